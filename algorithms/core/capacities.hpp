@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every size that the module's static memory is made of, in one place.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace polygmap {
+
+inline constexpr std::size_t kJointCount = 12;   // 6 per leg, left leg first
+inline constexpr std::size_t kJointsPerLeg = 6;  // hip roll, hip yaw, hip pitch, knee, ankle pitch, ankle roll
+inline constexpr std::size_t kFootCount = 2;
+inline constexpr std::size_t kContactsPerFoot = 4;
+inline constexpr std::size_t kContactCount = kFootCount * kContactsPerFoot;
+
+inline constexpr std::int32_t kDepthWidth_px = 640;  // the robot's camera
+inline constexpr std::int32_t kDepthHeight_px = 480;
+
+inline constexpr std::size_t kMaxPlanesPerFrame = 24;
+inline constexpr std::size_t kMaxPolygonVertices = 24;
+inline constexpr std::size_t kMaxMapPolygons = 64;
+
+inline constexpr std::size_t kStateRingCapacity = 256;  // 0.51 s at 500 Hz: covers LIO and camera delays with margin
+
+inline constexpr std::size_t kFootholdRasterSide_cells = 161;  // 1.6 m square at 10 mm, centred 0.4 m ahead of the base
+
+}  // namespace polygmap

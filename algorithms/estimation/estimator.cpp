@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/estimation/estimator.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+namespace {
+
+constexpr double kEncoderSlack_rad = 0.01;
+
+}  // namespace
+
+void Estimator::reset(const Params& params) noexcept {
+  params_ = params;
+  counters_ = {};
+  standstill_.reset(params.standstill);
+  contacts_.reset(params.contacts);
+  attitude_.reset(params.attitude);
+  base_.reset(params.base);
+  fusion_.reset(params.fusion);
+  ring_.clear();
+  state_ = {};
+  imu_ = {};
+  joints_ = {};
+  has_imu_ = has_joints_ = has_state_ = false;
+  legs_ = {};
+  touch_downs_ = {};
+  heights_ = {};
+  stood_ = {};
+  initial_odom_T_base_ = {};
+  initialised_ns_ = 0;
+}
+
+void Estimator::tick(const ImuSample& imu, const JointFeedback& joints,
+                     const std::array<bool, kFootCount>& planned_stance) noexcept {
+  ++counters_.ticks;
+  const bool new_imu = accept(imu);
+  const bool new_joints = accept(joints);
+  if (!has_imu_ || !has_joints_) return;
+  const std::int64_t now_ns = std::max(imu_.stamp_ns, joints_.stamp_ns);
+  if (has_state_ && now_ns <= state_.stamp_ns) return;
+  has_state_ = true;
+
+  for (TouchDown& touch_down : touch_downs_) touch_down.now = false;
+  if (new_joints) take_joints(planned_stance);
+  if (!state_.initialised) {
+    if (new_imu && new_joints) calibrate();
+    publish(now_ns, 0.0);
+    return;
+  }
+
+  double dt_s = seconds(now_ns - state_.stamp_ns);
+  if (dt_s > params_.max_step_s) {
+    ++counters_.gaps;
+    dt_s = params_.max_step_s;
+  }
+  attitude_.predict(imu_.gyro_radps, dt_s);
+  if (new_joints) attitude_.correct_by_feet({legs_[0].base_T_sole.R, legs_[1].base_T_sole.R}, contacts_.feet(), dt_s);
+  const Mat3& odom_R_base = attitude_.odom_R_base();
+  const Vec3 base_w_base_radps = imu_.gyro_radps - attitude_.gyro_bias_radps();
+  const ContactRows rows =
+      base_.make_rows(odom_R_base, base_w_base_radps, legs_, contacts_.feet(), touch_downs_, heights_, dt_s);
+  base_.predict(odom_R_base * imu_.accel_mps2 - Vec3{0, 0, attitude_.gravity_mps2()}, dt_s, rows);
+  if (new_joints) base_.correct(rows);
+  attitude_.correct_by_gravity(imu_.accel_mps2, base_.odom_v_base_mps(), dt_s, now_ns);
+  counters_.gravity_rejected = attitude_.gravity_rejected();
+  publish(now_ns, dt_s);
+  ring_.push(state_);
+}
+
+void Estimator::add_lio(const LioSample& sample, std::int64_t now_ns) noexcept {
+  LioVerdict verdict = fusion_.check(sample, now_ns);
+  if (verdict == LioVerdict::kAccepted) {
+    // Until initialised the base has not moved; where it stood in odom is known from then on (rebase).
+    StateEstimate then;
+    bool known = standstill_.collecting() && sample.stamp_ns >= standstill_.start_ns();
+    if (state_.initialised) {
+      if (known && sample.stamp_ns < initialised_ns_) {
+        then.odom_T_base = initial_odom_T_base_;
+      } else {
+        known = ring_.try_at(sample.stamp_ns, then);
+      }
+    }
+    verdict = known ? fusion_.fuse(sample, then.odom_T_base) : LioVerdict::kTooOld;
+  }
+  ++counters_.lio[static_cast<std::size_t>(verdict)];
+}
+
+void Estimator::set_tread_height(Foot foot, double odom_z_m, double sigma_m) noexcept {
+  KnownHeight& height = heights_[index_of(foot)];
+  height = {};
+  if (!state_.initialised || !std::isfinite(odom_z_m) || !(sigma_m > 0.0 && sigma_m < 1.0)) {
+    ++counters_.height_invalid;
+  } else if (std::abs(odom_z_m - state_.odom_T_sole[index_of(foot)].p_m.z()) > params_.max_height_error_m) {
+    ++counters_.height_rejected;
+  } else {
+    height = {odom_z_m, sigma_m};
+  }
+}
+
+bool Estimator::accept(const ImuSample& imu) noexcept {
+  if (!math::all_finite(imu.gyro_radps) || !math::all_finite(imu.accel_mps2) ||
+      imu.gyro_radps.cwiseAbs().maxCoeff() > params_.max_rate_radps ||
+      imu.accel_mps2.cwiseAbs().maxCoeff() > params_.max_accel_mps2) {
+    ++counters_.imu_invalid;
+    return false;
+  }
+  if (has_imu_ && imu.stamp_ns <= imu_.stamp_ns) {
+    ++counters_.imu_stale;
+    return false;
+  }
+  imu_ = imu;
+  has_imu_ = true;
+  return true;
+}
+
+bool Estimator::accept(const JointFeedback& joints) noexcept {
+  bool good = math::all_finite(joints.q_rad) && math::all_finite(joints.dq_radps) &&
+              joints.q_rad.cwiseAbs().maxCoeff() <= params_.max_joint_rad &&
+              joints.dq_radps.cwiseAbs().maxCoeff() <= params_.max_joint_speed_radps;
+  for (const double force_n : joints.foot_force_n) good = good && std::abs(force_n) <= params_.max_force_n;
+  if (!good) {
+    ++counters_.joints_invalid;
+    return false;
+  }
+  if (has_joints_ && joints.stamp_ns <= joints_.stamp_ns) {
+    ++counters_.joints_stale;
+    return false;
+  }
+  // The bound grows until the next accepted sample, so a true move is taken up again by itself.
+  const double most_rad =
+      kEncoderSlack_rad + params_.max_joint_speed_radps * seconds(joints.stamp_ns - joints_.stamp_ns);
+  if (has_joints_ && (joints.q_rad - joints_.q_rad).cwiseAbs().maxCoeff() > most_rad) {
+    ++counters_.joints_jump;
+    return false;
+  }
+  joints_ = joints;
+  for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
+  has_joints_ = true;
+  return true;
+}
+
+void Estimator::take_joints(const std::array<bool, kFootCount>& planned_stance) noexcept {
+  contacts_.update(joints_.foot_force_n, planned_stance, joints_.stamp_ns);
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    legs_[i] = measure_leg(params_.geometry, static_cast<Foot>(i), joints_.q_rad, joints_.dq_radps);
+    const FootContact& contact = contacts_.feet()[i];
+    if (stood_[i] && !contact.stands) heights_[i] = {};  // lifted: its tread's height is history
+    stood_[i] = contact.stands;
+    // The contact's place is that of the touch: by now the leg may have pushed on by some millimetres.
+    StateEstimate then;
+    touch_downs_[i].now = contact.landed && ring_.try_at(contact.touch_ns, then);
+    if (touch_downs_[i].now) touch_downs_[i].odom_T_sole = then.odom_T_sole[i];
+  }
+}
+
+void Estimator::calibrate() noexcept {
+  const bool still = standstill_.try_finish(imu_, joints_);
+  if (counters_.standstill_restarts != standstill_.restarts()) {
+    counters_.standstill_restarts = standstill_.restarts();
+    fusion_.reset(params_.fusion);  // what it averaged was another place
+  }
+  if (!standstill_.collecting()) return;
+
+  // Origin: the floor under the base, the soles at z = 0 in the mean, yaw 0.
+  initial_odom_T_base_ = {standstill_.odom_R_base(), Vec3::Zero()};
+  const JointVector q_rad = standstill_.q_rad();
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    const Transform sole = base_T_sole(params_.geometry, static_cast<Foot>(i), leg_joints(q_rad, static_cast<Foot>(i)));
+    initial_odom_T_base_.p_m.z() -= (initial_odom_T_base_.R * sole.p_m).z() / static_cast<double>(kFootCount);
+  }
+  if (!still) return;
+
+  attitude_.initialise(initial_odom_T_base_.R, standstill_.gyro_bias_radps(), standstill_.gravity_mps2(),
+                       {legs_[0].base_T_sole.R, legs_[1].base_T_sole.R});
+  heights_.fill({0.0, params_.floor_sigma_m});
+  // Feet not yet standing: the contacts begin where kinematics has them.
+  base_.initialise(initial_odom_T_base_.p_m,
+                   base_.make_rows(initial_odom_T_base_.R, Vec3::Zero(), legs_, {}, {}, {}, params_.max_step_s));
+  fusion_.rebase(initial_odom_T_base_);
+  initialised_ns_ = std::max(imu_.stamp_ns, joints_.stamp_ns);
+  state_.initialised = true;
+}
+
+void Estimator::publish(std::int64_t now_ns, double dt_s) noexcept {
+  const Vec3 before_m = state_.odom_T_base.p_m;
+  state_.stamp_ns = now_ns;
+  if (dt_s > 0.0) {
+    state_.odom_T_base = {attitude_.odom_R_base(), base_.odom_p_base_m()};
+    state_.odom_v_base_mps = base_.odom_v_base_mps();
+    state_.base_w_base_radps = imu_.gyro_radps - attitude_.gyro_bias_radps();
+    fusion_.tick(state_.odom_T_base, (state_.odom_T_base.p_m - before_m).norm(), dt_s);
+  } else {
+    state_.odom_T_base = initial_odom_T_base_;
+  }
+  state_.world_T_odom = fusion_.world_T_odom();
+  state_.q_rad = joints_.q_rad;
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    state_.odom_T_sole[i] = state_.odom_T_base * legs_[i].base_T_sole;
+    state_.contact_probability[i] = contacts_.feet()[i].probability;
+  }
+  state_.position_sigma_m.setConstant(fusion_.position_sigma_m());
+  state_.yaw_sigma_rad = fusion_.yaw_sigma_rad();
+  state_.lio_age_ns = fusion_.last_accepted_ns() < 0 ? -1 : now_ns - fusion_.last_accepted_ns();
+}
+
+}  // namespace polygmap

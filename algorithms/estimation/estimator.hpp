@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// State estimation as one stage: samples in, StateEstimate out, one call per 2 ms.
+#pragma once
+
+#include "algorithms/core/state.hpp"
+#include "algorithms/estimation/attitude_filter.hpp"
+#include "algorithms/estimation/base_filter.hpp"
+#include "algorithms/estimation/contacts.hpp"
+#include "algorithms/estimation/odometry_fusion.hpp"
+#include "algorithms/estimation/standstill.hpp"
+#include "algorithms/estimation/state_ring.hpp"
+
+namespace polygmap {
+
+class Estimator {
+ public:
+  struct Params {
+    LegGeometry geometry;
+    StandstillCalibration::Params standstill;
+    ContactEstimator::Params contacts;
+    AttitudeFilter::Params attitude;
+    BaseFilter::Params base;
+    OdometryFusion::Params fusion;
+    double max_rate_radps = 20.0;  // sensor samples beyond these are invalid
+    double max_accel_mps2 = 100.0;
+    double max_joint_rad = 4.0;
+    double max_joint_speed_radps = 15.0;  // also against the last sample: a single wrong angle is not a motion
+    double max_force_n = 5000.0;
+    double max_step_s = 0.05;          // a longer gap is bridged with this much time
+    double max_height_error_m = 0.03;  // of a tread against the sole on it
+    double floor_sigma_m = 0.003;      // of the floor under the feet at the start
+  };
+  struct Counters {
+    std::uint32_t ticks = 0;
+    std::uint32_t imu_invalid = 0;  // not finite or out of range
+    std::uint32_t imu_stale = 0;    // no newer stamp than the last
+    std::uint32_t joints_invalid = 0;
+    std::uint32_t joints_stale = 0;
+    std::uint32_t joints_jump = 0;  // moved faster than a joint can
+    std::uint32_t gaps = 0;         // longer than max_step_s
+    std::uint32_t standstill_restarts = 0;
+    std::uint32_t gravity_rejected = 0;
+    std::uint32_t height_invalid = 0;
+    std::uint32_t height_rejected = 0;  // disagreed by more than max_height_error_m
+    std::array<std::uint32_t, kLioVerdictCount> lio{};
+    [[nodiscard]] std::uint32_t lio_of(LioVerdict verdict) const noexcept {
+      return lio[static_cast<std::size_t>(verdict)];
+    }
+  };
+
+  void reset(const Params& params) noexcept;
+
+  // One tick. planned_stance: the feet the gait believes to stand. A bad or stale sample is counted; the other one
+  // still counts, and the last good rates carry the state on.
+  void tick(const ImuSample& imu, const JointFeedback& joints,
+            const std::array<bool, kFootCount>& planned_stance) noexcept;
+  // A pose as it arrives. Counted by its verdict.
+  void add_lio(const LioSample& sample, std::int64_t now_ns) noexcept;
+  // At touch-down, once: height in odom of the tread under that foot as the map has it, until the foot lifts.
+  void set_tread_height(Foot foot, double odom_z_m, double sigma_m) noexcept;
+
+  [[nodiscard]] const StateEstimate& state() const noexcept { return state_; }
+  // The state at a stamp of the last half second. False, and out untouched, outside or before initialisation.
+  [[nodiscard]] bool try_state_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {
+    return ring_.try_at(stamp_ns, out);
+  }
+  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+  [[nodiscard]] const Vec3& gyro_bias_radps() const noexcept { return attitude_.gyro_bias_radps(); }
+  [[nodiscard]] const BaseFilter& base_filter() const noexcept { return base_; }
+
+ private:
+  [[nodiscard]] bool accept(const ImuSample& imu) noexcept;
+  [[nodiscard]] bool accept(const JointFeedback& joints) noexcept;
+  void take_joints(const std::array<bool, kFootCount>& planned_stance) noexcept;
+  void calibrate() noexcept;
+  void publish(std::int64_t now_ns, double dt_s) noexcept;
+
+  Params params_;
+  Counters counters_;
+  StandstillCalibration standstill_;
+  ContactEstimator contacts_;
+  AttitudeFilter attitude_;
+  BaseFilter base_;
+  OdometryFusion fusion_;
+  StateRing ring_;
+  StateEstimate state_;
+  ImuSample imu_;         // last accepted
+  JointFeedback joints_;  // last accepted
+  bool has_imu_ = false;
+  bool has_joints_ = false;
+  bool has_state_ = false;
+  std::array<LegMeasurement, kFootCount> legs_;
+  std::array<TouchDown, kFootCount> touch_downs_;
+  std::array<KnownHeight, kFootCount> heights_;
+  std::array<bool, kFootCount> stood_{};
+  Transform initial_odom_T_base_;  // stood still there until initialised_ns_
+  std::int64_t initialised_ns_ = 0;
+};
+
+}  // namespace polygmap

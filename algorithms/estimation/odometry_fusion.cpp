@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/estimation/odometry_fusion.hpp"
+
+#include <algorithm>
+
+#include "algorithms/geometry/so3.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr double kMaxCoordinate_m = 1e5;
+constexpr double kOrthonormalTolerance = 1e-3;
+
+bool plausible_sigma(const Vec3& sigma, double max) noexcept {
+  return math::all_finite(sigma) && sigma.minCoeff() >= 0.0 && sigma.maxCoeff() <= max;
+}
+double stated_or(double stated, double otherwise) noexcept { return stated > 0.0 ? stated : otherwise; }
+
+// A low-pass of gain g lets g^2 of a new value's variance in and keeps (1 - g)^2 of the old.
+double blended_sigma(double old_sigma, double new_sigma, double gain) noexcept {
+  return math::sqrt(math::square((1.0 - gain) * old_sigma) + math::square(gain * new_sigma));
+}
+double share_within(double length, double limit) noexcept { return length > limit ? limit / length : 1.0; }
+
+}  // namespace
+
+Transform base_from_lidar(const Transform& lio_T_lidar, const Transform& base_T_lidar) noexcept {
+  return lio_T_lidar * base_T_lidar.inverse();
+}
+
+double complementary_gain(double dt_s, double tau_s) noexcept { return dt_s / (tau_s + dt_s); }
+
+Transform fuse_pose(const Transform& world_T_base, const Transform& lio_world_T_base, double gain) noexcept {
+  const Vec3 turn_rad = so3_log(world_T_base.R.transpose() * lio_world_T_base.R);  // eq. (7)
+  return {world_T_base.R * so3_exp(gain * turn_rad),                               // eq. (8)
+          (1.0 - gain) * world_T_base.p_m + gain * lio_world_T_base.p_m};          // eq. (6)
+}
+
+void OdometryFusion::reset(const Params& params) noexcept {
+  *this = OdometryFusion{};
+  params_ = params;
+  sigma_m_ = params.initial_sigma_m;
+  sigma_rad_ = params.initial_sigma_rad;
+}
+
+LioVerdict OdometryFusion::check(const LioSample& sample, std::int64_t now_ns) const noexcept {
+  if (!math::all_finite(sample.lio_T_lidar.R) || !math::all_finite(sample.lio_T_lidar.p_m) ||
+      sample.lio_T_lidar.p_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) {
+    return LioVerdict::kNonFinite;
+  }
+  if (!is_rotation(sample.lio_T_lidar.R, kOrthonormalTolerance)) return LioVerdict::kNotRotation;
+  if (!plausible_sigma(sample.position_sigma_m, params_.max_position_sigma_m) ||
+      !plausible_sigma(sample.rotation_sigma_rad, params_.max_rotation_sigma_rad)) {
+    return LioVerdict::kCovariance;
+  }
+  if (sample.stamp_ns > now_ns) return LioVerdict::kFuture;
+  if (sample.stamp_ns <= last_stamp_ns_) return LioVerdict::kOrder;
+  if (seconds(now_ns - sample.stamp_ns) > params_.max_age_s) return LioVerdict::kTooOld;
+  return LioVerdict::kAccepted;
+}
+
+LioVerdict OdometryFusion::fuse(const LioSample& sample, const Transform& odom_T_base) noexcept {
+  last_stamp_ns_ = sample.stamp_ns;
+  const Transform lidar{so3_renormalised(sample.lio_T_lidar.R), sample.lio_T_lidar.p_m};
+  const Transform lio_T_base = base_from_lidar(lidar, params_.base_T_lidar);
+  if (count_ == 0) {
+    lio_T_odom_ = lio_T_base * odom_T_base.inverse();
+    count_ = 1;
+    last_accepted_ns_ = sample.stamp_ns;
+    return LioVerdict::kAccepted;
+  }
+
+  const double silence_s = seconds(sample.stamp_ns - last_accepted_ns_);
+  const Transform predicted = lio_T_odom_ * odom_T_base;
+  if (is_jump(predicted, lio_T_base, silence_s)) {
+    if (!try_realign(lio_T_base, odom_T_base)) return LioVerdict::kJump;
+    last_accepted_ns_ = sample.stamp_ns;
+    return LioVerdict::kRealigned;
+  }
+  jumped_count_ = 0;
+  last_accepted_ns_ = sample.stamp_ns;
+
+  const double gain = complementary_gain(std::min(silence_s, params_.max_gap_s), params_.tau_s);
+  if (aligned_) {
+    lio_T_odom_ = fuse_pose(predicted, lio_T_base, gain) * odom_T_base.inverse();
+    narrow_sigmas(sample, gain);
+  } else {
+    const double averaging = 1.0 / static_cast<double>(++count_);
+    lio_T_odom_ = fuse_pose(predicted, lio_T_base, averaging) * odom_T_base.inverse();
+    if (averaging <= gain) {
+      aligned_ = true;
+      world_T_lio_ = lio_T_odom_.inverse();
+    }
+  }
+  lio_T_odom_.R = so3_renormalised(lio_T_odom_.R);
+  return LioVerdict::kAccepted;
+}
+
+void OdometryFusion::rebase(const Transform& new_T_old) noexcept {
+  lio_T_odom_ = lio_T_odom_ * new_T_old.inverse();
+  if (aligned_) world_T_lio_ = lio_T_odom_.inverse();
+  jumped_count_ = 0;
+}
+
+void OdometryFusion::tick(const Transform& odom_T_base, double travelled_m, double dt_s) noexcept {
+  sigma_m_ += params_.drift_per_m * travelled_m;
+  sigma_rad_ += params_.drift_yaw_radps * dt_s;
+  const Transform wanted = target() * odom_T_base;
+  const Transform now = world_T_odom_ * odom_T_base;
+  const Vec3 move_m = wanted.p_m - now.p_m;
+  const Vec3 turn_rad = so3_log(wanted.R * now.R.transpose());
+  const double move_share = share_within(move_m.norm(), params_.slew_m);
+  const double turn_share = share_within(turn_rad.norm(), params_.slew_rad);
+  if (move_share >= 1.0 && turn_share >= 1.0) {
+    world_T_odom_ = target();
+    return;
+  }
+  const Transform next{so3_renormalised(so3_exp(turn_share * turn_rad) * now.R), now.p_m + move_share * move_m};
+  world_T_odom_ = next * odom_T_base.inverse();
+}
+
+bool OdometryFusion::is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept {
+  const double bound_m = std::min(params_.jump_m + params_.jump_growth_mps * silence_s, params_.max_jump_m);
+  const double bound_rad = std::min(params_.jump_rad + params_.jump_growth_radps * silence_s, params_.max_jump_rad);
+  return (measured.p_m - predicted.p_m).norm() > bound_m ||
+         so3_log(predicted.R.transpose() * measured.R).norm() > bound_rad;
+}
+
+bool OdometryFusion::try_realign(const Transform& lio_T_base, const Transform& odom_T_base) noexcept {
+  const bool agrees = jumped_count_ > 0 && !is_jump(jumped_lio_T_odom_ * odom_T_base, lio_T_base, 0.0);
+  jumped_count_ = agrees ? jumped_count_ + 1 : 1;
+  const Transform before = agrees ? jumped_lio_T_odom_ * odom_T_base : lio_T_base;
+  jumped_lio_T_odom_ = fuse_pose(before, lio_T_base, 1.0 / static_cast<double>(jumped_count_)) * odom_T_base.inverse();
+  jumped_lio_T_odom_.R = so3_renormalised(jumped_lio_T_odom_.R);
+  const bool first_pose_contradicted = !aligned_ && count_ == 1;
+  if (jumped_count_ < params_.realign_count && !first_pose_contradicted) return false;
+  if (aligned_) {
+    world_T_lio_ = target() * jumped_lio_T_odom_.inverse();  // our world stays where it is
+  } else {
+    count_ = jumped_count_;
+  }
+  lio_T_odom_ = jumped_lio_T_odom_;
+  jumped_count_ = 0;
+  return true;
+}
+
+void OdometryFusion::narrow_sigmas(const LioSample& sample, double gain) noexcept {
+  const double rotation_rad = stated_or(sample.rotation_sigma_rad.maxCoeff(), params_.default_rotation_sigma_rad);
+  const double lidar_m = stated_or(sample.position_sigma_m.maxCoeff(), params_.default_position_sigma_m);
+  const double lever_m = params_.base_T_lidar.p_m.norm() * rotation_rad;
+  sigma_m_ = blended_sigma(sigma_m_, math::sqrt(math::square(lidar_m) + math::square(lever_m)), gain);
+  sigma_rad_ = blended_sigma(sigma_rad_, rotation_rad, gain);
+}
+
+Transform OdometryFusion::target() const noexcept { return aligned_ ? world_T_lio_ * lio_T_odom_ : Transform{}; }
+
+}  // namespace polygmap

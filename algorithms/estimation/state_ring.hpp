@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// The last half second of states, so that late data meets the pose of its own stamp.
+#pragma once
+
+#include "algorithms/core/ring_buffer.hpp"
+#include "algorithms/core/state.hpp"
+
+namespace polygmap {
+
+class StateRing {
+ public:
+  void clear() noexcept { states_.clear(); }
+  // Stamps must increase: an older or equal one is not stored.
+  void push(const StateEstimate& state) noexcept;
+  [[nodiscard]] bool empty() const noexcept { return states_.empty(); }
+  [[nodiscard]] std::int64_t oldest_ns() const noexcept { return states_.oldest().stamp_ns; }
+  [[nodiscard]] std::int64_t newest_ns() const noexcept { return states_.newest().stamp_ns; }
+  // The state at a stamp between the oldest and the newest: linear in positions and joints, constant rotation rate
+  // between ticks. False, and out untouched, outside.
+  [[nodiscard]] bool try_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept;
+
+ private:
+  RingBuffer<StateEstimate, kStateRingCapacity> states_;
+};
+
+}  // namespace polygmap

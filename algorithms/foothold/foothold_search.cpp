@@ -1,0 +1,385 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/foothold/foothold_search.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// The raster reaches g_range ahead of the base: it is centred this far ahead.
+constexpr double kCentreAhead_m = 0.4;
+// A riser or nosing this far behind a nosing bounds that tread; nearer is the tread's own, farther another one's.
+constexpr double kNearestBack_m = 0.05, kFarthestBack_m = 0.8;
+constexpr double kFacing = 0.7;  // cosine: an upright surface that the robot looks at
+
+bool valid(const FootholdSearch::Query& q) noexcept {
+  const auto finite = [](const Transform& t) { return math::all_finite(t.R) && math::all_finite(t.p_m); };
+  return finite(q.world_T_base) && finite(q.world_T_sole[0]) && finite(q.world_T_sole[1]) &&
+         q.world_T_base.p_m.cwiseAbs().maxCoeff() < 1e6;
+}
+
+}  // namespace
+
+void FootholdSearch::begin(const MapSnapshot& map, const Query& query) noexcept {
+  if (stage_ != Stage::kIdle) ++counters_.abandoned;
+  stage_ = Stage::kIdle;
+  if (!valid(query)) {
+    ++counters_.rejected_queries;
+    return;
+  }
+  map_ = map;
+  query_ = query;
+  base_ = PlanFrame(query.world_T_base);
+  sole_ = PlanFrame(query.world_T_sole[index_of(query.stance)]);
+  z_foot_ = z_foot_m(query.world_T_sole[index_of(query.stance)]);
+  pending_ = {};
+  pending_.map_stamp_ns = map.stamp_ns;
+  levels_.clear();
+  uprights_.clear();
+  unconfirmed_ahead_ = has_p_star_cell_ = false;
+  next_ = next_next_ = kNone;
+  next_distance2_m2_ = p_star_distance2_m2_ = p_star_star_distance2_m2_ = kInfinity;
+  top_cells_ = top_cells_seen_ = 0;
+  raster_.centre_on(base_.origin_m() + kCentreAhead_m * base_.heading(), params_.g_res_m);
+  index_ = 0;
+  row_ = 0;
+  stage_ = Stage::kPrepare;
+}
+
+Progress FootholdSearch::step(WorkBudget& budget) noexcept {
+  if (stage_ == Stage::kIdle) return Progress::kIdle;
+  // Runs piece(row) for the next row and moves on after the last.
+  const auto rows = [this](auto&& piece, Stage next) {
+    piece(row_);
+    if (++row_ < FootholdRaster::kSide) return;
+    row_ = 0;
+    stage_ = next;
+  };
+  while (!budget.exhausted()) {
+    budget.spend(1);
+    switch (stage_) {
+      case Stage::kPrepare:
+        if (index_ < map_.polygons.size()) {
+          prepare_one(map_.polygons[index_++]);
+        } else {
+          index_ = 0;
+          stage_ = Stage::kLink;
+        }
+        break;
+      case Stage::kLink:
+        if (index_ < levels_.size()) {
+          link(index_++);
+        } else {
+          stage_ = Stage::kRaster;
+        }
+        break;
+      case Stage::kRaster:
+        rows([this](std::int32_t row) { raster_row(row); }, Stage::kErode);
+        break;
+      case Stage::kErode:
+        rows([this](std::int32_t row) { erode_row(row); }, Stage::kChoose);
+        break;
+      case Stage::kChoose:
+        choose();
+        stage_ = pending_.has_p_star ? Stage::kLookAhead : Stage::kFinish;
+        break;
+      case Stage::kLookAhead:
+        rows([this](std::int32_t row) { look_ahead_row(row); }, Stage::kFinish);
+        break;
+      case Stage::kFinish:
+        finish();
+        stage_ = Stage::kIdle;
+        return Progress::kDone;
+      case Stage::kIdle:
+        return Progress::kIdle;
+    }
+  }
+  return Progress::kBusy;
+}
+
+void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
+  const SurfacePatch& surface = polygon.surface;
+  const bool confirmed = polygon.sightings >= params_.confirmed_sightings;
+  if (surface.kind == SurfaceKind::kTread && surface.area_m2 >= params_.area_min_m2) {
+    LevelSurface level;
+    if (!prepare(polygon, yaw_of(query_.world_T_base.R), level)) return;
+    if (confirmed) {
+      (void)levels_.try_push_back(level);  // as many as the map holds
+    } else if (level.height_m > z_foot_ + params_.delta_foot_m &&
+               in_range(base_(centroid_m(level.hull)), params_.g_range_m)) {
+      unconfirmed_ahead_ = true;
+    }
+  }
+  if (surface.kind == SurfaceKind::kRiser && confirmed) {
+    const Vec2 outward = surface.normal.head<2>().normalized();
+    Upright upright{surface.centroid_m.head<2>(), left_of(outward), outward, 0.0, 0.0, kInfinity, -kInfinity};
+    for (const Vec3& v : surface.polygon) {
+      const double along_m = upright.direction.dot(v.head<2>() - upright.point_m);
+      upright.reach_left_m = std::max(upright.reach_left_m, along_m);
+      upright.reach_right_m = std::min(upright.reach_right_m, along_m);
+      upright.bottom_m = std::min(upright.bottom_m, v.z());
+      upright.top_m = std::max(upright.top_m, v.z());
+    }
+    (void)uprights_.try_push_back(upright);
+  }
+}
+
+// What the toe must not reach: the next tread's nosing and the next riser, beside the tread's own back edge.
+void FootholdSearch::link(std::size_t i) noexcept {
+  LevelSurface& tread = levels_[i];
+  if (!tread.has_nosing) return;
+  for (std::size_t j = 0; j < levels_.size(); ++j) {
+    const LevelSurface& other = levels_[j];
+    const double rise_m = other.height_m - tread.height_m;
+    if (j == i || !other.has_nosing || rise_m < params_.delta_foot_m) continue;
+    add_toe_limit(tread, other.nosing_middle_m(), other.left, kNearestBack_m, kFarthestBack_m);
+  }
+  for (const Upright& upright : uprights_) {
+    if (upright.top_m < tread.height_m + params_.delta_foot_m || upright.outward.dot(tread.heading) > -kFacing)
+      continue;
+    add_toe_limit(tread, upright.point_m, upright.direction, kNearestBack_m, kFarthestBack_m);
+  }
+}
+
+void FootholdSearch::raster_row(std::int32_t row) noexcept {
+  raster_.clear_row(row);
+  for (std::size_t i = 0; i < levels_.size(); ++i) raster_.add_row(row, levels_[i], static_cast<std::uint8_t>(i));
+
+  for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
+    FootholdRaster::Cell& cell = raster_(column, row);
+    const Vec2 p = raster_.at(column, row);
+    const Vec2 sole_p = sole_(p);
+    if (sole_p.x() >= params_.top_from_m && sole_p.x() <= params_.top_to_m &&
+        std::abs(sole_p.y()) <= params_.top_half_width_m) {
+      ++top_cells_;
+      if (in_sole_layer(cell.z_m, z_foot_, params_.delta_foot_m)) ++top_cells_seen_;  // eq. (28)
+    }
+    if (cell.layer == FootholdRaster::kNoLayer) continue;
+    const Vec2 base_p = base_(p);
+    if (!in_range(base_p, params_.g_range_m)) {  // eq. (20)
+      cell = {};
+      continue;
+    }
+    // What comes next is decided before the height limit and the erosion: an obstacle is not skipped over.
+    if (cell.z_m > z_foot_ + params_.delta_foot_m && std::abs(base_p.y()) <= params_.corridor_half_width_m &&
+        base_p.squaredNorm() < next_distance2_m2_) {
+      next_distance2_m2_ = base_p.squaredNorm();
+      next_ = cell.layer;
+    }
+    if (!below_limit(cell.z_m, z_foot_, params_.g_z_m)) cell = {};  // eq. (23)
+  }
+}
+
+bool FootholdSearch::fits(const FootholdRaster::Cell& cell) const noexcept {
+  // A cell survives when a foot may fit somewhere in it: half its diagonal is forgiven here and not in the refinement.
+  const double least_m = params_.clearance_min_m - params_.g_res_m * std::numbers::sqrt2 / 2.0;
+  return cell.layer != FootholdRaster::kNoLayer && cell.clearance_m >= least_m && cell.toe_clearance_m >= least_m;
+}
+
+// Erosion of each layer, eqs (24)-(25). A layer is a mapped surface, since the map has already put together what lies
+// within its height gate; floor(z / 1 mm) would split a noisy or tilted tread. The structuring element is the contact
+// rectangle at the tread's yaw, exact, instead of N pixels in all directions (13 of them leave nothing of a 0.28 m
+// tread).
+void FootholdSearch::erode_row(std::int32_t row) noexcept {
+  for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
+    FootholdRaster::Cell& cell = raster_(column, row);
+    if (cell.layer == FootholdRaster::kNoLayer) continue;
+    const LevelSurface& surface = levels_[cell.layer];
+    const Vec2 p = raster_.at(column, row);
+    cell.clearance_m = static_cast<float>(surface.contact_clearance_m(p));
+    cell.toe_clearance_m = static_cast<float>(surface.toe_clearance_m(p));
+    if (!fits(cell)) continue;
+    ++pending_.candidate_cells;
+    // Eq. (26), on the tread that comes next.
+    const double distance2 = (p - base_.origin_m()).squaredNorm();
+    if (cell.layer == next_ && cell.z_m > z_foot_ + params_.delta_foot_m && distance2 < p_star_distance2_m2_) {
+      p_star_distance2_m2_ = distance2;
+      p_star_cell_m_ = p;
+      has_p_star_cell_ = true;
+    }
+  }
+}
+
+// Sole origin behind the nosing for a foot between two lateral positions: centred between heel and toe limits, but not
+// deep into a long tread.
+double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, double right_m) const noexcept {
+  const double heel_m = -kContactRectangle.heel_x_m;
+  double room_m = 2.0 * params_.heel_inset_m;
+  if (!tread.toe.empty()) {
+    room_m = kInfinity;
+    for (const FootLimit& limit : tread.toe) {
+      for (const double lateral_m : {left_m, right_m}) {
+        const double closing = -limit.inside.inward.dot(tread.heading);  // over 0.86, see add_toe_limit
+        room_m = std::min(room_m, limit.clearance_m(tread.at(heel_m, lateral_m)) / closing);
+      }
+    }
+  }
+  // A tread that ends in nothing ends all the same: the next riser may be there and not be seen.
+  if (tread.far_end_m) room_m = std::min(room_m, *tread.far_end_m - heel_m - kCollisionRectangle.toe_x_m);
+  return heel_m + math::clamp(0.5 * room_m, 0.0, params_.heel_inset_max_m);
+}
+
+Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept {
+  const Vec2 p = tread.at(along_m, lateral_m);
+  Foothold out;
+  out.position_m = {p.x(), p.y(), tread.plane.height_m(p)};
+  out.yaw_rad = tread.yaw_rad;
+  out.clearance_m = tread.contact_clearance_m(p);
+  out.toe_clearance_m = tread.toe_clearance_m(p);
+  out.polygon_id = tread.id;
+  out.last_seen_ns = tread.last_seen_ns;
+  out.nosing_distance_m = along_m;
+  return out;
+}
+
+// Where the middle between the feet should be: in the middle of the tread when both its sides are known, without
+// veering on the way up; otherwise where the robot is.
+double FootholdSearch::middle_m(const LevelSurface& tread) const noexcept {
+  const double own_m = 0.5 * (tread.lateral_m(query_.world_T_sole[0].p_m.head<2>()) +
+                              tread.lateral_m(query_.world_T_sole[1].p_m.head<2>()));
+  if (!tread.left_end_m || !tread.right_end_m) return own_m;
+  const double centre_m = 0.5 * (*tread.left_end_m + *tread.right_end_m);
+  if (!query_.climbing) return centre_m;
+  return math::clamp(centre_m, own_m - params_.veer_max_m, own_m + params_.veer_max_m);
+}
+
+// Both soles side by side on the tread, as near to that middle as the sides allow, closer together when they must.
+bool FootholdSearch::place_feet(const LevelSurface& tread) noexcept {
+  const double middle_m = this->middle_m(tread);
+  constexpr int kSpacings = 7;
+  for (int i = 0; i < kSpacings; ++i) {
+    const double half_m = params_.half_spacing_m - (params_.half_spacing_m - params_.half_spacing_min_m) *
+                                                       static_cast<double>(i) / (kSpacings - 1);
+    const double along_m = aim_along_m(tread, middle_m + half_m, middle_m - half_m);
+    double low_m = -kInfinity, high_m = kInfinity;
+    for (const FootLimit& edge : tread.edges) {
+      if (!edge.side) continue;
+      // Clearance of the foot nearer to the edge is base + inward . left * middle.
+      const double across = edge.inside.inward.dot(tread.left);
+      const double base_m = edge.clearance_m(tread.at(along_m, 0.0)) - half_m * std::abs(across);
+      const double bound_m = (params_.side_margin_m - base_m) / across;
+      (across > 0.0 ? low_m : high_m) = across > 0.0 ? std::max(low_m, bound_m) : std::min(high_m, bound_m);
+    }
+    if (low_m > high_m) continue;
+    const double placed_m = std::min(std::max(middle_m, low_m), high_m);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      pending_.p_star_feet[index_of(foot)] = foothold_at(tread, along_m, placed_m + side_sign(foot) * half_m);
+    }
+    return true;
+  }
+  return false;
+}
+
+TreadView FootholdSearch::view_of(const LevelSurface& tread) const noexcept {
+  return {tread.id,         tread.height_m, tread.yaw_rad,       tread.nosing_a_m,
+          tread.nosing_b_m, tread.depth_m,  tread.nosing_sigma_m};
+}
+
+// The riser beneath a mapped tread: the tread says how high it is. Seen from close above, a riser's own ends are the
+// worst known part of the map: 0.12 m of riser measured 0.21 m.
+bool FootholdSearch::carries(const Upright& riser, const LevelSurface& tread) noexcept {
+  constexpr double kMaxNosing_m = 0.06, kTolerance_m = 0.02;
+  if (!tread.has_nosing) return false;
+  const double behind_m = tread.along_m(riser.point_m);
+  return behind_m >= -kTolerance_m && behind_m <= kMaxNosing_m + kTolerance_m;
+}
+
+// A face that rises from the level the robot stands on higher than it may climb, before the next tread.
+bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) const noexcept {
+  const Vec2 sole_p_m = base_(sole_.origin_m());
+  const double farthest_m =
+      std::min(query_.climbing ? sole_p_m.x() + params_.step_max_m : params_.g_range_m, next_distance_m + 0.1);
+  for (const Upright& u : uprights_) {
+    if (u.top_m - z_foot_ <= params_.rise_max_m || u.bottom_m > z_foot_ + 2.0 * params_.delta_foot_m) continue;
+    if (u.outward.dot(base_.heading()) > -kFacing) continue;
+    if (next_ != kNone && carries(u, levels_[next_])) continue;
+    const Vec2 a = base_(u.point_m + u.reach_left_m * u.direction);
+    const Vec2 b = base_(u.point_m + u.reach_right_m * u.direction);
+    const double gap_m = std::max(std::min(a.y(), b.y()), -std::max(a.y(), b.y()));
+    const double x_m = 0.5 * (a.x() + b.x());
+    if (gap_m > params_.top_half_width_m || x_m < 0.0 || x_m > farthest_m) continue;
+    top_m = u.top_m;
+    return true;
+  }
+  return false;
+}
+
+Obstruction FootholdSearch::without_next() const noexcept {
+  if (unconfirmed_ahead_) return Obstruction::kNothingSeen;
+  if (!query_.climbing) return Obstruction::kNoStaircase;
+  // Nothing higher is known: is that because nothing rises there, or because nobody looked?
+  const bool looked = static_cast<double>(top_cells_seen_) >= params_.top_fraction * static_cast<double>(top_cells_);
+  return looked ? Obstruction::kTop : Obstruction::kNothingSeen;
+}
+
+Obstruction FootholdSearch::judge_next() noexcept {
+  const LevelSurface& tread = levels_[next_];
+  pending_.measured_rise_m = tread.height_m - z_foot_;
+  pending_.measured_tread_m = tread.depth_m;
+  pending_.tread = view_of(tread);
+  if (pending_.measured_rise_m > params_.rise_max_m) return Obstruction::kRiseTooHigh;
+  if (!tread.has_nosing) return Obstruction::kNothingSeen;
+  if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return Obstruction::kTreadTooShort;
+  if (!place_feet(tread)) return Obstruction::kTooNarrow;
+  const Foothold& foot = pending_.p_star_feet[index_of(query_.stance)];
+  if (query_.climbing) {
+    if (foot.nosing_distance_m - tread.along_m(sole_.origin_m()) > params_.step_max_m)
+      return without_next();  // another flight
+  }
+  for (const Foothold& f : pending_.p_star_feet) {
+    // Reaching over the end of what has been seen of it.
+    if (f.clearance_m < params_.clearance_min_m || f.toe_clearance_m < params_.clearance_min_m) {
+      return Obstruction::kNothingSeen;
+    }
+  }
+  return has_p_star_cell_ ? Obstruction::kNone : Obstruction::kNothingSeen;
+}
+
+void FootholdSearch::choose() noexcept {
+  double top_m = 0.0;
+  if (map_.stamp_ns == 0 || (levels_.empty() && uprights_.empty())) {
+    pending_.obstruction = Obstruction::kNothingSeen;
+  } else if (blocked_by_upright(math::sqrt(next_distance2_m2_), top_m)) {
+    pending_.obstruction = Obstruction::kRiseTooHigh;
+    pending_.measured_rise_m = top_m - z_foot_;
+  } else {
+    pending_.obstruction = next_ == kNone ? without_next() : judge_next();
+  }
+  if (pending_.obstruction != Obstruction::kNone) return;
+
+  const LevelSurface& tread = levels_[next_];
+  const double lateral_m = tread.lateral_m(p_star_cell_m_);
+  pending_.p_star = foothold_at(tread, aim_along_m(tread, lateral_m, lateral_m), lateral_m);
+  pending_.has_p_star = true;
+  pending_.theta_rel_rad = relative_bearing_rad(query_.world_T_base, pending_.p_star.position_m.head<2>());
+}
+
+// p**: the candidate nearest to p* that is higher by more than delta_foot.
+void FootholdSearch::look_ahead_row(std::int32_t row) noexcept {
+  for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
+    const FootholdRaster::Cell& cell = raster_(column, row);
+    if (!fits(cell) || cell.z_m <= pending_.p_star.position_m.z() + params_.delta_foot_m) continue;
+    const Vec2 p = raster_.at(column, row);
+    const double distance2 = (p - pending_.p_star.position_m.head<2>()).squaredNorm();
+    if (distance2 >= p_star_star_distance2_m2_) continue;
+    p_star_star_distance2_m2_ = distance2;
+    p_star_star_cell_m_ = p;
+    next_next_ = cell.layer;
+  }
+}
+
+void FootholdSearch::finish() noexcept {
+  if (next_next_ != kNone && levels_[next_next_].has_nosing) {
+    const LevelSurface& tread = levels_[next_next_];
+    const double lateral_m = tread.lateral_m(p_star_star_cell_m_);
+    pending_.p_star_star = foothold_at(tread, aim_along_m(tread, lateral_m, lateral_m), lateral_m);
+    pending_.has_p_star_star = true;
+    pending_.next_tread = view_of(tread);
+  }
+  if (map_.stamp_ns != 0 && query_.now_ns - map_.stamp_ns > params_.stale_after_ns) {
+    pending_.obstruction = Obstruction::kMapStale;
+  }
+  result_ = pending_;
+  ++counters_.searches;
+}
+
+}  // namespace polygmap

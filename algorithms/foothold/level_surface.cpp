@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/foothold/level_surface.hpp"
+
+#include <limits>
+
+namespace polygmap {
+namespace {
+
+// How far a foot of that yaw reaches from its sole origin against the inward normal of an edge.
+double reach_m(const SoleRectangle& foot, const Vec2& heading, const Vec2& inward) noexcept {
+  const double ahead = inward.dot(heading);
+  return std::max(-ahead * foot.toe_x_m, -ahead * foot.heel_x_m) + foot.half_width_m * std::abs(cross(heading, inward));
+}
+
+double least(double clearance, const auto& limits, const Vec2& p_m) noexcept {
+  for (const FootLimit& limit : limits) clearance = std::min(clearance, limit.clearance_m(p_m));
+  return clearance;
+}
+
+constexpr double kSide = 0.2;  // sine of an edge's turn against the nosing from which it bounds a side
+constexpr double kParallel = 0.95, kAcross = 0.2;  // cosines of turns against the heading: a side, a far end
+constexpr double kEndMin_m = 0.08;
+
+// The ends that were seen, at the middle of their edges.
+void note_ends(const SurfacePatch& surface, LevelSurface& out) noexcept {
+  if (!out.has_nosing) return;
+  const std::size_t n = surface.polygon.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    if (surface.edges[i] != EdgeKind::kObserved) continue;
+    const Vec2 a = surface.polygon[i].head<2>(), b = surface.polygon[i + 1 < n ? i + 1 : 0].head<2>();
+    const double length_m = math::sqrt((b - a).squaredNorm());
+    if (length_m < kEndMin_m) continue;
+    const Vec2 middle_m = 0.5 * (a + b);
+    const double turn = std::abs(out.heading.dot(b - a)) / length_m;  // cosine against the heading
+    if (turn > kParallel) {
+      (out.lateral_m(middle_m) > 0.0 ? out.left_end_m : out.right_end_m) = out.lateral_m(middle_m);
+    } else if (turn < kAcross && out.along_m(middle_m) > kEndMin_m) {
+      out.far_end_m = out.along_m(middle_m);
+    }
+  }
+}
+
+}  // namespace
+
+double LevelSurface::contact_clearance_m(const Vec2& p_m) const noexcept {
+  return least(std::numeric_limits<double>::infinity(), edges, p_m);
+}
+double LevelSurface::toe_clearance_m(const Vec2& p_m) const noexcept {
+  return least(std::numeric_limits<double>::infinity(), toe, p_m);
+}
+
+bool prepare(const MapPolygon& polygon, double base_yaw_rad, LevelSurface& out) noexcept {
+  const SurfacePatch& surface = polygon.surface;
+  out = {};
+  out.id = polygon.id;
+  out.last_seen_ns = polygon.last_seen_ns;
+  out.plane = {surface.normal, surface.d_m};
+  ConvexPolygon plan;  // eq. (14): z = 0
+  for (const Vec3& v : surface.polygon) (void)plan.try_push_back(v.head<2>());
+  out.hull = convex_hull(plan);
+  out.box = bounding_box(out.hull);
+  if (!(area_m2(out.hull) > 0.0) || !(std::abs(surface.normal.z()) > 0.5)) return false;
+  const Vec2 centre = centroid_m(out.hull);
+
+  out.has_nosing = surface.nosing.valid;
+  const EdgeLine& line = surface.nosing.valid ? surface.nosing : surface.back;
+  out.yaw_rad = base_yaw_rad;
+  if (line.valid) {
+    const Vec2 along = (line.b_m - line.a_m).head<2>();
+    const double into = (out.has_nosing ? 1.0 : -1.0) * cross(along, centre - line.a_m.head<2>());
+    const Vec2 heading = into >= 0.0 ? left_of(along) : Vec2{-left_of(along)};
+    out.yaw_rad = math::atan2(heading.y(), heading.x());
+  }
+  out.heading = unit_at(out.yaw_rad);
+  out.left = left_of(out.heading);
+  if (out.has_nosing) {
+    const bool a_is_left = out.left.dot((surface.nosing.a_m - surface.nosing.b_m).head<2>()) > 0.0;
+    out.nosing_a_m = a_is_left ? surface.nosing.a_m : surface.nosing.b_m;
+    out.nosing_b_m = a_is_left ? surface.nosing.b_m : surface.nosing.a_m;
+    out.nosing_sigma_m = surface.nosing.sigma_m;
+  }
+  out.height_m = out.plane.height_m(out.has_nosing ? out.nosing_middle_m() : centre);
+
+  note_ends(surface, out);
+  for (std::size_t i = 0; i < out.hull.size(); ++i) {
+    const HalfPlane inside = edge_half_plane(out.hull, i);
+    (void)out.edges.try_push_back({inside, reach_m(kContactRectangle, out.heading, inside.inward),
+                                   std::abs(inside.inward.dot(out.left)) > kSide});
+  }
+  if (out.has_nosing && surface.back.valid) {
+    const std::optional<Line2> back = line_through(surface.back.a_m.head<2>(), surface.back.b_m.head<2>());
+    if (back) add_toe_limit(out, back->point_m, back->direction, 0.0, std::numeric_limits<double>::infinity());
+  }
+  return true;
+}
+
+void add_toe_limit(LevelSurface& surface, const Vec2& point_m, const Vec2& direction, double min_m,
+                   double max_m) noexcept {
+  const double across = direction.dot(surface.left);
+  constexpr double kCos30 = 0.866;
+  if (std::abs(across) < kCos30) return;
+  // Where it crosses the middle of the surface.
+  const Vec2 d = direction / across;
+  const double depth_m = surface.along_m(point_m - surface.lateral_m(point_m) * d);
+  if (!(depth_m > min_m) || !(depth_m < max_m)) return;
+  const Vec2 inward = -left_of(direction) * (left_of(direction).dot(surface.heading) > 0.0 ? 1.0 : -1.0);
+  const FootLimit limit{{inward, inward.dot(point_m)}, reach_m(kCollisionRectangle, surface.heading, inward), false};
+  if (!surface.toe.try_push_back(limit)) {  // keep the nearest
+    FootLimit* farthest = surface.toe.begin();
+    const Vec2 middle = surface.nosing_middle_m();
+    for (FootLimit& t : surface.toe) {
+      if (t.clearance_m(middle) > farthest->clearance_m(middle)) farthest = &t;
+    }
+    if (farthest->clearance_m(middle) > limit.clearance_m(middle)) *farthest = limit;
+  }
+  if (surface.depth_m == 0.0 || depth_m < surface.depth_m) surface.depth_m = depth_m;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// A mapped level surface prepared for the foothold search, and how a foot lies on it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "algorithms/core/surfaces.hpp"
+#include "algorithms/geometry/convex.hpp"
+#include "algorithms/geometry/plane.hpp"
+#include "algorithms/robot/model.hpp"
+
+namespace polygmap {
+
+// A foot on the surface has its yaw, so each edge takes the same part of every foot: what is left of the edge's
+// distance to the sole's origin is distance - reach. Plan view, world frame.
+struct FootLimit {
+  HalfPlane inside;
+  double reach_m = 0.0;  // from the sole's origin towards the edge
+  bool side = false;     // bounds the surface to the left or right
+  [[nodiscard]] double clearance_m(const Vec2& sole_p_m) const noexcept {
+    return inside.distance_m(sole_p_m) - reach_m;
+  }
+};
+
+struct LevelSurface {
+  std::uint32_t id = 0;
+  std::int64_t last_seen_ns = 0;
+  Plane plane;
+  ConvexPolygon hull;     // eqs 14, 15: the plan view
+  BoundingBox box;        // eq. 16
+  double height_m = 0.0;  // at the nosing's middle, else at the centroid
+  bool has_nosing = false;
+  double yaw_rad = 0.0;  // up the stairs
+  Vec2 heading = Vec2::UnitX();
+  Vec2 left = Vec2::UnitY();
+  Vec3 nosing_a_m = Vec3::Zero();  // left end
+  Vec3 nosing_b_m = Vec3::Zero();
+  double nosing_sigma_m = 0.0;
+  StaticVector<FootLimit, kMaxPolygonVertices> edges;  // contact rectangle
+  StaticVector<FootLimit, 3> toe;                      // collision box to back edge, next nosing, next riser
+  double depth_m = 0.0;                                // nosing to the nearest of these, 0: none
+  // Where they were seen: lateral places of its sides, and how far behind the nosing it ends, in a riser or in nothing.
+  std::optional<double> left_end_m, right_end_m, far_end_m;
+
+  [[nodiscard]] Vec2 nosing_middle_m() const noexcept { return 0.5 * (nosing_a_m + nosing_b_m).head<2>(); }
+  // Sole origin at a distance behind the nosing and to the left of its middle.
+  [[nodiscard]] Vec2 at(double along_m, double lateral_m) const noexcept {
+    return nosing_middle_m() + along_m * heading + lateral_m * left;
+  }
+  [[nodiscard]] double lateral_m(const Vec2& p_m) const noexcept { return left.dot(p_m - nosing_middle_m()); }
+  [[nodiscard]] double along_m(const Vec2& p_m) const noexcept { return heading.dot(p_m - nosing_middle_m()); }
+
+  // Signed: least distance from the contact rectangle of a sole at p to the surface's edges, eq. (25).
+  [[nodiscard]] double contact_clearance_m(const Vec2& p_m) const noexcept;
+  // Signed: collision box to what rises behind the surface; +inf when nothing is mapped.
+  [[nodiscard]] double toe_clearance_m(const Vec2& p_m) const noexcept;
+};
+
+// Eqs (14)-(16) and the foot limits of the edges; base_yaw_rad is the heading of surfaces without a nosing. False when
+// the polygon has no area.
+[[nodiscard]] bool prepare(const MapPolygon& polygon, double base_yaw_rad, LevelSurface& out) noexcept;
+
+// Adds something that the collision box must not reach: a line in plan that rises behind the surface, through point_m
+// along the unit vector direction. Ignored unless it runs roughly across the heading (within 30 degrees) and lies
+// between min_m and max_m behind the nosing.
+void add_toe_limit(LevelSurface& surface, const Vec2& point_m, const Vec2& direction, double min_m,
+                   double max_m) noexcept;
+
+}  // namespace polygmap

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/climb_planner.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+namespace {
+
+constexpr double kCorrection_m = 0.05;  // a shorter step of the walk up only corrects
+
+bool usable(const Foothold& f) noexcept { return math::all_finite(f.position_m) && std::isfinite(f.yaw_rad); }
+
+SolePose in_odom(const Transform& world_T_odom, const Foothold& foothold) noexcept {
+  const Transform world_T_sole{rotation_z(foothold.yaw_rad), foothold.position_m};
+  return sole_pose(world_T_odom.inverse() * world_T_sole);
+}
+
+double measured(const FootholdSet& set) noexcept {
+  switch (set.obstruction) {
+    case Obstruction::kRiseTooHigh:
+      return set.measured_rise_m;
+    case Obstruction::kTreadTooShort:
+      return set.measured_tread_m;
+    default:
+      return 0.0;
+  }
+}
+
+// Distance from the foremost corner of the foot to the line through the nosing, along `yaw_rad`; positive before it.
+// odom_p_a and odom_p_b: two points of the nosing.
+double toe_to_line_m(const SolePose& sole, const Vec3& odom_p_a, const Vec3& odom_p_b, double yaw_rad) noexcept {
+  const Mat3 R = rotation_z(yaw_rad).transpose();
+  const Vec3 a = R * odom_p_a, b = R * odom_p_b;
+  double least_m = 1e9;
+  for (const double side : {-1.0, 1.0}) {
+    const Vec3 corner =
+        sole.transform() * Vec3{kCollisionRectangle.toe_x_m, side * kCollisionRectangle.half_width_m, 0};
+    const Vec3 p = R * corner;
+    const double along = std::abs(b.y() - a.y()) > 0.05 ? (p.y() - a.y()) / (b.y() - a.y()) : 0.5;
+    least_m = std::min(least_m, a.x() + along * (b.x() - a.x()) - p.x());
+  }
+  return least_m;
+}
+
+}  // namespace
+
+void ClimbPlanner::reset(const Params& params) noexcept {
+  *this = ClimbPlanner{};
+  params_ = params;
+}
+
+ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
+                                                   const FootholdSet& footholds) const noexcept {
+  Decision decision;
+  decision.has_step = true;
+  StepGoal& goal = decision.goal;
+  goal.kind = StepKind::kTrailing;
+  goal.foot = other(leading_);
+  // The search looks from the foot that stands and soon offers the tread above: then the memory holds.
+  const Foothold& seen = footholds.p_star_feet[index_of(goal.foot)];
+  const bool same_tread = footholds.has_p_star && seen.polygon_id == trailing_foothold_.polygon_id && usable(seen);
+  goal.foothold = same_tread ? seen : trailing_foothold_;
+  goal.target = in_odom(situation.world_T_odom, goal.foothold);
+  return decision;
+}
+
+Foot ClimbPlanner::leading_foot(const Situation& situation, const SolePair& targets) const noexcept {
+  const TorsoDisplacement step = displacement(middle_of(situation.soles), middle_of(targets));
+  return swing_foot(step, has_leading_ ? leading_ : other(last_swing_), params_.rule);
+}
+
+bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& footholds, StepGoal& goal) const noexcept {
+  const Transform odom_T_world = situation.world_T_odom.inverse();
+  const TreadView& tread = footholds.tread;
+  const Vec3 a = odom_T_world * tread.nosing_a_m, b = odom_T_world * tread.nosing_b_m;
+  const SolePair on_tread{in_odom(situation.world_T_odom, footholds.p_star_feet[0]),
+                          in_odom(situation.world_T_odom, footholds.p_star_feet[1])};
+  const double yaw_rad = middle_of(on_tread).yaw_rad;
+  const double floor_m = middle_of(situation.soles).position_m.z();
+
+  // The stand-off: straight back from the footholds until the toes are that far from the nosing.
+  SolePair stand_off;
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    const double back_m = params_.stand_off_m - toe_to_line_m(on_tread[i], a, b, yaw_rad);
+    stand_off[i] = {on_tread[i].position_m - rotation_z(yaw_rad) * Vec3{back_m, 0, 0}, yaw_rad};
+    stand_off[i].position_m.z() = floor_m;
+  }
+
+  const double relaxed =
+      corrections_ > params_.strict_corrections ? 1.0 + 0.5 * (corrections_ - params_.strict_corrections) : 1.0;
+  const double tolerance = std::min(relaxed, params_.max_relaxation);
+  std::array<bool, kFootCount> lined_up{};
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    const SolePose& sole = situation.soles[i];
+    const Vec3 off_m = rotation_z(yaw_rad).transpose() * (sole.position_m - stand_off[i].position_m);
+    lined_up[i] = std::abs(off_m.x()) <= tolerance * params_.line_up_m &&
+                  std::abs(off_m.y()) <= tolerance * params_.line_up_lateral_m &&
+                  std::abs(math::wrap_angle(sole.yaw_rad - yaw_rad)) <= tolerance * params_.line_up_yaw_rad &&
+                  toe_to_line_m(sole, a, b, yaw_rad) >= params_.min_stand_off_m;
+  }
+  if (lined_up[0] && lined_up[1]) return false;
+
+  const TorsoPose torso_goal = middle_of(stand_off);
+  Foot foot = other(last_swing_);
+  if (lined_up[index_of(foot)]) {
+    foot = other(foot);
+  } else if (floor_steps_ == 0) {
+    foot = swing_foot(displacement(middle_of(situation.soles), torso_goal), foot, params_.rule);
+  }
+  const double half_width_m =
+      math::clamp(0.5 * (stand_off[0].position_m - stand_off[1].position_m).norm(), 0.08, kStanceHalfWidth_m + 0.03);
+  const SolePose& stance = situation.soles[index_of(other(foot))];
+  goal = {};
+  goal.kind = StepKind::kFloor;
+  goal.foot = foot;
+  FloorStepLimits limits = params_.floor;
+  limits.forward_m *= stride_share_;
+  limits.backward_m *= stride_share_;
+  limits.lateral_m *= stride_share_;
+  limits.turn_rad *= stride_share_;
+  goal.target = floor_step(stance, foot, torso_goal, half_width_m, limits);
+  // On the way, with the heading still wrong, no toe comes near the riser.
+  const double short_m = params_.floor_clearance_m - toe_to_line_m(goal.target, a, b, yaw_rad);
+  if (short_m > 0.0) goal.target.position_m -= rotation_z(yaw_rad) * Vec3{short_m, 0, 0};
+  const Vec3 world_p = situation.world_T_odom * goal.target.position_m;
+  goal.foothold.position_m = world_p;
+  goal.foothold.yaw_rad = math::wrap_angle(goal.target.yaw_rad + yaw_of(situation.world_T_odom.R));
+  goal.foothold.last_seen_ns = footholds.map_stamp_ns;
+  return true;
+}
+
+ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const FootholdSet& footholds) const noexcept {
+  if (split_stance_) return trailing_step(situation, footholds);
+
+  Decision decision;
+  decision.obstruction = footholds.obstruction;
+  decision.measured_m = measured(footholds);
+  if (footholds.map_stamp_ns <= 0) {
+    decision.obstruction = Obstruction::kNothingSeen;
+    return decision;
+  }
+  if (situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) {
+    decision.obstruction = Obstruction::kMapStale;
+    return decision;
+  }
+  if (decision.obstruction != Obstruction::kNone) return decision;
+  const auto& feet = footholds.p_star_feet;
+  if (!footholds.has_p_star || !usable(feet[0]) || !usable(feet[1]) || !math::all_finite(footholds.tread.nosing_a_m) ||
+      !math::all_finite(footholds.tread.nosing_b_m)) {
+    decision.obstruction = Obstruction::kNoStaircase;
+    return decision;
+  }
+  const SolePair targets{in_odom(situation.world_T_odom, feet[0]), in_odom(situation.world_T_odom, feet[1])};
+  decision.rise_m = middle_of(targets).position_m.z() - middle_of(situation.soles).position_m.z();
+  const bool underfoot = treads_climbed_ > 0 && feet[0].polygon_id == tread_id_;
+  if (decision.rise_m < params_.min_rise_m || underfoot) {  // a search from before the last step
+    decision.obstruction = Obstruction::kMapStale;
+    return decision;
+  }
+  decision.has_step = true;
+  if (treads_climbed_ == 0 && floor_goal(situation, footholds, decision.goal)) return decision;
+
+  const Foot lead = leading_foot(situation, targets), trail = other(lead);
+  decision.goal = {StepKind::kLeading, lead, targets[index_of(lead)], feet[index_of(lead)]};
+  decision.trailing = {StepKind::kTrailing, trail, targets[index_of(trail)], feet[index_of(trail)]};
+  return decision;
+}
+
+void ClimbPlanner::latched(const Situation& situation, const Decision& decision) noexcept {
+  latched_ = decision;
+  last_swing_ = decision.goal.foot;
+  const Vec3 travel_m = decision.goal.target.position_m - situation.soles[index_of(last_swing_)].position_m;
+  if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < kCorrection_m) ++corrections_;
+  if (decision.goal.kind == StepKind::kLeading) {
+    leading_ = decision.goal.foot;
+    has_leading_ = true;
+    trailing_foothold_ = decision.trailing.foothold;
+  }
+}
+
+bool ClimbPlanner::shorten_floor_steps() noexcept {
+  constexpr double kShorter = 0.6, kShortest = 0.2;
+  stride_share_ *= kShorter;
+  return stride_share_ > kShortest;
+}
+
+void ClimbPlanner::landed() noexcept {
+  stride_share_ = 1.0;
+  switch (latched_.goal.kind) {
+    case StepKind::kFloor:
+      ++floor_steps_;
+      break;
+    case StepKind::kLeading:
+      split_stance_ = true;
+      break;
+    case StepKind::kTrailing:
+      split_stance_ = false;
+      tread_id_ = latched_.goal.foothold.polygon_id;
+      ++treads_climbed_;
+      break;
+  }
+}
+
+}  // namespace polygmap

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which foot goes where next: the walk up to the stand-off before the stairs, then double support on every tread.
+#pragma once
+
+#include "algorithms/core/footholds.hpp"
+#include "algorithms/core/gait_status.hpp"
+#include "algorithms/gait/step_plan.hpp"
+
+namespace polygmap {
+
+class ClimbPlanner {
+ public:
+  struct Params {
+    double stand_off_m = 0.032;      // collision toe to the first nosing or riser
+    double min_stand_off_m = 0.022;  // nearer than this is not lined up, whatever the tolerance
+    double line_up_m = 0.004;        // along the heading, of either foot
+    double line_up_lateral_m = 0.012;
+    double line_up_yaw_rad = 0.009;        // 0.5 degrees
+    std::uint32_t strict_corrections = 2;  // steps in place before the tolerance relaxes, by half of itself per step
+    double max_relaxation = 2.5;
+    FloorStepLimits floor;
+    double floor_clearance_m = 0.02;  // of a toe on the way to the line of the first nosing
+    SwingRule rule;
+    double min_rise_m = 0.02;  // Delta_foot: below it is the tread already underfoot
+    std::int64_t max_map_age_ns = 500 * kNsPerMs;
+  };
+
+  // What the planner looks at; poses in odom.
+  struct Situation {
+    std::int64_t stamp_ns = 0;
+    Transform world_T_odom;
+    SolePair soles;
+  };
+  struct Decision {
+    bool has_step = false;
+    StepGoal goal;
+    StepGoal trailing;                             // the step after a leading one
+    Obstruction obstruction = Obstruction::kNone;  // without a step: why
+    double measured_m = 0.0;
+    double rise_m = 0.0;  // of a leading step
+  };
+
+  void reset(const Params& params) noexcept;
+  [[nodiscard]] Decision decide(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  // A swing was latched: its goal is what the next decisions build on.
+  void latched(const Situation& situation, const Decision& decision) noexcept;
+  // The legs cannot do the step: the next ones on the floor are shorter. False when they are short already.
+  bool shorten_floor_steps() noexcept;
+  // Its foot stands.
+  void landed() noexcept;
+  [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
+  // The leading foot stands on a tread, the other one below: only the trailing step ends this.
+  [[nodiscard]] bool in_split_stance() const noexcept { return split_stance_; }
+
+ private:
+  [[nodiscard]] Decision trailing_step(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  [[nodiscard]] bool floor_goal(const Situation& situation, const FootholdSet& footholds,
+                                StepGoal& goal) const noexcept;
+  [[nodiscard]] Foot leading_foot(const Situation& situation, const SolePair& targets) const noexcept;
+
+  Params params_;
+  Decision latched_;
+  Foothold trailing_foothold_;  // remembered from the leading latch, world
+  Foot last_swing_ = Foot::kRight;
+  Foot leading_ = Foot::kLeft;
+  bool has_leading_ = false;
+  bool split_stance_ = false;
+  std::uint32_t tread_id_ = 0;  // under the feet
+  std::uint32_t treads_climbed_ = 0;
+  double stride_share_ = 1.0;  // of the floor step's limits
+  std::uint32_t floor_steps_ = 0;
+  std::uint32_t corrections_ = 0;  // the short ones of them
+};
+
+}  // namespace polygmap

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/gait.hpp"
+
+namespace polygmap {
+namespace {
+
+bool finite(const Transform& T) noexcept { return math::all_finite(T.R) && math::all_finite(T.p_m); }
+
+bool usable(const StateEstimate& s) noexcept {
+  return finite(s.odom_T_base) && finite(s.world_T_odom) && finite(s.odom_T_sole[0]) && finite(s.odom_T_sole[1]);
+}
+
+}  // namespace
+
+void Gait::reset(const Params& params) noexcept {
+  *this = Gait{};
+  params_ = params;
+  planner_.reset(params.planner);
+}
+
+ClimbPlanner::Situation Gait::situation(const StateEstimate& state) const noexcept {
+  const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
+  return {state.stamp_ns,
+          state.world_T_odom,
+          {sole_pose(odom_T_plan * plan_T_sole_[0]), sole_pose(odom_T_plan * plan_T_sole_[1])}};
+}
+
+void Gait::carry_plan_to_odometry() noexcept {
+  const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
+  for (Transform& sole : plan_T_sole_) sole = odom_T_plan * sole;
+  torso_state_ = TorsoTrajectory::moved(torso_state_, odom_T_plan);
+  plan_T_base_ = odom_T_plan * plan_T_base_;
+  correction_.reset();
+}
+
+void Gait::start(const StateEstimate& state) noexcept {
+  plan_T_base_ = state.odom_T_base;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    plan_T_sole_[index_of(leg)] = plan_T_base_ * joints_.base_T_sole_reference(leg);
+  }
+  torso_state_ = TorsoTrajectory::at_rest(plan_T_base_);
+  started_ = true;
+  begin_hold();
+}
+
+void Gait::settle_between_feet() noexcept {
+  const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
+  TorsoPose middle = torso_between(params_.geometry, params_.step.torso, soles);
+  torso_.plan(torso_state_, middle, params_.settle_ticks, params_.settle_ticks);
+  tick_ = 0;
+}
+
+void Gait::begin_hold() noexcept {
+  activity_ = Activity::kHold;
+  settle_between_feet();
+}
+
+void Gait::end(GaitPhase phase, Obstruction reason, double measured_m) noexcept {
+  activity_ = Activity::kEnd;
+  status_.phase = phase;
+  status_.stop_reason = reason;
+  status_.stop_measured_m = measured_m;
+}
+
+void Gait::begin_shift(const ClimbPlanner::Decision& decision, std::int32_t shift_ticks) noexcept {
+  carry_plan_to_odometry();
+  decision_ = decision;
+  activity_ = Activity::kShift;
+  status_.phase = GaitPhase::kDoubleSupport;
+  tick_ = 0;
+  shift_ticks_ = shift_ticks;
+  const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
+  const StepPlan plan = plan_step(params_.geometry, params_.step, decision.goal, soles, kToeDown_rad[0]);
+  torso_.plan(torso_state_, plan.lift_off, shift_ticks, shift_ticks);
+  search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, torso_state_, plan_T_sole_);
+}
+
+void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexcept {
+  if (stop_requested_) return end(GaitPhase::kStopped, Obstruction::kNone, 0.0);
+  if (!state.initialised || !usable(state)) return;
+  const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
+  if (decision.has_step) {
+    wait_ticks_ = 0;
+    reshifts_ = 0;
+    const bool on_floor = decision.goal.kind == StepKind::kFloor;
+    return begin_shift(decision, on_floor ? params_.step.floor_shift_ticks : params_.step.stair_shift_ticks);
+  }
+  ++wait_ticks_;
+  const std::int32_t patience = status_.step.sequence == 0 ? params_.start_patience_ticks : params_.patience_ticks;
+  if (wait_ticks_ < patience) return;
+  const bool nothing_higher =
+      decision.obstruction == Obstruction::kTop || decision.obstruction == Obstruction::kNoStaircase;
+  if (nothing_higher && planner_.treads_climbed() > 0) return end(GaitPhase::kFinished, Obstruction::kNone, 0.0);
+  end(GaitPhase::kStopped, decision.obstruction == Obstruction::kTop ? Obstruction::kNoStaircase : decision.obstruction,
+      decision.measured_m);
+}
+
+bool Gait::close_to_planned(const StepGoal& goal) const noexcept {
+  const StepGoal& planned = decision_.goal;
+  return goal.kind == planned.kind && goal.foot == planned.foot &&
+         (goal.target.position_m - planned.target.position_m).norm() <= params_.absorb_m &&
+         std::abs(math::wrap_angle(goal.target.yaw_rad - planned.target.yaw_rad)) <= params_.absorb_rad;
+}
+
+void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexcept {
+  if (search_.step() == StepSearch::State::kImpossible) {
+    begin_hold();
+    if (decision_.goal.kind == StepKind::kFloor && planner_.shorten_floor_steps()) return;
+    return end(GaitPhase::kStopped, Obstruction::kRiseTooHigh, decision_.rise_m);
+  }
+  if (stop_requested_) return begin_hold();
+  if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
+  if (!usable(state)) return;
+  const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
+  if (!decision.has_step) {  // over the stance foot for a moment more: one lost frame is no reason to go back
+    if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_hold();
+    return;
+  }
+  if (close_to_planned(decision.goal)) return lift_off(state, footholds, decision);
+  if (++reshifts_ > params_.max_reshifts) {
+    begin_hold();
+    return end(GaitPhase::kStopped, Obstruction::kMapStale, 0.0);
+  }
+  begin_shift(decision, params_.reshift_ticks);
+}
+
+void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
+                    const ClimbPlanner::Decision& decision) noexcept {
+  // The leg that carries now puts the base elsewhere than the two of them did: take it from there, and level it.
+  carry_plan_to_odometry();
+  const StepGoal& goal = decision.goal;
+  const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
+  const StepPlan plan = plan_step(params_.geometry, params_.step, goal, soles, search_.plan().shape.toe_down_rad);
+  swing_.plan(plan_T_sole_[index_of(goal.foot)], goal.target, plan.shape, plan.swing_ticks);
+  torso_.plan(torso_state_, plan.touch_down, plan.swing_ticks, plan.rise_ticks);
+  planner_.latched(situation(state), decision);
+  decision_ = decision;
+
+  LatchedStep& step = status_.step;
+  step = {.sequence = step.sequence + 1,
+          .foot = goal.foot,
+          .onto_tread = goal.kind != StepKind::kFloor,
+          .latch_stamp_ns = state.stamp_ns,
+          .map_stamp_ns = footholds.map_stamp_ns,
+          .target = goal.foothold,
+          .odom_T_target = goal.target.transform(),
+          .touch_down_stamp_ns = 0,
+          .odom_T_executed = {}};
+  status_.phase = GaitPhase::kSwing;
+  status_.stands[index_of(goal.foot)] = false;
+  activity_ = Activity::kSwing;
+  tick_ = 0;
+  unloaded_ = false;
+}
+
+void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noexcept {
+  const Foot foot = decision_.goal.foot;
+  const std::size_t i = index_of(foot);
+  const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
+  if (!loaded) unloaded_ = true;
+  const bool descending = 2 * tick_ > swing_.duration_ticks();
+  if (descending && unloaded_ && loaded) {
+    if (swing_.at(tick_ - 1).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m) ++status_.early_contacts;
+    if (swing_.lowered_m(tick_) > params_.late_m) ++status_.late_contacts;
+    return touch_down(state);
+  }
+  // A force that never left is a broken sensor: the plan's end is the touch-down.
+  if (!unloaded_ && tick_ > swing_.duration_ticks()) return touch_down(state);
+  if (swing_.lowered_m(tick_) > params_.max_lowering_m) {  // the ground that was seen is not there
+    ++status_.late_contacts;
+    return end(GaitPhase::kStopped, Obstruction::kNothingSeen, swing_.lowered_m(tick_));
+  }
+  const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
+  plan_T_sole_[i] = plan_T_odom * swing_.at(tick_);
+}
+
+void Gait::touch_down(const StateEstimate& state) noexcept {
+  const std::size_t i = index_of(decision_.goal.foot);
+  status_.step.touch_down_stamp_ns = state.stamp_ns;
+  status_.step.odom_T_executed =
+      usable(state) ? state.odom_T_sole[i] : correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
+  status_.stands[i] = true;
+  planner_.landed();
+  status_.treads_climbed = planner_.treads_climbed();
+  status_.phase = GaitPhase::kDoubleSupport;
+  carry_plan_to_odometry();
+  begin_hold();
+}
+
+void Gait::tick(const StateEstimate& state, const FootholdSet& footholds, const JointFeedback& feedback,
+                JointCommand& command) noexcept {
+  command = {};
+  command.stamp_ns = state.stamp_ns;
+  status_.stamp_ns = state.stamp_ns;
+  if (!armed_) {
+    // Without one good reading the drives get no stiffness: there is nothing safe to ask of them.
+    if (!math::all_finite(feedback.q_rad)) return;
+    joints_.reset(params_.geometry, params_.joints, feedback.q_rad);
+    armed_ = true;
+  }
+  if (!started_) {
+    joints_.hold(command);
+    if (state.initialised && usable(state)) start(state);
+    return;
+  }
+
+  torso_state_ = torso_.at(tick_);
+  plan_T_base_ = TorsoTrajectory::pose(torso_state_);
+  if (usable(state)) {
+    correction_.update(state.odom_T_base, plan_T_base_, kTick_s / (kTick_s + params_.correction_time_s));
+  }
+  switch (activity_) {
+    case Activity::kHold:
+      hold(state, footholds);
+      break;
+    case Activity::kShift:
+      shift(state, footholds);
+      break;
+    case Activity::kSwing:
+      swing(state, feedback);
+      break;
+    case Activity::kEnd:
+      break;
+  }
+  ++tick_;
+
+  if (joints_.follow(plan_T_base_, plan_T_sole_, command)) ++status_.ik_limited_ticks;
+  const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
+  status_.odom_T_base_desired = odom_T_plan * plan_T_base_;
+  for (std::size_t i = 0; i < kFootCount; ++i) status_.odom_T_sole_desired[i] = odom_T_plan * plan_T_sole_[i];
+}
+
+}  // namespace polygmap

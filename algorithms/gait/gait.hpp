@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// The gait: walks up to the stairs, climbs them in double-support gait, ends by itself.
+#pragma once
+
+#include <array>
+
+#include "algorithms/core/footholds.hpp"
+#include "algorithms/core/gait_status.hpp"
+#include "algorithms/core/state.hpp"
+#include "algorithms/gait/base_correction.hpp"
+#include "algorithms/gait/climb_planner.hpp"
+#include "algorithms/gait/joint_reference.hpp"
+#include "algorithms/gait/step_plan.hpp"
+
+namespace polygmap {
+
+// Inside, everything moves in the plan frame: odometry as it was when the last shift or swing began, in which standing
+// feet do not move and the joint commands never jump. The swing foot is steered in odometry through the base
+// correction.
+class Gait {
+ public:
+  struct Params {
+    LegGeometry geometry;
+    StepParams step;
+    ClimbPlanner::Params planner;
+    JointReference::Params joints;
+    double correction_time_s = 0.06;  // low-pass of the base's difference to the plan
+    double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
+    double absorb_rad = 0.035;
+    std::int32_t reshift_ticks = 125;  // a weight shift for a target that changed more
+    std::int32_t max_reshifts = 8;
+    std::int32_t start_patience_ticks = 1500;  // nothing to climb, before the first step
+    std::int32_t patience_ticks = 500;         // an obstruction persists, or the top: 1 s
+    std::int32_t settle_ticks = 300;           // to the middle between the feet when there is nothing to do
+    double touch_force_n = 15.0;
+    double early_m = 0.005;  // contact this far above the target counts as early
+    double late_m = 0.005;   // and this far below as late
+    double max_lowering_m = 0.04;
+  };
+
+  void reset(const Params& params) noexcept;
+  // One 500 Hz tick: state machine, trajectories, leg kinematics, joint command. footholds: the newest finished search.
+  void tick(const StateEstimate& state, const FootholdSet& footholds, const JointFeedback& feedback,
+            JointCommand& command) noexcept;
+  [[nodiscard]] const GaitStatus& status() const noexcept { return status_; }
+  // Finishes the committed step, then holds in double support.
+  void request_stop() noexcept { stop_requested_ = true; }
+
+ private:
+  enum class Activity : std::uint8_t {
+    kHold,   // both feet stand and nothing is planned: settle between the feet, look for a step
+    kShift,  // weight moves over the stance foot
+    kSwing,
+    kEnd,  // finished or stopped
+  };
+
+  void start(const StateEstimate& state) noexcept;
+  void hold(const StateEstimate& state, const FootholdSet& footholds) noexcept;
+  void shift(const StateEstimate& state, const FootholdSet& footholds) noexcept;
+  void swing(const StateEstimate& state, const JointFeedback& feedback) noexcept;
+
+  void begin_hold() noexcept;
+  void begin_shift(const ClimbPlanner::Decision& decision, std::int32_t shift_ticks) noexcept;
+  void lift_off(const StateEstimate& state, const FootholdSet& footholds,
+                const ClimbPlanner::Decision& decision) noexcept;
+  void touch_down(const StateEstimate& state) noexcept;
+  void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
+  void carry_plan_to_odometry() noexcept;
+  void settle_between_feet() noexcept;
+  [[nodiscard]] ClimbPlanner::Situation situation(const StateEstimate& state) const noexcept;
+  [[nodiscard]] bool close_to_planned(const StepGoal& goal) const noexcept;
+
+  Params params_;
+  ClimbPlanner planner_;
+  JointReference joints_;
+  StepSearch search_;
+  BaseCorrection correction_;
+  TorsoTrajectory torso_;
+  TorsoTrajectory::State torso_state_{};
+  Swing swing_;  // odometry
+  Transform plan_T_base_;
+  std::array<Transform, kFootCount> plan_T_sole_;
+  ClimbPlanner::Decision decision_;
+  GaitStatus status_;
+  Activity activity_ = Activity::kHold;
+  std::int32_t tick_ = 0;        // of the activity
+  std::int32_t wait_ticks_ = 0;  // since there was last a step to do
+  std::int32_t shift_ticks_ = 0;
+  std::int32_t reshifts_ = 0;
+  bool armed_ = false;
+  bool started_ = false;
+  bool unloaded_ = false;  // the swing foot was felt to leave the ground
+  bool stop_requested_ = false;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/joint_reference.hpp"
+
+#include <algorithm>
+
+#include "algorithms/gait/blend.hpp"
+
+namespace polygmap {
+
+void JointReference::reset(const LegGeometry& geometry, const Params& params, const JointVector& q_rad) noexcept {
+  geometry_ = geometry;
+  params_ = params;
+  reference_rad_ = q_rad;
+  commanded_rad_ = q_rad;
+}
+
+bool JointReference::follow(const Transform& odom_T_base, const std::array<Transform, kFootCount>& odom_T_sole,
+                            JointCommand& command) noexcept {
+  constexpr double kRounding_rad = 1e-9;
+  bool limited = false;
+  const Transform base_T_odom = odom_T_base.inverse();
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const LegSolution solution = solve_leg(geometry_, leg, base_T_odom * odom_T_sole[index_of(leg)]);
+    limited = limited || !solution.reachable || !math::all_finite(solution.q_rad);
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      const JointLimits limits = joint_limits(leg, j);
+      const std::size_t n = joint_index(leg, j);
+      const auto i = static_cast<Eigen::Index>(n);
+      const double before_rad = reference_rad_[i];
+      const double step_rad = limits.speed_radps * kTick_s;
+      const double asked_rad = solution.q_rad[static_cast<Eigen::Index>(j)];
+      const double q_rad = math::clamp(math::clamp(asked_rad, before_rad - step_rad, before_rad + step_rad),
+                                       limits.min_rad, limits.max_rad);
+      if (!(std::abs(q_rad - asked_rad) <= kRounding_rad)) limited = true;
+      const double dq_radps = (q_rad - before_rad) / kTick_s;
+      reference_rad_[i] = q_rad;
+      // The lead may change faster than the reference, never faster than the drive.
+      const double sent_rad = commanded_rad_[i];
+      commanded_rad_[i] =
+          math::clamp(math::clamp(q_rad + params_.drive_delay_s * dq_radps, sent_rad - step_rad, sent_rad + step_rad),
+                      limits.min_rad, limits.max_rad);
+      command.joints[n] = {commanded_rad_[i], dq_radps, 0.0, params_.kp_nmprad[j], params_.kd_nmsprad[j]};
+    }
+  }
+  return limited;
+}
+
+void JointReference::hold(JointCommand& command) const noexcept {
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const std::size_t j = n % kJointsPerLeg;
+    command.joints[n] = {commanded_rad_[static_cast<Eigen::Index>(n)], 0.0, 0.0, params_.kp_nmprad[j],
+                         params_.kd_nmsprad[j]};
+  }
+}
+
+Transform JointReference::base_T_sole_reference(Foot leg) const noexcept {
+  return base_T_sole(geometry_, leg, leg_joints(reference_rad_, leg));
+}
+
+}  // namespace polygmap

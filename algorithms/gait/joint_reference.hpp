@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// From poses of base and soles to what the drives are told: leg kinematics, the drives' limits, their lag.
+#pragma once
+
+#include <array>
+
+#include "algorithms/robot/leg_kinematics.hpp"
+
+namespace polygmap {
+
+class JointReference {
+ public:
+  struct Params {
+    double drive_delay_s = 0.013;  // by the data sheet: 10 ms first-order lag, 2 ms on the bus, half a tick of hold
+    std::array<double, kJointsPerLeg> kp_nmprad{220, 100, 224, 224, 58, 58};
+    std::array<double, kJointsPerLeg> kd_nmsprad{8, 4, 8, 8, 2, 2};
+  };
+
+  void reset(const LegGeometry& geometry, const Params& params, const JointVector& q_rad) noexcept;
+  // True when a leg could not do what was asked: out of reach, range or speed. The command never leaves the limits.
+  bool follow(const Transform& odom_T_base, const std::array<Transform, kFootCount>& odom_T_sole,
+              JointCommand& command) noexcept;
+  // Repeats the last joint angles, at rest.
+  void hold(JointCommand& command) const noexcept;
+  // Where the reference puts the soles.
+  [[nodiscard]] Transform base_T_sole_reference(Foot leg) const noexcept;
+
+ private:
+  LegGeometry geometry_;
+  Params params_;
+  JointVector reference_rad_ = JointVector::Zero();
+  JointVector commanded_rad_ = JointVector::Zero();  // with the lead for the drives' delay
+};
+
+}  // namespace polygmap

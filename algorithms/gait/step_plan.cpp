@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/step_plan.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+
+StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal, const SolePair& soles,
+                   double toe_down_rad) noexcept {
+  const bool on_floor = goal.kind == StepKind::kFloor;
+  const Foot stance = other(goal.foot);
+  const TorsoParams& torso = params.torso;
+  SolePair landed = soles;
+  landed[index_of(goal.foot)] = goal.target;
+
+  StepPlan plan;
+  plan.goal = goal;
+  plan.shape = on_floor ? params.floor_swing : params.stair_swing;
+  plan.shift_ticks = on_floor ? params.floor_shift_ticks : params.stair_shift_ticks;
+  plan.swing_ticks = on_floor ? params.floor_swing_ticks : params.stair_swing_ticks;
+  plan.rise_ticks = plan.swing_ticks;
+  if (!on_floor) plan.rise_ticks = static_cast<std::int32_t>(params.rise_share * plan.swing_ticks);
+  plan.shape.toe_down_rad = on_floor ? 0.5 * toe_down_rad : toe_down_rad;
+  switch (goal.kind) {
+    case StepKind::kFloor:
+      plan.lift_off = torso_over(geometry, torso, stance, soles, torso.ahead_floor_m);
+      plan.touch_down = torso_over(geometry, torso, stance, landed, torso.ahead_floor_m);
+      break;
+    case StepKind::kLeading: {
+      plan.lift_off = torso_over(geometry, torso, stance, soles, torso.ahead_lead_lift_m);
+      plan.touch_down = torso_over(geometry, torso, stance, landed, torso.ahead_lead_land_m);
+      // Rising with the foot gives the leading leg room to fold, at a lower knee speed.
+      const double tall_m = soles[index_of(stance)].position_m.z() + torso.lead_height_m;
+      plan.touch_down.position_m.z() = std::min(plan.touch_down.position_m.z(), tall_m);
+      break;
+    }
+    case StepKind::kTrailing:
+      plan.lift_off = torso_over(geometry, torso, stance, soles, torso.ahead_trail_lift_m);
+      plan.touch_down = torso_over(geometry, torso, stance, landed, torso.ahead_trail_land_m);
+      break;
+  }
+  return plan;
+}
+
+StepKnots::StepKnots(const StepPlan& plan, const TorsoTrajectory::State& from,
+                     const std::array<Transform, kFootCount>& soles, std::int32_t knot_ticks) noexcept
+    : foot_(plan.goal.foot),
+      soles_(soles),
+      shift_ticks_(plan.shift_ticks),
+      knot_ticks_(std::max(knot_ticks, 1)),
+      count_(1 + (plan.shift_ticks + plan.swing_ticks + knot_ticks_ - 1) / knot_ticks_) {
+  shift_.plan(from, plan.lift_off, plan.shift_ticks, plan.shift_ticks);
+  lean_.plan(shift_.at(plan.shift_ticks), plan.touch_down, plan.swing_ticks, plan.rise_ticks);
+  swing_.plan(soles[index_of(foot_)], plan.goal.target, plan.shape, plan.swing_ticks);
+}
+
+StepKnot StepKnots::operator[](std::int32_t i) const noexcept {
+  StepKnot knot;
+  knot.tick = i * knot_ticks_;
+  knot.odom_T_sole = soles_;
+  const std::int32_t swing_tick = std::min(knot.tick - shift_ticks_, swing_.duration_ticks());
+  if (swing_tick < 0) {
+    knot.odom_T_base = TorsoTrajectory::pose(shift_.at(knot.tick));
+  } else {
+    knot.odom_T_base = TorsoTrajectory::pose(lean_.at(swing_tick));
+    knot.odom_T_sole[index_of(foot_)] = swing_.at(swing_tick);
+  }
+  return knot;
+}
+
+void StepProof::begin(const LegGeometry& geometry, const StepParams& params, const StepKnots& knots) noexcept {
+  geometry_ = geometry;
+  params_ = params;
+  knots_ = knots;
+  check_ = {true, 1e9, 1e9, 0.0};
+  next_ = 0;
+}
+
+bool StepProof::advance(std::int32_t count) noexcept {
+  const std::int32_t end = std::min(next_ + count, knots_.count());
+  for (; next_ < end; ++next_) {
+    const StepKnot knot = knots_[next_];
+    const Transform base_T_odom = knot.odom_T_base.inverse();
+    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+      const LegSolution s = solve_leg(geometry_, leg, base_T_odom * knot.odom_T_sole[index_of(leg)]);
+      LegVector& before = previous_[index_of(leg)];
+      if (!s.reachable) check_.feasible = false;
+      for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+        const JointLimits limits = joint_limits(leg, j);
+        const auto i = static_cast<Eigen::Index>(j);
+        const double q = s.q_rad[i];
+        // The knee's lower end is the stretched leg, which has a margin of its own.
+        double& low = j == kKnee ? check_.knee_rad : check_.joint_margin_rad;
+        low = std::min(low, q - limits.min_rad);
+        check_.joint_margin_rad = std::min(check_.joint_margin_rad, limits.max_rad - q);
+        if (next_ > 0) {
+          const double speed_radps = std::abs(q - before[i]) / (knots_.knot_ticks() * kTick_s);
+          check_.speed_share = std::max(check_.speed_share, speed_radps / limits.speed_radps);
+        }
+      }
+      before = s.q_rad;
+    }
+  }
+  if (next_ < knots_.count()) return false;
+  check_.feasible = check_.feasible && check_.joint_margin_rad >= params_.joint_margin_rad &&
+                    check_.knee_rad >= params_.knee_min_rad && check_.speed_share <= params_.speed_share;
+  return true;
+}
+
+StepCheck check_step(const LegGeometry& geometry, const StepParams& params, const StepKnots& knots) noexcept {
+  StepProof proof;
+  proof.begin(geometry, params, knots);
+  static_cast<void>(proof.advance(knots.count()));
+  return proof.check();
+}
+
+void StepSearch::begin(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal,
+                       const StepGoal& trailing, const TorsoTrajectory::State& from,
+                       const std::array<Transform, kFootCount>& soles) noexcept {
+  geometry_ = geometry;
+  params_ = params;
+  goal_ = goal;
+  trailing_ = trailing;
+  from_ = from;
+  soles_ = soles;
+  shape_ = 0;
+  leading_found_ = false;
+  state_ = State::kSearching;
+  try_candidate();
+}
+
+void StepSearch::try_candidate() noexcept {
+  const StepGoal& goal = leading_found_ ? trailing_ : goal_;
+  std::array<Transform, kFootCount> soles = soles_;
+  TorsoTrajectory::State from = from_;
+  if (leading_found_) {
+    soles[index_of(goal_.foot)] = goal_.target.transform();
+    from = TorsoTrajectory::at_rest({rotation_z(plan_.touch_down.yaw_rad), plan_.touch_down.position_m});
+  }
+  candidate_ = plan_step(geometry_, params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, kToeDown_rad[shape_]);
+  proof_.begin(geometry_, params_, StepKnots(candidate_, from, soles, params_.knot_ticks));
+}
+
+// Can the weight then move over the foot that landed? A wide diagonal step could be a dead end: the ankle roll of the
+// leg left behind.
+bool StepSearch::leads_on() const noexcept {
+  SolePair landed{sole_pose(soles_[0]), sole_pose(soles_[1])};
+  landed[index_of(goal_.foot)] = goal_.target;
+  const TorsoPose over = torso_over(geometry_, params_.torso, goal_.foot, landed, params_.torso.ahead_floor_m);
+  const Transform base_T_odom = Transform{rotation_z(over.yaw_rad), over.position_m}.inverse();
+  const double margin_rad = 2.0 * params_.joint_margin_rad;  // the foot lands some mm off
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const LegSolution s = solve_leg(geometry_, leg, base_T_odom * landed[index_of(leg)].transform());
+    if (!s.reachable || s.q_rad[kKnee] < params_.knee_min_rad) return false;
+    LegVector q_rad = s.q_rad;
+    q_rad[kKnee] = std::max(q_rad[kKnee], margin_rad);  // the stretched leg has a margin of its own
+    if (limit_margin_rad(leg, q_rad) < margin_rad) return false;
+  }
+  return true;
+}
+
+StepSearch::State StepSearch::step() noexcept {
+  if (state_ != State::kSearching || !proof_.advance(kKnotsPerCall)) return state_;
+  if (!proof_.check().feasible) {
+    if (++shape_ == kToeDown_rad.size()) return state_ = State::kImpossible;
+  } else {
+    if (!leading_found_) plan_ = candidate_;
+    if (goal_.kind == StepKind::kFloor && !leads_on()) return state_ = State::kImpossible;
+    if (leading_found_ || goal_.kind != StepKind::kLeading) return state_ = State::kFound;
+    leading_found_ = true;
+    shape_ = 0;
+  }
+  try_candidate();
+  return state_;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+// One step as a whole: the weight moves over the stance foot, the other foot swings. Knots of it (eqs 30, 37), the
+// proof that the legs can follow, and the search for a swing shape that they can.
+#pragma once
+
+#include <array>
+
+#include "algorithms/core/footholds.hpp"
+#include "algorithms/gait/swing.hpp"
+#include "algorithms/gait/torso.hpp"
+#include "algorithms/robot/leg_kinematics.hpp"
+
+namespace polygmap {
+
+enum class StepKind : std::uint8_t {
+  kFloor,     // while walking up
+  kLeading,   // the first foot onto the next tread
+  kTrailing,  // the second, beside it
+};
+
+struct StepGoal {
+  StepKind kind = StepKind::kFloor;
+  Foot foot = Foot::kLeft;
+  SolePose target;    // odom
+  Foothold foothold;  // the same, world
+};
+
+struct StepParams {
+  TorsoParams torso;
+  SwingShape stair_swing;
+  SwingShape floor_swing{.lift_end = 0.40,
+                         .forward_begin = 0.12,
+                         .forward_end = 0.80,
+                         .landing_begin = 0.55,
+                         .clearance_m = 0.05,
+                         .retreat_m = 0.0};
+  std::int32_t stair_shift_ticks = 310;  // 0.62 s of double support
+  std::int32_t stair_swing_ticks = 490;  // 0.98 s
+  std::int32_t floor_shift_ticks = 260;
+  std::int32_t floor_swing_ticks = 350;
+  double rise_share = 0.45;        // of a swing onto a tread in which the torso rises, to give the foot room
+  std::int32_t knot_ticks = 10;    // eq. (37): 20 ms
+  double joint_margin_rad = 0.03;  // what a plan keeps from the joints' ranges
+  double knee_min_rad = 0.08;      // and from the stretched leg
+  double speed_share = 0.9;        // of the drives' speed that a plan may use
+};
+
+struct StepPlan {
+  StepGoal goal;
+  TorsoPose lift_off;
+  TorsoPose touch_down;
+  SwingShape shape;
+  std::int32_t shift_ticks = 1;
+  std::int32_t swing_ticks = 1;
+  std::int32_t rise_ticks = 1;  // of the swing: the torso has risen
+};
+
+// Toe-down angles that are tried, in this order; half of each on the floor.
+inline constexpr std::array<double, 5> kToeDown_rad{0.3, 0.2, 0.4, 0.1, 0.5};
+
+[[nodiscard]] StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal,
+                                 const SolePair& soles, double toe_down_rad) noexcept;
+
+// Eq. (30): one of the N knots of a step; eq. (37): t_i = i dt.
+struct StepKnot {
+  std::array<Transform, kFootCount> odom_T_sole;
+  Transform odom_T_base;
+  std::int32_t tick = 0;
+};
+
+// The knots of a plan, each made when asked for: nothing is stored.
+class StepKnots {
+ public:
+  StepKnots() noexcept = default;
+  StepKnots(const StepPlan& plan, const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles,
+            std::int32_t knot_ticks) noexcept;
+  [[nodiscard]] std::int32_t count() const noexcept { return count_; }
+  [[nodiscard]] std::int32_t knot_ticks() const noexcept { return knot_ticks_; }
+  [[nodiscard]] StepKnot operator[](std::int32_t i) const noexcept;
+
+ private:
+  Foot foot_ = Foot::kLeft;
+  std::array<Transform, kFootCount> soles_;
+  TorsoTrajectory shift_, lean_;
+  Swing swing_;
+  std::int32_t shift_ticks_ = 0, knot_ticks_ = 1, count_ = 0;
+};
+
+struct StepCheck {
+  bool feasible = false;
+  double joint_margin_rad = 0.0;  // least, over all knots and joints
+  double knee_rad = 0.0;          // least
+  double speed_share = 0.0;       // greatest, of the drive's limit
+};
+
+// Follows the knots with the leg kinematics, as many per call as the tick can spare.
+class StepProof {
+ public:
+  void begin(const LegGeometry& geometry, const StepParams& params, const StepKnots& knots) noexcept;
+  // Up to `count` knots; true when all are done. A knot costs two leg solutions, about 3 us on one x86 core.
+  bool advance(std::int32_t count) noexcept;
+  [[nodiscard]] const StepCheck& check() const noexcept { return check_; }
+
+ private:
+  LegGeometry geometry_;
+  StepParams params_;
+  StepKnots knots_;
+  StepCheck check_;
+  std::array<LegVector, kFootCount> previous_;
+  std::int32_t next_ = 0;
+};
+[[nodiscard]] StepCheck check_step(const LegGeometry& geometry, const StepParams& params,
+                                   const StepKnots& knots) noexcept;
+
+// Looks for a shape of a step that both legs can do, kKnotsPerCall knots per call. A leading step is only offered when
+// the trailing step after it is possible too.
+class StepSearch {
+ public:
+  enum class State : std::uint8_t { kSearching, kFound, kImpossible };
+  static constexpr std::int32_t kKnotsPerCall = 8;
+
+  // trailing: the goal of the step after a leading one; ignored otherwise.
+  void begin(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal, const StepGoal& trailing,
+             const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept;
+  State step() noexcept;
+  [[nodiscard]] State state() const noexcept { return state_; }
+  [[nodiscard]] const StepPlan& plan() const noexcept { return plan_; }
+
+ private:
+  void try_candidate() noexcept;
+  [[nodiscard]] bool leads_on() const noexcept;
+
+  LegGeometry geometry_;
+  StepParams params_;
+  StepGoal goal_, trailing_;
+  TorsoTrajectory::State from_{};
+  std::array<Transform, kFootCount> soles_;
+  StepPlan plan_;       // the offered one, of goal_
+  StepPlan candidate_;  // under proof
+  StepProof proof_;
+  std::size_t shape_ = 0;
+  bool leading_found_ = false;
+  State state_ = State::kImpossible;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/swing.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+
+void Swing::plan(const Transform& start, const SolePose& target, const SwingShape& shape,
+                 std::int32_t duration_ticks) noexcept {
+  start_m_ = start.p_m;
+  start_yaw_rad_ = yaw_of(start.R);
+  start_pitch_rad_ = math::asin(math::clamp(-start.R(2, 0), -1.0, 1.0));
+  start_roll_rad_ = math::atan2(start.R(2, 1), start.R(2, 2));
+  target_ = target;
+  turn_rad_ = math::wrap_angle(target.yaw_rad - start_yaw_rad_);
+  shape_ = shape;
+  duration_ticks_ = std::max(duration_ticks, 1);
+  apex_m_ = std::max(start.p_m.z(), target.position_m.z()) + shape.clearance_m;
+  approach_s_ = shape.approach_m / shape.approach_mps;
+  const double landing_s = duration_ticks_ * kTick_s * (1.0 - shape.landing_begin) - approach_s_;
+  landing_ = Quintic({apex_m_, 0.0, 0.0}, {target.position_m.z() + shape.approach_m, -shape.approach_mps, 0.0},
+                     std::max(landing_s, kTick_s));
+}
+
+double Swing::height_m(std::int32_t tick) const noexcept {
+  const double u = static_cast<double>(tick) / duration_ticks_;
+  if (u <= shape_.landing_begin) {
+    return start_m_.z() + (apex_m_ - start_m_.z()) * smooth_window(u, 0.0, shape_.lift_end);
+  }
+  const double to_end_s = (duration_ticks_ - tick) * kTick_s;
+  if (to_end_s <= approach_s_) return target_.position_m.z() + to_end_s * shape_.approach_mps;
+  return landing_.at((u - shape_.landing_begin) * duration_ticks_ * kTick_s).position;
+}
+
+double Swing::lowered_m(std::int32_t tick) const noexcept {
+  return (tick - duration_ticks_) * kTick_s * shape_.approach_mps;
+}
+
+// Eq. (32): lift to the apex, down to the landing height z_0. As printed the curve jumps by z_0 at the apex and starts
+// at full speed; here both halves start and end smoothly. Eq. (33): start to end in a share of the time; the printed
+// constant speed would meet the riser, so the motion waits for the rise and ends before the landing.
+Transform Swing::at(std::int32_t tick) const noexcept {
+  const SwingShape& s = shape_;
+  const double u = static_cast<double>(tick) / duration_ticks_;
+  const double forward = smooth_window(u, s.forward_begin, s.forward_end);
+  const double retreat_m = s.retreat_m * smooth_window(u, 0.0, s.retreat_end) * (1.0 - forward);
+  const double toe_down_rad = s.toe_down_rad * smooth_window(u, s.toe_down_begin, s.toe_down_full) *
+                              (1.0 - smooth_window(u, s.toe_up_begin, s.toe_up_end));
+  const double yaw_rad = start_yaw_rad_ + turn_rad_ * forward;
+
+  // Pitched, the lowest point is the toe's edge and the foremost one the upper front edge of the collision box: these
+  // two follow the planned path.
+  const double toe_m = kCollisionRectangle.toe_x_m;
+  const double lift_m = toe_m * math::sin(toe_down_rad);
+  const double lean_m = toe_m * (math::cos(toe_down_rad) - 1.0) + kCollisionHeight_m * math::sin(toe_down_rad);
+
+  Transform sole;
+  const Vec3 heading{math::cos(yaw_rad), math::sin(yaw_rad), 0.0};
+  sole.p_m = start_m_ + (target_.position_m - start_m_) * forward - (retreat_m + lean_m) * heading;
+  sole.p_m.z() = height_m(tick) + lift_m;
+  const double level = 1.0 - smooth_window(u, 0.0, s.forward_end);  // the start's small tilt fades
+  sole.R =
+      rotation_z(yaw_rad) * rotation_y(toe_down_rad + start_pitch_rad_ * level) * rotation_x(start_roll_rad_ * level);
+  return sole;
+}
+
+}  // namespace polygmap

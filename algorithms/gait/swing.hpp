@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// The path of the swing foot (eqs 32-33), with what a real staircase asks for: rise before moving forward, keep away
+// from the riser, cross the nosing high, come down straight, seek the ground slowly.
+#pragma once
+
+#include "algorithms/gait/blend.hpp"
+#include "algorithms/gait/footstep_plan.hpp"
+
+namespace polygmap {
+
+// Times as fractions of the swing.
+struct SwingShape {
+  double lift_end = 0.46;       // apex reached
+  double forward_begin = 0.40;  // horizontal motion
+  double forward_end = 0.84;
+  double landing_begin = 0.74;
+  double clearance_m = 0.05;  // of the lowest point of the foot at the apex above the higher of start and target
+  double retreat_m = 0.015;   // away from the riser while rising
+  double retreat_end = 0.25;
+  double toe_down_rad = 0.0;  // pitch at the top of the rise: folds the leg without the ankle's limit
+  double toe_down_begin = 0.04;
+  double toe_down_full = 0.38;
+  double toe_up_begin = 0.44;
+  double toe_up_end = 0.80;
+  double approach_m = 0.008;  // the last part is done at approach_mps until something is felt
+  double approach_mps = 0.08;
+};
+
+class Swing {
+ public:
+  // start may be tilted a little; target is flat. duration_ticks: until the target height is reached.
+  void plan(const Transform& start, const SolePose& target, const SwingShape& shape,
+            std::int32_t duration_ticks) noexcept;
+  // Pose of the sole. After duration_ticks the foot goes on downwards at approach_mps: the caller ends it.
+  [[nodiscard]] Transform at(std::int32_t tick) const noexcept;
+  [[nodiscard]] std::int32_t duration_ticks() const noexcept { return duration_ticks_; }
+  // How far below the target it has been lowered, m; negative before the end.
+  [[nodiscard]] double lowered_m(std::int32_t tick) const noexcept;
+
+ private:
+  // Eq. (32) made continuous: height of the lowest point of the foot.
+  [[nodiscard]] double height_m(std::int32_t tick) const noexcept;
+
+  Vec3 start_m_ = Vec3::Zero();
+  double start_yaw_rad_ = 0.0, start_pitch_rad_ = 0.0, start_roll_rad_ = 0.0;
+  SolePose target_;
+  double turn_rad_ = 0.0;
+  double apex_m_ = 0.0;
+  SwingShape shape_;
+  Quintic landing_;
+  double approach_s_ = 0.0;
+  std::int32_t duration_ticks_ = 1;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/torso.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+
+double reach_height_m(const LegGeometry& g, const Vec3& base_m, double yaw_rad, Foot leg, const SolePose& sole,
+                      double max_leg_m) noexcept {
+  // The leg bends in a plane through the hip's roll axis: its forward reach and the distance from that axis add up to
+  // the leg, the axis being |hip_p_hip_pitch.z| above the pitch joint.
+  const Vec3 hip_m{g.base_p_hip_m.x() + g.hip_p_hip_pitch_m.x(),
+                   side_sign(leg) * (g.base_p_hip_m.y() + g.hip_p_hip_pitch_m.y()), 0.0};
+  const Vec3 d = rotation_z(yaw_rad).transpose() * (sole.position_m - base_m) - hip_m;
+  const double in_plane_m =
+      math::sqrt(std::max(math::square(max_leg_m) - math::square(d.x()), 0.0)) - g.hip_p_hip_pitch_m.z();
+  const double drop_m = math::sqrt(std::max(math::square(in_plane_m) - math::square(d.y()), 0.0));
+  return sole.position_m.z() + g.ankle_to_sole_m + drop_m - g.base_p_hip_m.z();
+}
+
+namespace {
+
+double allowed_height_m(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles,
+                        const TorsoPose& torso) noexcept {
+  double z_m = std::max(soles[0].position_m.z(), soles[1].position_m.z()) + params.height_m;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    z_m = std::min(
+        z_m, reach_height_m(geometry, torso.position_m, torso.yaw_rad, leg, soles[index_of(leg)], params.max_leg_m));
+  }
+  return z_m;
+}
+
+}  // namespace
+
+TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance, const SolePair& soles,
+                     double ahead_m) noexcept {
+  const SolePose& foot = soles[index_of(stance)];
+  TorsoPose torso{foot.position_m + rotation_z(foot.yaw_rad) * Vec3{ahead_m, -side_sign(stance) * params.inward_m, 0.0},
+                  middle_of(soles).yaw_rad};
+  torso.position_m.z() = allowed_height_m(geometry, params, soles, torso);
+  return torso;
+}
+
+TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles) noexcept {
+  TorsoPose torso = middle_of(soles);
+  torso.position_m.z() = allowed_height_m(geometry, params, soles, torso);
+  return torso;
+}
+
+TorsoTrajectory::State TorsoTrajectory::at_rest(const Transform& base) noexcept {
+  const double pitch_rad = math::asin(math::clamp(-base.R(2, 0), -1.0, 1.0));
+  const double roll_rad = math::atan2(base.R(2, 1), base.R(2, 2));
+  return {Motion{base.p_m.x()}, {base.p_m.y()}, {base.p_m.z()}, {roll_rad}, {pitch_rad}, {yaw_of(base.R)}};
+}
+
+Transform TorsoTrajectory::pose(const State& s) noexcept {
+  return {rotation_z(s[5].position) * rotation_y(s[4].position) * rotation_x(s[3].position),
+          Vec3{s[0].position, s[1].position, s[2].position}};
+}
+
+TorsoTrajectory::State TorsoTrajectory::moved(const State& state, const Transform& by) noexcept {
+  State result = state;
+  const State placed = at_rest(by * pose(state));
+  for (std::size_t i = 0; i < kAxes; ++i) result[i].position = placed[i].position;
+  return result;
+}
+
+void TorsoTrajectory::plan(const State& from, const TorsoPose& to, std::int32_t duration_ticks,
+                           std::int32_t height_ticks) noexcept {
+  const double yaw_rad = from[5].position + math::wrap_angle(to.yaw_rad - from[5].position);
+  const std::array<double, kAxes> goal{to.position_m.x(), to.position_m.y(), to.position_m.z(), 0.0, 0.0, yaw_rad};
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    const std::int32_t ticks = std::max(i == 2 ? height_ticks : duration_ticks, 1);
+    axes_[i] = Quintic(from[i], {goal[i]}, ticks * kTick_s);
+  }
+}
+
+TorsoTrajectory::State TorsoTrajectory::at(std::int32_t tick) const noexcept {
+  State s;
+  for (std::size_t i = 0; i < kAxes; ++i) s[i] = axes_[i].at(tick * kTick_s);
+  return s;
+}
+
+}  // namespace polygmap

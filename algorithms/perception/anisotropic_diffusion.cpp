@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/anisotropic_diffusion.hpp"
+
+namespace polygmap {
+namespace {
+
+// c(difference) times difference, from a to b. Kappa in inverse depth is kappa_z w^2 with kappa_z = k (base + per z),
+// squared and shared by both: it vanishes with either pixel, so that an empty one conducts nothing, without a branch.
+inline float flux(float a, float b, float base, float per_metre) noexcept {
+  const float kappa2 = (base * a + per_metre) * (base * b + per_metre) * a * b;
+  const float difference = a - b;
+  return difference * kappa2 / (kappa2 + difference * difference + 1e-20F);
+}
+
+}  // namespace
+
+void AnisotropicDiffusion::step_row(const Params& params, const DepthSigma& noise, InverseDepthImage& image,
+                                    std::int32_t row, std::int32_t width_px, std::int32_t height_px) noexcept {
+  const auto base = static_cast<float>(params.kappa_sigmas * noise.base_m);
+  const auto per_metre = static_cast<float>(params.kappa_sigmas * noise.per_metre);
+  const auto lambda = static_cast<float>(math::clamp(params.lambda, 0.0, 0.25));
+  float* w = image.row(row);
+  float* above = flux_above_.data();
+  float* left = flux_left_.data();
+  float* below = flux_below_.data();
+  left[0] = 0.0F;
+  for (std::int32_t i = 1; i < width_px; ++i) left[i] = flux(w[i - 1], w[i], base, per_metre);
+  left[width_px] = 0.0F;
+  if (row + 1 < height_px) {
+    const float* next = image.row(row + 1);
+    for (std::int32_t i = 0; i < width_px; ++i) below[i] = flux(w[i], next[i], base, per_metre);
+  } else {
+    flux_below_.fill(0.0F);
+  }
+  for (std::int32_t i = 0; i < width_px; ++i) {
+    w[i] += lambda * ((left[i] - left[i + 1]) + (above[i] - below[i]));
+    above[i] = below[i];
+  }
+}
+
+}  // namespace polygmap

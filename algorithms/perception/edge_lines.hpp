@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a surface ends, to a fraction of a pixel: change-points in the raw picture, one line through all.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/surfaces.hpp"
+#include "algorithms/perception/depth_reduction.hpp"
+#include "algorithms/perception/plane_fit.hpp"
+
+namespace polygmap {
+
+using FullDepthImage = Raster<std::uint16_t, kDepthWidth_px, kDepthHeight_px>;
+
+// What the finder reads: the raw picture, which of its pixels are the robot's own, and the camera.
+struct RawPicture {
+  const FullDepthImage* depth = nullptr;
+  const HalfImage<std::uint8_t>* flags = nullptr;
+  CameraIntrinsics intrinsics;
+  DepthReduction reduction;  // for the valid range
+};
+
+class EdgeLineFinder {
+ public:
+  struct Params {
+    std::int32_t window_px = 16;  // full-resolution rows searched to each side of the first guess
+    std::int32_t column_step_px = 2;
+    std::int32_t segment_px = 28;  // columns that share one change-point
+    double truncate_sigmas = 3.0;
+    std::int32_t min_side_px = 3;  // valid pixels of the window on each side of the change-point that fit their plane
+    std::int32_t max_gap_px = 6;   // rows without data at the change-point: beyond, the column says nothing
+    std::int32_t min_columns = 12;
+    double min_length_m = 0.06;
+    double max_rms_m = 0.006;
+    double min_inlier_share = 0.5;
+    // Where the two planes meet is the sharper answer when no overhang lies between: it uses every pixel of both. It is
+    // taken when it lies within agree_m or three sigmas of the change-points, but never beyond agree_max_m.
+    double agree_m = 0.003;
+    double agree_max_m = 0.008;
+    double face_m = 0.006;         // an overhang's front face stands out from the riser by more than this ...
+    double face_max_m = 0.08;      // ... and less than this
+    double slow_error_m = 0.0012;  // of a segment's change-point, shared by its columns
+  };
+  enum class Outcome : std::uint8_t { kFound, kAgain, kFewColumns, kNoLine, kNotStraight, kShort };
+
+  // Boundary pixels of the surface in half-resolution columns, as a first guess.
+  void begin_guess() noexcept { guess_count_ = 0; }
+  void add_guess(std::int32_t column, std::int32_t row) noexcept;
+  // A line through most of the guesses; false when there is none.
+  [[nodiscard]] bool try_guess(const Params& params, std::uint32_t seed) noexcept;
+
+  // The plane beyond an edge and the covariance of its m.
+  struct Beyond {
+    InversePlane plane;
+    Mat3 covariance = Mat3::Zero();
+  };
+  // surface_above: the surface lies above its boundary in the picture (a nosing), else below it (a back line). other:
+  // the plane on the far side; null when that is not known, then only leaving the surface's plane counts.
+  void begin(const Params& params, const DepthSigma& noise, const RawPicture& picture, const InversePlane& surface,
+             const Beyond* other, bool surface_above) noexcept;
+  // Searches the next columns; true when all are done. At most max_columns columns.
+  bool step(std::int32_t max_columns) noexcept;
+  // kAgain: the tread overhangs the riser with a face of its own; step() once more, against that face.
+  [[nodiscard]] Outcome finish(EdgeLine& line) noexcept;
+  // The first guess on the surface's plane, after begin(); good to a half-resolution pixel.
+  [[nodiscard]] EdgeLine guessed_line() const noexcept { return {guess_a_m_, guess_b_m_, 0.01, true}; }
+
+  [[nodiscard]] std::int32_t column_count() const noexcept { return count_; }
+
+ private:
+  struct Guess {
+    std::int16_t column, row;
+  };
+  static constexpr std::int32_t kMaxWindow_px = 24;
+  static constexpr std::int32_t kBinsPerPixel = 2;
+  static constexpr std::int32_t kMaxReach_bins = kMaxWindow_px * kBinsPerPixel;
+  static constexpr std::int32_t kMaxSegments = 24;
+
+  // Columns are pooled in segments: one column's change-point is skewed towards the less noisy plane by up to a pixel,
+  // the pooled one is not.
+  struct Segment {
+    std::array<float, 2 * kMaxReach_bins> gain{};  // sum of cost(surface) - cost(other), by distance from the guess
+    double columns = 0.0;
+    double column_sum = 0.0;
+  };
+  void search_column(std::int32_t column) noexcept;
+  void restart() noexcept;
+  void add_face(std::int32_t column, std::int32_t first, std::int32_t from, std::int32_t steps) noexcept;
+  // How far the first pixels past the change-point stand out from the other plane; false when there are too few.
+  [[nodiscard]] bool try_face_offset(double& offset_m) const noexcept;
+  [[nodiscard]] bool try_segment_point(const Segment& segment, Vec2& point_m) const noexcept;
+
+  std::array<Guess, kHalfWidth_px> guess_{};
+  std::size_t guess_count_ = 0;
+  double guess_row_ = 0.0;  // full-resolution row at column 0 of the guessed line
+  double guess_slope_ = 0.0;
+  std::int32_t first_column_ = 0;  // full resolution
+  std::int32_t last_column_ = -1;
+
+  Params params_;
+  DepthSigma noise_;
+  RawPicture picture_;
+  InversePlane surface_;
+  InversePlane other_;
+  Mat3 other_covariance_ = Mat3::Zero();
+  bool other_known_ = false;
+  bool surface_above_ = true;
+  std::int32_t next_column_ = 0;
+
+  // Coordinates (along, across) on the surface's plane.
+  Vec3 origin_m_ = Vec3::Zero();
+  Vec3 guess_a_m_ = Vec3::Zero();
+  Vec3 guess_b_m_ = Vec3::Zero();
+  Vec3 along_ = Vec3::UnitX();
+  Vec3 across_ = Vec3::UnitY();
+
+  std::array<Segment, kMaxSegments> segments_{};
+  std::int32_t segment_count_ = 0;
+  static constexpr std::int32_t kFaceBins = 64;
+  static constexpr double kFaceBin_m = 0.002;
+  std::array<std::int32_t, kFaceBins> face_{};  // offsets of 0, 2, ... mm; below 0 counts as 0
+  bool face_tried_ = false;
+  std::array<Vec2, kMaxSegments> points_m_{};
+  std::array<double, kMaxSegments> weights_{};
+  std::array<double, kMaxSegments> scratch_{};
+  std::int32_t count_ = 0;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the polygon map keeps about one surface.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/surfaces.hpp"
+#include "algorithms/core/transform.hpp"
+#include "algorithms/geometry/convex.hpp"
+#include "algorithms/geometry/plane.hpp"
+
+namespace polygmap {
+
+inline constexpr std::size_t kMapSides = 8;  // side k looks along k * 45 degrees from the local x axis
+
+// A seen line, local coordinates.
+struct SeenLine {
+  Vec2 a_m, b_m;
+  double variance_m2;
+};
+// x = offset + slope * y in local coordinates, with the 2x2 information of (offset, slope).
+struct TrackedLine {
+  Vec2 state = Vec2::Zero();
+  Mat2 information = Mat2::Zero();
+  std::int64_t seen_ns = 0;
+  std::uint32_t sightings = 0;
+  std::uint32_t outliers = 0;
+  [[nodiscard]] double at_m(double y_m) const noexcept { return state[0] + state[1] * y_m; }
+  [[nodiscard]] double variance_m2(double y_m) const noexcept;
+};
+struct TrackedSide {
+  double support_m = 0.0;
+  double information = 0.0;
+  std::int64_t seen_ns = 0;
+  std::uint32_t outliers = 0;
+  bool observed = false;
+};
+// A surface of the frame, world coordinates.
+struct SeenSurface {
+  SurfaceKind kind = SurfaceKind::kOther;
+  Plane plane;
+  Vec3 centroid_m = Vec3::Zero();
+  double offset_variance_m2 = 0.0;
+  double tilt_variance_rad2 = 0.0;
+  double pose_variance_m2 = 0.0;
+  double rmse_m = 0.0;
+  double invalid_fraction = 0.0;
+  PolygonVertices polygon;
+  std::array<EdgeKind, kMaxPolygonVertices> edges{};
+  EdgeLine nosing;
+  EdgeLine back;
+};
+struct MapTrack {
+  std::uint32_t id = 0;
+  SurfaceKind kind = SurfaceKind::kOther;
+  std::uint32_t sightings = 0;
+  std::uint32_t misses = 0;
+  std::int64_t first_seen_ns = 0;
+  std::int64_t last_seen_ns = 0;
+  Transform world_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up
+  double offset_information = 0.0;
+  double tilt_information = 0.0;
+  double pose_variance_m2 = 0.0;
+  double rmse_m = 0.0;
+  double invalid_fraction = 0.0;
+  std::array<TrackedSide, kMapSides> sides{};
+  TrackedLine nosing;
+  TrackedLine back;
+  ConvexPolygon polygon;  // local
+  EdgeTags tags{};
+  bool dirty = false;
+  bool dead = false;
+};
+
+}  // namespace polygmap

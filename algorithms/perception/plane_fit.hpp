@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Planes in inverse depth: w(ray) = m . ray for the ray (x, y, 1). RANSAC with deterministic draws and a weighted
+// least-squares refinement.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "algorithms/core/math.hpp"
+#include "algorithms/perception/images.hpp"
+
+namespace polygmap {
+
+// m = -normal / d for normal . p + d = 0, normal towards the camera, d > 0.
+struct InversePlane {
+  Vec3 m = Vec3::UnitZ();
+
+  [[nodiscard]] double d_m() const noexcept { return 1.0 / m.norm(); }
+  [[nodiscard]] Vec3 normal() const noexcept { return -m / m.norm(); }
+  [[nodiscard]] double inverse_depth(const Vec3& ray) const noexcept { return m.dot(ray); }
+  // Where a ray meets the plane; only for rays with inverse_depth > 0.
+  [[nodiscard]] Vec3 point(const Vec3& ray) const noexcept { return ray / m.dot(ray); }
+  // Signed distance of a point, positive on the camera's side.
+  [[nodiscard]] double distance_m(const Vec3& point_m) const noexcept { return (1.0 - m.dot(point_m)) * d_m(); }
+};
+
+// One measured pixel.
+struct PlaneSample {
+  float x = 0.0F;  // ray
+  float y = 0.0F;
+  float w = 0.0F;  // inverse depth, 1/m
+};
+
+// sigma of an inverse depth on the plane: sigma_z w^2 with sigma_z of the noise model and cos(incidence) = w d / |ray|.
+[[nodiscard]] double inverse_depth_sigma(const DepthSigma& noise, const InversePlane& plane, const Vec3& ray) noexcept;
+
+// Weighted moments of samples: sum of g ray ray^T, g ray w, g w^2, g z^2... enough for a fit, and they add.
+struct PlaneMoments {
+  double xx = 0, xy = 0, x1 = 0, yy = 0, y1 = 0, one = 0;  // of g ray ray^T
+  double xw = 0, yw = 0, w1 = 0, ww = 0;                   // of g ray w and g w w
+  double count = 0;
+
+  void add(double g, double x, double y, double w) noexcept {
+    xx += g * x * x, xy += g * x * y, x1 += g * x, yy += g * y * y, y1 += g * y, one += g;
+    xw += g * x * w, yw += g * y * w, w1 += g * w, ww += g * w * w;
+    count += 1.0;
+  }
+  void add(const PlaneMoments& o) noexcept {
+    xx += o.xx, xy += o.xy, x1 += o.x1, yy += o.yy, y1 += o.y1, one += o.one;
+    xw += o.xw, yw += o.yw, w1 += o.w1, ww += o.ww;
+    count += o.count;
+  }
+  [[nodiscard]] Mat3 matrix() const noexcept { return (Mat3() << xx, xy, x1, xy, yy, y1, x1, y1, one).finished(); }
+  [[nodiscard]] Vec3 vector() const noexcept { return {xw, yw, w1}; }
+  [[nodiscard]] Vec3 mean_ray() const noexcept { return {x1 / one, y1 / one, 1.0}; }
+};
+
+// What gravity says about a plane before it is measured.
+enum class Lean : std::uint8_t { kAny, kLevel, kUpright };
+
+struct PlaneFit {
+  struct Params {
+    std::int32_t trials = 24;
+    double inlier_sigmas = 3.0;
+    double inlier_floor_m = 0.002;  // added: slow depth errors that the noise model does not have
+    double enough_inliers = 0.92;   // stop drawing at this share
+    // Half-resolution pixels that are worth one independent measurement: depth errors are correlated over 5 pixels and
+    // warp slowly over 35. Sets how much the lean below counts, and the covariance.
+    double correlated_px = 160.0;
+    double lean_sigma_rad = 0.02;  // how level treads and how upright risers are, the estimator's up included
+  };
+};
+
+// Standard deviation of the plane's place along its normal where a ray meets it; covariance is that of m.
+[[nodiscard]] double plane_sigma_m(const InversePlane& plane, const Mat3& covariance, const Vec3& ray) noexcept;
+
+// Weighted least squares of moments whose weights were 1 / sigma^2, with the lean as a prior. False when the moments do
+// not fix a plane in front of the camera. covariance (of m) is optional.
+[[nodiscard]] bool try_solve(const PlaneFit::Params& params, const PlaneMoments& moments, Lean lean, const Vec3& up,
+                             InversePlane& plane, Mat3* covariance) noexcept;
+
+// RANSAC over a list of samples, one trial per call so that it can be resumed.
+class PlaneRansac {
+ public:
+  void begin(std::uint32_t seed, std::span<const PlaneSample> samples) noexcept;
+  // Draw number trial; true when no further draw is wanted.
+  bool step(const PlaneFit::Params& params, const DepthSigma& noise, Lean lean, const Vec3& up) noexcept;
+  // Refines the best draw by two rounds of truncated least squares. False when nothing was found.
+  [[nodiscard]] bool try_finish(const PlaneFit::Params& params, const DepthSigma& noise, Lean lean, const Vec3& up,
+                                InversePlane& plane, std::int32_t& inliers) const noexcept;
+  [[nodiscard]] std::int32_t trials() const noexcept { return trial_; }
+
+ private:
+  std::span<const PlaneSample> samples_{};
+  std::uint32_t seed_ = 0;
+  std::int32_t trial_ = 0;
+  std::int32_t best_inliers_ = 0;
+  InversePlane best_;
+};
+
+// A 32-bit hash of a counter: the same draws on every machine and in every slicing.
+[[nodiscard]] constexpr std::uint32_t counter_random(std::uint32_t seed, std::uint32_t counter) noexcept {
+  std::uint32_t h = seed * 0x9E3779B9U + counter * 0x85EBCA6BU + 0x27220A95U;
+  h ^= h >> 16U;
+  h *= 0x7FEB352DU;
+  h ^= h >> 15U;
+  h *= 0x846CA68BU;
+  h ^= h >> 16U;
+  return h;
+}
+
+}  // namespace polygmap

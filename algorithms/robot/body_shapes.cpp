@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/robot/body_shapes.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+
+OrientedBox collision_box(const Transform& sole) noexcept {
+  constexpr SoleRectangle r = kCollisionRectangle;
+  const Transform sole_T_centre{Mat3::Identity(), Vec3{r.centre_x_m(), 0, 0.5 * kCollisionHeight_m}};
+  return {sole * sole_T_centre, Vec3{0.5 * r.length_m(), r.half_width_m, 0.5 * kCollisionHeight_m}};
+}
+
+LegShapes base_leg_shapes(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept {
+  const LegPoints points = base_p_leg(geometry, leg, q_rad);
+  return {{points.hip_pitch_m, points.knee_m, kThighRadius_m},
+          {points.knee_m, points.ankle_m, kShankRadius_m},
+          collision_box(base_T_sole(geometry, leg, q_rad))};
+}
+
+double signed_distance_m(const Capsule& capsule, const Vec3& point_m) noexcept {
+  const Vec3 axis = capsule.b_m - capsule.a_m;
+  const double length2 = std::max(axis.squaredNorm(), 1e-12);
+  const double along = math::clamp((point_m - capsule.a_m).dot(axis) / length2, 0.0, 1.0);
+  return (point_m - capsule.a_m - along * axis).norm() - capsule.radius_m;
+}
+
+double signed_distance_m(const OrientedBox& box, const Vec3& point_m) noexcept {
+  const Vec3 q = (box.centre.inverse() * point_m).cwiseAbs() - box.half_m;
+  return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
+}
+
+}  // namespace polygmap

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts of the robot that its own camera can see, as shapes that follow the joints: what the self-filter masks and
+// what the simulated camera renders.
+#pragma once
+
+#include "algorithms/robot/leg_kinematics.hpp"
+
+namespace polygmap {
+
+struct Capsule {
+  Vec3 a_m = Vec3::Zero();
+  Vec3 b_m = Vec3::Zero();
+  double radius_m = 0.0;
+};
+struct OrientedBox {
+  Transform centre;  // pose of the box's centre and axes
+  Vec3 half_m = Vec3::Zero();
+};
+struct LegShapes {
+  Capsule thigh;
+  Capsule shank;
+  OrientedBox foot;
+};
+
+inline constexpr double kThighRadius_m = 0.07;
+inline constexpr double kShankRadius_m = 0.055;
+
+// In the base frame.
+[[nodiscard]] LegShapes base_leg_shapes(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept;
+
+// The foot's collision box for a sole pose, in the frame of that pose.
+[[nodiscard]] OrientedBox collision_box(const Transform& sole) noexcept;
+
+// Signed distance of a point to a shape's surface, m; negative inside. Same frame for both.
+[[nodiscard]] double signed_distance_m(const Capsule& capsule, const Vec3& point_m) noexcept;
+[[nodiscard]] double signed_distance_m(const OrientedBox& box, const Vec3& point_m) noexcept;
+
+}  // namespace polygmap

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/robot/leg_kinematics.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace polygmap {
+namespace {
+
+Vec3 mirrored(const Vec3& left_m, Foot leg) noexcept { return {left_m.x(), side_sign(leg) * left_m.y(), left_m.z()}; }
+
+// Joint frames of one leg in the base frame, each after its own joint's rotation.
+struct LegFrames {
+  std::array<Transform, kJointsPerLeg> joint;
+  Transform sole;
+};
+
+LegFrames leg_frames(const LegGeometry& g, Foot leg, const LegVector& q) noexcept {
+  LegFrames f;
+  f.joint[kHipRoll] = Transform{rotation_x(q[kHipRoll]), mirrored(g.base_p_hip_m, leg)};
+  f.joint[kHipYaw] = f.joint[kHipRoll] * Transform{rotation_z(q[kHipYaw]), Vec3::Zero()};
+  f.joint[kHipPitch] = f.joint[kHipYaw] * Transform{rotation_y(q[kHipPitch]), mirrored(g.hip_p_hip_pitch_m, leg)};
+  f.joint[kKnee] = f.joint[kHipPitch] * Transform{rotation_y(q[kKnee]), Vec3{0, 0, -g.thigh_m}};
+  f.joint[kAnklePitch] = f.joint[kKnee] * Transform{rotation_y(q[kAnklePitch]), Vec3{0, 0, -g.shank_m}};
+  f.joint[kAnkleRoll] = f.joint[kAnklePitch] * Transform{rotation_x(q[kAnkleRoll]), Vec3::Zero()};
+  f.sole = f.joint[kAnkleRoll] * Transform{Mat3::Identity(), Vec3{0, 0, -g.ankle_to_sole_m}};
+  return f;
+}
+
+}  // namespace
+
+LegVector leg_joints(const JointVector& q_rad, Foot leg) noexcept {
+  return q_rad.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0)));
+}
+
+Transform base_T_sole(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept {
+  return leg_frames(geometry, leg, q_rad).sole;
+}
+
+LegPoints base_p_leg(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept {
+  const LegFrames f = leg_frames(geometry, leg, q_rad);
+  return {f.joint[kHipPitch].p_m, f.joint[kKnee].p_m, f.joint[kAnklePitch].p_m};
+}
+
+LegJacobian leg_jacobian(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept {
+  constexpr std::array<int, kJointsPerLeg> kAxis{0, 2, 1, 1, 1, 0};
+  const LegFrames f = leg_frames(geometry, leg, q_rad);
+  LegJacobian jacobian;
+  for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+    const auto column = static_cast<Eigen::Index>(j);
+    const Vec3 axis = f.joint[j].R.col(kAxis[j]);
+    jacobian.block<3, 1>(0, column) = axis.cross(f.sole.p_m - f.joint[j].p_m);
+    jacobian.block<3, 1>(3, column) = axis;
+  }
+  return jacobian;
+}
+
+LegSolution solve_leg(const LegGeometry& g, Foot leg, const Transform& base_T_sole) noexcept {
+  LegSolution solution;
+  LegVector& q = solution.q_rad;
+  const Vec3 hip_p_pitch = mirrored(g.hip_p_hip_pitch_m, leg);
+  const Vec3 base_p_hip = mirrored(g.base_p_hip_m, leg);
+  const Vec3 base_p_ankle = base_T_sole * Vec3{0, 0, g.ankle_to_sole_m};
+
+  // The hip seen from the foot: the ankle roll brings its y to minus the pitch joint's lateral offset.
+  const Vec3 foot_p_hip = base_T_sole.R.transpose() * (base_p_hip - base_p_ankle);
+  const double radius = std::max(math::sqrt(math::square(foot_p_hip.y()) + math::square(foot_p_hip.z())), 1e-6);
+  const double offset = math::clamp(-hip_p_pitch.y() / radius, -1.0, 1.0);
+  q[kAnkleRoll] = math::wrap_angle(math::acos(offset) - math::atan2(foot_p_hip.z(), foot_p_hip.y()));
+
+  const Mat3 N = base_T_sole.R * rotation_x(-q[kAnkleRoll]);  // Rx(roll) Rz(yaw) Ry(sum of pitches)
+  q[kHipYaw] = math::asin(math::clamp(-N(0, 1), -1.0, 1.0));
+  q[kHipRoll] = math::atan2(N(2, 1), N(1, 1));
+  const double pitch_sum = math::atan2(N(0, 2), N(0, 0));
+
+  const Mat3 base_R_yaw = rotation_x(q[kHipRoll]) * rotation_z(q[kHipYaw]);
+  const Vec3 leg_vector = base_R_yaw.transpose() * (base_p_ankle - base_p_hip) - hip_p_pitch;
+  const double length = math::sqrt(math::square(leg_vector.x()) + math::square(leg_vector.z()));
+  const double cos_knee =
+      (length * length - g.thigh_m * g.thigh_m - g.shank_m * g.shank_m) / (2.0 * g.thigh_m * g.shank_m);
+  solution.reachable = cos_knee <= 1.0 && cos_knee >= -1.0;
+  q[kKnee] = math::acos(math::clamp(cos_knee, -1.0, 1.0));
+  const double bend = math::atan2(g.shank_m * math::sin(q[kKnee]), g.thigh_m + g.shank_m * math::cos(q[kKnee]));
+  q[kHipPitch] = math::atan2(-leg_vector.x(), -leg_vector.z()) - bend;
+  q[kAnklePitch] = math::wrap_angle(pitch_sum - q[kHipPitch] - q[kKnee]);
+  solution.within_limits = limit_margin_rad(leg, q) >= 0.0;
+  return solution;
+}
+
+double limit_margin_rad(Foot leg, const LegVector& q_rad) noexcept {
+  double margin = 1e9;
+  for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+    const JointLimits limits = joint_limits(leg, j);
+    const double q = q_rad[static_cast<Eigen::Index>(j)];
+    margin = std::min({margin, q - limits.min_rad, limits.max_rad - q});
+  }
+  return margin;
+}
+
+}  // namespace polygmap

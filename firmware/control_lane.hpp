@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sense, estimate, gait, command: in every minor frame.
+#pragma once
+
+#include "algorithms/core/work.hpp"
+#include "firmware/lane_link.hpp"
+#include "firmware/params.hpp"
+#include "hal/ports/imu.hpp"
+#include "hal/ports/joint_bus.hpp"
+#include "hal/ports/lidar_odometry.hpp"
+#include "scheduler/health.hpp"
+
+namespace polygmap {
+
+class ControlLane {
+ public:
+  ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometry& lio, LaneLink& link,
+              const Params& params) noexcept;
+
+  Progress sense(std::int64_t now_ns) noexcept;
+  Progress estimate(std::int64_t now_ns) noexcept;
+  Progress gait(std::int64_t now_ns) noexcept;
+  Progress command(std::int64_t now_ns) noexcept;
+  Progress health(std::int64_t now_ns) noexcept;
+
+  void request_stop() noexcept { gait_.request_stop(); }
+
+  [[nodiscard]] const StateEstimate& state() const noexcept { return estimator_.state(); }
+  [[nodiscard]] const GaitStatus& gait_status() const noexcept { return gait_.status(); }
+  [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
+  [[nodiscard]] const JointCommand& last_command() const noexcept { return command_; }
+  [[nodiscard]] Health& faults() noexcept { return health_; }
+  [[nodiscard]] const Health& faults() const noexcept { return health_; }
+
+ private:
+  void answer_pose_request() noexcept;
+  void report_rejections(std::int64_t now_ns) noexcept;
+  void report_gait(std::int64_t now_ns) noexcept;
+  void hand_over_touch_down() noexcept;
+
+  hal::Imu& imu_port_;
+  hal::JointBus& joint_port_;
+  hal::LidarOdometry& lio_port_;
+  LaneLink& link_;
+  const Params& params_;
+
+  Estimator estimator_;
+  Gait gait_;
+  Health health_;
+  ImuSample imu_;
+  JointFeedback joints_;
+  FootholdSet footholds_;
+  JointCommand command_;
+  bool imu_fresh_ = false;
+  bool joints_fresh_ = false;
+  bool command_ready_ = false;
+  bool lio_missing_ = false;
+  Estimator::Counters estimator_seen_;  // as of the last frame: what grew since is reported
+  GaitStatus gait_seen_;
+  std::uint32_t step_handed_over_ = 0;  // sequence of the last touch-down told to the estimator
+};
+
+}  // namespace polygmap

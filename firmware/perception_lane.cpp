@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "firmware/perception_lane.hpp"
+
+#include "algorithms/robot/body_shapes.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr std::int64_t kCameraTimeout_ns = 200 * kNsPerMs;  // six frames
+
+}  // namespace
+
+PerceptionLane::PerceptionLane(hal::DepthCamera& camera, LaneLink& link, const Params& params) noexcept
+    : camera_port_(camera),
+      link_(link),
+      params_(params),
+      intrinsics_(camera.intrinsics()),
+      extractor_(params.surfaces),
+      map_(params.map),
+      search_(params.footholds) {}
+
+Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
+  if (stage_ == FrameStage::kWaiting) {
+    if (!camera_port_.try_acquire(frame_)) {
+      if (now_ns - last_frame_ns_ > kCameraTimeout_ns) {
+        health_.raise(Fault::kDepthMissing, now_ns);
+        last_frame_ns_ = now_ns;
+      }
+      return Progress::kIdle;
+    }
+    last_frame_ns_ = now_ns;
+    link_.pose_request.back() = {frame_.sequence, frame_.stamp_ns};
+    link_.pose_request.publish();
+    stage_ = FrameStage::kPoseAsked;
+    return Progress::kBusy;
+  }
+  if (stage_ == FrameStage::kPoseAsked && link_.pose_answer.try_take()) {
+    begin_extraction(now_ns);
+    return Progress::kDone;
+  }
+  return Progress::kIdle;
+}
+
+void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
+  const PoseAnswer& answer = link_.pose_answer.front();
+  stage_ = FrameStage::kWaiting;
+  if (answer.found && answer.state.initialised && answer.sequence == frame_.sequence) {
+    exposure_state_ = answer.state;
+    const Transform camera_T_base = params_.base_T_camera.inverse();
+    SurfaceExtractor::View view;
+    view.intrinsics = intrinsics_;
+    view.camera_up = (camera_T_base.R * exposure_state_.odom_T_base.R.transpose()) * Vec3::UnitZ();
+    view.body_margin_m = params_.body_margin_m;
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      if (!params_.self_filter) break;
+      view.body[index_of(foot)] =
+          transformed(camera_T_base, base_leg_shapes(params_.legs, foot, leg_joints(exposure_state_.q_rad, foot)));
+    }
+    if (extractor_.try_begin(frame_, view)) {
+      stage_ = FrameStage::kExtracting;
+    } else {
+      health_.raise(Fault::kDepthRejected, now_ns);
+    }
+  }
+  camera_port_.release();
+}
+
+Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexcept {
+  if (stage_ != FrameStage::kExtracting) return Progress::kIdle;
+  const Progress progress = extractor_.step(budget);
+  if (progress == Progress::kDone) {
+    if (extractor_.result().dropped > 0) health_.raise(Limit::kPlanesFull, now_ns, extractor_.result().dropped);
+    begin_map();
+    stage_ = FrameStage::kWaiting;
+  }
+  return progress;
+}
+
+void PerceptionLane::begin_map() noexcept {
+  PolygonMap::View view;
+  view.world_T_camera = exposure_state_.world_T_base() * params_.base_T_camera;
+  view.position_sigma_m = exposure_state_.position_sigma_m.norm();
+  view.intrinsics = intrinsics_;
+  map_.begin(extractor_.result(), view);
+  mapping_ = true;
+}
+
+Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
+  if (!mapping_) return Progress::kIdle;
+  const Progress progress = map_.step(budget);
+  if (progress != Progress::kBusy) {
+    mapping_ = false;
+    search_due_ = true;
+    health_.raise(Limit::kMapFull, now_ns, map_.counters().evicted - evicted_seen_);
+    evicted_seen_ = map_.counters().evicted;
+  }
+  return progress;
+}
+
+void PerceptionLane::begin_search(std::int64_t now_ns) noexcept {
+  (void)link_.search_context.try_take();  // the newest, or the last one again
+  const SearchContext& context = link_.search_context.front();
+  FootholdSearch::Query query;
+  query.world_T_base = context.state.world_T_base();
+  for (const Foot foot : {Foot::kLeft, Foot::kRight})
+    query.world_T_sole[index_of(foot)] = context.state.world_T_sole(foot);
+  query.stance = context.stance;
+  query.now_ns = now_ns;
+  query.climbing = context.climbing;
+  search_.begin(map_.snapshot(), query);
+  search_due_ = false;
+  searching_ = true;
+}
+
+Progress PerceptionLane::footholds(std::int64_t now_ns, WorkBudget& budget) noexcept {
+  if (!searching_ && search_due_) begin_search(now_ns);
+  if (!searching_) return Progress::kIdle;
+  const Progress progress = search_.step(budget);
+  if (progress == Progress::kDone) {
+    link_.footholds.back() = search_.result();
+    link_.footholds.publish();
+  }
+  if (progress != Progress::kBusy) searching_ = false;
+  return progress;
+}
+
+}  // namespace polygmap

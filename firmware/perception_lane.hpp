@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frame intake, surfaces, map, footholds: resumable, whenever a frame is there.
+#pragma once
+
+#include "algorithms/core/work.hpp"
+#include "firmware/lane_link.hpp"
+#include "firmware/params.hpp"
+#include "hal/ports/depth_camera.hpp"
+#include "scheduler/health.hpp"
+
+namespace polygmap {
+
+class PerceptionLane {
+ public:
+  PerceptionLane(hal::DepthCamera& camera, LaneLink& link, const Params& params) noexcept;
+
+  // Takes a frame from the driver, asks for the pose at its exposure, and starts the extraction when it is known.
+  Progress intake(std::int64_t now_ns) noexcept;
+  Progress surfaces(std::int64_t now_ns, WorkBudget& budget) noexcept;
+  Progress map(std::int64_t now_ns, WorkBudget& budget) noexcept;
+  Progress footholds(std::int64_t now_ns, WorkBudget& budget) noexcept;
+
+  [[nodiscard]] const SurfaceFrame& surface_frame() const noexcept { return extractor_.result(); }
+  [[nodiscard]] const StateEstimate& state_at_exposure() const noexcept { return exposure_state_; }
+  [[nodiscard]] const MapSnapshot& map_snapshot() const noexcept { return map_.snapshot(); }
+  [[nodiscard]] const FootholdSet& foothold_set() const noexcept { return search_.result(); }
+  [[nodiscard]] const SurfaceExtractor& extractor() const noexcept { return extractor_; }
+  [[nodiscard]] const Health& faults() const noexcept { return health_; }
+
+ private:
+  enum class FrameStage : std::uint8_t { kWaiting, kPoseAsked, kExtracting };
+
+  void begin_extraction(std::int64_t now_ns) noexcept;
+  void begin_map() noexcept;
+  void begin_search(std::int64_t now_ns) noexcept;
+
+  hal::DepthCamera& camera_port_;
+  LaneLink& link_;
+  const Params& params_;
+  CameraIntrinsics intrinsics_;
+
+  // The next frame is extracted while the last one is still being searched.
+  FrameStage stage_ = FrameStage::kWaiting;
+  bool mapping_ = false;
+  bool search_due_ = false;
+  bool searching_ = false;
+  DepthFrameView frame_;
+  StateEstimate exposure_state_;
+  std::int64_t last_frame_ns_ = 0;
+  std::uint32_t evicted_seen_ = 0;
+  SurfaceExtractor extractor_;
+  PolygonMap map_;
+  FootholdSearch search_;
+  Health health_;
+};
+
+}  // namespace polygmap

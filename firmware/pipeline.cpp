@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "firmware/pipeline.hpp"
+
+namespace polygmap {
+
+static_assert(sizeof(Pipeline) <= kMemoryBudget_bytes);
+
+Progress Pipeline::run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& budget) noexcept {
+  switch (static_cast<Row>(row)) {
+    case kSense:
+      return control_.sense(frame_ns);
+    case kEstimate:
+      return control_.estimate(frame_ns);
+    case kGait:
+      return control_.gait(frame_ns);
+    case kCommand:
+      return control_.command(frame_ns);
+    case kHealth:
+      return control_.health(frame_ns);
+    case kIntake:
+      return perception_.intake(frame_ns);
+    case kSurfaces:
+      return perception_.surfaces(frame_ns, budget);
+    case kMap:
+      return perception_.map(frame_ns, budget);
+    case kFootholds:
+      return perception_.footholds(frame_ns, budget);
+    case kRowCount:
+      break;
+  }
+  return Progress::kIdle;
+}
+
+Telemetry Pipeline::telemetry(std::int64_t now_ns) const noexcept {
+  return {now_ns,
+          control_.state(),
+          perception_.surface_frame(),
+          perception_.state_at_exposure(),
+          perception_.map_snapshot(),
+          perception_.foothold_set(),
+          control_.gait_status()};
+}
+
+std::array<StageMemory, 7> static_memory() noexcept {
+  constexpr std::size_t kStages = sizeof(Estimator) + sizeof(SurfaceExtractor) + sizeof(PolygonMap) +
+                                  sizeof(FootholdSearch) + sizeof(Gait) + sizeof(LaneLink);
+  return {{{"estimation", sizeof(Estimator)},
+           {"perception", sizeof(SurfaceExtractor)},
+           {"polygon_map", sizeof(PolygonMap)},
+           {"foothold", sizeof(FootholdSearch)},
+           {"gait", sizeof(Gait)},
+           {"lane_link", sizeof(LaneLink)},
+           {"other", sizeof(Pipeline) - kStages}}};
+}
+
+}  // namespace polygmap

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// The wiring: ports in, joint commands out. One static object; nothing is allocated.
+#pragma once
+
+#include <array>
+
+#include "firmware/control_lane.hpp"
+#include "firmware/perception_lane.hpp"
+#include "firmware/schedule.hpp"
+#include "firmware/telemetry.hpp"
+
+namespace polygmap {
+
+struct Ports {
+  hal::DepthCamera& camera;
+  hal::Imu& imu;
+  hal::JointBus& joints;
+  hal::LidarOdometry& lio;
+};
+
+// The tasks of the schedule's rows; a CyclicExecutive runs them. Rows of different lanes may run on different threads.
+class Pipeline {
+ public:
+  Pipeline(const Ports& ports, const Params& params) noexcept
+      : params_(params),
+        control_(ports.imu, ports.joints, ports.lio, link_, params_),
+        perception_(ports.camera, link_, params_) {}
+  Pipeline(const Pipeline&) = delete;  // the lanes refer to the link inside
+  Pipeline& operator=(const Pipeline&) = delete;
+
+  Progress run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& budget) noexcept;
+
+  [[nodiscard]] ControlLane& control() noexcept { return control_; }
+  [[nodiscard]] const ControlLane& control() const noexcept { return control_; }
+  [[nodiscard]] const PerceptionLane& perception() const noexcept { return perception_; }
+  [[nodiscard]] Telemetry telemetry(std::int64_t now_ns) const noexcept;
+
+ private:
+  Params params_;
+  LaneLink link_;
+  ControlLane control_;
+  PerceptionLane perception_;
+};
+
+// The module's static memory, stage by stage; the last entry is what the stages do not account for. Sums to
+// sizeof(Pipeline).
+inline constexpr std::size_t kMemoryBudget_bytes = 16U * 1024U * 1024U;
+[[nodiscard]] std::array<StageMemory, 7> static_memory() noexcept;
+
+}  // namespace polygmap

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// The module seen from outside after a tick: for reports, recorders and tests. Never an input.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "algorithms/core/footholds.hpp"
+#include "algorithms/core/gait_status.hpp"
+#include "algorithms/core/state.hpp"
+#include "algorithms/core/surfaces.hpp"
+
+namespace polygmap {
+
+// References into the module's static object, valid until its next tick.
+struct Telemetry {
+  std::int64_t now_ns;
+  const StateEstimate& state;
+  const SurfaceFrame& surfaces;            // newest finished frame; its sequence changes when a new one is done
+  const StateEstimate& state_at_exposure;  // the estimate that frame was placed with
+  const MapSnapshot& map;                  // stamp_ns changes in the tick a frame was fused
+  const FootholdSet& footholds;            // newest finished search
+  const GaitStatus& gait;
+};
+
+// One line of the static memory table.
+struct StageMemory {
+  const char* stage;
+  std::size_t bytes;
+};
+
+}  // namespace polygmap

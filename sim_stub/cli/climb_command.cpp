@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/cli/climb_command.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <ostream>
+
+namespace polygmap::sim {
+namespace {
+
+constexpr double kMaxLength_m = 2.0;
+constexpr int kMaxSteps = 200;
+constexpr double kTimeLimit_s = 60.0;        // simulated: walking up and ending, ...
+constexpr double kTimeLimitPerStep_s = 6.0;  // ... and nearly twice what a step may take
+constexpr double kQuietPeriod_s = 5.0;       // simulated, between progress lines of a log
+
+struct ClimbArguments {
+  ClimbOptions options;
+  std::string noise = "white";
+  std::vector<double> render_shift_m;
+  int missing_step = 0;  // 1-based as people count, 0: none
+  bool no_self_filter = false;
+};
+
+// CLI11 2.1 lets -1 and 2^64 wrap around.
+std::string whole_number(const std::string& text) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool good = error == std::errc{} && end == text.data() + text.size();
+  return good ? "" : "must be a whole number from 0 to 2^64 - 1, not " + text;
+}
+
+void declare(CLI::App& climb, ClimbArguments& a) {
+  StairParams& stairs = a.options.stairs;
+  climb.add_option("--steps", stairs.steps, "Number of steps; the last one is the landing")->capture_default_str();
+  climb.add_option("--rise", stairs.rise_m, "Rise of a step, m")->capture_default_str();
+  climb.add_option("--tread", stairs.tread_m, "Depth of a tread, m")->capture_default_str();
+  climb.add_option("--width", stairs.width_m, "Width of the staircase, m")->capture_default_str();
+  climb.add_option("--nosing", stairs.nosing_m, "Overhang of a tread over its riser, m")->capture_default_str();
+  climb.add_option("--landing", stairs.landing_m, "Depth of the landing, m")->capture_default_str();
+  climb.add_option("--gait", a.options.gait, "ds: both feet on every tread")->capture_default_str();
+  climb.add_option("--seed", a.options.seed, "Draws the start, the steps' jitter, the robot's errors and all noise")
+      ->check(whole_number)
+      ->capture_default_str();
+  climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
+  climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
+
+  // What the camera shows may differ from what the robot stands on: shows that the module lives on what it sees.
+  const std::string causality = "causality (experiments on what the module sees)";
+  climb.add_option("--render-shift", a.render_shift_m, "Shift of the rendered staircase, m")
+      ->expected(3)
+      ->type_name("X Y Z")
+      ->group(causality);
+  climb.add_option("--render-missing-step", a.missing_step, "Leave step K (1 is the lowest) out of the picture")
+      ->type_name("K")
+      ->group(causality);
+  climb.add_flag("--blank-depth", a.options.blank_depth, "The camera delivers no depth")->group(causality);
+  climb.add_flag("--no-self-filter", a.no_self_filter, "The module does not mask its own legs")->group(causality);
+}
+
+std::string number(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%g", value);
+  return buffer;
+}
+
+// Empty when the arguments are good, else one sentence. Completes the options.
+std::string complaint(ClimbArguments& a) {
+  const StairParams& stairs = a.options.stairs;
+  if (stairs.steps < 1 || stairs.steps > kMaxSteps) {
+    return "--steps must be from 1 to " + std::to_string(kMaxSteps) + ", not " + std::to_string(stairs.steps) + ".";
+  }
+  struct Length {
+    const char* name;
+    double value_m;
+    bool may_be_zero;
+  };
+  for (const Length& length : {Length{"--rise", stairs.rise_m, false}, Length{"--tread", stairs.tread_m, false},
+                               Length{"--width", stairs.width_m, false}, Length{"--nosing", stairs.nosing_m, true},
+                               Length{"--landing", stairs.landing_m, false}}) {
+    const bool good = length.may_be_zero ? length.value_m >= 0.0 : length.value_m > 0.0;
+    if (!good || !(length.value_m <= kMaxLength_m)) {
+      return std::string(length.name) + (length.may_be_zero ? " must be at least 0" : " must be above 0") +
+             " and at most " + number(kMaxLength_m) + " m, not " + number(length.value_m) + ".";
+    }
+  }
+  if (stairs.nosing_m >= stairs.tread_m) {
+    return "--nosing must be shorter than the tread of " + number(stairs.tread_m) + " m, not " +
+           number(stairs.nosing_m) + ".";
+  }
+  if (a.options.gait == "ss") return "The single-step gait (--gait ss) is not available yet: use --gait ds.";
+  if (a.options.gait != "ds") return "--gait must be ds, not \"" + a.options.gait + "\".";
+  if (a.noise != "white" && a.noise != "correlated") {
+    return "--noise must be white or correlated, not \"" + a.noise + "\".";
+  }
+  a.options.noise = a.noise == "white" ? DepthNoise::kWhite : DepthNoise::kCorrelated;
+
+  if (a.missing_step < 0 || a.missing_step > stairs.steps) {
+    return "--render-missing-step must be a step from 1 to " + std::to_string(stairs.steps) + ", not " +
+           std::to_string(a.missing_step) + ".";
+  }
+  a.options.render_missing_step = a.missing_step - 1;
+  if (!a.render_shift_m.empty()) {
+    for (const double shift_m : a.render_shift_m) {
+      if (!(std::abs(shift_m) <= kMaxLength_m)) {
+        return "--render-shift must be three lengths within +-" + number(kMaxLength_m) + " m, not " + number(shift_m) +
+               ".";
+      }
+    }
+    a.options.render_dx_m = a.render_shift_m[0];
+    a.options.render_dy_m = a.render_shift_m[1];
+    a.options.render_dz_m = a.render_shift_m[2];
+  }
+  a.options.self_filter = !a.no_self_filter;
+  a.options.time_limit_s = std::max(a.options.time_limit_s, kTimeLimit_s + kTimeLimitPerStep_s * stairs.steps);
+  return {};
+}
+
+// Makes the directory and tries to write into it before a minute of climbing is spent.
+std::string output_complaint(const std::string& directory) {
+  namespace fs = std::filesystem;
+  if (directory.empty()) return "--out must name a directory.";
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (!fs::is_directory(directory, error)) return "Cannot create the directory \"" + directory + "\" given by --out.";
+  const fs::path probe = fs::path(directory) / ".polygmap_probe";
+  std::ofstream file(probe);
+  file << "x";
+  file.close();
+  const bool written = static_cast<bool>(file);
+  fs::remove(probe, error);
+  if (!written) return "Cannot write into the directory \"" + directory + "\" given by --out.";
+  return {};
+}
+
+class ProgressLine {
+ public:
+  ProgressLine(std::ostream& out, int steps, bool live) : out_(out), steps_(steps), live_(live) {}
+
+  void show(const ClimbProgress& p) {
+    if (!live_ && p.time_s < next_s_) return;
+    next_s_ = p.time_s + kQuietPeriod_s;
+    char line[160];
+    std::snprintf(line, sizeof line, "%6.1f s  step %d of %d  %-16s worst row %s %.0f us", p.time_s, p.treads_climbed,
+                  steps_, p.phase, p.worst_row, p.worst_row_us);
+    out_ << (live_ ? "\r" : "") << line << (live_ ? "\x1b[K" : "\n") << std::flush;
+    shown_ = true;
+  }
+  void end() {
+    if (live_ && shown_) out_ << "\n";
+  }
+
+ private:
+  std::ostream& out_;
+  int steps_;
+  bool live_;
+  bool shown_ = false;
+  double next_s_ = 0.0;
+};
+
+}  // namespace
+
+int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& run, std::ostream& out,
+                  std::ostream& err, bool live) {
+  CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
+  app.require_subcommand(1);
+  app.footer("Exit codes: 0 pass, 1 the climb failed, 2 a bad argument or output that cannot be written.");
+  CLI::App* climb = app.add_subcommand(
+      "climb", "Climb a simulated staircase; writes summary.json and climb.svg, exit code 0 only on pass");
+  ClimbArguments a;
+  a.options.out_dir = "climb_out";
+  declare(*climb, a);
+
+  try {
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 wants the last one first
+  } catch (const CLI::Success& success) {
+    return app.exit(success, out, err);
+  } catch (const CLI::ParseError& error) {
+    err << "polygmap: " << error.what() << "; see polygmap climb --help.\n";
+    return kExitUsage;
+  }
+  std::string sentence = complaint(a);
+  if (sentence.empty()) sentence = output_complaint(a.options.out_dir);
+  if (!sentence.empty()) {
+    err << "polygmap: " << sentence << "\n";
+    return kExitUsage;
+  }
+
+  ProgressLine progress(out, a.options.stairs.steps, live);
+  try {
+    const ClimbSummary summary = run(a.options, [&progress](const ClimbProgress& p) { progress.show(p); });
+    progress.end();
+    out << verdict_line(summary) << "\n";
+    return summary.pass ? kExitPass : kExitFail;
+  } catch (const std::exception& error) {
+    progress.end();
+    err << "polygmap: " << error.what() << "\n";
+    return kExitUsage;
+  }
+}
+
+}  // namespace polygmap::sim

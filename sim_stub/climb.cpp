@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/climb.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+
+#include "firmware/pipeline.hpp"
+#include "scheduler/cyclic_executive.hpp"
+#include "sim_stub/clearance.hpp"
+#include "sim_stub/climb_report.hpp"
+#include "sim_stub/heap_trap.hpp"
+#include "sim_stub/sim_robot.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+using WallClock = std::chrono::steady_clock;
+
+// The module's rows, timed by the wall clock on the way: virtual time has no cost.
+class TimedPipeline {
+ public:
+  explicit TimedPipeline(Pipeline& pipeline) noexcept : pipeline_(pipeline) {}
+
+  Progress run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& budget) noexcept {
+    const auto begin = WallClock::now();
+    const Progress progress = pipeline_.run_row(row, frame_ns, budget);
+    if (progress != Progress::kIdle) {
+      wall_[row].add(static_cast<std::uint64_t>(std::chrono::nanoseconds(WallClock::now() - begin).count()));
+    }
+    return progress;
+  }
+  [[nodiscard]] const DurationStatistics& wall(std::size_t row) const noexcept { return wall_[row]; }
+
+ private:
+  Pipeline& pipeline_;
+  std::array<DurationStatistics, kRowCount> wall_;
+};
+
+// The lidar's port on the way to the module: the report wants to see what the module accepts.
+class WatchedLidar final : public hal::LidarOdometry {
+ public:
+  explicit WatchedLidar(hal::LidarOdometry& lidar) noexcept : lidar_(lidar) {}
+  [[nodiscard]] bool try_read(LioSample& sample) noexcept override {
+    if (!lidar_.try_read(sample)) return false;
+    last_ = sample;
+    return true;
+  }
+  // Once per sample: it is the one that the newest estimate is as old as.
+  [[nodiscard]] bool accepted(const StateEstimate& state) noexcept {
+    const bool fresh =
+        last_.stamp_ns > told_ns_ && state.lio_age_ns >= 0 && state.stamp_ns - state.lio_age_ns == last_.stamp_ns;
+    if (fresh) told_ns_ = last_.stamp_ns;
+    return fresh;
+  }
+  [[nodiscard]] const LioSample& last() const noexcept { return last_; }
+
+ private:
+  hal::LidarOdometry& lidar_;
+  LioSample last_;
+  std::int64_t told_ns_ = 0;
+};
+
+using Executive = CyclicExecutive<TimedPipeline, kOneLaneSchedule>;
+
+SimOptions sim_options(const ClimbOptions& options) {
+  SimOptions sim;
+  sim.seed = options.seed;
+  sim.stairs = options.stairs;
+  sim.noise = options.noise;
+  sim.camera.stairs_shift_m = {options.render_dx_m, options.render_dy_m, options.render_dz_m};
+  sim.camera.missing_step = options.render_missing_step;
+  sim.camera.threaded = options.threaded_render;
+  if (options.blank_depth) sim.camera.blank = {{0, INT64_MAX}};
+  return sim;
+}
+
+const char* name_of(GaitPhase phase) {
+  switch (phase) {
+    case GaitPhase::kStandstill:
+      return "standing";
+    case GaitPhase::kDoubleSupport:
+      return "double support";
+    case GaitPhase::kSwing:
+      return "swing";
+    case GaitPhase::kFinished:
+      return "on top";
+    case GaitPhase::kStopped:
+      return "stopped";
+  }
+  return "?";
+}
+
+ClimbProgress progress_of(std::int64_t now_ns, const GaitStatus& gait, const TimedPipeline& tasks) {
+  ClimbProgress progress{seconds(now_ns), static_cast<int>(gait.treads_climbed), name_of(gait.phase), "", 0.0};
+  double worst_share = -1.0;
+  for (std::size_t row = 0; row < kRowCount; ++row) {
+    const double max_us = 1e-3 * static_cast<double>(tasks.wall(row).max_ns());
+    if (max_us / kOneLaneSchedule[row].budget_us <= worst_share) continue;
+    worst_share = max_us / kOneLaneSchedule[row].budget_us;
+    progress.worst_row = kOneLaneSchedule[row].task.data();
+    progress.worst_row_us = max_us;
+  }
+  return progress;
+}
+
+std::vector<ScheduleRow> schedule_of(const Executive& executive, const TimedPipeline& tasks) {
+  std::vector<ScheduleRow> rows;
+  for (std::size_t row = 0; row < kRowCount; ++row) {
+    const RowStatistics& statistics = executive.row_statistics(row);
+    rows.push_back({std::string(kSchedule[row].task), kSchedule[row].lane == 0 ? "control" : "perception",
+                    static_cast<double>(kSchedule[row].budget_us), statistics.runs, statistics.overruns,
+                    1e-3 * static_cast<double>(tasks.wall(row).mean_ns()),
+                    1e-3 * static_cast<double>(tasks.wall(row).max_ns())});
+  }
+  return rows;
+}
+
+}  // namespace
+
+ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction& progress) {
+  constexpr std::int64_t kRestAfterEnd_ns = kNsPerS / 2;  // the robot is watched a little longer than it climbs
+  const auto wall_begin = WallClock::now();
+  heap::set_on_call(heap::OnCall::kCount);
+  heap::reset();
+
+  SimRobot robot(sim_options(options));
+  Params params;
+  params.self_filter = options.self_filter;
+  WatchedLidar lidar(robot);
+  const auto pipeline = std::make_unique<Pipeline>(Ports{robot, robot, robot, lidar}, params);
+  TimedPipeline tasks(*pipeline);
+  Health health;
+  Executive executive(tasks, robot, health);
+  ClimbReport report(robot.stairs());
+
+  executive.start(robot.now_ns() + kMinorFrame_ns);
+  std::int64_t end_ns = -1;
+  std::int64_t next_progress_ns = 0;
+  while (seconds(robot.now_ns()) < options.time_limit_s) {
+    robot.advance();
+    {
+      const heap::ModuleCall call("CyclicExecutive::tick");
+      executive.tick(robot.now_ns());
+    }
+    const Telemetry telemetry = pipeline->telemetry(robot.now_ns());
+    report.observe(robot.truth(), telemetry);
+    if (lidar.accepted(telemetry.state)) report.observe_lio(lidar.last());
+    if (progress && robot.now_ns() >= next_progress_ns) {
+      progress(progress_of(robot.now_ns(), telemetry.gait, tasks));
+      next_progress_ns += kNsPerS;
+    }
+    const bool over = telemetry.gait.phase == GaitPhase::kFinished || telemetry.gait.phase == GaitPhase::kStopped;
+    if (over && end_ns < 0) end_ns = robot.now_ns() + kRestAfterEnd_ns;
+    if (robot.truth().fell || (over && robot.now_ns() >= end_ns)) break;
+  }
+
+  RunFigures figures;
+  figures.gait = options.gait;
+  figures.seed = options.seed;
+  figures.heap_calls = heap::report().calls;
+  figures.heap_first_caller = heap::report().first_caller;
+  const auto memory = static_memory();
+  figures.static_memory.assign(memory.begin(), memory.end());
+  figures.schedule = schedule_of(executive, tasks);
+  figures.wall_seconds = std::chrono::duration<double>(WallClock::now() - wall_begin).count();
+  const ClimbSummary summary = report.finish(figures);
+  if (!options.out_dir.empty()) write_climb_files(options.out_dir, report, summary);
+  return summary;
+}
+
+}  // namespace polygmap::sim

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// One simulated climb: robot, module and report in a closed loop.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "sim_stub/climb_summary.hpp"
+#include "sim_stub/noise_kind.hpp"
+#include "sim_stub/stair_world.hpp"
+
+namespace polygmap::sim {
+
+struct ClimbOptions {
+  StairParams stairs;
+  std::uint64_t seed = 1;
+  DepthNoise noise = DepthNoise::kWhite;
+  std::string gait = "ds";
+  std::string out_dir;          // empty: no files
+  double time_limit_s = 150.0;  // simulated
+  bool threaded_render = true;
+  // Causality tests: the picture shows something else than the plant stands on.
+  double render_dx_m = 0.0, render_dy_m = 0.0, render_dz_m = 0.0;
+  int render_missing_step = -1;  // 0-based, -1: none
+  bool blank_depth = false;
+  bool self_filter = true;
+};
+
+// Called about once per simulated second: step, simulated time, worst row of the schedule.
+struct ClimbProgress {
+  double time_s;
+  int treads_climbed;
+  const char* phase;
+  const char* worst_row;
+  double worst_row_us;
+};
+
+using ClimbProgressFunction = std::function<void(const ClimbProgress&)>;
+
+// Runs one climb to its end and, unless options.out_dir is empty, writes summary.json and climb.svg there (the
+// directory exists). Throws std::runtime_error with one sentence when it cannot.
+[[nodiscard]] ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction& progress);
+
+}  // namespace polygmap::sim

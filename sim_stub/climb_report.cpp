@@ -1,0 +1,425 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/climb_report.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <stdexcept>
+#include <utility>
+
+#include "algorithms/robot/body_shapes.hpp"
+#include "sim_stub/surface_match.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+constexpr std::int64_t kPast_ns = 2 * kNsPerS;           // covers the latest LIO pose and the latest frame
+constexpr std::int64_t kRest_ns = 50 * kNsPerMs;         // both soles stand this long: they rest
+constexpr std::uint64_t kTrailEvery_ticks = 10;          // 20 ms
+constexpr std::uint64_t kRestClearanceEvery_ticks = 10;  // a resting foot hardly moves
+constexpr std::size_t kFlightEvery_poses = 2;            // 4 ms: at 1 m/s a foot moves 4 mm
+
+double ms(std::int64_t duration_ns) { return static_cast<double>(duration_ns) * 1e-6; }
+
+void keep_min(double& least, double value) {
+  if (!std::isnan(value) && !(least <= value)) least = value;
+}
+void keep_max(double& greatest, double value) {
+  if (!std::isnan(value) && !(greatest >= value)) greatest = value;
+}
+
+// a_T_b from one body's pose in both worlds, heading and place only.
+Transform aligned_worlds(const Transform& a_T_body, const Transform& b_T_body) {
+  const Mat3 R = rotation_z(yaw_of(a_T_body.R) - yaw_of(b_T_body.R));
+  return {R, a_T_body.p_m - R * b_T_body.p_m};
+}
+
+// The point seen from a sole: along its heading, across it, up.
+Vec3 level_frame_p(const Transform& any_T_sole, const Vec3& any_p_m) {
+  return rotation_z(yaw_of(any_T_sole.R)).transpose() * (any_p_m - any_T_sole.p_m);
+}
+
+// Along the sole's axis from the nosing to the sole's origin.
+double nosing_distance_m(const Step& step, const Transform& true_T_sole) {
+  return (true_T_sole.p_m.x() - step.nosing_x_m) / std::cos(yaw_of(true_T_sole.R));
+}
+
+std::string sentence(const char* format, double a = 0.0, double b = 0.0, double c = 0.0, double d = 0.0) {
+  char buffer[200];
+  std::snprintf(buffer, sizeof buffer, format, a, b, c, d);
+  return buffer;
+}
+
+std::string why_stopped(Obstruction reason, double measured_m) {
+  switch (reason) {
+    case Obstruction::kNone:
+      return "it gave no reason";
+    case Obstruction::kNothingSeen:
+      return "it saw no surface";
+    case Obstruction::kNoStaircase:
+      return "it saw level ground and no higher tread";
+    case Obstruction::kTop:
+      return "it took the tread it stood on for the highest";
+    case Obstruction::kRiseTooHigh:
+      return sentence("it measured a rise of %.3f m, too high to climb", measured_m);
+    case Obstruction::kTreadTooShort:
+      return sentence("it measured a tread of %.3f m, too short for the foot", measured_m);
+    case Obstruction::kTooNarrow:
+      return "it measured a tread too narrow for two feet";
+    case Obstruction::kMapStale:
+      return "its map was stale";
+  }
+  return "it gave no known reason";
+}
+
+}  // namespace
+
+void ClimbReport::PositionError::add(const Vec3& error_m) {
+  sum_m2 += error_m.squaredNorm();
+  ++count;
+}
+double ClimbReport::PositionError::rmse_m() const {
+  return count == 0 ? kNotMeasured : std::sqrt(sum_m2 / static_cast<double>(count));
+}
+
+ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera)
+    : world_(std::move(world)),
+      solids_(stair_solids(world_)),
+      true_base_T_camera_(true_base_T_camera),
+      climbed_(world_.steps.size(), false) {}
+
+std::optional<Transform> ClimbReport::true_T_base_at(std::int64_t stamp_ns) const {
+  const auto after = std::lower_bound(past_.begin(), past_.end(), stamp_ns,
+                                      [](const TruePose& p, std::int64_t stamp) { return p.stamp_ns < stamp; });
+  if (after == past_.end()) return std::nullopt;
+  if (after->stamp_ns == stamp_ns) return after->true_T_base;
+  if (after == past_.begin()) return std::nullopt;
+  const TruePose& a = *std::prev(after);
+  const TruePose& b = *after;
+  const double s = seconds(stamp_ns - a.stamp_ns) / seconds(b.stamp_ns - a.stamp_ns);
+  const Eigen::Quaterniond qa(a.true_T_base.R), qb(b.true_T_base.R);
+  return Transform{qa.slerp(s, qb).toRotationMatrix(), a.true_T_base.p_m + s * (b.true_T_base.p_m - a.true_T_base.p_m)};
+}
+
+void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
+  past_.push_back({truth.stamp_ns, truth.true_T_base});
+  while (truth.stamp_ns - past_.front().stamp_ns > kPast_ns) past_.pop_front();
+  last_stamp_ns_ = truth.stamp_ns;
+  if (truth.fell && !fell_) {
+    fell_ = true;
+    fall_reason_ = truth.fall_reason;
+  }
+  observe_odometry(truth, telemetry.state);
+  if (aligned_) {
+    observe_surfaces(telemetry.surfaces);
+    observe_map(telemetry);
+    observe_footsteps(truth, telemetry);
+    observe_tracking(truth, telemetry.gait);
+  }
+  observe_soles(truth, telemetry.gait.step.onto_tread);
+  observe_steps_climbed(truth);
+  if (ticks_ % kTrailEvery_ticks == 0) observe_trails(truth);
+  ++ticks_;
+}
+
+void ClimbReport::observe_odometry(const Truth& truth, const StateEstimate& state) {
+  if (!aligned_) {
+    if (!state.initialised) return;
+    true_T_odom_ = aligned_worlds(truth.true_T_base, state.odom_T_base);
+    true_T_world_ = aligned_worlds(truth.true_T_base, state.world_T_base());
+    aligned_ = true;
+    aligned_stamp_ns_ = truth.stamp_ns;
+  }
+  base_error_.add(true_T_odom_ * state.odom_T_base.p_m - truth.true_T_base.p_m);
+  fused_error_.add(true_T_world_ * state.world_T_base().p_m - truth.true_T_base.p_m);
+}
+
+void ClimbReport::observe_lio(const LioSample& sample) {
+  const std::optional<Transform> true_T_base = true_T_base_at(sample.stamp_ns);
+  if (!true_T_base) return;
+  // Through the nominal mount to the base: all three errors are about the same point.
+  const Transform lio_T_base = sample.lio_T_lidar * base_T_lidar().inverse();
+  if (!true_T_lio_) true_T_lio_ = aligned_worlds(*true_T_base, lio_T_base);
+  lio_error_.add(*true_T_lio_ * lio_T_base.p_m - true_T_base->p_m);
+}
+
+void ClimbReport::observe_surfaces(const SurfaceFrame& frame) {
+  if (frame.sequence == frame_sequence_ && frame.stamp_ns == frame_stamp_ns_) return;
+  frame_sequence_ = frame.sequence;
+  frame_stamp_ns_ = frame.stamp_ns;
+  ++frames_;
+  const std::optional<Transform> true_T_base = true_T_base_at(frame.stamp_ns);
+  std::uint64_t matching = 0;
+  for (const SurfacePatch& patch : frame.surfaces) {
+    if (true_T_base && matches_true_surface(world_, patch, *true_T_base * true_base_T_camera_)) ++matching;
+  }
+  surfaces_ += frame.surfaces.size();
+  surfaces_unmatched_ += frame.surfaces.size() - matching;
+  if (matching > 0 && matching == frame.surfaces.size()) ++frames_matching_;
+}
+
+void ClimbReport::observe_map(const Telemetry& telemetry) {
+  const MapSnapshot& map = telemetry.map;
+  if (map.stamp_ns == map_stamp_ns_) return;
+  map_stamp_ns_ = map.stamp_ns;
+  exposure_to_map_ms_.push_back(ms(telemetry.now_ns - map.stamp_ns));
+  for (auto& [id, seen] : polygons_) seen.remembered = false;
+  for (const MapPolygon& polygon : map.polygons) polygons_[polygon.id] = {polygon.surface, true};
+}
+
+void ClimbReport::observe_footsteps(const Truth& truth, const Telemetry& telemetry) {
+  const GaitStatus& gait = telemetry.gait;
+  const LatchedStep& step = gait.step;
+  phase_ = gait.phase;
+  stop_reason_ = gait.stop_reason;
+  stop_measured_m_ = gait.stop_measured_m;
+  if (step.sequence == 0) return;
+
+  if (footsteps_.empty() || footsteps_.back().sequence != step.sequence) {
+    Footstep f;
+    f.sequence = step.sequence;
+    f.foot = step.foot;
+    f.onto_tread = step.onto_tread;
+    f.true_T_planned = true_T_world_ * Transform{rotation_z(step.target.yaw_rad), step.target.position_m};
+    if (step.onto_tread) f.map_age_at_latch_ms = ms(step.latch_stamp_ns - step.map_stamp_ns);
+    footsteps_.push_back(f);
+    target_ = step.target;
+    const Transform& odom_T_stance = telemetry.state.odom_T_sole[index_of(other(step.foot))];
+    latched_across_m_ = level_frame_p(odom_T_stance, step.odom_T_target.p_m).y();
+    landing_pending_ = true;
+  }
+
+  Footstep& f = footsteps_.back();
+  if (step.touch_down_stamp_ns == 0) return;
+  if (std::isnan(f.execution_error_m)) {
+    f.execution_error_m = (step.odom_T_executed.p_m - step.odom_T_target.p_m).norm();
+    if (f.onto_tread) {
+      std::int64_t last_seen_ns = target_.last_seen_ns;
+      for (const MapPolygon& polygon : telemetry.map.polygons) {
+        if (polygon.id == target_.polygon_id) last_seen_ns = std::max(last_seen_ns, polygon.last_seen_ns);
+      }
+      f.target_last_seen_ms = ms(step.touch_down_stamp_ns - last_seen_ns);
+    }
+  }
+  // The module may report touch-down before the sole truly stands: the truth is taken when it does.
+  if (landing_pending_ && truth.in_contact[index_of(f.foot)]) observe_landing(truth);
+}
+
+void ClimbReport::observe_landing(const Truth& truth) {
+  Footstep& f = footsteps_.back();
+  const std::size_t foot = index_of(f.foot);
+  const Transform& true_T_sole = truth.true_T_sole[foot];
+  landing_pending_ = false;
+  f.landed = true;
+  f.step_index = truth.step_index[foot];
+  f.true_T_landed = true_T_sole;
+  standing_footstep_[foot] = static_cast<int>(footsteps_.size()) - 1;
+  if (!f.onto_tread || world_.steps.empty()) return;
+
+  if (f.step_index >= 0) {
+    f.along_error_m = target_.nosing_distance_m -
+                      nosing_distance_m(world_.steps[static_cast<std::size_t>(f.step_index)], true_T_sole);
+  } else {
+    // It stands on the floor although a tread was meant: the nosing that makes the error least is the meant one.
+    for (const Step& step : world_.steps) {
+      const double error_m = target_.nosing_distance_m - nosing_distance_m(step, true_T_sole);
+      if (!(std::abs(f.along_error_m) <= std::abs(error_m))) f.along_error_m = error_m;
+    }
+  }
+  const Transform& true_T_stance = truth.true_T_sole[index_of(other(f.foot))];
+  f.across_error_m = latched_across_m_ - level_frame_p(true_T_stance, true_T_sole.p_m).y();
+}
+
+void ClimbReport::observe_tracking(const Truth& truth, const GaitStatus& gait) {
+  if (gait.phase != GaitPhase::kSwing) return;
+  const std::size_t swing = index_of(gait.step.foot), stance = index_of(other(gait.step.foot));
+  const Vec3 desired_m = level_frame_p(gait.odom_T_sole_desired[stance], gait.odom_T_sole_desired[swing].p_m);
+  const Vec3 actual_m = level_frame_p(truth.true_T_sole[stance], truth.true_T_sole[swing].p_m);
+  keep_max(tracking_x_max_m_, std::abs(desired_m.x() - actual_m.x()));
+  keep_max(tracking_z_max_m_, std::abs(desired_m.z() - actual_m.z()));
+}
+
+double ClimbReport::flight_clearance_m(const Flight& flight, int to_step) const {
+  double least_m = kNotMeasured;
+  for (std::size_t i = 0; i < flight.true_T_sole.size(); i += kFlightEvery_poses) {
+    keep_min(least_m,
+             clearance_m(collision_box(flight.true_T_sole[i]), solids_, std::array{flight.from_step, to_step}));
+  }
+  return least_m;
+}
+
+void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
+  flight_onto_tread_ = onto_tread;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    const Transform& true_T_sole = truth.true_T_sole[foot];
+    if (!truth.in_contact[foot]) {
+      if (!flights_[foot]) flights_[foot] = Flight{last_step_[foot], truth.stamp_ns, {}};
+      flights_[foot]->true_T_sole.push_back(true_T_sole);
+      standing_footstep_[foot] = -1;
+      continue;
+    }
+    const int step = truth.step_index[foot];
+    if (flights_[foot]) {
+      if (step >= 0 && first_lift_off_ns_ < 0) first_lift_off_ns_ = flights_[foot]->lift_off_ns;
+      keep_min(clearance_min_m_, flight_clearance_m(*flights_[foot], step));
+      flights_[foot].reset();
+    }
+    last_step_[foot] = step;
+    if (ticks_ % kRestClearanceEvery_ticks == 0) {
+      keep_min(clearance_min_m_, clearance_m(collision_box(true_T_sole), solids_, std::array{step}));
+    }
+    if (step < 0) continue;
+    const double margin_m = sole_margin_m(true_T_sole, world_, step);
+    keep_min(sole_margin_min_m_, margin_m);
+    const int footstep = standing_footstep_[foot];
+    if (footstep >= 0) keep_min(footsteps_[static_cast<std::size_t>(footstep)].sole_margin_m, margin_m);
+  }
+}
+
+void ClimbReport::observe_steps_climbed(const Truth& truth) {
+  const int step = truth.step_index[0];
+  bool rests = step >= 0 && step == truth.step_index[1] && truth.in_contact[0] && truth.in_contact[1];
+  for (std::size_t foot = 0; rests && foot < kFootCount; ++foot) {
+    rests = sole_margin_m(truth.true_T_sole[foot], world_, step) >= 0.0;
+  }
+  if (!rests) {
+    resting_step_ = -1;
+    return;
+  }
+  if (step != resting_step_) {
+    resting_step_ = step;
+    resting_since_ns_ = truth.stamp_ns;
+  }
+  const auto index = static_cast<std::size_t>(step);
+  if (truth.stamp_ns - resting_since_ns_ < kRest_ns || climbed_[index]) return;
+  climbed_[index] = true;
+  ++steps_climbed_;
+  if (index + 1 == world_.steps.size()) on_top_ns_ = resting_since_ns_;
+}
+
+void ClimbReport::observe_trails(const Truth& truth) {
+  base_trail_m_.push_back(truth.true_T_base.p_m);
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) sole_trail_m_[foot].push_back(truth.true_T_sole[foot].p_m);
+}
+
+double ClimbReport::clearance_min_m() const {
+  double least_m = clearance_min_m_;
+  for (const std::optional<Flight>& flight : flights_) {
+    // The run ended in the air: the module's word tells which tread was meant.
+    if (flight) keep_min(least_m, flight_clearance_m(*flight, flight->from_step + (flight_onto_tread_ ? 1 : 0)));
+  }
+  return least_m;
+}
+
+void ClimbReport::judge(ClimbSummary& s, const std::string& heap_first_caller) const {
+  const std::string climbed = sentence("%.0f of %.0f steps", s.steps_climbed, s.steps_total);
+  const bool all_climbed = s.steps_total > 0 && s.steps_climbed == s.steps_total;
+  s.pass = all_climbed && !s.fell && s.sole_margin_min_m >= 0.0 && s.swing_clearance_min_m > 0.0 && s.heap_calls == 0;
+  if (s.pass) {
+    s.reason = "Climbed " + climbed +
+               sentence(" in %.1f s (%.2f s per step), least sole margin %.1f mm, least swing clearance %.1f mm",
+                        s.climb_time_s, s.seconds_per_step, s.sole_margin_min_m * 1e3, s.swing_clearance_min_m * 1e3);
+    s.reason += phase_ == GaitPhase::kFinished ? "." : "; the run ended before the module did.";
+  } else if (s.fell) {
+    s.reason = "Fell after " + climbed + ": " + fall_reason_;
+  } else if (!all_climbed && phase_ == GaitPhase::kStopped) {
+    s.reason = "The module stopped after " + climbed + ": " + why_stopped(stop_reason_, stop_measured_m_) + ".";
+  } else if (!all_climbed && phase_ == GaitPhase::kFinished) {
+    s.reason = "The module ended the climb after " + climbed + ": " + why_stopped(Obstruction::kTop, 0.0) + ".";
+  } else if (!all_climbed) {
+    s.reason = "Time ran out after " + climbed + ".";
+  } else if (s.heap_calls != 0) {
+    s.reason = "The module called the heap, " + std::to_string(s.heap_calls) + " times in all, first from " +
+               (heap_first_caller.empty() ? "an unknown function" : heap_first_caller) + ".";
+  } else if (!(s.sole_margin_min_m >= 0.0)) {
+    s.reason = sentence("A sole stood %.1f mm over the edge of its tread.", -s.sole_margin_min_m * 1e3);
+  } else {
+    s.reason =
+        sentence("A foot came within %.1f mm of the stairs (0 or less is a collision).", s.swing_clearance_min_m * 1e3);
+  }
+}
+
+ClimbSummary ClimbReport::finish(const RunFigures& run) const {
+  ClimbSummary s;
+  s.plant = run.plant;
+  s.gait = run.gait;
+  s.seed = run.seed;
+  s.fell = fell_;
+  s.steps_total = static_cast<int>(world_.steps.size());
+  s.steps_climbed = steps_climbed_;
+  if (on_top_ns_ >= 0 && first_lift_off_ns_ >= 0) {
+    s.climb_time_s = seconds(on_top_ns_ - first_lift_off_ns_);
+    s.seconds_per_step = s.climb_time_s / s.steps_total;
+  }
+
+  const double run_s = aligned_ ? seconds(last_stamp_ns_ - aligned_stamp_ns_) : 0.0;
+  s.plane_rate_hz = run_s > 0.0 ? static_cast<double>(frames_matching_) / run_s : 0.0;
+  s.frames = frames_;
+  s.frames_matching = frames_matching_;
+  s.surfaces = surfaces_;
+  s.surfaces_unmatched = surfaces_unmatched_;
+
+  std::vector<double> execution, foothold, along, across, map_age, last_seen;
+  for (const Footstep& f : footsteps_) {
+    if (!f.onto_tread) continue;
+    map_age.push_back(f.map_age_at_latch_ms);
+    if (!std::isnan(f.execution_error_m)) {
+      execution.push_back(f.execution_error_m);
+      last_seen.push_back(f.target_last_seen_ms);
+    }
+    if (!f.landed) continue;
+    along.push_back(std::abs(f.along_error_m));
+    across.push_back(std::abs(f.across_error_m));
+    foothold.push_back(std::max(along.back(), across.back()));
+  }
+  s.execution_error_m = spread_of(execution);
+  s.foothold_error_m = spread_of(foothold);
+  s.foothold_error_along_m = spread_of(along);
+  s.foothold_error_across_m = spread_of(across);
+  s.map_age_at_latch_ms = spread_of(map_age);
+  s.target_last_seen_ms = spread_of(last_seen);
+  s.exposure_to_map_ms = spread_of(exposure_to_map_ms_);
+  s.sole_margin_min_m = sole_margin_min_m_;
+  s.swing_clearance_min_m = clearance_min_m();
+  s.tracking_error_x_max_m = tracking_x_max_m_;
+  s.tracking_error_z_max_m = tracking_z_max_m_;
+  s.odometry_rmse_base_m = base_error_.rmse_m();
+  s.odometry_rmse_lio_m = lio_error_.rmse_m();
+  s.odometry_rmse_fused_m = fused_error_.rmse_m();
+
+  s.heap_calls = run.heap_calls;
+  for (const StageMemory& stage : run.static_memory) s.static_memory.push_back({stage.stage, stage.bytes});
+  s.schedule = run.schedule;
+  s.footsteps = footsteps_;
+  s.wall_seconds = run.wall_seconds;
+  judge(s, run.heap_first_caller);
+  return s;
+}
+
+ClimbDrawing ClimbReport::drawing() const {
+  ClimbDrawing d;
+  for (const auto& [id, seen] : polygons_) {
+    ClimbDrawing::Polygon polygon{seen.surface.kind, {}, seen.remembered};
+    for (const Vec3& vertex_m : seen.surface.polygon) polygon.vertices_m.push_back(true_T_world_ * vertex_m);
+    d.polygons.push_back(std::move(polygon));
+  }
+  d.base_trail_m = base_trail_m_;
+  d.sole_trail_m = sole_trail_m_;
+  return d;
+}
+
+void write_climb_files(const std::string& directory, const ClimbReport& report, const ClimbSummary& summary) {
+  const auto write = [&directory](const char* name, const std::string& text) {
+    const std::string path = directory + "/" + name;
+    std::ofstream file(path, std::ios::binary);
+    file << text;
+    file.close();
+    if (!file) throw std::runtime_error("Cannot write " + path + ".");
+  };
+  write("summary.json", to_json(summary).dump(2) + "\n");
+  write("climb.svg", climb_svg(report.world(), report.drawing(), summary));
+}
+
+}  // namespace polygmap::sim

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/climb_summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "algorithms/robot/model.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Not measured (NaN) becomes JSON's null; -0 becomes 0, or one run could print two texts.
+Json rounded(double value, double per_unit) {
+  if (!std::isfinite(value)) return nullptr;
+  return std::round(value * per_unit) / per_unit + 0.0;
+}
+Json mm(double length_m) { return rounded(length_m * 1e3, 100.0); }
+Json metres(double length_m) { return rounded(length_m, 1e5); }
+Json seconds_of(double time_s) { return rounded(time_s, 1e4); }
+Json ms(double time_ms) { return rounded(time_ms, 1e3); }
+
+Json spread_mm(const Spread& s) { return {{"median", mm(s.median)}, {"max", mm(s.max)}}; }
+Json spread_ms(const Spread& s) { return {{"median", ms(s.median)}, {"max", ms(s.max)}}; }
+
+Json pose(const Transform& T) {
+  return {{"x", metres(T.p_m.x())},
+          {"y", metres(T.p_m.y())},
+          {"z", metres(T.p_m.z())},
+          {"yaw_rad", rounded(yaw_of(T.R), 1e5)}};
+}
+
+Json footstep_json(const Footstep& f) {
+  return {{"sequence", f.sequence},
+          {"foot", f.foot == Foot::kLeft ? "left" : "right"},
+          {"onto_tread", f.onto_tread},
+          {"step", f.landed ? Json(f.step_index + 1) : Json(nullptr)},
+          {"planned_m", pose(f.true_T_planned)},
+          {"landed_m", f.landed ? pose(f.true_T_landed) : Json(nullptr)},
+          {"execution_error_mm", mm(f.execution_error_m)},
+          {"along_error_mm", mm(f.along_error_m)},
+          {"across_error_mm", mm(f.across_error_m)},
+          {"sole_margin_mm", mm(f.sole_margin_m)},
+          {"map_age_at_latch_ms", ms(f.map_age_at_latch_ms)},
+          {"target_last_seen_ms", ms(f.target_last_seen_ms)}};
+}
+
+std::string format(const char* text, double a, double b) {
+  char buffer[160];
+  std::snprintf(buffer, sizeof buffer, text, a, b);
+  return buffer;
+}
+
+}  // namespace
+
+Spread spread_of(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  const double median = values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
+  return {median, values.back()};
+}
+
+Json to_json(const ClimbSummary& s) {
+  Json j;
+  j["verdict"] = s.pass ? "pass" : "fail";
+  j["reason"] = s.reason;
+  j["fell"] = s.fell;
+  j["plant"] = s.plant;
+  j["gait"] = s.gait;
+  j["seed"] = s.seed;
+  j["steps_total"] = s.steps_total;
+  j["steps_climbed"] = s.steps_climbed;
+  j["climb_time_s"] = seconds_of(s.climb_time_s);
+  j["seconds_per_step"] = seconds_of(s.seconds_per_step);
+  j["plane_rate_hz"] = rounded(s.plane_rate_hz, 100.0);
+  j["execution_error_mm"] = spread_mm(s.execution_error_m);
+  j["foothold_error_mm"] = spread_mm(s.foothold_error_m);
+  j["foothold_error_mm"]["along"] = spread_mm(s.foothold_error_along_m);
+  j["foothold_error_mm"]["across"] = spread_mm(s.foothold_error_across_m);
+  j["sole_margin_mm_min"] = mm(s.sole_margin_min_m);
+  j["swing_clearance_mm_min"] = mm(s.swing_clearance_min_m);
+  j["tracking_error_mm"] = {{"x_max", mm(s.tracking_error_x_max_m)}, {"z_max", mm(s.tracking_error_z_max_m)}};
+  j["odometry_rmse_mm"] = {
+      {"base", mm(s.odometry_rmse_base_m)}, {"lio", mm(s.odometry_rmse_lio_m)}, {"fused", mm(s.odometry_rmse_fused_m)}};
+  j["exposure_to_map_ms"] = spread_ms(s.exposure_to_map_ms);
+  j["map_age_at_latch_ms"] = spread_ms(s.map_age_at_latch_ms);
+  j["target_last_seen_ms"] = spread_ms(s.target_last_seen_ms);
+  j["heap_calls"] = s.heap_calls;
+
+  std::size_t total_bytes = 0;
+  Json stages = Json::object();
+  for (const StageBytes& stage : s.static_memory) {
+    stages[stage.stage] = stage.bytes;
+    total_bytes += stage.bytes;
+  }
+  j["static_memory_bytes"] = total_bytes;
+  j["static_memory"] = stages;
+
+  Json schedule = Json::array();
+  Json wall_tasks = Json::object();
+  for (const ScheduleRow& row : s.schedule) {
+    schedule.push_back({{"task", row.task},
+                        {"lane", row.lane},
+                        {"budget_us", rounded(row.budget_us, 1e3)},
+                        {"runs", row.runs},
+                        {"overruns", row.overruns}});
+    wall_tasks[row.task] = {{"mean_us", rounded(row.wall_mean_us, 1e3)}, {"max_us", rounded(row.wall_max_us, 1e3)}};
+  }
+  j["schedule"] = schedule;
+  j["surfaces"] = {{"frames", s.frames},
+                   {"frames_matching", s.frames_matching},
+                   {"seen", s.surfaces},
+                   {"unmatched", s.surfaces_unmatched}};
+  Json footsteps = Json::array();
+  for (const Footstep& f : s.footsteps) footsteps.push_back(footstep_json(f));
+  j["footsteps"] = footsteps;
+  j["wall"] = {{"seconds", rounded(s.wall_seconds, 1e3)}, {"tasks", wall_tasks}};
+  return j;
+}
+
+std::string verdict_line(const ClimbSummary& s) {
+  std::string line = (s.pass ? "PASS: " : "FAIL: ") + s.reason;
+  if (std::isfinite(s.foothold_error_m.max)) {
+    line += format(" Foothold error up to %.1f mm, execution error up to %.1f mm", s.foothold_error_m.max * 1e3,
+                   s.execution_error_m.max * 1e3);
+    line += format("; planes at %.1f Hz.", s.plane_rate_hz, 0.0);
+  }
+  return line;
+}
+
+}  // namespace polygmap::sim

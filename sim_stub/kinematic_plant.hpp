@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// The robot without dynamics: 12 joints that follow their commands, and a base that stands on the feet that touch.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "algorithms/robot/leg_kinematics.hpp"
+#include "sim_stub/clearance.hpp"
+#include "sim_stub/robot_errors.hpp"
+#include "sim_stub/stair_world.hpp"
+
+namespace polygmap::sim {
+
+// Angles of the drives are as their encoders read them; the true angle is that minus the encoder's offset.
+class KinematicPlant {
+ public:
+  struct Params {
+    double tick_s = 0.002;
+    double drive_lag_s = 0.010;
+    double share_bandwidth_radps = 20.0;  // of the critically damped load transfer: 0.2 s to move nine tenths
+    double lift_height_m = 0.002;         // a sole this far above its anchor has left it
+    double lift_share = 0.1;              // unless it carries more than this
+    double loaded_lift_height_m = 0.010;  // raised this far it is off in any case,
+    double loaded_lift_share = 0.3;       // and a fall when it carried more than this
+    double touch_depth_m = 0.002;         // a corner deeper than this (or two ticks of travel) came from the side
+    double collision_depth_m = 0.005;
+    double limit_tolerance_rad = 1e-3;
+    double max_closure_m = 0.06;  // both legs loaded and this far apart: a foot slips
+    double min_base_height_m = 0.3;
+  };
+
+  // Stands with the middle of the soles below true_T_start (x, y and yaw are used) and the drives at q_rad.
+  KinematicPlant(const Params& params, const StairWorld& world, const RobotErrors& errors,
+                 const Transform& true_T_start, const JointVector& q_rad);
+
+  // One tick towards the drives' command; nothing moves any more after a fall.
+  void step(const JointVector& command_rad);
+
+  [[nodiscard]] const Transform& true_T_base() const noexcept { return true_T_base_; }
+  [[nodiscard]] const Transform& true_T_sole(std::size_t foot) const noexcept { return feet_[foot].true_T_sole; }
+  [[nodiscard]] bool in_contact(std::size_t foot) const noexcept { return feet_[foot].anchored; }
+  [[nodiscard]] int step_index(std::size_t foot) const noexcept { return feet_[foot].step; }
+  [[nodiscard]] double load_share(std::size_t foot) const noexcept { return foot == 0 ? share_ : 1.0 - share_; }
+  [[nodiscard]] double closure_error_m() const noexcept { return closure_m_; }
+  [[nodiscard]] const JointVector& drive_q_rad() const noexcept { return q_; }
+  [[nodiscard]] const JointVector& drive_dq_radps() const noexcept { return dq_; }
+  [[nodiscard]] JointVector true_q_rad() const noexcept { return q_ - errors_.encoder_offset_rad; }
+  [[nodiscard]] bool fell() const noexcept { return !fall_reason_.empty(); }
+  [[nodiscard]] const std::string& fall_reason() const noexcept { return fall_reason_; }
+
+ private:
+  // A difference of poses that dies out smoothly: keeps the base's position and velocity continuous at lift-off.
+  struct Slack {
+    Vec3 p_m = Vec3::Zero(), p_rate = Vec3::Zero();
+    Vec3 turn_rad = Vec3::Zero(), turn_rate = Vec3::Zero();
+  };
+  struct FootState {
+    Transform base_T_sole;
+    Transform true_T_sole;                                   // the anchor while anchored
+    Transform true_T_base;                                   // implied by the anchor; valid while anchored
+    Slack base_offset;                                       // from there to the base, last tick
+    std::array<double, kContactsPerFoot> corner_height_m{};  // above what was below it, last tick
+    bool anchored = true;
+    int step = kFloorStep;
+    double gap_m = 0.0;    // KinematicPlant::gap_m() as usual while standing
+    double raise_m = 0.0;  // above that
+  };
+  [[nodiscard]] bool accept_command(const JointVector& command_rad);
+  void move_joints(const JointVector& command_rad);
+  void update_leg_kinematics();
+  void transfer_load();
+  void lift_feet();
+  void move_base();
+  void move_swing_feet();
+  void check_falls();
+  [[nodiscard]] Transform blend() const;
+  [[nodiscard]] double gap_m(std::size_t foot) const;  // of its sole above its anchor, on the other leg's base
+  void fall(const char* format, ...) __attribute__((format(printf, 2, 3)));
+
+  Params params_;
+  const StairWorld& world_;
+  const RobotErrors& errors_;
+  std::vector<SolidBox> solids_;
+  std::array<FootState, kFootCount> feet_;
+  JointVector q_, dq_ = JointVector::Zero();
+  Transform true_T_base_;
+  Slack slack_;
+  double share_ = 0.5, share_rate_ = 0.0;  // of the left foot
+  double closure_m_ = 0.0;
+  std::string fall_reason_;
+};
+
+}  // namespace polygmap::sim

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the sensors make of the true motion. Each is a function of the true state and of counter noise, no more.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/ring_buffer.hpp"
+#include "algorithms/core/samples.hpp"
+#include "sim_stub/counter_noise.hpp"
+#include "sim_stub/robot_errors.hpp"
+
+namespace polygmap::sim {
+
+inline constexpr double kRobotWeight_n = 540.0;
+
+// Integrating IMU: the mean over the last tick, by finite differences of the true base poses.
+class ImuModel {
+ public:
+  ImuModel(const ErrorParams& params, const RobotErrors& errors, std::uint64_t seed, const Transform& true_T_base);
+  [[nodiscard]] ImuSample sample(const Transform& true_T_base, std::int64_t stamp_ns, double tick_s);
+
+ private:
+  ErrorParams params_;
+  const RobotErrors& errors_;
+  CounterNoise gyro_noise_, accel_noise_;
+  std::uint64_t index_ = 0;
+  Transform previous_;
+  Vec3 previous_velocity_mps_ = Vec3::Zero();
+};
+
+class JointModel {
+ public:
+  JointModel(const ErrorParams& params, std::uint64_t seed)
+      : params_(params), angle_noise_(seed, Stream::kEncoders), rate_noise_(seed, Stream::kJointRates) {}
+  // q and dq as the drives have them (offset included); forces as delayed by foot_force().
+  [[nodiscard]] JointFeedback sample(const JointVector& drive_q_rad, const JointVector& drive_dq_radps,
+                                     std::int64_t stamp_ns);
+
+ private:
+  ErrorParams params_;
+  CounterNoise angle_noise_, rate_noise_;
+  std::uint64_t index_ = 0;
+};
+
+// Vertical forces from the load shares, as the plant's contact sensors report them 6 ms later.
+class FootForceModel {
+ public:
+  [[nodiscard]] std::array<double, kFootCount> sample(const std::array<double, kFootCount>& load_share,
+                                                      const std::array<bool, kFootCount>& in_contact);
+
+ private:
+  static constexpr std::size_t kDelay_ticks = 3;
+  static constexpr double kTouch_n = 30.0;  // least force of a sole that touches
+  RingBuffer<std::array<double, kFootCount>, kDelay_ticks + 1> history_;
+};
+
+class LioModel {
+ public:
+  LioModel(const ErrorParams& params, const RobotErrors& errors, std::uint64_t seed)
+      : params_(params),
+        errors_(errors),
+        position_noise_(seed, Stream::kLioPosition),
+        rotation_noise_(seed, Stream::kLioRotation) {}
+  [[nodiscard]] LioSample sample(const Transform& true_T_base, std::int64_t stamp_ns);
+
+ private:
+  ErrorParams params_;
+  const RobotErrors& errors_;
+  CounterNoise position_noise_, rotation_noise_;
+  std::uint64_t index_ = 0;
+};
+
+}  // namespace polygmap::sim

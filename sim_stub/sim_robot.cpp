@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/sim_robot.hpp"
+
+#include "sim_stub/counter_noise.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+// The data sheet's robot standing upright; the real one, with its offsets and lengths, stands almost so.
+JointVector standing_q_rad() {
+  JointVector q;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const Transform sole{Mat3::Identity(), Vec3{0, side_sign(foot) * kStanceHalfWidth_m, -kNominalBaseHeight_m}};
+    q.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(foot, 0))) =
+        solve_leg({}, foot, sole).q_rad;
+  }
+  return q;
+}
+
+Transform start_transform(const StartPose& start) {
+  return {rotation_z(start.yaw_rad), Vec3{-start.distance_m, start.lateral_m, kNominalBaseHeight_m}};
+}
+
+}  // namespace
+
+StartPose draw_start(std::uint64_t seed) {
+  const CounterNoise noise(seed, Stream::kStart);
+  constexpr double kYaw_rad = 10.0 * kPi / 180.0;
+  return {noise.uniform(0, 0.35, 0.8), noise.uniform(1, -0.15, 0.15), noise.uniform(2, -kYaw_rad, kYaw_rad)};
+}
+
+SimRobot::SimRobot(const SimOptions& options)
+    : stairs_(make_stairs(options.stairs, options.seed)),
+      start_(options.start.value_or(draw_start(options.seed))),
+      error_params_(options.errors),
+      errors_(draw_errors(options.errors, options.seed)),
+      lio_silent_(options.lio_silent),
+      plant_params_(options.plant),
+      plant_(plant_params_, stairs_, errors_, start_transform(start_), standing_q_rad()),
+      camera_(options.camera,
+              {.kind = options.noise, .scale = errors_.depth_scale, .strength = options.errors.depth_noise}, stairs_,
+              options.seed),
+      imu_(error_params_, errors_, options.seed, plant_.true_T_base()),
+      joints_(error_params_, options.seed),
+      lio_(error_params_, errors_, options.seed),
+      written_q_rad_(standing_q_rad()),
+      active_q_rad_(standing_q_rad()) {
+  sense();
+}
+
+void SimRobot::advance() {
+  clock_.advance();
+  plant_.step(active_q_rad_);
+  active_q_rad_ = written_q_rad_;
+  sense();
+}
+
+void SimRobot::sense() {
+  update_truth();
+  const std::int64_t now_ns = clock_.now_ns();
+  imu_queue_.push_overwrite(imu_.sample(plant_.true_T_base(), now_ns, plant_params_.tick_s));
+  feedback_ = joints_.sample(plant_.drive_q_rad(), plant_.drive_dq_radps(), now_ns);
+  feedback_.foot_force_n = forces_.sample(truth_.load_share, truth_.in_contact);
+  feedback_fresh_ = true;
+  if (clock_.tick() % kLioPeriod_ticks == 0 && !any_contains(lio_silent_, now_ns)) {
+    lio_queue_.push_overwrite(lio_.sample(plant_.true_T_base(), now_ns));
+  }
+  const JointVector q = plant_.true_q_rad();
+  camera_.tick(clock_.tick(), plant_.true_T_base(),
+               {base_leg_shapes(errors_.legs[0], Foot::kLeft, leg_joints(q, Foot::kLeft)),
+                base_leg_shapes(errors_.legs[1], Foot::kRight, leg_joints(q, Foot::kRight))});
+}
+
+void SimRobot::update_truth() {
+  truth_.stamp_ns = clock_.now_ns();
+  truth_.true_T_base = plant_.true_T_base();
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    truth_.true_T_sole[f] = plant_.true_T_sole(f);
+    truth_.in_contact[f] = plant_.in_contact(f);
+    truth_.load_share[f] = plant_.load_share(f);
+    truth_.step_index[f] = plant_.step_index(f);
+  }
+  truth_.closure_error_m = plant_.closure_error_m();
+  truth_.fell = plant_.fell();
+  truth_.fall_reason = plant_.fall_reason();
+}
+
+bool SimRobot::try_read(JointFeedback& feedback) noexcept {
+  if (!feedback_fresh_) return false;
+  feedback = feedback_;
+  feedback_fresh_ = false;
+  return true;
+}
+
+bool SimRobot::try_write(const JointCommand& command) noexcept {
+  for (std::size_t j = 0; j < kJointCount; ++j) written_q_rad_[static_cast<Eigen::Index>(j)] = command.joints[j].q_rad;
+  return true;
+}
+
+bool SimRobot::try_read(LioSample& sample) noexcept {
+  const std::int64_t latest_ns = clock_.now_ns() - kLioLatency_ticks * VirtualClock::kTick_ns;
+  if (lio_queue_.empty() || lio_queue_.oldest().stamp_ns > latest_ns) return false;
+  return lio_queue_.try_pop(sample);
+}
+
+}  // namespace polygmap::sim

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// The simulated robot on its stairs: plant and sensors behind the module's ports. Deterministic per seed and options,
+// byte for byte, with or without the rendering thread.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "algorithms/core/ring_buffer.hpp"
+#include "hal/ports/clock.hpp"
+#include "hal/ports/depth_camera.hpp"
+#include "hal/ports/imu.hpp"
+#include "hal/ports/joint_bus.hpp"
+#include "hal/ports/lidar_odometry.hpp"
+#include "sim_stub/depth_camera.hpp"
+#include "sim_stub/kinematic_plant.hpp"
+#include "sim_stub/robot_errors.hpp"
+#include "sim_stub/sensor_models.hpp"
+#include "sim_stub/stair_world.hpp"
+#include "sim_stub/truth.hpp"
+#include "sim_stub/virtual_clock.hpp"
+
+namespace polygmap::sim {
+
+// Where the robot starts, standing on the floor.
+struct StartPose {
+  double distance_m = 0.5;  // from the base to the first riser along the stairs' axis
+  double lateral_m = 0.0;
+  double yaw_rad = 0.0;
+};
+// 0.35-0.8 m, +-0.15 m, +-10 degrees.
+[[nodiscard]] StartPose draw_start(std::uint64_t seed);
+
+struct SimOptions {
+  std::uint64_t seed = 1;
+  StairParams stairs;
+  DepthNoise noise = DepthNoise::kWhite;
+  ErrorParams errors;
+  std::optional<StartPose> start;  // drawn from the seed when absent
+  DepthCameraOptions camera;
+  std::vector<Window> lio_silent;  // poses stamped then never arrive
+  KinematicPlant::Params plant;
+};
+
+class SimRobot final : public hal::Clock,
+                       public hal::DepthCamera,
+                       public hal::Imu,
+                       public hal::JointBus,
+                       public hal::LidarOdometry {
+ public:
+  explicit SimRobot(const SimOptions& options);
+  SimRobot(const SimRobot&) = delete;
+  SimRobot& operator=(const SimRobot&) = delete;
+
+  // 2 ms: the command written last tick moves the drives, then the sensors sample. Host code, not for module time.
+  void advance();
+  [[nodiscard]] const Truth& truth() const noexcept { return truth_; }
+  [[nodiscard]] const StairWorld& stairs() const noexcept { return stairs_; }
+  [[nodiscard]] const StartPose& start() const noexcept { return start_; }
+  [[nodiscard]] const RobotErrors& errors() const noexcept { return errors_; }
+  [[nodiscard]] const SimDepthCamera& depth_camera() const noexcept { return camera_; }
+  [[nodiscard]] JointVector true_q_rad() const noexcept { return plant_.true_q_rad(); }
+  [[nodiscard]] VirtualClock& clock() noexcept { return clock_; }  // for tests that inject work
+
+  [[nodiscard]] std::int64_t now_ns() const noexcept override { return clock_.now_ns(); }
+  [[nodiscard]] std::uint64_t cycles() const noexcept override { return clock_.cycles(); }
+  [[nodiscard]] double cycles_per_us() const noexcept override { return VirtualClock::kCyclesPerUs; }
+  [[nodiscard]] CameraIntrinsics intrinsics() const noexcept override { return camera_.intrinsics(); }
+  [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept override { return camera_.try_acquire(frame); }
+  void release() noexcept override { camera_.release(); }
+  [[nodiscard]] bool try_read(ImuSample& sample) noexcept override { return imu_queue_.try_pop(sample); }
+  [[nodiscard]] bool try_read(JointFeedback& feedback) noexcept override;
+  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override;
+  [[nodiscard]] bool try_read(LioSample& sample) noexcept override;
+
+ private:
+  static constexpr std::int64_t kLioPeriod_ticks = 50;
+  static constexpr std::int64_t kLioLatency_ticks = 50;
+
+  void sense();
+  void update_truth();
+
+  StairWorld stairs_;
+  StartPose start_;
+  ErrorParams error_params_;
+  RobotErrors errors_;
+  std::vector<Window> lio_silent_;
+  KinematicPlant::Params plant_params_;
+  VirtualClock clock_;
+  KinematicPlant plant_;
+  SimDepthCamera camera_;
+  ImuModel imu_;
+  JointModel joints_;
+  FootForceModel forces_;
+  LioModel lio_;
+  RingBuffer<ImuSample, 64> imu_queue_;
+  RingBuffer<LioSample, 16> lio_queue_;  // sampled; readable once they have arrived
+  JointFeedback feedback_;
+  bool feedback_fresh_ = false;
+  JointVector written_q_rad_;  // by the module, in this tick
+  JointVector active_q_rad_;   // what the drives follow
+  Truth truth_;
+};
+
+}  // namespace polygmap::sim

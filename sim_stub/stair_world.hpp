@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// The true staircase of the simulation. True world frame: x up the stairs, y left, z up; level floor at z = 0; the
+// first riser stands at x = 0, the staircase is centred on y = 0.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace polygmap::sim {
+
+struct StairParams {
+  int steps = 10;  // step N is the landing
+  double rise_m = 0.13;
+  double tread_m = 0.28;
+  double width_m = 1.2;
+  double nosing_m = 0.0;    // overhang of every tread's front edge over its riser
+  double landing_m = 1.0;   // length of step N
+  double jitter_m = 0.005;  // each step's rise and tread differ by up to this much
+};
+
+// A tread with a nosing is a slab of this thickness that overhangs its riser.
+inline constexpr double kTreadSlab_m = 0.03;
+
+// Step k (1-based in speech, index k - 1): a level tread from its nosing to the next riser.
+struct Step {
+  double riser_x_m = 0.0;   // plane of the riser beneath the tread
+  double nosing_x_m = 0.0;  // front edge of the tread: riser_x_m - nosing
+  double back_x_m = 0.0;    // the next riser's plane; the landing's far end for step N
+  double height_m = 0.0;
+};
+
+struct StairWorld {
+  std::vector<Step> steps;
+  double half_width_m = 0.6;
+
+  // Height of the highest surface at (x, y): 0 beside, before and behind the staircase. Index of its step in *step
+  // (-1: floor).
+  [[nodiscard]] double height_m(double x_m, double y_m, int* step = nullptr) const noexcept;
+};
+
+// The staircase of one seed: jitter drawn from the seed, nothing else.
+[[nodiscard]] StairWorld make_stairs(const StairParams& params, std::uint64_t seed);
+
+}  // namespace polygmap::sim

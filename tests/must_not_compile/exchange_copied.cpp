@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two threads hold references into it.
+// expect: deleted
+#include "algorithms/core/exchange.hpp"
+
+int newest(const polygmap::Exchange<int>& exchange) {
+#ifdef POSITIVE_CONTROL
+  const auto& same = exchange;
+#else
+  const auto same = exchange;
+#endif
+  return same.front();
+}

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// Without the answer an old value is taken for news.
+// expect: nodiscard
+#include "algorithms/core/exchange.hpp"
+
+int newest(polygmap::Exchange<int>& exchange) {
+#ifdef POSITIVE_CONTROL
+  if (!exchange.try_take()) return -1;
+#else
+  exchange.try_take();
+#endif
+  return exchange.front();
+}

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// The consumer reads; only the producer's back() may be written.
+// expect: (read-only|cannot assign to return value)
+#include "algorithms/core/exchange.hpp"
+
+void write(polygmap::Exchange<int>& exchange) {
+#ifdef POSITIVE_CONTROL
+  exchange.back() = 1;
+#else
+  exchange.front() = 1;
+#endif
+}

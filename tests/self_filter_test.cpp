@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/self_filter.hpp"
+
+#include <gtest/gtest.h>
+
+#include "algorithms/robot/model.hpp"
+#include "tests/support/depth_scene.hpp"
+
+namespace polygmap {
+namespace {
+
+LegVector bent(double hip_rad) {
+  LegVector q = LegVector::Zero();
+  q[kHipPitch] = hip_rad;
+  q[kKnee] = -2.0 * hip_rad;
+  q[kAnklePitch] = hip_rad;
+  return q;
+}
+
+std::array<LegShapes, kFootCount> camera_legs(double left_hip_rad, double right_hip_rad) {
+  const Transform camera_T_base = base_T_camera().inverse();
+  return {transformed(camera_T_base, base_leg_shapes({}, Foot::kLeft, bent(left_hip_rad))),
+          transformed(camera_T_base, base_leg_shapes({}, Foot::kRight, bent(right_hip_rad)))};
+}
+
+HalfImage<std::uint8_t> mask_of(const HalfRays& rays, const std::array<LegShapes, kFootCount>& legs, double margin_m) {
+  SelfFilter filter;
+  filter.clear();
+  for (std::size_t i = 0; i < SelfFilter::kShapes; ++i) filter.add_shape(rays, legs, margin_m, i);
+  HalfImage<std::uint8_t> flags;
+  for (std::int32_t r = 0; r < rays.height_px; ++r) filter.mark_row(r, rays.width_px, flags.row(r));
+  return flags;
+}
+
+bool hits(const std::array<LegShapes, kFootCount>& legs, const Vec3& ray, double margin_m) {
+  for (double z = 0.02; z < 2.0; z += 0.005) {
+    for (const LegShapes& leg : legs) {
+      if (signed_distance_m(leg.thigh, ray * z) < margin_m || signed_distance_m(leg.shank, ray * z) < margin_m ||
+          signed_distance_m(leg.foot, ray * z) < margin_m) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+TEST(SelfFilter, Mask_LegsOfSeveralPoses_CoversEveryRayThatHitsThemAndLittleElse) {
+  HalfRays rays;
+  rays.set(robot_camera_intrinsics());
+  for (const double hip : {-0.3, -0.8, -1.2}) {
+    const auto legs = camera_legs(hip, -0.4);
+    const HalfImage<std::uint8_t> mask = mask_of(rays, legs, 0.02);
+    int hit = 0, missed = 0, needless = 0;
+    for (std::int32_t r = 0; r < rays.height_px; r += 5) {
+      for (std::int32_t c = 0; c < rays.width_px; c += 5) {
+        const bool body = (mask(c, r) & kPixelBody) != 0;
+        hit += hits(legs, rays.ray(c, r), 0.0) ? 1 : 0;
+        missed += !body && hits(legs, rays.ray(c, r), 0.015) ? 1 : 0;
+        // The box grows by its margin along its axes: its corners reach 1.73 times as far.
+        needless += body && !hits(legs, rays.ray(c, r), 0.042) ? 1 : 0;
+      }
+    }
+    EXPECT_GT(hit, 50) << hip;
+    EXPECT_EQ(missed, 0) << hip;
+    EXPECT_LT(needless, 22) << hip;
+  }
+}
+
+TEST(SelfFilter, Mask_ShapesBehindTheCamera_IsEmpty) {
+  HalfRays rays;
+  rays.set(robot_camera_intrinsics());
+  std::array<LegShapes, kFootCount> legs{};
+  legs[0].thigh = {{0, 0, -0.5}, {0.1, 0, -0.6}, 0.07};
+  legs[0].foot = {{Mat3::Identity(), Vec3{0, 0, -0.8}}, Vec3{0.1, 0.05, 0.05}};
+  const HalfImage<std::uint8_t> mask = mask_of(rays, legs, 0.02);
+  for (std::int32_t r = 0; r < rays.height_px; ++r) {
+    for (std::int32_t c = 0; c < rays.width_px; ++c) ASSERT_EQ(mask(c, r), 0);
+  }
+}
+
+TEST(SelfFilter, Mask_AbsentShapes_IsEmpty) {
+  HalfRays rays;
+  rays.set(robot_camera_intrinsics());
+  std::array<LegShapes, kFootCount> legs{};
+  for (LegShapes& leg : legs) {
+    leg.thigh = {{0, 0, 1}, {0, 0, 1}, 0.0};
+    leg.shank = leg.thigh;
+    leg.foot = {{Mat3::Identity(), Vec3{0, 0, 1}}, Vec3::Zero()};
+  }
+  EXPECT_EQ(mask_of(rays, legs, 0.05)(160, 120), 0);
+}
+
+}  // namespace
+}  // namespace polygmap

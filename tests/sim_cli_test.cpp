@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+
+#include "sim_stub/cli/climb_command.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+struct Call {
+  int code = -1;
+  std::string out, err;
+  std::optional<ClimbOptions> options;  // what the runner got, if it was called
+};
+
+std::string temporary(const std::string& name) { return testing::TempDir() + "polygmap_cli_test_" + name; }
+
+// Runs the command with a runner that records its options and says pass or fail.
+Call call(std::vector<std::string> arguments, bool pass = true) {
+  Call c;
+  std::ostringstream out, err;
+  if (std::find(arguments.begin(), arguments.end(), "--out") == arguments.end() && !arguments.empty()) {
+    arguments.insert(arguments.end(), {"--out", temporary("default")});
+  }
+  const auto run = [&c, pass](const ClimbOptions& options, const ClimbProgressFunction& progress) {
+    c.options = options;
+    progress({1.0, 2, "swing", "perception", 812.0});
+    progress({2.0, 2, "swing", "perception", 812.0});
+    ClimbSummary s;
+    s.pass = pass;
+    s.reason = "Because.";
+    return s;
+  };
+  c.code = polygmap_main(arguments, run, out, err, false);
+  c.out = out.str();
+  c.err = err.str();
+  return c;
+}
+
+// Refused: exit 2, one sentence on one line that names the culprit, and no climb.
+void expect_refused(const std::vector<std::string>& arguments, const std::string& culprit) {
+  const Call c = call(arguments);
+  EXPECT_EQ(c.code, kExitUsage) << culprit;
+  EXPECT_FALSE(c.options) << culprit;
+  EXPECT_NE(c.err.find(culprit), std::string::npos) << c.err;
+  EXPECT_EQ(std::count(c.err.begin(), c.err.end(), '\n'), 1) << c.err;
+  ASSERT_GE(c.err.size(), 2U);
+  EXPECT_EQ(c.err.substr(c.err.size() - 2), ".\n") << c.err;
+  EXPECT_EQ(c.out, "");
+}
+
+TEST(ClimbCommand, NoOptions_RunsWithTheDefaults) {
+  const Call c = call({"climb"});
+  ASSERT_TRUE(c.options) << c.err;
+  EXPECT_EQ(c.code, kExitPass);
+  EXPECT_EQ(c.options->stairs.steps, 10);
+  EXPECT_EQ(c.options->stairs.rise_m, 0.13);
+  EXPECT_EQ(c.options->stairs.tread_m, 0.28);
+  EXPECT_EQ(c.options->stairs.width_m, 1.2);
+  EXPECT_EQ(c.options->stairs.nosing_m, 0.0);
+  EXPECT_EQ(c.options->stairs.landing_m, 1.0);
+  EXPECT_EQ(c.options->seed, 1U);
+  EXPECT_EQ(c.options->noise, DepthNoise::kWhite);
+  EXPECT_EQ(c.options->render_missing_step, -1);
+  EXPECT_FALSE(c.options->blank_depth);
+  EXPECT_TRUE(c.options->self_filter);
+  EXPECT_EQ(c.err, "");
+}
+
+TEST(ClimbCommand, EveryOption_ReachesTheRun) {
+  const Call c = call({"climb",
+                       "--steps",
+                       "4",
+                       "--rise",
+                       "0.15",
+                       "--tread",
+                       "0.3",
+                       "--width",
+                       "0.8",
+                       "--nosing",
+                       "0.02",
+                       "--landing",
+                       "1.5",
+                       "--gait",
+                       "ds",
+                       "--seed",
+                       "42",
+                       "--noise",
+                       "correlated",
+                       "--out",
+                       temporary("every/deep"),
+                       "--render-shift",
+                       "0.03",
+                       "-0.01",
+                       "0.02",
+                       "--render-missing-step",
+                       "3",
+                       "--blank-depth",
+                       "--no-self-filter"});
+  ASSERT_TRUE(c.options) << c.err;
+  EXPECT_EQ(c.options->stairs.steps, 4);
+  EXPECT_EQ(c.options->stairs.rise_m, 0.15);
+  EXPECT_EQ(c.options->stairs.tread_m, 0.3);
+  EXPECT_EQ(c.options->stairs.width_m, 0.8);
+  EXPECT_EQ(c.options->stairs.nosing_m, 0.02);
+  EXPECT_EQ(c.options->stairs.landing_m, 1.5);
+  EXPECT_EQ(c.options->seed, 42U);
+  EXPECT_EQ(c.options->noise, DepthNoise::kCorrelated);
+  EXPECT_EQ(c.options->out_dir, temporary("every/deep"));
+  EXPECT_EQ(c.options->render_dx_m, 0.03);
+  EXPECT_EQ(c.options->render_dy_m, -0.01);
+  EXPECT_EQ(c.options->render_dz_m, 0.02);
+  EXPECT_EQ(c.options->render_missing_step, 2);  // 0-based inside
+  EXPECT_TRUE(c.options->blank_depth);
+  EXPECT_FALSE(c.options->self_filter);
+  EXPECT_TRUE(std::filesystem::is_directory(temporary("every/deep")));
+}
+
+TEST(ClimbCommand, BadLength_IsRefusedWithOneSentence) {
+  for (const char* option : {"--rise", "--tread", "--width", "--landing"}) {
+    for (const char* value : {"nan", "inf", "-inf", "0", "-0.1", "2.01", "1e300", "abc", ""}) {
+      expect_refused({"climb", option, value}, option);
+    }
+  }
+  for (const char* value : {"nan", "inf", "-0.01", "2.5", "0.28", "x"}) {
+    expect_refused({"climb", "--nosing", value}, "--nosing");
+  }
+}
+
+TEST(ClimbCommand, UnclimbableStairs_Run) {
+  EXPECT_TRUE(call({"climb", "--rise", "0.5", "--tread", "0.1"}).options);
+  EXPECT_TRUE(call({"climb", "--rise", "2", "--tread", "2", "--width", "2", "--landing", "2"}).options);
+}
+
+TEST(ClimbCommand, LongStairs_GetTheTimeTheyNeed) {
+  EXPECT_EQ(call({"climb"}).options->time_limit_s, ClimbOptions{}.time_limit_s);
+  EXPECT_GE(call({"climb", "--steps", "200"}).options->time_limit_s, 200 * 3.7 + 30.0);
+}
+
+TEST(ClimbCommand, BadCount_IsRefused) {
+  for (const char* value : {"0", "-3", "201", "1.5", "99999999999999999999", "many"}) {
+    expect_refused({"climb", "--steps", value}, "--steps");
+  }
+  for (const char* value : {"-1", "1.5", "99999999999999999999999", "x"}) {
+    expect_refused({"climb", "--seed", value}, "--seed");
+  }
+  expect_refused({"climb", "--steps", "4", "--render-missing-step", "5"}, "--render-missing-step");
+  expect_refused({"climb", "--render-missing-step", "-1"}, "--render-missing-step");
+}
+
+TEST(ClimbCommand, BadWord_IsRefused) {
+  expect_refused({"climb", "--gait", "ss"}, "single-step");
+  expect_refused({"climb", "--gait", "trot"}, "--gait");
+  expect_refused({"climb", "--noise", "pink"}, "--noise");
+  expect_refused({"climb", "--render-shift", "0.01", "nan", "0"}, "--render-shift");
+  expect_refused({"climb", "--render-shift", "0.01", "0.02"}, "--render-shift");
+  expect_refused({"climb", "--bogus"}, "--bogus");
+  expect_refused({"dance"}, "");
+  expect_refused({}, "subcommand");
+}
+
+TEST(ClimbCommand, UnwritableOut_IsRefused) {
+  const std::string file = temporary("a_file");
+  std::ofstream(file) << "x";
+  expect_refused({"climb", "--out", file}, file);
+  expect_refused({"climb", "--out", file + "/inside"}, file);
+  expect_refused({"climb", "--out", "/proc/polygmap"}, "/proc/polygmap");
+  expect_refused({"climb", "--out", "/proc"}, "/proc");
+  expect_refused({"climb", "--out", ""}, "--out");
+}
+
+TEST(ClimbCommand, BadArguments_LeaveNoDirectory) {
+  const std::string directory = temporary("never_made");
+  std::filesystem::remove_all(directory);
+  expect_refused({"climb", "--rise", "nan", "--out", directory}, "--rise");
+  EXPECT_FALSE(std::filesystem::exists(directory));
+}
+
+TEST(ClimbCommand, Verdict_IsOneLineAndTheExitCode) {
+  const Call pass = call({"climb"});
+  EXPECT_EQ(pass.code, 0);
+  EXPECT_NE(pass.out.find("\nPASS: Because.\n"), std::string::npos) << pass.out;
+  const Call fail = call({"climb"}, false);
+  EXPECT_EQ(fail.code, 1);
+  EXPECT_NE(fail.out.find("\nFAIL: Because.\n"), std::string::npos) << fail.out;
+}
+
+TEST(ClimbCommand, Progress_IsALineNowAndThenInALog) {
+  const Call c = call({"climb", "--steps", "7"});
+  EXPECT_NE(c.out.find("step 2 of 7"), std::string::npos) << c.out;
+  EXPECT_NE(c.out.find("perception 812 us"), std::string::npos) << c.out;
+  EXPECT_EQ(std::count(c.out.begin(), c.out.end(), '\n'), 2)
+      << "one progress line (the second is too soon), one verdict";
+}
+
+TEST(ClimbCommand, RunThatCannotWrite_SaysSoAndExits2) {
+  std::ostringstream out, err;
+  const int code = polygmap_main(
+      {"climb", "--out", temporary("throws")},
+      [](const ClimbOptions&, const ClimbProgressFunction&) -> ClimbSummary {
+        throw std::runtime_error("Cannot write it.");
+      },
+      out, err, false);
+  EXPECT_EQ(code, kExitUsage);
+  EXPECT_EQ(err.str(), "polygmap: Cannot write it.\n");
+}
+
+TEST(ClimbCommand, Help_ExplainsExitCodesAndOptions) {
+  const Call app = call({"--help"});
+  EXPECT_EQ(app.code, 0);
+  EXPECT_NE(app.out.find("Exit codes"), std::string::npos);
+  const Call climb = call({"climb", "--help"});
+  EXPECT_EQ(climb.code, 0);
+  for (const char* part : {"--rise", "0.13", "causality", "--render-shift"}) {
+    EXPECT_NE(climb.out.find(part), std::string::npos) << part << "\n" << climb.out;
+  }
+}
+
+}  // namespace
+}  // namespace polygmap::sim

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whole climbs, end to end: what the issue asks of every seed, of causality, and of repetition.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "sim_stub/climb.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+ClimbSummary climb(const ClimbOptions& options) { return run_climb(options, {}); }
+
+ClimbOptions options_of(std::uint64_t seed, int steps) {
+  ClimbOptions options;
+  options.seed = seed;
+  options.stairs.steps = steps;
+  options.noise = seed % 2 == 0 ? DepthNoise::kCorrelated : DepthNoise::kWhite;
+  return options;
+}
+
+// Every figure that a passing climb must show.
+void expect_a_good_climb(const ClimbSummary& summary, int steps) {
+  EXPECT_TRUE(summary.pass) << summary.reason;
+  EXPECT_FALSE(summary.fell);
+  EXPECT_EQ(summary.steps_climbed, steps);
+  EXPECT_LE(summary.execution_error_m.max, 0.0124);
+  EXPECT_LE(summary.foothold_error_m.max, 0.0124);
+  EXPECT_GE(summary.sole_margin_min_m, 0.0);
+  EXPECT_GT(summary.swing_clearance_min_m, 0.0);
+  EXPECT_GE(summary.seconds_per_step, 2.4);
+  EXPECT_LE(summary.seconds_per_step, 3.7);
+  EXPECT_GE(summary.plane_rate_hz, 29.0);  // 30 Hz frames; a few hold a surface that is none
+  EXPECT_LE(summary.exposure_to_map_ms.max, 64.0);
+  EXPECT_LE(summary.map_age_at_latch_ms.max, 100.0);
+  EXPECT_EQ(summary.heap_calls, 0U);
+}
+
+struct Case {
+  std::uint64_t seed;
+  int steps;
+  double rise_m;
+};
+std::string name_of(const testing::TestParamInfo<Case>& info) {
+  return "seed" + std::to_string(info.param.seed) + "_steps" + std::to_string(info.param.steps) + "_rise" +
+         std::to_string(std::lround(info.param.rise_m * 1000));
+}
+class Climb : public testing::TestWithParam<Case> {};
+
+TEST_P(Climb, StairsSeenOnlyInDepth_ClimbedWithinTheFigures) {
+  ClimbOptions options = options_of(GetParam().seed, GetParam().steps);
+  options.stairs.rise_m = GetParam().rise_m;
+  expect_a_good_climb(climb(options), GetParam().steps);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, Climb,
+                         testing::Values(Case{1, 10, 0.13}, Case{2, 10, 0.17}, Case{3, 10, 0.10}, Case{4, 10, 0.15},
+                                         Case{1, 4, 0.17}, Case{2, 4, 0.10}, Case{3, 4, 0.15}, Case{4, 4, 0.13}),
+                         name_of);
+
+// The one climb that every build runs, sanitizers included.
+TEST(ClimbOneStep, ThreadedRendering_Climbed) {
+  const ClimbSummary summary = climb(options_of(6, 1));
+  EXPECT_TRUE(summary.pass) << summary.reason;
+  EXPECT_EQ(summary.steps_climbed, 1);
+  EXPECT_EQ(summary.heap_calls, 0U);
+}
+
+std::vector<Case> long_cases() {
+  constexpr double kRises_m[]{0.13, 0.10, 0.17, 0.15, 0.12};
+  std::vector<Case> cases;
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) cases.push_back({seed, 10, kRises_m[seed % 5]});
+  return cases;
+}
+INSTANTIATE_TEST_SUITE_P(Long, Climb, testing::ValuesIn(long_cases()), name_of);
+
+TEST(ClimbRepetition, SameSeedThreadedOrNot_SameSummaryByteForByte) {
+  ClimbOptions options = options_of(2, 2);
+  auto first = to_json(climb(options));
+  options.threaded_render = false;
+  auto second = to_json(climb(options));
+  first.erase("wall");
+  second.erase("wall");
+  EXPECT_EQ(first.dump(), second.dump());
+}
+
+int steps_onto_treads(const ClimbSummary& summary) {
+  int count = 0;
+  for (const Footstep& step : summary.footsteps) count += step.onto_tread ? 1 : 0;
+  return count;
+}
+
+// The robot starts from the same place and sees a staircase that stands elsewhere than the one it walks on. The stairs'
+// x axis is the true world's.
+void expect_footholds_to_move_by(double dx_m, double dy_m, double dz_m) {
+  ClimbOptions options = options_of(5, 1);
+  const ClimbSummary straight = climb(options);
+  options.render_dx_m = dx_m;
+  options.render_dy_m = dy_m;
+  options.render_dz_m = dz_m;
+  const ClimbSummary shifted = climb(options);
+  ASSERT_GE(steps_onto_treads(straight), 1);
+  int compared = 0;
+  for (const Footstep& a : straight.footsteps) {
+    for (const Footstep& b : shifted.footsteps) {
+      if (!a.onto_tread || !b.onto_tread || a.foot != b.foot) continue;
+      const Vec3 moved_m = b.true_T_planned.p_m - a.true_T_planned.p_m;
+      EXPECT_NEAR(moved_m.x(), dx_m, 0.005);
+      EXPECT_NEAR(moved_m.y(), dy_m, 0.005);
+      EXPECT_NEAR(moved_m.z(), dz_m, 0.005);
+      ++compared;
+    }
+  }
+  EXPECT_GE(compared, 1);
+}
+TEST(ClimbCausality, PictureShifted30mmAhead_FootholdsFollow) { expect_footholds_to_move_by(0.03, 0, 0); }
+TEST(ClimbCausality, PictureShifted30mmAside_FootholdsFollow) { expect_footholds_to_move_by(0, 0.03, 0); }
+TEST(ClimbCausality, PictureRaised20mm_FootholdsFollow) { expect_footholds_to_move_by(0, 0, 0.02); }
+
+TEST(ClimbCausality, BlankDepth_NoStepOntoAnythingAndTheReasonIsNamed) {
+  ClimbOptions options = options_of(1, 2);
+  options.blank_depth = true;
+  const ClimbSummary summary = climb(options);
+  EXPECT_FALSE(summary.pass);
+  EXPECT_FALSE(summary.fell);
+  EXPECT_EQ(steps_onto_treads(summary), 0);
+  EXPECT_NE(summary.reason.find("saw no surface"), std::string::npos) << summary.reason;
+}
+
+TEST(ClimbCausality, StepMissingFromThePicture_NoFootholdThere) {
+  ClimbOptions options = options_of(1, 4);
+  options.render_missing_step = 2;
+  const ClimbSummary summary = climb(options);
+  EXPECT_FALSE(summary.pass);
+  EXPECT_FALSE(summary.fell) << summary.reason;
+  EXPECT_LE(summary.steps_climbed, 2);
+  for (const Footstep& step : summary.footsteps) EXPECT_LE(step.step_index, 1);
+}
+
+TEST(ClimbCausality, SelfFilterOff_LegsAreTakenForSurfaces) {
+  ClimbOptions options = options_of(1, 2);
+  const ClimbSummary filtered = climb(options);
+  options.self_filter = false;
+  const ClimbSummary unfiltered = climb(options);
+  EXPECT_GT(unfiltered.surfaces_unmatched, filtered.surfaces_unmatched + 10);
+}
+
+void expect_to_name(const std::string& what, double true_m, const std::string& reason) {
+  const std::size_t at = reason.find(what);
+  ASSERT_NE(at, std::string::npos) << reason;
+  EXPECT_NEAR(std::stod(reason.substr(at + what.size())), true_m, 0.015) << reason;
+}
+
+TEST(ClimbLimits, RiseOfHalfAMetre_ModuleStopsAndNamesTheRise) {
+  ClimbOptions options = options_of(1, 3);
+  options.stairs.rise_m = 0.5;
+  const ClimbSummary summary = climb(options);
+  EXPECT_FALSE(summary.pass);
+  EXPECT_FALSE(summary.fell) << summary.reason;
+  expect_to_name("rise of ", 0.5, summary.reason);
+}
+
+TEST(ClimbLimits, TreadOfTenCentimetres_ModuleStopsAndNamesTheTread) {
+  ClimbOptions options = options_of(1, 3);
+  options.stairs.tread_m = 0.1;
+  const ClimbSummary summary = climb(options);
+  EXPECT_FALSE(summary.pass);
+  EXPECT_FALSE(summary.fell) << summary.reason;
+  expect_to_name("tread of ", 0.1, summary.reason);
+}
+
+}  // namespace
+}  // namespace polygmap::sim

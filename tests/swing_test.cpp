@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/swing.hpp"
+
+#include <gtest/gtest.h>
+
+namespace polygmap {
+namespace {
+
+struct Case {
+  double rise_m;
+  double toe_down_rad;
+};
+constexpr Case kCases[]{{0.0, 0.0}, {0.10, 0.3}, {0.13, 0.2}, {0.17, 0.5}, {-0.05, 0.0}};
+constexpr std::int32_t kTicks = 490;
+
+Swing make(const Case& c, double retreat_m = 0.015) {
+  SwingShape shape;
+  shape.toe_down_rad = c.toe_down_rad;
+  shape.retreat_m = retreat_m;
+  Swing swing;
+  swing.plan({Mat3::Identity(), {0, 0.1, 0}}, {{0.28, 0.1, c.rise_m}, 0.0}, shape, kTicks);
+  return swing;
+}
+double lowest_m(const Transform& sole) {
+  return std::min((sole * Vec3{kCollisionRectangle.toe_x_m, 0, 0}).z(),
+                  (sole * Vec3{kCollisionRectangle.heel_x_m, 0, 0}).z());
+}
+double front_m(const Transform& sole) {
+  return std::max((sole * Vec3{kCollisionRectangle.toe_x_m, 0, 0}).x(),
+                  (sole * Vec3{kCollisionRectangle.toe_x_m, 0, kCollisionHeight_m}).x());
+}
+
+TEST(Swing_Eq32, LiftAndLand_ReachApexAndTarget) {
+  for (const Case& c : kCases) {
+    const Swing swing = make(c);
+    EXPECT_LT((swing.at(0).p_m - Vec3(0, 0.1, 0)).norm(), 1e-12);
+    EXPECT_LT((swing.at(kTicks).p_m - Vec3(0.28, 0.1, c.rise_m)).norm(), 1e-9);
+    EXPECT_LT((swing.at(kTicks).R - Mat3::Identity()).norm(), 1e-9);
+    double apex = -1;
+    for (int i = 0; i <= kTicks; ++i) apex = std::max(apex, lowest_m(swing.at(i)));
+    EXPECT_NEAR(apex, std::max(c.rise_m, 0.0) + SwingShape{}.clearance_m, 1e-6);
+  }
+}
+
+// As printed, eq. (32) jumps by z_0 when the landing begins.
+TEST(Swing_Eq32Eq33, WholePath_IsContinuousInPositionAndSpeed) {
+  for (const Case& c : kCases) {
+    const Swing swing = make(c);
+    for (int i = 2; i <= kTicks + 50; ++i) {
+      const Vec3 v1 = (swing.at(i - 1).p_m - swing.at(i - 2).p_m) / kTick_s;
+      const Vec3 v2 = (swing.at(i).p_m - swing.at(i - 1).p_m) / kTick_s;
+      EXPECT_LT(v2.norm(), 1.6) << i;
+      EXPECT_LT((v2 - v1).norm() / kTick_s, 25.0) << i;  // m/s2: no jump of the speed
+    }
+  }
+}
+
+TEST(Swing_Eq33, Forward_NeverOvershootsAndEndsBeforeTheLanding) {
+  const Swing swing = make({0.13, 0.3});
+  for (int i = 0; i <= kTicks; ++i) EXPECT_LE(front_m(swing.at(i)), 0.28 + kCollisionRectangle.toe_x_m + 1e-9) << i;
+  for (int i = 0; i <= kTicks; ++i) {
+    const Transform sole = swing.at(i);
+    if (i > kTicks / 2 && lowest_m(sole) < 0.13 + 0.03) {
+      EXPECT_NEAR(sole.p_m.x(), 0.28, 1e-3) << i;  // straight down over the last 30 mm
+    }
+  }
+}
+
+TEST(Swing, RiserAtTheToe_RisesBeforeItGoesForward) {
+  for (const Case& c : {Case{0.10, 0.3}, Case{0.13, 0.2}, Case{0.17, 0.5}}) {
+    const Swing swing = make(c);
+    for (int i = 0; i <= kTicks; ++i) {
+      const Transform sole = swing.at(i);
+      // 11 mm to the riser, which may be 10 mm nearer and 10 mm higher than mapped.
+      if (lowest_m(sole) < c.rise_m + 0.01 && i < kTicks / 2) {
+        EXPECT_LT(front_m(sole), kCollisionRectangle.toe_x_m + 0.001) << c.rise_m << " " << i;
+      }
+      const double toe_x = (sole * Vec3{kCollisionRectangle.toe_x_m, 0, 0}).x();
+      if (std::abs(toe_x - kCollisionRectangle.toe_x_m - 0.011) < 0.003 && i > 50) {
+        EXPECT_GT(lowest_m(sole), c.rise_m + 0.04) << i;
+      }
+    }
+  }
+}
+
+TEST(Swing, NothingFelt_GoesOnDownAtApproachSpeed) {
+  const Swing swing = make({0.13, 0.3});
+  EXPECT_NEAR(swing.at(kTicks + 100).p_m.z(), 0.13 - 0.2 * SwingShape{}.approach_mps, 1e-9);
+  EXPECT_NEAR(swing.lowered_m(kTicks + 100), 0.2 * SwingShape{}.approach_mps, 1e-12);
+  EXPECT_NEAR((swing.at(kTicks).p_m.z() - swing.at(kTicks - 1).p_m.z()) / kTick_s, -SwingShape{}.approach_mps, 1e-9);
+}
+
+TEST(Swing, TiltedAndTurnedStart_LeavesItContinuouslyAndLandsFlat) {
+  const Transform start{rotation_z(0.15) * rotation_y(0.004) * rotation_x(-0.003), {0, 0.1, 0}};
+  Swing swing;
+  swing.plan(start, {{0.2, 0.12, 0.0}, -0.05}, {}, kTicks);
+  EXPECT_LT((swing.at(0).R - start.R).norm(), 1e-12);
+  EXPECT_LT((swing.at(kTicks).R - rotation_z(-0.05)).norm(), 1e-9);
+}
+
+TEST(Quintic, EndsAndSpeeds_AreAsAsked) {
+  const Quintic q({1.0, -0.5, 2.0}, {3.0, 0.25, -1.0}, 0.7);
+  EXPECT_NEAR(q.at(0.0).acceleration, 2.0, 1e-12);
+  EXPECT_NEAR(q.at(0.0).speed, -0.5, 1e-12);
+  EXPECT_NEAR(q.at(0.7).position, 3.0, 1e-12);
+  EXPECT_NEAR(q.at(0.7).speed, 0.25, 1e-11);
+  EXPECT_NEAR(q.at(0.7).acceleration, -1.0, 1e-10);
+  for (double t = 0.01; t < 0.69; t += 0.01) {
+    EXPECT_NEAR(q.at(t).speed, (q.at(t + 1e-6).position - q.at(t - 1e-6).position) / 2e-6, 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace polygmap

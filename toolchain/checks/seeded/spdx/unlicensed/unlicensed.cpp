@@ -1,0 +1,2 @@
+// expect: unlicensed.cpp:1: no 'SPDX
+int unlicensed;

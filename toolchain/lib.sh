@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+# What climb and check share. Sourced from the repository's root.
+
+say() { printf '%s: %s\n' "${0##*/}" "$*"; }
+die() {
+  printf '%s: %s\n' "${0##*/}" "$*" >&2
+  exit 2
+}
+
+# One line per installed package: name version, name:architecture version for a foreign one.
+installed_packages() {
+  local native
+  native=$(dpkg --print-architecture)
+  dpkg-query -W -f='${db:Status-Status} ${Package} ${Architecture} ${Version}\n' |
+    awk -v native="$native" '$1 == "installed" { print ($3 == native || $3 == "all") ? $2 : $2 ":" $3, $4 }'
+}
+
+# ensure_packages PACKAGE...: installs with apt what is missing, and only then calls apt at all.
+ensure_packages() {
+  command -v dpkg-query >/dev/null && command -v apt-get >/dev/null ||
+    die "this needs Debian 12 (or a relative with apt); elsewhere, install these by hand and build with CMake: $*"
+  local missing=() package root=() installed
+  installed=$(installed_packages)
+  for package in "$@"; do
+    grep -q "^$package " <<<"$installed" || missing+=("$package")
+  done
+  ((${#missing[@]})) || return 0
+  if [[ $EUID -ne 0 ]]; then
+    command -v sudo >/dev/null || die "not root and no sudo; as root: apt-get install --no-install-recommends ${missing[*]}"
+    root=(sudo)
+  fi
+  say "installing with ${root[*]:+sudo }apt: ${missing[*]}"
+  mkdir -p build/logs
+  local log=build/logs/apt.log
+  : >"$log"
+  for package in "${missing[@]}"; do
+    [[ $package == *:* ]] || continue
+    grep -qx "${package#*:}" < <(dpkg --print-foreign-architectures) && continue
+    say "adding the architecture ${package#*:} to dpkg, for the cross build's libraries"
+    "${root[@]}" dpkg --add-architecture "${package#*:}" || die "dpkg --add-architecture ${package#*:} failed"
+  done
+  "${root[@]}" apt-get update >>"$log" 2>&1 || say "apt-get update complained (see $log); trying all the same"
+  "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}" \
+    >>"$log" 2>&1 || {
+    tail -n 15 "$log" >&2
+    die "apt could not install them all; the whole story is in $log"
+  }
+}
+
+# configure PRESET: once, and again when the presets or the toolchain file changed. CMake itself sees the rest.
+configure() {
+  local stamp=build/$1/.configured key
+  key=$(sha256sum CMakePresets.json toolchain/aarch64-orin.cmake)
+  [[ -e build/$1/build.ninja && -e $stamp && $(<"$stamp") == "$key" ]] && return 0
+  cmake --preset "$1" -DCMAKE_CXX_COMPILER_LAUNCHER= || return 1  # ccache loses the call graphs
+  printf '%s\n' "$key" >"$stamp"
+}
