@@ -17,6 +17,10 @@ int careless(int a, int b, int c) noexcept {
             if (n > 100) {
               if (n % 2 == 0 || n % 3 == 0) n -= 7;
               if (n % 5 == 0) n += 11;
+              for (int m = 0; m < n; ++m) {
+                if (m % 7 == 3 && n > k) n -= m;
+                while (n > 1000) n /= 2;
+              }
             }
           }
         }
