@@ -232,7 +232,8 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     case Phase::kRefit:
       // Rounds: 0 sharpens the seed regions' planes, 1 assigns all pixels, 2 again if what 1 left over gave new planes.
       refit();
-      merge_planes();
+      // After the last round nobody would hand a merged plane's pixels to the one that stays.
+      if (round_ == 0) merge_planes();
       enter(round_ == 0 ? Phase::kAssign : Phase::kClean);
       ++round_;
       start_round();
@@ -431,6 +432,7 @@ std::int32_t SurfaceExtractor::ransac_step() noexcept {
 void SurfaceExtractor::add_plane(const InversePlane& plane, Lean lean, std::size_t region) noexcept {
   if (plane_count_ == kMaxPlanes) {
     ++counters_.plane_overflow;
+    ++next_.dropped;
     return;
   }
   Plane& p = planes_[++plane_count_];
@@ -909,7 +911,7 @@ void SurfaceExtractor::build_polygon() noexcept {
   }
   const auto drop = [&] {
     own.alive = false;
-    ++next_.dropped;
+    ++counters_.no_polygon;
   };
   if (flat.size() < 3 || !(twice_area(flat) > 0.0)) {
     drop();

@@ -68,6 +68,7 @@ class SurfaceExtractor {
     std::uint32_t region_overflow = 0;  // pixels and regions that found no room
     std::uint32_t plane_overflow = 0;   // planes or surfaces that found no room
     std::uint32_t no_plane = 0;         // regions without a plane
+    std::uint32_t no_polygon = 0;       // surfaces whose outline encloses no area
     std::uint32_t contour_overflow = 0;
     std::uint32_t rejected_lines = 0;  // nosings and back lines that were looked for and not good enough
   };
