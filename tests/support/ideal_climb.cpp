@@ -122,12 +122,8 @@ FootholdSet IdealClimb::search() const {
     hold.last_seen_ns = set.map_stamp_ns;
   }
   set.p_star = set.p_star_feet[0];
-  set.tread.polygon_id = set.p_star.polygon_id;
   set.tread.nosing_a_m = world_T_true * Vec3{x_m, stairs.half_width_m, z_m};
   set.tread.nosing_b_m = world_T_true * Vec3{x_m, -stairs.half_width_m, z_m};
-  set.tread.yaw_rad = set.p_star.yaw_rad;
-  set.tread.height_m = set.tread.nosing_a_m.z();
-  set.tread.depth_m = depth_m;
   set.measured_rise_m = z_m - stance_m;
   return set;
 }
