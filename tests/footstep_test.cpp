@@ -171,11 +171,24 @@ TEST(StepSearch, RiseBeyondTheLegs_IsImpossibleBeforeTheFirstLiftOff) {
     trailing.foot = Foot::kRight;
     trailing.target.position_m.y() = -0.1;
     StepSearch search;
-    search.begin({}, {}, plan.goal, trailing, from, soles);
+    search.begin({}, {}, plan.goal, trailing, StepParams{}.stair_shift_ticks, from, soles);
     int calls = 0;
     while (search.step() == StepSearch::State::kSearching && calls < 1000) ++calls;
     EXPECT_EQ(search.state(), StepSearch::State::kImpossible) << rise;
     EXPECT_LT(calls, 160);  // less than half a weight shift: it is known before the foot would leave
+  }
+}
+
+TEST(StepSearch, ShiftFasterThanTheDrives_IsNotProvenByASlowerOne) {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  const StepPlan plan = stair_step(StepKind::kTrailing, 0.13, 0.28, soles, from);
+  for (const std::int32_t shift_ticks : {StepParams{}.stair_shift_ticks, 40}) {
+    StepSearch search;
+    search.begin({}, {}, plan.goal, {}, shift_ticks, from, soles);
+    for (int i = 0; i < 1000 && search.step() == StepSearch::State::kSearching; ++i) {
+    }
+    EXPECT_EQ(search.state() == StepSearch::State::kFound, shift_ticks > 40);
   }
 }
 
