@@ -173,6 +173,15 @@ TEST(ClimbLimits, RiseOfHalfAMetre_ModuleStopsAndNamesTheRise) {
   expect_to_name("rise of ", 0.5, summary.reason);
 }
 
+// Shorter than the way ahead that is looked at: its end is seen, so the module knows that it is on top.
+TEST(ClimbLimits, LandingOf40Centimetres_ModuleEndsByItself) {
+  ClimbOptions options = options_of(1, 1);
+  options.stairs.landing_m = 0.4;
+  const ClimbSummary summary = climb(options);
+  EXPECT_TRUE(summary.pass) << summary.reason;
+  EXPECT_EQ(summary.reason.find("before the module"), std::string::npos) << summary.reason;
+}
+
 TEST(ClimbLimits, TreadOfTenCentimetres_ModuleStopsAndNamesTheTread) {
   ClimbOptions options = options_of(1, 3);
   options.stairs.tread_m = 0.1;
