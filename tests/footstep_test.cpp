@@ -152,7 +152,11 @@ TEST(StepSearch, RisesAndTreadsOfTheStairs_LegsCanDoAllOfThem) {
         std::array<Transform, kFootCount> soles;
         TorsoTrajectory::State from;
         const StepPlan plan = stair_step(kind, rise, ahead, soles, from);
-        const StepCheck check = check_step({}, params, StepKnots(plan, from, soles, 2));
+        const StepKnots knots(plan, from, soles, 2);
+        StepProof proof;
+        proof.begin({}, params, knots);
+        ASSERT_TRUE(proof.advance(knots.count()));
+        const StepCheck& check = proof.check();
         EXPECT_TRUE(check.feasible) << rise << " " << ahead << " kind " << static_cast<int>(kind) << ": margin "
                                     << check.joint_margin_rad << " knee " << check.knee_rad << " speed "
                                     << check.speed_share;

@@ -40,7 +40,6 @@ struct GaitStatus {
   LatchedStep step;                                 // the current or the last swing
   std::uint32_t treads_climbed = 0;                 // both feet on it, by the module's own count
   std::array<bool, kFootCount> stands{true, true};  // planned contact
-  Transform odom_T_base_desired;
   std::array<Transform, kFootCount> odom_T_sole_desired;
   std::uint32_t ik_limited_ticks = 0;  // ticks in which a leg could not reach what was asked
   std::uint32_t early_contacts = 0;

@@ -12,6 +12,7 @@
 #include "algorithms/foothold/foothold_raster.hpp"
 #include "algorithms/foothold/level_surface.hpp"
 #include "algorithms/foothold/reach.hpp"
+#include "algorithms/geometry/plan_frame.hpp"
 
 namespace polygmap {
 

@@ -273,7 +273,6 @@ void Gait::tick(const StateEstimate& state, const FootholdSet& footholds, const 
 
   if (joints_.follow(plan_T_base_, plan_T_sole_, command)) ++status_.ik_limited_ticks;
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
-  status_.odom_T_base_desired = odom_T_plan * plan_T_base_;
   for (std::size_t i = 0; i < kFootCount; ++i) status_.odom_T_sole_desired[i] = odom_T_plan * plan_T_sole_[i];
 }
 

@@ -107,13 +107,6 @@ bool StepProof::advance(std::int32_t count) noexcept {
   return true;
 }
 
-StepCheck check_step(const LegGeometry& geometry, const StepParams& params, const StepKnots& knots) noexcept {
-  StepProof proof;
-  proof.begin(geometry, params, knots);
-  static_cast<void>(proof.advance(knots.count()));
-  return proof.check();
-}
-
 void StepSearch::begin(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal,
                        const StepGoal& trailing, std::int32_t shift_ticks, const TorsoTrajectory::State& from,
                        const std::array<Transform, kFootCount>& soles) noexcept {

@@ -109,8 +109,6 @@ class StepProof {
   std::array<LegVector, kFootCount> previous_;
   std::int32_t next_ = 0;
 };
-[[nodiscard]] StepCheck check_step(const LegGeometry& geometry, const StepParams& params,
-                                   const StepKnots& knots) noexcept;
 
 // Looks for a shape of a step that both legs can do, kKnotsPerCall knots per call. A leading step is only offered when
 // the trailing step after it is possible too.
