@@ -32,13 +32,7 @@ Progress Pipeline::run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& b
 }
 
 Telemetry Pipeline::telemetry(std::int64_t now_ns) const noexcept {
-  return {now_ns,
-          control_.state(),
-          perception_.surface_frame(),
-          perception_.state_at_exposure(),
-          perception_.map_snapshot(),
-          perception_.foothold_set(),
-          control_.gait_status()};
+  return {now_ns, control_.state(), perception_.surface_frame(), perception_.map_snapshot(), control_.gait_status()};
 }
 
 std::array<StageMemory, 7> static_memory() noexcept {

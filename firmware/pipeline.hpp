@@ -33,6 +33,12 @@ class Pipeline {
   [[nodiscard]] ControlLane& control() noexcept { return control_; }
   [[nodiscard]] const ControlLane& control() const noexcept { return control_; }
   [[nodiscard]] const PerceptionLane& perception() const noexcept { return perception_; }
+  // Where that lane's executive counts its own.
+  [[nodiscard]] Health& lane_health(std::size_t lane) noexcept {
+    return lane == 0 ? control_.faults() : perception_.faults();
+  }
+  // Everything that both lanes and their executives counted; perception's as of its last frame. Control's thread only.
+  [[nodiscard]] const Health& health() const noexcept { return control_.all_faults(); }
   [[nodiscard]] Telemetry telemetry(std::int64_t now_ns) const noexcept;
 
  private:

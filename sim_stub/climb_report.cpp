@@ -70,6 +70,8 @@ std::string why_stopped(Obstruction reason, double measured_m) {
       return "it measured a tread too narrow for two feet";
     case Obstruction::kMapStale:
       return "its map was stale";
+    case Obstruction::kStateStale:
+      return "its IMU or its joints fell silent";
   }
   return "it gave no known reason";
 }

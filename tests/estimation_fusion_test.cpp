@@ -170,7 +170,9 @@ class EstimatorLioTest : public ::testing::Test {
     for (; t_ns_ < std::min(until_ns, walk.end_ns()); t_ns_ += kTick_ns) {
       const ImuSample imu = walk.imu(t_ns_);
       const JointFeedback joints = walk.joints(t_ns_);
-      estimator_.tick(imu, joints, walk.truth(t_ns_).stance);
+      estimator_.add_imu(imu, t_ns_);
+      estimator_.add_joints(joints, t_ns_);
+      estimator_.tick(walk.truth(t_ns_).stance);
       if (t_ns_ % kLioPeriod_ns == 0 && t_ns_ >= kLioPeriod_ns) deliver(walk.lio(t_ns_ - kLioPeriod_ns));
       if (!aligned_ && estimator_.state().initialised) {
         true_T_world_ = walk.truth(t_ns_).true_T_base * estimator_.state().world_T_base().inverse();

@@ -384,7 +384,7 @@ TEST(GaitInput, NotInitialised_HoldsTheMeasuredJointsAndNeverMoves) {
   for (int i = 0; i < 12; ++i) feedback.q_rad[i] = 0.01 * i;
   JointCommand command;
   for (int i = 0; i < 2000; ++i) {
-    gait.tick({}, {}, feedback, command);
+    gait.tick(0, {}, {}, feedback, command);
     feedback.q_rad.array() += 1e-4;  // it must not follow a sagging joint
   }
   EXPECT_EQ(gait.status().phase, GaitPhase::kStandstill);
@@ -401,7 +401,7 @@ TEST(GaitInput, NoGoodReading_DrivesGetNoStiffness) {
   JointFeedback feedback;
   feedback.q_rad[3] = std::numeric_limits<double>::quiet_NaN();
   JointCommand command;
-  gait.tick({}, {}, feedback, command);
+  gait.tick(0, {}, {}, feedback, command);
   for (const JointSetpoint& joint : command.joints) EXPECT_EQ(joint.kp_nmprad, 0.0);
 }
 

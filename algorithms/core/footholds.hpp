@@ -33,6 +33,7 @@ enum class Obstruction : std::uint8_t {
   kTreadTooShort,  // the foot does not fit: measured_tread_m
   kTooNarrow,      // both feet do not fit side by side
   kMapStale,       // the newest fused frame is too old
+  kStateStale,     // IMU or joint feedback fell silent
 };
 
 // One tread ahead, as the search measured it.

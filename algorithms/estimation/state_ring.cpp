@@ -29,6 +29,7 @@ bool StateRing::try_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept
     out = stamp_ns == a.stamp_ns ? a : b;
     return true;
   }
+  if (b.stamp_ns - a.stamp_ns > kMaxGap_ns) return false;
   const double share = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
   out = share < 0.5 ? a : b;  // what is not interpolated: probabilities, ages, sigmas
   out.stamp_ns = stamp_ns;
