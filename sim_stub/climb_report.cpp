@@ -79,6 +79,8 @@ std::string why_stopped(Obstruction reason, double measured_m) {
       return "what it saw kept changing";
     case Obstruction::kGroundMissing:
       return "there was no ground where a foot came down, and it put the foot back";
+    case Obstruction::kStateStale:
+      return "its IMU or its joints fell silent";
   }
   return "it gave no known reason";
 }

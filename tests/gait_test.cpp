@@ -530,7 +530,7 @@ TEST(GaitInput, NotInitialised_HoldsTheMeasuredJointsAndNeverMoves) {
   for (int i = 0; i < 12; ++i) feedback.q_rad[i] = 0.01 * i;
   JointCommand command;
   for (int i = 0; i < 2000; ++i) {
-    gait.tick({}, {}, feedback, command);
+    gait.tick(0, {}, {}, feedback, command);
     feedback.q_rad.array() += 1e-4;  // it must not follow a sagging joint
   }
   EXPECT_EQ(gait.status().phase, GaitPhase::kStandstill);
@@ -548,10 +548,10 @@ TEST(GaitInput, NoGoodReading_DrivesGetNoStiffness) {
     JointFeedback feedback;
     feedback.q_rad[kKnee] = knee_rad;
     JointCommand command;
-    gait.tick({}, {}, feedback, command);
+    gait.tick(0, {}, {}, feedback, command);
     for (const JointSetpoint& joint : command.joints) EXPECT_EQ(joint.kp_nmprad, 0.0) << knee_rad;
     feedback.q_rad[kKnee] = 0.5;
-    gait.tick({}, {}, feedback, command);
+    gait.tick(0, {}, {}, feedback, command);
     EXPECT_GT(command.joints[kKnee].kp_nmprad, 0.0) << knee_rad;
     EXPECT_DOUBLE_EQ(command.joints[kKnee].q_rad, 0.5);
   }
@@ -563,7 +563,7 @@ TEST(GaitInput, EncoderALittleOutsideTheRange_HoldsAtTheLimit) {
   JointFeedback feedback;
   feedback.q_rad[kKnee] = -0.01;
   JointCommand command;
-  gait.tick({}, {}, feedback, command);
+  gait.tick(0, {}, {}, feedback, command);
   EXPECT_GT(command.joints[kKnee].kp_nmprad, 0.0);
   EXPECT_EQ(command.joints[kKnee].q_rad, 0.0);
 }

@@ -38,6 +38,7 @@ enum class Obstruction : std::uint8_t {
   kLegsCannot,     // the legs cannot do the next step: of this rise when it is a leading one, 0 otherwise
   kUnsteady,       // what the search offers keeps changing
   kGroundMissing,  // no ground where the foot came down: it was put back where it had stood
+  kStateStale,     // IMU or joint feedback fell silent
 };
 
 // The edge of the next tread.

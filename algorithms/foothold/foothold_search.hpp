@@ -61,7 +61,7 @@ class FootholdSearch {
 
   // Copies what it needs. An invalid query is counted and leaves nothing to do.
   void begin(const MapSnapshot& map, const Query& query) noexcept;
-  // A unit is one row of the raster (about 3 us) or one polygon.
+  // A unit is one row of the raster or one polygon.
   Progress step(WorkBudget& budget) noexcept;
   // Changes only in the step that returns kDone.
   [[nodiscard]] const FootholdSet& result() const noexcept { return result_; }

@@ -10,10 +10,6 @@ constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
 
 bool finite(const Transform& T) noexcept { return math::all_finite(T.R) && math::all_finite(T.p_m); }
 
-bool usable(const StateEstimate& s) noexcept {
-  return finite(s.odom_T_base) && finite(s.world_T_odom) && finite(s.odom_T_sole[0]) && finite(s.odom_T_sole[1]);
-}
-
 }  // namespace
 
 void Gait::reset(const Params& params) noexcept {
@@ -29,9 +25,16 @@ void Gait::reset(const Params& params) noexcept {
   // copy from would take 7 KB of stack.
 }
 
+bool Gait::usable(const StateEstimate& s) const noexcept {
+  return now_ns_ - s.oldest_input_ns <= params_.steer_age_ns && finite(s.odom_T_base) && finite(s.world_T_odom) &&
+         finite(s.odom_T_sole[0]) && finite(s.odom_T_sole[1]);
+}
+
+bool Gait::lost(const StateEstimate& s) const noexcept { return now_ns_ - s.oldest_input_ns > params_.stop_age_ns; }
+
 ClimbPlanner::Situation Gait::situation(const StateEstimate& state) const noexcept {
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
-  return {state.stamp_ns,
+  return {now_ns_,
           state.world_T_odom,
           {sole_pose(odom_T_plan * plan_T_sole_[0]), sole_pose(odom_T_plan * plan_T_sole_[1])}};
 }
@@ -93,6 +96,7 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
 
 void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexcept {
   if (stop_requested_) return end(GaitPhase::kStopped, Obstruction::kNone, 0.0);
+  if (lost(state)) return end(GaitPhase::kStopped, Obstruction::kStateStale, 0.0);
   if (!state.initialised || !usable(state)) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (decision.has_step) {
@@ -128,7 +132,7 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
     const double rise_m = decision_.goal.kind == StepKind::kLeading ? decision_.rise_m : 0.0;
     return end(GaitPhase::kStopped, Obstruction::kLegsCannot, rise_m);
   }
-  if (stop_requested_) return begin_hold();
+  if (stop_requested_ || lost(state)) return begin_hold();
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
   if (!usable(state)) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
@@ -158,7 +162,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   step = {.sequence = step.sequence + 1,
           .foot = goal.foot,
           .onto_tread = goal.kind != StepKind::kFloor,
-          .latch_stamp_ns = state.stamp_ns,
+          .latch_stamp_ns = now_ns_,
           .map_stamp_ns = footholds.map_stamp_ns,
           .target = goal.foothold,
           .odom_T_target = goal.target.transform(),
@@ -184,8 +188,9 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     if (swing_.lowered_m(tick_) > params_.late_m) ++status_.late_contacts;
     return touch_down(state);
   }
-  // A force that never left is a broken sensor: the plan's end is the touch-down.
-  if (!unloaded_ && tick_ > swing_.duration_ticks()) return touch_down(state);
+  // A force that never left or is no longer told: the plan's end is the touch-down.
+  const bool told = now_ns_ - feedback.stamp_ns <= params_.steer_age_ns;
+  if (!(unloaded_ && told) && tick_ > swing_.duration_ticks()) return touch_down(state);
   if (swing_.lowered_m(tick_) > params_.max_lowering_m) {  // the ground that was seen is not there
     ++status_.late_contacts;
     activity_ = Activity::kRetreat;
@@ -220,7 +225,7 @@ void Gait::retreat(const JointFeedback& feedback) noexcept {
 
 void Gait::touch_down(const StateEstimate& state) noexcept {
   const std::size_t i = index_of(decision_.goal.foot);
-  status_.step.touch_down_stamp_ns = state.stamp_ns;
+  status_.step.touch_down_stamp_ns = now_ns_;
   status_.step.odom_T_executed =
       usable(state) ? state.odom_T_sole[i] : correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
   status_.stands[i] = true;
@@ -231,11 +236,12 @@ void Gait::touch_down(const StateEstimate& state) noexcept {
   begin_hold();
 }
 
-void Gait::tick(const StateEstimate& state, const FootholdSet& footholds, const JointFeedback& feedback,
-                JointCommand& command) noexcept {
+void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
+                const JointFeedback& feedback, JointCommand& command) noexcept {
   command = {};
-  command.stamp_ns = state.stamp_ns;
-  status_.stamp_ns = state.stamp_ns;
+  now_ns_ = now_ns;
+  command.stamp_ns = now_ns;
+  status_.stamp_ns = now_ns;
   // Without one good reading the drives get no stiffness: there is nothing safe to ask of them.
   if (!armed_) armed_ = joints_.try_arm(params_.geometry, params_.joints, feedback.q_rad);
   if (!armed_) return;

@@ -34,17 +34,20 @@ class Gait {
     std::int32_t unsteady_patience = 3;        // as many times longer for obstructions that change
     std::int32_t settle_ticks = 300;           // to the middle between the feet when there is nothing to do
     double touch_force_n = 15.0;
-    double early_m = 0.005;                 // contact this far above the target counts as early
-    double late_m = 0.005;                  // and this far below as late
-    double max_lowering_m = 0.04;           // no ground found: the foot goes back
-    std::int32_t retreat_pause_ticks = 50;  // before it does
-    double put_back_m = 0.01;               // about where it stood: weight counts as the ground; below, it is there
+    double early_m = 0.005;                     // contact this far above the target counts as early
+    double late_m = 0.005;                      // and this far below as late
+    double max_lowering_m = 0.04;               // no ground found: the foot goes back
+    std::int32_t retreat_pause_ticks = 50;      // before it does
+    double put_back_m = 0.01;                   // about where it stood: weight counts as the ground; below, it is there
+    std::int64_t steer_age_ns = 20 * kNsPerMs;  // of IMU and joint samples: older ones steer nothing and start nothing
+    std::int64_t stop_age_ns = 100 * kNsPerMs;  // of the same on two feet: then the gait stops
   };
 
   void reset(const Params& params) noexcept;
   // One 500 Hz tick: state machine, trajectories, leg kinematics, joint command. footholds: the newest finished search.
-  void tick(const StateEstimate& state, const FootholdSet& footholds, const JointFeedback& feedback,
-            JointCommand& command) noexcept;
+  // Without fresh samples a swing is finished as it was planned; then the gait stops on two feet.
+  void tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
+            const JointFeedback& feedback, JointCommand& command) noexcept;
   [[nodiscard]] const GaitStatus& status() const noexcept { return status_; }
   // Finishes the committed step, then holds in double support.
   void request_stop() noexcept { stop_requested_ = true; }
@@ -74,10 +77,13 @@ class Gait {
   [[nodiscard]] std::int32_t motion_tick() const noexcept;
   void carry_plan_to_odometry() noexcept;
   void settle_between_feet() noexcept;
+  [[nodiscard]] bool usable(const StateEstimate& state) const noexcept;
+  [[nodiscard]] bool lost(const StateEstimate& state) const noexcept;
   [[nodiscard]] ClimbPlanner::Situation situation(const StateEstimate& state) const noexcept;
   [[nodiscard]] bool close_to_planned(const StepGoal& goal) const noexcept;
 
   Params params_;
+  std::int64_t now_ns_ = 0;
   ClimbPlanner planner_;
   JointReference joints_;
   StepSearch search_;

@@ -73,9 +73,9 @@ class SurfaceExtractor {
     std::uint32_t rejected_lines = 0;  // nosings and back lines that were looked for and not good enough
   };
 
-  // One unit is one row of 320 half-resolution pixels through one light pass, or as much work: about 0.5 us on a 2.4
-  // GHz x86 core. A staircase takes 13,000; with every capacity full a frame takes at most kMaxUnitsPerFrame. No piece
-  // is larger than kMaxPieceUnits.
+  // One unit is one row of 320 half-resolution pixels through one light pass, or as much work (its cost:
+  // firmware/schedule.hpp). A staircase takes 13,000; with every capacity full a frame takes at most kMaxUnitsPerFrame.
+  // No piece is larger than kMaxPieceUnits.
   static constexpr std::int32_t kMaxPieceUnits = 40;
   static constexpr std::int32_t kMaxUnitsPerFrame = 60000;
 
