@@ -129,7 +129,7 @@ TEST(ClimbCommand, BadLength_IsRefusedWithOneSentence) {
     }
   }
   // 0.276: below the tread, but not below the shortest that the jitter may draw.
-  for (const char* value : {"nan", "inf", "-0.01", "2.5", "0.276", "x"}) {
+  for (const char* value : {"nan", "inf", "-0.01", "2.5", "0.276", "x", ""}) {
     expect_refused({"climb", "--nosing", value}, "--nosing");
   }
 }
@@ -163,7 +163,11 @@ TEST(ClimbCommand, BadWord_IsRefused) {
   expect_refused({"climb", "--render-shift", "0.01", "nan", "0"}, "--render-shift");
   expect_refused({"climb", "--render-shift", "0.01", "0.02"}, "--render-shift");
   expect_refused({"climb", "--bogus"}, "--bogus");
-  expect_refused({"dance"}, "");
+  expect_refused({"climb", "climb"}, "not expected: climb");
+  expect_refused({"climb", "--steps", "3", "--steps", "4"}, "--steps");
+  expect_refused({"climb", "--render-shift", "", "", ""}, "--render-shift");
+  expect_refused({"--bogus"}, "--bogus");
+  expect_refused({"dance"}, "dance");
   expect_refused({}, "subcommand");
 }
 

@@ -38,6 +38,9 @@ std::string whole_number(const std::string& text) {
   return good ? "" : "must be a whole number from 0 to 2^64 - 1, not " + text;
 }
 
+// CLI11 2.1 takes an empty word for the number 0.
+std::string not_empty(const std::string& text) { return text.empty() ? "must not be empty" : ""; }
+
 void declare(CLI::App& climb, ClimbArguments& a) {
   StairParams& stairs = a.options.stairs;
   climb.add_option("--steps", stairs.steps, "Number of steps; the last one is the landing")->capture_default_str();
@@ -64,6 +67,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->group(causality);
   climb.add_flag("--blank-depth", a.options.blank_depth, "The camera delivers no depth")->group(causality);
   climb.add_flag("--no-self-filter", a.no_self_filter, "The module does not mask its own legs")->group(causality);
+  for (CLI::Option* option : climb.get_options()) option->check(not_empty);
 }
 
 std::string number(double value) {
@@ -174,7 +178,7 @@ class ProgressLine {
 int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& run, std::ostream& out,
                   std::ostream& err, bool live) {
   CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
-  app.require_subcommand(1);
+  app.require_subcommand(0, 1);
   app.footer("Exit codes: 0 pass, 1 the climb failed, 2 a bad argument or output that cannot be written.");
   CLI::App* climb = app.add_subcommand(
       "climb", "Climb a simulated staircase; writes summary.json and climb.svg, exit code 0 only on pass");
@@ -188,6 +192,10 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
     err << "polygmap: " << error.what() << "; see polygmap climb --help.\n";
+    return kExitUsage;
+  }
+  if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
+    err << "polygmap: A subcommand is required; see polygmap --help.\n";
     return kExitUsage;
   }
   std::string sentence = complaint(a);
