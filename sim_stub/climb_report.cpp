@@ -439,7 +439,7 @@ void write_climb_files(const std::string& directory, const ClimbReport& report, 
     file.close();
     if (!file) throw std::runtime_error("Cannot write " + path + ".");
   };
-  write("summary.json", to_json(summary).dump(2) + "\n");
+  write("summary.json", summary_text(summary));
   write("climb.svg", climb_svg(report.world(), report.drawing(), summary));
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "algorithms/robot/model.hpp"
 
@@ -123,6 +124,8 @@ Json to_json(const ClimbSummary& s) {
   j["wall"] = {{"seconds", rounded(s.wall_seconds, 1e3)}, {"tasks", wall_tasks}};
   return j;
 }
+
+std::string summary_text(const ClimbSummary& s) { return to_json(s).dump(2) + "\n"; }
 
 std::string verdict_line(const ClimbSummary& s) {
   std::string line = (s.pass ? "PASS: " : "FAIL: ") + s.reason;

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -101,6 +101,9 @@ struct ClimbSummary {
 // Keys in a fixed order, lengths rounded to 0.01 mm and times to 0.1 ms: one run, one text. Whatever the wall clock
 // measured stands under "wall" alone.
 [[nodiscard]] nlohmann::ordered_json to_json(const ClimbSummary& summary);
+
+// The same as summary.json holds it.
+[[nodiscard]] std::string summary_text(const ClimbSummary& summary);
 
 // "PASS: ..." or "FAIL: ...", one line without a line break.
 [[nodiscard]] std::string verdict_line(const ClimbSummary& summary);

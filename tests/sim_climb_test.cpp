@@ -90,12 +90,14 @@ INSTANTIATE_TEST_SUITE_P(Long, Climb, testing::ValuesIn(long_cases()), name_of);
 
 TEST(ClimbRepetition, SameSeedThreadedOrNot_SameSummaryByteForByte) {
   ClimbOptions options = options_of(2, 2);
-  auto first = to_json(climb(options));
+  const auto text = [&options] {
+    const std::string all = summary_text(climb(options));
+    return all.substr(0, all.find("\"wall\""));  // the last key
+  };
+  const std::string first = text();
   options.threaded_render = false;
-  auto second = to_json(climb(options));
-  first.erase("wall");
-  second.erase("wall");
-  EXPECT_EQ(first.dump(), second.dump());
+  EXPECT_EQ(first, text());
+  EXPECT_GT(first.size(), 1000U);
 }
 
 int steps_onto_treads(const ClimbSummary& summary) {
