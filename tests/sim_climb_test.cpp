@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ostream>
 #include <string>
 
 #include "sim_stub/climb.hpp"
@@ -55,6 +56,8 @@ std::string name_of(const testing::TestParamInfo<Case>& info) {
   if (stairs.nosing_m != usual.nosing_m) add_mm("_nosing", stairs.nosing_m);
   return name;
 }
+// The name says it all; the default prints bytes, padding included.
+void PrintTo(const Case& c, std::ostream* out) { *out << "seed " << c.seed; }
 class Climb : public testing::TestWithParam<Case> {};
 
 TEST_P(Climb, StairsSeenOnlyInDepth_ClimbedWithinTheFigures) {
