@@ -94,12 +94,13 @@ double signed_distance_m(const OrientedBox& box, const SolidBox& solid) noexcept
   return gap <= 0.0 ? gap : gap_m(box, other);
 }
 
-double clearance_m(const OrientedBox& box, std::span<const SolidBox> solids, std::span<const int> excluded) noexcept {
+double clearance_m(const OrientedBox& box, std::span<const SolidBox> solids, std::span<const int> excluded,
+                   double at_most_m) noexcept {
   const auto is_excluded = [&](int step) {
     return std::find(excluded.begin(), excluded.end(), step) != excluded.end();
   };
   const Vec3 reach = box.centre.R.cwiseAbs() * box.half_m;
-  double least = is_excluded(kFloorStep) ? kInf : box.centre.p_m.z() - reach.z();
+  double least = is_excluded(kFloorStep) ? at_most_m : std::min(at_most_m, box.centre.p_m.z() - reach.z());
   for (const SolidBox& solid : solids) {
     if (is_excluded(solid.step)) continue;
     const Vec3 centre = 0.5 * (solid.min_m + solid.max_m), half = 0.5 * (solid.max_m - solid.min_m);

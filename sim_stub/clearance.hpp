@@ -2,6 +2,7 @@
 // How far a foot is from the true stairs: what the plant judges collisions by and the report measures.
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -27,9 +28,10 @@ struct SolidBox {
 [[nodiscard]] double signed_distance_m(const OrientedBox& box, const SolidBox& solid) noexcept;
 
 // Least signed distance of a box in the true world frame to the floor and the solids, leaving out the steps in excluded
-// (kFloorStep: the floor). +inf when nothing is left.
+// (kFloorStep: the floor); at_most_m when that is less, and cheap then. +inf when nothing is left.
 [[nodiscard]] double clearance_m(const OrientedBox& box, std::span<const SolidBox> solids,
-                                 std::span<const int> excluded = {}) noexcept;
+                                 std::span<const int> excluded = {},
+                                 double at_most_m = std::numeric_limits<double>::infinity()) noexcept;
 
 // Least signed distance of the contact rectangle's corners, seen from above, to the edges of the tread of one step
 // (nosing, next riser, sides; the landing's far end); negative = overhang. For kFloorStep the edge is the staircase.

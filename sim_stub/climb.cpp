@@ -181,7 +181,13 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   figures.schedule = schedule_of(executive, tasks);
   figures.wall_seconds = std::chrono::duration<double>(WallClock::now() - wall_begin).count();
   const ClimbSummary summary = report.finish(figures);
-  if (!options.out_dir.empty()) write_climb_files(options.out_dir, report, summary);
+  if (!options.out_dir.empty()) {
+    try {
+      write_climb_files(options.out_dir, report, summary);
+    } catch (const std::runtime_error& error) {
+      throw ClimbNotWritten(error.what(), summary);
+    }
+  }
   return summary;
 }
 

@@ -4,7 +4,9 @@
 
 #include <cstdint>
 #include <functional>
+#include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "sim_stub/climb_summary.hpp"
 #include "sim_stub/noise_kind.hpp"
@@ -38,8 +40,15 @@ struct ClimbProgress {
 
 using ClimbProgressFunction = std::function<void(const ClimbProgress&)>;
 
+// The climb is over, but its files could not be written: one sentence, and the verdict that is worth a minute.
+struct ClimbNotWritten : std::runtime_error {
+  ClimbNotWritten(const std::string& sentence, ClimbSummary climbed)
+      : std::runtime_error(sentence), summary(std::move(climbed)) {}
+  ClimbSummary summary;
+};
+
 // Runs one climb to its end and, unless options.out_dir is empty, writes summary.json and climb.svg there (the
-// directory exists). Throws std::runtime_error with one sentence when it cannot.
+// directory exists). Throws ClimbNotWritten when it cannot write.
 [[nodiscard]] ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction& progress);
 
 }  // namespace polygmap::sim

@@ -15,11 +15,9 @@
 namespace polygmap::sim {
 namespace {
 
-constexpr std::int64_t kPast_ns = 2 * kNsPerS;           // covers the latest LIO pose and the latest frame
-constexpr std::int64_t kRest_ns = 50 * kNsPerMs;         // both soles stand this long: they rest
-constexpr std::uint64_t kTrailEvery_ticks = 10;          // 20 ms
-constexpr std::uint64_t kRestClearanceEvery_ticks = 10;  // a resting foot hardly moves
-constexpr std::size_t kFlightEvery_poses = 2;            // 4 ms: at 1 m/s a foot moves 4 mm
+constexpr std::int64_t kPast_ns = 2 * kNsPerS;    // covers the latest LIO pose and the latest frame
+constexpr std::int64_t kRest_ns = 50 * kNsPerMs;  // both soles stand this long: they rest
+constexpr std::uint64_t kTrailEvery_ticks = 10;   // 20 ms
 
 double ms(std::int64_t duration_ns) { return static_cast<double>(duration_ns) * 1e-6; }
 
@@ -130,6 +128,7 @@ void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
     observe_tracking(truth, telemetry.gait);
   }
   observe_soles(truth, telemetry.gait.step.onto_tread);
+  observe_stance(truth);
   observe_steps_climbed(truth);
   if (ticks_ % kTrailEvery_ticks == 0) observe_trails(truth);
   ++ticks_;
@@ -252,13 +251,12 @@ void ClimbReport::observe_tracking(const Truth& truth, const GaitStatus& gait) {
   keep_max(tracking_z_max_m_, std::abs(desired_m.z() - actual_m.z()));
 }
 
-double ClimbReport::flight_clearance_m(const Flight& flight, int to_step) const {
-  double least_m = kNotMeasured;
-  for (std::size_t i = 0; i < flight.true_T_sole.size(); i += kFlightEvery_poses) {
-    keep_min(least_m,
-             clearance_m(collision_box(flight.true_T_sole[i]), solids_, std::array{flight.from_step, to_step}));
+double ClimbReport::flight_clearance_m(const Flight& flight, int to_step, double at_most_m) const {
+  const std::array excluded{flight.from_step, to_step};
+  for (const Transform& true_T_sole : flight.true_T_sole) {
+    at_most_m = clearance_m(collision_box(true_T_sole), solids_, excluded, at_most_m);
   }
-  return least_m;
+  return at_most_m;
 }
 
 void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
@@ -274,19 +272,29 @@ void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
     const int step = truth.step_index[foot];
     if (flights_[foot]) {
       if (step >= 0 && first_lift_off_ns_ < 0) first_lift_off_ns_ = flights_[foot]->lift_off_ns;
-      keep_min(clearance_min_m_, flight_clearance_m(*flights_[foot], step));
+      clearance_min_m_ = flight_clearance_m(*flights_[foot], step, clearance_min_m_);
       flights_[foot].reset();
     }
     last_step_[foot] = step;
-    if (ticks_ % kRestClearanceEvery_ticks == 0) {
-      keep_min(clearance_min_m_, clearance_m(collision_box(true_T_sole), solids_, std::array{step}));
-    }
+    clearance_min_m_ = clearance_m(collision_box(true_T_sole), solids_, std::array{step}, clearance_min_m_);
     if (step < 0) continue;
     const double margin_m = sole_margin_m(true_T_sole, world_, step);
     keep_min(sole_margin_min_m_, margin_m);
     const int footstep = standing_footstep_[foot];
     if (footstep >= 0) keep_min(footsteps_[static_cast<std::size_t>(footstep)].sole_margin_m, margin_m);
   }
+}
+
+void ClimbReport::observe_stance(const Truth& truth) {
+  if (!truth.in_contact[0] || !truth.in_contact[1]) return;
+  closure_error_m_.push_back(truth.closure_error_m);
+  if (world_.steps.empty() || first_lift_off_ns_ >= 0) return;
+  double toe_x_m = -std::numeric_limits<double>::infinity();
+  for (const Transform& true_T_sole : truth.true_T_sole) {
+    const OrientedBox box = collision_box(true_T_sole);
+    toe_x_m = std::max(toe_x_m, box.centre.p_m.x() + box.centre.R.row(0).cwiseAbs().dot(box.half_m));
+  }
+  stand_off_m_ = world_.steps.front().nosing_x_m - toe_x_m;
 }
 
 void ClimbReport::observe_steps_climbed(const Truth& truth) {
@@ -319,9 +327,9 @@ double ClimbReport::clearance_min_m() const {
   double least_m = clearance_min_m_;
   for (const std::optional<Flight>& flight : flights_) {
     // The run ended in the air: the module's word tells which tread was meant.
-    if (flight) keep_min(least_m, flight_clearance_m(*flight, flight->from_step + (flight_onto_tread_ ? 1 : 0)));
+    if (flight) least_m = flight_clearance_m(*flight, flight->from_step + (flight_onto_tread_ ? 1 : 0), least_m);
   }
-  return least_m;
+  return std::isinf(least_m) ? kNotMeasured : least_m;
 }
 
 void ClimbReport::judge(ClimbSummary& s, const std::string& heap_first_caller) const {
@@ -360,6 +368,8 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.fell = fell_;
   s.steps_total = static_cast<int>(world_.steps.size());
   s.steps_climbed = steps_climbed_;
+  const bool module_ended = phase_ == GaitPhase::kFinished || phase_ == GaitPhase::kStopped;
+  s.ended_by = fell_ ? "fall" : module_ended ? "module" : "time limit";
   if (on_top_ns_ >= 0 && first_lift_off_ns_ >= 0) {
     s.climb_time_s = seconds(on_top_ns_ - first_lift_off_ns_);
     s.seconds_per_step = s.climb_time_s / s.steps_total;
@@ -394,6 +404,8 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.exposure_to_map_ms = spread_of(exposure_to_map_ms_);
   s.sole_margin_min_m = sole_margin_min_m_;
   s.swing_clearance_min_m = clearance_min_m();
+  s.stand_off_m = stand_off_m_;
+  s.closure_error_m = spread_of(closure_error_m_);
   s.tracking_error_x_max_m = tracking_x_max_m_;
   s.tracking_error_z_max_m = tracking_z_max_m_;
   s.odometry_rmse_base_m = base_error_.rmse_m();
@@ -429,7 +441,7 @@ void write_climb_files(const std::string& directory, const ClimbReport& report, 
     file.close();
     if (!file) throw std::runtime_error("Cannot write " + path + ".");
   };
-  write("summary.json", to_json(summary).dump(2) + "\n");
+  write("summary.json", summary_text(summary));
   write("climb.svg", climb_svg(report.world(), report.drawing(), summary));
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -44,7 +45,6 @@ class ClimbReport {
   [[nodiscard]] ClimbSummary finish(const RunFigures& run) const;
   [[nodiscard]] ClimbDrawing drawing() const;
   [[nodiscard]] const StairWorld& world() const { return world_; }
-  [[nodiscard]] int steps_climbed() const { return steps_climbed_; }
 
  private:
   struct TruePose {
@@ -74,9 +74,11 @@ class ClimbReport {
   void observe_landing(const Truth& truth);
   void observe_tracking(const Truth& truth, const GaitStatus& gait);
   void observe_soles(const Truth& truth, bool onto_tread);
+  void observe_stance(const Truth& truth);
   void observe_steps_climbed(const Truth& truth);
   void observe_trails(const Truth& truth);
-  [[nodiscard]] double flight_clearance_m(const Flight& flight, int to_step) const;
+  // The least of a flight that ended on to_step, and of at_most_m.
+  [[nodiscard]] double flight_clearance_m(const Flight& flight, int to_step, double at_most_m) const;
   [[nodiscard]] double clearance_min_m() const;
   void judge(ClimbSummary& summary, const std::string& heap_first_caller) const;
 
@@ -121,7 +123,9 @@ class ClimbReport {
   std::array<int, kFootCount> last_step_{-1, -1};
   std::array<int, kFootCount> standing_footstep_{-1, -1};  // index into footsteps_ of what each sole stands on
   double sole_margin_min_m_ = kNotMeasured;
-  double clearance_min_m_ = kNotMeasured;
+  double clearance_min_m_ = std::numeric_limits<double>::infinity();
+  double stand_off_m_ = kNotMeasured;
+  std::vector<double> closure_error_m_;  // every tick on both feet
 
   int steps_climbed_ = 0;
   std::vector<bool> climbed_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "algorithms/robot/model.hpp"
 
@@ -68,6 +69,7 @@ Json to_json(const ClimbSummary& s) {
   j["verdict"] = s.pass ? "pass" : "fail";
   j["reason"] = s.reason;
   j["fell"] = s.fell;
+  j["ended_by"] = s.ended_by;
   j["plant"] = s.plant;
   j["gait"] = s.gait;
   j["seed"] = s.seed;
@@ -82,6 +84,8 @@ Json to_json(const ClimbSummary& s) {
   j["foothold_error_mm"]["across"] = spread_mm(s.foothold_error_across_m);
   j["sole_margin_mm_min"] = mm(s.sole_margin_min_m);
   j["swing_clearance_mm_min"] = mm(s.swing_clearance_min_m);
+  j["stand_off_mm"] = mm(s.stand_off_m);
+  j["closure_error_mm"] = spread_mm(s.closure_error_m);
   j["tracking_error_mm"] = {{"x_max", mm(s.tracking_error_x_max_m)}, {"z_max", mm(s.tracking_error_z_max_m)}};
   j["odometry_rmse_mm"] = {
       {"base", mm(s.odometry_rmse_base_m)}, {"lio", mm(s.odometry_rmse_lio_m)}, {"fused", mm(s.odometry_rmse_fused_m)}};
@@ -120,6 +124,8 @@ Json to_json(const ClimbSummary& s) {
   j["wall"] = {{"seconds", rounded(s.wall_seconds, 1e3)}, {"tasks", wall_tasks}};
   return j;
 }
+
+std::string summary_text(const ClimbSummary& s) { return to_json(s).dump(2) + "\n"; }
 
 std::string verdict_line(const ClimbSummary& s) {
   std::string line = (s.pass ? "PASS: " : "FAIL: ") + s.reason;

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -60,6 +60,7 @@ struct ClimbSummary {
   bool pass = false;
   std::string reason;  // one sentence
   bool fell = false;
+  std::string ended_by;  // "module": by itself; "fall"; "time limit"
   std::string plant;
   std::string gait;
   std::uint64_t seed = 0;
@@ -78,6 +79,10 @@ struct ClimbSummary {
   Spread foothold_error_across_m;
   double sole_margin_min_m = kNotMeasured;
   double swing_clearance_min_m = kNotMeasured;
+  // From the foremost collision toe to the first step's nosing, both feet on the floor: at the last such tick before a
+  // foot left for the stairs, or of the run.
+  double stand_off_m = kNotMeasured;
+  Spread closure_error_m;  // by which the two standing legs disagree about the base
   double tracking_error_x_max_m = kNotMeasured;
   double tracking_error_z_max_m = kNotMeasured;
   double odometry_rmse_base_m = kNotMeasured;
@@ -96,6 +101,9 @@ struct ClimbSummary {
 // Keys in a fixed order, lengths rounded to 0.01 mm and times to 0.1 ms: one run, one text. Whatever the wall clock
 // measured stands under "wall" alone.
 [[nodiscard]] nlohmann::ordered_json to_json(const ClimbSummary& summary);
+
+// The same as summary.json holds it.
+[[nodiscard]] std::string summary_text(const ClimbSummary& summary);
 
 // "PASS: ..." or "FAIL: ...", one line without a line break.
 [[nodiscard]] std::string verdict_line(const ClimbSummary& summary);

@@ -43,7 +43,6 @@ SimRobot::SimRobot(const SimOptions& options)
       imu_(error_params_, errors_, options.seed, plant_.true_T_base()),
       joints_(error_params_, options.seed),
       lio_(error_params_, errors_, options.seed),
-      written_q_rad_(standing_q_rad()),
       active_q_rad_(standing_q_rad()) {
   sense();
 }
@@ -51,7 +50,11 @@ SimRobot::SimRobot(const SimOptions& options)
 void SimRobot::advance() {
   clock_.advance();
   plant_.step(active_q_rad_);
-  active_q_rad_ = written_q_rad_;
+  if (command_) {
+    for (std::size_t j = 0; j < kJointCount; ++j) {
+      active_q_rad_[static_cast<Eigen::Index>(j)] = command_->joints[j].q_rad;
+    }
+  }
   sense();
 }
 
@@ -93,7 +96,7 @@ bool SimRobot::try_read(JointFeedback& feedback) noexcept {
 }
 
 bool SimRobot::try_write(const JointCommand& command) noexcept {
-  for (std::size_t j = 0; j < kJointCount; ++j) written_q_rad_[static_cast<Eigen::Index>(j)] = command.joints[j].q_rad;
+  command_ = command;
   return true;
 }
 

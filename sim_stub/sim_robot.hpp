@@ -61,6 +61,8 @@ class SimRobot final : public hal::Clock,
   [[nodiscard]] const RobotErrors& errors() const noexcept { return errors_; }
   [[nodiscard]] const SimDepthCamera& depth_camera() const noexcept { return camera_; }
   [[nodiscard]] JointVector true_q_rad() const noexcept { return plant_.true_q_rad(); }
+  // The last command as the module wrote it. The kinematic plant follows its angles and nothing else of it.
+  [[nodiscard]] const std::optional<JointCommand>& last_command() const noexcept { return command_; }
   [[nodiscard]] VirtualClock& clock() noexcept { return clock_; }  // for tests that inject work
 
   [[nodiscard]] std::int64_t now_ns() const noexcept override { return clock_.now_ns(); }
@@ -98,8 +100,8 @@ class SimRobot final : public hal::Clock,
   RingBuffer<LioSample, 16> lio_queue_;  // sampled; readable once they have arrived
   JointFeedback feedback_;
   bool feedback_fresh_ = false;
-  JointVector written_q_rad_;  // by the module, in this tick
-  JointVector active_q_rad_;   // what the drives follow
+  std::optional<JointCommand> command_;  // by the module, in this tick or before
+  JointVector active_q_rad_;             // what the drives follow
   Truth truth_;
 };
 

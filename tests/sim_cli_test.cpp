@@ -124,11 +124,12 @@ TEST(ClimbCommand, EveryOption_ReachesTheRun) {
 
 TEST(ClimbCommand, BadLength_IsRefusedWithOneSentence) {
   for (const char* option : {"--rise", "--tread", "--width", "--landing"}) {
-    for (const char* value : {"nan", "inf", "-inf", "0", "-0.1", "2.01", "1e300", "abc", ""}) {
+    for (const char* value : {"nan", "inf", "-inf", "0", "-0.1", "0.0099", "2.01", "1e9", "1e300", "abc", ""}) {
       expect_refused({"climb", option, value}, option);
     }
   }
-  for (const char* value : {"nan", "inf", "-0.01", "2.5", "0.28", "x"}) {
+  // 0.276: below the tread, but not below the shortest that the jitter may draw.
+  for (const char* value : {"nan", "inf", "-0.01", "2.5", "0.276", "x", ""}) {
     expect_refused({"climb", "--nosing", value}, "--nosing");
   }
 }
@@ -152,6 +153,7 @@ TEST(ClimbCommand, BadCount_IsRefused) {
   }
   expect_refused({"climb", "--steps", "4", "--render-missing-step", "5"}, "--render-missing-step");
   expect_refused({"climb", "--render-missing-step", "-1"}, "--render-missing-step");
+  expect_refused({"climb", "--render-missing-step", "0"}, "--render-missing-step");
 }
 
 TEST(ClimbCommand, BadWord_IsRefused) {
@@ -161,7 +163,11 @@ TEST(ClimbCommand, BadWord_IsRefused) {
   expect_refused({"climb", "--render-shift", "0.01", "nan", "0"}, "--render-shift");
   expect_refused({"climb", "--render-shift", "0.01", "0.02"}, "--render-shift");
   expect_refused({"climb", "--bogus"}, "--bogus");
-  expect_refused({"dance"}, "");
+  expect_refused({"climb", "climb"}, "not expected: climb");
+  expect_refused({"climb", "--steps", "3", "--steps", "4"}, "--steps");
+  expect_refused({"climb", "--render-shift", "", "", ""}, "--render-shift");
+  expect_refused({"--bogus"}, "--bogus");
+  expect_refused({"dance"}, "dance");
   expect_refused({}, "subcommand");
 }
 
@@ -199,16 +205,28 @@ TEST(ClimbCommand, Progress_IsALineNowAndThenInALog) {
       << "one progress line (the second is too soon), one verdict";
 }
 
-TEST(ClimbCommand, RunThatCannotWrite_SaysSoAndExits2) {
+TEST(ClimbCommand, RunThatCannotWrite_StillTellsTheVerdictAndExits2) {
   std::ostringstream out, err;
   const int code = polygmap_main(
       {"climb", "--out", temporary("throws")},
       [](const ClimbOptions&, const ClimbProgressFunction&) -> ClimbSummary {
-        throw std::runtime_error("Cannot write it.");
+        ClimbSummary climbed;
+        climbed.pass = true;
+        climbed.reason = "Because.";
+        throw ClimbNotWritten("Cannot write it.", climbed);
       },
       out, err, false);
   EXPECT_EQ(code, kExitUsage);
+  EXPECT_EQ(out.str(), "PASS: Because.\n");
   EXPECT_EQ(err.str(), "polygmap: Cannot write it.\n");
+}
+
+TEST(ClimbCommand, StandardOutputFull_SaysSoAndExits2) {
+  std::ofstream out("/dev/full");
+  std::ostringstream err;
+  const auto run = [](const ClimbOptions&, const ClimbProgressFunction&) { return ClimbSummary{}; };
+  EXPECT_EQ(polygmap_main({"climb", "--out", temporary("full")}, run, out, err, false), kExitUsage);
+  EXPECT_EQ(err.str(), "polygmap: Cannot write the verdict to the standard output.\n");
 }
 
 TEST(ClimbCommand, Help_ExplainsExitCodesAndOptions) {

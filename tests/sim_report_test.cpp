@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "sim_stub/climb_report.hpp"
@@ -109,23 +110,63 @@ TEST(ClimbReport, SwingClearance_SeesTheNextRiserButNotTheTreadsOfTheSwing) {
   EXPECT_NEAR(climb.finish().swing_clearance_min_m, 0.28 - (0.09 + 0.179), kUm);
 }
 
-TEST(ClimbReport, CollisionInTheAir_Fails) {
-  ScriptedClimb climb(plain_stairs(3));
+TEST(ClimbReport, CollisionOfASingleTick_Fails) {
+  for (const bool in_the_air : {true, false}) {
+    for (int before = 0; before < 3; ++before) {
+      ScriptedClimb climb(plain_stairs(3));
+      climb.wait(100 * kNsPerMs);
+      climb.swing(Foot::kLeft, climb.on_step(0, Foot::kLeft), 0);
+      climb.swing(Foot::kRight, climb.on_step(0, Foot::kRight), 0);
+      climb.wait(100 * kNsPerMs);
+      climb.truth.in_contact[0] = !in_the_air;
+      for (int i = 0; i < before; ++i) climb.tick();
+      // The foot dips into step 3, which it neither leaves nor lands on.
+      const Transform from = climb.truth.true_T_sole[0];
+      climb.truth.true_T_sole[0].p_m = Vec3(0.56 - 0.179 + 0.003, 0.1, 0.30);
+      climb.tick();
+      climb.truth.true_T_sole[0] = from;
+      climb.truth.in_contact[0] = true;
+      climb.tick();
+      const ClimbSummary s = climb.finish();
+      EXPECT_NEAR(s.swing_clearance_min_m, -0.003, kUm) << in_the_air << before;
+      EXPECT_FALSE(s.pass);
+    }
+  }
+}
+
+TEST(ClimbReport, StandOff_IsOfTheForemostToeBeforeAFootLeavesForTheStairs) {
+  ScriptedClimb climb(plain_stairs(1, 0.02));
   climb.wait(100 * kNsPerMs);
-  climb.swing(Foot::kLeft, climb.on_step(0, Foot::kLeft), 0);
-  climb.swing(Foot::kRight, climb.on_step(0, Foot::kRight), 0);
+  EXPECT_NEAR(climb.finish().stand_off_m, 0.3 - 0.02 - 0.179, kUm);
+  Transform nearer = climb.truth.true_T_sole[0];
+  nearer.p_m.x() += 0.05;
+  climb.swing(Foot::kLeft, nearer, -1);
+  climb.climb_all();
+  EXPECT_NEAR(climb.finish().stand_off_m, 0.25 - 0.02 - 0.179, kUm);
+}
+
+TEST(ClimbReport, End_IsTheModulesOwnOrAFallOrTheTimeLimit) {
+  ScriptedClimb climb(plain_stairs(1));
   climb.wait(100 * kNsPerMs);
-  // In the middle of the next swing the foot dips into step 3, which is neither left nor landed on.
-  climb.truth.in_contact[0] = false;
-  const Transform from = climb.truth.true_T_sole[0];
-  climb.truth.true_T_sole[0].p_m = Vec3(0.56 - 0.179 + 0.003, 0.1, 0.30);
-  climb.wait(4 * kNsPerMs);
-  climb.truth.true_T_sole[0] = from;
-  climb.truth.in_contact[0] = true;
+  EXPECT_EQ(climb.finish().ended_by, "time limit");
+  climb.climb_all();
+  EXPECT_EQ(climb.finish().ended_by, "module");
+  climb.truth.fell = true;
   climb.tick();
-  const ClimbSummary s = climb.finish();
-  EXPECT_NEAR(s.swing_clearance_min_m, -0.003, kUm);
-  EXPECT_FALSE(s.pass);
+  EXPECT_EQ(climb.finish().ended_by, "fall");
+}
+
+TEST(ClimbReport, ClosureError_CountsOnBothFeetOnly) {
+  ScriptedClimb climb(plain_stairs(1));
+  for (const double error_m : {0.001, 0.002, 0.004}) {
+    climb.truth.closure_error_m = error_m;
+    climb.tick();
+  }
+  climb.truth.in_contact[0] = false;
+  climb.truth.closure_error_m = 0.0;
+  climb.wait(20 * kNsPerMs);
+  EXPECT_DOUBLE_EQ(climb.finish().closure_error_m.median, 0.002);
+  EXPECT_DOUBLE_EQ(climb.finish().closure_error_m.max, 0.004);
 }
 
 TEST(ClimbReport, RunEndingInTheAir_StillJudgesTheSwing) {
@@ -390,9 +431,11 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
   std::string keys;
   for (const auto& [key, value] : j.items()) keys += key + " ";
   EXPECT_EQ(keys,
-            "verdict reason fell plant gait seed steps_total steps_climbed climb_time_s seconds_per_step plane_rate_hz "
-            "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min tracking_error_mm "
-            "odometry_rmse_mm exposure_to_map_ms map_age_at_latch_ms target_last_seen_ms heap_calls "
+            "verdict reason fell ended_by plant gait seed steps_total steps_climbed climb_time_s seconds_per_step "
+            "plane_rate_hz "
+            "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min stand_off_mm "
+            "closure_error_mm tracking_error_mm odometry_rmse_mm exposure_to_map_ms map_age_at_latch_ms "
+            "target_last_seen_ms heap_calls "
             "static_memory_bytes static_memory schedule surfaces footsteps wall ");
   EXPECT_EQ(j["verdict"], "pass");
   EXPECT_EQ(j["seed"], 7);

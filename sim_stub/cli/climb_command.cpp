@@ -9,12 +9,14 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <ostream>
 
 namespace polygmap::sim {
 namespace {
 
 constexpr double kMaxLength_m = 2.0;
+constexpr double kMinStep_m = 0.01;  // rise or tread: jitter takes up to half of it
 constexpr int kMaxSteps = 200;
 constexpr double kTimeLimit_s = 60.0;        // simulated: walking up and ending, ...
 constexpr double kTimeLimitPerStep_s = 6.0;  // ... and nearly twice what a step may take
@@ -24,7 +26,7 @@ struct ClimbArguments {
   ClimbOptions options;
   std::string noise = "white";
   std::vector<double> render_shift_m;
-  int missing_step = 0;  // 1-based as people count, 0: none
+  std::optional<int> missing_step;  // 1-based as people count
   bool no_self_filter = false;
 };
 
@@ -35,6 +37,9 @@ std::string whole_number(const std::string& text) {
   const bool good = error == std::errc{} && end == text.data() + text.size();
   return good ? "" : "must be a whole number from 0 to 2^64 - 1, not " + text;
 }
+
+// CLI11 2.1 takes an empty word for the number 0.
+std::string not_empty(const std::string& text) { return text.empty() ? "must not be empty" : ""; }
 
 void declare(CLI::App& climb, ClimbArguments& a) {
   StairParams& stairs = a.options.stairs;
@@ -62,6 +67,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->group(causality);
   climb.add_flag("--blank-depth", a.options.blank_depth, "The camera delivers no depth")->group(causality);
   climb.add_flag("--no-self-filter", a.no_self_filter, "The module does not mask its own legs")->group(causality);
+  for (CLI::Option* option : climb.get_options()) option->check(not_empty);
 }
 
 std::string number(double value) {
@@ -79,19 +85,20 @@ std::string complaint(ClimbArguments& a) {
   struct Length {
     const char* name;
     double value_m;
-    bool may_be_zero;
+    double min_m;
   };
-  for (const Length& length : {Length{"--rise", stairs.rise_m, false}, Length{"--tread", stairs.tread_m, false},
-                               Length{"--width", stairs.width_m, false}, Length{"--nosing", stairs.nosing_m, true},
-                               Length{"--landing", stairs.landing_m, false}}) {
-    const bool good = length.may_be_zero ? length.value_m >= 0.0 : length.value_m > 0.0;
-    if (!good || !(length.value_m <= kMaxLength_m)) {
-      return std::string(length.name) + (length.may_be_zero ? " must be at least 0" : " must be above 0") +
-             " and at most " + number(kMaxLength_m) + " m, not " + number(length.value_m) + ".";
+  for (const Length& length :
+       {Length{"--rise", stairs.rise_m, kMinStep_m}, Length{"--tread", stairs.tread_m, kMinStep_m},
+        Length{"--width", stairs.width_m, kMinStep_m}, Length{"--nosing", stairs.nosing_m, 0.0},
+        Length{"--landing", stairs.landing_m, kMinStep_m}}) {
+    if (!(length.value_m >= length.min_m && length.value_m <= kMaxLength_m)) {
+      return std::string(length.name) + " must be from " + number(length.min_m) + " to " + number(kMaxLength_m) +
+             " m, not " + number(length.value_m) + ".";
     }
   }
-  if (stairs.nosing_m >= stairs.tread_m) {
-    return "--nosing must be shorter than the tread of " + number(stairs.tread_m) + " m, not " +
+  const double shortest_tread_m = stairs.tread_m - stairs.jitter_m;
+  if (!(stairs.nosing_m < shortest_tread_m)) {
+    return "--nosing must be shorter than the shortest tread, " + number(shortest_tread_m) + " m, not " +
            number(stairs.nosing_m) + ".";
   }
   if (a.options.gait == "ss") return "The single-step gait (--gait ss) is not available yet: use --gait ds.";
@@ -101,11 +108,13 @@ std::string complaint(ClimbArguments& a) {
   }
   a.options.noise = a.noise == "white" ? DepthNoise::kWhite : DepthNoise::kCorrelated;
 
-  if (a.missing_step < 0 || a.missing_step > stairs.steps) {
-    return "--render-missing-step must be a step from 1 to " + std::to_string(stairs.steps) + ", not " +
-           std::to_string(a.missing_step) + ".";
+  if (a.missing_step) {
+    if (*a.missing_step < 1 || *a.missing_step > stairs.steps) {
+      return "--render-missing-step must be a step from 1 to " + std::to_string(stairs.steps) + ", not " +
+             std::to_string(*a.missing_step) + ".";
+    }
+    a.options.render_missing_step = *a.missing_step - 1;
   }
-  a.options.render_missing_step = a.missing_step - 1;
   if (!a.render_shift_m.empty()) {
     for (const double shift_m : a.render_shift_m) {
       if (!(std::abs(shift_m) <= kMaxLength_m)) {
@@ -169,7 +178,7 @@ class ProgressLine {
 int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& run, std::ostream& out,
                   std::ostream& err, bool live) {
   CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
-  app.require_subcommand(1);
+  app.require_subcommand(0, 1);
   app.footer("Exit codes: 0 pass, 1 the climb failed, 2 a bad argument or output that cannot be written.");
   CLI::App* climb = app.add_subcommand(
       "climb", "Climb a simulated staircase; writes summary.json and climb.svg, exit code 0 only on pass");
@@ -185,6 +194,10 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
     err << "polygmap: " << error.what() << "; see polygmap climb --help.\n";
     return kExitUsage;
   }
+  if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
+    err << "polygmap: A subcommand is required; see polygmap --help.\n";
+    return kExitUsage;
+  }
   std::string sentence = complaint(a);
   if (sentence.empty()) sentence = output_complaint(a.options.out_dir);
   if (!sentence.empty()) {
@@ -193,16 +206,26 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   }
 
   ProgressLine progress(out, a.options.stairs.steps, live);
+  ClimbSummary summary;
+  std::string not_written;
   try {
-    const ClimbSummary summary = run(a.options, [&progress](const ClimbProgress& p) { progress.show(p); });
-    progress.end();
-    out << verdict_line(summary) << "\n";
-    return summary.pass ? kExitPass : kExitFail;
-  } catch (const std::exception& error) {
+    summary = run(a.options, [&progress](const ClimbProgress& p) { progress.show(p); });
+  } catch (const ClimbNotWritten& error) {
+    summary = error.summary;
+    not_written = error.what();
+  } catch (const std::exception& error) {  // no memory, no thread for the camera
     progress.end();
     err << "polygmap: " << error.what() << "\n";
     return kExitUsage;
   }
+  progress.end();
+  out << verdict_line(summary) << "\n" << std::flush;
+  if (!out && not_written.empty()) not_written = "Cannot write the verdict to the standard output.";
+  if (!not_written.empty()) {
+    err << "polygmap: " << not_written << "\n";
+    return kExitUsage;
+  }
+  return summary.pass ? kExitPass : kExitFail;
 }
 
 }  // namespace polygmap::sim

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/support/synthetic_walk.hpp"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
-#include <stdexcept>
 
 #include "algorithms/geometry/so3.hpp"
 
@@ -142,7 +143,7 @@ JointVector SyntheticWalk::true_joints(std::int64_t t_ns) const {
   for (std::size_t i = 0; i < kFootCount; ++i) {
     const auto leg = static_cast<Foot>(i);
     const LegSolution solution = solve_leg(true_geometry_[i], leg, now.true_T_base.inverse() * now.true_T_sole[i]);
-    if (!solution.reachable) throw std::logic_error("the synthetic walk is out of the leg's reach");
+    EXPECT_TRUE(solution.reachable) << "the synthetic walk is out of the leg's reach";
     q.segment<kJointsPerLeg>(static_cast<int>(joint_index(leg, 0))) = solution.q_rad;
   }
   return q;
