@@ -14,7 +14,8 @@ void reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const st
   }
   for (std::int32_t g = 0; g < columns; ++g) {
     const float* p = each.data() + static_cast<std::ptrdiff_t>(kColumn_px) * g;
-    const std::int32_t n = (p[0] > 0.0F ? 1 : 0) + (p[1] > 0.0F ? 1 : 0) + (p[2] > 0.0F ? 1 : 0) + (p[3] > 0.0F ? 1 : 0);
+    const std::int32_t n =
+        (p[0] > 0.0F ? 1 : 0) + (p[1] > 0.0F ? 1 : 0) + (p[2] > 0.0F ? 1 : 0) + (p[3] > 0.0F ? 1 : 0);
     const float sum = (p[0] + p[1]) + (p[2] + p[3]);
     inverse_depth[g] = n > 0 ? sum / static_cast<float>(n > 0 ? n : 1) : 0.0F;
     valid[g] = static_cast<std::uint8_t>(n);

@@ -87,7 +87,7 @@ void PlaneGrowing::sort_seeds() noexcept {
     for (std::size_t k = 0; k < column.size(); ++k) {
       if (column[k].rows() < params_.min_rows) continue;
       seeds_[start[static_cast<std::size_t>(kDepthHeight_px - column[k].rows())]++] = {static_cast<std::int16_t>(g),
-                                                                                      static_cast<std::int16_t>(k)};
+                                                                                       static_cast<std::int16_t>(k)};
     }
   }
 }

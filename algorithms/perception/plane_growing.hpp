@@ -22,8 +22,8 @@ class PlaneGrowing {
   struct Params {
     double join_sigmas = 1.5;  // a run whose line is join_floor_m + join_sigmas sigma_z off a plane belongs to it
     double join_floor_m = 0.003;
-    std::int32_t min_rows = 3;      // of a run that starts a plane
-    std::int32_t min_columns = 4;   // of a plane
+    std::int32_t min_rows = 3;        // of a run that starts a plane
+    std::int32_t min_columns = 4;     // of a plane
     std::int32_t min_plane_px = 800;  // full-resolution pixels
   };
   static constexpr std::size_t kMaxPlanes = 96;

@@ -115,15 +115,14 @@ void RunSegmentation::step(std::int32_t column, float at_row, const float* inver
   store(open_.b, Lanes::select(in, b, b0));
   store(open_.mean, Lanes::select(in, mean, mean0));
   store(open_.last, last);
-  store(open_.pending_first,
-        Lanes::select(Lanes::both(out, pending0 < all(0.5F)), row, load(open_.pending_first)));
+  store(open_.pending_first, Lanes::select(Lanes::both(out, pending0 < all(0.5F)), row, load(open_.pending_first)));
   store(open_.pending, pending);
 
   const auto ended = Lanes::both(out, Lanes::either(Lanes::no(fitted), pending >= all(kPending)));
   const auto bent = Lanes::both(in, Lanes::both(n1 > all(7.0F), Lanes::magnitude(mean) > all(bend_)));
   const auto gap = Lanes::both(Lanes::both(started, Lanes::no(valid)), row - last > all(max_gap_));
-  store(event_, Lanes::select(ended, all(kOut),
-                              Lanes::select(bent, all(kBend), Lanes::select(gap, all(kGap), all(kNone)))));
+  store(event_,
+        Lanes::select(ended, all(kOut), Lanes::select(bent, all(kBend), Lanes::select(gap, all(kGap), all(kNone)))));
 }
 
 void RunSegmentation::add_row(std::int32_t row) noexcept {

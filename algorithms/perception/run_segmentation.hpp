@@ -24,9 +24,9 @@ struct Run {
 class RunSegmentation {
  public:
   struct Params {
-    double outlier_sigmas = 3.5;  // a row this far off the run's line does not belong to it
-    double bend_sigmas = 1.7;     // mean of the last rows' residuals: the run bends away
-    double jump_share = 0.03;     // the first rows of a run differ by less than this share of the depth per row
+    double outlier_sigmas = 3.5;    // a row this far off the run's line does not belong to it
+    double bend_sigmas = 1.7;       // mean of the last rows' residuals: the run bends away
+    double jump_share = 0.03;       // the first rows of a run differ by less than this share of the depth per row
     double correlated_share = 0.7;  // of a pixel's noise variance that its neighbours in the row share
     double floor_m = 0.001;         // slow depth errors, added to the noise
     std::int32_t max_gap_px = 8;    // rows without data inside a run
@@ -48,7 +48,7 @@ class RunSegmentation {
  private:
   static constexpr float kPending = 3.0F;  // outliers in a row that end a run
   static constexpr std::int32_t kMinRows = 3;
-  static constexpr float kMemory = 0.7F;       // of the mean of residuals, per row
+  static constexpr float kMemory = 0.7F;  // of the mean of residuals, per row
 
   // Events, as floats: one vector width for all. No two at once.
   static constexpr float kNone = 0.0F, kOut = 1.0F, kBend = 2.0F, kGap = 3.0F;
@@ -57,9 +57,9 @@ class RunSegmentation {
   // The state of all columns' open runs. Sums over accepted rows, t counted from the run's top and inverse depth from
   // the first row's, so that single precision is enough.
   struct Open {
-    Floats n, t, tt, w, tw;      // sums
-    Floats first, a, b;          // inverse depth at top; line first + a + b t
-    Floats mean;                 // recursive mean of normalised residuals
+    Floats n, t, tt, w, tw;                    // sums
+    Floats first, a, b;                        // inverse depth at top; line first + a + b t
+    Floats mean;                               // recursive mean of normalised residuals
     Floats top, last, pending, pending_first;  // rows, as floats: one vector width for all
   };
 

@@ -65,7 +65,7 @@ void SurfaceBoundaries::gather(std::int32_t column, const RunSegmentation::Colum
         continue;
       }
     }
-    Interval interval;
+    ColumnSpan interval;
     interval.top = run.top;
     interval.bottom = run.bottom;
     interval.plane = plane;
@@ -94,7 +94,8 @@ std::uint16_t SurfaceBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower)
 }
 
 // Grows one end while rows without data or two rows off the plane do not stop it.
-void SurfaceBoundaries::extend(std::int32_t column, Interval& interval, std::int32_t step, std::int32_t limit) noexcept {
+void SurfaceBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::int32_t step,
+                               std::int32_t limit) noexcept {
   constexpr int kMaxEmpty = 3;
   const Line line = line_of(planes_[interval.plane].plane, column);
   const auto most = static_cast<float>(math::square(params_.inlier_sigmas));
@@ -131,13 +132,13 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
 void SurfaceBoundaries::meet(std::int32_t column) noexcept {
   Column& intervals = columns_[static_cast<std::size_t>(column)];
   for (std::size_t k = 0; k < intervals.size(); ++k) {
-    Interval& upper = intervals[k];
+    ColumnSpan& upper = intervals[k];
     if (k == 0) extend(column, upper, -1, 0);
     if (k + 1 == intervals.size()) {
       extend(column, upper, 1, rays_->height_px - 1);
       break;
     }
-    Interval& lower = intervals[k + 1];
+    ColumnSpan& lower = intervals[k + 1];
     if (upper.plane == lower.plane || lower.top - upper.bottom > params_.max_gap_px) {
       extend(column, upper, 1, lower.top - 1);
       extend(column, lower, -1, upper.bottom + 1);
@@ -181,7 +182,7 @@ void SurfaceBoundaries::settle() noexcept {
   for (std::size_t i = 0; i < joint_count_; ++i) {
     const Joint& joint = joints_[i];
     Column& intervals = columns_[static_cast<std::size_t>(joint.column)];
-    Interval &upper = intervals[joint.upper], &lower = intervals[joint.upper + 1U];
+    ColumnSpan &upper = intervals[joint.upper], &lower = intervals[joint.upper + 1U];
     const double row = std::floor(static_cast<double>(joint.row) + shift_px[joint.pair]);
     upper.bottom = static_cast<std::int16_t>(math::clamp(row, upper.top, lower.bottom - 1.0));
     lower.top = static_cast<std::int16_t>(upper.bottom + 1);
@@ -199,7 +200,7 @@ void SurfaceBoundaries::refit(std::int32_t column) noexcept {
   constexpr std::int32_t kThick_px = 8;  // thicker surfaces do without the rows next to another
   const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(column)]);
   const auto most = static_cast<float>(math::square(params_.inlier_sigmas));
-  for (const Interval& interval : columns_[static_cast<std::size_t>(column)]) {
+  for (const ColumnSpan& interval : columns_[static_cast<std::size_t>(column)]) {
     Plane& plane = planes_[interval.plane];
     const Line line = line_of(plane.plane, column);
     const std::int32_t rows = interval.bottom - interval.top + 1, margin = rows > kThick_px ? 1 : 0;
@@ -220,8 +221,11 @@ void SurfaceBoundaries::refit(std::int32_t column) noexcept {
       count += valid * stride;
     }
     // Weights so far are per squared relative depth; |m|^2 |ray|^2 makes them 1 / sigma^2.
-    const double scale = d_m * d_m / (x * x + math::square(static_cast<double>(
-                             rays_->y[static_cast<std::size_t>((interval.top + interval.bottom) / 2)])) + 1.0);
+    const double scale =
+        d_m * d_m /
+        (x * x +
+         math::square(static_cast<double>(rays_->y[static_cast<std::size_t>((interval.top + interval.bottom) / 2)])) +
+         1.0);
     PlaneMoments& m = plane.moments;
     m.xx += scale * x * x * n, m.xy += scale * x * y1, m.x1 += scale * x * n, m.yy += scale * yy;
     m.y1 += scale * y1, m.one += scale * n;

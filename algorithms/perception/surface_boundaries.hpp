@@ -15,7 +15,7 @@
 namespace polygmap {
 
 // Rows top .. bottom of a column show one plane.
-struct Interval {
+struct ColumnSpan {
   std::int16_t top = 0;
   std::int16_t bottom = 0;
   std::uint8_t plane = 0;
@@ -25,18 +25,18 @@ struct Interval {
 class SurfaceBoundaries {
  public:
   struct Params {
-    double inlier_sigmas = 3.0;  // of a row in a refit, and of a row that extends a surface
+    double inlier_sigmas = 3.0;    // of a row in a refit, and of a row that extends a surface
     double same_gap_sigmas = 3.0;  // rows between two runs of one plane that are this far off it are something else
     double gap_floor_m = 0.006;
-    double meet_px = 2.0;        // planes meet where their line is no farther than this from the change-points
-    std::int32_t window_px = 6;  // rows searched beyond where the runs ended
+    double meet_px = 2.0;          // planes meet where their line is no farther than this from the change-points
+    std::int32_t window_px = 6;    // rows searched beyond where the runs ended
     std::int32_t max_gap_px = 24;  // rows between two surfaces that are still next to each other
     double correlated_share = 0.7;
   };
   static constexpr std::size_t kMaxPlanes = 96;
   static constexpr std::size_t kMaxIntervals = 32;
   static constexpr std::int32_t kRefitColumns = 4;  // per piece
-  using Column = StaticVector<Interval, kMaxIntervals>;
+  using Column = StaticVector<ColumnSpan, kMaxIntervals>;
   using Columns = std::array<Column, kColumns>;
   struct Plane {
     InversePlane plane;
@@ -55,8 +55,8 @@ class SurfaceBoundaries {
   void gather(std::int32_t column, const RunSegmentation::Column& runs,
               const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept;
   void begin_meeting() noexcept;
-  void meet(std::int32_t column) noexcept;   // change-points between the column's surfaces
-  void settle() noexcept;                    // one decision per pair of planes, then all columns follow it
+  void meet(std::int32_t column) noexcept;  // change-points between the column's surfaces
+  void settle() noexcept;                   // one decision per pair of planes, then all columns follow it
   void begin_refit() noexcept;
   void refit(std::int32_t column) noexcept;  // adds the column to its planes' moments
 
@@ -87,7 +87,7 @@ class SurfaceBoundaries {
   [[nodiscard]] Line line_of(const InversePlane& plane, std::int32_t column) const noexcept;
   // Residual over sigma, squared.
   [[nodiscard]] float cost(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
-  void extend(std::int32_t column, Interval& interval, std::int32_t step, std::int32_t limit) noexcept;
+  void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
                                           std::int32_t last) const noexcept;
   [[nodiscard]] std::uint16_t pair_of(std::uint8_t upper, std::uint8_t lower) noexcept;
