@@ -3,17 +3,31 @@
 
 #include <cmath>
 
+#include "scheduler/schedule_table.hpp"
+
 namespace polygmap {
 namespace {
 
+// A sensor that delivers every frame is missing when nothing came and its newest sample is at least this old. Frames
+// that catch up find everything read by the first of them; for a latency below one frame none of them is misled.
+constexpr std::int64_t kMissing_ns = kMinorFrame_ns;
 constexpr std::int64_t kLioTimeout_ns = 2 * kNsPerS;  // twenty poses
 constexpr int kMaxReadsPerFrame = 4;  // of one port: a backlog is worked off, a babbling driver is not followed
 
 bool all_finite(const JointCommand& command) noexcept {
   for (const JointSetpoint& joint : command.joints) {
-    if (!std::isfinite(joint.q_rad) || !std::isfinite(joint.dq_radps) || !std::isfinite(joint.tau_ff_nm)) return false;
+    for (const double x : {joint.q_rad, joint.dq_radps, joint.tau_ff_nm, joint.kp_nmprad, joint.kd_nmsprad}) {
+      if (!std::isfinite(x)) return false;
+    }
   }
   return true;
+}
+
+std::uint32_t imu_rejections(const Estimator::Counters& counters) noexcept {
+  return counters.imu_invalid + counters.imu_stale + counters.imu_future;
+}
+std::uint32_t joint_rejections(const Estimator::Counters& counters) noexcept {
+  return counters.joints_invalid + counters.joints_stale + counters.joints_future + counters.joints_jump;
 }
 
 }  // namespace
@@ -26,28 +40,37 @@ ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometr
 }
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {
-  imu_fresh_ = false;
-  for (int i = 0; i < kMaxReadsPerFrame && imu_port_.try_read(imu_); ++i) imu_fresh_ = true;
-  joints_fresh_ = joint_port_.try_read(joints_);
-  if (!imu_fresh_) health_.raise(Fault::kImuMissing, now_ns);
-  if (!joints_fresh_) health_.raise(Fault::kJointFeedbackMissing, now_ns);
+  if (first_ns_ < 0) first_ns_ = now_ns;
+  bool imu_came = false;
+  ImuSample imu;
+  for (int i = 0; i < kMaxReadsPerFrame && imu_port_.try_read(imu); ++i) {
+    estimator_.add_imu(imu, now_ns);
+    imu_came = true;
+  }
+  if (!imu_came && now_ns - estimator_.newest_imu_ns() >= kMissing_ns) health_.raise(Fault::kImuMissing, now_ns);
+  JointFeedback joints;
+  if (joint_port_.try_read(joints)) {
+    estimator_.add_joints(joints, now_ns);
+  } else if (now_ns - estimator_.joints().stamp_ns >= kMissing_ns) {
+    health_.raise(Fault::kJointFeedbackMissing, now_ns);
+  }
   LioSample lio;
   for (int i = 0; i < kMaxReadsPerFrame && lio_port_.try_read(lio); ++i) estimator_.add_lio(lio, now_ns);
   return Progress::kDone;
 }
 
 Progress ControlLane::estimate(std::int64_t /*now_ns*/) noexcept {
-  if (!imu_fresh_ || !joints_fresh_) return Progress::kIdle;
-  estimator_.tick(imu_, joints_, gait_.status().stands);
+  estimator_.tick(gait_.status().stands);
   answer_pose_request();
   return Progress::kDone;
 }
 
-Progress ControlLane::gait(std::int64_t /*now_ns*/) noexcept {
+// Whatever is silent, the gait runs: a foot in the air has to come down.
+Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   command_ready_ = false;
-  if (!joints_fresh_) return Progress::kIdle;
+  if (!estimator_.has_joints()) return Progress::kIdle;  // where the legs are is not known yet
   if (link_.footholds.try_take()) footholds_ = link_.footholds.front();
-  gait_.tick(estimator_.state(), footholds_, joints_, command_);
+  gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
   command_ready_ = true;
   hand_over_touch_down();
 
@@ -73,25 +96,31 @@ Progress ControlLane::command(std::int64_t now_ns) noexcept {
 
 Progress ControlLane::health(std::int64_t now_ns) noexcept {
   report_rejections(now_ns);
+  report_lidar(now_ns);
   report_gait(now_ns);
+  (void)link_.health.try_take();  // the newest, or the last one again
+  all_faults_ = health_;
+  all_faults_.merge(link_.health.front());
   return Progress::kDone;
 }
 
 void ControlLane::report_rejections(std::int64_t now_ns) noexcept {
   const Estimator::Counters& now = estimator_.counters();
   const Estimator::Counters& seen = estimator_seen_;
-  health_.raise(Fault::kImuRejected, now_ns, now.imu_invalid + now.imu_stale - seen.imu_invalid - seen.imu_stale);
-  health_.raise(Fault::kJointFeedbackRejected, now_ns,
-                now.joints_invalid + now.joints_stale + now.joints_jump - seen.joints_invalid - seen.joints_stale -
-                    seen.joints_jump);
+  health_.raise(Fault::kImuRejected, now_ns, imu_rejections(now) - imu_rejections(seen));
+  health_.raise(Fault::kJointFeedbackRejected, now_ns, joint_rejections(now) - joint_rejections(seen));
   for (std::size_t v = 0; v < kLioVerdictCount; ++v) {
     const auto verdict = static_cast<LioVerdict>(v);
     if (verdict == LioVerdict::kAccepted || verdict == LioVerdict::kRealigned) continue;
     health_.raise(Fault::kLioRejected, now_ns, now.lio[v] - seen.lio[v]);
   }
   estimator_seen_ = now;
-  const std::int64_t lio_age_ns = estimator_.state().lio_age_ns;
-  const bool missing = lio_age_ns > kLioTimeout_ns;
+}
+
+void ControlLane::report_lidar(std::int64_t now_ns) noexcept {
+  const StateEstimate& state = estimator_.state();
+  const std::int64_t last_ns = state.lio_age_ns < 0 ? first_ns_ : state.stamp_ns - state.lio_age_ns;
+  const bool missing = now_ns - last_ns > kLioTimeout_ns;
   if (missing && !lio_missing_) health_.raise(Fault::kLioMissing, now_ns);
   lio_missing_ = missing;
 }
@@ -104,6 +133,7 @@ void ControlLane::report_gait(std::int64_t now_ns) noexcept {
   if (now.phase == GaitPhase::kStopped && gait_seen_.phase != GaitPhase::kStopped) {
     health_.raise(Fault::kGaitStopped, now_ns);
     if (now.stop_reason == Obstruction::kMapStale) health_.raise(Fault::kMapStale, now_ns);
+    if (now.stop_reason == Obstruction::kStateStale) health_.raise(Fault::kStateStale, now_ns);
   }
   gait_seen_ = now;
 }
@@ -112,17 +142,19 @@ void ControlLane::answer_pose_request() noexcept {
   if (!link_.pose_request.try_take()) return;
   const PoseRequest& request = link_.pose_request.front();
   PoseAnswer& answer = link_.pose_answer.back();
-  answer.sequence = request.sequence;
+  answer.number = request.number;
   answer.found = estimator_.try_state_at(request.stamp_ns, answer.state);
-  if (!answer.found) health_.raise(Limit::kStateRingMissed, request.stamp_ns);
+  if (!answer.found && estimator_.state().initialised) health_.raise(Limit::kStateRingMissed, request.stamp_ns);
   link_.pose_answer.publish();
 }
 
-// A tread's height enters the estimator once, as it was frozen at the latch: the map never hears its own echo.
+// A tread's height enters the estimator once, as it was frozen at the latch: the map never hears its own echo. The
+// target of a step on the floor is the estimator's own height: no news at all.
 void ControlLane::hand_over_touch_down() noexcept {
   const LatchedStep& step = gait_.status().step;
   if (step.touch_down_stamp_ns == 0 || step.sequence == step_handed_over_) return;
   step_handed_over_ = step.sequence;
+  if (!step.onto_tread) return;
   estimator_.set_tread_height(step.foot, step.odom_T_target.p_m.z(), params_.tread_height_sigma_m);
 }
 

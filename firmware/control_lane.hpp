@@ -28,12 +28,14 @@ class ControlLane {
   [[nodiscard]] const StateEstimate& state() const noexcept { return estimator_.state(); }
   [[nodiscard]] const GaitStatus& gait_status() const noexcept { return gait_.status(); }
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
+  [[nodiscard]] const Health& all_faults() const noexcept { return all_faults_; }  // of both lanes, as of this frame
   [[nodiscard]] const JointCommand& last_command() const noexcept { return command_; }
   [[nodiscard]] Health& faults() noexcept { return health_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_; }
 
  private:
   void answer_pose_request() noexcept;
+  void report_lidar(std::int64_t now_ns) noexcept;
   void report_rejections(std::int64_t now_ns) noexcept;
   void report_gait(std::int64_t now_ns) noexcept;
   void hand_over_touch_down() noexcept;
@@ -47,14 +49,12 @@ class ControlLane {
   Estimator estimator_;
   Gait gait_;
   Health health_;
-  ImuSample imu_;
-  JointFeedback joints_;
+  Health all_faults_;
   FootholdSet footholds_;
   JointCommand command_;
-  bool imu_fresh_ = false;
-  bool joints_fresh_ = false;
   bool command_ready_ = false;
   bool lio_missing_ = false;
+  std::int64_t first_ns_ = -1;          // of the first frame: the time-out of a lidar that never speaks starts there
   Estimator::Counters estimator_seen_;  // as of the last frame: what grew since is reported
   GaitStatus gait_seen_;
   std::uint32_t step_handed_over_ = 0;  // sequence of the last touch-down told to the estimator

@@ -7,16 +7,17 @@
 #include "algorithms/core/footholds.hpp"
 #include "algorithms/core/gait_status.hpp"
 #include "algorithms/core/state.hpp"
+#include "scheduler/health.hpp"
 
 namespace polygmap {
 
 // Perception asks for the pose at a frame's exposure; control, which owns the past, answers in its next frame.
 struct PoseRequest {
-  std::uint32_t sequence = 0;
+  std::uint32_t number = 0;  // the answer has the same
   std::int64_t stamp_ns = 0;
 };
 struct PoseAnswer {
-  std::uint32_t sequence = 0;
+  std::uint32_t number = 0;
   bool found = false;
   StateEstimate state;
 };
@@ -33,6 +34,7 @@ struct LaneLink {
   Exchange<PoseAnswer> pose_answer;        // control -> perception
   Exchange<SearchContext> search_context;  // control -> perception
   Exchange<FootholdSet> footholds;         // perception -> control
+  Exchange<Health> health;                 // perception -> control
 };
 
 }  // namespace polygmap

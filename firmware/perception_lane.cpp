@@ -7,6 +7,7 @@ namespace polygmap {
 namespace {
 
 constexpr std::int64_t kCameraTimeout_ns = 200 * kNsPerMs;  // six frames
+constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers within two minor frames
 
 }  // namespace
 
@@ -20,6 +21,9 @@ PerceptionLane::PerceptionLane(hal::DepthCamera& camera, LaneLink& link, const P
       search_(params.footholds) {}
 
 Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
+  link_.health.back() = health_;
+  link_.health.publish();
+  if (last_frame_ns_ < 0) last_frame_ns_ = now_ns;
   if (stage_ == FrameStage::kWaiting) {
     if (!camera_port_.try_acquire(frame_)) {
       if (now_ns - last_frame_ns_ > kCameraTimeout_ns) {
@@ -29,22 +33,30 @@ Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
       return Progress::kIdle;
     }
     last_frame_ns_ = now_ns;
-    link_.pose_request.back() = {frame_.sequence, frame_.stamp_ns};
+    link_.pose_request.back() = {++request_, frame_.stamp_ns};
     link_.pose_request.publish();
     stage_ = FrameStage::kPoseAsked;
     return Progress::kBusy;
   }
-  if (stage_ == FrameStage::kPoseAsked && link_.pose_answer.try_take()) {
+  if (stage_ != FrameStage::kPoseAsked) return Progress::kIdle;
+  // A late answer to a request that was given up is not this frame's.
+  if (link_.pose_answer.try_take() && link_.pose_answer.front().number == request_) {
     begin_extraction(now_ns);
     return Progress::kDone;
   }
-  return Progress::kIdle;
+  if (now_ns - last_frame_ns_ <= kPoseTimeout_ns) return Progress::kIdle;
+  health_.raise(Fault::kPoseMissing, now_ns);
+  stage_ = FrameStage::kWaiting;
+  camera_port_.release();
+  return Progress::kDone;
 }
 
 void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
   const PoseAnswer& answer = link_.pose_answer.front();
   stage_ = FrameStage::kWaiting;
-  if (answer.found && answer.state.initialised && answer.sequence == frame_.sequence) {
+  if (!answer.found) {
+    health_.raise(Limit::kDepthUnplaced, now_ns);
+  } else {
     exposure_state_ = answer.state;
     const Transform camera_T_base = params_.base_T_camera.inverse();
     SurfaceExtractor::View view;
@@ -69,7 +81,9 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
   if (stage_ != FrameStage::kExtracting) return Progress::kIdle;
   const Progress progress = extractor_.step(budget);
   if (progress == Progress::kDone) {
-    if (extractor_.result().dropped > 0) health_.raise(Limit::kPlanesFull, now_ns, extractor_.result().dropped);
+    const std::uint32_t overflow = extractor_.counters().plane_overflow;
+    health_.raise(Limit::kPlanesFull, now_ns, overflow - overflow_seen_);
+    overflow_seen_ = overflow;
     begin_map();
     stage_ = FrameStage::kWaiting;
   }
@@ -79,7 +93,8 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
 void PerceptionLane::begin_map() noexcept {
   PolygonMap::View view;
   view.world_T_camera = exposure_state_.world_T_base() * params_.base_T_camera;
-  view.position_sigma_m = exposure_state_.position_sigma_m.norm();
+  view.position_sigma_m = exposure_state_.position_sigma_m.maxCoeff();
+  view.tilt_sigma_rad = exposure_state_.tilt_sigma_rad;
   view.intrinsics = intrinsics_;
   map_.begin(extractor_.result(), view);
   mapping_ = true;

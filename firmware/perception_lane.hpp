@@ -14,17 +14,17 @@ class PerceptionLane {
  public:
   PerceptionLane(hal::DepthCamera& camera, LaneLink& link, const Params& params) noexcept;
 
-  // Takes a frame from the driver, asks for the pose at its exposure, and starts the extraction when it is known.
+  // Takes a frame from the driver, asks for the pose at its exposure, and starts the extraction when it is known. Gives
+  // the frame back where it is not, and tells control of this lane's faults.
   Progress intake(std::int64_t now_ns) noexcept;
   Progress surfaces(std::int64_t now_ns, WorkBudget& budget) noexcept;
   Progress map(std::int64_t now_ns, WorkBudget& budget) noexcept;
   Progress footholds(std::int64_t now_ns, WorkBudget& budget) noexcept;
 
   [[nodiscard]] const SurfaceFrame& surface_frame() const noexcept { return extractor_.result(); }
-  [[nodiscard]] const StateEstimate& state_at_exposure() const noexcept { return exposure_state_; }
   [[nodiscard]] const MapSnapshot& map_snapshot() const noexcept { return map_.snapshot(); }
-  [[nodiscard]] const FootholdSet& foothold_set() const noexcept { return search_.result(); }
   [[nodiscard]] const SurfaceExtractor& extractor() const noexcept { return extractor_; }
+  [[nodiscard]] Health& faults() noexcept { return health_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_; }
 
  private:
@@ -46,7 +46,9 @@ class PerceptionLane {
   bool searching_ = false;
   DepthFrameView frame_;
   StateEstimate exposure_state_;
-  std::int64_t last_frame_ns_ = 0;
+  std::int64_t last_frame_ns_ = -1;  // taken; from the start until there is one
+  std::uint32_t request_ = 0;        // number of the last pose request
+  std::uint32_t overflow_seen_ = 0;  // the stages' counters as last reported
   std::uint32_t evicted_seen_ = 0;
   SurfaceExtractor extractor_;
   PolygonMap map_;

@@ -1,9 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/pipeline.hpp"
 
+#include "algorithms/gait/blend.hpp"
+#include "scheduler/cyclic_executive.hpp"
+
 namespace polygmap {
 
-static_assert(sizeof(Pipeline) <= kMemoryBudget_bytes);
+namespace {
+
+static_assert(1e6 * kTick_s == kMinorFrame_us, "the gait counts minor frames");
+
+// As the robot runs it; all rows in one lane take less.
+constexpr std::size_t kExecutives_bytes =
+    sizeof(CyclicExecutive<Pipeline, kSchedule, 0>) + sizeof(CyclicExecutive<Pipeline, kSchedule, 1>);
+constexpr std::size_t kStacks_bytes = lane_count(kSchedule) * kLaneStack_bytes;
+static_assert(lane_count(kSchedule) == 2);
+static_assert(sizeof(Pipeline) + kExecutives_bytes + kStacks_bytes <= kMemoryBudget_bytes);
+
+}  // namespace
 
 Progress Pipeline::run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& budget) noexcept {
   switch (static_cast<Row>(row)) {
@@ -32,25 +46,23 @@ Progress Pipeline::run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& b
 }
 
 Telemetry Pipeline::telemetry(std::int64_t now_ns) const noexcept {
-  return {now_ns,
-          control_.state(),
-          perception_.surface_frame(),
-          perception_.state_at_exposure(),
-          perception_.map_snapshot(),
-          perception_.foothold_set(),
-          control_.gait_status()};
+  return {now_ns, control_.state(), perception_.surface_frame(), perception_.map_snapshot(), control_.gait_status()};
 }
 
-std::array<StageMemory, 7> static_memory() noexcept {
+std::array<StageMemory, kMemoryStages> static_memory() noexcept {
+  constexpr std::size_t kHealth = sizeof(Health) * 3;  // of either lane and of both
   constexpr std::size_t kStages = sizeof(Estimator) + sizeof(SurfaceExtractor) + sizeof(PolygonMap) +
-                                  sizeof(FootholdSearch) + sizeof(Gait) + sizeof(LaneLink);
+                                  sizeof(FootholdSearch) + sizeof(Gait) + sizeof(LaneLink) + kHealth;
   return {{{"estimation", sizeof(Estimator)},
            {"perception", sizeof(SurfaceExtractor)},
            {"polygon_map", sizeof(PolygonMap)},
            {"foothold", sizeof(FootholdSearch)},
            {"gait", sizeof(Gait)},
            {"lane_link", sizeof(LaneLink)},
-           {"other", sizeof(Pipeline) - kStages}}};
+           {"health", kHealth},
+           {"other", sizeof(Pipeline) - kStages},
+           {"executive", kExecutives_bytes},
+           {"stacks", kStacks_bytes}}};
 }
 
 }  // namespace polygmap

@@ -33,6 +33,12 @@ class Pipeline {
   [[nodiscard]] ControlLane& control() noexcept { return control_; }
   [[nodiscard]] const ControlLane& control() const noexcept { return control_; }
   [[nodiscard]] const PerceptionLane& perception() const noexcept { return perception_; }
+  // Where that lane's executive counts its own.
+  [[nodiscard]] Health& lane_health(std::size_t lane) noexcept {
+    return lane == 0 ? control_.faults() : perception_.faults();
+  }
+  // Everything that both lanes and their executives counted; perception's as of its last frame. Control's thread only.
+  [[nodiscard]] const Health& health() const noexcept { return control_.all_faults(); }
   [[nodiscard]] Telemetry telemetry(std::int64_t now_ns) const noexcept;
 
  private:
@@ -42,9 +48,12 @@ class Pipeline {
   PerceptionLane perception_;
 };
 
-// The module's static memory, stage by stage; the last entry is what the stages do not account for. Sums to
-// sizeof(Pipeline).
+// The module's static memory, stage by stage: sizeof(Pipeline), where "other" is what its stages do not account for,
+// the executives and the stacks of both lanes.
 inline constexpr std::size_t kMemoryBudget_bytes = 16U * 1024U * 1024U;
-[[nodiscard]] std::array<StageMemory, 7> static_memory() noexcept;
+// Of a lane's thread: what it is to be given. toolchain/checks/stack prints the deepest chain of calls.
+inline constexpr std::size_t kLaneStack_bytes = 64U * 1024U;
+inline constexpr std::size_t kMemoryStages = 10;
+[[nodiscard]] std::array<StageMemory, kMemoryStages> static_memory() noexcept;
 
 }  // namespace polygmap

@@ -9,8 +9,10 @@ namespace polygmap {
 enum Row : std::size_t { kSense, kEstimate, kGait, kCommand, kHealth, kIntake, kSurfaces, kMap, kFootholds, kRowCount };
 
 // Control on lane 0, perception on lane 1; the simulation runs both in one lane, so all rows together fit one frame.
-// Units: see the stage's step(); their costs are those of a 2.4 GHz x86 core (0.66 us, 0.2 us and 2.1 us measured, the
-// `wall` figures of summary.json over the units) with half as much again. Shed first: what the next frame repeats
+// Units: see the stage's step(). What they cost is stated here only: 0.43-0.46 us (surfaces), 0.13-0.16 us (map) and
+// 1.8-1.9 us (footholds) on one core of a shared AMD EPYC, CPU time of a row's runs over the units they spent, climbs
+// of seed 1 (4 steps, white) and seed 44 (10 steps, correlated). The table allows for twice that, footholds for half as
+// much again, which also covers what other programs on that machine take. Shed first: what the next frame repeats
 // anyway.
 inline constexpr ScheduleTable<kRowCount> kSchedule{{
     {.task = "sense", .lane = 0, .budget_us = 40},

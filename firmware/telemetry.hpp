@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "algorithms/core/footholds.hpp"
 #include "algorithms/core/gait_status.hpp"
 #include "algorithms/core/state.hpp"
 #include "algorithms/core/surfaces.hpp"
@@ -16,10 +15,8 @@ namespace polygmap {
 struct Telemetry {
   std::int64_t now_ns;
   const StateEstimate& state;
-  const SurfaceFrame& surfaces;            // newest finished frame; its sequence changes when a new one is done
-  const StateEstimate& state_at_exposure;  // the estimate that frame was placed with
-  const MapSnapshot& map;                  // stamp_ns changes in the tick a frame was fused
-  const FootholdSet& footholds;            // newest finished search
+  const SurfaceFrame& surfaces;  // newest finished frame; its sequence changes when a new one is done
+  const MapSnapshot& map;        // stamp_ns changes in the tick a frame was fused
   const GaitStatus& gait;
 };
 

@@ -43,7 +43,6 @@ class DurationStatistics {
   [[nodiscard]] constexpr std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] constexpr std::uint64_t min_ns() const noexcept { return count_ == 0 ? 0 : min_ns_; }
   [[nodiscard]] constexpr std::uint64_t max_ns() const noexcept { return max_ns_; }
-  [[nodiscard]] constexpr std::uint64_t sum_ns() const noexcept { return sum_ns_; }
   [[nodiscard]] constexpr std::uint64_t mean_ns() const noexcept { return count_ == 0 ? 0 : sum_ns_ / count_; }
   [[nodiscard]] constexpr const std::array<std::uint32_t, kBuckets>& histogram() const noexcept { return histogram_; }
 

@@ -17,8 +17,8 @@ enum class Fault : std::uint8_t {
   kRowOverrun,        // a row took longer than its budget
   kFrameSlip,         // a tick came so late that minor frames were skipped
   kClockRate,         // the cycle counter's rate is outside CycleScale's range
-  kImuMissing,        // no sample in a slot
-  kImuRejected,       // not finite, out of range or out of order
+  kImuMissing,        // no sample in a slot, and none read ahead
+  kImuRejected,       // not finite, out of range, out of order or of the future
   kJointFeedbackMissing,
   kJointFeedbackRejected,
   kJointCommandRefused,  // the bus would not take a command
@@ -27,7 +27,9 @@ enum class Fault : std::uint8_t {
   kDepthRejected,        // wrong size, out of order, no data
   kLioMissing,
   kLioRejected,  // not finite, out of order, or too far from the odometry
+  kPoseMissing,  // control did not say in time where a frame was exposed; the frame was given back
   kMapStale,     // the newest fused frame is too old to step on
+  kStateStale,   // IMU or joints silent for so long that the gait stopped
   kGaitStopped,  // held in double support for a reason other than being on top
   kEnd,          // not a fault
 };
@@ -37,9 +39,10 @@ enum class Limit : std::uint8_t {
   kRowShed = 101,    // a slot given up for lack of time
   kRowDeferred,      // a slot that paid back an overdraft of work units
   kFrameCaughtUp,    // a frame run late
-  kPlanesFull,       // surfaces of a frame that found no room
+  kPlanesFull,       // planes and surfaces of a frame that found no room
   kMapFull,          // polygons that found no room in the map
-  kStateRingMissed,  // a stamp older than the ring of past states
+  kStateRingMissed,  // a frame's stamp that the ring of past states does not cover
+  kDepthUnplaced,    // a frame given back for that, or from before the start
   kReachLimited,     // a leg could not reach the pose asked for
   kContactEarly,     // a foot touched before its planned time
   kContactLate,
@@ -69,11 +72,13 @@ inline constexpr std::array<std::string_view, kCodeCount<Fault>> kFaultNames{"fr
                                                                              "depth_rejected",
                                                                              "lio_missing",
                                                                              "lio_rejected",
+                                                                             "pose_missing",
                                                                              "map_stale",
+                                                                             "state_stale",
                                                                              "gait_stopped"};
 inline constexpr std::array<std::string_view, kCodeCount<Limit>> kLimitNames{
-    "row_shed",          "row_deferred",  "frame_caught_up", "planes_full", "map_full",
-    "state_ring_missed", "reach_limited", "contact_early",   "contact_late"};
+    "row_shed",          "row_deferred",   "frame_caught_up", "planes_full",   "map_full",
+    "state_ring_missed", "depth_unplaced", "reach_limited",   "contact_early", "contact_late"};
 static_assert(!kFaultNames.back().empty() && !kLimitNames.back().empty(), "a code without a name");
 
 // "unknown" outside the enumeration.
@@ -92,8 +97,8 @@ struct CodeCount {
   std::int64_t last_ns = 0;
 };
 
-// One per lane, written by that lane's thread only; a copy crosses lanes through an Exchange and is merged by the
-// reader.
+// One per lane, written by that lane's thread only (its tasks and its executive); a copy crosses lanes through an
+// Exchange and is merged by the reader.
 class Health {
  public:
   constexpr void raise(Fault fault, std::int64_t now_ns, std::uint32_t times = 1) noexcept {

@@ -33,7 +33,7 @@ struct ScheduleRow {
   std::uint8_t lane = 0;  // a lane is a core; lanes count from 0 without a gap
   SlotMask slots = kEverySlot;
   std::int32_t budget_us = 0;     // per slot, on the robot
-  std::int32_t unit_cost_ns = 0;  // of one work unit, as `polygmap bench` measured it; 0: the row is not resumable
+  std::int32_t unit_cost_ns = 0;  // of one work unit, as measured; 0: the row is not resumable
   std::uint8_t shed_order = 0;    // 1 is shed first, then 2, ...; 0 is never shed (control, gait, health)
 
   [[nodiscard]] constexpr bool resumable() const noexcept { return unit_cost_ns > 0; }

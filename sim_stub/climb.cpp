@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
+#include <optional>
 
 #include "firmware/pipeline.hpp"
 #include "scheduler/cyclic_executive.hpp"
@@ -62,6 +63,15 @@ class WatchedLidar final : public hal::LidarOdometry {
 };
 
 using Executive = CyclicExecutive<TimedPipeline, kOneLaneSchedule>;
+
+// Memory that is there before the module is: the heap is watched from its first instruction on.
+struct Module {
+  std::optional<Pipeline> pipeline;
+  std::optional<TimedPipeline> tasks;
+  std::optional<Executive> executive;
+};
+
+static_assert(VirtualClock::kTick_ns == kMinorFrame_ns);
 
 SimOptions sim_options(const ClimbOptions& options) {
   SimOptions sim;
@@ -128,13 +138,19 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   Params params;
   params.self_filter = options.self_filter;
   WatchedLidar lidar(robot);
-  const auto pipeline = std::make_unique<Pipeline>(Ports{robot, robot, robot, lidar}, params);
-  TimedPipeline tasks(*pipeline);
-  Health health;
-  Executive executive(tasks, robot, health);
+  const auto module = std::make_unique<Module>();
+  {
+    const heap::ModuleCall call("Pipeline::Pipeline");
+    module->pipeline.emplace(Ports{robot, robot, robot, lidar}, params);
+    module->tasks.emplace(*module->pipeline);
+    module->executive.emplace(*module->tasks, robot, module->pipeline->lane_health(0));
+    module->executive->start(robot.now_ns() + kMinorFrame_ns);
+  }
+  Pipeline& pipeline = *module->pipeline;
+  TimedPipeline& tasks = *module->tasks;
+  Executive& executive = *module->executive;
   ClimbReport report(robot.stairs());
 
-  executive.start(robot.now_ns() + kMinorFrame_ns);
   std::int64_t end_ns = -1;
   std::int64_t next_progress_ns = 0;
   while (seconds(robot.now_ns()) < options.time_limit_s) {
@@ -143,7 +159,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
       const heap::ModuleCall call("CyclicExecutive::tick");
       executive.tick(robot.now_ns());
     }
-    const Telemetry telemetry = pipeline->telemetry(robot.now_ns());
+    const Telemetry telemetry = pipeline.telemetry(robot.now_ns());
     report.observe(robot.truth(), telemetry);
     if (lidar.accepted(telemetry.state)) report.observe_lio(lidar.last());
     if (progress && robot.now_ns() >= next_progress_ns) {

@@ -57,7 +57,7 @@ std::string why_stopped(Obstruction reason, double measured_m) {
     case Obstruction::kNone:
       return "it gave no reason";
     case Obstruction::kNothingSeen:
-      return "it saw no surface";
+      return "it saw no surface to step on";
     case Obstruction::kNoStaircase:
       return "it saw level ground and no higher tread";
     case Obstruction::kTop:
@@ -70,6 +70,17 @@ std::string why_stopped(Obstruction reason, double measured_m) {
       return "it measured a tread too narrow for two feet";
     case Obstruction::kMapStale:
       return "its map was stale";
+    case Obstruction::kEdgeUncertain:
+      return "it knew the edges of the next tread too vaguely";
+    case Obstruction::kLegsCannot:
+      return measured_m > 0.0 ? sentence("its legs could not do the next step, of %.3f m rise", measured_m)
+                              : "its legs could not do the next step";
+    case Obstruction::kUnsteady:
+      return "what it saw kept changing";
+    case Obstruction::kGroundMissing:
+      return "there was no ground where a foot came down, and it put the foot back";
+    case Obstruction::kStateStale:
+      return "its IMU or its joints fell silent";
   }
   return "it gave no known reason";
 }

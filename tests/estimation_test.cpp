@@ -249,13 +249,18 @@ TEST(Contacts, PlannedSwing_FootNeverUnloads_StandsAgainAfterTheTimeout) {
 
 class EstimatorTest : public ::testing::Test {
  protected:
+  void tick(const ImuSample& imu, const JointFeedback& joints, const std::array<bool, kFootCount>& stance) {
+    estimator_.add_imu(imu, t_ns_);
+    estimator_.add_joints(joints, t_ns_);
+    estimator_.tick(stance);
+  }
   // Runs to `until_ns` (exclusive), LIO arriving late; each(tick) after every tick.
   template <typename Each>
   void run(SyntheticWalk& walk, const WalkSpec& spec, std::int64_t until_ns, bool with_lio, const Each& each) {
     for (; t_ns_ < std::min(until_ns, walk.end_ns()); t_ns_ += kTick_ns) {
       const ImuSample imu = walk.imu(t_ns_);
       const JointFeedback joints = walk.joints(t_ns_);
-      estimator_.tick(imu, joints, walk.truth(t_ns_).stance);
+      tick(imu, joints, walk.truth(t_ns_).stance);
       const std::int64_t stamp_ns = t_ns_ - spec.lio_delay_ns;
       if (with_lio && stamp_ns >= 0 && t_ns_ % (100 * kNsPerMs) == 0) estimator_.add_lio(walk.lio(stamp_ns), t_ns_);
       each(t_ns_);
@@ -306,7 +311,7 @@ TEST_F(EstimatorTest, Standstill_RobotIsMoved_StartsOver) {
   run(walk, spec, 800 * kNsPerMs);
   ImuSample pushed = walk.imu(t_ns_);
   pushed.gyro_radps.x() = 0.3;
-  estimator_.tick(pushed, walk.joints(t_ns_), kBothStand);
+  tick(pushed, walk.joints(t_ns_), kBothStand);
   t_ns_ += kTick_ns;
   EXPECT_EQ(estimator_.counters().standstill_restarts, 1U);
   run(walk, spec, 1700 * kNsPerMs);
@@ -424,26 +429,26 @@ TEST_F(EstimatorTest, BadSamples_EveryKind_IsCountedAndTheStateStaysGood) {
   SyntheticWalk walk(spec);
   run(walk, spec, 1500 * kNsPerMs);
   const Transform before = estimator_.state().odom_T_base;
-  const auto tick = [&](auto&& spoil) {
+  const auto spoilt = [&](auto&& spoil) {
     ImuSample imu = walk.imu(t_ns_);
     JointFeedback joints = walk.joints(t_ns_);
     spoil(imu, joints);
-    estimator_.tick(imu, joints, kBothStand);
+    tick(imu, joints, kBothStand);
     t_ns_ += kTick_ns;
   };
-  tick([](ImuSample& imu, JointFeedback&) { imu.gyro_radps.y() = kNaN; });
-  tick([](ImuSample& imu, JointFeedback&) { imu.accel_mps2.z() = 1e9; });
-  tick([](ImuSample& imu, JointFeedback&) { imu.stamp_ns -= 4 * kTick_ns; });
-  tick([](ImuSample&, JointFeedback& joints) { joints.q_rad[3] = kNaN; });
-  tick([](ImuSample&, JointFeedback& joints) { joints.foot_force_n[0] = std::numeric_limits<double>::infinity(); });
-  tick([](ImuSample&, JointFeedback& joints) { joints.stamp_ns -= 10 * kTick_ns; });
-  tick([](ImuSample&, JointFeedback& joints) { joints.q_rad[3] += 0.5; });
-  tick([](ImuSample& imu, JointFeedback& joints) {
+  spoilt([](ImuSample& imu, JointFeedback&) { imu.gyro_radps.y() = kNaN; });
+  spoilt([](ImuSample& imu, JointFeedback&) { imu.accel_mps2.z() = 1e9; });
+  spoilt([](ImuSample& imu, JointFeedback&) { imu.stamp_ns -= 4 * kTick_ns; });
+  spoilt([](ImuSample&, JointFeedback& joints) { joints.q_rad[3] = kNaN; });
+  spoilt([](ImuSample&, JointFeedback& joints) { joints.foot_force_n[0] = std::numeric_limits<double>::infinity(); });
+  spoilt([](ImuSample&, JointFeedback& joints) { joints.stamp_ns -= 10 * kTick_ns; });
+  spoilt([](ImuSample&, JointFeedback& joints) { joints.q_rad[3] += 0.5; });
+  spoilt([](ImuSample& imu, JointFeedback& joints) {
     imu.stamp_ns = -1;
     joints.stamp_ns = -1;
   });
   t_ns_ += 60 * kTick_ns;
-  tick([](ImuSample&, JointFeedback&) {});
+  spoilt([](ImuSample&, JointFeedback&) {});
   const Estimator::Counters& counters = estimator_.counters();
   EXPECT_EQ(counters.imu_invalid, 2U);
   EXPECT_EQ(counters.imu_stale, 2U);
@@ -455,6 +460,88 @@ TEST_F(EstimatorTest, BadSamples_EveryKind_IsCountedAndTheStateStaysGood) {
   EXPECT_EQ(state.stamp_ns, t_ns_ - kTick_ns);
   EXPECT_LT((state.odom_T_base.p_m - before.p_m).norm(), 1e-3);
   EXPECT_LT(so3_log(before.R.transpose() * state.odom_T_base.R).norm(), 2e-3);
+}
+
+// A wrong clock, once: were its stamp taken, every later sample would be a stale one.
+TEST_F(EstimatorTest, StampsOfTheFuture_OfEitherSensor_AreCountedAndTheNextSampleIsTaken) {
+  const WalkSpec spec;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 1500 * kNsPerMs);
+  ImuSample imu = walk.imu(t_ns_);
+  JointFeedback joints = walk.joints(t_ns_);
+  imu.stamp_ns = joints.stamp_ns = t_ns_ + kNsPerS;
+  tick(imu, joints, kBothStand);
+  t_ns_ += kTick_ns;
+  EXPECT_EQ(estimator_.counters().imu_future, 1U);
+  EXPECT_EQ(estimator_.counters().joints_future, 1U);
+  run(walk, spec, 1600 * kNsPerMs);
+  EXPECT_EQ(estimator_.counters().imu_stale + estimator_.counters().joints_stale, 0U);
+  EXPECT_EQ(estimator_.state().oldest_input_ns, t_ns_ - kTick_ns);
+}
+
+// A frame that catches up gets samples of after its own time.
+TEST_F(EstimatorTest, StampsSixMillisecondsAhead_OfALateTick_AreTaken) {
+  const WalkSpec spec;
+  SyntheticWalk walk(spec);
+  estimator_.add_imu(walk.imu(6 * kNsPerMs), 0);
+  estimator_.add_joints(walk.joints(6 * kNsPerMs), 0);
+  EXPECT_EQ(estimator_.newest_imu_ns(), 6 * kNsPerMs);
+  EXPECT_EQ(estimator_.joints().stamp_ns, 6 * kNsPerMs);
+}
+
+TEST_F(EstimatorTest, ImuFasterThanTheTick_EverySampleCounts) {
+  WalkSpec spec;
+  spec.noise_scale = 0.0;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 1500 * kNsPerMs);
+  ASSERT_TRUE(estimator_.state().initialised);
+  for (int i = 3; i >= 0; --i) {  // all of the turn is in the oldest of four
+    ImuSample imu = walk.imu(t_ns_);
+    imu.stamp_ns -= i * kTick_ns / 4;
+    if (i == 3) imu.gyro_radps.z() = 0.4;
+    estimator_.add_imu(imu, t_ns_);
+  }
+  estimator_.add_joints(walk.joints(t_ns_), t_ns_);
+  estimator_.tick(kBothStand);
+  EXPECT_NEAR(estimator_.state().base_w_base_radps.z(), 0.1, 1e-3);
+}
+
+TEST_F(EstimatorTest, OneSensorSilentInSwing_OtherOneCarriesTheStateOn) {
+  for (const bool imu_silent : {true, false}) {
+    WalkSpec spec;
+    spec.steps = 1;
+    SyntheticWalk walk(spec);
+    estimator_.reset({});
+    t_ns_ = 0;
+    aligned_ = false;
+    run(walk, spec, 3000 * kNsPerMs, false, [&](std::int64_t) { align(walk); });
+    ASSERT_FALSE(walk.truth(t_ns_).stance[0]);
+    const std::int64_t silent_since_ns = t_ns_;
+    // Legs alone for the rest of the swing; the IMU alone for half as long as it takes to drift away.
+    const std::int64_t until_ns = t_ns_ + (imu_silent ? 400 : 100) * kNsPerMs;
+    for (; t_ns_ < until_ns; t_ns_ += kTick_ns) {
+      const ImuSample imu = walk.imu(t_ns_);
+      const JointFeedback joints = walk.joints(t_ns_);
+      if (imu_silent) {
+        estimator_.add_joints(joints, t_ns_);
+      } else {
+        estimator_.add_imu(imu, t_ns_);
+      }
+      estimator_.tick(walk.truth(t_ns_).stance);
+    }
+    const StateEstimate& state = estimator_.state();
+    EXPECT_EQ(state.stamp_ns, t_ns_ - kTick_ns);
+    EXPECT_EQ(state.oldest_input_ns, silent_since_ns - kTick_ns);
+    const Transform truth = walk.truth(state.stamp_ns).true_T_base;
+    EXPECT_LT(((true_T_odom_ * state.odom_T_base).p_m - truth.p_m).norm(), 0.01) << imu_silent;
+    StateEstimate then;  // nothing late is fused with a state on one leg
+    EXPECT_TRUE(estimator_.try_state_at(silent_since_ns + 20 * kNsPerMs, then));
+    EXPECT_FALSE(estimator_.try_state_at(state.stamp_ns, then));
+    run(walk, spec, t_ns_ + 200 * kNsPerMs);
+    EXPECT_EQ(estimator_.state().oldest_input_ns, t_ns_ - kTick_ns);
+    EXPECT_TRUE(estimator_.try_state_at(t_ns_ - kTick_ns, then));
+    EXPECT_FALSE(estimator_.try_state_at(until_ns - 30 * kNsPerMs, then)) << "in the gap";
+  }
 }
 
 TEST_F(EstimatorTest, StateAt_BetweenTicks_IsInterpolatedAndOutsideRefused) {

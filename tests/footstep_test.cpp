@@ -152,7 +152,11 @@ TEST(StepSearch, RisesAndTreadsOfTheStairs_LegsCanDoAllOfThem) {
         std::array<Transform, kFootCount> soles;
         TorsoTrajectory::State from;
         const StepPlan plan = stair_step(kind, rise, ahead, soles, from);
-        const StepCheck check = check_step({}, params, StepKnots(plan, from, soles, 2));
+        const StepKnots knots(plan, from, soles, 2);
+        StepProof proof;
+        proof.begin({}, params, knots);
+        ASSERT_TRUE(proof.advance(knots.count()));
+        const StepCheck& check = proof.check();
         EXPECT_TRUE(check.feasible) << rise << " " << ahead << " kind " << static_cast<int>(kind) << ": margin "
                                     << check.joint_margin_rad << " knee " << check.knee_rad << " speed "
                                     << check.speed_share;
@@ -171,11 +175,24 @@ TEST(StepSearch, RiseBeyondTheLegs_IsImpossibleBeforeTheFirstLiftOff) {
     trailing.foot = Foot::kRight;
     trailing.target.position_m.y() = -0.1;
     StepSearch search;
-    search.begin({}, {}, plan.goal, trailing, from, soles);
+    search.begin({}, {}, plan.goal, trailing, StepParams{}.stair_shift_ticks, from, soles);
     int calls = 0;
     while (search.step() == StepSearch::State::kSearching && calls < 1000) ++calls;
     EXPECT_EQ(search.state(), StepSearch::State::kImpossible) << rise;
     EXPECT_LT(calls, 160);  // less than half a weight shift: it is known before the foot would leave
+  }
+}
+
+TEST(StepSearch, ShiftFasterThanTheDrives_IsNotProvenByASlowerOne) {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  const StepPlan plan = stair_step(StepKind::kTrailing, 0.13, 0.28, soles, from);
+  for (const std::int32_t shift_ticks : {StepParams{}.stair_shift_ticks, 40}) {
+    StepSearch search;
+    search.begin({}, {}, plan.goal, {}, shift_ticks, from, soles);
+    for (int i = 0; i < 1000 && search.step() == StepSearch::State::kSearching; ++i) {
+    }
+    EXPECT_EQ(search.state() == StepSearch::State::kFound, shift_ticks > 40);
   }
 }
 

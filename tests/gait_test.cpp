@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 
 #include "tests/support/ideal_climb.hpp"
@@ -219,7 +220,7 @@ TEST(GaitStop, ReasonsOfTheSearch_StopBeforeTheStairsWithTheMeasure) {
 TEST(GaitStop, EveryObstructionAfterTheFirstTread_StandsOnBothFeet) {
   for (const Obstruction obstruction :
        {Obstruction::kNothingSeen, Obstruction::kNoStaircase, Obstruction::kTop, Obstruction::kRiseTooHigh,
-        Obstruction::kTreadTooShort, Obstruction::kTooNarrow, Obstruction::kMapStale}) {
+        Obstruction::kTreadTooShort, Obstruction::kTooNarrow, Obstruction::kMapStale, Obstruction::kEdgeUncertain}) {
     IdealClimb climb({});
     climb.tamper = [&](StateEstimate&, FootholdSet& set, JointFeedback&) {
       if (climb.status().treads_climbed == 0) return;
@@ -280,35 +281,180 @@ TEST(GaitStop, NothingSeenAtTheStart_WaitsThenStopsWithoutAStep) {
 }
 
 // The search offers a step that only the legs know to be too high.
-TEST(GaitStop, StepBeyondTheLegs_StopsBeforeTheStairsWithTheRise) {
+TEST(GaitStop, LeadingStepBeyondTheLegs_StopsBeforeTheStairsWithTheRise) {
   IdealClimb climb({});
   climb.tamper = [](StateEstimate&, FootholdSet& set, JointFeedback&) {
     for (Foothold& hold : set.p_star_feet) hold.position_m.z() += 0.2;
   };
   climb.run(40.0);
   EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
-  EXPECT_EQ(climb.status().stop_reason, Obstruction::kRiseTooHigh);
+  EXPECT_EQ(climb.status().stop_reason, Obstruction::kLegsCannot);
   EXPECT_NEAR(climb.status().stop_measured_m, 0.33, 0.003);
   EXPECT_EQ(climb.status().treads_climbed, 0U);
   EXPECT_FALSE(climb.status().step.onto_tread);
 }
 
-TEST(GaitContact, TreadThatIsNotThere_HoldsOnTheStanceFootAndSaysSo) {
-  ClimbSetup setup;
-  setup.stairs.steps = 2;
-  IdealClimb climb(setup);
-  climb.tamper = [&](StateEstimate&, FootholdSet& set, JointFeedback& feedback) {
-    if (climb.status().phase == GaitPhase::kSwing && climb.status().step.onto_tread) {
-      feedback.foot_force_n[index_of(climb.status().step.foot)] = 0.0;
-    }
-    static_cast<void>(set);
+TEST(GaitStop, TrailingStepBeyondTheLegs_BlamesNoRise) {
+  IdealClimb climb({});
+  climb.tamper = [&](StateEstimate&, FootholdSet& set, JointFeedback&) {
+    const LatchedStep& step = climb.status().step;
+    if (!step.onto_tread || step.touch_down_stamp_ns == 0) return;
+    Foothold& hold = set.p_star_feet[index_of(other(step.foot))];
+    hold = step.target;
+    hold.position_m.z() += 0.3;
+    set.has_p_star = true;
   };
   climb.run(40.0);
   EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
-  EXPECT_EQ(climb.status().stop_reason, Obstruction::kNothingSeen);
-  EXPECT_FALSE(climb.status().stands[index_of(climb.status().step.foot)]);
-  EXPECT_EQ(climb.status().late_contacts, 1U);
+  EXPECT_EQ(climb.status().stop_reason, Obstruction::kLegsCannot);
+  EXPECT_EQ(climb.status().stop_measured_m, 0.0);
+  EXPECT_TRUE(climb.status().step.onto_tread);
+  EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);
+}
+
+TEST(GaitStop, FloorStepBeyondTheDrives_BlamesNoRise) {
+  Gait::Params params;
+  params.step.floor_swing_ticks = 20;
+  IdealClimb climb({}, params);
+  climb.run(20.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+  EXPECT_EQ(climb.status().stop_reason, Obstruction::kLegsCannot);
+  EXPECT_EQ(climb.status().stop_measured_m, 0.0);
+  EXPECT_EQ(climb.status().step.sequence, 0U);
+}
+
+constexpr std::uint32_t kOnTheFirstTread = 1;
+// Calls disturb(ns since both feet stood on the first tread, footholds).
+void disturb_after_the_first_tread(IdealClimb& climb,
+                                   const std::function<void(std::int64_t since_ns, FootholdSet& set)>& disturb) {
+  climb.tamper = [&climb, disturb](StateEstimate& state, FootholdSet& set, JointFeedback&) {
+    if (climb.status().treads_climbed < kOnTheFirstTread) return;
+    disturb(state.stamp_ns - climb.status().step.touch_down_stamp_ns, set);
+  };
+}
+void expect_unsteady(IdealClimb& climb) {
+  climb.run(60.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+  EXPECT_EQ(climb.status().stop_reason, Obstruction::kUnsteady);
+  EXPECT_EQ(climb.status().treads_climbed, kOnTheFirstTread);
+  EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);
   expect_sound_commands(climb);
+}
+
+TEST(GaitStop, TargetsThatNeverHoldStill_AreCalledUnsteady) {
+  IdealClimb climb({});
+  disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
+    const double off_m = (since_ns + 150 * kNsPerMs) / (250 * kNsPerMs) % 2 == 0 ? 0.02 : -0.02;
+    for (Foothold& hold : set.p_star_feet) hold.position_m += rotation_z(hold.yaw_rad) * Vec3{off_m, 0, 0};
+  });
+  expect_unsteady(climb);
+}
+
+TEST(GaitStop, FootholdsThatComeAndGo_AreCalledUnsteady) {
+  IdealClimb climb({});
+  disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
+    if (since_ns % kNsPerS > 400 * kNsPerMs) set.obstruction = Obstruction::kNothingSeen;
+  });
+  expect_unsteady(climb);
+}
+
+TEST(GaitStop, ReasonsThatComeAndGo_AreCalledUnsteady) {
+  IdealClimb climb({});
+  disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
+    set.obstruction = since_ns / (300 * kNsPerMs) % 2 == 0 ? Obstruction::kTop : Obstruction::kNothingSeen;
+  });
+  expect_unsteady(climb);
+}
+
+TEST(GaitFinish, TopSeenAfterAnotherObstruction_WaitsAWholeSecondOfTop) {
+  IdealClimb climb({});
+  disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
+    set.obstruction = since_ns < 800 * kNsPerMs ? Obstruction::kNothingSeen : Obstruction::kTop;
+  });
+  climb.run(60.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+  const double waited_s = seconds(climb.status().stamp_ns - climb.status().step.touch_down_stamp_ns);
+  EXPECT_GT(waited_s, 1.79);
+  EXPECT_LT(waited_s, 1.9);
+}
+
+// The target moves aside just before the lift-off, and with it the rule which foot leads.
+TEST(GaitLatch, OtherFootLeadsAfterTheShift_WeightTakesTheTimeOfAWholeShift) {
+  IdealClimb climb({});
+  disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
+    const double off_m = since_ns < 500 * kNsPerMs ? 0.03 : -0.03;
+    for (Foothold& hold : set.p_star_feet) hold.position_m += rotation_z(hold.yaw_rad) * Vec3{0, off_m, 0};
+  });
+  const auto swings_from_the_first_tread = [&] {
+    return climb.status().treads_climbed == kOnTheFirstTread && climb.status().phase == GaitPhase::kSwing;
+  };
+  while (climb.tick() && !swings_from_the_first_tread()) {
+  }
+  EXPECT_EQ(climb.status().step.foot, Foot::kRight);
+  const std::int64_t stood_ns = climb.record().steps.back().touch_down_stamp_ns;
+  EXPECT_GT(seconds(climb.status().step.latch_stamp_ns - stood_ns), 2 * 0.62);
+  climb.run(60.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+  EXPECT_EQ(climb.status().ik_limited_ticks, 0U);
+  expect_sound_commands(climb);
+}
+
+// The nth swing onto a tread finds nothing: 1 is a leading foot, 2 a trailing one.
+bool in_swing_onto_tread(const IdealClimb& climb, int nth) {
+  const auto& done = climb.record().steps;
+  const auto landed = std::count_if(done.begin(), done.end(), [](const LatchedStep& step) { return step.onto_tread; });
+  return climb.status().phase == GaitPhase::kSwing && climb.status().step.onto_tread && landed + 1 == nth;
+}
+void expect_put_back(IdealClimb& climb, int nth) {
+  while (climb.tick() && !in_swing_onto_tread(climb, nth)) {
+  }
+  const Foot foot = climb.status().step.foot;
+  const Transform stood = climb.true_T_sole(foot);  // the tick of the lift-off
+  climb.run(40.0);
+  const GaitStatus& status = climb.status();
+  EXPECT_EQ(status.phase, GaitPhase::kStopped);
+  EXPECT_EQ(status.stop_reason, Obstruction::kGroundMissing);
+  EXPECT_EQ(status.stop_measured_m, 0.0);
+  EXPECT_TRUE(status.stands[0] && status.stands[1]);
+  EXPECT_EQ(status.late_contacts, 1U);
+  EXPECT_EQ(status.treads_climbed, 0U);
+  EXPECT_EQ(status.step.touch_down_stamp_ns, 0);
+  for (int i = 0; i < 500; ++i) climb.tick();
+  EXPECT_TRUE(climb.touches(Foot::kLeft) && climb.touches(Foot::kRight));
+  EXPECT_LT((climb.true_T_sole(foot).p_m - stood.p_m).norm(), 0.003);
+  EXPECT_EQ(climb.status().ik_limited_ticks, 0U);
+  EXPECT_LT(climb.record().penetration_m, 0.002);
+  expect_sound_commands(climb);
+}
+
+TEST(GaitContact, TreadFarLowerThanMapped_PutsTheFootBackAndSaysSo) {
+  ClimbSetup setup;
+  setup.stairs.rise_m = 0.10;
+  setup.map_shift_z_m = 0.07;
+  IdealClimb climb(setup);
+  expect_put_back(climb, 1);
+}
+
+TEST(GaitContact, ForceSensorDead_PutsTheFootBackByThePlan) {
+  for (const int nth : {1, 2}) {
+    IdealClimb climb({});
+    climb.tamper = [&](StateEstimate&, FootholdSet&, JointFeedback& feedback) {
+      if (in_swing_onto_tread(climb, nth)) feedback.foot_force_n[index_of(climb.status().step.foot)] = 0.0;
+    };
+    expect_put_back(climb, nth);
+  }
+}
+
+TEST(GaitReach, EstimateJumpsInMidSwing_LegStopsAtItsReachAndIsCounted) {
+  IdealClimb climb({});
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback&) {
+    if (climb.status().phase == GaitPhase::kSwing) state.odom_T_base.p_m.x() += 1.0;
+  };
+  ASSERT_TRUE(climb.run_until(GaitPhase::kSwing, 1));
+  for (int i = 0; i < 300; ++i) climb.tick();
+  EXPECT_GT(climb.status().ik_limited_ticks, 0U);
+  EXPECT_LE(*std::max_element(climb.record().speed_share.begin(), climb.record().speed_share.end()), 1.0 + 1e-9);
+  EXPECT_GE(climb.record().joint_margin_rad, 0.0);
 }
 
 TEST(GaitContact, ForceSensorStuckOn_LandsByThePlan) {
@@ -384,7 +530,7 @@ TEST(GaitInput, NotInitialised_HoldsTheMeasuredJointsAndNeverMoves) {
   for (int i = 0; i < 12; ++i) feedback.q_rad[i] = 0.01 * i;
   JointCommand command;
   for (int i = 0; i < 2000; ++i) {
-    gait.tick({}, {}, feedback, command);
+    gait.tick(0, {}, {}, feedback, command);
     feedback.q_rad.array() += 1e-4;  // it must not follow a sagging joint
   }
   EXPECT_EQ(gait.status().phase, GaitPhase::kStandstill);
@@ -396,13 +542,72 @@ TEST(GaitInput, NotInitialised_HoldsTheMeasuredJointsAndNeverMoves) {
 }
 
 TEST(GaitInput, NoGoodReading_DrivesGetNoStiffness) {
+  for (const double knee_rad : {std::numeric_limits<double>::quiet_NaN(), -0.1, 2.7, 1e9}) {
+    Gait gait;
+    gait.reset({});
+    JointFeedback feedback;
+    feedback.q_rad[kKnee] = knee_rad;
+    JointCommand command;
+    gait.tick(0, {}, {}, feedback, command);
+    for (const JointSetpoint& joint : command.joints) EXPECT_EQ(joint.kp_nmprad, 0.0) << knee_rad;
+    feedback.q_rad[kKnee] = 0.5;
+    gait.tick(0, {}, {}, feedback, command);
+    EXPECT_GT(command.joints[kKnee].kp_nmprad, 0.0) << knee_rad;
+    EXPECT_DOUBLE_EQ(command.joints[kKnee].q_rad, 0.5);
+  }
+}
+
+TEST(GaitInput, EncoderALittleOutsideTheRange_HoldsAtTheLimit) {
   Gait gait;
   gait.reset({});
   JointFeedback feedback;
-  feedback.q_rad[3] = std::numeric_limits<double>::quiet_NaN();
+  feedback.q_rad[kKnee] = -0.01;
   JointCommand command;
-  gait.tick({}, {}, feedback, command);
-  for (const JointSetpoint& joint : command.joints) EXPECT_EQ(joint.kp_nmprad, 0.0);
+  gait.tick(0, {}, {}, feedback, command);
+  EXPECT_GT(command.joints[kKnee].kp_nmprad, 0.0);
+  EXPECT_EQ(command.joints[kKnee].q_rad, 0.0);
+}
+
+class JointReferenceTest : public testing::Test {
+ protected:
+  JointReferenceTest() {
+    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+      base_T_sole_[index_of(leg)] = {Mat3::Identity(), Vec3{0, side_sign(leg) * kStanceHalfWidth_m, -0.75}};
+      q_rad_.segment<6>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
+          solve_leg({}, leg, base_T_sole_[index_of(leg)]).q_rad;
+    }
+    EXPECT_TRUE(reference_.try_arm({}, {}, q_rad_));
+  }
+  JointReference reference_;
+  JointVector q_rad_;
+  std::array<Transform, kFootCount> base_T_sole_;
+  JointCommand command_;
+};
+
+TEST_F(JointReferenceTest, PoseReached_IsNotLimited) {
+  EXPECT_FALSE(reference_.follow({}, base_T_sole_, command_));
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    EXPECT_NEAR(command_.joints[n].q_rad, q_rad_[static_cast<Eigen::Index>(n)], 1e-9);
+  }
+}
+
+TEST_F(JointReferenceTest, PoseNotFinite_LegStaysWhereItIs) {
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      auto soles = base_T_sole_;
+      soles[0].p_m[axis] = bad;
+      for (int i = 0; i < 100; ++i) EXPECT_TRUE(reference_.follow({}, soles, command_));
+      for (std::size_t n = 0; n < kJointCount; ++n) {
+        EXPECT_NEAR(command_.joints[n].q_rad, q_rad_[static_cast<Eigen::Index>(n)], 1e-9) << n;
+        EXPECT_NEAR(command_.joints[n].dq_radps, 0.0, 1e-9) << n;
+      }
+    }
+  }
+}
+
+TEST_F(JointReferenceTest, PoseOutOfReach_IsLimited) {
+  base_T_sole_[1].p_m.z() = -1.2;
+  EXPECT_TRUE(reference_.follow({}, base_T_sole_, command_));
 }
 
 TEST(GaitInput, NanInEstimatesAndFootholds_NeverReachesACommand) {

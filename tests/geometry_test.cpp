@@ -180,7 +180,7 @@ TEST(Line, HalfPlaneOfALine_IsItsLeftSide) {
 
 TEST(PlaneGeometry, MovedPlane_KeepsItsPoints) {
   const Transform world_T_camera{rotation_y(0.4) * rotation_z(1.0), Vec3{1, 2, 3}};
-  const Plane plane = plane_through({0.1, 0.2, 0.9}, Vec3{0.1, -0.2, -1}.normalized());
+  const Plane plane{Vec3{0.1, -0.2, -1}.normalized(), 0.9};
   const Vec3 p = plane.project({0.5, -0.3, 2});
   EXPECT_NEAR(plane.distance_m(p), 0.0, 1e-12);
   EXPECT_NEAR((world_T_camera * plane).distance_m(world_T_camera * p), 0.0, 1e-12);

@@ -1,39 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
-// The wiring, on fakes: every fault that firmware raises, raised; no heap call; static memory within its budget.
+// The wiring, on fakes: every fault and limit that firmware raises by itself, raised (kReachLimited, kContactEarly and
+// kContactLate repeat the gait's counters, which its own tests raise); both lanes on threads of their own; no heap
+// call, init included; static memory within its budget.
 #include "firmware/pipeline.hpp"
 
 #include <gtest/gtest.h>
 
+#include <barrier>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <thread>
 #include <vector>
 
-#include "algorithms/robot/leg_kinematics.hpp"
-#include "scheduler/cyclic_executive.hpp"
-#include "sim_stub/heap_trap.hpp"
-#include "tests/support/fakes/fake_clock.hpp"
-#include "tests/support/fakes/fake_depth_camera.hpp"
-#include "tests/support/fakes/fake_imu.hpp"
-#include "tests/support/fakes/fake_joint_bus.hpp"
-#include "tests/support/fakes/fake_lidar_odometry.hpp"
+#include "tests/support/fake_robot.hpp"
+#include "tests/support/trapped_module.hpp"
 
 namespace polygmap {
 namespace {
 
-// A robot that stands still on level floor, fed by hand.
+using test::FakeRobot;
+using test::TrappedModule;
+
+// No stamp is near 0 on a robot's clock.
+fakes::FakeClock three_days_up() {
+  fakes::FakeClock clock;
+  clock.advance_ns(3 * 86400 * kNsPerS);
+  return clock;
+}
+
+// A robot that stands still on level floor whatever it is told, fed by hand.
 class PipelineTest : public testing::Test {
  protected:
-  PipelineTest() : camera_(robot_camera_intrinsics()) {
-    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      const Transform sole{Mat3::Identity(), Vec3{0, side_sign(foot) * kStanceHalfWidth_m, -kNominalBaseHeight_m}};
-      standing_q_rad_.segment<6>(static_cast<Eigen::Index>(joint_index(foot, 0))) = solve_leg({}, foot, sole).q_rad;
-    }
-    pipeline_ = std::make_unique<Pipeline>(Ports{camera_, imu_, joints_, lidar_}, Params{});
-    executive_ = std::make_unique<Executive>(*pipeline_, clock_, health_);
-    executive_->start(clock_.now_ns() + kMinorFrame_ns);
-  }
+  explicit PipelineTest(const Params& params = {})
+      : camera_(robot_camera_intrinsics()), module_({camera_, imu_, joints_, lidar_}, params, clock_) {}
 
   [[nodiscard]] ImuSample imu_at(std::int64_t stamp_ns) const {
     return {stamp_ns, Vec3::Zero(), Vec3{0, 0, kGravity_mps2}};
@@ -48,8 +49,7 @@ class PipelineTest : public testing::Test {
   void tick_with(const ImuSample* imu, const JointFeedback* joints) {
     if (imu != nullptr) imu_.feed(*imu);
     if (joints != nullptr) joints_.feed(*joints);
-    const heap::ModuleCall call("CyclicExecutive::tick");
-    executive_->tick(clock_.now_ns());
+    module_.tick();
   }
   void stand(int ticks) {
     for (int i = 0; i < ticks; ++i) {
@@ -59,30 +59,26 @@ class PipelineTest : public testing::Test {
       tick_with(&imu, &joints);
     }
   }
-  [[nodiscard]] std::uint32_t control(Fault fault) const { return pipeline_->control().faults().count(fault).count; }
-  [[nodiscard]] std::uint32_t perception(Fault fault) const {
-    return pipeline_->perception().faults().count(fault).count;
-  }
+  [[nodiscard]] const ControlLane& control() const { return module_.pipeline().control(); }
+  [[nodiscard]] std::uint32_t count(Fault fault) const { return module_.pipeline().health().count(fault).count; }
+  [[nodiscard]] std::uint32_t count(Limit limit) const { return module_.pipeline().health().count(limit).count; }
 
-  using Executive = CyclicExecutive<Pipeline, kOneLaneSchedule>;
   static constexpr int kInitialised_ticks = 700;  // the standstill takes a second
 
-  fakes::FakeClock clock_;
+  const JointVector standing_q_rad_ = test::standing_joints();
+  fakes::FakeClock clock_ = three_days_up();
   fakes::FakeDepthCamera camera_;
   fakes::FakeImu imu_;
   fakes::FakeJointBus joints_;
   fakes::FakeLidarOdometry lidar_;
-  Health health_;
-  JointVector standing_q_rad_ = JointVector::Zero();
-  std::unique_ptr<Pipeline> pipeline_;
-  std::unique_ptr<Executive> executive_;
+  TrappedModule module_;
 };
 
 TEST_F(PipelineTest, StandingStill_InitialisesCommandsAndRaisesNothingOfControl) {
   stand(kInitialised_ticks);
-  EXPECT_TRUE(pipeline_->control().state().initialised);
-  EXPECT_FALSE(pipeline_->control().faults().any_fault());
-  const JointCommand& command = pipeline_->control().last_command();
+  EXPECT_TRUE(control().state().initialised);
+  EXPECT_FALSE(control().faults().any_fault());
+  const JointCommand& command = control().last_command();
   for (std::size_t j = 0; j < kJointCount; ++j) {
     EXPECT_NEAR(command.joints[j].q_rad, standing_q_rad_[static_cast<Eigen::Index>(j)], 0.05) << j;
   }
@@ -92,8 +88,8 @@ TEST_F(PipelineTest, SensorsSilent_AreCountedAsMissing) {
   stand(10);
   clock_.advance_ns(kMinorFrame_ns);
   tick_with(nullptr, nullptr);
-  EXPECT_EQ(control(Fault::kImuMissing), 1U);
-  EXPECT_EQ(control(Fault::kJointFeedbackMissing), 1U);
+  EXPECT_EQ(count(Fault::kImuMissing), 1U);
+  EXPECT_EQ(count(Fault::kJointFeedbackMissing), 1U);
 }
 
 TEST_F(PipelineTest, SensorsNotFinite_AreRejectedAndTheCommandStaysFinite) {
@@ -104,10 +100,10 @@ TEST_F(PipelineTest, SensorsNotFinite_AreRejectedAndTheCommandStaysFinite) {
   JointFeedback joints = joints_at(clock_.now_ns());
   joints.q_rad[3] = std::numeric_limits<double>::infinity();
   tick_with(&imu, &joints);
-  EXPECT_EQ(control(Fault::kImuRejected), 1U);
-  EXPECT_EQ(control(Fault::kJointFeedbackRejected), 1U);
-  EXPECT_EQ(control(Fault::kJointCommandInvalid), 0U);
-  for (const JointSetpoint& joint : pipeline_->control().last_command().joints) {
+  EXPECT_EQ(count(Fault::kImuRejected), 1U);
+  EXPECT_EQ(count(Fault::kJointFeedbackRejected), 1U);
+  EXPECT_EQ(count(Fault::kJointCommandInvalid), 0U);
+  for (const JointSetpoint& joint : control().last_command().joints) {
     EXPECT_TRUE(std::isfinite(joint.q_rad) && std::isfinite(joint.dq_radps));
   }
 }
@@ -116,7 +112,7 @@ TEST_F(PipelineTest, BusRefusesTheCommand_IsCounted) {
   stand(10);
   joints_.writes.fail_next();
   stand(1);
-  EXPECT_EQ(control(Fault::kJointCommandRefused), 1U);
+  EXPECT_EQ(count(Fault::kJointCommandRefused), 1U);
 }
 
 TEST_F(PipelineTest, LidarFromTheFuture_IsRejected) {
@@ -127,7 +123,7 @@ TEST_F(PipelineTest, LidarFromTheFuture_IsRejected) {
   sample.rotation_sigma_rad = Vec3::Constant(0.003);
   lidar_.feed(sample);
   stand(1);
-  EXPECT_EQ(control(Fault::kLioRejected), 1U);
+  EXPECT_EQ(count(Fault::kLioRejected), 1U);
 }
 
 TEST_F(PipelineTest, LidarFallsSilent_IsMissingOnce) {
@@ -139,12 +135,12 @@ TEST_F(PipelineTest, LidarFallsSilent_IsMissingOnce) {
   sample.rotation_sigma_rad = Vec3::Constant(0.003);
   lidar_.feed(sample);
   stand(1500);
-  EXPECT_EQ(control(Fault::kLioMissing), 1U);
+  EXPECT_EQ(count(Fault::kLioMissing), 1U);
 }
 
 TEST_F(PipelineTest, CameraSilent_IsMissing) {
   stand(kInitialised_ticks);
-  EXPECT_GE(perception(Fault::kDepthMissing), 1U);
+  EXPECT_GE(count(Fault::kDepthMissing), 1U);
 }
 
 TEST_F(PipelineTest, FrameOfTheRobotsFuture_HasNoPoseAndIsGivenBack) {
@@ -152,7 +148,7 @@ TEST_F(PipelineTest, FrameOfTheRobotsFuture_HasNoPoseAndIsGivenBack) {
   const std::vector<std::uint16_t> blank(camera_.pixels(), 0);
   camera_.feed(clock_.now_ns() + kNsPerS, blank);
   stand(4);
-  EXPECT_EQ(pipeline_->control().faults().count(Limit::kStateRingMissed).count, 1U);
+  EXPECT_EQ(count(Limit::kStateRingMissed), 1U);
   EXPECT_FALSE(camera_.holding());
 }
 
@@ -163,22 +159,393 @@ TEST_F(PipelineTest, FrameOutOfOrder_IsRejectedAndGivenBack) {
   stand(40);
   camera_.feed(clock_.now_ns() - 200 * kNsPerMs, blank);
   stand(4);
-  EXPECT_EQ(perception(Fault::kDepthRejected), 1U);
+  EXPECT_EQ(count(Fault::kDepthRejected), 1U);
   EXPECT_FALSE(camera_.holding());
 }
 
 TEST_F(PipelineTest, NothingToSee_StopsStandingAndSaysSo) {
   stand(kInitialised_ticks + 2000);
-  EXPECT_EQ(pipeline_->control().gait_status().phase, GaitPhase::kStopped);
-  EXPECT_EQ(pipeline_->control().gait_status().stop_reason, Obstruction::kNothingSeen);
-  EXPECT_EQ(control(Fault::kGaitStopped), 1U);
+  EXPECT_EQ(control().gait_status().phase, GaitPhase::kStopped);
+  EXPECT_EQ(control().gait_status().stop_reason, Obstruction::kNothingSeen);
+  EXPECT_EQ(count(Fault::kGaitStopped), 1U);
+}
+
+// After a late tick the executive runs three frames at once; the first of them reads everything.
+TEST_F(PipelineTest, TickComesTwoFramesLate_NothingIsMissingAndTheGaitKeepsTime) {
+  stand(kInitialised_ticks);
+  for (int i = 0; i < 3; ++i) {
+    clock_.advance_ns(kMinorFrame_ns);
+    imu_.feed(imu_at(clock_.now_ns()));
+  }
+  joints_.feed(joints_at(clock_.now_ns()));
+  const std::uint64_t commands = joints_.writes.calls();
+  module_.tick();
+  EXPECT_EQ(count(Limit::kFrameCaughtUp), 2U);
+  EXPECT_FALSE(control().faults().any_fault());
+  EXPECT_EQ(joints_.writes.calls(), commands + 3);
+  EXPECT_EQ(control().gait_status().stamp_ns, clock_.now_ns());
+  EXPECT_EQ(control().state().oldest_input_ns, clock_.now_ns());
+}
+
+TEST_F(PipelineTest, ImuFasterThanTheFrame_EverySampleCounts) {
+  stand(kInitialised_ticks);
+  clock_.advance_ns(kMinorFrame_ns);
+  for (int i = 3; i >= 0; --i) {
+    ImuSample imu = imu_at(clock_.now_ns() - i * kMinorFrame_ns / 4);
+    if (i == 3) imu.gyro_radps.z() = 0.4;
+    imu_.feed(imu);
+  }
+  const JointFeedback joints = joints_at(clock_.now_ns());
+  tick_with(nullptr, &joints);
+  EXPECT_NEAR(control().state().base_w_base_radps.z(), 0.1, 1e-3);
+}
+
+TEST_F(PipelineTest, SamplesOfTheFuture_AreRejectedOnceAndForgotten) {
+  stand(kInitialised_ticks);
+  clock_.advance_ns(kMinorFrame_ns);
+  const ImuSample imu = imu_at(clock_.now_ns() + kNsPerS);
+  const JointFeedback joints = joints_at(clock_.now_ns() + kNsPerS);
+  tick_with(&imu, &joints);
+  stand(10);
+  EXPECT_EQ(count(Fault::kImuRejected), 1U);
+  EXPECT_EQ(count(Fault::kJointFeedbackRejected), 1U);
+  EXPECT_EQ(control().state().oldest_input_ns, clock_.now_ns());
+}
+
+TEST_F(PipelineTest, LidarNeverSpeaks_IsMissingTwoSecondsAfterTheStart) {
+  stand(1000);
+  EXPECT_EQ(count(Fault::kLioMissing), 0U);
+  stand(10);
+  EXPECT_EQ(count(Fault::kLioMissing), 1U);
+}
+
+TEST_F(PipelineTest, CameraNeverSpeaks_IsMissingAFifthOfASecondAfterTheStart) {
+  stand(100);
+  EXPECT_EQ(count(Fault::kDepthMissing), 0U);
+  stand(10);
+  EXPECT_EQ(count(Fault::kDepthMissing), 1U);
+}
+
+TEST_F(PipelineTest, FrameBeforeTheStart_IsGivenBackAndCounted) {
+  stand(100);
+  camera_.feed(clock_.now_ns(), std::vector<std::uint16_t>(camera_.pixels(), 0));
+  stand(4);
+  EXPECT_EQ(count(Limit::kDepthUnplaced), 1U);
+  EXPECT_EQ(count(Limit::kStateRingMissed), 0U);
+  EXPECT_FALSE(camera_.holding());
+}
+
+class PipelineWithBadStiffness : public PipelineTest {
+ protected:
+  PipelineWithBadStiffness() : PipelineTest(params()) {}
+  static Params params() {
+    Params params;
+    params.gait.joints.kp_nmprad[2] = std::numeric_limits<double>::quiet_NaN();
+    return params;
+  }
+};
+
+TEST_F(PipelineWithBadStiffness, CommandNotFinite_IsCountedAndNeverSent) {
+  stand(10);
+  EXPECT_EQ(count(Fault::kJointCommandInvalid), 10U);
+  EXPECT_EQ(joints_.writes.calls(), 0U);
+}
+
+// Boxes of different heights, a surface or two of each.
+class PipelineAmongBoxes : public PipelineTest {
+ protected:
+  PipelineAmongBoxes() : PipelineTest(params()) {}
+  static Params params() {
+    Params params;
+    params.map.misses_unconfirmed = 1000;  // it shall fill, whatever is seen next
+    params.map.unconfirmed_age_s = 1000.0;
+    return params;
+  }
+  void show(int rows, int columns, double lowest_m) {
+    constexpr double kStep_m = 0.02;  // no two of them are one to the map
+    test::DepthScene scene;
+    scene.world_T_camera = Transform{Mat3::Identity(), Vec3{0, 0, kNominalBaseHeight_m}} * base_T_camera();
+    scene.floor = false;
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns; ++column) {
+        const Vec3 corner_m{0.35 + 0.2 * row, -0.1 * columns + 0.2 * column, -3.0};
+        const double height_m = lowest_m + kStep_m * (row * columns + column);
+        scene.boxes.push_back({corner_m, corner_m + Vec3{0.16, 0.16, 3.0 + height_m}});
+      }
+    }
+    camera_.feed(clock_.now_ns(), test::render_for_robot(scene));
+    stand(100);
+  }
+};
+
+TEST_F(PipelineAmongBoxes, MoreSurfacesThanAFrameMayHave_IsCounted) {
+  stand(kInitialised_ticks);
+  show(2, 3, -0.1);
+  EXPECT_EQ(count(Limit::kPlanesFull), 0U);
+  show(6, 8, -0.5);
+  EXPECT_GT(count(Limit::kPlanesFull), 0U);
+}
+
+TEST_F(PipelineAmongBoxes, MorePolygonsThanTheMapHolds_IsCounted) {
+  stand(kInitialised_ticks);
+  for (const double lowest_m : {-1.5, -1.25, -1.0, -0.75, -0.5, -0.25}) show(3, 4, lowest_m);
+  EXPECT_EQ(count(Limit::kMapFull), 0U);
+  for (const double lowest_m : {0.0, 0.25, -1.75, -2.0}) show(3, 4, lowest_m);
+  EXPECT_GT(count(Limit::kMapFull), 0U);
+}
+
+// A robot that does what it is told, before stairs that it sees.
+class PipelineOnARobot : public testing::Test {
+ protected:
+  void start(double toe_gap_m, const Params& params = {}) {
+    robot_ = std::make_unique<FakeRobot>(toe_gap_m);
+    module_ = std::make_unique<TrappedModule>(robot_->ports(), params, robot_->clock);
+  }
+  void run(int ticks) {
+    for (int i = 0; i < ticks; ++i) {
+      const auto& sent = robot_->joints.commands();
+      const JointCommand before = sent.empty() ? JointCommand{} : sent.newest();
+      const std::uint64_t writes = robot_->joints.writes.calls();
+      robot_->advance();
+      module_->tick();
+      if (!started_) {
+        started_ = !sent.empty();
+        continue;
+      }
+      // Whatever is silent, the drives hear of the gait every tick, and nothing jumps.
+      ASSERT_EQ(robot_->joints.writes.calls(), writes + 1);
+      for (std::size_t n = 0; n < kJointCount; ++n) {
+        const double most_rad =
+            joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg).speed_radps * 1e-6 * kMinorFrame_us;
+        ASSERT_LE(std::abs(sent.newest().joints[n].q_rad - before.joints[n].q_rad), most_rad + 1e-9) << n;
+      }
+    }
+  }
+  // Until the nth swing is in the air, or double support after it.
+  [[nodiscard]] bool run_until(GaitPhase phase, std::uint32_t swing) {
+    for (int i = 0; i < 6000 && !(gait().phase == phase && gait().step.sequence == swing); ++i) run(1);
+    return gait().phase == phase;
+  }
+  [[nodiscard]] const GaitStatus& gait() const { return module_->pipeline().control().gait_status(); }
+  [[nodiscard]] const ControlLane& control() const { return module_->pipeline().control(); }
+  [[nodiscard]] std::uint32_t count(Fault fault) const { return module_->pipeline().health().count(fault).count; }
+
+  // Until the first swing onto a tread begins.
+  [[nodiscard]] bool reach_the_stairs() {
+    while (gait().step.sequence < 6 && run_until(GaitPhase::kSwing, gait().step.sequence + 1)) {
+      if (gait().step.onto_tread) return true;
+    }
+    return false;
+  }
+  // In the middle of a swing of 0.98 s onto the first tread.
+  void fly() {
+    start(kToeGap_m);
+    ASSERT_TRUE(reach_the_stairs());
+    run(150);
+    ASSERT_FALSE(robot_->stands(gait().step.foot));
+    ASSERT_FALSE(control().faults().any_fault());
+  }
+  // most_off_m: of the foot against its target on the true stairs, at touch-down.
+  void expect_landed_and_stopped(double most_off_m) {
+    ASSERT_TRUE(run_until(GaitPhase::kDoubleSupport, gait().step.sequence));
+    const Vec3 landed_m = robot_->true_T_sole(gait().step.foot).p_m;
+    EXPECT_NEAR(landed_m.z(), 0.13, most_off_m);
+    EXPECT_NEAR(landed_m.x(), robot_->first_riser_x_m() + gait().step.target.nosing_distance_m, most_off_m);
+    run(600);
+    EXPECT_NE(gait().step.touch_down_stamp_ns, 0);
+    EXPECT_TRUE(gait().stands[0] && gait().stands[1]);
+    EXPECT_EQ(gait().phase, GaitPhase::kStopped);
+    EXPECT_EQ(gait().stop_reason, Obstruction::kStateStale);
+    EXPECT_TRUE(gait().step.onto_tread);
+    EXPECT_EQ(count(Fault::kStateStale), 1U);
+    EXPECT_EQ(count(Fault::kGaitStopped), 1U);
+    EXPECT_EQ(gait().stamp_ns, robot_->clock.now_ns());
+    EXPECT_LT(std::abs(robot_->true_T_base().R(2, 2) - 1.0), 5e-4);
+  }
+
+  static constexpr double kToeGap_m = 0.062;  // one step of each foot before the stairs
+  std::unique_ptr<FakeRobot> robot_;
+  std::unique_ptr<TrappedModule> module_;
+  bool started_ = false;
+};
+
+TEST_F(PipelineOnARobot, JointsFallSilentInSwing_FootComesDownAsPlannedAndTheGaitStops) {
+  ASSERT_NO_FATAL_FAILURE(fly());
+  robot_->joints_speak = false;
+  expect_landed_and_stopped(0.003);
+  EXPECT_GT(count(Fault::kJointFeedbackMissing), 600U);
+  EXPECT_EQ(count(Fault::kImuMissing), 0U);
+  EXPECT_EQ(control().state().stamp_ns, robot_->clock.now_ns());
+}
+
+TEST_F(PipelineOnARobot, ImuFallsSilentInSwing_FootComesDownAndTheGaitStops) {
+  ASSERT_NO_FATAL_FAILURE(fly());
+  robot_->imu_speaks = false;
+  expect_landed_and_stopped(0.003);
+  EXPECT_GT(count(Fault::kImuMissing), 600U);
+  EXPECT_EQ(count(Fault::kJointFeedbackMissing), 0U);
+  EXPECT_EQ(control().state().stamp_ns, robot_->clock.now_ns());
+}
+
+TEST_F(PipelineOnARobot, BothFallSilentInSwing_FootComesDownAsPlannedAndTheGaitStops) {
+  ASSERT_NO_FATAL_FAILURE(fly());
+  robot_->imu_speaks = robot_->joints_speak = false;
+  const std::int64_t last_ns = robot_->clock.now_ns();
+  expect_landed_and_stopped(0.003);
+  EXPECT_EQ(control().state().stamp_ns, last_ns);
+}
+
+TEST_F(PipelineOnARobot, ImuSilentForAMomentInSwing_ClimbGoesOn) {
+  ASSERT_NO_FATAL_FAILURE(fly());
+  robot_->imu_speaks = false;
+  run(40);
+  robot_->imu_speaks = true;
+  ASSERT_TRUE(run_until(GaitPhase::kSwing, gait().step.sequence + 1));
+}
+
+TEST_F(PipelineOnARobot, JointsSilentOnTwoFeet_StopsWithinATenthOfASecond) {
+  start(kToeGap_m);
+  ASSERT_TRUE(run_until(GaitPhase::kDoubleSupport, 0));
+  run(20);
+  robot_->joints_speak = false;
+  run(55);
+  EXPECT_EQ(gait().phase, GaitPhase::kStopped);
+  EXPECT_EQ(gait().stop_reason, Obstruction::kStateStale);
+  run(500);
+  EXPECT_EQ(gait().step.sequence, 0U);
+}
+
+TEST_F(PipelineOnARobot, CameraFallsSilentBeforeTheStep_StopsWithAStaleMap) {
+  start(kToeGap_m);
+  ASSERT_TRUE(run_until(GaitPhase::kDoubleSupport, 0));
+  robot_->camera_speaks = false;
+  run(3000);
+  EXPECT_EQ(gait().phase, GaitPhase::kStopped);
+  EXPECT_EQ(gait().stop_reason, Obstruction::kMapStale);
+  EXPECT_EQ(count(Fault::kMapStale), 1U);
+  EXPECT_EQ(gait().step.sequence, 0U);
+}
+
+// The target's height of a step on the floor is the estimator's own; a tread's is the map's.
+TEST_F(PipelineOnARobot, TouchDown_OnlyATreadsHeightIsNews) {
+  start(kToeGap_m);
+  ASSERT_TRUE(reach_the_stairs());
+  EXPECT_GT(gait().step.sequence, 1U);
+  EXPECT_EQ(control().estimator().counters().height_taken, 0U);
+  ASSERT_TRUE(run_until(GaitPhase::kDoubleSupport, gait().step.sequence));
+  EXPECT_EQ(control().estimator().counters().height_taken, 1U);
+}
+
+TEST_F(PipelineOnARobot, PoseOfAFrameIsUncertain_MapKnows) {
+  Params params;
+  params.estimator.attitude.gyro_noise_radprs = 0.1;
+  params.estimator.attitude.foot_sigma_rad = 0.1;
+  start(kToeGap_m, params);
+  run(800);
+  const double tilt_sigma_rad = control().state().tilt_sigma_rad;
+  EXPECT_GT(tilt_sigma_rad, 0.02);
+  ASSERT_FALSE(module_->pipeline().perception().map_snapshot().polygons.empty());
+  for (const MapPolygon& polygon : module_->pipeline().perception().map_snapshot().polygons) {
+    EXPECT_GT(polygon.surface.tilt_sigma_rad, 0.9 * tilt_sigma_rad);
+  }
+}
+
+// The table as the robot runs it: control and perception on threads of their own.
+class PipelineInTwoLanes : public testing::Test {
+ protected:
+  PipelineInTwoLanes() : camera_(robot_camera_intrinsics()) {
+    pipeline_ = std::make_unique<Pipeline>(Ports{camera_, imu_, joints_, lidar_}, Params{});
+    control_ = std::make_unique<CyclicExecutive<Pipeline, kSchedule, 0>>(*pipeline_, control_clock_,
+                                                                         pipeline_->lane_health(0));
+    perception_ = std::make_unique<CyclicExecutive<Pipeline, kSchedule, 1>>(*pipeline_, perception_clock_,
+                                                                            pipeline_->lane_health(1));
+    control_->start(control_clock_.now_ns() + kMinorFrame_ns);
+    perception_->start(perception_clock_.now_ns() + kMinorFrame_ns);
+  }
+  void control_frame() {
+    control_clock_.advance_ns(kMinorFrame_ns);
+    const std::int64_t now_ns = control_clock_.now_ns();
+    imu_.feed({now_ns, Vec3::Zero(), Vec3{0, 0, kGravity_mps2}});
+    JointFeedback feedback;
+    feedback.stamp_ns = now_ns;
+    feedback.q_rad = standing_q_rad_;
+    feedback.foot_force_n = {270.0, 270.0};
+    joints_.feed(feedback);
+    const heap::ModuleCall call("control lane");
+    control_->tick(now_ns);
+  }
+  void perception_frame() {
+    perception_clock_.advance_ns(kMinorFrame_ns);
+    const heap::ModuleCall call("perception lane");
+    perception_->tick(perception_clock_.now_ns());
+  }
+
+  const JointVector standing_q_rad_ = test::standing_joints();
+  fakes::FakeClock control_clock_ = three_days_up(), perception_clock_ = three_days_up();
+  fakes::FakeDepthCamera camera_;
+  fakes::FakeImu imu_;
+  fakes::FakeJointBus joints_;
+  fakes::FakeLidarOdometry lidar_;
+  std::unique_ptr<Pipeline> pipeline_;
+  std::unique_ptr<CyclicExecutive<Pipeline, kSchedule, 0>> control_;
+  std::unique_ptr<CyclicExecutive<Pipeline, kSchedule, 1>> perception_;
+};
+
+TEST_F(PipelineInTwoLanes, OneSecondBeforeStairs_PosesFootholdsAndFaultsCross) {
+  constexpr int kFrames = 1100;
+  test::DepthScene scene;
+  scene.world_T_camera = Transform{Mat3::Identity(), Vec3{0, 0, kNominalBaseHeight_m}} * base_T_camera();
+  scene.add_stairs({.rise_m = 0.13, .first_riser_x_m = kCollisionRectangle.toe_x_m + 0.1});
+  const std::vector<std::uint16_t> stairs = test::render_for_robot(scene);
+  std::barrier frame_begins(2);  // both lanes run the same frame at the same time
+  std::thread control([&] {
+    for (int i = 0; i < kFrames; ++i) {
+      frame_begins.arrive_and_wait();
+      control_frame();
+    }
+  });
+  for (int i = 0; i < kFrames; ++i) {
+    frame_begins.arrive_and_wait();
+    if (i > 700 && i % 16 == 0) camera_.feed(perception_clock_.now_ns(), stairs);
+    perception_frame();
+  }
+  control.join();
+  EXPECT_EQ(control_->lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
+  EXPECT_EQ(perception_->lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
+  EXPECT_GE(pipeline_->perception().extractor().counters().frames, 15U);
+  EXPECT_FALSE(pipeline_->perception().map_snapshot().polygons.empty());
+  EXPECT_NE(pipeline_->control().gait_status().phase, GaitPhase::kStandstill);  // a foothold came across
+  EXPECT_EQ(pipeline_->lane_health(0).count(Fault::kDepthMissing).count, 0U);
+  EXPECT_GE(pipeline_->health().count(Fault::kDepthMissing).count, 6U);  // so did perception's faults
+  EXPECT_EQ(pipeline_->health().count(Fault::kPoseMissing).count, 0U);
+}
+
+TEST_F(PipelineInTwoLanes, ControlDoesNotAnswer_FrameIsGivenBackAndALateAnswerIsNotTheNextFrames) {
+  const std::vector<std::uint16_t> blank(camera_.pixels(), 0);
+  const Health& health = pipeline_->perception().faults();
+  camera_.feed(perception_clock_.now_ns(), blank);
+  for (int i = 0; i < 10; ++i) perception_frame();
+  EXPECT_TRUE(camera_.holding());
+  for (int i = 0; i < 2; ++i) perception_frame();
+  EXPECT_FALSE(camera_.holding());
+  EXPECT_EQ(health.count(Fault::kPoseMissing).count, 1U);
+  control_frame();
+  camera_.feed(perception_clock_.now_ns(), blank);
+  for (int i = 0; i < 2; ++i) perception_frame();
+  EXPECT_TRUE(camera_.holding());
+  EXPECT_EQ(health.count(Limit::kDepthUnplaced).count, 0U);
+  control_frame();
+  perception_frame();
+  EXPECT_FALSE(camera_.holding());
+  EXPECT_EQ(health.count(Limit::kDepthUnplaced).count, 1U);
 }
 
 TEST(PipelineMemory, Stages_SumUpWithinTheBudget) {
   const auto memory = static_memory();
   const std::size_t sum = std::accumulate(memory.begin(), memory.end(), std::size_t{0},
                                           [](std::size_t s, const StageMemory& m) { return s + m.bytes; });
-  EXPECT_EQ(sum, sizeof(Pipeline));
+  EXPECT_EQ(sum, sizeof(Pipeline) + sizeof(CyclicExecutive<Pipeline, kSchedule, 0>) +
+                     sizeof(CyclicExecutive<Pipeline, kSchedule, 1>) + 2 * kLaneStack_bytes);
   EXPECT_LE(sum, kMemoryBudget_bytes);
   for (const StageMemory& stage : memory) EXPECT_GT(stage.bytes, 0U) << stage.stage;
 }

@@ -138,6 +138,18 @@ TEST(ClimbCausality, StepMissingFromThePicture_NoFootholdThere) {
   for (const Footstep& step : summary.footsteps) EXPECT_LE(step.step_index, 1);
 }
 
+// The picture of the stairs hangs above the stairs: the foot finds nothing to stand on.
+TEST(ClimbCausality, TreadsLowerThanSeen_FootIsPutBackAndTheReasonIsNamed) {
+  ClimbOptions options = options_of(1, 2);
+  options.stairs.rise_m = 0.10;
+  options.render_dz_m = 0.06;
+  const ClimbSummary summary = climb(options);
+  EXPECT_FALSE(summary.fell) << summary.reason;
+  EXPECT_EQ(summary.steps_climbed, 0);
+  EXPECT_GT(summary.swing_clearance_min_m, 0.0);
+  EXPECT_NE(summary.reason.find("no ground"), std::string::npos) << summary.reason;
+}
+
 TEST(ClimbCausality, SelfFilterOff_LegsAreTakenForSurfaces) {
   ClimbOptions options = options_of(1, 2);
   const ClimbSummary filtered = climb(options);
@@ -159,6 +171,15 @@ TEST(ClimbLimits, RiseOfHalfAMetre_ModuleStopsAndNamesTheRise) {
   EXPECT_FALSE(summary.pass);
   EXPECT_FALSE(summary.fell) << summary.reason;
   expect_to_name("rise of ", 0.5, summary.reason);
+}
+
+// Shorter than the way ahead that is looked at: its end is seen, so the module knows that it is on top.
+TEST(ClimbLimits, LandingOf40Centimetres_ModuleEndsByItself) {
+  ClimbOptions options = options_of(1, 1);
+  options.stairs.landing_m = 0.4;
+  const ClimbSummary summary = climb(options);
+  EXPECT_TRUE(summary.pass) << summary.reason;
+  EXPECT_EQ(summary.reason.find("before the module"), std::string::npos) << summary.reason;
 }
 
 TEST(ClimbLimits, TreadOfTenCentimetres_ModuleStopsAndNamesTheTread) {

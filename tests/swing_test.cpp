@@ -90,6 +90,12 @@ TEST(Swing, NothingFelt_GoesOnDownAtApproachSpeed) {
   EXPECT_NEAR((swing.at(kTicks).p_m.z() - swing.at(kTicks - 1).p_m.z()) / kTick_s, -SwingShape{}.approach_mps, 1e-9);
 }
 
+TEST(Swing, BackBeyondTheStart_GoesOnDownAtApproachSpeed) {
+  const Swing swing = make({0.13, 0.3});
+  EXPECT_NEAR(swing.at(-100).p_m.z(), -0.2 * SwingShape{}.approach_mps, 1e-9);
+  EXPECT_LT((swing.at(-100).p_m - swing.at(0).p_m).head<2>().norm(), 1e-12);
+}
+
 TEST(Swing, TiltedAndTurnedStart_LeavesItContinuouslyAndLandsFlat) {
   const Transform start{rotation_z(0.15) * rotation_y(0.004) * rotation_x(-0.003), {0, 0.1, 0}};
   Swing swing;

@@ -23,44 +23,43 @@ struct Foothold {
   double nosing_distance_m = 0.0;  // along the foot axis from the mapped nosing to the sole frame's origin
 };
 
-// Why there is no foothold ahead. Anything but kNone and kTop is a reason to stop.
+// Why the climb does not go on: what the search found in the map's way, or from kLegsCannot on what the gait met.
+// Anything but kNone and kTop is a reason to stop.
 enum class Obstruction : std::uint8_t {
   kNone,
-  kNothingSeen,    // no frame, or no surface in it
+  kNothingSeen,    // no frame, no surface in it, or too little of the next tread
   kNoStaircase,    // level ground, no higher tread in the map
   kTop,            // standing on the highest tread of a staircase just climbed
   kRiseTooHigh,    // the next tread is out of reach: measured_rise_m
   kTreadTooShort,  // the foot does not fit: measured_tread_m
   kTooNarrow,      // both feet do not fit side by side
   kMapStale,       // the newest fused frame is too old
+  kEdgeUncertain,  // the foot fits the next tread, but not with its edges known so vaguely
+  kLegsCannot,     // the legs cannot do the next step: of this rise when it is a leading one, 0 otherwise
+  kUnsteady,       // what the search offers keeps changing
+  kGroundMissing,  // no ground where the foot came down: it was put back where it had stood
+  kStateStale,     // IMU or joint feedback fell silent
 };
 
-// One tread ahead, as the search measured it.
+// The edge of the next tread.
 struct TreadView {
-  std::uint32_t polygon_id = 0;
-  double height_m = 0.0;           // world z at the nosing's middle
-  double yaw_rad = 0.0;            // heading perpendicular to the nosing, up the stairs
   Vec3 nosing_a_m = Vec3::Zero();  // left end seen when climbing
   Vec3 nosing_b_m = Vec3::Zero();  // right end
-  double depth_m = 0.0;            // nosing to back edge; 0 when the back edge is not mapped yet
-  double nosing_sigma_m = 0.0;
 };
 
 // Result of one search (eqs 14-28).
 struct FootholdSet {
   std::int64_t map_stamp_ns = 0;  // exposure of the newest fused frame
   Foothold p_star;                // eq. 26: on the nearest tread higher than the stance
-  Foothold p_star_star;           // on the next higher one; only for look-ahead
+  Foothold p_star_star;           // on the next higher one: where one foot per tread will step
   bool has_p_star = false;
   bool has_p_star_star = false;
   std::array<Foothold, kFootCount> p_star_feet;  // p* spread to left and right sole, both on the same tread
   TreadView tread;                               // of p*
-  TreadView next_tread;                          // of p**
   double theta_rel_rad = 0.0;                    // eq. 27: bearing of p* from the robot, relative to its heading
   Obstruction obstruction = Obstruction::kNothingSeen;
-  double measured_rise_m = 0.0;  // stance to the next tread, valid unless nothing was seen
-  double measured_tread_m = 0.0;
-  std::uint32_t candidate_cells = 0;  // cells left after erosion (eq. 25)
+  double measured_rise_m = 0.0;   // stance to the next tread, valid unless nothing was seen
+  double measured_tread_m = 0.0;  // nosing to what rises behind it; 0: nothing is mapped there
 };
 
 }  // namespace polygmap

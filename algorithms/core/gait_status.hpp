@@ -14,9 +14,9 @@ namespace polygmap {
 enum class GaitPhase : std::uint8_t {
   kStandstill,     // both feet stand, the estimator is initialising or nothing is planned yet
   kDoubleSupport,  // weight moves over the next stance foot
-  kSwing,
-  kFinished,  // on top, the climb is over
-  kStopped,   // both feet stand; stop_reason says why
+  kSwing,          // one foot in the air, on its way or on its way back
+  kFinished,       // on top, the climb is over
+  kStopped,        // both feet stand; stop_reason says why
 };
 
 // A footstep as it was frozen at lift-off ("latch") and what became of it.
@@ -28,7 +28,7 @@ struct LatchedStep {
   std::int64_t map_stamp_ns = 0;         // exposure of the newest fused frame at the latch
   Foothold target;                       // world frame at the latch
   Transform odom_T_target;               // the same sole pose in the odometry frame that the swing is steered in
-  std::int64_t touch_down_stamp_ns = 0;  // 0 while in the air
+  std::int64_t touch_down_stamp_ns = 0;  // 0 while in the air, and for ever when the foot was put back
   Transform odom_T_executed;             // estimated sole pose at touch-down
 };
 
@@ -40,7 +40,6 @@ struct GaitStatus {
   LatchedStep step;                                 // the current or the last swing
   std::uint32_t treads_climbed = 0;                 // both feet on it, by the module's own count
   std::array<bool, kFootCount> stands{true, true};  // planned contact
-  Transform odom_T_base_desired;
   std::array<Transform, kFootCount> odom_T_sole_desired;
   std::uint32_t ik_limited_ticks = 0;  // ticks in which a leg could not reach what was asked
   std::uint32_t early_contacts = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Linear algebra types and the scalar functions of the cycle. Transcendental functions are called only through here, so
-// that one definition decides on every target.
+// Linear algebra types and the scalar functions of the cycle. Transcendental functions are called only through here:
+// they are the C library's, which may round the last bit differently on another target, and this is the one place to
+// change that.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,12 +23,10 @@ namespace math {
 
 [[nodiscard]] inline double sin(double x_rad) noexcept { return std::sin(x_rad); }
 [[nodiscard]] inline double cos(double x_rad) noexcept { return std::cos(x_rad); }
-[[nodiscard]] inline double tan(double x_rad) noexcept { return std::tan(x_rad); }
 [[nodiscard]] inline double asin(double x) noexcept { return std::asin(x); }
 [[nodiscard]] inline double acos(double x) noexcept { return std::acos(x); }
 [[nodiscard]] inline double atan2(double y, double x) noexcept { return std::atan2(y, x); }
 [[nodiscard]] inline double exp(double x) noexcept { return std::exp(x); }
-[[nodiscard]] inline float exp(float x) noexcept { return std::exp(x); }
 [[nodiscard]] inline double sqrt(double x) noexcept { return std::sqrt(x); }  // exact under IEEE 754
 [[nodiscard]] inline float sqrt(float x) noexcept { return std::sqrt(x); }
 

@@ -19,7 +19,7 @@ enum class EdgeKind : std::uint8_t {
   kUnknown,   // the picture ends here, or the robot's own leg, or a hole in the data
 };
 
-// Two points on a straight edge, with the standard deviation across it.
+// Two points on a straight edge, with the standard deviation across it (map: against the robot).
 struct EdgeLine {
   Vec3 a_m = Vec3::Zero();
   Vec3 b_m = Vec3::Zero();
@@ -34,7 +34,7 @@ struct SurfacePatch {
   SurfaceKind kind = SurfaceKind::kOther;
   Vec3 normal = Vec3::UnitZ();  // unit, towards the viewer (map: out of the surface)
   double d_m = 0.0;             // normal . p + d = 0
-  double offset_sigma_m = 0.0;  // along the normal, at the centroid
+  double offset_sigma_m = 0.0;  // along the normal, at the centroid (map: against the robot)
   double tilt_sigma_rad = 0.0;
   Vec3 centroid_m = Vec3::Zero();
   double area_m2 = 0.0;

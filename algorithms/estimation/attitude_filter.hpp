@@ -6,6 +6,8 @@
 // everything alike, but 1 mrad of changing tilt moves a foot by 0.8 mm.
 #pragma once
 
+#include <algorithm>
+
 #include "algorithms/estimation/contacts.hpp"
 
 namespace polygmap {
@@ -35,6 +37,10 @@ class AttitudeFilter {
 
   [[nodiscard]] const Mat3& odom_R_base() const noexcept { return odom_R_base_; }
   [[nodiscard]] const Vec3& gyro_bias_radps() const noexcept { return bias_radps_; }
+  // Of roll and pitch, one sigma, the larger one; grown since the start.
+  [[nodiscard]] double tilt_sigma_rad() const noexcept {
+    return math::sqrt(std::max(P_[0](kAttitude, kAttitude), P_[1](kAttitude, kAttitude)));
+  }
   [[nodiscard]] double gravity_mps2() const noexcept { return gravity_mps2_; }
   [[nodiscard]] std::uint32_t gravity_rejected() const noexcept { return gravity_rejected_; }
 

@@ -2,6 +2,7 @@
 #include "algorithms/estimation/estimator.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace polygmap {
 namespace {
@@ -22,7 +23,8 @@ void Estimator::reset(const Params& params) noexcept {
   state_ = {};
   imu_ = {};
   joints_ = {};
-  has_imu_ = has_joints_ = has_state_ = false;
+  new_imus_ = 0;
+  new_joints_ = has_imu_ = has_joints_ = has_state_ = false;
   legs_ = {};
   touch_downs_ = {};
   heights_ = {};
@@ -31,11 +33,10 @@ void Estimator::reset(const Params& params) noexcept {
   initialised_ns_ = 0;
 }
 
-void Estimator::tick(const ImuSample& imu, const JointFeedback& joints,
-                     const std::array<bool, kFootCount>& planned_stance) noexcept {
+void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcept {
   ++counters_.ticks;
-  const bool new_imu = accept(imu);
-  const bool new_joints = accept(joints);
+  const bool new_imu = std::exchange(new_imus_, 0U) > 0;
+  const bool new_joints = std::exchange(new_joints_, false);
   if (!has_imu_ || !has_joints_) return;
   const std::int64_t now_ns = std::max(imu_.stamp_ns, joints_.stamp_ns);
   if (has_state_ && now_ns <= state_.stamp_ns) return;
@@ -45,7 +46,7 @@ void Estimator::tick(const ImuSample& imu, const JointFeedback& joints,
   if (new_joints) take_joints(planned_stance);
   if (!state_.initialised) {
     if (new_imu && new_joints) calibrate();
-    publish(now_ns, 0.0);
+    publish(now_ns, Vec3::Zero(), 0.0);
     return;
   }
 
@@ -54,18 +55,22 @@ void Estimator::tick(const ImuSample& imu, const JointFeedback& joints,
     ++counters_.gaps;
     dt_s = params_.max_step_s;
   }
-  attitude_.predict(imu_.gyro_radps, dt_s);
+  // The last rates bridge a short silence of the IMU; beyond it the feet alone say how the base moves.
+  const bool felt = seconds(now_ns - imu_.stamp_ns) <= params_.max_step_s;
+  const Vec3 gyro_radps = felt ? imu_.gyro_radps : attitude_.gyro_bias_radps();
+  attitude_.predict(gyro_radps, dt_s);
   if (new_joints) attitude_.correct_by_feet({legs_[0].base_T_sole.R, legs_[1].base_T_sole.R}, contacts_.feet(), dt_s);
   const Mat3& odom_R_base = attitude_.odom_R_base();
-  const Vec3 base_w_base_radps = imu_.gyro_radps - attitude_.gyro_bias_radps();
+  const Vec3 base_w_base_radps = gyro_radps - attitude_.gyro_bias_radps();
   const ContactRows rows =
       base_.make_rows(odom_R_base, base_w_base_radps, legs_, contacts_.feet(), touch_downs_, heights_, dt_s);
-  base_.predict(odom_R_base * imu_.accel_mps2 - Vec3{0, 0, attitude_.gravity_mps2()}, dt_s, rows);
+  const Vec3 odom_a_base_mps2 = odom_R_base * imu_.accel_mps2 - Vec3{0, 0, attitude_.gravity_mps2()};
+  base_.predict(felt ? odom_a_base_mps2 : Vec3::Zero(), dt_s, rows);
   if (new_joints) base_.correct(rows);
-  attitude_.correct_by_gravity(imu_.accel_mps2, base_.odom_v_base_mps(), dt_s, now_ns);
+  if (felt) attitude_.correct_by_gravity(imu_.accel_mps2, base_.odom_v_base_mps(), dt_s, now_ns);
   counters_.gravity_rejected = attitude_.gravity_rejected();
-  publish(now_ns, dt_s);
-  ring_.push(state_);
+  publish(now_ns, gyro_radps, dt_s);
+  if (seconds(now_ns - state_.oldest_input_ns) <= params_.max_step_s) ring_.push(state_);
 }
 
 void Estimator::add_lio(const LioSample& sample, std::int64_t now_ns) noexcept {
@@ -94,50 +99,63 @@ void Estimator::set_tread_height(Foot foot, double odom_z_m, double sigma_m) noe
   } else if (std::abs(odom_z_m - state_.odom_T_sole[index_of(foot)].p_m.z()) > params_.max_height_error_m) {
     ++counters_.height_rejected;
   } else {
+    ++counters_.height_taken;
     height = {odom_z_m, sigma_m};
   }
 }
 
-bool Estimator::accept(const ImuSample& imu) noexcept {
+void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
   if (!math::all_finite(imu.gyro_radps) || !math::all_finite(imu.accel_mps2) ||
       imu.gyro_radps.cwiseAbs().maxCoeff() > params_.max_rate_radps ||
       imu.accel_mps2.cwiseAbs().maxCoeff() > params_.max_accel_mps2) {
     ++counters_.imu_invalid;
-    return false;
+    return;
+  }
+  if (imu.stamp_ns > now_ns + params_.max_lead_ns) {  // taken, it would make every later sample a stale one
+    ++counters_.imu_future;
+    return;
   }
   if (has_imu_ && imu.stamp_ns <= imu_.stamp_ns) {
     ++counters_.imu_stale;
-    return false;
+    return;
   }
+  const Vec3 gyro_radps = imu_.gyro_radps, accel_mps2 = imu_.accel_mps2;
   imu_ = imu;
+  if (++new_imus_ > 1) {  // samples come evenly
+    const double share = 1.0 / new_imus_;
+    imu_.gyro_radps = gyro_radps + share * (imu.gyro_radps - gyro_radps);
+    imu_.accel_mps2 = accel_mps2 + share * (imu.accel_mps2 - accel_mps2);
+  }
   has_imu_ = true;
-  return true;
 }
 
-bool Estimator::accept(const JointFeedback& joints) noexcept {
+void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noexcept {
   bool good = math::all_finite(joints.q_rad) && math::all_finite(joints.dq_radps) &&
               joints.q_rad.cwiseAbs().maxCoeff() <= params_.max_joint_rad &&
               joints.dq_radps.cwiseAbs().maxCoeff() <= params_.max_joint_speed_radps;
   for (const double force_n : joints.foot_force_n) good = good && std::abs(force_n) <= params_.max_force_n;
   if (!good) {
     ++counters_.joints_invalid;
-    return false;
+    return;
+  }
+  if (joints.stamp_ns > now_ns + params_.max_lead_ns) {
+    ++counters_.joints_future;
+    return;
   }
   if (has_joints_ && joints.stamp_ns <= joints_.stamp_ns) {
     ++counters_.joints_stale;
-    return false;
+    return;
   }
   // The bound grows until the next accepted sample, so a true move is taken up again by itself.
   const double most_rad =
       kEncoderSlack_rad + params_.max_joint_speed_radps * seconds(joints.stamp_ns - joints_.stamp_ns);
   if (has_joints_ && (joints.q_rad - joints_.q_rad).cwiseAbs().maxCoeff() > most_rad) {
     ++counters_.joints_jump;
-    return false;
+    return;
   }
   joints_ = joints;
   for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
-  has_joints_ = true;
-  return true;
+  has_joints_ = new_joints_ = true;
 }
 
 void Estimator::take_joints(const std::array<bool, kFootCount>& planned_stance) noexcept {
@@ -182,13 +200,14 @@ void Estimator::calibrate() noexcept {
   state_.initialised = true;
 }
 
-void Estimator::publish(std::int64_t now_ns, double dt_s) noexcept {
+void Estimator::publish(std::int64_t now_ns, const Vec3& gyro_radps, double dt_s) noexcept {
   const Vec3 before_m = state_.odom_T_base.p_m;
   state_.stamp_ns = now_ns;
+  state_.oldest_input_ns = std::min(imu_.stamp_ns, joints_.stamp_ns);
   if (dt_s > 0.0) {
     state_.odom_T_base = {attitude_.odom_R_base(), base_.odom_p_base_m()};
     state_.odom_v_base_mps = base_.odom_v_base_mps();
-    state_.base_w_base_radps = imu_.gyro_radps - attitude_.gyro_bias_radps();
+    state_.base_w_base_radps = gyro_radps - attitude_.gyro_bias_radps();
     fusion_.tick(state_.odom_T_base, (state_.odom_T_base.p_m - before_m).norm(), dt_s);
   } else {
     state_.odom_T_base = initial_odom_T_base_;
@@ -201,6 +220,7 @@ void Estimator::publish(std::int64_t now_ns, double dt_s) noexcept {
   }
   state_.position_sigma_m.setConstant(fusion_.position_sigma_m());
   state_.yaw_sigma_rad = fusion_.yaw_sigma_rad();
+  state_.tilt_sigma_rad = attitude_.tilt_sigma_rad();
   state_.lio_age_ns = fusion_.last_accepted_ns() < 0 ? -1 : now_ns - fusion_.last_accepted_ns();
 }
 

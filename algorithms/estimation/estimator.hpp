@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// State estimation as one stage: samples in, StateEstimate out, one call per 2 ms.
+// State estimation as one stage: samples in as they arrive, StateEstimate out once per 2 ms.
 #pragma once
 
 #include "algorithms/core/state.hpp"
@@ -26,20 +26,24 @@ class Estimator {
     double max_joint_rad = 4.0;
     double max_joint_speed_radps = 15.0;  // also against the last sample: a single wrong angle is not a motion
     double max_force_n = 5000.0;
-    double max_step_s = 0.05;          // a longer gap is bridged with this much time
-    double max_height_error_m = 0.03;  // of a tread against the sole on it
-    double floor_sigma_m = 0.003;      // of the floor under the feet at the start
+    double max_step_s = 0.05;  // a longer gap is bridged with this much time; older rates are not believed
+    std::int64_t max_lead_ns = 10 * kNsPerMs;  // of a stamp before now: frames caught up run up to 6 ms late
+    double max_height_error_m = 0.03;          // of a tread against the sole on it
+    double floor_sigma_m = 0.003;              // of the floor under the feet at the start
   };
   struct Counters {
     std::uint32_t ticks = 0;
     std::uint32_t imu_invalid = 0;  // not finite or out of range
     std::uint32_t imu_stale = 0;    // no newer stamp than the last
+    std::uint32_t imu_future = 0;   // stamped later than now
     std::uint32_t joints_invalid = 0;
     std::uint32_t joints_stale = 0;
+    std::uint32_t joints_future = 0;
     std::uint32_t joints_jump = 0;  // moved faster than a joint can
     std::uint32_t gaps = 0;         // longer than max_step_s
     std::uint32_t standstill_restarts = 0;
     std::uint32_t gravity_rejected = 0;
+    std::uint32_t height_taken = 0;
     std::uint32_t height_invalid = 0;
     std::uint32_t height_rejected = 0;  // disagreed by more than max_height_error_m
     std::array<std::uint32_t, kLioVerdictCount> lio{};
@@ -50,30 +54,35 @@ class Estimator {
 
   void reset(const Params& params) noexcept;
 
-  // One tick. planned_stance: the feet the gait believes to stand. A bad or stale sample is counted; the other one
-  // still counts, and the last good rates carry the state on.
-  void tick(const ImuSample& imu, const JointFeedback& joints,
-            const std::array<bool, kFootCount>& planned_stance) noexcept;
+  // Samples as they arrive, the oldest first. A bad, stale or future one is counted and left out. IMU samples of one
+  // tick count as their mean.
+  void add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept;
+  void add_joints(const JointFeedback& joints, std::int64_t now_ns) noexcept;
+  // One tick, to the newest sample. planned_stance: the feet the gait believes to stand. With one sensor silent the
+  // other one carries the state on, and oldest_input_ns says since when; with both silent the state stays as it is.
+  void tick(const std::array<bool, kFootCount>& planned_stance) noexcept;
   // A pose as it arrives. Counted by its verdict.
   void add_lio(const LioSample& sample, std::int64_t now_ns) noexcept;
   // At touch-down, once: height in odom of the tread under that foot as the map has it, until the foot lifts.
   void set_tread_height(Foot foot, double odom_z_m, double sigma_m) noexcept;
 
   [[nodiscard]] const StateEstimate& state() const noexcept { return state_; }
-  // The state at a stamp of the last half second. False, and out untouched, outside or before initialisation.
+  // The last accepted feedback; has_joints() is false before the first one.
+  [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
+  [[nodiscard]] bool has_joints() const noexcept { return has_joints_; }
+  [[nodiscard]] std::int64_t newest_imu_ns() const noexcept { return imu_.stamp_ns; }  // accepted; 0: none yet
+  // The state at a stamp of the last half second. False, and out untouched, outside, before initialisation, and where a
+  // sensor was silent for longer than max_step_s.
   [[nodiscard]] bool try_state_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {
     return ring_.try_at(stamp_ns, out);
   }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
   [[nodiscard]] const Vec3& gyro_bias_radps() const noexcept { return attitude_.gyro_bias_radps(); }
-  [[nodiscard]] const BaseFilter& base_filter() const noexcept { return base_; }
 
  private:
-  [[nodiscard]] bool accept(const ImuSample& imu) noexcept;
-  [[nodiscard]] bool accept(const JointFeedback& joints) noexcept;
   void take_joints(const std::array<bool, kFootCount>& planned_stance) noexcept;
   void calibrate() noexcept;
-  void publish(std::int64_t now_ns, double dt_s) noexcept;
+  void publish(std::int64_t now_ns, const Vec3& gyro_radps, double dt_s) noexcept;
 
   Params params_;
   Counters counters_;
@@ -84,8 +93,10 @@ class Estimator {
   OdometryFusion fusion_;
   StateRing ring_;
   StateEstimate state_;
-  ImuSample imu_;         // last accepted
-  JointFeedback joints_;  // last accepted
+  ImuSample imu_;               // last accepted; rates: the mean of those of its tick
+  JointFeedback joints_;        // last accepted
+  std::uint32_t new_imus_ = 0;  // accepted since the last tick
+  bool new_joints_ = false;
   bool has_imu_ = false;
   bool has_joints_ = false;
   bool has_state_ = false;

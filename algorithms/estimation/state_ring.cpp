@@ -13,11 +13,11 @@ Transform between(const Transform& a, const Transform& b, double share) noexcept
 }  // namespace
 
 void StateRing::push(const StateEstimate& state) noexcept {
-  if (states_.empty() || state.stamp_ns > newest_ns()) states_.push_overwrite(state);
+  if (states_.empty() || state.stamp_ns > states_.newest().stamp_ns) states_.push_overwrite(state);
 }
 
 bool StateRing::try_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {
-  if (states_.empty() || stamp_ns < oldest_ns() || stamp_ns > newest_ns()) return false;
+  if (states_.empty() || stamp_ns < states_.oldest().stamp_ns || stamp_ns > states_.newest().stamp_ns) return false;
   std::size_t low = 0, high = states_.size() - 1;  // stamp in [low, high]
   while (high - low > 1) {
     const std::size_t middle = low + (high - low) / 2;
@@ -29,6 +29,7 @@ bool StateRing::try_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept
     out = stamp_ns == a.stamp_ns ? a : b;
     return true;
   }
+  if (b.stamp_ns - a.stamp_ns > kMaxGap_ns) return false;
   const double share = static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
   out = share < 0.5 ? a : b;  // what is not interpolated: probabilities, ages, sigmas
   out.stamp_ns = stamp_ns;

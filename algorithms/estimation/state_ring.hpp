@@ -12,11 +12,9 @@ class StateRing {
   void clear() noexcept { states_.clear(); }
   // Stamps must increase: an older or equal one is not stored.
   void push(const StateEstimate& state) noexcept;
-  [[nodiscard]] bool empty() const noexcept { return states_.empty(); }
-  [[nodiscard]] std::int64_t oldest_ns() const noexcept { return states_.oldest().stamp_ns; }
-  [[nodiscard]] std::int64_t newest_ns() const noexcept { return states_.newest().stamp_ns; }
+  static constexpr std::int64_t kMaxGap_ns = 50 * kNsPerMs;  // what happened in a longer one is unknown
   // The state at a stamp between the oldest and the newest: linear in positions and joints, constant rotation rate
-  // between ticks. False, and out untouched, outside.
+  // between ticks. False, and out untouched, outside and in a gap.
   [[nodiscard]] bool try_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept;
 
  private:

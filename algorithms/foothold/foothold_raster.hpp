@@ -34,6 +34,7 @@ class FootholdRaster {
   // The part of one surface in one row: eqs (17)-(19), and the highest surface stays, eq. (21).
   void add_row(std::int32_t row, const LevelSurface& surface, std::uint8_t layer) noexcept {
     const double y_m = at(0, row).y();
+    if (y_m < surface.box.min_m.y() || y_m > surface.box.max_m.y()) return;  // eq. (16)
     Interval x;
     if (!row_interval(surface.hull, y_m, x)) return;  // eq. (17)
     const double limit = static_cast<double>(kSide);

@@ -12,14 +12,16 @@ double reach_m(const SoleRectangle& foot, const Vec2& heading, const Vec2& inwar
   return std::max(-ahead * foot.toe_x_m, -ahead * foot.heel_x_m) + foot.half_width_m * std::abs(cross(heading, inward));
 }
 
-double least(double clearance, const auto& limits, const Vec2& p_m) noexcept {
-  for (const FootLimit& limit : limits) clearance = std::min(clearance, limit.clearance_m(p_m));
-  return clearance;
+double least_m(const auto& limits, const Vec2& p_m, double sigmas) noexcept {
+  double clearance_m = std::numeric_limits<double>::infinity();
+  for (const FootLimit& limit : limits) clearance_m = std::min(clearance_m, limit.clearance_m(p_m, sigmas));
+  return clearance_m;
 }
 
 constexpr double kSide = 0.2;  // sine of an edge's turn against the nosing from which it bounds a side
 constexpr double kParallel = 0.95, kAcross = 0.2;  // cosines of turns against the heading: a side, a far end
 constexpr double kEndMin_m = 0.08;
+constexpr double kCos30 = 0.866;  // of an edge's turn against the nosing up to which it is a front or a back
 
 // The ends that were seen, at the middle of their edges.
 void note_ends(const SurfacePatch& surface, LevelSurface& out) noexcept {
@@ -42,11 +44,11 @@ void note_ends(const SurfacePatch& surface, LevelSurface& out) noexcept {
 
 }  // namespace
 
-double LevelSurface::contact_clearance_m(const Vec2& p_m) const noexcept {
-  return least(std::numeric_limits<double>::infinity(), edges, p_m);
+double LevelSurface::contact_clearance_m(const Vec2& p_m, double sigmas) const noexcept {
+  return least_m(edges, p_m, sigmas);
 }
-double LevelSurface::toe_clearance_m(const Vec2& p_m) const noexcept {
-  return least(std::numeric_limits<double>::infinity(), toe, p_m);
+double LevelSurface::toe_clearance_m(const Vec2& p_m, double sigmas) const noexcept {
+  return least_m(toe, p_m, sigmas);
 }
 
 bool prepare(const MapPolygon& polygon, double base_yaw_rad, LevelSurface& out) noexcept {
@@ -84,27 +86,31 @@ bool prepare(const MapPolygon& polygon, double base_yaw_rad, LevelSurface& out) 
   note_ends(surface, out);
   for (std::size_t i = 0; i < out.hull.size(); ++i) {
     const HalfPlane inside = edge_half_plane(out.hull, i);
-    (void)out.edges.try_push_back({inside, reach_m(kContactRectangle, out.heading, inside.inward),
+    const double facing = inside.inward.dot(out.heading);
+    double sigma_m = 0.0;  // the sides keep a margin of their own
+    if (facing > kCos30 && surface.nosing.valid) sigma_m = surface.nosing.sigma_m;
+    if (facing < -kCos30 && surface.back.valid) sigma_m = surface.back.sigma_m;
+    (void)out.edges.try_push_back({inside, reach_m(kContactRectangle, out.heading, inside.inward), sigma_m,
                                    std::abs(inside.inward.dot(out.left)) > kSide});
   }
   if (out.has_nosing && surface.back.valid) {
     const std::optional<Line2> back = line_through(surface.back.a_m.head<2>(), surface.back.b_m.head<2>());
-    if (back) add_toe_limit(out, back->point_m, back->direction, 0.0, std::numeric_limits<double>::infinity());
+    if (back) add_toe_limit(out, *back, surface.back.sigma_m, 0.0, std::numeric_limits<double>::infinity());
   }
   return true;
 }
 
-void add_toe_limit(LevelSurface& surface, const Vec2& point_m, const Vec2& direction, double min_m,
-                   double max_m) noexcept {
+void add_toe_limit(LevelSurface& surface, const Line2& line, double sigma_m, double min_m, double max_m) noexcept {
+  const auto& [point_m, direction] = line;
   const double across = direction.dot(surface.left);
-  constexpr double kCos30 = 0.866;
   if (std::abs(across) < kCos30) return;
   // Where it crosses the middle of the surface.
   const Vec2 d = direction / across;
   const double depth_m = surface.along_m(point_m - surface.lateral_m(point_m) * d);
   if (!(depth_m > min_m) || !(depth_m < max_m)) return;
   const Vec2 inward = -left_of(direction) * (left_of(direction).dot(surface.heading) > 0.0 ? 1.0 : -1.0);
-  const FootLimit limit{{inward, inward.dot(point_m)}, reach_m(kCollisionRectangle, surface.heading, inward), false};
+  const FootLimit limit{
+      {inward, inward.dot(point_m)}, reach_m(kCollisionRectangle, surface.heading, inward), sigma_m, false};
   if (!surface.toe.try_push_back(limit)) {  // keep the nearest
     FootLimit* farthest = surface.toe.begin();
     const Vec2 middle = surface.nosing_middle_m();

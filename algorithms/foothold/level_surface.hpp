@@ -18,9 +18,11 @@ namespace polygmap {
 struct FootLimit {
   HalfPlane inside;
   double reach_m = 0.0;  // from the sole's origin towards the edge
+  double sigma_m = 0.0;  // of the edge's place across itself
   bool side = false;     // bounds the surface to the left or right
-  [[nodiscard]] double clearance_m(const Vec2& sole_p_m) const noexcept {
-    return inside.distance_m(sole_p_m) - reach_m;
+  // `sigmas` nearer than it is mapped.
+  [[nodiscard]] double clearance_m(const Vec2& sole_p_m, double sigmas = 0.0) const noexcept {
+    return inside.distance_m(sole_p_m) - reach_m - sigmas * sigma_m;
   }
 };
 
@@ -52,10 +54,11 @@ struct LevelSurface {
   [[nodiscard]] double lateral_m(const Vec2& p_m) const noexcept { return left.dot(p_m - nosing_middle_m()); }
   [[nodiscard]] double along_m(const Vec2& p_m) const noexcept { return heading.dot(p_m - nosing_middle_m()); }
 
-  // Signed: least distance from the contact rectangle of a sole at p to the surface's edges, eq. (25).
-  [[nodiscard]] double contact_clearance_m(const Vec2& p_m) const noexcept;
+  // Signed: least distance from the contact rectangle of a sole at p to the surface's edges, eq. (25), each of them so
+  // many of its sigmas nearer than it is mapped.
+  [[nodiscard]] double contact_clearance_m(const Vec2& p_m, double sigmas = 0.0) const noexcept;
   // Signed: collision box to what rises behind the surface; +inf when nothing is mapped.
-  [[nodiscard]] double toe_clearance_m(const Vec2& p_m) const noexcept;
+  [[nodiscard]] double toe_clearance_m(const Vec2& p_m, double sigmas = 0.0) const noexcept;
 };
 
 // Eqs (14)-(16) and the foot limits of the edges; base_yaw_rad is the heading of surfaces without a nosing. False when
@@ -63,9 +66,8 @@ struct LevelSurface {
 [[nodiscard]] bool prepare(const MapPolygon& polygon, double base_yaw_rad, LevelSurface& out) noexcept;
 
 // Adds something that the collision box must not reach: a line in plan that rises behind the surface, through point_m
-// along the unit vector direction. Ignored unless it runs roughly across the heading (within 30 degrees) and lies
-// between min_m and max_m behind the nosing.
-void add_toe_limit(LevelSurface& surface, const Vec2& point_m, const Vec2& direction, double min_m,
-                   double max_m) noexcept;
+// along the unit vector direction, known to sigma_m. Ignored unless it runs roughly across the heading (within 30
+// degrees) and lies between min_m and max_m behind the nosing.
+void add_toe_limit(LevelSurface& surface, const Line2& line, double sigma_m, double min_m, double max_m) noexcept;
 
 }  // namespace polygmap

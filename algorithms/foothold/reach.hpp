@@ -4,29 +4,9 @@
 
 #include <algorithm>
 
-#include "algorithms/geometry/line.hpp"
 #include "algorithms/robot/model.hpp"
 
 namespace polygmap {
-
-// The horizontal frame of a pose: its heading x, left y. The paper turns into the full base frame; torso pitch would
-// move a far point by pitch x drop, so only the heading counts here.
-class PlanFrame {
- public:
-  PlanFrame() noexcept = default;
-  explicit PlanFrame(const Transform& world_T_pose) noexcept
-      : origin_m_(world_T_pose.p_m.head<2>()), heading_(unit_at(yaw_of(world_T_pose.R))) {}
-  [[nodiscard]] Vec2 operator()(const Vec2& world_p_m) const noexcept {
-    const Vec2 d = world_p_m - origin_m_;
-    return {heading_.dot(d), cross(heading_, d)};
-  }
-  [[nodiscard]] const Vec2& origin_m() const noexcept { return origin_m_; }
-  [[nodiscard]] const Vec2& heading() const noexcept { return heading_; }
-
- private:
-  Vec2 origin_m_ = Vec2::Zero();
-  Vec2 heading_ = Vec2::UnitX();
-};
 
 // Range filter, eq. (20).
 [[nodiscard]] inline bool in_range(const Vec2& base_p_m, double g_range_m) noexcept {

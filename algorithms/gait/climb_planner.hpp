@@ -49,8 +49,6 @@ class ClimbPlanner {
   // Its foot stands.
   void landed() noexcept;
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
-  // The leading foot stands on a tread, the other one below: only the trailing step ends this.
-  [[nodiscard]] bool in_split_stance() const noexcept { return split_stance_; }
 
  private:
   [[nodiscard]] Decision trailing_step(const Situation& situation, const FootholdSet& footholds) const noexcept;
@@ -64,7 +62,7 @@ class ClimbPlanner {
   Foot last_swing_ = Foot::kRight;
   Foot leading_ = Foot::kLeft;
   bool has_leading_ = false;
-  bool split_stance_ = false;
+  bool split_stance_ = false;   // the leading foot stands on a tread, the other one below: the trailing step ends this
   std::uint32_t tread_id_ = 0;  // under the feet
   std::uint32_t treads_climbed_ = 0;
   double stride_share_ = 1.0;  // of the floor step's limits

@@ -1,26 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algorithms/gait/gait.hpp"
 
+#include <algorithm>
+
 namespace polygmap {
 namespace {
 
-bool finite(const Transform& T) noexcept { return math::all_finite(T.R) && math::all_finite(T.p_m); }
+constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
 
-bool usable(const StateEstimate& s) noexcept {
-  return finite(s.odom_T_base) && finite(s.world_T_odom) && finite(s.odom_T_sole[0]) && finite(s.odom_T_sole[1]);
-}
+bool finite(const Transform& T) noexcept { return math::all_finite(T.R) && math::all_finite(T.p_m); }
 
 }  // namespace
 
 void Gait::reset(const Params& params) noexcept {
-  *this = Gait{};
   params_ = params;
   planner_.reset(params.planner);
+  correction_.reset();
+  status_ = {};
+  activity_ = Activity::kHold;
+  waiting_for_ = Obstruction::kNone;
+  tick_ = shifts_ = wait_ticks_ = idle_ticks_ = 0;
+  armed_ = started_ = unloaded_ = stop_requested_ = false;
+  // All else is set before it is read: by arming, by start() and by what begins a shift or a swing. A fresh object to
+  // copy from would take 7 KB of stack.
 }
+
+bool Gait::usable(const StateEstimate& s) const noexcept {
+  return now_ns_ - s.oldest_input_ns <= params_.steer_age_ns && finite(s.odom_T_base) && finite(s.world_T_odom) &&
+         finite(s.odom_T_sole[0]) && finite(s.odom_T_sole[1]);
+}
+
+bool Gait::lost(const StateEstimate& s) const noexcept { return now_ns_ - s.oldest_input_ns > params_.stop_age_ns; }
 
 ClimbPlanner::Situation Gait::situation(const StateEstimate& state) const noexcept {
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
-  return {state.stamp_ns,
+  return {now_ns_,
           state.world_T_odom,
           {sole_pose(odom_T_plan * plan_T_sole_[0]), sole_pose(odom_T_plan * plan_T_sole_[1])}};
 }
@@ -62,37 +76,46 @@ void Gait::end(GaitPhase phase, Obstruction reason, double measured_m) noexcept 
   status_.stop_measured_m = measured_m;
 }
 
-void Gait::begin_shift(const ClimbPlanner::Decision& decision, std::int32_t shift_ticks) noexcept {
+void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexcept {
+  if (++shifts_ > params_.max_shifts) {
+    begin_hold();
+    return end(GaitPhase::kStopped, Obstruction::kUnsteady, 0.0);
+  }
   carry_plan_to_odometry();
   decision_ = decision;
   activity_ = Activity::kShift;
   status_.phase = GaitPhase::kDoubleSupport;
   tick_ = 0;
-  shift_ticks_ = shift_ticks;
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   const StepPlan plan = plan_step(params_.geometry, params_.step, decision.goal, soles, kToeDown_rad[0]);
-  torso_.plan(torso_state_, plan.lift_off, shift_ticks, shift_ticks);
-  search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, torso_state_, plan_T_sole_);
+  shift_ticks_ = again ? params_.reshift_ticks : plan.shift_ticks;
+  torso_.plan(torso_state_, plan.lift_off, shift_ticks_, shift_ticks_);
+  search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, shift_ticks_, torso_state_,
+                plan_T_sole_);
 }
 
 void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexcept {
   if (stop_requested_) return end(GaitPhase::kStopped, Obstruction::kNone, 0.0);
+  if (lost(state)) return end(GaitPhase::kStopped, Obstruction::kStateStale, 0.0);
   if (!state.initialised || !usable(state)) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (decision.has_step) {
     wait_ticks_ = 0;
-    reshifts_ = 0;
-    const bool on_floor = decision.goal.kind == StepKind::kFloor;
-    return begin_shift(decision, on_floor ? params_.step.floor_shift_ticks : params_.step.stair_shift_ticks);
+    return begin_shift(decision, false);
   }
-  ++wait_ticks_;
+  Obstruction reason = decision.obstruction;
+  if (reason == Obstruction::kTop || reason == Obstruction::kNoStaircase) {  // nothing higher is mapped
+    reason = planner_.treads_climbed() > 0 ? Obstruction::kTop : Obstruction::kNoStaircase;
+  }
+  wait_ticks_ = reason == waiting_for_ ? wait_ticks_ + 1 : 1;
+  waiting_for_ = reason;
+  ++idle_ticks_;
   const std::int32_t patience = status_.step.sequence == 0 ? params_.start_patience_ticks : params_.patience_ticks;
-  if (wait_ticks_ < patience) return;
-  const bool nothing_higher =
-      decision.obstruction == Obstruction::kTop || decision.obstruction == Obstruction::kNoStaircase;
-  if (nothing_higher && planner_.treads_climbed() > 0) return end(GaitPhase::kFinished, Obstruction::kNone, 0.0);
-  end(GaitPhase::kStopped, decision.obstruction == Obstruction::kTop ? Obstruction::kNoStaircase : decision.obstruction,
-      decision.measured_m);
+  if (wait_ticks_ >= patience) {
+    if (reason == Obstruction::kTop) return end(GaitPhase::kFinished, Obstruction::kNone, 0.0);
+    return end(GaitPhase::kStopped, reason, decision.measured_m);
+  }
+  if (idle_ticks_ >= params_.unsteady_patience * patience) end(GaitPhase::kStopped, Obstruction::kUnsteady, 0.0);
 }
 
 bool Gait::close_to_planned(const StepGoal& goal) const noexcept {
@@ -106,9 +129,10 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
   if (search_.step() == StepSearch::State::kImpossible) {
     begin_hold();
     if (decision_.goal.kind == StepKind::kFloor && planner_.shorten_floor_steps()) return;
-    return end(GaitPhase::kStopped, Obstruction::kRiseTooHigh, decision_.rise_m);
+    const double rise_m = decision_.goal.kind == StepKind::kLeading ? decision_.rise_m : 0.0;
+    return end(GaitPhase::kStopped, Obstruction::kLegsCannot, rise_m);
   }
-  if (stop_requested_) return begin_hold();
+  if (stop_requested_ || lost(state)) return begin_hold();
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
   if (!usable(state)) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
@@ -117,11 +141,9 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
     return;
   }
   if (close_to_planned(decision.goal)) return lift_off(state, footholds, decision);
-  if (++reshifts_ > params_.max_reshifts) {
-    begin_hold();
-    return end(GaitPhase::kStopped, Obstruction::kMapStale, 0.0);
-  }
-  begin_shift(decision, params_.reshift_ticks);
+  // Over the other foot the weight has its whole way to go.
+  const StepGoal& planned = decision_.goal;
+  begin_shift(decision, decision.goal.foot == planned.foot && decision.goal.kind == planned.kind);
 }
 
 void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
@@ -140,7 +162,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   step = {.sequence = step.sequence + 1,
           .foot = goal.foot,
           .onto_tread = goal.kind != StepKind::kFloor,
-          .latch_stamp_ns = state.stamp_ns,
+          .latch_stamp_ns = now_ns_,
           .map_stamp_ns = footholds.map_stamp_ns,
           .target = goal.foothold,
           .odom_T_target = goal.target.transform(),
@@ -150,6 +172,8 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   status_.stands[index_of(goal.foot)] = false;
   activity_ = Activity::kSwing;
   tick_ = 0;
+  shifts_ = 0;
+  idle_ticks_ = 0;
   unloaded_ = false;
 }
 
@@ -164,19 +188,44 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     if (swing_.lowered_m(tick_) > params_.late_m) ++status_.late_contacts;
     return touch_down(state);
   }
-  // A force that never left is a broken sensor: the plan's end is the touch-down.
-  if (!unloaded_ && tick_ > swing_.duration_ticks()) return touch_down(state);
+  // A force that never left or is no longer told: the plan's end is the touch-down.
+  const bool told = now_ns_ - feedback.stamp_ns <= params_.steer_age_ns;
+  if (!(unloaded_ && told) && tick_ > swing_.duration_ticks()) return touch_down(state);
   if (swing_.lowered_m(tick_) > params_.max_lowering_m) {  // the ground that was seen is not there
     ++status_.late_contacts;
-    return end(GaitPhase::kStopped, Obstruction::kNothingSeen, swing_.lowered_m(tick_));
+    activity_ = Activity::kRetreat;
+    turn_tick_ = tick_;
+    tick_ = 0;
+    return;
   }
   const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
   plan_T_sole_[i] = plan_T_odom * swing_.at(tick_);
 }
 
+std::int32_t Gait::motion_tick() const noexcept {
+  if (activity_ != Activity::kRetreat) return tick_;
+  return turn_tick_ - std::max(tick_ - params_.retreat_pause_ticks, 0);
+}
+
+// The only ground that is known is where the foot stood, and the only way there that is known to be free is the one it
+// came: the whole step backwards, at the speeds that were proven.
+void Gait::retreat(const JointFeedback& feedback) noexcept {
+  const std::size_t i = index_of(decision_.goal.foot);
+  const Transform odom_T_sole = swing_.at(motion_tick());
+  const double above_m = odom_T_sole.p_m.z() - swing_.at(0).p_m.z();
+  const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
+  if ((loaded && above_m < params_.put_back_m) || above_m < -params_.put_back_m) {
+    status_.stands[i] = true;
+    carry_plan_to_odometry();
+    begin_hold();
+    return end(GaitPhase::kStopped, Obstruction::kGroundMissing, 0.0);
+  }
+  plan_T_sole_[i] = correction_.odom_T_plan(plan_T_base_).inverse() * odom_T_sole;
+}
+
 void Gait::touch_down(const StateEstimate& state) noexcept {
   const std::size_t i = index_of(decision_.goal.foot);
-  status_.step.touch_down_stamp_ns = state.stamp_ns;
+  status_.step.touch_down_stamp_ns = now_ns_;
   status_.step.odom_T_executed =
       usable(state) ? state.odom_T_sole[i] : correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
   status_.stands[i] = true;
@@ -187,24 +236,25 @@ void Gait::touch_down(const StateEstimate& state) noexcept {
   begin_hold();
 }
 
-void Gait::tick(const StateEstimate& state, const FootholdSet& footholds, const JointFeedback& feedback,
-                JointCommand& command) noexcept {
+void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
+                const JointFeedback& feedback, JointCommand& command) noexcept {
   command = {};
-  command.stamp_ns = state.stamp_ns;
-  status_.stamp_ns = state.stamp_ns;
-  if (!armed_) {
-    // Without one good reading the drives get no stiffness: there is nothing safe to ask of them.
-    if (!math::all_finite(feedback.q_rad)) return;
-    joints_.reset(params_.geometry, params_.joints, feedback.q_rad);
-    armed_ = true;
-  }
+  now_ns_ = now_ns;
+  command.stamp_ns = now_ns;
+  status_.stamp_ns = now_ns;
+  // Without one good reading the drives get no stiffness: there is nothing safe to ask of them.
+  if (!armed_) armed_ = joints_.try_arm(params_.geometry, params_.joints, feedback.q_rad);
+  if (!armed_) return;
   if (!started_) {
     joints_.hold(command);
     if (state.initialised && usable(state)) start(state);
     return;
   }
 
-  torso_state_ = torso_.at(tick_);
+  torso_state_ = torso_.at(motion_tick());
+  if (activity_ == Activity::kRetreat) {
+    for (Motion& axis : torso_state_) axis.speed = -axis.speed;
+  }
   plan_T_base_ = TorsoTrajectory::pose(torso_state_);
   if (usable(state)) {
     correction_.update(state.odom_T_base, plan_T_base_, kTick_s / (kTick_s + params_.correction_time_s));
@@ -219,14 +269,16 @@ void Gait::tick(const StateEstimate& state, const FootholdSet& footholds, const 
     case Activity::kSwing:
       swing(state, feedback);
       break;
+    case Activity::kRetreat:
+      retreat(feedback);
+      break;
     case Activity::kEnd:
       break;
   }
-  ++tick_;
+  tick_ = std::min(tick_ + 1, kTickLimit);
 
   if (joints_.follow(plan_T_base_, plan_T_sole_, command)) ++status_.ik_limited_ticks;
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
-  status_.odom_T_base_desired = odom_T_plan * plan_T_base_;
   for (std::size_t i = 0; i < kFootCount; ++i) status_.odom_T_sole_desired[i] = odom_T_plan * plan_T_sole_[i];
 }
 

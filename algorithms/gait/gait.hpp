@@ -27,21 +27,27 @@ class Gait {
     double correction_time_s = 0.06;  // low-pass of the base's difference to the plan
     double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
     double absorb_rad = 0.035;
-    std::int32_t reshift_ticks = 125;  // a weight shift for a target that changed more
-    std::int32_t max_reshifts = 8;
-    std::int32_t start_patience_ticks = 1500;  // nothing to climb, before the first step
-    std::int32_t patience_ticks = 500;         // an obstruction persists, or the top: 1 s
+    std::int32_t reshift_ticks = 125;          // another weight shift over the same foot for a target that changed more
+    std::int32_t max_shifts = 9;               // for one swing
+    std::int32_t start_patience_ticks = 1500;  // the same obstruction without a break, before the first step
+    std::int32_t patience_ticks = 500;         // and later, or the top: 1 s
+    std::int32_t unsteady_patience = 3;        // as many times longer for obstructions that change
     std::int32_t settle_ticks = 300;           // to the middle between the feet when there is nothing to do
     double touch_force_n = 15.0;
-    double early_m = 0.005;  // contact this far above the target counts as early
-    double late_m = 0.005;   // and this far below as late
-    double max_lowering_m = 0.04;
+    double early_m = 0.005;                     // contact this far above the target counts as early
+    double late_m = 0.005;                      // and this far below as late
+    double max_lowering_m = 0.04;               // no ground found: the foot goes back
+    std::int32_t retreat_pause_ticks = 50;      // before it does
+    double put_back_m = 0.01;                   // about where it stood: weight counts as the ground; below, it is there
+    std::int64_t steer_age_ns = 20 * kNsPerMs;  // of IMU and joint samples: older ones steer nothing and start nothing
+    std::int64_t stop_age_ns = 100 * kNsPerMs;  // of the same on two feet: then the gait stops
   };
 
   void reset(const Params& params) noexcept;
   // One 500 Hz tick: state machine, trajectories, leg kinematics, joint command. footholds: the newest finished search.
-  void tick(const StateEstimate& state, const FootholdSet& footholds, const JointFeedback& feedback,
-            JointCommand& command) noexcept;
+  // Without fresh samples a swing is finished as it was planned; then the gait stops on two feet.
+  void tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
+            const JointFeedback& feedback, JointCommand& command) noexcept;
   [[nodiscard]] const GaitStatus& status() const noexcept { return status_; }
   // Finishes the committed step, then holds in double support.
   void request_stop() noexcept { stop_requested_ = true; }
@@ -51,26 +57,33 @@ class Gait {
     kHold,   // both feet stand and nothing is planned: settle between the feet, look for a step
     kShift,  // weight moves over the stance foot
     kSwing,
-    kEnd,  // finished or stopped
+    kRetreat,  // the swing backwards
+    kEnd,      // finished or stopped
   };
 
   void start(const StateEstimate& state) noexcept;
   void hold(const StateEstimate& state, const FootholdSet& footholds) noexcept;
   void shift(const StateEstimate& state, const FootholdSet& footholds) noexcept;
   void swing(const StateEstimate& state, const JointFeedback& feedback) noexcept;
+  void retreat(const JointFeedback& feedback) noexcept;
 
   void begin_hold() noexcept;
-  void begin_shift(const ClimbPlanner::Decision& decision, std::int32_t shift_ticks) noexcept;
+  void begin_shift(const ClimbPlanner::Decision& decision, bool again) noexcept;
   void lift_off(const StateEstimate& state, const FootholdSet& footholds,
                 const ClimbPlanner::Decision& decision) noexcept;
   void touch_down(const StateEstimate& state) noexcept;
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
+  // Of swing and torso: backwards in a retreat.
+  [[nodiscard]] std::int32_t motion_tick() const noexcept;
   void carry_plan_to_odometry() noexcept;
   void settle_between_feet() noexcept;
+  [[nodiscard]] bool usable(const StateEstimate& state) const noexcept;
+  [[nodiscard]] bool lost(const StateEstimate& state) const noexcept;
   [[nodiscard]] ClimbPlanner::Situation situation(const StateEstimate& state) const noexcept;
   [[nodiscard]] bool close_to_planned(const StepGoal& goal) const noexcept;
 
   Params params_;
+  std::int64_t now_ns_ = 0;
   ClimbPlanner planner_;
   JointReference joints_;
   StepSearch search_;
@@ -83,10 +96,13 @@ class Gait {
   ClimbPlanner::Decision decision_;
   GaitStatus status_;
   Activity activity_ = Activity::kHold;
-  std::int32_t tick_ = 0;        // of the activity
-  std::int32_t wait_ticks_ = 0;  // since there was last a step to do
+  std::int32_t tick_ = 0;       // of the activity, saturates
+  std::int32_t turn_tick_ = 0;  // of the swing, when the retreat began
   std::int32_t shift_ticks_ = 0;
-  std::int32_t reshifts_ = 0;
+  std::int32_t shifts_ = 0;  // since the last swing
+  Obstruction waiting_for_ = Obstruction::kNone;
+  std::int32_t wait_ticks_ = 0;  // for that reason, without a break
+  std::int32_t idle_ticks_ = 0;  // without a step to do since the last swing
   bool armed_ = false;
   bool started_ = false;
   bool unloaded_ = false;  // the swing foot was felt to leave the ground

@@ -7,11 +7,19 @@
 
 namespace polygmap {
 
-void JointReference::reset(const LegGeometry& geometry, const Params& params, const JointVector& q_rad) noexcept {
+bool JointReference::try_arm(const LegGeometry& geometry, const Params& params, const JointVector& q_rad) noexcept {
+  JointVector inside_rad;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const auto i = static_cast<Eigen::Index>(n);
+    const JointLimits limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg);
+    inside_rad[i] = math::clamp(q_rad[i], limits.min_rad, limits.max_rad);
+    if (!(std::abs(q_rad[i] - inside_rad[i]) <= kEncoderOffset_rad)) return false;
+  }
   geometry_ = geometry;
   params_ = params;
-  reference_rad_ = q_rad;
-  commanded_rad_ = q_rad;
+  reference_rad_ = inside_rad;
+  commanded_rad_ = inside_rad;
+  return true;
 }
 
 bool JointReference::follow(const Transform& odom_T_base, const std::array<Transform, kFootCount>& odom_T_sole,
@@ -21,17 +29,18 @@ bool JointReference::follow(const Transform& odom_T_base, const std::array<Trans
   const Transform base_T_odom = odom_T_base.inverse();
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const LegSolution solution = solve_leg(geometry_, leg, base_T_odom * odom_T_sole[index_of(leg)]);
-    limited = limited || !solution.reachable || !math::all_finite(solution.q_rad);
+    const bool solved = math::all_finite(solution.q_rad);
+    limited = limited || !solution.reachable || !solved;
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       const JointLimits limits = joint_limits(leg, j);
       const std::size_t n = joint_index(leg, j);
       const auto i = static_cast<Eigen::Index>(n);
       const double before_rad = reference_rad_[i];
       const double step_rad = limits.speed_radps * kTick_s;
-      const double asked_rad = solution.q_rad[static_cast<Eigen::Index>(j)];
+      const double asked_rad = solved ? solution.q_rad[static_cast<Eigen::Index>(j)] : before_rad;
       const double q_rad = math::clamp(math::clamp(asked_rad, before_rad - step_rad, before_rad + step_rad),
                                        limits.min_rad, limits.max_rad);
-      if (!(std::abs(q_rad - asked_rad) <= kRounding_rad)) limited = true;
+      if (std::abs(q_rad - asked_rad) > kRounding_rad) limited = true;
       const double dq_radps = (q_rad - before_rad) / kTick_s;
       reference_rad_[i] = q_rad;
       // The lead may change faster than the reference, never faster than the drive.

@@ -10,14 +10,18 @@ namespace polygmap {
 
 class JointReference {
  public:
+  static constexpr double kEncoderOffset_rad = 0.02;
   struct Params {
     double drive_delay_s = 0.013;  // by the data sheet: 10 ms first-order lag, 2 ms on the bus, half a tick of hold
     std::array<double, kJointsPerLeg> kp_nmprad{220, 100, 224, 224, 58, 58};
     std::array<double, kJointsPerLeg> kd_nmsprad{8, 4, 8, 8, 2, 2};
   };
 
-  void reset(const LegGeometry& geometry, const Params& params, const JointVector& q_rad) noexcept;
-  // True when a leg could not do what was asked: out of reach, range or speed. The command never leaves the limits.
+  // Starts from measured angles, moved into the joints' ranges. False, and nothing changes, when one is not finite or
+  // further outside than an encoder may be off.
+  [[nodiscard]] bool try_arm(const LegGeometry& geometry, const Params& params, const JointVector& q_rad) noexcept;
+  // True when a leg could not do what was asked: out of reach, range or speed, or not a number, upon which the leg
+  // stays. The command never leaves the limits.
   bool follow(const Transform& odom_T_base, const std::array<Transform, kFootCount>& odom_T_sole,
               JointCommand& command) noexcept;
   // Repeats the last joint angles, at rest.

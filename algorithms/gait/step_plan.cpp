@@ -107,20 +107,14 @@ bool StepProof::advance(std::int32_t count) noexcept {
   return true;
 }
 
-StepCheck check_step(const LegGeometry& geometry, const StepParams& params, const StepKnots& knots) noexcept {
-  StepProof proof;
-  proof.begin(geometry, params, knots);
-  static_cast<void>(proof.advance(knots.count()));
-  return proof.check();
-}
-
 void StepSearch::begin(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal,
-                       const StepGoal& trailing, const TorsoTrajectory::State& from,
+                       const StepGoal& trailing, std::int32_t shift_ticks, const TorsoTrajectory::State& from,
                        const std::array<Transform, kFootCount>& soles) noexcept {
   geometry_ = geometry;
   params_ = params;
   goal_ = goal;
   trailing_ = trailing;
+  shift_ticks_ = shift_ticks;
   from_ = from;
   soles_ = soles;
   shape_ = 0;
@@ -138,6 +132,7 @@ void StepSearch::try_candidate() noexcept {
     from = TorsoTrajectory::at_rest({rotation_z(plan_.touch_down.yaw_rad), plan_.touch_down.position_m});
   }
   candidate_ = plan_step(geometry_, params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, kToeDown_rad[shape_]);
+  if (!leading_found_) candidate_.shift_ticks = shift_ticks_;
   proof_.begin(geometry_, params_, StepKnots(candidate_, from, soles, params_.knot_ticks));
 }
 

@@ -109,8 +109,6 @@ class StepProof {
   std::array<LegVector, kFootCount> previous_;
   std::int32_t next_ = 0;
 };
-[[nodiscard]] StepCheck check_step(const LegGeometry& geometry, const StepParams& params,
-                                   const StepKnots& knots) noexcept;
 
 // Looks for a shape of a step that both legs can do, kKnotsPerCall knots per call. A leading step is only offered when
 // the trailing step after it is possible too.
@@ -119,9 +117,11 @@ class StepSearch {
   enum class State : std::uint8_t { kSearching, kFound, kImpossible };
   static constexpr std::int32_t kKnotsPerCall = 8;
 
-  // trailing: the goal of the step after a leading one; ignored otherwise.
+  // trailing: the goal of the step after a leading one; ignored otherwise. shift_ticks: of the shift before the goal's
+  // swing, as it will be done.
   void begin(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal, const StepGoal& trailing,
-             const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept;
+             std::int32_t shift_ticks, const TorsoTrajectory::State& from,
+             const std::array<Transform, kFootCount>& soles) noexcept;
   State step() noexcept;
   [[nodiscard]] State state() const noexcept { return state_; }
   [[nodiscard]] const StepPlan& plan() const noexcept { return plan_; }
@@ -138,6 +138,7 @@ class StepSearch {
   StepPlan plan_;       // the offered one, of goal_
   StepPlan candidate_;  // under proof
   StepProof proof_;
+  std::int32_t shift_ticks_ = 1;
   std::size_t shape_ = 0;
   bool leading_found_ = false;
   State state_ = State::kImpossible;

@@ -23,6 +23,7 @@ void Swing::plan(const Transform& start, const SolePose& target, const SwingShap
 }
 
 double Swing::height_m(std::int32_t tick) const noexcept {
+  if (tick < 0) return start_m_.z() + tick * kTick_s * shape_.approach_mps;
   const double u = static_cast<double>(tick) / duration_ticks_;
   if (u <= shape_.landing_begin) {
     return start_m_.z() + (apex_m_ - start_m_.z()) * smooth_window(u, 0.0, shape_.lift_end);

@@ -31,7 +31,8 @@ class Swing {
   // start may be tilted a little; target is flat. duration_ticks: until the target height is reached.
   void plan(const Transform& start, const SolePose& target, const SwingShape& shape,
             std::int32_t duration_ticks) noexcept;
-  // Pose of the sole. After duration_ticks the foot goes on downwards at approach_mps: the caller ends it.
+  // Pose of the sole. After duration_ticks, and before 0 on the way back, the foot goes on downwards at approach_mps:
+  // the caller ends it.
   [[nodiscard]] Transform at(std::int32_t tick) const noexcept;
   [[nodiscard]] std::int32_t duration_ticks() const noexcept { return duration_ticks_; }
   // How far below the target it has been lowered, m; negative before the end.

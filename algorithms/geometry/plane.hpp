@@ -19,9 +19,6 @@ struct Plane {
   }
 };
 
-[[nodiscard]] inline Plane plane_through(const Vec3& point_m, const Vec3& normal) noexcept {
-  return {normal, -normal.dot(point_m)};
-}
 [[nodiscard]] inline Plane operator*(const Transform& a_T_b, const Plane& plane) noexcept {
   const Vec3 normal = a_T_b.R * plane.normal;
   return {normal, plane.d_m - normal.dot(a_T_b.p_m)};

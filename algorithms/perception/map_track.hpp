@@ -61,7 +61,6 @@ struct MapTrack {
   Transform world_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up
   double offset_information = 0.0;
   double tilt_information = 0.0;
-  double pose_variance_m2 = 0.0;
   double rmse_m = 0.0;
   double invalid_fraction = 0.0;
   std::array<TrackedSide, kMapSides> sides{};

@@ -330,7 +330,6 @@ void PolygonMap::create() noexcept {
   track.world_T_local = {frame_from(normal, x_hint), seen_.centroid_m};
   track.offset_information = 1.0 / seen_.offset_variance_m2;
   track.tilt_information = 1.0 / seen_.tilt_variance_rad2;
-  track.pose_variance_m2 = seen_.pose_variance_m2;
   track.rmse_m = seen_.rmse_m;
   track.invalid_fraction = seen_.invalid_fraction;
   seen_local_ = local_polygon(track);
@@ -366,7 +365,6 @@ void PolygonMap::fuse(MapTrack& track) noexcept {
   if (track.last_seen_ns != newest_ns_) ++track.sightings;
   track.last_seen_ns = newest_ns_;
   track.misses = 0;
-  track.pose_variance_m2 = seen_.pose_variance_m2;
   track.rmse_m += 0.1 * (seen_.rmse_m - track.rmse_m);
   track.invalid_fraction = seen_.invalid_fraction;
 
@@ -655,8 +653,9 @@ void PolygonMap::write(const MapTrack& track, MapPolygon& out) const noexcept {
   out.last_seen_ns = track.last_seen_ns;
 }
 
+// Against the robot, which stands where its map has it: the error of the pose is theirs in common.
 void PolygonMap::write_sigmas(const MapTrack& track, SurfacePatch& out) const noexcept {
-  const double common = track.pose_variance_m2 + math::square(params_.systematic_sigma_m);
+  const double common = math::square(params_.systematic_sigma_m);
   const auto sigma = [&](double variance, std::int64_t seen_ns) {
     return math::sqrt(variance + common + math::square(params_.drift_m_per_sqrt_s) * seconds(newest_ns_ - seen_ns));
   };

@@ -79,7 +79,7 @@ class PolygonMap {
 
   // Copies the frame. A frame that is invalid or not newer is counted and leaves nothing to do.
   void begin(const SurfaceFrame& frame, const View& view) noexcept;
-  // A unit is one comparison of a seen with a remembered surface (about 0.3 us); the largest piece is 24 units.
+  // A unit is one comparison of a seen with a remembered surface; the largest piece is 24 units.
   Progress step(WorkBudget& budget) noexcept;
   // Changes only in the step that returns kDone. The stamp moves on only with a frame in which something was seen.
   [[nodiscard]] const MapSnapshot& snapshot() const noexcept { return snapshot_; }

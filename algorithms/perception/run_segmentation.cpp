@@ -30,7 +30,7 @@ struct Single {
   static bool both(bool a, bool b) noexcept { return a && b; }
   static bool either(bool a, bool b) noexcept { return a || b; }
   static bool no(bool a) noexcept { return !a; }
-  static V root(V a) noexcept { return std::sqrt(a); }
+  static V root(V a) noexcept { return math::sqrt(a); }
   static V magnitude(V a) noexcept { return std::abs(a); }
 };
 static_assert(kColumns % Wide::kCount == 0);

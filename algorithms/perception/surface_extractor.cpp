@@ -135,12 +135,14 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
           growing_.begin(params_.growing, params_.noise, column_rays_, runs_.columns());
           enter(Phase::kGrow);
         }
+        return kMaxPieceUnits;
       }
       return 1;
     case Phase::kGrow:
       if (growing_.step()) {
         take_grown_planes();
         enter(Phase::kMeet);
+        return kMaxPieceUnits;
       }
       return 1;
     case Phase::kMeet:
@@ -161,16 +163,23 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
         if (round_ == 0) merge_planes();
         enter(round_ == 0 ? Phase::kMeet : Phase::kPieces);
         ++round_;
+        return kMaxPieceUnits;
       }
       return 2;
     case Phase::kPieces:
       counters_.run_overflow += boundaries_.overflow();
       find_pieces();
       join_pieces();
-      profile();
-      enter(Phase::kOutline);
-      index_ = 1;
+      begin_profile();
+      enter(Phase::kProfile);
       return kMaxPieceUnits;
+    case Phase::kProfile:
+      profile(row_);
+      if (++row_ == column_rays_.columns) {
+        enter(Phase::kOutline);
+        index_ = 1;
+      }
+      return 1;
     case Phase::kOutline:
       if (index_ > plane_count_) {
         enter(Phase::kFinish);
@@ -289,13 +298,13 @@ void SurfaceExtractor::find_pieces() noexcept {
   };
   std::uint16_t count = 0;
   for (std::int32_t g = 0; g < column_rays_.columns; ++g) {
-    for (ColumnSpan& interval : columns[static_cast<std::size_t>(g)]) {
-      interval.piece = ++count;
+    for (ColumnSpan& span : columns[static_cast<std::size_t>(g)]) {
+      span.piece = ++count;
       parent_[count] = count;
       if (g == 0) continue;
       for (const ColumnSpan& left : columns[static_cast<std::size_t>(g - 1)]) {
-        if (left.plane != interval.plane || left.bottom < interval.top || left.top > interval.bottom) continue;
-        const std::uint16_t a = root(left.piece), b = root(interval.piece);
+        if (left.plane != span.plane || left.bottom < span.top || left.top > span.bottom) continue;
+        const std::uint16_t a = root(left.piece), b = root(span.piece);
         parent_[std::max(a, b)] = std::min(a, b);
       }
     }
@@ -316,15 +325,15 @@ void SurfaceExtractor::find_pieces() noexcept {
     parent_[i] = static_cast<std::uint16_t>(piece_count_);
   }
   for (std::int32_t g = 0; g < column_rays_.columns; ++g) {
-    for (ColumnSpan& interval : columns[static_cast<std::size_t>(g)]) {
-      interval.piece = parent_[interval.piece];
-      if (interval.piece == 0) continue;
-      Piece& piece = pieces_[interval.piece];
-      const double area_px = kColumn_px * (interval.bottom - interval.top + 1);
-      piece.plane = interval.plane;
+    for (ColumnSpan& span : columns[static_cast<std::size_t>(g)]) {
+      span.piece = parent_[span.piece];
+      if (span.piece == 0) continue;
+      Piece& piece = pieces_[span.piece];
+      const double area_px = kColumn_px * (span.bottom - span.top + 1);
+      piece.plane = span.plane;
       piece.area_px += area_px;
       piece.sum_column += area_px * (2.0 * g + 0.5);
-      piece.sum_row += area_px * 0.25 * (interval.top + interval.bottom);
+      piece.sum_row += area_px * 0.25 * (span.top + span.bottom);
     }
   }
 }
@@ -427,31 +436,32 @@ bool SurfaceExtractor::shows(std::int32_t half_column, const ColumnSpan& span) c
   return 2 * on > all;
 }
 
-// Whose each column's rows are, and where each surface begins and ends in every column.
-void SurfaceExtractor::profile() noexcept {
+void SurfaceExtractor::begin_profile() noexcept {
   owner_.fill(0);
   for (std::size_t p = 1; p <= plane_count_; ++p) profiles_[p] = SurfaceProfile{};
-  for (std::int32_t g = 0; g < column_rays_.columns; ++g) {
-    for (const ColumnSpan& interval : boundaries_.columns()[static_cast<std::size_t>(g)]) {
-      const std::uint8_t plane = interval.piece == 0 ? std::uint8_t{0} : pieces_[interval.piece].plane;
-      if (plane == 0 || !planes_[plane].alive) continue;
-      for (std::int32_t r = interval.top; r <= interval.bottom; ++r) owner_(g, r) = plane;
-      const bool left_end = !continues(g - 1, interval), right_end = !continues(g + 1, interval);
-      // A column is four pixels wide: at a surface's side the pixels themselves say how far it goes.
-      std::int32_t first = 2 * g, last = 2 * g + 1;
-      if (left_end) {
-        while (first < last && !shows(first, interval)) ++first;
-        while (first <= 2 * g && first > 2 * g - 2 && shows(first - 1, interval)) --first;
-      }
-      if (right_end) {
-        while (last > first && !shows(last, interval)) --last;
-        while (last > 2 * g && last < 2 * g + 3 && shows(last + 1, interval)) ++last;
-      }
-      SurfaceProfile& profile = profiles_[plane];
-      profile.columns[static_cast<std::size_t>(g)].add(interval.top, interval.bottom);
-      profile.left = std::min(profile.left, first);
-      profile.right = std::max(profile.right, last);
+}
+
+// Whose a column's rows are, and where each surface begins and ends in it.
+void SurfaceExtractor::profile(std::int32_t g) noexcept {
+  for (const ColumnSpan& span : boundaries_.columns()[static_cast<std::size_t>(g)]) {
+    const std::uint8_t plane = span.piece == 0 ? std::uint8_t{0} : pieces_[span.piece].plane;
+    if (plane == 0 || !planes_[plane].alive) continue;
+    for (std::int32_t r = span.top; r <= span.bottom; ++r) owner_(g, r) = plane;
+    const bool left_end = !continues(g - 1, span), right_end = !continues(g + 1, span);
+    // A column is four pixels wide: at a surface's side the pixels themselves say how far it goes.
+    std::int32_t first = 2 * g, last = 2 * g + 1;
+    if (left_end) {
+      while (first < last && !shows(first, span)) ++first;
+      while (first <= 2 * g && first > 2 * g - 2 && shows(first - 1, span)) --first;
     }
+    if (right_end) {
+      while (last > first && !shows(last, span)) --last;
+      while (last > 2 * g && last < 2 * g + 3 && shows(last + 1, span)) ++last;
+    }
+    SurfaceProfile& profile = profiles_[plane];
+    profile.columns[static_cast<std::size_t>(g)].add(span.top, span.bottom);
+    profile.left = std::min(profile.left, first);
+    profile.right = std::max(profile.right, last);
   }
 }
 

@@ -64,10 +64,11 @@ class SurfaceExtractor {
     std::uint32_t rejected_lines = 0;  // nosings and back lines that were looked for and not good enough
   };
 
-  // One unit is a row of 160 columns through reduction and segmentation, or as much work. No piece is larger than
-  // kMaxPieceUnits.
+  // One unit is a row of 160 columns through reduction and segmentation, or as much work (its cost:
+  // firmware/schedule.hpp). A staircase takes about 2,600; with every capacity full a frame takes at most
+  // kMaxUnitsPerFrame. No piece is larger than kMaxPieceUnits.
   static constexpr std::int32_t kMaxPieceUnits = 40;
-  static constexpr std::int32_t kMaxUnitsPerFrame = 60000;
+  static constexpr std::int32_t kMaxUnitsPerFrame = 12000;
 
   SurfaceExtractor() noexcept = default;
   explicit SurfaceExtractor(const Params& params) noexcept : params_(params) {}
@@ -100,6 +101,7 @@ class SurfaceExtractor {
     kMeet,
     kRefit,
     kPieces,
+    kProfile,
     kOutline,
     kNosing,
     kBack,
@@ -143,7 +145,8 @@ class SurfaceExtractor {
   [[nodiscard]] bool apart(const Piece& a, const Piece& b, const InversePlane& plane) const noexcept;
   [[nodiscard]] bool continues(std::int32_t column, const ColumnSpan& span) const noexcept;
   [[nodiscard]] bool shows(std::int32_t half_column, const ColumnSpan& span) const noexcept;
-  void profile() noexcept;
+  void begin_profile() noexcept;
+  void profile(std::int32_t column) noexcept;
   void outline() noexcept;
   [[nodiscard]] bool begin_line(bool nosing) noexcept;
   std::int32_t line_step(bool nosing) noexcept;

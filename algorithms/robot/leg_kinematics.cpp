@@ -83,7 +83,6 @@ LegSolution solve_leg(const LegGeometry& g, Foot leg, const Transform& base_T_so
   const double bend = math::atan2(g.shank_m * math::sin(q[kKnee]), g.thigh_m + g.shank_m * math::cos(q[kKnee]));
   q[kHipPitch] = math::atan2(-leg_vector.x(), -leg_vector.z()) - bend;
   q[kAnklePitch] = math::wrap_angle(pitch_sum - q[kHipPitch] - q[kKnee]);
-  solution.within_limits = limit_margin_rad(leg, q) >= 0.0;
   return solution;
 }
 

@@ -24,11 +24,11 @@ struct LegPoints {
 
 struct LegSolution {
   LegVector q_rad = LegVector::Zero();
-  bool reachable = false;      // false: the leg is too short or too folded; q is the nearest pose in that direction
-  bool within_limits = false;  // of the joints; q is not clamped
+  bool reachable = false;  // false: the leg is too short or too folded; q is the nearest pose in that direction
 };
-// Joint angles that put the sole at base_T_sole. Knee bent forward. Source: own derivation; the roll and yaw axes meet
-// and the three pitch axes are parallel, so the ankle roll follows from the hip's place in the foot frame.
+// Joint angles that put the sole at base_T_sole, not clamped to the joints' ranges. Knee bent forward. Source: own
+// derivation; the roll and yaw axes meet and the three pitch axes are parallel, so the ankle roll follows from the
+// hip's place in the foot frame.
 [[nodiscard]] LegSolution solve_leg(const LegGeometry& geometry, Foot leg, const Transform& base_T_sole) noexcept;
 
 // Least margin of q to the joint limits of that leg, rad; negative outside.

@@ -72,7 +72,6 @@ inline constexpr double kCollisionHeight_m = 0.07;                              
           Vec3{r.heel_x_m, -r.half_width_m, 0}};
 }
 
-inline constexpr double kHipSpacing_m = 0.086;        // hip pitch axes from the middle plane
 inline constexpr double kNominalBaseHeight_m = 0.79;  // base above the soles, standing
 inline constexpr double kStanceHalfWidth_m = 0.1;     // soles from the middle plane (eq. 31: y_b)
 

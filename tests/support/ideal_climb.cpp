@@ -56,7 +56,7 @@ double IdealClimb::noise() {  // about normal, sigma 1
 
 void IdealClimb::sense() {
   const std::int64_t now_ns = record_.ticks * 2 * kNsPerMs;
-  state_.stamp_ns = now_ns;
+  state_.stamp_ns = state_.oldest_input_ns = now_ns;
   state_.initialised = record_.ticks > 250;
   const Mat3 tilt = rotation_y(setup_.estimate_tilt_rad) * rotation_x(setup_.estimate_tilt_rad);
   state_.odom_T_base = odom_T_true_ * true_T_base_;
@@ -122,12 +122,8 @@ FootholdSet IdealClimb::search() const {
     hold.last_seen_ns = set.map_stamp_ns;
   }
   set.p_star = set.p_star_feet[0];
-  set.tread.polygon_id = set.p_star.polygon_id;
   set.tread.nosing_a_m = world_T_true * Vec3{x_m, stairs.half_width_m, z_m};
   set.tread.nosing_b_m = world_T_true * Vec3{x_m, -stairs.half_width_m, z_m};
-  set.tread.yaw_rad = set.p_star.yaw_rad;
-  set.tread.height_m = set.tread.nosing_a_m.z();
-  set.tread.depth_m = depth_m;
   set.measured_rise_m = z_m - stance_m;
   return set;
 }
@@ -251,7 +247,7 @@ bool IdealClimb::tick() {
   JointFeedback feedback = feedback_;
   if (tamper) tamper(state, footholds, feedback);
   const GaitStatus before = gait_.status();
-  gait_.tick(state, footholds, feedback, command_);
+  gait_.tick(state_.stamp_ns, state, footholds, feedback, command_);
   measure(before);
   move();
   ++record_.ticks;
