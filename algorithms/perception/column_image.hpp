@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// The picture as columns of four pixels' width, at full resolution downwards: the means of the valid inverse depths.
+// Stairs change from row to row and hardly within four pixels of a row; the mean halves white noise.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/perception/depth_reduction.hpp"
+#include "algorithms/perception/images.hpp"
+
+namespace polygmap {
+
+inline constexpr std::int32_t kColumn_px = 4;
+inline constexpr std::int32_t kColumns = kDepthWidth_px / kColumn_px;
+
+struct ColumnImage {
+  Raster<float, kColumns, kDepthHeight_px> inverse_depth;  // 1/m, 0 = nothing measured, or the robot's own body
+  Raster<std::uint8_t, kColumns, kDepthHeight_px> valid;   // of the column's four pixels
+};
+
+// Rays through the columns' middles and through rows of the full picture.
+struct ColumnRays {
+  std::array<float, kColumns> x{};
+  std::array<float, kDepthHeight_px> y{};
+  std::int32_t columns = 0;
+  std::int32_t height_px = 0;
+
+  void set(const CameraIntrinsics& k) noexcept {
+    columns = k.width_px / kColumn_px;
+    height_px = k.height_px;
+    for (std::int32_t g = 0; g < columns; ++g) {
+      x[static_cast<std::size_t>(g)] =
+          static_cast<float>((kColumn_px * g + 0.5 * (kColumn_px - 1) - k.cx_px) / k.fx_px);
+    }
+    for (std::int32_t r = 0; r < height_px; ++r) {
+      y[static_cast<std::size_t>(r)] = static_cast<float>((r - k.cy_px) / k.fy_px);
+    }
+  }
+};
+
+// Pixels outside [min_raw, max_raw] count as not measured.
+struct RawRange {
+  std::uint16_t min = 1;
+  std::uint16_t max = 65534;
+  float per_metre = 1000.0F;  // raw units in a metre
+};
+
+// One row of raw depth to one row of columns. body: half-resolution flags of that row, or null.
+void reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body, std::int32_t columns,
+                       float* inverse_depth, std::uint8_t* valid) noexcept;
+
+}  // namespace polygmap

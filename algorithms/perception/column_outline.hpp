@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// The convex outline of a surface from where it begins and ends in each column of the picture.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/perception/column_image.hpp"
+#include "algorithms/perception/contour.hpp"
+
+namespace polygmap {
+
+struct ColumnEnds {
+  std::int16_t top = -1;  // full-resolution rows, inclusive; -1 = the surface is not in this column
+  std::int16_t bottom = -1;
+  [[nodiscard]] bool empty() const noexcept { return top < 0; }
+  void add(std::int16_t first, std::int16_t last) noexcept {
+    top = empty() || first < top ? first : top;
+    bottom = last > bottom ? last : bottom;
+  }
+};
+
+struct SurfaceProfile {
+  std::array<ColumnEnds, kColumns> columns{};
+  // Half-resolution columns of the surface's sides, finer than the columns above.
+  std::int32_t left = kHalfWidth_px;
+  std::int32_t right = -1;
+};
+
+class ColumnOutline {
+ public:
+  // Corner points in half-resolution pixel coordinates (x right, y down), right-hand turns in the picture (clockwise as
+  // seen), at most max_vertices: the corners that cost least area go first.
+  void build(const SurfaceProfile& profile, std::size_t max_vertices, Outline2& outline) noexcept;
+
+ private:
+  std::array<Vec2, 2 * (kColumns + 2)> chain_{};
+};
+
+}  // namespace polygmap

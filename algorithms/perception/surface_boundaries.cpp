@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/surface_boundaries.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+namespace {
+
+constexpr float kTruncation = 9.0F;  // of a cost: an outlier says no more than three sigmas do
+
+}  // namespace
+
+void SurfaceBoundaries::begin(const Params& params, const DepthSigma& noise, const ColumnRays& rays, double fy_px,
+                              double cy_px, const ColumnImage& image) noexcept {
+  params_ = params;
+  rays_ = &rays;
+  image_ = &image;
+  fy_px_ = fy_px;
+  cy_px_ = cy_px;
+  base_ = static_cast<float>(noise.base_m);
+  per_metre_ = static_cast<float>(noise.per_metre);
+  share_[0] = 1.0F;
+  for (std::size_t n = 1; n < share_.size(); ++n) {
+    share_[n] = static_cast<float>(params.correlated_share + (1.0 - params.correlated_share) / static_cast<double>(n));
+  }
+  for (Plane& plane : planes_) plane = Plane{};
+  overflow_ = 0;
+}
+
+SurfaceBoundaries::Line SurfaceBoundaries::line_of(const InversePlane& plane, std::int32_t column) const noexcept {
+  const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(column)]);
+  return {static_cast<float>(plane.m.x() * x + plane.m.z()), static_cast<float>(plane.m.y()),
+          static_cast<float>(plane.m.norm())};
+}
+
+float SurfaceBoundaries::cost(const Line& line, std::int32_t column, std::int32_t row) const noexcept {
+  const float w = image_->inverse_depth(column, row);
+  const float residual = w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)]);
+  const float sigma = (base_ * w + per_metre_) * line.norm;
+  return residual * residual / (sigma * sigma * share_[image_->valid(column, row)]);
+}
+
+void SurfaceBoundaries::gather(std::int32_t column, const RunSegmentation::Column& runs,
+                               const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept {
+  constexpr int kElsewhere = 3;
+  Column& out = columns_[static_cast<std::size_t>(column)];
+  out.clear();
+  for (const Run& run : runs) {
+    const std::uint8_t plane = run.plane <= kMaxPlanes ? to_plane[run.plane] : std::uint8_t{0};
+    if (plane == 0) continue;
+    if (!out.empty() && out.back().plane == plane) {
+      const Line line = line_of(planes_[plane].plane, column);
+      int other = 0, own = 0;
+      for (std::int32_t r = out.back().bottom + 1; r < run.top; ++r) {
+        const float w = image_->inverse_depth(column, r);
+        if (!(w > 0.0F)) continue;
+        const float off = std::abs(w - (line.a + line.b * rays_->y[static_cast<std::size_t>(r)]));
+        const float limit = (static_cast<float>(params_.same_gap_sigmas) * (base_ * w + per_metre_) +
+                             static_cast<float>(params_.gap_floor_m) * w) *
+                            line.norm;
+        ++(off > limit ? other : own);
+      }
+      if (other < kElsewhere || 2 * other < own) {
+        out.back().bottom = run.bottom;
+        continue;
+      }
+    }
+    ColumnSpan interval;
+    interval.top = run.top;
+    interval.bottom = run.bottom;
+    interval.plane = plane;
+    if (!out.try_push_back(interval)) ++overflow_;
+  }
+}
+
+void SurfaceBoundaries::begin_meeting() noexcept {
+  joint_count_ = 0;
+  pair_count_ = 0;
+}
+
+std::uint16_t SurfaceBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower) noexcept {
+  for (std::size_t i = 0; i < pair_count_; ++i) {
+    if (pairs_[i].upper == upper && pairs_[i].lower == lower) return static_cast<std::uint16_t>(i);
+  }
+  if (pair_count_ == kMaxPairs) {
+    ++overflow_;
+    return kMaxPairs;
+  }
+  Pair& pair = pairs_[pair_count_];
+  pair.upper = upper;
+  pair.lower = lower;
+  pair.offsets.fill(0);
+  return static_cast<std::uint16_t>(pair_count_++);
+}
+
+// Grows one end while rows without data or two rows off the plane do not stop it.
+void SurfaceBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::int32_t step,
+                               std::int32_t limit) noexcept {
+  constexpr int kMaxEmpty = 3;
+  const Line line = line_of(planes_[interval.plane].plane, column);
+  const auto most = static_cast<float>(math::square(params_.inlier_sigmas));
+  std::int16_t& end = step > 0 ? interval.bottom : interval.top;
+  int empty = 0, off = 0;
+  for (std::int32_t r = end + step; step > 0 ? r <= limit : r >= limit; r += step) {
+    if (image_->valid(column, r) == 0) {
+      if (++empty > kMaxEmpty) return;
+    } else if (cost(line, column, r) < most) {
+      end = static_cast<std::int16_t>(r);
+      empty = off = 0;
+    } else if (++off > 1) {
+      return;
+    }
+  }
+}
+
+// Rows first .. last belong to either; the last row of the upper one, first - 1 when all are the lower one's.
+std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& upper, const Line& lower,
+                                             std::int32_t first, std::int32_t last) const noexcept {
+  float sum = 0.0F, best = 0.0F;
+  std::int32_t at = first - 1;
+  for (std::int32_t r = first; r <= last; ++r) {
+    if (image_->valid(column, r) == 0) continue;
+    sum += std::min(cost(upper, column, r), kTruncation) - std::min(cost(lower, column, r), kTruncation);
+    if (sum < best) {
+      best = sum;
+      at = r;
+    }
+  }
+  return at;
+}
+
+void SurfaceBoundaries::meet(std::int32_t column) noexcept {
+  Column& intervals = columns_[static_cast<std::size_t>(column)];
+  for (std::size_t k = 0; k < intervals.size(); ++k) {
+    ColumnSpan& upper = intervals[k];
+    if (k == 0) extend(column, upper, -1, 0);
+    if (k + 1 == intervals.size()) {
+      extend(column, upper, 1, rays_->height_px - 1);
+      break;
+    }
+    ColumnSpan& lower = intervals[k + 1];
+    if (upper.plane == lower.plane || lower.top - upper.bottom > params_.max_gap_px) {
+      extend(column, upper, 1, lower.top - 1);
+      extend(column, lower, -1, upper.bottom + 1);
+      continue;
+    }
+    const Line a = line_of(planes_[upper.plane].plane, column), b = line_of(planes_[lower.plane].plane, column);
+    const double y = static_cast<double>(b.a - a.a) / static_cast<double>(a.b - b.b);
+    const double row = y * fy_px_ + cy_px_;
+    const std::int32_t window = params_.window_px;
+    std::int32_t first = upper.bottom, last = lower.top;
+    const bool meets = row > first - window && row < last + window;  // false for parallel planes, too
+    if (meets) {
+      first = std::min(first, static_cast<std::int32_t>(row));
+      last = std::max(last, static_cast<std::int32_t>(row) + 1);
+    }
+    first = std::max<std::int32_t>(first - window, upper.top);
+    last = std::min<std::int32_t>(last + window, lower.bottom);
+    const std::int32_t own = change_point(column, a, b, first, last);
+    upper.bottom = static_cast<std::int16_t>(std::clamp<std::int32_t>(own, upper.top, lower.bottom - 1));
+    lower.top = static_cast<std::int16_t>(upper.bottom + 1);
+    if (!meets) continue;
+    const std::uint16_t pair = pair_of(upper.plane, lower.plane);
+    if (pair == kMaxPairs || joint_count_ == kMaxJoints) continue;
+    const double bin = (upper.bottom + 0.5 - row) * 2.0 + kBins / 2;
+    ++pairs_[pair].offsets[static_cast<std::size_t>(math::clamp(bin, 0.0, kBins - 1.0))];
+    joints_[joint_count_++] = {pair, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k),
+                               static_cast<float>(row), upper.bottom};
+  }
+}
+
+void SurfaceBoundaries::settle() noexcept {
+  std::array<double, kMaxPairs> shift_px{};
+  for (std::size_t i = 0; i < pair_count_; ++i) {
+    std::int32_t all = 0, below = 0;
+    for (const std::uint16_t n : pairs_[i].offsets) all += n;
+    std::size_t bin = 0;
+    while (2 * (below + pairs_[i].offsets[bin]) < all) below += pairs_[i].offsets[bin++];
+    const double median = (static_cast<double>(bin) + 0.5 - kBins / 2) / 2.0;
+    shift_px[i] = std::abs(median) < params_.meet_px ? 0.0 : median;
+  }
+  for (std::size_t i = 0; i < joint_count_; ++i) {
+    const Joint& joint = joints_[i];
+    Column& intervals = columns_[static_cast<std::size_t>(joint.column)];
+    ColumnSpan &upper = intervals[joint.upper], &lower = intervals[joint.upper + 1U];
+    const double row = std::floor(static_cast<double>(joint.row) + shift_px[joint.pair]);
+    upper.bottom = static_cast<std::int16_t>(math::clamp(row, upper.top, lower.bottom - 1.0));
+    lower.top = static_cast<std::int16_t>(upper.bottom + 1);
+  }
+}
+
+void SurfaceBoundaries::begin_refit() noexcept {
+  for (Plane& plane : planes_) {
+    plane.moments = PlaneMoments{};
+    plane.residual2 = 0.0;
+  }
+}
+
+void SurfaceBoundaries::refit(std::int32_t column) noexcept {
+  constexpr std::int32_t kThick_px = 8;  // thicker surfaces do without the rows next to another
+  const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(column)]);
+  const auto most = static_cast<float>(math::square(params_.inlier_sigmas));
+  for (const ColumnSpan& interval : columns_[static_cast<std::size_t>(column)]) {
+    Plane& plane = planes_[interval.plane];
+    const Line line = line_of(plane.plane, column);
+    const std::int32_t rows = interval.bottom - interval.top + 1, margin = rows > kThick_px ? 1 : 0;
+    // A tall column has rows to spare: neighbours say nearly the same.
+    const std::int32_t stride = rows > 64 ? 3 : (rows > 24 ? 2 : 1);
+    const double d_m = plane.plane.d_m();
+    double n = 0, y1 = 0, yy = 0, w1 = 0, yw = 0, ww = 0, residual2 = 0, count = 0;
+    for (std::int32_t r = interval.top + margin; r <= interval.bottom - margin; r += stride) {
+      const std::int32_t valid = image_->valid(column, r);
+      if (valid == 0 || cost(line, column, r) > most) continue;
+      const auto w = static_cast<double>(image_->inverse_depth(column, r));
+      const auto y = static_cast<double>(rays_->y[static_cast<std::size_t>(r)]);
+      const double sigma = static_cast<double>(base_) * w + static_cast<double>(per_metre_);
+      const double g = valid * stride / (sigma * sigma);
+      n += g, y1 += g * y, yy += g * y * y, w1 += g * w, yw += g * y * w, ww += g * w * w;
+      const double off_m = (w - static_cast<double>(line.a + line.b * static_cast<float>(y))) / w * d_m;
+      residual2 += valid * stride * off_m * off_m;
+      count += valid * stride;
+    }
+    // Weights so far are per squared relative depth; |m|^2 |ray|^2 makes them 1 / sigma^2.
+    const double scale =
+        d_m * d_m /
+        (x * x +
+         math::square(static_cast<double>(rays_->y[static_cast<std::size_t>((interval.top + interval.bottom) / 2)])) +
+         1.0);
+    PlaneMoments& m = plane.moments;
+    m.xx += scale * x * x * n, m.xy += scale * x * y1, m.x1 += scale * x * n, m.yy += scale * yy;
+    m.y1 += scale * y1, m.one += scale * n;
+    m.xw += scale * x * w1, m.yw += scale * yw, m.w1 += scale * w1, m.ww += scale * ww;
+    m.count += count;
+    plane.residual2 += residual2;
+  }
+}
+
+}  // namespace polygmap

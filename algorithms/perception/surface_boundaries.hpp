@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where one plane ends and the next begins in every column, and the planes' final fit to what lies between.
+//
+// Two planes that meet in space meet in the picture on a straight line that is known far better than any one column's
+// pixels tell. Where they do not meet (an overhang, something in front), the columns' most likely change-points decide,
+// all columns of a pair of planes together.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/perception/plane_fit.hpp"
+#include "algorithms/perception/run_segmentation.hpp"
+
+namespace polygmap {
+
+// Rows top .. bottom of a column show one plane.
+struct ColumnSpan {
+  std::int16_t top = 0;
+  std::int16_t bottom = 0;
+  std::uint8_t plane = 0;
+  std::uint16_t piece = 0;  // for whoever joins intervals into pieces
+};
+
+class SurfaceBoundaries {
+ public:
+  struct Params {
+    double inlier_sigmas = 3.0;    // of a row in a refit, and of a row that extends a surface
+    double same_gap_sigmas = 3.0;  // rows between two runs of one plane that are this far off it are something else
+    double gap_floor_m = 0.006;
+    double meet_px = 2.0;          // planes meet where their line is no farther than this from the change-points
+    std::int32_t window_px = 6;    // rows searched beyond where the runs ended
+    std::int32_t max_gap_px = 24;  // rows between two surfaces that are still next to each other
+    double correlated_share = 0.7;
+  };
+  static constexpr std::size_t kMaxPlanes = 96;
+  static constexpr std::size_t kMaxIntervals = 32;
+  static constexpr std::int32_t kRefitColumns = 4;  // per piece
+  using Column = StaticVector<ColumnSpan, kMaxIntervals>;
+  using Columns = std::array<Column, kColumns>;
+  struct Plane {
+    InversePlane plane;
+    PlaneMoments moments;    // of the last refit, weights 1 / sigma^2
+    double residual2 = 0.0;  // sum of squared normal distances, per pixel
+    bool alive = false;
+  };
+
+  void begin(const Params& params, const DepthSigma& noise, const ColumnRays& rays, double fy_px, double cy_px,
+             const ColumnImage& image) noexcept;
+  // Planes are set by the caller between the passes; 1-based.
+  [[nodiscard]] Plane& plane(std::size_t i) noexcept { return planes_[i]; }
+  [[nodiscard]] const Plane& plane(std::size_t i) const noexcept { return planes_[i]; }
+
+  // One column's runs to intervals, each run's plane looked up in to_plane.
+  void gather(std::int32_t column, const RunSegmentation::Column& runs,
+              const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept;
+  void begin_meeting() noexcept;
+  void meet(std::int32_t column) noexcept;  // change-points between the column's surfaces
+  void settle() noexcept;                   // one decision per pair of planes, then all columns follow it
+  void begin_refit() noexcept;
+  void refit(std::int32_t column) noexcept;  // adds the column to its planes' moments
+
+  [[nodiscard]] Columns& columns() noexcept { return columns_; }
+  [[nodiscard]] const Columns& columns() const noexcept { return columns_; }
+  [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
+
+ private:
+  static constexpr std::size_t kMaxJoints = 4096;
+  static constexpr std::size_t kMaxPairs = 192;
+  static constexpr std::int32_t kBins = 64;  // of half a pixel, -16 .. 16
+  struct Joint {
+    std::uint16_t pair = 0;
+    std::int16_t column = 0;
+    std::uint8_t upper = 0;  // interval
+    float row = 0.0F;        // where the planes meet
+    std::int16_t last = 0;   // the column's own answer: last row of the upper plane
+  };
+  struct Pair {
+    std::uint8_t upper = 0;
+    std::uint8_t lower = 0;
+    std::array<std::uint16_t, kBins> offsets{};  // of the columns' answers from where the planes meet
+  };
+  // A plane in one column: inverse depth a + b y, and its tolerance per sigma.
+  struct Line {
+    float a, b, norm;
+  };
+  [[nodiscard]] Line line_of(const InversePlane& plane, std::int32_t column) const noexcept;
+  // Residual over sigma, squared.
+  [[nodiscard]] float cost(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
+  void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
+  [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
+                                          std::int32_t last) const noexcept;
+  [[nodiscard]] std::uint16_t pair_of(std::uint8_t upper, std::uint8_t lower) noexcept;
+
+  Params params_;
+  const ColumnRays* rays_ = nullptr;
+  const ColumnImage* image_ = nullptr;
+  double fy_px_ = 1.0, cy_px_ = 0.0;
+  float base_ = 0.0F, per_metre_ = 0.0F;
+  std::array<float, kColumn_px + 1> share_{};  // of a pixel's variance that the mean of n pixels has
+
+  std::array<Plane, kMaxPlanes + 1> planes_{};
+  Columns columns_{};
+  std::array<Joint, kMaxJoints> joints_{};
+  std::size_t joint_count_ = 0;
+  std::array<Pair, kMaxPairs> pairs_{};
+  std::size_t pair_count_ = 0;
+  std::uint32_t overflow_ = 0;
+};
+
+}  // namespace polygmap
