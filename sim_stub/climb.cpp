@@ -126,6 +126,18 @@ std::vector<ScheduleRow> schedule_of(const Executive& executive, const TimedPipe
   return rows;
 }
 
+// Of all lanes, by name; only what was raised.
+std::vector<std::pair<std::string, std::uint32_t>> raised(const Health& health) {
+  std::vector<std::pair<std::string, std::uint32_t>> out;
+  const auto add = [&]<typename Code>(std::size_t i, Code) {
+    const auto code = static_cast<Code>(kFirstCode<Code> + i);
+    if (const std::uint32_t count = health.count(code).count; count > 0) out.emplace_back(name_of(code), count);
+  };
+  for (std::size_t i = 0; i < kCodeCount<Fault>; ++i) add(i, Fault{});
+  for (std::size_t i = 0; i < kCodeCount<Limit>; ++i) add(i, Limit{});
+  return out;
+}
+
 }  // namespace
 
 ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction& progress) {
@@ -175,6 +187,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   figures.gait = options.gait;
   figures.seed = options.seed;
   figures.heap_calls = heap::report().calls;
+  figures.faults = raised(module->pipeline->health());
   figures.heap_first_caller = heap::report().first_caller;
   const auto memory = static_memory();
   figures.static_memory.assign(memory.begin(), memory.end());

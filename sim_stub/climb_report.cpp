@@ -413,6 +413,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.odometry_rmse_fused_m = fused_error_.rmse_m();
 
   s.heap_calls = run.heap_calls;
+  s.faults = run.faults;
   for (const StageMemory& stage : run.static_memory) s.static_memory.push_back({stage.stage, stage.bytes});
   s.schedule = run.schedule;
   s.footsteps = footsteps_;

@@ -27,7 +27,8 @@ struct RunFigures {
   std::string plant = "kinematic";
   std::uint64_t seed = 1;
   std::uint64_t heap_calls = 0;
-  std::string heap_first_caller;  // the function, when there was a call
+  std::vector<std::pair<std::string, std::uint32_t>> faults;  // raised faults and limits by name
+  std::string heap_first_caller;                              // the function, when there was a call
   std::vector<StageMemory> static_memory;
   std::vector<ScheduleRow> schedule;
   double wall_seconds = 0.0;

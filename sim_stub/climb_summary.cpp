@@ -93,6 +93,8 @@ Json to_json(const ClimbSummary& s) {
   j["map_age_at_latch_ms"] = spread_ms(s.map_age_at_latch_ms);
   j["target_last_seen_ms"] = spread_ms(s.target_last_seen_ms);
   j["heap_calls"] = s.heap_calls;
+  j["faults"] = Json::object();
+  for (const auto& [name, count] : s.faults) j["faults"][name] = count;
 
   std::size_t total_bytes = 0;
   Json stages = Json::object();

@@ -7,6 +7,7 @@
 #include <limits>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "algorithms/core/samples.hpp"
@@ -92,6 +93,7 @@ struct ClimbSummary {
   Spread map_age_at_latch_ms;
   Spread target_last_seen_ms;
   std::uint64_t heap_calls = 0;
+  std::vector<std::pair<std::string, std::uint32_t>> faults;  // raised faults and limits by name
   std::vector<StageBytes> static_memory;
   std::vector<ScheduleRow> schedule;
   std::vector<Footstep> footsteps;  // all of them, walking up included

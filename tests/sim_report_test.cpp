@@ -427,6 +427,7 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
   run.static_memory = {{"estimation", 1000}, {"perception", 2000}};
   run.schedule = {{"sense", "control", 100.0, 500, 1, 12.34567, 99.0}};
   run.wall_seconds = 1.5;
+  run.faults = {{"map_stale", 2}};
   const nlohmann::ordered_json j = to_json(climb.report.finish(run));
   std::string keys;
   for (const auto& [key, value] : j.items()) keys += key + " ";
@@ -435,13 +436,14 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
             "plane_rate_hz "
             "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min stand_off_mm "
             "closure_error_mm tracking_error_mm odometry_rmse_mm exposure_to_map_ms map_age_at_latch_ms "
-            "target_last_seen_ms heap_calls "
+            "target_last_seen_ms heap_calls faults "
             "static_memory_bytes static_memory schedule surfaces footsteps wall ");
   EXPECT_EQ(j["verdict"], "pass");
   EXPECT_EQ(j["seed"], 7);
   EXPECT_EQ(j["execution_error_mm"].dump(), R"({"median":1.23,"max":1.23})");
   EXPECT_EQ(j["odometry_rmse_mm"].dump(), R"({"base":0.0,"lio":null,"fused":0.0})");
   EXPECT_EQ(j["exposure_to_map_ms"].dump(), R"({"median":null,"max":null})");
+  EXPECT_EQ(j["faults"].dump(), R"({"map_stale":2})");
   EXPECT_EQ(j["static_memory_bytes"], 3000);
   EXPECT_EQ(j["static_memory"].dump(), R"({"estimation":1000,"perception":2000})");
   EXPECT_EQ(j["schedule"].dump(), R"([{"task":"sense","lane":"control","budget_us":100.0,"runs":500,"overruns":1}])");
