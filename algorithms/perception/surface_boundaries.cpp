@@ -162,7 +162,7 @@ void SurfaceBoundaries::meet(std::int32_t column) noexcept {
     if (!meets) continue;
     const std::uint16_t pair = pair_of(upper.plane, lower.plane);
     if (pair == kMaxPairs || joint_count_ == kMaxJoints) continue;
-    const double bin = (upper.bottom + 0.5 - row) * 2.0 + kBins / 2;
+    const double bin = (upper.bottom + 0.5 - row) * 2.0 + 0.5 * kBins;
     ++pairs_[pair].offsets[static_cast<std::size_t>(math::clamp(bin, 0.0, kBins - 1.0))];
     joints_[joint_count_++] = {pair, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k),
                                static_cast<float>(row), upper.bottom};
@@ -176,7 +176,7 @@ void SurfaceBoundaries::settle() noexcept {
     for (const std::uint16_t n : pairs_[i].offsets) all += n;
     std::size_t bin = 0;
     while (2 * (below + pairs_[i].offsets[bin]) < all) below += pairs_[i].offsets[bin++];
-    const double median = (static_cast<double>(bin) + 0.5 - kBins / 2) / 2.0;
+    const double median = (static_cast<double>(bin) + 0.5 - 0.5 * kBins) / 2.0;
     shift_px[i] = std::abs(median) < params_.meet_px ? 0.0 : median;
   }
   for (std::size_t i = 0; i < joint_count_; ++i) {

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/column_outline.hpp"
+
+#include <gtest/gtest.h>
+
+namespace polygmap {
+namespace {
+
+SurfaceProfile rectangle(std::int32_t first, std::int32_t last, std::int16_t top, std::int16_t bottom) {
+  SurfaceProfile profile;
+  for (std::int32_t g = first; g <= last; ++g) profile.columns[static_cast<std::size_t>(g)].add(top, bottom);
+  profile.left = 2 * first;
+  profile.right = 2 * last + 1;
+  return profile;
+}
+
+TEST(ColumnOutline, Rectangle_HasFourCornersInTheOrderOfThePicture) {
+  ColumnOutline builder;
+  Outline2 outline;
+  builder.build(rectangle(10, 20, 100, 199), 20, outline);
+  ASSERT_EQ(outline.size(), 4U);
+  EXPECT_NEAR(twice_area(outline), 2.0 * 22.0 * 50.0, 1e-9);  // y down: right-hand turns count as positive
+  for (const Vec2& p : outline) {
+    EXPECT_TRUE(std::abs(p.x() - 19.5) < 1e-9 || std::abs(p.x() - 41.5) < 1e-9);
+    EXPECT_TRUE(std::abs(p.y() - 49.5) < 1e-9 || std::abs(p.y() - 99.5) < 1e-9);
+  }
+}
+
+TEST(ColumnOutline, OneColumnThatRunsOver_DoesNotCarryTheHullAlong) {
+  SurfaceProfile profile = rectangle(10, 40, 100, 199);
+  profile.columns[25].add(60, 230);
+  ColumnOutline builder;
+  Outline2 outline;
+  builder.build(profile, 20, outline);
+  for (const Vec2& p : outline) EXPECT_TRUE(p.y() > 49.0 && p.y() < 100.0);
+}
+
+TEST(ColumnOutline, NoColumn_NoOutline) {
+  ColumnOutline builder;
+  Outline2 outline;
+  builder.build(SurfaceProfile{}, 20, outline);
+  EXPECT_TRUE(outline.empty());
+}
+
+TEST(ColumnOutline, RoundSurface_KeepsToItsVerticesAndInside) {
+  SurfaceProfile profile;
+  for (std::int32_t g = 0; g < 100; ++g) {
+    const double half = 100.0 * std::sqrt(std::max(0.0, 1.0 - math::square((g - 49.5) / 50.0)));
+    profile.columns[static_cast<std::size_t>(g)].add(static_cast<std::int16_t>(240.0 - half),
+                                                     static_cast<std::int16_t>(240.0 + half));
+  }
+  profile.left = 0;
+  profile.right = 199;
+  ColumnOutline builder;
+  Outline2 outline;
+  builder.build(profile, 12, outline);
+  EXPECT_LE(outline.size(), 12U);
+  EXPECT_GT(0.5 * twice_area(outline), 0.85 * kPi * 100.0 * 50.0);
+  EXPECT_LT(0.5 * twice_area(outline), 1.05 * kPi * 100.0 * 50.0);
+}
+
+}  // namespace
+}  // namespace polygmap

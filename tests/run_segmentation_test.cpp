@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/run_segmentation.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/column_scene.hpp"
+
+namespace polygmap {
+namespace {
+
+using test::ColumnScene;
+
+class RunSegmentationTest : public testing::Test {
+ protected:
+  const RunSegmentation::Columns& segment() {
+    runs_->begin({}, {}, scene_.intrinsics, *scene_.image);
+    for (std::int32_t r = 0; r < kDepthHeight_px; ++r) runs_->add_row(r);
+    runs_->finish();
+    return runs_->columns();
+  }
+  ColumnScene scene_;
+  std::unique_ptr<RunSegmentation> runs_ = std::make_unique<RunSegmentation>();
+  InversePlane floor_ = test::plane_of({0.1, -0.8, -0.6}, 0.8);
+  InversePlane riser_ = test::plane_of({0.0, 0.6, -0.8}, 0.6);
+};
+
+TEST_F(RunSegmentationTest, OnePlane_OneExactRunPerColumn) {
+  scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 40 && r < 470 ? &floor_ : nullptr; });
+  for (std::int32_t g = 0; g < kColumns; ++g) {
+    const RunSegmentation::Column& runs = segment()[static_cast<std::size_t>(g)];
+    ASSERT_EQ(runs.size(), 1U) << g;
+    EXPECT_EQ(runs[0].top, 40);
+    EXPECT_EQ(runs[0].bottom, 469);
+    EXPECT_NEAR(static_cast<double>(runs[0].inverse_depth), floor_.inverse_depth(scene_.ray(g, 40)), 2e-5);
+    EXPECT_NEAR(static_cast<double>(runs[0].slope), floor_.m.y() / scene_.intrinsics.fy_px, 1e-7);
+    if (g > 5) break;
+  }
+}
+
+TEST_F(RunSegmentationTest, CreaseJumpAndGap_EndTheRun_NoiseDoesNot) {
+  // Rows 0..199 riser, 200..299 floor, 300..319 nothing, 320..479 floor again.
+  scene_.paint(
+      [this](std::int32_t, std::int32_t r) -> const InversePlane* {
+        const InversePlane* below = r < 300 || r >= 320 ? &floor_ : nullptr;
+        return r < 200 ? &riser_ : below;
+      },
+      0.0015, 3);
+  std::size_t exact = 0;
+  for (const RunSegmentation::Column& runs : segment()) {
+    if (runs.size() != 3) continue;
+    ++exact;
+    EXPECT_NEAR(runs[0].bottom, 199, 3);
+    EXPECT_NEAR(runs[1].bottom, 299, 1);
+    EXPECT_NEAR(runs[2].top, 320, 1);
+  }
+  EXPECT_GE(exact, std::size_t{kColumns} * 9 / 10);
+}
+
+TEST_F(RunSegmentationTest, SingleOutliersAndShortGaps_StayInsideTheRun) {
+  scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 40 ? &floor_ : nullptr; });
+  for (std::int32_t g = 0; g < kColumns; ++g) {
+    scene_.image->inverse_depth(g, 100) *= 1.3F;
+    scene_.image->inverse_depth(g, 101) *= 0.8F;
+    for (std::int32_t r = 200; r < 206; ++r) scene_.image->inverse_depth(g, r) = 0.0F;
+  }
+  for (const RunSegmentation::Column& runs : segment()) {
+    ASSERT_EQ(runs.size(), 1U);
+    EXPECT_EQ(runs[0].rows(), kDepthHeight_px - 40);
+  }
+}
+
+// The vector code and the replay of single columns are one arithmetic: what a column says does not depend on its place.
+TEST_F(RunSegmentationTest, EqualColumns_GiveEqualRuns) {
+  scene_.paint([this](std::int32_t, std::int32_t r) { return r / 37 % 2 == 0 ? &riser_ : &floor_; }, 0.002, 5);
+  for (std::int32_t r = 0; r < kDepthHeight_px; ++r) {
+    for (std::int32_t g = 1; g < kColumns; ++g) scene_.image->inverse_depth(g, r) = scene_.image->inverse_depth(0, r);
+  }
+  const RunSegmentation::Columns& columns = segment();
+  ASSERT_GE(columns[0].size(), 8U);
+  for (const RunSegmentation::Column& runs : columns) {
+    ASSERT_EQ(runs.size(), columns[0].size());
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      EXPECT_EQ(runs[k].top, columns[0][k].top);
+      EXPECT_EQ(runs[k].bottom, columns[0][k].bottom);
+      EXPECT_EQ(runs[k].slope, columns[0][k].slope);
+    }
+  }
+}
+
+TEST_F(RunSegmentationTest, MoreRunsThanFit_AreCounted) {
+  scene_.paint([this](std::int32_t, std::int32_t r) { return r / 5 % 2 == 0 ? &riser_ : &floor_; });
+  static_cast<void>(segment());
+  EXPECT_GT(runs_->overflow(), 0U);
+  for (const RunSegmentation::Column& runs : runs_->columns()) {
+    for (const polygmap::Run& run : runs) EXPECT_LE(run.top, run.bottom);
+  }
+}
+
+}  // namespace
+}  // namespace polygmap
