@@ -42,6 +42,8 @@ struct SurfacePatch {
   double invalid_fraction = 0.0;  // of the pixels inside the polygon
   PolygonVertices polygon;        // convex, on the plane, counter-clockwise seen against the normal (from outside)
   std::array<EdgeKind, kMaxPolygonVertices> edges{};  // edge i: vertex i to i + 1
+  Mat3 covariance = Mat3::Zero();                     // of m = -normal / d, 1/m; in a frame only
+  std::uint8_t plane = 0;                             // surfaces cut from one plane share its number; in a frame only
   EdgeLine nosing;  // treads: the front edge where the surface drops away towards the viewer
   EdgeLine back;    // treads: the far edge where the next riser starts
 };

@@ -703,6 +703,8 @@ void SurfaceExtractor::build_polygon() noexcept {
 
   SurfacePatch patch;
   patch.kind = own.kind;
+  patch.plane = own.source;
+  patch.covariance = own.covariance;
   patch.normal = n;
   patch.d_m = plane.d_m();
   patch.area_m2 = area_m2;

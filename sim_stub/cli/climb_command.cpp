@@ -12,6 +12,8 @@
 #include <optional>
 #include <ostream>
 
+#include "sim_stub/cli/perceive_command.hpp"
+
 namespace polygmap::sim {
 namespace {
 
@@ -185,15 +187,18 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   ClimbArguments a;
   a.options.out_dir = "climb_out";
   declare(*climb, a);
+  PerceiveArguments perceive_arguments;
+  const CLI::App* perceive = declare_perceive(app, perceive_arguments);
 
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 wants the last one first
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
-    err << "polygmap: " << error.what() << "; see polygmap climb --help.\n";
+    err << "polygmap: " << error.what() << "; see polygmap --help.\n";
     return kExitUsage;
   }
+  if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
     err << "polygmap: A subcommand is required; see polygmap --help.\n";
     return kExitUsage;

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/cli/perceive_command.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <ostream>
+
+#include "sim_stub/cli/climb_command.hpp"
+#include "sim_stub/perceive.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+constexpr int kMaxRepeat = 100000;
+
+// Where one picture's output goes: OUT itself, or NAME + suffix in the folder OUT when there are several pictures.
+std::string place(const std::string& out, const std::string& depth, bool several, const char* suffix) {
+  if (!several) return out;
+  return (std::filesystem::path(out) / (std::filesystem::path(depth).stem().string() + suffix)).string();
+}
+
+std::string complaint(const PerceiveArguments& a) {
+  if (a.repeat < 1 || a.repeat > kMaxRepeat) return "--repeat must be from 1 to " + std::to_string(kMaxRepeat) + ".";
+  if (a.gravity.empty()) return {};
+  const double norm = std::hypot(a.gravity[0], a.gravity[1], a.gravity[2]);
+  if (!(norm > 1e-6) || !(norm < 1e6)) return "--gravity must be three finite numbers, not all zero.";
+  return {};
+}
+
+}  // namespace
+
+CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
+  CLI::App* perceive = app.add_subcommand("perceive", "Find the planes in depth pictures (PNG, 16 bits)");
+  perceive->add_option("depth", a.depth, "Depth pictures")->required()->type_name("DEPTH.png");
+  perceive->add_option("--camera", a.camera, "Size, intrinsics, depth unit and noise")
+      ->required()
+      ->type_name("CAMERA.toml");
+  perceive->add_option("--gravity", a.gravity, "Down in the camera frame (x right, y down, z forward)")
+      ->expected(3)
+      ->type_name("X Y Z");
+  const std::string folder = "; a folder when there are several pictures";
+  perceive->add_option("--labels", a.labels, "Each pixel's plane, 0 = none" + folder)->type_name("OUT.png");
+  perceive->add_option("--json", a.json, "The planes" + folder)->type_name("OUT.json");
+  perceive->add_option("--picture", a.picture, "Planes, polygons and nosings over the depth" + folder)
+      ->type_name("OUT.png");
+  perceive->add_option("--repeat", a.repeat, "Extract as often, and say how long it took")->type_name("N");
+  return perceive;
+}
+
+int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& err) {
+  if (const std::string sentence = complaint(a); !sentence.empty()) {
+    err << "polygmap: " << sentence << "\n";
+    return kExitUsage;
+  }
+  const bool several = a.depth.size() > 1;
+  std::optional<Vec3> gravity;
+  if (!a.gravity.empty()) gravity = Vec3{a.gravity[0], a.gravity[1], a.gravity[2]};
+  try {
+    const CameraProfile camera = read_camera(a.camera);
+    for (const std::string& folder : {a.labels, a.json, a.picture}) {
+      if (!several || folder.empty()) continue;
+      std::error_code error;
+      std::filesystem::create_directories(folder, error);
+      if (!std::filesystem::is_directory(folder, error))
+        throw PerceiveError("Cannot create the folder \"" + folder + "\".");
+    }
+    for (const std::string& path : a.depth) {
+      const DepthPng picture = read_depth(path);
+      if (picture.width_px != camera.intrinsics.width_px || picture.height_px != camera.intrinsics.height_px) {
+        throw PerceiveError("\"" + path + "\" is " + std::to_string(picture.width_px) + "x" +
+                            std::to_string(picture.height_px) + ", but the camera file says " +
+                            std::to_string(camera.intrinsics.width_px) + "x" +
+                            std::to_string(camera.intrinsics.height_px) + ".");
+      }
+      Perceived perceived = perceive(camera, picture, gravity, a.repeat);
+      if (!a.labels.empty()) write_labels(place(a.labels, path, several, ".labels.png"), picture, perceived);
+      if (!a.json.empty()) write_planes(place(a.json, path, several, ".planes.json"), perceived);
+      if (!a.picture.empty())
+        write_picture(place(a.picture, path, several, ".picture.png"), camera, picture, perceived);
+      std::vector<double>& times = perceived.microseconds;
+      std::sort(times.begin(), times.end());
+      char line[96];
+      std::snprintf(line, sizeof line, ": %zu planes, median %.0f us, max %.0f us\n", perceived.planes.size(),
+                    times[times.size() / 2], times.back());
+      out << path << line;
+    }
+  } catch (const std::exception& error) {
+    err << "polygmap: " << error.what() << "\n";
+    return kExitUsage;
+  }
+  out << std::flush;
+  if (!out) {
+    err << "polygmap: Cannot write to the standard output.\n";
+    return kExitUsage;
+  }
+  return kExitPass;
+}
+
+}  // namespace polygmap::sim

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// `polygmap perceive`: planes, labels and a picture of depth pictures from files.
+#pragma once
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace polygmap::sim {
+
+struct PerceiveArguments {
+  std::vector<std::string> depth;
+  std::string camera;
+  std::vector<double> gravity;
+  std::string labels, json, picture;
+  int repeat = 1;
+};
+
+[[nodiscard]] CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& arguments);
+// The exit code. Errors are one sentence on err.
+[[nodiscard]] int run_perceive(const PerceiveArguments& arguments, std::ostream& out, std::ostream& err);
+
+}  // namespace polygmap::sim

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// The module's plane extraction on depth pictures from files: what `polygmap perceive` does.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "algorithms/perception/surface_extractor.hpp"
+
+namespace polygmap::sim {
+
+// What a user is told, in one sentence.
+struct PerceiveError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+struct CameraProfile {
+  CameraIntrinsics intrinsics;
+  DepthSigma noise;
+  double min_depth_m = 0.2;
+  double max_depth_m = 6.0;
+};
+
+struct DepthPng {
+  std::int32_t width_px = 0;
+  std::int32_t height_px = 0;
+  std::vector<std::uint16_t> depth;
+};
+
+// Both throw PerceiveError.
+[[nodiscard]] CameraProfile read_camera(const std::string& path);
+[[nodiscard]] DepthPng read_depth(const std::string& path);
+
+// One plane; surfaces that were cut from it (on both sides of a leg, of a staircase) count together.
+struct PerceivedPlane {
+  SurfaceKind kind = SurfaceKind::kOther;
+  Vec3 normal = Vec3::UnitZ();  // camera frame, normal . p + d_m = 0, d_m > 0
+  double d_m = 0.0;
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  // of normal and d_m
+  Vec3 centroid_m = Vec3::Zero();                        // of the largest surface, as all that follows
+  double area_m2 = 0.0;                                  // of all surfaces
+  double rmse_m = 0.0;
+  double invalid_fraction = 0.0;
+  std::vector<Vec3> polygon_m;
+  EdgeLine nosing;
+};
+
+struct Perceived {
+  std::vector<PerceivedPlane> planes;  // id is the index + 1
+  std::vector<std::uint8_t> labels;    // per pixel, 0 = none
+  Vec3 camera_up = Vec3::Zero();       // given, or found
+  std::vector<double> microseconds;    // one per repetition
+};
+
+// gravity: down, camera frame; without it, the largest plane that looks level says where up is.
+[[nodiscard]] Perceived perceive(const CameraProfile& camera, const DepthPng& picture,
+                                 const std::optional<Vec3>& gravity, int repeat);
+
+// Throw PerceiveError when the file cannot be written.
+void write_labels(const std::string& path, const DepthPng& picture, const Perceived& perceived);
+void write_planes(const std::string& path, const Perceived& perceived);
+void write_picture(const std::string& path, const CameraProfile& camera, const DepthPng& picture,
+                   const Perceived& perceived);
+
+}  // namespace polygmap::sim
