@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <string_view>
 #define TOML_EXCEPTIONS 0
 #include <toml++/toml.h>
 
@@ -82,9 +83,9 @@ class Extraction {
   std::unique_ptr<SurfaceExtractor> extractor_ = std::make_unique<SurfaceExtractor>();
 };
 
-// The largest surface that faces upwards in the picture; straight up in the picture when there is none.
-Vec3 find_up(const SurfaceFrame& frame) {
-  Vec3 up{0.0, -1.0, 0.0};
+// The normal of the largest surface that faces upwards in the picture.
+std::optional<Vec3> find_up(const SurfaceFrame& frame) {
+  std::optional<Vec3> up;
   double most_m2 = kMinLevelArea_m2;
   for (const SurfacePatch& surface : frame.surfaces) {
     if (surface.normal.y() > -0.35 || std::abs(surface.normal.x()) > 0.5 || surface.area_m2 < most_m2) continue;
@@ -102,6 +103,13 @@ CameraProfile read_camera(const std::string& path) {
     fail("Cannot read the camera file \"" + path + "\": " + std::string(parsed.error().description()) + ".");
   }
   const toml::table& table = parsed.table();
+  constexpr std::array<std::string_view, 11> kKeys{
+      "width",        "height",          "fx",          "fy",         "cx", "cy", "depth_unit_m",
+      "noise_base_m", "noise_per_metre", "min_depth_m", "max_depth_m"};
+  for (const auto& [key, value] : table) {
+    if (std::find(kKeys.begin(), kKeys.end(), key.str()) != kKeys.end()) continue;
+    fail("Camera file \"" + path + "\": " + std::string(key.str()) + " is no key of a camera.");
+  }
   CameraProfile camera;
   CameraIntrinsics& k = camera.intrinsics;
   const double width = number(table, path, "width", {}), height = number(table, path, "height", {});
@@ -116,7 +124,7 @@ CameraProfile read_camera(const std::string& path) {
   k.fy_px = number(table, path, "fy", {});
   k.cx_px = number(table, path, "cx", {});
   k.cy_px = number(table, path, "cy", {});
-  k.depth_unit_m = number(table, path, "depth_unit_m", 0.001);
+  k.depth_unit_m = number(table, path, "depth_unit_m", {});
   camera.noise.base_m = number(table, path, "noise_base_m", camera.noise.base_m);
   camera.noise.per_metre = number(table, path, "noise_per_metre", camera.noise.per_metre);
   camera.min_depth_m = number(table, path, "min_depth_m", camera.min_depth_m);
@@ -160,8 +168,11 @@ Perceived perceive(const CameraProfile& camera, const DepthPng& picture, const s
   if (gravity) {
     out.camera_up = -gravity->normalized();
   } else {
-    static_cast<void>(extraction.run({0.0, -1.0, 0.0}));
-    out.camera_up = find_up(extraction.extractor().result());
+    const Vec3 along_the_picture{0.0, -1.0, 0.0};
+    static_cast<void>(extraction.run(along_the_picture));
+    const std::optional<Vec3> found = find_up(extraction.extractor().result());
+    out.up_assumed = !found;
+    out.camera_up = found.value_or(along_the_picture);
   }
   for (int i = 0; i < std::max(repeat, 1); ++i) out.microseconds.push_back(extraction.run(out.camera_up));
 

@@ -42,7 +42,7 @@ struct PerceivedPlane {
   double d_m = 0.0;
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  // of normal and d_m
   Vec3 centroid_m = Vec3::Zero();                        // of the largest surface, as all that follows
-  double area_m2 = 0.0;                                  // of all surfaces
+  double area_m2 = 0.0;                                  // of the polygons of all surfaces
   double rmse_m = 0.0;
   double invalid_fraction = 0.0;
   std::vector<Vec3> polygon_m;
@@ -53,6 +53,7 @@ struct Perceived {
   std::vector<PerceivedPlane> planes;  // id is the index + 1
   std::vector<std::uint8_t> labels;    // per pixel, 0 = none
   Vec3 camera_up = Vec3::Zero();       // given, or found
+  bool up_assumed = false;             // neither: no plane looks level, up is up in the picture
   std::vector<double> microseconds;    // one per repetition
 };
 

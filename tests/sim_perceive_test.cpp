@@ -108,6 +108,7 @@ TEST_F(PerceiveCommand, NothingMeasured_IsAnEmptyResult) {
   write_depth("blank.png", std::vector<std::uint16_t>(640 * 480, 0), 640, 480);
   ASSERT_EQ(call({"perceive", at("blank.png"), "--camera", at("camera.toml"), "--json", at("out.json")}), kExitPass);
   EXPECT_TRUE(nlohmann::json::parse(std::ifstream(at("out.json")))["planes"].empty());
+  EXPECT_NE(out_.find("assumed"), std::string::npos) << out_;
 }
 
 TEST_F(PerceiveCommand, FilesThatAreNone_AreNamedInOneSentence) {
@@ -142,6 +143,8 @@ TEST_F(PerceiveCommand, CameraFilesThatAreNone_AreNamedInOneSentence) {
   refused("fx = 366.7", "fx = nan", "fx");
   refused("fx = 366.7", "fx = -1", "positive");
   refused("cx = 322.7\n", "", "cx");
+  refused("depth_unit_m = 0.001\n", "", "depth_unit_m");
+  refused("depth_unit_m", "depht_unit_m", "depht_unit_m");
   refused("cy = 242.3", "cy = \"a\"", "cy");
   refused("width = 640", "width = 0", "0x480");
   refused("width = 640", "width = 4096", "4096x480");

@@ -181,7 +181,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
                   std::ostream& err, bool live) {
   CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
   app.require_subcommand(0, 1);
-  app.footer("Exit codes: 0 pass, 1 the climb failed, 2 a bad argument or output that cannot be written.");
+  app.footer("Exit codes: 0 pass or done, 1 the climb failed, 2 a bad argument, file or output.");
   CLI::App* climb = app.add_subcommand(
       "climb", "Climb a simulated staircase; writes summary.json and climb.svg, exit code 0 only on pass");
   ClimbArguments a;
@@ -195,7 +195,8 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
-    err << "polygmap: " << error.what() << "; see polygmap --help.\n";
+    const bool named = !arguments.empty() && (arguments[0] == "climb" || arguments[0] == "perceive");
+    err << "polygmap: " << error.what() << "; see polygmap " << (named ? arguments[0] + " " : "") << "--help.\n";
     return kExitUsage;
   }
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);

@@ -35,10 +35,16 @@ std::string complaint(const PerceiveArguments& a) {
 CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
   CLI::App* perceive = app.add_subcommand("perceive", "Find the planes in depth pictures (PNG, 16 bits)");
   perceive->add_option("depth", a.depth, "Depth pictures")->required()->type_name("DEPTH.png");
-  perceive->add_option("--camera", a.camera, "Size, intrinsics, depth unit and noise")
+  perceive
+      ->add_option("--camera", a.camera,
+                   "width, height, fx, fy, cx, cy (px), depth_unit_m; optional: noise_base_m, noise_per_metre, "
+                   "min_depth_m, max_depth_m")
       ->required()
       ->type_name("CAMERA.toml");
-  perceive->add_option("--gravity", a.gravity, "Down in the camera frame (x right, y down, z forward)")
+  perceive
+      ->add_option(
+          "--gravity", a.gravity,
+          "Down in the camera frame (x right, y down, z forward); without it the largest level-looking plane says")
       ->expected(3)
       ->type_name("X Y Z");
   const std::string folder = "; a folder when there are several pictures";
@@ -82,9 +88,11 @@ int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& er
         write_picture(place(a.picture, path, several, ".picture.png"), camera, picture, perceived);
       std::vector<double>& times = perceived.microseconds;
       std::sort(times.begin(), times.end());
-      char line[96];
-      std::snprintf(line, sizeof line, ": %zu planes, median %.0f us, max %.0f us\n", perceived.planes.size(),
-                    times[times.size() / 2], times.back());
+      const Vec3& up = perceived.camera_up;
+      const char* source = gravity ? "given" : (perceived.up_assumed ? "assumed: no plane looks level" : "found");
+      char line[192];
+      std::snprintf(line, sizeof line, ": %zu planes, median %.0f us, max %.0f us, up (%.3f, %.3f, %.3f) %s\n",
+                    perceived.planes.size(), times[times.size() / 2], times.back(), up.x(), up.y(), up.z(), source);
       out << path << line;
     }
   } catch (const std::exception& error) {
