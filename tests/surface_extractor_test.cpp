@@ -194,6 +194,26 @@ TEST(SurfaceExtractor, Polygon_OfANarrowStaircase_EndsWhereTheTreadEnds) {
   for (std::size_t i = 0; i < tread->polygon.size(); ++i) EXPECT_EQ(tread->edges[i], EdgeKind::kObserved) << i;
 }
 
+TEST(SurfaceExtractor, RiserSeenNearlyEdgeOn_EndsAtTheTreads) {
+  StairSpec stairs;
+  stairs.first_riser_x_m = 0.05;
+  const DepthScene scene = stair_scene(stairs);
+  Extraction extraction;
+  int risers = 0;
+  for (const SurfacePatch& patch : extraction.run(scene, {.correlated = true}, 11).surfaces) {
+    if (patch.kind != SurfaceKind::kRiser) continue;
+    ++risers;
+    double low_m = 1e9, high_m = -1e9;
+    for (const Vec3& p : patch.polygon) {
+      const double z_m = (scene.world_T_camera * p).z();
+      low_m = std::min(low_m, z_m);
+      high_m = std::max(high_m, z_m);
+    }
+    EXPECT_LT(high_m - low_m, stairs.rise_m + 0.015);
+  }
+  EXPECT_GE(risers, 2);
+}
+
 TEST(SurfaceExtractor, Polygon_CutByThePicture_SaysUnknownThere) {
   StairSpec stairs;
   stairs.width_m = 6.0;

@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::int32_t kMinSide_px = 32;
 constexpr double kStepLeast_m = 0.01;  // a neighbour's centre is this far above or below to count as such
+constexpr double kLeastSlope = 0.5;    // sine between a riser and the tread that ends it
 constexpr double kOnLine_m = 0.002;    // a polygon's edge lies on a line
 
 bool finite(const LegShapes& s) noexcept {
@@ -643,6 +644,26 @@ double SurfaceExtractor::invalid_share(const PolygonVertices& polygon) const noe
   return all > 0 ? static_cast<double>(invalid) / all : 0.0;
 }
 
+// The tread that most columns of this surface show right below (or above) it in the picture; 0 = none.
+std::size_t SurfaceExtractor::tread_beside(bool below) const noexcept {
+  constexpr std::int32_t kProbe_px = 6;
+  std::array<std::int32_t, kMaxPlanes + 1> votes{};
+  for (std::int32_t g = 0; g < column_rays_.columns; ++g) {
+    const ColumnEnds& ends = profiles_[index_].columns[static_cast<std::size_t>(g)];
+    if (ends.empty()) continue;
+    const std::int32_t row = below ? ends.bottom + kProbe_px : ends.top - kProbe_px;
+    if (row >= 0 && row < column_rays_.height_px) ++votes[owner_(g, row)];
+  }
+  std::size_t best = 0;
+  for (std::size_t p = 1; p <= plane_count_; ++p) {
+    if (!planes_[p].alive || planes_[p].kind != SurfaceKind::kTread || votes[p] < params_.edge_lines.min_columns / 2) {
+      continue;
+    }
+    if (best == 0 || votes[p] > votes[best]) best = p;
+  }
+  return best;
+}
+
 void SurfaceExtractor::build_polygon() noexcept {
   Plane& own = planes_[index_];
   const InversePlane& plane = own.plane;
@@ -694,6 +715,19 @@ void SurfaceExtractor::build_polygon() noexcept {
   if (nosing_.valid) cut(nosing_);
   if (back_.valid) cut(back_);
   if (occluder_.valid) cut(occluder_);
+  if (own.kind == SurfaceKind::kRiser) {
+    // Seen nearly edge-on, half a pixel is decimetres of a riser: it ends where the treads above and below it say.
+    for (const bool below : {true, false}) {
+      const std::size_t tread = tread_beside(below);
+      if (tread == 0) continue;
+      const InversePlane& level = planes_[tread].plane;
+      const double side = below ? 1.0 : -1.0;
+      const Vec3 up = side * level.normal();
+      const Vec2 inward{up.dot(x_axis), up.dot(y_axis)};
+      if (!(inward.norm() > kLeastSlope)) continue;
+      clip(flat, -side * level.distance_m(origin) * inward / inward.squaredNorm(), inward.normalized());
+    }
+  }
   if (flat.size() >= 3) reduce(flat, kMaxPolygonVertices, 1e-6);
   const double area_m2 = flat.size() >= 3 ? 0.5 * twice_area(flat) : 0.0;
   if (!(area_m2 > 1e-4)) {

@@ -152,6 +152,7 @@ class SurfaceExtractor {
   std::int32_t line_step(bool nosing) noexcept;
   // Share of the polygon's pixels without data.
   [[nodiscard]] double invalid_share(const PolygonVertices& polygon) const noexcept;
+  [[nodiscard]] std::size_t tread_beside(bool below) const noexcept;
   void build_polygon() noexcept;
   [[nodiscard]] EdgeKind judge_edge(const InversePlane& plane, const Vec3& a_m, const Vec3& b_m,
                                     const Vec3& inside_m) const noexcept;
