@@ -126,7 +126,7 @@ void RunSegmentation::step(std::int32_t column, float at_row, const float* inver
 }
 
 void RunSegmentation::add_row(std::int32_t row) noexcept {
-  // Columns beyond the picture have no data: they never start a run.
+  // Whole registers; what columns beyond a narrower picture say is never read.
   const float* w = image_->inverse_depth.row(row);
   for (std::int32_t g = 0; g < kColumns; g += Wide::kCount) step<Wide>(g, static_cast<float>(row), w);
   float any = 0.0F;
