@@ -91,8 +91,8 @@ TEST(PlaneFit, Ransac_CleanData_StopsEarlyAndRepeatsExactly) {
 
 TEST(PlaneFit, Solve_WhiteNoise_IsUnbiasedAndItsSigmaIsHonest) {
   const Vec3 normal = Vec3{0.1, -0.5, -0.85}.normalized();
-  PlaneFit::Params params;
-  params.correlated_px = 1.0;  // this noise is white
+  DepthSigma noise;
+  noise.correlated_px = 1.0;  // this noise is white
   const Vec3 ray{0.0, 0.0, 1.0};
   double bias = 0.0, squares = 0.0;
   constexpr int kRuns = 200;
@@ -105,7 +105,7 @@ TEST(PlaneFit, Solve_WhiteNoise_IsUnbiasedAndItsSigmaIsHonest) {
     }
     InversePlane plane;
     Mat3 covariance;
-    ASSERT_TRUE(try_solve(params, moments, Lean::kAny, Vec3::UnitZ(), plane, &covariance));
+    ASSERT_TRUE(try_solve({}, noise, moments, Lean::kAny, Vec3::UnitZ(), plane, &covariance));
     const double error = plane.distance_m(truth.point(ray)), sigma = plane_sigma_m(plane, covariance, ray);
     bias += error / kRuns;
     squares += math::square(error / sigma) / kRuns;
@@ -128,10 +128,10 @@ TEST(PlaneFit, Moments_OfTwoHalves_AddUpToTheWhole) {
 
 TEST(PlaneFit, Solve_NoOrDegenerateMoments_IsRefused) {
   InversePlane plane;
-  EXPECT_FALSE(try_solve({}, {}, Lean::kAny, Vec3::UnitZ(), plane, nullptr));
+  EXPECT_FALSE(try_solve({}, {}, {}, Lean::kAny, Vec3::UnitZ(), plane, nullptr));
   PlaneMoments point;
   for (int i = 0; i < 10; ++i) point.add(1.0, 0.1, 0.2, 1.0);
-  EXPECT_FALSE(try_solve({}, point, Lean::kAny, Vec3::UnitZ(), plane, nullptr));
+  EXPECT_FALSE(try_solve({}, {}, point, Lean::kAny, Vec3::UnitZ(), plane, nullptr));
 }
 
 TEST(CounterRandom, Draws_AreSpreadAndFixed) {

@@ -122,7 +122,7 @@ TEST_F(PlanesFromRuns, Refit_RecoversThePlanesThroughNoise) {
   bound();
   for (std::size_t i = 1; i <= 2; ++i) {
     InversePlane plane;
-    ASSERT_TRUE(try_solve({}, boundaries_->plane(i).moments, Lean::kAny, Vec3::UnitY(), plane, nullptr));
+    ASSERT_TRUE(try_solve({}, {}, boundaries_->plane(i).moments, Lean::kAny, Vec3::UnitY(), plane, nullptr));
     const InversePlane& truth =
         plane.normal().dot(tread_.normal()) > plane.normal().dot(riser_.normal()) ? tread_ : riser_;
     EXPECT_LT(std::acos(std::min(plane.normal().dot(truth.normal()), 1.0)), 5e-4);

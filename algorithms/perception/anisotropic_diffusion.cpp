@@ -6,6 +6,7 @@ namespace {
 
 // c(difference) times difference, from a to b. Kappa in inverse depth is kappa_z w^2 with kappa_z = k (base + per z),
 // squared and shared by both: it vanishes with either pixel, so that an empty one conducts nothing, without a branch.
+// (A quadratic term would not vanish: it is left out.)
 inline float flux(float a, float b, float base, float per_metre) noexcept {
   const float kappa2 = (base * a + per_metre) * (base * b + per_metre) * a * b;
   const float difference = a - b;

@@ -147,9 +147,9 @@ void EdgeLineFinder::search_column(std::int32_t column) noexcept {
     const std::int32_t row = surface_above_ ? first + s : last - s;
     const std::uint16_t raw = (*picture_.depth)(column, row);
     if (!picture_.reduction.valid(raw) || ((*picture_.flags)(column / 2, row / 2) & kPixelBody) != 0) continue;
-    // Residual over sigma: (w - w_plane) / ((base w + per_metre) |ray| |m|), times z above and below.
+    // Residual over sigma: (w - w_plane) / (sigma_z w |ray| |m|), times z above and below.
     const double y = (row - k.cy_px) / k.fy_px, z = raw * k.depth_unit_m;
-    const double inverse_sigma = 1.0 / ((noise_.base_m + noise_.per_metre * z) * norm);
+    const double inverse_sigma = 1.0 / (noise_.sigma_m(z) * norm);
     const double w_surface = surface_.m.x() * x + surface_.m.y() * y + surface_.m.z();
     const double w_other = other_.m.x() * x + other_.m.y() * y + other_.m.z();
     const double cost_surface = std::min(math::square((1.0 - z * w_surface) * inverse_sigma), truncation);

@@ -19,24 +19,25 @@ bool agrees(const InversePlane& plane, Lean lean, const Vec3& up) noexcept {
   return true;
 }
 
-// |w - predicted| against the tolerance, without a division per sample: sigma_w = (b w + p) w |ray| / (w d).
+// |w - predicted| against the tolerance, without a division per sample: both times w; cos(incidence) = w d / |ray|.
 struct Gate {
-  double base, per_metre, floor, k, inverse_d;
+  DepthSigma noise;
+  double floor, k, inverse_d;
   [[nodiscard]] bool inside(double residual, double w, double ray_norm) const noexcept {
-    const double sigma = (base * w + per_metre) * ray_norm * inverse_d;
-    return std::abs(residual) < k * sigma + floor * w * w;
+    const double sigma = noise.inverse_sigma(w) * ray_norm * inverse_d;
+    return std::abs(residual) * w < k * sigma + floor * w * w * w;
   }
 };
 
 Gate gate_of(const PlaneFit::Params& params, const DepthSigma& noise, const InversePlane& plane) noexcept {
-  return {noise.base_m, noise.per_metre, params.inlier_floor_m, params.inlier_sigmas, plane.m.norm()};
+  return {noise, params.inlier_floor_m, params.inlier_sigmas, plane.m.norm()};
 }
 
 }  // namespace
 
 double inverse_depth_sigma(const DepthSigma& noise, const InversePlane& plane, const Vec3& ray) noexcept {
   const double w = std::max(plane.inverse_depth(ray), kMinInverseDepth);
-  return (noise.base_m * w + noise.per_metre) * ray.norm() * plane.m.norm();
+  return noise.inverse_sigma(w) / w * ray.norm() * plane.m.norm();
 }
 
 double plane_sigma_m(const InversePlane& plane, const Mat3& covariance, const Vec3& ray) noexcept {
@@ -45,10 +46,10 @@ double plane_sigma_m(const InversePlane& plane, const Mat3& covariance, const Ve
   return plane.d_m() / w * math::sqrt(std::max(ray.dot(covariance * ray), 0.0));
 }
 
-bool try_solve(const PlaneFit::Params& params, const PlaneMoments& moments, Lean lean, const Vec3& up,
-               InversePlane& plane, Mat3* covariance) noexcept {
+bool try_solve(const PlaneFit::Params& params, const DepthSigma& noise, const PlaneMoments& moments, Lean lean,
+               const Vec3& up, InversePlane& plane, Mat3* covariance) noexcept {
   if (!(moments.one > 0.0)) return false;
-  const double belief = 1.0 / std::max(params.correlated_px, 1.0);
+  const double belief = 1.0 / std::max(noise.correlated_px, 1.0);
   Mat3 a = moments.matrix() * belief;
   const Vec3 b = moments.vector() * belief;
   if (lean != Lean::kAny) {
@@ -140,7 +141,7 @@ bool PlaneRansac::try_finish(const PlaneFit::Params& params, const DepthSigma& n
       moments.add(1.0 / math::square(inverse_depth_sigma(noise, plane, ray)), ray.x(), ray.y(), w);
       ++inliers;
     }
-    if (!try_solve(params, moments, lean, up, plane, nullptr)) return false;
+    if (!try_solve(params, noise, moments, lean, up, plane, nullptr)) return false;
   }
   return agrees(plane, lean, up);
 }

@@ -65,10 +65,7 @@ struct PlaneFit {
     double inlier_sigmas = 3.0;
     double inlier_floor_m = 0.002;  // added: slow depth errors that the noise model does not have
     double enough_inliers = 0.92;   // stop drawing at this share
-    // Pixels that are worth one independent measurement: depth errors are correlated over 9 pixels and
-    // warp slowly over 70. Sets how much the lean below counts, and the covariance.
-    double correlated_px = 640.0;
-    double lean_sigma_rad = 0.02;  // how level treads and how upright risers are, the estimator's up included
+    double lean_sigma_rad = 0.02;   // how level treads and how upright risers are, the estimator's up included
   };
 };
 
@@ -77,8 +74,8 @@ struct PlaneFit {
 
 // Weighted least squares of moments whose weights were 1 / sigma^2, with the lean as a prior. False when the moments do
 // not fix a plane in front of the camera. covariance (of m) is optional.
-[[nodiscard]] bool try_solve(const PlaneFit::Params& params, const PlaneMoments& moments, Lean lean, const Vec3& up,
-                             InversePlane& plane, Mat3* covariance) noexcept;
+[[nodiscard]] bool try_solve(const PlaneFit::Params& params, const DepthSigma& noise, const PlaneMoments& moments,
+                             Lean lean, const Vec3& up, InversePlane& plane, Mat3* covariance) noexcept;
 
 // RANSAC over a list of samples, one trial per call so that it can be resumed.
 class PlaneRansac {

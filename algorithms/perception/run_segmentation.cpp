@@ -42,12 +42,13 @@ void RunSegmentation::begin(const Params& params, const DepthSigma& noise, const
   image_ = &image;
   column_count_ = intrinsics.width_px / kColumn_px;
   height_px_ = intrinsics.height_px;
-  const double share = math::sqrt(params.correlated_share + (1.0 - params.correlated_share) / kColumn_px);
+  const double share = math::sqrt(noise.correlated_share + (1.0 - noise.correlated_share) / kColumn_px);
   outlier2_ = static_cast<float>(math::square(params.outlier_sigmas));
   bend_ = static_cast<float>(params.bend_sigmas);
   jump_share_ = static_cast<float>(params.jump_share);
   base_ = static_cast<float>(noise.base_m * share);
   per_metre_ = static_cast<float>(noise.per_metre * share);
+  quadratic_ = static_cast<float>(noise.quadratic_per_m * share);
   floor_ = static_cast<float>(params.floor_m);
   max_gap_ = static_cast<float>(params.max_gap_px);
   fy_ = static_cast<float>(intrinsics.fy_px);
@@ -79,13 +80,14 @@ void RunSegmentation::step(std::int32_t column, float at_row, const float* inver
   const V pending0 = load(open_.pending), last0 = load(open_.last);
   const auto valid = w > zero, started = n > zero, fitted = n >= all(3.0F);
 
-  const V residual = w - (first0 + a0 + b0 * (row - top0));
-  // Residual across the line in space against sigma_z: dw^2 / (|m|^2 w^2) with m of the line in the column's plane.
+  // Residual across the line in space against sigma_z: dw^2 / (|m|^2 w^2) with m of the line in the column's plane. All
+  // are multiplied by w, so that sigma is that of the inverse depth.
+  const V residual = (w - (first0 + a0 + b0 * (row - top0))) * w;
   const V my = b0 * all(fy_), m0 = first0 + a0 + b0 * (all(cy_) - top0);
-  const V sigma = all(base_) * w + all(per_metre_), floor = all(floor_) * w;
+  const V sigma = (all(base_) * w + all(per_metre_)) * w + all(quadratic_), floor = all(floor_) * w * w;
   // Predicting one row past n has about (1 + 4 / n) of a row's variance.
   const V spread = (my * my + m0 * m0) * (sigma * sigma + floor * floor) * (one + all(4.0F) / (n + one));
-  const V jump = w * (all(jump_share_) + all(4.0F) * sigma);
+  const V jump = w * (all(jump_share_) * w + all(4.0F) * sigma);
   const V limit2 = Lanes::select(fitted, all(outlier2_) * spread, jump * jump);
   const auto fits = Lanes::either(Lanes::no(started), residual * residual < limit2);
   const auto in = Lanes::both(valid, fits), out = Lanes::both(valid, Lanes::no(fits));

@@ -24,12 +24,11 @@ struct Run {
 class RunSegmentation {
  public:
   struct Params {
-    double outlier_sigmas = 3.5;    // a row this far off the run's line does not belong to it
-    double bend_sigmas = 1.7;       // mean of the last rows' residuals: the run bends away
-    double jump_share = 0.03;       // the first rows of a run differ by less than this share of the depth per row
-    double correlated_share = 0.7;  // of a pixel's noise variance that its neighbours in the row share
-    double floor_m = 0.001;         // slow depth errors, added to the noise
-    std::int32_t max_gap_px = 8;    // rows without data inside a run
+    double outlier_sigmas = 3.5;  // a row this far off the run's line does not belong to it
+    double bend_sigmas = 1.7;     // mean of the last rows' residuals: the run bends away
+    double jump_share = 0.03;     // the first rows of a run differ by less than this share of the depth per row
+    double floor_m = 0.001;       // slow depth errors, added to the noise
+    std::int32_t max_gap_px = 8;  // rows without data inside a run
   };
   static constexpr std::size_t kMaxRunsPerColumn = 48;
   using Column = StaticVector<Run, kMaxRunsPerColumn>;
@@ -72,7 +71,8 @@ class RunSegmentation {
   const ColumnImage* image_ = nullptr;
   std::int32_t column_count_ = 0;
   std::int32_t height_px_ = 0;
-  float outlier2_ = 0.0F, bend_ = 0.0F, jump_share_ = 0.0F, base_ = 0.0F, per_metre_ = 0.0F, floor_ = 0.0F;
+  float outlier2_ = 0.0F, bend_ = 0.0F, jump_share_ = 0.0F, base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F,
+        floor_ = 0.0F;
   float max_gap_ = 0.0F, fy_ = 1.0F, cy_ = 0.0F;
   Open open_;
   Floats event_{};

@@ -19,9 +19,10 @@ void SurfaceBoundaries::begin(const Params& params, const DepthSigma& noise, con
   cy_px_ = cy_px;
   base_ = static_cast<float>(noise.base_m);
   per_metre_ = static_cast<float>(noise.per_metre);
+  quadratic_ = static_cast<float>(noise.quadratic_per_m);
   share_[0] = 1.0F;
   for (std::size_t n = 1; n < share_.size(); ++n) {
-    share_[n] = static_cast<float>(params.correlated_share + (1.0 - params.correlated_share) / static_cast<double>(n));
+    share_[n] = static_cast<float>(noise.correlated_share + (1.0 - noise.correlated_share) / static_cast<double>(n));
   }
   for (Plane& plane : planes_) plane = Plane{};
   overflow_ = 0;
@@ -35,8 +36,8 @@ SurfaceBoundaries::Line SurfaceBoundaries::line_of(const InversePlane& plane, st
 
 float SurfaceBoundaries::cost(const Line& line, std::int32_t column, std::int32_t row) const noexcept {
   const float w = image_->inverse_depth(column, row);
-  const float residual = w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)]);
-  const float sigma = (base_ * w + per_metre_) * line.norm;
+  const float residual = (w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)])) * w;
+  const float sigma = inverse_sigma(w) * line.norm;
   return residual * residual / (sigma * sigma * share_[image_->valid(column, row)]);
 }
 
@@ -54,9 +55,9 @@ void SurfaceBoundaries::gather(std::int32_t column, const RunSegmentation::Colum
       for (std::int32_t r = out.back().bottom + 1; r < run.top; ++r) {
         const float w = image_->inverse_depth(column, r);
         if (!(w > 0.0F)) continue;
-        const float off = std::abs(w - (line.a + line.b * rays_->y[static_cast<std::size_t>(r)]));
-        const float limit = (static_cast<float>(params_.same_gap_sigmas) * (base_ * w + per_metre_) +
-                             static_cast<float>(params_.gap_floor_m) * w) *
+        const float off = std::abs(w - (line.a + line.b * rays_->y[static_cast<std::size_t>(r)])) * w;
+        const float limit = (static_cast<float>(params_.same_gap_sigmas) * inverse_sigma(w) +
+                             static_cast<float>(params_.gap_floor_m) * w * w) *
                             line.norm;
         ++(off > limit ? other : own);
       }
@@ -213,8 +214,8 @@ void SurfaceBoundaries::refit(std::int32_t column) noexcept {
       if (valid == 0 || cost(line, column, r) > most) continue;
       const auto w = static_cast<double>(image_->inverse_depth(column, r));
       const auto y = static_cast<double>(rays_->y[static_cast<std::size_t>(r)]);
-      const double sigma = static_cast<double>(base_) * w + static_cast<double>(per_metre_);
-      const double g = valid * stride / (sigma * sigma);
+      const double relative = w / static_cast<double>(inverse_sigma(static_cast<float>(w)));
+      const double g = valid * stride * relative * relative;
       n += g, y1 += g * y, yy += g * y * y, w1 += g * w, yw += g * y * w, ww += g * w * w;
       const double off_m = (w - static_cast<double>(line.a + line.b * static_cast<float>(y))) / w * d_m;
       residual2 += valid * stride * off_m * off_m;

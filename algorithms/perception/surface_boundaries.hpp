@@ -31,7 +31,6 @@ class SurfaceBoundaries {
     double meet_px = 2.0;          // planes meet where their line is no farther than this from the change-points
     std::int32_t window_px = 6;    // rows searched beyond where the runs ended
     std::int32_t max_gap_px = 24;  // rows between two surfaces that are still next to each other
-    double correlated_share = 0.7;
   };
   static constexpr std::size_t kMaxPlanes = 96;
   static constexpr std::size_t kMaxIntervals = 32;
@@ -85,6 +84,7 @@ class SurfaceBoundaries {
     float a, b, norm;
   };
   [[nodiscard]] Line line_of(const InversePlane& plane, std::int32_t column) const noexcept;
+  [[nodiscard]] float inverse_sigma(float w) const noexcept { return (base_ * w + per_metre_) * w + quadratic_; }
   // Residual over sigma, squared.
   [[nodiscard]] float cost(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
   void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
@@ -96,7 +96,7 @@ class SurfaceBoundaries {
   const ColumnRays* rays_ = nullptr;
   const ColumnImage* image_ = nullptr;
   double fy_px_ = 1.0, cy_px_ = 0.0;
-  float base_ = 0.0F, per_metre_ = 0.0F;
+  float base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F;
   std::array<float, kColumn_px + 1> share_{};  // of a pixel's variance that the mean of n pixels has
 
   std::array<Plane, kMaxPlanes + 1> planes_{};

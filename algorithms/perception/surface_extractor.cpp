@@ -278,7 +278,7 @@ void SurfaceExtractor::solve_planes() noexcept {
     p.moments = fitted.moments;
     p.residual2 = fitted.residual2;
     if (p.moments.count < kLeast_px ||
-        !try_solve(params_.planes, p.moments, lean, view_.camera_up, p.plane, &p.covariance)) {
+        !try_solve(params_.planes, params_.noise, p.moments, lean, view_.camera_up, p.plane, &p.covariance)) {
       p.alive = false;
       for (std::uint8_t& plane : to_plane_) plane = plane == i ? std::uint8_t{0} : plane;
       continue;
