@@ -16,7 +16,7 @@ inline constexpr std::size_t kContactCount = kFootCount * kContactsPerFoot;
 inline constexpr std::int32_t kDepthWidth_px = 640;  // the robot's camera
 inline constexpr std::int32_t kDepthHeight_px = 480;
 
-inline constexpr std::size_t kMaxPlanesPerFrame = 24;
+inline constexpr std::size_t kMaxPlanesPerFrame = 64;
 inline constexpr std::size_t kMaxPolygonVertices = 24;
 inline constexpr std::size_t kMaxMapPolygons = 64;
 

@@ -72,6 +72,95 @@ void SurfaceBoundaries::gather(std::int32_t column, const RunSegmentation::Colum
     interval.plane = plane;
     if (!out.try_push_back(interval)) ++overflow_;
   }
+  for (ColumnSpan& span : out) trim(column, span);
+}
+
+// A run's ends may reach over an edge: rows that the plane, known better than the run's line, does not explain.
+void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const noexcept {
+  constexpr std::int32_t kMost_px = 8, kGood = 2;
+  const Line line = line_of(planes_[interval.plane].plane, column);
+  const auto cut = [&](std::int32_t from, std::int32_t step) {
+    std::int32_t at = from, good = 0;
+    for (std::int32_t i = 0; i < kMost_px && good < kGood; ++i) {
+      const std::int32_t r = from + i * step;
+      if (r < interval.top || r > interval.bottom) return from;
+      if (image_->valid(column, r) == 0) continue;
+      if (cost(line, column, r) > kTruncation) {
+        good = 0;
+        at = r + step;
+      } else {
+        ++good;
+      }
+    }
+    return good == kGood ? at : from;
+  };
+  interval.top = static_cast<std::int16_t>(cut(interval.top, 1));
+  interval.bottom = static_cast<std::int16_t>(cut(interval.bottom, -1));
+}
+
+bool SurfaceBoundaries::try_claim(std::int32_t column, std::int32_t first, std::int32_t last,
+                                  const StaticVector<std::uint8_t, kMaxPlanes>& candidates,
+                                  ColumnSpan& claimed) const noexcept {
+  constexpr std::int32_t kMinRows = 2;
+  std::int32_t most = 0;
+  for (const std::uint8_t plane : candidates) {
+    const Line line = line_of(planes_[plane].plane, column);
+    // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
+    std::int32_t top = -1, bottom = -1, fitting = 0, off = 0;
+    const auto close = [&] {
+      if (fitting >= kMinRows && fitting > most) {
+        most = fitting;
+        claimed.top = static_cast<std::int16_t>(top);
+        claimed.bottom = static_cast<std::int16_t>(bottom);
+        claimed.plane = plane;
+      }
+      fitting = off = 0;
+      top = -1;
+    };
+    for (std::int32_t r = first; r <= last; ++r) {
+      if (image_->valid(column, r) != 0 && cost(line, column, r) < kTruncation) {
+        top = fitting == 0 ? r : top;
+        bottom = r;
+        ++fitting;
+        off = 0;
+      } else if (++off > 1 && fitting > 0) {
+        close();
+      }
+    }
+    close();
+  }
+  return most >= kMinRows;
+}
+
+void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t first_plane,
+                              std::size_t last_plane) noexcept {
+  Column& spans = columns_[static_cast<std::size_t>(column)];
+  const bool any_beside = beside >= 0 && beside < rays_->columns;
+  std::int32_t from = 0;
+  for (std::size_t k = 0; k <= spans.size(); ++k) {
+    const std::int32_t until = k < spans.size() ? spans[k].top - 1 : rays_->height_px - 1;
+    const std::int32_t gap_from = from;
+    if (k < spans.size()) from = spans[k].bottom + 1;
+    if (until <= gap_from || spans.full()) continue;
+    const std::uint8_t above = k > 0 ? spans[k - 1].plane : std::uint8_t{0};
+    const std::uint8_t below = k < spans.size() ? spans[k].plane : std::uint8_t{0};
+    StaticVector<std::uint8_t, kMaxPlanes> candidates;
+    const auto consider = [&](std::uint8_t plane) {
+      if (plane == above || plane == below) return;
+      static_cast<void>(candidates.try_push_back(plane));
+    };
+    if (any_beside) {
+      for (const ColumnSpan& other : columns_[static_cast<std::size_t>(beside)]) {
+        if (other.top <= until + 1 && other.bottom >= gap_from - 1) consider(other.plane);
+      }
+    }
+    for (std::size_t p = first_plane; p <= last_plane; ++p) consider(static_cast<std::uint8_t>(p));
+    ColumnSpan claimed;
+    if (!try_claim(column, gap_from, until, candidates, claimed)) continue;
+    if (!spans.try_push_back(claimed)) continue;
+    std::rotate(spans.begin() + static_cast<std::ptrdiff_t>(k), spans.end() - 1, spans.end());
+    from = claimed.bottom + 1;
+  }
 }
 
 void SurfaceBoundaries::begin_meeting() noexcept {

@@ -41,7 +41,6 @@ class SurfaceBoundaries {
     InversePlane plane;
     PlaneMoments moments;    // of the last refit, weights 1 / sigma^2
     double residual2 = 0.0;  // sum of squared normal distances, per pixel
-    bool alive = false;
   };
 
   void begin(const Params& params, const DepthSigma& noise, const ColumnRays& rays, double fy_px, double cy_px,
@@ -53,6 +52,9 @@ class SurfaceBoundaries {
   // One column's runs to intervals, each run's plane looked up in to_plane.
   void gather(std::int32_t column, const RunSegmentation::Column& runs,
               const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept;
+  // Gives rows that are in none of the column's spans to planes that the column beside shows there, or to one of the
+  // planes first .. last. Such rows are too few for a run of their own.
+  void claim(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
   void begin_meeting() noexcept;
   void meet(std::int32_t column) noexcept;  // change-points between the column's surfaces
   void settle() noexcept;                   // one decision per pair of planes, then all columns follow it
@@ -87,6 +89,11 @@ class SurfaceBoundaries {
   [[nodiscard]] float inverse_sigma(float w) const noexcept { return (base_ * w + per_metre_) * w + quadratic_; }
   // Residual over sigma, squared.
   [[nodiscard]] float cost(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
+  void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
+  // The best of the candidates in rows first .. last; false when none fits.
+  [[nodiscard]] bool try_claim(std::int32_t column, std::int32_t first, std::int32_t last,
+                               const StaticVector<std::uint8_t, kMaxPlanes>& candidates,
+                               ColumnSpan& claimed) const noexcept;
   void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
                                           std::int32_t last) const noexcept;

@@ -142,13 +142,22 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     case Phase::kGrow:
       if (growing_.step()) {
         take_grown_planes();
-        enter(Phase::kMeet);
+        enter(Phase::kGather);
         return kMaxPieceUnits;
       }
       return 1;
+    case Phase::kGather:
+      boundaries_.gather(row_, runs_.columns()[static_cast<std::size_t>(row_)], to_plane_);
+      if (++row_ == column_rays_.columns) enter(round_ == 0 ? Phase::kMeet : Phase::kClaim);
+      return 1;
+    case Phase::kClaim: {  // from left to right and back
+      const std::int32_t last = column_rays_.columns - 1, g = row_ <= last ? row_ : 2 * last + 1 - row_;
+      boundaries_.claim(g, row_ <= last ? g - 1 : g + 1, first_found_, plane_count_);
+      if (++row_ == 2 * column_rays_.columns) enter(Phase::kMeet);
+      return 1;
+    }
     case Phase::kMeet:
       if (row_ == 0) boundaries_.begin_meeting();
-      boundaries_.gather(row_, runs_.columns()[static_cast<std::size_t>(row_)], to_plane_);
       boundaries_.meet(row_);
       if (++row_ == column_rays_.columns) {
         boundaries_.settle();
@@ -162,11 +171,20 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       if (++row_ == column_rays_.columns) {
         solve_planes();
         if (round_ == 0) merge_planes();
-        enter(round_ == 0 ? Phase::kMeet : Phase::kPieces);
+        enter(round_ == 0 ? Phase::kSearch : Phase::kPieces);
         ++round_;
         return kMaxPieceUnits;
       }
       return 2;
+    case Phase::kSearch:
+      if (row_ == 0) begin_search();
+      search_.add_column(column_rays_, columns_, row_, boundaries_.columns()[static_cast<std::size_t>(row_)]);
+      if (++row_ == column_rays_.columns) {
+        take_found_planes();
+        enter(Phase::kGather);
+        return kMaxPieceUnits;
+      }
+      return 1;
     case Phase::kPieces:
       counters_.run_overflow += boundaries_.overflow();
       find_pieces();
@@ -265,6 +283,33 @@ void SurfaceExtractor::merge_planes() noexcept {
       q.alive = false;
       for (std::uint8_t& plane : to_plane_) plane = plane == gone ? static_cast<std::uint8_t>(keep) : plane;
     }
+  }
+}
+
+void SurfaceExtractor::begin_search() noexcept {
+  search_.begin(params_.remainder, view_.camera_up);
+  for (std::size_t i = 1; i <= plane_count_; ++i) {
+    const Plane& p = planes_[i];
+    if (!p.alive) continue;
+    if (p.kind == SurfaceKind::kTread) search_.know_level(p.plane);
+    if (p.kind == SurfaceKind::kRiser) search_.know_upright(p.plane, p.pixels);
+  }
+}
+
+void SurfaceExtractor::take_found_planes() noexcept {
+  search_.finish();
+  first_found_ = plane_count_ + 1;
+  for (const InversePlane& found : search_.found()) {
+    if (plane_count_ == kMaxPlanes) {
+      ++counters_.plane_overflow;
+      break;
+    }
+    Plane& p = planes_[++plane_count_];
+    p = Plane{};
+    p.plane = found;
+    p.kind = kind_of(found, view_.camera_up, params_.kind_tilt_rad);
+    p.alive = true;
+    boundaries_.plane(plane_count_).plane = found;
   }
 }
 

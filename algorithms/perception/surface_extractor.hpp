@@ -18,6 +18,7 @@
 #include "algorithms/perception/images.hpp"
 #include "algorithms/perception/plane_fit.hpp"
 #include "algorithms/perception/plane_growing.hpp"
+#include "algorithms/perception/remainder_search.hpp"
 #include "algorithms/perception/run_segmentation.hpp"
 #include "algorithms/perception/self_filter.hpp"
 #include "algorithms/perception/surface_boundaries.hpp"
@@ -32,6 +33,7 @@ class SurfaceExtractor {
     RunSegmentation::Params runs;
     PlaneGrowing::Params growing;
     SurfaceBoundaries::Params boundaries;
+    RemainderSearch::Params remainder;
     PlaneFit::Params planes;
     EdgeLineFinder::Params edge_lines;
     double kind_tilt_rad = 0.21;  // a fitted plane within this of level is a tread, of upright a riser
@@ -98,8 +100,11 @@ class SurfaceExtractor {
     kMask,
     kReduce,
     kGrow,
+    kGather,
+    kClaim,
     kMeet,
     kRefit,
+    kSearch,
     kPieces,
     kProfile,
     kOutline,
@@ -138,6 +143,8 @@ class SurfaceExtractor {
 
   void reduce_row() noexcept;
   void take_grown_planes() noexcept;
+  void begin_search() noexcept;
+  void take_found_planes() noexcept;
   void merge_planes() noexcept;
   void solve_planes() noexcept;
   void find_pieces() noexcept;
@@ -190,6 +197,8 @@ class SurfaceExtractor {
   RunSegmentation runs_;
   PlaneGrowing growing_;
   SurfaceBoundaries boundaries_;
+  RemainderSearch search_;
+  std::size_t first_found_ = 1;  // planes first_found_ .. plane_count_ came from the search
   std::array<std::uint8_t, kMaxPlanes + 1> to_plane_{};    // from a grown plane
   Raster<std::uint8_t, kColumns, kDepthHeight_px> owner_;  // plane of each column's row, 0 = none
 
