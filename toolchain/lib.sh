@@ -47,11 +47,19 @@ ensure_packages() {
   }
 }
 
+# CMake's options for this machine's processor. Exported, for the gates' own shells.
+export kProcessorOptions=
+if [[ $(uname -m) == x86_64 ]] && ! grep -qw avx2 /proc/cpuinfo; then
+  kProcessorOptions=-DPOLYGMAP_AVX2=OFF
+  say "this processor has no AVX2, so everything is built without: the same results, and perception takes longer"
+fi
+
 # configure PRESET: once, and again when the presets or the toolchain file changed. CMake itself sees the rest.
 configure() {
   local stamp=build/$1/.configured key
-  key=$(sha256sum CMakePresets.json toolchain/aarch64-orin.cmake)
+  key=$(sha256sum CMakePresets.json toolchain/aarch64-orin.cmake; echo "$kProcessorOptions")
   [[ -e build/$1/build.ninja && -e $stamp && $(<"$stamp") == "$key" ]] && return 0
-  cmake --preset "$1" -DCMAKE_CXX_COMPILER_LAUNCHER= || return 1  # ccache loses the call graphs
+  # shellcheck disable=SC2086 # none or one
+  cmake --preset "$1" -DCMAKE_CXX_COMPILER_LAUNCHER= $kProcessorOptions || return 1  # ccache loses the call graphs
   printf '%s\n' "$key" >"$stamp"
 }
