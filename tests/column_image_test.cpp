@@ -3,46 +3,98 @@
 
 #include <gtest/gtest.h>
 
-#include <vector>
+#include <algorithm>
+#include <initializer_list>
 
 namespace polygmap {
 namespace {
 
 constexpr RawRange kRange{200, 4000, 1000.0F};
 
+// Rows of the rasters' length, of which a picture fills the beginning.
+struct ReducedPicture {
+  std::array<std::uint16_t, kDepthWidth_px> raw{};
+  std::array<std::uint8_t, kHalfWidth_px> body{};
+  std::array<float, kColumns> w{};
+  std::array<std::uint8_t, kColumns> valid{};
+  ReducedRow row;
+
+  explicit ReducedPicture(std::initializer_list<std::uint16_t> pixels = {},
+                          std::initializer_list<std::uint8_t> flags = {}) {
+    std::copy(pixels.begin(), pixels.end(), raw.begin());
+    std::copy(flags.begin(), flags.end(), body.begin());
+    row = reduce_to_columns(kRange, raw.data(), flags.size() == 0 ? nullptr : body.data(),
+                            static_cast<std::int32_t>(pixels.size()) / kColumn_px, w.data(), valid.data());
+  }
+};
+
 TEST(ColumnImage, ValidPixels_AreAveragedAsInverseDepth) {
-  const std::vector<std::uint16_t> raw{1000, 2000, 1000, 2000, 500, 500, 500, 500};
-  std::array<float, 2> w{};
-  std::array<std::uint8_t, 2> valid{};
-  reduce_to_columns(kRange, raw.data(), nullptr, 2, w.data(), valid.data());
-  EXPECT_FLOAT_EQ(w[0], 0.75F);
-  EXPECT_FLOAT_EQ(w[1], 2.0F);
-  EXPECT_EQ(valid[0], 4);
+  const ReducedPicture picture({1000, 2000, 1000, 2000, 500, 500, 500, 500});
+  EXPECT_FLOAT_EQ(picture.w[0], 0.75F);
+  EXPECT_FLOAT_EQ(picture.w[1], 2.0F);
+  EXPECT_EQ(picture.valid[0], 4);
+  EXPECT_EQ(picture.row.measured_px, 8);
+  EXPECT_EQ(picture.row.body_columns, 0);
 }
 
 TEST(ColumnImage, PixelsOutsideTheRange_DoNotCount) {
-  const std::vector<std::uint16_t> raw{0, 1000, 65535, 4001, 199, 0, 4500, 0, 200, 4000, 0, 0};
-  std::array<float, 3> w{};
-  std::array<std::uint8_t, 3> valid{};
-  reduce_to_columns(kRange, raw.data(), nullptr, 3, w.data(), valid.data());
-  EXPECT_FLOAT_EQ(w[0], 1.0F);
-  EXPECT_EQ(valid[0], 1);
-  EXPECT_EQ(w[1], 0.0F);
-  EXPECT_EQ(valid[1], 0);
-  EXPECT_FLOAT_EQ(w[2], 0.5F * (5.0F + 0.25F));
-  EXPECT_EQ(valid[2], 2);
+  const ReducedPicture picture({0, 1000, 65535, 4001, 199, 0, 4500, 0, 200, 4000, 0, 0});
+  EXPECT_FLOAT_EQ(picture.w[0], 1.0F);
+  EXPECT_EQ(picture.valid[0], 1);
+  EXPECT_EQ(picture.w[1], 0.0F);
+  EXPECT_EQ(picture.valid[1], 0);
+  EXPECT_FLOAT_EQ(picture.w[2], 0.5F * (5.0F + 0.25F));
+  EXPECT_EQ(picture.valid[2], 2);
+  EXPECT_EQ(picture.row.measured_px, 3);
 }
 
 TEST(ColumnImage, BodyPixels_EmptyTheirColumn) {
-  const std::vector<std::uint16_t> raw(12, 1000);
-  const std::vector<std::uint8_t> body{0, 0, kPixelBody, 0, 0, kPixelBody};
-  std::array<float, 3> w{};
-  std::array<std::uint8_t, 3> valid{};
-  reduce_to_columns(kRange, raw.data(), body.data(), 3, w.data(), valid.data());
-  EXPECT_GT(w[0], 0.0F);
-  EXPECT_EQ(w[1], 0.0F);
-  EXPECT_EQ(w[2], 0.0F);
-  EXPECT_EQ(valid[1] + valid[2], 0);
+  const ReducedPicture picture({1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000},
+                               {0, 0, kPixelBody, 0, 0, kPixelBody});
+  EXPECT_GT(picture.w[0], 0.0F);
+  EXPECT_EQ(picture.w[1], 0.0F);
+  EXPECT_EQ(picture.w[2], 0.0F);
+  EXPECT_EQ(picture.valid[1] + picture.valid[2], 0);
+  EXPECT_EQ(picture.row.measured_px, 4);
+  EXPECT_EQ(picture.row.body_columns, 2);
+}
+
+// What an earlier, wider frame left behind the picture's rows is not in it.
+TEST(ColumnImage, ColumnsBeyondThePicture_AreEmpty) {
+  ReducedPicture picture({1000, 1000, 1000, 1000});
+  picture.raw.fill(1000);
+  picture.body.fill(kPixelBody);
+  picture.body[0] = picture.body[1] = 0;
+  picture.row = reduce_to_columns(kRange, picture.raw.data(), picture.body.data(), 1, picture.w.data(),
+                                  picture.valid.data());
+  EXPECT_EQ(picture.row.measured_px, 4);
+  EXPECT_EQ(picture.row.body_columns, 0);
+  for (std::size_t g = 1; g < kColumns; ++g) EXPECT_EQ(picture.w[g], 0.0F) << g;
+}
+
+// Every pixel value in every place, against the same sum one pixel at a time: the result that all machines have.
+TEST(ColumnImage, VectorsOfAnyWidth_GiveTheResultOfOneColumn) {
+  std::uint32_t state = 1;
+  for (int repeat = 0; repeat < 50; ++repeat) {
+    ReducedPicture picture;
+    for (std::uint16_t& raw : picture.raw) raw = static_cast<std::uint16_t>((state = state * 1664525U + 1013904223U) >> 19U);
+    picture.row = reduce_to_columns(kRange, picture.raw.data(), nullptr, kColumns, picture.w.data(),
+                                    picture.valid.data());
+    for (std::size_t g = 0; g < kColumns; ++g) {
+      std::array<float, 4> d{}, good{};
+      float n = 0.0F;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const std::uint16_t raw = picture.raw[4 * g + i];
+        good[i] = raw >= kRange.min && raw <= kRange.max ? 1.0F : 0.0F;
+        d[i] = good[i] > 0.0F ? static_cast<float>(raw) : 1.0F;
+        n += good[i];
+      }
+      const float lower = d[0] * d[1], upper = d[2] * d[3];
+      const float sum = (good[0] * d[1] + good[1] * d[0]) * upper + (good[2] * d[3] + good[3] * d[2]) * lower;
+      ASSERT_EQ(picture.w[g], sum * kRange.per_metre / (lower * upper * std::max(n, 1.0F))) << g;
+      ASSERT_EQ(static_cast<float>(picture.valid[g]), n);
+    }
+  }
 }
 
 }  // namespace

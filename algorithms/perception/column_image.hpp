@@ -46,8 +46,13 @@ struct RawRange {
   float per_metre = 1000.0F;  // raw units in a metre
 };
 
-// One row of raw depth to one row of columns. body: half-resolution flags of that row, or null.
-void reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body, std::int32_t columns,
-                       float* inverse_depth, std::uint8_t* valid) noexcept;
+struct ReducedRow {
+  std::int32_t measured_px = 0;
+  std::int32_t body_columns = 0;
+};
+// One row of raw depth to one row of columns. body: half-resolution flags of that row, or null. Works in whole vector
+// registers: all rows are as long as the rasters', and columns beyond the picture's come out empty.
+ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body,
+                             std::int32_t columns, float* inverse_depth, std::uint8_t* valid) noexcept;
 
 }  // namespace polygmap

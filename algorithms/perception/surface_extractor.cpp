@@ -236,13 +236,10 @@ void SurfaceExtractor::reduce_row() noexcept {
     self_filter_.mark_row(row_ / 2, rays_.width_px, flags);
   }
   const std::int32_t columns = column_rays_.columns;
-  const std::uint8_t* valid = columns_.valid.row(row_);
-  reduce_to_columns(raw_range_, full_.row(row_), flags, columns, columns_.inverse_depth.row(row_),
-                    columns_.valid.row(row_));
-  for (std::int32_t g = 0; g < columns; ++g) {
-    measured_px_ += valid[g];
-    outside_body_px_ += ((flags[2 * g] | flags[2 * g + 1]) & kPixelBody) == 0 ? kColumn_px : 0;
-  }
+  const ReducedRow reduced = reduce_to_columns(raw_range_, full_.row(row_), flags, columns,
+                                               columns_.inverse_depth.row(row_), columns_.valid.row(row_));
+  measured_px_ += reduced.measured_px;
+  outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
   runs_.add_row(row_);
 }
 
