@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
+
 #include "tests/support/column_scene.hpp"
 
 namespace polygmap {
@@ -69,7 +71,7 @@ TEST_F(RunSegmentationTest, SingleOutliersAndShortGaps_StayInsideTheRun) {
   }
 }
 
-// The vector code and the replay of single columns are one arithmetic: what a column says does not depend on its place.
+// Whatever register a column lies in, it says the same.
 TEST_F(RunSegmentationTest, EqualColumns_GiveEqualRuns) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r / 37 % 2 == 0 ? &riser_ : &floor_; }, 0.002, 5);
   for (std::int32_t r = 0; r < kDepthHeight_px; ++r) {
@@ -85,6 +87,32 @@ TEST_F(RunSegmentationTest, EqualColumns_GiveEqualRuns) {
       EXPECT_EQ(runs[k].slope, columns[0][k].slope);
     }
   }
+}
+
+// Two planes, dropouts and noise in whole numbers: not one bit may depend on the width of the machine's registers.
+TEST_F(RunSegmentationTest, VectorsOfAnyWidth_GiveTheSameRuns) {
+  std::uint32_t state = 1, hash = 2166136261U;
+  for (std::int32_t r = 0; r < kDepthHeight_px; ++r) {
+    for (std::int32_t g = 0; g < kColumns; ++g) {
+      const std::uint32_t draw = (state = state * 1664525U + 1013904223U) >> 22U;
+      const std::int32_t along = (r + g / 4) % 60, depth = along < 25 ? 1000 - 2 * along : 900 + 6 * along;
+      const float noise = static_cast<float>(draw % 64U) * (1.0F / 16384.0F);
+      scene_.image->inverse_depth(g, r) = draw < 30U ? 0.0F : 512.0F / static_cast<float>(depth) + noise;
+    }
+  }
+  const auto add = [&hash](std::uint32_t value) { hash = (hash ^ value) * 16777619U; };
+  std::size_t count = 0;
+  for (const RunSegmentation::Column& runs : segment()) {
+    count += runs.size();
+    for (const polygmap::Run& run : runs) {
+      add(static_cast<std::uint32_t>(run.top));
+      add(static_cast<std::uint32_t>(run.bottom));
+      add(std::bit_cast<std::uint32_t>(run.inverse_depth));
+      add(std::bit_cast<std::uint32_t>(run.slope));
+    }
+  }
+  EXPECT_GT(count, std::size_t{kColumns} * 12);
+  EXPECT_EQ(hash, 2788143759U);
 }
 
 TEST_F(RunSegmentationTest, MoreRunsThanFit_AreCounted) {

@@ -45,37 +45,39 @@ class RunSegmentation {
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }  // runs that found no room
 
  private:
-  static constexpr float kPending = 3.0F;  // outliers in a row that end a run
+  static constexpr std::int32_t kPending = 3;  // outliers in a row that end a run
   static constexpr std::int32_t kMinRows = 3;
   static constexpr float kMemory = 0.7F;  // of the mean of residuals, per row
-
-  // Events, as floats: one vector width for all. No two at once.
-  static constexpr float kNone = 0.0F, kOut = 1.0F, kBend = 2.0F, kGap = 3.0F;
   using Floats = std::array<float, kColumns>;
 
-  // The state of all columns' open runs. Sums over accepted rows, t counted from the run's top and inverse depth from
-  // the first row's, so that single precision is enough.
+  // The state of all columns' open runs: the least-squares line through the accepted rows, updated row by row, so that
+  // nothing large is ever subtracted and single precision is enough.
   struct Open {
-    Floats n, t, tt, w, tw;                    // sums
-    Floats first, a, b;                        // inverse depth at top; line first + a + b t
-    Floats mean;                               // recursive mean of normalised residuals
-    Floats top, last, pending, pending_first;  // rows, as floats: one vector width for all
+    Floats rows;     // accepted, 0: no run is open
+    Floats value;    // of the line at the row last stepped, 1/m
+    Floats slope;    // 1/m per row
+    Floats lever;    // from the mean of the accepted rows to the row last stepped
+    Floats squares;  // sum of squared rows from that mean
+    Floats drift;    // recursive mean of residuals, 1/m
+    Floats absent;   // rows since the last accepted one, an outlier counts outlier_weight_; whole numbers
   };
 
+  void step(std::int32_t first_column, std::int32_t row) noexcept;
   void handle(std::int32_t g, std::int32_t row) noexcept;
-  void close(std::int32_t g, std::int32_t bottom) noexcept;
+  void replay(std::int32_t g, std::int32_t from, std::int32_t row) noexcept;
+  void forget(std::int32_t g, std::int32_t forgotten, std::int32_t row) noexcept;
+  [[nodiscard]] std::int32_t last_accepted(std::int32_t g, std::int32_t row) const noexcept;
+  void close(std::int32_t g, std::int32_t bottom, std::int32_t row) noexcept;
   void clear(std::int32_t g) noexcept;
-  template <typename Lanes>
-  void step(std::int32_t column, float row, const float* inverse_depth) noexcept;
 
   const ColumnImage* image_ = nullptr;
   std::int32_t column_count_ = 0;
   std::int32_t height_px_ = 0;
-  float outlier2_ = 0.0F, bend_ = 0.0F, jump_share_ = 0.0F, base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F,
-        floor_ = 0.0F;
-  float max_gap_ = 0.0F, fy_ = 1.0F, cy_ = 0.0F;
+  float outlier2_ = 0.0F, bend2_ = 0.0F, max_gap_ = 0.0F, outlier_weight_ = 1.0F, fy_ = 1.0F, cy_ = 0.0F;
+  float base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F, floor2_ = 0.0F;
+  std::array<float, 3> jump_{};  // a polynomial of inverse depth
   Open open_;
-  Floats event_{};
+  std::array<std::int16_t, kColumns> top_{};
   Columns runs_;
   std::uint32_t overflow_ = 0;
 };
