@@ -65,8 +65,8 @@ TEST(ColumnImage, ColumnsBeyondThePicture_AreEmpty) {
   picture.raw.fill(1000);
   picture.body.fill(kPixelBody);
   picture.body[0] = picture.body[1] = 0;
-  picture.row = reduce_to_columns(kRange, picture.raw.data(), picture.body.data(), 1, picture.w.data(),
-                                  picture.valid.data());
+  picture.row =
+      reduce_to_columns(kRange, picture.raw.data(), picture.body.data(), 1, picture.w.data(), picture.valid.data());
   EXPECT_EQ(picture.row.measured_px, 4);
   EXPECT_EQ(picture.row.body_columns, 0);
   for (std::size_t g = 1; g < kColumns; ++g) EXPECT_EQ(picture.w[g], 0.0F) << g;
@@ -77,9 +77,10 @@ TEST(ColumnImage, VectorsOfAnyWidth_GiveTheResultOfOneColumn) {
   std::uint32_t state = 1;
   for (int repeat = 0; repeat < 50; ++repeat) {
     ReducedPicture picture;
-    for (std::uint16_t& raw : picture.raw) raw = static_cast<std::uint16_t>((state = state * 1664525U + 1013904223U) >> 19U);
-    picture.row = reduce_to_columns(kRange, picture.raw.data(), nullptr, kColumns, picture.w.data(),
-                                    picture.valid.data());
+    for (std::uint16_t& raw : picture.raw)
+      raw = static_cast<std::uint16_t>((state = state * 1664525U + 1013904223U) >> 19U);
+    picture.row =
+        reduce_to_columns(kRange, picture.raw.data(), nullptr, kColumns, picture.w.data(), picture.valid.data());
     for (std::size_t g = 0; g < kColumns; ++g) {
       std::array<float, 4> d{}, good{};
       float n = 0.0F;

@@ -47,8 +47,8 @@ ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, co
       return (cv::v_min(above, reach) == above) & wanted;
     };
     const Raw good_a = good(a), good_b = good(b), good_c = good(c), good_d = good(d);
-    const Raw count = cv::v_sub_wrap(
-        none, cv::v_add_wrap(cv::v_add_wrap(good_a, good_b), cv::v_add_wrap(good_c, good_d)));
+    const Raw count =
+        cv::v_sub_wrap(none, cv::v_add_wrap(cv::v_add_wrap(good_a, good_b), cv::v_add_wrap(good_c, good_d)));
     // Pixels that are none become 1, and leave the numerators below.
     a = cv::v_max(a & good_a, one), b = cv::v_max(b & good_b, one);
     c = cv::v_max(c & good_c, one), d = cv::v_max(d & good_d, one);

@@ -35,20 +35,20 @@ struct PlaneSample {
 // sigma of an inverse depth on the plane: sigma_z w^2 with sigma_z of the noise model and cos(incidence) = w d / |ray|.
 [[nodiscard]] double inverse_depth_sigma(const DepthSigma& noise, const InversePlane& plane, const Vec3& ray) noexcept;
 
-// Weighted moments of samples: sum of g ray ray^T, g ray w, g w^2, g z^2... enough for a fit, and they add.
+// Weighted moments of samples: sum of g ray ray^T and g ray w, enough for a fit, and they add.
 struct PlaneMoments {
   double xx = 0, xy = 0, x1 = 0, yy = 0, y1 = 0, one = 0;  // of g ray ray^T
-  double xw = 0, yw = 0, w1 = 0, ww = 0;                   // of g ray w and g w w
+  double xw = 0, yw = 0, w1 = 0;                           // of g ray w
   double count = 0;
 
   void add(double g, double x, double y, double w) noexcept {
     xx += g * x * x, xy += g * x * y, x1 += g * x, yy += g * y * y, y1 += g * y, one += g;
-    xw += g * x * w, yw += g * y * w, w1 += g * w, ww += g * w * w;
+    xw += g * x * w, yw += g * y * w, w1 += g * w;
     count += 1.0;
   }
   void add(const PlaneMoments& o) noexcept {
     xx += o.xx, xy += o.xy, x1 += o.x1, yy += o.yy, y1 += o.y1, one += o.one;
-    xw += o.xw, yw += o.yw, w1 += o.w1, ww += o.ww;
+    xw += o.xw, yw += o.yw, w1 += o.w1;
     count += o.count;
   }
   [[nodiscard]] Mat3 matrix() const noexcept { return (Mat3() << xx, xy, x1, xy, yy, y1, x1, y1, one).finished(); }

@@ -12,11 +12,11 @@ namespace {
 using Wide = cv::v_float32;
 static_assert(kColumns % Wide::nlanes == 0);
 
-constexpr float kNowhere = -1e3F;  // 1/m: the line of a column without a run, which no row fits
-constexpr float kNever = -1e9F;    // its absent rows
+constexpr float kNowhere = -1e3F;   // 1/m: the line of a column without a run, which no row fits
+constexpr float kNever = -1e9F;     // its absent rows
 constexpr float kNoSpread = 1e-9F;  // added to a sum of squares that may be 0
-constexpr float kFitted = 3.0F;    // rows that make a line
-constexpr float kBends = 7.0F;     // a run of more rows may bend away
+constexpr float kFitted = 3.0F;     // rows that make a line
+constexpr float kBends = 7.0F;      // a run of more rows may bend away
 constexpr std::int32_t kBentRows = 3;
 
 }  // namespace
@@ -65,8 +65,8 @@ void RunSegmentation::step(std::int32_t first_column, std::int32_t at_row) noexc
   const Wide valid = w > zero, fitted = n >= all(kFitted);
 
   const Wide residual = w - value;
-  // Residual across the line in space against sigma_z: dw^2 / (|m|^2 w^2) with m of the line in the column's plane. Both
-  // sides are multiplied by w^2, so that sigma is that of the inverse depth.
+  // Residual across the line in space against sigma_z: dw^2 / (|m|^2 w^2) with m of the line in the column's plane.
+  // Both sides are multiplied by w^2, so that sigma is that of the inverse depth.
   const Wide my = slope * all(fy_), m0 = value + slope * all(cy_ - static_cast<float>(at_row));
   const Wide w2 = w * w, sigma = (all(base_) * w + all(per_metre_)) * w + all(quadratic_);
   // Predicting one row past n has about (1 + 4 / n) of a row's variance.
@@ -169,7 +169,8 @@ void RunSegmentation::forget(std::int32_t column, std::int32_t forgotten, std::i
 std::int32_t RunSegmentation::last_accepted(std::int32_t column, std::int32_t row) const noexcept {
   const auto g = static_cast<std::size_t>(column);
   float absent = open_.absent[g];
-  for (; absent > 0.0F && row > top_[g]; --row) absent -= image_->inverse_depth(column, row) > 0.0F ? outlier_weight_ : 1.0F;
+  for (; absent > 0.0F && row > top_[g]; --row)
+    absent -= image_->inverse_depth(column, row) > 0.0F ? outlier_weight_ : 1.0F;
   return row;
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "algorithms/perception/vectors.hpp"
+
 namespace polygmap {
 namespace {
 
@@ -20,6 +22,7 @@ void SurfaceBoundaries::begin(const Params& params, const DepthSigma& noise, con
   base_ = static_cast<float>(noise.base_m);
   per_metre_ = static_cast<float>(noise.per_metre);
   quadratic_ = static_cast<float>(noise.quadratic_per_m);
+  correlated_share_ = static_cast<float>(noise.correlated_share);
   share_[0] = 1.0F;
   for (std::size_t n = 1; n < share_.size(); ++n) {
     share_[n] = static_cast<float>(noise.correlated_share + (1.0 - noise.correlated_share) / static_cast<double>(n));
@@ -286,42 +289,118 @@ void SurfaceBoundaries::begin_refit() noexcept {
   }
 }
 
-void SurfaceBoundaries::refit(std::int32_t column) noexcept {
+void SurfaceBoundaries::refit(std::int32_t first_column) noexcept {
   constexpr std::int32_t kThick_px = 8;  // thicker surfaces do without the rows next to another
-  const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(column)]);
-  const auto most = static_cast<float>(math::square(params_.inlier_sigmas));
-  for (const ColumnSpan& interval : columns_[static_cast<std::size_t>(column)]) {
-    Plane& plane = planes_[interval.plane];
-    const Line line = line_of(plane.plane, column);
-    const std::int32_t rows = interval.bottom - interval.top + 1, margin = rows > kThick_px ? 1 : 0;
-    // A tall column has rows to spare: neighbours say nearly the same.
-    const std::int32_t stride = rows > 64 ? 3 : (rows > 24 ? 2 : 1);
-    const double d_m = plane.plane.d_m();
-    double n = 0, y1 = 0, yy = 0, w1 = 0, yw = 0, ww = 0, residual2 = 0, count = 0;
-    for (std::int32_t r = interval.top + margin; r <= interval.bottom - margin; r += stride) {
-      const std::int32_t valid = image_->valid(column, r);
-      if (valid == 0 || cost(line, column, r) > most) continue;
-      const auto w = static_cast<double>(image_->inverse_depth(column, r));
-      const auto y = static_cast<double>(rays_->y[static_cast<std::size_t>(r)]);
-      const double relative = w / static_cast<double>(inverse_sigma(static_cast<float>(w)));
-      const double g = valid * stride * relative * relative;
-      n += g, y1 += g * y, yy += g * y * y, w1 += g * w, yw += g * y * w, ww += g * w * w;
-      const double off_m = (w - static_cast<double>(line.a + line.b * static_cast<float>(y))) / w * d_m;
-      residual2 += valid * stride * off_m * off_m;
-      count += valid * stride;
+  std::array<std::size_t, kRefitColumns> next{};
+  const std::int32_t count = std::min(kRefitColumns, rays_->columns - first_column);
+  // Down the columns together: the topmost span that is left, and with it those of its plane that are next elsewhere.
+  for (;;) {
+    Strip strip;
+    std::int32_t topmost = rays_->height_px;
+    for (std::int32_t k = 0; k < count; ++k) {
+      const Column& spans = columns_[static_cast<std::size_t>(first_column + k)];
+      const std::size_t i = next[static_cast<std::size_t>(k)];
+      if (i == spans.size() || spans[i].top >= topmost) continue;
+      topmost = spans[i].top;
+      strip.plane = spans[i].plane;
     }
+    if (topmost == rays_->height_px) return;
+    for (std::int32_t k = 0; k < kRefitColumns; ++k) {
+      const auto lane = static_cast<std::size_t>(k);
+      strip.top[lane] = 1;
+      strip.bottom[lane] = 0;
+      if (k >= count) continue;
+      const Column& spans = columns_[static_cast<std::size_t>(first_column + k)];
+      if (next[lane] == spans.size() || spans[next[lane]].plane != strip.plane) continue;
+      const ColumnSpan& span = spans[next[lane]++];
+      const int margin = span.bottom - span.top >= kThick_px ? 1 : 0;
+      strip.top[lane] = static_cast<std::int16_t>(span.top + margin);
+      strip.bottom[lane] = static_cast<std::int16_t>(span.bottom - margin);
+    }
+    refit(first_column, strip);
+  }
+}
+
+void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip) noexcept {
+  using Wide = cv::v_float32;
+  using Lanes = std::array<float, kRefitColumns>;
+  static_assert(kRefitColumns % Wide::nlanes == 0 && kColumns % kRefitColumns == 0);
+  Plane& plane = planes_[strip.plane];
+  std::int32_t top = rays_->height_px, bottom = 0, rows = 0;
+  for (std::size_t k = 0; k < kRefitColumns; ++k) {
+    if (strip.top[k] > strip.bottom[k]) continue;
+    top = std::min<std::int32_t>(top, strip.top[k]);
+    bottom = std::max<std::int32_t>(bottom, strip.bottom[k]);
+    rows = std::max(rows, strip.bottom[k] - strip.top[k] + 1);
+  }
+  if (rows == 0) return;
+  // A tall strip has rows to spare: neighbours say nearly the same.
+  const std::int32_t stride = rows > 64 ? 3 : (rows > 24 ? 2 : 1);
+  // Rows count from top, and inverse depths from the plane as it is: what is summed stays small, so that single
+  // precision is enough.
+  const double y0 = static_cast<double>(rays_->y[static_cast<std::size_t>(top)]), pitch = 1.0 / fy_px_;
+  const auto slope = static_cast<float>(plane.plane.m.y() * pitch);
+  Lanes at_top{}, from{}, to{};
+  for (std::size_t k = 0; k < kRefitColumns; ++k) {
+    const auto column = static_cast<std::size_t>(first_column) + k;
+    const auto x = static_cast<double>(rays_->x[column]);
+    at_top[k] = static_cast<float>(plane.plane.m.x() * x + plane.plane.m.y() * y0 + plane.plane.m.z());
+    from[k] = static_cast<float>(strip.top[k] - top);
+    to[k] = static_cast<float>(strip.bottom[k] - top);
+  }
+
+  Lanes n, t1, tt, r1, tr, off2, count;
+  const auto all = [](float value) { return cv::vx_setall_f32(value); };
+  const Wide least = all(1e-3F), base = all(base_), per_metre = all(per_metre_), b = all(slope);
+  const Wide quadratic = all(quadratic_), share1 = all(correlated_share_), share0 = all(1.0F - correlated_share_);
+  const Wide most = all(static_cast<float>(math::square(params_.inlier_sigmas) * plane.plane.m.squaredNorm()));
+  for (std::int32_t k = 0; k < kRefitColumns; k += Wide::nlanes) {
+    const Wide first = cv::vx_load(from.data() + k), last = cv::vx_load(to.data() + k);
+    const Wide a = cv::vx_load(at_top.data() + k);
+    Wide sum_n = all(0.0F), sum_t = sum_n, sum_tt = sum_n, sum_r = sum_n, sum_tr = sum_n;
+    Wide sum_off2 = sum_n, sum_count = sum_n;
+    for (std::int32_t r = top; r <= bottom; r += stride) {
+      const Wide t = all(static_cast<float>(r - top));
+      const Wide w = cv::v_max(cv::vx_load(image_->inverse_depth.row(r) + first_column + k), least);
+      const Wide pixels =
+          cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand_q(image_->valid.row(r) + first_column + k)));
+      const Wide residual = w - (a + b * t), sigma = (base * w + per_metre) * w + quadratic;
+      const Wide w2 = w * w, variance = sigma * sigma;
+      // The mean of n pixels has (share1 + share0 / n) of a pixel's variance. Without pixels nothing counts.
+      const Wide inside = (t >= first) & (t <= last) &
+                          (residual * residual * w2 * pixels <= most * variance * (share1 * pixels + share0));
+      const Wide used = pixels & inside;
+      const Wide g = used * w2 / variance;
+      const Wide gt = g * t, gr = g * residual;
+      const Wide relative = residual / w;
+      sum_n += g, sum_t += gt, sum_tt += gt * t, sum_r += gr, sum_tr += gr * t;
+      sum_off2 += used * relative * relative;
+      sum_count += used;
+    }
+    cv::v_store(n.data() + k, sum_n), cv::v_store(t1.data() + k, sum_t), cv::v_store(tt.data() + k, sum_tt);
+    cv::v_store(r1.data() + k, sum_r), cv::v_store(tr.data() + k, sum_tr);
+    cv::v_store(off2.data() + k, sum_off2), cv::v_store(count.data() + k, sum_count);
+  }
+
+  const double d_m = plane.plane.d_m();
+  for (std::size_t k = 0; k < kRefitColumns; ++k) {
+    if (!(count[k] > 0.0F)) continue;
+    const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(first_column) + k]);
+    const double middle = static_cast<double>(rays_->y[static_cast<std::size_t>((strip.top[k] + strip.bottom[k]) / 2)]);
     // Weights so far are per squared relative depth; |m|^2 |ray|^2 makes them 1 / sigma^2.
-    const double scale =
-        d_m * d_m /
-        (x * x +
-         math::square(static_cast<double>(rays_->y[static_cast<std::size_t>((interval.top + interval.bottom) / 2)])) +
-         1.0);
+    const double scale = stride * d_m * d_m / (x * x + middle * middle + 1.0);
+    const auto of = [scale](float sum) { return scale * static_cast<double>(sum); };
+    // y = y0 + pitch t, w = residual + a + b t.
+    const auto a0 = static_cast<double>(at_top[k]), b0 = static_cast<double>(slope);
+    const double g = of(n[k]), gt = of(t1[k]), gtt = of(tt[k]);
+    const double gw = of(r1[k]) + a0 * g + b0 * gt, gtw = of(tr[k]) + a0 * gt + b0 * gtt;
+    const double gy = y0 * g + pitch * gt;
     PlaneMoments& m = plane.moments;
-    m.xx += scale * x * x * n, m.xy += scale * x * y1, m.x1 += scale * x * n, m.yy += scale * yy;
-    m.y1 += scale * y1, m.one += scale * n;
-    m.xw += scale * x * w1, m.yw += scale * yw, m.w1 += scale * w1, m.ww += scale * ww;
-    m.count += count;
-    plane.residual2 += residual2;
+    m.xx += x * x * g, m.xy += x * gy, m.x1 += x * g, m.one += g, m.y1 += gy;
+    m.yy += y0 * gy + pitch * (y0 * gt + pitch * gtt);
+    m.xw += x * gw, m.w1 += gw, m.yw += y0 * gw + pitch * gtw;
+    m.count += stride * static_cast<double>(count[k]);
+    plane.residual2 += stride * d_m * d_m * static_cast<double>(off2[k]);
   }
 }
 

@@ -34,7 +34,7 @@ class SurfaceBoundaries {
   };
   static constexpr std::size_t kMaxPlanes = 96;
   static constexpr std::size_t kMaxIntervals = 32;
-  static constexpr std::int32_t kRefitColumns = 4;  // per piece
+  static constexpr std::int32_t kRefitColumns = 8;  // per call, the same number for every vector width
   using Column = StaticVector<ColumnSpan, kMaxIntervals>;
   using Columns = std::array<Column, kColumns>;
   struct Plane {
@@ -59,7 +59,8 @@ class SurfaceBoundaries {
   void meet(std::int32_t column) noexcept;  // change-points between the column's surfaces
   void settle() noexcept;                   // one decision per pair of planes, then all columns follow it
   void begin_refit() noexcept;
-  void refit(std::int32_t column) noexcept;  // adds the column to its planes' moments
+  // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments.
+  void refit(std::int32_t first_column) noexcept;
 
   [[nodiscard]] Columns& columns() noexcept { return columns_; }
   [[nodiscard]] const Columns& columns() const noexcept { return columns_; }
@@ -94,6 +95,12 @@ class SurfaceBoundaries {
   [[nodiscard]] bool try_claim(std::int32_t column, std::int32_t first, std::int32_t last,
                                const StaticVector<std::uint8_t, kMaxPlanes>& candidates,
                                ColumnSpan& claimed) const noexcept;
+  // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
+  struct Strip {
+    std::array<std::int16_t, kRefitColumns> top{}, bottom{};
+    std::uint8_t plane = 0;
+  };
+  void refit(std::int32_t first_column, const Strip& strip) noexcept;
   void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
                                           std::int32_t last) const noexcept;
@@ -103,7 +110,7 @@ class SurfaceBoundaries {
   const ColumnRays* rays_ = nullptr;
   const ColumnImage* image_ = nullptr;
   double fy_px_ = 1.0, cy_px_ = 0.0;
-  float base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F;
+  float base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F, correlated_share_ = 0.0F;
   std::array<float, kColumn_px + 1> share_{};  // of a pixel's variance that the mean of n pixels has
 
   std::array<Plane, kMaxPlanes + 1> planes_{};

@@ -168,7 +168,8 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       // Round 0 sharpens the grown planes, round 1 measures them within their final boundaries.
       if (row_ == 0) boundaries_.begin_refit();
       boundaries_.refit(row_);
-      if (++row_ == column_rays_.columns) {
+      row_ += SurfaceBoundaries::kRefitColumns;
+      if (row_ >= column_rays_.columns) {
         solve_planes();
         if (round_ == 0) merge_planes();
         enter(round_ == 0 ? Phase::kSearch : Phase::kPieces);
