@@ -54,54 +54,57 @@ void RunSegmentation::clear(std::int32_t column) noexcept {
   open_.absent[g] = kNever;
 }
 
-void RunSegmentation::step(std::int32_t first_column, std::int32_t at_row) noexcept {
-  const auto g = static_cast<std::size_t>(first_column);
-  const auto all = [](float x) { return cv::vx_setall_f32(x); };
-  const auto load = [g](const Floats& x) { return cv::vx_load(x.data() + g); };
-  const auto store = [g](Floats& to, const Wide& x) { cv::v_store(to.data() + g, x); };
-  const Wide zero = all(0.0F), one = all(1.0F);
-  const Wide w = cv::vx_load(image_->inverse_depth.row(at_row) + g), n = load(open_.rows);
-  const Wide slope = load(open_.slope), value = load(open_.value) + slope, lever = load(open_.lever) + one;
-  const Wide valid = w > zero, fitted = n >= all(kFitted);
-
-  const Wide residual = w - value;
-  // Residual across the line in space against sigma_z: dw^2 / (|m|^2 w^2) with m of the line in the column's plane.
-  // Both sides are multiplied by w^2, so that sigma is that of the inverse depth.
-  const Wide my = slope * all(fy_), m0 = value + slope * all(cy_ - static_cast<float>(at_row));
-  const Wide w2 = w * w, sigma = (all(base_) * w + all(per_metre_)) * w + all(quadratic_);
-  // Predicting one row past n has about (1 + 4 / n) of a row's variance.
-  const Wide share = one / (n + one);
-  const Wide spread = (my * my + m0 * m0) * (sigma * sigma + all(floor2_) * w2 * w2) * (one + all(4.0F) * share);
-  // Two rows make no slope: the third is held against the second.
-  const Wide off = residual + cv::v_select(fitted, zero, slope);
-  const Wide jump = (all(jump_[2]) * w + all(jump_[1])) * w + all(jump_[0]);
-  const Wide fits = off * off * w2 < cv::v_select(fitted, all(outlier2_) * spread, jump * jump * w2);
-  const Wide in = valid & fits;
-
-  // Recursive least squares: a row that joins, at distance x from the others' mean, moves the line by its residual.
-  const Wide x = lever & in, news = residual & in;
-  const Wide lever1 = lever - x * share, squares1 = load(open_.squares) + x * lever1;
-  const Wide gain = news * (lever1 / squares1);
-  const Wide n1 = n + (one & in);
-  const Wide drift0 = load(open_.drift), drift = drift0 + (((news & fitted) - drift0) * all(1.0F - kMemory) & in);
-  const Wide absent = cv::v_select(in, zero, load(open_.absent) + cv::v_select(valid, all(outlier_weight_), one));
-  store(open_.rows, n1);
-  store(open_.value, value + news * share + gain * lever1);
-  store(open_.slope, slope + gain);
-  store(open_.lever, lever1);
-  store(open_.squares, squares1);
-  store(open_.drift, drift);
-  store(open_.absent, absent);
-
-  const Wide strange = cv::v_select(fitted, zero, valid) & ~fits;
-  const Wide bent = in & (n1 > all(kBends)) & (drift * drift * w2 > all(bend2_) * spread);
-  auto events = static_cast<std::uint32_t>(cv::v_signmask(strange | bent | (absent > all(max_gap_))));
-  for (; events != 0; events &= events - 1U) handle(first_column + std::countr_zero(events), at_row);
-}
-
 void RunSegmentation::add_row(std::int32_t row) noexcept {
+  const auto all = [](float x) { return cv::vx_setall_f32(x); };
+  const Wide zero = all(0.0F), one = all(1.0F), four = all(4.0F), memory = all(1.0F - kMemory);
+  const Wide enough = all(kFitted), long_run = all(kBends), outlier_weight = all(outlier_weight_);
+  const Wide base = all(base_), per_metre = all(per_metre_), quadratic = all(quadratic_), floor2 = all(floor2_);
+  const Wide jump0 = all(jump_[0]), jump1 = all(jump_[1]), jump2 = all(jump_[2]);
+  const Wide outlier2 = all(outlier2_), bend2 = all(bend2_), max_gap = all(max_gap_);
+  const Wide fy = all(fy_), to_centre = all(cy_ - static_cast<float>(row));
   // Whole registers: what columns beyond a narrower picture say is never read.
-  for (std::int32_t g = 0; g < column_count_; g += Wide::nlanes) step(g, row);
+  for (std::int32_t column = 0; column < column_count_; column += Wide::nlanes) {
+    const auto g = static_cast<std::size_t>(column);
+    const auto load = [g](const Floats& x) { return cv::vx_load(x.data() + g); };
+    const auto store = [g](Floats& to, const Wide& x) { cv::v_store(to.data() + g, x); };
+    const Wide w = cv::vx_load(image_->inverse_depth.row(row) + g), n = load(open_.rows);
+    const Wide slope = load(open_.slope), value = load(open_.value) + slope, lever = load(open_.lever) + one;
+    const Wide valid = w > zero, fitted = n >= enough;
+
+    const Wide residual = w - value;
+    // Residual across the line in space against sigma_z: dw^2 / (|m|^2 w^2) with m of the line in the column's plane.
+    // Both sides are multiplied by w^2, so that sigma is that of the inverse depth.
+    const Wide my = slope * fy, m0 = value + slope * to_centre;
+    const Wide w2 = w * w, sigma = (base * w + per_metre) * w + quadratic;
+    // Predicting one row past n has about (1 + 4 / n) of a row's variance.
+    const Wide share = one / (n + one);
+    const Wide spread = (my * my + m0 * m0) * (sigma * sigma + floor2 * w2 * w2) * (one + four * share);
+    // Two rows make no slope: the third is held against the second.
+    const Wide off = residual + cv::v_select(fitted, zero, slope);
+    const Wide jump = (jump2 * w + jump1) * w + jump0;
+    const Wide fits = off * off * w2 < cv::v_select(fitted, outlier2 * spread, jump * jump * w2);
+    const Wide in = valid & fits;
+
+    // Recursive least squares: a row that joins, at distance x from the others' mean, moves the line by its residual.
+    const Wide x = lever & in, news = residual & in;
+    const Wide lever1 = lever - x * share, squares1 = load(open_.squares) + x * lever1;
+    const Wide gain = news * (lever1 / squares1);
+    const Wide n1 = n + (one & in);
+    const Wide drift0 = load(open_.drift), drift = drift0 + (((news & fitted) - drift0) * memory & in);
+    const Wide absent = cv::v_select(in, zero, load(open_.absent) + cv::v_select(valid, outlier_weight, one));
+    store(open_.rows, n1);
+    store(open_.value, value + news * share + gain * lever1);
+    store(open_.slope, slope + gain);
+    store(open_.lever, lever1);
+    store(open_.squares, squares1);
+    store(open_.drift, drift);
+    store(open_.absent, absent);
+
+    const Wide strange = cv::v_select(fitted, zero, valid) & ~fits;
+    const Wide bent = in & (n1 > long_run) & (drift * drift * w2 > bend2 * spread);
+    auto events = static_cast<std::uint32_t>(cv::v_signmask(strange | bent | (absent > max_gap)));
+    for (; events != 0; events &= events - 1U) handle(column + std::countr_zero(events), row);
+  }
 }
 
 // Ends the column's run where it stopped fitting and starts the next one with the rows since.

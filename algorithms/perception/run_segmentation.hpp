@@ -62,7 +62,6 @@ class RunSegmentation {
     Floats absent;   // rows since the last accepted one, an outlier counts outlier_weight_; whole numbers
   };
 
-  void step(std::int32_t first_column, std::int32_t row) noexcept;
   void handle(std::int32_t g, std::int32_t row) noexcept;
   void replay(std::int32_t g, std::int32_t from, std::int32_t row) noexcept;
   void forget(std::int32_t g, std::int32_t forgotten, std::int32_t row) noexcept;
