@@ -249,6 +249,14 @@ bool EdgeLineFinder::step(std::int32_t max_columns) noexcept {
   return next_column_ > last;
 }
 
+// How far across the surface one row of the picture reaches there.
+double EdgeLineFinder::pixel_m(double along_m, double across_m) const noexcept {
+  const Vec3 p = origin_m_ + along_m * along_ + across_m * across_;
+  const double w = 1.0 / p.z(), dw = surface_.m.y() / picture_.intrinsics.fy_px;  // inverse depth, and of the next row
+  const Vec3 next = (p * w + Vec3::UnitY() / picture_.intrinsics.fy_px) / (w + dw);
+  return std::abs((next - p).dot(across_));
+}
+
 EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
   constexpr int kRounds = 8;
   constexpr double kTukey = 4.685;
@@ -306,7 +314,10 @@ EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
     const double meet_lo = (1.0 - other_.m.dot(origin_m_ + lo * along_)) / slope;
     const double meet_hi = (1.0 - other_.m.dot(origin_m_ + hi * along_)) / slope;
     const double apart = 0.5 * (meet_lo + meet_hi - t_lo - t_hi);
-    const bool agree = std::abs(apart) < math::clamp(1.5 * line.sigma_m, params_.agree_m, params_.agree_max_m);
+    const double limit_m =
+        std::max(math::clamp(1.5 * line.sigma_m, params_.agree_m, params_.agree_max_m),
+                 params_.agree_px * pixel_m(0.5 * (lo + hi), 0.25 * (t_lo + t_hi + meet_lo + meet_hi)));
+    const bool agree = std::abs(apart) < limit_m;
     double face_m = 0.0;
     if (!agree && surface_above_ && !face_tried_ && try_face_offset(face_m) && face_m > params_.face_m &&
         face_m < params_.face_max_m) {

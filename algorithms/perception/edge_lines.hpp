@@ -35,9 +35,11 @@ class EdgeLineFinder {
     double max_rms_m = 0.006;
     double min_inlier_share = 0.5;
     // Where the two planes meet is the sharper answer when no overhang lies between: it uses every pixel of both. It is
-    // taken when it lies within agree_m or three sigmas of the change-points, but never beyond agree_max_m.
+    // taken when it lies within agree_m or three sigmas of the change-points, but never beyond agree_max_m; far away,
+    // where a pixel is centimetres of the surface, within agree_px.
     double agree_m = 0.003;
     double agree_max_m = 0.008;
+    double agree_px = 0.3;
     double face_m = 0.006;         // an overhang's front face stands out from the riser by more than this ...
     double face_max_m = 0.08;      // ... and less than this
     double slow_error_m = 0.0012;  // of a segment's change-point, shared by its columns
@@ -89,6 +91,7 @@ class EdgeLineFinder {
   void add_face(std::int32_t column, std::int32_t first, std::int32_t from, std::int32_t steps) noexcept;
   // How far the first pixels past the change-point stand out from the other plane; false when there are too few.
   [[nodiscard]] bool try_face_offset(double& offset_m) const noexcept;
+  [[nodiscard]] double pixel_m(double along_m, double across_m) const noexcept;
   [[nodiscard]] bool try_segment_point(const Segment& segment, Vec2& point_m) const noexcept;
 
   std::array<Guess, kHalfWidth_px> guess_{};

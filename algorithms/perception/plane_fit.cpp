@@ -80,6 +80,25 @@ bool try_solve(const PlaneFit::Params& params, const DepthSigma& noise, const Pl
   return true;
 }
 
+bool try_solve_leaning(const PlaneFit::Params& params, const DepthSigma& noise, const PlaneMoments& moments,
+                       const Vec3& up, InversePlane& plane, Mat3* covariance) noexcept {
+  InversePlane free;
+  if (!try_solve(params, noise, moments, Lean::kAny, up, free, covariance)) return false;
+  plane = free;
+  const double c = free.normal().dot(up), most = math::sin(params.lean_tilt_rad);
+  const Lean lean =
+      c > math::cos(params.lean_tilt_rad) ? Lean::kLevel : (std::abs(c) < most ? Lean::kUpright : Lean::kAny);
+  InversePlane leaning;
+  Mat3 leaning_covariance;
+  if (lean == Lean::kAny || !try_solve(params, noise, moments, lean, up, leaning, &leaning_covariance)) return true;
+  const Vec3 off = leaning.m - free.m;
+  const double contradiction = off.dot(moments.matrix() * off) / std::max(noise.correlated_px, 1.0);
+  if (contradiction > math::square(params.lean_sigmas)) return true;
+  plane = leaning;
+  if (covariance != nullptr) *covariance = leaning_covariance;
+  return true;
+}
+
 void PlaneRansac::begin(std::uint32_t seed, std::span<const PlaneSample> samples) noexcept {
   samples_ = samples;
   seed_ = seed;

@@ -65,7 +65,9 @@ struct PlaneFit {
     double inlier_sigmas = 3.0;
     double inlier_floor_m = 0.002;  // added: slow depth errors that the noise model does not have
     double enough_inliers = 0.92;   // stop drawing at this share
-    double lean_sigma_rad = 0.02;   // how level treads and how upright risers are, the estimator's up included
+    double lean_sigma_rad = 0.01;   // how level treads and how upright risers are, the estimator's up included
+    double lean_tilt_rad = 0.5;     // further from level or upright, a plane is neither ...
+    double lean_sigmas = 3.0;       // ... nor when its pixels contradict it by this
   };
 };
 
@@ -76,6 +78,12 @@ struct PlaneFit {
 // not fix a plane in front of the camera. covariance (of m) is optional.
 [[nodiscard]] bool try_solve(const PlaneFit::Params& params, const DepthSigma& noise, const PlaneMoments& moments,
                              Lean lean, const Vec3& up, InversePlane& plane, Mat3* covariance) noexcept;
+
+// The same with the lean that lies nearest, unless the pixels contradict it: few pixels say little about a plane's
+// lean.
+[[nodiscard]] bool try_solve_leaning(const PlaneFit::Params& params, const DepthSigma& noise,
+                                     const PlaneMoments& moments, const Vec3& up, InversePlane& plane,
+                                     Mat3* covariance) noexcept;
 
 // RANSAC over a list of samples, one trial per call so that it can be resumed.
 class PlaneRansac {

@@ -16,9 +16,7 @@ void RemainderSearch::begin(const Params& params, const Vec3& up) noexcept {
   found_.clear();
 }
 
-void RemainderSearch::know_level(const InversePlane& plane) noexcept {
-  static_cast<void>(known_.try_push_back(plane));
-}
+void RemainderSearch::know_level(const InversePlane& plane) noexcept { static_cast<void>(known_.try_push_back(plane)); }
 
 void RemainderSearch::know_upright(const InversePlane& plane, double pixels) noexcept {
   static_cast<void>(known_.try_push_back(plane));
@@ -36,7 +34,8 @@ void RemainderSearch::add_column(const ColumnRays& rays, const ColumnImage& imag
     for (std::int32_t r = first; r <= last; ++r) {
       const float w = image.inverse_depth(column, r);
       if (!(w > 0.0F)) continue;
-      const Vec3 point = Vec3{x, static_cast<double>(rays.y[static_cast<std::size_t>(r)]), 1.0} / static_cast<double>(w);
+      const Vec3 point =
+          Vec3{x, static_cast<double>(rays.y[static_cast<std::size_t>(r)]), 1.0} / static_cast<double>(w);
       for (Axis* axis : {&level_, &upright_}) {
         // A plane that faces the camera lies on the far side of its normal.
         const std::int32_t bin = Axis::bin_of(-axis->direction.dot(point));

@@ -182,7 +182,8 @@ std::uint16_t SurfaceBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower)
   Pair& pair = pairs_[pair_count_];
   pair.upper = upper;
   pair.lower = lower;
-  pair.offsets.fill(0);
+  pair.columns = 0.0;
+  pair.gain.fill(0.0F);
   return static_cast<std::uint16_t>(pair_count_++);
 }
 
@@ -206,18 +207,28 @@ void SurfaceBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::i
   }
 }
 
-// Rows first .. last belong to either; the last row of the upper one, first - 1 when all are the lower one's.
+// Rows first .. last belong to either; the last row of the upper one, first - 1 when all are the lower one's. What the
+// rows say goes into the pair, too, if there is one.
 std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& upper, const Line& lower,
-                                             std::int32_t first, std::int32_t last) const noexcept {
+                                             std::int32_t first, std::int32_t last, float meeting_row,
+                                             Pair* pair) const noexcept {
+  // One sigma for both: with each its own, the boundary drifts towards the less noisy plane.
+  const float norm = std::sqrt(upper.norm * lower.norm);
+  const Line a{upper.a, upper.b, norm}, b{lower.a, lower.b, norm};
   float sum = 0.0F, best = 0.0F;
   std::int32_t at = first - 1;
   for (std::int32_t r = first; r <= last; ++r) {
     if (image_->valid(column, r) == 0) continue;
-    sum += std::min(cost(upper, column, r), kTruncation) - std::min(cost(lower, column, r), kTruncation);
+    const float gain = std::min(cost(a, column, r), kTruncation) - std::min(cost(b, column, r), kTruncation);
+    sum += gain;
     if (sum < best) {
       best = sum;
       at = r;
     }
+    if (pair == nullptr) continue;
+    const auto bin =
+        static_cast<std::int32_t>(std::floor((static_cast<float>(r) - meeting_row) * kBinsPerPixel)) + kBins / 2;
+    if (bin >= 0 && bin < kBins) pair->gain[static_cast<std::size_t>(bin)] += gain;
   }
   return at;
 }
@@ -249,34 +260,39 @@ void SurfaceBoundaries::meet(std::int32_t column) noexcept {
     }
     first = std::max<std::int32_t>(first - window, upper.top);
     last = std::min<std::int32_t>(last + window, lower.bottom);
-    const std::int32_t own = change_point(column, a, b, first, last);
+    const std::uint16_t i = meets && joint_count_ < kMaxJoints ? pair_of(upper.plane, lower.plane) : kMaxPairs;
+    Pair* pair = i == kMaxPairs ? nullptr : &pairs_[i];
+    const std::int32_t own = change_point(column, a, b, first, last, static_cast<float>(row), pair);
     upper.bottom = static_cast<std::int16_t>(std::clamp<std::int32_t>(own, upper.top, lower.bottom - 1));
     lower.top = static_cast<std::int16_t>(upper.bottom + 1);
-    if (!meets) continue;
-    const std::uint16_t pair = pair_of(upper.plane, lower.plane);
-    if (pair == kMaxPairs || joint_count_ == kMaxJoints) continue;
-    const double bin = (upper.bottom + 0.5 - row) * 2.0 + 0.5 * kBins;
-    ++pairs_[pair].offsets[static_cast<std::size_t>(math::clamp(bin, 0.0, kBins - 1.0))];
-    joints_[joint_count_++] = {pair, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k),
-                               static_cast<float>(row), upper.bottom};
+    if (pair == nullptr) continue;
+    pair->columns += 1.0;
+    joints_[joint_count_++] = {i, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k),
+                               static_cast<float>(row)};
   }
 }
 
 void SurfaceBoundaries::settle() noexcept {
   std::array<double, kMaxPairs> shift_px{};
   for (std::size_t i = 0; i < pair_count_; ++i) {
-    std::int32_t all = 0, below = 0;
-    for (const std::uint16_t n : pairs_[i].offsets) all += n;
-    std::size_t bin = 0;
-    while (2 * (below + pairs_[i].offsets[bin]) < all) below += pairs_[i].offsets[bin++];
-    const double median = (static_cast<double>(bin) + 0.5 - 0.5 * kBins) / 2.0;
-    shift_px[i] = std::abs(median) < params_.meet_px ? 0.0 : median;
+    double sum = 0.0, best = 0.0, meeting = 0.0;
+    std::int32_t at = 0;  // bins above the boundary
+    for (std::int32_t bin = 0; bin < kBins; ++bin) {
+      if (bin == kBins / 2) meeting = sum;
+      sum += static_cast<double>(pairs_[i].gain[static_cast<std::size_t>(bin)]);
+      if (sum >= best) continue;
+      best = sum;
+      at = bin + 1;
+    }
+    const double offset_px = (at - kBins / 2) / static_cast<double>(kBinsPerPixel);
+    const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].columns;
+    shift_px[i] = meets ? 0.0 : offset_px;
   }
   for (std::size_t i = 0; i < joint_count_; ++i) {
     const Joint& joint = joints_[i];
     Column& intervals = columns_[static_cast<std::size_t>(joint.column)];
     ColumnSpan &upper = intervals[joint.upper], &lower = intervals[joint.upper + 1U];
-    const double row = std::floor(static_cast<double>(joint.row) + shift_px[joint.pair]);
+    const double row = std::ceil(static_cast<double>(joint.row) + shift_px[joint.pair]) - 1.0;
     upper.bottom = static_cast<std::int16_t>(math::clamp(row, upper.top, lower.bottom - 1.0));
     lower.top = static_cast<std::int16_t>(upper.bottom + 1);
   }

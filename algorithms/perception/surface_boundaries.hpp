@@ -28,7 +28,8 @@ class SurfaceBoundaries {
     double inlier_sigmas = 3.0;    // of a row in a refit, and of a row that extends a surface
     double same_gap_sigmas = 3.0;  // rows between two runs of one plane that are this far off it are something else
     double gap_floor_m = 0.006;
-    double meet_px = 2.0;          // planes meet where their line is no farther than this from the change-points
+    double meet_px = 2.0;          // planes meet where their line is no farther than this from the change-point ...
+    double meet_gain = 1.0;        // ... or hardly worse: of the columns' mean cost
     std::int32_t window_px = 6;    // rows searched beyond where the runs ended
     std::int32_t max_gap_px = 24;  // rows between two surfaces that are still next to each other
   };
@@ -70,17 +71,18 @@ class SurfaceBoundaries {
   static constexpr std::size_t kMaxJoints = 4096;
   static constexpr std::size_t kMaxPairs = 192;
   static constexpr std::int32_t kBins = 64;  // of half a pixel, -16 .. 16
+  static constexpr float kBinsPerPixel = 2.0F;
   struct Joint {
     std::uint16_t pair = 0;
     std::int16_t column = 0;
     std::uint8_t upper = 0;  // interval
     float row = 0.0F;        // where the planes meet
-    std::int16_t last = 0;   // the column's own answer: last row of the upper plane
   };
   struct Pair {
     std::uint8_t upper = 0;
     std::uint8_t lower = 0;
-    std::array<std::uint16_t, kBins> offsets{};  // of the columns' answers from where the planes meet
+    double columns = 0.0;
+    std::array<float, kBins> gain{};  // sum of cost(upper) - cost(lower), by distance from where the planes meet
   };
   // A plane in one column: inverse depth a + b y, and its tolerance per sigma.
   struct Line {
@@ -103,7 +105,7 @@ class SurfaceBoundaries {
   void refit(std::int32_t first_column, const Strip& strip) noexcept;
   void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
-                                          std::int32_t last) const noexcept;
+                                          std::int32_t last, float meeting_row, Pair* pair) const noexcept;
   [[nodiscard]] std::uint16_t pair_of(std::uint8_t upper, std::uint8_t lower) noexcept;
 
   Params params_;

@@ -28,17 +28,11 @@ bool usable(const CameraIntrinsics& k) noexcept {
          k.depth_unit_m < 0.1;
 }
 
-// The lean that a kind of seed or plane implies.
 SurfaceKind kind_of(const InversePlane& plane, const Vec3& up, double tilt_rad) noexcept {
   const double c = plane.normal().dot(up);
   if (c > math::cos(tilt_rad)) return SurfaceKind::kTread;
   if (std::abs(c) < math::sin(tilt_rad)) return SurfaceKind::kRiser;
   return SurfaceKind::kOther;
-}
-
-Lean lean_of(SurfaceKind kind) noexcept {
-  if (kind == SurfaceKind::kTread) return Lean::kLevel;
-  return kind == SurfaceKind::kRiser ? Lean::kUpright : Lean::kAny;
 }
 
 }  // namespace
@@ -317,11 +311,10 @@ void SurfaceExtractor::solve_planes() noexcept {
     Plane& p = planes_[i];
     if (!p.alive) continue;
     const SurfaceBoundaries::Plane& fitted = boundaries_.plane(i);
-    const Lean lean = lean_of(kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad));
     p.moments = fitted.moments;
     p.residual2 = fitted.residual2;
     if (p.moments.count < kLeast_px ||
-        !try_solve(params_.planes, params_.noise, p.moments, lean, view_.camera_up, p.plane, &p.covariance)) {
+        !try_solve_leaning(params_.planes, params_.noise, p.moments, view_.camera_up, p.plane, &p.covariance)) {
       p.alive = false;
       for (std::uint8_t& plane : to_plane_) plane = plane == i ? std::uint8_t{0} : plane;
       continue;
@@ -446,7 +439,9 @@ void SurfaceExtractor::join_pieces() noexcept {
     plane.piece_px += piece.area_px;
   }
   for (std::size_t p = 1; p <= plane_count_; ++p) {
-    planes_[p].alive = planes_[p].alive && planes_[p].piece_px >= params_.min_surface_px;
+    const std::int32_t least_px =
+        planes_[p].kind == SurfaceKind::kOther ? params_.min_other_px : params_.min_surface_px;
+    planes_[p].alive = planes_[p].alive && planes_[p].piece_px >= least_px;
   }
 }
 

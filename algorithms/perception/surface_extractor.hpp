@@ -43,6 +43,7 @@ class SurfaceExtractor {
     double apart_m = 0.04;                // seen this far from a plane: something else is there
     std::int32_t min_component_px = 160;  // of a piece of a surface
     std::int32_t min_surface_px = 440;    // of a surface
+    std::int32_t min_other_px = 1000;     // of one that is neither level nor upright: curved things have such facets
     double snap_m = 0.015;                // polygon corners this close to a nosing or back line go onto it
     double probe_px = 3.0;                // half-resolution pixels outside a polygon's edge where its end is judged
   };
@@ -198,7 +199,7 @@ class SurfaceExtractor {
   PlaneGrowing growing_;
   SurfaceBoundaries boundaries_;
   RemainderSearch search_;
-  std::size_t first_found_ = 1;  // planes first_found_ .. plane_count_ came from the search
+  std::size_t first_found_ = 1;                            // planes first_found_ .. plane_count_ came from the search
   std::array<std::uint8_t, kMaxPlanes + 1> to_plane_{};    // from a grown plane
   Raster<std::uint8_t, kColumns, kDepthHeight_px> owner_;  // plane of each column's row, 0 = none
 
