@@ -53,8 +53,8 @@ class Extraction {
   Extraction(const CameraProfile& camera, const DepthPng& picture) : picture_(picture) {
     SurfaceExtractor::Params params;
     params.noise = camera.noise;
-    params.reduction.min_depth_m = camera.min_depth_m;
-    params.reduction.max_depth_m = camera.max_depth_m;
+    params.limits.min_depth_m = camera.min_depth_m;
+    params.limits.max_depth_m = camera.max_depth_m;
     extractor_->configure(params);
     view_.intrinsics = camera.intrinsics;
     view_.body_margin_m = 0.0;

@@ -55,7 +55,7 @@ struct Bench {
   }
   EdgeLineFinder::Outcome find(const InversePlane* other, bool nosing, EdgeLine& line) {
     RawPicture picture{depth.get(), flags.get(), scene.intrinsics, {}};
-    picture.reduction.set({}, scene.intrinsics.depth_unit_m);
+    picture.range.set({}, scene.intrinsics.depth_unit_m);
     if (!finder->try_guess({}, 1)) return EdgeLineFinder::Outcome::kNoLine;
     const EdgeLineFinder::Beyond beyond{other != nullptr ? *other : InversePlane{}, 1e-6 * Mat3::Identity()};
     finder->begin({}, {}, picture, tread(), other != nullptr ? &beyond : nullptr, nosing);

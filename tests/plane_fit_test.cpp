@@ -3,91 +3,15 @@
 
 #include <gtest/gtest.h>
 
-#include <random>
 #include <vector>
+
+#include "tests/support/plane_samples.hpp"
 
 namespace polygmap {
 namespace {
 
-constexpr DepthSigma kNoise;
-
-std::vector<PlaneSample> sample_plane(const Vec3& normal, double d_m, std::size_t count, double outliers,
-                                      std::uint32_t seed, double half_field = 0.3) {
-  std::mt19937 random(seed);
-  std::normal_distribution<> gauss;
-  std::uniform_real_distribution<> uniform(-1.0, 1.0);
-  std::vector<PlaneSample> samples;
-  const InversePlane plane{-normal / d_m};
-  while (samples.size() < count) {
-    const Vec3 ray{half_field * uniform(random), half_field * uniform(random), 1.0};
-    double w = plane.inverse_depth(ray);
-    if (w < 0.2) continue;
-    w += gauss(random) * inverse_depth_sigma(kNoise, plane, ray);
-    if (uniform(random) < 2.0 * outliers - 1.0) w = 1.0 + 0.5 * uniform(random);
-    samples.push_back({static_cast<float>(ray.x()), static_cast<float>(ray.y()), static_cast<float>(w)});
-  }
-  return samples;
-}
-
-bool fit(const std::vector<PlaneSample>& samples, Lean lean, const Vec3& up, InversePlane& plane, std::int32_t& inliers,
-         std::int32_t* trials = nullptr) {
-  PlaneRansac ransac;
-  ransac.begin(5, samples);
-  while (!ransac.step({}, kNoise, lean, up)) {
-  }
-  if (trials != nullptr) *trials = ransac.trials();
-  return ransac.try_finish({}, kNoise, lean, up, plane, inliers);
-}
-
-TEST(PlaneFit, Ransac_ThirtyPercentOutliers_FindsThePlane) {
-  const Vec3 normal = Vec3{0.05, -0.5, -0.86}.normalized();
-  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
-    InversePlane plane;
-    std::int32_t inliers = 0;
-    ASSERT_TRUE(fit(sample_plane(normal, 0.7, 256, 0.3, seed), Lean::kLevel, normal, plane, inliers));
-    EXPECT_LT(math::acos(std::min(1.0, plane.normal().dot(normal))), 0.01) << seed;
-    EXPECT_NEAR(plane.d_m(), 0.7, 0.002) << seed;
-    EXPECT_GT(inliers, 150) << seed;
-  }
-}
-
-TEST(PlaneFit, Ransac_NarrowStrip_TakesItsTiltFromGravity) {
-  const Vec3 normal = Vec3{0.0, -0.5, -0.866}.normalized();
-  std::vector<PlaneSample> samples = sample_plane(normal, 0.7, 200, 0.0, 3);
-  const InversePlane truth{-normal / 0.7};
-  std::mt19937 random(9);
-  std::normal_distribution<> gauss;
-  for (PlaneSample& s : samples) {
-    s.y = 0.01F * s.y;
-    const Vec3 ray{static_cast<double>(s.x), static_cast<double>(s.y), 1.0};
-    s.w = static_cast<float>(truth.inverse_depth(ray) + gauss(random) * inverse_depth_sigma(kNoise, truth, ray));
-  }
-  InversePlane plane;
-  std::int32_t inliers = 0;
-  ASSERT_TRUE(fit(samples, Lean::kLevel, normal, plane, inliers));
-  EXPECT_LT(math::acos(std::min(1.0, plane.normal().dot(normal))), 0.02);
-}
-
-TEST(PlaneFit, Ransac_WrongLeanOrTooFewSamples_FindsNothing) {
-  const Vec3 normal = Vec3{0.0, -0.5, -0.866}.normalized();
-  InversePlane plane;
-  std::int32_t inliers = 0;
-  EXPECT_FALSE(fit(sample_plane(normal, 0.7, 256, 0.0, 1), Lean::kUpright, normal, plane, inliers));
-  EXPECT_FALSE(fit(sample_plane(normal, 0.7, 2, 0.0, 1), Lean::kAny, normal, plane, inliers));
-  const std::vector<PlaneSample> same(100, {0.1F, 0.1F, 1.0F});
-  EXPECT_FALSE(fit(same, Lean::kAny, normal, plane, inliers));
-}
-
-TEST(PlaneFit, Ransac_CleanData_StopsEarlyAndRepeatsExactly) {
-  const Vec3 normal = Vec3{0.0, -0.5, -0.866}.normalized();
-  const std::vector<PlaneSample> samples = sample_plane(normal, 0.7, 256, 0.0, 1);
-  InversePlane a, b;
-  std::int32_t inliers = 0, trials = 0;
-  ASSERT_TRUE(fit(samples, Lean::kLevel, normal, a, inliers, &trials));
-  EXPECT_LT(trials, PlaneFit::Params{}.trials);
-  ASSERT_TRUE(fit(samples, Lean::kLevel, normal, b, inliers));
-  EXPECT_EQ(a.m, b.m);
-}
+using test::kSampleNoise;
+using test::sample_plane;
 
 TEST(PlaneFit, Solve_WhiteNoise_IsUnbiasedAndItsSigmaIsHonest) {
   const Vec3 normal = Vec3{0.1, -0.5, -0.85}.normalized();
@@ -101,7 +25,8 @@ TEST(PlaneFit, Solve_WhiteNoise_IsUnbiasedAndItsSigmaIsHonest) {
     const InversePlane truth{-normal / 0.7};
     for (const PlaneSample& s : sample_plane(normal, 0.7, 300, 0.0, static_cast<std::uint32_t>(run + 1))) {
       const Vec3 r{static_cast<double>(s.x), static_cast<double>(s.y), 1.0};
-      moments.add(1.0 / math::square(inverse_depth_sigma(kNoise, truth, r)), r.x(), r.y(), static_cast<double>(s.w));
+      moments.add(1.0 / math::square(inverse_depth_sigma(kSampleNoise, truth, r)), r.x(), r.y(),
+                  static_cast<double>(s.w));
     }
     InversePlane plane;
     Mat3 covariance;

@@ -6,7 +6,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/perception/depth_reduction.hpp"
+#include "algorithms/perception/depth_range.hpp"
 #include "algorithms/perception/images.hpp"
 
 namespace polygmap {
@@ -37,13 +37,6 @@ struct ColumnRays {
       y[static_cast<std::size_t>(r)] = static_cast<float>((r - k.cy_px) / k.fy_px);
     }
   }
-};
-
-// Pixels outside [min_raw, max_raw] count as not measured.
-struct RawRange {
-  std::uint16_t min = 1;
-  std::uint16_t max = 65534;
-  float per_metre = 1000.0F;  // raw units in a metre
 };
 
 struct ReducedRow {

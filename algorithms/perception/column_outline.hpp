@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "algorithms/perception/column_image.hpp"
-#include "algorithms/perception/contour.hpp"
+#include "algorithms/perception/outline.hpp"
 
 namespace polygmap {
 

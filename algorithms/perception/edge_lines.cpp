@@ -146,7 +146,7 @@ void EdgeLineFinder::search_column(std::int32_t column) noexcept {
   for (std::int32_t s = 0; s < steps; ++s) {
     const std::int32_t row = surface_above_ ? first + s : last - s;
     const std::uint16_t raw = (*picture_.depth)(column, row);
-    if (!picture_.reduction.valid(raw) || ((*picture_.flags)(column / 2, row / 2) & kPixelBody) != 0) continue;
+    if (!picture_.range.valid(raw) || ((*picture_.flags)(column / 2, row / 2) & kPixelBody) != 0) continue;
     // Residual over sigma: (w - w_plane) / (sigma_z w |ray| |m|), times z above and below.
     const double y = (row - k.cy_px) / k.fy_px, z = raw * k.depth_unit_m;
     const double inverse_sigma = 1.0 / (noise_.sigma_m(z) * norm);
@@ -201,7 +201,7 @@ void EdgeLineFinder::add_face(std::int32_t column, std::int32_t first, std::int3
   for (std::int32_t s = std::max(from - kBefore_px, 0); s < steps && taken < kPixels; ++s) {
     const std::int32_t row = first + s;
     const std::uint16_t raw = (*picture_.depth)(column, row);
-    if (!picture_.reduction.valid(raw) || ((*picture_.flags)(column / 2, row / 2) & kPixelBody) != 0) continue;
+    if (!picture_.range.valid(raw) || ((*picture_.flags)(column / 2, row / 2) & kPixelBody) != 0) continue;
     const Vec3 ray{(column - k.cx_px) / k.fx_px, (row - k.cy_px) / k.fy_px, 1.0};
     const double z = raw * k.depth_unit_m;
     const double off_surface_m = surface_.distance_m(z * ray);

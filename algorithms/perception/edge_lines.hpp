@@ -6,7 +6,8 @@
 #include <cstdint>
 
 #include "algorithms/core/surfaces.hpp"
-#include "algorithms/perception/depth_reduction.hpp"
+#include "algorithms/perception/depth_range.hpp"
+#include "algorithms/perception/images.hpp"
 #include "algorithms/perception/plane_fit.hpp"
 
 namespace polygmap {
@@ -18,7 +19,7 @@ struct RawPicture {
   const FullDepthImage* depth = nullptr;
   const HalfImage<std::uint8_t>* flags = nullptr;
   CameraIntrinsics intrinsics;
-  DepthReduction reduction;  // for the valid range
+  RawRange range;
 };
 
 class EdgeLineFinder {

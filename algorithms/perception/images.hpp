@@ -16,13 +16,9 @@ inline constexpr std::int32_t kHalfHeight_px = kDepthHeight_px / 2;
 
 template <typename T>
 using HalfImage = Raster<T, kHalfWidth_px, kHalfHeight_px>;
-// Inverse depth, 1/m, 0 = nothing measured. On a plane it is linear in the image, which depth is not: smoothing,
-// fitting and comparing with a plane need no back-projection and have no bias on slanted surfaces.
-using InverseDepthImage = HalfImage<float>;
 
 enum PixelFlag : std::uint8_t {
-  kPixelMeasured = 1,  // at least one of the four full-resolution pixels is valid
-  kPixelBody = 2,      // the robot's own body may cover it: unknown, not free
+  kPixelBody = 2,  // the robot's own body may cover it: unknown, not free
 };
 
 // Ray (x, y, 1) through the centre of half-resolution pixel (column, row). Such a pixel covers the full-resolution

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Planes in inverse depth: w(ray) = m . ray for the ray (x, y, 1). RANSAC with deterministic draws and a weighted
-// least-squares refinement.
+// Planes in inverse depth: w(ray) = m . ray for the ray (x, y, 1), fitted by weighted least squares.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <span>
 
 #include "algorithms/core/math.hpp"
 #include "algorithms/perception/images.hpp"
@@ -24,16 +21,6 @@ struct InversePlane {
   // Signed distance of a point, positive on the camera's side.
   [[nodiscard]] double distance_m(const Vec3& point_m) const noexcept { return (1.0 - m.dot(point_m)) * d_m(); }
 };
-
-// One measured pixel.
-struct PlaneSample {
-  float x = 0.0F;  // ray
-  float y = 0.0F;
-  float w = 0.0F;  // inverse depth, 1/m
-};
-
-// sigma of an inverse depth on the plane: sigma_z w^2 with sigma_z of the noise model and cos(incidence) = w d / |ray|.
-[[nodiscard]] double inverse_depth_sigma(const DepthSigma& noise, const InversePlane& plane, const Vec3& ray) noexcept;
 
 // Weighted moments of samples: sum of g ray ray^T and g ray w, enough for a fit, and they add.
 struct PlaneMoments {
@@ -61,10 +48,6 @@ enum class Lean : std::uint8_t { kAny, kLevel, kUpright };
 
 struct PlaneFit {
   struct Params {
-    std::int32_t trials = 24;
-    double inlier_sigmas = 3.0;
-    double inlier_floor_m = 0.002;  // added: slow depth errors that the noise model does not have
-    double enough_inliers = 0.92;   // stop drawing at this share
     double lean_sigma_rad = 0.01;   // how level treads and how upright risers are, the estimator's up included
     double lean_tilt_rad = 0.5;     // further from level or upright, a plane is neither ...
     double lean_sigmas = 3.0;       // ... nor when its pixels contradict it by this
@@ -84,25 +67,6 @@ struct PlaneFit {
 [[nodiscard]] bool try_solve_leaning(const PlaneFit::Params& params, const DepthSigma& noise,
                                      const PlaneMoments& moments, const Vec3& up, InversePlane& plane,
                                      Mat3* covariance) noexcept;
-
-// RANSAC over a list of samples, one trial per call so that it can be resumed.
-class PlaneRansac {
- public:
-  void begin(std::uint32_t seed, std::span<const PlaneSample> samples) noexcept;
-  // Draw number trial; true when no further draw is wanted.
-  bool step(const PlaneFit::Params& params, const DepthSigma& noise, Lean lean, const Vec3& up) noexcept;
-  // Refines the best draw by two rounds of truncated least squares. False when nothing was found.
-  [[nodiscard]] bool try_finish(const PlaneFit::Params& params, const DepthSigma& noise, Lean lean, const Vec3& up,
-                                InversePlane& plane, std::int32_t& inliers) const noexcept;
-  [[nodiscard]] std::int32_t trials() const noexcept { return trial_; }
-
- private:
-  std::span<const PlaneSample> samples_{};
-  std::uint32_t seed_ = 0;
-  std::int32_t trial_ = 0;
-  std::int32_t best_inliers_ = 0;
-  InversePlane best_;
-};
 
 // A 32-bit hash of a counter: the same draws on every machine and in every slicing.
 [[nodiscard]] constexpr std::uint32_t counter_random(std::uint32_t seed, std::uint32_t counter) noexcept {

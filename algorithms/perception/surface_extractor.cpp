@@ -70,12 +70,7 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
   raw_.depth = &full_;
   raw_.flags = &flags_;
   raw_.intrinsics = view.intrinsics;
-  raw_.reduction.set(params_.reduction, view.intrinsics.depth_unit_m);
-  const double raw_max = params_.reduction.max_depth_m / view.intrinsics.depth_unit_m;
-  raw_range_.min = static_cast<std::uint16_t>(
-      math::clamp(std::ceil(params_.reduction.min_depth_m / view.intrinsics.depth_unit_m), 1.0, 65534.0));
-  raw_range_.max = static_cast<std::uint16_t>(math::clamp(std::floor(raw_max), 1.0, 65534.0));
-  raw_range_.per_metre = static_cast<float>(1.0 / view.intrinsics.depth_unit_m);
+  raw_.range.set(params_.limits, view.intrinsics.depth_unit_m);
   column_rays_.set(view.intrinsics);
   runs_.begin(params_.runs, params_.noise, view.intrinsics, columns_);
   self_filter_.clear();
@@ -231,7 +226,7 @@ void SurfaceExtractor::reduce_row() noexcept {
     self_filter_.mark_row(row_ / 2, rays_.width_px, flags);
   }
   const std::int32_t columns = column_rays_.columns;
-  const ReducedRow reduced = reduce_to_columns(raw_range_, full_.row(row_), flags, columns,
+  const ReducedRow reduced = reduce_to_columns(raw_.range, full_.row(row_), flags, columns,
                                                columns_.inverse_depth.row(row_), columns_.valid.row(row_));
   measured_px_ += reduced.measured_px;
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
@@ -465,7 +460,7 @@ bool SurfaceExtractor::shows(std::int32_t half_column, const ColumnSpan& span) c
   for (std::int32_t r = span.top; r <= span.bottom; r += stride) {
     for (const std::int32_t c : {2 * half_column, 2 * half_column + 1}) {
       const std::uint16_t raw = full_(c, r);
-      if (raw < raw_range_.min || raw > raw_range_.max) continue;
+      if (raw < raw_.range.min || raw > raw_.range.max) continue;
       const double z = raw * view_.intrinsics.depth_unit_m;
       const Vec3 point = back_project(view_.intrinsics, c, r, z);
       ++all;

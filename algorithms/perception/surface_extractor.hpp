@@ -13,7 +13,7 @@
 #include "algorithms/core/work.hpp"
 #include "algorithms/perception/column_image.hpp"
 #include "algorithms/perception/column_outline.hpp"
-#include "algorithms/perception/depth_reduction.hpp"
+#include "algorithms/perception/depth_range.hpp"
 #include "algorithms/perception/edge_lines.hpp"
 #include "algorithms/perception/images.hpp"
 #include "algorithms/perception/plane_fit.hpp"
@@ -29,7 +29,7 @@ class SurfaceExtractor {
  public:
   struct Params {
     DepthSigma noise;
-    DepthReduction::Params reduction;
+    DepthLimits limits;
     RunSegmentation::Params runs;
     PlaneGrowing::Params growing;
     SurfaceBoundaries::Params boundaries;
@@ -95,7 +95,7 @@ class SurfaceExtractor {
     return (flags_(column, row) & kPixelBody) != 0;
   }
 
- private:
+  // What the next step begins with; a benchmark charges time to it.
   enum class Phase : std::uint8_t {
     kIdle,
     kMask,
@@ -114,7 +114,9 @@ class SurfaceExtractor {
     kPolygon,
     kFinish,
   };
+  [[nodiscard]] Phase phase() const noexcept { return phase_; }
 
+ private:
   static constexpr std::size_t kMaxPlanes = SurfaceBoundaries::kMaxPlanes;
   static constexpr std::size_t kMaxPieces = 255;
   static constexpr std::int32_t kColumnsPerPiece = 48;
@@ -194,7 +196,6 @@ class SurfaceExtractor {
   HalfImage<std::uint8_t> flags_;
   ColumnRays column_rays_;
   ColumnImage columns_;
-  RawRange raw_range_;
   RunSegmentation runs_;
   PlaneGrowing growing_;
   SurfaceBoundaries boundaries_;

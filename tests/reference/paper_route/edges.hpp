@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "algorithms/perception/images.hpp"
-#include "algorithms/perception/normals.hpp"
+#include "tests/reference/paper_route/half_depth.hpp"
+#include "tests/reference/paper_route/normals.hpp"
 
 namespace polygmap {
 

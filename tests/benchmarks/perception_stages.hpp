@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// Perception cut into stages, each a function of its own: a clock can be read around it, and callgrind counts what is
+// spent inside it.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string_view>
+
+#include "tests/benchmarks/stair_scenes.hpp"
+#include "tests/reference/paper_route/paper_route.hpp"
+
+namespace polygmap::bench {
+
+// One scene with the state that its stages need. The map has seen the scene often enough to trust it.
+struct Workbench {
+  explicit Workbench(StairScene seen_scene);
+
+  // The next exposure of the scene.
+  [[nodiscard]] DepthFrameView next_frame() noexcept;
+  // What makes the scene useless as a benchmark, empty when nothing does: a stage that finds nothing is fast.
+  [[nodiscard]] std::string_view complaint() const noexcept;
+
+  StairScene scene;
+  std::int64_t now_ns = kNsPerS;
+  std::unique_ptr<SurfaceExtractor> extractor = std::make_unique<SurfaceExtractor>();
+  SurfaceFrame surfaces;
+  std::unique_ptr<PolygonMap> map = std::make_unique<PolygonMap>();
+  std::unique_ptr<FootholdSearch> search = std::make_unique<FootholdSearch>();
+  std::unique_ptr<PaperRoute> paper = std::make_unique<PaperRoute>(PaperRoute::Params{});
+  RawRange range;  // this and the next two: reduction and runs by themselves
+  std::unique_ptr<ColumnImage> columns = std::make_unique<ColumnImage>();
+  std::unique_ptr<RunSegmentation> runs = std::make_unique<RunSegmentation>();
+  std::uint32_t sum = 0;
+};
+
+// On a frame's way through the extractor; some run more than once in a frame.
+void stage_intake(Workbench& bench);
+void stage_mask(Workbench& bench);
+void stage_columns(Workbench& bench);  // reduction and runs, row by row
+void stage_growing(Workbench& bench);
+void stage_meeting(Workbench& bench);  // runs to intervals, who has which rows, change-points
+void stage_refit(Workbench& bench);
+void stage_remainder(Workbench& bench);  // planes in what is left over
+void stage_pieces(Workbench& bench);     // and their profiles
+void stage_polygons(Workbench& bench);   // outlines, nosing and back lines, polygons
+// By themselves.
+void stage_streaming_floor(Workbench& bench);  // reads every pixel once: nothing that sees the whole frame is faster
+void stage_reduction(Workbench& bench);
+void stage_runs(Workbench& bench);
+void stage_whole_frame(Workbench& bench);
+void stage_map(Workbench& bench);
+void stage_footholds(Workbench& bench);
+void stage_paper_route(Workbench& bench);
+
+struct Stage {
+  std::string_view name;
+  void (*run)(Workbench&);
+};
+enum ExtractorStage : std::size_t {
+  kIntake,
+  kMask,
+  kColumnRuns,
+  kGrowing,
+  kMeeting,
+  kRefit,
+  kRemainder,
+  kPieces,
+  kPolygons
+};
+inline constexpr std::array<Stage, 9> kExtractorStages{{{"intake", stage_intake},
+                                                        {"mask", stage_mask},
+                                                        {"columns", stage_columns},
+                                                        {"growing", stage_growing},
+                                                        {"meeting", stage_meeting},
+                                                        {"refit", stage_refit},
+                                                        {"remainder", stage_remainder},
+                                                        {"pieces", stage_pieces},
+                                                        {"polygons", stage_polygons}}};
+inline constexpr std::array<Stage, 7> kOtherStages{{{"whole_frame", stage_whole_frame},
+                                                    {"streaming_floor", stage_streaming_floor},
+                                                    {"reduction", stage_reduction},
+                                                    {"runs", stage_runs},
+                                                    {"map", stage_map},
+                                                    {"footholds", stage_footholds},
+                                                    {"paper_route", stage_paper_route}}};
+
+// The stage that a phase of the extractor belongs to.
+[[nodiscard]] ExtractorStage extractor_stage(SurfaceExtractor::Phase phase) noexcept;
+
+// One frame through the extractor. around(stage) must call stage.run(bench), and may do so between two looks at a
+// clock.
+template <typename Around>
+void extract_in_stages(Workbench& bench, const Around& around) {
+  do {
+    around(kExtractorStages[extractor_stage(bench.extractor->phase())]);
+  } while (bench.extractor->busy());
+}
+
+}  // namespace polygmap::bench
