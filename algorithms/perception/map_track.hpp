@@ -31,6 +31,7 @@ struct TrackedLine {
 };
 struct TrackedSide {
   double support_m = 0.0;
+  double reach_m = 0.0;  // of the last sighting: one frame alone does not make an unknown end grow
   double information = 0.0;
   std::int64_t seen_ns = 0;
   std::uint32_t outliers = 0;
@@ -56,6 +57,7 @@ struct MapTrack {
   SurfaceKind kind = SurfaceKind::kOther;
   std::uint32_t sightings = 0;
   std::uint32_t misses = 0;
+  std::uint32_t outliers = 0;  // consecutive sightings of its plane elsewhere
   std::int64_t first_seen_ns = 0;
   std::int64_t last_seen_ns = 0;
   Transform world_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up

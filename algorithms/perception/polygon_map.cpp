@@ -5,14 +5,17 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace polygmap {
 namespace {
 
-// Work units: multiples of one comparison.
-constexpr std::int32_t kLoadUnits = 3;
+// Work units, of 300 to 500 instructions.
+constexpr std::int32_t kLoadUnits = 2;
+constexpr std::int32_t kMatchUnits = 2;
+constexpr std::int32_t kMeasureUnits = 2;
 constexpr std::int32_t kFuseUnits = 12;
-constexpr std::int32_t kPublishUnits = 24;
+constexpr std::int32_t kEvictUnits = 20;
 
 constexpr double kMinSigma_m = 0.0005;  // a frame that claims more than this is not believed
 constexpr double kMinTilt_rad = 0.0005;
@@ -23,6 +26,8 @@ constexpr double kMaxLocalSlope = 0.05;  // steeper: the local axes turn to the 
 constexpr double kMinArea_m2 = 1e-4;
 constexpr std::uint8_t kNosingTag = 8;  // tags below are side indices
 constexpr std::uint8_t kBackTag = 9;
+
+constexpr std::size_t kLeftSide = 2, kRightSide = 6;
 
 double turned(std::size_t side) noexcept { return static_cast<double>(side) * (kPi / 4.0); }
 
@@ -112,6 +117,8 @@ void PolygonMap::clear() noexcept {
   tracks_.clear();
   snapshot_.polygons.clear();
   snapshot_.stamp_ns = 0;
+  snapshot_.drift_m.setZero();
+  drift_.clear();
   any_frame_ = false;
   newest_ns_ = 0;
   stage_ = Stage::kIdle;
@@ -132,9 +139,49 @@ void PolygonMap::begin(const SurfaceFrame& frame, const View& view) noexcept {
   view_ = view;
   newest_ns_ = frame.stamp_ns;
   any_frame_ = true;
-  patch_ = 0;
   fused_in_frame_ = 0;
+  order_surfaces();
+  drift_.begin_frame(frame.stamp_ns, view.position_sigma_m);
+  map_T_camera_ = view.world_T_camera;
+  map_T_camera_.p_m -= drift_.drift_m();
+  measuring_ = drift_.possible();
+  patch_ = 0;
   stage_ = Stage::kLoad;
+  if (!measuring_) begin_fusing();
+}
+
+// Where the map is nearly full, what a foot needs finds its place first.
+void PolygonMap::order_surfaces() noexcept {
+  order_.clear();
+  for (const bool others : {false, true}) {
+    for (std::size_t i = 0; i < frame_.surfaces.size(); ++i) {
+      if ((frame_.surfaces[i].kind == SurfaceKind::kOther) != others) continue;
+      (void)order_.try_push_back(static_cast<std::uint8_t>(i));
+    }
+    if (!others) telling_ = order_.size();
+  }
+}
+
+void PolygonMap::begin_fusing() noexcept {
+  if (measuring_) drift_.end_frame();
+  measuring_ = false;
+  map_T_camera_.p_m = view_.world_T_camera.p_m - drift_.frame_offset_m();
+  patch_ = 0;
+}
+
+void PolygonMap::next_surface() noexcept {
+  track_ = 0;
+  if (measuring_ && patch_ >= telling_) return begin_fusing();
+  if (patch_ >= order_.size()) {
+    stage_ = Stage::kAge;
+  } else if (load(frame_.surfaces[order_[patch_]])) {
+    best_ = second_ = kMaxMapPolygons;
+    best_cost_ = second_cost_ = std::numeric_limits<double>::infinity();
+    stage_ = Stage::kCompare;
+  } else {
+    if (!measuring_) ++counters_.rejected_surfaces;
+    ++patch_;
+  }
 }
 
 Progress PolygonMap::step(WorkBudget& budget) noexcept {
@@ -143,29 +190,20 @@ Progress PolygonMap::step(WorkBudget& budget) noexcept {
     switch (stage_) {
       case Stage::kLoad:
         budget.spend(kLoadUnits);
-        track_ = 0;
-        if (patch_ >= frame_.surfaces.size()) {
-          stage_ = Stage::kAge;
-        } else if (load(frame_.surfaces[patch_])) {
-          best_ = second_ = kMaxMapPolygons;
-          best_cost_ = second_cost_ = std::numeric_limits<double>::infinity();
-          stage_ = Stage::kCompare;
-        } else {
-          ++counters_.rejected_surfaces;
-          ++patch_;
-        }
+        next_surface();
         break;
       case Stage::kCompare:
-        budget.spend(1);
-        if (track_ < tracks_.size()) {
-          compare_one();
-        } else {
-          stage_ = Stage::kFuse;
-        }
+        budget.spend(compare_some());
+        if (track_ >= tracks_.size()) stage_ = Stage::kFuse;
         break;
       case Stage::kFuse:
-        budget.spend(kFuseUnits);
-        fuse_best();
+        if (measuring_) {
+          budget.spend(kMeasureUnits);
+          measure_offset();
+        } else {
+          budget.spend(kFuseUnits + (best_ >= tracks_.size() && tracks_.full() ? kEvictUnits : 0));
+          fuse_best();
+        }
         ++patch_;
         stage_ = Stage::kLoad;
         break;
@@ -178,8 +216,7 @@ Progress PolygonMap::step(WorkBudget& budget) noexcept {
         }
         break;
       case Stage::kPublish:
-        budget.spend(kPublishUnits);
-        publish();
+        budget.spend(publish());
         stage_ = Stage::kIdle;
         return Progress::kDone;
       case Stage::kIdle:
@@ -191,25 +228,24 @@ Progress PolygonMap::step(WorkBudget& budget) noexcept {
 
 bool PolygonMap::load(const SurfacePatch& patch) noexcept {
   if (!valid(patch)) return false;
-  const Transform& world_T_camera = view_.world_T_camera;
   seen_.kind = patch.kind;
-  seen_.plane = world_T_camera * Plane{patch.normal.normalized(), patch.d_m};
+  seen_.plane = map_T_camera_ * Plane{patch.normal.normalized(), patch.d_m};
   const double up = seen_.plane.normal.z();
-  if (seen_.plane.distance_m(world_T_camera.p_m) <= 0.0) return false;  // seen from behind
+  if (seen_.plane.distance_m(map_T_camera_.p_m) <= 0.0) return false;  // seen from behind
   if (patch.kind == SurfaceKind::kTread && up < 0.8) return false;
   if (patch.kind == SurfaceKind::kRiser && std::abs(up) > 0.5) return false;
-  seen_.centroid_m = seen_.plane.project(world_T_camera * patch.centroid_m);
+  seen_.centroid_m = seen_.plane.project(map_T_camera_ * patch.centroid_m);
   seen_.offset_variance_m2 = math::square(std::max(patch.offset_sigma_m, kMinSigma_m));
   seen_.tilt_variance_rad2 = math::square(std::max(patch.tilt_sigma_rad, kMinTilt_rad));
-  const double range2_m2 = (seen_.centroid_m - world_T_camera.p_m).squaredNorm();
+  const double range2_m2 = (seen_.centroid_m - map_T_camera_.p_m).squaredNorm();
   seen_.pose_variance_m2 = math::square(view_.position_sigma_m) + math::square(view_.tilt_sigma_rad) * range2_m2;
   seen_.rmse_m = patch.rmse_m;
   seen_.invalid_fraction = patch.invalid_fraction;
   seen_.polygon.clear();
-  for (const Vec3& v : patch.polygon) (void)seen_.polygon.try_push_back(seen_.plane.project(world_T_camera * v));
+  for (const Vec3& v : patch.polygon) (void)seen_.polygon.try_push_back(seen_.plane.project(map_T_camera_ * v));
   seen_.edges = patch.edges;
-  seen_.nosing = moved(world_T_camera, patch.nosing);
-  seen_.back = moved(world_T_camera, patch.back);
+  seen_.nosing = moved(map_T_camera_, patch.nosing);
+  seen_.back = moved(map_T_camera_, patch.back);
   return true;
 }
 
@@ -219,46 +255,51 @@ ConvexPolygon PolygonMap::local_polygon(const MapTrack& track) const noexcept {
   return out;
 }
 
-bool PolygonMap::matches(const MapTrack& track, double& cost) const noexcept {
+// The cheap part of the comparison, which most pairs do not pass.
+bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
   if (track.dead || track.kind != seen_.kind || track.polygon.size() < 3) return false;
   const bool upright = track.kind == SurfaceKind::kRiser;
   const Vec3 normal = track.world_T_local.R.col(2);
-  const double turn_gate = upright ? params_.upright_turn_gate_rad : params_.tilt_gate_rad;
-  if (normal.dot(seen_.plane.normal) < math::cos(turn_gate)) return false;
-
+  if (normal.dot(seen_.plane.normal) < math::cos(upright ? params_.upright_turn_gate_rad : params_.tilt_gate_rad)) {
+    return false;
+  }
   const Vec3 offset = seen_.centroid_m - track.world_T_local.p_m;
-  const double across_m = normal.dot(offset);
-  const double variance = seen_.offset_variance_m2 + seen_.pose_variance_m2 + 1.0 / track.offset_information +
-                          offset.squaredNorm() / track.tilt_information;
-  const double gate =
-      upright ? params_.upright_gate_m
-              : math::clamp(3.0 * math::sqrt(variance), params_.height_gate_min_m, params_.height_gate_max_m);
-  if (std::abs(across_m) > gate) return false;
+  out.across_m = normal.dot(offset);
+  if (std::abs(out.across_m) > (upright ? params_.upright_gate_m : params_.height_gate_max_m)) return false;
+  out.variance_m2 =
+      seen_.offset_variance_m2 + 1.0 / track.offset_information + offset.squaredNorm() / track.tilt_information;
+  out.gate_m = upright ? params_.upright_gate_m
+                       : math::clamp(3.0 * math::sqrt(out.variance_m2 + seen_.pose_variance_m2),
+                                     params_.height_gate_min_m, params_.height_gate_max_m);
+  return std::abs(out.across_m) <= out.gate_m;
+}
 
+bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept {
+  const bool upright = track.kind == SurfaceKind::kRiser;
   const BoundingBox seen = bounding_box(local_polygon(track)), known = bounding_box(track.polygon);
   const Interval seen_x{seen.min_m.x(), seen.max_m.x()}, known_x{known.min_m.x(), known.max_m.x()};
   const Interval seen_y{seen.min_m.y(), seen.max_m.y()}, known_y{known.min_m.y(), known.max_m.y()};
+  const double overlap_x_m = overlap_m(seen_x, known_x), overlap_y_m = overlap_m(seen_y, known_y);
   if (track.kind == SurfaceKind::kOther) {
-    if (std::min(overlap_m(seen_x, known_x), overlap_m(seen_y, known_y)) < -params_.other_gap_m) return false;
+    if (std::min(overlap_x_m, overlap_y_m) < -params_.other_gap_m) return false;
   } else {
-    const Interval& seen_along = upright ? seen_y : seen_x;
-    const Interval& known_along = upright ? known_y : known_x;
-    const double lateral_m = upright ? overlap_m(seen_x, known_x) : overlap_m(seen_y, known_y);
-    const double shorter_m = std::min(length_m(seen_along), length_m(known_along));
-    if (overlap_m(seen_along, known_along) < params_.overlap_fraction * shorter_m) return false;
-    if (lateral_m < -params_.lateral_gap_m) return false;
+    const double shorter_m =
+        upright ? std::min(length_m(seen_y), length_m(known_y)) : std::min(length_m(seen_x), length_m(known_x));
+    if ((upright ? overlap_y_m : overlap_x_m) < params_.overlap_fraction * shorter_m) return false;
+    if ((upright ? overlap_x_m : overlap_y_m) < -params_.lateral_gap_m) return false;
   }
-  cost = std::abs(across_m) / gate + (track.polygon.size() >= 3 && overlap_area_m2(track) > 0.0 ? 0.0 : 1.0);
+  cost = std::abs(near.across_m) / near.gate_m + (std::min(overlap_x_m, overlap_y_m) > 0.0 ? 0.0 : 1.0);
   return true;
 }
 
-double PolygonMap::overlap_area_m2(const MapTrack& track) const noexcept {
-  return area_m2(intersection(convex_hull(local_polygon(track)), track.polygon));
-}
-
-void PolygonMap::compare_one() noexcept {
-  double cost = 0.0;
-  if (matches(tracks_[track_], cost)) {
+std::int32_t PolygonMap::compare_some() noexcept {
+  std::int32_t units = 1;
+  for (std::size_t glances = 0; glances < kGlancesPerUnit && track_ < tracks_.size(); ++glances, ++track_) {
+    Nearness near;
+    if (!is_near(tracks_[track_], near)) continue;
+    units += kMatchUnits;
+    double cost = 0.0;
+    if (!matches(tracks_[track_], near, cost)) continue;
     if (cost < best_cost_) {
       second_ = best_;
       second_cost_ = best_cost_;
@@ -269,7 +310,40 @@ void PolygonMap::compare_one() noexcept {
       second_cost_ = cost;
     }
   }
-  ++track_;
+  return units;
+}
+
+// What the seen surface says about the frame's offset: along the remembered normal, and across the edges of a tread.
+void PolygonMap::measure_offset() noexcept {
+  if (best_ >= tracks_.size()) return;
+  const MapTrack& track = tracks_[best_];
+  Nearness near;
+  if (track.sightings < params_.confirmed_sightings || !is_near(track, near)) return;
+  const double common_m2 = math::square(params_.systematic_sigma_m);
+  // A riser is matched from further off than it may lie; a plane's normal says nothing about its place beside it.
+  if (std::abs(near.across_m) < params_.line_gate_max_m) {
+    drift_.add(track.world_T_local.R.col(2), near.across_m, near.variance_m2 + common_m2);
+  }
+  for (const auto& [edge, line] : {std::pair{&seen_.nosing, &track.nosing}, std::pair{&seen_.back, &track.back}}) {
+    const std::optional<SeenLine> seen = local_line(track, *edge);
+    if (!seen || line->sightings < params_.line_min_sightings || !agrees(*line, *seen)) continue;
+    const Vec2 middle_m = 0.5 * (seen->a_m + seen->b_m);
+    const double norm = math::sqrt(1.0 + math::square(line->state[1]));
+    drift_.add(track.world_T_local.R * Vec3{1.0 / norm, -line->state[1] / norm, 0.0},
+               (middle_m.x() - line->at_m(middle_m.y())) / norm,
+               seen->variance_m2 + std::min(line->variance_m2(middle_m.y()), 1.0) + common_m2);
+  }
+  if (track.kind != SurfaceKind::kTread) return;
+  const ConvexPolygon seen = local_polygon(track);
+  for (const std::size_t k : {kLeftSide, kRightSide}) {
+    const TrackedSide& side = track.sides[k];
+    const Vec2 u = unit_at(turned(k));
+    const double support = support_m(seen, u);
+    if (!side.observed || std::abs(support - side.support_m) > params_.side_gate_m) continue;
+    if (!end_observed(seen, seen_.edges, u, support)) continue;
+    drift_.add(track.world_T_local.R * Vec3{u.x(), u.y(), 0.0}, support - side.support_m,
+               math::square(params_.side_sigma_m) + 1.0 / side.information + common_m2);
+  }
 }
 
 void PolygonMap::fuse_best() noexcept {
@@ -322,7 +396,7 @@ void PolygonMap::create() noexcept {
   const Vec3 normal = seen_.plane.normal;
   const Vec3 level = Vec3::UnitZ().cross(normal);  // horizontal; x of an upright surface, so that y is up
   // Optical axis and the picture's up together point ahead at any camera pitch.
-  const Vec3 ahead = view_.world_T_camera.R.col(2) - view_.world_T_camera.R.col(1);
+  const Vec3 ahead = map_T_camera_.R.col(2) - map_T_camera_.R.col(1);
   Vec3 x_hint = track.kind == SurfaceKind::kTread ? ahead : level;
   if (track.kind == SurfaceKind::kTread) {
     if (const std::optional<Vec3> heading = heading_from_lines()) x_hint = *heading;
@@ -341,27 +415,52 @@ void PolygonMap::create() noexcept {
     ++counters_.rejected_surfaces;
     return;
   }
-  ++counters_.created;
-  if (tracks_.try_push_back(track)) return;
-
-  // Full: the oldest one out of reach goes, else the oldest unconfirmed, else the oldest.
-  const Vec2 eye_m = view_.world_T_camera.p_m.head<2>();
-  const auto rank = [&](const MapTrack& t) {
-    const double distance2 = (t.world_T_local.p_m.head<2>() - eye_m).squaredNorm();
-    if (t.dead || distance2 > math::square(params_.reach_m)) return 0;
-    return t.sightings < params_.confirmed_sightings ? 1 : 2;
-  };
-  std::size_t victim = 0;
-  for (std::size_t i = 1; i < tracks_.size(); ++i) {
-    const int a = rank(tracks_[i]), b = rank(tracks_[victim]);
-    if (a < b || (a == b && tracks_[i].last_seen_ns < tracks_[victim].last_seen_ns)) victim = i;
+  const bool worth_a_place =
+      track.kind != SurfaceKind::kOther || (area_m2(track.polygon) >= params_.other_area_min_m2 && claim(track) > 0);
+  if (!worth_a_place) {
+    ++counters_.passed_over;
+    return;
   }
-  tracks_[victim] = track;
-  ++counters_.evicted;
+  admit(track);
+}
+
+// What is worth keeping when the map is full.
+int PolygonMap::claim(const MapTrack& track) const noexcept {
+  const Vec2 eye_m = local_xy(track.world_T_local, map_T_camera_.p_m);
+  // A long floor's middle may be far from where the robot stands on it.
+  const double distance_m = track.kind == SurfaceKind::kTread
+                                ? -signed_distance_m(track.polygon, eye_m)
+                                : (track.world_T_local.p_m - map_T_camera_.p_m).head<2>().norm();
+  if (track.dead || distance_m > params_.reach_m) return 0;
+  return (track.kind == SurfaceKind::kOther ? 1 : 3) + (track.sightings < params_.confirmed_sightings ? 0 : 1);
+}
+
+void PolygonMap::admit(const MapTrack& track) noexcept {
+  if (!tracks_.try_push_back(track)) {
+    // The least worth keeping goes, of these the one not seen for longest.
+    std::size_t victim = 0;
+    int least = claim(tracks_[0]);
+    for (std::size_t i = 1; i < tracks_.size(); ++i) {
+      const int worth = claim(tracks_[i]);
+      if (worth < least || (worth == least && tracks_[i].last_seen_ns < tracks_[victim].last_seen_ns)) {
+        victim = i;
+        least = worth;
+      }
+    }
+    // Never for something of less worth, nor one surface of this frame for its like.
+    const int claimed = claim(track);
+    if (least > claimed || (least == claimed && tracks_[victim].last_seen_ns == newest_ns_)) {
+      ++counters_.refused;
+      return;
+    }
+    ++(least > 0 ? counters_.evicted : counters_.forgotten);
+    tracks_[victim] = track;
+  }
+  ++counters_.created;
 }
 
 void PolygonMap::fuse(MapTrack& track) noexcept {
-  const double fade = faded(track.last_seen_ns);
+  double fade = faded(track.last_seen_ns);
   if (track.last_seen_ns != newest_ns_) ++track.sightings;
   track.last_seen_ns = newest_ns_;
   track.misses = 0;
@@ -373,6 +472,14 @@ void PolygonMap::fuse(MapTrack& track) noexcept {
   Vec3 normal = frame.R.col(2);
   const double cosine = normal.dot(seen_.plane.normal);
   const double offset_m = -seen_.plane.distance_m(frame.p_m) / cosine;
+  // A riser is matched from further off than it may have moved.
+  if (std::abs(offset_m) > params_.line_gate_max_m) {
+    ++counters_.plane_outliers;
+    if (++track.outliers < params_.outliers_to_reset) return;
+    ++counters_.resets;
+    fade = 0.0;
+  }
+  track.outliers = 0;
   const double lever2_m2 = (seen_.centroid_m - frame.p_m).squaredNorm();
   const double weight = 1.0 / (seen_.offset_variance_m2 + seen_.tilt_variance_rad2 * lever2_m2);
   track.offset_information = track.offset_information * fade + weight;
@@ -437,7 +544,7 @@ void PolygonMap::turn_to(MapTrack& track, const Vec3& world_x) noexcept {
     const auto from = static_cast<std::size_t>((static_cast<int>(k) + shift + 2 * static_cast<int>(kMapSides)) %
                                                static_cast<int>(kMapSides));
     track.sides[k] = old[from];
-    track.sides[k].support_m = support_m(track.polygon, unit_at(turned(k)));
+    track.sides[k].support_m = track.sides[k].reach_m = support_m(track.polygon, unit_at(turned(k)));
   }
   for (TrackedLine* line : {&track.nosing, &track.back}) {
     const Vec2 a = new_R_old * Vec2{line->at_m(-0.5), -0.5}, b = new_R_old * Vec2{line->at_m(0.5), 0.5};
@@ -451,22 +558,27 @@ void PolygonMap::turn_to(MapTrack& track, const Vec3& world_x) noexcept {
   }
 }
 
+bool PolygonMap::agrees(const TrackedLine& line, const SeenLine& seen) const noexcept {
+  const Vec2 along = seen.b_m - seen.a_m, middle = 0.5 * (seen.a_m + seen.b_m);
+  const double half_m = std::abs(along.y()) / math::sqrt(12.0);
+  const double sigma = math::sqrt(seen.variance_m2 + std::min(line.variance_m2(middle.y()), 1.0));
+  const double gate = math::clamp(4.0 * sigma, params_.line_gate_min_m, params_.line_gate_max_m);
+  const double turn_gate = std::max(params_.line_turn_gate, 4.0 * math::sqrt(seen.variance_m2) / half_m);
+  return std::abs(middle.x() - line.at_m(middle.y())) <= gate &&
+         std::abs(along.x() / along.y() - line.state[1]) <= turn_gate;
+}
+
 void PolygonMap::update_line(TrackedLine& line, const SeenLine& seen) noexcept {
   const Vec2 along = seen.b_m - seen.a_m, middle = 0.5 * (seen.a_m + seen.b_m);
   const double slope = along.x() / along.y();
   // Two points that together carry the offset's variance and the slope's of a fit over the whole edge.
   const double half_m = std::abs(along.y()) / math::sqrt(12.0);
   const double variance = 2.0 * seen.variance_m2;
-  if (line.sightings > 0) {
-    const double sigma = math::sqrt(seen.variance_m2 + std::min(line.variance_m2(middle.y()), 1.0));
-    const double gate = math::clamp(4.0 * sigma, params_.line_gate_min_m, params_.line_gate_max_m);
-    const double turn_gate = std::max(params_.line_turn_gate, 4.0 * math::sqrt(seen.variance_m2) / half_m);
-    if (std::abs(middle.x() - line.at_m(middle.y())) > gate || std::abs(slope - line.state[1]) > turn_gate) {
-      ++counters_.line_outliers;
-      if (++line.outliers < params_.outliers_to_reset) return;
-      ++counters_.resets;
-      line = {};
-    }
+  if (line.sightings > 0 && !agrees(line, seen)) {
+    ++counters_.line_outliers;
+    if (++line.outliers < params_.outliers_to_reset) return;
+    ++counters_.resets;
+    line = {};
   }
   line.outliers = 0;
   line.information *= line.sightings > 0 ? faded(line.seen_ns) : 0.0;
@@ -489,8 +601,8 @@ void PolygonMap::update_sides(MapTrack& track, bool first) noexcept {
     const bool observed = end_observed(seen_local_, seen_.edges, u, support);
     TrackedSide& side = track.sides[k];
     if (first) {
-      side = {support - (observed ? 0.0 : params_.unknown_margin_m), 1.0 / math::square(params_.side_sigma_m),
-              newest_ns_, 0, observed};
+      const double reach_m = support - params_.unknown_margin_m;
+      side = {observed ? support : reach_m, reach_m, 1.0 / math::square(params_.side_sigma_m), newest_ns_, 0, observed};
     } else {
       update_side(side, support, observed);
     }
@@ -499,7 +611,9 @@ void PolygonMap::update_sides(MapTrack& track, bool first) noexcept {
 
 void PolygonMap::update_side(TrackedSide& side, double seen_m, bool observed) noexcept {
   const double weight = 1.0 / math::square(params_.side_sigma_m);
-  const double reach_m = seen_m - params_.unknown_margin_m;  // certainly surface up to here
+  // Certainly surface up to here, in this frame and in the one before.
+  const double seen_reach_m = seen_m - params_.unknown_margin_m;
+  const double reach_m = std::min(seen_reach_m, std::exchange(side.reach_m, seen_reach_m));
   if (!observed && !side.observed) {
     side.support_m = std::max(side.support_m, reach_m);
     return;
@@ -520,7 +634,7 @@ void PolygonMap::update_side(TrackedSide& side, double seen_m, bool observed) no
     if (++side.outliers < params_.outliers_to_reset) return;
     ++counters_.resets;
   }
-  side = {observed ? seen_m : reach_m, weight, newest_ns_, 0, observed};
+  side = {observed ? seen_m : reach_m, seen_reach_m, weight, newest_ns_, 0, observed};
 }
 
 void PolygonMap::rebuild(MapTrack& track) noexcept {
@@ -571,7 +685,7 @@ void PolygonMap::rebuild(MapTrack& track) noexcept {
 }
 
 bool PolygonMap::should_be_seen(const MapTrack& track) const noexcept {
-  const Transform camera_T_local = view_.world_T_camera.inverse() * track.world_T_local;
+  const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
   const Vec2 middle = centroid_m(track.polygon);
   const Vec3 centre = camera_T_local * Vec3{middle.x(), middle.y(), 0.0};
   const double range_m = centre.norm();
@@ -603,11 +717,15 @@ void PolygonMap::age(MapTrack& track) noexcept {
   }
 }
 
-void PolygonMap::publish() noexcept {
+std::int32_t PolygonMap::publish() noexcept {
   MapPolygons& out = snapshot_.polygons;
+  auto units = static_cast<std::int32_t>(1 + tracks_.size() / kGlancesPerUnit);
   (void)out.try_resize(tracks_.size());
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    if (tracks_[i].dirty) write(tracks_[i], out[i]);
+    if (tracks_[i].dirty) {
+      write(tracks_[i], out[i]);
+      ++units;
+    }
     tracks_[i].dirty = false;
     write_sigmas(tracks_[i], out[i].surface);
   }
@@ -617,7 +735,9 @@ void PolygonMap::publish() noexcept {
     (void)out.try_swap_remove(i);
   }
   ++counters_.frames;
+  snapshot_.drift_m = drift_.drift_m();
   if (fused_in_frame_ > 0) snapshot_.stamp_ns = newest_ns_;
+  return units;
 }
 
 void PolygonMap::write(const MapTrack& track, MapPolygon& out) const noexcept {
