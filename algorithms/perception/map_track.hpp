@@ -13,6 +13,24 @@
 namespace polygmap {
 
 inline constexpr std::size_t kMapSides = 8;  // side k looks along k * 45 degrees from the local x axis
+inline constexpr std::size_t kLeftSide = 2, kRightSide = 6;
+// Of a polygon's edges; tags below are those of sides.
+inline constexpr std::uint8_t kNosingTag = 8;
+inline constexpr std::uint8_t kBackTag = 9;
+inline constexpr double kMinSeenSigma_m = 0.0005;  // a frame that claims more than this is not believed
+
+[[nodiscard]] inline Vec2 side_direction(std::size_t side) noexcept {
+  return unit_at(static_cast<double>(side) * (kPi / 4.0));
+}
+[[nodiscard]] inline Vec2 local_xy(const Transform& world_T_local, const Vec3& world_m) noexcept {
+  return (world_T_local.R.transpose() * (world_m - world_T_local.p_m)).head<2>();
+}
+// A right-handed frame with z along the unit normal and x as near to the given direction as that allows.
+[[nodiscard]] Mat3 frame_from(const Vec3& normal, const Vec3& x_hint) noexcept;
+// Is the farthest end of the polygon in direction u one that was really seen to end? The edges along that end decide;
+// a mere corner counts when both its edges were seen. support: of the polygon in that direction.
+[[nodiscard]] bool end_observed(const ConvexPolygon& polygon, const std::array<EdgeKind, kMaxPolygonVertices>& edges,
+                                const Vec2& u, double support) noexcept;
 
 // A seen line, local coordinates.
 struct SeenLine {

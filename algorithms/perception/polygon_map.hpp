@@ -88,7 +88,7 @@ class PolygonMap {
   // Copies the frame. A frame that is invalid or not newer is counted and leaves nothing to do.
   void begin(const SurfaceFrame& frame, const View& view) noexcept;
   // A unit is a glance at kGlancesPerUnit remembered surfaces, or as much work: a comparison with one that is near is
-  // two. The largest piece publishes all that a frame changed: kMaxPieceUnits. Eight surfaces take about 230 units.
+  // two. The largest piece publishes all that a frame changed: kMaxPieceUnits. Eight surfaces take about 220 units.
   static constexpr std::size_t kGlancesPerUnit = 8;
   static constexpr std::int32_t kMaxPieceUnits = 1 + kMaxMapPolygons / kGlancesPerUnit + kMaxMapPolygons;
   Progress step(WorkBudget& budget) noexcept;
