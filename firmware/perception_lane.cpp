@@ -106,8 +106,9 @@ Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
   if (progress != Progress::kBusy) {
     mapping_ = false;
     search_due_ = true;
-    health_.raise(Limit::kMapFull, now_ns, map_.counters().evicted - evicted_seen_);
-    evicted_seen_ = map_.counters().evicted;
+    const std::uint32_t map_full = map_.counters().evicted + map_.counters().refused;
+    health_.raise(Limit::kMapFull, now_ns, map_full - map_full_seen_);
+    map_full_seen_ = map_full;
   }
   return progress;
 }

@@ -49,7 +49,7 @@ class PerceptionLane {
   std::int64_t last_frame_ns_ = -1;  // taken; from the start until there is one
   std::uint32_t request_ = 0;        // number of the last pose request
   std::uint32_t overflow_seen_ = 0;  // the stages' counters as last reported
-  std::uint32_t evicted_seen_ = 0;
+  std::uint32_t map_full_seen_ = 0;
   SurfaceExtractor extractor_;
   PolygonMap map_;
   FootholdSearch search_;

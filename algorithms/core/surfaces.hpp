@@ -68,7 +68,8 @@ struct MapPolygon {
 using MapPolygons = StaticVector<MapPolygon, kMaxMapPolygons>;
 
 struct MapSnapshot {
-  std::int64_t stamp_ns = 0;  // exposure of the newest fused frame
+  std::int64_t stamp_ns = 0;    // exposure of the newest fused frame
+  Vec3 drift_m = Vec3::Zero();  // what lies at p in the map lies at p + drift in the world of the pose
   MapPolygons polygons;
 };
 

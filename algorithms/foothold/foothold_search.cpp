@@ -17,6 +17,15 @@ bool valid(const FootholdSearch::Query& q) noexcept {
          q.world_T_base.p_m.cwiseAbs().maxCoeff() < 1e6;
 }
 
+// From the map's world to that of the pose.
+FootholdSet moved(FootholdSet set, const Vec3& by_m) noexcept {
+  for (Vec3* p : {&set.p_star.position_m, &set.p_star_star.position_m, &set.p_star_feet[0].position_m,
+                  &set.p_star_feet[1].position_m, &set.tread.nosing_a_m, &set.tread.nosing_b_m}) {
+    *p += by_m;
+  }
+  return set;
+}
+
 }  // namespace
 
 void FootholdSearch::begin(const MapSnapshot& map, const Query& query) noexcept {
@@ -28,9 +37,11 @@ void FootholdSearch::begin(const MapSnapshot& map, const Query& query) noexcept 
   }
   map_ = map;
   query_ = query;
-  base_ = PlanFrame(query.world_T_base);
-  sole_ = PlanFrame(query.world_T_sole[index_of(query.stance)]);
-  z_foot_ = z_foot_m(query.world_T_sole[index_of(query.stance)]);
+  query_.world_T_base.p_m -= map.drift_m;
+  for (Transform& sole : query_.world_T_sole) sole.p_m -= map.drift_m;
+  base_ = PlanFrame(query_.world_T_base);
+  sole_ = PlanFrame(query_.world_T_sole[index_of(query.stance)]);
+  z_foot_ = z_foot_m(query_.world_T_sole[index_of(query.stance)]);
   pending_ = {};
   pending_.map_stamp_ns = map.stamp_ns;
   levels_.clear();
@@ -389,7 +400,7 @@ void FootholdSearch::finish() noexcept {
   if (map_.stamp_ns != 0 && query_.now_ns - map_.stamp_ns > params_.stale_after_ns) {
     pending_.obstruction = Obstruction::kMapStale;
   }
-  result_ = pending_;
+  result_ = moved(pending_, map_.drift_m);
   ++counters_.searches;
 }
 

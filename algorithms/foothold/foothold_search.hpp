@@ -59,7 +59,8 @@ class FootholdSearch {
   FootholdSearch() noexcept : FootholdSearch(Params{}) {}
   explicit FootholdSearch(const Params& params) noexcept : params_(params) {}
 
-  // Copies what it needs. An invalid query is counted and leaves nothing to do.
+  // Copies what it needs. Query and result are in the world of the pose; the search itself is in that of the map, which
+  // knows how far the two have drifted apart. An invalid query is counted and leaves nothing to do.
   void begin(const MapSnapshot& map, const Query& query) noexcept;
   // A unit is one row of the raster or one polygon.
   Progress step(WorkBudget& budget) noexcept;

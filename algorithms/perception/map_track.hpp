@@ -13,6 +13,24 @@
 namespace polygmap {
 
 inline constexpr std::size_t kMapSides = 8;  // side k looks along k * 45 degrees from the local x axis
+inline constexpr std::size_t kLeftSide = 2, kRightSide = 6;
+// Of a polygon's edges; tags below are those of sides.
+inline constexpr std::uint8_t kNosingTag = 8;
+inline constexpr std::uint8_t kBackTag = 9;
+inline constexpr double kMinSeenSigma_m = 0.0005;  // a frame that claims more than this is not believed
+
+[[nodiscard]] inline Vec2 side_direction(std::size_t side) noexcept {
+  return unit_at(static_cast<double>(side) * (kPi / 4.0));
+}
+[[nodiscard]] inline Vec2 local_xy(const Transform& world_T_local, const Vec3& world_m) noexcept {
+  return (world_T_local.R.transpose() * (world_m - world_T_local.p_m)).head<2>();
+}
+// A right-handed frame with z along the unit normal and x as near to the given direction as that allows.
+[[nodiscard]] Mat3 frame_from(const Vec3& normal, const Vec3& x_hint) noexcept;
+// Is the farthest end of the polygon in direction u one that was really seen to end? The edges along that end decide;
+// a mere corner counts when both its edges were seen. support: of the polygon in that direction.
+[[nodiscard]] bool end_observed(const ConvexPolygon& polygon, const std::array<EdgeKind, kMaxPolygonVertices>& edges,
+                                const Vec2& u, double support) noexcept;
 
 // A seen line, local coordinates.
 struct SeenLine {
@@ -31,6 +49,7 @@ struct TrackedLine {
 };
 struct TrackedSide {
   double support_m = 0.0;
+  double reach_m = 0.0;  // of the last sighting: one frame alone does not make an unknown end grow
   double information = 0.0;
   std::int64_t seen_ns = 0;
   std::uint32_t outliers = 0;
@@ -56,6 +75,7 @@ struct MapTrack {
   SurfaceKind kind = SurfaceKind::kOther;
   std::uint32_t sightings = 0;
   std::uint32_t misses = 0;
+  std::uint32_t outliers = 0;  // consecutive sightings of its plane elsewhere
   std::int64_t first_seen_ns = 0;
   std::int64_t last_seen_ns = 0;
   Transform world_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up

@@ -10,14 +10,16 @@
 #include "algorithms/core/surfaces.hpp"
 #include "algorithms/core/transform.hpp"
 #include "algorithms/core/work.hpp"
+#include "algorithms/perception/map_drift.hpp"
 #include "algorithms/perception/map_track.hpp"
 
 namespace polygmap {
 
 // Each remembered surface is a plane with eight ends in directions 45 degrees apart, and for level surfaces the nosing
-// and the back edge as lines. Every quantity is a mean weighted by information that fades with window_s: noise
-// averages, slow odometry drift is followed. Only an observed end can pull an end inwards; where the picture ends, the
-// surface is taken to reach at least as far as it was seen.
+// and the back edge as lines. Every quantity is a mean weighted by information that fades with window_s. Only an
+// observed end can pull an end inwards; where the picture ends, the surface is taken to reach at least as far as it was
+// seen. What a whole frame is off by, as far as its pose's covariance allows, is the pose's (MapDrift) and moves
+// nothing: surfaces out of view stay in place against those in view. The map's world is that of the pose at the start.
 class PolygonMap {
  public:
   struct Params {
@@ -49,6 +51,8 @@ class PolygonMap {
     double view_range_m = 2.5;
     double view_min_incidence = 0.25;  // sine of the angle between ray and surface
     double reach_m = 1.5;              // beyond it a polygon makes room first when the map is full
+    double other_area_min_m2 = 0.02;  // smaller ones, and those out of reach, are not worth a place: nothing reads them
+    MapDrift::Params drift;
   };
   struct View {
     Transform world_T_camera;       // at the exposure
@@ -65,21 +69,28 @@ class PolygonMap {
     std::uint32_t created = 0;
     std::uint32_t fused = 0;
     std::uint32_t merged = 0;  // two remembered surfaces turned out to be one
+    std::uint32_t plane_outliers = 0;
     std::uint32_t line_outliers = 0;
     std::uint32_t side_outliers = 0;
     std::uint32_t resets = 0;      // outliers that persisted
     std::uint32_t degenerate = 0;  // lines that left no polygon; the ends were used
     std::uint32_t dropped_unconfirmed = 0;
     std::uint32_t dropped_vanished = 0;  // confirmed, in view, not there any more
-    std::uint32_t evicted = 0;           // full
+    std::uint32_t passed_over = 0;       // not worth a place: other_area_min_m2
+    std::uint32_t forgotten = 0;         // out of reach: made room
+    std::uint32_t evicted = 0;           // within reach: made room
+    std::uint32_t refused = 0;           // found no room
   };
 
   PolygonMap() noexcept : PolygonMap(Params{}) {}
-  explicit PolygonMap(const Params& params) noexcept : params_(params) {}
+  explicit PolygonMap(const Params& params) noexcept : params_(params), drift_(params.drift) {}
 
   // Copies the frame. A frame that is invalid or not newer is counted and leaves nothing to do.
   void begin(const SurfaceFrame& frame, const View& view) noexcept;
-  // A unit is one comparison of a seen with a remembered surface; the largest piece is 24 units.
+  // A unit is a glance at kGlancesPerUnit remembered surfaces, or as much work: a comparison with one that is near is
+  // two. The largest piece publishes all that a frame changed: kMaxPieceUnits. Eight surfaces take about 220 units.
+  static constexpr std::size_t kGlancesPerUnit = 8;
+  static constexpr std::int32_t kMaxPieceUnits = 1 + kMaxMapPolygons / kGlancesPerUnit + kMaxMapPolygons;
   Progress step(WorkBudget& budget) noexcept;
   // Changes only in the step that returns kDone. The stamp moves on only with a frame in which something was seen.
   [[nodiscard]] const MapSnapshot& snapshot() const noexcept { return snapshot_; }
@@ -89,20 +100,34 @@ class PolygonMap {
  private:
   enum class Stage : std::uint8_t { kIdle, kLoad, kCompare, kFuse, kAge, kPublish };
 
+  // Of the seen surface to a remembered one that may be the same.
+  struct Nearness {
+    double across_m = 0.0;  // along the remembered normal, at the seen middle
+    double gate_m = 0.0;
+    double variance_m2 = 0.0;  // of across, but for the pose's
+  };
+
+  void order_surfaces() noexcept;
+  void begin_fusing() noexcept;
+  void next_surface() noexcept;
   [[nodiscard]] bool load(const SurfacePatch& patch) noexcept;
-  [[nodiscard]] bool matches(const MapTrack& track, double& cost) const noexcept;
-  [[nodiscard]] double overlap_area_m2(const MapTrack& track) const noexcept;
-  void compare_one() noexcept;
+  [[nodiscard]] bool is_near(const MapTrack& track, Nearness& out) const noexcept;
+  [[nodiscard]] bool matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept;
+  [[nodiscard]] std::int32_t compare_some() noexcept;
+  void measure_offset() noexcept;
   void fuse_best() noexcept;
   void create() noexcept;
+  void admit(const MapTrack& track) noexcept;
+  [[nodiscard]] int claim(const MapTrack& track) const noexcept;
   void fuse(MapTrack& track) noexcept;
   void merge(MapTrack& into, MapTrack& from) noexcept;
   void age(MapTrack& track) noexcept;
-  void publish() noexcept;
+  [[nodiscard]] std::int32_t publish() noexcept;
 
   [[nodiscard]] ConvexPolygon local_polygon(const MapTrack& track) const noexcept;
   [[nodiscard]] std::optional<SeenLine> local_line(const MapTrack& track, const EdgeLine& line) const noexcept;
   [[nodiscard]] std::optional<Vec3> heading_from_lines() const noexcept;
+  [[nodiscard]] bool agrees(const TrackedLine& line, const SeenLine& seen) const noexcept;
   void turn_to(MapTrack& track, const Vec3& world_x) noexcept;
   void update_line(TrackedLine& line, const SeenLine& seen) noexcept;
   void update_sides(MapTrack& track, bool first) noexcept;
@@ -117,8 +142,12 @@ class PolygonMap {
   Counters counters_;
   MapSnapshot snapshot_;
   StaticVector<MapTrack, kMaxMapPolygons> tracks_;  // index i is snapshot polygon i once published
+  MapDrift drift_;
   SurfaceFrame frame_;
+  StaticVector<std::uint8_t, kMaxPlanesPerFrame> order_;  // of the frame's surfaces: treads and risers first
+  std::size_t telling_ = 0;                               // how many of these say where the frame lies
   View view_;
+  Transform map_T_camera_;  // at first by the last drift, then by the frame's own offset
   SeenSurface seen_;
   ConvexPolygon seen_local_;  // in the frame of the track being updated
   std::int64_t newest_ns_ = 0;
@@ -126,7 +155,8 @@ class PolygonMap {
   std::uint32_t fused_in_frame_ = 0;
   bool any_frame_ = false;
   Stage stage_ = Stage::kIdle;
-  std::size_t patch_ = 0;
+  bool measuring_ = false;  // the first pass, in which nothing changes yet
+  std::size_t patch_ = 0;   // in order_
   std::size_t track_ = 0;
   std::size_t best_ = kMaxMapPolygons;
   std::size_t second_ = kMaxMapPolygons;

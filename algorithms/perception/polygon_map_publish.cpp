@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// The polygon map: what others get to see.
+#include <algorithm>
+#include <utility>
+
+#include "algorithms/perception/polygon_map.hpp"
+
+namespace polygmap {
+
+std::int32_t PolygonMap::publish() noexcept {
+  MapPolygons& out = snapshot_.polygons;
+  auto units = static_cast<std::int32_t>(1 + tracks_.size() / kGlancesPerUnit);
+  (void)out.try_resize(tracks_.size());
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    if (tracks_[i].dirty) {
+      write(tracks_[i], out[i]);
+      ++units;
+    }
+    tracks_[i].dirty = false;
+    write_sigmas(tracks_[i], out[i].surface);
+  }
+  for (std::size_t i = tracks_.size(); i-- > 0;) {
+    if (!tracks_[i].dead) continue;
+    (void)tracks_.try_swap_remove(i);
+    (void)out.try_swap_remove(i);
+  }
+  ++counters_.frames;
+  snapshot_.drift_m = drift_.drift_m();
+  if (fused_in_frame_ > 0) snapshot_.stamp_ns = newest_ns_;
+  return units;
+}
+
+void PolygonMap::write(const MapTrack& track, MapPolygon& out) const noexcept {
+  const Transform& frame = track.world_T_local;
+  const auto world = [&frame](const Vec2& p) { return Vec3{frame * Vec3{p.x(), p.y(), 0.0}}; };
+  SurfacePatch& surface = out.surface;
+  surface.kind = track.kind;
+  surface.normal = frame.R.col(2);
+  surface.d_m = -surface.normal.dot(frame.p_m);
+  surface.centroid_m = world(centroid_m(track.polygon));
+  surface.area_m2 = area_m2(track.polygon);
+  surface.rmse_m = track.rmse_m;
+  surface.invalid_fraction = track.invalid_fraction;
+  surface.polygon.clear();
+  surface.nosing = {};
+  surface.back = {};
+  const std::size_t n = track.polygon.size();
+  for (std::size_t i = 0; i < n && i < kMaxPolygonVertices; ++i) {
+    const std::uint8_t tag = track.tags[i];
+    (void)surface.polygon.try_push_back(world(track.polygon[i]));
+    surface.edges[i] = tag >= kNosingTag || track.sides[tag].observed ? EdgeKind::kObserved : EdgeKind::kUnknown;
+    if (tag < kNosingTag) continue;
+    // Left end first, looking up the stairs; the polygon runs counter-clockwise.
+    EdgeLine& line = tag == kNosingTag ? surface.nosing : surface.back;
+    const Vec3 from = world(track.polygon[i]), to = world(track.polygon[i + 1 == n ? 0 : i + 1]);
+    line.a_m = tag == kNosingTag ? from : to;
+    line.b_m = tag == kNosingTag ? to : from;
+    line.valid = true;
+  }
+  out.id = track.id;
+  out.sightings = track.sightings;
+  out.first_seen_ns = track.first_seen_ns;
+  out.last_seen_ns = track.last_seen_ns;
+}
+
+// Against the robot, which stands where its map has it: the error of the pose is theirs in common.
+void PolygonMap::write_sigmas(const MapTrack& track, SurfacePatch& out) const noexcept {
+  const double common = math::square(params_.systematic_sigma_m);
+  const auto sigma = [&](double variance, std::int64_t seen_ns) {
+    return math::sqrt(variance + common + math::square(params_.drift_m_per_sqrt_s) * seconds(newest_ns_ - seen_ns));
+  };
+  out.offset_sigma_m = sigma(1.0 / track.offset_information, track.last_seen_ns);
+  out.tilt_sigma_rad = math::sqrt(1.0 / track.tilt_information + math::square(view_.tilt_sigma_rad));
+  for (const auto& [line, edge] : {std::pair{&track.nosing, &out.nosing}, std::pair{&track.back, &out.back}}) {
+    if (!edge->valid) continue;
+    const double y_m = local_xy(track.world_T_local, 0.5 * (edge->a_m + edge->b_m)).y();
+    edge->sigma_m = sigma(std::min(line->variance_m2(y_m), 1.0), line->seen_ns);
+  }
+}
+
+}  // namespace polygmap
