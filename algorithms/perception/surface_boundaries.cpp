@@ -213,7 +213,7 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
                                              std::int32_t first, std::int32_t last, float meeting_row,
                                              Pair* pair) const noexcept {
   // One sigma for both: with each its own, the boundary drifts towards the less noisy plane.
-  const float norm = std::sqrt(upper.norm * lower.norm);
+  const float norm = math::sqrt(upper.norm * lower.norm);
   const Line a{upper.a, upper.b, norm}, b{lower.a, lower.b, norm};
   float sum = 0.0F, best = 0.0F;
   std::int32_t at = first - 1;
@@ -249,8 +249,7 @@ void SurfaceBoundaries::meet(std::int32_t column) noexcept {
       continue;
     }
     const Line a = line_of(planes_[upper.plane].plane, column), b = line_of(planes_[lower.plane].plane, column);
-    const double y = static_cast<double>(b.a - a.a) / static_cast<double>(a.b - b.b);
-    const double row = y * fy_px_ + cy_px_;
+    const double row = meeting_row(a, b);
     const std::int32_t window = params_.window_px;
     std::int32_t first = upper.bottom, last = lower.top;
     const bool meets = row > first - window && row < last + window;  // false for parallel planes, too
@@ -267,13 +266,11 @@ void SurfaceBoundaries::meet(std::int32_t column) noexcept {
     lower.top = static_cast<std::int16_t>(upper.bottom + 1);
     if (pair == nullptr) continue;
     pair->columns += 1.0;
-    joints_[joint_count_++] = {i, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k),
-                               static_cast<float>(row)};
+    joints_[joint_count_++] = {i, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k)};
   }
 }
 
 void SurfaceBoundaries::settle() noexcept {
-  std::array<double, kMaxPairs> shift_px{};
   for (std::size_t i = 0; i < pair_count_; ++i) {
     double sum = 0.0, best = 0.0, meeting = 0.0;
     std::int32_t at = 0;  // bins above the boundary
@@ -286,13 +283,20 @@ void SurfaceBoundaries::settle() noexcept {
     }
     const double offset_px = (at - kBins / 2) / static_cast<double>(kBinsPerPixel);
     const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].columns;
-    shift_px[i] = meets ? 0.0 : offset_px;
+    pairs_[i].shift_px = meets ? 0.0 : offset_px;
   }
+  follow();
+}
+
+void SurfaceBoundaries::follow() noexcept {
   for (std::size_t i = 0; i < joint_count_; ++i) {
     const Joint& joint = joints_[i];
     Column& intervals = columns_[static_cast<std::size_t>(joint.column)];
     ColumnSpan &upper = intervals[joint.upper], &lower = intervals[joint.upper + 1U];
-    const double row = std::ceil(static_cast<double>(joint.row) + shift_px[joint.pair]) - 1.0;
+    const Line a = line_of(planes_[upper.plane].plane, joint.column),
+               b = line_of(planes_[lower.plane].plane, joint.column);
+    const double row = std::ceil(meeting_row(a, b) + pairs_[joint.pair].shift_px) - 1.0;
+    if (!std::isfinite(row)) continue;
     upper.bottom = static_cast<std::int16_t>(math::clamp(row, upper.top, lower.bottom - 1.0));
     lower.top = static_cast<std::int16_t>(upper.bottom + 1);
   }

@@ -58,7 +58,8 @@ class SurfaceBoundaries {
   void claim(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
   void begin_meeting() noexcept;
   void meet(std::int32_t column) noexcept;  // change-points between the column's surfaces
-  void settle() noexcept;                   // one decision per pair of planes, then all columns follow it
+  void settle() noexcept;                   // one decision per pair of planes, then all columns follow it ...
+  void follow() noexcept;                   // ... and again when the planes have changed
   void begin_refit() noexcept;
   // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments.
   void refit(std::int32_t first_column) noexcept;
@@ -76,12 +77,12 @@ class SurfaceBoundaries {
     std::uint16_t pair = 0;
     std::int16_t column = 0;
     std::uint8_t upper = 0;  // interval
-    float row = 0.0F;        // where the planes meet
   };
   struct Pair {
     std::uint8_t upper = 0;
     std::uint8_t lower = 0;
     double columns = 0.0;
+    double shift_px = 0.0;            // of the boundary from where the planes meet
     std::array<float, kBins> gain{};  // sum of cost(upper) - cost(lower), by distance from where the planes meet
   };
   // A plane in one column: inverse depth a + b y, and its tolerance per sigma.
@@ -106,6 +107,10 @@ class SurfaceBoundaries {
   void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
                                           std::int32_t last, float meeting_row, Pair* pair) const noexcept;
+  // The row, real, where the lines meet; not finite for parallel ones.
+  [[nodiscard]] double meeting_row(const Line& upper, const Line& lower) const noexcept {
+    return static_cast<double>(lower.a - upper.a) / static_cast<double>(upper.b - lower.b) * fy_px_ + cy_px_;
+  }
   [[nodiscard]] std::uint16_t pair_of(std::uint8_t upper, std::uint8_t lower) noexcept;
 
   Params params_;

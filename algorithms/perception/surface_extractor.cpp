@@ -67,10 +67,7 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
     std::copy(source, source + frame.width_px, full_.row(r));
   }
   rays_.set(view.intrinsics);
-  raw_.depth = &full_;
-  raw_.flags = &flags_;
-  raw_.intrinsics = view.intrinsics;
-  raw_.range.set(params_.limits, view.intrinsics.depth_unit_m);
+  range_.set(params_.limits, view.intrinsics.depth_unit_m);
   column_rays_.set(view.intrinsics);
   runs_.begin(params_.runs, params_.noise, view.intrinsics, columns_);
   self_filter_.clear();
@@ -161,6 +158,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       if (row_ >= column_rays_.columns) {
         solve_planes();
         if (round_ == 0) merge_planes();
+        if (round_ == 1) boundaries_.follow();
         enter(round_ == 0 ? Phase::kSearch : Phase::kPieces);
         ++round_;
         return kMaxPieceUnits;
@@ -226,7 +224,7 @@ void SurfaceExtractor::reduce_row() noexcept {
     self_filter_.mark_row(row_ / 2, rays_.width_px, flags);
   }
   const std::int32_t columns = column_rays_.columns;
-  const ReducedRow reduced = reduce_to_columns(raw_.range, full_.row(row_), flags, columns,
+  const ReducedRow reduced = reduce_to_columns(range_, full_.row(row_), flags, columns,
                                                columns_.inverse_depth.row(row_), columns_.valid.row(row_));
   measured_px_ += reduced.measured_px;
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
@@ -460,7 +458,7 @@ bool SurfaceExtractor::shows(std::int32_t half_column, const ColumnSpan& span) c
   for (std::int32_t r = span.top; r <= span.bottom; r += stride) {
     for (const std::int32_t c : {2 * half_column, 2 * half_column + 1}) {
       const std::uint16_t raw = full_(c, r);
-      if (raw < raw_.range.min || raw > raw_.range.max) continue;
+      if (raw < range_.min || raw > range_.max) continue;
       const double z = raw * view_.intrinsics.depth_unit_m;
       const Vec3 point = back_project(view_.intrinsics, c, r, z);
       ++all;
@@ -521,28 +519,21 @@ void SurfaceExtractor::outline() noexcept {
 
 // Gathers where the surface ends in each column and what lies beyond; false when there is too little to look for.
 bool SurfaceExtractor::begin_line(bool nosing) noexcept {
-  constexpr std::int32_t kProbe_px = 4;
-  const auto end_of = [&](std::int32_t half_column) -> std::int32_t {
-    const ColumnEnds& ends = profiles_[index_].columns[static_cast<std::size_t>(half_column / 2)];
-    return ends.empty() ? -1 : (nosing ? ends.bottom : ends.top) / 2;
-  };
-  const std::int32_t down = nosing ? 1 : -1;
+  constexpr std::int32_t kProbe_px = 8;
+  // Per column: the plane beyond, 0 where there is none, or the body or the picture's end hides it.
+  std::array<std::uint8_t, kColumns> beyond{};
   std::array<std::int32_t, kMaxPlanes + 1> votes{};
-  const auto beyond = [&](std::int32_t column, std::int32_t row) -> std::int32_t {
-    // -1: hidden by the body or the picture's end; else the plane beyond, 0 = none.
-    std::int32_t found = 0;
-    for (std::int32_t k = 1; k <= kProbe_px; ++k) {
-      const std::int32_t r = row + down * k;
-      if (r < 0 || r >= rays_.height_px || (flags_(column, r) & kPixelBody) != 0) return -1;
-      if (found == 0) found = plane_at(column, r);
-    }
-    return found;
+  const std::int32_t down = nosing ? 1 : -1;
+  const auto end_of = [&](std::int32_t g) -> std::int32_t {
+    const ColumnEnds& ends = profiles_[index_].columns[static_cast<std::size_t>(g)];
+    return nosing ? ends.bottom : ends.top;
   };
-  for (std::int32_t i = 0; i < 2 * column_rays_.columns; ++i) {
-    const std::int32_t row = end_of(i);
-    if (row < 0) continue;
-    const std::int32_t p = beyond(i, row);
-    if (p > 0) ++votes[static_cast<std::size_t>(p)];
+  for (std::int32_t g = 0; g < column_rays_.columns; ++g) {
+    const std::int32_t end = end_of(g), far = end + down * kProbe_px;
+    if (end < 0 || far < 0 || far >= column_rays_.height_px || (flags_(2 * g, far / 2) & kPixelBody) != 0) continue;
+    std::uint8_t& found = beyond[static_cast<std::size_t>(g)];
+    for (std::int32_t r = end + down; found == 0 && r != far + down; r += down) found = owner_(g, r);
+    ++votes[found];
   }
   // The plane beyond: most columns, and on the right side of the surface (a nosing has it below, a back line above).
   // Above, a riser is the back; without one, a higher tread whose nosing hides the rest of this surface.
@@ -562,16 +553,16 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   const std::size_t other = riser != 0 ? riser : most(false);
   if (other == 0) return false;
   line_finder_.begin_guess();
-  for (std::int32_t i = 0; i < 2 * column_rays_.columns; ++i) {
-    const std::int32_t row = end_of(i);
-    if (row >= 0 && beyond(i, row) == static_cast<std::int32_t>(other)) line_finder_.add_guess(i, row);
+  for (std::int32_t g = 0; g < column_rays_.columns; ++g) {
+    if (beyond[static_cast<std::size_t>(g)] == other) line_finder_.add_guess(g, end_of(g));
   }
   if (!line_finder_.try_guess(params_.edge_lines, static_cast<std::uint32_t>(index_))) {
     ++counters_.rejected_lines;
     return false;
   }
   const EdgeLineFinder::Beyond far_side{planes_[other].plane, planes_[other].covariance};
-  line_finder_.begin(params_.edge_lines, params_.noise, raw_, own.plane, &far_side, nosing);
+  line_finder_.begin(params_.edge_lines, params_.noise, view_.intrinsics, column_rays_, columns_, own.plane, &far_side,
+                     nosing);
   if (!nosing && riser == 0) {
     occluder_ = line_finder_.guessed_line();
     return false;
@@ -689,7 +680,7 @@ std::size_t SurfaceExtractor::tread_beside(bool below) const noexcept {
   }
   std::size_t best = 0;
   for (std::size_t p = 1; p <= plane_count_; ++p) {
-    if (!planes_[p].alive || planes_[p].kind != SurfaceKind::kTread || votes[p] < params_.edge_lines.min_columns / 2) {
+    if (!planes_[p].alive || planes_[p].kind != SurfaceKind::kTread || votes[p] < params_.edge_lines.min_columns) {
       continue;
     }
     if (best == 0 || votes[p] > votes[best]) best = p;

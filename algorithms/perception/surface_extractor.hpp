@@ -25,6 +25,8 @@
 
 namespace polygmap {
 
+using FullDepthImage = Raster<std::uint16_t, kDepthWidth_px, kDepthHeight_px>;
+
 class SurfaceExtractor {
  public:
   struct Params {
@@ -192,7 +194,7 @@ class SurfaceExtractor {
   FullDepthImage full_;
   HalfRays rays_;
   SelfFilter self_filter_;
-  RawPicture raw_;
+  RawRange range_;
   HalfImage<std::uint8_t> flags_;
   ColumnRays column_rays_;
   ColumnImage columns_;
