@@ -57,7 +57,7 @@ class Extraction {
     params.limits.max_depth_m = camera.max_depth_m;
     extractor_->configure(params);
     view_.intrinsics = camera.intrinsics;
-    view_.body_margin_m = 0.0;
+    view_.body_margin = {};
   }
   double run(const Vec3& up) {
     view_.camera_up = up;

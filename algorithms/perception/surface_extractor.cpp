@@ -43,8 +43,9 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
     return false;
   }
   const double up_norm = view.camera_up.norm();
-  if (!usable(view.intrinsics) || !(std::abs(up_norm - 1.0) < 0.01) || !(view.body_margin_m >= 0.0) ||
-      !(view.body_margin_m < 0.5) || !finite(view.body[0]) || !finite(view.body[1])) {
+  if (!usable(view.intrinsics) || !(std::abs(up_norm - 1.0) < 0.01) || !(view.body_margin.fixed_m >= 0.0) ||
+      !(view.body_margin.fixed_m < 0.5) || !(view.body_margin.turn_rad >= 0.0) || !(view.body_margin.turn_rad < 0.5) ||
+      !finite(view.body[0]) || !finite(view.body[1])) {
     ++counters_.bad_view;
     return false;
   }
@@ -110,7 +111,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     case Phase::kIdle:
       return 1;
     case Phase::kMask:
-      self_filter_.add_shape(rays_, view_.body, view_.body_margin_m, index_);
+      self_filter_.add_shape(rays_, view_.body, view_.body_margin, index_);
       if (++index_ == SelfFilter::kShapes) enter(Phase::kReduce);
       return 20;
     case Phase::kReduce:

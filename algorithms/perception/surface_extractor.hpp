@@ -52,7 +52,7 @@ class SurfaceExtractor {
     CameraIntrinsics intrinsics;
     Vec3 camera_up{0.0, -1.0, 0.0};            // unit, opposite to gravity
     std::array<LegShapes, kFootCount> body{};  // shapes of radius or size 0 are absent
-    double body_margin_m = 0.025;
+    BodyMargin body_margin{0.025, 0.0};
   };
   struct Counters {
     std::uint32_t frames = 0;          // accepted
