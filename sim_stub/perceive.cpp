@@ -37,13 +37,25 @@ Eigen::Matrix4d plane_covariance(const SurfacePatch& surface) {
 class Extraction {
  public:
   Extraction(const CameraProfile& camera, const DepthPng& picture) : picture_(picture) {
-    SurfaceExtractor::Params params;
-    params.noise = camera.noise;
-    params.limits.min_depth_m = camera.min_depth_m;
-    params.limits.max_depth_m = camera.max_depth_m;
-    extractor_->configure(params);
+    params_.noise = camera.noise;
+    params_.noise_gain = 0.5;
+    params_.limits.min_depth_m = camera.min_depth_m;
+    params_.limits.max_depth_m = camera.max_depth_m;
+    extractor_->configure(params_);
     view_.intrinsics = camera.intrinsics;
     view_.body_margin = {};
+  }
+  // A camera delivers many frames; here one has to say by itself how noisy it is.
+  void settle_noise(const Vec3& up) {
+    constexpr int kMostRounds = 6;
+    constexpr double kSettled = 0.03;
+    for (int i = 0; i < kMostRounds; ++i) {
+      const double before = extractor_->noise_scale();
+      static_cast<void>(run(up));
+      if (std::abs(extractor_->noise_scale() - before) < kSettled * before) break;
+    }
+    params_.noise_gain = 0.0;
+    extractor_->configure(params_);
   }
   double run(const Vec3& up) {
     view_.camera_up = up;
@@ -64,6 +76,7 @@ class Extraction {
 
  private:
   const DepthPng& picture_;
+  SurfaceExtractor::Params params_;
   SurfaceExtractor::View view_;
   std::int64_t stamp_ = 0;
   std::unique_ptr<SurfaceExtractor> extractor_ = std::make_unique<SurfaceExtractor>();
@@ -121,6 +134,7 @@ Perceived perceive(const CameraProfile& camera, const DepthPng& picture, const s
     out.up_assumed = !found;
     out.camera_up = found.value_or(along_the_picture);
   }
+  extraction.settle_noise(out.camera_up);
   for (int i = 0; i < std::max(repeat, 1); ++i) out.microseconds.push_back(extraction.run(out.camera_up));
 
   const SurfaceExtractor& extractor = extraction.extractor();
