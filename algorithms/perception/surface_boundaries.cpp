@@ -8,7 +8,8 @@
 namespace polygmap {
 namespace {
 
-constexpr float kTruncation = 9.0F;  // of a cost: an outlier says no more than three sigmas do
+constexpr float kCostsPerUnit = 4.0F;  // bins of the noise scale's histogram
+constexpr float kTruncation = 9.0F;    // of a cost: an outlier says no more than three sigmas do
 
 }  // namespace
 
@@ -303,6 +304,7 @@ void SurfaceBoundaries::follow() noexcept {
 }
 
 void SurfaceBoundaries::begin_refit() noexcept {
+  costs_.fill(0);
   for (Plane& plane : planes_) {
     plane.moments = PlaneMoments{};
     plane.residual2 = 0.0;
@@ -311,6 +313,7 @@ void SurfaceBoundaries::begin_refit() noexcept {
 
 void SurfaceBoundaries::refit(std::int32_t first_column) noexcept {
   constexpr std::int32_t kThick_px = 8;  // thicker surfaces do without the rows next to another
+  sample_noise(first_column);
   std::array<std::size_t, kRefitColumns> next{};
   const std::int32_t count = std::min(kRefitColumns, rays_->columns - first_column);
   // Down the columns together: the topmost span that is left, and with it those of its plane that are next elsewhere.
@@ -422,6 +425,33 @@ void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip) noe
     m.count += stride * static_cast<double>(count[k]);
     plane.residual2 += stride * d_m * d_m * static_cast<double>(off2[k]);
   }
+}
+
+// One column of each strip and every other row are enough for a median.
+void SurfaceBoundaries::sample_noise(std::int32_t column) noexcept {
+  constexpr std::int32_t kStride = 2;
+  for (const ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) {
+    const Line line = line_of(planes_[span.plane].plane, column);
+    for (std::int32_t r = span.top + 1; r < span.bottom; r += kStride) {
+      if (image_->valid(column, r) == 0) continue;
+      const float bin = std::min(cost(line, column, r) * kCostsPerUnit, static_cast<float>(kCostBins));
+      ++costs_[static_cast<std::size_t>(bin)];
+    }
+  }
+}
+
+// The median forgives half of the rows being something else; a squared normal variable's is 0.455.
+double SurfaceBoundaries::noise_scale() const noexcept {
+  constexpr std::int32_t kLeastRows = 300;
+  constexpr double kMedian = 0.455;
+  std::int32_t all = 0;
+  for (const std::int32_t n : costs_) all += n;
+  if (all < kLeastRows) return 0.0;
+  std::int32_t below = 0;
+  std::size_t bin = 0;
+  while (2 * (below + costs_[bin]) < all) below += costs_[bin++];
+  const double within = (0.5 * all - below) / costs_[bin];
+  return math::sqrt((static_cast<double>(bin) + within) / static_cast<double>(kCostsPerUnit) / kMedian);
 }
 
 }  // namespace polygmap

@@ -64,6 +64,9 @@ class SurfaceBoundaries {
   // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments.
   void refit(std::int32_t first_column) noexcept;
 
+  // How large the noise is against its model, from the rows of the last refit's surfaces; 0 when there are too few.
+  [[nodiscard]] double noise_scale() const noexcept;
+
   [[nodiscard]] Columns& columns() noexcept { return columns_; }
   [[nodiscard]] const Columns& columns() const noexcept { return columns_; }
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
@@ -111,6 +114,7 @@ class SurfaceBoundaries {
   [[nodiscard]] double meeting_row(const Line& upper, const Line& lower) const noexcept {
     return static_cast<double>(lower.a - upper.a) / static_cast<double>(upper.b - lower.b) * fy_px_ + cy_px_;
   }
+  void sample_noise(std::int32_t column) noexcept;
   [[nodiscard]] std::uint16_t pair_of(std::uint8_t upper, std::uint8_t lower) noexcept;
 
   Params params_;
@@ -126,6 +130,8 @@ class SurfaceBoundaries {
   std::size_t joint_count_ = 0;
   std::array<Pair, kMaxPairs> pairs_{};
   std::size_t pair_count_ = 0;
+  static constexpr std::int32_t kCostBins = 128;  // of 0.25: up to 5.7 sigmas
+  std::array<std::int32_t, kCostBins + 1> costs_{};
   std::uint32_t overflow_ = 0;
 };
 

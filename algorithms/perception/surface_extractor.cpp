@@ -43,8 +43,9 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
     return false;
   }
   const double up_norm = view.camera_up.norm();
-  if (!usable(view.intrinsics) || !(std::abs(up_norm - 1.0) < 0.01) || !(view.body_margin_m >= 0.0) ||
-      !(view.body_margin_m < 0.5) || !finite(view.body[0]) || !finite(view.body[1])) {
+  if (!usable(view.intrinsics) || !(std::abs(up_norm - 1.0) < 0.01) || !(view.body_margin.fixed_m >= 0.0) ||
+      !(view.body_margin.fixed_m < 0.5) || !(view.body_margin.turn_rad >= 0.0) || !(view.body_margin.turn_rad < 0.5) ||
+      !finite(view.body[0]) || !finite(view.body[1])) {
     ++counters_.bad_view;
     return false;
   }
@@ -69,7 +70,8 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
   rays_.set(view.intrinsics);
   range_.set(params_.limits, view.intrinsics.depth_unit_m);
   column_rays_.set(view.intrinsics);
-  runs_.begin(params_.runs, params_.noise, view.intrinsics, columns_);
+  noise_ = params_.noise.scaled(noise_scale_);
+  runs_.begin(params_.runs, noise_, view.intrinsics, columns_);
   self_filter_.clear();
   next_.stamp_ns = frame.stamp_ns;
   next_.sequence = frame.sequence;
@@ -107,7 +109,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     case Phase::kIdle:
       return 1;
     case Phase::kMask:
-      self_filter_.add_shape(rays_, view_.body, view_.body_margin_m, index_);
+      self_filter_.add_shape(rays_, view_.body, view_.body_margin, index_);
       if (++index_ == SelfFilter::kShapes) enter(Phase::kReduce);
       return 20;
     case Phase::kReduce:
@@ -119,7 +121,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
           ++counters_.blank_frames;
           enter(Phase::kFinish);
         } else {
-          growing_.begin(params_.growing, params_.noise, column_rays_, runs_.columns());
+          growing_.begin(params_.growing, noise_, column_rays_, runs_.columns());
           enter(Phase::kGrow);
         }
         return kMaxPieceUnits;
@@ -232,8 +234,7 @@ void SurfaceExtractor::reduce_row() noexcept {
 }
 
 void SurfaceExtractor::take_grown_planes() noexcept {
-  boundaries_.begin(params_.boundaries, params_.noise, column_rays_, view_.intrinsics.fy_px, view_.intrinsics.cy_px,
-                    columns_);
+  boundaries_.begin(params_.boundaries, noise_, column_rays_, view_.intrinsics.fy_px, view_.intrinsics.cy_px, columns_);
   counters_.plane_overflow += growing_.overflow();
   to_plane_.fill(0);
   plane_count_ = std::min(growing_.count(), kMaxPlanes);
@@ -307,7 +308,7 @@ void SurfaceExtractor::solve_planes() noexcept {
     p.moments = fitted.moments;
     p.residual2 = fitted.residual2;
     if (p.moments.count < kLeast_px ||
-        !try_solve_leaning(params_.planes, params_.noise, p.moments, view_.camera_up, p.plane, &p.covariance)) {
+        !try_solve_leaning(params_.planes, noise_, p.moments, view_.camera_up, p.plane, &p.covariance)) {
       p.alive = false;
       for (std::uint8_t& plane : to_plane_) plane = plane == i ? std::uint8_t{0} : plane;
       continue;
@@ -462,7 +463,7 @@ bool SurfaceExtractor::shows(std::int32_t half_column, const ColumnSpan& span) c
       const double z = raw * view_.intrinsics.depth_unit_m;
       const Vec3 point = back_project(view_.intrinsics, c, r, z);
       ++all;
-      on += std::abs(plane.distance_m(point)) < kFloor_m + 3.0 * params_.noise.sigma_m(z) ? 1 : 0;
+      on += std::abs(plane.distance_m(point)) < kFloor_m + 3.0 * noise_.sigma_m(z) ? 1 : 0;
     }
   }
   return 2 * on > all;
@@ -561,7 +562,7 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
     return false;
   }
   const EdgeLineFinder::Beyond far_side{planes_[other].plane, planes_[other].covariance};
-  line_finder_.begin(params_.edge_lines, params_.noise, view_.intrinsics, column_rays_, columns_, own.plane, &far_side,
+  line_finder_.begin(params_.edge_lines, noise_, view_.intrinsics, column_rays_, columns_, own.plane, &far_side,
                      nosing);
   if (!nosing && riser == 0) {
     occluder_ = line_finder_.guessed_line();
@@ -800,6 +801,10 @@ void SurfaceExtractor::build_polygon() noexcept {
 }
 
 void SurfaceExtractor::finish() noexcept {
+  if (const double seen = boundaries_.noise_scale(); measured_px_ > 0 && seen > 0.0) {
+    noise_scale_ = math::clamp(noise_scale_ * (1.0 + params_.noise_gain * (seen - 1.0)), params_.min_noise_scale,
+                               params_.max_noise_scale);
+  }
   next_.invalid_fraction = outside_body_px_ > 0 ? 1.0 - static_cast<double>(measured_px_) / outside_body_px_ : 1.0;
   result_ = next_;
 }
