@@ -76,10 +76,12 @@ void SurfaceBoundaries::gather(std::int32_t column, const RunSegmentation::Colum
     interval.plane = plane;
     if (!out.try_push_back(interval)) ++overflow_;
   }
-  for (ColumnSpan& span : out) trim(column, span);
 }
 
-// A run's ends may reach over an edge: rows that the plane, known better than the run's line, does not explain.
+void SurfaceBoundaries::trim(std::int32_t column) noexcept {
+  for (ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) trim(column, span);
+}
+
 void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const noexcept {
   constexpr std::int32_t kMost_px = 8, kGood = 2;
   const Line line = line_of(planes_[interval.plane].plane, column);
@@ -214,21 +216,29 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
                                              std::int32_t first, std::int32_t last, float meeting_row,
                                              Pair* pair) const noexcept {
   // One sigma for both: with each its own, the boundary drifts towards the less noisy plane.
-  const float norm = math::sqrt(upper.norm * lower.norm);
-  const Line a{upper.a, upper.b, norm}, b{lower.a, lower.b, norm};
+  const float norm2 = upper.norm * lower.norm;
+  const auto to_bin = [&](std::int32_t r) {
+    return static_cast<std::int32_t>(
+               std::floor((static_cast<float>(r) - meeting_row) * static_cast<float>(kBinsPerPixel))) +
+           kBins / 2;
+  };
+  constexpr std::int32_t kNowhere = -1000000;
+  std::int32_t bin = pair != nullptr ? to_bin(first) : kNowhere;  // a row further is kBinsPerPixel bins further
   float sum = 0.0F, best = 0.0F;
   std::int32_t at = first - 1;
-  for (std::int32_t r = first; r <= last; ++r) {
-    if (image_->valid(column, r) == 0) continue;
-    const float gain = std::min(cost(a, column, r), kTruncation) - std::min(cost(b, column, r), kTruncation);
+  for (std::int32_t r = first; r <= last; ++r, bin += kBinsPerPixel) {
+    const std::size_t valid = image_->valid(column, r);
+    if (valid == 0) continue;
+    const float w = image_->inverse_depth(column, r), y = rays_->y[static_cast<std::size_t>(r)];
+    const float off_upper = (w - (upper.a + upper.b * y)) * w, off_lower = (w - (lower.a + lower.b * y)) * w;
+    const float sigma = inverse_sigma(w), information = 1.0F / (sigma * sigma * norm2 * share_[valid]);
+    const float gain = std::min(off_upper * off_upper * information, kTruncation) -
+                       std::min(off_lower * off_lower * information, kTruncation);
     sum += gain;
     if (sum < best) {
       best = sum;
       at = r;
     }
-    if (pair == nullptr) continue;
-    const auto bin =
-        static_cast<std::int32_t>(std::floor((static_cast<float>(r) - meeting_row) * kBinsPerPixel)) + kBins / 2;
     if (bin >= 0 && bin < kBins) pair->gain[static_cast<std::size_t>(bin)] += gain;
   }
   return at;

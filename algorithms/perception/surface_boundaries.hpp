@@ -53,6 +53,9 @@ class SurfaceBoundaries {
   // One column's runs to intervals, each run's plane looked up in to_plane.
   void gather(std::int32_t column, const RunSegmentation::Column& runs,
               const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept;
+  // A run's ends may reach over an edge: takes away rows that the plane, known better than the run's line, does not
+  // explain.
+  void trim(std::int32_t column) noexcept;
   // Gives rows that are in none of the column's spans to planes that the column beside shows there, or to one of the
   // planes first .. last. Such rows are too few for a run of their own.
   void claim(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
@@ -75,7 +78,7 @@ class SurfaceBoundaries {
   static constexpr std::size_t kMaxJoints = 4096;
   static constexpr std::size_t kMaxPairs = 192;
   static constexpr std::int32_t kBins = 64;  // of half a pixel, -16 .. 16
-  static constexpr float kBinsPerPixel = 2.0F;
+  static constexpr std::int32_t kBinsPerPixel = 2;
   struct Joint {
     std::uint16_t pair = 0;
     std::int16_t column = 0;

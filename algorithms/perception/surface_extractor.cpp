@@ -136,6 +136,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       return 1;
     case Phase::kGather:
       boundaries_.gather(row_, runs_.columns()[static_cast<std::size_t>(row_)], to_plane_);
+      if (round_ == 1) boundaries_.trim(row_);
       if (++row_ == column_rays_.columns) enter(round_ == 0 ? Phase::kMeet : Phase::kClaim);
       return 1;
     case Phase::kClaim: {  // from left to right and back
