@@ -70,6 +70,15 @@ class SurfaceBoundaries {
   // How large the noise is against its model, from the rows of the last refit's surfaces; 0 when there are too few.
   [[nodiscard]] double noise_scale() const noexcept;
 
+  // visit(other plane, columns in which the two meet), of the last meeting.
+  template <typename Visit>
+  void for_each_meeting(std::uint8_t plane, const Visit& visit) const noexcept {
+    for (std::size_t i = 0; i < pair_count_; ++i) {
+      const Pair& pair = pairs_[i];
+      if (pair.upper == plane) visit(pair.lower, pair.columns);
+      if (pair.lower == plane) visit(pair.upper, pair.columns);
+    }
+  }
   [[nodiscard]] Columns& columns() noexcept { return columns_; }
   [[nodiscard]] const Columns& columns() const noexcept { return columns_; }
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }

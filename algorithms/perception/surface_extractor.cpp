@@ -388,6 +388,18 @@ bool SurfaceExtractor::apart(const Piece& a, const Piece& b, const InversePlane&
   return elsewhere >= kEnough;
 }
 
+// A tread that meets a riser, or a riser that meets a tread.
+bool SurfaceExtractor::on_a_step(const Plane& plane) const noexcept {
+  constexpr double kLeastColumns = 4.0;
+  bool found = false;
+  if (plane.kind == SurfaceKind::kOther) return false;
+  const SurfaceKind wanted = plane.kind == SurfaceKind::kTread ? SurfaceKind::kRiser : SurfaceKind::kTread;
+  boundaries_.for_each_meeting(plane.source, [&](std::uint8_t other, double columns) {
+    found = found || (columns >= kLeastColumns && planes_[other].kind == wanted && planes_[other].alive);
+  });
+  return found;
+}
+
 // The largest piece of a plane keeps it. A piece apart from that becomes a surface of its own in the same plane.
 void SurfaceExtractor::join_pieces() noexcept {
   const std::size_t fitted = plane_count_;
@@ -434,8 +446,7 @@ void SurfaceExtractor::join_pieces() noexcept {
     plane.piece_px += piece.area_px;
   }
   for (std::size_t p = 1; p <= plane_count_; ++p) {
-    const std::int32_t least_px =
-        planes_[p].kind == SurfaceKind::kOther ? params_.min_other_px : params_.min_surface_px;
+    const std::int32_t least_px = on_a_step(planes_[p]) ? params_.min_surface_px : params_.min_other_px;
     planes_[p].alive = planes_[p].alive && planes_[p].piece_px >= least_px;
   }
 }

@@ -48,8 +48,8 @@ class SurfaceExtractor {
     double small_plane_px = 4000.0;       // smaller planes' tilt is known half as well
     double apart_m = 0.04;                // seen this far from a plane: something else is there
     std::int32_t min_component_px = 160;  // of a piece of a surface
-    std::int32_t min_surface_px = 440;    // of a surface
-    std::int32_t min_other_px = 1000;     // of one that is neither level nor upright: curved things have such facets
+    std::int32_t min_surface_px = 440;    // of a tread that meets a riser, or the reverse
+    std::int32_t min_other_px = 1300;     // of any other surface: curved things have facets of this size
     double snap_m = 0.015;                // polygon corners this close to a nosing or back line go onto it
     double probe_px = 3.0;                // half-resolution pixels outside a polygon's edge where its end is judged
   };
@@ -159,6 +159,7 @@ class SurfaceExtractor {
   void solve_planes() noexcept;
   void find_pieces() noexcept;
   void join_pieces() noexcept;
+  [[nodiscard]] bool on_a_step(const Plane& plane) const noexcept;
   [[nodiscard]] bool apart(const Piece& a, const Piece& b, const InversePlane& plane) const noexcept;
   [[nodiscard]] bool continues(std::int32_t column, const ColumnSpan& span) const noexcept;
   [[nodiscard]] bool shows(std::int32_t half_column, const ColumnSpan& span) const noexcept;
