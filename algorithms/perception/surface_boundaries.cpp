@@ -244,7 +244,7 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
   return at;
 }
 
-void SurfaceBoundaries::meet(std::int32_t column) noexcept {
+void SurfaceBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
   Column& intervals = columns_[static_cast<std::size_t>(column)];
   for (std::size_t k = 0; k < intervals.size(); ++k) {
     ColumnSpan& upper = intervals[k];
@@ -264,6 +264,11 @@ void SurfaceBoundaries::meet(std::int32_t column) noexcept {
     const std::int32_t window = params_.window_px;
     std::int32_t first = upper.bottom, last = lower.top;
     const bool meets = row > first - window && row < last + window;  // false for parallel planes, too
+    if (meets && by_planes) {
+      upper.bottom = static_cast<std::int16_t>(math::clamp(std::ceil(row) - 1.0, upper.top, lower.bottom - 1.0));
+      lower.top = static_cast<std::int16_t>(upper.bottom + 1);
+      continue;
+    }
     if (meets) {
       first = std::min(first, static_cast<std::int32_t>(row));
       last = std::max(last, static_cast<std::int32_t>(row) + 1);

@@ -60,9 +60,10 @@ class SurfaceBoundaries {
   // planes first .. last. Such rows are too few for a run of their own.
   void claim(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
   void begin_meeting() noexcept;
-  void meet(std::int32_t column) noexcept;  // change-points between the column's surfaces
-  void settle() noexcept;                   // one decision per pair of planes, then all columns follow it ...
-  void follow() noexcept;                   // ... and again when the planes have changed
+  // Change-points between the column's surfaces. by_planes: where planes meet near them, that is believed unmeasured.
+  void meet(std::int32_t column, bool by_planes) noexcept;
+  void settle() noexcept;  // one decision per pair of planes, then all columns follow it ...
+  void follow() noexcept;  // ... and again when the planes have changed
   void begin_refit() noexcept;
   // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments.
   void refit(std::int32_t first_column) noexcept;

@@ -147,7 +147,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     }
     case Phase::kMeet:
       if (row_ == 0) boundaries_.begin_meeting();
-      boundaries_.meet(row_);
+      boundaries_.meet(row_, round_ == 0);
       if (++row_ == column_rays_.columns) {
         boundaries_.settle();
         enter(Phase::kRefit);

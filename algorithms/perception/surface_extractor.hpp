@@ -49,7 +49,7 @@ class SurfaceExtractor {
     double apart_m = 0.04;                // seen this far from a plane: something else is there
     std::int32_t min_component_px = 160;  // of a piece of a surface
     std::int32_t min_surface_px = 440;    // of a tread that meets a riser, or the reverse
-    std::int32_t min_other_px = 1300;     // of any other surface: curved things have facets of this size
+    std::int32_t min_other_px = 1500;     // of any other surface: curved things have facets of this size
     double snap_m = 0.015;                // polygon corners this close to a nosing or back line go onto it
     double probe_px = 3.0;                // half-resolution pixels outside a polygon's edge where its end is judged
   };
