@@ -105,11 +105,12 @@ void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const no
 }
 
 bool SurfaceBoundaries::try_claim(std::int32_t column, std::int32_t first, std::int32_t last,
-                                  const StaticVector<std::uint8_t, kMaxPlanes>& candidates,
+                                  const StaticVector<ColumnSpan, kMaxPlanes>& candidates,
                                   ColumnSpan& claimed) const noexcept {
   constexpr std::int32_t kMinRows = 2;
   std::int32_t most = 0;
-  for (const std::uint8_t plane : candidates) {
+  for (const ColumnSpan& candidate : candidates) {
+    const std::uint8_t plane = candidate.plane;
     const Line line = line_of(planes_[plane].plane, column);
     // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
     std::int32_t top = -1, bottom = -1, fitting = 0, off = 0;
@@ -123,7 +124,8 @@ bool SurfaceBoundaries::try_claim(std::int32_t column, std::int32_t first, std::
       fitting = off = 0;
       top = -1;
     };
-    for (std::int32_t r = first; r <= last; ++r) {
+    for (std::int32_t r = std::max<std::int32_t>(first, candidate.top);
+         r <= std::min<std::int32_t>(last, candidate.bottom); ++r) {
       if (image_->valid(column, r) != 0 && cost(line, column, r) < kTruncation) {
         top = fitting == 0 ? r : top;
         bottom = r;
@@ -140,6 +142,7 @@ bool SurfaceBoundaries::try_claim(std::int32_t column, std::int32_t first, std::
 
 void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t first_plane,
                               std::size_t last_plane) noexcept {
+  constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
   Column& spans = columns_[static_cast<std::size_t>(column)];
   const bool any_beside = beside >= 0 && beside < rays_->columns;
   std::int32_t from = 0;
@@ -150,17 +153,24 @@ void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::siz
     if (until <= gap_from || spans.full()) continue;
     const std::uint8_t above = k > 0 ? spans[k - 1].plane : std::uint8_t{0};
     const std::uint8_t below = k < spans.size() ? spans[k].plane : std::uint8_t{0};
-    StaticVector<std::uint8_t, kMaxPlanes> candidates;
-    const auto consider = [&](std::uint8_t plane) {
-      if (plane == above || plane == below) return;
-      static_cast<void>(candidates.try_push_back(plane));
+    StaticVector<ColumnSpan, kMaxPlanes> candidates;
+    const auto consider = [&](ColumnSpan candidate) {
+      if (candidate.plane == above || candidate.plane == below) return;
+      static_cast<void>(candidates.try_push_back(candidate));
     };
     if (any_beside) {
-      for (const ColumnSpan& other : columns_[static_cast<std::size_t>(beside)]) {
-        if (other.top <= until + 1 && other.bottom >= gap_from - 1) consider(other.plane);
+      for (ColumnSpan other : columns_[static_cast<std::size_t>(beside)]) {
+        other.top = static_cast<std::int16_t>(other.top - kReach_px);
+        other.bottom = static_cast<std::int16_t>(other.bottom + kReach_px);
+        if (other.top <= until && other.bottom >= gap_from) consider(other);
       }
     }
-    for (std::size_t p = first_plane; p <= last_plane; ++p) consider(static_cast<std::uint8_t>(p));
+    for (std::size_t p = first_plane; p <= last_plane; ++p) {
+      ColumnSpan anywhere;
+      anywhere.bottom = static_cast<std::int16_t>(rays_->height_px - 1);
+      anywhere.plane = static_cast<std::uint8_t>(p);
+      consider(anywhere);
+    }
     ColumnSpan claimed;
     if (!try_claim(column, gap_from, until, candidates, claimed)) continue;
     if (!spans.try_push_back(claimed)) continue;

@@ -110,9 +110,9 @@ class SurfaceBoundaries {
   // Residual over sigma, squared.
   [[nodiscard]] float cost(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
   void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
-  // The best of the candidates in rows first .. last; false when none fits.
+  // The best of the candidates, each within its own rows, in rows first .. last; false when none fits.
   [[nodiscard]] bool try_claim(std::int32_t column, std::int32_t first, std::int32_t last,
-                               const StaticVector<std::uint8_t, kMaxPlanes>& candidates,
+                               const StaticVector<ColumnSpan, kMaxPlanes>& candidates,
                                ColumnSpan& claimed) const noexcept;
   // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
   struct Strip {
