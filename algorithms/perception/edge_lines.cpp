@@ -161,7 +161,7 @@ void EdgeLineFinder::search_columns(std::int32_t first_column) noexcept {
   const auto all = [](double x) { return cv::vx_setall_f32(static_cast<float>(x)); };
   const Wide zero = all(0.0), one = all(1.0), truncation = all(math::square(params_.truncate_sigmas));
   const Wide base = all(noise_.base_m), per_metre = all(noise_.per_metre), quadratic = all(noise_.quadratic_per_m);
-  const Wide half_gap = all(params_.max_gap_px / 2 + 0.5);
+  const Wide half_gap = all(0.5 * (params_.max_gap_px + 1));
   const Wide surface_b = all(surface_.m.y()), other_b = all(other_.m.y());
   for (std::int32_t k0 = 0; k0 < kLanes; k0 += Wide::nlanes) {
     const auto load = [k0](const Lanes& x) { return cv::vx_load(x.data() + k0); };

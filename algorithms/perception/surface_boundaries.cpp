@@ -307,7 +307,7 @@ void SurfaceBoundaries::settle() noexcept {
       best = sum;
       at = bin + 1;
     }
-    const double offset_px = (at - kBins / 2) / static_cast<double>(kBinsPerPixel);
+    const double offset_px = (at - 0.5 * kBins) / kBinsPerPixel;
     const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].columns;
     pairs_[i].shift_px = meets ? 0.0 : offset_px;
   }
