@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "tests/support/ideal_climb.hpp"
+#include "tests/support/slow_machine.hpp"
 
 namespace polygmap {
 namespace {
@@ -48,6 +49,7 @@ TEST(GaitClimb, RisesTreadsAndStarts_ClimbsToTheTopAndEnds) {
     for (const double tread : {0.275, 0.28, 0.285}) {
       for (const int steps : {4, 10}) {
         if (steps == 10 && rise == 0.10) continue;  // long climbs are for the corners
+        if (test::kSlowMachine && (steps == 10 || tread != 0.28)) continue;
         ClimbSetup setup;
         setup.stairs = {.steps = steps, .rise_m = rise, .tread_m = tread};
         const auto& start = starts[n++ % starts.size()];

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "algorithms/robot/model.hpp"
 #include "tests/support/depth_scene.hpp"
 
@@ -34,13 +36,15 @@ HalfImage<std::uint8_t> mask_of(const HalfRays& rays, const std::array<LegShapes
 }
 
 bool hits(const std::array<LegShapes, kFootCount>& legs, const Vec3& ray, double margin_m) {
-  for (double z = 0.02; z < 2.0; z += 0.005) {
+  const double length = ray.norm();
+  for (double z = 0.02; z < 2.0;) {
+    double clear_m = 2.0;
     for (const LegShapes& leg : legs) {
-      if (signed_distance_m(leg.thigh, ray * z) < margin_m || signed_distance_m(leg.shank, ray * z) < margin_m ||
-          signed_distance_m(leg.foot, ray * z) < margin_m) {
-        return true;
-      }
+      clear_m = std::min({clear_m, signed_distance_m(leg.thigh, ray * z), signed_distance_m(leg.shank, ray * z),
+                          signed_distance_m(leg.foot, ray * z)});
     }
+    if (clear_m < margin_m) return true;
+    z += std::max(0.005, (clear_m - margin_m) / length);  // nothing is nearer
   }
   return false;
 }

@@ -27,12 +27,12 @@ double enter(const SceneBox& box, const Vec3& origin, const Vec3& direction, int
   return axis >= 0 && near <= far ? near : std::numeric_limits<double>::infinity();
 }
 
-// First z at which the ray (x, y, 1) comes within a tenth of a millimetre of the shape.
+// First z below limit_m at which the ray (x, y, 1) comes within a tenth of a millimetre of the shape.
 template <typename Shape>
-double march(const Shape& shape, const Vec3& ray) {
+double march(const Shape& shape, const Vec3& ray, double limit_m) {
   const double length = ray.norm();
   double t = 0.0;
-  for (int i = 0; i < 80 && t < kFar_m; ++i) {
+  for (int i = 0; i < 80 && t < limit_m * length; ++i) {
     const double distance = signed_distance_m(shape, ray / length * t);
     if (distance < 1e-4) return t / length;
     t += distance;
@@ -120,17 +120,16 @@ DepthPicture render(const DepthScene& scene) {
         best = t;
         cosine = std::abs(direction[axis]) / ray.norm();
       }
+      double nearest = best;
       for (const LegShapes& leg : scene.legs) {
         for (const Capsule* capsule : {&leg.thigh, &leg.shank}) {
-          if (capsule->radius_m > 0.0 && march(*capsule, ray) < best) {
-            best = march(*capsule, ray);
-            cosine = 1.0;
-          }
+          if (capsule->radius_m > 0.0) nearest = std::min(nearest, march(*capsule, ray, nearest));
         }
-        if (leg.foot.half_m.minCoeff() > 0.0 && march(leg.foot, ray) < best) {
-          best = march(leg.foot, ray);
-          cosine = 1.0;
-        }
+        if (leg.foot.half_m.minCoeff() > 0.0) nearest = std::min(nearest, march(leg.foot, ray, nearest));
+      }
+      if (nearest < best) {
+        best = nearest;
+        cosine = 1.0;
       }
       const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width_px) + static_cast<std::size_t>(u);
       if (best < kFar_m) picture.depth_m[i] = best;

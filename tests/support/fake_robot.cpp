@@ -6,12 +6,14 @@
 
 #include "algorithms/geometry/so3.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
+#include "tests/support/slow_machine.hpp"
 
 namespace polygmap::test {
 namespace {
 
 constexpr double kTick_s = 1e-6 * kMinorFrame_us;
 constexpr double kWeight_n = 540.0, kLeg_n = 30.0;
+constexpr int kPicture_ticks = kSlowMachine ? 48 : 16;
 
 }  // namespace
 
@@ -122,7 +124,7 @@ void FakeRobot::sense() {
     }
     joints.feed(feedback);
   }
-  if (camera_speaks && tick_ % 16 == 0) {
+  if (camera_speaks && tick_ % kPicture_ticks == 0) {
     scene_.world_T_camera = true_T_base_ * base_T_camera();
     camera.feed(now_ns, render_for_robot(scene_));
   }

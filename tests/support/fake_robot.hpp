@@ -28,7 +28,8 @@ class FakeRobot {
   // toe_gap_m: from the collision toes to the first riser. Four steps of 0.13 x 0.28 m.
   explicit FakeRobot(double toe_gap_m);
   [[nodiscard]] Ports ports() noexcept { return {camera, imu, joints, lidar}; }
-  // 2 ms: the legs follow the newest command, then the sensors speak. The camera sees every 16th tick, at once.
+  // 2 ms: the legs follow the newest command, then the sensors speak. The camera sees every 16th tick (48th
+  // on a slow machine), at once.
   void advance();
 
   [[nodiscard]] const Transform& true_T_base() const noexcept { return true_T_base_; }
