@@ -441,7 +441,7 @@ TEST_F(PipelineOnARobot, PoseOfAFrameIsUncertain_MapKnows) {
   params.estimator.attitude.gyro_noise_radprs = 0.1;
   params.estimator.attitude.foot_sigma_rad = 0.1;
   start(kToeGap_m, params);
-  run(800);
+  run(1000);
   const double tilt_sigma_rad = control().state().tilt_sigma_rad;
   EXPECT_GT(tilt_sigma_rad, 0.02);
   ASSERT_FALSE(module_->pipeline().perception().map_snapshot().polygons.empty());
