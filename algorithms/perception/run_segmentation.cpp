@@ -36,7 +36,8 @@ void RunSegmentation::begin(const Params& params, const DepthSigma& noise, const
   // jump_share w + 4 sigma
   jump_ = {4.0F * quadratic_, static_cast<float>(params.jump_share) + 4.0F * per_metre_, 4.0F * base_};
   max_gap_ = static_cast<float>(params.max_gap_px);
-  outlier_weight_ = static_cast<float>(params.max_gap_px / kPending + 1);
+  const std::int32_t outlier_weight = params.max_gap_px / kPending + 1;
+  outlier_weight_ = static_cast<float>(outlier_weight);
   fy_ = static_cast<float>(intrinsics.fy_px);
   cy_ = static_cast<float>(intrinsics.cy_px);
   for (std::int32_t g = 0; g < kColumns; ++g) {
