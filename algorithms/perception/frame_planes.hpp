@@ -42,8 +42,9 @@ struct FramePicture {
   HalfImage<std::uint8_t> flags;
   ColumnRays column_rays;
   ColumnImage columns;
-  Raster<std::uint8_t, kColumns, kDepthHeight_px> owner;  // plane of each column's row, 0 = none
+  Raster<std::uint8_t, kDepthHeight_px, kColumns> owners;  // a column a line: the plane of each of its rows, 0 = none
 
+  [[nodiscard]] std::uint8_t owner(std::int32_t column, std::int32_t row) const noexcept { return owners(row, column); }
   // Of a half-resolution pixel.
   [[nodiscard]] std::uint8_t plane_at(std::int32_t column, std::int32_t row) const noexcept {
     return column / 2 < column_rays.columns ? owner(column / 2, 2 * row) : std::uint8_t{0};

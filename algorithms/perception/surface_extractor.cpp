@@ -181,13 +181,13 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       enter(Phase::kProfile);
       return kMaxPieceUnits;
     case Phase::kProfile:
-      profiles_.add_column(raw_, params_.noise, boundaries_, pieces_, planes_, row_, picture_);
+      profiles_.add_column(boundaries_.columns(), pieces_, planes_, row_, picture_);
       if (++row_ == picture_.column_rays.columns) {
-        enter(Phase::kOutline);
+        enter(Phase::kSides);
         index_ = 1;
       }
       return 1;
-    case Phase::kOutline:
+    case Phase::kSides:
       if (index_ > planes_.count) {
         enter(Phase::kFinish);
         return 1;
@@ -196,6 +196,13 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
         ++index_;
         return 1;
       }
+      // One side at a time.
+      (started_ ? sides_.right : sides_.left) =
+          side_finder_.find(params_.sides, params_.noise, raw_, picture_, planes_, index_, profiles_[index_], started_);
+      if (started_) phase_ = Phase::kOutline;
+      started_ = !started_;
+      return 4;
+    case Phase::kOutline:
       outline();
       return 20;
     case Phase::kNosing:
@@ -205,7 +212,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     case Phase::kPolygon: {
       build_polygon();
       const std::size_t next = index_ + 1;
-      enter(Phase::kOutline);
+      enter(Phase::kSides);
       index_ = next;
       return 20;
     }
@@ -326,7 +333,7 @@ std::size_t SurfaceExtractor::surface_at(std::int32_t column, std::int32_t row) 
 }
 
 void SurfaceExtractor::outline() noexcept {
-  column_outline_.build(profiles_[index_], kMaxPolygonVertices - 4, outline_);
+  column_outline_.build(profiles_[index_], sides_, kMaxPolygonVertices - 4, outline_);
   lines_ = SurfaceLines{};
   phase_ = planes_[index_].kind == SurfaceKind::kTread ? Phase::kNosing : Phase::kPolygon;
 }

@@ -26,6 +26,7 @@
 #include "algorithms/perception/surface_pieces.hpp"
 #include "algorithms/perception/surface_polygons.hpp"
 #include "algorithms/perception/surface_profiles.hpp"
+#include "algorithms/perception/surface_sides.hpp"
 
 namespace polygmap {
 
@@ -45,6 +46,7 @@ class SurfaceExtractor {
     double merge_tilt_rad = 0.12;
     double small_plane_px = 4000.0;  // smaller planes' tilt is known half as well
     SurfacePieces::Params pieces;
+    SurfaceSides::Params sides;
     SurfacePolygons::Params polygons;
   };
   // What the module knows about this frame, in the camera frame at the exposure.
@@ -108,6 +110,7 @@ class SurfaceExtractor {
     kSearch,
     kPieces,
     kProfile,
+    kSides,
     kOutline,
     kNosing,
     kBack,
@@ -166,6 +169,8 @@ class SurfaceExtractor {
   FramePlanes planes_;
   SurfacePieces pieces_;
   SurfaceProfiles profiles_;
+  SurfaceSides side_finder_;
+  OutlineSides sides_;
   ColumnOutline column_outline_;
   Outline2 outline_;
   EdgeLineFinder line_finder_;

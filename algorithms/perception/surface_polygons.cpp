@@ -3,6 +3,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <utility>
+
+#include "algorithms/perception/vectors.hpp"
 
 namespace polygmap {
 namespace {
@@ -10,42 +13,71 @@ namespace {
 constexpr double kLeastSlope = 0.5;  // sine between a riser and the tread that ends it
 constexpr double kOnLine_m = 0.002;  // a polygon's edge lies on a line
 
-// Over the polygon's rows and columns in the picture.
+// Adds a row's columns first .. last that are not the robot's own, and the valid pixels in them.
+void count_pixels(const std::uint8_t* flags, const std::uint8_t* valid, std::int32_t first, std::int32_t last,
+                  std::int32_t& free_columns, std::int32_t& valid_px) noexcept {
+  using Bytes = cv::v_uint8;
+  static_assert(kColumns % Bytes::nlanes == 0);
+  static constexpr std::array<std::uint8_t, kColumns> kIndices = [] {
+    std::array<std::uint8_t, kColumns> indices{};
+    for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<std::uint8_t>(i);
+    return indices;
+  }();
+  const Bytes from = cv::vx_setall_u8(static_cast<std::uint8_t>(first)),
+              to = cv::vx_setall_u8(static_cast<std::uint8_t>(last)), is_body = cv::vx_setall_u8(kPixelBody),
+              none = cv::vx_setzero_u8();
+  // No lane gets more than 4 * kColumns / nlanes.
+  Bytes free_sum = none, valid_sum = none;
+  for (std::int32_t g = first / Bytes::nlanes * Bytes::nlanes; g <= last; g += Bytes::nlanes) {
+    const Bytes index = cv::vx_load(kIndices.data() + g);
+    const Bytes wanted = (cv::v_max(index, from) == index) & (cv::v_min(index, to) == index);
+    Bytes left_half, right_half;
+    cv::v_load_deinterleave(flags + 2 * static_cast<std::ptrdiff_t>(g), left_half, right_half);
+    const Bytes seen = (((left_half | right_half) & is_body) == none) & wanted;
+    free_sum = cv::v_sub_wrap(free_sum, seen);
+    valid_sum = cv::v_add_wrap(valid_sum, cv::vx_load(valid + g) & seen);
+  }
+  free_columns += static_cast<std::int32_t>(cv::v_reduce_sum(free_sum));
+  valid_px += static_cast<std::int32_t>(cv::v_reduce_sum(valid_sum));
+}
+
+// Share of the polygon's pixels without data, over its rows and columns in the picture.
 double invalid_share(const FramePicture& picture, const PolygonVertices& polygon) noexcept {
-  Outline2 seen;
-  for (const Vec3& p : polygon) {
-    static_cast<void>(seen.try_push_back({p.x() / p.z() * picture.rays.fx_px + picture.rays.cx_px,
-                                          p.y() / p.z() * picture.rays.fy_px + picture.rays.cy_px}));
+  const HalfRays& rays = picture.rays;
+  // From which column to which the convex polygon reaches in every row: two of its edges cross it.
+  struct Reach {
+    double left = 1e9, right = -1e9;
+  };
+  std::array<Reach, kHalfHeight_px> reach;
+  std::int32_t first_row = rays.height_px, last_row = -1;
+  const auto column_of = [&](const Vec3& p) { return p.x() / p.z() * rays.fx_px + rays.cx_px; };
+  const auto row_of = [&](const Vec3& p) { return p.y() / p.z() * rays.fy_px + rays.cy_px; };
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vec3 *upper = &polygon[i], *lower = &polygon[i + 1 < polygon.size() ? i + 1 : 0];
+    if (row_of(*lower) < row_of(*upper)) std::swap(upper, lower);
+    const double top = row_of(*upper), bottom = row_of(*lower);
+    const auto first = static_cast<std::int32_t>(std::ceil(math::clamp(top, 0.0, rays.height_px)));
+    const auto last = static_cast<std::int32_t>(std::floor(math::clamp(bottom, -1.0, rays.height_px - 1.0)));
+    const double step = (column_of(*lower) - column_of(*upper)) / std::max(bottom - top, 1e-9);
+    double x = column_of(*upper) + (first - top) * step;
+    for (std::int32_t r = first; r <= last; ++r, x += step) {
+      Reach& row = reach[static_cast<std::size_t>(r)];
+      row.left = std::min(row.left, x);
+      row.right = std::max(row.right, x);
+    }
+    first_row = std::min(first_row, first);
+    last_row = std::max(last_row, last);
   }
-  std::int32_t all = 0, invalid = 0;
-  double top = 1e9, bottom = -1e9;
-  for (const Vec2& p : seen) {
-    top = std::min(top, p.y());
-    bottom = std::max(bottom, p.y());
-  }
-  const auto first_row = static_cast<std::int32_t>(math::clamp(std::ceil(top), 0.0, picture.rays.height_px - 1.0));
-  const auto last_row = static_cast<std::int32_t>(math::clamp(std::floor(bottom), 0.0, picture.rays.height_px - 1.0));
+  std::int32_t free = 0, valid = 0;
   for (std::int32_t r = first_row; r <= last_row; ++r) {
-    double lo = 1e9, hi = -1e9;
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      const Vec2 &a = seen[i], &b = seen[(i + 1) % seen.size()];
-      if ((a.y() <= r) == (b.y() <= r)) continue;
-      const double x = a.x() + (r - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
-      lo = std::min(lo, x);
-      hi = std::max(hi, x);
-    }
-    if (hi < lo) continue;
-    const auto left = static_cast<std::int32_t>(math::clamp(std::ceil(lo), 0.0, picture.rays.width_px - 1.0));
-    const auto right = static_cast<std::int32_t>(math::clamp(std::floor(hi), 0.0, picture.rays.width_px - 1.0));
-    const std::uint8_t* flags = picture.flags.row(r);
-    const std::uint8_t* valid = picture.columns.valid.row(2 * r);
-    for (std::int32_t c = left; c <= right && c / 2 < picture.column_rays.columns; c += 2) {
-      if ((flags[c] & kPixelBody) != 0) continue;
-      all += kColumn_px;
-      invalid += kColumn_px - valid[c / 2];
-    }
+    const Reach& row = reach[static_cast<std::size_t>(r)];
+    // Columns whose middles, at 2 g + 0.5, lie within.
+    const auto left = static_cast<std::int32_t>(std::ceil(math::clamp(0.5 * (row.left - 0.5), 0.0, kColumns)));
+    const auto right = static_cast<std::int32_t>(
+        std::floor(math::clamp(0.5 * (row.right - 0.5), -1.0, picture.column_rays.columns - 1.0)));
+    if (left <= right) count_pixels(picture.flags.row(r), picture.columns.valid.row(2 * r), left, right, free, valid);
   }
-  return all > 0 ? static_cast<double>(invalid) / all : 0.0;
+  return free > 0 ? 1.0 - static_cast<double>(valid) / (kColumn_px * free) : 0.0;
 }
 
 }  // namespace
@@ -192,7 +224,7 @@ bool SurfacePolygons::try_build(const FramePicture& picture, const FramePlanes& 
   const auto seen_on = [&](const EdgeLine& line, const Vec2& a, const Vec2& b) {
     if (!line.valid) return false;
     const Vec2 p = to_plane(line.a_m), q = to_plane(line.b_m);
-    const Vec2 along = (q - p).normalized(), normal{-along.y(), along.x()};
+    const Vec2 along = (q - p) / std::max((q - p).norm(), 1e-9), normal{-along.y(), along.x()};
     if (std::abs(normal.dot(a - p)) > kOnLine_m || std::abs(normal.dot(b - p)) > kOnLine_m) return false;
     const double from = std::min(along.dot(a - p), along.dot(b - p)), to = std::max(along.dot(a - p), along.dot(b - p));
     return 2.0 * (std::min(to, (q - p).norm()) - std::max(from, 0.0)) > to - from;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whose each pixel is, and where every surface begins and ends in the picture.
+// Whose each pixel is, and where every surface begins and ends in the picture's columns and rows.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
 #include "algorithms/perception/column_outline.hpp"
-#include "algorithms/perception/edge_lines.hpp"
 #include "algorithms/perception/frame_planes.hpp"
 #include "algorithms/perception/surface_boundaries.hpp"
 #include "algorithms/perception/surface_pieces.hpp"
@@ -16,10 +15,9 @@ namespace polygmap {
 class SurfaceProfiles {
  public:
   void begin(std::size_t planes, FramePicture& picture) noexcept;
-  // Writes the column's owners into the picture.
-  void add_column(const RawPicture& raw, const DepthSigma& noise, const SurfaceBoundaries& boundaries,
-                  const SurfacePieces& pieces, const FramePlanes& planes, std::int32_t column,
-                  FramePicture& picture) noexcept;
+  // Columns come from left to right. Writes the column's owners into the picture.
+  void add_column(const SurfaceBoundaries::Columns& columns, const SurfacePieces& pieces, const FramePlanes& planes,
+                  std::int32_t column, FramePicture& picture) noexcept;
   [[nodiscard]] const SurfaceProfile& operator[](std::size_t plane) const noexcept { return profiles_[plane]; }
 
  private:
