@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kLeastCosine = 0.26;                    // of the incidence; the noise model ends there
 constexpr std::int32_t kFlatRows = 4, kFlatColumns = 3;  // more columns in these rows: too flat
+constexpr std::int32_t kMixed_px = 2;                    // of neither plane, where one pixel sees both
 constexpr std::int32_t kInside_px = 8;                   // of the outermost column and the one beside it
 constexpr std::int32_t kOutside_px = 8;                  // searched beyond
 
@@ -32,11 +33,9 @@ struct RowPlane {
     slope = static_cast<float>(plane.m.x() / k.fx_px);
     per_sigma = static_cast<float>(cosine / (w * noise.sigma_m(1.0 / w)));
   }
-  // Twice the negative logarithm of the likelihood, but for a constant; no more than most. more: what a wider sigma
-  // adds.
-  [[nodiscard]] float cost(std::int32_t column, float depth_m, float more, float most) const noexcept {
-    const float residual = ((at + slope * static_cast<float>(column)) * depth_m - 1.0F) * per_sigma;
-    return std::min(residual * residual + more, most);
+  // Over sigma.
+  [[nodiscard]] float residual(std::int32_t column, float depth_m) const noexcept {
+    return ((at + slope * static_cast<float>(column)) * depth_m - 1.0F) * per_sigma;
   }
   // 2 ln(sigma over the other's), near enough: with residuals alone a crease moves towards the plane of less noise.
   [[nodiscard]] float wider_than(const RowPlane& other) const noexcept {
@@ -76,6 +75,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(const Params& params, const DepthS
   constexpr float kTie = 1e-3F;
   float sum = 0.0F, least = 1e9F;
   std::int32_t from = 0, to = 0;
+  std::int32_t of_neither = 0;  // pixels with data between from and to, those behind the surface less those before it
   bool measured_beyond = false;
   for (std::int32_t i = 0; i < kInside_px + kOutside_px; ++i) {
     const std::int32_t c = first + out * i;
@@ -84,22 +84,30 @@ SurfaceSides::Ending SurfaceSides::end_of_row(const Params& params, const DepthS
       if (i < kInside_px) return Ending::kHidden;
       break;
     }
+    std::int32_t deviation = 0;
     if (raw.range.valid(depth[c])) {
       const float z_m = static_cast<float>(depth[c]) * unit_m;
       measured_beyond = true;
-      sum += own.cost(c, z_m, 0.0F, most) - (other.valid ? other.cost(c, z_m, more, most) : leave);
+      const float residual = own.residual(c, z_m);
+      deviation = residual < 0.0F ? -1 : 1;
+      // Twice the negative logarithm of the likelihoods, but for a constant.
+      const float beyond = other.valid ? std::min(other.residual(c, z_m) * other.residual(c, z_m) + more, most) : leave;
+      sum += std::min(residual * residual, most) - beyond;
     }
     if (sum < least - kTie) {
       least = sum;
       from = to = i;
+      of_neither = 0;
       measured_beyond = false;
     } else if (sum < least + kTie && to == i - 1) {
       to = i;
+      of_neither += deviation;
       measured_beyond = false;
     }
   }
   if (from == 0) return Ending::kNone;
   if (!measured_beyond) return Ending::kHidden;
+  if (std::abs(of_neither) > kMixed_px) to = from;  // something narrow stands between: the surface ends at it
   end_px = first + out * (0.5 * (from + to) + 0.5);
   return Ending::kSeen;
 }
@@ -156,6 +164,7 @@ OutlineSide SurfaceSides::find(const Params& params, const DepthSigma& noise, co
                                const FramePicture& picture, const FramePlanes& planes, std::size_t index,
                                const SurfaceProfile& profile, bool right) noexcept {
   const double out = right ? 1.0 : -1.0;
+  const auto outer_edge = [right](std::uint8_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
   seen_.clear();
   hidden_.clear();
   const auto& ends = right ? profile.right : profile.left;
@@ -179,38 +188,40 @@ OutlineSide SurfaceSides::find(const Params& params, const DepthSigma& noise, co
     RowEnd end{static_cast<double>(r), 0.0};
     const Ending ending = end_of_row(params, noise, raw, picture, planes, index, r, g, right, end.column);
     if (ending == Ending::kNone) continue;
-    if (ending == Ending::kHidden) end.column = kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5);
+    if (ending == Ending::kHidden) end.column = outer_edge(g);
     static_cast<void>((ending == Ending::kSeen ? seen_ : hidden_).try_push_back(end));
     outermost = std::max(outermost, out * end.column);
   }
   // Half-resolution pixel i is where full-resolution 2 i + 0.5 is.
   OutlineSide side;
   if (outermost < -1e8) {  // no row but flat ones
-    for (std::int32_t r = profile.first_row; r <= profile.last_row; ++r) {
+    for (std::int32_t r = first_row; r <= last_row; ++r) {
       const std::uint8_t g = ends[static_cast<std::size_t>(r)];
-      if (g != SurfaceProfile::kNoColumn)
-        outermost = std::max(outermost, out * (kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5)));
+      if (g != SurfaceProfile::kNoColumn) outermost = std::max(outermost, out * outer_edge(g));
     }
   }
   side.column_px = 0.5 * (out * outermost - 0.5);
   Line line;
   if (!try_line(params, raw.intrinsics, planes[index].plane, line)) return side;
-  std::int32_t on = 0, outside = 0, between = 0;
+  std::int32_t on = 0, between = 0;
   double first = 1e9, last = -1e9;
-  const auto beyond = [&](const RowEnd& e) { return out * (e.column - line.at - line.slope * e.row); };
+  const auto beyond = [&](double row, double column) { return out * (column - line.at - line.slope * row); };
   for (const RowEnd& e : seen_) {
-    if (std::abs(beyond(e)) > params.inlier_px) continue;
+    if (std::abs(beyond(e.row, e.column)) > params.inlier_px) continue;
     ++on;
     first = std::min(first, e.row);
     last = std::max(last, e.row);
   }
-  const auto judge = [&](const RowEnd& e) {
-    outside += beyond(e) > params.outside_px ? 1 : 0;
-    between += e.row >= first && e.row <= last ? 1 : 0;
-  };
-  for (const RowEnd& e : seen_) judge(e);
-  for (const RowEnd& e : hidden_) judge(e);
-  if (on < params.min_rows || outside > params.max_outside * on || on < params.min_share * between) return side;
+  for (const auto* all : {&seen_, &hidden_}) {
+    for (const RowEnd& e : *all) between += e.row >= first && e.row <= last ? 1 : 0;
+  }
+  double cut_px = 0.0;
+  for (std::int32_t r = first_row; r <= last_row; ++r) {
+    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+    if (g != SurfaceProfile::kNoColumn) cut_px += std::max(beyond(r, outer_edge(g)) - params.outside_px, 0.0);
+  }
+  if (on < params.min_rows || on < params.min_share * between) return side;
+  if (cut_px > params.max_cut * planes[index].piece_px) return side;
   side.fitted = true;
   side.column_px = 0.5 * (line.at + 0.5 * line.slope - 0.5);
   side.slope = line.slope;

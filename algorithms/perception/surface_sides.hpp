@@ -18,8 +18,8 @@ class SurfaceSides {
     double leave_sigmas = 2.0;  // a pixel this far off has left the surface, when what lies beyond is no known plane
     double max_lean = 1.0;      // on the plane, along over across the picture's rows: a front or a back leans more
     double inlier_px = 2.0;
-    double outside_px = 3.0;    // a row that ends this far outside the line contradicts it
-    double max_outside = 0.3;   // of the rows on the line
+    double outside_px = 3.0;    // what of the surface's pixels lies farther than this outside the line ...
+    double max_cut = 0.03;      // ... is no more than this share of them
     std::int32_t min_rows = 6;  // looked at and on the line
     double min_share = 0.5;     // of the rows between the line's ends
   };
