@@ -178,6 +178,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       counters_.run_overflow += pieces_.overflow();
       counters_.plane_overflow += pieces_.join(params_.pieces, picture_, planes_);
       profiles_.begin(planes_.count, picture_);
+      side_finder_.begin(params_.sides, params_.noise, raw_, picture_, planes_);
       enter(Phase::kProfile);
       return kMaxPieceUnits;
     case Phase::kProfile:
@@ -188,20 +189,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       }
       return 1;
     case Phase::kSides:
-      if (index_ > planes_.count) {
-        enter(Phase::kFinish);
-        return 1;
-      }
-      if (!planes_[index_].alive) {
-        ++index_;
-        return 1;
-      }
-      // One side at a time.
-      (started_ ? sides_.right : sides_.left) =
-          side_finder_.find(params_.sides, params_.noise, raw_, picture_, planes_, index_, profiles_[index_], started_);
-      if (started_) phase_ = Phase::kOutline;
-      started_ = !started_;
-      return 4;
+      return side_step();
     case Phase::kOutline:
       outline();
       return 20;
@@ -330,6 +318,22 @@ void SurfaceExtractor::solve_planes() noexcept {
 std::size_t SurfaceExtractor::surface_at(std::int32_t column, std::int32_t row) const noexcept {
   return column / kColumn_px < picture_.column_rays.columns ? planes_[picture_.owner(column / kColumn_px, row)].surface
                                                             : 0U;
+}
+
+// One side of one surface at a time.
+std::int32_t SurfaceExtractor::side_step() noexcept {
+  if (index_ > planes_.count) {
+    enter(Phase::kFinish);
+    return 1;
+  }
+  if (!planes_[index_].alive) {
+    ++index_;
+    return 1;
+  }
+  (started_ ? sides_.right : sides_.left) = side_finder_.find(index_, profiles_[index_], started_);
+  if (started_) phase_ = Phase::kOutline;
+  started_ = !started_;
+  return 4;
 }
 
 void SurfaceExtractor::outline() noexcept {

@@ -131,6 +131,7 @@ class SurfaceExtractor {
   void take_found_planes() noexcept;
   void merge_planes() noexcept;
   void solve_planes() noexcept;
+  std::int32_t side_step() noexcept;
   void outline() noexcept;
   [[nodiscard]] bool begin_line(bool nosing) noexcept;
   std::int32_t line_step(bool nosing) noexcept;

@@ -60,10 +60,11 @@ double invalid_share(const FramePicture& picture, const PolygonVertices& polygon
     const auto last = static_cast<std::int32_t>(std::floor(math::clamp(bottom, -1.0, rays.height_px - 1.0)));
     const double step = (column_of(*lower) - column_of(*upper)) / std::max(bottom - top, 1e-9);
     double x = column_of(*upper) + (first - top) * step;
-    for (std::int32_t r = first; r <= last; ++r, x += step) {
+    for (std::int32_t r = first; r <= last; ++r) {
       Reach& row = reach[static_cast<std::size_t>(r)];
       row.left = std::min(row.left, x);
       row.right = std::max(row.right, x);
+      x += step;
     }
     first_row = std::min(first_row, first);
     last_row = std::max(last_row, last);

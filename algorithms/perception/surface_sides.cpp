@@ -45,32 +45,40 @@ struct RowPlane {
 
 }  // namespace
 
-SurfaceSides::Ending SurfaceSides::end_of_row(const Params& params, const DepthSigma& noise, const RawPicture& raw,
-                                              const FramePicture& picture, const FramePlanes& planes, std::size_t index,
-                                              std::int32_t row, std::int32_t column, bool right,
+void SurfaceSides::begin(const Params& params, const DepthSigma& noise, const RawPicture& raw,
+                         const FramePicture& picture, const FramePlanes& planes) noexcept {
+  params_ = params;
+  noise_ = noise;
+  raw_ = &raw;
+  picture_ = &picture;
+  planes_ = &planes;
+}
+
+SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t row, std::int32_t column, bool right,
                                               double& end_px) const noexcept {
-  const CameraIntrinsics& k = raw.intrinsics;
+  const CameraIntrinsics& k = raw_->intrinsics;
+  const FramePlanes& planes = *planes_;
   const std::int32_t out = right ? 1 : -1;
   const std::int32_t border = kColumn_px * column + (right ? kColumn_px - 1 : 0);  // the outermost column's last pixel
   // The picture's last columns hide what comes after them.
   if (border + 2 * out < 0 || border + 2 * out >= k.width_px) return Ending::kHidden;
   const std::int32_t first = border - out * (kInside_px - 1);
   if (first < 0 || first >= k.width_px) return Ending::kNone;
-  const RowPlane own(planes[index].plane, noise, k, border, row);
+  const RowPlane own(planes[index].plane, noise_, k, border, row);
   if (!own.valid) return Ending::kNone;
   // The plane beyond, if there is one.
   RowPlane other;
   for (std::int32_t g = column + out; g != column + 3 * out; g += out) {
-    if (g < 0 || g >= picture.column_rays.columns) break;
-    const std::size_t p = picture.owner(g, row);
-    if (p != 0 && p != index) other = RowPlane(planes[p].plane, noise, k, border, row);
+    if (g < 0 || g >= picture_->column_rays.columns) break;
+    const std::size_t p = picture_->owner(g, row);
+    if (p != 0 && p != index) other = RowPlane(planes[p].plane, noise_, k, border, row);
   }
   const float more = other.valid ? other.wider_than(own) : 0.0F;
-  const auto most = static_cast<float>(params.truncate_sigmas * params.truncate_sigmas);
-  const auto leave = static_cast<float>(params.leave_sigmas * params.leave_sigmas);
+  const auto most = static_cast<float>(params_.truncate_sigmas * params_.truncate_sigmas);
+  const auto leave = static_cast<float>(params_.leave_sigmas * params_.leave_sigmas);
   const auto unit_m = static_cast<float>(k.depth_unit_m);
-  const std::uint16_t* depth = raw.depth->row(row);
-  const std::uint8_t* flags = picture.flags.row(row / 2);
+  const std::uint16_t* depth = raw_->depth->row(row);
+  const std::uint8_t* flags = picture_->flags.row(row / 2);
   // The boundary with the least cost; between equally good ones (a pixel without data or of neither) in their middle.
   constexpr float kTie = 1e-3F;
   float sum = 0.0F, least = 1e9F;
@@ -85,7 +93,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(const Params& params, const DepthS
       break;
     }
     std::int32_t deviation = 0;
-    if (raw.range.valid(depth[c])) {
+    if (raw_->range.valid(depth[c])) {
       const float z_m = static_cast<float>(depth[c]) * unit_m;
       measured_beyond = true;
       const float residual = own.residual(c, z_m);
@@ -113,10 +121,10 @@ SurfaceSides::Ending SurfaceSides::end_of_row(const Params& params, const DepthS
 }
 
 // The steep line that most of the seen ends lie on: pairs of them propose, least squares of those near by decide.
-bool SurfaceSides::try_line(const Params& params, const CameraIntrinsics& k, const InversePlane& plane,
-                            Line& line) const noexcept {
+bool SurfaceSides::try_line(const InversePlane& plane, Line& line) const noexcept {
+  const CameraIntrinsics& k = raw_->intrinsics;
   const auto n = static_cast<std::int32_t>(seen_.size());
-  if (n < params.min_rows) return false;
+  if (n < params_.min_rows) return false;
   const Vec3 normal = plane.normal();
   const Vec3 along = (Vec3::UnitX() - normal * normal.x()).normalized(), across = normal.cross(along);
   const double first_row = seen_.front().row, last_row = seen_.back().row;
@@ -125,7 +133,7 @@ bool SurfaceSides::try_line(const Params& params, const CameraIntrinsics& k, con
       return plane.point({(l.at + l.slope * row - k.cx_px) / k.fx_px, (row - k.cy_px) / k.fy_px, 1.0});
     };
     const Vec3 direction = point(last_row) - point(first_row);
-    return std::abs(along.dot(direction)) <= params.max_lean * std::abs(across.dot(direction));
+    return std::abs(along.dot(direction)) <= params_.max_lean * std::abs(across.dot(direction));
   };
   double best = 1e9;
   for (const std::int32_t apart : {n / 2, n / 4}) {
@@ -138,7 +146,7 @@ bool SurfaceSides::try_line(const Params& params, const CameraIntrinsics& k, con
       double cost = 0.0;
       for (const RowEnd& e : seen_) {
         const double off = e.column - a.column - slope * (e.row - a.row);
-        cost += std::min(off * off, params.inlier_px * params.inlier_px);
+        cost += std::min(off * off, params_.inlier_px * params_.inlier_px);
       }
       if (cost >= best) continue;
       best = cost;
@@ -149,20 +157,19 @@ bool SurfaceSides::try_line(const Params& params, const CameraIntrinsics& k, con
   for (int round = 0; round < 3; ++round) {
     double count = 0.0, row = 0.0, column = 0.0, row2 = 0.0, both = 0.0;
     for (const RowEnd& e : seen_) {
-      if (std::abs(e.column - line.at - line.slope * e.row) > params.inlier_px) continue;
+      if (std::abs(e.column - line.at - line.slope * e.row) > params_.inlier_px) continue;
       count += 1.0, row += e.row, column += e.column, row2 += e.row * e.row, both += e.row * e.column;
     }
     const double spread = count * row2 - row * row;
-    if (count < params.min_rows || !(spread > 0.0)) return false;
+    if (count < params_.min_rows || !(spread > 0.0)) return false;
     line.slope = (count * both - row * column) / spread;
     line.at = (column - line.slope * row) / count;
   }
   return upright(line);
 }
 
-OutlineSide SurfaceSides::find(const Params& params, const DepthSigma& noise, const RawPicture& raw,
-                               const FramePicture& picture, const FramePlanes& planes, std::size_t index,
-                               const SurfaceProfile& profile, bool right) noexcept {
+OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept {
+  const FramePlane& plane = (*planes_)[index];
   const double out = right ? 1.0 : -1.0;
   const auto outer_edge = [right](std::uint8_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
   seen_.clear();
@@ -186,7 +193,7 @@ OutlineSide SurfaceSides::find(const Params& params, const DepthSigma& noise, co
     const std::int32_t r = rows_[i];
     const std::uint8_t g = ends[static_cast<std::size_t>(r)];
     RowEnd end{static_cast<double>(r), 0.0};
-    const Ending ending = end_of_row(params, noise, raw, picture, planes, index, r, g, right, end.column);
+    const Ending ending = end_of_row(index, r, g, right, end.column);
     if (ending == Ending::kNone) continue;
     if (ending == Ending::kHidden) end.column = outer_edge(g);
     static_cast<void>((ending == Ending::kSeen ? seen_ : hidden_).try_push_back(end));
@@ -202,12 +209,12 @@ OutlineSide SurfaceSides::find(const Params& params, const DepthSigma& noise, co
   }
   side.column_px = 0.5 * (out * outermost - 0.5);
   Line line;
-  if (!try_line(params, raw.intrinsics, planes[index].plane, line)) return side;
+  if (!try_line(plane.plane, line)) return side;
   std::int32_t on = 0, between = 0;
   double first = 1e9, last = -1e9;
   const auto beyond = [&](double row, double column) { return out * (column - line.at - line.slope * row); };
   for (const RowEnd& e : seen_) {
-    if (std::abs(beyond(e.row, e.column)) > params.inlier_px) continue;
+    if (std::abs(beyond(e.row, e.column)) > params_.inlier_px) continue;
     ++on;
     first = std::min(first, e.row);
     last = std::max(last, e.row);
@@ -218,10 +225,10 @@ OutlineSide SurfaceSides::find(const Params& params, const DepthSigma& noise, co
   double cut_px = 0.0;
   for (std::int32_t r = first_row; r <= last_row; ++r) {
     const std::uint8_t g = ends[static_cast<std::size_t>(r)];
-    if (g != SurfaceProfile::kNoColumn) cut_px += std::max(beyond(r, outer_edge(g)) - params.outside_px, 0.0);
+    if (g != SurfaceProfile::kNoColumn) cut_px += std::max(beyond(r, outer_edge(g)) - params_.outside_px, 0.0);
   }
-  if (on < params.min_rows || on < params.min_share * between) return side;
-  if (cut_px > params.max_cut * planes[index].piece_px) return side;
+  if (on < params_.min_rows || on < params_.min_share * between) return side;
+  if (cut_px > params_.max_cut * plane.piece_px) return side;
   side.fitted = true;
   side.column_px = 0.5 * (line.at + 0.5 * line.slope - 0.5);
   side.slope = line.slope;

@@ -24,11 +24,12 @@ class SurfaceSides {
     double min_share = 0.5;     // of the rows between the line's ends
   };
 
-  // The line through the ends of the profile's rows on that side; not fitted, as far as the columns reach, where the
-  // ends are not seen (the picture's or the robot's own) or not straight.
-  [[nodiscard]] OutlineSide find(const Params& params, const DepthSigma& noise, const RawPicture& raw,
-                                 const FramePicture& picture, const FramePlanes& planes, std::size_t index,
-                                 const SurfaceProfile& profile, bool right) noexcept;
+  // All but the parameters are read again by find.
+  void begin(const Params& params, const DepthSigma& noise, const RawPicture& raw, const FramePicture& picture,
+             const FramePlanes& planes) noexcept;
+  // The line through the ends of a surface's rows on that side; not fitted, as far as the columns reach, where the ends
+  // are not seen (the picture's or the robot's own) or not straight.
+  [[nodiscard]] OutlineSide find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept;
 
  private:
   static constexpr std::int32_t kMaxRows = 40;
@@ -36,19 +37,22 @@ class SurfaceSides {
   // surface's.
   enum class Ending : std::uint8_t { kSeen, kHidden, kNone };
   // Between which columns one row's pixels leave the surface (pixel c reaches from c - 0.5 to c + 0.5).
-  [[nodiscard]] Ending end_of_row(const Params& params, const DepthSigma& noise, const RawPicture& raw,
-                                  const FramePicture& picture, const FramePlanes& planes, std::size_t index,
-                                  std::int32_t row, std::int32_t column, bool right, double& end_px) const noexcept;
+  [[nodiscard]] Ending end_of_row(std::size_t index, std::int32_t row, std::int32_t column, bool right,
+                                  double& end_px) const noexcept;
   struct Line {  // column = at + slope * row
     double at = 0.0;
     double slope = 0.0;
   };
-  [[nodiscard]] bool try_line(const Params& params, const CameraIntrinsics& k, const InversePlane& plane,
-                              Line& line) const noexcept;
+  [[nodiscard]] bool try_line(const InversePlane& plane, Line& line) const noexcept;
 
   struct RowEnd {
     double row, column;
   };
+  Params params_;
+  DepthSigma noise_;
+  const RawPicture* raw_ = nullptr;
+  const FramePicture* picture_ = nullptr;
+  const FramePlanes* planes_ = nullptr;
   std::array<std::int16_t, kDepthHeight_px> rows_{};  // that may end at a side
   StaticVector<RowEnd, kMaxRows> seen_;               // full-resolution pixels
   StaticVector<RowEnd, kMaxRows> hidden_;             // as far as the columns reach
