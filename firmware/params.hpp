@@ -5,6 +5,7 @@
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/foothold/foothold_search.hpp"
 #include "algorithms/gait/gait.hpp"
+#include "algorithms/perception/mount_estimator.hpp"
 #include "algorithms/perception/polygon_map.hpp"
 #include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/model.hpp"
@@ -14,13 +15,15 @@ namespace polygmap {
 struct Params {
   Estimator::Params estimator;
   SurfaceExtractor::Params surfaces;
+  MountEstimator::Params mount;
   PolygonMap::Params map;
   FootholdSearch::Params footholds;
   Gait::Params gait;
   LegGeometry legs;
-  Transform base_T_camera = polygmap::base_T_camera();
+  Transform base_T_camera = polygmap::base_T_camera();  // as the data sheet says
+  bool estimate_mount = true;
   bool self_filter = true;              // false only to show what the camera then takes for ground
-  double body_margin_m = 0.02;          // around the robot's own shapes
+  BodyUncertainty body;                 // of the robot's own shapes
   double tread_height_sigma_m = 0.004;  // of a mapped tread under a foot that has just landed on it
 };
 

@@ -17,6 +17,7 @@ PerceptionLane::PerceptionLane(hal::DepthCamera& camera, LaneLink& link, const P
       params_(params),
       intrinsics_(camera.intrinsics()),
       extractor_(params.surfaces),
+      mount_(params.mount, params.base_T_camera),
       map_(params.map),
       search_(params.footholds) {}
 
@@ -58,16 +59,18 @@ void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
     health_.raise(Limit::kDepthUnplaced, now_ns);
   } else {
     exposure_state_ = answer.state;
-    const Transform camera_T_base = params_.base_T_camera.inverse();
+    const Transform camera_T_base = mount_.base_T_camera().inverse();
     SurfaceExtractor::View view;
     view.intrinsics = intrinsics_;
     view.camera_up = (camera_T_base.R * exposure_state_.odom_T_base.R.transpose()) * Vec3::UnitZ();
-    view.body_margin_m = params_.body_margin_m;
+    // Yaw of the mount stays as vague as the data sheet.
+    view.body_margin = body_margin(params_.body, params_.legs, params_.mount.prior_tilt_sigma_rad);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       if (!params_.self_filter) break;
-      view.body[index_of(foot)] =
+      body_[index_of(foot)] =
           transformed(camera_T_base, base_leg_shapes(params_.legs, foot, leg_joints(exposure_state_.q_rad, foot)));
     }
+    view.body = body_;
     if (extractor_.try_begin(frame_, view)) {
       stage_ = FrameStage::kExtracting;
     } else {
@@ -84,18 +87,33 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
     const std::uint32_t overflow = extractor_.counters().plane_overflow;
     health_.raise(Limit::kPlanesFull, now_ns, overflow - overflow_seen_);
     overflow_seen_ = overflow;
+    if (params_.estimate_mount) learn_mount();
     begin_map();
     stage_ = FrameStage::kWaiting;
   }
   return progress;
 }
 
+void PerceptionLane::learn_mount() noexcept {
+  constexpr double kStands = 0.9;
+  const StateEstimate& state = exposure_state_;
+  const Transform base_T_odom = state.odom_T_base.inverse();
+  MountEstimator::Stance stance;
+  stance.base_up = base_T_odom.R.col(2);
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    stance.base_T_sole[foot] = base_T_odom * state.odom_T_sole[foot];
+    stance.stands[foot] = state.contact_probability[foot] > kStands;
+  }
+  mount_.update(extractor_.result(), stance);
+}
+
 void PerceptionLane::begin_map() noexcept {
   PolygonMap::View view;
-  view.world_T_camera = exposure_state_.world_T_base() * params_.base_T_camera;
+  view.world_T_camera = exposure_state_.world_T_base() * mount_.base_T_camera();
   view.position_sigma_m = exposure_state_.position_sigma_m.maxCoeff();
   view.tilt_sigma_rad = exposure_state_.tilt_sigma_rad;
   view.intrinsics = intrinsics_;
+  view.body = body_;
   map_.begin(extractor_.result(), view);
   mapping_ = true;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "algorithms/core/work.hpp"
+#include "algorithms/perception/mount_estimator.hpp"
 #include "firmware/lane_link.hpp"
 #include "firmware/params.hpp"
 #include "hal/ports/depth_camera.hpp"
@@ -23,6 +24,7 @@ class PerceptionLane {
 
   [[nodiscard]] const SurfaceFrame& surface_frame() const noexcept { return extractor_.result(); }
   [[nodiscard]] const MapSnapshot& map_snapshot() const noexcept { return map_.snapshot(); }
+  [[nodiscard]] const MountEstimator& mount() const noexcept { return mount_; }
   [[nodiscard]] const SurfaceExtractor& extractor() const noexcept { return extractor_; }
   [[nodiscard]] Health& faults() noexcept { return health_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_; }
@@ -32,6 +34,7 @@ class PerceptionLane {
 
   void begin_extraction(std::int64_t now_ns) noexcept;
   void begin_map() noexcept;
+  void learn_mount() noexcept;
   void begin_search(std::int64_t now_ns) noexcept;
 
   hal::DepthCamera& camera_port_;
@@ -46,11 +49,13 @@ class PerceptionLane {
   bool searching_ = false;
   DepthFrameView frame_;
   StateEstimate exposure_state_;
-  std::int64_t last_frame_ns_ = -1;  // taken; from the start until there is one
-  std::uint32_t request_ = 0;        // number of the last pose request
-  std::uint32_t overflow_seen_ = 0;  // the stages' counters as last reported
+  std::array<LegShapes, kFootCount> body_{};  // camera frame, at the exposure
+  std::int64_t last_frame_ns_ = -1;           // taken; from the start until there is one
+  std::uint32_t request_ = 0;                 // number of the last pose request
+  std::uint32_t overflow_seen_ = 0;           // the stages' counters as last reported
   std::uint32_t map_full_seen_ = 0;
   SurfaceExtractor extractor_;
+  MountEstimator mount_;
   PolygonMap map_;
   FootholdSearch search_;
   Health health_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -81,6 +82,14 @@ SimOptions sim_options(const ClimbOptions& options) {
   sim.camera.stairs_shift_m = {options.render_dx_m, options.render_dy_m, options.render_dz_m};
   sim.camera.missing_step = options.render_missing_step;
   sim.camera.threaded = options.threaded_render;
+  sim.camera.scan_s = 1e-3 * options.scan_ms;
+  sim.errors.camera_mount_rad = options.mount_error_deg * kPi / 180.0;
+  sim.errors.camera_mount_m = 0.003 * options.mount_error_deg;
+  sim.errors.depth_scale = options.scale_error;
+  if (options.camera) {
+    sim.intrinsics = options.camera->intrinsics;
+    sim.depth_sigma = options.camera->noise;
+  }
   if (options.blank_depth) sim.camera.blank = {{0, INT64_MAX}};
   return sim;
 }
@@ -126,6 +135,19 @@ std::vector<ScheduleRow> schedule_of(const Executive& executive, const TimedPipe
   return rows;
 }
 
+CameraFigures camera_figures(const ClimbOptions& options, const RobotErrors& errors, const MountEstimator& mount) {
+  constexpr double kDegrees = 180.0 / kPi;
+  const Mat3 turn = errors.base_T_camera.R * base_T_camera().R.transpose();
+  CameraFigures f;
+  f.scan_ms = options.scan_ms;
+  f.scale_error = errors.depth_scale - 1.0;
+  f.mount_error_deg = kDegrees * Vec3{std::atan2(turn(2, 1), turn(2, 2)), -std::asin(turn(2, 0)), yaw_of(turn)};
+  f.mount_error_m = errors.base_T_camera.p_m - base_T_camera().p_m;
+  f.mount_found_deg = kDegrees * Vec2{mount.roll_rad(), mount.pitch_rad()};
+  f.mount_found_height_m = mount.height_m();
+  return f;
+}
+
 // Of all lanes, by name; only what was raised.
 std::vector<std::pair<std::string, std::uint32_t>> raised(const Health& health) {
   std::vector<std::pair<std::string, std::uint32_t>> out;
@@ -149,6 +171,12 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   SimRobot robot(sim_options(options));
   Params params;
   params.self_filter = options.self_filter;
+  params.estimate_mount = options.estimate_mount;
+  if (options.camera) {
+    params.surfaces.noise = options.camera->noise;
+    params.surfaces.limits.min_depth_m = options.camera->min_depth_m;
+    params.surfaces.limits.max_depth_m = options.camera->max_depth_m;
+  }
   WatchedLidar lidar(robot);
   const auto module = std::make_unique<Module>();
   {
@@ -161,7 +189,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   Pipeline& pipeline = *module->pipeline;
   TimedPipeline& tasks = *module->tasks;
   Executive& executive = *module->executive;
-  ClimbReport report(robot.stairs());
+  ClimbReport report(robot.stairs(), robot.errors().base_T_camera);
 
   std::int64_t end_ns = -1;
   std::int64_t next_progress_ns = 0;
@@ -186,6 +214,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   RunFigures figures;
   figures.gait = options.gait;
   figures.seed = options.seed;
+  figures.camera = camera_figures(options, robot.errors(), pipeline.perception().mount());
   figures.heap_calls = heap::report().calls;
   figures.faults = raised(module->pipeline->health());
   figures.heap_first_caller = heap::report().first_caller;

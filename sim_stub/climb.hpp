@@ -4,10 +4,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "sim_stub/camera_profile.hpp"
 #include "sim_stub/climb_summary.hpp"
 #include "sim_stub/noise_kind.hpp"
 #include "sim_stub/stair_world.hpp"
@@ -27,6 +29,12 @@ struct ClimbOptions {
   int render_missing_step = -1;  // 0-based, -1: none
   bool blank_depth = false;
   bool self_filter = true;
+  // The camera, and what the module is not told of it. Of a seed's errors, half ranges.
+  std::optional<CameraProfile> camera;  // the robot's own when absent; the module is told its noise and range
+  double scan_ms = 16.0;                // one exposure, top to bottom, to the nearest 4 ms
+  double mount_error_deg = 1.0;         // roll, pitch, yaw; and 3 mm per degree in each direction
+  double scale_error = 0.003;
+  bool estimate_mount = true;
 };
 
 // Called about once per simulated second: step, simulated time, worst row of the schedule.

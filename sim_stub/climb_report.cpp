@@ -365,6 +365,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.plant = run.plant;
   s.gait = run.gait;
   s.seed = run.seed;
+  s.camera = run.camera;
   s.fell = fell_;
   s.steps_total = static_cast<int>(world_.steps.size());
   s.steps_climbed = steps_climbed_;

@@ -26,6 +26,7 @@ struct RunFigures {
   std::string gait = "ds";
   std::string plant = "kinematic";
   std::uint64_t seed = 1;
+  CameraFigures camera;
   std::uint64_t heap_calls = 0;
   std::vector<std::pair<std::string, std::uint32_t>> faults;  // raised faults and limits by name
   std::string heap_first_caller;                              // the function, when there was a call

@@ -73,6 +73,21 @@ Json to_json(const ClimbSummary& s) {
   j["plant"] = s.plant;
   j["gait"] = s.gait;
   j["seed"] = s.seed;
+  const CameraFigures& camera = s.camera;
+  const auto degrees = [](double x) { return rounded(x, 1e3); };
+  j["camera"] = {
+      {"scan_ms", ms(camera.scan_ms)},
+      {"scale_error_percent", rounded(1e2 * camera.scale_error, 1e3)},
+      {"mount_error_deg",
+       {{"roll", degrees(camera.mount_error_deg.x())},
+        {"pitch", degrees(camera.mount_error_deg.y())},
+        {"yaw", degrees(camera.mount_error_deg.z())}}},
+      {"mount_error_mm",
+       {{"x", mm(camera.mount_error_m.x())}, {"y", mm(camera.mount_error_m.y())}, {"z", mm(camera.mount_error_m.z())}}},
+      {"mount_found",
+       {{"roll_deg", degrees(camera.mount_found_deg.x())},
+        {"pitch_deg", degrees(camera.mount_found_deg.y())},
+        {"height_mm", mm(camera.mount_found_height_m)}}}};
   j["steps_total"] = s.steps_total;
   j["steps_climbed"] = s.steps_climbed;
   j["climb_time_s"] = seconds_of(s.climb_time_s);

@@ -57,6 +57,16 @@ struct StageBytes {
   std::size_t bytes = 0;
 };
 
+// What this seed's camera is like, and what the module found out about its mount.
+struct CameraFigures {
+  double scan_ms = 0.0;
+  double scale_error = 0.0;             // true depth is read as 1 + this
+  Vec3 mount_error_deg = Vec3::Zero();  // roll, pitch, yaw in the base, against the data sheet
+  Vec3 mount_error_m = Vec3::Zero();    // base frame
+  Vec2 mount_found_deg = Vec2::Zero();  // roll, pitch, by the module, at the end
+  double mount_found_height_m = 0.0;    // absorbs scale and leg lengths
+};
+
 struct ClimbSummary {
   bool pass = false;
   std::string reason;  // one sentence
@@ -65,6 +75,7 @@ struct ClimbSummary {
   std::string plant;
   std::string gait;
   std::uint64_t seed = 0;
+  CameraFigures camera;
   int steps_total = 0;
   int steps_climbed = 0;  // both true soles rested on it at once, inside its edges
   double climb_time_s = kNotMeasured;

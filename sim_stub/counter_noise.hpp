@@ -32,6 +32,7 @@ enum class Stream : std::uint64_t {
   kDepthEdges,
   kDepthWarp,
   kTables,
+  kCameraMount,
 };
 
 // Finaliser of SplitMix64 (Steele, Lea, Flood 2014): a bijection that passes the usual statistical batteries.

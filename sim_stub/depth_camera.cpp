@@ -2,6 +2,7 @@
 #include "sim_stub/depth_camera.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace polygmap::sim {
 namespace {
@@ -20,11 +21,14 @@ std::vector<SolidBox> rendered_solids(const StairWorld& world, const DepthCamera
 }  // namespace
 
 SimDepthCamera::SimDepthCamera(const DepthCameraOptions& options, const DepthNoiseModel::Params& noise,
+                               const CameraIntrinsics& intrinsics, const Transform& base_T_camera,
                                const StairWorld& world, std::uint64_t seed)
     : options_(options),
+      half_scan_ticks_(std::llround(0.5 * options.scan_s / seconds(VirtualClock::kTick_ns))),
+      base_T_camera_(base_T_camera),
       solids_(rendered_solids(world, options)),
-      renderer_(robot_camera_intrinsics()),
-      noise_(noise, robot_camera_intrinsics(), seed) {
+      renderer_(intrinsics),
+      noise_(noise, intrinsics, seed) {
   const CameraIntrinsics& k = renderer_.intrinsics();
   for (Slot& slot : slots_)
     slot.depth.resize(static_cast<std::size_t>(k.width_px) * static_cast<std::size_t>(k.height_px));
@@ -41,12 +45,13 @@ void SimDepthCamera::tick(std::int64_t tick, const Transform& true_T_base,
     if (rendering_.valid()) rendering_.get();
     due->state = SlotState::kArrived;
   }
-  if (tick >= exposure_tick(next_frame_)) expose(tick, true_T_base, base_legs);
+  past_.push_back({true_T_base * base_T_camera_, solids_, base_legs, base_T_camera_, options_.legs_visible});
+  if (past_.size() > static_cast<std::size_t>(2 * half_scan_ticks_ + 1)) past_.pop_front();
+  if (tick >= exposure_tick(next_frame_) + half_scan_ticks_) expose();
 }
 
-void SimDepthCamera::expose(std::int64_t tick, const Transform& true_T_base,
-                            const std::array<LegShapes, kFootCount>& base_legs) {
-  const std::int64_t frame = next_frame_++;
+void SimDepthCamera::expose() {
+  const std::int64_t frame = next_frame_++, tick = exposure_tick(frame);
   const std::int64_t stamp_ns = VirtualClock::stamp_ns(tick);
   if (any_contains(options_.silent, stamp_ns)) return;
   Slot& slot = free_slot();
@@ -59,10 +64,9 @@ void SimDepthCamera::expose(std::int64_t tick, const Transform& true_T_base,
     std::fill(slot.depth.begin(), slot.depth.end(), std::uint16_t{0});
     return;
   }
-  const DepthScene scene{true_T_base * base_T_camera(), solids_, base_legs, base_T_camera(), options_.legs_visible};
   const double time_s = seconds(stamp_ns - VirtualClock::kStart_ns);
-  const auto render = [this, scene, frame, time_s, depth] {
-    renderer_.render(scene);
+  const auto render = [this, first = past_.front(), last = past_.back(), frame, time_s, depth] {
+    renderer_.render(first, last);
     noise_.apply(renderer_, static_cast<std::uint64_t>(frame), time_s, depth);
   };
   if (options_.threaded) {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <future>
 #include <vector>
 
@@ -31,6 +32,8 @@ struct DepthCameraOptions {
   Vec3 stairs_shift_m = Vec3::Zero();  // of the rendered staircase against the true one; the floor stays
   int missing_step = -1;               // index of a step that the camera does not see: an open hole down to the floor
   bool legs_visible = true;
+  // From the first row of a picture to its last, to the nearest 4 ms; the stamp is their middle. The L515 scans.
+  double scan_s = 0.016;
   std::vector<Window> blank;   // frames exposed then have no valid pixel
   std::vector<Window> silent;  // frames exposed then never arrive
   bool threaded = true;        // the pictures are the same either way
@@ -38,19 +41,20 @@ struct DepthCameraOptions {
 
 class SimDepthCamera {
  public:
-  SimDepthCamera(const DepthCameraOptions& options, const DepthNoiseModel::Params& noise, const StairWorld& world,
+  SimDepthCamera(const DepthCameraOptions& options, const DepthNoiseModel::Params& noise,
+                 const CameraIntrinsics& intrinsics, const Transform& base_T_camera, const StairWorld& world,
                  std::uint64_t seed);
   ~SimDepthCamera();
   SimDepthCamera(const SimDepthCamera&) = delete;
   SimDepthCamera& operator=(const SimDepthCamera&) = delete;
 
-  // Frame k is exposed at the tick nearest to k / 30 s and stamped with that tick's time.
+  // The middle of frame k's exposure is the tick nearest to k / 30 s; it is stamped with that tick's time.
   [[nodiscard]] static constexpr std::int64_t exposure_tick(std::int64_t frame) noexcept {
     return (50 * frame + 1) / 3;
   }
   static constexpr std::int64_t kLatency_ticks = 15;
 
-  // Once per tick, in order: starts a picture if one is due, and delivers the one that arrives.
+  // Once per tick, in order: starts a picture when its exposure has ended, and delivers the one that arrives.
   void tick(std::int64_t tick, const Transform& true_T_base, const std::array<LegShapes, kFootCount>& base_legs);
 
   [[nodiscard]] const CameraIntrinsics& intrinsics() const noexcept { return renderer_.intrinsics(); }
@@ -70,12 +74,15 @@ class SimDepthCamera {
   // One exposed, one arrived, one held, one to spare.
   static constexpr std::size_t kSlots = 4;
 
-  void expose(std::int64_t tick, const Transform& true_T_base, const std::array<LegShapes, kFootCount>& base_legs);
+  void expose();
   [[nodiscard]] Slot& free_slot();
   [[nodiscard]] Slot* oldest(SlotState state) noexcept;
 
   DepthCameraOptions options_;
+  std::int64_t half_scan_ticks_;
+  Transform base_T_camera_;
   std::vector<SolidBox> solids_;
+  std::deque<DepthScene> past_;  // as long as an exposure
   DepthRenderer renderer_;
   DepthNoiseModel noise_;
   std::array<Slot, kSlots> slots_;

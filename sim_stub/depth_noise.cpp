@@ -134,15 +134,20 @@ struct RowSources {
   const float* field;  // null: white noise only
   const float* warp_mm;
 };
+// Standard deviation of z mm at normal incidence, mm.
+struct SigmaOfDepth {
+  float base_mm, slope, quadratic_per_mm;
+};
 
-void add_noise(const RowSources& s, float* __restrict depth_mm, int width, float strength) {
+void add_noise(const RowSources& s, const SigmaOfDepth& sigma, float* __restrict depth_mm, int width, float strength) {
   constexpr float kLeastCosine = 0.258819045F;  // 75 degrees
   const float* __restrict z_mm = s.z_mm, * __restrict white = s.white, * __restrict warp = s.warp_mm;
   const float* __restrict inverse = s.inverse_depth, * __restrict plane = s.plane_distance, * __restrict length = s.inverse_length;
+  const float base = sigma.base_mm, slope = sigma.slope, quadratic = sigma.quadratic_per_mm;
   if (s.field == nullptr) {
     for (int u = 0; u < width; ++u) {
       const float cosine = std::max(plane[u] * inverse[u] * length[u], kLeastCosine);
-      depth_mm[u] = z_mm[u] + strength * white[u] * (1.0F + 1.5e-3F * z_mm[u]) / cosine;
+      depth_mm[u] = z_mm[u] + strength * white[u] * (base + (slope + quadratic * z_mm[u]) * z_mm[u]) / cosine;
     }
     return;
   }
@@ -150,7 +155,7 @@ void add_noise(const RowSources& s, float* __restrict depth_mm, int width, float
   for (int u = 0; u < width; ++u) {
     const float cosine = std::max(plane[u] * inverse[u] * length[u], kLeastCosine);
     const float noise = 0.5F * white[u] + 0.87F * field[u];
-    depth_mm[u] = z_mm[u] + strength * noise * (1.0F + 1.5e-3F * z_mm[u]) / cosine + warp[u];
+    depth_mm[u] = z_mm[u] + strength * noise * (base + (slope + quadratic * z_mm[u]) * z_mm[u]) / cosine + warp[u];
   }
 }
 
@@ -256,6 +261,8 @@ void DepthNoiseModel::apply(const DepthRenderer& picture, std::uint64_t frame, d
   const auto least_inverse = static_cast<float>(1.0 / params_.range_m);
   const auto units_per_mm = static_cast<float>(1e-3 * params_.scale / intrinsics_.depth_unit_m);
   const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
+  const SigmaOfDepth sigma{static_cast<float>(1e3 * params_.sigma.base_m), static_cast<float>(params_.sigma.per_metre),
+                           static_cast<float>(1e-3 * params_.sigma.quadratic_per_m)};
   if (correlated) prepare_warp(time_s);
 
   const std::size_t places_x = kFieldSide - w, places_y = kFieldSide - h;
@@ -285,7 +292,7 @@ void DepthNoiseModel::apply(const DepthRenderer& picture, std::uint64_t frame, d
       if (correlated) warp_row(v);
       add_noise({z_row_.data(), picture.inverse_depth(v), picture.plane_distance(v), picture.inverse_length(v),
                  tables_->white.data() + at, correlated ? field + row * kFieldSide : nullptr, warp_row_.data()},
-                depth_row_.data(), width, static_cast<float>(params_.strength));
+                sigma, depth_row_.data(), width, static_cast<float>(params_.strength));
       find_jumps(z_row_.data(), z_below_row_.data(), jump_.data(), width);
       mix_edges(frame, v, z_row_.data(), z_below_row_.data());
     }

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "algorithms/perception/images.hpp"
 #include "sim_stub/counter_noise.hpp"
 #include "sim_stub/depth_renderer.hpp"
 #include "sim_stub/noise_kind.hpp"
@@ -14,13 +15,15 @@ namespace polygmap::sim {
 
 struct DepthNoiseTables;
 
-// sigma = (1 + 1.5 z) mm / cos(incidence), clamped at 75 degrees. Correlated noise adds spatial correlation, dropouts
-// in blobs, and a slow warp of which half the variance is the seed's and half is redrawn with 0.5 s correlation. Random
-// values come from fixed tables read at random offsets per frame (correlated) or per row (white): one load a pixel.
+// sigma = (1 + 1.5 z) mm / cos(incidence) unless told otherwise, clamped at 75 degrees. Correlated noise adds spatial
+// correlation, dropouts in blobs, and a slow warp of which half the variance is the seed's and half is redrawn with 0.5
+// s correlation. Random values come from fixed tables read at random offsets per frame (correlated) or per row (white):
+// one load a pixel.
 class DepthNoiseModel {
  public:
   struct Params {
     DepthNoise kind = DepthNoise::kWhite;
+    DepthSigma sigma{};
     double scale = 1.0;     // of the depth: the seed's calibration error
     double strength = 1.0;  // of sigma and warp; 0 switches edge mixing and dropouts off too
     double warp_m = 0.002;  // standard deviation, correlated noise only

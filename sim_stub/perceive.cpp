@@ -10,9 +10,6 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <string_view>
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
 
 namespace polygmap::sim {
 namespace {
@@ -20,18 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr double kMinLevelArea_m2 = 0.02;
 
-[[noreturn]] void fail(const std::string& sentence) { throw PerceiveError(sentence); }
-
-double number(const toml::table& table, const std::string& path, const char* key, std::optional<double> otherwise) {
-  const toml::node* node = table.get(key);
-  if (node == nullptr) {
-    if (otherwise) return *otherwise;
-    fail("Camera file \"" + path + "\" has no " + key + ".");
-  }
-  const auto value = node->value<double>();
-  if (!value || !std::isfinite(*value)) fail("Camera file \"" + path + "\": " + key + " must be a finite number.");
-  return *value;
-}
+[[noreturn]] void fail(const std::string& sentence) { throw FileError(sentence); }
 
 Json point(const Vec3& p) { return Json::array({p.x(), p.y(), p.z()}); }
 
@@ -51,13 +37,25 @@ Eigen::Matrix4d plane_covariance(const SurfacePatch& surface) {
 class Extraction {
  public:
   Extraction(const CameraProfile& camera, const DepthPng& picture) : picture_(picture) {
-    SurfaceExtractor::Params params;
-    params.noise = camera.noise;
-    params.limits.min_depth_m = camera.min_depth_m;
-    params.limits.max_depth_m = camera.max_depth_m;
-    extractor_->configure(params);
+    params_.noise = camera.noise;
+    params_.noise_gain = 0.5;
+    params_.limits.min_depth_m = camera.min_depth_m;
+    params_.limits.max_depth_m = camera.max_depth_m;
+    extractor_->configure(params_);
     view_.intrinsics = camera.intrinsics;
-    view_.body_margin_m = 0.0;
+    view_.body_margin = {};
+  }
+  // A camera delivers many frames; here one has to say by itself how noisy it is.
+  void settle_noise(const Vec3& up) {
+    constexpr int kMostRounds = 6;
+    constexpr double kSettled = 0.03;
+    for (int i = 0; i < kMostRounds; ++i) {
+      const double before = extractor_->noise_scale();
+      static_cast<void>(run(up));
+      if (std::abs(extractor_->noise_scale() - before) < kSettled * before) break;
+    }
+    params_.noise_gain = 0.0;
+    extractor_->configure(params_);
   }
   double run(const Vec3& up) {
     view_.camera_up = up;
@@ -78,6 +76,7 @@ class Extraction {
 
  private:
   const DepthPng& picture_;
+  SurfaceExtractor::Params params_;
   SurfaceExtractor::View view_;
   std::int64_t stamp_ = 0;
   std::unique_ptr<SurfaceExtractor> extractor_ = std::make_unique<SurfaceExtractor>();
@@ -96,45 +95,6 @@ std::optional<Vec3> find_up(const SurfaceFrame& frame) {
 }
 
 }  // namespace
-
-CameraProfile read_camera(const std::string& path) {
-  const toml::parse_result parsed = toml::parse_file(path);
-  if (!parsed) {
-    fail("Cannot read the camera file \"" + path + "\": " + std::string(parsed.error().description()) + ".");
-  }
-  const toml::table& table = parsed.table();
-  constexpr std::array<std::string_view, 11> kKeys{
-      "width",        "height",          "fx",          "fy",         "cx", "cy", "depth_unit_m",
-      "noise_base_m", "noise_per_metre", "min_depth_m", "max_depth_m"};
-  for (const auto& [key, value] : table) {
-    if (std::find(kKeys.begin(), kKeys.end(), key.str()) != kKeys.end()) continue;
-    fail("Camera file \"" + path + "\": " + std::string(key.str()) + " is no key of a camera.");
-  }
-  CameraProfile camera;
-  CameraIntrinsics& k = camera.intrinsics;
-  const double width = number(table, path, "width", {}), height = number(table, path, "height", {});
-  if (width < 32 || height < 32 || width > kDepthWidth_px || height > kDepthHeight_px) {
-    fail("Camera file \"" + path + "\": pictures from 32x32 to " + std::to_string(kDepthWidth_px) + "x" +
-         std::to_string(kDepthHeight_px) + " are read, not " + std::to_string(std::lround(width)) + "x" +
-         std::to_string(std::lround(height)) + ".");
-  }
-  k.width_px = static_cast<std::int32_t>(width);
-  k.height_px = static_cast<std::int32_t>(height);
-  k.fx_px = number(table, path, "fx", {});
-  k.fy_px = number(table, path, "fy", {});
-  k.cx_px = number(table, path, "cx", {});
-  k.cy_px = number(table, path, "cy", {});
-  k.depth_unit_m = number(table, path, "depth_unit_m", {});
-  camera.noise.base_m = number(table, path, "noise_base_m", camera.noise.base_m);
-  camera.noise.per_metre = number(table, path, "noise_per_metre", camera.noise.per_metre);
-  camera.min_depth_m = number(table, path, "min_depth_m", camera.min_depth_m);
-  camera.max_depth_m = number(table, path, "max_depth_m", camera.max_depth_m);
-  if (!(k.fx_px > 1.0) || !(k.fy_px > 1.0) || !(k.depth_unit_m > 0.0) || !(camera.noise.base_m > 0.0) ||
-      !(camera.noise.per_metre >= 0.0) || !(camera.min_depth_m > 0.0) || !(camera.max_depth_m > camera.min_depth_m)) {
-    fail("Camera file \"" + path + "\": focal lengths, depth unit, noise and depth range must be positive.");
-  }
-  return camera;
-}
 
 DepthPng read_depth(const std::string& path) {
   std::vector<unsigned char> file;
@@ -174,6 +134,7 @@ Perceived perceive(const CameraProfile& camera, const DepthPng& picture, const s
     out.up_assumed = !found;
     out.camera_up = found.value_or(along_the_picture);
   }
+  extraction.settle_noise(out.camera_up);
   for (int i = 0; i < std::max(repeat, 1); ++i) out.microseconds.push_back(extraction.run(out.camera_up));
 
   const SurfaceExtractor& extractor = extraction.extractor();

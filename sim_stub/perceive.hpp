@@ -5,25 +5,13 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "algorithms/perception/surface_extractor.hpp"
+#include "sim_stub/camera_profile.hpp"
 
 namespace polygmap::sim {
-
-// What a user is told, in one sentence.
-struct PerceiveError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-struct CameraProfile {
-  CameraIntrinsics intrinsics;
-  DepthSigma noise;
-  double min_depth_m = 0.2;
-  double max_depth_m = 6.0;
-};
 
 struct DepthPng {
   std::int32_t width_px = 0;
@@ -31,8 +19,7 @@ struct DepthPng {
   std::vector<std::uint16_t> depth;
 };
 
-// Both throw PerceiveError.
-[[nodiscard]] CameraProfile read_camera(const std::string& path);
+// Throws FileError.
 [[nodiscard]] DepthPng read_depth(const std::string& path);
 
 // One plane; surfaces that were cut from it (on both sides of a leg, of a staircase) count together.
@@ -61,7 +48,7 @@ struct Perceived {
 [[nodiscard]] Perceived perceive(const CameraProfile& camera, const DepthPng& picture,
                                  const std::optional<Vec3>& gravity, int repeat);
 
-// Throw PerceiveError when the file cannot be written.
+// Throw FileError when the file cannot be written.
 void write_labels(const std::string& path, const DepthPng& picture, const Perceived& perceived);
 void write_planes(const std::string& path, const Perceived& perceived);
 void write_picture(const std::string& path, const CameraProfile& camera, const DepthPng& picture,

@@ -22,10 +22,12 @@ struct ErrorParams {
   double accel_noise_mps2 = 0.05;
   double lio_position_m = 0.010;
   double lio_rotation_rad = 0.2 * kPi / 180.0;
-  double depth_scale = 0.003;  // half range, uniform
-  double depth_noise = 1.0;    // scales sigma, warp, edge mixing and dropouts: 0 or 1
+  double depth_scale = 0.003;             // half range, uniform
+  double camera_mount_rad = kPi / 180.0;  // half range, uniform, each of roll, pitch and yaw in the base
+  double camera_mount_m = 0.003;          // half range, uniform, per axis
+  double depth_noise = 1.0;               // scales sigma, warp, edge mixing and dropouts: 0 or 1
 
-  [[nodiscard]] static constexpr ErrorParams none() noexcept { return {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}; }
+  [[nodiscard]] static constexpr ErrorParams none() noexcept { return {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}; }
 };
 
 // What a seed makes of one robot, constant over its run.
@@ -36,7 +38,8 @@ struct RobotErrors {
   Vec3 gyro_bias_radps = Vec3::Zero();
   Vec3 accel_bias_mps2 = Vec3::Zero();
   double depth_scale = 1.0;
-  Transform lio_T_true;  // LIO's own world: level, with its own origin and yaw
+  Transform base_T_camera = polygmap::base_T_camera();  // true mount
+  Transform lio_T_true;                                 // LIO's own world: level, with its own origin and yaw
 };
 
 [[nodiscard]] RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed);

@@ -36,6 +36,8 @@ struct SimOptions {
   std::uint64_t seed = 1;
   StairParams stairs;
   DepthNoise noise = DepthNoise::kWhite;
+  CameraIntrinsics intrinsics = robot_camera_intrinsics();
+  DepthSigma depth_sigma;
   ErrorParams errors;
   std::optional<StartPose> start;  // drawn from the seed when absent
   DepthCameraOptions camera;

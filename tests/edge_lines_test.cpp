@@ -15,8 +15,11 @@ namespace {
 struct Bench {
   test::DepthScene scene;
   test::StairSpec stairs;
+  using FullDepthImage = Raster<std::uint16_t, kDepthWidth_px, kDepthHeight_px>;
   std::unique_ptr<FullDepthImage> depth = std::make_unique<FullDepthImage>();
   std::unique_ptr<HalfImage<std::uint8_t>> flags = std::make_unique<HalfImage<std::uint8_t>>();
+  std::unique_ptr<ColumnImage> columns = std::make_unique<ColumnImage>();
+  ColumnRays rays;
   std::unique_ptr<EdgeLineFinder> finder = std::make_unique<EdgeLineFinder>();
 
   explicit Bench(double nosing_m, double yaw_rad = 0.05) {
@@ -24,6 +27,7 @@ struct Bench {
     scene.place_camera(0.77, 1.04, yaw_rad, 0.02);
     stairs.nosing_m = nosing_m;
     scene.add_stairs(stairs);
+    rays.set(scene.intrinsics);
   }
   void draw(const test::NoiseSpec& noise, std::uint32_t seed) {
     test::DepthPicture picture = test::render(scene);
@@ -40,25 +44,27 @@ struct Bench {
   [[nodiscard]] InversePlane riser(int k) const {
     return plane(-Vec3::UnitX(), {stairs.first_riser_x_m + k * stairs.tread_m, 0, 0});
   }
-  // Half-resolution boundary rows of the world line (x, -0.5..0.5, z).
+  // Boundary rows of the world line (x, -0.5..0.5, z).
   void guess(double x_m, double z_m, double error_px) {
-    HalfRays rays;
-    rays.set(scene.intrinsics);
+    const CameraIntrinsics& k = scene.intrinsics;
     finder->begin_guess();
-    for (int i = 0; i < 2000; ++i) {
+    for (int i = 0; i < 2000; i += 5) {
       const Vec3 p = scene.world_T_camera.inverse() * Vec3{x_m, -0.5 + i / 2000.0, z_m};
-      const double c = p.x() / p.z() * rays.fx_px + rays.cx_px, r = p.y() / p.z() * rays.fy_px + rays.cy_px;
-      if (p.z() < 0.1 || c < 0 || c > 319 || r < 0 || r > 239) continue;
-      finder->add_guess(static_cast<std::int32_t>(c), static_cast<std::int32_t>(r + error_px));
-      i += 4;
+      const double c = p.x() / p.z() * k.fx_px + k.cx_px, r = p.y() / p.z() * k.fy_px + k.cy_px;
+      if (p.z() < 0.1 || c < 0 || c > 639 || r < 0 || r > 479) continue;
+      finder->add_guess(static_cast<std::int32_t>(c) / kColumn_px, static_cast<std::int32_t>(r + error_px));
     }
   }
   EdgeLineFinder::Outcome find(const InversePlane* other, bool nosing, EdgeLine& line) {
-    RawPicture picture{depth.get(), flags.get(), scene.intrinsics, {}};
-    picture.range.set({}, scene.intrinsics.depth_unit_m);
+    RawRange range;
+    range.set({}, scene.intrinsics.depth_unit_m);
+    for (std::int32_t r = 0; r < 480; ++r) {
+      reduce_to_columns(range, depth->row(r), flags->row(r / 2), kColumns, columns->inverse_depth.row(r),
+                        columns->valid.row(r));
+    }
     if (!finder->try_guess({}, 1)) return EdgeLineFinder::Outcome::kNoLine;
     const EdgeLineFinder::Beyond beyond{other != nullptr ? *other : InversePlane{}, 1e-6 * Mat3::Identity()};
-    finder->begin({}, {}, picture, tread(), other != nullptr ? &beyond : nullptr, nosing);
+    finder->begin({}, {}, scene.intrinsics, rays, *columns, tread(), other != nullptr ? &beyond : nullptr, nosing);
     EdgeLineFinder::Outcome outcome = EdgeLineFinder::Outcome::kAgain;
     for (int pass = 0; pass < 2 && outcome == EdgeLineFinder::Outcome::kAgain; ++pass) {
       while (!finder->step(48)) {
@@ -83,13 +89,13 @@ TEST_P(NosingNoise, EdgeLine_NosingAndBackLine_WithinThreeMillimetres) {
       bench.draw({.correlated = GetParam()}, seed);
       const InversePlane below = bench.riser(0), above = bench.riser(1);
       EdgeLine line;
-      bench.guess(bench.stairs.first_riser_x_m - nosing_m, bench.stairs.rise_m, 1.0);
+      bench.guess(bench.stairs.first_riser_x_m - nosing_m, bench.stairs.rise_m, 2.0);
       ASSERT_EQ(bench.find(&below, true, line), EdgeLineFinder::Outcome::kFound);
       EXPECT_TRUE(line.valid);
       EXPECT_LT(bench.error_m(line, bench.stairs.first_riser_x_m - nosing_m), 0.003) << nosing_m << " " << seed;
       EXPECT_LT((line.b_m - line.a_m).norm(), 1.3);
       EXPECT_LT(std::abs(bench.tread().distance_m(line.a_m)), 1e-9);
-      bench.guess(bench.stairs.first_riser_x_m + bench.stairs.tread_m, bench.stairs.rise_m, -1.0);
+      bench.guess(bench.stairs.first_riser_x_m + bench.stairs.tread_m, bench.stairs.rise_m, -2.0);
       ASSERT_EQ(bench.find(&above, false, line), EdgeLineFinder::Outcome::kFound);
       EXPECT_LT(bench.error_m(line, bench.stairs.first_riser_x_m + bench.stairs.tread_m), 0.003) << nosing_m;
     }
@@ -124,7 +130,7 @@ TEST(EdgeLine, ColumnsHiddenByTheBody_AreLeftOut) {
   EdgeLine line;
   ASSERT_EQ(bench.find(&below, true, line), EdgeLineFinder::Outcome::kFound);
   EXPECT_LT(bench.error_m(line, bench.stairs.first_riser_x_m), 0.003);
-  EXPECT_LT(bench.finder->column_count(), 230);
+  EXPECT_LT(bench.finder->column_count(), 115);
   // All hidden: no line.
   bench.flags->fill(kPixelBody);
   EXPECT_EQ(bench.find(&below, true, line), EdgeLineFinder::Outcome::kFewColumns);
@@ -146,8 +152,8 @@ TEST(EdgeLine, NoEdgeInThePicture_GivesNone) {
 TEST(EdgeLine, ScatteredGuesses_AreRefused) {
   EdgeLineFinder finder;
   finder.begin_guess();
-  for (std::int32_t i = 0; i < 300; ++i) {
-    finder.add_guess(i, static_cast<std::int32_t>(counter_random(3, static_cast<std::uint32_t>(i)) % 240));
+  for (std::int32_t i = 0; i < kColumns; ++i) {
+    finder.add_guess(i, static_cast<std::int32_t>(counter_random(3, static_cast<std::uint32_t>(i)) % 480));
   }
   EXPECT_FALSE(finder.try_guess({}, 1));
   finder.begin_guess();

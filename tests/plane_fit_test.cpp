@@ -39,6 +39,32 @@ TEST(PlaneFit, Solve_WhiteNoise_IsUnbiasedAndItsSigmaIsHonest) {
   EXPECT_NEAR(std::sqrt(squares), 1.0, 0.15);
 }
 
+TEST(PlaneFit, SolveLeaning_FewPixelsOfALevelPlane_ComesOutLevel_AManyPixelSlopeStays) {
+  DepthSigma noise;
+  const auto moments_of = [](const Vec3& normal, int samples) {
+    PlaneMoments moments;
+    const InversePlane truth{-normal / 0.7};
+    for (const PlaneSample& s : sample_plane(normal, 0.7, samples, 0.0, 7)) {
+      const Vec3 r{static_cast<double>(s.x), static_cast<double>(s.y), 1.0};
+      moments.add(1.0 / math::square(inverse_depth_sigma(kSampleNoise, truth, r)), r.x(), r.y(),
+                  static_cast<double>(s.w));
+    }
+    return moments;
+  };
+  const Vec3 normal = Vec3{0.0, -0.5, -0.85}.normalized(), up = Vec3{0.1, -0.5, -0.85}.normalized();
+  InversePlane free, leaning;
+  // 100 pixels say less than one independent measurement: 6 degrees off level are no contradiction.
+  ASSERT_TRUE(try_solve({}, noise, moments_of(normal, 100), Lean::kAny, up, free, nullptr));
+  ASSERT_TRUE(try_solve_leaning({}, noise, moments_of(normal, 100), up, leaning, nullptr));
+  EXPECT_GT(leaning.normal().dot(up), free.normal().dot(up));
+  EXPECT_GT(leaning.normal().dot(up), std::cos(0.01));
+  // 200 independent ones do contradict it.
+  noise.correlated_px = 1.0;
+  ASSERT_TRUE(try_solve({}, noise, moments_of(normal, 200), Lean::kAny, up, free, nullptr));
+  ASSERT_TRUE(try_solve_leaning({}, noise, moments_of(normal, 200), up, leaning, nullptr));
+  EXPECT_LT((leaning.m - free.m).norm(), 1e-12);
+}
+
 TEST(PlaneFit, Moments_OfTwoHalves_AddUpToTheWhole) {
   const std::vector<PlaneSample> samples = sample_plane(Vec3{0, -0.5, -0.866}.normalized(), 0.7, 100, 0.0, 4);
   PlaneMoments whole, first, second;

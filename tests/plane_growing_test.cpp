@@ -33,7 +33,7 @@ class PlanesFromRuns : public testing::Test {
     boundaries_->begin_meeting();
     for (std::int32_t g = 0; g < kColumns; ++g) {
       boundaries_->gather(g, runs_->columns()[static_cast<std::size_t>(g)], to_plane);
-      boundaries_->meet(g);
+      boundaries_->meet(g, false);
     }
     boundaries_->settle();
     boundaries_->begin_refit();

@@ -95,6 +95,30 @@ TEST(DepthRenderer, SeveralPoses_AgreeWithARayMarcher) {
   }
 }
 
+TEST(DepthRenderer, MovingWhileItScans_EveryRowIsAsSeenFromItsOwnMoment) {
+  const StairWorld world = make_stairs({.steps = 5, .nosing_m = 0.02}, 2);
+  const std::vector<SolidBox> solids = stair_solids(world);
+  // 1 m/s and half a radian per second for 16 ms, a leg swinging.
+  const auto scene = [&](double s) {
+    const Mat3 turn = rotation_z(0.1 + 0.006 * s) * rotation_y(0.03 - 0.008 * s) * rotation_x(0.005 * s);
+    return scene_at({turn, Vec3{0.1 + 0.016 * s, 0.0, 0.92}}, solids, bent_q_rad(0.15 + 0.01 * s, 0.1 + 0.016 * s));
+  };
+  DepthRenderer renderer(robot_camera_intrinsics());
+  renderer.render(scene(0.0), scene(1.0));
+  int compared = 0, differ = 0, as_in_the_middle = 0;
+  const DepthScene middle = scene(0.5);
+  for (int v = 3; v < kHeight; v += 9) {
+    const DepthScene then = scene((v + 0.5) / kHeight);
+    for (int u = 2; u < kWidth; u += 7) {
+      ++compared;
+      differ += std::abs(depth_m(renderer, u, v) - marched_depth_m(then, u, v)) > 4e-4 ? 1 : 0;
+      as_in_the_middle += std::abs(depth_m(renderer, u, v) - marched_depth_m(middle, u, v)) < 4e-4 ? 1 : 0;
+    }
+  }
+  EXPECT_LE(differ, compared / 500);
+  EXPECT_LT(as_in_the_middle, compared / 2);
+}
+
 TEST(DepthRenderer, IncidenceCosine_EverySurface_IsTheAngleToItsNormal) {
   const StairWorld world = make_stairs({}, 1);
   const std::vector<SolidBox> solids = stair_solids(world);
@@ -150,9 +174,10 @@ class NoiseOnFloor {
   void expose(int frame) { noise_.apply(renderer_, static_cast<std::uint64_t>(frame), frame / 30.0, depth_.data()); }
   [[nodiscard]] bool valid(int u, int v) const { return raw(u, v) != 0; }
   [[nodiscard]] double error_mm(int u, int v) const { return 0.25 * raw(u, v) - 1e3 * depth_m(renderer_, u, v); }
+  [[nodiscard]] double depth(int u, int v) const { return depth_m(renderer_, u, v); }
+  [[nodiscard]] double cosine(int u, int v) const { return -(base_T_camera().R * ray_of(u, v).normalized()).z(); }
   [[nodiscard]] double sigma_mm(int u, int v) const {
-    const Vec3 ray = base_T_camera().R * ray_of(u, v).normalized();
-    return (1.0 + 1.5 * depth_m(renderer_, u, v)) / std::max(-ray.z(), std::cos(75.0 * kPi / 180.0));
+    return (1.0 + 1.5 * depth(u, v)) / std::max(cosine(u, v), std::cos(75.0 * kPi / 180.0));
   }
 
  private:
@@ -224,6 +249,28 @@ TEST(DepthNoise, White_OnFloor_HasItsSigmaAndNoCorrelation) {
   EXPECT_NEAR(f.frame_to_frame, 0.0, 0.01);
   EXPECT_NEAR(f.dropout, 0.05, 0.003);
   EXPECT_NEAR(f.dropout_pairs, 0.05, 0.005);
+}
+
+TEST(DepthNoise, StereoOnFloor_GrowsWithTheSquareOfTheRange) {
+  NoiseOnFloor floor({.sigma = {.base_m = 0.0005, .per_metre = 0.0, .quadratic_per_m = 0.004}});
+  double near = 0, far = 0;
+  int near_count = 0, far_count = 0;
+  for (int frame = 0; frame < 10; ++frame) {
+    floor.expose(frame);
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; u += 5) {
+        const double z_m = floor.depth(u, v), cosine = floor.cosine(u, v);
+        if (!floor.valid(u, v) || cosine < 0.3) continue;
+        const double off = floor.error_mm(u, v) * cosine / (0.5 + 4.0 * z_m * z_m);
+        if (z_m < 1.0) near += off * off, ++near_count;
+        if (z_m > 1.1) far += off * off, ++far_count;
+      }
+    }
+  }
+  ASSERT_GT(near_count, 1000);
+  ASSERT_GT(far_count, 1000);
+  EXPECT_NEAR(std::sqrt(near / near_count), 1.0, 0.03);
+  EXPECT_NEAR(std::sqrt(far / far_count), 1.0, 0.03);
 }
 
 TEST(DepthNoise, Correlated_OnFloor_HasItsSigmaAndCorrelationAndBlobs) {
@@ -380,6 +427,26 @@ TEST(SimCamera, BlankWindow_GivesFramesWithoutAnyDepth) {
   const std::vector<std::uint16_t> picture = first_picture(options);
   ASSERT_EQ(picture.size(), static_cast<std::size_t>(kWidth * kHeight));
   EXPECT_EQ(std::count(picture.begin(), picture.end(), 0), kWidth * kHeight);
+}
+
+TEST(SimCamera, MountErrors_StayWithinTheirRangesAndMoveThePicture) {
+  Vec3 most_rad = Vec3::Zero(), most_m = Vec3::Zero();
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    const Transform mount = draw_errors({}, seed).base_T_camera, nominal = base_T_camera();
+    const Mat3 turn = mount.R * nominal.R.transpose();
+    const Vec3 rad{turn(2, 1), turn(0, 2), turn(1, 0)};
+    most_rad = most_rad.cwiseMax(rad.cwiseAbs());
+    most_m = most_m.cwiseMax((mount.p_m - nominal.p_m).cwiseAbs());
+  }
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(most_rad[i], kPi / 180.0, 0.001);
+    EXPECT_NEAR(most_m[i], 0.003, 0.0001);
+  }
+  EXPECT_EQ((draw_errors(ErrorParams::none(), 3).base_T_camera.R - base_T_camera().R).norm(), 0.0);
+  SimOptions off = quiet(1);
+  off.errors.camera_mount_rad = kPi / 180.0;
+  const std::vector<std::uint16_t> a = first_picture(quiet(1)), b = first_picture(off);
+  EXPECT_NE(a, b);
 }
 
 TEST(SimCamera, ShiftedStairs_LookLikeStairsThere) {

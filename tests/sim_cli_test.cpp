@@ -55,6 +55,36 @@ void expect_refused(const std::vector<std::string>& arguments, const std::string
   EXPECT_EQ(c.out, "");
 }
 
+TEST(ClimbCommand, CameraErrors_OnByDefault_EachCanBeTurnedOff) {
+  const Call usual = call({"climb"});
+  ASSERT_TRUE(usual.options) << usual.err;
+  EXPECT_EQ(usual.options->scan_ms, 16.0);
+  EXPECT_EQ(usual.options->mount_error_deg, 1.0);
+  EXPECT_EQ(usual.options->scale_error, 0.003);
+  EXPECT_TRUE(usual.options->estimate_mount);
+  const Call none =
+      call({"climb", "--scan-ms", "0", "--mount-error", "0", "--scale-error", "0", "--no-mount-estimate"});
+  ASSERT_TRUE(none.options) << none.err;
+  EXPECT_EQ(none.options->scan_ms, 0.0);
+  EXPECT_EQ(none.options->mount_error_deg, 0.0);
+  EXPECT_EQ(none.options->scale_error, 0.0);
+  EXPECT_FALSE(none.options->estimate_mount);
+  expect_refused({"climb", "--scan-ms", "40"}, "--scan-ms");
+  expect_refused({"climb", "--mount-error", "-1"}, "--mount-error");
+  expect_refused({"climb", "--scale-error", "nan"}, "--scale-error");
+}
+
+TEST(ClimbCommand, Camera_IsReadFromItsFile) {
+  const std::string path = temporary("camera.toml");
+  std::ofstream(path) << "width = 512\nheight = 424\nfx = 365\nfy = 365\ncx = 256\ncy = 212\ndepth_unit_m = 0.001\n"
+                         "noise_quadratic_per_m = 0.002\n";
+  const Call c = call({"climb", "--camera", path});
+  ASSERT_TRUE(c.options && c.options->camera) << c.err;
+  EXPECT_EQ(c.options->camera->intrinsics.width_px, 512);
+  EXPECT_EQ(c.options->camera->noise.quadratic_per_m, 0.002);
+  expect_refused({"climb", "--camera", temporary("none.toml")}, "none.toml");
+}
+
 TEST(ClimbCommand, NoOptions_RunsWithTheDefaults) {
   const Call c = call({"climb"});
   ASSERT_TRUE(c.options) << c.err;

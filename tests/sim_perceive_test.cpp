@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "algorithms/robot/model.hpp"
 #include "sim_stub/cli/climb_command.hpp"
 #include "sim_stub/perceive.hpp"
 #include "tests/support/depth_scene.hpp"
@@ -132,6 +133,32 @@ TEST_F(PerceiveCommand, FilesThatAreNone_AreNamedInOneSentence) {
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--repeat", "0"}, "--repeat");
 }
 
+// What `polygmap perceive` and `climb` are given.
+TEST(CameraProfiles, OfTheProject_AreReadAndSayWhatTheyKnow) {
+  const std::filesystem::path folder = POLYGMAP_CAMERAS;
+  int count = 0;
+  for (const auto& file : std::filesystem::directory_iterator(folder)) {
+    const CameraProfile camera = read_camera(file.path().string());
+    EXPECT_GT(camera.noise.sigma_m(1.0), 0.001) << file.path();
+    EXPECT_LT(camera.noise.sigma_m(1.0), 0.02) << file.path();
+    ++count;
+  }
+  EXPECT_EQ(count, 4);
+  const CameraProfile stereo = read_camera((folder / "d435.toml").string());
+  EXPECT_NEAR(stereo.noise.sigma_m(2.0) - stereo.noise.base_m, 4.0 * (stereo.noise.sigma_m(1.0) - stereo.noise.base_m),
+              1e-12);
+  // The robot's own is what module and simulation have built in.
+  const CameraProfile own = read_camera((folder / "kuavo.toml").string());
+  const SurfaceExtractor::Params built_in;
+  EXPECT_EQ(own.intrinsics.fx_px, robot_camera_intrinsics().fx_px);
+  EXPECT_EQ(own.intrinsics.cy_px, robot_camera_intrinsics().cy_px);
+  EXPECT_EQ(own.intrinsics.depth_unit_m, robot_camera_intrinsics().depth_unit_m);
+  EXPECT_EQ(own.noise.base_m, built_in.noise.base_m);
+  EXPECT_EQ(own.noise.per_metre, built_in.noise.per_metre);
+  EXPECT_EQ(own.noise.correlated_px, built_in.noise.correlated_px);
+  EXPECT_EQ(own.max_depth_m, built_in.limits.max_depth_m);
+}
+
 TEST_F(PerceiveCommand, CameraFilesThatAreNone_AreNamedInOneSentence) {
   write_depth("good.png", std::vector<std::uint16_t>(640 * 480, 1000), 640, 480);
   const auto refused = [this](const std::string& from, const std::string& to, const std::string& culprit) {
@@ -149,6 +176,8 @@ TEST_F(PerceiveCommand, CameraFilesThatAreNone_AreNamedInOneSentence) {
   refused("width = 640", "width = 0", "0x480");
   refused("width = 640", "width = 4096", "4096x480");
   refused("height = 480", "height = = 480", "bad.toml");
+  refused("depth_unit_m = 0.001", "depth_unit_m = 0.001\nnoise_quadratic_per_m = -1", "positive");
+  refused("depth_unit_m = 0.001", "depth_unit_m = 0.001\nnoise_correlated_share = 1.5", "noise_correlated_share");
   expect_refused({"perceive", at("good.png"), "--camera", at("none.toml")}, "none.toml");
 }
 

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "algorithms/perception/vectors.hpp"
+
 namespace polygmap {
 namespace {
 
@@ -31,53 +33,52 @@ void EdgeLineFinder::add_guess(std::int32_t column, std::int32_t row) noexcept {
 
 bool EdgeLineFinder::try_guess(const Params& params, std::uint32_t seed) noexcept {
   constexpr int kTrials = 32;
-  constexpr double kTolerance_px = 2.5;  // half resolution
+  constexpr float kTolerance_px = 5.0F;
+  constexpr double kEnough = 0.9;
   const auto n = static_cast<std::uint32_t>(guess_count_);
-  if (guess_count_ * 2 < static_cast<std::size_t>(params.min_columns)) return false;
-  double best_a = 0.0, best_b = 0.0;
-  std::size_t best = 0;
-  for (std::uint32_t trial = 0; trial < kTrials; ++trial) {
+  if (guess_count_ < static_cast<std::size_t>(params.min_columns)) return false;
+  float best_a = 0.0F, best_b = 0.0F;
+  std::int32_t best = 0;
+  const auto fits = [](const Guess& guess, float a, float b) {
+    return std::abs(static_cast<float>(guess.row) - (a + b * static_cast<float>(guess.column))) < kTolerance_px;
+  };
+  for (std::uint32_t trial = 0; trial < kTrials && best < kEnough * n; ++trial) {
     const Guess& p = guess_[counter_random(seed, 2 * trial) % n];
     const Guess& q = guess_[counter_random(seed, 2 * trial + 1) % n];
-    if (std::abs(p.column - q.column) < 4) continue;
-    const double b = static_cast<double>(q.row - p.row) / (q.column - p.column);
-    const double a = p.row - b * p.column;
-    std::size_t inliers = 0;
-    for (std::size_t i = 0; i < guess_count_; ++i) {
-      inliers += std::abs(guess_[i].row - (a + b * guess_[i].column)) < kTolerance_px ? 1U : 0U;
-    }
+    if (std::abs(p.column - q.column) < 2) continue;
+    const float b = static_cast<float>(q.row - p.row) / static_cast<float>(q.column - p.column);
+    const float a = static_cast<float>(p.row) - b * static_cast<float>(p.column);
+    std::int32_t inliers = 0;
+    for (std::size_t i = 0; i < guess_count_; ++i) inliers += fits(guess_[i], a, b) ? 1 : 0;
     if (inliers > best) {
       best = inliers;
       best_a = a;
       best_b = b;
     }
   }
-  if (static_cast<double>(best) < params.min_inlier_share * static_cast<double>(guess_count_)) return false;
+  if (best < params.min_inlier_share * n) return false;
   LineSums sums;
-  std::int32_t first = kHalfWidth_px, last = -1;
+  first_column_ = kColumns;
+  last_column_ = -1;
   for (std::size_t i = 0; i < guess_count_; ++i) {
     const Guess& g = guess_[i];
-    if (std::abs(g.row - (best_a + best_b * g.column)) >= kTolerance_px) continue;
-    sums.add(1.0, g.column, g.row);
-    first = std::min<std::int32_t>(first, g.column);
-    last = std::max<std::int32_t>(last, g.column);
+    if (!fits(g, best_a, best_b)) continue;
+    sums.add(1.0, middle_px(g.column), g.row);
+    first_column_ = std::min<std::int32_t>(first_column_, g.column);
+    last_column_ = std::max<std::int32_t>(last_column_, g.column);
   }
-  if (!sums.try_solve(best_a, best_b)) return false;
-  // Half-resolution pixel i lies at full-resolution 2i + 0.5.
-  guess_slope_ = best_b;
-  guess_row_ = 2.0 * best_a + 0.5 - best_b * 0.5;
-  first_column_ = 2 * first;
-  last_column_ = 2 * last + 1;
-  return true;
+  return sums.try_solve(guess_row_, guess_slope_);
 }
 
-void EdgeLineFinder::begin(const Params& params, const DepthSigma& noise, const RawPicture& picture,
-                           const InversePlane& surface, const Beyond* other, bool surface_above) noexcept {
+void EdgeLineFinder::begin(const Params& params, const DepthSigma& noise, const CameraIntrinsics& intrinsics,
+                           const ColumnRays& rays, const ColumnImage& image, const InversePlane& surface,
+                           const Beyond* other, bool surface_above) noexcept {
   params_ = params;
   params_.window_px = std::clamp(params.window_px, 4, kMaxWindow_px);
-  params_.column_step_px = std::clamp(params.column_step_px, 1, 16);
   noise_ = noise;
-  picture_ = picture;
+  intrinsics_ = intrinsics;
+  rays_ = &rays;
+  image_ = &image;
   surface_ = surface;
   other_known_ = other != nullptr;
   if (other_known_) {
@@ -87,9 +88,10 @@ void EdgeLineFinder::begin(const Params& params, const DepthSigma& noise, const 
   surface_above_ = surface_above;
   face_tried_ = false;
   restart();
-  const CameraIntrinsics& k = picture.intrinsics;
-  const auto ray = [&](double column) {
-    return Vec3{(column - k.cx_px) / k.fx_px, (guess_row_ + guess_slope_ * column - k.cy_px) / k.fy_px, 1.0};
+  const auto ray = [&](std::int32_t column) {
+    const double x_px = middle_px(column);
+    return Vec3{(x_px - intrinsics.cx_px) / intrinsics.fx_px, (guess_at(x_px) - intrinsics.cy_px) / intrinsics.fy_px,
+                1.0};
   };
   const Vec3 a = ray(first_column_), b = ray(last_column_);
   origin_m_ = surface.inverse_depth(a) > 1e-3 ? surface.point(a) : Vec3{a};
@@ -104,7 +106,7 @@ void EdgeLineFinder::begin(const Params& params, const DepthSigma& noise, const 
 }
 
 void EdgeLineFinder::restart() noexcept {
-  next_column_ = first_column_;
+  next_column_ = first_column_ / kLanes * kLanes;
   count_ = 0;
   segment_count_ = 0;
   segments_.fill(Segment{});
@@ -114,7 +116,7 @@ void EdgeLineFinder::restart() noexcept {
 bool EdgeLineFinder::try_face_offset(double& offset_m) const noexcept {
   std::int32_t all = 0;
   for (const std::int32_t n : face_) all += n;
-  if (all < 2 * params_.min_columns) return false;
+  if (all < 4 * params_.min_columns) return false;
   std::int32_t below = 0;
   std::size_t bin = 0;
   while (2 * (below + face_[bin]) < all) below += face_[bin++];
@@ -122,118 +124,151 @@ bool EdgeLineFinder::try_face_offset(double& offset_m) const noexcept {
   return true;
 }
 
-void EdgeLineFinder::search_column(std::int32_t column) noexcept {
-  const CameraIntrinsics& k = picture_.intrinsics;
-  const double guess = guess_row_ + guess_slope_ * column;
-  const auto centre = static_cast<std::int32_t>(std::floor(guess + 0.5));
-  // The picture's end is no edge.
-  if (centre < params_.min_side_px + 1 || centre > k.height_px - 2 - params_.min_side_px) return;
-  const std::int32_t first = std::max(centre - params_.window_px, 0);
-  const std::int32_t last = std::min(centre + params_.window_px, k.height_px - 1);
-  const std::int32_t steps = last - first + 1;
-  const double x = (column - k.cx_px) / k.fx_px;
-  const double truncation = math::square(params_.truncate_sigmas);
+void EdgeLineFinder::search_columns(std::int32_t first_column) noexcept {
+  using Wide = cv::v_float32;
+  static_assert(kLanes % Wide::nlanes == 0 && kColumns % kLanes == 0);
+  // Per lane: both planes' lines w = a + b y, the scale of the noise, and the rows of the window.
+  Lanes surface_a{}, other_a{}, inverse_norm{}, centre{}, reach{};
+  std::array<std::int32_t, kLanes> centre_row{};
+  std::int32_t first_row = intrinsics_.height_px, last_row = -1;
   // One sigma for both planes: with each its own, the boundary drifts towards the less noisy one.
   const double scale = other_known_ ? math::sqrt(surface_.m.norm() * other_.m.norm()) : surface_.m.norm();
-  const double norm = scale * math::sqrt(x * x + math::square((guess - k.cy_px) / k.fy_px) + 1.0);
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const std::int32_t g = first_column + static_cast<std::int32_t>(k);
+    const double guess = guess_at(middle_px(g)), x = (middle_px(g) - intrinsics_.cx_px) / intrinsics_.fx_px;
+    const auto row = static_cast<std::int32_t>(std::floor(guess + 0.5));
+    centre_row[k] = row;
+    centre[k] = static_cast<float>(row);
+    surface_a[k] = static_cast<float>(surface_.m.x() * x + surface_.m.z());
+    other_a[k] = static_cast<float>(other_.m.x() * x + other_.m.z());
+    const double y = (guess - intrinsics_.cy_px) / intrinsics_.fy_px;
+    inverse_norm[k] = static_cast<float>(1.0 / (scale * math::sqrt(x * x + y * y + 1.0)));
+    // The picture's end is no edge.
+    const bool searched = g >= first_column_ && g <= last_column_ && g < rays_->columns && row > params_.min_side_px &&
+                          row < intrinsics_.height_px - 1 - params_.min_side_px;
+    reach[k] = searched ? static_cast<float>(params_.window_px) + 0.5F : -1.0F;
+    if (!searched) continue;
+    first_row = std::min(first_row, row - params_.window_px);
+    last_row = std::max(last_row, row + params_.window_px);
+  }
+  if (last_row < 0) return;
+  first_row = std::max(first_row, 0);
+  last_row = std::min(last_row, intrinsics_.height_px - 1);
 
   // Walk from the surface's side to the other. Every row gains cost(surface) - cost(other), nothing where there is no
   // data; the change-point is where the running sum is least.
-  std::array<float, 2 * kMaxWindow_px + 1> gain{};
-  double sum = 0.0, best = 0.0;
-  std::int32_t best_step = -1, surface_seen = 0, surface_at_best = 0, other_seen = 0, other_at_best = 0;
-  std::int32_t usable_near = 0;
-  for (std::int32_t s = 0; s < steps; ++s) {
-    const std::int32_t row = surface_above_ ? first + s : last - s;
-    const std::uint16_t raw = (*picture_.depth)(column, row);
-    if (!picture_.range.valid(raw) || ((*picture_.flags)(column / 2, row / 2) & kPixelBody) != 0) continue;
-    // Residual over sigma: (w - w_plane) / (sigma_z w |ray| |m|), times z above and below.
-    const double y = (row - k.cy_px) / k.fy_px, z = raw * k.depth_unit_m;
-    const double inverse_sigma = 1.0 / (noise_.sigma_m(z) * norm);
-    const double w_surface = surface_.m.x() * x + surface_.m.y() * y + surface_.m.z();
-    const double w_other = other_.m.x() * x + other_.m.y() * y + other_.m.z();
-    const double cost_surface = std::min(math::square((1.0 - z * w_surface) * inverse_sigma), truncation);
-    const double cost_other =
-        other_known_ ? std::min(math::square((1.0 - z * w_other) * inverse_sigma), truncation) : 0.5 * truncation;
-    surface_seen += cost_surface < truncation ? 1 : 0;
-    other_seen += cost_other < truncation ? 1 : 0;
-    usable_near += std::abs(row - centre) <= params_.max_gap_px / 2 ? 1 : 0;
-    gain[static_cast<std::size_t>(s)] = static_cast<float>(cost_surface - cost_other);
-    sum += cost_surface - cost_other;
-    if (sum < best) {
-      best = sum;
-      best_step = s;
-      surface_at_best = surface_seen;
-      other_at_best = other_seen;
+  Lanes best_row{}, surface_side{}, other_side{}, near_rows{};
+  const auto all = [](double x) { return cv::vx_setall_f32(static_cast<float>(x)); };
+  const Wide zero = all(0.0), one = all(1.0), truncation = all(math::square(params_.truncate_sigmas));
+  const Wide base = all(noise_.base_m), per_metre = all(noise_.per_metre), quadratic = all(noise_.quadratic_per_m);
+  const Wide half_gap = all(0.5 * (params_.max_gap_px + 1));
+  const Wide surface_b = all(surface_.m.y()), other_b = all(other_.m.y());
+  for (std::int32_t k0 = 0; k0 < kLanes; k0 += Wide::nlanes) {
+    const auto load = [k0](const Lanes& x) { return cv::vx_load(x.data() + k0); };
+    const Wide a_surface = load(surface_a), a_other = load(other_a), norm = load(inverse_norm);
+    const Wide middle = load(centre), window = load(reach);
+    Wide sum = zero, best = zero, at = all(-1.0), near = zero;
+    Wide surface_seen = zero, surface_at_best = zero, other_seen = zero, other_at_best = zero;
+    const std::int32_t steps = last_row - first_row + 1;
+    for (std::int32_t s = 0; s < steps; ++s) {
+      const std::int32_t r = surface_above_ ? first_row + s : last_row - s;
+      const Wide w = cv::vx_load(image_->inverse_depth.row(r) + first_column + k0);
+      const Wide off = cv::v_abs(all(r) - middle);
+      const Wide used = (w > zero) & (off < window);
+      const Wide y = cv::vx_setall_f32(rays_->y[static_cast<std::size_t>(r)]);
+      // Residual over sigma, both times w: (w - w_plane) w / ((base w^2 + per_metre w + quadratic) |ray| |m|).
+      const Wide unit = w * norm / ((base * w + per_metre) * w + quadratic);
+      const Wide d_surface = (w - (a_surface + surface_b * y)) * unit;
+      const Wide d_other = (w - (a_other + other_b * y)) * unit;
+      const Wide cost_surface = cv::v_min(d_surface * d_surface, truncation);
+      const Wide cost_other = other_known_ ? cv::v_min(d_other * d_other, truncation) : all(0.5) * truncation;
+      const Wide gain = cv::v_select(used, cost_surface - cost_other, zero);
+      cv::v_store(gains_[static_cast<std::size_t>(r)].data() + k0, gain);
+      surface_seen = surface_seen + cv::v_select(used & (cost_surface < truncation), one, zero);
+      other_seen = other_seen + cv::v_select(used & (cost_other < truncation), one, zero);
+      near = near + cv::v_select(used & (off < half_gap), one, zero);
+      sum = sum + gain;
+      const Wide better = sum < best;
+      best = cv::v_min(sum, best);
+      at = cv::v_select(better, all(r), at);
+      surface_at_best = cv::v_select(better, surface_seen, surface_at_best);
+      other_at_best = cv::v_select(better, other_seen, other_at_best);
     }
+    cv::v_store(best_row.data() + k0, at);
+    cv::v_store(surface_side.data() + k0, surface_at_best);
+    cv::v_store(other_side.data() + k0, other_seen - other_at_best);
+    cv::v_store(near_rows.data() + k0, near);
   }
-  if (best_step < 0 || usable_near == 0) return;
-  if (surface_at_best < params_.min_side_px || other_seen - other_at_best < params_.min_side_px) return;
-
-  const std::int32_t width = std::max(params_.segment_px, (last_column_ - first_column_ + kMaxSegments) / kMaxSegments);
-  Segment& segment = segments_[static_cast<std::size_t>(std::min((column - first_column_) / width, kMaxSegments - 1))];
-  segment_count_ = std::max(segment_count_, std::min((column - first_column_) / width, kMaxSegments - 1) + 1);
-  if (other_known_ && surface_above_ && !face_tried_) add_face(column, first, best_step, steps);
-  segment.columns += 1.0;
-  segment.column_sum += column;
-  ++count_;
-  for (std::int32_t s = 0; s < steps; ++s) {
-    const std::int32_t row = surface_above_ ? first + s : last - s;
-    // A pixel's gain is spread over the bins that its square covers: from row - 0.5 to row + 0.5.
-    const double offset = surface_above_ ? row - 0.5 - guess : guess - row - 0.5;
-    const double place = (offset + kMaxWindow_px) * kBinsPerPixel;
-    const auto bin = static_cast<std::int32_t>(std::floor(place));
-    const auto part = static_cast<float>(place - bin);
-    const float share = gain[static_cast<std::size_t>(s)] / kBinsPerPixel;
-    for (std::int32_t b = 0; b <= kBinsPerPixel; ++b) {
-      if (bin + b < 0 || bin + b >= 2 * kMaxReach_bins) continue;
-      const float weight = b == 0 ? 1.0F - part : (b == kBinsPerPixel ? part : 1.0F);
-      segment.gain[static_cast<std::size_t>(bin + b)] += weight * share;
-    }
+  const auto least = static_cast<float>(params_.min_side_px);
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    if (reach[k] < 0.0F || best_row[k] < 0.0F || near_rows[k] < 0.5F) continue;
+    if (surface_side[k] < least || other_side[k] < least) continue;
+    const std::int32_t g = first_column + static_cast<std::int32_t>(k);
+    if (other_known_ && surface_above_ && !face_tried_) add_face(g, static_cast<std::int32_t>(best_row[k]), last_row);
+    take_column(g, centre_row[k], first_row, last_row, k);
   }
 }
 
-void EdgeLineFinder::add_face(std::int32_t column, std::int32_t first, std::int32_t from, std::int32_t steps) noexcept {
-  constexpr std::int32_t kPixels = 4;  // a face 30 mm high is 7 pixels high at 0.8 m
+void EdgeLineFinder::take_column(std::int32_t column, std::int32_t centre, std::int32_t first_row,
+                                 std::int32_t last_row, std::size_t lane) noexcept {
+  const std::int32_t all = last_column_ - first_column_ + 1;
+  const std::int32_t width = std::max(params_.segment_px / kColumn_px, (all + kMaxSegments - 1) / kMaxSegments);
+  const std::int32_t index = (column - first_column_) / width;
+  segment_count_ = std::max(segment_count_, index + 1);
+  Segment& segment = segments_[static_cast<std::size_t>(index)];
+  segment.columns += 1.0;
+  segment.column_sum += middle_px(column);
+  segment.rounded_sum += guess_at(middle_px(column)) - centre;
+  ++count_;
+  const std::int32_t first = std::max(first_row, centre - params_.window_px);
+  const std::int32_t last = std::min(last_row, centre + params_.window_px);
+  for (std::int32_t r = first; r <= last; ++r) {
+    const std::int32_t outwards = surface_above_ ? r - centre : centre - r;
+    segment.gain[static_cast<std::size_t>(outwards + kMaxWindow_px)] += gains_[static_cast<std::size_t>(r)][lane];
+  }
+}
+
+void EdgeLineFinder::add_face(std::int32_t column, std::int32_t from_row, std::int32_t last_row) noexcept {
+  constexpr std::int32_t kRows = 4;  // a face 30 mm high is 7 pixels high at 0.8 m
   constexpr std::int32_t kBefore_px = 6;
-  const CameraIntrinsics& k = picture_.intrinsics;
+  const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(column)]);
+  const double surface_a = surface_.m.x() * x + surface_.m.z(), other_a = other_.m.x() * x + other_.m.z();
+  const double surface_d_m = surface_.d_m(), other_d_m = other_.d_m();
   std::int32_t taken = 0;
-  for (std::int32_t s = std::max(from - kBefore_px, 0); s < steps && taken < kPixels; ++s) {
-    const std::int32_t row = first + s;
-    const std::uint16_t raw = (*picture_.depth)(column, row);
-    if (!picture_.range.valid(raw) || ((*picture_.flags)(column / 2, row / 2) & kPixelBody) != 0) continue;
-    const Vec3 ray{(column - k.cx_px) / k.fx_px, (row - k.cy_px) / k.fy_px, 1.0};
-    const double z = raw * k.depth_unit_m;
-    const double off_surface_m = surface_.distance_m(z * ray);
+  for (std::int32_t r = std::max(from_row - kBefore_px, 0); r <= last_row && taken < kRows; ++r) {
+    const auto w = static_cast<double>(image_->inverse_depth(column, r));
+    if (!(w > 0.0)) continue;
+    const auto y = static_cast<double>(rays_->y[static_cast<std::size_t>(r)]);
+    const double z = 1.0 / w;
     // Off the tread by more than its noise, along the tread's normal, and downwards.
+    const double off_surface_m = (1.0 - (surface_a + surface_.m.y() * y) * z) * surface_d_m;
     if (off_surface_m > -params_.truncate_sigmas * noise_.sigma_m(z)) continue;
     ++taken;
-    const double bin = math::clamp(other_.distance_m(z * ray) / kFaceBin_m, 0.0, kFaceBins - 1.0);
-    ++face_[static_cast<std::size_t>(bin)];
+    const double off_other_m = (1.0 - (other_a + other_.m.y() * y) * z) * other_d_m;
+    ++face_[static_cast<std::size_t>(math::clamp(off_other_m / kFaceBin_m, 0.0, kFaceBins - 1.0))];
   }
 }
 
 bool EdgeLineFinder::try_segment_point(const Segment& segment, Vec2& point_m) const noexcept {
   double sum = 0.0, best = 0.0;
   std::int32_t at = -1;
-  for (std::int32_t b = 0; b < 2 * kMaxReach_bins; ++b) {
-    sum += static_cast<double>(segment.gain[static_cast<std::size_t>(b)]);
+  for (std::int32_t i = 0; i < kOffsets; ++i) {
+    sum += static_cast<double>(segment.gain[static_cast<std::size_t>(i)]);
     if (sum < best) {
       best = sum;
-      at = b;
+      at = i;
     }
   }
-  if (at < 1 || at + 2 >= 2 * kMaxReach_bins) return false;
-  // The running sum's least value lies where the gain crosses zero: between the bins on both sides of the minimum.
+  if (at < 1 || at + 2 >= kOffsets) return false;
+  // The running sum's least value lies where the gain crosses zero: between the rows on both sides of the minimum.
   const auto g0 = static_cast<double>(segment.gain[static_cast<std::size_t>(at)]);
   const auto g1 = static_cast<double>(segment.gain[static_cast<std::size_t>(at + 1)]);
   const double fraction = g1 - g0 > 1e-9 ? math::clamp(-g0 / (g1 - g0), 0.0, 1.0) : 0.5;
-  const double offset = (at + 0.5 + fraction) / kBinsPerPixel - kMaxWindow_px;
-  const CameraIntrinsics& k = picture_.intrinsics;
+  const double outwards = at + fraction - kMaxWindow_px;
   const double column = segment.column_sum / segment.columns;
-  const double guess = guess_row_ + guess_slope_ * column;
-  const double row = surface_above_ ? guess + offset : guess - offset;
-  const Vec3 ray{(column - k.cx_px) / k.fx_px, (row - k.cy_px) / k.fy_px, 1.0};
+  const double centre = guess_at(column) - segment.rounded_sum / segment.columns;
+  const double row = surface_above_ ? centre + outwards : centre - outwards;
+  const Vec3 ray{(column - intrinsics_.cx_px) / intrinsics_.fx_px, (row - intrinsics_.cy_px) / intrinsics_.fy_px, 1.0};
   if (!(surface_.inverse_depth(ray) > 1e-3)) return false;
   const Vec3 from_origin = surface_.point(ray) - origin_m_;
   point_m = {from_origin.dot(along_), from_origin.dot(across_)};
@@ -241,10 +276,10 @@ bool EdgeLineFinder::try_segment_point(const Segment& segment, Vec2& point_m) co
 }
 
 bool EdgeLineFinder::step(std::int32_t max_columns) noexcept {
-  const std::int32_t last = std::min(last_column_, picture_.intrinsics.width_px - 1);
-  for (std::int32_t i = 0; i < max_columns && next_column_ <= last; ++i) {
-    search_column(next_column_);
-    next_column_ += params_.column_step_px;
+  const std::int32_t last = std::min(last_column_, rays_->columns - 1);
+  for (std::int32_t i = 0; i < max_columns && next_column_ <= last; i += kLanes) {
+    search_columns(next_column_);
+    next_column_ += kLanes;
   }
   return next_column_ > last;
 }
@@ -252,8 +287,8 @@ bool EdgeLineFinder::step(std::int32_t max_columns) noexcept {
 // How far across the surface one row of the picture reaches there.
 double EdgeLineFinder::pixel_m(double along_m, double across_m) const noexcept {
   const Vec3 p = origin_m_ + along_m * along_ + across_m * across_;
-  const double w = 1.0 / p.z(), dw = surface_.m.y() / picture_.intrinsics.fy_px;  // inverse depth, and of the next row
-  const Vec3 next = (p * w + Vec3::UnitY() / picture_.intrinsics.fy_px) / (w + dw);
+  const double w = 1.0 / p.z(), dw = surface_.m.y() / intrinsics_.fy_px;  // inverse depth, and of the next row
+  const Vec3 next = (p * w + Vec3::UnitY() / intrinsics_.fy_px) / (w + dw);
   return std::abs((next - p).dot(across_));
 }
 
@@ -266,7 +301,7 @@ EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
   std::size_t n = 0;
   for (std::int32_t i = 0; i < segment_count_; ++i) {
     const Segment& segment = segments_[static_cast<std::size_t>(i)];
-    if (segment.columns < 3.0 || !try_segment_point(segment, points_m_[n])) continue;
+    if (segment.columns < 2.0 || !try_segment_point(segment, points_m_[n])) continue;
     weights_[n++] = segment.columns;
   }
   if (n < 3) return Outcome::kFewColumns;

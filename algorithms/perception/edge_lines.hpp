@@ -1,37 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a surface ends, to a fraction of a pixel: change-points in the raw picture, one line through all.
+// Where a surface ends, to a fraction of a pixel: change-points in the columns of the picture, one line through all.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
 #include "algorithms/core/surfaces.hpp"
-#include "algorithms/perception/depth_range.hpp"
+#include "algorithms/perception/column_image.hpp"
 #include "algorithms/perception/images.hpp"
 #include "algorithms/perception/plane_fit.hpp"
 
 namespace polygmap {
 
-using FullDepthImage = Raster<std::uint16_t, kDepthWidth_px, kDepthHeight_px>;
-
-// What the finder reads: the raw picture, which of its pixels are the robot's own, and the camera.
-struct RawPicture {
-  const FullDepthImage* depth = nullptr;
-  const HalfImage<std::uint8_t>* flags = nullptr;
-  CameraIntrinsics intrinsics;
-  RawRange range;
-};
-
 class EdgeLineFinder {
  public:
   struct Params {
-    std::int32_t window_px = 16;  // full-resolution rows searched to each side of the first guess
-    std::int32_t column_step_px = 2;
-    std::int32_t segment_px = 28;  // columns that share one change-point
+    std::int32_t window_px = 12;   // rows searched to each side of the first guess
+    std::int32_t segment_px = 28;  // that share one change-point
     double truncate_sigmas = 3.0;
-    std::int32_t min_side_px = 3;  // valid pixels of the window on each side of the change-point that fit their plane
+    std::int32_t min_side_px = 3;  // rows of the window on each side of the change-point that fit their plane
     std::int32_t max_gap_px = 6;   // rows without data at the change-point: beyond, the column says nothing
-    std::int32_t min_columns = 12;
+    std::int32_t min_columns = 6;  // of four pixels
     double min_length_m = 0.06;
     double max_rms_m = 0.006;
     double min_inlier_share = 0.5;
@@ -47,7 +36,7 @@ class EdgeLineFinder {
   };
   enum class Outcome : std::uint8_t { kFound, kAgain, kFewColumns, kNoLine, kNotStraight, kShort };
 
-  // Boundary pixels of the surface in half-resolution columns, as a first guess.
+  // The surface's last row in a column, as a first guess.
   void begin_guess() noexcept { guess_count_ = 0; }
   void add_guess(std::int32_t column, std::int32_t row) noexcept;
   // A line through most of the guesses; false when there is none.
@@ -60,13 +49,13 @@ class EdgeLineFinder {
   };
   // surface_above: the surface lies above its boundary in the picture (a nosing), else below it (a back line). other:
   // the plane on the far side; null when that is not known, then only leaving the surface's plane counts.
-  void begin(const Params& params, const DepthSigma& noise, const RawPicture& picture, const InversePlane& surface,
-             const Beyond* other, bool surface_above) noexcept;
-  // Searches the next columns; true when all are done. At most max_columns columns.
+  void begin(const Params& params, const DepthSigma& noise, const CameraIntrinsics& intrinsics, const ColumnRays& rays,
+             const ColumnImage& image, const InversePlane& surface, const Beyond* other, bool surface_above) noexcept;
+  // Searches the next columns; true when all are done. At most max_columns columns, a multiple of kLanes.
   bool step(std::int32_t max_columns) noexcept;
   // kAgain: the tread overhangs the riser with a face of its own; step() once more, against that face.
   [[nodiscard]] Outcome finish(EdgeLine& line) noexcept;
-  // The first guess on the surface's plane, after begin(); good to a half-resolution pixel.
+  // The first guess on the surface's plane, after begin(); good to a pixel.
   [[nodiscard]] EdgeLine guessed_line() const noexcept { return {guess_a_m_, guess_b_m_, 0.01, true}; }
 
   [[nodiscard]] std::int32_t column_count() const noexcept { return count_; }
@@ -75,36 +64,47 @@ class EdgeLineFinder {
   struct Guess {
     std::int16_t column, row;
   };
-  static constexpr std::int32_t kMaxWindow_px = 24;
-  static constexpr std::int32_t kBinsPerPixel = 2;
-  static constexpr std::int32_t kMaxReach_bins = kMaxWindow_px * kBinsPerPixel;
+  static constexpr std::int32_t kLanes = 8;  // columns that are searched together, on every machine
+  static constexpr std::int32_t kMaxWindow_px = 16;
+  static constexpr std::int32_t kOffsets = 2 * kMaxWindow_px + 1;
   static constexpr std::int32_t kMaxSegments = 24;
+  using Lanes = std::array<float, kLanes>;
 
   // Columns are pooled in segments: one column's change-point is skewed towards the less noisy plane by up to a pixel,
   // the pooled one is not.
   struct Segment {
-    std::array<float, 2 * kMaxReach_bins> gain{};  // sum of cost(surface) - cost(other), by distance from the guess
+    std::array<float, kOffsets> gain{};  // sum of cost(surface) - cost(other), by rows from the guess, outwards
     double columns = 0.0;
-    double column_sum = 0.0;
+    double column_sum = 0.0;   // of their middles, pixels
+    double rounded_sum = 0.0;  // of the guess less the row that it was rounded to
   };
-  void search_column(std::int32_t column) noexcept;
+  [[nodiscard]] double guess_at(double column_px) const noexcept { return guess_row_ + guess_slope_ * column_px; }
+  [[nodiscard]] static double middle_px(std::int32_t column) noexcept {
+    return kColumn_px * column + 0.5 * (kColumn_px - 1);
+  }
+  // kLanes columns from a multiple of kLanes on.
+  void search_columns(std::int32_t first_column) noexcept;
+  void take_column(std::int32_t column, std::int32_t centre, std::int32_t first_row, std::int32_t last_row,
+                   std::size_t lane) noexcept;
   void restart() noexcept;
-  void add_face(std::int32_t column, std::int32_t first, std::int32_t from, std::int32_t steps) noexcept;
+  void add_face(std::int32_t column, std::int32_t from_row, std::int32_t last_row) noexcept;
   // How far the first pixels past the change-point stand out from the other plane; false when there are too few.
   [[nodiscard]] bool try_face_offset(double& offset_m) const noexcept;
   [[nodiscard]] double pixel_m(double along_m, double across_m) const noexcept;
   [[nodiscard]] bool try_segment_point(const Segment& segment, Vec2& point_m) const noexcept;
 
-  std::array<Guess, kHalfWidth_px> guess_{};
+  std::array<Guess, kColumns> guess_{};
   std::size_t guess_count_ = 0;
-  double guess_row_ = 0.0;  // full-resolution row at column 0 of the guessed line
+  double guess_row_ = 0.0;  // row of the guessed line at pixel column 0
   double guess_slope_ = 0.0;
-  std::int32_t first_column_ = 0;  // full resolution
+  std::int32_t first_column_ = 0;
   std::int32_t last_column_ = -1;
 
   Params params_;
   DepthSigma noise_;
-  RawPicture picture_;
+  CameraIntrinsics intrinsics_;
+  const ColumnRays* rays_ = nullptr;
+  const ColumnImage* image_ = nullptr;
   InversePlane surface_;
   InversePlane other_;
   Mat3 other_covariance_ = Mat3::Zero();
@@ -119,6 +119,7 @@ class EdgeLineFinder {
   Vec3 along_ = Vec3::UnitX();
   Vec3 across_ = Vec3::UnitY();
 
+  std::array<Lanes, kDepthHeight_px> gains_{};  // of the columns searched together, by row
   std::array<Segment, kMaxSegments> segments_{};
   std::int32_t segment_count_ = 0;
   static constexpr std::int32_t kFaceBins = 64;

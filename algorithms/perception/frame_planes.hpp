@@ -7,11 +7,21 @@
 
 #include "algorithms/core/surfaces.hpp"
 #include "algorithms/perception/column_image.hpp"
+#include "algorithms/perception/depth_range.hpp"
 #include "algorithms/perception/images.hpp"
 #include "algorithms/perception/plane_fit.hpp"
 #include "algorithms/perception/surface_boundaries.hpp"
 
 namespace polygmap {
+
+using FullDepthImage = Raster<std::uint16_t, kDepthWidth_px, kDepthHeight_px>;
+
+// The picture as the camera delivered it.
+struct RawPicture {
+  const FullDepthImage* depth = nullptr;
+  CameraIntrinsics intrinsics;
+  RawRange range;
+};
 
 struct FramePlane {
   InversePlane plane;

@@ -63,6 +63,9 @@ struct DepthSigma {
   // 70. Sets how much a plane's lean counts against its pixels, and its covariance.
   double correlated_px = 640.0;
 
+  [[nodiscard]] DepthSigma scaled(double factor) const noexcept {
+    return {factor * base_m, factor * per_metre, factor * quadratic_per_m, correlated_share, correlated_px};
+  }
   [[nodiscard]] double sigma_m(double z_m) const noexcept { return base_m + z_m * (per_metre + quadratic_per_m * z_m); }
   // Of the inverse depth w = 1 / z: sigma_z w^2, 1/m.
   [[nodiscard]] double inverse_sigma(double w) const noexcept { return (base_m * w + per_metre) * w + quadratic_per_m; }

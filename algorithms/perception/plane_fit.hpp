@@ -48,9 +48,9 @@ enum class Lean : std::uint8_t { kAny, kLevel, kUpright };
 
 struct PlaneFit {
   struct Params {
-    double lean_sigma_rad = 0.01;  // how level treads and how upright risers are, the estimator's up included
-    double lean_tilt_rad = 0.5;    // further from level or upright, a plane is neither ...
-    double lean_sigmas = 3.0;      // ... nor when its pixels contradict it by this
+    double lean_sigma_rad = 0.006;  // how level treads and how upright risers are, the estimator's up included
+    double lean_tilt_rad = 0.5;     // further from level or upright, a plane is neither ...
+    double lean_sigmas = 3.0;       // ... nor when its pixels contradict it by this
   };
 };
 

@@ -12,6 +12,7 @@
 #include "algorithms/core/work.hpp"
 #include "algorithms/perception/map_drift.hpp"
 #include "algorithms/perception/map_track.hpp"
+#include "algorithms/robot/body_shapes.hpp"
 
 namespace polygmap {
 
@@ -59,6 +60,8 @@ class PolygonMap {
     double position_sigma_m = 0.0;  // of that pose
     double tilt_sigma_rad = 0.0;
     CameraIntrinsics intrinsics;
+    std::array<LegShapes, kFootCount> body{};  // camera frame; what it hides is not seen to be empty
+    double body_margin_m = 0.02;
   };
   struct Counters {
     std::uint32_t frames = 0;

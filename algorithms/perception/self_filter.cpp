@@ -18,6 +18,14 @@ LegShapes transformed(const Transform& to_T_from, const LegShapes& shapes) noexc
           {to_T_from * shapes.foot.centre, shapes.foot.half_m}};
 }
 
+BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& legs, double turn_rad) noexcept {
+  const double reach_m = legs.thigh_m + legs.shank_m + legs.ankle_to_sole_m;
+  // Of the hip's three joints two move the foot sideways or ahead, and the knee half as far.
+  const double turned_m = 1.5 * uncertainty.encoder_rad * reach_m, longer_m = uncertainty.leg_length * reach_m;
+  const double position_m = math::sqrt(math::square(turned_m) + math::square(longer_m));
+  return {uncertainty.shape_m + uncertainty.sigmas * position_m, turn_rad};
+}
+
 void SelfFilter::clear() noexcept {
   for (Outline& outline : outlines_) outline.fill(Interval{});
 }
@@ -79,8 +87,8 @@ void SelfFilter::add_segment(Outline& outline, const HalfRays& rays, const Vec3&
   }
 }
 
-void SelfFilter::add_shape(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body, double margin_m,
-                           std::size_t slot) noexcept {
+void SelfFilter::add_shape(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body,
+                           const BodyMargin& margin, std::size_t slot) noexcept {
   if (slot >= kShapes) return;
   const LegShapes& leg = body[slot / 3];
   Outline& outline = outlines_[slot];
@@ -89,13 +97,15 @@ void SelfFilter::add_shape(const HalfRays& rays, const std::array<LegShapes, kFo
     if (!(capsule.radius_m > 0.0)) return;
     for (int i = 0; i < kSpheresPerCapsule; ++i) {
       const double along = static_cast<double>(i) / (kSpheresPerCapsule - 1);
-      add_sphere(outline, rays, capsule.a_m + along * (capsule.b_m - capsule.a_m), capsule.radius_m + margin_m);
+      const Vec3 centre_m = capsule.a_m + along * (capsule.b_m - capsule.a_m);
+      add_sphere(outline, rays, centre_m, capsule.radius_m + margin.at(centre_m.norm()));
     }
     return;
   }
   if (!(leg.foot.half_m.minCoeff() > 0.0)) return;
   std::array<Vec3, 8> corners;
-  const Vec3 half = leg.foot.half_m + Vec3::Constant(margin_m);
+  const double farthest_m = leg.foot.centre.p_m.norm() + leg.foot.half_m.norm();
+  const Vec3 half = leg.foot.half_m + Vec3::Constant(margin.at(farthest_m));
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Vec3 sign{(i & 1U) != 0 ? 1.0 : -1.0, (i & 2U) != 0 ? 1.0 : -1.0, (i & 4U) != 0 ? 1.0 : -1.0};
     corners[i] = leg.foot.centre * half.cwiseProduct(sign);

@@ -13,6 +13,23 @@ namespace polygmap {
 // The shapes moved to another frame.
 [[nodiscard]] LegShapes transformed(const Transform& to_T_from, const LegShapes& shapes) noexcept;
 
+// How far the body may be from where its joints say: a length, and a turn of the camera about itself.
+struct BodyMargin {
+  double fixed_m = 0.0;
+  double turn_rad = 0.0;
+  [[nodiscard]] double at(double distance_m) const noexcept { return fixed_m + turn_rad * distance_m; }
+};
+// What is not known of the legs. One sigma each, as a data sheet has it.
+struct BodyUncertainty {
+  double shape_m = 0.008;     // not a sigma: covers beyond the shapes, and a leg's way in half an exposure
+  double leg_length = 0.005;  // relative
+  double encoder_rad = 2e-3;  // offset of a joint
+  double sigmas = 2.5;
+};
+// At the foot, which is worst off. turn_rad: of the camera's mount.
+[[nodiscard]] BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& legs,
+                                     double turn_rad) noexcept;
+
 // The picture of convex shapes, each grown by a margin: one column interval per row and shape. A pixel whose ray meets
 // a grown shape is body whatever depth it measured, so that flying pixels around a leg go with it.
 class SelfFilter {
@@ -21,7 +38,7 @@ class SelfFilter {
 
   void clear() noexcept;
   // Slots 0..2 of a foot: thigh, shank, foot. Camera frame, m.
-  void add_shape(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body, double margin_m,
+  void add_shape(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body, const BodyMargin& margin,
                  std::size_t slot) noexcept;
   // Sets kPixelBody in one row of flags.
   void mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept;

@@ -8,7 +8,8 @@
 namespace polygmap {
 namespace {
 
-constexpr float kTruncation = 9.0F;  // of a cost: an outlier says no more than three sigmas do
+constexpr float kCostsPerUnit = 4.0F;  // bins of the noise scale's histogram
+constexpr float kTruncation = 9.0F;    // of a cost: an outlier says no more than three sigmas do
 
 }  // namespace
 
@@ -75,10 +76,12 @@ void SurfaceBoundaries::gather(std::int32_t column, const RunSegmentation::Colum
     interval.plane = plane;
     if (!out.try_push_back(interval)) ++overflow_;
   }
-  for (ColumnSpan& span : out) trim(column, span);
 }
 
-// A run's ends may reach over an edge: rows that the plane, known better than the run's line, does not explain.
+void SurfaceBoundaries::trim(std::int32_t column) noexcept {
+  for (ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) trim(column, span);
+}
+
 void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const noexcept {
   constexpr std::int32_t kMost_px = 8, kGood = 2;
   const Line line = line_of(planes_[interval.plane].plane, column);
@@ -102,11 +105,12 @@ void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const no
 }
 
 bool SurfaceBoundaries::try_claim(std::int32_t column, std::int32_t first, std::int32_t last,
-                                  const StaticVector<std::uint8_t, kMaxPlanes>& candidates,
+                                  const StaticVector<ColumnSpan, kMaxPlanes>& candidates,
                                   ColumnSpan& claimed) const noexcept {
   constexpr std::int32_t kMinRows = 2;
   std::int32_t most = 0;
-  for (const std::uint8_t plane : candidates) {
+  for (const ColumnSpan& candidate : candidates) {
+    const std::uint8_t plane = candidate.plane;
     const Line line = line_of(planes_[plane].plane, column);
     // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
     std::int32_t top = -1, bottom = -1, fitting = 0, off = 0;
@@ -120,7 +124,8 @@ bool SurfaceBoundaries::try_claim(std::int32_t column, std::int32_t first, std::
       fitting = off = 0;
       top = -1;
     };
-    for (std::int32_t r = first; r <= last; ++r) {
+    for (std::int32_t r = std::max<std::int32_t>(first, candidate.top);
+         r <= std::min<std::int32_t>(last, candidate.bottom); ++r) {
       if (image_->valid(column, r) != 0 && cost(line, column, r) < kTruncation) {
         top = fitting == 0 ? r : top;
         bottom = r;
@@ -137,6 +142,7 @@ bool SurfaceBoundaries::try_claim(std::int32_t column, std::int32_t first, std::
 
 void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t first_plane,
                               std::size_t last_plane) noexcept {
+  constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
   Column& spans = columns_[static_cast<std::size_t>(column)];
   const bool any_beside = beside >= 0 && beside < rays_->columns;
   std::int32_t from = 0;
@@ -147,17 +153,24 @@ void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::siz
     if (until <= gap_from || spans.full()) continue;
     const std::uint8_t above = k > 0 ? spans[k - 1].plane : std::uint8_t{0};
     const std::uint8_t below = k < spans.size() ? spans[k].plane : std::uint8_t{0};
-    StaticVector<std::uint8_t, kMaxPlanes> candidates;
-    const auto consider = [&](std::uint8_t plane) {
-      if (plane == above || plane == below) return;
-      static_cast<void>(candidates.try_push_back(plane));
+    StaticVector<ColumnSpan, kMaxPlanes> candidates;
+    const auto consider = [&](ColumnSpan candidate) {
+      if (candidate.plane == above || candidate.plane == below) return;
+      static_cast<void>(candidates.try_push_back(candidate));
     };
     if (any_beside) {
-      for (const ColumnSpan& other : columns_[static_cast<std::size_t>(beside)]) {
-        if (other.top <= until + 1 && other.bottom >= gap_from - 1) consider(other.plane);
+      for (ColumnSpan other : columns_[static_cast<std::size_t>(beside)]) {
+        other.top = static_cast<std::int16_t>(other.top - kReach_px);
+        other.bottom = static_cast<std::int16_t>(other.bottom + kReach_px);
+        if (other.top <= until && other.bottom >= gap_from) consider(other);
       }
     }
-    for (std::size_t p = first_plane; p <= last_plane; ++p) consider(static_cast<std::uint8_t>(p));
+    for (std::size_t p = first_plane; p <= last_plane; ++p) {
+      ColumnSpan anywhere;
+      anywhere.bottom = static_cast<std::int16_t>(rays_->height_px - 1);
+      anywhere.plane = static_cast<std::uint8_t>(p);
+      consider(anywhere);
+    }
     ColumnSpan claimed;
     if (!try_claim(column, gap_from, until, candidates, claimed)) continue;
     if (!spans.try_push_back(claimed)) continue;
@@ -213,27 +226,35 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
                                              std::int32_t first, std::int32_t last, float meeting_row,
                                              Pair* pair) const noexcept {
   // One sigma for both: with each its own, the boundary drifts towards the less noisy plane.
-  const float norm = std::sqrt(upper.norm * lower.norm);
-  const Line a{upper.a, upper.b, norm}, b{lower.a, lower.b, norm};
+  const float norm2 = upper.norm * lower.norm;
+  const auto to_bin = [&](std::int32_t r) {
+    return static_cast<std::int32_t>(
+               std::floor((static_cast<float>(r) - meeting_row) * static_cast<float>(kBinsPerPixel))) +
+           kBins / 2;
+  };
+  constexpr std::int32_t kNowhere = -1000000;
+  std::int32_t bin = pair != nullptr ? to_bin(first) : kNowhere;  // a row further is kBinsPerPixel bins further
   float sum = 0.0F, best = 0.0F;
   std::int32_t at = first - 1;
-  for (std::int32_t r = first; r <= last; ++r) {
-    if (image_->valid(column, r) == 0) continue;
-    const float gain = std::min(cost(a, column, r), kTruncation) - std::min(cost(b, column, r), kTruncation);
+  for (std::int32_t r = first; r <= last; ++r, bin += kBinsPerPixel) {
+    const std::size_t valid = image_->valid(column, r);
+    if (valid == 0) continue;
+    const float w = image_->inverse_depth(column, r), y = rays_->y[static_cast<std::size_t>(r)];
+    const float off_upper = (w - (upper.a + upper.b * y)) * w, off_lower = (w - (lower.a + lower.b * y)) * w;
+    const float sigma = inverse_sigma(w), information = 1.0F / (sigma * sigma * norm2 * share_[valid]);
+    const float gain = std::min(off_upper * off_upper * information, kTruncation) -
+                       std::min(off_lower * off_lower * information, kTruncation);
     sum += gain;
     if (sum < best) {
       best = sum;
       at = r;
     }
-    if (pair == nullptr) continue;
-    const auto bin =
-        static_cast<std::int32_t>(std::floor((static_cast<float>(r) - meeting_row) * kBinsPerPixel)) + kBins / 2;
     if (bin >= 0 && bin < kBins) pair->gain[static_cast<std::size_t>(bin)] += gain;
   }
   return at;
 }
 
-void SurfaceBoundaries::meet(std::int32_t column) noexcept {
+void SurfaceBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
   Column& intervals = columns_[static_cast<std::size_t>(column)];
   for (std::size_t k = 0; k < intervals.size(); ++k) {
     ColumnSpan& upper = intervals[k];
@@ -249,11 +270,15 @@ void SurfaceBoundaries::meet(std::int32_t column) noexcept {
       continue;
     }
     const Line a = line_of(planes_[upper.plane].plane, column), b = line_of(planes_[lower.plane].plane, column);
-    const double y = static_cast<double>(b.a - a.a) / static_cast<double>(a.b - b.b);
-    const double row = y * fy_px_ + cy_px_;
+    const double row = meeting_row(a, b);
     const std::int32_t window = params_.window_px;
     std::int32_t first = upper.bottom, last = lower.top;
     const bool meets = row > first - window && row < last + window;  // false for parallel planes, too
+    if (meets && by_planes) {
+      upper.bottom = static_cast<std::int16_t>(math::clamp(std::ceil(row) - 1.0, upper.top, lower.bottom - 1.0));
+      lower.top = static_cast<std::int16_t>(upper.bottom + 1);
+      continue;
+    }
     if (meets) {
       first = std::min(first, static_cast<std::int32_t>(row));
       last = std::max(last, static_cast<std::int32_t>(row) + 1);
@@ -267,13 +292,11 @@ void SurfaceBoundaries::meet(std::int32_t column) noexcept {
     lower.top = static_cast<std::int16_t>(upper.bottom + 1);
     if (pair == nullptr) continue;
     pair->columns += 1.0;
-    joints_[joint_count_++] = {i, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k),
-                               static_cast<float>(row)};
+    joints_[joint_count_++] = {i, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k)};
   }
 }
 
 void SurfaceBoundaries::settle() noexcept {
-  std::array<double, kMaxPairs> shift_px{};
   for (std::size_t i = 0; i < pair_count_; ++i) {
     double sum = 0.0, best = 0.0, meeting = 0.0;
     std::int32_t at = 0;  // bins above the boundary
@@ -284,21 +307,29 @@ void SurfaceBoundaries::settle() noexcept {
       best = sum;
       at = bin + 1;
     }
-    const double offset_px = (at - kBins / 2) / static_cast<double>(kBinsPerPixel);
+    const double offset_px = (at - 0.5 * kBins) / kBinsPerPixel;
     const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].columns;
-    shift_px[i] = meets ? 0.0 : offset_px;
+    pairs_[i].shift_px = meets ? 0.0 : offset_px;
   }
+  follow();
+}
+
+void SurfaceBoundaries::follow() noexcept {
   for (std::size_t i = 0; i < joint_count_; ++i) {
     const Joint& joint = joints_[i];
     Column& intervals = columns_[static_cast<std::size_t>(joint.column)];
     ColumnSpan &upper = intervals[joint.upper], &lower = intervals[joint.upper + 1U];
-    const double row = std::ceil(static_cast<double>(joint.row) + shift_px[joint.pair]) - 1.0;
+    const Line a = line_of(planes_[upper.plane].plane, joint.column),
+               b = line_of(planes_[lower.plane].plane, joint.column);
+    const double row = std::ceil(meeting_row(a, b) + pairs_[joint.pair].shift_px) - 1.0;
+    if (!std::isfinite(row)) continue;
     upper.bottom = static_cast<std::int16_t>(math::clamp(row, upper.top, lower.bottom - 1.0));
     lower.top = static_cast<std::int16_t>(upper.bottom + 1);
   }
 }
 
 void SurfaceBoundaries::begin_refit() noexcept {
+  costs_.fill(0);
   for (Plane& plane : planes_) {
     plane.moments = PlaneMoments{};
     plane.residual2 = 0.0;
@@ -307,6 +338,7 @@ void SurfaceBoundaries::begin_refit() noexcept {
 
 void SurfaceBoundaries::refit(std::int32_t first_column) noexcept {
   constexpr std::int32_t kThick_px = 8;  // thicker surfaces do without the rows next to another
+  sample_noise(first_column);
   std::array<std::size_t, kRefitColumns> next{};
   const std::int32_t count = std::min(kRefitColumns, rays_->columns - first_column);
   // Down the columns together: the topmost span that is left, and with it those of its plane that are next elsewhere.
@@ -418,6 +450,33 @@ void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip) noe
     m.count += stride * static_cast<double>(count[k]);
     plane.residual2 += stride * d_m * d_m * static_cast<double>(off2[k]);
   }
+}
+
+// One column of each strip and every other row are enough for a median.
+void SurfaceBoundaries::sample_noise(std::int32_t column) noexcept {
+  constexpr std::int32_t kStride = 2;
+  for (const ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) {
+    const Line line = line_of(planes_[span.plane].plane, column);
+    for (std::int32_t r = span.top + 1; r < span.bottom; r += kStride) {
+      if (image_->valid(column, r) == 0) continue;
+      const float bin = std::min(cost(line, column, r) * kCostsPerUnit, static_cast<float>(kCostBins));
+      ++costs_[static_cast<std::size_t>(bin)];
+    }
+  }
+}
+
+// The median forgives half of the rows being something else; a squared normal variable's is 0.455.
+double SurfaceBoundaries::noise_scale() const noexcept {
+  constexpr std::int32_t kLeastRows = 300;
+  constexpr double kMedian = 0.455;
+  std::int32_t all = 0;
+  for (const std::int32_t n : costs_) all += n;
+  if (all < kLeastRows) return 0.0;
+  std::int32_t below = 0;
+  std::size_t bin = 0;
+  while (2 * (below + costs_[bin]) < all) below += costs_[bin++];
+  const double within = (0.5 * all - below) / costs_[bin];
+  return math::sqrt((static_cast<double>(bin) + within) / static_cast<double>(kCostsPerUnit) / kMedian);
 }
 
 }  // namespace polygmap

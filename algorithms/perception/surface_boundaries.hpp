@@ -53,16 +53,33 @@ class SurfaceBoundaries {
   // One column's runs to intervals, each run's plane looked up in to_plane.
   void gather(std::int32_t column, const RunSegmentation::Column& runs,
               const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept;
+  // A run's ends may reach over an edge: takes away rows that the plane, known better than the run's line, does not
+  // explain.
+  void trim(std::int32_t column) noexcept;
   // Gives rows that are in none of the column's spans to planes that the column beside shows there, or to one of the
   // planes first .. last. Such rows are too few for a run of their own.
   void claim(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
   void begin_meeting() noexcept;
-  void meet(std::int32_t column) noexcept;  // change-points between the column's surfaces
-  void settle() noexcept;                   // one decision per pair of planes, then all columns follow it
+  // Change-points between the column's surfaces. by_planes: where planes meet near them, that is believed unmeasured.
+  void meet(std::int32_t column, bool by_planes) noexcept;
+  void settle() noexcept;  // one decision per pair of planes, then all columns follow it ...
+  void follow() noexcept;  // ... and again when the planes have changed
   void begin_refit() noexcept;
   // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments.
   void refit(std::int32_t first_column) noexcept;
 
+  // How large the noise is against its model, from the rows of the last refit's surfaces; 0 when there are too few.
+  [[nodiscard]] double noise_scale() const noexcept;
+
+  // visit(other plane, columns in which the two meet), of the last meeting.
+  template <typename Visit>
+  void for_each_meeting(std::uint8_t plane, const Visit& visit) const noexcept {
+    for (std::size_t i = 0; i < pair_count_; ++i) {
+      const Pair& pair = pairs_[i];
+      if (pair.upper == plane) visit(pair.lower, pair.columns);
+      if (pair.lower == plane) visit(pair.upper, pair.columns);
+    }
+  }
   [[nodiscard]] Columns& columns() noexcept { return columns_; }
   [[nodiscard]] const Columns& columns() const noexcept { return columns_; }
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
@@ -71,17 +88,17 @@ class SurfaceBoundaries {
   static constexpr std::size_t kMaxJoints = 4096;
   static constexpr std::size_t kMaxPairs = 192;
   static constexpr std::int32_t kBins = 64;  // of half a pixel, -16 .. 16
-  static constexpr float kBinsPerPixel = 2.0F;
+  static constexpr std::int32_t kBinsPerPixel = 2;
   struct Joint {
     std::uint16_t pair = 0;
     std::int16_t column = 0;
     std::uint8_t upper = 0;  // interval
-    float row = 0.0F;        // where the planes meet
   };
   struct Pair {
     std::uint8_t upper = 0;
     std::uint8_t lower = 0;
     double columns = 0.0;
+    double shift_px = 0.0;            // of the boundary from where the planes meet
     std::array<float, kBins> gain{};  // sum of cost(upper) - cost(lower), by distance from where the planes meet
   };
   // A plane in one column: inverse depth a + b y, and its tolerance per sigma.
@@ -93,9 +110,9 @@ class SurfaceBoundaries {
   // Residual over sigma, squared.
   [[nodiscard]] float cost(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
   void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
-  // The best of the candidates in rows first .. last; false when none fits.
+  // The best of the candidates, each within its own rows, in rows first .. last; false when none fits.
   [[nodiscard]] bool try_claim(std::int32_t column, std::int32_t first, std::int32_t last,
-                               const StaticVector<std::uint8_t, kMaxPlanes>& candidates,
+                               const StaticVector<ColumnSpan, kMaxPlanes>& candidates,
                                ColumnSpan& claimed) const noexcept;
   // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
   struct Strip {
@@ -106,6 +123,11 @@ class SurfaceBoundaries {
   void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
                                           std::int32_t last, float meeting_row, Pair* pair) const noexcept;
+  // The row, real, where the lines meet; not finite for parallel ones.
+  [[nodiscard]] double meeting_row(const Line& upper, const Line& lower) const noexcept {
+    return static_cast<double>(lower.a - upper.a) / static_cast<double>(upper.b - lower.b) * fy_px_ + cy_px_;
+  }
+  void sample_noise(std::int32_t column) noexcept;
   [[nodiscard]] std::uint16_t pair_of(std::uint8_t upper, std::uint8_t lower) noexcept;
 
   Params params_;
@@ -121,6 +143,8 @@ class SurfaceBoundaries {
   std::size_t joint_count_ = 0;
   std::array<Pair, kMaxPairs> pairs_{};
   std::size_t pair_count_ = 0;
+  static constexpr std::int32_t kCostBins = 128;  // of 0.25: up to 5.7 sigmas
+  std::array<std::int32_t, kCostBins + 1> costs_{};
   std::uint32_t overflow_ = 0;
 };
 

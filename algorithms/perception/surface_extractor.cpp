@@ -38,8 +38,9 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
     return false;
   }
   const double up_norm = view.camera_up.norm();
-  if (!usable(view.intrinsics) || !(std::abs(up_norm - 1.0) < 0.01) || !(view.body_margin_m >= 0.0) ||
-      !(view.body_margin_m < 0.5) || !finite(view.body[0]) || !finite(view.body[1])) {
+  if (!usable(view.intrinsics) || !(std::abs(up_norm - 1.0) < 0.01) || !(view.body_margin.fixed_m >= 0.0) ||
+      !(view.body_margin.fixed_m < 0.5) || !(view.body_margin.turn_rad >= 0.0) || !(view.body_margin.turn_rad < 0.5) ||
+      !finite(view.body[0]) || !finite(view.body[1])) {
     ++counters_.bad_view;
     return false;
   }
@@ -64,11 +65,11 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
   polygons_.configure(params_.polygons);
   picture_.rays.set(view.intrinsics);
   raw_.depth = &full_;
-  raw_.flags = &picture_.flags;
   raw_.intrinsics = view.intrinsics;
   raw_.range.set(params_.limits, view.intrinsics.depth_unit_m);
   picture_.column_rays.set(view.intrinsics);
-  runs_.begin(params_.runs, params_.noise, view.intrinsics, picture_.columns);
+  noise_ = params_.noise.scaled(noise_scale_);
+  runs_.begin(params_.runs, noise_, view.intrinsics, picture_.columns);
   self_filter_.clear();
   next_.stamp_ns = frame.stamp_ns;
   next_.sequence = frame.sequence;
@@ -106,7 +107,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     case Phase::kIdle:
       return 1;
     case Phase::kMask:
-      self_filter_.add_shape(picture_.rays, view_.body, view_.body_margin_m, index_);
+      self_filter_.add_shape(picture_.rays, view_.body, view_.body_margin, index_);
       if (++index_ == SelfFilter::kShapes) enter(Phase::kReduce);
       return 20;
     case Phase::kReduce:
@@ -118,7 +119,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
           ++counters_.blank_frames;
           enter(Phase::kFinish);
         } else {
-          growing_.begin(params_.growing, params_.noise, picture_.column_rays, runs_.columns());
+          growing_.begin(params_.growing, noise_, picture_.column_rays, runs_.columns());
           enter(Phase::kGrow);
         }
         return kMaxPieceUnits;
@@ -133,6 +134,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       return 1;
     case Phase::kGather:
       boundaries_.gather(row_, runs_.columns()[static_cast<std::size_t>(row_)], to_plane_);
+      if (round_ == 1) boundaries_.trim(row_);
       if (++row_ == picture_.column_rays.columns) enter(round_ == 0 ? Phase::kMeet : Phase::kClaim);
       return 1;
     case Phase::kClaim: {  // from left to right and back
@@ -143,7 +145,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     }
     case Phase::kMeet:
       if (row_ == 0) boundaries_.begin_meeting();
-      boundaries_.meet(row_);
+      boundaries_.meet(row_, round_ == 0);
       if (++row_ == picture_.column_rays.columns) {
         boundaries_.settle();
         enter(Phase::kRefit);
@@ -157,6 +159,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       if (row_ >= picture_.column_rays.columns) {
         solve_planes();
         if (round_ == 0) merge_planes();
+        if (round_ == 1) boundaries_.follow();
         enter(round_ == 0 ? Phase::kSearch : Phase::kPieces);
         ++round_;
         return kMaxPieceUnits;
@@ -176,9 +179,9 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       counters_.run_overflow += boundaries_.overflow();
       pieces_.find(boundaries_.columns(), picture_.column_rays.columns);
       counters_.run_overflow += pieces_.overflow();
-      counters_.plane_overflow += pieces_.join(params_.pieces, picture_, planes_);
+      counters_.plane_overflow += pieces_.join(params_.pieces, boundaries_, picture_, planes_);
       profiles_.begin(planes_.count, picture_);
-      side_finder_.begin(params_.sides, params_.noise, raw_, picture_, planes_);
+      side_finder_.begin(params_.sides, noise_, raw_, picture_, planes_);
       enter(Phase::kProfile);
       return kMaxPieceUnits;
     case Phase::kProfile:
@@ -228,8 +231,8 @@ void SurfaceExtractor::reduce_row() noexcept {
 }
 
 void SurfaceExtractor::take_grown_planes() noexcept {
-  boundaries_.begin(params_.boundaries, params_.noise, picture_.column_rays, view_.intrinsics.fy_px,
-                    view_.intrinsics.cy_px, picture_.columns);
+  boundaries_.begin(params_.boundaries, noise_, picture_.column_rays, view_.intrinsics.fy_px, view_.intrinsics.cy_px,
+                    picture_.columns);
   counters_.plane_overflow += growing_.overflow();
   to_plane_.fill(0);
   planes_.count = std::min(growing_.count(), FramePlanes::kMaxPlanes);
@@ -303,7 +306,7 @@ void SurfaceExtractor::solve_planes() noexcept {
     p.moments = fitted.moments;
     p.residual2 = fitted.residual2;
     if (p.moments.count < kLeast_px ||
-        !try_solve_leaning(params_.planes, params_.noise, p.moments, view_.camera_up, p.plane, &p.covariance)) {
+        !try_solve_leaning(params_.planes, noise_, p.moments, view_.camera_up, p.plane, &p.covariance)) {
       p.alive = false;
       for (std::uint8_t& plane : to_plane_) plane = plane == i ? std::uint8_t{0} : plane;
       continue;
@@ -344,28 +347,23 @@ void SurfaceExtractor::outline() noexcept {
 
 // Gathers where the surface ends in each column and what lies beyond; false when there is too little to look for.
 bool SurfaceExtractor::begin_line(bool nosing) noexcept {
-  constexpr std::int32_t kProbe_px = 4;
-  const auto end_of = [&](std::int32_t half_column) -> std::int32_t {
-    const ColumnEnds& ends = profiles_[index_].columns[static_cast<std::size_t>(half_column / 2)];
-    return ends.empty() ? -1 : (nosing ? ends.bottom : ends.top) / 2;
-  };
-  const std::int32_t down = nosing ? 1 : -1;
+  constexpr std::int32_t kProbe_px = 8;
+  // Per column: the plane beyond, 0 where there is none, or the body or the picture's end hides it.
+  std::array<std::uint8_t, kColumns> beyond{};
   std::array<std::int32_t, FramePlanes::kMaxPlanes + 1> votes{};
-  const auto beyond = [&](std::int32_t column, std::int32_t row) -> std::int32_t {
-    // -1: hidden by the body or the picture's end; else the plane beyond, 0 = none.
-    std::int32_t found = 0;
-    for (std::int32_t k = 1; k <= kProbe_px; ++k) {
-      const std::int32_t r = row + down * k;
-      if (r < 0 || r >= picture_.rays.height_px || (picture_.flags(column, r) & kPixelBody) != 0) return -1;
-      if (found == 0) found = picture_.plane_at(column, r);
-    }
-    return found;
+  const std::int32_t down = nosing ? 1 : -1;
+  const auto end_of = [&](std::int32_t g) -> std::int32_t {
+    const ColumnEnds& ends = profiles_[index_].columns[static_cast<std::size_t>(g)];
+    return nosing ? ends.bottom : ends.top;
   };
-  for (std::int32_t i = 0; i < 2 * picture_.column_rays.columns; ++i) {
-    const std::int32_t row = end_of(i);
-    if (row < 0) continue;
-    const std::int32_t p = beyond(i, row);
-    if (p > 0) ++votes[static_cast<std::size_t>(p)];
+  for (std::int32_t g = 0; g < picture_.column_rays.columns; ++g) {
+    const std::int32_t end = end_of(g), far = end + down * kProbe_px;
+    if (end < 0 || far < 0 || far >= picture_.column_rays.height_px ||
+        (picture_.flags(2 * g, far / 2) & kPixelBody) != 0)
+      continue;
+    std::uint8_t& found = beyond[static_cast<std::size_t>(g)];
+    for (std::int32_t r = end + down; found == 0 && r != far + down; r += down) found = picture_.owner(g, r);
+    ++votes[found];
   }
   // The plane beyond: most columns, and on the right side of the surface (a nosing has it below, a back line above).
   // Above, a riser is the back; without one, a higher tread whose nosing hides the rest of this surface.
@@ -385,16 +383,16 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   const std::size_t other = riser != 0 ? riser : most(false);
   if (other == 0) return false;
   line_finder_.begin_guess();
-  for (std::int32_t i = 0; i < 2 * picture_.column_rays.columns; ++i) {
-    const std::int32_t row = end_of(i);
-    if (row >= 0 && beyond(i, row) == static_cast<std::int32_t>(other)) line_finder_.add_guess(i, row);
+  for (std::int32_t g = 0; g < picture_.column_rays.columns; ++g) {
+    if (beyond[static_cast<std::size_t>(g)] == other) line_finder_.add_guess(g, end_of(g));
   }
   if (!line_finder_.try_guess(params_.edge_lines, static_cast<std::uint32_t>(index_))) {
     ++counters_.rejected_lines;
     return false;
   }
   const EdgeLineFinder::Beyond far_side{planes_[other].plane, planes_[other].covariance};
-  line_finder_.begin(params_.edge_lines, params_.noise, raw_, own.plane, &far_side, nosing);
+  line_finder_.begin(params_.edge_lines, noise_, view_.intrinsics, picture_.column_rays, picture_.columns, own.plane,
+                     &far_side, nosing);
   if (!nosing && riser == 0) {
     lines_.occluder = line_finder_.guessed_line();
     return false;
@@ -443,6 +441,10 @@ void SurfaceExtractor::build_polygon() noexcept {
 }
 
 void SurfaceExtractor::finish() noexcept {
+  if (const double seen = boundaries_.noise_scale(); measured_px_ > 0 && seen > 0.0) {
+    noise_scale_ = math::clamp(noise_scale_ * (1.0 + params_.noise_gain * (seen - 1.0)), params_.min_noise_scale,
+                               params_.max_noise_scale);
+  }
   next_.invalid_fraction = outside_body_px_ > 0 ? 1.0 - static_cast<double>(measured_px_) / outside_body_px_ : 1.0;
   result_ = next_;
 }

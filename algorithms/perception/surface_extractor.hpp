@@ -34,6 +34,10 @@ class SurfaceExtractor {
  public:
   struct Params {
     DepthSigma noise;
+    // The noise as measured, against that model: followed slowly, within bounds.
+    double noise_gain = 0.1;  // per frame
+    double min_noise_scale = 1.0;
+    double max_noise_scale = 4.0;
     DepthLimits limits;
     RunSegmentation::Params runs;
     PlaneGrowing::Params growing;
@@ -54,7 +58,7 @@ class SurfaceExtractor {
     CameraIntrinsics intrinsics;
     Vec3 camera_up{0.0, -1.0, 0.0};            // unit, opposite to gravity
     std::array<LegShapes, kFootCount> body{};  // shapes of radius or size 0 are absent
-    double body_margin_m = 0.025;
+    BodyMargin body_margin{0.025, 0.0};
   };
   struct Counters {
     std::uint32_t frames = 0;          // accepted
@@ -88,6 +92,7 @@ class SurfaceExtractor {
   // Of the last finished frame.
   [[nodiscard]] const SurfaceFrame& result() const noexcept { return result_; }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+  [[nodiscard]] double noise_scale() const noexcept { return noise_scale_; }        // for the next frame
   [[nodiscard]] std::int32_t units_spent() const noexcept { return units_spent_; }  // on the last frame
 
   // What a pixel was taken for: 1 + index in result().surfaces, 0 = none. For pictures and tests; valid until the next
@@ -139,6 +144,8 @@ class SurfaceExtractor {
   void finish() noexcept;
 
   Params params_;
+  DepthSigma noise_;  // of this frame
+  double noise_scale_ = 1.0;
   View view_;
   Counters counters_;
   SurfaceFrame result_;

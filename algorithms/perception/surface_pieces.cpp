@@ -4,6 +4,21 @@
 #include <algorithm>
 
 namespace polygmap {
+namespace {
+
+// A tread that meets a riser, or a riser that meets a tread.
+bool on_a_step(const SurfaceBoundaries& boundaries, const FramePlanes& planes, const FramePlane& plane) noexcept {
+  constexpr double kLeastColumns = 4.0;
+  bool found = false;
+  if (plane.kind == SurfaceKind::kOther) return false;
+  const SurfaceKind wanted = plane.kind == SurfaceKind::kTread ? SurfaceKind::kRiser : SurfaceKind::kTread;
+  boundaries.for_each_meeting(plane.source, [&](std::uint8_t other, double columns) {
+    found = found || (columns >= kLeastColumns && planes[other].kind == wanted && planes[other].alive);
+  });
+  return found;
+}
+
+}  // namespace
 
 // Intervals of one plane that share rows in neighbouring columns hang together. Pieces come out by area.
 void SurfacePieces::find(SurfaceBoundaries::Columns& columns, std::int32_t column_count) noexcept {
@@ -74,7 +89,8 @@ bool SurfacePieces::apart(double apart_m, const FramePicture& picture, const Pie
 }
 
 // The largest piece of a plane keeps it. A piece apart from that becomes a surface of its own in the same plane.
-std::uint32_t SurfacePieces::join(const Params& params, const FramePicture& picture, FramePlanes& planes) noexcept {
+std::uint32_t SurfacePieces::join(const Params& params, const SurfaceBoundaries& boundaries,
+                                  const FramePicture& picture, FramePlanes& planes) noexcept {
   std::uint32_t without_room = 0;
   const std::size_t fitted = planes.count;
   for (std::size_t p = 1; p <= fitted; ++p) {
@@ -120,7 +136,8 @@ std::uint32_t SurfacePieces::join(const Params& params, const FramePicture& pict
     plane.piece_px += piece.area_px;
   }
   for (std::size_t p = 1; p <= planes.count; ++p) {
-    const std::int32_t least_px = planes[p].kind == SurfaceKind::kOther ? params.min_other_px : params.min_surface_px;
+    const std::int32_t least_px =
+        on_a_step(boundaries, planes, planes[p]) ? params.min_surface_px : params.min_other_px;
     planes[p].alive = planes[p].alive && planes[p].piece_px >= least_px;
   }
   return without_room;

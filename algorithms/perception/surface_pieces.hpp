@@ -15,14 +15,15 @@ class SurfacePieces {
   struct Params {
     double apart_m = 0.04;                // seen this far from a plane: something else is there
     std::int32_t min_component_px = 160;  // of a piece of a surface
-    std::int32_t min_surface_px = 440;    // of a surface
-    std::int32_t min_other_px = 1000;     // of one that is neither level nor upright: curved things have such facets
+    std::int32_t min_surface_px = 440;    // of a tread that meets a riser, or the reverse
+    std::int32_t min_other_px = 1500;     // of any other surface: curved things have facets of this size
   };
 
   // Numbers the pieces that the planes' spans form, and writes each span's number into it: 0 for those without room.
   void find(SurfaceBoundaries::Columns& columns, std::int32_t column_count) noexcept;
   // Gives every piece a plane, and planes without enough of them up. Returns how many surfaces found no room.
-  std::uint32_t join(const Params& params, const FramePicture& picture, FramePlanes& planes) noexcept;
+  std::uint32_t join(const Params& params, const SurfaceBoundaries& boundaries, const FramePicture& picture,
+                     FramePlanes& planes) noexcept;
   // Of a piece, after join: 0 = none.
   [[nodiscard]] std::uint8_t plane_of(std::uint16_t piece) const noexcept { return pieces_[piece].plane; }
   // Pieces that found no room.

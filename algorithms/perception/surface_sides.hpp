@@ -6,7 +6,6 @@
 #include <cstdint>
 
 #include "algorithms/perception/column_outline.hpp"
-#include "algorithms/perception/edge_lines.hpp"
 #include "algorithms/perception/frame_planes.hpp"
 
 namespace polygmap {

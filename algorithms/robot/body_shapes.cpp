@@ -30,4 +30,23 @@ double signed_distance_m(const OrientedBox& box, const Vec3& point_m) noexcept {
   return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
 }
 
+bool hides(const LegShapes& leg, double margin_m, const Vec3& point_m) noexcept {
+  constexpr int kMaxSteps = 64;
+  constexpr double kStep_m = 0.02;
+  const double range_m = point_m.norm();
+  const Vec3 direction = point_m / std::max(range_m, 1e-6);
+  double along_m = 0.0;
+  for (int i = 0; i < kMaxSteps && along_m < range_m; ++i) {
+    const Vec3 p = along_m * direction;
+    double clear_m = range_m;
+    for (const Capsule* capsule : {&leg.thigh, &leg.shank}) {
+      if (capsule->radius_m > 0.0) clear_m = std::min(clear_m, signed_distance_m(*capsule, p));
+    }
+    if (leg.foot.half_m.minCoeff() > 0.0) clear_m = std::min(clear_m, signed_distance_m(leg.foot, p));
+    if (clear_m < margin_m) return true;
+    along_m += std::max(clear_m - margin_m, kStep_m);
+  }
+  return false;
+}
+
 }  // namespace polygmap

@@ -35,4 +35,7 @@ inline constexpr double kShankRadius_m = 0.055;
 [[nodiscard]] double signed_distance_m(const Capsule& capsule, const Vec3& point_m) noexcept;
 [[nodiscard]] double signed_distance_m(const OrientedBox& box, const Vec3& point_m) noexcept;
 
+// Whether a leg, grown by a margin, is between the origin and a point. Shapes of radius or size 0 are absent.
+[[nodiscard]] bool hides(const LegShapes& leg, double margin_m, const Vec3& point_m) noexcept;
+
 }  // namespace polygmap

@@ -30,6 +30,8 @@ struct ClimbArguments {
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
   bool no_self_filter = false;
+  bool no_mount_estimate = false;
+  std::string camera;
 };
 
 // CLI11 2.1 lets -1 and 2^64 wrap around.
@@ -58,6 +60,20 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
   climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
 
+  climb.add_option("--camera", a.camera, "The robot's camera; the module is told its noise and range")
+      ->type_name("CAMERA.toml");
+  climb.add_option("--scan-ms", a.options.scan_ms, "Time from a picture's first row to its last, ms, in steps of 4")
+      ->capture_default_str();
+  climb
+      .add_option("--mount-error", a.options.mount_error_deg,
+                  "How far the camera's mount may be off, unknown to the module: degrees about each axis, and 3 mm for "
+                  "each degree")
+      ->capture_default_str();
+  climb
+      .add_option("--scale-error", a.options.scale_error,
+                  "How far the depths' scale may be off, unknown to the module: share of the depth")
+      ->capture_default_str();
+
   // What the camera shows may differ from what the robot stands on: shows that the module lives on what it sees.
   const std::string causality = "causality (experiments on what the module sees)";
   climb.add_option("--render-shift", a.render_shift_m, "Shift of the rendered staircase, m")
@@ -68,6 +84,8 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->type_name("K")
       ->group(causality);
   climb.add_flag("--blank-depth", a.options.blank_depth, "The camera delivers no depth")->group(causality);
+  climb.add_flag("--no-mount-estimate", a.no_mount_estimate, "The module believes the mount's data sheet")
+      ->group(causality);
   climb.add_flag("--no-self-filter", a.no_self_filter, "The module does not mask its own legs")->group(causality);
   for (CLI::Option* option : climb.get_options()) option->check(not_empty);
 }
@@ -110,6 +128,26 @@ std::string complaint(ClimbArguments& a) {
   }
   a.options.noise = a.noise == "white" ? DepthNoise::kWhite : DepthNoise::kCorrelated;
 
+  struct Error {
+    const char* name;
+    double value, most;
+    const char* unit;
+  };
+  for (const Error& error : {Error{"--scan-ms", a.options.scan_ms, 32.0, " ms"},
+                             Error{"--mount-error", a.options.mount_error_deg, 5.0, " degrees"},
+                             Error{"--scale-error", a.options.scale_error, 0.05, ""}}) {
+    if (!(error.value >= 0.0 && error.value <= error.most)) {
+      return std::string(error.name) + " must be from 0 to " + number(error.most) + error.unit + ", not " +
+             number(error.value) + ".";
+    }
+  }
+  if (!a.camera.empty()) {
+    try {
+      a.options.camera = read_camera(a.camera);
+    } catch (const FileError& error) {
+      return error.what();
+    }
+  }
   if (a.missing_step) {
     if (*a.missing_step < 1 || *a.missing_step > stairs.steps) {
       return "--render-missing-step must be a step from 1 to " + std::to_string(stairs.steps) + ", not " +
@@ -129,6 +167,7 @@ std::string complaint(ClimbArguments& a) {
     a.options.render_dz_m = a.render_shift_m[2];
   }
   a.options.self_filter = !a.no_self_filter;
+  a.options.estimate_mount = !a.no_mount_estimate;
   a.options.time_limit_s = std::max(a.options.time_limit_s, kTimeLimit_s + kTimeLimitPerStep_s * stairs.steps);
   return {};
 }

@@ -36,9 +36,10 @@ CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
   CLI::App* perceive = app.add_subcommand("perceive", "Find the planes in depth pictures (PNG, 16 bits)");
   perceive->add_option("depth", a.depth, "Depth pictures")->required()->type_name("DEPTH.png");
   perceive
-      ->add_option("--camera", a.camera,
-                   "width, height, fx, fy, cx, cy (px), depth_unit_m; optional: noise_base_m, noise_per_metre, "
-                   "min_depth_m, max_depth_m")
+      ->add_option(
+          "--camera", a.camera,
+          "width, height, fx, fy, cx, cy (px), depth_unit_m; optional: min_depth_m, max_depth_m, noise_base_m, "
+          "noise_per_metre, noise_quadratic_per_m, noise_correlated_share, noise_correlated_px")
       ->required()
       ->type_name("CAMERA.toml");
   perceive
@@ -71,15 +72,15 @@ int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& er
       std::error_code error;
       std::filesystem::create_directories(folder, error);
       if (!std::filesystem::is_directory(folder, error))
-        throw PerceiveError("Cannot create the folder \"" + folder + "\".");
+        throw FileError("Cannot create the folder \"" + folder + "\".");
     }
     for (const std::string& path : a.depth) {
       const DepthPng picture = read_depth(path);
       if (picture.width_px != camera.intrinsics.width_px || picture.height_px != camera.intrinsics.height_px) {
-        throw PerceiveError("\"" + path + "\" is " + std::to_string(picture.width_px) + "x" +
-                            std::to_string(picture.height_px) + ", but the camera file says " +
-                            std::to_string(camera.intrinsics.width_px) + "x" +
-                            std::to_string(camera.intrinsics.height_px) + ".");
+        throw FileError("\"" + path + "\" is " + std::to_string(picture.width_px) + "x" +
+                        std::to_string(picture.height_px) + ", but the camera file says " +
+                        std::to_string(camera.intrinsics.width_px) + "x" + std::to_string(camera.intrinsics.height_px) +
+                        ".");
       }
       Perceived perceived = perceive(camera, picture, gravity, a.repeat);
       if (!a.labels.empty()) write_labels(place(a.labels, path, several, ".labels.png"), picture, perceived);

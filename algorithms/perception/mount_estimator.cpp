@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/mount_estimator.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+namespace {
+
+constexpr double kLongestStep_s = 0.1;  // between two frames, for the fading
+
+bool is_unit(const Vec3& v) noexcept { return std::abs(v.squaredNorm() - 1.0) < 1e-3; }  // false for NaN
+
+}  // namespace
+
+MountEstimator::MountEstimator(const Params& params, const Transform& nominal_base_T_camera) noexcept
+    : params_(params), nominal_(nominal_base_T_camera), base_T_camera_(nominal_base_T_camera) {}
+
+double MountEstimator::tilt_sigma_rad() const noexcept {
+  return 1.0 / math::sqrt(tilt_.information + 1.0 / math::square(params_.prior_tilt_sigma_rad));
+}
+
+bool MountEstimator::usable(const SurfacePatch& patch) const noexcept {
+  return is_unit(patch.normal) && std::isfinite(patch.d_m) && math::all_finite(patch.centroid_m) &&
+         patch.tilt_sigma_rad >= 0.0;
+}
+
+void MountEstimator::update(const SurfaceFrame& frame, const Stance& stance) noexcept {
+  bool good = is_unit(stance.base_up) && frame.stamp_ns > last_ns_;
+  for (const Transform& sole : stance.base_T_sole)
+    good = good && math::all_finite(sole.R) && math::all_finite(sole.p_m);
+  if (!good) {
+    ++counters_.rejected_frames;
+    return;
+  }
+  const double fade =
+      last_ns_ == 0 ? 1.0 : math::exp(-std::min(seconds(frame.stamp_ns - last_ns_), kLongestStep_s) / params_.window_s);
+  last_ns_ = frame.stamp_ns;
+
+  // Level is what the standing soles lie on: treads are parallel to it, and a foot is put down by the same kinematics.
+  // Gravity as the estimator has it errs by twice as much, and alike in everything but the camera.
+  Vec3 level = Vec3::Zero();
+  std::array<bool, kFootCount> flat{};
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    const Vec3 up = stance.base_T_sole[foot].R.col(2);
+    flat[foot] = stance.stands[foot] && up.dot(stance.base_up) > math::cos(params_.max_sole_tilt_rad);
+    if (flat[foot]) level += up;
+  }
+  level = level.squaredNorm() > 0.5 ? Vec3{level.normalized()} : stance.base_up;
+
+  Vec2 sum = Vec2::Zero();
+  double weights = 0.0;
+  const auto near_level = [&](const SurfacePatch& patch) {
+    return (base_T_camera_.R * patch.normal).dot(level) > math::cos(params_.tilt_gate_rad);
+  };
+  for (const SurfacePatch& patch : frame.surfaces) {
+    if (patch.kind != SurfaceKind::kTread || patch.tilt_sigma_rad > params_.max_tilt_sigma_rad) continue;
+    if (!usable(patch) || !near_level(patch)) {
+      ++counters_.rejected_surfaces;
+      continue;
+    }
+    const double weight = 1.0 / (math::square(patch.tilt_sigma_rad) + math::square(params_.systematic_tilt_rad));
+    sum += weight * (nominal_.R * patch.normal).cross(level).head<2>();
+    weights += weight;
+  }
+  if (!(weights > 0.0)) return;
+  ++counters_.frames;
+  const auto fuse = [fade](auto& mean, const auto& value, double sigma, double prior_sigma) {
+    const double information = 1.0 / math::square(sigma);
+    mean.information = fade * mean.information + information;
+    mean.weighted = fade * mean.weighted + information * value;
+    return 1.0 / (mean.information + 1.0 / math::square(prior_sigma));
+  };
+  const double tilt_variance =
+      fuse(tilt_, Vec2{sum / weights}, params_.frame_tilt_sigma_rad, params_.prior_tilt_sigma_rad);
+  for (int i = 0; i < 2; ++i) {
+    tilt_rad_[i] = math::clamp(tilt_variance * tilt_.weighted[i], -params_.max_tilt_rad, params_.max_tilt_rad);
+  }
+  base_T_camera_.R = rotation_y(tilt_rad_.y()) * rotation_x(tilt_rad_.x()) * nominal_.R;
+
+  // How far each standing sole lies above the largest surface that can be what it stands on.
+  double above_m = 0.0;
+  int soles = 0;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    if (!flat[foot]) continue;
+    const Vec3 camera_p_sole = base_T_camera_.R.transpose() * (stance.base_T_sole[foot].p_m - nominal_.p_m);
+    double largest_m2 = 0.0, best_m = 0.0;
+    for (const SurfacePatch& patch : frame.surfaces) {
+      if (patch.kind != SurfaceKind::kTread || patch.tilt_sigma_rad > params_.max_tilt_sigma_rad || !usable(patch) ||
+          !near_level(patch) || !(patch.area_m2 > largest_m2)) {
+        continue;
+      }
+      const double height_m = patch.normal.dot(camera_p_sole) + patch.d_m;
+      if (std::abs(height_m - height_m_) > params_.height_gate_m) continue;
+      largest_m2 = patch.area_m2;
+      best_m = height_m;
+    }
+    if (!(largest_m2 > 0.0)) continue;
+    above_m += best_m;
+    ++soles;
+  }
+  if (soles > 0) {
+    ++counters_.heights;
+    const double variance = fuse(height_, above_m / soles, params_.frame_height_sigma_m, params_.prior_height_sigma_m);
+    height_m_ = math::clamp(variance * height_.weighted, -params_.max_height_m, params_.max_height_m);
+  }
+  base_T_camera_.p_m = nominal_.p_m + height_m_ * level;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the camera really sits on the base: roll, pitch and height, found slowly from the ground that the robot stands
+// on. A mount is known to a degree at best, and a degree is 13 mm at the camera's height. Yaw and the place along the
+// ground cannot be told from level surfaces and stay as the data sheet says.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/samples.hpp"
+#include "algorithms/core/surfaces.hpp"
+#include "algorithms/core/transform.hpp"
+
+namespace polygmap {
+
+class MountEstimator {
+ public:
+  struct Params {
+    double prior_tilt_sigma_rad = 0.0175;  // of the data sheet's roll and pitch
+    double prior_height_sigma_m = 0.005;
+    // Of one frame. Far more than the pixels' noise: frames err alike, and one frame must not decide.
+    double frame_tilt_sigma_rad = 0.03;
+    double frame_height_sigma_m = 0.010;
+    double window_s = 6.0;                    // information fades to 1/e; time without level surfaces does not count
+    double max_tilt_rad = 2.0 * kPi / 180.0;  // bounds of the estimate
+    double max_height_m = 0.008;
+    double tilt_gate_rad = 3.0 * kPi / 180.0;      // from level, as the mount is believed: more is a ramp
+    double height_gate_m = 0.020;                  // below half of the least step
+    double max_tilt_sigma_rad = 0.006;             // of a surface: vaguer ones say what gravity told the fit before
+    double systematic_tilt_rad = 0.003;            // of a surface, added to its sigma
+    double max_sole_tilt_rad = 3.0 * kPi / 180.0;  // from gravity: more, and the foot does not stand flat
+  };
+  // The robot at the exposure, base frame.
+  struct Stance {
+    Vec3 base_up = Vec3::UnitZ();  // by gravity, unit
+    std::array<Transform, kFootCount> base_T_sole;
+    std::array<bool, kFootCount> stands{};
+  };
+  struct Counters {
+    std::uint32_t frames = 0;             // that said something about the tilt
+    std::uint32_t heights = 0;            // ... about the height
+    std::uint32_t rejected_frames = 0;    // stance not finite, or not newer than the last frame
+    std::uint32_t rejected_surfaces = 0;  // level ones: not finite, or beyond the gate
+  };
+
+  MountEstimator() noexcept : MountEstimator(Params{}, Transform{}) {}
+  MountEstimator(const Params& params, const Transform& nominal_base_T_camera) noexcept;
+
+  // One finished frame, seen through the mount as believed when it was begun.
+  void update(const SurfaceFrame& frame, const Stance& stance) noexcept;
+
+  [[nodiscard]] const Transform& base_T_camera() const noexcept { return base_T_camera_; }
+  // What was added to the data sheet's mount.
+  [[nodiscard]] double roll_rad() const noexcept { return tilt_rad_.x(); }
+  [[nodiscard]] double pitch_rad() const noexcept { return tilt_rad_.y(); }
+  [[nodiscard]] double height_m() const noexcept { return height_m_; }
+  // One sigma of roll and pitch.
+  [[nodiscard]] double tilt_sigma_rad() const noexcept;
+  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+
+ private:
+  // A mean whose information fades, drawn towards zero by the prior.
+  template <typename T>
+  struct FadingMean {
+    double information = 0.0;
+    T weighted;
+  };
+  [[nodiscard]] bool usable(const SurfacePatch& patch) const noexcept;
+
+  Params params_;
+  Transform nominal_;
+  Transform base_T_camera_;
+  Vec2 tilt_rad_ = Vec2::Zero();
+  double height_m_ = 0.0;
+  FadingMean<Vec2> tilt_{0.0, Vec2::Zero()};
+  FadingMean<double> height_{0.0, 0.0};
+  std::int64_t last_ns_ = 0;
+  Counters counters_;
+};
+
+}  // namespace polygmap

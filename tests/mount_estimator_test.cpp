@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/mount_estimator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "algorithms/robot/model.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr double kDegree = kPi / 180.0;
+constexpr std::int64_t kFrame_ns = 33 * kNsPerMs;
+
+// A robot on level ground whose camera is mounted otherwise than its data sheet says.
+class Robot {
+ public:
+  Robot(double roll_rad, double pitch_rad, const Vec3& shift_m) {
+    const Transform nominal = base_T_camera();
+    true_mount_ = {rotation_y(pitch_rad) * rotation_x(roll_rad) * nominal.R, nominal.p_m + shift_m};
+    for (const double side : {1.0, -1.0}) {
+      stance_.base_T_sole[side > 0 ? 0 : 1].p_m = {0.0, side * kStanceHalfWidth_m, -kNominalBaseHeight_m};
+    }
+    stance_.stands = {true, true};
+  }
+  // A surface at a height above the soles that rises by tilt_rad ahead.
+  void see(double height_m, double tilt_rad = 0.0, double noise_rad = 0.0) {
+    const Transform camera_T_base = true_mount_.inverse();
+    std::normal_distribution<> noise(0.0, noise_rad);
+    SurfacePatch patch;
+    patch.kind = SurfaceKind::kTread;
+    const Vec3 normal = rotation_y(-tilt_rad + noise(random_)) * rotation_x(noise(random_)) * Vec3::UnitZ();
+    patch.normal = camera_T_base.R * normal;
+    patch.centroid_m = camera_T_base * Vec3{0.6, 0.0, height_m - kNominalBaseHeight_m};
+    patch.d_m = -patch.normal.dot(patch.centroid_m);
+    patch.tilt_sigma_rad = 0.002;
+    patch.area_m2 = 0.3;
+    ASSERT_TRUE(frame_.surfaces.try_push_back(patch));
+  }
+  SurfacePatch& last() { return frame_.surfaces.back(); }
+  MountEstimator::Stance& stance() { return stance_; }
+  void deliver(MountEstimator& mount) {
+    frame_.stamp_ns += kFrame_ns;
+    mount.update(frame_, stance_);
+    frame_.surfaces.clear();
+  }
+
+ private:
+  Transform true_mount_;
+  MountEstimator::Stance stance_;
+  SurfaceFrame frame_;
+  std::mt19937 random_{1};
+};
+
+MountEstimator estimator() { return {MountEstimator::Params{}, base_T_camera()}; }
+
+TEST(MountEstimator, TiltedAndRaisedMount_FoundWithinATenthOfADegreeAndAMillimetre) {
+  for (const double sign : {1.0, -1.0}) {
+    MountEstimator mount = estimator();
+    Robot robot(sign * 0.7 * kDegree, sign * -0.9 * kDegree, {0.0, 0.0, sign * 0.003});
+    for (int i = 0; i < 300; ++i) {
+      robot.see(0.0, 0.0, 0.003);
+      robot.see(0.15, 0.0, 0.003);
+      robot.deliver(mount);
+    }
+    EXPECT_NEAR(mount.roll_rad(), sign * 0.7 * kDegree, 0.1 * kDegree);
+    EXPECT_NEAR(mount.pitch_rad(), sign * -0.9 * kDegree, 0.1 * kDegree);
+    EXPECT_NEAR(mount.height_m(), sign * 0.003, 0.001);
+    // A point of the ground, seen through the mount that was found.
+    const Transform nominal = base_T_camera();
+    const Transform truth{rotation_y(sign * -0.9 * kDegree) * rotation_x(sign * 0.7 * kDegree) * nominal.R,
+                          nominal.p_m + Vec3{0, 0, sign * 0.003}};
+    const Vec3 base_p{0.5, 0.1, -0.79};
+    EXPECT_LT((mount.base_T_camera() * (truth.inverse() * base_p) - base_p).norm(), 0.002);
+    EXPECT_LT(mount.tilt_sigma_rad(), 0.2 * kDegree);
+  }
+}
+
+TEST(MountEstimator, OneSecond_FindsMost_OneFrame_Little) {
+  MountEstimator mount = estimator();
+  Robot robot(0.0, 1.0 * kDegree, Vec3::Zero());
+  robot.see(0.0);
+  robot.deliver(mount);
+  EXPECT_LT(mount.pitch_rad(), 0.35 * kDegree);
+  for (int i = 0; i < 30; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  EXPECT_GT(mount.pitch_rad(), 0.85 * kDegree);
+}
+
+TEST(MountEstimator, OneBadFrame_MovesItByLittle) {
+  MountEstimator mount = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero());
+  for (int i = 0; i < 150; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  robot.see(0.015, 2.5 * kDegree);
+  robot.deliver(mount);
+  EXPECT_LT(std::abs(mount.pitch_rad()), 0.03 * kDegree);
+  EXPECT_LT(std::abs(mount.height_m()), 2e-4);
+}
+
+TEST(MountEstimator, RampAhead_IsNoLevelSurface_AndAFlatOnePullsNoFartherThanTheBounds) {
+  MountEstimator steep = estimator(), flat = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero()), other(0.0, 0.0, Vec3::Zero());
+  for (int i = 0; i < 3000; ++i) {
+    robot.see(0.0, 6.0 * kDegree);
+    robot.deliver(steep);
+    other.see(0.0, 2.9 * kDegree);
+    other.deliver(flat);
+  }
+  EXPECT_EQ(steep.pitch_rad(), 0.0);
+  EXPECT_EQ(steep.counters().rejected_surfaces, 3000U);
+  EXPECT_LE(std::abs(flat.pitch_rad()), 2.0 * kDegree);
+  EXPECT_LE(std::abs(flat.height_m()), 0.008);
+}
+
+TEST(MountEstimator, GravityOffByHalfADegree_SolesSayWhatIsLevel) {
+  MountEstimator mount = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero());
+  robot.stance().base_up = rotation_y(0.5 * kDegree) * Vec3::UnitZ();
+  for (int i = 0; i < 300; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  EXPECT_LT(std::abs(mount.pitch_rad()), 0.01 * kDegree);
+  // No foot flat on the ground: gravity says.
+  robot.stance().stands = {false, false};
+  for (int i = 0; i < 3000; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  EXPECT_NEAR(mount.pitch_rad(), 0.5 * kDegree, 0.02 * kDegree);
+}
+
+TEST(MountEstimator, NoStandingSole_LeavesTheHeight_NextStepIsNotTheSolesOwn) {
+  MountEstimator mount = estimator();
+  Robot robot(0.0, 0.0, {0.0, 0.0, 0.003});
+  for (int i = 0; i < 60; ++i) {
+    robot.see(0.04);  // a step of 40 mm
+    robot.deliver(mount);
+  }
+  robot.stance().stands = {false, false};
+  for (int i = 0; i < 60; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  EXPECT_EQ(mount.height_m(), 0.0);
+  EXPECT_EQ(mount.counters().heights, 0U);
+}
+
+TEST(MountEstimator, NumbersThatAreNone_AreCountedAndChangeNothing) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  MountEstimator mount = estimator();
+  Robot robot(0.0, 1.0 * kDegree, Vec3::Zero());
+  robot.see(0.0);
+  robot.last().normal.x() = kNan;
+  robot.see(0.0);
+  robot.last().d_m = kNan;
+  robot.deliver(mount);
+  EXPECT_EQ(mount.counters().rejected_surfaces, 2U);
+  robot.see(0.0);
+  robot.stance().base_up.z() = kNan;
+  robot.deliver(mount);
+  robot.stance().base_up = Vec3::UnitZ();
+  robot.stance().base_T_sole[1].p_m.x() = kNan;
+  robot.see(0.0);
+  robot.deliver(mount);
+  EXPECT_EQ(mount.counters().rejected_frames, 2U);
+  EXPECT_EQ(mount.pitch_rad(), 0.0);
+  EXPECT_EQ((mount.base_T_camera().R - base_T_camera().R).norm(), 0.0);
+}
+
+}  // namespace
+}  // namespace polygmap

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// The extractor measures how noisy its pictures are against the camera's profile.
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "algorithms/perception/surface_extractor.hpp"
+#include "algorithms/robot/model.hpp"
+#include "tests/support/depth_scene.hpp"
+
+namespace polygmap {
+namespace {
+
+struct Seen {
+  double scale = 0.0;
+  int treads = 0, surfaces = 0;
+};
+
+// After some frames of one picture, with noise of so many times the profile's.
+Seen look(double strength, double gain, int frames) {
+  test::DepthScene scene;
+  scene.intrinsics = robot_camera_intrinsics();
+  scene.place_camera(0.77, 1.047, 0.0, 0.01);
+  scene.add_stairs({});
+  test::DepthPicture picture = test::render(scene);
+  test::add_noise(picture, {.correlated = true, .strength = strength}, 4);
+  const std::vector<std::uint16_t> raw = picture.raw();
+  SurfaceExtractor::Params params;
+  params.noise_gain = gain;
+  const auto extractor = std::make_unique<SurfaceExtractor>(params);
+  SurfaceExtractor::View view;
+  view.intrinsics = scene.intrinsics;
+  view.camera_up = scene.camera_up();
+  for (int i = 0; i < frames; ++i) {
+    EXPECT_TRUE(extractor->try_begin({i + 1, 1, 640, 480, raw.data()}, view));
+    WorkBudget budget(1'000'000);
+    EXPECT_EQ(extractor->step(budget), Progress::kDone);
+  }
+  Seen seen{extractor->noise_scale()};
+  for (const SurfacePatch& s : extractor->result().surfaces) {
+    ++seen.surfaces;
+    seen.treads += s.kind == SurfaceKind::kTread ? 1 : 0;
+  }
+  return seen;
+}
+
+TEST(NoiseScale, NoiseAsTheProfileSays_StaysNearOne) {
+  const Seen seen = look(1.0, 0.1, 30);
+  EXPECT_GE(seen.scale, 1.0);
+  EXPECT_LT(seen.scale, 1.6);
+}
+
+TEST(NoiseScale, NoiseOfTwoAndAHalfTimesTheProfile_IsFoundSlowlyAndPlanesStayWhole) {
+  const Seen once = look(2.5, 0.1, 1), blind = look(2.5, 0.0, 40), settled = look(2.5, 0.1, 40);
+  EXPECT_LT(once.scale, 1.4);
+  EXPECT_EQ(blind.scale, 1.0);
+  EXPECT_GT(settled.scale, 2.0);
+  EXPECT_LT(settled.scale, 4.0);
+  EXPECT_LT(settled.surfaces, blind.surfaces);
+  EXPECT_GE(settled.treads, 3);  // with the floor
+}
+
+TEST(NoiseScale, NoiseBeyondAllBounds_IsHeldThere) { EXPECT_LE(look(12.0, 1.0, 20).scale, 4.0); }
+
+}  // namespace
+}  // namespace polygmap
