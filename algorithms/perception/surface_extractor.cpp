@@ -176,12 +176,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       }
       return 1;
     case Phase::kPieces:
-      counters_.run_overflow += boundaries_.overflow();
-      pieces_.find(boundaries_.columns(), picture_.column_rays.columns);
-      counters_.run_overflow += pieces_.overflow();
-      counters_.plane_overflow += pieces_.join(params_.pieces, boundaries_, picture_, planes_);
-      profiles_.begin(planes_.count, picture_);
-      side_finder_.begin(params_.sides, noise_, raw_, picture_, planes_);
+      find_pieces();
       enter(Phase::kProfile);
       return kMaxPieceUnits;
     case Phase::kProfile:
@@ -321,6 +316,15 @@ void SurfaceExtractor::solve_planes() noexcept {
 std::size_t SurfaceExtractor::surface_at(std::int32_t column, std::int32_t row) const noexcept {
   return column / kColumn_px < picture_.column_rays.columns ? planes_[picture_.owner(column / kColumn_px, row)].surface
                                                             : 0U;
+}
+
+void SurfaceExtractor::find_pieces() noexcept {
+  counters_.run_overflow += boundaries_.overflow();
+  pieces_.find(boundaries_.columns(), picture_.column_rays.columns);
+  counters_.run_overflow += pieces_.overflow();
+  counters_.plane_overflow += pieces_.join(params_.pieces, boundaries_, picture_, planes_);
+  profiles_.begin(planes_.count, picture_);
+  side_finder_.begin(params_.sides, noise_, raw_, picture_, planes_);
 }
 
 // One side of one surface at a time.

@@ -136,6 +136,7 @@ class SurfaceExtractor {
   void take_found_planes() noexcept;
   void merge_planes() noexcept;
   void solve_planes() noexcept;
+  void find_pieces() noexcept;
   std::int32_t side_step() noexcept;
   void outline() noexcept;
   [[nodiscard]] bool begin_line(bool nosing) noexcept;
