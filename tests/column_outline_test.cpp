@@ -9,15 +9,21 @@ namespace {
 SurfaceProfile rectangle(std::int32_t first, std::int32_t last, std::int16_t top, std::int16_t bottom) {
   SurfaceProfile profile;
   for (std::int32_t g = first; g <= last; ++g) profile.columns[static_cast<std::size_t>(g)].add(top, bottom);
-  profile.left = 2 * first;
-  profile.right = 2 * last + 1;
   return profile;
+}
+
+// As far as columns first .. last reach.
+OutlineSides upright_sides(std::int32_t first, std::int32_t last) {
+  OutlineSides sides;
+  sides.left.column_px = 2.0 * first - 0.5;
+  sides.right.column_px = 2.0 * last + 1.5;
+  return sides;
 }
 
 TEST(ColumnOutline, Rectangle_HasFourCornersInTheOrderOfThePicture) {
   ColumnOutline builder;
   Outline2 outline;
-  builder.build(rectangle(10, 20, 100, 199), 20, outline);
+  builder.build(rectangle(10, 20, 100, 199), upright_sides(10, 20), 20, outline);
   ASSERT_EQ(outline.size(), 4U);
   EXPECT_NEAR(twice_area(outline), 2.0 * 22.0 * 50.0, 1e-9);  // y down: right-hand turns count as positive
   for (const Vec2& p : outline) {
@@ -31,14 +37,45 @@ TEST(ColumnOutline, OneColumnThatRunsOver_DoesNotCarryTheHullAlong) {
   profile.columns[25].add(60, 230);
   ColumnOutline builder;
   Outline2 outline;
-  builder.build(profile, 20, outline);
+  builder.build(profile, upright_sides(10, 40), 20, outline);
   for (const Vec2& p : outline) EXPECT_TRUE(p.y() > 49.0 && p.y() < 100.0);
+}
+
+TEST(ColumnOutline, FittedSides_CutWhatReachesBeyondAndCloseWhatFallsShort) {
+  // A trapezoid whose columns were a little too many on the left and too few on the right.
+  OutlineSides sides;
+  sides.left = {25.0, 0.1, 49.5, 99.5, true};
+  sides.right = {90.0, -0.05, 49.5, 99.5, true};
+  ColumnOutline builder;
+  Outline2 outline;
+  builder.build(rectangle(12, 41, 100, 199), sides, 20, outline);
+  ASSERT_EQ(outline.size(), 4U);
+  for (const Vec2& p : outline) {
+    EXPECT_LT(std::min(std::abs(p.x() - sides.left.at(p.y())), std::abs(p.x() - sides.right.at(p.y()))), 1e-9);
+    EXPECT_TRUE(std::abs(p.y() - 49.5) < 1e-9 || std::abs(p.y() - 99.5) < 1e-9);
+  }
+}
+
+TEST(ColumnOutline, SideSeenInItsLowerHalfOnly_IsNotExtendedUpwards) {
+  SurfaceProfile profile = rectangle(10, 40, 100, 199);
+  for (std::int32_t g = 10; g < 20; ++g) profile.columns[static_cast<std::size_t>(g)].top = 150;
+  OutlineSides sides = upright_sides(10, 40);
+  sides.left = {19.0, 0.0, 74.5, 99.5, true};
+  ColumnOutline builder;
+  Outline2 outline;
+  builder.build(profile, sides, 20, outline);
+  double top = 1e9;
+  for (const Vec2& p : outline) {
+    EXPECT_GE(p.x(), 19.0 - 1e-9);
+    if (p.x() < 30.0) top = std::min(top, p.y());
+  }
+  EXPECT_GT(top, 60.0);
 }
 
 TEST(ColumnOutline, NoColumn_NoOutline) {
   ColumnOutline builder;
   Outline2 outline;
-  builder.build(SurfaceProfile{}, 20, outline);
+  builder.build(SurfaceProfile{}, {}, 20, outline);
   EXPECT_TRUE(outline.empty());
 }
 
@@ -49,11 +86,9 @@ TEST(ColumnOutline, RoundSurface_KeepsToItsVerticesAndInside) {
     profile.columns[static_cast<std::size_t>(g)].add(static_cast<std::int16_t>(240.0 - half),
                                                      static_cast<std::int16_t>(240.0 + half));
   }
-  profile.left = 0;
-  profile.right = 199;
   ColumnOutline builder;
   Outline2 outline;
-  builder.build(profile, 12, outline);
+  builder.build(profile, upright_sides(0, 99), 12, outline);
   EXPECT_LE(outline.size(), 12U);
   EXPECT_GT(0.5 * twice_area(outline), 0.85 * kPi * 100.0 * 50.0);
   EXPECT_LT(0.5 * twice_area(outline), 1.05 * kPi * 100.0 * 50.0);

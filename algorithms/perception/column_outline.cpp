@@ -6,26 +6,33 @@
 namespace polygmap {
 namespace {
 
-// A hull follows its outermost points, and with them the noise: the median of five columns first.
-ColumnEnds smoothed(const SurfaceProfile& profile, std::int32_t g) noexcept {
-  constexpr std::int32_t kReach = 2;
-  std::array<std::int16_t, 2 * kReach + 1> tops{}, bottoms{};
-  std::ptrdiff_t n = 0;
-  for (std::int32_t i = std::max(g - kReach, 0); i <= std::min(g + kReach, kColumns - 1); ++i) {
-    const ColumnEnds& ends = profile.columns[static_cast<std::size_t>(i)];
-    if (ends.empty()) continue;
-    tops[static_cast<std::size_t>(n)] = ends.top;
-    bottoms[static_cast<std::size_t>(n++)] = ends.bottom;
+std::int16_t median(std::int16_t a, std::int16_t b, std::int16_t c, std::int16_t d, std::int16_t e) noexcept {
+  const auto low = [](std::int16_t x, std::int16_t y) { return x < y ? x : y; };
+  const auto high = [](std::int16_t x, std::int16_t y) { return x < y ? y : x; };
+  // Neither the least nor the largest of four is the median of five; of the other two and the fifth it is the middle.
+  const std::int16_t f = high(low(a, b), low(c, d));
+  const std::int16_t g = low(high(a, b), high(c, d));
+  return high(low(f, g), low(high(f, g), e));
+}
+
+// A hull follows its outermost points, and with them the noise: the median of five columns, where there are five.
+void smooth(const SurfaceProfile& profile, std::int32_t first, std::int32_t last,
+            std::array<ColumnEnds, kColumns>& smoothed) noexcept {
+  for (std::int32_t g = first; g <= last; ++g) {
+    const ColumnEnds* ends = &profile.columns[static_cast<std::size_t>(g)];
+    ColumnEnds& out = smoothed[static_cast<std::size_t>(g)];
+    out = *ends;
+    if (g < first + 2 || g > last - 2) continue;
+    if ((ends[-2].top | ends[-1].top | ends[0].top | ends[1].top | ends[2].top) < 0) continue;
+    out.top = median(ends[-2].top, ends[-1].top, ends[0].top, ends[1].top, ends[2].top);
+    out.bottom = median(ends[-2].bottom, ends[-1].bottom, ends[0].bottom, ends[1].bottom, ends[2].bottom);
   }
-  if (n < 2 * kReach + 1) return profile.columns[static_cast<std::size_t>(g)];
-  std::nth_element(tops.begin(), tops.begin() + kReach, tops.end());
-  std::nth_element(bottoms.begin(), bottoms.begin() + kReach, bottoms.end());
-  return {tops[kReach], bottoms[kReach]};
 }
 
 }  // namespace
 
-void ColumnOutline::build(const SurfaceProfile& profile, std::size_t max_vertices, Outline2& outline) noexcept {
+void ColumnOutline::build(const SurfaceProfile& profile, const OutlineSides& sides, std::size_t max_vertices,
+                          Outline2& outline) noexcept {
   outline.clear();
   std::int32_t first = 0, last = kColumns - 1;
   const auto ends = [&profile](std::int32_t g) { return profile.columns[static_cast<std::size_t>(g)]; };
@@ -33,8 +40,7 @@ void ColumnOutline::build(const SurfaceProfile& profile, std::size_t max_vertice
   while (last >= first && ends(last).empty()) --last;
   if (first > last) return;
   std::size_t count = 0;
-  const auto push = [&](double x, double y, std::size_t base) {
-    const Vec2 p{x, y};
+  const auto push = [&](const Vec2& p, std::size_t base) {
     const auto turn = [&] {
       const Vec2 &a = chain_[count - 2], &b = chain_[count - 1];
       return (b.x() - a.x()) * (p.y() - a.y()) - (b.y() - a.y()) * (p.x() - a.x());
@@ -42,23 +48,49 @@ void ColumnOutline::build(const SurfaceProfile& profile, std::size_t max_vertice
     while (count >= base + 2 && turn() <= 0.0) --count;
     chain_[count++] = p;
   };
-  // A column's ends are those at its middle; only the outermost ones reach to the sides. Full-resolution row r covers
-  // half-resolution (r - 1) / 2 to r / 2.
+  smooth(profile, first, last, smooth_);
+  // A column's ends are those at its middle; only the sides reach farther. Full-resolution row r covers half-resolution
+  // (r - 1) / 2 to r / 2.
   const auto middle = [](std::int32_t g) { return 2.0 * g + 0.5; };
-  const auto upper = [&](std::int32_t g) { return 0.5 * (smoothed(profile, g).top - 1); };
-  const auto lower = [&](std::int32_t g) { return 0.5 * smoothed(profile, g).bottom; };
-  const double left = profile.left - 0.5, right = profile.right + 0.5;
-  push(left, upper(first), 0);
-  for (std::int32_t g = first; g <= last; ++g) {
-    if (!ends(g).empty() && middle(g) > left && middle(g) < right) push(middle(g), upper(g), 0);
+  const auto upper = [&](std::int32_t g) { return 0.5 * (smooth_[static_cast<std::size_t>(g)].top - 1); };
+  const auto lower = [&](std::int32_t g) { return 0.5 * smooth_[static_cast<std::size_t>(g)].bottom; };
+  const auto inside = [&](std::int32_t g, double row) {
+    return !ends(g).empty() && middle(g) > sides.left.at(row) && middle(g) < sides.right.at(row);
+  };
+  struct Chain {  // columns between the sides, in one of the two directions
+    std::int32_t first = -1, last = -1;
+  };
+  const auto between = [&](const auto& row_of) {
+    Chain chain{first, last};
+    while (chain.first <= last && !inside(chain.first, row_of(chain.first))) ++chain.first;
+    while (chain.last >= first && !inside(chain.last, row_of(chain.last))) --chain.last;
+    return chain;
+  };
+  const Chain top = between(upper), bottom = between(lower);
+  if (top.first > top.last || bottom.first > bottom.last) return;
+  // A side ends where it was last seen, or at the corner with the columns next to it if that is near.
+  constexpr double kCorner_px = 4.0;
+  const auto corner = [](const OutlineSide& side, double seen, double column_end) {
+    const double row = !side.fitted || std::abs(seen - column_end) < kCorner_px ? column_end : seen;
+    return Vec2{side.at(row), row};
+  };
+  const Vec2 top_left = corner(sides.left, sides.left.top_px, upper(top.first));
+  const Vec2 top_right = corner(sides.right, sides.right.top_px, upper(top.last));
+  const Vec2 bottom_left = corner(sides.left, sides.left.bottom_px, lower(bottom.first));
+  const Vec2 bottom_right = corner(sides.right, sides.right.bottom_px, lower(bottom.last));
+  push(top_left, 0);
+  for (std::int32_t g = top.first; g <= top.last; ++g) {
+    if (!inside(g, upper(g)) || middle(g) <= top_left.x() || middle(g) >= top_right.x()) continue;
+    push({middle(g), upper(g)}, 0);
   }
-  push(right, upper(last), 0);
+  push(top_right, 0);
   const std::size_t base = count - 1;
-  push(right, lower(last), base);
-  for (std::int32_t g = last; g >= first; --g) {
-    if (!ends(g).empty() && middle(g) > left && middle(g) < right) push(middle(g), lower(g), base);
+  push(bottom_right, base);
+  for (std::int32_t g = bottom.last; g >= bottom.first; --g) {
+    if (!inside(g, lower(g)) || middle(g) <= bottom_left.x() || middle(g) >= bottom_right.x()) continue;
+    push({middle(g), lower(g)}, base);
   }
-  push(left, lower(first), base);
+  push(bottom_left, base);
   // Too many corners for an outline: every second one goes first, which only shrinks it.
   while (count > kMaxOutline) {
     std::size_t kept = 0;

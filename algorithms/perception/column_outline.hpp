@@ -21,20 +21,43 @@ struct ColumnEnds {
 };
 
 struct SurfaceProfile {
+  static constexpr std::uint8_t kNoColumn = 255;
+  SurfaceProfile() noexcept {
+    left.fill(kNoColumn);
+    right.fill(kNoColumn);
+  }
   std::array<ColumnEnds, kColumns> columns{};
-  // Half-resolution columns of the surface's sides, finer than the columns above.
-  std::int32_t left = kHalfWidth_px;
-  std::int32_t right = -1;
+  std::array<std::uint8_t, kDepthHeight_px> left{};  // first and last column of each row
+  std::array<std::uint8_t, kDepthHeight_px> right{};
+  std::int16_t first_row = kDepthHeight_px;
+  std::int16_t last_row = -1;
+};
+
+// The line that ends a surface at its left or right: column = column_px + slope * row, half-resolution pixels. Not
+// fitted: upright, as far as the surface's columns reach.
+struct OutlineSide {
+  double column_px = 0.0;
+  double slope = 0.0;
+  double top_px = 0.0;  // rows between which it was seen
+  double bottom_px = 0.0;
+  bool fitted = false;
+  [[nodiscard]] double at(double row) const noexcept { return column_px + slope * row; }
+};
+struct OutlineSides {
+  OutlineSide left;
+  OutlineSide right;
 };
 
 class ColumnOutline {
  public:
   // Corner points in half-resolution pixel coordinates (x right, y down), right-hand turns in the picture (clockwise as
   // seen), at most max_vertices: the corners that cost least area go first.
-  void build(const SurfaceProfile& profile, std::size_t max_vertices, Outline2& outline) noexcept;
+  void build(const SurfaceProfile& profile, const OutlineSides& sides, std::size_t max_vertices,
+             Outline2& outline) noexcept;
 
  private:
   std::array<Vec2, 2 * (kColumns + 2)> chain_{};
+  std::array<ColumnEnds, kColumns> smooth_{};
 };
 
 }  // namespace polygmap

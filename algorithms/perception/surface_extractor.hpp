@@ -15,6 +15,7 @@
 #include "algorithms/perception/column_outline.hpp"
 #include "algorithms/perception/depth_range.hpp"
 #include "algorithms/perception/edge_lines.hpp"
+#include "algorithms/perception/frame_planes.hpp"
 #include "algorithms/perception/images.hpp"
 #include "algorithms/perception/plane_fit.hpp"
 #include "algorithms/perception/plane_growing.hpp"
@@ -22,10 +23,12 @@
 #include "algorithms/perception/run_segmentation.hpp"
 #include "algorithms/perception/self_filter.hpp"
 #include "algorithms/perception/surface_boundaries.hpp"
+#include "algorithms/perception/surface_pieces.hpp"
+#include "algorithms/perception/surface_polygons.hpp"
+#include "algorithms/perception/surface_profiles.hpp"
+#include "algorithms/perception/surface_sides.hpp"
 
 namespace polygmap {
-
-using FullDepthImage = Raster<std::uint16_t, kDepthWidth_px, kDepthHeight_px>;
 
 class SurfaceExtractor {
  public:
@@ -45,13 +48,10 @@ class SurfaceExtractor {
     double kind_tilt_rad = 0.21;  // a fitted plane within this of level is a tread, of upright a riser
     double merge_m = 0.012;       // pieces whose planes are this close at each other's centre are one surface
     double merge_tilt_rad = 0.12;
-    double small_plane_px = 4000.0;       // smaller planes' tilt is known half as well
-    double apart_m = 0.04;                // seen this far from a plane: something else is there
-    std::int32_t min_component_px = 160;  // of a piece of a surface
-    std::int32_t min_surface_px = 440;    // of a tread that meets a riser, or the reverse
-    std::int32_t min_other_px = 1500;     // of any other surface: curved things have facets of this size
-    double snap_m = 0.015;                // polygon corners this close to a nosing or back line go onto it
-    double probe_px = 3.0;                // half-resolution pixels outside a polygon's edge where its end is judged
+    double small_plane_px = 4000.0;  // smaller planes' tilt is known half as well
+    SurfacePieces::Params pieces;
+    SurfaceSides::Params sides;
+    SurfacePolygons::Params polygons;
   };
   // What the module knows about this frame, in the camera frame at the exposure.
   struct View {
@@ -99,7 +99,7 @@ class SurfaceExtractor {
   // try_begin.
   [[nodiscard]] std::size_t surface_at(std::int32_t column, std::int32_t row) const noexcept;
   [[nodiscard]] bool body_at(std::int32_t column, std::int32_t row) const noexcept {
-    return (flags_(column, row) & kPixelBody) != 0;
+    return (picture_.flags(column, row) & kPixelBody) != 0;
   }
 
   // What the next step begins with; a benchmark charges time to it.
@@ -115,6 +115,7 @@ class SurfaceExtractor {
     kSearch,
     kPieces,
     kProfile,
+    kSides,
     kOutline,
     kNosing,
     kBack,
@@ -124,29 +125,7 @@ class SurfaceExtractor {
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
 
  private:
-  static constexpr std::size_t kMaxPlanes = SurfaceBoundaries::kMaxPlanes;
-  static constexpr std::size_t kMaxPieces = 255;
   static constexpr std::int32_t kColumnsPerPiece = 48;
-
-  struct Plane {
-    InversePlane plane;
-    SurfaceKind kind = SurfaceKind::kOther;
-    Vec3 centre_m = Vec3::Zero();
-    Mat3 covariance = Mat3::Zero();
-    PlaneMoments moments;
-    double residual2 = 0.0;  // sum of squared normal distances of the fitted pixels
-    double pixels = 0.0;
-    bool alive = false;
-    std::uint8_t surface = 0;  // 1 + index in the result
-    std::uint8_t source = 0;   // the plane whose pixels these are
-    std::uint16_t main_piece = 0;
-    double piece_px = 0.0;
-  };
-  struct Piece {             // a connected piece of a plane's pixels
-    std::uint8_t plane = 0;  // 1-based; 0: dropped
-    double area_px = 0.0;
-    double sum_column = 0.0, sum_row = 0.0;  // half resolution
-  };
 
   void enter(Phase phase) noexcept;
   std::int32_t run_piece() noexcept;  // does one piece, returns its units
@@ -158,26 +137,12 @@ class SurfaceExtractor {
   void merge_planes() noexcept;
   void solve_planes() noexcept;
   void find_pieces() noexcept;
-  void join_pieces() noexcept;
-  [[nodiscard]] bool on_a_step(const Plane& plane) const noexcept;
-  [[nodiscard]] bool apart(const Piece& a, const Piece& b, const InversePlane& plane) const noexcept;
-  [[nodiscard]] bool continues(std::int32_t column, const ColumnSpan& span) const noexcept;
-  [[nodiscard]] bool shows(std::int32_t half_column, const ColumnSpan& span) const noexcept;
-  void begin_profile() noexcept;
-  void profile(std::int32_t column) noexcept;
+  std::int32_t side_step() noexcept;
   void outline() noexcept;
   [[nodiscard]] bool begin_line(bool nosing) noexcept;
   std::int32_t line_step(bool nosing) noexcept;
-  // Share of the polygon's pixels without data.
-  [[nodiscard]] double invalid_share(const PolygonVertices& polygon) const noexcept;
-  [[nodiscard]] std::size_t tread_beside(bool below) const noexcept;
   void build_polygon() noexcept;
-  [[nodiscard]] EdgeKind judge_edge(const InversePlane& plane, const Vec3& a_m, const Vec3& b_m,
-                                    const Vec3& inside_m) const noexcept;
   void finish() noexcept;
-  // Of a half-resolution pixel.
-  [[nodiscard]] std::uint8_t plane_at(std::int32_t column, std::int32_t row) const noexcept;
-  [[nodiscard]] float inverse_depth_at(std::int32_t column, std::int32_t row) const noexcept;
 
   Params params_;
   DepthSigma noise_;  // of this frame
@@ -200,33 +165,26 @@ class SurfaceExtractor {
   std::int32_t outside_body_px_ = 0;
 
   FullDepthImage full_;
-  HalfRays rays_;
   SelfFilter self_filter_;
-  RawRange range_;
-  HalfImage<std::uint8_t> flags_;
-  ColumnRays column_rays_;
-  ColumnImage columns_;
+  RawPicture raw_;
+  FramePicture picture_;
   RunSegmentation runs_;
   PlaneGrowing growing_;
   SurfaceBoundaries boundaries_;
   RemainderSearch search_;
-  std::size_t first_found_ = 1;                            // planes first_found_ .. plane_count_ came from the search
-  std::array<std::uint8_t, kMaxPlanes + 1> to_plane_{};    // from a grown plane
-  Raster<std::uint8_t, kColumns, kDepthHeight_px> owner_;  // plane of each column's row, 0 = none
+  std::size_t first_found_ = 1;  // planes first_found_ .. planes_.count came from the search
+  std::array<std::uint8_t, FramePlanes::kMaxPlanes + 1> to_plane_{};  // from a grown plane
 
-  std::array<Plane, kMaxPlanes + 1> planes_;  // 1-based
-  std::size_t plane_count_ = 0;
-  std::array<Piece, kMaxPieces + 1> pieces_{};
-  std::size_t piece_count_ = 0;
-  // Union-find over all intervals.
-  std::array<std::uint16_t, static_cast<std::size_t>(kColumns) * SurfaceBoundaries::kMaxIntervals + 1> parent_{};
-  std::array<SurfaceProfile, kMaxPlanes + 1> profiles_{};
+  FramePlanes planes_;
+  SurfacePieces pieces_;
+  SurfaceProfiles profiles_;
+  SurfaceSides side_finder_;
+  OutlineSides sides_;
   ColumnOutline column_outline_;
   Outline2 outline_;
   EdgeLineFinder line_finder_;
-  EdgeLine nosing_;
-  EdgeLine back_;
-  EdgeLine occluder_;  // where a nearer surface hides the rest: cuts the polygon, but is no end of it
+  SurfaceLines lines_;
+  SurfacePolygons polygons_;
 };
 
 }  // namespace polygmap

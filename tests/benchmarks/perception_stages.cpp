@@ -97,6 +97,7 @@ ExtractorStage extractor_stage(SurfaceExtractor::Phase phase) noexcept {
     case Phase::kPieces:
     case Phase::kProfile:
       return kPieces;
+    case Phase::kSides:
     case Phase::kOutline:
     case Phase::kNosing:
     case Phase::kBack:

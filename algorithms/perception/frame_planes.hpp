@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is known of one frame: its picture as the stages see it, and the planes in it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/surfaces.hpp"
+#include "algorithms/perception/column_image.hpp"
+#include "algorithms/perception/depth_range.hpp"
+#include "algorithms/perception/images.hpp"
+#include "algorithms/perception/plane_fit.hpp"
+#include "algorithms/perception/surface_boundaries.hpp"
+
+namespace polygmap {
+
+using FullDepthImage = Raster<std::uint16_t, kDepthWidth_px, kDepthHeight_px>;
+
+// The picture as the camera delivered it.
+struct RawPicture {
+  const FullDepthImage* depth = nullptr;
+  CameraIntrinsics intrinsics;
+  RawRange range;
+};
+
+struct FramePlane {
+  InversePlane plane;
+  SurfaceKind kind = SurfaceKind::kOther;
+  Vec3 centre_m = Vec3::Zero();
+  Mat3 covariance = Mat3::Zero();
+  PlaneMoments moments;
+  double residual2 = 0.0;  // sum of squared normal distances of the fitted pixels
+  double pixels = 0.0;
+  bool alive = false;
+  std::uint8_t surface = 0;  // 1 + index in the result
+  std::uint8_t source = 0;   // the plane whose pixels these are
+  std::uint16_t main_piece = 0;
+  double piece_px = 0.0;
+};
+
+struct FramePlanes {  // 1-based
+  static constexpr std::size_t kMaxPlanes = SurfaceBoundaries::kMaxPlanes;
+  std::array<FramePlane, kMaxPlanes + 1> planes;
+  std::size_t count = 0;
+
+  [[nodiscard]] FramePlane& operator[](std::size_t i) noexcept { return planes[i]; }
+  [[nodiscard]] const FramePlane& operator[](std::size_t i) const noexcept { return planes[i]; }
+};
+
+struct FramePicture {
+  HalfRays rays;
+  HalfImage<std::uint8_t> flags;
+  ColumnRays column_rays;
+  ColumnImage columns;
+  Raster<std::uint8_t, kDepthHeight_px, kColumns> owners;  // a column a line: the plane of each of its rows, 0 = none
+
+  [[nodiscard]] std::uint8_t owner(std::int32_t column, std::int32_t row) const noexcept { return owners(row, column); }
+  // Of a half-resolution pixel.
+  [[nodiscard]] std::uint8_t plane_at(std::int32_t column, std::int32_t row) const noexcept {
+    return column / 2 < column_rays.columns ? owner(column / 2, 2 * row) : std::uint8_t{0};
+  }
+  [[nodiscard]] float inverse_depth_at(std::int32_t column, std::int32_t row) const noexcept {
+    if (column < 0 || row < 0 || column / 2 >= column_rays.columns || row >= rays.height_px) return 0.0F;
+    const float upper = columns.inverse_depth(column / 2, 2 * row);
+    return upper > 0.0F ? upper : columns.inverse_depth(column / 2, 2 * row + 1);
+  }
+};
+
+}  // namespace polygmap

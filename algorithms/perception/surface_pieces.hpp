@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// The connected pieces of every plane's pixels, and which of them are one surface.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/perception/frame_planes.hpp"
+#include "algorithms/perception/surface_boundaries.hpp"
+
+namespace polygmap {
+
+class SurfacePieces {
+ public:
+  struct Params {
+    double apart_m = 0.04;                // seen this far from a plane: something else is there
+    std::int32_t min_component_px = 160;  // of a piece of a surface
+    std::int32_t min_surface_px = 440;    // of a tread that meets a riser, or the reverse
+    std::int32_t min_other_px = 1500;     // of any other surface: curved things have facets of this size
+  };
+
+  // Numbers the pieces that the planes' spans form, and writes each span's number into it: 0 for those without room.
+  void find(SurfaceBoundaries::Columns& columns, std::int32_t column_count) noexcept;
+  // Gives every piece a plane, and planes without enough of them up. Returns how many surfaces found no room.
+  std::uint32_t join(const Params& params, const SurfaceBoundaries& boundaries, const FramePicture& picture,
+                     FramePlanes& planes) noexcept;
+  // Of a piece, after join: 0 = none.
+  [[nodiscard]] std::uint8_t plane_of(std::uint16_t piece) const noexcept { return pieces_[piece].plane; }
+  // Pieces that found no room.
+  [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
+
+ private:
+  static constexpr std::size_t kMaxPieces = 255;
+  struct Piece {             // a connected piece of a plane's pixels
+    std::uint8_t plane = 0;  // 1-based; 0: dropped
+    double area_px = 0.0;
+    double sum_column = 0.0, sum_row = 0.0;  // half resolution
+  };
+  [[nodiscard]] static bool apart(double apart_m, const FramePicture& picture, const Piece& a, const Piece& b,
+                                  const InversePlane& plane) noexcept;
+
+  std::array<Piece, kMaxPieces + 1> pieces_{};
+  std::size_t piece_count_ = 0;
+  // Union-find over all intervals.
+  std::array<std::uint16_t, static_cast<std::size_t>(kColumns) * SurfaceBoundaries::kMaxIntervals + 1> parent_{};
+  std::uint32_t overflow_ = 0;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/surface_polygons.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <utility>
+
+#include "algorithms/perception/vectors.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr double kLeastSlope = 0.5;  // sine between a riser and the tread that ends it
+constexpr double kOnLine_m = 0.002;  // a polygon's edge lies on a line
+
+// Adds a row's columns first .. last that are not the robot's own, and the valid pixels in them.
+void count_pixels(const std::uint8_t* flags, const std::uint8_t* valid, std::int32_t first, std::int32_t last,
+                  std::int32_t& free_columns, std::int32_t& valid_px) noexcept {
+  using Bytes = cv::v_uint8;
+  static_assert(kColumns % Bytes::nlanes == 0);
+  static constexpr std::array<std::uint8_t, kColumns> kIndices = [] {
+    std::array<std::uint8_t, kColumns> indices{};
+    for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<std::uint8_t>(i);
+    return indices;
+  }();
+  const Bytes from = cv::vx_setall_u8(static_cast<std::uint8_t>(first)),
+              to = cv::vx_setall_u8(static_cast<std::uint8_t>(last)), is_body = cv::vx_setall_u8(kPixelBody),
+              none = cv::vx_setzero_u8();
+  // No lane gets more than 4 * kColumns / nlanes.
+  Bytes free_sum = none, valid_sum = none;
+  for (std::int32_t g = first / Bytes::nlanes * Bytes::nlanes; g <= last; g += Bytes::nlanes) {
+    const Bytes index = cv::vx_load(kIndices.data() + g);
+    const Bytes wanted = (cv::v_max(index, from) == index) & (cv::v_min(index, to) == index);
+    Bytes left_half, right_half;
+    cv::v_load_deinterleave(flags + 2 * static_cast<std::ptrdiff_t>(g), left_half, right_half);
+    const Bytes seen = (((left_half | right_half) & is_body) == none) & wanted;
+    free_sum = cv::v_sub_wrap(free_sum, seen);
+    valid_sum = cv::v_add_wrap(valid_sum, cv::vx_load(valid + g) & seen);
+  }
+  free_columns += static_cast<std::int32_t>(cv::v_reduce_sum(free_sum));
+  valid_px += static_cast<std::int32_t>(cv::v_reduce_sum(valid_sum));
+}
+
+// Share of the polygon's pixels without data, over its rows and columns in the picture.
+double invalid_share(const FramePicture& picture, const PolygonVertices& polygon) noexcept {
+  const HalfRays& rays = picture.rays;
+  // From which column to which the convex polygon reaches in every row: two of its edges cross it.
+  struct Reach {
+    double left = 1e9, right = -1e9;
+  };
+  std::array<Reach, kHalfHeight_px> reach;
+  std::int32_t first_row = rays.height_px, last_row = -1;
+  const auto column_of = [&](const Vec3& p) { return p.x() / p.z() * rays.fx_px + rays.cx_px; };
+  const auto row_of = [&](const Vec3& p) { return p.y() / p.z() * rays.fy_px + rays.cy_px; };
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vec3 *upper = &polygon[i], *lower = &polygon[i + 1 < polygon.size() ? i + 1 : 0];
+    if (row_of(*lower) < row_of(*upper)) std::swap(upper, lower);
+    const double top = row_of(*upper), bottom = row_of(*lower);
+    const auto first = static_cast<std::int32_t>(std::ceil(math::clamp(top, 0.0, rays.height_px)));
+    const auto last = static_cast<std::int32_t>(std::floor(math::clamp(bottom, -1.0, rays.height_px - 1.0)));
+    const double step = (column_of(*lower) - column_of(*upper)) / std::max(bottom - top, 1e-9);
+    double x = column_of(*upper) + (first - top) * step;
+    for (std::int32_t r = first; r <= last; ++r) {
+      Reach& row = reach[static_cast<std::size_t>(r)];
+      row.left = std::min(row.left, x);
+      row.right = std::max(row.right, x);
+      x += step;
+    }
+    first_row = std::min(first_row, first);
+    last_row = std::max(last_row, last);
+  }
+  std::int32_t free = 0, valid = 0;
+  for (std::int32_t r = first_row; r <= last_row; ++r) {
+    const Reach& row = reach[static_cast<std::size_t>(r)];
+    // Columns whose middles, at 2 g + 0.5, lie within.
+    const auto left = static_cast<std::int32_t>(std::ceil(math::clamp(0.5 * (row.left - 0.5), 0.0, kColumns)));
+    const auto right = static_cast<std::int32_t>(
+        std::floor(math::clamp(0.5 * (row.right - 0.5), -1.0, picture.column_rays.columns - 1.0)));
+    if (left <= right) count_pixels(picture.flags.row(r), picture.columns.valid.row(2 * r), left, right, free, valid);
+  }
+  return free > 0 ? 1.0 - static_cast<double>(valid) / (kColumn_px * free) : 0.0;
+}
+
+}  // namespace
+
+// What is just outside an edge decides whether the surface ends there or only the view of it.
+EdgeKind SurfacePolygons::judge_edge(const FramePicture& picture, const InversePlane& plane, const Vec3& a_m,
+                                     const Vec3& b_m, const Vec3& inside_m) const noexcept {
+  constexpr int kProbes = 9;
+  const Vec3 middle = 0.5 * (a_m + b_m);
+  const auto project = [&](const Vec3& p) {
+    return Vec2{p.x() / p.z() * picture.rays.fx_px + picture.rays.cx_px,
+                p.y() / p.z() * picture.rays.fy_px + picture.rays.cy_px};
+  };
+  const Vec2 a = project(a_m), b = project(b_m), centre = project(inside_m);
+  Vec2 outward{(b - a).y(), -(b - a).x()};
+  if (outward.norm() < 1e-9) return EdgeKind::kUnknown;
+  outward.normalize();
+  if (outward.dot(project(middle) - centre) < 0.0) outward = -outward;
+  int observed = 0;
+  for (int i = 0; i < kProbes; ++i) {
+    const Vec2 on = a + (b - a) * ((i + 0.5) / kProbes);
+    // The first measured pixel outside, up to twice the probe's distance; the body or the picture's end before it hides
+    // the end of the surface.
+    const auto reach_px = static_cast<std::int32_t>(1.5 * params_.probe_px);
+    for (std::int32_t k = 0; k <= reach_px; ++k) {
+      const double out = 0.5 * params_.probe_px + k;
+      const Vec2 p = on + out * outward;
+      const auto c = static_cast<std::int32_t>(std::floor(p.x() + 0.5)),
+                 r = static_cast<std::int32_t>(std::floor(p.y() + 0.5));
+      if (c < 0 || c >= picture.rays.width_px || r < 0 || r >= picture.rays.height_px ||
+          (picture.flags(c, r) & kPixelBody) != 0)
+        break;
+      const auto w = static_cast<double>(picture.inverse_depth_at(c, r));
+      if (!(w > 0.0) || out < params_.probe_px) continue;
+      const double expected = plane.inverse_depth(picture.rays.ray(c, r));
+      // Something well in front hides it, unless it stands on the surface right here (a riser's foot).
+      const bool hidden = expected > 1e-3 && 1.0 / expected - 1.0 / w > params_.apart_m;
+      observed += hidden ? 0 : 1;
+      break;
+    }
+  }
+  return 2 * observed > kProbes ? EdgeKind::kObserved : EdgeKind::kUnknown;
+}
+
+// The tread that most columns of this surface show right below (or above) it in the picture; 0 = none.
+std::size_t SurfacePolygons::tread_beside(const FramePicture& picture, const FramePlanes& planes,
+                                          const SurfaceProfile& profile, bool below) const noexcept {
+  constexpr std::int32_t kProbe_px = 6;
+  std::array<std::int32_t, FramePlanes::kMaxPlanes + 1> votes{};
+  for (std::int32_t g = 0; g < picture.column_rays.columns; ++g) {
+    const ColumnEnds& ends = profile.columns[static_cast<std::size_t>(g)];
+    if (ends.empty()) continue;
+    const std::int32_t row = below ? ends.bottom + kProbe_px : ends.top - kProbe_px;
+    if (row >= 0 && row < picture.column_rays.height_px) ++votes[picture.owner(g, row)];
+  }
+  std::size_t best = 0;
+  for (std::size_t p = 1; p <= planes.count; ++p) {
+    if (!planes[p].alive || planes[p].kind != SurfaceKind::kTread || votes[p] < params_.min_tread_columns) {
+      continue;
+    }
+    if (best == 0 || votes[p] > votes[best]) best = p;
+  }
+  return best;
+}
+
+bool SurfacePolygons::try_build(const FramePicture& picture, const FramePlanes& planes, std::size_t index,
+                                const SurfaceProfile& profile, const Outline2& outline, const SurfaceLines& lines,
+                                SurfacePatch& patch) const noexcept {
+  const FramePlane& own = planes[index];
+  const InversePlane& plane = own.plane;
+  const Vec3 n = plane.normal();
+  // Plane coordinates with x along the nosing, else along the picture's rows; x cross y = n.
+  Vec3 x_axis = Vec3::UnitX();
+  if (lines.nosing.valid) {
+    x_axis = lines.nosing.b_m - lines.nosing.a_m;
+  } else if (lines.back.valid) {
+    x_axis = lines.back.b_m - lines.back.a_m;
+  }
+  x_axis -= n * n.dot(x_axis);
+  if (x_axis.norm() < 1e-6) x_axis = n.unitOrthogonal();
+  x_axis.normalize();
+  const Vec3 y_axis = n.cross(x_axis);
+  const Vec3 origin = own.centre_m - n * plane.distance_m(own.centre_m);
+  const auto to_plane = [&](const Vec3& p) { return Vec2{(p - origin).dot(x_axis), (p - origin).dot(y_axis)}; };
+  const auto to_space = [&](const Vec2& p) { return Vec3{origin + p.x() * x_axis + p.y() * y_axis}; };
+
+  // The picture's outline onto the plane: a projection keeps it convex, and turns clockwise in the picture into
+  // clockwise seen from the camera, so the order is reversed.
+  Outline2 flat;
+  for (std::size_t i = outline.size(); i-- > 0;) {
+    const Vec3 ray = picture.rays.ray(outline[i].x(), outline[i].y());
+    if (plane.inverse_depth(ray) > 0.1) static_cast<void>(flat.try_push_back(to_plane(plane.point(ray))));
+  }
+  if (flat.size() < 3 || !(twice_area(flat) > 0.0)) return false;
+  const Vec2 middle = centroid(flat);
+  const auto cut = [&](const EdgeLine& line) {
+    const Vec2 a = to_plane(line.a_m), b = to_plane(line.b_m);
+    Vec2 inward{-(b - a).y(), (b - a).x()};
+    inward.normalize();
+    if (inward.dot(middle - a) < 0.0) inward = -inward;
+    // Corners just short of the line go onto it, those beyond are cut off: either way the edge is the line. Moving only
+    // the two extreme ones keeps the outline convex.
+    for (Vec2& p : flat) {
+      const double distance = inward.dot(p - a);
+      if (distance > 0.0 && distance < params_.snap_m) p -= (distance + 1e-6) * inward;
+    }
+    clip(flat, a, inward);
+  };
+  if (lines.nosing.valid) cut(lines.nosing);
+  if (lines.back.valid) cut(lines.back);
+  if (lines.occluder.valid) cut(lines.occluder);
+  if (own.kind == SurfaceKind::kRiser) {
+    // Seen nearly edge-on, half a pixel is decimetres of a riser: it ends where the treads above and below it say.
+    for (const bool below : {true, false}) {
+      const std::size_t tread = tread_beside(picture, planes, profile, below);
+      if (tread == 0) continue;
+      const InversePlane& level = planes[tread].plane;
+      const double side = below ? 1.0 : -1.0;
+      const Vec3 up = side * level.normal();
+      const Vec2 inward{up.dot(x_axis), up.dot(y_axis)};
+      if (!(inward.norm() > kLeastSlope)) continue;
+      clip(flat, -side * level.distance_m(origin) * inward / inward.squaredNorm(), inward.normalized());
+    }
+  }
+  if (flat.size() >= 3) reduce(flat, kMaxPolygonVertices, 1e-6);
+  const double area_m2 = flat.size() >= 3 ? 0.5 * twice_area(flat) : 0.0;
+  if (!(area_m2 > 1e-4)) return false;
+
+  patch = SurfacePatch{};
+  patch.kind = own.kind;
+  patch.plane = own.source;
+  patch.covariance = own.covariance;
+  patch.normal = n;
+  patch.d_m = plane.d_m();
+  patch.area_m2 = area_m2;
+  patch.centroid_m = to_space(centroid(flat));
+  patch.rmse_m = math::sqrt(own.residual2 / std::max(own.moments.count, 1.0));
+  patch.offset_sigma_m = plane_sigma_m(plane, own.covariance, patch.centroid_m / patch.centroid_m.z());
+  const Mat3 across = Mat3::Identity() - n * n.transpose();
+  patch.tilt_sigma_rad = patch.d_m * math::sqrt(std::max((across * own.covariance * across).trace(), 0.0));
+  patch.nosing = lines.nosing;
+  patch.back = lines.back;
+  // An edge on a nosing or back line is observed if the line was seen along most of it.
+  const auto seen_on = [&](const EdgeLine& line, const Vec2& a, const Vec2& b) {
+    if (!line.valid) return false;
+    const Vec2 p = to_plane(line.a_m), q = to_plane(line.b_m);
+    const Vec2 along = (q - p) / std::max((q - p).norm(), 1e-9), normal{-along.y(), along.x()};
+    if (std::abs(normal.dot(a - p)) > kOnLine_m || std::abs(normal.dot(b - p)) > kOnLine_m) return false;
+    const double from = std::min(along.dot(a - p), along.dot(b - p)), to = std::max(along.dot(a - p), along.dot(b - p));
+    return 2.0 * (std::min(to, (q - p).norm()) - std::max(from, 0.0)) > to - from;
+  };
+  for (std::size_t i = 0; i < flat.size(); ++i) {
+    const Vec2 &a = flat[i], &b = flat[(i + 1) % flat.size()];
+    static_cast<void>(patch.polygon.try_push_back(to_space(a)));
+    patch.edges[i] = seen_on(lines.nosing, a, b) || seen_on(lines.back, a, b)
+                         ? EdgeKind::kObserved
+                         : judge_edge(picture, plane, to_space(a), to_space(b), patch.centroid_m);
+  }
+  patch.invalid_fraction = invalid_share(picture, patch.polygon);
+  return true;
+}
+
+}  // namespace polygmap

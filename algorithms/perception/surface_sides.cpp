@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/surface_sides.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+namespace {
+
+constexpr double kLeastCosine = 0.26;                    // of the incidence; the noise model ends there
+constexpr std::int32_t kFlatRows = 4, kFlatColumns = 3;  // more columns in these rows: too flat
+constexpr std::int32_t kMixed_px = 2;                    // of neither plane, where one pixel sees both
+constexpr std::int32_t kInside_px = 8;                   // of the outermost column and the one beside it
+constexpr std::int32_t kOutside_px = 8;                  // searched beyond
+
+// A plane in one row: inverse depth at + slope * column, and the tolerance of measured over expected depth.
+struct RowPlane {
+  float at = 0.0F;
+  float slope = 0.0F;
+  float per_sigma = 0.0F;
+  bool valid = false;
+
+  RowPlane() noexcept = default;
+  RowPlane(const InversePlane& plane, const DepthSigma& noise, const CameraIntrinsics& k, std::int32_t column,
+           std::int32_t row) noexcept {
+    const double y = (row - k.cy_px) / k.fy_px;
+    const double constant = plane.m.y() * y + plane.m.z() - plane.m.x() * k.cx_px / k.fx_px;
+    const Vec3 ray{(column - k.cx_px) / k.fx_px, y, 1.0};
+    const double w = plane.inverse_depth(ray);
+    valid = w > 0.05;
+    if (!valid) return;
+    const double cosine = math::clamp(w * plane.d_m() / ray.norm(), kLeastCosine, 1.0);
+    at = static_cast<float>(constant);
+    slope = static_cast<float>(plane.m.x() / k.fx_px);
+    per_sigma = static_cast<float>(cosine / (w * noise.sigma_m(1.0 / w)));
+  }
+  // Over sigma.
+  [[nodiscard]] float residual(std::int32_t column, float depth_m) const noexcept {
+    return ((at + slope * static_cast<float>(column)) * depth_m - 1.0F) * per_sigma;
+  }
+  // 2 ln(sigma over the other's), near enough: with residuals alone a crease moves towards the plane of less noise.
+  [[nodiscard]] float wider_than(const RowPlane& other) const noexcept {
+    return 4.0F * (other.per_sigma - per_sigma) / (other.per_sigma + per_sigma);
+  }
+};
+
+}  // namespace
+
+void SurfaceSides::begin(const Params& params, const DepthSigma& noise, const RawPicture& raw,
+                         const FramePicture& picture, const FramePlanes& planes) noexcept {
+  params_ = params;
+  noise_ = noise;
+  raw_ = &raw;
+  picture_ = &picture;
+  planes_ = &planes;
+}
+
+SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t row, std::int32_t column, bool right,
+                                              double& end_px) const noexcept {
+  const CameraIntrinsics& k = raw_->intrinsics;
+  const FramePlanes& planes = *planes_;
+  const std::int32_t out = right ? 1 : -1;
+  const std::int32_t border = kColumn_px * column + (right ? kColumn_px - 1 : 0);  // the outermost column's last pixel
+  // The picture's last columns hide what comes after them.
+  if (border + 2 * out < 0 || border + 2 * out >= k.width_px) return Ending::kHidden;
+  const std::int32_t first = border - out * (kInside_px - 1);
+  if (first < 0 || first >= k.width_px) return Ending::kNone;
+  const RowPlane own(planes[index].plane, noise_, k, border, row);
+  if (!own.valid) return Ending::kNone;
+  // The plane beyond, if there is one.
+  RowPlane other;
+  for (std::int32_t g = column + out; g != column + 3 * out; g += out) {
+    if (g < 0 || g >= picture_->column_rays.columns) break;
+    const std::size_t p = picture_->owner(g, row);
+    if (p != 0 && p != index) other = RowPlane(planes[p].plane, noise_, k, border, row);
+  }
+  const float more = other.valid ? other.wider_than(own) : 0.0F;
+  const auto most = static_cast<float>(params_.truncate_sigmas * params_.truncate_sigmas);
+  const auto leave = static_cast<float>(params_.leave_sigmas * params_.leave_sigmas);
+  const auto unit_m = static_cast<float>(k.depth_unit_m);
+  const std::uint16_t* depth = raw_->depth->row(row);
+  const std::uint8_t* flags = picture_->flags.row(row / 2);
+  // The boundary with the least cost; between equally good ones (a pixel without data or of neither) in their middle.
+  constexpr float kTie = 1e-3F;
+  float sum = 0.0F, least = 1e9F;
+  std::int32_t from = 0, to = 0;
+  std::int32_t of_neither = 0;  // pixels with data between from and to, those behind the surface less those before it
+  bool measured_beyond = false;
+  for (std::int32_t i = 0; i < kInside_px + kOutside_px; ++i) {
+    const std::int32_t c = first + out * i;
+    if (c < 0 || c >= k.width_px) break;
+    if ((flags[c / 2] & kPixelBody) != 0) {
+      if (i < kInside_px) return Ending::kHidden;
+      break;
+    }
+    std::int32_t deviation = 0;
+    if (raw_->range.valid(depth[c])) {
+      const float z_m = static_cast<float>(depth[c]) * unit_m;
+      measured_beyond = true;
+      const float residual = own.residual(c, z_m);
+      deviation = residual < 0.0F ? -1 : 1;
+      // Twice the negative logarithm of the likelihoods, but for a constant.
+      const float beyond = other.valid ? std::min(other.residual(c, z_m) * other.residual(c, z_m) + more, most) : leave;
+      sum += std::min(residual * residual, most) - beyond;
+    }
+    if (sum < least - kTie) {
+      least = sum;
+      from = to = i;
+      of_neither = 0;
+      measured_beyond = false;
+    } else if (sum < least + kTie && to == i - 1) {
+      to = i;
+      of_neither += deviation;
+      measured_beyond = false;
+    }
+  }
+  if (from == 0) return Ending::kNone;
+  if (!measured_beyond) return Ending::kHidden;
+  if (std::abs(of_neither) > kMixed_px) to = from;  // something narrow stands between: the surface ends at it
+  end_px = first + out * (0.5 * (from + to) + 0.5);
+  return Ending::kSeen;
+}
+
+// The steep line that most of the seen ends lie on: pairs of them propose, least squares of those near by decide.
+bool SurfaceSides::try_line(const InversePlane& plane, Line& line) const noexcept {
+  const CameraIntrinsics& k = raw_->intrinsics;
+  const auto n = static_cast<std::int32_t>(seen_.size());
+  if (n < params_.min_rows) return false;
+  const Vec3 normal = plane.normal();
+  const Vec3 along = (Vec3::UnitX() - normal * normal.x()).normalized(), across = normal.cross(along);
+  const double first_row = seen_.front().row, last_row = seen_.back().row;
+  const auto upright = [&](const Line& l) {
+    const auto point = [&](double row) {
+      return plane.point({(l.at + l.slope * row - k.cx_px) / k.fx_px, (row - k.cy_px) / k.fy_px, 1.0});
+    };
+    const Vec3 direction = point(last_row) - point(first_row);
+    return std::abs(along.dot(direction)) <= params_.max_lean * std::abs(across.dot(direction));
+  };
+  double best = 1e9;
+  for (const std::int32_t apart : {n / 2, n / 4}) {
+    const std::int32_t stride = std::max(apart / 3, 1);
+    for (std::int32_t i = 0; i + apart < n; i += stride) {
+      const RowEnd &a = seen_[static_cast<std::size_t>(i)], &b = seen_[static_cast<std::size_t>(i + apart)];
+      const double slope = (b.column - a.column) / (b.row - a.row);
+      const Line candidate{a.column - slope * a.row, slope};
+      if (!upright(candidate)) continue;
+      double cost = 0.0;
+      for (const RowEnd& e : seen_) {
+        const double off = e.column - a.column - slope * (e.row - a.row);
+        cost += std::min(off * off, params_.inlier_px * params_.inlier_px);
+      }
+      if (cost >= best) continue;
+      best = cost;
+      line = candidate;
+    }
+  }
+  if (best > 1e8) return false;
+  for (int round = 0; round < 3; ++round) {
+    double count = 0.0, row = 0.0, column = 0.0, row2 = 0.0, both = 0.0;
+    for (const RowEnd& e : seen_) {
+      if (std::abs(e.column - line.at - line.slope * e.row) > params_.inlier_px) continue;
+      count += 1.0, row += e.row, column += e.column, row2 += e.row * e.row, both += e.row * e.column;
+    }
+    const double spread = count * row2 - row * row;
+    if (count < params_.min_rows || !(spread > 0.0)) return false;
+    line.slope = (count * both - row * column) / spread;
+    line.at = (column - line.slope * row) / count;
+  }
+  return upright(line);
+}
+
+OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept {
+  const FramePlane& plane = (*planes_)[index];
+  const double out = right ? 1.0 : -1.0;
+  const auto outer_edge = [right](std::uint8_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
+  seen_.clear();
+  hidden_.clear();
+  const auto& ends = right ? profile.right : profile.left;
+  // Where the surface's end runs off sideways from row to row it is a front or a back, no side.
+  std::size_t count = 0;
+  const std::int32_t first_row = profile.first_row, last_row = profile.last_row;
+  for (std::int32_t r = first_row; r <= last_row; ++r) {
+    const auto end_at = [&](std::int32_t row) {
+      return static_cast<std::int32_t>(ends[static_cast<std::size_t>(row)]);
+    };
+    const std::int32_t drift =
+        end_at(std::min(r + kFlatRows / 2, last_row)) - end_at(std::max(r - kFlatRows / 2, first_row));
+    rows_[count] = static_cast<std::int16_t>(r);
+    count += end_at(r) != SurfaceProfile::kNoColumn && drift <= kFlatColumns && drift >= -kFlatColumns ? 1U : 0U;
+  }
+  const std::size_t stride = (count + kMaxRows - 1) / kMaxRows;
+  double outermost = -1e9;
+  for (std::size_t i = stride / 2; i < count; i += stride) {
+    const std::int32_t r = rows_[i];
+    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+    RowEnd end{static_cast<double>(r), 0.0};
+    const Ending ending = end_of_row(index, r, g, right, end.column);
+    if (ending == Ending::kNone) continue;
+    if (ending == Ending::kHidden) end.column = outer_edge(g);
+    static_cast<void>((ending == Ending::kSeen ? seen_ : hidden_).try_push_back(end));
+    outermost = std::max(outermost, out * end.column);
+  }
+  // Half-resolution pixel i is where full-resolution 2 i + 0.5 is.
+  OutlineSide side;
+  if (outermost < -1e8) {  // no row but flat ones
+    for (std::int32_t r = first_row; r <= last_row; ++r) {
+      const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+      if (g != SurfaceProfile::kNoColumn) outermost = std::max(outermost, out * outer_edge(g));
+    }
+  }
+  side.column_px = 0.5 * (out * outermost - 0.5);
+  Line line;
+  if (!try_line(plane.plane, line)) return side;
+  std::int32_t on = 0, between = 0;
+  double first = 1e9, last = -1e9;
+  const auto beyond = [&](double row, double column) { return out * (column - line.at - line.slope * row); };
+  for (const RowEnd& e : seen_) {
+    if (std::abs(beyond(e.row, e.column)) > params_.inlier_px) continue;
+    ++on;
+    first = std::min(first, e.row);
+    last = std::max(last, e.row);
+  }
+  for (const auto* all : {&seen_, &hidden_}) {
+    for (const RowEnd& e : *all) between += e.row >= first && e.row <= last ? 1 : 0;
+  }
+  double cut_px = 0.0;
+  for (std::int32_t r = first_row; r <= last_row; ++r) {
+    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+    if (g != SurfaceProfile::kNoColumn) cut_px += std::max(beyond(r, outer_edge(g)) - params_.outside_px, 0.0);
+  }
+  if (on < params_.min_rows || on < params_.min_share * between) return side;
+  if (cut_px > params_.max_cut * plane.piece_px) return side;
+  side.fitted = true;
+  side.column_px = 0.5 * (line.at + 0.5 * line.slope - 0.5);
+  side.slope = line.slope;
+  side.top_px = 0.5 * (first - 1.0);
+  side.bottom_px = 0.5 * last;
+  return side;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// The left and right sides of a surface in the picture: where its rows of pixels end, one straight line through all.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/perception/column_outline.hpp"
+#include "algorithms/perception/frame_planes.hpp"
+
+namespace polygmap {
+
+class SurfaceSides {
+ public:
+  struct Params {
+    double truncate_sigmas = 3.0;
+    double leave_sigmas = 2.0;  // a pixel this far off has left the surface, when what lies beyond is no known plane
+    double max_lean = 1.0;      // on the plane, along over across the picture's rows: a front or a back leans more
+    double inlier_px = 2.0;
+    double outside_px = 3.0;    // what of the surface's pixels lies farther than this outside the line ...
+    double max_cut = 0.03;      // ... is no more than this share of them
+    std::int32_t min_rows = 6;  // looked at and on the line
+    double min_share = 0.5;     // of the rows between the line's ends
+  };
+
+  // All but the parameters are read again by find.
+  void begin(const Params& params, const DepthSigma& noise, const RawPicture& raw, const FramePicture& picture,
+             const FramePlanes& planes) noexcept;
+  // The line through the ends of a surface's rows on that side; not fitted, as far as the columns reach, where the ends
+  // are not seen (the picture's or the robot's own) or not straight.
+  [[nodiscard]] OutlineSide find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept;
+
+ private:
+  static constexpr std::int32_t kMaxRows = 40;
+  // kHidden: by the picture's end, the robot's own body or missing data. kNone: the row's pixels there are not the
+  // surface's.
+  enum class Ending : std::uint8_t { kSeen, kHidden, kNone };
+  // Between which columns one row's pixels leave the surface (pixel c reaches from c - 0.5 to c + 0.5).
+  [[nodiscard]] Ending end_of_row(std::size_t index, std::int32_t row, std::int32_t column, bool right,
+                                  double& end_px) const noexcept;
+  struct Line {  // column = at + slope * row
+    double at = 0.0;
+    double slope = 0.0;
+  };
+  [[nodiscard]] bool try_line(const InversePlane& plane, Line& line) const noexcept;
+
+  struct RowEnd {
+    double row, column;
+  };
+  Params params_;
+  DepthSigma noise_;
+  const RawPicture* raw_ = nullptr;
+  const FramePicture* picture_ = nullptr;
+  const FramePlanes* planes_ = nullptr;
+  std::array<std::int16_t, kDepthHeight_px> rows_{};  // that may end at a side
+  StaticVector<RowEnd, kMaxRows> seen_;               // full-resolution pixels
+  StaticVector<RowEnd, kMaxRows> hidden_;             // as far as the columns reach
+};
+
+}  // namespace polygmap
