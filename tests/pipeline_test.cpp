@@ -290,7 +290,7 @@ TEST_F(PipelineAmongBoxes, MorePolygonsThanTheMapHolds_IsCounted) {
   stand(kInitialised_ticks);
   for (const double lowest_m : {-1.5, -1.25, -1.0, -0.75, -0.5, -0.25}) show(3, 4, lowest_m);
   EXPECT_EQ(count(Limit::kMapFull), 0U);
-  for (const double lowest_m : {0.0, 0.25, -1.75, -2.0}) show(3, 4, lowest_m);
+  for (const double lowest_m : {0.0, 0.25, -1.75, -2.0, -1.38, -1.13, -0.88, -0.63, -0.38}) show(3, 4, lowest_m);
   EXPECT_GT(count(Limit::kMapFull), 0U);
 }
 
