@@ -176,7 +176,10 @@ void ClimbReport::observe_map(const Telemetry& telemetry) {
   map_stamp_ns_ = map.stamp_ns;
   exposure_to_map_ms_.push_back(ms(telemetry.now_ns - map.stamp_ns));
   for (auto& [id, seen] : polygons_) seen.remembered = false;
-  for (const MapPolygon& polygon : map.polygons) polygons_[polygon.id] = {polygon.surface, true};
+  for (const MapPolygon& polygon : map.polygons) {
+    auto& seen = polygons_[polygon.id] = {polygon.surface, true};
+    for (Vec3& vertex_m : seen.surface.polygon) vertex_m += map.drift_m;  // from the map's world to the estimator's
+  }
 }
 
 void ClimbReport::observe_footsteps(const Truth& truth, const Telemetry& telemetry) {

@@ -41,7 +41,7 @@ TEST(PlaneFit, Solve_WhiteNoise_IsUnbiasedAndItsSigmaIsHonest) {
 
 TEST(PlaneFit, SolveLeaning_FewPixelsOfALevelPlane_ComesOutLevel_AManyPixelSlopeStays) {
   DepthSigma noise;
-  const auto moments_of = [](const Vec3& normal, int samples) {
+  const auto moments_of = [](const Vec3& normal, std::size_t samples) {
     PlaneMoments moments;
     const InversePlane truth{-normal / 0.7};
     for (const PlaneSample& s : sample_plane(normal, 0.7, samples, 0.0, 7)) {

@@ -259,7 +259,8 @@ bool EdgeLineFinder::try_segment_point(const Segment& segment, Vec2& point_m) co
       at = i;
     }
   }
-  if (at < 1 || at + 2 >= kOffsets) return false;
+  // At the window's ends nothing was compared.
+  if (at <= kMaxWindow_px - params_.window_px || at + 2 > kMaxWindow_px + params_.window_px) return false;
   // The running sum's least value lies where the gain crosses zero: between the rows on both sides of the minimum.
   const auto g0 = static_cast<double>(segment.gain[static_cast<std::size_t>(at)]);
   const auto g1 = static_cast<double>(segment.gain[static_cast<std::size_t>(at + 1)]);
@@ -355,7 +356,7 @@ EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
     const bool agree = std::abs(apart) < limit_m;
     double face_m = 0.0;
     if (!agree && surface_above_ && !face_tried_ && try_face_offset(face_m) && face_m > params_.face_m &&
-        face_m < params_.face_max_m) {
+        face_m < params_.face_max_m && other_.d_m() > 2.0 * face_m) {
       // The face is taken as parallel to the riser: n . p + d - face = 0.
       other_.m *= other_.d_m() / (other_.d_m() - face_m);
       face_tried_ = true;

@@ -19,7 +19,7 @@ class EdgeLineFinder {
     std::int32_t segment_px = 28;  // that share one change-point
     double truncate_sigmas = 3.0;
     std::int32_t min_side_px = 3;  // rows of the window on each side of the change-point that fit their plane
-    std::int32_t max_gap_px = 6;   // rows without data at the change-point: beyond, the column says nothing
+    std::int32_t max_gap_px = 6;   // rows without data at the first guess: beyond, the column says nothing
     std::int32_t min_columns = 6;  // of four pixels
     double min_length_m = 0.06;
     double max_rms_m = 0.006;

@@ -56,9 +56,6 @@ struct FramePicture {
 
   [[nodiscard]] std::uint8_t owner(std::int32_t column, std::int32_t row) const noexcept { return owners(row, column); }
   // Of a half-resolution pixel.
-  [[nodiscard]] std::uint8_t plane_at(std::int32_t column, std::int32_t row) const noexcept {
-    return column / 2 < column_rays.columns ? owner(column / 2, 2 * row) : std::uint8_t{0};
-  }
   [[nodiscard]] float inverse_depth_at(std::int32_t column, std::int32_t row) const noexcept {
     if (column < 0 || row < 0 || column / 2 >= column_rays.columns || row >= rays.height_px) return 0.0F;
     const float upper = columns.inverse_depth(column / 2, 2 * row);

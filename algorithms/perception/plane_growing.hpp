@@ -27,7 +27,6 @@ class PlaneGrowing {
     std::int32_t min_plane_px = 800;  // full-resolution pixels
   };
   static constexpr std::size_t kMaxPlanes = 96;
-  static constexpr std::int32_t kMaxPieceUnits = 24;
 
   void begin(const Params& params, const DepthSigma& noise, const ColumnRays& rays,
              RunSegmentation::Columns& runs) noexcept;

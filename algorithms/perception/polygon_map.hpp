@@ -61,7 +61,7 @@ class PolygonMap {
     double tilt_sigma_rad = 0.0;
     CameraIntrinsics intrinsics;
     std::array<LegShapes, kFootCount> body{};  // camera frame; what it hides is not seen to be empty
-    double body_margin_m = 0.02;
+    BodyMargin body_margin{0.02, 0.0};
   };
   struct Counters {
     std::uint32_t frames = 0;

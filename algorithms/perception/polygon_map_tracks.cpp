@@ -178,7 +178,7 @@ bool PolygonMap::should_be_seen(const MapTrack& track) const noexcept {
   const double incidence = -camera_T_local.R.col(2).dot(centre) / std::max(range_m, 1e-6);
   if (range_m > params_.view_range_m || incidence < params_.view_min_incidence) return false;
   for (const LegShapes& leg : view_.body) {
-    if (hides(leg, view_.body_margin_m, centre)) return false;
+    if (hides(leg, view_.body_margin.at(range_m), centre)) return false;
   }
   const CameraIntrinsics& c = view_.intrinsics;
   for (const Vec2& v : track.polygon) {

@@ -13,12 +13,6 @@ namespace polygmap {
 // The shapes moved to another frame.
 [[nodiscard]] LegShapes transformed(const Transform& to_T_from, const LegShapes& shapes) noexcept;
 
-// How far the body may be from where its joints say: a length, and a turn of the camera about itself.
-struct BodyMargin {
-  double fixed_m = 0.0;
-  double turn_rad = 0.0;
-  [[nodiscard]] double at(double distance_m) const noexcept { return fixed_m + turn_rad * distance_m; }
-};
 // What is not known of the legs. One sigma each, as a data sheet has it.
 struct BodyUncertainty {
   double shape_m = 0.008;     // not a sigma: covers beyond the shapes, and a leg's way in half an exposure

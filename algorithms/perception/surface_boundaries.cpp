@@ -150,7 +150,11 @@ void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::siz
     const std::int32_t until = k < spans.size() ? spans[k].top - 1 : rays_->height_px - 1;
     const std::int32_t gap_from = from;
     if (k < spans.size()) from = spans[k].bottom + 1;
-    if (until <= gap_from || spans.full()) continue;
+    if (until <= gap_from) continue;
+    if (spans.full()) {
+      ++overflow_;
+      return;
+    }
     const std::uint8_t above = k > 0 ? spans[k - 1].plane : std::uint8_t{0};
     const std::uint8_t below = k < spans.size() ? spans[k].plane : std::uint8_t{0};
     StaticVector<ColumnSpan, kMaxPlanes> candidates;
@@ -285,6 +289,7 @@ void SurfaceBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
     }
     first = std::max<std::int32_t>(first - window, upper.top);
     last = std::min<std::int32_t>(last + window, lower.bottom);
+    overflow_ += meets && joint_count_ == kMaxJoints ? 1U : 0U;
     const std::uint16_t i = meets && joint_count_ < kMaxJoints ? pair_of(upper.plane, lower.plane) : kMaxPairs;
     Pair* pair = i == kMaxPairs ? nullptr : &pairs_[i];
     const std::int32_t own = change_point(column, a, b, first, last, static_cast<float>(row), pair);

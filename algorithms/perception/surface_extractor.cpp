@@ -97,7 +97,6 @@ Progress SurfaceExtractor::step(WorkBudget& budget) noexcept {
 void SurfaceExtractor::enter(Phase phase) noexcept {
   phase_ = phase;
   row_ = 0;
-  repeat_ = 0;
   index_ = 0;
   started_ = false;
 }
@@ -117,6 +116,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
         counters_.run_overflow += runs_.overflow();
         if (measured_px_ == 0) {
           ++counters_.blank_frames;
+          picture_.owners.fill(0);
           enter(Phase::kFinish);
         } else {
           growing_.begin(params_.growing, noise_, picture_.column_rays, runs_.columns());

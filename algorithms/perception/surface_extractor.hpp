@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // From one raw depth frame to the planar surfaces in it: polygons, nosings, back lines. Static memory, resumable.
 //
-// Route: self filter -> columns of four pixels (11) -> straight runs -> planes grown from runs -> boundaries where the
-// planes meet, weighted least squares (twice) -> connected pieces -> convex polygons, cut to nosing and back lines that
-// are found in the raw picture.
+// Route: self filter -> columns of four pixels -> straight runs -> planes grown from runs -> boundaries where the
+// planes meet, weighted least squares -> level and upright planes in what is left over, rows claimed beside them ->
+// boundaries and least squares again -> connected pieces -> outlines, with sides fitted in the raw picture -> convex
+// polygons, cut to nosing and back lines that are found in the columns.
 #pragma once
 
 #include <array>
@@ -154,7 +155,6 @@ class SurfaceExtractor {
 
   Phase phase_ = Phase::kIdle;
   std::int32_t row_ = 0;
-  std::int32_t repeat_ = 0;
   std::size_t index_ = 0;
   std::int32_t round_ = 0;
   bool started_ = false;  // sub-step of a phase

@@ -135,11 +135,14 @@ std::uint32_t SurfacePieces::join(const Params& params, const SurfaceBoundaries&
     }
     plane.piece_px += piece.area_px;
   }
+  // All are judged by what all were, whatever their order.
+  std::array<bool, FramePlanes::kMaxPlanes + 1> kept{};
   for (std::size_t p = 1; p <= planes.count; ++p) {
     const std::int32_t least_px =
         on_a_step(boundaries, planes, planes[p]) ? params.min_surface_px : params.min_other_px;
-    planes[p].alive = planes[p].alive && planes[p].piece_px >= least_px;
+    kept[p] = planes[p].alive && planes[p].piece_px >= least_px;
   }
+  for (std::size_t p = 1; p <= planes.count; ++p) planes[p].alive = kept[p];
   return without_room;
 }
 

@@ -35,6 +35,13 @@ inline constexpr double kShankRadius_m = 0.055;
 [[nodiscard]] double signed_distance_m(const Capsule& capsule, const Vec3& point_m) noexcept;
 [[nodiscard]] double signed_distance_m(const OrientedBox& box, const Vec3& point_m) noexcept;
 
+// How far the body may be from where its joints say: a length, and a turn of the camera about itself.
+struct BodyMargin {
+  double fixed_m = 0.0;
+  double turn_rad = 0.0;
+  [[nodiscard]] double at(double distance_m) const noexcept { return fixed_m + turn_rad * distance_m; }
+};
+
 // Whether a leg, grown by a margin, is between the origin and a point. Shapes of radius or size 0 are absent.
 [[nodiscard]] bool hides(const LegShapes& leg, double margin_m, const Vec3& point_m) noexcept;
 
