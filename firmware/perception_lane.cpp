@@ -71,7 +71,6 @@ void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
           transformed(camera_T_base, base_leg_shapes(params_.legs, foot, leg_joints(exposure_state_.q_rad, foot)));
     }
     view.body = body_;
-    view.body_margin = body_margin(params_.body, params_.legs, params_.mount.prior_tilt_sigma_rad);
     if (extractor_.try_begin(frame_, view)) {
       stage_ = FrameStage::kExtracting;
     } else {
@@ -115,6 +114,7 @@ void PerceptionLane::begin_map() noexcept {
   view.tilt_sigma_rad = exposure_state_.tilt_sigma_rad;
   view.intrinsics = intrinsics_;
   view.body = body_;
+  view.body_margin = body_margin(params_.body, params_.legs, params_.mount.prior_tilt_sigma_rad);
   map_.begin(extractor_.result(), view);
   mapping_ = true;
 }
