@@ -2,6 +2,7 @@
 // Compiled once for each size, see the header.
 #include "sim_stub/frame_extraction.hpp"
 
+#include <algorithm>
 #include <chrono>
 
 #include "algorithms/perception/surface_extractor.hpp"
@@ -24,6 +25,12 @@ class FrameExtractor final : public polygmap_frames::Extractor {
                      c.noise_correlated_px};
     params_.noise_gain = 0.5;
     params_.limits = {c.min_depth_m, c.max_depth_m};
+    // What fills an eighth of a picture is a surface, however few pixels the picture has.
+    const std::int32_t eighth_px = c.width_px * c.height_px / 8;
+    for (std::int32_t* least_px :
+         {&params_.growing.min_plane_px, &params_.pieces.min_surface_px, &params_.pieces.min_other_px}) {
+      *least_px = std::min(*least_px, eighth_px);
+    }
     extractor_.configure(params_);
     view_.intrinsics = {c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.depth_unit_m};
     view_.body_margin = {};
