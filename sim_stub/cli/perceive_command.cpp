@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <ostream>
+#include <set>
 
 #include "sim_stub/cli/climb_command.hpp"
 #include "sim_stub/perceive.hpp"
@@ -24,6 +25,14 @@ std::string place(const std::string& out, const std::string& depth, bool several
 
 std::string complaint(const PerceiveArguments& a) {
   if (a.repeat < 1 || a.repeat > kMaxRepeat) return "--repeat must be from 1 to " + std::to_string(kMaxRepeat) + ".";
+  if (a.depth.size() > 1 && !(a.labels + a.json + a.picture).empty()) {
+    std::set<std::string> names;
+    for (const std::string& path : a.depth) {
+      const std::string name = std::filesystem::path(path).stem().string();
+      if (!names.insert(name).second)
+        return "Two pictures are called \"" + name + "\": one would overwrite the other's output.";
+    }
+  }
   if (a.gravity.empty()) return {};
   const double norm = std::hypot(a.gravity[0], a.gravity[1], a.gravity[2]);
   if (!(norm > 1e-6) || !(norm < 1e6)) return "--gravity must be three finite numbers, not all zero.";
