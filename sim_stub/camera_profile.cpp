@@ -66,9 +66,10 @@ class CameraFile {
       throw FileError("Cannot read the camera file \"" + path + "\": " + std::string(parsed_.error().description()) +
                       ".");
     }
-    for (const auto& [name, value] : parsed_.table()) {
-      if (std::none_of(kKeys.begin(), kKeys.end(), [&](const Key& key) { return key.name == name.str(); })) {
-        fail("\"" + std::string(name.str()) + "\" is no key of a camera");
+    for (const auto& entry : parsed_.table()) {
+      const std::string_view name = entry.first.str();
+      if (std::none_of(kKeys.begin(), kKeys.end(), [name](const Key& key) { return key.name == name; })) {
+        fail("\"" + std::string(name) + "\" is no key of a camera");
       }
     }
   }
