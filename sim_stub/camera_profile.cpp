@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <iomanip>
 #include <limits>
 #include <sstream>
@@ -62,6 +63,7 @@ std::string text(double number) {
 class CameraFile {
  public:
   explicit CameraFile(const std::string& path) : path_(path), parsed_(toml::parse_file(path)) {
+    if (std::filesystem::is_directory(path)) fail("it is a folder");
     if (!parsed_) {
       throw FileError("Cannot read the camera file \"" + path + "\": " + std::string(parsed_.error().description()) +
                       ".");

@@ -115,9 +115,14 @@ std::optional<Vec3> find_up(const std::vector<Surface>& surfaces) {
 
 }  // namespace
 
+std::string size_text(std::int64_t width, std::int64_t height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
 DepthPng read_depth(const std::string& path) {
   std::vector<unsigned char> file;
   if (lodepng::load_file(file, path) != 0) fail("Cannot read the picture \"" + path + "\".");
+  if (file.empty()) fail("The picture \"" + path + "\" is empty.");
   lodepng::State state;
   unsigned width = 0, height = 0;
   if (const unsigned error = lodepng_inspect(&width, &height, &state, file.data(), file.size()); error != 0) {
@@ -125,6 +130,10 @@ DepthPng read_depth(const std::string& path) {
   }
   if (state.info_png.color.colortype != LCT_GREY || state.info_png.color.bitdepth != 16) {
     fail("\"" + path + "\" is no depth picture: it must be a PNG of one channel of 16 bits.");
+  }
+  if (width > polygmap_frames::kMaxWidth_px || height > polygmap_frames::kMaxHeight_px) {  // before memory is taken
+    fail("\"" + path + "\" is " + size_text(width, height) + ", more than the " +
+         size_text(polygmap_frames::kMaxWidth_px, polygmap_frames::kMaxHeight_px) + " that are read.");
   }
   state.info_raw.colortype = LCT_GREY;
   state.info_raw.bitdepth = 16;

@@ -18,6 +18,8 @@ struct DepthPng {
   std::vector<std::uint16_t> depth;
 };
 
+[[nodiscard]] std::string size_text(std::int64_t width, std::int64_t height);  // as people write it
+
 // Throws FileError.
 [[nodiscard]] DepthPng read_depth(const std::string& path);
 

@@ -122,12 +122,17 @@ TEST_F(PerceiveCommand, FilesThatAreNone_AreNamedInOneSentence) {
   const std::string bytes{std::istreambuf_iterator<char>(good), {}};
   write("cut.png", bytes.substr(0, bytes.size() / 2));
   write("text.png", "no picture");
+  write("empty.png", "");
+  write_depth("large.png", std::vector<std::uint16_t>(1025 * 32, 1000), 1025, 32);
   const std::string camera = at("camera.toml");
   expect_refused({"perceive", at("missing.png"), "--camera", camera}, "missing.png");
   expect_refused({"perceive", at("small.png"), "--camera", camera}, "64x48");
   expect_refused({"perceive", at("eight.png"), "--camera", camera}, "16 bits");
   expect_refused({"perceive", at("cut.png"), "--camera", camera}, "cut.png");
   expect_refused({"perceive", at("text.png"), "--camera", camera}, "text.png");
+  expect_refused({"perceive", at("empty.png"), "--camera", camera}, "is empty");
+  expect_refused({"perceive", folder_, "--camera", camera}, "Cannot read the picture");
+  expect_refused({"perceive", at("large.png"), "--camera", camera}, "is 1025x32, more than the 1024x768 that are read");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--json", "/proc/none/x.json"}, "/proc/none");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--gravity", "0", "0", "0"}, "--gravity");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--gravity", "nan", "0", "1"}, "--gravity");
@@ -292,7 +297,7 @@ TEST_F(PerceiveCommand, CameraFilesThatAreNone_AreNamedInOneSentence) {
   refused_with("min_depth_m = 3\nmax_depth_m = 3", "min_depth_m, 3, must be less than max_depth_m, 3");
   refused_with("min_depth_m = 66\nmax_depth_m = 67", "16 bits");
   refused_with("depth_unit_m = 0.001", "bad.toml");  // twice
-  expect_refused({"perceive", at("good.png"), "--camera", folder_}, folder_);
+  expect_refused({"perceive", at("good.png"), "--camera", folder_}, "folder");
   expect_refused({"perceive", at("good.png"), "--camera", at("none.toml")}, "none.toml");
 }
 

@@ -100,7 +100,7 @@ TEST_F(SurfaceSidesOfABoard, WallCloseBehind_EndsTheBoardOnlyWhereItIsKnown) {
 }
 
 TEST_F(SurfaceSidesOfABoard, LastTwoPixelsOfThePicture_AreTooFewToEndABoard) {
-  paint({2.0, 0.0}, {638.0, 0.0}, 1300, 0);
+  paint({1.5, 0.0}, {638.0, 0.0}, 1300, 0);
   EXPECT_FALSE(find(false).fitted);
   EXPECT_FALSE(find(true).fitted);
 }

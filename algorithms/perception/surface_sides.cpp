@@ -171,7 +171,9 @@ bool SurfaceSides::try_line(const InversePlane& plane, Line& line) const noexcep
 OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept {
   const FramePlane& plane = (*planes_)[index];
   const double out = right ? 1.0 : -1.0;
-  const auto outer_edge = [right](SurfaceProfile::Column g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
+  const auto outer_edge = [right](SurfaceProfile::Column g) {
+    return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5);
+  };
   seen_.clear();
   hidden_.clear();
   const auto& ends = right ? profile.right : profile.left;

@@ -52,11 +52,8 @@ void make_folders(const std::vector<std::string>& folders) {
 std::string one_picture(const PerceiveArguments& a, const CameraProfile& camera, const std::string& path,
                         bool several) {
   const DepthPng picture = read_depth(path);
-  const auto size = [](std::int32_t width, std::int32_t height) {
-    return std::to_string(width) + "x" + std::to_string(height);
-  };
-  const std::string own = size(picture.width_px, picture.height_px);
-  const std::string expected = size(camera.intrinsics.width_px, camera.intrinsics.height_px);
+  const std::string own = size_text(picture.width_px, picture.height_px);
+  const std::string expected = size_text(camera.intrinsics.width_px, camera.intrinsics.height_px);
   if (own != expected) throw FileError("\"" + path + "\" is " + own + ", but the camera file says " + expected + ".");
   std::optional<Vec3> gravity;
   if (!a.gravity.empty()) gravity = Vec3{a.gravity[0], a.gravity[1], a.gravity[2]};
