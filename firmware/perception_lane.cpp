@@ -73,9 +73,9 @@ void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
     view.body = body_;
     if (extractor_.try_begin(frame_, view)) {
       stage_ = FrameStage::kExtracting;
-    } else {
-      health_.raise(Fault::kDepthRejected, now_ns);
+      return;
     }
+    health_.raise(Fault::kDepthRejected, now_ns);
   }
   camera_port_.release();
 }
@@ -84,6 +84,7 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
   if (stage_ != FrameStage::kExtracting) return Progress::kIdle;
   const Progress progress = extractor_.step(budget);
   if (progress == Progress::kDone) {
+    camera_port_.release();
     const std::uint32_t overflow = extractor_.counters().plane_overflow;
     health_.raise(Limit::kPlanesFull, now_ns, overflow - overflow_seen_);
     overflow_seen_ = overflow;
