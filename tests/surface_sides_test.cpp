@@ -24,7 +24,7 @@ class SurfaceSidesOfABoard : public testing::Test {
     picture_->rays.set(intrinsics_);
     picture_->column_rays.set(intrinsics_);
     picture_->flags.fill(0);
-    raw_.depth = depth_.get();
+    raw_.depth = depth_->data();
     raw_.intrinsics = intrinsics_;
     raw_.range.set({}, intrinsics_.depth_unit_m);
     planes_->count = 2;
@@ -73,7 +73,8 @@ class SurfaceSidesOfABoard : public testing::Test {
   }
 
   CameraIntrinsics intrinsics_;
-  std::unique_ptr<FullDepthImage> depth_ = std::make_unique<FullDepthImage>();
+  using Depth = Raster<std::uint16_t, kDepthWidth_px, kDepthHeight_px>;
+  std::unique_ptr<Depth> depth_ = std::make_unique<Depth>();
   std::unique_ptr<FramePicture> picture_ = std::make_unique<FramePicture>();
   std::unique_ptr<FramePlanes> planes_ = std::make_unique<FramePlanes>();
   std::unique_ptr<SurfaceProfile> profile_;
