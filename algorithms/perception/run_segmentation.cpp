@@ -11,7 +11,7 @@ namespace {
 
 using Wide = cv::v_float32;
 
-constexpr float kNowhere = -1e3F;   // 1/m: the line of a column without a run, which no row fits
+constexpr float kNowhere = -1e9F;   // 1/m: the line of a column without a run, which no row fits: not a depth of 1 mm
 constexpr float kNever = -1e9F;     // its absent rows
 constexpr float kNoSpread = 1e-9F;  // added to a sum of squares that may be 0
 constexpr float kFitted = 3.0F;     // rows that make a line

@@ -86,7 +86,7 @@ class SurfaceBoundaries {
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
 
  private:
-  static constexpr std::size_t kMaxJoints = 4096;
+  static constexpr std::size_t kMaxJoints = 26 * static_cast<std::size_t>(kColumns);  // ten steps have 20 a column
   static constexpr std::size_t kMaxPairs = 192;
   static constexpr std::int32_t kBins = 64;  // of half a pixel, -16 .. 16
   static constexpr std::int32_t kBinsPerPixel = 2;

@@ -202,7 +202,9 @@ bool SurfaceSides::try_line(const InversePlane& plane, Line& line) const noexcep
 OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept {
   const FramePlane& plane = (*planes_)[index];
   const double out = right ? 1.0 : -1.0;
-  const auto outer_edge = [right](std::uint8_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
+  const auto outer_edge = [right](SurfaceProfile::Column g) {
+    return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5);
+  };
   seen_.clear();
   hidden_.clear();
   const auto& ends = right ? profile.right : profile.left;
@@ -222,7 +224,7 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   double outermost = -1e9;
   for (std::size_t i = stride / 2; i < count; i += stride) {
     const std::int32_t r = rows_[i];
-    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+    const SurfaceProfile::Column g = ends[static_cast<std::size_t>(r)];
     RowEnd end{static_cast<double>(r), 0.0};
     const Ending ending = end_of_row(index, r, g, right, end.column);
     if (ending == Ending::kNone) continue;
@@ -234,7 +236,7 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   OutlineSide side;
   if (outermost < -1e8) {  // no row but flat ones
     for (std::int32_t r = first_row; r <= last_row; ++r) {
-      const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+      const SurfaceProfile::Column g = ends[static_cast<std::size_t>(r)];
       if (g != SurfaceProfile::kNoColumn) outermost = std::max(outermost, out * outer_edge(g));
     }
   }
@@ -255,7 +257,7 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   }
   double cut_px = 0.0;
   for (std::int32_t r = first_row; r <= last_row; ++r) {
-    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+    const SurfaceProfile::Column g = ends[static_cast<std::size_t>(r)];
     if (g != SurfaceProfile::kNoColumn) cut_px += std::max(beyond(r, outer_edge(g)) - params_.outside_px, 0.0);
   }
   if (on < params_.min_rows || on < params_.min_share * between) return side;
