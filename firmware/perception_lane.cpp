@@ -112,6 +112,7 @@ void PerceptionLane::begin_map() noexcept {
   view.world_T_camera = exposure_state_.world_T_base() * mount_.base_T_camera();
   view.position_sigma_m = exposure_state_.position_sigma_m.maxCoeff();
   view.tilt_sigma_rad = exposure_state_.tilt_sigma_rad;
+  if (params_.estimate_mount) view.mount_sigma_rad = mount_.tilt_sigma_rad();  // else the data sheet is believed
   view.intrinsics = intrinsics_;
   view.body = body_;
   view.body_margin = body_margin(params_.body, params_.legs, params_.mount.prior_tilt_sigma_rad);

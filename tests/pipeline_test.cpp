@@ -450,6 +450,22 @@ TEST_F(PipelineOnARobot, PoseOfAFrameIsUncertain_MapKnows) {
   }
 }
 
+TEST_F(PipelineOnARobot, MountIsUncertain_EdgesAre) {
+  Params params;
+  start(kToeGap_m, params);
+  run(1000);
+  const PerceptionLane& perception = module_->pipeline().perception();
+  const double learnt_rad = perception.mount().tilt_sigma_rad();
+  EXPECT_LT(learnt_rad, 0.5 * params.mount.prior_tilt_sigma_rad);
+  int edges = 0;
+  for (const MapPolygon& polygon : perception.map_snapshot().polygons) {
+    if (!polygon.surface.nosing.valid) continue;
+    ++edges;
+    EXPECT_GT(polygon.surface.nosing.sigma_m, 0.4 * learnt_rad);  // the camera is higher than that
+  }
+  EXPECT_GT(edges, 0);
+}
+
 // The table as the robot runs it: control and perception on threads of their own.
 class PipelineInTwoLanes : public testing::Test {
  protected:

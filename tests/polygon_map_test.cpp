@@ -36,8 +36,11 @@ double tread_error_m(const MapPolygon& tread, const Stairs& stairs, int step) {
 // A robot that looks and a map that remembers.
 class PolygonMapTest : public ::testing::Test {
  protected:
-  void fuse(const SurfaceFrame& frame, const Transform& world_T_camera, double position_sigma_m = 0.0) {
-    map_->begin(frame, {world_T_camera, position_sigma_m, 0.0, robot_camera_intrinsics()});
+  void fuse(const SurfaceFrame& frame, const Transform& world_T_camera, double position_sigma_m = 0.0,
+            double mount_sigma_rad = 0.0) {
+    PolygonMap::View view{world_T_camera, position_sigma_m, 0.0, robot_camera_intrinsics()};
+    view.mount_sigma_rad = mount_sigma_rad;
+    map_->begin(frame, view);
     WorkBudget budget(1 << 20);
     ASSERT_EQ(map_->step(budget), Progress::kDone);
     most_units_ = std::max(most_units_, (1 << 20) - budget.left());
@@ -140,6 +143,32 @@ TEST_F(PolygonMapTest, NosingLine_OverManyRuns_IsUnbiasedAndItsSigmaHonest) {
   EXPECT_LT(rms, sigma);        // the systematic part is not in these frames
   EXPECT_GT(rms, 0.2 * sigma);  // but it is not a made-up figure either
   EXPECT_LT(sigma, 0.003);
+}
+
+// What the mount turns by, it turns about the camera: an edge moves along the stairs by its depth below, a height by
+// its distance ahead.
+TEST_F(PolygonMapTest, MountKnownToAFifthOfADegree_EdgesAndHeightsAreAsVague) {
+  constexpr double kMount_rad = 0.2 * kPi / 180.0;
+  const Stairs stairs{.width_m = 0.7};
+  const Transform camera = test::camera_of(on_floor_);
+  std::array<SurfacePatch, 2> treads;
+  for (const bool vague : {false, true}) {
+    map_->clear();
+    for (int i = 0; i < 30; ++i) {
+      stamp_ns_ += kFrame_ns;
+      fuse(test::seen_from(stairs, camera, stamp_ns_, {}, random_), camera, 0.0, vague ? kMount_rad : 0.0);
+    }
+    const MapPolygon* tread = level_at(stairs.rise_m);
+    ASSERT_NE(tread, nullptr);
+    treads[vague ? 1 : 0] = tread->surface;
+  }
+  const auto added = [](double now, double before) { return std::sqrt(now * now - before * before); };
+  const double below_m = camera.p_m.z() - stairs.rise_m;
+  const double ahead_m = (treads[0].centroid_m - camera.p_m).head<2>().norm();
+  EXPECT_NEAR(added(treads[1].nosing.sigma_m, treads[0].nosing.sigma_m), kMount_rad * below_m, 2e-5);
+  EXPECT_NEAR(added(treads[1].back.sigma_m, treads[0].back.sigma_m), kMount_rad * below_m, 2e-5);
+  EXPECT_NEAR(added(treads[1].offset_sigma_m, treads[0].offset_sigma_m), kMount_rad * ahead_m, 2e-5);
+  EXPECT_NEAR(added(treads[1].tilt_sigma_rad, treads[0].tilt_sigma_rad), kMount_rad, 1e-5);
 }
 
 // Beside a map that was spared that frame: as good at once, and the same 2 s later.
@@ -551,7 +580,10 @@ TEST_F(PolygonMapTest, InvalidInput_IsRejectedAndCounted) {
   bad = view;
   bad.intrinsics.fx_px = 0.0;
   EXPECT_EQ(begin_with(bad, frame), Progress::kIdle);
-  EXPECT_EQ(counters().rejected_frames, 3U);
+  bad = view;
+  bad.mount_sigma_rad = std::nan("");
+  EXPECT_EQ(begin_with(bad, frame), Progress::kIdle);
+  EXPECT_EQ(counters().rejected_frames, 4U);
 
   EXPECT_EQ(begin_with(view, frame), Progress::kDone);
   EXPECT_EQ(begin_with(view, frame), Progress::kIdle);

@@ -58,10 +58,11 @@ class PolygonMap {
   struct View {
     Transform world_T_camera;       // at the exposure
     double position_sigma_m = 0.0;  // of that pose
-    double tilt_sigma_rad = 0.0;
+    double tilt_sigma_rad = 0.0;    // of the base
     CameraIntrinsics intrinsics;
     std::array<LegShapes, kFootCount> body{};  // camera frame; what it hides is not seen to be empty
     BodyMargin body_margin{0.02, 0.0};
+    double mount_sigma_rad = 0.0;  // of the camera's roll and pitch on the base: between what is seen and the feet
   };
   struct Counters {
     std::uint32_t frames = 0;
