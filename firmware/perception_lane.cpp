@@ -84,9 +84,10 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
   if (stage_ != FrameStage::kExtracting) return Progress::kIdle;
   const Progress progress = extractor_.step(budget);
   if (progress == Progress::kDone) {
-    const std::uint32_t overflow = extractor_.counters().plane_overflow;
-    health_.raise(Limit::kPlanesFull, now_ns, overflow - overflow_seen_);
-    overflow_seen_ = overflow;
+    const SurfaceExtractor::Counters& now = extractor_.counters();
+    health_.raise(Limit::kRunsFull, now_ns, now.run_overflow - extractor_seen_.run_overflow);
+    health_.raise(Limit::kPlanesFull, now_ns, now.plane_overflow - extractor_seen_.plane_overflow);
+    extractor_seen_ = now;
     if (params_.estimate_mount) learn_mount();
     begin_map();
     stage_ = FrameStage::kWaiting;

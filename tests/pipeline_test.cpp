@@ -286,6 +286,22 @@ TEST_F(PipelineAmongBoxes, MoreSurfacesThanAFrameMayHave_IsCounted) {
   EXPECT_GT(count(Limit::kPlanesFull), 0U);
 }
 
+// A fence of thin slats, one above the other: each ends a run wherever a column looks.
+TEST_F(PipelineAmongBoxes, MoreRunsThanAColumnMayHave_IsCounted) {
+  stand(kInitialised_ticks);
+  show(2, 3, -0.1);
+  EXPECT_EQ(count(Limit::kRunsFull), 0U);
+  const CameraIntrinsics camera = robot_camera_intrinsics();
+  std::vector<std::uint16_t> slats(camera_.pixels());
+  for (std::size_t i = 0; i < slats.size(); ++i) {
+    const bool near = i / static_cast<std::size_t>(camera.width_px) / 6 % 2 == 0;
+    slats[i] = static_cast<std::uint16_t>((near ? 0.8 : 1.2) / camera.depth_unit_m);
+  }
+  camera_.feed(clock_.now_ns(), slats);
+  stand(100);
+  EXPECT_GT(count(Limit::kRunsFull), 0U);
+}
+
 TEST_F(PipelineAmongBoxes, MorePolygonsThanTheMapHolds_IsCounted) {
   stand(kInitialised_ticks);
   for (const double lowest_m : {-1.5, -1.25, -1.0, -0.75, -0.5, -0.25}) show(3, 4, lowest_m);
@@ -434,6 +450,17 @@ TEST_F(PipelineOnARobot, TouchDown_OnlyATreadsHeightIsNews) {
   EXPECT_EQ(control().estimator().counters().height_taken, 0U);
   ASSERT_TRUE(run_until(GaitPhase::kDoubleSupport, gait().step.sequence));
   EXPECT_EQ(control().estimator().counters().height_taken, 1U);
+}
+
+TEST_F(PipelineOnARobot, TreadElsewhereThanTheSoleOnIt_IsCounted) {
+  Params params;
+  params.estimator.max_height_error_m = 0.0;
+  start(kToeGap_m, params);
+  ASSERT_TRUE(reach_the_stairs());
+  EXPECT_EQ(module_->pipeline().health().count(Limit::kHeightRejected).count, 0U);
+  ASSERT_TRUE(run_until(GaitPhase::kDoubleSupport, gait().step.sequence));
+  run(2);
+  EXPECT_EQ(module_->pipeline().health().count(Limit::kHeightRejected).count, 1U);
 }
 
 TEST_F(PipelineOnARobot, PoseOfAFrameIsUncertain_MapKnows) {
