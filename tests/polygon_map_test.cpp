@@ -381,6 +381,43 @@ TEST_F(PolygonMapTest, PatchesOfOneTreadBesideTheRobotsLeg_AreOneTread) {
   EXPECT_EQ(counters().created, 1U);
 }
 
+// Risers are matched from up to 60 mm off, and may have moved by 25 mm.
+TEST_F(PolygonMapTest, RiserSeenElsewhere_OnlyItsOutliersCountUntilTheyPersist) {
+  const Transform camera = looking_down({0, 0, 1});
+  const auto see_riser_at = [&](double x_m, double rmse_m) {
+    SurfacePatch riser;
+    riser.kind = SurfaceKind::kRiser;
+    riser.normal = -Vec3::UnitX();
+    riser.d_m = x_m;
+    riser.centroid_m = {x_m, 0.0, 0.1};
+    riser.offset_sigma_m = riser.tilt_sigma_rad = 0.001;
+    riser.rmse_m = rmse_m;
+    for (const Vec2& v : {Vec2{0.3, 0.05}, {-0.3, 0.05}, {-0.3, 0.15}, {0.3, 0.15}}) {
+      EXPECT_TRUE(riser.polygon.try_push_back({x_m, v.x(), v.y()}));
+    }
+    stamp_ns_ += kFrame_ns;
+    fuse(in_camera({riser}, camera, stamp_ns_), camera);
+  };
+  for (int i = 0; i < 10; ++i) see_riser_at(0.2, 0.001);
+  const std::int64_t last_ns = stamp_ns_;
+  const std::uint32_t persistent = PolygonMap::Params{}.outliers_to_reset;
+  for (std::uint32_t i = 1; i < persistent; ++i) see_riser_at(0.24, 0.01);
+  ASSERT_EQ(map_->snapshot().polygons.size(), 1U);
+  const MapPolygon& riser = map_->snapshot().polygons[0];
+  EXPECT_EQ(counters().plane_outliers, persistent - 1);
+  EXPECT_EQ(counters().fused, 9U);
+  EXPECT_EQ(riser.sightings, 10U);
+  EXPECT_EQ(riser.last_seen_ns, last_ns);
+  EXPECT_EQ(map_->snapshot().stamp_ns, last_ns);
+  EXPECT_NEAR(riser.surface.rmse_m, 0.001, 1e-9);
+  EXPECT_NEAR(riser.surface.centroid_m.x(), 0.2, 1e-6);
+  see_riser_at(0.24, 0.01);
+  EXPECT_EQ(counters().resets, 1U);
+  EXPECT_EQ(riser.sightings, 11U);
+  EXPECT_EQ(riser.last_seen_ns, stamp_ns_);
+  EXPECT_NEAR(riser.surface.centroid_m.x(), 0.24, 1e-6);
+}
+
 TEST_F(PolygonMapTest, TwoPolygonsBridgedByOneSighting_BecomeOne) {
   const Transform camera = looking_down({0, 0, 2});
   for (int i = 0; i < 5; ++i) {

@@ -123,7 +123,8 @@ class PolygonMap {
   void create() noexcept;
   void admit(const MapTrack& track) noexcept;
   [[nodiscard]] int claim(const MapTrack& track) const noexcept;
-  void fuse(MapTrack& track) noexcept;
+  // offset_m: of the seen plane along the remembered normal, at the track's origin; fade: of what was known.
+  void fuse(MapTrack& track, double offset_m, double fade) noexcept;
   void merge(MapTrack& into, MapTrack& from) noexcept;
   void age(MapTrack& track) noexcept;
   [[nodiscard]] std::int32_t publish() noexcept;

@@ -2,6 +2,7 @@
 // The polygon map: surfaces that are created, fused, merged, and dropped.
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <utility>
 
 #include "algorithms/perception/polygon_map.hpp"
 
@@ -13,26 +14,32 @@ constexpr double kMaxLocalSlope = 0.05;  // steeper: the local axes turn to the 
 }  // namespace
 
 void PolygonMap::fuse_best() noexcept {
-  ++fused_in_frame_;
   if (best_ >= tracks_.size()) {
+    ++fused_in_frame_;
     create();
     return;
   }
-  MapTrack& best = tracks_[best_];
+  MapTrack* keep = &tracks_[best_];
+  MapTrack* gone = nullptr;
   // One surface that lies on two remembered ones says that they are one.
-  if (second_ < tracks_.size()) {
-    MapTrack& second = tracks_[second_];
-    if (best_cost_ < 1.0 && second_cost_ < 1.0) {
-      const bool best_stays =
-          best.sightings > second.sightings || (best.sightings == second.sightings && best.id < second.id);
-      MapTrack& keep = best_stays ? best : second;
-      merge(keep, best_stays ? second : best);
-      fuse(keep);
-      ++counters_.fused;
-      return;
+  if (second_ < tracks_.size() && best_cost_ < 1.0 && second_cost_ < 1.0) {
+    gone = &tracks_[second_];
+    if (gone->sightings > keep->sightings || (gone->sightings == keep->sightings && gone->id < keep->id)) {
+      std::swap(keep, gone);
     }
   }
-  fuse(best);
+  // A riser is matched from further off than it may have moved.
+  const Transform& frame = keep->world_T_local;
+  const double offset_m = -seen_.plane.distance_m(frame.p_m) / frame.R.col(2).dot(seen_.plane.normal);
+  const bool outlier = std::abs(offset_m) > params_.line_gate_max_m;
+  if (outlier) {
+    ++counters_.plane_outliers;
+    if (++keep->outliers < params_.outliers_to_reset) return;
+    ++counters_.resets;
+  }
+  if (gone != nullptr) merge(*keep, *gone);
+  fuse(*keep, offset_m, outlier ? 0.0 : faded(keep->last_seen_ns));
+  ++fused_in_frame_;
   ++counters_.fused;
 }
 
@@ -108,11 +115,11 @@ void PolygonMap::admit(const MapTrack& track) noexcept {
   ++counters_.created;
 }
 
-void PolygonMap::fuse(MapTrack& track) noexcept {
-  double fade = faded(track.last_seen_ns);
+void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
   if (track.last_seen_ns != newest_ns_) ++track.sightings;
   track.last_seen_ns = newest_ns_;
   track.misses = 0;
+  track.outliers = 0;
   track.rmse_m += 0.1 * (seen_.rmse_m - track.rmse_m);
   track.invalid_fraction = seen_.invalid_fraction;
 
@@ -120,15 +127,6 @@ void PolygonMap::fuse(MapTrack& track) noexcept {
   Transform& frame = track.world_T_local;
   Vec3 normal = frame.R.col(2);
   const double cosine = normal.dot(seen_.plane.normal);
-  const double offset_m = -seen_.plane.distance_m(frame.p_m) / cosine;
-  // A riser is matched from further off than it may have moved.
-  if (std::abs(offset_m) > params_.line_gate_max_m) {
-    ++counters_.plane_outliers;
-    if (++track.outliers < params_.outliers_to_reset) return;
-    ++counters_.resets;
-    fade = 0.0;
-  }
-  track.outliers = 0;
   const double lever2_m2 = (seen_.centroid_m - frame.p_m).squaredNorm();
   const double weight = 1.0 / (seen_.offset_variance_m2 + seen_.tilt_variance_rad2 * lever2_m2);
   track.offset_information = track.offset_information * fade + weight;
