@@ -529,6 +529,34 @@ TEST_F(PolygonMapTest, ConfirmedInViewButGone_IsDroppedAfter3s) {
   EXPECT_GE(counters().dropped_vanished, 1U);
 }
 
+// Shanks across the view of a tread, seen from above, that is not there any more.
+TEST_F(PolygonMapTest, TreadGoneBehindALeg_ForgottenWhereMostOfItsPlaceIsInView) {
+  const Transform camera = looking_down({0, 0, 1});
+  const auto vanishes_behind = [&](const std::vector<double>& shanks_x_m) {
+    map_->clear();
+    for (int i = 0; i < 10; ++i) {
+      stamp_ns_ += kFrame_ns;
+      fuse(in_camera({level_patch({0, 0, 0.1}, 0.14, 0.3)}, camera, stamp_ns_), camera);
+    }
+    PolygonMap::View view{camera, 0.0, 0.0, robot_camera_intrinsics()};
+    for (std::size_t i = 0; i < shanks_x_m.size(); ++i) {  // camera frame, halfway to the tread
+      view.body[i].shank = {Vec3{shanks_x_m[i], -0.2, 0.45}, Vec3{shanks_x_m[i], 0.2, 0.45}, 0.03};
+    }
+    for (int i = 0; i < 100; ++i) {
+      SurfaceFrame blank;
+      blank.stamp_ns = stamp_ns_ += kFrame_ns;
+      map_->begin(blank, view);
+      WorkBudget budget(1 << 20);
+      EXPECT_EQ(map_->step(budget), Progress::kDone);
+    }
+    return map_->snapshot().polygons.empty();
+  };
+  EXPECT_TRUE(vanishes_behind({}));
+  EXPECT_TRUE(vanishes_behind({0.0}));           // hides the middle alone
+  EXPECT_FALSE(vanishes_behind({-0.08, 0.08}));  // leave a gap at the middle
+  EXPECT_TRUE(vanishes_behind({-0.08}));         // hides less than half
+}
+
 TEST_F(PolygonMapTest, FrameWithoutSurfaces_DoesNotMakeTheMapFresh) {
   look({}, on_floor_, {});
   const std::int64_t seen = stamp_ns_;

@@ -151,9 +151,8 @@ Progress PolygonMap::step(WorkBudget& budget) noexcept {
         stage_ = Stage::kLoad;
         break;
       case Stage::kAge:
-        budget.spend(1);
         if (track_ < tracks_.size()) {
-          age(tracks_[track_++]);
+          budget.spend(age(tracks_[track_++]));
         } else {
           stage_ = Stage::kPublish;
         }

@@ -126,7 +126,7 @@ class PolygonMap {
   // offset_m: of the seen plane along the remembered normal, at the track's origin; fade: of what was known.
   void fuse(MapTrack& track, double offset_m, double fade) noexcept;
   void merge(MapTrack& into, MapTrack& from) noexcept;
-  void age(MapTrack& track) noexcept;
+  [[nodiscard]] std::int32_t age(MapTrack& track) noexcept;
   [[nodiscard]] std::int32_t publish() noexcept;
 
   [[nodiscard]] ConvexPolygon local_polygon(const MapTrack& track) const noexcept;
@@ -138,7 +138,8 @@ class PolygonMap {
   void update_sides(MapTrack& track, bool first) noexcept;
   void update_side(TrackedSide& side, double seen_m, bool observed) noexcept;
   void rebuild(MapTrack& track) noexcept;
-  [[nodiscard]] bool should_be_seen(const MapTrack& track) const noexcept;
+  [[nodiscard]] bool in_view(const MapTrack& track, const Transform& camera_T_local) const noexcept;
+  [[nodiscard]] bool hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept;
   [[nodiscard]] double faded(std::int64_t since_ns) const noexcept;
   void write(const MapTrack& track, MapPolygon& out) const noexcept;
   void write_sigmas(const MapTrack& track, SurfacePatch& out) const noexcept;

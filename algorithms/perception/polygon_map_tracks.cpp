@@ -9,6 +9,10 @@
 namespace polygmap {
 namespace {
 
+// Work units.
+constexpr std::int32_t kAgeUnits = 1;
+constexpr std::int32_t kHiddenUnits = 20;
+
 constexpr double kMaxLocalSlope = 0.05;  // steeper: the local axes turn to the line
 
 }  // namespace
@@ -168,16 +172,12 @@ void PolygonMap::merge(MapTrack& into, MapTrack& from) noexcept {
   ++counters_.merged;
 }
 
-bool PolygonMap::should_be_seen(const MapTrack& track) const noexcept {
-  const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
+bool PolygonMap::in_view(const MapTrack& track, const Transform& camera_T_local) const noexcept {
   const Vec2 middle = centroid_m(track.polygon);
   const Vec3 centre = camera_T_local * Vec3{middle.x(), middle.y(), 0.0};
   const double range_m = centre.norm();
   const double incidence = -camera_T_local.R.col(2).dot(centre) / std::max(range_m, 1e-6);
   if (range_m > params_.view_range_m || incidence < params_.view_min_incidence) return false;
-  for (const LegShapes& leg : view_.body) {
-    if (hides(leg, view_.body_margin.at(range_m), centre)) return false;
-  }
   const CameraIntrinsics& c = view_.intrinsics;
   for (const Vec2& v : track.polygon) {
     const Vec2 inner = 0.5 * (v + middle);
@@ -190,10 +190,27 @@ bool PolygonMap::should_be_seen(const MapTrack& track) const noexcept {
   return true;
 }
 
-void PolygonMap::age(MapTrack& track) noexcept {
-  if (track.dead || track.last_seen_ns == newest_ns_) return;
+// By the robot's own body: half of its middle and four points halfway to vertices around it, or more.
+bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept {
+  constexpr std::size_t kAround = 4;
+  const Vec2 middle = centroid_m(track.polygon);
+  std::size_t hidden = 0;
+  for (std::size_t i = 0; i <= kAround; ++i) {
+    const Vec2 towards = i == kAround ? middle : track.polygon[i * track.polygon.size() / kAround];
+    const Vec2 inner = 0.5 * (towards + middle);
+    const Vec3 p = camera_T_local * Vec3{inner.x(), inner.y(), 0.0};
+    const double margin_m = view_.body_margin.at(p.norm());
+    hidden += hides(view_.body[0], margin_m, p) || hides(view_.body[1], margin_m, p) ? 1U : 0U;
+  }
+  return 2 * hidden > kAround;
+}
+
+std::int32_t PolygonMap::age(MapTrack& track) noexcept {
+  if (track.dead || track.last_seen_ns == newest_ns_) return kAgeUnits;
+  const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
+  const bool looked = in_view(track, camera_T_local);
+  if (looked && !hidden(track, camera_T_local)) ++track.misses;
   const bool confirmed = track.sightings >= params_.confirmed_sightings;
-  if (should_be_seen(track)) ++track.misses;
   if (confirmed && track.misses >= params_.misses_confirmed) {
     track.dead = true;
     ++counters_.dropped_vanished;
@@ -202,6 +219,7 @@ void PolygonMap::age(MapTrack& track) noexcept {
     track.dead = true;
     ++counters_.dropped_unconfirmed;
   }
+  return looked ? kAgeUnits + kHiddenUnits : kAgeUnits;
 }
 
 double PolygonMap::faded(std::int64_t since_ns) const noexcept {
