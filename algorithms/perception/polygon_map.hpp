@@ -47,7 +47,6 @@ class PolygonMap {
     std::uint32_t misses_confirmed = 90;
     double unconfirmed_age_s = 2.0;      // unconfirmed and out of view
     double systematic_sigma_m = 0.0015;  // of depth errors that repeat from frame to frame and do not average out
-    double drift_m_per_sqrt_s = 0.0015;  // of the world pose while a surface is out of view
     double view_margin_px = 30.0;
     double view_range_m = 2.5;
     double view_min_incidence = 0.25;  // sine of the angle between ray and surface

@@ -70,7 +70,7 @@ void PolygonMap::write_sigmas(const MapTrack& track, SurfacePatch& out) const no
   const double common_m2 = math::square(params_.systematic_sigma_m), mount_rad2 = math::square(view_.mount_sigma_rad);
   const auto sigma = [&](double variance_m2, double arm2_m2, std::int64_t seen_ns) {
     return math::sqrt(variance_m2 + common_m2 + mount_rad2 * arm2_m2 +
-                      math::square(params_.drift_m_per_sqrt_s) * seconds(newest_ns_ - seen_ns));
+                      math::square(params_.drift.walk_m_per_sqrt_s) * seconds(newest_ns_ - seen_ns));
   };
   const auto arm_m = [this](const Vec3& p_m) { return Vec3{p_m - map_T_camera_.p_m}; };
   out.offset_sigma_m =
