@@ -273,16 +273,18 @@ TEST(DepthNoise, StereoOnFloor_GrowsWithTheSquareOfTheRange) {
   EXPECT_NEAR(std::sqrt(far / far_count), 1.0, 0.03);
 }
 
-TEST(DepthNoise, Correlated_OnFloor_HasItsSigmaAndCorrelationAndBlobs) {
-  NoiseOnFloor floor({.kind = DepthNoise::kCorrelated, .warp_m = 0.0});
-  const NoiseFigures f = measure(floor);
-  EXPECT_NEAR(f.mean, 0.0, 0.05);
-  EXPECT_NEAR(f.sigma, std::sqrt(0.25 + 0.87 * 0.87), 0.03);
-  EXPECT_NEAR(f.next, 0.87 * 0.87 * (8.0 / 9.0) / (0.25 + 0.87 * 0.87), 0.03);
-  EXPECT_NEAR(f.far, 0.0, 0.05);
-  EXPECT_NEAR(f.frame_to_frame, 0.0, 0.05);
-  EXPECT_NEAR(f.dropout, 0.05, 0.01);
-  EXPECT_GT(f.dropout_pairs, 0.4);
+TEST(DepthNoise, Correlated_OnFloor_HasItsSigmaAndItsSharesCorrelationAndBlobs) {
+  for (const double share : {DepthSigma{}.correlated_share, 0.3, 1.0}) {
+    NoiseOnFloor floor({.kind = DepthNoise::kCorrelated, .sigma = {.correlated_share = share}, .warp_m = 0.0});
+    const NoiseFigures f = measure(floor);
+    EXPECT_NEAR(f.mean, 0.0, 0.05);
+    EXPECT_NEAR(f.sigma, 1.0, 0.03);
+    EXPECT_NEAR(f.next, std::min(share, 8.0 / 9.0), 0.03);
+    EXPECT_NEAR(f.far, 0.0, 0.05);
+    EXPECT_NEAR(f.frame_to_frame, 0.0, 0.05);
+    EXPECT_NEAR(f.dropout, 0.05, 0.01);
+    EXPECT_GT(f.dropout_pairs, 0.4);
+  }
 }
 
 TEST(DepthNoise, Warp_OverTwentySeconds_IsHalfFixedAndHalfRedrawn) {
