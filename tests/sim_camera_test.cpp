@@ -523,6 +523,14 @@ std::uint64_t fingerprint(SimOptions options, bool threaded) {
   return hash;
 }
 
+TEST(SimRobot, ScanTime_IsRoundedToTwoTicksAndSaysSo) {
+  for (const auto& [asked_ms, simulated_ms] : {std::pair{16.0, 16.0}, {15.0, 16.0}, {9.5, 8.0}, {1.0, 0.0}}) {
+    SimOptions options;
+    options.camera.scan_s = 1e-3 * asked_ms;
+    EXPECT_NEAR(1e3 * SimRobot(options).depth_camera().scan_s(), simulated_ms, 1e-9) << asked_ms;
+  }
+}
+
 TEST(SimRobot, SameSeed_ThreadedOrNot_IsTheSameToTheLastBit) {
   for (const DepthNoise kind : {DepthNoise::kWhite, DepthNoise::kCorrelated}) {
     SimOptions options;
