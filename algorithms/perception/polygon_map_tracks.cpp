@@ -190,7 +190,7 @@ bool PolygonMap::in_view(const MapTrack& track, const Transform& camera_T_local)
   return true;
 }
 
-// By the robot's own body: half of its middle and four points halfway to vertices around it, or more.
+// By the robot's own body: three of five points, the middle and four halfway to vertices around it.
 bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept {
   constexpr std::size_t kAround = 4;
   const Vec2 middle = centroid_m(track.polygon);
