@@ -73,9 +73,9 @@ void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
     view.body = body_;
     if (extractor_.try_begin(frame_, view)) {
       stage_ = FrameStage::kExtracting;
-    } else {
-      health_.raise(Fault::kDepthRejected, now_ns);
+      return;
     }
+    health_.raise(Fault::kDepthRejected, now_ns);
   }
   camera_port_.release();
 }
@@ -84,6 +84,7 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
   if (stage_ != FrameStage::kExtracting) return Progress::kIdle;
   const Progress progress = extractor_.step(budget);
   if (progress == Progress::kDone) {
+    camera_port_.release();
     const SurfaceExtractor::Counters& now = extractor_.counters();
     health_.raise(Limit::kRunsFull, now_ns, now.run_overflow - extractor_seen_.run_overflow);
     health_.raise(Limit::kPlanesFull, now_ns, now.plane_overflow - extractor_seen_.plane_overflow);

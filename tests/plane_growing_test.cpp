@@ -16,7 +16,8 @@ class PlanesFromRuns : public testing::Test {
  protected:
   void grow(const PlaneGrowing::Params& params = {}) {
     runs_->begin({}, {}, scene_.intrinsics, *scene_.image);
-    for (std::int32_t r = 0; r < kDepthHeight_px; ++r) runs_->add_row(r);
+    for (std::int32_t r = 0; r < kDepthHeight_px; r += RunSegmentation::kBlock)
+      runs_->add_rows(r, r + RunSegmentation::kBlock - 1);
     runs_->finish();
     growing_->begin(params, {}, scene_.rays, runs_->columns());
     while (!growing_->step()) {
@@ -37,7 +38,7 @@ class PlanesFromRuns : public testing::Test {
     }
     boundaries_->settle();
     boundaries_->begin_refit();
-    for (std::int32_t g = 0; g < kColumns; g += SurfaceBoundaries::kRefitColumns) boundaries_->refit(g);
+    for (std::int32_t g = 0; g < kColumns; g += SurfaceBoundaries::kRefitColumns) boundaries_->refit(g, false);
   }
   // Row at which plane a, above, hands over to b in a column's ray.
   [[nodiscard]] double meeting_row(const InversePlane& a, const InversePlane& b, std::int32_t column) const {

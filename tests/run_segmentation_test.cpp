@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include "tests/support/column_scene.hpp"
 
@@ -14,9 +16,9 @@ using test::ColumnScene;
 
 class RunSegmentationTest : public testing::Test {
  protected:
-  const RunSegmentation::Columns& segment() {
+  const RunSegmentation::Columns& segment(std::int32_t rows = RunSegmentation::kBlock) {
     runs_->begin({}, {}, scene_.intrinsics, *scene_.image);
-    for (std::int32_t r = 0; r < kDepthHeight_px; ++r) runs_->add_row(r);
+    for (std::int32_t r = 0; r < kDepthHeight_px; r += rows) runs_->add_rows(r, r + rows - 1);
     runs_->finish();
     return runs_->columns();
   }
@@ -112,7 +114,29 @@ TEST_F(RunSegmentationTest, VectorsOfAnyWidth_GiveTheSameRuns) {
     }
   }
   EXPECT_GT(count, std::size_t{kColumns} * 12);
-  EXPECT_EQ(hash, 2788143759U);
+  EXPECT_EQ(hash, 2079954293U);
+}
+
+// Rows that are added together are the same least squares as one after the other.
+TEST_F(RunSegmentationTest, RowsInBlocks_GiveTheRunsOfRowsOneByOne) {
+  scene_.paint([this](std::int32_t, std::int32_t r) { return r / 37 % 2 == 0 ? &riser_ : &floor_; }, 0.002, 5);
+  const RunSegmentation::Columns one_by_one = segment(1);
+  const RunSegmentation::Columns& in_blocks = segment();
+  std::size_t runs = 0, same_ends = 0, same_lines = 0;
+  for (std::size_t g = 0; g < kColumns; ++g) {
+    runs += one_by_one[g].size();
+    for (std::size_t k = 0; k < std::min(one_by_one[g].size(), in_blocks[g].size()); ++k) {
+      const polygmap::Run &a = one_by_one[g][k], &b = in_blocks[g][k];
+      if (a.top != b.top || a.bottom != b.bottom) continue;
+      ++same_ends;
+      // A row that is an outlier to one of them only moves the line.
+      same_lines +=
+          std::abs(a.slope - b.slope) < 1e-7F && std::abs(a.inverse_depth - b.inverse_depth) < 1e-5F ? 1U : 0U;
+    }
+  }
+  EXPECT_GT(runs, std::size_t{kColumns} * 12);
+  EXPECT_GT(static_cast<double>(same_ends), 0.95 * static_cast<double>(runs));
+  EXPECT_GT(static_cast<double>(same_lines), 0.95 * static_cast<double>(runs));
 }
 
 TEST_F(RunSegmentationTest, MoreRunsThanFit_AreCounted) {

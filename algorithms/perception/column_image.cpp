@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algorithms/perception/column_image.hpp"
 
+#include <algorithm>
+
 #include "algorithms/perception/vectors.hpp"
 
 namespace polygmap {
@@ -16,52 +18,53 @@ void widen(const Raw& x, std::array<Wide, 2>& out) noexcept {
   out = {cv::v_cvt_f32(cv::v_reinterpret_as_s32(low)), cv::v_cvt_f32(cv::v_reinterpret_as_s32(high))};
 }
 
-// x + y, which 16 bits do not hold.
-void widen_sum(const Raw& x, const Raw& y, std::array<Wide, 2>& out) noexcept {
-  cv::v_uint32 x_low, x_high, y_low, y_high;
-  cv::v_expand(x, x_low, x_high);
-  cv::v_expand(y, y_low, y_high);
-  out = {cv::v_cvt_f32(cv::v_reinterpret_as_s32(x_low + y_low)),
-         cv::v_cvt_f32(cv::v_reinterpret_as_s32(x_high + y_high))};
+// w + x + y + z, which 16 bits do not hold.
+void widen_sum(const Raw& w, const Raw& x, const Raw& y, const Raw& z, std::array<Wide, 2>& out) noexcept {
+  std::array<cv::v_uint32, 2> sum, next;
+  cv::v_expand(w, sum[0], sum[1]);
+  for (const Raw* more : {&x, &y, &z}) {
+    cv::v_expand(*more, next[0], next[1]);
+    for (std::size_t half = 0; half < 2; ++half) sum[half] = sum[half] + next[half];
+  }
+  for (std::size_t half = 0; half < 2; ++half) out[half] = cv::v_cvt_f32(cv::v_reinterpret_as_s32(sum[half]));
 }
 
 }  // namespace
 
 ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body,
                              std::int32_t columns, float* inverse_depth, std::uint8_t* valid) noexcept {
-  const Raw lowest = cv::vx_setall_u16(range.min), none = cv::vx_setzero_u16(), one = cv::vx_setall_u16(1);
+  const Raw lowest = cv::vx_setall_u16(range.min), none = cv::vx_setzero_u16();
   const Raw reach = cv::vx_setall_u16(static_cast<std::uint16_t>(range.max - range.min));
   const Raw all = none == none, any = range.min <= range.max ? all : none;
   const cv::v_uint8 is_body = cv::vx_setall_u8(kPixelBody);
-  const Wide per_metre = cv::vx_setall_f32(range.per_metre);
+  const Wide per_metre = cv::vx_setall_f32(range.per_metre), least = cv::vx_setall_f32(1.0F);
   Raw measured = none, free = none;
+  std::array<std::uint16_t, static_cast<std::size_t>(kColumn_px) * Raw::nlanes> tail{};
   std::int32_t g = 0;
   for (; g < columns; g += Raw::nlanes) {
+    const std::uint16_t* from = raw + static_cast<std::ptrdiff_t>(kColumn_px) * g;
+    if (columns - g < Raw::nlanes) {  // the driver's buffer ends with its last row
+      std::copy(from, raw + static_cast<std::ptrdiff_t>(kColumn_px) * columns, tail.begin());
+      from = tail.data();
+    }
     Raw a, b, c, d;
-    cv::v_load_deinterleave(raw + static_cast<std::ptrdiff_t>(kColumn_px) * g, a, b, c, d);
+    cv::v_load_deinterleave(from, a, b, c, d);
     Raw seen = all;
     if (body != nullptr) seen = cv::v_reinterpret_as_u16(cv::vx_load(body + 2 * g) & is_body) == none;
-    const Raw wanted = seen & any;
     const auto good = [&](const Raw& x) {
       const Raw above = cv::v_sub_wrap(x, lowest);
-      return (cv::v_min(above, reach) == above) & wanted;
+      return cv::v_min(above, reach) == above;
     };
     const Raw good_a = good(a), good_b = good(b), good_c = good(c), good_d = good(d);
     const Raw count =
-        cv::v_sub_wrap(none, cv::v_add_wrap(cv::v_add_wrap(good_a, good_b), cv::v_add_wrap(good_c, good_d)));
-    // Pixels that are none become 1, and leave the numerators below.
-    a = cv::v_max(a & good_a, one), b = cv::v_max(b & good_b, one);
-    c = cv::v_max(c & good_c, one), d = cv::v_max(d & good_d, one);
-    std::array<Wide, 2> fa, fb, fc, fd, ab, cd, n;
-    widen(a, fa), widen(b, fb), widen(c, fc), widen(d, fd);
-    widen_sum(b & good_a, a & good_b, ab);
-    widen_sum(d & good_c, c & good_d, cd);
-    widen(cv::v_max(count, one), n);
+        cv::v_sub_wrap(none, cv::v_add_wrap(cv::v_add_wrap(good_a, good_b), cv::v_add_wrap(good_c, good_d))) & seen &
+        any;
+    std::array<Wide, 2> n, sum;
+    widen(count, n);
+    widen_sum(a & good_a, b & good_b, c & good_c, d & good_d, sum);
     for (std::size_t half = 0; half < 2; ++half) {
-      // 1/a + 1/b + 1/c + 1/d with one division.
-      const Wide lower = fa[half] * fb[half], upper = fc[half] * fd[half];
-      const Wide sum = (ab[half] * upper + cd[half] * lower) * per_metre / (lower * upper * n[half]);
-      cv::v_store(inverse_depth + g + static_cast<std::ptrdiff_t>(half) * Wide::nlanes, sum);
+      cv::v_store(inverse_depth + g + static_cast<std::ptrdiff_t>(half) * Wide::nlanes,
+                  n[half] * per_metre / cv::v_max(sum[half], least));
     }
     cv::v_pack_store(valid + g, count);
     measured = cv::v_add_wrap(measured, count);

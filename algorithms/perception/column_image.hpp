@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The picture as columns of four pixels' width, at full resolution downwards: the means of the valid inverse depths.
-// Stairs change from row to row and hardly within four pixels of a row; the mean halves white noise.
+// The picture as columns of four pixels' width, at full resolution downwards: the inverse of the valid depths' mean.
+// Stairs change from row to row and hardly within four pixels of a row; the mean halves white noise. (The mean of the
+// inverses, linear on a plane, takes twice the work; the two differ by the square of the depths' relative spread.)
 #pragma once
 
 #include <array>
@@ -44,7 +45,7 @@ struct ReducedRow {
   std::int32_t body_columns = 0;
 };
 // One row of raw depth to one row of columns. body: half-resolution flags of that row, or null. Works in whole vector
-// registers: all rows are as long as the rasters', and columns beyond the picture's come out empty.
+// registers: body and the outputs are as long as the rasters' rows, and columns beyond the picture's come out empty.
 ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body,
                              std::int32_t columns, float* inverse_depth, std::uint8_t* valid) noexcept;
 

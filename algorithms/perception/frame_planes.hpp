@@ -14,13 +14,14 @@
 
 namespace polygmap {
 
-using FullDepthImage = Raster<std::uint16_t, kDepthWidth_px, kDepthHeight_px>;
-
-// The picture as the camera delivered it.
+// The picture as the camera delivered it, in the driver's buffer.
 struct RawPicture {
-  const FullDepthImage* depth = nullptr;
+  const std::uint16_t* depth = nullptr;
   CameraIntrinsics intrinsics;
   RawRange range;
+  [[nodiscard]] const std::uint16_t* row(std::int32_t r) const noexcept {
+    return depth + static_cast<std::ptrdiff_t>(r) * intrinsics.width_px;
+  }
 };
 
 struct FramePlane {

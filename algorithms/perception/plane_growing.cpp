@@ -126,8 +126,9 @@ bool PlaneGrowing::try_seed(Place place) noexcept {
   Vec3 m;
   if (used < 3 || !sums.try_solve(m)) return false;
   const double w = sums.w / sums.n;
-  if (math::sqrt(sums.mean_square(m)) > tolerance_m(w) * m.norm() * w) return false;
+  if (sums.mean_square(m) > math::square(tolerance_w(w)) * m.squaredNorm()) return false;
   m_ = m;
+  norm2_ = m.squaredNorm();
   sums_ = Sums{};
   // The first fit waits until the plane itself has more than the seed had.
   next_fit_px_ = kGrowth * sums.n;
@@ -149,15 +150,17 @@ void PlaneGrowing::consider(Place place) noexcept {
   const double offset = middle.w - (m_.x() * ray_x + m_.y() * middle.y + m_.z());
   const double tilt = static_cast<double>(run.slope) - m_.y() * pitch;
   const double rows = run.rows();
-  const double off2 = offset * offset + tilt * tilt * (rows * rows - 1.0) / 12.0;
-  if (!(middle.w > kLeastNorm)) return;
-  if (off2 > math::square(tolerance_m(middle.w) * middle.w) * m_.squaredNorm()) return;
+  const double off2 = offset * offset + tilt * tilt * (rows * rows - 1.0) * (1.0 / 12.0);
+  if (!(middle.w > kLeastNorm) || off2 > math::square(tolerance_w(middle.w)) * norm2_) return;
   run.plane = static_cast<std::uint8_t>(count_ + 1);
   sums_.add(ray_x, *rays_, run);
   queue_[queue_size_++] = place;
   first_column_ = std::min<std::int32_t>(first_column_, place.column);
   last_column_ = std::max<std::int32_t>(last_column_, place.column);
-  if (sums_.n > next_fit_px_ && sums_.try_solve(m_)) next_fit_px_ = kGrowth * sums_.n;
+  if (sums_.n > next_fit_px_ && sums_.try_solve(m_)) {
+    norm2_ = m_.squaredNorm();
+    next_fit_px_ = kGrowth * sums_.n;
+  }
 }
 
 void PlaneGrowing::visit(Place place) noexcept {

@@ -63,8 +63,9 @@ class PlaneGrowing {
   void visit(Place place) noexcept;
   void consider(Place place) noexcept;
   void close() noexcept;
-  [[nodiscard]] double tolerance_m(double inverse_depth) const noexcept {
-    return params_.join_floor_m + params_.join_sigmas * noise_.sigma_m(1.0 / inverse_depth);
+  // The tolerance of a distance times inverse depth.
+  [[nodiscard]] double tolerance_w(double w) const noexcept {
+    return params_.join_floor_m * w + params_.join_sigmas * noise_.inverse_sigma(w) / w;
   }
 
   Params params_;
@@ -82,6 +83,7 @@ class PlaneGrowing {
   bool growing_ = false;
   Sums sums_;
   Vec3 m_ = Vec3::UnitZ();
+  double norm2_ = 1.0;  // of m_
   double next_fit_px_ = 0.0;
   std::int32_t first_column_ = 0;
   std::int32_t last_column_ = 0;

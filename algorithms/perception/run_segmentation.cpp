@@ -10,7 +10,6 @@ namespace polygmap {
 namespace {
 
 using Wide = cv::v_float32;
-static_assert(kColumns % Wide::nlanes == 0);
 
 constexpr float kNowhere = -1e3F;   // 1/m: the line of a column without a run, which no row fits
 constexpr float kNever = -1e9F;     // its absent rows
@@ -19,7 +18,28 @@ constexpr float kFitted = 3.0F;     // rows that make a line
 constexpr float kBends = 7.0F;      // a run of more rows may bend away
 constexpr std::int32_t kBentRows = 3;
 
+Wide all(float x) noexcept { return cv::vx_setall_f32(x); }
+
 }  // namespace
+
+struct RunSegmentation::Wides {
+  Wide zero = all(0.0F), one = all(1.0F), two = all(2.0F), four = all(4.0F);
+  Wide memory = all(1.0F - kMemory), fitted = all(kFitted), long_run = all(kBends);
+  Wide outlier_weight, base, per_metre, quadratic, floor2, jump0, jump1, jump2, outlier2, bend2, max_gap, fy;
+  explicit Wides(const RunSegmentation& s) noexcept
+      : outlier_weight(all(s.outlier_weight_)),
+        base(all(s.base_)),
+        per_metre(all(s.per_metre_)),
+        quadratic(all(s.quadratic_)),
+        floor2(all(s.floor2_)),
+        jump0(all(s.jump_[0])),
+        jump1(all(s.jump_[1])),
+        jump2(all(s.jump_[2])),
+        outlier2(all(s.outlier2_)),
+        bend2(all(s.bend2_)),
+        max_gap(all(s.max_gap_)),
+        fy(all(s.fy_)) {}
+};
 
 void RunSegmentation::begin(const Params& params, const DepthSigma& noise, const CameraIntrinsics& intrinsics,
                             const ColumnImage& image) noexcept {
@@ -55,44 +75,115 @@ void RunSegmentation::clear(std::int32_t column) noexcept {
   open_.absent[g] = kNever;
 }
 
-void RunSegmentation::add_row(std::int32_t row) noexcept {
-  const auto all = [](float x) { return cv::vx_setall_f32(x); };
-  const Wide zero = all(0.0F), one = all(1.0F), four = all(4.0F), memory = all(1.0F - kMemory);
-  const Wide enough = all(kFitted), long_run = all(kBends), outlier_weight = all(outlier_weight_);
-  const Wide base = all(base_), per_metre = all(per_metre_), quadratic = all(quadratic_), floor2 = all(floor2_);
-  const Wide jump0 = all(jump_[0]), jump1 = all(jump_[1]), jump2 = all(jump_[2]);
-  const Wide outlier2 = all(outlier2_), bend2 = all(bend2_), max_gap = all(max_gap_);
-  const Wide fy = all(fy_), to_centre = all(cy_ - static_cast<float>(row));
+void RunSegmentation::add_rows(std::int32_t first, std::int32_t last) noexcept {
+  const Wides c(*this);
+  for (std::int32_t column = 0; column < column_count_; column += kGroup) {
+    if (last - first + 1 == kBlock && try_block(c, column, first)) continue;
+    for (std::int32_t row = first; row <= last; ++row) add_row(c, column, row);
+  }
+}
+
+// Most blocks of rows go on as their columns' lines say: one update for four rows. What is decided here is the same for
+// every register width: all columns of the group or none.
+bool RunSegmentation::try_block(const Wides& c, std::int32_t column, std::int32_t row) noexcept {
+  constexpr std::size_t kRegisters = kGroup / Wide::nlanes;
+  static_assert(kGroup % Wide::nlanes == 0);
+  const Wide to_centre = all(cy_ - static_cast<float>(row));
+  struct Next {
+    Wide idle, rows, value, slope, lever, squares, drift, absent;
+  };
+  std::array<Next, kRegisters> next;
+  for (std::size_t i = 0; i < kRegisters; ++i) {
+    const std::size_t g = static_cast<std::size_t>(column) + i * Wide::nlanes;
+    const auto load = [g](const Floats& x) { return cv::vx_load(x.data() + g); };
+    const Wide rows = load(open_.rows), slope = load(open_.slope), lever = load(open_.lever);
+    Wide value = load(open_.value) + slope, drift = load(open_.drift), absent = load(open_.absent);
+
+    // As in add_row, but once, at the block's first row.
+    const Wide my = slope * c.fy, m0 = value + slope * to_centre;
+    const Wide w2 = value * value, sigma = (c.base * value + c.per_metre) * value + c.quadratic;
+    const Wide share = c.one / (rows + c.four), leans = c.four * share;
+    const Wide spread = (my * my + m0 * m0) * (sigma * sigma + c.floor2 * w2 * w2) * (c.one + leans);
+    const Wide limit = c.outlier2 * spread;
+
+    // Sums over the block's rows that join, x from the row before the block, and of residuals from the line so far.
+    Wide n = c.zero, sum_x = c.zero, sum_xx = c.zero, sum_r = c.zero, sum_xr = c.zero;
+    Wide moved = c.zero;  // by how much, nearly, these rows have moved the line
+    Wide any = c.zero, longest = c.zero, x = c.one;
+    for (std::int32_t r = row; r < row + kBlock; ++r, value = value + slope, x = x + c.one) {
+      const Wide w = cv::vx_load(image_->inverse_depth.row(r) + g), valid = w > c.zero;
+      const Wide residual = w - value, off = residual - moved;
+      const Wide in = valid & (off * off * w2 < limit);
+      const Wide joined = residual & in, at = x & in, jumped = off & in;
+      any = any | valid;
+      n = n + (c.one & in), sum_x = sum_x + at, sum_xx = sum_xx + at * x;
+      sum_r = sum_r + joined, sum_xr = sum_xr + joined * x;
+      moved = moved + leans * jumped;
+      drift = drift + ((jumped - drift) * c.memory & in);
+      absent = cv::v_select(in, c.zero, absent + cv::v_select(valid, c.outlier_weight, c.one));
+      longest = cv::v_max(longest, absent);
+    }
+    const Wide bent = (rows + n > c.long_run) & (drift * drift * w2 > c.bend2 * spread);
+    const Wide goes_on = (rows >= c.fitted) & (longest <= c.max_gap) & ~bent;
+    const Wide idle = (rows == c.zero) & (any == c.zero);
+    if (!cv::v_check_all(goes_on | idle)) return false;
+
+    // Recursive least squares with all of them at once; lever: from the mean of the rows so far.
+    const Wide rows1 = rows + n, mean = c.one / rows1;
+    const Wide x_sum = lever * n + sum_x, shift = x_sum * mean;
+    const Wide squares = load(open_.squares) + lever * (lever * n + c.two * sum_x) + sum_xx - x_sum * shift;
+    const Wide gain = (lever * sum_r + sum_xr - shift * sum_r) / squares, lever1 = lever + c.four - shift;
+    next[i] = {idle, rows1, value - slope + sum_r * mean + gain * lever1, slope + gain, lever1, squares, drift, absent};
+  }
+  for (std::size_t i = 0; i < kRegisters; ++i) {
+    const std::size_t g = static_cast<std::size_t>(column) + i * Wide::nlanes;
+    const Wide& idle = next[i].idle;
+    const auto store = [g, &idle](Floats& to, const Wide& x) {
+      cv::v_store(to.data() + g, cv::v_select(idle, cv::vx_load(to.data() + g), x));
+    };
+    store(open_.rows, next[i].rows);
+    store(open_.value, next[i].value);
+    store(open_.slope, next[i].slope);
+    store(open_.lever, next[i].lever);
+    store(open_.squares, next[i].squares);
+    store(open_.drift, next[i].drift);
+    store(open_.absent, next[i].absent);
+  }
+  return true;
+}
+
+void RunSegmentation::add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept {
+  const Wide to_centre = all(cy_ - static_cast<float>(row));
   // Whole registers: what columns beyond a narrower picture say is never read.
-  for (std::int32_t column = 0; column < column_count_; column += Wide::nlanes) {
+  for (std::int32_t column = first_column; column < first_column + kGroup; column += Wide::nlanes) {
     const auto g = static_cast<std::size_t>(column);
     const auto load = [g](const Floats& x) { return cv::vx_load(x.data() + g); };
     const auto store = [g](Floats& to, const Wide& x) { cv::v_store(to.data() + g, x); };
     const Wide w = cv::vx_load(image_->inverse_depth.row(row) + g), n = load(open_.rows);
-    const Wide slope = load(open_.slope), value = load(open_.value) + slope, lever = load(open_.lever) + one;
-    const Wide valid = w > zero, fitted = n >= enough;
+    const Wide slope = load(open_.slope), value = load(open_.value) + slope, lever = load(open_.lever) + c.one;
+    const Wide valid = w > c.zero, fitted = n >= c.fitted;
 
     const Wide residual = w - value;
     // Residual across the line in space against sigma_z: dw^2 / (|m|^2 w^2) with m of the line in the column's plane.
     // Both sides are multiplied by w^2, so that sigma is that of the inverse depth.
-    const Wide my = slope * fy, m0 = value + slope * to_centre;
-    const Wide w2 = w * w, sigma = (base * w + per_metre) * w + quadratic;
+    const Wide my = slope * c.fy, m0 = value + slope * to_centre;
+    const Wide w2 = w * w, sigma = (c.base * w + c.per_metre) * w + c.quadratic;
     // Predicting one row past n has about (1 + 4 / n) of a row's variance.
-    const Wide share = one / (n + one);
-    const Wide spread = (my * my + m0 * m0) * (sigma * sigma + floor2 * w2 * w2) * (one + four * share);
+    const Wide share = c.one / (n + c.one);
+    const Wide spread = (my * my + m0 * m0) * (sigma * sigma + c.floor2 * w2 * w2) * (c.one + c.four * share);
     // Two rows make no slope: the third is held against the second.
-    const Wide off = residual + cv::v_select(fitted, zero, slope);
-    const Wide jump = (jump2 * w + jump1) * w + jump0;
-    const Wide fits = off * off * w2 < cv::v_select(fitted, outlier2 * spread, jump * jump * w2);
+    const Wide off = residual + cv::v_select(fitted, c.zero, slope);
+    const Wide jump = (c.jump2 * w + c.jump1) * w + c.jump0;
+    const Wide fits = off * off * w2 < cv::v_select(fitted, c.outlier2 * spread, jump * jump * w2);
     const Wide in = valid & fits;
 
     // Recursive least squares: a row that joins, at distance x from the others' mean, moves the line by its residual.
     const Wide x = lever & in, news = residual & in;
     const Wide lever1 = lever - x * share, squares1 = load(open_.squares) + x * lever1;
     const Wide gain = news * (lever1 / squares1);
-    const Wide n1 = n + (one & in);
-    const Wide drift0 = load(open_.drift), drift = drift0 + (((news & fitted) - drift0) * memory & in);
-    const Wide absent = cv::v_select(in, zero, load(open_.absent) + cv::v_select(valid, outlier_weight, one));
+    const Wide n1 = n + (c.one & in);
+    const Wide drift0 = load(open_.drift), drift = drift0 + (((news & fitted) - drift0) * c.memory & in);
+    const Wide absent = cv::v_select(in, c.zero, load(open_.absent) + cv::v_select(valid, c.outlier_weight, c.one));
     store(open_.rows, n1);
     store(open_.value, value + news * share + gain * lever1);
     store(open_.slope, slope + gain);
@@ -101,9 +192,9 @@ void RunSegmentation::add_row(std::int32_t row) noexcept {
     store(open_.drift, drift);
     store(open_.absent, absent);
 
-    const Wide strange = cv::v_select(fitted, zero, valid) & ~fits;
-    const Wide bent = in & (n1 > long_run) & (drift * drift * w2 > bend2 * spread);
-    auto events = static_cast<std::uint32_t>(cv::v_signmask(strange | bent | (absent > max_gap)));
+    const Wide strange = cv::v_select(fitted, c.zero, valid) & ~fits;
+    const Wide bent = in & (n1 > c.long_run) & (drift * drift * w2 > c.bend2 * spread);
+    auto events = static_cast<std::uint32_t>(cv::v_signmask(strange | bent | (absent > c.max_gap)));
     for (; events != 0; events &= events - 1U) handle(column + std::countr_zero(events), row);
   }
 }

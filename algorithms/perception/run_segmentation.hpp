@@ -36,8 +36,9 @@ class RunSegmentation {
 
   void begin(const Params& params, const DepthSigma& noise, const CameraIntrinsics& intrinsics,
              const ColumnImage& image) noexcept;
+  static constexpr std::int32_t kBlock = 4;  // rows that are best added together
   // Rows must come in order, 0 .. height - 1.
-  void add_row(std::int32_t row) noexcept;
+  void add_rows(std::int32_t first, std::int32_t last) noexcept;
   void finish() noexcept;
 
   [[nodiscard]] Columns& columns() noexcept { return runs_; }
@@ -48,6 +49,8 @@ class RunSegmentation {
   static constexpr std::int32_t kPending = 3;  // outliers in a row that end a run
   static constexpr std::int32_t kMinRows = 3;
   static constexpr float kMemory = 0.7F;  // of the mean of residuals, per row
+  static constexpr std::int32_t kGroup = 8;  // columns that are decided on together, for every register width
+  static_assert(kColumns % kGroup == 0);
   using Floats = std::array<float, kColumns>;
 
   // The state of all columns' open runs: the least-squares line through the accepted rows, updated row by row, so that
@@ -62,6 +65,9 @@ class RunSegmentation {
     Floats absent;   // rows since the last accepted one, an outlier counts outlier_weight_; whole numbers
   };
 
+  struct Wides;  // the parameters in vector registers
+  [[nodiscard]] bool try_block(const Wides& c, std::int32_t column, std::int32_t row) noexcept;
+  void add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept;
   void handle(std::int32_t g, std::int32_t row) noexcept;
   void replay(std::int32_t g, std::int32_t from, std::int32_t row) noexcept;
   void forget(std::int32_t g, std::int32_t forgotten, std::int32_t row) noexcept;

@@ -38,11 +38,12 @@ SurfaceBoundaries::Line SurfaceBoundaries::line_of(const InversePlane& plane, st
           static_cast<float>(plane.m.norm())};
 }
 
-float SurfaceBoundaries::cost(const Line& line, std::int32_t column, std::int32_t row) const noexcept {
+SurfaceBoundaries::Offset SurfaceBoundaries::offset(const Line& line, std::int32_t column,
+                                                    std::int32_t row) const noexcept {
   const float w = image_->inverse_depth(column, row);
   const float residual = (w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)])) * w;
   const float sigma = inverse_sigma(w) * line.norm;
-  return residual * residual / (sigma * sigma * share_[image_->valid(column, row)]);
+  return {residual * residual, sigma * sigma * share_[image_->valid(column, row)]};
 }
 
 void SurfaceBoundaries::gather(std::int32_t column, const RunSegmentation::Column& runs,
@@ -91,7 +92,7 @@ void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const no
       const std::int32_t r = from + i * step;
       if (r < interval.top || r > interval.bottom) return from;
       if (image_->valid(column, r) == 0) continue;
-      if (cost(line, column, r) > kTruncation) {
+      if (!offset(line, column, r).within(kTruncation)) {
         good = 0;
         at = r + step;
       } else {
@@ -124,14 +125,19 @@ bool SurfaceBoundaries::try_claim(std::int32_t column, std::int32_t first, std::
       fitting = off = 0;
       top = -1;
     };
-    for (std::int32_t r = std::max<std::int32_t>(first, candidate.top);
-         r <= std::min<std::int32_t>(last, candidate.bottom); ++r) {
-      if (image_->valid(column, r) != 0 && cost(line, column, r) < kTruncation) {
-        top = fitting == 0 ? r : top;
+    const auto fits = [&](std::int32_t r) {
+      return image_->valid(column, r) != 0 && offset(line, column, r).within(kTruncation);
+    };
+    const std::int32_t from = std::max<std::int32_t>(first, candidate.top);
+    const std::int32_t until = std::min<std::int32_t>(last, candidate.bottom);
+    // Outside a stretch every second row is enough to meet the next one, which has two rows in a row or is none.
+    for (std::int32_t r = from; r <= until; r += fitting > 0 ? 1 : 2) {
+      if (fits(r)) {
+        if (fitting == 0) top = r > from && fits(r - 1) ? r - 1 : r;
+        fitting += fitting == 0 ? r - top + 1 : 1;
         bottom = r;
-        ++fitting;
         off = 0;
-      } else if (++off > 1 && fitting > 0) {
+      } else if (fitting > 0 && ++off > 1) {
         close();
       }
     }
@@ -199,7 +205,7 @@ std::uint16_t SurfaceBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower)
   Pair& pair = pairs_[pair_count_];
   pair.upper = upper;
   pair.lower = lower;
-  pair.columns = 0.0;
+  pair.columns = pair.measured = 0.0;
   pair.gain.fill(0.0F);
   return static_cast<std::uint16_t>(pair_count_++);
 }
@@ -215,7 +221,7 @@ void SurfaceBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::i
   for (std::int32_t r = end + step; step > 0 ? r <= limit : r >= limit; r += step) {
     if (image_->valid(column, r) == 0) {
       if (++empty > kMaxEmpty) return;
-    } else if (cost(line, column, r) < most) {
+    } else if (offset(line, column, r).within(most)) {
       end = static_cast<std::int16_t>(r);
       empty = off = 0;
     } else if (++off > 1) {
@@ -292,12 +298,16 @@ void SurfaceBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
     overflow_ += meets && joint_count_ == kMaxJoints ? 1U : 0U;
     const std::uint16_t i = meets && joint_count_ < kMaxJoints ? pair_of(upper.plane, lower.plane) : kMaxPairs;
     Pair* pair = i == kMaxPairs ? nullptr : &pairs_[i];
+    if (pair != nullptr) {
+      pair->columns += 1.0;
+      joints_[joint_count_++] = {i, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k)};
+      // Columns side by side share most of their noise: what every second one says is enough for the pair.
+      if (column % kMeasuredColumns != 0 && pair->measured > 0.0) continue;
+      pair->measured += 1.0;
+    }
     const std::int32_t own = change_point(column, a, b, first, last, static_cast<float>(row), pair);
     upper.bottom = static_cast<std::int16_t>(std::clamp<std::int32_t>(own, upper.top, lower.bottom - 1));
     lower.top = static_cast<std::int16_t>(upper.bottom + 1);
-    if (pair == nullptr) continue;
-    pair->columns += 1.0;
-    joints_[joint_count_++] = {i, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k)};
   }
 }
 
@@ -313,7 +323,7 @@ void SurfaceBoundaries::settle() noexcept {
       at = bin + 1;
     }
     const double offset_px = (at - 0.5 * kBins) / kBinsPerPixel;
-    const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].columns;
+    const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].measured;
     pairs_[i].shift_px = meets ? 0.0 : offset_px;
   }
   follow();
@@ -341,9 +351,9 @@ void SurfaceBoundaries::begin_refit() noexcept {
   }
 }
 
-void SurfaceBoundaries::refit(std::int32_t first_column) noexcept {
+void SurfaceBoundaries::refit(std::int32_t first_column, bool roughly) noexcept {
   constexpr std::int32_t kThick_px = 8;  // thicker surfaces do without the rows next to another
-  sample_noise(first_column);
+  if (!roughly) sample_noise(first_column);
   std::array<std::size_t, kRefitColumns> next{};
   const std::int32_t count = std::min(kRefitColumns, rays_->columns - first_column);
   // Down the columns together: the topmost span that is left, and with it those of its plane that are next elsewhere.
@@ -370,11 +380,11 @@ void SurfaceBoundaries::refit(std::int32_t first_column) noexcept {
       strip.top[lane] = static_cast<std::int16_t>(span.top + margin);
       strip.bottom[lane] = static_cast<std::int16_t>(span.bottom - margin);
     }
-    refit(first_column, strip);
+    refit(first_column, strip, roughly);
   }
 }
 
-void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip) noexcept {
+void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip, bool roughly) noexcept {
   using Wide = cv::v_float32;
   using Lanes = std::array<float, kRefitColumns>;
   static_assert(kRefitColumns % Wide::nlanes == 0 && kColumns % kRefitColumns == 0);
@@ -388,7 +398,7 @@ void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip) noe
   }
   if (rows == 0) return;
   // A tall strip has rows to spare: neighbours say nearly the same.
-  const std::int32_t stride = rows > 64 ? 3 : (rows > 24 ? 2 : 1);
+  const std::int32_t stride = (roughly && rows > 12 ? 2 : 1) * (rows > 64 ? 3 : (rows > 24 ? 2 : 1));
   // Rows count from top, and inverse depths from the plane as it is: what is summed stays small, so that single
   // precision is enough.
   const double y0 = static_cast<double>(rays_->y[static_cast<std::size_t>(top)]), pitch = 1.0 / fy_px_;
@@ -457,14 +467,15 @@ void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip) noe
   }
 }
 
-// One column of each strip and every other row are enough for a median.
+// One column of each strip and every fourth row are enough for a median.
 void SurfaceBoundaries::sample_noise(std::int32_t column) noexcept {
-  constexpr std::int32_t kStride = 2;
+  constexpr std::int32_t kStride = 4;
   for (const ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) {
     const Line line = line_of(planes_[span.plane].plane, column);
     for (std::int32_t r = span.top + 1; r < span.bottom; r += kStride) {
       if (image_->valid(column, r) == 0) continue;
-      const float bin = std::min(cost(line, column, r) * kCostsPerUnit, static_cast<float>(kCostBins));
+      const Offset at = offset(line, column, r);
+      const float bin = std::min(at.off2 / at.variance * kCostsPerUnit, static_cast<float>(kCostBins));
       ++costs_[static_cast<std::size_t>(bin)];
     }
   }
@@ -472,7 +483,7 @@ void SurfaceBoundaries::sample_noise(std::int32_t column) noexcept {
 
 // The median forgives half of the rows being something else; a squared normal variable's is 0.455.
 double SurfaceBoundaries::noise_scale() const noexcept {
-  constexpr std::int32_t kLeastRows = 300;
+  constexpr std::int32_t kLeastRows = 150;
   constexpr double kMedian = 0.455;
   std::int32_t all = 0;
   for (const std::int32_t n : costs_) all += n;

@@ -65,8 +65,9 @@ class SurfaceBoundaries {
   void settle() noexcept;  // one decision per pair of planes, then all columns follow it ...
   void follow() noexcept;  // ... and again when the planes have changed
   void begin_refit() noexcept;
-  // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments.
-  void refit(std::int32_t first_column) noexcept;
+  // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments. roughly: of fewer of their rows,
+  // and without looking at the noise.
+  void refit(std::int32_t first_column, bool roughly) noexcept;
 
   // How large the noise is against its model, from the rows of the last refit's surfaces; 0 when there are too few.
   [[nodiscard]] double noise_scale() const noexcept;
@@ -89,6 +90,7 @@ class SurfaceBoundaries {
   static constexpr std::size_t kMaxPairs = 192;
   static constexpr std::int32_t kBins = 64;  // of half a pixel, -16 .. 16
   static constexpr std::int32_t kBinsPerPixel = 2;
+  static constexpr std::int32_t kMeasuredColumns = 2;
   struct Joint {
     std::uint16_t pair = 0;
     std::int16_t column = 0;
@@ -98,6 +100,7 @@ class SurfaceBoundaries {
     std::uint8_t upper = 0;
     std::uint8_t lower = 0;
     double columns = 0.0;
+    double measured = 0.0;            // of these, columns that were asked
     double shift_px = 0.0;            // of the boundary from where the planes meet
     std::array<float, kBins> gain{};  // sum of cost(upper) - cost(lower), by distance from where the planes meet
   };
@@ -107,8 +110,12 @@ class SurfaceBoundaries {
   };
   [[nodiscard]] Line line_of(const InversePlane& plane, std::int32_t column) const noexcept;
   [[nodiscard]] float inverse_sigma(float w) const noexcept { return (base_ * w + per_metre_) * w + quadratic_; }
-  // Residual over sigma, squared.
-  [[nodiscard]] float cost(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
+  // A row against a line: residual over sigma, squared, is off2 / variance.
+  struct Offset {
+    float off2, variance;
+    [[nodiscard]] bool within(float cost) const noexcept { return off2 < cost * variance; }
+  };
+  [[nodiscard]] Offset offset(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
   void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
   // The best of the candidates, each within its own rows, in rows first .. last; false when none fits.
   [[nodiscard]] bool try_claim(std::int32_t column, std::int32_t first, std::int32_t last,
@@ -119,7 +126,7 @@ class SurfaceBoundaries {
     std::array<std::int16_t, kRefitColumns> top{}, bottom{};
     std::uint8_t plane = 0;
   };
-  void refit(std::int32_t first_column, const Strip& strip) noexcept;
+  void refit(std::int32_t first_column, const Strip& strip, bool roughly) noexcept;
   void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
                                           std::int32_t last, float meeting_row, Pair* pair) const noexcept;

@@ -58,13 +58,9 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
   ++counters_.frames;
   view_ = view;
   view_.camera_up /= up_norm;
-  for (std::int32_t r = 0; r < frame.height_px; ++r) {
-    const std::uint16_t* source = frame.depth + static_cast<std::ptrdiff_t>(r) * frame.width_px;
-    std::copy(source, source + frame.width_px, full_.row(r));
-  }
   polygons_.configure(params_.polygons);
   picture_.rays.set(view.intrinsics);
-  raw_.depth = &full_;
+  raw_.depth = frame.depth;
   raw_.intrinsics = view.intrinsics;
   raw_.range.set(params_.limits, view.intrinsics.depth_unit_m);
   picture_.column_rays.set(view.intrinsics);
@@ -154,7 +150,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     case Phase::kRefit:
       // Round 0 sharpens the grown planes, round 1 measures them within their final boundaries.
       if (row_ == 0) boundaries_.begin_refit();
-      boundaries_.refit(row_);
+      boundaries_.refit(row_, round_ == 0);
       row_ += SurfaceBoundaries::kRefitColumns;
       if (row_ >= picture_.column_rays.columns) {
         solve_planes();
@@ -218,11 +214,14 @@ void SurfaceExtractor::reduce_row() noexcept {
   }
   const std::int32_t columns = picture_.column_rays.columns;
   const ReducedRow reduced =
-      reduce_to_columns(raw_.range, full_.row(row_), flags, columns, picture_.columns.inverse_depth.row(row_),
+      reduce_to_columns(raw_.range, raw_.row(row_), flags, columns, picture_.columns.inverse_depth.row(row_),
                         picture_.columns.valid.row(row_));
   measured_px_ += reduced.measured_px;
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
-  runs_.add_row(row_);
+  constexpr std::int32_t kBlock = RunSegmentation::kBlock;
+  if (row_ % kBlock == kBlock - 1 || row_ + 1 == picture_.column_rays.height_px) {
+    runs_.add_rows(row_ - row_ % kBlock, row_);
+  }
 }
 
 void SurfaceExtractor::take_grown_planes() noexcept {

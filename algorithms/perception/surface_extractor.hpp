@@ -84,8 +84,8 @@ class SurfaceExtractor {
   explicit SurfaceExtractor(const Params& params) noexcept : params_(params) {}
   void configure(const Params& params) noexcept { params_ = params; }
 
-  // Validates and copies the frame (the driver's buffer may go back at once). False, with a counted reason, for a frame
-  // that cannot be used or while busy.
+  // Validates the frame; its pixels stay in the driver's buffer, which must live until busy() is false. False, with a
+  // counted reason, for a frame that cannot be used or while busy.
   [[nodiscard]] bool try_begin(const DepthFrameView& frame, const View& view) noexcept;
   // kDone exactly once per frame, then kIdle.
   Progress step(WorkBudget& budget) noexcept;
@@ -164,7 +164,6 @@ class SurfaceExtractor {
   std::int32_t measured_px_ = 0;
   std::int32_t outside_body_px_ = 0;
 
-  FullDepthImage full_;
   SelfFilter self_filter_;
   RawPicture raw_;
   FramePicture picture_;

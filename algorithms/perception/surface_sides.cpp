@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "algorithms/perception/vectors.hpp"
+
 namespace polygmap {
 namespace {
 
@@ -11,6 +13,15 @@ constexpr std::int32_t kFlatRows = 4, kFlatColumns = 3;  // more columns in thes
 constexpr std::int32_t kMixed_px = 2;                    // of neither plane, where one pixel sees both
 constexpr std::int32_t kInside_px = 8;                   // of the outermost column and the one beside it
 constexpr std::int32_t kOutside_px = 8;                  // searched beyond
+constexpr std::int32_t kReach_px = kInside_px + kOutside_px;
+
+using Wide = cv::v_float32;
+using Reach = std::array<float, kReach_px>;  // from inside outwards
+
+// The rays of one row: (x0 + pitch * column, y, 1).
+struct RowRays {
+  double x0, pitch, y;
+};
 
 // A plane in one row: inverse depth at + slope * column, and the tolerance of measured over expected depth.
 struct RowPlane {
@@ -20,28 +31,54 @@ struct RowPlane {
   bool valid = false;
 
   RowPlane() noexcept = default;
-  RowPlane(const InversePlane& plane, const DepthSigma& noise, const CameraIntrinsics& k, std::int32_t column,
-           std::int32_t row) noexcept {
-    const double y = (row - k.cy_px) / k.fy_px;
-    const double constant = plane.m.y() * y + plane.m.z() - plane.m.x() * k.cx_px / k.fx_px;
-    const Vec3 ray{(column - k.cx_px) / k.fx_px, y, 1.0};
-    const double w = plane.inverse_depth(ray);
+  // Near one pixel of the row.
+  RowPlane(const InversePlane& plane, const DepthSigma& noise, const RowRays& rays, std::int32_t column) noexcept {
+    const double x = rays.x0 + rays.pitch * column, ray2 = x * x + rays.y * rays.y + 1.0;
+    const double constant = plane.m.y() * rays.y + plane.m.z(), w = plane.m.x() * x + constant;
     valid = w > 0.05;
     if (!valid) return;
-    const double cosine = math::clamp(w * plane.d_m() / ray.norm(), kLeastCosine, 1.0);
-    at = static_cast<float>(constant);
-    slope = static_cast<float>(plane.m.x() / k.fx_px);
-    per_sigma = static_cast<float>(cosine / (w * noise.sigma_m(1.0 / w)));
+    const double cosine = math::clamp(w / math::sqrt(plane.m.squaredNorm() * ray2), kLeastCosine, 1.0);
+    at = static_cast<float>(constant + plane.m.x() * rays.x0);
+    slope = static_cast<float>(plane.m.x() * rays.pitch);
+    per_sigma = static_cast<float>(cosine * w / noise.inverse_sigma(w));
   }
   // Over sigma.
-  [[nodiscard]] float residual(std::int32_t column, float depth_m) const noexcept {
-    return ((at + slope * static_cast<float>(column)) * depth_m - 1.0F) * per_sigma;
+  [[nodiscard]] Wide residual(const Wide& column, const Wide& depth_m) const noexcept {
+    const auto all = [](float x) { return cv::vx_setall_f32(x); };
+    return ((all(at) + all(slope) * column) * depth_m - all(1.0F)) * all(per_sigma);
   }
   // 2 ln(sigma over the other's), near enough: with residuals alone a crease moves towards the plane of less noise.
   [[nodiscard]] float wider_than(const RowPlane& other) const noexcept {
     return 4.0F * (other.per_sigma - per_sigma) / (other.per_sigma + per_sigma);
   }
 };
+
+// What every pixel says for the plane beyond and against our own: twice the negative logarithms of the likelihoods, but
+// for a constant. Nothing where there is no data.
+void weigh(const SurfaceSides::Params& params, const RawPicture& picture, const RowPlane& own, const RowPlane& other,
+           std::int32_t first, std::int32_t out, const std::array<std::uint16_t, kReach_px>& raw, Reach& gain,
+           Reach& residual) noexcept {
+  static_assert(kReach_px % Wide::nlanes == 0);
+  const auto all = [](float x) { return cv::vx_setall_f32(x); };
+  static constexpr Reach kSteps{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  const Wide most = all(static_cast<float>(math::square(params.truncate_sigmas)));
+  const Wide leave = all(static_cast<float>(math::square(params.leave_sigmas)));
+  const Wide more = all(other.valid ? other.wider_than(own) : 0.0F);
+  const Wide unit_m = all(static_cast<float>(picture.intrinsics.depth_unit_m));
+  const Wide least = all(static_cast<float>(picture.range.min)), largest = all(static_cast<float>(picture.range.max));
+  for (std::int32_t i = 0; i < kReach_px; i += Wide::nlanes) {
+    const Wide depth = cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand(raw.data() + i)));
+    const Wide column = all(static_cast<float>(first)) + all(static_cast<float>(out)) * cv::vx_load(kSteps.data() + i);
+    const Wide r = own.residual(column, depth * unit_m);
+    Wide beyond = leave;
+    if (other.valid) {
+      const Wide o = other.residual(column, depth * unit_m);
+      beyond = cv::v_min(o * o + more, most);
+    }
+    cv::v_store(gain.data() + i, (cv::v_min(r * r, most) - beyond) & (depth >= least) & (depth <= largest));
+    cv::v_store(residual.data() + i, r);
+  }
+}
 
 }  // namespace
 
@@ -64,44 +101,38 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
   if (border + 2 * out < 0 || border + 2 * out >= k.width_px) return Ending::kHidden;
   const std::int32_t first = border - out * (kInside_px - 1);
   if (first < 0 || first >= k.width_px) return Ending::kNone;
-  const RowPlane own(planes[index].plane, noise_, k, border, row);
+  const double pitch = 1.0 / k.fx_px;
+  const RowRays rays{-k.cx_px * pitch, pitch,
+                     static_cast<double>(picture_->column_rays.y[static_cast<std::size_t>(row)])};
+  const RowPlane own(planes[index].plane, noise_, rays, border);
   if (!own.valid) return Ending::kNone;
   // The plane beyond, if there is one.
   RowPlane other;
   for (std::int32_t g = column + out; g != column + 3 * out; g += out) {
     if (g < 0 || g >= picture_->column_rays.columns) break;
     const std::size_t p = picture_->owner(g, row);
-    if (p != 0 && p != index) other = RowPlane(planes[p].plane, noise_, k, border, row);
+    if (p != 0 && p != index) other = RowPlane(planes[p].plane, noise_, rays, border);
   }
-  const float more = other.valid ? other.wider_than(own) : 0.0F;
-  const auto most = static_cast<float>(params_.truncate_sigmas * params_.truncate_sigmas);
-  const auto leave = static_cast<float>(params_.leave_sigmas * params_.leave_sigmas);
-  const auto unit_m = static_cast<float>(k.depth_unit_m);
-  const std::uint16_t* depth = raw_->depth->row(row);
-  const std::uint8_t* flags = picture_->flags.row(row / 2);
+  std::array<std::uint16_t, kReach_px> raw{};
+  std::int32_t count = 0;
+  for (std::int32_t c = first; count < kReach_px && c >= 0 && c < k.width_px; c += out) {
+    if ((picture_->flags(c / 2, row / 2) & kPixelBody) != 0) break;
+    raw[static_cast<std::size_t>(count++)] = raw_->row(row)[c];
+  }
+  if (count < kInside_px) return Ending::kHidden;  // by the robot's own body
+  Reach gain, residual;
+  weigh(params_, *raw_, own, other, first, out, raw, gain, residual);
   // The boundary with the least cost; between equally good ones (a pixel without data or of neither) in their middle.
   constexpr float kTie = 1e-3F;
   float sum = 0.0F, least = 1e9F;
   std::int32_t from = 0, to = 0;
   std::int32_t of_neither = 0;  // pixels with data between from and to, those behind the surface less those before it
   bool measured_beyond = false;
-  for (std::int32_t i = 0; i < kInside_px + kOutside_px; ++i) {
-    const std::int32_t c = first + out * i;
-    if (c < 0 || c >= k.width_px) break;
-    if ((flags[c / 2] & kPixelBody) != 0) {
-      if (i < kInside_px) return Ending::kHidden;
-      break;
-    }
-    std::int32_t deviation = 0;
-    if (raw_->range.valid(depth[c])) {
-      const float z_m = static_cast<float>(depth[c]) * unit_m;
-      measured_beyond = true;
-      const float residual = own.residual(c, z_m);
-      deviation = residual < 0.0F ? -1 : 1;
-      // Twice the negative logarithm of the likelihoods, but for a constant.
-      const float beyond = other.valid ? std::min(other.residual(c, z_m) * other.residual(c, z_m) + more, most) : leave;
-      sum += std::min(residual * residual, most) - beyond;
-    }
+  for (std::int32_t i = 0; i < count; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const bool measured = raw_->range.valid(raw[at]);
+    measured_beyond = measured_beyond || measured;
+    sum += gain[at];
     if (sum < least - kTie) {
       least = sum;
       from = to = i;
@@ -109,7 +140,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
       measured_beyond = false;
     } else if (sum < least + kTie && to == i - 1) {
       to = i;
-      of_neither += deviation;
+      if (measured) of_neither += residual[at] < 0.0F ? -1 : 1;
       measured_beyond = false;
     }
   }

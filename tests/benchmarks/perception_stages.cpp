@@ -129,7 +129,8 @@ void stage_reduction(Workbench& bench) { reduce(bench); }
 void stage_runs(Workbench& bench) {
   const CameraIntrinsics& k = bench.scene.view.intrinsics;
   bench.runs->begin({}, {}, k, *bench.columns);
-  for (std::int32_t r = 0; r < k.height_px; ++r) bench.runs->add_row(r);
+  for (std::int32_t r = 0; r < k.height_px; r += RunSegmentation::kBlock)
+    bench.runs->add_rows(r, r + RunSegmentation::kBlock - 1);
   bench.runs->finish();
 }
 void stage_whole_frame(Workbench& bench) { extract(bench); }
