@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "algorithms/perception/images.hpp"
+#include "algorithms/perception/depth_sigma.hpp"
 #include "sim_stub/counter_noise.hpp"
 #include "sim_stub/depth_renderer.hpp"
 #include "sim_stub/noise_kind.hpp"
