@@ -82,6 +82,7 @@ TEST(ClimbCommand, Camera_IsReadFromItsFile) {
   ASSERT_TRUE(c.options && c.options->camera) << c.err;
   EXPECT_EQ(c.options->camera->intrinsics.width_px, 512);
   EXPECT_EQ(c.options->camera->noise.quadratic_per_m, 0.002);
+  EXPECT_EQ(c.options->camera_file, path);
   expect_refused({"climb", "--camera", temporary("none.toml")}, "none.toml");
 }
 

@@ -62,7 +62,9 @@ void declare(CLI::App& climb, ClimbArguments& a) {
 
   climb.add_option("--camera", a.camera, "The robot's camera; the module is told its noise and range")
       ->type_name("CAMERA.toml");
-  climb.add_option("--scan-ms", a.options.scan_ms, "Time from a picture's first row to its last, ms, in steps of 4")
+  climb
+      .add_option("--scan-ms", a.options.scan_ms,
+                  "Time from a picture's first row to its last, ms; the nearest of 0, 4, 8 ... is simulated")
       ->capture_default_str();
   climb
       .add_option("--mount-error", a.options.mount_error_deg,
@@ -144,6 +146,7 @@ std::string complaint(ClimbArguments& a) {
   if (!a.camera.empty()) {
     try {
       a.options.camera = read_camera(a.camera);
+      a.options.camera_file = a.camera;
     } catch (const FileError& error) {
       return error.what();
     }
