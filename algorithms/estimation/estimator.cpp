@@ -86,7 +86,7 @@ void Estimator::add_lio(const LioSample& sample, std::int64_t now_ns) noexcept {
         known = ring_.try_at(sample.stamp_ns, then);
       }
     }
-    verdict = known ? fusion_.fuse(sample, then.odom_T_base) : LioVerdict::kTooOld;
+    verdict = known ? fusion_.fuse(sample, then.odom_T_base) : LioVerdict::kNoOdometry;
   }
   ++counters_.lio[static_cast<std::size_t>(verdict)];
 }
@@ -208,7 +208,7 @@ void Estimator::publish(std::int64_t now_ns, const Vec3& gyro_radps, double dt_s
     state_.odom_T_base = {attitude_.odom_R_base(), base_.odom_p_base_m()};
     state_.odom_v_base_mps = base_.odom_v_base_mps();
     state_.base_w_base_radps = gyro_radps - attitude_.gyro_bias_radps();
-    fusion_.tick(state_.odom_T_base, (state_.odom_T_base.p_m - before_m).norm(), dt_s);
+    fusion_.tick(state_.odom_T_base, state_.odom_T_base.p_m - before_m, dt_s);
   } else {
     state_.odom_T_base = initial_odom_T_base_;
   }
@@ -218,7 +218,7 @@ void Estimator::publish(std::int64_t now_ns, const Vec3& gyro_radps, double dt_s
     state_.odom_T_sole[i] = state_.odom_T_base * legs_[i].base_T_sole;
     state_.contact_probability[i] = contacts_.feet()[i].probability;
   }
-  state_.position_sigma_m.setConstant(fusion_.position_sigma_m());
+  state_.position_sigma_m = fusion_.position_sigma_m();
   state_.yaw_sigma_rad = fusion_.yaw_sigma_rad();
   state_.tilt_sigma_rad = attitude_.tilt_sigma_rad();
   state_.lio_age_ns = fusion_.last_accepted_ns() < 0 ? -1 : now_ns - fusion_.last_accepted_ns();
