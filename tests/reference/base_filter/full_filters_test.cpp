@@ -4,85 +4,25 @@
 
 #include <gtest/gtest.h>
 
-#include <random>
-
 #include "tests/support/slow_machine.hpp"
-#include "tests/support/synthetic_walk.hpp"
+#include "tests/support/walk_rows.hpp"
 
 namespace polygmap::reference {
 namespace {
 
-using test::SyntheticWalk;
+using test::WalkRows;
 using test::WalkSpec;
-using test::WalkTruth;
 
-constexpr std::int64_t kTick_ns = SyntheticWalk::kTick_ns;
-constexpr double kTick_s = 0.002;
+constexpr double kTick_s = WalkRows::kTick_s;
 
-// A stair climb with noisy sensors, feet that lift and land, treads whose height is known or not, and noise that
-// differs from contact to contact and from tick to tick: each tick's rows and acceleration.
-class WalkRows {
- public:
-  explicit WalkRows(std::uint32_t seed = 1)
-      : walk_([seed] {
-          WalkSpec spec;
-          spec.seed = seed;
-          spec.steps = 15;
-          spec.stand_s = 0.5;
-          spec.yaw_per_step_rad = 0.05;
-          return spec;
-        }()) {
-    contacts_.reset({});
-    axes.reset({});
-    heights_.fill({0.0, 0.003});
-  }
-
-  void next() {
-    const WalkTruth truth = walk_.truth(t_ns_);
-    const JointFeedback joints = walk_.joints(t_ns_);
-    contacts_.update(joints.foot_force_n, truth.stance, t_ns_);
-    const LegGeometry geometry;
-    const std::array<LegMeasurement, kFootCount> legs{
-        measure_leg(geometry, Foot::kLeft, joints.q_rad, joints.dq_radps),
-        measure_leg(geometry, Foot::kRight, joints.q_rad, joints.dq_radps)};
-    const auto make = [&](const std::array<FootContact, kFootCount>& feet) {
-      return axes.make_rows(truth.true_T_base.R, Vec3::Zero(), legs, feet, touch_downs(truth), heights_, kTick_s);
-    };
-    if (t_ns_ == 0) axes.initialise(truth.true_T_base.p_m, make({}));
-    rows = make(contacts_.feet());
-    for (ContactRow& row : rows) {
-      row.position_m2 *= scale_(random_);
-      row.velocity_m2ps2 *= scale_(random_);
-      row.process_m2 *= scale_(random_);
-    }
-    accel_mps2 = truth.true_T_base.R * walk_.imu(t_ns_).accel_mps2 - Vec3{0, 0, kGravity_mps2};
-    t_ns_ += kTick_ns;
-  }
-
-  BaseFilter axes;
-  ContactRows rows;
-  Vec3 accel_mps2 = Vec3::Zero();
-
- private:
-  // A foot that lands is anchored and, every other time, on a tread of known height.
-  std::array<TouchDown, kFootCount> touch_downs(const WalkTruth& truth) {
-    std::array<TouchDown, kFootCount> now;
-    for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-      if (!contacts_.feet()[foot].landed) continue;
-      now[foot] = {true, truth.true_T_sole[foot]};
-      heights_[foot] = ++landings_ % 2 == 0 ? KnownHeight{truth.true_T_sole[foot].p_m.z(), 0.004} : KnownHeight{};
-    }
-    return now;
-  }
-
-  SyntheticWalk walk_;
-  ContactEstimator contacts_;
-  std::array<KnownHeight, kFootCount> heights_;
-  int landings_ = 0;
-  std::mt19937 random_{5};
-  std::uniform_real_distribution<double> scale_{0.25, 4.0};
-  std::int64_t t_ns_ = 0;
-};
+WalkRows climb(std::uint32_t seed) {
+  WalkSpec spec;
+  spec.seed = seed;
+  spec.steps = 15;
+  spec.stand_s = 0.5;
+  spec.yaw_per_step_rad = 0.05;
+  return WalkRows(spec);
+}
 
 FullState state_of(const BaseFilter& axes) {
   FullState x;
@@ -104,7 +44,7 @@ FullCovariance covariance_of(const BaseFilter& axes) {
 }
 
 TEST(FullFilters, AxisFiltersAgainstDenseForm_OverAClimbOf20000Ticks_AreTheSameFilter) {
-  WalkRows walk;
+  WalkRows walk = climb(1);
   DenseFilter dense;
   double worst_m = 0.0, worst_P = 0.0, cross_P = 0.0;
   for (int i = 0; i < (test::kSlowMachine ? 1500 : 20000); ++i) {
@@ -146,7 +86,7 @@ void couple(FullStep& step) {
 }
 
 TEST(FullFilters, SequentialAgainstDenseForm_CoupledNoise_AreTheSameFilterAndNotTheAxisFilters) {
-  WalkRows walk(2);
+  WalkRows walk = climb(2);
   DenseFilter dense;
   SequentialFilter sequential;
   double worst_m = 0.0, worst_P = 0.0, cross_P = 0.0, from_axes_m = 0.0;
@@ -177,7 +117,7 @@ TEST(FullFilters, SequentialAgainstDenseForm_CoupledNoise_AreTheSameFilterAndNot
 }
 
 TEST(FullFilters, EveryForm_DiagonalNoise_SameState) {
-  WalkRows walk(3);
+  WalkRows walk = climb(3);
   DenseFilter dense;
   SequentialFilter sequential;
   DynamicFilter dynamic;
