@@ -32,7 +32,7 @@ class WalkRows {
     const auto make = [&](const std::array<FootContact, kFootCount>& feet) {
       return axes.make_rows(truth.true_T_base.R, Vec3::Zero(), legs, feet, touch_downs(truth), heights_, kTick_s);
     };
-    if (t_ns_ == 0) axes.initialise(truth.true_T_base.p_m, make({}));
+    if (t_ns_ == 0) axes.initialise(truth.true_T_base.p_m, Vec3::Zero(), make({}));
     rows = make(contacts_.feet());
     for (ContactRow& row : rows) {
       row.position_m2 *= scale_(random_);
