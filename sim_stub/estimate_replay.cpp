@@ -51,14 +51,10 @@ class LogReplay {
   LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log) {
     Odometry::Params params;
     params.attitude.gyro_noise_radprs = 3e-4;
-    params.base.closure_share = 0.0;  // that is of legs whose lengths err
-    params.base.accel_noise_mpsrs = 5e-3;
-    params.base.stance_walk_mprs = params.base.stance_walk_z_mprs = params.attitude.contact_walk_mprs;
     params.fusion.base_T_lidar = options.base_T_lidar.value_or(Transform{});
     params.fusion.tau_s = options.lio_tau_s;
     odometry_.reset(params);
-    ContactEstimator::Params contacts;
-    contacts_.reset(contacts);
+    contacts_.reset({});
     begin();
   }
 
@@ -93,6 +89,7 @@ class LogReplay {
     result_.gyro_bias_radps = odometry_.attitude().gyro_bias_radps();
     result_.accel_bias_mps2 = odometry_.attitude().accel_bias_mps2();
     result_.foot_position_sigma_m = odometry_.motion().position_sigma_m();
+    result_.contact_walk_mprs = odometry_.attitude().contact_walk_mprs();
     result_.outliers = odometry_.attitude().outliers();
     result_.innovation_ratio_mean /= static_cast<double>(log_.rows.size());
     return std::move(result_);
@@ -103,7 +100,7 @@ class LogReplay {
     Odometry::Legs legs;
     for (std::size_t f = 0; f < kFootCount; ++f) {
       legs[f].base_T_sole.p_m = row.base_p_foot_m[f];
-      legs[f].sole_known = legs[f].rates_known = false;
+      legs[f].sole_known = false;
       legs[f].position_sigma_m = odometry_.motion().position_sigma_m();
     }
     return legs;
@@ -112,7 +109,7 @@ class LogReplay {
   void begin() {
     const LogRow& first = log_.rows.front();
     AttitudeFilter::Start start;
-    start.gyro_bias_sigma_radps = 0.02;
+    start.gyro_bias_sigma_radps = 0.007;
     start.accel_bias_sigma_mps2 = 0.1;
     if (log_.has_truth) {
       start.odom_R_base = first.truth.true_T_base.R;

@@ -34,7 +34,7 @@ struct Replay {
   std::vector<ReplayTick> ticks;  // one per row
   StartSource start = StartSource::kTruth;
   Vec3 gyro_bias_radps = Vec3::Zero(), accel_bias_mps2 = Vec3::Zero();  // at the end
-  double foot_position_sigma_m = 0.0;                                   // measured
+  double foot_position_sigma_m = 0.0, contact_walk_mprs = 0.0;          // measured
   double innovation_ratio_mean = 0.0;
   std::uint32_t outliers = 0;
   std::uint32_t gaps = 0;  // rows that came after more than 50 ms

@@ -70,6 +70,7 @@ void write_estimate_json(const std::string& path, const EstimateLog& log, const 
   json["gyro_bias_radps"] = vector(replay.gyro_bias_radps);
   json["accel_bias_mps2"] = vector(replay.accel_bias_mps2);
   json["foot_position_noise_mm"] = 1e3 * replay.foot_position_sigma_m;
+  json["contact_walk_mm_per_sqrt_s"] = 1e3 * replay.contact_walk_mprs;
   json["innovation_ratio_mean"] = replay.innovation_ratio_mean;  // 1: noise is what it is thought to be
   json["innovation_outliers"] = replay.outliers;
   json["moving_contact_rows"] = replay.slipping_rows;

@@ -18,6 +18,7 @@ int of_foot(int first, std::size_t foot) noexcept { return first + 3 * static_ca
 void AttitudeFilter::reset(const Params& params) noexcept {
   *this = AttitudeFilter{};
   params_ = params;
+  contact_walk_mprs_ = params.contact_walk_mprs;
 }
 
 void AttitudeFilter::initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs) noexcept {
@@ -55,12 +56,13 @@ void AttitudeFilter::anchor(std::size_t foot, const LegMeasurement& leg) noexcep
   if (leg.sole_known) copy(of_foot(kSole, foot), kAttitude, math::square(params_.foot_sigma_rad));
 }
 
-void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s) noexcept {
+void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s,
+                             bool lost) noexcept {
   const Vec3 turn_rad = (gyro_radps - gyro_bias_radps_) * dt_s;
   const Vec3 force_mps2 = odom_R_base_ * so3_exp(0.5 * turn_rad) * (accel_mps2 - accel_bias_mps2_);
   const Vec3 odom_a_mps2 = force_mps2 - Vec3{0, 0, gravity_mps2_};
-  predict_covariance(params_.accel_noise_mpsrs + params_.dynamic_accel_share * odom_a_mps2.norm() * math::sqrt(dt_s),
-                     dt_s);
+  const double dynamic_mpsrs = params_.dynamic_accel_share * odom_a_mps2.norm() * math::sqrt(dt_s);
+  predict_covariance(params_.accel_noise_mpsrs + dynamic_mpsrs + (lost ? params_.lost_accel_noise_mpsrs : 0.0), dt_s);
   odom_p_base_m_ += dt_s * (odom_v_base_mps_ + 0.5 * dt_s * odom_a_mps2);
   odom_v_base_mps_ += dt_s * odom_a_mps2;
   odom_R_base_ = so3_renormalised(odom_R_base_ * so3_exp(turn_rad));
@@ -110,13 +112,20 @@ void AttitudeFilter::correct_by_feet(const std::array<LegMeasurement, kFootCount
     const LegMeasurement& leg = legs[foot];
     if (!contacts[foot].stands || contacts[foot].landed) {
       anchor(foot, leg);
+      whiteness_[foot] = {};
       continue;
     }
     const double share = std::max(contacts[foot].load_share * contacts[foot].probability, 0.05);
     const int contact = of_foot(kContact, foot), sole = of_foot(kSole, foot);
     P_.diagonal().segment<3>(contact).array() +=
-        dt_s * (math::square(params_.contact_walk_mprs) / share + contacts[foot].walk_m2ps);
+        dt_s * (math::square(contact_walk_mprs_) / share + contacts[foot].walk_m2ps);
     const Vec3 off_m = odom_R_base_ * leg.base_T_sole.p_m - (odom_p_contact_m_[foot] - odom_p_base_m_);
+    if (contacts[foot].walk_m2ps > 0.0) {
+      whiteness_[foot] = {};
+    } else {
+      const double s_m2 = P_(contact, contact) + P_(kPosition, kPosition) - 2.0 * P_(contact, kPosition);
+      measure_walk(foot, off_m, s_m2 + math::square(leg.position_sigma_m), dt_s);
+    }
     correct(contact, kPosition, off_m, math::square(leg.position_sigma_m), dt_s);
     if (!leg.sole_known) continue;
     P_.diagonal().segment<3>(sole).array() += dt_s * math::square(params_.foot_walk_radprs) / share;
@@ -147,6 +156,24 @@ void AttitudeFilter::correct(int plus, int minus, const Vec3& innovation, double
     for (int j = 0; j < kStates; ++j) P_.col(j) -= PHt[j] * PHt;  // symmetric to the last bit
   }
   apply(error);
+}
+
+void AttitudeFilter::measure_walk(std::size_t foot, const Vec3& innovation_m, double variance_m2,
+                                  double dt_s) noexcept {
+  Whiteness& w = whiteness_[foot];
+  const double share = dt_s / (params_.whiteness_window_s + dt_s);
+  w.mean_m += share * (innovation_m - w.mean_m);
+  w.age_s += dt_s;
+  if (w.age_s < params_.whiteness_window_s) return;
+  constexpr double kMostRatio = 5.0;
+  const double white_m2 = 3.0 * variance_m2 * share / (2.0 - share);
+  const double ratio = std::min(w.mean_m.squaredNorm() / white_m2, kMostRatio);
+  walk_time_s_ += dt_s;
+  const double gain_ps =
+      std::max(params_.whiteness_gain_ps, params_.whiteness_start_gain / (walk_time_s_ + params_.whiteness_window_s));
+  contact_walk_mprs_ *= math::exp(gain_ps * dt_s * (ratio - 1.0));
+  contact_walk_mprs_ =
+      math::clamp(contact_walk_mprs_, params_.min_contact_walk_mprs, params_.max_contact_walk_mprs);
 }
 
 void AttitudeFilter::apply(const Vector& error) noexcept {

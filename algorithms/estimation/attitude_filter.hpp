@@ -22,12 +22,18 @@ class AttitudeFilter {
   struct Params {
     double gyro_noise_radprs = 1e-4;       // rad/sqrt(s); 2e-3 rad/s at 500 Hz is 0.9e-4
     double accel_noise_mpsrs = 3e-3;       // m/s/sqrt(s); 0.05 m/s^2 at 500 Hz is 2.2e-3
+    double lost_accel_noise_mpsrs = 2.0;
     double dynamic_accel_share = 0.02;     // of what differs from gravity: sampling, scale, mount
     double gyro_bias_walk_radpsrs = 5e-6;  // rad/s/sqrt(s)
     double accel_bias_walk_mps2rs = 1e-4;
     double foot_sigma_rad = 1e-3;          // of one kinematic attitude of a sole, encoder noise
     double foot_walk_radprs = 1e-3;        // rad/sqrt(s): creep of a loaded foot and kinematic error as the legs move
-    double contact_walk_mprs = 2e-3;       // m/sqrt(s): the same of its place
+    double contact_walk_mprs = 1e-2;       // m/sqrt(s): the same of its place, at the start; then measured
+    double min_contact_walk_mprs = 3e-4;
+    double max_contact_walk_mprs = 2e-2;
+    double whiteness_window_s = 0.2;       // the walk is right when innovations averaged over this are white
+    double whiteness_gain_ps = 1.0;        // of the walk's logarithm, in the long run ...
+    double whiteness_start_gain = 1.0;     // ... and this over the time measured, at the start
     double outlier_sigmas = 5.0;           // rows further out weigh less, in proportion (Huber)
   };
   // One sigma each, of what is known at the start.
@@ -47,7 +53,8 @@ class AttitudeFilter {
   void reset(const Params& params) noexcept;
   void initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs) noexcept;
 
-  void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s) noexcept;
+  // lost: no foot has rested for so long that the velocity is not known any more.
+  void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, bool lost) noexcept;
   // A foot that does not stand is anchored anew.
   void correct_by_feet(const std::array<LegMeasurement, kFootCount>& legs,
                        const std::array<FootContact, kFootCount>& contacts, double dt_s) noexcept;
@@ -68,6 +75,8 @@ class AttitudeFilter {
   [[nodiscard]] double velocity_sigma_mps() const noexcept;
   // Mean of the squared innovations over their variances, recent: 1 when noise is what it is thought to be.
   [[nodiscard]] double innovation_ratio() const noexcept { return innovation_ratio_; }
+  // Random walk of a resting contact, m/sqrt(s), as measured.
+  [[nodiscard]] double contact_walk_mprs() const noexcept { return contact_walk_mprs_; }
   [[nodiscard]] std::uint32_t outliers() const noexcept { return outliers_; }
 
  private:
@@ -81,6 +90,9 @@ class AttitudeFilter {
   // Three rows: state at `plus` minus state at `minus` is innovation, each of this variance.
   void correct(int plus, int minus, const Vec3& innovation, double variance, double dt_s) noexcept;
   void apply(const Vector& error) noexcept;
+  // A foot rolls and creeps as long as its leg moves, by more or less from robot to robot. Too small a walk shows as
+  // innovations that keep their sign.
+  void measure_walk(std::size_t foot, const Vec3& innovation_m, double variance_m2, double dt_s) noexcept;
 
   Params params_;
   Mat3 odom_R_base_ = Mat3::Identity();
@@ -89,6 +101,13 @@ class AttitudeFilter {
   Vec3 gyro_bias_radps_ = Vec3::Zero();
   Vec3 accel_bias_mps2_ = Vec3::Zero();
   std::array<Vec3, kFootCount> odom_p_contact_m_{Vec3::Zero(), Vec3::Zero()};
+  struct Whiteness {
+    Vec3 mean_m = Vec3::Zero();
+    double age_s = 0.0;
+  };
+  std::array<Whiteness, kFootCount> whiteness_{};
+  double contact_walk_mprs_ = 0.0;
+  double walk_time_s_ = 0.0;  // measured for so long
   std::array<Mat3, kFootCount> odom_R_foot_{Mat3::Identity(), Mat3::Identity()};
   Covariance P_ = Covariance::Zero();
   double gravity_mps2_ = kGravity_mps2;

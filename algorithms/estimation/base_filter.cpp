@@ -43,14 +43,12 @@ ContactRows BaseFilter::make_rows(const Mat3& odom_R_base, const Vec3& base_w_ba
     const bool stands = contacts[foot].stands && !touch_down.now;
     const Vec3 walk_mprs = stands ? Vec3{params_.stance_walk_mprs, params_.stance_walk_mprs, params_.stance_walk_z_mprs}
                                   : Vec3::Constant(params_.swing_walk_mprs);
-    // Four points of one sole share its noise; a foot whose sole is unknown is four times the same point.
-    const double known_m = leg.sole_known ? params_.position_sigma_m : 2.0 * leg.position_sigma_m;
-    const double position_m = touch_down.now ? params_.anchor_sigma_m : known_m;
-    const double velocity_mps = stands && leg.rates_known ? params_.velocity_sigma_mps : kSwingVelocity_mps;
+    const double position_m = touch_down.now ? params_.anchor_sigma_m : params_.position_sigma_m;
+    const double velocity_mps = stands ? params_.velocity_sigma_mps : kSwingVelocity_mps;
     const KnownHeight& height = heights[foot];
     const bool height_counts = height.sigma_m > 0.0 && stands;
     for (std::size_t i = 0; i < kContactsPerFoot; ++i) {
-      const Vec3 base_r_m = leg.sole_known ? Vec3(leg.base_T_sole.R * sole_p_contact_m[i]) : Vec3(Vec3::Zero());  // from the sole's origin
+      const Vec3 base_r_m = leg.base_T_sole.R * sole_p_contact_m[i];  // from the sole's origin
       const Vec3 base_p_m = leg.base_T_sole.p_m + base_r_m;
       ContactRow& row = rows[foot * kContactsPerFoot + i];
       row.odom_r_contact_m = touch_down.now ? Vec3(touch_down.odom_T_sole * sole_p_contact_m[i] - odom_p_predicted_m)

@@ -12,8 +12,7 @@ struct LegMeasurement {
   Transform base_T_sole;
   Vec3 base_v_sole_mps = Vec3::Zero();
   Vec3 base_w_sole_radps = Vec3::Zero();
-  bool sole_known = true;   // the sole's rotation; without it the foot is one contact point
-  bool rates_known = true;  // the velocities
+  bool sole_known = true;          // its rotation and motion; without them the foot is one point
   double position_sigma_m = 3e-4;  // white noise of the position, per axis
 };
 

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // From IMU, legs and contacts to a pose: the filters in their order. Whoever has measurements, the module from its
 // joints or a replay from a log, runs this.
+//
+// Position and velocity are those of eqs (1)-(4) where soles are known: eight contact points, tread heights, legs that
+// disagree. Where feet are points there is none of that, and the attitude filter's own are published: they gain from
+// what tilt and biases turn out to have been, which filters that take the attitude as given cannot.
 #pragma once
 
 #include "algorithms/core/state.hpp"
@@ -19,6 +23,8 @@ class Odometry {
     AttitudeFilter::Params attitude;
     BaseFilter::Params base;
     OdometryFusion::Params fusion;
+    double lost_s = 0.25;              // a standing robot none of whose feet rest for so long has lost its velocity
+    double doubtful_walk_m2ps = 1e-4;  // random walk of a contact as likely as not: 0.3 mm in 1 ms
   };
   // What is new since the last step. Rates hold over dt.
   struct Step {
@@ -52,6 +58,12 @@ class Odometry {
     return attitude_.odom_p_base_m() + attitude_.odom_R_base() * leg.base_T_sole.p_m;
   }
 
+  Params params_;
+  void take_legs(const Legs& legs) noexcept;
+  [[nodiscard]] Vec3 odom_p_base_m() const noexcept {
+    return soles_known_ ? base_.odom_p_base_m() : attitude_.odom_p_base_m();
+  }
+
   AttitudeFilter attitude_;
   BaseFilter base_;
   FootMotion motion_;
@@ -59,6 +71,8 @@ class Odometry {
   Contacts contacts_{};
   std::array<Vec3, kFootCount> odom_p_foot_m_{Vec3::Zero(), Vec3::Zero()};  // as of the last corrected state
   double since_legs_s_ = 0.0;
+  double unrested_s_ = 0.0;
+  bool soles_known_ = true;
   Vec3 base_w_base_radps_ = Vec3::Zero();
 };
 
