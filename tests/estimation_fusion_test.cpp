@@ -129,7 +129,12 @@ TEST_F(FusionTest, Slew_YawCorrectedFiftyMetresFromTheOrigin_BaseMovesByNoMoreTh
     offset_moved_m = std::max(offset_moved_m, (fusion_.world_T_odom().p_m - before.p_m).norm());
   }
   EXPECT_GT(corrected_m, 0.005);
-  EXPECT_GT(offset_moved_m, 10.0 * params_.slew_m);  // a limit on the transform's own origin would have been another
+  tick(odom_T_base, 2000);
+  fusion_.tick(odom_T_base, Vec3::Zero(), kTick_s);
+  const Transform arrived = fusion_.world_T_odom();
+  tick(odom_T_base, 1);
+  EXPECT_EQ(arrived.p_m, fusion_.world_T_odom().p_m);  // it gets there
+  EXPECT_GT(offset_moved_m, 10.0 * params_.slew_m);    // a limit on the transform's own origin would have been another
 }
 
 TEST_F(FusionTest, Slew_AfterLongSilence_NoTickMovesTheFusedPoseByMoreThanTheBound) {
@@ -204,6 +209,39 @@ TEST_F(FusionTest, Sigma_FarFromWhereTheWorldWasTied_IsLarger) {
   EXPECT_NEAR(far_m.x(), near_m.x(), 1e-9);
   EXPECT_NEAR(far_m.y(), std::hypot(near_m.y(), 10 * turn_rad), 1e-4);
   EXPECT_NEAR(far_m.z(), std::hypot(near_m.z(), 10 * turn_rad), 1e-4);
+}
+
+TEST(FusionUncertainty, BlendsWithoutDrift_LetThroughWhatALowPassOfWhiteNoiseDoes) {
+  FusionUncertainty uncertainty;
+  uncertainty.reset({});
+  const double gain = 0.1;
+  for (int i = 0; i < 500; ++i) uncertainty.blend(gain, 0.01, 0.002);
+  EXPECT_NEAR(uncertainty.offset_variance().x(), 1e-4 * gain / (2.0 - gain), 1e-12);
+  EXPECT_NEAR(uncertainty.offset_variance()[3], 4e-6 * gain / (2.0 - gain), 1e-14);
+}
+
+TEST(FusionUncertainty, DriftUnderBlends_LagsByTheTimeConstant) {
+  FusionUncertainty uncertainty;
+  const FusionUncertainty::Params params;
+  uncertainty.reset(params);
+  for (int i = 0; i < 2000; ++i) {
+    uncertainty.move({0, 0, 0.02}, 0.1);  // up: no heading bends that
+    uncertainty.blend(0.1, 0.0, 0.0);
+  }
+  EXPECT_NEAR(std::sqrt(uncertainty.offset_variance().z()), params.drift_per_m * 0.02 * 0.9 / 0.1, 1e-9);
+}
+
+TEST(FusionUncertainty, Tie_AtThatMomentChangesNothing) {
+  FusionUncertainty uncertainty;
+  uncertainty.reset({});
+  for (int i = 0; i < 100; ++i) uncertainty.move({0.02, 0.01, 0.005}, 0.1);
+  const Vec3 there_m{2.0, 1.0, 0.5}, before_m = uncertainty.position_sigma_m(there_m);
+  const double yaw_rad = uncertainty.yaw_sigma_rad();
+  uncertainty.tie(there_m, 0.01, 0.003);
+  EXPECT_LT((uncertainty.position_sigma_m(there_m) - before_m).norm(), 1e-12);
+  EXPECT_NEAR(uncertainty.yaw_sigma_rad(), yaw_rad, 1e-12);
+  for (int i = 0; i < 500; ++i) uncertainty.blend(0.1, 0.0, 0.0);  // what is forgotten no longer cancels it
+  EXPECT_NEAR(uncertainty.position_sigma_m(there_m).x(), std::hypot(before_m.x(), 0.01), 1e-9);
 }
 
 TEST_F(FusionTest, Innovations_HonestSigmas_AreOneInTheMean) {
