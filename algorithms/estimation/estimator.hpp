@@ -2,11 +2,7 @@
 // State estimation as one stage: samples in as they arrive, StateEstimate out once per 2 ms.
 #pragma once
 
-#include "algorithms/core/state.hpp"
-#include "algorithms/estimation/attitude_filter.hpp"
-#include "algorithms/estimation/base_filter.hpp"
-#include "algorithms/estimation/contacts.hpp"
-#include "algorithms/estimation/odometry_fusion.hpp"
+#include "algorithms/estimation/odometry.hpp"
 #include "algorithms/estimation/standstill.hpp"
 #include "algorithms/estimation/state_ring.hpp"
 
@@ -14,13 +10,10 @@ namespace polygmap {
 
 class Estimator {
  public:
-  struct Params {
+  struct Params : Odometry::Params {
     LegGeometry geometry;
     StandstillCalibration::Params standstill;
     ContactEstimator::Params contacts;
-    AttitudeFilter::Params attitude;
-    BaseFilter::Params base;
-    OdometryFusion::Params fusion;
     double max_rate_radps = 20.0;  // sensor samples beyond these are invalid
     double max_accel_mps2 = 100.0;
     double max_joint_rad = 4.0;
@@ -42,7 +35,6 @@ class Estimator {
     std::uint32_t joints_jump = 0;  // moved faster than a joint can
     std::uint32_t gaps = 0;         // longer than max_step_s
     std::uint32_t standstill_restarts = 0;
-    std::uint32_t gravity_rejected = 0;
     std::uint32_t height_taken = 0;
     std::uint32_t height_invalid = 0;
     std::uint32_t height_rejected = 0;  // disagreed by more than max_height_error_m
@@ -76,21 +68,20 @@ class Estimator {
   [[nodiscard]] bool try_state_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {
     return ring_.try_at(stamp_ns, out);
   }
+  [[nodiscard]] const LioInnovations& lio_innovations() const noexcept { return odometry_.fusion().innovations(); }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
-  [[nodiscard]] const Vec3& gyro_bias_radps() const noexcept { return attitude_.gyro_bias_radps(); }
+  [[nodiscard]] const Vec3& gyro_bias_radps() const noexcept { return odometry_.attitude().gyro_bias_radps(); }
 
  private:
   void take_joints(const std::array<bool, kFootCount>& planned_stance) noexcept;
   void calibrate() noexcept;
-  void publish(std::int64_t now_ns, const Vec3& gyro_radps, double dt_s) noexcept;
+  void publish(std::int64_t now_ns) noexcept;
 
   Params params_;
   Counters counters_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;
-  AttitudeFilter attitude_;
-  BaseFilter base_;
-  OdometryFusion fusion_;
+  Odometry odometry_;
   StateRing ring_;
   StateEstimate state_;
   ImuSample imu_;               // last accepted; rates: the mean of those of its tick
@@ -100,9 +91,8 @@ class Estimator {
   bool has_imu_ = false;
   bool has_joints_ = false;
   bool has_state_ = false;
-  std::array<LegMeasurement, kFootCount> legs_;
-  std::array<TouchDown, kFootCount> touch_downs_;
-  std::array<KnownHeight, kFootCount> heights_;
+  Odometry::Legs legs_;
+  Odometry::Ground ground_;
   std::array<bool, kFootCount> stood_{};
   Transform initial_odom_T_base_;  // stood still there until initialised_ns_
   std::int64_t initialised_ns_ = 0;

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <optional>
 #include <ostream>
 
+#include "sim_stub/cli/estimate_command.hpp"
 #include "sim_stub/cli/perceive_command.hpp"
 
 namespace polygmap::sim {
@@ -231,17 +233,21 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   declare(*climb, a);
   PerceiveArguments perceive_arguments;
   const CLI::App* perceive = declare_perceive(app, perceive_arguments);
+  EstimateArguments estimate_arguments;
+  const CLI::App* estimate = declare_estimate(app, estimate_arguments);
 
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 wants the last one first
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
-    const bool named = !arguments.empty() && (arguments[0] == "climb" || arguments[0] == "perceive");
+    constexpr std::array<std::string_view, 3> kCommands{"climb", "perceive", "estimate"};
+    const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
     err << "polygmap: " << error.what() << "; see polygmap " << (named ? arguments[0] + " " : "") << "--help.\n";
     return kExitUsage;
   }
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);
+  if (estimate->parsed()) return run_estimate(estimate_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
     err << "polygmap: A subcommand is required; see polygmap --help.\n";
     return kExitUsage;

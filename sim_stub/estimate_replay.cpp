@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/estimate_replay.hpp"
+
+#include <algorithm>
+#include <memory>
+
+#include "algorithms/geometry/so3.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+constexpr double kGap_s = 0.05;
+constexpr std::int64_t kRingPeriod_ns = 2 * kNsPerMs;  // the ring holds half a second at this rate
+// A start without truth: still for this long, or the first acceleration must do.
+constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0;
+constexpr double kStillRate_radps = 0.1, kStillAccel_mps2 = 1.0, kStillMove_m = 0.01;
+
+Mat3 level_R_base(const Vec3& up) {
+  const double roll_rad = std::atan2(up.y(), up.z());
+  const double pitch_rad = std::atan2(-up.x(), std::hypot(up.y(), up.z()));
+  return rotation_y(pitch_rad) * rotation_x(roll_rad);
+}
+
+// How the log begins, where no truth says so.
+struct Opening {
+  Vec3 gyro_radps = Vec3::Zero(), accel_mps2 = Vec3::Zero();
+  double still_s = 0.0;
+};
+Opening opening(const EstimateLog& log) {
+  Opening o;
+  double count = 0.0;
+  const LogRow& first = log.rows.front();
+  for (const LogRow& row : log.rows) {
+    bool still = row.gyro_radps.cwiseAbs().maxCoeff() < kStillRate_radps &&
+                 std::abs(row.accel_mps2.norm() - kGravity_mps2) < kStillAccel_mps2 &&
+                 seconds(row.stamp_ns) < kMaxStill_s;
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      still = still && row.contact[f] >= 0.5 && (row.base_p_foot_m[f] - first.base_p_foot_m[f]).norm() < kStillMove_m;
+    }
+    if (!still) break;
+    count += 1.0;
+    o.gyro_radps += (row.gyro_radps - o.gyro_radps) / count;
+    o.accel_mps2 += (row.accel_mps2 - o.accel_mps2) / count;
+    o.still_s = seconds(row.stamp_ns);
+  }
+  return o;
+}
+
+class LogReplay {
+ public:
+  LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log) {
+    Odometry::Params params;
+    params.attitude.gyro_noise_radprs = 3e-4;
+    params.fusion.base_T_lidar = options.base_T_lidar.value_or(Transform{});
+    params.fusion.tau_s = options.lio_tau_s;
+    odometry_.reset(params);
+    contacts_.reset({});
+    begin();
+  }
+
+  void add_lio(const LioRow& row, std::int64_t now_ns) {
+    LioSample sample;
+    sample.stamp_ns = row.stamp_ns;
+    sample.lio_T_lidar = row.pose;
+    LioVerdict verdict = odometry_.fusion().check(sample, now_ns);
+    StateEstimate then;
+    if (verdict == LioVerdict::kAccepted) {
+      verdict = ring_.try_at(sample.stamp_ns, then) ? odometry_.fusion().fuse(sample, then.odom_T_base)
+                                                    : LioVerdict::kNoOdometry;
+    }
+    ++result_.lio[static_cast<std::size_t>(verdict)];
+  }
+
+  void step(std::size_t i) {
+    const LogRow& row = log_.rows[i];
+    contacts_.update_stated(row.contact, row.stamp_ns);
+    if (i > 0) {
+      const LogRow& before = log_.rows[i - 1];
+      const double dt_s = seconds(row.stamp_ns - before.stamp_ns);
+      if (dt_s > kGap_s) ++result_.gaps;
+      // Samples of a moment: over the step, the mean of both its ends.
+      odometry_.step({dt_s, 0.5 * (row.gyro_radps + before.gyro_radps), 0.5 * (row.accel_mps2 + before.accel_mps2)},
+                     legs_of(row), contacts_.feet(), {});
+    }
+    publish(row, i);
+  }
+
+  [[nodiscard]] Replay take() {
+    result_.gyro_bias_radps = odometry_.attitude().gyro_bias_radps();
+    result_.accel_bias_mps2 = odometry_.attitude().accel_bias_mps2();
+    result_.foot_position_sigma_m = odometry_.motion().position_sigma_m();
+    result_.contact_walk_mprs = odometry_.attitude().contact_walk_mprs();
+    result_.outliers = odometry_.attitude().outliers();
+    result_.innovation_ratio_mean /= static_cast<double>(log_.rows.size());
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] Odometry::Legs legs_of(const LogRow& row) const {
+    Odometry::Legs legs;
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      legs[f].base_T_sole.p_m = row.base_p_foot_m[f];
+      legs[f].sole_known = false;
+      legs[f].position_sigma_m = odometry_.motion().position_sigma_m();
+    }
+    return legs;
+  }
+
+  void begin() {
+    const LogRow& first = log_.rows.front();
+    AttitudeFilter::Start start;
+    start.gyro_bias_sigma_radps = 0.007;
+    start.accel_bias_sigma_mps2 = 0.1;
+    if (log_.has_truth) {
+      start.odom_R_base = first.truth.true_T_base.R;
+      start.odom_p_base_m = first.truth.true_T_base.p_m;
+      start.odom_v_base_mps = first.truth.true_v_base_mps;
+    } else {
+      const Opening o = opening(log_);
+      const bool stood = o.still_s >= kMinStill_s;
+      result_.start = stood ? StartSource::kStandstill : StartSource::kFirstAcceleration;
+      start.odom_R_base = level_R_base(stood ? o.accel_mps2 : first.accel_mps2);
+      for (const Vec3& foot_m : first.base_p_foot_m) {  // the feet's mean at height 0
+        start.odom_p_base_m.z() -= (start.odom_R_base * foot_m).z() / static_cast<double>(kFootCount);
+      }
+      if (stood) start.gyro_bias_radps = o.gyro_radps;
+      start.gyro_bias_sigma_radps = stood ? 1e-3 : start.gyro_bias_sigma_radps;
+      start.tilt_sigma_rad = stood ? start.accel_bias_sigma_mps2 / kGravity_mps2 : 0.2;
+      start.velocity_sigma_mps = stood ? 0.01 : 1.0;
+    }
+    contacts_.update_stated(first.contact, 0);
+    odometry_.initialise(start, legs_of(first), 0.01);
+  }
+
+  void publish(const LogRow& row, std::size_t i) {
+    StateEstimate state;
+    state.stamp_ns = row.stamp_ns;
+    odometry_.describe(row.stamp_ns, state);
+    if (row.stamp_ns - last_ring_ns_ >= kRingPeriod_ns || i == 0) {
+      ring_.push(state);
+      last_ring_ns_ = row.stamp_ns;
+    }
+    const Mat3& world_R_odom = state.world_T_odom.R;
+    ReplayTick tick;
+    tick.stamp_ns = row.stamp_ns;
+    tick.odom_T_base = state.odom_T_base;
+    tick.world_T_base = state.world_T_base();
+    tick.world_v_base_mps = world_R_odom * state.odom_v_base_mps;
+    tick.base_w_base_radps = state.base_w_base_radps;
+    tick.covariance = odometry_.attitude().covariance();
+    tick.contact_probability = state.contact_probability;
+    tick.lio_age_ns = state.lio_age_ns;
+    result_.ticks.push_back(tick);
+    if (i > 0) {  // as the fusion's limit counts: the new offset against the old one, at the same place
+      const double slew_m = (tick.world_T_base.p_m - last_world_T_odom_ * state.odom_T_base.p_m).norm();
+      result_.largest_slew_m = std::max(result_.largest_slew_m, slew_m);
+    }
+    last_world_T_odom_ = state.world_T_odom;
+    result_.innovation_ratio_mean += odometry_.attitude().innovation_ratio();
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      if (contacts_.feet()[f].stands && odometry_.motion().walk_m2ps(f) > 0.0) ++result_.slipping_rows;
+    }
+  }
+
+  const EstimateLog& log_;
+  Odometry odometry_;
+  ContactEstimator contacts_;
+  StateRing ring_;
+  std::int64_t last_ring_ns_ = 0;
+  Transform last_world_T_odom_;
+  Replay result_;
+};
+
+}  // namespace
+
+Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options) {
+  const auto estimator = std::make_unique<LogReplay>(log, options);  // its ring is too large for a stack
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < log.rows.size(); ++i) {
+    const std::int64_t now_ns = log.rows[i].stamp_ns;
+    for (; next < lio.size() && lio[next].arrival_ns <= now_ns; ++next) estimator->add_lio(lio[next], now_ns);
+    estimator->step(i);
+  }
+  return estimator->take();
+}
+
+}  // namespace polygmap::sim
