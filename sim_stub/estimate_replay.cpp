@@ -49,11 +49,7 @@ Opening opening(const EstimateLog& log) {
 class LogReplay {
  public:
   LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log) {
-    Odometry::Params params;
-    params.attitude.gyro_noise_radprs = 3e-4;
-    params.fusion.base_T_lidar = options.base_T_lidar.value_or(Transform{});
-    params.fusion.tau_s = options.lio_tau_s;
-    odometry_.reset(params);
+    odometry_.reset(options.odometry);
     contacts_.reset({});
     begin();
   }
@@ -109,7 +105,7 @@ class LogReplay {
   void begin() {
     const LogRow& first = log_.rows.front();
     AttitudeFilter::Start start;
-    start.gyro_bias_sigma_radps = 0.007;
+    start.gyro_bias_sigma_radps = 0.005;
     start.accel_bias_sigma_mps2 = 0.1;
     if (log_.has_truth) {
       start.odom_R_base = first.truth.true_T_base.R;
@@ -172,6 +168,14 @@ class LogReplay {
 };
 
 }  // namespace
+
+Odometry::Params log_params() {
+  Odometry::Params params;
+  params.attitude.gyro_noise_radprs = 3e-4;
+  params.attitude.contact_walk_mprs = 1e-2;
+  params.fusion.base_T_lidar = {};
+  return params;
+}
 
 Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options) {
   const auto estimator = std::make_unique<LogReplay>(log, options);  // its ring is too large for a stack

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "algorithms/estimation/odometry.hpp"
@@ -12,9 +11,11 @@
 
 namespace polygmap::sim {
 
+// The module's, but for what no data sheet says of a robot that is only known by its log.
+[[nodiscard]] Odometry::Params log_params();
+
 struct ReplayOptions {
-  std::optional<Transform> base_T_lidar;  // absent: LIO gives the base's pose
-  double lio_tau_s = OdometryFusion::Params{}.tau_s;
+  Odometry::Params odometry = log_params();  // its lidar mount: none, LIO gives the base's pose
 };
 
 enum class StartSource : std::uint8_t { kTruth, kStandstill, kFirstAcceleration };

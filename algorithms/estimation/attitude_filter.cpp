@@ -59,6 +59,9 @@ void AttitudeFilter::anchor(std::size_t foot, const LegMeasurement& leg) noexcep
 void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s,
                              bool lost) noexcept {
   const Vec3 turn_rad = (gyro_radps - gyro_bias_radps_) * dt_s;
+  constexpr double kLeg_m = 0.5;
+  const double speed_mps = odom_v_base_mps_.norm() + kLeg_m * turn_rad.norm() / dt_s;
+  pace_ = std::min(speed_mps / params_.full_walk_speed_mps, 1.0);
   const Vec3 force_mps2 = odom_R_base_ * so3_exp(0.5 * turn_rad) * (accel_mps2 - accel_bias_mps2_);
   const Vec3 odom_a_mps2 = force_mps2 - Vec3{0, 0, gravity_mps2_};
   const double dynamic_mpsrs = params_.dynamic_accel_share * odom_a_mps2.norm() * math::sqrt(dt_s);
@@ -108,6 +111,7 @@ void AttitudeFilter::predict_covariance(double accel_noise_mpsrs, double dt_s) n
 
 void AttitudeFilter::correct_by_feet(const std::array<LegMeasurement, kFootCount>& legs,
                                      const std::array<FootContact, kFootCount>& contacts, double dt_s) noexcept {
+  const double walk_mprs = std::max(pace_ * contact_walk_mprs_, params_.min_contact_walk_mprs);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     const LegMeasurement& leg = legs[foot];
     if (!contacts[foot].stands || contacts[foot].landed) {
@@ -118,7 +122,7 @@ void AttitudeFilter::correct_by_feet(const std::array<LegMeasurement, kFootCount
     const double share = std::max(contacts[foot].load_share * contacts[foot].probability, 0.05);
     const int contact = of_foot(kContact, foot), sole = of_foot(kSole, foot);
     P_.diagonal().segment<3>(contact).array() +=
-        dt_s * (math::square(contact_walk_mprs_) / share + contacts[foot].walk_m2ps);
+        dt_s * (math::square(walk_mprs) / share + contacts[foot].walk_m2ps);
     const Vec3 off_m = odom_R_base_ * leg.base_T_sole.p_m - (odom_p_contact_m_[foot] - odom_p_base_m_);
     if (contacts[foot].walk_m2ps > 0.0) {
       whiteness_[foot] = {};

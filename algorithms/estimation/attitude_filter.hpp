@@ -28,8 +28,9 @@ class AttitudeFilter {
     double accel_bias_walk_mps2rs = 1e-4;
     double foot_sigma_rad = 1e-3;          // of one kinematic attitude of a sole, encoder noise
     double foot_walk_radprs = 1e-3;        // rad/sqrt(s): creep of a loaded foot and kinematic error as the legs move
-    double contact_walk_mprs = 1e-2;       // m/sqrt(s): the same of its place, at the start; then measured
+    double contact_walk_mprs = 2e-3;       // m/sqrt(s): the same of its place, at the start; then measured
     double min_contact_walk_mprs = 3e-4;
+    double full_walk_speed_mps = 0.1;      // of the base, turning included; below it a contact walks less
     double max_contact_walk_mprs = 2e-2;
     double whiteness_window_s = 0.2;       // the walk is right when innovations averaged over this are white
     double whiteness_gain_ps = 1.0;        // of the walk's logarithm, in the long run ...
@@ -48,12 +49,12 @@ class AttitudeFilter {
     double position_sigma_m = 1e-4;
     double velocity_sigma_mps = 1e-3;
     double gyro_bias_sigma_radps = 2e-4;  // after one second of standstill
-    double accel_bias_sigma_mps2 = 0.01;
+    double accel_bias_sigma_mps2 = 0.003;
   };
   void reset(const Params& params) noexcept;
   void initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs) noexcept;
 
-  // lost: no foot has rested for so long that the velocity is not known any more.
+  // lost: what the base feels is not known, or no foot has rested for so long that its velocity is not.
   void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, bool lost) noexcept;
   // A foot that does not stand is anchored anew.
   void correct_by_feet(const std::array<LegMeasurement, kFootCount>& legs,
@@ -107,6 +108,7 @@ class AttitudeFilter {
   };
   std::array<Whiteness, kFootCount> whiteness_{};
   double contact_walk_mprs_ = 0.0;
+  double pace_ = 1.0;         // share of that walk at the base's speed
   double walk_time_s_ = 0.0;  // measured for so long
   std::array<Mat3, kFootCount> odom_R_foot_{Mat3::Identity(), Mat3::Identity()};
   Covariance P_ = Covariance::Zero();

@@ -33,6 +33,9 @@ class FootMotion {
   // the last corrected state. speed_sigma_mps: of the base's velocity, one sigma.
   void update(std::size_t foot, const Vec3& odom_step_m, double speed_sigma_mps, double dt_s) noexcept;
 
+  // The foot is known to rest from now on, whatever it did before.
+  void rest(std::size_t foot) noexcept { feet_[foot] = {}; }
+
   // Random walk of the contact that its motion stands for, m^2/s, 0 at rest.
   [[nodiscard]] double walk_m2ps(std::size_t foot) const noexcept { return feet_[foot].walk_m2ps; }
   [[nodiscard]] const Vec3& odom_v_foot_mps(std::size_t foot) const noexcept { return feet_[foot].odom_v_mps; }
@@ -44,7 +47,6 @@ class FootMotion {
     Vec3 odom_v_mps = Vec3::Zero();
     Vec3 last_step_m = Vec3::Zero();
     double walk_m2ps = 0.0;
-    double weight = 0.0;  // of the low-pass so far: a first value counts fully
     bool has_step = false;
   };
   void measure_noise(const Vec3& jerk_m, double dt_s) noexcept;

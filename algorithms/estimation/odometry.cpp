@@ -34,7 +34,7 @@ void Odometry::step(const Step& step, const Legs& legs, const Contacts& contacts
   const Vec3 rest_mps2 =
       attitude_.accel_bias_mps2() + attitude_.odom_R_base().transpose() * Vec3{0, 0, attitude_.gravity_mps2()};
   const Vec3 accel_mps2 = step.felt ? step.accel_mps2 : rest_mps2;
-  attitude_.predict(gyro_radps, accel_mps2, step.dt_s, unrested_s_ > params_.lost_s);
+  attitude_.predict(gyro_radps, accel_mps2, step.dt_s, !step.felt || unrested_s_ > params_.lost_s);
   since_legs_s_ += step.dt_s;
   contacts_ = contacts;
   if (step.new_legs) take_legs(legs);
@@ -57,6 +57,8 @@ void Odometry::take_legs(const Legs& legs) noexcept {
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     FootContact& contact = contacts_[foot];
     motion_.update(foot, odom_p_foot_m(legs[foot]) - odom_p_foot_m_[foot], velocity_sigma_mps, since_legs_s_);
+    // Where force says when a sole landed and kinematics where, its swing is no reason to let go of it.
+    if (legs[foot].sole_known && (!contact.stands || contact.landed)) motion_.rest(foot);
     const double doubt = 1.0 / std::max(contact.probability, 0.01) - 1.0;
     contact.walk_m2ps = motion_.walk_m2ps(foot) + params_.doubtful_walk_m2ps * doubt;
     stands = stands || contact.stands;

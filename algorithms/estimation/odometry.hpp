@@ -24,7 +24,7 @@ class Odometry {
     BaseFilter::Params base;
     OdometryFusion::Params fusion;
     double lost_s = 0.25;              // a standing robot none of whose feet rest for so long has lost its velocity
-    double doubtful_walk_m2ps = 1e-4;  // random walk of a contact as likely as not: 0.3 mm in 1 ms
+    double doubtful_walk_m2ps = 1e-3;  // random walk of a contact as likely as not: 1 mm in 1 ms
   };
   // What is new since the last step. Rates hold over dt.
   struct Step {
