@@ -10,9 +10,5 @@ static volatile int sink;
 
 int main() {
   stage_loop();
-<<<<<<< HEAD:toolchain/checks/seeded/instructions.cpp
-  std::puts("build seeded narrow\nframes 1");
-=======
-  std::puts("build seeded\nruns 1");
->>>>>>> lio:toolchain/checks/seeded/instructions/lost/main.cpp
+  std::puts("build seeded narrow\nruns 1");
 }
