@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "algorithms/perception/counter_random.hpp"
 #include "algorithms/perception/vectors.hpp"
 
 namespace polygmap {

@@ -8,6 +8,7 @@
 
 #include "algorithms/core/static_vector.hpp"
 #include "algorithms/perception/column_image.hpp"
+#include "algorithms/perception/depth_sigma.hpp"
 
 namespace polygmap {
 
