@@ -32,7 +32,8 @@ Opening opening(const EstimateLog& log) {
   const LogRow& first = log.rows.front();
   for (const LogRow& row : log.rows) {
     bool still = row.gyro_radps.cwiseAbs().maxCoeff() < kStillRate_radps &&
-                 std::abs(row.accel_mps2.norm() - kGravity_mps2) < kStillAccel_mps2 && seconds(row.stamp_ns) < kMaxStill_s;
+                 std::abs(row.accel_mps2.norm() - kGravity_mps2) < kStillAccel_mps2 &&
+                 seconds(row.stamp_ns) < kMaxStill_s;
     for (std::size_t f = 0; f < kFootCount; ++f) {
       still = still && row.contact[f] >= 0.5 && (row.base_p_foot_m[f] - first.base_p_foot_m[f]).norm() < kStillMove_m;
     }
@@ -60,8 +61,8 @@ class LogReplay {
     LioVerdict verdict = odometry_.fusion().check(sample, now_ns);
     StateEstimate then;
     if (verdict == LioVerdict::kAccepted) {
-      verdict = ring_.try_at(sample.stamp_ns, then) ? odometry_.fusion().fuse(sample, then.odom_T_base)
-                                                    : LioVerdict::kTooOld;
+      verdict =
+          ring_.try_at(sample.stamp_ns, then) ? odometry_.fusion().fuse(sample, then.odom_T_base) : LioVerdict::kTooOld;
     }
     ++result_.lio[static_cast<std::size_t>(verdict)];
   }

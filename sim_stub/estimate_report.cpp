@@ -18,9 +18,8 @@ constexpr double kDegrees = 180.0 / kPi;
 Json vector(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
 Json lio_counts(const std::vector<LioRow>& lio, const Replay& replay) {
-  constexpr std::array<const char*, kLioVerdictCount> kNames{"accepted", "non_finite", "not_rotation",
-                                                             "covariance", "order", "future",
-                                                             "too_old", "jump", "realigned"};
+  constexpr std::array<const char*, kLioVerdictCount> kNames{
+      "accepted", "non_finite", "not_rotation", "covariance", "order", "future", "too_old", "jump", "realigned"};
   Json counts{{"poses", lio.size()}};
   for (std::size_t v = 0; v < kLioVerdictCount; ++v) counts[kNames[v]] = replay.lio[v];
   return counts;
@@ -62,9 +61,8 @@ double drift_percent(const Score& score) {
 
 void write_estimate_json(const std::string& path, const EstimateLog& log, const std::vector<LioRow>& lio,
                          const Replay& replay) {
-  Json json{{"rows", log.rows.size()},
-            {"duration_s", seconds(log.rows.back().stamp_ns)},
-            {"start", name_of(replay.start)}};
+  Json json{
+      {"rows", log.rows.size()}, {"duration_s", seconds(log.rows.back().stamp_ns)}, {"start", name_of(replay.start)}};
   if (log.has_truth) json.update(scores(log, replay));
   const ReplayTick& last = replay.ticks.back();
   json["gyro_bias_radps"] = vector(replay.gyro_bias_radps);
