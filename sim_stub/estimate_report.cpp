@@ -18,8 +18,9 @@ constexpr double kDegrees = 180.0 / kPi;
 Json vector(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
 Json lio_counts(const std::vector<LioRow>& lio, const Replay& replay) {
-  constexpr std::array<const char*, kLioVerdictCount> kNames{
-      "accepted", "non_finite", "not_rotation", "covariance", "order", "future", "too_old", "jump", "realigned"};
+  constexpr std::array<const char*, kLioVerdictCount> kNames{"accepted", "non_finite", "not_rotation", "covariance",
+                                                             "order",    "future",     "too_old",      "no_odometry",
+                                                             "jump",     "realigned"};
   Json counts{{"poses", lio.size()}};
   for (std::size_t v = 0; v < kLioVerdictCount; ++v) counts[kNames[v]] = replay.lio[v];
   return counts;

@@ -5,7 +5,6 @@
 
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/geometry/so3.hpp"
-#include "tests/support/dense_base_filter.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
 
@@ -53,55 +52,6 @@ ContactRows rows_of(const BaseFilter& filter, const WalkTruth& truth, const Join
                           {measure_leg(geometry, Foot::kLeft, joints.q_rad, joints.dq_radps),
                            measure_leg(geometry, Foot::kRight, joints.q_rad, joints.dq_radps)},
                           contacts, {}, heights, kTick_s);
-}
-
-// A walk through the base filter alone; calls each(filter, rows, acceleration) before every tick.
-template <typename Each>
-void run_base_filter(BaseFilter& filter, int ticks, const Each& each) {
-  WalkSpec spec;
-  spec.stand_s = 0.5;
-  SyntheticWalk walk(spec);
-  ContactEstimator contacts;
-  contacts.reset({});
-  filter.reset({});
-  std::array<KnownHeight, kFootCount> heights{KnownHeight{0.0, 0.003}, KnownHeight{0.0, 0.003}};
-  for (int i = 0; i < ticks; ++i) {
-    const std::int64_t t_ns = i * kTick_ns;
-    const WalkTruth truth = walk.truth(t_ns);
-    const JointFeedback joints = walk.joints(t_ns);
-    contacts.update(joints.foot_force_n, truth.stance, t_ns);
-    if (i == 1200) heights = {KnownHeight{}, KnownHeight{0.01, 0.004}};
-    if (i == 0) filter.initialise(truth.true_T_base.p_m, Vec3::Zero(), rows_of(filter, truth, joints, {}, {}));
-    const ContactRows rows = rows_of(filter, truth, joints, contacts.feet(), heights);
-    const Vec3 accel_mps2 = truth.true_T_base.R * walk.imu(t_ns).accel_mps2 - Vec3{0, 0, kGravity_mps2};
-    each(filter, rows, accel_mps2, i == 0);
-  }
-}
-
-TEST(BaseFilter, AxisFilters_AgainstDense30States56Rows_AgreeOverAWalk) {
-  BaseFilter filter;
-  test::DenseBaseFilter dense;
-  double worst_m = 0.0, worst_mps = 0.0, cross = 0.0;
-  run_base_filter(filter, 3000, [&](BaseFilter& axes, const ContactRows& rows, const Vec3& accel_mps2, bool first) {
-    if (first) dense.initialise(axes);
-    axes.predict(accel_mps2, kTick_s, rows);
-    axes.correct(rows);
-    dense.predict(accel_mps2, kTick_s, axes.base_process(kTick_s), rows);
-    dense.correct(rows);
-    worst_m = std::max(worst_m, (axes.odom_p_base_m() - dense.position_m()).norm());
-    worst_mps = std::max(worst_mps, (axes.odom_v_base_mps() - dense.velocity_mps()).norm());
-    for (std::size_t c = 0; c < kContactCount; ++c) {
-      worst_m = std::max(worst_m, (axes.odom_p_contact_m(c) - dense.contact_m(c)).norm());
-    }
-    for (int r = 0; r < 30; ++r) {
-      for (int c = 0; c < 30; ++c) {
-        if (r % 3 != c % 3) cross = std::max(cross, std::abs(dense.covariance()(r, c)));
-      }
-    }
-  });
-  EXPECT_LT(worst_m, 1e-9);
-  EXPECT_LT(worst_mps, 1e-8);
-  EXPECT_LT(cross, 1e-15);  // why three filters of ten states are the same filter
 }
 
 TEST(BaseFilter, Eq2Prediction_ConstantAcceleration_IsTheParabola) {

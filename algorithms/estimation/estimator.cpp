@@ -73,7 +73,7 @@ void Estimator::add_lio(const LioSample& sample, std::int64_t now_ns) noexcept {
         known = ring_.try_at(sample.stamp_ns, then);
       }
     }
-    verdict = known ? odometry_.fusion().fuse(sample, then.odom_T_base) : LioVerdict::kTooOld;
+    verdict = known ? odometry_.fusion().fuse(sample, then.odom_T_base) : LioVerdict::kNoOdometry;
   }
   ++counters_.lio[static_cast<std::size_t>(verdict)];
 }

@@ -72,6 +72,7 @@ class Estimator {
   [[nodiscard]] bool try_state_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {
     return ring_.try_at(stamp_ns, out);
   }
+  [[nodiscard]] const LioInnovations& lio_innovations() const noexcept { return odometry_.fusion().innovations(); }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
   [[nodiscard]] const Vec3& gyro_bias_radps() const noexcept { return odometry_.attitude().gyro_bias_radps(); }
 

@@ -48,7 +48,7 @@ void Odometry::step(const Step& step, const Legs& legs, const Contacts& contacts
     base_.predict(step.felt ? odom_a_base_mps2 : Vec3::Zero(), step.dt_s, rows);
     if (step.new_legs) base_.correct(rows);
   }
-  fusion_.tick({attitude_.odom_R_base(), odom_p_base_m()}, (odom_p_base_m() - before_m).norm(), step.dt_s);
+  fusion_.tick({attitude_.odom_R_base(), odom_p_base_m()}, odom_p_base_m() - before_m, step.dt_s);
 }
 
 void Odometry::take_legs(const Legs& legs) noexcept {
@@ -75,7 +75,7 @@ void Odometry::describe(std::int64_t now_ns, StateEstimate& state) const noexcep
   state.odom_v_base_mps = soles_known_ ? base_.odom_v_base_mps() : attitude_.odom_v_base_mps();
   state.base_w_base_radps = base_w_base_radps_;
   state.world_T_odom = fusion_.world_T_odom();
-  state.position_sigma_m.setConstant(fusion_.position_sigma_m());
+  state.position_sigma_m = fusion_.position_sigma_m();
   state.yaw_sigma_rad = fusion_.yaw_sigma_rad();
   state.tilt_sigma_rad = attitude_.tilt_sigma_rad();
   state.lio_age_ns = fusion_.last_accepted_ns() < 0 ? -1 : now_ns - fusion_.last_accepted_ns();

@@ -11,6 +11,7 @@
 
 #include "algorithms/core/samples.hpp"
 #include "algorithms/core/transform.hpp"
+#include "algorithms/estimation/fusion_uncertainty.hpp"
 #include "algorithms/robot/model.hpp"
 
 namespace polygmap {
@@ -30,11 +31,23 @@ enum class LioVerdict : std::uint8_t {
   kCovariance,  // a stated sigma is negative, not finite or absurd
   kOrder,       // not newer than the last one
   kFuture,      // stamped later than now
-  kTooOld,      // older than max_age_s, or than the standstill at the start
+  kTooOld,      // older than max_age_s
+  kNoOdometry,  // none known at its stamp: earlier than the standstill at the start, or a sensor was silent
   kJump,        // too far from the prediction
   kRealigned,   // accepted: a lasting jump of LIO's own world was taken as its new alignment
 };
-inline constexpr std::size_t kLioVerdictCount = 9;
+inline constexpr std::size_t kLioVerdictCount = 10;
+
+// How far accepted LIO poses lay from their predictions, once aligned: x, y, z in m and yaw in rad, world axes.
+// Normalised: squared, over its variance; 1 in the mean where all sigmas are honest.
+struct LioInnovations {
+  using Quantities = FusionUncertainty::Quantities;
+  std::int64_t stamp_ns = -1;  // of the last one; -1: none yet
+  std::uint32_t count = 0;
+  Quantities last = Quantities::Zero();
+  Quantities normalised_last = Quantities::Zero();
+  Quantities normalised_mean = Quantities::Zero();
+};
 
 class OdometryFusion {
  public:
@@ -56,10 +69,7 @@ class OdometryFusion {
     std::uint32_t realign_count = 20;  // jumped poses in a row that agree among themselves
     double slew_m = 2e-4;              // most that one tick moves the fused pose by
     double slew_rad = 3.5e-4;          // 0.02 deg
-    double drift_per_m = 0.01;         // odometry alone: of the way gone
-    double drift_yaw_radps = 1e-4;     // what standstill leaves of the gyro's bias
-    double initial_sigma_m = 1e-3;
-    double initial_sigma_rad = 1e-3;
+    FusionUncertainty::Params uncertainty;
   };
   void reset(const Params& params) noexcept;
 
@@ -70,17 +80,27 @@ class OdometryFusion {
   // The odometry chooses its origin: what was old_p is now new_T_old * old_p. The world follows.
   void rebase(const Transform& new_T_old) noexcept;
 
-  // Once per tick: moves the published offset towards the fused one within the slew limits, lets the sigmas grow.
-  void tick(const Transform& odom_T_base, double travelled_m, double dt_s) noexcept;
+  // Once per tick: moves the published offset towards the fused one within the slew limits, which hold at the base,
+  // wherever odom's origin is; lets the sigmas grow. odom_step: by which the odometry moved the base since the last.
+  void tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept;
   [[nodiscard]] const Transform& world_T_odom() const noexcept { return world_T_odom_; }
-  [[nodiscard]] double position_sigma_m() const noexcept { return sigma_m_; }
-  [[nodiscard]] double yaw_sigma_rad() const noexcept { return sigma_rad_; }
+  // Of the published pose, world axes; what the slew limit still holds back counts as error.
+  [[nodiscard]] const Vec3& position_sigma_m() const noexcept { return position_sigma_m_; }
+  [[nodiscard]] double yaw_sigma_rad() const noexcept { return uncertainty_.yaw_sigma_rad(); }
+  [[nodiscard]] const LioInnovations& innovations() const noexcept { return innovations_; }
   [[nodiscard]] std::int64_t last_accepted_ns() const noexcept { return last_accepted_ns_; }  // -1: none
 
  private:
+  struct LioSigmas {
+    double position_m, rotation_rad;  // of the base
+  };
   [[nodiscard]] bool is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept;
-  [[nodiscard]] bool try_realign(const Transform& lio_T_base, const Transform& odom_T_base) noexcept;
-  void narrow_sigmas(const LioSample& sample, double gain) noexcept;
+  [[nodiscard]] bool try_realign(const Transform& lio_T_base, const Transform& odom_T_base,
+                                 const LioSigmas& sigmas) noexcept;
+  [[nodiscard]] LioSigmas sigmas_of(const LioSample& sample) const noexcept;
+  void observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,
+               std::int64_t stamp_ns) noexcept;
+  void tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept;
   [[nodiscard]] Transform target() const noexcept;
 
   Params params_;
@@ -95,8 +115,9 @@ class OdometryFusion {
   std::uint32_t jumped_count_ = 0;
   std::int64_t last_stamp_ns_ = -1;  // of any pose that was in order
   std::int64_t last_accepted_ns_ = -1;
-  double sigma_m_ = 0.0;
-  double sigma_rad_ = 0.0;
+  FusionUncertainty uncertainty_;
+  Vec3 position_sigma_m_ = Vec3::Zero();
+  LioInnovations innovations_;
 };
 
 }  // namespace polygmap

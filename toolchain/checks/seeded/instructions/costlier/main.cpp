@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// expect: error: loop [\d,]+ a frame, \+\d+\.\d% of its record 1,000
+// expect: error: loop [\d,]+, \+\d+\.\d% of its record 1,000
 // A stage that has become dearer than its record: a store and a branch a thousand times, whatever the compiler.
 #include <cstdio>
 
@@ -11,5 +11,5 @@ static volatile int sink;
 
 int main() {
   stage_loop();
-  std::puts("build seeded\nframes 1");
+  std::puts("build seeded\nruns 1");
 }

@@ -11,5 +11,5 @@ static volatile int sink;
 
 int main() {
   stage_loop();
-  std::puts("build seeded\nframes 1");
+  std::puts("build seeded\nruns 1");
 }
