@@ -90,6 +90,7 @@ SimOptions sim_options(const ClimbOptions& options) {
     sim.intrinsics = options.camera->intrinsics;
     sim.depth_sigma = options.camera->noise;
   }
+  sim.force_sensors = !options.infer_contacts;
   if (options.blank_depth) sim.camera.blank = {{0, INT64_MAX}};
   return sim;
 }
@@ -172,6 +173,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   SimRobot robot(sim_options(options));
   Params params;
   params.self_filter = options.self_filter;
+  params.estimator.infer_forces = options.infer_contacts;
   params.estimate_mount = options.estimate_mount;
   if (options.camera) {
     params.surfaces.noise = options.camera->noise;

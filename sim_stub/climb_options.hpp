@@ -32,6 +32,7 @@ struct ClimbOptions {
   double mount_error_deg = 1.0;         // roll, pitch, yaw; and 3 mm per degree in each direction
   double scale_error = 0.003;
   bool estimate_mount = true;
+  bool infer_contacts = false;  // from joint torques: the feet have no force sensors
 };
 
 }  // namespace polygmap::sim

@@ -40,7 +40,8 @@ std::string read_text(const std::string& path) {
 // As it may stand in a sentence on one line.
 std::string shown(std::string_view text) {
   std::string clean(text.substr(0, kMostShown));
-  std::replace_if(clean.begin(), clean.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  std::replace_if(
+      clean.begin(), clean.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
   return "\"" + clean + (text.size() > kMostShown ? "...\"" : "\"");
 }
 

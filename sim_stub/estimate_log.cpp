@@ -52,7 +52,8 @@ EstimateLog read_estimate_log(const std::string& path) {
   const std::size_t stamp = table.column("t_s");
   const Columns3 gyro = columns3(table, "gyro_", "_radps"), accel = columns3(table, "accel_", "_mps2");
   const std::array<std::size_t, kFootCount> contact{table.column("left_contact"), table.column("right_contact")};
-  const std::array<Columns3, kFootCount> foot{columns3(table, "left_foot_", "_m"), columns3(table, "right_foot_", "_m")};
+  const std::array<Columns3, kFootCount> foot{columns3(table, "left_foot_", "_m"),
+                                              columns3(table, "right_foot_", "_m")};
   EstimateLog log;
   Columns3 truth_p{}, truth_v{};
   Columns4 truth_q{};
@@ -95,7 +96,8 @@ std::vector<LioRow> read_lio_log(const std::string& path, double start_s) {
     rows[i].stamp_ns = nanoseconds(table, i, table.number(i, stamp, kMaxStamp_s), start_s);
     rows[i].arrival_ns = nanoseconds(table, i, table.number(i, arrival, kMaxStamp_s), start_s);
     // A stamp may be anything, the module counts it; but what arrived is recorded as it arrived.
-    if (i > 0 && rows[i].arrival_ns < rows[i - 1].arrival_ns) table.fail(i, "arrival_s is before that of the row before");
+    if (i > 0 && rows[i].arrival_ns < rows[i - 1].arrival_ns)
+      table.fail(i, "arrival_s is before that of the row before");
     rows[i].pose = {rotation(table, i, q), vector(table, i, p, kMaxPlace_m)};
   }
   return rows;

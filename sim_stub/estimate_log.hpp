@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Recorded logs for state estimation: IMU, contacts and feet by position in the base frame, so any robot's; and poses of
-// a lidar odometry.
+// Recorded logs for state estimation: IMU, contacts and feet by position in the base frame, so any robot's; and poses
+// of a lidar odometry.
 #pragma once
 
 #include <array>

@@ -144,6 +144,12 @@ class LogReplay {
     tick.world_v_base_mps = world_R_odom * state.odom_v_base_mps;
     tick.base_w_base_radps = state.base_w_base_radps;
     tick.covariance = odometry_.attitude().covariance();
+    if (state.lio_age_ns >= 0) {  // the position is LIO's and odometry's by now, and the fusion knows how sure it is
+      tick.covariance.topRows<3>().setZero();
+      tick.covariance.leftCols<3>().setZero();
+      tick.covariance.topLeftCorner<3, 3>() = state.position_sigma_m.cwiseAbs2().asDiagonal();
+      tick.covariance(8, 8) = math::square(state.yaw_sigma_rad);
+    }
     tick.contact_probability = state.contact_probability;
     tick.lio_age_ns = state.lio_age_ns;
     result_.ticks.push_back(tick);

@@ -30,8 +30,7 @@ Score score(const EstimateLog& log, const Replay& replay) {
     s.tilt_rmse_rad += turn_rad.head<2>().squaredNorm() / rows;
     s.yaw_rmse_rad += turn_rad.z() * turn_rad.z() / rows;
     s.odometry_rmse_m += (tick.odom_T_base.p_m - truth.true_T_base.p_m).squaredNorm() / rows;
-    const Eigen::Matrix<double, kNeesStates, kNeesStates> P =
-        tick.covariance.topLeftCorner<kNeesStates, kNeesStates>();
+    const Eigen::Matrix<double, kNeesStates, kNeesStates> P = tick.covariance.topLeftCorner<kNeesStates, kNeesStates>();
     const double nees = error.dot(P.ldlt().solve(error));
     s.nees_mean += nees / rows;
     if (nees >= kNeesLow && nees <= kNeesHigh) s.nees_in_bounds += 1.0 / rows;

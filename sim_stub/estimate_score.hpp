@@ -14,7 +14,7 @@ struct Score {
   double position_rmse_m = 0.0, velocity_rmse_mps = 0.0, attitude_rmse_rad = 0.0;
   double odometry_rmse_m = 0.0;  // without LIO's offset
   double tilt_rmse_rad = 0.0, yaw_rmse_rad = 0.0;
-  double distance_m = 0.0;      // that the true base went
+  double distance_m = 0.0;  // that the true base went
   double final_error_m = 0.0;
   double nees_in_bounds = 0.0;  // share of the rows
   double nees_mean = 0.0;

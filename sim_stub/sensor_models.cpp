@@ -3,8 +3,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/leg_kinematics.hpp"
 
 namespace polygmap::sim {
 
@@ -58,6 +59,29 @@ std::array<double, kFootCount> FootForceModel::sample(const std::array<double, k
   }
   history_.push_overwrite(force);
   return history_.oldest();
+}
+
+JointVector TorqueModel::sample(const JointVector& true_q_rad, const JointVector& dq_radps, const Mat3& true_R_base,
+                                const std::array<double, kFootCount>& force_n) {
+  JointVector tau_nm;
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    const auto leg = static_cast<Foot>(f);
+    const LegVector q = leg_joints(true_q_rad, leg);
+    const Vec3 base_f = true_R_base.transpose() * Vec3{0, 0, force_n[f]};
+    const Vec3 base_r = kContactRectangle.centre_x_m() * base_T_sole(errors_.legs[f], leg, q).R.col(0);
+    Eigen::Matrix<double, 6, 1> wrench;
+    wrench.head<3>() = base_f;
+    wrench.tail<3>() = base_r.cross(base_f);
+    tau_nm.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
+        -leg_jacobian(errors_.legs[f], leg, q).transpose() * wrench;
+  }
+  constexpr double kCreep_radps = 0.02;  // friction turns round smoothly about here
+  for (Eigen::Index j = 0; j < tau_nm.size(); ++j) {
+    tau_nm[j] += params_.friction_nm * std::tanh(dq_radps[j] / kCreep_radps) +
+                 params_.torque_noise_nm * noise_.normal(index_ * kJointCount + static_cast<std::uint64_t>(j));
+  }
+  ++index_;
+  return tau_nm;
 }
 
 LioSample LioModel::sample(const Transform& true_T_base, std::int64_t stamp_ns) {

@@ -56,8 +56,7 @@ void AttitudeFilter::anchor(std::size_t foot, const LegMeasurement& leg) noexcep
   if (leg.sole_known) copy(of_foot(kSole, foot), kAttitude, math::square(params_.foot_sigma_rad));
 }
 
-void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s,
-                             bool lost) noexcept {
+void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, bool lost) noexcept {
   const Vec3 turn_rad = (gyro_radps - gyro_bias_radps_) * dt_s;
   constexpr double kLeg_m = 0.5;
   const double speed_mps = odom_v_base_mps_.norm() + kLeg_m * turn_rad.norm() / dt_s;
@@ -121,8 +120,7 @@ void AttitudeFilter::correct_by_feet(const std::array<LegMeasurement, kFootCount
     }
     const double share = std::max(contacts[foot].load_share * contacts[foot].probability, 0.05);
     const int contact = of_foot(kContact, foot), sole = of_foot(kSole, foot);
-    P_.diagonal().segment<3>(contact).array() +=
-        dt_s * (math::square(walk_mprs) / share + contacts[foot].walk_m2ps);
+    P_.diagonal().segment<3>(contact).array() += dt_s * (math::square(walk_mprs) / share + contacts[foot].walk_m2ps);
     const Vec3 off_m = odom_R_base_ * leg.base_T_sole.p_m - (odom_p_contact_m_[foot] - odom_p_base_m_);
     if (contacts[foot].walk_m2ps > 0.0) {
       whiteness_[foot] = {};
@@ -176,8 +174,7 @@ void AttitudeFilter::measure_walk(std::size_t foot, const Vec3& innovation_m, do
   const double gain_ps =
       std::max(params_.whiteness_gain_ps, params_.whiteness_start_gain / (walk_time_s_ + params_.whiteness_window_s));
   contact_walk_mprs_ *= math::exp(gain_ps * dt_s * (ratio - 1.0));
-  contact_walk_mprs_ =
-      math::clamp(contact_walk_mprs_, params_.min_contact_walk_mprs, params_.max_contact_walk_mprs);
+  contact_walk_mprs_ = math::clamp(contact_walk_mprs_, params_.min_contact_walk_mprs, params_.max_contact_walk_mprs);
 }
 
 void AttitudeFilter::apply(const Vector& error) noexcept {

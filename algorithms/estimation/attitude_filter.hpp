@@ -20,22 +20,22 @@ namespace polygmap {
 class AttitudeFilter {
  public:
   struct Params {
-    double gyro_noise_radprs = 1e-4;       // rad/sqrt(s); 2e-3 rad/s at 500 Hz is 0.9e-4
-    double accel_noise_mpsrs = 3e-3;       // m/s/sqrt(s); 0.05 m/s^2 at 500 Hz is 2.2e-3
+    double gyro_noise_radprs = 1e-4;  // rad/sqrt(s); 2e-3 rad/s at 500 Hz is 0.9e-4
+    double accel_noise_mpsrs = 3e-3;  // m/s/sqrt(s); 0.05 m/s^2 at 500 Hz is 2.2e-3
     double lost_accel_noise_mpsrs = 2.0;
     double dynamic_accel_share = 0.02;     // of what differs from gravity: sampling, scale, mount
     double gyro_bias_walk_radpsrs = 5e-6;  // rad/s/sqrt(s)
     double accel_bias_walk_mps2rs = 1e-4;
-    double foot_sigma_rad = 1e-3;          // of one kinematic attitude of a sole, encoder noise
-    double foot_walk_radprs = 1e-3;        // rad/sqrt(s): creep of a loaded foot and kinematic error as the legs move
-    double contact_walk_mprs = 2e-3;       // m/sqrt(s): the same of its place, at the start; then measured
+    double foot_sigma_rad = 1e-3;     // of one kinematic attitude of a sole, encoder noise
+    double foot_walk_radprs = 1e-3;   // rad/sqrt(s): creep of a loaded foot and kinematic error as the legs move
+    double contact_walk_mprs = 2e-3;  // m/sqrt(s): the same of its place, at the start; then measured
     double min_contact_walk_mprs = 3e-4;
-    double full_walk_speed_mps = 0.1;      // of the base, turning included; below it a contact walks less
+    double full_walk_speed_mps = 0.1;  // of the base, turning included; below it a contact walks less
     double max_contact_walk_mprs = 2e-2;
-    double whiteness_window_s = 0.2;       // the walk is right when innovations averaged over this are white
-    double whiteness_gain_ps = 1.0;        // of the walk's logarithm, in the long run ...
-    double whiteness_start_gain = 1.0;     // ... and this over the time measured, at the start
-    double outlier_sigmas = 5.0;           // rows further out weigh less, in proportion (Huber)
+    double whiteness_window_s = 0.2;    // the walk is right when innovations averaged over this are white
+    double whiteness_gain_ps = 1.0;     // of the walk's logarithm, in the long run ...
+    double whiteness_start_gain = 1.0;  // ... and this over the time measured, at the start
+    double outlier_sigmas = 5.0;        // rows further out weigh less, in proportion (Huber)
   };
   // One sigma each, of what is known at the start.
   struct Start {
@@ -82,7 +82,15 @@ class AttitudeFilter {
 
  private:
   static constexpr int kStates = 27;
-  enum Index : int { kAttitude = 0, kVelocity = 3, kPosition = 6, kGyroBias = 9, kAccelBias = 12, kContact = 15, kSole = 21 };
+  enum Index : int {
+    kAttitude = 0,
+    kVelocity = 3,
+    kPosition = 6,
+    kGyroBias = 9,
+    kAccelBias = 12,
+    kContact = 15,
+    kSole = 21
+  };
   using Covariance = Eigen::Matrix<double, kStates, kStates>;
   using Vector = Eigen::Matrix<double, kStates, 1>;
 

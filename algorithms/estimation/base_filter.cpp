@@ -13,8 +13,7 @@ constexpr double kInitialVelocity_mps = 1e-2;
 
 }  // namespace
 
-void BaseFilter::initialise(const Vec3& odom_p_base_m, const Vec3& odom_v_base_mps,
-                            const ContactRows& rows) noexcept {
+void BaseFilter::initialise(const Vec3& odom_p_base_m, const Vec3& odom_v_base_mps, const ContactRows& rows) noexcept {
   for (int a = 0; a < 3; ++a) {
     AxisFilter::State x = AxisFilter::State::Zero();
     AxisFilter::State variance = AxisFilter::State::Constant(math::square(kInitialContact_m));

@@ -33,8 +33,8 @@ class ContactEstimator {
   // early touch-down counts.
   void update(const std::array<double, kFootCount>& force_n, const std::array<bool, kFootCount>& planned_stance,
               std::int64_t stamp_ns) noexcept;
-  // The same for contacts as a log states them, a probability or 0 and 1. A drop of some milliseconds is bridged: a foot
-  // that really lifts is seen to move.
+  // The same for contacts as a log states them, a probability or 0 and 1. A drop of some milliseconds is bridged: a
+  // foot that really lifts is seen to move.
   void update_stated(const std::array<double, kFootCount>& probability, std::int64_t stamp_ns) noexcept;
   [[nodiscard]] const std::array<FootContact, kFootCount>& feet() const noexcept { return feet_; }
 

@@ -16,6 +16,7 @@ void Estimator::reset(const Params& params) noexcept {
   counters_ = {};
   standstill_.reset(params.standstill);
   contacts_.reset(params.contacts);
+  forces_.reset(params.forces);
   odometry_.reset(params);
   ring_.clear();
   state_ = {};
@@ -119,7 +120,12 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
   bool good = math::all_finite(joints.q_rad) && math::all_finite(joints.dq_radps) &&
               joints.q_rad.cwiseAbs().maxCoeff() <= params_.max_joint_rad &&
               joints.dq_radps.cwiseAbs().maxCoeff() <= params_.max_joint_speed_radps;
-  for (const double force_n : joints.foot_force_n) good = good && std::abs(force_n) <= params_.max_force_n;
+  for (const double force_n : joints.foot_force_n) {
+    good = good && (params_.infer_forces || std::abs(force_n) <= params_.max_force_n);
+  }
+  if (params_.infer_forces) {
+    good = good && math::all_finite(joints.tau_nm) && joints.tau_nm.cwiseAbs().maxCoeff() <= params_.max_torque_nm;
+  }
   if (!good) {
     ++counters_.joints_invalid;
     return;
@@ -140,6 +146,9 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
     return;
   }
   joints_ = joints;
+  if (params_.infer_forces) {  // until there is an attitude, upright
+    joints_.foot_force_n = forces_.update(params_.geometry, joints, state_.odom_T_base.R.row(2).transpose());
+  }
   for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
   has_joints_ = new_joints_ = true;
 }

@@ -2,6 +2,7 @@
 // State estimation as one stage: samples in as they arrive, StateEstimate out once per 2 ms.
 #pragma once
 
+#include "algorithms/estimation/force_inference.hpp"
 #include "algorithms/estimation/odometry.hpp"
 #include "algorithms/estimation/standstill.hpp"
 #include "algorithms/estimation/state_ring.hpp"
@@ -14,6 +15,9 @@ class Estimator {
     LegGeometry geometry;
     StandstillCalibration::Params standstill;
     ContactEstimator::Params contacts;
+    bool infer_forces = false;  // foot forces from joint torques: no sensor measures them
+    ForceInference::Params forces;
+    double max_torque_nm = 1000.0;
     double max_rate_radps = 20.0;  // sensor samples beyond these are invalid
     double max_accel_mps2 = 100.0;
     double max_joint_rad = 4.0;
@@ -59,7 +63,7 @@ class Estimator {
   void set_tread_height(Foot foot, double odom_z_m, double sigma_m) noexcept;
 
   [[nodiscard]] const StateEstimate& state() const noexcept { return state_; }
-  // The last accepted feedback; has_joints() is false before the first one.
+  // The last accepted feedback, its forces inferred where they are not sensed; has_joints() is false before the first one.
   [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
   [[nodiscard]] bool has_joints() const noexcept { return has_joints_; }
   [[nodiscard]] std::int64_t newest_imu_ns() const noexcept { return imu_.stamp_ns; }  // accepted; 0: none yet
@@ -81,6 +85,7 @@ class Estimator {
   Counters counters_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;
+  ForceInference forces_;
   Odometry odometry_;
   StateRing ring_;
   StateEstimate state_;

@@ -22,11 +22,9 @@ void FootMotion::update(std::size_t foot, const Vec3& odom_step_m, double speed_
   const double share = dt_s / (window_s + dt_s);
   track.odom_v_mps += share * (odom_step_m / dt_s - track.odom_v_mps);
   // Low-passed differences of white noise: sigma over the window.
-  const double variance_m2ps2 =
-      math::square(position_sigma_m_ / (window_s + dt_s)) + math::square(speed_sigma_mps) +
-      math::square(params_.rest_sigma_mps);
-  const double beyond_m2ps2 =
-      track.odom_v_mps.squaredNorm() - math::square(params_.rest_sigmas) * variance_m2ps2;
+  const double variance_m2ps2 = math::square(position_sigma_m_ / (window_s + dt_s)) + math::square(speed_sigma_mps) +
+                                math::square(params_.rest_sigma_mps);
+  const double beyond_m2ps2 = track.odom_v_mps.squaredNorm() - math::square(params_.rest_sigmas) * variance_m2ps2;
   track.walk_m2ps = params_.gain * std::max(beyond_m2ps2, 0.0) * window_s;
 }
 

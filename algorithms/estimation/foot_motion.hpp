@@ -16,16 +16,16 @@ namespace polygmap {
 class FootMotion {
  public:
   struct Params {
-    double speed_sigma_mps = 0.04;      // wanted of the measured speed: how long to average follows from the noise
+    double speed_sigma_mps = 0.04;  // wanted of the measured speed: how long to average follows from the noise
     double min_window_s = 0.010;
     double max_window_s = 0.060;
-    double noise_memory_s = 0.5;        // of the measured position noise
+    double noise_memory_s = 0.5;  // of the measured position noise
     double min_position_sigma_m = 3e-4;
     double max_position_sigma_m = 0.02;
     double first_position_sigma_m = 1e-3;
-    double rest_sigma_mps = 0.05;       // of a foot that rests: it rolls and creeps
-    double rest_sigmas = 3.0;           // a speed below this many of its sigmas is rest
-    double gain = 4.0;                  // of the walk that a speed stands for: speed^2 times the window
+    double rest_sigma_mps = 0.05;  // of a foot that rests: it rolls and creeps
+    double rest_sigmas = 3.0;      // a speed below this many of its sigmas is rest
+    double gain = 4.0;             // of the walk that a speed stands for: speed^2 times the window
   };
   void reset(const Params& params) noexcept;
 

@@ -29,6 +29,7 @@ constexpr double kQuietPeriod_s = 5.0;       // simulated, between progress line
 struct ClimbArguments {
   ClimbOptions options;
   std::string noise = "white";
+  std::string contacts = "sensed";
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
   bool no_self_filter = false;
@@ -60,6 +61,8 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->check(whole_number)
       ->capture_default_str();
   climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
+  climb.add_option("--contacts", a.contacts, "Foot forces: sensed, or inferred from joint torques")
+      ->capture_default_str();
   climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
 
   climb.add_option("--camera", a.camera, "The robot's camera; the module is told its noise and range")
@@ -131,6 +134,11 @@ std::string complaint(ClimbArguments& a) {
     return "--noise must be white or correlated, not \"" + a.noise + "\".";
   }
   a.options.noise = a.noise == "white" ? DepthNoise::kWhite : DepthNoise::kCorrelated;
+
+  if (a.contacts != "sensed" && a.contacts != "inferred") {
+    return "--contacts must be sensed or inferred, not \"" + a.contacts + "\".";
+  }
+  a.options.infer_contacts = a.contacts == "inferred";
 
   struct Error {
     const char* name;

@@ -51,8 +51,8 @@ void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
   std::snprintf(line, sizeof line,
                 "position %.2f mm, velocity %.2f mm/s, attitude %.3f deg RMSE; drift %.2f %% of %.2f m; NEES in bounds "
                 "in %.1f %% of the rows\n",
-                1e3 * s.position_rmse_m, 1e3 * s.velocity_rmse_mps, s.attitude_rmse_rad * 180.0 / kPi,
-                drift_percent(s), s.distance_m, 100.0 * s.nees_in_bounds);
+                1e3 * s.position_rmse_m, 1e3 * s.velocity_rmse_mps, s.attitude_rmse_rad * 180.0 / kPi, drift_percent(s),
+                s.distance_m, 100.0 * s.nees_in_bounds);
   out << line;
 }
 
