@@ -65,8 +65,8 @@ class SurfaceBoundaries {
   void settle() noexcept;  // one decision per pair of planes, then all columns follow it ...
   void follow() noexcept;  // ... and again when the planes have changed
   void begin_refit() noexcept;
-  // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments. roughly: of fewer of their rows,
-  // and without looking at the noise.
+  // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments. roughly: of fewer of their
+  // rows, and without looking at the noise.
   void refit(std::int32_t first_column, bool roughly) noexcept;
 
   // How large the noise is against its model, from the rows of the last refit's surfaces; 0 when there are too few.
