@@ -440,6 +440,7 @@ TEST_F(PipelineOnARobot, PoseOfAFrameIsUncertain_MapKnows) {
   Params params;
   params.estimator.attitude.gyro_noise_radprs = 0.1;
   params.estimator.attitude.foot_sigma_rad = 0.1;
+  params.estimator.attitude.accel_noise_mpsrs = 1.0;  // gravity bounds the tilt, too
   start(kToeGap_m, params);
   run(1000);
   const double tilt_sigma_rad = control().state().tilt_sigma_rad;
