@@ -180,6 +180,7 @@ Odometry::Params log_params() {
   params.attitude.gyro_noise_radprs = 3e-4;
   params.attitude.contact_walk_mprs = 1e-2;
   params.fusion.base_T_lidar = {};
+  params.fusion.tau_s = 1.0;  // odometry of point feet turns away sooner than that of soles
   return params;
 }
 

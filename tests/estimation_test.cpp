@@ -197,6 +197,54 @@ TEST(Contacts, PlannedSwing_FootNeverUnloads_StandsAgainAfterTheTimeout) {
   EXPECT_DOUBLE_EQ(contacts.feet()[1].probability, 1.0);
 }
 
+TEST(ForceInference, StaticTorquesOfAStandingLeg_GiveItsForce_FrictionOfALightOneNone) {
+  const LegGeometry geometry;
+  JointFeedback joints;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const Transform sole{rotation_z(0.1), Vec3{0.05, side_sign(leg) * 0.1, -0.72}};
+    const LegVector q = solve_leg(geometry, leg, sole).q_rad;
+    Eigen::Matrix<double, 6, 1> wrench = Eigen::Matrix<double, 6, 1>::Zero();
+    wrench[2] = 300.0;
+    const auto at = static_cast<Eigen::Index>(joint_index(leg, 0));
+    joints.q_rad.segment<6>(at) = q;
+    joints.tau_nm.segment<6>(at) = -leg_jacobian(geometry, leg, q).transpose() * wrench;
+  }
+  joints.tau_nm.tail<6>().setConstant(1.0);  // the right leg: friction alone
+  ForceInference inference;
+  inference.reset({});
+  const auto force_n = inference.update(geometry, joints, Vec3::UnitZ());
+  EXPECT_NEAR(force_n[0], 300.0, 6.0);
+  EXPECT_EQ(force_n[1], 0.0);
+}
+
+// --- Slips ---------------------------------------------------------------------------------------------------------
+
+TEST(FootMotion, RestingFootWithNoise_IsRest_SlippingFootIsLetGo_AndTheNoiseIsMeasured) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0.0, 2e-3);
+  FootMotion motion;
+  motion.reset({});
+  Vec3 before = Vec3::Zero();
+  double slid_m = 0.0;
+  const auto run = [&](int ticks, double speed_mps) {
+    int let_go = 0;
+    for (int i = 0; i < ticks; ++i) {
+      slid_m += speed_mps * kTick_s;
+      const Vec3 now{slid_m + noise(random), noise(random), noise(random)};
+      motion.update(0, now - before, 0.005, kTick_s);
+      before = now;
+      let_go += motion.walk_m2ps(0) > 0.0 ? 1 : 0;
+    }
+    return let_go;
+  };
+  run(500, 0.0);
+  EXPECT_EQ(run(1000, 0.0), 0);
+  EXPECT_NEAR(motion.position_sigma_m(), 2e-3, 3e-4);
+  EXPECT_GT(run(100, 0.3), 60);  // of 0.2 s
+  run(100, 0.0);
+  EXPECT_EQ(run(100, 0.0), 0);
+}
+
 // --- The stage -----------------------------------------------------------------------------------------------------
 
 class EstimatorTest : public ::testing::Test {
@@ -290,7 +338,7 @@ TEST_F(EstimatorTest, Walk_PerfectSensors_FollowsTheTruth) {
   });
   EXPECT_LT(worst_m, 2e-3);
   EXPECT_LT(worst_rad, 1e-3);
-  EXPECT_LT(worst_mps, 5e-3);
+  EXPECT_LT(worst_mps, 8e-3);
 }
 
 TEST_F(EstimatorTest, Walk_NoisySensorsWithoutLio_DriftStaysBelowOnePercentAndIsSmooth) {

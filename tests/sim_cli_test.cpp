@@ -55,6 +55,12 @@ void expect_refused(const std::vector<std::string>& arguments, const std::string
   EXPECT_EQ(c.out, "");
 }
 
+TEST(ClimbCommand, Contacts_SensedUnlessInferred) {
+  EXPECT_FALSE(call({"climb"}).options->infer_contacts);
+  EXPECT_TRUE(call({"climb", "--contacts", "inferred"}).options->infer_contacts);
+  expect_refused({"climb", "--contacts", "guessed"}, "--contacts");
+}
+
 TEST(ClimbCommand, CameraErrors_OnByDefault_EachCanBeTurnedOff) {
   const Call usual = call({"climb"});
   ASSERT_TRUE(usual.options) << usual.err;

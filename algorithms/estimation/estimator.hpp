@@ -63,8 +63,7 @@ class Estimator {
   void set_tread_height(Foot foot, double odom_z_m, double sigma_m) noexcept;
 
   [[nodiscard]] const StateEstimate& state() const noexcept { return state_; }
-  // The last accepted feedback, its forces inferred where they are not sensed; has_joints() is false before the first
-  // one.
+  // The last accepted feedback, its forces inferred where they are not sensed; has_joints() is false before the first.
   [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
   [[nodiscard]] bool has_joints() const noexcept { return has_joints_; }
   [[nodiscard]] std::int64_t newest_imu_ns() const noexcept { return imu_.stamp_ns; }  // accepted; 0: none yet

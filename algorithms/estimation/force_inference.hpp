@@ -14,7 +14,7 @@ class ForceInference {
   struct Params {
     double smoothing_s = 0.008;
     double friction_n = 20.0;  // what the joints' friction may feign: a smaller force is none
-    double damping_m = 0.02;   // of the inverse, against a stretched knee; a foot 0.3 m off the joint loses 0.4 %
+    double damping_m = 0.02;   // of the inverse, against a stretched knee: takes 1 to 2 % of the force
   };
   void reset(const Params& params) noexcept;
   // base_up: the vertical in base axes. Forces in N, upwards on the foot, never negative.
