@@ -64,6 +64,7 @@ Json arguments_json(const ClimbOptions& o) {
           {"scale_error", o.scale_error},
           {"estimate_mount", o.estimate_mount},
           {"self_filter", o.self_filter},
+          {"contacts", o.infer_contacts ? "inferred" : "sensed"},
           {"render_shift_m", {o.render_dx_m, o.render_dy_m, o.render_dz_m}},
           {"render_missing_step", o.render_missing_step < 0 ? Json(nullptr) : Json(o.render_missing_step + 1)},
           {"blank_depth", o.blank_depth}};

@@ -557,6 +557,7 @@ TEST_F(PipelineInTwoLanes, TwoSecondsBeforeStairs_PosesFootholdsAndFaultsCross) 
   EXPECT_EQ(control_->lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
   EXPECT_EQ(perception_->lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
   EXPECT_GE(pipeline_->perception().extractor().counters().frames, 15U);
+  EXPECT_FALSE(camera_.holding());
   EXPECT_FALSE(pipeline_->perception().map_snapshot().polygons.empty());
   EXPECT_NE(pipeline_->control().gait_status().phase, GaitPhase::kStandstill);  // a foothold came across
   EXPECT_EQ(pipeline_->lane_health(0).count(Fault::kDepthMissing).count, 0U);

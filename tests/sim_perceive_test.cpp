@@ -79,7 +79,7 @@ TEST_F(PerceiveCommand, Stairs_AreTreadsAndRisersWithNosings_GravityGivenOrNot) 
                                        "--json",    at("out.json"),   "--labels", at("out.png"),
                                        "--picture", at("pic.png"),    "--repeat", "2"};
     if (given) {
-      arguments.insert(arguments.end(),
+      arguments.insert(arguments.begin() + 1,
                        {"--gravity", std::to_string(down.x()), std::to_string(down.y()), std::to_string(down.z())});
     }
     ASSERT_EQ(call(arguments), kExitPass) << err_;
@@ -135,6 +135,10 @@ TEST_F(PerceiveCommand, FilesThatAreNone_AreNamedInOneSentence) {
   expect_refused({"perceive", at("large.png"), "--camera", camera}, "is 1025x32, more than the 1024x768 that are read");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--json", "/proc/none/x.json"}, "/proc/none");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--gravity", "0", "0", "0"}, "--gravity");
+  expect_refused({"perceive", at("good.png"), "--camera", camera, "--picture", at("good.png")}, "overwritten");
+  expect_refused({"perceive", at("good.png"), "--camera", camera, "--json", camera}, "overwritten");
+  expect_refused({"perceive", at("good.png"), "--camera", camera, "--json", at("out"), "--labels", at("out")},
+                 "overwritten");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--gravity", "nan", "0", "1"}, "--gravity");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--repeat", "0"}, "--repeat");
 }

@@ -445,11 +445,12 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
             "static_memory_bytes static_memory schedule surfaces footsteps wall ");
   EXPECT_EQ(j["verdict"], "pass");
   EXPECT_EQ(j["seed"], 7);
-  EXPECT_EQ(j["arguments"].dump(),
-            R"({"steps":10,"rise_m":0.17,"tread_m":0.28,"width_m":1.2,"nosing_m":0.0,"landing_m":1.0,)"
-            R"("noise":"correlated","camera":null,"scan_ms":16.0,"mount_error_deg":1.0,"scale_error":0.003,)"
-            R"("estimate_mount":true,"self_filter":true,"render_shift_m":[0.0,0.0,0.0],"render_missing_step":2,)"
-            R"("blank_depth":false})");
+  EXPECT_EQ(
+      j["arguments"].dump(),
+      R"({"steps":10,"rise_m":0.17,"tread_m":0.28,"width_m":1.2,"nosing_m":0.0,"landing_m":1.0,)"
+      R"("noise":"correlated","camera":null,"scan_ms":16.0,"mount_error_deg":1.0,"scale_error":0.003,)"
+      R"("estimate_mount":true,"self_filter":true,"contacts":"sensed","render_shift_m":[0.0,0.0,0.0],"render_missing_step":2,)"
+      R"("blank_depth":false})");
   EXPECT_EQ(j["execution_error_mm"].dump(), R"({"median":1.23,"max":1.23})");
   EXPECT_EQ(j["odometry_rmse_mm"].dump(), R"({"base":0.0,"lio":null,"fused":0.0})");
   EXPECT_EQ(j["exposure_to_map_ms"].dump(), R"({"median":null,"max":null})");

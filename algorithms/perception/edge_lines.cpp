@@ -366,8 +366,9 @@ EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
       return Outcome::kAgain;
     }
     if (agree) {
-      // Both by their information; change-points are also skewed towards the less noisy plane, which their scatter
-      // hides.
+      // Both by their information. Change-points are also skewed towards the less noisy plane, which their scatter
+      // hides: over six seeds of generated stairs 2 gives a mean p95 of 0.69 / 2.14 mm in white / correlated noise, 1
+      // gives 0.80 / 2.14, and where the planes meet alone 0.59 / 2.32.
       constexpr double kSeenLess = 2.0;
       const double seen2 = kSeenLess * math::square(line.sigma_m);
       const auto join = [&](double s, double meet, double& t) {

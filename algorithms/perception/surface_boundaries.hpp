@@ -91,6 +91,7 @@ class SurfaceBoundaries {
   static constexpr std::int32_t kBins = 64;  // of half a pixel, -16 .. 16
   static constexpr std::int32_t kBinsPerPixel = 2;
   static constexpr std::int32_t kMeasuredColumns = 2;
+  static constexpr double kLeastMeasured = 4.0;
   struct Joint {
     std::uint16_t pair = 0;
     std::int16_t column = 0;

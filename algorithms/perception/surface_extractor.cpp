@@ -450,6 +450,7 @@ void SurfaceExtractor::finish() noexcept {
   }
   next_.invalid_fraction = outside_body_px_ > 0 ? 1.0 - static_cast<double>(measured_px_) / outside_body_px_ : 1.0;
   result_ = next_;
+  raw_.depth = nullptr;  // the driver's again
 }
 
 }  // namespace polygmap

@@ -60,7 +60,11 @@ void weigh(const SurfaceSides::Params& params, const RawPicture& picture, const 
            Reach& residual) noexcept {
   static_assert(kReach_px % Wide::nlanes == 0);
   const auto all = [](float x) { return cv::vx_setall_f32(x); };
-  static constexpr Reach kSteps{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  static constexpr Reach kSteps = [] {
+    Reach steps{};
+    for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = static_cast<float>(i);
+    return steps;
+  }();
   const Wide most = all(static_cast<float>(math::square(params.truncate_sigmas)));
   const Wide leave = all(static_cast<float>(math::square(params.leave_sigmas)));
   const Wide more = all(other.valid ? other.wider_than(own) : 0.0F);

@@ -3,11 +3,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <ostream>
 #include <set>
+#include <utility>
 
 #include "sim_stub/cli/climb_command.hpp"
 #include "sim_stub/perceive.hpp"
@@ -16,11 +18,17 @@ namespace polygmap::sim {
 namespace {
 
 constexpr int kMaxRepeat = 100000;
+constexpr const char *kLabels = ".labels.png", *kPlanes = ".planes.json", *kPicture = ".picture.png";
 
 // Where one picture's output goes: OUT itself, or NAME + suffix in the folder OUT when there are several pictures.
 std::string place(const std::string& out, const std::string& depth, bool several, const char* suffix) {
   if (!several) return out;
   return (std::filesystem::path(out) / (std::filesystem::path(depth).stem().string() + suffix)).string();
+}
+
+std::string absolute(const std::string& path) {
+  std::error_code error;
+  return std::filesystem::weakly_canonical(path, error).string();
 }
 
 std::string complaint(const PerceiveArguments& a) {
@@ -31,6 +39,18 @@ std::string complaint(const PerceiveArguments& a) {
       const std::string name = std::filesystem::path(path).stem().string();
       if (!names.insert(name).second)
         return "Two pictures are called \"" + name + "\": one would overwrite the other's output.";
+    }
+  }
+  // Nothing that is read, and nothing written for another option, is overwritten.
+  std::set<std::string> taken{absolute(a.camera)};
+  for (const std::string& path : a.depth) taken.insert(absolute(path));
+  for (const std::string& path : a.depth) {
+    const std::array<std::pair<std::string, const char*>, 3> outputs{
+        {{a.labels, kLabels}, {a.json, kPlanes}, {a.picture, kPicture}}};
+    for (const auto& [out, suffix] : outputs) {
+      if (out.empty()) continue;
+      const std::string file = place(out, path, a.depth.size() > 1, suffix);
+      if (!taken.insert(absolute(file)).second) return "\"" + file + "\" would be overwritten.";
     }
   }
   if (a.gravity.empty()) return {};
@@ -58,9 +78,9 @@ std::string one_picture(const PerceiveArguments& a, const CameraProfile& camera,
   std::optional<Vec3> gravity;
   if (!a.gravity.empty()) gravity = Vec3{a.gravity[0], a.gravity[1], a.gravity[2]};
   Perceived perceived = perceive(camera, picture, gravity, a.repeat);
-  if (!a.labels.empty()) write_labels(place(a.labels, path, several, ".labels.png"), picture, perceived);
-  if (!a.json.empty()) write_planes(place(a.json, path, several, ".planes.json"), perceived);
-  if (!a.picture.empty()) write_picture(place(a.picture, path, several, ".picture.png"), camera, picture, perceived);
+  if (!a.labels.empty()) write_labels(place(a.labels, path, several, kLabels), picture, perceived);
+  if (!a.json.empty()) write_planes(place(a.json, path, several, kPlanes), perceived);
+  if (!a.picture.empty()) write_picture(place(a.picture, path, several, kPicture), camera, picture, perceived);
   std::vector<double>& times = perceived.microseconds;
   std::sort(times.begin(), times.end());
   const Vec3& up = perceived.camera_up;
@@ -88,6 +108,7 @@ CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
           "--gravity", a.gravity,
           "Down in the camera frame (x right, y down, z forward); without it the largest level-looking plane says")
       ->expected(3)
+      ->allow_extra_args(false)  // the pictures may follow
       ->type_name("X Y Z");
   const std::string folder = "; a folder when there are several pictures";
   perceive->add_option("--labels", a.labels, "Each pixel's plane, 0 = none" + folder)->type_name("OUT.png");
