@@ -175,6 +175,34 @@ TEST(EstimateReplay, LateLioWithOutliersAndFutureStamps_IsCountedAndNeverMakesAS
   EXPECT_LT(result.ticks.back().lio_age_ns, 210 * kNsPerMs);
 }
 
+TEST(EstimateReplay, TruthCountsFromFarAway_ScoresAreThoseOfAStartAtTheOrigin) {
+  WalkSpec spec;
+  spec.steps = 2;
+  EstimateLog log = climb_log(spec);
+  const Score near = score(log, replay(log, {}, {}));
+  const Vec3 away_m{5e5, -5e5, 1e3};
+  for (LogRow& row : log.rows) row.truth.true_T_base.p_m += away_m;
+  const Replay result = replay(log, lio_of(log, 7), {});
+  EXPECT_LT((result.ticks.back().world_T_base.p_m - log.rows.back().truth.true_T_base.p_m).norm(), 0.05);
+  const Score far = score(log, replay(log, {}, {}));
+  EXPECT_NEAR(far.position_rmse_m, near.position_rmse_m, 1e-6);
+  EXPECT_NEAR(far.velocity_rmse_mps, near.velocity_rmse_mps, 1e-6);
+  EXPECT_NEAR(far.nees_mean, near.nees_mean, 1e-3);
+}
+
+TEST(EstimateReplay, LioWithoutDelay_IsAccepted_AtAnyRateOfRows) {
+  WalkSpec spec;
+  spec.steps = 1;
+  EstimateLog log = climb_log(spec);
+  for (LogRow& row : log.rows) row.stamp_ns /= 2;  // 1 kHz
+  std::vector<LioRow> lio = lio_of(log, 7);
+  for (std::size_t i = 0; i < lio.size(); ++i) {
+    lio[i].stamp_ns = lio[i].arrival_ns = log.rows[50 * i + i % 2].stamp_ns;
+  }
+  const Replay result = replay(log, lio, {});
+  EXPECT_EQ(result.lio[static_cast<std::size_t>(LioVerdict::kNoOdometry)], 0U);
+}
+
 TEST(EstimateReplay, LidarMount_PosesOfTheLidar_AreThoseOfTheBase) {
   WalkSpec spec;
   spec.steps = 1;
