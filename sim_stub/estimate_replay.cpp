@@ -9,7 +9,6 @@
 namespace polygmap::sim {
 namespace {
 
-constexpr double kGap_s = 0.05;
 constexpr std::int64_t kRingPeriod_ns = 2 * kNsPerMs;  // the ring holds half a second at this rate
 // A start without truth: still for this long, or the first acceleration must do.
 constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0;
@@ -48,7 +47,8 @@ Opening opening(const EstimateLog& log) {
 
 class LogReplay {
  public:
-  LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log) {
+  LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log), options_(options) {
+    felt_.stamp_ns = -1;
     odometry_.reset(options.odometry);
     contacts_.reset({});
     begin();
@@ -71,13 +71,21 @@ class LogReplay {
   void step(std::size_t i) {
     const LogRow& row = log_.rows[i];
     contacts_.update_stated(row.contact, row.stamp_ns);
+    const LogRow before = felt_;
+    if (odometry_.is_valid_imu(row.gyro_radps, row.accel_mps2)) {
+      felt_ = row;
+    } else {
+      ++result_.imu_invalid;
+    }
     if (i > 0) {
-      const LogRow& before = log_.rows[i - 1];
-      const double dt_s = seconds(row.stamp_ns - before.stamp_ns);
-      if (dt_s > kGap_s) ++result_.gaps;
-      // Samples of a moment: over the step, the mean of both its ends.
-      odometry_.step({dt_s, 0.5 * (row.gyro_radps + before.gyro_radps), 0.5 * (row.accel_mps2 + before.accel_mps2)},
-                     legs_of(row), contacts_.feet(), {});
+      Odometry::Step step;
+      step.dt_s = seconds(row.stamp_ns - log_.rows[i - 1].stamp_ns);
+      if (step.dt_s > options_.odometry.max_step_s) ++result_.gaps;
+      // Samples of a moment: over the step, the mean of both its ends. The last ones bridge some that are invalid.
+      step.gyro_radps = 0.5 * (felt_.gyro_radps + before.gyro_radps);
+      step.accel_mps2 = 0.5 * (felt_.accel_mps2 + before.accel_mps2);
+      step.felt = felt_.stamp_ns >= 0 && seconds(row.stamp_ns - felt_.stamp_ns) <= options_.odometry.max_step_s;
+      odometry_.step(step, legs_of(row), contacts_.feet(), {});
     }
     publish(row, i);
   }
@@ -169,6 +177,8 @@ class LogReplay {
   }
 
   const EstimateLog& log_;
+  const ReplayOptions& options_;
+  LogRow felt_;  // the last whose IMU was valid; before there is one: stamp -1
   Odometry odometry_;
   ContactEstimator contacts_;
   StateRing ring_;
@@ -188,6 +198,13 @@ Odometry::Params log_params() {
   params.fusion.base_T_lidar = {};
   params.fusion.tau_s = 1.0;  // odometry of point feet turns away sooner than that of soles
   return params;
+}
+
+bool is_finite(const Replay& replay) {
+  return std::all_of(replay.ticks.begin(), replay.ticks.end(), [](const ReplayTick& tick) {
+    return math::all_finite(tick.world_T_base.p_m) && math::all_finite(tick.world_T_base.R) &&
+           math::all_finite(tick.world_v_base_mps) && math::all_finite(tick.covariance);
+  });
 }
 
 Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options) {
