@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <sstream>
 
 #include "sim_stub/csv_table.hpp"
 
@@ -13,6 +14,8 @@ namespace {
 constexpr double kMaxStamp_s = 1e11, kMaxSpan_s = 1e8;
 constexpr double kMaxRate_radps = 200.0, kMaxAccel_mps2 = 2000.0, kMaxLeg_m = 20.0;
 constexpr double kMaxPlace_m = 1e6, kMaxSpeed_mps = 1e3;
+constexpr double kMaxGap_s = 5.0;        // nobody knows where a robot went in longer ones
+constexpr double kMaxPeriod_s = 0.1;     // of rows, in the mean
 constexpr double kNormTolerance = 0.01;  // of a quaternion
 
 using Columns3 = std::array<std::size_t, 3>;
@@ -72,6 +75,12 @@ EstimateLog read_estimate_log(const std::string& path) {
     if (i > 0 && row.stamp_ns <= log.rows[i - 1].stamp_ns) {
       table.fail(i, "t_s is " + std::to_string(stamp_s) + ", not later than the row before");
     }
+    if (i > 0 && seconds(row.stamp_ns - log.rows[i - 1].stamp_ns) > kMaxGap_s) {
+      std::ostringstream sentence;
+      sentence << "t_s is " << seconds(row.stamp_ns - log.rows[i - 1].stamp_ns) << " s after the row before: more than "
+               << kMaxGap_s << " s without samples cannot be bridged (are the stamps in seconds?)";
+      table.fail(i, sentence.str());
+    }
     row.gyro_radps = vector(table, i, gyro, kMaxRate_radps);
     row.accel_mps2 = vector(table, i, accel, kMaxAccel_mps2);
     for (std::size_t f = 0; f < kFootCount; ++f) {
@@ -82,6 +91,14 @@ EstimateLog read_estimate_log(const std::string& path) {
     if (!log.has_truth) continue;
     row.truth.true_T_base = {rotation(table, i, truth_q), vector(table, i, truth_p, kMaxPlace_m)};
     row.truth.true_v_base_mps = vector(table, i, truth_v, kMaxSpeed_mps);
+  }
+  if (log.rows.size() < 2) table.fail(0, "is the only row, and there is nothing to estimate between rows");
+  const double period_s = seconds(log.rows.back().stamp_ns) / static_cast<double>(log.rows.size() - 1);
+  if (period_s > kMaxPeriod_s) {
+    std::ostringstream sentence;
+    sentence << "the rows up to this one come every " << period_s << " s, but legged odometry needs one per "
+             << kMaxPeriod_s << " s at least (are the stamps in seconds?)";
+    table.fail(table.rows() - 1, sentence.str());
   }
   return log;
 }

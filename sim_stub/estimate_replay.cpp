@@ -9,7 +9,6 @@
 namespace polygmap::sim {
 namespace {
 
-constexpr double kGap_s = 0.05;
 constexpr std::int64_t kRingPeriod_ns = 2 * kNsPerMs;  // the ring holds half a second at this rate
 // A start without truth: still for this long, or the first acceleration must do.
 constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0;
@@ -48,7 +47,8 @@ Opening opening(const EstimateLog& log) {
 
 class LogReplay {
  public:
-  LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log) {
+  LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log), options_(options) {
+    felt_.stamp_ns = -1;
     odometry_.reset(options.odometry);
     contacts_.reset({});
     begin();
@@ -61,6 +61,7 @@ class LogReplay {
     LioVerdict verdict = odometry_.fusion().check(sample, now_ns);
     StateEstimate then;
     if (verdict == LioVerdict::kAccepted) {
+      if (sample.stamp_ns > last_ring_ns_) keep();  // as young as this row
       verdict = ring_.try_at(sample.stamp_ns, then) ? odometry_.fusion().fuse(sample, then.odom_T_base)
                                                     : LioVerdict::kNoOdometry;
     }
@@ -70,13 +71,21 @@ class LogReplay {
   void step(std::size_t i) {
     const LogRow& row = log_.rows[i];
     contacts_.update_stated(row.contact, row.stamp_ns);
+    const LogRow before = felt_;
+    if (odometry_.is_valid_imu(row.gyro_radps, row.accel_mps2)) {
+      felt_ = row;
+    } else {
+      ++result_.imu_invalid;
+    }
     if (i > 0) {
-      const LogRow& before = log_.rows[i - 1];
-      const double dt_s = seconds(row.stamp_ns - before.stamp_ns);
-      if (dt_s > kGap_s) ++result_.gaps;
-      // Samples of a moment: over the step, the mean of both its ends.
-      odometry_.step({dt_s, 0.5 * (row.gyro_radps + before.gyro_radps), 0.5 * (row.accel_mps2 + before.accel_mps2)},
-                     legs_of(row), contacts_.feet(), {});
+      Odometry::Step step;
+      step.dt_s = seconds(row.stamp_ns - log_.rows[i - 1].stamp_ns);
+      if (step.dt_s > options_.odometry.max_step_s) ++result_.gaps;
+      // Samples of a moment: over the step, the mean of both its ends. The last ones bridge some that are invalid.
+      step.gyro_radps = 0.5 * (felt_.gyro_radps + before.gyro_radps);
+      step.accel_mps2 = 0.5 * (felt_.accel_mps2 + before.accel_mps2);
+      step.felt = felt_.stamp_ns >= 0 && seconds(row.stamp_ns - felt_.stamp_ns) <= options_.odometry.max_step_s;
+      odometry_.step(step, legs_of(row), contacts_.feet(), {});
     }
     publish(row, i);
   }
@@ -109,7 +118,8 @@ class LogReplay {
     start.accel_bias_sigma_mps2 = 0.1;
     if (log_.has_truth) {
       start.odom_R_base = first.truth.true_T_base.R;
-      start.odom_p_base_m = first.truth.true_T_base.p_m;
+      // The filter's errors turn about its origin, so that is the start, wherever on earth the truth counts from.
+      start_m_ = first.truth.true_T_base.p_m;
       start.odom_v_base_mps = first.truth.true_v_base_mps;
     } else {
       const Opening o = opening(log_);
@@ -128,19 +138,21 @@ class LogReplay {
     odometry_.initialise(start, legs_of(first), 0.01);
   }
 
+  void keep() {
+    ring_.push(now_);
+    last_ring_ns_ = now_.stamp_ns;
+  }
+
   void publish(const LogRow& row, std::size_t i) {
-    StateEstimate state;
+    StateEstimate& state = now_;
     state.stamp_ns = row.stamp_ns;
     odometry_.describe(row.stamp_ns, state);
-    if (row.stamp_ns - last_ring_ns_ >= kRingPeriod_ns || i == 0) {
-      ring_.push(state);
-      last_ring_ns_ = row.stamp_ns;
-    }
+    if (row.stamp_ns - last_ring_ns_ >= kRingPeriod_ns || i == 0) keep();
     const Mat3& world_R_odom = state.world_T_odom.R;
     ReplayTick tick;
     tick.stamp_ns = row.stamp_ns;
-    tick.odom_T_base = state.odom_T_base;
-    tick.world_T_base = state.world_T_base();
+    tick.odom_T_base = {state.odom_T_base.R, start_m_ + state.odom_T_base.p_m};
+    tick.world_T_base = {world_R_odom * state.odom_T_base.R, start_m_ + state.world_T_base().p_m};
     tick.world_v_base_mps = world_R_odom * state.odom_v_base_mps;
     tick.base_w_base_radps = state.base_w_base_radps;
     tick.covariance = odometry_.attitude().covariance();
@@ -154,7 +166,7 @@ class LogReplay {
     tick.lio_age_ns = state.lio_age_ns;
     result_.ticks.push_back(tick);
     if (i > 0) {  // as the fusion's limit counts: the new offset against the old one, at the same place
-      const double slew_m = (tick.world_T_base.p_m - last_world_T_odom_ * state.odom_T_base.p_m).norm();
+      const double slew_m = (state.world_T_base().p_m - last_world_T_odom_ * state.odom_T_base.p_m).norm();
       result_.largest_slew_m = std::max(result_.largest_slew_m, slew_m);
     }
     last_world_T_odom_ = state.world_T_odom;
@@ -165,9 +177,13 @@ class LogReplay {
   }
 
   const EstimateLog& log_;
+  const ReplayOptions& options_;
+  LogRow felt_;  // the last whose IMU was valid; before there is one: stamp -1
   Odometry odometry_;
   ContactEstimator contacts_;
   StateRing ring_;
+  StateEstimate now_;
+  Vec3 start_m_ = Vec3::Zero();  // world minus the filter's axes
   std::int64_t last_ring_ns_ = 0;
   Transform last_world_T_odom_;
   Replay result_;
@@ -184,13 +200,20 @@ Odometry::Params log_params() {
   return params;
 }
 
+bool is_finite(const Replay& replay) {
+  return std::all_of(replay.ticks.begin(), replay.ticks.end(), [](const ReplayTick& tick) {
+    return math::all_finite(tick.world_T_base.p_m) && math::all_finite(tick.world_T_base.R) &&
+           math::all_finite(tick.world_v_base_mps) && math::all_finite(tick.covariance);
+  });
+}
+
 Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options) {
   const auto estimator = std::make_unique<LogReplay>(log, options);  // its ring is too large for a stack
   std::size_t next = 0;
   for (std::size_t i = 0; i < log.rows.size(); ++i) {
     const std::int64_t now_ns = log.rows[i].stamp_ns;
+    estimator->step(i);  // first, so that a pose stamped with this row finds it
     for (; next < lio.size() && lio[next].arrival_ns <= now_ns; ++next) estimator->add_lio(lio[next], now_ns);
-    estimator->step(i);
   }
   return estimator->take();
 }

@@ -38,12 +38,15 @@ struct Replay {
   double foot_position_sigma_m = 0.0, contact_walk_mprs = 0.0;          // measured
   double innovation_ratio_mean = 0.0;
   std::uint32_t outliers = 0;
-  std::uint32_t gaps = 0;  // rows that came after more than 50 ms
+  std::uint32_t imu_invalid = 0;  // rows beyond what the module takes for true: not felt
+  std::uint32_t gaps = 0;         // rows that came after more than 50 ms
   std::uint32_t slipping_rows = 0;
   std::array<std::uint32_t, kLioVerdictCount> lio{};
   double largest_slew_m = 0.0;  // most that one tick moved the fused pose against the odometry
 };
 
+// False: the log's numbers, each possible by itself, broke the filter.
+[[nodiscard]] bool is_finite(const Replay& replay);
 [[nodiscard]] Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options);
 
 }  // namespace polygmap::sim

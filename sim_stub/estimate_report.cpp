@@ -74,6 +74,7 @@ void write_estimate_json(const std::string& path, const EstimateLog& log, const 
   json["innovation_outliers"] = replay.outliers;
   json["moving_contact_rows"] = replay.slipping_rows;
   json["gaps"] = replay.gaps;
+  json["imu_invalid"] = replay.imu_invalid;
   json["final_position_sigma_mm"] = vector(1e3 * last.covariance.diagonal().head<3>().cwiseSqrt());
   json["final_yaw_sigma_deg"] = kDegrees * std::sqrt(last.covariance(8, 8));
   json["lio"] = lio_counts(lio, replay);

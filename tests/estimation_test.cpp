@@ -219,6 +219,18 @@ TEST(ForceInference, StaticTorquesOfAStandingLeg_GiveItsForce_FrictionOfALightOn
 
 // --- Slips ---------------------------------------------------------------------------------------------------------
 
+TEST(AttitudeFilter, SilentImu_TiltAndYawGetUnsureAsNobodyFeelsThem) {
+  AttitudeFilter filter;
+  filter.reset({});
+  filter.initialise({}, {});
+  const Vec3 rest_mps2{0, 0, kGravity_mps2};
+  for (int i = 0; i < 50; ++i) filter.predict(Vec3::Zero(), rest_mps2, kTick_s, AttitudeFilter::Motion::kFelt);
+  EXPECT_LT(filter.yaw_sigma_rad(), 1e-3);
+  for (int i = 0; i < 50; ++i) filter.predict(Vec3::Zero(), rest_mps2, kTick_s, AttitudeFilter::Motion::kUnfelt);
+  EXPECT_NEAR(filter.yaw_sigma_rad(), 0.1 * std::sqrt(0.1), 1e-3);
+  EXPECT_NEAR(filter.tilt_sigma_rad(), 0.1 * std::sqrt(0.1), 1e-3);
+}
+
 TEST(FootMotion, RestingFootWithNoise_IsRest_SlippingFootIsLetGo_AndTheNoiseIsMeasured) {
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0.0, 2e-3);

@@ -72,6 +72,12 @@ double worst_error_m(const EstimateLog& log, const Replay& result) {
   return worst_m;
 }
 
+double end_error_over_variance(const EstimateLog& log, const Replay& result) {
+  const Vec3 error_m = result.ticks.back().world_T_base.p_m - log.rows.back().truth.true_T_base.p_m;
+  const Mat3 P = result.ticks.back().covariance.topLeftCorner<3, 3>();
+  return error_m.dot(P.inverse() * error_m);
+}
+
 std::vector<LioRow> lio_of(const EstimateLog& log, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0.0, 0.005);
@@ -104,9 +110,7 @@ TEST(EstimateReplay, ClimbWithBiasedNoisySensors_DriftsByLittle_AndKnowsHowFar) 
     EXPECT_LT(s.velocity_rmse_mps, 0.010) << seed;
     EXPECT_LT(s.attitude_rmse_rad, 0.03) << seed;  // yaw, which nothing observes
     EXPECT_NEAR(result.foot_position_sigma_m, kFootNoise_m, 0.2 * kFootNoise_m) << seed;
-    const Mat3 P = result.ticks.back().covariance.topLeftCorner<3, 3>();
-    const Vec3 error_m = result.ticks.back().world_T_base.p_m - log.rows.back().truth.true_T_base.p_m;
-    EXPECT_LT(error_m.dot(P.inverse() * error_m), 25.0) << seed;
+    EXPECT_LT(end_error_over_variance(log, result), 25.0) << seed;
     EXPECT_GT(result.ticks.back().covariance(8, 8), result.ticks[10].covariance(8, 8)) << "yaw gets no surer";
   }
 }
@@ -173,6 +177,67 @@ TEST(EstimateReplay, LateLioWithOutliersAndFutureStamps_IsCountedAndNeverMakesAS
   EXPECT_LE(result.largest_slew_m, options.odometry.fusion.slew_m + 1e-9);
   EXPECT_EQ(result.ticks[10].lio_age_ns, -1);
   EXPECT_LT(result.ticks.back().lio_age_ns, 210 * kNsPerMs);
+}
+
+TEST(EstimateReplay, TruthCountsFromFarAway_ScoresAreThoseOfAStartAtTheOrigin) {
+  WalkSpec spec;
+  spec.steps = 2;
+  EstimateLog log = climb_log(spec);
+  const Score near = score(log, replay(log, {}, {}));
+  const Vec3 away_m{5e5, -5e5, 1e3};
+  for (LogRow& row : log.rows) row.truth.true_T_base.p_m += away_m;
+  const Replay result = replay(log, lio_of(log, 7), {});
+  EXPECT_LT((result.ticks.back().world_T_base.p_m - log.rows.back().truth.true_T_base.p_m).norm(), 0.05);
+  const Score far = score(log, replay(log, {}, {}));
+  EXPECT_NEAR(far.position_rmse_m, near.position_rmse_m, 1e-6);
+  EXPECT_NEAR(far.velocity_rmse_mps, near.velocity_rmse_mps, 1e-6);
+  EXPECT_NEAR(far.nees_mean, near.nees_mean, 1e-3);
+}
+
+TEST(EstimateReplay, RowsMissingInTheMiddleOfAStep_AreBridged_AndTheSigmasSayHowWell) {
+  WalkSpec spec;
+  spec.steps = 3;
+  const EstimateLog whole = climb_log(spec);
+  for (const auto& [gap_ns, bound_m] : {std::pair{200 * kNsPerMs, 0.1}, {1000 * kNsPerMs, 0.6}}) {
+    for (const std::int64_t from_ns : {2700 * kNsPerMs, 3400 * kNsPerMs}) {
+      EstimateLog log = whole;
+      std::erase_if(log.rows, [&, until_ns = from_ns + gap_ns](const LogRow& row) {
+        return row.stamp_ns > from_ns && row.stamp_ns < until_ns;
+      });
+      const Replay result = replay(log, {}, {});
+      EXPECT_EQ(result.gaps, 1U);
+      EXPECT_LT(worst_error_m(log, result), bound_m) << gap_ns << " " << from_ns;
+      EXPECT_LT(score(log, result).velocity_rmse_mps, 0.05) << gap_ns << " " << from_ns;
+      EXPECT_LT(end_error_over_variance(log, result), 16.0) << gap_ns << " " << from_ns;
+    }
+  }
+}
+
+TEST(EstimateReplay, ImuBeyondTheModulesRange_IsCountedAndNotFelt) {
+  WalkSpec spec;
+  spec.steps = 2;
+  EstimateLog log = climb_log(spec);
+  const Score clean = score(log, replay(log, {}, {}));
+  for (std::size_t i = 700; i < 1700; i += 100) {
+    log.rows[i].accel_mps2.x() = 500.0;
+    log.rows[i + 1].gyro_radps.z() = -50.0;
+  }
+  const Replay result = replay(log, {}, {});
+  EXPECT_EQ(result.imu_invalid, 20U);
+  EXPECT_LT(score(log, result).position_rmse_m, clean.position_rmse_m + 2e-3);
+}
+
+TEST(EstimateReplay, LioWithoutDelay_IsAccepted_AtAnyRateOfRows) {
+  WalkSpec spec;
+  spec.steps = 1;
+  EstimateLog log = climb_log(spec);
+  for (LogRow& row : log.rows) row.stamp_ns /= 2;  // 1 kHz
+  std::vector<LioRow> lio = lio_of(log, 7);
+  for (std::size_t i = 0; i < lio.size(); ++i) {
+    lio[i].stamp_ns = lio[i].arrival_ns = log.rows[50 * i + i % 2].stamp_ns;
+  }
+  const Replay result = replay(log, lio, {});
+  EXPECT_EQ(result.lio[static_cast<std::size_t>(LioVerdict::kNoOdometry)], 0U);
 }
 
 TEST(EstimateReplay, LidarMount_PosesOfTheLidar_AreThoseOfTheBase) {
@@ -306,6 +371,9 @@ TEST_F(EstimateCommand, BadLogs_AreNamedInOneSentenceWithTheirLine) {
       {spoilt(4, "100.004,0,0,0,0,0,9.81,2,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,1,0,0,0"), "left_contact"},
       {spoilt(4, "100.004,0,0,0,0,0,9.81,1,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,0,0,0,0"), "quaternion"},
       {spoilt(4, ""), "line 4"},
+      {std::string(kHeader) + "\n100.0" + kRow + "\n", "line 2: is the only row"},
+      {spoilt(4, std::string("106.1") + kRow), "line 4: t_s is 6.098 s after"},
+      {std::string(kHeader) + "\n100" + kRow + "\n102" + kRow + "\n104" + kRow + "\n", "line 4: the rows"},
   };
   for (const auto& c : kCases) expect_refused({"estimate", write("bad.csv", c.text)}, c.culprit);
   expect_refused({"estimate", at("absent.csv")}, "absent.csv");

@@ -56,7 +56,7 @@ void AttitudeFilter::anchor(std::size_t foot, const LegMeasurement& leg) noexcep
   if (leg.sole_known) copy(of_foot(kSole, foot), kAttitude, math::square(params_.foot_sigma_rad));
 }
 
-void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, bool lost) noexcept {
+void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion) noexcept {
   const Vec3 turn_rad = (gyro_radps - gyro_bias_radps_) * dt_s;
   constexpr double kLeg_m = 0.5;
   const double speed_mps = odom_v_base_mps_.norm() + kLeg_m * turn_rad.norm() / dt_s;
@@ -64,13 +64,16 @@ void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, dou
   const Vec3 force_mps2 = odom_R_base_ * so3_exp(0.5 * turn_rad) * (accel_mps2 - accel_bias_mps2_);
   const Vec3 odom_a_mps2 = force_mps2 - Vec3{0, 0, gravity_mps2_};
   const double dynamic_mpsrs = params_.dynamic_accel_share * odom_a_mps2.norm() * math::sqrt(dt_s);
-  predict_covariance(params_.accel_noise_mpsrs + dynamic_mpsrs + (lost ? params_.lost_accel_noise_mpsrs : 0.0), dt_s);
+  predict_covariance(
+      params_.gyro_noise_radprs + (motion == Motion::kUnfelt ? params_.lost_gyro_noise_radprs : 0.0),
+      params_.accel_noise_mpsrs + dynamic_mpsrs + (motion == Motion::kFelt ? 0.0 : params_.lost_accel_noise_mpsrs),
+      dt_s);
   odom_p_base_m_ += dt_s * (odom_v_base_mps_ + 0.5 * dt_s * odom_a_mps2);
   odom_v_base_mps_ += dt_s * odom_a_mps2;
   odom_R_base_ = so3_renormalised(odom_R_base_ * so3_exp(turn_rad));
 }
 
-void AttitudeFilter::predict_covariance(double accel_noise_mpsrs, double dt_s) noexcept {
+void AttitudeFilter::predict_covariance(double gyro_noise_radprs, double accel_noise_mpsrs, double dt_s) noexcept {
   const Mat3 R = odom_R_base_ * dt_s;
   const Mat3 gravity = skew(Vec3{0, 0, -gravity_mps2_ * dt_s});
   struct Turned {
@@ -95,7 +98,7 @@ void AttitudeFilter::predict_covariance(double accel_noise_mpsrs, double dt_s) n
   for (const Turned& t : turned) P_.middleCols<3>(t.index).noalias() -= bias_t * t.arm.transpose();
 
   // The gyro's noise turns everything that is held in odom axes.
-  const double turn_rad2 = math::square(params_.gyro_noise_radprs) * dt_s;
+  const double turn_rad2 = math::square(gyro_noise_radprs) * dt_s;
   P_.diagonal().segment<3>(kAttitude).array() += turn_rad2;
   for (const Turned& a : turned) {
     const Mat3 with_attitude = turn_rad2 * a.arm;

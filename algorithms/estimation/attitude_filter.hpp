@@ -23,6 +23,7 @@ class AttitudeFilter {
     double gyro_noise_radprs = 1e-4;  // rad/sqrt(s); 2e-3 rad/s at 500 Hz is 0.9e-4
     double accel_noise_mpsrs = 3e-3;  // m/s/sqrt(s); 0.05 m/s^2 at 500 Hz is 2.2e-3
     double lost_accel_noise_mpsrs = 2.0;
+    double lost_gyro_noise_radprs = 0.1;   // of a walking base whose turning nobody feels: 0.03 rad in 0.1 s
     double dynamic_accel_share = 0.02;     // of what differs from gravity: sampling, scale, mount
     double gyro_bias_walk_radpsrs = 5e-6;  // rad/s/sqrt(s)
     double accel_bias_walk_mps2rs = 1e-4;
@@ -54,8 +55,12 @@ class AttitudeFilter {
   void reset(const Params& params) noexcept;
   void initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs) noexcept;
 
-  // lost: what the base feels is not known, or no foot has rested for so long that its velocity is not.
-  void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, bool lost) noexcept;
+  enum class Motion : std::uint8_t {
+    kFelt,
+    kVelocityLost,  // felt, but no foot has rested for so long that the velocity is not known
+    kUnfelt         // the IMU is silent: rates are guesses
+  };
+  void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion) noexcept;
   // A foot that does not stand is anchored anew.
   void correct_by_feet(const std::array<LegMeasurement, kFootCount>& legs,
                        const std::array<FootContact, kFootCount>& contacts, double dt_s) noexcept;
@@ -94,7 +99,7 @@ class AttitudeFilter {
   using Covariance = Eigen::Matrix<double, kStates, kStates>;
   using Vector = Eigen::Matrix<double, kStates, 1>;
 
-  void predict_covariance(double accel_noise_mpsrs, double dt_s) noexcept;
+  void predict_covariance(double gyro_noise_radprs, double accel_noise_mpsrs, double dt_s) noexcept;
   void anchor(std::size_t foot, const LegMeasurement& leg) noexcept;
   // Three rows: state at `plus` minus state at `minus` is innovation, each of this variance.
   void correct(int plus, int minus, const Vec3& innovation, double variance, double dt_s) noexcept;

@@ -48,11 +48,8 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
     return;
   }
 
-  double dt_s = seconds(now_ns - state_.stamp_ns);
-  if (dt_s > params_.max_step_s) {
-    ++counters_.gaps;
-    dt_s = params_.max_step_s;
-  }
+  const double dt_s = seconds(now_ns - state_.stamp_ns);
+  if (dt_s > params_.max_step_s) ++counters_.gaps;
   // The last rates bridge a short silence of the IMU; beyond it the feet alone say how the base moves.
   const bool felt = seconds(now_ns - imu_.stamp_ns) <= params_.max_step_s;
   odometry_.step({dt_s, imu_.gyro_radps, imu_.accel_mps2, felt, new_joints}, legs_, contacts_.feet(), ground_);
@@ -92,9 +89,7 @@ void Estimator::set_tread_height(Foot foot, double odom_z_m, double sigma_m) noe
 }
 
 void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
-  if (!math::all_finite(imu.gyro_radps) || !math::all_finite(imu.accel_mps2) ||
-      imu.gyro_radps.cwiseAbs().maxCoeff() > params_.max_rate_radps ||
-      imu.accel_mps2.cwiseAbs().maxCoeff() > params_.max_accel_mps2) {
+  if (!odometry_.is_valid_imu(imu.gyro_radps, imu.accel_mps2)) {
     ++counters_.imu_invalid;
     return;
   }

@@ -18,12 +18,9 @@ class Estimator {
     bool infer_forces = false;  // foot forces from joint torques: no sensor measures them
     ForceInference::Params forces;
     double max_torque_nm = 1000.0;
-    double max_rate_radps = 20.0;  // sensor samples beyond these are invalid
-    double max_accel_mps2 = 100.0;
-    double max_joint_rad = 4.0;
+    double max_joint_rad = 4.0;           // sensor samples beyond these are invalid
     double max_joint_speed_radps = 15.0;  // also against the last sample: a single wrong angle is not a motion
     double max_force_n = 5000.0;
-    double max_step_s = 0.05;  // a longer gap is bridged with this much time; older rates are not believed
     std::int64_t max_lead_ns = 10 * kNsPerMs;  // of a stamp before now: frames caught up run up to 6 ms late
     double max_height_error_m = 0.03;          // of a tread against the sole on it
     double floor_sigma_m = 0.003;              // of the floor under the feet at the start

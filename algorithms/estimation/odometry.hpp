@@ -23,7 +23,12 @@ class Odometry {
     AttitudeFilter::Params attitude;
     BaseFilter::Params base;
     OdometryFusion::Params fusion;
-    double lost_s = 0.25;              // a standing robot none of whose feet rest for so long has lost its velocity
+    double max_rate_radps = 20.0;  // IMU samples beyond these are invalid
+    double max_accel_mps2 = 100.0;
+    double max_step_s = 0.05;  // a longer gap is bridged without feeling; older rates are not believed
+    double max_gap_s = 5.0;    // bridged by no more than this
+    double coast_s = 1.0;      // the base is thought to stop within about this time when nothing is felt for long
+    double lost_s = 0.25;      // a standing robot none of whose feet rest for so long has lost its velocity
     double doubtful_walk_m2ps = 1e-3;  // random walk of a contact as likely as not: 1 mm in 1 ms
   };
   // What is new since the last step. Rates hold over dt.
@@ -42,7 +47,10 @@ class Odometry {
   };
 
   void reset(const Params& params) noexcept;
+  // Finite and in range.
+  [[nodiscard]] bool is_valid_imu(const Vec3& gyro_radps, const Vec3& accel_mps2) const noexcept;
   void initialise(const AttitudeFilter::Start& start, const Legs& legs, double dt_s) noexcept;
+  // A step longer than max_step_s is a gap: the base coasts through it, its sigmas grow, and the feet are new contacts.
   void step(const Step& step, const Legs& legs, const Contacts& contacts, const Ground& ground) noexcept;
   // Fills in pose, twist, sigmas and LIO's share, as of now_ns.
   void describe(std::int64_t now_ns, StateEstimate& state) const noexcept;
@@ -59,6 +67,7 @@ class Odometry {
   }
 
   Params params_;
+  void bridge(double gap_s) noexcept;
   void take_legs(const Legs& legs) noexcept;
   [[nodiscard]] Vec3 odom_p_base_m() const noexcept {
     return soles_known_ ? base_.odom_p_base_m() : attitude_.odom_p_base_m();
@@ -72,6 +81,7 @@ class Odometry {
   std::array<Vec3, kFootCount> odom_p_foot_m_{Vec3::Zero(), Vec3::Zero()};  // as of the last corrected state
   double since_legs_s_ = 0.0;
   double unrested_s_ = 0.0;
+  bool feet_lost_ = false;  // by a gap, until the next legs
   bool soles_known_ = true;
   Vec3 base_w_base_radps_ = Vec3::Zero();
 };

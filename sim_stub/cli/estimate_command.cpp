@@ -95,6 +95,7 @@ int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& er
     const EstimateLog log = read_estimate_log(a.log);
     const std::vector<LioRow> lio = a.lio.empty() ? std::vector<LioRow>{} : read_lio_log(a.lio, log.start_s);
     const Replay result = replay(log, lio, options_of(a));
+    if (!is_finite(result)) throw FileError("\"" + a.log + "\": the estimate is not finite, so nothing is written.");
     if (!a.json.empty()) write_estimate_json(a.json, log, lio, result);
     if (!a.csv.empty()) write_estimate_csv(a.csv, log, result);
     print(log, result, out);
