@@ -45,6 +45,17 @@ Opening opening(const EstimateLog& log) {
   return o;
 }
 
+using Covariance = Eigen::Matrix<double, 9, 9>;
+constexpr int kYaw = 8;
+
+// Of x, y, z besides what the heading does, and of yaw.
+FusionUncertainty::Quantities variances_of(const Covariance& P) {
+  FusionUncertainty::Quantities v;
+  v.head<3>() = P.diagonal().head<3>() - P.col(kYaw).head<3>().cwiseAbs2() / P(kYaw, kYaw);
+  v[3] = P(kYaw, kYaw);
+  return v;
+}
+
 class LogReplay {
  public:
   LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log), options_(options) {
@@ -86,6 +97,9 @@ class LogReplay {
       step.accel_mps2 = 0.5 * (felt_.accel_mps2 + before.accel_mps2);
       step.felt = felt_.stamp_ns >= 0 && seconds(row.stamp_ns - felt_.stamp_ns) <= options_.odometry.max_step_s;
       odometry_.step(step, legs_of(row), contacts_.feet(), {});
+      const FusionUncertainty::Quantities variances = variances_of(odometry_.attitude().covariance());
+      odometry_.fusion().grow((variances - variances_).cwiseMax(0.0));
+      variances_ = variances;
     }
     publish(row, i);
   }
@@ -136,6 +150,7 @@ class LogReplay {
     }
     contacts_.update_stated(first.contact, 0);
     odometry_.initialise(start, legs_of(first), 0.01);
+    variances_ = variances_of(odometry_.attitude().covariance());
   }
 
   void keep() {
@@ -155,13 +170,7 @@ class LogReplay {
     tick.world_T_base = {world_R_odom * state.odom_T_base.R, start_m_ + state.world_T_base().p_m};
     tick.world_v_base_mps = world_R_odom * state.odom_v_base_mps;
     tick.base_w_base_radps = state.base_w_base_radps;
-    tick.covariance = odometry_.attitude().covariance();
-    if (state.lio_age_ns >= 0) {  // the position is LIO's and odometry's by now, and the fusion knows how sure it is
-      tick.covariance.topRows<3>().setZero();
-      tick.covariance.leftCols<3>().setZero();
-      tick.covariance.topLeftCorner<3, 3>() = state.position_sigma_m.cwiseAbs2().asDiagonal();
-      tick.covariance(8, 8) = math::square(state.yaw_sigma_rad);
-    }
+    tick.covariance = fused_covariance(state);
     tick.contact_probability = state.contact_probability;
     tick.lio_age_ns = state.lio_age_ns;
     result_.ticks.push_back(tick);
@@ -176,9 +185,21 @@ class LogReplay {
     }
   }
 
+  // Until LIO corrects anything the odometry's own; then its correlations, with the fusion's sigmas for what LIO
+  // corrects.
+  [[nodiscard]] Covariance fused_covariance(const StateEstimate& state) const {
+    const Covariance P = odometry_.attitude().covariance();
+    if (!odometry_.fusion().aligned()) return P;
+    Eigen::Matrix<double, 9, 1> scale = Eigen::Matrix<double, 9, 1>::Ones();
+    for (int i = 0; i < 3; ++i) scale[i] = state.position_sigma_m[i] / std::sqrt(P(i, i));
+    scale[kYaw] = state.yaw_sigma_rad / std::sqrt(P(kYaw, kYaw));
+    return scale.asDiagonal() * P * scale.asDiagonal();
+  }
+
   const EstimateLog& log_;
   const ReplayOptions& options_;
   LogRow felt_;  // the last whose IMU was valid; before there is one: stamp -1
+  FusionUncertainty::Quantities variances_;
   Odometry odometry_;
   ContactEstimator contacts_;
   StateRing ring_;
@@ -196,7 +217,9 @@ Odometry::Params log_params() {
   params.attitude.gyro_noise_radprs = 3e-4;
   params.attitude.contact_walk_mprs = 1e-2;
   params.fusion.base_T_lidar = {};
-  params.fusion.tau_s = 1.0;  // odometry of point feet turns away sooner than that of soles
+  params.fusion.uncertainty = {0.0, 0.0, 1e-4, 1e-4};  // grows as the filter's own does, from the start's sigmas
+  params.fusion.tau_s = 2.0;                           // odometry of point feet turns away sooner than that of soles
+  params.fusion.default_position_sigma_m = 0.007;      // a log's LIO states none: between 5 and 10 mm
   return params;
 }
 

@@ -195,14 +195,16 @@ void AttitudeFilter::apply(const Vector& error) noexcept {
 
 Eigen::Matrix<double, 9, 9> AttitudeFilter::covariance() const noexcept {
   // d_p = e_p - p x e, and so for velocity.
-  Eigen::Matrix<double, 9, 9> J = Eigen::Matrix<double, 9, 9>::Zero(), P;
+  using Square = Eigen::Matrix<double, 9, 9>;
+  Square J = Square::Zero();
   J.block<3, 3>(0, 0) = -skew(odom_p_base_m_);
   J.block<3, 3>(0, 6).setIdentity();
   J.block<3, 3>(3, 0) = -skew(odom_v_base_mps_);
   J.block<3, 3>(3, 3).setIdentity();
   J.block<3, 3>(6, 0).setIdentity();
-  P.noalias() = J * P_.topLeftCorner<9, 9>() * J.transpose();
-  return P;
+  // Products of this size would go through Eigen's blocking and its heap.
+  const Square JP = J.lazyProduct(P_.topLeftCorner<9, 9>());
+  return JP.lazyProduct(J.transpose());
 }
 
 double AttitudeFilter::velocity_sigma_mps() const noexcept {

@@ -23,10 +23,19 @@ class FusionUncertainty {
   void reset(const Params& params) noexcept;
   // Odometry alone, one tick: it errs alike all the way, so sigmas add up, and a wrong heading bends the way.
   void move(const Vec3& world_step_m, double dt_s) noexcept;
+  // What the odometry's own filter says that its variances grew by, besides what the heading does.
+  void grow(const Quantities& variance) noexcept { walk_variance_ += variance; }
   // A LIO pose of these sigmas, blended in with the gain of eq. (9).
   void blend(double gain, double lio_sigma_m, double lio_sigma_rad) noexcept;
   // LIO's world is tied to ours anew, from here on: with these sigmas, the base at world_p_base.
   void tie(const Vec3& world_p_base_m, double sigma_m, double sigma_rad) noexcept;
+  // Before any blend: the share of one more LIO pose's innovation that is the tie's error rather than the odometry's
+  // drift since the tie, for position and for rotation. A robot at rest: 1/2, 1/3, ...
+  struct TieGains {
+    double position, rotation;
+  };
+  [[nodiscard]] TieGains tie_gains(double lio_sigma_m, double lio_sigma_rad) const noexcept;
+  void average(const TieGains& gains, double lio_sigma_m, double lio_sigma_rad) noexcept;
   // The odometry chooses its origin.
   void rebase(const Transform& new_T_old) noexcept { tie_world_p_base_m_ = new_T_old * tie_world_p_base_m_; }
 
@@ -40,8 +49,10 @@ class FusionUncertainty {
   Quantities start_variance_ = Quantities::Zero();  // odometry's until the tie: no LIO pose can tell
   Quantities lag_ = Quantities::Zero();             // drift since then that the low-pass has not followed yet, sigmas
   Vec3 bent_m_ = Vec3::Zero();                      // the same of a wrong heading: signed, so that sway cancels
+  Quantities walk_variance_ = Quantities::Zero();   // the same of drift that has no direction
   Quantities noise_variance_ = Quantities::Zero();  // LIO's that came through
-  Quantities tie_variance_ = Quantities::Zero();    // its share at the tie, which stays ...
+  Quantities tie_covariance_ = Quantities::Zero();  // of the tie's error with the odometry's
+  Quantities tie_variance_ = Quantities::Zero();    // LIO's share at the tie, which stays ...
   double tie_share_ = 0.0;                          // ... once the low-pass has forgotten it: until then they cancel
   Vec3 tie_world_p_base_m_ = Vec3::Zero();          // a world tied with a turn is wrong in proportion to the distance
 };

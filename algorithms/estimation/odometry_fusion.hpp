@@ -80,6 +80,8 @@ class OdometryFusion {
   // The odometry chooses its origin: what was old_p is now new_T_old * old_p. The world follows.
   void rebase(const Transform& new_T_old) noexcept;
 
+  // Variances of the odometry that its own filter says grew: x, y, z besides what the heading does, and yaw.
+  void grow(const FusionUncertainty::Quantities& variance) noexcept { uncertainty_.grow(variance); }
   // Once per tick: moves the published offset towards the fused one within the slew limits, which hold at the base,
   // wherever odom's origin is; lets the sigmas grow. odom_step: by which the odometry moved the base since the last.
   void tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept;
@@ -87,6 +89,7 @@ class OdometryFusion {
   // Of the published pose, world axes; what the slew limit still holds back counts as error.
   [[nodiscard]] const Vec3& position_sigma_m() const noexcept { return position_sigma_m_; }
   [[nodiscard]] double yaw_sigma_rad() const noexcept { return uncertainty_.yaw_sigma_rad(); }
+  [[nodiscard]] bool aligned() const noexcept { return aligned_; }  // until then the fused pose is the odometry's
   [[nodiscard]] const LioInnovations& innovations() const noexcept { return innovations_; }
   [[nodiscard]] std::int64_t last_accepted_ns() const noexcept { return last_accepted_ns_; }  // -1: none
 
@@ -100,17 +103,17 @@ class OdometryFusion {
   [[nodiscard]] LioSigmas sigmas_of(const LioSample& sample) const noexcept;
   void observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,
                std::int64_t stamp_ns) noexcept;
+  void align(const Transform& predicted, const Transform& lio_T_base, const LioSigmas& sigmas, double gain) noexcept;
   void tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept;
-  [[nodiscard]] Transform target() const noexcept;
 
   Params params_;
-  // LIO's world is not ours. The first poses, with a gain of 1/n until that is eq. (9)'s, say where odom lies in it;
-  // there world is odom, and from then on lio_T_odom moves as the odometry drifts.
-  Transform lio_T_odom_;
+  // LIO's world is not ours. The first poses say where it lies, while world is odom: each by its weight against the
+  // drift since the first. Once that is no more than eq. (9)'s gain the tie stays and odom moves as it drifts.
   Transform world_T_lio_;
   bool aligned_ = false;
-  std::uint32_t count_ = 0;  // poses averaged into the alignment
-  Transform world_T_odom_;   // published
+  std::uint32_t count_ = 0;       // poses averaged into the alignment
+  Transform fused_world_T_odom_;  // towards which the published one moves
+  Transform world_T_odom_;        // published
   Transform jumped_lio_T_odom_;
   std::uint32_t jumped_count_ = 0;
   std::int64_t last_stamp_ns_ = -1;  // of any pose that was in order
