@@ -15,9 +15,10 @@ namespace {
 constexpr std::size_t kMostShown = 24;  // of a cell, in a sentence
 
 std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r");
+  constexpr std::string_view kBlank = " \t\r\n";
+  const std::size_t first = text.find_first_not_of(kBlank);
   if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
 std::vector<std::string_view> split(std::string_view line) {
@@ -74,6 +75,11 @@ CsvTable::CsvTable(std::string path) : path_(std::move(path)), text_(read_text(p
     cells_.insert(cells_.end(), cells.begin(), cells.end());
   }
   if (lines_.empty()) throw FileError("\"" + path_ + "\" has no rows of data.");
+}
+
+bool CsvTable::has_any(std::string_view prefix) const noexcept {
+  return std::any_of(header_.begin(), header_.end(),
+                     [prefix](std::string_view name) { return name.substr(0, prefix.size()) == prefix; });
 }
 
 std::size_t CsvTable::find(std::string_view column) const noexcept {

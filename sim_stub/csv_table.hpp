@@ -15,7 +15,8 @@ class CsvTable {
   explicit CsvTable(std::string path);
 
   [[nodiscard]] std::size_t rows() const noexcept { return lines_.size(); }
-  [[nodiscard]] bool has(std::string_view column) const noexcept { return find(column) < header_.size(); }
+  // Does any column's name begin so?
+  [[nodiscard]] bool has_any(std::string_view prefix) const noexcept;
   // Index of a column. Throws FileError when it is missing.
   [[nodiscard]] std::size_t column(std::string_view name) const;
   // Throws FileError when the cell is no finite number within +-limit.

@@ -180,6 +180,8 @@ class LogReplay {
     }
     last_world_T_odom_ = state.world_T_odom;
     result_.innovation_ratio_mean += odometry_.attitude().innovation_ratio();
+    const auto& feet = contacts_.feet();
+    if (!feet[0].stands && !feet[1].stands) ++result_.rows_without_contact;
     for (std::size_t f = 0; f < kFootCount; ++f) {
       if (contacts_.feet()[f].stands && odometry_.motion().walk_m2ps(f) > 0.0) ++result_.slipping_rows;
     }

@@ -41,6 +41,7 @@ struct Replay {
   std::uint32_t imu_invalid = 0;  // rows beyond what the module takes for true: not felt
   std::uint32_t gaps = 0;         // rows that came after more than 50 ms
   std::uint32_t slipping_rows = 0;
+  std::uint32_t rows_without_contact = 0;
   std::array<std::uint32_t, kLioVerdictCount> lio{};
   double largest_slew_m = 0.0;  // most that one tick moved the fused pose against the odometry
 };

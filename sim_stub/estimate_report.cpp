@@ -73,6 +73,8 @@ void write_estimate_json(const std::string& path, const EstimateLog& log, const 
   json["innovation_ratio_mean"] = replay.innovation_ratio_mean;  // 1: noise is what it is thought to be
   json["innovation_outliers"] = replay.outliers;
   json["moving_contact_rows"] = replay.slipping_rows;
+  json["rows_without_contact_percent"] =
+      100.0 * static_cast<double>(replay.rows_without_contact) / static_cast<double>(log.rows.size());
   json["gaps"] = replay.gaps;
   json["imu_invalid"] = replay.imu_invalid;
   json["final_position_sigma_mm"] = vector(1e3 * last.covariance.diagonal().head<3>().cwiseSqrt());

@@ -227,6 +227,20 @@ TEST(EstimateReplay, ImuBeyondTheModulesRange_IsCountedAndNotFelt) {
   EXPECT_LT(score(log, result).position_rmse_m, clean.position_rmse_m + 2e-3);
 }
 
+TEST(EstimateReplay, ContactsNoSurerThanAsLikelyAsNot_StillHoldTheRobot) {
+  WalkSpec spec;
+  spec.steps = 2;
+  EstimateLog log = climb_log(spec);
+  for (LogRow& row : log.rows) {
+    for (double& contact : row.contact) contact *= 0.6;
+  }
+  const Replay result = replay(log, {}, {});
+  EXPECT_EQ(result.rows_without_contact, 0U);
+  EXPECT_LT(worst_error_m(log, result), 0.05);
+  for (LogRow& row : log.rows) row.contact.fill(0.1);
+  EXPECT_EQ(replay(log, {}, {}).rows_without_contact, log.rows.size());
+}
+
 TEST(EstimateReplay, LioWithoutDelay_IsAccepted_AtAnyRateOfRows) {
   WalkSpec spec;
   spec.steps = 1;
@@ -361,6 +375,10 @@ TEST_F(EstimateCommand, StandingLog_WritesScoresAndOneRowPerRow) {
   EXPECT_EQ(line.empty(), true);
 }
 
+TEST_F(EstimateCommand, BlankLinesAtTheEnd_AreNoRows) {
+  EXPECT_EQ(call({"estimate", write("log.csv", log_text(20) + "\n  \n\r\n\n")}), kExitPass) << err_;
+}
+
 TEST_F(EstimateCommand, BadLogs_AreNamedInOneSentenceWithTheirLine) {
   const std::string good = log_text(5);
   const auto spoilt = [&good](int line, const std::string& text) {
@@ -386,6 +404,8 @@ TEST_F(EstimateCommand, BadLogs_AreNamedInOneSentenceWithTheirLine) {
       {spoilt(1, "t_s,gyro_x_radps"), "line 2"},
       {spoilt(1, swapped("t_s", "t_x")), "\"t_s\" is missing"},
       {spoilt(1, swapped("gyro_x_radps", "gyro_x")), "is missing"},
+      {spoilt(1, swapped("truth_px_m,", "px_m,")), "\"truth_px_m\" is missing"},
+      {spoilt(1, swapped("truth_qz", "qz")), "\"truth_qz\" is missing"},
       {spoilt(1, swapped("gyro_y_radps", "gyro_x_radps")), "twice"},
       {spoilt(4, "100.004,0,0"), "line 4: has 3 values"},
       {spoilt(4, row + ",1"), "line 4: has 26 values"},

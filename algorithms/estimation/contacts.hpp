@@ -23,8 +23,8 @@ class ContactEstimator {
     double force_standing_n = 25.0;  // at and above: stands (a foot that touches weighs at least its own leg)
     double force_delay_s = 0.006;    // of the sensor
     double settle_s = 0.006;         // blanking at touch-down: from 0 to 1 at the earliest in this time
-    double stated_standing = 0.9;    // a stated probability at and above: stands ...
-    double stated_air = 0.8;         // ... until it falls below this
+    double stated_standing = 0.5;    // a stated probability at and above: stands ...
+    double stated_air = 0.4;         // ... until it falls below this
     double flicker_s = 0.003;        // a stated contact that ends fades in this time
     double stuck_swing_s = 0.15;     // a planned swing whose force never went away stands after all
   };

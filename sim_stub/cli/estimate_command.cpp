@@ -43,6 +43,9 @@ void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
   std::snprintf(line, sizeof line, "%zu rows, %.3f s; start: %s; feet's noise %.2f mm\n", log.rows.size(),
                 seconds(log.rows.back().stamp_ns), name_of(replay.start), 1e3 * replay.foot_position_sigma_m);
   out << line;
+  if (replay.rows_without_contact == log.rows.size()) {
+    out << "No foot ever stands (contact of 0.5 or more): this is dead reckoning by the IMU alone.\n";
+  }
   if (!log.has_truth) {
     out << "No truth columns: nothing is scored.\n";
     return;
@@ -78,7 +81,7 @@ CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
                    "(R = Rz Ry Rx)")
       ->expected(6)
       ->type_name("X Y Z ROLL PITCH YAW");
-  estimate->add_option("--lio-tau", a.lio_tau_s, "Time constant of the offset's low-pass, s; 0: the module's own")
+  estimate->add_option("--lio-tau", a.lio_tau_s, "Time constant of the offset's low-pass, s; 0: that for logs, 1 s")
       ->type_name("TAU");
   estimate->add_option("--json", a.json, "Scores, biases, innovations, rejections")->type_name("OUT.json");
   estimate->add_option("--csv", a.csv, "Pose, twist, sigmas, contact probabilities, LIO's age, row by row")
