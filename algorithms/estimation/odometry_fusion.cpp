@@ -104,8 +104,9 @@ void OdometryFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m,
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
   const Vec3 turn_rad = so3_log(wanted.R * now.R.transpose());
-  const double move_share = share_within(move_m.norm(), params_.slew_m);
-  const double turn_share = share_within(turn_rad.norm(), params_.slew_rad);
+  const double slew_s = std::min(dt_s, params_.max_slew_s);
+  const double move_share = share_within(move_m.norm(), params_.slew_mps * slew_s);
+  const double turn_share = share_within(turn_rad.norm(), params_.slew_radps * slew_s);
   if (move_share >= 1.0 && turn_share >= 1.0) {
     world_T_odom_ = fused_world_T_odom_;
   } else {

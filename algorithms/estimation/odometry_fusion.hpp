@@ -67,8 +67,9 @@ class OdometryFusion {
     double max_jump_m = 0.5;
     double max_jump_rad = 0.3;
     std::uint32_t realign_count = 20;  // jumped poses in a row that agree among themselves
-    double slew_m = 2e-4;              // most that one tick moves the fused pose by
-    double slew_rad = 3.5e-4;          // 0.02 deg
+    double slew_mps = 0.1;             // most that the fused pose moves by: 0.2 mm in a tick of 2 ms ...
+    double slew_radps = 0.175;         // ... and 0.02 deg
+    double max_slew_s = 0.01;          // longer ticks move it by no more than one of these: 1 mm
     FusionUncertainty::Params uncertainty;
   };
   void reset(const Params& params) noexcept;
