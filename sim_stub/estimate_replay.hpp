@@ -41,7 +41,8 @@ struct Replay {
   std::uint32_t gaps = 0;  // rows that came after more than 50 ms
   std::uint32_t slipping_rows = 0;
   std::array<std::uint32_t, kLioVerdictCount> lio{};
-  double largest_slew_m = 0.0;  // most that one tick moved the fused pose against the odometry
+  std::size_t lio_not_arrived = 0;  // by the last row
+  double largest_slew_m = 0.0;      // most that one tick moved the fused pose against the odometry
 };
 
 [[nodiscard]] Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options);

@@ -114,6 +114,7 @@ TEST_F(EstimatorLioTest, BadPoses_EveryKind_HasItsOwnCounterAndDoesNotMoveTheWor
   };
   send([](LioSample& s) { s.lio_T_lidar.p_m.x() = kNaN; });
   send([](LioSample& s) { s.lio_T_lidar.R(1, 1) = kNaN; });
+  send([](LioSample& s) { s.lio_T_lidar.p_m.z() = 2e5; });
   send([](LioSample& s) { s.lio_T_lidar.R *= 1.1; });
   send([](LioSample& s) { s.lio_T_lidar.R.col(0) *= -1.0; });
   send([](LioSample& s) { s.position_sigma_m.x() = -1.0; });
@@ -130,6 +131,7 @@ TEST_F(EstimatorLioTest, BadPoses_EveryKind_HasItsOwnCounterAndDoesNotMoveTheWor
     return estimator_.counters().lio_of(verdict) - before[static_cast<std::size_t>(verdict)];
   };
   EXPECT_EQ(counted(LioVerdict::kNonFinite), 2U);
+  EXPECT_EQ(counted(LioVerdict::kOutOfRange), 1U);
   EXPECT_EQ(counted(LioVerdict::kNotRotation), 2U);
   EXPECT_EQ(counted(LioVerdict::kCovariance), 3U);
   EXPECT_EQ(counted(LioVerdict::kFuture), 1U);

@@ -40,18 +40,18 @@ void OdometryFusion::reset(const Params& params) noexcept {
 }
 
 LioVerdict OdometryFusion::check(const LioSample& sample, std::int64_t now_ns) const noexcept {
-  if (!math::all_finite(sample.lio_T_lidar.R) || !math::all_finite(sample.lio_T_lidar.p_m) ||
-      sample.lio_T_lidar.p_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) {
+  if (!math::all_finite(sample.lio_T_lidar.R) || !math::all_finite(sample.lio_T_lidar.p_m)) {
     return LioVerdict::kNonFinite;
   }
+  if (sample.lio_T_lidar.p_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) return LioVerdict::kOutOfRange;
   if (!is_rotation(sample.lio_T_lidar.R, kOrthonormalTolerance)) return LioVerdict::kNotRotation;
   if (!plausible_sigma(sample.position_sigma_m, params_.max_position_sigma_m) ||
       !plausible_sigma(sample.rotation_sigma_rad, params_.max_rotation_sigma_rad)) {
     return LioVerdict::kCovariance;
   }
   if (sample.stamp_ns > now_ns) return LioVerdict::kFuture;
-  if (sample.stamp_ns <= last_stamp_ns_) return LioVerdict::kOrder;
   if (seconds(now_ns - sample.stamp_ns) > params_.max_age_s) return LioVerdict::kTooOld;
+  if (sample.stamp_ns <= last_stamp_ns_) return LioVerdict::kOrder;
   return LioVerdict::kAccepted;
 }
 
