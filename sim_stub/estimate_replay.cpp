@@ -240,7 +240,9 @@ Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const Repl
     estimator->step(i);  // first, so that a pose stamped with this row finds it
     for (; next < lio.size() && lio[next].arrival_ns <= now_ns; ++next) estimator->add_lio(lio[next], now_ns);
   }
-  return estimator->take();
+  Replay result = estimator->take();
+  result.lio_not_arrived = lio.size() - next;
+  return result;
 }
 
 }  // namespace polygmap::sim

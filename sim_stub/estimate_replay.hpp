@@ -43,7 +43,8 @@ struct Replay {
   std::uint32_t slipping_rows = 0;
   std::uint32_t rows_without_contact = 0;
   std::array<std::uint32_t, kLioVerdictCount> lio{};
-  double largest_slew_m = 0.0;  // most that one tick moved the fused pose against the odometry
+  std::size_t lio_not_arrived = 0;  // by the last row
+  double largest_slew_m = 0.0;      // most that one tick moved the fused pose against the odometry
 };
 
 // False: the log's numbers, each possible by itself, broke the filter.

@@ -20,9 +20,10 @@ Json vector(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
 Json lio_counts(const std::vector<LioRow>& lio, const Replay& replay) {
   constexpr std::array<const char*, kLioVerdictCount> kNames{"accepted", "non_finite", "not_rotation", "covariance",
                                                              "order",    "future",     "too_old",      "no_odometry",
-                                                             "jump",     "realigned"};
+                                                             "jump",     "realigned",  "out_of_range"};
   Json counts{{"poses", lio.size()}};
   for (std::size_t v = 0; v < kLioVerdictCount; ++v) counts[kNames[v]] = replay.lio[v];
+  counts["not_arrived"] = replay.lio_not_arrived;
   return counts;
 }
 

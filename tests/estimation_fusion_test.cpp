@@ -123,8 +123,8 @@ TEST_F(FusionTest, Slew_YawCorrectedFiftyMetresFromTheOrigin_BaseMovesByNoMoreTh
     const Transform before = fusion_.world_T_odom();
     fusion_.tick(odom_T_base, step_m, kTick_s);
     const Transform by_odometry = before * odom_T_base, now = fusion_.world_T_odom() * odom_T_base;
-    ASSERT_LE((now.p_m - by_odometry.p_m).norm(), params_.slew_m * (1.0 + 1e-6));
-    ASSERT_LE(so3_log(by_odometry.R.transpose() * now.R).norm(), params_.slew_rad * (1.0 + 1e-6));
+    ASSERT_LE((now.p_m - by_odometry.p_m).norm(), params_.slew_mps * kTick_s * (1.0 + 1e-6));
+    ASSERT_LE(so3_log(by_odometry.R.transpose() * now.R).norm(), params_.slew_radps * kTick_s * (1.0 + 1e-6));
     corrected_m += (now.p_m - by_odometry.p_m).norm();
     offset_moved_m = std::max(offset_moved_m, (fusion_.world_T_odom().p_m - before.p_m).norm());
   }
@@ -134,7 +134,8 @@ TEST_F(FusionTest, Slew_YawCorrectedFiftyMetresFromTheOrigin_BaseMovesByNoMoreTh
   const Transform arrived = fusion_.world_T_odom();
   tick(odom_T_base, 1);
   EXPECT_EQ(arrived.p_m, fusion_.world_T_odom().p_m);  // it gets there
-  EXPECT_GT(offset_moved_m, 10.0 * params_.slew_m);    // a limit on the transform's own origin would have been another
+  EXPECT_GT(offset_moved_m,
+            10.0 * params_.slew_mps * kTick_s);  // a limit on the transform's own origin would have been another
 }
 
 TEST_F(FusionTest, Slew_AfterLongSilence_NoTickMovesTheFusedPoseByMoreThanTheBound) {
@@ -147,13 +148,25 @@ TEST_F(FusionTest, Slew_AfterLongSilence_NoTickMovesTheFusedPoseByMoreThanTheBou
   for (int i = 0; i < 500; ++i) {
     fusion_.tick(drifted, Vec3::Zero(), kTick_s);
     const Transform now = fusion_.world_T_odom() * drifted;
-    EXPECT_LE((now.p_m - before.p_m).norm(), params_.slew_m * (1.0 + 1e-9));
-    EXPECT_LE(so3_log(before.R.transpose() * now.R).norm(), params_.slew_rad * (1.0 + 1e-6));
+    EXPECT_LE((now.p_m - before.p_m).norm(), params_.slew_mps * kTick_s * (1.0 + 1e-9));
+    EXPECT_LE(so3_log(before.R.transpose() * now.R).norm(), params_.slew_radps * kTick_s * (1.0 + 1e-6));
     moved_m += (now.p_m - before.p_m).norm();
     before = now;
   }
   const double gain = complementary_gain(params_.max_gap_s, params_.tau_s);  // not 20 s: no single pose decides
   EXPECT_NEAR(moved_m, gain * (drifted.p_m - kPose.p_m).norm(), 1e-3);
+}
+
+TEST_F(FusionTest, Slew_TicksOfAnyLength_IsARateAndNoTickMovesByMoreThanOneMillimetre) {
+  align();
+  const Transform drifted = Transform{Mat3::Identity(), Vec3{0.05, 0.03, 0}} * kPose;
+  now_ns_ += 20 * kNsPerS;
+  ASSERT_EQ(feed(kPose, drifted), LioVerdict::kAccepted);
+  for (const double dt_s : {0.001, 0.002, 0.005, 0.5}) {
+    const Transform before = fusion_.world_T_odom() * drifted;
+    fusion_.tick(drifted, Vec3::Zero(), dt_s);
+    EXPECT_NEAR((fusion_.world_T_odom() * drifted.p_m - before.p_m).norm(), std::min(0.1 * dt_s, 1e-3), 1e-9) << dt_s;
+  }
 }
 
 TEST_F(FusionTest, FirstPose_ContradictedByTheSecond_IsThrownAway) {

@@ -59,8 +59,8 @@ class EstimatorLioTest : public ::testing::Test {
   // Beyond the odometry's own motion, at the base, in the worst tick.
   void expect_no_step_beyond_the_slew_limit() const {
     const OdometryFusion::Params params;
-    EXPECT_LE(most_slewed_m_, params.slew_m * (1.0 + 1e-6));
-    EXPECT_LE(most_slewed_rad_, params.slew_rad * (1.0 + 1e-6));
+    EXPECT_LE(most_slewed_m_, params.slew_mps * seconds(kTick_ns) * (1.0 + 1e-6));
+    EXPECT_LE(most_slewed_rad_, params.slew_radps * seconds(kTick_ns) * (1.0 + 1e-6));
   }
   void silent_in_the_climb(double silent_s, int steps);
   auto deliver() {
@@ -114,6 +114,7 @@ TEST_F(EstimatorLioTest, BadPoses_EveryKind_HasItsOwnCounterAndDoesNotMoveTheWor
   };
   send([](LioSample& s) { s.lio_T_lidar.p_m.x() = kNaN; });
   send([](LioSample& s) { s.lio_T_lidar.R(1, 1) = kNaN; });
+  send([](LioSample& s) { s.lio_T_lidar.p_m.z() = 2e5; });
   send([](LioSample& s) { s.lio_T_lidar.R *= 1.1; });
   send([](LioSample& s) { s.lio_T_lidar.R.col(0) *= -1.0; });
   send([](LioSample& s) { s.position_sigma_m.x() = -1.0; });
@@ -130,6 +131,7 @@ TEST_F(EstimatorLioTest, BadPoses_EveryKind_HasItsOwnCounterAndDoesNotMoveTheWor
     return estimator_.counters().lio_of(verdict) - before[static_cast<std::size_t>(verdict)];
   };
   EXPECT_EQ(counted(LioVerdict::kNonFinite), 2U);
+  EXPECT_EQ(counted(LioVerdict::kOutOfRange), 1U);
   EXPECT_EQ(counted(LioVerdict::kNotRotation), 2U);
   EXPECT_EQ(counted(LioVerdict::kCovariance), 3U);
   EXPECT_EQ(counted(LioVerdict::kFuture), 1U);
@@ -174,8 +176,8 @@ TEST_F(EstimatorLioTest, SilenceOf4s_OnTheStairs_SigmaGrowsAndTheReturnIsSlewed)
 TEST_F(EstimatorLioTest, SilenceOf40s_OnTheStairs_ErrorStaysWithinThreeSigmaAndTheReturnIsSlewed) {
   silent_in_the_climb(40.0, 17);
   EXPECT_LT(worst_m_, 0.03);
-  EXPECT_LT(estimator_.state().position_sigma_m.maxCoeff(), 0.02);    // LIO is believed again
-  EXPECT_GT(most_slewed_m_, OdometryFusion::Params{}.slew_m * 0.99);  // and the limit was needed
+  EXPECT_LT(estimator_.state().position_sigma_m.maxCoeff(), 0.02);                          // LIO is believed again
+  EXPECT_GT(most_slewed_m_, OdometryFusion::Params{}.slew_mps * seconds(kTick_ns) * 0.99);  // and the limit was needed
 }
 
 TEST_F(EstimatorLioTest, JumpsAndStampsOfTheFuture_OnTheStairs_AreCountedAndThePoseDoesNotStep) {

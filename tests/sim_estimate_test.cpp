@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <random>
 #include <sstream>
 
@@ -168,13 +169,22 @@ TEST(EstimateReplay, LateLioWithOutliersAndFutureStamps_IsCountedAndNeverMakesAS
   std::vector<LioRow> lio = lio_of(log, 7);
   lio[60].pose.p_m.x() += 0.5;
   lio[70].stamp_ns += kNsPerS;
+  LioRow early = lio.front(), old = lio.front();  // both of before the log, where no odometry is known
+  early.stamp_ns = -50 * kNsPerMs;
+  old.stamp_ns = -kNsPerS;
+  early.arrival_ns = old.arrival_ns = 0;
+  lio.insert(lio.begin(), {early, old});
   const ReplayOptions options;
   const Replay result = replay(log, lio, options);
   const auto count = [&result](LioVerdict verdict) { return result.lio[static_cast<std::size_t>(verdict)]; };
   EXPECT_EQ(count(LioVerdict::kJump), 1U);
   EXPECT_EQ(count(LioVerdict::kFuture), 1U);
-  EXPECT_GT(count(LioVerdict::kAccepted), lio.size() - 6);
-  EXPECT_LE(result.largest_slew_m, options.odometry.fusion.slew_m + 1e-9);
+  EXPECT_EQ(count(LioVerdict::kNoOdometry), 1U);
+  EXPECT_EQ(count(LioVerdict::kTooOld), 1U);
+  EXPECT_GT(count(LioVerdict::kAccepted), lio.size() - 8);
+  EXPECT_GT(result.lio_not_arrived, 0U);
+  EXPECT_EQ(std::accumulate(result.lio.begin(), result.lio.end(), result.lio_not_arrived), lio.size());
+  EXPECT_LE(result.largest_slew_m, options.odometry.fusion.slew_mps * seconds(SyntheticWalk::kTick_ns) + 1e-9);
   EXPECT_EQ(result.ticks[10].lio_age_ns, -1);
   EXPECT_LT(result.ticks.back().lio_age_ns, 210 * kNsPerMs);
 }

@@ -40,18 +40,18 @@ void OdometryFusion::reset(const Params& params) noexcept {
 }
 
 LioVerdict OdometryFusion::check(const LioSample& sample, std::int64_t now_ns) const noexcept {
-  if (!math::all_finite(sample.lio_T_lidar.R) || !math::all_finite(sample.lio_T_lidar.p_m) ||
-      sample.lio_T_lidar.p_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) {
+  if (!math::all_finite(sample.lio_T_lidar.R) || !math::all_finite(sample.lio_T_lidar.p_m)) {
     return LioVerdict::kNonFinite;
   }
+  if (sample.lio_T_lidar.p_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) return LioVerdict::kOutOfRange;
   if (!is_rotation(sample.lio_T_lidar.R, kOrthonormalTolerance)) return LioVerdict::kNotRotation;
   if (!plausible_sigma(sample.position_sigma_m, params_.max_position_sigma_m) ||
       !plausible_sigma(sample.rotation_sigma_rad, params_.max_rotation_sigma_rad)) {
     return LioVerdict::kCovariance;
   }
   if (sample.stamp_ns > now_ns) return LioVerdict::kFuture;
-  if (sample.stamp_ns <= last_stamp_ns_) return LioVerdict::kOrder;
   if (seconds(now_ns - sample.stamp_ns) > params_.max_age_s) return LioVerdict::kTooOld;
+  if (sample.stamp_ns <= last_stamp_ns_) return LioVerdict::kOrder;
   return LioVerdict::kAccepted;
 }
 
@@ -104,8 +104,9 @@ void OdometryFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m,
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
   const Vec3 turn_rad = so3_log(wanted.R * now.R.transpose());
-  const double move_share = share_within(move_m.norm(), params_.slew_m);
-  const double turn_share = share_within(turn_rad.norm(), params_.slew_rad);
+  const double slew_s = std::min(dt_s, params_.max_slew_s);
+  const double move_share = share_within(move_m.norm(), params_.slew_mps * slew_s);
+  const double turn_share = share_within(turn_rad.norm(), params_.slew_radps * slew_s);
   if (move_share >= 1.0 && turn_share >= 1.0) {
     world_T_odom_ = fused_world_T_odom_;
   } else {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "algorithms/core/samples.hpp"
 #include "algorithms/core/transform.hpp"
@@ -35,8 +36,9 @@ enum class LioVerdict : std::uint8_t {
   kNoOdometry,  // none known at its stamp: earlier than the standstill at the start, or a sensor was silent
   kJump,        // too far from the prediction
   kRealigned,   // accepted: a lasting jump of LIO's own world was taken as its new alignment
+  kOutOfRange,  // finite, but farther off than any LIO goes
 };
-inline constexpr std::size_t kLioVerdictCount = 10;
+inline constexpr std::size_t kLioVerdictCount = 11;
 
 // How far accepted LIO poses lay from their predictions, once aligned: x, y, z in m and yaw in rad, world axes.
 // Normalised: squared, over its variance; 1 in the mean where all sigmas are honest.
@@ -67,8 +69,9 @@ class OdometryFusion {
     double max_jump_m = 0.5;
     double max_jump_rad = 0.3;
     std::uint32_t realign_count = 20;  // jumped poses in a row that agree among themselves
-    double slew_m = 2e-4;              // most that one tick moves the fused pose by
-    double slew_rad = 3.5e-4;          // 0.02 deg
+    double slew_mps = 0.1;             // most that the fused pose moves by: 0.2 mm in a tick of 2 ms ...
+    double slew_radps = 0.175;         // ... and 0.02 deg
+    double max_slew_s = 0.01;          // longer ticks move it by no more than one of these: 1 mm
     FusionUncertainty::Params uncertainty;
   };
   void reset(const Params& params) noexcept;
@@ -116,7 +119,7 @@ class OdometryFusion {
   Transform world_T_odom_;        // published
   Transform jumped_lio_T_odom_;
   std::uint32_t jumped_count_ = 0;
-  std::int64_t last_stamp_ns_ = -1;  // of any pose that was in order
+  std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();  // of any pose that was in order
   std::int64_t last_accepted_ns_ = -1;
   FusionUncertainty uncertainty_;
   Vec3 position_sigma_m_ = Vec3::Zero();
