@@ -53,11 +53,16 @@ struct RowPlane {
   }
 };
 
+struct PixelGains {
+  Reach gain, residual;
+};
+
 // What every pixel says for the plane beyond and against our own: twice the negative logarithms of the likelihoods, but
 // for a constant. Nothing where there is no data.
-void weigh(const SurfaceSides::Params& params, const RawPicture& picture, const RowPlane& own, const RowPlane& other,
-           std::int32_t first, std::int32_t out, const std::array<std::uint16_t, kReach_px>& raw, Reach& gain,
-           Reach& residual) noexcept {
+PixelGains weigh(const SurfaceSides::Params& params, const RawPicture& picture, const RowPlane& own,
+                 const RowPlane& other, std::int32_t first, std::int32_t out,
+                 const std::array<std::uint16_t, kReach_px>& raw) noexcept {
+  PixelGains gains;
   static_assert(kReach_px % Wide::nlanes == 0);
   const auto all = [](float x) { return cv::vx_setall_f32(x); };
   static constexpr Reach kSteps = [] {
@@ -79,9 +84,10 @@ void weigh(const SurfaceSides::Params& params, const RawPicture& picture, const 
       const Wide o = other.residual(column, depth * unit_m);
       beyond = cv::v_min(o * o + more, most);
     }
-    cv::v_store(gain.data() + i, (cv::v_min(r * r, most) - beyond) & (depth >= least) & (depth <= largest));
-    cv::v_store(residual.data() + i, r);
+    cv::v_store(gains.gain.data() + i, (cv::v_min(r * r, most) - beyond) & (depth >= least) & (depth <= largest));
+    cv::v_store(gains.residual.data() + i, r);
   }
+  return gains;
 }
 
 }  // namespace
@@ -124,8 +130,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
     raw[static_cast<std::size_t>(count++)] = raw_->row(row)[c];
   }
   if (count < kInside_px) return Ending::kHidden;  // by the robot's own body
-  Reach gain, residual;
-  weigh(params_, *raw_, own, other, first, out, raw, gain, residual);
+  const PixelGains gains = weigh(params_, *raw_, own, other, first, out, raw);
   // The boundary with the least cost; between equally good ones (a pixel without data or of neither) in their middle.
   constexpr float kTie = 1e-3F;
   float sum = 0.0F, least = 1e9F;
@@ -136,7 +141,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
     const auto at = static_cast<std::size_t>(i);
     const bool measured = raw_->range.valid(raw[at]);
     measured_beyond = measured_beyond || measured;
-    sum += gain[at];
+    sum += gains.gain[at];
     if (sum < least - kTie) {
       least = sum;
       from = to = i;
@@ -144,7 +149,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
       measured_beyond = false;
     } else if (sum < least + kTie && to == i - 1) {
       to = i;
-      if (measured) of_neither += residual[at] < 0.0F ? -1 : 1;
+      if (measured) of_neither += gains.residual[at] < 0.0F ? -1 : 1;
       measured_beyond = false;
     }
   }
