@@ -38,7 +38,6 @@ class FootMotion {
 
   // Random walk of the contact that its motion stands for, m^2/s, 0 at rest.
   [[nodiscard]] double walk_m2ps(std::size_t foot) const noexcept { return feet_[foot].walk_m2ps; }
-  [[nodiscard]] const Vec3& odom_v_foot_mps(std::size_t foot) const noexcept { return feet_[foot].odom_v_mps; }
   // White noise of one foot position, per axis, measured from its jitter.
   [[nodiscard]] double position_sigma_m() const noexcept { return position_sigma_m_; }
 
