@@ -261,7 +261,7 @@ class PipelineAmongBoxes : public PipelineTest {
     params.map.unconfirmed_age_s = 1000.0;
     return params;
   }
-  void show(int rows, int columns, double lowest_m) {
+  void feed(int rows, int columns, double lowest_m) {
     constexpr double kStep_m = 0.02;  // no two of them are one to the map
     test::DepthScene scene;
     scene.world_T_camera = Transform{Mat3::Identity(), Vec3{0, 0, kNominalBaseHeight_m}} * base_T_camera();
@@ -274,9 +274,34 @@ class PipelineAmongBoxes : public PipelineTest {
       }
     }
     camera_.feed(clock_.now_ns(), test::render_for_robot(scene));
+  }
+  void show(int rows, int columns, double lowest_m) {
+    feed(rows, columns, lowest_m);
     stand(100);
   }
 };
+
+// The extraction reads the driver's buffer in place.
+TEST_F(PipelineAmongBoxes, FrameUnderExtraction_IsHeldUntilItsSurfacesAreOut) {
+  stand(kInitialised_ticks);
+  show(2, 3, -0.1);
+  const PerceptionLane& perception = module_.pipeline().perception();
+  const std::int64_t before_ns = perception.surface_frame().stamp_ns;
+  feed(2, 3, -0.1);
+  const std::int64_t fed_ns = clock_.now_ns();
+  int held_ticks = 0;
+  for (int i = 0; i < 100 && perception.surface_frame().stamp_ns == before_ns; ++i) {
+    stand(1);
+    if (perception.extractor().busy()) {
+      ++held_ticks;
+      EXPECT_TRUE(camera_.holding());
+    }
+  }
+  EXPECT_GE(held_ticks, 1);
+  EXPECT_FALSE(perception.extractor().busy());
+  EXPECT_EQ(perception.surface_frame().stamp_ns, fed_ns);
+  EXPECT_FALSE(camera_.holding());
+}
 
 TEST_F(PipelineAmongBoxes, MoreSurfacesThanAFrameMayHave_IsCounted) {
   stand(kInitialised_ticks);

@@ -171,6 +171,27 @@ TEST_F(PolygonMapTest, MountKnownToAFifthOfADegree_EdgesAndHeightsAreAsVague) {
   EXPECT_NEAR(added(treads[1].tilt_sigma_rad, treads[0].tilt_sigma_rad), kMount_rad, 1e-5);
 }
 
+// What is learnt of the mount afterwards does not mend what was seen before, nor does coming nearer.
+TEST_F(PolygonMapTest, MountLearntAfterTheLastSighting_EdgesAndHeightsStayAsVague) {
+  constexpr double kMount_rad = 0.2 * kPi / 180.0;
+  const Stairs stairs{.width_m = 0.7};
+  const Transform camera = test::camera_of(on_floor_);
+  for (int i = 0; i < 30; ++i) {
+    stamp_ns_ += kFrame_ns;
+    fuse(test::seen_from(stairs, camera, stamp_ns_, {}, random_), camera, 0.0, kMount_rad);
+  }
+  ASSERT_NE(level_at(stairs.rise_m), nullptr);
+  const SurfacePatch before = level_at(stairs.rise_m)->surface;
+  const Transform turned_away = test::camera_of({rotation_z(kPi), on_floor_.p_m + Vec3{0.3, 0.0, stairs.rise_m}});
+  stamp_ns_ += kFrame_ns;
+  fuse(test::seen_from(stairs, turned_away, stamp_ns_, {}, random_), turned_away, 0.0, 0.0);
+  ASSERT_NE(level_at(stairs.rise_m), nullptr);
+  const SurfacePatch after = level_at(stairs.rise_m)->surface;
+  EXPECT_GE(after.nosing.sigma_m, before.nosing.sigma_m);
+  EXPECT_GE(after.offset_sigma_m, before.offset_sigma_m);
+  EXPECT_GE(after.tilt_sigma_rad, before.tilt_sigma_rad);
+}
+
 // Beside a map that was spared that frame: as good at once, and the same 2 s later.
 TEST_F(PolygonMapTest, OneFrame40mmOff_IsForgotten) {
   const Stairs stairs{.width_m = 0.7};

@@ -32,6 +32,11 @@ inline constexpr double kMinSeenSigma_m = 0.0005;  // a frame that claims more t
 [[nodiscard]] bool end_observed(const ConvexPolygon& polygon, const std::array<EdgeKind, kMaxPolygonVertices>& edges,
                                 const Vec2& u, double support) noexcept;
 
+// Where the camera was at the last sighting, and how well its mount was known then.
+struct Viewpoint {
+  Vec3 world_p_camera_m = Vec3::Zero();
+  double mount_sigma_rad = 0.0;
+};
 // A seen line, local coordinates.
 struct SeenLine {
   Vec2 a_m, b_m;
@@ -42,6 +47,7 @@ struct TrackedLine {
   Vec2 state = Vec2::Zero();
   Mat2 information = Mat2::Zero();
   std::int64_t seen_ns = 0;
+  Viewpoint seen_from;
   std::uint32_t sightings = 0;
   std::uint32_t outliers = 0;
   [[nodiscard]] double at_m(double y_m) const noexcept { return state[0] + state[1] * y_m; }
@@ -78,6 +84,7 @@ struct MapTrack {
   std::uint32_t outliers = 0;  // consecutive sightings of its plane elsewhere
   std::int64_t first_seen_ns = 0;
   std::int64_t last_seen_ns = 0;
+  Viewpoint seen_from;
   Transform world_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up
   double offset_information = 0.0;
   double tilt_information = 0.0;

@@ -141,6 +141,7 @@ class PolygonMap {
   [[nodiscard]] bool hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept;
   [[nodiscard]] double faded(std::int64_t since_ns) const noexcept;
   void write(const MapTrack& track, MapPolygon& out) const noexcept;
+  [[nodiscard]] Viewpoint viewpoint() const noexcept { return {map_T_camera_.p_m, view_.mount_sigma_rad}; }
   void write_sigmas(const MapTrack& track, SurfacePatch& out) const noexcept;
 
   Params params_;

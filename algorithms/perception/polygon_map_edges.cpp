@@ -97,6 +97,7 @@ void PolygonMap::update_line(TrackedLine& line, const SeenLine& seen) noexcept {
   }
   line.state += line.information.inverse() * gradient;
   line.seen_ns = newest_ns_;
+  line.seen_from = viewpoint();
   ++line.sightings;
 }
 

@@ -65,22 +65,25 @@ void PolygonMap::write(const MapTrack& track, MapPolygon& out) const noexcept {
 }
 
 // Against the robot, which stands where its map has it: the error of the pose is theirs in common, that of the camera's
-// mount is not. It turns what is seen about the camera, a tread's height by its distance, an edge by its depth below.
+// mount is not. It turned what was seen about the camera: a tread's height by its distance, an edge by its depth below.
 void PolygonMap::write_sigmas(const MapTrack& track, SurfacePatch& out) const noexcept {
-  const double common_m2 = math::square(params_.systematic_sigma_m), mount_rad2 = math::square(view_.mount_sigma_rad);
-  const auto sigma = [&](double variance_m2, double arm2_m2, std::int64_t seen_ns) {
-    return math::sqrt(variance_m2 + common_m2 + mount_rad2 * arm2_m2 +
+  const auto sigma = [&](double variance_m2, double turned_m2, std::int64_t seen_ns) {
+    return math::sqrt(variance_m2 + math::square(params_.systematic_sigma_m) + turned_m2 +
                       math::square(params_.drift.walk_m_per_sqrt_s) * seconds(newest_ns_ - seen_ns));
   };
-  const auto arm_m = [this](const Vec3& p_m) { return Vec3{p_m - map_T_camera_.p_m}; };
+  const Viewpoint& from = track.seen_from;
+  const double mount_rad2 = math::square(from.mount_sigma_rad);
+  const Vec3 arm_m = out.centroid_m - from.world_p_camera_m;
   out.offset_sigma_m =
-      sigma(1.0 / track.offset_information, out.normal.cross(arm_m(out.centroid_m)).squaredNorm(), track.last_seen_ns);
+      sigma(1.0 / track.offset_information, mount_rad2 * out.normal.cross(arm_m).squaredNorm(), track.last_seen_ns);
   out.tilt_sigma_rad = math::sqrt(1.0 / track.tilt_information + math::square(view_.tilt_sigma_rad) + mount_rad2);
   for (const auto& [line, edge] : {std::pair{&track.nosing, &out.nosing}, std::pair{&track.back, &out.back}}) {
     if (!edge->valid) continue;
     const Vec3 middle_m = 0.5 * (edge->a_m + edge->b_m);
     const double variance_m2 = line->variance_m2(local_xy(track.world_T_local, middle_m).y());
-    edge->sigma_m = sigma(std::min(variance_m2, 1.0), math::square(arm_m(middle_m).z()), line->seen_ns);
+    const double depth_m = middle_m.z() - line->seen_from.world_p_camera_m.z();
+    edge->sigma_m =
+        sigma(std::min(variance_m2, 1.0), math::square(line->seen_from.mount_sigma_rad * depth_m), line->seen_ns);
   }
 }
 

@@ -53,6 +53,7 @@ void PolygonMap::create() noexcept {
   track.kind = seen_.kind;
   track.sightings = 1;
   track.first_seen_ns = track.last_seen_ns = newest_ns_;
+  track.seen_from = viewpoint();
   const Vec3 normal = seen_.plane.normal;
   const Vec3 level = Vec3::UnitZ().cross(normal);  // horizontal; x of an upright surface, so that y is up
   // Optical axis and the picture's up together point ahead at any camera pitch.
@@ -122,6 +123,7 @@ void PolygonMap::admit(const MapTrack& track) noexcept {
 void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
   if (track.last_seen_ns != newest_ns_) ++track.sightings;
   track.last_seen_ns = newest_ns_;
+  track.seen_from = viewpoint();
   track.misses = 0;
   track.outliers = 0;
   track.rmse_m += 0.1 * (seen_.rmse_m - track.rmse_m);
