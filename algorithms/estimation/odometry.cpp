@@ -105,7 +105,7 @@ void Odometry::take_legs(const Legs& legs) noexcept {
     }
     // Where force says when a sole landed and kinematics where, its swing is no reason to let go of it.
     if (legs[foot].sole_known && (!contact.stands || contact.landed)) motion_.rest(foot);
-    const double doubt = 1.0 / std::max(contact.probability, 0.01) - 1.0;
+    const double doubt = std::max(params_.sure_contact / std::max(contact.probability, 0.01) - 1.0, 0.0);
     contact.walk_m2ps = motion_.walk_m2ps(foot) + params_.doubtful_walk_m2ps * doubt;
     stands = stands || contact.stands;
     rests = rests || (contact.stands && motion_.walk_m2ps(foot) <= 0.0);

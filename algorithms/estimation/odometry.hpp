@@ -29,7 +29,8 @@ class Odometry {
     double max_gap_s = 5.0;    // bridged by no more than this
     double coast_s = 1.0;      // the base is thought to stop within about this time when nothing is felt for long
     double lost_s = 0.25;      // a standing robot none of whose feet rest for so long has lost its velocity
-    double doubtful_walk_m2ps = 1e-3;  // random walk of a contact as likely as not: 1 mm in 1 ms
+    double sure_contact = 0.8;         // a probability at and above is as good as certain
+    double doubtful_walk_m2ps = 1e-3;  // random walk of a contact half as likely as that: 1 mm in 1 ms
   };
   // What is new since the last step. Rates hold over dt.
   struct Step {
