@@ -10,9 +10,11 @@ namespace polygmap::sim {
 namespace {
 
 constexpr std::int64_t kRingPeriod_ns = 2 * kNsPerMs;  // the ring holds half a second at this rate
-// A start without truth: still for this long, or the first acceleration must do.
-constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0;
-constexpr double kStillRate_radps = 0.1, kStillAccel_mps2 = 1.0, kStillMove_m = 0.01;
+// Standing still at the start, for so long at least and at most. What is noise is smoothed away, and the last of it is
+// left out: it was motion before it could be seen.
+constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0, kSmoothing_s = 0.05, kUnseenMotion_s = 0.15;
+constexpr double kStillRate_radps = 0.1, kStillAccel_mps2 = 1.0, kStillMove_m = 0.004;
+constexpr double kUnseenTurn_rad = 2e-4, kUnseenSpeed_mps = 5e-3;  // in that time
 
 Mat3 level_R_base(const Vec3& up) {
   const double roll_rad = std::atan2(up.y(), up.z());
@@ -20,23 +22,52 @@ Mat3 level_R_base(const Vec3& up) {
   return rotation_y(pitch_rad) * rotation_x(roll_rad);
 }
 
-// How the log begins, where no truth says so.
+// Means over the standstill at the start.
 struct Opening {
   Vec3 gyro_radps = Vec3::Zero(), accel_mps2 = Vec3::Zero();
   double still_s = 0.0;
 };
-Opening opening(const EstimateLog& log) {
-  Opening o;
+
+// Signals of one row, smoothed.
+struct Smoothed {
+  Vec3 gyro_radps = Vec3::Zero(), accel_mps2 = Vec3::Zero();
+  std::array<Vec3, kFootCount> base_p_foot_m{Vec3::Zero(), Vec3::Zero()};
+  void take(const LogRow& row, double share) {
+    gyro_radps += share * (row.gyro_radps - gyro_radps);
+    accel_mps2 += share * (row.accel_mps2 - accel_mps2);
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      base_p_foot_m[f] += share * (row.base_p_foot_m[f] - base_p_foot_m[f]);
+    }
+  }
+};
+
+std::int64_t end_of_standstill_ns(const EstimateLog& log) {
+  Smoothed now, mean;
   double count = 0.0;
-  const LogRow& first = log.rows.front();
+  std::int64_t last_ns = 0;
   for (const LogRow& row : log.rows) {
-    bool still = row.gyro_radps.cwiseAbs().maxCoeff() < kStillRate_radps &&
-                 std::abs(row.accel_mps2.norm() - kGravity_mps2) < kStillAccel_mps2 &&
+    count += 1.0;
+    const double dt_s = seconds(row.stamp_ns - last_ns);
+    now.take(row, std::max(1.0 / count, dt_s / (kSmoothing_s + dt_s)));
+    mean.take(row, 1.0 / count);
+    bool still = now.gyro_radps.cwiseAbs().maxCoeff() < kStillRate_radps &&
+                 std::abs(now.accel_mps2.norm() - kGravity_mps2) < kStillAccel_mps2 &&
                  seconds(row.stamp_ns) < kMaxStill_s;
     for (std::size_t f = 0; f < kFootCount; ++f) {
-      still = still && row.contact[f] >= 0.5 && (row.base_p_foot_m[f] - first.base_p_foot_m[f]).norm() < kStillMove_m;
+      still = still && row.contact[f] >= 0.5 && (now.base_p_foot_m[f] - mean.base_p_foot_m[f]).norm() < kStillMove_m;
     }
     if (!still) break;
+    last_ns = row.stamp_ns;
+  }
+  return last_ns;
+}
+
+Opening opening(const EstimateLog& log) {
+  const std::int64_t end_ns = end_of_standstill_ns(log) - static_cast<std::int64_t>(kUnseenMotion_s * 1e9);
+  Opening o;
+  double count = 0.0;
+  for (const LogRow& row : log.rows) {
+    if (row.stamp_ns > end_ns) break;
     count += 1.0;
     o.gyro_radps += (row.gyro_radps - o.gyro_radps) / count;
     o.accel_mps2 += (row.accel_mps2 - o.accel_mps2) / count;
@@ -62,6 +93,7 @@ class LogReplay {
     felt_.stamp_ns = -1;
     odometry_.reset(options.odometry);
     contacts_.reset({});
+    imu_noise_.reset();
     begin();
   }
 
@@ -85,6 +117,7 @@ class LogReplay {
     const LogRow before = felt_;
     if (odometry_.is_valid_imu(row.gyro_radps, row.accel_mps2)) {
       felt_ = row;
+      imu_noise_.update(row.stamp_ns, row.gyro_radps, row.accel_mps2);
     } else {
       ++result_.imu_invalid;
     }
@@ -96,6 +129,7 @@ class LogReplay {
       step.gyro_radps = 0.5 * (felt_.gyro_radps + before.gyro_radps);
       step.accel_mps2 = 0.5 * (felt_.accel_mps2 + before.accel_mps2);
       step.felt = felt_.stamp_ns >= 0 && seconds(row.stamp_ns - felt_.stamp_ns) <= options_.odometry.max_step_s;
+      step.imu_noise = imu_noise_.density();
       odometry_.step(step, legs_of(row), contacts_.feet(), {});
       const FusionUncertainty::Quantities variances = variances_of(odometry_.attitude().covariance());
       odometry_.fusion().grow((variances - variances_).cwiseMax(0.0));
@@ -127,24 +161,27 @@ class LogReplay {
 
   void begin() {
     const LogRow& first = log_.rows.front();
+    const Opening o = opening(log_);
+    const bool stood = o.still_s >= kMinStill_s;
     AttitudeFilter::Start start;
-    start.gyro_bias_sigma_radps = 0.005;
-    start.accel_bias_sigma_mps2 = 0.1;
+    start.gyro_bias_sigma_radps = stood ? kUnseenTurn_rad / o.still_s : options_.gyro_bias_sigma_radps;
+    start.accel_bias_sigma_mps2 = options_.accel_bias_sigma_mps2;
+    if (stood) start.gyro_bias_radps = o.gyro_radps;
     if (log_.has_truth) {
       start.odom_R_base = first.truth.true_T_base.R;
       // The filter's errors turn about its origin, so that is the start, wherever on earth the truth counts from.
       start_m_ = first.truth.true_T_base.p_m;
       start.odom_v_base_mps = first.truth.true_v_base_mps;
+      if (stood) {
+        start.accel_bias_mps2 = o.accel_mps2 - start.odom_R_base.transpose() * Vec3{0, 0, kGravity_mps2};
+        start.accel_bias_sigma_mps2 = kUnseenSpeed_mps / o.still_s;
+      }
     } else {
-      const Opening o = opening(log_);
-      const bool stood = o.still_s >= kMinStill_s;
       result_.start = stood ? StartSource::kStandstill : StartSource::kFirstAcceleration;
       start.odom_R_base = level_R_base(stood ? o.accel_mps2 : first.accel_mps2);
       for (const Vec3& foot_m : first.base_p_foot_m) {  // the feet's mean at height 0
         start.odom_p_base_m.z() -= (start.odom_R_base * foot_m).z() / static_cast<double>(kFootCount);
       }
-      if (stood) start.gyro_bias_radps = o.gyro_radps;
-      start.gyro_bias_sigma_radps = stood ? 1e-3 : start.gyro_bias_sigma_radps;
       start.tilt_sigma_rad = stood ? start.accel_bias_sigma_mps2 / kGravity_mps2 : 0.2;
       start.velocity_sigma_mps = stood ? 0.01 : 1.0;
     }
@@ -204,6 +241,7 @@ class LogReplay {
   FusionUncertainty::Quantities variances_;
   Odometry odometry_;
   ContactEstimator contacts_;
+  ImuNoise imu_noise_;
   StateRing ring_;
   StateEstimate now_;
   Vec3 start_m_ = Vec3::Zero();  // world minus the filter's axes
@@ -220,8 +258,9 @@ Odometry::Params log_params() {
   params.attitude.contact_walk_mprs = 1e-2;
   params.fusion.base_T_lidar = {};
   params.fusion.uncertainty = {0.0, 0.0, 1e-4, 1e-4};  // grows as the filter's own does, from the start's sigmas
-  params.fusion.tau_s = 2.0;                           // odometry of point feet turns away sooner than that of soles
-  params.fusion.default_position_sigma_m = 0.007;      // a log's LIO states none: between 5 and 10 mm
+  // As the module's 4 s are to its lidar's 10 mm: what comes through grows with LIO's noise, drift does not.
+  params.fusion.tau_s = 1.0;
+  params.fusion.tau_spm = 400.0;
   return params;
 }
 

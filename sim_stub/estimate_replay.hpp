@@ -16,6 +16,8 @@ namespace polygmap::sim {
 
 struct ReplayOptions {
   Odometry::Params odometry = log_params();  // its lidar mount: none, LIO gives the base's pose
+  // One sigma, where no standstill at the start says what they are.
+  double gyro_bias_sigma_radps = 0.005, accel_bias_sigma_mps2 = 0.1;
 };
 
 enum class StartSource : std::uint8_t { kTruth, kStandstill, kFirstAcceleration };

@@ -26,7 +26,7 @@ void AttitudeFilter::initialise(const Start& start, const std::array<LegMeasurem
   odom_p_base_m_ = start.odom_p_base_m;
   odom_v_base_mps_ = start.odom_v_base_mps;
   gyro_bias_radps_ = start.gyro_bias_radps;
-  accel_bias_mps2_.setZero();
+  accel_bias_mps2_ = start.accel_bias_mps2;
   gravity_mps2_ = start.gravity_mps2;
   P_.setZero();
   const Vec3 attitude_rad2 = Vec3{start.tilt_sigma_rad, start.tilt_sigma_rad, start.yaw_sigma_rad}.cwiseAbs2();
@@ -56,7 +56,8 @@ void AttitudeFilter::anchor(std::size_t foot, const LegMeasurement& leg) noexcep
   if (leg.sole_known) copy(of_foot(kSole, foot), kAttitude, math::square(params_.foot_sigma_rad));
 }
 
-void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion) noexcept {
+void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion,
+                             const ImuNoiseDensity& noise) noexcept {
   const Vec3 turn_rad = (gyro_radps - gyro_bias_radps_) * dt_s;
   constexpr double kLeg_m = 0.5;
   const double speed_mps = odom_v_base_mps_.norm() + kLeg_m * turn_rad.norm() / dt_s;
@@ -65,8 +66,10 @@ void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, dou
   const Vec3 odom_a_mps2 = force_mps2 - Vec3{0, 0, gravity_mps2_};
   const double dynamic_mpsrs = params_.dynamic_accel_share * odom_a_mps2.norm() * math::sqrt(dt_s);
   predict_covariance(
-      params_.gyro_noise_radprs + (motion == Motion::kUnfelt ? params_.lost_gyro_noise_radprs : 0.0),
-      params_.accel_noise_mpsrs + dynamic_mpsrs + (motion == Motion::kFelt ? 0.0 : params_.lost_accel_noise_mpsrs),
+      std::max(params_.gyro_noise_radprs, noise.gyro_radprs) +
+          (motion == Motion::kUnfelt ? params_.lost_gyro_noise_radprs : 0.0),
+      std::max(params_.accel_noise_mpsrs, noise.accel_mpsrs) + dynamic_mpsrs +
+          (motion == Motion::kFelt ? 0.0 : params_.lost_accel_noise_mpsrs),
       dt_s);
   odom_p_base_m_ += dt_s * (odom_v_base_mps_ + 0.5 * dt_s * odom_a_mps2);
   odom_v_base_mps_ += dt_s * odom_a_mps2;

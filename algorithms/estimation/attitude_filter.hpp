@@ -13,6 +13,7 @@
 #include <algorithm>
 
 #include "algorithms/estimation/contacts.hpp"
+#include "algorithms/estimation/imu_noise.hpp"
 #include "algorithms/estimation/leg_measurement.hpp"
 
 namespace polygmap {
@@ -20,8 +21,8 @@ namespace polygmap {
 class AttitudeFilter {
  public:
   struct Params {
-    double gyro_noise_radprs = 1e-4;  // rad/sqrt(s); 2e-3 rad/s at 500 Hz is 0.9e-4
-    double accel_noise_mpsrs = 3e-3;  // m/s/sqrt(s); 0.05 m/s^2 at 500 Hz is 2.2e-3
+    double gyro_noise_radprs = 1e-4;  // at least, rad/sqrt(s); 2e-3 rad/s at 500 Hz is 0.9e-4
+    double accel_noise_mpsrs = 3e-3;  // at least, m/s/sqrt(s); 0.05 m/s^2 at 500 Hz is 2.2e-3
     double lost_accel_noise_mpsrs = 2.0;
     double lost_gyro_noise_radprs = 0.1;   // of a walking base whose turning nobody feels: 0.03 rad in 0.1 s
     double dynamic_accel_share = 0.02;     // of what differs from gravity: sampling, scale, mount
@@ -44,6 +45,7 @@ class AttitudeFilter {
     Vec3 odom_p_base_m = Vec3::Zero();
     Vec3 odom_v_base_mps = Vec3::Zero();
     Vec3 gyro_bias_radps = Vec3::Zero();
+    Vec3 accel_bias_mps2 = Vec3::Zero();
     double gravity_mps2 = kGravity_mps2;
     double tilt_sigma_rad = 1e-4;
     double yaw_sigma_rad = 1e-4;
@@ -60,7 +62,9 @@ class AttitudeFilter {
     kVelocityLost,  // felt, but no foot has rested for so long that the velocity is not known
     kUnfelt         // the IMU is silent: rates are guesses
   };
-  void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion) noexcept;
+  // noise: as measured of this IMU.
+  void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion,
+               const ImuNoiseDensity& noise = {}) noexcept;
   // A foot that does not stand is anchored anew.
   void correct_by_feet(const std::array<LegMeasurement, kFootCount>& legs,
                        const std::array<FootContact, kFootCount>& contacts, double dt_s) noexcept;

@@ -82,6 +82,7 @@ class Estimator {
   Counters counters_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;
+  ImuNoise imu_noise_;
   ForceInference forces_;
   Odometry odometry_;
   StateRing ring_;

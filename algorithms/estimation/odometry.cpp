@@ -69,7 +69,7 @@ void Odometry::step(const Step& whole, const Legs& legs, const Contacts& contact
   const auto motion = !step.felt                     ? AttitudeFilter::Motion::kUnfelt
                       : unrested_s_ > params_.lost_s ? AttitudeFilter::Motion::kVelocityLost
                                                      : AttitudeFilter::Motion::kFelt;
-  attitude_.predict(gyro_radps, accel_mps2, step.dt_s, motion);
+  attitude_.predict(gyro_radps, accel_mps2, step.dt_s, motion, step.imu_noise);
   since_legs_s_ += step.dt_s;
   contacts_ = contacts;
   const bool feet_lost = feet_lost_;
@@ -101,10 +101,11 @@ void Odometry::take_legs(const Legs& legs) noexcept {
       motion_.rest(foot);
       contact.landed = contact.stands;
     } else {
-      motion_.update(foot, odom_p_foot_m(legs[foot]) - odom_p_foot_m_[foot], velocity_sigma_mps, since_legs_s_);
+      motion_.update(foot, odom_p_foot_m(legs[foot]) - odom_p_foot_m_[foot], velocity_sigma_mps, contact.stands,
+                     since_legs_s_);
     }
     // Where force says when a sole landed and kinematics where, its swing is no reason to let go of it.
-    if (legs[foot].sole_known && (!contact.stands || contact.landed)) motion_.rest(foot);
+    if (!contact.stands || contact.landed) motion_.rest(foot);
     const double doubt = std::max(params_.sure_contact / std::max(contact.probability, 0.01) - 1.0, 0.0);
     contact.walk_m2ps = motion_.walk_m2ps(foot) + params_.doubtful_walk_m2ps * doubt;
     stands = stands || contact.stands;

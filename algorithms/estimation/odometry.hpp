@@ -39,6 +39,7 @@ class Odometry {
     Vec3 accel_mps2 = Vec3::Zero();
     bool felt = true;      // false: the IMU is silent, and the feet alone say how the base moves
     bool new_legs = true;  // false: the legs are silent
+    ImuNoiseDensity imu_noise;
   };
   using Legs = std::array<LegMeasurement, kFootCount>;
   using Contacts = std::array<FootContact, kFootCount>;

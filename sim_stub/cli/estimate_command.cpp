@@ -29,7 +29,10 @@ std::string complaint(const EstimateArguments& a) {
 
 ReplayOptions options_of(const EstimateArguments& a) {
   ReplayOptions options;
-  if (a.lio_tau_s > 0.0) options.odometry.fusion.tau_s = a.lio_tau_s;
+  if (a.lio_tau_s > 0.0) {
+    options.odometry.fusion.tau_s = a.lio_tau_s;
+    options.odometry.fusion.tau_spm = 0.0;
+  }
   if (!a.lidar_mount.empty()) {
     const auto rad = [&a](std::size_t i) { return a.lidar_mount[i] * kPi / 180.0; };
     options.odometry.fusion.base_T_lidar = {rotation_z(rad(5)) * rotation_y(rad(4)) * rotation_x(rad(3)),
