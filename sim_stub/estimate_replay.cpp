@@ -26,6 +26,7 @@ Mat3 level_R_base(const Vec3& up) {
 struct Opening {
   Vec3 gyro_radps = Vec3::Zero(), accel_mps2 = Vec3::Zero();
   double still_s = 0.0;
+  double gyro_sigma_radps = 0.0;  // of the mean: noise, and a turn too slow to be seen
 };
 
 // Signals of one row, smoothed.
@@ -66,25 +67,18 @@ Opening opening(const EstimateLog& log) {
   const std::int64_t end_ns = end_of_standstill_ns(log) - static_cast<std::int64_t>(kUnseenMotion_s * 1e9);
   Opening o;
   double count = 0.0;
+  Vec3 squares = Vec3::Zero();
   for (const LogRow& row : log.rows) {
     if (row.stamp_ns > end_ns) break;
     count += 1.0;
-    o.gyro_radps += (row.gyro_radps - o.gyro_radps) / count;
+    const Vec3 off_radps = row.gyro_radps - o.gyro_radps;
+    o.gyro_radps += off_radps / count;
+    squares += off_radps.cwiseProduct(row.gyro_radps - o.gyro_radps);
     o.accel_mps2 += (row.accel_mps2 - o.accel_mps2) / count;
     o.still_s = seconds(row.stamp_ns);
   }
+  o.gyro_sigma_radps = std::hypot(std::sqrt(squares.maxCoeff()) / count, kUnseenTurn_rad / o.still_s);
   return o;
-}
-
-using Covariance = Eigen::Matrix<double, 9, 9>;
-constexpr int kYaw = 8;
-
-// Of x, y, z besides what the heading does, and of yaw.
-FusionUncertainty::Quantities variances_of(const Covariance& P) {
-  FusionUncertainty::Quantities v;
-  v.head<3>() = P.diagonal().head<3>() - P.col(kYaw).head<3>().cwiseAbs2() / P(kYaw, kYaw);
-  v[3] = P(kYaw, kYaw);
-  return v;
 }
 
 class LogReplay {
@@ -123,6 +117,7 @@ class LogReplay {
     }
     if (i > 0) {
       Odometry::Step step;
+      step.stamp_ns = row.stamp_ns;
       step.dt_s = seconds(row.stamp_ns - log_.rows[i - 1].stamp_ns);
       if (step.dt_s > options_.odometry.max_step_s) ++result_.gaps;
       // Samples of a moment: over the step, the mean of both its ends. The last ones bridge some that are invalid.
@@ -131,9 +126,6 @@ class LogReplay {
       step.felt = felt_.stamp_ns >= 0 && seconds(row.stamp_ns - felt_.stamp_ns) <= options_.odometry.max_step_s;
       step.imu_noise = imu_noise_.density();
       odometry_.step(step, legs_of(row), contacts_.feet(), {});
-      const FusionUncertainty::Quantities variances = variances_of(odometry_.attitude().covariance());
-      odometry_.fusion().grow((variances - variances_).cwiseMax(0.0));
-      variances_ = variances;
     }
     publish(row, i);
   }
@@ -143,8 +135,6 @@ class LogReplay {
     result_.accel_bias_mps2 = odometry_.attitude().accel_bias_mps2();
     result_.foot_position_sigma_m = odometry_.motion().position_sigma_m();
     result_.contact_walk_mprs = odometry_.attitude().contact_walk_mprs();
-    result_.outliers = odometry_.attitude().outliers();
-    result_.innovation_ratio_mean /= static_cast<double>(log_.rows.size());
     return std::move(result_);
   }
 
@@ -164,7 +154,7 @@ class LogReplay {
     const Opening o = opening(log_);
     const bool stood = o.still_s >= kMinStill_s;
     AttitudeFilter::Start start;
-    start.gyro_bias_sigma_radps = stood ? kUnseenTurn_rad / o.still_s : options_.gyro_bias_sigma_radps;
+    start.gyro_bias_sigma_radps = stood ? o.gyro_sigma_radps : options_.gyro_bias_sigma_radps;
     start.accel_bias_sigma_mps2 = options_.accel_bias_sigma_mps2;
     if (stood) start.gyro_bias_radps = o.gyro_radps;
     if (log_.has_truth) {
@@ -187,7 +177,6 @@ class LogReplay {
     }
     contacts_.update_stated(first.contact, 0);
     odometry_.initialise(start, legs_of(first), 0.01);
-    variances_ = variances_of(odometry_.attitude().covariance());
   }
 
   void keep() {
@@ -207,7 +196,7 @@ class LogReplay {
     tick.world_T_base = {world_R_odom * state.odom_T_base.R, start_m_ + state.world_T_base().p_m};
     tick.world_v_base_mps = world_R_odom * state.odom_v_base_mps;
     tick.base_w_base_radps = state.base_w_base_radps;
-    tick.covariance = fused_covariance(state);
+    odometry_.describe(row.stamp_ns, tick.quality);
     tick.contact_probability = state.contact_probability;
     tick.lio_age_ns = state.lio_age_ns;
     result_.ticks.push_back(tick);
@@ -216,7 +205,6 @@ class LogReplay {
       result_.largest_slew_m = std::max(result_.largest_slew_m, slew_m);
     }
     last_world_T_odom_ = state.world_T_odom;
-    result_.innovation_ratio_mean += odometry_.attitude().innovation_ratio();
     const auto& feet = contacts_.feet();
     if (!feet[0].stands && !feet[1].stands) ++result_.rows_without_contact;
     for (std::size_t f = 0; f < kFootCount; ++f) {
@@ -224,21 +212,9 @@ class LogReplay {
     }
   }
 
-  // Until LIO corrects anything the odometry's own; then its correlations, with the fusion's sigmas for what LIO
-  // corrects.
-  [[nodiscard]] Covariance fused_covariance(const StateEstimate& state) const {
-    const Covariance P = odometry_.attitude().covariance();
-    if (!odometry_.fusion().aligned()) return P;
-    Eigen::Matrix<double, 9, 1> scale = Eigen::Matrix<double, 9, 1>::Ones();
-    for (int i = 0; i < 3; ++i) scale[i] = state.position_sigma_m[i] / std::sqrt(P(i, i));
-    scale[kYaw] = state.yaw_sigma_rad / std::sqrt(P(kYaw, kYaw));
-    return scale.asDiagonal() * P * scale.asDiagonal();
-  }
-
   const EstimateLog& log_;
   const ReplayOptions& options_;
   LogRow felt_;  // the last whose IMU was valid; before there is one: stamp -1
-  FusionUncertainty::Quantities variances_;
   Odometry odometry_;
   ContactEstimator contacts_;
   ImuNoise imu_noise_;
@@ -254,10 +230,12 @@ class LogReplay {
 
 Odometry::Params log_params() {
   Odometry::Params params;
-  params.attitude.gyro_noise_radprs = 3e-4;
+  // How much contacts creep is soon found out, where nothing is known of the feet.
   params.attitude.contact_walk_mprs = 1e-2;
+  params.attitude.whiteness_start_gain = params.attitude.whiteness_gain_ps = 2.0;
   params.fusion.base_T_lidar = {};
-  params.fusion.uncertainty = {0.0, 0.0, 1e-4, 1e-4};  // grows as the filter's own does, from the start's sigmas
+  params.fusion.uncertainty.initial_sigma_m = 1e-4;  // the start is the truth's, or defined there
+  params.fusion.uncertainty.initial_sigma_rad = 1e-4;
   // As the module's 4 s are to its lidar's 10 mm: what comes through grows with LIO's noise, drift does not.
   params.fusion.tau_s = 1.0;
   params.fusion.tau_spm = 400.0;
@@ -267,7 +245,7 @@ Odometry::Params log_params() {
 bool is_finite(const Replay& replay) {
   return std::all_of(replay.ticks.begin(), replay.ticks.end(), [](const ReplayTick& tick) {
     return math::all_finite(tick.world_T_base.p_m) && math::all_finite(tick.world_T_base.R) &&
-           math::all_finite(tick.world_v_base_mps) && math::all_finite(tick.covariance);
+           math::all_finite(tick.world_v_base_mps) && math::all_finite(tick.quality.covariance);
   });
 }
 

@@ -140,8 +140,8 @@ TEST(ClimbOdometry, Fig4_TenSteps_FusedHasNeitherLiosJitterNorTheOdometrysDrift)
 }
 
 // Over 20 climbs the mean of 60 squares lies between these in 19 of 20 cases, if the sigmas are honest. The error of a
-// climb lasts (how its world was tied to LIO's), so neighbouring ticks are one case. The first twenty are those on which
-// the constants were set.
+// climb lasts (how its world was tied to LIO's), so neighbouring ticks are one case. The first twenty are those on
+// which the constants were set.
 class ClimbOdometrySeeds : public testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(ClimbOdometrySeeds, FusedPosition_TwentySeeds_SquaredErrorOverVarianceIsWithinItsBoundsInNineOfTenTicks) {

@@ -14,6 +14,7 @@
 
 #include "algorithms/estimation/contacts.hpp"
 #include "algorithms/estimation/imu_noise.hpp"
+#include "algorithms/estimation/innovation.hpp"
 #include "algorithms/estimation/leg_measurement.hpp"
 
 namespace polygmap {
@@ -82,9 +83,10 @@ class AttitudeFilter {
   [[nodiscard]] double yaw_sigma_rad() const noexcept { return math::sqrt(P_(kAttitude + 2, kAttitude + 2)); }
   // Of position, velocity and attitude in odom axes, in this order: of what is true minus what is estimated.
   [[nodiscard]] Eigen::Matrix<double, 9, 9> covariance() const noexcept;
-  [[nodiscard]] double velocity_sigma_mps() const noexcept;
-  // Mean of the squared innovations over their variances, recent: 1 when noise is what it is thought to be.
-  [[nodiscard]] double innovation_ratio() const noexcept { return innovation_ratio_; }
+  [[nodiscard]] double velocity_sigma_mps() const noexcept;  // of the axis that is known worst
+  // Of the last correction.
+  [[nodiscard]] const NormalisedRows& position_rows() const noexcept { return position_rows_; }
+  [[nodiscard]] const NormalisedRows& sole_rows() const noexcept { return sole_rows_; }
   // Random walk of a resting contact, m/sqrt(s), as measured.
   [[nodiscard]] double contact_walk_mprs() const noexcept { return contact_walk_mprs_; }
   [[nodiscard]] std::uint32_t outliers() const noexcept { return outliers_; }
@@ -106,7 +108,7 @@ class AttitudeFilter {
   void predict_covariance(double gyro_noise_radprs, double accel_noise_mpsrs, double dt_s) noexcept;
   void anchor(std::size_t foot, const LegMeasurement& leg) noexcept;
   // Three rows: state at `plus` minus state at `minus` is innovation, each of this variance.
-  void correct(int plus, int minus, const Vec3& innovation, double variance, double dt_s) noexcept;
+  void correct(int plus, int minus, const Vec3& innovation, double variance, NormalisedRows& rows) noexcept;
   void apply(const Vector& error) noexcept;
   // A foot rolls and creeps as long as its leg moves, by more or less from robot to robot. Too small a walk shows as
   // innovations that keep their sign.
@@ -130,7 +132,7 @@ class AttitudeFilter {
   std::array<Mat3, kFootCount> odom_R_foot_{Mat3::Identity(), Mat3::Identity()};
   Covariance P_ = Covariance::Zero();
   double gravity_mps2_ = kGravity_mps2;
-  double innovation_ratio_ = 1.0;
+  NormalisedRows position_rows_, sole_rows_;
   std::uint32_t outliers_ = 0;
 };
 

@@ -21,6 +21,7 @@ void Estimator::reset(const Params& params) noexcept {
   odometry_.reset(params);
   ring_.clear();
   state_ = {};
+  quality_ = {};
   imu_ = {};
   joints_ = {};
   new_imus_ = 0;
@@ -53,8 +54,8 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   if (dt_s > params_.max_step_s) ++counters_.gaps;
   // The last rates bridge a short silence of the IMU; beyond it the feet alone say how the base moves.
   const bool felt = seconds(now_ns - imu_.stamp_ns) <= params_.max_step_s;
-  odometry_.step({dt_s, imu_.gyro_radps, imu_.accel_mps2, felt, new_joints, imu_noise_.density()},
-                 legs_, contacts_.feet(), ground_);
+  odometry_.step({now_ns, dt_s, imu_.gyro_radps, imu_.accel_mps2, felt, new_joints, imu_noise_.density()}, legs_,
+                 contacts_.feet(), ground_);
   publish(now_ns);
   if (seconds(now_ns - state_.oldest_input_ns) <= params_.max_step_s) ring_.push(state_);
 }
@@ -195,10 +196,11 @@ void Estimator::calibrate() noexcept {
 }
 
 void Estimator::publish(std::int64_t now_ns) noexcept {
-  state_.stamp_ns = now_ns;
+  state_.stamp_ns = counters_.stamp_ns = quality_.stamp_ns = now_ns;
   state_.oldest_input_ns = std::min(imu_.stamp_ns, joints_.stamp_ns);
   if (state_.initialised) {
     odometry_.describe(now_ns, state_);
+    odometry_.describe(now_ns, quality_);
   } else {
     state_.odom_T_base = initial_odom_T_base_;
   }

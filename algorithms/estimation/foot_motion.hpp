@@ -21,14 +21,15 @@ class FootMotion {
     double min_window_s = 0.010;
     double max_window_s = 0.060;
     NoiseLevel::Params noise{1e-3, 0.0, 2.0, 3e-4, 0.02};  // of a resting foot's position, m
-    double rest_sigma_mps = 0.05;  // of a foot that rests: it rolls and creeps
-    double rest_sigmas = 3.0;      // a speed below this many of its sigmas is rest
-    double gain = 4.0;             // of the walk that a speed stands for: speed^2 times the window
+    double rest_sigma_mps = 0.05;                          // of a foot that rests: it rolls and creeps
+    double rest_sigmas = 3.0;                              // a speed below this many of its sigmas is rest
+    double gain = 4.0;  // of the walk that a speed stands for: speed^2 times the window
   };
   void reset(const Params& params) noexcept;
 
   // odom_step_m: by how much the foot moved over the ground in this step of dt_s, the base as predicted by the IMU from
-  // the last corrected state. speed_sigma_mps: of the base's velocity, one sigma. A foot in the air says nothing of noise.
+  // the last corrected state. speed_sigma_mps: of the base's velocity, one sigma. A foot in the air says nothing of
+  // noise.
   void update(std::size_t foot, const Vec3& odom_step_m, double speed_sigma_mps, bool stands, double dt_s) noexcept;
 
   // The foot is known to rest from now on, whatever it did before.

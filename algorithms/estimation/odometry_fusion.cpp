@@ -91,7 +91,7 @@ LioVerdict OdometryFusion::fuse(const LioSample& sample, const Transform& odom_T
   measure_noise(lio_T_base, odom_T_base, silence_s);
 
   const double gain = complementary_gain(std::min(silence_s, params_.max_gap_s),
-                                           std::max(params_.tau_s, params_.tau_spm * sigmas.position_m));
+                                         std::max(params_.tau_s, params_.tau_spm * sigmas.position_m));
   if (aligned_) {
     observe(predicted, measured, sigmas, sample.stamp_ns);
     fused_world_T_odom_ = fuse_pose(predicted, turned_by_yaw(predicted, measured), gain) * odom_T_base.inverse();
@@ -111,7 +111,7 @@ void OdometryFusion::rebase(const Transform& new_T_old) noexcept {
 }
 
 void OdometryFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept {
-  uncertainty_.move(world_T_odom_.R * odom_step_m, dt_s);
+  uncertainty_.move(world_T_odom_.R * odom_step_m);
   const Transform wanted = fused_world_T_odom_ * odom_T_base;
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
@@ -173,15 +173,14 @@ void OdometryFusion::measure_noise(const Transform& lio_T_base, const Transform&
 void OdometryFusion::observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,
                              std::int64_t stamp_ns) noexcept {
   LioInnovations& i = innovations_;
-  i.stamp_ns = stamp_ns;
   i.last.head<3>() = measured.p_m - predicted.p_m;
   i.last[3] = so3_log(measured.R * predicted.R.transpose()).z();
-  LioInnovations::Quantities variance = uncertainty_.offset_variance();
+  FusionUncertainty::Quantities variance = uncertainty_.offset_variance();
   variance.head<3>().array() += math::square(sigmas.position_m);
   variance[3] += math::square(sigmas.rotation_rad);
-  i.normalised_last = i.last.cwiseAbs2().cwiseQuotient(variance);
-  ++i.count;
-  i.normalised_mean += (i.normalised_last - i.normalised_mean) / static_cast<double>(i.count);
+  const FusionUncertainty::Quantities normalised = i.last.cwiseAbs2().cwiseQuotient(variance);
+  i.position.take({normalised.head<3>().sum(), 3}, stamp_ns);
+  i.yaw.take({normalised[3], 1}, stamp_ns);
 }
 
 // Moves LIO's world against ours, so that its pose comes nearer to the odometry's by the tie's share of the innovation.
