@@ -54,13 +54,14 @@ Progress ControlLane::sense(std::int64_t now_ns) noexcept {
   } else if (now_ns - estimator_.joints().stamp_ns >= kMissing_ns) {
     health_.raise(Fault::kJointFeedbackMissing, now_ns);
   }
-  LioSample lio;
-  for (int i = 0; i < kMaxReadsPerFrame && lio_port_.try_read(lio); ++i) estimator_.add_lio(lio, now_ns);
   return Progress::kDone;
 }
 
-Progress ControlLane::estimate(std::int64_t /*now_ns*/) noexcept {
+// A LIO pose meets the state of its stamp, which may be this frame's: after the tick. It moves the next one.
+Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
   estimator_.tick(gait_.status().stands);
+  LioSample lio;
+  for (int i = 0; i < kMaxReadsPerFrame && lio_port_.try_read(lio); ++i) estimator_.add_lio(lio, now_ns);
   answer_pose_request();
   return Progress::kDone;
 }

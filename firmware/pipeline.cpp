@@ -46,7 +46,12 @@ Progress Pipeline::run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& b
 }
 
 Telemetry Pipeline::telemetry(std::int64_t now_ns) const noexcept {
-  return {now_ns, control_.state(), perception_.surface_frame(), perception_.map_snapshot(), control_.gait_status()};
+  return {now_ns,
+          control_.state(),
+          control_.estimator().quality(),
+          perception_.surface_frame(),
+          perception_.map_snapshot(),
+          control_.gait_status()};
 }
 
 std::array<StageMemory, kMemoryStages> static_memory() noexcept {

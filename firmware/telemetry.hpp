@@ -8,6 +8,7 @@
 #include "algorithms/core/gait_status.hpp"
 #include "algorithms/core/state.hpp"
 #include "algorithms/core/surfaces.hpp"
+#include "algorithms/estimation/estimate_quality.hpp"
 
 namespace polygmap {
 
@@ -15,8 +16,9 @@ namespace polygmap {
 struct Telemetry {
   std::int64_t now_ns;
   const StateEstimate& state;
-  const SurfaceFrame& surfaces;  // newest finished frame; its sequence changes when a new one is done
-  const MapSnapshot& map;        // stamp_ns changes in the tick a frame was fused
+  const EstimateQuality& quality;  // its covariance, innovations, contacts; stamped with it
+  const SurfaceFrame& surfaces;    // newest finished frame; its sequence changes when a new one is done
+  const MapSnapshot& map;          // stamp_ns changes in the tick a frame was fused
   const GaitStatus& gait;
 };
 

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 #include "sim_stub/camera_profile.hpp"
@@ -32,10 +34,14 @@ std::vector<std::string_view> split(std::string_view line) {
 }
 
 std::string read_text(const std::string& path) {
+  std::error_code none;
+  if (!std::filesystem::exists(path, none)) throw FileError("There is no file \"" + path + "\".");
+  if (std::filesystem::is_directory(path, none)) throw FileError("\"" + path + "\" is a folder, not a file.");
   std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) throw FileError("Cannot read \"" + path + "\", or it is empty.");
-  return std::move(text).str();
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  if (!file.is_open() || file.bad()) throw FileError("Cannot read \"" + path + "\".");
+  if (text.empty()) throw FileError("\"" + path + "\" is empty.");
+  return text;
 }
 
 // As it may stand in a sentence on one line.
@@ -60,6 +66,7 @@ CsvTable::CsvTable(std::string path) : path_(std::move(path)), text_(read_text(p
     const std::vector<std::string_view> cells = split(line);
     if (number == 1) {
       header_ = cells;
+      refuse_other_dialects(line);
       for (auto name = header_.begin(); name != header_.end(); ++name) {
         if (!name->empty() && std::find(name + 1, header_.end(), *name) != header_.end()) {
           throw FileError("\"" + path_ + "\" line 1: the column " + shown(*name) + " is named twice.");
@@ -75,6 +82,17 @@ CsvTable::CsvTable(std::string path) : path_(std::move(path)), text_(read_text(p
     cells_.insert(cells_.end(), cells.begin(), cells.end());
   }
   if (lines_.empty()) throw FileError("\"" + path_ + "\" has no rows of data.");
+}
+
+void CsvTable::refuse_other_dialects(std::string_view line) const {
+  for (const auto& [separator, name] : {std::pair{';', "semicolons"}, std::pair{'\t', "tabs"}}) {
+    if (trimmed(line).find(separator) != std::string_view::npos) {
+      throw FileError("\"" + path_ + "\" line 1: the columns are separated by " + name + ", not by commas.");
+    }
+  }
+  if (line.find('"') != std::string_view::npos) {
+    throw FileError("\"" + path_ + "\" line 1: the columns' names stand in quotes, which are not read.");
+  }
 }
 
 bool CsvTable::has_any(std::string_view prefix) const noexcept {

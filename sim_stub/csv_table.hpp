@@ -11,7 +11,8 @@ namespace polygmap::sim {
 
 class CsvTable {
  public:
-  // Reads the whole file. Throws FileError: unreadable, empty, a column named twice, a row of another length.
+  // Reads the whole file. Throws FileError: absent, a folder, unreadable, empty, not separated by commas, names in
+  // quotes, a column named twice, a row of another length.
   explicit CsvTable(std::string path);
 
   [[nodiscard]] std::size_t rows() const noexcept { return lines_.size(); }
@@ -29,6 +30,7 @@ class CsvTable {
     std::size_t number;  // in the file, from 1
     std::size_t first_cell;
   };
+  void refuse_other_dialects(std::string_view header) const;
   [[nodiscard]] std::size_t find(std::string_view column) const noexcept;
 
   std::string path_, text_;

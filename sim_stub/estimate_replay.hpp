@@ -16,6 +16,8 @@ namespace polygmap::sim {
 
 struct ReplayOptions {
   Odometry::Params odometry = log_params();  // its lidar mount: none, LIO gives the base's pose
+  // One sigma, where no standstill at the start says what they are.
+  double gyro_bias_sigma_radps = 0.01, accel_bias_sigma_mps2 = 0.2;
 };
 
 enum class StartSource : std::uint8_t { kTruth, kStandstill, kFirstAcceleration };
@@ -26,7 +28,7 @@ struct ReplayTick {
   Transform world_T_base, odom_T_base;
   Vec3 world_v_base_mps = Vec3::Zero();
   Vec3 base_w_base_radps = Vec3::Zero();
-  Eigen::Matrix<double, 9, 9> covariance;  // of position, velocity and attitude, world axes
+  EstimateQuality quality;
   std::array<double, kFootCount> contact_probability{};
   std::int64_t lio_age_ns = -1;
 };
@@ -36,8 +38,6 @@ struct Replay {
   StartSource start = StartSource::kTruth;
   Vec3 gyro_bias_radps = Vec3::Zero(), accel_bias_mps2 = Vec3::Zero();  // at the end
   double foot_position_sigma_m = 0.0, contact_walk_mprs = 0.0;          // measured
-  double innovation_ratio_mean = 0.0;
-  std::uint32_t outliers = 0;
   std::uint32_t imu_invalid = 0;  // rows beyond what the module takes for true: not felt
   std::uint32_t gaps = 0;         // rows that came after more than 50 ms
   std::uint32_t slipping_rows = 0;

@@ -11,6 +11,7 @@ namespace polygmap::sim {
 [[nodiscard]] const char* name_of(StartSource source);
 // Error at the end, per cent of the way gone; 0 where nothing went.
 [[nodiscard]] double drift_percent(const Score& score);
+[[nodiscard]] double horizontal_drift_percent(const Score& score);
 
 // Throw FileError when the file cannot be written.
 void write_estimate_json(const std::string& path, const EstimateLog& log, const std::vector<LioRow>& lio,

@@ -30,16 +30,19 @@ Score score(const EstimateLog& log, const Replay& replay) {
     s.tilt_rmse_rad += turn_rad.head<2>().squaredNorm() / rows;
     s.yaw_rmse_rad += turn_rad.z() * turn_rad.z() / rows;
     s.odometry_rmse_m += (tick.odom_T_base.p_m - truth.true_T_base.p_m).squaredNorm() / rows;
-    const Eigen::Matrix<double, kNeesStates, kNeesStates> P = tick.covariance.topLeftCorner<kNeesStates, kNeesStates>();
+    const Eigen::Matrix<double, kNeesStates, kNeesStates> P =
+        tick.quality.covariance.topLeftCorner<kNeesStates, kNeesStates>();
     const double nees = error.dot(P.ldlt().solve(error));
     s.nees_mean += nees / rows;
     if (nees >= kNeesLow && nees <= kNeesHigh) s.nees_in_bounds += 1.0 / rows;
-    const double gone_m = (truth.true_T_base.p_m - mark_m).norm();
-    if (gone_m >= kStep_m || i + 1 == log.rows.size()) {
-      s.distance_m += gone_m;
+    const Vec3 gone_m = truth.true_T_base.p_m - mark_m;
+    if (gone_m.norm() >= kStep_m || i + 1 == log.rows.size()) {
+      s.distance_m += gone_m.norm();
+      s.horizontal_distance_m += gone_m.head<2>().norm();
       mark_m = truth.true_T_base.p_m;
     }
     s.final_error_m = error.head<3>().norm();
+    s.final_horizontal_error_m = error.head<2>().norm();
   }
   for (double* rmse : {&s.position_rmse_m, &s.velocity_rmse_mps, &s.attitude_rmse_rad, &s.tilt_rmse_rad,
                        &s.yaw_rmse_rad, &s.odometry_rmse_m}) {

@@ -16,6 +16,7 @@ struct Score {
   double tilt_rmse_rad = 0.0, yaw_rmse_rad = 0.0;
   double distance_m = 0.0;  // that the true base went
   double final_error_m = 0.0;
+  double horizontal_distance_m = 0.0, final_horizontal_error_m = 0.0;
   double nees_in_bounds = 0.0;  // share of the rows
   double nees_mean = 0.0;
 };

@@ -61,6 +61,8 @@ class FusionTest : public ::testing::Test {
     LioSample sample;
     sample.stamp_ns = now_ns_;
     sample.lio_T_lidar = lio_T_true_ * true_T_base * base_T_lidar();
+    sample.position_sigma_m.setConstant(kLioSigma_m);
+    sample.rotation_sigma_rad.setConstant(kLioSigma_rad);
     const LioVerdict verdict = fusion_.check(sample, now_ns_);
     return verdict == LioVerdict::kAccepted ? fusion_.fuse(sample, odom_T_base) : verdict;
   }
@@ -71,6 +73,7 @@ class FusionTest : public ::testing::Test {
     for (int i = 0; i < 60; ++i) ASSERT_EQ(feed(kPose, kPose), LioVerdict::kAccepted);
   }
 
+  static constexpr double kLioSigma_m = 0.01, kLioSigma_rad = 0.0035;
   OdometryFusion::Params params_;
   OdometryFusion fusion_;
   Transform lio_T_true_{rotation_z(2.0), Vec3{12, -7, 1}};
@@ -194,14 +197,17 @@ TEST_F(FusionTest, Sigma_WithoutLio_GrowsWithTheWayAndItsHeadingAndWithLioShrink
   align();
   tick(kPose, 2000);
   const Vec3 start_m = fusion_.position_sigma_m();
-  for (int i = 0; i < 5000; ++i) fusion_.tick(kPose, {5e-4, 0, 0}, kTick_s);  // 2.5 m in 10 s
+  for (int i = 0; i < 5000; ++i) {  // 2.5 m in 10 s, by an odometry that turns
+    fusion_.follow({0.0, 0.0, 0.0, math::square(2e-4 * i * kTick_s)});
+    fusion_.tick(kPose, {5e-4, 0, 0}, kTick_s);
+  }
   const FusionUncertainty::Params& p = params_.uncertainty;
   const double drift_m = p.drift_per_m * 2.5;
   const Vec3 grown_m = fusion_.position_sigma_m();
   EXPECT_NEAR(grown_m.z(), std::hypot(start_m.z(), drift_m), 1e-4);
   EXPECT_GT(grown_m.y(), std::hypot(start_m.y(), drift_m) + 5e-4);  // the way was along x, its heading unknown
   EXPECT_NEAR(grown_m.x(), grown_m.z(), 1e-4);
-  EXPECT_GT(fusion_.yaw_sigma_rad(), 10.0 * p.drift_yaw_radps);
+  EXPECT_GT(fusion_.yaw_sigma_rad(), 0.99 * 2e-3);
   for (int i = 0; i < 400; ++i) ASSERT_EQ(feed(kPose, kPose), LioVerdict::kAccepted);
   fusion_.tick(kPose, Vec3::Zero(), kTick_s);
   EXPECT_LT(fusion_.position_sigma_m().maxCoeff(), 0.0025);  // 10 mm and 3.5 mrad at 0.7 m, low-passed over 4 s
@@ -218,7 +224,7 @@ TEST_F(FusionTest, Sigma_FarFromWhereTheWorldWasTied_IsLarger) {
   const Vec3 near_m = fusion_.position_sigma_m();
   fusion_.tick({kPose.R, kPose.p_m + Vec3{10, 0, 0}}, Vec3::Zero(), kTick_s);
   const Vec3 far_m = fusion_.position_sigma_m();
-  const double turn_rad = params_.default_rotation_sigma_rad / std::sqrt(41.0);
+  const double turn_rad = kLioSigma_rad / std::sqrt(41.0);
   EXPECT_NEAR(far_m.x(), near_m.x(), 1e-9);
   EXPECT_NEAR(far_m.y(), std::hypot(near_m.y(), 10 * turn_rad), 1e-4);
   EXPECT_NEAR(far_m.z(), std::hypot(near_m.z(), 10 * turn_rad), 1e-4);
@@ -238,7 +244,7 @@ TEST(FusionUncertainty, DriftUnderBlends_LagsByTheTimeConstant) {
   const FusionUncertainty::Params params;
   uncertainty.reset(params);
   for (int i = 0; i < 2000; ++i) {
-    uncertainty.move({0, 0, 0.02}, 0.1);  // up: no heading bends that
+    uncertainty.move({0, 0, 0.02});  // up: no heading bends that
     uncertainty.blend(0.1, 0.0, 0.0);
   }
   EXPECT_NEAR(std::sqrt(uncertainty.offset_variance().z()), params.drift_per_m * 0.02 * 0.9 / 0.1, 1e-9);
@@ -247,7 +253,7 @@ TEST(FusionUncertainty, DriftUnderBlends_LagsByTheTimeConstant) {
 TEST(FusionUncertainty, Tie_AtThatMomentChangesNothing) {
   FusionUncertainty uncertainty;
   uncertainty.reset({});
-  for (int i = 0; i < 100; ++i) uncertainty.move({0.02, 0.01, 0.005}, 0.1);
+  for (int i = 0; i < 100; ++i) uncertainty.move({0.02, 0.01, 0.005});
   const Vec3 there_m{2.0, 1.0, 0.5}, before_m = uncertainty.position_sigma_m(there_m);
   const double yaw_rad = uncertainty.yaw_sigma_rad();
   uncertainty.tie(there_m, 0.01, 0.003);
@@ -257,27 +263,72 @@ TEST(FusionUncertainty, Tie_AtThatMomentChangesNothing) {
   EXPECT_NEAR(uncertainty.position_sigma_m(there_m).x(), std::hypot(before_m.x(), 0.01), 1e-9);
 }
 
-TEST_F(FusionTest, Innovations_HonestSigmas_AreOneInTheMean) {
-  std::mt19937 random(4);
-  std::normal_distribution<double> normal;
-  params_.base_T_lidar.p_m.setZero();
-  SetUp();
-  for (int i = 0; i < 2000; ++i) {
-    Transform noisy = kPose;
-    for (int a = 0; a < 3; ++a) noisy.p_m[a] += params_.default_position_sigma_m * normal(random);
-    noisy.R = rotation_z(params_.default_rotation_sigma_rad * normal(random)) * noisy.R;
-    now_ns_ += kLioPeriod_ns;
-    const LioSample sample{now_ns_, lio_T_true_ * noisy * params_.base_T_lidar, Vec3::Zero(), Vec3::Zero()};
-    ASSERT_EQ(fusion_.fuse(sample, kPose), LioVerdict::kAccepted);
-    tick(kPose, 1);
+// What the odometry's filter takes back, because a foot stands firmly again, is not counted twice when it grows anew.
+TEST(FusionUncertainty, OdometrysVariance_GrowsAndShrinks_IsFollowed) {
+  using Quantities = FusionUncertainty::Quantities;
+  FusionUncertainty uncertainty;
+  uncertainty.reset({});
+  uncertainty.begin(Quantities::Constant(1e-6));
+  for (int i = 0; i < 10; ++i) {
+    uncertainty.follow(Quantities::Constant(5e-6));
+    EXPECT_NEAR(uncertainty.offset_variance()[2], 4e-6, 1e-15);
+    uncertainty.follow(Quantities::Constant(2e-6));
+    EXPECT_NEAR(uncertainty.offset_variance()[2], 1e-6, 1e-15);
   }
+  uncertainty.blend(0.5, 0.0, 0.0);  // LIO knows better: what shrinks then is gone already
+  uncertainty.follow(Quantities::Constant(1e-6));
+  EXPECT_EQ(uncertainty.offset_variance()[2], 0.0);
+}
+
+class NoisyFusionTest : public FusionTest {
+ protected:
+  // Poses of a robot at rest, white noise of kLioSigma_m on every axis and kLioSigma_rad on yaw and tilt.
+  void feed_noisy(int poses, bool stated, double scale) {
+    params_.base_T_lidar = {};
+    SetUp();
+    for (int i = 0; i < poses; ++i) {
+      const auto draw = [&](double sigma) { return scale * sigma * normal_(random_); };
+      Transform noisy = kPose;
+      for (int a = 0; a < 3; ++a) noisy.p_m[a] += draw(kLioSigma_m);
+      const double roll = draw(kLioSigma_rad), pitch = draw(kLioSigma_rad), yaw = draw(kLioSigma_rad);
+      noisy.R = rotation_z(yaw) * rotation_y(pitch) * rotation_x(roll) * noisy.R;
+      now_ns_ += kLioPeriod_ns;
+      const double share = stated ? scale : 0.0;
+      const LioSample sample{now_ns_, lio_T_true_ * noisy, Vec3::Constant(share * kLioSigma_m),
+                             Vec3::Constant(share * kLioSigma_rad)};
+      ASSERT_EQ(fusion_.fuse(sample, kPose), LioVerdict::kAccepted);
+      tick(kPose, 50);
+    }
+  }
+  std::mt19937 random_{4};
+  std::normal_distribution<double> normal_;
+};
+
+TEST_F(NoisyFusionTest, Innovations_HonestSigmas_AreOneInTheMean) {
+  feed_noisy(2000, true, 1.0);
   const LioInnovations& seen = fusion_.innovations();
-  EXPECT_EQ(seen.stamp_ns, now_ns_);
-  EXPECT_EQ(seen.count, 2000U - 41U);
-  for (int i = 0; i < 4; ++i) {
-    EXPECT_NEAR(seen.normalised_mean[i], 1.0, 0.1) << i;  // +-3 sigma of 1959 squares
-    EXPECT_NEAR(seen.normalised_last[i] / math::square(seen.last[i]), i < 3 ? 1e4 : 81e3, i < 3 ? 3e2 : 3e3) << i;
+  EXPECT_EQ(seen.position.stamp_ns, now_ns_);
+  EXPECT_EQ(seen.position.count, 2000U - 41U);
+  EXPECT_NEAR(seen.position.mean, 1.0, 0.06);  // +-3 sigma of 3 x 1959 squares
+  EXPECT_NEAR(seen.yaw.mean, 1.0, 0.1);
+  EXPECT_NEAR(seen.position.last / (seen.last.head<3>().squaredNorm() / 3.0), 1e4, 3e2);
+  EXPECT_NEAR(seen.yaw.last / math::square(seen.last[3]), 81e3, 3e3);
+}
+
+TEST_F(NoisyFusionTest, Lio_ThatStatesNoSigma_IsAsNoisyAsItIsMeasuredToBe) {
+  for (const double scale : {0.3, 1.0, 1.5}) {
+    feed_noisy(600, false, scale);
+    EXPECT_NEAR(fusion_.innovations().position.mean, 1.0, 0.2) << scale;
+    EXPECT_NEAR(fusion_.innovations().yaw.mean, 1.0, 0.25) << scale;
   }
+}
+
+// Gravity holds the odometry's tilt, LIO's own is noise of every single pose.
+TEST_F(NoisyFusionTest, TiltOfLio_NeverTiltsTheFusedPose) {
+  feed_noisy(600, true, 1.5);
+  const Mat3 off = fusion_.world_T_odom().R;
+  EXPECT_GT(off(2, 2), 1.0 - 1e-15);
+  EXPECT_GT(std::abs(off(1, 0)), 1e-6);  // yaw is LIO's to tell
 }
 
 // --- LIO as it arrives, 10 Hz and 100 ms late, on a walk of 60 s at 0.23 m/s whose odometry is 2 % short

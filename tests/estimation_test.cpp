@@ -243,7 +243,7 @@ TEST(FootMotion, RestingFootWithNoise_IsRest_SlippingFootIsLetGo_AndTheNoiseIsMe
     for (int i = 0; i < ticks; ++i) {
       slid_m += speed_mps * kTick_s;
       const Vec3 now{slid_m + noise(random), noise(random), noise(random)};
-      motion.update(0, now - before, 0.005, kTick_s);
+      motion.update(0, now - before, 0.005, true, kTick_s);
       before = now;
       let_go += motion.walk_m2ps(0) > 0.0 ? 1 : 0;
     }

@@ -75,7 +75,7 @@ double worst_error_m(const EstimateLog& log, const Replay& result) {
 
 double end_error_over_variance(const EstimateLog& log, const Replay& result) {
   const Vec3 error_m = result.ticks.back().world_T_base.p_m - log.rows.back().truth.true_T_base.p_m;
-  const Mat3 P = result.ticks.back().covariance.topLeftCorner<3, 3>();
+  const Mat3 P = result.ticks.back().quality.covariance.topLeftCorner<3, 3>();
   return error_m.dot(P.inverse() * error_m);
 }
 
@@ -112,33 +112,42 @@ TEST(EstimateReplay, ClimbWithBiasedNoisySensors_DriftsByLittle_AndKnowsHowFar) 
     EXPECT_LT(s.attitude_rmse_rad, 0.03) << seed;  // yaw, which nothing observes
     EXPECT_NEAR(result.foot_position_sigma_m, kFootNoise_m, 0.2 * kFootNoise_m) << seed;
     EXPECT_LT(end_error_over_variance(log, result), 25.0) << seed;
-    EXPECT_GT(result.ticks.back().covariance(8, 8), result.ticks[10].covariance(8, 8)) << "yaw gets no surer";
+    EXPECT_GT(result.ticks.back().quality.covariance(8, 8), result.ticks[10].quality.covariance(8, 8))
+        << "yaw gets no surer";
   }
 }
 
 TEST(EstimateReplay, FootSlipsThreeTenthsForAFifthOfASecond_PositionStaysWithinTwentyMillimetres) {
-  WalkSpec spec;
-  spec.steps = 2;
-  EstimateLog log = climb_log(spec);
-  const Replay firm = replay(log, {}, {});
-  add_slip(log, 2500 * kNsPerMs, 0.3, 0.2);
-  const Replay slipped = replay(log, {}, {});
-  EXPECT_LT(worst_error_m(log, slipped), 0.020);
-  EXPECT_GT(slipped.slipping_rows, firm.slipping_rows + 50);
   ReplayOptions careless;
   careless.odometry.motion.gain = 0.0;
-  EXPECT_GT(worst_error_m(log, replay(log, {}, careless)), 0.020);
+  constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    WalkSpec spec;
+    spec.seed = seed;
+    spec.steps = 2;
+    EstimateLog log = climb_log(spec);
+    const Replay firm = replay(log, {}, {});
+    add_slip(log, (2200 + 50 * seed) * kNsPerMs, 0.3, 0.2);
+    const Replay slipped = replay(log, {}, {});
+    EXPECT_LT(worst_error_m(log, slipped), 0.020) << seed;
+    EXPECT_GT(slipped.slipping_rows, firm.slipping_rows + 50) << seed;
+    EXPECT_GT(worst_error_m(log, replay(log, {}, careless)), 0.020) << seed;
+  }
 }
 
 TEST(EstimateReplay, NoSlip_VelocityIsAsGoodAsThatOfAFilterThatLetsNothingGo) {
-  WalkSpec spec;
-  spec.steps = 4;
-  const EstimateLog log = climb_log(spec);
   ReplayOptions careless;
   careless.odometry.motion.gain = 0.0;
-  const double with_mps = score(log, replay(log, {}, {})).velocity_rmse_mps;
-  const double without_mps = score(log, replay(log, {}, careless)).velocity_rmse_mps;
-  EXPECT_LT(with_mps, 1.05 * without_mps);
+  constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    WalkSpec spec;
+    spec.seed = seed;
+    spec.steps = 4;
+    const EstimateLog log = climb_log(spec);
+    const double with_mps = score(log, replay(log, {}, {})).velocity_rmse_mps;
+    const double without_mps = score(log, replay(log, {}, careless)).velocity_rmse_mps;
+    EXPECT_LT(with_mps, 1.05 * without_mps) << seed;
+  }
 }
 
 TEST(EstimateReplay, NoTruth_StartsLevelAtStandstill_OrByTheFirstAcceleration) {
@@ -264,8 +273,8 @@ TEST(EstimateReplay, LioWithoutDelay_IsAccepted_AtAnyRateOfRows) {
   EXPECT_EQ(result.lio[static_cast<std::size_t>(LioVerdict::kNoOdometry)], 0U);
 }
 
-// Odometry that drifts from the first row on: the biases are unknown at the start, and half of the robots set out after
-// 0.2 s. Where the odometry is better than LIO (5 mm) some of LIO's noise comes through: 3.7 mm at tau 1 s.
+// The biases are unknown at the start, and half of the robots set out after 0.2 s. Where the odometry is better than
+// LIO (5 mm) some of LIO's noise comes through: 3.3 mm at tau 1 s.
 TEST(EstimateReplay, BiasedLogWithLateLio_IsNoWorseThanWithoutAndKnowsHowGoodItIs) {
   constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
   for (std::uint32_t seed = 11; seed < 11 + kSeeds; ++seed) {
@@ -277,9 +286,10 @@ TEST(EstimateReplay, BiasedLogWithLateLio_IsNoWorseThanWithoutAndKnowsHowGoodItI
     const EstimateLog log = climb_log(spec);
     const std::vector<LioRow> lio = lio_of(log, seed);
     const Score without = score(log, replay(log, {}, {}));
-    for (const double tau_s : {1.0, log_params().fusion.tau_s, 4.0}) {
+    for (const double tau_s : {0.0, 1.0, 4.0}) {  // 0: by LIO's noise
       ReplayOptions options;
-      options.odometry.fusion.tau_s = tau_s;
+      if (tau_s > 0.0) options.odometry.fusion.tau_s = tau_s;
+      if (tau_s > 0.0) options.odometry.fusion.tau_spm = 0.0;
       const Score with = score(log, replay(log, lio, options));
       EXPECT_LT(with.position_rmse_m, std::max(without.position_rmse_m, 0.004)) << seed << ", tau " << tau_s;
       EXPECT_GT(with.nees_in_bounds, 0.65) << seed << ", tau " << tau_s;
@@ -287,7 +297,7 @@ TEST(EstimateReplay, BiasedLogWithLateLio_IsNoWorseThanWithoutAndKnowsHowGoodItI
     }
     const Score single = score(log, replay(log, {lio.front()}, {}));  // says where LIO's world is, and nothing else
     EXPECT_EQ(single.position_rmse_m, without.position_rmse_m) << seed;
-    EXPECT_EQ(single.nees_in_bounds, without.nees_in_bounds) << seed;
+    EXPECT_NEAR(single.nees_in_bounds, without.nees_in_bounds, 0.02) << seed;
   }
 }
 
@@ -299,7 +309,6 @@ TEST(EstimateReplay, LidarMount_PosesOfTheLidar_AreThoseOfTheBase) {
   std::vector<LioRow> lio = lio_of(log, 7);
   const Transform mount{rotation_y(0.3), Vec3{0.1, 0.0, 0.6}};
   ReplayOptions options;
-  options.odometry.fusion.default_rotation_sigma_rad = 1e-9;  // a lever would make positions less sure, and weigh less
   const Replay plain = replay(log, lio, options);
   for (LioRow& row : lio) row.pose = row.pose * mount;
   options.odometry.fusion.base_T_lidar = mount;
@@ -409,7 +418,10 @@ TEST_F(EstimateCommand, BadLogs_AreNamedInOneSentenceWithTheirLine) {
   const struct {
     std::string text, culprit;
   } kCases[] = {
-      {"", "empty"},
+      {"", "is empty"},
+      {"t_s;gyro_x_radps;gyro_y_radps\n1;2;3\n", "line 1: the columns are separated by semicolons"},
+      {"t_s\tgyro_x_radps\n1\t2\n", "line 1: the columns are separated by tabs"},
+      {"\"t_s\",\"gyro_x_radps\"\n1,2\n", "line 1: the columns' names stand in quotes"},
       {std::string(kHeader) + "\n", "no rows"},
       {spoilt(1, "t_s,gyro_x_radps"), "line 2"},
       {spoilt(1, swapped("t_s", "t_x")), "\"t_s\" is missing"},
@@ -434,14 +446,15 @@ TEST_F(EstimateCommand, BadLogs_AreNamedInOneSentenceWithTheirLine) {
       {std::string(kHeader) + "\n100" + kRow + "\n102" + kRow + "\n104" + kRow + "\n", "line 4: the rows"},
   };
   for (const auto& c : kCases) expect_refused({"estimate", write("bad.csv", c.text)}, c.culprit);
-  expect_refused({"estimate", at("absent.csv")}, "absent.csv");
-  expect_refused({"estimate", folder_}, folder_);
+  expect_refused({"estimate", at("absent.csv")}, "There is no file");
+  expect_refused({"estimate", folder_}, "is a folder");
   expect_refused({"estimate", write("log.csv", good), "--json", folder_}, folder_);
   expect_refused({"estimate", at("log.csv"), "--csv", at("no/such/folder.csv")}, "folder.csv");
   expect_refused({"estimate", at("log.csv"), "--lio", write("lio.csv", "stamp_s\n1\n")}, "\"arrival_s\" is missing");
   const std::string backwards = std::string(kLioHeader) + "100.1,100.2,0,0,0,1,0,0,0\n100.2,100.1,0,0,0,1,0,0,0\n";
   expect_refused({"estimate", at("log.csv"), "--lio", write("lio.csv", backwards)}, "line 3: arrival_s");
   expect_refused({"estimate", at("log.csv"), "--lidar-mount", "0", "0", "0", "0", "0", "0"}, "--lio");
+  expect_refused({"estimate", at("log.csv"), "--lio-tau", "2"}, "--lio-tau is of no use");
 }
 
 TEST_F(EstimateCommand, Garbage_OfEveryKind_IsReadOrRefusedButNeverACrash) {

@@ -23,6 +23,7 @@ struct StateEstimate {
   std::array<Transform, kFootCount> odom_T_sole;  // leg kinematics on odom_T_base; sole frame: robot/model.hpp
   std::array<double, kFootCount> contact_probability{};
   Vec3 position_sigma_m = Vec3::Zero();  // of world_p_base
+  Vec3 velocity_sigma_mps = Vec3::Zero();
   double yaw_sigma_rad = 0.0;
   double tilt_sigma_rad = 0.0;   // of odom's roll and pitch against those of the start
   std::int64_t lio_age_ns = -1;  // since the stamp of the last accepted LIO pose; -1: none yet

@@ -9,7 +9,12 @@
 namespace polygmap {
 namespace {
 
-constexpr double kInnovationMemory_s = 1.0;
+template <typename Square>
+void symmetrise(Square& P) noexcept {
+  for (int j = 0; j < P.cols(); ++j) {
+    for (int i = 0; i < j; ++i) P(i, j) = P(j, i) = 0.5 * (P(i, j) + P(j, i));
+  }
+}
 
 int of_foot(int first, std::size_t foot) noexcept { return first + 3 * static_cast<int>(foot); }
 
@@ -26,7 +31,7 @@ void AttitudeFilter::initialise(const Start& start, const std::array<LegMeasurem
   odom_p_base_m_ = start.odom_p_base_m;
   odom_v_base_mps_ = start.odom_v_base_mps;
   gyro_bias_radps_ = start.gyro_bias_radps;
-  accel_bias_mps2_.setZero();
+  accel_bias_mps2_ = start.accel_bias_mps2;
   gravity_mps2_ = start.gravity_mps2;
   P_.setZero();
   const Vec3 attitude_rad2 = Vec3{start.tilt_sigma_rad, start.tilt_sigma_rad, start.yaw_sigma_rad}.cwiseAbs2();
@@ -56,7 +61,8 @@ void AttitudeFilter::anchor(std::size_t foot, const LegMeasurement& leg) noexcep
   if (leg.sole_known) copy(of_foot(kSole, foot), kAttitude, math::square(params_.foot_sigma_rad));
 }
 
-void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion) noexcept {
+void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion,
+                             const ImuNoiseDensity& noise) noexcept {
   const Vec3 turn_rad = (gyro_radps - gyro_bias_radps_) * dt_s;
   constexpr double kLeg_m = 0.5;
   const double speed_mps = odom_v_base_mps_.norm() + kLeg_m * turn_rad.norm() / dt_s;
@@ -64,10 +70,11 @@ void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, dou
   const Vec3 force_mps2 = odom_R_base_ * so3_exp(0.5 * turn_rad) * (accel_mps2 - accel_bias_mps2_);
   const Vec3 odom_a_mps2 = force_mps2 - Vec3{0, 0, gravity_mps2_};
   const double dynamic_mpsrs = params_.dynamic_accel_share * odom_a_mps2.norm() * math::sqrt(dt_s);
-  predict_covariance(
-      params_.gyro_noise_radprs + (motion == Motion::kUnfelt ? params_.lost_gyro_noise_radprs : 0.0),
-      params_.accel_noise_mpsrs + dynamic_mpsrs + (motion == Motion::kFelt ? 0.0 : params_.lost_accel_noise_mpsrs),
-      dt_s);
+  predict_covariance(std::max(params_.gyro_noise_radprs, noise.gyro_radprs) +
+                         (motion == Motion::kUnfelt ? params_.lost_gyro_noise_radprs : 0.0),
+                     std::max(params_.accel_noise_mpsrs, noise.accel_mpsrs) + dynamic_mpsrs +
+                         (motion == Motion::kFelt ? 0.0 : params_.lost_accel_noise_mpsrs),
+                     dt_s);
   odom_p_base_m_ += dt_s * (odom_v_base_mps_ + 0.5 * dt_s * odom_a_mps2);
   odom_v_base_mps_ += dt_s * odom_a_mps2;
   odom_R_base_ = so3_renormalised(odom_R_base_ * so3_exp(turn_rad));
@@ -109,10 +116,12 @@ void AttitudeFilter::predict_covariance(double gyro_noise_radprs, double accel_n
   P_.diagonal().segment<3>(kVelocity).array() += math::square(accel_noise_mpsrs) * dt_s;
   P_.diagonal().segment<3>(kGyroBias).array() += math::square(params_.gyro_bias_walk_radpsrs) * dt_s;
   P_.diagonal().segment<3>(kAccelBias).array() += math::square(params_.accel_bias_walk_mps2rs) * dt_s;
+  symmetrise(P_);  // rows and columns round differently
 }
 
 void AttitudeFilter::correct_by_feet(const std::array<LegMeasurement, kFootCount>& legs,
                                      const std::array<FootContact, kFootCount>& contacts, double dt_s) noexcept {
+  position_rows_ = sole_rows_ = {};
   const double walk_mprs = std::max(pace_ * contact_walk_mprs_, params_.min_contact_walk_mprs);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     const LegMeasurement& leg = legs[foot];
@@ -131,21 +140,22 @@ void AttitudeFilter::correct_by_feet(const std::array<LegMeasurement, kFootCount
       const double s_m2 = P_(contact, contact) + P_(kPosition, kPosition) - 2.0 * P_(contact, kPosition);
       measure_walk(foot, off_m, s_m2 + math::square(leg.position_sigma_m), dt_s);
     }
-    correct(contact, kPosition, off_m, math::square(leg.position_sigma_m), dt_s);
+    correct(contact, kPosition, off_m, math::square(leg.position_sigma_m), position_rows_);
     if (!leg.sole_known) continue;
     P_.diagonal().segment<3>(sole).array() += dt_s * math::square(params_.foot_walk_radprs) / share;
     const Vec3 off_rad = so3_log(odom_R_base_ * leg.base_T_sole.R * odom_R_foot_[foot].transpose());
-    correct(sole, kAttitude, off_rad, math::square(params_.foot_sigma_rad), dt_s);
+    correct(sole, kAttitude, off_rad, math::square(params_.foot_sigma_rad), sole_rows_);
   }
 }
 
-void AttitudeFilter::correct(int plus, int minus, const Vec3& innovation, double variance, double dt_s) noexcept {
+void AttitudeFilter::correct(int plus, int minus, const Vec3& innovation, double variance,
+                             NormalisedRows& rows) noexcept {
   double ratio = 0.0;
   for (int i = 0; i < 3; ++i) {
     const double s = P_(plus + i, plus + i) + P_(minus + i, minus + i) - 2.0 * P_(plus + i, minus + i) + variance;
-    ratio += math::square(innovation[i]) / (3.0 * s);
+    if (s > 0.0) ratio += math::square(innovation[i]) / (3.0 * s);
   }
-  innovation_ratio_ += (std::min(ratio, 100.0) - innovation_ratio_) * dt_s / (kInnovationMemory_s + dt_s);
+  rows.take(3.0 * ratio, 3);
   const double sigmas = math::sqrt(ratio) / params_.outlier_sigmas;
   if (sigmas > 1.0) {
     ++outliers_;
@@ -155,6 +165,7 @@ void AttitudeFilter::correct(int plus, int minus, const Vec3& innovation, double
   for (int i = 0; i < 3; ++i) {
     Vector PHt = P_.col(plus + i) - P_.col(minus + i);
     const double s = PHt[plus + i] - PHt[minus + i] + variance;
+    if (!(s > 0.0)) continue;
     const double inverse_root = 1.0 / math::sqrt(s);
     PHt *= inverse_root;
     error += PHt * (inverse_root * (innovation[i] - (error[plus + i] - error[minus + i])));
@@ -204,7 +215,9 @@ Eigen::Matrix<double, 9, 9> AttitudeFilter::covariance() const noexcept {
   J.block<3, 3>(6, 0).setIdentity();
   // Products of this size would go through Eigen's blocking and its heap.
   const Square JP = J.lazyProduct(P_.topLeftCorner<9, 9>());
-  return JP.lazyProduct(J.transpose());
+  Square P = JP.lazyProduct(J.transpose());
+  symmetrise(P);
+  return P;
 }
 
 double AttitudeFilter::velocity_sigma_mps() const noexcept {

@@ -13,6 +13,8 @@
 #include <algorithm>
 
 #include "algorithms/estimation/contacts.hpp"
+#include "algorithms/estimation/imu_noise.hpp"
+#include "algorithms/estimation/innovation.hpp"
 #include "algorithms/estimation/leg_measurement.hpp"
 
 namespace polygmap {
@@ -20,8 +22,8 @@ namespace polygmap {
 class AttitudeFilter {
  public:
   struct Params {
-    double gyro_noise_radprs = 1e-4;  // rad/sqrt(s); 2e-3 rad/s at 500 Hz is 0.9e-4
-    double accel_noise_mpsrs = 3e-3;  // m/s/sqrt(s); 0.05 m/s^2 at 500 Hz is 2.2e-3
+    double gyro_noise_radprs = 1e-4;  // at least, rad/sqrt(s); 2e-3 rad/s at 500 Hz is 0.9e-4
+    double accel_noise_mpsrs = 3e-3;  // at least, m/s/sqrt(s); 0.05 m/s^2 at 500 Hz is 2.2e-3
     double lost_accel_noise_mpsrs = 2.0;
     double lost_gyro_noise_radprs = 0.1;   // of a walking base whose turning nobody feels: 0.03 rad in 0.1 s
     double dynamic_accel_share = 0.02;     // of what differs from gravity: sampling, scale, mount
@@ -44,6 +46,7 @@ class AttitudeFilter {
     Vec3 odom_p_base_m = Vec3::Zero();
     Vec3 odom_v_base_mps = Vec3::Zero();
     Vec3 gyro_bias_radps = Vec3::Zero();
+    Vec3 accel_bias_mps2 = Vec3::Zero();
     double gravity_mps2 = kGravity_mps2;
     double tilt_sigma_rad = 1e-4;
     double yaw_sigma_rad = 1e-4;
@@ -60,7 +63,9 @@ class AttitudeFilter {
     kVelocityLost,  // felt, but no foot has rested for so long that the velocity is not known
     kUnfelt         // the IMU is silent: rates are guesses
   };
-  void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion) noexcept;
+  // noise: as measured of this IMU.
+  void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion,
+               const ImuNoiseDensity& noise = {}) noexcept;
   // A foot that does not stand is anchored anew.
   void correct_by_feet(const std::array<LegMeasurement, kFootCount>& legs,
                        const std::array<FootContact, kFootCount>& contacts, double dt_s) noexcept;
@@ -78,9 +83,10 @@ class AttitudeFilter {
   [[nodiscard]] double yaw_sigma_rad() const noexcept { return math::sqrt(P_(kAttitude + 2, kAttitude + 2)); }
   // Of position, velocity and attitude in odom axes, in this order: of what is true minus what is estimated.
   [[nodiscard]] Eigen::Matrix<double, 9, 9> covariance() const noexcept;
-  [[nodiscard]] double velocity_sigma_mps() const noexcept;
-  // Mean of the squared innovations over their variances, recent: 1 when noise is what it is thought to be.
-  [[nodiscard]] double innovation_ratio() const noexcept { return innovation_ratio_; }
+  [[nodiscard]] double velocity_sigma_mps() const noexcept;  // of the axis that is known worst
+  // Of the last correction.
+  [[nodiscard]] const NormalisedRows& position_rows() const noexcept { return position_rows_; }
+  [[nodiscard]] const NormalisedRows& sole_rows() const noexcept { return sole_rows_; }
   // Random walk of a resting contact, m/sqrt(s), as measured.
   [[nodiscard]] double contact_walk_mprs() const noexcept { return contact_walk_mprs_; }
   [[nodiscard]] std::uint32_t outliers() const noexcept { return outliers_; }
@@ -102,7 +108,7 @@ class AttitudeFilter {
   void predict_covariance(double gyro_noise_radprs, double accel_noise_mpsrs, double dt_s) noexcept;
   void anchor(std::size_t foot, const LegMeasurement& leg) noexcept;
   // Three rows: state at `plus` minus state at `minus` is innovation, each of this variance.
-  void correct(int plus, int minus, const Vec3& innovation, double variance, double dt_s) noexcept;
+  void correct(int plus, int minus, const Vec3& innovation, double variance, NormalisedRows& rows) noexcept;
   void apply(const Vector& error) noexcept;
   // A foot rolls and creeps as long as its leg moves, by more or less from robot to robot. Too small a walk shows as
   // innovations that keep their sign.
@@ -126,7 +132,7 @@ class AttitudeFilter {
   std::array<Mat3, kFootCount> odom_R_foot_{Mat3::Identity(), Mat3::Identity()};
   Covariance P_ = Covariance::Zero();
   double gravity_mps2_ = kGravity_mps2;
-  double innovation_ratio_ = 1.0;
+  NormalisedRows position_rows_, sole_rows_;
   std::uint32_t outliers_ = 0;
 };
 

@@ -34,32 +34,37 @@ class AxisFilter {
   }
 
   // Rows B_p_c of eqs (3)-(4): contact minus base, in world axes.
-  void correct_positions(const PerContact& relative_m, const PerContact& variance_m2) noexcept {
+  // These return the innovations' squares over their variances.
+  double correct_positions(const PerContact& relative_m, const PerContact& variance_m2) noexcept {
+    double squares = 0.0;
     for (std::size_t c = 0; c < kContactCount; ++c) {
       const int i = kFirstContact + static_cast<int>(c);
       const State PHt = P_.col(i) - P_.col(kPosition);
-      correct(PHt, PHt[i] - PHt[kPosition] + variance_m2[c], relative_m[c] - (x_[i] - x_[kPosition]));
+      squares += correct(PHt, PHt[i] - PHt[kPosition] + variance_m2[c], relative_m[c] - (x_[i] - x_[kPosition]));
     }
+    return squares;
   }
   // Rows B_v_c: a standing contact moves against the base at minus the base's velocity. All eight observe this one
   // number, so their mean by information is the same update.
-  void correct_velocities(const PerContact& relative_mps, const PerContact& variance_m2ps2) noexcept {
+  double correct_velocities(const PerContact& relative_mps, const PerContact& variance_m2ps2) noexcept {
     double information = 0.0, weighted = 0.0;
     for (std::size_t c = 0; c < kContactCount; ++c) {
       information += 1.0 / variance_m2ps2[c];
       weighted -= relative_mps[c] / variance_m2ps2[c];
     }
     const State PHt = P_.col(kVelocity);
-    correct(PHt, PHt[kVelocity] + 1.0 / information, weighted / information - x_[kVelocity]);
+    return correct(PHt, PHt[kVelocity] + 1.0 / information, weighted / information - x_[kVelocity]);
   }
   // Rows h_c, of the vertical axis. A negative variance: nothing known of that contact's height.
-  void correct_heights(const PerContact& height_m, const PerContact& variance_m2) noexcept {
+  double correct_heights(const PerContact& height_m, const PerContact& variance_m2) noexcept {
+    double squares = 0.0;
     for (std::size_t c = 0; c < kContactCount; ++c) {
       if (variance_m2[c] < 0.0) continue;
       const int i = kFirstContact + static_cast<int>(c);
       const State PHt = P_.col(i);
-      correct(PHt, PHt[i] + variance_m2[c], height_m[c] - x_[i]);
+      squares += correct(PHt, PHt[i] + variance_m2[c], height_m[c] - x_[i]);
     }
+    return squares;
   }
 
   [[nodiscard]] double position_m() const noexcept { return x_[kPosition]; }
@@ -73,13 +78,15 @@ class AxisFilter {
   enum Index : int { kPosition, kVelocity, kFirstContact };
 
   // By value: the caller's column is about to change.
-  void correct(const State PHt, double innovation_variance, double innovation) noexcept {
+  double correct(const State PHt, double innovation_variance, double innovation) noexcept {
+    if (!(innovation_variance > 0.0)) return 0.0;  // no measurement could be as sure as that
     const double inverse = 1.0 / innovation_variance;
     x_ += PHt * (innovation * inverse);
     for (int j = 0; j < kStates; ++j) {
       const double scaled = PHt[j] * inverse;
       for (int i = 0; i <= j; ++i) P_(i, j) = P_(j, i) = P_(i, j) - PHt[i] * scaled;
     }
+    return innovation * innovation * inverse;
   }
 
   State x_ = State::Zero();

@@ -96,6 +96,7 @@ void BaseFilter::predict(const Vec3& odom_a_base_mps2, double dt_s, const Contac
 }
 
 void BaseFilter::correct(const ContactRows& rows) noexcept {
+  velocity_rows_ = height_rows_ = {};
   AxisFilter::PerContact value, variance;
   for (int a = 0; a < 3; ++a) {
     AxisFilter& axis = axes_[static_cast<std::size_t>(a)];
@@ -108,13 +109,15 @@ void BaseFilter::correct(const ContactRows& rows) noexcept {
       value[c] = rows[c].odom_dr_contact_mps[a];
       variance[c] = rows[c].velocity_m2ps2;
     }
-    axis.correct_velocities(value, variance);
+    velocity_rows_.take(axis.correct_velocities(value, variance), 1);
   }
   for (std::size_t c = 0; c < kContactCount; ++c) {
     value[c] = rows[c].height_m;
     variance[c] = rows[c].height_m2;
   }
-  axes_[2].correct_heights(value, variance);
+  const auto known =
+      std::count_if(rows.begin(), rows.end(), [](const ContactRow& row) { return row.height_m2 >= 0.0; });
+  height_rows_.take(axes_[2].correct_heights(value, variance), static_cast<std::uint32_t>(known));
 }
 
 }  // namespace polygmap

@@ -5,6 +5,7 @@
 
 #include "algorithms/estimation/axis_filter.hpp"
 #include "algorithms/estimation/contacts.hpp"
+#include "algorithms/estimation/innovation.hpp"
 #include "algorithms/estimation/leg_measurement.hpp"
 
 namespace polygmap {
@@ -64,6 +65,9 @@ class BaseFilter {
   [[nodiscard]] Vec3 odom_p_contact_m(std::size_t contact) const noexcept {
     return {axes_[0].contact_m(contact), axes_[1].contact_m(contact), axes_[2].contact_m(contact)};
   }
+  // Of the last correction.
+  [[nodiscard]] const NormalisedRows& velocity_rows() const noexcept { return velocity_rows_; }
+  [[nodiscard]] const NormalisedRows& height_rows() const noexcept { return height_rows_; }
   [[nodiscard]] const AxisFilter& axis(std::size_t i) const noexcept { return axes_[i]; }
   [[nodiscard]] const Params& params() const noexcept { return params_; }
   // Variances of one step of the base's own states: position, velocity.
@@ -82,6 +86,7 @@ class BaseFilter {
 
   Params params_;
   std::array<AxisFilter, 3> axes_;
+  NormalisedRows velocity_rows_, height_rows_;
 };
 
 }  // namespace polygmap

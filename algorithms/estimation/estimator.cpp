@@ -16,10 +16,12 @@ void Estimator::reset(const Params& params) noexcept {
   counters_ = {};
   standstill_.reset(params.standstill);
   contacts_.reset(params.contacts);
+  imu_noise_.reset();
   forces_.reset(params.forces);
   odometry_.reset(params);
   ring_.clear();
   state_ = {};
+  quality_ = {};
   imu_ = {};
   joints_ = {};
   new_imus_ = 0;
@@ -52,7 +54,8 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   if (dt_s > params_.max_step_s) ++counters_.gaps;
   // The last rates bridge a short silence of the IMU; beyond it the feet alone say how the base moves.
   const bool felt = seconds(now_ns - imu_.stamp_ns) <= params_.max_step_s;
-  odometry_.step({dt_s, imu_.gyro_radps, imu_.accel_mps2, felt, new_joints}, legs_, contacts_.feet(), ground_);
+  odometry_.step({now_ns, dt_s, imu_.gyro_radps, imu_.accel_mps2, felt, new_joints, imu_noise_.density()}, legs_,
+                 contacts_.feet(), ground_);
   publish(now_ns);
   if (seconds(now_ns - state_.oldest_input_ns) <= params_.max_step_s) ring_.push(state_);
 }
@@ -101,6 +104,7 @@ void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
     ++counters_.imu_stale;
     return;
   }
+  imu_noise_.update(imu.stamp_ns, imu.gyro_radps, imu.accel_mps2);
   const Vec3 gyro_radps = imu_.gyro_radps, accel_mps2 = imu_.accel_mps2;
   imu_ = imu;
   if (++new_imus_ > 1) {  // samples come evenly
@@ -192,10 +196,11 @@ void Estimator::calibrate() noexcept {
 }
 
 void Estimator::publish(std::int64_t now_ns) noexcept {
-  state_.stamp_ns = now_ns;
+  state_.stamp_ns = counters_.stamp_ns = quality_.stamp_ns = now_ns;
   state_.oldest_input_ns = std::min(imu_.stamp_ns, joints_.stamp_ns);
   if (state_.initialised) {
     odometry_.describe(now_ns, state_);
+    odometry_.describe(now_ns, quality_);
   } else {
     state_.odom_T_base = initial_odom_T_base_;
   }

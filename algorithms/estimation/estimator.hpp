@@ -26,6 +26,7 @@ class Estimator {
     double floor_sigma_m = 0.003;              // of the floor under the feet at the start
   };
   struct Counters {
+    std::int64_t stamp_ns = 0;  // of the last tick's state
     std::uint32_t ticks = 0;
     std::uint32_t imu_invalid = 0;  // not finite or out of range
     std::uint32_t imu_stale = 0;    // no newer stamp than the last
@@ -69,6 +70,8 @@ class Estimator {
   [[nodiscard]] bool try_state_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {
     return ring_.try_at(stamp_ns, out);
   }
+  // Of that state; stamped with it.
+  [[nodiscard]] const EstimateQuality& quality() const noexcept { return quality_; }
   [[nodiscard]] const LioInnovations& lio_innovations() const noexcept { return odometry_.fusion().innovations(); }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
   [[nodiscard]] const Vec3& gyro_bias_radps() const noexcept { return odometry_.attitude().gyro_bias_radps(); }
@@ -82,10 +85,12 @@ class Estimator {
   Counters counters_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;
+  ImuNoise imu_noise_;
   ForceInference forces_;
   Odometry odometry_;
   StateRing ring_;
   StateEstimate state_;
+  EstimateQuality quality_;
   ImuSample imu_;               // last accepted; rates: the mean of those of its tick
   JointFeedback joints_;        // last accepted
   std::uint32_t new_imus_ = 0;  // accepted since the last tick

@@ -10,6 +10,7 @@
 #include <array>
 
 #include "algorithms/core/samples.hpp"
+#include "algorithms/estimation/noise_level.hpp"
 
 namespace polygmap {
 
@@ -19,19 +20,17 @@ class FootMotion {
     double speed_sigma_mps = 0.04;  // wanted of the measured speed: how long to average follows from the noise
     double min_window_s = 0.010;
     double max_window_s = 0.060;
-    double noise_memory_s = 0.5;  // of the measured position noise
-    double min_position_sigma_m = 3e-4;
-    double max_position_sigma_m = 0.02;
-    double first_position_sigma_m = 1e-3;
-    double rest_sigma_mps = 0.05;  // of a foot that rests: it rolls and creeps
-    double rest_sigmas = 3.0;      // a speed below this many of its sigmas is rest
-    double gain = 4.0;             // of the walk that a speed stands for: speed^2 times the window
+    NoiseLevel::Params noise{1e-3, 0.0, 2.0, 3e-4, 0.02};  // of a resting foot's position, m
+    double rest_sigma_mps = 0.05;                          // of a foot that rests: it rolls and creeps
+    double rest_sigmas = 3.0;                              // a speed below this many of its sigmas is rest
+    double gain = 4.0;  // of the walk that a speed stands for: speed^2 times the window
   };
   void reset(const Params& params) noexcept;
 
   // odom_step_m: by how much the foot moved over the ground in this step of dt_s, the base as predicted by the IMU from
-  // the last corrected state. speed_sigma_mps: of the base's velocity, one sigma.
-  void update(std::size_t foot, const Vec3& odom_step_m, double speed_sigma_mps, double dt_s) noexcept;
+  // the last corrected state. speed_sigma_mps: of the base's velocity, one sigma. A foot in the air says nothing of
+  // noise.
+  void update(std::size_t foot, const Vec3& odom_step_m, double speed_sigma_mps, bool stands, double dt_s) noexcept;
 
   // The foot is known to rest from now on, whatever it did before.
   void rest(std::size_t foot) noexcept { feet_[foot] = {}; }
@@ -39,7 +38,7 @@ class FootMotion {
   // Random walk of the contact that its motion stands for, m^2/s, 0 at rest.
   [[nodiscard]] double walk_m2ps(std::size_t foot) const noexcept { return feet_[foot].walk_m2ps; }
   // White noise of one foot position, per axis, measured from its jitter.
-  [[nodiscard]] double position_sigma_m() const noexcept { return position_sigma_m_; }
+  [[nodiscard]] double position_sigma_m() const noexcept { return noise_m_.sigma(); }
 
  private:
   struct Track {
@@ -48,12 +47,10 @@ class FootMotion {
     double walk_m2ps = 0.0;
     bool has_step = false;
   };
-  void measure_noise(const Vec3& jerk_m, double dt_s) noexcept;
 
   Params params_;
   std::array<Track, kFootCount> feet_{};
-  double position_sigma_m_ = 0.0;
-  double noise_time_s_ = 0.0;
+  NoiseLevel noise_m_;
 };
 
 }  // namespace polygmap

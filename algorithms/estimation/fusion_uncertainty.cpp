@@ -21,11 +21,11 @@ void FusionUncertainty::reset(const Params& params) noexcept {
   start_variance_ = variances(params.initial_sigma_m, params.initial_sigma_rad);
 }
 
-void FusionUncertainty::move(const Vec3& world_step_m, double dt_s) noexcept {
+void FusionUncertainty::move(const Vec3& world_step_m) noexcept {
   const double drift_m = params_.drift_per_m * world_step_m.norm();
   const double yaw_sigma_rad = math::sqrt(offset_variance()[kYaw]);
   bent_m_ += yaw_sigma_rad * Vec3{-world_step_m.y(), world_step_m.x(), 0.0};
-  lag_ += Quantities{drift_m, drift_m, drift_m, params_.drift_yaw_radps * dt_s};
+  lag_ += Quantities{drift_m, drift_m, drift_m, 0.0};
 }
 
 void FusionUncertainty::blend(double gain, double lio_sigma_m, double lio_sigma_rad) noexcept {

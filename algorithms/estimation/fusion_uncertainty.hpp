@@ -10,10 +10,9 @@ namespace polygmap {
 class FusionUncertainty {
  public:
   struct Params {
-    // Of 20 simulated climbs, whose odometry alone ends 9, 15 and 16 mm off after 7.4 m of way and 10 mrad after 39 s:
-    // with these the fused position's squared error over its variance is 2.6 in the mean, of 3 that are honest.
-    double drift_per_m = 0.0013;  // per axis, besides what the heading does
-    double drift_yaw_radps = 2e-4;
+    // What no filter sees, legs that are longer than thought: per axis, besides what the heading does. The rest of the
+    // drift is what the odometry's filter says (follow).
+    double drift_per_m = 0.0013;
     double initial_sigma_m = 1e-3;
     double initial_sigma_rad = 1e-3;
   };
@@ -22,9 +21,15 @@ class FusionUncertainty {
 
   void reset(const Params& params) noexcept;
   // Odometry alone, one tick: it errs alike all the way, so sigmas add up, and a wrong heading bends the way.
-  void move(const Vec3& world_step_m, double dt_s) noexcept;
-  // What the odometry's own filter says that its variances grew by, besides what the heading does.
-  void grow(const Quantities& variance) noexcept { walk_variance_ += variance; }
+  void move(const Vec3& world_step_m) noexcept;
+  // The odometry's own variances, besides what the heading does, as its filter has them now: what they grew by adds to
+  // the walk, what they shrink by is taken off it.
+  void follow(const Quantities& odometry) noexcept {
+    walk_variance_ = (walk_variance_ + odometry - odometry_variance_).cwiseMax(0.0);
+    odometry_variance_ = odometry;
+  }
+  // The odometry starts, with these.
+  void begin(const Quantities& odometry) noexcept { odometry_variance_ = odometry; }
   // A LIO pose of these sigmas, blended in with the gain of eq. (9).
   void blend(double gain, double lio_sigma_m, double lio_sigma_rad) noexcept;
   // LIO's world is tied to ours anew, from here on: with these sigmas, the base at world_p_base.
@@ -50,6 +55,7 @@ class FusionUncertainty {
   Quantities lag_ = Quantities::Zero();             // drift since then that the low-pass has not followed yet, sigmas
   Vec3 bent_m_ = Vec3::Zero();                      // the same of a wrong heading: signed, so that sway cancels
   Quantities walk_variance_ = Quantities::Zero();   // the same of drift that has no direction
+  Quantities odometry_variance_ = Quantities::Zero();
   Quantities noise_variance_ = Quantities::Zero();  // LIO's that came through
   Quantities tie_covariance_ = Quantities::Zero();  // of the tie's error with the odometry's
   Quantities tie_variance_ = Quantities::Zero();    // LIO's share at the tie, which stays ...

@@ -7,7 +7,16 @@
 namespace polygmap {
 namespace {
 
-constexpr double kGapEnd_s = 0.002;  // the rates of a gap's last sample hold for so long
+constexpr double kGapEnd_s = 0.002;     // the rates of a gap's last sample hold for so long
+constexpr int kVelocity = 3, kYaw = 8;  // in the covariance
+
+// Of x, y, z besides what the heading does, and of yaw.
+FusionUncertainty::Quantities fusion_variances(const Eigen::Matrix<double, 9, 9>& P) noexcept {
+  FusionUncertainty::Quantities v;
+  v.head<3>() = P.diagonal().head<3>() - P.col(kYaw).head<3>().cwiseAbs2() / P(kYaw, kYaw);
+  v[3] = P(kYaw, kYaw);
+  return v;
+}
 
 }  // namespace
 
@@ -22,10 +31,14 @@ void Odometry::reset(const Params& params) noexcept {
   since_legs_s_ = unrested_s_ = 0.0;
   feet_lost_ = false;
   base_w_base_radps_.setZero();
+  covariance_.setZero();
+  innovations_ = {};
 }
 
 void Odometry::initialise(const AttitudeFilter::Start& start, const Legs& legs, double dt_s) noexcept {
   attitude_.initialise(start, legs);
+  covariance_ = attitude_.covariance();
+  fusion_.begin(fusion_variances(covariance_));
   soles_known_ = legs[0].sole_known && legs[1].sole_known;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) odom_p_foot_m_[foot] = odom_p_foot_m(legs[foot]);
   since_legs_s_ = 0.0;
@@ -69,7 +82,7 @@ void Odometry::step(const Step& whole, const Legs& legs, const Contacts& contact
   const auto motion = !step.felt                     ? AttitudeFilter::Motion::kUnfelt
                       : unrested_s_ > params_.lost_s ? AttitudeFilter::Motion::kVelocityLost
                                                      : AttitudeFilter::Motion::kFelt;
-  attitude_.predict(gyro_radps, accel_mps2, step.dt_s, motion);
+  attitude_.predict(gyro_radps, accel_mps2, step.dt_s, motion, step.imu_noise);
   since_legs_s_ += step.dt_s;
   contacts_ = contacts;
   const bool feet_lost = feet_lost_;
@@ -88,6 +101,9 @@ void Odometry::step(const Step& whole, const Legs& legs, const Contacts& contact
     base_.predict(step.felt ? odom_a_base_mps2 : Vec3::Zero(), step.dt_s, rows);
     if (step.new_legs) base_.correct(rows);
   }
+  count_innovations(step);
+  covariance_ = attitude_.covariance();
+  fusion_.follow(fusion_variances(covariance_));
   fusion_.tick({attitude_.odom_R_base(), odom_p_base_m()}, odom_p_base_m() - before_m, whole.dt_s);
 }
 
@@ -101,11 +117,12 @@ void Odometry::take_legs(const Legs& legs) noexcept {
       motion_.rest(foot);
       contact.landed = contact.stands;
     } else {
-      motion_.update(foot, odom_p_foot_m(legs[foot]) - odom_p_foot_m_[foot], velocity_sigma_mps, since_legs_s_);
+      motion_.update(foot, odom_p_foot_m(legs[foot]) - odom_p_foot_m_[foot], velocity_sigma_mps, contact.stands,
+                     since_legs_s_);
     }
     // Where force says when a sole landed and kinematics where, its swing is no reason to let go of it.
-    if (legs[foot].sole_known && (!contact.stands || contact.landed)) motion_.rest(foot);
-    const double doubt = 1.0 / std::max(contact.probability, 0.01) - 1.0;
+    if (!contact.stands || contact.landed) motion_.rest(foot);
+    const double doubt = std::max(params_.sure_contact / std::max(contact.probability, 0.01) - 1.0, 0.0);
     contact.walk_m2ps = motion_.walk_m2ps(foot) + params_.doubtful_walk_m2ps * doubt;
     stands = stands || contact.stands;
     rests = rests || (contact.stands && motion_.walk_m2ps(foot) <= 0.0);
@@ -116,16 +133,44 @@ void Odometry::take_legs(const Legs& legs) noexcept {
   since_legs_s_ = 0.0;
 }
 
+void Odometry::count_innovations(const Step& step) noexcept {
+  if (!step.new_legs) return;
+  const auto take = [&](MeasurementGroup group, const NormalisedRows& rows) {
+    innovations_[static_cast<std::size_t>(group)].take(rows, step.stamp_ns);
+  };
+  take(MeasurementGroup::kFootPosition, attitude_.position_rows());
+  take(MeasurementGroup::kSoleAttitude, attitude_.sole_rows());
+  if (!soles_known_) return;
+  take(MeasurementGroup::kFootVelocity, base_.velocity_rows());
+  take(MeasurementGroup::kTreadHeight, base_.height_rows());
+}
+
 void Odometry::describe(std::int64_t now_ns, StateEstimate& state) const noexcept {
   state.odom_T_base = {attitude_.odom_R_base(), odom_p_base_m()};
   state.odom_v_base_mps = soles_known_ ? base_.odom_v_base_mps() : attitude_.odom_v_base_mps();
   state.base_w_base_radps = base_w_base_radps_;
   state.world_T_odom = fusion_.world_T_odom();
   state.position_sigma_m = fusion_.position_sigma_m();
+  state.velocity_sigma_mps = covariance_.diagonal().segment<3>(kVelocity).cwiseSqrt();
   state.yaw_sigma_rad = fusion_.yaw_sigma_rad();
   state.tilt_sigma_rad = attitude_.tilt_sigma_rad();
   state.lio_age_ns = fusion_.last_accepted_ns() < 0 ? -1 : now_ns - fusion_.last_accepted_ns();
   for (std::size_t foot = 0; foot < kFootCount; ++foot) state.contact_probability[foot] = contacts_[foot].probability;
+}
+
+// The attitude filter's correlations, with the fusion's sigmas for what LIO corrects.
+void Odometry::describe(std::int64_t now_ns, EstimateQuality& quality) const noexcept {
+  quality.stamp_ns = now_ns;
+  Eigen::Matrix<double, 9, 1> scale = Eigen::Matrix<double, 9, 1>::Ones();
+  for (int i = 0; i < 3; ++i) scale[i] = fusion_.position_sigma_m()[i] / math::sqrt(covariance_(i, i));
+  scale[kYaw] = fusion_.yaw_sigma_rad() / math::sqrt(covariance_(kYaw, kYaw));
+  for (int j = 0; j < 9; ++j) {
+    for (int i = 0; i < 9; ++i) quality.covariance(i, j) = scale[i] * scale[j] * covariance_(i, j);
+  }
+  quality.innovations = innovations_;
+  quality.innovations[static_cast<std::size_t>(MeasurementGroup::kLioPosition)] = fusion_.innovations().position;
+  quality.innovations[static_cast<std::size_t>(MeasurementGroup::kLioYaw)] = fusion_.innovations().yaw;
+  quality.outliers = attitude_.outliers();
 }
 
 }  // namespace polygmap

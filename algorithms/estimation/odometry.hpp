@@ -10,6 +10,7 @@
 #include "algorithms/core/state.hpp"
 #include "algorithms/estimation/attitude_filter.hpp"
 #include "algorithms/estimation/base_filter.hpp"
+#include "algorithms/estimation/estimate_quality.hpp"
 #include "algorithms/estimation/foot_motion.hpp"
 #include "algorithms/estimation/odometry_fusion.hpp"
 #include "algorithms/estimation/state_ring.hpp"
@@ -25,19 +26,22 @@ class Odometry {
     OdometryFusion::Params fusion;
     double max_rate_radps = 20.0;  // IMU samples beyond these are invalid
     double max_accel_mps2 = 100.0;
-    double max_step_s = 0.05;  // a longer gap is bridged without feeling; older rates are not believed
-    double max_gap_s = 5.0;    // bridged by no more than this
-    double coast_s = 1.0;      // the base is thought to stop within about this time when nothing is felt for long
-    double lost_s = 0.25;      // a standing robot none of whose feet rest for so long has lost its velocity
-    double doubtful_walk_m2ps = 1e-3;  // random walk of a contact as likely as not: 1 mm in 1 ms
+    double max_step_s = 0.05;   // a longer gap is bridged without feeling; older rates are not believed
+    double max_gap_s = 5.0;     // bridged by no more than this
+    double coast_s = 1.0;       // the base is thought to stop within about this time when nothing is felt for long
+    double lost_s = 0.25;       // a standing robot none of whose feet rest for so long has lost its velocity
+    double sure_contact = 0.8;  // a probability at and above is as good as certain
+    double doubtful_walk_m2ps = 1e-3;  // random walk of a contact half as likely as that: 1 mm in 1 ms
   };
   // What is new since the last step. Rates hold over dt.
   struct Step {
+    std::int64_t stamp_ns = 0;
     double dt_s = 0.0;
     Vec3 gyro_radps = Vec3::Zero();
     Vec3 accel_mps2 = Vec3::Zero();
     bool felt = true;      // false: the IMU is silent, and the feet alone say how the base moves
     bool new_legs = true;  // false: the legs are silent
+    ImuNoiseDensity imu_noise;
   };
   using Legs = std::array<LegMeasurement, kFootCount>;
   using Contacts = std::array<FootContact, kFootCount>;
@@ -54,6 +58,7 @@ class Odometry {
   void step(const Step& step, const Legs& legs, const Contacts& contacts, const Ground& ground) noexcept;
   // Fills in pose, twist, sigmas and LIO's share, as of now_ns.
   void describe(std::int64_t now_ns, StateEstimate& state) const noexcept;
+  void describe(std::int64_t now_ns, EstimateQuality& quality) const noexcept;
 
   [[nodiscard]] const AttitudeFilter& attitude() const noexcept { return attitude_; }
   [[nodiscard]] const BaseFilter& base() const noexcept { return base_; }
@@ -66,13 +71,14 @@ class Odometry {
     return attitude_.odom_p_base_m() + attitude_.odom_R_base() * leg.base_T_sole.p_m;
   }
 
-  Params params_;
   void bridge(double gap_s) noexcept;
   void take_legs(const Legs& legs) noexcept;
+  void count_innovations(const Step& step) noexcept;
   [[nodiscard]] Vec3 odom_p_base_m() const noexcept {
     return soles_known_ ? base_.odom_p_base_m() : attitude_.odom_p_base_m();
   }
 
+  Params params_;
   AttitudeFilter attitude_;
   BaseFilter base_;
   FootMotion motion_;
@@ -84,6 +90,8 @@ class Odometry {
   bool feet_lost_ = false;  // by a gap, until the next legs
   bool soles_known_ = true;
   Vec3 base_w_base_radps_ = Vec3::Zero();
+  Eigen::Matrix<double, 9, 9> covariance_ = Eigen::Matrix<double, 9, 9>::Zero();  // of the attitude filter
+  std::array<InnovationStatistics, kMeasurementGroupCount> innovations_{};        // LIO's: the fusion has them
 };
 
 }  // namespace polygmap

@@ -16,6 +16,12 @@ bool plausible_sigma(const Vec3& sigma, double max) noexcept {
 }
 double stated_or(double stated, double otherwise) noexcept { return stated > 0.0 ? stated : otherwise; }
 
+// Gravity tells the odometry its tilt, for good, better than a pose of LIO can: of its rotation yaw alone is news.
+Transform turned_by_yaw(const Transform& predicted, const Transform& measured) noexcept {
+  const double yaw_rad = so3_log(measured.R * predicted.R.transpose()).z();
+  return {rotation_z(yaw_rad) * predicted.R, measured.p_m};
+}
+
 double share_within(double length, double limit) noexcept { return length > limit ? limit / length : 1.0; }
 
 }  // namespace
@@ -36,6 +42,8 @@ void OdometryFusion::reset(const Params& params) noexcept {
   *this = OdometryFusion{};
   params_ = params;
   uncertainty_.reset(params.uncertainty);
+  position_noise_m_.reset(params.unstated_position_m);
+  rotation_noise_rad_.reset(params.unstated_rotation_rad);
   position_sigma_m_ = uncertainty_.position_sigma_m(Vec3::Zero());
 }
 
@@ -64,6 +72,7 @@ LioVerdict OdometryFusion::fuse(const LioSample& sample, const Transform& odom_T
     world_T_lio_ = odom_T_base * lio_T_base.inverse();
     count_ = 1;
     last_accepted_ns_ = sample.stamp_ns;
+    last_lio_T_odom_ = world_T_lio_.inverse();
     tie(odom_T_base, sigmas, count_);
     return LioVerdict::kAccepted;
   }
@@ -74,15 +83,18 @@ LioVerdict OdometryFusion::fuse(const LioSample& sample, const Transform& odom_T
   if (is_jump(predicted, measured, silence_s)) {
     if (!try_realign(lio_T_base, odom_T_base, sigmas)) return LioVerdict::kJump;
     last_accepted_ns_ = sample.stamp_ns;
+    last_lio_T_odom_ = lio_T_base * odom_T_base.inverse();
     return LioVerdict::kRealigned;
   }
   jumped_count_ = 0;
   last_accepted_ns_ = sample.stamp_ns;
+  measure_noise(lio_T_base, odom_T_base, silence_s);
 
-  const double gain = complementary_gain(std::min(silence_s, params_.max_gap_s), params_.tau_s);
+  const double gain = complementary_gain(std::min(silence_s, params_.max_gap_s),
+                                         std::max(params_.tau_s, params_.tau_spm * sigmas.position_m));
   if (aligned_) {
     observe(predicted, measured, sigmas, sample.stamp_ns);
-    fused_world_T_odom_ = fuse_pose(predicted, measured, gain) * odom_T_base.inverse();
+    fused_world_T_odom_ = fuse_pose(predicted, turned_by_yaw(predicted, measured), gain) * odom_T_base.inverse();
     fused_world_T_odom_.R = so3_renormalised(fused_world_T_odom_.R);
     uncertainty_.blend(gain, sigmas.position_m, sigmas.rotation_rad);
   } else {
@@ -99,7 +111,7 @@ void OdometryFusion::rebase(const Transform& new_T_old) noexcept {
 }
 
 void OdometryFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept {
-  uncertainty_.move(world_T_odom_.R * odom_step_m, dt_s);
+  uncertainty_.move(world_T_odom_.R * odom_step_m);
   const Transform wanted = fused_world_T_odom_ * odom_T_base;
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
@@ -141,24 +153,34 @@ bool OdometryFusion::try_realign(const Transform& lio_T_base, const Transform& o
 }
 
 OdometryFusion::LioSigmas OdometryFusion::sigmas_of(const LioSample& sample) const noexcept {
-  const double rotation_rad = stated_or(sample.rotation_sigma_rad.maxCoeff(), params_.default_rotation_sigma_rad);
-  const double lidar_m = stated_or(sample.position_sigma_m.maxCoeff(), params_.default_position_sigma_m);
-  const double lever_m = params_.base_T_lidar.p_m.norm() * rotation_rad;
+  const double rotation_rad = stated_or(sample.rotation_sigma_rad.maxCoeff(), rotation_noise_rad_.sigma());
+  const bool stated = sample.position_sigma_m.maxCoeff() > 0.0;  // of the lidar; what is measured is the base's
+  const double lidar_m = stated_or(sample.position_sigma_m.maxCoeff(), position_noise_m_.sigma());
+  const double lever_m = stated ? params_.base_T_lidar.p_m.norm() * rotation_rad : 0.0;
   return {math::sqrt(math::square(lidar_m) + math::square(lever_m)), rotation_rad};
+}
+
+void OdometryFusion::measure_noise(const Transform& lio_T_base, const Transform& odom_T_base,
+                                   double silence_s) noexcept {
+  const Transform expected = last_lio_T_odom_ * odom_T_base;
+  last_lio_T_odom_ = lio_T_base * odom_T_base.inverse();
+  if (silence_s > params_.max_gap_s) return;
+  constexpr double kRows = 2.0 * 3.0;
+  position_noise_m_.take((lio_T_base.p_m - expected.p_m).squaredNorm() / kRows, silence_s);
+  rotation_noise_rad_.take(so3_log(lio_T_base.R * expected.R.transpose()).squaredNorm() / kRows, silence_s);
 }
 
 void OdometryFusion::observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,
                              std::int64_t stamp_ns) noexcept {
   LioInnovations& i = innovations_;
-  i.stamp_ns = stamp_ns;
   i.last.head<3>() = measured.p_m - predicted.p_m;
   i.last[3] = so3_log(measured.R * predicted.R.transpose()).z();
-  LioInnovations::Quantities variance = uncertainty_.offset_variance();
+  FusionUncertainty::Quantities variance = uncertainty_.offset_variance();
   variance.head<3>().array() += math::square(sigmas.position_m);
   variance[3] += math::square(sigmas.rotation_rad);
-  i.normalised_last = i.last.cwiseAbs2().cwiseQuotient(variance);
-  ++i.count;
-  i.normalised_mean += (i.normalised_last - i.normalised_mean) / static_cast<double>(i.count);
+  const FusionUncertainty::Quantities normalised = i.last.cwiseAbs2().cwiseQuotient(variance);
+  i.position.take({normalised.head<3>().sum(), 3}, stamp_ns);
+  i.yaw.take({normalised[3], 1}, stamp_ns);
 }
 
 // Moves LIO's world against ours, so that its pose comes nearer to the odometry's by the tie's share of the innovation.

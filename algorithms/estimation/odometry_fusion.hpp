@@ -13,6 +13,8 @@
 #include "algorithms/core/samples.hpp"
 #include "algorithms/core/transform.hpp"
 #include "algorithms/estimation/fusion_uncertainty.hpp"
+#include "algorithms/estimation/innovation.hpp"
+#include "algorithms/estimation/noise_level.hpp"
 #include "algorithms/robot/model.hpp"
 
 namespace polygmap {
@@ -40,26 +42,23 @@ enum class LioVerdict : std::uint8_t {
 };
 inline constexpr std::size_t kLioVerdictCount = 11;
 
-// How far accepted LIO poses lay from their predictions, once aligned: x, y, z in m and yaw in rad, world axes.
-// Normalised: squared, over its variance; 1 in the mean where all sigmas are honest.
+// How far accepted LIO poses lay from their predictions, once aligned.
 struct LioInnovations {
-  using Quantities = FusionUncertainty::Quantities;
-  std::int64_t stamp_ns = -1;  // of the last one; -1: none yet
-  std::uint32_t count = 0;
-  Quantities last = Quantities::Zero();
-  Quantities normalised_last = Quantities::Zero();
-  Quantities normalised_mean = Quantities::Zero();
+  FusionUncertainty::Quantities last = FusionUncertainty::Quantities::Zero();  // x, y, z in m, yaw in rad, world axes
+  InnovationStatistics position, yaw;
 };
 
 class OdometryFusion {
  public:
   struct Params {
     Transform base_T_lidar = polygmap::base_T_lidar();
-    double max_age_s = 0.4;                  // of a pose on arrival; the state ring holds 0.5 s
-    double tau_s = 4.0;                      // LIO of 10 mm at 10 Hz: 2.2 mm come through
-    double max_gap_s = 1.0;                  // dt of eq. (9) at most, so that after a silence no single pose decides
-    double default_position_sigma_m = 0.01;  // where the sample states 0
-    double default_rotation_sigma_rad = 0.0035;
+    double max_age_s = 0.4;  // of a pose on arrival; the state ring holds 0.5 s
+    double tau_s = 4.0;      // LIO of 10 mm at 10 Hz: 2.2 mm come through. At least this ...
+    double tau_spm = 0.0;    // ... and so much per metre of LIO's sigma
+    double max_gap_s = 1.0;  // dt of eq. (9) at most, so that after a silence no single pose decides
+    // Where samples state 0: measured from one pose to the next, and until then these.
+    NoiseLevel::Params unstated_position_m{0.01, 0.5, 10.0, 1e-3, 0.3};
+    NoiseLevel::Params unstated_rotation_rad{0.0035, 0.5, 10.0, 2e-4, 0.2};
     double max_position_sigma_m = 0.3;
     double max_rotation_sigma_rad = 0.2;
     double jump_m = 0.08;           // bound at full rate ...
@@ -83,8 +82,10 @@ class OdometryFusion {
   // The odometry chooses its origin: what was old_p is now new_T_old * old_p. The world follows.
   void rebase(const Transform& new_T_old) noexcept;
 
-  // Variances of the odometry that its own filter says grew: x, y, z besides what the heading does, and yaw.
-  void grow(const FusionUncertainty::Quantities& variance) noexcept { uncertainty_.grow(variance); }
+  // Variances that the odometry's own filter has of x, y, z besides what the heading does, and of yaw: at its start,
+  // and before every tick.
+  void begin(const FusionUncertainty::Quantities& odometry) noexcept { uncertainty_.begin(odometry); }
+  void follow(const FusionUncertainty::Quantities& odometry) noexcept { uncertainty_.follow(odometry); }
   // Once per tick: moves the published offset towards the fused one within the slew limits, which hold at the base,
   // wherever odom's origin is; lets the sigmas grow. odom_step: by which the odometry moved the base since the last.
   void tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept;
@@ -104,6 +105,8 @@ class OdometryFusion {
   [[nodiscard]] bool try_realign(const Transform& lio_T_base, const Transform& odom_T_base,
                                  const LioSigmas& sigmas) noexcept;
   [[nodiscard]] LioSigmas sigmas_of(const LioSample& sample) const noexcept;
+  // The odometry moves by next to nothing against LIO from one pose to the next: what is left is LIO's noise, twice.
+  void measure_noise(const Transform& lio_T_base, const Transform& odom_T_base, double silence_s) noexcept;
   void observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,
                std::int64_t stamp_ns) noexcept;
   void align(const Transform& predicted, const Transform& lio_T_base, const LioSigmas& sigmas, double gain) noexcept;
@@ -117,6 +120,8 @@ class OdometryFusion {
   std::uint32_t count_ = 0;       // poses averaged into the alignment
   Transform fused_world_T_odom_;  // towards which the published one moves
   Transform world_T_odom_;        // published
+  Transform last_lio_T_odom_;     // by the last accepted pose alone
+  NoiseLevel position_noise_m_, rotation_noise_rad_;
   Transform jumped_lio_T_odom_;
   std::uint32_t jumped_count_ = 0;
   std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();  // of any pose that was in order

@@ -23,13 +23,17 @@ std::string complaint(const EstimateArguments& a) {
     }
   }
   if (!a.lidar_mount.empty() && a.lio.empty()) return "--lidar-mount is of no use without --lio.";
+  if (a.lio_tau_s != 0.0 && a.lio.empty()) return "--lio-tau is of no use without --lio.";
   if (!(a.lio_tau_s >= 0.0 && a.lio_tau_s <= kMaxTau_s)) return "--lio-tau must be from 0 to 1000 s.";
   return {};
 }
 
 ReplayOptions options_of(const EstimateArguments& a) {
   ReplayOptions options;
-  if (a.lio_tau_s > 0.0) options.odometry.fusion.tau_s = a.lio_tau_s;
+  if (a.lio_tau_s > 0.0) {
+    options.odometry.fusion.tau_s = a.lio_tau_s;
+    options.odometry.fusion.tau_spm = 0.0;
+  }
   if (!a.lidar_mount.empty()) {
     const auto rad = [&a](std::size_t i) { return a.lidar_mount[i] * kPi / 180.0; };
     options.odometry.fusion.base_T_lidar = {rotation_z(rad(5)) * rotation_y(rad(4)) * rotation_x(rad(3)),
@@ -51,11 +55,12 @@ void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
     return;
   }
   const Score s = score(log, replay);
-  std::snprintf(line, sizeof line,
-                "position %.2f mm, velocity %.2f mm/s, attitude %.3f deg RMSE; drift %.2f %% of %.2f m; NEES in bounds "
-                "in %.1f %% of the rows\n",
-                1e3 * s.position_rmse_m, 1e3 * s.velocity_rmse_mps, s.attitude_rmse_rad * 180.0 / kPi, drift_percent(s),
-                s.distance_m, 100.0 * s.nees_in_bounds);
+  std::snprintf(
+      line, sizeof line,
+      "position %.2f mm, velocity %.2f mm/s, attitude %.3f deg RMSE; drift %.2f %% of %.2f m, horizontal %.2f %%; "
+      "NEES in bounds in %.1f %% of the rows\n",
+      1e3 * s.position_rmse_m, 1e3 * s.velocity_rmse_mps, s.attitude_rmse_rad * 180.0 / kPi, drift_percent(s),
+      s.distance_m, horizontal_drift_percent(s), 100.0 * s.nees_in_bounds);
   out << line;
 }
 
@@ -81,7 +86,10 @@ CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
                    "(R = Rz Ry Rx)")
       ->expected(6)
       ->type_name("X Y Z ROLL PITCH YAW");
-  estimate->add_option("--lio-tau", a.lio_tau_s, "Time constant of the offset's low-pass, s; 0: that for logs, 1 s")
+  estimate
+      ->add_option(
+          "--lio-tau", a.lio_tau_s,
+          "Time constant of the offset's low-pass, s; 0: 0.4 s per mm of LIO's noise as measured, 1 s at least")
       ->type_name("TAU");
   estimate->add_option("--json", a.json, "Scores, biases, innovations, rejections")->type_name("OUT.json");
   estimate->add_option("--csv", a.csv, "Pose, twist, sigmas, contact probabilities, LIO's age, row by row")

@@ -15,7 +15,7 @@ namespace polygmap::sim {
 struct EstimateArguments {
   std::string log, lio, json, csv;
   std::vector<double> lidar_mount;
-  double lio_tau_s = 0.0;  // 0: the module's own
+  double lio_tau_s = 0.0;  // 0: by LIO's noise, as log_params() has it
 };
 
 [[nodiscard]] CLI::App* declare_estimate(CLI::App& app, EstimateArguments& arguments);

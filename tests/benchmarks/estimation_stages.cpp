@@ -71,7 +71,8 @@ std::string_view complaint(const EstimationBench& end, const EstimationWalk& wal
     return (form.state().template head<3>() - end.axes.odom_p_base_m()).norm();
   };
   if (grown(LioVerdict::kAccepted) != walk.ticks.size()) return "LIO poses were rejected";
-  if (end.estimator.lio_innovations().count == 0 || end.fusion.innovations().count == 0) return "LIO is not aligned";
+  if (end.estimator.lio_innovations().position.count == 0 || end.fusion.innovations().position.count == 0)
+    return "LIO is not aligned";
   if (!end.estimator.state().initialised) return "the estimator is not initialised";
   if (walk.ticks.front().stance[0] == walk.ticks[walk.ticks.size() / 2].stance[0]) return "no foot swings";
   // Not the same filter to the last digit: the full forms began without the axis filters' correlations.
@@ -106,8 +107,8 @@ void stage_lio_alignment(EstimationBench& bench, const EstimationTick& tick) {
 void stage_fused_tick(EstimationBench& bench, const EstimationTick& tick) {
   bench.estimator.add_imu(tick.imu, tick.now_ns);
   bench.estimator.add_joints(tick.joints, tick.now_ns);
-  bench.estimator.add_lio(tick.lio, tick.now_ns);
   bench.estimator.tick(tick.stance);
+  bench.estimator.add_lio(tick.lio, tick.now_ns);
 }
 
 }  // namespace polygmap::bench

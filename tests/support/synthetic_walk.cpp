@@ -114,12 +114,24 @@ WalkTruth SyntheticWalk::truth(std::int64_t t_ns) const {
     truth.true_T_sole[f].R = rotation_z(turn);
     truth.stance[f] = false;
   }
+  truth.true_T_sole[0].p_m += slipped_m(t_ns);
   const double left = p.left_share_from + s * (p.left_share_to - p.left_share_from);
   truth.load_share = {left, 1.0 - left};
   if (p.swing >= 0) {
     truth.load_share = {p.swing == 0 ? 0.0 : 1.0, p.swing == 0 ? 1.0 : 0.0};
   }
   return truth;
+}
+
+// Until its next swing, which brings the foot back to where it belongs.
+Vec3 SyntheticWalk::slipped_m(std::int64_t t_ns) const {
+  if (spec_.slip_ns < 0 || t_ns < spec_.slip_ns) return Vec3::Zero();
+  const double slid_m = 0.3 * std::min(seconds(t_ns - spec_.slip_ns), 0.2);
+  const auto swing = std::find_if(phases_.begin(), phases_.end(),
+                                  [&](const Phase& p) { return p.swing == 0 && p.start_ns > spec_.slip_ns; });
+  if (swing == phases_.end()) return {slid_m, 0, 0};
+  const double share = seconds(t_ns - swing->start_ns) / seconds(swing->end_ns - swing->start_ns);
+  return {slid_m * (1.0 - smooth((share - 0.15) / 0.7)), 0, 0};
 }
 
 ImuSample SyntheticWalk::imu(std::int64_t t_ns) {

@@ -18,6 +18,7 @@ struct WalkSpec {
   double tread_m = 0.28;
   double stand_s = 2.0;  // before and after
   double yaw_per_step_rad = 0.0;
+  std::int64_t slip_ns = -1;  // from here on the standing left foot slips ahead, 0.3 m/s for 0.2 s; -1: never
   // Sensor errors, one sigma; scale 0 makes everything perfect.
   double noise_scale = 1.0;
   double encoder_noise_rad = 2e-4, encoder_offset_rad = 2e-3, encoder_rate_noise_radps = 0.02;
@@ -61,6 +62,7 @@ class SyntheticWalk {
     double left_share_from, left_share_to;
   };
   void build();
+  [[nodiscard]] Vec3 slipped_m(std::int64_t t_ns) const;
   [[nodiscard]] JointVector true_joints(std::int64_t t_ns) const;
   [[nodiscard]] double draw(double sigma) { return spec_.noise_scale * sigma * normal_(random_); }
   [[nodiscard]] Vec3 draw3(double sigma) {

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a controller is told of the estimate besides the pose, and a foot that slips.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "algorithms/estimation/estimator.hpp"
+#include "tests/support/slow_machine.hpp"
+#include "tests/support/synthetic_walk.hpp"
+
+namespace polygmap {
+namespace {
+
+using test::SyntheticWalk;
+using test::WalkSpec;
+
+constexpr std::int64_t kTick_ns = SyntheticWalk::kTick_ns;
+
+struct WalkErrors {
+  double worst_m = 0.0;
+  double velocity_rmse_mps = 0.0;
+};
+
+class EstimateQualityTest : public ::testing::Test {
+ protected:
+  template <typename Each>
+  void run(const WalkSpec& spec, const Estimator::Params& params, bool with_lio, const Each& each) {
+    SyntheticWalk walk(spec);
+    estimator_.reset(params);
+    for (std::int64_t t_ns = 0; t_ns < walk.end_ns(); t_ns += kTick_ns) {
+      estimator_.add_imu(walk.imu(t_ns), t_ns);
+      estimator_.add_joints(walk.joints(t_ns), t_ns);
+      estimator_.tick(walk.truth(t_ns).stance);
+      const std::int64_t stamp_ns = t_ns - spec.lio_delay_ns;
+      if (with_lio && stamp_ns >= 0 && t_ns % (100 * kNsPerMs) == 0) estimator_.add_lio(walk.lio(stamp_ns), t_ns);
+      if (estimator_.state().initialised) each(walk, t_ns);
+    }
+  }
+  // Of the odometry, without heights of treads.
+  WalkErrors walk_errors(const WalkSpec& spec, const Estimator::Params& params) {
+    WalkErrors errors;
+    Transform true_T_odom;
+    double ticks = 0.0;
+    run(spec, params, false, [&](const SyntheticWalk& walk, std::int64_t t_ns) {
+      const StateEstimate& state = estimator_.state();
+      const Transform truth = walk.truth(t_ns).true_T_base;
+      if (ticks == 0.0) true_T_odom = truth * state.odom_T_base.inverse();
+      ticks += 1.0;
+      const Vec3 v_mps =
+          (walk.truth(t_ns + kNsPerMs).true_T_base.p_m - walk.truth(t_ns - kNsPerMs).true_T_base.p_m) / 2e-3;
+      errors.worst_m = std::max(errors.worst_m, (true_T_odom * state.odom_T_base.p_m - truth.p_m).norm());
+      errors.velocity_rmse_mps += (true_T_odom.R * state.odom_v_base_mps - v_mps).squaredNorm();
+    });
+    errors.velocity_rmse_mps = std::sqrt(errors.velocity_rmse_mps / ticks);
+    return errors;
+  }
+
+  static Estimator estimator_;  // its ring is too large for a stack
+};
+Estimator EstimateQualityTest::estimator_;
+
+TEST_F(EstimateQualityTest, Climb_EveryTick_CovarianceIsSymmetricPositiveAndHasTheStatesSigmas) {
+  WalkSpec spec;
+  spec.steps = 2;
+  run(spec, {}, true, [&](const SyntheticWalk&, std::int64_t) {
+    const StateEstimate& state = estimator_.state();
+    const EstimateQuality& quality = estimator_.quality();
+    ASSERT_EQ(quality.stamp_ns, state.stamp_ns);
+    ASSERT_EQ(estimator_.counters().stamp_ns, state.stamp_ns);
+    ASSERT_EQ(quality.covariance, quality.covariance.transpose());
+    ASSERT_GT((quality.covariance.ldlt().vectorD().minCoeff()), 0.0);
+    const Eigen::Matrix<double, 9, 1> sigma = quality.covariance.diagonal().cwiseSqrt();
+    ASSERT_LT((sigma.head<3>() - state.position_sigma_m).norm(), 1e-12);
+    ASSERT_LT((sigma.segment<3>(3) - state.velocity_sigma_mps).norm(), 1e-12);
+    ASSERT_NEAR(sigma[8], state.yaw_sigma_rad, 1e-12);
+  });
+}
+
+TEST_F(EstimateQualityTest, Climb_Innovations_AreCountedByGroupAndStamped) {
+  WalkSpec spec;
+  spec.steps = 4;
+  run(spec, {}, true, [](const SyntheticWalk&, std::int64_t) {});
+  const EstimateQuality& quality = estimator_.quality();
+  const auto of = [&](MeasurementGroup group) { return quality.innovations_of(group); };
+  const auto steps = of(MeasurementGroup::kFootPosition).count;
+  EXPECT_GT(steps, 5000U);
+  EXPECT_EQ(of(MeasurementGroup::kSoleAttitude).count, steps);
+  EXPECT_EQ(of(MeasurementGroup::kFootVelocity).count, steps);
+  EXPECT_GT(of(MeasurementGroup::kTreadHeight).count, 500U);  // the floor, until both feet have left it
+  EXPECT_LT(of(MeasurementGroup::kTreadHeight).count, steps);
+  EXPECT_LT(of(MeasurementGroup::kTreadHeight).stamp_ns, quality.stamp_ns - kNsPerS);
+  EXPECT_EQ(of(MeasurementGroup::kFootPosition).stamp_ns, quality.stamp_ns);
+  EXPECT_GT(of(MeasurementGroup::kLioPosition).count, 50U);
+  EXPECT_EQ(of(MeasurementGroup::kLioYaw).count, of(MeasurementGroup::kLioPosition).count);
+  EXPECT_LT(of(MeasurementGroup::kLioPosition).stamp_ns, quality.stamp_ns);
+  EXPECT_NEAR(of(MeasurementGroup::kLioPosition).mean, 1.0, 0.5);
+  for (const InnovationStatistics& group : quality.innovations) {
+    EXPECT_GT(group.mean, 0.0);
+    EXPECT_LT(group.mean, 2.0);
+  }
+}
+
+TEST(InnovationStatistics, NoisierMeasurements_ShowInTheLastSecondAtOnceAndInTheMeanLater) {
+  InnovationStatistics statistics;
+  statistics.take({}, 1);  // no rows: no update
+  EXPECT_EQ(statistics.stamp_ns, -1);
+  for (int i = 0; i < 5000; ++i) statistics.take({3.0, 3}, i * kTick_ns);
+  for (int i = 5000; i < 6000; ++i) statistics.take({27.0, 3}, i * kTick_ns);
+  EXPECT_EQ(statistics.count, 6000U);
+  EXPECT_EQ(statistics.last, 9.0);
+  EXPECT_NEAR(statistics.recent, 9.0 - 8.0 * std::exp(-2.0), 0.01);
+  EXPECT_NEAR(statistics.mean, (5000.0 + 9.0 * 1000.0) / 6000.0, 1e-9);
+}
+
+TEST(ImuNoise, WhiteNoiseOnMotion_IsMeasuredAtAnyRate) {
+  for (const double rate_hz : {200.0, 500.0, 1000.0}) {
+    std::mt19937 random(1);
+    std::normal_distribution<double> normal;
+    ImuNoise noise;
+    noise.reset();
+    for (int i = 0; i < 5000; ++i) {
+      const double t_s = i / rate_hz, swing = std::sin(2.0 * kPi * 1.5 * t_s);
+      const auto draw = [&](double sigma) { return Vec3{sigma * normal(random), sigma * normal(random), swing}; };
+      noise.update(static_cast<std::int64_t>(1e9 * t_s), 0.5 * draw(8e-3), 2.0 * draw(0.1) + Vec3{0, 0, kGravity_mps2});
+    }
+    const double two_of_three = std::sqrt(2.0 / 3.0);
+    EXPECT_NEAR(noise.density().gyro_radprs * std::sqrt(rate_hz), two_of_three * 4e-3, 4e-4) << rate_hz;
+    EXPECT_NEAR(noise.density().accel_mpsrs * std::sqrt(rate_hz), two_of_three * 0.2, 2e-2) << rate_hz;
+  }
+}
+
+// In double support, alone, and early: the left foot stands on the first step from 3.4 to 5.5 s, alone from 4.1 to 4.8.
+TEST_F(EstimateQualityTest, FootSlipsThreeTenthsForAFifthOfASecond_PositionStaysWithinTwentyMillimetres) {
+  Estimator::Params careless;
+  careless.motion.gain = 0.0;
+  constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 4;
+  for (const std::int64_t slip_ms : {3500, 3800, 4300, 4500, 5000}) {
+    for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+      WalkSpec spec;
+      spec.seed = seed;
+      spec.steps = 2;
+      spec.slip_ns = slip_ms * kNsPerMs;
+      EXPECT_LT(walk_errors(spec, {}).worst_m, 0.020) << slip_ms << " ms, seed " << seed;
+    }
+  }
+  WalkSpec spec;
+  spec.steps = 2;
+  spec.slip_ns = 4300 * kNsPerMs;
+  EXPECT_GT(walk_errors(spec, careless).worst_m, 0.020);
+}
+
+TEST_F(EstimateQualityTest, NoSlip_VelocityIsAsGoodAsThatOfAFilterThatLetsNothingGo) {
+  Estimator::Params careless;
+  careless.motion.gain = 0.0;
+  constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    WalkSpec spec;
+    spec.seed = seed;
+    spec.steps = 4;
+    EXPECT_LT(walk_errors(spec, {}).velocity_rmse_mps, 1.05 * walk_errors(spec, careless).velocity_rmse_mps) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace polygmap
