@@ -12,7 +12,7 @@ class FusionUncertainty {
   struct Params {
     // What no filter sees, legs that are longer than thought: per axis, besides what the heading does. The rest of the
     // drift is what the odometry's filter says (follow).
-    double drift_per_m = 0.0013;
+    double drift_per_m = 0.0011;
     double initial_sigma_m = 1e-3;
     double initial_sigma_rad = 1e-3;
   };
