@@ -41,7 +41,7 @@ class Extractor {
  public:
   virtual ~Extractor() = default;
   // depth: the camera's width x height, row-major. The microseconds it took; none when the camera, whose size must be a
-  // multiple of 4 and of 2, or up (unit, camera frame) is refused.
+  // multiple of 8 and of 2, or up (unit, camera frame) is refused.
   [[nodiscard]] virtual std::optional<double> extract(const std::uint16_t* depth, const Eigen::Vector3d& up) = 0;
   // Of the last picture.
   [[nodiscard]] virtual std::vector<Surface> surfaces() const = 0;

@@ -53,8 +53,8 @@ class Extraction {
   Extraction(const CameraProfile& profile, const DepthPng& picture) {
     const CameraIntrinsics& k = profile.intrinsics;
     const DepthSigma& noise = profile.noise;
-    // Whole columns of four pixels and pairs of rows: what is left over at the right and below is not looked at.
-    camera_ = {k.width_px / 4 * 4,
+    // Whole columns of eight pixels and pairs of rows: what is left over at the right and below is not looked at.
+    camera_ = {k.width_px / 8 * 8,
                k.height_px / 2 * 2,
                k.fx_px,
                k.fy_px,

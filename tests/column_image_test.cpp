@@ -30,16 +30,19 @@ struct ReducedPicture {
 };
 
 TEST(ColumnImage, ValidPixels_GiveTheInverseOfTheirMean) {
-  const ReducedPicture picture({1000, 2000, 1000, 2000, 500, 500, 500, 500});
+  const ReducedPicture picture(
+      {1000, 2000, 1000, 2000, 1000, 2000, 1000, 2000, 500, 500, 500, 500, 500, 500, 500, 500});
   EXPECT_FLOAT_EQ(picture.w[0], 1.0F / 1.5F);
   EXPECT_FLOAT_EQ(picture.w[1], 2.0F);
-  EXPECT_EQ(picture.valid[0], 4);
-  EXPECT_EQ(picture.row.measured_px, 8);
+  EXPECT_EQ(picture.valid[0], 8);
+  EXPECT_EQ(picture.row.measured_px, 16);
   EXPECT_EQ(picture.row.body_columns, 0);
 }
 
 TEST(ColumnImage, PixelsOutsideTheRange_DoNotCount) {
-  const ReducedPicture picture({0, 1000, 65535, 4001, 199, 0, 4500, 0, 200, 4000, 0, 0});
+  const ReducedPicture picture({0,   1000, 65535, 4001, 0, 0,    0, 0,  //
+                                199, 0,    4500,  0,    0, 4001, 0, 0,  //
+                                200, 0,    0,     0,    0, 4000, 0, 0});
   EXPECT_FLOAT_EQ(picture.w[0], 1.0F);
   EXPECT_EQ(picture.valid[0], 1);
   EXPECT_EQ(picture.w[1], 0.0F);
@@ -50,13 +53,14 @@ TEST(ColumnImage, PixelsOutsideTheRange_DoNotCount) {
 }
 
 TEST(ColumnImage, BodyPixels_EmptyTheirColumn) {
-  const ReducedPicture picture({1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000},
-                               {0, 0, kPixelBody, 0, 0, kPixelBody});
+  const ReducedPicture picture({1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000,
+                                1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000},
+                               {0, 0, 0, 0, 0, kPixelBody, 0, 0, 0, 0, 0, kPixelBody});
   EXPECT_GT(picture.w[0], 0.0F);
   EXPECT_EQ(picture.w[1], 0.0F);
   EXPECT_EQ(picture.w[2], 0.0F);
   EXPECT_EQ(picture.valid[1] + picture.valid[2], 0);
-  EXPECT_EQ(picture.row.measured_px, 4);
+  EXPECT_EQ(picture.row.measured_px, kColumn_px);
   EXPECT_EQ(picture.row.body_columns, 2);
 }
 
@@ -66,7 +70,7 @@ TEST(ColumnImage, RowOfAnyLength_IsReadToItsEndOnly) {
     ReducedPicture picture;
     const std::vector<std::uint16_t> raw(static_cast<std::size_t>(kColumn_px * columns), 1000);
     picture.body.fill(kPixelBody);
-    std::fill_n(picture.body.begin(), 2 * columns, std::uint8_t{0});
+    std::fill_n(picture.body.begin(), kColumn_px / 2 * columns, std::uint8_t{0});
     picture.row =
         reduce_to_columns(kRange, raw.data(), picture.body.data(), columns, picture.w.data(), picture.valid.data());
     EXPECT_EQ(picture.row.measured_px, kColumn_px * columns);
@@ -88,8 +92,8 @@ TEST(ColumnImage, VectorsOfAnyWidth_GiveTheResultOfOneColumn) {
         reduce_to_columns(kRange, picture.raw.data(), nullptr, kColumns, picture.w.data(), picture.valid.data());
     for (std::size_t g = 0; g < kColumns; ++g) {
       float n = 0.0F, sum = 0.0F;
-      for (std::size_t i = 0; i < 4; ++i) {
-        const std::uint16_t raw = picture.raw[4 * g + i];
+      for (std::size_t i = 0; i < kColumn_px; ++i) {
+        const std::uint16_t raw = picture.raw[kColumn_px * g + i];
         if (raw < kRange.min || raw > kRange.max) continue;
         n += 1.0F;
         sum += static_cast<float>(raw);

@@ -307,7 +307,7 @@ TEST_F(PipelineAmongBoxes, MoreSurfacesThanAFrameMayHave_IsCounted) {
   stand(kInitialised_ticks);
   show(2, 3, -0.1);
   EXPECT_EQ(count(Limit::kPlanesFull), 0U);
-  show(6, 8, -0.5);
+  show(8, 10, -0.8);
   EXPECT_GT(count(Limit::kPlanesFull), 0U);
 }
 

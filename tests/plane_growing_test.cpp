@@ -75,7 +75,7 @@ TEST_F(PlanesFromRuns, TreadAndRiser_AreTwoPlanesWithTheirNormals) {
 
 TEST_F(PlanesFromRuns, PatchSmallerThanTheLeast_IsNoPlane) {
   const auto patch = [this](std::int32_t g, std::int32_t r) {
-    return g >= 60 && g < 66 && r >= 100 && r < 120 ? &tread_ : nullptr;
+    return g >= 60 && g < 63 && r >= 100 && r < 120 ? &tread_ : nullptr;
   };
   scene_.paint(patch);
   grow({.min_plane_px = 600});

@@ -17,6 +17,11 @@ class Remainder : public testing::Test {
     for (std::int32_t g = 0; g < kColumns; ++g) search_->add_column(scene_.rays, *scene_.image, g, spans);
     search_->finish();
   }
+  [[nodiscard]] static SurfaceBoundaries::Column spans_from(std::int16_t top) {
+    SurfaceBoundaries::Column spans;
+    EXPECT_TRUE(spans.try_push_back({top, kDepthHeight_px - 1, 1, 0}));
+    return spans;
+  }
   ColumnScene scene_;
   Vec3 up_ = Vec3{0.0, -0.86, -0.51}.normalized();
   Vec3 towards_ = Vec3{-0.1, 0.5, -0.85};
@@ -30,10 +35,19 @@ TEST_F(Remainder, AFewLevelRows_AreFoundAtTheirHeight) {
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
     scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 100 && r < 103 ? &tread_ : nullptr; }, 0.004, seed);
     search_->begin({}, up_);
-    search();
+    search(spans_from(120));
     ASSERT_EQ(search_->found().size(), 1U);
     EXPECT_NEAR(search_->found()[0].d_m(), 0.6, 0.002);
     EXPECT_GT(search_->found()[0].normal().dot(up_), 0.9999);
+  }
+}
+
+TEST_F(Remainder, RowsDeepInClutter_AreNotLookedAt) {
+  scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 100 && r < 103 ? &tread_ : nullptr; });
+  for (const std::int16_t end : {std::int16_t{103 + kRemainderReach_px}, std::int16_t{99 + kRemainderReach_px}}) {
+    search_->begin({}, up_);
+    search(spans_from(end));
+    EXPECT_EQ(search_->found().size(), end < 100 + kRemainderReach_px ? 1U : 0U);
   }
 }
 

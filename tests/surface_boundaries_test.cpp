@@ -119,19 +119,19 @@ TEST_F(Boundaries, RowsOfSomethingElse_AreNotClaimed) {
 
 TEST_F(Boundaries, ARunThatReachesOverTheEdge_IsTrimmed) {
   paint(0.0, 0.0, 6);
-  const auto row = static_cast<std::int16_t>(meeting_row(80));
+  const auto row = static_cast<std::int16_t>(meeting_row(40));
   RunSegmentation::Column runs;
   polygmap::Run run;
   run.top = static_cast<std::int16_t>(row - 60);
   run.bottom = static_cast<std::int16_t>(row + 5);
   run.plane = kTread;
   ASSERT_TRUE(runs.try_push_back(run));
-  boundaries_->gather(80, runs, to_plane_);
-  EXPECT_EQ(boundaries_->columns()[80][0].bottom, row + 5);
-  boundaries_->trim(80);
-  EXPECT_LT(boundaries_->columns()[80][0].bottom, row + 5);
-  EXPECT_GE(boundaries_->columns()[80][0].bottom, row - 1);
-  EXPECT_EQ(boundaries_->columns()[80][0].top, row - 60);
+  boundaries_->gather(40, runs, to_plane_);
+  EXPECT_EQ(boundaries_->columns()[40][0].bottom, row + 5);
+  boundaries_->trim(40);
+  EXPECT_LT(boundaries_->columns()[40][0].bottom, row + 5);
+  EXPECT_GE(boundaries_->columns()[40][0].bottom, row - 1);
+  EXPECT_EQ(boundaries_->columns()[40][0].top, row - 60);
 }
 
 }  // namespace

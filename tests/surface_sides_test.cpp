@@ -43,7 +43,7 @@ class SurfaceSidesOfABoard : public testing::Test {
         pixels += inside ? 1.0 : 0.0;
       }
       for (std::int32_t g = 0; g < picture_->column_rays.columns; ++g) {
-        const double middle = kColumn_px * g + 1.5;
+        const double middle = kColumn_px * g + 0.5 * (kColumn_px - 1);
         const bool inside = r >= kTop && r <= kBottom && middle >= first && middle < past;
         picture_->owners(r, g) = static_cast<std::uint8_t>(inside ? kNear : owner);
         if (!inside) continue;
@@ -144,8 +144,8 @@ TEST_F(SurfaceSidesOfABoard, CrookedEnd_IsNotCutStraight) {
   paint(kLeft, {400.0, 0.0}, 1300, kFar);
   for (std::int32_t r = (kTop + kBottom) / 2 + 8; r <= kBottom; ++r) {
     for (std::int32_t c = 400; c < 480; ++c) (*depth_)(c, r) = 1000;
-    for (std::int32_t g = 100; g < 120; ++g) picture_->owners(r, g) = kNear;
-    profile_->right[static_cast<std::size_t>(r)] = 119;
+    for (std::int32_t g = 400 / kColumn_px; g < 480 / kColumn_px; ++g) picture_->owners(r, g) = kNear;
+    profile_->right[static_cast<std::size_t>(r)] = 480 / kColumn_px - 1;
   }
   EXPECT_FALSE(find(true).fitted);
   EXPECT_NEAR(2.0 * find(true).column_px + 0.5, 479.5, 1.0);

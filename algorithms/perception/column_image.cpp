@@ -9,36 +9,49 @@ namespace polygmap {
 namespace {
 
 using Raw = cv::v_uint16;
+using Words = cv::v_uint32;
 using Wide = cv::v_float32;
-static_assert(kColumns % Raw::nlanes == 0);
+static_assert(kColumns % Raw::nlanes == 0 && kColumn_px == 8);
 
-void widen(const Raw& x, std::array<Wide, 2>& out) noexcept {
-  cv::v_uint32 low, high;
-  cv::v_expand(x, low, high);
-  out = {cv::v_cvt_f32(cv::v_reinterpret_as_s32(low)), cv::v_cvt_f32(cv::v_reinterpret_as_s32(high))};
-}
+constexpr int kCountShift = 20;  // below: the sum of eight depths; from here on: how many of them are valid
 
-// w + x + y + z, which 16 bits do not hold.
-void widen_sum(const Raw& w, const Raw& x, const Raw& y, const Raw& z, std::array<Wide, 2>& out) noexcept {
-  std::array<cv::v_uint32, 2> sum, next;
-  cv::v_expand(w, sum[0], sum[1]);
-  for (const Raw* more : {&x, &y, &z}) {
-    cv::v_expand(*more, next[0], next[1]);
-    for (std::size_t half = 0; half < 2; ++half) sum[half] = sum[half] + next[half];
+// The range as vectors see it.
+struct Range {
+  Raw lowest, reach;
+  explicit Range(const RawRange& range) noexcept
+      : lowest(cv::vx_setall_u16(range.min)),
+        reach(cv::vx_setall_u16(static_cast<std::uint16_t>(range.max - range.min))) {}
+  [[nodiscard]] Raw valid(const Raw& x) const noexcept {
+    const Raw above = cv::v_sub_wrap(x, lowest);
+    return cv::v_min(above, reach) == above;
   }
-  for (std::size_t half = 0; half < 2; ++half) out[half] = cv::v_cvt_f32(cv::v_reinterpret_as_s32(sum[half]));
+};
+
+// Sum and count of pairs of pixels.
+Words pairs(const Range& range, const std::uint16_t* raw) noexcept {
+  const Raw x = cv::vx_load(raw), valid = range.valid(x);
+  const Words depths = cv::v_reinterpret_as_u32(x & valid);
+  const cv::v_int32 minus_count = cv::v_dotprod(cv::v_reinterpret_as_s16(valid), cv::vx_setall_s16(1));
+  return (depths & cv::vx_setall_u32(0xffff)) + (depths >> 16) - (cv::v_reinterpret_as_u32(minus_count) << kCountShift);
 }
+
+// Sums of neighbours, those of a before those of b.
+Words add_neighbours(const Words& a, const Words& b) noexcept {
+  const cv::v_uint64 a2 = cv::v_reinterpret_as_u64(a), b2 = cv::v_reinterpret_as_u64(b);
+  return cv::v_pack(a2 + (a2 >> 32), b2 + (b2 >> 32));  // keeps the lower halves
+}
+
+Wide to_float(const Words& x) noexcept { return cv::v_cvt_f32(cv::v_reinterpret_as_s32(x)); }
 
 }  // namespace
 
-ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body,
+ReducedRow reduce_to_columns(const RawRange& raw_range, const std::uint16_t* raw, const std::uint8_t* body,
                              std::int32_t columns, float* inverse_depth, std::uint8_t* valid) noexcept {
-  const Raw lowest = cv::vx_setall_u16(range.min), none = cv::vx_setzero_u16();
-  const Raw reach = cv::vx_setall_u16(static_cast<std::uint16_t>(range.max - range.min));
-  const Raw all = none == none, any = range.min <= range.max ? all : none;
+  const Range range(raw_range);
+  const Words none = cv::vx_setzero_u32(), any = raw_range.min <= raw_range.max ? none == none : none;
   const cv::v_uint8 is_body = cv::vx_setall_u8(kPixelBody);
-  const Wide per_metre = cv::vx_setall_f32(range.per_metre), least = cv::vx_setall_f32(1.0F);
-  Raw measured = none, free = none;
+  const Wide per_metre = cv::vx_setall_f32(raw_range.per_metre), least = cv::vx_setall_f32(1.0F);
+  Words measured = none, free = none;
   std::array<std::uint16_t, static_cast<std::size_t>(kColumn_px) * Raw::nlanes> tail{};
   std::int32_t g = 0;
   for (; g < columns; g += Raw::nlanes) {
@@ -47,35 +60,36 @@ ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, co
       std::copy(from, raw + static_cast<std::ptrdiff_t>(kColumn_px) * columns, tail.begin());
       from = tail.data();
     }
-    Raw a, b, c, d;
-    cv::v_load_deinterleave(from, a, b, c, d);
-    Raw seen = all;
-    if (body != nullptr) seen = cv::v_reinterpret_as_u16(cv::vx_load(body + 2 * g) & is_body) == none;
-    const auto good = [&](const Raw& x) {
-      const Raw above = cv::v_sub_wrap(x, lowest);
-      return cv::v_min(above, reach) == above;
-    };
-    const Raw good_a = good(a), good_b = good(b), good_c = good(c), good_d = good(d);
-    const Raw count =
-        cv::v_sub_wrap(none, cv::v_add_wrap(cv::v_add_wrap(good_a, good_b), cv::v_add_wrap(good_c, good_d))) & seen &
-        any;
-    std::array<Wide, 2> n, sum;
-    widen(count, n);
-    widen_sum(a & good_a, b & good_b, c & good_c, d & good_d, sum);
-    for (std::size_t half = 0; half < 2; ++half) {
-      cv::v_store(inverse_depth + g + static_cast<std::ptrdiff_t>(half) * Wide::nlanes,
-                  n[half] * per_metre / cv::v_max(sum[half], least));
+    std::array<Words, 2> count;
+    for (std::size_t half = 0; half < 2; ++half, from += 4 * Raw::nlanes) {
+      const std::int32_t first = g + static_cast<std::int32_t>(half) * Words::nlanes;
+      Words seen = any;
+      if (body != nullptr) {
+        seen = cv::v_reinterpret_as_u32(cv::vx_load(body + kColumn_px / 2 * first) & is_body) == none;
+        free = free - seen;
+        seen = seen & any;
+      }
+      const Words sum =
+          add_neighbours(add_neighbours(pairs(range, from), pairs(range, from + Raw::nlanes)),
+                         add_neighbours(pairs(range, from + 2 * Raw::nlanes), pairs(range, from + 3 * Raw::nlanes))) &
+          seen;
+      count[half] = sum >> kCountShift;
+      const Wide depths = to_float(sum & cv::vx_setall_u32((1U << kCountShift) - 1U));
+      cv::v_store(inverse_depth + first, to_float(count[half]) * per_metre / cv::v_max(depths, least));
+      measured = measured + count[half];
     }
-    cv::v_pack_store(valid + g, count);
-    measured = cv::v_add_wrap(measured, count);
-    free = cv::v_sub_wrap(free, seen);
+    cv::v_pack_store(valid + g, cv::v_pack(count[0], count[1]));
   }
   ReducedRow row{static_cast<std::int32_t>(cv::v_reduce_sum(measured)),
-                 g - static_cast<std::int32_t>(cv::v_reduce_sum(free))};
+                 body != nullptr ? g - static_cast<std::int32_t>(cv::v_reduce_sum(free)) : 0};
   while (g > columns) {
     --g;
     row.measured_px -= valid[g];
-    if (body != nullptr && ((body[2 * g] | body[2 * g + 1]) & kPixelBody) != 0) --row.body_columns;
+    if (body != nullptr) {
+      const std::uint8_t* flags = body + kColumn_px / 2 * g;
+      row.body_columns -=
+          std::any_of(flags, flags + kColumn_px / 2, [](std::uint8_t f) { return (f & kPixelBody) != 0; });
+    }
     inverse_depth[g] = 0.0F;
     valid[g] = 0;
   }

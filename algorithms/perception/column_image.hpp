@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The picture as columns of four pixels' width, at full resolution downwards: the inverse of the valid depths' mean.
-// Stairs change from row to row and hardly within four pixels of a row; the mean halves white noise. (The mean of the
-// inverses, linear on a plane, takes twice the work; the two differ by the square of the depths' relative spread.)
+// The picture as columns of eight pixels' width, at full resolution downwards: the inverse of the valid depths' mean.
+// Stairs change from row to row and hardly within eight pixels of a row, over which depth errors are correlated: four
+// pixels find the same edges in 1.6 times the time. (The mean of the inverses, linear on a plane, takes twice the work;
+// the two differ by the square of the depths' relative spread.)
 #pragma once
 
 #include <array>
@@ -12,12 +13,12 @@
 
 namespace polygmap {
 
-inline constexpr std::int32_t kColumn_px = 4;
+inline constexpr std::int32_t kColumn_px = 8;
 inline constexpr std::int32_t kColumns = kDepthWidth_px / kColumn_px;
 
 struct ColumnImage {
   Raster<float, kColumns, kDepthHeight_px> inverse_depth;  // 1/m, 0 = nothing measured, or the robot's own body
-  Raster<std::uint8_t, kColumns, kDepthHeight_px> valid;   // of the column's four pixels
+  Raster<std::uint8_t, kColumns, kDepthHeight_px> valid;   // of the column's eight pixels
 };
 
 // Rays through the columns' middles and through rows of the full picture.

@@ -51,7 +51,7 @@ void ColumnOutline::build(const SurfaceProfile& profile, const OutlineSides& sid
   smooth(profile, first, last, smooth_);
   // A column's ends are those at its middle; only the sides reach farther. Full-resolution row r covers half-resolution
   // (r - 1) / 2 to r / 2.
-  const auto middle = [](std::int32_t g) { return 2.0 * g + 0.5; };
+  const auto middle = [](std::int32_t g) { return 0.5 * kColumn_px * g + 0.25 * kColumn_px - 0.5; };
   const auto upper = [&](std::int32_t g) { return 0.5 * (smooth_[static_cast<std::size_t>(g)].top - 1); };
   const auto lower = [&](std::int32_t g) { return 0.5 * smooth_[static_cast<std::size_t>(g)].bottom; };
   const auto inside = [&](std::int32_t g, double row) {

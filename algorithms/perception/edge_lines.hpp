@@ -16,11 +16,11 @@ class EdgeLineFinder {
  public:
   struct Params {
     std::int32_t window_px = 12;   // rows searched to each side of the first guess
-    std::int32_t segment_px = 28;  // that share one change-point
+    std::int32_t segment_px = 24;  // that share one change-point
     double truncate_sigmas = 3.0;
     std::int32_t min_side_px = 3;  // rows of the window on each side of the change-point that fit their plane
     std::int32_t max_gap_px = 6;   // rows without data at the first guess: beyond, the column says nothing
-    std::int32_t min_columns = 6;  // of four pixels
+    std::int32_t min_columns = 3;  // of eight pixels
     double min_length_m = 0.06;
     double max_rms_m = 0.006;
     double min_inlier_share = 0.5;

@@ -58,9 +58,9 @@ struct FramePicture {
   [[nodiscard]] std::uint8_t owner(std::int32_t column, std::int32_t row) const noexcept { return owners(row, column); }
   // Of a half-resolution pixel.
   [[nodiscard]] float inverse_depth_at(std::int32_t column, std::int32_t row) const noexcept {
-    if (column < 0 || row < 0 || column / 2 >= column_rays.columns || row >= rays.height_px) return 0.0F;
-    const float upper = columns.inverse_depth(column / 2, 2 * row);
-    return upper > 0.0F ? upper : columns.inverse_depth(column / 2, 2 * row + 1);
+    if (column < 0 || row < 0 || 2 * column / kColumn_px >= column_rays.columns || row >= rays.height_px) return 0.0F;
+    const float upper = columns.inverse_depth(2 * column / kColumn_px, 2 * row);
+    return upper > 0.0F ? upper : columns.inverse_depth(2 * column / kColumn_px, 2 * row + 1);
   }
 };
 

@@ -23,7 +23,7 @@ class PlaneGrowing {
     double join_sigmas = 1.5;  // a run whose line is join_floor_m + join_sigmas sigma_z off a plane belongs to it
     double join_floor_m = 0.003;
     std::int32_t min_rows = 3;        // of a run that starts a plane
-    std::int32_t min_columns = 4;     // of a plane
+    std::int32_t min_columns = 3;     // of a plane
     std::int32_t min_plane_px = 800;  // full-resolution pixels
   };
   static constexpr std::size_t kMaxPlanes = 96;
@@ -39,7 +39,7 @@ class PlaneGrowing {
 
  private:
   static constexpr std::size_t kQueue = static_cast<std::size_t>(kColumns) * RunSegmentation::kMaxRunsPerColumn;
-  static constexpr std::int32_t kSeedReach = 2;  // columns to each side that a seed's plane is fitted to
+  static constexpr std::int32_t kSeedReach = 1;  // columns to each side that a seed's plane is fitted to
   static constexpr std::uint8_t kTried = 255;    // a run that grew into nothing
 
   struct Place {

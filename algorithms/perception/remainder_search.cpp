@@ -29,19 +29,32 @@ void RemainderSearch::know_upright(const InversePlane& plane, double pixels) noe
 
 void RemainderSearch::add_column(const ColumnRays& rays, const ColumnImage& image, std::int32_t column,
                                  const SurfaceBoundaries::Column& spans) noexcept {
-  const double x = static_cast<double>(rays.x[static_cast<std::size_t>(column)]);
-  const auto add_rows = [&](std::int32_t first, std::int32_t last) {
+  // Of a ray in this column: its steps along an axis are bins times inverse depth, linear in the row.
+  struct Steps {
+    float at, slope;
+    Steps(const Axis& axis, float x) noexcept
+        // A plane that faces the camera lies on the far side of its normal.
+        : at(static_cast<float>(-(axis.direction.x() * static_cast<double>(x) + axis.direction.z()) / Axis::kBin_m)),
+          slope(static_cast<float>(-axis.direction.y() / Axis::kBin_m)) {}
+  };
+  const float x = rays.x[static_cast<std::size_t>(column)];
+  const Steps level(level_, x), upright(upright_, x);
+  const auto count = [](Axis& axis, float bin) {
+    if (bin >= 0.0F && bin < static_cast<float>(Axis::kBins)) ++axis.rows[static_cast<std::size_t>(bin)];
+  };
+  const auto add_stretch = [&](std::int32_t first, std::int32_t last) {
     for (std::int32_t r = first; r <= last; ++r) {
       const float w = image.inverse_depth(column, r);
       if (!(w > 0.0F)) continue;
-      const Vec3 point =
-          Vec3{x, static_cast<double>(rays.y[static_cast<std::size_t>(r)]), 1.0} / static_cast<double>(w);
-      for (Axis* axis : {&level_, &upright_}) {
-        // A plane that faces the camera lies on the far side of its normal.
-        const std::int32_t bin = Axis::bin_of(-axis->direction.dot(point));
-        if (bin >= 0 && bin < Axis::kBins) ++axis->rows[static_cast<std::size_t>(bin)];
-      }
+      const float y = rays.y[static_cast<std::size_t>(r)], z = 1.0F / w;
+      count(level_, (level.at + level.slope * y) * z);
+      count(upright_, (upright.at + upright.slope * y) * z);
     }
+  };
+  const auto add_rows = [&](std::int32_t first, std::int32_t last) {
+    const std::int32_t until = std::min(last, first + kRemainderReach_px - 1);
+    add_stretch(first, until);
+    add_stretch(std::max(until + 1, last - kRemainderReach_px + 1), last);
   };
   std::int32_t next = 0;
   for (const ColumnSpan& span : spans) {

@@ -17,7 +17,7 @@ namespace polygmap {
 class RemainderSearch {
  public:
   struct Params {
-    std::int32_t min_rows = 100;   // of a peak, in column rows (four pixels each)
+    std::int32_t min_rows = 50;    // of a peak, in column rows (eight pixels each)
     double min_contrast = 2.5;     // of a peak against what lies around it
     double known_apart_m = 0.015;  // nearer to a known plane it is that one
   };

@@ -175,11 +175,17 @@ void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::siz
         if (other.top <= until && other.bottom >= gap_from) consider(other);
       }
     }
+    const bool deep = until - gap_from >= 2 * kRemainderReach_px;
     for (std::size_t p = first_plane; p <= last_plane; ++p) {
-      ColumnSpan anywhere;
-      anywhere.bottom = static_cast<std::int16_t>(rays_->height_px - 1);
-      anywhere.plane = static_cast<std::uint8_t>(p);
-      consider(anywhere);
+      ColumnSpan end;
+      end.plane = static_cast<std::uint8_t>(p);
+      end.top = static_cast<std::int16_t>(gap_from);
+      end.bottom = static_cast<std::int16_t>(deep ? gap_from + kRemainderReach_px - 1 : until);
+      consider(end);
+      if (!deep) continue;
+      end.top = static_cast<std::int16_t>(until - kRemainderReach_px + 1);
+      end.bottom = static_cast<std::int16_t>(until);
+      consider(end);
     }
     ColumnSpan claimed;
     if (!try_claim(column, gap_from, until, candidates, claimed)) continue;
@@ -205,7 +211,7 @@ std::uint16_t SurfaceBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower)
   Pair& pair = pairs_[pair_count_];
   pair.upper = upper;
   pair.lower = lower;
-  pair.columns = pair.measured = 0.0;
+  pair.columns = 0.0;
   pair.gain.fill(0.0F);
   return static_cast<std::uint16_t>(pair_count_++);
 }
@@ -301,13 +307,6 @@ void SurfaceBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
     if (pair != nullptr) {
       pair->columns += 1.0;
       joints_[joint_count_++] = {i, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k)};
-      // Columns side by side share most of their noise: what every second one says is enough for the pair.
-      if (column % kMeasuredColumns != 0 && pair->measured >= kLeastMeasured) {
-        upper.bottom = static_cast<std::int16_t>(math::clamp(std::ceil(row) - 1.0, upper.top, lower.bottom - 1.0));
-        lower.top = static_cast<std::int16_t>(upper.bottom + 1);
-        continue;
-      }
-      pair->measured += 1.0;
     }
     const std::int32_t own = change_point(column, a, b, first, last, static_cast<float>(row), pair);
     upper.bottom = static_cast<std::int16_t>(std::clamp<std::int32_t>(own, upper.top, lower.bottom - 1));
@@ -327,7 +326,7 @@ void SurfaceBoundaries::settle() noexcept {
       at = bin + 1;
     }
     const double offset_px = (at - 0.5 * kBins) / kBinsPerPixel;
-    const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].measured;
+    const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].columns;
     pairs_[i].shift_px = meets ? 0.0 : offset_px;
   }
   follow();

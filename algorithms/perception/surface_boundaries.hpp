@@ -22,6 +22,10 @@ struct ColumnSpan {
   std::uint16_t piece = 0;  // for whoever joins intervals into pieces
 };
 
+// Rows that belong to no plane are searched for the rest of known or cut-off surfaces this far from the nearest span's
+// or the picture's end; what lies deeper in them is clutter.
+inline constexpr std::int32_t kRemainderReach_px = 48;
+
 class SurfaceBoundaries {
  public:
   struct Params {
@@ -90,8 +94,6 @@ class SurfaceBoundaries {
   static constexpr std::size_t kMaxPairs = 192;
   static constexpr std::int32_t kBins = 64;  // of half a pixel, -16 .. 16
   static constexpr std::int32_t kBinsPerPixel = 2;
-  static constexpr std::int32_t kMeasuredColumns = 2;
-  static constexpr double kLeastMeasured = 4.0;
   struct Joint {
     std::uint16_t pair = 0;
     std::int16_t column = 0;
@@ -101,7 +103,6 @@ class SurfaceBoundaries {
     std::uint8_t upper = 0;
     std::uint8_t lower = 0;
     double columns = 0.0;
-    double measured = 0.0;            // of these, columns that were asked
     double shift_px = 0.0;            // of the boundary from where the planes meet
     std::array<float, kBins> gain{};  // sum of cost(upper) - cost(lower), by distance from where the planes meet
   };

@@ -247,14 +247,14 @@ void SurfaceExtractor::take_grown_planes() noexcept {
 
 // Pieces of one surface that a leg, a hole or noise has split share one plane: the larger one's.
 void SurfaceExtractor::merge_planes() noexcept {
+  const double least_cosine = math::cos(params_.merge_tilt_rad), least_small = math::cos(2.0 * params_.merge_tilt_rad);
   for (std::size_t a = 1; a <= planes_.count; ++a) {
     for (std::size_t b = a + 1; b <= planes_.count && planes_[a].alive; ++b) {
       if (!planes_[b].alive) continue;
       const std::size_t keep = planes_[a].pixels >= planes_[b].pixels ? a : b, gone = keep == a ? b : a;
       FramePlane &p = planes_[keep], &q = planes_[gone];
       const bool small = q.pixels < params_.small_plane_px;
-      const double tilt_rad = params_.merge_tilt_rad * (small ? 2.0 : 1.0);
-      if (p.plane.normal().dot(q.plane.normal()) < math::cos(tilt_rad)) continue;
+      if (p.plane.normal().dot(q.plane.normal()) < (small ? least_small : least_cosine)) continue;
       if (std::abs(p.plane.distance_m(q.centre_m)) > params_.merge_m) continue;
       if (!small && std::abs(q.plane.distance_m(p.centre_m)) > 2.0 * params_.merge_m) continue;
       p.pixels += q.pixels;
@@ -362,7 +362,7 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   for (std::int32_t g = 0; g < picture_.column_rays.columns; ++g) {
     const std::int32_t end = end_of(g), far = end + down * kProbe_px;
     if (end < 0 || far < 0 || far >= picture_.column_rays.height_px ||
-        (picture_.flags(2 * g, far / 2) & kPixelBody) != 0)
+        (picture_.flags(kColumn_px / 2 * g, far / 2) & kPixelBody) != 0)
       continue;
     std::uint8_t& found = beyond[static_cast<std::size_t>(g)];
     for (std::int32_t r = end + down; found == 0 && r != far + down; r += down) found = picture_.owner(g, r);

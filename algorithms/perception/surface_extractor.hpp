@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // From one raw depth frame to the planar surfaces in it: polygons, nosings, back lines. Static memory, resumable.
 //
-// Route: self filter -> columns of four pixels -> straight runs -> planes grown from runs -> boundaries where the
+// Route: self filter -> columns of eight pixels -> straight runs -> planes grown from runs -> boundaries where the
 // planes meet, weighted least squares -> level and upright planes in what is left over, rows claimed beside them ->
 // boundaries and least squares again -> connected pieces -> outlines, with sides fitted in the raw picture -> convex
 // polygons, cut to nosing and back lines that are found in the columns.
@@ -74,7 +74,7 @@ class SurfaceExtractor {
     std::uint32_t rejected_lines = 0;  // nosings and back lines that were looked for and not good enough
   };
 
-  // One unit is a row of 160 columns through reduction and segmentation, or as much work (its cost:
+  // One unit is a row of 80 columns through reduction and segmentation, or as much work (its cost:
   // firmware/schedule.hpp). A staircase takes about 2,900; with every capacity full a frame takes at most
   // kMaxUnitsPerFrame. No piece is larger than kMaxPieceUnits.
   static constexpr std::int32_t kMaxPieceUnits = 40;

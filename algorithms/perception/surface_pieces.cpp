@@ -8,7 +8,7 @@ namespace {
 
 // A tread that meets a riser, or a riser that meets a tread.
 bool on_a_step(const SurfaceBoundaries& boundaries, const FramePlanes& planes, const FramePlane& plane) noexcept {
-  constexpr double kLeastColumns = 4.0;
+  constexpr double kLeastColumns = 2.0;
   bool found = false;
   if (plane.kind == SurfaceKind::kOther) return false;
   const SurfaceKind wanted = plane.kind == SurfaceKind::kTread ? SurfaceKind::kRiser : SurfaceKind::kTread;
@@ -34,7 +34,8 @@ void SurfacePieces::find(SurfaceBoundaries::Columns& columns, std::int32_t colum
       parent_[count] = count;
       if (g == 0) continue;
       for (const ColumnSpan& left : columns[static_cast<std::size_t>(g - 1)]) {
-        if (left.plane != span.plane || left.bottom < span.top || left.top > span.bottom) continue;
+        if (left.top > span.bottom) break;
+        if (left.plane != span.plane || left.bottom < span.top) continue;
         const std::uint16_t a = root(left.piece), b = root(span.piece);
         parent_[std::max(a, b)] = std::min(a, b);
       }
@@ -63,7 +64,7 @@ void SurfacePieces::find(SurfaceBoundaries::Columns& columns, std::int32_t colum
       const double area_px = kColumn_px * (span.bottom - span.top + 1);
       piece.plane = span.plane;
       piece.area_px += area_px;
-      piece.sum_column += area_px * (2.0 * g + 0.5);
+      piece.sum_column += area_px * (0.5 * kColumn_px * g + 0.25 * kColumn_px - 0.5);
       piece.sum_row += area_px * 0.25 * (span.top + span.bottom);
     }
   }

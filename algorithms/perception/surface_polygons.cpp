@@ -16,26 +16,26 @@ constexpr double kOnLine_m = 0.002;  // a polygon's edge lies on a line
 // Adds a row's columns first .. last that are not the robot's own, and the valid pixels in them.
 void count_pixels(const std::uint8_t* flags, const std::uint8_t* valid, std::int32_t first, std::int32_t last,
                   std::int32_t& free_columns, std::int32_t& valid_px) noexcept {
-  using Bytes = cv::v_uint8;
+  using Bytes = cv::v_uint8x16;
   static_assert(kColumns % Bytes::nlanes == 0 && kColumns <= 256, "columns are counted in whole registers of bytes");
   static constexpr std::array<std::uint8_t, kColumns> kIndices = [] {
     std::array<std::uint8_t, kColumns> indices{};
     for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<std::uint8_t>(i);
     return indices;
   }();
-  const Bytes from = cv::vx_setall_u8(static_cast<std::uint8_t>(first)),
-              to = cv::vx_setall_u8(static_cast<std::uint8_t>(last)), is_body = cv::vx_setall_u8(kPixelBody),
-              none = cv::vx_setzero_u8();
-  // No lane gets more than 4 * kColumns / nlanes.
+  const Bytes from = cv::v_setall_u8(static_cast<std::uint8_t>(first)),
+              to = cv::v_setall_u8(static_cast<std::uint8_t>(last)), is_body = cv::v_setall_u8(kPixelBody),
+              none = cv::v_setzero_u8();
+  // No lane gets more than 8 * kColumns / nlanes.
   Bytes free_sum = none, valid_sum = none;
   for (std::int32_t g = first / Bytes::nlanes * Bytes::nlanes; g <= last; g += Bytes::nlanes) {
-    const Bytes index = cv::vx_load(kIndices.data() + g);
+    const Bytes index = cv::v_load(kIndices.data() + g);
     const Bytes wanted = (cv::v_max(index, from) == index) & (cv::v_min(index, to) == index);
-    Bytes left_half, right_half;
-    cv::v_load_deinterleave(flags + 2 * static_cast<std::ptrdiff_t>(g), left_half, right_half);
-    const Bytes seen = (((left_half | right_half) & is_body) == none) & wanted;
+    Bytes a, b, c, d;
+    cv::v_load_deinterleave(flags + 4 * static_cast<std::ptrdiff_t>(g), a, b, c, d);
+    const Bytes seen = ((((a | b) | (c | d)) & is_body) == none) & wanted;
     free_sum = cv::v_sub_wrap(free_sum, seen);
-    valid_sum = cv::v_add_wrap(valid_sum, cv::vx_load(valid + g) & seen);
+    valid_sum = cv::v_add_wrap(valid_sum, cv::v_load(valid + g) & seen);
   }
   free_columns += static_cast<std::int32_t>(cv::v_reduce_sum(free_sum));
   valid_px += static_cast<std::int32_t>(cv::v_reduce_sum(valid_sum));
@@ -73,9 +73,10 @@ double invalid_share(const FramePicture& picture, const PolygonVertices& polygon
   for (std::int32_t r = first_row; r <= last_row; ++r) {
     const Reach& row = reach[static_cast<std::size_t>(r)];
     // Columns whose middles, at 2 g + 0.5, lie within.
-    const auto left = static_cast<std::int32_t>(std::ceil(math::clamp(0.5 * (row.left - 0.5), 0.0, kColumns)));
+    const auto left =
+        static_cast<std::int32_t>(std::ceil(math::clamp((row.left + 0.5) / (0.5 * kColumn_px) - 0.5, 0.0, kColumns)));
     const auto right = static_cast<std::int32_t>(
-        std::floor(math::clamp(0.5 * (row.right - 0.5), -1.0, picture.column_rays.columns - 1.0)));
+        std::floor(math::clamp((row.right + 0.5) / (0.5 * kColumn_px) - 0.5, -1.0, picture.column_rays.columns - 1.0)));
     if (left <= right) count_pixels(picture.flags.row(r), picture.columns.valid.row(2 * r), left, right, free, valid);
   }
   return free > 0 ? 1.0 - static_cast<double>(valid) / (kColumn_px * free) : 0.0;
@@ -86,7 +87,7 @@ double invalid_share(const FramePicture& picture, const PolygonVertices& polygon
 // What is just outside an edge decides whether the surface ends there or only the view of it.
 EdgeKind SurfacePolygons::judge_edge(const FramePicture& picture, const InversePlane& plane, const Vec3& a_m,
                                      const Vec3& b_m, const Vec3& inside_m) const noexcept {
-  constexpr int kProbes = 9;
+  constexpr int kProbes = 5;
   const Vec3 middle = 0.5 * (a_m + b_m);
   const auto project = [&](const Vec3& p) {
     return Vec2{p.x() / p.z() * picture.rays.fx_px + picture.rays.cx_px,

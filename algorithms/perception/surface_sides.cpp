@@ -2,6 +2,7 @@
 #include "algorithms/perception/surface_sides.hpp"
 
 #include <algorithm>
+#include <bit>
 
 #include "algorithms/perception/vectors.hpp"
 
@@ -9,7 +10,7 @@ namespace polygmap {
 namespace {
 
 constexpr double kLeastCosine = 0.26;                    // of the incidence; the noise model ends there
-constexpr std::int32_t kFlatRows = 4, kFlatColumns = 3;  // more columns in these rows: too flat
+constexpr std::int32_t kFlatRows = 4, kFlatColumns = 2;  // more columns in these rows: too flat
 constexpr std::int32_t kMixed_px = 2;                    // of neither plane, where one pixel sees both
 constexpr std::int32_t kInside_px = 8;                   // of the outermost column and the one beside it
 constexpr std::int32_t kOutside_px = 8;                  // searched beyond
@@ -17,6 +18,7 @@ constexpr std::int32_t kReach_px = kInside_px + kOutside_px;
 
 using Wide = cv::v_float32;
 using Reach = std::array<float, kReach_px>;  // from inside outwards
+using Raws = std::array<std::uint16_t, kReach_px>;
 
 // The rays of one row: (x0 + pitch * column, y, 1).
 struct RowRays {
@@ -54,14 +56,23 @@ struct RowPlane {
 };
 
 struct PixelGains {
-  Reach gain, residual;
+  Reach gain;
+  std::uint32_t measured = 0, before = 0;  // a bit a pixel: it has data; it lies before the surface
 };
+
+// A bit for each that is less than most.
+std::uint32_t below(const Reach& x, float most) noexcept {
+  std::uint32_t bits = 0;
+  for (std::int32_t i = 0; i < kReach_px; i += Wide::nlanes) {
+    bits |= static_cast<std::uint32_t>(cv::v_signmask(cv::vx_load(x.data() + i) < cv::vx_setall_f32(most))) << i;
+  }
+  return bits;
+}
 
 // What every pixel says for the plane beyond and against our own: twice the negative logarithms of the likelihoods, but
 // for a constant. Nothing where there is no data.
 PixelGains weigh(const SurfaceSides::Params& params, const RawPicture& picture, const RowPlane& own,
-                 const RowPlane& other, std::int32_t first, std::int32_t out,
-                 const std::array<std::uint16_t, kReach_px>& raw) noexcept {
+                 const RowPlane& other, std::int32_t first, std::int32_t out, const Raws& raw) noexcept {
   PixelGains gains;
   static_assert(kReach_px % Wide::nlanes == 0);
   const auto all = [](float x) { return cv::vx_setall_f32(x); };
@@ -84,8 +95,10 @@ PixelGains weigh(const SurfaceSides::Params& params, const RawPicture& picture, 
       const Wide o = other.residual(column, depth * unit_m);
       beyond = cv::v_min(o * o + more, most);
     }
-    cv::v_store(gains.gain.data() + i, (cv::v_min(r * r, most) - beyond) & (depth >= least) & (depth <= largest));
-    cv::v_store(gains.residual.data() + i, r);
+    const Wide measured = (depth >= least) & (depth <= largest);
+    cv::v_store(gains.gain.data() + i, (cv::v_min(r * r, most) - beyond) & measured);
+    gains.measured |= static_cast<std::uint32_t>(cv::v_signmask(measured)) << i;
+    gains.before |= static_cast<std::uint32_t>(cv::v_signmask(r)) << i;
   }
   return gains;
 }
@@ -123,38 +136,32 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
     const std::size_t p = picture_->owner(g, row);
     if (p != 0 && p != index) other = RowPlane(planes[p].plane, noise_, rays, border);
   }
-  std::array<std::uint16_t, kReach_px> raw{};
+  const std::uint8_t* flags = picture_->flags.row(row / 2);
+  const std::uint16_t* pixels = raw_->row(row);
+  Raws raw{};
   std::int32_t count = 0;
   for (std::int32_t c = first; count < kReach_px && c >= 0 && c < k.width_px; c += out) {
-    if ((picture_->flags(c / 2, row / 2) & kPixelBody) != 0) break;
-    raw[static_cast<std::size_t>(count++)] = raw_->row(row)[c];
+    if ((flags[c / 2] & kPixelBody) != 0) break;
+    raw[static_cast<std::size_t>(count++)] = pixels[c];
   }
   if (count < kInside_px) return Ending::kHidden;  // by the robot's own body
   const PixelGains gains = weigh(params_, *raw_, own, other, first, out, raw);
   // The boundary with the least cost; between equally good ones (a pixel without data or of neither) in their middle.
   constexpr float kTie = 1e-3F;
+  Reach cost;
   float sum = 0.0F, least = 1e9F;
-  std::int32_t from = 0, to = 0;
-  std::int32_t of_neither = 0;  // pixels with data between from and to, those behind the surface less those before it
-  bool measured_beyond = false;
-  for (std::int32_t i = 0; i < count; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const bool measured = raw_->range.valid(raw[at]);
-    measured_beyond = measured_beyond || measured;
-    sum += gains.gain[at];
-    if (sum < least - kTie) {
-      least = sum;
-      from = to = i;
-      of_neither = 0;
-      measured_beyond = false;
-    } else if (sum < least + kTie && to == i - 1) {
-      to = i;
-      if (measured) of_neither += gains.residual[at] < 0.0F ? -1 : 1;
-      measured_beyond = false;
-    }
+  for (std::size_t i = 0; i < cost.size(); ++i) {
+    cost[i] = sum += gains.gain[i];
+    least = std::min(least, sum);
   }
+  const std::uint32_t equal = below(cost, least + kTie);
+  const auto from = std::countr_zero(equal);
+  auto to = from + std::countr_one(equal >> from) - 1;
   if (from == 0) return Ending::kNone;
-  if (!measured_beyond) return Ending::kHidden;
+  if ((gains.measured >> to >> 1) == 0) return Ending::kHidden;
+  // Pixels with data between from and to, those behind the surface less those before it.
+  const std::uint32_t between = gains.measured & ((2U << to) - (2U << from));
+  const std::int32_t of_neither = std::popcount(between) - 2 * std::popcount(between & gains.before);
   if (std::abs(of_neither) > kMixed_px) to = from;  // something narrow stands between: the surface ends at it
   end_px = first + out * (0.5 * (from + to) + 0.5);
   return Ending::kSeen;
