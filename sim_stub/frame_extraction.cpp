@@ -18,12 +18,19 @@ Kind kind_of(SurfaceKind kind) {
   return kind == SurfaceKind::kTread ? Kind::kTread : (kind == SurfaceKind::kRiser ? Kind::kRiser : Kind::kOther);
 }
 
+// A file that says more noise than usual may be a guess: down to half of it, and to the usual, the picture decides.
+double least_noise_scale(const DepthSigma& noise) {
+  constexpr double kDepth_m = 1.0;
+  return math::clamp(DepthSigma{}.sigma_m(kDepth_m) / noise.sigma_m(kDepth_m), 0.5, 1.0);
+}
+
 class FrameExtractor final : public polygmap_frames::Extractor {
  public:
   explicit FrameExtractor(const Camera& c) {
     params_.noise = {c.noise_base_m, c.noise_per_metre, c.noise_quadratic_per_m, c.noise_correlated_share,
                      c.noise_correlated_px};
-    params_.noise_gain = 0.5;
+    params_.depth_noise.gain = 0.5;
+    params_.depth_noise.min_scale = least_noise_scale(params_.noise);
     params_.limits = {c.min_depth_m, c.max_depth_m};
     // What fills an eighth of a picture is a surface, however few pixels the picture has.
     const std::int32_t eighth_px = c.width_px * c.height_px / 8;
@@ -70,9 +77,9 @@ class FrameExtractor final : public polygmap_frames::Extractor {
   std::size_t surface_at(std::int32_t column, std::int32_t row) const override {
     return extractor_.surface_at(column, row);
   }
-  double noise_scale() const override { return extractor_.noise_scale(); }
-  void hold_noise_scale() override {
-    params_.noise_gain = 0.0;
+  double noise_sigma_m(double z_m) const override { return extractor_.noise().sigma_m(z_m); }
+  void hold_noise() override {
+    params_.depth_noise.gain = 0.0;
     extractor_.configure(params_);
   }
 

@@ -46,8 +46,8 @@ class Extractor {
   // Of the last picture.
   [[nodiscard]] virtual std::vector<Surface> surfaces() const = 0;
   [[nodiscard]] virtual std::size_t surface_at(std::int32_t column, std::int32_t row) const = 0;  // 1-based, 0 = none
-  [[nodiscard]] virtual double noise_scale() const = 0;
-  virtual void hold_noise_scale() = 0;
+  [[nodiscard]] virtual double noise_sigma_m(double z_m) const = 0;  // as it is believed for the next picture
+  virtual void hold_noise() = 0;
 };
 
 }  // namespace polygmap_frames

@@ -78,12 +78,15 @@ class Extraction {
   void settle_noise(const Vec3& up) {
     constexpr int kMostRounds = 6;
     constexpr double kSettled = 0.03;
+    const auto settled = [this](double z_m, double before_m) {
+      return std::abs(extractor_->noise_sigma_m(z_m) - before_m) < kSettled * before_m;
+    };
     for (int i = 0; i < kMostRounds; ++i) {
-      const double before = extractor_->noise_scale();
+      const double near_m = extractor_->noise_sigma_m(1.0), far_m = extractor_->noise_sigma_m(3.0);
       static_cast<void>(run(up));
-      if (std::abs(extractor_->noise_scale() - before) < kSettled * before) break;
+      if (settled(1.0, near_m) && settled(3.0, far_m)) break;
     }
-    extractor_->hold_noise_scale();
+    extractor_->hold_noise();
   }
   double run(const Vec3& up) {
     const std::optional<double> microseconds = extractor_->extract(depth_.data(), up);

@@ -75,7 +75,8 @@ TEST(FrameBits, TwoPicturesOfStairs_GiveTheRecordedBits) {
     const SurfaceFrame& frame = extractor->result();
     ASSERT_GE(frame.surfaces.size(), 5U);
     for (const SurfacePatch& s : frame.surfaces) surfaces.add(s);
-    surfaces.add(frame.invalid_fraction), surfaces.add(extractor->noise_scale());
+    surfaces.add(frame.invalid_fraction), surfaces.add(extractor->noise().sigma_m(1.0)),
+        surfaces.add(extractor->noise().sigma_m(3.0));
     for (std::int32_t r = 0; r < 480; ++r) {
       for (std::int32_t c = 0; c < 640; ++c) labels.add(std::uint64_t{extractor->surface_at(c, r)});
     }

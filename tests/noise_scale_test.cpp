@@ -11,8 +11,10 @@
 namespace polygmap {
 namespace {
 
+constexpr double kDepth_m = 1.0;
+
 struct Seen {
-  double scale = 0.0;
+  double scale = 0.0;  // of the noise at that depth
   int treads = 0, surfaces = 0;
 };
 
@@ -26,8 +28,8 @@ Seen look(double strength, double gain, int frames, double min_noise_scale = 1.0
   test::add_noise(picture, {.correlated = true, .strength = strength}, 4);
   const std::vector<std::uint16_t> raw = picture.raw();
   SurfaceExtractor::Params params;
-  params.noise_gain = gain;
-  params.min_noise_scale = min_noise_scale;
+  params.depth_noise.gain = gain;
+  params.depth_noise.min_scale = min_noise_scale;
   const auto extractor = std::make_unique<SurfaceExtractor>(params);
   SurfaceExtractor::View view;
   view.intrinsics = scene.intrinsics;
@@ -37,7 +39,7 @@ Seen look(double strength, double gain, int frames, double min_noise_scale = 1.0
     WorkBudget budget(1'000'000);
     EXPECT_EQ(extractor->step(budget), Progress::kDone);
   }
-  Seen seen{extractor->noise_scale()};
+  Seen seen{extractor->noise().sigma_m(kDepth_m) / DepthSigma{}.sigma_m(kDepth_m)};
   for (const SurfacePatch& s : extractor->result().surfaces) {
     ++seen.surfaces;
     seen.treads += s.kind == SurfaceKind::kTread ? 1 : 0;

@@ -131,7 +131,8 @@ TEST(PerceiveSize, BothExtractors_SayTheSameOfAPictureThatBothHold) {
   const auto own = make_extractor(camera), large = polygmap_1024x768::make_extractor(camera);
   ASSERT_TRUE(own->extract(raw.data(), scene.camera_up()) && large->extract(raw.data(), scene.camera_up()));
   const std::vector<Surface> a = own->surfaces(), b = large->surfaces();
-  EXPECT_EQ(own->noise_scale(), large->noise_scale());
+  EXPECT_EQ(own->noise_sigma_m(1.0), large->noise_sigma_m(1.0));
+  EXPECT_EQ(own->noise_sigma_m(3.0), large->noise_sigma_m(3.0));
   ASSERT_EQ(a.size(), b.size());
   ASSERT_GE(a.size(), 5U);
   for (std::size_t i = 0; i < a.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <memory>
 #include <random>
+#include <set>
 #include <vector>
 
 #include "algorithms/robot/leg_kinematics.hpp"
@@ -352,6 +353,55 @@ TEST(SurfaceExtractor, PlatformsWithAGapBetween_StayTwoSurfaces) {
     EXPECT_NEAR(nearest, 0.08, 0.01);
   }
   EXPECT_EQ(platforms, 2);
+}
+
+// Two platforms of one height, 0.2 m x 0.16 m seen from above, this far apart: how many planes they count as.
+std::size_t planes_of_platforms(double gap_m, double other_height_m = 0.15) {
+  DepthScene scene = stair_scene({.steps = 0});
+  scene.boxes.push_back({{0.4, 0.5 * gap_m, 0.0}, {0.6, 0.5 * gap_m + 0.16, 0.15}});
+  scene.boxes.push_back({{0.4, -0.5 * gap_m - 0.16, 0.0}, {0.6, -0.5 * gap_m, other_height_m}});
+  Extraction extraction;
+  const SurfaceFrame& frame = extraction.run(scene, {}, 12);
+  std::set<std::uint8_t> planes;
+  int platforms = 0;
+  for (const SurfacePatch& s : frame.surfaces) {
+    if (s.kind != SurfaceKind::kTread || std::abs((scene.world_T_camera * s.centroid_m).z() - 0.15) > 0.03) continue;
+    planes.insert(s.plane);
+    ++platforms;
+  }
+  EXPECT_EQ(platforms, 2);
+  return planes.size();
+}
+
+TEST(SurfaceExtractor, CoplanarPlatforms_FartherApartThanTheyAreWide_AreTwoPlanes) {
+  EXPECT_EQ(planes_of_platforms(0.08), 1U);
+  EXPECT_EQ(planes_of_platforms(0.30), 2U);
+}
+
+TEST(SurfaceExtractor, NearPlatforms_ApartByMoreThanTheNoise_AreTwoPlanes) {
+  EXPECT_EQ(planes_of_platforms(0.08, 0.161), 2U);
+}
+
+// A platform on the floor, in which of every ten rows these lie 50 mm nearer. Runs pass over two such rows.
+bool finds_striped_platform(const std::set<int>& stripes) {
+  DepthScene scene = stair_scene({.steps = 0});
+  const DepthPicture floor = test::render(scene);
+  scene.boxes.push_back({{0.35, -0.15, 0.0}, {0.65, 0.15, 0.15}});
+  DepthPicture picture = test::render(scene);
+  for (std::size_t i = 0; i < picture.depth_m.size(); ++i) {
+    const bool on_platform = picture.depth_m[i] != floor.depth_m[i];
+    if (on_platform && stripes.count(static_cast<int>(i / 640 % 10)) != 0) picture.depth_m[i] -= 0.05;
+  }
+  Extraction extraction;
+  const SurfaceFrame* frame = extraction.run_raw(scene, picture.raw());
+  EXPECT_NE(frame, nullptr);
+  return frame != nullptr && tread_at(*frame, scene, 0.15) != nullptr;
+}
+
+TEST(SurfaceExtractor, SurfaceThatItsPlaneHardlyExplains_IsNone) {
+  EXPECT_TRUE(finds_striped_platform({}));
+  EXPECT_TRUE(finds_striped_platform({0}));
+  EXPECT_FALSE(finds_striped_platform({0, 3, 6, 9}));
 }
 
 TEST(SurfaceExtractor, AnySlicing_GivesTheSameBitsAndHoldsItsBudget) {

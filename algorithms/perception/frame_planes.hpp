@@ -35,6 +35,7 @@ struct FramePlane {
   bool alive = false;
   std::uint8_t surface = 0;  // 1 + index in the result
   std::uint8_t source = 0;   // the plane whose pixels these are
+  std::uint8_t same = 0;     // the first surface of those that count as one plane
   std::uint16_t main_piece = 0;
   double piece_px = 0.0;
 };

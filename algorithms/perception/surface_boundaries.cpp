@@ -8,8 +8,7 @@
 namespace polygmap {
 namespace {
 
-constexpr float kCostsPerUnit = 4.0F;  // bins of the noise scale's histogram
-constexpr float kTruncation = 9.0F;    // of a cost: an outlier says no more than three sigmas do
+constexpr float kTruncation = 9.0F;  // of a cost: an outlier says no more than three sigmas do
 
 }  // namespace
 
@@ -347,10 +346,11 @@ void SurfaceBoundaries::follow() noexcept {
 }
 
 void SurfaceBoundaries::begin_refit() noexcept {
-  costs_.fill(0);
+  noise_samples_.clear();
   for (Plane& plane : planes_) {
     plane.moments = PlaneMoments{};
     plane.residual2 = 0.0;
+    plane.seen_px = 0.0;
   }
 }
 
@@ -415,7 +415,7 @@ void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip, boo
     to[k] = static_cast<float>(strip.bottom[k] - top);
   }
 
-  Lanes n, t1, tt, r1, tr, off2, count;
+  Lanes n, t1, tt, r1, tr, off2, count, seen_px;
   const auto all = [](float value) { return cv::vx_setall_f32(value); };
   const Wide least = all(1e-3F), base = all(base_), per_metre = all(per_metre_), b = all(slope);
   const Wide quadratic = all(quadratic_), share1 = all(correlated_share_), share0 = all(1.0F - correlated_share_);
@@ -424,7 +424,7 @@ void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip, boo
     const Wide first = cv::vx_load(from.data() + k), last = cv::vx_load(to.data() + k);
     const Wide a = cv::vx_load(at_top.data() + k);
     Wide sum_n = all(0.0F), sum_t = sum_n, sum_tt = sum_n, sum_r = sum_n, sum_tr = sum_n;
-    Wide sum_off2 = sum_n, sum_count = sum_n;
+    Wide sum_off2 = sum_n, sum_count = sum_n, sum_seen = sum_n;
     for (std::int32_t r = top; r <= bottom; r += stride) {
       const Wide t = all(static_cast<float>(r - top));
       const Wide w = cv::v_max(cv::vx_load(image_->inverse_depth.row(r) + first_column + k), least);
@@ -433,23 +433,24 @@ void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip, boo
       const Wide residual = w - (a + b * t), sigma = (base * w + per_metre) * w + quadratic;
       const Wide w2 = w * w, variance = sigma * sigma;
       // The mean of n pixels has (share1 + share0 / n) of a pixel's variance. Without pixels nothing counts.
-      const Wide inside = (t >= first) & (t <= last) &
-                          (residual * residual * w2 * pixels <= most * variance * (share1 * pixels + share0));
-      const Wide used = pixels & inside;
+      const Wide seen = pixels & (t >= first) & (t <= last);
+      const Wide used = seen & (residual * residual * w2 * pixels <= most * variance * (share1 * pixels + share0));
       const Wide g = used * w2 / variance;
       const Wide gt = g * t, gr = g * residual;
       const Wide relative = residual / w;
       sum_n += g, sum_t += gt, sum_tt += gt * t, sum_r += gr, sum_tr += gr * t;
       sum_off2 += used * relative * relative;
-      sum_count += used;
+      sum_count += used, sum_seen += seen;
     }
     cv::v_store(n.data() + k, sum_n), cv::v_store(t1.data() + k, sum_t), cv::v_store(tt.data() + k, sum_tt);
     cv::v_store(r1.data() + k, sum_r), cv::v_store(tr.data() + k, sum_tr);
     cv::v_store(off2.data() + k, sum_off2), cv::v_store(count.data() + k, sum_count);
+    cv::v_store(seen_px.data() + k, sum_seen);
   }
 
   const double d_m = plane.plane.d_m();
   for (std::size_t k = 0; k < kRefitColumns; ++k) {
+    plane.seen_px += stride * static_cast<double>(seen_px[k]);
     if (!(count[k] > 0.0F)) continue;
     const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(first_column) + k]);
     const double middle = static_cast<double>(rays_->y[static_cast<std::size_t>((strip.top[k] + strip.bottom[k]) / 2)]);
@@ -478,24 +479,9 @@ void SurfaceBoundaries::sample_noise(std::int32_t column) noexcept {
     for (std::int32_t r = span.top + 1; r < span.bottom; r += kStride) {
       if (image_->valid(column, r) == 0) continue;
       const Offset at = offset(line, column, r);
-      const float bin = std::min(at.off2 / at.variance * kCostsPerUnit, static_cast<float>(kCostBins));
-      ++costs_[static_cast<std::size_t>(bin)];
+      noise_samples_.add(image_->inverse_depth(column, r), at.off2 / at.variance);
     }
   }
-}
-
-// The median forgives half of the rows being something else; a squared normal variable's is 0.455.
-double SurfaceBoundaries::noise_scale() const noexcept {
-  constexpr std::int32_t kLeastRows = 150;
-  constexpr double kMedian = 0.455;
-  std::int32_t all = 0;
-  for (const std::int32_t n : costs_) all += n;
-  if (all < kLeastRows) return 0.0;
-  std::int32_t below = 0;
-  std::size_t bin = 0;
-  while (2 * (below + costs_[bin]) < all) below += costs_[bin++];
-  const double within = (0.5 * all - below) / costs_[bin];
-  return math::sqrt((static_cast<double>(bin) + within) / static_cast<double>(kCostsPerUnit) / kMedian);
 }
 
 }  // namespace polygmap

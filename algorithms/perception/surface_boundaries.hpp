@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdint>
 
+#include "algorithms/perception/depth_noise.hpp"
 #include "algorithms/perception/plane_fit.hpp"
 #include "algorithms/perception/run_segmentation.hpp"
 
@@ -46,6 +47,7 @@ class SurfaceBoundaries {
     InversePlane plane;
     PlaneMoments moments;    // of the last refit, weights 1 / sigma^2
     double residual2 = 0.0;  // sum of squared normal distances, per pixel
+    double seen_px = 0.0;    // measured in the rows refitted to, among them those that the plane does not explain
   };
 
   void begin(const Params& params, const DepthSigma& noise, const ColumnRays& rays, double fy_px, double cy_px,
@@ -73,8 +75,8 @@ class SurfaceBoundaries {
   // rows, and without looking at the noise.
   void refit(std::int32_t first_column, bool roughly) noexcept;
 
-  // How large the noise is against its model, from the rows of the last refit's surfaces; 0 when there are too few.
-  [[nodiscard]] double noise_scale() const noexcept;
+  // The noise as the rows of the last refit's surfaces show it.
+  [[nodiscard]] const NoiseSamples& noise_samples() const noexcept { return noise_samples_; }
 
   // visit(other plane, columns in which the two meet), of the last meeting.
   template <typename Visit>
@@ -152,8 +154,7 @@ class SurfaceBoundaries {
   std::size_t joint_count_ = 0;
   std::array<Pair, kMaxPairs> pairs_{};
   std::size_t pair_count_ = 0;
-  static constexpr std::int32_t kCostBins = 128;  // of 0.25: up to 5.7 sigmas
-  std::array<std::int32_t, kCostBins + 1> costs_{};
+  NoiseSamples noise_samples_;
   std::uint32_t overflow_ = 0;
 };
 

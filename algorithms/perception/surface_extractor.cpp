@@ -64,7 +64,7 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
   raw_.intrinsics = view.intrinsics;
   raw_.range.set(params_.limits, view.intrinsics.depth_unit_m);
   picture_.column_rays.set(view.intrinsics);
-  noise_ = params_.noise.scaled(noise_scale_);
+  noise_ = depth_noise_.of(params_.noise);
   runs_.begin(params_.runs, noise_, view.intrinsics, picture_.columns);
   self_filter_.clear();
   next_.stamp_ns = frame.stamp_ns;
@@ -255,8 +255,12 @@ void SurfaceExtractor::merge_planes() noexcept {
       FramePlane &p = planes_[keep], &q = planes_[gone];
       const bool small = q.pixels < params_.small_plane_px;
       if (p.plane.normal().dot(q.plane.normal()) < (small ? least_small : least_cosine)) continue;
-      if (std::abs(p.plane.distance_m(q.centre_m)) > params_.merge_m) continue;
-      if (!small && std::abs(q.plane.distance_m(p.centre_m)) > 2.0 * params_.merge_m) continue;
+      // Where a large plane lies is known well: apart by more than what lets a run join a plane, the two are not one.
+      const double noise_m =
+          params_.growing.join_floor_m + params_.growing.join_sigmas * noise_.sigma_m(q.centre_m.z());
+      const double merge_m = small ? params_.merge_m : std::min(noise_m, params_.merge_m);
+      if (std::abs(p.plane.distance_m(q.centre_m)) > merge_m) continue;
+      if (!small && std::abs(q.plane.distance_m(p.centre_m)) > 2.0 * merge_m) continue;
       p.pixels += q.pixels;
       q.alive = false;
       for (std::uint8_t& plane : to_plane_) plane = plane == gone ? static_cast<std::uint8_t>(keep) : plane;
@@ -293,13 +297,21 @@ void SurfaceExtractor::take_found_planes() noexcept {
 
 void SurfaceExtractor::solve_planes() noexcept {
   constexpr double kLeast_px = 64.0;
+  double explained_px = 0.0, seen_px = 0.0;
+  for (std::size_t i = 1; i <= planes_.count; ++i) {
+    if (!planes_[i].alive) continue;
+    explained_px += boundaries_.plane(i).moments.count;
+    seen_px += boundaries_.plane(i).seen_px;
+  }
+  // While planes are rough, what they do not explain says little.
+  const double least_share = round_ == 1 ? params_.min_explained * explained_px / std::max(seen_px, 1.0) : 0.0;
   for (std::size_t i = 1; i <= planes_.count; ++i) {
     FramePlane& p = planes_[i];
     if (!p.alive) continue;
     const SurfaceBoundaries::Plane& fitted = boundaries_.plane(i);
     p.moments = fitted.moments;
     p.residual2 = fitted.residual2;
-    if (p.moments.count < kLeast_px ||
+    if (p.moments.count < kLeast_px || p.moments.count < least_share * fitted.seen_px ||
         !try_solve_leaning(params_.planes, noise_, p.moments, view_.camera_up, p.plane, &p.covariance)) {
       p.alive = false;
       for (std::uint8_t& plane : to_plane_) plane = plane == i ? std::uint8_t{0} : plane;
@@ -444,10 +456,7 @@ void SurfaceExtractor::build_polygon() noexcept {
 }
 
 void SurfaceExtractor::finish() noexcept {
-  if (const double seen = boundaries_.noise_scale(); measured_px_ > 0 && seen > 0.0) {
-    noise_scale_ = math::clamp(noise_scale_ * (1.0 + params_.noise_gain * (seen - 1.0)), params_.min_noise_scale,
-                               params_.max_noise_scale);
-  }
+  if (measured_px_ > 0) depth_noise_.follow(params_.depth_noise, params_.noise, boundaries_.noise_samples());
   next_.invalid_fraction = outside_body_px_ > 0 ? 1.0 - static_cast<double>(measured_px_) / outside_body_px_ : 1.0;
   result_ = next_;
   raw_.depth = nullptr;  // the driver's again

@@ -14,6 +14,7 @@
 #include "algorithms/core/work.hpp"
 #include "algorithms/perception/column_image.hpp"
 #include "algorithms/perception/column_outline.hpp"
+#include "algorithms/perception/depth_noise.hpp"
 #include "algorithms/perception/depth_range.hpp"
 #include "algorithms/perception/edge_lines.hpp"
 #include "algorithms/perception/frame_planes.hpp"
@@ -35,10 +36,7 @@ class SurfaceExtractor {
  public:
   struct Params {
     DepthSigma noise;
-    // The noise as measured, against that model: followed slowly, within bounds.
-    double noise_gain = 0.1;  // per frame
-    double min_noise_scale = 1.0;
-    double max_noise_scale = 4.0;
+    DepthNoise::Params depth_noise;  // how it is followed from frame to frame
     DepthLimits limits;
     RunSegmentation::Params runs;
     PlaneGrowing::Params growing;
@@ -47,9 +45,11 @@ class SurfaceExtractor {
     PlaneFit::Params planes;
     EdgeLineFinder::Params edge_lines;
     double kind_tilt_rad = 0.21;  // a fitted plane within this of level is a tread, of upright a riser
-    double merge_m = 0.012;       // pieces whose planes are this close at each other's centre are one surface
+    double merge_m = 0.012;       // pieces whose planes are this close at each other's centre are one surface; large
+                                  // ones where a run of one could join the other, too
     double merge_tilt_rad = 0.12;
     double small_plane_px = 4000.0;  // smaller planes' tilt is known half as well
+    double min_explained = 0.75;     // share of a surface's pixels that its plane explains, over that of all surfaces
     SurfacePieces::Params pieces;
     SurfaceSides::Params sides;
     SurfacePolygons::Params polygons;
@@ -93,7 +93,8 @@ class SurfaceExtractor {
   // Of the last finished frame.
   [[nodiscard]] const SurfaceFrame& result() const noexcept { return result_; }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
-  [[nodiscard]] double noise_scale() const noexcept { return noise_scale_; }        // for the next frame
+  // For the next frame.
+  [[nodiscard]] DepthSigma noise() const noexcept { return depth_noise_.of(params_.noise); }
   [[nodiscard]] std::int32_t units_spent() const noexcept { return units_spent_; }  // on the last frame
 
   // What a pixel was taken for: 1 + index in result().surfaces, 0 = none. For pictures and tests; valid until the next
@@ -147,7 +148,7 @@ class SurfaceExtractor {
 
   Params params_;
   DepthSigma noise_;  // of this frame
-  double noise_scale_ = 1.0;
+  DepthNoise depth_noise_;
   View view_;
   Counters counters_;
   SurfaceFrame result_;

@@ -61,6 +61,13 @@ void SurfacePieces::find(SurfaceBoundaries::Columns& columns, std::int32_t colum
       span.piece = parent_[span.piece];
       if (span.piece == 0) continue;
       Piece& piece = pieces_[span.piece];
+      if (piece.area_px == 0.0) {
+        piece.left = g;
+        piece.top = span.top;
+      }
+      piece.right = g;
+      piece.top = std::min<std::int32_t>(piece.top, span.top);
+      piece.bottom = std::max<std::int32_t>(piece.bottom, span.bottom);
       const double area_px = kColumn_px * (span.bottom - span.top + 1);
       piece.plane = span.plane;
       piece.area_px += area_px;
@@ -89,6 +96,28 @@ bool SurfacePieces::apart(double apart_m, const FramePicture& picture, const Pie
   return elsewhere >= kEnough;
 }
 
+// That a piece is coplanar with others of a plane says little about one farther away than it is wide: another box of
+// the same height, the wall below a table. One that leaves the picture may hang together outside.
+std::uint8_t SurfacePieces::same_plane(const FramePicture& picture, const FramePlanes& planes, const Piece& piece,
+                                       std::uint8_t source) const noexcept {
+  const bool leaves = piece.left == 0 || piece.top == 0 || piece.right + 1 == picture.column_rays.columns ||
+                      piece.bottom + 1 == picture.column_rays.height_px;
+  if (leaves) return source;
+  double nearest2 = piece.area_px;
+  std::uint8_t same = 0;
+  for (std::size_t p = 1; p <= planes.count; ++p) {
+    if (planes[p].source != source || planes[p].main_piece == 0) continue;
+    const Piece& other = pieces_[planes[p].main_piece];
+    const double across = kColumn_px * std::max({0, other.left - piece.right - 1, piece.left - other.right - 1});
+    const double down = std::max({0, other.top - piece.bottom - 1, piece.top - other.bottom - 1});
+    const double gap2 = across * across + down * down;
+    if (gap2 >= nearest2) continue;
+    nearest2 = gap2;
+    same = planes[p].same;
+  }
+  return same;
+}
+
 // The largest piece of a plane keeps it. A piece apart from that becomes a surface of its own in the same plane.
 std::uint32_t SurfacePieces::join(const Params& params, const SurfaceBoundaries& boundaries,
                                   const FramePicture& picture, FramePlanes& planes) noexcept {
@@ -96,6 +125,7 @@ std::uint32_t SurfacePieces::join(const Params& params, const SurfaceBoundaries&
   const std::size_t fitted = planes.count;
   for (std::size_t p = 1; p <= fitted; ++p) {
     planes[p].source = static_cast<std::uint8_t>(p);
+    planes[p].same = static_cast<std::uint8_t>(p);
     planes[p].main_piece = 0;
     planes[p].piece_px = 0.0;
   }
@@ -123,7 +153,9 @@ std::uint32_t SurfacePieces::join(const Params& params, const SurfaceBoundaries&
         ++without_room;
         continue;
       }
+      const std::uint8_t same = same_plane(picture, planes, piece, source);
       planes[++planes.count] = planes[source];
+      planes[planes.count].same = same != 0 ? same : static_cast<std::uint8_t>(planes.count);
       planes[planes.count].main_piece = 0;
       planes[planes.count].piece_px = 0.0;
       piece.plane = static_cast<std::uint8_t>(planes.count);

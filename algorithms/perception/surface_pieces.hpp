@@ -34,10 +34,14 @@ class SurfacePieces {
   struct Piece {             // a connected piece of a plane's pixels
     std::uint8_t plane = 0;  // 1-based; 0: dropped
     double area_px = 0.0;
-    double sum_column = 0.0, sum_row = 0.0;  // half resolution
+    double sum_column = 0.0, sum_row = 0.0;                 // half resolution
+    std::int32_t left = 0, right = 0, top = 0, bottom = 0;  // columns and rows, inclusive
   };
   [[nodiscard]] static bool apart(double apart_m, const FramePicture& picture, const Piece& a, const Piece& b,
                                   const InversePlane& plane) noexcept;
+  // Of the surfaces of one fitted plane, that of the nearest which the piece belongs to; 0 = none.
+  [[nodiscard]] std::uint8_t same_plane(const FramePicture& picture, const FramePlanes& planes, const Piece& piece,
+                                        std::uint8_t source) const noexcept;
 
   std::array<Piece, kMaxPieces + 1> pieces_{};
   std::size_t piece_count_ = 0;

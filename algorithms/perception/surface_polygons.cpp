@@ -210,7 +210,7 @@ bool SurfacePolygons::try_build(const FramePicture& picture, const FramePlanes& 
 
   patch = SurfacePatch{};
   patch.kind = own.kind;
-  patch.plane = own.source;
+  patch.plane = own.same;
   patch.covariance = own.covariance;
   patch.normal = n;
   patch.d_m = plane.d_m();
