@@ -259,8 +259,8 @@ void SurfaceExtractor::merge_planes() noexcept {
       const double noise_m =
           params_.growing.join_floor_m + params_.growing.join_sigmas * noise_.sigma_m(q.centre_m.z());
       const double merge_m = small ? params_.merge_m : std::min(noise_m, params_.merge_m);
-      if (std::abs(p.plane.distance_m(q.centre_m)) > merge_m) continue;
-      if (!small && std::abs(q.plane.distance_m(p.centre_m)) > 2.0 * merge_m) continue;
+      const double apart_m = std::abs(p.plane.distance_m(q.centre_m));
+      if (small ? apart_m > merge_m : apart_m + std::abs(q.plane.distance_m(p.centre_m)) > 2.0 * merge_m) continue;
       p.pixels += q.pixels;
       q.alive = false;
       for (std::uint8_t& plane : to_plane_) plane = plane == gone ? static_cast<std::uint8_t>(keep) : plane;
