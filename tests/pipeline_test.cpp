@@ -126,6 +126,17 @@ TEST_F(PipelineTest, LidarFromTheFuture_IsRejected) {
   EXPECT_EQ(count(Fault::kLioRejected), 1U);
 }
 
+TEST_F(PipelineTest, LidarWithoutDelay_MeetsTheStateOfItsOwnFrame) {
+  stand(kInitialised_ticks);
+  LioSample sample;
+  sample.stamp_ns = clock_.now_ns() + kMinorFrame_ns;  // when the next frame begins
+  sample.lio_T_lidar = Transform{Mat3::Identity(), Vec3{0, 0, kNominalBaseHeight_m}} * base_T_lidar();
+  lidar_.feed(sample);
+  stand(1);
+  EXPECT_EQ(control().estimator().counters().lio_of(LioVerdict::kAccepted), 1U);
+  EXPECT_EQ(count(Fault::kLioRejected), 0U);
+}
+
 TEST_F(PipelineTest, LidarFallsSilent_IsMissingOnce) {
   stand(kInitialised_ticks);
   LioSample sample;

@@ -11,7 +11,8 @@ class FusionUncertainty {
  public:
   struct Params {
     // What no filter sees, legs that are longer than thought: per axis, besides what the heading does. The rest of the
-    // drift is what the odometry's filter says (follow).
+    // drift is what the odometry's filter says (follow). Set on the simulated climbs of seeds 1-20: with it the fused
+    // position's squared error over its variance is 2.5 in the mean there, of 3 that are honest, and 2.8 on 101-120.
     double drift_per_m = 0.0011;
     double initial_sigma_m = 1e-3;
     double initial_sigma_rad = 1e-3;

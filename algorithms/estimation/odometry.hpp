@@ -5,8 +5,8 @@
 // The position is that of eqs (1)-(4) where soles are known: eight contact points, tread heights, legs that disagree.
 // Where feet are points there is none of that, and the attitude filter's own is published. The velocity is the attitude
 // filter's: it gains from what tilt and biases turn out to have been, which filters that take the attitude as given
-// cannot. On the walks of estimation_quality_test it errs by 1.8 to 2.0 mm/s (RMS) where that of eqs (1)-(4) errs by 2.9
-// to 3.3 mm/s, and it is what the published covariance is of.
+// cannot. On the walks of estimation_quality_test it errs by 1.8 to 2.0 mm/s (RMS) where that of eqs (1)-(4) errs
+// by 2.9 to 3.3 mm/s, and it is what the published covariance is of.
 #pragma once
 
 #include "algorithms/core/state.hpp"

@@ -88,7 +88,8 @@ LioVerdict OdometryFusion::fuse(const LioSample& sample, const Transform& odom_T
   }
   jumped_count_ = 0;
   last_accepted_ns_ = sample.stamp_ns;
-  measure_noise(lio_T_base, odom_T_base, silence_s);
+  const bool stated = sample.position_sigma_m.maxCoeff() > 0.0 && sample.rotation_sigma_rad.maxCoeff() > 0.0;
+  if (!stated) measure_noise(lio_T_base, odom_T_base, silence_s);
 
   const double gain = complementary_gain(std::min(silence_s, params_.max_gap_s),
                                          std::max(params_.tau_s, params_.tau_spm * sigmas.position_m));
