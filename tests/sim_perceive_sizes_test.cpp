@@ -2,6 +2,8 @@
 // Pictures of any size, through the module's own extractor and through the one for larger pictures.
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "sim_stub/perceive.hpp"
 #include "tests/support/depth_scene.hpp"
 
@@ -104,6 +106,23 @@ TEST(PerceiveSize, ThirtyThreeByThirtyTwo_ShowsTheFloorAndNothingElse) {
   for (std::size_t i = 0; i < found.labels.size(); ++i) EXPECT_EQ(found.labels[i], i % 33 < 32 ? 1 : 0) << i;
 }
 
+polygmap_frames::Camera camera_of(const CameraIntrinsics& k, const DepthSigma& noise) {
+  return {k.width_px,
+          k.height_px,
+          k.fx_px,
+          k.fy_px,
+          k.cx_px,
+          k.cy_px,
+          k.depth_unit_m,
+          0.2,
+          4.0,
+          noise.base_m,
+          noise.per_metre,
+          noise.quadratic_per_m,
+          noise.correlated_share,
+          noise.correlated_px};
+}
+
 // Capacities apart, the two are one extractor.
 TEST(PerceiveSize, BothExtractors_SayTheSameOfAPictureThatBothHold) {
   test::DepthScene scene = stairs_of({640, 480});
@@ -111,22 +130,7 @@ TEST(PerceiveSize, BothExtractors_SayTheSameOfAPictureThatBothHold) {
   test::DepthPicture picture = test::render(scene);
   test::add_noise(picture, {.correlated = true}, 6);
   const std::vector<std::uint16_t> raw = picture.raw();
-  const CameraIntrinsics& k = scene.intrinsics;
-  const DepthSigma noise;
-  const polygmap_frames::Camera camera{k.width_px,
-                                       k.height_px,
-                                       k.fx_px,
-                                       k.fy_px,
-                                       k.cx_px,
-                                       k.cy_px,
-                                       k.depth_unit_m,
-                                       0.2,
-                                       4.0,
-                                       noise.base_m,
-                                       noise.per_metre,
-                                       noise.quadratic_per_m,
-                                       noise.correlated_share,
-                                       noise.correlated_px};
+  const polygmap_frames::Camera camera = camera_of(scene.intrinsics, DepthSigma{});
   EXPECT_TRUE(holds(camera));
   const auto own = make_extractor(camera), large = polygmap_1024x768::make_extractor(camera);
   ASSERT_TRUE(own->extract(raw.data(), scene.camera_up()) && large->extract(raw.data(), scene.camera_up()));
@@ -143,8 +147,23 @@ TEST(PerceiveSize, BothExtractors_SayTheSameOfAPictureThatBothHold) {
     EXPECT_EQ(a[i].rmse_m, b[i].rmse_m);
     EXPECT_EQ(a[i].invalid_fraction, b[i].invalid_fraction);
   }
-  for (std::int32_t r = 0; r < k.height_px; ++r) {
-    for (std::int32_t c = 0; c < k.width_px; ++c) ASSERT_EQ(own->surface_at(c, r), large->surface_at(c, r));
+  for (std::int32_t r = 0; r < camera.height_px; ++r) {
+    for (std::int32_t c = 0; c < camera.width_px; ++c) ASSERT_EQ(own->surface_at(c, r), large->surface_at(c, r));
+  }
+}
+
+TEST(PerceiveNoise, MoreThanThePictureShows_IsHalvedAtMostAndNeverBelowTheUsual) {
+  constexpr int kPictures = 20;
+  test::DepthScene scene = stairs_of({640, 480});
+  scene.add_stairs({});
+  test::DepthPicture picture = test::render(scene);
+  test::add_noise(picture, {.strength = 0.1}, 6);
+  const std::vector<std::uint16_t> raw = picture.raw();
+  const DepthSigma usual;
+  for (const auto& [said, believed] : {std::pair{1.0, 1.0}, std::pair{1.5, 1.0}, std::pair{3.0, 1.5}}) {
+    const auto extractor = make_extractor(camera_of(scene.intrinsics, usual.scaled(said)));
+    for (int i = 0; i < kPictures; ++i) ASSERT_TRUE(extractor->extract(raw.data(), scene.camera_up()));
+    EXPECT_NEAR(extractor->noise_sigma_m(1.0) / usual.sigma_m(1.0), believed, 0.02) << said;
   }
 }
 

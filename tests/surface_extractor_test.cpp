@@ -355,11 +355,11 @@ TEST(SurfaceExtractor, PlatformsWithAGapBetween_StayTwoSurfaces) {
   EXPECT_EQ(platforms, 2);
 }
 
-// Two platforms of one height, 0.2 m x 0.16 m seen from above, this far apart: how many planes they count as.
-std::size_t planes_of_platforms(double gap_m, double other_height_m = 0.15) {
+// Two platforms, 0.2 m deep, this far apart: how many planes they count as.
+std::size_t planes_of_platforms(double gap_m, double width_m = 0.16, double other_height_m = 0.15) {
   DepthScene scene = stair_scene({.steps = 0});
-  scene.boxes.push_back({{0.4, 0.5 * gap_m, 0.0}, {0.6, 0.5 * gap_m + 0.16, 0.15}});
-  scene.boxes.push_back({{0.4, -0.5 * gap_m - 0.16, 0.0}, {0.6, -0.5 * gap_m, other_height_m}});
+  scene.boxes.push_back({{0.4, 0.5 * gap_m, 0.0}, {0.6, 0.5 * gap_m + width_m, 0.15}});
+  scene.boxes.push_back({{0.4, -0.5 * gap_m - width_m, 0.0}, {0.6, -0.5 * gap_m, other_height_m}});
   Extraction extraction;
   const SurfaceFrame& frame = extraction.run(scene, {}, 12);
   std::set<std::uint8_t> planes;
@@ -376,10 +376,11 @@ std::size_t planes_of_platforms(double gap_m, double other_height_m = 0.15) {
 TEST(SurfaceExtractor, CoplanarPlatforms_FartherApartThanTheyAreWide_AreTwoPlanes) {
   EXPECT_EQ(planes_of_platforms(0.08), 1U);
   EXPECT_EQ(planes_of_platforms(0.30), 2U);
+  EXPECT_EQ(planes_of_platforms(0.40, 2.0), 1U) << "both leave the picture";
 }
 
 TEST(SurfaceExtractor, NearPlatforms_ApartByMoreThanTheNoise_AreTwoPlanes) {
-  EXPECT_EQ(planes_of_platforms(0.08, 0.161), 2U);
+  EXPECT_EQ(planes_of_platforms(0.08, 0.16, 0.161), 2U);
 }
 
 // A platform on the floor, in which of every ten rows these lie 50 mm nearer. Runs pass over two such rows.
@@ -401,7 +402,7 @@ bool finds_striped_platform(const std::set<int>& stripes) {
 TEST(SurfaceExtractor, SurfaceThatItsPlaneHardlyExplains_IsNone) {
   EXPECT_TRUE(finds_striped_platform({}));
   EXPECT_TRUE(finds_striped_platform({0}));
-  EXPECT_FALSE(finds_striped_platform({0, 3, 6, 9}));
+  EXPECT_FALSE(finds_striped_platform({1, 4, 7, 9}));
 }
 
 TEST(SurfaceExtractor, AnySlicing_GivesTheSameBitsAndHoldsItsBudget) {
