@@ -134,13 +134,8 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       if (++row_ == picture_.column_rays.columns) enter(round_ == 0 ? Phase::kMeet : Phase::kClaim);
       return 1;
     case Phase::kClaim: {  // from left to right and back
-      const std::int32_t last = picture_.column_rays.columns - 1;
-      if (row_ <= last) {
-        boundaries_.claim(row_, row_ - 1, first_found_, planes_.count);
-      } else {
-        const std::int32_t g = 2 * last + 1 - row_;
-        boundaries_.claim(g, g + 1, first_found_, planes_.count);
-      }
+      const std::int32_t last = picture_.column_rays.columns - 1, g = row_ <= last ? row_ : 2 * last + 1 - row_;
+      boundaries_.claim(g, row_ <= last ? g - 1 : g + 1, first_found_, planes_.count);
       if (++row_ == 2 * picture_.column_rays.columns) enter(Phase::kMeet);
       return 1;
     }
