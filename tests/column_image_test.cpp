@@ -52,16 +52,17 @@ TEST(ColumnImage, PixelsOutsideTheRange_DoNotCount) {
   EXPECT_EQ(picture.row.measured_px, 3);
 }
 
-TEST(ColumnImage, BodyPixels_EmptyTheirColumn) {
+TEST(ColumnImage, BodyPixels_DoNotCountAndThreeEmptyTheirColumn) {
   const ReducedPicture picture({1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000,
                                 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000},
-                               {0, 0, 0, 0, 0, kPixelBody, 0, 0, 0, 0, 0, kPixelBody});
+                               {0, 0, 0, 0, 0, kPixelBody, kPixelBody, 0, kPixelBody, kPixelBody, 0, kPixelBody});
   EXPECT_GT(picture.w[0], 0.0F);
-  EXPECT_EQ(picture.w[1], 0.0F);
+  EXPECT_GT(picture.w[1], 0.0F);
+  EXPECT_EQ(picture.valid[1], 4);
   EXPECT_EQ(picture.w[2], 0.0F);
-  EXPECT_EQ(picture.valid[1] + picture.valid[2], 0);
-  EXPECT_EQ(picture.row.measured_px, kColumn_px);
-  EXPECT_EQ(picture.row.body_columns, 2);
+  EXPECT_EQ(picture.valid[2], 0);
+  EXPECT_EQ(picture.row.measured_px, kColumn_px + 4);
+  EXPECT_EQ(picture.row.body_columns, 1);
 }
 
 // Behind a picture's last row there is nothing to read: its row ends anywhere in a register.

@@ -13,6 +13,7 @@ using Words = cv::v_uint32;
 using Wide = cv::v_float32;
 static_assert(kColumns % Raw::nlanes == 0 && kColumn_px == 8);
 
+constexpr std::int32_t kMostBody = kColumn_px / 4;  // half-resolution pixels: a column of more body is not seen
 constexpr int kCountShift = 20;  // below: the sum of eight depths; from here on: how many of them are valid
 
 // The range as vectors see it.
@@ -27,9 +28,14 @@ struct Range {
   }
 };
 
-// Sum and count of pairs of pixels.
-Words pairs(const Range& range, const std::uint16_t* raw) noexcept {
-  const Raw x = cv::vx_load(raw), valid = range.valid(x);
+// Sum and count of pairs of pixels, of which body has a flag each.
+Words pairs(const Range& range, const std::uint16_t* raw, const std::uint8_t* body) noexcept {
+  const Raw x = cv::vx_load(raw);
+  Raw valid = range.valid(x);
+  if (body != nullptr) {
+    const Words free = (cv::vx_load_expand_q(body) & cv::vx_setall_u32(kPixelBody)) == cv::vx_setzero_u32();
+    valid = valid & cv::v_reinterpret_as_u16(free);
+  }
   const Words depths = cv::v_reinterpret_as_u32(x & valid);
   const cv::v_int32 minus_count = cv::v_dotprod(cv::v_reinterpret_as_s16(valid), cv::vx_setall_s16(1));
   return (depths & cv::vx_setall_u32(0xffff)) + (depths >> 16) - (cv::v_reinterpret_as_u32(minus_count) << kCountShift);
@@ -65,14 +71,17 @@ ReducedRow reduce_to_columns(const RawRange& raw_range, const std::uint16_t* raw
       const std::int32_t first = g + static_cast<std::int32_t>(half) * Words::nlanes;
       Words seen = any;
       if (body != nullptr) {
-        seen = cv::v_reinterpret_as_u32(cv::vx_load(body + kColumn_px / 2 * first) & is_body) == none;
+        const cv::v_uint8 flags = cv::vx_load(body + kColumn_px / 2 * first) & is_body;
+        seen = cv::v_dotprod_expand(flags, cv::vx_setall_u8(1)) <= cv::vx_setall_u32(kMostBody * kPixelBody);
         free = free - seen;
         seen = seen & any;
       }
+      const auto pairs_of = [&](std::int32_t k) {
+        return pairs(range, from + k * Raw::nlanes,
+                     body == nullptr ? nullptr : body + kColumn_px / 2 * first + k * Words::nlanes);
+      };
       const Words sum =
-          add_neighbours(add_neighbours(pairs(range, from), pairs(range, from + Raw::nlanes)),
-                         add_neighbours(pairs(range, from + 2 * Raw::nlanes), pairs(range, from + 3 * Raw::nlanes))) &
-          seen;
+          add_neighbours(add_neighbours(pairs_of(0), pairs_of(1)), add_neighbours(pairs_of(2), pairs_of(3))) & seen;
       count[half] = sum >> kCountShift;
       const Wide depths = to_float(sum & cv::vx_setall_u32((1U << kCountShift) - 1U));
       cv::v_store(inverse_depth + first, to_float(count[half]) * per_metre / cv::v_max(depths, least));
@@ -87,8 +96,8 @@ ReducedRow reduce_to_columns(const RawRange& raw_range, const std::uint16_t* raw
     row.measured_px -= valid[g];
     if (body != nullptr) {
       const std::uint8_t* flags = body + kColumn_px / 2 * g;
-      row.body_columns -=
-          std::any_of(flags, flags + kColumn_px / 2, [](std::uint8_t f) { return (f & kPixelBody) != 0; });
+      const auto covered = [](std::uint8_t f) { return (f & kPixelBody) != 0; };
+      row.body_columns -= std::count_if(flags, flags + kColumn_px / 2, covered) > kMostBody ? 1 : 0;
     }
     inverse_depth[g] = 0.0F;
     valid[g] = 0;

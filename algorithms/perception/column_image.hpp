@@ -45,7 +45,8 @@ struct ReducedRow {
   std::int32_t measured_px = 0;
   std::int32_t body_columns = 0;
 };
-// One row of raw depth to one row of columns. body: half-resolution flags of that row, or null. Works in whole vector
+// One row of raw depth to one row of columns. body: half-resolution flags of that row, or null;
+// what it covers does not count, and a column that it covers by more than half is empty. Works in whole vector
 // registers: body and the outputs are as long as the rasters' rows, and columns beyond the picture's come out empty.
 ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body,
                              std::int32_t columns, float* inverse_depth, std::uint8_t* valid) noexcept;

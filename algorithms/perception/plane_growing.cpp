@@ -48,7 +48,7 @@ bool PlaneGrowing::Sums::try_solve(Vec3& m) const noexcept {
   if (!(determinant > 1e-14)) return false;
   const double a = (cxw * cyy - cyw * cxy) / determinant, b = (cyw * cxx - cxw * cxy) / determinant;
   const Vec3 solved{a, b, mw - a * mx - b * my};
-  if (!(solved.norm() > kLeastNorm)) return false;
+  if (!(solved.squaredNorm() > kLeastNorm * kLeastNorm)) return false;
   m = solved;
   return true;
 }

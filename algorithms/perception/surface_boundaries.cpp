@@ -104,50 +104,43 @@ void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const no
   interval.bottom = static_cast<std::int16_t>(cut(interval.bottom, -1));
 }
 
-bool SurfaceBoundaries::try_claim(std::int32_t column, std::int32_t first, std::int32_t last,
-                                  const StaticVector<ColumnSpan, kMaxPlanes>& candidates,
+void SurfaceBoundaries::try_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
                                   ColumnSpan& claimed) const noexcept {
-  constexpr std::int32_t kMinRows = 2;
-  std::int32_t most = 0;
-  for (const ColumnSpan& candidate : candidates) {
-    const std::uint8_t plane = candidate.plane;
-    const Line line = line_of(planes_[plane].plane, column);
-    // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
-    std::int32_t top = -1, bottom = -1, fitting = 0, off = 0;
-    const auto close = [&] {
-      if (fitting >= kMinRows && fitting > most) {
-        most = fitting;
-        claimed.top = static_cast<std::int16_t>(top);
-        claimed.bottom = static_cast<std::int16_t>(bottom);
-        claimed.plane = plane;
-      }
-      fitting = off = 0;
-      top = -1;
-    };
-    const auto fits = [&](std::int32_t r) {
-      return image_->valid(column, r) != 0 && offset(line, column, r).within(kTruncation);
-    };
-    const std::int32_t from = std::max<std::int32_t>(first, candidate.top);
-    const std::int32_t until = std::min<std::int32_t>(last, candidate.bottom);
-    // Outside a stretch every second row is looked at: that meets all those with two rows in a row.
-    for (std::int32_t r = from; r <= until; r += fitting > 0 ? 1 : 2) {
-      if (fits(r)) {
-        if (fitting == 0) top = r > from && fits(r - 1) ? r - 1 : r;
-        fitting += fitting == 0 ? r - top + 1 : 1;
-        bottom = r;
-        off = 0;
-      } else if (fitting > 0 && ++off > 1) {
-        close();
-      }
+  const Line line = line_of(planes_[candidate.plane].plane, column);
+  // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
+  std::int32_t top = -1, bottom = -1, fitting = 0, off = 0;
+  const auto close = [&] {
+    if (fitting > most) {
+      most = fitting;
+      claimed.top = static_cast<std::int16_t>(top);
+      claimed.bottom = static_cast<std::int16_t>(bottom);
+      claimed.plane = candidate.plane;
     }
-    close();
+    fitting = off = 0;
+    top = -1;
+  };
+  const auto fits = [&](std::int32_t r) {
+    return image_->valid(column, r) != 0 && offset(line, column, r).within(kTruncation);
+  };
+  // Outside a stretch every second row is looked at: that meets all those with two rows in a row.
+  for (std::int32_t r = candidate.top; r <= candidate.bottom; r += fitting > 0 ? 1 : 2) {
+    if (fits(r)) {
+      if (fitting == 0) top = r > candidate.top && fits(r - 1) ? r - 1 : r;
+      fitting += fitting == 0 ? r - top + 1 : 1;
+      bottom = r;
+      off = 0;
+    } else if (fitting > 0 && ++off > 1) {
+      close();
+    }
+    if (fitting == 0 && candidate.bottom - r <= most) return;  // too few are left
   }
-  return most >= kMinRows;
+  close();
 }
 
 void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t first_plane,
                               std::size_t last_plane) noexcept {
   constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
+  constexpr std::int32_t kMinRows = 2;   // that fit
   Column& spans = columns_[static_cast<std::size_t>(column)];
   const bool any_beside = beside >= 0 && beside < rays_->columns;
   std::int32_t from = 0;
@@ -162,33 +155,30 @@ void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::siz
     }
     const std::uint8_t above = k > 0 ? spans[k - 1].plane : std::uint8_t{0};
     const std::uint8_t below = k < spans.size() ? spans[k].plane : std::uint8_t{0};
-    StaticVector<ColumnSpan, kMaxPlanes> candidates;
-    const auto consider = [&](ColumnSpan candidate) {
-      if (candidate.plane == above || candidate.plane == below) return;
-      static_cast<void>(candidates.try_push_back(candidate));
+    std::int32_t most = kMinRows - 1;
+    ColumnSpan claimed;
+    const auto consider = [&](std::uint8_t plane, std::int32_t top, std::int32_t bottom) {
+      if (plane == above || plane == below || bottom - top < most) return;
+      ColumnSpan candidate;
+      candidate.plane = plane;
+      candidate.top = static_cast<std::int16_t>(top);
+      candidate.bottom = static_cast<std::int16_t>(bottom);
+      try_claim(column, candidate, most, claimed);
     };
     if (any_beside) {
-      for (ColumnSpan other : columns_[static_cast<std::size_t>(beside)]) {
-        other.top = static_cast<std::int16_t>(other.top - kReach_px);
-        other.bottom = static_cast<std::int16_t>(other.bottom + kReach_px);
-        if (other.top <= until && other.bottom >= gap_from) consider(other);
+      for (const ColumnSpan& other : columns_[static_cast<std::size_t>(beside)]) {
+        if (other.top - kReach_px > until) break;
+        if (other.bottom + kReach_px < gap_from) continue;
+        consider(other.plane, std::max(gap_from, other.top - kReach_px), std::min(until, other.bottom + kReach_px));
       }
     }
     const bool deep = until - gap_from >= 2 * kRemainderReach_px;
     for (std::size_t p = first_plane; p <= last_plane; ++p) {
-      ColumnSpan end;
-      end.plane = static_cast<std::uint8_t>(p);
-      end.top = static_cast<std::int16_t>(gap_from);
-      end.bottom = static_cast<std::int16_t>(deep ? gap_from + kRemainderReach_px - 1 : until);
-      consider(end);
-      if (!deep) continue;
-      end.top = static_cast<std::int16_t>(until - kRemainderReach_px + 1);
-      end.bottom = static_cast<std::int16_t>(until);
-      consider(end);
+      const auto plane = static_cast<std::uint8_t>(p);
+      consider(plane, gap_from, deep ? gap_from + kRemainderReach_px - 1 : until);
+      if (deep) consider(plane, until - kRemainderReach_px + 1, until);
     }
-    ColumnSpan claimed;
-    if (!try_claim(column, gap_from, until, candidates, claimed)) continue;
-    if (!spans.try_push_back(claimed)) continue;
+    if (most < kMinRows || !spans.try_push_back(claimed)) continue;
     std::rotate(spans.begin() + static_cast<std::ptrdiff_t>(k), spans.end() - 1, spans.end());
     from = claimed.bottom + 1;
   }

@@ -121,10 +121,9 @@ class SurfaceBoundaries {
   };
   [[nodiscard]] Offset offset(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
   void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
-  // The best of the candidates, each within its own rows, in rows first .. last; false when none fits.
-  [[nodiscard]] bool try_claim(std::int32_t column, std::int32_t first, std::int32_t last,
-                               const StaticVector<ColumnSpan, kMaxPlanes>& candidates,
-                               ColumnSpan& claimed) const noexcept;
+  // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
+  void try_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
+                 ColumnSpan& claimed) const noexcept;
   // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
   struct Strip {
     std::array<std::int16_t, kRefitColumns> top{}, bottom{};
