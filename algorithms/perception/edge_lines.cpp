@@ -303,7 +303,7 @@ EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
   std::size_t n = 0;
   for (std::int32_t i = 0; i < segment_count_; ++i) {
     const Segment& segment = segments_[static_cast<std::size_t>(i)];
-    if (segment.columns < 2.0 || !try_segment_point(segment, points_m_[n])) continue;
+    if (segment.columns < 1.0 || !try_segment_point(segment, points_m_[n])) continue;
     weights_[n++] = segment.columns;
   }
   if (n < 3) return Outcome::kFewColumns;
