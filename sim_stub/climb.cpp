@@ -79,6 +79,7 @@ SimOptions sim_options(const ClimbOptions& options) {
   sim.seed = options.seed;
   sim.stairs = options.stairs;
   sim.noise = options.noise;
+  sim.plant_kind = options.plant;
   sim.camera.stairs_shift_m = {options.render_dx_m, options.render_dy_m, options.render_dz_m};
   sim.camera.missing_step = options.render_missing_step;
   sim.camera.threaded = options.threaded_render;
@@ -213,6 +214,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
 
   RunFigures figures;
   figures.gait = options.gait;
+  figures.plant = options.plant == PlantKind::kMujoco ? "mujoco" : "kinematic";
   figures.seed = options.seed;
   figures.camera = camera_figures(options, robot.errors(), pipeline.perception().mount());
   figures.heap_calls = heap::report().calls;

@@ -12,6 +12,7 @@
 #include "sim_stub/camera_profile.hpp"
 #include "sim_stub/climb_summary.hpp"
 #include "sim_stub/noise_kind.hpp"
+#include "sim_stub/plant.hpp"
 #include "sim_stub/stair_world.hpp"
 
 namespace polygmap::sim {
@@ -20,6 +21,7 @@ struct ClimbOptions {
   StairParams stairs;
   std::uint64_t seed = 1;
   DepthNoise noise = DepthNoise::kWhite;
+  PlantKind plant = PlantKind::kKinematic;
   std::string gait = "ds";
   std::string out_dir;          // empty: no files
   double time_limit_s = 150.0;  // simulated

@@ -66,7 +66,14 @@ KinematicPlant::KinematicPlant(const Params& params, const StairWorld& world, co
   }
 }
 
-void KinematicPlant::step(const JointVector& command_rad) {
+double KinematicPlant::foot_force_n(std::size_t foot) const noexcept {
+  constexpr double kTouch_n = 30.0;  // least force of a sole that touches
+  return feet_[foot].anchored ? std::max(kTouch_n, load_share(foot) * kRobotWeight_n) : 0.0;
+}
+
+void KinematicPlant::step(const JointCommand& command) {
+  JointVector command_rad;
+  for (std::size_t j = 0; j < kJointCount; ++j) command_rad[static_cast<Eigen::Index>(j)] = command.joints[j].q_rad;
   if (fell()) {
     dq_.setZero();
     return;
@@ -102,7 +109,7 @@ bool KinematicPlant::accept_command(const JointVector& command_rad) {
 
 void KinematicPlant::move_joints(const JointVector& command_rad) {
   const JointVector before = q_;
-  const double dt = params_.tick_s / kDriveSubsteps;
+  const double dt = kPlantTick_s / kDriveSubsteps;
   const double gain = 1.0 - std::exp(-dt / params_.drive_lag_s);
   for (std::size_t j = 0; j < kJointCount; ++j) {
     const JointLimits limits = joint_limits(static_cast<Foot>(j / kJointsPerLeg), j % kJointsPerLeg);
@@ -113,7 +120,7 @@ void KinematicPlant::move_joints(const JointVector& command_rad) {
       q_[i] = math::clamp(q_[i], limits.min_rad, limits.max_rad);
     }
   }
-  dq_ = (q_ - before) / params_.tick_s;
+  dq_ = (q_ - before) / kPlantTick_s;
 }
 
 void KinematicPlant::update_leg_kinematics() {
@@ -139,7 +146,7 @@ void KinematicPlant::transfer_load() {
   // A foot is unloaded before the base is all the way over the other one: the sole has a width.
   constexpr double kDeadEnd = 0.1;
   const double target = smooth_step((along - kDeadEnd) / (1.0 - 2.0 * kDeadEnd));
-  critically_damped(share_, share_rate_, target, params_.share_bandwidth_radps, params_.tick_s);
+  critically_damped(share_, share_rate_, target, params_.share_bandwidth_radps, kPlantTick_s);
   if (share_ <= 0.0 || share_ >= 1.0) {
     share_ = math::clamp(share_, 0.0, 1.0);
     share_rate_ = 0.0;
@@ -149,7 +156,7 @@ void KinematicPlant::transfer_load() {
     FootState& foot = feet_[f];
     const double gap = gap_m(f);
     if (load_share(f) >= params_.loaded_lift_share) {
-      foot.gap_m += (gap - foot.gap_m) * params_.tick_s / kGapMemory_s;
+      foot.gap_m += (gap - foot.gap_m) * kPlantTick_s / kGapMemory_s;
     } else {
       foot.gap_m = std::min(foot.gap_m, gap);
     }
@@ -195,15 +202,15 @@ Transform KinematicPlant::blend() const {
 void KinematicPlant::move_base() {
   const double w = params_.share_bandwidth_radps;
   const Vec3 zero = Vec3::Zero();
-  critically_damped(slack_.p_m, slack_.p_rate, zero, w, params_.tick_s);
-  critically_damped(slack_.turn_rad, slack_.turn_rate, zero, w, params_.tick_s);
+  critically_damped(slack_.p_m, slack_.p_rate, zero, w, kPlantTick_s);
+  critically_damped(slack_.turn_rad, slack_.turn_rate, zero, w, kPlantTick_s);
   const Transform stood = blend();
   true_T_base_ = {stood.R * rotation(slack_.turn_rad), stood.p_m + slack_.p_m};
   for (FootState& foot : feet_) {
     const Vec3 p_m = true_T_base_.p_m - foot.true_T_base.p_m;
     const Vec3 turn_rad = rotation_vector(foot.true_T_base.R.transpose() * true_T_base_.R);
-    foot.base_offset = {p_m, (p_m - foot.base_offset.p_m) / params_.tick_s, turn_rad,
-                        (turn_rad - foot.base_offset.turn_rad) / params_.tick_s};
+    foot.base_offset = {p_m, (p_m - foot.base_offset.p_m) / kPlantTick_s, turn_rad,
+                        (turn_rad - foot.base_offset.turn_rad) / kPlantTick_s};
   }
 }
 

@@ -50,16 +50,6 @@ JointFeedback JointModel::sample(const JointVector& drive_q_rad, const JointVect
   return feedback;
 }
 
-std::array<double, kFootCount> FootForceModel::sample(const std::array<double, kFootCount>& load_share,
-                                                      const std::array<bool, kFootCount>& in_contact) {
-  std::array<double, kFootCount> force{};
-  for (std::size_t f = 0; f < kFootCount; ++f) {
-    if (in_contact[f]) force[f] = std::max(kTouch_n, load_share[f] * kRobotWeight_n);
-  }
-  history_.push_overwrite(force);
-  return history_.oldest();
-}
-
 LioSample LioModel::sample(const Transform& true_T_base, std::int64_t stamp_ns) {
   const Vec3 turn_rad = params_.lio_rotation_rad * rotation_noise_.normal3(index_);
   const Transform noise{rotation_z(turn_rad.z()) * rotation_y(turn_rad.y()) * rotation_x(turn_rad.x()), Vec3::Zero()};

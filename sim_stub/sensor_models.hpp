@@ -12,8 +12,6 @@
 
 namespace polygmap::sim {
 
-inline constexpr double kRobotWeight_n = 540.0;
-
 // Integrating IMU: the mean over the last tick, by finite differences of the true base poses.
 class ImuModel {
  public:
@@ -43,15 +41,16 @@ class JointModel {
   std::uint64_t index_ = 0;
 };
 
-// Vertical forces from the load shares, as the plant's contact sensors report them 6 ms later.
+// Vertical forces as the plant's contact sensors report them 6 ms later.
 class FootForceModel {
  public:
-  [[nodiscard]] std::array<double, kFootCount> sample(const std::array<double, kFootCount>& load_share,
-                                                      const std::array<bool, kFootCount>& in_contact);
+  [[nodiscard]] std::array<double, kFootCount> sample(const std::array<double, kFootCount>& force_n) {
+    history_.push_overwrite(force_n);
+    return history_.oldest();
+  }
 
  private:
   static constexpr std::size_t kDelay_ticks = 3;
-  static constexpr double kTouch_n = 30.0;  // least force of a sole that touches
   RingBuffer<std::array<double, kFootCount>, kDelay_ticks + 1> history_;
 };
 

@@ -27,6 +27,7 @@ constexpr double kQuietPeriod_s = 5.0;       // simulated, between progress line
 struct ClimbArguments {
   ClimbOptions options;
   std::string noise = "white";
+  std::string plant = "kinematic";
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
   bool no_self_filter = false;
@@ -53,6 +54,10 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_option("--width", stairs.width_m, "Width of the staircase, m")->capture_default_str();
   climb.add_option("--nosing", stairs.nosing_m, "Overhang of a tread over its riser, m")->capture_default_str();
   climb.add_option("--landing", stairs.landing_m, "Depth of the landing, m")->capture_default_str();
+  climb
+      .add_option("--plant", a.plant,
+                  "kinematic: follows and never tips over; mujoco: under physics, it balances or falls")
+      ->capture_default_str();
   climb.add_option("--gait", a.options.gait, "ds: both feet on every tread")->capture_default_str();
   climb.add_option("--seed", a.options.seed, "Draws the start, the steps' jitter, the robot's errors and all noise")
       ->check(whole_number)
@@ -123,6 +128,10 @@ std::string complaint(ClimbArguments& a) {
   }
   if (a.options.gait == "ss") return "The single-step gait (--gait ss) is not available yet: use --gait ds.";
   if (a.options.gait != "ds") return "--gait must be ds, not \"" + a.options.gait + "\".";
+  if (a.plant != "kinematic" && a.plant != "mujoco") {
+    return "--plant must be kinematic or mujoco, not \"" + a.plant + "\".";
+  }
+  a.options.plant = a.plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kKinematic;
   if (a.noise != "white" && a.noise != "correlated") {
     return "--noise must be white or correlated, not \"" + a.noise + "\".";
   }
