@@ -16,6 +16,7 @@ void Gait::reset(const Params& params) noexcept {
   params_ = params;
   planner_.reset(params.planner);
   correction_.reset();
+  balance_.reset();
   status_ = {};
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
@@ -53,8 +54,60 @@ void Gait::start(const StateEstimate& state) noexcept {
     plan_T_sole_[index_of(leg)] = plan_T_base_ * joints_.base_T_sole_reference(leg);
   }
   torso_state_ = TorsoTrajectory::at_rest(plan_T_base_);
+  const Vec3 com_m = plan_T_base_ * reference_com_m();
+  torso_state_[0].position = com_m.x();
+  torso_state_[1].position = com_m.y();
   started_ = true;
   begin_hold();
+}
+
+// Of the posture last asked for, in the base.
+Vec3 Gait::reference_com_m() const noexcept {
+  return centre_of_mass(params_.geometry, params_.balance.masses, joints_.reference_rad(), JointVector::Zero())
+      .base_p_com_m;
+}
+
+// The horizontal part of the torso's trajectory is the centre of mass's: the base follows from the legs' places, one
+// tick old.
+Transform Gait::plan_T_base_over(const TorsoTrajectory::State& state) const noexcept {
+  Transform base = TorsoTrajectory::pose(state);
+  base.p_m.head<2>() -= (base.R * reference_com_m()).head<2>();
+  return base;
+}
+
+void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept {
+  Balance::Reference reference;
+  for (int a = 0; a < 2; ++a) {
+    const Motion& axis = torso_state_[static_cast<std::size_t>(a)];
+    reference.com.position_m[a] = axis.position;
+    reference.com.velocity_mps[a] = axis.speed;
+    reference.com.acceleration_mps2[a] = axis.acceleration;
+  }
+  reference.up_mps2 = torso_state_[2].acceleration;
+  reference.plan_T_sole = plan_T_sole_;
+  reference.stands = status_.stands;
+  const bool seen = started_ && usable(state) && math::all_finite(feedback.dq_radps);
+  Balance::Body body{plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad(), JointVector::Zero()};
+  if (seen) body = {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad, feedback.dq_radps};
+  const JointVector torque_nm = balance_.torques_nm(params_.balance, params_.geometry, reference, body, kTick_s);
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const double limit_nm = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg).torque_nm;
+    command.joints[n].tau_ff_nm = math::clamp(torque_nm[static_cast<Eigen::Index>(n)], -limit_nm, limit_nm);
+  }
+}
+
+// Nothing is known but the joint angles: the soles are taken for level.
+void Gait::hold_upright(JointCommand& command) noexcept {
+  joints_.hold(command);
+  plan_T_base_ = {joints_.base_T_sole_reference(Foot::kLeft).R.transpose(), Vec3::Zero()};
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    plan_T_sole_[index_of(leg)] = plan_T_base_ * joints_.base_T_sole_reference(leg);
+  }
+  torso_state_ = TorsoTrajectory::at_rest(plan_T_base_);
+  const Vec3 com_m = plan_T_base_ * reference_com_m();
+  torso_state_[0].position = com_m.x();
+  torso_state_[1].position = com_m.y();
+  add_torques({}, {}, command);
 }
 
 void Gait::settle_between_feet() noexcept {
@@ -246,7 +299,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   if (!armed_) armed_ = joints_.try_arm(params_.geometry, params_.joints, feedback.q_rad);
   if (!armed_) return;
   if (!started_) {
-    joints_.hold(command);
+    hold_upright(command);
     if (state.initialised && usable(state)) start(state);
     return;
   }
@@ -255,7 +308,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   if (activity_ == Activity::kRetreat) {
     for (Motion& axis : torso_state_) axis.speed = -axis.speed;
   }
-  plan_T_base_ = TorsoTrajectory::pose(torso_state_);
+  plan_T_base_ = plan_T_base_over(torso_state_);
   if (usable(state)) {
     correction_.update(state.odom_T_base, plan_T_base_, kTick_s / (kTick_s + params_.correction_time_s));
   }
@@ -277,7 +330,8 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   }
   tick_ = std::min(tick_ + 1, kTickLimit);
 
-  if (joints_.follow(plan_T_base_, plan_T_sole_, command)) ++status_.ik_limited_ticks;
+  if (joints_.follow(plan_T_base_, plan_T_sole_, status_.stands, command)) ++status_.ik_limited_ticks;
+  add_torques(state, feedback, command);
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
   for (std::size_t i = 0; i < kFootCount; ++i) status_.odom_T_sole_desired[i] = odom_T_plan * plan_T_sole_[i];
 }

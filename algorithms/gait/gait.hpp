@@ -7,6 +7,7 @@
 #include "algorithms/core/footholds.hpp"
 #include "algorithms/core/gait_status.hpp"
 #include "algorithms/core/state.hpp"
+#include "algorithms/gait/balance.hpp"
 #include "algorithms/gait/base_correction.hpp"
 #include "algorithms/gait/climb_planner.hpp"
 #include "algorithms/gait/joint_reference.hpp"
@@ -24,6 +25,7 @@ class Gait {
     StepParams step;
     ClimbPlanner::Params planner;
     JointReference::Params joints;
+    Balance::Params balance;
     double correction_time_s = 0.06;  // low-pass of the base's difference to the plan
     double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
     double absorb_rad = 0.035;
@@ -49,6 +51,7 @@ class Gait {
   void tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
             const JointFeedback& feedback, JointCommand& command) noexcept;
   [[nodiscard]] const GaitStatus& status() const noexcept { return status_; }
+  [[nodiscard]] const Balance& balance() const noexcept { return balance_; }
   // Finishes the committed step, then holds in double support.
   void request_stop() noexcept { stop_requested_ = true; }
 
@@ -67,6 +70,10 @@ class Gait {
   void swing(const StateEstimate& state, const JointFeedback& feedback) noexcept;
   void retreat(const JointFeedback& feedback) noexcept;
 
+  [[nodiscard]] Vec3 reference_com_m() const noexcept;
+  void hold_upright(JointCommand& command) noexcept;
+  [[nodiscard]] Transform plan_T_base_over(const TorsoTrajectory::State& state) const noexcept;
+  void add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept;
   void begin_hold() noexcept;
   void begin_shift(const ClimbPlanner::Decision& decision, bool again) noexcept;
   void lift_off(const StateEstimate& state, const FootholdSet& footholds,
@@ -86,6 +93,7 @@ class Gait {
   std::int64_t now_ns_ = 0;
   ClimbPlanner planner_;
   JointReference joints_;
+  Balance balance_;
   StepSearch search_;
   BaseCorrection correction_;
   TorsoTrajectory torso_;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "algorithms/robot/leg_dynamics.hpp"
+
 namespace polygmap {
 
 StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal, const SolePair& soles,
@@ -74,32 +76,44 @@ void StepProof::begin(const LegGeometry& geometry, const StepParams& params, con
   knots_ = knots;
   check_ = {true, 1e9, 1e9, 0.0};
   next_ = 0;
+  constexpr int kPasses = 3;  // of base and legs that follow each other
+  previous_.setZero();
+  for (int i = 0; i < kPasses; ++i) (void)solve(0, previous_, previous_);
+}
+
+bool StepProof::solve(std::int32_t i, const JointVector& before_rad, JointVector& q_rad) const noexcept {
+  StepKnot knot = knots_[i];
+  const Vec3 base_p_com_m = centre_of_mass(geometry_, masses_, before_rad, JointVector::Zero()).base_p_com_m;
+  knot.odom_T_base.p_m.head<2>() -= (knot.odom_T_base.R * base_p_com_m).head<2>();
+  const Transform base_T_odom = knot.odom_T_base.inverse();
+  bool reachable = true;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const LegSolution s = solve_leg(geometry_, leg, base_T_odom * knot.odom_T_sole[index_of(leg)]);
+    reachable = reachable && s.reachable;
+    q_rad.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
+  }
+  return reachable;
 }
 
 bool StepProof::advance(std::int32_t count) noexcept {
   const std::int32_t end = std::min(next_ + count, knots_.count());
   for (; next_ < end; ++next_) {
-    const StepKnot knot = knots_[next_];
-    const Transform base_T_odom = knot.odom_T_base.inverse();
-    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-      const LegSolution s = solve_leg(geometry_, leg, base_T_odom * knot.odom_T_sole[index_of(leg)]);
-      LegVector& before = previous_[index_of(leg)];
-      if (!s.reachable) check_.feasible = false;
-      for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-        const JointLimits limits = joint_limits(leg, j);
-        const auto i = static_cast<Eigen::Index>(j);
-        const double q = s.q_rad[i];
-        // The knee's lower end is the stretched leg, which has a margin of its own.
-        double& low = j == kKnee ? check_.knee_rad : check_.joint_margin_rad;
-        low = std::min(low, q - limits.min_rad);
-        check_.joint_margin_rad = std::min(check_.joint_margin_rad, limits.max_rad - q);
-        if (next_ > 0) {
-          const double speed_radps = std::abs(q - before[i]) / (knots_.knot_ticks() * kTick_s);
-          check_.speed_share = std::max(check_.speed_share, speed_radps / limits.speed_radps);
-        }
+    JointVector q_rad;
+    if (!solve(next_, previous_, q_rad)) check_.feasible = false;
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      const std::size_t j = n % kJointsPerLeg;
+      const JointLimits limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), j);
+      const auto i = static_cast<Eigen::Index>(n);
+      // The knee's lower end is the stretched leg, which has a margin of its own.
+      double& low = j == kKnee ? check_.knee_rad : check_.joint_margin_rad;
+      low = std::min(low, q_rad[i] - limits.min_rad);
+      check_.joint_margin_rad = std::min(check_.joint_margin_rad, limits.max_rad - q_rad[i]);
+      if (next_ > 0) {
+        const double speed_radps = std::abs(q_rad[i] - previous_[i]) / (knots_.knot_ticks() * kTick_s);
+        check_.speed_share = std::max(check_.speed_share, speed_radps / limits.speed_radps);
       }
-      before = s.q_rad;
     }
+    previous_ = q_rad;
   }
   if (next_ < knots_.count()) return false;
   check_.feasible = check_.feasible && check_.joint_margin_rad >= params_.joint_margin_rad &&

@@ -102,11 +102,16 @@ class StepProof {
   [[nodiscard]] const StepCheck& check() const noexcept { return check_; }
 
  private:
+  // Both legs at a knot; false when one is out of reach. The plan says where the centre of mass is: the base follows
+  // from the legs' places in `before`.
+  bool solve(std::int32_t i, const JointVector& before_rad, JointVector& q_rad) const noexcept;
+
   LegGeometry geometry_;
   StepParams params_;
   StepKnots knots_;
   StepCheck check_;
-  std::array<LegVector, kFootCount> previous_;
+  MassModel masses_;
+  JointVector previous_ = JointVector::Zero();
   std::int32_t next_ = 0;
 };
 

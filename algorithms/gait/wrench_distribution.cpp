@@ -8,7 +8,11 @@ namespace polygmap {
 
 Pressure distribute(const Support& support, const PressureLimits& limits, const Vec3& odom_p_com_m,
                     const Vec2& slope) noexcept {
-  const Vec3 &left = support.odom_T_sole[0].p_m, &right = support.odom_T_sole[1].p_m;
+  Vec3 left = support.odom_T_sole[0].p_m, right = support.odom_T_sole[1].p_m;
+  if (support.stands[0] && support.stands[1]) {
+    left -= limits.inward_m * support.odom_T_sole[0].R.col(1);
+    right += limits.inward_m * support.odom_T_sole[1].R.col(1);
+  }
   const auto line_at = [&](double z_m) -> Vec2 { return odom_p_com_m.head<2>() - (odom_p_com_m.z() - z_m) * slope; };
 
   Pressure pressure;
@@ -27,7 +31,8 @@ Pressure distribute(const Support& support, const PressureLimits& limits, const 
   const Vec2 rest_m = line_at(ground_m) - (share * left + (1.0 - share) * right).head<2>();
   for (std::size_t f = 0; f < kFootCount; ++f) {
     const Transform& sole = support.odom_T_sole[f];
-    const Vec3 local_m = sole.R.transpose() * Vec3{rest_m.x(), rest_m.y(), 0.0};
+    const Vec3 carried_m = (f == 0 ? left : right) - sole.p_m;
+    const Vec3 local_m = sole.R.transpose() * Vec3{carried_m.x() + rest_m.x(), carried_m.y() + rest_m.y(), 0.0};
     pressure.centre_m[f] = sole * Vec3{math::clamp(local_m.x(), -limits.behind_m, limits.ahead_m),
                                        math::clamp(local_m.y(), -limits.aside_m, limits.aside_m), 0.0};
     pressure.zmp_m += pressure.share[f] * pressure.centre_m[f];
