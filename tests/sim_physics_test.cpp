@@ -42,7 +42,9 @@ struct Body {
       const Vec3 force_n{0, 0, 0.5 * kWeight_n};
       const Vec3 from_sole_m = com.base_p_com_m - base_T_sole({}, foot, q).p_m;
       const SoleWrench ground{force_n, Vec3{0, -from_sole_m.x() * force_n.z(), 0}};
-      const LegVector tau = leg_torques_nm({}, {}, foot, q, Vec3{0, 0, -kGravity_mps2}, ground);
+      std::array<Vec3, kJointsPerLeg> gravity_mps2;
+      gravity_mps2.fill({0, 0, -kGravity_mps2});
+      const LegVector tau = leg_torques_nm({}, {}, foot, q, gravity_mps2, ground);
       for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
         const auto i = static_cast<Eigen::Index>(j);
         command.joints[joint_index(foot, j)] = {q[i], 0.0, tau[i], 1000.0, 30.0};

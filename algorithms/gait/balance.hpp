@@ -4,6 +4,7 @@
 #pragma once
 
 #include "algorithms/gait/dcm_stabiliser.hpp"
+#include "algorithms/gait/link_motion.hpp"
 #include "algorithms/gait/wrench_distribution.hpp"
 
 namespace polygmap {
@@ -14,10 +15,11 @@ class Balance {
     DcmStabiliser::Params dcm;
     PressureLimits pressure;
     MassModel masses;
+    double armature_kgm2 = 0.05;  // of a drive, seen at its joint
   };
   struct Reference {  // plan frame
     HorizontalMotion com;
-    double up_mps2 = 0.0;  // acceleration of the height
+    LinkMotion::Acceleration links;
     std::array<Transform, kFootCount> plan_T_sole;
     std::array<bool, kFootCount> stands{true, true};
   };

@@ -57,6 +57,7 @@ void Gait::start(const StateEstimate& state) noexcept {
   const Vec3 com_m = plan_T_base_ * reference_com_m();
   torso_state_[0].position = com_m.x();
   torso_state_[1].position = com_m.y();
+  nominal_rad_ = joints_.reference_rad();
   started_ = true;
   begin_hold();
 }
@@ -75,6 +76,25 @@ Transform Gait::plan_T_base_over(const TorsoTrajectory::State& state) const noex
   return base;
 }
 
+// The posture as planned, without the steering: its second differences are smooth.
+void Gait::observe_links() noexcept {
+  const std::size_t f = index_of(decision_.goal.foot);
+  std::array<Transform, kFootCount> plan_T_sole = plan_T_sole_;
+  const bool swings = activity_ == Activity::kSwing || activity_ == Activity::kRetreat;
+  if (swings) plan_T_sole[f] = swing_.at(motion_tick());
+  if (links_activity_ != activity_ || tick_ == 0) link_motion_.restart();
+  links_activity_ = activity_;
+  const Vec3 base_p_com_m =
+      centre_of_mass(params_.geometry, params_.balance.masses, nominal_rad_, JointVector::Zero()).base_p_com_m;
+  Transform plan_T_base = TorsoTrajectory::pose(torso_state_);
+  plan_T_base.p_m.head<2>() -= (plan_T_base.R * base_p_com_m).head<2>();
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const LegSolution s = solve_leg(params_.geometry, leg, plan_T_base.inverse() * plan_T_sole[index_of(leg)]);
+    nominal_rad_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
+  }
+  link_acceleration_ = link_motion_.update(params_.geometry, params_.balance.masses, plan_T_base, nominal_rad_);
+}
+
 void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept {
   Balance::Reference reference;
   for (int a = 0; a < 2; ++a) {
@@ -83,7 +103,7 @@ void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback
     reference.com.velocity_mps[a] = axis.speed;
     reference.com.acceleration_mps2[a] = axis.acceleration;
   }
-  reference.up_mps2 = torso_state_[2].acceleration;
+  reference.links = link_acceleration_;
   reference.plan_T_sole = plan_T_sole_;
   reference.stands = status_.stands;
   const bool seen = started_ && usable(state) && math::all_finite(feedback.dq_radps);
@@ -330,6 +350,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   }
   tick_ = std::min(tick_ + 1, kTickLimit);
 
+  observe_links();
   if (joints_.follow(plan_T_base_, plan_T_sole_, status_.stands, command)) ++status_.ik_limited_ticks;
   add_torques(state, feedback, command);
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);

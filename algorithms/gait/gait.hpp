@@ -73,6 +73,7 @@ class Gait {
   [[nodiscard]] Vec3 reference_com_m() const noexcept;
   void hold_upright(JointCommand& command) noexcept;
   [[nodiscard]] Transform plan_T_base_over(const TorsoTrajectory::State& state) const noexcept;
+  void observe_links() noexcept;
   void add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept;
   void begin_hold() noexcept;
   void begin_shift(const ClimbPlanner::Decision& decision, bool again) noexcept;
@@ -94,6 +95,9 @@ class Gait {
   ClimbPlanner planner_;
   JointReference joints_;
   Balance balance_;
+  LinkMotion link_motion_;
+  LinkMotion::Acceleration link_acceleration_;
+  JointVector nominal_rad_ = JointVector::Zero();  // joint angles of the plan, without the steering
   StepSearch search_;
   BaseCorrection correction_;
   TorsoTrajectory torso_;
@@ -104,6 +108,7 @@ class Gait {
   ClimbPlanner::Decision decision_;
   GaitStatus status_;
   Activity activity_ = Activity::kHold;
+  Activity links_activity_ = Activity::kHold;
   std::int32_t tick_ = 0;       // of the activity, saturates
   std::int32_t turn_tick_ = 0;  // of the swing, when the retreat began
   std::int32_t shift_ticks_ = 0;

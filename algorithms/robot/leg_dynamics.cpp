@@ -36,14 +36,24 @@ CentreOfMass centre_of_mass(const LegGeometry& geometry, const MassModel& masses
   return {moment_kgm / masses.total_kg(), momentum / masses.total_kg()};
 }
 
+PerLink base_p_links_m(const LegGeometry& geometry, const MassModel& masses, const JointVector& q_rad) noexcept {
+  PerLink points;
+  points.torso = masses.torso.centre_m;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const LegFrames f = leg_frames(geometry, leg, leg_joints(q_rad, leg));
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) points.leg[index_of(leg)][j] = base_p_link(f, masses, leg, j);
+  }
+  return points;
+}
+
 LegVector leg_torques_nm(const LegGeometry& geometry, const MassModel& masses, Foot leg, const LegVector& q_rad,
-                         const Vec3& specific_mps2, const SoleWrench& ground) noexcept {
+                         const std::array<Vec3, kJointsPerLeg>& specific_mps2, const SoleWrench& ground) noexcept {
   const LegFrames f = leg_frames(geometry, leg, q_rad);
   LegVector torque_nm;
   Vec3 force_n = ground.force_n;  // on all that hangs on the joint, and its moment about the base's origin
   Vec3 moment_nm = ground.moment_nm + f.sole.p_m.cross(ground.force_n);
   for (std::size_t j = kJointsPerLeg; j-- > 0;) {
-    const Vec3 weight_n = masses.leg[j].mass_kg * specific_mps2;
+    const Vec3 weight_n = masses.leg[j].mass_kg * specific_mps2[j];
     force_n += weight_n;
     moment_nm += base_p_link(f, masses, leg, j).cross(weight_n);
     const Vec3 axis = f.joint[j].R.col(kJointAxis[j]);

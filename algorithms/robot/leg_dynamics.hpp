@@ -19,10 +19,19 @@ struct SoleWrench {
   Vec3 force_n = Vec3::Zero();
   Vec3 moment_nm = Vec3::Zero();
 };
-// Drive torques of one leg whose links feel specific_mps2 (gravity minus their acceleration, base axes) while the
-// ground presses on its sole: the static balance of every joint with all that hangs on it.
+// A vector for every link: the torso, and each leg's from the hip down.
+struct PerLink {
+  Vec3 torso = Vec3::Zero();
+  std::array<std::array<Vec3, kJointsPerLeg>, kFootCount> leg{};
+};
+// Centres of all links, base frame.
+[[nodiscard]] PerLink base_p_links_m(const LegGeometry& geometry, const MassModel& masses,
+                                     const JointVector& q_rad) noexcept;
+
+// Drive torques of one leg whose links feel specific_mps2 (gravity minus each one's acceleration, base axes) while the
+// ground presses on its sole: the balance of every joint with all that hangs on it, links as points.
 [[nodiscard]] LegVector leg_torques_nm(const LegGeometry& geometry, const MassModel& masses, Foot leg,
-                                       const LegVector& q_rad, const Vec3& specific_mps2,
+                                       const LegVector& q_rad, const std::array<Vec3, kJointsPerLeg>& specific_mps2,
                                        const SoleWrench& ground) noexcept;
 
 }  // namespace polygmap
