@@ -22,7 +22,7 @@ JointCommand standing_command() {
   JointCommand command;
   const JointVector q = standing_q_rad();
   for (std::size_t j = 0; j < kJointCount; ++j) {
-    command.joints[j] = {q[static_cast<Eigen::Index>(j)], 0.0, 0.0, 1000.0, 30.0};
+    command.joints[j] = {q[static_cast<Eigen::Index>(j)], 0.0, 0.0, 2000.0, 40.0};
   }
   return command;
 }
@@ -34,7 +34,11 @@ Transform start_transform(const StartPose& start) {
 std::unique_ptr<Plant> make_plant(const SimOptions& options, const StairWorld& stairs, const RobotErrors& errors,
                                   const StartPose& start) {
   if (options.plant_kind == PlantKind::kMujoco) {
-    return std::make_unique<MujocoPlant>(options.mujoco, stairs, errors, start_transform(start), standing_q_rad());
+    auto plant =
+        std::make_unique<MujocoPlant>(options.mujoco, stairs, errors, start_transform(start), standing_q_rad());
+    constexpr int kSettle_ticks = 1000;  // it has stood there for a while
+    for (int i = 0; i < kSettle_ticks; ++i) plant->step(standing_command());
+    return plant;
   }
   return std::make_unique<KinematicPlant>(options.plant, stairs, errors, start_transform(start), standing_q_rad());
 }

@@ -16,8 +16,8 @@ class JointReference {
     std::array<double, kJointsPerLeg> kp_nmprad{400, 400, 400, 400, 120, 120};
     std::array<double, kJointsPerLeg> kd_nmsprad{10, 10, 10, 10, 4, 4};
     double swing_gain = 1.5;   // of both, in the leg that swings
-    double hold_kp_nmprad = 600;  // before there is an estimate to balance by: stiffer than the robot is top-heavy
-    double hold_kd_nmsprad = 15;
+    double hold_kp_nmprad = 2000;  // before there is an estimate to balance by: stiffer than the robot is top-heavy
+    double hold_kd_nmsprad = 40;
   };
 
   // Starts from measured angles, moved into the joints' ranges. False, and nothing changes, when one is not finite or
