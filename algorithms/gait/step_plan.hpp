@@ -34,9 +34,9 @@ struct StepParams {
                          .landing_begin = 0.55,
                          .clearance_m = 0.05,
                          .retreat_m = 0.0};
-  std::int32_t stair_shift_ticks = 310;  // 0.62 s of double support
+  std::int32_t stair_shift_ticks = 800;  // 1.6 s of double support
   std::int32_t stair_swing_ticks = 490;  // 0.98 s
-  std::int32_t floor_shift_ticks = 260;
+  std::int32_t floor_shift_ticks = 800;
   std::int32_t floor_swing_ticks = 350;
   double rise_share = 0.45;        // of a swing onto a tread in which the torso rises, to give the foot room
   std::int32_t knot_ticks = 10;    // eq. (37): 20 ms
