@@ -21,13 +21,14 @@ double push_share(double u) noexcept {
 
 void ComPlan::plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept {
   const double w = omega_radps_ = params.omega_radps;
-  const Vec2 start_m = from.position_m - from.acceleration_mps2 / math::square(w);
+  const Vec2 start_m = zmp_under(params, from);
 
   // The knots of plan and push together, in their order.
   StaticVector<ZmpKnot, kSegments> all;
-  const double push_ticks = params.push_ticks;
+  const std::int32_t push = std::min(params.push_ticks, knots.back().tick);
+  const double push_ticks = push;
   const std::array<std::int32_t, 3> extra{static_cast<std::int32_t>(kPushUp * push_ticks),
-                                          static_cast<std::int32_t>(kPushDown * push_ticks), params.push_ticks};
+                                          static_cast<std::int32_t>(kPushDown * push_ticks), push};
   const auto straight = [&](std::int32_t tick) -> Vec2 {
     ZmpKnot before{0, start_m};
     for (const ZmpKnot& knot : knots) {

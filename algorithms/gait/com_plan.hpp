@@ -25,6 +25,9 @@ class ComPlan {
     std::int32_t push_ticks = 200;  // the start's motion is met by pushing off to the side in that time
   };
 
+  [[nodiscard]] static Vec2 zmp_under(const Params& params, const HorizontalMotion& com) noexcept {
+    return com.position_m - com.acceleration_mps2 / math::square(params.omega_radps);
+  }
   // knots: at ticks > 0 that rise, at least one; after the last one everything rests. from: at tick 0. The zero-moment
   // point starts under `from`'s acceleration. What the pendulum would need of speed at the start and does not have is
   // made up by a push: the zero-moment point leaves its straight way for push_ticks.

@@ -130,10 +130,20 @@ void Gait::hold_upright(JointCommand& command) noexcept {
   add_torques({}, {}, command);
 }
 
+// The centre of mass comes to rest there.
+void Gait::rest_over(const Vec2& plan_p_m) noexcept {
+  ZmpKnots knots;
+  (void)knots.try_push_back({params_.step.com.push_ticks, plan_p_m});
+  com_.plan(params_.step.com, TorsoTrajectory::horizontal(torso_state_), knots);
+  com_tick_ = 0;
+}
+
 void Gait::settle_between_feet() noexcept {
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   TorsoPose middle = torso_between(params_.geometry, params_.step.torso, soles);
-  torso_.plan(torso_state_, middle, params_.settle_ticks, params_.settle_ticks);
+  torso_.plan(torso_state_, middle.position_m.z(), middle.yaw_rad, params_.settle_ticks, params_.settle_ticks);
+  const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{params_.step.zmp_ahead_m, 0, 0};
+  rest_over((middle.position_m + ahead_m).head<2>());
   tick_ = 0;
 }
 
@@ -160,9 +170,14 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   status_.phase = GaitPhase::kDoubleSupport;
   tick_ = 0;
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
-  const StepPlan plan = plan_step(params_.geometry, params_.step, decision.goal, soles, kToeDown_rad[0]);
-  shift_ticks_ = again ? params_.reshift_ticks : plan.shift_ticks;
-  torso_.plan(torso_state_, plan.lift_off, shift_ticks_, shift_ticks_);
+  StepPlan plan = plan_step(params_.geometry, params_.step, decision.goal, soles, kToeDown_rad[0]);
+  if (again) plan.shift_ticks = params_.reshift_ticks;
+  shift_ticks_ = plan.shift_ticks;
+  torso_.plan(torso_state_, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
+  const HorizontalMotion com = TorsoTrajectory::horizontal(torso_state_);
+  com_.plan(params_.step.com, com,
+            zmp_of_shift(params_.step, plan, ComPlan::zmp_under(params_.step.com, com)));
+  com_tick_ = 0;
   search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, shift_ticks_, torso_state_,
                 plan_T_sole_);
 }
@@ -227,7 +242,11 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   const StepPlan plan = plan_step(params_.geometry, params_.step, goal, soles, search_.plan().shape.toe_down_rad);
   swing_.plan(plan_T_sole_[index_of(goal.foot)], goal.target, plan.shape, plan.swing_ticks);
-  torso_.plan(torso_state_, plan.touch_down, plan.swing_ticks, plan.rise_ticks);
+  torso_.plan(torso_state_, plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks,
+              plan.rise_ticks);
+  com_.plan(params_.step.com, TorsoTrajectory::horizontal(torso_state_), zmp_of_swing(params_.step, plan));
+  com_tick_ = 0;
+  zmp_stance_m_ = plan.zmp_stance_m;
   planner_.latched(situation(state), decision);
   decision_ = decision;
 
@@ -271,6 +290,8 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     tick_ = 0;
     return;
   }
+  // The ground is late: the weight must not set off for it.
+  if (tick_ == swing_.duration_ticks() + params_.step.landing_hold_ticks / 2) rest_over(zmp_stance_m_);
   const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
   plan_T_sole_[i] = plan_T_odom * swing_.at(tick_);
 }
@@ -324,9 +345,9 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
     return;
   }
 
-  torso_state_ = torso_.at(motion_tick());
+  torso_state_ = torso_.at(motion_tick(), com_.at(com_tick_));
   if (activity_ == Activity::kRetreat) {
-    for (Motion& axis : torso_state_) axis.speed = -axis.speed;
+    for (std::size_t i = 2; i < TorsoTrajectory::kAxes; ++i) torso_state_[i].speed = -torso_state_[i].speed;
   }
   plan_T_base_ = plan_T_base_over(torso_state_);
   if (usable(state)) {
@@ -349,6 +370,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
       break;
   }
   tick_ = std::min(tick_ + 1, kTickLimit);
+  com_tick_ = std::min(com_tick_ + 1, kTickLimit);
 
   observe_links();
   if (joints_.follow(plan_T_base_, plan_T_sole_, status_.stands, command)) ++status_.ik_limited_ticks;

@@ -85,6 +85,7 @@ class Gait {
   [[nodiscard]] std::int32_t motion_tick() const noexcept;
   void carry_plan_to_odometry() noexcept;
   void settle_between_feet() noexcept;
+  void rest_over(const Vec2& plan_p_m) noexcept;
   [[nodiscard]] bool usable(const StateEstimate& state) const noexcept;
   [[nodiscard]] bool lost(const StateEstimate& state) const noexcept;
   [[nodiscard]] ClimbPlanner::Situation situation(const StateEstimate& state) const noexcept;
@@ -101,7 +102,9 @@ class Gait {
   StepSearch search_;
   BaseCorrection correction_;
   TorsoTrajectory torso_;
-  TorsoTrajectory::State torso_state_{};
+  TorsoTrajectory::State torso_state_{};  // x and y: of the centre of mass
+  ComPlan com_;
+  Vec2 zmp_stance_m_ = Vec2::Zero();  // of the swing, plan frame
   Swing swing_;  // odometry
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
@@ -110,6 +113,7 @@ class Gait {
   Activity activity_ = Activity::kHold;
   Activity links_activity_ = Activity::kHold;
   std::int32_t tick_ = 0;       // of the activity, saturates
+  std::int32_t com_tick_ = 0;   // of the plan of the centre of mass, likewise
   std::int32_t turn_tick_ = 0;  // of the swing, when the retreat began
   std::int32_t shift_ticks_ = 0;
   std::int32_t shifts_ = 0;  // since the last swing

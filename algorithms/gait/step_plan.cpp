@@ -41,18 +41,51 @@ StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const 
       plan.touch_down = torso_over(geometry, torso, stance, landed, torso.ahead_trail_land_m);
       break;
   }
+  const auto zmp_in = [&](Foot foot) -> Vec2 {
+    const SolePose& sole = landed[index_of(foot)];
+    const Vec3 local_m{params.zmp_ahead_m, -side_sign(foot) * params.zmp_inward_m, 0.0};
+    return (sole.position_m + rotation_z(sole.yaw_rad) * local_m).head<2>();
+  };
+  plan.zmp_stance_m = zmp_in(stance);
+  // After a leading step the weight goes on to that foot; after the others it may have to stop anywhere.
+  plan.zmp_next_m = zmp_in(goal.foot);
+  if (goal.kind != StepKind::kLeading) plan.zmp_next_m = 0.5 * (plan.zmp_next_m + plan.zmp_stance_m);
   return plan;
 }
 
-StepKnots::StepKnots(const StepPlan& plan, const TorsoTrajectory::State& from,
-                     const std::array<Transform, kFootCount>& soles, std::int32_t knot_ticks) noexcept
+ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept {
+  const std::int32_t stay = plan.swing_ticks + params.landing_hold_ticks;
+  const std::int32_t ramp = params.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
+  ZmpKnots knots;
+  (void)knots.try_push_back({stay, plan.zmp_stance_m});
+  (void)knots.try_push_back({stay + std::max(ramp, 1), plan.zmp_next_m});
+  return knots;
+}
+
+ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2& start_m) noexcept {
+  ZmpKnots knots;
+  const std::int32_t over = std::max(plan.shift_ticks - params.lift_hold_ticks, 2);
+  (void)knots.try_push_back({std::min(params.landing_hold_ticks, over / 2), start_m});
+  (void)knots.try_push_back({over, plan.zmp_stance_m});
+  for (const ZmpKnot& knot : zmp_of_swing(params, plan)) {
+    (void)knots.try_push_back({plan.shift_ticks + knot.tick, knot.zmp_m});
+  }
+  return knots;
+}
+
+StepKnots::StepKnots(const StepParams& params, const StepPlan& plan, const TorsoTrajectory::State& from,
+                     const std::array<Transform, kFootCount>& soles) noexcept
     : foot_(plan.goal.foot),
       soles_(soles),
       shift_ticks_(plan.shift_ticks),
-      knot_ticks_(std::max(knot_ticks, 1)),
+      swing_ticks_(plan.swing_ticks),
+      knot_ticks_(std::max(params.knot_ticks, 1)),
       count_(1 + (plan.shift_ticks + plan.swing_ticks + knot_ticks_ - 1) / knot_ticks_) {
-  shift_.plan(from, plan.lift_off, plan.shift_ticks, plan.shift_ticks);
-  lean_.plan(shift_.at(plan.shift_ticks), plan.touch_down, plan.swing_ticks, plan.rise_ticks);
+  const HorizontalMotion com = TorsoTrajectory::horizontal(from);
+  com_.plan(params.com, com, zmp_of_shift(params, plan, ComPlan::zmp_under(params.com, com)));
+  shift_.plan(from, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, plan.shift_ticks, plan.shift_ticks);
+  lean_.plan(shift_.at(plan.shift_ticks, com), plan.touch_down.position_m.z(), plan.touch_down.yaw_rad,
+             plan.swing_ticks, plan.rise_ticks);
   swing_.plan(soles[index_of(foot_)], plan.goal.target, plan.shape, plan.swing_ticks);
 }
 
@@ -62,9 +95,9 @@ StepKnot StepKnots::operator[](std::int32_t i) const noexcept {
   knot.odom_T_sole = soles_;
   const std::int32_t swing_tick = std::min(knot.tick - shift_ticks_, swing_.duration_ticks());
   if (swing_tick < 0) {
-    knot.odom_T_base = TorsoTrajectory::pose(shift_.at(knot.tick));
+    knot.odom_T_base = TorsoTrajectory::pose(shift_.at(knot.tick, com_.at(knot.tick)));
   } else {
-    knot.odom_T_base = TorsoTrajectory::pose(lean_.at(swing_tick));
+    knot.odom_T_base = TorsoTrajectory::pose(lean_.at(swing_tick, com_.at(knot.tick)));
     knot.odom_T_sole[index_of(foot_)] = swing_.at(swing_tick);
   }
   return knot;
@@ -144,10 +177,11 @@ void StepSearch::try_candidate() noexcept {
   if (leading_found_) {
     soles[index_of(goal_.foot)] = goal_.target.transform();
     from = TorsoTrajectory::at_rest({rotation_z(plan_.touch_down.yaw_rad), plan_.touch_down.position_m});
+    TorsoTrajectory::set_horizontal(from, com_landed_);
   }
   candidate_ = plan_step(geometry_, params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, kToeDown_rad[shape_]);
   if (!leading_found_) candidate_.shift_ticks = shift_ticks_;
-  proof_.begin(geometry_, params_, StepKnots(candidate_, from, soles, params_.knot_ticks));
+  proof_.begin(geometry_, params_, StepKnots(params_, candidate_, from, soles));
 }
 
 // Can the weight then move over the foot that landed? A wide diagonal step could be a dead end: the ankle roll of the
@@ -177,6 +211,7 @@ StepSearch::State StepSearch::step() noexcept {
     if (goal_.kind == StepKind::kFloor && !leads_on()) return state_ = State::kImpossible;
     if (leading_found_ || goal_.kind != StepKind::kLeading) return state_ = State::kFound;
     leading_found_ = true;
+    com_landed_ = proof_.knots().com_at_landing();
     shape_ = 0;
   }
   try_candidate();

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "algorithms/core/footholds.hpp"
+#include "algorithms/gait/com_plan.hpp"
 #include "algorithms/gait/swing.hpp"
 #include "algorithms/gait/torso.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
@@ -34,10 +35,15 @@ struct StepParams {
                          .landing_begin = 0.55,
                          .clearance_m = 0.05,
                          .retreat_m = 0.0};
-  std::int32_t stair_shift_ticks = 800;  // 1.6 s of double support
-  std::int32_t stair_swing_ticks = 490;  // 0.98 s
-  std::int32_t floor_shift_ticks = 800;
+  std::int32_t stair_shift_ticks = 375;  // 0.75 s of double support
+  std::int32_t stair_swing_ticks = 400;  // 0.8 s
+  std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
+  ComPlan::Params com;
+  double zmp_ahead_m = 0.02;             // in the stance sole, ahead of the ankle
+  double zmp_inward_m = 0.012;           // and towards the other foot
+  std::int32_t landing_hold_ticks = 75;  // the foot may land that much late before the weight sets off for it
+  std::int32_t lift_hold_ticks = 20;     // and the weight is over the stance foot that long before the other one lifts
   double rise_share = 0.45;        // of a swing onto a tread in which the torso rises, to give the foot room
   std::int32_t knot_ticks = 10;    // eq. (37): 20 ms
   double joint_margin_rad = 0.03;  // what a plan keeps from the joints' ranges
@@ -49,6 +55,8 @@ struct StepPlan {
   StepGoal goal;
   TorsoPose lift_off;
   TorsoPose touch_down;
+  Vec2 zmp_stance_m = Vec2::Zero();  // while the foot swings
+  Vec2 zmp_next_m = Vec2::Zero();    // then
   SwingShape shape;
   std::int32_t shift_ticks = 1;
   std::int32_t swing_ticks = 1;
@@ -61,6 +69,10 @@ inline constexpr std::array<double, 5> kToeDown_rad{0.3, 0.2, 0.4, 0.1, 0.5};
 [[nodiscard]] StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal,
                                  const SolePair& soles, double toe_down_rad) noexcept;
 
+// Zero-moment points of a step whose shift begins with one at start_m, and from its lift-off on.
+[[nodiscard]] ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2& start_m) noexcept;
+[[nodiscard]] ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept;
+
 // Eq. (30): one of the N knots of a step; eq. (37): t_i = i dt.
 struct StepKnot {
   std::array<Transform, kFootCount> odom_T_sole;
@@ -72,8 +84,8 @@ struct StepKnot {
 class StepKnots {
  public:
   StepKnots() noexcept = default;
-  StepKnots(const StepPlan& plan, const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles,
-            std::int32_t knot_ticks) noexcept;
+  StepKnots(const StepParams& params, const StepPlan& plan, const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept;
+  [[nodiscard]] HorizontalMotion com_at_landing() const noexcept { return com_.at(shift_ticks_ + swing_ticks_); }
   [[nodiscard]] std::int32_t count() const noexcept { return count_; }
   [[nodiscard]] std::int32_t knot_ticks() const noexcept { return knot_ticks_; }
   [[nodiscard]] StepKnot operator[](std::int32_t i) const noexcept;
@@ -82,8 +94,9 @@ class StepKnots {
   Foot foot_ = Foot::kLeft;
   std::array<Transform, kFootCount> soles_;
   TorsoTrajectory shift_, lean_;
+  ComPlan com_;
   Swing swing_;
-  std::int32_t shift_ticks_ = 0, knot_ticks_ = 1, count_ = 0;
+  std::int32_t shift_ticks_ = 0, swing_ticks_ = 0, knot_ticks_ = 1, count_ = 0;
 };
 
 struct StepCheck {
@@ -100,6 +113,7 @@ class StepProof {
   // Up to `count` knots; true when all are done. A knot costs two leg solutions, about 3 us on one x86 core.
   bool advance(std::int32_t count) noexcept;
   [[nodiscard]] const StepCheck& check() const noexcept { return check_; }
+  [[nodiscard]] const StepKnots& knots() const noexcept { return knots_; }
 
  private:
   // Both legs at a knot; false when one is out of reach. The plan says where the centre of mass is: the base follows
@@ -143,6 +157,7 @@ class StepSearch {
   StepPlan plan_;       // the offered one, of goal_
   StepPlan candidate_;  // under proof
   StepProof proof_;
+  HorizontalMotion com_landed_;  // after the leading swing
   std::int32_t shift_ticks_ = 1;
   std::size_t shape_ = 0;
   bool leading_found_ = false;

@@ -65,19 +65,32 @@ TorsoTrajectory::State TorsoTrajectory::moved(const State& state, const Transfor
   return result;
 }
 
-void TorsoTrajectory::plan(const State& from, const TorsoPose& to, std::int32_t duration_ticks,
-                           std::int32_t height_ticks) noexcept {
-  const double yaw_rad = from[5].position + math::wrap_angle(to.yaw_rad - from[5].position);
-  const std::array<double, kAxes> goal{to.position_m.x(), to.position_m.y(), to.position_m.z(), 0.0, 0.0, yaw_rad};
-  for (std::size_t i = 0; i < kAxes; ++i) {
-    const std::int32_t ticks = std::max(i == 2 ? height_ticks : duration_ticks, 1);
-    axes_[i] = Quintic(from[i], {goal[i]}, ticks * kTick_s);
+HorizontalMotion TorsoTrajectory::horizontal(const State& state) noexcept {
+  return {{state[0].position, state[1].position},
+          {state[0].speed, state[1].speed},
+          {state[0].acceleration, state[1].acceleration}};
+}
+
+void TorsoTrajectory::set_horizontal(State& state, const HorizontalMotion& motion) noexcept {
+  for (int a = 0; a < 2; ++a) {
+    state[static_cast<std::size_t>(a)] = {motion.position_m[a], motion.velocity_mps[a], motion.acceleration_mps2[a]};
   }
 }
 
-TorsoTrajectory::State TorsoTrajectory::at(std::int32_t tick) const noexcept {
+void TorsoTrajectory::plan(const State& from, double height_m, double yaw_rad, std::int32_t duration_ticks,
+                           std::int32_t height_ticks) noexcept {
+  const std::array<double, kAxes - 2> goal{height_m, 0.0, 0.0,
+                                           from[5].position + math::wrap_angle(yaw_rad - from[5].position)};
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    const std::int32_t ticks = std::max(i == 0 ? height_ticks : duration_ticks, 1);
+    axes_[i] = Quintic(from[i + 2], {goal[i]}, ticks * kTick_s);
+  }
+}
+
+TorsoTrajectory::State TorsoTrajectory::at(std::int32_t tick, const HorizontalMotion& horizontal) const noexcept {
   State s;
-  for (std::size_t i = 0; i < kAxes; ++i) s[i] = axes_[i].at(tick * kTick_s);
+  set_horizontal(s, horizontal);
+  for (std::size_t i = 0; i < axes_.size(); ++i) s[i + 2] = axes_[i].at(tick * kTick_s);
   return s;
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "algorithms/gait/blend.hpp"
+#include "algorithms/gait/dcm_stabiliser.hpp"
 #include "algorithms/gait/footstep_plan.hpp"
 
 namespace polygmap {
@@ -15,7 +16,7 @@ struct TorsoParams {
   double max_leg_m = 0.612;           // hip pitch to ankle, of 0.630 stretched
   double inward_m = 0.022;            // from the stance foot's middle line towards the other foot at lift-off
   double ahead_lead_lift_m = 0.01;    // of the base before the stance sole's origin: leading foot leaves
-  double ahead_lead_land_m = 0.05;    // it lands
+  double ahead_lead_land_m = 0.09;    // it lands
   double ahead_trail_lift_m = -0.02;  // trailing foot leaves: as far back as the support allows
   double ahead_trail_land_m = 0.005;  // it lands
   double ahead_floor_m = 0.01;
@@ -33,7 +34,8 @@ struct TorsoParams {
 [[nodiscard]] TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params,
                                       const SolePair& soles) noexcept;
 
-// x, y, z, roll, pitch, yaw: moves from any motion to an upright rest.
+// x, y, z, roll, pitch, yaw: height and attitude move from any motion to an upright rest; x and y are the centre of
+// mass's and come from elsewhere (com_plan.hpp).
 class TorsoTrajectory {
  public:
   static constexpr std::size_t kAxes = 6;
@@ -44,12 +46,17 @@ class TorsoTrajectory {
   // The state in another frame that differs by a small rigid motion: speeds stay.
   [[nodiscard]] static State moved(const State& state, const Transform& by) noexcept;
 
+  [[nodiscard]] static HorizontalMotion horizontal(const State& state) noexcept;
+  static void set_horizontal(State& state, const HorizontalMotion& motion) noexcept;
+
   // height_ticks: the height may arrive earlier than the rest.
-  void plan(const State& from, const TorsoPose& to, std::int32_t duration_ticks, std::int32_t height_ticks) noexcept;
-  [[nodiscard]] State at(std::int32_t tick) const noexcept;
+  void plan(const State& from, double height_m, double yaw_rad, std::int32_t duration_ticks,
+            std::int32_t height_ticks) noexcept;
+  // x and y as set in `horizontal`.
+  [[nodiscard]] State at(std::int32_t tick, const HorizontalMotion& horizontal) const noexcept;
 
  private:
-  std::array<Quintic, kAxes> axes_;
+  std::array<Quintic, kAxes - 2> axes_;  // from z on
 };
 
 }  // namespace polygmap
