@@ -72,14 +72,17 @@ double KinematicPlant::foot_force_n(std::size_t foot) const noexcept {
 }
 
 void KinematicPlant::step(const JointCommand& command) {
-  JointVector command_rad;
-  for (std::size_t j = 0; j < kJointCount; ++j) command_rad[static_cast<Eigen::Index>(j)] = command.joints[j].q_rad;
+  JointVector command_rad, rate_radps;
+  for (std::size_t j = 0; j < kJointCount; ++j) {
+    command_rad[static_cast<Eigen::Index>(j)] = command.joints[j].q_rad;
+    rate_radps[static_cast<Eigen::Index>(j)] = command.joints[j].dq_radps;
+  }
   if (fell()) {
     dq_.setZero();
     return;
   }
   if (!accept_command(command_rad)) return;
-  move_joints(command_rad);
+  move_joints(command_rad, rate_radps);
   update_leg_kinematics();
   transfer_load();
   lift_feet();
@@ -107,7 +110,7 @@ bool KinematicPlant::accept_command(const JointVector& command_rad) {
   return true;
 }
 
-void KinematicPlant::move_joints(const JointVector& command_rad) {
+void KinematicPlant::move_joints(const JointVector& command_rad, const JointVector& rate_radps) {
   const JointVector before = q_;
   const double dt = kPlantTick_s / kDriveSubsteps;
   const double gain = 1.0 - std::exp(-dt / params_.drive_lag_s);
@@ -115,8 +118,9 @@ void KinematicPlant::move_joints(const JointVector& command_rad) {
     const JointLimits limits = joint_limits(static_cast<Foot>(j / kJointsPerLeg), j % kJointsPerLeg);
     const auto i = static_cast<Eigen::Index>(j);
     const double reach = limits.speed_radps * dt;
+    const double target_rad = command_rad[i] + params_.drive_lag_s * rate_radps[i];
     for (int k = 0; k < kDriveSubsteps; ++k) {
-      q_[i] += math::clamp(gain * (command_rad[i] - q_[i]), -reach, reach);
+      q_[i] += math::clamp(gain * (target_rad - q_[i]), -reach, reach);
       q_[i] = math::clamp(q_[i], limits.min_rad, limits.max_rad);
     }
   }

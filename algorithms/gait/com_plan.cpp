@@ -63,6 +63,7 @@ void ComPlan::plan(const Params& params, const HorizontalMotion& from, const Zmp
     push_xi = share_at(i) + rate / w + decay * (push_xi - share_at(i + 1) - rate / w);
   }
   const Vec2 push_m = (from.position_m + from.velocity_mps / w - xi_m) / std::max(push_xi, 0.05);
+  push_m_ = push_m.norm();
   for (std::size_t i = 0; i < count_; ++i) all[i].zmp_m += share_at(i) * push_m;
 
   // Backwards again for the growing part, forwards for the dying one.

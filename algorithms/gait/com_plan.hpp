@@ -34,6 +34,7 @@ class ComPlan {
   void plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept;
   [[nodiscard]] HorizontalMotion at(std::int32_t tick) const noexcept;
   [[nodiscard]] Vec2 zmp_m(std::int32_t tick) const noexcept;
+  [[nodiscard]] double push_m() const noexcept { return push_m_; }  // how far it leaves it at the start
 
  private:
   // x(t) = p + s t + a e^(w (t - T)) + b e^(-w t), T the duration: neither exponential overflows.
@@ -51,6 +52,7 @@ class ComPlan {
   std::array<Segment, kSegments> segments_;
   std::size_t count_ = 0;
   double omega_radps_ = 1.0;
+  double push_m_ = 0.0;
 };
 
 }  // namespace polygmap

@@ -16,7 +16,7 @@ struct HorizontalMotion {
 class DcmStabiliser {
  public:
   struct Params {
-    double gain = 1.5;            // metres of ZMP for each metre of DCM; at 1 and below nothing is stable
+    double gain = 2.0;            // metres of ZMP for each metre of DCM; at 1 and below nothing is stable
     double integral_per_s = 0.3;  // of the same
     double integral_max_m = 0.02;
   };

@@ -172,11 +172,18 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   StepPlan plan = plan_step(params_.geometry, params_.step, decision.goal, soles, kToeDown_rad[0]);
   if (again) plan.shift_ticks = params_.reshift_ticks;
+  // Standing over the other foot there is little room to push off with: the weight then waits and sets off gently.
+  const HorizontalMotion com = TorsoTrajectory::horizontal(torso_state_);
+  const Vec2 start_m = ComPlan::zmp_under(params_.step.com, com);
+  constexpr std::int32_t kLonger_ticks = 50;
+  const std::int32_t longest_ticks = plan.shift_ticks + 10 * kLonger_ticks;
+  com_.plan(params_.step.com, com, zmp_of_shift(params_.step, plan, start_m));
+  while (com_.push_m() > params_.max_push_m && plan.shift_ticks < longest_ticks) {
+    plan.shift_ticks += kLonger_ticks;
+    com_.plan(params_.step.com, com, zmp_of_shift(params_.step, plan, start_m));
+  }
   shift_ticks_ = plan.shift_ticks;
   torso_.plan(torso_state_, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
-  const HorizontalMotion com = TorsoTrajectory::horizontal(torso_state_);
-  com_.plan(params_.step.com, com,
-            zmp_of_shift(params_.step, plan, ComPlan::zmp_under(params_.step.com, com)));
   com_tick_ = 0;
   search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, shift_ticks_, torso_state_,
                 plan_T_sole_);

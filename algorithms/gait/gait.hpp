@@ -26,10 +26,11 @@ class Gait {
     ClimbPlanner::Params planner;
     JointReference::Params joints;
     Balance::Params balance;
-    double correction_time_s = 0.06;  // low-pass of the base's difference to the plan
+    double correction_time_s = 0.03;  // low-pass of the base's difference to the plan
     double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
     double absorb_rad = 0.035;
     std::int32_t reshift_ticks = 125;          // another weight shift over the same foot for a target that changed more
+    double max_push_m = 0.03;                  // of the zero-moment point, to set off
     std::int32_t max_shifts = 9;               // for one swing
     std::int32_t start_patience_ticks = 1500;  // the same obstruction without a break, before the first step
     std::int32_t patience_ticks = 500;         // and later, or the top: 1 s

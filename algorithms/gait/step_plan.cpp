@@ -65,7 +65,8 @@ ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept {
 ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2& start_m) noexcept {
   ZmpKnots knots;
   const std::int32_t over = std::max(plan.shift_ticks - params.lift_hold_ticks, 2);
-  (void)knots.try_push_back({std::min(params.landing_hold_ticks, over / 2), start_m});
+  const std::int32_t ramp = params.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
+  (void)knots.try_push_back({std::max(over - ramp, over / 5), start_m});
   (void)knots.try_push_back({over, plan.zmp_stance_m});
   for (const ZmpKnot& knot : zmp_of_swing(params, plan)) {
     (void)knots.try_push_back({plan.shift_ticks + knot.tick, knot.zmp_m});

@@ -135,7 +135,10 @@ void IdealClimb::move() {
     const double reach = joint_limits(static_cast<Foot>(n / 6), n % 6).speed_radps * 0.002;
     q_[i] += math::clamp(gain * (active_[i] - q_[i]), -reach, reach);
   }
-  active_ = sent_;
+  for (std::size_t n = 0; n < kJointCount; ++n) {  // drives that know the rate do not lag on a ramp
+    const auto i = static_cast<Eigen::Index>(n);
+    active_[i] = sent_[i] + 0.010 * command_.joints[n].dq_radps;
+  }
   std::array<Transform, kFootCount> base_T_foot;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     base_T_foot[index_of(leg)] = base_T_sole({}, leg, leg_joints(q_ - setup_.encoder_offset_rad, leg));
