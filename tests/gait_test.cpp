@@ -587,7 +587,7 @@ class JointReferenceTest : public testing::Test {
 };
 
 TEST_F(JointReferenceTest, PoseReached_IsNotLimited) {
-  EXPECT_FALSE(reference_.follow({}, base_T_sole_, command_));
+  EXPECT_FALSE(reference_.follow({}, base_T_sole_, {true, true}, command_));
   for (std::size_t n = 0; n < kJointCount; ++n) {
     EXPECT_NEAR(command_.joints[n].q_rad, q_rad_[static_cast<Eigen::Index>(n)], 1e-9);
   }
@@ -598,7 +598,7 @@ TEST_F(JointReferenceTest, PoseNotFinite_LegStaysWhereItIs) {
     for (int axis = 0; axis < 3; ++axis) {
       auto soles = base_T_sole_;
       soles[0].p_m[axis] = bad;
-      for (int i = 0; i < 100; ++i) EXPECT_TRUE(reference_.follow({}, soles, command_));
+      for (int i = 0; i < 100; ++i) EXPECT_TRUE(reference_.follow({}, soles, {true, true}, command_));
       for (std::size_t n = 0; n < kJointCount; ++n) {
         EXPECT_NEAR(command_.joints[n].q_rad, q_rad_[static_cast<Eigen::Index>(n)], 1e-9) << n;
         EXPECT_NEAR(command_.joints[n].dq_radps, 0.0, 1e-9) << n;
@@ -609,7 +609,7 @@ TEST_F(JointReferenceTest, PoseNotFinite_LegStaysWhereItIs) {
 
 TEST_F(JointReferenceTest, PoseOutOfReach_IsLimited) {
   base_T_sole_[1].p_m.z() = -1.2;
-  EXPECT_TRUE(reference_.follow({}, base_T_sole_, command_));
+  EXPECT_TRUE(reference_.follow({}, base_T_sole_, {true, true}, command_));
 }
 
 TEST(GaitInput, NanInEstimatesAndFootholds_NeverReachesACommand) {

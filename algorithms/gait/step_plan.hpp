@@ -36,7 +36,7 @@ struct StepParams {
                          .clearance_m = 0.05,
                          .retreat_m = 0.0};
   std::int32_t stair_shift_ticks = 375;  // 0.75 s of double support
-  std::int32_t stair_swing_ticks = 400;  // 0.8 s
+  std::int32_t stair_swing_ticks = 490;  // 0.98 s
   std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
   ComPlan::Params com;

@@ -17,7 +17,7 @@ struct TorsoParams {
   double inward_m = 0.022;            // from the stance foot's middle line towards the other foot at lift-off
   double ahead_lead_lift_m = 0.01;    // of the base before the stance sole's origin: leading foot leaves
   double ahead_lead_land_m = 0.09;    // it lands
-  double ahead_trail_lift_m = -0.02;  // trailing foot leaves: as far back as the support allows
+  double ahead_trail_lift_m = -0.01;  // trailing foot leaves: as far back as the support allows
   double ahead_trail_land_m = 0.005;  // it lands
   double ahead_floor_m = 0.01;
 };

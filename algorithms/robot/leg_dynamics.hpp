@@ -21,8 +21,11 @@ struct SoleWrench {
 };
 // A vector for every link: the torso, and each leg's from the hip down.
 struct PerLink {
+  PerLink() noexcept {
+    for (auto& links : leg) links.fill(Vec3::Zero());  // Eigen's own default is no value
+  }
   Vec3 torso = Vec3::Zero();
-  std::array<std::array<Vec3, kJointsPerLeg>, kFootCount> leg{};
+  std::array<std::array<Vec3, kJointsPerLeg>, kFootCount> leg;
 };
 // Centres of all links, base frame.
 [[nodiscard]] PerLink base_p_links_m(const LegGeometry& geometry, const MassModel& masses,
