@@ -65,6 +65,7 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
 }
 
 Foot ClimbPlanner::leading_foot(const Situation& situation, const SolePair& targets) const noexcept {
+  if (situation.leads) return situation.leading;
   const TorsoDisplacement step = displacement(middle_of(situation.soles), middle_of(targets));
   return swing_foot(step, has_leading_ ? leading_ : other(last_swing_), params_.rule);
 }

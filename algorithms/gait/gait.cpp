@@ -37,7 +37,9 @@ ClimbPlanner::Situation Gait::situation(const StateEstimate& state) const noexce
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
   return {now_ns_,
           state.world_T_odom,
-          {sole_pose(odom_T_plan * plan_T_sole_[0]), sole_pose(odom_T_plan * plan_T_sole_[1])}};
+          {sole_pose(odom_T_plan * plan_T_sole_[0]), sole_pose(odom_T_plan * plan_T_sole_[1])},
+          activity_ == Activity::kShift && decision_.goal.kind == StepKind::kLeading,
+          decision_.goal.foot};
 }
 
 void Gait::carry_plan_to_odometry() noexcept {
