@@ -36,7 +36,8 @@ class KinematicPlant final : public Plant {
   KinematicPlant(const Params& params, const StairWorld& world, const RobotErrors& errors,
                  const Transform& true_T_start, const JointVector& q_rad);
 
-  // One tick towards the angles of the command, its rates known ahead: no lag on a ramp. Nothing else of it counts; nothing moves any more after a fall.
+  // One tick towards the angles of the command, its rates known ahead: no lag on a ramp. Nothing else of it counts;
+  // nothing moves any more after a fall.
   void step(const JointCommand& command) override;
 
   [[nodiscard]] const Transform& true_T_base() const noexcept override { return true_T_base_; }

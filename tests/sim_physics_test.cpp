@@ -8,6 +8,7 @@
 
 #include "algorithms/robot/leg_dynamics.hpp"
 #include "sim_stub/sim_robot.hpp"
+#include "tests/support/physical_climb.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -161,6 +162,43 @@ TEST(MujocoPlant, CommandOverTheBus_TakesHold2msLater) {
   robot.advance();
   ASSERT_TRUE(robot.try_read(feedback));
   EXPECT_EQ(feedback.tau_nm[kKnee], 7.0);
+}
+
+SimOptions few_steps(std::uint64_t seed) {
+  SimOptions options;
+  options.seed = seed;
+  options.stairs.steps = 2;
+  return options;
+}
+
+TEST(PhysicalClimb, WithEverySensorsErrors_ClimbsAndStands) {
+  for (const std::uint64_t seed : {1, 4}) {
+    PhysicalClimb climb(few_steps(seed));
+    climb.run(60.0);
+    EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
+    EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+    EXPECT_EQ(climb.status().treads_climbed, 2U);
+    EXPECT_EQ(climb.truth().step_index[0], 1);
+    EXPECT_EQ(climb.truth().step_index[1], 1);
+    EXPECT_LT(climb.gait().balance().com_error_m().norm(), 0.02);
+  }
+}
+
+TEST(PhysicalClimb, SameSeedTwice_RepeatsBitForBit) {
+  PhysicalClimb one(few_steps(2)), two(few_steps(2));
+  one.run(6.0);
+  two.run(6.0);
+  EXPECT_EQ(one.truth().true_T_base.p_m, two.truth().true_T_base.p_m);
+  EXPECT_GT(one.status().step.sequence, 1U);
+}
+
+TEST(PhysicalClimb, WithoutFeedbackOfTheDcm_Falls) {
+  Gait::Params params;
+  params.balance.dcm.gain = 0.0;
+  params.balance.dcm.integral_per_s = 0.0;
+  PhysicalClimb climb(few_steps(1), params);
+  climb.run(60.0);
+  EXPECT_TRUE(climb.truth().fell);
 }
 
 }  // namespace

@@ -45,8 +45,8 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   HorizontalMotion planned = reference.com;
   planned.position_m += odom_p_plan_m.head<2>();
   com_error_m_ = planned.position_m - odom_p_com_m.head<2>();
-  const Vec2 zmp_m = stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(),
-                                       omega_radps, tick_s);
+  const Vec2 zmp_m =
+      stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(), omega_radps, tick_s);
   // Legs that swing turn the body: the ground's force passes beside the centre of mass by as much as that takes.
   PerLink odom_p_links_m = base_p_links_m(geometry, params.masses, body.q_rad);
   odom_p_links_m.torso = R * odom_p_links_m.torso;
@@ -57,7 +57,9 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   const double vertical_n = params.masses.total_kg() * up_mps2;
   const Vec2 beside_m{-turning_nm.y() / vertical_n, turning_nm.x() / vertical_n};
   const Vec2 slope = (odom_p_com_m.head<2>() - zmp_m) / height_m;
-  const Pressure pressure = distribute(support, params.pressure, {odom_p_com_m.x() + beside_m.x(), odom_p_com_m.y() + beside_m.y(), odom_p_com_m.z()}, slope);
+  const Pressure pressure =
+      distribute(support, params.pressure,
+                 {odom_p_com_m.x() + beside_m.x(), odom_p_com_m.y() + beside_m.y(), odom_p_com_m.z()}, slope);
   share_ = pressure.share;
 
   // The force that the clamped centres of pressure can give.

@@ -6,6 +6,7 @@
 namespace polygmap {
 namespace {
 
+constexpr std::int32_t kLower_ticks = 300;      // of the torso before a foot goes back
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
 
 bool finite(const Transform& T) noexcept { return math::all_finite(T.R) && math::all_finite(T.p_m); }
@@ -251,8 +252,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   const StepPlan plan = plan_step(params_.geometry, params_.step, goal, soles, search_.plan().shape.toe_down_rad);
   swing_.plan(plan_T_sole_[index_of(goal.foot)], goal.target, plan.shape, plan.swing_ticks);
-  torso_.plan(torso_state_, plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks,
-              plan.rise_ticks);
+  torso_.plan(torso_state_, plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
   com_.plan(params_.step.com, TorsoTrajectory::horizontal(torso_state_), zmp_of_swing(params_.step, plan));
   com_tick_ = 0;
   zmp_stance_m_ = plan.zmp_stance_m;
@@ -297,10 +297,17 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     activity_ = Activity::kRetreat;
     turn_tick_ = tick_;
     tick_ = 0;
+    // The weight stays over the stance foot, as low as the way back asks for.
+    const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
+    SolePair stood{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
+    stood[i] = sole_pose(plan_T_odom * swing_.at(0));
+    const TorsoPose low =
+        torso_over(params_.geometry, params_.step.torso, other(foot), stood, params_.step.zmp_ahead_m);
+    torso_.plan(torso_state_, low.position_m.z(), low.yaw_rad, kLower_ticks, kLower_ticks);
     return;
   }
   // The ground is late: the weight must not set off for it.
-  if (tick_ == swing_.duration_ticks() + params_.step.landing_hold_ticks / 2) rest_over(zmp_stance_m_);
+  if (tick_ == swing_.duration_ticks() + params_.step.landing_hold_ticks) rest_over(zmp_stance_m_);
   const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
   plan_T_sole_[i] = plan_T_odom * swing_.at(tick_);
 }
@@ -311,7 +318,7 @@ std::int32_t Gait::motion_tick() const noexcept {
 }
 
 // The only ground that is known is where the foot stood, and the only way there that is known to be free is the one it
-// came: the whole step backwards, at the speeds that were proven.
+// came: the swing backwards, at the speeds that were proven.
 void Gait::retreat(const JointFeedback& feedback) noexcept {
   const std::size_t i = index_of(decision_.goal.foot);
   const Transform odom_T_sole = swing_.at(motion_tick());
@@ -354,10 +361,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
     return;
   }
 
-  torso_state_ = torso_.at(motion_tick(), com_.at(com_tick_));
-  if (activity_ == Activity::kRetreat) {
-    for (std::size_t i = 2; i < TorsoTrajectory::kAxes; ++i) torso_state_[i].speed = -torso_state_[i].speed;
-  }
+  torso_state_ = torso_.at(tick_, com_.at(com_tick_));
   plan_T_base_ = plan_T_base_over(torso_state_);
   if (usable(state)) {
     correction_.update(state.odom_T_base, plan_T_base_, kTick_s / (kTick_s + params_.correction_time_s));

@@ -40,7 +40,7 @@ class Gait {
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
     double max_lowering_m = 0.04;               // no ground found: the foot goes back
-    std::int32_t retreat_pause_ticks = 50;      // before it does
+    std::int32_t retreat_pause_ticks = 200;     // before it does
     double put_back_m = 0.01;                   // about where it stood: weight counts as the ground; below, it is there
     std::int64_t steer_age_ns = 20 * kNsPerMs;  // of IMU and joint samples: older ones steer nothing and start nothing
     std::int64_t stop_age_ns = 100 * kNsPerMs;  // of the same on two feet: then the gait stops
@@ -82,7 +82,7 @@ class Gait {
                 const ClimbPlanner::Decision& decision) noexcept;
   void touch_down(const StateEstimate& state) noexcept;
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
-  // Of swing and torso: backwards in a retreat.
+  // Of the swing: backwards in a retreat.
   [[nodiscard]] std::int32_t motion_tick() const noexcept;
   void carry_plan_to_odometry() noexcept;
   void settle_between_feet() noexcept;
@@ -106,7 +106,7 @@ class Gait {
   TorsoTrajectory::State torso_state_{};  // x and y: of the centre of mass
   ComPlan com_;
   Vec2 zmp_stance_m_ = Vec2::Zero();  // of the swing, plan frame
-  Swing swing_;  // odometry
+  Swing swing_;                       // odometry
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
   ClimbPlanner::Decision decision_;

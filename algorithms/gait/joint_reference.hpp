@@ -15,7 +15,7 @@ class JointReference {
     double drive_delay_s = 0.003;  // by the data sheet: 2 ms on the bus, half a tick of hold
     std::array<double, kJointsPerLeg> kp_nmprad{400, 400, 400, 400, 120, 120};
     std::array<double, kJointsPerLeg> kd_nmsprad{10, 10, 10, 10, 4, 4};
-    double swing_gain = 2.0;   // of both, in the leg that swings
+    double swing_gain = 2.0;       // of both, in the leg that swings
     double hold_kp_nmprad = 2000;  // before there is an estimate to balance by: stiffer than the robot is top-heavy
     double hold_kd_nmsprad = 40;
   };

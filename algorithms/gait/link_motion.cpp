@@ -28,8 +28,7 @@ LinkMotion::Acceleration LinkMotion::update(const LegGeometry& geometry, const M
     a.plan_mps2.torso = second_difference(now.plan_p_m.torso, b.plan_p_m.torso, c.plan_p_m.torso);
     for (std::size_t f = 0; f < kFootCount; ++f) {
       for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-        a.plan_mps2.leg[f][j] =
-            second_difference(now.plan_p_m.leg[f][j], b.plan_p_m.leg[f][j], c.plan_p_m.leg[f][j]);
+        a.plan_mps2.leg[f][j] = second_difference(now.plan_p_m.leg[f][j], b.plan_p_m.leg[f][j], c.plan_p_m.leg[f][j]);
       }
     }
     a.joint_radps2 = (now.q_rad - 2.0 * b.q_rad + c.q_rad) / math::square(kTick_s);

@@ -44,11 +44,11 @@ struct StepParams {
   double zmp_inward_m = 0.012;           // and towards the other foot
   std::int32_t landing_hold_ticks = 75;  // the foot may land that much late before the weight sets off for it
   std::int32_t lift_hold_ticks = 20;     // and the weight is over the stance foot that long before the other one lifts
-  double rise_share = 0.45;        // of a swing onto a tread in which the torso rises, to give the foot room
-  std::int32_t knot_ticks = 10;    // eq. (37): 20 ms
-  double joint_margin_rad = 0.03;  // what a plan keeps from the joints' ranges
-  double knee_min_rad = 0.08;      // and from the stretched leg
-  double speed_share = 0.9;        // of the drives' speed that a plan may use
+  double rise_share = 0.45;              // of a swing onto a tread in which the torso rises, to give the foot room
+  std::int32_t knot_ticks = 10;          // eq. (37): 20 ms
+  double joint_margin_rad = 0.03;        // what a plan keeps from the joints' ranges
+  double knee_min_rad = 0.08;            // and from the stretched leg
+  double speed_share = 0.9;              // of the drives' speed that a plan may use
 };
 
 struct StepPlan {
@@ -84,7 +84,8 @@ struct StepKnot {
 class StepKnots {
  public:
   StepKnots() noexcept = default;
-  StepKnots(const StepParams& params, const StepPlan& plan, const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept;
+  StepKnots(const StepParams& params, const StepPlan& plan, const TorsoTrajectory::State& from,
+            const std::array<Transform, kFootCount>& soles) noexcept;
   [[nodiscard]] HorizontalMotion com_at_landing() const noexcept { return com_.at(shift_ticks_ + swing_ticks_); }
   [[nodiscard]] std::int32_t count() const noexcept { return count_; }
   [[nodiscard]] std::int32_t knot_ticks() const noexcept { return knot_ticks_; }

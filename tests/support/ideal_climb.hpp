@@ -74,6 +74,7 @@ class IdealClimb {
   [[nodiscard]] const ClimbRecord& record() const { return record_; }
   [[nodiscard]] const Transform& true_T_base() const { return true_T_base_; }
   [[nodiscard]] const Transform& true_T_sole(Foot f) const { return feet_[index_of(f)].true_T_sole; }
+  [[nodiscard]] const JointVector& q_rad() const { return q_; }
   [[nodiscard]] bool touches(Foot f) const { return feet_[index_of(f)].anchored; }
   [[nodiscard]] int tick_count() const { return record_.ticks; }
 
