@@ -380,9 +380,8 @@ TEST(GaitFinish, TopSeenAfterAnotherObstruction_WaitsAWholeSecondOfTop) {
   EXPECT_LT(waited_s, 1.9);
 }
 
-// The target moves aside just before the lift-off, and with it the rule which foot leads: the weight does not turn
-// round.
-TEST(GaitLatch, OtherFootWouldLeadAfterTheShift_TheFreeFootLeads) {
+// The target moves aside just before the lift-off, and with it the rule which foot leads.
+TEST(GaitLatch, OtherFootLeadsAfterTheShift_WeightTakesTheTimeOfAWholeShift) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
     const double off_m = since_ns < 500 * kNsPerMs ? 0.03 : -0.03;
@@ -393,10 +392,13 @@ TEST(GaitLatch, OtherFootWouldLeadAfterTheShift_TheFreeFootLeads) {
   };
   while (climb.tick() && !swings_from_the_first_tread()) {
   }
-  EXPECT_EQ(climb.status().step.foot, Foot::kLeft);
+  EXPECT_EQ(climb.status().step.foot, Foot::kRight);
+  const std::int64_t stood_ns = climb.record().steps.back().touch_down_stamp_ns;
+  EXPECT_GT(seconds(climb.status().step.latch_stamp_ns - stood_ns), 2 * 0.62);
   climb.run(60.0);
   EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
   EXPECT_EQ(climb.status().ik_limited_ticks, 0U);
+  expect_sound_commands(climb);
 }
 
 // The nth swing onto a tread finds nothing: 1 is a leading foot, 2 a trailing one.

@@ -6,7 +6,10 @@
 namespace polygmap {
 namespace {
 
-constexpr std::int32_t kLower_ticks = 300;      // of the torso before a foot goes back
+constexpr std::int32_t kLower_ticks = 200;    // of the torso where a foot needs a longer leg
+constexpr std::int32_t kPatience_ticks = 20;  // 10 mm of late ground, which the shift after it can make up for
+constexpr double kInward_m = 0.01;
+constexpr double kSpare_m = 0.02;               // of its height: the base is not right over the centre of mass
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
 
 bool finite(const Transform& T) noexcept { return math::all_finite(T.R) && math::all_finite(T.p_m); }
@@ -133,6 +136,24 @@ void Gait::hold_upright(JointCommand& command) noexcept {
   add_torques({}, {}, command);
 }
 
+void Gait::plan_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept {
+  torso_.plan(torso_state_, height_m, yaw_rad, ticks, height_ticks);
+  torso_tick_ = 0;
+}
+
+// No ground: the weight rests over the stance foot, as low as the other sole at odom_p_sole asks for.
+void Gait::wait_over_stance(const SolePose& sole) noexcept {
+  const Foot foot = decision_.goal.foot;
+  SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
+  soles[index_of(foot)] = sole;
+  const TorsoPose low = torso_over(params_.geometry, params_.step.torso, other(foot), soles, params_.step.zmp_ahead_m);
+  plan_torso(std::min(low.position_m.z() - kSpare_m, torso_state_[2].position), low.yaw_rad, kLower_ticks,
+             kLower_ticks);
+  // As far towards the free foot as the sole carries: the ankle roll of a folded leg has little range.
+  const Vec3 inward_m = plan_T_sole_[index_of(other(foot))].R.col(1) * (side_sign(foot) * kInward_m);
+  rest_over(zmp_stance_m_ + inward_m.head<2>());
+}
+
 // The centre of mass comes to rest there.
 void Gait::rest_over(const Vec2& plan_p_m) noexcept {
   ZmpKnots knots;
@@ -144,7 +165,7 @@ void Gait::rest_over(const Vec2& plan_p_m) noexcept {
 void Gait::settle_between_feet() noexcept {
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   TorsoPose middle = torso_between(params_.geometry, params_.step.torso, soles);
-  torso_.plan(torso_state_, middle.position_m.z(), middle.yaw_rad, params_.settle_ticks, params_.settle_ticks);
+  plan_torso(middle.position_m.z(), middle.yaw_rad, params_.settle_ticks, params_.settle_ticks);
   const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{params_.step.zmp_ahead_m, 0, 0};
   rest_over((middle.position_m + ahead_m).head<2>());
   tick_ = 0;
@@ -175,18 +196,19 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   StepPlan plan = plan_step(params_.geometry, params_.step, decision.goal, soles, kToeDown_rad[0]);
   if (again) plan.shift_ticks = params_.reshift_ticks;
-  // Standing over the other foot there is little room to push off with: the weight then waits and sets off gently.
+  // Sooner where the weight is on its way already, later where it stands over the other foot with little room to push
+  // off: the first shift that needs a small push.
+  constexpr std::array<std::int32_t, 10> kLonger_ticks{0, -35, -70, 50, 100, 150, 200, 300, 400, 500};
   const HorizontalMotion com = TorsoTrajectory::horizontal(torso_state_);
   const Vec2 start_m = ComPlan::zmp_under(params_.step.com, com);
-  constexpr std::int32_t kLonger_ticks = 50;
-  const std::int32_t longest_ticks = plan.shift_ticks + 10 * kLonger_ticks;
-  com_.plan(params_.step.com, com, zmp_of_shift(params_.step, plan, start_m));
-  while (com_.push_m() > params_.max_push_m && plan.shift_ticks < longest_ticks) {
-    plan.shift_ticks += kLonger_ticks;
+  const std::int32_t usual_ticks = plan.shift_ticks;
+  for (const std::int32_t longer : kLonger_ticks) {
+    plan.shift_ticks = std::max(usual_ticks + longer, params_.reshift_ticks);
     com_.plan(params_.step.com, com, zmp_of_shift(params_.step, plan, start_m));
+    if (com_.push_m() <= params_.max_push_m) break;
   }
   shift_ticks_ = plan.shift_ticks;
-  torso_.plan(torso_state_, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
+  plan_torso(plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
   com_tick_ = 0;
   search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, shift_ticks_, torso_state_,
                 plan_T_sole_);
@@ -252,7 +274,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   const StepPlan plan = plan_step(params_.geometry, params_.step, goal, soles, search_.plan().shape.toe_down_rad);
   swing_.plan(plan_T_sole_[index_of(goal.foot)], goal.target, plan.shape, plan.swing_ticks);
-  torso_.plan(torso_state_, plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
+  plan_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
   com_.plan(params_.step.com, TorsoTrajectory::horizontal(torso_state_), zmp_of_swing(params_.step, plan));
   com_tick_ = 0;
   zmp_stance_m_ = plan.zmp_stance_m;
@@ -297,28 +319,26 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     activity_ = Activity::kRetreat;
     turn_tick_ = tick_;
     tick_ = 0;
-    // The weight stays over the stance foot, as low as the way back asks for.
-    const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
-    SolePair stood{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
-    stood[i] = sole_pose(plan_T_odom * swing_.at(0));
-    const TorsoPose low =
-        torso_over(params_.geometry, params_.step.torso, other(foot), stood, params_.step.zmp_ahead_m);
-    torso_.plan(torso_state_, low.position_m.z(), low.yaw_rad, kLower_ticks, kLower_ticks);
+    wait_over_stance(sole_pose(correction_.odom_T_plan(plan_T_base_).inverse() * swing_.at(0)));
     return;
   }
   // The ground is late: the weight must not set off for it.
-  if (tick_ == swing_.duration_ticks() + params_.step.landing_hold_ticks) rest_over(zmp_stance_m_);
+  if (tick_ == swing_.duration_ticks() + params_.step.landing_hold_ticks + kPatience_ticks) {
+    SolePose lowest = sole_pose(plan_T_sole_[i]);
+    lowest.position_m.z() -= params_.max_lowering_m;
+    wait_over_stance(lowest);
+  }
   const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
   plan_T_sole_[i] = plan_T_odom * swing_.at(tick_);
 }
 
 std::int32_t Gait::motion_tick() const noexcept {
   if (activity_ != Activity::kRetreat) return tick_;
-  return turn_tick_ - std::max(tick_ - params_.retreat_pause_ticks, 0);
+  return turn_tick_ - std::max(tick_ - params_.retreat_pause_ticks, 0) / 2;
 }
 
 // The only ground that is known is where the foot stood, and the only way there that is known to be free is the one it
-// came: the swing backwards, at the speeds that were proven.
+// came: the swing backwards, at half the speed, since the torso is elsewhere.
 void Gait::retreat(const JointFeedback& feedback) noexcept {
   const std::size_t i = index_of(decision_.goal.foot);
   const Transform odom_T_sole = swing_.at(motion_tick());
@@ -361,7 +381,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
     return;
   }
 
-  torso_state_ = torso_.at(tick_, com_.at(com_tick_));
+  torso_state_ = torso_.at(torso_tick_, com_.at(com_tick_));
   plan_T_base_ = plan_T_base_over(torso_state_);
   if (usable(state)) {
     correction_.update(state.odom_T_base, plan_T_base_, kTick_s / (kTick_s + params_.correction_time_s));
@@ -384,6 +404,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   }
   tick_ = std::min(tick_ + 1, kTickLimit);
   com_tick_ = std::min(com_tick_ + 1, kTickLimit);
+  torso_tick_ = std::min(torso_tick_ + 1, kTickLimit);
 
   observe_links();
   if (joints_.follow(plan_T_base_, plan_T_sole_, status_.stands, command)) ++status_.ik_limited_ticks;

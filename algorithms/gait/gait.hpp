@@ -86,6 +86,8 @@ class Gait {
   [[nodiscard]] std::int32_t motion_tick() const noexcept;
   void carry_plan_to_odometry() noexcept;
   void settle_between_feet() noexcept;
+  void plan_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
+  void wait_over_stance(const SolePose& sole) noexcept;
   void rest_over(const Vec2& plan_p_m) noexcept;
   [[nodiscard]] bool usable(const StateEstimate& state) const noexcept;
   [[nodiscard]] bool lost(const StateEstimate& state) const noexcept;
@@ -113,9 +115,10 @@ class Gait {
   GaitStatus status_;
   Activity activity_ = Activity::kHold;
   Activity links_activity_ = Activity::kHold;
-  std::int32_t tick_ = 0;       // of the activity, saturates
-  std::int32_t com_tick_ = 0;   // of the plan of the centre of mass, likewise
-  std::int32_t turn_tick_ = 0;  // of the swing, when the retreat began
+  std::int32_t tick_ = 0;        // of the activity, saturates
+  std::int32_t torso_tick_ = 0;  // of the torso's plan, likewise
+  std::int32_t com_tick_ = 0;    // of the plan of the centre of mass, likewise
+  std::int32_t turn_tick_ = 0;   // of the swing, when the retreat began
   std::int32_t shift_ticks_ = 0;
   std::int32_t shifts_ = 0;  // since the last swing
   Obstruction waiting_for_ = Obstruction::kNone;

@@ -41,7 +41,7 @@ struct StepParams {
   std::int32_t floor_swing_ticks = 350;
   ComPlan::Params com;
   double zmp_ahead_m = 0.02;             // in the stance sole, ahead of the ankle
-  double zmp_inward_m = 0.012;           // and towards the other foot
+  double zmp_inward_m = 0.022;           // and towards the other foot
   std::int32_t landing_hold_ticks = 75;  // the foot may land that much late before the weight sets off for it
   std::int32_t lift_hold_ticks = 20;     // and the weight is over the stance foot that long before the other one lifts
   double rise_share = 0.45;              // of a swing onto a tread in which the torso rises, to give the foot room
