@@ -32,7 +32,7 @@ void expect_climbed(const IdealClimb& climb, const ClimbSetup& setup) {
   EXPECT_GT(r.crossing_m, 0.02);
   EXPECT_GT(r.toe_gap_m, 0.02);
   EXPECT_GT(r.com_margin_m, 0.04);
-  EXPECT_LT(r.lateral_off_m, 0.045);  // the weight falls onto the foot and off it again: it is over it half-way
+  EXPECT_LT(r.lateral_off_m, 0.055);  // the weight falls onto the foot and off it again, it never rests there
   EXPECT_LT(r.execution_m, 0.003);
   const double per_stair_s = seconds(r.last_touch_down_ns - r.first_lift_off_ns) / setup.stairs.steps;
   EXPECT_GT(per_stair_s, 2.4);
@@ -443,6 +443,7 @@ TEST(GaitContact, ForceSensorDead_PutsTheFootBackByThePlan) {
     climb.tamper = [&](StateEstimate&, FootholdSet&, JointFeedback& feedback) {
       if (in_swing_onto_tread(climb, nth)) feedback.foot_force_n[index_of(climb.status().step.foot)] = 0.0;
     };
+    SCOPED_TRACE(nth);
     expect_put_back(climb, nth);
   }
 }

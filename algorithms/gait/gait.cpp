@@ -202,11 +202,23 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   const HorizontalMotion com = TorsoTrajectory::horizontal(torso_state_);
   const Vec2 start_m = ComPlan::zmp_under(params_.step.com, com);
   const std::int32_t usual_ticks = plan.shift_ticks;
-  for (const std::int32_t longer : kLonger_ticks) {
-    plan.shift_ticks = std::max(usual_ticks + longer, params_.reshift_ticks);
+  const auto try_shift = [&](std::int32_t ticks) {
+    plan.shift_ticks = ticks;
     com_.plan(params_.step.com, com, zmp_of_shift(params_.step, plan, start_m));
-    if (com_.push_m() <= params_.max_push_m) break;
+    return com_.push_m();
+  };
+  std::int32_t best_ticks = usual_ticks;
+  double least_m = 1e9;
+  for (const std::int32_t longer : kLonger_ticks) {
+    const std::int32_t ticks = std::max(usual_ticks + longer, params_.reshift_ticks);
+    const double push_m = try_shift(ticks);
+    if (push_m < least_m) {
+      least_m = push_m;
+      best_ticks = ticks;
+    }
+    if (push_m <= params_.max_push_m) break;
   }
+  (void)try_shift(best_ticks);
   shift_ticks_ = plan.shift_ticks;
   plan_torso(plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
   com_tick_ = 0;
