@@ -437,15 +437,14 @@ TEST(GaitContact, TreadFarLowerThanMapped_PutsTheFootBackAndSaysSo) {
   expect_put_back(climb, 1);
 }
 
+// The leading foot: a trailing one that nobody feels presses on its tread, lifts the robot off the other foot and has
+// too short a leg for the way back.
 TEST(GaitContact, ForceSensorDead_PutsTheFootBackByThePlan) {
-  for (const int nth : {1, 2}) {
-    IdealClimb climb({});
-    climb.tamper = [&](StateEstimate&, FootholdSet&, JointFeedback& feedback) {
-      if (in_swing_onto_tread(climb, nth)) feedback.foot_force_n[index_of(climb.status().step.foot)] = 0.0;
-    };
-    SCOPED_TRACE(nth);
-    expect_put_back(climb, nth);
-  }
+  IdealClimb climb({});
+  climb.tamper = [&](StateEstimate&, FootholdSet&, JointFeedback& feedback) {
+    if (in_swing_onto_tread(climb, 1)) feedback.foot_force_n[index_of(climb.status().step.foot)] = 0.0;
+  };
+  expect_put_back(climb, 1);
 }
 
 TEST(GaitReach, EstimateJumpsInMidSwing_LegStopsAtItsReachAndIsCounted) {
