@@ -172,7 +172,7 @@ SimOptions few_steps(std::uint64_t seed) {
 }
 
 TEST(PhysicalClimb, WithEverySensorsErrors_ClimbsAndStands) {
-  for (const std::uint64_t seed : {1, 4}) {
+  for (const std::uint64_t seed : {1U, 4U}) {
     PhysicalClimb climb(few_steps(seed));
     climb.run(60.0);
     EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
