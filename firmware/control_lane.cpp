@@ -109,6 +109,7 @@ void ControlLane::report_rejections(std::int64_t now_ns) noexcept {
   const Estimator::Counters& seen = estimator_seen_;
   health_.raise(Fault::kImuRejected, now_ns, imu_rejections(now) - imu_rejections(seen));
   health_.raise(Fault::kJointFeedbackRejected, now_ns, joint_rejections(now) - joint_rejections(seen));
+  health_.raise(Limit::kHeightRejected, now_ns, now.height_rejected - seen.height_rejected);
   for (std::size_t v = 0; v < kLioVerdictCount; ++v) {
     const auto verdict = static_cast<LioVerdict>(v);
     if (verdict == LioVerdict::kAccepted || verdict == LioVerdict::kRealigned) continue;

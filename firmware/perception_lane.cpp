@@ -85,9 +85,10 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
   const Progress progress = extractor_.step(budget);
   if (progress == Progress::kDone) {
     camera_port_.release();
-    const std::uint32_t overflow = extractor_.counters().plane_overflow;
-    health_.raise(Limit::kPlanesFull, now_ns, overflow - overflow_seen_);
-    overflow_seen_ = overflow;
+    const SurfaceExtractor::Counters& now = extractor_.counters();
+    health_.raise(Limit::kRunsFull, now_ns, now.run_overflow - extractor_seen_.run_overflow);
+    health_.raise(Limit::kPlanesFull, now_ns, now.plane_overflow - extractor_seen_.plane_overflow);
+    extractor_seen_ = now;
     if (params_.estimate_mount) learn_mount();
     begin_map();
     stage_ = FrameStage::kWaiting;
@@ -113,6 +114,7 @@ void PerceptionLane::begin_map() noexcept {
   view.world_T_camera = exposure_state_.world_T_base() * mount_.base_T_camera();
   view.position_sigma_m = exposure_state_.position_sigma_m.maxCoeff();
   view.tilt_sigma_rad = exposure_state_.tilt_sigma_rad;
+  if (params_.estimate_mount) view.mount_sigma_rad = mount_.tilt_sigma_rad();  // else the data sheet is believed
   view.intrinsics = intrinsics_;
   view.body = body_;
   view.body_margin = body_margin(params_.body, params_.legs, params_.mount.prior_tilt_sigma_rad);

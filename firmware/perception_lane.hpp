@@ -49,10 +49,10 @@ class PerceptionLane {
   bool searching_ = false;
   DepthFrameView frame_;
   StateEstimate exposure_state_;
-  std::array<LegShapes, kFootCount> body_{};  // camera frame, at the exposure
-  std::int64_t last_frame_ns_ = -1;           // taken; from the start until there is one
-  std::uint32_t request_ = 0;                 // number of the last pose request
-  std::uint32_t overflow_seen_ = 0;           // the stages' counters as last reported
+  std::array<LegShapes, kFootCount> body_{};   // camera frame, at the exposure
+  std::int64_t last_frame_ns_ = -1;            // taken; from the start until there is one
+  std::uint32_t request_ = 0;                  // number of the last pose request
+  SurfaceExtractor::Counters extractor_seen_;  // the stages' counters as last reported
   std::uint32_t map_full_seen_ = 0;
   SurfaceExtractor extractor_;
   MountEstimator mount_;

@@ -46,7 +46,9 @@ enum class Limit : std::uint8_t {
   kReachLimited,     // a leg could not reach the pose asked for
   kContactEarly,     // a foot touched before its planned time
   kContactLate,
-  kEnd,  // not a limit
+  kRunsFull,        // runs, intervals and pairs of planes of a frame that found no room
+  kHeightRejected,  // a mapped tread's height that disagrees with the sole that landed on it
+  kEnd,             // not a limit
 };
 
 template <typename Code>
@@ -77,8 +79,8 @@ inline constexpr std::array<std::string_view, kCodeCount<Fault>> kFaultNames{"fr
                                                                              "state_stale",
                                                                              "gait_stopped"};
 inline constexpr std::array<std::string_view, kCodeCount<Limit>> kLimitNames{
-    "row_shed",          "row_deferred",   "frame_caught_up", "planes_full",   "map_full",
-    "state_ring_missed", "depth_unplaced", "reach_limited",   "contact_early", "contact_late"};
+    "row_shed",       "row_deferred",  "frame_caught_up", "planes_full",  "map_full",  "state_ring_missed",
+    "depth_unplaced", "reach_limited", "contact_early",   "contact_late", "runs_full", "height_rejected"};
 static_assert(!kFaultNames.back().empty() && !kLimitNames.back().empty(), "a code without a name");
 
 // "unknown" outside the enumeration.

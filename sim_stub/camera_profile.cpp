@@ -4,51 +4,95 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
+#include <filesystem>
+#include <iomanip>
+#include <limits>
+#include <sstream>
 #include <string_view>
 #define TOML_EXCEPTIONS 0
 #include <toml++/toml.h>
 
+#include "sim_stub/frame_extraction.hpp"
+
 namespace polygmap::sim {
 namespace {
+
+// What a camera file may say: beyond these bounds the plane extraction refuses, or what it makes means nothing.
+struct Key {
+  std::string_view name;
+  double least, most;
+  double otherwise;  // NaN: required
+};
+constexpr double kRequired = std::numeric_limits<double>::quiet_NaN();
+constexpr DepthSigma kNoise;
+constexpr Key kWidth{"width", polygmap_frames::kLeastSide_px, polygmap_frames::kMaxWidth_px, kRequired};
+constexpr Key kHeight{"height", polygmap_frames::kLeastSide_px, polygmap_frames::kMaxHeight_px, kRequired};
+constexpr Key kFx{"fx", 1.0, 1e5, kRequired};
+constexpr Key kFy{"fy", 1.0, 1e5, kRequired};
+constexpr Key kCx{"cx", -1e5, 1e5, kRequired};
+constexpr Key kCy{"cy", -1e5, 1e5, kRequired};
+constexpr Key kDepthUnit{"depth_unit_m", 1e-6, 0.1, kRequired};
+constexpr Key kMinDepth{"min_depth_m", 0.001, 1000.0, 0.2};
+constexpr Key kMaxDepth{"max_depth_m", 0.001, 1000.0, 6.0};
+constexpr Key kNoiseBase{"noise_base_m", 1e-6, 1.0, kNoise.base_m};
+constexpr Key kNoisePerMetre{"noise_per_metre", 0.0, 1.0, kNoise.per_metre};
+constexpr Key kNoiseQuadratic{"noise_quadratic_per_m", 0.0, 1.0, kNoise.quadratic_per_m};
+constexpr Key kCorrelatedShare{"noise_correlated_share", 0.0, 1.0, kNoise.correlated_share};
+constexpr Key kCorrelated{"noise_correlated_px", 1.0, 1e6, kNoise.correlated_px};
+constexpr std::array kKeys{kWidth,
+                           kHeight,
+                           kFx,
+                           kFy,
+                           kCx,
+                           kCy,
+                           kDepthUnit,
+                           kMinDepth,
+                           kMaxDepth,
+                           kNoiseBase,
+                           kNoisePerMetre,
+                           kNoiseQuadratic,
+                           kCorrelatedShare,
+                           kCorrelated};
+
+std::string text(double number) {
+  std::ostringstream out;
+  out << std::setprecision(10) << number;
+  return out.str();
+}
 
 class CameraFile {
  public:
   explicit CameraFile(const std::string& path) : path_(path), parsed_(toml::parse_file(path)) {
+    if (std::filesystem::is_directory(path)) fail("it is a folder");
     if (!parsed_) {
       throw FileError("Cannot read the camera file \"" + path + "\": " + std::string(parsed_.error().description()) +
                       ".");
     }
-    constexpr std::array<std::string_view, 14> kKeys{"width",
-                                                     "height",
-                                                     "fx",
-                                                     "fy",
-                                                     "cx",
-                                                     "cy",
-                                                     "depth_unit_m",
-                                                     "min_depth_m",
-                                                     "max_depth_m",
-                                                     "noise_base_m",
-                                                     "noise_per_metre",
-                                                     "noise_quadratic_per_m",
-                                                     "noise_correlated_share",
-                                                     "noise_correlated_px"};
-    for (const auto& [key, value] : parsed_.table()) {
-      if (std::find(kKeys.begin(), kKeys.end(), key.str()) == kKeys.end()) {
-        fail(std::string(key.str()) + " is no key of a camera.");
+    for (const auto& entry : parsed_.table()) {
+      const std::string_view name = entry.first.str();
+      if (std::none_of(kKeys.begin(), kKeys.end(), [name](const Key& key) { return key.name == name; })) {
+        fail("\"" + std::string(name) + "\" is no key of a camera");
       }
     }
   }
-  [[noreturn]] void fail(const std::string& what) const { throw FileError("Camera file \"" + path_ + "\": " + what); }
-  [[nodiscard]] double number(const char* key, std::optional<double> otherwise = {}) const {
-    const toml::node* node = parsed_.table().get(key);
-    if (node == nullptr) {
-      if (otherwise) return *otherwise;
-      throw FileError("Camera file \"" + path_ + "\" has no " + key + ".");
+  [[noreturn]] void fail(const std::string& what) const {
+    throw FileError("Camera file \"" + path_ + "\": " + what + ".");
+  }
+  [[nodiscard]] double number(const Key& key) const {
+    const std::string name(key.name);
+    const toml::node* node = parsed_.table().get(key.name);
+    if (node == nullptr && std::isnan(key.otherwise)) fail(name + " is missing");
+    if (node != nullptr && !node->is_number()) fail(name + " must be a number");
+    const double value = node == nullptr ? key.otherwise : *node->value<double>();
+    if (!(value >= key.least && value <= key.most)) {
+      fail(name + " must be from " + text(key.least) + " to " + text(key.most) + ", not " + text(value));
     }
-    const auto value = node->value<double>();
-    if (!value || !std::isfinite(*value)) fail(std::string(key) + " must be a finite number.");
-    return *value;
+    return value;
+  }
+  [[nodiscard]] std::int32_t whole(const Key& key) const {
+    const double value = number(key);
+    if (value != std::floor(value)) fail(std::string(key.name) + " must be a whole number, not " + text(value));
+    return static_cast<std::int32_t>(value);
   }
 
  private:
@@ -61,34 +105,18 @@ class CameraFile {
 CameraProfile read_camera(const std::string& path) {
   const CameraFile file(path);
   CameraProfile camera;
-  CameraIntrinsics& k = camera.intrinsics;
-  const double width = file.number("width"), height = file.number("height");
-  if (width < 32 || height < 32 || width > kDepthWidth_px || height > kDepthHeight_px) {
-    file.fail("pictures from 32x32 to " + std::to_string(kDepthWidth_px) + "x" + std::to_string(kDepthHeight_px) +
-              " are read, not " + std::to_string(std::lround(width)) + "x" + std::to_string(std::lround(height)) + ".");
+  camera.intrinsics = {file.whole(kWidth), file.whole(kHeight), file.number(kFx),       file.number(kFy),
+                       file.number(kCx),   file.number(kCy),    file.number(kDepthUnit)};
+  camera.min_depth_m = file.number(kMinDepth);
+  camera.max_depth_m = file.number(kMaxDepth);
+  camera.noise = {file.number(kNoiseBase), file.number(kNoisePerMetre), file.number(kNoiseQuadratic),
+                  file.number(kCorrelatedShare), file.number(kCorrelated)};
+  if (!(camera.min_depth_m < camera.max_depth_m)) {
+    file.fail("min_depth_m, " + text(camera.min_depth_m) + ", must be less than max_depth_m, " +
+              text(camera.max_depth_m));
   }
-  k.width_px = static_cast<std::int32_t>(width);
-  k.height_px = static_cast<std::int32_t>(height);
-  k.fx_px = file.number("fx");
-  k.fy_px = file.number("fy");
-  k.cx_px = file.number("cx");
-  k.cy_px = file.number("cy");
-  k.depth_unit_m = file.number("depth_unit_m");
-  camera.min_depth_m = file.number("min_depth_m", camera.min_depth_m);
-  camera.max_depth_m = file.number("max_depth_m", camera.max_depth_m);
-  DepthSigma& noise = camera.noise;
-  noise.base_m = file.number("noise_base_m", noise.base_m);
-  noise.per_metre = file.number("noise_per_metre", noise.per_metre);
-  noise.quadratic_per_m = file.number("noise_quadratic_per_m", noise.quadratic_per_m);
-  noise.correlated_share = file.number("noise_correlated_share", noise.correlated_share);
-  noise.correlated_px = file.number("noise_correlated_px", noise.correlated_px);
-  if (!(k.fx_px > 1.0) || !(k.fy_px > 1.0) || !(k.depth_unit_m > 0.0) || !(noise.base_m > 0.0) ||
-      !(noise.per_metre >= 0.0) || !(noise.quadratic_per_m >= 0.0) || !(camera.min_depth_m > 0.0) ||
-      !(camera.max_depth_m > camera.min_depth_m)) {
-    file.fail("focal lengths, depth unit, noise and depth range must be positive.");
-  }
-  if (!(noise.correlated_share >= 0.0 && noise.correlated_share <= 1.0) || !(noise.correlated_px >= 1.0)) {
-    file.fail("noise_correlated_share must be from 0 to 1, noise_correlated_px at least 1.");
+  if (const double most_m = 65534.0 * camera.intrinsics.depth_unit_m; camera.min_depth_m > most_m) {
+    file.fail("16 bits of depth_unit_m reach " + text(most_m) + " m, less than min_depth_m");
   }
   return camera;
 }

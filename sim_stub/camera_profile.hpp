@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "algorithms/perception/depth_sigma.hpp"
 #include "algorithms/perception/images.hpp"
 
 namespace polygmap::sim {

@@ -91,6 +91,7 @@ SimOptions sim_options(const ClimbOptions& options) {
     sim.intrinsics = options.camera->intrinsics;
     sim.depth_sigma = options.camera->noise;
   }
+  sim.force_sensors = !options.infer_contacts;
   if (options.blank_depth) sim.camera.blank = {{0, INT64_MAX}};
   return sim;
 }
@@ -136,11 +137,12 @@ std::vector<ScheduleRow> schedule_of(const Executive& executive, const TimedPipe
   return rows;
 }
 
-CameraFigures camera_figures(const ClimbOptions& options, const RobotErrors& errors, const MountEstimator& mount) {
+CameraFigures camera_figures(const SimRobot& robot, const MountEstimator& mount) {
   constexpr double kDegrees = 180.0 / kPi;
+  const RobotErrors& errors = robot.errors();
   const Mat3 turn = errors.base_T_camera.R * base_T_camera().R.transpose();
   CameraFigures f;
-  f.scan_ms = options.scan_ms;
+  f.scan_ms = 1e3 * robot.depth_camera().scan_s();
   f.scale_error = errors.depth_scale - 1.0;
   f.mount_error_deg = kDegrees * Vec3{std::atan2(turn(2, 1), turn(2, 2)), -std::asin(turn(2, 0)), yaw_of(turn)};
   f.mount_error_m = errors.base_T_camera.p_m - base_T_camera().p_m;
@@ -172,6 +174,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   SimRobot robot(sim_options(options));
   Params params;
   params.self_filter = options.self_filter;
+  params.estimator.infer_forces = options.infer_contacts;
   params.estimate_mount = options.estimate_mount;
   if (options.camera) {
     params.surfaces.noise = options.camera->noise;
@@ -213,10 +216,8 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   }
 
   RunFigures figures;
-  figures.gait = options.gait;
-  figures.plant = options.plant == PlantKind::kMujoco ? "mujoco" : "kinematic";
-  figures.seed = options.seed;
-  figures.camera = camera_figures(options, robot.errors(), pipeline.perception().mount());
+  figures.options = options;
+  figures.camera = camera_figures(robot, pipeline.perception().mount());
   figures.heap_calls = heap::report().calls;
   figures.faults = raised(module->pipeline->health());
   figures.heap_first_caller = heap::report().first_caller;

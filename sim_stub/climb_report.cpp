@@ -267,6 +267,7 @@ void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     const Transform& true_T_sole = truth.true_T_sole[foot];
     if (!truth.in_contact[foot]) {
+      swung_ = true;
       if (!flights_[foot]) flights_[foot] = Flight{last_step_[foot], truth.stamp_ns, {}};
       flights_[foot]->true_T_sole.push_back(true_T_sole);
       standing_footstep_[foot] = -1;
@@ -327,6 +328,7 @@ void ClimbReport::observe_trails(const Truth& truth) {
 }
 
 double ClimbReport::clearance_min_m() const {
+  if (!swung_) return kNotMeasured;  // the feet stand clear of the stairs, which says nothing
   double least_m = clearance_min_m_;
   for (const std::optional<Flight>& flight : flights_) {
     // The run ended in the air: the module's word tells which tread was meant.
@@ -365,9 +367,7 @@ void ClimbReport::judge(ClimbSummary& s, const std::string& heap_first_caller) c
 
 ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   ClimbSummary s;
-  s.plant = run.plant;
-  s.gait = run.gait;
-  s.seed = run.seed;
+  s.options = run.options;
   s.camera = run.camera;
   s.fell = fell_;
   s.steps_total = static_cast<int>(world_.steps.size());

@@ -23,9 +23,7 @@ namespace polygmap::sim {
 
 // What the run knows beside truth and telemetry.
 struct RunFigures {
-  std::string gait = "ds";
-  std::string plant = "kinematic";
-  std::uint64_t seed = 1;
+  ClimbOptions options;
   CameraFigures camera;
   std::uint64_t heap_calls = 0;
   std::vector<std::pair<std::string, std::uint32_t>> faults;  // raised faults and limits by name
@@ -124,6 +122,7 @@ class ClimbReport {
   bool flight_onto_tread_ = false;
   std::array<int, kFootCount> last_step_{-1, -1};
   std::array<int, kFootCount> standing_footstep_{-1, -1};  // index into footsteps_ of what each sole stands on
+  bool swung_ = false;
   double sole_margin_min_m_ = kNotMeasured;
   double clearance_min_m_ = std::numeric_limits<double>::infinity();
   double stand_off_m_ = kNotMeasured;

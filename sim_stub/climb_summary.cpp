@@ -48,6 +48,28 @@ Json footstep_json(const Footstep& f) {
           {"target_last_seen_ms", ms(f.target_last_seen_ms)}};
 }
 
+// What the command line said beside gait and seed, defaults included: enough to run it again.
+Json arguments_json(const ClimbOptions& o) {
+  const StairParams& stairs = o.stairs;
+  return {{"steps", stairs.steps},
+          {"rise_m", stairs.rise_m},
+          {"tread_m", stairs.tread_m},
+          {"width_m", stairs.width_m},
+          {"nosing_m", stairs.nosing_m},
+          {"landing_m", stairs.landing_m},
+          {"noise", o.noise == DepthNoise::kWhite ? "white" : "correlated"},
+          {"camera", o.camera ? Json(o.camera_file) : Json(nullptr)},
+          {"scan_ms", o.scan_ms},
+          {"mount_error_deg", o.mount_error_deg},
+          {"scale_error", o.scale_error},
+          {"estimate_mount", o.estimate_mount},
+          {"self_filter", o.self_filter},
+          {"contacts", o.infer_contacts ? "inferred" : "sensed"},
+          {"render_shift_m", {o.render_dx_m, o.render_dy_m, o.render_dz_m}},
+          {"render_missing_step", o.render_missing_step < 0 ? Json(nullptr) : Json(o.render_missing_step + 1)},
+          {"blank_depth", o.blank_depth}};
+}
+
 std::string format(const char* text, double a, double b) {
   char buffer[160];
   std::snprintf(buffer, sizeof buffer, text, a, b);
@@ -70,9 +92,10 @@ Json to_json(const ClimbSummary& s) {
   j["reason"] = s.reason;
   j["fell"] = s.fell;
   j["ended_by"] = s.ended_by;
-  j["plant"] = s.plant;
-  j["gait"] = s.gait;
-  j["seed"] = s.seed;
+  j["plant"] = name_of(s.options.plant);
+  j["gait"] = s.options.gait;
+  j["seed"] = s.options.seed;
+  j["arguments"] = arguments_json(s.options);
   const CameraFigures& camera = s.camera;
   const auto degrees = [](double x) { return rounded(x, 1e3); };
   j["camera"] = {

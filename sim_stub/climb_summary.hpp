@@ -12,6 +12,7 @@
 
 #include "algorithms/core/samples.hpp"
 #include "algorithms/core/transform.hpp"
+#include "sim_stub/climb_options.hpp"
 
 namespace polygmap::sim {
 
@@ -59,7 +60,7 @@ struct StageBytes {
 
 // What this seed's camera is like, and what the module found out about its mount.
 struct CameraFigures {
-  double scan_ms = 0.0;
+  double scan_ms = 0.0;                 // as simulated
   double scale_error = 0.0;             // true depth is read as 1 + this
   Vec3 mount_error_deg = Vec3::Zero();  // roll, pitch, yaw in the base, against the data sheet
   Vec3 mount_error_m = Vec3::Zero();    // base frame
@@ -72,9 +73,7 @@ struct ClimbSummary {
   std::string reason;  // one sentence
   bool fell = false;
   std::string ended_by;  // "module": by itself; "fall"; "time limit"
-  std::string plant;
-  std::string gait;
-  std::uint64_t seed = 0;
+  ClimbOptions options;
   CameraFigures camera;
   int steps_total = 0;
   int steps_climbed = 0;  // both true soles rested on it at once, inside its edges

@@ -33,6 +33,7 @@ enum class Stream : std::uint64_t {
   kDepthWarp,
   kTables,
   kCameraMount,
+  kTorques,
 };
 
 // Finaliser of SplitMix64 (Steele, Lea, Flood 2014): a bijection that passes the usual statistical batteries.

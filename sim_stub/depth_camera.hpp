@@ -32,7 +32,8 @@ struct DepthCameraOptions {
   Vec3 stairs_shift_m = Vec3::Zero();  // of the rendered staircase against the true one; the floor stays
   int missing_step = -1;               // index of a step that the camera does not see: an open hole down to the floor
   bool legs_visible = true;
-  // From the first row of a picture to its last, to the nearest 4 ms; the stamp is their middle. The L515 scans.
+  // From the first row of a picture to its last; the stamp is their middle, and both ends are ticks: scan_s() is what
+  // becomes of it. The L515 scans.
   double scan_s = 0.016;
   std::vector<Window> blank;   // frames exposed then have no valid pixel
   std::vector<Window> silent;  // frames exposed then never arrive
@@ -58,6 +59,7 @@ class SimDepthCamera {
   void tick(std::int64_t tick, const Transform& true_T_base, const std::array<LegShapes, kFootCount>& base_legs);
 
   [[nodiscard]] const CameraIntrinsics& intrinsics() const noexcept { return renderer_.intrinsics(); }
+  [[nodiscard]] double scan_s() const noexcept { return seconds(2 * half_scan_ticks_ * VirtualClock::kTick_ns); }
   [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept;
   void release() noexcept;
   [[nodiscard]] std::uint32_t overwritten() const noexcept { return overwritten_; }  // arrived, but never acquired

@@ -8,7 +8,8 @@ namespace polygmap::sim {
 namespace {
 
 constexpr std::size_t kWhiteCount = 1U << 19U;
-constexpr std::size_t kFieldSide = 1024;  // leaves 384 x 544 places for a 640 x 480 window
+constexpr std::size_t kFieldSide = 1024;        // leaves 384 x 544 places for a 640 x 480 window
+constexpr double kFieldNeighbours = 8.0 / 9.0;  // correlation of neighbours in it
 constexpr double kDropout = 0.05;
 constexpr float kMixed = 0.4F;  // of the pixels at a jump
 constexpr float kJump_mm = 30.0F;
@@ -138,8 +139,13 @@ struct RowSources {
 struct SigmaOfDepth {
   float base_mm, slope, quadratic_per_mm;
 };
+// Of unit variance together.
+struct NoiseMix {
+  float white, field;
+};
 
-void add_noise(const RowSources& s, const SigmaOfDepth& sigma, float* __restrict depth_mm, int width, float strength) {
+void add_noise(const RowSources& s, const SigmaOfDepth& sigma, const NoiseMix& mix, float* __restrict depth_mm,
+               int width, float strength) {
   constexpr float kLeastCosine = 0.258819045F;  // 75 degrees
   const float* __restrict z_mm = s.z_mm, * __restrict white = s.white, * __restrict warp = s.warp_mm;
   const float* __restrict inverse = s.inverse_depth, * __restrict plane = s.plane_distance, * __restrict length = s.inverse_length;
@@ -154,7 +160,7 @@ void add_noise(const RowSources& s, const SigmaOfDepth& sigma, float* __restrict
   const float* __restrict field = s.field;
   for (int u = 0; u < width; ++u) {
     const float cosine = std::max(plane[u] * inverse[u] * length[u], kLeastCosine);
-    const float noise = 0.5F * white[u] + 0.87F * field[u];
+    const float noise = mix.white * white[u] + mix.field * field[u];
     depth_mm[u] = z_mm[u] + strength * noise * (base + (slope + quadratic * z_mm[u]) * z_mm[u]) / cosine + warp[u];
   }
 }
@@ -263,6 +269,8 @@ void DepthNoiseModel::apply(const DepthRenderer& picture, std::uint64_t frame, d
   const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
   const SigmaOfDepth sigma{static_cast<float>(1e3 * params_.sigma.base_m), static_cast<float>(params_.sigma.per_metre),
                            static_cast<float>(1e-3 * params_.sigma.quadratic_per_m)};
+  const double field_share = std::min(1.0, params_.sigma.correlated_share / kFieldNeighbours);
+  const NoiseMix mix{static_cast<float>(std::sqrt(1.0 - field_share)), static_cast<float>(std::sqrt(field_share))};
   if (correlated) prepare_warp(time_s);
 
   const std::size_t places_x = kFieldSide - w, places_y = kFieldSide - h;
@@ -292,7 +300,7 @@ void DepthNoiseModel::apply(const DepthRenderer& picture, std::uint64_t frame, d
       if (correlated) warp_row(v);
       add_noise({z_row_.data(), picture.inverse_depth(v), picture.plane_distance(v), picture.inverse_length(v),
                  tables_->white.data() + at, correlated ? field + row * kFieldSide : nullptr, warp_row_.data()},
-                sigma, depth_row_.data(), width, static_cast<float>(params_.strength));
+                sigma, mix, depth_row_.data(), width, static_cast<float>(params_.strength));
       find_jumps(z_row_.data(), z_below_row_.data(), jump_.data(), width);
       mix_edges(frame, v, z_row_.data(), z_below_row_.data());
     }

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "algorithms/perception/images.hpp"
+#include "algorithms/perception/depth_sigma.hpp"
 #include "sim_stub/counter_noise.hpp"
 #include "sim_stub/depth_renderer.hpp"
 #include "sim_stub/noise_kind.hpp"
@@ -16,9 +16,9 @@ namespace polygmap::sim {
 struct DepthNoiseTables;
 
 // sigma = (1 + 1.5 z) mm / cos(incidence) unless told otherwise, clamped at 75 degrees. Correlated noise adds spatial
-// correlation, dropouts in blobs, and a slow warp of which half the variance is the seed's and half is redrawn with 0.5
-// s correlation. Random values come from fixed tables read at random offsets per frame (correlated) or per row (white):
-// one load a pixel.
+// correlation over 9 px (of the variance neighbours share the sigma's correlated_share, 8/9 at most), dropouts in
+// blobs, and a slow warp of which half the variance is the seed's and half is redrawn with 0.5 s correlation. Random
+// values come from fixed tables read at random offsets per frame (correlated) or per row (white): one load a pixel.
 class DepthNoiseModel {
  public:
   struct Params {

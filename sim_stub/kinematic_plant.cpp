@@ -64,11 +64,27 @@ KinematicPlant::KinematicPlant(const Params& params, const StairWorld& world, co
     feet_[f].base_offset.p_rate.setZero();
     feet_[f].base_offset.turn_rate.setZero();
   }
+  load_drives();
 }
 
 double KinematicPlant::foot_force_n(std::size_t foot) const noexcept {
   constexpr double kTouch_n = 30.0;  // least force of a sole that touches
   return feet_[foot].anchored ? std::max(kTouch_n, load_share(foot) * kRobotWeight_n) : 0.0;
+}
+
+// The foot's force, at the middle of its sole, through the Jacobian.
+void KinematicPlant::load_drives() {
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    const auto leg = static_cast<Foot>(f);
+    const LegVector q = leg_joints(true_q_rad(), leg);
+    const Vec3 base_f = true_T_base_.R.transpose() * Vec3{0, 0, foot_force_n(f)};
+    const Vec3 base_r = kContactRectangle.centre_x_m() * base_T_sole(errors_.legs[f], leg, q).R.col(0);
+    Eigen::Matrix<double, 6, 1> wrench;
+    wrench.head<3>() = base_f;
+    wrench.tail<3>() = base_r.cross(base_f);
+    tau_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
+        -leg_jacobian(errors_.legs[f], leg, q).transpose() * wrench;
+  }
 }
 
 void KinematicPlant::step(const JointCommand& command) {
@@ -88,6 +104,7 @@ void KinematicPlant::step(const JointCommand& command) {
   lift_feet();
   move_base();
   move_swing_feet();
+  load_drives();
   check_falls();
 }
 

@@ -77,6 +77,7 @@ class KinematicPlant final : public Plant {
   void lift_feet();
   void move_base();
   void move_swing_feet();
+  void load_drives();
   void check_falls();
   [[nodiscard]] Transform blend() const;
   [[nodiscard]] double gap_m(std::size_t foot) const;  // of its sole above its anchor, on the other leg's base
@@ -87,7 +88,8 @@ class KinematicPlant final : public Plant {
   const RobotErrors& errors_;
   std::vector<SolidBox> solids_;
   std::array<FootState, kFootCount> feet_;
-  JointVector q_, dq_ = JointVector::Zero(), tau_ = JointVector::Zero();
+  JointVector q_, dq_ = JointVector::Zero();
+  JointVector tau_ = JointVector::Zero();  // of massless legs that stand, quasi-static
   Transform true_T_base_;
   Slack slack_;
   double share_ = 0.5, share_rate_ = 0.0;  // of the left foot

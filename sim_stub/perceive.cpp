@@ -10,23 +10,37 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 namespace polygmap::sim {
 namespace {
 
 using Json = nlohmann::ordered_json;
+using polygmap_frames::Kind;
 constexpr double kMinLevelArea_m2 = 0.02;
 
 [[noreturn]] void fail(const std::string& sentence) { throw FileError(sentence); }
 
 Json point(const Vec3& p) { return Json::array({p.x(), p.y(), p.z()}); }
 
+// What is a surface's own; the rest is its plane's.
+Json piece(const Surface& surface) {
+  Json j;
+  j["centroid"] = point(surface.centroid_m);
+  j["area_m2"] = surface.area_m2;
+  j["invalid_fraction"] = surface.invalid_fraction;
+  j["polygon"] = Json::array();
+  for (const Vec3& v : surface.polygon_m) j["polygon"].push_back(point(v));
+  j["nosing"] = surface.nosing_m ? Json::array({point((*surface.nosing_m)[0]), point((*surface.nosing_m)[1])}) : Json();
+  return j;
+}
+
 void save(const std::string& path, const std::vector<unsigned char>& bytes) {
   if (lodepng::save_file(bytes, path) != 0) fail("Cannot write \"" + path + "\".");
 }
 
 // Of the normal and d of m = -normal / d, from that of m.
-Eigen::Matrix4d plane_covariance(const SurfacePatch& surface) {
+Eigen::Matrix4d plane_covariance(const Surface& surface) {
   const Vec3& n = surface.normal;
   Eigen::Matrix<double, 4, 3> jacobian;
   jacobian.topRows<3>() = -surface.d_m * (Mat3::Identity() - n * n.transpose());
@@ -36,14 +50,29 @@ Eigen::Matrix4d plane_covariance(const SurfacePatch& surface) {
 
 class Extraction {
  public:
-  Extraction(const CameraProfile& camera, const DepthPng& picture) : picture_(picture) {
-    params_.noise = camera.noise;
-    params_.noise_gain = 0.5;
-    params_.limits.min_depth_m = camera.min_depth_m;
-    params_.limits.max_depth_m = camera.max_depth_m;
-    extractor_->configure(params_);
-    view_.intrinsics = camera.intrinsics;
-    view_.body_margin = {};
+  Extraction(const CameraProfile& profile, const DepthPng& picture) {
+    const CameraIntrinsics& k = profile.intrinsics;
+    const DepthSigma& noise = profile.noise;
+    // Whole columns of four pixels and pairs of rows: what is left over at the right and below is not looked at.
+    camera_ = {k.width_px / 4 * 4,
+               k.height_px / 2 * 2,
+               k.fx_px,
+               k.fy_px,
+               k.cx_px,
+               k.cy_px,
+               k.depth_unit_m,
+               profile.min_depth_m,
+               profile.max_depth_m,
+               noise.base_m,
+               noise.per_metre,
+               noise.quadratic_per_m,
+               noise.correlated_share,
+               noise.correlated_px};
+    for (std::int32_t r = 0; r < camera_.height_px; ++r) {
+      const auto row = picture.depth.begin() + static_cast<std::ptrdiff_t>(r) * picture.width_px;
+      depth_.insert(depth_.end(), row, row + camera_.width_px);
+    }
+    extractor_ = holds(camera_) ? make_extractor(camera_) : polygmap_1024x768::make_extractor(camera_);
   }
   // A camera delivers many frames; here one has to say by itself how noisy it is.
   void settle_noise(const Vec3& up) {
@@ -54,39 +83,29 @@ class Extraction {
       static_cast<void>(run(up));
       if (std::abs(extractor_->noise_scale() - before) < kSettled * before) break;
     }
-    params_.noise_gain = 0.0;
-    extractor_->configure(params_);
+    extractor_->hold_noise_scale();
   }
   double run(const Vec3& up) {
-    view_.camera_up = up;
-    const DepthFrameView frame{++stamp_, static_cast<std::uint32_t>(stamp_), picture_.width_px, picture_.height_px,
-                               picture_.depth.data()};
-    const auto start = std::chrono::steady_clock::now();
-    if (!extractor_->try_begin(frame, view_)) {
-      fail("The camera file's intrinsics are out of range: focal lengths must be above 1 px, the size from 32x32 to " +
-           std::to_string(kDepthWidth_px) + "x" + std::to_string(kDepthHeight_px) + " and even.");
-    }
-    for (Progress progress = Progress::kBusy; progress == Progress::kBusy;) {
-      WorkBudget budget(SurfaceExtractor::kMaxUnitsPerFrame);
-      progress = extractor_->step(budget);
-    }
-    return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count();
+    const std::optional<double> microseconds = extractor_->extract(depth_.data(), up);
+    if (!microseconds) fail("The plane extraction refuses this camera or gravity.");
+    return *microseconds;
   }
-  [[nodiscard]] const SurfaceExtractor& extractor() const { return *extractor_; }
+  [[nodiscard]] std::vector<Surface> surfaces() const { return extractor_->surfaces(); }
+  [[nodiscard]] std::size_t surface_at(std::int32_t column, std::int32_t row) const {
+    return column < camera_.width_px && row < camera_.height_px ? extractor_->surface_at(column, row) : 0U;
+  }
 
  private:
-  const DepthPng& picture_;
-  SurfaceExtractor::Params params_;
-  SurfaceExtractor::View view_;
-  std::int64_t stamp_ = 0;
-  std::unique_ptr<SurfaceExtractor> extractor_ = std::make_unique<SurfaceExtractor>();
+  polygmap_frames::Camera camera_;
+  std::vector<std::uint16_t> depth_;
+  std::unique_ptr<polygmap_frames::Extractor> extractor_;
 };
 
 // The normal of the largest surface that faces upwards in the picture.
-std::optional<Vec3> find_up(const SurfaceFrame& frame) {
+std::optional<Vec3> find_up(const std::vector<Surface>& surfaces) {
   std::optional<Vec3> up;
   double most_m2 = kMinLevelArea_m2;
-  for (const SurfacePatch& surface : frame.surfaces) {
+  for (const Surface& surface : surfaces) {
     if (surface.normal.y() > -0.35 || std::abs(surface.normal.x()) > 0.5 || surface.area_m2 < most_m2) continue;
     most_m2 = surface.area_m2;
     up = surface.normal;
@@ -96,9 +115,14 @@ std::optional<Vec3> find_up(const SurfaceFrame& frame) {
 
 }  // namespace
 
+std::string size_text(std::int64_t width, std::int64_t height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
 DepthPng read_depth(const std::string& path) {
   std::vector<unsigned char> file;
   if (lodepng::load_file(file, path) != 0) fail("Cannot read the picture \"" + path + "\".");
+  if (file.empty()) fail("The picture \"" + path + "\" is empty.");
   lodepng::State state;
   unsigned width = 0, height = 0;
   if (const unsigned error = lodepng_inspect(&width, &height, &state, file.data(), file.size()); error != 0) {
@@ -106,6 +130,10 @@ DepthPng read_depth(const std::string& path) {
   }
   if (state.info_png.color.colortype != LCT_GREY || state.info_png.color.bitdepth != 16) {
     fail("\"" + path + "\" is no depth picture: it must be a PNG of one channel of 16 bits.");
+  }
+  if (width > polygmap_frames::kMaxWidth_px || height > polygmap_frames::kMaxHeight_px) {  // before memory is taken
+    fail("\"" + path + "\" is " + size_text(width, height) + ", more than the " +
+         size_text(polygmap_frames::kMaxWidth_px, polygmap_frames::kMaxHeight_px) + " that are read.");
   }
   state.info_raw.colortype = LCT_GREY;
   state.info_raw.bitdepth = 16;
@@ -130,42 +158,29 @@ Perceived perceive(const CameraProfile& camera, const DepthPng& picture, const s
   } else {
     const Vec3 along_the_picture{0.0, -1.0, 0.0};
     static_cast<void>(extraction.run(along_the_picture));
-    const std::optional<Vec3> found = find_up(extraction.extractor().result());
+    const std::optional<Vec3> found = find_up(extraction.surfaces());
     out.up_assumed = !found;
     out.camera_up = found.value_or(along_the_picture);
   }
   extraction.settle_noise(out.camera_up);
   for (int i = 0; i < std::max(repeat, 1); ++i) out.microseconds.push_back(extraction.run(out.camera_up));
 
-  const SurfaceExtractor& extractor = extraction.extractor();
   std::map<std::uint8_t, std::size_t> index_of_plane;
   std::vector<std::uint8_t> label_of_surface{0};
-  std::vector<double> largest_m2;
-  for (const SurfacePatch& surface : extractor.result().surfaces) {
+  for (Surface& surface : extraction.surfaces()) {
     const auto [place, fresh] = index_of_plane.try_emplace(surface.plane, out.planes.size());
     label_of_surface.push_back(static_cast<std::uint8_t>(place->second + 1));
-    if (fresh) {
-      out.planes.emplace_back();
-      largest_m2.push_back(0.0);
-    }
-    PerceivedPlane& plane = out.planes[place->second];
-    plane.area_m2 += surface.area_m2;
-    if (surface.area_m2 <= largest_m2[place->second]) continue;
-    largest_m2[place->second] = surface.area_m2;
-    plane.kind = surface.kind;
-    plane.normal = surface.normal;
-    plane.d_m = surface.d_m;
-    plane.covariance = plane_covariance(surface);
-    plane.centroid_m = surface.centroid_m;
-    plane.rmse_m = surface.rmse_m;
-    plane.invalid_fraction = surface.invalid_fraction;
-    plane.polygon_m.assign(surface.polygon.begin(), surface.polygon.end());
-    plane.nosing = surface.nosing;
+    if (fresh) out.planes.emplace_back();
+    out.planes[place->second].push_back(std::move(surface));
   }
-  out.labels.resize(picture.depth.size());
+  for (PerceivedPlane& plane : out.planes) {
+    std::stable_sort(plane.begin(), plane.end(),
+                     [](const Surface& a, const Surface& b) { return a.area_m2 > b.area_m2; });
+  }
+  out.labels.reserve(picture.depth.size());
   for (std::int32_t r = 0; r < picture.height_px; ++r) {
     for (std::int32_t c = 0; c < picture.width_px; ++c) {
-      out.labels[static_cast<std::size_t>(r * picture.width_px + c)] = label_of_surface[extractor.surface_at(c, r)];
+      out.labels.push_back(label_of_surface[extraction.surface_at(c, r)]);
     }
   }
   return out;
@@ -186,23 +201,24 @@ void write_labels(const std::string& path, const DepthPng& picture, const Percei
 void write_planes(const std::string& path, const Perceived& perceived) {
   Json planes = Json::array();
   for (std::size_t i = 0; i < perceived.planes.size(); ++i) {
-    const PerceivedPlane& p = perceived.planes[i];
+    const PerceivedPlane& pieces = perceived.planes[i];
+    const Surface& largest = pieces.front();
     Json j;
     j["id"] = i + 1;
-    j["kind"] = p.kind == SurfaceKind::kTread ? "tread" : (p.kind == SurfaceKind::kRiser ? "riser" : "other");
-    j["normal"] = point(p.normal);
-    j["d_m"] = p.d_m;
+    j["kind"] = largest.kind == Kind::kTread ? "tread" : (largest.kind == Kind::kRiser ? "riser" : "other");
+    j["normal"] = point(largest.normal);
+    j["d_m"] = largest.d_m;
     j["covariance"] = Json::array();
+    const Eigen::Matrix4d covariance = plane_covariance(largest);
     for (int r = 0; r < 4; ++r) {
-      j["covariance"].push_back({p.covariance(r, 0), p.covariance(r, 1), p.covariance(r, 2), p.covariance(r, 3)});
+      j["covariance"].push_back({covariance(r, 0), covariance(r, 1), covariance(r, 2), covariance(r, 3)});
     }
-    j["centroid"] = point(p.centroid_m);
-    j["area_m2"] = p.area_m2;
-    j["rmse_mm"] = 1e3 * p.rmse_m;
-    j["invalid_fraction"] = p.invalid_fraction;
-    j["polygon"] = Json::array();
-    for (const Vec3& v : p.polygon_m) j["polygon"].push_back(point(v));
-    j["nosing"] = p.nosing.valid ? Json::array({point(p.nosing.a_m), point(p.nosing.b_m)}) : Json();
+    j["rmse_mm"] = 1e3 * largest.rmse_m;
+    j.update(piece(largest));
+    j["area_m2"] = std::accumulate(pieces.begin(), pieces.end(), 0.0,
+                                   [](double sum, const Surface& s) { return sum + s.area_m2; });
+    j["pieces"] = Json::array();
+    for (const Surface& s : pieces) j["pieces"].push_back(piece(s));
     planes.push_back(j);
   }
   std::ofstream file(path);
@@ -239,11 +255,13 @@ void write_picture(const std::string& path, const CameraProfile& camera, const D
       }
     }
   };
-  for (const PerceivedPlane& plane : perceived.planes) {
-    for (std::size_t i = 0; i < plane.polygon_m.size(); ++i) {
-      draw(plane.polygon_m[i], plane.polygon_m[(i + 1) % plane.polygon_m.size()], {255, 255, 255});
+  for (const PerceivedPlane& pieces : perceived.planes) {
+    for (const Surface& s : pieces) {
+      for (std::size_t i = 0; i < s.polygon_m.size(); ++i) {
+        draw(s.polygon_m[i], s.polygon_m[(i + 1) % s.polygon_m.size()], {255, 255, 255});
+      }
+      if (s.nosing_m) draw((*s.nosing_m)[0], (*s.nosing_m)[1], {255, 40, 40});
     }
-    if (plane.nosing.valid) draw(plane.nosing.a_m, plane.nosing.b_m, {255, 40, 40});
   }
   std::vector<unsigned char> bytes;
   const unsigned error = lodepng::encode(bytes, rgb, static_cast<unsigned>(picture.width_px),

@@ -2,14 +2,13 @@
 // The module's plane extraction on depth pictures from files: what `polygmap perceive` does.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "algorithms/perception/surface_extractor.hpp"
 #include "sim_stub/camera_profile.hpp"
+#include "sim_stub/frame_extraction.hpp"
 
 namespace polygmap::sim {
 
@@ -19,22 +18,14 @@ struct DepthPng {
   std::vector<std::uint16_t> depth;
 };
 
+[[nodiscard]] std::string size_text(std::int64_t width, std::int64_t height);  // as people write it
+
 // Throws FileError.
 [[nodiscard]] DepthPng read_depth(const std::string& path);
 
-// One plane; surfaces that were cut from it (on both sides of a leg, of a staircase) count together.
-struct PerceivedPlane {
-  SurfaceKind kind = SurfaceKind::kOther;
-  Vec3 normal = Vec3::UnitZ();  // camera frame, normal . p + d_m = 0, d_m > 0
-  double d_m = 0.0;
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  // of normal and d_m
-  Vec3 centroid_m = Vec3::Zero();                        // of the largest surface, as all that follows
-  double area_m2 = 0.0;                                  // of the polygons of all surfaces
-  double rmse_m = 0.0;
-  double invalid_fraction = 0.0;
-  std::vector<Vec3> polygon_m;
-  EdgeLine nosing;
-};
+using polygmap_frames::Surface;
+// The surfaces that were cut from one plane (on both sides of a leg, of a staircase), the largest first; never none.
+using PerceivedPlane = std::vector<Surface>;
 
 struct Perceived {
   std::vector<PerceivedPlane> planes;  // id is the index + 1

@@ -11,6 +11,7 @@
 namespace polygmap::sim {
 
 enum class PlantKind : std::uint8_t { kKinematic, kMujoco };
+[[nodiscard]] inline std::string name_of(PlantKind kind) { return kind == PlantKind::kMujoco ? "mujoco" : "kinematic"; }
 
 inline constexpr double kPlantTick_s = 0.002;
 

@@ -25,9 +25,13 @@ struct ErrorParams {
   double depth_scale = 0.003;             // half range, uniform
   double camera_mount_rad = kPi / 180.0;  // half range, uniform, each of roll, pitch and yaw in the base
   double camera_mount_m = 0.003;          // half range, uniform, per axis
-  double depth_noise = 1.0;               // scales sigma, warp, edge mixing and dropouts: 0 or 1
+  double torque_noise_nm = 0.5;           // of a measured joint torque, white
+  double friction_nm = 1.0;  // Coulomb, of a moving joint: what the drive measures and the leg does not feel
+  double depth_noise = 1.0;  // scales sigma, warp, edge mixing and dropouts: 0 or 1
 
-  [[nodiscard]] static constexpr ErrorParams none() noexcept { return {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}; }
+  [[nodiscard]] static constexpr ErrorParams none() noexcept {
+    return {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  }
 };
 
 // What a seed makes of one robot, constant over its run.

@@ -3,8 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-
-#include "algorithms/robot/model.hpp"
+#include <cmath>
 
 namespace polygmap::sim {
 
@@ -48,6 +47,17 @@ JointFeedback JointModel::sample(const JointVector& drive_q_rad, const JointVect
   }
   ++index_;
   return feedback;
+}
+
+JointVector TorqueModel::sample(const JointVector& drive_tau_nm, const JointVector& dq_radps) {
+  JointVector tau_nm = drive_tau_nm;
+  constexpr double kCreep_radps = 0.02;  // friction turns round smoothly about here
+  for (Eigen::Index j = 0; j < tau_nm.size(); ++j) {
+    tau_nm[j] += params_.friction_nm * std::tanh(dq_radps[j] / kCreep_radps) +
+                 params_.torque_noise_nm * noise_.normal(index_ * kJointCount + static_cast<std::uint64_t>(j));
+  }
+  ++index_;
+  return tau_nm;
 }
 
 LioSample LioModel::sample(const Transform& true_T_base, std::int64_t stamp_ns) {

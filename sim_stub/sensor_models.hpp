@@ -54,6 +54,18 @@ class FootForceModel {
   RingBuffer<std::array<double, kFootCount>, kDelay_ticks + 1> history_;
 };
 
+// What the drives say of their torques: friction and noise on top.
+class TorqueModel {
+ public:
+  TorqueModel(const ErrorParams& params, std::uint64_t seed) : params_(params), noise_(seed, Stream::kTorques) {}
+  [[nodiscard]] JointVector sample(const JointVector& drive_tau_nm, const JointVector& dq_radps);
+
+ private:
+  ErrorParams params_;
+  CounterNoise noise_;
+  std::uint64_t index_ = 0;
+};
+
 class LioModel {
  public:
   LioModel(const ErrorParams& params, const RobotErrors& errors, std::uint64_t seed)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_stub/sim_robot.hpp"
 
+#include <limits>
+
 #include "sim_stub/counter_noise.hpp"
 
 namespace polygmap::sim {
@@ -66,6 +68,8 @@ SimRobot::SimRobot(const SimOptions& options)
               options.intrinsics, errors_.base_T_camera, stairs_, options.seed),
       imu_(error_params_, errors_, options.seed, plant_->true_T_base()),
       joints_(error_params_, options.seed),
+      torques_(error_params_, options.seed),
+      force_sensors_(options.force_sensors),
       lio_(error_params_, errors_, options.seed),
       active_(standing_command()) {
   sense();
@@ -83,8 +87,9 @@ void SimRobot::sense() {
   const std::int64_t now_ns = clock_.now_ns();
   imu_queue_.push_overwrite(imu_.sample(plant_->true_T_base(), now_ns, kPlantTick_s));
   feedback_ = joints_.sample(plant_->drive_q_rad(), plant_->drive_dq_radps(), now_ns);
-  feedback_.tau_nm = plant_->drive_tau_nm();
+  feedback_.tau_nm = torques_.sample(plant_->drive_tau_nm(), plant_->drive_dq_radps());
   feedback_.foot_force_n = forces_.sample({plant_->foot_force_n(0), plant_->foot_force_n(1)});
+  if (!force_sensors_) feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
   feedback_fresh_ = true;
   if (clock_.tick() % kLioPeriod_ticks == 0 && !any_contains(lio_silent_, now_ns)) {
     lio_queue_.push_overwrite(lio_.sample(plant_->true_T_base(), now_ns));

@@ -43,6 +43,7 @@ struct SimOptions {
   ErrorParams errors;
   std::optional<StartPose> start;  // drawn from the seed when absent
   DepthCameraOptions camera;
+  bool force_sensors = true;       // false: no foot force is measured, NaN
   std::vector<Window> lio_silent;  // poses stamped then never arrive
   PlantKind plant_kind = PlantKind::kKinematic;
   KinematicPlant::Params plant;
@@ -101,6 +102,8 @@ class SimRobot final : public hal::Clock,
   ImuModel imu_;
   JointModel joints_;
   FootForceModel forces_;
+  TorqueModel torques_;
+  bool force_sensors_;
   LioModel lio_;
   RingBuffer<ImuSample, 64> imu_queue_;
   RingBuffer<LioSample, 16> lio_queue_;  // sampled; readable once they have arrived

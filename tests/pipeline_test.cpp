@@ -286,6 +286,22 @@ TEST_F(PipelineAmongBoxes, MoreSurfacesThanAFrameMayHave_IsCounted) {
   EXPECT_GT(count(Limit::kPlanesFull), 0U);
 }
 
+// A fence of thin slats, one above the other: each ends a run wherever a column looks.
+TEST_F(PipelineAmongBoxes, MoreRunsThanAColumnMayHave_IsCounted) {
+  stand(kInitialised_ticks);
+  show(2, 3, -0.1);
+  EXPECT_EQ(count(Limit::kRunsFull), 0U);
+  const CameraIntrinsics camera = robot_camera_intrinsics();
+  std::vector<std::uint16_t> slats(camera_.pixels());
+  for (std::size_t i = 0; i < slats.size(); ++i) {
+    const bool near = i / static_cast<std::size_t>(camera.width_px) / 6 % 2 == 0;
+    slats[i] = static_cast<std::uint16_t>((near ? 0.8 : 1.2) / camera.depth_unit_m);
+  }
+  camera_.feed(clock_.now_ns(), slats);
+  stand(100);
+  EXPECT_GT(count(Limit::kRunsFull), 0U);
+}
+
 TEST_F(PipelineAmongBoxes, MorePolygonsThanTheMapHolds_IsCounted) {
   stand(kInitialised_ticks);
   for (const double lowest_m : {-1.5, -1.25, -1.0, -0.75, -0.5, -0.25}) show(3, 4, lowest_m);
@@ -436,10 +452,22 @@ TEST_F(PipelineOnARobot, TouchDown_OnlyATreadsHeightIsNews) {
   EXPECT_EQ(control().estimator().counters().height_taken, 1U);
 }
 
+TEST_F(PipelineOnARobot, TreadElsewhereThanTheSoleOnIt_IsCounted) {
+  Params params;
+  params.estimator.max_height_error_m = 0.0;
+  start(kToeGap_m, params);
+  ASSERT_TRUE(reach_the_stairs());
+  EXPECT_EQ(module_->pipeline().health().count(Limit::kHeightRejected).count, 0U);
+  ASSERT_TRUE(run_until(GaitPhase::kDoubleSupport, gait().step.sequence));
+  run(2);
+  EXPECT_EQ(module_->pipeline().health().count(Limit::kHeightRejected).count, 1U);
+}
+
 TEST_F(PipelineOnARobot, PoseOfAFrameIsUncertain_MapKnows) {
   Params params;
   params.estimator.attitude.gyro_noise_radprs = 0.1;
   params.estimator.attitude.foot_sigma_rad = 0.1;
+  params.estimator.attitude.accel_noise_mpsrs = 3.0;  // gravity tells less
   start(kToeGap_m, params);
   run(1000);
   const double tilt_sigma_rad = control().state().tilt_sigma_rad;
@@ -448,6 +476,22 @@ TEST_F(PipelineOnARobot, PoseOfAFrameIsUncertain_MapKnows) {
   for (const MapPolygon& polygon : module_->pipeline().perception().map_snapshot().polygons) {
     EXPECT_GT(polygon.surface.tilt_sigma_rad, 0.9 * tilt_sigma_rad);
   }
+}
+
+TEST_F(PipelineOnARobot, MountIsUncertain_EdgesAre) {
+  Params params;
+  start(kToeGap_m, params);
+  run(1000);
+  const PerceptionLane& perception = module_->pipeline().perception();
+  const double learnt_rad = perception.mount().tilt_sigma_rad();
+  EXPECT_LT(learnt_rad, 0.5 * params.mount.prior_tilt_sigma_rad);
+  int edges = 0;
+  for (const MapPolygon& polygon : perception.map_snapshot().polygons) {
+    if (!polygon.surface.nosing.valid) continue;
+    ++edges;
+    EXPECT_GT(polygon.surface.nosing.sigma_m, 0.4 * learnt_rad);  // the camera is higher than that
+  }
+  EXPECT_GT(edges, 0);
 }
 
 // The table as the robot runs it: control and perception on threads of their own.
@@ -491,8 +535,8 @@ class PipelineInTwoLanes : public testing::Test {
   std::unique_ptr<CyclicExecutive<Pipeline, kSchedule, 1>> perception_;
 };
 
-TEST_F(PipelineInTwoLanes, OneSecondBeforeStairs_PosesFootholdsAndFaultsCross) {
-  constexpr int kFrames = 1100;
+TEST_F(PipelineInTwoLanes, TwoSecondsBeforeStairs_PosesFootholdsAndFaultsCross) {
+  constexpr int kFrames = 1700;  // 700 of them before the first picture; then the camera's mount is to be learnt
   test::DepthScene scene;
   scene.world_T_camera = Transform{Mat3::Identity(), Vec3{0, 0, kNominalBaseHeight_m}} * base_T_camera();
   scene.add_stairs({.rise_m = 0.13, .first_riser_x_m = kCollisionRectangle.toe_x_m + 0.1});
@@ -513,6 +557,7 @@ TEST_F(PipelineInTwoLanes, OneSecondBeforeStairs_PosesFootholdsAndFaultsCross) {
   EXPECT_EQ(control_->lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
   EXPECT_EQ(perception_->lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
   EXPECT_GE(pipeline_->perception().extractor().counters().frames, 15U);
+  EXPECT_FALSE(camera_.holding());
   EXPECT_FALSE(pipeline_->perception().map_snapshot().polygons.empty());
   EXPECT_NE(pipeline_->control().gait_status().phase, GaitPhase::kStandstill);  // a foothold came across
   EXPECT_EQ(pipeline_->lane_health(0).count(Fault::kDepthMissing).count, 0U);

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "algorithms/perception/counter_random.hpp"
 #include "tests/support/plane_samples.hpp"
 
 namespace polygmap {

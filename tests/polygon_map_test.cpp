@@ -36,8 +36,11 @@ double tread_error_m(const MapPolygon& tread, const Stairs& stairs, int step) {
 // A robot that looks and a map that remembers.
 class PolygonMapTest : public ::testing::Test {
  protected:
-  void fuse(const SurfaceFrame& frame, const Transform& world_T_camera, double position_sigma_m = 0.0) {
-    map_->begin(frame, {world_T_camera, position_sigma_m, 0.0, robot_camera_intrinsics()});
+  void fuse(const SurfaceFrame& frame, const Transform& world_T_camera, double position_sigma_m = 0.0,
+            double mount_sigma_rad = 0.0) {
+    PolygonMap::View view{world_T_camera, position_sigma_m, 0.0, robot_camera_intrinsics()};
+    view.mount_sigma_rad = mount_sigma_rad;
+    map_->begin(frame, view);
     WorkBudget budget(1 << 20);
     ASSERT_EQ(map_->step(budget), Progress::kDone);
     most_units_ = std::max(most_units_, (1 << 20) - budget.left());
@@ -140,6 +143,32 @@ TEST_F(PolygonMapTest, NosingLine_OverManyRuns_IsUnbiasedAndItsSigmaHonest) {
   EXPECT_LT(rms, sigma);        // the systematic part is not in these frames
   EXPECT_GT(rms, 0.2 * sigma);  // but it is not a made-up figure either
   EXPECT_LT(sigma, 0.003);
+}
+
+// What the mount turns by, it turns about the camera: an edge moves along the stairs by its depth below, a height by
+// its distance ahead.
+TEST_F(PolygonMapTest, MountKnownToAFifthOfADegree_EdgesAndHeightsAreAsVague) {
+  constexpr double kMount_rad = 0.2 * kPi / 180.0;
+  const Stairs stairs{.width_m = 0.7};
+  const Transform camera = test::camera_of(on_floor_);
+  std::array<SurfacePatch, 2> treads;
+  for (const bool vague : {false, true}) {
+    map_->clear();
+    for (int i = 0; i < 30; ++i) {
+      stamp_ns_ += kFrame_ns;
+      fuse(test::seen_from(stairs, camera, stamp_ns_, {}, random_), camera, 0.0, vague ? kMount_rad : 0.0);
+    }
+    const MapPolygon* tread = level_at(stairs.rise_m);
+    ASSERT_NE(tread, nullptr);
+    treads[vague ? 1 : 0] = tread->surface;
+  }
+  const auto added = [](double now, double before) { return std::sqrt(now * now - before * before); };
+  const double below_m = camera.p_m.z() - stairs.rise_m;
+  const double ahead_m = (treads[0].centroid_m - camera.p_m).head<2>().norm();
+  EXPECT_NEAR(added(treads[1].nosing.sigma_m, treads[0].nosing.sigma_m), kMount_rad * below_m, 2e-5);
+  EXPECT_NEAR(added(treads[1].back.sigma_m, treads[0].back.sigma_m), kMount_rad * below_m, 2e-5);
+  EXPECT_NEAR(added(treads[1].offset_sigma_m, treads[0].offset_sigma_m), kMount_rad * ahead_m, 2e-5);
+  EXPECT_NEAR(added(treads[1].tilt_sigma_rad, treads[0].tilt_sigma_rad), kMount_rad, 1e-5);
 }
 
 // Beside a map that was spared that frame: as good at once, and the same 2 s later.
@@ -352,6 +381,43 @@ TEST_F(PolygonMapTest, PatchesOfOneTreadBesideTheRobotsLeg_AreOneTread) {
   EXPECT_EQ(counters().created, 1U);
 }
 
+// Risers are matched from up to 60 mm off, and may have moved by 25 mm.
+TEST_F(PolygonMapTest, RiserSeenElsewhere_OnlyItsOutliersCountUntilTheyPersist) {
+  const Transform camera = looking_down({0, 0, 1});
+  const auto see_riser_at = [&](double x_m, double rmse_m) {
+    SurfacePatch riser;
+    riser.kind = SurfaceKind::kRiser;
+    riser.normal = -Vec3::UnitX();
+    riser.d_m = x_m;
+    riser.centroid_m = {x_m, 0.0, 0.1};
+    riser.offset_sigma_m = riser.tilt_sigma_rad = 0.001;
+    riser.rmse_m = rmse_m;
+    for (const Vec2& v : {Vec2{0.3, 0.05}, {-0.3, 0.05}, {-0.3, 0.15}, {0.3, 0.15}}) {
+      EXPECT_TRUE(riser.polygon.try_push_back({x_m, v.x(), v.y()}));
+    }
+    stamp_ns_ += kFrame_ns;
+    fuse(in_camera({riser}, camera, stamp_ns_), camera);
+  };
+  for (int i = 0; i < 10; ++i) see_riser_at(0.2, 0.001);
+  const std::int64_t last_ns = stamp_ns_;
+  const std::uint32_t persistent = PolygonMap::Params{}.outliers_to_reset;
+  for (std::uint32_t i = 1; i < persistent; ++i) see_riser_at(0.24, 0.01);
+  ASSERT_EQ(map_->snapshot().polygons.size(), 1U);
+  const MapPolygon& riser = map_->snapshot().polygons[0];
+  EXPECT_EQ(counters().plane_outliers, persistent - 1);
+  EXPECT_EQ(counters().fused, 9U);
+  EXPECT_EQ(riser.sightings, 10U);
+  EXPECT_EQ(riser.last_seen_ns, last_ns);
+  EXPECT_EQ(map_->snapshot().stamp_ns, last_ns);
+  EXPECT_NEAR(riser.surface.rmse_m, 0.001, 1e-9);
+  EXPECT_NEAR(riser.surface.centroid_m.x(), 0.2, 1e-6);
+  see_riser_at(0.24, 0.01);
+  EXPECT_EQ(counters().resets, 1U);
+  EXPECT_EQ(riser.sightings, 11U);
+  EXPECT_EQ(riser.last_seen_ns, stamp_ns_);
+  EXPECT_NEAR(riser.surface.centroid_m.x(), 0.24, 1e-6);
+}
+
 TEST_F(PolygonMapTest, TwoPolygonsBridgedByOneSighting_BecomeOne) {
   const Transform camera = looking_down({0, 0, 2});
   for (int i = 0; i < 5; ++i) {
@@ -463,6 +529,34 @@ TEST_F(PolygonMapTest, ConfirmedInViewButGone_IsDroppedAfter3s) {
   EXPECT_GE(counters().dropped_vanished, 1U);
 }
 
+// Shanks across the view of a tread, seen from above, that is not there any more.
+TEST_F(PolygonMapTest, TreadGoneBehindALeg_ForgottenWhereMostOfItsPlaceIsInView) {
+  const Transform camera = looking_down({0, 0, 1});
+  const auto vanishes_behind = [&](const std::vector<double>& shanks_x_m) {
+    map_->clear();
+    for (int i = 0; i < 10; ++i) {
+      stamp_ns_ += kFrame_ns;
+      fuse(in_camera({level_patch({0, 0, 0.1}, 0.14, 0.3)}, camera, stamp_ns_), camera);
+    }
+    PolygonMap::View view{camera, 0.0, 0.0, robot_camera_intrinsics()};
+    for (std::size_t i = 0; i < shanks_x_m.size(); ++i) {  // camera frame, halfway to the tread
+      view.body[i].shank = {Vec3{shanks_x_m[i], -0.2, 0.45}, Vec3{shanks_x_m[i], 0.2, 0.45}, 0.03};
+    }
+    for (int i = 0; i < 100; ++i) {
+      SurfaceFrame blank;
+      blank.stamp_ns = stamp_ns_ += kFrame_ns;
+      map_->begin(blank, view);
+      WorkBudget budget(1 << 20);
+      EXPECT_EQ(map_->step(budget), Progress::kDone);
+    }
+    return map_->snapshot().polygons.empty();
+  };
+  EXPECT_TRUE(vanishes_behind({}));
+  EXPECT_TRUE(vanishes_behind({0.0}));           // hides the middle alone
+  EXPECT_FALSE(vanishes_behind({-0.08, 0.08}));  // leave a gap at the middle
+  EXPECT_TRUE(vanishes_behind({-0.08}));         // hides less than half
+}
+
 TEST_F(PolygonMapTest, FrameWithoutSurfaces_DoesNotMakeTheMapFresh) {
   look({}, on_floor_, {});
   const std::int64_t seen = stamp_ns_;
@@ -551,7 +645,10 @@ TEST_F(PolygonMapTest, InvalidInput_IsRejectedAndCounted) {
   bad = view;
   bad.intrinsics.fx_px = 0.0;
   EXPECT_EQ(begin_with(bad, frame), Progress::kIdle);
-  EXPECT_EQ(counters().rejected_frames, 3U);
+  bad = view;
+  bad.mount_sigma_rad = std::nan("");
+  EXPECT_EQ(begin_with(bad, frame), Progress::kIdle);
+  EXPECT_EQ(counters().rejected_frames, 4U);
 
   EXPECT_EQ(begin_with(view, frame), Progress::kDone);
   EXPECT_EQ(begin_with(view, frame), Progress::kIdle);

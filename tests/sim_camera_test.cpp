@@ -273,16 +273,18 @@ TEST(DepthNoise, StereoOnFloor_GrowsWithTheSquareOfTheRange) {
   EXPECT_NEAR(std::sqrt(far / far_count), 1.0, 0.03);
 }
 
-TEST(DepthNoise, Correlated_OnFloor_HasItsSigmaAndCorrelationAndBlobs) {
-  NoiseOnFloor floor({.kind = DepthNoise::kCorrelated, .warp_m = 0.0});
-  const NoiseFigures f = measure(floor);
-  EXPECT_NEAR(f.mean, 0.0, 0.05);
-  EXPECT_NEAR(f.sigma, std::sqrt(0.25 + 0.87 * 0.87), 0.03);
-  EXPECT_NEAR(f.next, 0.87 * 0.87 * (8.0 / 9.0) / (0.25 + 0.87 * 0.87), 0.03);
-  EXPECT_NEAR(f.far, 0.0, 0.05);
-  EXPECT_NEAR(f.frame_to_frame, 0.0, 0.05);
-  EXPECT_NEAR(f.dropout, 0.05, 0.01);
-  EXPECT_GT(f.dropout_pairs, 0.4);
+TEST(DepthNoise, Correlated_OnFloor_HasItsSigmaAndItsSharesCorrelationAndBlobs) {
+  for (const double share : {DepthSigma{}.correlated_share, 0.3, 1.0}) {
+    NoiseOnFloor floor({.kind = DepthNoise::kCorrelated, .sigma = {.correlated_share = share}, .warp_m = 0.0});
+    const NoiseFigures f = measure(floor);
+    EXPECT_NEAR(f.mean, 0.0, 0.05);
+    EXPECT_NEAR(f.sigma, 1.0, 0.03);
+    EXPECT_NEAR(f.next, std::min(share, 8.0 / 9.0), 0.03);
+    EXPECT_NEAR(f.far, 0.0, 0.05);
+    EXPECT_NEAR(f.frame_to_frame, 0.0, 0.05);
+    EXPECT_NEAR(f.dropout, 0.05, 0.01);
+    EXPECT_GT(f.dropout_pairs, 0.4);
+  }
 }
 
 TEST(DepthNoise, Warp_OverTwentySeconds_IsHalfFixedAndHalfRedrawn) {
@@ -519,6 +521,14 @@ std::uint64_t fingerprint(SimOptions options, bool threaded) {
     robot.advance();
   }
   return hash;
+}
+
+TEST(SimRobot, ScanTime_IsRoundedToTwoTicksAndSaysSo) {
+  for (const auto& [asked_ms, simulated_ms] : {std::pair{16.0, 16.0}, {15.0, 16.0}, {9.5, 8.0}, {1.0, 0.0}}) {
+    SimOptions options;
+    options.camera.scan_s = 1e-3 * asked_ms;
+    EXPECT_NEAR(1e3 * SimRobot(options).depth_camera().scan_s(), simulated_ms, 1e-9) << asked_ms;
+  }
 }
 
 TEST(SimRobot, SameSeed_ThreadedOrNot_IsTheSameToTheLastBit) {

@@ -55,6 +55,12 @@ void expect_refused(const std::vector<std::string>& arguments, const std::string
   EXPECT_EQ(c.out, "");
 }
 
+TEST(ClimbCommand, Contacts_SensedUnlessInferred) {
+  EXPECT_FALSE(call({"climb"}).options->infer_contacts);
+  EXPECT_TRUE(call({"climb", "--contacts", "inferred"}).options->infer_contacts);
+  expect_refused({"climb", "--contacts", "guessed"}, "--contacts");
+}
+
 TEST(ClimbCommand, CameraErrors_OnByDefault_EachCanBeTurnedOff) {
   const Call usual = call({"climb"});
   ASSERT_TRUE(usual.options) << usual.err;
@@ -82,6 +88,7 @@ TEST(ClimbCommand, Camera_IsReadFromItsFile) {
   ASSERT_TRUE(c.options && c.options->camera) << c.err;
   EXPECT_EQ(c.options->camera->intrinsics.width_px, 512);
   EXPECT_EQ(c.options->camera->noise.quadratic_per_m, 0.002);
+  EXPECT_EQ(c.options->camera_file, path);
   expect_refused({"climb", "--camera", temporary("none.toml")}, "none.toml");
 }
 

@@ -83,6 +83,14 @@ TEST(ClimbOneStep, ThreadedRendering_Climbed) {
   EXPECT_EQ(summary.heap_calls, 0U);
 }
 
+TEST(ClimbContacts, InferredFromTorques_ClimbedWithinTheFigures) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    ClimbOptions options = options_of(seed, 4);
+    options.infer_contacts = true;
+    expect_a_good_climb(climb(options), 4);
+  }
+}
+
 std::vector<Case> long_cases() {
   constexpr double kRises_m[]{0.13, 0.10, 0.17, 0.15, 0.12};
   std::vector<Case> cases;

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/model.hpp"
 #include "sim_stub/cli/climb_command.hpp"
 #include "sim_stub/perceive.hpp"
@@ -78,7 +79,7 @@ TEST_F(PerceiveCommand, Stairs_AreTreadsAndRisersWithNosings_GravityGivenOrNot) 
                                        "--json",    at("out.json"),   "--labels", at("out.png"),
                                        "--picture", at("pic.png"),    "--repeat", "2"};
     if (given) {
-      arguments.insert(arguments.end(),
+      arguments.insert(arguments.begin() + 1,
                        {"--gravity", std::to_string(down.x()), std::to_string(down.y()), std::to_string(down.z())});
     }
     ASSERT_EQ(call(arguments), kExitPass) << err_;
@@ -121,16 +122,90 @@ TEST_F(PerceiveCommand, FilesThatAreNone_AreNamedInOneSentence) {
   const std::string bytes{std::istreambuf_iterator<char>(good), {}};
   write("cut.png", bytes.substr(0, bytes.size() / 2));
   write("text.png", "no picture");
+  write("empty.png", "");
+  write_depth("large.png", std::vector<std::uint16_t>(1025 * 32, 1000), 1025, 32);
   const std::string camera = at("camera.toml");
   expect_refused({"perceive", at("missing.png"), "--camera", camera}, "missing.png");
   expect_refused({"perceive", at("small.png"), "--camera", camera}, "64x48");
   expect_refused({"perceive", at("eight.png"), "--camera", camera}, "16 bits");
   expect_refused({"perceive", at("cut.png"), "--camera", camera}, "cut.png");
   expect_refused({"perceive", at("text.png"), "--camera", camera}, "text.png");
+  expect_refused({"perceive", at("empty.png"), "--camera", camera}, "is empty");
+  expect_refused({"perceive", folder_, "--camera", camera}, "Cannot read the picture");
+  expect_refused({"perceive", at("large.png"), "--camera", camera}, "is 1025x32, more than the 1024x768 that are read");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--json", "/proc/none/x.json"}, "/proc/none");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--gravity", "0", "0", "0"}, "--gravity");
+  expect_refused({"perceive", at("good.png"), "--camera", camera, "--picture", at("good.png")}, "overwritten");
+  expect_refused({"perceive", at("good.png"), "--camera", camera, "--json", camera}, "overwritten");
+  expect_refused({"perceive", at("good.png"), "--camera", camera, "--json", at("out"), "--labels", at("out")},
+                 "overwritten");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--gravity", "nan", "0", "1"}, "--gravity");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--repeat", "0"}, "--repeat");
+}
+
+TEST_F(PerceiveCommand, OneBadPictureAmongGoodOnes_IsNamedAndTheOthersAreWritten) {
+  write_depth("one.png", std::vector<std::uint16_t>(640 * 480, 1000), 640, 480);
+  write_depth("two.png", std::vector<std::uint16_t>(640 * 480, 1100), 640, 480);
+  write_depth("small.png", std::vector<std::uint16_t>(64 * 48, 1000), 64, 48);
+  const std::string out = at("several");
+  std::filesystem::remove_all(out);
+  EXPECT_EQ(call({"perceive", at("one.png"), at("small.png"), at("missing.png"), at("two.png"), "--camera",
+                  at("camera.toml"), "--json", out, "--labels", out, "--picture", out}),
+            kExitUsage);
+  EXPECT_EQ(std::count(err_.begin(), err_.end(), '\n'), 2) << err_;
+  EXPECT_NE(err_.find("small.png"), std::string::npos);
+  EXPECT_NE(err_.find("missing.png"), std::string::npos);
+  EXPECT_EQ(std::count(out_.begin(), out_.end(), '\n'), 2) << out_;
+  for (const std::string name : {"one", "two"}) {
+    for (const std::string suffix : {".planes.json", ".labels.png", ".picture.png"}) {
+      EXPECT_TRUE(std::filesystem::exists(std::filesystem::path(out) / (name + suffix))) << name << suffix;
+    }
+  }
+  EXPECT_FALSE(std::filesystem::exists(std::filesystem::path(out) / "small.planes.json"));
+}
+
+TEST_F(PerceiveCommand, PicturesOfOneName_WouldOverwriteEachOthersOutput) {
+  std::filesystem::create_directories(at("other"));
+  for (const char* name : {"one.png", "other/one.png"}) {
+    write_depth(name, std::vector<std::uint16_t>(640 * 480, 1000), 640, 480);
+  }
+  const std::string camera = at("camera.toml");
+  expect_refused({"perceive", at("one.png"), at("other/one.png"), "--camera", camera, "--json", at("several")},
+                 "\"one\"");
+  EXPECT_EQ(call({"perceive", at("one.png"), at("other/one.png"), "--camera", camera}), kExitPass) << err_;
+}
+
+TEST_F(PerceiveCommand, PlatformsWithAGapBetween_AreOnePlaneOfTwoPieces) {
+  scene_.boxes.clear();
+  scene_.boxes.push_back({{0.3, 0.08, 0.0}, {1.0, 0.6, 0.15}});
+  scene_.boxes.push_back({{0.3, -0.4, 0.0}, {1.0, -0.08, 0.15}});
+  test::DepthPicture picture = test::render(scene_);
+  test::add_noise(picture, {}, 11);
+  write_depth("gap.png", picture.raw(), 640, 480);
+  ASSERT_EQ(call({"perceive", at("gap.png"), "--camera", at("camera.toml"), "--json", at("gap.json")}), kExitPass);
+  const auto vertex = [this](const nlohmann::json& v) {
+    return Vec3{scene_.world_T_camera * Vec3{v[0].get<double>(), v[1].get<double>(), v[2].get<double>()}};
+  };
+  const nlohmann::json planes = nlohmann::json::parse(std::ifstream(at("gap.json")))["planes"];
+  int platforms = 0;
+  for (const auto& plane : planes) {
+    if (std::abs(vertex(plane["centroid"]).z() - 0.15) > 0.01) continue;
+    ++platforms;
+    const auto& pieces = plane["pieces"];
+    ASSERT_EQ(pieces.size(), 2U);
+    EXPECT_EQ(pieces[0]["polygon"], plane["polygon"]);  // the largest first
+    EXPECT_GE(pieces[0]["area_m2"], pieces[1]["area_m2"]);
+    EXPECT_NEAR(plane["area_m2"].get<double>(), pieces[0]["area_m2"].get<double>() + pieces[1]["area_m2"].get<double>(),
+                1e-9);
+    EXPECT_LT(vertex(pieces[0]["centroid"]).y() * vertex(pieces[1]["centroid"]).y(), 0.0);
+    for (const auto& piece : pieces) {
+      double nearest = 1e9;
+      for (const auto& v : piece["polygon"]) nearest = std::min(nearest, std::abs(vertex(v).y()));
+      EXPECT_NEAR(nearest, 0.08, 0.01);
+      EXPECT_FALSE(piece["nosing"].is_null());
+    }
+  }
+  EXPECT_EQ(platforms, 1);
 }
 
 // What `polygmap perceive` and `climb` are given.
@@ -159,6 +234,24 @@ TEST(CameraProfiles, OfTheProject_AreReadAndSayWhatTheyKnow) {
   EXPECT_EQ(own.max_depth_m, built_in.limits.max_depth_m);
 }
 
+// What a camera file may say and what the extractor takes are the same.
+TEST_F(PerceiveCommand, CamerasAtTheBoundsOfWhatIsAllowed_AreTaken) {
+  const std::vector<std::uint16_t> depth(32 * 32, 1000);
+  write_depth("least.png", depth, 32, 32);
+  for (const std::string focal : {"1", "100000"}) {
+    for (const std::string centre : {"-100000", "100000"}) {
+      for (const std::string unit : {"1e-6", "0.1"}) {
+        write("bound.toml", "width = 32\nheight = 32\nfx = " + focal + "\nfy = " + focal + "\ncx = " + centre +
+                                "\ncy = " + centre + "\ndepth_unit_m = " + unit +
+                                "\nmin_depth_m = 0.001\nmax_depth_m = 1000\nnoise_base_m = 1\n"
+                                "noise_per_metre = 1\nnoise_quadratic_per_m = 1\nnoise_correlated_share = 0\n"
+                                "noise_correlated_px = 1e6\n");
+        EXPECT_EQ(call({"perceive", at("least.png"), "--camera", at("bound.toml")}), kExitPass) << err_;
+      }
+    }
+  }
+}
+
 TEST_F(PerceiveCommand, CameraFilesThatAreNone_AreNamedInOneSentence) {
   write_depth("good.png", std::vector<std::uint16_t>(640 * 480, 1000), 640, 480);
   const auto refused = [this](const std::string& from, const std::string& to, const std::string& culprit) {
@@ -167,17 +260,48 @@ TEST_F(PerceiveCommand, CameraFilesThatAreNone_AreNamedInOneSentence) {
     write("bad.toml", text);
     expect_refused({"perceive", at("good.png"), "--camera", at("bad.toml")}, culprit);
   };
-  refused("fx = 366.7", "fx = nan", "fx");
-  refused("fx = 366.7", "fx = -1", "positive");
-  refused("cx = 322.7\n", "", "cx");
-  refused("depth_unit_m = 0.001\n", "", "depth_unit_m");
+  for (const std::string key : {"fx", "fy"}) {
+    const std::string good = key + " = 366.7";
+    for (const std::string value : {"nan", "inf", "-inf", "0", "-1", "0.99", "1e9"}) {
+      refused(good, key + " = " + value, key + " must be from 1 to 100000, not ");
+    }
+    for (const std::string value : {"\"a\"", "true", "[1]", "2020-01-01"}) {
+      refused(good, key + " = " + value, key + " must be a number");
+    }
+    refused(good, "", key + " is missing");
+  }
+  refused("cx = 322.7\n", "", "cx is missing");
+  refused("cx = 322.7", "cx = 100001", "cx");
+  refused("cy = 242.3", "cy = -100001", "cy");
+  refused("cy = 242.3", "cy = nan", "cy");
+  refused("depth_unit_m = 0.001\n", "", "depth_unit_m is missing");
   refused("depth_unit_m", "depht_unit_m", "depht_unit_m");
-  refused("cy = 242.3", "cy = \"a\"", "cy");
-  refused("width = 640", "width = 0", "0x480");
-  refused("width = 640", "width = 4096", "4096x480");
+  for (const std::string value : {"0", "-0.001", "0.11", "1e-7", "nan"}) {
+    refused("= 0.001", "= " + value, "depth_unit_m must be");
+  }
+  refused("width = 640", "width = 640.5", "width must be a whole number, not 640.5");
+  refused("width = 640", "width = 31", "width must be from 32 to 1024, not 31");
+  refused("width = 640", "width = 1025", "width must be from 32 to 1024, not 1025");
+  refused("height = 480", "height = 769", "height must be from 32 to 768, not 769");
+  refused("height = 480", "height = 1e300", "height");
+  refused("height = 480", "height = 424", "640x424");
   refused("height = 480", "height = = 480", "bad.toml");
-  refused("depth_unit_m = 0.001", "depth_unit_m = 0.001\nnoise_quadratic_per_m = -1", "positive");
-  refused("depth_unit_m = 0.001", "depth_unit_m = 0.001\nnoise_correlated_share = 1.5", "noise_correlated_share");
+  const auto refused_with = [&](const std::string& line, const std::string& culprit) {
+    refused("depth_unit_m = 0.001", "depth_unit_m = 0.001\n" + line, culprit);
+  };
+  refused_with("noise_base_m = 0", "noise_base_m");
+  refused_with("noise_base_m = 1e9", "noise_base_m");
+  refused_with("noise_per_metre = -1", "noise_per_metre");
+  refused_with("noise_quadratic_per_m = -1", "noise_quadratic_per_m");
+  refused_with("noise_quadratic_per_m = 1e9", "noise_quadratic_per_m");
+  refused_with("noise_correlated_share = 1.5", "noise_correlated_share");
+  refused_with("noise_correlated_px = 0.5", "noise_correlated_px");
+  refused_with("min_depth_m = 0", "min_depth_m");
+  refused_with("max_depth_m = -1", "max_depth_m");
+  refused_with("min_depth_m = 3\nmax_depth_m = 3", "min_depth_m, 3, must be less than max_depth_m, 3");
+  refused_with("min_depth_m = 66\nmax_depth_m = 67", "16 bits");
+  refused_with("depth_unit_m = 0.001", "bad.toml");  // twice
+  expect_refused({"perceive", at("good.png"), "--camera", folder_}, "folder");
   expect_refused({"perceive", at("good.png"), "--camera", at("none.toml")}, "none.toml");
 }
 

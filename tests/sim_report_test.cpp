@@ -49,7 +49,7 @@ TEST(ClimbReport, FlawlessClimb_Passes) {
   const ClimbSummary s = climb.finish();
   EXPECT_TRUE(s.pass) << s.reason;
   EXPECT_FALSE(s.fell);
-  EXPECT_EQ(s.plant, "kinematic");
+  EXPECT_EQ(s.options.plant, PlantKind::kKinematic);
   EXPECT_EQ(s.steps_total, 3);
   EXPECT_EQ(s.steps_climbed, 3);
   EXPECT_NEAR(s.execution_error_m.max, 0.0, kUm);
@@ -216,6 +216,7 @@ TEST(ClimbReport, ModuleStopped_NamesWhatItMeasured) {
   EXPECT_FALSE(s.pass);
   EXPECT_EQ(s.reason, "The module stopped after 0 of 2 steps: it measured a rise of 0.498 m, too high to climb.");
   EXPECT_TRUE(std::isnan(s.climb_time_s));
+  EXPECT_TRUE(std::isnan(s.swing_clearance_min_m));  // nothing swung
 }
 
 TEST(ClimbReport, RunCutShort_SaysSo) {
@@ -423,7 +424,10 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
   ScriptedClimb climb(plain_stairs(1));
   climb.climb_all({.execution_m = Vec3(0.00123456, 0, 0)});
   RunFigures run;
-  run.seed = 7;
+  run.options.seed = 7;
+  run.options.stairs.rise_m = 0.17;
+  run.options.noise = DepthNoise::kCorrelated;
+  run.options.render_missing_step = 1;
   run.static_memory = {{"estimation", 1000}, {"perception", 2000}};
   run.schedule = {{"sense", "control", 100.0, 500, 1, 12.34567, 99.0}};
   run.wall_seconds = 1.5;
@@ -431,16 +435,22 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
   const nlohmann::ordered_json j = to_json(climb.report.finish(run));
   std::string keys;
   for (const auto& [key, value] : j.items()) keys += key + " ";
-  EXPECT_EQ(
-      keys,
-      "verdict reason fell ended_by plant gait seed camera steps_total steps_climbed climb_time_s seconds_per_step "
-      "plane_rate_hz "
-      "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min stand_off_mm "
-      "closure_error_mm tracking_error_mm odometry_rmse_mm exposure_to_map_ms map_age_at_latch_ms "
-      "target_last_seen_ms heap_calls faults "
-      "static_memory_bytes static_memory schedule surfaces footsteps wall ");
+  EXPECT_EQ(keys,
+            "verdict reason fell ended_by plant gait seed arguments camera steps_total steps_climbed climb_time_s "
+            "seconds_per_step "
+            "plane_rate_hz "
+            "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min stand_off_mm "
+            "closure_error_mm tracking_error_mm odometry_rmse_mm exposure_to_map_ms map_age_at_latch_ms "
+            "target_last_seen_ms heap_calls faults "
+            "static_memory_bytes static_memory schedule surfaces footsteps wall ");
   EXPECT_EQ(j["verdict"], "pass");
   EXPECT_EQ(j["seed"], 7);
+  EXPECT_EQ(
+      j["arguments"].dump(),
+      R"({"steps":10,"rise_m":0.17,"tread_m":0.28,"width_m":1.2,"nosing_m":0.0,"landing_m":1.0,)"
+      R"("noise":"correlated","camera":null,"scan_ms":16.0,"mount_error_deg":1.0,"scale_error":0.003,)"
+      R"("estimate_mount":true,"self_filter":true,"contacts":"sensed","render_shift_m":[0.0,0.0,0.0],"render_missing_step":2,)"
+      R"("blank_depth":false})");
   EXPECT_EQ(j["execution_error_mm"].dump(), R"({"median":1.23,"max":1.23})");
   EXPECT_EQ(j["odometry_rmse_mm"].dump(), R"({"base":0.0,"lio":null,"fused":0.0})");
   EXPECT_EQ(j["exposure_to_map_ms"].dump(), R"({"median":null,"max":null})");

@@ -13,8 +13,14 @@ inline constexpr std::size_t kFootCount = 2;
 inline constexpr std::size_t kContactsPerFoot = 4;
 inline constexpr std::size_t kContactCount = kFootCount * kContactsPerFoot;
 
-inline constexpr std::int32_t kDepthWidth_px = 640;  // the robot's camera
-inline constexpr std::int32_t kDepthHeight_px = 480;
+// The largest depth picture: the robot's camera's, unless the build defines another. Widths are multiples of 128, even
+// heights: perception works in whole vector registers.
+#ifndef POLYGMAP_DEPTH_WIDTH_PX
+#define POLYGMAP_DEPTH_WIDTH_PX 640
+#define POLYGMAP_DEPTH_HEIGHT_PX 480
+#endif
+inline constexpr std::int32_t kDepthWidth_px = POLYGMAP_DEPTH_WIDTH_PX;
+inline constexpr std::int32_t kDepthHeight_px = POLYGMAP_DEPTH_HEIGHT_PX;
 
 inline constexpr std::size_t kMaxPlanesPerFrame = 64;
 inline constexpr std::size_t kMaxPolygonVertices = 24;

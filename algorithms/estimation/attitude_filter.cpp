@@ -2,118 +2,217 @@
 #include "algorithms/estimation/attitude_filter.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "algorithms/geometry/so3.hpp"
 
 namespace polygmap {
+namespace {
+
+constexpr double kInnovationMemory_s = 1.0;
+
+int of_foot(int first, std::size_t foot) noexcept { return first + 3 * static_cast<int>(foot); }
+
+}  // namespace
 
 void AttitudeFilter::reset(const Params& params) noexcept {
   *this = AttitudeFilter{};
   params_ = params;
+  contact_walk_mprs_ = params.contact_walk_mprs;
 }
 
-void AttitudeFilter::initialise(const Mat3& odom_R_base, const Vec3& gyro_bias_radps, double gravity_mps2,
-                                const std::array<Mat3, kFootCount>& base_R_sole) noexcept {
-  odom_R_base_ = odom_R_base;
-  bias_radps_ = gyro_bias_radps;
-  gravity_mps2_ = gravity_mps2;
-  for (AxisCovariance& P : P_) {
-    P.setZero();
-    P(kBias, kBias) = math::square(params_.initial_bias_sigma_radps);
+void AttitudeFilter::initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs) noexcept {
+  odom_R_base_ = start.odom_R_base;
+  odom_p_base_m_ = start.odom_p_base_m;
+  odom_v_base_mps_ = start.odom_v_base_mps;
+  gyro_bias_radps_ = start.gyro_bias_radps;
+  accel_bias_mps2_.setZero();
+  gravity_mps2_ = start.gravity_mps2;
+  P_.setZero();
+  const Vec3 attitude_rad2 = Vec3{start.tilt_sigma_rad, start.tilt_sigma_rad, start.yaw_sigma_rad}.cwiseAbs2();
+  P_.diagonal().segment<3>(kAttitude) = attitude_rad2;
+  P_.diagonal().segment<3>(kVelocity).setConstant(math::square(start.velocity_sigma_mps));
+  P_.diagonal().segment<3>(kPosition).setConstant(math::square(start.position_sigma_m));
+  P_.diagonal().segment<3>(kGyroBias).setConstant(math::square(start.gyro_bias_sigma_radps));
+  P_.diagonal().segment<3>(kAccelBias).setConstant(math::square(start.accel_bias_sigma_mps2));
+  // Right-invariant errors of velocity and position hold the attitude's: e_v = dv + v x e.
+  for (const auto& [index, value] : {std::pair{+kVelocity, odom_v_base_mps_}, std::pair{+kPosition, odom_p_base_m_}}) {
+    P_.middleRows<3>(index) += skew(value) * P_.middleRows<3>(kAttitude);
+    P_.middleCols<3>(index) += P_.middleCols<3>(kAttitude) * skew(value).transpose();
   }
-  for (std::size_t foot = 0; foot < kFootCount; ++foot) anchor(foot, base_R_sole[foot]);
-  window_start_ns_ = -1;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) anchor(foot, legs[foot]);
 }
 
-void AttitudeFilter::anchor(std::size_t foot, const Mat3& base_R_sole) noexcept {
-  odom_R_foot_[foot] = odom_R_base_ * base_R_sole;
-  const int state = kFirstFoot + static_cast<int>(foot);
-  for (AxisCovariance& P : P_) {
-    P.row(state) = P.row(kAttitude);
-    P.col(state) = P.col(kAttitude);
-    P(state, state) = P(kAttitude, kAttitude) + math::square(params_.foot_sigma_rad);
+void AttitudeFilter::anchor(std::size_t foot, const LegMeasurement& leg) noexcept {
+  odom_p_contact_m_[foot] = odom_p_base_m_ + odom_R_base_ * leg.base_T_sole.p_m;
+  odom_R_foot_[foot] = odom_R_base_ * leg.base_T_sole.R;
+  const auto copy = [&](int to, int from, double variance) {
+    P_.middleRows<3>(to) = P_.middleRows<3>(from);
+    P_.middleCols<3>(to) = P_.middleCols<3>(from);
+    P_.block<3, 3>(to, to) = P_.block<3, 3>(from, from);
+    P_.diagonal().segment<3>(to).array() += variance;
+  };
+  copy(of_foot(kContact, foot), kPosition, math::square(leg.position_sigma_m));
+  if (leg.sole_known) copy(of_foot(kSole, foot), kAttitude, math::square(params_.foot_sigma_rad));
+}
+
+void AttitudeFilter::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion) noexcept {
+  const Vec3 turn_rad = (gyro_radps - gyro_bias_radps_) * dt_s;
+  constexpr double kLeg_m = 0.5;
+  const double speed_mps = odom_v_base_mps_.norm() + kLeg_m * turn_rad.norm() / dt_s;
+  pace_ = std::min(speed_mps / params_.full_walk_speed_mps, 1.0);
+  const Vec3 force_mps2 = odom_R_base_ * so3_exp(0.5 * turn_rad) * (accel_mps2 - accel_bias_mps2_);
+  const Vec3 odom_a_mps2 = force_mps2 - Vec3{0, 0, gravity_mps2_};
+  const double dynamic_mpsrs = params_.dynamic_accel_share * odom_a_mps2.norm() * math::sqrt(dt_s);
+  predict_covariance(
+      params_.gyro_noise_radprs + (motion == Motion::kUnfelt ? params_.lost_gyro_noise_radprs : 0.0),
+      params_.accel_noise_mpsrs + dynamic_mpsrs + (motion == Motion::kFelt ? 0.0 : params_.lost_accel_noise_mpsrs),
+      dt_s);
+  odom_p_base_m_ += dt_s * (odom_v_base_mps_ + 0.5 * dt_s * odom_a_mps2);
+  odom_v_base_mps_ += dt_s * odom_a_mps2;
+  odom_R_base_ = so3_renormalised(odom_R_base_ * so3_exp(turn_rad));
+}
+
+void AttitudeFilter::predict_covariance(double gyro_noise_radprs, double accel_noise_mpsrs, double dt_s) noexcept {
+  const Mat3 R = odom_R_base_ * dt_s;
+  const Mat3 gravity = skew(Vec3{0, 0, -gravity_mps2_ * dt_s});
+  struct Turned {
+    int index;
+    Mat3 arm;
+  };
+  const std::array<Turned, 4> turned{{{kVelocity, skew(odom_v_base_mps_)},
+                                      {kPosition, skew(odom_p_base_m_)},
+                                      {kContact, skew(odom_p_contact_m_[0])},
+                                      {kContact + 3, skew(odom_p_contact_m_[1])}}};
+  // F P F', rows first: what a row takes from others it takes as they were before the step.
+  Eigen::Matrix<double, 3, kStates> bias = R * P_.middleRows<3>(kGyroBias);
+  P_.middleRows<3>(kPosition) += dt_s * P_.middleRows<3>(kVelocity);
+  P_.middleRows<3>(kVelocity) += gravity * P_.middleRows<3>(kAttitude) - R * P_.middleRows<3>(kAccelBias);
+  P_.middleRows<3>(kAttitude) -= bias;
+  for (const Turned& t : turned) P_.middleRows<3>(t.index).noalias() -= t.arm * bias;
+  Eigen::Matrix<double, kStates, 3> bias_t = P_.middleCols<3>(kGyroBias) * R.transpose();
+  P_.middleCols<3>(kPosition) += dt_s * P_.middleCols<3>(kVelocity);
+  P_.middleCols<3>(kVelocity) +=
+      P_.middleCols<3>(kAttitude) * gravity.transpose() - P_.middleCols<3>(kAccelBias) * R.transpose();
+  P_.middleCols<3>(kAttitude) -= bias_t;
+  for (const Turned& t : turned) P_.middleCols<3>(t.index).noalias() -= bias_t * t.arm.transpose();
+
+  // The gyro's noise turns everything that is held in odom axes.
+  const double turn_rad2 = math::square(gyro_noise_radprs) * dt_s;
+  P_.diagonal().segment<3>(kAttitude).array() += turn_rad2;
+  for (const Turned& a : turned) {
+    const Mat3 with_attitude = turn_rad2 * a.arm;
+    P_.block<3, 3>(a.index, kAttitude) += with_attitude;
+    P_.block<3, 3>(kAttitude, a.index) += with_attitude.transpose();
+    for (const Turned& b : turned) P_.block<3, 3>(a.index, b.index) += with_attitude * b.arm.transpose();
   }
+  P_.diagonal().segment<3>(kVelocity).array() += math::square(accel_noise_mpsrs) * dt_s;
+  P_.diagonal().segment<3>(kGyroBias).array() += math::square(params_.gyro_bias_walk_radpsrs) * dt_s;
+  P_.diagonal().segment<3>(kAccelBias).array() += math::square(params_.accel_bias_walk_mps2rs) * dt_s;
 }
 
-void AttitudeFilter::predict(const Vec3& gyro_radps, double dt_s) noexcept {
-  odom_R_base_ = so3_renormalised(odom_R_base_ * so3_exp((gyro_radps - bias_radps_) * dt_s));
-  for (AxisCovariance& P : P_) {  // attitude error grows by minus the bias error
-    P.row(kAttitude) -= dt_s * P.row(kBias);
-    P.col(kAttitude) -= dt_s * P.col(kBias);
-    P(kAttitude, kAttitude) += math::square(params_.gyro_noise_radprs) * dt_s;
-    P(kBias, kBias) += math::square(params_.bias_walk_radpsrs) * dt_s;
-  }
-}
-
-void AttitudeFilter::correct_by_feet(const std::array<Mat3, kFootCount>& base_R_sole,
+void AttitudeFilter::correct_by_feet(const std::array<LegMeasurement, kFootCount>& legs,
                                      const std::array<FootContact, kFootCount>& contacts, double dt_s) noexcept {
-  const double variance = math::square(params_.foot_sigma_rad);
+  const double walk_mprs = std::max(pace_ * contact_walk_mprs_, params_.min_contact_walk_mprs);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-    const int state = kFirstFoot + static_cast<int>(foot);
+    const LegMeasurement& leg = legs[foot];
     if (!contacts[foot].stands || contacts[foot].landed) {
-      anchor(foot, base_R_sole[foot]);
+      anchor(foot, leg);
+      whiteness_[foot] = {};
       continue;
     }
-    const double walk = math::square(params_.foot_walk_radprs) * dt_s / std::max(contacts[foot].load_share, 0.05);
-    // log(R^T R_foot M^T) = attitude error - foot error, in base axes.
-    const Vec3 innovation_rad = so3_log(odom_R_base_.transpose() * odom_R_foot_[foot] * base_R_sole[foot].transpose());
-    AxisGain row = AxisGain::Zero();
-    row[kAttitude] = 1.0;
-    row[state] = -1.0;
-    std::array<AxisGain, 3> corrections;
-    for (int axis = 0; axis < 3; ++axis) {
-      P_[static_cast<std::size_t>(axis)](state, state) += walk;
-      corrections[static_cast<std::size_t>(axis)] = correct_axis(axis, row, innovation_rad[axis], variance);
+    const double share = std::max(contacts[foot].load_share * contacts[foot].probability, 0.05);
+    const int contact = of_foot(kContact, foot), sole = of_foot(kSole, foot);
+    P_.diagonal().segment<3>(contact).array() += dt_s * (math::square(walk_mprs) / share + contacts[foot].walk_m2ps);
+    const Vec3 off_m = odom_R_base_ * leg.base_T_sole.p_m - (odom_p_contact_m_[foot] - odom_p_base_m_);
+    if (contacts[foot].walk_m2ps > 0.0) {
+      whiteness_[foot] = {};
+    } else {
+      const double s_m2 = P_(contact, contact) + P_(kPosition, kPosition) - 2.0 * P_(contact, kPosition);
+      measure_walk(foot, off_m, s_m2 + math::square(leg.position_sigma_m), dt_s);
     }
-    apply(corrections);
+    correct(contact, kPosition, off_m, math::square(leg.position_sigma_m), dt_s);
+    if (!leg.sole_known) continue;
+    P_.diagonal().segment<3>(sole).array() += dt_s * math::square(params_.foot_walk_radprs) / share;
+    const Vec3 off_rad = so3_log(odom_R_base_ * leg.base_T_sole.R * odom_R_foot_[foot].transpose());
+    correct(sole, kAttitude, off_rad, math::square(params_.foot_sigma_rad), dt_s);
   }
 }
 
-void AttitudeFilter::correct_by_gravity(const Vec3& accel_mps2, const Vec3& odom_v_mps, double dt_s,
-                                        std::int64_t stamp_ns) noexcept {
-  window_force_mps_ += odom_R_base_ * accel_mps2 * dt_s;
-  const double window_s = seconds(stamp_ns - window_start_ns_);
-  if (window_start_ns_ >= 0 && window_s < params_.gravity_window_s) return;
-  const bool first = window_start_ns_ < 0;
-  const Vec3 up_mps2 = (window_force_mps_ - (odom_v_mps - window_start_v_mps_)) / window_s;
-  window_force_mps_.setZero();
-  window_start_v_mps_ = odom_v_mps;
-  window_start_ns_ = stamp_ns;
-  if (first) return;
-  if (!((up_mps2 - Vec3{0, 0, gravity_mps2_}).norm() < params_.max_gravity_error_mps2)) {
-    ++gravity_rejected_;
-    return;
+void AttitudeFilter::correct(int plus, int minus, const Vec3& innovation, double variance, double dt_s) noexcept {
+  double ratio = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const double s = P_(plus + i, plus + i) + P_(minus + i, minus + i) - 2.0 * P_(plus + i, minus + i) + variance;
+    ratio += math::square(innovation[i]) / (3.0 * s);
   }
-  // Measured up against odom's z, as a small turn in base axes; about the vertical it says nothing.
-  const Vec3 innovation_rad = odom_R_base_.transpose() * (up_mps2.normalized().cross(Vec3::UnitZ()));
-  AxisGain row = AxisGain::Zero();
-  row[kAttitude] = 1.0;
-  const double variance = math::square(params_.gravity_sigma_rad);
-  apply({correct_axis(0, row, innovation_rad.x(), variance), correct_axis(1, row, innovation_rad.y(), variance),
-         AxisGain::Zero()});
+  innovation_ratio_ += (std::min(ratio, 100.0) - innovation_ratio_) * dt_s / (kInnovationMemory_s + dt_s);
+  const double sigmas = math::sqrt(ratio) / params_.outlier_sigmas;
+  if (sigmas > 1.0) {
+    ++outliers_;
+    variance *= math::square(sigmas);
+  }
+  Vector error = Vector::Zero();
+  for (int i = 0; i < 3; ++i) {
+    Vector PHt = P_.col(plus + i) - P_.col(minus + i);
+    const double s = PHt[plus + i] - PHt[minus + i] + variance;
+    const double inverse_root = 1.0 / math::sqrt(s);
+    PHt *= inverse_root;
+    error += PHt * (inverse_root * (innovation[i] - (error[plus + i] - error[minus + i])));
+    for (int j = 0; j < kStates; ++j) P_.col(j) -= PHt[j] * PHt;  // symmetric to the last bit
+  }
+  apply(error);
 }
 
-AttitudeFilter::AxisGain AttitudeFilter::correct_axis(int axis, const AxisGain& row, double innovation_rad,
-                                                      double variance) noexcept {
-  AxisCovariance& P = P_[static_cast<std::size_t>(axis)];
-  const AxisGain PHt = P * row;
-  const double s = row.dot(PHt) + variance;
-  for (int i = 0; i < kStates; ++i) {  // symmetric by construction
-    for (int j = i; j < kStates; ++j) P(i, j) = P(j, i) = P(i, j) - PHt[i] * PHt[j] / s;
-  }
-  return PHt * (innovation_rad / s);
+void AttitudeFilter::measure_walk(std::size_t foot, const Vec3& innovation_m, double variance_m2,
+                                  double dt_s) noexcept {
+  Whiteness& w = whiteness_[foot];
+  const double share = dt_s / (params_.whiteness_window_s + dt_s);
+  w.mean_m += share * (innovation_m - w.mean_m);
+  w.age_s += dt_s;
+  if (w.age_s < params_.whiteness_window_s) return;
+  constexpr double kMostRatio = 5.0;
+  const double white_m2 = 3.0 * variance_m2 * share / (2.0 - share);
+  const double ratio = std::min(w.mean_m.squaredNorm() / white_m2, kMostRatio);
+  walk_time_s_ += dt_s;
+  const double gain_ps =
+      std::max(params_.whiteness_gain_ps, params_.whiteness_start_gain / (walk_time_s_ + params_.whiteness_window_s));
+  contact_walk_mprs_ *= math::exp(gain_ps * dt_s * (ratio - 1.0));
+  contact_walk_mprs_ = math::clamp(contact_walk_mprs_, params_.min_contact_walk_mprs, params_.max_contact_walk_mprs);
 }
 
-void AttitudeFilter::apply(const std::array<AxisGain, 3>& corrections) noexcept {
-  const auto part = [&](int state) {
-    return Vec3{corrections[0][state], corrections[1][state], corrections[2][state]};
-  };
+void AttitudeFilter::apply(const Vector& error) noexcept {
+  const Mat3 turn = so3_exp(error.segment<3>(kAttitude));
+  odom_R_base_ = so3_renormalised(turn * odom_R_base_);
+  odom_v_base_mps_ = turn * odom_v_base_mps_ + error.segment<3>(kVelocity);
+  odom_p_base_m_ = turn * odom_p_base_m_ + error.segment<3>(kPosition);
+  gyro_bias_radps_ += error.segment<3>(kGyroBias);
+  accel_bias_mps2_ += error.segment<3>(kAccelBias);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-    const Vec3 turn_rad = odom_R_base_ * part(kFirstFoot + static_cast<int>(foot));
-    odom_R_foot_[foot] = so3_renormalised(so3_exp(turn_rad) * odom_R_foot_[foot]);
+    odom_p_contact_m_[foot] = turn * odom_p_contact_m_[foot] + error.segment<3>(of_foot(kContact, foot));
+    odom_R_foot_[foot] = so3_renormalised(so3_exp(error.segment<3>(of_foot(kSole, foot))) * odom_R_foot_[foot]);
   }
-  odom_R_base_ = so3_renormalised(odom_R_base_ * so3_exp(part(kAttitude)));
-  bias_radps_ += part(kBias);
+}
+
+Eigen::Matrix<double, 9, 9> AttitudeFilter::covariance() const noexcept {
+  // d_p = e_p - p x e, and so for velocity.
+  using Square = Eigen::Matrix<double, 9, 9>;
+  Square J = Square::Zero();
+  J.block<3, 3>(0, 0) = -skew(odom_p_base_m_);
+  J.block<3, 3>(0, 6).setIdentity();
+  J.block<3, 3>(3, 0) = -skew(odom_v_base_mps_);
+  J.block<3, 3>(3, 3).setIdentity();
+  J.block<3, 3>(6, 0).setIdentity();
+  // Products of this size would go through Eigen's blocking and its heap.
+  const Square JP = J.lazyProduct(P_.topLeftCorner<9, 9>());
+  return JP.lazyProduct(J.transpose());
+}
+
+double AttitudeFilter::velocity_sigma_mps() const noexcept {
+  const Mat3 J = skew(odom_v_base_mps_);
+  const Mat3 cross = J * P_.block<3, 3>(kAttitude, kVelocity);
+  const Mat3 P = P_.block<3, 3>(kVelocity, kVelocity) - cross - cross.transpose() +
+                 J * P_.block<3, 3>(kAttitude, kAttitude) * J.transpose();
+  return math::sqrt(std::max(P.diagonal().maxCoeff(), 0.0));
 }
 
 }  // namespace polygmap

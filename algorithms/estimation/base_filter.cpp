@@ -13,18 +13,12 @@ constexpr double kInitialVelocity_mps = 1e-2;
 
 }  // namespace
 
-LegMeasurement measure_leg(const LegGeometry& geometry, Foot leg, const JointVector& q_rad,
-                           const JointVector& dq_radps) noexcept {
-  const LegVector q = leg_joints(q_rad, leg);
-  const Eigen::Matrix<double, 6, 1> rates = leg_jacobian(geometry, leg, q) * leg_joints(dq_radps, leg);
-  return {base_T_sole(geometry, leg, q), rates.head<3>(), rates.tail<3>()};
-}
-
-void BaseFilter::initialise(const Vec3& odom_p_base_m, const ContactRows& rows) noexcept {
+void BaseFilter::initialise(const Vec3& odom_p_base_m, const Vec3& odom_v_base_mps, const ContactRows& rows) noexcept {
   for (int a = 0; a < 3; ++a) {
     AxisFilter::State x = AxisFilter::State::Zero();
     AxisFilter::State variance = AxisFilter::State::Constant(math::square(kInitialContact_m));
     x[0] = odom_p_base_m[a];
+    x[1] = odom_v_base_mps[a];
     variance[0] = 0.0;  // the origin is defined here
     variance[1] = math::square(kInitialVelocity_mps);
     for (std::size_t c = 0; c < kContactCount; ++c) {
@@ -60,7 +54,7 @@ ContactRows BaseFilter::make_rows(const Mat3& odom_R_base, const Vec3& base_w_ba
                                             : Vec3(odom_R_base * base_p_m);
       row.odom_dr_contact_mps = odom_R_base * (leg.base_v_sole_mps + leg.base_w_sole_radps.cross(base_r_m) +
                                                base_w_base_radps.cross(base_p_m));
-      row.process_m2 = walk_mprs.cwiseAbs2() * dt_s;
+      row.process_m2 = (walk_mprs.cwiseAbs2().array() + contacts[foot].walk_m2ps) * dt_s;
       row.position_m2 = math::square(position_m);
       row.velocity_m2ps2 = math::square(velocity_mps);
       row.height_m = height.odom_z_m;
@@ -88,7 +82,7 @@ void BaseFilter::share_closure(const std::array<FootContact, kFootCount>& contac
 }
 
 Vec2 BaseFilter::base_process(double dt_s) const noexcept {
-  const double velocity_m2ps2 = math::square(params_.accel_sigma_mps2 * dt_s);
+  const double velocity_m2ps2 = math::square(params_.accel_noise_mpsrs) * dt_s;
   return {0.25 * velocity_m2ps2 * dt_s * dt_s, velocity_m2ps2};
 }
 

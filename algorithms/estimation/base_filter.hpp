@@ -5,23 +5,15 @@
 
 #include "algorithms/estimation/axis_filter.hpp"
 #include "algorithms/estimation/contacts.hpp"
-#include "algorithms/robot/leg_kinematics.hpp"
+#include "algorithms/estimation/leg_measurement.hpp"
 
 namespace polygmap {
 
-// One leg as measured: pose and motion of the sole relative to the base, in base axes.
-struct LegMeasurement {
-  Transform base_T_sole;
-  Vec3 base_v_sole_mps = Vec3::Zero();
-  Vec3 base_w_sole_radps = Vec3::Zero();
-};
 // Where a foot met the ground, known a few ticks later.
 struct TouchDown {
   bool now = false;
   Transform odom_T_sole;
 };
-[[nodiscard]] LegMeasurement measure_leg(const LegGeometry& geometry, Foot leg, const JointVector& q_rad,
-                                         const JointVector& dq_radps) noexcept;
 
 // One contact's seven rows of eqs (3)-(4), turned into odom axes, with their noise.
 struct ContactRow {
@@ -43,7 +35,7 @@ struct KnownHeight {
 class BaseFilter {
  public:
   struct Params {
-    double accel_sigma_mps2 = 0.3;      // per step at 500 Hz: 6 Hz between leg kinematics and acceleration
+    double accel_noise_mpsrs = 0.0134;  // m/s/sqrt(s); 0.3 m/s^2 at 500 Hz: 6 Hz between legs and acceleration
     double velocity_sigma_mps = 0.2;    // of one contact's velocity row
     double position_sigma_m = 4e-4;     // of one contact's position row; four per foot share their error
     double closure_share = 0.97;        // of two legs' disagreement that is shared by load instead of filtered away
@@ -56,9 +48,9 @@ class BaseFilter {
   void reset(const Params& params) noexcept { *this = BaseFilter{params}; }
   BaseFilter() noexcept = default;
 
-  // odom_p_base at rest, contacts by kinematics.
-  void initialise(const Vec3& odom_p_base_m, const ContactRows& rows) noexcept;
-  // Eqs (3)-(4) with noise by contact probability and load.
+  // Contacts by kinematics.
+  void initialise(const Vec3& odom_p_base_m, const Vec3& odom_v_base_mps, const ContactRows& rows) noexcept;
+  // Eqs (3)-(4) with noise by contact and load.
   [[nodiscard]] ContactRows make_rows(const Mat3& odom_R_base, const Vec3& base_w_base_radps,
                                       const std::array<LegMeasurement, kFootCount>& legs,
                                       const std::array<FootContact, kFootCount>& contacts,

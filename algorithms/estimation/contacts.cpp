@@ -38,4 +38,20 @@ void ContactEstimator::update(const std::array<double, kFootCount>& force_n,
   stamp_ns_ = stamp_ns;
 }
 
+void ContactEstimator::update_stated(const std::array<double, kFootCount>& probability,
+                                     std::int64_t stamp_ns) noexcept {
+  const double dt_s = stamp_ns_ < 0 ? 0.0 : seconds(stamp_ns - stamp_ns_);
+  const double kept = params_.flicker_s / (params_.flicker_s + dt_s);
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    FootContact& foot = feet_[i];
+    foot.probability = std::max(probability[i], kept * foot.probability);
+    foot.landed = !foot.stands && foot.probability >= params_.stated_standing;
+    foot.stands = foot.landed || (foot.stands && foot.probability >= params_.stated_air);
+    if (foot.landed) foot.touch_ns = stamp_ns;
+  }
+  const double total = feet_[0].probability + feet_[1].probability;
+  for (FootContact& foot : feet_) foot.load_share = total > 0.0 ? foot.probability / total : 0.5;
+  stamp_ns_ = stamp_ns;
+}
+
 }  // namespace polygmap

@@ -16,9 +16,8 @@ void Estimator::reset(const Params& params) noexcept {
   counters_ = {};
   standstill_.reset(params.standstill);
   contacts_.reset(params.contacts);
-  attitude_.reset(params.attitude);
-  base_.reset(params.base);
-  fusion_.reset(params.fusion);
+  forces_.reset(params.forces);
+  odometry_.reset(params);
   ring_.clear();
   state_ = {};
   imu_ = {};
@@ -26,8 +25,7 @@ void Estimator::reset(const Params& params) noexcept {
   new_imus_ = 0;
   new_joints_ = has_imu_ = has_joints_ = has_state_ = false;
   legs_ = {};
-  touch_downs_ = {};
-  heights_ = {};
+  ground_ = {};
   stood_ = {};
   initial_odom_T_base_ = {};
   initialised_ns_ = 0;
@@ -42,39 +40,25 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   if (has_state_ && now_ns <= state_.stamp_ns) return;
   has_state_ = true;
 
-  for (TouchDown& touch_down : touch_downs_) touch_down.now = false;
+  for (TouchDown& touch_down : ground_.touch_downs) touch_down.now = false;
   if (new_joints) take_joints(planned_stance);
   if (!state_.initialised) {
     if (new_imu && new_joints) calibrate();
-    publish(now_ns, Vec3::Zero(), 0.0);
+    publish(now_ns);
     return;
   }
 
-  double dt_s = seconds(now_ns - state_.stamp_ns);
-  if (dt_s > params_.max_step_s) {
-    ++counters_.gaps;
-    dt_s = params_.max_step_s;
-  }
+  const double dt_s = seconds(now_ns - state_.stamp_ns);
+  if (dt_s > params_.max_step_s) ++counters_.gaps;
   // The last rates bridge a short silence of the IMU; beyond it the feet alone say how the base moves.
   const bool felt = seconds(now_ns - imu_.stamp_ns) <= params_.max_step_s;
-  const Vec3 gyro_radps = felt ? imu_.gyro_radps : attitude_.gyro_bias_radps();
-  attitude_.predict(gyro_radps, dt_s);
-  if (new_joints) attitude_.correct_by_feet({legs_[0].base_T_sole.R, legs_[1].base_T_sole.R}, contacts_.feet(), dt_s);
-  const Mat3& odom_R_base = attitude_.odom_R_base();
-  const Vec3 base_w_base_radps = gyro_radps - attitude_.gyro_bias_radps();
-  const ContactRows rows =
-      base_.make_rows(odom_R_base, base_w_base_radps, legs_, contacts_.feet(), touch_downs_, heights_, dt_s);
-  const Vec3 odom_a_base_mps2 = odom_R_base * imu_.accel_mps2 - Vec3{0, 0, attitude_.gravity_mps2()};
-  base_.predict(felt ? odom_a_base_mps2 : Vec3::Zero(), dt_s, rows);
-  if (new_joints) base_.correct(rows);
-  if (felt) attitude_.correct_by_gravity(imu_.accel_mps2, base_.odom_v_base_mps(), dt_s, now_ns);
-  counters_.gravity_rejected = attitude_.gravity_rejected();
-  publish(now_ns, gyro_radps, dt_s);
+  odometry_.step({dt_s, imu_.gyro_radps, imu_.accel_mps2, felt, new_joints}, legs_, contacts_.feet(), ground_);
+  publish(now_ns);
   if (seconds(now_ns - state_.oldest_input_ns) <= params_.max_step_s) ring_.push(state_);
 }
 
 void Estimator::add_lio(const LioSample& sample, std::int64_t now_ns) noexcept {
-  LioVerdict verdict = fusion_.check(sample, now_ns);
+  LioVerdict verdict = odometry_.fusion().check(sample, now_ns);
   if (verdict == LioVerdict::kAccepted) {
     // Until initialised the base has not moved; where it stood in odom is known from then on (rebase).
     StateEstimate then;
@@ -86,13 +70,13 @@ void Estimator::add_lio(const LioSample& sample, std::int64_t now_ns) noexcept {
         known = ring_.try_at(sample.stamp_ns, then);
       }
     }
-    verdict = known ? fusion_.fuse(sample, then.odom_T_base) : LioVerdict::kTooOld;
+    verdict = known ? odometry_.fusion().fuse(sample, then.odom_T_base) : LioVerdict::kNoOdometry;
   }
   ++counters_.lio[static_cast<std::size_t>(verdict)];
 }
 
 void Estimator::set_tread_height(Foot foot, double odom_z_m, double sigma_m) noexcept {
-  KnownHeight& height = heights_[index_of(foot)];
+  KnownHeight& height = ground_.heights[index_of(foot)];
   height = {};
   if (!state_.initialised || !std::isfinite(odom_z_m) || !(sigma_m > 0.0 && sigma_m < 1.0)) {
     ++counters_.height_invalid;
@@ -105,9 +89,7 @@ void Estimator::set_tread_height(Foot foot, double odom_z_m, double sigma_m) noe
 }
 
 void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
-  if (!math::all_finite(imu.gyro_radps) || !math::all_finite(imu.accel_mps2) ||
-      imu.gyro_radps.cwiseAbs().maxCoeff() > params_.max_rate_radps ||
-      imu.accel_mps2.cwiseAbs().maxCoeff() > params_.max_accel_mps2) {
+  if (!odometry_.is_valid_imu(imu.gyro_radps, imu.accel_mps2)) {
     ++counters_.imu_invalid;
     return;
   }
@@ -133,7 +115,12 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
   bool good = math::all_finite(joints.q_rad) && math::all_finite(joints.dq_radps) &&
               joints.q_rad.cwiseAbs().maxCoeff() <= params_.max_joint_rad &&
               joints.dq_radps.cwiseAbs().maxCoeff() <= params_.max_joint_speed_radps;
-  for (const double force_n : joints.foot_force_n) good = good && std::abs(force_n) <= params_.max_force_n;
+  for (const double force_n : joints.foot_force_n) {
+    good = good && (params_.infer_forces || std::abs(force_n) <= params_.max_force_n);
+  }
+  if (params_.infer_forces) {
+    good = good && math::all_finite(joints.tau_nm) && joints.tau_nm.cwiseAbs().maxCoeff() <= params_.max_torque_nm;
+  }
   if (!good) {
     ++counters_.joints_invalid;
     return;
@@ -154,6 +141,9 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
     return;
   }
   joints_ = joints;
+  if (params_.infer_forces) {  // until there is an attitude, upright
+    joints_.foot_force_n = forces_.update(params_.geometry, joints, state_.odom_T_base.R.row(2).transpose());
+  }
   for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
   has_joints_ = new_joints_ = true;
 }
@@ -163,12 +153,12 @@ void Estimator::take_joints(const std::array<bool, kFootCount>& planned_stance) 
   for (std::size_t i = 0; i < kFootCount; ++i) {
     legs_[i] = measure_leg(params_.geometry, static_cast<Foot>(i), joints_.q_rad, joints_.dq_radps);
     const FootContact& contact = contacts_.feet()[i];
-    if (stood_[i] && !contact.stands) heights_[i] = {};  // lifted: its tread's height is history
+    if (stood_[i] && !contact.stands) ground_.heights[i] = {};  // lifted: its tread's height is history
     stood_[i] = contact.stands;
     // The contact's place is that of the touch: by now the leg may have pushed on by some millimetres.
     StateEstimate then;
-    touch_downs_[i].now = contact.landed && ring_.try_at(contact.touch_ns, then);
-    if (touch_downs_[i].now) touch_downs_[i].odom_T_sole = then.odom_T_sole[i];
+    ground_.touch_downs[i].now = contact.landed && ring_.try_at(contact.touch_ns, then);
+    if (ground_.touch_downs[i].now) ground_.touch_downs[i].odom_T_sole = then.odom_T_sole[i];
   }
 }
 
@@ -176,7 +166,7 @@ void Estimator::calibrate() noexcept {
   const bool still = standstill_.try_finish(imu_, joints_);
   if (counters_.standstill_restarts != standstill_.restarts()) {
     counters_.standstill_restarts = standstill_.restarts();
-    fusion_.reset(params_.fusion);  // what it averaged was another place
+    odometry_.fusion().reset(params_.fusion);  // what it averaged was another place
   }
   if (!standstill_.collecting()) return;
 
@@ -189,39 +179,31 @@ void Estimator::calibrate() noexcept {
   }
   if (!still) return;
 
-  attitude_.initialise(initial_odom_T_base_.R, standstill_.gyro_bias_radps(), standstill_.gravity_mps2(),
-                       {legs_[0].base_T_sole.R, legs_[1].base_T_sole.R});
-  heights_.fill({0.0, params_.floor_sigma_m});
-  // Feet not yet standing: the contacts begin where kinematics has them.
-  base_.initialise(initial_odom_T_base_.p_m,
-                   base_.make_rows(initial_odom_T_base_.R, Vec3::Zero(), legs_, {}, {}, {}, params_.max_step_s));
-  fusion_.rebase(initial_odom_T_base_);
+  AttitudeFilter::Start start;
+  start.odom_R_base = initial_odom_T_base_.R;
+  start.odom_p_base_m = initial_odom_T_base_.p_m;
+  start.gyro_bias_radps = standstill_.gyro_bias_radps();
+  start.gravity_mps2 = standstill_.gravity_mps2();
+  odometry_.initialise(start, legs_, params_.max_step_s);
+  ground_.heights.fill({0.0, params_.floor_sigma_m});
+  odometry_.fusion().rebase(initial_odom_T_base_);
   initialised_ns_ = std::max(imu_.stamp_ns, joints_.stamp_ns);
   state_.initialised = true;
 }
 
-void Estimator::publish(std::int64_t now_ns, const Vec3& gyro_radps, double dt_s) noexcept {
-  const Vec3 before_m = state_.odom_T_base.p_m;
+void Estimator::publish(std::int64_t now_ns) noexcept {
   state_.stamp_ns = now_ns;
   state_.oldest_input_ns = std::min(imu_.stamp_ns, joints_.stamp_ns);
-  if (dt_s > 0.0) {
-    state_.odom_T_base = {attitude_.odom_R_base(), base_.odom_p_base_m()};
-    state_.odom_v_base_mps = base_.odom_v_base_mps();
-    state_.base_w_base_radps = gyro_radps - attitude_.gyro_bias_radps();
-    fusion_.tick(state_.odom_T_base, (state_.odom_T_base.p_m - before_m).norm(), dt_s);
+  if (state_.initialised) {
+    odometry_.describe(now_ns, state_);
   } else {
     state_.odom_T_base = initial_odom_T_base_;
   }
-  state_.world_T_odom = fusion_.world_T_odom();
   state_.q_rad = joints_.q_rad;
   for (std::size_t i = 0; i < kFootCount; ++i) {
     state_.odom_T_sole[i] = state_.odom_T_base * legs_[i].base_T_sole;
     state_.contact_probability[i] = contacts_.feet()[i].probability;
   }
-  state_.position_sigma_m.setConstant(fusion_.position_sigma_m());
-  state_.yaw_sigma_rad = fusion_.yaw_sigma_rad();
-  state_.tilt_sigma_rad = attitude_.tilt_sigma_rad();
-  state_.lio_age_ns = fusion_.last_accepted_ns() < 0 ? -1 : now_ns - fusion_.last_accepted_ns();
 }
 
 }  // namespace polygmap

@@ -2,11 +2,8 @@
 // State estimation as one stage: samples in as they arrive, StateEstimate out once per 2 ms.
 #pragma once
 
-#include "algorithms/core/state.hpp"
-#include "algorithms/estimation/attitude_filter.hpp"
-#include "algorithms/estimation/base_filter.hpp"
-#include "algorithms/estimation/contacts.hpp"
-#include "algorithms/estimation/odometry_fusion.hpp"
+#include "algorithms/estimation/force_inference.hpp"
+#include "algorithms/estimation/odometry.hpp"
 #include "algorithms/estimation/standstill.hpp"
 #include "algorithms/estimation/state_ring.hpp"
 
@@ -14,19 +11,16 @@ namespace polygmap {
 
 class Estimator {
  public:
-  struct Params {
+  struct Params : Odometry::Params {
     LegGeometry geometry;
     StandstillCalibration::Params standstill;
     ContactEstimator::Params contacts;
-    AttitudeFilter::Params attitude;
-    BaseFilter::Params base;
-    OdometryFusion::Params fusion;
-    double max_rate_radps = 20.0;  // sensor samples beyond these are invalid
-    double max_accel_mps2 = 100.0;
-    double max_joint_rad = 4.0;
+    bool infer_forces = false;  // foot forces from joint torques: no sensor measures them
+    ForceInference::Params forces;
+    double max_torque_nm = 1000.0;
+    double max_joint_rad = 4.0;           // sensor samples beyond these are invalid
     double max_joint_speed_radps = 15.0;  // also against the last sample: a single wrong angle is not a motion
     double max_force_n = 5000.0;
-    double max_step_s = 0.05;  // a longer gap is bridged with this much time; older rates are not believed
     std::int64_t max_lead_ns = 10 * kNsPerMs;  // of a stamp before now: frames caught up run up to 6 ms late
     double max_height_error_m = 0.03;          // of a tread against the sole on it
     double floor_sigma_m = 0.003;              // of the floor under the feet at the start
@@ -42,7 +36,6 @@ class Estimator {
     std::uint32_t joints_jump = 0;  // moved faster than a joint can
     std::uint32_t gaps = 0;         // longer than max_step_s
     std::uint32_t standstill_restarts = 0;
-    std::uint32_t gravity_rejected = 0;
     std::uint32_t height_taken = 0;
     std::uint32_t height_invalid = 0;
     std::uint32_t height_rejected = 0;  // disagreed by more than max_height_error_m
@@ -67,7 +60,7 @@ class Estimator {
   void set_tread_height(Foot foot, double odom_z_m, double sigma_m) noexcept;
 
   [[nodiscard]] const StateEstimate& state() const noexcept { return state_; }
-  // The last accepted feedback; has_joints() is false before the first one.
+  // The last accepted feedback, its forces inferred where they are not sensed; has_joints() is false before the first.
   [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
   [[nodiscard]] bool has_joints() const noexcept { return has_joints_; }
   [[nodiscard]] std::int64_t newest_imu_ns() const noexcept { return imu_.stamp_ns; }  // accepted; 0: none yet
@@ -76,21 +69,21 @@ class Estimator {
   [[nodiscard]] bool try_state_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {
     return ring_.try_at(stamp_ns, out);
   }
+  [[nodiscard]] const LioInnovations& lio_innovations() const noexcept { return odometry_.fusion().innovations(); }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
-  [[nodiscard]] const Vec3& gyro_bias_radps() const noexcept { return attitude_.gyro_bias_radps(); }
+  [[nodiscard]] const Vec3& gyro_bias_radps() const noexcept { return odometry_.attitude().gyro_bias_radps(); }
 
  private:
   void take_joints(const std::array<bool, kFootCount>& planned_stance) noexcept;
   void calibrate() noexcept;
-  void publish(std::int64_t now_ns, const Vec3& gyro_radps, double dt_s) noexcept;
+  void publish(std::int64_t now_ns) noexcept;
 
   Params params_;
   Counters counters_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;
-  AttitudeFilter attitude_;
-  BaseFilter base_;
-  OdometryFusion fusion_;
+  ForceInference forces_;
+  Odometry odometry_;
   StateRing ring_;
   StateEstimate state_;
   ImuSample imu_;               // last accepted; rates: the mean of those of its tick
@@ -100,9 +93,8 @@ class Estimator {
   bool has_imu_ = false;
   bool has_joints_ = false;
   bool has_state_ = false;
-  std::array<LegMeasurement, kFootCount> legs_;
-  std::array<TouchDown, kFootCount> touch_downs_;
-  std::array<KnownHeight, kFootCount> heights_;
+  Odometry::Legs legs_;
+  Odometry::Ground ground_;
   std::array<bool, kFootCount> stood_{};
   Transform initial_odom_T_base_;  // stood still there until initialised_ns_
   std::int64_t initialised_ns_ = 0;

@@ -16,10 +16,6 @@ bool plausible_sigma(const Vec3& sigma, double max) noexcept {
 }
 double stated_or(double stated, double otherwise) noexcept { return stated > 0.0 ? stated : otherwise; }
 
-// A low-pass of gain g lets g^2 of a new value's variance in and keeps (1 - g)^2 of the old.
-double blended_sigma(double old_sigma, double new_sigma, double gain) noexcept {
-  return math::sqrt(math::square((1.0 - gain) * old_sigma) + math::square(gain * new_sigma));
-}
 double share_within(double length, double limit) noexcept { return length > limit ? limit / length : 1.0; }
 
 }  // namespace
@@ -39,23 +35,23 @@ Transform fuse_pose(const Transform& world_T_base, const Transform& lio_world_T_
 void OdometryFusion::reset(const Params& params) noexcept {
   *this = OdometryFusion{};
   params_ = params;
-  sigma_m_ = params.initial_sigma_m;
-  sigma_rad_ = params.initial_sigma_rad;
+  uncertainty_.reset(params.uncertainty);
+  position_sigma_m_ = uncertainty_.position_sigma_m(Vec3::Zero());
 }
 
 LioVerdict OdometryFusion::check(const LioSample& sample, std::int64_t now_ns) const noexcept {
-  if (!math::all_finite(sample.lio_T_lidar.R) || !math::all_finite(sample.lio_T_lidar.p_m) ||
-      sample.lio_T_lidar.p_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) {
+  if (!math::all_finite(sample.lio_T_lidar.R) || !math::all_finite(sample.lio_T_lidar.p_m)) {
     return LioVerdict::kNonFinite;
   }
+  if (sample.lio_T_lidar.p_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) return LioVerdict::kOutOfRange;
   if (!is_rotation(sample.lio_T_lidar.R, kOrthonormalTolerance)) return LioVerdict::kNotRotation;
   if (!plausible_sigma(sample.position_sigma_m, params_.max_position_sigma_m) ||
       !plausible_sigma(sample.rotation_sigma_rad, params_.max_rotation_sigma_rad)) {
     return LioVerdict::kCovariance;
   }
   if (sample.stamp_ns > now_ns) return LioVerdict::kFuture;
-  if (sample.stamp_ns <= last_stamp_ns_) return LioVerdict::kOrder;
   if (seconds(now_ns - sample.stamp_ns) > params_.max_age_s) return LioVerdict::kTooOld;
+  if (sample.stamp_ns <= last_stamp_ns_) return LioVerdict::kOrder;
   return LioVerdict::kAccepted;
 }
 
@@ -63,17 +59,20 @@ LioVerdict OdometryFusion::fuse(const LioSample& sample, const Transform& odom_T
   last_stamp_ns_ = sample.stamp_ns;
   const Transform lidar{so3_renormalised(sample.lio_T_lidar.R), sample.lio_T_lidar.p_m};
   const Transform lio_T_base = base_from_lidar(lidar, params_.base_T_lidar);
+  const LioSigmas sigmas = sigmas_of(sample);
   if (count_ == 0) {
-    lio_T_odom_ = lio_T_base * odom_T_base.inverse();
+    world_T_lio_ = odom_T_base * lio_T_base.inverse();
     count_ = 1;
     last_accepted_ns_ = sample.stamp_ns;
+    tie(odom_T_base, sigmas, count_);
     return LioVerdict::kAccepted;
   }
 
   const double silence_s = seconds(sample.stamp_ns - last_accepted_ns_);
-  const Transform predicted = lio_T_odom_ * odom_T_base;
-  if (is_jump(predicted, lio_T_base, silence_s)) {
-    if (!try_realign(lio_T_base, odom_T_base)) return LioVerdict::kJump;
+  const Transform predicted = fused_world_T_odom_ * odom_T_base;
+  const Transform measured = world_T_lio_ * lio_T_base;
+  if (is_jump(predicted, measured, silence_s)) {
+    if (!try_realign(lio_T_base, odom_T_base, sigmas)) return LioVerdict::kJump;
     last_accepted_ns_ = sample.stamp_ns;
     return LioVerdict::kRealigned;
   }
@@ -82,41 +81,40 @@ LioVerdict OdometryFusion::fuse(const LioSample& sample, const Transform& odom_T
 
   const double gain = complementary_gain(std::min(silence_s, params_.max_gap_s), params_.tau_s);
   if (aligned_) {
-    lio_T_odom_ = fuse_pose(predicted, lio_T_base, gain) * odom_T_base.inverse();
-    narrow_sigmas(sample, gain);
+    observe(predicted, measured, sigmas, sample.stamp_ns);
+    fused_world_T_odom_ = fuse_pose(predicted, measured, gain) * odom_T_base.inverse();
+    fused_world_T_odom_.R = so3_renormalised(fused_world_T_odom_.R);
+    uncertainty_.blend(gain, sigmas.position_m, sigmas.rotation_rad);
   } else {
-    const double averaging = 1.0 / static_cast<double>(++count_);
-    lio_T_odom_ = fuse_pose(predicted, lio_T_base, averaging) * odom_T_base.inverse();
-    if (averaging <= gain) {
-      aligned_ = true;
-      world_T_lio_ = lio_T_odom_.inverse();
-    }
+    align(predicted, lio_T_base, sigmas, gain);
   }
-  lio_T_odom_.R = so3_renormalised(lio_T_odom_.R);
   return LioVerdict::kAccepted;
 }
 
 void OdometryFusion::rebase(const Transform& new_T_old) noexcept {
-  lio_T_odom_ = lio_T_odom_ * new_T_old.inverse();
-  if (aligned_) world_T_lio_ = lio_T_odom_.inverse();
+  world_T_lio_ = new_T_old * fused_world_T_odom_.inverse() * world_T_lio_;
+  fused_world_T_odom_ = {};
+  uncertainty_.rebase(new_T_old);
   jumped_count_ = 0;
 }
 
-void OdometryFusion::tick(const Transform& odom_T_base, double travelled_m, double dt_s) noexcept {
-  sigma_m_ += params_.drift_per_m * travelled_m;
-  sigma_rad_ += params_.drift_yaw_radps * dt_s;
-  const Transform wanted = target() * odom_T_base;
+void OdometryFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept {
+  uncertainty_.move(world_T_odom_.R * odom_step_m, dt_s);
+  const Transform wanted = fused_world_T_odom_ * odom_T_base;
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
   const Vec3 turn_rad = so3_log(wanted.R * now.R.transpose());
-  const double move_share = share_within(move_m.norm(), params_.slew_m);
-  const double turn_share = share_within(turn_rad.norm(), params_.slew_rad);
+  const double slew_s = std::min(dt_s, params_.max_slew_s);
+  const double move_share = share_within(move_m.norm(), params_.slew_mps * slew_s);
+  const double turn_share = share_within(turn_rad.norm(), params_.slew_radps * slew_s);
   if (move_share >= 1.0 && turn_share >= 1.0) {
-    world_T_odom_ = target();
-    return;
+    world_T_odom_ = fused_world_T_odom_;
+  } else {
+    const Transform next{so3_renormalised(so3_exp(turn_share * turn_rad) * now.R), now.p_m + move_share * move_m};
+    world_T_odom_ = next * odom_T_base.inverse();
   }
-  const Transform next{so3_renormalised(so3_exp(turn_share * turn_rad) * now.R), now.p_m + move_share * move_m};
-  world_T_odom_ = next * odom_T_base.inverse();
+  const Vec3 held_back_m = (1.0 - move_share) * move_m;
+  position_sigma_m_ = (uncertainty_.position_sigma_m(wanted.p_m).cwiseAbs2() + held_back_m.cwiseAbs2()).cwiseSqrt();
 }
 
 bool OdometryFusion::is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept {
@@ -126,7 +124,8 @@ bool OdometryFusion::is_jump(const Transform& predicted, const Transform& measur
          so3_log(predicted.R.transpose() * measured.R).norm() > bound_rad;
 }
 
-bool OdometryFusion::try_realign(const Transform& lio_T_base, const Transform& odom_T_base) noexcept {
+bool OdometryFusion::try_realign(const Transform& lio_T_base, const Transform& odom_T_base,
+                                 const LioSigmas& sigmas) noexcept {
   const bool agrees = jumped_count_ > 0 && !is_jump(jumped_lio_T_odom_ * odom_T_base, lio_T_base, 0.0);
   jumped_count_ = agrees ? jumped_count_ + 1 : 1;
   const Transform before = agrees ? jumped_lio_T_odom_ * odom_T_base : lio_T_base;
@@ -134,24 +133,52 @@ bool OdometryFusion::try_realign(const Transform& lio_T_base, const Transform& o
   jumped_lio_T_odom_.R = so3_renormalised(jumped_lio_T_odom_.R);
   const bool first_pose_contradicted = !aligned_ && count_ == 1;
   if (jumped_count_ < params_.realign_count && !first_pose_contradicted) return false;
-  if (aligned_) {
-    world_T_lio_ = target() * jumped_lio_T_odom_.inverse();  // our world stays where it is
-  } else {
-    count_ = jumped_count_;
-  }
-  lio_T_odom_ = jumped_lio_T_odom_;
+  world_T_lio_ = fused_world_T_odom_ * jumped_lio_T_odom_.inverse();  // our world stays where it is
+  tie(odom_T_base, sigmas, jumped_count_);
+  count_ = jumped_count_;
   jumped_count_ = 0;
   return true;
 }
 
-void OdometryFusion::narrow_sigmas(const LioSample& sample, double gain) noexcept {
+OdometryFusion::LioSigmas OdometryFusion::sigmas_of(const LioSample& sample) const noexcept {
   const double rotation_rad = stated_or(sample.rotation_sigma_rad.maxCoeff(), params_.default_rotation_sigma_rad);
   const double lidar_m = stated_or(sample.position_sigma_m.maxCoeff(), params_.default_position_sigma_m);
   const double lever_m = params_.base_T_lidar.p_m.norm() * rotation_rad;
-  sigma_m_ = blended_sigma(sigma_m_, math::sqrt(math::square(lidar_m) + math::square(lever_m)), gain);
-  sigma_rad_ = blended_sigma(sigma_rad_, rotation_rad, gain);
+  return {math::sqrt(math::square(lidar_m) + math::square(lever_m)), rotation_rad};
 }
 
-Transform OdometryFusion::target() const noexcept { return aligned_ ? world_T_lio_ * lio_T_odom_ : Transform{}; }
+void OdometryFusion::observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,
+                             std::int64_t stamp_ns) noexcept {
+  LioInnovations& i = innovations_;
+  i.stamp_ns = stamp_ns;
+  i.last.head<3>() = measured.p_m - predicted.p_m;
+  i.last[3] = so3_log(measured.R * predicted.R.transpose()).z();
+  LioInnovations::Quantities variance = uncertainty_.offset_variance();
+  variance.head<3>().array() += math::square(sigmas.position_m);
+  variance[3] += math::square(sigmas.rotation_rad);
+  i.normalised_last = i.last.cwiseAbs2().cwiseQuotient(variance);
+  ++i.count;
+  i.normalised_mean += (i.normalised_last - i.normalised_mean) / static_cast<double>(i.count);
+}
+
+// Moves LIO's world against ours, so that its pose comes nearer to the odometry's by the tie's share of the innovation.
+void OdometryFusion::align(const Transform& predicted, const Transform& lio_T_base, const LioSigmas& sigmas,
+                           double gain) noexcept {
+  const FusionUncertainty::TieGains gains = uncertainty_.tie_gains(sigmas.position_m, sigmas.rotation_rad);
+  const Transform measured = world_T_lio_ * lio_T_base;
+  const Transform nearer{fuse_pose(measured, predicted, gains.rotation).R,
+                         fuse_pose(measured, predicted, gains.position).p_m};
+  world_T_lio_ = nearer * lio_T_base.inverse();
+  world_T_lio_.R = so3_renormalised(world_T_lio_.R);
+  uncertainty_.average(gains, sigmas.position_m, sigmas.rotation_rad);
+  ++count_;
+  aligned_ = gains.position <= gain * (1.0 + 1e-9);
+}
+
+// LIO's world, as the mean of so many poses has it, is where ours is now.
+void OdometryFusion::tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept {
+  const double share = 1.0 / math::sqrt(static_cast<double>(poses));
+  uncertainty_.tie(fused_world_T_odom_ * odom_T_base.p_m, share * sigmas.position_m, share * sigmas.rotation_rad);
+}
 
 }  // namespace polygmap

@@ -8,9 +8,11 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "algorithms/core/samples.hpp"
 #include "algorithms/core/transform.hpp"
+#include "algorithms/estimation/fusion_uncertainty.hpp"
 #include "algorithms/robot/model.hpp"
 
 namespace polygmap {
@@ -30,11 +32,24 @@ enum class LioVerdict : std::uint8_t {
   kCovariance,  // a stated sigma is negative, not finite or absurd
   kOrder,       // not newer than the last one
   kFuture,      // stamped later than now
-  kTooOld,      // older than max_age_s, or than the standstill at the start
+  kTooOld,      // older than max_age_s
+  kNoOdometry,  // none known at its stamp: earlier than the standstill at the start, or a sensor was silent
   kJump,        // too far from the prediction
   kRealigned,   // accepted: a lasting jump of LIO's own world was taken as its new alignment
+  kOutOfRange,  // finite, but farther off than any LIO goes
 };
-inline constexpr std::size_t kLioVerdictCount = 9;
+inline constexpr std::size_t kLioVerdictCount = 11;
+
+// How far accepted LIO poses lay from their predictions, once aligned: x, y, z in m and yaw in rad, world axes.
+// Normalised: squared, over its variance; 1 in the mean where all sigmas are honest.
+struct LioInnovations {
+  using Quantities = FusionUncertainty::Quantities;
+  std::int64_t stamp_ns = -1;  // of the last one; -1: none yet
+  std::uint32_t count = 0;
+  Quantities last = Quantities::Zero();
+  Quantities normalised_last = Quantities::Zero();
+  Quantities normalised_mean = Quantities::Zero();
+};
 
 class OdometryFusion {
  public:
@@ -54,12 +69,10 @@ class OdometryFusion {
     double max_jump_m = 0.5;
     double max_jump_rad = 0.3;
     std::uint32_t realign_count = 20;  // jumped poses in a row that agree among themselves
-    double slew_m = 2e-4;              // most that one tick moves the fused pose by
-    double slew_rad = 3.5e-4;          // 0.02 deg
-    double drift_per_m = 0.01;         // odometry alone: of the way gone
-    double drift_yaw_radps = 1e-4;     // what standstill leaves of the gyro's bias
-    double initial_sigma_m = 1e-3;
-    double initial_sigma_rad = 1e-3;
+    double slew_mps = 0.1;             // most that the fused pose moves by: 0.2 mm in a tick of 2 ms ...
+    double slew_radps = 0.175;         // ... and 0.02 deg
+    double max_slew_s = 0.01;          // longer ticks move it by no more than one of these: 1 mm
+    FusionUncertainty::Params uncertainty;
   };
   void reset(const Params& params) noexcept;
 
@@ -70,33 +83,47 @@ class OdometryFusion {
   // The odometry chooses its origin: what was old_p is now new_T_old * old_p. The world follows.
   void rebase(const Transform& new_T_old) noexcept;
 
-  // Once per tick: moves the published offset towards the fused one within the slew limits, lets the sigmas grow.
-  void tick(const Transform& odom_T_base, double travelled_m, double dt_s) noexcept;
+  // Variances of the odometry that its own filter says grew: x, y, z besides what the heading does, and yaw.
+  void grow(const FusionUncertainty::Quantities& variance) noexcept { uncertainty_.grow(variance); }
+  // Once per tick: moves the published offset towards the fused one within the slew limits, which hold at the base,
+  // wherever odom's origin is; lets the sigmas grow. odom_step: by which the odometry moved the base since the last.
+  void tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept;
   [[nodiscard]] const Transform& world_T_odom() const noexcept { return world_T_odom_; }
-  [[nodiscard]] double position_sigma_m() const noexcept { return sigma_m_; }
-  [[nodiscard]] double yaw_sigma_rad() const noexcept { return sigma_rad_; }
+  // Of the published pose, world axes; what the slew limit still holds back counts as error.
+  [[nodiscard]] const Vec3& position_sigma_m() const noexcept { return position_sigma_m_; }
+  [[nodiscard]] double yaw_sigma_rad() const noexcept { return uncertainty_.yaw_sigma_rad(); }
+  [[nodiscard]] bool aligned() const noexcept { return aligned_; }  // until then the fused pose is the odometry's
+  [[nodiscard]] const LioInnovations& innovations() const noexcept { return innovations_; }
   [[nodiscard]] std::int64_t last_accepted_ns() const noexcept { return last_accepted_ns_; }  // -1: none
 
  private:
+  struct LioSigmas {
+    double position_m, rotation_rad;  // of the base
+  };
   [[nodiscard]] bool is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept;
-  [[nodiscard]] bool try_realign(const Transform& lio_T_base, const Transform& odom_T_base) noexcept;
-  void narrow_sigmas(const LioSample& sample, double gain) noexcept;
-  [[nodiscard]] Transform target() const noexcept;
+  [[nodiscard]] bool try_realign(const Transform& lio_T_base, const Transform& odom_T_base,
+                                 const LioSigmas& sigmas) noexcept;
+  [[nodiscard]] LioSigmas sigmas_of(const LioSample& sample) const noexcept;
+  void observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,
+               std::int64_t stamp_ns) noexcept;
+  void align(const Transform& predicted, const Transform& lio_T_base, const LioSigmas& sigmas, double gain) noexcept;
+  void tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept;
 
   Params params_;
-  // LIO's world is not ours. The first poses, with a gain of 1/n until that is eq. (9)'s, say where odom lies in it;
-  // there world is odom, and from then on lio_T_odom moves as the odometry drifts.
-  Transform lio_T_odom_;
+  // LIO's world is not ours. The first poses say where it lies, while world is odom: each by its weight against the
+  // drift since the first. Once that is no more than eq. (9)'s gain the tie stays and odom moves as it drifts.
   Transform world_T_lio_;
   bool aligned_ = false;
-  std::uint32_t count_ = 0;  // poses averaged into the alignment
-  Transform world_T_odom_;   // published
+  std::uint32_t count_ = 0;       // poses averaged into the alignment
+  Transform fused_world_T_odom_;  // towards which the published one moves
+  Transform world_T_odom_;        // published
   Transform jumped_lio_T_odom_;
   std::uint32_t jumped_count_ = 0;
-  std::int64_t last_stamp_ns_ = -1;  // of any pose that was in order
+  std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();  // of any pose that was in order
   std::int64_t last_accepted_ns_ = -1;
-  double sigma_m_ = 0.0;
-  double sigma_rad_ = 0.0;
+  FusionUncertainty uncertainty_;
+  Vec3 position_sigma_m_ = Vec3::Zero();
+  LioInnovations innovations_;
 };
 
 }  // namespace polygmap

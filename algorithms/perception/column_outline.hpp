@@ -4,6 +4,8 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
+#include <type_traits>
 
 #include "algorithms/perception/column_image.hpp"
 #include "algorithms/perception/outline.hpp"
@@ -21,14 +23,15 @@ struct ColumnEnds {
 };
 
 struct SurfaceProfile {
-  static constexpr std::uint8_t kNoColumn = 255;
+  using Column = std::conditional_t<(kColumns < 256), std::uint8_t, std::uint16_t>;
+  static constexpr Column kNoColumn = std::numeric_limits<Column>::max();
   SurfaceProfile() noexcept {
     left.fill(kNoColumn);
     right.fill(kNoColumn);
   }
   std::array<ColumnEnds, kColumns> columns{};
-  std::array<std::uint8_t, kDepthHeight_px> left{};  // first and last column of each row
-  std::array<std::uint8_t, kDepthHeight_px> right{};
+  std::array<Column, kDepthHeight_px> left{};  // first and last column of each row
+  std::array<Column, kDepthHeight_px> right{};
   std::int16_t first_row = kDepthHeight_px;
   std::int16_t last_row = -1;
 };

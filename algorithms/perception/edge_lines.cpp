@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "algorithms/perception/counter_random.hpp"
 #include "algorithms/perception/vectors.hpp"
 
 namespace polygmap {
@@ -365,13 +366,18 @@ EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
       return Outcome::kAgain;
     }
     if (agree) {
-      t_lo = meet_lo;
-      t_hi = meet_hi;
-      const auto sigma = [&](double s, double t) {
-        const Vec3 p = origin_m_ + s * along_ + t * across_;
-        return plane_sigma_m(other_, other_covariance_, p / p.z());
+      // Both by their information. Change-points are also skewed towards the less noisy plane, which their scatter
+      // hides: over six seeds of generated stairs 2 gives a mean p95 of 0.69 / 2.14 mm in white / correlated noise, 1
+      // gives 0.80 / 2.14, and where the planes meet alone 0.59 / 2.32.
+      constexpr double kSeenLess = 2.0;
+      const double seen2 = kSeenLess * math::square(line.sigma_m);
+      const auto join = [&](double s, double meet, double& t) {
+        const Vec3 p = origin_m_ + s * along_ + meet * across_;
+        const double met2 = math::square(plane_sigma_m(other_, other_covariance_, p / p.z()));
+        t = (seen2 * meet + met2 * t) / (seen2 + met2);
+        return math::sqrt(seen2 * met2 / (seen2 + met2));
       };
-      line.sigma_m = std::max(sigma(lo, t_lo), sigma(hi, t_hi));
+      line.sigma_m = std::max(join(lo, meet_lo, t_lo), join(hi, meet_hi, t_hi));
     }
   }
   line.a_m = origin_m_ + lo * along_ + t_lo * across_;

@@ -7,7 +7,7 @@
 
 #include "algorithms/core/surfaces.hpp"
 #include "algorithms/perception/column_image.hpp"
-#include "algorithms/perception/images.hpp"
+#include "algorithms/perception/depth_sigma.hpp"
 #include "algorithms/perception/plane_fit.hpp"
 
 namespace polygmap {

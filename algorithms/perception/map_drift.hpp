@@ -16,7 +16,7 @@ class MapDrift {
  public:
   struct Params {
     double bound_sigmas = 3.0;          // of the pose, along each axis: what is further off is no drift
-    double walk_m_per_sqrt_s = 0.0015;  // while the pose's sigma does not grow
+    double walk_m_per_sqrt_s = 0.0015;  // while the pose's sigma does not grow; of what is out of view, too
     // What is common to a frame and gone in the next: of the depth image, of the pose at the exposure. With it and the
     // walk, half of a step in the pose's world is in the drift after 13 frames.
     double frame_sigma_m = 0.005;

@@ -43,7 +43,8 @@ bool valid(const PolygonMap::View& view) noexcept {
   return math::all_finite(R) && math::all_finite(view.world_T_camera.p_m) &&
          (R * R.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-6 && view.position_sigma_m >= 0.0 &&
          std::isfinite(view.position_sigma_m) && view.tilt_sigma_rad >= 0.0 && std::isfinite(view.tilt_sigma_rad) &&
-         view.intrinsics.fx_px > 0.0 && view.intrinsics.fy_px > 0.0;
+         view.mount_sigma_rad >= 0.0 && std::isfinite(view.mount_sigma_rad) && view.intrinsics.fx_px > 0.0 &&
+         view.intrinsics.fy_px > 0.0;
 }
 
 EdgeLine moved(const Transform& a_T_b, const EdgeLine& line) noexcept {
@@ -150,9 +151,8 @@ Progress PolygonMap::step(WorkBudget& budget) noexcept {
         stage_ = Stage::kLoad;
         break;
       case Stage::kAge:
-        budget.spend(1);
         if (track_ < tracks_.size()) {
-          age(tracks_[track_++]);
+          budget.spend(age(tracks_[track_++]));
         } else {
           stage_ = Stage::kPublish;
         }
@@ -180,7 +180,8 @@ bool PolygonMap::load(const SurfacePatch& patch) noexcept {
   seen_.offset_variance_m2 = math::square(std::max(patch.offset_sigma_m, kMinSeenSigma_m));
   seen_.tilt_variance_rad2 = math::square(std::max(patch.tilt_sigma_rad, kMinTilt_rad));
   const double range2_m2 = (seen_.centroid_m - map_T_camera_.p_m).squaredNorm();
-  seen_.pose_variance_m2 = math::square(view_.position_sigma_m) + math::square(view_.tilt_sigma_rad) * range2_m2;
+  seen_.pose_variance_m2 = math::square(view_.position_sigma_m) +
+                           (math::square(view_.tilt_sigma_rad) + math::square(view_.mount_sigma_rad)) * range2_m2;
   seen_.rmse_m = patch.rmse_m;
   seen_.invalid_fraction = patch.invalid_fraction;
   seen_.polygon.clear();

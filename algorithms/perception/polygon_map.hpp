@@ -47,7 +47,6 @@ class PolygonMap {
     std::uint32_t misses_confirmed = 90;
     double unconfirmed_age_s = 2.0;      // unconfirmed and out of view
     double systematic_sigma_m = 0.0015;  // of depth errors that repeat from frame to frame and do not average out
-    double drift_m_per_sqrt_s = 0.0015;  // of the world pose while a surface is out of view
     double view_margin_px = 30.0;
     double view_range_m = 2.5;
     double view_min_incidence = 0.25;  // sine of the angle between ray and surface
@@ -58,10 +57,11 @@ class PolygonMap {
   struct View {
     Transform world_T_camera;       // at the exposure
     double position_sigma_m = 0.0;  // of that pose
-    double tilt_sigma_rad = 0.0;
+    double tilt_sigma_rad = 0.0;    // of the base
     CameraIntrinsics intrinsics;
     std::array<LegShapes, kFootCount> body{};  // camera frame; what it hides is not seen to be empty
     BodyMargin body_margin{0.02, 0.0};
+    double mount_sigma_rad = 0.0;  // of the camera's roll and pitch on the base: between what is seen and the feet
   };
   struct Counters {
     std::uint32_t frames = 0;
@@ -122,9 +122,10 @@ class PolygonMap {
   void create() noexcept;
   void admit(const MapTrack& track) noexcept;
   [[nodiscard]] int claim(const MapTrack& track) const noexcept;
-  void fuse(MapTrack& track) noexcept;
+  // offset_m: of the seen plane along the remembered normal, at the track's origin; fade: of what was known.
+  void fuse(MapTrack& track, double offset_m, double fade) noexcept;
   void merge(MapTrack& into, MapTrack& from) noexcept;
-  void age(MapTrack& track) noexcept;
+  [[nodiscard]] std::int32_t age(MapTrack& track) noexcept;
   [[nodiscard]] std::int32_t publish() noexcept;
 
   [[nodiscard]] ConvexPolygon local_polygon(const MapTrack& track) const noexcept;
@@ -136,7 +137,8 @@ class PolygonMap {
   void update_sides(MapTrack& track, bool first) noexcept;
   void update_side(TrackedSide& side, double seen_m, bool observed) noexcept;
   void rebuild(MapTrack& track) noexcept;
-  [[nodiscard]] bool should_be_seen(const MapTrack& track) const noexcept;
+  [[nodiscard]] bool in_view(const MapTrack& track, const Transform& camera_T_local) const noexcept;
+  [[nodiscard]] bool hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept;
   [[nodiscard]] double faded(std::int64_t since_ns) const noexcept;
   void write(const MapTrack& track, MapPolygon& out) const noexcept;
   void write_sigmas(const MapTrack& track, SurfacePatch& out) const noexcept;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The polygon map: what others get to see.
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <utility>
 
@@ -63,18 +64,23 @@ void PolygonMap::write(const MapTrack& track, MapPolygon& out) const noexcept {
   out.last_seen_ns = track.last_seen_ns;
 }
 
-// Against the robot, which stands where its map has it: the error of the pose is theirs in common.
+// Against the robot, which stands where its map has it: the error of the pose is theirs in common, that of the camera's
+// mount is not. It turns what is seen about the camera, a tread's height by its distance, an edge by its depth below.
 void PolygonMap::write_sigmas(const MapTrack& track, SurfacePatch& out) const noexcept {
-  const double common = math::square(params_.systematic_sigma_m);
-  const auto sigma = [&](double variance, std::int64_t seen_ns) {
-    return math::sqrt(variance + common + math::square(params_.drift_m_per_sqrt_s) * seconds(newest_ns_ - seen_ns));
+  const double common_m2 = math::square(params_.systematic_sigma_m), mount_rad2 = math::square(view_.mount_sigma_rad);
+  const auto sigma = [&](double variance_m2, double arm2_m2, std::int64_t seen_ns) {
+    return math::sqrt(variance_m2 + common_m2 + mount_rad2 * arm2_m2 +
+                      math::square(params_.drift.walk_m_per_sqrt_s) * seconds(newest_ns_ - seen_ns));
   };
-  out.offset_sigma_m = sigma(1.0 / track.offset_information, track.last_seen_ns);
-  out.tilt_sigma_rad = math::sqrt(1.0 / track.tilt_information + math::square(view_.tilt_sigma_rad));
+  const auto arm_m = [this](const Vec3& p_m) { return Vec3{p_m - map_T_camera_.p_m}; };
+  out.offset_sigma_m =
+      sigma(1.0 / track.offset_information, out.normal.cross(arm_m(out.centroid_m)).squaredNorm(), track.last_seen_ns);
+  out.tilt_sigma_rad = math::sqrt(1.0 / track.tilt_information + math::square(view_.tilt_sigma_rad) + mount_rad2);
   for (const auto& [line, edge] : {std::pair{&track.nosing, &out.nosing}, std::pair{&track.back, &out.back}}) {
     if (!edge->valid) continue;
-    const double y_m = local_xy(track.world_T_local, 0.5 * (edge->a_m + edge->b_m)).y();
-    edge->sigma_m = sigma(std::min(line->variance_m2(y_m), 1.0), line->seen_ns);
+    const Vec3 middle_m = 0.5 * (edge->a_m + edge->b_m);
+    const double variance_m2 = line->variance_m2(local_xy(track.world_T_local, middle_m).y());
+    edge->sigma_m = sigma(std::min(variance_m2, 1.0), math::square(arm_m(middle_m).z()), line->seen_ns);
   }
 }
 

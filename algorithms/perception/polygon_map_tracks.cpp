@@ -2,37 +2,48 @@
 // The polygon map: surfaces that are created, fused, merged, and dropped.
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <utility>
 
 #include "algorithms/perception/polygon_map.hpp"
 
 namespace polygmap {
 namespace {
 
+// Work units.
+constexpr std::int32_t kAgeUnits = 1;
+constexpr std::int32_t kHiddenUnits = 20;
+
 constexpr double kMaxLocalSlope = 0.05;  // steeper: the local axes turn to the line
 
 }  // namespace
 
 void PolygonMap::fuse_best() noexcept {
-  ++fused_in_frame_;
   if (best_ >= tracks_.size()) {
+    ++fused_in_frame_;
     create();
     return;
   }
-  MapTrack& best = tracks_[best_];
+  MapTrack* keep = &tracks_[best_];
+  MapTrack* gone = nullptr;
   // One surface that lies on two remembered ones says that they are one.
-  if (second_ < tracks_.size()) {
-    MapTrack& second = tracks_[second_];
-    if (best_cost_ < 1.0 && second_cost_ < 1.0) {
-      const bool best_stays =
-          best.sightings > second.sightings || (best.sightings == second.sightings && best.id < second.id);
-      MapTrack& keep = best_stays ? best : second;
-      merge(keep, best_stays ? second : best);
-      fuse(keep);
-      ++counters_.fused;
-      return;
+  if (second_ < tracks_.size() && best_cost_ < 1.0 && second_cost_ < 1.0) {
+    gone = &tracks_[second_];
+    if (gone->sightings > keep->sightings || (gone->sightings == keep->sightings && gone->id < keep->id)) {
+      std::swap(keep, gone);
     }
   }
-  fuse(best);
+  // A riser is matched from further off than it may have moved.
+  const Transform& frame = keep->world_T_local;
+  const double offset_m = -seen_.plane.distance_m(frame.p_m) / frame.R.col(2).dot(seen_.plane.normal);
+  const bool outlier = std::abs(offset_m) > params_.line_gate_max_m;
+  if (outlier) {
+    ++counters_.plane_outliers;
+    if (++keep->outliers < params_.outliers_to_reset) return;
+    ++counters_.resets;
+  }
+  if (gone != nullptr) merge(*keep, *gone);
+  fuse(*keep, offset_m, outlier ? 0.0 : faded(keep->last_seen_ns));
+  ++fused_in_frame_;
   ++counters_.fused;
 }
 
@@ -108,11 +119,11 @@ void PolygonMap::admit(const MapTrack& track) noexcept {
   ++counters_.created;
 }
 
-void PolygonMap::fuse(MapTrack& track) noexcept {
-  double fade = faded(track.last_seen_ns);
+void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
   if (track.last_seen_ns != newest_ns_) ++track.sightings;
   track.last_seen_ns = newest_ns_;
   track.misses = 0;
+  track.outliers = 0;
   track.rmse_m += 0.1 * (seen_.rmse_m - track.rmse_m);
   track.invalid_fraction = seen_.invalid_fraction;
 
@@ -120,15 +131,6 @@ void PolygonMap::fuse(MapTrack& track) noexcept {
   Transform& frame = track.world_T_local;
   Vec3 normal = frame.R.col(2);
   const double cosine = normal.dot(seen_.plane.normal);
-  const double offset_m = -seen_.plane.distance_m(frame.p_m) / cosine;
-  // A riser is matched from further off than it may have moved.
-  if (std::abs(offset_m) > params_.line_gate_max_m) {
-    ++counters_.plane_outliers;
-    if (++track.outliers < params_.outliers_to_reset) return;
-    ++counters_.resets;
-    fade = 0.0;
-  }
-  track.outliers = 0;
   const double lever2_m2 = (seen_.centroid_m - frame.p_m).squaredNorm();
   const double weight = 1.0 / (seen_.offset_variance_m2 + seen_.tilt_variance_rad2 * lever2_m2);
   track.offset_information = track.offset_information * fade + weight;
@@ -170,16 +172,12 @@ void PolygonMap::merge(MapTrack& into, MapTrack& from) noexcept {
   ++counters_.merged;
 }
 
-bool PolygonMap::should_be_seen(const MapTrack& track) const noexcept {
-  const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
+bool PolygonMap::in_view(const MapTrack& track, const Transform& camera_T_local) const noexcept {
   const Vec2 middle = centroid_m(track.polygon);
   const Vec3 centre = camera_T_local * Vec3{middle.x(), middle.y(), 0.0};
   const double range_m = centre.norm();
   const double incidence = -camera_T_local.R.col(2).dot(centre) / std::max(range_m, 1e-6);
   if (range_m > params_.view_range_m || incidence < params_.view_min_incidence) return false;
-  for (const LegShapes& leg : view_.body) {
-    if (hides(leg, view_.body_margin.at(range_m), centre)) return false;
-  }
   const CameraIntrinsics& c = view_.intrinsics;
   for (const Vec2& v : track.polygon) {
     const Vec2 inner = 0.5 * (v + middle);
@@ -192,10 +190,27 @@ bool PolygonMap::should_be_seen(const MapTrack& track) const noexcept {
   return true;
 }
 
-void PolygonMap::age(MapTrack& track) noexcept {
-  if (track.dead || track.last_seen_ns == newest_ns_) return;
+// By the robot's own body: three of five points, the middle and four halfway to vertices around it.
+bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept {
+  constexpr std::size_t kAround = 4;
+  const Vec2 middle = centroid_m(track.polygon);
+  std::size_t hidden = 0;
+  for (std::size_t i = 0; i <= kAround; ++i) {
+    const Vec2 towards = i == kAround ? middle : track.polygon[i * track.polygon.size() / kAround];
+    const Vec2 inner = 0.5 * (towards + middle);
+    const Vec3 p = camera_T_local * Vec3{inner.x(), inner.y(), 0.0};
+    const double margin_m = view_.body_margin.at(p.norm());
+    hidden += hides(view_.body[0], margin_m, p) || hides(view_.body[1], margin_m, p) ? 1U : 0U;
+  }
+  return 2 * hidden > kAround;
+}
+
+std::int32_t PolygonMap::age(MapTrack& track) noexcept {
+  if (track.dead || track.last_seen_ns == newest_ns_) return kAgeUnits;
+  const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
+  const bool looked = in_view(track, camera_T_local);
+  if (looked && !hidden(track, camera_T_local)) ++track.misses;
   const bool confirmed = track.sightings >= params_.confirmed_sightings;
-  if (should_be_seen(track)) ++track.misses;
   if (confirmed && track.misses >= params_.misses_confirmed) {
     track.dead = true;
     ++counters_.dropped_vanished;
@@ -204,6 +219,7 @@ void PolygonMap::age(MapTrack& track) noexcept {
     track.dead = true;
     ++counters_.dropped_unconfirmed;
   }
+  return looked ? kAgeUnits + kHiddenUnits : kAgeUnits;
 }
 
 double PolygonMap::faded(std::int64_t since_ns) const noexcept {

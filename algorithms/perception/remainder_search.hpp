@@ -40,7 +40,7 @@ class RemainderSearch {
     static constexpr std::int32_t kBins = 1024;
     static constexpr double kBin_m = 0.005;
     Vec3 direction = Vec3::Zero();  // unit, the planes' normal; zero: not in use
-    std::array<std::uint16_t, kBins> rows{};
+    std::array<std::int32_t, kBins> rows{};
     [[nodiscard]] static std::int32_t bin_of(double distance_m) noexcept {
       return static_cast<std::int32_t>(std::floor(distance_m / kBin_m));
     }

@@ -11,7 +11,7 @@ namespace {
 
 using Wide = cv::v_float32;
 
-constexpr float kNowhere = -1e3F;   // 1/m: the line of a column without a run, which no row fits
+constexpr float kNowhere = -1e9F;   // 1/m: the line of a column without a run, which no row fits: not a depth of 1 mm
 constexpr float kNever = -1e9F;     // its absent rows
 constexpr float kNoSpread = 1e-9F;  // added to a sum of squares that may be 0
 constexpr float kFitted = 3.0F;     // rows that make a line
@@ -99,7 +99,7 @@ bool RunSegmentation::try_block(const Wides& c, std::int32_t column, std::int32_
     const Wide rows = load(open_.rows), slope = load(open_.slope), lever = load(open_.lever);
     Wide value = load(open_.value) + slope, drift = load(open_.drift), absent = load(open_.absent);
 
-    // As in add_row, but once, at the block's first row.
+    // As in add_row, but once, at the block's first row: what is nearer is held to the noise of the line's own depth.
     const Wide my = slope * c.fy, m0 = value + slope * to_centre;
     const Wide w2 = value * value, sigma = (c.base * value + c.per_metre) * value + c.quadratic;
     const Wide share = c.one / (rows + c.four), leans = c.four * share;
@@ -113,7 +113,7 @@ bool RunSegmentation::try_block(const Wides& c, std::int32_t column, std::int32_
     for (std::int32_t r = row; r < row + kBlock; ++r, value = value + slope, x = x + c.one) {
       const Wide w = cv::vx_load(image_->inverse_depth.row(r) + g), valid = w > c.zero;
       const Wide residual = w - value, off = residual - moved;
-      const Wide in = valid & (off * off * w2 < limit);
+      const Wide in = valid & (off * off * cv::v_max(w2, w * w) < limit);
       const Wide joined = residual & in, at = x & in, jumped = off & in;
       any = any | valid;
       n = n + (c.one & in), sum_x = sum_x + at, sum_xx = sum_xx + at * x;

@@ -8,6 +8,7 @@
 
 #include "algorithms/core/static_vector.hpp"
 #include "algorithms/perception/column_image.hpp"
+#include "algorithms/perception/depth_sigma.hpp"
 
 namespace polygmap {
 
@@ -48,7 +49,7 @@ class RunSegmentation {
  private:
   static constexpr std::int32_t kPending = 3;  // outliers in a row that end a run
   static constexpr std::int32_t kMinRows = 3;
-  static constexpr float kMemory = 0.7F;  // of the mean of residuals, per row
+  static constexpr float kMemory = 0.7F;     // of the mean of residuals, per row
   static constexpr std::int32_t kGroup = 8;  // columns that are decided on together, for every register width
   static_assert(kColumns % kGroup == 0);
   using Floats = std::array<float, kColumns>;

@@ -130,7 +130,7 @@ bool SurfaceBoundaries::try_claim(std::int32_t column, std::int32_t first, std::
     };
     const std::int32_t from = std::max<std::int32_t>(first, candidate.top);
     const std::int32_t until = std::min<std::int32_t>(last, candidate.bottom);
-    // Outside a stretch every second row is enough to meet the next one, which has two rows in a row or is none.
+    // Outside a stretch every second row is looked at: that meets all those with two rows in a row.
     for (std::int32_t r = from; r <= until; r += fitting > 0 ? 1 : 2) {
       if (fits(r)) {
         if (fitting == 0) top = r > from && fits(r - 1) ? r - 1 : r;
@@ -302,7 +302,11 @@ void SurfaceBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
       pair->columns += 1.0;
       joints_[joint_count_++] = {i, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k)};
       // Columns side by side share most of their noise: what every second one says is enough for the pair.
-      if (column % kMeasuredColumns != 0 && pair->measured > 0.0) continue;
+      if (column % kMeasuredColumns != 0 && pair->measured >= kLeastMeasured) {
+        upper.bottom = static_cast<std::int16_t>(math::clamp(std::ceil(row) - 1.0, upper.top, lower.bottom - 1.0));
+        lower.top = static_cast<std::int16_t>(upper.bottom + 1);
+        continue;
+      }
       pair->measured += 1.0;
     }
     const std::int32_t own = change_point(column, a, b, first, last, static_cast<float>(row), pair);

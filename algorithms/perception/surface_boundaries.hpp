@@ -65,8 +65,8 @@ class SurfaceBoundaries {
   void settle() noexcept;  // one decision per pair of planes, then all columns follow it ...
   void follow() noexcept;  // ... and again when the planes have changed
   void begin_refit() noexcept;
-  // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments. roughly: of fewer of their rows,
-  // and without looking at the noise.
+  // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments. roughly: of fewer of their
+  // rows, and without looking at the noise.
   void refit(std::int32_t first_column, bool roughly) noexcept;
 
   // How large the noise is against its model, from the rows of the last refit's surfaces; 0 when there are too few.
@@ -86,11 +86,12 @@ class SurfaceBoundaries {
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
 
  private:
-  static constexpr std::size_t kMaxJoints = 4096;
+  static constexpr std::size_t kMaxJoints = 26 * static_cast<std::size_t>(kColumns);  // ten steps have 20 a column
   static constexpr std::size_t kMaxPairs = 192;
   static constexpr std::int32_t kBins = 64;  // of half a pixel, -16 .. 16
   static constexpr std::int32_t kBinsPerPixel = 2;
   static constexpr std::int32_t kMeasuredColumns = 2;
+  static constexpr double kLeastMeasured = 4.0;
   struct Joint {
     std::uint16_t pair = 0;
     std::int16_t column = 0;

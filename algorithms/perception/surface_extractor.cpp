@@ -16,11 +16,11 @@ bool finite(const LegShapes& s) noexcept {
 }
 
 bool usable(const CameraIntrinsics& k) noexcept {
-  const auto positive = [](double x) { return x > 1.0 && x < 1e5; };
+  const auto positive = [](double x) { return x >= 1.0 && x <= 1e5; };
   return k.width_px >= kMinSide_px && k.width_px <= kDepthWidth_px && k.height_px >= kMinSide_px &&
          k.height_px <= kDepthHeight_px && k.width_px % 2 == 0 && k.height_px % 2 == 0 && positive(k.fx_px) &&
-         positive(k.fy_px) && std::abs(k.cx_px) < 1e5 && std::abs(k.cy_px) < 1e5 && k.depth_unit_m > 1e-6 &&
-         k.depth_unit_m < 0.1;
+         positive(k.fy_px) && std::abs(k.cx_px) <= 1e5 && std::abs(k.cy_px) <= 1e5 && k.depth_unit_m >= 1e-6 &&
+         k.depth_unit_m <= 0.1;
 }
 
 SurfaceKind kind_of(const InversePlane& plane, const Vec3& up, double tilt_rad) noexcept {
@@ -450,6 +450,7 @@ void SurfaceExtractor::finish() noexcept {
   }
   next_.invalid_fraction = outside_body_px_ > 0 ? 1.0 - static_cast<double>(measured_px_) / outside_body_px_ : 1.0;
   result_ = next_;
+  raw_.depth = nullptr;  // the driver's again
 }
 
 }  // namespace polygmap

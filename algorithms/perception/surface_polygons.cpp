@@ -17,7 +17,7 @@ constexpr double kOnLine_m = 0.002;  // a polygon's edge lies on a line
 void count_pixels(const std::uint8_t* flags, const std::uint8_t* valid, std::int32_t first, std::int32_t last,
                   std::int32_t& free_columns, std::int32_t& valid_px) noexcept {
   using Bytes = cv::v_uint8;
-  static_assert(kColumns % Bytes::nlanes == 0);
+  static_assert(kColumns % Bytes::nlanes == 0 && kColumns <= 256, "columns are counted in whole registers of bytes");
   static constexpr std::array<std::uint8_t, kColumns> kIndices = [] {
     std::array<std::uint8_t, kColumns> indices{};
     for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<std::uint8_t>(i);

@@ -37,7 +37,7 @@ void SurfaceProfiles::add_column(const SurfaceBoundaries::Columns& columns, cons
     profile.columns[static_cast<std::size_t>(column)].add(span.top, span.bottom);
     profile.first_row = std::min(profile.first_row, span.top);
     profile.last_row = std::max(profile.last_row, span.bottom);
-    const auto here = static_cast<std::uint8_t>(column);
+    const auto here = static_cast<SurfaceProfile::Column>(column);
     rows_alone(span, surface, column - 1, [&](std::size_t row) {
       if (profile.left[row] == SurfaceProfile::kNoColumn) profile.left[row] = here;
     });

@@ -53,14 +53,23 @@ struct RowPlane {
   }
 };
 
+struct PixelGains {
+  Reach gain, residual;
+};
+
 // What every pixel says for the plane beyond and against our own: twice the negative logarithms of the likelihoods, but
 // for a constant. Nothing where there is no data.
-void weigh(const SurfaceSides::Params& params, const RawPicture& picture, const RowPlane& own, const RowPlane& other,
-           std::int32_t first, std::int32_t out, const std::array<std::uint16_t, kReach_px>& raw, Reach& gain,
-           Reach& residual) noexcept {
+PixelGains weigh(const SurfaceSides::Params& params, const RawPicture& picture, const RowPlane& own,
+                 const RowPlane& other, std::int32_t first, std::int32_t out,
+                 const std::array<std::uint16_t, kReach_px>& raw) noexcept {
+  PixelGains gains;
   static_assert(kReach_px % Wide::nlanes == 0);
   const auto all = [](float x) { return cv::vx_setall_f32(x); };
-  static constexpr Reach kSteps{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  static constexpr Reach kSteps = [] {
+    Reach steps{};
+    for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = static_cast<float>(i);
+    return steps;
+  }();
   const Wide most = all(static_cast<float>(math::square(params.truncate_sigmas)));
   const Wide leave = all(static_cast<float>(math::square(params.leave_sigmas)));
   const Wide more = all(other.valid ? other.wider_than(own) : 0.0F);
@@ -75,9 +84,10 @@ void weigh(const SurfaceSides::Params& params, const RawPicture& picture, const 
       const Wide o = other.residual(column, depth * unit_m);
       beyond = cv::v_min(o * o + more, most);
     }
-    cv::v_store(gain.data() + i, (cv::v_min(r * r, most) - beyond) & (depth >= least) & (depth <= largest));
-    cv::v_store(residual.data() + i, r);
+    cv::v_store(gains.gain.data() + i, (cv::v_min(r * r, most) - beyond) & (depth >= least) & (depth <= largest));
+    cv::v_store(gains.residual.data() + i, r);
   }
+  return gains;
 }
 
 }  // namespace
@@ -120,8 +130,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
     raw[static_cast<std::size_t>(count++)] = raw_->row(row)[c];
   }
   if (count < kInside_px) return Ending::kHidden;  // by the robot's own body
-  Reach gain, residual;
-  weigh(params_, *raw_, own, other, first, out, raw, gain, residual);
+  const PixelGains gains = weigh(params_, *raw_, own, other, first, out, raw);
   // The boundary with the least cost; between equally good ones (a pixel without data or of neither) in their middle.
   constexpr float kTie = 1e-3F;
   float sum = 0.0F, least = 1e9F;
@@ -132,7 +141,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
     const auto at = static_cast<std::size_t>(i);
     const bool measured = raw_->range.valid(raw[at]);
     measured_beyond = measured_beyond || measured;
-    sum += gain[at];
+    sum += gains.gain[at];
     if (sum < least - kTie) {
       least = sum;
       from = to = i;
@@ -140,7 +149,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
       measured_beyond = false;
     } else if (sum < least + kTie && to == i - 1) {
       to = i;
-      if (measured) of_neither += residual[at] < 0.0F ? -1 : 1;
+      if (measured) of_neither += gains.residual[at] < 0.0F ? -1 : 1;
       measured_beyond = false;
     }
   }
@@ -202,7 +211,9 @@ bool SurfaceSides::try_line(const InversePlane& plane, Line& line) const noexcep
 OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept {
   const FramePlane& plane = (*planes_)[index];
   const double out = right ? 1.0 : -1.0;
-  const auto outer_edge = [right](std::uint8_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
+  const auto outer_edge = [right](SurfaceProfile::Column g) {
+    return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5);
+  };
   seen_.clear();
   hidden_.clear();
   const auto& ends = right ? profile.right : profile.left;
@@ -222,7 +233,7 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   double outermost = -1e9;
   for (std::size_t i = stride / 2; i < count; i += stride) {
     const std::int32_t r = rows_[i];
-    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+    const SurfaceProfile::Column g = ends[static_cast<std::size_t>(r)];
     RowEnd end{static_cast<double>(r), 0.0};
     const Ending ending = end_of_row(index, r, g, right, end.column);
     if (ending == Ending::kNone) continue;
@@ -234,7 +245,7 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   OutlineSide side;
   if (outermost < -1e8) {  // no row but flat ones
     for (std::int32_t r = first_row; r <= last_row; ++r) {
-      const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+      const SurfaceProfile::Column g = ends[static_cast<std::size_t>(r)];
       if (g != SurfaceProfile::kNoColumn) outermost = std::max(outermost, out * outer_edge(g));
     }
   }
@@ -255,7 +266,7 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   }
   double cut_px = 0.0;
   for (std::int32_t r = first_row; r <= last_row; ++r) {
-    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+    const SurfaceProfile::Column g = ends[static_cast<std::size_t>(r)];
     if (g != SurfaceProfile::kNoColumn) cut_px += std::max(beyond(r, outer_edge(g)) - params_.outside_px, 0.0);
   }
   if (on < params_.min_rows || on < params_.min_share * between) return side;

@@ -11,8 +11,8 @@ class DepthCamera {
   [[nodiscard]] virtual CameraIntrinsics intrinsics() const noexcept = 0;
   // The oldest frame that has arrived and was not yet acquired, stamps and sequence strictly increasing; false, and
   // frame untouched, when there is none. Never blocks. The view and its pixels stay valid until release(), whatever
-  // arrives meanwhile. At most one frame is held: acquiring again without release() returns false. Frames that nobody
-  // acquires push out the oldest, which leaves a gap in the sequence.
+  // arrives meanwhile, a restart of the stream included. At most one frame is held: acquiring again without release()
+  // returns false. Frames that nobody acquires push out the oldest, which leaves a gap in the sequence.
   [[nodiscard]] virtual bool try_acquire(DepthFrameView& frame) noexcept = 0;
   // Without effect when no frame is held.
   virtual void release() noexcept = 0;

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <optional>
 #include <ostream>
 
+#include "sim_stub/cli/estimate_command.hpp"
 #include "sim_stub/cli/perceive_command.hpp"
 
 namespace polygmap::sim {
@@ -28,6 +30,7 @@ struct ClimbArguments {
   ClimbOptions options;
   std::string noise = "white";
   std::string plant = "kinematic";
+  std::string contacts = "sensed";
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
   bool no_self_filter = false;
@@ -63,11 +66,15 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->check(whole_number)
       ->capture_default_str();
   climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
+  climb.add_option("--contacts", a.contacts, "Foot forces: sensed, or inferred from joint torques")
+      ->capture_default_str();
   climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
 
   climb.add_option("--camera", a.camera, "The robot's camera; the module is told its noise and range")
       ->type_name("CAMERA.toml");
-  climb.add_option("--scan-ms", a.options.scan_ms, "Time from a picture's first row to its last, ms, in steps of 4")
+  climb
+      .add_option("--scan-ms", a.options.scan_ms,
+                  "Time from a picture's first row to its last, ms; the nearest of 0, 4, 8 ... is simulated")
       ->capture_default_str();
   climb
       .add_option("--mount-error", a.options.mount_error_deg,
@@ -137,6 +144,11 @@ std::string complaint(ClimbArguments& a) {
   }
   a.options.noise = a.noise == "white" ? DepthNoise::kWhite : DepthNoise::kCorrelated;
 
+  if (a.contacts != "sensed" && a.contacts != "inferred") {
+    return "--contacts must be sensed or inferred, not \"" + a.contacts + "\".";
+  }
+  a.options.infer_contacts = a.contacts == "inferred";
+
   struct Error {
     const char* name;
     double value, most;
@@ -153,6 +165,7 @@ std::string complaint(ClimbArguments& a) {
   if (!a.camera.empty()) {
     try {
       a.options.camera = read_camera(a.camera);
+      a.options.camera_file = a.camera;
     } catch (const FileError& error) {
       return error.what();
     }
@@ -237,17 +250,21 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   declare(*climb, a);
   PerceiveArguments perceive_arguments;
   const CLI::App* perceive = declare_perceive(app, perceive_arguments);
+  EstimateArguments estimate_arguments;
+  const CLI::App* estimate = declare_estimate(app, estimate_arguments);
 
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 wants the last one first
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
-    const bool named = !arguments.empty() && (arguments[0] == "climb" || arguments[0] == "perceive");
+    constexpr std::array<std::string_view, 3> kCommands{"climb", "perceive", "estimate"};
+    const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
     err << "polygmap: " << error.what() << "; see polygmap " << (named ? arguments[0] + " " : "") << "--help.\n";
     return kExitUsage;
   }
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);
+  if (estimate->parsed()) return run_estimate(estimate_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
     err << "polygmap: A subcommand is required; see polygmap --help.\n";
     return kExitUsage;

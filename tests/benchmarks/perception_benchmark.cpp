@@ -5,25 +5,18 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "tests/benchmarks/cpu_seconds.hpp"
 #include "tests/benchmarks/perception_stages.hpp"
 
 namespace polygmap::bench {
 namespace {
 
 constexpr int kPasses = 20;  // over all scenes
-
-// Of this thread on its core: what other programs on the machine take is no property of a stage.
-double cpu_seconds() {
-  std::timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 double seconds_in(const Stage& stage, Workbench& bench) {
   const double start = cpu_seconds();

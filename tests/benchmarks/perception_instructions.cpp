@@ -1,23 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every stage on every scene, once: what toolchain/checks/instructions counts. Prints the build that the counts are of
-// and how many frames they are over.
+// and how many runs, here frames, they are over.
 #include <cstdio>
 #include <utility>
 
+#include "tests/benchmarks/build_name.hpp"
 #include "tests/benchmarks/perception_stages.hpp"
 
 int main() {
   using namespace polygmap::bench;
-#if defined(__AVX2__)
-  constexpr const char* kVectors = "avx2";
-#else
-  constexpr const char* kVectors = "sse2";
-#endif
-#if defined(__clang__)
-  constexpr const char* kCompiler = "";  // says its name itself
-#else
-  constexpr const char* kCompiler = "g++ ";
-#endif
   int frames = 0;
   for (StairScene& scene : stair_scenes()) {
     Workbench bench(std::move(scene));
@@ -30,6 +21,6 @@ int main() {
     extract_in_stages(bench, [&bench](const Stage& stage) { stage.run(bench); });
     for (const Stage& stage : kOtherStages) stage.run(bench);
   }
-  std::printf("build %s%s %s\nframes %d\n", kCompiler, __VERSION__, kVectors, frames);
+  std::printf("build %s\nruns %d\n", build_name().c_str(), frames);
   return 0;
 }

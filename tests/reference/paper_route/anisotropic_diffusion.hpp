@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 
+#include "algorithms/perception/depth_sigma.hpp"
 #include "tests/reference/paper_route/half_depth.hpp"
 
 namespace polygmap {

@@ -4,6 +4,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "algorithms/perception/counter_random.hpp"
+
 namespace polygmap {
 namespace {
 

@@ -43,7 +43,11 @@ class FakeDepthCamera final : public hal::DepthCamera {
     holding_ = true;
     return true;
   }
-  void release() noexcept override { holding_ = false; }
+  // The driver writes into the buffer at once.
+  void release() noexcept override {
+    if (holding_) buffers_[held_.buffer].assign(pixels(), std::uint16_t{12345});
+    holding_ = false;
+  }
 
  private:
   struct Entry {

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/estimation/odometry.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace polygmap {
+namespace {
+
+constexpr double kGapEnd_s = 0.002;  // the rates of a gap's last sample hold for so long
+
+}  // namespace
+
+void Odometry::reset(const Params& params) noexcept {
+  params_ = params;
+  attitude_.reset(params.attitude);
+  base_.reset(params.base);
+  motion_.reset(params.motion);
+  fusion_.reset(params.fusion);
+  contacts_ = {};
+  odom_p_foot_m_.fill(Vec3::Zero());
+  since_legs_s_ = unrested_s_ = 0.0;
+  feet_lost_ = false;
+  base_w_base_radps_.setZero();
+}
+
+void Odometry::initialise(const AttitudeFilter::Start& start, const Legs& legs, double dt_s) noexcept {
+  attitude_.initialise(start, legs);
+  soles_known_ = legs[0].sole_known && legs[1].sole_known;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) odom_p_foot_m_[foot] = odom_p_foot_m(legs[foot]);
+  since_legs_s_ = 0.0;
+  // Feet not yet standing: the contacts begin where kinematics has them.
+  base_.initialise(start.odom_p_base_m, start.odom_v_base_mps,
+                   base_.make_rows(start.odom_R_base, Vec3::Zero(), legs, {}, {}, {}, dt_s));
+}
+
+bool Odometry::is_valid_imu(const Vec3& gyro_radps, const Vec3& accel_mps2) const noexcept {
+  return math::all_finite(gyro_radps) && math::all_finite(accel_mps2) &&
+         gyro_radps.cwiseAbs().maxCoeff() <= params_.max_rate_radps &&
+         accel_mps2.cwiseAbs().maxCoeff() <= params_.max_accel_mps2;
+}
+
+void Odometry::bridge(double gap_s) noexcept {
+  constexpr int kParts = 4;  // enough for position to gain from velocity's growing variance
+  const double part_s = gap_s / kParts;
+  const double slowing_ps = (1.0 - math::exp(-part_s / params_.coast_s)) / part_s;
+  for (int i = 0; i < kParts; ++i) {
+    const Vec3 odom_a_mps2 = -slowing_ps * attitude_.odom_v_base_mps();
+    const Vec3 felt_mps2 = attitude_.odom_R_base().transpose() * (odom_a_mps2 + Vec3{0, 0, attitude_.gravity_mps2()});
+    attitude_.predict(attitude_.gyro_bias_radps(), attitude_.accel_bias_mps2() + felt_mps2, part_s,
+                      AttitudeFilter::Motion::kUnfelt);
+    if (soles_known_) base_.predict(-slowing_ps * base_.odom_v_base_mps(), part_s, {});
+  }
+  feet_lost_ = true;
+}
+
+void Odometry::step(const Step& whole, const Legs& legs, const Contacts& contacts, const Ground& ground) noexcept {
+  const Vec3 before_m = odom_p_base_m();
+  Step step = whole;
+  if (whole.dt_s > params_.max_step_s) {  // the last of it is felt
+    step.dt_s = kGapEnd_s;
+    bridge(std::min(whole.dt_s, params_.max_gap_s) - step.dt_s);
+  }
+  const Vec3 gyro_radps = step.felt ? step.gyro_radps : attitude_.gyro_bias_radps();
+  // A silent IMU: as if it felt no acceleration.
+  const Vec3 rest_mps2 =
+      attitude_.accel_bias_mps2() + attitude_.odom_R_base().transpose() * Vec3{0, 0, attitude_.gravity_mps2()};
+  const Vec3 accel_mps2 = step.felt ? step.accel_mps2 : rest_mps2;
+  const auto motion = !step.felt                     ? AttitudeFilter::Motion::kUnfelt
+                      : unrested_s_ > params_.lost_s ? AttitudeFilter::Motion::kVelocityLost
+                                                     : AttitudeFilter::Motion::kFelt;
+  attitude_.predict(gyro_radps, accel_mps2, step.dt_s, motion);
+  since_legs_s_ += step.dt_s;
+  contacts_ = contacts;
+  const bool feet_lost = feet_lost_;
+  if (step.new_legs) take_legs(legs);
+  base_w_base_radps_ = gyro_radps - attitude_.gyro_bias_radps();
+  if (soles_known_) {
+    const Mat3& odom_R_base = attitude_.odom_R_base();
+    Contacts known = contacts_;
+    if (feet_lost) {  // where they stand is anyone's guess
+      for (FootContact& contact : known) contact.stands = false;
+    }
+    const ContactRows rows =
+        base_.make_rows(odom_R_base, base_w_base_radps_, legs, known, ground.touch_downs, ground.heights, step.dt_s);
+    const Vec3 odom_a_base_mps2 =
+        odom_R_base * (accel_mps2 - attitude_.accel_bias_mps2()) - Vec3{0, 0, attitude_.gravity_mps2()};
+    base_.predict(step.felt ? odom_a_base_mps2 : Vec3::Zero(), step.dt_s, rows);
+    if (step.new_legs) base_.correct(rows);
+  }
+  fusion_.tick({attitude_.odom_R_base(), odom_p_base_m()}, odom_p_base_m() - before_m, whole.dt_s);
+}
+
+void Odometry::take_legs(const Legs& legs) noexcept {
+  const double velocity_sigma_mps = attitude_.velocity_sigma_mps();
+  const bool feet_lost = std::exchange(feet_lost_, false);
+  bool stands = false, rests = false;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    FootContact& contact = contacts_[foot];
+    if (feet_lost) {
+      motion_.rest(foot);
+      contact.landed = contact.stands;
+    } else {
+      motion_.update(foot, odom_p_foot_m(legs[foot]) - odom_p_foot_m_[foot], velocity_sigma_mps, since_legs_s_);
+    }
+    // Where force says when a sole landed and kinematics where, its swing is no reason to let go of it.
+    if (legs[foot].sole_known && (!contact.stands || contact.landed)) motion_.rest(foot);
+    const double doubt = 1.0 / std::max(contact.probability, 0.01) - 1.0;
+    contact.walk_m2ps = motion_.walk_m2ps(foot) + params_.doubtful_walk_m2ps * doubt;
+    stands = stands || contact.stands;
+    rests = rests || (contact.stands && motion_.walk_m2ps(foot) <= 0.0);
+  }
+  unrested_s_ = stands && !rests ? unrested_s_ + since_legs_s_ : 0.0;
+  attitude_.correct_by_feet(legs, contacts_, since_legs_s_);
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) odom_p_foot_m_[foot] = odom_p_foot_m(legs[foot]);
+  since_legs_s_ = 0.0;
+}
+
+void Odometry::describe(std::int64_t now_ns, StateEstimate& state) const noexcept {
+  state.odom_T_base = {attitude_.odom_R_base(), odom_p_base_m()};
+  state.odom_v_base_mps = soles_known_ ? base_.odom_v_base_mps() : attitude_.odom_v_base_mps();
+  state.base_w_base_radps = base_w_base_radps_;
+  state.world_T_odom = fusion_.world_T_odom();
+  state.position_sigma_m = fusion_.position_sigma_m();
+  state.yaw_sigma_rad = fusion_.yaw_sigma_rad();
+  state.tilt_sigma_rad = attitude_.tilt_sigma_rad();
+  state.lio_age_ns = fusion_.last_accepted_ns() < 0 ? -1 : now_ns - fusion_.last_accepted_ns();
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) state.contact_probability[foot] = contacts_[foot].probability;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// From IMU, legs and contacts to a pose: the filters in their order. Whoever has measurements, the module from its
+// joints or a replay from a log, runs this.
+//
+// Position and velocity are those of eqs (1)-(4) where soles are known: eight contact points, tread heights, legs that
+// disagree. Where feet are points there is none of that, and the attitude filter's own are published: they gain from
+// what tilt and biases turn out to have been, which filters that take the attitude as given cannot.
+#pragma once
+
+#include "algorithms/core/state.hpp"
+#include "algorithms/estimation/attitude_filter.hpp"
+#include "algorithms/estimation/base_filter.hpp"
+#include "algorithms/estimation/foot_motion.hpp"
+#include "algorithms/estimation/odometry_fusion.hpp"
+#include "algorithms/estimation/state_ring.hpp"
+
+namespace polygmap {
+
+class Odometry {
+ public:
+  struct Params {
+    FootMotion::Params motion;
+    AttitudeFilter::Params attitude;
+    BaseFilter::Params base;
+    OdometryFusion::Params fusion;
+    double max_rate_radps = 20.0;  // IMU samples beyond these are invalid
+    double max_accel_mps2 = 100.0;
+    double max_step_s = 0.05;  // a longer gap is bridged without feeling; older rates are not believed
+    double max_gap_s = 5.0;    // bridged by no more than this
+    double coast_s = 1.0;      // the base is thought to stop within about this time when nothing is felt for long
+    double lost_s = 0.25;      // a standing robot none of whose feet rest for so long has lost its velocity
+    double doubtful_walk_m2ps = 1e-3;  // random walk of a contact as likely as not: 1 mm in 1 ms
+  };
+  // What is new since the last step. Rates hold over dt.
+  struct Step {
+    double dt_s = 0.0;
+    Vec3 gyro_radps = Vec3::Zero();
+    Vec3 accel_mps2 = Vec3::Zero();
+    bool felt = true;      // false: the IMU is silent, and the feet alone say how the base moves
+    bool new_legs = true;  // false: the legs are silent
+  };
+  using Legs = std::array<LegMeasurement, kFootCount>;
+  using Contacts = std::array<FootContact, kFootCount>;
+  struct Ground {
+    std::array<TouchDown, kFootCount> touch_downs{};
+    std::array<KnownHeight, kFootCount> heights{};
+  };
+
+  void reset(const Params& params) noexcept;
+  // Finite and in range.
+  [[nodiscard]] bool is_valid_imu(const Vec3& gyro_radps, const Vec3& accel_mps2) const noexcept;
+  void initialise(const AttitudeFilter::Start& start, const Legs& legs, double dt_s) noexcept;
+  // A step longer than max_step_s is a gap: the base coasts through it, its sigmas grow, and the feet are new contacts.
+  void step(const Step& step, const Legs& legs, const Contacts& contacts, const Ground& ground) noexcept;
+  // Fills in pose, twist, sigmas and LIO's share, as of now_ns.
+  void describe(std::int64_t now_ns, StateEstimate& state) const noexcept;
+
+  [[nodiscard]] const AttitudeFilter& attitude() const noexcept { return attitude_; }
+  [[nodiscard]] const BaseFilter& base() const noexcept { return base_; }
+  [[nodiscard]] const FootMotion& motion() const noexcept { return motion_; }
+  [[nodiscard]] const OdometryFusion& fusion() const noexcept { return fusion_; }
+  [[nodiscard]] OdometryFusion& fusion() noexcept { return fusion_; }
+
+ private:
+  [[nodiscard]] Vec3 odom_p_foot_m(const LegMeasurement& leg) const noexcept {
+    return attitude_.odom_p_base_m() + attitude_.odom_R_base() * leg.base_T_sole.p_m;
+  }
+
+  Params params_;
+  void bridge(double gap_s) noexcept;
+  void take_legs(const Legs& legs) noexcept;
+  [[nodiscard]] Vec3 odom_p_base_m() const noexcept {
+    return soles_known_ ? base_.odom_p_base_m() : attitude_.odom_p_base_m();
+  }
+
+  AttitudeFilter attitude_;
+  BaseFilter base_;
+  FootMotion motion_;
+  OdometryFusion fusion_;
+  Contacts contacts_{};
+  std::array<Vec3, kFootCount> odom_p_foot_m_{Vec3::Zero(), Vec3::Zero()};  // as of the last corrected state
+  double since_legs_s_ = 0.0;
+  double unrested_s_ = 0.0;
+  bool feet_lost_ = false;  // by a gap, until the next legs
+  bool soles_known_ = true;
+  Vec3 base_w_base_radps_ = Vec3::Zero();
+};
+
+}  // namespace polygmap

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// `polygmap estimate`: a recorded log through the module's state estimation.
+#pragma once
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace polygmap::sim {
+
+struct EstimateArguments {
+  std::string log, lio, json, csv;
+  std::vector<double> lidar_mount;
+  double lio_tau_s = 0.0;  // 0: the module's own
+};
+
+[[nodiscard]] CLI::App* declare_estimate(CLI::App& app, EstimateArguments& arguments);
+// The exit code. Errors are one sentence on err.
+[[nodiscard]] int run_estimate(const EstimateArguments& arguments, std::ostream& out, std::ostream& err);
+
+}  // namespace polygmap::sim

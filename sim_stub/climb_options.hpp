@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a simulated climb is told: the stairs, the camera, and which errors the robot has.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "sim_stub/camera_profile.hpp"
+#include "sim_stub/noise_kind.hpp"
+#include "sim_stub/plant.hpp"
+#include "sim_stub/stair_world.hpp"
+
+namespace polygmap::sim {
+
+struct ClimbOptions {
+  StairParams stairs;
+  std::uint64_t seed = 1;
+  DepthNoise noise = DepthNoise::kWhite;
+  PlantKind plant = PlantKind::kKinematic;
+  std::string gait = "ds";
+  std::string out_dir;          // empty: no files
+  double time_limit_s = 150.0;  // simulated
+  bool threaded_render = true;
+  // Causality tests: the picture shows something else than the plant stands on.
+  double render_dx_m = 0.0, render_dy_m = 0.0, render_dz_m = 0.0;
+  int render_missing_step = -1;  // 0-based, -1: none
+  bool blank_depth = false;
+  bool self_filter = true;
+  // The camera, and what the module is not told of it. Of a seed's errors, half ranges.
+  std::optional<CameraProfile> camera;  // the robot's own when absent; the module is told its noise and range
+  std::string camera_file;              // that it was read from
+  double scan_ms = 16.0;                // one exposure, top to bottom; SimDepthCamera rounds it
+  double mount_error_deg = 1.0;         // roll, pitch, yaw; and 3 mm per degree in each direction
+  double scale_error = 0.003;
+  bool estimate_mount = true;
+  bool infer_contacts = false;  // from joint torques: the feet have no force sensors
+};
+
+}  // namespace polygmap::sim

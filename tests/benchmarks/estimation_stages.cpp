@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/benchmarks/estimation_stages.hpp"
+
+#include <algorithm>
+
+#include "tests/support/walk_rows.hpp"
+
+namespace polygmap::bench {
+namespace {
+
+using test::SyntheticWalk;
+using test::WalkRows;
+using test::WalkSpec;
+
+constexpr double kTick_s = WalkRows::kTick_s;
+constexpr std::int64_t kLioDelay_ns = 100 * kNsPerMs;
+constexpr std::int64_t kWarm_ns = 6 * kNsPerS;  // standing: calibrated and aligned, the ring is full
+constexpr std::int64_t kEnd_ns = kWarm_ns + 1500 * kNsPerMs;
+
+reference::FullStep full_step_of(const EstimationBench& bench, const EstimationTick& tick) {
+  return reference::full_step(bench.axes.base_process(kTick_s), tick.rows);
+}
+template <typename Filter>
+void run_full(Filter& filter, const reference::FullStep& step, const EstimationTick& tick) {
+  filter.predict(tick.accel_mps2, kTick_s, step);
+  filter.correct(step);
+}
+
+}  // namespace
+
+EstimationWalk::EstimationWalk() {
+  WalkSpec spec;
+  spec.stand_s = seconds(kWarm_ns);
+  spec.steps = 1;
+  SyntheticWalk walk(spec);
+  WalkRows rows(spec);
+  start.estimator.reset({});
+  start.fusion.reset({});
+  for (std::int64_t t_ns = kLioDelay_ns; t_ns < kEnd_ns; t_ns += SyntheticWalk::kTick_ns) {
+    EstimationTick tick;
+    tick.now_ns = t_ns;
+    tick.imu = walk.imu(t_ns);
+    tick.joints = walk.joints(t_ns);
+    tick.stance = walk.truth(t_ns).stance;
+    tick.lio = walk.lio(t_ns - kLioDelay_ns);
+    tick.odom_T_base = walk.truth(t_ns).true_T_base;
+    rows.next();
+    tick.rows = rows.rows;
+    for (ContactRow& row : tick.rows) row.height_m2 = 1e-4;  // all 56 rows
+    tick.accel_mps2 = rows.accel_mps2;
+    if (t_ns >= kWarm_ns) {
+      ticks.push_back(tick);
+    } else {
+      rows.axes.predict(tick.accel_mps2, kTick_s, rows.rows);
+      rows.axes.correct(rows.rows);
+      stage_fused_tick(start, tick);
+      stage_lio_alignment(start, tick);
+    }
+  }
+  start.axes = rows.axes;
+  start.dense.initialise(start.axes);
+  start.sequential.initialise(start.axes);
+  start.dynamic.initialise(start.axes);
+}
+
+std::string_view complaint(const EstimationBench& end, const EstimationWalk& walk) {
+  const auto grown = [&](LioVerdict verdict) {
+    return end.estimator.counters().lio_of(verdict) - walk.start.estimator.counters().lio_of(verdict);
+  };
+  const auto off_m = [&](const auto& form) {
+    return (form.state().template head<3>() - end.axes.odom_p_base_m()).norm();
+  };
+  if (grown(LioVerdict::kAccepted) != walk.ticks.size()) return "LIO poses were rejected";
+  if (end.estimator.lio_innovations().count == 0 || end.fusion.innovations().count == 0) return "LIO is not aligned";
+  if (!end.estimator.state().initialised) return "the estimator is not initialised";
+  if (walk.ticks.front().stance[0] == walk.ticks[walk.ticks.size() / 2].stance[0]) return "no foot swings";
+  // Not the same filter to the last digit: the full forms began without the axis filters' correlations.
+  if (!(std::max({off_m(end.dense), off_m(end.sequential), off_m(end.dynamic)}) < 1e-3)) return "the forms disagree";
+  return {};
+}
+
+void stage_base_filter(EstimationBench& bench, const EstimationTick& tick) {
+  bench.axes.predict(tick.accel_mps2, kTick_s, tick.rows);
+  bench.axes.correct(tick.rows);
+}
+
+void stage_base_dense(EstimationBench& bench, const EstimationTick& tick) {
+  run_full(bench.dense, full_step_of(bench, tick), tick);
+}
+void stage_base_sequential(EstimationBench& bench, const EstimationTick& tick) {
+  run_full(bench.sequential, full_step_of(bench, tick), tick);
+}
+void stage_base_dynamic(EstimationBench& bench, const EstimationTick& tick) {
+  run_full(bench.dynamic, full_step_of(bench, tick), tick);
+}
+
+void stage_lio_alignment(EstimationBench& bench, const EstimationTick& tick) {
+  StateEstimate state;
+  state.stamp_ns = tick.now_ns;
+  state.odom_T_base = tick.odom_T_base;
+  bench.ring.push(state);
+  if (bench.fusion.check(tick.lio, tick.now_ns) != LioVerdict::kAccepted) return;
+  if (bench.ring.try_at(tick.lio.stamp_ns, state)) static_cast<void>(bench.fusion.fuse(tick.lio, state.odom_T_base));
+}
+
+void stage_fused_tick(EstimationBench& bench, const EstimationTick& tick) {
+  bench.estimator.add_imu(tick.imu, tick.now_ns);
+  bench.estimator.add_joints(tick.joints, tick.now_ns);
+  bench.estimator.add_lio(tick.lio, tick.now_ns);
+  bench.estimator.tick(tick.stance);
+}
+
+}  // namespace polygmap::bench
