@@ -49,8 +49,9 @@ ClimbPlanner::Situation Gait::situation(const StateEstimate& state) const noexce
 void Gait::carry_plan_to_odometry() noexcept {
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
   for (Transform& sole : plan_T_sole_) sole = odom_T_plan * sole;
-  torso_state_ = TorsoTrajectory::moved(torso_state_, odom_T_plan);
   plan_T_base_ = odom_T_plan * plan_T_base_;
+  torso_state_ = TorsoTrajectory::placed(torso_state_, plan_T_base_, (plan_T_base_ * reference_com_m()).head<2>());
+  link_motion_.carry(odom_T_plan);
   correction_.reset();
 }
 
@@ -59,11 +60,9 @@ void Gait::start(const StateEstimate& state) noexcept {
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     plan_T_sole_[index_of(leg)] = plan_T_base_ * joints_.base_T_sole_reference(leg);
   }
-  torso_state_ = TorsoTrajectory::at_rest(plan_T_base_);
-  const Vec3 com_m = plan_T_base_ * reference_com_m();
-  torso_state_[0].position = com_m.x();
-  torso_state_[1].position = com_m.y();
+  torso_state_ = TorsoTrajectory::placed({}, plan_T_base_, (plan_T_base_ * reference_com_m()).head<2>());
   nominal_rad_ = joints_.reference_rad();
+  link_motion_.restart();
   started_ = true;
   begin_hold();
 }
@@ -88,15 +87,17 @@ void Gait::observe_links() noexcept {
   std::array<Transform, kFootCount> plan_T_sole = plan_T_sole_;
   const bool swings = activity_ == Activity::kSwing || activity_ == Activity::kRetreat;
   if (swings) plan_T_sole[f] = swing_.at(motion_tick());
-  if (links_activity_ != activity_ || tick_ == 0) link_motion_.restart();
-  links_activity_ = activity_;
-  const Vec3 base_p_com_m =
-      centre_of_mass(params_.geometry, params_.balance.masses, nominal_rad_, JointVector::Zero()).base_p_com_m;
-  Transform plan_T_base = TorsoTrajectory::pose(torso_state_);
-  plan_T_base.p_m.head<2>() -= (plan_T_base.R * base_p_com_m).head<2>();
-  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    const LegSolution s = solve_leg(params_.geometry, leg, plan_T_base.inverse() * plan_T_sole[index_of(leg)]);
-    nominal_rad_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
+  Transform plan_T_base;
+  const int passes = link_motion_.restarted() ? 4 : 1;  // the base follows the legs' places and they the base
+  for (int i = 0; i < passes; ++i) {
+    const Vec3 base_p_com_m =
+        centre_of_mass(params_.geometry, params_.balance.masses, nominal_rad_, JointVector::Zero()).base_p_com_m;
+    plan_T_base = TorsoTrajectory::pose(torso_state_);
+    plan_T_base.p_m.head<2>() -= (plan_T_base.R * base_p_com_m).head<2>();
+    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+      const LegSolution s = solve_leg(params_.geometry, leg, plan_T_base.inverse() * plan_T_sole[index_of(leg)]);
+      nominal_rad_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
+    }
   }
   link_acceleration_ = link_motion_.update(params_.geometry, params_.balance.masses, plan_T_base, nominal_rad_);
 }
@@ -129,10 +130,7 @@ void Gait::hold_upright(JointCommand& command) noexcept {
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     plan_T_sole_[index_of(leg)] = plan_T_base_ * joints_.base_T_sole_reference(leg);
   }
-  torso_state_ = TorsoTrajectory::at_rest(plan_T_base_);
-  const Vec3 com_m = plan_T_base_ * reference_com_m();
-  torso_state_[0].position = com_m.x();
-  torso_state_[1].position = com_m.y();
+  torso_state_ = TorsoTrajectory::placed({}, plan_T_base_, (plan_T_base_ * reference_com_m()).head<2>());
   add_torques({}, {}, command);
 }
 
@@ -331,6 +329,7 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     activity_ = Activity::kRetreat;
     turn_tick_ = tick_;
     tick_ = 0;
+    link_motion_.restart();
     wait_over_stance(sole_pose(correction_.odom_T_plan(plan_T_base_).inverse() * swing_.at(0)));
     return;
   }
@@ -358,6 +357,7 @@ void Gait::retreat(const JointFeedback& feedback) noexcept {
   const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
   if ((loaded && above_m < params_.put_back_m) || above_m < -params_.put_back_m) {
     status_.stands[i] = true;
+    link_motion_.restart();
     carry_plan_to_odometry();
     begin_hold();
     return end(GaitPhase::kStopped, Obstruction::kGroundMissing, 0.0);
@@ -371,6 +371,7 @@ void Gait::touch_down(const StateEstimate& state) noexcept {
   status_.step.odom_T_executed =
       usable(state) ? state.odom_T_sole[i] : correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
   status_.stands[i] = true;
+  link_motion_.restart();  // the swing foot is where it was steered to, and stops
   planner_.landed();
   status_.treads_climbed = planner_.treads_climbed();
   status_.phase = GaitPhase::kDoubleSupport;

@@ -114,7 +114,6 @@ class Gait {
   ClimbPlanner::Decision decision_;
   GaitStatus status_;
   Activity activity_ = Activity::kHold;
-  Activity links_activity_ = Activity::kHold;
   std::int32_t tick_ = 0;        // of the activity, saturates
   std::int32_t torso_tick_ = 0;  // of the torso's plan, likewise
   std::int32_t com_tick_ = 0;    // of the plan of the centre of mass, likewise

@@ -39,6 +39,15 @@ LinkMotion::Acceleration LinkMotion::update(const LegGeometry& geometry, const M
   return a;
 }
 
+void LinkMotion::carry(const Transform& to_T_plan) noexcept {
+  for (Posture& posture : past_) {
+    posture.plan_p_m.torso = to_T_plan * posture.plan_p_m.torso;
+    for (auto& leg : posture.plan_p_m.leg) {
+      for (Vec3& link : leg) link = to_T_plan * link;
+    }
+  }
+}
+
 Vec3 angular_momentum_rate_nm(const MassModel& masses, const PerLink& p_m, const PerLink& mps2) noexcept {
   Vec3 centre_kgm = masses.torso.mass_kg * p_m.torso;
   Vec3 force_n = masses.torso.mass_kg * mps2.torso;

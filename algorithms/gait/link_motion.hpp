@@ -15,6 +15,9 @@ class LinkMotion {
   };
   // The plan goes on from elsewhere.
   void restart() noexcept { known_ = 0; }
+  [[nodiscard]] bool restarted() const noexcept { return known_ == 0; }
+  // The plan goes on as it was, in another frame.
+  void carry(const Transform& to_T_plan) noexcept;
   // One tick, planned posture. The result belongs to the tick before.
   [[nodiscard]] Acceleration update(const LegGeometry& geometry, const MassModel& masses, const Transform& plan_T_base,
                                     const JointVector& q_rad) noexcept;

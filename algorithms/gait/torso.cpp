@@ -58,10 +58,14 @@ Transform TorsoTrajectory::pose(const State& s) noexcept {
           Vec3{s[0].position, s[1].position, s[2].position}};
 }
 
-TorsoTrajectory::State TorsoTrajectory::moved(const State& state, const Transform& by) noexcept {
-  State result = state;
-  const State placed = at_rest(by * pose(state));
-  for (std::size_t i = 0; i < kAxes; ++i) result[i].position = placed[i].position;
+TorsoTrajectory::State TorsoTrajectory::placed(const State& state, const Transform& base, const Vec2& com_m) noexcept {
+  State result = at_rest(base);
+  result[0].position = com_m.x();
+  result[1].position = com_m.y();
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    result[i].speed = state[i].speed;
+    result[i].acceleration = state[i].acceleration;
+  }
   return result;
 }
 

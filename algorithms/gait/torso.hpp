@@ -43,8 +43,9 @@ class TorsoTrajectory {
 
   [[nodiscard]] static State at_rest(const Transform& base) noexcept;
   [[nodiscard]] static Transform pose(const State& state) noexcept;
-  // The state in another frame that differs by a small rigid motion: speeds stay.
-  [[nodiscard]] static State moved(const State& state, const Transform& by) noexcept;
+  // The state in another frame that differs by a small rigid motion, in which base and centre of mass are there: speeds
+  // stay.
+  [[nodiscard]] static State placed(const State& state, const Transform& base, const Vec2& com_m) noexcept;
 
   [[nodiscard]] static HorizontalMotion horizontal(const State& state) noexcept;
   static void set_horizontal(State& state, const HorizontalMotion& motion) noexcept;

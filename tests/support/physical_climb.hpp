@@ -62,8 +62,8 @@ class PhysicalClimb {
   [[nodiscard]] FootholdSet search() const {
     const Truth& truth = robot_.truth();
     const StateEstimate& state = estimator_.state();
-    const Transform exact = state.world_T_base() * truth.true_T_base.inverse();
-    const Transform world_T_true{rotation_z(yaw_of(exact.R)), exact.p_m};
+    // Seen from the base, as a camera sees it: legs and camera share an error of the attitude.
+    const Transform world_T_true = state.world_T_base() * truth.true_T_base.inverse();
     FootholdSet set;
     set.map_stamp_ns = state.stamp_ns - 40 * kNsPerMs;
     set.obstruction = Obstruction::kNone;
