@@ -122,27 +122,27 @@ StepPlan stair_step(StepKind kind, double rise_m, double ahead_m, std::array<Tra
     lead.kind = StepKind::kLeading;
     lead.foot = Foot::kLeft;
     lead.target = left;
-    const StepPlan before = plan_step({}, params, lead, {SolePose{{0, 0.1, 0}, 0}, right}, kToeDown_rad[0]);
+    const StepPlan before = plan_step(params, lead, {SolePose{{0, 0.1, 0}, 0}, right}, kToeDown_rad[0]);
     const auto start = TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.0, 0.79}});
-    const StepKnots knots(params, before, start, {SolePose{{0, 0.1, 0}, 0}.transform(), right.transform()});
-    from = TorsoTrajectory::at_rest({Mat3::Identity(), before.touch_down.position_m});
+    const StepKnots knots({}, params, before, start, {SolePose{{0, 0.1, 0}, 0}.transform(), right.transform()});
+    from = TorsoTrajectory::at_rest({Mat3::Identity(), knots.torso_at_landing().position_m});
     TorsoTrajectory::set_horizontal(from, knots.com_at_landing());
   } else {
     from = TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.0, 0.79}});
   }
-  return plan_step({}, params, goal, {left, right}, kToeDown_rad[0]);
+  return plan_step(params, goal, {left, right}, kToeDown_rad[0]);
 }
 
 TEST(StepKnots_Eq30Eq37, WholeStep_KnotsAreEvenInTimeAndEndOnTheTarget) {
   std::array<Transform, kFootCount> soles;
   TorsoTrajectory::State from;
   const StepPlan plan = stair_step(StepKind::kLeading, 0.13, 0.28, soles, from);
-  const StepKnots knots({}, plan, from, soles);
+  const StepKnots knots({}, {}, plan, from, soles);
   ASSERT_EQ(knots.count(), 1 + (plan.shift_ticks + plan.swing_ticks + 9) / 10);
   for (std::int32_t i = 0; i < knots.count(); ++i) EXPECT_EQ(knots[i].tick, 10 * i);
   const StepKnot last = knots[knots.count() - 1];
   EXPECT_LT((last.odom_T_sole[0].p_m - plan.goal.target.position_m).norm(), 1e-9);
-  EXPECT_NEAR(last.odom_T_base.p_m.z(), plan.touch_down.position_m.z(), 1e-9);
+  EXPECT_NEAR(last.odom_T_base.p_m.z(), knots.torso_at_landing().position_m.z(), 1e-9);
   EXPECT_LT((knots[0].odom_T_sole[0].p_m - soles[0].p_m).norm(), 1e-12);
 }
 
@@ -156,7 +156,7 @@ TEST(StepSearch, RisesAndTreadsOfTheStairs_LegsCanDoAllOfThem) {
         std::array<Transform, kFootCount> soles;
         TorsoTrajectory::State from;
         const StepPlan plan = stair_step(kind, rise, ahead, soles, from);
-        const StepKnots knots(params, plan, from, soles);
+        const StepKnots knots({}, params, plan, from, soles);
         StepProof proof;
         proof.begin({}, params, knots);
         ASSERT_TRUE(proof.advance(knots.count()));
@@ -191,12 +191,12 @@ TEST(StepSearch, ShiftFasterThanTheDrives_IsNotProvenByASlowerOne) {
   std::array<Transform, kFootCount> soles;
   TorsoTrajectory::State from;
   const StepPlan plan = stair_step(StepKind::kTrailing, 0.13, 0.28, soles, from);
-  for (const std::int32_t shift_ticks : {StepParams{}.stair_shift_ticks, 40}) {
+  for (const std::int32_t shift_ticks : {StepParams{}.stair_shift_ticks, 15}) {
     StepSearch search;
     search.begin({}, {}, plan.goal, {}, shift_ticks, from, soles);
     for (int i = 0; i < 1000 && search.step() == StepSearch::State::kSearching; ++i) {
     }
-    EXPECT_EQ(search.state() == StepSearch::State::kFound, shift_ticks > 40);
+    EXPECT_EQ(search.state() == StepSearch::State::kFound, shift_ticks > 15);
   }
 }
 

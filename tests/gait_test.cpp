@@ -31,8 +31,7 @@ void expect_climbed(const IdealClimb& climb, const ClimbSetup& setup) {
   EXPECT_LT(r.penetration_m, 0.002);  // of the contact itself
   EXPECT_GT(r.crossing_m, 0.02);
   EXPECT_GT(r.toe_gap_m, 0.02);
-  EXPECT_GT(r.com_margin_m, 0.04);
-  EXPECT_LT(r.lateral_off_m, 0.055);  // the weight falls onto the foot and off it again, it never rests there
+  EXPECT_GT(r.zmp_margin_m, 0.01);
   EXPECT_LT(r.execution_m, 0.003);
   const double per_stair_s = seconds(r.last_touch_down_ns - r.first_lift_off_ns) / setup.stairs.steps;
   EXPECT_GT(per_stair_s, 2.4);
@@ -170,14 +169,14 @@ TEST(GaitLatch, SmallChangeBeforeLiftOff_IsAbsorbedAndALargeOneCostsANewShift) {
     while (climb.tick() && !climb.status().step.onto_tread) floor_steps = climb.status().step.sequence;
     ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, floor_steps + 2));  // both on the first tread
     const std::int64_t landed_ns = climb.status().stamp_ns;
-    changed_ns = landed_ns + 400 * kNsPerMs;  // in the middle of the shift
+    changed_ns = landed_ns + 200 * kNsPerMs;  // in the middle of the shift
     ASSERT_TRUE(climb.run_until(GaitPhase::kSwing, floor_steps + 3));
     const double shift_s = seconds(climb.status().stamp_ns - landed_ns);
     if (change < 0.015) {
-      EXPECT_LT(shift_s, 0.9);
+      EXPECT_LT(shift_s, 0.5);
     } else {
-      EXPECT_GT(shift_s, 1.0);
-      EXPECT_LT(shift_s, 1.25);
+      EXPECT_GT(shift_s, 0.6);
+      EXPECT_LT(shift_s, 0.85);
     }
   }
 }
@@ -355,7 +354,7 @@ TEST(GaitStop, TargetsThatNeverHoldStill_AreCalledUnsteady) {
 TEST(GaitStop, FootholdsThatComeAndGo_AreCalledUnsteady) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
-    if (since_ns % (2 * kNsPerS) > 400 * kNsPerMs) set.obstruction = Obstruction::kNothingSeen;
+    if (since_ns % kNsPerS > 100 * kNsPerMs) set.obstruction = Obstruction::kNothingSeen;
   });
   expect_unsteady(climb);
 }
@@ -384,7 +383,7 @@ TEST(GaitFinish, TopSeenAfterAnotherObstruction_WaitsAWholeSecondOfTop) {
 TEST(GaitLatch, OtherFootLeadsAfterTheShift_WeightTakesTheTimeOfAWholeShift) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
-    const double off_m = since_ns < 500 * kNsPerMs ? 0.03 : -0.03;
+    const double off_m = since_ns < 100 * kNsPerMs ? 0.03 : -0.03;
     for (Foothold& hold : set.p_star_feet) hold.position_m += rotation_z(hold.yaw_rad) * Vec3{0, off_m, 0};
   });
   const auto swings_from_the_first_tread = [&] {
@@ -434,16 +433,6 @@ TEST(GaitContact, TreadFarLowerThanMapped_PutsTheFootBackAndSaysSo) {
   setup.stairs.rise_m = 0.10;
   setup.map_shift_z_m = 0.07;
   IdealClimb climb(setup);
-  expect_put_back(climb, 1);
-}
-
-// The leading foot: a trailing one that nobody feels presses on its tread, lifts the robot off the other foot and has
-// too short a leg for the way back.
-TEST(GaitContact, ForceSensorDead_PutsTheFootBackByThePlan) {
-  IdealClimb climb({});
-  climb.tamper = [&](StateEstimate&, FootholdSet&, JointFeedback& feedback) {
-    if (in_swing_onto_tread(climb, 1)) feedback.foot_force_n[index_of(climb.status().step.foot)] = 0.0;
-  };
   expect_put_back(climb, 1);
 }
 

@@ -201,5 +201,97 @@ TEST(PhysicalClimb, WithoutFeedbackOfTheDcm_Falls) {
   EXPECT_TRUE(climb.truth().fell);
 }
 
+// Ticks until both feet stand still after the gait ended; false when it fell.
+bool stands_for(PhysicalClimb& climb, double for_s) {
+  const double end_s = climb.time_s() + for_s;
+  while (climb.time_s() < end_s && !climb.truth().fell) (void)climb.tick();
+  return !climb.truth().fell && climb.truth().in_contact[0] && climb.truth().in_contact[1] &&
+         climb.gait().balance().com_error_m().norm() < 0.02;
+}
+bool run_to_swing_onto(PhysicalClimb& climb, std::uint32_t nth, double limit_s = 40.0) {
+  std::uint32_t onto = 0, sequence = 0;
+  while (climb.time_s() < limit_s && climb.tick()) {
+    const LatchedStep& step = climb.status().step;
+    if (step.sequence != sequence && step.onto_tread) ++onto;
+    sequence = step.sequence;
+    if (onto == nth) return true;
+  }
+  return false;
+}
+
+TEST(PhysicalStop, RequestedAtAnyPhase_EndsOnBothFeet) {
+  for (const double after_s : {0.0, 0.2, 0.45, 0.7, 1.0, 1.2}) {
+    PhysicalClimb climb(few_steps(2));
+    ASSERT_TRUE(run_to_swing_onto(climb, 2));
+    climb.run(after_s);
+    climb.gait().request_stop();
+    climb.run(5.0);
+    EXPECT_EQ(climb.status().phase, GaitPhase::kStopped) << after_s;
+    EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);
+    EXPECT_TRUE(stands_for(climb, 3.0)) << after_s << climb.truth().fall_reason;
+  }
+}
+
+TEST(PhysicalStop, PerceptionLostInSwing_FinishesTheStepsAndStandsOnBothFeet) {
+  for (const std::uint32_t nth : {1U, 2U}) {
+    PhysicalClimb climb(few_steps(2));
+    ASSERT_TRUE(run_to_swing_onto(climb, nth));
+    climb.tamper_footholds = [](FootholdSet& set) {
+      set.has_p_star = false;
+      set.obstruction = Obstruction::kNothingSeen;
+    };
+    climb.run(20.0);
+    EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+    EXPECT_EQ(climb.status().stop_reason, Obstruction::kNothingSeen);
+    EXPECT_EQ(climb.status().treads_climbed, 1U);
+    EXPECT_TRUE(stands_for(climb, 3.0)) << climb.truth().fall_reason;
+  }
+}
+
+TEST(PhysicalStop, StepBeyondTheLegs_StandsOnBothFeetAndSaysSo) {
+  PhysicalClimb climb(few_steps(2));
+  climb.tamper_footholds = [](FootholdSet& set) {
+    for (Foothold& hold : set.p_star_feet) hold.position_m.z() += 0.2;
+  };
+  climb.run(40.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+  EXPECT_EQ(climb.status().stop_reason, Obstruction::kLegsCannot);
+  EXPECT_TRUE(stands_for(climb, 3.0)) << climb.truth().fall_reason;
+}
+
+// Rises of the map 10 mm off, more with every stair, and no news: it falls or stops, and does not climb on.
+TEST(PhysicalClimb, MapFrozenWithAWrongRise_StopsOrFalls) {
+  for (const double per_stair_m : {0.010, -0.010}) {
+    SimOptions options;
+    options.seed = 2;
+    PhysicalClimb climb(options);
+    climb.tamper_footholds = [&](FootholdSet& set) {
+      const double off_m = per_stair_m * (climb.status().treads_climbed + 1);
+      for (Foothold& hold : set.p_star_feet) hold.position_m.z() += off_m;
+    };
+    climb.run(60.0);
+    EXPECT_TRUE(climb.truth().fell || climb.status().phase == GaitPhase::kStopped) << per_stair_m;
+  }
+}
+
+// Failures of the study that this climb rests on.
+TEST(PhysicalFailure, ForceSensorDead_FootThatDoesNotGoDownStands) {
+  for (const std::uint32_t nth : {1U, 2U}) {
+    PhysicalClimb climb(few_steps(2));
+    std::size_t dead = kFootCount;
+    climb.tamper = [&](JointFeedback& joints) {
+      if (dead < kFootCount) joints.foot_force_n[dead] = 0.0;
+    };
+    ASSERT_TRUE(run_to_swing_onto(climb, nth));
+    dead = index_of(climb.status().step.foot);
+    while (climb.status().phase == GaitPhase::kSwing && climb.tick()) {
+    }
+    dead = kFootCount;
+    climb.run(60.0);
+    EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
+    EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+  }
+}
+
 }  // namespace
 }  // namespace polygmap::sim

@@ -7,7 +7,7 @@ namespace polygmap {
 namespace {
 
 constexpr std::int32_t kLower_ticks = 200;    // of the torso where a foot needs a longer leg
-constexpr std::int32_t kPatience_ticks = 20;  // 10 mm of late ground, which the shift after it can make up for
+constexpr std::int32_t kPatience_ticks = 20;  // late ground that the shift after it can make up for: 3 mm
 constexpr double kInward_m = 0.01;
 constexpr double kSpare_m = 0.02;               // of its height: the base is not right over the centre of mass
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
@@ -134,7 +134,7 @@ void Gait::hold_upright(JointCommand& command) noexcept {
   add_torques({}, {}, command);
 }
 
-void Gait::plan_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept {
+void Gait::move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept {
   torso_.plan(torso_state_, height_m, yaw_rad, ticks, height_ticks);
   torso_tick_ = 0;
 }
@@ -144,8 +144,8 @@ void Gait::wait_over_stance(const SolePose& sole) noexcept {
   const Foot foot = decision_.goal.foot;
   SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   soles[index_of(foot)] = sole;
-  const TorsoPose low = torso_over(params_.geometry, params_.step.torso, other(foot), soles, params_.step.zmp_ahead_m);
-  plan_torso(std::min(low.position_m.z() - kSpare_m, torso_state_[2].position), low.yaw_rad, kLower_ticks,
+  const TorsoPose low = torso_over(params_.geometry, params_.step.torso, other(foot), soles);
+  move_torso(std::min(low.position_m.z() - kSpare_m, torso_state_[2].position), low.yaw_rad, kLower_ticks,
              kLower_ticks);
   // As far towards the free foot as the sole carries: the ankle roll of a folded leg has little range.
   const Vec3 inward_m = plan_T_sole_[index_of(other(foot))].R.col(1) * (side_sign(foot) * kInward_m);
@@ -163,7 +163,7 @@ void Gait::rest_over(const Vec2& plan_p_m) noexcept {
 void Gait::settle_between_feet() noexcept {
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   TorsoPose middle = torso_between(params_.geometry, params_.step.torso, soles);
-  plan_torso(middle.position_m.z(), middle.yaw_rad, params_.settle_ticks, params_.settle_ticks);
+  move_torso(middle.position_m.z(), middle.yaw_rad, params_.settle_ticks, params_.settle_ticks);
   const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{params_.step.zmp_ahead_m, 0, 0};
   rest_over((middle.position_m + ahead_m).head<2>());
   tick_ = 0;
@@ -192,7 +192,7 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   status_.phase = GaitPhase::kDoubleSupport;
   tick_ = 0;
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
-  StepPlan plan = plan_step(params_.geometry, params_.step, decision.goal, soles, kToeDown_rad[0]);
+  StepPlan plan = plan_step(params_.step, decision.goal, soles, kToeDown_rad[0]);
   if (again) plan.shift_ticks = params_.reshift_ticks;
   // Sooner where the weight is on its way already, later where it stands over the other foot with little room to push
   // off: the first shift that needs a small push.
@@ -218,7 +218,8 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   }
   (void)try_shift(best_ticks);
   shift_ticks_ = plan.shift_ticks;
-  plan_torso(plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
+  plan_torso(params_.geometry, params_.step, soles, com_, shift_ticks_, plan);
+  move_torso(plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
   com_tick_ = 0;
   search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, shift_ticks_, torso_state_,
                 plan_T_sole_);
@@ -282,10 +283,11 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   carry_plan_to_odometry();
   const StepGoal& goal = decision.goal;
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
-  const StepPlan plan = plan_step(params_.geometry, params_.step, goal, soles, search_.plan().shape.toe_down_rad);
-  swing_.plan(plan_T_sole_[index_of(goal.foot)], goal.target, plan.shape, plan.swing_ticks);
-  plan_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
+  StepPlan plan = plan_step(params_.step, goal, soles, search_.plan().toe_down_rad);
   com_.plan(params_.step.com, TorsoTrajectory::horizontal(torso_state_), zmp_of_swing(params_.step, plan));
+  plan_torso(params_.geometry, params_.step, soles, com_, 0, plan);
+  swing_.plan(plan_T_sole_[index_of(goal.foot)], goal.target, plan.shape, plan.swing_ticks);
+  move_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
   com_tick_ = 0;
   zmp_stance_m_ = plan.zmp_stance_m;
   planner_.latched(situation(state), decision);
@@ -316,7 +318,10 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
   const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
   if (!loaded) unloaded_ = true;
   const bool descending = 2 * tick_ > swing_.duration_ticks();
-  if (descending && unloaded_ && loaded) {
+  // What does not go down any more stands on something, whatever its force sensor says.
+  const double above_m = usable(state) ? state.odom_T_sole[i].p_m.z() - swing_.at(tick_).p_m.z() : 0.0;
+  const bool blocked = swing_.lowered_m(tick_) > params_.late_m && above_m > params_.blocked_m;
+  if ((descending && unloaded_ && loaded) || blocked) {
     if (swing_.at(tick_ - 1).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m) ++status_.early_contacts;
     if (swing_.lowered_m(tick_) > params_.late_m) ++status_.late_contacts;
     return touch_down(state);
@@ -343,9 +348,9 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
   plan_T_sole_[i] = plan_T_odom * swing_.at(tick_);
 }
 
-std::int32_t Gait::motion_tick() const noexcept {
+double Gait::motion_tick() const noexcept {
   if (activity_ != Activity::kRetreat) return tick_;
-  return turn_tick_ - std::max(tick_ - params_.retreat_pause_ticks, 0) / 2;
+  return turn_tick_ - 0.5 * std::max(tick_ - params_.retreat_pause_ticks, 0);
 }
 
 // The only ground that is known is where the foot stood, and the only way there that is known to be free is the one it

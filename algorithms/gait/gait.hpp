@@ -39,6 +39,7 @@ class Gait {
     double touch_force_n = 15.0;
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
+    double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down
     double max_lowering_m = 0.04;               // no ground found: the foot goes back
     std::int32_t retreat_pause_ticks = 200;     // before it does
     double put_back_m = 0.01;                   // about where it stood: weight counts as the ground; below, it is there
@@ -83,10 +84,10 @@ class Gait {
   void touch_down(const StateEstimate& state) noexcept;
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
   // Of the swing: backwards in a retreat.
-  [[nodiscard]] std::int32_t motion_tick() const noexcept;
+  [[nodiscard]] double motion_tick() const noexcept;
   void carry_plan_to_odometry() noexcept;
   void settle_between_feet() noexcept;
-  void plan_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
+  void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
   void wait_over_stance(const SolePose& sole) noexcept;
   void rest_over(const Vec2& plan_p_m) noexcept;
   [[nodiscard]] bool usable(const StateEstimate& state) const noexcept;

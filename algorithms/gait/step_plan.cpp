@@ -7,11 +7,10 @@
 
 namespace polygmap {
 
-StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal, const SolePair& soles,
+StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePair& soles,
                    double toe_down_rad) noexcept {
   const bool on_floor = goal.kind == StepKind::kFloor;
   const Foot stance = other(goal.foot);
-  const TorsoParams& torso = params.torso;
   SolePair landed = soles;
   landed[index_of(goal.foot)] = goal.target;
 
@@ -22,25 +21,8 @@ StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const 
   plan.swing_ticks = on_floor ? params.floor_swing_ticks : params.stair_swing_ticks;
   plan.rise_ticks = plan.swing_ticks;
   if (!on_floor) plan.rise_ticks = static_cast<std::int32_t>(params.rise_share * plan.swing_ticks);
+  plan.toe_down_rad = toe_down_rad;
   plan.shape.toe_down_rad = on_floor ? 0.5 * toe_down_rad : toe_down_rad;
-  switch (goal.kind) {
-    case StepKind::kFloor:
-      plan.lift_off = torso_over(geometry, torso, stance, soles, torso.ahead_floor_m);
-      plan.touch_down = torso_over(geometry, torso, stance, landed, torso.ahead_floor_m);
-      break;
-    case StepKind::kLeading: {
-      plan.lift_off = torso_over(geometry, torso, stance, soles, torso.ahead_lead_lift_m);
-      plan.touch_down = torso_over(geometry, torso, stance, landed, torso.ahead_lead_land_m);
-      // Rising with the foot gives the leading leg room to fold, at a lower knee speed.
-      const double tall_m = soles[index_of(stance)].position_m.z() + torso.lead_height_m;
-      plan.touch_down.position_m.z() = std::min(plan.touch_down.position_m.z(), tall_m);
-      break;
-    }
-    case StepKind::kTrailing:
-      plan.lift_off = torso_over(geometry, torso, stance, soles, torso.ahead_trail_lift_m);
-      plan.touch_down = torso_over(geometry, torso, stance, landed, torso.ahead_trail_land_m);
-      break;
-  }
   const auto zmp_in = [&](Foot foot) -> Vec2 {
     const SolePose& sole = landed[index_of(foot)];
     const Vec3 local_m{params.zmp_ahead_m, -side_sign(foot) * params.zmp_inward_m, 0.0};
@@ -51,6 +33,18 @@ StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const 
   plan.zmp_next_m = zmp_in(goal.foot);
   if (goal.kind != StepKind::kLeading) plan.zmp_next_m = 0.5 * (plan.zmp_next_m + plan.zmp_stance_m);
   return plan;
+}
+
+void plan_torso(const LegGeometry& geometry, const StepParams& params, const SolePair& soles, const ComPlan& com,
+                std::int32_t lift_off_tick, StepPlan& plan) noexcept {
+  SolePair landed = soles;
+  landed[index_of(plan.goal.foot)] = plan.goal.target;
+  plan.lift_off = torso_at(geometry, params.torso, soles, com.at(lift_off_tick + params.leave_ticks).position_m);
+  plan.touch_down = torso_at(geometry, params.torso, landed, com.at(lift_off_tick + plan.swing_ticks).position_m);
+  if (plan.goal.kind != StepKind::kLeading) return;
+  // Rising with the foot gives the leading leg room to fold, at a lower knee speed.
+  const double tall_m = soles[index_of(other(plan.goal.foot))].position_m.z() + params.torso.lead_height_m;
+  plan.touch_down.position_m.z() = std::min(plan.touch_down.position_m.z(), tall_m);
 }
 
 ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept {
@@ -74,16 +68,19 @@ ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2
   return knots;
 }
 
-StepKnots::StepKnots(const StepParams& params, const StepPlan& plan, const TorsoTrajectory::State& from,
-                     const std::array<Transform, kFootCount>& soles) noexcept
-    : foot_(plan.goal.foot),
+StepKnots::StepKnots(const LegGeometry& geometry, const StepParams& params, const StepPlan& step,
+                     const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept
+    : foot_(step.goal.foot),
       soles_(soles),
-      shift_ticks_(plan.shift_ticks),
-      swing_ticks_(plan.swing_ticks),
+      shift_ticks_(step.shift_ticks),
+      swing_ticks_(step.swing_ticks),
       knot_ticks_(std::max(params.knot_ticks, 1)),
-      count_(1 + (plan.shift_ticks + plan.swing_ticks + knot_ticks_ - 1) / knot_ticks_) {
+      count_(1 + (step.shift_ticks + step.swing_ticks + knot_ticks_ - 1) / knot_ticks_) {
   const HorizontalMotion com = TorsoTrajectory::horizontal(from);
-  com_.plan(params.com, com, zmp_of_shift(params, plan, ComPlan::zmp_under(params.com, com)));
+  com_.plan(params.com, com, zmp_of_shift(params, step, ComPlan::zmp_under(params.com, com)));
+  StepPlan plan = step;
+  plan_torso(geometry, params, {sole_pose(soles[0]), sole_pose(soles[1])}, com_, plan.shift_ticks, plan);
+  torso_at_landing_ = plan.touch_down;
   shift_.plan(from, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, plan.shift_ticks, plan.shift_ticks);
   lean_.plan(shift_.at(plan.shift_ticks, com), plan.touch_down.position_m.z(), plan.touch_down.yaw_rad,
              plan.swing_ticks, plan.rise_ticks);
@@ -177,12 +174,12 @@ void StepSearch::try_candidate() noexcept {
   TorsoTrajectory::State from = from_;
   if (leading_found_) {
     soles[index_of(goal_.foot)] = goal_.target.transform();
-    from = TorsoTrajectory::at_rest({rotation_z(plan_.touch_down.yaw_rad), plan_.touch_down.position_m});
+    from = TorsoTrajectory::at_rest({rotation_z(torso_landed_.yaw_rad), torso_landed_.position_m});
     TorsoTrajectory::set_horizontal(from, com_landed_);
   }
-  candidate_ = plan_step(geometry_, params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, kToeDown_rad[shape_]);
+  candidate_ = plan_step(params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, kToeDown_rad[shape_]);
   if (!leading_found_) candidate_.shift_ticks = shift_ticks_;
-  proof_.begin(geometry_, params_, StepKnots(params_, candidate_, from, soles));
+  proof_.begin(geometry_, params_, StepKnots(geometry_, params_, candidate_, from, soles));
 }
 
 // Can the weight then move over the foot that landed? A wide diagonal step could be a dead end: the ankle roll of the
@@ -190,7 +187,7 @@ void StepSearch::try_candidate() noexcept {
 bool StepSearch::leads_on() const noexcept {
   SolePair landed{sole_pose(soles_[0]), sole_pose(soles_[1])};
   landed[index_of(goal_.foot)] = goal_.target;
-  const TorsoPose over = torso_over(geometry_, params_.torso, goal_.foot, landed, params_.torso.ahead_floor_m);
+  const TorsoPose over = torso_over(geometry_, params_.torso, goal_.foot, landed);
   const Transform base_T_odom = Transform{rotation_z(over.yaw_rad), over.position_m}.inverse();
   const double margin_rad = 2.0 * params_.joint_margin_rad;  // the foot lands some mm off
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
@@ -213,6 +210,7 @@ StepSearch::State StepSearch::step() noexcept {
     if (leading_found_ || goal_.kind != StepKind::kLeading) return state_ = State::kFound;
     leading_found_ = true;
     com_landed_ = proof_.knots().com_at_landing();
+    torso_landed_ = proof_.knots().torso_at_landing();
     shape_ = 0;
   }
   try_candidate();

@@ -32,13 +32,18 @@ double allowed_height_m(const LegGeometry& geometry, const TorsoParams& params, 
 
 }  // namespace
 
-TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance, const SolePair& soles,
-                     double ahead_m) noexcept {
-  const SolePose& foot = soles[index_of(stance)];
-  TorsoPose torso{foot.position_m + rotation_z(foot.yaw_rad) * Vec3{ahead_m, -side_sign(stance) * params.inward_m, 0.0},
-                  middle_of(soles).yaw_rad};
+TorsoPose torso_at(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles,
+                   const Vec2& base_m) noexcept {
+  TorsoPose torso{{base_m.x(), base_m.y(), 0.0}, middle_of(soles).yaw_rad};
   torso.position_m.z() = allowed_height_m(geometry, params, soles, torso);
   return torso;
+}
+
+TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance,
+                     const SolePair& soles) noexcept {
+  const SolePose& foot = soles[index_of(stance)];
+  const Vec3 local_m{params.ahead_m, -side_sign(stance) * params.inward_m, 0.0};
+  return torso_at(geometry, params, soles, (foot.position_m + rotation_z(foot.yaw_rad) * local_m).head<2>());
 }
 
 TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles) noexcept {

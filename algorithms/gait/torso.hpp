@@ -11,25 +11,23 @@
 namespace polygmap {
 
 struct TorsoParams {
-  double height_m = 0.795;            // above the higher foot, at most
-  double lead_height_m = 0.86;        // above the lower foot when the leading one lands
-  double max_leg_m = 0.612;           // hip pitch to ankle, of 0.630 stretched
-  double inward_m = 0.022;            // from the stance foot's middle line towards the other foot at lift-off
-  double ahead_lead_lift_m = 0.01;    // of the base before the stance sole's origin: leading foot leaves
-  double ahead_lead_land_m = 0.09;    // it lands
-  double ahead_trail_lift_m = -0.01;  // trailing foot leaves: as far back as the support allows
-  double ahead_trail_land_m = 0.005;  // it lands
-  double ahead_floor_m = 0.01;
+  double height_m = 0.795;      // above the higher foot, at most
+  double lead_height_m = 0.86;  // above the lower foot when the leading one lands
+  double max_leg_m = 0.612;     // hip pitch to ankle, of 0.630 stretched
+  double inward_m = 0.022;      // of the base at rest over one foot, from its middle line towards the other one
+  double ahead_m = 0.01;        // and before its sole's origin
 };
 
 // Base height at which the leg to `sole` is max_leg_m long, for a base at (x, y) with that heading.
 [[nodiscard]] double reach_height_m(const LegGeometry& geometry, const Vec3& base_m, double yaw_rad, Foot leg,
                                     const SolePose& sole, double max_leg_m) noexcept;
 
-// Over the foot that stands alone: ahead_m along its heading, params.inward_m towards the other foot; height: the
-// highest that both feet allow.
+// With its base there, heading between the soles; height: the highest that both feet allow.
+[[nodiscard]] TorsoPose torso_at(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles,
+                                 const Vec2& base_m) noexcept;
+// At rest over the foot that stands alone.
 [[nodiscard]] TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance,
-                                   const SolePair& soles, double ahead_m) noexcept;
+                                   const SolePair& soles) noexcept;
 // Between both feet.
 [[nodiscard]] TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params,
                                       const SolePair& soles) noexcept;

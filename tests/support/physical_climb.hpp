@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 
 #include "algorithms/estimation/estimator.hpp"
@@ -32,12 +33,18 @@ class PhysicalClimb {
     ImuSample imu;
     while (robot_.try_read(imu)) estimator_.add_imu(imu, now_ns);
     JointFeedback joints;
-    if (robot_.try_read(joints)) estimator_.add_joints(joints, now_ns);
+    if (robot_.try_read(joints)) {
+      if (tamper) tamper(joints);
+      estimator_.add_joints(joints, now_ns);
+    }
     LioSample lio;
     while (robot_.try_read(lio)) estimator_.add_lio(lio, now_ns);
     estimator_.tick(gait_.status().stands);
     constexpr int kFrame_ticks = 16;
-    if (ticks_++ % kFrame_ticks == 0) footholds_ = search();
+    if (ticks_++ % kFrame_ticks == 0) {
+      footholds_ = search();
+      if (tamper_footholds) tamper_footholds(footholds_);
+    }
     gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
     (void)robot_.try_write(command_);
     const GaitPhase phase = gait_.status().phase;
@@ -52,10 +59,15 @@ class PhysicalClimb {
   [[nodiscard]] const Truth& truth() const { return robot_.truth(); }
   [[nodiscard]] const GaitStatus& status() const { return gait_.status(); }
   [[nodiscard]] const StateEstimate& state() const { return estimator_.state(); }
-  [[nodiscard]] const Gait& gait() const { return gait_; }
   [[nodiscard]] const JointCommand& command() const { return command_; }
   [[nodiscard]] SimRobot& robot() { return robot_; }
+  [[nodiscard]] MujocoPlant& plant() { return dynamic_cast<MujocoPlant&>(robot_.plant()); }
+  [[nodiscard]] Gait& gait() { return gait_; }
   [[nodiscard]] double time_s() const { return seconds(robot_.now_ns()); }
+
+  // May change what the module sees, after it was made.
+  std::function<void(JointFeedback&)> tamper;
+  std::function<void(FootholdSet&)> tamper_footholds;
 
  private:
   // What a map without errors would give at this moment.
