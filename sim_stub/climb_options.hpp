@@ -18,6 +18,7 @@ struct ClimbOptions {
   std::uint64_t seed = 1;
   DepthNoise noise = DepthNoise::kWhite;
   PlantKind plant = PlantKind::kKinematic;
+  std::optional<Push> push;
   std::string gait = "ds";
   std::string out_dir;          // empty: no files
   double time_limit_s = 150.0;  // simulated

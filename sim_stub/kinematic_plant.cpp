@@ -64,6 +64,7 @@ KinematicPlant::KinematicPlant(const Params& params, const StairWorld& world, co
     feet_[f].base_offset.p_rate.setZero();
     feet_[f].base_offset.turn_rate.setZero();
   }
+  base_before_m_ = true_T_base_.p_m;
   load_drives();
 }
 
@@ -155,15 +156,28 @@ void KinematicPlant::update_leg_kinematics() {
 
 void KinematicPlant::transfer_load() {
   FootState &left = feet_[0], &right = feet_[1];
+  const bool both = left.anchored && right.anchored;
+  // As the legs move it, whoever carries: the shares must not act on what they follow from.
+  const Vec3 base_m = both ? Vec3(0.5 * (left.true_T_base.p_m + right.true_T_base.p_m))
+                           : (left.anchored ? left : right).true_T_base.p_m;
+  if (both != both_anchored_) base_before_m_ = base_m - kPlantTick_s * base_v_mps_;
+  both_anchored_ = both;
+  const Vec3 velocity_mps = (base_m - base_before_m_) / kPlantTick_s;
+  base_before_m_ = base_m;
+  constexpr double kSmooth_radps = 50.0;
+  critically_damped(base_v_mps_, base_a_mps2_, velocity_mps, kSmooth_radps, kPlantTick_s);
   if (!left.anchored || !right.anchored) {
     closure_m_ = 0.0;
     return;
   }
   closure_m_ = (left.true_T_base.p_m - right.true_T_base.p_m).norm();
 
-  // Where the base hangs between the soles, seen from above: 0 over the right one, 1 over the left.
+  // Where a mass at the base, moving as it does, presses between the soles: 0 at the right one, 1 at the left.
+  constexpr double kPendulum_radps = 3.5, kMost_mps2 = 2.0;
+  const Vec3 pressed_m =
+      true_T_base_.p_m - base_a_mps2_.cwiseMax(-kMost_mps2).cwiseMin(kMost_mps2) / math::square(kPendulum_radps);
   const Vec2 between = (left.true_T_sole.p_m - right.true_T_sole.p_m).head<2>();
-  const double along = (true_T_base_.p_m - right.true_T_sole.p_m).head<2>().dot(between) / between.squaredNorm();
+  const double along = (pressed_m - right.true_T_sole.p_m).head<2>().dot(between) / between.squaredNorm();
   // A foot is unloaded before the base is all the way over the other one: the sole has a width.
   constexpr double kDeadEnd = 0.1;
   const double target = smooth_step((along - kDeadEnd) / (1.0 - 2.0 * kDeadEnd));

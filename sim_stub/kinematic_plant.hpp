@@ -93,6 +93,8 @@ class KinematicPlant final : public Plant {
   Transform true_T_base_;
   Slack slack_;
   double share_ = 0.5, share_rate_ = 0.0;  // of the left foot
+  Vec3 base_before_m_ = Vec3::Zero(), base_v_mps_ = Vec3::Zero(), base_a_mps2_ = Vec3::Zero();
+  bool both_anchored_ = false;
   double closure_m_ = 0.0;
   std::string fall_reason_;
 };

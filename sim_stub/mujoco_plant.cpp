@@ -113,7 +113,10 @@ void MujocoPlant::read_state() {
 
 void MujocoPlant::read_contacts() {
   std::array<double, kFootCount> strongest_n{};
-  for (FootState& foot : feet_) foot.force_n = 0.0;
+  for (FootState& foot : feet_) {
+    foot.force_n = 0.0;
+    foot.pressure_nm.setZero();
+  }
   for (int c = 0; c < data_->ncon; ++c) {
     const mjContact& contact = data_->contact[c];
     for (std::size_t f = 0; f < kFootCount; ++f) {
@@ -125,6 +128,7 @@ void MujocoPlant::read_contacts() {
       for (std::size_t a = 0; a < 3; ++a) up_n += contact.frame[3 * a + 2] * wrench[a];
       if (first) up_n = -up_n;
       feet_[f].force_n += up_n;
+      feet_[f].pressure_nm += up_n * Vec3{contact.pos[0], contact.pos[1], contact.pos[2]};
       if (up_n <= strongest_n[f]) continue;
       strongest_n[f] = up_n;
       const int ground = first ? contact.geom2 : contact.geom1;
@@ -151,6 +155,14 @@ void MujocoPlant::check_falls() {
 double MujocoPlant::load_share(std::size_t foot) const noexcept {
   const double both_n = feet_[0].force_n + feet_[1].force_n;
   return both_n > 0.0 ? feet_[foot].force_n / both_n : 0.5;
+}
+
+double MujocoPlant::zmp_margin_m() const noexcept {
+  if (in_contact(0) == in_contact(1)) return Plant::zmp_margin_m();
+  const FootState& foot = feet_[in_contact(0) ? 0 : 1];
+  const Vec3 local_m = foot.true_T_sole.inverse() * Vec3(foot.pressure_nm / foot.force_n);
+  const SoleRectangle& sole = kContactRectangle;
+  return std::min({local_m.x() - sole.heel_x_m, sole.toe_x_m - local_m.x(), sole.half_width_m - std::abs(local_m.y())});
 }
 
 double MujocoPlant::total_mass_kg() const noexcept { return mj_getTotalmass(model_.get()); }

@@ -36,7 +36,7 @@ class MujocoPlant final : public Plant {
   // Two steps of 1 ms. It goes on after a fall: what falls, falls.
   void step(const JointCommand& command) override;
   // A force on the torso's centre, true axes, until it is changed.
-  void push(const Vec3& force_n) noexcept;
+  void push(const Vec3& force_n) noexcept override;
 
   [[nodiscard]] const Transform& true_T_base() const noexcept override { return true_T_base_; }
   [[nodiscard]] const Transform& true_T_sole(std::size_t f) const noexcept override { return feet_[f].true_T_sole; }
@@ -54,7 +54,8 @@ class MujocoPlant final : public Plant {
   [[nodiscard]] const std::string& fall_reason() const noexcept override { return fall_reason_; }
 
   [[nodiscard]] double total_mass_kg() const noexcept;
-  [[nodiscard]] Vec3 true_p_com_m() const noexcept;
+  [[nodiscard]] Vec3 true_p_com_m() const noexcept override;
+  [[nodiscard]] double zmp_margin_m() const noexcept override;
 
  private:
   struct Delete {
@@ -64,6 +65,7 @@ class MujocoPlant final : public Plant {
   struct FootState {
     Transform true_T_sole;
     double force_n = 0.0;
+    Vec3 pressure_nm = Vec3::Zero();  // places of contacts times their forces, true axes
     int step = -1;
     int body = -1;
   };

@@ -59,6 +59,7 @@ SimRobot::SimRobot(const SimOptions& options)
       error_params_(options.errors),
       errors_(draw_errors(options.errors, options.seed)),
       lio_silent_(options.lio_silent),
+      push_(options.push),
       plant_(make_plant(options, stairs_, errors_, start_)),
       camera_(options.camera,
               {.kind = options.noise,
@@ -77,6 +78,11 @@ SimRobot::SimRobot(const SimOptions& options)
 
 void SimRobot::advance() {
   clock_.advance();
+  if (push_) {
+    const double since_s = seconds(clock_.now_ns()) - push_->at_s;
+    const bool pushes = since_s >= 0.0 && since_s < Push::kDuration_s;
+    plant_->push(pushes ? Vec3(push_->impulse_ns / Push::kDuration_s * Vec3::Unit(push_->axis)) : Vec3(Vec3::Zero()));
+  }
   plant_->step(active_);
   if (command_) active_ = *command_;
   sense();
@@ -109,6 +115,10 @@ void SimRobot::update_truth() {
     truth_.load_share[f] = plant_->load_share(f);
     truth_.step_index[f] = plant_->step_index(f);
   }
+  truth_.true_p_com_m = plant_->true_p_com_m();
+  truth_.zmp_margin_m = plant_->zmp_margin_m();
+  truth_.drive_tau_nm = plant_->drive_tau_nm();
+  truth_.drive_dq_radps = plant_->drive_dq_radps();
   truth_.closure_error_m = plant_->closure_error_m();
   truth_.fell = plant_->fell();
   truth_.fall_reason = plant_->fall_reason();

@@ -48,6 +48,7 @@ struct SimOptions {
   PlantKind plant_kind = PlantKind::kKinematic;
   KinematicPlant::Params plant;
   MujocoPlant::Params mujoco;
+  std::optional<Push> push;
 };
 
 class SimRobot final : public hal::Clock,
@@ -96,6 +97,7 @@ class SimRobot final : public hal::Clock,
   ErrorParams error_params_;
   RobotErrors errors_;
   std::vector<Window> lio_silent_;
+  std::optional<Push> push_;
   VirtualClock clock_;
   std::unique_ptr<Plant> plant_;
   SimDepthCamera camera_;

@@ -9,6 +9,7 @@ namespace polygmap {
 void Balance::reset() noexcept {
   stabiliser_.reset();
   share_ = {0.5, 0.5};
+  odom_p_com_planned_m_.setZero();
   com_error_m_.setZero();
 }
 
@@ -44,6 +45,7 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   const double omega_radps = math::sqrt(up_mps2 / height_m);
   HorizontalMotion planned = reference.com;
   planned.position_m += odom_p_plan_m.head<2>();
+  odom_p_com_planned_m_ = planned.position_m;
   com_error_m_ = planned.position_m - odom_p_com_m.head<2>();
   const Vec2 zmp_m =
       stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(), omega_radps, tick_s);

@@ -35,12 +35,14 @@ class Balance {
   // One tick. The plan frame is laid on the estimate by the standing soles: an error of the base is what is fed back.
   [[nodiscard]] JointVector torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
                                        const Body& body, double tick_s) noexcept;
-  // Horizontal, planned less estimated centre of mass in the last tick.
+  // Of the last tick, horizontal: the planned centre of mass, and how far ahead of the estimated one it is.
+  [[nodiscard]] const Vec2& odom_p_com_planned_m() const noexcept { return odom_p_com_planned_m_; }
   [[nodiscard]] const Vec2& com_error_m() const noexcept { return com_error_m_; }
 
  private:
   DcmStabiliser stabiliser_;
   std::array<double, kFootCount> share_{0.5, 0.5};
+  Vec2 odom_p_com_planned_m_ = Vec2::Zero();
   Vec2 com_error_m_ = Vec2::Zero();
 };
 

@@ -427,6 +427,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   observe_links();
   if (joints_.follow(plan_T_base_, plan_T_sole_, status_.stands, command)) ++status_.ik_limited_ticks;
   add_torques(state, feedback, command);
+  status_.odom_p_com_desired_m = balance_.odom_p_com_planned_m();
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
   for (std::size_t i = 0; i < kFootCount; ++i) status_.odom_T_sole_desired[i] = odom_T_plan * plan_T_sole_[i];
 }
