@@ -8,6 +8,7 @@
 
 #include "sim_stub/camera_profile.hpp"
 #include "sim_stub/noise_kind.hpp"
+#include "sim_stub/plant.hpp"
 #include "sim_stub/stair_world.hpp"
 
 namespace polygmap::sim {
@@ -16,6 +17,8 @@ struct ClimbOptions {
   StairParams stairs;
   std::uint64_t seed = 1;
   DepthNoise noise = DepthNoise::kWhite;
+  PlantKind plant = PlantKind::kKinematic;
+  std::optional<Push> push;
   std::string gait = "ds";
   std::string out_dir;          // empty: no files
   double time_limit_s = 150.0;  // simulated

@@ -126,6 +126,7 @@ void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
     observe_map(telemetry);
     observe_footsteps(truth, telemetry);
     observe_tracking(truth, telemetry.gait);
+    observe_balance(truth, telemetry);
   }
   observe_soles(truth, telemetry.gait.step.onto_tread);
   observe_stance(truth);
@@ -254,6 +255,24 @@ void ClimbReport::observe_tracking(const Truth& truth, const GaitStatus& gait) {
   keep_max(tracking_z_max_m_, std::abs(desired_m.z() - actual_m.z()));
 }
 
+void ClimbReport::observe_balance(const Truth& truth, const Telemetry& telemetry) {
+  const GaitStatus& gait = telemetry.gait;
+  keep_min(zmp_margin_min_m_, truth.zmp_margin_m);
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const std::size_t j = n % kJointsPerLeg;
+    const auto i = static_cast<Eigen::Index>(n);
+    const JointLimits limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), j);
+    keep_max(torque_peak_ratio_[j], std::abs(truth.drive_tau_nm[i]) / limits.torque_nm);
+    keep_max(joint_speed_peak_ratio_[j], std::abs(truth.drive_dq_radps[i]) / limits.speed_radps);
+  }
+  if (gait.step.sequence == 0) return;  // it may not have begun to balance
+  const std::size_t stance = gait.stands[0] ? 0 : 1;
+  const Vec2& com_m = gait.odom_p_com_desired_m;
+  const Vec3 desired_m = level_frame_p(telemetry.state.odom_T_sole[stance], {com_m.x(), com_m.y(), 0.0});
+  const Vec3 actual_m = level_frame_p(truth.true_T_sole[stance], truth.true_p_com_m);
+  keep_max(com_tracking_max_m_, (desired_m - actual_m).head<2>().norm());
+}
+
 double ClimbReport::flight_clearance_m(const Flight& flight, int to_step, double at_most_m) const {
   const std::array excluded{flight.from_step, to_step};
   for (const Transform& true_T_sole : flight.true_T_sole) {
@@ -367,7 +386,6 @@ void ClimbReport::judge(ClimbSummary& s, const std::string& heap_first_caller) c
 
 ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   ClimbSummary s;
-  s.plant = run.plant;
   s.options = run.options;
   s.camera = run.camera;
   s.fell = fell_;
@@ -413,6 +431,10 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.closure_error_m = spread_of(closure_error_m_);
   s.tracking_error_x_max_m = tracking_x_max_m_;
   s.tracking_error_z_max_m = tracking_z_max_m_;
+  s.com_tracking_max_m = com_tracking_max_m_;
+  s.zmp_margin_min_m = zmp_margin_min_m_;
+  s.torque_peak_ratio = torque_peak_ratio_;
+  s.joint_speed_peak_ratio = joint_speed_peak_ratio_;
   s.odometry_rmse_base_m = base_error_.rmse_m();
   s.odometry_rmse_lio_m = lio_error_.rmse_m();
   s.odometry_rmse_fused_m = fused_error_.rmse_m();

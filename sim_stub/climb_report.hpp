@@ -23,7 +23,6 @@ namespace polygmap::sim {
 
 // What the run knows beside truth and telemetry.
 struct RunFigures {
-  std::string plant = "kinematic";
   ClimbOptions options;
   CameraFigures camera;
   std::uint64_t heap_calls = 0;
@@ -74,6 +73,7 @@ class ClimbReport {
   void observe_footsteps(const Truth& truth, const Telemetry& telemetry);
   void observe_landing(const Truth& truth);
   void observe_tracking(const Truth& truth, const GaitStatus& gait);
+  void observe_balance(const Truth& truth, const Telemetry& telemetry);
   void observe_soles(const Truth& truth, bool onto_tread);
   void observe_stance(const Truth& truth);
   void observe_steps_climbed(const Truth& truth);
@@ -117,6 +117,8 @@ class ClimbReport {
   GaitPhase phase_ = GaitPhase::kStandstill;
   Obstruction stop_reason_ = Obstruction::kNone;
   double stop_measured_m_ = 0.0;
+  double com_tracking_max_m_ = kNotMeasured, zmp_margin_min_m_ = kNotMeasured;
+  std::array<double, kJointsPerLeg> torque_peak_ratio_{}, joint_speed_peak_ratio_{};
   double tracking_x_max_m_ = kNotMeasured, tracking_z_max_m_ = kNotMeasured;
 
   std::array<std::optional<Flight>, kFootCount> flights_;

@@ -26,6 +26,14 @@ Json ms(double time_ms) { return rounded(time_ms, 1e3); }
 Json spread_mm(const Spread& s) { return {{"median", mm(s.median)}, {"max", mm(s.max)}}; }
 Json spread_ms(const Spread& s) { return {{"median", ms(s.median)}, {"max", ms(s.max)}}; }
 
+Json per_joint(const std::array<double, kJointsPerLeg>& ratio) {
+  constexpr std::array<const char*, kJointsPerLeg> kNames{"hip_roll", "hip_yaw",     "hip_pitch",
+                                                          "knee",     "ankle_pitch", "ankle_roll"};
+  Json j = Json::object();
+  for (std::size_t i = 0; i < kJointsPerLeg; ++i) j[kNames[i]] = rounded(ratio[i], 1e3);
+  return j;
+}
+
 Json pose(const Transform& T) {
   return {{"x", metres(T.p_m.x())},
           {"y", metres(T.p_m.y())},
@@ -48,6 +56,11 @@ Json footstep_json(const Footstep& f) {
           {"target_last_seen_ms", ms(f.target_last_seen_ms)}};
 }
 
+Json push_json(const std::optional<Push>& push) {
+  if (!push) return nullptr;
+  return {{"at_s", push->at_s}, {"axis", push->axis == 0 ? "x" : "y"}, {"impulse_ns", push->impulse_ns}};
+}
+
 // What the command line said beside gait and seed, defaults included: enough to run it again.
 Json arguments_json(const ClimbOptions& o) {
   const StairParams& stairs = o.stairs;
@@ -65,6 +78,7 @@ Json arguments_json(const ClimbOptions& o) {
           {"estimate_mount", o.estimate_mount},
           {"self_filter", o.self_filter},
           {"contacts", o.infer_contacts ? "inferred" : "sensed"},
+          {"push", push_json(o.push)},
           {"render_shift_m", {o.render_dx_m, o.render_dy_m, o.render_dz_m}},
           {"render_missing_step", o.render_missing_step < 0 ? Json(nullptr) : Json(o.render_missing_step + 1)},
           {"blank_depth", o.blank_depth}};
@@ -92,7 +106,7 @@ Json to_json(const ClimbSummary& s) {
   j["reason"] = s.reason;
   j["fell"] = s.fell;
   j["ended_by"] = s.ended_by;
-  j["plant"] = s.plant;
+  j["plant"] = name_of(s.options.plant);
   j["gait"] = s.options.gait;
   j["seed"] = s.options.seed;
   j["arguments"] = arguments_json(s.options);
@@ -125,6 +139,10 @@ Json to_json(const ClimbSummary& s) {
   j["stand_off_mm"] = mm(s.stand_off_m);
   j["closure_error_mm"] = spread_mm(s.closure_error_m);
   j["tracking_error_mm"] = {{"x_max", mm(s.tracking_error_x_max_m)}, {"z_max", mm(s.tracking_error_z_max_m)}};
+  j["com_tracking_mm_max"] = mm(s.com_tracking_max_m);
+  j["zmp_margin_mm_min"] = mm(s.zmp_margin_min_m);
+  j["torque_peak_ratio"] = per_joint(s.torque_peak_ratio);
+  j["joint_speed_peak_ratio"] = per_joint(s.joint_speed_peak_ratio);
   j["odometry_rmse_mm"] = {
       {"base", mm(s.odometry_rmse_base_m)}, {"lio", mm(s.odometry_rmse_lio_m)}, {"fused", mm(s.odometry_rmse_fused_m)}};
   j["exposure_to_map_ms"] = spread_ms(s.exposure_to_map_ms);

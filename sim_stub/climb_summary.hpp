@@ -2,6 +2,7 @@
 // The figures of one climb: what summary.json says. A figure that could not be measured is NaN here and null there.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -73,7 +74,6 @@ struct ClimbSummary {
   std::string reason;  // one sentence
   bool fell = false;
   std::string ended_by;  // "module": by itself; "fall"; "time limit"
-  std::string plant;
   ClimbOptions options;
   CameraFigures camera;
   int steps_total = 0;
@@ -97,6 +97,12 @@ struct ClimbSummary {
   Spread closure_error_m;  // by which the two standing legs disagree about the base
   double tracking_error_x_max_m = kNotMeasured;
   double tracking_error_z_max_m = kNotMeasured;
+  // Planned against true centre of mass, horizontal, relative to a standing sole; centre of pressure to the edge of a
+  // sole that stands alone.
+  double com_tracking_max_m = kNotMeasured;
+  double zmp_margin_min_m = kNotMeasured;
+  // Greatest of both legs, over the drives' limits (robot/model.hpp).
+  std::array<double, kJointsPerLeg> torque_peak_ratio{}, joint_speed_peak_ratio{};
   double odometry_rmse_base_m = kNotMeasured;
   double odometry_rmse_lio_m = kNotMeasured;
   double odometry_rmse_fused_m = kNotMeasured;

@@ -64,20 +64,48 @@ KinematicPlant::KinematicPlant(const Params& params, const StairWorld& world, co
     feet_[f].base_offset.p_rate.setZero();
     feet_[f].base_offset.turn_rate.setZero();
   }
+  base_before_m_ = true_T_base_.p_m;
+  load_drives();
 }
 
-void KinematicPlant::step(const JointVector& command_rad) {
+double KinematicPlant::foot_force_n(std::size_t foot) const noexcept {
+  constexpr double kTouch_n = 30.0;  // least force of a sole that touches
+  return feet_[foot].anchored ? std::max(kTouch_n, load_share(foot) * kRobotWeight_n) : 0.0;
+}
+
+// The foot's force, at the middle of its sole, through the Jacobian.
+void KinematicPlant::load_drives() {
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    const auto leg = static_cast<Foot>(f);
+    const LegVector q = leg_joints(true_q_rad(), leg);
+    const Vec3 base_f = true_T_base_.R.transpose() * Vec3{0, 0, foot_force_n(f)};
+    const Vec3 base_r = kContactRectangle.centre_x_m() * base_T_sole(errors_.legs[f], leg, q).R.col(0);
+    Eigen::Matrix<double, 6, 1> wrench;
+    wrench.head<3>() = base_f;
+    wrench.tail<3>() = base_r.cross(base_f);
+    tau_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
+        -leg_jacobian(errors_.legs[f], leg, q).transpose() * wrench;
+  }
+}
+
+void KinematicPlant::step(const JointCommand& command) {
+  JointVector command_rad, rate_radps;
+  for (std::size_t j = 0; j < kJointCount; ++j) {
+    command_rad[static_cast<Eigen::Index>(j)] = command.joints[j].q_rad;
+    rate_radps[static_cast<Eigen::Index>(j)] = command.joints[j].dq_radps;
+  }
   if (fell()) {
     dq_.setZero();
     return;
   }
   if (!accept_command(command_rad)) return;
-  move_joints(command_rad);
+  move_joints(command_rad, rate_radps);
   update_leg_kinematics();
   transfer_load();
   lift_feet();
   move_base();
   move_swing_feet();
+  load_drives();
   check_falls();
 }
 
@@ -100,20 +128,21 @@ bool KinematicPlant::accept_command(const JointVector& command_rad) {
   return true;
 }
 
-void KinematicPlant::move_joints(const JointVector& command_rad) {
+void KinematicPlant::move_joints(const JointVector& command_rad, const JointVector& rate_radps) {
   const JointVector before = q_;
-  const double dt = params_.tick_s / kDriveSubsteps;
+  const double dt = kPlantTick_s / kDriveSubsteps;
   const double gain = 1.0 - std::exp(-dt / params_.drive_lag_s);
   for (std::size_t j = 0; j < kJointCount; ++j) {
     const JointLimits limits = joint_limits(static_cast<Foot>(j / kJointsPerLeg), j % kJointsPerLeg);
     const auto i = static_cast<Eigen::Index>(j);
     const double reach = limits.speed_radps * dt;
+    const double target_rad = command_rad[i] + params_.drive_lag_s * rate_radps[i];
     for (int k = 0; k < kDriveSubsteps; ++k) {
-      q_[i] += math::clamp(gain * (command_rad[i] - q_[i]), -reach, reach);
+      q_[i] += math::clamp(gain * (target_rad - q_[i]), -reach, reach);
       q_[i] = math::clamp(q_[i], limits.min_rad, limits.max_rad);
     }
   }
-  dq_ = (q_ - before) / params_.tick_s;
+  dq_ = (q_ - before) / kPlantTick_s;
 }
 
 void KinematicPlant::update_leg_kinematics() {
@@ -127,19 +156,32 @@ void KinematicPlant::update_leg_kinematics() {
 
 void KinematicPlant::transfer_load() {
   FootState &left = feet_[0], &right = feet_[1];
+  const bool both = left.anchored && right.anchored;
+  // As the legs move it, whoever carries: the shares must not act on what they follow from.
+  const Vec3 base_m = both ? Vec3(0.5 * (left.true_T_base.p_m + right.true_T_base.p_m))
+                           : (left.anchored ? left : right).true_T_base.p_m;
+  if (both != both_anchored_) base_before_m_ = base_m - kPlantTick_s * base_v_mps_;
+  both_anchored_ = both;
+  const Vec3 velocity_mps = (base_m - base_before_m_) / kPlantTick_s;
+  base_before_m_ = base_m;
+  constexpr double kSmooth_radps = 50.0;
+  critically_damped(base_v_mps_, base_a_mps2_, velocity_mps, kSmooth_radps, kPlantTick_s);
   if (!left.anchored || !right.anchored) {
     closure_m_ = 0.0;
     return;
   }
   closure_m_ = (left.true_T_base.p_m - right.true_T_base.p_m).norm();
 
-  // Where the base hangs between the soles, seen from above: 0 over the right one, 1 over the left.
+  // Where a mass at the base, moving as it does, presses between the soles: 0 at the right one, 1 at the left.
+  constexpr double kPendulum_radps = 3.5, kMost_mps2 = 2.0;
+  const Vec3 pressed_m =
+      true_T_base_.p_m - base_a_mps2_.cwiseMax(-kMost_mps2).cwiseMin(kMost_mps2) / math::square(kPendulum_radps);
   const Vec2 between = (left.true_T_sole.p_m - right.true_T_sole.p_m).head<2>();
-  const double along = (true_T_base_.p_m - right.true_T_sole.p_m).head<2>().dot(between) / between.squaredNorm();
+  const double along = (pressed_m - right.true_T_sole.p_m).head<2>().dot(between) / between.squaredNorm();
   // A foot is unloaded before the base is all the way over the other one: the sole has a width.
   constexpr double kDeadEnd = 0.1;
   const double target = smooth_step((along - kDeadEnd) / (1.0 - 2.0 * kDeadEnd));
-  critically_damped(share_, share_rate_, target, params_.share_bandwidth_radps, params_.tick_s);
+  critically_damped(share_, share_rate_, target, params_.share_bandwidth_radps, kPlantTick_s);
   if (share_ <= 0.0 || share_ >= 1.0) {
     share_ = math::clamp(share_, 0.0, 1.0);
     share_rate_ = 0.0;
@@ -149,7 +191,7 @@ void KinematicPlant::transfer_load() {
     FootState& foot = feet_[f];
     const double gap = gap_m(f);
     if (load_share(f) >= params_.loaded_lift_share) {
-      foot.gap_m += (gap - foot.gap_m) * params_.tick_s / kGapMemory_s;
+      foot.gap_m += (gap - foot.gap_m) * kPlantTick_s / kGapMemory_s;
     } else {
       foot.gap_m = std::min(foot.gap_m, gap);
     }
@@ -195,15 +237,15 @@ Transform KinematicPlant::blend() const {
 void KinematicPlant::move_base() {
   const double w = params_.share_bandwidth_radps;
   const Vec3 zero = Vec3::Zero();
-  critically_damped(slack_.p_m, slack_.p_rate, zero, w, params_.tick_s);
-  critically_damped(slack_.turn_rad, slack_.turn_rate, zero, w, params_.tick_s);
+  critically_damped(slack_.p_m, slack_.p_rate, zero, w, kPlantTick_s);
+  critically_damped(slack_.turn_rad, slack_.turn_rate, zero, w, kPlantTick_s);
   const Transform stood = blend();
   true_T_base_ = {stood.R * rotation(slack_.turn_rad), stood.p_m + slack_.p_m};
   for (FootState& foot : feet_) {
     const Vec3 p_m = true_T_base_.p_m - foot.true_T_base.p_m;
     const Vec3 turn_rad = rotation_vector(foot.true_T_base.R.transpose() * true_T_base_.R);
-    foot.base_offset = {p_m, (p_m - foot.base_offset.p_m) / params_.tick_s, turn_rad,
-                        (turn_rad - foot.base_offset.turn_rad) / params_.tick_s};
+    foot.base_offset = {p_m, (p_m - foot.base_offset.p_m) / kPlantTick_s, turn_rad,
+                        (turn_rad - foot.base_offset.turn_rad) / kPlantTick_s};
   }
 }
 

@@ -8,16 +8,17 @@
 
 #include "algorithms/robot/leg_kinematics.hpp"
 #include "sim_stub/clearance.hpp"
+#include "sim_stub/plant.hpp"
 #include "sim_stub/robot_errors.hpp"
 #include "sim_stub/stair_world.hpp"
 
 namespace polygmap::sim {
 
-// Angles of the drives are as their encoders read them; the true angle is that minus the encoder's offset.
-class KinematicPlant {
+inline constexpr double kRobotWeight_n = 540.0;
+
+class KinematicPlant final : public Plant {
  public:
   struct Params {
-    double tick_s = 0.002;
     double drive_lag_s = 0.010;
     double share_bandwidth_radps = 20.0;  // of the critically damped load transfer: 0.2 s to move nine tenths
     double lift_height_m = 0.002;         // a sole this far above its anchor has left it
@@ -35,20 +36,22 @@ class KinematicPlant {
   KinematicPlant(const Params& params, const StairWorld& world, const RobotErrors& errors,
                  const Transform& true_T_start, const JointVector& q_rad);
 
-  // One tick towards the drives' command; nothing moves any more after a fall.
-  void step(const JointVector& command_rad);
+  // One tick towards the angles of the command, its rates known ahead: no lag on a ramp. Nothing else of it counts;
+  // nothing moves any more after a fall.
+  void step(const JointCommand& command) override;
 
-  [[nodiscard]] const Transform& true_T_base() const noexcept { return true_T_base_; }
-  [[nodiscard]] const Transform& true_T_sole(std::size_t foot) const noexcept { return feet_[foot].true_T_sole; }
-  [[nodiscard]] bool in_contact(std::size_t foot) const noexcept { return feet_[foot].anchored; }
-  [[nodiscard]] int step_index(std::size_t foot) const noexcept { return feet_[foot].step; }
-  [[nodiscard]] double load_share(std::size_t foot) const noexcept { return foot == 0 ? share_ : 1.0 - share_; }
-  [[nodiscard]] double closure_error_m() const noexcept { return closure_m_; }
-  [[nodiscard]] const JointVector& drive_q_rad() const noexcept { return q_; }
-  [[nodiscard]] const JointVector& drive_dq_radps() const noexcept { return dq_; }
-  [[nodiscard]] JointVector true_q_rad() const noexcept { return q_ - errors_.encoder_offset_rad; }
-  [[nodiscard]] bool fell() const noexcept { return !fall_reason_.empty(); }
-  [[nodiscard]] const std::string& fall_reason() const noexcept { return fall_reason_; }
+  [[nodiscard]] const Transform& true_T_base() const noexcept override { return true_T_base_; }
+  [[nodiscard]] const Transform& true_T_sole(std::size_t f) const noexcept override { return feet_[f].true_T_sole; }
+  [[nodiscard]] bool in_contact(std::size_t foot) const noexcept override { return feet_[foot].anchored; }
+  [[nodiscard]] int step_index(std::size_t foot) const noexcept override { return feet_[foot].step; }
+  [[nodiscard]] double foot_force_n(std::size_t foot) const noexcept override;
+  [[nodiscard]] double load_share(std::size_t f) const noexcept override { return f == 0 ? share_ : 1.0 - share_; }
+  [[nodiscard]] double closure_error_m() const noexcept override { return closure_m_; }
+  [[nodiscard]] const JointVector& drive_q_rad() const noexcept override { return q_; }
+  [[nodiscard]] const JointVector& drive_dq_radps() const noexcept override { return dq_; }
+  [[nodiscard]] const JointVector& drive_tau_nm() const noexcept override { return tau_; }
+  [[nodiscard]] JointVector true_q_rad() const noexcept override { return q_ - errors_.encoder_offset_rad; }
+  [[nodiscard]] const std::string& fall_reason() const noexcept override { return fall_reason_; }
 
  private:
   // A difference of poses that dies out smoothly: keeps the base's position and velocity continuous at lift-off.
@@ -68,12 +71,13 @@ class KinematicPlant {
     double raise_m = 0.0;  // above that
   };
   [[nodiscard]] bool accept_command(const JointVector& command_rad);
-  void move_joints(const JointVector& command_rad);
+  void move_joints(const JointVector& command_rad, const JointVector& rate_radps);
   void update_leg_kinematics();
   void transfer_load();
   void lift_feet();
   void move_base();
   void move_swing_feet();
+  void load_drives();
   void check_falls();
   [[nodiscard]] Transform blend() const;
   [[nodiscard]] double gap_m(std::size_t foot) const;  // of its sole above its anchor, on the other leg's base
@@ -85,9 +89,12 @@ class KinematicPlant {
   std::vector<SolidBox> solids_;
   std::array<FootState, kFootCount> feet_;
   JointVector q_, dq_ = JointVector::Zero();
+  JointVector tau_ = JointVector::Zero();  // of massless legs that stand, quasi-static
   Transform true_T_base_;
   Slack slack_;
   double share_ = 0.5, share_rate_ = 0.0;  // of the left foot
+  Vec3 base_before_m_ = Vec3::Zero(), base_v_mps_ = Vec3::Zero(), base_a_mps2_ = Vec3::Zero();
+  bool both_anchored_ = false;
   double closure_m_ = 0.0;
   std::string fall_reason_;
 };

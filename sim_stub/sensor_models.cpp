@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "algorithms/robot/leg_kinematics.hpp"
-
 namespace polygmap::sim {
 
 ImuModel::ImuModel(const ErrorParams& params, const RobotErrors& errors, std::uint64_t seed,
@@ -51,30 +49,8 @@ JointFeedback JointModel::sample(const JointVector& drive_q_rad, const JointVect
   return feedback;
 }
 
-std::array<double, kFootCount> FootForceModel::sample(const std::array<double, kFootCount>& load_share,
-                                                      const std::array<bool, kFootCount>& in_contact) {
-  std::array<double, kFootCount> force{};
-  for (std::size_t f = 0; f < kFootCount; ++f) {
-    if (in_contact[f]) force[f] = std::max(kTouch_n, load_share[f] * kRobotWeight_n);
-  }
-  history_.push_overwrite(force);
-  return history_.oldest();
-}
-
-JointVector TorqueModel::sample(const JointVector& true_q_rad, const JointVector& dq_radps, const Mat3& true_R_base,
-                                const std::array<double, kFootCount>& force_n) {
-  JointVector tau_nm;
-  for (std::size_t f = 0; f < kFootCount; ++f) {
-    const auto leg = static_cast<Foot>(f);
-    const LegVector q = leg_joints(true_q_rad, leg);
-    const Vec3 base_f = true_R_base.transpose() * Vec3{0, 0, force_n[f]};
-    const Vec3 base_r = kContactRectangle.centre_x_m() * base_T_sole(errors_.legs[f], leg, q).R.col(0);
-    Eigen::Matrix<double, 6, 1> wrench;
-    wrench.head<3>() = base_f;
-    wrench.tail<3>() = base_r.cross(base_f);
-    tau_nm.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
-        -leg_jacobian(errors_.legs[f], leg, q).transpose() * wrench;
-  }
+JointVector TorqueModel::sample(const JointVector& drive_tau_nm, const JointVector& dq_radps) {
+  JointVector tau_nm = drive_tau_nm;
   constexpr double kCreep_radps = 0.02;  // friction turns round smoothly about here
   for (Eigen::Index j = 0; j < tau_nm.size(); ++j) {
     tau_nm[j] += params_.friction_nm * std::tanh(dq_radps[j] / kCreep_radps) +

@@ -12,8 +12,6 @@
 
 namespace polygmap::sim {
 
-inline constexpr double kRobotWeight_n = 540.0;
-
 // Integrating IMU: the mean over the last tick, by finite differences of the true base poses.
 class ImuModel {
  public:
@@ -43,32 +41,27 @@ class JointModel {
   std::uint64_t index_ = 0;
 };
 
-// Vertical forces from the load shares, as the plant's contact sensors report them 6 ms later.
+// Vertical forces as the plant's contact sensors report them 6 ms later.
 class FootForceModel {
  public:
-  [[nodiscard]] std::array<double, kFootCount> sample(const std::array<double, kFootCount>& load_share,
-                                                      const std::array<bool, kFootCount>& in_contact);
-  // As of now, not delayed.
-  [[nodiscard]] const std::array<double, kFootCount>& true_force_n() const noexcept { return history_.newest(); }
+  [[nodiscard]] std::array<double, kFootCount> sample(const std::array<double, kFootCount>& force_n) {
+    history_.push_overwrite(force_n);
+    return history_.oldest();
+  }
 
  private:
   static constexpr std::size_t kDelay_ticks = 3;
-  static constexpr double kTouch_n = 30.0;  // least force of a sole that touches
   RingBuffer<std::array<double, kFootCount>, kDelay_ticks + 1> history_;
 };
 
-// Joint torques of massless legs that stand, quasi-static: the foot's force, at the middle of its sole, through the
-// Jacobian; the drive's friction and noise on top.
+// What the drives say of their torques: friction and noise on top.
 class TorqueModel {
  public:
-  TorqueModel(const ErrorParams& params, const RobotErrors& errors, std::uint64_t seed)
-      : params_(params), errors_(errors), noise_(seed, Stream::kTorques) {}
-  [[nodiscard]] JointVector sample(const JointVector& true_q_rad, const JointVector& dq_radps, const Mat3& true_R_base,
-                                   const std::array<double, kFootCount>& force_n);
+  TorqueModel(const ErrorParams& params, std::uint64_t seed) : params_(params), noise_(seed, Stream::kTorques) {}
+  [[nodiscard]] JointVector sample(const JointVector& drive_tau_nm, const JointVector& dq_radps);
 
  private:
   ErrorParams params_;
-  const RobotErrors& errors_;
   CounterNoise noise_;
   std::uint64_t index_ = 0;
 };

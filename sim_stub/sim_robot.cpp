@@ -19,8 +19,30 @@ JointVector standing_q_rad() {
   return q;
 }
 
+// Before the module speaks, stiff drives keep the robot standing.
+JointCommand standing_command() {
+  JointCommand command;
+  const JointVector q = standing_q_rad();
+  for (std::size_t j = 0; j < kJointCount; ++j) {
+    command.joints[j] = {q[static_cast<Eigen::Index>(j)], 0.0, 0.0, 2000.0, 40.0};
+  }
+  return command;
+}
+
 Transform start_transform(const StartPose& start) {
   return {rotation_z(start.yaw_rad), Vec3{-start.distance_m, start.lateral_m, kNominalBaseHeight_m}};
+}
+
+std::unique_ptr<Plant> make_plant(const SimOptions& options, const StairWorld& stairs, const RobotErrors& errors,
+                                  const StartPose& start) {
+  if (options.plant_kind == PlantKind::kMujoco) {
+    auto plant =
+        std::make_unique<MujocoPlant>(options.mujoco, stairs, errors, start_transform(start), standing_q_rad());
+    constexpr int kSettle_ticks = 1000;  // it has stood there for a while
+    for (int i = 0; i < kSettle_ticks; ++i) plant->step(standing_command());
+    return plant;
+  }
+  return std::make_unique<KinematicPlant>(options.plant, stairs, errors, start_transform(start), standing_q_rad());
 }
 
 }  // namespace
@@ -37,65 +59,69 @@ SimRobot::SimRobot(const SimOptions& options)
       error_params_(options.errors),
       errors_(draw_errors(options.errors, options.seed)),
       lio_silent_(options.lio_silent),
-      plant_params_(options.plant),
-      plant_(plant_params_, stairs_, errors_, start_transform(start_), standing_q_rad()),
+      push_(options.push),
+      plant_(make_plant(options, stairs_, errors_, start_)),
       camera_(options.camera,
               {.kind = options.noise,
                .sigma = options.depth_sigma,
                .scale = errors_.depth_scale,
                .strength = options.errors.depth_noise},
               options.intrinsics, errors_.base_T_camera, stairs_, options.seed),
-      imu_(error_params_, errors_, options.seed, plant_.true_T_base()),
+      imu_(error_params_, errors_, options.seed, plant_->true_T_base()),
       joints_(error_params_, options.seed),
-      torques_(error_params_, errors_, options.seed),
+      torques_(error_params_, options.seed),
       force_sensors_(options.force_sensors),
       lio_(error_params_, errors_, options.seed),
-      active_q_rad_(standing_q_rad()) {
+      active_(standing_command()) {
   sense();
 }
 
 void SimRobot::advance() {
   clock_.advance();
-  plant_.step(active_q_rad_);
-  if (command_) {
-    for (std::size_t j = 0; j < kJointCount; ++j) {
-      active_q_rad_[static_cast<Eigen::Index>(j)] = command_->joints[j].q_rad;
-    }
+  if (push_) {
+    const double since_s = seconds(clock_.now_ns()) - push_->at_s;
+    const bool pushes = since_s >= 0.0 && since_s < Push::kDuration_s;
+    plant_->push(pushes ? Vec3(push_->impulse_ns / Push::kDuration_s * Vec3::Unit(push_->axis)) : Vec3(Vec3::Zero()));
   }
+  plant_->step(active_);
+  if (command_) active_ = *command_;
   sense();
 }
 
 void SimRobot::sense() {
   update_truth();
   const std::int64_t now_ns = clock_.now_ns();
-  imu_queue_.push_overwrite(imu_.sample(plant_.true_T_base(), now_ns, plant_params_.tick_s));
-  feedback_ = joints_.sample(plant_.drive_q_rad(), plant_.drive_dq_radps(), now_ns);
-  feedback_.foot_force_n = forces_.sample(truth_.load_share, truth_.in_contact);
-  feedback_.tau_nm =
-      torques_.sample(plant_.true_q_rad(), plant_.drive_dq_radps(), plant_.true_T_base().R, forces_.true_force_n());
+  imu_queue_.push_overwrite(imu_.sample(plant_->true_T_base(), now_ns, kPlantTick_s));
+  feedback_ = joints_.sample(plant_->drive_q_rad(), plant_->drive_dq_radps(), now_ns);
+  feedback_.tau_nm = torques_.sample(plant_->drive_tau_nm(), plant_->drive_dq_radps());
+  feedback_.foot_force_n = forces_.sample({plant_->foot_force_n(0), plant_->foot_force_n(1)});
   if (!force_sensors_) feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
   feedback_fresh_ = true;
   if (clock_.tick() % kLioPeriod_ticks == 0 && !any_contains(lio_silent_, now_ns)) {
-    lio_queue_.push_overwrite(lio_.sample(plant_.true_T_base(), now_ns));
+    lio_queue_.push_overwrite(lio_.sample(plant_->true_T_base(), now_ns));
   }
-  const JointVector q = plant_.true_q_rad();
-  camera_.tick(clock_.tick(), plant_.true_T_base(),
+  const JointVector q = plant_->true_q_rad();
+  camera_.tick(clock_.tick(), plant_->true_T_base(),
                {base_leg_shapes(errors_.legs[0], Foot::kLeft, leg_joints(q, Foot::kLeft)),
                 base_leg_shapes(errors_.legs[1], Foot::kRight, leg_joints(q, Foot::kRight))});
 }
 
 void SimRobot::update_truth() {
   truth_.stamp_ns = clock_.now_ns();
-  truth_.true_T_base = plant_.true_T_base();
+  truth_.true_T_base = plant_->true_T_base();
   for (std::size_t f = 0; f < kFootCount; ++f) {
-    truth_.true_T_sole[f] = plant_.true_T_sole(f);
-    truth_.in_contact[f] = plant_.in_contact(f);
-    truth_.load_share[f] = plant_.load_share(f);
-    truth_.step_index[f] = plant_.step_index(f);
+    truth_.true_T_sole[f] = plant_->true_T_sole(f);
+    truth_.in_contact[f] = plant_->in_contact(f);
+    truth_.load_share[f] = plant_->load_share(f);
+    truth_.step_index[f] = plant_->step_index(f);
   }
-  truth_.closure_error_m = plant_.closure_error_m();
-  truth_.fell = plant_.fell();
-  truth_.fall_reason = plant_.fall_reason();
+  truth_.true_p_com_m = plant_->true_p_com_m();
+  truth_.zmp_margin_m = plant_->zmp_margin_m();
+  truth_.drive_tau_nm = plant_->drive_tau_nm();
+  truth_.drive_dq_radps = plant_->drive_dq_radps();
+  truth_.closure_error_m = plant_->closure_error_m();
+  truth_.fell = plant_->fell();
+  truth_.fall_reason = plant_->fall_reason();
 }
 
 bool SimRobot::try_read(JointFeedback& feedback) noexcept {

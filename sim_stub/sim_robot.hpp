@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "hal/ports/lidar_odometry.hpp"
 #include "sim_stub/depth_camera.hpp"
 #include "sim_stub/kinematic_plant.hpp"
+#include "sim_stub/mujoco_plant.hpp"
 #include "sim_stub/robot_errors.hpp"
 #include "sim_stub/sensor_models.hpp"
 #include "sim_stub/stair_world.hpp"
@@ -43,7 +45,10 @@ struct SimOptions {
   DepthCameraOptions camera;
   bool force_sensors = true;       // false: no foot force is measured, NaN
   std::vector<Window> lio_silent;  // poses stamped then never arrive
+  PlantKind plant_kind = PlantKind::kKinematic;
   KinematicPlant::Params plant;
+  MujocoPlant::Params mujoco;
+  std::optional<Push> push;
 };
 
 class SimRobot final : public hal::Clock,
@@ -63,8 +68,9 @@ class SimRobot final : public hal::Clock,
   [[nodiscard]] const StartPose& start() const noexcept { return start_; }
   [[nodiscard]] const RobotErrors& errors() const noexcept { return errors_; }
   [[nodiscard]] const SimDepthCamera& depth_camera() const noexcept { return camera_; }
-  [[nodiscard]] JointVector true_q_rad() const noexcept { return plant_.true_q_rad(); }
-  // The last command as the module wrote it. The kinematic plant follows its angles and nothing else of it.
+  [[nodiscard]] JointVector true_q_rad() const noexcept { return plant_->true_q_rad(); }
+  [[nodiscard]] Plant& plant() noexcept { return *plant_; }  // for tests that push it
+  // The last command as the module wrote it.
   [[nodiscard]] const std::optional<JointCommand>& last_command() const noexcept { return command_; }
   [[nodiscard]] VirtualClock& clock() noexcept { return clock_; }  // for tests that inject work
 
@@ -91,9 +97,9 @@ class SimRobot final : public hal::Clock,
   ErrorParams error_params_;
   RobotErrors errors_;
   std::vector<Window> lio_silent_;
-  KinematicPlant::Params plant_params_;
+  std::optional<Push> push_;
   VirtualClock clock_;
-  KinematicPlant plant_;
+  std::unique_ptr<Plant> plant_;
   SimDepthCamera camera_;
   ImuModel imu_;
   JointModel joints_;
@@ -106,7 +112,7 @@ class SimRobot final : public hal::Clock,
   JointFeedback feedback_;
   bool feedback_fresh_ = false;
   std::optional<JointCommand> command_;  // by the module, in this tick or before
-  JointVector active_q_rad_;             // what the drives follow
+  JointCommand active_;                  // what the drives follow
   Truth truth_;
 };
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 
 #include "algorithms/core/samples.hpp"
@@ -19,6 +20,9 @@ struct Truth {
   std::array<bool, kFootCount> in_contact{true, true};  // the sole stands on a surface
   std::array<double, kFootCount> load_share{0.5, 0.5};  // of the weight, sums to 1
   std::array<int, kFootCount> step_index{-1, -1};       // step under each standing sole (0-based), -1: floor
+  Vec3 true_p_com_m = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());  // under physics only
+  double zmp_margin_m = std::numeric_limits<double>::quiet_NaN();                // see plant.hpp
+  JointVector drive_tau_nm = JointVector::Zero(), drive_dq_radps = JointVector::Zero();
   double closure_error_m = 0.0;  // distance by which the two standing legs disagree about the base
   bool fell = false;
   std::string fall_reason;  // one sentence with the number behind it

@@ -31,8 +31,7 @@ void expect_climbed(const IdealClimb& climb, const ClimbSetup& setup) {
   EXPECT_LT(r.penetration_m, 0.002);  // of the contact itself
   EXPECT_GT(r.crossing_m, 0.02);
   EXPECT_GT(r.toe_gap_m, 0.02);
-  EXPECT_GT(r.com_margin_m, 0.04);
-  EXPECT_LT(r.lateral_off_m, 0.03);
+  EXPECT_GT(r.zmp_margin_m, 0.01);
   EXPECT_LT(r.execution_m, 0.003);
   const double per_stair_s = seconds(r.last_touch_down_ns - r.first_lift_off_ns) / setup.stairs.steps;
   EXPECT_GT(per_stair_s, 2.4);
@@ -170,14 +169,14 @@ TEST(GaitLatch, SmallChangeBeforeLiftOff_IsAbsorbedAndALargeOneCostsANewShift) {
     while (climb.tick() && !climb.status().step.onto_tread) floor_steps = climb.status().step.sequence;
     ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, floor_steps + 2));  // both on the first tread
     const std::int64_t landed_ns = climb.status().stamp_ns;
-    changed_ns = landed_ns + 400 * kNsPerMs;  // in the middle of the shift
+    changed_ns = landed_ns + 200 * kNsPerMs;  // in the middle of the shift
     ASSERT_TRUE(climb.run_until(GaitPhase::kSwing, floor_steps + 3));
     const double shift_s = seconds(climb.status().stamp_ns - landed_ns);
     if (change < 0.015) {
-      EXPECT_LT(shift_s, 0.68);
+      EXPECT_LT(shift_s, 0.5);
     } else {
-      EXPECT_GT(shift_s, 0.8);
-      EXPECT_LT(shift_s, 1.0);
+      EXPECT_GT(shift_s, 0.6);
+      EXPECT_LT(shift_s, 0.85);
     }
   }
 }
@@ -346,7 +345,7 @@ void expect_unsteady(IdealClimb& climb) {
 TEST(GaitStop, TargetsThatNeverHoldStill_AreCalledUnsteady) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
-    const double off_m = (since_ns + 150 * kNsPerMs) / (250 * kNsPerMs) % 2 == 0 ? 0.02 : -0.02;
+    const double off_m = since_ns / (250 * kNsPerMs) % 2 == 0 ? 0.02 : -0.02;
     for (Foothold& hold : set.p_star_feet) hold.position_m += rotation_z(hold.yaw_rad) * Vec3{off_m, 0, 0};
   });
   expect_unsteady(climb);
@@ -355,7 +354,7 @@ TEST(GaitStop, TargetsThatNeverHoldStill_AreCalledUnsteady) {
 TEST(GaitStop, FootholdsThatComeAndGo_AreCalledUnsteady) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
-    if (since_ns % kNsPerS > 400 * kNsPerMs) set.obstruction = Obstruction::kNothingSeen;
+    if (since_ns % kNsPerS > 100 * kNsPerMs) set.obstruction = Obstruction::kNothingSeen;
   });
   expect_unsteady(climb);
 }
@@ -384,7 +383,7 @@ TEST(GaitFinish, TopSeenAfterAnotherObstruction_WaitsAWholeSecondOfTop) {
 TEST(GaitLatch, OtherFootLeadsAfterTheShift_WeightTakesTheTimeOfAWholeShift) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
-    const double off_m = since_ns < 500 * kNsPerMs ? 0.03 : -0.03;
+    const double off_m = since_ns < 100 * kNsPerMs ? 0.03 : -0.03;
     for (Foothold& hold : set.p_star_feet) hold.position_m += rotation_z(hold.yaw_rad) * Vec3{0, off_m, 0};
   });
   const auto swings_from_the_first_tread = [&] {
@@ -435,16 +434,6 @@ TEST(GaitContact, TreadFarLowerThanMapped_PutsTheFootBackAndSaysSo) {
   setup.map_shift_z_m = 0.07;
   IdealClimb climb(setup);
   expect_put_back(climb, 1);
-}
-
-TEST(GaitContact, ForceSensorDead_PutsTheFootBackByThePlan) {
-  for (const int nth : {1, 2}) {
-    IdealClimb climb({});
-    climb.tamper = [&](StateEstimate&, FootholdSet&, JointFeedback& feedback) {
-      if (in_swing_onto_tread(climb, nth)) feedback.foot_force_n[index_of(climb.status().step.foot)] = 0.0;
-    };
-    expect_put_back(climb, nth);
-  }
 }
 
 TEST(GaitReach, EstimateJumpsInMidSwing_LegStopsAtItsReachAndIsCounted) {
@@ -522,7 +511,9 @@ TEST(GaitFinish, OnTop_StandsBetweenTheFeet) {
   climb.run(60.0);
   for (int i = 0; i < 500; ++i) climb.tick();
   const Vec3 middle = 0.5 * (climb.true_T_sole(Foot::kLeft).p_m + climb.true_T_sole(Foot::kRight).p_m);
-  EXPECT_LT((climb.true_T_base().p_m - middle).head<2>().norm(), 0.005);
+  const CentreOfMass com = centre_of_mass({}, {}, climb.q_rad(), JointVector::Zero());
+  const Vec3 ahead_m{Gait::Params{}.step.zmp_ahead_m, 0, 0};
+  EXPECT_LT((climb.true_T_base() * com.base_p_com_m - middle - ahead_m).head<2>().norm(), 0.005);
 }
 
 TEST(GaitInput, NotInitialised_HoldsTheMeasuredJointsAndNeverMoves) {
@@ -587,7 +578,7 @@ class JointReferenceTest : public testing::Test {
 };
 
 TEST_F(JointReferenceTest, PoseReached_IsNotLimited) {
-  EXPECT_FALSE(reference_.follow({}, base_T_sole_, command_));
+  EXPECT_FALSE(reference_.follow({}, base_T_sole_, {true, true}, command_));
   for (std::size_t n = 0; n < kJointCount; ++n) {
     EXPECT_NEAR(command_.joints[n].q_rad, q_rad_[static_cast<Eigen::Index>(n)], 1e-9);
   }
@@ -598,7 +589,7 @@ TEST_F(JointReferenceTest, PoseNotFinite_LegStaysWhereItIs) {
     for (int axis = 0; axis < 3; ++axis) {
       auto soles = base_T_sole_;
       soles[0].p_m[axis] = bad;
-      for (int i = 0; i < 100; ++i) EXPECT_TRUE(reference_.follow({}, soles, command_));
+      for (int i = 0; i < 100; ++i) EXPECT_TRUE(reference_.follow({}, soles, {true, true}, command_));
       for (std::size_t n = 0; n < kJointCount; ++n) {
         EXPECT_NEAR(command_.joints[n].q_rad, q_rad_[static_cast<Eigen::Index>(n)], 1e-9) << n;
         EXPECT_NEAR(command_.joints[n].dq_radps, 0.0, 1e-9) << n;
@@ -609,7 +600,7 @@ TEST_F(JointReferenceTest, PoseNotFinite_LegStaysWhereItIs) {
 
 TEST_F(JointReferenceTest, PoseOutOfReach_IsLimited) {
   base_T_sole_[1].p_m.z() = -1.2;
-  EXPECT_TRUE(reference_.follow({}, base_T_sole_, command_));
+  EXPECT_TRUE(reference_.follow({}, base_T_sole_, {true, true}, command_));
 }
 
 TEST(GaitInput, NanInEstimatesAndFootholds_NeverReachesACommand) {

@@ -196,6 +196,11 @@ TEST(ClimbCommand, BadCount_IsRefused) {
 TEST(ClimbCommand, BadWord_IsRefused) {
   expect_refused({"climb", "--gait", "ss"}, "single-step");
   expect_refused({"climb", "--gait", "trot"}, "--gait");
+  expect_refused({"climb", "--plant", "rubber"}, "--plant");
+  expect_refused({"climb", "--push", "5,x,10"}, "--push");  // the kinematic plant
+  for (const std::string push : {"x", "5,x", "5,z,10", "5,x,10,", "-1,x,10", "nan,x,10", "5,y,1000", "5,y,nan"}) {
+    expect_refused({"climb", "--plant", "mujoco", "--push", push}, "--push");
+  }
   expect_refused({"climb", "--noise", "pink"}, "--noise");
   expect_refused({"climb", "--render-shift", "0.01", "nan", "0"}, "--render-shift");
   expect_refused({"climb", "--render-shift", "0.01", "0.02"}, "--render-shift");

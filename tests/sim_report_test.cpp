@@ -49,7 +49,7 @@ TEST(ClimbReport, FlawlessClimb_Passes) {
   const ClimbSummary s = climb.finish();
   EXPECT_TRUE(s.pass) << s.reason;
   EXPECT_FALSE(s.fell);
-  EXPECT_EQ(s.plant, "kinematic");
+  EXPECT_EQ(s.options.plant, PlantKind::kKinematic);
   EXPECT_EQ(s.steps_total, 3);
   EXPECT_EQ(s.steps_climbed, 3);
   EXPECT_NEAR(s.execution_error_m.max, 0.0, kUm);
@@ -440,7 +440,8 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
             "seconds_per_step "
             "plane_rate_hz "
             "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min stand_off_mm "
-            "closure_error_mm tracking_error_mm odometry_rmse_mm exposure_to_map_ms map_age_at_latch_ms "
+            "closure_error_mm tracking_error_mm com_tracking_mm_max zmp_margin_mm_min torque_peak_ratio "
+            "joint_speed_peak_ratio odometry_rmse_mm exposure_to_map_ms map_age_at_latch_ms "
             "target_last_seen_ms heap_calls faults "
             "static_memory_bytes static_memory schedule surfaces footsteps wall ");
   EXPECT_EQ(j["verdict"], "pass");
@@ -449,7 +450,7 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
       j["arguments"].dump(),
       R"({"steps":10,"rise_m":0.17,"tread_m":0.28,"width_m":1.2,"nosing_m":0.0,"landing_m":1.0,)"
       R"("noise":"correlated","camera":null,"scan_ms":16.0,"mount_error_deg":1.0,"scale_error":0.003,)"
-      R"("estimate_mount":true,"self_filter":true,"contacts":"sensed","render_shift_m":[0.0,0.0,0.0],"render_missing_step":2,)"
+      R"("estimate_mount":true,"self_filter":true,"contacts":"sensed","push":null,"render_shift_m":[0.0,0.0,0.0],"render_missing_step":2,)"
       R"("blank_depth":false})");
   EXPECT_EQ(j["execution_error_mm"].dump(), R"({"median":1.23,"max":1.23})");
   EXPECT_EQ(j["odometry_rmse_mm"].dump(), R"({"base":0.0,"lio":null,"fused":0.0})");

@@ -41,7 +41,8 @@ struct GaitStatus {
   std::uint32_t treads_climbed = 0;                 // both feet on it, by the module's own count
   std::array<bool, kFootCount> stands{true, true};  // planned contact
   std::array<Transform, kFootCount> odom_T_sole_desired;
-  std::uint32_t ik_limited_ticks = 0;  // ticks in which a leg could not reach what was asked
+  Vec2 odom_p_com_desired_m = Vec2::Zero();  // planned centre of mass, laid on the estimate by the standing soles
+  std::uint32_t ik_limited_ticks = 0;        // ticks in which a leg could not reach what was asked
   std::uint32_t early_contacts = 0;
   std::uint32_t late_contacts = 0;
 };

@@ -66,6 +66,12 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
 
 Foot ClimbPlanner::leading_foot(const Situation& situation, const SolePair& targets) const noexcept {
   const TorsoDisplacement step = displacement(middle_of(situation.soles), middle_of(targets));
+  constexpr double kReasonToTurnRound = 2.5;  // times the dead bands
+  if (situation.leads) {
+    return swing_foot(
+        step, situation.leading,
+        {kReasonToTurnRound * params_.rule.lateral_dead_band_m, kReasonToTurnRound * params_.rule.turn_dead_band_rad});
+  }
   return swing_foot(step, has_leading_ ? leading_ : other(last_swing_), params_.rule);
 }
 

@@ -30,6 +30,10 @@ class ClimbPlanner {
     std::int64_t stamp_ns = 0;
     Transform world_T_odom;
     SolePair soles;
+    // The weight is on its way over the other foot for a leading step of this one: no reason to turn round
+    // but a large one.
+    bool leads = false;
+    Foot leading = Foot::kLeft;
   };
   struct Decision {
     bool has_step = false;

@@ -6,6 +6,10 @@
 namespace polygmap {
 namespace {
 
+constexpr std::int32_t kLower_ticks = 200;    // of the torso where a foot needs a longer leg
+constexpr std::int32_t kPatience_ticks = 20;  // late ground that the shift after it can make up for: 3 mm
+constexpr double kInward_m = 0.01;
+constexpr double kSpare_m = 0.02;               // of its height: the base is not right over the centre of mass
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
 
 bool finite(const Transform& T) noexcept { return math::all_finite(T.R) && math::all_finite(T.p_m); }
@@ -16,6 +20,7 @@ void Gait::reset(const Params& params) noexcept {
   params_ = params;
   planner_.reset(params.planner);
   correction_.reset();
+  balance_.reset();
   status_ = {};
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
@@ -36,14 +41,17 @@ ClimbPlanner::Situation Gait::situation(const StateEstimate& state) const noexce
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
   return {now_ns_,
           state.world_T_odom,
-          {sole_pose(odom_T_plan * plan_T_sole_[0]), sole_pose(odom_T_plan * plan_T_sole_[1])}};
+          {sole_pose(odom_T_plan * plan_T_sole_[0]), sole_pose(odom_T_plan * plan_T_sole_[1])},
+          activity_ == Activity::kShift && decision_.goal.kind == StepKind::kLeading,
+          decision_.goal.foot};
 }
 
 void Gait::carry_plan_to_odometry() noexcept {
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
   for (Transform& sole : plan_T_sole_) sole = odom_T_plan * sole;
-  torso_state_ = TorsoTrajectory::moved(torso_state_, odom_T_plan);
   plan_T_base_ = odom_T_plan * plan_T_base_;
+  torso_state_ = TorsoTrajectory::placed(torso_state_, plan_T_base_, (plan_T_base_ * reference_com_m()).head<2>());
+  link_motion_.carry(odom_T_plan);
   correction_.reset();
 }
 
@@ -52,15 +60,112 @@ void Gait::start(const StateEstimate& state) noexcept {
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     plan_T_sole_[index_of(leg)] = plan_T_base_ * joints_.base_T_sole_reference(leg);
   }
-  torso_state_ = TorsoTrajectory::at_rest(plan_T_base_);
+  torso_state_ = TorsoTrajectory::placed({}, plan_T_base_, (plan_T_base_ * reference_com_m()).head<2>());
+  nominal_rad_ = joints_.reference_rad();
+  link_motion_.restart();
   started_ = true;
   begin_hold();
+}
+
+// Of the posture last asked for, in the base.
+Vec3 Gait::reference_com_m() const noexcept {
+  return centre_of_mass(params_.geometry, params_.balance.masses, joints_.reference_rad(), JointVector::Zero())
+      .base_p_com_m;
+}
+
+// The horizontal part of the torso's trajectory is the centre of mass's: the base follows from the legs' places, one
+// tick old.
+Transform Gait::plan_T_base_over(const TorsoTrajectory::State& state) const noexcept {
+  Transform base = TorsoTrajectory::pose(state);
+  base.p_m.head<2>() -= (base.R * reference_com_m()).head<2>();
+  return base;
+}
+
+// The posture as planned, without the steering: its second differences are smooth.
+void Gait::observe_links() noexcept {
+  const std::size_t f = index_of(decision_.goal.foot);
+  std::array<Transform, kFootCount> plan_T_sole = plan_T_sole_;
+  const bool swings = activity_ == Activity::kSwing || activity_ == Activity::kRetreat;
+  if (swings) plan_T_sole[f] = swing_.at(motion_tick());
+  Transform plan_T_base;
+  const int passes = link_motion_.restarted() ? 4 : 1;  // the base follows the legs' places and they the base
+  for (int i = 0; i < passes; ++i) {
+    const Vec3 base_p_com_m =
+        centre_of_mass(params_.geometry, params_.balance.masses, nominal_rad_, JointVector::Zero()).base_p_com_m;
+    plan_T_base = TorsoTrajectory::pose(torso_state_);
+    plan_T_base.p_m.head<2>() -= (plan_T_base.R * base_p_com_m).head<2>();
+    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+      const LegSolution s = solve_leg(params_.geometry, leg, plan_T_base.inverse() * plan_T_sole[index_of(leg)]);
+      nominal_rad_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
+    }
+  }
+  link_acceleration_ = link_motion_.update(params_.geometry, params_.balance.masses, plan_T_base, nominal_rad_);
+}
+
+void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept {
+  Balance::Reference reference;
+  for (int a = 0; a < 2; ++a) {
+    const Motion& axis = torso_state_[static_cast<std::size_t>(a)];
+    reference.com.position_m[a] = axis.position;
+    reference.com.velocity_mps[a] = axis.speed;
+    reference.com.acceleration_mps2[a] = axis.acceleration;
+  }
+  reference.links = link_acceleration_;
+  reference.plan_T_sole = plan_T_sole_;
+  reference.stands = status_.stands;
+  const bool seen = started_ && usable(state) && math::all_finite(feedback.dq_radps);
+  Balance::Body body{plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad(), JointVector::Zero()};
+  if (seen) body = {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad, feedback.dq_radps};
+  const JointVector torque_nm = balance_.torques_nm(params_.balance, params_.geometry, reference, body, kTick_s);
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const double limit_nm = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg).torque_nm;
+    command.joints[n].tau_ff_nm = math::clamp(torque_nm[static_cast<Eigen::Index>(n)], -limit_nm, limit_nm);
+  }
+}
+
+// Nothing is known but the joint angles: the soles are taken for level.
+void Gait::hold_upright(JointCommand& command) noexcept {
+  joints_.hold(command);
+  plan_T_base_ = {joints_.base_T_sole_reference(Foot::kLeft).R.transpose(), Vec3::Zero()};
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    plan_T_sole_[index_of(leg)] = plan_T_base_ * joints_.base_T_sole_reference(leg);
+  }
+  torso_state_ = TorsoTrajectory::placed({}, plan_T_base_, (plan_T_base_ * reference_com_m()).head<2>());
+  add_torques({}, {}, command);
+}
+
+void Gait::move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept {
+  torso_.plan(torso_state_, height_m, yaw_rad, ticks, height_ticks);
+  torso_tick_ = 0;
+}
+
+// No ground: the weight rests over the stance foot, as low as the other sole at odom_p_sole asks for.
+void Gait::wait_over_stance(const SolePose& sole) noexcept {
+  const Foot foot = decision_.goal.foot;
+  SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
+  soles[index_of(foot)] = sole;
+  const TorsoPose low = torso_over(params_.geometry, params_.step.torso, other(foot), soles);
+  move_torso(std::min(low.position_m.z() - kSpare_m, torso_state_[2].position), low.yaw_rad, kLower_ticks,
+             kLower_ticks);
+  // As far towards the free foot as the sole carries: the ankle roll of a folded leg has little range.
+  const Vec3 inward_m = plan_T_sole_[index_of(other(foot))].R.col(1) * (side_sign(foot) * kInward_m);
+  rest_over(zmp_stance_m_ + inward_m.head<2>());
+}
+
+// The centre of mass comes to rest there.
+void Gait::rest_over(const Vec2& plan_p_m) noexcept {
+  ZmpKnots knots;
+  (void)knots.try_push_back({params_.step.com.push_ticks, plan_p_m});
+  com_.plan(params_.step.com, TorsoTrajectory::horizontal(torso_state_), knots);
+  com_tick_ = 0;
 }
 
 void Gait::settle_between_feet() noexcept {
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   TorsoPose middle = torso_between(params_.geometry, params_.step.torso, soles);
-  torso_.plan(torso_state_, middle, params_.settle_ticks, params_.settle_ticks);
+  move_torso(middle.position_m.z(), middle.yaw_rad, params_.settle_ticks, params_.settle_ticks);
+  const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{params_.step.zmp_ahead_m, 0, 0};
+  rest_over((middle.position_m + ahead_m).head<2>());
   tick_ = 0;
 }
 
@@ -87,9 +192,35 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   status_.phase = GaitPhase::kDoubleSupport;
   tick_ = 0;
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
-  const StepPlan plan = plan_step(params_.geometry, params_.step, decision.goal, soles, kToeDown_rad[0]);
-  shift_ticks_ = again ? params_.reshift_ticks : plan.shift_ticks;
-  torso_.plan(torso_state_, plan.lift_off, shift_ticks_, shift_ticks_);
+  StepPlan plan = plan_step(params_.step, decision.goal, soles, kToeDown_rad[0]);
+  if (again) plan.shift_ticks = params_.reshift_ticks;
+  // Sooner where the weight is on its way already, later where it stands over the other foot with little room to push
+  // off: the first shift that needs a small push.
+  constexpr std::array<std::int32_t, 10> kLonger_ticks{0, -35, -70, 50, 100, 150, 200, 300, 400, 500};
+  const HorizontalMotion com = TorsoTrajectory::horizontal(torso_state_);
+  const Vec2 start_m = ComPlan::zmp_under(params_.step.com, com);
+  const std::int32_t usual_ticks = plan.shift_ticks;
+  const auto try_shift = [&](std::int32_t ticks) {
+    plan.shift_ticks = ticks;
+    com_.plan(params_.step.com, com, zmp_of_shift(params_.step, plan, start_m));
+    return com_.push_m();
+  };
+  std::int32_t best_ticks = usual_ticks;
+  double least_m = 1e9;
+  for (const std::int32_t longer : kLonger_ticks) {
+    const std::int32_t ticks = std::max(usual_ticks + longer, params_.reshift_ticks);
+    const double push_m = try_shift(ticks);
+    if (push_m < least_m) {
+      least_m = push_m;
+      best_ticks = ticks;
+    }
+    if (push_m <= params_.max_push_m) break;
+  }
+  (void)try_shift(best_ticks);
+  shift_ticks_ = plan.shift_ticks;
+  plan_torso(params_.geometry, params_.step, soles, com_, shift_ticks_, plan);
+  move_torso(plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
+  com_tick_ = 0;
   search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, shift_ticks_, torso_state_,
                 plan_T_sole_);
 }
@@ -152,9 +283,13 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   carry_plan_to_odometry();
   const StepGoal& goal = decision.goal;
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
-  const StepPlan plan = plan_step(params_.geometry, params_.step, goal, soles, search_.plan().shape.toe_down_rad);
+  StepPlan plan = plan_step(params_.step, goal, soles, search_.plan().toe_down_rad);
+  com_.plan(params_.step.com, TorsoTrajectory::horizontal(torso_state_), zmp_of_swing(params_.step, plan));
+  plan_torso(params_.geometry, params_.step, soles, com_, 0, plan);
   swing_.plan(plan_T_sole_[index_of(goal.foot)], goal.target, plan.shape, plan.swing_ticks);
-  torso_.plan(torso_state_, plan.touch_down, plan.swing_ticks, plan.rise_ticks);
+  move_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
+  com_tick_ = 0;
+  zmp_stance_m_ = plan.zmp_stance_m;
   planner_.latched(situation(state), decision);
   decision_ = decision;
 
@@ -183,7 +318,10 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
   const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
   if (!loaded) unloaded_ = true;
   const bool descending = 2 * tick_ > swing_.duration_ticks();
-  if (descending && unloaded_ && loaded) {
+  // What does not go down any more stands on something, whatever its force sensor says.
+  const double above_m = usable(state) ? state.odom_T_sole[i].p_m.z() - swing_.at(tick_).p_m.z() : 0.0;
+  const bool blocked = swing_.lowered_m(tick_) > params_.late_m && above_m > params_.blocked_m;
+  if ((descending && unloaded_ && loaded) || blocked) {
     if (swing_.at(tick_ - 1).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m) ++status_.early_contacts;
     if (swing_.lowered_m(tick_) > params_.late_m) ++status_.late_contacts;
     return touch_down(state);
@@ -196,19 +334,27 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     activity_ = Activity::kRetreat;
     turn_tick_ = tick_;
     tick_ = 0;
+    link_motion_.restart();
+    wait_over_stance(sole_pose(correction_.odom_T_plan(plan_T_base_).inverse() * swing_.at(0)));
     return;
+  }
+  // The ground is late: the weight must not set off for it.
+  if (tick_ == swing_.duration_ticks() + params_.step.landing_hold_ticks + kPatience_ticks) {
+    SolePose lowest = sole_pose(plan_T_sole_[i]);
+    lowest.position_m.z() -= params_.max_lowering_m;
+    wait_over_stance(lowest);
   }
   const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
   plan_T_sole_[i] = plan_T_odom * swing_.at(tick_);
 }
 
-std::int32_t Gait::motion_tick() const noexcept {
+double Gait::motion_tick() const noexcept {
   if (activity_ != Activity::kRetreat) return tick_;
-  return turn_tick_ - std::max(tick_ - params_.retreat_pause_ticks, 0);
+  return turn_tick_ - 0.5 * std::max(tick_ - params_.retreat_pause_ticks, 0);
 }
 
 // The only ground that is known is where the foot stood, and the only way there that is known to be free is the one it
-// came: the whole step backwards, at the speeds that were proven.
+// came: the swing backwards, at half the speed, since the torso is elsewhere.
 void Gait::retreat(const JointFeedback& feedback) noexcept {
   const std::size_t i = index_of(decision_.goal.foot);
   const Transform odom_T_sole = swing_.at(motion_tick());
@@ -216,6 +362,7 @@ void Gait::retreat(const JointFeedback& feedback) noexcept {
   const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
   if ((loaded && above_m < params_.put_back_m) || above_m < -params_.put_back_m) {
     status_.stands[i] = true;
+    link_motion_.restart();
     carry_plan_to_odometry();
     begin_hold();
     return end(GaitPhase::kStopped, Obstruction::kGroundMissing, 0.0);
@@ -229,6 +376,7 @@ void Gait::touch_down(const StateEstimate& state) noexcept {
   status_.step.odom_T_executed =
       usable(state) ? state.odom_T_sole[i] : correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
   status_.stands[i] = true;
+  link_motion_.restart();  // the swing foot is where it was steered to, and stops
   planner_.landed();
   status_.treads_climbed = planner_.treads_climbed();
   status_.phase = GaitPhase::kDoubleSupport;
@@ -246,16 +394,13 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   if (!armed_) armed_ = joints_.try_arm(params_.geometry, params_.joints, feedback.q_rad);
   if (!armed_) return;
   if (!started_) {
-    joints_.hold(command);
+    hold_upright(command);
     if (state.initialised && usable(state)) start(state);
     return;
   }
 
-  torso_state_ = torso_.at(motion_tick());
-  if (activity_ == Activity::kRetreat) {
-    for (Motion& axis : torso_state_) axis.speed = -axis.speed;
-  }
-  plan_T_base_ = TorsoTrajectory::pose(torso_state_);
+  torso_state_ = torso_.at(torso_tick_, com_.at(com_tick_));
+  plan_T_base_ = plan_T_base_over(torso_state_);
   if (usable(state)) {
     correction_.update(state.odom_T_base, plan_T_base_, kTick_s / (kTick_s + params_.correction_time_s));
   }
@@ -276,8 +421,13 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
       break;
   }
   tick_ = std::min(tick_ + 1, kTickLimit);
+  com_tick_ = std::min(com_tick_ + 1, kTickLimit);
+  torso_tick_ = std::min(torso_tick_ + 1, kTickLimit);
 
-  if (joints_.follow(plan_T_base_, plan_T_sole_, command)) ++status_.ik_limited_ticks;
+  observe_links();
+  if (joints_.follow(plan_T_base_, plan_T_sole_, status_.stands, command)) ++status_.ik_limited_ticks;
+  add_torques(state, feedback, command);
+  status_.odom_p_com_desired_m = balance_.odom_p_com_planned_m();
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
   for (std::size_t i = 0; i < kFootCount; ++i) status_.odom_T_sole_desired[i] = odom_T_plan * plan_T_sole_[i];
 }

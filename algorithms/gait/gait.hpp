@@ -7,6 +7,7 @@
 #include "algorithms/core/footholds.hpp"
 #include "algorithms/core/gait_status.hpp"
 #include "algorithms/core/state.hpp"
+#include "algorithms/gait/balance.hpp"
 #include "algorithms/gait/base_correction.hpp"
 #include "algorithms/gait/climb_planner.hpp"
 #include "algorithms/gait/joint_reference.hpp"
@@ -24,10 +25,12 @@ class Gait {
     StepParams step;
     ClimbPlanner::Params planner;
     JointReference::Params joints;
-    double correction_time_s = 0.06;  // low-pass of the base's difference to the plan
+    Balance::Params balance;
+    double correction_time_s = 0.03;  // low-pass of the base's difference to the plan
     double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
     double absorb_rad = 0.035;
     std::int32_t reshift_ticks = 125;          // another weight shift over the same foot for a target that changed more
+    double max_push_m = 0.03;                  // of the zero-moment point, to set off
     std::int32_t max_shifts = 9;               // for one swing
     std::int32_t start_patience_ticks = 1500;  // the same obstruction without a break, before the first step
     std::int32_t patience_ticks = 500;         // and later, or the top: 1 s
@@ -36,8 +39,9 @@ class Gait {
     double touch_force_n = 15.0;
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
+    double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down
     double max_lowering_m = 0.04;               // no ground found: the foot goes back
-    std::int32_t retreat_pause_ticks = 50;      // before it does
+    std::int32_t retreat_pause_ticks = 200;     // before it does
     double put_back_m = 0.01;                   // about where it stood: weight counts as the ground; below, it is there
     std::int64_t steer_age_ns = 20 * kNsPerMs;  // of IMU and joint samples: older ones steer nothing and start nothing
     std::int64_t stop_age_ns = 100 * kNsPerMs;  // of the same on two feet: then the gait stops
@@ -49,6 +53,7 @@ class Gait {
   void tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
             const JointFeedback& feedback, JointCommand& command) noexcept;
   [[nodiscard]] const GaitStatus& status() const noexcept { return status_; }
+  [[nodiscard]] const Balance& balance() const noexcept { return balance_; }
   // Finishes the committed step, then holds in double support.
   void request_stop() noexcept { stop_requested_ = true; }
 
@@ -67,16 +72,24 @@ class Gait {
   void swing(const StateEstimate& state, const JointFeedback& feedback) noexcept;
   void retreat(const JointFeedback& feedback) noexcept;
 
+  [[nodiscard]] Vec3 reference_com_m() const noexcept;
+  void hold_upright(JointCommand& command) noexcept;
+  [[nodiscard]] Transform plan_T_base_over(const TorsoTrajectory::State& state) const noexcept;
+  void observe_links() noexcept;
+  void add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept;
   void begin_hold() noexcept;
   void begin_shift(const ClimbPlanner::Decision& decision, bool again) noexcept;
   void lift_off(const StateEstimate& state, const FootholdSet& footholds,
                 const ClimbPlanner::Decision& decision) noexcept;
   void touch_down(const StateEstimate& state) noexcept;
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
-  // Of swing and torso: backwards in a retreat.
-  [[nodiscard]] std::int32_t motion_tick() const noexcept;
+  // Of the swing: backwards in a retreat.
+  [[nodiscard]] double motion_tick() const noexcept;
   void carry_plan_to_odometry() noexcept;
   void settle_between_feet() noexcept;
+  void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
+  void wait_over_stance(const SolePose& sole) noexcept;
+  void rest_over(const Vec2& plan_p_m) noexcept;
   [[nodiscard]] bool usable(const StateEstimate& state) const noexcept;
   [[nodiscard]] bool lost(const StateEstimate& state) const noexcept;
   [[nodiscard]] ClimbPlanner::Situation situation(const StateEstimate& state) const noexcept;
@@ -86,18 +99,26 @@ class Gait {
   std::int64_t now_ns_ = 0;
   ClimbPlanner planner_;
   JointReference joints_;
+  Balance balance_;
+  LinkMotion link_motion_;
+  LinkMotion::Acceleration link_acceleration_;
+  JointVector nominal_rad_ = JointVector::Zero();  // joint angles of the plan, without the steering
   StepSearch search_;
   BaseCorrection correction_;
   TorsoTrajectory torso_;
-  TorsoTrajectory::State torso_state_{};
-  Swing swing_;  // odometry
+  TorsoTrajectory::State torso_state_{};  // x and y: of the centre of mass
+  ComPlan com_;
+  Vec2 zmp_stance_m_ = Vec2::Zero();  // of the swing, plan frame
+  Swing swing_;                       // odometry
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
   ClimbPlanner::Decision decision_;
   GaitStatus status_;
   Activity activity_ = Activity::kHold;
-  std::int32_t tick_ = 0;       // of the activity, saturates
-  std::int32_t turn_tick_ = 0;  // of the swing, when the retreat began
+  std::int32_t tick_ = 0;        // of the activity, saturates
+  std::int32_t torso_tick_ = 0;  // of the torso's plan, likewise
+  std::int32_t com_tick_ = 0;    // of the plan of the centre of mass, likewise
+  std::int32_t turn_tick_ = 0;   // of the swing, when the retreat began
   std::int32_t shift_ticks_ = 0;
   std::int32_t shifts_ = 0;  // since the last swing
   Obstruction waiting_for_ = Obstruction::kNone;

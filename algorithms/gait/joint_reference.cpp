@@ -23,13 +23,14 @@ bool JointReference::try_arm(const LegGeometry& geometry, const Params& params, 
 }
 
 bool JointReference::follow(const Transform& odom_T_base, const std::array<Transform, kFootCount>& odom_T_sole,
-                            JointCommand& command) noexcept {
+                            const std::array<bool, kFootCount>& stands, JointCommand& command) noexcept {
   constexpr double kRounding_rad = 1e-9;
   bool limited = false;
   const Transform base_T_odom = odom_T_base.inverse();
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const LegSolution solution = solve_leg(geometry_, leg, base_T_odom * odom_T_sole[index_of(leg)]);
     const bool solved = math::all_finite(solution.q_rad);
+    const double gain = stands[index_of(leg)] ? 1.0 : params_.swing_gain;
     limited = limited || !solution.reachable || !solved;
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       const JointLimits limits = joint_limits(leg, j);
@@ -48,7 +49,7 @@ bool JointReference::follow(const Transform& odom_T_base, const std::array<Trans
       commanded_rad_[i] =
           math::clamp(math::clamp(q_rad + params_.drive_delay_s * dq_radps, sent_rad - step_rad, sent_rad + step_rad),
                       limits.min_rad, limits.max_rad);
-      command.joints[n] = {commanded_rad_[i], dq_radps, 0.0, params_.kp_nmprad[j], params_.kd_nmsprad[j]};
+      command.joints[n] = {commanded_rad_[i], dq_radps, 0.0, gain * params_.kp_nmprad[j], gain * params_.kd_nmsprad[j]};
     }
   }
   return limited;
@@ -56,9 +57,8 @@ bool JointReference::follow(const Transform& odom_T_base, const std::array<Trans
 
 void JointReference::hold(JointCommand& command) const noexcept {
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    const std::size_t j = n % kJointsPerLeg;
-    command.joints[n] = {commanded_rad_[static_cast<Eigen::Index>(n)], 0.0, 0.0, params_.kp_nmprad[j],
-                         params_.kd_nmsprad[j]};
+    command.joints[n] = {commanded_rad_[static_cast<Eigen::Index>(n)], 0.0, 0.0, params_.hold_kp_nmprad,
+                         params_.hold_kd_nmsprad};
   }
 }
 

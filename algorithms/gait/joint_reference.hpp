@@ -12,9 +12,12 @@ class JointReference {
  public:
   static constexpr double kEncoderOffset_rad = 0.02;
   struct Params {
-    double drive_delay_s = 0.013;  // by the data sheet: 10 ms first-order lag, 2 ms on the bus, half a tick of hold
-    std::array<double, kJointsPerLeg> kp_nmprad{220, 100, 224, 224, 58, 58};
-    std::array<double, kJointsPerLeg> kd_nmsprad{8, 4, 8, 8, 2, 2};
+    double drive_delay_s = 0.003;  // by the data sheet: 2 ms on the bus, half a tick of hold
+    std::array<double, kJointsPerLeg> kp_nmprad{400, 400, 400, 400, 120, 120};
+    std::array<double, kJointsPerLeg> kd_nmsprad{10, 10, 10, 10, 4, 4};
+    double swing_gain = 2.0;       // of both, in the leg that swings
+    double hold_kp_nmprad = 2000;  // before there is an estimate to balance by: stiffer than the robot is top-heavy
+    double hold_kd_nmsprad = 40;
   };
 
   // Starts from measured angles, moved into the joints' ranges. False, and nothing changes, when one is not finite or
@@ -23,9 +26,10 @@ class JointReference {
   // True when a leg could not do what was asked: out of reach, range or speed, or not a number, upon which the leg
   // stays. The command never leaves the limits.
   bool follow(const Transform& odom_T_base, const std::array<Transform, kFootCount>& odom_T_sole,
-              JointCommand& command) noexcept;
+              const std::array<bool, kFootCount>& stands, JointCommand& command) noexcept;
   // Repeats the last joint angles, at rest.
   void hold(JointCommand& command) const noexcept;
+  [[nodiscard]] const JointVector& reference_rad() const noexcept { return reference_rad_; }
   // Where the reference puts the soles.
   [[nodiscard]] Transform base_T_sole_reference(Foot leg) const noexcept;
 

@@ -3,13 +3,14 @@
 
 #include <algorithm>
 
+#include "algorithms/robot/leg_dynamics.hpp"
+
 namespace polygmap {
 
-StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal, const SolePair& soles,
+StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePair& soles,
                    double toe_down_rad) noexcept {
   const bool on_floor = goal.kind == StepKind::kFloor;
   const Foot stance = other(goal.foot);
-  const TorsoParams& torso = params.torso;
   SolePair landed = soles;
   landed[index_of(goal.foot)] = goal.target;
 
@@ -20,37 +21,69 @@ StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const 
   plan.swing_ticks = on_floor ? params.floor_swing_ticks : params.stair_swing_ticks;
   plan.rise_ticks = plan.swing_ticks;
   if (!on_floor) plan.rise_ticks = static_cast<std::int32_t>(params.rise_share * plan.swing_ticks);
+  plan.toe_down_rad = toe_down_rad;
   plan.shape.toe_down_rad = on_floor ? 0.5 * toe_down_rad : toe_down_rad;
-  switch (goal.kind) {
-    case StepKind::kFloor:
-      plan.lift_off = torso_over(geometry, torso, stance, soles, torso.ahead_floor_m);
-      plan.touch_down = torso_over(geometry, torso, stance, landed, torso.ahead_floor_m);
-      break;
-    case StepKind::kLeading: {
-      plan.lift_off = torso_over(geometry, torso, stance, soles, torso.ahead_lead_lift_m);
-      plan.touch_down = torso_over(geometry, torso, stance, landed, torso.ahead_lead_land_m);
-      // Rising with the foot gives the leading leg room to fold, at a lower knee speed.
-      const double tall_m = soles[index_of(stance)].position_m.z() + torso.lead_height_m;
-      plan.touch_down.position_m.z() = std::min(plan.touch_down.position_m.z(), tall_m);
-      break;
-    }
-    case StepKind::kTrailing:
-      plan.lift_off = torso_over(geometry, torso, stance, soles, torso.ahead_trail_lift_m);
-      plan.touch_down = torso_over(geometry, torso, stance, landed, torso.ahead_trail_land_m);
-      break;
-  }
+  const auto zmp_in = [&](Foot foot) -> Vec2 {
+    const SolePose& sole = landed[index_of(foot)];
+    const Vec3 local_m{params.zmp_ahead_m, -side_sign(foot) * params.zmp_inward_m, 0.0};
+    return (sole.position_m + rotation_z(sole.yaw_rad) * local_m).head<2>();
+  };
+  plan.zmp_stance_m = zmp_in(stance);
+  // After a leading step the weight goes on to that foot; after the others it may have to stop anywhere.
+  plan.zmp_next_m = zmp_in(goal.foot);
+  if (goal.kind != StepKind::kLeading) plan.zmp_next_m = 0.5 * (plan.zmp_next_m + plan.zmp_stance_m);
   return plan;
 }
 
-StepKnots::StepKnots(const StepPlan& plan, const TorsoTrajectory::State& from,
-                     const std::array<Transform, kFootCount>& soles, std::int32_t knot_ticks) noexcept
-    : foot_(plan.goal.foot),
+void plan_torso(const LegGeometry& geometry, const StepParams& params, const SolePair& soles, const ComPlan& com,
+                std::int32_t lift_off_tick, StepPlan& plan) noexcept {
+  SolePair landed = soles;
+  landed[index_of(plan.goal.foot)] = plan.goal.target;
+  plan.lift_off = torso_at(geometry, params.torso, soles, com.at(lift_off_tick + params.leave_ticks).position_m);
+  plan.touch_down = torso_at(geometry, params.torso, landed, com.at(lift_off_tick + plan.swing_ticks).position_m);
+  if (plan.goal.kind != StepKind::kLeading) return;
+  // Rising with the foot gives the leading leg room to fold, at a lower knee speed.
+  const double tall_m = soles[index_of(other(plan.goal.foot))].position_m.z() + params.torso.lead_height_m;
+  plan.touch_down.position_m.z() = std::min(plan.touch_down.position_m.z(), tall_m);
+}
+
+ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept {
+  const std::int32_t stay = plan.swing_ticks + params.landing_hold_ticks;
+  const std::int32_t ramp = params.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
+  ZmpKnots knots;
+  (void)knots.try_push_back({stay, plan.zmp_stance_m});
+  (void)knots.try_push_back({stay + std::max(ramp, 1), plan.zmp_next_m});
+  return knots;
+}
+
+ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2& start_m) noexcept {
+  ZmpKnots knots;
+  const std::int32_t over = std::max(plan.shift_ticks - params.lift_hold_ticks, 2);
+  const std::int32_t ramp = params.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
+  (void)knots.try_push_back({std::max(over - ramp, over / 5), start_m});
+  (void)knots.try_push_back({over, plan.zmp_stance_m});
+  for (const ZmpKnot& knot : zmp_of_swing(params, plan)) {
+    (void)knots.try_push_back({plan.shift_ticks + knot.tick, knot.zmp_m});
+  }
+  return knots;
+}
+
+StepKnots::StepKnots(const LegGeometry& geometry, const StepParams& params, const StepPlan& step,
+                     const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept
+    : foot_(step.goal.foot),
       soles_(soles),
-      shift_ticks_(plan.shift_ticks),
-      knot_ticks_(std::max(knot_ticks, 1)),
-      count_(1 + (plan.shift_ticks + plan.swing_ticks + knot_ticks_ - 1) / knot_ticks_) {
-  shift_.plan(from, plan.lift_off, plan.shift_ticks, plan.shift_ticks);
-  lean_.plan(shift_.at(plan.shift_ticks), plan.touch_down, plan.swing_ticks, plan.rise_ticks);
+      shift_ticks_(step.shift_ticks),
+      swing_ticks_(step.swing_ticks),
+      knot_ticks_(std::max(params.knot_ticks, 1)),
+      count_(1 + (step.shift_ticks + step.swing_ticks + knot_ticks_ - 1) / knot_ticks_) {
+  const HorizontalMotion com = TorsoTrajectory::horizontal(from);
+  com_.plan(params.com, com, zmp_of_shift(params, step, ComPlan::zmp_under(params.com, com)));
+  StepPlan plan = step;
+  plan_torso(geometry, params, {sole_pose(soles[0]), sole_pose(soles[1])}, com_, plan.shift_ticks, plan);
+  torso_at_landing_ = plan.touch_down;
+  shift_.plan(from, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, plan.shift_ticks, plan.shift_ticks);
+  lean_.plan(shift_.at(plan.shift_ticks, com), plan.touch_down.position_m.z(), plan.touch_down.yaw_rad,
+             plan.swing_ticks, plan.rise_ticks);
   swing_.plan(soles[index_of(foot_)], plan.goal.target, plan.shape, plan.swing_ticks);
 }
 
@@ -60,9 +93,9 @@ StepKnot StepKnots::operator[](std::int32_t i) const noexcept {
   knot.odom_T_sole = soles_;
   const std::int32_t swing_tick = std::min(knot.tick - shift_ticks_, swing_.duration_ticks());
   if (swing_tick < 0) {
-    knot.odom_T_base = TorsoTrajectory::pose(shift_.at(knot.tick));
+    knot.odom_T_base = TorsoTrajectory::pose(shift_.at(knot.tick, com_.at(knot.tick)));
   } else {
-    knot.odom_T_base = TorsoTrajectory::pose(lean_.at(swing_tick));
+    knot.odom_T_base = TorsoTrajectory::pose(lean_.at(swing_tick, com_.at(knot.tick)));
     knot.odom_T_sole[index_of(foot_)] = swing_.at(swing_tick);
   }
   return knot;
@@ -74,32 +107,44 @@ void StepProof::begin(const LegGeometry& geometry, const StepParams& params, con
   knots_ = knots;
   check_ = {true, 1e9, 1e9, 0.0};
   next_ = 0;
+  constexpr int kPasses = 3;  // of base and legs that follow each other
+  previous_.setZero();
+  for (int i = 0; i < kPasses; ++i) (void)solve(0, previous_, previous_);
+}
+
+bool StepProof::solve(std::int32_t i, const JointVector& before_rad, JointVector& q_rad) const noexcept {
+  StepKnot knot = knots_[i];
+  const Vec3 base_p_com_m = centre_of_mass(geometry_, masses_, before_rad, JointVector::Zero()).base_p_com_m;
+  knot.odom_T_base.p_m.head<2>() -= (knot.odom_T_base.R * base_p_com_m).head<2>();
+  const Transform base_T_odom = knot.odom_T_base.inverse();
+  bool reachable = true;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const LegSolution s = solve_leg(geometry_, leg, base_T_odom * knot.odom_T_sole[index_of(leg)]);
+    reachable = reachable && s.reachable;
+    q_rad.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
+  }
+  return reachable;
 }
 
 bool StepProof::advance(std::int32_t count) noexcept {
   const std::int32_t end = std::min(next_ + count, knots_.count());
   for (; next_ < end; ++next_) {
-    const StepKnot knot = knots_[next_];
-    const Transform base_T_odom = knot.odom_T_base.inverse();
-    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-      const LegSolution s = solve_leg(geometry_, leg, base_T_odom * knot.odom_T_sole[index_of(leg)]);
-      LegVector& before = previous_[index_of(leg)];
-      if (!s.reachable) check_.feasible = false;
-      for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-        const JointLimits limits = joint_limits(leg, j);
-        const auto i = static_cast<Eigen::Index>(j);
-        const double q = s.q_rad[i];
-        // The knee's lower end is the stretched leg, which has a margin of its own.
-        double& low = j == kKnee ? check_.knee_rad : check_.joint_margin_rad;
-        low = std::min(low, q - limits.min_rad);
-        check_.joint_margin_rad = std::min(check_.joint_margin_rad, limits.max_rad - q);
-        if (next_ > 0) {
-          const double speed_radps = std::abs(q - before[i]) / (knots_.knot_ticks() * kTick_s);
-          check_.speed_share = std::max(check_.speed_share, speed_radps / limits.speed_radps);
-        }
+    JointVector q_rad;
+    if (!solve(next_, previous_, q_rad)) check_.feasible = false;
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      const std::size_t j = n % kJointsPerLeg;
+      const JointLimits limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), j);
+      const auto i = static_cast<Eigen::Index>(n);
+      // The knee's lower end is the stretched leg, which has a margin of its own.
+      double& low = j == kKnee ? check_.knee_rad : check_.joint_margin_rad;
+      low = std::min(low, q_rad[i] - limits.min_rad);
+      check_.joint_margin_rad = std::min(check_.joint_margin_rad, limits.max_rad - q_rad[i]);
+      if (next_ > 0) {
+        const double speed_radps = std::abs(q_rad[i] - previous_[i]) / (knots_.knot_ticks() * kTick_s);
+        check_.speed_share = std::max(check_.speed_share, speed_radps / limits.speed_radps);
       }
-      before = s.q_rad;
     }
+    previous_ = q_rad;
   }
   if (next_ < knots_.count()) return false;
   check_.feasible = check_.feasible && check_.joint_margin_rad >= params_.joint_margin_rad &&
@@ -129,11 +174,12 @@ void StepSearch::try_candidate() noexcept {
   TorsoTrajectory::State from = from_;
   if (leading_found_) {
     soles[index_of(goal_.foot)] = goal_.target.transform();
-    from = TorsoTrajectory::at_rest({rotation_z(plan_.touch_down.yaw_rad), plan_.touch_down.position_m});
+    from = TorsoTrajectory::at_rest({rotation_z(torso_landed_.yaw_rad), torso_landed_.position_m});
+    TorsoTrajectory::set_horizontal(from, com_landed_);
   }
-  candidate_ = plan_step(geometry_, params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, kToeDown_rad[shape_]);
+  candidate_ = plan_step(params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, kToeDown_rad[shape_]);
   if (!leading_found_) candidate_.shift_ticks = shift_ticks_;
-  proof_.begin(geometry_, params_, StepKnots(candidate_, from, soles, params_.knot_ticks));
+  proof_.begin(geometry_, params_, StepKnots(geometry_, params_, candidate_, from, soles));
 }
 
 // Can the weight then move over the foot that landed? A wide diagonal step could be a dead end: the ankle roll of the
@@ -141,7 +187,7 @@ void StepSearch::try_candidate() noexcept {
 bool StepSearch::leads_on() const noexcept {
   SolePair landed{sole_pose(soles_[0]), sole_pose(soles_[1])};
   landed[index_of(goal_.foot)] = goal_.target;
-  const TorsoPose over = torso_over(geometry_, params_.torso, goal_.foot, landed, params_.torso.ahead_floor_m);
+  const TorsoPose over = torso_over(geometry_, params_.torso, goal_.foot, landed);
   const Transform base_T_odom = Transform{rotation_z(over.yaw_rad), over.position_m}.inverse();
   const double margin_rad = 2.0 * params_.joint_margin_rad;  // the foot lands some mm off
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
@@ -163,6 +209,8 @@ StepSearch::State StepSearch::step() noexcept {
     if (goal_.kind == StepKind::kFloor && !leads_on()) return state_ = State::kImpossible;
     if (leading_found_ || goal_.kind != StepKind::kLeading) return state_ = State::kFound;
     leading_found_ = true;
+    com_landed_ = proof_.knots().com_at_landing();
+    torso_landed_ = proof_.knots().torso_at_landing();
     shape_ = 0;
   }
   try_candidate();

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "algorithms/core/footholds.hpp"
+#include "algorithms/gait/com_plan.hpp"
 #include "algorithms/gait/swing.hpp"
 #include "algorithms/gait/torso.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
@@ -34,32 +35,51 @@ struct StepParams {
                          .landing_begin = 0.55,
                          .clearance_m = 0.05,
                          .retreat_m = 0.0};
-  std::int32_t stair_shift_ticks = 310;  // 0.62 s of double support
-  std::int32_t stair_swing_ticks = 490;  // 0.98 s
-  std::int32_t floor_shift_ticks = 260;
+  std::int32_t stair_shift_ticks = 195;  // 0.39 s of double support
+  std::int32_t stair_swing_ticks = 450;  // 0.90 s
+  std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
-  double rise_share = 0.45;        // of a swing onto a tread in which the torso rises, to give the foot room
-  std::int32_t knot_ticks = 10;    // eq. (37): 20 ms
-  double joint_margin_rad = 0.03;  // what a plan keeps from the joints' ranges
-  double knee_min_rad = 0.08;      // and from the stretched leg
-  double speed_share = 0.9;        // of the drives' speed that a plan may use
+  ComPlan::Params com;
+  double zmp_ahead_m = 0.01;             // of the ankle, near the middle of what it can hold either way
+  double zmp_inward_m = 0.022;           // and towards the other foot
+  std::int32_t landing_hold_ticks = 50;  // the foot may land that much late before the weight sets off for it
+  std::int32_t lift_hold_ticks = 15;     // and the weight is over the stance foot that long before the other one lifts
+  std::int32_t leave_ticks = 30;         // the rear leg still reaches the ground so long after its foot has left it
+  double rise_share = 0.5;               // of a swing onto a tread in which the torso rises, to give the foot room
+  std::int32_t knot_ticks = 10;          // eq. (37): 20 ms
+  double joint_margin_rad = 0.03;        // what a plan keeps from the joints' ranges
+  double knee_min_rad = 0.08;            // and from the stretched leg
+  double speed_share = 0.95;             // of the drives' speed that a plan may use
 };
+
+// Toe-down angles that are tried, in this order; half of each on the floor.
+inline constexpr std::array<double, 5> kToeDown_rad{0.3, 0.2, 0.4, 0.1, 0.5};
 
 struct StepPlan {
   StepGoal goal;
   TorsoPose lift_off;
   TorsoPose touch_down;
+  Vec2 zmp_stance_m = Vec2::Zero();  // while the foot swings
+  Vec2 zmp_next_m = Vec2::Zero();    // then
+  double toe_down_rad = 0.0;         // as tried; the floor's shape has half of it
   SwingShape shape;
   std::int32_t shift_ticks = 1;
   std::int32_t swing_ticks = 1;
   std::int32_t rise_ticks = 1;  // of the swing: the torso has risen
 };
 
-// Toe-down angles that are tried, in this order; half of each on the floor.
-inline constexpr std::array<double, 5> kToeDown_rad{0.3, 0.2, 0.4, 0.1, 0.5};
+// All but the torso.
+[[nodiscard]] StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePair& soles,
+                                 double toe_down_rad) noexcept;
+// The torso as high as both legs reach from where the centre of mass is a little after the foot leaves, which rises
+// slowly at first, and when it lands: on the way to the stance foot it is still behind it, which spares the front leg
+// its bend.
+void plan_torso(const LegGeometry& geometry, const StepParams& params, const SolePair& soles, const ComPlan& com,
+                std::int32_t lift_off_tick, StepPlan& plan) noexcept;
 
-[[nodiscard]] StepPlan plan_step(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal,
-                                 const SolePair& soles, double toe_down_rad) noexcept;
+// Zero-moment points of a step whose shift begins with one at start_m, and from its lift-off on.
+[[nodiscard]] ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2& start_m) noexcept;
+[[nodiscard]] ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept;
 
 // Eq. (30): one of the N knots of a step; eq. (37): t_i = i dt.
 struct StepKnot {
@@ -72,8 +92,10 @@ struct StepKnot {
 class StepKnots {
  public:
   StepKnots() noexcept = default;
-  StepKnots(const StepPlan& plan, const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles,
-            std::int32_t knot_ticks) noexcept;
+  StepKnots(const LegGeometry& geometry, const StepParams& params, const StepPlan& plan,
+            const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept;
+  [[nodiscard]] const TorsoPose& torso_at_landing() const noexcept { return torso_at_landing_; }
+  [[nodiscard]] HorizontalMotion com_at_landing() const noexcept { return com_.at(shift_ticks_ + swing_ticks_); }
   [[nodiscard]] std::int32_t count() const noexcept { return count_; }
   [[nodiscard]] std::int32_t knot_ticks() const noexcept { return knot_ticks_; }
   [[nodiscard]] StepKnot operator[](std::int32_t i) const noexcept;
@@ -82,8 +104,10 @@ class StepKnots {
   Foot foot_ = Foot::kLeft;
   std::array<Transform, kFootCount> soles_;
   TorsoTrajectory shift_, lean_;
+  ComPlan com_;
   Swing swing_;
-  std::int32_t shift_ticks_ = 0, knot_ticks_ = 1, count_ = 0;
+  TorsoPose torso_at_landing_;
+  std::int32_t shift_ticks_ = 0, swing_ticks_ = 0, knot_ticks_ = 1, count_ = 0;
 };
 
 struct StepCheck {
@@ -100,13 +124,19 @@ class StepProof {
   // Up to `count` knots; true when all are done. A knot costs two leg solutions, about 3 us on one x86 core.
   bool advance(std::int32_t count) noexcept;
   [[nodiscard]] const StepCheck& check() const noexcept { return check_; }
+  [[nodiscard]] const StepKnots& knots() const noexcept { return knots_; }
 
  private:
+  // Both legs at a knot; false when one is out of reach. The plan says where the centre of mass is: the base follows
+  // from the legs' places in `before`.
+  bool solve(std::int32_t i, const JointVector& before_rad, JointVector& q_rad) const noexcept;
+
   LegGeometry geometry_;
   StepParams params_;
   StepKnots knots_;
   StepCheck check_;
-  std::array<LegVector, kFootCount> previous_;
+  MassModel masses_;
+  JointVector previous_ = JointVector::Zero();
   std::int32_t next_ = 0;
 };
 
@@ -138,6 +168,8 @@ class StepSearch {
   StepPlan plan_;       // the offered one, of goal_
   StepPlan candidate_;  // under proof
   StepProof proof_;
+  HorizontalMotion com_landed_;  // after the leading swing
+  TorsoPose torso_landed_;
   std::int32_t shift_ticks_ = 1;
   std::size_t shape_ = 0;
   bool leading_found_ = false;

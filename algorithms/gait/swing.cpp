@@ -22,9 +22,9 @@ void Swing::plan(const Transform& start, const SolePose& target, const SwingShap
                      std::max(landing_s, kTick_s));
 }
 
-double Swing::height_m(std::int32_t tick) const noexcept {
+double Swing::height_m(double tick) const noexcept {
   if (tick < 0) return start_m_.z() + tick * kTick_s * shape_.approach_mps;
-  const double u = static_cast<double>(tick) / duration_ticks_;
+  const double u = tick / duration_ticks_;
   if (u <= shape_.landing_begin) {
     return start_m_.z() + (apex_m_ - start_m_.z()) * smooth_window(u, 0.0, shape_.lift_end);
   }
@@ -40,9 +40,9 @@ double Swing::lowered_m(std::int32_t tick) const noexcept {
 // Eq. (32): lift to the apex, down to the landing height z_0. As printed the curve jumps by z_0 at the apex and starts
 // at full speed; here both halves start and end smoothly. Eq. (33): start to end in a share of the time; the printed
 // constant speed would meet the riser, so the motion waits for the rise and ends before the landing.
-Transform Swing::at(std::int32_t tick) const noexcept {
+Transform Swing::at(double tick) const noexcept {
   const SwingShape& s = shape_;
-  const double u = static_cast<double>(tick) / duration_ticks_;
+  const double u = tick / duration_ticks_;
   const double forward = smooth_window(u, s.forward_begin, s.forward_end);
   const double retreat_m = s.retreat_m * smooth_window(u, 0.0, s.retreat_end) * (1.0 - forward);
   const double toe_down_rad = s.toe_down_rad * smooth_window(u, s.toe_down_begin, s.toe_down_full) *

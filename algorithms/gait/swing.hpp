@@ -33,14 +33,14 @@ class Swing {
             std::int32_t duration_ticks) noexcept;
   // Pose of the sole. After duration_ticks, and before 0 on the way back, the foot goes on downwards at approach_mps:
   // the caller ends it.
-  [[nodiscard]] Transform at(std::int32_t tick) const noexcept;
+  [[nodiscard]] Transform at(double tick) const noexcept;
   [[nodiscard]] std::int32_t duration_ticks() const noexcept { return duration_ticks_; }
   // How far below the target it has been lowered, m; negative before the end.
   [[nodiscard]] double lowered_m(std::int32_t tick) const noexcept;
 
  private:
   // Eq. (32) made continuous: height of the lowest point of the foot.
-  [[nodiscard]] double height_m(std::int32_t tick) const noexcept;
+  [[nodiscard]] double height_m(double tick) const noexcept;
 
   Vec3 start_m_ = Vec3::Zero();
   double start_yaw_rad_ = 0.0, start_pitch_rad_ = 0.0, start_roll_rad_ = 0.0;

@@ -32,13 +32,18 @@ double allowed_height_m(const LegGeometry& geometry, const TorsoParams& params, 
 
 }  // namespace
 
-TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance, const SolePair& soles,
-                     double ahead_m) noexcept {
-  const SolePose& foot = soles[index_of(stance)];
-  TorsoPose torso{foot.position_m + rotation_z(foot.yaw_rad) * Vec3{ahead_m, -side_sign(stance) * params.inward_m, 0.0},
-                  middle_of(soles).yaw_rad};
+TorsoPose torso_at(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles,
+                   const Vec2& base_m) noexcept {
+  TorsoPose torso{{base_m.x(), base_m.y(), 0.0}, middle_of(soles).yaw_rad};
   torso.position_m.z() = allowed_height_m(geometry, params, soles, torso);
   return torso;
+}
+
+TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance,
+                     const SolePair& soles) noexcept {
+  const SolePose& foot = soles[index_of(stance)];
+  const Vec3 local_m{params.ahead_m, -side_sign(stance) * params.inward_m, 0.0};
+  return torso_at(geometry, params, soles, (foot.position_m + rotation_z(foot.yaw_rad) * local_m).head<2>());
 }
 
 TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles) noexcept {
@@ -58,26 +63,43 @@ Transform TorsoTrajectory::pose(const State& s) noexcept {
           Vec3{s[0].position, s[1].position, s[2].position}};
 }
 
-TorsoTrajectory::State TorsoTrajectory::moved(const State& state, const Transform& by) noexcept {
-  State result = state;
-  const State placed = at_rest(by * pose(state));
-  for (std::size_t i = 0; i < kAxes; ++i) result[i].position = placed[i].position;
+TorsoTrajectory::State TorsoTrajectory::placed(const State& state, const Transform& base, const Vec2& com_m) noexcept {
+  State result = at_rest(base);
+  result[0].position = com_m.x();
+  result[1].position = com_m.y();
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    result[i].speed = state[i].speed;
+    result[i].acceleration = state[i].acceleration;
+  }
   return result;
 }
 
-void TorsoTrajectory::plan(const State& from, const TorsoPose& to, std::int32_t duration_ticks,
-                           std::int32_t height_ticks) noexcept {
-  const double yaw_rad = from[5].position + math::wrap_angle(to.yaw_rad - from[5].position);
-  const std::array<double, kAxes> goal{to.position_m.x(), to.position_m.y(), to.position_m.z(), 0.0, 0.0, yaw_rad};
-  for (std::size_t i = 0; i < kAxes; ++i) {
-    const std::int32_t ticks = std::max(i == 2 ? height_ticks : duration_ticks, 1);
-    axes_[i] = Quintic(from[i], {goal[i]}, ticks * kTick_s);
+HorizontalMotion TorsoTrajectory::horizontal(const State& state) noexcept {
+  return {{state[0].position, state[1].position},
+          {state[0].speed, state[1].speed},
+          {state[0].acceleration, state[1].acceleration}};
+}
+
+void TorsoTrajectory::set_horizontal(State& state, const HorizontalMotion& motion) noexcept {
+  for (int a = 0; a < 2; ++a) {
+    state[static_cast<std::size_t>(a)] = {motion.position_m[a], motion.velocity_mps[a], motion.acceleration_mps2[a]};
   }
 }
 
-TorsoTrajectory::State TorsoTrajectory::at(std::int32_t tick) const noexcept {
+void TorsoTrajectory::plan(const State& from, double height_m, double yaw_rad, std::int32_t duration_ticks,
+                           std::int32_t height_ticks) noexcept {
+  const std::array<double, kAxes - 2> goal{height_m, 0.0, 0.0,
+                                           from[5].position + math::wrap_angle(yaw_rad - from[5].position)};
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    const std::int32_t ticks = std::max(i == 0 ? height_ticks : duration_ticks, 1);
+    axes_[i] = Quintic(from[i + 2], {goal[i]}, ticks * kTick_s);
+  }
+}
+
+TorsoTrajectory::State TorsoTrajectory::at(std::int32_t tick, const HorizontalMotion& horizontal) const noexcept {
   State s;
-  for (std::size_t i = 0; i < kAxes; ++i) s[i] = axes_[i].at(tick * kTick_s);
+  set_horizontal(s, horizontal);
+  for (std::size_t i = 0; i < axes_.size(); ++i) s[i + 2] = axes_[i].at(tick * kTick_s);
   return s;
 }
 

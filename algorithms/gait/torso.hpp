@@ -5,35 +5,35 @@
 #include <array>
 
 #include "algorithms/gait/blend.hpp"
+#include "algorithms/gait/dcm_stabiliser.hpp"
 #include "algorithms/gait/footstep_plan.hpp"
 
 namespace polygmap {
 
 struct TorsoParams {
-  double height_m = 0.795;            // above the higher foot, at most
-  double lead_height_m = 0.86;        // above the lower foot when the leading one lands
-  double max_leg_m = 0.612;           // hip pitch to ankle, of 0.630 stretched
-  double inward_m = 0.022;            // from the stance foot's middle line towards the other foot at lift-off
-  double ahead_lead_lift_m = 0.01;    // of the base before the stance sole's origin: leading foot leaves
-  double ahead_lead_land_m = 0.09;    // it lands
-  double ahead_trail_lift_m = -0.02;  // trailing foot leaves: as far back as the support allows
-  double ahead_trail_land_m = 0.005;  // it lands
-  double ahead_floor_m = 0.01;
+  double height_m = 0.795;      // above the higher foot, at most
+  double lead_height_m = 0.86;  // above the lower foot when the leading one lands
+  double max_leg_m = 0.612;     // hip pitch to ankle, of 0.630 stretched
+  double inward_m = 0.022;      // of the base at rest over one foot, from its middle line towards the other one
+  double ahead_m = 0.01;        // and before its sole's origin
 };
 
 // Base height at which the leg to `sole` is max_leg_m long, for a base at (x, y) with that heading.
 [[nodiscard]] double reach_height_m(const LegGeometry& geometry, const Vec3& base_m, double yaw_rad, Foot leg,
                                     const SolePose& sole, double max_leg_m) noexcept;
 
-// Over the foot that stands alone: ahead_m along its heading, params.inward_m towards the other foot; height: the
-// highest that both feet allow.
+// With its base there, heading between the soles; height: the highest that both feet allow.
+[[nodiscard]] TorsoPose torso_at(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles,
+                                 const Vec2& base_m) noexcept;
+// At rest over the foot that stands alone.
 [[nodiscard]] TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance,
-                                   const SolePair& soles, double ahead_m) noexcept;
+                                   const SolePair& soles) noexcept;
 // Between both feet.
 [[nodiscard]] TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params,
                                       const SolePair& soles) noexcept;
 
-// x, y, z, roll, pitch, yaw: moves from any motion to an upright rest.
+// x, y, z, roll, pitch, yaw: height and attitude move from any motion to an upright rest; x and y are the centre of
+// mass's and come from elsewhere (com_plan.hpp).
 class TorsoTrajectory {
  public:
   static constexpr std::size_t kAxes = 6;
@@ -41,15 +41,21 @@ class TorsoTrajectory {
 
   [[nodiscard]] static State at_rest(const Transform& base) noexcept;
   [[nodiscard]] static Transform pose(const State& state) noexcept;
-  // The state in another frame that differs by a small rigid motion: speeds stay.
-  [[nodiscard]] static State moved(const State& state, const Transform& by) noexcept;
+  // The state in another frame that differs by a small rigid motion, in which base and centre of mass are there: speeds
+  // stay.
+  [[nodiscard]] static State placed(const State& state, const Transform& base, const Vec2& com_m) noexcept;
+
+  [[nodiscard]] static HorizontalMotion horizontal(const State& state) noexcept;
+  static void set_horizontal(State& state, const HorizontalMotion& motion) noexcept;
 
   // height_ticks: the height may arrive earlier than the rest.
-  void plan(const State& from, const TorsoPose& to, std::int32_t duration_ticks, std::int32_t height_ticks) noexcept;
-  [[nodiscard]] State at(std::int32_t tick) const noexcept;
+  void plan(const State& from, double height_m, double yaw_rad, std::int32_t duration_ticks,
+            std::int32_t height_ticks) noexcept;
+  // x and y as set in `horizontal`.
+  [[nodiscard]] State at(std::int32_t tick, const HorizontalMotion& horizontal) const noexcept;
 
  private:
-  std::array<Quintic, kAxes> axes_;
+  std::array<Quintic, kAxes - 2> axes_;  // from z on
 };
 
 }  // namespace polygmap

@@ -4,16 +4,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "algorithms/robot/leg_frames.hpp"
+
 namespace polygmap {
 namespace {
 
 Vec3 mirrored(const Vec3& left_m, Foot leg) noexcept { return {left_m.x(), side_sign(leg) * left_m.y(), left_m.z()}; }
 
-// Joint frames of one leg in the base frame, each after its own joint's rotation.
-struct LegFrames {
-  std::array<Transform, kJointsPerLeg> joint;
-  Transform sole;
-};
+}  // namespace
 
 LegFrames leg_frames(const LegGeometry& g, Foot leg, const LegVector& q) noexcept {
   LegFrames f;
@@ -26,8 +24,6 @@ LegFrames leg_frames(const LegGeometry& g, Foot leg, const LegVector& q) noexcep
   f.sole = f.joint[kAnkleRoll] * Transform{Mat3::Identity(), Vec3{0, 0, -g.ankle_to_sole_m}};
   return f;
 }
-
-}  // namespace
 
 LegVector leg_joints(const JointVector& q_rad, Foot leg) noexcept {
   return q_rad.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0)));
@@ -43,12 +39,11 @@ LegPoints base_p_leg(const LegGeometry& geometry, Foot leg, const LegVector& q_r
 }
 
 LegJacobian leg_jacobian(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept {
-  constexpr std::array<int, kJointsPerLeg> kAxis{0, 2, 1, 1, 1, 0};
   const LegFrames f = leg_frames(geometry, leg, q_rad);
   LegJacobian jacobian;
   for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
     const auto column = static_cast<Eigen::Index>(j);
-    const Vec3 axis = f.joint[j].R.col(kAxis[j]);
+    const Vec3 axis = f.joint[j].R.col(kJointAxis[j]);
     jacobian.block<3, 1>(0, column) = axis.cross(f.sole.p_m - f.joint[j].p_m);
     jacobian.block<3, 1>(3, column) = axis;
   }

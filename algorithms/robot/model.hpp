@@ -29,6 +29,29 @@ struct JointLimits {
   double torque_nm;
 };
 
+// A rigid link: its mass and where its centre is, in the frame of the joint that moves it.
+struct LinkMass {
+  double mass_kg;
+  Vec3 centre_m;
+};
+// 55 kg. The torso is the base link with arms and head at rest. Source of the figures: the robot's public description,
+// centres rounded to a centimetre.
+struct MassModel {
+  LinkMass torso{37.012, {-0.018, 0.0, 0.21}};
+  // Left; the right one mirrors y.
+  std::array<LinkMass, kJointsPerLeg> leg{{{1.711, {0.0, 0.0, -0.01}},
+                                           {0.580, {0.0, 0.0, -0.09}},
+                                           {4.504, {0.0, 0.01, -0.08}},
+                                           {1.628, {0.01, 0.0, -0.12}},
+                                           {0.072, {0.0, 0.0, 0.0}},
+                                           {0.499, {0.03, 0.0, -0.04}}}};
+  [[nodiscard]] double total_kg() const noexcept {
+    double sum_kg = torso.mass_kg;
+    for (const LinkMass& link : leg) sum_kg += 2.0 * link.mass_kg;
+    return sum_kg;
+  }
+};
+
 enum LegJoint : std::uint8_t { kHipRoll, kHipYaw, kHipPitch, kKnee, kAnklePitch, kAnkleRoll };
 
 // Left leg; the right leg's roll and yaw ranges are swapped and negated.

@@ -29,12 +29,14 @@ constexpr double kQuietPeriod_s = 5.0;       // simulated, between progress line
 struct ClimbArguments {
   ClimbOptions options;
   std::string noise = "white";
+  std::string plant = "kinematic";
   std::string contacts = "sensed";
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
   bool no_self_filter = false;
   bool no_mount_estimate = false;
   std::string camera;
+  std::string push;
 };
 
 // CLI11 2.1 lets -1 and 2^64 wrap around.
@@ -56,6 +58,10 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_option("--width", stairs.width_m, "Width of the staircase, m")->capture_default_str();
   climb.add_option("--nosing", stairs.nosing_m, "Overhang of a tread over its riser, m")->capture_default_str();
   climb.add_option("--landing", stairs.landing_m, "Depth of the landing, m")->capture_default_str();
+  climb
+      .add_option("--plant", a.plant,
+                  "kinematic: follows and never tips over; mujoco: under physics, it balances or falls")
+      ->capture_default_str();
   climb.add_option("--gait", a.options.gait, "ds: both feet on every tread")->capture_default_str();
   climb.add_option("--seed", a.options.seed, "Draws the start, the steps' jitter, the robot's errors and all noise")
       ->check(whole_number)
@@ -63,6 +69,8 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
   climb.add_option("--contacts", a.contacts, "Foot forces: sensed, or inferred from joint torques")
       ->capture_default_str();
+  climb.add_option("--push", a.push, "One push of the torso, over 0.1 s: when, s; along x or y; how much, N s")
+      ->type_name("\"T,AXIS,NS\"");
   climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
 
   climb.add_option("--camera", a.camera, "The robot's camera; the module is told its noise and range")
@@ -103,6 +111,19 @@ std::string number(double value) {
   return buffer;
 }
 
+// As in "12.5,x,10"; nothing when it is no push.
+std::optional<Push> read_push(const std::string& text) {
+  Push push;
+  char axis = 0;
+  int end = 0;
+  if (std::sscanf(text.c_str(), "%lf,%c,%lf%n", &push.at_s, &axis, &push.impulse_ns, &end) != 3) return {};
+  if (end != static_cast<int>(text.size()) || (axis != 'x' && axis != 'y')) return {};
+  constexpr double kLatest_s = 1000.0, kHardest_ns = 100.0;
+  if (!(push.at_s >= 0.0 && push.at_s <= kLatest_s && std::abs(push.impulse_ns) <= kHardest_ns)) return {};
+  push.axis = axis == 'x' ? 0 : 1;
+  return push;
+}
+
 // Empty when the arguments are good, else one sentence. Completes the options.
 std::string complaint(ClimbArguments& a) {
   const StairParams& stairs = a.options.stairs;
@@ -130,6 +151,18 @@ std::string complaint(ClimbArguments& a) {
   }
   if (a.options.gait == "ss") return "The single-step gait (--gait ss) is not available yet: use --gait ds.";
   if (a.options.gait != "ds") return "--gait must be ds, not \"" + a.options.gait + "\".";
+  if (a.plant != "kinematic" && a.plant != "mujoco") {
+    return "--plant must be kinematic or mujoco, not \"" + a.plant + "\".";
+  }
+  a.options.plant = a.plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kKinematic;
+  if (!a.push.empty()) {
+    if (a.options.plant != PlantKind::kMujoco) return "--push needs --plant mujoco: the kinematic plant does not move.";
+    a.options.push = read_push(a.push);
+    if (!a.options.push) {
+      return "--push must be a time from 0 to 1000 s, x or y and up to 100 N s, as in 12.5,x,10, not \"" + a.push +
+             "\".";
+    }
+  }
   if (a.noise != "white" && a.noise != "correlated") {
     return "--noise must be white or correlated, not \"" + a.noise + "\".";
   }

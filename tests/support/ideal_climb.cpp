@@ -135,7 +135,10 @@ void IdealClimb::move() {
     const double reach = joint_limits(static_cast<Foot>(n / 6), n % 6).speed_radps * 0.002;
     q_[i] += math::clamp(gain * (active_[i] - q_[i]), -reach, reach);
   }
-  active_ = sent_;
+  for (std::size_t n = 0; n < kJointCount; ++n) {  // drives that know the rate do not lag on a ramp
+    const auto i = static_cast<Eigen::Index>(n);
+    active_[i] = sent_[i] + 0.010 * command_.joints[n].dq_radps;
+  }
   std::array<Transform, kFootCount> base_T_foot;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     base_T_foot[index_of(leg)] = base_T_sole({}, leg, leg_joints(q_ - setup_.encoder_offset_rad, leg));
@@ -166,6 +169,24 @@ void IdealClimb::move() {
   }
 }
 
+// Mass points on a straight line through the centre of mass; accelerations over 40 ms, since commands follow in steps.
+void IdealClimb::measure_zmp() {
+  if (gait_.status().phase != GaitPhase::kSwing) return com_m_.clear();
+  com_m_.push_back(true_T_base_ * centre_of_mass({}, {}, q_, JointVector::Zero()).base_p_com_m);
+  constexpr std::size_t kHalf = 10;
+  if (com_m_.size() <= 2 * kHalf) return;
+  const Vec3 &now = com_m_.back(), &middle = *(com_m_.end() - kHalf - 1), &then = *(com_m_.end() - 2 * kHalf - 1);
+  const Vec3 mps2 = (now - 2.0 * middle + then) / (kHalf * kTick_s * kHalf * kTick_s);
+  const Transform& stance = feet_[index_of(other(gait_.status().step.foot))].true_T_sole;
+  const double height_m = middle.z() - stance.p_m.z();
+  const Vec3 zmp_m{middle.x() - height_m / (kGravity_mps2 + mps2.z()) * mps2.x(),
+                   middle.y() - height_m / (kGravity_mps2 + mps2.z()) * mps2.y(), stance.p_m.z()};
+  const Vec3 local_m = stance.inverse() * zmp_m;
+  const SoleRectangle& sole = kContactRectangle;
+  record_.zmp_margin_m = std::min({record_.zmp_margin_m, local_m.x() - sole.heel_x_m, sole.toe_x_m - local_m.x(),
+                                   sole.half_width_m - std::abs(local_m.y())});
+}
+
 void IdealClimb::measure(const GaitStatus& before) {
   ClimbRecord& r = record_;
   const GaitStatus& now = gait_.status();
@@ -178,6 +199,7 @@ void IdealClimb::measure(const GaitStatus& before) {
     r.joint_margin_rad = std::min({r.joint_margin_rad, q - limits.min_rad, limits.max_rad - q});
     if (n % 6 == kKnee) r.knee_min_rad = std::min(r.knee_min_rad, q);
   }
+  measure_zmp();
   const Staircase& stairs = setup_.stairs;
   if (now.phase == GaitPhase::kSwing) {
     const std::size_t f = index_of(now.step.foot), s = 1 - f;
@@ -202,10 +224,6 @@ void IdealClimb::measure(const GaitStatus& before) {
           now.step.onto_tread && std::abs(toe.x() - stairs.riser_x_m(k)) < 0.004 && toe.z() > stairs.top_m(k) - 0.02;
       if (ahead) r.crossing_m = std::min(r.crossing_m, toe.z() - stairs.top_m(k));
     }
-    const Vec3 base_in_foot = feet_[s].true_T_sole.inverse() * true_T_base_.p_m;
-    r.com_margin_m = std::min(
-        {r.com_margin_m, base_in_foot.x() - kContactRectangle.heel_x_m, kContactRectangle.toe_x_m - base_in_foot.x()});
-    r.lateral_off_m = std::max(r.lateral_off_m, std::abs(base_in_foot.y()));
     const Vec3 desired = (now.odom_T_sole_desired[s].inverse() * now.odom_T_sole_desired[f]).p_m;
     const Vec3 actual = (feet_[s].true_T_sole.inverse() * sole).p_m;
     r.swing_tracking_m = std::max(r.swing_tracking_m, (desired - actual).norm());

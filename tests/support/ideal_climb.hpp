@@ -44,8 +44,7 @@ struct ClimbRecord {
   double penetration_m = -1e9;  // deepest point of a swinging foot's collision box in the stairs
   double crossing_m = 1e9;      // least height of the toe's edge over the nosing it crosses
   double toe_gap_m = 1e9;       // least, of standing toes before the first riser
-  double com_margin_m = 1e9;    // base inside the stance foot's contact rectangle while it stands alone
-  double lateral_off_m = 0.0;   // and from its middle line
+  double zmp_margin_m = 1e9;    // of the true zero-moment point in the stance foot's contact rectangle, on one foot
   double execution_m = 0.0;     // latched against executed along the ground, greatest
   double execution_z_m = 0.0;
   double swing_tracking_m = 0.0;       // desired against true, relative to the stance foot
@@ -74,6 +73,7 @@ class IdealClimb {
   [[nodiscard]] const ClimbRecord& record() const { return record_; }
   [[nodiscard]] const Transform& true_T_base() const { return true_T_base_; }
   [[nodiscard]] const Transform& true_T_sole(Foot f) const { return feet_[index_of(f)].true_T_sole; }
+  [[nodiscard]] const JointVector& q_rad() const { return q_; }
   [[nodiscard]] bool touches(Foot f) const { return feet_[index_of(f)].anchored; }
   [[nodiscard]] int tick_count() const { return record_.ticks; }
 
@@ -88,6 +88,7 @@ class IdealClimb {
   void sense();
   void move();
   void measure(const GaitStatus& before);
+  void measure_zmp();
   [[nodiscard]] FootholdSet search() const;
   double noise();
 
@@ -104,6 +105,7 @@ class IdealClimb {
   JointFeedback feedback_;
   std::array<std::array<double, kFootCount>, 4> force_history_{};
   Transform odom_T_true_;
+  std::vector<Vec3> com_m_;  // true, of the single support so far
   std::uint64_t random_ = 88172645463325252ULL;
 };
 

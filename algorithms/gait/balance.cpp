@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/balance.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace polygmap {
+
+void Balance::reset() noexcept {
+  stabiliser_.reset();
+  share_ = {0.5, 0.5};
+  odom_p_com_planned_m_.setZero();
+  com_error_m_.setZero();
+}
+
+JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
+                                const Body& body, double tick_s) noexcept {
+  const Mat3& R = body.odom_T_base.R;
+  const CentreOfMass com = centre_of_mass(geometry, params.masses, body.q_rad, body.dq_radps);
+  const Vec3 odom_p_com_m = body.odom_T_base * com.base_p_com_m;
+  const Vec3 odom_v_com_mps =
+      body.odom_v_base_mps + R * (com.base_v_com_mps + body.base_w_base_radps.cross(com.base_p_com_m));
+
+  Support support;
+  support.stands = reference.stands;
+  Vec3 odom_p_plan_m = Vec3::Zero();
+  double ground_m = 0.0;
+  const double standing = reference.stands[0] && reference.stands[1] ? 2.0 : 1.0;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const std::size_t f = index_of(leg);
+    support.odom_T_sole[f] = body.odom_T_base * base_T_sole(geometry, leg, leg_joints(body.q_rad, leg));
+    if (!reference.stands[f]) continue;
+    odom_p_plan_m += (support.odom_T_sole[f].p_m - reference.plan_T_sole[f].p_m) / standing;
+  }
+  for (std::size_t f = 0; f < kFootCount; ++f) ground_m += share_[f] * support.odom_T_sole[f].p_m.z();
+
+  constexpr double kLeastHeight_m = 0.3;  // a falling robot still gets finite numbers
+  const double height_m = std::max(odom_p_com_m.z() - ground_m, kLeastHeight_m);
+  const PerLink& links_mps2 = reference.links.plan_mps2;
+  double lift_n = params.masses.torso.mass_kg * links_mps2.torso.z();
+  for (const auto& leg : links_mps2.leg) {
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) lift_n += params.masses.leg[j].mass_kg * leg[j].z();
+  }
+  const double up_mps2 = kGravity_mps2 + lift_n / params.masses.total_kg();
+  const double omega_radps = math::sqrt(up_mps2 / height_m);
+  HorizontalMotion planned = reference.com;
+  planned.position_m += odom_p_plan_m.head<2>();
+  odom_p_com_planned_m_ = planned.position_m;
+  com_error_m_ = planned.position_m - odom_p_com_m.head<2>();
+  const Vec2 zmp_m =
+      stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(), omega_radps, tick_s);
+  // Legs that swing turn the body: the ground's force passes beside the centre of mass by as much as that takes.
+  PerLink odom_p_links_m = base_p_links_m(geometry, params.masses, body.q_rad);
+  odom_p_links_m.torso = R * odom_p_links_m.torso;
+  for (auto& leg : odom_p_links_m.leg) {
+    for (Vec3& link : leg) link = R * link;
+  }
+  const Vec3 turning_nm = angular_momentum_rate_nm(params.masses, odom_p_links_m, links_mps2);
+  const double vertical_n = params.masses.total_kg() * up_mps2;
+  const Vec2 beside_m{-turning_nm.y() / vertical_n, turning_nm.x() / vertical_n};
+  const Vec2 slope = (odom_p_com_m.head<2>() - zmp_m) / height_m;
+  const Pressure pressure =
+      distribute(support, params.pressure,
+                 {odom_p_com_m.x() + beside_m.x(), odom_p_com_m.y() + beside_m.y(), odom_p_com_m.z()}, slope);
+  share_ = pressure.share;
+
+  // The force that the clamped centres of pressure can give.
+  const Vec2 given = (odom_p_com_m.head<2>() + beside_m - pressure.zmp_m.head<2>()) / height_m;
+  const Vec3 force_n{vertical_n * given.x(), vertical_n * given.y(), vertical_n};
+  JointVector torque_nm;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const SoleWrench ground = sole_wrench(pressure, support, leg, force_n, R);
+    std::array<Vec3, kJointsPerLeg> specific_mps2;
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      specific_mps2[j] = R.transpose() * (Vec3{0, 0, -kGravity_mps2} - links_mps2.leg[index_of(leg)][j]);
+    }
+    torque_nm.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
+        leg_torques_nm(geometry, params.masses, leg, leg_joints(body.q_rad, leg), specific_mps2, ground);
+  }
+  return torque_nm + params.armature_kgm2 * reference.links.joint_radps2;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// From where the centre of mass should be and where it is to torques of the drives: feedback of the divergent component
+// of motion, a ground force through the centre of mass, its split over the standing soles, the legs' statics.
+#pragma once
+
+#include "algorithms/gait/dcm_stabiliser.hpp"
+#include "algorithms/gait/link_motion.hpp"
+#include "algorithms/gait/wrench_distribution.hpp"
+
+namespace polygmap {
+
+class Balance {
+ public:
+  struct Params {
+    DcmStabiliser::Params dcm;
+    PressureLimits pressure;
+    MassModel masses;
+    double armature_kgm2 = 0.05;  // of a drive, seen at its joint
+  };
+  struct Reference {  // plan frame
+    HorizontalMotion com;
+    LinkMotion::Acceleration links;
+    std::array<Transform, kFootCount> plan_T_sole;
+    std::array<bool, kFootCount> stands{true, true};
+  };
+  struct Body {  // as estimated
+    Transform odom_T_base;
+    Vec3 odom_v_base_mps = Vec3::Zero();
+    Vec3 base_w_base_radps = Vec3::Zero();
+    JointVector q_rad = JointVector::Zero();
+    JointVector dq_radps = JointVector::Zero();
+  };
+
+  void reset() noexcept;
+  // One tick. The plan frame is laid on the estimate by the standing soles: an error of the base is what is fed back.
+  [[nodiscard]] JointVector torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
+                                       const Body& body, double tick_s) noexcept;
+  // Of the last tick, horizontal: the planned centre of mass, and how far ahead of the estimated one it is.
+  [[nodiscard]] const Vec2& odom_p_com_planned_m() const noexcept { return odom_p_com_planned_m_; }
+  [[nodiscard]] const Vec2& com_error_m() const noexcept { return com_error_m_; }
+
+ private:
+  DcmStabiliser stabiliser_;
+  std::array<double, kFootCount> share_{0.5, 0.5};
+  Vec2 odom_p_com_planned_m_ = Vec2::Zero();
+  Vec2 com_error_m_ = Vec2::Zero();
+};
+
+}  // namespace polygmap

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+// Plan of the centre of mass, feedback, split of the ground's force, torques: each by itself.
+#include "algorithms/gait/balance.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "algorithms/gait/com_plan.hpp"
+
+namespace polygmap {
+namespace {
+
+JointVector bent_q_rad() {
+  JointVector q;
+  q << 0.05, 0.1, -0.5, 0.9, -0.4, -0.03, -0.04, -0.1, -0.3, 0.7, -0.35, 0.06;
+  return q;
+}
+
+ZmpKnots knots(std::initializer_list<ZmpKnot> list) {
+  ZmpKnots result;
+  for (const ZmpKnot& knot : list) EXPECT_TRUE(result.try_push_back(knot));
+  return result;
+}
+
+// Two steps to the left and on.
+const ZmpKnots kWalk = knots({{75, {0, 0}}, {355, {0.1, 0.09}}, {850, {0.1, 0.09}}, {1130, {0.35, -0.09}}});
+
+TEST(ComPlan, FromRest_StartsAndEndsAtRestAndKeepsThePendulumsLaw) {
+  ComPlan plan;
+  plan.plan({}, {}, kWalk);
+  EXPECT_LT(plan.at(0).position_m.norm() + plan.at(0).velocity_mps.norm(), 1e-12);
+  EXPECT_LT((plan.at(4000).position_m - Vec2(0.35, -0.09)).norm(), 1e-6);
+  EXPECT_LT(plan.at(4000).velocity_mps.norm(), 1e-6);
+  const double w = ComPlan::Params{}.omega_radps;
+  for (int tick = 1; tick < 3000; ++tick) {
+    const HorizontalMotion before = plan.at(tick - 1), now = plan.at(tick), after = plan.at(tick + 1);
+    // Speeds are those of the positions, accelerations those of the pendulum over the zero-moment point.
+    EXPECT_LT(((after.position_m - before.position_m) / (2 * kTick_s) - now.velocity_mps).norm(), 1e-4) << tick;
+    EXPECT_LT((now.acceleration_mps2 - w * w * (now.position_m - plan.zmp_m(tick))).norm(), 1e-9) << tick;
+    EXPECT_LT((after.acceleration_mps2 - now.acceleration_mps2).norm(), 0.06) << tick;  // no jump of the ZMP
+  }
+}
+
+TEST(ComPlan, AfterThePush_ZmpIsOnItsStraightWay) {
+  ComPlan plan;
+  plan.plan({}, {}, kWalk);
+  EXPECT_GT(plan.push_m(), 0.005);
+  EXPECT_LT((plan.zmp_m(200) - (200.0 - 75.0) / 280.0 * Vec2(0.1, 0.09)).norm(), 1e-12);
+  EXPECT_EQ(plan.zmp_m(600), Vec2(0.1, 0.09));
+}
+
+TEST(ComPlan, MadeAgainOnItsWay_NeedsNoPush) {
+  ComPlan plan;
+  plan.plan({}, {}, kWalk);
+  ComPlan again;
+  again.plan({}, plan.at(400), knots({{450, {0.1, 0.09}}, {730, {0.35, -0.09}}}));
+  EXPECT_LT(again.push_m(), 1e-9);
+  EXPECT_LT((again.at(300).position_m - plan.at(700).position_m).norm(), 1e-9);
+}
+
+TEST(ComPlan, InMotion_ComesToRest) {
+  ComPlan plan;
+  const HorizontalMotion moving{{0.1, 0.0}, {0.2, -0.1}, {0.3, 0.1}};
+  plan.plan({}, moving, knots({{200, {0.12, 0.01}}}));
+  EXPECT_LT((plan.at(0).velocity_mps - moving.velocity_mps).norm(), 1e-9);
+  EXPECT_LT((plan.at(0).acceleration_mps2 - moving.acceleration_mps2).norm(), 1e-9);
+  EXPECT_LT((plan.at(3000).position_m - Vec2(0.12, 0.01)).norm(), 1e-6);
+}
+
+TEST(DcmStabiliser, PendulumOffItsPlace_ReturnsAndWithoutFeedbackFalls) {
+  for (const double gain : {2.0, 0.0}) {
+    DcmStabiliser::Params params;
+    params.gain = gain;
+    DcmStabiliser stabiliser;
+    const double w = 3.5;
+    Vec2 x{0.01, -0.02}, v = Vec2::Zero();
+    for (int tick = 0; tick < 1500; ++tick) {
+      const Vec2 zmp = stabiliser.zmp_m(params, {}, x, v, w, kTick_s);
+      v += kTick_s * w * w * (x - zmp);
+      x += kTick_s * v;
+    }
+    EXPECT_EQ(x.norm() < 0.01, gain > 0.0) << gain << ": " << x.norm();
+  }
+}
+
+TEST(DcmStabiliser, LastingError_IntegralIsLimited) {
+  DcmStabiliser stabiliser;
+  Vec2 zmp = Vec2::Zero();
+  for (int tick = 0; tick < 100'000; ++tick) {
+    zmp = stabiliser.zmp_m({}, {}, Vec2(0.01, 0), Vec2::Zero(), 3.5, kTick_s);
+  }
+  EXPECT_NEAR(zmp.x(), 2.0 * 0.01 + 0.02, 1e-12);
+}
+
+Support standing(double left_z_m = 0.0) {
+  Support support;
+  support.odom_T_sole[0].p_m = {0.0, 0.1, left_z_m};
+  support.odom_T_sole[1].p_m = {0.0, -0.1, 0.0};
+  return support;
+}
+
+TEST(WrenchDistribution, ForceBetweenTheSoles_IsSharedByPlace) {
+  const Pressure middle = distribute(standing(), {}, {0, 0, 0.8}, Vec2::Zero());
+  EXPECT_NEAR(middle.share[0], 0.5, 1e-12);
+  EXPECT_LT(middle.zmp_m.head<2>().norm(), 1e-12);
+  const Pressure left = distribute(standing(), {}, {0, 0.08, 0.8}, Vec2::Zero());
+  EXPECT_EQ(left.share[0], 1.0);  // 30 mm inward of the left sole's middle line it carries everything
+  EXPECT_NEAR(left.zmp_m.y(), 0.08, 1e-12);
+}
+
+TEST(WrenchDistribution, WrenchesOfBothSoles_AddUpToTheForceThroughTheCentreOfMass) {
+  const Support support = standing(0.13);
+  const Vec3 com_m{0.02, 0.03, 0.9};
+  const Vec2 slope{0.02, -0.03};
+  const Pressure pressure = distribute(support, {}, com_m, slope);
+  const Vec3 force_n{540 * slope.x(), 540 * slope.y(), 540};
+  Vec3 sum_n = Vec3::Zero(), moment_nm = Vec3::Zero();
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const SoleWrench wrench = sole_wrench(pressure, support, foot, force_n, Mat3::Identity());
+    sum_n += wrench.force_n;
+    moment_nm += wrench.moment_nm + (support.odom_T_sole[index_of(foot)].p_m - com_m).cross(wrench.force_n);
+  }
+  EXPECT_LT((sum_n - force_n).norm(), 1e-9);
+  EXPECT_LT(moment_nm.norm(), 1.0);  // feet at two heights: the line meets their connection within 2 mm
+}
+
+TEST(WrenchDistribution, ForceBeyondTheSole_StopsAtItsLimits) {
+  Support support = standing();
+  support.stands = {true, false};
+  const PressureLimits limits;
+  const Pressure far = distribute(support, limits, {0.3, 0.3, 0.8}, Vec2::Zero());
+  EXPECT_EQ(far.share[0], 1.0);
+  EXPECT_NEAR(far.zmp_m.x(), limits.ahead_m, 1e-12);
+  EXPECT_NEAR(far.zmp_m.y(), 0.1 + limits.aside_m, 1e-12);
+  const Pressure behind = distribute(support, limits, {-0.3, -0.3, 0.8}, Vec2::Zero());
+  EXPECT_NEAR(behind.zmp_m.x(), -limits.behind_m, 1e-12);
+  EXPECT_NEAR(behind.zmp_m.y(), 0.1 - limits.aside_m, 1e-12);
+}
+
+TEST(LegDynamics, CentreOfMassSpeed_IsItsDifference) {
+  const JointVector q = bent_q_rad();
+  for (int j = 0; j < 12; ++j) {
+    const JointVector dq = 1e-6 * JointVector::Unit(j);
+    const Vec3 difference =
+        centre_of_mass({}, {}, q + dq, dq).base_p_com_m - centre_of_mass({}, {}, q, dq).base_p_com_m;
+    EXPECT_LT((centre_of_mass({}, {}, q, dq).base_v_com_mps - difference).norm(), 1e-11) << j;
+  }
+}
+
+// Virtual work: torques hold the links' weights and the sole's wrench against any small motion of the joints.
+TEST(LegDynamics, Torques_DoTheWorkOfWeightsAndGround) {
+  const JointVector q = bent_q_rad();
+  const MassModel masses;
+  const Vec3 gravity{0.3, -0.2, -9.8};
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const SoleWrench ground{{20, -30, 250}, {5, -12, 3}};
+    std::array<Vec3, kJointsPerLeg> specific;
+    specific.fill(gravity);
+    const LegVector torque = leg_torques_nm({}, masses, leg, leg_joints(q, leg), specific, ground);
+    const LegJacobian jacobian = leg_jacobian({}, leg, leg_joints(q, leg));
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      const double step = 1e-6;
+      JointVector moved = q;
+      moved[static_cast<Eigen::Index>(joint_index(leg, j))] += step;
+      const PerLink before = base_p_links_m({}, masses, q), after = base_p_links_m({}, masses, moved);
+      double work = 0.0;
+      for (std::size_t l = 0; l < kJointsPerLeg; ++l) {
+        work += masses.leg[l].mass_kg * gravity.dot(after.leg[index_of(leg)][l] - before.leg[index_of(leg)][l]) / step;
+      }
+      const auto c = static_cast<Eigen::Index>(j);
+      work += ground.force_n.dot(jacobian.col(c).head<3>()) + ground.moment_nm.dot(jacobian.col(c).tail<3>());
+      EXPECT_NEAR(torque[c], -work, 1e-3) << j;
+    }
+  }
+}
+
+TEST(LinkMotion, EvenAcceleration_IsFoundAndForgottenAtARestart) {
+  LinkMotion motion;
+  const Vec3 a{1.0, -2.0, 0.5};
+  LinkMotion::Acceleration found;
+  for (int tick = 0; tick < 5; ++tick) {
+    const double t = tick * kTick_s;
+    found = motion.update({}, {}, {Mat3::Identity(), 0.5 * t * t * a}, bent_q_rad());
+    EXPECT_EQ(found.plan_mps2.torso.norm() > 0.0, tick >= 2);
+  }
+  EXPECT_LT((found.plan_mps2.torso - a).norm(), 1e-6);
+  EXPECT_LT((found.plan_mps2.leg[1][kKnee] - a).norm(), 1e-6);
+  // A body that moves as one does not turn.
+  EXPECT_LT(angular_momentum_rate_nm({}, base_p_links_m({}, {}, bent_q_rad()), found.plan_mps2).norm(), 1e-5);
+  motion.restart();
+  EXPECT_EQ(motion.update({}, {}, {}, bent_q_rad()).plan_mps2.torso.norm(), 0.0);
+}
+
+TEST(LinkMotion, SwingingFoot_TurnsTheBody) {
+  PerLink p = base_p_links_m({}, {}, JointVector::Zero()), a;
+  a.leg[0][kAnkleRoll] = {10.0, 0, 0};  // forward, far below the centre of mass
+  const MassModel masses;
+  const double lever_m =
+      p.leg[0][kAnkleRoll].z() - centre_of_mass({}, masses, JointVector::Zero(), JointVector::Zero()).base_p_com_m.z();
+  EXPECT_NEAR(angular_momentum_rate_nm(masses, p, a).y(), masses.leg[kAnkleRoll].mass_kg * 10.0 * lever_m, 1e-9);
+}
+
+}  // namespace
+}  // namespace polygmap

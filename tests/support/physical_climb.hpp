@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// The gait on the robot under physics, with every sensor's errors and the module's own estimator, and footholds read
+// from the true stairs: what perception adds is left out, so that a climb takes a second or two.
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+
+#include "algorithms/estimation/estimator.hpp"
+#include "algorithms/gait/gait.hpp"
+#include "sim_stub/sim_robot.hpp"
+
+namespace polygmap::sim {
+
+[[nodiscard]] inline SimOptions without_pictures(SimOptions options) {
+  options.plant_kind = PlantKind::kMujoco;
+  options.camera.silent = {{0, std::numeric_limits<std::int64_t>::max()}};
+  return options;
+}
+
+class PhysicalClimb {
+ public:
+  explicit PhysicalClimb(const SimOptions& options, const Gait::Params& gait = {}) : robot_(without_pictures(options)) {
+    estimator_.reset({});
+    gait_.reset(gait);
+  }
+
+  // One tick; false when the gait has ended or the robot fell.
+  bool tick() {
+    robot_.advance();
+    const std::int64_t now_ns = robot_.now_ns();
+    ImuSample imu;
+    while (robot_.try_read(imu)) estimator_.add_imu(imu, now_ns);
+    JointFeedback joints;
+    if (robot_.try_read(joints)) {
+      if (tamper) tamper(joints);
+      estimator_.add_joints(joints, now_ns);
+    }
+    LioSample lio;
+    while (robot_.try_read(lio)) estimator_.add_lio(lio, now_ns);
+    estimator_.tick(gait_.status().stands);
+    constexpr int kFrame_ticks = 16;
+    if (ticks_++ % kFrame_ticks == 0) {
+      footholds_ = search();
+      if (tamper_footholds) tamper_footholds(footholds_);
+    }
+    gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
+    (void)robot_.try_write(command_);
+    const GaitPhase phase = gait_.status().phase;
+    return phase != GaitPhase::kFinished && phase != GaitPhase::kStopped && !robot_.truth().fell;
+  }
+  void run(double limit_s) {
+    const double end_s = time_s() + limit_s;
+    while (time_s() < end_s && tick()) {
+    }
+  }
+
+  [[nodiscard]] const Truth& truth() const { return robot_.truth(); }
+  [[nodiscard]] const GaitStatus& status() const { return gait_.status(); }
+  [[nodiscard]] const StateEstimate& state() const { return estimator_.state(); }
+  [[nodiscard]] const JointCommand& command() const { return command_; }
+  [[nodiscard]] SimRobot& robot() { return robot_; }
+  [[nodiscard]] MujocoPlant& plant() { return dynamic_cast<MujocoPlant&>(robot_.plant()); }
+  [[nodiscard]] Gait& gait() { return gait_; }
+  [[nodiscard]] double time_s() const { return seconds(robot_.now_ns()); }
+
+  // May change what the module sees, after it was made.
+  std::function<void(JointFeedback&)> tamper;
+  std::function<void(FootholdSet&)> tamper_footholds;
+
+ private:
+  // What a map without errors would give at this moment.
+  [[nodiscard]] FootholdSet search() const {
+    const Truth& truth = robot_.truth();
+    const StateEstimate& state = estimator_.state();
+    // Seen from the base, as a camera sees it: legs and camera share an error of the attitude.
+    const Transform world_T_true = state.world_T_base() * truth.true_T_base.inverse();
+    FootholdSet set;
+    set.map_stamp_ns = state.stamp_ns - 40 * kNsPerMs;
+    set.obstruction = Obstruction::kNone;
+    double stance_m = -1e9;
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      if (gait_.status().stands[f]) stance_m = std::max(stance_m, truth.true_T_sole[f].p_m.z());
+    }
+    const auto& steps = robot_.stairs().steps;
+    std::size_t next = 0;
+    while (next < steps.size() && steps[next].height_m < stance_m + 0.04) ++next;
+    if (next == steps.size()) {
+      set.obstruction = Obstruction::kTop;
+      return set;
+    }
+    const Step& step = steps[next];
+    const double inset_m = std::min(0.5 * (step.back_x_m - step.nosing_x_m - 0.252), 0.014);
+    set.has_p_star = true;
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      Foothold& hold = set.p_star_feet[index_of(foot)];
+      hold.position_m = world_T_true * Vec3{step.nosing_x_m + inset_m - kContactRectangle.heel_x_m,
+                                            side_sign(foot) * kStanceHalfWidth_m, step.height_m};
+      hold.yaw_rad = yaw_of(world_T_true.R);
+      hold.polygon_id = static_cast<std::uint32_t>(next) + 10;
+      hold.last_seen_ns = set.map_stamp_ns;
+    }
+    set.p_star = set.p_star_feet[0];
+    set.tread.nosing_a_m = world_T_true * Vec3{step.nosing_x_m, 0.6, step.height_m};
+    set.tread.nosing_b_m = world_T_true * Vec3{step.nosing_x_m, -0.6, step.height_m};
+    set.measured_rise_m = step.height_m - stance_m;
+    return set;
+  }
+
+  SimRobot robot_;
+  Estimator estimator_;
+  Gait gait_;
+  JointCommand command_;
+  FootholdSet footholds_;
+  int ticks_ = 0;
+};
+
+}  // namespace polygmap::sim
