@@ -298,7 +298,7 @@ TEST_F(PipelineAmongBoxes, FrameUnderExtraction_IsHeldUntilItsSurfacesAreOut) {
   show(2, 3, -0.1);
   const PerceptionLane& perception = module_.pipeline().perception();
   const std::int64_t before_ns = perception.surface_frame().stamp_ns;
-  feed(2, 3, -0.1);
+  feed(6, 8, -0.5);
   const std::int64_t fed_ns = clock_.now_ns();
   int held_ticks = 0;
   for (int i = 0; i < 100 && perception.surface_frame().stamp_ns == before_ns; ++i) {

@@ -147,7 +147,7 @@ void Odometry::count_innovations(const Step& step) noexcept {
 
 void Odometry::describe(std::int64_t now_ns, StateEstimate& state) const noexcept {
   state.odom_T_base = {attitude_.odom_R_base(), odom_p_base_m()};
-  state.odom_v_base_mps = attitude_.odom_v_base_mps();
+  state.odom_v_base_mps = soles_known_ ? base_.odom_v_base_mps() : attitude_.odom_v_base_mps();
   state.base_w_base_radps = base_w_base_radps_;
   state.world_T_odom = fusion_.world_T_odom();
   state.position_sigma_m = fusion_.position_sigma_m();

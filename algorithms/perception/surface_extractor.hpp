@@ -45,7 +45,7 @@ class SurfaceExtractor {
     PlaneFit::Params planes;
     EdgeLineFinder::Params edge_lines;
     double kind_tilt_rad = 0.21;  // a fitted plane within this of level is a tread, of upright a riser
-    double merge_m = 0.012;       // pieces whose planes are this close at each other's centre are one surface; large
+    double merge_m = 0.015;       // pieces whose planes are this close at each other's centre are one surface; large
                                   // ones where a run of one could join the other, too
     double merge_tilt_rad = 0.12;
     double small_plane_px = 4000.0;  // smaller planes' tilt is known half as well
