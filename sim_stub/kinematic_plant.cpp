@@ -98,7 +98,7 @@ void KinematicPlant::step(const JointCommand& command) {
     dq_.setZero();
     return;
   }
-  if (!accept_command(command_rad)) return;
+  if (!accept_command(command_rad, rate_radps)) return;
   move_joints(command_rad, rate_radps);
   update_leg_kinematics();
   transfer_load();
@@ -109,11 +109,16 @@ void KinematicPlant::step(const JointCommand& command) {
   check_falls();
 }
 
-bool KinematicPlant::accept_command(const JointVector& command_rad) {
+bool KinematicPlant::accept_command(const JointVector& command_rad, const JointVector& rate_radps) {
   for (std::size_t j = 0; j < kJointCount; ++j) {
     const double q = command_rad[static_cast<Eigen::Index>(j)];
     const std::size_t foot = j / kJointsPerLeg, joint = j % kJointsPerLeg;
     const JointLimits limits = joint_limits(static_cast<Foot>(foot), joint);
+    const double rate = rate_radps[static_cast<Eigen::Index>(j)];
+    if (!std::isfinite(rate)) {
+      fall("The rate commanded to %s leg joint %zu is not finite (%g).", name_of(foot), joint, rate);
+      return false;
+    }
     if (!std::isfinite(q)) {
       fall("The command of %s leg joint %zu is not finite (%g).", name_of(foot), joint, q);
       return false;

@@ -70,7 +70,7 @@ class KinematicPlant final : public Plant {
     double gap_m = 0.0;    // KinematicPlant::gap_m() as usual while standing
     double raise_m = 0.0;  // above that
   };
-  [[nodiscard]] bool accept_command(const JointVector& command_rad);
+  [[nodiscard]] bool accept_command(const JointVector& command_rad, const JointVector& rate_radps);
   void move_joints(const JointVector& command_rad, const JointVector& rate_radps);
   void update_leg_kinematics();
   void transfer_load();

@@ -8,8 +8,8 @@
 
 namespace polygmap::sim {
 
-// Bodies "base", "left_1".."right_6" (one per joint, in the order of LegJoint), geoms "floor" and "step_K" (0-based,
-// one or two of each).
+// Bodies "base", "left_1".."right_6" (one per joint, in the order of LegJoint), geoms "floor" and "solid_K", the boxes
+// of stair_solids().
 [[nodiscard]] std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& world,
                                        const RobotErrors& errors);
 

@@ -89,6 +89,7 @@ void MujocoPlant::step(const JointCommand& command) {
   }
   read_contacts();
   mj_kinematics(model_.get(), data_.get());  // mj_step leaves poses one step behind
+  mj_comPos(model_.get(), data_.get());
   read_state();
   check_falls();
 }

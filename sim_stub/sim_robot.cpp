@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_stub/sim_robot.hpp"
 
+#include <cmath>
 #include <limits>
 
 #include "sim_stub/counter_noise.hpp"
@@ -79,8 +80,8 @@ SimRobot::SimRobot(const SimOptions& options)
 void SimRobot::advance() {
   clock_.advance();
   if (push_) {
-    const double since_s = seconds(clock_.now_ns()) - push_->at_s;
-    const bool pushes = since_s >= 0.0 && since_s < Push::kDuration_s;
+    const std::int64_t since_ns = clock_.now_ns() - std::llround(push_->at_s * kNsPerS);
+    const bool pushes = since_ns >= 0 && since_ns < std::llround(Push::kDuration_s * kNsPerS);
     plant_->push(pushes ? Vec3(push_->impulse_ns / Push::kDuration_s * Vec3::Unit(push_->axis)) : Vec3(Vec3::Zero()));
   }
   plant_->step(active_);

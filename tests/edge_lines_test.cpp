@@ -83,7 +83,7 @@ struct Bench {
 
 class NosingNoise : public ::testing::TestWithParam<bool> {};
 
-TEST_P(NosingNoise, EdgeLine_NosingAndBackLine_WithinThreeMillimetres) {
+TEST_P(NosingNoise, EdgeLine_NosingAndBackLine_WithinThreePointOneMillimetres) {
   for (const double nosing_m : {0.0, 0.02}) {
     Bench bench(nosing_m);
     for (std::uint32_t seed = 1; seed <= 3; ++seed) {

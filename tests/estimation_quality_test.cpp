@@ -150,6 +150,28 @@ TEST_F(EstimateQualityTest, FootSlipsThreeTenthsForAFifthOfASecond_PositionStays
   EXPECT_GT(walk_errors(spec, careless).worst_m, 0.020);
 }
 
+TEST_F(EstimateQualityTest, Climb_VelocityErrors_AreWithinThreeOfTheirSigmas) {
+  constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 4;
+  double ticks = 0.0, within = 0.0, squares = 0.0;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    WalkSpec spec;
+    spec.seed = seed;
+    spec.steps = 4;
+    run(spec, {}, false, [&](const SyntheticWalk& walk, std::int64_t t_ns) {
+      const StateEstimate& state = estimator_.state();
+      const Vec3 v_mps =
+          (walk.truth(t_ns + kNsPerMs).true_T_base.p_m - walk.truth(t_ns - kNsPerMs).true_T_base.p_m) / 2e-3;
+      const Vec3 true_v_mps = walk.truth(t_ns).true_T_base.R * state.odom_T_base.R.transpose() * state.odom_v_base_mps;
+      const Vec3 errors = (true_v_mps - v_mps).cwiseQuotient(state.velocity_sigma_mps);
+      ticks += 1.0;
+      squares += errors.squaredNorm();
+      within += errors.cwiseAbs().maxCoeff() <= 3.0 ? 1.0 : 0.0;
+    });
+  }
+  EXPECT_GT(within / ticks, 0.97);
+  EXPECT_GT(squares / ticks, 0.3);  // of 3: they mean something
+}
+
 TEST_F(EstimateQualityTest, NoSlip_VelocityIsAsGoodAsThatOfAFilterThatLetsNothingGo) {
   Estimator::Params careless;
   careless.motion.gain = 0.0;

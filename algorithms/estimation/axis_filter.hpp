@@ -34,18 +34,15 @@ class AxisFilter {
   }
 
   // Rows B_p_c of eqs (3)-(4): contact minus base, in world axes.
-  // These return the innovations' squares over their variances.
-  double correct_positions(const PerContact& relative_m, const PerContact& variance_m2) noexcept {
-    double squares = 0.0;
+  void correct_positions(const PerContact& relative_m, const PerContact& variance_m2) noexcept {
     for (std::size_t c = 0; c < kContactCount; ++c) {
       const int i = kFirstContact + static_cast<int>(c);
       const State PHt = P_.col(i) - P_.col(kPosition);
-      squares += correct(PHt, PHt[i] - PHt[kPosition] + variance_m2[c], relative_m[c] - (x_[i] - x_[kPosition]));
+      (void)correct(PHt, PHt[i] - PHt[kPosition] + variance_m2[c], relative_m[c] - (x_[i] - x_[kPosition]));
     }
-    return squares;
   }
   // Rows B_v_c: a standing contact moves against the base at minus the base's velocity. All eight observe this one
-  // number, so their mean by information is the same update.
+  // number, so their mean by information is the same update. Returns the innovation's square over its variance.
   double correct_velocities(const PerContact& relative_mps, const PerContact& variance_m2ps2) noexcept {
     double information = 0.0, weighted = 0.0;
     for (std::size_t c = 0; c < kContactCount; ++c) {
@@ -55,7 +52,8 @@ class AxisFilter {
     const State PHt = P_.col(kVelocity);
     return correct(PHt, PHt[kVelocity] + 1.0 / information, weighted / information - x_[kVelocity]);
   }
-  // Rows h_c, of the vertical axis. A negative variance: nothing known of that contact's height.
+  // Rows h_c, of the vertical axis. A negative variance: nothing known of that contact's height. Returns the sum of the
+  // innovations' squares over their variances.
   double correct_heights(const PerContact& height_m, const PerContact& variance_m2) noexcept {
     double squares = 0.0;
     for (std::size_t c = 0; c < kContactCount; ++c) {
@@ -69,6 +67,7 @@ class AxisFilter {
 
   [[nodiscard]] double position_m() const noexcept { return x_[kPosition]; }
   [[nodiscard]] double velocity_mps() const noexcept { return x_[kVelocity]; }
+  [[nodiscard]] double velocity_sigma_mps() const noexcept { return math::sqrt(P_(kVelocity, kVelocity)); }
   [[nodiscard]] double contact_m(std::size_t contact) const noexcept {
     return x_[kFirstContact + static_cast<int>(contact)];
   }
@@ -77,7 +76,7 @@ class AxisFilter {
  private:
   enum Index : int { kPosition, kVelocity, kFirstContact };
 
-  // By value: the caller's column is about to change.
+  // By value: the caller's column is about to change. Returns the innovation's square over its variance.
   double correct(const State PHt, double innovation_variance, double innovation) noexcept {
     if (!(innovation_variance > 0.0)) return 0.0;  // no measurement could be as sure as that
     const double inverse = 1.0 / innovation_variance;

@@ -27,7 +27,7 @@ class NoiseLevel {
     time_s_ = std::min(time_s_ + dt_s, params_.memory_s);
     const double usual = math::square(sigma_);
     const double seen = std::min(square, kMostRatio * usual);
-    sigma_ = math::clamp(math::sqrt(usual + dt_s / time_s_ * (seen - usual)), params_.min, params_.max);
+    sigma_ = math::clamp(math::sqrt(usual + std::min(dt_s / time_s_, 1.0) * (seen - usual)), params_.min, params_.max);
   }
   [[nodiscard]] double sigma() const noexcept { return sigma_; }
 

@@ -145,24 +145,38 @@ void Odometry::count_innovations(const Step& step) noexcept {
   take(MeasurementGroup::kTreadHeight, base_.height_rows());
 }
 
+// Of the velocity that is published; the attitude filter's own is the least that any can have.
+Vec3 Odometry::velocity_sigma_mps() const noexcept {
+  Vec3 sigma_mps = covariance_.diagonal().segment<3>(kVelocity).cwiseSqrt();
+  for (int i = 0; i < 3 && soles_known_; ++i) {
+    sigma_mps[i] = std::max(sigma_mps[i], base_.axis(static_cast<std::size_t>(i)).velocity_sigma_mps());
+  }
+  return sigma_mps;
+}
+
 void Odometry::describe(std::int64_t now_ns, StateEstimate& state) const noexcept {
   state.odom_T_base = {attitude_.odom_R_base(), odom_p_base_m()};
   state.odom_v_base_mps = soles_known_ ? base_.odom_v_base_mps() : attitude_.odom_v_base_mps();
   state.base_w_base_radps = base_w_base_radps_;
   state.world_T_odom = fusion_.world_T_odom();
   state.position_sigma_m = fusion_.position_sigma_m();
-  state.velocity_sigma_mps = covariance_.diagonal().segment<3>(kVelocity).cwiseSqrt();
+  state.velocity_sigma_mps = velocity_sigma_mps();
   state.yaw_sigma_rad = fusion_.yaw_sigma_rad();
   state.tilt_sigma_rad = attitude_.tilt_sigma_rad();
   state.lio_age_ns = fusion_.last_accepted_ns() < 0 ? -1 : now_ns - fusion_.last_accepted_ns();
   for (std::size_t foot = 0; foot < kFootCount; ++foot) state.contact_probability[foot] = contacts_[foot].probability;
 }
 
-// The attitude filter's correlations, with the fusion's sigmas for what LIO corrects.
+// The attitude filter's correlations, with the fusion's sigmas for what LIO corrects and those of the published
+// velocity.
 void Odometry::describe(std::int64_t now_ns, EstimateQuality& quality) const noexcept {
   quality.stamp_ns = now_ns;
   Eigen::Matrix<double, 9, 1> scale = Eigen::Matrix<double, 9, 1>::Ones();
-  for (int i = 0; i < 3; ++i) scale[i] = fusion_.position_sigma_m()[i] / math::sqrt(covariance_(i, i));
+  const Vec3 velocity_sigma = velocity_sigma_mps();
+  for (int i = 0; i < 3; ++i) {
+    scale[i] = fusion_.position_sigma_m()[i] / math::sqrt(covariance_(i, i));
+    scale[kVelocity + i] = velocity_sigma[i] / math::sqrt(covariance_(kVelocity + i, kVelocity + i));
+  }
   scale[kYaw] = fusion_.yaw_sigma_rad() / math::sqrt(covariance_(kYaw, kYaw));
   for (int j = 0; j < 9; ++j) {
     for (int i = 0; i < 9; ++i) quality.covariance(i, j) = scale[i] * scale[j] * covariance_(i, j);

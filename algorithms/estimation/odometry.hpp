@@ -77,6 +77,7 @@ class Odometry {
   void bridge(double gap_s) noexcept;
   void take_legs(const Legs& legs) noexcept;
   void count_innovations(const Step& step) noexcept;
+  [[nodiscard]] Vec3 velocity_sigma_mps() const noexcept;
   [[nodiscard]] Vec3 odom_p_base_m() const noexcept {
     return soles_known_ ? base_.odom_p_base_m() : attitude_.odom_p_base_m();
   }

@@ -107,6 +107,7 @@ LioVerdict OdometryFusion::fuse(const LioSample& sample, const Transform& odom_T
 void OdometryFusion::rebase(const Transform& new_T_old) noexcept {
   world_T_lio_ = new_T_old * fused_world_T_odom_.inverse() * world_T_lio_;
   fused_world_T_odom_ = {};
+  last_lio_T_odom_ = last_lio_T_odom_ * new_T_old.inverse();
   uncertainty_.rebase(new_T_old);
   jumped_count_ = 0;
 }

@@ -41,7 +41,8 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   for (const auto& leg : links_mps2.leg) {
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) lift_n += params.masses.leg[j].mass_kg * leg[j].z();
   }
-  const double up_mps2 = kGravity_mps2 + lift_n / params.masses.total_kg();
+  constexpr double kLeastUp_mps2 = 0.2 * kGravity_mps2;  // no plan falls freely
+  const double up_mps2 = std::max(kGravity_mps2 + lift_n / params.masses.total_kg(), kLeastUp_mps2);
   const double omega_radps = math::sqrt(up_mps2 / height_m);
   HorizontalMotion planned = reference.com;
   planned.position_m += odom_p_plan_m.head<2>();

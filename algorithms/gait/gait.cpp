@@ -2,6 +2,7 @@
 #include "algorithms/gait/gait.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace polygmap {
 namespace {
@@ -21,6 +22,7 @@ void Gait::reset(const Params& params) noexcept {
   planner_.reset(params.planner);
   correction_.reset();
   balance_.reset();
+  link_acceleration_ = {};
   status_ = {};
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
@@ -119,7 +121,8 @@ void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback
   const JointVector torque_nm = balance_.torques_nm(params_.balance, params_.geometry, reference, body, kTick_s);
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const double limit_nm = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg).torque_nm;
-    command.joints[n].tau_ff_nm = math::clamp(torque_nm[static_cast<Eigen::Index>(n)], -limit_nm, limit_nm);
+    const double wanted_nm = torque_nm[static_cast<Eigen::Index>(n)];
+    command.joints[n].tau_ff_nm = std::isfinite(wanted_nm) ? math::clamp(wanted_nm, -limit_nm, limit_nm) : 0.0;
   }
 }
 

@@ -104,7 +104,7 @@ void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const no
   interval.bottom = static_cast<std::int16_t>(cut(interval.bottom, -1));
 }
 
-void SurfaceBoundaries::try_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
+void SurfaceBoundaries::weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
                                   ColumnSpan& claimed) const noexcept {
   const Line line = line_of(planes_[candidate.plane].plane, column);
   // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
@@ -163,7 +163,7 @@ void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::siz
       candidate.plane = plane;
       candidate.top = static_cast<std::int16_t>(top);
       candidate.bottom = static_cast<std::int16_t>(bottom);
-      try_claim(column, candidate, most, claimed);
+      weigh_claim(column, candidate, most, claimed);
     };
     if (any_beside) {
       for (const ColumnSpan& other : columns_[static_cast<std::size_t>(beside)]) {

@@ -122,7 +122,7 @@ class SurfaceBoundaries {
   [[nodiscard]] Offset offset(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
   void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
   // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
-  void try_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
+  void weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
                  ColumnSpan& claimed) const noexcept;
   // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
   struct Strip {

@@ -72,7 +72,7 @@ double invalid_share(const FramePicture& picture, const PolygonVertices& polygon
   std::int32_t free = 0, valid = 0;
   for (std::int32_t r = first_row; r <= last_row; ++r) {
     const Reach& row = reach[static_cast<std::size_t>(r)];
-    // Columns whose middles, at 2 g + 0.5, lie within.
+    // Columns whose middles, at 4 g + 1.5 in steps of two pixels, lie within.
     const auto left =
         static_cast<std::int32_t>(std::ceil(math::clamp((row.left + 0.5) / (0.5 * kColumn_px) - 0.5, 0.0, kColumns)));
     const auto right = static_cast<std::int32_t>(
