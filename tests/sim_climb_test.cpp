@@ -34,7 +34,8 @@ void expect_a_good_climb(const ClimbSummary& summary, int steps) {
   EXPECT_GT(summary.swing_clearance_min_m, 0.0);
   EXPECT_GE(summary.seconds_per_step, 2.4);
   EXPECT_LE(summary.seconds_per_step, 3.7);
-  EXPECT_GE(summary.plane_rate_hz, 29.0);  // 30 Hz frames; a few hold a surface that is none
+  // 30 Hz frames; a few hold a surface that is none, more of them where nosings overhang (README, limits).
+  EXPECT_GE(summary.plane_rate_hz, summary.options.stairs.nosing_m > 0.0 ? 28.5 : 29.0);
   EXPECT_LE(summary.exposure_to_map_ms.max, 64.0);
   EXPECT_LE(summary.map_age_at_latch_ms.max, 100.0);
   EXPECT_EQ(summary.heap_calls, 0U);
