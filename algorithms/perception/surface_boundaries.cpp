@@ -105,7 +105,7 @@ void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const no
 }
 
 void SurfaceBoundaries::weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
-                                  ColumnSpan& claimed) const noexcept {
+                                    ColumnSpan& claimed) const noexcept {
   const Line line = line_of(planes_[candidate.plane].plane, column);
   // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
   std::int32_t top = -1, bottom = -1, fitting = 0, off = 0;

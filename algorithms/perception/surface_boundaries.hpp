@@ -123,7 +123,7 @@ class SurfaceBoundaries {
   void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
   // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
   void weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
-                 ColumnSpan& claimed) const noexcept;
+                   ColumnSpan& claimed) const noexcept;
   // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
   struct Strip {
     std::array<std::int16_t, kRefitColumns> top{}, bottom{};

@@ -156,7 +156,8 @@ std::string complaint(ClimbArguments& a) {
   }
   a.options.plant = a.plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kKinematic;
   if (!a.push.empty()) {
-    if (a.options.plant != PlantKind::kMujoco) return "--push needs --plant mujoco: forces do not move the kinematic plant.";
+    if (a.options.plant != PlantKind::kMujoco)
+      return "--push needs --plant mujoco: forces do not move the kinematic plant.";
     a.options.push = read_push(a.push);
     if (!a.options.push) {
       return "--push must be a time from 0 to 1000 s, x or y and up to 100 N s, as in 12.5,x,10, not \"" + a.push +
