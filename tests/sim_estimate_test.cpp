@@ -498,6 +498,9 @@ TEST_F(EstimateCommand, BadLogs_AreNamedInOneSentenceWithTheirLine) {
   const std::string backwards = std::string(kLioHeader) + "100.1,100.2,0,0,0,1,0,0,0\n100.2,100.1,0,0,0,1,0,0,0\n";
   expect_refused({"estimate", at("log.csv"), "--lio", write("lio.csv", backwards)}, "line 3: arrival_s");
   expect_refused({"estimate", at("log.csv"), "--lidar-mount", "0", "0", "0", "0", "0", "0"}, "--lio");
+  expect_refused({"estimate", at("log.csv"), "--csv", at("log.csv")}, "would be overwritten");
+  expect_refused({"estimate", at("log.csv"), "--lio", at("lio.csv"), "--json", folder_ + "/./lio.csv"}, "overwritten");
+  expect_refused({"estimate", at("log.csv"), "--csv", at("one.out"), "--json", at("one.out")}, "overwritten");
   expect_refused({"estimate", at("log.csv"), "--lio-tau", "2"}, "--lio-tau is of no use");
 }
 

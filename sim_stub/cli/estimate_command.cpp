@@ -4,7 +4,9 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <ostream>
+#include <set>
 
 #include "sim_stub/camera_profile.hpp"
 #include "sim_stub/cli/climb_command.hpp"
@@ -16,6 +18,13 @@ namespace {
 constexpr double kMaxMount_m = 10.0, kMaxAngle_deg = 360.0, kMaxTau_s = 1000.0;
 
 std::string complaint(const EstimateArguments& a) {
+  std::set<std::string> taken;  // nothing that is read, and nothing written for another option, is overwritten
+  for (const std::string& file : {a.log, a.lio, a.json, a.csv}) {
+    if (file.empty()) continue;
+    std::error_code error;
+    const bool fresh = taken.insert(std::filesystem::weakly_canonical(file, error).string()).second;
+    if (!fresh && (file == a.json || file == a.csv)) return "\"" + file + "\" would be overwritten.";
+  }
   for (std::size_t i = 0; i < a.lidar_mount.size(); ++i) {
     const double limit = i < 3 ? kMaxMount_m : kMaxAngle_deg;
     if (!(std::abs(a.lidar_mount[i]) <= limit)) {
@@ -42,6 +51,17 @@ ReplayOptions options_of(const EstimateArguments& a) {
   return options;
 }
 
+// What a user must know before trusting the rest.
+void print_lio(const Replay& replay, std::size_t poses, std::ostream& out) {
+  const auto count = [&replay](LioVerdict verdict) { return replay.lio[static_cast<std::size_t>(verdict)]; };
+  const ReplayTick& last = replay.ticks.back();
+  out << "LIO: " << count(LioVerdict::kAccepted) + count(LioVerdict::kRealigned) << " of " << poses
+      << " poses accepted; " << count(LioVerdict::kJump) << " too far from the odometry, " << count(LioVerdict::kTooOld)
+      << " too old, " << count(LioVerdict::kFuture) << " of the future, " << replay.lio_not_arrived << " not arrived";
+  if (last.lio_age_ns >= 0) out << "; the last one is " << 1e-9 * static_cast<double>(last.lio_age_ns) << " s old";
+  out << "\n";
+}
+
 void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
   char line[224];
   std::snprintf(line, sizeof line, "%zu rows, %.3f s; start: %s; feet's noise %.2f mm\n", log.rows.size(),
@@ -49,6 +69,10 @@ void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
   out << line;
   if (replay.rows_without_contact == log.rows.size()) {
     out << "No foot ever stands (contact of 0.5 or more): this is dead reckoning by the IMU alone.\n";
+  }
+  if (replay.imu_invalid > 0) {
+    out << replay.imu_invalid
+        << " rows of the IMU are beyond what the module takes for true (rad/s? m/s^2?): not felt.\n";
   }
   if (!log.has_truth) {
     out << "No truth columns: nothing is scored.\n";
@@ -110,6 +134,7 @@ int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& er
     if (!a.json.empty()) write_estimate_json(a.json, log, lio, result);
     if (!a.csv.empty()) write_estimate_csv(a.csv, log, result);
     print(log, result, out);
+    if (!a.lio.empty()) print_lio(result, lio.size(), out);
   } catch (const std::exception& error) {
     err << "polygmap: " << error.what() << "\n";
     return kExitUsage;
