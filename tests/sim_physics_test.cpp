@@ -202,7 +202,7 @@ TEST(PhysicalClimb, WithoutFeedbackOfTheDcm_Falls) {
   EXPECT_TRUE(climb.truth().fell);
 }
 
-// Ticks until both feet stand still after the gait ended; false when it fell.
+// Runs on for for_s after the gait ended: upright, on both feet, its centre of mass at rest where planned.
 bool stands_for(PhysicalClimb& climb, double for_s) {
   const double end_s = climb.time_s() + for_s;
   while (climb.time_s() < end_s && !climb.truth().fell) (void)climb.tick();

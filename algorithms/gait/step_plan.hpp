@@ -121,7 +121,7 @@ struct StepCheck {
 class StepProof {
  public:
   void begin(const LegGeometry& geometry, const StepParams& params, const StepKnots& knots) noexcept;
-  // Up to `count` knots; true when all are done. A knot costs two leg solutions, about 3 us on one x86 core.
+  // Up to `count` knots; true when all are done. A knot costs two leg solutions and a centre of mass.
   bool advance(std::int32_t count) noexcept;
   [[nodiscard]] const StepCheck& check() const noexcept { return check_; }
   [[nodiscard]] const StepKnots& knots() const noexcept { return knots_; }

@@ -75,7 +75,7 @@ class SurfaceExtractor {
   };
 
   // One unit is a row of 80 columns through reduction and segmentation, or as much work (its cost:
-  // firmware/schedule.hpp). A staircase takes about 2,900; with every capacity full a frame takes at most
+  // firmware/schedule.hpp). With every capacity full a frame takes at most
   // kMaxUnitsPerFrame. No piece is larger than kMaxPieceUnits.
   static constexpr std::int32_t kMaxPieceUnits = 40;
   static constexpr std::int32_t kMaxUnitsPerFrame = 12000;
