@@ -169,6 +169,23 @@ TEST(StepSearch, RisesAndTreadsOfTheStairs_LegsCanDoAllOfThem) {
   }
 }
 
+// The leg left behind on the lower tread: with a level sole its ankle runs out of range.
+TEST(StepProof, TrailingSwingWithALevelSole_MeetsTheAnklesLimitThatAPitchedOneKeepsOff) {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  StepPlan plan = stair_step(StepKind::kTrailing, 0.17, 0.28, soles, from);
+  const auto ankle_margin_rad = [&](double toe_down_rad) {
+    plan.shape.toe_down_rad = toe_down_rad;
+    const StepKnots knots({}, {}, plan, from, soles);
+    StepProof proof;
+    proof.begin({}, {}, knots);
+    EXPECT_TRUE(proof.advance(knots.count()));
+    return proof.check().joint_margin_rad;
+  };
+  EXPECT_LT(ankle_margin_rad(0.0), 0.0);
+  EXPECT_GT(ankle_margin_rad(kToeDown_rad[0]), StepParams{}.joint_margin_rad);
+}
+
 TEST(StepSearch, RiseBeyondTheLegs_IsImpossibleBeforeTheFirstLiftOff) {
   for (const double rise : {0.30, 0.5}) {
     std::array<Transform, kFootCount> soles;

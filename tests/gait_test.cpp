@@ -135,6 +135,34 @@ TEST(GaitClimb, StairsNearerThanMapped_NeverTouchesARiser) {
   EXPECT_LT(climb.record().penetration_m, 0.002);
 }
 
+// Times are integer ticks: summed up, they would make it another climb, or one sample that leaps.
+TEST(GaitClimb, ClockAWeekOn_SamePlanBitForBit) {
+  ClimbSetup setup;
+  IdealClimb now(setup);
+  setup.clock_ns = 7 * 24 * 3600 * kNsPerS;
+  IdealClimb later(setup);
+  while (now.tick()) {
+    ASSERT_TRUE(later.tick());
+    ASSERT_EQ(now.q_rad(), later.q_rad()) << now.tick_count();
+  }
+  EXPECT_EQ(now.status().phase, GaitPhase::kFinished);
+}
+TEST(TorsoTrajectory, EveryDuration_HeightHasNoLeapBetweenTwoTicks) {
+  for (std::int32_t ticks = 1; ticks <= 1000; ++ticks) {
+    const auto from = TorsoTrajectory::at_rest({Mat3::Identity(), Vec3{0, 0, 0.70}});
+    TorsoTrajectory torso;
+    torso.plan(from, 0.83, 0.0, ticks, ticks);
+    const double most_mps2 = 5.78 * 0.13 / math::square(ticks * kTick_s);  // of a quintic between two rests
+    for (std::int32_t tick = 0; tick <= ticks; ++tick) {
+      const Motion z = torso.at(tick, {})[2];
+      ASSERT_LE(std::abs(z.acceleration), most_mps2) << tick << " of " << ticks;
+      ASSERT_GE(z.position, 0.70 - 1e-12);
+      ASSERT_LE(z.position, 0.83 + 1e-12);
+    }
+    EXPECT_NEAR(torso.at(ticks, {})[2].position, 0.83, 1e-12);
+  }
+}
+
 TEST(GaitLatch, FootholdsMoveInMidSwing_TargetStaysFrozen) {
   IdealClimb climb({});
   bool in_swing = false;

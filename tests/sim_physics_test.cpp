@@ -134,6 +134,25 @@ TEST(MujocoPlant, FootDroppedOnATread_StandsAtItsHeight) {
   EXPECT_NEAR(lowest_m, 0.10, 2e-3);
 }
 
+// The sole's box carries on what is left on the tread; soles of points would slip off its nosing.
+TEST(MujocoPlant, HeelHangs15mmOverTheNosing_StandsStill) {
+  Body body;
+  constexpr double kSole_x_m = -0.02;
+  const double nosing_x_m = kSole_x_m + kContactRectangle.heel_x_m + 0.015;
+  body.world.steps = {{nosing_x_m, nosing_x_m, 2.0, 0.10}};
+  body.q_rad = Body::home(kNominalBaseHeight_m);
+  const Transform sole{Mat3::Identity(), Vec3{kSole_x_m, kStanceHalfWidth_m, 0.105 - kNominalBaseHeight_m}};
+  body.q_rad.head<6>() = solve_leg({}, Foot::kLeft, sole).q_rad;
+  MujocoPlant plant(body.params, body.world, body.errors, {Mat3::Identity(), Vec3{0, -0.6, 0}}, body.q_rad);
+  for (int tick = 0; tick < 500; ++tick) plant.step(body.hold());
+  ASSERT_TRUE(plant.in_contact(0));
+  const Vec3 landed_m = plant.true_T_sole(0).p_m;
+  for (int tick = 0; tick < 1500; ++tick) plant.step(body.hold());
+  EXPECT_FALSE(plant.fell()) << plant.fall_reason();
+  EXPECT_TRUE(plant.in_contact(0));
+  EXPECT_LT((plant.true_T_sole(0).p_m - landed_m).norm(), 0.002);
+}
+
 TEST(MujocoPlant, Drive_SaturatesAtItsTorqueLimit) {
   Body body;
   const auto plant = body.stand();

@@ -55,14 +55,14 @@ double IdealClimb::noise() {  // about normal, sigma 1
 }
 
 void IdealClimb::sense() {
-  const std::int64_t now_ns = record_.ticks * 2 * kNsPerMs;
+  const std::int64_t now_ns = setup_.clock_ns + record_.ticks * 2 * kNsPerMs;
   state_.stamp_ns = state_.oldest_input_ns = now_ns;
   state_.initialised = record_.ticks > 250;
   const Mat3 tilt = rotation_y(setup_.estimate_tilt_rad) * rotation_x(setup_.estimate_tilt_rad);
   state_.odom_T_base = odom_T_true_ * true_T_base_;
   state_.odom_T_base.R = state_.odom_T_base.R * tilt;
   for (int i = 0; i < 3; ++i) state_.odom_T_base.p_m[i] += setup_.estimate_noise_m * noise();
-  const double drift_m = setup_.world_drift_mps * seconds(now_ns);
+  const double drift_m = setup_.world_drift_mps * seconds(now_ns - setup_.clock_ns);
   state_.world_T_odom = {rotation_z(0.4), Vec3{1.0 + drift_m, 2.0 - drift_m, 0.05}};
   state_.q_rad = q_;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {

@@ -34,6 +34,7 @@ struct ClimbSetup {
   double world_drift_mps = 0.0;                          // the LIO offset wanders that fast
   JointVector encoder_offset_rad = JointVector::Zero();  // reading minus true angle
   double foothold_noise_m = 0.0;                         // white, of every search
+  std::int64_t clock_ns = 0;                             // at the first tick
 };
 
 struct ClimbRecord {
