@@ -38,15 +38,16 @@ struct Body {
   // Stiff drives and what the links weigh, half of it on each sole.
   [[nodiscard]] JointCommand hold() const {
     JointCommand command;
-    const CentreOfMass com = centre_of_mass({}, {}, q_rad, JointVector::Zero());
+    const BodyFrames frames = body_frames({}, q_rad);
+    const Vec3 base_p_com = base_p_com_m({}, frames);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const LegVector q = leg_joints(q_rad, foot);
       const Vec3 force_n{0, 0, 0.5 * kWeight_n};
-      const Vec3 from_sole_m = com.base_p_com_m - base_T_sole({}, foot, q).p_m;
+      const Vec3 from_sole_m = base_p_com - base_T_sole({}, foot, q).p_m;
       const SoleWrench ground{force_n, Vec3{0, -from_sole_m.x() * force_n.z(), 0}};
       std::array<Vec3, kJointsPerLeg> gravity_mps2;
       gravity_mps2.fill({0, 0, -kGravity_mps2});
-      const LegVector tau = leg_torques_nm({}, {}, foot, q, gravity_mps2, ground);
+      const LegVector tau = leg_torques_nm({}, foot, frames[index_of(foot)], gravity_mps2, ground);
       for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
         const auto i = static_cast<Eigen::Index>(j);
         command.joints[joint_index(foot, j)] = {q[i], 0.0, tau[i], 1000.0, 30.0};
@@ -68,8 +69,8 @@ TEST(MujocoPlant, Biped_Weighs55kgAsTheModuleBelieves) {
 TEST(MujocoPlant, CentreOfMass_IsWhereTheModuleComputesIt) {
   Body body;
   const auto plant = body.stand();
-  const CentreOfMass com = centre_of_mass({}, {}, body.q_rad, JointVector::Zero());
-  EXPECT_LT((plant->true_T_base() * com.base_p_com_m - plant->true_p_com_m()).norm(), 1e-6);
+  const Vec3 base_p_com = base_p_com_m({}, body_frames({}, body.q_rad));
+  EXPECT_LT((plant->true_T_base() * base_p_com - plant->true_p_com_m()).norm(), 1e-6);
 }
 
 TEST(MujocoPlant, HeldAtHomeWithGravityTorques_StandsStillForFiveSeconds) {

@@ -16,10 +16,12 @@ void Balance::reset() noexcept {
 JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
                                 const Body& body, double tick_s) noexcept {
   const Mat3& R = body.odom_T_base.R;
-  const CentreOfMass com = centre_of_mass(geometry, params.masses, body.q_rad, body.dq_radps);
-  const Vec3 odom_p_com_m = body.odom_T_base * com.base_p_com_m;
+  const BodyFrames frames = body_frames(geometry, body.q_rad);
+  const Vec3 base_p_com = base_p_com_m(params.masses, frames);
+  const Vec3 base_v_com = base_v_com_mps(params.masses, frames, body.dq_radps);
+  const Vec3 odom_p_com_m = body.odom_T_base * base_p_com;
   const Vec3 odom_v_com_mps =
-      body.odom_v_base_mps + R * (com.base_v_com_mps + body.base_w_base_radps.cross(com.base_p_com_m));
+      body.odom_v_base_mps + R * (base_v_com + body.base_w_base_radps.cross(base_p_com));
 
   Support support;
   support.stands = reference.stands;
@@ -28,7 +30,7 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   const double standing = reference.stands[0] && reference.stands[1] ? 2.0 : 1.0;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const std::size_t f = index_of(leg);
-    support.odom_T_sole[f] = body.odom_T_base * base_T_sole(geometry, leg, leg_joints(body.q_rad, leg));
+    support.odom_T_sole[f] = body.odom_T_base * frames[f].sole;
     if (!reference.stands[f]) continue;
     odom_p_plan_m += (support.odom_T_sole[f].p_m - reference.plan_T_sole[f].p_m) / standing;
   }
@@ -51,7 +53,7 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   const Vec2 zmp_m =
       stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(), omega_radps, tick_s);
   // Legs that swing turn the body: the ground's force passes beside the centre of mass by as much as that takes.
-  PerLink odom_p_links_m = base_p_links_m(geometry, params.masses, body.q_rad);
+  PerLink odom_p_links_m = base_p_links_m(params.masses, frames);
   odom_p_links_m.torso = R * odom_p_links_m.torso;
   for (auto& leg : odom_p_links_m.leg) {
     for (Vec3& link : leg) link = R * link;
@@ -76,7 +78,7 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
       specific_mps2[j] = R.transpose() * (Vec3{0, 0, -kGravity_mps2} - links_mps2.leg[index_of(leg)][j]);
     }
     torque_nm.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
-        leg_torques_nm(geometry, params.masses, leg, leg_joints(body.q_rad, leg), specific_mps2, ground);
+        leg_torques_nm(params.masses, leg, frames[index_of(leg)], specific_mps2, ground);
   }
   return torque_nm + params.armature_kgm2 * reference.links.joint_radps2;
 }

@@ -52,7 +52,7 @@ void Gait::carry_plan_to_odometry() noexcept {
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
   for (Transform& sole : plan_T_sole_) sole = odom_T_plan * sole;
   plan_T_base_ = odom_T_plan * plan_T_base_;
-  torso_state_ = TorsoTrajectory::placed(torso_state_, plan_T_base_, (plan_T_base_ * reference_com_m()).head<2>());
+  torso_state_ = TorsoTrajectory::placed(torso_state_, plan_T_base_, (plan_T_base_ * reference_p_com_m_).head<2>());
   link_motion_.carry(odom_T_plan);
   correction_.reset();
 }
@@ -62,24 +62,24 @@ void Gait::start(const StateEstimate& state) noexcept {
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     plan_T_sole_[index_of(leg)] = plan_T_base_ * joints_.base_T_sole_reference(leg);
   }
-  torso_state_ = TorsoTrajectory::placed({}, plan_T_base_, (plan_T_base_ * reference_com_m()).head<2>());
+  torso_state_ = TorsoTrajectory::placed({}, plan_T_base_, (plan_T_base_ * reference_p_com_m_).head<2>());
   nominal_rad_ = joints_.reference_rad();
+  nominal_p_com_m_ = reference_p_com_m_;
   link_motion_.restart();
   started_ = true;
   begin_hold();
 }
 
 // Of the posture last asked for, in the base.
-Vec3 Gait::reference_com_m() const noexcept {
-  return centre_of_mass(params_.geometry, params_.balance.masses, joints_.reference_rad(), JointVector::Zero())
-      .base_p_com_m;
+void Gait::observe_reference() noexcept {
+  reference_p_com_m_ = base_p_com_m(params_.balance.masses, body_frames(params_.geometry, joints_.reference_rad()));
 }
 
 // The horizontal part of the torso's trajectory is the centre of mass's: the base follows from the legs' places, one
 // tick old.
 Transform Gait::plan_T_base_over(const TorsoTrajectory::State& state) const noexcept {
   Transform base = TorsoTrajectory::pose(state);
-  base.p_m.head<2>() -= (base.R * reference_com_m()).head<2>();
+  base.p_m.head<2>() -= (base.R * reference_p_com_m_).head<2>();
   return base;
 }
 
@@ -90,18 +90,19 @@ void Gait::observe_links() noexcept {
   const bool swings = activity_ == Activity::kSwing || activity_ == Activity::kRetreat;
   if (swings) plan_T_sole[f] = swing_.at(motion_tick());
   Transform plan_T_base;
+  BodyFrames frames;
   const int passes = link_motion_.restarted() ? 4 : 1;  // the base follows the legs' places and they the base
   for (int i = 0; i < passes; ++i) {
-    const Vec3 base_p_com_m =
-        centre_of_mass(params_.geometry, params_.balance.masses, nominal_rad_, JointVector::Zero()).base_p_com_m;
     plan_T_base = TorsoTrajectory::pose(torso_state_);
-    plan_T_base.p_m.head<2>() -= (plan_T_base.R * base_p_com_m).head<2>();
+    plan_T_base.p_m.head<2>() -= (plan_T_base.R * nominal_p_com_m_).head<2>();
     for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
       const LegSolution s = solve_leg(params_.geometry, leg, plan_T_base.inverse() * plan_T_sole[index_of(leg)]);
       nominal_rad_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
     }
+    frames = body_frames(params_.geometry, nominal_rad_);
+    nominal_p_com_m_ = base_p_com_m(params_.balance.masses, frames);
   }
-  link_acceleration_ = link_motion_.update(params_.geometry, params_.balance.masses, plan_T_base, nominal_rad_);
+  link_acceleration_ = link_motion_.update(params_.balance.masses, plan_T_base, frames, nominal_rad_);
 }
 
 void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept {
@@ -133,7 +134,7 @@ void Gait::hold_upright(JointCommand& command) noexcept {
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     plan_T_sole_[index_of(leg)] = plan_T_base_ * joints_.base_T_sole_reference(leg);
   }
-  torso_state_ = TorsoTrajectory::placed({}, plan_T_base_, (plan_T_base_ * reference_com_m()).head<2>());
+  torso_state_ = TorsoTrajectory::placed({}, plan_T_base_, (plan_T_base_ * reference_p_com_m_).head<2>());
   add_torques({}, {}, command);
 }
 
@@ -394,8 +395,11 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   command.stamp_ns = now_ns;
   status_.stamp_ns = now_ns;
   // Without one good reading the drives get no stiffness: there is nothing safe to ask of them.
-  if (!armed_) armed_ = joints_.try_arm(params_.geometry, params_.joints, feedback.q_rad);
-  if (!armed_) return;
+  if (!armed_) {
+    armed_ = joints_.try_arm(params_.geometry, params_.joints, feedback.q_rad);
+    if (!armed_) return;
+    observe_reference();
+  }
   if (!started_) {
     hold_upright(command);
     if (state.initialised && usable(state)) start(state);
@@ -429,6 +433,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
 
   observe_links();
   if (joints_.follow(plan_T_base_, plan_T_sole_, status_.stands, command)) ++status_.ik_limited_ticks;
+  observe_reference();
   add_torques(state, feedback, command);
   status_.odom_p_com_desired_m = balance_.odom_p_com_planned_m();
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);

@@ -72,7 +72,7 @@ class Gait {
   void swing(const StateEstimate& state, const JointFeedback& feedback) noexcept;
   void retreat(const JointFeedback& feedback) noexcept;
 
-  [[nodiscard]] Vec3 reference_com_m() const noexcept;
+  void observe_reference() noexcept;
   void hold_upright(JointCommand& command) noexcept;
   [[nodiscard]] Transform plan_T_base_over(const TorsoTrajectory::State& state) const noexcept;
   void observe_links() noexcept;
@@ -103,6 +103,8 @@ class Gait {
   LinkMotion link_motion_;
   LinkMotion::Acceleration link_acceleration_;
   JointVector nominal_rad_ = JointVector::Zero();  // joint angles of the plan, without the steering
+  Vec3 nominal_p_com_m_ = Vec3::Zero();            // its centre of mass, base frame
+  Vec3 reference_p_com_m_ = Vec3::Zero();          // of the posture last asked for, likewise
   StepSearch search_;
   BaseCorrection correction_;
   TorsoTrajectory torso_;

@@ -19,7 +19,7 @@ class LinkMotion {
   // The plan goes on as it was, in another frame.
   void carry(const Transform& to_T_plan) noexcept;
   // One tick, planned posture. The result belongs to the tick before.
-  [[nodiscard]] Acceleration update(const LegGeometry& geometry, const MassModel& masses, const Transform& plan_T_base,
+  [[nodiscard]] Acceleration update(const MassModel& masses, const Transform& plan_T_base, const BodyFrames& frames,
                                     const JointVector& q_rad) noexcept;
 
  private:

@@ -114,8 +114,8 @@ void StepProof::begin(const LegGeometry& geometry, const StepParams& params, con
 
 bool StepProof::solve(std::int32_t i, const JointVector& before_rad, JointVector& q_rad) const noexcept {
   StepKnot knot = knots_[i];
-  const Vec3 base_p_com_m = centre_of_mass(geometry_, masses_, before_rad, JointVector::Zero()).base_p_com_m;
-  knot.odom_T_base.p_m.head<2>() -= (knot.odom_T_base.R * base_p_com_m).head<2>();
+  const Vec3 base_p_com = base_p_com_m(masses_, body_frames(geometry_, before_rad));
+  knot.odom_T_base.p_m.head<2>() -= (knot.odom_T_base.R * base_p_com).head<2>();
   const Transform base_T_odom = knot.odom_T_base.inverse();
   bool reachable = true;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {

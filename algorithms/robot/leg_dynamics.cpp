@@ -3,8 +3,6 @@
 
 #include <Eigen/Geometry>
 
-#include "algorithms/robot/leg_frames.hpp"
-
 namespace polygmap {
 namespace {
 
@@ -15,13 +13,20 @@ Vec3 base_p_link(const LegFrames& frames, const MassModel& masses, Foot leg, std
 
 }  // namespace
 
-CentreOfMass centre_of_mass(const LegGeometry& geometry, const MassModel& masses, const JointVector& q_rad,
-                            const JointVector& dq_radps) noexcept {
+Vec3 base_p_com_m(const MassModel& masses, const BodyFrames& frames) noexcept {
   Vec3 moment_kgm = masses.torso.mass_kg * masses.torso.centre_m;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      moment_kgm += masses.leg[j].mass_kg * base_p_link(frames[index_of(leg)], masses, leg, j);
+    }
+  }
+  return moment_kgm / masses.total_kg();
+}
+
+Vec3 base_v_com_mps(const MassModel& masses, const BodyFrames& frames, const JointVector& dq_radps) noexcept {
   Vec3 momentum = Vec3::Zero();
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    const LegFrames f = leg_frames(geometry, leg, leg_joints(q_rad, leg));
-    const LegVector dq = leg_joints(dq_radps, leg);
+    const LegFrames& f = frames[index_of(leg)];
     // From the sole upwards: every joint moves all that hangs on it.
     double hanging_kg = 0.0;
     Vec3 hanging_kgm = Vec3::Zero();
@@ -29,26 +34,25 @@ CentreOfMass centre_of_mass(const LegGeometry& geometry, const MassModel& masses
       hanging_kg += masses.leg[j].mass_kg;
       hanging_kgm += masses.leg[j].mass_kg * base_p_link(f, masses, leg, j);
       const Vec3 axis = f.joint[j].R.col(kJointAxis[j]);
-      momentum += dq[static_cast<Eigen::Index>(j)] * axis.cross(hanging_kgm - hanging_kg * f.joint[j].p_m);
+      const double dq = dq_radps[static_cast<Eigen::Index>(joint_index(leg, j))];
+      momentum += dq * axis.cross(hanging_kgm - hanging_kg * f.joint[j].p_m);
     }
-    moment_kgm += hanging_kgm;
   }
-  return {moment_kgm / masses.total_kg(), momentum / masses.total_kg()};
+  return momentum / masses.total_kg();
 }
 
-PerLink base_p_links_m(const LegGeometry& geometry, const MassModel& masses, const JointVector& q_rad) noexcept {
+PerLink base_p_links_m(const MassModel& masses, const BodyFrames& frames) noexcept {
   PerLink points;
   points.torso = masses.torso.centre_m;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    const LegFrames f = leg_frames(geometry, leg, leg_joints(q_rad, leg));
-    for (std::size_t j = 0; j < kJointsPerLeg; ++j) points.leg[index_of(leg)][j] = base_p_link(f, masses, leg, j);
+    const std::size_t f = index_of(leg);
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) points.leg[f][j] = base_p_link(frames[f], masses, leg, j);
   }
   return points;
 }
 
-LegVector leg_torques_nm(const LegGeometry& geometry, const MassModel& masses, Foot leg, const LegVector& q_rad,
+LegVector leg_torques_nm(const MassModel& masses, Foot leg, const LegFrames& f,
                          const std::array<Vec3, kJointsPerLeg>& specific_mps2, const SoleWrench& ground) noexcept {
-  const LegFrames f = leg_frames(geometry, leg, q_rad);
   LegVector torque_nm;
   Vec3 force_n = ground.force_n;  // on all that hangs on the joint, and its moment about the base's origin
   Vec3 moment_nm = ground.moment_nm + f.sole.p_m.cross(ground.force_n);

@@ -2,17 +2,14 @@
 // The links' weights: where the centre of mass is, how it moves, and what the drives must hold.
 #pragma once
 
-#include "algorithms/robot/leg_kinematics.hpp"
+#include "algorithms/robot/leg_frames.hpp"
 
 namespace polygmap {
 
-// Of the whole robot, base frame.
-struct CentreOfMass {
-  Vec3 base_p_com_m = Vec3::Zero();
-  Vec3 base_v_com_mps = Vec3::Zero();  // relative to the base, from the joint rates
-};
-[[nodiscard]] CentreOfMass centre_of_mass(const LegGeometry& geometry, const MassModel& masses,
-                                          const JointVector& q_rad, const JointVector& dq_radps) noexcept;
+// Centre of mass of the whole robot, base frame, and its velocity relative to the base from the joint rates.
+[[nodiscard]] Vec3 base_p_com_m(const MassModel& masses, const BodyFrames& frames) noexcept;
+[[nodiscard]] Vec3 base_v_com_mps(const MassModel& masses, const BodyFrames& frames,
+                                  const JointVector& dq_radps) noexcept;
 
 // What the ground does to a sole, at the sole frame's origin, base axes.
 struct SoleWrench {
@@ -28,13 +25,12 @@ struct PerLink {
   std::array<std::array<Vec3, kJointsPerLeg>, kFootCount> leg;
 };
 // Centres of all links, base frame.
-[[nodiscard]] PerLink base_p_links_m(const LegGeometry& geometry, const MassModel& masses,
-                                     const JointVector& q_rad) noexcept;
+[[nodiscard]] PerLink base_p_links_m(const MassModel& masses, const BodyFrames& frames) noexcept;
 
 // Drive torques of one leg whose links feel specific_mps2 (gravity minus each one's acceleration, base axes) while the
 // ground presses on its sole: the balance of every joint with all that hangs on it, links as points.
-[[nodiscard]] LegVector leg_torques_nm(const LegGeometry& geometry, const MassModel& masses, Foot leg,
-                                       const LegVector& q_rad, const std::array<Vec3, kJointsPerLeg>& specific_mps2,
+[[nodiscard]] LegVector leg_torques_nm(const MassModel& masses, Foot leg, const LegFrames& frames,
+                                       const std::array<Vec3, kJointsPerLeg>& specific_mps2,
                                        const SoleWrench& ground) noexcept;
 
 }  // namespace polygmap

@@ -13,6 +13,10 @@ struct LegFrames {
 };
 [[nodiscard]] LegFrames leg_frames(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept;
 
+// Of both legs: made once for a posture, then read by all that asks where its links are.
+using BodyFrames = std::array<LegFrames, kFootCount>;
+[[nodiscard]] BodyFrames body_frames(const LegGeometry& geometry, const JointVector& q_rad) noexcept;
+
 // The column of a joint frame's rotation about which that joint turns: x, y or z.
 inline constexpr std::array<int, kJointsPerLeg> kJointAxis{0, 2, 1, 1, 1, 0};
 

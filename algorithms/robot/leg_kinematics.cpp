@@ -11,18 +11,38 @@ namespace {
 
 Vec3 mirrored(const Vec3& left_m, Foot leg) noexcept { return {left_m.x(), side_sign(leg) * left_m.y(), left_m.z()}; }
 
+// R turned about one axis of its own: what a product with rotation_x, _y or _z gives, without the zeros.
+void turn(const Mat3& R, int axis, double angle_rad, Mat3& turned) noexcept {
+  const double c = math::cos(angle_rad), s = math::sin(angle_rad);
+  const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+  turned.col(axis) = R.col(axis);
+  turned.col(u) = R.col(u) * c + R.col(v) * s;
+  turned.col(v) = R.col(v) * c - R.col(u) * s;
+}
+
 }  // namespace
 
 LegFrames leg_frames(const LegGeometry& g, Foot leg, const LegVector& q) noexcept {
   LegFrames f;
+  const auto below = [](const Transform& joint, double length_m) -> Vec3 {
+    return joint.p_m - joint.R.col(2) * length_m;
+  };
   f.joint[kHipRoll] = Transform{rotation_x(q[kHipRoll]), mirrored(g.base_p_hip_m, leg)};
-  f.joint[kHipYaw] = f.joint[kHipRoll] * Transform{rotation_z(q[kHipYaw]), Vec3::Zero()};
-  f.joint[kHipPitch] = f.joint[kHipYaw] * Transform{rotation_y(q[kHipPitch]), mirrored(g.hip_p_hip_pitch_m, leg)};
-  f.joint[kKnee] = f.joint[kHipPitch] * Transform{rotation_y(q[kKnee]), Vec3{0, 0, -g.thigh_m}};
-  f.joint[kAnklePitch] = f.joint[kKnee] * Transform{rotation_y(q[kAnklePitch]), Vec3{0, 0, -g.shank_m}};
-  f.joint[kAnkleRoll] = f.joint[kAnklePitch] * Transform{rotation_x(q[kAnkleRoll]), Vec3::Zero()};
-  f.sole = f.joint[kAnkleRoll] * Transform{Mat3::Identity(), Vec3{0, 0, -g.ankle_to_sole_m}};
+  for (std::size_t j = kHipYaw; j < kJointsPerLeg; ++j) {
+    turn(f.joint[j - 1].R, kJointAxis[j], q[static_cast<Eigen::Index>(j)], f.joint[j].R);
+  }
+  f.joint[kHipYaw].p_m = f.joint[kHipRoll].p_m;
+  f.joint[kHipPitch].p_m = f.joint[kHipYaw] * mirrored(g.hip_p_hip_pitch_m, leg);
+  f.joint[kKnee].p_m = below(f.joint[kHipPitch], g.thigh_m);
+  f.joint[kAnklePitch].p_m = below(f.joint[kKnee], g.shank_m);
+  f.joint[kAnkleRoll].p_m = f.joint[kAnklePitch].p_m;
+  f.sole = {f.joint[kAnkleRoll].R, below(f.joint[kAnkleRoll], g.ankle_to_sole_m)};
   return f;
+}
+
+BodyFrames body_frames(const LegGeometry& geometry, const JointVector& q_rad) noexcept {
+  return {leg_frames(geometry, Foot::kLeft, leg_joints(q_rad, Foot::kLeft)),
+          leg_frames(geometry, Foot::kRight, leg_joints(q_rad, Foot::kRight))};
 }
 
 LegVector leg_joints(const JointVector& q_rad, Foot leg) noexcept {

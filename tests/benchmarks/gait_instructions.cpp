@@ -12,11 +12,11 @@ int main() {
   using namespace polygmap;
   using namespace polygmap::bench;
   const auto stair = std::make_unique<GaitStair>();
-  const auto gait = std::make_unique<Gait>(stair->start);
-  for (const GaitTick& tick : stair->ticks) (tick.swings ? stage_gait_swing_tick : stage_gait_shift_tick)(*gait, tick);
+  const auto bench = std::make_unique<GaitBench>(stair->start);
+  for (const GaitTick& tick : stair->ticks) (tick.swings ? stage_gait_swing_tick : stage_gait_shift_tick)(*bench, tick);
   const auto plan = std::make_unique<StairPlan>();
   stage_gait_plan(*plan);
-  if (const std::string_view wrong = complaint(*gait, *plan); !wrong.empty()) {
+  if (const std::string_view wrong = complaint(*bench, *plan); !wrong.empty()) {
     std::fprintf(stderr, "gait_instructions: %.*s\n", static_cast<int>(wrong.size()), wrong.data());
     return 1;
   }

@@ -21,7 +21,7 @@ GaitStair::GaitStair() {
     const bool swung = climb.status().phase == GaitPhase::kSwing;
     if (!recording && climb.status().treads_climbed == 1) {
       recording = true;
-      start = climb.gait();
+      start.gait = climb.gait();
     }
     if (!climb.tick()) break;
     if (!recording) continue;
@@ -44,19 +44,17 @@ StairPlan::StairPlan() {
   from = TorsoTrajectory::at_rest({rotation_z(middle.yaw_rad), middle.position_m});
 }
 
-std::string_view complaint(const Gait& end, const StairPlan& plan) {
-  if (end.status().treads_climbed != 2) return "the gait did not climb the stair";
+std::string_view complaint(const GaitBench& end, const StairPlan& plan) {
+  if (end.gait.status().treads_climbed != 2) return "the gait did not climb the stair";
   if (plan.search.state() != StepSearch::State::kFound) return "no plan of the stair";
   return {};
 }
 
-void stage_gait_swing_tick(Gait& gait, const GaitTick& tick) {
-  JointCommand command;
-  gait.tick(tick.now_ns, tick.state, tick.footholds, tick.feedback, command);
+void stage_gait_swing_tick(GaitBench& bench, const GaitTick& tick) {
+  bench.gait.tick(tick.now_ns, tick.state, tick.footholds, tick.feedback, bench.swinging);
 }
-void stage_gait_shift_tick(Gait& gait, const GaitTick& tick) {
-  JointCommand command;
-  gait.tick(tick.now_ns, tick.state, tick.footholds, tick.feedback, command);
+void stage_gait_shift_tick(GaitBench& bench, const GaitTick& tick) {
+  bench.gait.tick(tick.now_ns, tick.state, tick.footholds, tick.feedback, bench.shifting);
 }
 
 void stage_gait_plan(StairPlan& p) {

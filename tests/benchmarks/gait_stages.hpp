@@ -19,10 +19,14 @@ struct GaitTick {
   bool swings = false;  // before and after it: nothing is planned
 };
 
+struct GaitBench {
+  Gait gait;
+  JointCommand swinging, shifting;  // of either stage: two functions that do the same become one
+};
 // Both feet onto a tread, as an ideal climb does it: the gait as it was when the tread below was climbed.
 struct GaitStair {
   GaitStair();
-  Gait start;
+  GaitBench start;
   std::vector<GaitTick> ticks;
 };
 
@@ -40,10 +44,10 @@ struct StairPlan {
 };
 
 // What makes the stair, run through by `end`, useless as a benchmark; empty when nothing does.
-[[nodiscard]] std::string_view complaint(const Gait& end, const StairPlan& plan);
+[[nodiscard]] std::string_view complaint(const GaitBench& end, const StairPlan& plan);
 
-void stage_gait_swing_tick(Gait& gait, const GaitTick& tick);
-void stage_gait_shift_tick(Gait& gait, const GaitTick& tick);  // and of touch-down and lift-off: searches, plans
+void stage_gait_swing_tick(GaitBench& bench, const GaitTick& tick);
+void stage_gait_shift_tick(GaitBench& bench, const GaitTick& tick);  // and of touch-down and lift-off: searches, plans
 void stage_gait_plan(StairPlan& plan);
 
 }  // namespace polygmap::bench
