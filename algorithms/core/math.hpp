@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Linear algebra types and the scalar functions of the cycle. Transcendental functions are called only through here:
 // they are the C library's, which may round the last bit differently on another target, and this is the one place to
-// change that.
+// change that. (Rotations have sin_cos.hpp.)
 #pragma once
 
 #include <Eigen/Core>

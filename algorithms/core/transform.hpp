@@ -3,6 +3,7 @@
 #pragma once
 
 #include "algorithms/core/math.hpp"
+#include "algorithms/core/sin_cos.hpp"
 
 namespace polygmap {
 
@@ -18,16 +19,16 @@ struct Transform {
 };
 
 [[nodiscard]] inline Mat3 rotation_x(double angle_rad) noexcept {
-  const double c = math::cos(angle_rad), s = math::sin(angle_rad);
+  const auto [s, c] = math::sin_cos(angle_rad);
   return (Mat3() << 1, 0, 0, 0, c, -s, 0, s, c).finished();
 }
 [[nodiscard]] inline Mat3 rotation_y(double angle_rad) noexcept {
-  const double c = math::cos(angle_rad), s = math::sin(angle_rad);
+  const auto [s, c] = math::sin_cos(angle_rad);
   return (Mat3() << c, 0, s, 0, 1, 0, -s, 0, c).finished();
 }
 // The paper's R_z, eq. (31).
 [[nodiscard]] inline Mat3 rotation_z(double angle_rad) noexcept {
-  const double c = math::cos(angle_rad), s = math::sin(angle_rad);
+  const auto [s, c] = math::sin_cos(angle_rad);
   return (Mat3() << c, -s, 0, s, c, 0, 0, 0, 1).finished();
 }
 // Heading of the x axis in the horizontal plane, rad, in (-pi, pi].

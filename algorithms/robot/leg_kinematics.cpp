@@ -11,9 +11,12 @@ namespace {
 
 Vec3 mirrored(const Vec3& left_m, Foot leg) noexcept { return {left_m.x(), side_sign(leg) * left_m.y(), left_m.z()}; }
 
+// Of an angle in 0..pi whose cosine is that, or the cosine where that is the sine of one in +-pi/2.
+double sine(double cosine) noexcept { return math::sqrt(std::max(1.0 - cosine * cosine, 0.0)); }
+
 // R turned about one axis of its own: what a product with rotation_x, _y or _z gives, without the zeros.
 void turn(const Mat3& R, int axis, double angle_rad, Mat3& turned) noexcept {
-  const double c = math::cos(angle_rad), s = math::sin(angle_rad);
+  const auto [s, c] = math::sin_cos(angle_rad);
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
   turned.col(axis) = R.col(axis);
   turned.col(u) = R.col(u) * c + R.col(v) * s;
@@ -78,24 +81,32 @@ LegSolution solve_leg(const LegGeometry& g, Foot leg, const Transform& base_T_so
   const Vec3 base_p_ankle = base_T_sole * Vec3{0, 0, g.ankle_to_sole_m};
 
   // The hip seen from the foot: the ankle roll brings its y to minus the pitch joint's lateral offset.
-  const Vec3 foot_p_hip = base_T_sole.R.transpose() * (base_p_hip - base_p_ankle);
+  const Mat3& R = base_T_sole.R;
+  const Vec3 foot_p_hip = R.transpose() * (base_p_hip - base_p_ankle);
   const double radius = std::max(math::sqrt(math::square(foot_p_hip.y()) + math::square(foot_p_hip.z())), 1e-6);
-  const double offset = math::clamp(-hip_p_pitch.y() / radius, -1.0, 1.0);
+  const double offset = math::clamp(-hip_p_pitch.y() / radius, -1.0, 1.0), depth = sine(offset);
   q[kAnkleRoll] = math::wrap_angle(math::acos(offset) - math::atan2(foot_p_hip.z(), foot_p_hip.y()));
+  const double cos_roll = (offset * foot_p_hip.y() + depth * foot_p_hip.z()) / radius;
+  const double sin_roll = (depth * foot_p_hip.y() - offset * foot_p_hip.z()) / radius;
 
-  const Mat3 N = base_T_sole.R * rotation_x(-q[kAnkleRoll]);  // Rx(roll) Rz(yaw) Ry(sum of pitches)
-  q[kHipYaw] = math::asin(math::clamp(-N(0, 1), -1.0, 1.0));
-  q[kHipRoll] = math::atan2(N(2, 1), N(1, 1));
-  const double pitch_sum = math::atan2(N(0, 2), N(0, 0));
+  // N = R Rx(-roll) = Rx(hip roll) Rz(yaw) Ry(sum of pitches). Its second column is that of Rx Rz, too.
+  const Vec3 side = R.col(1) * cos_roll - R.col(2) * sin_roll;
+  const double sin_yaw = math::clamp(-side.x(), -1.0, 1.0), cos_yaw = std::max(sine(sin_yaw), 1e-9);
+  q[kHipYaw] = math::asin(sin_yaw);
+  q[kHipRoll] = math::atan2(side.z(), side.y());
+  const double pitch_sum = math::atan2(R(0, 1) * sin_roll + R(0, 2) * cos_roll, R(0, 0));
 
-  const Mat3 base_R_yaw = rotation_x(q[kHipRoll]) * rotation_z(q[kHipYaw]);
-  const Vec3 leg_vector = base_R_yaw.transpose() * (base_p_ankle - base_p_hip) - hip_p_pitch;
+  const Vec3 hip_p_ankle = base_p_ankle - base_p_hip;
+  const Vec3 down{0.0, -side.z() / cos_yaw, side.y() / cos_yaw};  // third column of Rx Rz
+  const Vec3 ahead = side.cross(down);
+  const Vec3 leg_vector{ahead.dot(hip_p_ankle) - hip_p_pitch.x(), 0.0, down.dot(hip_p_ankle) - hip_p_pitch.z()};
   const double length = math::sqrt(math::square(leg_vector.x()) + math::square(leg_vector.z()));
-  const double cos_knee =
+  const double asked =
       (length * length - g.thigh_m * g.thigh_m - g.shank_m * g.shank_m) / (2.0 * g.thigh_m * g.shank_m);
-  solution.reachable = cos_knee <= 1.0 && cos_knee >= -1.0;
-  q[kKnee] = math::acos(math::clamp(cos_knee, -1.0, 1.0));
-  const double bend = math::atan2(g.shank_m * math::sin(q[kKnee]), g.thigh_m + g.shank_m * math::cos(q[kKnee]));
+  const double cos_knee = math::clamp(asked, -1.0, 1.0);
+  solution.reachable = asked <= 1.0 && asked >= -1.0;
+  q[kKnee] = math::acos(cos_knee);
+  const double bend = math::atan2(g.shank_m * sine(cos_knee), g.thigh_m + g.shank_m * cos_knee);
   q[kHipPitch] = math::atan2(-leg_vector.x(), -leg_vector.z()) - bend;
   q[kAnklePitch] = math::wrap_angle(pitch_sum - q[kHipPitch] - q[kKnee]);
   return solution;
