@@ -23,7 +23,7 @@ RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
     errors.encoder_offset_rad[static_cast<Eigen::Index>(j)] = params.encoder_offset_rad * offsets.normal(j);
   }
   const Vec3 imu_rad = params.imu_mount_rad * CounterNoise(seed, Stream::kImuMount).normal3(0);
-  errors.base_R_imu = rotation_z(imu_rad.z()) * rotation_y(imu_rad.y()) * rotation_x(imu_rad.x());
+  errors.base_R_imu = rotation_zyx(imu_rad.z(), imu_rad.y(), imu_rad.x());
   errors.gyro_bias_radps = params.gyro_bias_radps * CounterNoise(seed, Stream::kGyroBias).normal3(0);
   errors.accel_bias_mps2 = params.accel_bias_mps2 * CounterNoise(seed, Stream::kAccelBias).normal3(0);
   errors.depth_scale =
@@ -32,9 +32,8 @@ RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
   const auto within = [&mount](std::uint64_t index, double half) { return mount.uniform(index, -half, half); };
   const double turn_rad = params.camera_mount_rad, shift_m = params.camera_mount_m;
   const Transform nominal = base_T_camera();
-  errors.base_T_camera = {
-      rotation_z(within(2, turn_rad)) * rotation_y(within(1, turn_rad)) * rotation_x(within(0, turn_rad)) * nominal.R,
-      nominal.p_m + Vec3{within(3, shift_m), within(4, shift_m), within(5, shift_m)}};
+  errors.base_T_camera = {rotation_zyx(within(2, turn_rad), within(1, turn_rad), within(0, turn_rad)) * nominal.R,
+                          nominal.p_m + Vec3{within(3, shift_m), within(4, shift_m), within(5, shift_m)}};
   errors.lio_T_true = {rotation_z(lio.uniform(0, -kPi, kPi)),
                        Vec3{lio.uniform(1, -5, 5), lio.uniform(2, -5, 5), lio.uniform(3, -1, 1)}};
   return errors;

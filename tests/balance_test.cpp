@@ -19,6 +19,8 @@ JointVector bent_q_rad() {
   return q;
 }
 
+PerLink links_m(const JointVector& q_rad) { return base_p_links_m({}, body_frames({}, q_rad)); }
+
 ZmpKnots knots(std::initializer_list<ZmpKnot> list) {
   ZmpKnots result;
   for (const ZmpKnot& knot : list) EXPECT_TRUE(result.try_push_back(knot));
@@ -144,9 +146,8 @@ TEST(LegDynamics, CentreOfMassSpeed_IsItsDifference) {
   const JointVector q = bent_q_rad();
   for (int j = 0; j < 12; ++j) {
     const JointVector dq = 1e-6 * JointVector::Unit(j);
-    const Vec3 difference =
-        base_p_com_m({}, body_frames({}, q + dq)) - base_p_com_m({}, body_frames({}, q));
-    EXPECT_LT((base_v_com_mps({}, body_frames({}, q), dq) - difference).norm(), 1e-11) << j;
+    const Vec3 difference = centre_of_mass_m({}, links_m(q + dq)) - centre_of_mass_m({}, links_m(q));
+    EXPECT_LT((base_v_com_mps({}, body_frames({}, q), links_m(q), dq) - difference).norm(), 1e-11) << j;
   }
 }
 
@@ -165,8 +166,7 @@ TEST(LegDynamics, Torques_DoTheWorkOfWeightsAndGround) {
       const double step = 1e-6;
       JointVector moved = q;
       moved[static_cast<Eigen::Index>(joint_index(leg, j))] += step;
-      const PerLink before = base_p_links_m(masses, body_frames({}, q)),
-                    after = base_p_links_m(masses, body_frames({}, moved));
+      const PerLink before = links_m(q), after = links_m(moved);
       double work = 0.0;
       for (std::size_t l = 0; l < kJointsPerLeg; ++l) {
         work += masses.leg[l].mass_kg * gravity.dot(after.leg[index_of(leg)][l] - before.leg[index_of(leg)][l]) / step;
@@ -184,23 +184,22 @@ TEST(LinkMotion, EvenAcceleration_IsFoundAndForgottenAtARestart) {
   LinkMotion::Acceleration found;
   for (int tick = 0; tick < 5; ++tick) {
     const double t = tick * kTick_s;
-    found = motion.update({}, {Mat3::Identity(), 0.5 * t * t * a}, body_frames({}, bent_q_rad()), bent_q_rad());
+    found = motion.update({Mat3::Identity(), 0.5 * t * t * a}, links_m(bent_q_rad()), bent_q_rad());
     EXPECT_EQ(found.plan_mps2.torso.norm() > 0.0, tick >= 2);
   }
   EXPECT_LT((found.plan_mps2.torso - a).norm(), 1e-6);
   EXPECT_LT((found.plan_mps2.leg[1][kKnee] - a).norm(), 1e-6);
   // A body that moves as one does not turn.
-  EXPECT_LT(angular_momentum_rate_nm({}, base_p_links_m({}, body_frames({}, bent_q_rad())), found.plan_mps2).norm(), 1e-5);
+  EXPECT_LT(angular_momentum_rate_nm({}, links_m(bent_q_rad()), found.plan_mps2).norm(), 1e-5);
   motion.restart();
-  EXPECT_EQ(motion.update({}, {}, body_frames({}, bent_q_rad()), bent_q_rad()).plan_mps2.torso.norm(), 0.0);
+  EXPECT_EQ(motion.update({}, links_m(bent_q_rad()), bent_q_rad()).plan_mps2.torso.norm(), 0.0);
 }
 
 TEST(LinkMotion, SwingingFoot_TurnsTheBody) {
-  PerLink p = base_p_links_m({}, body_frames({}, JointVector::Zero())), a;
+  PerLink p = links_m(JointVector::Zero()), a;
   a.leg[0][kAnkleRoll] = {10.0, 0, 0};  // forward, far below the centre of mass
   const MassModel masses;
-  const double lever_m =
-      p.leg[0][kAnkleRoll].z() - base_p_com_m(masses, body_frames({}, JointVector::Zero())).z();
+  const double lever_m = p.leg[0][kAnkleRoll].z() - centre_of_mass_m(masses, p).z();
   EXPECT_NEAR(angular_momentum_rate_nm(masses, p, a).y(), masses.leg[kAnkleRoll].mass_kg * 10.0 * lever_m, 1e-9);
 }
 

@@ -174,11 +174,13 @@ TEST(StepProof, TrailingSwingWithALevelSole_MeetsTheAnklesLimitThatAPitchedOneKe
   std::array<Transform, kFootCount> soles;
   TorsoTrajectory::State from;
   StepPlan plan = stair_step(StepKind::kTrailing, 0.17, 0.28, soles, from);
+  StepParams params;
+  params.joint_margin_rad = 0.0;
   const auto ankle_margin_rad = [&](double toe_down_rad) {
     plan.shape.toe_down_rad = toe_down_rad;
-    const StepKnots knots({}, {}, plan, from, soles);
+    const StepKnots knots({}, params, plan, from, soles);
     StepProof proof;
-    proof.begin({}, {}, knots);
+    proof.begin({}, params, knots);
     EXPECT_TRUE(proof.advance(knots.count()));
     return proof.check().joint_margin_rad;
   };

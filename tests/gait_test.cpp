@@ -539,7 +539,7 @@ TEST(GaitFinish, OnTop_StandsBetweenTheFeet) {
   climb.run(60.0);
   for (int i = 0; i < 500; ++i) climb.tick();
   const Vec3 middle = 0.5 * (climb.true_T_sole(Foot::kLeft).p_m + climb.true_T_sole(Foot::kRight).p_m);
-  const Vec3 base_p_com = base_p_com_m({}, body_frames({}, climb.q_rad()));
+  const Vec3 base_p_com = centre_of_mass_m({}, base_p_links_m({}, body_frames({}, climb.q_rad())));
   const Vec3 ahead_m{Gait::Params{}.step.zmp_ahead_m, 0, 0};
   EXPECT_LT((climb.true_T_base() * base_p_com - middle - ahead_m).head<2>().norm(), 0.005);
 }

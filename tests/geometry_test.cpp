@@ -5,6 +5,7 @@
 #include <random>
 
 #include "algorithms/core/sin_cos.hpp"
+#include "algorithms/core/transform.hpp"
 #include "algorithms/geometry/convex.hpp"
 #include "algorithms/geometry/oriented_rectangle.hpp"
 #include "algorithms/geometry/plane.hpp"
@@ -83,6 +84,16 @@ TEST(SinCos, QuarterTurns_AreExactAndSmallAnglesKeepTheirDigits) {
 TEST(SinCos, NoNumberOrHuge_LibraryAnswers) {
   EXPECT_TRUE(std::isnan(math::sin_cos(NAN).sin) && std::isnan(math::sin_cos(INFINITY).cos));
   EXPECT_EQ(math::sin_cos(1e6).sin, std::sin(1e6));
+}
+
+TEST(RotationZyx, RandomAngles_IsTheProductOfThree) {
+  std::mt19937 random(4);
+  Uniform angle(-4.0, 4.0);
+  for (int i = 0; i < 1000; ++i) {
+    const double yaw = angle(random), pitch = angle(random), roll = angle(random);
+    const Mat3 product = rotation_z(yaw) * rotation_y(pitch) * rotation_x(roll);
+    EXPECT_LT((rotation_zyx(yaw, pitch, roll) - product).cwiseAbs().maxCoeff(), 1e-15);
+  }
 }
 
 TEST(ConvexHullEq15, RandomPoints_AgainstBruteForce_SameEdgesAndAllInside) {

@@ -39,7 +39,7 @@ struct Body {
   [[nodiscard]] JointCommand hold() const {
     JointCommand command;
     const BodyFrames frames = body_frames({}, q_rad);
-    const Vec3 base_p_com = base_p_com_m({}, frames);
+    const Vec3 base_p_com = centre_of_mass_m({}, base_p_links_m({}, frames));
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const LegVector q = leg_joints(q_rad, foot);
       const Vec3 force_n{0, 0, 0.5 * kWeight_n};
@@ -69,7 +69,7 @@ TEST(MujocoPlant, Biped_Weighs55kgAsTheModuleBelieves) {
 TEST(MujocoPlant, CentreOfMass_IsWhereTheModuleComputesIt) {
   Body body;
   const auto plant = body.stand();
-  const Vec3 base_p_com = base_p_com_m({}, body_frames({}, body.q_rad));
+  const Vec3 base_p_com = centre_of_mass_m({}, base_p_links_m({}, body_frames({}, body.q_rad)));
   EXPECT_LT((plant->true_T_base() * base_p_com - plant->true_p_com_m()).norm(), 1e-6);
 }
 

@@ -31,6 +31,15 @@ struct Transform {
   const auto [s, c] = math::sin_cos(angle_rad);
   return (Mat3() << c, -s, 0, s, c, 0, 0, 0, 1).finished();
 }
+// R_z R_y R_x: yaw, then pitch, then roll of the turned axes.
+[[nodiscard]] inline Mat3 rotation_zyx(double yaw_rad, double pitch_rad, double roll_rad) noexcept {
+  const math::SinCos z = math::sin_cos(yaw_rad), y = math::sin_cos(pitch_rad), x = math::sin_cos(roll_rad);
+  Mat3 R;
+  R.col(0) << z.cos * y.cos, z.sin * y.cos, -y.sin;
+  R.col(1) << z.cos * y.sin * x.sin - z.sin * x.cos, z.sin * y.sin * x.sin + z.cos * x.cos, y.cos * x.sin;
+  R.col(2) << z.cos * y.sin * x.cos + z.sin * x.sin, z.sin * y.sin * x.cos - z.cos * x.sin, y.cos * x.cos;
+  return R;
+}
 // Heading of the x axis in the horizontal plane, rad, in (-pi, pi].
 [[nodiscard]] inline double yaw_of(const Mat3& R) noexcept { return math::atan2(R(1, 0), R(0, 0)); }
 

@@ -17,11 +17,11 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
                                 const Body& body, double tick_s) noexcept {
   const Mat3& R = body.odom_T_base.R;
   const BodyFrames frames = body_frames(geometry, body.q_rad);
-  const Vec3 base_p_com = base_p_com_m(params.masses, frames);
-  const Vec3 base_v_com = base_v_com_mps(params.masses, frames, body.dq_radps);
-  const Vec3 odom_p_com_m = body.odom_T_base * base_p_com;
-  const Vec3 odom_v_com_mps =
-      body.odom_v_base_mps + R * (base_v_com + body.base_w_base_radps.cross(base_p_com));
+  const PerLink base_p_m = base_p_links_m(params.masses, frames);
+  const Vec3 base_p_com_m = centre_of_mass_m(params.masses, base_p_m);
+  const Vec3 base_v_com = base_v_com_mps(params.masses, frames, base_p_m, body.dq_radps);
+  const Vec3 odom_p_com_m = body.odom_T_base * base_p_com_m;
+  const Vec3 odom_v_com_mps = body.odom_v_base_mps + R * (base_v_com + body.base_w_base_radps.cross(base_p_com_m));
 
   Support support;
   support.stands = reference.stands;
@@ -53,12 +53,12 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   const Vec2 zmp_m =
       stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(), omega_radps, tick_s);
   // Legs that swing turn the body: the ground's force passes beside the centre of mass by as much as that takes.
-  PerLink odom_p_links_m = base_p_links_m(params.masses, frames);
-  odom_p_links_m.torso = R * odom_p_links_m.torso;
-  for (auto& leg : odom_p_links_m.leg) {
-    for (Vec3& link : leg) link = R * link;
+  PerLink turned_m;
+  turned_m.torso = R * base_p_m.torso;
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) turned_m.leg[f][j] = R * base_p_m.leg[f][j];
   }
-  const Vec3 turning_nm = angular_momentum_rate_nm(params.masses, odom_p_links_m, links_mps2);
+  const Vec3 turning_nm = angular_momentum_rate_nm(params.masses, turned_m, links_mps2);
   const double vertical_n = params.masses.total_kg() * up_mps2;
   const Vec2 beside_m{-turning_nm.y() / vertical_n, turning_nm.x() / vertical_n};
   const Vec2 slope = (odom_p_com_m.head<2>() - zmp_m) / height_m;

@@ -22,7 +22,7 @@ class BaseCorrection {
   }
   // Moves anything of the plan to odometry, given where the plan has the base: the difference is known at the base.
   [[nodiscard]] Transform odom_T_plan(const Transform& plan_T_base) const noexcept {
-    const Mat3 R = rotation_z(rotation_rad_.z()) * rotation_y(rotation_rad_.y()) * rotation_x(rotation_rad_.x());
+    const Mat3 R = rotation_zyx(rotation_rad_.z(), rotation_rad_.y(), rotation_rad_.x());
     return {R, plan_T_base.p_m + offset_m_ - R * plan_T_base.p_m};
   }
 

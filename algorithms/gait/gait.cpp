@@ -32,9 +32,9 @@ void Gait::reset(const Params& params) noexcept {
   // copy from would take 7 KB of stack.
 }
 
-bool Gait::usable(const StateEstimate& s) const noexcept {
-  return now_ns_ - s.oldest_input_ns <= params_.steer_age_ns && finite(s.odom_T_base) && finite(s.world_T_odom) &&
-         finite(s.odom_T_sole[0]) && finite(s.odom_T_sole[1]);
+void Gait::look_at(const StateEstimate& s) noexcept {
+  usable_ = now_ns_ - s.oldest_input_ns <= params_.steer_age_ns && finite(s.odom_T_base) && finite(s.world_T_odom) &&
+            finite(s.odom_T_sole[0]) && finite(s.odom_T_sole[1]);
 }
 
 bool Gait::lost(const StateEstimate& s) const noexcept { return now_ns_ - s.oldest_input_ns > params_.stop_age_ns; }
@@ -72,7 +72,9 @@ void Gait::start(const StateEstimate& state) noexcept {
 
 // Of the posture last asked for, in the base.
 void Gait::observe_reference() noexcept {
-  reference_p_com_m_ = base_p_com_m(params_.balance.masses, body_frames(params_.geometry, joints_.reference_rad()));
+  const MassModel& masses = params_.balance.masses;
+  const BodyFrames frames = body_frames(params_.geometry, joints_.reference_rad());
+  reference_p_com_m_ = centre_of_mass_m(masses, base_p_links_m(masses, frames));
 }
 
 // The horizontal part of the torso's trajectory is the centre of mass's: the base follows from the legs' places, one
@@ -90,7 +92,7 @@ void Gait::observe_links() noexcept {
   const bool swings = activity_ == Activity::kSwing || activity_ == Activity::kRetreat;
   if (swings) plan_T_sole[f] = swing_.at(motion_tick());
   Transform plan_T_base;
-  BodyFrames frames;
+  PerLink base_p_links;
   const int passes = link_motion_.restarted() ? 4 : 1;  // the base follows the legs' places and they the base
   for (int i = 0; i < passes; ++i) {
     plan_T_base = TorsoTrajectory::pose(torso_state_);
@@ -99,10 +101,10 @@ void Gait::observe_links() noexcept {
       const LegSolution s = solve_leg(params_.geometry, leg, plan_T_base.inverse() * plan_T_sole[index_of(leg)]);
       nominal_rad_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
     }
-    frames = body_frames(params_.geometry, nominal_rad_);
-    nominal_p_com_m_ = base_p_com_m(params_.balance.masses, frames);
+    base_p_links = base_p_links_m(params_.balance.masses, body_frames(params_.geometry, nominal_rad_));
+    nominal_p_com_m_ = centre_of_mass_m(params_.balance.masses, base_p_links);
   }
-  link_acceleration_ = link_motion_.update(params_.balance.masses, plan_T_base, frames, nominal_rad_);
+  link_acceleration_ = link_motion_.update(plan_T_base, base_p_links, nominal_rad_);
 }
 
 void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept {
@@ -116,7 +118,7 @@ void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback
   reference.links = link_acceleration_;
   reference.plan_T_sole = plan_T_sole_;
   reference.stands = status_.stands;
-  const bool seen = started_ && usable(state) && math::all_finite(feedback.dq_radps);
+  const bool seen = started_ && usable_ && math::all_finite(feedback.dq_radps);
   Balance::Body body{plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad(), JointVector::Zero()};
   if (seen) body = {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad, feedback.dq_radps};
   const JointVector torque_nm = balance_.torques_nm(params_.balance, params_.geometry, reference, body, kTick_s);
@@ -232,7 +234,7 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
 void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexcept {
   if (stop_requested_) return end(GaitPhase::kStopped, Obstruction::kNone, 0.0);
   if (lost(state)) return end(GaitPhase::kStopped, Obstruction::kStateStale, 0.0);
-  if (!state.initialised || !usable(state)) return;
+  if (!state.initialised || !usable_) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (decision.has_step) {
     wait_ticks_ = 0;
@@ -269,7 +271,7 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
   }
   if (stop_requested_ || lost(state)) return begin_hold();
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
-  if (!usable(state)) return;
+  if (!usable_) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (!decision.has_step) {  // over the stance foot for a moment more: one lost frame is no reason to go back
     if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_hold();
@@ -323,7 +325,8 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
   if (!loaded) unloaded_ = true;
   const bool descending = 2 * tick_ > swing_.duration_ticks();
   // What does not go down any more stands on something, whatever its force sensor says.
-  const double above_m = usable(state) ? state.odom_T_sole[i].p_m.z() - swing_.at(tick_).p_m.z() : 0.0;
+  const Transform odom_T_sole = swing_.at(tick_);
+  const double above_m = usable_ ? state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
   const bool blocked = swing_.lowered_m(tick_) > params_.late_m && above_m > params_.blocked_m;
   if ((descending && unloaded_ && loaded) || blocked) {
     if (swing_.at(tick_ - 1).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m) ++status_.early_contacts;
@@ -349,7 +352,7 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     wait_over_stance(lowest);
   }
   const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
-  plan_T_sole_[i] = plan_T_odom * swing_.at(tick_);
+  plan_T_sole_[i] = plan_T_odom * odom_T_sole;
 }
 
 double Gait::motion_tick() const noexcept {
@@ -378,7 +381,7 @@ void Gait::touch_down(const StateEstimate& state) noexcept {
   const std::size_t i = index_of(decision_.goal.foot);
   status_.step.touch_down_stamp_ns = now_ns_;
   status_.step.odom_T_executed =
-      usable(state) ? state.odom_T_sole[i] : correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
+      usable_ ? state.odom_T_sole[i] : correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
   status_.stands[i] = true;
   link_motion_.restart();  // the swing foot is where it was steered to, and stops
   planner_.landed();
@@ -400,15 +403,16 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
     if (!armed_) return;
     observe_reference();
   }
+  look_at(state);
   if (!started_) {
     hold_upright(command);
-    if (state.initialised && usable(state)) start(state);
+    if (state.initialised && usable_) start(state);
     return;
   }
 
   torso_state_ = torso_.at(torso_tick_, com_.at(com_tick_));
   plan_T_base_ = plan_T_base_over(torso_state_);
-  if (usable(state)) {
+  if (usable_) {
     correction_.update(state.odom_T_base, plan_T_base_, kTick_s / (kTick_s + params_.correction_time_s));
   }
   switch (activity_) {

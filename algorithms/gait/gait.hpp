@@ -90,7 +90,7 @@ class Gait {
   void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
   void wait_over_stance(const SolePose& sole) noexcept;
   void rest_over(const Vec2& plan_p_m) noexcept;
-  [[nodiscard]] bool usable(const StateEstimate& state) const noexcept;
+  void look_at(const StateEstimate& state) noexcept;
   [[nodiscard]] bool lost(const StateEstimate& state) const noexcept;
   [[nodiscard]] ClimbPlanner::Situation situation(const StateEstimate& state) const noexcept;
   [[nodiscard]] bool close_to_planned(const StepGoal& goal) const noexcept;
@@ -126,6 +126,7 @@ class Gait {
   Obstruction waiting_for_ = Obstruction::kNone;
   std::int32_t wait_ticks_ = 0;  // for that reason, without a break
   std::int32_t idle_ticks_ = 0;  // without a step to do since the last swing
+  bool usable_ = false;          // this tick's estimate: fresh, and all of it numbers
   bool armed_ = false;
   bool started_ = false;
   bool unloaded_ = false;  // the swing foot was felt to leave the ground

@@ -15,9 +15,9 @@ Vec3 second_difference(const Vec3& now, const Vec3& before, const Vec3& first) n
 
 }  // namespace
 
-LinkMotion::Acceleration LinkMotion::update(const MassModel& masses, const Transform& plan_T_base,
-                                            const BodyFrames& frames, const JointVector& q_rad) noexcept {
-  Posture now{base_p_links_m(masses, frames), q_rad};
+LinkMotion::Acceleration LinkMotion::update(const Transform& plan_T_base, const PerLink& base_p_m,
+                                            const JointVector& q_rad) noexcept {
+  Posture now{base_p_m, q_rad};
   now.plan_p_m.torso = plan_T_base * now.plan_p_m.torso;
   for (auto& leg : now.plan_p_m.leg) {
     for (Vec3& link : leg) link = plan_T_base * link;

@@ -19,7 +19,7 @@ class LinkMotion {
   // The plan goes on as it was, in another frame.
   void carry(const Transform& to_T_plan) noexcept;
   // One tick, planned posture. The result belongs to the tick before.
-  [[nodiscard]] Acceleration update(const MassModel& masses, const Transform& plan_T_base, const BodyFrames& frames,
+  [[nodiscard]] Acceleration update(const Transform& plan_T_base, const PerLink& base_p_m,
                                     const JointVector& q_rad) noexcept;
 
  private:

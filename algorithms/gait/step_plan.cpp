@@ -114,7 +114,7 @@ void StepProof::begin(const LegGeometry& geometry, const StepParams& params, con
 
 bool StepProof::solve(std::int32_t i, const JointVector& before_rad, JointVector& q_rad) const noexcept {
   StepKnot knot = knots_[i];
-  const Vec3 base_p_com = base_p_com_m(masses_, body_frames(geometry_, before_rad));
+  const Vec3 base_p_com = centre_of_mass_m(masses_, base_p_links_m(masses_, body_frames(geometry_, before_rad)));
   knot.odom_T_base.p_m.head<2>() -= (knot.odom_T_base.R * base_p_com).head<2>();
   const Transform base_T_odom = knot.odom_T_base.inverse();
   bool reachable = true;
@@ -145,11 +145,11 @@ bool StepProof::advance(std::int32_t count) noexcept {
       }
     }
     previous_ = q_rad;
+    check_.feasible = check_.feasible && check_.joint_margin_rad >= params_.joint_margin_rad &&
+                      check_.knee_rad >= params_.knee_min_rad && check_.speed_share <= params_.speed_share;
+    if (!check_.feasible) return true;
   }
-  if (next_ < knots_.count()) return false;
-  check_.feasible = check_.feasible && check_.joint_margin_rad >= params_.joint_margin_rad &&
-                    check_.knee_rad >= params_.knee_min_rad && check_.speed_share <= params_.speed_share;
-  return true;
+  return next_ == knots_.count();
 }
 
 void StepSearch::begin(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal,
@@ -179,7 +179,9 @@ void StepSearch::try_candidate() noexcept {
   }
   candidate_ = plan_step(params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, kToeDown_rad[shape_]);
   if (!leading_found_) candidate_.shift_ticks = shift_ticks_;
-  proof_.begin(geometry_, params_, StepKnots(geometry_, params_, candidate_, from, soles));
+  StepParams params = params_;
+  if (leading_found_) params.knot_ticks *= kLookAhead;
+  proof_.begin(geometry_, params, StepKnots(geometry_, params, candidate_, from, soles));
 }
 
 // Can the weight then move over the foot that landed? A wide diagonal step could be a dead end: the ankle roll of the

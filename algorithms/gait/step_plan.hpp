@@ -121,7 +121,7 @@ struct StepCheck {
 class StepProof {
  public:
   void begin(const LegGeometry& geometry, const StepParams& params, const StepKnots& knots) noexcept;
-  // Up to `count` knots; true when all are done. A knot costs two leg solutions and a centre of mass.
+  // Up to `count` knots; true when all are done or one cannot be. A knot costs two leg solutions and a centre of mass.
   bool advance(std::int32_t count) noexcept;
   [[nodiscard]] const StepCheck& check() const noexcept { return check_; }
   [[nodiscard]] const StepKnots& knots() const noexcept { return knots_; }
@@ -145,7 +145,8 @@ class StepProof {
 class StepSearch {
  public:
   enum class State : std::uint8_t { kSearching, kFound, kImpossible };
-  static constexpr std::int32_t kKnotsPerCall = 8;
+  static constexpr std::int32_t kKnotsPerCall = 2;  // a tick of the gait costs half as much again
+  static constexpr std::int32_t kLookAhead = 2;     // as far apart are the knots of a step that is proved again later
 
   // trailing: the goal of the step after a leading one; ignored otherwise. shift_ticks: of the shift before the goal's
   // swing, as it will be done.

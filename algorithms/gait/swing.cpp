@@ -52,16 +52,16 @@ Transform Swing::at(double tick) const noexcept {
   // Pitched, the lowest point is the toe's edge and the foremost one the upper front edge of the collision box: these
   // two follow the planned path.
   const double toe_m = kCollisionRectangle.toe_x_m;
-  const double lift_m = toe_m * math::sin(toe_down_rad);
-  const double lean_m = toe_m * (math::cos(toe_down_rad) - 1.0) + kCollisionHeight_m * math::sin(toe_down_rad);
+  const math::SinCos toe = math::sin_cos(toe_down_rad), turn = math::sin_cos(yaw_rad);
+  const double lift_m = toe_m * toe.sin;
+  const double lean_m = toe_m * (toe.cos - 1.0) + kCollisionHeight_m * toe.sin;
 
   Transform sole;
-  const Vec3 heading{math::cos(yaw_rad), math::sin(yaw_rad), 0.0};
+  const Vec3 heading{turn.cos, turn.sin, 0.0};
   sole.p_m = start_m_ + (target_.position_m - start_m_) * forward - (retreat_m + lean_m) * heading;
   sole.p_m.z() = height_m(tick) + lift_m;
   const double level = 1.0 - smooth_window(u, 0.0, s.forward_end);  // the start's small tilt fades
-  sole.R =
-      rotation_z(yaw_rad) * rotation_y(toe_down_rad + start_pitch_rad_ * level) * rotation_x(start_roll_rad_ * level);
+  sole.R = rotation_zyx(yaw_rad, toe_down_rad + start_pitch_rad_ * level, start_roll_rad_ * level);
   return sole;
 }
 

@@ -59,8 +59,7 @@ TorsoTrajectory::State TorsoTrajectory::at_rest(const Transform& base) noexcept 
 }
 
 Transform TorsoTrajectory::pose(const State& s) noexcept {
-  return {rotation_z(s[5].position) * rotation_y(s[4].position) * rotation_x(s[3].position),
-          Vec3{s[0].position, s[1].position, s[2].position}};
+  return {rotation_zyx(s[5].position, s[4].position, s[3].position), Vec3{s[0].position, s[1].position, s[2].position}};
 }
 
 TorsoTrajectory::State TorsoTrajectory::placed(const State& state, const Transform& base, const Vec2& com_m) noexcept {

@@ -13,17 +13,16 @@ Vec3 base_p_link(const LegFrames& frames, const MassModel& masses, Foot leg, std
 
 }  // namespace
 
-Vec3 base_p_com_m(const MassModel& masses, const BodyFrames& frames) noexcept {
-  Vec3 moment_kgm = masses.torso.mass_kg * masses.torso.centre_m;
-  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-      moment_kgm += masses.leg[j].mass_kg * base_p_link(frames[index_of(leg)], masses, leg, j);
-    }
+Vec3 centre_of_mass_m(const MassModel& masses, const PerLink& p_m) noexcept {
+  Vec3 moment_kgm = masses.torso.mass_kg * p_m.torso;
+  for (const auto& leg : p_m.leg) {
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) moment_kgm += masses.leg[j].mass_kg * leg[j];
   }
   return moment_kgm / masses.total_kg();
 }
 
-Vec3 base_v_com_mps(const MassModel& masses, const BodyFrames& frames, const JointVector& dq_radps) noexcept {
+Vec3 base_v_com_mps(const MassModel& masses, const BodyFrames& frames, const PerLink& base_p_m,
+                    const JointVector& dq_radps) noexcept {
   Vec3 momentum = Vec3::Zero();
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const LegFrames& f = frames[index_of(leg)];
@@ -32,7 +31,7 @@ Vec3 base_v_com_mps(const MassModel& masses, const BodyFrames& frames, const Joi
     Vec3 hanging_kgm = Vec3::Zero();
     for (std::size_t j = kJointsPerLeg; j-- > 0;) {
       hanging_kg += masses.leg[j].mass_kg;
-      hanging_kgm += masses.leg[j].mass_kg * base_p_link(f, masses, leg, j);
+      hanging_kgm += masses.leg[j].mass_kg * base_p_m.leg[index_of(leg)][j];
       const Vec3 axis = f.joint[j].R.col(kJointAxis[j]);
       const double dq = dq_radps[static_cast<Eigen::Index>(joint_index(leg, j))];
       momentum += dq * axis.cross(hanging_kgm - hanging_kg * f.joint[j].p_m);

@@ -6,11 +6,6 @@
 
 namespace polygmap {
 
-// Centre of mass of the whole robot, base frame, and its velocity relative to the base from the joint rates.
-[[nodiscard]] Vec3 base_p_com_m(const MassModel& masses, const BodyFrames& frames) noexcept;
-[[nodiscard]] Vec3 base_v_com_mps(const MassModel& masses, const BodyFrames& frames,
-                                  const JointVector& dq_radps) noexcept;
-
 // What the ground does to a sole, at the sole frame's origin, base axes.
 struct SoleWrench {
   Vec3 force_n = Vec3::Zero();
@@ -26,6 +21,12 @@ struct PerLink {
 };
 // Centres of all links, base frame.
 [[nodiscard]] PerLink base_p_links_m(const MassModel& masses, const BodyFrames& frames) noexcept;
+
+// Centre of mass of the whole robot, in the frame of the links' centres.
+[[nodiscard]] Vec3 centre_of_mass_m(const MassModel& masses, const PerLink& p_m) noexcept;
+// Its velocity relative to the base from the joint rates, base frame.
+[[nodiscard]] Vec3 base_v_com_mps(const MassModel& masses, const BodyFrames& frames, const PerLink& base_p_m,
+                                  const JointVector& dq_radps) noexcept;
 
 // Drive torques of one leg whose links feel specific_mps2 (gravity minus each one's acceleration, base axes) while the
 // ground presses on its sole: the balance of every joint with all that hangs on it, links as points.

@@ -14,13 +14,16 @@ Vec3 mirrored(const Vec3& left_m, Foot leg) noexcept { return {left_m.x(), side_
 // Of an angle in 0..pi whose cosine is that, or the cosine where that is the sine of one in +-pi/2.
 double sine(double cosine) noexcept { return math::sqrt(std::max(1.0 - cosine * cosine, 0.0)); }
 
-// R turned about one axis of its own: what a product with rotation_x, _y or _z gives, without the zeros.
-void turn(const Mat3& R, int axis, double angle_rad, Mat3& turned) noexcept {
+// The joint before, turned about one of its axes: what a product with rotation_x, _y or _z gives, without the zeros.
+template <std::size_t kJoint>
+void turn(LegFrames& frames, double angle_rad) noexcept {
+  constexpr int kAxis = kJointAxis[kJoint], kU = (kAxis + 1) % 3, kV = (kAxis + 2) % 3;
+  const Mat3& R = frames.joint[kJoint - 1].R;
+  Mat3& turned = frames.joint[kJoint].R;
   const auto [s, c] = math::sin_cos(angle_rad);
-  const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-  turned.col(axis) = R.col(axis);
-  turned.col(u) = R.col(u) * c + R.col(v) * s;
-  turned.col(v) = R.col(v) * c - R.col(u) * s;
+  turned.col(kAxis) = R.col(kAxis);
+  turned.col(kU) = R.col(kU) * c + R.col(kV) * s;
+  turned.col(kV) = R.col(kV) * c - R.col(kU) * s;
 }
 
 }  // namespace
@@ -31,9 +34,11 @@ LegFrames leg_frames(const LegGeometry& g, Foot leg, const LegVector& q) noexcep
     return joint.p_m - joint.R.col(2) * length_m;
   };
   f.joint[kHipRoll] = Transform{rotation_x(q[kHipRoll]), mirrored(g.base_p_hip_m, leg)};
-  for (std::size_t j = kHipYaw; j < kJointsPerLeg; ++j) {
-    turn(f.joint[j - 1].R, kJointAxis[j], q[static_cast<Eigen::Index>(j)], f.joint[j].R);
-  }
+  turn<kHipYaw>(f, q[kHipYaw]);
+  turn<kHipPitch>(f, q[kHipPitch]);
+  turn<kKnee>(f, q[kKnee]);
+  turn<kAnklePitch>(f, q[kAnklePitch]);
+  turn<kAnkleRoll>(f, q[kAnkleRoll]);
   f.joint[kHipYaw].p_m = f.joint[kHipRoll].p_m;
   f.joint[kHipPitch].p_m = f.joint[kHipYaw] * mirrored(g.hip_p_hip_pitch_m, leg);
   f.joint[kKnee].p_m = below(f.joint[kHipPitch], g.thigh_m);
@@ -85,9 +90,9 @@ LegSolution solve_leg(const LegGeometry& g, Foot leg, const Transform& base_T_so
   const Vec3 foot_p_hip = R.transpose() * (base_p_hip - base_p_ankle);
   const double radius = std::max(math::sqrt(math::square(foot_p_hip.y()) + math::square(foot_p_hip.z())), 1e-6);
   const double offset = math::clamp(-hip_p_pitch.y() / radius, -1.0, 1.0), depth = sine(offset);
-  q[kAnkleRoll] = math::wrap_angle(math::acos(offset) - math::atan2(foot_p_hip.z(), foot_p_hip.y()));
   const double cos_roll = (offset * foot_p_hip.y() + depth * foot_p_hip.z()) / radius;
   const double sin_roll = (depth * foot_p_hip.y() - offset * foot_p_hip.z()) / radius;
+  q[kAnkleRoll] = math::atan2(sin_roll, cos_roll);
 
   // N = R Rx(-roll) = Rx(hip roll) Rz(yaw) Ry(sum of pitches). Its second column is that of Rx Rz, too.
   const Vec3 side = R.col(1) * cos_roll - R.col(2) * sin_roll;
@@ -106,8 +111,9 @@ LegSolution solve_leg(const LegGeometry& g, Foot leg, const Transform& base_T_so
   const double cos_knee = math::clamp(asked, -1.0, 1.0);
   solution.reachable = asked <= 1.0 && asked >= -1.0;
   q[kKnee] = math::acos(cos_knee);
-  const double bend = math::atan2(g.shank_m * sine(cos_knee), g.thigh_m + g.shank_m * cos_knee);
-  q[kHipPitch] = math::atan2(-leg_vector.x(), -leg_vector.z()) - bend;
+  const double bent_m = g.shank_m * sine(cos_knee), straight_m = g.thigh_m + g.shank_m * cos_knee;
+  q[kHipPitch] = math::atan2(bent_m * leg_vector.z() - straight_m * leg_vector.x(),
+                             -bent_m * leg_vector.x() - straight_m * leg_vector.z());
   q[kAnklePitch] = math::wrap_angle(pitch_sum - q[kHipPitch] - q[kKnee]);
   return solution;
 }

@@ -16,12 +16,14 @@ int main() {
   for (const GaitTick& tick : stair->ticks) (tick.swings ? stage_gait_swing_tick : stage_gait_shift_tick)(*bench, tick);
   const auto plan = std::make_unique<StairPlan>();
   stage_gait_plan(*plan);
+  stage_gait_proof(*plan);
   if (const std::string_view wrong = complaint(*bench, *plan); !wrong.empty()) {
     std::fprintf(stderr, "gait_instructions: %.*s\n", static_cast<int>(wrong.size()), wrong.data());
     return 1;
   }
-  const auto swings = std::count_if(stair->ticks.begin(), stair->ticks.end(), [](const GaitTick& t) { return t.swings; });
-  std::printf("build %s\nruns 1\nruns_of gait_swing_tick %td\nruns_of gait_shift_tick %td\n", build_name().c_str(), swings,
-              static_cast<std::ptrdiff_t>(stair->ticks.size()) - swings);
+  const auto swings =
+      std::count_if(stair->ticks.begin(), stair->ticks.end(), [](const GaitTick& t) { return t.swings; });
+  std::printf("build %s\nruns 1\nruns_of gait_swing_tick %td\nruns_of gait_shift_tick %td\n", build_name().c_str(),
+              swings, static_cast<std::ptrdiff_t>(stair->ticks.size()) - swings);
   return 0;
 }

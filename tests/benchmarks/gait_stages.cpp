@@ -32,21 +32,23 @@ GaitStair::GaitStair() {
 
 StairPlan::StairPlan() {
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    soles[index_of(foot)] = {Mat3::Identity(), Vec3{0.0, side_sign(foot) * kStanceHalfWidth_m, 0.0}};
-    StepGoal& goal = foot == Foot::kLeft ? leading : trailing;
-    goal.kind = foot == Foot::kLeft ? StepKind::kLeading : StepKind::kTrailing;
-    goal.foot = foot;
-    goal.target = sole_pose(soles[index_of(foot)]);
-    goal.target.position_m += Vec3{kTread_m, 0.0, kRise_m};
+    const std::size_t f = index_of(foot);
+    soles[0][f] = {Mat3::Identity(), Vec3{0.0, side_sign(foot) * kStanceHalfWidth_m, 0.0}};
+    goals[f].kind = f == 0 ? StepKind::kLeading : StepKind::kTrailing;
+    goals[f].foot = foot;
+    goals[f].target = sole_pose(soles[0][f]);
+    goals[f].target.position_m += Vec3{kTread_m, 0.0, kRise_m};
   }
-  const SolePair flat{sole_pose(soles[0]), sole_pose(soles[1])};
-  const TorsoPose middle = torso_between(geometry, params.torso, flat);
-  from = TorsoTrajectory::at_rest({rotation_z(middle.yaw_rad), middle.position_m});
+  soles[1] = {goals[0].target.transform(), soles[0][1]};
+  const TorsoPose middle = torso_between(geometry, params.torso, {sole_pose(soles[0][0]), sole_pose(soles[0][1])});
+  from[0] = TorsoTrajectory::at_rest({rotation_z(middle.yaw_rad), middle.position_m});
 }
 
 std::string_view complaint(const GaitBench& end, const StairPlan& plan) {
   if (end.gait.status().treads_climbed != 2) return "the gait did not climb the stair";
-  if (plan.search.state() != StepSearch::State::kFound) return "no plan of the stair";
+  for (const StepSearch& search : plan.searches) {
+    if (search.state() != StepSearch::State::kFound) return "the legs cannot do the stair";
+  }
   return {};
 }
 
@@ -58,24 +60,28 @@ void stage_gait_shift_tick(GaitBench& bench, const GaitTick& tick) {
 }
 
 void stage_gait_plan(StairPlan& p) {
-  TorsoTrajectory::State from = p.from;
-  std::array<Transform, kFootCount> soles = p.soles;
-  for (const StepGoal& goal : {p.leading, p.trailing}) {
-    p.search.begin(p.geometry, p.params, goal, p.trailing, p.params.stair_shift_ticks, from, soles);
-    while (p.search.step() == StepSearch::State::kSearching) {
-    }
-    const SolePair flat{sole_pose(soles[0]), sole_pose(soles[1])};
-    StepPlan plan = plan_step(p.params, goal, flat, p.search.plan().toe_down_rad);
-    const HorizontalMotion com = TorsoTrajectory::horizontal(from);
+  for (std::size_t i = 0; i < p.goals.size(); ++i) {
+    const SolePair flat{sole_pose(p.soles[i][0]), sole_pose(p.soles[i][1])};
+    StepPlan plan = plan_step(p.params, p.goals[i], flat, kToeDown_rad[0]);
+    const HorizontalMotion com = TorsoTrajectory::horizontal(p.from[i]);
     p.com.plan(p.params.com, com, zmp_of_shift(p.params, plan, ComPlan::zmp_under(p.params.com, com)));
     plan_torso(p.geometry, p.params, flat, p.com, plan.shift_ticks, plan);
     const HorizontalMotion lift_off = p.com.at(plan.shift_ticks);
     p.com.plan(p.params.com, lift_off, zmp_of_swing(p.params, plan));
     plan_torso(p.geometry, p.params, flat, p.com, 0, plan);
-    p.swing.plan(soles[index_of(goal.foot)], goal.target, plan.shape, plan.swing_ticks);
-    soles[index_of(goal.foot)] = goal.target.transform();
-    from = TorsoTrajectory::at_rest({rotation_z(plan.touch_down.yaw_rad), plan.touch_down.position_m});
-    TorsoTrajectory::set_horizontal(from, p.com.at(plan.swing_ticks));
+    p.swing.plan(p.soles[i][index_of(plan.goal.foot)], plan.goal.target, plan.shape, plan.swing_ticks);
+    if (i > 0) continue;
+    p.from[1] = TorsoTrajectory::at_rest({rotation_z(plan.touch_down.yaw_rad), plan.touch_down.position_m});
+    TorsoTrajectory::set_horizontal(p.from[1], p.com.at(plan.swing_ticks));
+  }
+}
+
+void stage_gait_proof(StairPlan& p) {
+  for (std::size_t i = 0; i < p.goals.size(); ++i) {
+    StepSearch& search = p.searches[i];
+    search.begin(p.geometry, p.params, p.goals[i], p.goals[1], p.params.stair_shift_ticks, p.from[i], p.soles[i]);
+    while (search.step() == StepSearch::State::kSearching) {
+    }
   }
 }
 

@@ -30,15 +30,17 @@ struct GaitStair {
   std::vector<GaitTick> ticks;
 };
 
-// Both steps of a stair from rest, with shifts, searches, proofs and trajectories as the gait makes them.
+// Both steps of a stair from rest as the gait plans them: schedules, centre of mass, torso, swing; and the proof that
+// the legs can do them.
 struct StairPlan {
   StairPlan();
   LegGeometry geometry;
   StepParams params;
-  std::array<Transform, kFootCount> soles;
-  StepGoal leading, trailing;
-  TorsoTrajectory::State from{};
-  StepSearch search;
+  std::array<StepGoal, 2> goals;  // leading, trailing
+  // Before each of them, as the one before leaves it.
+  std::array<std::array<Transform, kFootCount>, 2> soles;
+  std::array<TorsoTrajectory::State, 2> from{};
+  std::array<StepSearch, 2> searches;
   ComPlan com;
   Swing swing;
 };
@@ -49,5 +51,6 @@ struct StairPlan {
 void stage_gait_swing_tick(GaitBench& bench, const GaitTick& tick);
 void stage_gait_shift_tick(GaitBench& bench, const GaitTick& tick);  // and of touch-down and lift-off: searches, plans
 void stage_gait_plan(StairPlan& plan);
+void stage_gait_proof(StairPlan& plan);
 
 }  // namespace polygmap::bench

@@ -172,7 +172,7 @@ void IdealClimb::move() {
 // Mass points on a straight line through the centre of mass; accelerations over 40 ms, since commands follow in steps.
 void IdealClimb::measure_zmp() {
   if (gait_.status().phase != GaitPhase::kSwing) return com_m_.clear();
-  com_m_.push_back(true_T_base_ * base_p_com_m({}, body_frames({}, q_)));
+  com_m_.push_back(true_T_base_ * centre_of_mass_m({}, base_p_links_m({}, body_frames({}, q_))));
   constexpr std::size_t kHalf = 10;
   if (com_m_.size() <= 2 * kHalf) return;
   const Vec3 &now = com_m_.back(), &middle = *(com_m_.end() - kHalf - 1), &then = *(com_m_.end() - 2 * kHalf - 1);
