@@ -261,7 +261,7 @@ void ClimbReport::observe_balance(const Truth& truth, const Telemetry& telemetry
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const std::size_t j = n % kJointsPerLeg;
     const auto i = static_cast<Eigen::Index>(n);
-    const JointLimits limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), j);
+    const JointLimits& limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), j);
     keep_max(torque_peak_ratio_[j], std::abs(truth.drive_tau_nm[i]) / limits.torque_nm);
     keep_max(joint_speed_peak_ratio_[j], std::abs(truth.drive_dq_radps[i]) / limits.speed_radps);
   }

@@ -113,7 +113,7 @@ bool KinematicPlant::accept_command(const JointVector& command_rad, const JointV
   for (std::size_t j = 0; j < kJointCount; ++j) {
     const double q = command_rad[static_cast<Eigen::Index>(j)];
     const std::size_t foot = j / kJointsPerLeg, joint = j % kJointsPerLeg;
-    const JointLimits limits = joint_limits(static_cast<Foot>(foot), joint);
+    const JointLimits& limits = joint_limits(static_cast<Foot>(foot), joint);
     const double rate = rate_radps[static_cast<Eigen::Index>(j)];
     if (!std::isfinite(rate)) {
       fall("The rate commanded to %s leg joint %zu is not finite (%g).", name_of(foot), joint, rate);
@@ -138,7 +138,7 @@ void KinematicPlant::move_joints(const JointVector& command_rad, const JointVect
   const double dt = kPlantTick_s / kDriveSubsteps;
   const double gain = 1.0 - std::exp(-dt / params_.drive_lag_s);
   for (std::size_t j = 0; j < kJointCount; ++j) {
-    const JointLimits limits = joint_limits(static_cast<Foot>(j / kJointsPerLeg), j % kJointsPerLeg);
+    const JointLimits& limits = joint_limits(static_cast<Foot>(j / kJointsPerLeg), j % kJointsPerLeg);
     const auto i = static_cast<Eigen::Index>(j);
     const double reach = limits.speed_radps * dt;
     const double target_rad = command_rad[i] + params_.drive_lag_s * rate_radps[i];

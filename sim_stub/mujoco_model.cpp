@@ -43,7 +43,7 @@ void add_link(Xml& xml, Foot leg, std::size_t joint, const LegGeometry& g) {
   const std::array<Vec3, kJointsPerLeg> origin_m{g.base_p_hip_m,         Vec3::Zero(),           g.hip_p_hip_pitch_m,
                                                  Vec3{0, 0, -g.thigh_m}, Vec3{0, 0, -g.shank_m}, Vec3::Zero()};
   const Vec3& p = origin_m[joint];
-  const JointLimits limits = joint_limits(leg, joint);
+  const JointLimits& limits = joint_limits(leg, joint);
   const LinkMass link = MassModel{}.leg[joint];
   const auto& half = kLinkHalf_m[joint];
   xml.add("<body name='%s_%zu' pos='%.9g %.9g %.9g'>", side, joint + 1, p.x(), sign * p.y(), p.z());

@@ -44,7 +44,7 @@ TEST(LegKinematicsAgainstKdl, RandomJointsOfBothLegs_SoleAndJacobianAgree) {
       KDL::JntArray joints(kJointsPerLeg);
       LegVector q_rad;
       for (unsigned j = 0; j < kJointsPerLeg; ++j) {
-        const JointLimits limits = joint_limits(leg, j);
+        const JointLimits& limits = joint_limits(leg, j);
         joints(j) = q_rad[j] = std::uniform_real_distribution<>(limits.min_rad, limits.max_rad)(random);
       }
       KDL::Frame frame;

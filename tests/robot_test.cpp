@@ -12,7 +12,7 @@ namespace {
 LegVector random_joints(std::mt19937& random, Foot leg) {
   LegVector q;
   for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-    const JointLimits limits = joint_limits(leg, j);
+    const JointLimits& limits = joint_limits(leg, j);
     q[static_cast<int>(j)] = std::uniform_real_distribution<>(limits.min_rad, limits.max_rad)(random);
   }
   q[kHipPitch] = std::uniform_real_distribution<>(-1.3, 0.3)(random);

@@ -11,7 +11,7 @@ bool JointReference::try_arm(const LegGeometry& geometry, const Params& params, 
   JointVector inside_rad;
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const auto i = static_cast<Eigen::Index>(n);
-    const JointLimits limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg);
+    const JointLimits& limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg);
     inside_rad[i] = math::clamp(q_rad[i], limits.min_rad, limits.max_rad);
     if (!(std::abs(q_rad[i] - inside_rad[i]) <= kEncoderOffset_rad)) return false;
   }
@@ -33,7 +33,7 @@ bool JointReference::follow(const Transform& odom_T_base, const std::array<Trans
     const double gain = stands[index_of(leg)] ? 1.0 : params_.swing_gain;
     limited = limited || !solution.reachable || !solved;
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-      const JointLimits limits = joint_limits(leg, j);
+      const JointLimits& limits = joint_limits(leg, j);
       const std::size_t n = joint_index(leg, j);
       const auto i = static_cast<Eigen::Index>(n);
       const double before_rad = reference_rad_[i];

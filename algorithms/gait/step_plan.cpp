@@ -133,7 +133,7 @@ bool StepProof::advance(std::int32_t count) noexcept {
     if (!solve(next_, previous_, q_rad)) check_.feasible = false;
     for (std::size_t n = 0; n < kJointCount; ++n) {
       const std::size_t j = n % kJointsPerLeg;
-      const JointLimits limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), j);
+      const JointLimits& limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), j);
       const auto i = static_cast<Eigen::Index>(n);
       // The knee's lower end is the stretched leg, which has a margin of its own.
       double& low = j == kKnee ? check_.knee_rad : check_.joint_margin_rad;

@@ -64,11 +64,20 @@ inline constexpr std::array<JointLimits, kJointsPerLeg> kLeftLegLimits{{
     {-0.262, 0.262, 4.0, 36.0},
 }};
 
-[[nodiscard]] constexpr JointLimits joint_limits(Foot leg, std::size_t joint) noexcept {
-  const JointLimits left = kLeftLegLimits[joint];
-  const bool mirrored = joint == kHipRoll || joint == kHipYaw || joint == kAnkleRoll;
-  if (leg == Foot::kLeft || !mirrored) return left;
-  return {-left.max_rad, -left.min_rad, left.speed_radps, left.torque_nm};
+// Of all joints, in the order of joint_index().
+inline constexpr std::array<JointLimits, kJointCount> kJointLimits = [] {
+  std::array<JointLimits, kJointCount> all{};
+  for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+    const JointLimits left = kLeftLegLimits[j];
+    const bool mirrored = j == kHipRoll || j == kHipYaw || j == kAnkleRoll;
+    all[j] = left;
+    all[kJointsPerLeg + j] =
+        mirrored ? JointLimits{-left.max_rad, -left.min_rad, left.speed_radps, left.torque_nm} : left;
+  }
+  return all;
+}();
+[[nodiscard]] constexpr const JointLimits& joint_limits(Foot leg, std::size_t joint) noexcept {
+  return kJointLimits[index_of(leg) * kJointsPerLeg + joint];
 }
 [[nodiscard]] constexpr std::size_t joint_index(Foot leg, std::size_t joint) noexcept {
   return index_of(leg) * kJointsPerLeg + joint;

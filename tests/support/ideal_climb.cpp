@@ -192,7 +192,7 @@ void IdealClimb::measure(const GaitStatus& before) {
   const GaitStatus& now = gait_.status();
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const auto i = static_cast<Eigen::Index>(n);
-    const JointLimits limits = joint_limits(static_cast<Foot>(n / 6), n % 6);
+    const JointLimits& limits = joint_limits(static_cast<Foot>(n / 6), n % 6);
     const double q = command_.joints[n].q_rad, step = std::abs(q - sent_[i]);
     r.speed_share[n] = std::max(r.speed_share[n], step / (limits.speed_radps * 0.002));
     r.jump_rad = std::max(r.jump_rad, step);
