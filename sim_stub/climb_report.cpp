@@ -321,10 +321,10 @@ void ClimbReport::observe_stance(const Truth& truth) {
 }
 
 void ClimbReport::observe_steps_climbed(const Truth& truth) {
-  const int step = truth.step_index[0];
-  bool rests = step >= 0 && step == truth.step_index[1] && truth.in_contact[0] && truth.in_contact[1];
+  const int step = std::min(truth.step_index[0], truth.step_index[1]);
+  bool rests = step >= 0 && truth.in_contact[0] && truth.in_contact[1];
   for (std::size_t foot = 0; rests && foot < kFootCount; ++foot) {
-    rests = sole_margin_m(truth.true_T_sole[foot], world_, step) >= 0.0;
+    rests = sole_margin_m(truth.true_T_sole[foot], world_, truth.step_index[foot]) >= 0.0;
   }
   if (!rests) {
     resting_step_ = -1;
