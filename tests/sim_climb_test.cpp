@@ -2,6 +2,7 @@
 // Whole climbs, end to end: what the issue asks of every seed, of causality, and of repetition.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <ostream>
 #include <string>
@@ -19,6 +20,12 @@ ClimbOptions options_of(std::uint64_t seed, int steps) {
   options.stairs.steps = steps;
   options.noise = seed % 2 == 0 ? DepthNoise::kCorrelated : DepthNoise::kWhite;
   return options;
+}
+
+int steps_onto_treads(const ClimbSummary& summary) {
+  int count = 0;
+  for (const Footstep& step : summary.footsteps) count += step.onto_tread ? 1 : 0;
+  return count;
 }
 
 // Every figure that a passing climb must show.
@@ -92,6 +99,23 @@ TEST(ClimbContacts, InferredFromTorques_ClimbedWithinTheFigures) {
   }
 }
 
+// Perception in the loop, under physics.
+TEST(ClimbSingleStep, UnderPhysics_ClimbedWithinTheFigures) {
+  ClimbOptions options = options_of(2, 4);
+  options.plant = PlantKind::kMujoco;
+  options.gait = GaitPattern::kSingleStep;
+  const ClimbSummary summary = climb(options);
+  EXPECT_TRUE(summary.pass) << summary.reason;
+  EXPECT_EQ(summary.ended_by, "module");
+  EXPECT_EQ(steps_onto_treads(summary), 5);  // one for each step, and the foot that comes beside the last one
+  EXPECT_LE(summary.seconds_per_step, 1.6);
+  EXPECT_LE(summary.execution_error_m.max, 0.020);
+  EXPECT_LE(summary.foothold_error_m.max, 0.0124);
+  EXPECT_GT(summary.swing_clearance_min_m, 0.0);
+  EXPECT_LE(*std::ranges::max_element(summary.torque_peak_ratio), 1.0);
+  EXPECT_LE(*std::ranges::max_element(summary.joint_speed_peak_ratio), 1.0);
+}
+
 std::vector<Case> long_cases() {
   constexpr double kRises_m[]{0.13, 0.10, 0.17, 0.15, 0.12};
   std::vector<Case> cases;
@@ -110,12 +134,6 @@ TEST(ClimbRepetition, SameSeedThreadedOrNot_SameSummaryByteForByte) {
   options.threaded_render = false;
   EXPECT_EQ(first, text());
   EXPECT_GT(first.size(), 1000U);
-}
-
-int steps_onto_treads(const ClimbSummary& summary) {
-  int count = 0;
-  for (const Footstep& step : summary.footsteps) count += step.onto_tread ? 1 : 0;
-  return count;
 }
 
 void expect_to_name(const std::string& what, double true_m, const std::string& reason) {

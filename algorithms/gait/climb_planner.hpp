@@ -76,7 +76,7 @@ class ClimbPlanner {
   Foot last_swing_ = Foot::kRight;
   Foot leading_ = Foot::kLeft;
   bool has_leading_ = false;
-  bool split_stance_ = false;   // the leading foot stands on a tread, the other one below: the trailing step ends this
+  bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this
   bool passing_refused_ = false;
   std::uint32_t tread_id_ = 0;  // under the foot that landed last
   std::uint32_t treads_climbed_ = 0;

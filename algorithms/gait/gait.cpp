@@ -263,7 +263,7 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
   if (search_.step() == StepSearch::State::kImpossible) {
     if (decision_.goal.kind == StepKind::kPassing) {
       planner_.refuse_passing();
-      return begin_shift(planner_.decide(situation(state), footholds), true);
+      return begin_shift(planner_.decide(situation(state), footholds), false);
     }
     begin_hold();
     if (decision_.goal.kind == StepKind::kFloor && planner_.shorten_floor_steps()) return;
@@ -274,15 +274,15 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
   if (!usable(state)) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
-  const bool falls_back = decision_.goal.kind == StepKind::kPassing && decision.goal.kind == StepKind::kTrailing;
-  if (!decision.has_step || falls_back) {  // over the stance foot for a moment more: one lost frame is no reason
-    if (tick_ <= shift_ticks_ + params_.reshift_ticks) return;
-    if (!decision.has_step) return begin_hold();
+  if (!decision.has_step) {  // over the stance foot for a moment more: one lost frame is no reason to go back
+    if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_hold();
+    return;
   }
   if (close_to_planned(decision.goal)) return lift_off(state, footholds, decision);
   // Over the other foot the weight has its whole way to go.
   const StepGoal& planned = decision_.goal;
-  begin_shift(decision, decision.goal.foot == planned.foot && onto_tread(decision.goal.kind) == onto_tread(planned.kind));
+  begin_shift(decision,
+              decision.goal.foot == planned.foot && onto_tread(decision.goal.kind) == onto_tread(planned.kind));
 }
 
 void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,

@@ -179,7 +179,8 @@ void StepSearch::try_candidate() noexcept {
     from = TorsoTrajectory::at_rest({rotation_z(torso_landed_.yaw_rad), torso_landed_.position_m});
     TorsoTrajectory::set_horizontal(from, com_landed_);
   }
-  candidate_ = plan_step(params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, kToeDown_rad[shape_]);
+  const auto& toe_down_rad = goal.kind == StepKind::kPassing ? kPassingToeDown_rad : kToeDown_rad;
+  candidate_ = plan_step(params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, toe_down_rad[shape_]);
   if (!leading_found_) candidate_.shift_ticks = shift_ticks_;
   proof_.begin(geometry_, params_, StepKnots(geometry_, params_, candidate_, from, soles));
 }

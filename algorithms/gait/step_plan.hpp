@@ -42,20 +42,20 @@ struct StepParams {
                          .clearance_m = 0.05,
                          .retreat_m = 0.0};
   // Two rises up and past the nosing of the tread that the other foot stands on.
-  SwingShape passing_swing{.lift_end = 0.60,
-                           .forward_begin = 0.22,
-                           .forward_end = 0.87,
-                           .landing_begin = 0.80,
-                           .clearance_m = 0.05,
+  SwingShape passing_swing{.lift_end = 0.67,
+                           .forward_begin = 0.16,
+                           .forward_end = 0.88,
+                           .landing_begin = 0.74,
+                           .clearance_m = 0.045,
                            .retreat_m = 0.02,
-                           .retreat_end = 0.20,
-                           .toe_down_begin = 0.04,
-                           .toe_down_full = 0.35,
-                           .toe_up_begin = 0.50,
-                           .toe_up_end = 0.82};
-  std::int32_t stair_shift_ticks = 195;  // 0.39 s of double support
-  std::int32_t stair_swing_ticks = 450;  // 0.90 s
-  std::int32_t passing_swing_ticks = 650;
+                           .retreat_end = 0.25,
+                           .toe_down_begin = 0.01,
+                           .toe_down_full = 0.29,
+                           .toe_up_begin = 0.30,
+                           .toe_up_end = 0.70};
+  std::int32_t stair_shift_ticks = 195;    // 0.39 s of double support
+  std::int32_t stair_swing_ticks = 450;    // 0.90 s
+  std::int32_t passing_swing_ticks = 460;  // 0.92 s
   std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
   ComPlan::Params com;
@@ -66,14 +66,15 @@ struct StepParams {
   std::int32_t leave_ticks = 30;         // the rear leg still reaches the ground so long after its foot has left it
   double rise_share = 0.5;               // of a swing onto a tread in which the torso rises, to give the foot room
   double passing_rise_share = 0.6;
-  std::int32_t knot_ticks = 10;          // eq. (37): 20 ms
-  double joint_margin_rad = 0.03;        // what a plan keeps from the joints' ranges
-  double knee_min_rad = 0.08;            // and from the stretched leg
-  double speed_share = 0.95;             // of the drives' speed that a plan may use
+  std::int32_t knot_ticks = 10;    // eq. (37): 20 ms
+  double joint_margin_rad = 0.03;  // what a plan keeps from the joints' ranges
+  double knee_min_rad = 0.08;      // and from the stretched leg
+  double speed_share = 0.95;       // of the drives' speed that a plan may use
 };
 
 // Toe-down angles that are tried, in this order; half of each on the floor.
 inline constexpr std::array<double, 5> kToeDown_rad{0.3, 0.2, 0.4, 0.1, 0.5};
+inline constexpr std::array<double, 5> kPassingToeDown_rad{0.4, 0.5, 0.3, 0.6, 0.2};
 
 struct StepPlan {
   StepGoal goal;

@@ -115,9 +115,9 @@ FootholdSet IdealClimb::search() const {
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       Foothold& hold = feet[index_of(foot)];
       hold.position_m =
-          world_T_true *
-          Vec3{stairs.riser_x_m(step) + setup_.map_shift_x_m + inset_m - kContactRectangle.heel_x_m,
-               middle_m + side_sign(foot) * kStanceHalfWidth_m, stairs.top_m(step) + setup_.map_shift_z_m};
+          world_T_true * Vec3{stairs.riser_x_m(step) + setup_.map_shift_x_m + inset_m - kContactRectangle.heel_x_m,
+                              middle_m + side_sign(foot) * kStanceHalfWidth_m,
+                              stairs.top_m(step) + setup_.map_shift_z_m};
       hold.yaw_rad = yaw_of(world_T_true.R);
       hold.polygon_id = static_cast<std::uint32_t>(step) + 10;
       hold.last_seen_ns = set.map_stamp_ns;
