@@ -174,6 +174,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
 
   SimRobot robot(sim_options(options));
   Params params;
+  params.gait.planner.pattern = options.gait;
   params.self_filter = options.self_filter;
   params.estimator.infer_forces = options.infer_contacts;
   params.estimate_mount = options.estimate_mount;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "algorithms/gait/climb_planner.hpp"
 #include "sim_stub/camera_profile.hpp"
 #include "sim_stub/noise_kind.hpp"
 #include "sim_stub/plant.hpp"
@@ -13,13 +14,15 @@
 
 namespace polygmap::sim {
 
+[[nodiscard]] inline std::string name_of(GaitPattern gait) { return gait == GaitPattern::kSingleStep ? "ss" : "ds"; }
+
 struct ClimbOptions {
   StairParams stairs;
   std::uint64_t seed = 1;
   DepthNoise noise = DepthNoise::kWhite;
   PlantKind plant = PlantKind::kKinematic;
   std::optional<Push> push;
-  std::string gait = "ds";
+  GaitPattern gait = GaitPattern::kDoubleStep;
   std::string out_dir;          // empty: no files
   double time_limit_s = 150.0;  // simulated
   bool threaded_render = true;

@@ -321,10 +321,10 @@ void ClimbReport::observe_stance(const Truth& truth) {
 }
 
 void ClimbReport::observe_steps_climbed(const Truth& truth) {
-  const int step = truth.step_index[0];
-  bool rests = step >= 0 && step == truth.step_index[1] && truth.in_contact[0] && truth.in_contact[1];
+  const int step = std::min(truth.step_index[0], truth.step_index[1]);
+  bool rests = step >= 0 && truth.in_contact[0] && truth.in_contact[1];
   for (std::size_t foot = 0; rests && foot < kFootCount; ++foot) {
-    rests = sole_margin_m(truth.true_T_sole[foot], world_, step) >= 0.0;
+    rests = sole_margin_m(truth.true_T_sole[foot], world_, truth.step_index[foot]) >= 0.0;
   }
   if (!rests) {
     resting_step_ = -1;
@@ -346,12 +346,22 @@ void ClimbReport::observe_trails(const Truth& truth) {
   for (std::size_t foot = 0; foot < kFootCount; ++foot) sole_trail_m_[foot].push_back(truth.true_T_sole[foot].p_m);
 }
 
+int ClimbReport::meant_step(Foot foot, const Flight& flight) const {
+  if (!flight_onto_tread_) return flight.from_step;
+  if (footsteps_.empty() || footsteps_.back().foot != foot) return flight.from_step + 1;
+  const auto off_m = [this](const Step& step) {
+    return std::abs(footsteps_.back().true_T_planned.p_m.z() - step.height_m);
+  };
+  const auto nearest = std::ranges::min_element(world_.steps, {}, off_m);
+  return static_cast<int>(nearest - world_.steps.begin());
+}
+
 double ClimbReport::clearance_min_m() const {
   if (!swung_) return kNotMeasured;  // the feet stand clear of the stairs, which says nothing
   double least_m = clearance_min_m_;
-  for (const std::optional<Flight>& flight : flights_) {
-    // The run ended in the air: the module's word tells which tread was meant.
-    if (flight) least_m = flight_clearance_m(*flight, flight->from_step + (flight_onto_tread_ ? 1 : 0), least_m);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const std::optional<Flight>& flight = flights_[index_of(foot)];
+    if (flight) least_m = flight_clearance_m(*flight, meant_step(foot, *flight), least_m);  // the run ended in the air
   }
   return std::isinf(least_m) ? kNotMeasured : least_m;
 }

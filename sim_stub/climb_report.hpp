@@ -81,6 +81,8 @@ class ClimbReport {
   // The least of a flight that ended on to_step, and of at_most_m.
   [[nodiscard]] double flight_clearance_m(const Flight& flight, int to_step, double at_most_m) const;
   [[nodiscard]] double clearance_min_m() const;
+  // The step that a foot in the air is meant for, by the module's word.
+  [[nodiscard]] int meant_step(Foot foot, const Flight& flight) const;
   void judge(ClimbSummary& summary, const std::string& heap_first_caller) const;
 
   StairWorld world_;

@@ -107,7 +107,7 @@ Json to_json(const ClimbSummary& s) {
   j["fell"] = s.fell;
   j["ended_by"] = s.ended_by;
   j["plant"] = name_of(s.options.plant);
-  j["gait"] = s.options.gait;
+  j["gait"] = name_of(s.options.gait);
   j["seed"] = s.options.seed;
   j["arguments"] = arguments_json(s.options);
   const CameraFigures& camera = s.camera;

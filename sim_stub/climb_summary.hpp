@@ -77,7 +77,7 @@ struct ClimbSummary {
   ClimbOptions options;
   CameraFigures camera;
   int steps_total = 0;
-  int steps_climbed = 0;  // both true soles rested on it at once, inside its edges
+  int steps_climbed = 0;  // both true soles rested on it or above, inside their treads' edges
   double climb_time_s = kNotMeasured;
   double seconds_per_step = kNotMeasured;
   double plane_rate_hz = 0.0;

@@ -366,8 +366,8 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
   std::string title = std::to_string(s.steps_climbed) + " of " + std::to_string(s.steps_total) + " steps climbed";
   add_text(out, kBorder_px + 90.0, 44.0, 21.0, "font-weight=\"600\" fill=\"#222\"", title);
   add_text(out, kWidth_px - kBorder_px, 44.0, 13.0, "text-anchor=\"end\" fill=\"#6b6b6b\"",
-           "gait " + s.options.gait + ", seed " + std::to_string(s.options.seed) + ", " + name_of(s.options.plant) +
-               " plant");
+           "gait " + name_of(s.options.gait) + ", seed " + std::to_string(s.options.seed) + ", " +
+               name_of(s.options.plant) + " plant");
   double text_px = 75.0;
   for (const std::string& line : reason) {
     add_text(out, kBorder_px, text_px, 14.5, "fill=\"#333\"", line);

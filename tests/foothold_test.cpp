@@ -247,6 +247,41 @@ TEST_F(FootholdTest, Eq26_PStar_IsOnTheNearestHigherTreadAndPStarStarOnTheNext) 
   }
 }
 
+TEST_F(FootholdTest, Eq26_PStarStarOfBothFeet_LieSideBySideOnTheTreadAfterTheNext) {
+  const Stairs s{};
+  MapSnapshot map = ideal_map(s);
+  map.drift_m = {0.02, -0.01, 0.03};
+  FootholdSearch::Query q = standing(s, 0);
+  q.world_T_base.p_m += map.drift_m;
+  for (Transform& sole : q.world_T_sole) sole.p_m += map.drift_m;
+  const FootholdSet& r = search(map, q);
+  ASSERT_TRUE(r.has_p_star_star);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const Foothold& f = r.p_star_star_feet[index_of(foot)];
+    EXPECT_NEAR(f.position_m.x(), s.nosing_x_m(2) + 0.0872 + map.drift_m.x(), 0.001);
+    EXPECT_NEAR(f.position_m.z(), 2 * s.rise_m + map.drift_m.z(), 1e-9);
+    EXPECT_NEAR(f.position_m.y(), r.p_star_feet[index_of(foot)].position_m.y(), 0.02);
+    EXPECT_EQ(f.polygon_id, r.p_star_star.polygon_id);
+    EXPECT_GT(f.clearance_m, 0.010);
+  }
+}
+
+TEST_F(FootholdTest, SecondRiseTooHigh_IsNoPStarStar) {
+  const Stairs s{};
+  MapSnapshot map = ideal_map(s);
+  for (MapPolygon& polygon : map.polygons) {
+    const bool above = polygon.surface.kind == SurfaceKind::kTread && polygon.surface.centroid_m.z() > 1.5 * s.rise_m;
+    if (!above) continue;
+    polygon.surface.centroid_m.z() += 0.07;
+    polygon.surface.d_m -= 0.07;
+    for (Vec3& v : polygon.surface.polygon) v.z() += 0.07;
+  }
+  const FootholdSet& r = search(map, standing(s, 0));
+  EXPECT_EQ(r.obstruction, Obstruction::kNone);
+  EXPECT_TRUE(r.has_p_star);
+  EXPECT_FALSE(r.has_p_star_star);
+}
+
 TEST_F(FootholdTest, Eq26_SplitStance_SearchesFromTheFootThatStays) {
   const Stairs s{};
   FootholdSearch::Query q = standing(s, 1);

@@ -188,6 +188,47 @@ TEST(StepProof, TrailingSwingWithALevelSole_MeetsTheAnklesLimitThatAPitchedOneKe
   EXPECT_GT(ankle_margin_rad(kToeDown_rad[0]), StepParams{}.joint_margin_rad);
 }
 
+// The rear foot, on the floor, passes the one that has just landed on the first tread.
+struct PassingStep {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  StepGoal goal, trailing;
+};
+PassingStep passing_step(double rise_m, double ahead_m) {
+  PassingStep step;
+  (void)stair_step(StepKind::kTrailing, rise_m, ahead_m, step.soles, step.from);
+  step.goal = {StepKind::kPassing, Foot::kRight, {{ahead_m + 0.28, -0.1, 2 * rise_m}, 0}, {}};
+  step.trailing = {StepKind::kTrailing, Foot::kLeft, {{ahead_m + 0.28, 0.1, 2 * rise_m}, 0}, {}};
+  return step;
+}
+StepSearch searched(const PassingStep& step, const StepParams& params = {}) {
+  StepSearch search;
+  search.begin({}, params, step.goal, step.trailing, params.stair_shift_ticks, step.from, step.soles);
+  for (int i = 0; i < 1000 && search.step() == StepSearch::State::kSearching; ++i) {
+  }
+  return search;
+}
+
+TEST(StepSearch, PassingStepOfTheStairs_IsFoundWithTheTrailingStepAfterIt) {
+  for (const double rise : {0.10, 0.13, 0.15, 0.17}) {
+    for (const double ahead : {0.27, 0.285, 0.308}) {
+      const StepSearch search = searched(passing_step(rise, ahead));
+      EXPECT_EQ(search.state(), StepSearch::State::kFound) << rise << " " << ahead;
+      EXPECT_EQ(search.plan().goal.kind, StepKind::kPassing);
+      EXPECT_EQ(search.plan().swing_ticks, StepParams{}.passing_swing_ticks);
+    }
+  }
+}
+
+TEST(StepSearch, PassingStepThatIsPossibleWithNoTrailingStepAfterIt_IsImpossible) {
+  PassingStep step = passing_step(0.13, 0.28);
+  step.trailing.target.position_m.z() += 0.3;
+  EXPECT_EQ(searched(step).state(), StepSearch::State::kImpossible);
+  StepParams fast;
+  fast.passing_swing_ticks = 300;
+  EXPECT_EQ(searched(passing_step(0.13, 0.28), fast).state(), StepSearch::State::kImpossible);
+}
+
 TEST(StepSearch, RiseBeyondTheLegs_IsImpossibleBeforeTheFirstLiftOff) {
   for (const double rise : {0.30, 0.5}) {
     std::array<Transform, kFootCount> soles;

@@ -194,7 +194,6 @@ TEST(ClimbCommand, BadCount_IsRefused) {
 }
 
 TEST(ClimbCommand, BadWord_IsRefused) {
-  expect_refused({"climb", "--gait", "ss"}, "single-step");
   expect_refused({"climb", "--gait", "trot"}, "--gait");
   expect_refused({"climb", "--plant", "rubber"}, "--plant");
   expect_refused({"climb", "--push", "5,x,10"}, "--push");  // the kinematic plant

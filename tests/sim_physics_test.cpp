@@ -281,6 +281,60 @@ TEST(PhysicalStop, StepBeyondTheLegs_StandsOnBothFeetAndSaysSo) {
   EXPECT_TRUE(stands_for(climb, 3.0)) << climb.truth().fall_reason;
 }
 
+Gait::Params single_step() {
+  Gait::Params params;
+  params.planner.pattern = GaitPattern::kSingleStep;
+  return params;
+}
+SimOptions four_steps(std::uint64_t seed) {
+  SimOptions options = few_steps(seed);
+  options.stairs.steps = 4;
+  return options;
+}
+
+TEST(PhysicalSingleStep, WithEverySensorsErrors_OneFootOnEveryStepAndBothOnTheLast) {
+  for (const std::uint64_t seed : {1U, 4U}) {
+    PhysicalClimb climb(four_steps(seed), single_step());
+    climb.run(60.0);
+    EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
+    EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+    EXPECT_EQ(climb.status().treads_climbed, 4U);
+    EXPECT_EQ(climb.truth().step_index[0], 3);
+    EXPECT_EQ(climb.truth().step_index[1], 3);
+    EXPECT_TRUE(stands_for(climb, 1.0));
+  }
+}
+
+TEST(PhysicalSingleStep, StopRequestedAtAnyPhase_EndsOnBothFeet) {
+  for (const double after_s : {0.0, 0.3, 0.6, 0.9, 1.0, 1.2}) {
+    if (test::kSlowMachine && after_s != 0.6) continue;
+    PhysicalClimb climb(four_steps(2), single_step());
+    ASSERT_TRUE(run_to_swing_onto(climb, 3));
+    climb.run(after_s);
+    climb.gait().request_stop();
+    climb.run(5.0);
+    EXPECT_EQ(climb.status().phase, GaitPhase::kStopped) << after_s;
+    EXPECT_TRUE(stands_for(climb, 3.0)) << after_s << climb.truth().fall_reason;
+  }
+}
+
+TEST(PhysicalSingleStep, PerceptionLostInSwing_EndsBesideTheFrontFoot) {
+  for (const std::uint32_t nth : {1U, 2U, 3U}) {
+    PhysicalClimb climb(four_steps(2), single_step());
+    ASSERT_TRUE(run_to_swing_onto(climb, nth));
+    climb.tamper_footholds = [](FootholdSet& set) {
+      set.has_p_star = set.has_p_star_star = false;
+      set.obstruction = Obstruction::kNothingSeen;
+    };
+    climb.run(20.0);
+    EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+    EXPECT_EQ(climb.status().stop_reason, Obstruction::kNothingSeen);
+    EXPECT_EQ(climb.status().treads_climbed, nth);
+    EXPECT_TRUE(stands_for(climb, 3.0)) << climb.truth().fall_reason;
+    EXPECT_EQ(climb.truth().step_index[0], climb.truth().step_index[1]);
+  }
+}
+
 // Rises of the map 10 mm off, more with every stair, and no news: it falls or stops, and does not climb on.
 TEST(PhysicalClimb, MapFrozenWithAWrongRise_StopsOrFalls) {
   for (const double per_stair_m : {0.010, -0.010}) {

@@ -92,6 +92,51 @@ TEST(ClimbReport, SoleMargin_IsOfTheWorstCornerAndNegativeMarginFails) {
   EXPECT_EQ(s.steps_climbed, 0) << "a sole over the edge does not rest inside it";
 }
 
+TEST(ClimbReport, OneFootOnEveryStep_CountsTheStepsThatBothFeetHaveReached) {
+  ScriptedClimb climb(plain_stairs(3));
+  climb.wait(200 * kNsPerMs);
+  climb.apex_m = 0.2;
+  const auto onto = [&](int step, Foot foot) {
+    climb.swing(foot, climb.on_step(step, foot), step);
+    climb.wait(100 * kNsPerMs);
+    return climb.finish().steps_climbed;
+  };
+  EXPECT_EQ(onto(0, Foot::kLeft), 0);
+  EXPECT_EQ(onto(1, Foot::kRight), 1);
+  EXPECT_EQ(onto(2, Foot::kLeft), 2);
+  EXPECT_EQ(onto(2, Foot::kRight), 3);
+  const ClimbSummary s = climb.finish();
+  EXPECT_TRUE(s.pass) << s.reason;
+  EXPECT_NEAR(s.climb_time_s, 4 * 0.400 + 3 * 0.100 - 0.002, 1e-9);
+  EXPECT_EQ(s.footsteps.size(), 4U);
+}
+
+TEST(ClimbReport, PassingFoot_MustClearTheTreadItPasses) {
+  for (const bool ends_in_the_air : {false, true}) {
+    ScriptedClimb climb(plain_stairs(3));
+    climb.wait(200 * kNsPerMs);
+    climb.apex_m = 0.2;
+    climb.swing(Foot::kLeft, climb.on_step(0, Foot::kLeft), 0);
+    climb.swing(Foot::kRight, climb.on_step(1, Foot::kRight), 1);
+    EXPECT_GT(climb.finish().swing_clearance_min_m, 0.0);
+    if (ends_in_the_air) {
+      climb.gait.step.sequence += 1;
+      climb.gait.step.foot = Foot::kLeft;
+      climb.gait.step.touch_down_stamp_ns = 0;
+      climb.gait.step.target.position_m = climb.world_T_true() * climb.on_step(2, Foot::kLeft).p_m;
+      climb.truth.in_contact[0] = false;
+      climb.truth.true_T_sole[0].p_m = Vec3(0.28 - 0.179 + 0.004, 0.1, 0.20);  // 4 mm into step 2 on the way to step 3
+      climb.tick();
+      EXPECT_NEAR(climb.finish().swing_clearance_min_m, -0.004, kUm);
+    } else {
+      climb.apex_m = -0.14;  // as high as step 2 but for a centimetre
+      climb.swing(Foot::kLeft, climb.on_step(2, Foot::kLeft), 2);
+      EXPECT_LT(climb.finish().swing_clearance_min_m, -0.005);
+      EXPECT_FALSE(climb.finish().pass);
+    }
+  }
+}
+
 TEST(ClimbReport, BriefTouch_IsNoRest) {
   ScriptedClimb climb(plain_stairs(1));
   climb.wait(100 * kNsPerMs);

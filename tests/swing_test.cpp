@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "algorithms/gait/step_plan.hpp"
+
 namespace polygmap {
 namespace {
 
@@ -79,6 +83,38 @@ TEST(Swing, RiserAtTheToe_RisesBeforeItGoesForward) {
       if (std::abs(toe_x - kCollisionRectangle.toe_x_m - 0.011) < 0.003 && i > 50) {
         EXPECT_GT(lowest_m(sole), c.rise_m + 0.04) << i;
       }
+    }
+  }
+}
+
+// The foot stands 14 mm before the riser of the tread that the other foot stands on, and lands on the one beyond.
+TEST(Swing, TwoRisersAhead_ClearsBothNosings) {
+  constexpr double kTread_m = 0.28, kGap_m = 0.014;
+  for (const double rise_m : {0.10, 0.13, 0.17}) {
+    for (const double toe_down_rad : kPassingToeDown_rad) {
+      const StepParams params;
+      SwingShape shape = params.passing_swing;
+      shape.toe_down_rad = toe_down_rad;
+      Swing swing;
+      swing.plan({Mat3::Identity(), {0, 0.1, 0}}, {{2 * kTread_m, 0.1, 2 * rise_m}, 0.0}, shape,
+                 params.passing_swing_ticks);
+      const double riser_x_m = kCollisionRectangle.toe_x_m + kGap_m;
+      double middle_m = 1e9, last_m = 1e9;  // least distance of a corner from the solid behind each riser
+      for (int i = 0; i <= params.passing_swing_ticks; ++i) {
+        const Transform sole = swing.at(i);
+        const bool lands = i > params.passing_swing.landing_begin * params.passing_swing_ticks;
+        for (const double x : {kCollisionRectangle.heel_x_m, kCollisionRectangle.toe_x_m}) {
+          for (const double z : {0.0, kCollisionHeight_m}) {
+            const Vec3 p = sole * Vec3{x, 0, z};
+            middle_m = std::min(middle_m, std::max(riser_x_m - p.x(), p.z() - rise_m));
+            if (!lands) {
+              last_m = std::min(last_m, std::max(riser_x_m + kTread_m - p.x(), p.z() - 2 * rise_m));
+            }
+          }
+        }
+      }
+      EXPECT_GT(middle_m, 0.005) << rise_m << " " << toe_down_rad;
+      EXPECT_GT(last_m, 0.015) << rise_m << " " << toe_down_rad;
     }
   }
 }

@@ -54,9 +54,10 @@ struct FootholdSet {
   Foothold p_star_star;           // on the next higher one: where one foot per tread will step
   bool has_p_star = false;
   bool has_p_star_star = false;
-  std::array<Foothold, kFootCount> p_star_feet;  // p* spread to left and right sole, both on the same tread
-  TreadView tread;                               // of p*
-  double theta_rel_rad = 0.0;                    // eq. 27: bearing of p* from the robot, relative to its heading
+  std::array<Foothold, kFootCount> p_star_feet;       // p* spread to left and right sole, both on the same tread
+  std::array<Foothold, kFootCount> p_star_star_feet;  // p** likewise
+  TreadView tread;                                    // of p*
+  double theta_rel_rad = 0.0;                         // eq. 27: bearing of p* from the robot, relative to its heading
   Obstruction obstruction = Obstruction::kNothingSeen;
   double measured_rise_m = 0.0;   // stance to the next tread, valid unless nothing was seen
   double measured_tread_m = 0.0;  // nosing to what rises behind it; 0: nothing is mapped there

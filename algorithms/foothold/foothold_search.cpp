@@ -19,10 +19,11 @@ bool valid(const FootholdSearch::Query& q) noexcept {
 
 // From the map's world to that of the pose.
 FootholdSet moved(FootholdSet set, const Vec3& by_m) noexcept {
-  for (Vec3* p : {&set.p_star.position_m, &set.p_star_star.position_m, &set.p_star_feet[0].position_m,
-                  &set.p_star_feet[1].position_m, &set.tread.nosing_a_m, &set.tread.nosing_b_m}) {
+  for (Vec3* p : {&set.p_star.position_m, &set.p_star_star.position_m, &set.tread.nosing_a_m, &set.tread.nosing_b_m}) {
     *p += by_m;
   }
+  for (Foothold& foot : set.p_star_feet) foot.position_m += by_m;
+  for (Foothold& foot : set.p_star_star_feet) foot.position_m += by_m;
   return set;
 }
 
@@ -265,7 +266,7 @@ double FootholdSearch::middle_m(const LevelSurface& tread) const noexcept {
 // (26) picks the tread and says that a foot fits there; its nearest cell is no aim, being the one with the least room
 // at the heel: least sole margins of 7.2 and 5.5 mm in two climbs of ten steps, against 11.7 and 9.7 mm centred (seeds
 // 1 and 4, both noises).
-bool FootholdSearch::place_feet(const LevelSurface& tread) noexcept {
+bool FootholdSearch::place_feet(const LevelSurface& tread, Feet& feet) const noexcept {
   const double middle_m = this->middle_m(tread);
   constexpr int kSpacings = 7;
   for (int i = 0; i < kSpacings; ++i) {
@@ -284,7 +285,7 @@ bool FootholdSearch::place_feet(const LevelSurface& tread) noexcept {
     if (low_m > high_m) continue;
     const double placed_m = std::min(std::max(middle_m, low_m), high_m);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      pending_.p_star_feet[index_of(foot)] = foothold_at(tread, along_m, placed_m + side_sign(foot) * half_m);
+      feet[index_of(foot)] = foothold_at(tread, along_m, placed_m + side_sign(foot) * half_m);
     }
     return true;
   }
@@ -329,21 +330,8 @@ Obstruction FootholdSearch::without_next() const noexcept {
   return looked ? Obstruction::kTop : Obstruction::kNothingSeen;
 }
 
-Obstruction FootholdSearch::judge_next() noexcept {
-  const LevelSurface& tread = levels_[next_];
-  pending_.measured_rise_m = tread.height_m - z_foot_;
-  pending_.measured_tread_m = tread.depth_m;
-  pending_.tread = {tread.nosing_a_m, tread.nosing_b_m};
-  if (pending_.measured_rise_m > params_.rise_max_m) return Obstruction::kRiseTooHigh;
-  if (!tread.has_nosing) return Obstruction::kNothingSeen;
-  if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return Obstruction::kTreadTooShort;
-  if (!place_feet(tread)) return Obstruction::kTooNarrow;
-  const Foothold& foot = pending_.p_star_feet[index_of(query_.stance)];
-  if (query_.climbing) {
-    if (foot.nosing_distance_m - tread.along_m(sole_.origin_m()) > params_.step_max_m)
-      return without_next();  // another flight
-  }
-  for (const Foothold& f : pending_.p_star_feet) {
+Obstruction FootholdSearch::judge_feet(const LevelSurface& tread, const Feet& feet) const noexcept {
+  for (const Foothold& f : feet) {
     // Reaching over the end of what has been seen of it.
     if (f.clearance_m < params_.clearance_min_m || f.toe_clearance_m < params_.clearance_min_m) {
       return Obstruction::kNothingSeen;
@@ -354,6 +342,25 @@ Obstruction FootholdSearch::judge_next() noexcept {
       return Obstruction::kEdgeUncertain;
     }
   }
+  return Obstruction::kNone;
+}
+
+Obstruction FootholdSearch::judge_next() noexcept {
+  const LevelSurface& tread = levels_[next_];
+  pending_.measured_rise_m = tread.height_m - z_foot_;
+  pending_.measured_tread_m = tread.depth_m;
+  pending_.tread = {tread.nosing_a_m, tread.nosing_b_m};
+  if (pending_.measured_rise_m > params_.rise_max_m) return Obstruction::kRiseTooHigh;
+  if (!tread.has_nosing) return Obstruction::kNothingSeen;
+  if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return Obstruction::kTreadTooShort;
+  if (!place_feet(tread, pending_.p_star_feet)) return Obstruction::kTooNarrow;
+  const Foothold& foot = pending_.p_star_feet[index_of(query_.stance)];
+  if (query_.climbing) {
+    if (foot.nosing_distance_m - tread.along_m(sole_.origin_m()) > params_.step_max_m)
+      return without_next();  // another flight
+  }
+  const Obstruction feet = judge_feet(tread, pending_.p_star_feet);
+  if (feet != Obstruction::kNone) return feet;
   return has_p_star_cell_ ? Obstruction::kNone : Obstruction::kNothingSeen;
 }
 
@@ -395,7 +402,9 @@ void FootholdSearch::finish() noexcept {
     const LevelSurface& tread = levels_[next_next_];
     const double lateral_m = tread.lateral_m(p_star_star_cell_m_);
     pending_.p_star_star = foothold_at(tread, aim_along_m(tread, lateral_m, lateral_m), lateral_m);
-    pending_.has_p_star_star = true;
+    pending_.has_p_star_star = tread.height_m - levels_[next_].height_m <= params_.rise_max_m &&
+                               place_feet(tread, pending_.p_star_star_feet) &&
+                               judge_feet(tread, pending_.p_star_star_feet) == Obstruction::kNone;
   }
   if (map_.stamp_ns != 0 && query_.now_ns - map_.stamp_ns > params_.stale_after_ns) {
     pending_.obstruction = Obstruction::kMapStale;

@@ -92,7 +92,9 @@ class FootholdSearch {
   [[nodiscard]] double aim_along_m(const LevelSurface& tread, double left_m, double right_m) const noexcept;
   [[nodiscard]] Foothold foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept;
   [[nodiscard]] double middle_m(const LevelSurface& tread) const noexcept;
-  [[nodiscard]] bool place_feet(const LevelSurface& tread) noexcept;
+  using Feet = std::array<Foothold, kFootCount>;
+  [[nodiscard]] bool place_feet(const LevelSurface& tread, Feet& feet) const noexcept;
+  [[nodiscard]] Obstruction judge_feet(const LevelSurface& tread, const Feet& feet) const noexcept;
   [[nodiscard]] static bool carries(const Upright& riser, const LevelSurface& tread) noexcept;
   [[nodiscard]] bool blocked_by_upright(double next_distance_m, double& top_m) const noexcept;
   [[nodiscard]] Obstruction without_next() const noexcept;

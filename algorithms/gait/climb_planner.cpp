@@ -15,6 +15,8 @@ SolePose in_odom(const Transform& world_T_odom, const Foothold& foothold) noexce
   return sole_pose(world_T_odom.inverse() * world_T_sole);
 }
 
+bool usable(const std::array<Foothold, kFootCount>& feet) noexcept { return usable(feet[0]) && usable(feet[1]); }
+
 double measured(const FootholdSet& set) noexcept {
   switch (set.obstruction) {
     case Obstruction::kRiseTooHigh:
@@ -62,6 +64,36 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
   goal.foothold = same_tread ? seen : trailing_foothold_;
   goal.target = in_odom(situation.world_T_odom, goal.foothold);
   return decision;
+}
+
+// The rear foot's p** is the standing foot's p*. A search from before the standing foot landed has its tread for p* and
+// the one beyond for p**: the weight need not wait for the next one.
+bool ClimbPlanner::passing_step(const Situation& situation, const FootholdSet& footholds,
+                                Decision& decision) const noexcept {
+  if (params_.pattern != GaitPattern::kSingleStep || passing_refused_) return false;
+  if (footholds.map_stamp_ns <= 0 || situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) return false;
+  if (footholds.obstruction != Obstruction::kNone || !footholds.has_p_star || !usable(footholds.p_star_feet)) {
+    return false;
+  }
+  const Foot foot = other(leading_);
+  const double standing_m = situation.soles[index_of(leading_)].position_m.z();
+  const auto rise_m = [&](const std::array<Foothold, kFootCount>& feet) {
+    return in_odom(situation.world_T_odom, feet[index_of(foot)]).position_m.z() - standing_m;
+  };
+  const auto* feet = &footholds.p_star_feet;
+  if ((*feet)[0].polygon_id == tread_id_ || rise_m(*feet) < params_.min_rise_m) {
+    feet = &footholds.p_star_star_feet;
+    if (!footholds.has_p_star_star || !usable(*feet) || rise_m(*feet) < params_.min_rise_m) return false;
+  }
+  decision.has_step = true;
+  decision.rise_m = rise_m(*feet);
+  const auto goal = [&](StepKind kind, Foot f) -> StepGoal {
+    const Foothold& foothold = (*feet)[index_of(f)];
+    return {kind, f, in_odom(situation.world_T_odom, foothold), foothold};
+  };
+  decision.goal = goal(StepKind::kPassing, foot);
+  decision.trailing = goal(StepKind::kTrailing, leading_);
+  return true;
 }
 
 Foot ClimbPlanner::leading_foot(const Situation& situation, const SolePair& targets) const noexcept {
@@ -136,9 +168,10 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
 }
 
 ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const FootholdSet& footholds) const noexcept {
-  if (split_stance_) return trailing_step(situation, footholds);
-
   Decision decision;
+  if (split_stance_) {
+    return passing_step(situation, footholds, decision) ? decision : trailing_step(situation, footholds);
+  }
   decision.obstruction = footholds.obstruction;
   decision.measured_m = measured(footholds);
   if (footholds.map_stamp_ns <= 0) {
@@ -151,7 +184,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
   }
   if (decision.obstruction != Obstruction::kNone) return decision;
   const auto& feet = footholds.p_star_feet;
-  if (!footholds.has_p_star || !usable(feet[0]) || !usable(feet[1]) || !math::all_finite(footholds.tread.nosing_a_m) ||
+  if (!footholds.has_p_star || !usable(feet) || !math::all_finite(footholds.tread.nosing_a_m) ||
       !math::all_finite(footholds.tread.nosing_b_m)) {
     decision.obstruction = Obstruction::kNoStaircase;
     return decision;
@@ -177,7 +210,7 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
   last_swing_ = decision.goal.foot;
   const Vec3 travel_m = decision.goal.target.position_m - situation.soles[index_of(last_swing_)].position_m;
   if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < kCorrection_m) ++corrections_;
-  if (decision.goal.kind == StepKind::kLeading) {
+  if (leads(decision.goal.kind)) {
     leading_ = decision.goal.foot;
     has_leading_ = true;
     trailing_foothold_ = decision.trailing.foothold;
@@ -196,15 +229,18 @@ void ClimbPlanner::landed() noexcept {
     case StepKind::kFloor:
       ++floor_steps_;
       break;
+    case StepKind::kPassing:
+      ++treads_climbed_;
+      break;
     case StepKind::kLeading:
       split_stance_ = true;
       break;
     case StepKind::kTrailing:
-      split_stance_ = false;
-      tread_id_ = latched_.goal.foothold.polygon_id;
+      split_stance_ = passing_refused_ = false;
       ++treads_climbed_;
       break;
   }
+  if (onto_tread(latched_.goal.kind)) tread_id_ = latched_.goal.foothold.polygon_id;
 }
 
 }  // namespace polygmap

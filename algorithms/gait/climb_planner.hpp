@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which foot goes where next: the walk up to the stand-off before the stairs, then double support on every tread.
+// Which foot goes where next: the walk up to the stand-off before the stairs, then both feet on every tread (DS) or one
+// (SS).
 #pragma once
 
 #include "algorithms/core/footholds.hpp"
@@ -8,9 +9,13 @@
 
 namespace polygmap {
 
+// The paper's two gaits. A single step passes the standing foot and lands one tread beyond it.
+enum class GaitPattern : std::uint8_t { kDoubleStep, kSingleStep };
+
 class ClimbPlanner {
  public:
   struct Params {
+    GaitPattern pattern = GaitPattern::kDoubleStep;
     double stand_off_m = 0.032;      // collision toe to the first nosing or riser
     double min_stand_off_m = 0.022;  // nearer than this is not lined up, whatever the tolerance
     double line_up_m = 0.004;        // along the heading, of either foot
@@ -38,7 +43,7 @@ class ClimbPlanner {
   struct Decision {
     bool has_step = false;
     StepGoal goal;
-    StepGoal trailing;                             // the step after a leading one
+    StepGoal trailing;                             // the step that may come after a leading or passing one
     Obstruction obstruction = Obstruction::kNone;  // without a step: why
     double measured_m = 0.0;
     double rise_m = 0.0;  // of a leading step
@@ -50,12 +55,17 @@ class ClimbPlanner {
   void latched(const Situation& situation, const Decision& decision) noexcept;
   // The legs cannot do the step: the next ones on the floor are shorter. False when they are short already.
   bool shorten_floor_steps() noexcept;
+  // The legs cannot pass the standing foot: the next step ends beside it.
+  void refuse_passing() noexcept { passing_refused_ = true; }
   // Its foot stands.
   void landed() noexcept;
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
 
  private:
   [[nodiscard]] Decision trailing_step(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  // Past the standing foot onto the tread beyond it; false when there is none to be sure of.
+  [[nodiscard]] bool passing_step(const Situation& situation, const FootholdSet& footholds,
+                                  Decision& decision) const noexcept;
   [[nodiscard]] bool floor_goal(const Situation& situation, const FootholdSet& footholds,
                                 StepGoal& goal) const noexcept;
   [[nodiscard]] Foot leading_foot(const Situation& situation, const SolePair& targets) const noexcept;
@@ -66,8 +76,9 @@ class ClimbPlanner {
   Foot last_swing_ = Foot::kRight;
   Foot leading_ = Foot::kLeft;
   bool has_leading_ = false;
-  bool split_stance_ = false;   // the leading foot stands on a tread, the other one below: the trailing step ends this
-  std::uint32_t tread_id_ = 0;  // under the feet
+  bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this
+  bool passing_refused_ = false;
+  std::uint32_t tread_id_ = 0;  // under the foot that landed last
   std::uint32_t treads_climbed_ = 0;
   double stride_share_ = 1.0;  // of the floor step's limits
   std::uint32_t floor_steps_ = 0;

@@ -264,6 +264,10 @@ bool Gait::close_to_planned(const StepGoal& goal) const noexcept {
 
 void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexcept {
   if (search_.step() == StepSearch::State::kImpossible) {
+    if (decision_.goal.kind == StepKind::kPassing) {
+      planner_.refuse_passing();
+      return begin_shift(planner_.decide(situation(state), footholds), false);
+    }
     begin_hold();
     if (decision_.goal.kind == StepKind::kFloor && planner_.shorten_floor_steps()) return;
     const double rise_m = decision_.goal.kind == StepKind::kLeading ? decision_.rise_m : 0.0;
@@ -280,7 +284,8 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
   if (close_to_planned(decision.goal)) return lift_off(state, footholds, decision);
   // Over the other foot the weight has its whole way to go.
   const StepGoal& planned = decision_.goal;
-  begin_shift(decision, decision.goal.foot == planned.foot && decision.goal.kind == planned.kind);
+  begin_shift(decision,
+              decision.goal.foot == planned.foot && onto_tread(decision.goal.kind) == onto_tread(planned.kind));
 }
 
 void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
@@ -302,7 +307,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   LatchedStep& step = status_.step;
   step = {.sequence = step.sequence + 1,
           .foot = goal.foot,
-          .onto_tread = goal.kind != StepKind::kFloor,
+          .onto_tread = onto_tread(goal.kind),
           .latch_stamp_ns = now_ns_,
           .map_stamp_ns = footholds.map_stamp_ns,
           .target = goal.foothold,

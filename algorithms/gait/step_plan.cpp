@@ -9,18 +9,20 @@ namespace polygmap {
 
 StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePair& soles,
                    double toe_down_rad) noexcept {
-  const bool on_floor = goal.kind == StepKind::kFloor;
+  const bool on_floor = goal.kind == StepKind::kFloor, passing = goal.kind == StepKind::kPassing;
   const Foot stance = other(goal.foot);
   SolePair landed = soles;
   landed[index_of(goal.foot)] = goal.target;
 
   StepPlan plan;
   plan.goal = goal;
-  plan.shape = on_floor ? params.floor_swing : params.stair_swing;
+  plan.shape = on_floor ? params.floor_swing : passing ? params.passing_swing : params.stair_swing;
   plan.shift_ticks = on_floor ? params.floor_shift_ticks : params.stair_shift_ticks;
-  plan.swing_ticks = on_floor ? params.floor_swing_ticks : params.stair_swing_ticks;
-  plan.rise_ticks = plan.swing_ticks;
-  if (!on_floor) plan.rise_ticks = static_cast<std::int32_t>(params.rise_share * plan.swing_ticks);
+  plan.swing_ticks = on_floor  ? params.floor_swing_ticks
+                     : passing ? params.passing_swing_ticks
+                               : params.stair_swing_ticks;
+  const double rise_share = on_floor ? 1.0 : passing ? params.passing_rise_share : params.rise_share;
+  plan.rise_ticks = static_cast<std::int32_t>(rise_share * plan.swing_ticks);
   plan.toe_down_rad = toe_down_rad;
   plan.shape.toe_down_rad = on_floor ? 0.5 * toe_down_rad : toe_down_rad;
   const auto zmp_in = [&](Foot foot) -> Vec2 {
@@ -29,9 +31,9 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
     return (sole.position_m + rotation_z(sole.yaw_rad) * local_m).head<2>();
   };
   plan.zmp_stance_m = zmp_in(stance);
-  // After a leading step the weight goes on to that foot; after the others it may have to stop anywhere.
+  // After a step that leads the weight goes on to that foot; after the others it may have to stop anywhere.
   plan.zmp_next_m = zmp_in(goal.foot);
-  if (goal.kind != StepKind::kLeading) plan.zmp_next_m = 0.5 * (plan.zmp_next_m + plan.zmp_stance_m);
+  if (!leads(goal.kind)) plan.zmp_next_m = 0.5 * (plan.zmp_next_m + plan.zmp_stance_m);
   return plan;
 }
 
@@ -41,7 +43,7 @@ void plan_torso(const LegGeometry& geometry, const StepParams& params, const Sol
   landed[index_of(plan.goal.foot)] = plan.goal.target;
   plan.lift_off = torso_at(geometry, params.torso, soles, com.at(lift_off_tick + params.leave_ticks).position_m);
   plan.touch_down = torso_at(geometry, params.torso, landed, com.at(lift_off_tick + plan.swing_ticks).position_m);
-  if (plan.goal.kind != StepKind::kLeading) return;
+  if (!leads(plan.goal.kind)) return;
   // Rising with the foot gives the leading leg room to fold, at a lower knee speed.
   const double tall_m = soles[index_of(other(plan.goal.foot))].position_m.z() + params.torso.lead_height_m;
   plan.touch_down.position_m.z() = std::min(plan.touch_down.position_m.z(), tall_m);
@@ -177,7 +179,8 @@ void StepSearch::try_candidate() noexcept {
     from = TorsoTrajectory::at_rest({rotation_z(torso_landed_.yaw_rad), torso_landed_.position_m});
     TorsoTrajectory::set_horizontal(from, com_landed_);
   }
-  candidate_ = plan_step(params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, kToeDown_rad[shape_]);
+  const auto& toe_down_rad = goal.kind == StepKind::kPassing ? kPassingToeDown_rad : kToeDown_rad;
+  candidate_ = plan_step(params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, toe_down_rad[shape_]);
   if (!leading_found_) candidate_.shift_ticks = shift_ticks_;
   StepParams params = params_;
   if (leading_found_) params.knot_ticks *= kLookAhead;
@@ -209,7 +212,7 @@ StepSearch::State StepSearch::step() noexcept {
   } else {
     if (!leading_found_) plan_ = candidate_;
     if (goal_.kind == StepKind::kFloor && !leads_on()) return state_ = State::kImpossible;
-    if (leading_found_ || goal_.kind != StepKind::kLeading) return state_ = State::kFound;
+    if (leading_found_ || !leads(goal_.kind)) return state_ = State::kFound;
     leading_found_ = true;
     com_landed_ = proof_.knots().com_at_landing();
     torso_landed_ = proof_.knots().torso_at_landing();

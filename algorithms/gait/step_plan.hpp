@@ -17,7 +17,13 @@ enum class StepKind : std::uint8_t {
   kFloor,     // while walking up
   kLeading,   // the first foot onto the next tread
   kTrailing,  // the second, beside it
+  kPassing,   // or past it onto the tread beyond
 };
+[[nodiscard]] constexpr bool onto_tread(StepKind kind) noexcept { return kind != StepKind::kFloor; }
+// It lands higher than the other foot stands, and the weight goes on to it.
+[[nodiscard]] constexpr bool leads(StepKind kind) noexcept {
+  return kind == StepKind::kLeading || kind == StepKind::kPassing;
+}
 
 struct StepGoal {
   StepKind kind = StepKind::kFloor;
@@ -35,8 +41,21 @@ struct StepParams {
                          .landing_begin = 0.55,
                          .clearance_m = 0.05,
                          .retreat_m = 0.0};
-  std::int32_t stair_shift_ticks = 195;  // 0.39 s of double support
-  std::int32_t stair_swing_ticks = 450;  // 0.90 s
+  // Two rises up and past the nosing of the tread that the other foot stands on.
+  SwingShape passing_swing{.lift_end = 0.67,
+                           .forward_begin = 0.16,
+                           .forward_end = 0.88,
+                           .landing_begin = 0.74,
+                           .clearance_m = 0.045,
+                           .retreat_m = 0.02,
+                           .retreat_end = 0.25,
+                           .toe_down_begin = 0.01,
+                           .toe_down_full = 0.29,
+                           .toe_up_begin = 0.30,
+                           .toe_up_end = 0.70};
+  std::int32_t stair_shift_ticks = 195;    // 0.39 s of double support
+  std::int32_t stair_swing_ticks = 450;    // 0.90 s
+  std::int32_t passing_swing_ticks = 460;  // 0.92 s
   std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
   ComPlan::Params com;
@@ -46,14 +65,16 @@ struct StepParams {
   std::int32_t lift_hold_ticks = 15;     // and the weight is over the stance foot that long before the other one lifts
   std::int32_t leave_ticks = 30;         // the rear leg still reaches the ground so long after its foot has left it
   double rise_share = 0.5;               // of a swing onto a tread in which the torso rises, to give the foot room
-  std::int32_t knot_ticks = 10;          // eq. (37): 20 ms
-  double joint_margin_rad = 0.03;        // what a plan keeps from the joints' ranges
-  double knee_min_rad = 0.08;            // and from the stretched leg
-  double speed_share = 0.95;             // of the drives' speed that a plan may use
+  double passing_rise_share = 0.6;
+  std::int32_t knot_ticks = 10;    // eq. (37): 20 ms
+  double joint_margin_rad = 0.03;  // what a plan keeps from the joints' ranges
+  double knee_min_rad = 0.08;      // and from the stretched leg
+  double speed_share = 0.95;       // of the drives' speed that a plan may use
 };
 
 // Toe-down angles that are tried, in this order; half of each on the floor.
 inline constexpr std::array<double, 5> kToeDown_rad{0.3, 0.2, 0.4, 0.1, 0.5};
+inline constexpr std::array<double, 5> kPassingToeDown_rad{0.4, 0.5, 0.3, 0.6, 0.2};
 
 struct StepPlan {
   StepGoal goal;
@@ -140,15 +161,15 @@ class StepProof {
   std::int32_t next_ = 0;
 };
 
-// Looks for a shape of a step that both legs can do, kKnotsPerCall knots per call. A leading step is only offered when
-// the trailing step after it is possible too.
+// Looks for a shape of a step that both legs can do, kKnotsPerCall knots per call. A leading or passing step is only
+// offered when the trailing step after it is possible too.
 class StepSearch {
  public:
   enum class State : std::uint8_t { kSearching, kFound, kImpossible };
   static constexpr std::int32_t kKnotsPerCall = 2;  // a tick of the gait costs half as much again
   static constexpr std::int32_t kLookAhead = 2;     // as far apart are the knots of a step that is proved again later
 
-  // trailing: the goal of the step after a leading one; ignored otherwise. shift_ticks: of the shift before the goal's
+  // trailing: the goal of the step after one that leads; ignored otherwise. shift_ticks: of the shift before the goal's
   // swing, as it will be done.
   void begin(const LegGeometry& geometry, const StepParams& params, const StepGoal& goal, const StepGoal& trailing,
              std::int32_t shift_ticks, const TorsoTrajectory::State& from,

@@ -30,6 +30,7 @@ struct ClimbArguments {
   ClimbOptions options;
   std::string noise = "white";
   std::string plant = "kinematic";
+  std::string gait = "ds";
   std::string contacts = "sensed";
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
@@ -62,7 +63,8 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       .add_option("--plant", a.plant,
                   "kinematic: follows and never tips over; mujoco: under physics, it balances or falls")
       ->capture_default_str();
-  climb.add_option("--gait", a.options.gait, "ds: both feet on every tread")->capture_default_str();
+  climb.add_option("--gait", a.gait, "ds: both feet on every tread; ss: one foot on every tread, both on the last")
+      ->capture_default_str();
   climb.add_option("--seed", a.options.seed, "Draws the start, the steps' jitter, the robot's errors and all noise")
       ->check(whole_number)
       ->capture_default_str();
@@ -149,8 +151,8 @@ std::string complaint(ClimbArguments& a) {
     return "--nosing must be shorter than the shortest tread, " + number(shortest_tread_m) + " m, not " +
            number(stairs.nosing_m) + ".";
   }
-  if (a.options.gait == "ss") return "The single-step gait (--gait ss) is not available yet: use --gait ds.";
-  if (a.options.gait != "ds") return "--gait must be ds, not \"" + a.options.gait + "\".";
+  if (a.gait != "ds" && a.gait != "ss") return "--gait must be ds or ss, not \"" + a.gait + "\".";
+  a.options.gait = a.gait == "ss" ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
   if (a.plant != "kinematic" && a.plant != "mujoco") {
     return "--plant must be kinematic or mujoco, not \"" + a.plant + "\".";
   }

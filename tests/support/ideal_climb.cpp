@@ -105,23 +105,29 @@ FootholdSet IdealClimb::search() const {
     set.obstruction = Obstruction::kTop;
     return set;
   }
-  const bool landing = next == stairs.steps - 1;
-  const double depth_m = landing ? stairs.landing_m : stairs.tread_m;
-  const double inset_m = std::min(0.5 * (depth_m - 0.252), 0.014);
   const double side_m = stairs.half_width_m - kStanceHalfWidth_m - 0.07;
   const double middle_m = math::clamp(lateral_m, -side_m, side_m);
   const double x_m = stairs.riser_x_m(next) + setup_.map_shift_x_m;
   const double z_m = stairs.top_m(next) + setup_.map_shift_z_m;
+  const auto place = [&](int step, std::array<Foothold, kFootCount>& feet) {
+    const double depth_m = step == stairs.steps - 1 ? stairs.landing_m : stairs.tread_m;
+    const double inset_m = std::min(0.5 * (depth_m - 0.252), 0.014);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      Foothold& hold = feet[index_of(foot)];
+      hold.position_m =
+          world_T_true * Vec3{stairs.riser_x_m(step) + setup_.map_shift_x_m + inset_m - kContactRectangle.heel_x_m,
+                              middle_m + side_sign(foot) * kStanceHalfWidth_m,
+                              stairs.top_m(step) + setup_.map_shift_z_m};
+      hold.yaw_rad = yaw_of(world_T_true.R);
+      hold.polygon_id = static_cast<std::uint32_t>(step) + 10;
+      hold.last_seen_ns = set.map_stamp_ns;
+    }
+  };
   set.has_p_star = true;
-  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    Foothold& hold = set.p_star_feet[index_of(foot)];
-    const Vec3 p{x_m + inset_m - kContactRectangle.heel_x_m, middle_m + side_sign(foot) * kStanceHalfWidth_m, z_m};
-    hold.position_m = world_T_true * p;
-    hold.yaw_rad = yaw_of(world_T_true.R);
-    hold.polygon_id = static_cast<std::uint32_t>(next) + 10;
-    hold.last_seen_ns = set.map_stamp_ns;
-  }
+  place(next, set.p_star_feet);
   set.p_star = set.p_star_feet[0];
+  set.has_p_star_star = next + 1 < stairs.steps;
+  if (set.has_p_star_star) place(next + 1, set.p_star_star_feet);
   set.tread.nosing_a_m = world_T_true * Vec3{x_m, stairs.half_width_m, z_m};
   set.tread.nosing_b_m = world_T_true * Vec3{x_m, -stairs.half_width_m, z_m};
   set.measured_rise_m = z_m - stance_m;

@@ -90,18 +90,24 @@ class PhysicalClimb {
       set.obstruction = Obstruction::kTop;
       return set;
     }
+    const auto place = [&](std::size_t index, std::array<Foothold, kFootCount>& feet) {
+      const Step& on = steps[index];
+      const double inset_m = std::min(0.5 * (on.back_x_m - on.nosing_x_m - 0.252), 0.014);
+      for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+        Foothold& hold = feet[index_of(foot)];
+        hold.position_m = world_T_true * Vec3{on.nosing_x_m + inset_m - kContactRectangle.heel_x_m,
+                                              side_sign(foot) * kStanceHalfWidth_m, on.height_m};
+        hold.yaw_rad = yaw_of(world_T_true.R);
+        hold.polygon_id = static_cast<std::uint32_t>(index) + 10;
+        hold.last_seen_ns = set.map_stamp_ns;
+      }
+    };
     const Step& step = steps[next];
-    const double inset_m = std::min(0.5 * (step.back_x_m - step.nosing_x_m - 0.252), 0.014);
     set.has_p_star = true;
-    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      Foothold& hold = set.p_star_feet[index_of(foot)];
-      hold.position_m = world_T_true * Vec3{step.nosing_x_m + inset_m - kContactRectangle.heel_x_m,
-                                            side_sign(foot) * kStanceHalfWidth_m, step.height_m};
-      hold.yaw_rad = yaw_of(world_T_true.R);
-      hold.polygon_id = static_cast<std::uint32_t>(next) + 10;
-      hold.last_seen_ns = set.map_stamp_ns;
-    }
+    place(next, set.p_star_feet);
     set.p_star = set.p_star_feet[0];
+    set.has_p_star_star = next + 1 < steps.size();
+    if (set.has_p_star_star) place(next + 1, set.p_star_star_feet);
     set.tread.nosing_a_m = world_T_true * Vec3{step.nosing_x_m, 0.6, step.height_m};
     set.tread.nosing_b_m = world_T_true * Vec3{step.nosing_x_m, -0.6, step.height_m};
     set.measured_rise_m = step.height_m - stance_m;
