@@ -27,7 +27,7 @@ void Gait::reset(const Params& params) noexcept {
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
   tick_ = shifts_ = wait_ticks_ = idle_ticks_ = 0;
-  armed_ = started_ = unloaded_ = stop_requested_ = false;
+  armed_ = started_ = unloaded_ = settles_ = stop_requested_ = false;
   // All else is set before it is read: by arming, by start() and by what begins a shift or a swing. A fresh object to
   // copy from would take 7 KB of stack.
 }
@@ -312,7 +312,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   tick_ = 0;
   shifts_ = 0;
   idle_ticks_ = 0;
-  unloaded_ = false;
+  unloaded_ = settles_ = false;
 }
 
 void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noexcept {
@@ -379,12 +379,22 @@ void Gait::touch_down(const StateEstimate& state) noexcept {
   status_.step.odom_T_executed =
       usable(state) ? state.odom_T_sole[i] : correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
   status_.stands[i] = true;
+  odom_T_landed_ = correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
+  settles_ = true;
   link_motion_.restart();  // the swing foot is where it was steered to, and stops
   planner_.landed();
   status_.treads_climbed = planner_.treads_climbed();
   status_.phase = GaitPhase::kDoubleSupport;
   carry_plan_to_odometry();
   begin_hold();
+}
+
+// Until it is pressed it would go along with what the base is off its plan: 5 mm towards the next riser.
+void Gait::hold_landed_foot(const JointFeedback& feedback) noexcept {
+  const std::size_t i = index_of(status_.step.foot);
+  settles_ = feedback.foot_force_n[i] < params_.hold_force_n &&
+             now_ns_ - status_.step.touch_down_stamp_ns < params_.hold_ns;
+  if (settles_) plan_T_sole_[i] = correction_.odom_T_plan(plan_T_base_).inverse() * odom_T_landed_;
 }
 
 void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
@@ -423,6 +433,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
     case Activity::kEnd:
       break;
   }
+  if (settles_) hold_landed_foot(feedback);
   tick_ = std::min(tick_ + 1, kTickLimit);
   com_tick_ = std::min(com_tick_ + 1, kTickLimit);
   torso_tick_ = std::min(torso_tick_ + 1, kTickLimit);

@@ -26,7 +26,7 @@ class Gait {
     ClimbPlanner::Params planner;
     JointReference::Params joints;
     Balance::Params balance;
-    double correction_time_s = 0.03;  // low-pass of the base's difference to the plan
+    double correction_time_s = 0.006;  // low-pass of the base's difference to the plan
     double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
     double absorb_rad = 0.035;
     std::int32_t reshift_ticks = 125;          // another weight shift over the same foot for a target that changed more
@@ -37,6 +37,8 @@ class Gait {
     std::int32_t unsteady_patience = 3;        // as many times longer for obstructions that change
     std::int32_t settle_ticks = 300;           // to the middle between the feet when there is nothing to do
     double touch_force_n = 15.0;
+    double hold_force_n = 100.0;                // pressed less, a foot that landed is held where it landed,
+    std::int64_t hold_ns = 400 * kNsPerMs;      // not longer: it may be the sensor
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
     double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down
@@ -82,6 +84,7 @@ class Gait {
   void lift_off(const StateEstimate& state, const FootholdSet& footholds,
                 const ClimbPlanner::Decision& decision) noexcept;
   void touch_down(const StateEstimate& state) noexcept;
+  void hold_landed_foot(const JointFeedback& feedback) noexcept;
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
   // Of the swing: backwards in a retreat.
   [[nodiscard]] double motion_tick() const noexcept;
@@ -112,6 +115,7 @@ class Gait {
   Swing swing_;                       // odometry
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
+  Transform odom_T_landed_;           // the last swing foot as it was asked to be when it landed
   ClimbPlanner::Decision decision_;
   GaitStatus status_;
   Activity activity_ = Activity::kHold;
@@ -127,6 +131,7 @@ class Gait {
   bool armed_ = false;
   bool started_ = false;
   bool unloaded_ = false;  // the swing foot was felt to leave the ground
+  bool settles_ = false;   // the last swing foot landed and carries little yet
   bool stop_requested_ = false;
 };
 
