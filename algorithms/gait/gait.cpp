@@ -40,10 +40,10 @@ bool Gait::usable(const StateEstimate& s) const noexcept {
 bool Gait::lost(const StateEstimate& s) const noexcept { return now_ns_ - s.oldest_input_ns > params_.stop_age_ns; }
 
 ClimbPlanner::Situation Gait::situation(const StateEstimate& state) const noexcept {
-  const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
+  // Where the soles are, not where the plan has them: legs that carry more than believed give way by some millimetres.
   return {now_ns_,
           state.world_T_odom,
-          {sole_pose(odom_T_plan * plan_T_sole_[0]), sole_pose(odom_T_plan * plan_T_sole_[1])},
+          {sole_pose(state.odom_T_sole[0]), sole_pose(state.odom_T_sole[1])},
           activity_ == Activity::kShift && decision_.goal.kind == StepKind::kLeading,
           decision_.goal.foot};
 }
