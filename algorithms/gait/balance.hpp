@@ -38,6 +38,8 @@ class Balance {
   // Of the last tick, horizontal: the planned centre of mass, and how far ahead of the estimated one it is.
   [[nodiscard]] const Vec2& odom_p_com_planned_m() const noexcept { return odom_p_com_planned_m_; }
   [[nodiscard]] const Vec2& com_error_m() const noexcept { return com_error_m_; }
+  // Likewise, how far the divergent component is ahead of its plan.
+  [[nodiscard]] const Vec2& dcm_error_m() const noexcept { return stabiliser_.error_m(); }
 
  private:
   DcmStabiliser stabiliser_;

@@ -16,25 +16,31 @@ struct HorizontalMotion {
 class DcmStabiliser {
  public:
   struct Params {
-    double gain = 2.0;            // metres of ZMP for each metre of DCM; at 1 and below nothing is stable
+    double gain = 3.0;            // metres of ZMP for each metre of DCM; at 1 and below nothing is stable
     double integral_per_s = 0.3;  // of the same
     double integral_max_m = 0.02;
   };
-  void reset() noexcept { integral_m_.setZero(); }
+  void reset() noexcept {
+    integral_m_.setZero();
+    error_m_.setZero();
+  }
   // The ZMP to ask for. omega_radps: of the pendulum, sqrt(g / height over the ground). error of the reference's own
   // ZMP is none: it is reference.position - acceleration / omega^2.
   [[nodiscard]] Vec2 zmp_m(const Params& params, const HorizontalMotion& reference, const Vec2& com_m,
                            const Vec2& velocity_mps, double omega_radps, double tick_s) noexcept {
-    const Vec2 error_m = com_m - reference.position_m + (velocity_mps - reference.velocity_mps) / omega_radps;
+    error_m_ = com_m - reference.position_m + (velocity_mps - reference.velocity_mps) / omega_radps;
     for (int a = 0; a < 2; ++a) {
-      integral_m_[a] = math::clamp(integral_m_[a] + params.integral_per_s * tick_s * error_m[a], -params.integral_max_m,
+      integral_m_[a] = math::clamp(integral_m_[a] + params.integral_per_s * tick_s * error_m_[a], -params.integral_max_m,
                                    params.integral_max_m);
     }
     const Vec2 planned_m = reference.position_m - reference.acceleration_mps2 / math::square(omega_radps);
-    return planned_m + params.gain * error_m + integral_m_;
+    return planned_m + params.gain * error_m_ + integral_m_;
   }
+  // Of the last tick: how far the divergent component is ahead of its reference.
+  [[nodiscard]] const Vec2& error_m() const noexcept { return error_m_; }
 
  private:
+  Vec2 error_m_ = Vec2::Zero();
   Vec2 integral_m_ = Vec2::Zero();
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace polygmap {
 namespace {
@@ -27,7 +28,7 @@ void Gait::reset(const Params& params) noexcept {
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
   tick_ = shifts_ = wait_ticks_ = idle_ticks_ = 0;
-  armed_ = started_ = unloaded_ = stop_requested_ = false;
+  armed_ = started_ = unloaded_ = retried_ = topples_ = turns_back_ = settles_ = stop_requested_ = false;
   // All else is set before it is read: by arming, by start() and by what begins a shift or a swing. A fresh object to
   // copy from would take 7 KB of stack.
 }
@@ -40,10 +41,10 @@ void Gait::look_at(const StateEstimate& s) noexcept {
 bool Gait::lost(const StateEstimate& s) const noexcept { return now_ns_ - s.oldest_input_ns > params_.stop_age_ns; }
 
 ClimbPlanner::Situation Gait::situation(const StateEstimate& state) const noexcept {
-  const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
+  // Where the soles are, not where the plan has them: legs that carry more than believed give way by some millimetres.
   return {now_ns_,
           state.world_T_odom,
-          {sole_pose(odom_T_plan * plan_T_sole_[0]), sole_pose(odom_T_plan * plan_T_sole_[1])},
+          {sole_pose(state.odom_T_sole[0]), sole_pose(state.odom_T_sole[1])},
           activity_ == Activity::kShift && decision_.goal.kind == StepKind::kLeading,
           decision_.goal.foot};
 }
@@ -235,6 +236,8 @@ void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexce
   if (stop_requested_) return end(GaitPhase::kStopped, Obstruction::kNone, 0.0);
   if (lost(state)) return end(GaitPhase::kStopped, Obstruction::kStateStale, 0.0);
   if (!state.initialised || !usable_) return;
+  if (retried_ && tick_ < params_.settle_ticks) return;
+  if (balance_.dcm_error_m().norm() > params_.steady_m && tick_ < 2 * params_.settle_ticks) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (decision.has_step) {
     wait_ticks_ = 0;
@@ -270,12 +273,17 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
     }
     begin_hold();
     if (decision_.goal.kind == StepKind::kFloor && planner_.shorten_floor_steps()) return;
+    if (!std::exchange(retried_, true)) return;
     const double rise_m = decision_.goal.kind == StepKind::kLeading ? decision_.rise_m : 0.0;
     return end(GaitPhase::kStopped, Obstruction::kLegsCannot, rise_m);
   }
   if (stop_requested_ || lost(state)) return begin_hold();
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
   if (!usable_) return;
+  if (balance_.dcm_error_m().norm() > params_.steady_m) {
+    if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_hold();
+    return;
+  }
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (!decision.has_step) {  // over the stance foot for a moment more: one lost frame is no reason to go back
     if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_hold();
@@ -320,48 +328,69 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   tick_ = 0;
   shifts_ = 0;
   idle_ticks_ = 0;
-  unloaded_ = false;
+  unloaded_ = retried_ = topples_ = turns_back_ = settles_ = false;
+  swing_tick_ = 0.0;
+  pace_ = 1.0;
+  wider_m_ = 0.0;
 }
 
 void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noexcept {
+  if (turns_back_) return retreat(feedback);
   const Foot foot = decision_.goal.foot;
   const std::size_t i = index_of(foot);
   const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
   if (!loaded) unloaded_ = true;
-  const bool descending = 2 * tick_ > swing_.duration_ticks();
+  const bool descending = 2.0 * swing_tick_ > swing_.duration_ticks();
   // What does not go down any more stands on something, whatever its force sensor says.
-  const Transform odom_T_sole = swing_.at(tick_);
+  const Transform odom_T_sole = swing_.at(swing_tick_);
   const double above_m = usable_ ? state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
-  const bool blocked = swing_.lowered_m(tick_) > params_.late_m && above_m > params_.blocked_m;
+  const bool blocked = swing_.lowered_m(swing_tick_) > params_.late_m && above_m > params_.blocked_m;
   if ((descending && unloaded_ && loaded) || blocked) {
-    if (swing_.at(tick_ - 1).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m) ++status_.early_contacts;
-    if (swing_.lowered_m(tick_) > params_.late_m) ++status_.late_contacts;
+    if (swing_.at(swing_tick_ - 1.0).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m) ++status_.early_contacts;
+    if (swing_.lowered_m(swing_tick_) > params_.late_m) ++status_.late_contacts;
     return touch_down(state);
   }
   // A force that never left or is no longer told: the plan's end is the touch-down.
   const bool told = now_ns_ - feedback.stamp_ns <= params_.steer_age_ns;
-  if (!(unloaded_ && told) && tick_ > swing_.duration_ticks()) return touch_down(state);
-  if (swing_.lowered_m(tick_) > params_.max_lowering_m) {  // the ground that was seen is not there
+  if (!(unloaded_ && told) && swing_tick_ > swing_.duration_ticks()) return touch_down(state);
+  if (swing_.lowered_m(swing_tick_) > params_.max_lowering_m) {  // the ground that was seen is not there
     ++status_.late_contacts;
     activity_ = Activity::kRetreat;
-    turn_tick_ = tick_;
+    turn_tick_ = swing_tick_;
     tick_ = 0;
     link_motion_.restart();
     wait_over_stance(sole_pose(correction_.odom_T_plan(plan_T_base_).inverse() * swing_.at(0)));
     return;
   }
   // The ground is late: the weight must not set off for it.
-  if (tick_ == swing_.duration_ticks() + params_.step.landing_hold_ticks + kPatience_ticks) {
+  const double late_tick = swing_.duration_ticks() + params_.step.landing_hold_ticks + kPatience_ticks;
+  if (swing_tick_ >= late_tick && swing_tick_ - pace_ < late_tick) {
     SolePose lowest = sole_pose(plan_T_sole_[i]);
     lowest.position_m.z() -= params_.max_lowering_m;
     wait_over_stance(lowest);
   }
   const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
   plan_T_sole_[i] = plan_T_odom * odom_T_sole;
+  plan_T_sole_[i].p_m += plan_T_sole_[index_of(other(foot))].R.col(1) * (side_sign(foot) * wider_m_);
+}
+
+// One sole cannot hold a body that topples towards the free foot: that one has to be there in time.
+void Gait::pace_swing() noexcept {
+  const Foot foot = decision_.goal.foot;
+  const Vec2 free_side = plan_T_sole_[index_of(other(foot))].R.col(1).head<2>() * side_sign(foot);
+  if (!topples_ && balance_.dcm_error_m().dot(free_side) > params_.topples_m) {
+    topples_ = true;
+    turns_back_ = decision_.goal.kind != StepKind::kTrailing && swing_tick_ < params_.turn_share * swing_.duration_ticks();
+  }
+  constexpr double kHarderPerTick = 0.05;
+  const double wanted = turns_back_ ? -1.0 : topples_ ? params_.hurry : 1.0;
+  pace_ += math::clamp(wanted - pace_, -kHarderPerTick, kHarderPerTick);
+  swing_tick_ += pace_;
+  if (topples_ && !turns_back_) wider_m_ = std::min(wider_m_ + params_.wider_mps * kTick_s, params_.wider_m);
 }
 
 double Gait::motion_tick() const noexcept {
-  if (activity_ != Activity::kRetreat) return tick_;
+  if (activity_ != Activity::kRetreat) return swing_tick_;
   return turn_tick_ - 0.5 * std::max(tick_ - params_.retreat_pause_ticks, 0);
 }
 
@@ -376,8 +405,11 @@ void Gait::retreat(const JointFeedback& feedback) noexcept {
     status_.stands[i] = true;
     link_motion_.restart();
     carry_plan_to_odometry();
+    const bool no_ground = activity_ == Activity::kRetreat;
+    status_.phase = GaitPhase::kDoubleSupport;
     begin_hold();
-    return end(GaitPhase::kStopped, Obstruction::kGroundMissing, 0.0);
+    if (no_ground) end(GaitPhase::kStopped, Obstruction::kGroundMissing, 0.0);
+    return;
   }
   plan_T_sole_[i] = correction_.odom_T_plan(plan_T_base_).inverse() * odom_T_sole;
 }
@@ -388,12 +420,22 @@ void Gait::touch_down(const StateEstimate& state) noexcept {
   status_.step.odom_T_executed =
       usable_ ? state.odom_T_sole[i] : correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
   status_.stands[i] = true;
+  odom_T_landed_ = correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
+  settles_ = true;
   link_motion_.restart();  // the swing foot is where it was steered to, and stops
   planner_.landed();
   status_.treads_climbed = planner_.treads_climbed();
   status_.phase = GaitPhase::kDoubleSupport;
   carry_plan_to_odometry();
   begin_hold();
+}
+
+// Until it is pressed it would go along with what the base is off its plan: 5 mm towards the next riser.
+void Gait::hold_landed_foot(const JointFeedback& feedback) noexcept {
+  const std::size_t i = index_of(status_.step.foot);
+  settles_ = feedback.foot_force_n[i] < params_.hold_force_n &&
+             now_ns_ - status_.step.touch_down_stamp_ns < params_.hold_ns;
+  if (settles_) plan_T_sole_[i] = correction_.odom_T_plan(plan_T_base_).inverse() * odom_T_landed_;
 }
 
 void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
@@ -436,6 +478,8 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
     case Activity::kEnd:
       break;
   }
+  if (settles_) hold_landed_foot(feedback);
+  if (activity_ == Activity::kSwing) pace_swing();
   tick_ = std::min(tick_ + 1, kTickLimit);
   com_tick_ = std::min(com_tick_ + 1, kTickLimit);
   torso_tick_ = std::min(torso_tick_ + 1, kTickLimit);

@@ -26,7 +26,7 @@ class Gait {
     ClimbPlanner::Params planner;
     JointReference::Params joints;
     Balance::Params balance;
-    double correction_time_s = 0.03;  // low-pass of the base's difference to the plan
+    double correction_time_s = 0.006;  // low-pass of the base's difference to the plan
     double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
     double absorb_rad = 0.035;
     std::int32_t reshift_ticks = 125;          // another weight shift over the same foot for a target that changed more
@@ -37,6 +37,14 @@ class Gait {
     std::int32_t unsteady_patience = 3;        // as many times longer for obstructions that change
     std::int32_t settle_ticks = 300;           // to the middle between the feet when there is nothing to do
     double touch_force_n = 15.0;
+    double hold_force_n = 100.0;                // pressed less, a foot that landed is held where it landed,
+    std::int64_t hold_ns = 400 * kNsPerMs;      // not longer: it may be the sensor
+    double steady_m = 0.015;                    // of the divergent component's error: beyond it no foot lifts
+    double topples_m = 0.02;                    // and towards the free foot: that one hurries
+    double hurry = 1.6;                         // times as fast, or back while it has not moved ahead
+    double turn_share = 0.33;                   // of the swing: later it is sooner there than back
+    double wider_m = 0.06;                      // it lands that much farther out
+    double wider_mps = 0.25;
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
     double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down
@@ -82,9 +90,11 @@ class Gait {
   void lift_off(const StateEstimate& state, const FootholdSet& footholds,
                 const ClimbPlanner::Decision& decision) noexcept;
   void touch_down(const StateEstimate& state) noexcept;
+  void hold_landed_foot(const JointFeedback& feedback) noexcept;
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
   // Of the swing: backwards in a retreat.
   [[nodiscard]] double motion_tick() const noexcept;
+  void pace_swing() noexcept;
   void carry_plan_to_odometry() noexcept;
   void settle_between_feet() noexcept;
   void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
@@ -114,13 +124,16 @@ class Gait {
   Swing swing_;                       // odometry
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
+  Transform odom_T_landed_;           // the last swing foot as it was asked to be when it landed
   ClimbPlanner::Decision decision_;
   GaitStatus status_;
   Activity activity_ = Activity::kHold;
   std::int32_t tick_ = 0;        // of the activity, saturates
   std::int32_t torso_tick_ = 0;  // of the torso's plan, likewise
   std::int32_t com_tick_ = 0;    // of the plan of the centre of mass, likewise
-  std::int32_t turn_tick_ = 0;   // of the swing, when the retreat began
+  double swing_tick_ = 0.0;      // of the swing's path: ahead of tick_ when it hurries
+  double pace_ = 1.0;            // along the swing's path, negative on the way back
+  double turn_tick_ = 0.0;       // of the swing's path, when the retreat began
   std::int32_t shift_ticks_ = 0;
   std::int32_t shifts_ = 0;  // since the last swing
   Obstruction waiting_for_ = Obstruction::kNone;
@@ -130,6 +143,11 @@ class Gait {
   bool armed_ = false;
   bool started_ = false;
   bool unloaded_ = false;  // the swing foot was felt to leave the ground
+  bool retried_ = false;   // the legs could not do a step from the motion the plan was in: once more, from rest
+  bool topples_ = false;   // towards the free foot, in this swing,
+  bool turns_back_ = false;  // which goes back where it stood
+  double wider_m_ = 0.0;     // or lands that much farther out
+  bool settles_ = false;   // the last swing foot landed and carries little yet
   bool stop_requested_ = false;
 };
 

@@ -33,7 +33,7 @@ double Swing::height_m(double tick) const noexcept {
   return landing_.at((u - shape_.landing_begin) * duration_ticks_ * kTick_s).position;
 }
 
-double Swing::lowered_m(std::int32_t tick) const noexcept {
+double Swing::lowered_m(double tick) const noexcept {
   return (tick - duration_ticks_) * kTick_s * shape_.approach_mps;
 }
 

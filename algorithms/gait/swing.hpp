@@ -36,7 +36,7 @@ class Swing {
   [[nodiscard]] Transform at(double tick) const noexcept;
   [[nodiscard]] std::int32_t duration_ticks() const noexcept { return duration_ticks_; }
   // How far below the target it has been lowered, m; negative before the end.
-  [[nodiscard]] double lowered_m(std::int32_t tick) const noexcept;
+  [[nodiscard]] double lowered_m(double tick) const noexcept;
 
  private:
   // Eq. (32) made continuous: height of the lowest point of the foot.
