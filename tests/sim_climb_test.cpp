@@ -2,7 +2,6 @@
 // Whole climbs, end to end: what the issue asks of every seed, of causality, and of repetition.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <ostream>
 #include <string>
@@ -98,34 +97,6 @@ TEST(ClimbContacts, InferredFromTorques_ClimbedWithinTheFigures) {
     expect_a_good_climb(climb(options), 4);
   }
 }
-
-// One foot on every tread, perception in the loop, under physics.
-class SingleStepClimb : public testing::TestWithParam<Case> {};
-
-TEST_P(SingleStepClimb, UnderPhysics_ClimbedWithinTheFigures) {
-  const int steps = GetParam().stairs.steps;
-  ClimbOptions options = options_of(GetParam().seed, steps);
-  options.plant = PlantKind::kMujoco;
-  options.gait = GaitPattern::kSingleStep;
-  const ClimbSummary summary = climb(options);
-  EXPECT_TRUE(summary.pass) << summary.reason;
-  EXPECT_EQ(summary.ended_by, "module");
-  EXPECT_EQ(steps_onto_treads(summary), steps + 1);  // one for each, and the foot that comes beside the last one
-  EXPECT_LE(summary.seconds_per_step, 1.6);
-  EXPECT_LE(summary.execution_error_m.max, 0.010);  // the paper: 0.0334
-  EXPECT_LE(summary.foothold_error_m.max, 0.0124);
-  EXPECT_LE(*std::ranges::max_element(summary.torque_peak_ratio), 1.0);
-  EXPECT_LE(*std::ranges::max_element(summary.joint_speed_peak_ratio), 1.0);
-  EXPECT_EQ(summary.heap_calls, 0U);
-}
-INSTANTIATE_TEST_SUITE_P(Seeds, SingleStepClimb, testing::Values(Case{2, {.steps = 4}}), name_of);
-
-std::vector<Case> twenty_seeds() {
-  std::vector<Case> cases;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) cases.push_back({seed, {}});
-  return cases;
-}
-INSTANTIATE_TEST_SUITE_P(Long, SingleStepClimb, testing::ValuesIn(twenty_seeds()), name_of);
 
 std::vector<Case> long_cases() {
   constexpr double kRises_m[]{0.13, 0.10, 0.17, 0.15, 0.12};

@@ -346,7 +346,8 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
   const double above_m = usable_ ? state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
   const bool blocked = swing_.lowered_m(swing_tick_) > params_.late_m && above_m > params_.blocked_m;
   if ((descending && unloaded_ && loaded) || blocked) {
-    if (swing_.at(swing_tick_ - 1.0).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m) ++status_.early_contacts;
+    if (swing_.at(swing_tick_ - 1.0).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m)
+      ++status_.early_contacts;
     if (swing_.lowered_m(swing_tick_) > params_.late_m) ++status_.late_contacts;
     return touch_down(state);
   }
@@ -380,7 +381,8 @@ void Gait::pace_swing() noexcept {
   const Vec2 free_side = plan_T_sole_[index_of(other(foot))].R.col(1).head<2>() * side_sign(foot);
   if (!topples_ && balance_.dcm_error_m().dot(free_side) > params_.topples_m) {
     topples_ = true;
-    turns_back_ = decision_.goal.kind != StepKind::kTrailing && swing_tick_ < params_.turn_share * swing_.duration_ticks();
+    turns_back_ =
+        decision_.goal.kind != StepKind::kTrailing && swing_tick_ < params_.turn_share * swing_.duration_ticks();
   }
   constexpr double kHarderPerTick = 0.05;
   const double wanted = turns_back_ ? -1.0 : topples_ ? params_.hurry : 1.0;
@@ -433,8 +435,8 @@ void Gait::touch_down(const StateEstimate& state) noexcept {
 // Until it is pressed it would go along with what the base is off its plan: 5 mm towards the next riser.
 void Gait::hold_landed_foot(const JointFeedback& feedback) noexcept {
   const std::size_t i = index_of(status_.step.foot);
-  settles_ = feedback.foot_force_n[i] < params_.hold_force_n &&
-             now_ns_ - status_.step.touch_down_stamp_ns < params_.hold_ns;
+  settles_ =
+      feedback.foot_force_n[i] < params_.hold_force_n && now_ns_ - status_.step.touch_down_stamp_ns < params_.hold_ns;
   if (settles_) plan_T_sole_[i] = correction_.odom_T_plan(plan_T_base_).inverse() * odom_T_landed_;
 }
 
