@@ -20,7 +20,7 @@ struct ClimbOptions {
   StairParams stairs;
   std::uint64_t seed = 1;
   DepthNoise noise = DepthNoise::kWhite;
-  PlantKind plant = PlantKind::kKinematic;
+  PlantKind plant = PlantKind::kMujoco;
   std::optional<Push> push;
   GaitPattern gait = GaitPattern::kDoubleStep;
   std::string out_dir;          // empty: no files

@@ -104,6 +104,7 @@ TEST(ClimbCommand, NoOptions_RunsWithTheDefaults) {
   EXPECT_EQ(c.options->stairs.landing_m, 1.0);
   EXPECT_EQ(c.options->seed, 1U);
   EXPECT_EQ(c.options->noise, DepthNoise::kWhite);
+  EXPECT_EQ(c.options->plant, PlantKind::kMujoco);
   EXPECT_EQ(c.options->render_missing_step, -1);
   EXPECT_FALSE(c.options->blank_depth);
   EXPECT_TRUE(c.options->self_filter);
@@ -196,9 +197,9 @@ TEST(ClimbCommand, BadCount_IsRefused) {
 TEST(ClimbCommand, BadWord_IsRefused) {
   expect_refused({"climb", "--gait", "trot"}, "--gait");
   expect_refused({"climb", "--plant", "rubber"}, "--plant");
-  expect_refused({"climb", "--push", "5,x,10"}, "--push");  // the kinematic plant
+  expect_refused({"climb", "--plant", "kinematic", "--push", "5,x,10"}, "--push");
   for (const std::string push : {"x", "5,x", "5,z,10", "5,x,10,", "-1,x,10", "nan,x,10", "5,y,1000", "5,y,nan"}) {
-    expect_refused({"climb", "--plant", "mujoco", "--push", push}, "--push");
+    expect_refused({"climb", "--push", push}, "--push");
   }
   expect_refused({"climb", "--noise", "pink"}, "--noise");
   expect_refused({"climb", "--render-shift", "0.01", "nan", "0"}, "--render-shift");

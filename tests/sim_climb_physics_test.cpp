@@ -31,7 +31,6 @@ std::string name_of(const testing::TestParamInfo<Case>& info) {
 
 ClimbSummary climb(const Case& c, GaitPattern gait) {
   ClimbOptions options;
-  options.plant = PlantKind::kMujoco;
   options.gait = gait;
   options.seed = c.seed;
   options.stairs = c.stairs;

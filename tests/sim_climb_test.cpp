@@ -15,6 +15,7 @@ ClimbSummary climb(const ClimbOptions& options) { return run_climb(options, {});
 
 ClimbOptions options_of(std::uint64_t seed, int steps) {
   ClimbOptions options;
+  options.plant = PlantKind::kKinematic;  // the quick one; sim_climb_physics_test has the other
   options.seed = seed;
   options.stairs.steps = steps;
   options.noise = seed % 2 == 0 ? DepthNoise::kCorrelated : DepthNoise::kWhite;

@@ -29,7 +29,7 @@ constexpr double kQuietPeriod_s = 5.0;       // simulated, between progress line
 struct ClimbArguments {
   ClimbOptions options;
   std::string noise = "white";
-  std::string plant = "kinematic";
+  std::string plant = name_of(ClimbOptions{}.plant);
   std::string gait = "ds";
   std::string contacts = "sensed";
   std::vector<double> render_shift_m;
@@ -61,7 +61,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_option("--landing", stairs.landing_m, "Depth of the landing, m")->capture_default_str();
   climb
       .add_option("--plant", a.plant,
-                  "kinematic: follows and never tips over; mujoco: under physics, it balances or falls")
+                  "mujoco: under physics, it balances or falls; kinematic: follows and never tips over, quicker")
       ->capture_default_str();
   climb.add_option("--gait", a.gait, "ds: both feet on every tread; ss: one foot on every tread, both on the last")
       ->capture_default_str();
