@@ -23,8 +23,8 @@ double pixel_evidence(const FramePicture& picture, const RawPicture& raw, const 
       const std::uint16_t value = raw.row(row)[column];
       if (picture.owner(g, row) != index || value < raw.range.min || value > raw.range.max) continue;
       const double w = 1.0 / (value * k.depth_unit_m);
-      const Vec3 ray{(column - k.cx_px) / k.fx_px, static_cast<double>(picture.column_rays.y[static_cast<std::size_t>(row)]),
-                     1.0};
+      const Vec3 ray{(column - k.cx_px) / k.fx_px,
+                     static_cast<double>(picture.column_rays.y[static_cast<std::size_t>(row)]), 1.0};
       const double off = (w - plane.plane.m.dot(ray)) * w;
       ++seen;
       on += off * off < most2 * math::square(noise.inverse_sigma(w)) ? 1 : 0;

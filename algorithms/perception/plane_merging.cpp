@@ -3,7 +3,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <utility>
 
 namespace polygmap {
 namespace {
@@ -66,75 +65,73 @@ void PlaneMerging::merge_pieces(const Params& params, const PlaneGrowing::Params
   }
 }
 
-// Planes that lie above or beside one another in the picture and face nearly the same way, and along how many pixels.
+// Spans above or beside one another in the picture.
 void PlaneMerging::measure_seams(const SurfaceBoundaries::Columns& columns, std::int32_t column_count,
                                  const FramePlanes& planes, double least_cosine, const PlaneIndex& to_plane) noexcept {
-  seams_.clear();
-  // Most neighbours are the same pair as the one before.
-  std::uint8_t last_a = 0, last_b = 0;
-  PlaneSeam* last = nullptr;
-  const auto add = [&](std::uint8_t a, std::uint8_t b, std::int32_t length_px) {
-    if (a > b) std::swap(a, b);
-    if (a != last_a || b != last_b) {
-      last_a = a;
-      last_b = b;
-      last = std::find_if(seams_.begin(), seams_.end(), [&](const PlaneSeam& s) { return s.a == a && s.b == b; });
-      if (last == seams_.end()) {
-        last = nullptr;
-        const bool alike = planes[a].alive && planes[b].alive &&
-                           planes[a].plane.normal().dot(planes[b].plane.normal()) >= least_cosine;
-        if (alike && seams_.try_push_back({a, b, 0})) last = &seams_.back();
-      }
+  for (std::size_t a = 0; a <= planes.count; ++a) {
+    seam_px_[a][a] = kUnlike;
+    for (std::size_t b = a + 1; b <= planes.count; ++b) {
+      const bool alike = a > 0 && planes[a].alive && planes[b].alive &&
+                         planes[a].plane.normal().dot(planes[b].plane.normal()) >= least_cosine;
+      seam_px_[a][b] = seam_px_[b][a] = alike ? 0 : kUnlike;
     }
-    if (last != nullptr) last->length_px += length_px;
+  }
+  const auto add = [&](std::uint8_t a, std::uint8_t b, std::int32_t length_px) {
+    std::int32_t& seam_px = seam_px_[a][b];
+    if (seam_px == kUnlike) return;
+    seam_px += length_px;
+    seam_px_[b][a] = seam_px;
   };
   for (std::int32_t g = 0; g < column_count; ++g) {
     const SurfaceBoundaries::Column& spans = columns[static_cast<std::size_t>(g)];
     for (std::size_t k = 0; k + 1 < spans.size(); ++k) {
-      const std::uint8_t a = to_plane[spans[k].plane], b = to_plane[spans[k + 1].plane];
-      if (a != b && a != 0 && b != 0 && spans[k + 1].top - spans[k].bottom <= kMaxGap_px) add(a, b, kColumn_px);
+      if (spans[k + 1].top - spans[k].bottom > kMaxGap_px) continue;
+      add(to_plane[spans[k].plane], to_plane[spans[k + 1].plane], kColumn_px);
     }
     if (g + 1 == column_count) break;
     const SurfaceBoundaries::Column& right = columns[static_cast<std::size_t>(g + 1)];
     for (std::size_t k = 0, i = 0; k < spans.size() && i < right.size();) {  // both from top to bottom
-      const std::int32_t shared =
-          std::min(spans[k].bottom, right[i].bottom) - std::max(spans[k].top, right[i].top) + 1;
-      const std::uint8_t a = to_plane[spans[k].plane], b = to_plane[right[i].plane];
-      if (shared > 0 && a != b && a != 0 && b != 0) add(a, b, shared);
+      const std::int32_t shared = std::min(spans[k].bottom, right[i].bottom) - std::max(spans[k].top, right[i].top) + 1;
+      if (shared > 0) add(to_plane[spans[k].plane], to_plane[right[i].plane], shared);
       ++(spans[k].bottom < right[i].bottom ? k : i);
     }
   }
 }
 
-void PlaneMerging::join_facets(const Params& params, const DepthSigma& noise,
-                               const SurfaceBoundaries::Columns& columns, std::int32_t column_count,
-                               FramePlanes& planes, PlaneIndex& to_plane) noexcept {
-  const double least_cosine = math::cos(params.facet_tilt_rad);
+void PlaneMerging::join_facets(const Params& params, const DepthSigma& noise, const SurfaceBoundaries::Columns& columns,
+                               std::int32_t column_count, FramePlanes& planes, PlaneIndex& to_plane) noexcept {
+  measure_seams(columns, column_count, planes, math::cos(params.facet_tilt_rad), to_plane);
   for (std::size_t joined = 0; joined < kMaxFacets; ++joined) {
-    measure_seams(columns, column_count, planes, least_cosine, to_plane);
     double least = params.facet_chi2;
-    const PlaneSeam* best = nullptr;
-    for (const PlaneSeam& seam : seams_) {
-      const FramePlane &p = planes[seam.a], &q = planes[seam.b];
-      const double smaller_px = std::min(p.pixels, q.pixels);
-      if (seam.length_px < params.facet_seam * math::sqrt(smaller_px)) continue;
-      double chi2 = 0.0;
-      if (!try_contradiction(params, noise, p, q, chi2) || !(chi2 < least)) continue;
-      least = chi2;
-      best = &seam;
+    std::size_t best_a = 0, best_b = 0;
+    for (std::size_t a = 1; a <= planes.count; ++a) {
+      for (std::size_t b = a + 1; b <= planes.count; ++b) {
+        if (seam_px_[a][b] <= 0) continue;
+        const FramePlane &p = planes[a], &q = planes[b];
+        if (seam_px_[a][b] < params.facet_seam * math::sqrt(std::min(p.pixels, q.pixels))) continue;
+        double chi2 = 0.0;
+        if (!try_contradiction(params, noise, p, q, chi2) || !(chi2 < least)) continue;
+        least = chi2;
+        best_a = a;
+        best_b = b;
+      }
     }
-    if (best == nullptr) return;
-    FramePlane &p = planes[best->a], &q = planes[best->b];
-    PlaneMoments both = p.moments;
-    both.add(q.moments);
-    if (!try_fit(both, p.plane.m)) return;
-    p.moments = both;
+    if (best_a == 0) return;
+    FramePlane &p = planes[best_a], &q = planes[best_b];
+    p.moments.add(q.moments);
+    if (!try_fit(p.moments, p.plane.m)) return;
     p.pixels += q.pixels;
     p.residual2 += q.residual2;
-    p.centre_m = p.plane.point(both.mean_ray());
+    p.centre_m = p.plane.point(p.moments.mean_ray());
     p.facets = static_cast<std::uint8_t>(std::min(p.facets + q.facets, 255));
     q.alive = false;
-    redirect(to_plane, best->b, best->a);
+    redirect(to_plane, best_b, best_a);
+    for (std::size_t c = 1; c <= planes.count; ++c) {  // what the one touches, both do
+      std::int32_t& both = seam_px_[best_a][c];
+      if (both != kUnlike) both += std::max(seam_px_[best_b][c], 0);
+      seam_px_[c][best_a] = both;
+      seam_px_[best_b][c] = seam_px_[c][best_b] = kUnlike;
+    }
   }
 }
 

@@ -12,12 +12,6 @@
 
 namespace polygmap {
 
-// Where two planes touch in the picture.
-struct PlaneSeam {
-  std::uint8_t a = 0, b = 0;
-  std::int32_t length_px = 0;
-};
-
 class PlaneMerging {
  public:
   struct Params {
@@ -44,10 +38,11 @@ class PlaneMerging {
   static constexpr std::int32_t kMaxGap_px = 24;  // rows between two surfaces that still touch
   static constexpr std::size_t kMaxFacets = 32;   // joined per frame
 
+  static constexpr std::int32_t kUnlike = -1;
   void measure_seams(const SurfaceBoundaries::Columns& columns, std::int32_t column_count, const FramePlanes& planes,
                      double least_cosine, const PlaneIndex& to_plane) noexcept;
-  static constexpr std::size_t kMaxSeams = 64;
-  StaticVector<PlaneSeam, kMaxSeams> seams_;
+  // Along how many pixels two planes touch in the picture, both orders; kUnlike: they face too different ways.
+  std::array<std::array<std::int32_t, FramePlanes::kMaxPlanes + 1>, FramePlanes::kMaxPlanes + 1> seam_px_{};
 };
 
 }  // namespace polygmap

@@ -135,7 +135,8 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       return 1;
     case Phase::kClaim: {  // from left to right and back
       const std::int32_t last = picture_.column_rays.columns - 1, g = row_ <= last ? row_ : 2 * last + 1 - row_;
-      boundaries_.claim(g, row_ <= last ? g - 1 : g + 1, first_found_, planes_.count);
+      boundaries_.claim(g, row_ <= last ? g - 1 : g + 1, row_ <= last ? first_found_ : planes_.count + 1,
+                        planes_.count);
       if (++row_ == 2 * picture_.column_rays.columns) enter(Phase::kMeet);
       return 1;
     }
@@ -215,12 +216,12 @@ void SurfaceExtractor::reduce_row() noexcept {
   std::uint8_t* flags = picture_.flags.row(row_ / 2);
   if (row_ % 2 == 0) {
     std::fill(flags, flags + picture_.rays.width_px, std::uint8_t{0});
-    self_filter_.mark_row(row_ / 2, picture_.rays.width_px, flags);
+    body_in_row_ = self_filter_.mark_row(row_ / 2, picture_.rays.width_px, flags);
   }
   const std::int32_t columns = picture_.column_rays.columns;
   const ReducedRow reduced =
-      reduce_to_columns(raw_.range, raw_.row(row_), flags, columns, picture_.columns.inverse_depth.row(row_),
-                        picture_.columns.valid.row(row_));
+      reduce_to_columns(raw_.range, raw_.row(row_), body_in_row_ ? flags : nullptr, columns,
+                        picture_.columns.inverse_depth.row(row_), picture_.columns.valid.row(row_));
   measured_px_ += reduced.measured_px;
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
   constexpr std::int32_t kBlock = RunSegmentation::kBlock;
@@ -255,7 +256,8 @@ void SurfaceExtractor::merge_planes() noexcept {
 }
 
 void SurfaceExtractor::join_facets() noexcept {
-  merging_.join_facets(params_.merging, noise_, boundaries_.columns(), picture_.column_rays.columns, planes_, to_plane_);
+  merging_.join_facets(params_.merging, noise_, boundaries_.columns(), picture_.column_rays.columns, planes_,
+                       to_plane_);
   for (std::size_t i = 1; i <= planes_.count; ++i) {
     FramePlane& p = planes_[i];
     if (!p.alive || p.facets == 1) continue;

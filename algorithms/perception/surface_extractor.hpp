@@ -19,8 +19,8 @@
 #include "algorithms/perception/edge_lines.hpp"
 #include "algorithms/perception/frame_planes.hpp"
 #include "algorithms/perception/images.hpp"
-#include "algorithms/perception/plane_fit.hpp"
 #include "algorithms/perception/pixel_evidence.hpp"
+#include "algorithms/perception/plane_fit.hpp"
 #include "algorithms/perception/plane_growing.hpp"
 #include "algorithms/perception/plane_merging.hpp"
 #include "algorithms/perception/remainder_search.hpp"
@@ -48,10 +48,10 @@ class SurfaceExtractor {
     EdgeLineFinder::Params edge_lines;
     double kind_tilt_rad = 0.21;  // a fitted plane within this of level is a tread, of upright a riser
     PlaneMerging::Params merging;
-    double min_explained = 0.75;     // share of a surface's pixels that its plane explains, over that of all surfaces
+    double min_explained = 0.75;  // share of a surface's pixels that its plane explains, over that of all surfaces
     double min_explained_curved = 0.55;  // that of several facets
-    double evidence_px = 3000.0;     // of a surface no larger than this are single pixels looked at ...
-    double min_evidence = 0.6;       // ... and this share of them lies on its plane
+    double evidence_px = 3000.0;         // of a surface no larger than this are single pixels looked at ...
+    double min_evidence = 0.6;           // ... and this share of them lies on its plane
     SurfacePieces::Params pieces;
     SurfaceSides::Params sides;
     SurfacePolygons::Params polygons;
@@ -169,6 +169,7 @@ class SurfaceExtractor {
   bool any_frame_ = false;
   std::int32_t measured_px_ = 0;
   std::int32_t outside_body_px_ = 0;
+  bool body_in_row_ = false;  // in the pair of rows being reduced
 
   SelfFilter self_filter_;
   RawPicture raw_;
@@ -177,7 +178,7 @@ class SurfaceExtractor {
   PlaneGrowing growing_;
   SurfaceBoundaries boundaries_;
   RemainderSearch search_;
-  std::size_t first_found_ = 1;  // planes first_found_ .. planes_.count came from the search
+  std::size_t first_found_ = 1;          // planes first_found_ .. planes_.count came from the search
   PlaneMerging::PlaneIndex to_plane_{};  // from a grown plane
   PlaneMerging merging_;
 
