@@ -108,6 +108,7 @@ class SurfaceBoundaries {
     double shift_px = 0.0;            // of the boundary from where the planes meet
     std::array<float, kBins> gain{};  // sum of cost(upper) - cost(lower), by distance from where the planes meet
   };
+  static constexpr float kTruncation = 9.0F;  // of a cost: an outlier says no more than three sigmas do
   // A plane in one column: inverse depth a + b y, and its tolerance per sigma.
   struct Line {
     float a, b, norm;
@@ -121,6 +122,12 @@ class SurfaceBoundaries {
   };
   [[nodiscard]] Offset offset(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
   void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
+  struct Depths {  // the range of some rows' inverse depths, 1/m; farthest > nearest: none has any
+    float farthest = -1.0F, nearest = -1.0F;
+  };
+  [[nodiscard]] Depths depths_of(std::int32_t column, std::int32_t first, std::int32_t last) const noexcept;
+  [[nodiscard]] bool reaches(std::int32_t column, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
+                             const Depths& depths) const noexcept;
   // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
   void weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
                    ColumnSpan& claimed) const noexcept;
@@ -156,5 +163,20 @@ class SurfaceBoundaries {
   NoiseSamples noise_samples_;
   std::uint32_t overflow_ = 0;
 };
+
+inline SurfaceBoundaries::Line SurfaceBoundaries::line_of(const InversePlane& plane,
+                                                          std::int32_t column) const noexcept {
+  const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(column)]);
+  return {static_cast<float>(plane.m.x() * x + plane.m.z()), static_cast<float>(plane.m.y()),
+          static_cast<float>(plane.m.norm())};
+}
+
+inline SurfaceBoundaries::Offset SurfaceBoundaries::offset(const Line& line, std::int32_t column,
+                                                           std::int32_t row) const noexcept {
+  const float w = image_->inverse_depth(column, row);
+  const float residual = (w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)])) * w;
+  const float sigma = inverse_sigma(w) * line.norm;
+  return {residual * residual, sigma * sigma * share_[image_->valid(column, row)]};
+}
 
 }  // namespace polygmap

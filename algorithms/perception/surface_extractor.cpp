@@ -135,7 +135,8 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       return 1;
     case Phase::kClaim: {  // from left to right and back
       const std::int32_t last = picture_.column_rays.columns - 1, g = row_ <= last ? row_ : 2 * last + 1 - row_;
-      boundaries_.claim(g, row_ <= last ? g - 1 : g + 1, first_found_, planes_.count);
+      boundaries_.claim(g, row_ <= last ? g - 1 : g + 1, row_ <= last ? first_found_ : planes_.count + 1,
+                        planes_.count);
       if (++row_ == 2 * picture_.column_rays.columns) enter(Phase::kMeet);
       return 1;
     }
@@ -154,7 +155,10 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       row_ += SurfaceBoundaries::kRefitColumns;
       if (row_ >= picture_.column_rays.columns) {
         solve_planes();
-        if (round_ == 0) merge_planes();
+        if (round_ == 0) {
+          merge_planes();
+          join_facets();
+        }
         if (round_ == 1) boundaries_.follow();
         enter(round_ == 0 ? Phase::kSearch : Phase::kPieces);
         ++round_;
@@ -178,10 +182,12 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     case Phase::kProfile:
       profiles_.add_column(boundaries_.columns(), pieces_, planes_, row_, picture_);
       if (++row_ == picture_.column_rays.columns) {
-        enter(Phase::kSides);
+        enter(Phase::kEvidence);
         index_ = 1;
       }
       return 1;
+    case Phase::kEvidence:
+      return evidence_step();
     case Phase::kSides:
       return side_step();
     case Phase::kOutline:
@@ -210,12 +216,12 @@ void SurfaceExtractor::reduce_row() noexcept {
   std::uint8_t* flags = picture_.flags.row(row_ / 2);
   if (row_ % 2 == 0) {
     std::fill(flags, flags + picture_.rays.width_px, std::uint8_t{0});
-    self_filter_.mark_row(row_ / 2, picture_.rays.width_px, flags);
+    body_in_row_ = self_filter_.mark_row(row_ / 2, picture_.rays.width_px, flags);
   }
   const std::int32_t columns = picture_.column_rays.columns;
   const ReducedRow reduced =
-      reduce_to_columns(raw_.range, raw_.row(row_), flags, columns, picture_.columns.inverse_depth.row(row_),
-                        picture_.columns.valid.row(row_));
+      reduce_to_columns(raw_.range, raw_.row(row_), body_in_row_ ? flags : nullptr, columns,
+                        picture_.columns.inverse_depth.row(row_), picture_.columns.valid.row(row_));
   measured_px_ += reduced.measured_px;
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
   constexpr std::int32_t kBlock = RunSegmentation::kBlock;
@@ -245,26 +251,18 @@ void SurfaceExtractor::take_grown_planes() noexcept {
   for (std::size_t i = 1; i <= planes_.count; ++i) boundaries_.plane(i).plane = planes_[i].plane;
 }
 
-// Pieces of one surface that a leg, a hole or noise has split share one plane: the larger one's.
 void SurfaceExtractor::merge_planes() noexcept {
-  const double least_cosine = math::cos(params_.merge_tilt_rad), least_small = math::cos(2.0 * params_.merge_tilt_rad);
-  for (std::size_t a = 1; a <= planes_.count; ++a) {
-    for (std::size_t b = a + 1; b <= planes_.count && planes_[a].alive; ++b) {
-      if (!planes_[b].alive) continue;
-      const std::size_t keep = planes_[a].pixels >= planes_[b].pixels ? a : b, gone = keep == a ? b : a;
-      FramePlane &p = planes_[keep], &q = planes_[gone];
-      const bool small = q.pixels < params_.small_plane_px;
-      if (p.plane.normal().dot(q.plane.normal()) < (small ? least_small : least_cosine)) continue;
-      // Where a large plane lies is known well: apart by more than what lets a run join a plane, the two are not one.
-      const double noise_m =
-          params_.growing.join_floor_m + params_.growing.join_sigmas * noise_.sigma_m(q.centre_m.z());
-      const double merge_m = small ? params_.merge_m : std::min(noise_m, params_.merge_m);
-      const double apart_m = std::abs(p.plane.distance_m(q.centre_m));
-      if (small ? apart_m > merge_m : apart_m + std::abs(q.plane.distance_m(p.centre_m)) > 2.0 * merge_m) continue;
-      p.pixels += q.pixels;
-      q.alive = false;
-      for (std::uint8_t& plane : to_plane_) plane = plane == gone ? static_cast<std::uint8_t>(keep) : plane;
-    }
+  PlaneMerging::merge_pieces(params_.merging, params_.growing, noise_, planes_, to_plane_);
+}
+
+void SurfaceExtractor::join_facets() noexcept {
+  merging_.join_facets(params_.merging, noise_, boundaries_.columns(), picture_.column_rays.columns, planes_,
+                       to_plane_);
+  for (std::size_t i = 1; i <= planes_.count; ++i) {
+    FramePlane& p = planes_[i];
+    if (!p.alive || p.facets == 1) continue;
+    p.kind = kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad);
+    boundaries_.plane(i).plane = p.plane;
   }
 }
 
@@ -304,14 +302,16 @@ void SurfaceExtractor::solve_planes() noexcept {
     seen_px += boundaries_.plane(i).seen_px;
   }
   // While planes are rough, what they do not explain says little.
-  const double least_share = round_ == 1 ? params_.min_explained * explained_px / std::max(seen_px, 1.0) : 0.0;
+  const double all_share = round_ == 1 ? explained_px / std::max(seen_px, 1.0) : 0.0;
+  const double least_share = params_.min_explained * all_share, least_curved = params_.min_explained_curved * all_share;
   for (std::size_t i = 1; i <= planes_.count; ++i) {
     FramePlane& p = planes_[i];
     if (!p.alive) continue;
     const SurfaceBoundaries::Plane& fitted = boundaries_.plane(i);
     p.moments = fitted.moments;
     p.residual2 = fitted.residual2;
-    if (p.moments.count < kLeast_px || p.moments.count < least_share * fitted.seen_px ||
+    const double least = p.facets > 1 ? least_curved : least_share;
+    if (p.moments.count < kLeast_px || p.moments.count < least * fitted.seen_px ||
         !try_solve_leaning(params_.planes, noise_, p.moments, view_.camera_up, p.plane, &p.covariance)) {
       p.alive = false;
       for (std::uint8_t& plane : to_plane_) plane = plane == i ? std::uint8_t{0} : plane;
@@ -336,6 +336,20 @@ void SurfaceExtractor::find_pieces() noexcept {
   counters_.plane_overflow += pieces_.join(params_.pieces, boundaries_, picture_, planes_);
   profiles_.begin(planes_.count, picture_);
   side_finder_.begin(params_.sides, noise_, raw_, picture_, planes_);
+}
+
+// Large surfaces are wider than what columns mix.
+std::int32_t SurfaceExtractor::evidence_step() noexcept {
+  if (index_ > planes_.count) {
+    enter(Phase::kSides);
+    index_ = 1;
+    return 1;
+  }
+  const std::size_t i = index_++;
+  FramePlane& plane = planes_[i];
+  if (!plane.alive || plane.piece_px > params_.evidence_px) return 1;
+  if (pixel_evidence(picture_, raw_, noise_, plane, i, profiles_[i]) < params_.min_evidence) plane.alive = false;
+  return 3;
 }
 
 // One side of one surface at a time.

@@ -19,8 +19,10 @@
 #include "algorithms/perception/edge_lines.hpp"
 #include "algorithms/perception/frame_planes.hpp"
 #include "algorithms/perception/images.hpp"
+#include "algorithms/perception/pixel_evidence.hpp"
 #include "algorithms/perception/plane_fit.hpp"
 #include "algorithms/perception/plane_growing.hpp"
+#include "algorithms/perception/plane_merging.hpp"
 #include "algorithms/perception/remainder_search.hpp"
 #include "algorithms/perception/run_segmentation.hpp"
 #include "algorithms/perception/self_filter.hpp"
@@ -45,11 +47,11 @@ class SurfaceExtractor {
     PlaneFit::Params planes;
     EdgeLineFinder::Params edge_lines;
     double kind_tilt_rad = 0.21;  // a fitted plane within this of level is a tread, of upright a riser
-    double merge_m = 0.015;       // pieces whose planes are this close at each other's centre are one surface; large
-                                  // ones where a run of one could join the other, too
-    double merge_tilt_rad = 0.12;
-    double small_plane_px = 4000.0;  // smaller planes' tilt is known half as well
-    double min_explained = 0.75;     // share of a surface's pixels that its plane explains, over that of all surfaces
+    PlaneMerging::Params merging;
+    double min_explained = 0.75;  // share of a surface's pixels that its plane explains, over that of all surfaces
+    double min_explained_curved = 0.55;  // that of several facets
+    double evidence_px = 3000.0;         // of a surface no larger than this are single pixels looked at ...
+    double min_evidence = 0.6;           // ... and this share of them lies on its plane
     SurfacePieces::Params pieces;
     SurfaceSides::Params sides;
     SurfacePolygons::Params polygons;
@@ -117,6 +119,7 @@ class SurfaceExtractor {
     kSearch,
     kPieces,
     kProfile,
+    kEvidence,
     kSides,
     kOutline,
     kNosing,
@@ -137,8 +140,10 @@ class SurfaceExtractor {
   void begin_search() noexcept;
   void take_found_planes() noexcept;
   void merge_planes() noexcept;
+  void join_facets() noexcept;
   void solve_planes() noexcept;
   void find_pieces() noexcept;
+  std::int32_t evidence_step() noexcept;
   std::int32_t side_step() noexcept;
   void outline() noexcept;
   [[nodiscard]] bool begin_line(bool nosing) noexcept;
@@ -164,6 +169,7 @@ class SurfaceExtractor {
   bool any_frame_ = false;
   std::int32_t measured_px_ = 0;
   std::int32_t outside_body_px_ = 0;
+  bool body_in_row_ = false;  // in the pair of rows being reduced
 
   SelfFilter self_filter_;
   RawPicture raw_;
@@ -172,8 +178,9 @@ class SurfaceExtractor {
   PlaneGrowing growing_;
   SurfaceBoundaries boundaries_;
   RemainderSearch search_;
-  std::size_t first_found_ = 1;  // planes first_found_ .. planes_.count came from the search
-  std::array<std::uint8_t, FramePlanes::kMaxPlanes + 1> to_plane_{};  // from a grown plane
+  std::size_t first_found_ = 1;          // planes first_found_ .. planes_.count came from the search
+  PlaneMerging::PlaneIndex to_plane_{};  // from a grown plane
+  PlaneMerging merging_;
 
   FramePlanes planes_;
   SurfacePieces pieces_;

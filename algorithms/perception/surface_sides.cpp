@@ -236,7 +236,8 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
     rows_[count] = static_cast<std::int16_t>(r);
     count += end_at(r) != SurfaceProfile::kNoColumn && drift <= kFlatColumns && drift >= -kFlatColumns ? 1U : 0U;
   }
-  const std::size_t stride = (count + kMaxRows - 1) / kMaxRows;
+  const std::size_t most = plane.kind == SurfaceKind::kTread ? kMaxRows : kOtherRows;
+  const std::size_t stride = (count + most - 1) / most;
   double outermost = -1e9;
   for (std::size_t i = stride / 2; i < count; i += stride) {
     const std::int32_t r = rows_[i];

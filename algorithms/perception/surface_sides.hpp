@@ -31,7 +31,8 @@ class SurfaceSides {
   [[nodiscard]] OutlineSide find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept;
 
  private:
-  static constexpr std::int32_t kMaxRows = 14;
+  static constexpr std::int32_t kMaxRows = 14;   // of a tread
+  static constexpr std::int32_t kOtherRows = 8;  // of what nobody steps on
   // kHidden: by the picture's end, the robot's own body or missing data. kNone: the row's pixels there are not the
   // surface's.
   enum class Ending : std::uint8_t { kSeen, kHidden, kNone };

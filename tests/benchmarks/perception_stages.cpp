@@ -96,6 +96,7 @@ ExtractorStage extractor_stage(SurfaceExtractor::Phase phase) noexcept {
       return kRemainder;
     case Phase::kPieces:
     case Phase::kProfile:
+    case Phase::kEvidence:
       return kPieces;
     case Phase::kSides:
     case Phase::kOutline:

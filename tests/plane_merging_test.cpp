@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/plane_merging.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+namespace polygmap {
+namespace {
+
+constexpr DepthSigma kNoise{.base_m = 0.001, .per_metre = 0.0015};
+
+// Two planes, one above the other in the picture, and the spans in which they were seen.
+class TwoPlanes {
+ public:
+  TwoPlanes() {
+    rays_.set({640, 480, 460.0, 460.0, 319.5, 239.5, 0.001});
+    planes_->count = 2;
+    for (std::size_t i = 0; i < to_plane_.size(); ++i) to_plane_[i] = static_cast<std::uint8_t>(i);
+  }
+  // Columns and rows from .. to - 1 of the picture show n . p + d = 0.
+  void show(std::uint8_t index, const Vec3& normal, const Vec3& through_m, std::int32_t first_column,
+            std::int32_t last_column, std::int16_t top, std::int16_t bottom) {
+    FramePlane& plane = (*planes_)[index];
+    plane = FramePlane{};
+    plane.alive = true;
+    plane.plane.m = normal / normal.dot(through_m);
+    for (std::int32_t g = first_column; g <= last_column; ++g) {
+      ColumnSpan span;
+      span.top = top;
+      span.bottom = bottom;
+      span.plane = index;
+      ASSERT_TRUE((*columns_)[static_cast<std::size_t>(g)].try_push_back(span));
+      for (std::int32_t r = top; r <= bottom; ++r) {
+        const auto x = static_cast<double>(rays_.x[static_cast<std::size_t>(g)]);
+        const auto y = static_cast<double>(rays_.y[static_cast<std::size_t>(r)]);
+        const double w = plane.plane.inverse_depth({x, y, 1.0});
+        const double sigma = kNoise.inverse_sigma(w) / w;  // of w, at normal incidence
+        plane.moments.add(kColumn_px / (sigma * sigma), x, y, w);
+        plane.moments.count += kColumn_px - 1;
+      }
+    }
+    plane.pixels = plane.moments.count;
+    plane.centre_m = plane.plane.point(plane.moments.mean_ray());
+  }
+  // Planes that are left.
+  int join() {
+    merging_->join_facets({}, kNoise, *columns_, rays_.columns, *planes_, to_plane_);
+    return ((*planes_)[1].alive ? 1 : 0) + ((*planes_)[2].alive ? 1 : 0);
+  }
+  [[nodiscard]] const FramePlane& plane(std::size_t i) const { return (*planes_)[i]; }
+  [[nodiscard]] std::uint8_t to_plane(std::size_t i) const { return to_plane_[i]; }
+
+ private:
+  ColumnRays rays_;
+  std::unique_ptr<FramePlanes> planes_ = std::make_unique<FramePlanes>();
+  std::unique_ptr<SurfaceBoundaries::Columns> columns_ = std::make_unique<SurfaceBoundaries::Columns>();
+  std::unique_ptr<PlaneMerging> merging_ = std::make_unique<PlaneMerging>();
+  PlaneMerging::PlaneIndex to_plane_{};
+};
+
+Vec3 leaning(double rad) { return {0.0, -math::sin(rad), -math::cos(rad)}; }
+
+// A cushion at 2.8 m: 100 mm of it above and below its bend.
+TEST(PlaneMerging, FacetsThatBendWithinTheNoise_BecomeOneSurface) {
+  TwoPlanes planes;
+  planes.show(1, leaning(0.15), {0.0, 0.0, 2.8}, 36, 43, 223, 239);
+  planes.show(2, leaning(-0.15), {0.0, 0.0, 2.8}, 36, 43, 240, 256);
+  ASSERT_EQ(planes.join(), 1);
+  EXPECT_TRUE(planes.plane(1).alive);
+  EXPECT_EQ(planes.to_plane(2), 1);
+  EXPECT_EQ(planes.plane(1).facets, 2);
+  EXPECT_NEAR(planes.plane(1).plane.normal().z(), -1.0, 1e-3);
+  EXPECT_NEAR(planes.plane(1).pixels, 8.0 * 8.0 * 34.0, 1.0);
+}
+
+TEST(PlaneMerging, FacetsOfAStrongBend_StayTwo) {
+  TwoPlanes planes;
+  planes.show(1, leaning(0.25), {0.0, 0.0, 2.8}, 24, 55, 180, 239);
+  planes.show(2, leaning(-0.25), {0.0, 0.0, 2.8}, 24, 55, 240, 299);
+  EXPECT_EQ(planes.join(), 2);
+}
+
+TEST(PlaneMerging, FacetsThatDoNotTouch_StayTwo) {
+  TwoPlanes planes;
+  planes.show(1, leaning(0.15), {0.0, 0.0, 2.8}, 36, 43, 213, 229);
+  planes.show(2, leaning(-0.15), {0.0, 0.0, 2.8}, 36, 43, 260, 276);
+  EXPECT_EQ(planes.join(), 2);
+}
+
+// Two treads 40 mm apart in height, 2.5 m away, of which the riser between was not seen.
+TEST(PlaneMerging, StepOfFortyMillimetres_StaysTwo) {
+  TwoPlanes planes;
+  const Vec3 up = leaning(0.9);
+  planes.show(1, up, Vec3{0.0, 0.0, 2.5} + 0.04 * up, 28, 51, 204, 239);
+  planes.show(2, up, {0.0, 0.0, 2.5}, 28, 51, 240, 275);
+  EXPECT_EQ(planes.join(), 2);
+}
+
+// A tread and its riser bend by a right angle: nothing joins them however few their pixels.
+TEST(PlaneMerging, TreadAndRiser_StayTwo) {
+  TwoPlanes planes;
+  planes.show(1, leaning(0.9), {0.0, 0.0, 3.0}, 30, 49, 232, 239);
+  planes.show(2, leaning(0.9 - 0.5 * kPi), {0.0, 0.0, 3.0}, 30, 49, 240, 247);
+  EXPECT_EQ(planes.join(), 2);
+}
+
+}  // namespace
+}  // namespace polygmap
