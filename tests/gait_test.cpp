@@ -209,6 +209,28 @@ TEST(GaitLatch, SmallChangeBeforeLiftOff_IsAbsorbedAndALargeOneCostsANewShift) {
   }
 }
 
+// Just lined up (4 mm) when the weight sets off, and just not any more when the foot might leave.
+TEST(GaitLatch, StandOffALittleOffDuringTheFirstShift_IsNoReasonToLineUpAgain) {
+  std::uint32_t floor_steps = 0;
+  for (const double off_m : {0.0, -0.0046, 0.0046}) {
+    IdealClimb climb({});
+    climb.tamper = [&](StateEstimate& state, FootholdSet& set, JointFeedback&) {
+      const LatchedStep& step = climb.status().step;
+      if (off_m == 0.0 || step.sequence < floor_steps || step.touch_down_stamp_ns == 0) return;
+      if (state.stamp_ns - step.touch_down_stamp_ns < 100 * kNsPerMs) return;
+      const Vec3 shift_m = rotation_z(set.p_star_feet[0].yaw_rad) * Vec3{off_m, 0, 0};
+      for (Vec3* p : {&set.p_star_feet[0].position_m, &set.p_star_feet[1].position_m, &set.tread.nosing_a_m,
+                      &set.tread.nosing_b_m}) {
+        *p += shift_m;
+      }
+    };
+    while (climb.tick() && !climb.status().step.onto_tread) {
+    }
+    if (off_m == 0.0) floor_steps = climb.status().step.sequence - 1;
+    EXPECT_EQ(climb.status().step.sequence, floor_steps + 1) << off_m;
+  }
+}
+
 TEST(GaitLatch, LostFootholdsAfterTheLeadingFoot_TrailingFootUsesTheMemory) {
   IdealClimb climb({});
   bool blind = false;
