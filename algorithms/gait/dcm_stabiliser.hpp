@@ -30,8 +30,8 @@ class DcmStabiliser {
                            const Vec2& velocity_mps, double omega_radps, double tick_s) noexcept {
     error_m_ = com_m - reference.position_m + (velocity_mps - reference.velocity_mps) / omega_radps;
     for (int a = 0; a < 2; ++a) {
-      integral_m_[a] = math::clamp(integral_m_[a] + params.integral_per_s * tick_s * error_m_[a], -params.integral_max_m,
-                                   params.integral_max_m);
+      integral_m_[a] = math::clamp(integral_m_[a] + params.integral_per_s * tick_s * error_m_[a],
+                                   -params.integral_max_m, params.integral_max_m);
     }
     const Vec2 planned_m = reference.position_m - reference.acceleration_mps2 / math::square(omega_radps);
     return planned_m + params.gain * error_m_ + integral_m_;

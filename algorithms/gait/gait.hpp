@@ -26,7 +26,7 @@ class Gait {
     ClimbPlanner::Params planner;
     JointReference::Params joints;
     Balance::Params balance;
-    double correction_time_s = 0.006;  // low-pass of the base's difference to the plan
+    double correction_time_s = 0.03;  // low-pass of the base's difference to the plan
     double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
     double absorb_rad = 0.035;
     std::int32_t reshift_ticks = 125;          // another weight shift over the same foot for a target that changed more
@@ -37,13 +37,13 @@ class Gait {
     std::int32_t unsteady_patience = 3;        // as many times longer for obstructions that change
     std::int32_t settle_ticks = 300;           // to the middle between the feet when there is nothing to do
     double touch_force_n = 15.0;
-    double hold_force_n = 100.0;                // pressed less, a foot that landed is held where it landed,
-    std::int64_t hold_ns = 400 * kNsPerMs;      // not longer: it may be the sensor
-    double steady_m = 0.015;                    // of the divergent component's error: beyond it no foot lifts
-    double topples_m = 0.02;                    // and towards the free foot: that one hurries
-    double hurry = 1.6;                         // times as fast, or back while it has not moved ahead
-    double turn_share = 0.33;                   // of the swing: later it is sooner there than back
-    double wider_m = 0.06;                      // it lands that much farther out
+    double hold_force_n = 100.0;            // pressed less, a foot that landed is held where it landed,
+    std::int64_t hold_ns = 400 * kNsPerMs;  // not longer: it may be the sensor
+    double steady_m = 0.015;                // of the divergent component's error: beyond it no foot lifts
+    double topples_m = 0.02;                // and towards the free foot: that one hurries
+    double hurry = 1.6;                     // times as fast, or back while it has not moved ahead
+    double turn_share = 0.38;               // of the swing: later it is sooner there than back
+    double wider_m = 0.06;                  // it lands that much farther out
     double wider_mps = 0.25;
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
@@ -118,11 +118,12 @@ class Gait {
   TorsoTrajectory torso_;
   TorsoTrajectory::State torso_state_{};  // x and y: of the centre of mass
   ComPlan com_;
+  Vec2 dcm_error_m_ = Vec2::Zero();   // of the divergent component, as last measured, odometry
   Vec2 zmp_stance_m_ = Vec2::Zero();  // of the swing, plan frame
   Swing swing_;                       // odometry
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
-  Transform odom_T_landed_;           // the last swing foot as it was asked to be when it landed
+  Transform odom_T_landed_;  // the last swing foot as it was asked to be when it landed
   ClimbPlanner::Decision decision_;
   GaitStatus status_;
   Activity activity_ = Activity::kHold;
@@ -139,12 +140,12 @@ class Gait {
   std::int32_t idle_ticks_ = 0;  // without a step to do since the last swing
   bool armed_ = false;
   bool started_ = false;
-  bool unloaded_ = false;  // the swing foot was felt to leave the ground
-  bool retried_ = false;   // the legs could not do a step from the motion the plan was in: once more, from rest
-  bool topples_ = false;   // towards the free foot, in this swing,
+  bool unloaded_ = false;    // the swing foot was felt to leave the ground
+  bool retried_ = false;     // the legs could not do a step from the motion the plan was in: once more, from rest
+  bool topples_ = false;     // towards the free foot, in this swing,
   bool turns_back_ = false;  // which goes back where it stood
   double wider_m_ = 0.0;     // or lands that much farther out
-  bool settles_ = false;   // the last swing foot landed and carries little yet
+  bool settles_ = false;     // the last swing foot landed and carries little yet
   bool stop_requested_ = false;
 };
 

@@ -33,9 +33,7 @@ double Swing::height_m(double tick) const noexcept {
   return landing_.at((u - shape_.landing_begin) * duration_ticks_ * kTick_s).position;
 }
 
-double Swing::lowered_m(double tick) const noexcept {
-  return (tick - duration_ticks_) * kTick_s * shape_.approach_mps;
-}
+double Swing::lowered_m(double tick) const noexcept { return (tick - duration_ticks_) * kTick_s * shape_.approach_mps; }
 
 // Eq. (32): lift to the apex, down to the landing height z_0. As printed the curve jumps by z_0 at the apex and starts
 // at full speed; here both halves start and end smoothly. Eq. (33): start to end in a share of the time; the printed
