@@ -237,7 +237,6 @@ void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexce
   if (lost(state)) return end(GaitPhase::kStopped, Obstruction::kStateStale, 0.0);
   if (!state.initialised || !usable(state)) return;
   if (retried_ && tick_ < params_.settle_ticks) return;
-  if (dcm_error_m_.norm() > params_.steady_m && tick_ < 2 * params_.settle_ticks) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (decision.has_step) {
     wait_ticks_ = 0;
