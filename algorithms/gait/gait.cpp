@@ -21,8 +21,9 @@ bool finite(const Transform& T) noexcept { return math::all_finite(T.R) && math:
 void Gait::reset(const Params& params) noexcept {
   params_ = params;
   planner_.reset(params.planner);
-  correction_.reset();
+  correction_ = {};
   balance_.reset();
+  dcm_error_m_.setZero();
   link_acceleration_ = {};
   status_ = {};
   activity_ = Activity::kHold;
@@ -35,7 +36,8 @@ void Gait::reset(const Params& params) noexcept {
 
 void Gait::look_at(const StateEstimate& s) noexcept {
   usable_ = now_ns_ - s.oldest_input_ns <= params_.steer_age_ns && finite(s.odom_T_base) && finite(s.world_T_odom) &&
-            finite(s.odom_T_sole[0]) && finite(s.odom_T_sole[1]);
+            finite(s.odom_T_sole[0]) && finite(s.odom_T_sole[1]) && math::all_finite(s.odom_v_base_mps) &&
+            math::all_finite(s.base_w_base_radps);
 }
 
 bool Gait::lost(const StateEstimate& s) const noexcept { return now_ns_ - s.oldest_input_ns > params_.stop_age_ns; }
@@ -123,6 +125,7 @@ void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback
   Balance::Body body{plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad(), JointVector::Zero()};
   if (seen) body = {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad, feedback.dq_radps};
   const JointVector torque_nm = balance_.torques_nm(params_.balance, params_.geometry, reference, body, kTick_s);
+  if (seen) dcm_error_m_ = balance_.dcm_error_m();
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const double limit_nm = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg).torque_nm;
     const double wanted_nm = torque_nm[static_cast<Eigen::Index>(n)];
@@ -237,7 +240,6 @@ void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexce
   if (lost(state)) return end(GaitPhase::kStopped, Obstruction::kStateStale, 0.0);
   if (!state.initialised || !usable_) return;
   if (retried_ && tick_ < params_.settle_ticks) return;
-  if (balance_.dcm_error_m().norm() > params_.steady_m && tick_ < 2 * params_.settle_ticks) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (decision.has_step) {
     wait_ticks_ = 0;
@@ -280,7 +282,7 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
   if (stop_requested_ || lost(state)) return begin_hold();
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
   if (!usable_) return;
-  if (balance_.dcm_error_m().norm() > params_.steady_m) {
+  if (dcm_error_m_.norm() > params_.steady_m) {
     if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_hold();
     return;
   }
@@ -379,7 +381,7 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
 void Gait::pace_swing() noexcept {
   const Foot foot = decision_.goal.foot;
   const Vec2 free_side = plan_T_sole_[index_of(other(foot))].R.col(1).head<2>() * side_sign(foot);
-  if (!topples_ && balance_.dcm_error_m().dot(free_side) > params_.topples_m) {
+  if (!topples_ && dcm_error_m_.dot(free_side) > params_.topples_m) {
     topples_ = true;
     turns_back_ =
         decision_.goal.kind != StepKind::kTrailing && swing_tick_ < params_.turn_share * swing_.duration_ticks();
@@ -462,7 +464,8 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   torso_state_ = torso_.at(torso_tick_, com_.at(com_tick_));
   plan_T_base_ = plan_T_base_over(torso_state_);
   if (usable_) {
-    correction_.update(state.odom_T_base, plan_T_base_, kTick_s / (kTick_s + params_.correction_time_s));
+    correction_.update(state.odom_T_base, state.odom_v_base_mps, state.odom_T_base.R * state.base_w_base_radps,
+                       plan_T_base_, params_.correction_time_s);
   }
   switch (activity_) {
     case Activity::kHold:

@@ -26,8 +26,8 @@ class Gait {
     ClimbPlanner::Params planner;
     JointReference::Params joints;
     Balance::Params balance;
-    double correction_time_s = 0.006;  // low-pass of the base's difference to the plan
-    double absorb_m = 0.015;           // change of a target up to lift-off that needs no new weight shift
+    double correction_time_s = 0.03;  // low-pass of the base's difference to the plan
+    double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
     double absorb_rad = 0.035;
     std::int32_t reshift_ticks = 125;          // another weight shift over the same foot for a target that changed more
     double max_push_m = 0.03;                  // of the zero-moment point, to set off
@@ -42,7 +42,7 @@ class Gait {
     double steady_m = 0.015;                // of the divergent component's error: beyond it no foot lifts
     double topples_m = 0.02;                // and towards the free foot: that one hurries
     double hurry = 1.6;                     // times as fast, or back while it has not moved ahead
-    double turn_share = 0.33;               // of the swing: later it is sooner there than back
+    double turn_share = 0.38;               // of the swing: later it is sooner there than back
     double wider_m = 0.06;                  // it lands that much farther out
     double wider_mps = 0.25;
     double early_m = 0.005;                     // contact this far above the target counts as early
@@ -120,6 +120,7 @@ class Gait {
   TorsoTrajectory torso_;
   TorsoTrajectory::State torso_state_{};  // x and y: of the centre of mass
   ComPlan com_;
+  Vec2 dcm_error_m_ = Vec2::Zero();   // of the divergent component, as last measured, odometry
   Vec2 zmp_stance_m_ = Vec2::Zero();  // of the swing, plan frame
   Swing swing_;                       // odometry
   Transform plan_T_base_;

@@ -62,7 +62,12 @@ void IdealClimb::sense() {
   state_.odom_T_base = odom_T_true_ * true_T_base_;
   state_.odom_T_base.R = state_.odom_T_base.R * tilt;
   for (int i = 0; i < 3; ++i) state_.odom_T_base.p_m[i] += setup_.estimate_noise_m * noise();
+<<<<<<< HEAD
   const double drift_m = setup_.world_drift_mps * seconds(now_ns - setup_.clock_ns);
+=======
+  state_.odom_v_base_mps = odom_T_true_.R * true_v_base_mps_;
+  const double drift_m = setup_.world_drift_mps * seconds(now_ns);
+>>>>>>> phys
   state_.world_T_odom = {rotation_z(0.4), Vec3{1.0 + drift_m, 2.0 - drift_m, 0.05}};
   state_.q_rad = q_;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
@@ -72,7 +77,8 @@ void IdealClimb::sense() {
   feedback_.q_rad = q_;
   for (std::size_t i = force_history_.size() - 1; i > 0; --i) force_history_[i] = force_history_[i - 1];
   for (std::size_t f = 0; f < kFootCount; ++f) {
-    force_history_[0][f] = !feet_[f].anchored ? 0.0 : (f == support_ ? kWeight_n : 30.0);
+    constexpr double kPressed_n = 150.0;  // what touches is anchored, as if it carried
+    force_history_[0][f] = !feet_[f].anchored ? 0.0 : (f == support_ ? kWeight_n : kPressed_n);
   }
   feedback_.foot_force_n = force_history_.back();
 }
@@ -149,7 +155,9 @@ void IdealClimb::move() {
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     base_T_foot[index_of(leg)] = base_T_sole({}, leg, leg_joints(q_ - setup_.encoder_offset_rad, leg));
   }
+  const Vec3 before_m = true_T_base_.p_m;
   true_T_base_ = feet_[support_].true_T_sole * base_T_foot[support_].inverse();
+  true_v_base_mps_ = (true_T_base_.p_m - before_m) / kTick_s;
   const std::size_t free = 1 - support_;
   FootState& foot = feet_[free];
   const Transform hanging = true_T_base_ * base_T_foot[free];

@@ -99,6 +99,7 @@ class IdealClimb {
   std::array<FootState, kFootCount> feet_;
   std::size_t support_ = 0;
   Transform true_T_base_;
+  Vec3 true_v_base_mps_ = Vec3::Zero();
   JointVector q_ = JointVector::Zero(), sent_ = JointVector::Zero(), active_ = JointVector::Zero();
   JointCommand command_;
   StateEstimate state_;
