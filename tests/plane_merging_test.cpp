@@ -97,6 +97,16 @@ TEST(PlaneMerging, StepOfFortyMillimetres_StaysTwo) {
   EXPECT_EQ(planes.join(), 2);
 }
 
+// The face of a slab that overhangs by 25 mm, and below it the foot of the riser behind: two strips too thin to
+// contradict the ramp through both, which leans against either.
+TEST(PlaneMerging, FaceOfAnOverhangAndTheRiserBehind_StayTwo) {
+  TwoPlanes planes;
+  const Vec3 front = leaning(-0.5), up = leaning(0.5 * kPi - 0.5);
+  planes.show(1, front, {0.0, 0.0, 1.2}, 36, 43, 228, 239);
+  planes.show(2, front, Vec3{0.0, 0.0, 1.2} - 0.025 * front - 0.03 * up, 36, 43, 240, 251);
+  EXPECT_EQ(planes.join(), 2);
+}
+
 // A tread and its riser bend by a right angle: nothing joins them however few their pixels.
 TEST(PlaneMerging, TreadAndRiser_StayTwo) {
   TwoPlanes planes;

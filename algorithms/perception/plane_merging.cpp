@@ -8,6 +8,7 @@ namespace polygmap {
 namespace {
 
 constexpr double kLeastDeterminant = 1e-13;  // of moments scaled to a trace of 1
+constexpr double kBetween = 0.1;             // rad: so far may the plane of two facets lie from between theirs
 
 void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t to) noexcept {
   for (std::uint8_t& plane : to_plane) plane = plane == from ? static_cast<std::uint8_t>(to) : plane;
@@ -21,6 +22,14 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
   return math::all_finite(m);
 }
 
+// The plane through a bend lies between its facets. That through a step leans against both: an overhanging nosing's
+// face and the foot of the riser behind it are no ramp.
+[[nodiscard]] bool lies_between(const InversePlane& both, const InversePlane& p, const InversePlane& q) noexcept {
+  const Vec3 n = both.normal();
+  const double bend = (p.normal() - q.normal()).norm() + kBetween;
+  return (n - p.normal()).norm() < bend && (n - q.normal()).norm() < bend;
+}
+
 // How much the pixels of both planes contradict the plane that fits them together best: chi^2 of the three parameters
 // that it has fewer. Neighbouring pixels' errors count once per correlated_px.
 [[nodiscard]] bool try_contradiction(const PlaneMerging::Params& params, const DepthSigma& noise, const FramePlane& p,
@@ -29,6 +38,7 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
   both.add(q.moments);
   Vec3 m;
   if (!try_fit(both, m)) return false;
+  if (!lies_between({m}, p.plane, q.plane)) return false;
   chi2 = 0.0;
   for (const FramePlane* plane : {&p, &q}) {
     Vec3 own;
