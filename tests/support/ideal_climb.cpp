@@ -62,12 +62,8 @@ void IdealClimb::sense() {
   state_.odom_T_base = odom_T_true_ * true_T_base_;
   state_.odom_T_base.R = state_.odom_T_base.R * tilt;
   for (int i = 0; i < 3; ++i) state_.odom_T_base.p_m[i] += setup_.estimate_noise_m * noise();
-<<<<<<< HEAD
-  const double drift_m = setup_.world_drift_mps * seconds(now_ns - setup_.clock_ns);
-=======
   state_.odom_v_base_mps = odom_T_true_.R * true_v_base_mps_;
-  const double drift_m = setup_.world_drift_mps * seconds(now_ns);
->>>>>>> phys
+  const double drift_m = setup_.world_drift_mps * seconds(now_ns - setup_.clock_ns);
   state_.world_T_odom = {rotation_z(0.4), Vec3{1.0 + drift_m, 2.0 - drift_m, 0.05}};
   state_.q_rad = q_;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
