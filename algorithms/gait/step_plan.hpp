@@ -53,7 +53,7 @@ struct StepParams {
                            .toe_down_full = 0.29,
                            .toe_up_begin = 0.30,
                            .toe_up_end = 0.70};
-  std::int32_t stair_shift_ticks = 150;    // 0.30 s of double support
+  std::int32_t stair_shift_ticks = 165;    // 0.33 s of double support
   std::int32_t stair_swing_ticks = 450;    // 0.90 s
   std::int32_t passing_swing_ticks = 460;  // 0.92 s
   std::int32_t floor_shift_ticks = 350;
