@@ -30,6 +30,10 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
   return (n - p.normal()).norm() < bend && (n - q.normal()).norm() < bend;
 }
 
+// Seams whose planes are not one, until either plane changes: their lengths are kept below PlaneMerging::kUnlike.
+constexpr std::int32_t refused(std::int32_t seam_px) noexcept { return -2 - seam_px; }
+constexpr std::int32_t length_of(std::int32_t seam_px) noexcept { return seam_px < -1 ? -2 - seam_px : seam_px; }
+
 // How much the pixels of both planes contradict the plane that fits them together best: chi^2 of the three parameters
 // that it has fewer. Neighbouring pixels' errors count once per correlated_px.
 [[nodiscard]] bool try_contradiction(const PlaneMerging::Params& params, const DepthSigma& noise, const FramePlane& p,
@@ -83,14 +87,12 @@ void PlaneMerging::measure_seams(const SurfaceBoundaries::Columns& columns, std:
     for (std::size_t b = a + 1; b <= planes.count; ++b) {
       const bool alike = a > 0 && planes[a].alive && planes[b].alive &&
                          planes[a].plane.normal().dot(planes[b].plane.normal()) >= least_cosine;
-      seam_px_[a][b] = seam_px_[b][a] = alike ? 0 : kUnlike;
+      seam_px_[a][b] = alike ? 0 : kUnlike;
     }
   }
   const auto add = [&](std::uint8_t a, std::uint8_t b, std::int32_t length_px) {
-    std::int32_t& seam_px = seam_px_[a][b];
-    if (seam_px == kUnlike) return;
-    seam_px += length_px;
-    seam_px_[b][a] = seam_px;
+    std::int32_t& seam_px = seam_px_[std::min(a, b)][std::max(a, b)];
+    if (seam_px != kUnlike) seam_px += length_px;
   };
   for (std::int32_t g = 0; g < column_count; ++g) {
     const SurfaceBoundaries::Column& spans = columns[static_cast<std::size_t>(g)];
@@ -120,7 +122,11 @@ void PlaneMerging::join_facets(const Params& params, const DepthSigma& noise, co
         const FramePlane &p = planes[a], &q = planes[b];
         if (seam_px_[a][b] < params.facet_seam * math::sqrt(std::min(p.pixels, q.pixels))) continue;
         double chi2 = 0.0;
-        if (!try_contradiction(params, noise, p, q, chi2) || !(chi2 < least)) continue;
+        if (!try_contradiction(params, noise, p, q, chi2) || !(chi2 < params.facet_chi2)) {
+          seam_px_[a][b] = refused(seam_px_[a][b]);
+          continue;
+        }
+        if (!(chi2 < least)) continue;
         least = chi2;
         best_a = a;
         best_b = b;
@@ -136,12 +142,16 @@ void PlaneMerging::join_facets(const Params& params, const DepthSigma& noise, co
     p.facets = static_cast<std::uint8_t>(std::min(p.facets + q.facets, 255));
     q.alive = false;
     redirect(to_plane, best_b, best_a);
-    for (std::size_t c = 1; c <= planes.count; ++c) {  // what the one touches, both do
-      std::int32_t& both = seam_px_[best_a][c];
-      if (both != kUnlike) both += std::max(seam_px_[best_b][c], 0);
-      seam_px_[c][best_a] = both;
-      seam_px_[best_b][c] = seam_px_[c][best_b] = kUnlike;
+    const auto seam = [this](std::size_t a, std::size_t b) -> std::int32_t& {
+      return seam_px_[std::min(a, b)][std::max(a, b)];
+    };
+    for (std::size_t c = 1; c <= planes.count; ++c) {  // what the one touches, both do, and are asked again
+      if (c == best_a || c == best_b) continue;
+      std::int32_t &both = seam(best_a, c), &gone = seam(best_b, c);
+      if (both != kUnlike) both = length_of(both) + std::max(length_of(gone), 0);
+      gone = kUnlike;
     }
+    seam(best_a, best_b) = kUnlike;
   }
 }
 

@@ -41,7 +41,8 @@ class PlaneMerging {
   static constexpr std::int32_t kUnlike = -1;
   void measure_seams(const SurfaceBoundaries::Columns& columns, std::int32_t column_count, const FramePlanes& planes,
                      double least_cosine, const PlaneIndex& to_plane) noexcept;
-  // Along how many pixels two planes touch in the picture, both orders; kUnlike: they face too different ways.
+  // Along how many pixels two planes touch in the picture, the smaller index first; kUnlike: they face too different
+  // ways; less: refused.
   std::array<std::array<std::int32_t, FramePlanes::kMaxPlanes + 1>, FramePlanes::kMaxPlanes + 1> seam_px_{};
 };
 

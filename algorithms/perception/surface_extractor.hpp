@@ -2,9 +2,10 @@
 // From one raw depth frame to the planar surfaces in it: polygons, nosings, back lines. Static memory, resumable.
 //
 // Route: self filter -> columns of eight pixels -> straight runs -> planes grown from runs -> boundaries where the
-// planes meet, weighted least squares -> level and upright planes in what is left over, rows claimed beside them ->
-// boundaries and least squares again -> connected pieces -> outlines, with sides fitted in the raw picture -> convex
-// polygons, cut to nosing and back lines that are found in the columns.
+// planes meet, weighted least squares, facets of curved surfaces joined -> level and upright planes in what is left
+// over, rows claimed beside them -> boundaries and least squares again -> connected pieces, small ones held against
+// single pixels -> outlines, with sides fitted in the raw picture -> convex polygons, cut to nosing and back lines that
+// are found in the columns.
 #pragma once
 
 #include <array>
