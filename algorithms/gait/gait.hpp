@@ -26,7 +26,7 @@ class Gait {
     ClimbPlanner::Params planner;
     JointReference::Params joints;
     Balance::Params balance;
-    double correction_time_s = 0.03;  // low-pass of the base's difference to the plan
+    double correction_time_s = 0.03;  // low-pass of the base's difference to the plan, see BaseCorrection
     double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
     double absorb_rad = 0.035;
     std::int32_t reshift_ticks = 125;          // another weight shift over the same foot for a target that changed more
@@ -41,9 +41,9 @@ class Gait {
     std::int64_t hold_ns = 400 * kNsPerMs;  // not longer: it may be the sensor
     double steady_m = 0.015;                // of the divergent component's error: beyond it no foot lifts
     double topples_m = 0.02;                // and towards the free foot: that one hurries
-    double hurry = 1.6;                     // times as fast, or back while it has not moved ahead
-    double turn_share = 0.38;               // of the swing: later it is sooner there than back
-    double wider_m = 0.06;                  // it lands that much farther out
+    double hurry = 1.6;                     // so many times as fast,
+    double turn_share = 0.38;               // or back, earlier in the swing and not from the tread below;
+    double wider_m = 0.06;                  // and lands that much farther out
     double wider_mps = 0.25;
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
