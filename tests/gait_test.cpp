@@ -312,6 +312,7 @@ TEST(GaitStop, SearchNoLongerRuns_StopsForAStaleMap) {
       last = set;
     } else {
       set = last;
+      set.map_stamp_ns -= 400 * kNsPerMs;  // too old before the next foot could lift
     }
   };
   climb.run(60.0);
