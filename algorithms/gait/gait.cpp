@@ -29,7 +29,8 @@ void Gait::reset(const Params& params) noexcept {
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
   tick_ = shifts_ = wait_ticks_ = idle_ticks_ = 0;
-  armed_ = started_ = unloaded_ = retried_ = topples_ = turns_back_ = settles_ = stop_requested_ = false;
+  armed_ = started_ = unloaded_ = retried_ = settles_ = stop_requested_ = false;
+  pace_.begin();
   // All else is set before it is read: by arming, by start() and by what begins a shift or a swing. A fresh object to
   // copy from would take 7 KB of stack.
 }
@@ -330,36 +331,34 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   tick_ = 0;
   shifts_ = 0;
   idle_ticks_ = 0;
-  unloaded_ = retried_ = topples_ = turns_back_ = settles_ = false;
-  swing_tick_ = 0.0;
-  pace_ = 1.0;
-  wider_m_ = 0.0;
+  unloaded_ = retried_ = settles_ = false;
+  pace_.begin();
 }
 
 void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noexcept {
-  if (turns_back_) return retreat(feedback);
+  if (pace_.turns_back()) return retreat(feedback);
   const Foot foot = decision_.goal.foot;
   const std::size_t i = index_of(foot);
   const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
   if (!loaded) unloaded_ = true;
-  const bool descending = 2.0 * swing_tick_ > swing_.duration_ticks();
+  const bool descending = 2.0 * pace_.tick() > swing_.duration_ticks();
   // What does not go down any more stands on something, whatever its force sensor says.
-  const Transform odom_T_sole = swing_.at(swing_tick_);
+  const Transform odom_T_sole = swing_.at(pace_.tick());
   const double above_m = usable_ ? state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
-  const bool blocked = swing_.lowered_m(swing_tick_) > params_.late_m && above_m > params_.blocked_m;
+  const bool blocked = swing_.lowered_m(pace_.tick()) > params_.late_m && above_m > params_.blocked_m;
   if ((descending && unloaded_ && loaded) || blocked) {
-    if (swing_.at(swing_tick_ - 1.0).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m)
+    if (swing_.at(pace_.last_tick()).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m)
       ++status_.early_contacts;
-    if (swing_.lowered_m(swing_tick_) > params_.late_m) ++status_.late_contacts;
+    if (swing_.lowered_m(pace_.tick()) > params_.late_m) ++status_.late_contacts;
     return touch_down(state);
   }
   // A force that never left or is no longer told: the plan's end is the touch-down.
   const bool told = now_ns_ - feedback.stamp_ns <= params_.steer_age_ns;
-  if (!(unloaded_ && told) && swing_tick_ > swing_.duration_ticks()) return touch_down(state);
-  if (swing_.lowered_m(swing_tick_) > params_.max_lowering_m) {  // the ground that was seen is not there
+  if (!(unloaded_ && told) && pace_.tick() > swing_.duration_ticks()) return touch_down(state);
+  if (swing_.lowered_m(pace_.tick()) > params_.max_lowering_m) {  // the ground that was seen is not there
     ++status_.late_contacts;
     activity_ = Activity::kRetreat;
-    turn_tick_ = swing_tick_;
+    turn_tick_ = pace_.tick();
     tick_ = 0;
     link_motion_.restart();
     wait_over_stance(sole_pose(correction_.odom_T_plan(plan_T_base_).inverse() * swing_.at(0)));
@@ -367,34 +366,18 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
   }
   // The ground is late: the weight must not set off for it.
   const double late_tick = swing_.duration_ticks() + params_.step.landing_hold_ticks + kPatience_ticks;
-  if (swing_tick_ >= late_tick && swing_tick_ - pace_ < late_tick) {
+  if (pace_.tick() >= late_tick && pace_.last_tick() < late_tick) {
     SolePose lowest = sole_pose(plan_T_sole_[i]);
     lowest.position_m.z() -= params_.max_lowering_m;
     wait_over_stance(lowest);
   }
   const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
   plan_T_sole_[i] = plan_T_odom * odom_T_sole;
-  plan_T_sole_[i].p_m += plan_T_sole_[index_of(other(foot))].R.col(1) * (side_sign(foot) * wider_m_);
-}
-
-// One sole cannot hold a body that topples towards the free foot: that one has to be there in time.
-void Gait::pace_swing() noexcept {
-  const Foot foot = decision_.goal.foot;
-  const Vec2 free_side = plan_T_sole_[index_of(other(foot))].R.col(1).head<2>() * side_sign(foot);
-  if (!topples_ && dcm_error_m_.dot(free_side) > params_.topples_m) {
-    topples_ = true;
-    turns_back_ =
-        decision_.goal.kind != StepKind::kTrailing && swing_tick_ < params_.turn_share * swing_.duration_ticks();
-  }
-  constexpr double kHarderPerTick = 0.05;
-  const double wanted = turns_back_ ? -1.0 : topples_ ? params_.hurry : 1.0;
-  pace_ += math::clamp(wanted - pace_, -kHarderPerTick, kHarderPerTick);
-  swing_tick_ += pace_;
-  if (topples_ && !turns_back_) wider_m_ = std::min(wider_m_ + params_.wider_mps * kTick_s, params_.wider_m);
+  plan_T_sole_[i].p_m += plan_T_sole_[index_of(other(foot))].R.col(1) * (side_sign(foot) * pace_.wider_m());
 }
 
 double Gait::motion_tick() const noexcept {
-  if (activity_ != Activity::kRetreat) return swing_tick_;
+  if (activity_ != Activity::kRetreat) return pace_.tick();
   return turn_tick_ - 0.5 * std::max(tick_ - params_.retreat_pause_ticks, 0);
 }
 
@@ -484,7 +467,12 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
       break;
   }
   if (settles_) hold_landed_foot(feedback);
-  if (activity_ == Activity::kSwing) pace_swing();
+  if (activity_ == Activity::kSwing) {
+    const StepGoal& goal = decision_.goal;
+    const Vec2 free_side = plan_T_sole_[index_of(other(goal.foot))].R.col(1).head<2>() * side_sign(goal.foot);
+    const bool beside = goal.kind == StepKind::kFloor || goal.kind == StepKind::kLeading;
+    pace_.advance(params_.pace, dcm_error_m_.dot(free_side), beside, swing_.duration_ticks());
+  }
   tick_ = std::min(tick_ + 1, kTickLimit);
   com_tick_ = std::min(com_tick_ + 1, kTickLimit);
   torso_tick_ = std::min(torso_tick_ + 1, kTickLimit);

@@ -12,6 +12,7 @@
 #include "algorithms/gait/climb_planner.hpp"
 #include "algorithms/gait/joint_reference.hpp"
 #include "algorithms/gait/step_plan.hpp"
+#include "algorithms/gait/swing_pace.hpp"
 
 namespace polygmap {
 
@@ -40,11 +41,7 @@ class Gait {
     double hold_force_n = 100.0;            // pressed less, a foot that landed is held where it landed,
     std::int64_t hold_ns = 400 * kNsPerMs;  // not longer: it may be the sensor
     double steady_m = 0.015;                // of the divergent component's error: beyond it no foot lifts
-    double topples_m = 0.02;                // and towards the free foot: that one hurries
-    double hurry = 1.6;                     // so many times as fast,
-    double turn_share = 0.38;               // or back, earlier in the swing and not from the tread below;
-    double wider_m = 0.06;                  // and lands that much farther out
-    double wider_mps = 0.25;
+    SwingPace::Params pace;
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
     double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down
@@ -94,7 +91,6 @@ class Gait {
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
   // Of the swing: backwards in a retreat.
   [[nodiscard]] double motion_tick() const noexcept;
-  void pace_swing() noexcept;
   void carry_plan_to_odometry() noexcept;
   void settle_between_feet() noexcept;
   void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
@@ -123,6 +119,7 @@ class Gait {
   Vec2 dcm_error_m_ = Vec2::Zero();   // of the divergent component, as last measured, odometry
   Vec2 zmp_stance_m_ = Vec2::Zero();  // of the swing, plan frame
   Swing swing_;                       // odometry
+  SwingPace pace_;
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
   Transform odom_T_landed_;  // the last swing foot as it was asked to be when it landed
@@ -132,8 +129,6 @@ class Gait {
   std::int32_t tick_ = 0;        // of the activity, saturates
   std::int32_t torso_tick_ = 0;  // of the torso's plan, likewise
   std::int32_t com_tick_ = 0;    // of the plan of the centre of mass, likewise
-  double swing_tick_ = 0.0;      // of the swing's path: ahead of tick_ when it hurries
-  double pace_ = 1.0;            // along the swing's path, negative on the way back
   double turn_tick_ = 0.0;       // of the swing's path, when the retreat began
   std::int32_t shift_ticks_ = 0;
   std::int32_t shifts_ = 0;  // since the last swing
@@ -143,12 +138,9 @@ class Gait {
   bool usable_ = false;          // this tick's estimate: fresh, and all of it numbers
   bool armed_ = false;
   bool started_ = false;
-  bool unloaded_ = false;    // the swing foot was felt to leave the ground
-  bool retried_ = false;     // the legs could not do a step from the motion the plan was in: once more, from rest
-  bool topples_ = false;     // towards the free foot, in this swing,
-  bool turns_back_ = false;  // which goes back where it stood
-  double wider_m_ = 0.0;     // or lands that much farther out
-  bool settles_ = false;     // the last swing foot landed and carries little yet
+  bool unloaded_ = false;  // the swing foot was felt to leave the ground
+  bool retried_ = false;   // the legs could not do a step from the motion the plan was in: once more, from rest
+  bool settles_ = false;   // the last swing foot landed and carries little yet
   bool stop_requested_ = false;
 };
 
