@@ -408,17 +408,17 @@ TEST(PhysicalFailure, FootThatLeavesLate_IsNotLowered) {
   EXPECT_EQ(climb.status().early_contacts, 0U);
 }
 
-// The first tread is lower than mapped: the foot is lowered, or goes back to where it stood.
-TEST(PhysicalFailure, TreadLowerThanMapped_LowersTheFootOrPutsItBack) {
-  for (const double lower_m : {0.010, 0.015, 0.020, 0.030, 0.050}) {
+// Both treads are lower than mapped: the weight is on its way, so the foot has to find them.
+TEST(PhysicalFailure, TreadsLowerThanMapped_FootFindsThemInTime) {
+  for (const double lower_m : {0.015, 0.030, 0.050}) {
     PhysicalClimb climb(few_steps(2));
     climb.tamper_footholds = [&](FootholdSet& set) {
       for (Foothold& hold : set.p_star_feet) hold.position_m.z() += lower_m;
     };
     climb.run(60.0);
     EXPECT_FALSE(climb.truth().fell) << lower_m << " " << climb.truth().fall_reason;
-    EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]) << lower_m;
-    std::printf("LOW %.3f phase %d reason %d treads %u fell %d\n", lower_m, (int)climb.status().phase, (int)climb.status().stop_reason, climb.status().treads_climbed, climb.truth().fell);
+    EXPECT_EQ(climb.status().phase, GaitPhase::kFinished) << lower_m;
+    EXPECT_GT(climb.status().late_contacts, 1U) << lower_m;
   }
 }
 

@@ -8,8 +8,7 @@
 namespace polygmap {
 namespace {
 
-constexpr std::int32_t kLower_ticks = 200;    // of the torso where a foot needs a longer leg
-constexpr std::int32_t kPatience_ticks = 20;  // late ground that the shift after it can make up for: 3 mm
+constexpr std::int32_t kLower_ticks = 200;  // of the torso where a foot needs a longer leg
 constexpr double kInward_m = 0.01;
 constexpr double kSpare_m = 0.02;               // of its height: the base is not right over the centre of mass
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
@@ -150,15 +149,21 @@ void Gait::move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::
   torso_tick_ = 0;
 }
 
-// No ground: the weight rests over the stance foot, as low as the other sole at odom_p_sole asks for.
-void Gait::wait_over_stance(const SolePose& sole) noexcept {
+// As low as the other sole asks for, plan frame, and the standing one allows.
+void Gait::lower_torso(const SolePose& sole) noexcept {
   const Foot foot = decision_.goal.foot;
   SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   soles[index_of(foot)] = sole;
   const TorsoPose low = torso_over(params_.geometry, params_.step.torso, other(foot), soles);
   move_torso(std::min(low.position_m.z() - kSpare_m, torso_state_[2].position), low.yaw_rad, kLower_ticks,
              kLower_ticks);
-  // As far towards the free foot as the sole carries: the ankle roll of a folded leg has little range.
+}
+
+// No ground: the weight rests over the stance foot, as far towards the free foot as the sole carries. The ankle roll of
+// a folded leg has little range.
+void Gait::wait_over_stance(const SolePose& sole) noexcept {
+  lower_torso(sole);
+  const Foot foot = decision_.goal.foot;
   const Vec3 inward_m = plan_T_sole_[index_of(other(foot))].R.col(1) * (side_sign(foot) * kInward_m);
   rest_over(zmp_stance_m_ + inward_m.head<2>());
 }
@@ -364,12 +369,12 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     wait_over_stance(sole_pose(correction_.odom_T_plan(plan_T_base_).inverse() * swing_.at(0)));
     return;
   }
-  // The ground is late: the weight must not set off for it.
-  const double late_tick = swing_.duration_ticks() + params_.step.landing_hold_ticks + kPatience_ticks;
+  // The ground is late. The weight is on its way and cannot wait; the leg is to reach farther down.
+  const double late_tick = swing_.duration_ticks() + params_.step.landing_hold_ticks;
   if (pace_.tick() >= late_tick && pace_.last_tick() < late_tick) {
     SolePose lowest = sole_pose(plan_T_sole_[i]);
     lowest.position_m.z() -= params_.max_lowering_m;
-    wait_over_stance(lowest);
+    lower_torso(lowest);
   }
   const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
   plan_T_sole_[i] = plan_T_odom * odom_T_sole;

@@ -45,7 +45,7 @@ class Gait {
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
     double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down
-    double max_lowering_m = 0.04;               // no ground found: the foot goes back
+    double max_lowering_m = 0.055;              // no ground found: the foot goes back
     std::int32_t retreat_pause_ticks = 200;     // before it does
     double put_back_m = 0.01;                   // about where it stood: weight counts as the ground; below, it is there
     std::int64_t steer_age_ns = 20 * kNsPerMs;  // of IMU and joint samples: older ones steer nothing and start nothing
@@ -94,6 +94,7 @@ class Gait {
   void carry_plan_to_odometry() noexcept;
   void settle_between_feet() noexcept;
   void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
+  void lower_torso(const SolePose& sole) noexcept;
   void wait_over_stance(const SolePose& sole) noexcept;
   void rest_over(const Vec2& plan_p_m) noexcept;
   void look_at(const StateEstimate& state) noexcept;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How fast a swing runs along its path, and how far beside it: as planned, unless the body topples towards the free
-// foot. One sole cannot hold that; the free foot has to be there in time, or back.
+// foot (one sole cannot hold that; the free foot has to be there in time, or back) or the ground is late (the weight is
+// on its way).
 #pragma once
 
 #include <algorithm>
@@ -17,6 +18,8 @@ class SwingPace {
     double turn_share = 0.38;  // or back, earlier in the swing than this;
     double wider_m = 0.06;     // and it lands that much farther out
     double wider_mps = 0.25;
+    std::int32_t late_ticks = 10;  // after the path's end it goes down
+    double seek = 5.0;             // so many times as fast
   };
 
   void begin() noexcept { *this = {}; }
@@ -28,7 +31,8 @@ class SwingPace {
       turns_back_ = may_turn_back && tick_ < params.turn_share * duration_ticks;
     }
     constexpr double kHarderPerTick = 0.05;
-    const double wanted = turns_back_ ? -1.0 : topples_ ? params.hurry : 1.0;
+    const double usual = tick_ > duration_ticks + params.late_ticks ? params.seek : topples_ ? params.hurry : 1.0;
+    const double wanted = turns_back_ ? -1.0 : usual;
     pace_ += math::clamp(wanted - pace_, -kHarderPerTick, kHarderPerTick);
     tick_ += pace_;
     if (topples_ && !turns_back_) wider_m_ = std::min(wider_m_ + params.wider_mps * kTick_s, params.wider_m);
