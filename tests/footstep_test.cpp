@@ -122,7 +122,7 @@ StepPlan stair_step(StepKind kind, double rise_m, double ahead_m, std::array<Tra
     lead.kind = StepKind::kLeading;
     lead.foot = Foot::kLeft;
     lead.target = left;
-    const StepPlan before = plan_step(params, lead, {SolePose{{0, 0.1, 0}, 0}, right}, kToeDown_rad[0]);
+    const StepPlan before = plan_step(params, lead, {SolePose{{0, 0.1, 0}, 0}, right}, kStepTries[0]);
     const auto start = TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.0, 0.79}});
     const StepKnots knots({}, params, before, start, {SolePose{{0, 0.1, 0}, 0}.transform(), right.transform()});
     from = TorsoTrajectory::at_rest({Mat3::Identity(), knots.torso_at_landing().position_m});
@@ -130,7 +130,7 @@ StepPlan stair_step(StepKind kind, double rise_m, double ahead_m, std::array<Tra
   } else {
     from = TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.0, 0.79}});
   }
-  return plan_step(params, goal, {left, right}, kToeDown_rad[0]);
+  return plan_step(params, goal, {left, right}, kStepTries[0]);
 }
 
 TEST(StepKnots_Eq30Eq37, WholeStep_KnotsAreEvenInTimeAndEndOnTheTarget) {
@@ -185,7 +185,7 @@ TEST(StepProof, TrailingSwingWithALevelSole_MeetsTheAnklesLimitThatAPitchedOneKe
     return proof.check().joint_margin_rad;
   };
   EXPECT_LT(ankle_margin_rad(0.0), 0.0);
-  EXPECT_GT(ankle_margin_rad(kToeDown_rad[0]), StepParams{}.joint_margin_rad);
+  EXPECT_GT(ankle_margin_rad(kStepTries[0].toe_down_rad), StepParams{}.joint_margin_rad);
 }
 
 // The rear foot, on the floor, passes the one that has just landed on the first tread.
@@ -227,6 +227,22 @@ TEST(StepSearch, PassingStepThatIsPossibleWithNoTrailingStepAfterIt_IsImpossible
   StepParams fast;
   fast.passing_swing_ticks = 300;
   EXPECT_EQ(searched(passing_step(0.13, 0.28), fast).state(), StepSearch::State::kImpossible);
+}
+
+TEST(StepSearch, RiseTooFastForTheDrives_IsDoneInALongerSwing) {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  const StepPlan plan = stair_step(StepKind::kLeading, 0.182, 0.35, soles, from);
+  StepGoal trailing = plan.goal;
+  trailing.kind = StepKind::kTrailing;
+  trailing.foot = Foot::kRight;
+  trailing.target.position_m.y() = -0.1;
+  StepSearch search;
+  search.begin({}, {}, plan.goal, trailing, StepParams{}.stair_shift_ticks, from, soles);
+  while (search.step() == StepSearch::State::kSearching) {
+  }
+  EXPECT_EQ(search.state(), StepSearch::State::kFound);
+  EXPECT_GT(search.plan().swing_ticks, StepParams{}.stair_swing_ticks);
 }
 
 TEST(StepSearch, RiseBeyondTheLegs_IsImpossibleBeforeTheFirstLiftOff) {

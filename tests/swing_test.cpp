@@ -91,10 +91,10 @@ TEST(Swing, RiserAtTheToe_RisesBeforeItGoesForward) {
 TEST(Swing, TwoRisersAhead_ClearsBothNosings) {
   constexpr double kTread_m = 0.28, kGap_m = 0.014;
   for (const double rise_m : {0.10, 0.13, 0.17}) {
-    for (const double toe_down_rad : kPassingToeDown_rad) {
+    for (const StepTry& tried : kPassingTries) {
       const StepParams params;
       SwingShape shape = params.passing_swing;
-      shape.toe_down_rad = toe_down_rad;
+      shape.toe_down_rad = tried.toe_down_rad;
       Swing swing;
       swing.plan({Mat3::Identity(), {0, 0.1, 0}}, {{2 * kTread_m, 0.1, 2 * rise_m}, 0.0}, shape,
                  params.passing_swing_ticks);

@@ -208,7 +208,7 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   status_.phase = GaitPhase::kDoubleSupport;
   tick_ = 0;
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
-  StepPlan plan = plan_step(params_.step, decision.goal, soles, kToeDown_rad[0]);
+  StepPlan plan = plan_step(params_.step, decision.goal, soles, kStepTries[0]);
   if (again) plan.shift_ticks = params_.reshift_ticks;
   // Sooner where the weight is on its way already, later where it stands over the other foot with little room to push
   // off: the first shift that needs a small push.
@@ -310,7 +310,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   carry_plan_to_odometry();
   const StepGoal& goal = decision.goal;
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
-  StepPlan plan = plan_step(params_.step, goal, soles, search_.plan().toe_down_rad);
+  StepPlan plan = plan_step(params_.step, goal, soles, search_.plan().tried);
   com_.plan(params_.step.com, TorsoTrajectory::horizontal(torso_state_), zmp_of_swing(params_.step, plan));
   plan_torso(params_.geometry, params_.step, soles, com_, 0, plan);
   swing_.plan(plan_T_sole_[index_of(goal.foot)], goal.target, plan.shape, plan.swing_ticks);

@@ -8,7 +8,7 @@
 namespace polygmap {
 
 StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePair& soles,
-                   double toe_down_rad) noexcept {
+                   const StepTry& tried) noexcept {
   const bool on_floor = goal.kind == StepKind::kFloor, passing = goal.kind == StepKind::kPassing;
   const Foot stance = other(goal.foot);
   SolePair landed = soles;
@@ -18,13 +18,14 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
   plan.goal = goal;
   plan.shape = on_floor ? params.floor_swing : passing ? params.passing_swing : params.stair_swing;
   plan.shift_ticks = on_floor ? params.floor_shift_ticks : params.stair_shift_ticks;
-  plan.swing_ticks = on_floor  ? params.floor_swing_ticks
-                     : passing ? params.passing_swing_ticks
-                               : params.stair_swing_ticks;
+  const std::int32_t usual_ticks = on_floor  ? params.floor_swing_ticks
+                                   : passing ? params.passing_swing_ticks
+                                             : params.stair_swing_ticks;
+  plan.swing_ticks = static_cast<std::int32_t>(tried.longer * usual_ticks);
   const double rise_share = on_floor ? 1.0 : passing ? params.passing_rise_share : params.rise_share;
   plan.rise_ticks = static_cast<std::int32_t>(rise_share * plan.swing_ticks);
-  plan.toe_down_rad = toe_down_rad;
-  plan.shape.toe_down_rad = on_floor ? 0.5 * toe_down_rad : toe_down_rad;
+  plan.tried = tried;
+  plan.shape.toe_down_rad = on_floor ? 0.5 * tried.toe_down_rad : tried.toe_down_rad;
   const auto zmp_in = [&](Foot foot) -> Vec2 {
     const SolePose& sole = landed[index_of(foot)];
     const Vec3 local_m{params.zmp_ahead_m, -side_sign(foot) * params.zmp_inward_m, 0.0};
@@ -164,7 +165,7 @@ void StepSearch::begin(const LegGeometry& geometry, const StepParams& params, co
   shift_ticks_ = shift_ticks;
   from_ = from;
   soles_ = soles;
-  shape_ = 0;
+  try_ = 0;
   leading_found_ = false;
   state_ = State::kSearching;
   try_candidate();
@@ -179,8 +180,8 @@ void StepSearch::try_candidate() noexcept {
     from = TorsoTrajectory::at_rest({rotation_z(torso_landed_.yaw_rad), torso_landed_.position_m});
     TorsoTrajectory::set_horizontal(from, com_landed_);
   }
-  const auto& toe_down_rad = goal.kind == StepKind::kPassing ? kPassingToeDown_rad : kToeDown_rad;
-  candidate_ = plan_step(params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, toe_down_rad[shape_]);
+  const StepTries& tries = goal.kind == StepKind::kPassing ? kPassingTries : kStepTries;
+  candidate_ = plan_step(params_, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, tries[try_]);
   if (!leading_found_) candidate_.shift_ticks = shift_ticks_;
   StepParams params = params_;
   if (leading_found_) params.knot_ticks *= kLookAhead;
@@ -208,7 +209,7 @@ bool StepSearch::leads_on() const noexcept {
 StepSearch::State StepSearch::step() noexcept {
   if (state_ != State::kSearching || !proof_.advance(kKnotsPerCall)) return state_;
   if (!proof_.check().feasible) {
-    if (++shape_ == kToeDown_rad.size()) return state_ = State::kImpossible;
+    if (++try_ == kStepTryCount) return state_ = State::kImpossible;
   } else {
     if (!leading_found_) plan_ = candidate_;
     if (goal_.kind == StepKind::kFloor && !leads_on()) return state_ = State::kImpossible;
@@ -216,7 +217,7 @@ StepSearch::State StepSearch::step() noexcept {
     leading_found_ = true;
     com_landed_ = proof_.knots().com_at_landing();
     torso_landed_ = proof_.knots().torso_at_landing();
-    shape_ = 0;
+    try_ = 0;
   }
   try_candidate();
   return state_;

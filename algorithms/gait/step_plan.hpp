@@ -72,9 +72,15 @@ struct StepParams {
   double speed_share = 0.95;       // of the drives' speed that a plan may use
 };
 
-// Toe-down angles that are tried, in this order; half of each on the floor.
-inline constexpr std::array<double, 5> kToeDown_rad{0.3, 0.2, 0.4, 0.1, 0.5};
-inline constexpr std::array<double, 5> kPassingToeDown_rad{0.4, 0.5, 0.3, 0.6, 0.2};
+// What is tried to make a step possible, in this order: the ankles ask for toes that point down, the drives for time.
+struct StepTry {
+  double toe_down_rad = 0.0;  // half of it on the floor
+  double longer = 1.0;        // the swing
+};
+inline constexpr std::size_t kStepTryCount = 7;
+using StepTries = std::array<StepTry, kStepTryCount>;
+inline constexpr StepTries kStepTries{{{0.3}, {0.2}, {0.4}, {0.1}, {0.5}, {0.3, 1.15}, {0.2, 1.15}}};
+inline constexpr StepTries kPassingTries{{{0.4}, {0.5}, {0.3}, {0.6}, {0.2}, {0.4, 1.15}, {0.5, 1.15}}};
 
 struct StepPlan {
   StepGoal goal;
@@ -82,7 +88,7 @@ struct StepPlan {
   TorsoPose touch_down;
   Vec2 zmp_stance_m = Vec2::Zero();  // while the foot swings
   Vec2 zmp_next_m = Vec2::Zero();    // then
-  double toe_down_rad = 0.0;         // as tried; the floor's shape has half of it
+  StepTry tried;
   SwingShape shape;
   std::int32_t shift_ticks = 1;
   std::int32_t swing_ticks = 1;
@@ -91,7 +97,7 @@ struct StepPlan {
 
 // All but the torso.
 [[nodiscard]] StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePair& soles,
-                                 double toe_down_rad) noexcept;
+                                 const StepTry& tried) noexcept;
 // The torso as high as both legs reach from where the centre of mass is a little after the foot leaves, which rises
 // slowly at first, and when it lands: on the way to the stance foot it is still behind it, which spares the front leg
 // its bend.
@@ -193,7 +199,7 @@ class StepSearch {
   HorizontalMotion com_landed_;  // after the leading swing
   TorsoPose torso_landed_;
   std::int32_t shift_ticks_ = 1;
-  std::size_t shape_ = 0;
+  std::size_t try_ = 0;
   bool leading_found_ = false;
   State state_ = State::kImpossible;
 };

@@ -62,7 +62,7 @@ void stage_gait_shift_tick(GaitBench& bench, const GaitTick& tick) {
 void stage_gait_plan(StairPlan& p) {
   for (std::size_t i = 0; i < p.goals.size(); ++i) {
     const SolePair flat{sole_pose(p.soles[i][0]), sole_pose(p.soles[i][1])};
-    StepPlan plan = plan_step(p.params, p.goals[i], flat, kToeDown_rad[0]);
+    StepPlan plan = plan_step(p.params, p.goals[i], flat, kStepTries[0]);
     const HorizontalMotion com = TorsoTrajectory::horizontal(p.from[i]);
     p.com.plan(p.params.com, com, zmp_of_shift(p.params, plan, ComPlan::zmp_under(p.params.com, com)));
     plan_torso(p.geometry, p.params, flat, p.com, plan.shift_ticks, plan);
