@@ -113,8 +113,8 @@ TEST(Swing, TwoRisersAhead_ClearsBothNosings) {
           }
         }
       }
-      EXPECT_GT(middle_m, 0.005) << rise_m << " " << toe_down_rad;
-      EXPECT_GT(last_m, 0.015) << rise_m << " " << toe_down_rad;
+      EXPECT_GT(middle_m, 0.005) << rise_m << " " << tried.toe_down_rad;
+      EXPECT_GT(last_m, 0.015) << rise_m << " " << tried.toe_down_rad;
     }
   }
 }
