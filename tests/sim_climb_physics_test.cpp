@@ -84,6 +84,8 @@ TEST_P(SingleStepClimb, UnderPhysics_ClimbedWithinTheFigures) {
   EXPECT_LE(summary.seconds_per_step, 1.6);
   EXPECT_LE(summary.execution_error_m.max, 0.010);  // the paper: 0.0334
   EXPECT_LE(summary.foothold_error_m.max, 0.0124);
+  EXPECT_LE(summary.tracking_error_x_max_m, 0.030);
+  EXPECT_GE(summary.sole_margin_min_m, 0.0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, PhysicsClimb, testing::Values(Case{3, {.steps = 4}}), name_of);

@@ -19,7 +19,7 @@ struct SinCos {
 // Source: reduction by pi/2 in three parts and minimax polynomials on +-pi/4, with the constants of fdlibm. Beyond
 // 1e5 rad, and for what is no number, the C library answers.
 [[nodiscard]] inline SinCos sin_cos(double x_rad) noexcept {
-  if (!(std::abs(x_rad) < 1e5)) return {std::sin(x_rad), std::cos(x_rad)};
+  if (!(std::abs(x_rad) < 1e5)) return {sin(x_rad), cos(x_rad)};
   constexpr double kPart1 = 1.57079632673412561417e+00, kPart2 = 6.07710050630396597660e-11,
                    kPart3 = 2.02226624879595063154e-21;
   constexpr double kRound = 0x1.8p52;  // the last bits of a sum with it are the nearest whole number

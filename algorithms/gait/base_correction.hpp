@@ -32,6 +32,8 @@ class BaseCorrection {
     offset_m_ += share * (odom_T_base.p_m - plan_T_base.p_m + ahead_m - offset_m_);
     rotation_rad_ += share * (rotation_rad + ahead_rad - rotation_rad_);
   }
+  // A tick without an estimate: the plan's way until the next one is not that of one tick.
+  void missed() noexcept { known_ = false; }
   // Moves anything of the plan to odometry, given where the plan has the base: the difference is known at the base.
   [[nodiscard]] Transform odom_T_plan(const Transform& plan_T_base) const noexcept {
     const Mat3 R = rotation_zyx(rotation_rad_.z(), rotation_rad_.y(), rotation_rad_.x());

@@ -276,6 +276,7 @@ bool Gait::close_to_planned(const StepGoal& goal) const noexcept {
 void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexcept {
   if (search_.step() == StepSearch::State::kImpossible) {
     if (decision_.goal.kind == StepKind::kPassing) {
+      if (!usable_) return;
       planner_.refuse_passing();
       return begin_shift(planner_.decide(situation(state), footholds), false);
     }
@@ -288,7 +289,7 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
   if (stop_requested_ || lost(state)) return begin_hold();
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
   if (!usable_) return;
-  if (dcm_error_m_.norm() > params_.steady_m) {
+  if (!(dcm_error_m_.norm() <= params_.steady_m)) {
     if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_hold();
     return;
   }
@@ -369,7 +370,7 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     wait_over_stance(sole_pose(correction_.odom_T_plan(plan_T_base_).inverse() * swing_.at(0)));
     return;
   }
-  // The ground is late. The weight is on its way and cannot wait; the leg is to reach farther down.
+  // The ground is late: the leg is to reach farther down.
   const double late_tick = swing_.duration_ticks() + params_.step.landing_hold_ticks;
   if (pace_.tick() >= late_tick && pace_.last_tick() < late_tick) {
     SolePose lowest = sole_pose(plan_T_sole_[i]);
@@ -454,6 +455,8 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   if (usable_) {
     correction_.update(state.odom_T_base, state.odom_v_base_mps, state.odom_T_base.R * state.base_w_base_radps,
                        plan_T_base_, params_.correction_time_s);
+  } else {
+    correction_.missed();
   }
   switch (activity_) {
     case Activity::kHold:

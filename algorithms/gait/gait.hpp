@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gait: walks up to the stairs, climbs them in double-support gait, ends by itself.
+// The gait: walks up to the stairs, climbs them in either of the paper's gaits, ends by itself.
 #pragma once
 
 #include <array>

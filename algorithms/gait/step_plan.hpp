@@ -59,7 +59,7 @@ struct StepParams {
   std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
   ComPlan::Params com;
-  double zmp_ahead_m = 0.01;             // of the ankle, near the middle of what it can hold either way
+  double zmp_ahead_m = 0.0;              // of the ankle: what it holds ahead and behind is the same
   double zmp_inward_m = 0.022;           // and towards the other foot
   std::int32_t landing_hold_ticks = 50;  // the foot may land that much late before the weight sets off for it
   std::int32_t lift_hold_ticks = 15;     // and the weight is over the stance foot that long before the other one lifts

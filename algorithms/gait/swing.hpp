@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The path of the swing foot (eqs 32-33), with what a real staircase asks for: rise before moving forward, keep away
-// from the riser, cross the nosing high, come down straight, seek the ground slowly.
+// from the riser, cross the nosing high, come down straight, seek the ground at an even speed (swing_pace.hpp: faster
+// where it is late).
 #pragma once
 
 #include "algorithms/gait/blend.hpp"

@@ -15,7 +15,7 @@ struct TorsoParams {
   double lead_height_m = 0.86;  // above the lower foot when the leading one lands
   double max_leg_m = 0.612;     // hip pitch to ankle, of 0.630 stretched
   double inward_m = 0.022;      // of the base at rest over one foot, from its middle line towards the other one
-  double ahead_m = 0.01;        // and before its sole's origin
+  double ahead_m = 0.0;         // and before its sole's origin
 };
 
 // Base height at which the leg to `sole` is max_leg_m long, for a base at (x, y) with that heading.
