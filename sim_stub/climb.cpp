@@ -167,7 +167,7 @@ std::vector<std::pair<std::string, std::uint32_t>> raised(const Health& health) 
 }  // namespace
 
 ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction& progress) {
-  constexpr std::int64_t kRestAfterEnd_ns = kNsPerS / 2;  // the robot is watched a little longer than it climbs
+  constexpr std::int64_t kRestAfterEnd_ns = 2 * kNsPerS;  // a robot that topples takes its time
   const auto wall_begin = WallClock::now();
   heap::set_on_call(heap::OnCall::kCount);
   heap::reset();
