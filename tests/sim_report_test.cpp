@@ -49,7 +49,7 @@ TEST(ClimbReport, FlawlessClimb_Passes) {
   const ClimbSummary s = climb.finish();
   EXPECT_TRUE(s.pass) << s.reason;
   EXPECT_FALSE(s.fell);
-  EXPECT_EQ(s.options.plant, PlantKind::kKinematic);
+  EXPECT_EQ(s.options.plant, PlantKind::kMujoco);
   EXPECT_EQ(s.steps_total, 3);
   EXPECT_EQ(s.steps_climbed, 3);
   EXPECT_NEAR(s.execution_error_m.max, 0.0, kUm);

@@ -39,7 +39,7 @@ class Gait {
     std::int32_t settle_ticks = 300;           // to the middle between the feet when there is nothing to do
     double touch_force_n = 15.0;
     double hold_force_n = 100.0;            // pressed less, a foot that landed is held where it landed,
-    std::int64_t hold_ns = 400 * kNsPerMs;  // not longer: it may be the sensor
+    std::int64_t hold_ns = 200 * kNsPerMs;  // not longer: it may be the sensor
     double steady_m = 0.015;                // of the divergent component's error: beyond it no foot lifts
     SwingPace::Params pace;
     double early_m = 0.005;                     // contact this far above the target counts as early
