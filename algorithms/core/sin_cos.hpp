@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sine and cosine at once: the cycle turns some fifty frames in a tick, for which the C library's took a fifth of the
-// gait's time. To the last bit but one, and the same bits on every target.
+// Sine and cosine at once, for the many frames that the gait turns in a tick: cheaper than the C library's. To the last
+// bit but one, and the same bits on every target.
 #pragma once
 
 #include <bit>
