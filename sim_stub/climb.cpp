@@ -80,7 +80,7 @@ SimOptions sim_options(const ClimbOptions& options) {
   sim.stairs = options.stairs;
   sim.noise = options.noise;
   sim.plant_kind = options.plant;
-  sim.push = options.push;
+  sim.pushes = options.pushes;
   sim.camera.stairs_shift_m = {options.render_dx_m, options.render_dy_m, options.render_dz_m};
   sim.camera.missing_step = options.render_missing_step;
   sim.camera.threaded = options.threaded_render;

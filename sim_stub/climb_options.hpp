@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "algorithms/gait/climb_planner.hpp"
 #include "sim_stub/camera_profile.hpp"
@@ -21,7 +22,7 @@ struct ClimbOptions {
   std::uint64_t seed = 1;
   DepthNoise noise = DepthNoise::kWhite;
   PlantKind plant = PlantKind::kMujoco;
-  std::optional<Push> push;
+  std::vector<Push> pushes;
   GaitPattern gait = GaitPattern::kDoubleStep;
   std::string out_dir;          // empty: no files
   double time_limit_s = 150.0;  // simulated

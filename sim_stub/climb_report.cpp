@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <stdexcept>
 #include <utility>
@@ -44,45 +43,6 @@ double nosing_distance_m(const Step& step, const Transform& true_T_sole) {
   return (true_T_sole.p_m.x() - step.nosing_x_m) / std::cos(yaw_of(true_T_sole.R));
 }
 
-std::string sentence(const char* format, double a = 0.0, double b = 0.0, double c = 0.0, double d = 0.0) {
-  char buffer[200];
-  std::snprintf(buffer, sizeof buffer, format, a, b, c, d);
-  return buffer;
-}
-
-std::string why_stopped(Obstruction reason, double measured_m) {
-  switch (reason) {
-    case Obstruction::kNone:
-      return "it gave no reason";
-    case Obstruction::kNothingSeen:
-      return "it saw no surface to step on";
-    case Obstruction::kNoStaircase:
-      return "it saw level ground and no higher tread";
-    case Obstruction::kTop:
-      return "it took the tread it stood on for the highest";
-    case Obstruction::kRiseTooHigh:
-      return sentence("it measured a rise of %.3f m, too high to climb", measured_m);
-    case Obstruction::kTreadTooShort:
-      return sentence("it measured a tread of %.3f m, too short for the foot", measured_m);
-    case Obstruction::kTooNarrow:
-      return "it measured a tread too narrow for two feet";
-    case Obstruction::kMapStale:
-      return "its map was stale";
-    case Obstruction::kEdgeUncertain:
-      return "it knew the edges of the next tread too vaguely";
-    case Obstruction::kLegsCannot:
-      return measured_m > 0.0 ? sentence("its legs could not do the next step, of %.3f m rise", measured_m)
-                              : "its legs could not do the next step";
-    case Obstruction::kUnsteady:
-      return "what it saw kept changing";
-    case Obstruction::kGroundMissing:
-      return "there was no ground where a foot came down, and it put the foot back";
-    case Obstruction::kStateStale:
-      return "its IMU or its joints fell silent";
-  }
-  return "it gave no known reason";
-}
-
 }  // namespace
 
 void ClimbReport::PositionError::add(const Vec3& error_m) {
@@ -118,7 +78,7 @@ void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
   last_stamp_ns_ = truth.stamp_ns;
   if (truth.fell && !fell_) {
     fell_ = true;
-    fall_reason_ = truth.fall_reason;
+    ending_.fall_reason = truth.fall_reason;
   }
   observe_odometry(truth, telemetry.state);
   if (aligned_) {
@@ -186,9 +146,9 @@ void ClimbReport::observe_map(const Telemetry& telemetry) {
 void ClimbReport::observe_footsteps(const Truth& truth, const Telemetry& telemetry) {
   const GaitStatus& gait = telemetry.gait;
   const LatchedStep& step = gait.step;
-  phase_ = gait.phase;
-  stop_reason_ = gait.stop_reason;
-  stop_measured_m_ = gait.stop_measured_m;
+  ending_.phase = gait.phase;
+  ending_.stop_reason = gait.stop_reason;
+  ending_.stop_measured_m = gait.stop_measured_m;
   if (step.sequence == 0) return;
 
   if (footsteps_.empty() || footsteps_.back().sequence != step.sequence) {
@@ -366,34 +326,6 @@ double ClimbReport::clearance_min_m() const {
   return std::isinf(least_m) ? kNotMeasured : least_m;
 }
 
-void ClimbReport::judge(ClimbSummary& s, const std::string& heap_first_caller) const {
-  const std::string climbed = sentence("%.0f of %.0f steps", s.steps_climbed, s.steps_total);
-  const bool all_climbed = s.steps_total > 0 && s.steps_climbed == s.steps_total;
-  s.pass = all_climbed && !s.fell && s.sole_margin_min_m >= 0.0 && s.swing_clearance_min_m > 0.0 && s.heap_calls == 0;
-  if (s.pass) {
-    s.reason = "Climbed " + climbed +
-               sentence(" in %.1f s (%.2f s per step), least sole margin %.1f mm, least swing clearance %.1f mm",
-                        s.climb_time_s, s.seconds_per_step, s.sole_margin_min_m * 1e3, s.swing_clearance_min_m * 1e3);
-    s.reason += phase_ == GaitPhase::kFinished ? "." : "; the run ended before the module did.";
-  } else if (s.fell) {
-    s.reason = "Fell after " + climbed + ": " + fall_reason_;
-  } else if (!all_climbed && phase_ == GaitPhase::kStopped) {
-    s.reason = "The module stopped after " + climbed + ": " + why_stopped(stop_reason_, stop_measured_m_) + ".";
-  } else if (!all_climbed && phase_ == GaitPhase::kFinished) {
-    s.reason = "The module ended the climb after " + climbed + ": " + why_stopped(Obstruction::kTop, 0.0) + ".";
-  } else if (!all_climbed) {
-    s.reason = "Time ran out after " + climbed + ".";
-  } else if (s.heap_calls != 0) {
-    s.reason = "The module called the heap, " + std::to_string(s.heap_calls) + " times in all, first from " +
-               (heap_first_caller.empty() ? "an unknown function" : heap_first_caller) + ".";
-  } else if (!(s.sole_margin_min_m >= 0.0)) {
-    s.reason = sentence("A sole stood %.1f mm over the edge of its tread.", -s.sole_margin_min_m * 1e3);
-  } else {
-    s.reason =
-        sentence("A foot came within %.1f mm of the stairs (0 or less is a collision).", s.swing_clearance_min_m * 1e3);
-  }
-}
-
 ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   ClimbSummary s;
   s.options = run.options;
@@ -401,7 +333,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.fell = fell_;
   s.steps_total = static_cast<int>(world_.steps.size());
   s.steps_climbed = steps_climbed_;
-  const bool module_ended = phase_ == GaitPhase::kFinished || phase_ == GaitPhase::kStopped;
+  const bool module_ended = ending_.phase == GaitPhase::kFinished || ending_.phase == GaitPhase::kStopped;
   s.ended_by = fell_ ? "fall" : module_ended ? "module" : "time limit";
   if (on_top_ns_ >= 0 && first_lift_off_ns_ >= 0) {
     s.climb_time_s = seconds(on_top_ns_ - first_lift_off_ns_);
@@ -455,7 +387,11 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.schedule = run.schedule;
   s.footsteps = footsteps_;
   s.wall_seconds = run.wall_seconds;
-  judge(s, run.heap_first_caller);
+
+  ClimbEnding ending = ending_;
+  ending.at_s = seconds(last_stamp_ns_);
+  ending.heap_first_caller = run.heap_first_caller;
+  judge(s, ending);
   return s;
 }
 

@@ -16,6 +16,7 @@
 #include "sim_stub/clearance.hpp"
 #include "sim_stub/climb_summary.hpp"
 #include "sim_stub/climb_svg.hpp"
+#include "sim_stub/climb_verdict.hpp"
 #include "sim_stub/stair_world.hpp"
 #include "sim_stub/truth.hpp"
 
@@ -83,7 +84,6 @@ class ClimbReport {
   [[nodiscard]] double clearance_min_m() const;
   // The step that a foot in the air is meant for, by the module's word.
   [[nodiscard]] int meant_step(Foot foot, const Flight& flight) const;
-  void judge(ClimbSummary& summary, const std::string& heap_first_caller) const;
 
   StairWorld world_;
   std::vector<SolidBox> solids_;
@@ -93,7 +93,7 @@ class ClimbReport {
   std::int64_t last_stamp_ns_ = 0;
   std::deque<TruePose> past_;
   bool fell_ = false;
-  std::string fall_reason_;
+  ClimbEnding ending_;
 
   bool aligned_ = false;
   std::int64_t aligned_stamp_ns_ = 0;
@@ -116,9 +116,6 @@ class ClimbReport {
   Foothold target_;              // of the newest footstep
   double latched_across_m_ = 0;  // the same: target's lateral place seen from the stance sole
   bool landing_pending_ = false;
-  GaitPhase phase_ = GaitPhase::kStandstill;
-  Obstruction stop_reason_ = Obstruction::kNone;
-  double stop_measured_m_ = 0.0;
   double com_tracking_max_m_ = kNotMeasured, zmp_margin_min_m_ = kNotMeasured;
   std::array<double, kJointsPerLeg> torque_peak_ratio_{}, joint_speed_peak_ratio_{};
   double tracking_x_max_m_ = kNotMeasured, tracking_z_max_m_ = kNotMeasured;

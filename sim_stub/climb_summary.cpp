@@ -56,9 +56,12 @@ Json footstep_json(const Footstep& f) {
           {"target_last_seen_ms", ms(f.target_last_seen_ms)}};
 }
 
-Json push_json(const std::optional<Push>& push) {
-  if (!push) return nullptr;
-  return {{"at_s", push->at_s}, {"axis", push->axis == 0 ? "x" : "y"}, {"impulse_ns", push->impulse_ns}};
+Json pushes_json(const std::vector<Push>& pushes) {
+  Json list = Json::array();
+  for (const Push& push : pushes) {
+    list.push_back({{"at_s", push.at_s}, {"axis", push.axis == 0 ? "x" : "y"}, {"impulse_ns", push.impulse_ns}});
+  }
+  return list;
 }
 
 // What the command line said beside gait and seed, defaults included: enough to run it again.
@@ -70,6 +73,7 @@ Json arguments_json(const ClimbOptions& o) {
           {"width_m", stairs.width_m},
           {"nosing_m", stairs.nosing_m},
           {"landing_m", stairs.landing_m},
+          {"jitter_m", stairs.jitter_m},
           {"noise", o.noise == DepthNoise::kWhite ? "white" : "correlated"},
           {"camera", o.camera ? Json(o.camera_file) : Json(nullptr)},
           {"scan_ms", o.scan_ms},
@@ -78,7 +82,7 @@ Json arguments_json(const ClimbOptions& o) {
           {"estimate_mount", o.estimate_mount},
           {"self_filter", o.self_filter},
           {"contacts", o.infer_contacts ? "inferred" : "sensed"},
-          {"push", push_json(o.push)},
+          {"pushes", pushes_json(o.pushes)},
           {"render_shift_m", {o.render_dx_m, o.render_dy_m, o.render_dz_m}},
           {"render_missing_step", o.render_missing_step < 0 ? Json(nullptr) : Json(o.render_missing_step + 1)},
           {"blank_depth", o.blank_depth}};

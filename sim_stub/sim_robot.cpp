@@ -60,7 +60,7 @@ SimRobot::SimRobot(const SimOptions& options)
       error_params_(options.errors),
       errors_(draw_errors(options.errors, options.seed)),
       lio_silent_(options.lio_silent),
-      push_(options.push),
+      pushes_(options.pushes),
       plant_(make_plant(options, stairs_, errors_, start_)),
       camera_(options.camera,
               {.kind = options.noise,
@@ -79,14 +79,20 @@ SimRobot::SimRobot(const SimOptions& options)
 
 void SimRobot::advance() {
   clock_.advance();
-  if (push_) {
-    const std::int64_t since_ns = clock_.now_ns() - std::llround(push_->at_s * kNsPerS);
-    const bool pushes = since_ns >= 0 && since_ns < std::llround(Push::kDuration_s * kNsPerS);
-    plant_->push(pushes ? Vec3(push_->impulse_ns / Push::kDuration_s * Vec3::Unit(push_->axis)) : Vec3(Vec3::Zero()));
-  }
+  if (!pushes_.empty()) plant_->push(push_force_n());
   plant_->step(active_);
   if (command_) active_ = *command_;
   sense();
+}
+
+Vec3 SimRobot::push_force_n() const {
+  Vec3 force_n = Vec3::Zero();
+  for (const Push& push : pushes_) {
+    const std::int64_t since_ns = clock_.now_ns() - std::llround(push.at_s * kNsPerS);
+    if (since_ns < 0 || since_ns >= std::llround(Push::kDuration_s * kNsPerS)) continue;
+    force_n[push.axis] += push.impulse_ns / Push::kDuration_s;
+  }
+  return force_n;
 }
 
 void SimRobot::sense() {

@@ -48,7 +48,7 @@ struct SimOptions {
   PlantKind plant_kind = PlantKind::kKinematic;
   KinematicPlant::Params plant;
   MujocoPlant::Params mujoco;
-  std::optional<Push> push;
+  std::vector<Push> pushes;
 };
 
 class SimRobot final : public hal::Clock,
@@ -89,6 +89,7 @@ class SimRobot final : public hal::Clock,
   static constexpr std::int64_t kLioPeriod_ticks = 50;
   static constexpr std::int64_t kLioLatency_ticks = 50;
 
+  [[nodiscard]] Vec3 push_force_n() const;
   void sense();
   void update_truth();
 
@@ -97,7 +98,7 @@ class SimRobot final : public hal::Clock,
   ErrorParams error_params_;
   RobotErrors errors_;
   std::vector<Window> lio_silent_;
-  std::optional<Push> push_;
+  std::vector<Push> pushes_;
   VirtualClock clock_;
   std::unique_ptr<Plant> plant_;
   SimDepthCamera camera_;

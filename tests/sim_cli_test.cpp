@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -20,6 +21,11 @@ struct Call {
 };
 
 std::string temporary(const std::string& name) { return testing::TempDir() + "polygmap_cli_test_" + name; }
+
+std::vector<std::string> words(const std::string& line) {
+  std::istringstream in(line);
+  return {std::istream_iterator<std::string>(in), {}};
+}
 
 // Runs the command with a runner that records its options and says pass or fail.
 Call call(std::vector<std::string> arguments, bool pass = true) {
@@ -112,35 +118,11 @@ TEST(ClimbCommand, NoOptions_RunsWithTheDefaults) {
 }
 
 TEST(ClimbCommand, EveryOption_ReachesTheRun) {
-  const Call c = call({"climb",
-                       "--steps",
-                       "4",
-                       "--rise",
-                       "0.15",
-                       "--tread",
-                       "0.3",
-                       "--width",
-                       "0.8",
-                       "--nosing",
-                       "0.02",
-                       "--landing",
-                       "1.5",
-                       "--gait",
-                       "ds",
-                       "--seed",
-                       "42",
-                       "--noise",
-                       "correlated",
-                       "--out",
-                       temporary("every/deep"),
-                       "--render-shift",
-                       "0.03",
-                       "-0.01",
-                       "0.02",
-                       "--render-missing-step",
-                       "3",
-                       "--blank-depth",
-                       "--no-self-filter"});
+  const Call c =
+      call(words("climb --steps 4 --rise 0.15 --tread 0.3 --width 0.8 --nosing 0.02 --landing 1.5 --jitter 0.01 "
+                 "--gait ss --seed 42 --noise correlated --render-shift 0.03 -0.01 0.02 "
+                 "--render-missing-step 3 --blank-depth --no-self-filter --push 5,x,10 --push 7.5,y,-8 --out " +
+                 temporary("every/deep")));
   ASSERT_TRUE(c.options) << c.err;
   EXPECT_EQ(c.options->stairs.steps, 4);
   EXPECT_EQ(c.options->stairs.rise_m, 0.15);
@@ -148,6 +130,13 @@ TEST(ClimbCommand, EveryOption_ReachesTheRun) {
   EXPECT_EQ(c.options->stairs.width_m, 0.8);
   EXPECT_EQ(c.options->stairs.nosing_m, 0.02);
   EXPECT_EQ(c.options->stairs.landing_m, 1.5);
+  EXPECT_EQ(c.options->stairs.jitter_m, 0.01);
+  EXPECT_EQ(c.options->gait, GaitPattern::kSingleStep);
+  ASSERT_EQ(c.options->pushes.size(), 2U);
+  EXPECT_EQ(c.options->pushes[0].axis, 0);
+  EXPECT_EQ(c.options->pushes[1].at_s, 7.5);
+  EXPECT_EQ(c.options->pushes[1].axis, 1);
+  EXPECT_EQ(c.options->pushes[1].impulse_ns, -8.0);
   EXPECT_EQ(c.options->seed, 42U);
   EXPECT_EQ(c.options->noise, DepthNoise::kCorrelated);
   EXPECT_EQ(c.options->out_dir, temporary("every/deep"));
@@ -169,6 +158,9 @@ TEST(ClimbCommand, BadLength_IsRefusedWithOneSentence) {
   // 0.276: below the tread, but not below the shortest that the jitter may draw.
   for (const char* value : {"nan", "inf", "-0.01", "2.5", "0.276", "x", ""}) {
     expect_refused({"climb", "--nosing", value}, "--nosing");
+  }
+  for (const char* value : {"nan", "-0.001", "0.066", "x", ""}) {
+    expect_refused({"climb", "--jitter", value}, "--jitter");
   }
 }
 
@@ -198,7 +190,7 @@ TEST(ClimbCommand, BadWord_IsRefused) {
   expect_refused({"climb", "--gait", "trot"}, "--gait");
   expect_refused({"climb", "--plant", "rubber"}, "--plant");
   expect_refused({"climb", "--plant", "kinematic", "--push", "5,x,10"}, "--push");
-  for (const std::string push : {"x", "5,x", "5,z,10", "5,x,10,", "-1,x,10", "nan,x,10", "5,y,1000", "5,y,nan"}) {
+  for (const std::string push : {"x", "5,x", "5,z,10", "5,x,10,", "1.0,x,10", "nan,x,10", "5,y,1000", "5,y,nan"}) {
     expect_refused({"climb", "--push", push}, "--push");
   }
   expect_refused({"climb", "--noise", "pink"}, "--noise");

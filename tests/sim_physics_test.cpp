@@ -471,9 +471,9 @@ TEST(PhysicalClimb, PushedAnyWayAtEightMomentsOfAStair_DoesNotFall) {
     for (const int axis : {0, 1}) {
       for (const double impulse_ns : {10.0, -10.0}) {
         SimOptions options = few_steps(2);
-        options.push = {.at_s = begin_s + 0.32 * moment, .axis = axis, .impulse_ns = impulse_ns};
+        options.pushes = {{.at_s = begin_s + 0.32 * moment, .axis = axis, .impulse_ns = impulse_ns}};
         PhysicalClimb climb(options);
-        climb.run(options.push->at_s - climb.time_s());
+        climb.run(options.pushes.front().at_s - climb.time_s());
         EXPECT_LT(climb.status().treads_climbed, 2U);
         EXPECT_FALSE(climb.truth().fell);
         climb.run(3.0);

@@ -15,16 +15,18 @@
 
 #include "sim_stub/cli/estimate_command.hpp"
 #include "sim_stub/cli/perceive_command.hpp"
+#include "sim_stub/virtual_clock.hpp"
 
 namespace polygmap::sim {
 namespace {
 
 constexpr double kMaxLength_m = 2.0;
-constexpr double kMinStep_m = 0.01;  // rise or tread: jitter takes up to half of it
+constexpr double kMinStep_m = 0.01;  // rise or tread
 constexpr int kMaxSteps = 200;
 constexpr double kTimeLimit_s = 60.0;        // simulated: walking up and ending, ...
 constexpr double kTimeLimitPerStep_s = 6.0;  // ... and nearly twice what a step may take
-constexpr double kQuietPeriod_s = 5.0;       // simulated, between progress lines of a log
+constexpr double kFirstPush_s = seconds(VirtualClock::kStart_ns), kLastPush_s = 1000.0, kHardestPush_ns = 100.0;
+constexpr double kQuietPeriod_s = 5.0;  // simulated, between progress lines of a log
 
 struct ClimbArguments {
   ClimbOptions options;
@@ -37,7 +39,7 @@ struct ClimbArguments {
   bool no_self_filter = false;
   bool no_mount_estimate = false;
   std::string camera;
-  std::string push;
+  std::vector<std::string> pushes;
 };
 
 // CLI11 2.1 lets -1 and 2^64 wrap around.
@@ -59,6 +61,8 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_option("--width", stairs.width_m, "Width of the staircase, m")->capture_default_str();
   climb.add_option("--nosing", stairs.nosing_m, "Overhang of a tread over its riser, m")->capture_default_str();
   climb.add_option("--landing", stairs.landing_m, "Depth of the landing, m")->capture_default_str();
+  climb.add_option("--jitter", stairs.jitter_m, "Rise and tread of each step differ by up to this much, m")
+      ->capture_default_str();
   climb
       .add_option("--plant", a.plant,
                   "mujoco: under physics, it balances or falls; kinematic: follows and never tips over, quicker")
@@ -71,7 +75,8 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
   climb.add_option("--contacts", a.contacts, "Foot forces: sensed, or inferred from joint torques")
       ->capture_default_str();
-  climb.add_option("--push", a.push, "One push of the torso, over 0.1 s: when, s; along x or y; how much, N s")
+  climb.add_option("--push", a.pushes, "Pushes of the torso, over 0.1 s: when, s; along x or y; how much, N s")
+      ->expected(1, 16)
       ->type_name("\"T,AXIS,NS\"");
   climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
 
@@ -120,8 +125,9 @@ std::optional<Push> read_push(const std::string& text) {
   int end = 0;
   if (std::sscanf(text.c_str(), "%lf,%c,%lf%n", &push.at_s, &axis, &push.impulse_ns, &end) != 3) return {};
   if (end != static_cast<int>(text.size()) || (axis != 'x' && axis != 'y')) return {};
-  constexpr double kLatest_s = 1000.0, kHardest_ns = 100.0;
-  if (!(push.at_s >= 0.0 && push.at_s <= kLatest_s && std::abs(push.impulse_ns) <= kHardest_ns)) return {};
+  if (!(push.at_s >= kFirstPush_s && push.at_s <= kLastPush_s && std::abs(push.impulse_ns) <= kHardestPush_ns)) {
+    return {};
+  }
   push.axis = axis == 'x' ? 0 : 1;
   return push;
 }
@@ -146,6 +152,11 @@ std::string complaint(ClimbArguments& a) {
              " m, not " + number(length.value_m) + ".";
     }
   }
+  const double most_jitter_m = 0.5 * std::min(stairs.rise_m, stairs.tread_m);
+  if (!(stairs.jitter_m >= 0.0 && stairs.jitter_m <= most_jitter_m)) {
+    return "--jitter must be from 0 to half of rise and tread, " + number(most_jitter_m) + " m, not " +
+           number(stairs.jitter_m) + ".";
+  }
   const double shortest_tread_m = stairs.tread_m - stairs.jitter_m;
   if (!(stairs.nosing_m < shortest_tread_m)) {
     return "--nosing must be shorter than the shortest tread, " + number(shortest_tread_m) + " m, not " +
@@ -157,14 +168,16 @@ std::string complaint(ClimbArguments& a) {
     return "--plant must be kinematic or mujoco, not \"" + a.plant + "\".";
   }
   a.options.plant = a.plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kKinematic;
-  if (!a.push.empty()) {
-    if (a.options.plant != PlantKind::kMujoco)
-      return "--push needs --plant mujoco: forces do not move the kinematic plant.";
-    a.options.push = read_push(a.push);
-    if (!a.options.push) {
-      return "--push must be a time from 0 to 1000 s, x or y and up to 100 N s, as in 12.5,x,10, not \"" + a.push +
-             "\".";
+  if (!a.pushes.empty() && a.options.plant != PlantKind::kMujoco) {
+    return "--push needs --plant mujoco: forces do not move the kinematic plant.";
+  }
+  for (const std::string& text : a.pushes) {
+    const std::optional<Push> push = read_push(text);
+    if (!push) {
+      return "--push must be a time from " + number(kFirstPush_s) + " to " + number(kLastPush_s) +
+             " s, x or y and up to " + number(kHardestPush_ns) + " N s, as in 12.5,x,10, not \"" + text + "\".";
     }
+    a.options.pushes.push_back(*push);
   }
   if (a.noise != "white" && a.noise != "correlated") {
     return "--noise must be white or correlated, not \"" + a.noise + "\".";
