@@ -188,6 +188,12 @@ TEST(StepProof, TrailingSwingWithALevelSole_MeetsTheAnklesLimitThatAPitchedOneKe
   EXPECT_GT(ankle_margin_rad(kStepTries[0].toe_down_rad), StepParams{}.joint_margin_rad);
 }
 
+StepSearch::State finish(StepSearch& search, int most_calls = 1000) {
+  while (most_calls-- > 0 && search.step() == StepSearch::State::kSearching) {
+  }
+  return search.state();
+}
+
 // The rear foot, on the floor, passes the one that has just landed on the first tread.
 struct PassingStep {
   std::array<Transform, kFootCount> soles;
@@ -204,8 +210,7 @@ PassingStep passing_step(double rise_m, double ahead_m) {
 StepSearch searched(const PassingStep& step, const StepParams& params = {}) {
   StepSearch search;
   search.begin({}, params, step.goal, step.trailing, params.stair_shift_ticks, step.from, step.soles);
-  for (int i = 0; i < 1000 && search.step() == StepSearch::State::kSearching; ++i) {
-  }
+  finish(search);
   return search;
 }
 
@@ -229,37 +234,31 @@ TEST(StepSearch, PassingStepThatIsPossibleWithNoTrailingStepAfterIt_IsImpossible
   EXPECT_EQ(searched(passing_step(0.13, 0.28), fast).state(), StepSearch::State::kImpossible);
 }
 
-TEST(StepSearch, RiseTooFastForTheDrives_IsDoneInALongerSwing) {
+// The left foot onto a tread, and the right one after it.
+StepSearch leading_search(double rise_m, double ahead_m) {
   std::array<Transform, kFootCount> soles;
   TorsoTrajectory::State from;
-  const StepPlan plan = stair_step(StepKind::kLeading, 0.182, 0.35, soles, from);
+  const StepPlan plan = stair_step(StepKind::kLeading, rise_m, ahead_m, soles, from);
   StepGoal trailing = plan.goal;
   trailing.kind = StepKind::kTrailing;
   trailing.foot = Foot::kRight;
   trailing.target.position_m.y() = -0.1;
   StepSearch search;
   search.begin({}, {}, plan.goal, trailing, StepParams{}.stair_shift_ticks, from, soles);
-  while (search.step() == StepSearch::State::kSearching) {
-  }
-  EXPECT_EQ(search.state(), StepSearch::State::kFound);
+  return search;
+}
+
+TEST(StepSearch, RiseTooFastForTheDrives_IsDoneInALongerSwing) {
+  StepSearch search = leading_search(0.182, 0.35);
+  EXPECT_EQ(finish(search), StepSearch::State::kFound);
   EXPECT_GT(search.plan().swing_ticks, StepParams{}.stair_swing_ticks);
 }
 
 TEST(StepSearch, RiseBeyondTheLegs_IsImpossibleBeforeTheFirstLiftOff) {
+  constexpr int kHalfAShift = 160;  // calls, one a tick: it is known before the foot would leave
   for (const double rise : {0.30, 0.5}) {
-    std::array<Transform, kFootCount> soles;
-    TorsoTrajectory::State from;
-    const StepPlan plan = stair_step(StepKind::kLeading, rise, 0.3, soles, from);
-    StepGoal trailing = plan.goal;
-    trailing.kind = StepKind::kTrailing;
-    trailing.foot = Foot::kRight;
-    trailing.target.position_m.y() = -0.1;
-    StepSearch search;
-    search.begin({}, {}, plan.goal, trailing, StepParams{}.stair_shift_ticks, from, soles);
-    int calls = 0;
-    while (search.step() == StepSearch::State::kSearching && calls < 1000) ++calls;
-    EXPECT_EQ(search.state(), StepSearch::State::kImpossible) << rise;
-    EXPECT_LT(calls, 160);  // less than half a weight shift: it is known before the foot would leave
+    StepSearch search = leading_search(rise, 0.3);
+    EXPECT_EQ(finish(search, kHalfAShift), StepSearch::State::kImpossible) << rise;
   }
 }
 
@@ -271,9 +270,7 @@ TEST(StepSearch, ShiftFasterThanTheDrives_IsNotProvenByASlowerOne) {
   for (const std::int32_t shift_ticks : {StepParams{}.stair_shift_ticks, 15}) {
     StepSearch search;
     search.begin({}, {}, plan.goal, {}, shift_ticks, from, soles);
-    for (int i = 0; i < 1000 && search.step() == StepSearch::State::kSearching; ++i) {
-    }
-    EXPECT_EQ(search.state() == StepSearch::State::kFound, shift_ticks > 15);
+    EXPECT_EQ(finish(search) == StepSearch::State::kFound, shift_ticks > 15);
   }
 }
 

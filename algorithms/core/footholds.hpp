@@ -51,11 +51,10 @@ struct TreadView {
 struct FootholdSet {
   std::int64_t map_stamp_ns = 0;  // exposure of the newest fused frame
   Foothold p_star;                // eq. 26: on the nearest tread higher than the stance
-  Foothold p_star_star;           // on the next higher one: where one foot per tread will step
   bool has_p_star = false;
   bool has_p_star_star = false;
   std::array<Foothold, kFootCount> p_star_feet;       // p* spread to left and right sole, both on the same tread
-  std::array<Foothold, kFootCount> p_star_star_feet;  // p** likewise
+  std::array<Foothold, kFootCount> p_star_star_feet;  // p** likewise, on the tread after p*'s
   TreadView tread;                                    // of p*
   double theta_rel_rad = 0.0;                         // eq. 27: bearing of p* from the robot, relative to its heading
   Obstruction obstruction = Obstruction::kNothingSeen;

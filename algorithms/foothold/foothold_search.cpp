@@ -19,7 +19,7 @@ bool valid(const FootholdSearch::Query& q) noexcept {
 
 // From the map's world to that of the pose.
 FootholdSet moved(FootholdSet set, const Vec3& by_m) noexcept {
-  for (Vec3* p : {&set.p_star.position_m, &set.p_star_star.position_m, &set.tread.nosing_a_m, &set.tread.nosing_b_m}) {
+  for (Vec3* p : {&set.p_star.position_m, &set.tread.nosing_a_m, &set.tread.nosing_b_m}) {
     *p += by_m;
   }
   for (Foothold& foot : set.p_star_feet) foot.position_m += by_m;
@@ -345,22 +345,26 @@ Obstruction FootholdSearch::judge_feet(const LevelSurface& tread, const Feet& fe
   return Obstruction::kNone;
 }
 
+Obstruction FootholdSearch::judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
+                                        double step_max_m, Feet& feet) const noexcept {
+  if (tread.height_m - from_height_m > params_.rise_max_m) return Obstruction::kRiseTooHigh;
+  if (!tread.has_nosing) return Obstruction::kNothingSeen;
+  if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return Obstruction::kTreadTooShort;
+  if (!place_feet(tread, feet)) return Obstruction::kTooNarrow;
+  const Foothold& foot = feet[index_of(query_.stance)];
+  if (foot.nosing_distance_m - tread.along_m(from_p_m) > step_max_m) return Obstruction::kNoStaircase;
+  return judge_feet(tread, feet);
+}
+
 Obstruction FootholdSearch::judge_next() noexcept {
   const LevelSurface& tread = levels_[next_];
   pending_.measured_rise_m = tread.height_m - z_foot_;
   pending_.measured_tread_m = tread.depth_m;
   pending_.tread = {tread.nosing_a_m, tread.nosing_b_m};
-  if (pending_.measured_rise_m > params_.rise_max_m) return Obstruction::kRiseTooHigh;
-  if (!tread.has_nosing) return Obstruction::kNothingSeen;
-  if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return Obstruction::kTreadTooShort;
-  if (!place_feet(tread, pending_.p_star_feet)) return Obstruction::kTooNarrow;
-  const Foothold& foot = pending_.p_star_feet[index_of(query_.stance)];
-  if (query_.climbing) {
-    if (foot.nosing_distance_m - tread.along_m(sole_.origin_m()) > params_.step_max_m)
-      return without_next();  // another flight
-  }
-  const Obstruction feet = judge_feet(tread, pending_.p_star_feet);
-  if (feet != Obstruction::kNone) return feet;
+  const double step_max_m = query_.climbing ? params_.step_max_m : kInfinity;
+  const Obstruction found = judge_tread(tread, z_foot_, sole_.origin_m(), step_max_m, pending_.p_star_feet);
+  if (found == Obstruction::kNoStaircase) return without_next();  // another flight
+  if (found != Obstruction::kNone) return found;
   return has_p_star_cell_ ? Obstruction::kNone : Obstruction::kNothingSeen;
 }
 
@@ -392,19 +396,15 @@ void FootholdSearch::look_ahead_row(std::int32_t row) noexcept {
     const double distance2 = (p - pending_.p_star.position_m.head<2>()).squaredNorm();
     if (distance2 >= p_star_star_distance2_m2_) continue;
     p_star_star_distance2_m2_ = distance2;
-    p_star_star_cell_m_ = p;
     next_next_ = cell.layer;
   }
 }
 
 void FootholdSearch::finish() noexcept {
-  if (next_next_ != kNone && levels_[next_next_].has_nosing) {
-    const LevelSurface& tread = levels_[next_next_];
-    const double lateral_m = tread.lateral_m(p_star_star_cell_m_);
-    pending_.p_star_star = foothold_at(tread, aim_along_m(tread, lateral_m, lateral_m), lateral_m);
-    pending_.has_p_star_star = tread.height_m - levels_[next_].height_m <= params_.rise_max_m &&
-                               place_feet(tread, pending_.p_star_star_feet) &&
-                               judge_feet(tread, pending_.p_star_star_feet) == Obstruction::kNone;
+  if (next_next_ != kNone) {
+    pending_.has_p_star_star =
+        judge_tread(levels_[next_next_], levels_[next_].height_m, pending_.p_star.position_m.head<2>(),
+                    params_.step_max_m, pending_.p_star_star_feet) == Obstruction::kNone;
   }
   if (map_.stamp_ns != 0 && query_.now_ns - map_.stamp_ns > params_.stale_after_ns) {
     pending_.obstruction = Obstruction::kMapStale;

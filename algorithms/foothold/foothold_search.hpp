@@ -95,6 +95,9 @@ class FootholdSearch {
   using Feet = std::array<Foothold, kFootCount>;
   [[nodiscard]] bool place_feet(const LevelSurface& tread, Feet& feet) const noexcept;
   [[nodiscard]] Obstruction judge_feet(const LevelSurface& tread, const Feet& feet) const noexcept;
+  // Of a step onto the tread from soles at a point before it; places the feet. kNoStaircase: it is too far for a step.
+  [[nodiscard]] Obstruction judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
+                                        double step_max_m, Feet& feet) const noexcept;
   [[nodiscard]] static bool carries(const Upright& riser, const LevelSurface& tread) noexcept;
   [[nodiscard]] bool blocked_by_upright(double next_distance_m, double& top_m) const noexcept;
   [[nodiscard]] Obstruction without_next() const noexcept;
@@ -126,7 +129,6 @@ class FootholdSearch {
   std::size_t next_next_ = kNone;
   std::size_t underfoot_ = kNone;  // the tread under the standing foot, when its far end was seen
   double p_star_star_distance2_m2_ = 0.0;
-  Vec2 p_star_star_cell_m_ = Vec2::Zero();
   std::uint32_t top_cells_ = 0;
   std::uint32_t top_cells_seen_ = 0;
 };
