@@ -214,7 +214,7 @@ TEST_F(EstimatorLioTest, LioOfASilenceOfTheJoints_HasNoOdometryAndIsCounted) {
 // quarter or four times that where they are off by a factor of two. The error of a seed lasts (how its world was tied
 // to LIO's), so 30 seeds scatter as 90 squares do. Sigmas of the first second are a floor.
 TEST_F(EstimatorLioTest, FusedPosition_ThirtySeeds_SigmasAreHonest) {
-  const int seeds = test::kSlowMachine ? 8 : 30;
+  const int seeds = test::kSlowMachine ? 3 : 30;
   double sum = 0.0, count = 0.0;
   for (int seed = 1; seed <= seeds; ++seed) {
     WalkSpec spec;

@@ -33,6 +33,12 @@ std::vector<std::uint16_t> render_for_robot(DepthScene scene) {
   return out;
 }
 
+fakes::FakeClock three_days_up() {
+  fakes::FakeClock clock;
+  clock.advance_ns(3 * 86400 * kNsPerS);
+  return clock;
+}
+
 JointVector standing_joints() {
   JointVector q_rad;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {

@@ -20,6 +20,8 @@ namespace polygmap::test {
 
 // Half as wide and high, each pixel four times: exact at the module's own half resolution, at a quarter of the price.
 [[nodiscard]] std::vector<std::uint16_t> render_for_robot(DepthScene scene);
+// No stamp is near 0 on a robot's clock.
+[[nodiscard]] fakes::FakeClock three_days_up();
 // Joint angles of a robot standing upright.
 [[nodiscard]] JointVector standing_joints();
 
