@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "algorithms/perception/pixel_owner.hpp"
+
 namespace polygmap {
 namespace {
 
@@ -325,8 +327,8 @@ void SurfaceExtractor::solve_planes() noexcept {
 }
 
 std::size_t SurfaceExtractor::surface_at(std::int32_t column, std::int32_t row) const noexcept {
-  return column / kColumn_px < picture_.column_rays.columns ? planes_[picture_.owner(column / kColumn_px, row)].surface
-                                                            : 0U;
+  if (column / kColumn_px >= picture_.column_rays.columns) return 0;
+  return planes_[pixel_owner(picture_, planes_, column, row)].surface;
 }
 
 void SurfaceExtractor::find_pieces() noexcept {
