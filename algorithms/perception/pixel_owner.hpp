@@ -10,8 +10,9 @@
 
 namespace polygmap {
 
-// The plane of a pixel of the full picture, 0 = none.
-[[nodiscard]] std::size_t pixel_owner(const FramePicture& picture, const FramePlanes& planes, std::int32_t column,
-                                      std::int32_t row) noexcept;
+// The plane of a pixel of the full picture, 0 = none. Without the raw picture's depths (null) columns in which two
+// things are seen are nobody's.
+[[nodiscard]] std::size_t pixel_owner(const FramePicture& picture, const RawPicture& raw, const DepthSigma& noise,
+                                      const FramePlanes& planes, std::int32_t column, std::int32_t row) noexcept;
 
 }  // namespace polygmap
