@@ -34,8 +34,8 @@ class FrameExtractor final : public polygmap_frames::Extractor {
     params_.limits = {c.min_depth_m, c.max_depth_m};
     // What fills an eighth of a picture is a surface, however few pixels the picture has.
     const std::int32_t eighth_px = c.width_px * c.height_px / 8;
-    for (std::int32_t* least_px :
-         {&params_.growing.min_plane_px, &params_.pieces.min_surface_px, &params_.pieces.min_other_px}) {
+    for (std::int32_t* least_px : {&params_.growing.min_plane_px, &params_.growing.min_facet_px,
+                                   &params_.pieces.min_surface_px, &params_.pieces.min_other_px}) {
       *least_px = std::min(*least_px, eighth_px);
     }
     extractor_.configure(params_);
@@ -45,6 +45,7 @@ class FrameExtractor final : public polygmap_frames::Extractor {
 
   std::optional<double> extract(const std::uint16_t* depth, const Eigen::Vector3d& up) override {
     view_.camera_up = up;
+    depth_ = depth;
     const DepthFrameView frame{++stamp_, static_cast<std::uint32_t>(stamp_), view_.intrinsics.width_px,
                                view_.intrinsics.height_px, depth};
     const auto start = std::chrono::steady_clock::now();
@@ -75,7 +76,7 @@ class FrameExtractor final : public polygmap_frames::Extractor {
     return out;
   }
   std::size_t surface_at(std::int32_t column, std::int32_t row) const override {
-    return extractor_.surface_at(column, row);
+    return extractor_.surface_at(column, row, depth_);
   }
   double noise_sigma_m(double z_m) const override { return extractor_.noise().sigma_m(z_m); }
   void hold_noise() override {
@@ -86,6 +87,7 @@ class FrameExtractor final : public polygmap_frames::Extractor {
  private:
   SurfaceExtractor::Params params_;
   SurfaceExtractor::View view_;
+  const std::uint16_t* depth_ = nullptr;  // of the last picture
   std::int64_t stamp_ = 0;
   SurfaceExtractor extractor_;
 };

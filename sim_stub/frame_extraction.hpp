@@ -43,7 +43,7 @@ class Extractor {
   // depth: the camera's width x height, row-major. The microseconds it took; none when the camera, whose size must be a
   // multiple of 8 and of 2, or up (unit, camera frame) is refused.
   [[nodiscard]] virtual std::optional<double> extract(const std::uint16_t* depth, const Eigen::Vector3d& up) = 0;
-  // Of the last picture.
+  // Of the last picture, whose depth must live as long as surface_at is asked.
   [[nodiscard]] virtual std::vector<Surface> surfaces() const = 0;
   [[nodiscard]] virtual std::size_t surface_at(std::int32_t column, std::int32_t row) const = 0;  // 1-based, 0 = none
   [[nodiscard]] virtual double noise_sigma_m(double z_m) const = 0;  // as it is believed for the next picture

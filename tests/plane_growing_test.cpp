@@ -78,9 +78,9 @@ TEST_F(PlanesFromRuns, PatchSmallerThanTheLeast_IsNoPlane) {
     return g >= 60 && g < 63 && r >= 100 && r < 120 ? &tread_ : nullptr;
   };
   scene_.paint(patch);
-  grow({.min_plane_px = 600});
+  grow({.min_facet_px = 600});
   EXPECT_EQ(growing_->count(), 0U);
-  grow({.min_plane_px = 300});
+  grow({.min_facet_px = 300});
   EXPECT_EQ(growing_->count(), 1U);
 }
 

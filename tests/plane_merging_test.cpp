@@ -45,9 +45,14 @@ class TwoPlanes {
   }
   // Planes that are left.
   int join() {
-    merging_->join_facets({}, kNoise, *columns_, rays_.columns, *planes_, to_plane_);
+    merging_->join_facets({}, {}, kNoise, *columns_, rays_.columns, *planes_, to_plane_);
     return ((*planes_)[1].alive ? 1 : 0) + ((*planes_)[2].alive ? 1 : 0);
   }
+  int merge(bool measured) {
+    PlaneMerging::merge_pieces({}, {}, kNoise, *planes_, to_plane_, measured);
+    return ((*planes_)[1].alive ? 1 : 0) + ((*planes_)[2].alive ? 1 : 0);
+  }
+  void make_facets() { (*planes_)[1].facet = (*planes_)[2].facet = true; }
   [[nodiscard]] const FramePlane& plane(std::size_t i) const { return (*planes_)[i]; }
   [[nodiscard]] std::uint8_t to_plane(std::size_t i) const { return to_plane_[i]; }
 
@@ -105,6 +110,35 @@ TEST(PlaneMerging, FaceOfAnOverhangAndTheRiserBehind_StayTwo) {
   planes.show(1, front, {0.0, 0.0, 1.2}, 36, 43, 228, 239);
   planes.show(2, front, Vec3{0.0, 0.0, 1.2} - 0.025 * front - 0.03 * up, 36, 43, 240, 251);
   EXPECT_EQ(planes.join(), 2);
+}
+
+// Each is too small to be a plane by itself. 8 x 8 columns and rows are 512 pixels.
+TEST(PlaneMerging, TwoSmallFacets_AreOnePlaneTogether_AndNoneAlone) {
+  TwoPlanes planes;
+  planes.show(1, leaning(0.15), {0.0, 0.0, 2.8}, 36, 43, 232, 239);
+  planes.show(2, leaning(-0.15), {0.0, 0.0, 2.8}, 36, 43, 240, 247);
+  planes.make_facets();
+  EXPECT_EQ(planes.merge(true), 2);  // pieces need not touch, facets must
+  ASSERT_EQ(planes.join(), 1);
+  EXPECT_FALSE(planes.plane(1).facet);
+  TwoPlanes apart;
+  apart.show(1, leaning(0.15), {0.0, 0.0, 2.8}, 36, 43, 200, 207);
+  apart.show(2, leaning(-0.15), {0.0, 0.0, 2.8}, 36, 43, 240, 247);
+  apart.make_facets();
+  EXPECT_EQ(apart.join(), 2);
+  EXPECT_TRUE(apart.plane(1).facet && apart.plane(2).facet);
+}
+
+// A floor to the left and the right of something: where the camera bends it by 12 mm the pixels say that one plane does
+// not hold both, though a run of one could join the other.
+TEST(PlaneMerging, LargePiecesFarApart_AreOneOnlyWherePixelsDoNotContradict) {
+  const Vec3 up = leaning(1.0), floor{0.0, 0.0, 2.0};
+  for (const double bent_m : {0.001, 0.012}) {
+    TwoPlanes planes;
+    planes.show(1, up, floor, 0, 29, 200, 399);
+    planes.show(2, up, floor + bent_m * up, 60, 79, 200, 399);
+    EXPECT_EQ(planes.merge(true), bent_m < 0.01 ? 1 : 2) << bent_m;
+  }
 }
 
 // A tread and its riser bend by a right angle: nothing joins them however few their pixels.

@@ -51,6 +51,16 @@ TEST_F(Remainder, RowsDeepInClutter_AreNotLookedAt) {
   }
 }
 
+TEST_F(Remainder, RowsOfAPlaneGivenUp_AreSearchedAgain) {
+  scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 10 && r < 13 ? &tread_ : nullptr; });
+  for (const bool given_back : {false, true}) {
+    search_->begin({}, up_);
+    if (given_back) search_->give_back(1);
+    search(spans_from(5));
+    EXPECT_EQ(search_->found().size(), given_back ? 1U : 0U);
+  }
+}
+
 TEST_F(Remainder, UprightRows_AreFoundParallelToTheKnownRiser) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r < 4 ? &riser_ : nullptr; }, 0.003);
   search_->begin({}, up_);

@@ -33,6 +33,7 @@ struct FramePlane {
   double residual2 = 0.0;  // sum of squared normal distances of the fitted pixels
   double pixels = 0.0;
   bool alive = false;
+  bool facet = false;        // too small to be a plane by itself
   std::uint8_t facets = 1;   // planes that were joined into this one
   std::uint8_t surface = 0;  // 1 + index in the result
   std::uint8_t source = 0;   // the plane whose pixels these are

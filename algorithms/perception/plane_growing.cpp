@@ -181,7 +181,7 @@ void PlaneGrowing::visit(Place place) noexcept {
 
 void PlaneGrowing::close() noexcept {
   growing_ = false;
-  const bool kept = sums_.n >= params_.min_plane_px && last_column_ - first_column_ + 1 >= params_.min_columns &&
+  const bool kept = sums_.n >= params_.min_facet_px && last_column_ - first_column_ + 1 >= params_.min_columns &&
                     count_ < kMaxPlanes && sums_.try_solve(m_) &&
                     m_.dot(Vec3{sums_.x / sums_.n, sums_.y / sums_.n, 1.0}) > kLeastNorm;
   if (!kept) {

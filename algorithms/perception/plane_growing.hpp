@@ -24,7 +24,8 @@ class PlaneGrowing {
     double join_floor_m = 0.003;
     std::int32_t min_rows = 3;        // of a run that starts a plane
     std::int32_t min_columns = 3;     // of a plane
-    std::int32_t min_plane_px = 800;  // full-resolution pixels
+    std::int32_t min_plane_px = 800;  // full-resolution pixels; of a plane that is to be one by itself ...
+    std::int32_t min_facet_px = 400;  // ... and of one that may be part of another
   };
   static constexpr std::size_t kMaxPlanes = 96;
 

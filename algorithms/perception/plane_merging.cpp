@@ -58,11 +58,11 @@ constexpr std::int32_t length_of(std::int32_t seam_px) noexcept { return seam_px
 }  // namespace
 
 void PlaneMerging::merge_pieces(const Params& params, const PlaneGrowing::Params& growing, const DepthSigma& noise,
-                                FramePlanes& planes, PlaneIndex& to_plane) noexcept {
+                                FramePlanes& planes, PlaneIndex& to_plane, bool measured) noexcept {
   const double least_cosine = math::cos(params.merge_tilt_rad), least_small = math::cos(2.0 * params.merge_tilt_rad);
   for (std::size_t a = 1; a <= planes.count; ++a) {
     for (std::size_t b = a + 1; b <= planes.count && planes[a].alive; ++b) {
-      if (!planes[b].alive) continue;
+      if (!planes[b].alive || planes[a].facet || planes[b].facet) continue;
       const std::size_t keep = planes[a].pixels >= planes[b].pixels ? a : b, gone = keep == a ? b : a;
       FramePlane &p = planes[keep], &q = planes[gone];
       const bool small = q.pixels < params.small_plane_px;
@@ -71,7 +71,11 @@ void PlaneMerging::merge_pieces(const Params& params, const PlaneGrowing::Params
       const double noise_m = growing.join_floor_m + growing.join_sigmas * noise.sigma_m(q.centre_m.z());
       const double merge_m = small ? params.merge_m : std::min(noise_m, params.merge_m);
       const double apart_m = std::abs(p.plane.distance_m(q.centre_m));
-      if (small ? apart_m > merge_m : apart_m + std::abs(q.plane.distance_m(p.centre_m)) > 2.0 * merge_m) continue;
+      const double both_apart_m = small ? apart_m : apart_m + std::abs(q.plane.distance_m(p.centre_m));
+      if (both_apart_m > (small || !measured ? 1.0 : 2.0) * merge_m) continue;
+      // Once large ones are measured their pixels have the last word: two floors that the camera bends are two.
+      double chi2 = 0.0;
+      if (!small && measured && (!try_contradiction(params, noise, p, q, chi2) || chi2 > params.pieces_chi2)) continue;
       p.pixels += q.pixels;
       q.alive = false;
       redirect(to_plane, gone, keep);
@@ -110,8 +114,9 @@ void PlaneMerging::measure_seams(const SurfaceBoundaries::Columns& columns, std:
   }
 }
 
-void PlaneMerging::join_facets(const Params& params, const DepthSigma& noise, const SurfaceBoundaries::Columns& columns,
-                               std::int32_t column_count, FramePlanes& planes, PlaneIndex& to_plane) noexcept {
+void PlaneMerging::join_facets(const Params& params, const PlaneGrowing::Params& growing, const DepthSigma& noise,
+                               const SurfaceBoundaries::Columns& columns, std::int32_t column_count,
+                               FramePlanes& planes, PlaneIndex& to_plane) noexcept {
   measure_seams(columns, column_count, planes, math::cos(params.facet_tilt_rad), to_plane);
   for (std::size_t joined = 0; joined < kMaxFacets; ++joined) {
     double least = params.facet_chi2;
@@ -137,6 +142,7 @@ void PlaneMerging::join_facets(const Params& params, const DepthSigma& noise, co
     p.moments.add(q.moments);
     if (!try_fit(p.moments, p.plane.m)) return;
     p.pixels += q.pixels;
+    p.facet = p.facet && q.facet && p.pixels < growing.min_plane_px;
     p.residual2 += q.residual2;
     p.centre_m = p.plane.point(p.moments.mean_ray());
     p.facets = static_cast<std::uint8_t>(std::min(p.facets + q.facets, 255));

@@ -13,6 +13,7 @@ void RemainderSearch::begin(const Params& params, const Vec3& up) noexcept {
   upright_.rows.fill(0);
   upright_pixels_ = 0.0;
   known_.clear();
+  given_back_.fill(false);
   found_.clear();
 }
 
@@ -58,6 +59,7 @@ void RemainderSearch::add_column(const ColumnRays& rays, const ColumnImage& imag
   };
   std::int32_t next = 0;
   for (const ColumnSpan& span : spans) {
+    if (given_back_[span.plane]) continue;
     add_rows(next, span.top - 1);
     next = span.bottom + 1;
   }

@@ -27,6 +27,8 @@ class RemainderSearch {
   // Planes that are known already. The largest upright one says which way risers face.
   void know_level(const InversePlane& plane) noexcept;
   void know_upright(const InversePlane& plane, double pixels) noexcept;
+  // A plane that was given up: what its spans hold is searched as if it were in none.
+  void give_back(std::size_t plane) noexcept { given_back_[plane] = true; }
   // Adds the rows of a column that are in none of its spans.
   void add_column(const ColumnRays& rays, const ColumnImage& image, std::int32_t column,
                   const SurfaceBoundaries::Column& spans) noexcept;
@@ -52,6 +54,7 @@ class RemainderSearch {
   Axis level_;
   Axis upright_;
   double upright_pixels_ = 0.0;
+  std::array<bool, SurfaceBoundaries::kMaxPlanes + 1> given_back_{};
   StaticVector<InversePlane, SurfaceBoundaries::kMaxPlanes> known_;
   StaticVector<InversePlane, kMaxFound> found_;
 };

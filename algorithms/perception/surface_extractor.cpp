@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "algorithms/perception/pixel_owner.hpp"
+
 namespace polygmap {
 namespace {
 
@@ -156,7 +158,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       if (row_ >= picture_.column_rays.columns) {
         solve_planes();
         if (round_ == 0) {
-          merge_planes();
+          merge_planes(true);
           join_facets();
         }
         if (round_ == 1) boundaries_.follow();
@@ -244,22 +246,24 @@ void SurfaceExtractor::take_grown_planes() noexcept {
     p.kind = kind_of(grown.plane, view_.camera_up, params_.kind_tilt_rad);
     p.pixels = grown.pixels;
     p.alive = true;
+    p.facet = grown.pixels < params_.growing.min_plane_px;
     p.centre_m = grown.plane.point(grown.mean_ray);
     to_plane_[i] = static_cast<std::uint8_t>(i);
   }
-  merge_planes();
+  merge_planes(false);
   for (std::size_t i = 1; i <= planes_.count; ++i) boundaries_.plane(i).plane = planes_[i].plane;
 }
 
-void SurfaceExtractor::merge_planes() noexcept {
-  PlaneMerging::merge_pieces(params_.merging, params_.growing, noise_, planes_, to_plane_);
+void SurfaceExtractor::merge_planes(bool measured) noexcept {
+  PlaneMerging::merge_pieces(params_.merging, params_.growing, noise_, planes_, to_plane_, measured);
 }
 
 void SurfaceExtractor::join_facets() noexcept {
-  merging_.join_facets(params_.merging, noise_, boundaries_.columns(), picture_.column_rays.columns, planes_,
-                       to_plane_);
+  merging_.join_facets(params_.merging, params_.growing, noise_, boundaries_.columns(), picture_.column_rays.columns,
+                       planes_, to_plane_);
   for (std::size_t i = 1; i <= planes_.count; ++i) {
     FramePlane& p = planes_[i];
+    if (p.alive && p.facet) drop(i);
     if (!p.alive || p.facets == 1) continue;
     p.kind = kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad);
     boundaries_.plane(i).plane = p.plane;
@@ -270,6 +274,7 @@ void SurfaceExtractor::begin_search() noexcept {
   search_.begin(params_.remainder, view_.camera_up);
   for (std::size_t i = 1; i <= planes_.count; ++i) {
     const FramePlane& p = planes_[i];
+    if (!p.alive && p.facet && p.kind != SurfaceKind::kOther) search_.give_back(i);
     if (!p.alive) continue;
     if (p.kind == SurfaceKind::kTread) search_.know_level(p.plane);
     if (p.kind == SurfaceKind::kRiser) search_.know_upright(p.plane, p.pixels);
@@ -293,6 +298,11 @@ void SurfaceExtractor::take_found_planes() noexcept {
   }
 }
 
+void SurfaceExtractor::drop(std::size_t plane) noexcept {
+  planes_[plane].alive = false;
+  for (std::uint8_t& p : to_plane_) p = p == plane ? std::uint8_t{0} : p;
+}
+
 void SurfaceExtractor::solve_planes() noexcept {
   constexpr double kLeast_px = 64.0;
   double explained_px = 0.0, seen_px = 0.0;
@@ -313,8 +323,7 @@ void SurfaceExtractor::solve_planes() noexcept {
     const double least = p.facets > 1 ? least_curved : least_share;
     if (p.moments.count < kLeast_px || p.moments.count < least * fitted.seen_px ||
         !try_solve_leaning(params_.planes, noise_, p.moments, view_.camera_up, p.plane, &p.covariance)) {
-      p.alive = false;
-      for (std::uint8_t& plane : to_plane_) plane = plane == i ? std::uint8_t{0} : plane;
+      drop(i);
       continue;
     }
     p.kind = kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad);
@@ -324,9 +333,12 @@ void SurfaceExtractor::solve_planes() noexcept {
   }
 }
 
-std::size_t SurfaceExtractor::surface_at(std::int32_t column, std::int32_t row) const noexcept {
-  return column / kColumn_px < picture_.column_rays.columns ? planes_[picture_.owner(column / kColumn_px, row)].surface
-                                                            : 0U;
+std::size_t SurfaceExtractor::surface_at(std::int32_t column, std::int32_t row,
+                                         const std::uint16_t* depth) const noexcept {
+  if (column / kColumn_px >= picture_.column_rays.columns) return 0;
+  RawPicture raw = raw_;
+  raw.depth = depth;
+  return planes_[pixel_owner(picture_, raw, noise_, planes_, column, row)].surface;
 }
 
 void SurfaceExtractor::find_pieces() noexcept {

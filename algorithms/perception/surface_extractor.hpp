@@ -101,8 +101,10 @@ class SurfaceExtractor {
   [[nodiscard]] std::int32_t units_spent() const noexcept { return units_spent_; }  // on the last frame
 
   // What a pixel was taken for: 1 + index in result().surfaces, 0 = none. For pictures and tests; valid until the next
-  // try_begin.
-  [[nodiscard]] std::size_t surface_at(std::int32_t column, std::int32_t row) const noexcept;
+  // try_begin. depth: the frame's pixels, if they are still there; with them the sides of surfaces are known to the
+  // pixel.
+  [[nodiscard]] std::size_t surface_at(std::int32_t column, std::int32_t row,
+                                       const std::uint16_t* depth = nullptr) const noexcept;
   [[nodiscard]] bool body_at(std::int32_t column, std::int32_t row) const noexcept {
     return (picture_.flags(column, row) & kPixelBody) != 0;
   }
@@ -140,8 +142,9 @@ class SurfaceExtractor {
   void take_grown_planes() noexcept;
   void begin_search() noexcept;
   void take_found_planes() noexcept;
-  void merge_planes() noexcept;
+  void merge_planes(bool measured) noexcept;
   void join_facets() noexcept;
+  void drop(std::size_t plane) noexcept;
   void solve_planes() noexcept;
   void find_pieces() noexcept;
   std::int32_t evidence_step() noexcept;
