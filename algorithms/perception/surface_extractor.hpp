@@ -104,7 +104,7 @@ class SurfaceExtractor {
   // try_begin.
   [[nodiscard]] std::size_t surface_at(std::int32_t column, std::int32_t row) const noexcept;
   [[nodiscard]] bool body_at(std::int32_t column, std::int32_t row) const noexcept {
-    return (picture_.flags(column, row) & kPixelBody) != 0;
+    return picture_.body(column, row);
   }
 
   // What the next step begins with; a benchmark charges time to it.
@@ -117,6 +117,7 @@ class SurfaceExtractor {
     kClaim,
     kMeet,
     kRefit,
+    kFacets,
     kSearch,
     kPieces,
     kProfile,
@@ -141,7 +142,7 @@ class SurfaceExtractor {
   void begin_search() noexcept;
   void take_found_planes() noexcept;
   void merge_planes() noexcept;
-  void join_facets() noexcept;
+  std::int32_t facet_step() noexcept;
   void solve_planes() noexcept;
   void find_pieces() noexcept;
   std::int32_t evidence_step() noexcept;
@@ -170,7 +171,6 @@ class SurfaceExtractor {
   bool any_frame_ = false;
   std::int32_t measured_px_ = 0;
   std::int32_t outside_body_px_ = 0;
-  bool body_in_row_ = false;  // in the pair of rows being reduced
 
   SelfFilter self_filter_;
   RawPicture raw_;
