@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 
 namespace polygmap {
@@ -10,12 +11,12 @@ namespace {
 
 constexpr DepthSigma kNoise{.base_m = 0.001, .per_metre = 0.0015};
 
-// Two planes, one above the other in the picture, and the spans in which they were seen.
-class TwoPlanes {
+// Planes, one below the other in the picture, and the spans in which they were seen.
+class SeenPlanes {
  public:
-  TwoPlanes() {
+  explicit SeenPlanes(std::size_t count = 2) {
     rays_.set({640, 480, 460.0, 460.0, 319.5, 239.5, 0.001});
-    planes_->count = 2;
+    planes_->count = count;
     for (std::size_t i = 0; i < to_plane_.size(); ++i) to_plane_[i] = static_cast<std::uint8_t>(i);
   }
   // Columns and rows from .. to - 1 of the picture show n . p + d = 0.
@@ -45,9 +46,20 @@ class TwoPlanes {
   }
   // Planes that are left.
   int join() {
-    merging_->join_facets({}, {}, kNoise, *columns_, rays_.columns, *planes_, to_plane_);
-    return ((*planes_)[1].alive ? 1 : 0) + ((*planes_)[2].alive ? 1 : 0);
+    begin();
+    while (!merging_->join_some(*planes_, to_plane_)) ++calls_;
+    return static_cast<int>(std::count_if(planes_->planes.begin() + 1, planes_->planes.end(),
+                                          [](const FramePlane& plane) { return plane.alive; }));
   }
+  void begin() {
+    merging_->begin_facets({}, {}, kNoise, *planes_);
+    const auto columns = static_cast<std::size_t>(rays_.columns);
+    for (std::size_t g = 0; g < columns; ++g) {
+      merging_->add_column((*columns_)[g], g + 1 < columns ? &(*columns_)[g + 1] : nullptr, to_plane_);
+    }
+  }
+  [[nodiscard]] int calls() const { return calls_; }  // of join_some, but for the last
+  [[nodiscard]] std::uint32_t overflow() const { return merging_->overflow(); }
   int merge(bool measured) {
     PlaneMerging::merge_pieces({}, {}, kNoise, *planes_, to_plane_, measured);
     return ((*planes_)[1].alive ? 1 : 0) + ((*planes_)[2].alive ? 1 : 0);
@@ -62,13 +74,14 @@ class TwoPlanes {
   std::unique_ptr<SurfaceBoundaries::Columns> columns_ = std::make_unique<SurfaceBoundaries::Columns>();
   std::unique_ptr<PlaneMerging> merging_ = std::make_unique<PlaneMerging>();
   PlaneMerging::PlaneIndex to_plane_{};
+  int calls_ = 0;
 };
 
 Vec3 leaning(double rad) { return {0.0, -math::sin(rad), -math::cos(rad)}; }
 
 // A cushion at 2.8 m: 100 mm of it above and below its bend.
 TEST(PlaneMerging, FacetsThatBendWithinTheNoise_BecomeOneSurface) {
-  TwoPlanes planes;
+  SeenPlanes planes;
   planes.show(1, leaning(0.15), {0.0, 0.0, 2.8}, 36, 43, 223, 239);
   planes.show(2, leaning(-0.15), {0.0, 0.0, 2.8}, 36, 43, 240, 256);
   ASSERT_EQ(planes.join(), 1);
@@ -80,14 +93,14 @@ TEST(PlaneMerging, FacetsThatBendWithinTheNoise_BecomeOneSurface) {
 }
 
 TEST(PlaneMerging, FacetsOfAStrongBend_StayTwo) {
-  TwoPlanes planes;
+  SeenPlanes planes;
   planes.show(1, leaning(0.25), {0.0, 0.0, 2.8}, 24, 55, 180, 239);
   planes.show(2, leaning(-0.25), {0.0, 0.0, 2.8}, 24, 55, 240, 299);
   EXPECT_EQ(planes.join(), 2);
 }
 
 TEST(PlaneMerging, FacetsThatDoNotTouch_StayTwo) {
-  TwoPlanes planes;
+  SeenPlanes planes;
   planes.show(1, leaning(0.15), {0.0, 0.0, 2.8}, 36, 43, 213, 229);
   planes.show(2, leaning(-0.15), {0.0, 0.0, 2.8}, 36, 43, 260, 276);
   EXPECT_EQ(planes.join(), 2);
@@ -95,7 +108,7 @@ TEST(PlaneMerging, FacetsThatDoNotTouch_StayTwo) {
 
 // Two treads 40 mm apart in height, 2.5 m away, of which the riser between was not seen.
 TEST(PlaneMerging, StepOfFortyMillimetres_StaysTwo) {
-  TwoPlanes planes;
+  SeenPlanes planes;
   const Vec3 up = leaning(0.9);
   planes.show(1, up, Vec3{0.0, 0.0, 2.5} + 0.04 * up, 28, 51, 204, 239);
   planes.show(2, up, {0.0, 0.0, 2.5}, 28, 51, 240, 275);
@@ -105,7 +118,7 @@ TEST(PlaneMerging, StepOfFortyMillimetres_StaysTwo) {
 // The face of a slab that overhangs by 25 mm, and below it the foot of the riser behind: two strips too thin to
 // contradict the ramp through both, which leans against either.
 TEST(PlaneMerging, FaceOfAnOverhangAndTheRiserBehind_StayTwo) {
-  TwoPlanes planes;
+  SeenPlanes planes;
   const Vec3 front = leaning(-0.5), up = leaning(0.5 * kPi - 0.5);
   planes.show(1, front, {0.0, 0.0, 1.2}, 36, 43, 228, 239);
   planes.show(2, front, Vec3{0.0, 0.0, 1.2} - 0.025 * front - 0.03 * up, 36, 43, 240, 251);
@@ -114,14 +127,14 @@ TEST(PlaneMerging, FaceOfAnOverhangAndTheRiserBehind_StayTwo) {
 
 // Each is too small to be a plane by itself. 8 x 8 columns and rows are 512 pixels.
 TEST(PlaneMerging, TwoSmallFacets_AreOnePlaneTogether_AndNoneAlone) {
-  TwoPlanes planes;
+  SeenPlanes planes;
   planes.show(1, leaning(0.15), {0.0, 0.0, 2.8}, 36, 43, 232, 239);
   planes.show(2, leaning(-0.15), {0.0, 0.0, 2.8}, 36, 43, 240, 247);
   planes.make_facets();
   EXPECT_EQ(planes.merge(true), 2);  // pieces need not touch, facets must
   ASSERT_EQ(planes.join(), 1);
   EXPECT_FALSE(planes.plane(1).facet);
-  TwoPlanes apart;
+  SeenPlanes apart;
   apart.show(1, leaning(0.15), {0.0, 0.0, 2.8}, 36, 43, 200, 207);
   apart.show(2, leaning(-0.15), {0.0, 0.0, 2.8}, 36, 43, 240, 247);
   apart.make_facets();
@@ -134,7 +147,7 @@ TEST(PlaneMerging, TwoSmallFacets_AreOnePlaneTogether_AndNoneAlone) {
 TEST(PlaneMerging, LargePiecesFarApart_AreOneOnlyWherePixelsDoNotContradict) {
   const Vec3 up = leaning(1.0), floor{0.0, 0.0, 2.0};
   for (const double bent_m : {0.001, 0.012}) {
-    TwoPlanes planes;
+    SeenPlanes planes;
     planes.show(1, up, floor, 0, 29, 200, 399);
     planes.show(2, up, floor + bent_m * up, 60, 79, 200, 399);
     EXPECT_EQ(planes.merge(true), bent_m < 0.01 ? 1 : 2) << bent_m;
@@ -143,10 +156,41 @@ TEST(PlaneMerging, LargePiecesFarApart_AreOneOnlyWherePixelsDoNotContradict) {
 
 // A tread and its riser bend by a right angle: nothing joins them however few their pixels.
 TEST(PlaneMerging, TreadAndRiser_StayTwo) {
-  TwoPlanes planes;
+  SeenPlanes planes;
   planes.show(1, leaning(0.9), {0.0, 0.0, 3.0}, 30, 49, 232, 239);
   planes.show(2, leaning(0.9 - 0.5 * kPi), {0.0, 0.0, 3.0}, 30, 49, 240, 247);
   EXPECT_EQ(planes.join(), 2);
+}
+
+// A column of radius 1 m at 3 m, seen in thirty strips: eight seams at most are looked at in one call, and a join is
+// one.
+TEST(PlaneMerging, ManyFacets_AreJoinedABoundedPieceAtATime) {
+  constexpr int kStrips = 30;
+  SeenPlanes planes(kStrips);
+  for (int i = 0; i < kStrips; ++i) {
+    const double lean = 0.02 * (i - 0.5 * kStrips);
+    planes.show(static_cast<std::uint8_t>(i + 1), leaning(lean), {0.0, -math::sin(lean), 3.0 - math::cos(lean)}, 20, 59,
+                static_cast<std::int16_t>(90 + 10 * i), static_cast<std::int16_t>(99 + 10 * i));
+  }
+  const int left = planes.join();
+  EXPECT_LE(left, 2 * kStrips / 3);
+  EXPECT_GE(planes.calls(), (kStrips - 1) / 8 + (kStrips - left));
+  EXPECT_EQ(planes.overflow(), 0U);
+}
+
+// More seams than there is room for are counted and left apart.
+TEST(PlaneMerging, MoreSeamsThanThereIsRoomFor_AreCounted) {
+  constexpr int kPlanes = 64;
+  SeenPlanes planes(kPlanes);
+  const auto show = [&](int i, int column, int top) {
+    planes.show(static_cast<std::uint8_t>(i + 1), leaning(0.0), {0.0, 0.0, 1.0 + 0.05 * i}, column, column,
+                static_cast<std::int16_t>(top), static_cast<std::int16_t>(top + 9));
+  };
+  for (int column = 0; column < 80; ++column) {
+    for (int k = 0; k < 24; ++k) show((k * (column % 31 + 1) + column) % kPlanes, column, 20 * k);
+  }
+  EXPECT_EQ(planes.join(), kPlanes);
+  EXPECT_GT(planes.overflow(), 0U);
 }
 
 }  // namespace

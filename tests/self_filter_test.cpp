@@ -31,7 +31,8 @@ HalfImage<std::uint8_t> mask_of(const HalfRays& rays, const std::array<LegShapes
   filter.clear();
   for (std::size_t i = 0; i < SelfFilter::kShapes; ++i) filter.add_shape(rays, legs, margin, i);
   HalfImage<std::uint8_t> flags;
-  for (std::int32_t r = 0; r < rays.height_px; ++r) filter.mark_row(r, rays.width_px, flags.row(r));
+  for (std::int32_t r = 0; r < rays.height_px; ++r)
+    static_cast<void>(filter.try_mark_row(r, rays.width_px, flags.row(r)));
   return flags;
 }
 

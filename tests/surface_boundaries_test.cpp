@@ -112,6 +112,7 @@ TEST_F(Boundaries, RowsOfSomethingElse_AreNotClaimed) {
   for (std::int32_t r = 0; r < kDepthHeight_px; ++r) {
     scene_.image->inverse_depth(11, r) = static_cast<float>(far.inverse_depth(scene_.ray(11, r)));
   }
+  scene_.image->turn(0, kDepthHeight_px - 1);
   boundaries_->gather(11, {}, to_plane_);
   boundaries_->claim(11, 10, 1, 0);
   EXPECT_TRUE(boundaries_->columns()[11].empty());

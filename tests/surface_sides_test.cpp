@@ -127,6 +127,7 @@ TEST_F(SurfaceSidesOfABoard, OwnBodyBesideTheBoard_HidesThatSideOnly) {
   for (std::int32_t r = 0; r < kHalfHeight_px; ++r) {
     const auto past = static_cast<std::int32_t>(0.5 * (kRight.at + kRight.slope * 2.0 * r));
     for (std::int32_t c = past - 2; c < past + 20; ++c) picture_->flags(c, r) = kPixelBody;
+    picture_->body_rows[static_cast<std::size_t>(r)] = true;
   }
   EXPECT_FALSE(find(true).fitted);
   expect_on(find(false), kLeft);

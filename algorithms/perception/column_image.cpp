@@ -29,10 +29,11 @@ struct Range {
 };
 
 // Sum and count of pairs of pixels, of which body has a flag each.
-Words pairs(const Range& range, const std::uint16_t* raw, const std::uint8_t* body) noexcept {
+template <bool kBody>
+Words pairs(const Range& range, const std::uint16_t* raw, [[maybe_unused]] const std::uint8_t* body) noexcept {
   const Raw x = cv::vx_load(raw);
   Raw valid = range.valid(x);
-  if (body != nullptr) {
+  if constexpr (kBody) {
     const Words free = (cv::vx_load_expand_q(body) & cv::vx_setall_u32(kPixelBody)) == cv::vx_setzero_u32();
     valid = valid & cv::v_reinterpret_as_u16(free);
   }
@@ -49,45 +50,85 @@ Words add_neighbours(const Words& a, const Words& b) noexcept {
 
 Wide to_float(const Words& x) noexcept { return cv::v_cvt_f32(cv::v_reinterpret_as_s32(x)); }
 
-}  // namespace
-
-ReducedRow reduce_to_columns(const RawRange& raw_range, const std::uint16_t* raw, const std::uint8_t* body,
-                             std::int32_t columns, float* inverse_depth, std::uint8_t* valid) noexcept {
+// Whole registers of columns, from column 0 on. Body: whether body counts.
+template <bool kBody>
+void reduce_registers(const RawRange& raw_range, const std::uint16_t* raw, const std::uint8_t* body,
+                      std::int32_t registers, float* inverse_depth, std::uint8_t* valid, Words& measured,
+                      Words& free) noexcept {
   const Range range(raw_range);
   const Words none = cv::vx_setzero_u32(), any = raw_range.min <= raw_range.max ? none == none : none;
   const cv::v_uint8 is_body = cv::vx_setall_u8(kPixelBody);
   const Wide per_metre = cv::vx_setall_f32(raw_range.per_metre), least = cv::vx_setall_f32(1.0F);
-  Words measured = none, free = none;
-  std::array<std::uint16_t, static_cast<std::size_t>(kColumn_px) * Raw::nlanes> tail{};
-  std::int32_t g = 0;
-  for (; g < columns; g += Raw::nlanes) {
-    const std::uint16_t* from = raw + static_cast<std::ptrdiff_t>(kColumn_px) * g;
-    if (columns - g < Raw::nlanes) {  // the driver's buffer ends with its last row
-      std::copy(from, raw + static_cast<std::ptrdiff_t>(kColumn_px) * columns, tail.begin());
-      from = tail.data();
+  const auto half = [&](Words& count) {
+    Words seen = any;
+    if constexpr (kBody) {
+      const cv::v_uint8 flags = cv::vx_load(body) & is_body;
+      seen = cv::v_dotprod_expand(flags, cv::vx_setall_u8(1)) <= cv::vx_setall_u32(kMostBody * kPixelBody);
+      free = free - seen;
+      seen = seen & any;
     }
-    std::array<Words, 2> count;
-    for (std::size_t half = 0; half < 2; ++half, from += 4 * Raw::nlanes) {
-      const std::int32_t first = g + static_cast<std::int32_t>(half) * Words::nlanes;
-      Words seen = any;
-      if (body != nullptr) {
-        const cv::v_uint8 flags = cv::vx_load(body + kColumn_px / 2 * first) & is_body;
-        seen = cv::v_dotprod_expand(flags, cv::vx_setall_u8(1)) <= cv::vx_setall_u32(kMostBody * kPixelBody);
-        free = free - seen;
-        seen = seen & any;
-      }
-      const auto pairs_of = [&](std::int32_t k) {
-        return pairs(range, from + k * Raw::nlanes,
-                     body == nullptr ? nullptr : body + kColumn_px / 2 * first + k * Words::nlanes);
-      };
-      const Words sum =
-          add_neighbours(add_neighbours(pairs_of(0), pairs_of(1)), add_neighbours(pairs_of(2), pairs_of(3))) & seen;
-      count[half] = sum >> kCountShift;
-      const Wide depths = to_float(sum & cv::vx_setall_u32((1U << kCountShift) - 1U));
-      cv::v_store(inverse_depth + first, to_float(count[half]) * per_metre / cv::v_max(depths, least));
-      measured = measured + count[half];
+    const auto pairs_of = [&](std::int32_t k) {
+      return pairs<kBody>(range, raw + k * Raw::nlanes, kBody ? body + k * Words::nlanes : nullptr);
+    };
+    const Words sum =
+        add_neighbours(add_neighbours(pairs_of(0), pairs_of(1)), add_neighbours(pairs_of(2), pairs_of(3))) & seen;
+    count = sum >> kCountShift;
+    const Wide depths = to_float(sum & cv::vx_setall_u32((1U << kCountShift) - 1U));
+    cv::v_store(inverse_depth, to_float(count) * per_metre / cv::v_max(depths, least));
+    measured = measured + count;
+    raw += 4 * Raw::nlanes;
+    inverse_depth += Words::nlanes;
+    if constexpr (kBody) body += 4 * Words::nlanes;
+  };
+  for (std::int32_t i = 0; i < registers; ++i, valid += Raw::nlanes) {
+    Words left, right;
+    half(left);
+    half(right);
+    cv::v_pack_store(valid, cv::v_pack(left, right));
+  }
+}
+
+}  // namespace
+
+void ColumnImage::turn(std::int32_t first_row, std::int32_t last_row) noexcept {
+  using Four = cv::v_float32x4;
+  static_assert(kColumns % Four::nlanes == 0 && kTurn == Four::nlanes);
+  std::int32_t r = first_row;
+  for (; r + kTurn - 1 <= last_row; r += kTurn) {
+    for (std::int32_t g = 0; g < kColumns; g += Four::nlanes) {
+      Four a, b, c, d;
+      cv::v_transpose4x4(cv::v_load(inverse_depth.row(r) + g), cv::v_load(inverse_depth.row(r + 1) + g),
+                         cv::v_load(inverse_depth.row(r + 2) + g), cv::v_load(inverse_depth.row(r + 3) + g), a, b, c,
+                         d);
+      cv::v_store(down.row(g) + r, a), cv::v_store(down.row(g + 1) + r, b);
+      cv::v_store(down.row(g + 2) + r, c), cv::v_store(down.row(g + 3) + r, d);
     }
-    cv::v_pack_store(valid + g, cv::v_pack(count[0], count[1]));
+  }
+  for (; r <= last_row; ++r) {
+    for (std::int32_t g = 0; g < kColumns; ++g) down(r, g) = inverse_depth(g, r);
+  }
+}
+
+ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body,
+                             std::int32_t columns, float* inverse_depth, std::uint8_t* valid) noexcept {
+  Words measured = cv::vx_setzero_u32(), free = measured;
+  const auto reduce = [&](std::int32_t registers, const std::uint16_t* from, std::int32_t g) {
+    if (body != nullptr) {
+      reduce_registers<true>(range, from, body + kColumn_px / 2 * static_cast<std::ptrdiff_t>(g), registers,
+                             inverse_depth + g, valid + g, measured, free);
+    } else {
+      reduce_registers<false>(range, from, nullptr, registers, inverse_depth + g, valid + g, measured, free);
+    }
+  };
+  const std::int32_t whole = columns / Raw::nlanes;
+  reduce(whole, raw, 0);
+  std::int32_t g = whole * Raw::nlanes;
+  if (g < columns) {  // the driver's buffer ends with its last row
+    std::array<std::uint16_t, static_cast<std::size_t>(kColumn_px) * Raw::nlanes> tail{};
+    std::copy(raw + static_cast<std::ptrdiff_t>(kColumn_px) * g,
+              raw + static_cast<std::ptrdiff_t>(kColumn_px) * columns, tail.begin());
+    reduce(1, tail.data(), g);
+    g += Raw::nlanes;
   }
   ReducedRow row{static_cast<std::int32_t>(cv::v_reduce_sum(measured)),
                  body != nullptr ? g - static_cast<std::int32_t>(cv::v_reduce_sum(free)) : 0};

@@ -19,6 +19,10 @@ inline constexpr std::int32_t kColumns = kDepthWidth_px / kColumn_px;
 struct ColumnImage {
   Raster<float, kColumns, kDepthHeight_px> inverse_depth;  // 1/m, 0 = nothing measured, or the robot's own body
   Raster<std::uint8_t, kColumns, kDepthHeight_px> valid;   // of the column's eight pixels
+  Raster<float, kDepthHeight_px, kColumns> down;           // inverse_depth again, a column a line: see turn
+  // Copies some rows of inverse_depth, first a multiple of kTurn, into down.
+  static constexpr std::int32_t kTurn = 4;  // rows that are best copied together
+  void turn(std::int32_t first_row, std::int32_t last_row) noexcept;
 };
 
 // Rays through the columns' middles and through rows of the full picture.

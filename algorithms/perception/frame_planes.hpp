@@ -53,13 +53,17 @@ struct FramePlanes {  // 1-based
 
 struct FramePicture {
   HalfRays rays;
-  HalfImage<std::uint8_t> flags;
+  HalfImage<std::uint8_t> flags;                 // of rows without body as some picture before left them
+  std::array<bool, kHalfHeight_px> body_rows{};  // with body
   ColumnRays column_rays;
   ColumnImage columns;
   Raster<std::uint8_t, kDepthHeight_px, kColumns> owners;  // a column a line: the plane of each of its rows, 0 = none
 
   [[nodiscard]] std::uint8_t owner(std::int32_t column, std::int32_t row) const noexcept { return owners(row, column); }
-  // Of a half-resolution pixel.
+  // Of a half-resolution pixel, both.
+  [[nodiscard]] bool body(std::int32_t column, std::int32_t row) const noexcept {
+    return body_rows[static_cast<std::size_t>(row)] && (flags(column, row) & kPixelBody) != 0;
+  }
   [[nodiscard]] float inverse_depth_at(std::int32_t column, std::int32_t row) const noexcept {
     if (column < 0 || row < 0 || 2 * column / kColumn_px >= column_rays.columns || row >= rays.height_px) return 0.0F;
     const float upper = columns.inverse_depth(2 * column / kColumn_px, 2 * row);

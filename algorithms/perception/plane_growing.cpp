@@ -2,6 +2,7 @@
 #include "algorithms/perception/plane_growing.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace polygmap {
 namespace {
@@ -70,6 +71,21 @@ void PlaneGrowing::begin(const Params& params, const DepthSigma& noise, const Co
   growing_ = false;
   next_seed_ = 0;
   sort_seeds();
+  index_rows();
+}
+
+// A column of clutter has dozens of runs, of which a neighbour overlaps one or two.
+void PlaneGrowing::index_rows() noexcept {
+  static_assert(RunSegmentation::kMaxRunsPerColumn <= std::numeric_limits<std::uint8_t>::max());
+  for (std::int32_t g = 0; g < rays_->columns; ++g) {
+    const RunSegmentation::Column& column = (*runs_)[static_cast<std::size_t>(g)];
+    auto& first = first_near_[static_cast<std::size_t>(g)];
+    std::size_t k = 0;
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      while (k < column.size() && column[k].bottom < static_cast<std::int32_t>(i) * kIndexRows) ++k;
+      first[i] = static_cast<std::uint8_t>(k);
+    }
+  }
 }
 
 // By length, longest first; equal lengths in the order of the picture.
@@ -99,7 +115,7 @@ bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noe
   const Run& run = at(from);
   const RunSegmentation::Column& column = (*runs_)[static_cast<std::size_t>(g)];
   std::int32_t most = 0;
-  for (std::size_t k = 0; k < column.size() && column[k].top <= run.bottom; ++k) {
+  for (std::size_t k = first_near(g, run.top); k < column.size() && column[k].top <= run.bottom; ++k) {
     const Run& other = column[k];
     const std::int32_t shared = std::min(run.bottom, other.bottom) - std::max(run.top, other.top) + 1;
     const std::int32_t covered = std::max(run.bottom, other.bottom) - std::min(run.top, other.top) + 1;
@@ -112,19 +128,15 @@ bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noe
 
 bool PlaneGrowing::try_seed(Place place) noexcept {
   if (at(place).plane != 0) return false;
+  // Three runs beside one another: most seeds have no such neighbours.
+  Place left, right;
+  if (!try_neighbour(place, -1, left) || !try_neighbour(place, 1, right)) return false;
   Sums sums;
-  sums.add(static_cast<double>(rays_->x[static_cast<std::size_t>(place.column)]), *rays_, at(place));
-  std::int32_t used = 1;
-  for (const std::int32_t side : {-1, 1}) {
-    Place current = place, next;
-    for (std::int32_t i = 0; i < kSeedReach && try_neighbour(current, side, next); ++i) {
-      sums.add(static_cast<double>(rays_->x[static_cast<std::size_t>(next.column)]), *rays_, at(next));
-      current = next;
-      ++used;
-    }
+  for (const Place& p : {place, left, right}) {
+    sums.add(static_cast<double>(rays_->x[static_cast<std::size_t>(p.column)]), *rays_, at(p));
   }
   Vec3 m;
-  if (used < 3 || !sums.try_solve(m)) return false;
+  if (!sums.try_solve(m)) return false;
   const double w = sums.w / sums.n;
   if (sums.mean_square(m) > math::square(tolerance_w(w)) * m.squaredNorm()) return false;
   m_ = m;
@@ -169,7 +181,7 @@ void PlaneGrowing::visit(Place place) noexcept {
     const std::int32_t g = place.column + side;
     if (g < 0 || g >= rays_->columns) continue;
     const RunSegmentation::Column& column = (*runs_)[static_cast<std::size_t>(g)];
-    for (std::size_t k = 0; k < column.size() && column[k].top <= run.bottom; ++k) {
+    for (std::size_t k = first_near(g, run.top); k < column.size() && column[k].top <= run.bottom; ++k) {
       if (column[k].bottom < run.top) continue;
       consider({static_cast<std::int16_t>(g), static_cast<std::int16_t>(k)});
     }

@@ -40,8 +40,7 @@ class PlaneGrowing {
 
  private:
   static constexpr std::size_t kQueue = static_cast<std::size_t>(kColumns) * RunSegmentation::kMaxRunsPerColumn;
-  static constexpr std::int32_t kSeedReach = 1;  // columns to each side that a seed's plane is fitted to
-  static constexpr std::uint8_t kTried = 255;    // a run that grew into nothing
+  static constexpr std::uint8_t kTried = 255;  // a run that grew into nothing
 
   struct Place {
     std::int16_t column = 0;
@@ -59,6 +58,11 @@ class PlaneGrowing {
     return (*runs_)[static_cast<std::size_t>(p.column)][static_cast<std::size_t>(p.index)];
   }
   void sort_seeds() noexcept;
+  void index_rows() noexcept;
+  // Of the first run of a column that ends at this row or below, or of one a little above it.
+  [[nodiscard]] std::size_t first_near(std::int32_t column, std::int32_t row) const noexcept {
+    return first_near_[static_cast<std::size_t>(column)][static_cast<std::size_t>(row / kIndexRows)];
+  }
   [[nodiscard]] bool try_seed(Place place) noexcept;
   [[nodiscard]] bool try_neighbour(Place from, std::int32_t side, Place& best) noexcept;
   void visit(Place place) noexcept;
@@ -74,6 +78,8 @@ class PlaneGrowing {
   const ColumnRays* rays_ = nullptr;
   RunSegmentation::Columns* runs_ = nullptr;
 
+  static constexpr std::int32_t kIndexRows = 16;
+  std::array<std::array<std::uint8_t, kDepthHeight_px / kIndexRows + 1>, kColumns> first_near_{};
   std::array<Place, kQueue> seeds_{};
   std::size_t seed_count_ = 0;
   std::size_t next_seed_ = 0;

@@ -30,10 +30,6 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
   return (n - p.normal()).norm() < bend && (n - q.normal()).norm() < bend;
 }
 
-// Seams whose planes are not one, until either plane changes: their lengths are kept below PlaneMerging::kUnlike.
-constexpr std::int32_t refused(std::int32_t seam_px) noexcept { return -2 - seam_px; }
-constexpr std::int32_t length_of(std::int32_t seam_px) noexcept { return seam_px < -1 ? -2 - seam_px : seam_px; }
-
 // How much the pixels of both planes contradict the plane that fits them together best: chi^2 of the three parameters
 // that it has fewer. Neighbouring pixels' errors count once per correlated_px.
 [[nodiscard]] bool try_contradiction(const PlaneMerging::Params& params, const DepthSigma& noise, const FramePlane& p,
@@ -60,13 +56,16 @@ constexpr std::int32_t length_of(std::int32_t seam_px) noexcept { return seam_px
 void PlaneMerging::merge_pieces(const Params& params, const PlaneGrowing::Params& growing, const DepthSigma& noise,
                                 FramePlanes& planes, PlaneIndex& to_plane, bool measured) noexcept {
   const double least_cosine = math::cos(params.merge_tilt_rad), least_small = math::cos(2.0 * params.merge_tilt_rad);
+  std::array<Vec3, FramePlanes::kMaxPlanes + 1> normals;
+  for (std::size_t p = 1; p <= planes.count; ++p) normals[p] = planes[p].plane.normal();
   for (std::size_t a = 1; a <= planes.count; ++a) {
     for (std::size_t b = a + 1; b <= planes.count && planes[a].alive; ++b) {
-      if (!planes[b].alive || planes[a].facet || planes[b].facet) continue;
+      const double cosine = normals[a].dot(normals[b]);
+      if (!planes[b].alive || planes[a].facet || planes[b].facet || cosine < least_small) continue;
       const std::size_t keep = planes[a].pixels >= planes[b].pixels ? a : b, gone = keep == a ? b : a;
       FramePlane &p = planes[keep], &q = planes[gone];
       const bool small = q.pixels < params.small_plane_px;
-      if (p.plane.normal().dot(q.plane.normal()) < (small ? least_small : least_cosine)) continue;
+      if (!small && cosine < least_cosine) continue;
       // Where a large plane lies is known well: apart by more than what lets a run join a plane, the two are not one.
       const double noise_m = growing.join_floor_m + growing.join_sigmas * noise.sigma_m(q.centre_m.z());
       const double merge_m = small ? params.merge_m : std::min(noise_m, params.merge_m);
@@ -83,82 +82,116 @@ void PlaneMerging::merge_pieces(const Params& params, const PlaneGrowing::Params
   }
 }
 
-// Spans above or beside one another in the picture.
-void PlaneMerging::measure_seams(const SurfaceBoundaries::Columns& columns, std::int32_t column_count,
-                                 const FramePlanes& planes, double least_cosine, const PlaneIndex& to_plane) noexcept {
-  for (std::size_t a = 0; a <= planes.count; ++a) {
-    seam_px_[a][a] = kUnlike;
-    for (std::size_t b = a + 1; b <= planes.count; ++b) {
-      const bool alike = a > 0 && planes[a].alive && planes[b].alive &&
-                         planes[a].plane.normal().dot(planes[b].plane.normal()) >= least_cosine;
-      seam_px_[a][b] = alike ? 0 : kUnlike;
-    }
+void PlaneMerging::begin_facets(const Params& params, const PlaneGrowing::Params& growing, const DepthSigma& noise,
+                                const FramePlanes& planes) noexcept {
+  params_ = params;
+  min_plane_px_ = growing.min_plane_px;
+  noise_ = noise;
+  least_cosine_ = math::cos(params.facet_tilt_rad);
+  normals_[0] = Vec3::Zero();
+  for (std::size_t p = 1; p <= planes.count; ++p) {
+    normals_[p] = planes[p].alive ? planes[p].plane.normal() : Vec3{Vec3::Zero()};
   }
-  const auto add = [&](std::uint8_t a, std::uint8_t b, std::int32_t length_px) {
-    std::int32_t& seam_px = seam_px_[std::min(a, b)][std::max(a, b)];
-    if (seam_px != kUnlike) seam_px += length_px;
-  };
-  for (std::int32_t g = 0; g < column_count; ++g) {
-    const SurfaceBoundaries::Column& spans = columns[static_cast<std::size_t>(g)];
-    for (std::size_t k = 0; k + 1 < spans.size(); ++k) {
-      if (spans[k + 1].top - spans[k].bottom > kMaxGap_px) continue;
-      add(to_plane[spans[k].plane], to_plane[spans[k + 1].plane], kColumn_px);
+  for (std::size_t p = 0; p <= planes.count; ++p) seam_of_[p].fill(0);
+  seam_count_ = joined_ = 0;
+  next_open_ = 1;
+  overflow_ = 0;
+}
+
+void PlaneMerging::touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px) noexcept {
+  if (a == b) return;
+  SeamIndex& seam = seam_of(a, b);
+  if (seam == 0) {
+    if (!alike(a, b)) return;
+    if (seam_count_ == kMaxSeams) {
+      ++overflow_;
+      return;
     }
-    if (g + 1 == column_count) break;
-    const SurfaceBoundaries::Column& right = columns[static_cast<std::size_t>(g + 1)];
-    for (std::size_t k = 0, i = 0; k < spans.size() && i < right.size();) {  // both from top to bottom
-      const std::int32_t shared = std::min(spans[k].bottom, right[i].bottom) - std::max(spans[k].top, right[i].top) + 1;
-      if (shared > 0) add(to_plane[spans[k].plane], to_plane[right[i].plane], shared);
-      ++(spans[k].bottom < right[i].bottom ? k : i);
-    }
+    seam = static_cast<SeamIndex>(++seam_count_);
+    seams_[seam] = Seam{};
+    seams_[seam].a = std::min(a, b);
+    seams_[seam].b = std::max(a, b);
+  }
+  seams_[seam].length_px += length_px;
+}
+
+// Spans above or beside one another in the picture.
+void PlaneMerging::add_column(const SurfaceBoundaries::Column& spans, const SurfaceBoundaries::Column* right,
+                              const PlaneIndex& to_plane) noexcept {
+  for (std::size_t k = 0; k + 1 < spans.size(); ++k) {
+    if (spans[k + 1].top - spans[k].bottom > kMaxGap_px) continue;
+    touch(to_plane[spans[k].plane], to_plane[spans[k + 1].plane], kColumn_px);
+  }
+  if (right == nullptr) return;
+  for (std::size_t k = 0, i = 0; k < spans.size() && i < right->size();) {  // both from top to bottom
+    const ColumnSpan &here = spans[k], &there = (*right)[i];
+    const std::int32_t shared = std::min(here.bottom, there.bottom) - std::max(here.top, there.top) + 1;
+    if (shared > 0) touch(to_plane[here.plane], to_plane[there.plane], shared);
+    ++(here.bottom < there.bottom ? k : i);
   }
 }
 
-void PlaneMerging::join_facets(const Params& params, const PlaneGrowing::Params& growing, const DepthSigma& noise,
-                               const SurfaceBoundaries::Columns& columns, std::int32_t column_count,
-                               FramePlanes& planes, PlaneIndex& to_plane) noexcept {
-  measure_seams(columns, column_count, planes, math::cos(params.facet_tilt_rad), to_plane);
-  for (std::size_t joined = 0; joined < kMaxFacets; ++joined) {
-    double least = params.facet_chi2;
-    std::size_t best_a = 0, best_b = 0;
-    for (std::size_t a = 1; a <= planes.count; ++a) {
-      for (std::size_t b = a + 1; b <= planes.count; ++b) {
-        if (seam_px_[a][b] <= 0) continue;
-        const FramePlane &p = planes[a], &q = planes[b];
-        if (seam_px_[a][b] < params.facet_seam * math::sqrt(std::min(p.pixels, q.pixels))) continue;
-        double chi2 = 0.0;
-        if (!try_contradiction(params, noise, p, q, chi2) || !(chi2 < params.facet_chi2)) {
-          seam_px_[a][b] = refused(seam_px_[a][b]);
-          continue;
-        }
-        if (!(chi2 < least)) continue;
-        least = chi2;
-        best_a = a;
-        best_b = b;
-      }
-    }
-    if (best_a == 0) return;
-    FramePlane &p = planes[best_a], &q = planes[best_b];
-    p.moments.add(q.moments);
-    if (!try_fit(p.moments, p.plane.m)) return;
-    p.pixels += q.pixels;
-    p.facet = p.facet && q.facet && p.pixels < growing.min_plane_px;
-    p.residual2 += q.residual2;
-    p.centre_m = p.plane.point(p.moments.mean_ray());
-    p.facets = static_cast<std::uint8_t>(std::min(p.facets + q.facets, 255));
-    q.alive = false;
-    redirect(to_plane, best_b, best_a);
-    const auto seam = [this](std::size_t a, std::size_t b) -> std::int32_t& {
-      return seam_px_[std::min(a, b)][std::max(a, b)];
-    };
-    for (std::size_t c = 1; c <= planes.count; ++c) {  // what the one touches, both do, and are asked again
-      if (c == best_a || c == best_b) continue;
-      std::int32_t &both = seam(best_a, c), &gone = seam(best_b, c);
-      if (both != kUnlike) both = length_of(both) + std::max(length_of(gone), 0);
-      gone = kUnlike;
-    }
-    seam(best_a, best_b) = kUnlike;
+void PlaneMerging::judge(const FramePlanes& planes, Seam& seam) const noexcept {
+  const FramePlane &p = planes[seam.a], &q = planes[seam.b];
+  if (seam.length_px < params_.facet_seam * math::sqrt(std::min(p.pixels, q.pixels))) {
+    seam.verdict = Seam::Verdict::kShort;
+  } else {
+    const bool one = try_contradiction(params_, noise_, p, q, seam.chi2) && seam.chi2 < params_.facet_chi2;
+    seam.verdict = one ? Seam::Verdict::kOne : Seam::Verdict::kContradicted;
   }
+}
+
+bool PlaneMerging::try_join(FramePlanes& planes, PlaneIndex& to_plane, Seam& best) noexcept {
+  const std::size_t kept = best.a, gone = best.b;
+  FramePlane &p = planes[kept], &q = planes[gone];
+  p.moments.add(q.moments);
+  if (!try_fit(p.moments, p.plane.m)) return false;
+  p.pixels += q.pixels;
+  p.facet = p.facet && q.facet && p.pixels < min_plane_px_;
+  p.residual2 += q.residual2;
+  p.centre_m = p.plane.point(p.moments.mean_ray());
+  p.facets = static_cast<std::uint8_t>(std::min(p.facets + q.facets, 255));
+  q.alive = false;
+  redirect(to_plane, gone, kept);
+  best.verdict = Seam::Verdict::kGone;
+  for (std::size_t i = 1; i <= seam_count_; ++i) {  // what the one touches, both do, and are asked again
+    Seam& seam = seams_[i];
+    if (seam.verdict == Seam::Verdict::kGone) continue;
+    if (seam.a == kept || seam.b == kept) seam.verdict = Seam::Verdict::kOpen;
+    if (seam.a != gone && seam.b != gone) continue;
+    const std::size_t other = seam.a == gone ? seam.b : seam.a;
+    const bool counts = seam.verdict != Seam::Verdict::kContradicted && alike(kept, other);
+    SeamIndex& both = seam_of(kept, other);
+    if (both != 0) {
+      if (counts) seams_[both].length_px += seam.length_px;
+      seam.verdict = Seam::Verdict::kGone;
+    } else if (counts) {
+      both = static_cast<SeamIndex>(i);
+      seam.a = static_cast<std::uint8_t>(std::min(kept, other));
+      seam.b = static_cast<std::uint8_t>(std::max(kept, other));
+      seam.verdict = Seam::Verdict::kOpen;
+    } else {
+      seam.verdict = Seam::Verdict::kGone;
+    }
+  }
+  next_open_ = 1;
+  return true;
+}
+
+bool PlaneMerging::join_some(FramePlanes& planes, PlaneIndex& to_plane) noexcept {
+  std::size_t looked_at = 0;
+  for (; next_open_ <= seam_count_ && looked_at < kSeamsAtOnce; ++next_open_) {
+    if (seams_[next_open_].verdict != Seam::Verdict::kOpen) continue;
+    judge(planes, seams_[next_open_]);
+    ++looked_at;
+  }
+  if (next_open_ <= seam_count_) return false;
+  Seam* best = nullptr;
+  for (std::size_t i = 1; i <= seam_count_; ++i) {
+    Seam& seam = seams_[i];
+    if (seam.verdict == Seam::Verdict::kOne && (best == nullptr || seam.chi2 < best->chi2)) best = &seam;
+  }
+  return best == nullptr || !try_join(planes, to_plane, *best) || ++joined_ == kMaxFacets;
 }
 
 }  // namespace polygmap

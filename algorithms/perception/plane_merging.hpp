@@ -32,22 +32,55 @@ class PlaneMerging {
   // planes are one only where there is no doubt. Facets too small to be planes are left to join_facets.
   static void merge_pieces(const Params& params, const PlaneGrowing::Params& growing, const DepthSigma& noise,
                            FramePlanes& planes, PlaneIndex& to_plane, bool measured) noexcept;
-  // Facets get a plane of their own, fitted to all of them; together they may be large enough to be one. columns: the
-  // spans that the planes were fitted to.
-  void join_facets(const Params& params, const PlaneGrowing::Params& growing, const DepthSigma& noise,
-                   const SurfaceBoundaries::Columns& columns, std::int32_t column_count, FramePlanes& planes,
-                   PlaneIndex& to_plane) noexcept;
+  // Facets get a plane of their own, fitted to all of them, and may together be large enough to be one: begin_facets,
+  // the columns of spans that the planes were fitted to, from left to right, then join_some until it is done.
+  void begin_facets(const Params& params, const PlaneGrowing::Params& growing, const DepthSigma& noise,
+                    const FramePlanes& planes) noexcept;
+  // right: the next column, null for the last.
+  void add_column(const SurfaceBoundaries::Column& spans, const SurfaceBoundaries::Column* right,
+                  const PlaneIndex& to_plane) noexcept;
+  // Looks at kSeamsAtOnce seams, or joins two planes; true when nothing is left to join.
+  [[nodiscard]] bool join_some(FramePlanes& planes, PlaneIndex& to_plane) noexcept;
+  // Seams that found no room.
+  [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
 
  private:
   static constexpr std::int32_t kMaxGap_px = 24;  // rows between two surfaces that still touch
   static constexpr std::size_t kMaxFacets = 32;   // joined per frame
+  static constexpr std::size_t kMaxSeams = 512;
+  static constexpr std::size_t kSeamsAtOnce = 8;
 
-  static constexpr std::int32_t kUnlike = -1;
-  void measure_seams(const SurfaceBoundaries::Columns& columns, std::int32_t column_count, const FramePlanes& planes,
-                     double least_cosine, const PlaneIndex& to_plane) noexcept;
-  // Along how many pixels two planes touch in the picture, the smaller index first; kUnlike: they face too different
-  // ways; less: refused.
-  std::array<std::array<std::int32_t, FramePlanes::kMaxPlanes + 1>, FramePlanes::kMaxPlanes + 1> seam_px_{};
+  // Where two planes that face much the same way touch in the picture. What was said of them holds until either plane
+  // changes.
+  struct Seam {
+    enum class Verdict : std::uint8_t { kOpen, kShort, kContradicted, kOne, kGone };
+    std::uint8_t a = 0, b = 0;
+    Verdict verdict = Verdict::kOpen;
+    std::int32_t length_px = 0;
+    double chi2 = 0.0;  // if kOne
+  };
+  using SeamIndex = std::uint16_t;  // 0 = none
+  [[nodiscard]] SeamIndex& seam_of(std::size_t a, std::size_t b) noexcept {
+    return seam_of_[a < b ? a : b][a < b ? b : a];
+  }
+  [[nodiscard]] bool alike(std::size_t a, std::size_t b) const noexcept {
+    return normals_[a].dot(normals_[b]) >= least_cosine_;
+  }
+  void touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px) noexcept;
+  void judge(const FramePlanes& planes, Seam& seam) const noexcept;
+  [[nodiscard]] bool try_join(FramePlanes& planes, PlaneIndex& to_plane, Seam& best) noexcept;
+
+  Params params_;
+  double min_plane_px_ = 0.0;
+  DepthSigma noise_;
+  double least_cosine_ = 1.0;
+  std::array<Vec3, FramePlanes::kMaxPlanes + 1> normals_{};  // before any were joined; zero: no plane
+  std::array<std::array<SeamIndex, FramePlanes::kMaxPlanes + 1>, FramePlanes::kMaxPlanes + 1> seam_of_{};
+  std::array<Seam, kMaxSeams + 1> seams_{};  // 1-based
+  std::size_t seam_count_ = 0;
+  std::size_t next_open_ = 1;  // none before it is open
+  std::size_t joined_ = 0;
+  std::uint32_t overflow_ = 0;
 };
 
 }  // namespace polygmap

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "algorithms/perception/vectors.hpp"
+
 namespace polygmap {
 
 void RemainderSearch::begin(const Params& params, const Vec3& up) noexcept {
@@ -40,16 +42,30 @@ void RemainderSearch::add_column(const ColumnRays& rays, const ColumnImage& imag
   };
   const float x = rays.x[static_cast<std::size_t>(column)];
   const Steps level(level_, x), upright(upright_, x);
-  const auto count = [](Axis& axis, float bin) {
-    if (bin >= 0.0F && bin < static_cast<float>(Axis::kBins)) ++axis.rows[static_cast<std::size_t>(bin)];
-  };
+  using Wide = cv::v_float32;
+  constexpr std::int32_t kAtOnce = 8;
+  static_assert(kAtOnce % Wide::nlanes == 0 && kDepthHeight_px % kAtOnce == 0);
+  const auto all = [](float value) { return cv::vx_setall_f32(value); };
+  const Wide zero = all(0.0F), end = all(static_cast<float>(Axis::kBins)), none = end;
+  const float *ws = image.down.row(column), *ys = rays.y.data();
   const auto add_stretch = [&](std::int32_t first, std::int32_t last) {
-    for (std::int32_t r = first; r <= last; ++r) {
-      const float w = image.inverse_depth(column, r);
-      if (!(w > 0.0F)) continue;
-      const float y = rays.y[static_cast<std::size_t>(r)], z = 1.0F / w;
-      count(level_, (level.at + level.slope * y) * z);
-      count(upright_, (upright.at + upright.slope * y) * z);
+    for (std::int32_t from = first; from <= last; from += kAtOnce) {
+      const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce), until = std::min(last + 1 - start, kAtOnce);
+      std::array<std::int32_t, kAtOnce> level_bins, upright_bins;
+      for (std::int32_t i = 0; i < kAtOnce; i += Wide::nlanes) {
+        const Wide w = cv::vx_load(ws + start + i), y = cv::vx_load(ys + start + i);
+        const Wide z = all(1.0F) / w;
+        const auto bins = [&](const Steps& steps) {
+          const Wide bin = (all(steps.at) + all(steps.slope) * y) * z;
+          return cv::v_trunc(cv::v_select((w > zero) & (bin >= zero) & (bin < end), bin, none));
+        };
+        cv::v_store(level_bins.data() + i, bins(level));
+        cv::v_store(upright_bins.data() + i, bins(upright));
+      }
+      for (std::int32_t i = from - start; i < until; ++i) {
+        ++level_.rows[static_cast<std::size_t>(level_bins[static_cast<std::size_t>(i)])];
+        ++upright_.rows[static_cast<std::size_t>(upright_bins[static_cast<std::size_t>(i)])];
+      }
     }
   };
   const auto add_rows = [&](std::int32_t first, std::int32_t last) {
@@ -73,18 +89,25 @@ void RemainderSearch::forget(Axis& axis, double distance_m, double apart_m) noex
 }
 
 void RemainderSearch::find(Axis& axis) noexcept {
-  constexpr std::int32_t kPeak = 1;     // bins to each side that belong to a peak
+  constexpr std::int32_t kPeak = 1;     // bins to each side that belong to a peak, see peak_at
   constexpr std::int32_t kAround = 10;  // bins to each side that it is compared with
   for (int guard = 0; guard < 4; ++guard) {
-    std::int32_t best = 0, at = -1;
-    for (std::int32_t b = kAround; b < Axis::kBins - kAround; ++b) {
-      std::int32_t rows = 0;
-      for (std::int32_t i = b - kPeak; i <= b + kPeak; ++i) rows += axis.rows[static_cast<std::size_t>(i)];
-      if (rows <= best) continue;
-      best = rows;
-      at = b;
+    // The largest peak, the first of those.
+    using Wide = cv::v_int32;
+    const auto load = [&axis](std::int32_t b) { return cv::vx_load(axis.rows.data() + b); };
+    constexpr std::int32_t kFirst = kAround, kEnd = Axis::kBins - kAround, kWhole = (kEnd - kFirst) / Wide::nlanes;
+    const auto peak_at = [&axis](std::int32_t b) {
+      const std::int32_t* rows = axis.rows.data() + b;
+      return rows[-1] + rows[0] + rows[1];
+    };
+    Wide most = cv::vx_setzero_s32();
+    for (std::int32_t b = kFirst; b < kFirst + kWhole * Wide::nlanes; b += Wide::nlanes) {
+      most = cv::v_max(most, load(b - 1) + load(b) + load(b + 1));
     }
-    if (best < params_.min_rows) return;
+    std::int32_t best = cv::v_reduce_max(most), at = kFirst;
+    for (std::int32_t b = kFirst + kWhole * Wide::nlanes; b < kEnd; ++b) best = std::max(best, peak_at(b));
+    if (best < std::max(params_.min_rows, 1)) return;
+    while (peak_at(at) != best) ++at;
     std::int32_t around = 0;
     double sum = 0.0;
     for (std::int32_t i = at - kAround; i <= at + kAround; ++i) around += axis.rows[static_cast<std::size_t>(i)];

@@ -41,8 +41,8 @@ class RemainderSearch {
   struct Axis {
     static constexpr std::int32_t kBins = 1024;
     static constexpr double kBin_m = 0.005;
-    Vec3 direction = Vec3::Zero();  // unit, the planes' normal; zero: not in use
-    std::array<std::int32_t, kBins> rows{};
+    Vec3 direction = Vec3::Zero();               // unit, the planes' normal; zero: not in use
+    std::array<std::int32_t, kBins + 1> rows{};  // the last: in none
     [[nodiscard]] static std::int32_t bin_of(double distance_m) noexcept {
       return static_cast<std::int32_t>(std::floor(distance_m / kBin_m));
     }

@@ -116,13 +116,15 @@ void SelfFilter::add_shape(const HalfRays& rays, const std::array<LegShapes, kFo
   }
 }
 
-bool SelfFilter::mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept {
+bool SelfFilter::try_mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept {
   bool any = false;
   for (const Outline& outline : outlines_) {
     const Interval interval = outline[static_cast<std::size_t>(row)];
     const std::int32_t last = std::min<std::int32_t>(interval.last, width_px - 1);
-    for (std::int32_t i = interval.first; i <= last; ++i) flags[i] = static_cast<std::uint8_t>(flags[i] | kPixelBody);
-    any = any || interval.first <= last;
+    if (interval.first > last) continue;
+    if (!any) std::fill(flags, flags + width_px, std::uint8_t{0});
+    any = true;
+    std::fill(flags + interval.first, flags + last + 1, static_cast<std::uint8_t>(kPixelBody));
   }
   return any;
 }

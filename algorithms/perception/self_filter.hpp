@@ -34,8 +34,8 @@ class SelfFilter {
   // Slots 0..2 of a foot: thigh, shank, foot. Camera frame, m.
   void add_shape(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body, const BodyMargin& margin,
                  std::size_t slot) noexcept;
-  // Sets kPixelBody in one row of flags; false when there is none in it.
-  bool mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept;
+  // Writes one row of flags, of kPixelBody; false, and nothing written, when there is none in it.
+  [[nodiscard]] bool try_mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept;
 
  private:
   struct Interval {

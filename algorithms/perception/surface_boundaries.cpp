@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "algorithms/perception/vectors.hpp"
+
 namespace polygmap {
 void SurfaceBoundaries::begin(const Params& params, const DepthSigma& noise, const ColumnRays& rays, double fy_px,
                               double cy_px, const ColumnImage& image) noexcept {
@@ -35,7 +37,7 @@ void SurfaceBoundaries::gather(std::int32_t column, const RunSegmentation::Colum
       const Line line = line_of(planes_[plane].plane, column);
       int other = 0, own = 0;
       for (std::int32_t r = out.back().bottom + 1; r < run.top; ++r) {
-        const float w = image_->inverse_depth(column, r);
+        const float w = image_->down(r, column);
         if (!(w > 0.0F)) continue;
         const float off = std::abs(w - (line.a + line.b * rays_->y[static_cast<std::size_t>(r)])) * w;
         const float limit = (static_cast<float>(params_.same_gap_sigmas) * inverse_sigma(w) +
@@ -68,7 +70,7 @@ void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const no
     for (std::int32_t i = 0; i < kMost_px && good < kGood; ++i) {
       const std::int32_t r = from + i * step;
       if (r < interval.top || r > interval.bottom) return from;
-      if (image_->valid(column, r) == 0) continue;
+      if (!(image_->down(r, column) > 0.0F)) continue;
       if (!offset(line, column, r).within(kTruncation)) {
         good = 0;
         at = r + step;
@@ -112,7 +114,7 @@ void SurfaceBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::i
   std::int16_t& end = step > 0 ? interval.bottom : interval.top;
   int empty = 0, off = 0;
   for (std::int32_t r = end + step; step > 0 ? r <= limit : r >= limit; r += step) {
-    if (image_->valid(column, r) == 0) {
+    if (!(image_->down(r, column) > 0.0F)) {
       if (++empty > kMaxEmpty) return;
     } else if (offset(line, column, r).within(most)) {
       end = static_cast<std::int16_t>(r);
@@ -139,20 +141,38 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
   std::int32_t bin = pair != nullptr ? to_bin(first) : kNowhere;  // a row further is kBinsPerPixel bins further
   float sum = 0.0F, best = 0.0F;
   std::int32_t at = first - 1;
-  for (std::int32_t r = first; r <= last; ++r, bin += kBinsPerPixel) {
-    const std::size_t valid = image_->valid(column, r);
-    if (valid == 0) continue;
-    const float w = image_->inverse_depth(column, r), y = rays_->y[static_cast<std::size_t>(r)];
-    const float off_upper = (w - (upper.a + upper.b * y)) * w, off_lower = (w - (lower.a + lower.b * y)) * w;
-    const float sigma = inverse_sigma(w), information = 1.0F / (sigma * sigma * norm2 * share_[valid]);
-    const float gain = std::min(off_upper * off_upper * information, kTruncation) -
-                       std::min(off_lower * off_lower * information, kTruncation);
-    sum += gain;
-    if (sum < best) {
-      best = sum;
-      at = r;
+  using Wide = cv::v_float32;
+  constexpr std::int32_t kAtOnce = 8;
+  static_assert(kAtOnce % Wide::nlanes == 0);
+  const auto all = [](float x) { return cv::vx_setall_f32(x); };
+  const Wide zero = all(0.0F), most = all(kTruncation);
+  const float *ws = image_->down.row(column), *ys = rays_->y.data();
+  for (std::int32_t from = first; from <= last; from += kAtOnce) {
+    // The last rows of the picture are looked at with others before them.
+    const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce), end = std::min(last + 1 - start, kAtOnce);
+    std::array<float, kAtOnce> share, gains;
+    for (std::int32_t i = 0; i < kAtOnce; ++i) {
+      share[static_cast<std::size_t>(i)] = share_[image_->valid(column, start + i)];
     }
-    if (bin >= 0 && bin < kBins) pair->gain[static_cast<std::size_t>(bin)] += gain;
+    for (std::int32_t i = 0; i < kAtOnce; i += Wide::nlanes) {
+      const Wide w = cv::vx_load(ws + start + i), y = cv::vx_load(ys + start + i);
+      const Wide off_upper = (w - (all(upper.a) + all(upper.b) * y)) * w;
+      const Wide off_lower = (w - (all(lower.a) + all(lower.b) * y)) * w;
+      const Wide sigma = (all(base_) * w + all(per_metre_)) * w + all(quadratic_);
+      const Wide information = all(1.0F) / (sigma * sigma * all(norm2) * cv::vx_load(share.data() + i));
+      const Wide gain =
+          cv::v_min(off_upper * off_upper * information, most) - cv::v_min(off_lower * off_lower * information, most);
+      cv::v_store(gains.data() + i, gain & (w > zero));  // nothing where there is no data
+    }
+    for (std::int32_t i = from - start; i < end; ++i, bin += kBinsPerPixel) {
+      const float gain = gains[static_cast<std::size_t>(i)];
+      sum += gain;
+      if (sum < best) {
+        best = sum;
+        at = start + i;
+      }
+      if (bin >= 0 && bin < kBins) pair->gain[static_cast<std::size_t>(bin)] += gain;
+    }
   }
   return at;
 }

@@ -123,11 +123,13 @@ class SurfaceBoundaries {
   [[nodiscard]] Offset offset(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
   void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
   struct Depths {  // the range of some rows' inverse depths, 1/m; farthest > nearest: none has any
-    float farthest = -1.0F, nearest = -1.0F;
+    float farthest, nearest;
   };
   [[nodiscard]] Depths depths_of(std::int32_t column, std::int32_t first, std::int32_t last) const noexcept;
   [[nodiscard]] bool reaches(std::int32_t column, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
                              const Depths& depths) const noexcept;
+  static constexpr std::int32_t kRowsAtOnce = 8;
+  [[nodiscard]] std::uint32_t fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept;
   // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
   void weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
                    ColumnSpan& claimed) const noexcept;
@@ -173,7 +175,7 @@ inline SurfaceBoundaries::Line SurfaceBoundaries::line_of(const InversePlane& pl
 
 inline SurfaceBoundaries::Offset SurfaceBoundaries::offset(const Line& line, std::int32_t column,
                                                            std::int32_t row) const noexcept {
-  const float w = image_->inverse_depth(column, row);
+  const float w = image_->down(row, column);
   const float residual = (w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)])) * w;
   const float sigma = inverse_sigma(w) * line.norm;
   return {residual * residual, sigma * sigma * share_[image_->valid(column, row)]};

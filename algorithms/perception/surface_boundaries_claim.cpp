@@ -1,52 +1,104 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rows that are in no span, given to planes seen beside them or found in the remainder.
 #include <algorithm>
+#include <bit>
 
 #include "algorithms/perception/surface_boundaries.hpp"
+#include "algorithms/perception/vectors.hpp"
 
 namespace polygmap {
+
+// Of the rows first .. first + kRowsAtOnce - 1, a bit for each that lies on the line. As offset() has it.
+std::uint32_t SurfaceBoundaries::fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept {
+  using Wide = cv::v_float32;
+  static_assert(kRowsAtOnce % Wide::nlanes == 0 && kDepthHeight_px % kRowsAtOnce == 0);
+  const auto all = [](float x) { return cv::vx_setall_f32(x); };
+  std::array<float, kRowsAtOnce> share;
+  for (std::int32_t i = 0; i < kRowsAtOnce; ++i) {
+    share[static_cast<std::size_t>(i)] = share_[image_->valid(column, first + i)];
+  }
+  std::uint32_t bits = 0;
+  for (std::int32_t i = 0; i < kRowsAtOnce; i += Wide::nlanes) {
+    const Wide w = cv::vx_load(image_->down.row(column) + first + i), y = cv::vx_load(rays_->y.data() + first + i);
+    const Wide residual = (w - (all(line.a) + all(line.b) * y)) * w;
+    const Wide sigma = ((all(base_) * w + all(per_metre_)) * w + all(quadratic_)) * all(line.norm);
+    const Wide variance = sigma * sigma * cv::vx_load(share.data() + i);
+    const Wide fits = (w > all(0.0F)) & (residual * residual < all(kTruncation) * variance);
+    bits |= static_cast<std::uint32_t>(cv::v_signmask(fits)) << i;
+  }
+  return bits;
+}
 
 void SurfaceBoundaries::weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
                                     ColumnSpan& claimed) const noexcept {
   const Line line = line_of(planes_[candidate.plane].plane, column);
   // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
-  std::int32_t top = -1, bottom = -1, fitting = 0, off = 0;
+  std::int32_t top = -1, bottom = -1, rows = 0, off = 0;
   const auto close = [&] {
-    if (fitting > most) {
-      most = fitting;
+    if (rows > most) {
+      most = rows;
       claimed.top = static_cast<std::int16_t>(top);
       claimed.bottom = static_cast<std::int16_t>(bottom);
       claimed.plane = candidate.plane;
     }
-    fitting = off = 0;
+    rows = off = 0;
     top = -1;
   };
-  const auto fits = [&](std::int32_t r) {
-    return image_->valid(column, r) != 0 && offset(line, column, r).within(kTruncation);
+  // A bit for each of eight rows that are looked at together.
+  std::int32_t looked_at = -1;
+  std::uint32_t eight = 0;
+  const auto bits_from = [&](std::int32_t r) {
+    if (r / kRowsAtOnce != looked_at) {
+      looked_at = r / kRowsAtOnce;
+      eight = fitting(line, column, looked_at * kRowsAtOnce);
+    }
+    return eight >> (r % kRowsAtOnce);
   };
-  // Outside a stretch every second row is looked at: that meets all those with two rows in a row.
-  for (std::int32_t r = candidate.top; r <= candidate.bottom; r += fitting > 0 ? 1 : 2) {
-    if (fits(r)) {
-      if (fitting == 0) top = r > candidate.top && fits(r - 1) ? r - 1 : r;
-      fitting += fitting == 0 ? r - top + 1 : 1;
+  for (std::int32_t r = candidate.top; r <= candidate.bottom;) {
+    const std::uint32_t bits = bits_from(r);
+    if (rows == 0) {
+      // Outside a stretch every second row is looked at: that meets all those with two rows in a row.
+      constexpr std::uint32_t kEverySecond = 0x55;
+      if (candidate.bottom - r + 2 <= most) return;  // too few are left, the row before among them
+      if ((bits & kEverySecond) == 0) {
+        r += (kRowsAtOnce + 1 - r % kRowsAtOnce) / 2 * 2;
+        continue;
+      }
+      r += std::countr_zero(bits & kEverySecond);
+      if (r > candidate.bottom) break;
+      top = r > candidate.top && (bits_from(r - 1) & 1U) != 0 ? r - 1 : r;
+      rows = r - top + 1;
+      bottom = r;
+    } else if ((bits & 1U) != 0) {
+      ++rows;
       bottom = r;
       off = 0;
-    } else if (fitting > 0 && ++off > 1) {
+    } else if (++off > 1) {
       close();
+      ++r;  // of the rows looked at outside a stretch the next
     }
-    if (fitting == 0 && candidate.bottom - r <= most) return;  // too few are left
+    ++r;
   }
   close();
 }
 
 SurfaceBoundaries::Depths SurfaceBoundaries::depths_of(std::int32_t column, std::int32_t first,
                                                        std::int32_t last) const noexcept {
+  using Wide = cv::v_float32;
   constexpr float kNone = 1e9F;  // 1/m
-  Depths depths{kNone, 0.0F};
-  for (std::int32_t r = first; r <= last; ++r) {
-    const float w = image_->inverse_depth(column, r);
-    depths.farthest = std::min(depths.farthest, w > 0.0F ? w : kNone);
-    depths.nearest = std::max(depths.nearest, w);
+  const float* w = image_->down.row(column);
+  const Wide zero = cv::vx_setall_f32(0.0F), none = cv::vx_setall_f32(kNone);
+  Wide least = none, most = zero;
+  std::int32_t r = first;
+  for (; r + Wide::nlanes - 1 <= last; r += Wide::nlanes) {
+    const Wide some = cv::vx_load(w + r);
+    least = cv::v_min(least, cv::v_select(some > zero, some, none));
+    most = cv::v_max(most, some);
+  }
+  Depths depths{cv::v_reduce_min(least), cv::v_reduce_max(most)};
+  for (; r <= last; ++r) {
+    depths.farthest = std::min(depths.farthest, w[r] > 0.0F ? w[r] : kNone);
+    depths.nearest = std::max(depths.nearest, w[r]);
   }
   return depths;
 }
@@ -71,6 +123,7 @@ void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::siz
   Column& spans = columns_[static_cast<std::size_t>(column)];
   const bool any_beside = beside >= 0 && beside < rays_->columns;
   std::int32_t from = 0;
+  std::size_t next_beside = 0;  // the first span there that reaches down to this gap
   for (std::size_t k = 0; k <= spans.size(); ++k) {
     const std::int32_t until = k < spans.size() ? spans[k].top - 1 : rays_->height_px - 1;
     const std::int32_t gap_from = from;
@@ -84,10 +137,8 @@ void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::siz
     const std::uint8_t below = k < spans.size() ? spans[k].plane : std::uint8_t{0};
     std::int32_t most = kMinRows - 1;
     ColumnSpan claimed;
-    Depths depths;  // of the gap, when they are first asked for
-    const auto consider = [&](std::uint8_t plane, std::int32_t top, std::int32_t bottom) {
+    const auto consider = [&](std::uint8_t plane, std::int32_t top, std::int32_t bottom, const Depths& depths) {
       if (plane == above || plane == below || bottom - top < most) return;
-      if (depths.farthest < 0.0F) depths = depths_of(column, gap_from, until);
       if (!reaches(column, plane, top, bottom, depths)) return;
       ColumnSpan candidate;
       candidate.plane = plane;
@@ -96,17 +147,27 @@ void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::siz
       weigh_claim(column, candidate, most, claimed);
     };
     if (any_beside) {
-      for (const ColumnSpan& other : columns_[static_cast<std::size_t>(beside)]) {
-        if (other.top - kReach_px > until) break;
-        if (other.bottom + kReach_px < gap_from) continue;
-        consider(other.plane, std::max(gap_from, other.top - kReach_px), std::min(until, other.bottom + kReach_px));
+      const Column& others = columns_[static_cast<std::size_t>(beside)];
+      while (next_beside < others.size() && others[next_beside].bottom + kReach_px < gap_from) ++next_beside;
+      for (std::size_t i = next_beside; i < others.size() && others[i].top - kReach_px <= until; ++i) {
+        const ColumnSpan& other = others[i];
+        if (other.plane == above || other.plane == below) continue;
+        const std::int32_t top = std::max(gap_from, other.top - kReach_px);
+        const std::int32_t bottom = std::min(until, other.bottom + kReach_px);
+        consider(other.plane, top, bottom, depths_of(column, top, bottom));
       }
     }
-    const bool deep = until - gap_from >= 2 * kRemainderReach_px;
-    for (std::size_t p = first_plane; p <= last_plane; ++p) {
-      const auto plane = static_cast<std::uint8_t>(p);
-      consider(plane, gap_from, deep ? gap_from + kRemainderReach_px - 1 : until);
-      if (deep) consider(plane, until - kRemainderReach_px + 1, until);
+    if (first_plane <= last_plane) {
+      const bool deep = until - gap_from >= 2 * kRemainderReach_px;
+      const std::int32_t upper_end = deep ? gap_from + kRemainderReach_px - 1 : until;
+      const std::int32_t lower_start = until - kRemainderReach_px + 1;
+      const Depths upper = depths_of(column, gap_from, upper_end);
+      const Depths lower = deep ? depths_of(column, lower_start, until) : upper;
+      for (std::size_t p = first_plane; p <= last_plane; ++p) {
+        const auto plane = static_cast<std::uint8_t>(p);
+        consider(plane, gap_from, upper_end, upper);
+        if (deep) consider(plane, lower_start, until, lower);
+      }
     }
     if (most < kMinRows || !spans.try_push_back(claimed)) continue;
     std::rotate(spans.begin() + static_cast<std::ptrdiff_t>(k), spans.end() - 1, spans.end());

@@ -139,9 +139,10 @@ void SurfaceBoundaries::sample_noise(std::int32_t column) noexcept {
   for (const ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) {
     const Line line = line_of(planes_[span.plane].plane, column);
     for (std::int32_t r = span.top + 1; r < span.bottom; r += kStride) {
-      if (image_->valid(column, r) == 0) continue;
+      const float w = image_->down(r, column);
+      if (!(w > 0.0F)) continue;
       const Offset at = offset(line, column, r);
-      noise_samples_.add(image_->inverse_depth(column, r), at.off2 / at.variance);
+      noise_samples_.add(w, at.off2 / at.variance);
     }
   }
 }

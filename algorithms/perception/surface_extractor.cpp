@@ -25,13 +25,6 @@ bool usable(const CameraIntrinsics& k) noexcept {
          k.depth_unit_m <= 0.1;
 }
 
-SurfaceKind kind_of(const InversePlane& plane, const Vec3& up, double tilt_rad) noexcept {
-  const double c = plane.normal().dot(up);
-  if (c > math::cos(tilt_rad)) return SurfaceKind::kTread;
-  if (std::abs(c) < math::sin(tilt_rad)) return SurfaceKind::kRiser;
-  return SurfaceKind::kOther;
-}
-
 }  // namespace
 
 bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) noexcept {
@@ -159,14 +152,17 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
         solve_planes();
         if (round_ == 0) {
           merge_planes(true);
-          join_facets();
+          merging_.begin_facets(params_.merging, params_.growing, noise_, planes_);
+        } else {
+          boundaries_.follow();
         }
-        if (round_ == 1) boundaries_.follow();
-        enter(round_ == 0 ? Phase::kSearch : Phase::kPieces);
+        enter(round_ == 0 ? Phase::kFacets : Phase::kPieces);
         ++round_;
         return kMaxPieceUnits;
       }
       return 2;
+    case Phase::kFacets:
+      return facet_step();
     case Phase::kSearch:
       if (row_ == 0) begin_search();
       search_.add_column(picture_.column_rays, picture_.columns, row_,
@@ -217,119 +213,21 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
 void SurfaceExtractor::reduce_row() noexcept {
   std::uint8_t* flags = picture_.flags.row(row_ / 2);
   if (row_ % 2 == 0) {
-    std::fill(flags, flags + picture_.rays.width_px, std::uint8_t{0});
-    body_in_row_ = self_filter_.mark_row(row_ / 2, picture_.rays.width_px, flags);
+    picture_.body_rows[static_cast<std::size_t>(row_ / 2)] =
+        self_filter_.try_mark_row(row_ / 2, picture_.rays.width_px, flags);
   }
+  const bool body = picture_.body_rows[static_cast<std::size_t>(row_ / 2)];
   const std::int32_t columns = picture_.column_rays.columns;
   const ReducedRow reduced =
-      reduce_to_columns(raw_.range, raw_.row(row_), body_in_row_ ? flags : nullptr, columns,
+      reduce_to_columns(raw_.range, raw_.row(row_), body ? flags : nullptr, columns,
                         picture_.columns.inverse_depth.row(row_), picture_.columns.valid.row(row_));
   measured_px_ += reduced.measured_px;
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
   constexpr std::int32_t kBlock = RunSegmentation::kBlock;
   if (row_ % kBlock == kBlock - 1 || row_ + 1 == picture_.column_rays.height_px) {
+    static_assert(kBlock % ColumnImage::kTurn == 0);
+    picture_.columns.turn(row_ - row_ % kBlock, row_);
     runs_.add_rows(row_ - row_ % kBlock, row_);
-  }
-}
-
-void SurfaceExtractor::take_grown_planes() noexcept {
-  boundaries_.begin(params_.boundaries, noise_, picture_.column_rays, view_.intrinsics.fy_px, view_.intrinsics.cy_px,
-                    picture_.columns);
-  counters_.plane_overflow += growing_.overflow();
-  to_plane_.fill(0);
-  planes_.count = std::min(growing_.count(), FramePlanes::kMaxPlanes);
-  for (std::size_t i = 1; i <= planes_.count; ++i) {
-    const GrownPlane& grown = growing_.plane(i);
-    FramePlane& p = planes_[i];
-    p = FramePlane{};
-    p.plane = grown.plane;
-    p.kind = kind_of(grown.plane, view_.camera_up, params_.kind_tilt_rad);
-    p.pixels = grown.pixels;
-    p.alive = true;
-    p.facet = grown.pixels < params_.growing.min_plane_px;
-    p.centre_m = grown.plane.point(grown.mean_ray);
-    to_plane_[i] = static_cast<std::uint8_t>(i);
-  }
-  merge_planes(false);
-  for (std::size_t i = 1; i <= planes_.count; ++i) boundaries_.plane(i).plane = planes_[i].plane;
-}
-
-void SurfaceExtractor::merge_planes(bool measured) noexcept {
-  PlaneMerging::merge_pieces(params_.merging, params_.growing, noise_, planes_, to_plane_, measured);
-}
-
-void SurfaceExtractor::join_facets() noexcept {
-  merging_.join_facets(params_.merging, params_.growing, noise_, boundaries_.columns(), picture_.column_rays.columns,
-                       planes_, to_plane_);
-  for (std::size_t i = 1; i <= planes_.count; ++i) {
-    FramePlane& p = planes_[i];
-    if (p.alive && p.facet) drop(i);
-    if (!p.alive || p.facets == 1) continue;
-    p.kind = kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad);
-    boundaries_.plane(i).plane = p.plane;
-  }
-}
-
-void SurfaceExtractor::begin_search() noexcept {
-  search_.begin(params_.remainder, view_.camera_up);
-  for (std::size_t i = 1; i <= planes_.count; ++i) {
-    const FramePlane& p = planes_[i];
-    if (!p.alive && p.facet && p.kind != SurfaceKind::kOther) search_.give_back(i);
-    if (!p.alive) continue;
-    if (p.kind == SurfaceKind::kTread) search_.know_level(p.plane);
-    if (p.kind == SurfaceKind::kRiser) search_.know_upright(p.plane, p.pixels);
-  }
-}
-
-void SurfaceExtractor::take_found_planes() noexcept {
-  search_.finish();
-  first_found_ = planes_.count + 1;
-  for (const InversePlane& found : search_.found()) {
-    if (planes_.count == FramePlanes::kMaxPlanes) {
-      ++counters_.plane_overflow;
-      break;
-    }
-    FramePlane& p = planes_[++planes_.count];
-    p = FramePlane{};
-    p.plane = found;
-    p.kind = kind_of(found, view_.camera_up, params_.kind_tilt_rad);
-    p.alive = true;
-    boundaries_.plane(planes_.count).plane = found;
-  }
-}
-
-void SurfaceExtractor::drop(std::size_t plane) noexcept {
-  planes_[plane].alive = false;
-  for (std::uint8_t& p : to_plane_) p = p == plane ? std::uint8_t{0} : p;
-}
-
-void SurfaceExtractor::solve_planes() noexcept {
-  constexpr double kLeast_px = 64.0;
-  double explained_px = 0.0, seen_px = 0.0;
-  for (std::size_t i = 1; i <= planes_.count; ++i) {
-    if (!planes_[i].alive) continue;
-    explained_px += boundaries_.plane(i).moments.count;
-    seen_px += boundaries_.plane(i).seen_px;
-  }
-  // While planes are rough, what they do not explain says little.
-  const double all_share = round_ == 1 ? explained_px / std::max(seen_px, 1.0) : 0.0;
-  const double least_share = params_.min_explained * all_share, least_curved = params_.min_explained_curved * all_share;
-  for (std::size_t i = 1; i <= planes_.count; ++i) {
-    FramePlane& p = planes_[i];
-    if (!p.alive) continue;
-    const SurfaceBoundaries::Plane& fitted = boundaries_.plane(i);
-    p.moments = fitted.moments;
-    p.residual2 = fitted.residual2;
-    const double least = p.facets > 1 ? least_curved : least_share;
-    if (p.moments.count < kLeast_px || p.moments.count < least * fitted.seen_px ||
-        !try_solve_leaning(params_.planes, noise_, p.moments, view_.camera_up, p.plane, &p.covariance)) {
-      drop(i);
-      continue;
-    }
-    p.kind = kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad);
-    p.pixels = p.moments.count;
-    p.centre_m = p.plane.point(p.moments.mean_ray());
-    boundaries_.plane(i).plane = p.plane;
   }
 }
 
@@ -399,8 +297,7 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   };
   for (std::int32_t g = 0; g < picture_.column_rays.columns; ++g) {
     const std::int32_t end = end_of(g), far = end + down * kProbe_px;
-    if (end < 0 || far < 0 || far >= picture_.column_rays.height_px ||
-        (picture_.flags(kColumn_px / 2 * g, far / 2) & kPixelBody) != 0)
+    if (end < 0 || far < 0 || far >= picture_.column_rays.height_px || picture_.body(kColumn_px / 2 * g, far / 2))
       continue;
     std::uint8_t& found = beyond[static_cast<std::size_t>(g)];
     for (std::int32_t r = end + down; found == 0 && r != far + down; r += down) found = picture_.owner(g, r);

@@ -106,7 +106,7 @@ class SurfaceExtractor {
   [[nodiscard]] std::size_t surface_at(std::int32_t column, std::int32_t row,
                                        const std::uint16_t* depth = nullptr) const noexcept;
   [[nodiscard]] bool body_at(std::int32_t column, std::int32_t row) const noexcept {
-    return (picture_.flags(column, row) & kPixelBody) != 0;
+    return picture_.body(column, row);
   }
 
   // What the next step begins with; a benchmark charges time to it.
@@ -119,6 +119,7 @@ class SurfaceExtractor {
     kClaim,
     kMeet,
     kRefit,
+    kFacets,
     kSearch,
     kPieces,
     kProfile,
@@ -143,7 +144,7 @@ class SurfaceExtractor {
   void begin_search() noexcept;
   void take_found_planes() noexcept;
   void merge_planes(bool measured) noexcept;
-  void join_facets() noexcept;
+  std::int32_t facet_step() noexcept;
   void drop(std::size_t plane) noexcept;
   void solve_planes() noexcept;
   void find_pieces() noexcept;
@@ -173,7 +174,6 @@ class SurfaceExtractor {
   bool any_frame_ = false;
   std::int32_t measured_px_ = 0;
   std::int32_t outside_body_px_ = 0;
-  bool body_in_row_ = false;  // in the pair of rows being reduced
 
   SelfFilter self_filter_;
   RawPicture raw_;

@@ -29,12 +29,15 @@ void SurfacePieces::find(SurfaceBoundaries::Columns& columns, std::int32_t colum
   };
   std::uint16_t count = 0;
   for (std::int32_t g = 0; g < column_count; ++g) {
+    std::size_t next = 0;  // on the left, the first span that ends no higher than this one begins
     for (ColumnSpan& span : columns[static_cast<std::size_t>(g)]) {
       span.piece = ++count;
       parent_[count] = count;
       if (g == 0) continue;
-      for (const ColumnSpan& left : columns[static_cast<std::size_t>(g - 1)]) {
-        if (left.top > span.bottom) break;
+      const SurfaceBoundaries::Column& lefts = columns[static_cast<std::size_t>(g - 1)];
+      while (next < lefts.size() && lefts[next].bottom < span.top) ++next;
+      for (std::size_t i = next; i < lefts.size() && lefts[i].top <= span.bottom; ++i) {
+        const ColumnSpan& left = lefts[i];
         if (left.plane != span.plane || left.bottom < span.top) continue;
         const std::uint16_t a = root(left.piece), b = root(span.piece);
         parent_[std::max(a, b)] = std::min(a, b);

@@ -13,7 +13,8 @@ namespace {
 constexpr double kLeastSlope = 0.5;  // sine between a riser and the tread that ends it
 constexpr double kOnLine_m = 0.002;  // a polygon's edge lies on a line
 
-// Adds a row's columns first .. last that are not the robot's own, and the valid pixels in them.
+// Adds a row's columns first .. last that are not the robot's own, and the valid pixels in them. flags: null where
+// nothing is the robot's own.
 void count_pixels(const std::uint8_t* flags, const std::uint8_t* valid, std::int32_t first, std::int32_t last,
                   std::int32_t& free_columns, std::int32_t& valid_px) noexcept {
   using Bytes = cv::v_uint8x16;
@@ -28,6 +29,16 @@ void count_pixels(const std::uint8_t* flags, const std::uint8_t* valid, std::int
               none = cv::v_setzero_u8();
   // No lane gets more than 8 * kColumns / nlanes.
   Bytes free_sum = none, valid_sum = none;
+  if (flags == nullptr) {
+    for (std::int32_t g = first / Bytes::nlanes * Bytes::nlanes; g <= last; g += Bytes::nlanes) {
+      const Bytes index = cv::v_load(kIndices.data() + g);
+      const Bytes wanted = (cv::v_max(index, from) == index) & (cv::v_min(index, to) == index);
+      valid_sum = cv::v_add_wrap(valid_sum, cv::v_load(valid + g) & wanted);
+    }
+    free_columns += last - first + 1;
+    valid_px += static_cast<std::int32_t>(cv::v_reduce_sum(valid_sum));
+    return;
+  }
   for (std::int32_t g = first / Bytes::nlanes * Bytes::nlanes; g <= last; g += Bytes::nlanes) {
     const Bytes index = cv::v_load(kIndices.data() + g);
     const Bytes wanted = (cv::v_max(index, from) == index) & (cv::v_min(index, to) == index);
@@ -80,7 +91,8 @@ double invalid_share(const FramePicture& picture, const PolygonVertices& polygon
         static_cast<std::int32_t>(std::ceil(math::clamp((row.left + 0.5) / (0.5 * kColumn_px) - 0.5, 0.0, kColumns)));
     const auto right = static_cast<std::int32_t>(
         std::floor(math::clamp((row.right + 0.5) / (0.5 * kColumn_px) - 0.5, -1.0, picture.column_rays.columns - 1.0)));
-    if (left <= right) count_pixels(picture.flags.row(r), picture.columns.valid.row(2 * r), left, right, free, valid);
+    const std::uint8_t* flags = picture.body_rows[static_cast<std::size_t>(r)] ? picture.flags.row(r) : nullptr;
+    if (left <= right) count_pixels(flags, picture.columns.valid.row(2 * r), left, right, free, valid);
   }
   return free > 0 ? 1.0 - static_cast<double>(valid) / (kColumn_px * free) : 0.0;
 }
@@ -102,7 +114,8 @@ EdgeKind SurfacePolygons::judge_edge(const FramePicture& picture, const InverseP
   outward.normalize();
   if (outward.dot(project(middle) - centre) < 0.0) outward = -outward;
   int observed = 0;
-  for (int i = 0; i < kProbes; ++i) {
+  // Until enough of them say so, or too few are left that could.
+  for (int i = 0; i < kProbes && 2 * observed <= kProbes && 2 * (observed + kProbes - i) > kProbes; ++i) {
     const Vec2 on = a + (b - a) * ((i + 0.5) / kProbes);
     // The first measured pixel outside, up to twice the probe's distance; the body or the picture's end before it hides
     // the end of the surface.
@@ -112,11 +125,10 @@ EdgeKind SurfacePolygons::judge_edge(const FramePicture& picture, const InverseP
       const Vec2 p = on + out * outward;
       const auto c = static_cast<std::int32_t>(std::floor(p.x() + 0.5)),
                  r = static_cast<std::int32_t>(std::floor(p.y() + 0.5));
-      if (c < 0 || c >= picture.rays.width_px || r < 0 || r >= picture.rays.height_px ||
-          (picture.flags(c, r) & kPixelBody) != 0)
-        break;
+      if (c < 0 || c >= picture.rays.width_px || r < 0 || r >= picture.rays.height_px || picture.body(c, r)) break;
+      if (out < params_.probe_px) continue;
       const auto w = static_cast<double>(picture.inverse_depth_at(c, r));
-      if (!(w > 0.0) || out < params_.probe_px) continue;
+      if (!(w > 0.0)) continue;
       const double expected = plane.inverse_depth(picture.rays.ray(c, r));
       // Something well in front hides it, unless it stands on the surface right here (a riser's foot).
       const bool hidden = expected > 1e-3 && 1.0 / expected - 1.0 / w > params_.apart_m;

@@ -130,20 +130,23 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
   const RowPlane own(planes[index].plane, noise_, rays, border);
   if (!own.valid) return Ending::kNone;
   // The plane beyond, if there is one.
-  RowPlane other;
+  std::size_t beyond = 0;
   for (std::int32_t g = column + out; g != column + 3 * out; g += out) {
     if (g < 0 || g >= picture_->column_rays.columns) break;
     const std::size_t p = picture_->owner(g, row);
-    if (p != 0 && p != index) other = RowPlane(planes[p].plane, noise_, rays, border);
+    if (p != 0 && p != index) beyond = p;
   }
-  const std::uint8_t* flags = picture_->flags.row(row / 2);
+  const RowPlane other = beyond != 0 ? RowPlane(planes[beyond].plane, noise_, rays, border) : RowPlane();
   const std::uint16_t* pixels = raw_->row(row);
   Raws raw{};
-  std::int32_t count = 0;
-  for (std::int32_t c = first; count < kReach_px && c >= 0 && c < k.width_px; c += out) {
-    if ((flags[c / 2] & kPixelBody) != 0) break;
-    raw[static_cast<std::size_t>(count++)] = pixels[c];
+  std::int32_t count = std::min(kReach_px, right ? k.width_px - first : first + 1);
+  if (picture_->body_rows[static_cast<std::size_t>(row / 2)]) {
+    const std::uint8_t* flags = picture_->flags.row(row / 2);
+    std::int32_t free = 0;
+    while (free < count && (flags[(first + out * free) / 2] & kPixelBody) == 0) ++free;
+    count = free;
   }
+  for (std::int32_t i = 0; i < count; ++i) raw[static_cast<std::size_t>(i)] = pixels[first + out * i];
   if (count < kInside_px) return Ending::kHidden;  // by the robot's own body
   const PixelGains gains = weigh(params_, *raw_, own, other, first, out, raw);
   // The boundary with the least cost; between equally good ones (a pixel without data or of neither) in their middle.

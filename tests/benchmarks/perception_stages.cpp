@@ -91,6 +91,7 @@ ExtractorStage extractor_stage(SurfaceExtractor::Phase phase) noexcept {
     case Phase::kMeet:
       return kMeeting;
     case Phase::kRefit:
+    case Phase::kFacets:
       return kRefit;
     case Phase::kSearch:
       return kRemainder;

@@ -39,8 +39,8 @@ void stage_intake(Workbench& bench);
 void stage_mask(Workbench& bench);
 void stage_columns(Workbench& bench);  // reduction and runs, row by row
 void stage_growing(Workbench& bench);
-void stage_meeting(Workbench& bench);  // runs to intervals, who has which rows, change-points
-void stage_refit(Workbench& bench);
+void stage_meeting(Workbench& bench);    // runs to intervals, who has which rows, change-points
+void stage_refit(Workbench& bench);      // and facets that are joined
 void stage_remainder(Workbench& bench);  // planes in what is left over
 void stage_pieces(Workbench& bench);     // and their profiles
 void stage_polygons(Workbench& bench);   // outlines, nosing and back lines, polygons
