@@ -62,10 +62,10 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
   noise_ = depth_noise_.of(params_.noise);
   runs_.begin(params_.runs, noise_, view.intrinsics, picture_.columns);
   self_filter_.clear();
-  next_.stamp_ns = frame.stamp_ns;
-  next_.sequence = frame.sequence;
-  next_.surfaces.clear();
-  next_.dropped = 0;
+  next().stamp_ns = frame.stamp_ns;
+  next().sequence = frame.sequence;
+  next().surfaces.clear();
+  next().dropped = 0;
   measured_px_ = outside_body_px_ = 0;
   planes_.count = 0;
   round_ = 0;
@@ -99,7 +99,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
     case Phase::kMask:
       self_filter_.add_shape(picture_.rays, view_.body, view_.body_margin, index_);
       if (++index_ == SelfFilter::kShapes) enter(Phase::kReduce);
-      return 20;
+      return kMaxPieceUnits;
     case Phase::kReduce:
       reduce_row();
       if (++row_ == picture_.column_rays.height_px) {
@@ -160,7 +160,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
         ++round_;
         return kMaxPieceUnits;
       }
-      return 2;
+      return 8;
     case Phase::kFacets:
       return facet_step();
     case Phase::kSearch:
@@ -174,8 +174,14 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       }
       return 1;
     case Phase::kPieces:
-      find_pieces();
-      enter(Phase::kProfile);
+      if (!started_) {
+        counters_.run_overflow += boundaries_.overflow();
+        pieces_.find(boundaries_.columns(), picture_.column_rays.columns);
+        started_ = true;
+      } else {
+        join_pieces();
+        enter(Phase::kProfile);
+      }
       return kMaxPieceUnits;
     case Phase::kProfile:
       profiles_.add_column(boundaries_.columns(), pieces_, planes_, row_, picture_);
@@ -190,7 +196,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       return side_step();
     case Phase::kOutline:
       outline();
-      return 20;
+      return 5;
     case Phase::kNosing:
       return line_step(true);
     case Phase::kBack:
@@ -200,7 +206,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       const std::size_t next = index_ + 1;
       enter(Phase::kSides);
       index_ = next;
-      return 20;
+      return 10;
     }
     case Phase::kFinish:
       finish();
@@ -239,12 +245,10 @@ std::size_t SurfaceExtractor::surface_at(std::int32_t column, std::int32_t row,
   return planes_[pixel_owner(picture_, raw, noise_, planes_, column, row)].surface;
 }
 
-void SurfaceExtractor::find_pieces() noexcept {
-  counters_.run_overflow += boundaries_.overflow();
-  pieces_.find(boundaries_.columns(), picture_.column_rays.columns);
+void SurfaceExtractor::join_pieces() noexcept {
   counters_.run_overflow += pieces_.overflow();
   counters_.plane_overflow += pieces_.join(params_.pieces, boundaries_, picture_, planes_);
-  profiles_.begin(planes_.count, picture_);
+  profiles_.begin(planes_);
   side_finder_.begin(params_.sides, noise_, raw_, picture_, planes_);
 }
 
@@ -369,19 +373,19 @@ void SurfaceExtractor::build_polygon() noexcept {
     ++counters_.no_polygon;
     return;
   }
-  if (!next_.surfaces.try_push_back(patch)) {
-    ++next_.dropped;
+  if (!next().surfaces.try_push_back(patch)) {
+    ++next().dropped;
     ++counters_.plane_overflow;
     own.alive = false;
     return;
   }
-  own.surface = static_cast<std::uint8_t>(next_.surfaces.size());
+  own.surface = static_cast<std::uint8_t>(next().surfaces.size());
 }
 
 void SurfaceExtractor::finish() noexcept {
   if (measured_px_ > 0) depth_noise_.follow(params_.depth_noise, params_.noise, boundaries_.noise_samples());
-  next_.invalid_fraction = outside_body_px_ > 0 ? 1.0 - static_cast<double>(measured_px_) / outside_body_px_ : 1.0;
-  result_ = next_;
+  next().invalid_fraction = outside_body_px_ > 0 ? 1.0 - static_cast<double>(measured_px_) / outside_body_px_ : 1.0;
+  done_ = 1 - done_;
   raw_.depth = nullptr;  // the driver's again
 }
 

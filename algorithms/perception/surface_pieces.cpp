@@ -88,7 +88,7 @@ bool SurfacePieces::apart(double apart_m, const FramePicture& picture, const Pie
   constexpr int kEnough = 3;
   const Vec2 from = Vec2{a.sum_column, a.sum_row} / a.area_px, to = Vec2{b.sum_column, b.sum_row} / b.area_px;
   int elsewhere = 0;
-  for (int i = 0; i <= kProbes; ++i) {
+  for (int i = 0; i <= kProbes && elsewhere < kEnough; ++i) {
     const Vec2 p = from + (to - from) * (static_cast<double>(i) / kProbes);
     const auto c = static_cast<std::int32_t>(p.x() + 0.5), r = static_cast<std::int32_t>(p.y() + 0.5);
     const float w = picture.inverse_depth_at(c, r);
@@ -132,17 +132,21 @@ std::uint32_t SurfacePieces::join(const Params& params, const SurfaceBoundaries&
     planes[p].main_piece = 0;
     planes[p].piece_px = 0.0;
   }
-  std::array<std::uint8_t, kMaxPieces + 1> order{};
-  for (std::size_t k = 1; k <= piece_count_; ++k) order[k] = static_cast<std::uint8_t>(k);
-  std::sort(order.begin() + 1, order.begin() + 1 + static_cast<std::ptrdiff_t>(piece_count_),
-            [this](std::uint8_t a, std::uint8_t b) {
-              return pieces_[a].area_px != pieces_[b].area_px ? pieces_[a].area_px > pieces_[b].area_px : a < b;
-            });
-  for (std::size_t i = 1; i <= piece_count_; ++i) {
-    Piece& piece = pieces_[order[i]];
+  StaticVector<std::uint8_t, kMaxPieces> order;
+  for (std::size_t k = 1; k <= piece_count_; ++k) {
+    if (pieces_[k].area_px < params.min_component_px || !planes[pieces_[k].plane].alive) {
+      pieces_[k].plane = 0;
+    } else {
+      static_cast<void>(order.try_push_back(static_cast<std::uint8_t>(k)));
+    }
+  }
+  std::sort(order.begin(), order.end(), [this](std::uint8_t a, std::uint8_t b) {
+    return pieces_[a].area_px != pieces_[b].area_px ? pieces_[a].area_px > pieces_[b].area_px : a < b;
+  });
+  for (const std::uint8_t number : order) {
+    Piece& piece = pieces_[number];
     const std::uint8_t source = piece.plane;
     piece.plane = 0;
-    if (piece.area_px < params.min_component_px || !planes[source].alive) continue;
     for (std::size_t p = 1; p <= planes.count && piece.plane == 0; ++p) {
       const FramePlane& plane = planes[p];
       if (plane.source != source) continue;
@@ -165,7 +169,7 @@ std::uint32_t SurfacePieces::join(const Params& params, const SurfaceBoundaries&
     }
     FramePlane& plane = planes[piece.plane];
     if (plane.main_piece == 0) {
-      plane.main_piece = order[i];
+      plane.main_piece = number;
       const Vec3 ray = picture.rays.ray(piece.sum_column / piece.area_px, piece.sum_row / piece.area_px);
       if (plane.plane.inverse_depth(ray) > 1e-3) plane.centre_m = plane.plane.point(ray);
     }

@@ -5,9 +5,10 @@
 
 namespace polygmap {
 
-void SurfaceProfiles::begin(std::size_t planes, FramePicture& picture) noexcept {
-  picture.owners.fill(0);
-  for (std::size_t p = 1; p <= planes; ++p) profiles_[p] = SurfaceProfile{};
+void SurfaceProfiles::begin(const FramePlanes& planes) noexcept {
+  for (std::size_t p = 1; p <= planes.count; ++p) {
+    if (planes[p].alive) profiles_[p] = SurfaceProfile{};
+  }
 }
 
 void SurfaceProfiles::add_column(const SurfaceBoundaries::Columns& columns, const SurfacePieces& pieces,
@@ -34,11 +35,12 @@ void SurfaceProfiles::add_column(const SurfaceBoundaries::Columns& columns, cons
     }
     if (row <= span.bottom) end_at(row, span.bottom + 1);
   };
+  std::uint8_t* owners = picture.owners.row(column);
+  std::fill(owners, owners + kDepthHeight_px, std::uint8_t{0});
   std::size_t next_left = 0, next_right = 0;
   for (const ColumnSpan& span : columns[static_cast<std::size_t>(column)]) {
     const std::uint8_t surface = surface_of(span);
     if (surface == 0) continue;
-    std::uint8_t* owners = picture.owners.row(column);
     std::fill(owners + span.top, owners + span.bottom + 1, surface);
     SurfaceProfile& profile = profiles_[surface];
     profile.columns[static_cast<std::size_t>(column)].add(span.top, span.bottom);

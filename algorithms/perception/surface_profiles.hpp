@@ -14,7 +14,7 @@ namespace polygmap {
 
 class SurfaceProfiles {
  public:
-  void begin(std::size_t planes, FramePicture& picture) noexcept;
+  void begin(const FramePlanes& planes) noexcept;
   // Columns come from left to right. Writes the column's owners into the picture.
   void add_column(const SurfaceBoundaries::Columns& columns, const SurfacePieces& pieces, const FramePlanes& planes,
                   std::int32_t column, FramePicture& picture) noexcept;
