@@ -132,6 +132,7 @@ void ControlLane::report_gait(std::int64_t now_ns) noexcept {
   health_.raise(Limit::kReachLimited, now_ns, now.ik_limited_ticks - gait_seen_.ik_limited_ticks);
   health_.raise(Limit::kContactEarly, now_ns, now.early_contacts - gait_seen_.early_contacts);
   health_.raise(Limit::kContactLate, now_ns, now.late_contacts - gait_seen_.late_contacts);
+  health_.raise(Limit::kFootPutBack, now_ns, now.put_back - gait_seen_.put_back);
   if (now.phase == GaitPhase::kStopped && gait_seen_.phase != GaitPhase::kStopped) {
     health_.raise(Fault::kGaitStopped, now_ns);
     if (now.stop_reason == Obstruction::kMapStale) health_.raise(Fault::kMapStale, now_ns);

@@ -48,6 +48,7 @@ enum class Limit : std::uint8_t {
   kContactLate,
   kRunsFull,        // runs, intervals and pairs of planes of a frame that found no room
   kHeightRejected,  // a mapped tread's height that disagrees with the sole that landed on it
+  kFootPutBack,     // a foot went back in the air to where it had stood
   kEnd,             // not a limit
 };
 
@@ -79,8 +80,9 @@ inline constexpr std::array<std::string_view, kCodeCount<Fault>> kFaultNames{"fr
                                                                              "state_stale",
                                                                              "gait_stopped"};
 inline constexpr std::array<std::string_view, kCodeCount<Limit>> kLimitNames{
-    "row_shed",       "row_deferred",  "frame_caught_up", "planes_full",  "map_full",  "state_ring_missed",
-    "depth_unplaced", "reach_limited", "contact_early",   "contact_late", "runs_full", "height_rejected"};
+    "row_shed",          "row_deferred",    "frame_caught_up", "planes_full",   "map_full",
+    "state_ring_missed", "depth_unplaced",  "reach_limited",   "contact_early", "contact_late",
+    "runs_full",         "height_rejected", "foot_put_back"};
 static_assert(!kFaultNames.back().empty() && !kLimitNames.back().empty(), "a code without a name");
 
 // "unknown" outside the enumeration.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The wiring, on fakes fed by hand: every fault and limit that firmware raises by itself, raised (kReachLimited,
-// kContactEarly and kContactLate repeat the gait's counters, which its own tests raise); no heap call, init included;
+// kContactEarly, kContactLate and kFootPutBack repeat the gait's counters, which its own tests raise); no heap call, init included;
 // static memory within its budget.
 #include "firmware/pipeline.hpp"
 

@@ -463,14 +463,17 @@ TEST(PhysicalClimb, OtherBodyOrGroundThanBelieved_ClimbsAllTheSame) {
 }
 
 // Of both steps onto a tread, from the first lift-off on: the module is still climbing when each push comes.
-TEST(PhysicalClimb, PushedAnyWayAtEightMomentsOfAStair_DoesNotFall) {
-  PhysicalClimb calm(few_steps(2));
+class Pushed : public testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(Pushed, AnyWayAtEightMomentsOfAStair_DoesNotFall) {
+  const std::uint64_t seed = GetParam();
+  PhysicalClimb calm(few_steps(seed));
   ASSERT_TRUE(run_to_swing_onto(calm, 1));
   const double begin_s = calm.time_s();
   for (int moment = 0; moment < 8; moment += test::kSlowMachine ? 4 : 1) {
     for (const int axis : {0, 1}) {
       for (const double impulse_ns : {10.0, -10.0}) {
-        SimOptions options = few_steps(2);
+        SimOptions options = few_steps(seed);
         options.pushes = {{.at_s = begin_s + 0.32 * moment, .axis = axis, .impulse_ns = impulse_ns}};
         PhysicalClimb climb(options);
         climb.run(options.pushes.front().at_s - climb.time_s());
@@ -485,6 +488,7 @@ TEST(PhysicalClimb, PushedAnyWayAtEightMomentsOfAStair_DoesNotFall) {
     }
   }
 }
+INSTANTIATE_TEST_SUITE_P(Seeds, Pushed, testing::Values(2, 3, 4));
 
 }  // namespace
 }  // namespace polygmap::sim

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include "algorithms/core/math.hpp"
 #include "algorithms/core/samples.hpp"
@@ -21,6 +22,10 @@ struct Foothold {
   std::uint32_t polygon_id = 0;
   std::int64_t last_seen_ns = 0;   // exposure of the last frame that saw the polygon
   double nosing_distance_m = 0.0;  // along the foot axis from the mapped nosing to the sole frame's origin
+  // Signed: from the contact rectangle across to what is mapped of the tread on the left and on the right; +inf:
+  // unknown.
+  std::array<double, kFootCount> side_room_m{std::numeric_limits<double>::infinity(),
+                                             std::numeric_limits<double>::infinity()};
 };
 
 // Why the climb does not go on: what the search found in the map's way, or from kLegsCannot on what the gait met.

@@ -45,6 +45,7 @@ struct GaitStatus {
   std::uint32_t ik_limited_ticks = 0;        // ticks in which a leg could not reach what was asked
   std::uint32_t early_contacts = 0;
   std::uint32_t late_contacts = 0;
+  std::uint32_t put_back = 0;  // feet that turned back in the air to where they had stood
 };
 
 }  // namespace polygmap

@@ -248,6 +248,12 @@ Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, 
   out.polygon_id = tread.id;
   out.last_seen_ns = tread.last_seen_ns;
   out.nosing_distance_m = along_m;
+  for (const FootLimit& edge : tread.edges) {
+    if (!edge.side) continue;
+    const double across = edge.inside.inward.dot(tread.left);
+    double& room_m = out.side_room_m[index_of(across < 0.0 ? Foot::kLeft : Foot::kRight)];
+    room_m = std::min(room_m, edge.clearance_m(p) / std::abs(across));
+  }
   return out;
 }
 

@@ -225,6 +225,11 @@ bool ClimbPlanner::shorten_floor_steps() noexcept {
   return stride_share_ > kShortest;
 }
 
+void ClimbPlanner::passing_ends_beside(const StepGoal& goal) noexcept {
+  latched_.goal = goal;
+  leading_ = other(goal.foot);
+}
+
 void ClimbPlanner::landed() noexcept {
   stride_share_ = 1.0;
   switch (latched_.goal.kind) {

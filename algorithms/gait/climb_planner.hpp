@@ -57,8 +57,11 @@ class ClimbPlanner {
   bool shorten_floor_steps() noexcept;
   // The legs cannot pass the standing foot: the next step ends beside it.
   void refuse_passing() noexcept { passing_refused_ = true; }
+  // The passing foot that is in the air lands beside the standing one instead.
+  void passing_ends_beside(const StepGoal& goal) noexcept;
   // Its foot stands.
   void landed() noexcept;
+  [[nodiscard]] std::uint32_t tread_id() const noexcept { return tread_id_; }  // under the foot that landed last
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
 
  private:

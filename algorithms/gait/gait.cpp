@@ -9,6 +9,7 @@ namespace polygmap {
 namespace {
 
 constexpr std::int32_t kLower_ticks = 200;  // of the torso where a foot needs a longer leg
+constexpr std::int32_t kCrouch_ticks = 125;
 constexpr double kInward_m = 0.01;
 constexpr double kSpare_m = 0.02;               // of its height: the base is not right over the centre of mass
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
@@ -56,7 +57,8 @@ void Gait::carry_plan_to_odometry() noexcept {
   for (Transform& sole : plan_T_sole_) sole = odom_T_plan * sole;
   plan_T_base_ = odom_T_plan * plan_T_base_;
   torso_state_ = TorsoTrajectory::placed(torso_state_, plan_T_base_, (plan_T_base_ * reference_p_com_m_).head<2>());
-  link_motion_.carry(odom_T_plan);
+  plan_T_landed_ = odom_T_plan * plan_T_landed_;
+  posture_.carry(odom_T_plan);
   correction_.reset();
 }
 
@@ -66,9 +68,7 @@ void Gait::start(const StateEstimate& state) noexcept {
     plan_T_sole_[index_of(leg)] = plan_T_base_ * joints_.base_T_sole_reference(leg);
   }
   torso_state_ = TorsoTrajectory::placed({}, plan_T_base_, (plan_T_base_ * reference_p_com_m_).head<2>());
-  nominal_rad_ = joints_.reference_rad();
-  nominal_p_com_m_ = reference_p_com_m_;
-  link_motion_.restart();
+  posture_.reset(joints_.reference_rad(), reference_p_com_m_);
   started_ = true;
   begin_hold();
 }
@@ -88,26 +88,11 @@ Transform Gait::plan_T_base_over(const TorsoTrajectory::State& state) const noex
   return base;
 }
 
-// The posture as planned, without the steering: its second differences are smooth.
 void Gait::observe_links() noexcept {
-  const std::size_t f = index_of(decision_.goal.foot);
   std::array<Transform, kFootCount> plan_T_sole = plan_T_sole_;
-  const bool swings = activity_ == Activity::kSwing || activity_ == Activity::kRetreat;
-  if (swings) plan_T_sole[f] = swing_.at(motion_tick());
-  Transform plan_T_base;
-  PerLink base_p_links;
-  const int passes = link_motion_.restarted() ? 4 : 1;  // the base follows the legs' places and they the base
-  for (int i = 0; i < passes; ++i) {
-    plan_T_base = TorsoTrajectory::pose(torso_state_);
-    plan_T_base.p_m.head<2>() -= (plan_T_base.R * nominal_p_com_m_).head<2>();
-    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-      const LegSolution s = solve_leg(params_.geometry, leg, plan_T_base.inverse() * plan_T_sole[index_of(leg)]);
-      nominal_rad_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
-    }
-    base_p_links = base_p_links_m(params_.balance.masses, body_frames(params_.geometry, nominal_rad_));
-    nominal_p_com_m_ = centre_of_mass_m(params_.balance.masses, base_p_links);
-  }
-  link_acceleration_ = link_motion_.update(plan_T_base, base_p_links, nominal_rad_);
+  if (activity_ == Activity::kSwing) plan_T_sole[index_of(decision_.goal.foot)] = swing_.at(pace_.tick());
+  if (settles_) plan_T_sole[index_of(status_.step.foot)] = plan_T_landed_;
+  link_acceleration_ = posture_.update(params_.geometry, params_.balance.masses, torso_state_, plan_T_sole);
 }
 
 void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept {
@@ -176,10 +161,16 @@ void Gait::rest_over(const Vec2& plan_p_m) noexcept {
   com_tick_ = 0;
 }
 
+// A body off its plan needs longer legs than planned.
+double Gait::crouch_m() const noexcept {
+  const double off_m = dcm_error_m_.norm();
+  return off_m > params_.pace.topples_m ? std::min(params_.crouch * off_m, params_.crouch_max_m) : 0.0;
+}
+
 void Gait::settle_between_feet() noexcept {
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   TorsoPose middle = torso_between(params_.geometry, params_.step.torso, soles);
-  move_torso(middle.position_m.z(), middle.yaw_rad, params_.settle_ticks, params_.settle_ticks);
+  move_torso(middle.position_m.z() - crouch_m(), middle.yaw_rad, params_.settle_ticks, params_.settle_ticks);
   const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{params_.step.zmp_ahead_m, 0, 0};
   rest_over((middle.position_m + ahead_m).head<2>());
   tick_ = 0;
@@ -210,32 +201,10 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   StepPlan plan = plan_step(params_.step, decision.goal, soles, kStepTries[0]);
   if (again) plan.shift_ticks = params_.reshift_ticks;
-  // Sooner where the weight is on its way already, later where it stands over the other foot with little room to push
-  // off: the first shift that needs a small push.
-  constexpr std::array<std::int32_t, 10> kLonger_ticks{0, -35, -70, 50, 100, 150, 200, 300, 400, 500};
-  const HorizontalMotion com = TorsoTrajectory::horizontal(torso_state_);
-  const Vec2 start_m = ComPlan::zmp_under(params_.step.com, com);
-  const std::int32_t usual_ticks = plan.shift_ticks;
-  const auto try_shift = [&](std::int32_t ticks) {
-    plan.shift_ticks = ticks;
-    com_.plan(params_.step.com, com, zmp_of_shift(params_.step, plan, start_m));
-    return com_.push_m();
-  };
-  std::int32_t best_ticks = usual_ticks;
-  double least_m = 1e9;
-  for (const std::int32_t longer : kLonger_ticks) {
-    const std::int32_t ticks = std::max(usual_ticks + longer, params_.reshift_ticks);
-    const double push_m = try_shift(ticks);
-    if (push_m < least_m) {
-      least_m = push_m;
-      best_ticks = ticks;
-    }
-    if (push_m <= params_.max_push_m) break;
-  }
-  (void)try_shift(best_ticks);
+  plan_shift(params_.step, TorsoTrajectory::horizontal(torso_state_), params_.reshift_ticks, plan, com_);
   shift_ticks_ = plan.shift_ticks;
   plan_torso(params_.geometry, params_.step, soles, com_, shift_ticks_, plan);
-  move_torso(plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
+  move_torso(plan.lift_off.position_m.z() - crouch_m(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
   com_tick_ = 0;
   search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, shift_ticks_, torso_state_,
                 plan_T_sole_);
@@ -273,6 +242,19 @@ bool Gait::close_to_planned(const StepGoal& goal) const noexcept {
          std::abs(math::wrap_angle(goal.target.yaw_rad - planned.target.yaw_rad)) <= params_.absorb_rad;
 }
 
+// One sole can hold that much of an error by moving its pressure, and some more.
+bool Gait::steady() const noexcept {
+  const Foot stance = other(decision_.goal.foot);
+  const Vec2 off_m =
+      (plan_T_sole_[index_of(stance)].R.transpose() * Vec3{dcm_error_m_.x(), dcm_error_m_.y(), 0.0}).head<2>();
+  const PressureLimits& limits = params_.balance.pressure;
+  const double inward_m = params_.step.zmp_inward_m, ahead_m = params_.step.zmp_ahead_m;
+  const double inwards = -side_sign(stance) * off_m.y();
+  const double room_x_m = off_m.x() > 0.0 ? limits.ahead_m - ahead_m : limits.behind_m + ahead_m;
+  const double room_y_m = limits.aside_m + (inwards > 0.0 ? -inward_m : inward_m);
+  return std::abs(off_m.x()) <= params_.steady_share * room_x_m && std::abs(inwards) <= params_.steady_share * room_y_m;
+}
+
 void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexcept {
   if (search_.step() == StepSearch::State::kImpossible) {
     if (decision_.goal.kind == StepKind::kPassing) {
@@ -289,8 +271,10 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
   if (stop_requested_ || lost(state)) return begin_hold();
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
   if (!usable_) return;
-  if (!(dcm_error_m_.norm() <= params_.steady_m)) {
-    if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_hold();
+  if (!steady()) {  // on from where the body is
+    if (tick_ == shift_ticks_)
+      move_torso(torso_state_[2].position - crouch_m(), torso_state_[5].position, kCrouch_ticks, kCrouch_ticks);
+    if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_shift(decision_, true);
     return;
   }
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
@@ -303,132 +287,6 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
   const StepGoal& planned = decision_.goal;
   begin_shift(decision,
               decision.goal.foot == planned.foot && onto_tread(decision.goal.kind) == onto_tread(planned.kind));
-}
-
-void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
-                    const ClimbPlanner::Decision& decision) noexcept {
-  // The leg that carries now puts the base elsewhere than the two of them did: take it from there, and level it.
-  carry_plan_to_odometry();
-  const StepGoal& goal = decision.goal;
-  const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
-  StepPlan plan = plan_step(params_.step, goal, soles, search_.plan().tried);
-  com_.plan(params_.step.com, TorsoTrajectory::horizontal(torso_state_), zmp_of_swing(params_.step, plan));
-  plan_torso(params_.geometry, params_.step, soles, com_, 0, plan);
-  swing_.plan(plan_T_sole_[index_of(goal.foot)], goal.target, plan.shape, plan.swing_ticks);
-  move_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
-  com_tick_ = 0;
-  zmp_stance_m_ = plan.zmp_stance_m;
-  planner_.latched(situation(state), decision);
-  decision_ = decision;
-
-  LatchedStep& step = status_.step;
-  step = {.sequence = step.sequence + 1,
-          .foot = goal.foot,
-          .onto_tread = onto_tread(goal.kind),
-          .latch_stamp_ns = now_ns_,
-          .map_stamp_ns = footholds.map_stamp_ns,
-          .target = goal.foothold,
-          .odom_T_target = goal.target.transform(),
-          .touch_down_stamp_ns = 0,
-          .odom_T_executed = {}};
-  status_.phase = GaitPhase::kSwing;
-  status_.stands[index_of(goal.foot)] = false;
-  activity_ = Activity::kSwing;
-  tick_ = 0;
-  shifts_ = 0;
-  idle_ticks_ = 0;
-  unloaded_ = retried_ = settles_ = false;
-  pace_.begin();
-}
-
-void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noexcept {
-  if (pace_.turns_back()) return retreat(feedback);
-  const Foot foot = decision_.goal.foot;
-  const std::size_t i = index_of(foot);
-  const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
-  if (!loaded) unloaded_ = true;
-  const bool descending = 2.0 * pace_.tick() > swing_.duration_ticks();
-  // What does not go down any more stands on something, whatever its force sensor says.
-  const Transform odom_T_sole = swing_.at(pace_.tick());
-  const double above_m = usable_ ? state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
-  const bool blocked = swing_.lowered_m(pace_.tick()) > params_.late_m && above_m > params_.blocked_m;
-  if ((descending && unloaded_ && loaded) || blocked) {
-    if (swing_.at(pace_.last_tick()).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m)
-      ++status_.early_contacts;
-    if (swing_.lowered_m(pace_.tick()) > params_.late_m) ++status_.late_contacts;
-    return touch_down(state);
-  }
-  // A force that never left or is no longer told: the plan's end is the touch-down.
-  const bool told = now_ns_ - feedback.stamp_ns <= params_.steer_age_ns;
-  if (!(unloaded_ && told) && pace_.tick() > swing_.duration_ticks()) return touch_down(state);
-  if (swing_.lowered_m(pace_.tick()) > params_.max_lowering_m) {  // the ground that was seen is not there
-    ++status_.late_contacts;
-    activity_ = Activity::kRetreat;
-    turn_tick_ = pace_.tick();
-    tick_ = 0;
-    link_motion_.restart();
-    wait_over_stance(sole_pose(correction_.odom_T_plan(plan_T_base_).inverse() * swing_.at(0)));
-    return;
-  }
-  // The ground is late: the leg is to reach farther down.
-  const double late_tick = swing_.duration_ticks() + params_.step.landing_hold_ticks;
-  if (pace_.tick() >= late_tick && pace_.last_tick() < late_tick) {
-    SolePose lowest = sole_pose(plan_T_sole_[i]);
-    lowest.position_m.z() -= params_.max_lowering_m;
-    lower_torso(lowest);
-  }
-  const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
-  plan_T_sole_[i] = plan_T_odom * odom_T_sole;
-  plan_T_sole_[i].p_m += plan_T_sole_[index_of(other(foot))].R.col(1) * (side_sign(foot) * pace_.wider_m());
-}
-
-double Gait::motion_tick() const noexcept {
-  if (activity_ != Activity::kRetreat) return pace_.tick();
-  return turn_tick_ - 0.5 * std::max(tick_ - params_.retreat_pause_ticks, 0);
-}
-
-// The only ground that is known is where the foot stood, and the only way there that is known to be free is the one it
-// came: the swing backwards, at half the speed, since the torso is elsewhere.
-void Gait::retreat(const JointFeedback& feedback) noexcept {
-  const std::size_t i = index_of(decision_.goal.foot);
-  const Transform odom_T_sole = swing_.at(motion_tick());
-  const double above_m = odom_T_sole.p_m.z() - swing_.at(0).p_m.z();
-  const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
-  if ((loaded && above_m < params_.put_back_m) || above_m < -params_.put_back_m) {
-    status_.stands[i] = true;
-    link_motion_.restart();
-    carry_plan_to_odometry();
-    const bool no_ground = activity_ == Activity::kRetreat;
-    status_.phase = GaitPhase::kDoubleSupport;
-    begin_hold();
-    if (no_ground) end(GaitPhase::kStopped, Obstruction::kGroundMissing, 0.0);
-    return;
-  }
-  plan_T_sole_[i] = correction_.odom_T_plan(plan_T_base_).inverse() * odom_T_sole;
-}
-
-void Gait::touch_down(const StateEstimate& state) noexcept {
-  const std::size_t i = index_of(decision_.goal.foot);
-  status_.step.touch_down_stamp_ns = now_ns_;
-  status_.step.odom_T_executed =
-      usable_ ? state.odom_T_sole[i] : correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
-  status_.stands[i] = true;
-  odom_T_landed_ = correction_.odom_T_plan(plan_T_base_) * plan_T_sole_[i];
-  settles_ = true;
-  link_motion_.restart();  // the swing foot is where it was steered to, and stops
-  planner_.landed();
-  status_.treads_climbed = planner_.treads_climbed();
-  status_.phase = GaitPhase::kDoubleSupport;
-  carry_plan_to_odometry();
-  begin_hold();
-}
-
-// Until it is pressed it would go along with what the base is off its plan: 5 mm towards the next riser.
-void Gait::hold_landed_foot(const JointFeedback& feedback) noexcept {
-  const std::size_t i = index_of(status_.step.foot);
-  settles_ =
-      feedback.foot_force_n[i] < params_.hold_force_n && now_ns_ - status_.step.touch_down_stamp_ns < params_.hold_ns;
-  if (settles_) plan_T_sole_[i] = correction_.odom_T_plan(plan_T_base_).inverse() * odom_T_landed_;
 }
 
 void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
@@ -468,25 +326,19 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
     case Activity::kSwing:
       swing(state, feedback);
       break;
-    case Activity::kRetreat:
-      retreat(feedback);
-      break;
     case Activity::kEnd:
       break;
   }
   if (settles_) hold_landed_foot(feedback);
-  if (activity_ == Activity::kSwing) {
-    const StepGoal& goal = decision_.goal;
-    const Vec2 free_side = plan_T_sole_[index_of(other(goal.foot))].R.col(1).head<2>() * side_sign(goal.foot);
-    const bool beside = goal.kind == StepKind::kFloor || goal.kind == StepKind::kLeading;
-    pace_.advance(params_.pace, dcm_error_m_.dot(free_side), beside, swing_.duration_ticks());
-  }
+  if (activity_ == Activity::kSwing) set_pace();
   tick_ = std::min(tick_ + 1, kTickLimit);
   com_tick_ = std::min(com_tick_ + 1, kTickLimit);
   torso_tick_ = std::min(torso_tick_ + 1, kTickLimit);
 
   observe_links();
-  if (joints_.follow(plan_T_base_, plan_T_sole_, status_.stands, command)) ++status_.ik_limited_ticks;
+  const Transform base_T_plan = plan_T_base_.inverse();
+  const std::array<Transform, kFootCount> base_T_sole{base_T_plan * plan_T_sole_[0], base_T_plan * plan_T_sole_[1]};
+  if (joints_.follow(base_T_sole, status_.stands, command)) ++status_.ik_limited_ticks;
   observe_reference();
   add_torques(state, feedback, command);
   status_.odom_p_com_desired_m = balance_.odom_p_com_planned_m();

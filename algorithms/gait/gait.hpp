@@ -11,6 +11,7 @@
 #include "algorithms/gait/base_correction.hpp"
 #include "algorithms/gait/climb_planner.hpp"
 #include "algorithms/gait/joint_reference.hpp"
+#include "algorithms/gait/planned_posture.hpp"
 #include "algorithms/gait/step_plan.hpp"
 #include "algorithms/gait/swing_pace.hpp"
 
@@ -31,7 +32,6 @@ class Gait {
     double absorb_m = 0.015;          // change of a target up to lift-off that needs no new weight shift
     double absorb_rad = 0.035;
     std::int32_t reshift_ticks = 125;          // another weight shift over the same foot for a target that changed more
-    double max_push_m = 0.03;                  // of the zero-moment point, to set off
     std::int32_t max_shifts = 9;               // for one swing
     std::int32_t start_patience_ticks = 1500;  // the same obstruction without a break, before the first step
     std::int32_t patience_ticks = 500;         // and later, or the top: 1 s
@@ -40,13 +40,20 @@ class Gait {
     double touch_force_n = 15.0;
     double hold_force_n = 100.0;            // pressed less, a foot that landed is held where it landed,
     std::int64_t hold_ns = 200 * kNsPerMs;  // not longer: it may be the sensor
-    double steady_m = 0.015;                // of the divergent component's error: beyond it no foot lifts
+    double steady_share = 0.65;             // of the error that one sole can hold: beyond it no foot lifts
     SwingPace::Params pace;
+    double soon_ticks = 100.0;        // of the rest of a swing, straight to its target, when the body topples:
+    double soon_ticks_per_m = 450.0;  // the drives' share
+    double below_m = 0.03;            // not from farther below
+    double beside_from_m = 0.1;       // a passing foot that far behind the standing one lands beside it
+    double crouch = 0.7;              // lower in double support, of the divergent component's error
+    double crouch_max_m = 0.04;
+    double side_margin_m = 0.01;                // of a sole that lands farther out, to the end of its tread
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
-    double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down
+    double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down,
+    double lag_s = 0.015;                       // beyond what it follows behind
     double max_lowering_m = 0.055;              // no ground found: the foot goes back
-    std::int32_t retreat_pause_ticks = 200;     // before it does
     double put_back_m = 0.01;                   // about where it stood: weight counts as the ground; below, it is there
     std::int64_t steer_age_ns = 20 * kNsPerMs;  // of IMU and joint samples: older ones steer nothing and start nothing
     std::int64_t stop_age_ns = 100 * kNsPerMs;  // of the same on two feet: then the gait stops
@@ -66,16 +73,17 @@ class Gait {
   enum class Activity : std::uint8_t {
     kHold,   // both feet stand and nothing is planned: settle between the feet, look for a step
     kShift,  // weight moves over the stance foot
-    kSwing,
-    kRetreat,  // the swing backwards
-    kEnd,      // finished or stopped
+    kSwing,  // on its way or on its way back
+    kEnd,    // finished or stopped
   };
 
   void start(const StateEstimate& state) noexcept;
   void hold(const StateEstimate& state, const FootholdSet& footholds) noexcept;
   void shift(const StateEstimate& state, const FootholdSet& footholds) noexcept;
   void swing(const StateEstimate& state, const JointFeedback& feedback) noexcept;
-  void retreat(const JointFeedback& feedback) noexcept;
+  void put_back(const JointFeedback& feedback) noexcept;
+  void land_soon() noexcept;
+  void set_pace() noexcept;
 
   void observe_reference() noexcept;
   void hold_upright(JointCommand& command) noexcept;
@@ -89,9 +97,9 @@ class Gait {
   void touch_down(const StateEstimate& state) noexcept;
   void hold_landed_foot(const JointFeedback& feedback) noexcept;
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
-  // Of the swing: backwards in a retreat.
-  [[nodiscard]] double motion_tick() const noexcept;
   void carry_plan_to_odometry() noexcept;
+  [[nodiscard]] double crouch_m() const noexcept;
+  [[nodiscard]] bool steady() const noexcept;
   void settle_between_feet() noexcept;
   void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
   void lower_torso(const SolePose& sole) noexcept;
@@ -107,11 +115,9 @@ class Gait {
   ClimbPlanner planner_;
   JointReference joints_;
   Balance balance_;
-  LinkMotion link_motion_;
+  PlannedPosture posture_;
   LinkMotion::Acceleration link_acceleration_;
-  JointVector nominal_rad_ = JointVector::Zero();  // joint angles of the plan, without the steering
-  Vec3 nominal_p_com_m_ = Vec3::Zero();            // its centre of mass, base frame
-  Vec3 reference_p_com_m_ = Vec3::Zero();          // of the posture last asked for, likewise
+  Vec3 reference_p_com_m_ = Vec3::Zero();  // centre of mass of the posture last asked for, base frame
   StepSearch search_;
   BaseCorrection correction_;
   TorsoTrajectory torso_;
@@ -123,14 +129,14 @@ class Gait {
   SwingPace pace_;
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
-  Transform odom_T_landed_;  // the last swing foot as it was asked to be when it landed
+  // The last swing foot as it was asked to be when it landed; in the plan frame it follows no correction.
+  Transform odom_T_landed_, plan_T_landed_;
   ClimbPlanner::Decision decision_;
   GaitStatus status_;
   Activity activity_ = Activity::kHold;
   std::int32_t tick_ = 0;        // of the activity, saturates
   std::int32_t torso_tick_ = 0;  // of the torso's plan, likewise
   std::int32_t com_tick_ = 0;    // of the plan of the centre of mass, likewise
-  double turn_tick_ = 0.0;       // of the swing's path, when the retreat began
   std::int32_t shift_ticks_ = 0;
   std::int32_t shifts_ = 0;  // since the last swing
   Obstruction waiting_for_ = Obstruction::kNone;

@@ -22,13 +22,12 @@ bool JointReference::try_arm(const LegGeometry& geometry, const Params& params, 
   return true;
 }
 
-bool JointReference::follow(const Transform& odom_T_base, const std::array<Transform, kFootCount>& odom_T_sole,
+bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole,
                             const std::array<bool, kFootCount>& stands, JointCommand& command) noexcept {
   constexpr double kRounding_rad = 1e-9;
   bool limited = false;
-  const Transform base_T_odom = odom_T_base.inverse();
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    const LegSolution solution = solve_leg(geometry_, leg, base_T_odom * odom_T_sole[index_of(leg)]);
+    const LegSolution solution = solve_leg(geometry_, leg, base_T_sole[index_of(leg)]);
     const bool solved = math::all_finite(solution.q_rad);
     const double gain = stands[index_of(leg)] ? 1.0 : params_.swing_gain;
     limited = limited || !solution.reachable || !solved;

@@ -25,8 +25,8 @@ class JointReference {
   [[nodiscard]] bool try_arm(const LegGeometry& geometry, const Params& params, const JointVector& q_rad) noexcept;
   // True when a leg could not do what was asked: out of reach, range or speed, or not a number, upon which the leg
   // stays. The command never leaves the limits.
-  bool follow(const Transform& odom_T_base, const std::array<Transform, kFootCount>& odom_T_sole,
-              const std::array<bool, kFootCount>& stands, JointCommand& command) noexcept;
+  bool follow(const std::array<Transform, kFootCount>& base_T_sole, const std::array<bool, kFootCount>& stands,
+              JointCommand& command) noexcept;
   // Repeats the last joint angles, at rest.
   void hold(JointCommand& command) const noexcept;
   [[nodiscard]] const JointVector& reference_rad() const noexcept { return reference_rad_; }

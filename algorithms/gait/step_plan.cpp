@@ -71,6 +71,30 @@ ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2
   return knots;
 }
 
+void plan_shift(const StepParams& params, const HorizontalMotion& from, std::int32_t least_ticks, StepPlan& plan,
+                ComPlan& com) noexcept {
+  constexpr std::array<std::int32_t, 10> kLonger_ticks{0, -35, -70, 50, 100, 150, 200, 300, 400, 500};
+  const Vec2 start_m = ComPlan::zmp_under(params.com, from);
+  const std::int32_t usual_ticks = plan.shift_ticks;
+  const auto try_shift = [&](std::int32_t ticks) {
+    plan.shift_ticks = ticks;
+    com.plan(params.com, from, zmp_of_shift(params, plan, start_m));
+    return com.push_m();
+  };
+  std::int32_t best_ticks = usual_ticks;
+  double least_m = 1e9;
+  for (const std::int32_t longer : kLonger_ticks) {
+    const std::int32_t ticks = std::max(usual_ticks + longer, least_ticks);
+    const double push_m = try_shift(ticks);
+    if (push_m < least_m) {
+      least_m = push_m;
+      best_ticks = ticks;
+    }
+    if (push_m <= params.max_push_m) break;
+  }
+  (void)try_shift(best_ticks);
+}
+
 StepKnots::StepKnots(const LegGeometry& geometry, const StepParams& params, const StepPlan& step,
                      const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept
     : foot_(step.goal.foot),

@@ -59,8 +59,9 @@ struct StepParams {
   std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
   ComPlan::Params com;
+  double max_push_m = 0.03;              // of the zero-moment point, to set off
   double zmp_ahead_m = 0.0;              // of the ankle: what it holds ahead and behind is the same
-  double zmp_inward_m = 0.022;           // and towards the other foot
+  double zmp_inward_m = 0.025;           // and towards the other foot
   std::int32_t landing_hold_ticks = 50;  // the foot may land that much late before the weight sets off for it
   std::int32_t lift_hold_ticks = 15;     // and the weight is over the stance foot that long before the other one lifts
   std::int32_t leave_ticks = 30;         // the rear leg still reaches the ground so long after its foot has left it
@@ -107,6 +108,11 @@ void plan_torso(const LegGeometry& geometry, const StepParams& params, const Sol
 // Zero-moment points of a step whose shift begins with one at start_m, and from its lift-off on.
 [[nodiscard]] ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2& start_m) noexcept;
 [[nodiscard]] ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept;
+// Sets plan.shift_ticks, not below least_ticks, and plans the centre of mass on from `from`. As plan.shift_ticks was,
+// sooner where the weight is on its way already, or later where it stands over the other foot with little room to push
+// off: the first that needs a small push.
+void plan_shift(const StepParams& params, const HorizontalMotion& from, std::int32_t least_ticks, StepPlan& plan,
+                ComPlan& com) noexcept;
 
 // Eq. (30): one of the N knots of a step; eq. (37): t_i = i dt.
 struct StepKnot {

@@ -7,6 +7,7 @@ namespace polygmap {
 
 void Swing::plan(const Transform& start, const SolePose& target, const SwingShape& shape,
                  std::int32_t duration_ticks) noexcept {
+  redirected_ = false;
   start_m_ = start.p_m;
   start_yaw_rad_ = yaw_of(start.R);
   start_pitch_rad_ = math::asin(math::clamp(-start.R(2, 0), -1.0, 1.0));
@@ -20,6 +21,44 @@ void Swing::plan(const Transform& start, const SolePose& target, const SwingShap
   const double landing_s = duration_ticks_ * kTick_s * (1.0 - shape.landing_begin) - approach_s_;
   landing_ = Quintic({apex_m_, 0.0, 0.0}, {target.position_m.z() + shape.approach_m, -shape.approach_mps, 0.0},
                      std::max(landing_s, kTick_s));
+}
+
+void Swing::redirect(double tick, double pace, const SolePose& target, std::int32_t duration_ticks) noexcept {
+  constexpr double kUpShare = 0.4;
+  const Transform now = at(tick), before = at(tick - pace);
+  const Vec3 v_mps = (now.p_m - before.p_m) / kTick_s;
+  const double pitch_rad = math::asin(math::clamp(-now.R(2, 0), -1.0, 1.0));
+  const double before_rad = math::asin(math::clamp(-before.R(2, 0), -1.0, 1.0));
+  const double whole_s = duration_ticks * kTick_s - approach_s_;
+  // Over the nosing of the target's tread, and high enough to stop the rise.
+  const double apex_m = std::max(target.position_m.z() + shape_.clearance_m,
+                                 now.p_m.z() + std::max(v_mps.z(), 0.0) * kUpShare * whole_s * 0.4);
+  other_.up_s = kUpShare * whole_s;
+  other_.up = Quintic({now.p_m.z(), v_mps.z(), 0.0}, {apex_m, 0.0, 0.0}, other_.up_s);
+  other_.down = Quintic({apex_m, 0.0, 0.0}, {target.position_m.z() + shape_.approach_m, -shape_.approach_mps, 0.0},
+                        whole_s - other_.up_s);
+  other_.x = Quintic({now.p_m.x(), v_mps.x(), 0.0}, {target.position_m.x()}, whole_s);
+  other_.y = Quintic({now.p_m.y(), v_mps.y(), 0.0}, {target.position_m.y()}, whole_s);
+  other_.pitch = Quintic({pitch_rad, (pitch_rad - before_rad) / kTick_s, 0.0}, {0.0}, whole_s);
+  other_.yaw_rad = yaw_of(now.R);
+  target_ = target;
+  duration_ticks_ = std::max(duration_ticks, 1);
+  redirected_ = true;
+}
+
+Transform Swing::redirected_at(double tick) const noexcept {
+  const double t_s = tick * kTick_s, to_end_s = duration_ticks_ * kTick_s - t_s;
+  const double turned = smooth_step(tick / duration_ticks_);
+  Transform sole;
+  sole.p_m = {other_.x.at(t_s).position, other_.y.at(t_s).position, 0.0};
+  if (to_end_s <= approach_s_) {
+    sole.p_m.z() = target_.position_m.z() + to_end_s * shape_.approach_mps;
+  } else {
+    sole.p_m.z() = t_s < other_.up_s ? other_.up.at(t_s).position : other_.down.at(t_s - other_.up_s).position;
+  }
+  const double yaw_rad = other_.yaw_rad + turned * math::wrap_angle(target_.yaw_rad - other_.yaw_rad);
+  sole.R = rotation_zyx(yaw_rad, other_.pitch.at(t_s).position, 0.0);
+  return sole;
 }
 
 double Swing::height_m(double tick) const noexcept {
@@ -39,6 +78,7 @@ double Swing::lowered_m(double tick) const noexcept { return (tick - duration_ti
 // at full speed; here both halves start and end smoothly. Eq. (33): start to end in a share of the time; the printed
 // constant speed would meet the riser, so the motion waits for the rise and ends before the landing.
 Transform Swing::at(double tick) const noexcept {
+  if (redirected_) return redirected_at(tick);
   const SwingShape& s = shape_;
   const double u = tick / duration_ticks_;
   const double forward = smooth_window(u, s.forward_begin, s.forward_end);

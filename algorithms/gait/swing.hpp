@@ -32,16 +32,27 @@ class Swing {
   // start may be tilted a little; target is flat. duration_ticks: until the target height is reached.
   void plan(const Transform& start, const SolePose& target, const SwingShape& shape,
             std::int32_t duration_ticks) noexcept;
+  // Leaves the path at that tick, reached at that pace (ticks of the path in a tick), for another one to a flat target:
+  // ticks count from 0 again.
+  void redirect(double tick, double pace, const SolePose& target, std::int32_t duration_ticks) noexcept;
   // Pose of the sole. After duration_ticks, and before 0 on the way back, the foot goes on downwards at approach_mps:
   // the caller ends it.
   [[nodiscard]] Transform at(double tick) const noexcept;
   [[nodiscard]] std::int32_t duration_ticks() const noexcept { return duration_ticks_; }
+  [[nodiscard]] double approach_mps() const noexcept { return shape_.approach_mps; }
   // How far below the target it has been lowered, m; negative before the end.
   [[nodiscard]] double lowered_m(double tick) const noexcept;
 
  private:
   // Eq. (32) made continuous: height of the lowest point of the foot.
   [[nodiscard]] double height_m(double tick) const noexcept;
+
+  // Another way: along, across, pitch; up and down again.
+  struct Redirected {
+    Quintic x, y, pitch, up, down;
+    double yaw_rad = 0.0, up_s = 0.0;
+  };
+  [[nodiscard]] Transform redirected_at(double tick) const noexcept;
 
   Vec3 start_m_ = Vec3::Zero();
   double start_yaw_rad_ = 0.0, start_pitch_rad_ = 0.0, start_roll_rad_ = 0.0;
@@ -52,6 +63,8 @@ class Swing {
   Quintic landing_;
   double approach_s_ = 0.0;
   std::int32_t duration_ticks_ = 1;
+  Redirected other_;
+  bool redirected_ = false;
 };
 
 }  // namespace polygmap
