@@ -133,6 +133,16 @@ class SurfaceBoundaries {
   // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
   void weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
                    ColumnSpan& claimed) const noexcept;
+  struct Gap {  // rows of a column between spans of two planes, 0 = none
+    std::int32_t column, from, until;
+    std::uint8_t above, below;
+    [[nodiscard]] bool may_be(std::uint8_t plane) const noexcept { return plane != above && plane != below; }
+  };
+  // A plane for rows top .. bottom of the gap, whose depths are known; or several planes for its ends.
+  void consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom, const Depths& depths,
+                std::int32_t& most, ColumnSpan& claimed) const noexcept;
+  void consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
+                ColumnSpan& claimed) const noexcept;
   // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
   struct Strip {
     std::array<std::int16_t, kRefitColumns> top{}, bottom{};

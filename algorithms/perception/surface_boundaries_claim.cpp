@@ -116,6 +116,30 @@ bool SurfaceBoundaries::reaches(std::int32_t column, std::uint8_t plane, std::in
   return std::max(at_top, at_bottom) + most >= depths.farthest && std::min(at_top, at_bottom) - most <= depths.nearest;
 }
 
+void SurfaceBoundaries::consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
+                                 const Depths& depths, std::int32_t& most, ColumnSpan& claimed) const noexcept {
+  if (!gap.may_be(plane) || bottom - top < most || !reaches(gap.column, plane, top, bottom, depths)) return;
+  ColumnSpan candidate;
+  candidate.plane = plane;
+  candidate.top = static_cast<std::int16_t>(top);
+  candidate.bottom = static_cast<std::int16_t>(bottom);
+  weigh_claim(gap.column, candidate, most, claimed);
+}
+
+void SurfaceBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
+                                 ColumnSpan& claimed) const noexcept {
+  const bool deep = gap.until - gap.from >= 2 * kRemainderReach_px;
+  const std::int32_t upper_end = deep ? gap.from + kRemainderReach_px - 1 : gap.until;
+  const std::int32_t lower_start = gap.until - kRemainderReach_px + 1;
+  const Depths upper = depths_of(gap.column, gap.from, upper_end);
+  const Depths lower = deep ? depths_of(gap.column, lower_start, gap.until) : upper;
+  for (std::size_t p = first_plane; p <= last_plane; ++p) {
+    const auto plane = static_cast<std::uint8_t>(p);
+    consider(gap, plane, gap.from, upper_end, upper, most, claimed);
+    if (deep) consider(gap, plane, lower_start, gap.until, lower, most, claimed);
+  }
+}
+
 void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t first_plane,
                               std::size_t last_plane) noexcept {
   constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
@@ -133,42 +157,22 @@ void SurfaceBoundaries::claim(std::int32_t column, std::int32_t beside, std::siz
       ++overflow_;
       return;
     }
-    const std::uint8_t above = k > 0 ? spans[k - 1].plane : std::uint8_t{0};
-    const std::uint8_t below = k < spans.size() ? spans[k].plane : std::uint8_t{0};
+    const Gap gap{column, gap_from, until, k > 0 ? spans[k - 1].plane : std::uint8_t{0},
+                  k < spans.size() ? spans[k].plane : std::uint8_t{0}};
     std::int32_t most = kMinRows - 1;
     ColumnSpan claimed;
-    const auto consider = [&](std::uint8_t plane, std::int32_t top, std::int32_t bottom, const Depths& depths) {
-      if (plane == above || plane == below || bottom - top < most) return;
-      if (!reaches(column, plane, top, bottom, depths)) return;
-      ColumnSpan candidate;
-      candidate.plane = plane;
-      candidate.top = static_cast<std::int16_t>(top);
-      candidate.bottom = static_cast<std::int16_t>(bottom);
-      weigh_claim(column, candidate, most, claimed);
-    };
     if (any_beside) {
       const Column& others = columns_[static_cast<std::size_t>(beside)];
       while (next_beside < others.size() && others[next_beside].bottom + kReach_px < gap_from) ++next_beside;
       for (std::size_t i = next_beside; i < others.size() && others[i].top - kReach_px <= until; ++i) {
         const ColumnSpan& other = others[i];
-        if (other.plane == above || other.plane == below) continue;
         const std::int32_t top = std::max(gap_from, other.top - kReach_px);
         const std::int32_t bottom = std::min(until, other.bottom + kReach_px);
-        consider(other.plane, top, bottom, depths_of(column, top, bottom));
+        if (!gap.may_be(other.plane) || bottom - top < most) continue;
+        consider(gap, other.plane, top, bottom, depths_of(column, top, bottom), most, claimed);
       }
     }
-    if (first_plane <= last_plane) {
-      const bool deep = until - gap_from >= 2 * kRemainderReach_px;
-      const std::int32_t upper_end = deep ? gap_from + kRemainderReach_px - 1 : until;
-      const std::int32_t lower_start = until - kRemainderReach_px + 1;
-      const Depths upper = depths_of(column, gap_from, upper_end);
-      const Depths lower = deep ? depths_of(column, lower_start, until) : upper;
-      for (std::size_t p = first_plane; p <= last_plane; ++p) {
-        const auto plane = static_cast<std::uint8_t>(p);
-        consider(plane, gap_from, upper_end, upper);
-        if (deep) consider(plane, lower_start, until, lower);
-      }
-    }
+    if (first_plane <= last_plane) consider(gap, first_plane, last_plane, most, claimed);
     if (most < kMinRows || !spans.try_push_back(claimed)) continue;
     std::rotate(spans.begin() + static_cast<std::ptrdiff_t>(k), spans.end() - 1, spans.end());
     from = claimed.bottom + 1;

@@ -174,14 +174,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       }
       return 1;
     case Phase::kPieces:
-      if (!started_) {
-        counters_.run_overflow += boundaries_.overflow();
-        pieces_.find(boundaries_.columns(), picture_.column_rays.columns);
-        started_ = true;
-      } else {
-        join_pieces();
-        enter(Phase::kProfile);
-      }
+      pieces_step();
       return kMaxPieceUnits;
     case Phase::kProfile:
       profiles_.add_column(boundaries_.columns(), pieces_, planes_, row_, picture_);
@@ -245,11 +238,18 @@ std::size_t SurfaceExtractor::surface_at(std::int32_t column, std::int32_t row,
   return planes_[pixel_owner(picture_, raw, noise_, planes_, column, row)].surface;
 }
 
-void SurfaceExtractor::join_pieces() noexcept {
+void SurfaceExtractor::pieces_step() noexcept {
+  if (!started_) {
+    counters_.run_overflow += boundaries_.overflow();
+    pieces_.find(boundaries_.columns(), picture_.column_rays.columns);
+    started_ = true;
+    return;
+  }
   counters_.run_overflow += pieces_.overflow();
   counters_.plane_overflow += pieces_.join(params_.pieces, boundaries_, picture_, planes_);
   profiles_.begin(planes_);
   side_finder_.begin(params_.sides, noise_, raw_, picture_, planes_);
+  enter(Phase::kProfile);
 }
 
 // Large surfaces are wider than what columns mix.

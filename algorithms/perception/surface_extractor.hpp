@@ -148,7 +148,7 @@ class SurfaceExtractor {
   std::int32_t facet_step() noexcept;
   void drop(std::size_t plane) noexcept;
   void solve_planes() noexcept;
-  void join_pieces() noexcept;
+  void pieces_step() noexcept;
   std::int32_t evidence_step() noexcept;
   std::int32_t side_step() noexcept;
   void outline() noexcept;
