@@ -334,6 +334,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.steps_total = static_cast<int>(world_.steps.size());
   s.steps_climbed = steps_climbed_;
   const bool module_ended = ending_.phase == GaitPhase::kFinished || ending_.phase == GaitPhase::kStopped;
+  s.ended_at_s = seconds(last_stamp_ns_);
   s.ended_by = fell_ ? "fall" : module_ended ? "module" : "time limit";
   if (on_top_ns_ >= 0 && first_lift_off_ns_ >= 0) {
     s.climb_time_s = seconds(on_top_ns_ - first_lift_off_ns_);
@@ -389,7 +390,6 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.wall_seconds = run.wall_seconds;
 
   ClimbEnding ending = ending_;
-  ending.at_s = seconds(last_stamp_ns_);
   ending.heap_first_caller = run.heap_first_caller;
   judge(s, ending);
   return s;

@@ -110,6 +110,7 @@ Json to_json(const ClimbSummary& s) {
   j["reason"] = s.reason;
   j["fell"] = s.fell;
   j["ended_by"] = s.ended_by;
+  j["ended_at_s"] = seconds_of(s.ended_at_s);
   j["plant"] = name_of(s.options.plant);
   j["gait"] = name_of(s.options.gait);
   j["seed"] = s.options.seed;

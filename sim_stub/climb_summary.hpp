@@ -73,7 +73,8 @@ struct ClimbSummary {
   bool pass = false;
   std::string reason;  // one sentence
   bool fell = false;
-  std::string ended_by;  // "module": by itself; "fall"; "time limit"
+  std::string ended_by;              // "module": by itself; "fall"; "time limit"
+  double ended_at_s = kNotMeasured;  // simulation's clock
   ClimbOptions options;
   CameraFigures camera;
   int steps_total = 0;

@@ -86,8 +86,8 @@ void judge(ClimbSummary& s, const ClimbEnding& ending) {
   s.pass = all_climbed && !s.fell && s.sole_margin_min_m >= 0.0 && s.swing_clearance_min_m > 0.0 && s.heap_calls == 0;
   s.reason = reason_of(s, ending);
   for (const Push& push : s.options.pushes) {
-    if (push.at_s < ending.at_s) continue;
-    s.reason += sentence(" The push at %g s never came: the run ended at %.1f s.", push.at_s, ending.at_s);
+    if (push.at_s < s.ended_at_s) continue;
+    s.reason += sentence(" The push at %g s never came: the run ended at %.1f s.", push.at_s, s.ended_at_s);
   }
 }
 

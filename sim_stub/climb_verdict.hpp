@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether a climb passed, and in one sentence why.
+// Whether a climb passed and why: a sentence, and one for every push that it did not live to see.
 #pragma once
 
 #include <string>
@@ -14,7 +14,6 @@ struct ClimbEnding {
   GaitPhase phase = GaitPhase::kStandstill;
   Obstruction stop_reason = Obstruction::kNone;
   double stop_measured_m = 0.0;
-  double at_s = 0.0;              // the simulation's clock
   std::string fall_reason;        // a sentence; empty when it did not fall
   std::string heap_first_caller;  // the function, when the module called the heap
 };

@@ -212,7 +212,8 @@ TEST_F(EstimatorLioTest, LioOfASilenceOfTheJoints_HasNoOdometryAndIsCounted) {
 
 // Squared error over variance of the fused position, mean over seeds and ticks: 3 where the sigmas are honest, a
 // quarter or four times that where they are off by a factor of two. The error of a seed lasts (how its world was tied
-// to LIO's), so 30 seeds scatter as 90 squares do. Sigmas of the first second are a floor.
+// to LIO's), so 30 seeds scatter as 90 squares do; the 3 of slow machines only show that it runs there. Sigmas of the
+// first second are a floor.
 TEST_F(EstimatorLioTest, FusedPosition_ThirtySeeds_SigmasAreHonest) {
   const int seeds = test::kSlowMachine ? 3 : 30;
   double sum = 0.0, count = 0.0;

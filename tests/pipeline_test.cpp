@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The wiring, on fakes fed by hand: every fault and limit that firmware raises by itself, raised (kReachLimited,
-// kContactEarly, kContactLate and kFootPutBack repeat the gait's counters, which its own tests raise); no heap call, init included;
-// static memory within its budget.
+// kContactEarly, kContactLate and kFootPutBack repeat the gait's counters, which its own tests raise); no heap call,
+// init included; static memory within its budget.
 #include "firmware/pipeline.hpp"
 
 #include <gtest/gtest.h>

@@ -82,6 +82,7 @@ class Gait {
   void shift(const StateEstimate& state, const FootholdSet& footholds) noexcept;
   void swing(const StateEstimate& state, const JointFeedback& feedback) noexcept;
   void put_back(const JointFeedback& feedback) noexcept;
+  [[nodiscard]] Transform beside_path(const Transform& odom_T_sole) const noexcept;
   void land_soon() noexcept;
   void set_pace() noexcept;
 

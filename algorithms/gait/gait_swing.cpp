@@ -78,9 +78,15 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
     lowest.position_m.z() -= params_.max_lowering_m;
     lower_torso(lowest);
   }
-  const Transform plan_T_odom = correction_.odom_T_plan(plan_T_base_).inverse();
-  plan_T_sole_[i] = plan_T_odom * odom_T_sole;
-  plan_T_sole_[i].p_m += plan_T_sole_[index_of(other(foot))].R.col(1) * (side_sign(foot) * pace_.wider_m());
+  plan_T_sole_[i] = beside_path(odom_T_sole);
+}
+
+// The swing foot in the plan's frame, as far beside its path as the pace has it.
+Transform Gait::beside_path(const Transform& odom_T_sole) const noexcept {
+  const Foot foot = decision_.goal.foot;
+  Transform plan_T_sole = correction_.odom_T_plan(plan_T_base_).inverse() * odom_T_sole;
+  plan_T_sole.p_m += plan_T_sole_[index_of(other(foot))].R.col(1) * (side_sign(foot) * pace_.wider_m());
+  return plan_T_sole;
 }
 
 void Gait::set_pace() noexcept {
@@ -141,9 +147,9 @@ void Gait::land_soon() noexcept {
 void Gait::put_back(const JointFeedback& feedback) noexcept {
   const std::size_t i = index_of(decision_.goal.foot);
   const Transform odom_T_sole = swing_.at(pace_.tick());
-  const double above_m = odom_T_sole.p_m.z() - swing_.at(0).p_m.z();
-  const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
-  if ((loaded && above_m < params_.put_back_m) || above_m < -params_.put_back_m) {
+  const double above_m = odom_T_sole.p_m.z() - swing_.start_height_m();
+  const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n, all_the_way = pace_.tick() < 0.0;
+  if ((loaded && (all_the_way || above_m < params_.put_back_m)) || (all_the_way && above_m < -params_.put_back_m)) {
     status_.stands[i] = true;
     ++status_.put_back;
     posture_.restart();
@@ -154,7 +160,7 @@ void Gait::put_back(const JointFeedback& feedback) noexcept {
     if (pace_.no_ground()) end(GaitPhase::kStopped, Obstruction::kGroundMissing, 0.0);
     return;
   }
-  plan_T_sole_[i] = correction_.odom_T_plan(plan_T_base_).inverse() * odom_T_sole;
+  plan_T_sole_[i] = beside_path(odom_T_sole);
 }
 
 void Gait::touch_down(const StateEstimate& state) noexcept {

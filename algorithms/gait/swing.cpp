@@ -29,7 +29,7 @@ void Swing::redirect(double tick, double pace, const SolePose& target, std::int3
   const Vec3 v_mps = (now.p_m - before.p_m) / kTick_s;
   const double pitch_rad = math::asin(math::clamp(-now.R(2, 0), -1.0, 1.0));
   const double before_rad = math::asin(math::clamp(-before.R(2, 0), -1.0, 1.0));
-  const double whole_s = duration_ticks * kTick_s - approach_s_;
+  const double whole_s = std::max(duration_ticks * kTick_s - approach_s_, 2.0 * kTick_s);
   // Over the nosing of the target's tread, and high enough to stop the rise.
   const double apex_m = std::max(target.position_m.z() + shape_.clearance_m,
                                  now.p_m.z() + std::max(v_mps.z(), 0.0) * kUpShare * whole_s * 0.4);
@@ -51,7 +51,9 @@ Transform Swing::redirected_at(double tick) const noexcept {
   const double turned = smooth_step(tick / duration_ticks_);
   Transform sole;
   sole.p_m = {other_.x.at(t_s).position, other_.y.at(t_s).position, 0.0};
-  if (to_end_s <= approach_s_) {
+  if (t_s < 0.0) {
+    sole.p_m.z() = other_.up.at(0.0).position + t_s * shape_.approach_mps;
+  } else if (to_end_s <= approach_s_) {
     sole.p_m.z() = target_.position_m.z() + to_end_s * shape_.approach_mps;
   } else {
     sole.p_m.z() = t_s < other_.up_s ? other_.up.at(t_s).position : other_.down.at(t_s - other_.up_s).position;

@@ -38,6 +38,7 @@ class Swing {
   // Pose of the sole. After duration_ticks, and before 0 on the way back, the foot goes on downwards at approach_mps:
   // the caller ends it.
   [[nodiscard]] Transform at(double tick) const noexcept;
+  [[nodiscard]] double start_height_m() const noexcept { return start_m_.z(); }  // where the foot stood
   [[nodiscard]] std::int32_t duration_ticks() const noexcept { return duration_ticks_; }
   [[nodiscard]] double approach_mps() const noexcept { return shape_.approach_mps; }
   // How far below the target it has been lowered, m; negative before the end.

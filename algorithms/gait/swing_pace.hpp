@@ -24,7 +24,7 @@ class SwingPace {
     std::int32_t pause_ticks = 200;  // where there is no ground it waits,
     double retreat = 0.5;            // then goes back so many times as fast: the torso is elsewhere
   };
-  // What decides of a tick.
+  // What decides on a tick.
   struct Seen {
     double toppling_m = 0.0;    // of the divergent component's error, towards the free foot
     bool reaches_back = false;  // for long: the torso does not leave the place where the foot stood
@@ -35,6 +35,7 @@ class SwingPace {
   void begin() noexcept { *this = {}; }
   void advance(const Params& params, const Seen& seen, std::int32_t duration_ticks) noexcept {
     if (no_ground_) {
+      wider_m_ = std::max(wider_m_ - params.wider_mps * kTick_s, 0.0);
       pace_ = --pause_ticks_ >= 0 ? 0.0 : -params.retreat;
       tick_ += pace_;
       return;

@@ -27,7 +27,7 @@ constexpr double kOff = 3.0;
 double residual(const FramePicture& picture, const RawPicture& raw, const DepthSigma& noise, const InversePlane& plane,
                 std::int32_t column, std::int32_t row) noexcept {
   const std::uint16_t depth = raw.row(row)[column];
-  if (!raw.range.valid(depth) || (picture.flags(column / 2, row / 2) & kPixelBody) != 0) return 2.0 * kOff;
+  if (!raw.range.valid(depth) || picture.body(column / 2, row / 2)) return 2.0 * kOff;
   const CameraIntrinsics& k = raw.intrinsics;
   const double w = 1.0 / (depth * k.depth_unit_m);
   const Vec3 ray{(column - k.cx_px) / k.fx_px, (row - k.cy_px) / k.fy_px, 1.0};

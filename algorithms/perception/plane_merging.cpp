@@ -160,7 +160,7 @@ bool PlaneMerging::try_join(FramePlanes& planes, PlaneIndex& to_plane, Seam& bes
     if (seam.a == kept || seam.b == kept) seam.verdict = Seam::Verdict::kOpen;
     if (seam.a != gone && seam.b != gone) continue;
     const std::size_t other = seam.a == gone ? seam.b : seam.a;
-    const bool counts = seam.verdict != Seam::Verdict::kContradicted && alike(kept, other);
+    const bool counts = alike(kept, other);
     SeamIndex& both = seam_of(kept, other);
     if (both != 0) {
       if (counts) seams_[both].length_px += seam.length_px;

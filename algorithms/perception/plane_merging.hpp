@@ -19,7 +19,7 @@ class PlaneMerging {
                              // where a run of one could join the other, too
     double merge_tilt_rad = 0.12;
     double small_plane_px = 4000.0;  // smaller planes' tilt is known half as well
-    double pieces_chi2 = 6.5;        // large pieces need not touch: 90 % of what noise does to three parameters
+    double pieces_chi2 = 6.5;        // large pieces need not touch: 91 % of what noise does to three parameters
     double facet_chi2 = 8.0;         // neighbours are one surface unless their pixels contradict one plane for both by
                                      // this: 95 % of what noise does to three parameters
     double facet_floor_m = 0.002;    // what surfaces themselves are uneven by, added to the noise
