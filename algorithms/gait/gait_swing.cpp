@@ -44,7 +44,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
 
 void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noexcept {
   if (pace_.goes_back()) return put_back(feedback);
-  if (pace_.hurries()) land_soon();
+  if (pace_.hurries() && decision_.goal.kind == StepKind::kPassing) land_soon();
   const Foot foot = decision_.goal.foot;
   const std::size_t i = index_of(foot);
   const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
