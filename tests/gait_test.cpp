@@ -31,7 +31,7 @@ void expect_climbed(const IdealClimb& climb, const ClimbSetup& setup) {
   EXPECT_LT(r.penetration_m, 0.002);  // of the contact itself
   EXPECT_GT(r.crossing_m, 0.02);
   EXPECT_GT(r.toe_gap_m, 0.02);
-  EXPECT_GT(r.zmp_margin_m, 0.009);
+  EXPECT_GT(r.zmp_margin_m, 0.01);
   EXPECT_LT(r.execution_m, 0.003);
   const double per_stair_s = seconds(r.last_touch_down_ns - r.first_lift_off_ns) / setup.stairs.steps;
   EXPECT_GT(per_stair_s, 2.4);

@@ -36,7 +36,7 @@ void expect_sound(const IdealClimb& climb) {
   EXPECT_GE(r.joint_margin_rad, 0.0);
   EXPECT_GE(r.knee_min_rad, 0.05);
   EXPECT_LT(r.penetration_m, 0.002);
-  EXPECT_GT(r.zmp_margin_m, 0.009);
+  EXPECT_GT(r.zmp_margin_m, 0.01);
   EXPECT_LT(r.execution_m, 0.004);
   EXPECT_EQ(climb.status().ik_limited_ticks, 0U);
   EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);

@@ -9,6 +9,7 @@ namespace polygmap {
 namespace {
 
 constexpr std::int32_t kSwing_ticks = 450;
+constexpr double kTurn_tick = 170.0;
 constexpr SwingPace::Params kParams;
 constexpr double kToppling_m = kParams.topples_m + 0.001;
 
@@ -24,7 +25,8 @@ int ticks_to_the_end(SwingPace pace, const SwingPace::Seen& seen) {
 
 TEST(SwingPace, BodyOnItsPlan_RunsAsPlanned) {
   SwingPace pace;
-  advance(pace, kSwing_ticks, {.toppling_m = 0.9 * kParams.topples_m, .reaches_back = true, .drive_share = 0.95});
+  advance(pace, kSwing_ticks,
+          {.toppling_m = 0.9 * kParams.topples_m, .turn_until_tick = kTurn_tick, .drive_share = 0.95});
   EXPECT_EQ(pace.tick(), kSwing_ticks);
   EXPECT_EQ(pace.wider_m(), 0.0);
   EXPECT_FALSE(pace.goes_back());
@@ -34,7 +36,7 @@ TEST(SwingPace, TopplesTowardsTheFreeFoot_HurriesAndLandsWider) {
   SwingPace pace;
   const auto half = static_cast<int>(0.5 * kSwing_ticks);
   advance(pace, half, {});
-  advance(pace, 1, {.toppling_m = kToppling_m, .reaches_back = true});
+  advance(pace, 1, {.toppling_m = kToppling_m, .turn_until_tick = kTurn_tick});
   EXPECT_FALSE(pace.goes_back());
   // Once it topples it hurries to the end, whatever the feedback makes of it; nothing leaps.
   EXPECT_LT(ticks_to_the_end(pace, {}), 1.1 * (kSwing_ticks - half) / kParams.hurry);
@@ -71,8 +73,8 @@ TEST(SwingPace, Hurrying_TakesNoMoreThanTheDrivesHave) {
 TEST(SwingPace, TopplesEarly_TurnsBackWhereItMay) {
   for (const bool may : {true, false}) {
     SwingPace pace;
-    advance(pace, static_cast<int>(0.9 * kParams.turn_share * kSwing_ticks), {});
-    advance(pace, 1, {.toppling_m = kToppling_m, .reaches_back = may});
+    advance(pace, static_cast<int>(0.9 * kTurn_tick), {});
+    advance(pace, 1, {.toppling_m = kToppling_m, .turn_until_tick = may ? kTurn_tick : 0.0});
     EXPECT_EQ(pace.goes_back(), may);
     const double before = pace.tick();
     advance(pace, 100, {});

@@ -9,7 +9,6 @@ namespace polygmap {
 namespace {
 
 constexpr std::int32_t kLower_ticks = 200;  // of the torso where a foot needs a longer leg
-constexpr std::int32_t kCrouch_ticks = 125;
 constexpr double kInward_m = 0.01;
 constexpr double kSpare_m = 0.02;               // of its height: the base is not right over the centre of mass
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
@@ -242,19 +241,6 @@ bool Gait::close_to_planned(const StepGoal& goal) const noexcept {
          std::abs(math::wrap_angle(goal.target.yaw_rad - planned.target.yaw_rad)) <= params_.absorb_rad;
 }
 
-// One sole can hold that much of an error by moving its pressure, and some more.
-bool Gait::steady() const noexcept {
-  const Foot stance = other(decision_.goal.foot);
-  const Vec2 off_m =
-      (plan_T_sole_[index_of(stance)].R.transpose() * Vec3{dcm_error_m_.x(), dcm_error_m_.y(), 0.0}).head<2>();
-  const PressureLimits& limits = params_.balance.pressure;
-  const double inward_m = params_.step.zmp_inward_m, ahead_m = params_.step.zmp_ahead_m;
-  const double inwards = -side_sign(stance) * off_m.y();
-  const double room_x_m = off_m.x() > 0.0 ? limits.ahead_m - ahead_m : limits.behind_m + ahead_m;
-  const double room_y_m = limits.aside_m + (inwards > 0.0 ? -inward_m : inward_m);
-  return std::abs(off_m.x()) <= params_.steady_share * room_x_m && std::abs(inwards) <= params_.steady_share * room_y_m;
-}
-
 void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexcept {
   if (search_.step() == StepSearch::State::kImpossible) {
     if (decision_.goal.kind == StepKind::kPassing) {
@@ -271,10 +257,8 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
   if (stop_requested_ || lost(state)) return begin_hold();
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
   if (!usable_) return;
-  if (!steady()) {  // on from where the body is
-    if (tick_ == shift_ticks_)
-      move_torso(torso_state_[2].position - crouch_m(), torso_state_[5].position, kCrouch_ticks, kCrouch_ticks);
-    if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_shift(decision_, true);
+  if (!(dcm_error_m_.norm() <= params_.steady_m)) {
+    if (tick_ > shift_ticks_ + params_.reshift_ticks) begin_hold();
     return;
   }
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);

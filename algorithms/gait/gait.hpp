@@ -40,8 +40,10 @@ class Gait {
     double touch_force_n = 15.0;
     double hold_force_n = 100.0;            // pressed less, a foot that landed is held where it landed,
     std::int64_t hold_ns = 200 * kNsPerMs;  // not longer: it may be the sensor
-    double steady_share = 0.65;             // of the error that one sole can hold: beyond it no foot lifts
+    double steady_m = 0.015;                // of the divergent component's error: beyond it no foot lifts
     SwingPace::Params pace;
+    double turn_share = 0.38;         // of a swing, in which a toppling body's foot goes back to where it stood;
+    double turn_ticks = 45.0;         // of a passing one
     double soon_ticks = 100.0;        // of the rest of a swing, straight to its target, when the body topples:
     double soon_ticks_per_m = 450.0;  // the drives' share
     double below_m = 0.03;            // not from farther below
@@ -100,7 +102,6 @@ class Gait {
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
   void carry_plan_to_odometry() noexcept;
   [[nodiscard]] double crouch_m() const noexcept;
-  [[nodiscard]] bool steady() const noexcept;
   void settle_between_feet() noexcept;
   void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
   void lower_torso(const SolePose& sole) noexcept;

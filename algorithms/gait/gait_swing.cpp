@@ -44,7 +44,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
 
 void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noexcept {
   if (pace_.goes_back()) return put_back(feedback);
-  if (pace_.hurries()) land_soon();
+  if (pace_.hurries() && decision_.goal.kind == StepKind::kPassing) land_soon();
   const Foot foot = decision_.goal.foot;
   const std::size_t i = index_of(foot);
   const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
@@ -93,10 +93,14 @@ void Gait::set_pace() noexcept {
   const StepGoal& goal = decision_.goal;
   const Transform& stance = plan_T_sole_[index_of(other(goal.foot))];
   const bool reaches_back = goal.kind == StepKind::kFloor || goal.kind == StepKind::kLeading;
+  const bool reaches_shortly = goal.kind == StepKind::kPassing;  // the torso rises, and leaves its leg too short
+  const double until = reaches_back      ? params_.turn_share * swing_.duration_ticks()
+                       : reaches_shortly ? params_.turn_ticks
+                                         : 0.0;
   const bool went_back = pace_.goes_back();
   pace_.advance(params_.pace,
                 {.toppling_m = side_sign(goal.foot) * dcm_error_m_.dot(stance.R.col(1).head<2>()),
-                 .reaches_back = reaches_back,
+                 .turn_until_tick = until,
                  .drive_share = posture_.drive_share(goal.foot),
                  .side_room_m = goal.foothold.side_room_m[index_of(goal.foot)] - params_.side_margin_m},
                 swing_.duration_ticks());

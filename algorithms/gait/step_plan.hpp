@@ -61,7 +61,7 @@ struct StepParams {
   ComPlan::Params com;
   double max_push_m = 0.03;              // of the zero-moment point, to set off
   double zmp_ahead_m = 0.0;              // of the ankle: what it holds ahead and behind is the same
-  double zmp_inward_m = 0.025;           // and towards the other foot
+  double zmp_inward_m = 0.022;           // and towards the other foot
   std::int32_t landing_hold_ticks = 50;  // the foot may land that much late before the weight sets off for it
   std::int32_t lift_hold_ticks = 15;     // and the weight is over the stance foot that long before the other one lifts
   std::int32_t leave_ticks = 30;         // the rear leg still reaches the ground so long after its foot has left it

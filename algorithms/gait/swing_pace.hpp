@@ -13,11 +13,10 @@ namespace polygmap {
 class SwingPace {
  public:
   struct Params {
-    double topples_m = 0.02;       // of the divergent component's error towards the free foot:
-    double hurry = 1.6;            // beyond, the foot goes so many times as fast where its drives can,
-    double turn_share = 0.38;      // or back, earlier in the swing than this, or
-    std::int32_t turn_ticks = 45;  // than this where its leg soon does not reach back;
-    double wider_m = 0.06;         // and it lands that much farther out
+    double topples_m = 0.02;  // of the divergent component's error towards the free foot:
+    double hurry = 1.6;       // beyond, the foot goes so many times as fast where its drives can,
+    // or back, earlier in the swing than Seen says;
+    double wider_m = 0.06;  // and it lands that much farther out
     double wider_mps = 0.25;
     std::int32_t late_ticks = 10;    // after the path's end it goes down
     double seek = 5.0;               // so many times as fast
@@ -26,10 +25,10 @@ class SwingPace {
   };
   // What decides on a tick.
   struct Seen {
-    double toppling_m = 0.0;    // of the divergent component's error, towards the free foot
-    bool reaches_back = false;  // for long: the torso does not leave the place where the foot stood
-    double drive_share = 0.0;   // of the leg's fastest drive in the last tick, over its limit
-    double side_room_m = 1e9;   // beside the target, away from the standing foot
+    double toppling_m = 0.0;       // of the divergent component's error, towards the free foot
+    double turn_until_tick = 0.0;  // of the path: earlier a foot may still go back to where it stood
+    double drive_share = 0.0;      // of the leg's fastest drive in the last tick, over its limit
+    double side_room_m = 1e9;      // beside the target, away from the standing foot
   };
 
   void begin() noexcept { *this = {}; }
@@ -42,7 +41,7 @@ class SwingPace {
     }
     if (!topples_ && seen.toppling_m > params.topples_m) {
       topples_ = true;
-      turns_back_ = tick_ < (seen.reaches_back ? params.turn_share * duration_ticks : params.turn_ticks);
+      turns_back_ = tick_ < seen.turn_until_tick;
     }
     constexpr double kHarderPerTick = 0.05;
     // The plan's own pace is proved for the drives; they are as fast as the pace is, about.
