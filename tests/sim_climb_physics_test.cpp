@@ -88,7 +88,10 @@ TEST_P(SingleStepClimb, UnderPhysics_ClimbedWithinTheFigures) {
   EXPECT_GE(summary.sole_margin_min_m, 0.0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, PhysicsClimb, testing::Values(Case{3, {.steps = 4}}), name_of);
+INSTANTIATE_TEST_SUITE_P(Seeds, PhysicsClimb,
+                         testing::Values(Case{3, {.steps = 4}},
+                                         Case{60, {.steps = 4, .tread_m = 0.27, .jitter_m = 0.0}, false}),
+                         name_of);
 INSTANTIATE_TEST_SUITE_P(Seeds, SingleStepClimb, testing::Values(Case{2, {.steps = 4}}), name_of);
 
 std::vector<Case> long_cases() {
