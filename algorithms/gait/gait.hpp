@@ -53,8 +53,7 @@ class Gait {
     double side_margin_m = 0.01;                // of a sole that lands farther out, to the end of its tread
     double early_m = 0.005;                     // contact this far above the target counts as early
     double late_m = 0.005;                      // and this far below as late
-    double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down,
-    double lag_s = 0.015;                       // beyond what it follows behind
+    double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down
     double max_lowering_m = 0.055;              // no ground found: the foot goes back
     double put_back_m = 0.01;                   // about where it stood: weight counts as the ground; below, it is there
     std::int64_t steer_age_ns = 20 * kNsPerMs;  // of IMU and joint samples: older ones steer nothing and start nothing

@@ -53,8 +53,7 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
   // What does not go down any more stands on something, whatever its force sensor says.
   const Transform odom_T_sole = swing_.at(pace_.tick());
   const double above_m = usable_ ? state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
-  const double lag_m = params_.lag_s * pace_.pace() * swing_.approach_mps();
-  const bool blocked = swing_.lowered_m(pace_.tick()) > params_.late_m && above_m > params_.blocked_m + lag_m;
+  const bool blocked = swing_.lowered_m(pace_.tick()) > params_.late_m && above_m > params_.blocked_m;
   if ((descending && unloaded_ && loaded) || blocked) {
     if (swing_.at(pace_.last_tick()).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m)
       ++status_.early_contacts;
