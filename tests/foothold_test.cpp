@@ -541,9 +541,9 @@ TEST_F(FootholdTest, EdgesKnownVaguely_FootholdIsRefusedWithThatReason) {
     }
     return map;
   };
-  // 11.5 mm of room at either end, 3 mm of them always kept, the rest is 3.4 mm two and a half times.
-  EXPECT_EQ(search(with_sigma(0.0033, 0.0033), standing(s, 0)).obstruction, Obstruction::kNone);
-  for (const auto& [nosing_m, back_m] : {std::pair{0.0036, 0.001}, std::pair{0.001, 0.0036}}) {
+  // 11.5 mm of room at either end, 3 mm of them always kept, the rest is 4.25 mm twice.
+  EXPECT_EQ(search(with_sigma(0.0041, 0.0041), standing(s, 0)).obstruction, Obstruction::kNone);
+  for (const auto& [nosing_m, back_m] : {std::pair{0.0045, 0.001}, std::pair{0.001, 0.0045}}) {
     EXPECT_EQ(search(with_sigma(nosing_m, back_m), standing(s, 0)).obstruction, Obstruction::kEdgeUncertain);
     EXPECT_FALSE(search_->result().has_p_star);
   }
