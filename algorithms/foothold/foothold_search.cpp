@@ -367,7 +367,8 @@ Obstruction FootholdSearch::judge_next() noexcept {
   pending_.measured_rise_m = tread.height_m - z_foot_;
   pending_.measured_tread_m = tread.depth_m;
   pending_.tread = {tread.nosing_a_m, tread.nosing_b_m};
-  const double step_max_m = query_.climbing ? params_.step_max_m : kInfinity;
+  double step_max_m = kInfinity;
+  if (query_.climbing) step_max_m = params_.step_max_m;
   const Obstruction found = judge_tread(tread, z_foot_, sole_.origin_m(), step_max_m, pending_.p_star_feet);
   if (found == Obstruction::kNoStaircase) return without_next();  // another flight
   if (found != Obstruction::kNone) return found;
