@@ -45,7 +45,7 @@ class Gait {
     double turn_share = 0.38;         // of a swing, in which a toppling body's foot goes back to where it stood;
     double turn_ticks = 45.0;         // of a passing one
     double soon_ticks = 100.0;        // of the rest of a swing, straight to its target, when the body topples:
-    double soon_ticks_per_m = 450.0;  // the drives' share
+    double soon_ticks_per_m = 450.0;  // ticks for each metre of its way, for the drives
     double below_m = 0.03;            // not from farther below
     double beside_from_m = 0.1;       // a passing foot that far behind the standing one lands beside it
     double crouch = 0.7;              // lower in double support, of the divergent component's error
