@@ -109,8 +109,8 @@ void Gait::set_pace() noexcept {
   }
 }
 
-// The rest of the way straight to the target; a foot that was to pass the standing one and is still behind it lands
-// beside it.
+// Of a passing foot, the rest of the way straight to the target, or beside the standing foot while it is still behind
+// it.
 void Gait::land_soon() noexcept {
   StepGoal& goal = decision_.goal;
   const Foot foot = goal.foot;
@@ -118,8 +118,7 @@ void Gait::land_soon() noexcept {
   const SolePose stance = sole_pose(odom_T_plan * plan_T_sole_[index_of(other(foot))]);
   const Mat3 R = rotation_z(stance.yaw_rad);
   const Vec3 now_m = swing_.at(pace_.tick()).p_m;
-  const bool beside =
-      goal.kind == StepKind::kPassing && (R.transpose() * (now_m - stance.position_m)).x() < -params_.beside_from_m;
+  const bool beside = (R.transpose() * (now_m - stance.position_m)).x() < -params_.beside_from_m;
   const Vec3 beside_m = stance.position_m + R * Vec3{0.0, side_sign(foot) * 2.0 * kStanceHalfWidth_m, 0.0};
   const SolePose target = beside ? SolePose{beside_m, stance.yaw_rad} : goal.target;
   const Vec3 way_m = target.position_m - now_m;
