@@ -16,7 +16,9 @@ MountEstimator::MountEstimator(const Params& params, const Transform& nominal_ba
     : params_(params), nominal_(nominal_base_T_camera), base_T_camera_(nominal_base_T_camera) {}
 
 double MountEstimator::tilt_sigma_rad() const noexcept {
-  return 1.0 / math::sqrt(tilt_.information + 1.0 / math::square(params_.prior_tilt_sigma_rad));
+  const double left = 1.0 / (1.0 + tilt_.information * math::square(params_.prior_tilt_sigma_rad));  // of the prior
+  return math::sqrt(math::square(left * params_.prior_tilt_sigma_rad) +
+                    math::square((1.0 - left) * params_.common_tilt_sigma_rad));
 }
 
 bool MountEstimator::usable(const SurfacePatch& patch) const noexcept {
