@@ -137,6 +137,46 @@ TEST(MountEstimator, NarrowTreadSeenTilted_FloorDecides) {
   EXPECT_LT(std::abs(mount.pitch_rad()), 0.0015);
 }
 
+// On the stairs nothing but such treads may be in view for longer than the window.
+TEST(MountEstimator, FloorThenNarrowTreadsForTwentySeconds_FloorIsNotForgotten) {
+  MountEstimator mount = estimator(), treads_only = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero());
+  const auto see_treads = [&](MountEstimator& m) {
+    robot.see(0.13, 0.008);
+    robot.last().tilt_sigma_rad = 0.0045;
+    robot.deliver(m);
+  };
+  for (int i = 0; i < 60; ++i) {
+    robot.see(0.0);
+    robot.last().tilt_sigma_rad = 0.001;
+    robot.deliver(mount);
+  }
+  for (int i = 0; i < 600; ++i) see_treads(mount);
+  for (int i = 0; i < 600; ++i) see_treads(treads_only);
+  EXPECT_LT(std::abs(mount.pitch_rad()), 0.002);
+  EXPECT_GT(std::abs(treads_only.pitch_rad()), 0.007);  // where they are all there is, they count
+}
+
+// What both soles said together holds when one of them stands alone.
+TEST(MountEstimator, SolesNotParallel_OneAloneCountsAsBoth) {
+  MountEstimator mount = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero());
+  robot.stance().base_T_sole[0].R = rotation_y(0.006);
+  robot.stance().base_T_sole[1].R = rotation_y(-0.002);
+  const auto look = [&](bool left, bool right, int frames) {
+    robot.stance().stands = {left, right};
+    for (int i = 0; i < frames; ++i) {
+      robot.see(0.0);
+      robot.deliver(mount);
+    }
+    return mount.pitch_rad();
+  };
+  const double both_rad = look(true, true, 100);
+  EXPECT_NEAR(std::abs(both_rad), 0.002, 0.0003);
+  EXPECT_NEAR(look(true, false, 300), both_rad, 0.0003);
+  EXPECT_NEAR(look(false, true, 300), both_rad, 0.0003);
+}
+
 TEST(MountEstimator, OneBadFrame_MovesItByLittle) {
   MountEstimator mount = estimator();
   Robot robot(0.0, 0.0, Vec3::Zero());

@@ -7,6 +7,7 @@ namespace polygmap {
 namespace {
 
 constexpr double kLongestStep_s = 0.1;  // between two frames, for the fading
+constexpr double kPairs = 60.0;         // frames that the soles' difference is the mean of
 
 bool is_unit(const Vec3& v) noexcept { return std::abs(v.squaredNorm() - 1.0) < 1e-3; }  // false for NaN
 
@@ -34,20 +35,26 @@ void MountEstimator::update(const SurfaceFrame& frame, const Stance& stance) noe
     ++counters_.rejected_frames;
     return;
   }
-  const double fade =
-      last_ns_ == 0 ? 1.0 : math::exp(-std::min(seconds(frame.stamp_ns - last_ns_), kLongestStep_s) / params_.window_s);
+  const double dt_s = last_ns_ == 0 ? 0.0 : std::min(seconds(frame.stamp_ns - last_ns_), kLongestStep_s);
   last_ns_ = frame.stamp_ns;
 
   // Level is what the standing soles lie on: treads are parallel to it, and a foot is put down by the same kinematics.
   // Gravity as the estimator has it errs by twice as much, and alike in everything but the camera.
-  Vec3 level = Vec3::Zero();
+  std::array<Vec3, kFootCount> up;
   std::array<bool, kFootCount> flat{};
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-    const Vec3 up = stance.base_T_sole[foot].R.col(2);
-    flat[foot] = stance.stands[foot] && up.dot(stance.base_up) > math::cos(params_.max_sole_tilt_rad);
-    if (flat[foot]) level += up;
+    up[foot] = stance.base_T_sole[foot].R.col(2);
+    flat[foot] = stance.stands[foot] && up[foot].dot(stance.base_up) > math::cos(params_.max_sole_tilt_rad);
   }
-  level = level.squaredNorm() > 0.5 ? Vec3{level.normalized()} : stance.base_up;
+  // Each is off by its own encoders. A sole that stands alone is turned by what it was off from the middle of both.
+  Vec3 level = stance.base_up;
+  if (flat[0] && flat[1]) {
+    pairs_ = std::min(pairs_ + 1.0, kPairs);
+    apart_ += (0.5 * (up[0] - up[1]) - apart_) / pairs_;
+    level = (up[0] + up[1]).normalized();
+  } else if (flat[0] || flat[1]) {
+    level = (flat[0] ? Vec3{up[0] - apart_} : Vec3{up[1] + apart_}).normalized();
+  }
 
   Vec2 sum = Vec2::Zero();
   double weights = 0.0;
@@ -66,14 +73,19 @@ void MountEstimator::update(const SurfaceFrame& frame, const Stance& stance) noe
   }
   if (!(weights > 0.0)) return;
   ++counters_.frames;
-  const auto fuse = [fade](auto& mean, const auto& value, double sigma, double prior_sigma) {
-    const double information = 1.0 / math::square(sigma);
+  // A surface errs in every frame alike: on the stairs many frames of narrow treads, 4 mrad off, must not outvote the
+  // few of the floor, 1 mrad off, neither by their number nor by age. So what sees level worse than what is known has
+  // been seen counts, and lets fade, by the square of that.
+  const double trust = math::square(seen_as_well_ > weights ? weights / seen_as_well_ : 1.0);
+  const auto fuse = [](auto& mean, const auto& value, double fade, double information, double prior_sigma) {
     mean.information = fade * mean.information + information;
     mean.weighted = fade * mean.weighted + information * value;
     return 1.0 / (mean.information + 1.0 / math::square(prior_sigma));
   };
-  const double tilt_variance =
-      fuse(tilt_, Vec2{sum / weights}, params_.frame_tilt_sigma_rad, params_.prior_tilt_sigma_rad);
+  const double information = trust / math::square(params_.frame_tilt_sigma_rad);
+  const double tilt_variance = fuse(tilt_, Vec2{sum / weights}, math::exp(-trust * dt_s / params_.window_s),
+                                    information, params_.prior_tilt_sigma_rad);
+  seen_as_well_ += information / tilt_.information * (weights - seen_as_well_);
   for (int i = 0; i < 2; ++i) {
     tilt_rad_[i] = math::clamp(tilt_variance * tilt_.weighted[i], -params_.max_tilt_rad, params_.max_tilt_rad);
   }
@@ -102,7 +114,8 @@ void MountEstimator::update(const SurfaceFrame& frame, const Stance& stance) noe
   }
   if (soles > 0) {
     ++counters_.heights;
-    const double variance = fuse(height_, above_m / soles, params_.frame_height_sigma_m, params_.prior_height_sigma_m);
+    const double variance = fuse(height_, above_m / soles, math::exp(-dt_s / params_.window_s),
+                                 1.0 / math::square(params_.frame_height_sigma_m), params_.prior_height_sigma_m);
     height_m_ = math::clamp(variance * height_.weighted, -params_.max_height_m, params_.max_height_m);
   }
   base_T_camera_.p_m = nominal_.p_m + height_m_ * level;

@@ -80,6 +80,9 @@ class MountEstimator {
   double height_m_ = 0.0;
   FadingMean<Vec2> tilt_{0.0, Vec2::Zero()};
   FadingMean<double> height_{0.0, 0.0};
+  double seen_as_well_ = 0.0;  // 1/rad^2, of level by its surfaces: mean of the frames that the tilt is made of
+  Vec3 apart_ = Vec3::Zero();  // half of the left sole's normal less the right one's, base frame
+  double pairs_ = 0.0;         // frames with both on the ground, up to a bound
   std::int64_t last_ns_ = 0;
   Counters counters_;
 };
