@@ -74,17 +74,17 @@ void PlaneGrowing::begin(const Params& params, const DepthSigma& noise, const Co
   index_rows();
 }
 
-// A column of clutter has dozens of runs, of which a neighbour overlaps one or two.
+// A column of clutter has dozens of runs, of which a neighbour overlaps one or two. Runs that end above a row are
+// counted, not looked for.
 void PlaneGrowing::index_rows() noexcept {
   static_assert(RunSegmentation::kMaxRunsPerColumn <= std::numeric_limits<std::uint8_t>::max());
   for (std::int32_t g = 0; g < rays_->columns; ++g) {
-    const RunSegmentation::Column& column = (*runs_)[static_cast<std::size_t>(g)];
     auto& first = first_near_[static_cast<std::size_t>(g)];
-    std::size_t k = 0;
-    for (std::size_t i = 0; i < first.size(); ++i) {
-      while (k < column.size() && column[k].bottom < static_cast<std::int32_t>(i) * kIndexRows) ++k;
-      first[i] = static_cast<std::uint8_t>(k);
+    first.fill(0);
+    for (const Run& run : (*runs_)[static_cast<std::size_t>(g)]) {
+      ++first[static_cast<std::size_t>(run.bottom / kIndexRows + 1)];
     }
+    for (std::size_t i = 1; i < first.size(); ++i) first[i] = static_cast<std::uint8_t>(first[i] + first[i - 1]);
   }
 }
 

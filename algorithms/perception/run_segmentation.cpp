@@ -77,9 +77,27 @@ void RunSegmentation::clear(std::int32_t column) noexcept {
 
 void RunSegmentation::add_rows(std::int32_t first, std::int32_t last) noexcept {
   const Wides c(*this);
+  // Columns whose rows cannot be added as a block, or do not go on, take them one by one, a row across them all before
+  // the next: a column's rows wait for one another, columns do not.
+  std::array<std::int32_t, kColumns / kGroup + 1> singly;
+  std::size_t count = 0;
   for (std::int32_t column = 0; column < column_count_; column += kGroup) {
-    if (last - first + 1 == kBlock && try_block(c, column, first)) continue;
-    for (std::int32_t row = first; row <= last; ++row) add_row(c, column, row);
+    singly[count] = column;
+    count += last - first + 1 == kBlock && try_block(c, column, first) ? 0U : 1U;
+  }
+  if (count == 0) return;
+  for (std::int32_t row = first; row <= last; ++row) {
+    static_assert(64 % kGroup == 0);
+    std::array<std::uint64_t, (kColumns + 63) / 64> events{};
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::int32_t column = singly[i];
+      events[static_cast<std::size_t>(column / 64)] |= std::uint64_t{add_row(c, column, row)} << (column % 64);
+    }
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      for (std::uint64_t left = events[i]; left != 0; left &= left - 1) {
+        handle(static_cast<std::int32_t>(64 * i) + std::countr_zero(left), row);
+      }
+    }
   }
 }
 
@@ -93,6 +111,13 @@ bool RunSegmentation::try_block(const Wides& c, std::int32_t column, std::int32_
     Wide idle, rows, value, slope, lever, squares, drift, absent;
   };
   std::array<Next, kRegisters> next;
+  // Runs too young for a block are none.
+  Wide may_go_on = c.zero == c.zero;
+  for (std::int32_t g = column; g < column + kGroup; g += Wide::nlanes) {
+    const Wide rows = cv::vx_load(open_.rows.data() + g);
+    may_go_on = may_go_on & ((rows >= c.fitted) | (rows == c.zero));
+  }
+  if (!cv::v_check_all(may_go_on)) return false;
   for (std::size_t i = 0; i < kRegisters; ++i) {
     const std::size_t g = static_cast<std::size_t>(column) + i * Wide::nlanes;
     const auto load = [g](const Floats& x) { return cv::vx_load(x.data() + g); };
@@ -152,7 +177,9 @@ bool RunSegmentation::try_block(const Wides& c, std::int32_t column, std::int32_
   return true;
 }
 
-void RunSegmentation::add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept {
+// A bit for each of the group's columns in which something ends.
+std::uint32_t RunSegmentation::add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept {
+  std::uint32_t events = 0;
   const Wide to_centre = all(cy_ - static_cast<float>(row));
   // Whole registers: what columns beyond a narrower picture say is never read.
   for (std::int32_t column = first_column; column < first_column + kGroup; column += Wide::nlanes) {
@@ -194,9 +221,10 @@ void RunSegmentation::add_row(const Wides& c, std::int32_t first_column, std::in
 
     const Wide strange = cv::v_select(fitted, c.zero, valid) & ~fits;
     const Wide bent = in & (n1 > c.long_run) & (drift * drift * w2 > c.bend2 * spread);
-    auto events = static_cast<std::uint32_t>(cv::v_signmask(strange | bent | (absent > c.max_gap)));
-    for (; events != 0; events &= events - 1U) handle(column + std::countr_zero(events), row);
+    events |= static_cast<std::uint32_t>(cv::v_signmask(strange | bent | (absent > c.max_gap)))
+              << (column - first_column);
   }
+  return events;
 }
 
 // Ends the column's run where it stopped fitting and starts the next one with the rows since.

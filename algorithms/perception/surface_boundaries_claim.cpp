@@ -29,9 +29,8 @@ std::uint32_t SurfaceBoundaries::fitting(const Line& line, std::int32_t column, 
   return bits;
 }
 
-void SurfaceBoundaries::weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
-                                    ColumnSpan& claimed) const noexcept {
-  const Line line = line_of(planes_[candidate.plane].plane, column);
+void SurfaceBoundaries::weigh_claim(std::int32_t column, const Line& line, const ColumnSpan& candidate,
+                                    std::int32_t& most, ColumnSpan& claimed) const noexcept {
   // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
   std::int32_t top = -1, bottom = -1, rows = 0, off = 0;
   const auto close = [&] {
@@ -103,11 +102,9 @@ SurfaceBoundaries::Depths SurfaceBoundaries::depths_of(std::int32_t column, std:
   return depths;
 }
 
-// Whether any row with a depth in that range could lie on the plane.
-bool SurfaceBoundaries::reaches(std::int32_t column, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
+// Whether any row with a depth in that range could lie on the line.
+bool SurfaceBoundaries::reaches(const Line& line, std::int32_t top, std::int32_t bottom,
                                 const Depths& depths) const noexcept {
-  if (depths.nearest < depths.farthest) return false;
-  const Line line = line_of(planes_[plane].plane, column);
   const float at_top = line.a + line.b * rays_->y[static_cast<std::size_t>(top)];
   const float at_bottom = line.a + line.b * rays_->y[static_cast<std::size_t>(bottom)];
   // No row's tolerance is larger.
@@ -118,12 +115,14 @@ bool SurfaceBoundaries::reaches(std::int32_t column, std::uint8_t plane, std::in
 
 void SurfaceBoundaries::consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
                                  const Depths& depths, std::int32_t& most, ColumnSpan& claimed) const noexcept {
-  if (!gap.may_be(plane) || bottom - top < most || !reaches(gap.column, plane, top, bottom, depths)) return;
+  if (!gap.may_be(plane) || bottom - top < most || !depths.any()) return;
+  const Line line = line_of(plane, gap.column);
+  if (!reaches(line, top, bottom, depths)) return;
   ColumnSpan candidate;
   candidate.plane = plane;
   candidate.top = static_cast<std::int16_t>(top);
   candidate.bottom = static_cast<std::int16_t>(bottom);
-  weigh_claim(gap.column, candidate, most, claimed);
+  weigh_claim(gap.column, line, candidate, most, claimed);
 }
 
 void SurfaceBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
