@@ -119,7 +119,9 @@ bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noe
     const Run& other = column[k];
     const std::int32_t shared = std::min(run.bottom, other.bottom) - std::max(run.top, other.top) + 1;
     const std::int32_t covered = std::max(run.bottom, other.bottom) - std::min(run.top, other.top) + 1;
-    if ((other.plane != 0 && other.plane != kTried) || 2 * shared <= covered || shared <= most) continue;
+    // Clutter has no habits that a branch could learn.
+    const int free = static_cast<int>(other.plane == 0) | static_cast<int>(other.plane == kTried);
+    if ((free & static_cast<int>(2 * shared > covered) & static_cast<int>(shared > most)) == 0) continue;
     most = shared;
     best = {static_cast<std::int16_t>(g), static_cast<std::int16_t>(k)};
   }

@@ -236,57 +236,79 @@ void RunSegmentation::handle(std::int32_t column, std::int32_t row) noexcept {
     close(column, from - 1, row);
   } else if (open_.rows[g] >= kFitted) {
     from = row - kBentRows + 1;
-    for (std::int32_t r = from; r <= row; ++r) forget(column, r, row);
+    forget(column, from, row);
     close(column, from - 1, row);
   }
   replay(column, from, row);
 }
 
+// One column's state, in registers while several rows in turn change it.
+struct RunSegmentation::OneColumn {
+  float rows = 0.0F, value = kNowhere, slope = 0.0F, lever = 0.0F, squares = kNoSpread, drift = 0.0F, absent = kNever;
+  OneColumn() noexcept = default;
+  OneColumn(const Open& open, std::size_t g) noexcept
+      : rows(open.rows[g]),
+        value(open.value[g]),
+        slope(open.slope[g]),
+        lever(open.lever[g]),
+        squares(open.squares[g]),
+        drift(open.drift[g]),
+        absent(open.absent[g]) {}
+  void store(Open& open, std::size_t g) const noexcept {
+    open.rows[g] = rows, open.value[g] = value, open.slope[g] = slope, open.lever[g] = lever;
+    open.squares[g] = squares, open.drift[g] = drift, open.absent[g] = absent;
+  }
+};
+
 // Opens a run at the first row with data. Rows this few make no line: each is held against the one before.
 void RunSegmentation::replay(std::int32_t column, std::int32_t from, std::int32_t row) noexcept {
   const auto g = static_cast<std::size_t>(column);
-  clear(column);
+  OneColumn run;
   for (std::int32_t r = from; r <= row; ++r) {
     const float w = image_->inverse_depth(column, r), jump = (jump_[2] * w + jump_[1]) * w + jump_[0];
-    const bool open = open_.rows[g] > 0.0F;
-    open_.value[g] += open_.slope[g];
-    open_.lever[g] += 1.0F;
-    const float residual = w - open_.value[g], off = residual + open_.slope[g];
+    run.value += run.slope;
+    run.lever += 1.0F;
+    const float residual = w - run.value, off = residual + run.slope;
     if (!(w > 0.0F)) {
-      open_.absent[g] += 1.0F;
-    } else if (open && off * off < jump * jump) {
-      const float share = 1.0F / (open_.rows[g] + 1.0F);
-      open_.rows[g] += 1.0F;
-      open_.squares[g] += open_.lever[g] * (open_.lever[g] - open_.lever[g] * share);
-      open_.lever[g] -= open_.lever[g] * share;
-      const float gain = residual * (open_.lever[g] / open_.squares[g]);
-      open_.value[g] += residual * share + gain * open_.lever[g];
-      open_.slope[g] += gain;
-      open_.absent[g] = 0.0F;
+      run.absent += 1.0F;
+    } else if (run.rows > 0.0F && off * off < jump * jump) {
+      const float share = 1.0F / (run.rows + 1.0F);
+      run.rows += 1.0F;
+      run.squares += run.lever * (run.lever - run.lever * share);
+      run.lever -= run.lever * share;
+      const float gain = residual * (run.lever / run.squares);
+      run.value += residual * share + gain * run.lever;
+      run.slope += gain;
+      run.absent = 0.0F;
     } else {
-      clear(column);
-      open_.rows[g] = 1.0F;
-      open_.value[g] = w;
-      open_.absent[g] = 0.0F;
+      run = OneColumn();
+      run.rows = 1.0F;
+      run.value = w;
+      run.absent = 0.0F;
       top_[g] = static_cast<std::int16_t>(r);
     }
   }
+  run.store(open_, g);
 }
 
-// Takes one accepted row out of the line again.
-void RunSegmentation::forget(std::int32_t column, std::int32_t forgotten, std::int32_t row) noexcept {
+// Takes accepted rows, the last ones up to row, out of the line again.
+void RunSegmentation::forget(std::int32_t column, std::int32_t from, std::int32_t row) noexcept {
   const auto g = static_cast<std::size_t>(column);
-  const float w = image_->inverse_depth(column, forgotten), back = static_cast<float>(forgotten - row);
-  const float n = open_.rows[g] - 1.0F, x = open_.lever[g] + back;
-  const float squares = open_.squares[g] - x * x * open_.rows[g] / n;
-  if (!(w > 0.0F) || n < kFitted || !(squares > 0.0F)) return;
-  const float residual = w - (open_.value[g] + open_.slope[g] * back);
-  const float gain = residual * (x * open_.rows[g] / n / squares);
-  open_.rows[g] = n;
-  open_.squares[g] = squares;
-  open_.lever[g] += x / n;
-  open_.value[g] -= residual / n + gain * open_.lever[g];
-  open_.slope[g] -= gain;
+  OneColumn run(open_, g);
+  for (std::int32_t r = from; r <= row; ++r) {
+    const float w = image_->inverse_depth(column, r), back = static_cast<float>(r - row);
+    const float n = run.rows - 1.0F, x = run.lever + back;
+    const float squares = run.squares - x * x * run.rows / n;
+    if (!(w > 0.0F) || n < kFitted || !(squares > 0.0F)) continue;
+    const float residual = w - (run.value + run.slope * back);
+    const float gain = residual * (x * run.rows / n / squares);
+    run.rows = n;
+    run.squares = squares;
+    run.lever += x / n;
+    run.value -= residual / n + gain * run.lever;
+    run.slope -= gain;
+  }
+  run.store(open_, g);
 }
 
 std::int32_t RunSegmentation::last_accepted(std::int32_t column, std::int32_t row) const noexcept {

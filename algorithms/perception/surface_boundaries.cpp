@@ -239,12 +239,14 @@ void SurfaceBoundaries::settle() noexcept {
   for (std::size_t i = 0; i < pair_count_; ++i) {
     double sum = 0.0, best = 0.0, meeting = 0.0;
     std::size_t at = 0;  // half bins above the boundary
-    for (std::size_t half = 0; half < 2 * kBins; ++half) {
-      if (half == kBins) meeting = sum;
-      sum += static_cast<double>(pairs_[i].gain[half % 2][kRowsAtOnce + half / 2]);
-      if (sum >= best) continue;
-      best = sum;
-      at = half + 1;
+    for (std::size_t bin = 0; bin < kBins; ++bin) {
+      if (bin == kBins / 2) meeting = sum;
+      for (std::size_t half = 0; half < 2; ++half) {
+        sum += static_cast<double>(pairs_[i].gain[half][kRowsAtOnce + bin]);
+        if (sum >= best) continue;
+        best = sum;
+        at = 2 * bin + half + 1;
+      }
     }
     const double offset_px = 0.5 * static_cast<double>(at) - 0.5 * kBins;
     const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].columns;

@@ -43,7 +43,7 @@ void SurfaceBoundaries::weigh_claim(std::int32_t column, const Line& line, const
     rows = off = 0;
     top = -1;
   };
-  // A bit for each of eight rows that are looked at together.
+  // A bit for each row; of eight rows that are looked at together.
   std::int32_t looked_at = -1;
   std::uint32_t eight = 0;
   const auto bits_from = [&](std::int32_t r) {
@@ -85,21 +85,21 @@ SurfaceBoundaries::Depths SurfaceBoundaries::depths_of(std::int32_t column, std:
                                                        std::int32_t last) const noexcept {
   using Wide = cv::v_float32;
   constexpr float kNone = 1e9F;  // 1/m
+  static constexpr std::array<float, kRowsAtOnce> kSteps{0, 1, 2, 3, 4, 5, 6, 7};
   const float* w = image_->down.row(column);
   const Wide zero = cv::vx_setall_f32(0.0F), none = cv::vx_setall_f32(kNone);
   Wide least = none, most = zero;
-  std::int32_t r = first;
-  for (; r + Wide::nlanes - 1 <= last; r += Wide::nlanes) {
-    const Wide some = cv::vx_load(w + r);
+  // Whole registers; the last one begins earlier, and what it has besides does not count if it is the only one.
+  for (std::int32_t r = first;; r += Wide::nlanes) {
+    const std::int32_t start = std::max(std::min(r, last + 1 - Wide::nlanes), 0);
+    const Wide row = cv::vx_load(kSteps.data()) + cv::vx_setall_f32(static_cast<float>(start));
+    const Wide some = cv::vx_load(w + start) & (row >= cv::vx_setall_f32(static_cast<float>(first))) &
+                      (row <= cv::vx_setall_f32(static_cast<float>(last)));
     least = cv::v_min(least, cv::v_select(some > zero, some, none));
     most = cv::v_max(most, some);
+    if (r + Wide::nlanes > last) break;
   }
-  Depths depths{cv::v_reduce_min(least), cv::v_reduce_max(most)};
-  for (; r <= last; ++r) {
-    depths.farthest = std::min(depths.farthest, w[r] > 0.0F ? w[r] : kNone);
-    depths.nearest = std::max(depths.nearest, w[r]);
-  }
-  return depths;
+  return {cv::v_reduce_min(least), cv::v_reduce_max(most)};
 }
 
 // Whether any row with a depth in that range could lie on the line.

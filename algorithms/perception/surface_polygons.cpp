@@ -133,7 +133,7 @@ EdgeKind SurfacePolygons::judge_edge(const FramePicture& picture, const InverseP
       if (!(w > 0.0)) continue;
       const double expected = plane.inverse_depth(picture.rays.ray(c, r));
       // Something well in front hides it, unless it stands on the surface right here (a riser's foot).
-      const bool hidden = expected > 1e-3 && 1.0 / expected - 1.0 / w > params_.apart_m;
+      const bool hidden = expected > 1e-3 && w - expected > params_.apart_m * expected * w;
       observed += hidden ? 0 : 1;
       break;
     }
