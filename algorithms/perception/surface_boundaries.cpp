@@ -64,8 +64,21 @@ void SurfaceBoundaries::trim(std::int32_t column) noexcept {
 }
 
 void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const noexcept {
-  constexpr std::int32_t kMost_px = 8, kGood = 2;
+  constexpr std::int32_t kMost_px = kRowsAtOnce, kGood = 2;
   const Line line = line_of(interval.plane, column);
+  if (interval.bottom - interval.top + 1 >= kRowsAtOnce) {
+    constexpr std::uint32_t kAll = (1U << kRowsAtOnce) - 1U;
+    const Rows upper = fitting(line, column, interval.top);
+    const Rows lower = fitting(line, column, interval.bottom - kRowsAtOnce + 1);
+    if ((upper.measured & lower.measured) == kAll) {  // the first two good ones next to each other, if there are any
+      const std::uint32_t from_top = upper.fit & upper.fit >> 1, from_bottom = lower.fit & lower.fit >> 1;
+      if (from_top != 0) interval.top = static_cast<std::int16_t>(interval.top + std::countr_zero(from_top));
+      if (from_bottom != 0) {
+        interval.bottom = static_cast<std::int16_t>(interval.bottom - kRowsAtOnce + 1 + std::bit_width(from_bottom));
+      }
+      return;
+    }
+  }
   const auto cut = [&](std::int32_t from, std::int32_t step) {
     std::int32_t at = from, good = 0;
     for (std::int32_t i = 0; i < kMost_px && good < kGood; ++i) {
@@ -140,6 +153,7 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
   const auto all = [](float x) { return cv::vx_setall_f32(x); };
   // One sigma for both: with each its own, the boundary drifts towards the less noisy plane.
   const Wide norm2 = all(upper.norm * lower.norm), zero = all(0.0F), most = all(kTruncation);
+  const Wide share1 = all(correlated_share_), share0 = all(1.0F - correlated_share_);
   float* bins = nullptr;
   std::int32_t bin = 0;  // a row further is a bin further
   if (pair != nullptr) {
@@ -155,16 +169,15 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
     // The last rows of the picture are looked at with others before them.
     const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce);
     const Wide first_step = all(static_cast<float>(from - start)), last_step = all(static_cast<float>(last - start));
-    std::array<float, kAtOnce> share, gains;
-    for (std::int32_t i = 0; i < kAtOnce; ++i) {
-      share[static_cast<std::size_t>(i)] = share_[image_->valid(column, start + i)];
-    }
+    std::array<float, kAtOnce> gains;
     for (std::int32_t i = 0; i < kAtOnce; i += Wide::nlanes) {
       const Wide w = cv::vx_load(ws + start + i), y = cv::vx_load(ys + start + i);
       const Wide off_upper = (w - (all(upper.a) + all(upper.b) * y)) * w;
       const Wide off_lower = (w - (all(lower.a) + all(lower.b) * y)) * w;
       const Wide sigma = (all(base_) * w + all(per_metre_)) * w + all(quadratic_);
-      const Wide information = all(1.0F) / (sigma * sigma * norm2 * cv::vx_load(share.data() + i));
+      const Wide pixels =
+          cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand_q(image_->valid_down.row(column) + start + i)));
+      const Wide information = pixels / (sigma * sigma * norm2 * (share1 * pixels + share0));
       const Wide gain =
           cv::v_min(off_upper * off_upper * information, most) - cv::v_min(off_lower * off_lower * information, most);
       // Nothing where there is no data.

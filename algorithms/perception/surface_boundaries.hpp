@@ -135,7 +135,11 @@ class SurfaceBoundaries {
   [[nodiscard]] Depths depths_of(std::int32_t column, std::int32_t first, std::int32_t last) const noexcept;
   [[nodiscard]] bool reaches(const Line& line, std::int32_t top, std::int32_t bottom,
                              const Depths& depths) const noexcept;
-  [[nodiscard]] std::uint32_t fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept;
+  struct Rows {  // a bit for each of kRowsAtOnce
+    std::uint32_t measured = 0, fit = 0;
+  };
+  // Which of the rows from first on have data, and which of them lie on the line.
+  [[nodiscard]] Rows fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept;
   // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
   void weigh_claim(std::int32_t column, const Line& line, const ColumnSpan& candidate, std::int32_t& most,
                    ColumnSpan& claimed) const noexcept;
@@ -194,7 +198,7 @@ inline SurfaceBoundaries::Offset SurfaceBoundaries::offset(const Line& line, std
   const float w = image_->down(row, column);
   const float residual = (w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)])) * w;
   const float sigma = inverse_sigma(w) * line.norm;
-  return {residual * residual, sigma * sigma * share_[image_->valid(column, row)]};
+  return {residual * residual, sigma * sigma * share_[image_->valid_down(row, column)]};
 }
 
 }  // namespace polygmap

@@ -8,25 +8,26 @@
 
 namespace polygmap {
 
-// Of the rows first .. first + kRowsAtOnce - 1, a bit for each that lies on the line. As offset() has it.
-std::uint32_t SurfaceBoundaries::fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept {
+// As offset() has it.
+SurfaceBoundaries::Rows SurfaceBoundaries::fitting(const Line& line, std::int32_t column,
+                                                   std::int32_t first) const noexcept {
   using Wide = cv::v_float32;
   static_assert(kRowsAtOnce % Wide::nlanes == 0 && kDepthHeight_px % kRowsAtOnce == 0);
   const auto all = [](float x) { return cv::vx_setall_f32(x); };
-  std::array<float, kRowsAtOnce> share;
-  for (std::int32_t i = 0; i < kRowsAtOnce; ++i) {
-    share[static_cast<std::size_t>(i)] = share_[image_->valid(column, first + i)];
-  }
-  std::uint32_t bits = 0;
+  Rows rows;
   for (std::int32_t i = 0; i < kRowsAtOnce; i += Wide::nlanes) {
     const Wide w = cv::vx_load(image_->down.row(column) + first + i), y = cv::vx_load(rays_->y.data() + first + i);
     const Wide residual = (w - (all(line.a) + all(line.b) * y)) * w;
     const Wide sigma = ((all(base_) * w + all(per_metre_)) * w + all(quadratic_)) * all(line.norm);
-    const Wide variance = sigma * sigma * cv::vx_load(share.data() + i);
-    const Wide fits = (w > all(0.0F)) & (residual * residual < all(kTruncation) * variance);
-    bits |= static_cast<std::uint32_t>(cv::v_signmask(fits)) << i;
+    const Wide pixels =
+        cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand_q(image_->valid_down.row(column) + first + i)));
+    const Wide most =
+        all(kTruncation) * sigma * sigma * (all(correlated_share_) * pixels + all(1.0F - correlated_share_));
+    const Wide measured = w > all(0.0F), fits = measured & (residual * residual * pixels < most);
+    rows.measured |= static_cast<std::uint32_t>(cv::v_signmask(measured)) << i;
+    rows.fit |= static_cast<std::uint32_t>(cv::v_signmask(fits)) << i;
   }
-  return bits;
+  return rows;
 }
 
 void SurfaceBoundaries::weigh_claim(std::int32_t column, const Line& line, const ColumnSpan& candidate,
@@ -49,7 +50,7 @@ void SurfaceBoundaries::weigh_claim(std::int32_t column, const Line& line, const
   const auto bits_from = [&](std::int32_t r) {
     if (r / kRowsAtOnce != looked_at) {
       looked_at = r / kRowsAtOnce;
-      eight = fitting(line, column, looked_at * kRowsAtOnce);
+      eight = fitting(line, column, looked_at * kRowsAtOnce).fit;
     }
     return eight >> (r % kRowsAtOnce);
   };

@@ -60,38 +60,42 @@ Vec2 project(const HalfRays& rays, const Vec3& p_m) noexcept {
   return {p_m.x() * w * rays.fx_px + rays.cx_px, p_m.y() * w * rays.fy_px + rays.cy_px};
 }
 
-// Share of a polygon's pixels without data, over its rows and columns in the picture.
+// Share of a polygon's pixels without data, over its columns in the picture in some of its rows.
 double invalid_share(const FramePicture& picture, const SeenPolygon& polygon) noexcept {
+  constexpr std::int32_t kRows = 32;  // more say the same
   const HalfRays& rays = picture.rays;
-  // From which column to which the convex polygon reaches in every row: two of its edges cross it.
+  const auto first_from = [&](double y) {
+    return static_cast<std::int32_t>(std::ceil(math::clamp(y, 0.0, rays.height_px)));
+  };
+  const auto last_until = [&](double y) {
+    return static_cast<std::int32_t>(std::floor(math::clamp(y, -1.0, rays.height_px - 1.0)));
+  };
+  double highest = 1e9, lowest = -1e9;
+  for (const Vec2& p : polygon) highest = std::min(highest, p.y()), lowest = std::max(lowest, p.y());
+  const std::int32_t first_row = first_from(highest), last_row = last_until(lowest);
+  const std::int32_t stride = 1 + std::max(last_row - first_row, 0) / kRows;
+  // From which column to which the convex polygon reaches in each of these rows: two of its edges cross it.
   struct Reach {
     double left = 1e9, right = -1e9;
   };
-  std::array<Reach, kHalfHeight_px> reach;
-  std::int32_t first_row = rays.height_px, last_row = -1;
+  std::array<Reach, kRows + 1> reach;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Vec2 *upper = &polygon[i], *lower = &polygon[i + 1 < polygon.size() ? i + 1 : 0];
     if (lower->y() < upper->y()) std::swap(upper, lower);
-    const double top = upper->y(), bottom = lower->y();
-    const auto first = static_cast<std::int32_t>(std::ceil(math::clamp(top, 0.0, rays.height_px)));
-    const auto last = static_cast<std::int32_t>(std::floor(math::clamp(bottom, -1.0, rays.height_px - 1.0)));
-    const double step = (lower->x() - upper->x()) / std::max(bottom - top, 1e-9);
-    double x = upper->x() + (first - top) * step;
-    for (std::int32_t r = first; r <= last; ++r) {
-      Reach& row = reach[static_cast<std::size_t>(r)];
+    const std::int32_t first = (first_from(upper->y()) - first_row + stride - 1) / stride;
+    const std::int32_t last = last_until(lower->y()) - first_row;
+    const double step = (lower->x() - upper->x()) / std::max(lower->y() - upper->y(), 1e-9);
+    double x = upper->x() + (first_row + first * stride - upper->y()) * step;
+    for (std::int32_t k = first; k * stride <= last; ++k) {
+      Reach& row = reach[static_cast<std::size_t>(k)];
       row.left = std::min(row.left, x);
       row.right = std::max(row.right, x);
-      x += step;
+      x += step * stride;
     }
-    first_row = std::min(first_row, first);
-    last_row = std::max(last_row, last);
   }
   std::int32_t free = 0, valid = 0;
-  // Of many rows every second one says the same.
-  constexpr std::int32_t kManyRows = 32;
-  const std::int32_t stride = last_row - first_row > kManyRows ? 2 : 1;
   for (std::int32_t r = first_row; r <= last_row; r += stride) {
-    const Reach& row = reach[static_cast<std::size_t>(r)];
+    const Reach& row = reach[static_cast<std::size_t>((r - first_row) / stride)];
     // Columns whose middles, at 4 g + 1.5 in steps of two pixels, lie within.
     const auto left =
         static_cast<std::int32_t>(std::ceil(math::clamp((row.left + 0.5) / (0.5 * kColumn_px) - 0.5, 0.0, kColumns)));
