@@ -267,8 +267,7 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   // Where the surface's end runs off sideways from row to row it is a front or a back, no side.
   std::size_t count = 0;
   const std::int32_t first_row = profile.first_row, last_row = profile.last_row;
-  const std::int32_t step = 1 + (last_row - first_row) / kManyRows;
-  for (std::int32_t r = first_row; r <= last_row; r += step) {
+  for (std::int32_t r = first_row; r <= last_row; ++r) {
     const auto end_at = [&](std::int32_t row) {
       return static_cast<std::int32_t>(ends[static_cast<std::size_t>(row)]);
     };
@@ -314,6 +313,7 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
     for (const RowEnd& e : *all) between += e.row >= first && e.row <= last ? 1 : 0;
   }
   double cut_px = 0.0;
+  const std::int32_t step = 1 + (last_row - first_row) / kManyRows;
   for (std::int32_t r = first_row; r <= last_row; r += step) {
     const std::uint8_t g = ends[static_cast<std::size_t>(r)];
     if (g != kNoColumn) cut_px += step * std::max(beyond(r, outer_edge(g)) - params_.outside_px, 0.0);
