@@ -74,7 +74,8 @@ void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const no
       const std::uint32_t from_top = upper.fit & upper.fit >> 1, from_bottom = lower.fit & lower.fit >> 1;
       if (from_top != 0) interval.top = static_cast<std::int16_t>(interval.top + std::countr_zero(from_top));
       if (from_bottom != 0) {
-        interval.bottom = static_cast<std::int16_t>(interval.bottom - kRowsAtOnce + 1 + std::bit_width(from_bottom));
+        const auto rows = static_cast<std::int32_t>(std::bit_width(from_bottom));
+        interval.bottom = static_cast<std::int16_t>(interval.bottom - kRowsAtOnce + 1 + rows);
       }
       return;
     }
