@@ -10,11 +10,13 @@ enum Row : std::size_t { kSense, kEstimate, kGait, kCommand, kHealth, kIntake, k
 
 // Control on lane 0, perception on lane 1; the simulation runs both in one lane, so all rows together fit one frame.
 // Units: see the stage's step(). What they cost is stated here only, on one core of a shared AMD EPYC: 0.11-0.14 us
-// (surfaces, means over generated stairs; 0.2 us on a cluttered desk, of which the dearest pieces take five times that;
-// every piece's time over its units, the lower quartile of 25 times), 0.16-0.18 us (map) and 0.83-0.86 us (footholds:
-// thread CPU time over the units spent, both taken around run_row() in `polygmap climb --steps 4 --seed 1`, three
-// times). The table allows for more than twice that, footholds for half as much again, which also covers what other
-// programs on that machine take. Shed first: what the next frame repeats anyway.
+// (surfaces, means over generated stairs; 0.19 us on a cluttered desk; every piece's time over its units, the lower
+// quartile of 25 times, on the desk of 81), 0.16-0.18 us (map) and 0.83-0.86 us (footholds: thread CPU time over the
+// units spent, both taken around run_row() in `polygmap climb --steps 4 --seed 1`, three times). The table allows for
+// more than twice these means, footholds for half as much again, which also covers what other programs on that machine
+// take. It does not hold for each piece: on the desk a fourth row, in which four are cut into runs, takes 1.4-2.1 us of
+// its one unit, eight columns' refit up to 1.3 us a unit, and the end of a meeting, where all boundaries are decided,
+// 6 us of its one. A slot hands out hundreds. Shed first: what the next frame repeats anyway.
 inline constexpr ScheduleTable<kRowCount> kSchedule{{
     {.task = "sense", .lane = 0, .budget_us = 40},
     {.task = "estimate", .lane = 0, .budget_us = 100},

@@ -94,5 +94,19 @@ TEST_F(PixelOwner, AColumnOfTwoThings_IsTheSurfacesUpToWhereItsPixelsLeaveIt) {
   EXPECT_EQ(owner(322, 245), 0U);
 }
 
+TEST_F(PixelOwner, APixelOfTheRobotsOwnBody_IsNoSurfaces) {
+  set_plane(1, Vec3{0.0, 0.0, -1.0}, {0.0, 0.0, 1.0});
+  own(1, 39, 200, 260);
+  for (std::int32_t r = 200; r <= 260; ++r) {
+    for (std::int32_t c = 300; c < 328; ++c) see(1, c, r);
+  }
+  picture_->flags(322 / 2, 230 / 2) = kPixelBody;
+  EXPECT_EQ(owner(322, 230), 1U);  // of some picture before: rows without body are not written
+  picture_->body_rows[230 / 2] = true;
+  EXPECT_EQ(owner(322, 230), 0U);
+  EXPECT_EQ(owner(322, 232), 1U);
+  EXPECT_EQ(owner(324, 230), 0U);  // two off: what lies behind the body has left the surface
+}
+
 }  // namespace
 }  // namespace polygmap

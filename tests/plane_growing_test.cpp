@@ -28,7 +28,7 @@ class PlanesFromRuns : public testing::Test {
     boundaries_->begin(params, {}, scene_.rays, scene_.intrinsics.fy_px, scene_.intrinsics.cy_px, *scene_.image);
     std::array<std::uint8_t, SurfaceBoundaries::kMaxPlanes + 1> to_plane{};
     for (std::size_t i = 1; i <= growing_->count(); ++i) {
-      boundaries_->plane(i).plane = growing_->plane(i).plane;
+      boundaries_->set_plane(i, growing_->plane(i).plane);
       to_plane[i] = static_cast<std::uint8_t>(i);
     }
     boundaries_->begin_meeting();

@@ -154,6 +154,22 @@ TEST(PlaneMerging, LargePiecesFarApart_AreOneOnlyWherePixelsDoNotContradict) {
   }
 }
 
+// The same, 5 mm apart: each side's centre is 5 mm off the other's plane, together a little more than what lets a run
+// join. Before planes are measured that is a doubt.
+TEST(PlaneMerging, LargePiecesALittleApart_AreOneOnceTheyAreMeasured) {
+  const Vec3 up = leaning(1.0), floor{0.0, 0.0, 2.0};
+  for (const bool measured : {false, true}) {
+    SeenPlanes planes;
+    planes.show(1, up, floor, 0, 29, 200, 399);
+    planes.show(2, up, floor + 0.005 * up, 60, 79, 200, 399);
+    EXPECT_EQ(planes.merge(measured), measured ? 1 : 2);
+  }
+  SeenPlanes same;
+  same.show(1, up, floor, 0, 29, 200, 399);
+  same.show(2, up, floor + 0.001 * up, 60, 79, 200, 399);
+  EXPECT_EQ(same.merge(false), 1);
+}
+
 // A tread and its riser bend by a right angle: nothing joins them however few their pixels.
 TEST(PlaneMerging, TreadAndRiser_StayTwo) {
   SeenPlanes planes;

@@ -26,8 +26,8 @@ class Boundaries : public testing::Test {
         [=, this](std::int32_t g, std::int32_t r) { return r <= meeting_row(g) + overhang_px ? &tread_ : &riser_; },
         sigma_m, seed);
     boundaries_->begin({}, {}, scene_.rays, scene_.intrinsics.fy_px, scene_.intrinsics.cy_px, *scene_.image);
-    boundaries_->plane(kTread).plane = tread_;
-    boundaries_->plane(kRiser).plane = riser_;
+    boundaries_->set_plane(kTread, tread_);
+    boundaries_->set_plane(kRiser, riser_);
     to_plane_[kTread] = kTread;
     to_plane_[kRiser] = kRiser;
   }
@@ -87,7 +87,7 @@ TEST_F(Boundaries, PlanesThatChange_TakeTheirBoundaryAlong) {
   meet();
   tread_ = test::plane_of({0.01, -0.86, -0.5}, 0.605);
   EXPECT_GT(wrong(0.0), kColumns / 2);
-  boundaries_->plane(kTread).plane = tread_;
+  boundaries_->set_plane(kTread, tread_);
   boundaries_->follow();
   EXPECT_EQ(wrong(0.0), 0);
 }

@@ -31,6 +31,10 @@ class SurfaceSidesOfABoard : public testing::Test {
     (*planes_)[kNear].plane = test::plane_of(-Vec3::UnitZ(), 1.0);
     (*planes_)[kFar].plane = test::plane_of(-Vec3::UnitZ(), 1.3);
   }
+  void own(std::int32_t g, std::int32_t r) {
+    picture_->owners(r, g) = kNear;
+    profile_->columns[static_cast<std::size_t>(g)].add(static_cast<std::int16_t>(r), static_cast<std::int16_t>(r));
+  }
   // beyond_mm: what is seen past the board; its columns belong to owner.
   void paint(Side left, Side right, std::uint16_t beyond_mm, std::size_t owner) {
     profile_ = std::make_unique<SurfaceProfile>();
@@ -45,12 +49,8 @@ class SurfaceSidesOfABoard : public testing::Test {
       for (std::int32_t g = 0; g < picture_->column_rays.columns; ++g) {
         const double middle = kColumn_px * g + 0.5 * (kColumn_px - 1);
         const bool inside = r >= kTop && r <= kBottom && middle >= first && middle < past;
-        picture_->owners(r, g) = static_cast<std::uint8_t>(inside ? kNear : owner);
-        if (!inside) continue;
-        const auto row = static_cast<std::size_t>(r);
-        const auto column = static_cast<SurfaceProfile::Column>(g);
-        if (profile_->left[row] == SurfaceProfile::kNoColumn) profile_->left[row] = column;
-        profile_->right[row] = column;
+        picture_->owners(r, g) = static_cast<std::uint8_t>(owner);
+        if (inside) own(g, r);
       }
     }
     profile_->first_row = kTop;
@@ -59,6 +59,7 @@ class SurfaceSidesOfABoard : public testing::Test {
   }
   [[nodiscard]] OutlineSide find(bool right) {
     sides_->begin({}, {}, raw_, *picture_, *planes_);
+    sides_->find_ends(kNear, *profile_);
     return sides_->find(kNear, *profile_, right);
   }
   // The border between pixels c - 1 and c is at c - 0.5; half-resolution pixel i is where 2 i + 0.5 is.
@@ -145,8 +146,7 @@ TEST_F(SurfaceSidesOfABoard, CrookedEnd_IsNotCutStraight) {
   paint(kLeft, {400.0, 0.0}, 1300, kFar);
   for (std::int32_t r = (kTop + kBottom) / 2 + 8; r <= kBottom; ++r) {
     for (std::int32_t c = 400; c < 480; ++c) (*depth_)(c, r) = 1000;
-    for (std::int32_t g = 400 / kColumn_px; g < 480 / kColumn_px; ++g) picture_->owners(r, g) = kNear;
-    profile_->right[static_cast<std::size_t>(r)] = 480 / kColumn_px - 1;
+    for (std::int32_t g = 400 / kColumn_px; g < 480 / kColumn_px; ++g) own(g, r);
   }
   EXPECT_FALSE(find(true).fitted);
   EXPECT_NEAR(2.0 * find(true).column_px + 0.5, 479.5, 1.0);

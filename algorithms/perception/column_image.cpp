@@ -2,6 +2,7 @@
 #include "algorithms/perception/column_image.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 #include "algorithms/perception/vectors.hpp"
 
@@ -103,9 +104,30 @@ void ColumnImage::turn(std::int32_t first_row, std::int32_t last_row) noexcept {
       cv::v_store(down.row(g) + r, a), cv::v_store(down.row(g + 1) + r, b);
       cv::v_store(down.row(g + 2) + r, c), cv::v_store(down.row(g + 3) + r, d);
     }
+    using Bytes = cv::v_uint8x16;
+    static_assert(kColumns % Bytes::nlanes == 0 && kTurn == sizeof(std::uint32_t));
+    for (std::int32_t g = 0; g < kColumns; g += Bytes::nlanes) {
+      const auto row = [&](std::int32_t i) { return cv::v_load(valid.row(r + i) + g); };
+      std::array<Bytes, 2> low, high;
+      std::array<Bytes, 4> fours;
+      cv::v_zip(row(0), row(2), low[0], low[1]);
+      cv::v_zip(row(1), row(3), high[0], high[1]);
+      cv::v_zip(low[0], high[0], fours[0], fours[1]);
+      cv::v_zip(low[1], high[1], fours[2], fours[3]);
+      for (std::int32_t i = 0; i < 4; ++i) {  // four columns each
+        std::array<std::uint32_t, 4> four;
+        cv::v_store(four.data(), cv::v_reinterpret_as_u32(fours[static_cast<std::size_t>(i)]));
+        for (std::int32_t k = 0; k < 4; ++k) {
+          std::memcpy(valid_down.row(g + 4 * i + k) + r, &four[static_cast<std::size_t>(k)], sizeof(std::uint32_t));
+        }
+      }
+    }
   }
   for (; r <= last_row; ++r) {
-    for (std::int32_t g = 0; g < kColumns; ++g) down(r, g) = inverse_depth(g, r);
+    for (std::int32_t g = 0; g < kColumns; ++g) {
+      down(r, g) = inverse_depth(g, r);
+      valid_down(r, g) = valid(g, r);
+    }
   }
 }
 

@@ -20,7 +20,8 @@ struct ColumnImage {
   Raster<float, kColumns, kDepthHeight_px> inverse_depth;  // 1/m, 0 = nothing measured, or the robot's own body
   Raster<std::uint8_t, kColumns, kDepthHeight_px> valid;   // of the column's eight pixels
   Raster<float, kDepthHeight_px, kColumns> down;           // inverse_depth again, a column a line: see turn
-  // Copies some rows of inverse_depth, first a multiple of kTurn, into down.
+  Raster<std::uint8_t, kDepthHeight_px, kColumns> valid_down;
+  // Copies some rows, first a multiple of kTurn, into down and valid_down.
   static constexpr std::int32_t kTurn = 4;  // rows that are best copied together
   void turn(std::int32_t first_row, std::int32_t last_row) noexcept;
 };

@@ -4,8 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <limits>
-#include <type_traits>
 
 #include "algorithms/perception/column_image.hpp"
 #include "algorithms/perception/outline.hpp"
@@ -23,15 +21,7 @@ struct ColumnEnds {
 };
 
 struct SurfaceProfile {
-  using Column = std::conditional_t<(kColumns < 256), std::uint8_t, std::uint16_t>;
-  static constexpr Column kNoColumn = std::numeric_limits<Column>::max();
-  SurfaceProfile() noexcept {
-    left.fill(kNoColumn);
-    right.fill(kNoColumn);
-  }
   std::array<ColumnEnds, kColumns> columns{};
-  std::array<Column, kDepthHeight_px> left{};  // first and last column of each row
-  std::array<Column, kDepthHeight_px> right{};
   std::int16_t first_row = kDepthHeight_px;
   std::int16_t last_row = -1;
 };

@@ -55,6 +55,7 @@ struct FramePicture {
   HalfRays rays;
   HalfImage<std::uint8_t> flags;                 // of rows without body as some picture before left them
   std::array<bool, kHalfHeight_px> body_rows{};  // with body
+  bool any_body = false;
   ColumnRays column_rays;
   ColumnImage columns;
   Raster<std::uint8_t, kDepthHeight_px, kColumns> owners;  // a column a line: the plane of each of its rows, 0 = none

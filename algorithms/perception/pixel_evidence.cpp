@@ -21,13 +21,15 @@ double pixel_evidence(const FramePicture& picture, const RawPicture& raw, const 
       across = (across + kNextPixel) % kColumn_px;
       const std::int32_t column = kColumn_px * g + across;
       const std::uint16_t value = raw.row(row)[column];
-      if (picture.owner(g, row) != index || value < raw.range.min || value > raw.range.max) continue;
+      // Which samples count is as good as random: nothing here branches on it.
+      const bool own = picture.owner(g, row) == index, measured = raw.range.valid(value);
       const double w = 1.0 / (value * k.depth_unit_m);
       const Vec3 ray{(column - k.cx_px) / k.fx_px,
                      static_cast<double>(picture.column_rays.y[static_cast<std::size_t>(row)]), 1.0};
       const double off = (w - plane.plane.m.dot(ray)) * w;
-      ++seen;
-      on += off * off < most2 * math::square(noise.inverse_sigma(w)) ? 1 : 0;
+      const int counts = static_cast<int>(own) & static_cast<int>(measured);
+      seen += counts;
+      on += counts & static_cast<int>(off * off < most2 * math::square(noise.inverse_sigma(w)));
     }
     skip = row - ends.bottom - 1;
   }

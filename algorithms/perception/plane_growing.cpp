@@ -74,17 +74,17 @@ void PlaneGrowing::begin(const Params& params, const DepthSigma& noise, const Co
   index_rows();
 }
 
-// A column of clutter has dozens of runs, of which a neighbour overlaps one or two.
+// A column of clutter has dozens of runs, of which a neighbour overlaps one or two. Runs that end above a row are
+// counted, not looked for.
 void PlaneGrowing::index_rows() noexcept {
   static_assert(RunSegmentation::kMaxRunsPerColumn <= std::numeric_limits<std::uint8_t>::max());
   for (std::int32_t g = 0; g < rays_->columns; ++g) {
-    const RunSegmentation::Column& column = (*runs_)[static_cast<std::size_t>(g)];
     auto& first = first_near_[static_cast<std::size_t>(g)];
-    std::size_t k = 0;
-    for (std::size_t i = 0; i < first.size(); ++i) {
-      while (k < column.size() && column[k].bottom < static_cast<std::int32_t>(i) * kIndexRows) ++k;
-      first[i] = static_cast<std::uint8_t>(k);
+    first.fill(0);
+    for (const Run& run : (*runs_)[static_cast<std::size_t>(g)]) {
+      ++first[static_cast<std::size_t>(run.bottom / kIndexRows + 1)];
     }
+    for (std::size_t i = 1; i < first.size(); ++i) first[i] = static_cast<std::uint8_t>(first[i] + first[i - 1]);
   }
 }
 
@@ -119,7 +119,9 @@ bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noe
     const Run& other = column[k];
     const std::int32_t shared = std::min(run.bottom, other.bottom) - std::max(run.top, other.top) + 1;
     const std::int32_t covered = std::max(run.bottom, other.bottom) - std::min(run.top, other.top) + 1;
-    if ((other.plane != 0 && other.plane != kTried) || 2 * shared <= covered || shared <= most) continue;
+    // Clutter has no habits that a branch could learn.
+    const int free = static_cast<int>(other.plane == 0) | static_cast<int>(other.plane == kTried);
+    if ((free & static_cast<int>(2 * shared > covered) & static_cast<int>(shared > most)) == 0) continue;
     most = shared;
     best = {static_cast<std::int16_t>(g), static_cast<std::int16_t>(k)};
   }

@@ -56,12 +56,20 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
 void PlaneMerging::merge_pieces(const Params& params, const PlaneGrowing::Params& growing, const DepthSigma& noise,
                                 FramePlanes& planes, PlaneIndex& to_plane, bool measured) noexcept {
   const double least_cosine = math::cos(params.merge_tilt_rad), least_small = math::cos(2.0 * params.merge_tilt_rad);
-  std::array<Vec3, FramePlanes::kMaxPlanes + 1> normals;
-  for (std::size_t p = 1; p <= planes.count; ++p) normals[p] = planes[p].plane.normal();
-  for (std::size_t a = 1; a <= planes.count; ++a) {
-    for (std::size_t b = a + 1; b <= planes.count && planes[a].alive; ++b) {
-      const double cosine = normals[a].dot(normals[b]);
-      if (!planes[b].alive || planes[a].facet || planes[b].facet || cosine < least_small) continue;
+  struct Candidate {
+    Vec3 normal;
+    std::size_t plane;
+  };
+  StaticVector<Candidate, FramePlanes::kMaxPlanes> candidates;
+  for (std::size_t p = 1; p <= planes.count; ++p) {
+    if (planes[p].alive && !planes[p].facet) static_cast<void>(candidates.try_push_back({planes[p].plane.normal(), p}));
+  }
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const std::size_t a = candidates[i].plane;
+    for (std::size_t j = i + 1; j < candidates.size() && planes[a].alive; ++j) {
+      const double cosine = candidates[i].normal.dot(candidates[j].normal);
+      const std::size_t b = candidates[j].plane;
+      if (cosine < least_small || !planes[b].alive) continue;
       const std::size_t keep = planes[a].pixels >= planes[b].pixels ? a : b, gone = keep == a ? b : a;
       FramePlane &p = planes[keep], &q = planes[gone];
       const bool small = q.pixels < params.small_plane_px;

@@ -77,9 +77,27 @@ void RunSegmentation::clear(std::int32_t column) noexcept {
 
 void RunSegmentation::add_rows(std::int32_t first, std::int32_t last) noexcept {
   const Wides c(*this);
+  // Columns whose rows cannot be added as a block, or do not go on, take them one by one, a row across them all before
+  // the next: a column's rows wait for one another, columns do not.
+  std::array<std::int32_t, kColumns / kGroup + 1> singly;
+  std::size_t count = 0;
   for (std::int32_t column = 0; column < column_count_; column += kGroup) {
-    if (last - first + 1 == kBlock && try_block(c, column, first)) continue;
-    for (std::int32_t row = first; row <= last; ++row) add_row(c, column, row);
+    singly[count] = column;
+    count += last - first + 1 == kBlock && try_block(c, column, first) ? 0U : 1U;
+  }
+  if (count == 0) return;
+  for (std::int32_t row = first; row <= last; ++row) {
+    static_assert(64 % kGroup == 0);
+    std::array<std::uint64_t, (kColumns + 63) / 64> events{};
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::int32_t column = singly[i];
+      events[static_cast<std::size_t>(column / 64)] |= std::uint64_t{add_row(c, column, row)} << (column % 64);
+    }
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      for (std::uint64_t left = events[i]; left != 0; left &= left - 1) {
+        handle(static_cast<std::int32_t>(64 * i) + std::countr_zero(left), row);
+      }
+    }
   }
 }
 
@@ -93,6 +111,13 @@ bool RunSegmentation::try_block(const Wides& c, std::int32_t column, std::int32_
     Wide idle, rows, value, slope, lever, squares, drift, absent;
   };
   std::array<Next, kRegisters> next;
+  // Runs too young for a block are none.
+  Wide may_go_on = c.zero == c.zero;
+  for (std::int32_t g = column; g < column + kGroup; g += Wide::nlanes) {
+    const Wide rows = cv::vx_load(open_.rows.data() + g);
+    may_go_on = may_go_on & ((rows >= c.fitted) | (rows == c.zero));
+  }
+  if (!cv::v_check_all(may_go_on)) return false;
   for (std::size_t i = 0; i < kRegisters; ++i) {
     const std::size_t g = static_cast<std::size_t>(column) + i * Wide::nlanes;
     const auto load = [g](const Floats& x) { return cv::vx_load(x.data() + g); };
@@ -152,7 +177,9 @@ bool RunSegmentation::try_block(const Wides& c, std::int32_t column, std::int32_
   return true;
 }
 
-void RunSegmentation::add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept {
+// A bit for each of the group's columns in which something ends.
+std::uint32_t RunSegmentation::add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept {
+  std::uint32_t events = 0;
   const Wide to_centre = all(cy_ - static_cast<float>(row));
   // Whole registers: what columns beyond a narrower picture say is never read.
   for (std::int32_t column = first_column; column < first_column + kGroup; column += Wide::nlanes) {
@@ -194,9 +221,10 @@ void RunSegmentation::add_row(const Wides& c, std::int32_t first_column, std::in
 
     const Wide strange = cv::v_select(fitted, c.zero, valid) & ~fits;
     const Wide bent = in & (n1 > c.long_run) & (drift * drift * w2 > c.bend2 * spread);
-    auto events = static_cast<std::uint32_t>(cv::v_signmask(strange | bent | (absent > c.max_gap)));
-    for (; events != 0; events &= events - 1U) handle(column + std::countr_zero(events), row);
+    events |= static_cast<std::uint32_t>(cv::v_signmask(strange | bent | (absent > c.max_gap)))
+              << (column - first_column);
   }
+  return events;
 }
 
 // Ends the column's run where it stopped fitting and starts the next one with the rows since.
@@ -208,57 +236,79 @@ void RunSegmentation::handle(std::int32_t column, std::int32_t row) noexcept {
     close(column, from - 1, row);
   } else if (open_.rows[g] >= kFitted) {
     from = row - kBentRows + 1;
-    for (std::int32_t r = from; r <= row; ++r) forget(column, r, row);
+    forget(column, from, row);
     close(column, from - 1, row);
   }
   replay(column, from, row);
 }
 
+// One column's state, in registers while several rows in turn change it.
+struct RunSegmentation::OneColumn {
+  float rows = 0.0F, value = kNowhere, slope = 0.0F, lever = 0.0F, squares = kNoSpread, drift = 0.0F, absent = kNever;
+  OneColumn() noexcept = default;
+  OneColumn(const Open& open, std::size_t g) noexcept
+      : rows(open.rows[g]),
+        value(open.value[g]),
+        slope(open.slope[g]),
+        lever(open.lever[g]),
+        squares(open.squares[g]),
+        drift(open.drift[g]),
+        absent(open.absent[g]) {}
+  void store(Open& open, std::size_t g) const noexcept {
+    open.rows[g] = rows, open.value[g] = value, open.slope[g] = slope, open.lever[g] = lever;
+    open.squares[g] = squares, open.drift[g] = drift, open.absent[g] = absent;
+  }
+};
+
 // Opens a run at the first row with data. Rows this few make no line: each is held against the one before.
 void RunSegmentation::replay(std::int32_t column, std::int32_t from, std::int32_t row) noexcept {
   const auto g = static_cast<std::size_t>(column);
-  clear(column);
+  OneColumn run;
   for (std::int32_t r = from; r <= row; ++r) {
     const float w = image_->inverse_depth(column, r), jump = (jump_[2] * w + jump_[1]) * w + jump_[0];
-    const bool open = open_.rows[g] > 0.0F;
-    open_.value[g] += open_.slope[g];
-    open_.lever[g] += 1.0F;
-    const float residual = w - open_.value[g], off = residual + open_.slope[g];
+    run.value += run.slope;
+    run.lever += 1.0F;
+    const float residual = w - run.value, off = residual + run.slope;
     if (!(w > 0.0F)) {
-      open_.absent[g] += 1.0F;
-    } else if (open && off * off < jump * jump) {
-      const float share = 1.0F / (open_.rows[g] + 1.0F);
-      open_.rows[g] += 1.0F;
-      open_.squares[g] += open_.lever[g] * (open_.lever[g] - open_.lever[g] * share);
-      open_.lever[g] -= open_.lever[g] * share;
-      const float gain = residual * (open_.lever[g] / open_.squares[g]);
-      open_.value[g] += residual * share + gain * open_.lever[g];
-      open_.slope[g] += gain;
-      open_.absent[g] = 0.0F;
+      run.absent += 1.0F;
+    } else if (run.rows > 0.0F && off * off < jump * jump) {
+      const float share = 1.0F / (run.rows + 1.0F);
+      run.rows += 1.0F;
+      run.squares += run.lever * (run.lever - run.lever * share);
+      run.lever -= run.lever * share;
+      const float gain = residual * (run.lever / run.squares);
+      run.value += residual * share + gain * run.lever;
+      run.slope += gain;
+      run.absent = 0.0F;
     } else {
-      clear(column);
-      open_.rows[g] = 1.0F;
-      open_.value[g] = w;
-      open_.absent[g] = 0.0F;
+      run = OneColumn();
+      run.rows = 1.0F;
+      run.value = w;
+      run.absent = 0.0F;
       top_[g] = static_cast<std::int16_t>(r);
     }
   }
+  run.store(open_, g);
 }
 
-// Takes one accepted row out of the line again.
-void RunSegmentation::forget(std::int32_t column, std::int32_t forgotten, std::int32_t row) noexcept {
+// Takes accepted rows, the last ones up to row, out of the line again.
+void RunSegmentation::forget(std::int32_t column, std::int32_t from, std::int32_t row) noexcept {
   const auto g = static_cast<std::size_t>(column);
-  const float w = image_->inverse_depth(column, forgotten), back = static_cast<float>(forgotten - row);
-  const float n = open_.rows[g] - 1.0F, x = open_.lever[g] + back;
-  const float squares = open_.squares[g] - x * x * open_.rows[g] / n;
-  if (!(w > 0.0F) || n < kFitted || !(squares > 0.0F)) return;
-  const float residual = w - (open_.value[g] + open_.slope[g] * back);
-  const float gain = residual * (x * open_.rows[g] / n / squares);
-  open_.rows[g] = n;
-  open_.squares[g] = squares;
-  open_.lever[g] += x / n;
-  open_.value[g] -= residual / n + gain * open_.lever[g];
-  open_.slope[g] -= gain;
+  OneColumn run(open_, g);
+  for (std::int32_t r = from; r <= row; ++r) {
+    const float w = image_->inverse_depth(column, r), back = static_cast<float>(r - row);
+    const float n = run.rows - 1.0F, x = run.lever + back;
+    const float squares = run.squares - x * x * run.rows / n;
+    if (!(w > 0.0F) || n < kFitted || !(squares > 0.0F)) continue;
+    const float residual = w - (run.value + run.slope * back);
+    const float gain = residual * (x * run.rows / n / squares);
+    run.rows = n;
+    run.squares = squares;
+    run.lever += x / n;
+    run.value -= residual / n + gain * run.lever;
+    run.slope -= gain;
+  }
+  run.store(open_, g);
 }
 
 std::int32_t RunSegmentation::last_accepted(std::int32_t column, std::int32_t row) const noexcept {

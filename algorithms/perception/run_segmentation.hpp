@@ -67,11 +67,12 @@ class RunSegmentation {
   };
 
   struct Wides;  // the parameters in vector registers
+  struct OneColumn;
   [[nodiscard]] bool try_block(const Wides& c, std::int32_t column, std::int32_t row) noexcept;
-  void add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept;
+  [[nodiscard]] std::uint32_t add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept;
   void handle(std::int32_t g, std::int32_t row) noexcept;
   void replay(std::int32_t g, std::int32_t from, std::int32_t row) noexcept;
-  void forget(std::int32_t g, std::int32_t forgotten, std::int32_t row) noexcept;
+  void forget(std::int32_t g, std::int32_t from, std::int32_t row) noexcept;
   [[nodiscard]] std::int32_t last_accepted(std::int32_t g, std::int32_t row) const noexcept;
   void close(std::int32_t g, std::int32_t bottom, std::int32_t row) noexcept;
   void clear(std::int32_t g) noexcept;

@@ -2,6 +2,7 @@
 #include "algorithms/perception/surface_boundaries.hpp"
 
 #include <algorithm>
+#include <bit>
 
 #include "algorithms/perception/vectors.hpp"
 
@@ -34,7 +35,7 @@ void SurfaceBoundaries::gather(std::int32_t column, const RunSegmentation::Colum
     const std::uint8_t plane = run.plane <= kMaxPlanes ? to_plane[run.plane] : std::uint8_t{0};
     if (plane == 0) continue;
     if (!out.empty() && out.back().plane == plane) {
-      const Line line = line_of(planes_[plane].plane, column);
+      const Line line = line_of(plane, column);
       int other = 0, own = 0;
       for (std::int32_t r = out.back().bottom + 1; r < run.top; ++r) {
         const float w = image_->down(r, column);
@@ -63,8 +64,22 @@ void SurfaceBoundaries::trim(std::int32_t column) noexcept {
 }
 
 void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const noexcept {
-  constexpr std::int32_t kMost_px = 8, kGood = 2;
-  const Line line = line_of(planes_[interval.plane].plane, column);
+  constexpr std::int32_t kMost_px = kRowsAtOnce, kGood = 2;
+  const Line line = line_of(interval.plane, column);
+  if (interval.bottom - interval.top + 1 >= kRowsAtOnce) {
+    constexpr std::uint32_t kAll = (1U << kRowsAtOnce) - 1U;
+    const Rows upper = fitting(line, column, interval.top);
+    const Rows lower = fitting(line, column, interval.bottom - kRowsAtOnce + 1);
+    if ((upper.measured & lower.measured) == kAll) {  // the first two good ones next to each other, if there are any
+      const std::uint32_t from_top = upper.fit & upper.fit >> 1, from_bottom = lower.fit & lower.fit >> 1;
+      if (from_top != 0) interval.top = static_cast<std::int16_t>(interval.top + std::countr_zero(from_top));
+      if (from_bottom != 0) {
+        const auto rows = static_cast<std::int32_t>(std::bit_width(from_bottom));
+        interval.bottom = static_cast<std::int16_t>(interval.bottom - kRowsAtOnce + 1 + rows);
+      }
+      return;
+    }
+  }
   const auto cut = [&](std::int32_t from, std::int32_t step) {
     std::int32_t at = from, good = 0;
     for (std::int32_t i = 0; i < kMost_px && good < kGood; ++i) {
@@ -87,29 +102,30 @@ void SurfaceBoundaries::trim(std::int32_t column, ColumnSpan& interval) const no
 void SurfaceBoundaries::begin_meeting() noexcept {
   joint_count_ = 0;
   pair_count_ = 0;
+  for (auto& lower : pair_of_) lower.fill(kMaxPairs);
 }
 
-std::uint16_t SurfaceBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower) noexcept {
-  for (std::size_t i = 0; i < pair_count_; ++i) {
-    if (pairs_[i].upper == upper && pairs_[i].lower == lower) return static_cast<std::uint16_t>(i);
-  }
+std::uint8_t SurfaceBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower) noexcept {
+  std::uint8_t& index = pair_of_[upper][lower];
+  if (index < kMaxPairs) return index;
   if (pair_count_ == kMaxPairs) {
     ++overflow_;
     return kMaxPairs;
   }
-  Pair& pair = pairs_[pair_count_];
+  index = static_cast<std::uint8_t>(pair_count_++);
+  Pair& pair = pairs_[index];
   pair.upper = upper;
   pair.lower = lower;
   pair.columns = 0.0;
-  pair.gain.fill(0.0F);
-  return static_cast<std::uint16_t>(pair_count_++);
+  for (auto& gain : pair.gain) gain.fill(0.0F);
+  return index;
 }
 
 // Grows one end while rows without data or two rows off the plane do not stop it.
 void SurfaceBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::int32_t step,
                                std::int32_t limit) noexcept {
   constexpr int kMaxEmpty = 3;
-  const Line line = line_of(planes_[interval.plane].plane, column);
+  const Line line = line_of(interval.plane, column);
   const auto most = static_cast<float>(math::square(params_.inlier_sigmas));
   std::int16_t& end = step > 0 ? interval.bottom : interval.top;
   int empty = 0, off = 0;
@@ -130,48 +146,60 @@ void SurfaceBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::i
 std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& upper, const Line& lower,
                                              std::int32_t first, std::int32_t last, float meeting_row,
                                              Pair* pair) const noexcept {
-  // One sigma for both: with each its own, the boundary drifts towards the less noisy plane.
-  const float norm2 = upper.norm * lower.norm;
-  const auto to_bin = [&](std::int32_t r) {
-    return static_cast<std::int32_t>(
-               std::floor((static_cast<float>(r) - meeting_row) * static_cast<float>(kBinsPerPixel))) +
-           kBins / 2;
-  };
-  constexpr std::int32_t kNowhere = -1000000;
-  std::int32_t bin = pair != nullptr ? to_bin(first) : kNowhere;  // a row further is kBinsPerPixel bins further
-  float sum = 0.0F, best = 0.0F;
-  std::int32_t at = first - 1;
   using Wide = cv::v_float32;
-  constexpr std::int32_t kAtOnce = 8;
-  static_assert(kAtOnce % Wide::nlanes == 0);
+  using Four = cv::v_float32x4;
+  constexpr std::int32_t kAtOnce = kRowsAtOnce;
+  static_assert(kAtOnce % Wide::nlanes == 0 && kAtOnce % Four::nlanes == 0);
+  static constexpr std::array<float, kAtOnce> kSteps{0, 1, 2, 3, 4, 5, 6, 7};
   const auto all = [](float x) { return cv::vx_setall_f32(x); };
-  const Wide zero = all(0.0F), most = all(kTruncation);
+  // One sigma for both: with each its own, the boundary drifts towards the less noisy plane.
+  const Wide norm2 = all(upper.norm * lower.norm), zero = all(0.0F), most = all(kTruncation);
+  const Wide share1 = all(correlated_share_), share0 = all(1.0F - correlated_share_);
+  float* bins = nullptr;
+  std::int32_t bin = 0;  // a row further is a bin further
+  if (pair != nullptr) {
+    const auto half_px = static_cast<std::int32_t>(std::floor(2.0F * (static_cast<float>(first) - meeting_row)));
+    bins = pair->gain[static_cast<std::size_t>(half_px & 1)].data();
+    bin = (half_px >> 1) + kBins / 2;
+  }
   const float *ws = image_->down.row(column), *ys = rays_->y.data();
-  for (std::int32_t from = first; from <= last; from += kAtOnce) {
+  Four sum = cv::v_setzero_f32();
+  float best = 0.0F;
+  std::int32_t at = first - 1;
+  for (std::int32_t from = first; from <= last; from += kAtOnce, bin += kAtOnce) {
     // The last rows of the picture are looked at with others before them.
-    const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce), end = std::min(last + 1 - start, kAtOnce);
-    std::array<float, kAtOnce> share, gains;
-    for (std::int32_t i = 0; i < kAtOnce; ++i) {
-      share[static_cast<std::size_t>(i)] = share_[image_->valid(column, start + i)];
-    }
+    const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce);
+    const Wide first_step = all(static_cast<float>(from - start)), last_step = all(static_cast<float>(last - start));
+    std::array<float, kAtOnce> gains;
     for (std::int32_t i = 0; i < kAtOnce; i += Wide::nlanes) {
       const Wide w = cv::vx_load(ws + start + i), y = cv::vx_load(ys + start + i);
       const Wide off_upper = (w - (all(upper.a) + all(upper.b) * y)) * w;
       const Wide off_lower = (w - (all(lower.a) + all(lower.b) * y)) * w;
       const Wide sigma = (all(base_) * w + all(per_metre_)) * w + all(quadratic_);
-      const Wide information = all(1.0F) / (sigma * sigma * all(norm2) * cv::vx_load(share.data() + i));
+      const Wide pixels =
+          cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand_q(image_->valid_down.row(column) + start + i)));
+      const Wide information = pixels / (sigma * sigma * norm2 * (share1 * pixels + share0));
       const Wide gain =
           cv::v_min(off_upper * off_upper * information, most) - cv::v_min(off_lower * off_lower * information, most);
-      cv::v_store(gains.data() + i, gain & (w > zero));  // nothing where there is no data
+      // Nothing where there is no data.
+      const Wide step = cv::vx_load(kSteps.data() + i);
+      cv::v_store(gains.data() + i, gain & (w > zero) & (step >= first_step) & (step <= last_step));
     }
-    for (std::int32_t i = from - start; i < end; ++i, bin += kBinsPerPixel) {
-      const float gain = gains[static_cast<std::size_t>(i)];
-      sum += gain;
-      if (sum < best) {
-        best = sum;
-        at = start + i;
-      }
-      if (bin >= 0 && bin < kBins) pair->gain[static_cast<std::size_t>(bin)] += gain;
+    for (std::int32_t i = 0; i < kAtOnce; i += Four::nlanes) {
+      Four sums = cv::v_load(gains.data() + i);
+      sums = sums + cv::v_rotate_left<1>(sums);
+      sums = sums + cv::v_rotate_left<2>(sums) + sum;
+      sum = cv::v_broadcast_element<3>(sums);
+      const float least = cv::v_reduce_min(sums);
+      if (least >= best) continue;
+      best = least;
+      at = start + i + std::countr_zero(static_cast<std::uint32_t>(cv::v_signmask(sums <= cv::v_setall_f32(least))));
+    }
+    const std::int32_t first_bin = bin - (from - start);
+    if (bins == nullptr || first_bin < -kAtOnce || first_bin > kBins) continue;
+    for (std::int32_t i = 0; i < kAtOnce; i += Wide::nlanes) {
+      float* to = bins + kAtOnce + first_bin + i;
+      cv::v_store(to, cv::vx_load(to) + cv::vx_load(gains.data() + i));
     }
   }
   return at;
@@ -192,7 +220,7 @@ void SurfaceBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
       extend(column, lower, -1, upper.bottom + 1);
       continue;
     }
-    const Line a = line_of(planes_[upper.plane].plane, column), b = line_of(planes_[lower.plane].plane, column);
+    const Line a = line_of(upper.plane, column), b = line_of(lower.plane, column);
     const double row = meeting_row(a, b);
     const std::int32_t window = params_.window_px;
     std::int32_t first = upper.bottom, last = lower.top;
@@ -209,11 +237,11 @@ void SurfaceBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
     first = std::max<std::int32_t>(first - window, upper.top);
     last = std::min<std::int32_t>(last + window, lower.bottom);
     overflow_ += meets && joint_count_ == kMaxJoints ? 1U : 0U;
-    const std::uint16_t i = meets && joint_count_ < kMaxJoints ? pair_of(upper.plane, lower.plane) : kMaxPairs;
+    const std::uint8_t i = meets && joint_count_ < kMaxJoints ? pair_of(upper.plane, lower.plane) : kMaxPairs;
     Pair* pair = i == kMaxPairs ? nullptr : &pairs_[i];
     if (pair != nullptr) {
       pair->columns += 1.0;
-      joints_[joint_count_++] = {i, static_cast<std::int16_t>(column), static_cast<std::uint8_t>(k)};
+      joints_[joint_count_++] = {static_cast<std::int16_t>(column), i, static_cast<std::uint8_t>(k)};
     }
     const std::int32_t own = change_point(column, a, b, first, last, static_cast<float>(row), pair);
     upper.bottom = static_cast<std::int16_t>(std::clamp<std::int32_t>(own, upper.top, lower.bottom - 1));
@@ -224,15 +252,17 @@ void SurfaceBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
 void SurfaceBoundaries::settle() noexcept {
   for (std::size_t i = 0; i < pair_count_; ++i) {
     double sum = 0.0, best = 0.0, meeting = 0.0;
-    std::int32_t at = 0;  // bins above the boundary
-    for (std::int32_t bin = 0; bin < kBins; ++bin) {
+    std::size_t at = 0;  // half bins above the boundary
+    for (std::size_t bin = 0; bin < kBins; ++bin) {
       if (bin == kBins / 2) meeting = sum;
-      sum += static_cast<double>(pairs_[i].gain[static_cast<std::size_t>(bin)]);
-      if (sum >= best) continue;
-      best = sum;
-      at = bin + 1;
+      for (std::size_t half = 0; half < 2; ++half) {
+        sum += static_cast<double>(pairs_[i].gain[half][kRowsAtOnce + bin]);
+        if (sum >= best) continue;
+        best = sum;
+        at = 2 * bin + half + 1;
+      }
     }
-    const double offset_px = (at - 0.5 * kBins) / kBinsPerPixel;
+    const double offset_px = 0.5 * static_cast<double>(at) - 0.5 * kBins;
     const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].columns;
     pairs_[i].shift_px = meets ? 0.0 : offset_px;
   }
@@ -244,8 +274,7 @@ void SurfaceBoundaries::follow() noexcept {
     const Joint& joint = joints_[i];
     Column& intervals = columns_[static_cast<std::size_t>(joint.column)];
     ColumnSpan &upper = intervals[joint.upper], &lower = intervals[joint.upper + 1U];
-    const Line a = line_of(planes_[upper.plane].plane, joint.column),
-               b = line_of(planes_[lower.plane].plane, joint.column);
+    const Line a = line_of(upper.plane, joint.column), b = line_of(lower.plane, joint.column);
     const double row = std::ceil(meeting_row(a, b) + pairs_[joint.pair].shift_px) - 1.0;
     if (!std::isfinite(row)) continue;
     upper.bottom = static_cast<std::int16_t>(math::clamp(row, upper.top, lower.bottom - 1.0));

@@ -45,6 +45,7 @@ class SurfaceBoundaries {
   using Columns = std::array<Column, kColumns>;
   struct Plane {
     InversePlane plane;
+    float norm = 1.0F;       // of plane.m
     PlaneMoments moments;    // of the last refit, weights 1 / sigma^2
     double residual2 = 0.0;  // sum of squared normal distances, per pixel
     double seen_px = 0.0;    // measured in the rows refitted to, among them those that the plane does not explain
@@ -53,7 +54,10 @@ class SurfaceBoundaries {
   void begin(const Params& params, const DepthSigma& noise, const ColumnRays& rays, double fy_px, double cy_px,
              const ColumnImage& image) noexcept;
   // Planes are set by the caller between the passes; 1-based.
-  [[nodiscard]] Plane& plane(std::size_t i) noexcept { return planes_[i]; }
+  void set_plane(std::size_t i, const InversePlane& plane) noexcept {
+    planes_[i].plane = plane;
+    planes_[i].norm = static_cast<float>(plane.m.norm());
+  }
   [[nodiscard]] const Plane& plane(std::size_t i) const noexcept { return planes_[i]; }
 
   // One column's runs to intervals, each run's plane looked up in to_plane.
@@ -93,27 +97,29 @@ class SurfaceBoundaries {
 
  private:
   static constexpr std::size_t kMaxJoints = 26 * static_cast<std::size_t>(kColumns);  // ten steps have 20 a column
-  static constexpr std::size_t kMaxPairs = 192;
-  static constexpr std::int32_t kBins = 64;  // of half a pixel, -16 .. 16
-  static constexpr std::int32_t kBinsPerPixel = 2;
+  static constexpr std::uint8_t kMaxPairs = 192;
+  static constexpr std::int32_t kRowsAtOnce = 8;
+  static constexpr std::int32_t kBins = 32;  // of a pixel, -16 .. 16
   struct Joint {
-    std::uint16_t pair = 0;
     std::int16_t column = 0;
+    std::uint8_t pair = 0;
     std::uint8_t upper = 0;  // interval
   };
   struct Pair {
     std::uint8_t upper = 0;
     std::uint8_t lower = 0;
     double columns = 0.0;
-    double shift_px = 0.0;            // of the boundary from where the planes meet
-    std::array<float, kBins> gain{};  // sum of cost(upper) - cost(lower), by distance from where the planes meet
+    double shift_px = 0.0;  // of the boundary from where the planes meet
+    // Sum of cost(upper) - cost(lower), by distance from where the planes meet: rows in the upper halves of the bins,
+    // then those in the lower halves. Eight rows are added at once, beyond both ends, too.
+    std::array<std::array<float, kBins + 2 * kRowsAtOnce>, 2> gain{};
   };
   static constexpr float kTruncation = 9.0F;  // of a cost: an outlier says no more than three sigmas do
   // A plane in one column: inverse depth a + b y, and its tolerance per sigma.
   struct Line {
     float a, b, norm;
   };
-  [[nodiscard]] Line line_of(const InversePlane& plane, std::int32_t column) const noexcept;
+  [[nodiscard]] Line line_of(std::uint8_t plane, std::int32_t column) const noexcept;
   [[nodiscard]] float inverse_sigma(float w) const noexcept { return (base_ * w + per_metre_) * w + quadratic_; }
   // A row against a line: residual over sigma, squared, is off2 / variance.
   struct Offset {
@@ -122,16 +128,20 @@ class SurfaceBoundaries {
   };
   [[nodiscard]] Offset offset(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
   void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
-  struct Depths {  // the range of some rows' inverse depths, 1/m; farthest > nearest: none has any
+  struct Depths {  // the range of some rows' inverse depths, 1/m
     float farthest, nearest;
+    [[nodiscard]] bool any() const noexcept { return nearest >= farthest; }
   };
   [[nodiscard]] Depths depths_of(std::int32_t column, std::int32_t first, std::int32_t last) const noexcept;
-  [[nodiscard]] bool reaches(std::int32_t column, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
+  [[nodiscard]] bool reaches(const Line& line, std::int32_t top, std::int32_t bottom,
                              const Depths& depths) const noexcept;
-  static constexpr std::int32_t kRowsAtOnce = 8;
-  [[nodiscard]] std::uint32_t fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept;
+  struct Rows {  // a bit for each of kRowsAtOnce
+    std::uint32_t measured = 0, fit = 0;
+  };
+  // Which of the rows from first on have data, and which of them lie on the line.
+  [[nodiscard]] Rows fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept;
   // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
-  void weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
+  void weigh_claim(std::int32_t column, const Line& line, const ColumnSpan& candidate, std::int32_t& most,
                    ColumnSpan& claimed) const noexcept;
   struct Gap {  // rows of a column between spans of two planes, 0 = none
     std::int32_t column, from, until;
@@ -157,7 +167,7 @@ class SurfaceBoundaries {
     return static_cast<double>(lower.a - upper.a) / static_cast<double>(upper.b - lower.b) * fy_px_ + cy_px_;
   }
   void sample_noise(std::int32_t column) noexcept;
-  [[nodiscard]] std::uint16_t pair_of(std::uint8_t upper, std::uint8_t lower) noexcept;
+  [[nodiscard]] std::uint8_t pair_of(std::uint8_t upper, std::uint8_t lower) noexcept;
 
   Params params_;
   const ColumnRays* rays_ = nullptr;
@@ -172,15 +182,15 @@ class SurfaceBoundaries {
   std::size_t joint_count_ = 0;
   std::array<Pair, kMaxPairs> pairs_{};
   std::size_t pair_count_ = 0;
+  std::array<std::array<std::uint8_t, kMaxPlanes + 1>, kMaxPlanes + 1> pair_of_{};  // by upper and lower
   NoiseSamples noise_samples_;
   std::uint32_t overflow_ = 0;
 };
 
-inline SurfaceBoundaries::Line SurfaceBoundaries::line_of(const InversePlane& plane,
-                                                          std::int32_t column) const noexcept {
+inline SurfaceBoundaries::Line SurfaceBoundaries::line_of(std::uint8_t plane, std::int32_t column) const noexcept {
   const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(column)]);
-  return {static_cast<float>(plane.m.x() * x + plane.m.z()), static_cast<float>(plane.m.y()),
-          static_cast<float>(plane.m.norm())};
+  const Vec3& m = planes_[plane].plane.m;
+  return {static_cast<float>(m.x() * x + m.z()), static_cast<float>(m.y()), planes_[plane].norm};
 }
 
 inline SurfaceBoundaries::Offset SurfaceBoundaries::offset(const Line& line, std::int32_t column,
@@ -188,7 +198,7 @@ inline SurfaceBoundaries::Offset SurfaceBoundaries::offset(const Line& line, std
   const float w = image_->down(row, column);
   const float residual = (w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)])) * w;
   const float sigma = inverse_sigma(w) * line.norm;
-  return {residual * residual, sigma * sigma * share_[image_->valid(column, row)]};
+  return {residual * residual, sigma * sigma * share_[image_->valid_down(row, column)]};
 }
 
 }  // namespace polygmap

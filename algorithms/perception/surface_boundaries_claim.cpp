@@ -8,30 +8,30 @@
 
 namespace polygmap {
 
-// Of the rows first .. first + kRowsAtOnce - 1, a bit for each that lies on the line. As offset() has it.
-std::uint32_t SurfaceBoundaries::fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept {
+// As offset() has it.
+SurfaceBoundaries::Rows SurfaceBoundaries::fitting(const Line& line, std::int32_t column,
+                                                   std::int32_t first) const noexcept {
   using Wide = cv::v_float32;
   static_assert(kRowsAtOnce % Wide::nlanes == 0 && kDepthHeight_px % kRowsAtOnce == 0);
   const auto all = [](float x) { return cv::vx_setall_f32(x); };
-  std::array<float, kRowsAtOnce> share;
-  for (std::int32_t i = 0; i < kRowsAtOnce; ++i) {
-    share[static_cast<std::size_t>(i)] = share_[image_->valid(column, first + i)];
-  }
-  std::uint32_t bits = 0;
+  Rows rows;
   for (std::int32_t i = 0; i < kRowsAtOnce; i += Wide::nlanes) {
     const Wide w = cv::vx_load(image_->down.row(column) + first + i), y = cv::vx_load(rays_->y.data() + first + i);
     const Wide residual = (w - (all(line.a) + all(line.b) * y)) * w;
     const Wide sigma = ((all(base_) * w + all(per_metre_)) * w + all(quadratic_)) * all(line.norm);
-    const Wide variance = sigma * sigma * cv::vx_load(share.data() + i);
-    const Wide fits = (w > all(0.0F)) & (residual * residual < all(kTruncation) * variance);
-    bits |= static_cast<std::uint32_t>(cv::v_signmask(fits)) << i;
+    const Wide pixels =
+        cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand_q(image_->valid_down.row(column) + first + i)));
+    const Wide most =
+        all(kTruncation) * sigma * sigma * (all(correlated_share_) * pixels + all(1.0F - correlated_share_));
+    const Wide measured = w > all(0.0F), fits = measured & (residual * residual * pixels < most);
+    rows.measured |= static_cast<std::uint32_t>(cv::v_signmask(measured)) << i;
+    rows.fit |= static_cast<std::uint32_t>(cv::v_signmask(fits)) << i;
   }
-  return bits;
+  return rows;
 }
 
-void SurfaceBoundaries::weigh_claim(std::int32_t column, const ColumnSpan& candidate, std::int32_t& most,
-                                    ColumnSpan& claimed) const noexcept {
-  const Line line = line_of(planes_[candidate.plane].plane, column);
+void SurfaceBoundaries::weigh_claim(std::int32_t column, const Line& line, const ColumnSpan& candidate,
+                                    std::int32_t& most, ColumnSpan& claimed) const noexcept {
   // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
   std::int32_t top = -1, bottom = -1, rows = 0, off = 0;
   const auto close = [&] {
@@ -44,13 +44,13 @@ void SurfaceBoundaries::weigh_claim(std::int32_t column, const ColumnSpan& candi
     rows = off = 0;
     top = -1;
   };
-  // A bit for each of eight rows that are looked at together.
+  // A bit for each row; of eight rows that are looked at together.
   std::int32_t looked_at = -1;
   std::uint32_t eight = 0;
   const auto bits_from = [&](std::int32_t r) {
     if (r / kRowsAtOnce != looked_at) {
       looked_at = r / kRowsAtOnce;
-      eight = fitting(line, column, looked_at * kRowsAtOnce);
+      eight = fitting(line, column, looked_at * kRowsAtOnce).fit;
     }
     return eight >> (r % kRowsAtOnce);
   };
@@ -86,28 +86,26 @@ SurfaceBoundaries::Depths SurfaceBoundaries::depths_of(std::int32_t column, std:
                                                        std::int32_t last) const noexcept {
   using Wide = cv::v_float32;
   constexpr float kNone = 1e9F;  // 1/m
+  static constexpr std::array<float, kRowsAtOnce> kSteps{0, 1, 2, 3, 4, 5, 6, 7};
   const float* w = image_->down.row(column);
   const Wide zero = cv::vx_setall_f32(0.0F), none = cv::vx_setall_f32(kNone);
   Wide least = none, most = zero;
-  std::int32_t r = first;
-  for (; r + Wide::nlanes - 1 <= last; r += Wide::nlanes) {
-    const Wide some = cv::vx_load(w + r);
+  // Whole registers; the last one begins earlier, and what it has besides does not count if it is the only one.
+  for (std::int32_t r = first;; r += Wide::nlanes) {
+    const std::int32_t start = std::max(std::min(r, last + 1 - Wide::nlanes), 0);
+    const Wide row = cv::vx_load(kSteps.data()) + cv::vx_setall_f32(static_cast<float>(start));
+    const Wide some = cv::vx_load(w + start) & (row >= cv::vx_setall_f32(static_cast<float>(first))) &
+                      (row <= cv::vx_setall_f32(static_cast<float>(last)));
     least = cv::v_min(least, cv::v_select(some > zero, some, none));
     most = cv::v_max(most, some);
+    if (r + Wide::nlanes > last) break;
   }
-  Depths depths{cv::v_reduce_min(least), cv::v_reduce_max(most)};
-  for (; r <= last; ++r) {
-    depths.farthest = std::min(depths.farthest, w[r] > 0.0F ? w[r] : kNone);
-    depths.nearest = std::max(depths.nearest, w[r]);
-  }
-  return depths;
+  return {cv::v_reduce_min(least), cv::v_reduce_max(most)};
 }
 
-// Whether any row with a depth in that range could lie on the plane.
-bool SurfaceBoundaries::reaches(std::int32_t column, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
+// Whether any row with a depth in that range could lie on the line.
+bool SurfaceBoundaries::reaches(const Line& line, std::int32_t top, std::int32_t bottom,
                                 const Depths& depths) const noexcept {
-  if (depths.nearest < depths.farthest) return false;
-  const Line line = line_of(planes_[plane].plane, column);
   const float at_top = line.a + line.b * rays_->y[static_cast<std::size_t>(top)];
   const float at_bottom = line.a + line.b * rays_->y[static_cast<std::size_t>(bottom)];
   // No row's tolerance is larger.
@@ -118,12 +116,14 @@ bool SurfaceBoundaries::reaches(std::int32_t column, std::uint8_t plane, std::in
 
 void SurfaceBoundaries::consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
                                  const Depths& depths, std::int32_t& most, ColumnSpan& claimed) const noexcept {
-  if (!gap.may_be(plane) || bottom - top < most || !reaches(gap.column, plane, top, bottom, depths)) return;
+  if (!gap.may_be(plane) || bottom - top < most || !depths.any()) return;
+  const Line line = line_of(plane, gap.column);
+  if (!reaches(line, top, bottom, depths)) return;
   ColumnSpan candidate;
   candidate.plane = plane;
   candidate.top = static_cast<std::int16_t>(top);
   candidate.bottom = static_cast<std::int16_t>(bottom);
-  weigh_claim(gap.column, candidate, most, claimed);
+  weigh_claim(gap.column, line, candidate, most, claimed);
 }
 
 void SurfaceBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,

@@ -2,6 +2,8 @@
 #include "algorithms/perception/surface_extractor.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cstring>
 
 #include "algorithms/perception/pixel_owner.hpp"
 
@@ -55,6 +57,7 @@ bool SurfaceExtractor::try_begin(const DepthFrameView& frame, const View& view) 
   view_.camera_up /= up_norm;
   polygons_.configure(params_.polygons);
   picture_.rays.set(view.intrinsics);
+  picture_.any_body = false;
   raw_.depth = frame.depth;
   raw_.intrinsics = view.intrinsics;
   raw_.range.set(params_.limits, view.intrinsics.depth_unit_m);
@@ -177,7 +180,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       pieces_step();
       return kMaxPieceUnits;
     case Phase::kProfile:
-      profiles_.add_column(boundaries_.columns(), pieces_, planes_, row_, picture_);
+      profiles_.add_column(boundaries_.columns(), pieces_, row_, picture_);
       if (++row_ == picture_.column_rays.columns) {
         enter(Phase::kEvidence);
         index_ = 1;
@@ -212,8 +215,9 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
 void SurfaceExtractor::reduce_row() noexcept {
   std::uint8_t* flags = picture_.flags.row(row_ / 2);
   if (row_ % 2 == 0) {
-    picture_.body_rows[static_cast<std::size_t>(row_ / 2)] =
-        self_filter_.try_mark_row(row_ / 2, picture_.rays.width_px, flags);
+    const bool marked = self_filter_.try_mark_row(row_ / 2, picture_.rays.width_px, flags);
+    picture_.body_rows[static_cast<std::size_t>(row_ / 2)] = marked;
+    picture_.any_body = picture_.any_body || marked;
   }
   const bool body = picture_.body_rows[static_cast<std::size_t>(row_ / 2)];
   const std::int32_t columns = picture_.column_rays.columns;
@@ -276,6 +280,7 @@ std::int32_t SurfaceExtractor::side_step() noexcept {
     ++index_;
     return 1;
   }
+  if (!started_) side_finder_.find_ends(index_, profiles_[index_]);
   (started_ ? sides_.right : sides_.left) = side_finder_.find(index_, profiles_[index_], started_);
   if (started_) phase_ = Phase::kOutline;
   started_ = !started_;
@@ -303,8 +308,13 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
     const std::int32_t end = end_of(g), far = end + down * kProbe_px;
     if (end < 0 || far < 0 || far >= picture_.column_rays.height_px || picture_.body(kColumn_px / 2 * g, far / 2))
       continue;
-    std::uint8_t& found = beyond[static_cast<std::size_t>(g)];
-    for (std::int32_t r = end + down; found == 0 && r != far + down; r += down) found = picture_.owner(g, r);
+    // The first owner from the end on: rows lie next to one another.
+    static_assert(kProbe_px == sizeof(std::uint64_t) && std::endian::native == std::endian::little);
+    std::uint64_t owners = 0;
+    std::memcpy(&owners, picture_.owners.row(g) + std::min(end + down, far), sizeof(owners));
+    const int first_bit = nosing ? std::countr_zero(owners) : 63 - std::countl_zero(owners);
+    const auto found = static_cast<std::uint8_t>(owners != 0 ? owners >> (first_bit & ~7) : 0U);
+    beyond[static_cast<std::size_t>(g)] = found;
     ++votes[found];
   }
   // The plane beyond: most columns, and on the right side of the surface (a nosing has it below, a back line above).
@@ -313,7 +323,7 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   const auto most = [&](bool riser_only) {
     std::size_t other = 0;
     for (std::size_t p = 1; p <= planes_.count; ++p) {
-      if (p == index_ || !planes_[p].alive || 2 * votes[p] < params_.edge_lines.min_columns) continue;
+      if (2 * votes[p] < params_.edge_lines.min_columns || p == index_ || !planes_[p].alive) continue;
       const double height = own.plane.distance_m(planes_[p].centre_m);
       if (nosing ? height > -kStepLeast_m : height < kStepLeast_m) continue;
       if (riser_only && planes_[p].kind != SurfaceKind::kRiser) continue;

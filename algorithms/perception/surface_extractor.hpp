@@ -78,7 +78,7 @@ class SurfaceExtractor {
   };
 
   // One unit is a row of 80 columns through reduction and segmentation, or as much work (its cost:
-  // firmware/schedule.hpp). Stairs take 2,300-2,900, a cluttered desk 3,650. With every capacity full a frame takes at
+  // firmware/schedule.hpp). Stairs take 2,300-2,900, a cluttered desk 3,550. With every capacity full a frame takes at
   // most kMaxUnitsPerFrame. No piece is larger than kMaxPieceUnits.
   static constexpr std::int32_t kMaxPieceUnits = 40;
   static constexpr std::int32_t kMaxUnitsPerFrame = 12000;

@@ -35,7 +35,7 @@ void SurfaceExtractor::take_grown_planes() noexcept {
     to_plane_[i] = static_cast<std::uint8_t>(i);
   }
   merge_planes(false);
-  for (std::size_t i = 1; i <= planes_.count; ++i) boundaries_.plane(i).plane = planes_[i].plane;
+  for (std::size_t i = 1; i <= planes_.count; ++i) boundaries_.set_plane(i, planes_[i].plane);
 }
 
 void SurfaceExtractor::merge_planes(bool measured) noexcept {
@@ -61,7 +61,7 @@ std::int32_t SurfaceExtractor::facet_step() noexcept {
     if (p.alive && p.facet) drop(i);
     if (!p.alive || p.facets == 1) continue;
     p.kind = kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad);
-    boundaries_.plane(i).plane = p.plane;
+    boundaries_.set_plane(i, p.plane);
   }
   enter(Phase::kSearch);
   return 4;
@@ -91,7 +91,7 @@ void SurfaceExtractor::take_found_planes() noexcept {
     p.plane = found;
     p.kind = kind_of(found, view_.camera_up, params_.kind_tilt_rad);
     p.alive = true;
-    boundaries_.plane(planes_.count).plane = found;
+    boundaries_.set_plane(planes_.count, found);
   }
 }
 
@@ -121,7 +121,7 @@ void SurfaceExtractor::solve_planes() noexcept {
     p.kind = kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad);
     p.pixels = p.moments.count;
     p.centre_m = p.plane.point(p.moments.mean_ray());
-    boundaries_.plane(i).plane = p.plane;
+    boundaries_.set_plane(i, p.plane);
   }
 }
 

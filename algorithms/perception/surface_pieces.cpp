@@ -147,7 +147,8 @@ std::uint32_t SurfacePieces::join(const Params& params, const SurfaceBoundaries&
     Piece& piece = pieces_[number];
     const std::uint8_t source = piece.plane;
     piece.plane = 0;
-    for (std::size_t p = 1; p <= planes.count && piece.plane == 0; ++p) {
+    // The plane itself and those that pieces of it have become.
+    for (std::size_t p = source; p <= planes.count && piece.plane == 0; p = p == source ? fitted + 1 : p + 1) {
       const FramePlane& plane = planes[p];
       if (plane.source != source) continue;
       if (plane.main_piece == 0 || !apart(params.apart_m, picture, pieces_[plane.main_piece], piece, plane.plane)) {
@@ -178,11 +179,13 @@ std::uint32_t SurfacePieces::join(const Params& params, const SurfaceBoundaries&
   // All are judged by what all were, whatever their order.
   std::array<bool, FramePlanes::kMaxPlanes + 1> kept{};
   for (std::size_t p = 1; p <= planes.count; ++p) {
-    const std::int32_t least_px =
-        on_a_step(boundaries, planes, planes[p]) ? params.min_surface_px : params.min_other_px;
-    kept[p] = planes[p].alive && planes[p].piece_px >= least_px;
+    const FramePlane& plane = planes[p];
+    kept[p] = plane.alive && plane.piece_px >= params.min_surface_px &&
+              (plane.piece_px >= params.min_other_px || on_a_step(boundaries, planes, plane));
   }
   for (std::size_t p = 1; p <= planes.count; ++p) planes[p].alive = kept[p];
+  for (std::size_t k = 1; k <= piece_count_; ++k)
+    pieces_[k].plane = kept[pieces_[k].plane] ? pieces_[k].plane : std::uint8_t{0};
   return without_room;
 }
 

@@ -24,7 +24,7 @@ class SurfacePieces {
   // Gives every piece a plane, and planes without enough of them up. Returns how many surfaces found no room.
   std::uint32_t join(const Params& params, const SurfaceBoundaries& boundaries, const FramePicture& picture,
                      FramePlanes& planes) noexcept;
-  // Of a piece, after join: 0 = none.
+  // Of a piece, after join: a plane that is kept, 0 = none.
   [[nodiscard]] std::uint8_t plane_of(std::uint16_t piece) const noexcept { return pieces_[piece].plane; }
   // Pieces that found no room.
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }

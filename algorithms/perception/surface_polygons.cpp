@@ -13,6 +13,8 @@ namespace {
 constexpr double kLeastSlope = 0.5;  // sine between a riser and the tread that ends it
 constexpr double kOnLine_m = 0.002;  // a polygon's edge lies on a line
 
+using SeenPolygon = StaticVector<Vec2, kMaxPolygonVertices>;  // its corners in the picture, half-resolution pixels
+
 // Adds a row's columns first .. last that are not the robot's own, and the valid pixels in them. flags: null where
 // nothing is the robot's own.
 void count_pixels(const std::uint8_t* flags, const std::uint8_t* valid, std::int32_t first, std::int32_t last,
@@ -52,40 +54,48 @@ void count_pixels(const std::uint8_t* flags, const std::uint8_t* valid, std::int
   valid_px += static_cast<std::int32_t>(cv::v_reduce_sum(valid_sum));
 }
 
-// Share of the polygon's pixels without data, over its rows and columns in the picture.
-double invalid_share(const FramePicture& picture, const PolygonVertices& polygon) noexcept {
+// Of a point, in half-resolution pixels.
+Vec2 project(const HalfRays& rays, const Vec3& p_m) noexcept {
+  const double w = 1.0 / p_m.z();
+  return {p_m.x() * w * rays.fx_px + rays.cx_px, p_m.y() * w * rays.fy_px + rays.cy_px};
+}
+
+// Share of a polygon's pixels without data, over its columns in the picture in some of its rows.
+double invalid_share(const FramePicture& picture, const SeenPolygon& polygon) noexcept {
+  constexpr std::int32_t kRows = 32;  // more say the same
   const HalfRays& rays = picture.rays;
-  // From which column to which the convex polygon reaches in every row: two of its edges cross it.
+  const auto first_from = [&](double y) {
+    return static_cast<std::int32_t>(std::ceil(math::clamp(y, 0.0, rays.height_px)));
+  };
+  const auto last_until = [&](double y) {
+    return static_cast<std::int32_t>(std::floor(math::clamp(y, -1.0, rays.height_px - 1.0)));
+  };
+  double highest = 1e9, lowest = -1e9;
+  for (const Vec2& p : polygon) highest = std::min(highest, p.y()), lowest = std::max(lowest, p.y());
+  const std::int32_t first_row = first_from(highest), last_row = last_until(lowest);
+  const std::int32_t stride = 1 + std::max(last_row - first_row, 0) / kRows;
+  // From which column to which the convex polygon reaches in each of these rows: two of its edges cross it.
   struct Reach {
     double left = 1e9, right = -1e9;
   };
-  std::array<Reach, kHalfHeight_px> reach;
-  std::int32_t first_row = rays.height_px, last_row = -1;
-  const auto column_of = [&](const Vec3& p) { return p.x() / p.z() * rays.fx_px + rays.cx_px; };
-  const auto row_of = [&](const Vec3& p) { return p.y() / p.z() * rays.fy_px + rays.cy_px; };
+  std::array<Reach, kRows + 1> reach;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Vec3 *upper = &polygon[i], *lower = &polygon[i + 1 < polygon.size() ? i + 1 : 0];
-    if (row_of(*lower) < row_of(*upper)) std::swap(upper, lower);
-    const double top = row_of(*upper), bottom = row_of(*lower);
-    const auto first = static_cast<std::int32_t>(std::ceil(math::clamp(top, 0.0, rays.height_px)));
-    const auto last = static_cast<std::int32_t>(std::floor(math::clamp(bottom, -1.0, rays.height_px - 1.0)));
-    const double step = (column_of(*lower) - column_of(*upper)) / std::max(bottom - top, 1e-9);
-    double x = column_of(*upper) + (first - top) * step;
-    for (std::int32_t r = first; r <= last; ++r) {
-      Reach& row = reach[static_cast<std::size_t>(r)];
+    const Vec2 *upper = &polygon[i], *lower = &polygon[i + 1 < polygon.size() ? i + 1 : 0];
+    if (lower->y() < upper->y()) std::swap(upper, lower);
+    const std::int32_t first = (first_from(upper->y()) - first_row + stride - 1) / stride;
+    const std::int32_t last = last_until(lower->y()) - first_row;
+    const double step = (lower->x() - upper->x()) / std::max(lower->y() - upper->y(), 1e-9);
+    double x = upper->x() + (first_row + first * stride - upper->y()) * step;
+    for (std::int32_t k = first; k * stride <= last; ++k) {
+      Reach& row = reach[static_cast<std::size_t>(k)];
       row.left = std::min(row.left, x);
       row.right = std::max(row.right, x);
-      x += step;
+      x += step * stride;
     }
-    first_row = std::min(first_row, first);
-    last_row = std::max(last_row, last);
   }
   std::int32_t free = 0, valid = 0;
-  // Of many rows every second one says the same.
-  constexpr std::int32_t kManyRows = 32;
-  const std::int32_t stride = last_row - first_row > kManyRows ? 2 : 1;
   for (std::int32_t r = first_row; r <= last_row; r += stride) {
-    const Reach& row = reach[static_cast<std::size_t>(r)];
+    const Reach& row = reach[static_cast<std::size_t>((r - first_row) / stride)];
     // Columns whose middles, at 4 g + 1.5 in steps of two pixels, lie within.
     const auto left =
         static_cast<std::int32_t>(std::ceil(math::clamp((row.left + 0.5) / (0.5 * kColumn_px) - 0.5, 0.0, kColumns)));
@@ -100,27 +110,23 @@ double invalid_share(const FramePicture& picture, const PolygonVertices& polygon
 }  // namespace
 
 // What is just outside an edge decides whether the surface ends there or only the view of it.
-EdgeKind SurfacePolygons::judge_edge(const FramePicture& picture, const InversePlane& plane, const Vec3& a_m,
-                                     const Vec3& b_m, const Vec3& inside_m) const noexcept {
+EdgeKind SurfacePolygons::judge_edge(const FramePicture& picture, const InversePlane& plane, const Vec2& a,
+                                     const Vec2& b, const Vec2& inside) const noexcept {
   constexpr int kProbes = 5;
-  const Vec3 middle = 0.5 * (a_m + b_m);
-  const auto project = [&](const Vec3& p) {
-    return Vec2{p.x() / p.z() * picture.rays.fx_px + picture.rays.cx_px,
-                p.y() / p.z() * picture.rays.fy_px + picture.rays.cy_px};
-  };
-  const Vec2 a = project(a_m), b = project(b_m), centre = project(inside_m);
   Vec2 outward{(b - a).y(), -(b - a).x()};
   if (outward.norm() < 1e-9) return EdgeKind::kUnknown;
   outward.normalize();
-  if (outward.dot(project(middle) - centre) < 0.0) outward = -outward;
+  if (outward.dot(a - inside) < 0.0) outward = -outward;
+  const auto reach_px = static_cast<std::int32_t>(1.5 * params_.probe_px);
+  // Nearer than the probe only the body is asked for.
+  const auto nearest_px = picture.any_body ? 0 : static_cast<std::int32_t>(std::ceil(0.5 * params_.probe_px));
   int observed = 0;
   // Until enough of them say so, or too few are left that could.
   for (int i = 0; i < kProbes && 2 * observed <= kProbes && 2 * (observed + kProbes - i) > kProbes; ++i) {
     const Vec2 on = a + (b - a) * ((i + 0.5) / kProbes);
     // The first measured pixel outside, up to twice the probe's distance; the body or the picture's end before it hides
     // the end of the surface.
-    const auto reach_px = static_cast<std::int32_t>(1.5 * params_.probe_px);
-    for (std::int32_t k = 0; k <= reach_px; ++k) {
+    for (std::int32_t k = nearest_px; k <= reach_px; ++k) {
       const double out = 0.5 * params_.probe_px + k;
       const Vec2 p = on + out * outward;
       const auto c = static_cast<std::int32_t>(std::floor(p.x() + 0.5)),
@@ -131,7 +137,7 @@ EdgeKind SurfacePolygons::judge_edge(const FramePicture& picture, const InverseP
       if (!(w > 0.0)) continue;
       const double expected = plane.inverse_depth(picture.rays.ray(c, r));
       // Something well in front hides it, unless it stands on the surface right here (a riser's foot).
-      const bool hidden = expected > 1e-3 && 1.0 / expected - 1.0 / w > params_.apart_m;
+      const bool hidden = expected > 1e-3 && w - expected > params_.apart_m * expected * w;
       observed += hidden ? 0 : 1;
       break;
     }
@@ -152,9 +158,7 @@ std::size_t SurfacePolygons::tread_beside(const FramePicture& picture, const Fra
   }
   std::size_t best = 0;
   for (std::size_t p = 1; p <= planes.count; ++p) {
-    if (!planes[p].alive || planes[p].kind != SurfaceKind::kTread || votes[p] < params_.min_tread_columns) {
-      continue;
-    }
+    if (votes[p] < params_.min_tread_columns || !planes[p].alive || planes[p].kind != SurfaceKind::kTread) continue;
     if (best == 0 || votes[p] > votes[best]) best = p;
   }
   return best;
@@ -246,14 +250,18 @@ bool SurfacePolygons::try_build(const FramePicture& picture, const FramePlanes& 
     const double from = std::min(along.dot(a - p), along.dot(b - p)), to = std::max(along.dot(a - p), along.dot(b - p));
     return 2.0 * (std::min(to, (q - p).norm()) - std::max(from, 0.0)) > to - from;
   };
-  for (std::size_t i = 0; i < flat.size(); ++i) {
-    const Vec2 &a = flat[i], &b = flat[(i + 1) % flat.size()];
-    static_cast<void>(patch.polygon.try_push_back(to_space(a)));
-    patch.edges[i] = seen_on(lines.nosing, a, b) || seen_on(lines.back, a, b)
-                         ? EdgeKind::kObserved
-                         : judge_edge(picture, plane, to_space(a), to_space(b), patch.centroid_m);
+  SeenPolygon seen;
+  for (const Vec2& p : flat) {
+    static_cast<void>(patch.polygon.try_push_back(to_space(p)));
+    static_cast<void>(seen.try_push_back(project(picture.rays, patch.polygon.back())));
   }
-  patch.invalid_fraction = invalid_share(picture, patch.polygon);
+  const Vec2 inside = project(picture.rays, patch.centroid_m);
+  for (std::size_t i = 0; i < flat.size(); ++i) {
+    const std::size_t next = i + 1 < flat.size() ? i + 1 : 0;
+    const bool on_line = seen_on(lines.nosing, flat[i], flat[next]) || seen_on(lines.back, flat[i], flat[next]);
+    patch.edges[i] = on_line ? EdgeKind::kObserved : judge_edge(picture, plane, seen[i], seen[next], inside);
+  }
+  patch.invalid_fraction = invalid_share(picture, seen);
   return true;
 }
 

@@ -37,8 +37,9 @@ class SurfacePolygons {
   // The tread that most columns of the surface show right below (or above) it in the picture; 0 = none.
   [[nodiscard]] std::size_t tread_beside(const FramePicture& picture, const FramePlanes& planes,
                                          const SurfaceProfile& profile, bool below) const noexcept;
-  [[nodiscard]] EdgeKind judge_edge(const FramePicture& picture, const InversePlane& plane, const Vec3& a_m,
-                                    const Vec3& b_m, const Vec3& inside_m) const noexcept;
+  // All in half-resolution pixels: the edge's ends, a point of the surface.
+  [[nodiscard]] EdgeKind judge_edge(const FramePicture& picture, const InversePlane& plane, const Vec2& a,
+                                    const Vec2& b, const Vec2& inside) const noexcept;
 
   Params params_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whose each pixel is, and where every surface begins and ends in the picture's columns and rows.
+// Whose each pixel is, and where every surface begins and ends in the picture's columns.
 #pragma once
 
 #include <array>
@@ -16,8 +16,8 @@ class SurfaceProfiles {
  public:
   void begin(const FramePlanes& planes) noexcept;
   // Columns come from left to right. Writes the column's owners into the picture.
-  void add_column(const SurfaceBoundaries::Columns& columns, const SurfacePieces& pieces, const FramePlanes& planes,
-                  std::int32_t column, FramePicture& picture) noexcept;
+  void add_column(const SurfaceBoundaries::Columns& columns, const SurfacePieces& pieces, std::int32_t column,
+                  FramePicture& picture) noexcept;
   [[nodiscard]] const SurfaceProfile& operator[](std::size_t plane) const noexcept { return profiles_[plane]; }
 
  private:

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kLeastCosine = 0.26;                    // of the incidence; the noise model ends there
 constexpr std::int32_t kFlatRows = 4, kFlatColumns = 2;  // more columns in these rows: too flat
+constexpr std::int32_t kManyRows = 64;                   // of more, every second one (third, ...) says the same
 constexpr std::int32_t kMixed_px = 2;                    // of neither plane, where one pixel sees both
 constexpr std::int32_t kInside_px = 8;                   // of the outermost column and the one beside it
 constexpr std::int32_t kOutside_px = 8;                  // searched beyond
@@ -39,10 +40,11 @@ struct RowPlane {
     const double constant = plane.m.y() * rays.y + plane.m.z(), w = plane.m.x() * x + constant;
     valid = w > 0.05;
     if (!valid) return;
-    const double cosine = math::clamp(w / math::sqrt(plane.m.squaredNorm() * ray2), kLeastCosine, 1.0);
+    // The cosine of the incidence is w over this.
+    const double over = math::clamp(math::sqrt(plane.m.squaredNorm() * ray2), w, w * (1.0 / kLeastCosine));
     at = static_cast<float>(constant + plane.m.x() * rays.x0);
     slope = static_cast<float>(plane.m.x() * rays.pitch);
-    per_sigma = static_cast<float>(cosine * w / noise.inverse_sigma(w));
+    per_sigma = static_cast<float>(w * w / (over * noise.inverse_sigma(w)));
   }
   // Over sigma.
   [[nodiscard]] Wide residual(const Wide& column, const Wide& depth_m) const noexcept {
@@ -60,11 +62,25 @@ struct PixelGains {
   std::uint32_t measured = 0, before = 0;  // a bit a pixel: it has data; it lies before the surface
 };
 
-// A bit for each that is less than most.
-std::uint32_t below(const Reach& x, float most) noexcept {
+// A bit for each step outwards at which the sum of the gains so far is least, or hardly more.
+std::uint32_t least_costs(const Reach& gain) noexcept {
+  using Four = cv::v_float32x4;  // the same order of summing for every register width
+  constexpr float kTie = 1e-3F;
+  constexpr std::size_t kFours = kReach_px / Four::nlanes;
+  std::array<Four, kFours> cost;
+  Four before = cv::v_setzero_f32(), least = cv::v_setall_f32(1e9F);
+  for (std::size_t i = 0; i < kFours; ++i) {
+    Four sum = cv::v_load(gain.data() + i * Four::nlanes);
+    sum = sum + cv::v_rotate_left<1>(sum);
+    sum = sum + cv::v_rotate_left<2>(sum) + before;
+    before = cv::v_broadcast_element<3>(sum);
+    least = cv::v_min(least, sum);
+    cost[i] = sum;
+  }
+  const Four most = cv::v_setall_f32(cv::v_reduce_min(least) + kTie);
   std::uint32_t bits = 0;
-  for (std::int32_t i = 0; i < kReach_px; i += Wide::nlanes) {
-    bits |= static_cast<std::uint32_t>(cv::v_signmask(cv::vx_load(x.data() + i) < cv::vx_setall_f32(most))) << i;
+  for (std::size_t i = 0; i < kFours; ++i) {
+    bits |= static_cast<std::uint32_t>(cv::v_signmask(cost[i] < most)) << (i * Four::nlanes);
   }
   return bits;
 }
@@ -112,6 +128,7 @@ void SurfaceSides::begin(const Params& params, const DepthSigma& noise, const Ra
   raw_ = &raw;
   picture_ = &picture;
   planes_ = &planes;
+  pitch_ = 1.0 / raw.intrinsics.fx_px;
 }
 
 SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t row, std::int32_t column, bool right,
@@ -124,8 +141,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
   if (border + 2 * out < 0 || border + 2 * out >= k.width_px) return Ending::kHidden;
   const std::int32_t first = border - out * (kInside_px - 1);
   if (first < 0 || first >= k.width_px) return Ending::kNone;
-  const double pitch = 1.0 / k.fx_px;
-  const RowRays rays{-k.cx_px * pitch, pitch,
+  const RowRays rays{-k.cx_px * pitch_, pitch_,
                      static_cast<double>(picture_->column_rays.y[static_cast<std::size_t>(row)])};
   const RowPlane own(planes[index].plane, noise_, rays, border);
   if (!own.valid) return Ending::kNone;
@@ -138,7 +154,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
   }
   const RowPlane other = beyond != 0 ? RowPlane(planes[beyond].plane, noise_, rays, border) : RowPlane();
   const std::uint16_t* pixels = raw_->row(row);
-  Raws raw{};
+  Raws raw;
   std::int32_t count = std::min(kReach_px, right ? k.width_px - first : first + 1);
   if (picture_->body_rows[static_cast<std::size_t>(row / 2)]) {
     const std::uint8_t* flags = picture_->flags.row(row / 2);
@@ -146,18 +162,21 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
     while (free < count && (flags[(first + out * free) / 2] & kPixelBody) == 0) ++free;
     count = free;
   }
-  for (std::int32_t i = 0; i < count; ++i) raw[static_cast<std::size_t>(i)] = pixels[first + out * i];
+  if (count == kReach_px) {
+    using Eight = cv::v_uint16x8;
+    static_assert(kReach_px == 2 * Eight::nlanes);
+    const std::uint16_t* leftmost = pixels + (right ? first : first - (kReach_px - 1));
+    const Eight a = cv::v_load(leftmost), b = cv::v_load(leftmost + Eight::nlanes);
+    cv::v_store(raw.data(), right ? a : cv::v_reverse(b));
+    cv::v_store(raw.data() + Eight::nlanes, right ? b : cv::v_reverse(a));
+  } else {
+    raw.fill(0);
+    for (std::int32_t i = 0; i < count; ++i) raw[static_cast<std::size_t>(i)] = pixels[first + out * i];
+  }
   if (count < kInside_px) return Ending::kHidden;  // by the robot's own body
   const PixelGains gains = weigh(params_, *raw_, own, other, first, out, raw);
   // The boundary with the least cost; between equally good ones (a pixel without data or of neither) in their middle.
-  constexpr float kTie = 1e-3F;
-  Reach cost;
-  float sum = 0.0F, least = 1e9F;
-  for (std::size_t i = 0; i < cost.size(); ++i) {
-    cost[i] = sum += gains.gain[i];
-    least = std::min(least, sum);
-  }
-  const std::uint32_t equal = below(cost, least + kTie);
+  const std::uint32_t equal = least_costs(gains.gain);
   const auto from = std::countr_zero(equal);
   auto to = from + std::countr_one(equal >> from) - 1;
   if (from == 0) return Ending::kNone;
@@ -191,14 +210,13 @@ bool SurfaceSides::try_line(const InversePlane& plane, Line& line) const noexcep
     for (std::int32_t i = 0; i + apart < n; i += stride) {
       const RowEnd &a = seen_[static_cast<std::size_t>(i)], &b = seen_[static_cast<std::size_t>(i + apart)];
       const double slope = (b.column - a.column) / (b.row - a.row);
-      const Line candidate{a.column - slope * a.row, slope};
-      if (!upright(candidate)) continue;
       double cost = 0.0;
       for (const RowEnd& e : seen_) {
         const double off = e.column - a.column - slope * (e.row - a.row);
         cost += std::min(off * off, params_.inlier_px * params_.inlier_px);
       }
-      if (cost >= best) continue;
+      const Line candidate{a.column - slope * a.row, slope};
+      if (cost >= best || !upright(candidate)) continue;
       best = cost;
       line = candidate;
     }
@@ -218,15 +236,34 @@ bool SurfaceSides::try_line(const InversePlane& plane, Line& line) const noexcep
   return upright(line);
 }
 
+void SurfaceSides::find_ends(std::size_t index, const SurfaceProfile& profile) noexcept {
+  using Bytes = cv::v_uint8;
+  static_assert(kDepthHeight_px % Bytes::nlanes == 0);
+  const std::int32_t from = profile.first_row / Bytes::nlanes * Bytes::nlanes;
+  std::fill(left_.begin() + from, left_.begin() + profile.last_row + 1, kNoColumn);
+  std::fill(right_.begin() + from, right_.begin() + profile.last_row + 1, kNoColumn);
+  const Bytes wanted = cv::vx_setall_u8(static_cast<std::uint8_t>(index));
+  for (std::int32_t g = 0; g < picture_->column_rays.columns; ++g) {
+    const ColumnEnds& ends = profile.columns[static_cast<std::size_t>(g)];
+    if (ends.empty()) continue;
+    const std::uint8_t* owners = picture_->owners.row(g);
+    const Bytes here = cv::vx_setall_u8(static_cast<std::uint8_t>(g));
+    for (std::int32_t r = ends.top / Bytes::nlanes * Bytes::nlanes; r <= ends.bottom; r += Bytes::nlanes) {
+      // From left to right, and no column is more than none.
+      const Bytes own = cv::vx_load(owners + r) == wanted;
+      cv::v_store(left_.data() + r, cv::v_min(cv::vx_load(left_.data() + r), here | ~own));
+      cv::v_store(right_.data() + r, cv::v_select(own, here, cv::vx_load(right_.data() + r)));
+    }
+  }
+}
+
 OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept {
   const FramePlane& plane = (*planes_)[index];
   const double out = right ? 1.0 : -1.0;
-  const auto outer_edge = [right](SurfaceProfile::Column g) {
-    return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5);
-  };
+  const auto outer_edge = [right](std::uint8_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
   seen_.clear();
   hidden_.clear();
-  const auto& ends = right ? profile.right : profile.left;
+  const RowColumns& ends = right ? right_ : left_;
   // Where the surface's end runs off sideways from row to row it is a front or a back, no side.
   std::size_t count = 0;
   const std::int32_t first_row = profile.first_row, last_row = profile.last_row;
@@ -237,14 +274,14 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
     const std::int32_t drift =
         end_at(std::min(r + kFlatRows / 2, last_row)) - end_at(std::max(r - kFlatRows / 2, first_row));
     rows_[count] = static_cast<std::int16_t>(r);
-    count += end_at(r) != SurfaceProfile::kNoColumn && drift <= kFlatColumns && drift >= -kFlatColumns ? 1U : 0U;
+    count += end_at(r) != kNoColumn && drift <= kFlatColumns && drift >= -kFlatColumns ? 1U : 0U;
   }
   const std::size_t most = plane.kind == SurfaceKind::kTread ? kMaxRows : kOtherRows;
   const std::size_t stride = (count + most - 1) / most;
   double outermost = -1e9;
   for (std::size_t i = stride / 2; i < count; i += stride) {
     const std::int32_t r = rows_[i];
-    const SurfaceProfile::Column g = ends[static_cast<std::size_t>(r)];
+    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
     RowEnd end{static_cast<double>(r), 0.0};
     const Ending ending = end_of_row(index, r, g, right, end.column);
     if (ending == Ending::kNone) continue;
@@ -256,8 +293,8 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   OutlineSide side;
   if (outermost < -1e8) {  // no row but flat ones
     for (std::int32_t r = first_row; r <= last_row; ++r) {
-      const SurfaceProfile::Column g = ends[static_cast<std::size_t>(r)];
-      if (g != SurfaceProfile::kNoColumn) outermost = std::max(outermost, out * outer_edge(g));
+      const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+      if (g != kNoColumn) outermost = std::max(outermost, out * outer_edge(g));
     }
   }
   side.column_px = 0.5 * (out * outermost - 0.5);
@@ -276,9 +313,10 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
     for (const RowEnd& e : *all) between += e.row >= first && e.row <= last ? 1 : 0;
   }
   double cut_px = 0.0;
-  for (std::int32_t r = first_row; r <= last_row; ++r) {
-    const SurfaceProfile::Column g = ends[static_cast<std::size_t>(r)];
-    if (g != SurfaceProfile::kNoColumn) cut_px += std::max(beyond(r, outer_edge(g)) - params_.outside_px, 0.0);
+  const std::int32_t step = 1 + (last_row - first_row) / kManyRows;
+  for (std::int32_t r = first_row; r <= last_row; r += step) {
+    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+    if (g != kNoColumn) cut_px += step * std::max(beyond(r, outer_edge(g)) - params_.outside_px, 0.0);
   }
   if (on < params_.min_rows || on < params_.min_share * between) return side;
   if (cut_px > params_.max_cut * plane.piece_px) return side;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include "algorithms/perception/column_outline.hpp"
 #include "algorithms/perception/frame_planes.hpp"
@@ -26,8 +27,10 @@ class SurfaceSides {
   // All but the parameters are read again by find.
   void begin(const Params& params, const DepthSigma& noise, const RawPicture& raw, const FramePicture& picture,
              const FramePlanes& planes) noexcept;
-  // The line through the ends of a surface's rows on that side; not fitted, as far as the columns reach, where the ends
-  // are not seen (the picture's or the robot's own) or not straight.
+  // Of the next surface: the first and the last column of each of its rows.
+  void find_ends(std::size_t index, const SurfaceProfile& profile) noexcept;
+  // The line through the ends of that surface's rows on one side; not fitted, as far as the columns reach, where the
+  // ends are not seen (the picture's or the robot's own) or not straight.
   [[nodiscard]] OutlineSide find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept;
 
  private:
@@ -53,6 +56,11 @@ class SurfaceSides {
   const RawPicture* raw_ = nullptr;
   const FramePicture* picture_ = nullptr;
   const FramePlanes* planes_ = nullptr;
+  double pitch_ = 0.0;  // of rays from pixel to pixel
+  using RowColumns = std::array<std::uint8_t, kDepthHeight_px>;
+  static constexpr std::uint8_t kNoColumn = std::numeric_limits<std::uint8_t>::max();
+  static_assert(kColumns <= kNoColumn);
+  RowColumns left_{}, right_{};                       // of the rows next to the surface's, too
   std::array<std::int16_t, kDepthHeight_px> rows_{};  // that may end at a side
   StaticVector<RowEnd, kMaxRows> seen_;               // full-resolution pixels
   StaticVector<RowEnd, kMaxRows> hidden_;             // as far as the columns reach
