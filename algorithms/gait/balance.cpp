@@ -8,9 +8,11 @@ namespace polygmap {
 
 void Balance::reset() noexcept {
   stabiliser_.reset();
+  bias_.reset();
   share_ = {0.5, 0.5};
   odom_p_com_planned_m_.setZero();
   com_error_m_.setZero();
+  slope_.setZero();
 }
 
 JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
@@ -20,7 +22,7 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   const PerLink base_p_m = base_p_links_m(params.masses, frames);
   const Vec3 base_p_com_m = centre_of_mass_m(params.masses, base_p_m);
   const Vec3 base_v_com = base_v_com_mps(params.masses, frames, base_p_m, body.dq_radps);
-  const Vec3 odom_p_com_m = body.odom_T_base * base_p_com_m;
+  Vec3 odom_p_com_m = body.odom_T_base * base_p_com_m;
   const Vec3 odom_v_com_mps = body.odom_v_base_mps + R * (base_v_com + body.base_w_base_radps.cross(base_p_com_m));
 
   Support support;
@@ -46,12 +48,6 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   constexpr double kLeastUp_mps2 = 0.2 * kGravity_mps2;  // no plan falls freely
   const double up_mps2 = std::max(kGravity_mps2 + lift_n / params.masses.total_kg(), kLeastUp_mps2);
   const double omega_radps = math::sqrt(up_mps2 / height_m);
-  HorizontalMotion planned = reference.com;
-  planned.position_m += odom_p_plan_m.head<2>();
-  odom_p_com_planned_m_ = planned.position_m;
-  com_error_m_ = planned.position_m - odom_p_com_m.head<2>();
-  const Vec2 zmp_m =
-      stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(), omega_radps, tick_s);
   // Legs that swing turn the body: the ground's force passes beside the centre of mass by as much as that takes.
   PerLink turned_m;
   turned_m.torso = R * base_p_m.torso;
@@ -61,6 +57,23 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   const Vec3 turning_nm = angular_momentum_rate_nm(params.masses, turned_m, links_mps2);
   const double vertical_n = params.masses.total_kg() * up_mps2;
   const Vec2 beside_m{-turning_nm.y() / vertical_n, turning_nm.x() / vertical_n};
+
+  Vec2 zmp_felt_m;
+  if (try_measure_zmp(params.masses, geometry, body.ground, support.odom_T_sole, slope_, zmp_felt_m)) {
+    const Mat2 heading = rotation_z(yaw_of(R)).topLeftCorner<2, 2>();
+    bias_.update(params.bias, odom_p_com_m.head<2>() + odom_v_com_mps.head<2>() / omega_radps, zmp_felt_m - beside_m,
+                 heading, omega_radps, tick_s);
+  } else {
+    bias_.missed();
+  }
+  odom_p_com_m.head<2>() -= bias_.odom_bias_m();
+
+  HorizontalMotion planned = reference.com;
+  planned.position_m += odom_p_plan_m.head<2>();
+  odom_p_com_planned_m_ = planned.position_m;
+  com_error_m_ = planned.position_m - odom_p_com_m.head<2>();
+  const Vec2 zmp_m =
+      stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(), omega_radps, tick_s);
   const Vec2 slope = (odom_p_com_m.head<2>() - zmp_m) / height_m;
   const Pressure pressure =
       distribute(support, params.pressure,
@@ -69,6 +82,7 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
 
   // The force that the clamped centres of pressure can give.
   const Vec2 given = (odom_p_com_m.head<2>() + beside_m - pressure.zmp_m.head<2>()) / height_m;
+  slope_ = given;
   const Vec3 force_n{vertical_n * given.x(), vertical_n * given.y(), vertical_n};
   JointVector torque_nm;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {

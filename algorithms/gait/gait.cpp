@@ -76,7 +76,9 @@ void Gait::start(const StateEstimate& state) noexcept {
 void Gait::observe_reference() noexcept {
   const MassModel& masses = params_.balance.masses;
   const BodyFrames frames = body_frames(params_.geometry, joints_.reference_rad());
-  reference_p_com_m_ = centre_of_mass_m(masses, base_p_links_m(masses, frames));
+  const Vec2& bias_m = balance_.odom_com_bias_m();
+  reference_p_com_m_ = centre_of_mass_m(masses, base_p_links_m(masses, frames)) -
+                       plan_T_base_.R.transpose() * Vec3{bias_m.x(), bias_m.y(), 0.0};
 }
 
 // The horizontal part of the torso's trajectory is the centre of mass's: the base follows from the legs' places, one
@@ -106,8 +108,9 @@ void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback
   reference.plan_T_sole = plan_T_sole_;
   reference.stands = status_.stands;
   const bool seen = started_ && usable_ && math::all_finite(feedback.dq_radps);
-  Balance::Body body{plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad(), JointVector::Zero()};
-  if (seen) body = {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad, feedback.dq_radps};
+  Balance::Body body{plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad(), JointVector::Zero(), {}};
+  if (seen) body = {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad, feedback.dq_radps,
+                    {feedback.foot_force_n, feedback.tau_nm}};
   const JointVector torque_nm = balance_.torques_nm(params_.balance, params_.geometry, reference, body, kTick_s);
   if (seen) dcm_error_m_ = balance_.dcm_error_m();
   for (std::size_t n = 0; n < kJointCount; ++n) {
