@@ -5,6 +5,24 @@
 #include <algorithm>
 
 namespace polygmap {
+namespace {
+
+// What each foot says of the place of the plan: those that stand, alike, but one that is hardly pressed hangs and moves.
+std::array<double, kFootCount> held_by(const std::array<bool, kFootCount>& stands,
+                                       const std::array<double, kFootCount>& force_n) noexcept {
+  constexpr double kPressed_n = 60.0;
+  std::array<double, kFootCount> holds{};
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    if (stands[f]) holds[f] = math::clamp(force_n[f] / kPressed_n, 0.0, 1.0);
+  }
+  if (!(holds[0] + holds[1] > 0.5)) {  // no force is told, or none is there
+    holds = {stands[0] ? 1.0 : 0.0, stands[1] ? 1.0 : 0.0};
+  }
+  const double sum = holds[0] + holds[1];
+  return {holds[0] / sum, holds[1] / sum};
+}
+
+}  // namespace
 
 void Balance::reset() noexcept {
   stabiliser_.reset();
@@ -29,12 +47,11 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   support.stands = reference.stands;
   Vec3 odom_p_plan_m = Vec3::Zero();
   double ground_m = 0.0;
-  const double standing = reference.stands[0] && reference.stands[1] ? 2.0 : 1.0;
+  const std::array<double, kFootCount> holds = held_by(reference.stands, body.ground.foot_force_n);
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const std::size_t f = index_of(leg);
     support.odom_T_sole[f] = body.odom_T_base * frames[f].sole;
-    if (!reference.stands[f]) continue;
-    odom_p_plan_m += (support.odom_T_sole[f].p_m - reference.plan_T_sole[f].p_m) / standing;
+    odom_p_plan_m += holds[f] * (support.odom_T_sole[f].p_m - reference.plan_T_sole[f].p_m);
   }
   for (std::size_t f = 0; f < kFootCount; ++f) ground_m += share_[f] * support.odom_T_sole[f].p_m.z();
 

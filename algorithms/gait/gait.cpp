@@ -9,6 +9,8 @@ namespace polygmap {
 namespace {
 
 constexpr std::int32_t kLower_ticks = 200;  // of the torso where a foot needs a longer leg
+constexpr std::int32_t kCrouch_ticks = 100;
+constexpr double kCrouchStep_m = 0.005;
 constexpr double kInward_m = 0.01;
 constexpr double kSpare_m = 0.02;               // of its height: the base is not right over the centre of mass
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
@@ -169,10 +171,20 @@ double Gait::crouch_m() const noexcept {
   return off_m > params_.pace.topples_m ? std::min(params_.crouch * off_m, params_.crouch_max_m) : 0.0;
 }
 
+// On two feet, as soon as a body off its plan needs it.
+void Gait::crouch() noexcept {
+  const double wanted_m = crouch_m();
+  if (wanted_m < crouched_m_ + kCrouchStep_m) return;
+  crouched_m_ = wanted_m;
+  move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, kCrouch_ticks, kCrouch_ticks);
+}
+
 void Gait::settle_between_feet() noexcept {
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   TorsoPose middle = torso_between(params_.geometry, params_.step.torso, soles);
-  move_torso(middle.position_m.z() - crouch_m(), middle.yaw_rad, params_.settle_ticks, params_.settle_ticks);
+  crouched_m_ = crouch_m();
+  upright_ = {middle.position_m.z(), middle.yaw_rad};
+  move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, params_.settle_ticks, params_.settle_ticks);
   const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{params_.step.zmp_ahead_m, 0, 0};
   rest_over((middle.position_m + ahead_m).head<2>());
   tick_ = 0;
@@ -206,7 +218,9 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   plan_shift(params_.step, TorsoTrajectory::horizontal(torso_state_), params_.reshift_ticks, plan, com_);
   shift_ticks_ = plan.shift_ticks;
   plan_torso(params_.geometry, params_.step, soles, com_, shift_ticks_, plan);
-  move_torso(plan.lift_off.position_m.z() - crouch_m(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
+  crouched_m_ = crouch_m();
+  upright_ = {plan.lift_off.position_m.z(), plan.lift_off.yaw_rad};
+  move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, shift_ticks_, shift_ticks_);
   com_tick_ = 0;
   search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, shift_ticks_, torso_state_,
                 plan_T_sole_);
@@ -317,7 +331,11 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
       break;
   }
   if (settles_) hold_landed_foot(feedback);
-  if (activity_ == Activity::kSwing) set_pace();
+  if (activity_ == Activity::kSwing) {
+    set_pace();
+  } else {
+    crouch();
+  }
   tick_ = std::min(tick_ + 1, kTickLimit);
   com_tick_ = std::min(com_tick_ + 1, kTickLimit);
   torso_tick_ = std::min(torso_tick_ + 1, kTickLimit);

@@ -101,6 +101,7 @@ class Gait {
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
   void carry_plan_to_odometry() noexcept;
   [[nodiscard]] double crouch_m() const noexcept;
+  void crouch() noexcept;
   void settle_between_feet() noexcept;
   void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
   void lower_torso(const SolePose& sole) noexcept;
@@ -123,6 +124,10 @@ class Gait {
   BaseCorrection correction_;
   TorsoTrajectory torso_;
   TorsoTrajectory::State torso_state_{};  // x and y: of the centre of mass
+  struct {
+    double height_m = 0.0, yaw_rad = 0.0;
+  } upright_;                // plan frame: of the torso in this hold or shift,
+  double crouched_m_ = 0.0;  // less this
   ComPlan com_;
   Vec2 dcm_error_m_ = Vec2::Zero();   // of the divergent component, as last measured, odometry
   Vec2 zmp_stance_m_ = Vec2::Zero();  // of the swing, plan frame
