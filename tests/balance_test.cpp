@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "algorithms/gait/com_plan.hpp"
@@ -249,6 +250,53 @@ TEST(WrenchDistribution, ForceBeyondTheSole_StopsAtItsLimits) {
   const Pressure behind = distribute(support, limits, {-0.3, -0.3, 0.8}, Vec2::Zero());
   EXPECT_NEAR(behind.zmp_m.x(), -limits.behind_m, 1e-12);
   EXPECT_NEAR(behind.zmp_m.y(), 0.1 - limits.aside_m, 1e-12);
+}
+
+// One foot on the next tread: sideways the soles' hull is narrow, and shares by the place between them give up ground.
+TEST(WrenchDistribution, ForceBeyondBothSoles_ComesAsCloseAsAnyShares) {
+  Support support = standing();
+  support.odom_T_sole[0].p_m = {-0.28, 0.1, -0.13};
+  const PressureLimits limits;
+  const Vec3 com_m{0.03, 0.02, 0.8};
+  const auto missed_m = [&](const Pressure& p) {
+    return (p.zmp_m.head<2>() - com_m.head<2>()).norm();  // no slope: the line is vertical
+  };
+  double closest_m = 1.0;
+  for (int i = 0; i <= 1000; ++i) {
+    const double share = 1e-3 * i;
+    Vec2 zmp_m = Vec2::Zero();
+    const Vec2 left_m = support.odom_T_sole[0].p_m.head<2>() - Vec2{0.0, limits.inward_m};
+    const Vec2 right_m = support.odom_T_sole[1].p_m.head<2>() + Vec2{0.0, limits.inward_m};
+    const Vec2 rest_m = com_m.head<2>() - share * left_m - (1.0 - share) * right_m;
+    for (const double side : {1.0, -1.0}) {
+      const Vec2 local_m = rest_m - Vec2{0.0, side * limits.inward_m};
+      const Vec2 pressed_m{math::clamp(local_m.x(), -limits.behind_m, limits.ahead_m),
+                           math::clamp(local_m.y(), -limits.aside_m, limits.aside_m)};
+      const Vec2 sole_m = support.odom_T_sole[side > 0.0 ? 0 : 1].p_m.head<2>();
+      zmp_m += (side > 0.0 ? share : 1.0 - share) * (sole_m + pressed_m);
+    }
+    closest_m = std::min(closest_m, (zmp_m - com_m.head<2>()).norm());
+  }
+  EXPECT_GT(closest_m, 0.02);
+  EXPECT_LT(missed_m(distribute(support, limits, com_m, Vec2::Zero())), closest_m + 0.5e-3);
+}
+
+TEST(Balance, FootThatHangs_DoesNotMoveThePlan) {
+  JointVector q_rad = bent_q_rad();
+  Balance::Reference reference;
+  for (std::size_t f = 0; f < kFootCount; ++f) reference.plan_T_sole[f] = body_frames({}, q_rad)[f].sole;
+  q_rad[static_cast<Eigen::Index>(joint_index(Foot::kRight, kHipPitch))] += 0.1;
+  const auto moved_m = [&](double right_n) {
+    Balance balance;
+    Balance::Body body;
+    body.q_rad = q_rad;
+    body.ground.foot_force_n = {500.0, right_n};
+    (void)balance.torques_nm({}, {}, reference, body, kTick_s);
+    return balance.odom_p_com_planned_m().norm();
+  };
+  EXPECT_LT(moved_m(0.0), 1e-12);
+  EXPECT_GT(moved_m(100.0), 0.02);
+  EXPECT_EQ(moved_m(std::nan("")), moved_m(100.0));  // without forces both count
 }
 
 TEST(LegDynamics, CentreOfMassSpeed_IsItsDifference) {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 
 namespace polygmap {
 namespace {
@@ -15,7 +16,7 @@ std::array<double, kFootCount> held_by(const std::array<bool, kFootCount>& stand
   for (std::size_t f = 0; f < kFootCount; ++f) {
     if (stands[f]) holds[f] = math::clamp(force_n[f] / kPressed_n, 0.0, 1.0);
   }
-  if (!(holds[0] + holds[1] > 0.5)) {  // no force is told, or none is there
+  if (!(holds[0] + holds[1] > 0.5) || !std::isfinite(force_n[0] + force_n[1])) {  // no force is told, or none is there
     holds = {stands[0] ? 1.0 : 0.0, stands[1] ? 1.0 : 0.0};
   }
   const double sum = holds[0] + holds[1];

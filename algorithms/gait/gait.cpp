@@ -230,7 +230,9 @@ void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexce
   if (stop_requested_) return end(GaitPhase::kStopped, Obstruction::kNone, 0.0);
   if (lost(state)) return end(GaitPhase::kStopped, Obstruction::kStateStale, 0.0);
   if (!state.initialised || !usable_) return;
-  if (retried_ && tick_ < params_.settle_ticks) return;
+  // A body that sways sideways is best off between the feet.
+  const bool sways = !(std::abs(plan_T_base_.R.col(1).head<2>().dot(dcm_error_m_)) <= params_.steady_m);
+  if ((retried_ || sways) && tick_ < params_.settle_ticks) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (decision.has_step) {
     wait_ticks_ = 0;

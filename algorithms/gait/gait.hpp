@@ -48,7 +48,7 @@ class Gait {
     double soon_ticks_per_m = 450.0;  // ticks for each metre of its way, for the drives
     double below_m = 0.03;            // not from farther below
     double beside_from_m = 0.1;       // a passing foot that far behind the standing one lands beside it
-    double crouch = 0.7;              // lower in double support, of the divergent component's error
+    double crouch = 1.0;              // lower in double support, of the divergent component's error
     double crouch_max_m = 0.04;
     double side_margin_m = 0.01;                // of a sole that lands farther out, to the end of its tread
     double early_m = 0.005;                     // contact this far above the target counts as early
