@@ -8,7 +8,8 @@
 namespace polygmap {
 namespace {
 
-// What each foot says of the place of the plan: those that stand, alike, but one that is hardly pressed hangs and moves.
+// What each foot says of the place of the plan: those that stand, alike, but one that is hardly pressed hangs and
+// moves.
 std::array<double, kFootCount> held_by(const std::array<bool, kFootCount>& stands,
                                        const std::array<double, kFootCount>& force_n) noexcept {
   constexpr double kPressed_n = 60.0;

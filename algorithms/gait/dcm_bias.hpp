@@ -13,8 +13,8 @@ namespace polygmap {
 class DcmBias {
  public:
   struct Params {
-    double rate_radps = 1.0;  // of the observer's slow pole pair; in the beginning,
-    double haste = 2.0;       // when all that is known of the bias is that it is small, this over the time since then
+    double rate_radps = 1.0;   // of the observer's slow pole pair; in the beginning,
+    double haste = 2.0;        // when all that is known of the bias is that it is small, this over the time since then
     double surprise_m = 0.02;  // an estimate farther from the observer's: a push, which says nothing of the bias
     double most_m = 0.04;
   };

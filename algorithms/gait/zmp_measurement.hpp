@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the ground presses, by what feet and ankle drives feel: the zero-moment point as it is, not as it was asked for.
+// Where the ground presses, by what feet and ankle drives feel: the zero-moment point as it is, not as it was asked
+// for.
 #pragma once
 
 #include "algorithms/core/samples.hpp"
