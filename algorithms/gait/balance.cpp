@@ -8,6 +8,8 @@
 namespace polygmap {
 namespace {
 
+constexpr int kBias_ticks = 4;  // the observer is slow
+
 // What each foot says of the place of the plan: those that stand, alike, but one that is hardly pressed hangs and
 // moves.
 std::array<double, kFootCount> held_by(const std::array<bool, kFootCount>& stands,
@@ -29,6 +31,7 @@ std::array<double, kFootCount> held_by(const std::array<bool, kFootCount>& stand
 void Balance::reset() noexcept {
   stabiliser_.reset();
   bias_.reset();
+  bias_tick_ = 0;
   share_ = {0.5, 0.5};
   odom_p_com_planned_m_.setZero();
   com_error_m_.setZero();
@@ -77,13 +80,18 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   const double vertical_n = params.masses.total_kg() * up_mps2;
   const Vec2 beside_m{-turning_nm.y() / vertical_n, turning_nm.x() / vertical_n};
 
-  Vec2 zmp_felt_m;
-  if (try_measure_zmp(params.masses, geometry, body.ground, support.odom_T_sole, slope_, zmp_felt_m)) {
-    const Mat2 heading = rotation_z(yaw_of(R)).topLeftCorner<2, 2>();
-    bias_.update(params.bias, odom_p_com_m.head<2>() + odom_v_com_mps.head<2>() / omega_radps, zmp_felt_m - beside_m,
-                 heading, omega_radps, tick_s);
-  } else {
-    bias_.missed();
+  if (++bias_tick_ >= kBias_ticks) {
+    bias_tick_ = 0;
+    Vec2 zmp_felt_m;
+    if (try_measure_zmp(params.masses, geometry, body.ground, support.odom_T_sole, slope_, zmp_felt_m)) {
+      const Vec2 ahead = R.col(0).head<2>().normalized();
+      Mat2 odom_R_heading;
+      odom_R_heading << ahead.x(), -ahead.y(), ahead.y(), ahead.x();
+      bias_.update(params.bias, odom_p_com_m.head<2>() + odom_v_com_mps.head<2>() / omega_radps, zmp_felt_m - beside_m,
+                   odom_R_heading, omega_radps, kBias_ticks * tick_s);
+    } else {
+      bias_.missed();
+    }
   }
   odom_p_com_m.head<2>() -= bias_.odom_bias_m();
 

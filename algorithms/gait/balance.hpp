@@ -50,6 +50,7 @@ class Balance {
  private:
   DcmStabiliser stabiliser_;
   DcmBias bias_;
+  int bias_tick_ = 0;
   std::array<double, kFootCount> share_{0.5, 0.5};
   Vec2 odom_p_com_planned_m_ = Vec2::Zero();
   Vec2 com_error_m_ = Vec2::Zero();

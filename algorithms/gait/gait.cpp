@@ -11,6 +11,7 @@ namespace {
 constexpr std::int32_t kLower_ticks = 200;  // of the torso where a foot needs a longer leg
 constexpr std::int32_t kCrouch_ticks = 100;
 constexpr double kCrouchStep_m = 0.005;
+constexpr std::int32_t kOff_ticks = 5;  // a body is off its plan for longer than an estimate jumps
 constexpr double kInward_m = 0.01;
 constexpr double kSpare_m = 0.02;               // of its height: the base is not right over the centre of mass
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
@@ -175,7 +176,11 @@ double Gait::crouch_m() const noexcept {
 // On two feet, as soon as a body off its plan needs it.
 void Gait::crouch() noexcept {
   const double wanted_m = crouch_m();
-  if (wanted_m < crouched_m_ + kCrouchStep_m) return;
+  if (wanted_m < crouched_m_ + kCrouchStep_m) {
+    off_ticks_ = 0;
+    return;
+  }
+  if (++off_ticks_ < kOff_ticks) return;
   crouched_m_ = wanted_m;
   move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, kCrouch_ticks, kCrouch_ticks);
 }

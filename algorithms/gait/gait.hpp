@@ -126,8 +126,9 @@ class Gait {
   TorsoTrajectory::State torso_state_{};  // x and y: of the centre of mass
   struct {
     double height_m = 0.0, yaw_rad = 0.0;
-  } upright_;                // plan frame: of the torso in this hold or shift,
-  double crouched_m_ = 0.0;  // less this
+  } upright_;                   // plan frame: of the torso in this hold or shift,
+  double crouched_m_ = 0.0;     // less this
+  std::int32_t off_ticks_ = 0;  // for which more was wanted
   ComPlan com_;
   Vec2 dcm_error_m_ = Vec2::Zero();   // of the divergent component, as last measured, odometry
   Vec2 zmp_stance_m_ = Vec2::Zero();  // of the swing, plan frame

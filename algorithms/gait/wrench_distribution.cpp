@@ -16,9 +16,10 @@ struct Carriers {
   }
 };
 
-// Of the left sole's share of the force: what remains of the line's place there goes to the centres of pressure.
+// Of the left sole's share of the force: what remains of the line's place there goes to the centres of pressure. Also
+// by how much they miss it.
 Pressure press(const Support& support, const PressureLimits& limits, const Carriers& carriers, double share,
-               const Vec2& line_m) noexcept {
+               const Vec2& line_m, double& missed_m) noexcept {
   Pressure pressure;
   pressure.share = {share, 1.0 - share};
   const Vec2 rest_m = line_m - (share * carriers.odom_p_m[0] + (1.0 - share) * carriers.odom_p_m[1]).head<2>();
@@ -30,6 +31,7 @@ Pressure press(const Support& support, const PressureLimits& limits, const Carri
                                        math::clamp(local_m.y(), -limits.aside_m, limits.aside_m), 0.0};
     pressure.zmp_m += pressure.share[f] * pressure.centre_m[f];
   }
+  missed_m = (pressure.zmp_m.head<2>() - line_m).norm();
   return pressure;
 }
 
@@ -46,8 +48,11 @@ Pressure distribute(const Support& support, const PressureLimits& limits, const 
   const auto line_at = [&](double share) -> Vec2 {
     return odom_p_com_m.head<2>() - (odom_p_com_m.z() - carriers.height_m(share)) * slope;
   };
-  const auto press_with = [&](double share) { return press(support, limits, carriers, share, line_at(share)); };
-  if (!both) return press_with(support.stands[0] ? 1.0 : 0.0);
+  double missed_m = 0.0;
+  const auto press_with = [&](double share, double& missed) {
+    return press(support, limits, carriers, share, line_at(share), missed);
+  };
+  if (!both) return press_with(support.stands[0] ? 1.0 : 0.0, missed_m);
 
   constexpr int kPasses = 3;  // the ground's height under the line depends on the shares
   const Vec2 right_m = carriers.odom_p_m[1].head<2>(), between_m = carriers.odom_p_m[0].head<2>() - right_m;
@@ -56,17 +61,17 @@ Pressure distribute(const Support& support, const PressureLimits& limits, const 
     const Vec2 off_m = line_at(share) - right_m;
     share = math::clamp(off_m.dot(between_m) / std::max(between_m.squaredNorm(), 1e-6), 0.0, 1.0);
   }
-  Pressure pressure = press_with(share);
-  const auto missed_m = [&](const Pressure& p) { return (p.zmp_m.head<2>() - line_at(p.share[0])).norm(); };
+  Pressure pressure = press_with(share, missed_m);
   constexpr double kMissed_m = 0.005;
-  if (missed_m(pressure) < kMissed_m) return pressure;
+  if (missed_m < kMissed_m) return pressure;
   // Beyond the soles' limits with these shares: with those that come closest.
   double low = 0.0, high = 1.0;
   constexpr int kHalvings = 8;
   for (int i = 0; i < kHalvings; ++i) {
     const double third = (high - low) / 3.0;
-    const Pressure left = press_with(high - third), right = press_with(low + third);
-    if (missed_m(left) < missed_m(right)) {
+    double left_missed_m = 0.0, right_missed_m = 0.0;
+    const Pressure left = press_with(high - third, left_missed_m), right = press_with(low + third, right_missed_m);
+    if (left_missed_m < right_missed_m) {
       pressure = left;
       low += third;
     } else {
