@@ -73,13 +73,20 @@ double KinematicPlant::foot_force_n(std::size_t foot) const noexcept {
   return feet_[foot].anchored ? std::max(kTouch_n, load_share(foot) * kRobotWeight_n) : 0.0;
 }
 
-// The foot's force, at the middle of its sole, through the Jacobian.
+// The feet's forces through the Jacobians. Where in its sole each presses is what the body's place and acceleration
+// leave over beyond the shares, within the sole.
 void KinematicPlant::load_drives() {
+  constexpr SoleRectangle kSole = kContactRectangle;
+  const Vec3 between_m = load_share(0) * feet_[0].true_T_sole.p_m + load_share(1) * feet_[1].true_T_sole.p_m;
+  const Vec3 rest_m = pressed_m() - between_m;
   for (std::size_t f = 0; f < kFootCount; ++f) {
     const auto leg = static_cast<Foot>(f);
     const LegVector q = leg_joints(true_q_rad(), leg);
     const Vec3 base_f = true_T_base_.R.transpose() * Vec3{0, 0, foot_force_n(f)};
-    const Vec3 base_r = kContactRectangle.centre_x_m() * base_T_sole(errors_.legs[f], leg, q).R.col(0);
+    const Vec3 local_m = feet_[f].true_T_sole.R.transpose() * rest_m;
+    const Vec3 base_r = base_T_sole(errors_.legs[f], leg, q).R *
+                        Vec3{math::clamp(local_m.x(), kSole.heel_x_m, kSole.toe_x_m),
+                             math::clamp(local_m.y(), -kSole.half_width_m, kSole.half_width_m), 0.0};
     Eigen::Matrix<double, 6, 1> wrench;
     wrench.head<3>() = base_f;
     wrench.tail<3>() = base_r.cross(base_f);
@@ -159,6 +166,20 @@ void KinematicPlant::update_leg_kinematics() {
   }
 }
 
+Vec3 KinematicPlant::true_p_mass_m() const {
+  BodyFrames frames;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    frames[index_of(leg)] = leg_frames(errors_.legs[index_of(leg)], leg, leg_joints(true_q_rad(), leg));
+  }
+  return true_T_base_ * centre_of_mass_m({}, base_p_links_m({}, frames));
+}
+
+// Where the weight, moving as the base does, presses on the ground.
+Vec3 KinematicPlant::pressed_m() const {
+  constexpr double kPendulum_radps = 3.5, kMost_mps2 = 2.0;
+  return true_p_mass_m() - base_a_mps2_.cwiseMax(-kMost_mps2).cwiseMin(kMost_mps2) / math::square(kPendulum_radps);
+}
+
 void KinematicPlant::transfer_load() {
   FootState &left = feet_[0], &right = feet_[1];
   const bool both = left.anchored && right.anchored;
@@ -177,12 +198,9 @@ void KinematicPlant::transfer_load() {
   }
   closure_m_ = (left.true_T_base.p_m - right.true_T_base.p_m).norm();
 
-  // Where a mass at the base, moving as it does, presses between the soles: 0 at the right one, 1 at the left.
-  constexpr double kPendulum_radps = 3.5, kMost_mps2 = 2.0;
-  const Vec3 pressed_m =
-      true_T_base_.p_m - base_a_mps2_.cwiseMax(-kMost_mps2).cwiseMin(kMost_mps2) / math::square(kPendulum_radps);
+  // Where it presses between the soles: 0 at the right one, 1 at the left.
   const Vec2 between = (left.true_T_sole.p_m - right.true_T_sole.p_m).head<2>();
-  const double along = (pressed_m - right.true_T_sole.p_m).head<2>().dot(between) / between.squaredNorm();
+  const double along = (pressed_m() - right.true_T_sole.p_m).head<2>().dot(between) / between.squaredNorm();
   // A foot is unloaded before the base is all the way over the other one: the sole has a width.
   constexpr double kDeadEnd = 0.1;
   const double target = smooth_step((along - kDeadEnd) / (1.0 - 2.0 * kDeadEnd));

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/robot/leg_dynamics.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
 #include "sim_stub/clearance.hpp"
 #include "sim_stub/plant.hpp"
@@ -78,6 +79,8 @@ class KinematicPlant final : public Plant {
   void move_base();
   void move_swing_feet();
   void load_drives();
+  [[nodiscard]] Vec3 true_p_mass_m() const;
+  [[nodiscard]] Vec3 pressed_m() const;
   void check_falls();
   [[nodiscard]] Transform blend() const;
   [[nodiscard]] double gap_m(std::size_t foot) const;  // of its sole above its anchor, on the other leg's base

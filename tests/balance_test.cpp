@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "algorithms/gait/com_plan.hpp"
@@ -97,6 +98,115 @@ TEST(DcmStabiliser, LastingError_IntegralIsLimited) {
   EXPECT_NEAR(zmp.x(), DcmStabiliser::Params{}.gain * 0.01 + 0.02, 1e-12);
 }
 
+// A pendulum held up by an estimate that is wrong by bias_m; push_mps: at 12 s.
+struct BiasedPendulum {
+  BiasedPendulum(const Vec2& bias, double heading) : bias_m(bias), heading_rad(heading) {}
+
+  Vec2 bias_m;
+  double heading_rad;
+  Vec2 push_mps = Vec2::Zero();
+  DcmBias observer;
+  Vec2 x_m{0.004, -0.006};
+
+  void run(double seconds, bool seen = true) {
+    constexpr double kOmega_radps = 3.5;
+    const Mat2 heading = rotation_z(heading_rad).topLeftCorner<2, 2>();
+    Vec2 v_mps = Vec2::Zero();
+    DcmStabiliser stabiliser;
+    for (int tick = 0; tick < seconds / kTick_s; ++tick) {
+      if (tick == 6000) v_mps += push_mps;
+      const Vec2 estimate_m = x_m + bias_m;
+      const Vec2 zmp_m = stabiliser.zmp_m({}, {}, estimate_m - observer.odom_bias_m(), v_mps, kOmega_radps, kTick_s);
+      if (seen) {
+        observer.update({}, estimate_m + v_mps / kOmega_radps, zmp_m, heading, kOmega_radps, kTick_s);
+      } else {
+        observer.missed();
+      }
+      v_mps += kTick_s * math::square(kOmega_radps) * (x_m - zmp_m);
+      x_m += kTick_s * v_mps;
+    }
+  }
+};
+
+TEST(DcmBias, WronglyEstimatedPendulum_IsFoundAndHeldInItsPlace) {
+  BiasedPendulum pendulum{{0.012, -0.009}, 0.7};
+  pendulum.run(10.0);
+  EXPECT_LT((pendulum.observer.odom_bias_m() - pendulum.bias_m).norm(), 0.2e-3);
+  EXPECT_LT(pendulum.x_m.norm(), 1e-3);
+  BiasedPendulum unseen{{0.012, -0.009}, 0.7};
+  unseen.run(10.0, false);
+  EXPECT_EQ(unseen.observer.odom_bias_m().norm(), 0.0);
+  EXPECT_GT(unseen.x_m.norm(), 0.01);
+}
+
+TEST(DcmBias, RobotThatTurns_BiasTurnsWithIt) {
+  BiasedPendulum pendulum{{0.01, 0.0}, 0.0};
+  pendulum.run(10.0);
+  pendulum.heading_rad = 0.5 * kPi;
+  pendulum.observer.missed();
+  pendulum.run(2 * kTick_s);
+  EXPECT_LT((pendulum.observer.odom_bias_m() - Vec2{0.0, 0.01}).norm(), 0.5e-3);
+}
+
+TEST(DcmBias, Push_IsNoBias) {
+  BiasedPendulum pendulum{{0.005, 0.005}, 0.0};
+  pendulum.push_mps = {0.0, 10.0 / MassModel{}.total_kg()};
+  pendulum.run(12.5);
+  EXPECT_LT((pendulum.observer.odom_bias_m() - pendulum.bias_m).norm(), 2e-3);
+}
+
+// Both legs bent, soles level, and pressed off their middles.
+struct PressedSoles {
+  MassModel masses;
+  GroundFeeling felt;
+  std::array<Transform, kFootCount> odom_T_sole;
+  Vec2 zmp_m = Vec2::Zero();
+  Vec2 slope{0.03, -0.05};
+
+  PressedSoles() {
+    const std::array<Vec3, kFootCount> local_m{Vec3{0.05, 0.01, 0.0}, Vec3{-0.02, -0.02, 0.0}};
+    constexpr std::array kForce_n{200.0, 340.0};
+    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+      const std::size_t f = index_of(leg);
+      odom_T_sole[f] = {rotation_z(0.2), Vec3{0.2 * static_cast<double>(f), 0.11 * side_sign(leg), -0.75}};
+      const LegVector q_rad = solve_leg({}, leg, odom_T_sole[f]).q_rad;  // the base at odometry's origin
+      const Vec3 force_n = kForce_n[f] * Vec3{slope.x(), slope.y(), 1.0};
+      std::array<Vec3, kJointsPerLeg> weight_mps2;
+      weight_mps2.fill({0, 0, -kGravity_mps2});
+      const SoleWrench ground{force_n, (odom_T_sole[f].R * local_m[f]).cross(force_n)};
+      felt.tau_nm.segment<6>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
+          leg_torques_nm(masses, leg, leg_frames({}, leg, q_rad), weight_mps2, ground);
+      felt.foot_force_n[f] = kForce_n[f];
+      zmp_m += kForce_n[f] / 540.0 * (odom_T_sole[f] * local_m[f]).head<2>();
+    }
+  }
+  [[nodiscard]] bool try_measure(Vec2& measured_m) const {
+    return try_measure_zmp(masses, {}, felt, odom_T_sole, slope, measured_m);
+  }
+};
+
+TEST(ZmpMeasurement, SolesPressedOffTheirMiddles_AreFound) {
+  Vec2 measured_m;
+  const PressedSoles soles;
+  ASSERT_TRUE(soles.try_measure(measured_m));
+  EXPECT_LT((measured_m - soles.zmp_m).norm(), 0.3e-3);  // the foot is also weighed
+}
+
+TEST(ZmpMeasurement, NothingTold_IsNone) {
+  const Vec2 before{7.0, 8.0};
+  Vec2 measured_m = before;
+  PressedSoles no_torque;
+  no_torque.felt.tau_nm[kAnklePitch] = std::nan("");
+  EXPECT_FALSE(no_torque.try_measure(measured_m));
+  PressedSoles no_force;
+  no_force.felt.foot_force_n.fill(std::nan(""));
+  EXPECT_FALSE(no_force.try_measure(measured_m));
+  PressedSoles dead_sensor;
+  dead_sensor.felt.foot_force_n[1] = 0.0;
+  EXPECT_FALSE(dead_sensor.try_measure(measured_m));
+  EXPECT_EQ(measured_m, before);
+}
+
 Support standing(double left_z_m = 0.0) {
   Support support;
   support.odom_T_sole[0].p_m = {0.0, 0.1, left_z_m};
@@ -140,6 +250,53 @@ TEST(WrenchDistribution, ForceBeyondTheSole_StopsAtItsLimits) {
   const Pressure behind = distribute(support, limits, {-0.3, -0.3, 0.8}, Vec2::Zero());
   EXPECT_NEAR(behind.zmp_m.x(), -limits.behind_m, 1e-12);
   EXPECT_NEAR(behind.zmp_m.y(), 0.1 - limits.aside_m, 1e-12);
+}
+
+// One foot on the next tread: sideways the soles' hull is narrow, and shares by the place between them give up ground.
+TEST(WrenchDistribution, ForceBeyondBothSoles_ComesAsCloseAsAnyShares) {
+  Support support = standing();
+  support.odom_T_sole[0].p_m = {-0.28, 0.1, -0.13};
+  const PressureLimits limits;
+  const Vec3 com_m{0.03, 0.02, 0.8};
+  const auto missed_m = [&](const Pressure& p) {
+    return (p.zmp_m.head<2>() - com_m.head<2>()).norm();  // no slope: the line is vertical
+  };
+  double closest_m = 1.0;
+  for (int i = 0; i <= 1000; ++i) {
+    const double share = 1e-3 * i;
+    Vec2 zmp_m = Vec2::Zero();
+    const Vec2 left_m = support.odom_T_sole[0].p_m.head<2>() - Vec2{0.0, limits.inward_m};
+    const Vec2 right_m = support.odom_T_sole[1].p_m.head<2>() + Vec2{0.0, limits.inward_m};
+    const Vec2 rest_m = com_m.head<2>() - share * left_m - (1.0 - share) * right_m;
+    for (const double side : {1.0, -1.0}) {
+      const Vec2 local_m = rest_m - Vec2{0.0, side * limits.inward_m};
+      const Vec2 pressed_m{math::clamp(local_m.x(), -limits.behind_m, limits.ahead_m),
+                           math::clamp(local_m.y(), -limits.aside_m, limits.aside_m)};
+      const Vec2 sole_m = support.odom_T_sole[side > 0.0 ? 0 : 1].p_m.head<2>();
+      zmp_m += (side > 0.0 ? share : 1.0 - share) * (sole_m + pressed_m);
+    }
+    closest_m = std::min(closest_m, (zmp_m - com_m.head<2>()).norm());
+  }
+  EXPECT_GT(closest_m, 0.02);
+  EXPECT_LT(missed_m(distribute(support, limits, com_m, Vec2::Zero())), closest_m + 0.5e-3);
+}
+
+TEST(Balance, FootThatHangs_DoesNotMoveThePlan) {
+  JointVector q_rad = bent_q_rad();
+  Balance::Reference reference;
+  for (std::size_t f = 0; f < kFootCount; ++f) reference.plan_T_sole[f] = body_frames({}, q_rad)[f].sole;
+  q_rad[static_cast<Eigen::Index>(joint_index(Foot::kRight, kHipPitch))] += 0.1;
+  const auto moved_m = [&](double right_n) {
+    Balance balance;
+    Balance::Body body;
+    body.q_rad = q_rad;
+    body.ground.foot_force_n = {500.0, right_n};
+    (void)balance.torques_nm({}, {}, reference, body, kTick_s);
+    return balance.odom_p_com_planned_m().norm();
+  };
+  EXPECT_LT(moved_m(0.0), 1e-12);
+  EXPECT_GT(moved_m(100.0), 0.02);
+  EXPECT_EQ(moved_m(std::nan("")), moved_m(100.0));  // without forces both count
 }
 
 TEST(LegDynamics, CentreOfMassSpeed_IsItsDifference) {

@@ -3,14 +3,39 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 
 namespace polygmap {
+namespace {
+
+constexpr int kBias_ticks = 4;  // the observer is slow
+
+// What each foot says of the place of the plan: those that stand, alike, but one that is hardly pressed hangs and
+// moves.
+std::array<double, kFootCount> held_by(const std::array<bool, kFootCount>& stands,
+                                       const std::array<double, kFootCount>& force_n) noexcept {
+  constexpr double kPressed_n = 60.0;
+  std::array<double, kFootCount> holds{};
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    if (stands[f]) holds[f] = math::clamp(force_n[f] / kPressed_n, 0.0, 1.0);
+  }
+  if (!(holds[0] + holds[1] > 0.5) || !std::isfinite(force_n[0] + force_n[1])) {  // no force is told, or none is there
+    holds = {stands[0] ? 1.0 : 0.0, stands[1] ? 1.0 : 0.0};
+  }
+  const double sum = holds[0] + holds[1];
+  return {holds[0] / sum, holds[1] / sum};
+}
+
+}  // namespace
 
 void Balance::reset() noexcept {
   stabiliser_.reset();
+  bias_.reset();
+  bias_tick_ = 0;
   share_ = {0.5, 0.5};
   odom_p_com_planned_m_.setZero();
   com_error_m_.setZero();
+  slope_.setZero();
 }
 
 JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
@@ -20,19 +45,18 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   const PerLink base_p_m = base_p_links_m(params.masses, frames);
   const Vec3 base_p_com_m = centre_of_mass_m(params.masses, base_p_m);
   const Vec3 base_v_com = base_v_com_mps(params.masses, frames, base_p_m, body.dq_radps);
-  const Vec3 odom_p_com_m = body.odom_T_base * base_p_com_m;
+  Vec3 odom_p_com_m = body.odom_T_base * base_p_com_m;
   const Vec3 odom_v_com_mps = body.odom_v_base_mps + R * (base_v_com + body.base_w_base_radps.cross(base_p_com_m));
 
   Support support;
   support.stands = reference.stands;
   Vec3 odom_p_plan_m = Vec3::Zero();
   double ground_m = 0.0;
-  const double standing = reference.stands[0] && reference.stands[1] ? 2.0 : 1.0;
+  const std::array<double, kFootCount> holds = held_by(reference.stands, body.ground.foot_force_n);
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const std::size_t f = index_of(leg);
     support.odom_T_sole[f] = body.odom_T_base * frames[f].sole;
-    if (!reference.stands[f]) continue;
-    odom_p_plan_m += (support.odom_T_sole[f].p_m - reference.plan_T_sole[f].p_m) / standing;
+    odom_p_plan_m += holds[f] * (support.odom_T_sole[f].p_m - reference.plan_T_sole[f].p_m);
   }
   for (std::size_t f = 0; f < kFootCount; ++f) ground_m += share_[f] * support.odom_T_sole[f].p_m.z();
 
@@ -46,12 +70,6 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   constexpr double kLeastUp_mps2 = 0.2 * kGravity_mps2;  // no plan falls freely
   const double up_mps2 = std::max(kGravity_mps2 + lift_n / params.masses.total_kg(), kLeastUp_mps2);
   const double omega_radps = math::sqrt(up_mps2 / height_m);
-  HorizontalMotion planned = reference.com;
-  planned.position_m += odom_p_plan_m.head<2>();
-  odom_p_com_planned_m_ = planned.position_m;
-  com_error_m_ = planned.position_m - odom_p_com_m.head<2>();
-  const Vec2 zmp_m =
-      stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(), omega_radps, tick_s);
   // Legs that swing turn the body: the ground's force passes beside the centre of mass by as much as that takes.
   PerLink turned_m;
   turned_m.torso = R * base_p_m.torso;
@@ -61,6 +79,28 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   const Vec3 turning_nm = angular_momentum_rate_nm(params.masses, turned_m, links_mps2);
   const double vertical_n = params.masses.total_kg() * up_mps2;
   const Vec2 beside_m{-turning_nm.y() / vertical_n, turning_nm.x() / vertical_n};
+
+  if (++bias_tick_ >= kBias_ticks) {
+    bias_tick_ = 0;
+    Vec2 zmp_felt_m;
+    if (try_measure_zmp(params.masses, geometry, body.ground, support.odom_T_sole, slope_, zmp_felt_m)) {
+      const Vec2 ahead = R.col(0).head<2>().normalized();
+      Mat2 odom_R_heading;
+      odom_R_heading << ahead.x(), -ahead.y(), ahead.y(), ahead.x();
+      bias_.update(params.bias, odom_p_com_m.head<2>() + odom_v_com_mps.head<2>() / omega_radps, zmp_felt_m - beside_m,
+                   odom_R_heading, omega_radps, kBias_ticks * tick_s);
+    } else {
+      bias_.missed();
+    }
+  }
+  odom_p_com_m.head<2>() -= bias_.odom_bias_m();
+
+  HorizontalMotion planned = reference.com;
+  planned.position_m += odom_p_plan_m.head<2>();
+  odom_p_com_planned_m_ = planned.position_m;
+  com_error_m_ = planned.position_m - odom_p_com_m.head<2>();
+  const Vec2 zmp_m =
+      stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(), omega_radps, tick_s);
   const Vec2 slope = (odom_p_com_m.head<2>() - zmp_m) / height_m;
   const Pressure pressure =
       distribute(support, params.pressure,
@@ -69,6 +109,7 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
 
   // The force that the clamped centres of pressure can give.
   const Vec2 given = (odom_p_com_m.head<2>() + beside_m - pressure.zmp_m.head<2>()) / height_m;
+  slope_ = given;
   const Vec3 force_n{vertical_n * given.x(), vertical_n * given.y(), vertical_n};
   JointVector torque_nm;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {

@@ -3,9 +3,11 @@
 // of motion, a ground force through the centre of mass, its split over the standing soles, the legs' statics.
 #pragma once
 
+#include "algorithms/gait/dcm_bias.hpp"
 #include "algorithms/gait/dcm_stabiliser.hpp"
 #include "algorithms/gait/link_motion.hpp"
 #include "algorithms/gait/wrench_distribution.hpp"
+#include "algorithms/gait/zmp_measurement.hpp"
 
 namespace polygmap {
 
@@ -13,6 +15,7 @@ class Balance {
  public:
   struct Params {
     DcmStabiliser::Params dcm;
+    DcmBias::Params bias;
     PressureLimits pressure;
     MassModel masses;
     double armature_kgm2 = 0.05;  // of a drive, seen at its joint
@@ -29,6 +32,7 @@ class Balance {
     Vec3 base_w_base_radps = Vec3::Zero();
     JointVector q_rad = JointVector::Zero();
     JointVector dq_radps = JointVector::Zero();
+    GroundFeeling ground;
   };
 
   void reset() noexcept;
@@ -40,12 +44,17 @@ class Balance {
   [[nodiscard]] const Vec2& com_error_m() const noexcept { return com_error_m_; }
   // Likewise, how far the divergent component is ahead of its plan.
   [[nodiscard]] const Vec2& dcm_error_m() const noexcept { return stabiliser_.error_m(); }
+  // How far the centre of mass is from where body and masses have it: theirs minus the true one.
+  [[nodiscard]] const Vec2& odom_com_bias_m() const noexcept { return bias_.odom_bias_m(); }
 
  private:
   DcmStabiliser stabiliser_;
+  DcmBias bias_;
+  int bias_tick_ = 0;
   std::array<double, kFootCount> share_{0.5, 0.5};
   Vec2 odom_p_com_planned_m_ = Vec2::Zero();
   Vec2 com_error_m_ = Vec2::Zero();
+  Vec2 slope_ = Vec2::Zero();  // of the ground's force asked for
 };
 
 }  // namespace polygmap

@@ -9,6 +9,9 @@ namespace polygmap {
 namespace {
 
 constexpr std::int32_t kLower_ticks = 200;  // of the torso where a foot needs a longer leg
+constexpr std::int32_t kCrouch_ticks = 100;
+constexpr double kCrouchStep_m = 0.005;
+constexpr std::int32_t kOff_ticks = 5;  // a body is off its plan for longer than an estimate jumps
 constexpr double kInward_m = 0.01;
 constexpr double kSpare_m = 0.02;               // of its height: the base is not right over the centre of mass
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
@@ -76,7 +79,9 @@ void Gait::start(const StateEstimate& state) noexcept {
 void Gait::observe_reference() noexcept {
   const MassModel& masses = params_.balance.masses;
   const BodyFrames frames = body_frames(params_.geometry, joints_.reference_rad());
-  reference_p_com_m_ = centre_of_mass_m(masses, base_p_links_m(masses, frames));
+  const Vec2& bias_m = balance_.odom_com_bias_m();
+  reference_p_com_m_ = centre_of_mass_m(masses, base_p_links_m(masses, frames)) -
+                       plan_T_base_.R.transpose() * Vec3{bias_m.x(), bias_m.y(), 0.0};
 }
 
 // The horizontal part of the torso's trajectory is the centre of mass's: the base follows from the legs' places, one
@@ -106,8 +111,10 @@ void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback
   reference.plan_T_sole = plan_T_sole_;
   reference.stands = status_.stands;
   const bool seen = started_ && usable_ && math::all_finite(feedback.dq_radps);
-  Balance::Body body{plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad(), JointVector::Zero()};
-  if (seen) body = {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad, feedback.dq_radps};
+  Balance::Body body{plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad(), JointVector::Zero(), {}};
+  if (seen)
+    body = {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps,
+            state.q_rad,       feedback.dq_radps,     {feedback.foot_force_n, feedback.tau_nm}};
   const JointVector torque_nm = balance_.torques_nm(params_.balance, params_.geometry, reference, body, kTick_s);
   if (seen) dcm_error_m_ = balance_.dcm_error_m();
   for (std::size_t n = 0; n < kJointCount; ++n) {
@@ -166,10 +173,24 @@ double Gait::crouch_m() const noexcept {
   return off_m > params_.pace.topples_m ? std::min(params_.crouch * off_m, params_.crouch_max_m) : 0.0;
 }
 
+// On two feet, as soon as a body off its plan needs it.
+void Gait::crouch() noexcept {
+  const double wanted_m = crouch_m();
+  if (wanted_m < crouched_m_ + kCrouchStep_m) {
+    off_ticks_ = 0;
+    return;
+  }
+  if (++off_ticks_ < kOff_ticks) return;
+  crouched_m_ = wanted_m;
+  move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, kCrouch_ticks, kCrouch_ticks);
+}
+
 void Gait::settle_between_feet() noexcept {
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   TorsoPose middle = torso_between(params_.geometry, params_.step.torso, soles);
-  move_torso(middle.position_m.z() - crouch_m(), middle.yaw_rad, params_.settle_ticks, params_.settle_ticks);
+  crouched_m_ = crouch_m();
+  upright_ = {middle.position_m.z(), middle.yaw_rad};
+  move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, params_.settle_ticks, params_.settle_ticks);
   const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{params_.step.zmp_ahead_m, 0, 0};
   rest_over((middle.position_m + ahead_m).head<2>());
   tick_ = 0;
@@ -203,7 +224,9 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
   plan_shift(params_.step, TorsoTrajectory::horizontal(torso_state_), params_.reshift_ticks, plan, com_);
   shift_ticks_ = plan.shift_ticks;
   plan_torso(params_.geometry, params_.step, soles, com_, shift_ticks_, plan);
-  move_torso(plan.lift_off.position_m.z() - crouch_m(), plan.lift_off.yaw_rad, shift_ticks_, shift_ticks_);
+  crouched_m_ = crouch_m();
+  upright_ = {plan.lift_off.position_m.z(), plan.lift_off.yaw_rad};
+  move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, shift_ticks_, shift_ticks_);
   com_tick_ = 0;
   search_.begin(params_.geometry, params_.step, decision.goal, decision.trailing, shift_ticks_, torso_state_,
                 plan_T_sole_);
@@ -213,7 +236,9 @@ void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexce
   if (stop_requested_) return end(GaitPhase::kStopped, Obstruction::kNone, 0.0);
   if (lost(state)) return end(GaitPhase::kStopped, Obstruction::kStateStale, 0.0);
   if (!state.initialised || !usable_) return;
-  if (retried_ && tick_ < params_.settle_ticks) return;
+  // A body that sways sideways is best off between the feet.
+  const bool sways = !(std::abs(plan_T_base_.R.col(1).head<2>().dot(dcm_error_m_)) <= params_.steady_m);
+  if ((retried_ || sways) && tick_ < params_.settle_ticks) return;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (decision.has_step) {
     wait_ticks_ = 0;
@@ -314,7 +339,11 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
       break;
   }
   if (settles_) hold_landed_foot(feedback);
-  if (activity_ == Activity::kSwing) set_pace();
+  if (activity_ == Activity::kSwing) {
+    set_pace();
+  } else {
+    crouch();
+  }
   tick_ = std::min(tick_ + 1, kTickLimit);
   com_tick_ = std::min(com_tick_ + 1, kTickLimit);
   torso_tick_ = std::min(torso_tick_ + 1, kTickLimit);

@@ -48,7 +48,7 @@ class Gait {
     double soon_ticks_per_m = 450.0;  // ticks for each metre of its way, for the drives
     double below_m = 0.03;            // not from farther below
     double beside_from_m = 0.1;       // a passing foot that far behind the standing one lands beside it
-    double crouch = 0.7;              // lower in double support, of the divergent component's error
+    double crouch = 1.0;              // lower in double support, of the divergent component's error
     double crouch_max_m = 0.04;
     double side_margin_m = 0.01;                // of a sole that lands farther out, to the end of its tread
     double early_m = 0.005;                     // contact this far above the target counts as early
@@ -101,6 +101,7 @@ class Gait {
   void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
   void carry_plan_to_odometry() noexcept;
   [[nodiscard]] double crouch_m() const noexcept;
+  void crouch() noexcept;
   void settle_between_feet() noexcept;
   void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
   void lower_torso(const SolePose& sole) noexcept;
@@ -123,6 +124,11 @@ class Gait {
   BaseCorrection correction_;
   TorsoTrajectory torso_;
   TorsoTrajectory::State torso_state_{};  // x and y: of the centre of mass
+  struct {
+    double height_m = 0.0, yaw_rad = 0.0;
+  } upright_;                   // plan frame: of the torso in this hold or shift,
+  double crouched_m_ = 0.0;     // less this
+  std::int32_t off_ticks_ = 0;  // for which more was wanted
   ComPlan com_;
   Vec2 dcm_error_m_ = Vec2::Zero();   // of the divergent component, as last measured, odometry
   Vec2 zmp_stance_m_ = Vec2::Zero();  // of the swing, plan frame

@@ -6,36 +6,78 @@
 
 namespace polygmap {
 
-Pressure distribute(const Support& support, const PressureLimits& limits, const Vec3& odom_p_com_m,
-                    const Vec2& slope) noexcept {
-  Vec3 left = support.odom_T_sole[0].p_m, right = support.odom_T_sole[1].p_m;
-  if (support.stands[0] && support.stands[1]) {
-    left -= limits.inward_m * support.odom_T_sole[0].R.col(1);
-    right += limits.inward_m * support.odom_T_sole[1].R.col(1);
-  }
-  const auto line_at = [&](double z_m) -> Vec2 { return odom_p_com_m.head<2>() - (odom_p_com_m.z() - z_m) * slope; };
+namespace {
 
-  Pressure pressure;
-  double share = support.stands[0] ? 1.0 : 0.0;  // of the left foot
-  if (support.stands[0] && support.stands[1]) {
-    constexpr int kPasses = 3;  // the ground's height under the line depends on the shares
-    const Vec2 between = (left - right).head<2>();
-    share = 0.5;
-    for (int i = 0; i < kPasses; ++i) {
-      const Vec2 off = line_at(right.z() + share * (left.z() - right.z())) - right.head<2>();
-      share = math::clamp(off.dot(between) / std::max(between.squaredNorm(), 1e-6), 0.0, 1.0);
-    }
+// Where each sole carries its share without any turning of its own: both, a little inward of their middles.
+struct Carriers {
+  std::array<Vec3, kFootCount> odom_p_m;
+  [[nodiscard]] double height_m(double share) const noexcept {
+    return odom_p_m[1].z() + share * (odom_p_m[0].z() - odom_p_m[1].z());
   }
+};
+
+// Of the left sole's share of the force: what remains of the line's place there goes to the centres of pressure. Also
+// by how much they miss it.
+Pressure press(const Support& support, const PressureLimits& limits, const Carriers& carriers, double share,
+               const Vec2& line_m, double& missed_m) noexcept {
+  Pressure pressure;
   pressure.share = {share, 1.0 - share};
-  const double ground_m = right.z() + share * (left.z() - right.z());
-  const Vec2 rest_m = line_at(ground_m) - (share * left + (1.0 - share) * right).head<2>();
+  const Vec2 rest_m = line_m - (share * carriers.odom_p_m[0] + (1.0 - share) * carriers.odom_p_m[1]).head<2>();
   for (std::size_t f = 0; f < kFootCount; ++f) {
     const Transform& sole = support.odom_T_sole[f];
-    const Vec3 carried_m = (f == 0 ? left : right) - sole.p_m;
+    const Vec3 carried_m = carriers.odom_p_m[f] - sole.p_m;
     const Vec3 local_m = sole.R.transpose() * Vec3{carried_m.x() + rest_m.x(), carried_m.y() + rest_m.y(), 0.0};
     pressure.centre_m[f] = sole * Vec3{math::clamp(local_m.x(), -limits.behind_m, limits.ahead_m),
                                        math::clamp(local_m.y(), -limits.aside_m, limits.aside_m), 0.0};
     pressure.zmp_m += pressure.share[f] * pressure.centre_m[f];
+  }
+  missed_m = (pressure.zmp_m.head<2>() - line_m).norm();
+  return pressure;
+}
+
+}  // namespace
+
+Pressure distribute(const Support& support, const PressureLimits& limits, const Vec3& odom_p_com_m,
+                    const Vec2& slope) noexcept {
+  Carriers carriers{{support.odom_T_sole[0].p_m, support.odom_T_sole[1].p_m}};
+  const bool both = support.stands[0] && support.stands[1];
+  if (both) {
+    carriers.odom_p_m[0] -= limits.inward_m * support.odom_T_sole[0].R.col(1);
+    carriers.odom_p_m[1] += limits.inward_m * support.odom_T_sole[1].R.col(1);
+  }
+  const auto line_at = [&](double share) -> Vec2 {
+    return odom_p_com_m.head<2>() - (odom_p_com_m.z() - carriers.height_m(share)) * slope;
+  };
+  double missed_m = 0.0;
+  const auto press_with = [&](double share, double& missed) {
+    return press(support, limits, carriers, share, line_at(share), missed);
+  };
+  if (!both) return press_with(support.stands[0] ? 1.0 : 0.0, missed_m);
+
+  constexpr int kPasses = 3;  // the ground's height under the line depends on the shares
+  const Vec2 right_m = carriers.odom_p_m[1].head<2>(), between_m = carriers.odom_p_m[0].head<2>() - right_m;
+  double share = 0.5;
+  for (int i = 0; i < kPasses; ++i) {
+    const Vec2 off_m = line_at(share) - right_m;
+    share = math::clamp(off_m.dot(between_m) / std::max(between_m.squaredNorm(), 1e-6), 0.0, 1.0);
+  }
+  Pressure pressure = press_with(share, missed_m);
+  constexpr double kMissed_m = 0.005;
+  if (missed_m < kMissed_m) return pressure;
+  // Beyond the soles' limits with these shares: with those that come closest.
+  double low = 0.0, high = 1.0;
+  constexpr int kHalvings = 8;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double third = (high - low) / 3.0;
+    double left_missed_m = 0.0, right_missed_m = 0.0;
+    const Pressure left = press_with(high - third, left_missed_m), right = press_with(low + third, right_missed_m);
+    if (left_missed_m < right_missed_m) {
+      pressure = left;
+      low += third;
+    } else {
+      pressure = right;
+      high -= third;
+    }
   }
   return pressure;
 }
