@@ -158,7 +158,7 @@ TEST(DcmBias, Push_IsNoBias) {
 // Both legs bent, soles level, and pressed off their middles.
 struct PressedSoles {
   MassModel masses;
-  GroundFeeling felt;
+  JointFeedback felt;
   std::array<Transform, kFootCount> odom_T_sole;
   Vec2 zmp_m = Vec2::Zero();
   Vec2 slope{0.03, -0.05};
@@ -290,8 +290,9 @@ TEST(Balance, FootThatHangs_DoesNotMoveThePlan) {
     Balance balance;
     Balance::Body body;
     body.q_rad = q_rad;
-    body.ground.foot_force_n = {500.0, right_n};
-    (void)balance.torques_nm({}, {}, reference, body, kTick_s);
+    JointFeedback feedback;
+    feedback.foot_force_n = {500.0, right_n};
+    (void)balance.torques_nm({}, {}, reference, body, feedback, kTick_s);
     return balance.odom_p_com_planned_m().norm();
   };
   EXPECT_LT(moved_m(0.0), 1e-12);

@@ -39,12 +39,12 @@ void Balance::reset() noexcept {
 }
 
 JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
-                                const Body& body, double tick_s) noexcept {
+                                const Body& body, const JointFeedback& feedback, double tick_s) noexcept {
   const Mat3& R = body.odom_T_base.R;
   const BodyFrames frames = body_frames(geometry, body.q_rad);
   const PerLink base_p_m = base_p_links_m(params.masses, frames);
   const Vec3 base_p_com_m = centre_of_mass_m(params.masses, base_p_m);
-  const Vec3 base_v_com = base_v_com_mps(params.masses, frames, base_p_m, body.dq_radps);
+  const Vec3 base_v_com = base_v_com_mps(params.masses, frames, base_p_m, feedback.dq_radps);
   Vec3 odom_p_com_m = body.odom_T_base * base_p_com_m;
   const Vec3 odom_v_com_mps = body.odom_v_base_mps + R * (base_v_com + body.base_w_base_radps.cross(base_p_com_m));
 
@@ -52,7 +52,7 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   support.stands = reference.stands;
   Vec3 odom_p_plan_m = Vec3::Zero();
   double ground_m = 0.0;
-  const std::array<double, kFootCount> holds = held_by(reference.stands, body.ground.foot_force_n);
+  const std::array<double, kFootCount> holds = held_by(reference.stands, feedback.foot_force_n);
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const std::size_t f = index_of(leg);
     support.odom_T_sole[f] = body.odom_T_base * frames[f].sole;
@@ -83,7 +83,7 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
   if (++bias_tick_ >= kBias_ticks) {
     bias_tick_ = 0;
     Vec2 zmp_felt_m;
-    if (try_measure_zmp(params.masses, geometry, body.ground, support.odom_T_sole, slope_, zmp_felt_m)) {
+    if (try_measure_zmp(params.masses, geometry, feedback, support.odom_T_sole, slope_, zmp_felt_m)) {
       const Vec2 ahead = R.col(0).head<2>().normalized();
       Mat2 odom_R_heading;
       odom_R_heading << ahead.x(), -ahead.y(), ahead.y(), ahead.x();

@@ -31,14 +31,13 @@ class Balance {
     Vec3 odom_v_base_mps = Vec3::Zero();
     Vec3 base_w_base_radps = Vec3::Zero();
     JointVector q_rad = JointVector::Zero();
-    JointVector dq_radps = JointVector::Zero();
-    GroundFeeling ground;
   };
 
   void reset() noexcept;
-  // One tick. The plan frame is laid on the estimate by the standing soles: an error of the base is what is fed back.
+  // One tick. feedback: rates, torques and forces on the feet, as measured. The plan frame is laid on the estimate by
+  // the standing soles: an error of the base is what is fed back.
   [[nodiscard]] JointVector torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
-                                       const Body& body, double tick_s) noexcept;
+                                       const Body& body, const JointFeedback& feedback, double tick_s) noexcept;
   // Of the last tick, horizontal: the planned centre of mass, and how far ahead of the estimated one it is.
   [[nodiscard]] const Vec2& odom_p_com_planned_m() const noexcept { return odom_p_com_planned_m_; }
   [[nodiscard]] const Vec2& com_error_m() const noexcept { return com_error_m_; }

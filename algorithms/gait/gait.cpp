@@ -111,11 +111,13 @@ void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback
   reference.plan_T_sole = plan_T_sole_;
   reference.stands = status_.stands;
   const bool seen = started_ && usable_ && math::all_finite(feedback.dq_radps);
-  Balance::Body body{plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad(), JointVector::Zero(), {}};
-  if (seen)
-    body = {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps,
-            state.q_rad,       feedback.dq_radps,     {feedback.foot_force_n, feedback.tau_nm}};
-  const JointVector torque_nm = balance_.torques_nm(params_.balance, params_.geometry, reference, body, kTick_s);
+  // Blind, it feeds forward to where the plan has itself.
+  const JointVector torque_nm =
+      seen ? balance_.torques_nm(params_.balance, params_.geometry, reference,
+                                 {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad},
+                                 feedback, kTick_s)
+           : balance_.torques_nm(params_.balance, params_.geometry, reference,
+                                 {plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad()}, {}, kTick_s);
   if (seen) dcm_error_m_ = balance_.dcm_error_m();
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const double limit_nm = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg).torque_nm;

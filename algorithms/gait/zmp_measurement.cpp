@@ -5,7 +5,7 @@
 
 namespace polygmap {
 
-bool try_measure_zmp(const MassModel& masses, const LegGeometry& geometry, const GroundFeeling& felt,
+bool try_measure_zmp(const MassModel& masses, const LegGeometry& geometry, const JointFeedback& felt,
                      const std::array<Transform, kFootCount>& odom_T_sole, const Vec2& odom_slope,
                      Vec2& odom_p_zmp_m) noexcept {
   if (!math::all_finite(felt.tau_nm)) return false;

@@ -8,15 +8,9 @@
 
 namespace polygmap {
 
-// What the robot's sensors tell of the ground.
-struct GroundFeeling {
-  std::array<double, kFootCount> foot_force_n{};  // vertical
-  JointVector tau_nm = JointVector::Zero();
-};
-
 // odom_slope: of the ground's force, horizontal over vertical. False, and nothing changes, when forces or torques are
 // not told or the feet together do not carry about the robot's weight.
-[[nodiscard]] bool try_measure_zmp(const MassModel& masses, const LegGeometry& geometry, const GroundFeeling& felt,
+[[nodiscard]] bool try_measure_zmp(const MassModel& masses, const LegGeometry& geometry, const JointFeedback& felt,
                                    const std::array<Transform, kFootCount>& odom_T_sole, const Vec2& odom_slope,
                                    Vec2& odom_p_zmp_m) noexcept;
 
