@@ -14,18 +14,18 @@ void PlannedPosture::reset(const JointVector& q_rad, const Vec3& base_p_com_m) n
 }
 
 LinkMotion::Acceleration PlannedPosture::update(const LegGeometry& geometry, const MassModel& masses,
-                                                const TorsoTrajectory::State& torso,
+                                                const Transform& torso, const Vec2& plan_p_com_m,
                                                 const std::array<Transform, kFootCount>& plan_T_sole) noexcept {
-  Transform plan_T_base;
+  Transform plan_T_base = torso;
   PerLink base_p_links;
   const bool restarted = motion_.restarted();
   const JointVector before_rad = q_rad_;
   const int passes = restarted ? 4 : 1;  // the base follows the legs' places and they the base
   for (int i = 0; i < passes; ++i) {
-    plan_T_base = TorsoTrajectory::pose(torso);
-    plan_T_base.p_m.head<2>() -= (plan_T_base.R * base_p_com_m_).head<2>();
+    plan_T_base.p_m.head<2>() = plan_p_com_m - (plan_T_base.R * base_p_com_m_).head<2>();
+    const Transform base_T_plan = plan_T_base.inverse();
     for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-      const LegSolution s = solve_leg(geometry, leg, plan_T_base.inverse() * plan_T_sole[index_of(leg)]);
+      const LegSolution s = solve_leg(geometry, leg, base_T_plan * plan_T_sole[index_of(leg)]);
       q_rad_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
     }
     base_p_links = base_p_links_m(masses, body_frames(geometry, q_rad_));

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "algorithms/gait/link_motion.hpp"
-#include "algorithms/gait/torso.hpp"
 
 namespace polygmap {
 
@@ -15,9 +14,10 @@ class PlannedPosture {
   void restart() noexcept { motion_.restart(); }
   // The plan goes on as it was, in another frame.
   void carry(const Transform& to_T_plan) noexcept { motion_.carry(to_T_plan); }
-  // One tick. torso: its x and y are of the centre of mass. The result belongs to the tick before.
+  // One tick. torso: the base's height and attitude; where it is follows from the centre of mass. The result belongs to
+  // the tick before.
   [[nodiscard]] LinkMotion::Acceleration update(const LegGeometry& geometry, const MassModel& masses,
-                                                const TorsoTrajectory::State& torso,
+                                                const Transform& torso, const Vec2& plan_p_com_m,
                                                 const std::array<Transform, kFootCount>& plan_T_sole) noexcept;
   // Of the leg's fastest drive in the last tick, over its limit; 0 after a restart.
   [[nodiscard]] double drive_share(Foot leg) const noexcept;

@@ -15,6 +15,7 @@ GaitStair::GaitStair() {
   GaitTick seen;
   climb.tamper = [&seen](StateEstimate& state, FootholdSet& footholds, JointFeedback& feedback) {
     seen = {state.stamp_ns, state, footholds, feedback, false};
+    seen.feedback.tau_nm.setZero();  // told: the measured zero-moment point is part of a tick
   };
   bool recording = false;
   while (climb.status().treads_climbed < 2) {
