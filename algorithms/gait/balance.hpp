@@ -44,7 +44,7 @@ class Balance {
   // Likewise, how far the divergent component is ahead of its plan.
   [[nodiscard]] const Vec2& dcm_error_m() const noexcept { return stabiliser_.error_m(); }
   // How far the centre of mass is from where body and masses have it: theirs minus the true one.
-  [[nodiscard]] const Vec2& odom_com_bias_m() const noexcept { return bias_.odom_bias_m(); }
+  [[nodiscard]] const Vec2& odom_com_bias_m() const noexcept { return odom_com_bias_m_; }
 
  private:
   DcmStabiliser stabiliser_;

@@ -96,8 +96,9 @@ void Gait::observe_links() noexcept {
   std::array<Transform, kFootCount> plan_T_sole = plan_T_sole_;
   if (activity_ == Activity::kSwing) plan_T_sole[index_of(decision_.goal.foot)] = swing_.at(pace_.tick());
   if (settles_) plan_T_sole[index_of(status_.step.foot)] = plan_T_landed_;
-  link_acceleration_ = posture_.update(params_.geometry, params_.balance.masses, plan_T_base_,
-                                       TorsoTrajectory::horizontal(torso_state_).position_m, plan_T_sole);
+  const Vec2 plan_p_com_m = TorsoTrajectory::horizontal(torso_state_).position_m + balance_.odom_com_bias_m();
+  link_acceleration_ =
+      posture_.update(params_.geometry, params_.balance.masses, plan_T_base_, plan_p_com_m, plan_T_sole);
 }
 
 void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept {

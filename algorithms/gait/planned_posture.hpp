@@ -14,8 +14,8 @@ class PlannedPosture {
   void restart() noexcept { motion_.restart(); }
   // The plan goes on as it was, in another frame.
   void carry(const Transform& to_T_plan) noexcept { motion_.carry(to_T_plan); }
-  // One tick. torso: the base's height and attitude; where it is follows from the centre of mass. The result belongs to
-  // the tick before.
+  // One tick. torso: the base's height and attitude; where it is follows from the centre of mass, as the masses
+  // have it. The result belongs to the tick before.
   [[nodiscard]] LinkMotion::Acceleration update(const LegGeometry& geometry, const MassModel& masses,
                                                 const Transform& torso, const Vec2& plan_p_com_m,
                                                 const std::array<Transform, kFootCount>& plan_T_sole) noexcept;
