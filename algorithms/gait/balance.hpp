@@ -54,6 +54,7 @@ class Balance {
   Vec2 odom_p_com_planned_m_ = Vec2::Zero();
   Vec2 com_error_m_ = Vec2::Zero();
   Vec2 slope_ = Vec2::Zero();  // of the ground's force asked for
+  Vec2 odom_com_bias_m_ = Vec2::Zero();  // evened out
 };
 
 }  // namespace polygmap
