@@ -53,7 +53,7 @@ class Balance {
   std::array<double, kFootCount> share_{0.5, 0.5};
   Vec2 odom_p_com_planned_m_ = Vec2::Zero();
   Vec2 com_error_m_ = Vec2::Zero();
-  Vec2 slope_ = Vec2::Zero();  // of the ground's force asked for
+  Vec2 slope_ = Vec2::Zero();            // of the ground's force asked for
   Vec2 odom_com_bias_m_ = Vec2::Zero();  // evened out
 };
 

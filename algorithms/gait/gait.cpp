@@ -80,8 +80,8 @@ void Gait::observe_reference() noexcept {
   const MassModel& masses = params_.balance.masses;
   const BodyFrames frames = body_frames(params_.geometry, joints_.reference_rad());
   const Vec2& bias_m = balance_.odom_com_bias_m();
-  reference_p_com_m_ = centre_of_mass_m(masses, base_p_links_m(masses, frames)) -
-                       plan_T_base_.R.transpose() * Vec3{bias_m.x(), bias_m.y(), 0.0};
+  base_com_bias_m_ = plan_T_base_.R.transpose() * Vec3{bias_m.x(), bias_m.y(), 0.0};
+  reference_p_com_m_ = centre_of_mass_m(masses, base_p_links_m(masses, frames)) - base_com_bias_m_;
 }
 
 // The horizontal part of the torso's trajectory is the centre of mass's: the base follows from the legs' places, one
@@ -96,7 +96,8 @@ void Gait::observe_links() noexcept {
   std::array<Transform, kFootCount> plan_T_sole = plan_T_sole_;
   if (activity_ == Activity::kSwing) plan_T_sole[index_of(decision_.goal.foot)] = swing_.at(pace_.tick());
   if (settles_) plan_T_sole[index_of(status_.step.foot)] = plan_T_landed_;
-  const Vec2 plan_p_com_m = TorsoTrajectory::horizontal(torso_state_).position_m + balance_.odom_com_bias_m();
+  const Vec2 plan_p_com_m =
+      TorsoTrajectory::horizontal(torso_state_).position_m + (plan_T_base_.R * base_com_bias_m_).head<2>();
   link_acceleration_ =
       posture_.update(params_.geometry, params_.balance.masses, plan_T_base_, plan_p_com_m, plan_T_sole);
 }

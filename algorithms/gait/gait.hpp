@@ -119,7 +119,8 @@ class Gait {
   Balance balance_;
   PlannedPosture posture_;
   LinkMotion::Acceleration link_acceleration_;
-  Vec3 reference_p_com_m_ = Vec3::Zero();  // centre of mass of the posture last asked for, base frame
+  Vec3 reference_p_com_m_ = Vec3::Zero();  // centre of mass of the posture last asked for, base frame,
+  Vec3 base_com_bias_m_ = Vec3::Zero();    // without this, which the masses have too much
   StepSearch search_;
   BaseCorrection correction_;
   TorsoTrajectory torso_;
