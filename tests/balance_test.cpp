@@ -120,7 +120,7 @@ struct BiasedPendulum {
       if (seen) {
         observer.update({}, estimate_m + v_mps / kOmega_radps, zmp_m, heading, kOmega_radps, kTick_s);
       } else {
-        observer.missed();
+        observer.missed(heading);
       }
       v_mps += kTick_s * math::square(kOmega_radps) * (x_m - zmp_m);
       x_m += kTick_s * v_mps;
@@ -143,8 +143,7 @@ TEST(DcmBias, RobotThatTurns_BiasTurnsWithIt) {
   BiasedPendulum pendulum{{0.01, 0.0}, 0.0};
   pendulum.run(10.0);
   pendulum.heading_rad = 0.5 * kPi;
-  pendulum.observer.missed();
-  pendulum.run(2 * kTick_s);
+  pendulum.run(2 * kTick_s, false);  // measured or not
   EXPECT_LT((pendulum.observer.odom_bias_m() - Vec2{0.0, 0.01}).norm(), 0.5e-3);
 }
 
@@ -198,6 +197,9 @@ TEST(ZmpMeasurement, NothingTold_IsNone) {
   PressedSoles no_torque;
   no_torque.felt.tau_nm[kAnklePitch] = std::nan("");
   EXPECT_FALSE(no_torque.try_measure(measured_m));
+  PressedSoles drives_that_tell_none;
+  drives_that_tell_none.felt.tau_nm.setZero();
+  EXPECT_FALSE(drives_that_tell_none.try_measure(measured_m));
   PressedSoles no_force;
   no_force.felt.foot_force_n.fill(std::nan(""));
   EXPECT_FALSE(no_force.try_measure(measured_m));
@@ -252,33 +254,47 @@ TEST(WrenchDistribution, ForceBeyondTheSole_StopsAtItsLimits) {
   EXPECT_NEAR(behind.zmp_m.y(), 0.1 - limits.aside_m, 1e-12);
 }
 
+// Of all shares, with what remains pressed within both soles: how close to a vertical line through the point they come.
+double closest_m(const Support& support, const PressureLimits& limits, const Vec2& line_m) {
+  double closest = 1e3;
+  const std::array side{1.0, -1.0};
+  std::array<Vec2, kFootCount> carrier_m;
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    carrier_m[f] = support.odom_T_sole[f].p_m.head<2>() - Vec2{0.0, side[f] * limits.inward_m};
+  }
+  for (int i = 0; i <= 1000; ++i) {
+    const std::array share{1e-3 * i, 1.0 - 1e-3 * i};
+    const Vec2 rest_m = line_m - share[0] * carrier_m[0] - share[1] * carrier_m[1];
+    Vec2 zmp_m = Vec2::Zero();
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      const Vec2 local_m = rest_m - Vec2{0.0, side[f] * limits.inward_m};
+      zmp_m += share[f] *
+               (support.odom_T_sole[f].p_m.head<2>() + Vec2{math::clamp(local_m.x(), -limits.behind_m, limits.ahead_m),
+                                                            math::clamp(local_m.y(), -limits.aside_m, limits.aside_m)});
+    }
+    closest = std::min(closest, (zmp_m - line_m).norm());
+  }
+  return closest;
+}
+
 // One foot on the next tread: sideways the soles' hull is narrow, and shares by the place between them give up ground.
-TEST(WrenchDistribution, ForceBeyondBothSoles_ComesAsCloseAsAnyShares) {
+TEST(WrenchDistribution, ForceBeyondBothSoles_ComesAboutAsCloseAsAnyShares) {
   Support support = standing();
   support.odom_T_sole[0].p_m = {-0.28, 0.1, -0.13};
   const PressureLimits limits;
-  const Vec3 com_m{0.03, 0.02, 0.8};
-  const auto missed_m = [&](const Pressure& p) {
-    return (p.zmp_m.head<2>() - com_m.head<2>()).norm();  // no slope: the line is vertical
-  };
-  double closest_m = 1.0;
-  for (int i = 0; i <= 1000; ++i) {
-    const double share = 1e-3 * i;
-    Vec2 zmp_m = Vec2::Zero();
-    const Vec2 left_m = support.odom_T_sole[0].p_m.head<2>() - Vec2{0.0, limits.inward_m};
-    const Vec2 right_m = support.odom_T_sole[1].p_m.head<2>() + Vec2{0.0, limits.inward_m};
-    const Vec2 rest_m = com_m.head<2>() - share * left_m - (1.0 - share) * right_m;
-    for (const double side : {1.0, -1.0}) {
-      const Vec2 local_m = rest_m - Vec2{0.0, side * limits.inward_m};
-      const Vec2 pressed_m{math::clamp(local_m.x(), -limits.behind_m, limits.ahead_m),
-                           math::clamp(local_m.y(), -limits.aside_m, limits.aside_m)};
-      const Vec2 sole_m = support.odom_T_sole[side > 0.0 ? 0 : 1].p_m.head<2>();
-      zmp_m += (side > 0.0 ? share : 1.0 - share) * (sole_m + pressed_m);
+  double most_m = 0.0;
+  for (double x_m = -0.4; x_m < 0.15; x_m += 0.05) {
+    for (double y_m = -0.2; y_m < 0.25; y_m += 0.05) {
+      const Vec2 line_m{x_m, y_m};
+      const Pressure pressure = distribute(support, limits, {x_m, y_m, 0.8}, Vec2::Zero());
+      most_m = std::max(most_m, closest_m(support, limits, line_m));
+      EXPECT_LT((pressure.zmp_m.head<2>() - line_m).norm(), closest_m(support, limits, line_m) + 0.007) << line_m;
     }
-    closest_m = std::min(closest_m, (zmp_m - com_m.head<2>()).norm());
   }
-  EXPECT_GT(closest_m, 0.02);
-  EXPECT_LT(missed_m(distribute(support, limits, com_m, Vec2::Zero())), closest_m + 0.5e-3);
+  EXPECT_GT(most_m, 0.1);
+  const Vec2 pushed_m{0.03, 0.02};
+  EXPECT_LT((distribute(support, limits, {0.03, 0.02, 0.8}, Vec2::Zero()).zmp_m.head<2>() - pushed_m).norm(),
+            closest_m(support, limits, pushed_m) + 0.001);
 }
 
 TEST(Balance, FootThatHangs_DoesNotMoveThePlan) {

@@ -34,7 +34,7 @@ struct JointFeedback {
   std::int64_t stamp_ns = 0;
   JointVector q_rad = JointVector::Zero();
   JointVector dq_radps = JointVector::Zero();
-  JointVector tau_nm = JointVector::Zero();
+  JointVector tau_nm = JointVector::Zero();       // not a number where a drive tells none
   std::array<double, kFootCount> foot_force_n{};  // vertical, 0 in the air
 };
 

@@ -83,15 +83,15 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
 
   if (++bias_tick_ >= kBias_ticks) {
     bias_tick_ = 0;
+    const Vec2 ahead = R.col(0).head<2>().normalized();
+    Mat2 odom_R_heading;
+    odom_R_heading << ahead.x(), -ahead.y(), ahead.y(), ahead.x();
     Vec2 zmp_felt_m;
     if (try_measure_zmp(params.masses, geometry, feedback, support.odom_T_sole, slope_, zmp_felt_m)) {
-      const Vec2 ahead = R.col(0).head<2>().normalized();
-      Mat2 odom_R_heading;
-      odom_R_heading << ahead.x(), -ahead.y(), ahead.y(), ahead.x();
       bias_.update(params.bias, odom_p_com_m.head<2>() + odom_v_com_mps.head<2>() / omega_radps, zmp_felt_m - beside_m,
                    odom_R_heading, omega_radps, kBias_ticks * tick_s);
     } else {
-      bias_.missed();
+      bias_.missed(odom_R_heading);
     }
   }
   constexpr double kEven_s = 0.1;  // what follows from its steps must not accelerate

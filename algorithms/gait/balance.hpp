@@ -38,7 +38,8 @@ class Balance {
   // the standing soles: an error of the base is what is fed back.
   [[nodiscard]] JointVector torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
                                        const Body& body, const JointFeedback& feedback, double tick_s) noexcept;
-  // Of the last tick, horizontal: the planned centre of mass, and how far ahead of the estimated one it is.
+  // Of the last tick, horizontal: the planned centre of mass, and how far ahead of the estimated one, without its bias,
+  // it is.
   [[nodiscard]] const Vec2& odom_p_com_planned_m() const noexcept { return odom_p_com_planned_m_; }
   [[nodiscard]] const Vec2& com_error_m() const noexcept { return com_error_m_; }
   // Likewise, how far the divergent component is ahead of its plan.

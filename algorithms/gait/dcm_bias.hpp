@@ -39,10 +39,13 @@ class DcmBias {
     const double dcm_gain = omega_radps + bias_gain + 2.0 * rate_radps;
     true_dcm_m_ += tick_s * (omega_radps * (true_dcm_m_ - zmp_m) + dcm_gain * surprise_m);
     bias_m_ -= tick_s * bias_gain * (odom_R_heading.transpose() * surprise_m);
-    bias_m_ = bias_m_.cwiseMax(-params.most_m).cwiseMin(params.most_m);
+    bias_m_ *= std::min(1.0, params.most_m / std::max(bias_m_.norm(), 1e-6));
   }
   // A tick without a measured zero-moment point: the bias stays.
-  void missed() noexcept { known_ = false; }
+  void missed(const Mat2& odom_R_heading) noexcept {
+    odom_bias_m_ = odom_R_heading * bias_m_;
+    known_ = false;
+  }
   // Estimated minus true, odometry.
   [[nodiscard]] const Vec2& odom_bias_m() const noexcept { return odom_bias_m_; }
 

@@ -30,7 +30,7 @@ void Gait::reset(const Params& params) noexcept {
   status_ = {};
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
-  tick_ = shifts_ = wait_ticks_ = idle_ticks_ = 0;
+  tick_ = shifts_ = wait_ticks_ = idle_ticks_ = off_ticks_ = 0;
   armed_ = started_ = unloaded_ = retried_ = settles_ = stop_requested_ = false;
   pace_.begin();
   // All else is set before it is read: by arming, by start() and by what begins a shift or a swing. A fresh object to
@@ -187,7 +187,8 @@ void Gait::crouch() noexcept {
   }
   if (++off_ticks_ < kOff_ticks) return;
   crouched_m_ = wanted_m;
-  move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, kCrouch_ticks, kCrouch_ticks);
+  const std::int32_t rest_ticks = (activity_ == Activity::kShift ? shift_ticks_ : params_.settle_ticks) - tick_;
+  move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, std::max(rest_ticks, kCrouch_ticks), kCrouch_ticks);
 }
 
 void Gait::settle_between_feet() noexcept {

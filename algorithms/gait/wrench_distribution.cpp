@@ -64,20 +64,20 @@ Pressure distribute(const Support& support, const PressureLimits& limits, const 
   Pressure pressure = press_with(share, missed_m);
   constexpr double kMissed_m = 0.005;
   if (missed_m < kMissed_m) return pressure;
-  // Beyond the soles' limits with these shares: with those that come closest.
-  double low = 0.0, high = 1.0;
-  constexpr int kHalvings = 8;
-  for (int i = 0; i < kHalvings; ++i) {
+  // Beyond the soles' limits with these shares: with those that come closest, where that gains anything.
+  constexpr double kGained_m = 0.0005;
+  double least_m = missed_m - kGained_m, low = 0.0, high = 1.0;
+  constexpr int kThirds = 8;
+  for (int i = 0; i < kThirds; ++i) {
     const double third = (high - low) / 3.0;
-    double left_missed_m = 0.0, right_missed_m = 0.0;
-    const Pressure left = press_with(high - third, left_missed_m), right = press_with(low + third, right_missed_m);
-    if (left_missed_m < right_missed_m) {
-      pressure = left;
-      low += third;
-    } else {
-      pressure = right;
-      high -= third;
+    std::array<double, 2> tried_m{};
+    const std::array<Pressure, 2> tried{press_with(low + third, tried_m[0]), press_with(high - third, tried_m[1])};
+    const std::size_t closer = tried_m[1] < tried_m[0] ? 1 : 0;
+    if (tried_m[closer] < least_m) {
+      least_m = tried_m[closer];
+      pressure = tried[closer];
     }
+    (closer == 1 ? low : high) = closer == 1 ? low + third : high - third;
   }
   return pressure;
 }

@@ -28,7 +28,8 @@ struct Pressure {
 
 // The split of a ground force whose line meets the ground at the zero-moment point p_zmp(z) = p_com - (z_com - z)
 // slope, slope = horizontal over vertical force. Shares by the place between the soles, what remains by the centres of
-// pressure, clamped to their limits. Feet on different treads: the line is cut where the shares put the ground.
+// pressure, clamped to their limits; where those miss the line, by the shares that come closest. Feet on different
+// treads: the line is cut where the shares put the ground.
 [[nodiscard]] Pressure distribute(const Support& support, const PressureLimits& limits, const Vec3& odom_p_com_m,
                                   const Vec2& slope) noexcept;
 

@@ -19,6 +19,7 @@ bool try_measure_zmp(const MassModel& masses, const LegGeometry& geometry, const
     sum_n += up_n;
     if (up_n < kPressed_n) continue;
     const LegVector tau_nm = leg_joints(felt.tau_nm, leg);
+    if (tau_nm[kAnklePitch] == 0.0 && tau_nm[kAnkleRoll] == 0.0) return false;  // drives that tell none
     const Transform& sole = odom_T_sole[f];
     const Vec3 slope = sole.R.transpose() * Vec3{odom_slope.x(), odom_slope.y(), 0.0};
     const LinkMass& foot = masses.leg[kAnkleRoll];

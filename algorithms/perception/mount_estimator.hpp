@@ -25,7 +25,8 @@ class MountEstimator {
     // mrad a joint), depth is warped. In 24 climbs, from 1 to 10 s after the first frame, 2.5 mrad with white noise and
     // 3.0 with correlated, roll and pitch together.
     double common_tilt_sigma_rad = 0.0027;
-    double window_s = 6.0;                    // information fades to 1/e; time without level surfaces does not count
+    // Information fades to 1/e, slower under surfaces that see level worse; time without any does not count.
+    double window_s = 6.0;
     double max_tilt_rad = 2.0 * kPi / 180.0;  // bounds of the estimate
     double max_height_m = 0.008;
     double tilt_gate_rad = 3.0 * kPi / 180.0;  // from level, as the mount is believed: more is a ramp

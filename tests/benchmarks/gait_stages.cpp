@@ -16,7 +16,7 @@ GaitStair::GaitStair() {
   climb.tamper = [&seen](StateEstimate& state, FootholdSet& footholds, JointFeedback& feedback) {
     seen = {state.stamp_ns, state, footholds, feedback, false};
     // A tick measures the zero-moment point. What this climb's forces know of it is nothing: worked out, then refused.
-    seen.feedback.tau_nm.setZero();
+    seen.feedback.tau_nm.setOnes();
     for (double& force_n : seen.feedback.foot_force_n) force_n *= 1.5;
   };
   bool recording = false;
