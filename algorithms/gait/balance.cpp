@@ -36,7 +36,6 @@ void Balance::reset() noexcept {
   odom_p_com_planned_m_.setZero();
   com_error_m_.setZero();
   slope_.setZero();
-  odom_com_bias_m_.setZero();
 }
 
 JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
@@ -94,9 +93,7 @@ JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometr
       bias_.missed(odom_R_heading);
     }
   }
-  constexpr double kEven_s = 0.1;  // what follows from its steps must not accelerate
-  odom_com_bias_m_ += tick_s / kEven_s * (bias_.odom_bias_m() - odom_com_bias_m_);
-  odom_p_com_m.head<2>() -= odom_com_bias_m_;
+  odom_p_com_m.head<2>() -= bias_.odom_bias_m();
 
   HorizontalMotion planned = reference.com;
   planned.position_m += odom_p_plan_m.head<2>();

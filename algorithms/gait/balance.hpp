@@ -45,7 +45,7 @@ class Balance {
   // Likewise, how far the divergent component is ahead of its plan.
   [[nodiscard]] const Vec2& dcm_error_m() const noexcept { return stabiliser_.error_m(); }
   // How far the centre of mass is from where body and masses have it: theirs minus the true one.
-  [[nodiscard]] const Vec2& odom_com_bias_m() const noexcept { return odom_com_bias_m_; }
+  [[nodiscard]] const Vec2& odom_com_bias_m() const noexcept { return bias_.odom_bias_m(); }
 
  private:
   DcmStabiliser stabiliser_;
@@ -54,8 +54,7 @@ class Balance {
   std::array<double, kFootCount> share_{0.5, 0.5};
   Vec2 odom_p_com_planned_m_ = Vec2::Zero();
   Vec2 com_error_m_ = Vec2::Zero();
-  Vec2 slope_ = Vec2::Zero();            // of the ground's force asked for
-  Vec2 odom_com_bias_m_ = Vec2::Zero();  // evened out
+  Vec2 slope_ = Vec2::Zero();  // of the ground's force asked for
 };
 
 }  // namespace polygmap

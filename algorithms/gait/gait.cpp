@@ -27,6 +27,7 @@ void Gait::reset(const Params& params) noexcept {
   balance_.reset();
   dcm_error_m_.setZero();
   link_acceleration_ = {};
+  base_com_bias_m_.setZero();
   status_ = {};
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
@@ -79,8 +80,11 @@ void Gait::start(const StateEstimate& state) noexcept {
 void Gait::observe_reference() noexcept {
   const MassModel& masses = params_.balance.masses;
   const BodyFrames frames = body_frames(params_.geometry, joints_.reference_rad());
+  // Evened out: neither the observer's steps nor those of the plan, when it is carried, may accelerate the links.
+  constexpr double kEven_s = 0.1;
   const Vec2& bias_m = balance_.odom_com_bias_m();
-  base_com_bias_m_ = plan_T_base_.R.transpose() * Vec3{bias_m.x(), bias_m.y(), 0.0};
+  const Vec3 base_bias_m = plan_T_base_.R.transpose() * Vec3{bias_m.x(), bias_m.y(), 0.0};
+  base_com_bias_m_ += kTick_s / kEven_s * (base_bias_m - base_com_bias_m_);
   reference_p_com_m_ = centre_of_mass_m(masses, base_p_links_m(masses, frames)) - base_com_bias_m_;
 }
 
