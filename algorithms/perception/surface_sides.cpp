@@ -85,6 +85,12 @@ std::uint32_t least_costs(const Reach& gain) noexcept {
   return bits;
 }
 
+// OpenCV's own of eight u16 holds a function-local static: a lock.
+cv::v_uint16x8 reversed(const cv::v_uint16x8& a) noexcept {
+  const cv::v_uint32x4 pairs = cv::v_reverse(cv::v_reinterpret_as_u32(a));
+  return cv::v_reinterpret_as_u16(cv::v_shl<16>(pairs) | cv::v_shr<16>(pairs));
+}
+
 // What every pixel says for the plane beyond and against our own: twice the negative logarithms of the likelihoods, but
 // for a constant. Nothing where there is no data.
 PixelGains weigh(const SurfaceSides::Params& params, const RawPicture& picture, const RowPlane& own,
@@ -167,8 +173,8 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
     static_assert(kReach_px == 2 * Eight::nlanes);
     const std::uint16_t* leftmost = pixels + (right ? first : first - (kReach_px - 1));
     const Eight a = cv::v_load(leftmost), b = cv::v_load(leftmost + Eight::nlanes);
-    cv::v_store(raw.data(), right ? a : cv::v_reverse(b));
-    cv::v_store(raw.data() + Eight::nlanes, right ? b : cv::v_reverse(a));
+    cv::v_store(raw.data(), right ? a : reversed(b));
+    cv::v_store(raw.data() + Eight::nlanes, right ? b : reversed(a));
   } else {
     raw.fill(0);
     for (std::int32_t i = 0; i < count; ++i) raw[static_cast<std::size_t>(i)] = pixels[first + out * i];
