@@ -474,6 +474,7 @@ class Pushed : public testing::TestWithParam<PushedCase> {};
 
 TEST_P(Pushed, AnyWayAtEightMomentsOfAStair_FallsNoMoreThanKnown) {
   const auto [seed, pattern, known_falls] = GetParam();
+  if (test::kSlowMachine && seed != 3) GTEST_SKIP() << "one seed of each gait";
   int falls = 0;
   Gait::Params params;
   params.planner.pattern = pattern;
