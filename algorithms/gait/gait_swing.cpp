@@ -104,7 +104,7 @@ void Gait::set_pace() noexcept {
                  .side_room_m = goal.foothold.side_room_m[index_of(goal.foot)] - params_.side_margin_m},
                 swing_.duration_ticks());
   // The torso is on its way up: the foot is to reach where it stood all the same.
-  if (pace_.goes_back() && !went_back && !reaches_back) {
+  if (pace_.goes_back() && !went_back) {
     lower_torso(sole_pose(correction_.odom_T_plan(plan_T_base_).inverse() * swing_.at(0)));
   }
 }
