@@ -117,14 +117,16 @@ void Gait::land_soon() noexcept {
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
   const SolePose stance = sole_pose(odom_T_plan * plan_T_sole_[index_of(other(foot))]);
   const Mat3 R = rotation_z(stance.yaw_rad);
-  const Vec3 now_m = swing_.at(pace_.tick()).p_m;
+  const Transform now = swing_.at(pace_.tick());
+  const Vec3& now_m = now.p_m;
   const bool beside = (R.transpose() * (now_m - stance.position_m)).x() < -params_.beside_from_m;
   const Vec3 beside_m = stance.position_m + R * Vec3{0.0, side_sign(foot) * 2.0 * kStanceHalfWidth_m, 0.0};
   const SolePose target = beside ? SolePose{beside_m, stance.yaw_rad} : goal.target;
   const Vec3 way_m = target.position_m - now_m;
   const auto ticks = static_cast<std::int32_t>(params_.soon_ticks + params_.soon_ticks_per_m * way_m.head<2>().norm());
-  // Below its nosing the tread is not to be had straight.
-  if (way_m.z() > params_.below_m || pace_.tick() + ticks >= swing_.duration_ticks()) return;
+  // Below its nosing the tread is not to be had straight, and toes point down.
+  const double toe_m = (now * Vec3{kCollisionRectangle.toe_x_m, 0.0, 0.0}).z();
+  if (target.position_m.z() - std::min(toe_m, now_m.z()) > params_.below_m || pace_.tick() + ticks >= swing_.duration_ticks()) return;
   carry_plan_to_odometry();
   if (beside) {
     goal.kind = StepKind::kTrailing;
