@@ -254,6 +254,20 @@ TEST(WrenchDistribution, ForceBeyondTheSole_StopsAtItsLimits) {
   EXPECT_NEAR(behind.zmp_m.y(), 0.1 - limits.aside_m, 1e-12);
 }
 
+// What the ankles hold is a torque: of half the force at twice the distance.
+TEST(WrenchDistribution, ForceFarAheadOfTwoSoles_IsPressedTwiceAsFarAheadAsOfOne) {
+  const PressureLimits limits;
+  const Pressure half = distribute(standing(), limits, {0.12, 0.0, 0.8}, Vec2::Zero());
+  EXPECT_NEAR(half.zmp_m.x(), 0.12, 1e-9);
+  EXPECT_NEAR(half.share[0], 0.5, 1e-9);
+  const Pressure far = distribute(standing(), limits, {0.3, 0.0, 0.8}, Vec2::Zero());
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    EXPECT_LE(far.share[f] * far.centre_m[f].x(), limits.ahead_m + 1e-9);
+    EXPECT_LE(far.centre_m[f].x(), limits.toe_m + 1e-9);
+  }
+  EXPECT_GT(far.zmp_m.x(), 1.9 * limits.ahead_m);
+}
+
 // Of all shares, with what remains pressed within both soles: how close to a vertical line through the point they come.
 double closest_m(const Support& support, const PressureLimits& limits, const Vec2& line_m) {
   double closest = 1e3;
@@ -268,8 +282,9 @@ double closest_m(const Support& support, const PressureLimits& limits, const Vec
     Vec2 zmp_m = Vec2::Zero();
     for (std::size_t f = 0; f < kFootCount; ++f) {
       const Vec2 local_m = rest_m - Vec2{0.0, side[f] * limits.inward_m};
+      const double ahead_m = std::min(limits.ahead_m / std::max(share[f], 0.1), limits.toe_m);
       zmp_m += share[f] *
-               (support.odom_T_sole[f].p_m.head<2>() + Vec2{math::clamp(local_m.x(), -limits.behind_m, limits.ahead_m),
+               (support.odom_T_sole[f].p_m.head<2>() + Vec2{math::clamp(local_m.x(), -limits.behind_m, ahead_m),
                                                             math::clamp(local_m.y(), -limits.aside_m, limits.aside_m)});
     }
     closest = std::min(closest, (zmp_m - line_m).norm());

@@ -126,7 +126,9 @@ void Gait::land_soon() noexcept {
   const auto ticks = static_cast<std::int32_t>(params_.soon_ticks + params_.soon_ticks_per_m * way_m.head<2>().norm());
   // Below its nosing the tread is not to be had straight, and toes point down.
   const double toe_m = (now * Vec3{kCollisionRectangle.toe_x_m, 0.0, 0.0}).z();
-  if (target.position_m.z() - std::min(toe_m, now_m.z()) > params_.below_m || pace_.tick() + ticks >= swing_.duration_ticks()) return;
+  if (target.position_m.z() - std::min(toe_m, now_m.z()) > params_.below_m ||
+      pace_.tick() + ticks >= swing_.duration_ticks())
+    return;
   carry_plan_to_odometry();
   if (beside) {
     goal.kind = StepKind::kTrailing;

@@ -9,8 +9,8 @@ namespace polygmap {
 
 // Where the centre of pressure may be in a sole, about the sole frame's origin.
 struct PressureLimits {
-  double ahead_m = 0.066;  // the ankle's 36 Nm hold 67 mm of 540 N; of a share of them more,
-  double toe_m = 0.155;    // to here: the sole ends at 171 mm
+  double ahead_m = 0.066;  // where it carries all: the ankle's 36 Nm hold 67 mm of 540 N; farther with a smaller share,
+  double toe_m = 0.155;    // to here: the contact ends at 171 mm
   double behind_m = 0.066;
   double inward_m = 0.03;  // from a sole's middle line towards the other sole: there it carries all of the weight
   double aside_m = 0.045;  // of a half width of 48 mm
