@@ -73,7 +73,9 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->check(whole_number)
       ->capture_default_str();
   climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
-  climb.add_option("--contacts", a.contacts, "Foot forces: sensed, or, on the kinematic plant, inferred from joint torques")
+  climb
+      .add_option("--contacts", a.contacts,
+                  "Foot forces: sensed, or, on the kinematic plant, inferred from joint torques")
       ->capture_default_str();
   climb.add_option("--push", a.pushes, "Pushes of the torso, over 0.1 s: when, s; along x or y; how much, N s")
       ->expected(1, 16)
