@@ -171,6 +171,26 @@ TEST(GaitStop, ReasonsThatComeAndGo_AreCalledUnsteady) {
   expect_unsteady(climb);
 }
 
+// Under physics a foot slid 12 mm after every step: it lined up for as long as the run lasted.
+TEST(GaitStop, NeverLinedUpBeforeTheStairs_IsCalledUnsteady) {
+  IdealClimb climb({});
+  climb.tamper = [&](StateEstimate&, FootholdSet& set, JointFeedback&) {
+    const double off_m = climb.status().step.sequence % 2 == 0 ? 0.02 : -0.02;
+    const Vec3 shift_m = rotation_z(set.p_star_feet[0].yaw_rad) * Vec3{off_m, 0, 0};
+    for (Vec3* p : {&set.p_star_feet[0].position_m, &set.p_star_feet[1].position_m, &set.tread.nosing_a_m,
+                    &set.tread.nosing_b_m}) {
+      *p += shift_m;
+    }
+  };
+  climb.run(60.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+  EXPECT_EQ(climb.status().stop_reason, Obstruction::kUnsteady);
+  EXPECT_FALSE(climb.status().step.onto_tread);
+  EXPECT_GT(climb.status().step.sequence, 8U);
+  EXPECT_LT(climb.status().step.sequence, 20U);
+  EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);
+}
+
 TEST(GaitFinish, TopSeenAfterAnotherObstruction_WaitsAWholeSecondOfTop) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {

@@ -202,7 +202,12 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     return decision;
   }
   decision.has_step = true;
-  if (treads_climbed_ == 0 && floor_goal(situation, footholds, decision.goal)) return decision;
+  if (treads_climbed_ == 0 && floor_goal(situation, footholds, decision.goal)) {
+    if (corrections_ < params_.max_corrections) return decision;
+    decision = {};
+    decision.obstruction = Obstruction::kUnsteady;
+    return decision;
+  }
 
   const Foot lead = leading_foot(situation, targets), trail = other(lead);
   decision.goal = {StepKind::kLeading, lead, targets[index_of(lead)], feet[index_of(lead)]};
