@@ -171,6 +171,24 @@ TEST(GaitStop, ReasonsThatComeAndGo_AreCalledUnsteady) {
   expect_unsteady(climb);
 }
 
+TEST(GaitStop, EdgeKnownTooVaguelyFromAfar_WalksUpAndLooksAgain) {
+  for (const bool better_from_nearby : {true, false}) {
+    IdealClimb climb({});
+    climb.tamper = [&](StateEstimate&, FootholdSet& set, JointFeedback&) {
+      const double gap_m = -climb.true_T_sole(Foot::kLeft).p_m.x() - kCollisionRectangle.toe_x_m;
+      if (climb.status().treads_climbed > 0 || (better_from_nearby && gap_m < 0.1)) return;
+      set.obstruction = Obstruction::kEdgeUncertain;
+      set.has_p_star = false;
+    };
+    climb.run(60.0);
+    EXPECT_GT(climb.status().step.sequence, 1U);
+    EXPECT_EQ(climb.status().phase, better_from_nearby ? GaitPhase::kFinished : GaitPhase::kStopped);
+    if (better_from_nearby) continue;
+    EXPECT_EQ(climb.status().stop_reason, Obstruction::kEdgeUncertain);
+    EXPECT_FALSE(climb.status().step.onto_tread);
+  }
+}
+
 // Under physics a foot slid 12 mm after every step: it lined up for as long as the run lasted.
 TEST(GaitStop, NeverLinedUpBeforeTheStairs_IsCalledUnsteady) {
   IdealClimb climb({});
