@@ -115,7 +115,7 @@ void MujocoPlant::read_state() {
 void MujocoPlant::read_contacts() {
   std::array<double, kFootCount> strongest_n{};
   for (FootState& foot : feet_) {
-    foot.force_n = 0.0;
+    foot.force_n = foot.carried_n = 0.0;
     foot.pressure_nm.setZero();
   }
   for (int c = 0; c < data_->ncon; ++c) {
@@ -130,6 +130,10 @@ void MujocoPlant::read_contacts() {
       if (first) up_n = -up_n;
       feet_[f].force_n += up_n;
       feet_[f].pressure_nm += up_n * Vec3{contact.pos[0], contact.pos[1], contact.pos[2]};
+      // A riser that a toe scrapes along is felt too, but nothing stands on it.
+      constexpr double kLevel = 0.7;  // cosine
+      if (std::abs(contact.frame[2]) < kLevel) continue;
+      feet_[f].carried_n += up_n;
       if (up_n <= strongest_n[f]) continue;
       strongest_n[f] = up_n;
       const int ground = first ? contact.geom2 : contact.geom1;

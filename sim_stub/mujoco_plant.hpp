@@ -41,7 +41,7 @@ class MujocoPlant final : public Plant {
   [[nodiscard]] const Transform& true_T_base() const noexcept override { return true_T_base_; }
   [[nodiscard]] const Transform& true_T_sole(std::size_t f) const noexcept override { return feet_[f].true_T_sole; }
   [[nodiscard]] bool in_contact(std::size_t f) const noexcept override {
-    return feet_[f].force_n > params_.contact_force_n;
+    return feet_[f].carried_n > params_.contact_force_n;
   }
   [[nodiscard]] int step_index(std::size_t f) const noexcept override { return feet_[f].step; }
   [[nodiscard]] double foot_force_n(std::size_t f) const noexcept override { return feet_[f].force_n; }
@@ -64,7 +64,8 @@ class MujocoPlant final : public Plant {
   };
   struct FootState {
     Transform true_T_sole;
-    double force_n = 0.0;
+    double force_n = 0.0;             // vertical, as a sensor feels it; what of it
+    double carried_n = 0.0;           // presses on something level
     Vec3 pressure_nm = Vec3::Zero();  // places of contacts times their forces, true axes
     int step = -1;
     int body = -1;

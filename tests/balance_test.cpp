@@ -98,62 +98,6 @@ TEST(DcmStabiliser, LastingError_IntegralIsLimited) {
   EXPECT_NEAR(zmp.x(), DcmStabiliser::Params{}.gain * 0.01 + 0.02, 1e-12);
 }
 
-// A pendulum held up by an estimate that is wrong by bias_m; push_mps: at 12 s.
-struct BiasedPendulum {
-  BiasedPendulum(const Vec2& bias, double heading) : bias_m(bias), heading_rad(heading) {}
-
-  Vec2 bias_m;
-  double heading_rad;
-  Vec2 push_mps = Vec2::Zero();
-  DcmBias observer;
-  Vec2 x_m{0.004, -0.006};
-
-  void run(double seconds, bool seen = true) {
-    constexpr double kOmega_radps = 3.5;
-    const Mat2 heading = rotation_z(heading_rad).topLeftCorner<2, 2>();
-    Vec2 v_mps = Vec2::Zero();
-    DcmStabiliser stabiliser;
-    for (int tick = 0; tick < seconds / kTick_s; ++tick) {
-      if (tick == 6000) v_mps += push_mps;
-      const Vec2 estimate_m = x_m + bias_m;
-      const Vec2 zmp_m = stabiliser.zmp_m({}, {}, estimate_m - observer.odom_bias_m(), v_mps, kOmega_radps, kTick_s);
-      if (seen) {
-        observer.update({}, estimate_m + v_mps / kOmega_radps, zmp_m, heading, kOmega_radps, kTick_s);
-      } else {
-        observer.missed(heading);
-      }
-      v_mps += kTick_s * math::square(kOmega_radps) * (x_m - zmp_m);
-      x_m += kTick_s * v_mps;
-    }
-  }
-};
-
-TEST(DcmBias, WronglyEstimatedPendulum_IsFoundAndHeldInItsPlace) {
-  BiasedPendulum pendulum{{0.012, -0.009}, 0.7};
-  pendulum.run(10.0);
-  EXPECT_LT((pendulum.observer.odom_bias_m() - pendulum.bias_m).norm(), 0.2e-3);
-  EXPECT_LT(pendulum.x_m.norm(), 1e-3);
-  BiasedPendulum unseen{{0.012, -0.009}, 0.7};
-  unseen.run(10.0, false);
-  EXPECT_EQ(unseen.observer.odom_bias_m().norm(), 0.0);
-  EXPECT_GT(unseen.x_m.norm(), 0.01);
-}
-
-TEST(DcmBias, RobotThatTurns_BiasTurnsWithIt) {
-  BiasedPendulum pendulum{{0.01, 0.0}, 0.0};
-  pendulum.run(10.0);
-  pendulum.heading_rad = 0.5 * kPi;
-  pendulum.run(2 * kTick_s, false);  // measured or not
-  EXPECT_LT((pendulum.observer.odom_bias_m() - Vec2{0.0, 0.01}).norm(), 0.5e-3);
-}
-
-TEST(DcmBias, Push_IsNoBias) {
-  BiasedPendulum pendulum{{0.005, 0.005}, 0.0};
-  pendulum.push_mps = {0.0, 10.0 / MassModel{}.total_kg()};
-  pendulum.run(12.5);
-  EXPECT_LT((pendulum.observer.odom_bias_m() - pendulum.bias_m).norm(), 2e-3);
-}
-
 // Both legs bent, soles level, and pressed off their middles.
 struct PressedSoles {
   MassModel masses;

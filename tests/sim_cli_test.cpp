@@ -63,7 +63,9 @@ void expect_refused(const std::vector<std::string>& arguments, const std::string
 
 TEST(ClimbCommand, Contacts_SensedUnlessInferred) {
   EXPECT_FALSE(call({"climb"}).options->infer_contacts);
-  EXPECT_TRUE(call({"climb", "--contacts", "inferred"}).options->infer_contacts);
+  EXPECT_TRUE(call({"climb", "--contacts", "inferred", "--plant", "kinematic"}).options->infer_contacts);
+  expect_refused({"climb", "--contacts", "inferred"}, "--contacts inferred needs --plant kinematic");
+  expect_refused({"climb", "--plant", "mujoco", "--contacts", "inferred"}, "--plant kinematic");
   expect_refused({"climb", "--contacts", "guessed"}, "--contacts");
 }
 

@@ -137,6 +137,31 @@ TEST(MujocoPlant, FootDroppedOnATread_StandsAtItsHeight) {
   EXPECT_NEAR(lowest_m, 0.10, 2e-3);
 }
 
+TEST(MujocoPlant, ToeThatScrapesDownARiser_IsFeltButStandsOnNothing) {
+  Body body;
+  constexpr double kSole_x_m = -0.02;
+  const double riser_x_m = kSole_x_m + kCollisionRectangle.toe_x_m + 0.001;
+  body.world.steps = {{riser_x_m, riser_x_m, 2.0, 0.10}};  // below the shank
+  body.q_rad = Body::home(kNominalBaseHeight_m);
+  const auto left_foot_at = [&](double x_m, double height_m) {
+    const Transform sole{Mat3::Identity(), Vec3{x_m, kStanceHalfWidth_m, height_m - kNominalBaseHeight_m}};
+    body.q_rad.head<6>() = solve_leg({}, Foot::kLeft, sole).q_rad;
+  };
+  left_foot_at(kSole_x_m, 0.06);
+  // The right foot stands beside the staircase.
+  MujocoPlant plant(body.params, body.world, body.errors, {Mat3::Identity(), Vec3{0, -0.6, 0}}, body.q_rad);
+  double most_n = 0.0;
+  for (int tick = 0; tick < 40; ++tick) {
+    left_foot_at(kSole_x_m + 0.02, 0.06 - 0.0005 * tick);  // 20 mm too far ahead
+    JointCommand command = body.hold();
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) command.joints[j].tau_ff_nm = 0.0;  // that leg carries nothing
+    plant.step(command);
+    most_n = std::max(most_n, plant.foot_force_n(0));
+    EXPECT_FALSE(plant.in_contact(0)) << tick;
+  }
+  EXPECT_GT(most_n, 15.0);
+}
+
 // The sole's box carries on what is left on the tread; soles of points would slip off its nosing.
 TEST(MujocoPlant, HeelHangs15mmOverTheNosing_StandsStill) {
   Body body;

@@ -167,7 +167,7 @@ void Estimator::take_joints(const std::array<bool, kFootCount>& planned_stance) 
 }
 
 void Estimator::calibrate() noexcept {
-  const bool still = standstill_.try_finish(imu_, joints_);
+  const bool still = standstill_.try_finish(imu_, joints_, legs_);
   if (counters_.standstill_restarts != standstill_.restarts()) {
     counters_.standstill_restarts = standstill_.restarts();
     odometry_.fusion().reset(params_.fusion);  // what it averaged was another place
@@ -176,16 +176,15 @@ void Estimator::calibrate() noexcept {
 
   // Origin: the floor under the base, the soles at z = 0 in the mean, yaw 0.
   initial_odom_T_base_ = {standstill_.odom_R_base(), Vec3::Zero()};
-  const JointVector q_rad = standstill_.q_rad();
-  for (std::size_t i = 0; i < kFootCount; ++i) {
-    const Transform sole = base_T_sole(params_.geometry, static_cast<Foot>(i), leg_joints(q_rad, static_cast<Foot>(i)));
-    initial_odom_T_base_.p_m.z() -= (initial_odom_T_base_.R * sole.p_m).z() / static_cast<double>(kFootCount);
+  for (const LegMeasurement& leg : legs_) {
+    initial_odom_T_base_.p_m.z() -= (initial_odom_T_base_.R * leg.base_T_sole.p_m).z() / kFootCount;
   }
   if (!still) return;
 
   AttitudeFilter::Start start;
   start.odom_R_base = initial_odom_T_base_.R;
   start.odom_p_base_m = initial_odom_T_base_.p_m;
+  start.odom_v_base_mps = standstill_.odom_v_base_mps();
   start.gyro_bias_radps = standstill_.gyro_bias_radps();
   start.gravity_mps2 = standstill_.gravity_mps2();
   odometry_.initialise(start, legs_, params_.max_step_s);

@@ -187,9 +187,11 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     decision.obstruction = Obstruction::kMapStale;
     return decision;
   }
-  if (decision.obstruction != Obstruction::kNone) return decision;
+  // From nearer by, an edge that is known too vaguely may be known better.
+  const bool walks_up = decision.obstruction == Obstruction::kEdgeUncertain && treads_climbed_ == 0;
+  if (decision.obstruction != Obstruction::kNone && !walks_up) return decision;
   const auto& feet = footholds.p_star_feet;
-  if (!footholds.has_p_star || !usable(feet) || !math::all_finite(footholds.tread.nosing_a_m) ||
+  if (!(footholds.has_p_star || walks_up) || !usable(feet) || !math::all_finite(footholds.tread.nosing_a_m) ||
       !math::all_finite(footholds.tread.nosing_b_m)) {
     decision.obstruction = Obstruction::kNoStaircase;
     return decision;
@@ -202,7 +204,14 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     return decision;
   }
   decision.has_step = true;
-  if (treads_climbed_ == 0 && floor_goal(situation, footholds, decision.goal)) return decision;
+  if (treads_climbed_ == 0 && floor_goal(situation, footholds, decision.goal)) {
+    if (corrections_ < params_.max_corrections) return decision;
+    decision = {};
+    decision.obstruction = Obstruction::kUnsteady;
+    return decision;
+  }
+  decision.has_step = !walks_up;
+  if (walks_up) return decision;
 
   const Foot lead = leading_foot(situation, targets), trail = other(lead);
   decision.goal = {StepKind::kLeading, lead, targets[index_of(lead)], feet[index_of(lead)]};

@@ -23,6 +23,7 @@ class ClimbPlanner {
     double line_up_yaw_rad = 0.009;        // 0.5 degrees
     std::uint32_t strict_corrections = 2;  // steps in place before the tolerance relaxes, by half of itself per step
     double max_relaxation = 2.5;
+    std::uint32_t max_corrections = 12;  // not lined up after so many: it will not be. 200 climbs took up to 7
     FloorStepLimits floor;
     double floor_clearance_m = 0.02;  // of a toe on the way to the line of the first nosing
     SwingRule rule;

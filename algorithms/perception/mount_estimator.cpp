@@ -18,8 +18,10 @@ MountEstimator::MountEstimator(const Params& params, const Transform& nominal_ba
 
 double MountEstimator::tilt_sigma_rad() const noexcept {
   const double left = 1.0 / (1.0 + tilt_.information * math::square(params_.prior_tilt_sigma_rad));  // of the prior
-  return math::sqrt(math::square(left * params_.prior_tilt_sigma_rad) +
-                    math::square((1.0 - left) * params_.common_tilt_sigma_rad));
+  const double alike_rad2 = math::square((1.0 - by_gravity_) * params_.soles_tilt_sigma_rad) +
+                            math::square(by_gravity_ * params_.gravity_tilt_sigma_rad) +
+                            (seen_as_well_ > 0.0 ? 1.0 / seen_as_well_ : 0.0);
+  return math::sqrt(math::square(left * params_.prior_tilt_sigma_rad) + math::square(1.0 - left) * alike_rad2);
 }
 
 bool MountEstimator::usable(const SurfacePatch& patch) const noexcept {
@@ -85,7 +87,9 @@ void MountEstimator::update(const SurfaceFrame& frame, const Stance& stance) noe
   const double information = trust / math::square(params_.frame_tilt_sigma_rad);
   const double tilt_variance = fuse(tilt_, Vec2{sum / weights}, math::exp(-trust * dt_s / params_.window_s),
                                     information, params_.prior_tilt_sigma_rad);
-  seen_as_well_ += information / tilt_.information * (weights - seen_as_well_);
+  const double share = information / tilt_.information;
+  seen_as_well_ += share * (weights - seen_as_well_);
+  by_gravity_ += share * ((flat[0] || flat[1] ? 0.0 : 1.0) - by_gravity_);
   for (int i = 0; i < 2; ++i) {
     tilt_rad_[i] = math::clamp(tilt_variance * tilt_.weighted[i], -params_.max_tilt_rad, params_.max_tilt_rad);
   }

@@ -22,9 +22,10 @@ class MountEstimator {
     double frame_tilt_sigma_rad = 0.03;
     double frame_height_sigma_m = 0.010;
     // What all frames err by alike, which no number of them takes away: soles are as level as their encoders have it (2
-    // mrad a joint), depth is warped. In 24 climbs, from 1 to 10 s after the first frame, 2.5 mrad with white noise and
-    // 3.0 with correlated, roll and pitch together.
-    double common_tilt_sigma_rad = 0.0027;
+    // mrad a joint), gravity as the IMU's mount and bias. With what the surfaces err by, in 24 climbs, from 1 to 10 s
+    // after the first frame, 2.5 mrad with white noise and 3.0 with correlated, roll and pitch together.
+    double soles_tilt_sigma_rad = 0.0023;
+    double gravity_tilt_sigma_rad = 0.006;
     // Information fades to 1/e, slower under surfaces that see level worse; time without any does not count.
     double window_s = 6.0;
     double max_tilt_rad = 2.0 * kPi / 180.0;  // bounds of the estimate
@@ -61,7 +62,8 @@ class MountEstimator {
   [[nodiscard]] double roll_rad() const noexcept { return tilt_rad_.x(); }
   [[nodiscard]] double pitch_rad() const noexcept { return tilt_rad_.y(); }
   [[nodiscard]] double height_m() const noexcept { return height_m_; }
-  // One sigma of roll and pitch: what of the data sheet's error is left, and what frames err by alike.
+  // One sigma of roll and pitch: what of the data sheet's error is left, and what frames err by alike: the surfaces
+  // that were seen, and what told which way is up.
   [[nodiscard]] double tilt_sigma_rad() const noexcept;
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
@@ -82,6 +84,7 @@ class MountEstimator {
   FadingMean<Vec2> tilt_{0.0, Vec2::Zero()};
   FadingMean<double> height_{0.0, 0.0};
   double seen_as_well_ = 0.0;  // 1/rad^2, of level by its surfaces: mean of the frames that the tilt is made of
+  double by_gravity_ = 0.0;    // share of that information whose level was gravity's
   Vec3 apart_ = Vec3::Zero();  // half of the left sole's normal less the right one's, base frame
   double pairs_ = 0.0;         // frames with both on the ground, up to a bound
   std::int64_t last_ns_ = 0;

@@ -73,7 +73,9 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->check(whole_number)
       ->capture_default_str();
   climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
-  climb.add_option("--contacts", a.contacts, "Foot forces: sensed, or inferred from joint torques")
+  climb
+      .add_option("--contacts", a.contacts,
+                  "Foot forces: sensed, or, on the kinematic plant, inferred from joint torques")
       ->capture_default_str();
   climb.add_option("--push", a.pushes, "Pushes of the torso, over 0.1 s: when, s; along x or y; how much, N s")
       ->expected(1, 16)
@@ -188,6 +190,9 @@ std::string complaint(ClimbArguments& a) {
     return "--contacts must be sensed or inferred, not \"" + a.contacts + "\".";
   }
   a.options.infer_contacts = a.contacts == "inferred";
+  if (a.options.infer_contacts && a.options.plant != PlantKind::kKinematic) {
+    return "--contacts inferred needs --plant kinematic: under physics a leg that swings feigns a touch-down.";
+  }
 
   struct Error {
     const char* name;

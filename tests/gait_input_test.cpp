@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// Readings and estimates that are none, and the reference that the drives get.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/support/gait_checks.hpp"
+
+namespace polygmap {
+namespace {
+
+using test::IdealClimb;
+
+TEST(GaitInput, NotInitialised_HoldsTheMeasuredJointsAndNeverMoves) {
+  Gait gait;
+  gait.reset({});
+  JointFeedback feedback;
+  for (int i = 0; i < 12; ++i) feedback.q_rad[i] = 0.01 * i;
+  JointCommand command;
+  for (int i = 0; i < 2000; ++i) {
+    gait.tick(0, {}, {}, feedback, command);
+    feedback.q_rad.array() += 1e-4;  // it must not follow a sagging joint
+  }
+  EXPECT_EQ(gait.status().phase, GaitPhase::kStandstill);
+  for (std::size_t i = 0; i < kJointCount; ++i) {
+    EXPECT_DOUBLE_EQ(command.joints[i].q_rad, 0.01 * static_cast<double>(i));
+    EXPECT_EQ(command.joints[i].dq_radps, 0.0);
+    EXPECT_GT(command.joints[i].kp_nmprad, 0.0);
+  }
+}
+
+TEST(GaitInput, NoGoodReading_DrivesGetNoStiffness) {
+  for (const double knee_rad : {std::numeric_limits<double>::quiet_NaN(), -0.1, 2.7, 1e9}) {
+    Gait gait;
+    gait.reset({});
+    JointFeedback feedback;
+    feedback.q_rad[kKnee] = knee_rad;
+    JointCommand command;
+    gait.tick(0, {}, {}, feedback, command);
+    for (const JointSetpoint& joint : command.joints) EXPECT_EQ(joint.kp_nmprad, 0.0) << knee_rad;
+    feedback.q_rad[kKnee] = 0.5;
+    gait.tick(0, {}, {}, feedback, command);
+    EXPECT_GT(command.joints[kKnee].kp_nmprad, 0.0) << knee_rad;
+    EXPECT_DOUBLE_EQ(command.joints[kKnee].q_rad, 0.5);
+  }
+}
+
+TEST(GaitInput, EncoderALittleOutsideTheRange_HoldsAtTheLimit) {
+  Gait gait;
+  gait.reset({});
+  JointFeedback feedback;
+  feedback.q_rad[kKnee] = -0.01;
+  JointCommand command;
+  gait.tick(0, {}, {}, feedback, command);
+  EXPECT_GT(command.joints[kKnee].kp_nmprad, 0.0);
+  EXPECT_EQ(command.joints[kKnee].q_rad, 0.0);
+}
+
+TEST(GaitInput, NanInEstimatesAndFootholds_NeverReachesACommand) {
+  IdealClimb climb({});
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  climb.tamper = [&](StateEstimate& state, FootholdSet& set, JointFeedback& feedback) {
+    const std::int64_t n = state.stamp_ns / (2 * kNsPerMs);
+    if (n % 7 == 3) state.odom_T_base.p_m.x() = nan;
+    if (n % 11 == 5) state.world_T_odom.R(0, 0) = nan;
+    if (n % 64 < 16) set.p_star_feet[0].position_m.y() = nan;
+    if (n % 64 >= 32 && n % 64 < 48) set.tread.nosing_a_m.x() = nan;
+    if (n % 13 == 5) feedback.foot_force_n = {nan, nan};
+  };
+  climb.run(90.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+  EXPECT_TRUE(math::all_finite(climb.true_T_base().p_m));
+  test::expect_sound_commands(climb);
+}
+
+class JointReferenceTest : public testing::Test {
+ protected:
+  JointReferenceTest() {
+    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+      base_T_sole_[index_of(leg)] = {Mat3::Identity(), Vec3{0, side_sign(leg) * kStanceHalfWidth_m, -0.75}};
+      q_rad_.segment<6>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
+          solve_leg({}, leg, base_T_sole_[index_of(leg)]).q_rad;
+    }
+    EXPECT_TRUE(reference_.try_arm({}, {}, q_rad_));
+  }
+  JointReference reference_;
+  JointVector q_rad_;
+  std::array<Transform, kFootCount> base_T_sole_;
+  JointCommand command_;
+};
+
+TEST_F(JointReferenceTest, PoseReached_IsNotLimited) {
+  EXPECT_FALSE(reference_.follow(base_T_sole_, {true, true}, command_));
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    EXPECT_NEAR(command_.joints[n].q_rad, q_rad_[static_cast<Eigen::Index>(n)], 1e-9);
+  }
+}
+
+TEST_F(JointReferenceTest, PoseNotFinite_LegStaysWhereItIs) {
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      auto soles = base_T_sole_;
+      soles[0].p_m[axis] = bad;
+      for (int i = 0; i < 100; ++i) EXPECT_TRUE(reference_.follow(soles, {true, true}, command_));
+      for (std::size_t n = 0; n < kJointCount; ++n) {
+        EXPECT_NEAR(command_.joints[n].q_rad, q_rad_[static_cast<Eigen::Index>(n)], 1e-9) << n;
+        EXPECT_NEAR(command_.joints[n].dq_radps, 0.0, 1e-9) << n;
+      }
+    }
+  }
+}
+
+TEST_F(JointReferenceTest, PoseOutOfReach_IsLimited) {
+  base_T_sole_[1].p_m.z() = -1.2;
+  EXPECT_TRUE(reference_.follow(base_T_sole_, {true, true}, command_));
+}
+
+}  // namespace
+}  // namespace polygmap
