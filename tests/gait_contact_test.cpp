@@ -58,6 +58,40 @@ TEST(GaitContact, ForceSensorStuckOn_LandsByThePlan) {
   EXPECT_EQ(climb.status().treads_climbed, 4U);
 }
 
+// A toe that goes down along the next riser.
+TEST(GaitContact, ForceForAMomentInTheAir_GoesOnToTheGround) {
+  IdealClimb climb({});
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
+    const LatchedStep& step = climb.status().step;
+    const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns - 540 * kNsPerMs;
+    if (climb.status().phase != GaitPhase::kSwing || step.sequence != 2 || since_ns < 0) return;
+    if (since_ns < 8 * kNsPerMs) feedback.foot_force_n[index_of(step.foot)] = 60.0;
+  };
+  ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
+  EXPECT_EQ(climb.status().early_contacts, 0U);
+  EXPECT_LT(climb.record().execution_z_m, 0.003);
+}
+
+// The base comes 10 mm off its plan: a foot that is hardly pressed must not go along.
+TEST(GaitContact, LandedFootHardlyPressed_StaysWhereItLanded) {
+  IdealClimb climb({});
+  bool off = false;
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
+    double& force_n = feedback.foot_force_n[index_of(climb.status().step.foot)];
+    if (climb.status().step.sequence == 2) force_n = std::min(force_n, 60.0);
+    if (off) state.odom_T_base.p_m.x() += 0.01;
+  };
+  ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
+  const std::size_t i = index_of(climb.status().step.foot);
+  const Vec3 landed_m = climb.status().odom_T_sole_desired[i].p_m;
+  for (int n = 0; n < 280; ++n) {
+    off = n >= 150;
+    climb.tick();
+    ASSERT_EQ(climb.status().phase, GaitPhase::kDoubleSupport);
+    EXPECT_LT((climb.status().odom_T_sole_desired[i].p_m - landed_m).norm(), 1e-3) << n;
+  }
+}
+
 TEST(GaitContact, BumpInTheAir_HoldsTheReferenceWithoutAJump) {
   IdealClimb climb({});
   climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {

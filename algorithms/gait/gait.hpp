@@ -39,8 +39,9 @@ class Gait {
     std::int32_t settle_ticks = 300;           // to the middle between the feet when there is nothing to do
     double touch_force_n = 15.0;
     double hold_force_n = 100.0;            // pressed less, a foot that landed is held where it landed,
-    std::int64_t hold_ns = 200 * kNsPerMs;  // not longer: it may be the sensor
-    double steady_m = 0.015;                // of the divergent component's error: beyond it no foot lifts
+    std::int64_t hold_ns = 200 * kNsPerMs;  // not longer: it may be the sensor, unless that told of the ground
+    std::int64_t felt_hold_ns = 600 * kNsPerMs;
+    double steady_m = 0.015;  // of the divergent component's error: beyond it no foot lifts
     SwingPace::Params pace;
     double turn_share = 0.38;         // of a swing, in which a toppling body's foot goes back to where it stood;
     double turn_ticks = 45.0;         // of a passing one
@@ -52,6 +53,7 @@ class Gait {
     double crouch_max_m = 0.04;
     double side_margin_m = 0.01;                // of a sole that lands farther out, to the end of its tread
     double early_m = 0.005;                     // contact this far above the target counts as early
+    std::int32_t scrape_ticks = 5;              // which is ground only when it lasts so long
     double late_m = 0.005;                      // and this far below as late
     double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down
     double max_lowering_m = 0.055;              // no ground found: the foot goes back
@@ -148,14 +150,16 @@ class Gait {
   std::int32_t shift_ticks_ = 0;
   std::int32_t shifts_ = 0;  // since the last swing
   Obstruction waiting_for_ = Obstruction::kNone;
-  std::int32_t wait_ticks_ = 0;  // for that reason, without a break
-  std::int32_t idle_ticks_ = 0;  // without a step to do since the last swing
-  bool usable_ = false;          // this tick's estimate: fresh, and all of it numbers
+  std::int32_t wait_ticks_ = 0;     // for that reason, without a break
+  std::int32_t touched_ticks_ = 0;  // for which the swing foot has been felt to touch
+  std::int32_t idle_ticks_ = 0;     // without a step to do since the last swing
+  bool usable_ = false;             // this tick's estimate: fresh, and all of it numbers
   bool armed_ = false;
   bool started_ = false;
   bool unloaded_ = false;  // the swing foot was felt to leave the ground
   bool retried_ = false;   // the legs could not do a step from the motion the plan was in: once more, from rest
   bool settles_ = false;   // the last swing foot landed and carries little yet
+  bool felt_ = false;      // its force told of the ground
   bool stop_requested_ = false;
 };
 

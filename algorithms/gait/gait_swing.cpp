@@ -39,6 +39,8 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   shifts_ = 0;
   idle_ticks_ = 0;
   unloaded_ = retried_ = settles_ = false;
+  felt_ = false;
+  touched_ticks_ = 0;
   pace_.begin();
 }
 
@@ -49,14 +51,18 @@ void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noex
   const std::size_t i = index_of(foot);
   const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
   if (!loaded) unloaded_ = true;
+  touched_ticks_ = loaded ? touched_ticks_ + 1 : 0;
   const bool descending = 2.0 * pace_.tick() > swing_.duration_ticks();
   // What does not go down any more stands on something, whatever its force sensor says.
   const Transform odom_T_sole = swing_.at(pace_.tick());
   const double above_m = usable_ ? state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
   const bool blocked = swing_.lowered_m(pace_.tick()) > params_.late_m && above_m > params_.blocked_m;
-  if ((descending && unloaded_ && loaded) || blocked) {
-    if (swing_.at(pace_.last_tick()).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m)
-      ++status_.early_contacts;
+  // A toe that scrapes along the next riser feels a force too, for a moment: ground that comes early has to stay.
+  const bool early = swing_.at(pace_.last_tick()).p_m.z() > decision_.goal.target.position_m.z() + params_.early_m;
+  const bool touches = loaded && touched_ticks_ >= (early ? params_.scrape_ticks : 1);
+  if ((descending && unloaded_ && touches) || blocked) {
+    felt_ = loaded;
+    if (early) ++status_.early_contacts;
     if (swing_.lowered_m(pace_.tick()) > params_.late_m) ++status_.late_contacts;
     return touch_down(state);
   }
@@ -189,8 +195,8 @@ void Gait::touch_down(const StateEstimate& state) noexcept {
 // Until it is pressed it would go along with what the base is off its plan: 5 mm towards the next riser.
 void Gait::hold_landed_foot(const JointFeedback& feedback) noexcept {
   const std::size_t i = index_of(status_.step.foot);
-  settles_ =
-      feedback.foot_force_n[i] < params_.hold_force_n && now_ns_ - status_.step.touch_down_stamp_ns < params_.hold_ns;
+  const std::int64_t most_ns = felt_ ? params_.felt_hold_ns : params_.hold_ns;
+  settles_ = feedback.foot_force_n[i] < params_.hold_force_n && now_ns_ - status_.step.touch_down_stamp_ns < most_ns;
   if (settles_) {
     plan_T_sole_[i] = correction_.odom_T_plan(plan_T_base_).inverse() * odom_T_landed_;
   } else {
