@@ -300,11 +300,12 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   std::array<std::uint8_t, kColumns> beyond{};
   std::array<std::int32_t, FramePlanes::kMaxPlanes + 1> votes{};
   const std::int32_t down = nosing ? 1 : -1;
+  const SurfaceProfile& profile = profiles_[index_];
   const auto end_of = [&](std::int32_t g) -> std::int32_t {
-    const ColumnEnds& ends = profiles_[index_].columns[static_cast<std::size_t>(g)];
+    const ColumnEnds& ends = profile.columns[static_cast<std::size_t>(g)];
     return nosing ? ends.bottom : ends.top;
   };
-  for (std::int32_t g = 0; g < picture_.column_rays.columns; ++g) {
+  for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const std::int32_t end = end_of(g), far = end + down * kProbe_px;
     if (end < 0 || far < 0 || far >= picture_.column_rays.height_px || picture_.body(kColumn_px / 2 * g, far / 2))
       continue;
@@ -335,7 +336,7 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   const std::size_t other = riser != 0 ? riser : most(false);
   if (other == 0) return false;
   line_finder_.begin_guess();
-  for (std::int32_t g = 0; g < picture_.column_rays.columns; ++g) {
+  for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     if (beyond[static_cast<std::size_t>(g)] == other) line_finder_.add_guess(g, end_of(g));
   }
   if (!line_finder_.try_guess(params_.edge_lines, static_cast<std::uint32_t>(index_))) {
