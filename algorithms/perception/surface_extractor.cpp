@@ -220,10 +220,11 @@ void SurfaceExtractor::reduce_row() noexcept {
     picture_.any_body = picture_.any_body || marked;
   }
   const bool body = picture_.body_rows[static_cast<std::size_t>(row_ / 2)];
-  const std::int32_t columns = picture_.column_rays.columns;
-  const ReducedRow reduced =
-      reduce_to_columns(raw_.range, raw_.row(row_), body ? flags : nullptr, columns,
-                        picture_.columns.inverse_depth.row(row_), picture_.columns.valid.row(row_));
+  constexpr std::int32_t kLater = 2;  // rows
+  const std::int32_t columns = picture_.column_rays.columns, last = picture_.column_rays.height_px - 1;
+  const ReducedRow reduced = reduce_to_columns(
+      raw_.range, raw_.row(row_), body ? flags : nullptr, columns, picture_.columns.inverse_depth.row(row_),
+      picture_.columns.valid.row(row_), raw_.row(std::min(row_ + kLater, last)));
   measured_px_ += reduced.measured_px;
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
   constexpr std::int32_t kBlock = RunSegmentation::kBlock;
