@@ -52,12 +52,17 @@ Words add_neighbours(const Words& a, const Words& b) noexcept {
 
 Wide to_float(const Words& x) noexcept { return cv::v_cvt_f32(cv::v_reinterpret_as_s32(x)); }
 
+struct RawPixels {
+  const std::uint16_t *now, *later;  // later: to be asked for
+};
+
 // Whole registers of columns, from column 0 on. Body: whether body counts.
 template <bool kBody>
-void reduce_registers(const RawRange& raw_range, const std::uint16_t* raw, const std::uint16_t* later_raw,
-                      const std::uint8_t* body, std::int32_t registers, float* inverse_depth, std::uint8_t* valid,
-                      Words& measured, Words& free) noexcept {
+void reduce_registers(const RawRange& raw_range, const RawPixels& pixels, const std::uint8_t* body,
+                      std::int32_t registers, float* inverse_depth, std::uint8_t* valid, Words& measured,
+                      Words& free) noexcept {
   const Range range(raw_range);
+  const std::uint16_t *raw = pixels.now, *later_raw = pixels.later;
   const Words none = cv::vx_setzero_u32(), any = raw_range.min <= raw_range.max ? none == none : none;
   const cv::v_uint8 is_body = cv::vx_setall_u8(kPixelBody);
   const Wide per_metre = cv::vx_setall_f32(raw_range.per_metre), least = cv::vx_setall_f32(1.0F);
@@ -139,23 +144,22 @@ ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, co
                              std::int32_t columns, float* inverse_depth, std::uint8_t* valid,
                              const std::uint16_t* later_raw) noexcept {
   Words measured = cv::vx_setzero_u32(), free = measured;
-  const auto reduce = [&](std::int32_t registers, const std::uint16_t* from, const std::uint16_t* later,
-                          std::int32_t g) {
+  const auto reduce = [&](std::int32_t registers, const RawPixels& from, std::int32_t g) {
     if (body != nullptr) {
-      reduce_registers<true>(range, from, later, body + kColumn_px / 2 * static_cast<std::ptrdiff_t>(g), registers,
+      reduce_registers<true>(range, from, body + kColumn_px / 2 * static_cast<std::ptrdiff_t>(g), registers,
                              inverse_depth + g, valid + g, measured, free);
     } else {
-      reduce_registers<false>(range, from, later, nullptr, registers, inverse_depth + g, valid + g, measured, free);
+      reduce_registers<false>(range, from, nullptr, registers, inverse_depth + g, valid + g, measured, free);
     }
   };
   const std::int32_t whole = columns / Raw::nlanes;
-  reduce(whole, raw, later_raw != nullptr ? later_raw : raw, 0);
+  reduce(whole, {raw, later_raw != nullptr ? later_raw : raw}, 0);
   std::int32_t g = whole * Raw::nlanes;
   if (g < columns) {  // the driver's buffer ends with its last row
     std::array<std::uint16_t, static_cast<std::size_t>(kColumn_px) * Raw::nlanes> tail{};
     std::copy(raw + static_cast<std::ptrdiff_t>(kColumn_px) * g,
               raw + static_cast<std::ptrdiff_t>(kColumn_px) * columns, tail.begin());
-    reduce(1, tail.data(), tail.data(), g);
+    reduce(1, {tail.data(), tail.data()}, g);
     g += Raw::nlanes;
   }
   ReducedRow row{static_cast<std::int32_t>(cv::v_reduce_sum(measured)),
