@@ -8,7 +8,7 @@ namespace {
 
 SurfaceProfile rectangle(std::int32_t first, std::int32_t last, std::int16_t top, std::int16_t bottom) {
   SurfaceProfile profile;
-  for (std::int32_t g = first; g <= last; ++g) profile.columns[static_cast<std::size_t>(g)].add(top, bottom);
+  for (std::int32_t g = first; g <= last; ++g) profile.add(g, top, bottom);
   return profile;
 }
 
@@ -83,8 +83,7 @@ TEST(ColumnOutline, RoundSurface_KeepsToItsVerticesAndInside) {
   SurfaceProfile profile;
   for (std::int32_t g = 0; g < 50; ++g) {
     const double half = 100.0 * std::sqrt(std::max(0.0, 1.0 - math::square((g - 24.5) / 25.0)));
-    profile.columns[static_cast<std::size_t>(g)].add(static_cast<std::int16_t>(240.0 - half),
-                                                     static_cast<std::int16_t>(240.0 + half));
+    profile.add(g, static_cast<std::int16_t>(240.0 - half), static_cast<std::int16_t>(240.0 + half));
   }
   ColumnOutline builder;
   Outline2 outline;

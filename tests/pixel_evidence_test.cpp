@@ -26,7 +26,7 @@ double evidence(double even_z_m, double odd_z_m, double plane_z_m, bool measured
   }
   for (const std::int32_t g : {20, 21}) {
     for (std::int32_t r = 100; r < 300; ++r) picture->owners(r, g) = 1;
-    profile->columns[static_cast<std::size_t>(g)].add(100, 299);
+    profile->add(g, 100, 299);
   }
   RawPicture raw;
   raw.depth = depth.data();

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "tests/support/column_scene.hpp"
 
 namespace polygmap {
@@ -115,6 +117,57 @@ TEST_F(Boundaries, RowsOfSomethingElse_AreNotClaimed) {
   scene_.image->turn(0, kDepthHeight_px - 1);
   boundaries_->gather(11, {}, to_plane_);
   boundaries_->claim(11, 10, 1, 0);
+  EXPECT_TRUE(boundaries_->columns()[11].empty());
+}
+
+// Rows of a column that lie on the tread; all others lie far behind it.
+class ClaimedRows : public Boundaries {
+ protected:
+  static constexpr std::int32_t kFirst = 101, kLast = 300;  // that the column beside shows
+  void show(const std::function<bool(std::int32_t)>& on_tread) {
+    const InversePlane far = test::plane_of({0.0, 0.0, -1.0}, 3.0);
+    scene_.paint([&](std::int32_t g, std::int32_t r) { return g == 10 || on_tread(r) ? &wall_ : &far; }, 0.0, 1);
+    boundaries_->begin({}, {}, scene_.rays, scene_.intrinsics.fy_px, scene_.intrinsics.cy_px, *scene_.image);
+    boundaries_->set_plane(kTread, wall_);
+    to_plane_[kTread] = kTread;
+    RunSegmentation::Column runs;
+    polygmap::Run run;
+    run.top = kFirst + 4;
+    run.bottom = kLast - 4;
+    run.plane = kTread;
+    ASSERT_TRUE(runs.try_push_back(run));
+    boundaries_->gather(10, runs, to_plane_);
+    boundaries_->gather(11, {}, to_plane_);
+    boundaries_->claim(11, 10, 1, 0);
+  }
+  void expect_claimed(std::int32_t top, std::int32_t bottom) const {
+    const SurfaceBoundaries::Column& claimed = boundaries_->columns()[11];
+    ASSERT_EQ(claimed.size(), 1U);
+    EXPECT_EQ(claimed[0].top, top);
+    EXPECT_EQ(claimed[0].bottom, bottom);
+  }
+  InversePlane wall_ = test::plane_of({0.0, 0.0, -1.0}, 1.0);
+};
+
+TEST_F(ClaimedRows, AllOfThem_AreOneStretch) {
+  show([](std::int32_t) { return true; });
+  expect_claimed(kFirst, kLast);
+}
+
+TEST_F(ClaimedRows, SingleRowsOffThePlane_DoNotEndAStretch) {
+  show([](std::int32_t r) { return r >= 110 && r <= 250 && r % 2 == 1; });
+  expect_claimed(111, 249);
+}
+
+TEST_F(ClaimedRows, TwoRowsOffThePlane_EndAStretch) {
+  for (const std::int32_t gap : {160, 161, 162, 163, 164, 165, 166, 167}) {  // where words of 64 bits meet, too
+    show([gap](std::int32_t r) { return r != gap && r != gap + 1; });
+    expect_claimed(gap + 2, kLast);
+  }
+}
+
+TEST_F(ClaimedRows, ASingleRow_IsNotClaimed) {
+  show([](std::int32_t r) { return r % 3 == 0; });
   EXPECT_TRUE(boundaries_->columns()[11].empty());
 }
 

@@ -33,7 +33,7 @@ class SurfaceSidesOfABoard : public testing::Test {
   }
   void own(std::int32_t g, std::int32_t r) {
     picture_->owners(r, g) = kNear;
-    profile_->columns[static_cast<std::size_t>(g)].add(static_cast<std::int16_t>(r), static_cast<std::int16_t>(r));
+    profile_->add(g, static_cast<std::int16_t>(r), static_cast<std::int16_t>(r));
   }
   // beyond_mm: what is seen past the board; its columns belong to owner.
   void paint(Side left, Side right, std::uint16_t beyond_mm, std::size_t owner) {
@@ -53,8 +53,6 @@ class SurfaceSidesOfABoard : public testing::Test {
         if (inside) own(g, r);
       }
     }
-    profile_->first_row = kTop;
-    profile_->last_row = kBottom;
     (*planes_)[kNear].piece_px = pixels;
   }
   [[nodiscard]] OutlineSide find(bool right) {

@@ -15,6 +15,7 @@ using Wide = cv::v_float32;
 static_assert(kColumns % Raw::nlanes == 0 && kColumn_px == 8);
 
 constexpr std::int32_t kMostBody = kColumn_px / 4;  // half-resolution pixels: a column of more body is not seen
+constexpr std::int32_t kLine = 64;                  // bytes of a cache
 constexpr int kCountShift = 20;  // below: the sum of eight depths; from here on: how many of them are valid
 
 // The range as vectors see it.
@@ -51,12 +52,17 @@ Words add_neighbours(const Words& a, const Words& b) noexcept {
 
 Wide to_float(const Words& x) noexcept { return cv::v_cvt_f32(cv::v_reinterpret_as_s32(x)); }
 
+struct RawPixels {
+  const std::uint16_t *now, *later;  // later: to be asked for
+};
+
 // Whole registers of columns, from column 0 on. Body: whether body counts.
 template <bool kBody>
-void reduce_registers(const RawRange& raw_range, const std::uint16_t* raw, const std::uint8_t* body,
+void reduce_registers(const RawRange& raw_range, const RawPixels& pixels, const std::uint8_t* body,
                       std::int32_t registers, float* inverse_depth, std::uint8_t* valid, Words& measured,
                       Words& free) noexcept {
   const Range range(raw_range);
+  const std::uint16_t *raw = pixels.now, *later_raw = pixels.later;
   const Words none = cv::vx_setzero_u32(), any = raw_range.min <= raw_range.max ? none == none : none;
   const cv::v_uint8 is_body = cv::vx_setall_u8(kPixelBody);
   const Wide per_metre = cv::vx_setall_f32(raw_range.per_metre), least = cv::vx_setall_f32(1.0F);
@@ -81,7 +87,10 @@ void reduce_registers(const RawRange& raw_range, const std::uint16_t* raw, const
     inverse_depth += Words::nlanes;
     if constexpr (kBody) body += 4 * Words::nlanes;
   };
-  for (std::int32_t i = 0; i < registers; ++i, valid += Raw::nlanes) {
+  constexpr std::int32_t kRawPerRegister = kColumn_px * Raw::nlanes;
+  for (std::int32_t i = 0; i < registers; ++i, valid += Raw::nlanes, later_raw += kRawPerRegister) {
+    constexpr auto kLinePixels = static_cast<std::int32_t>(kLine / sizeof(std::uint16_t));
+    for (std::int32_t k = 0; k < kRawPerRegister; k += kLinePixels) __builtin_prefetch(later_raw + k);
     Words left, right;
     half(left);
     half(right);
@@ -132,9 +141,10 @@ void ColumnImage::turn(std::int32_t first_row, std::int32_t last_row) noexcept {
 }
 
 ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body,
-                             std::int32_t columns, float* inverse_depth, std::uint8_t* valid) noexcept {
+                             std::int32_t columns, float* inverse_depth, std::uint8_t* valid,
+                             const std::uint16_t* later_raw) noexcept {
   Words measured = cv::vx_setzero_u32(), free = measured;
-  const auto reduce = [&](std::int32_t registers, const std::uint16_t* from, std::int32_t g) {
+  const auto reduce = [&](std::int32_t registers, const RawPixels& from, std::int32_t g) {
     if (body != nullptr) {
       reduce_registers<true>(range, from, body + kColumn_px / 2 * static_cast<std::ptrdiff_t>(g), registers,
                              inverse_depth + g, valid + g, measured, free);
@@ -143,13 +153,13 @@ ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, co
     }
   };
   const std::int32_t whole = columns / Raw::nlanes;
-  reduce(whole, raw, 0);
+  reduce(whole, {raw, later_raw != nullptr ? later_raw : raw}, 0);
   std::int32_t g = whole * Raw::nlanes;
   if (g < columns) {  // the driver's buffer ends with its last row
     std::array<std::uint16_t, static_cast<std::size_t>(kColumn_px) * Raw::nlanes> tail{};
     std::copy(raw + static_cast<std::ptrdiff_t>(kColumn_px) * g,
               raw + static_cast<std::ptrdiff_t>(kColumn_px) * columns, tail.begin());
-    reduce(1, tail.data(), g);
+    reduce(1, {tail.data(), tail.data()}, g);
     g += Raw::nlanes;
   }
   ReducedRow row{static_cast<std::int32_t>(cv::v_reduce_sum(measured)),

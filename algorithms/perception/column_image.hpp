@@ -53,7 +53,10 @@ struct ReducedRow {
 // One row of raw depth to one row of columns. body: half-resolution flags of that row, or null;
 // what it covers does not count, and a column that it covers by more than half is empty. Works in whole vector
 // registers: body and the outputs are as long as the rasters' rows, and columns beyond the picture's come out empty.
+// later_raw: a row that will be read soon, or null. The driver's picture is in no near cache, and what the processor
+// fetches by itself ends with every page of memory.
 ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body,
-                             std::int32_t columns, float* inverse_depth, std::uint8_t* valid) noexcept;
+                             std::int32_t columns, float* inverse_depth, std::uint8_t* valid,
+                             const std::uint16_t* later_raw = nullptr) noexcept;
 
 }  // namespace polygmap

@@ -34,10 +34,8 @@ void smooth(const SurfaceProfile& profile, std::int32_t first, std::int32_t last
 void ColumnOutline::build(const SurfaceProfile& profile, const OutlineSides& sides, std::size_t max_vertices,
                           Outline2& outline) noexcept {
   outline.clear();
-  std::int32_t first = 0, last = kColumns - 1;
+  const std::int32_t first = profile.first_column, last = profile.last_column;
   const auto ends = [&profile](std::int32_t g) { return profile.columns[static_cast<std::size_t>(g)]; };
-  while (first <= last && ends(first).empty()) ++first;
-  while (last >= first && ends(last).empty()) --last;
   if (first > last) return;
   std::size_t count = 0;
   const auto push = [&](const Vec2& p, std::size_t base) {

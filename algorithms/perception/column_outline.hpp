@@ -2,6 +2,7 @@
 // The convex outline of a surface from where it begins and ends in each column of the picture.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -24,6 +25,15 @@ struct SurfaceProfile {
   std::array<ColumnEnds, kColumns> columns{};
   std::int16_t first_row = kDepthHeight_px;
   std::int16_t last_row = -1;
+  std::int16_t first_column = kColumns;
+  std::int16_t last_column = -1;
+  void add(std::int32_t column, std::int16_t top, std::int16_t bottom) noexcept {
+    columns[static_cast<std::size_t>(column)].add(top, bottom);
+    first_row = std::min(first_row, top);
+    last_row = std::max(last_row, bottom);
+    first_column = std::min(first_column, static_cast<std::int16_t>(column));
+    last_column = std::max(last_column, static_cast<std::int16_t>(column));
+  }
 };
 
 // The line that ends a surface at its left or right: column = column_px + slope * row, half-resolution pixels. Not

@@ -13,7 +13,7 @@ double pixel_evidence(const FramePicture& picture, const RawPicture& raw, const 
   const auto stride = std::max(1, static_cast<std::int32_t>(plane.piece_px / (kColumn_px * kEvidence_px)));
   const double most2 = kSigmas * kSigmas * plane.plane.m.squaredNorm();
   std::int32_t seen = 0, on = 0, across = 0, skip = 0;
-  for (std::int32_t g = 0; g < picture.column_rays.columns; ++g) {
+  for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnEnds& ends = profile.columns[static_cast<std::size_t>(g)];
     if (ends.empty()) continue;
     std::int32_t row = ends.top + skip;

@@ -32,54 +32,47 @@ SurfaceBoundaries::Rows SurfaceBoundaries::fitting(const Line& line, std::int32_
 
 void SurfaceBoundaries::weigh_claim(std::int32_t column, const Line& line, const ColumnSpan& candidate,
                                     std::int32_t& most, ColumnSpan& claimed) const noexcept {
-  // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
-  std::int32_t top = -1, bottom = -1, rows = 0, off = 0;
-  const auto close = [&] {
-    if (rows > most) {
-      most = rows;
-      claimed.top = static_cast<std::int16_t>(top);
-      claimed.bottom = static_cast<std::int16_t>(bottom);
-      claimed.plane = candidate.plane;
-    }
-    rows = off = 0;
-    top = -1;
-  };
-  // A bit for each row; of eight rows that are looked at together.
-  std::int32_t looked_at = -1;
-  std::uint32_t eight = 0;
-  const auto bits_from = [&](std::int32_t r) {
-    if (r / kRowsAtOnce != looked_at) {
-      looked_at = r / kRowsAtOnce;
-      eight = fitting(line, column, looked_at * kRowsAtOnce).fit;
-    }
-    return eight >> (r % kRowsAtOnce);
-  };
-  for (std::int32_t r = candidate.top; r <= candidate.bottom;) {
-    const std::uint32_t bits = bits_from(r);
-    if (rows == 0) {
-      // Outside a stretch every second row is looked at: that meets all those with two rows in a row.
-      constexpr std::uint32_t kEverySecond = 0x55;
-      if (candidate.bottom - r + 2 <= most) return;  // too few are left, the row before among them
-      if ((bits & kEverySecond) == 0) {
-        r += (kRowsAtOnce + 1 - r % kRowsAtOnce) / 2 * 2;
-        continue;
-      }
-      r += std::countr_zero(bits & kEverySecond);
-      if (r > candidate.bottom) break;
-      top = r > candidate.top && (bits_from(r - 1) & 1U) != 0 ? r - 1 : r;
-      rows = r - top + 1;
-      bottom = r;
-    } else if ((bits & 1U) != 0) {
-      ++rows;
-      bottom = r;
-      off = 0;
-    } else if (++off > 1) {
-      close();
-      ++r;  // of the rows looked at outside a stretch the next
-    }
-    ++r;
+  // A bit for each row that fits, from the first of the candidate's on.
+  constexpr std::int32_t kBits = 64;
+  std::array<std::uint64_t, kDepthHeight_px / kBits + 2> fits{};
+  const std::int32_t count = candidate.bottom - candidate.top + 1;
+  std::int32_t fit = 0;
+  for (std::int32_t at = 0; at < count; at += kRowsAtOnce) {
+    // The last rows of the picture are looked at with others before them.
+    const std::int32_t first = std::min(candidate.top + at, kDepthHeight_px - kRowsAtOnce);
+    const std::uint32_t rows = fitting(line, column, first).fit >> (candidate.top + at - first);
+    const std::uint64_t bits = rows & ((1U << std::min(count - at, kRowsAtOnce)) - 1U);
+    fits[static_cast<std::size_t>(at / kBits)] |= bits << (at % kBits);
+    fit += std::popcount(bits);
   }
-  close();
+  if (fit <= most) return;
+  const auto bits_from = [&fits](std::int32_t at) {
+    const std::uint64_t* word = &fits[static_cast<std::size_t>(at / kBits)];
+    return word[0] >> (at % kBits) | word[1] << 1 << (kBits - 1 - at % kBits);
+  };
+  // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
+  for (std::int32_t at = 0; count - at > most;) {
+    const std::uint64_t bits = bits_from(at);
+    if (bits == 0) {
+      at += kBits;
+      continue;
+    }
+    const std::int32_t top = at + std::countr_zero(bits);
+    std::int32_t rows = 0;
+    std::uint64_t ends = 0;  // a bit for each row off the plane with another after it
+    for (at = top; ends == 0;) {
+      const std::uint64_t here = bits_from(at);
+      ends = ~here & ~here >> 1;
+      const std::int32_t until = std::min(std::countr_zero(ends), kBits - 2);  // the last two may begin such a pair
+      rows += std::popcount(here & ((std::uint64_t{1} << until) - 1U));
+      at += until;
+    }
+    if (rows <= most) continue;
+    most = rows;
+    claimed.top = static_cast<std::int16_t>(candidate.top + top);
+    claimed.bottom = static_cast<std::int16_t>(candidate.top + at - 1);
+    claimed.plane = candidate.plane;
+  }
 }
 
 SurfaceBoundaries::Depths SurfaceBoundaries::depths_of(std::int32_t column, std::int32_t first,

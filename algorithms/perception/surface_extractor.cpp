@@ -220,10 +220,11 @@ void SurfaceExtractor::reduce_row() noexcept {
     picture_.any_body = picture_.any_body || marked;
   }
   const bool body = picture_.body_rows[static_cast<std::size_t>(row_ / 2)];
-  const std::int32_t columns = picture_.column_rays.columns;
-  const ReducedRow reduced =
-      reduce_to_columns(raw_.range, raw_.row(row_), body ? flags : nullptr, columns,
-                        picture_.columns.inverse_depth.row(row_), picture_.columns.valid.row(row_));
+  constexpr std::int32_t kLater = 2;  // rows
+  const std::int32_t columns = picture_.column_rays.columns, last = picture_.column_rays.height_px - 1;
+  const ReducedRow reduced = reduce_to_columns(
+      raw_.range, raw_.row(row_), body ? flags : nullptr, columns, picture_.columns.inverse_depth.row(row_),
+      picture_.columns.valid.row(row_), raw_.row(std::min(row_ + kLater, last)));
   measured_px_ += reduced.measured_px;
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
   constexpr std::int32_t kBlock = RunSegmentation::kBlock;
@@ -300,11 +301,12 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   std::array<std::uint8_t, kColumns> beyond{};
   std::array<std::int32_t, FramePlanes::kMaxPlanes + 1> votes{};
   const std::int32_t down = nosing ? 1 : -1;
+  const SurfaceProfile& profile = profiles_[index_];
   const auto end_of = [&](std::int32_t g) -> std::int32_t {
-    const ColumnEnds& ends = profiles_[index_].columns[static_cast<std::size_t>(g)];
+    const ColumnEnds& ends = profile.columns[static_cast<std::size_t>(g)];
     return nosing ? ends.bottom : ends.top;
   };
-  for (std::int32_t g = 0; g < picture_.column_rays.columns; ++g) {
+  for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const std::int32_t end = end_of(g), far = end + down * kProbe_px;
     if (end < 0 || far < 0 || far >= picture_.column_rays.height_px || picture_.body(kColumn_px / 2 * g, far / 2))
       continue;
@@ -335,7 +337,7 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   const std::size_t other = riser != 0 ? riser : most(false);
   if (other == 0) return false;
   line_finder_.begin_guess();
-  for (std::int32_t g = 0; g < picture_.column_rays.columns; ++g) {
+  for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     if (beyond[static_cast<std::size_t>(g)] == other) line_finder_.add_guess(g, end_of(g));
   }
   if (!line_finder_.try_guess(params_.edge_lines, static_cast<std::uint32_t>(index_))) {

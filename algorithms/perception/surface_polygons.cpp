@@ -150,7 +150,7 @@ std::size_t SurfacePolygons::tread_beside(const FramePicture& picture, const Fra
                                           const SurfaceProfile& profile, bool below) const noexcept {
   constexpr std::int32_t kProbe_px = 6;
   std::array<std::int32_t, FramePlanes::kMaxPlanes + 1> votes{};
-  for (std::int32_t g = 0; g < picture.column_rays.columns; ++g) {
+  for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnEnds& ends = profile.columns[static_cast<std::size_t>(g)];
     if (ends.empty()) continue;
     const std::int32_t row = below ? ends.bottom + kProbe_px : ends.top - kProbe_px;

@@ -19,10 +19,7 @@ void SurfaceProfiles::add_column(const SurfaceBoundaries::Columns& columns, cons
     const std::uint8_t surface = span.piece == 0 ? std::uint8_t{0} : pieces.plane_of(span.piece);
     if (surface == 0) continue;
     std::fill(owners + span.top, owners + span.bottom + 1, surface);
-    SurfaceProfile& profile = profiles_[surface];
-    profile.columns[static_cast<std::size_t>(column)].add(span.top, span.bottom);
-    profile.first_row = std::min(profile.first_row, span.top);
-    profile.last_row = std::max(profile.last_row, span.bottom);
+    profiles_[surface].add(column, span.top, span.bottom);
   }
 }
 

@@ -246,10 +246,11 @@ void SurfaceSides::find_ends(std::size_t index, const SurfaceProfile& profile) n
   using Bytes = cv::v_uint8;
   static_assert(kDepthHeight_px % Bytes::nlanes == 0);
   const std::int32_t from = profile.first_row / Bytes::nlanes * Bytes::nlanes;
-  std::fill(left_.begin() + from, left_.begin() + profile.last_row + 1, kNoColumn);
-  std::fill(right_.begin() + from, right_.begin() + profile.last_row + 1, kNoColumn);
+  std::uint8_t *left = left_.data() + kPad, *right = right_.data() + kPad;
+  std::fill(left + from, left + profile.last_row + 1, kNoColumn);
+  std::fill(right + from, right + profile.last_row + 1, kNoColumn);
   const Bytes wanted = cv::vx_setall_u8(static_cast<std::uint8_t>(index));
-  for (std::int32_t g = 0; g < picture_->column_rays.columns; ++g) {
+  for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnEnds& ends = profile.columns[static_cast<std::size_t>(g)];
     if (ends.empty()) continue;
     const std::uint8_t* owners = picture_->owners.row(g);
@@ -257,9 +258,13 @@ void SurfaceSides::find_ends(std::size_t index, const SurfaceProfile& profile) n
     for (std::int32_t r = ends.top / Bytes::nlanes * Bytes::nlanes; r <= ends.bottom; r += Bytes::nlanes) {
       // From left to right, and no column is more than none.
       const Bytes own = cv::vx_load(owners + r) == wanted;
-      cv::v_store(left_.data() + r, cv::v_min(cv::vx_load(left_.data() + r), here | ~own));
-      cv::v_store(right_.data() + r, cv::v_select(own, here, cv::vx_load(right_.data() + r)));
+      cv::v_store(left + r, cv::v_min(cv::vx_load(left + r), here | ~own));
+      cv::v_store(right + r, cv::v_select(own, here, cv::vx_load(right + r)));
     }
+  }
+  for (std::uint8_t* ends : {left, right}) {
+    std::fill_n(ends + profile.first_row - kFlatRows / 2, kFlatRows / 2, ends[profile.first_row]);
+    std::fill_n(ends + profile.last_row + 1, kFlatRows / 2, ends[profile.last_row]);
   }
 }
 
@@ -269,25 +274,32 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   const auto outer_edge = [right](std::uint8_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
   seen_.clear();
   hidden_.clear();
-  const RowColumns& ends = right ? right_ : left_;
-  // Where the surface's end runs off sideways from row to row it is a front or a back, no side.
-  std::size_t count = 0;
+  const std::uint8_t* ends = (right ? right_ : left_).data() + kPad;
+  // Where the surface's end runs off sideways from row to row it is a front or a back, no side: a bit for each row that
+  // may end at one.
+  using Bytes = cv::v_uint8x16;
+  std::array<std::uint32_t, kDepthHeight_px / Bytes::nlanes + 1> upright;
+  std::int32_t count = 0;
   const std::int32_t first_row = profile.first_row, last_row = profile.last_row;
-  for (std::int32_t r = first_row; r <= last_row; ++r) {
-    const auto end_at = [&](std::int32_t row) {
-      return static_cast<std::int32_t>(ends[static_cast<std::size_t>(row)]);
-    };
-    const std::int32_t drift =
-        end_at(std::min(r + kFlatRows / 2, last_row)) - end_at(std::max(r - kFlatRows / 2, first_row));
-    rows_[count] = static_cast<std::int16_t>(r);
-    count += end_at(r) != kNoColumn && drift <= kFlatColumns && drift >= -kFlatColumns ? 1U : 0U;
+  const Bytes flat = cv::v_setall_u8(kFlatColumns), none = cv::v_setall_u8(kNoColumn);
+  for (std::int32_t r = first_row, i = 0; r <= last_row; r += Bytes::nlanes, ++i) {
+    const Bytes drift = cv::v_absdiff(cv::v_load(ends + r + kFlatRows / 2), cv::v_load(ends + r - kFlatRows / 2));
+    const Bytes may = (cv::v_max(drift, flat) == flat) & (cv::v_load(ends + r) != none);
+    const std::uint32_t rows = (2U << std::min(last_row - r, Bytes::nlanes - 1)) - 1U;
+    upright[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(cv::v_signmask(may)) & rows;
+    count += std::popcount(upright[static_cast<std::size_t>(i)]);
   }
-  const std::size_t most = plane.kind == SurfaceKind::kTread ? kMaxRows : kOtherRows;
-  const std::size_t stride = (count + most - 1) / most;
+  const std::int32_t most = plane.kind == SurfaceKind::kTread ? kMaxRows : kOtherRows;
+  const std::int32_t stride = (count + most - 1) / most;
   double outermost = -1e9;
-  for (std::size_t i = stride / 2; i < count; i += stride) {
-    const std::int32_t r = rows_[i];
-    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+  std::int32_t above = 0;  // such rows above r0
+  for (std::int32_t i = stride / 2, r0 = first_row; i < count; i += stride) {
+    const auto bits = [&] { return upright[static_cast<std::size_t>((r0 - first_row) / Bytes::nlanes)]; };
+    for (; above + std::popcount(bits()) <= i; r0 += Bytes::nlanes) above += std::popcount(bits());
+    std::uint32_t from_it = bits();
+    for (std::int32_t before = above; before < i; ++before) from_it &= from_it - 1U;
+    const std::int32_t r = r0 + std::countr_zero(from_it);
+    const std::uint8_t g = ends[r];
     RowEnd end{static_cast<double>(r), 0.0};
     const Ending ending = end_of_row(index, r, g, right, end.column);
     if (ending == Ending::kNone) continue;
@@ -299,7 +311,7 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   OutlineSide side;
   if (outermost < -1e8) {  // no row but flat ones
     for (std::int32_t r = first_row; r <= last_row; ++r) {
-      const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+      const std::uint8_t g = ends[r];
       if (g != kNoColumn) outermost = std::max(outermost, out * outer_edge(g));
     }
   }
@@ -321,7 +333,7 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   double cut_px = 0.0;
   const std::int32_t step = 1 + (last_row - first_row) / kManyRows;
   for (std::int32_t r = first_row; r <= last_row; r += step) {
-    const std::uint8_t g = ends[static_cast<std::size_t>(r)];
+    const std::uint8_t g = ends[r];
     if (g != kNoColumn) cut_px += step * std::max(beyond(r, outer_edge(g)) - params_.outside_px, 0.0);
   }
   if (on < params_.min_rows || on < params_.min_share * between) return side;

@@ -56,14 +56,14 @@ class SurfaceSides {
   const RawPicture* raw_ = nullptr;
   const FramePicture* picture_ = nullptr;
   const FramePlanes* planes_ = nullptr;
-  double pitch_ = 0.0;  // of rays from pixel to pixel
-  using RowColumns = std::array<std::uint8_t, kDepthHeight_px>;
+  double pitch_ = 0.0;                      // of rays from pixel to pixel
+  static constexpr std::int32_t kPad = 32;  // rows before the first and after the last: whole registers
+  using RowColumns = std::array<std::uint8_t, kDepthHeight_px + 2 * kPad>;
   static constexpr std::uint8_t kNoColumn = std::numeric_limits<std::uint8_t>::max();
   static_assert(kColumns <= kNoColumn);
-  RowColumns left_{}, right_{};                       // of the rows next to the surface's, too
-  std::array<std::int16_t, kDepthHeight_px> rows_{};  // that may end at a side
-  StaticVector<RowEnd, kMaxRows> seen_;               // full-resolution pixels
-  StaticVector<RowEnd, kMaxRows> hidden_;             // as far as the columns reach
+  RowColumns left_{}, right_{};            // from kPad on; of the rows next to the surface's, too
+  StaticVector<RowEnd, kMaxRows> seen_;    // full-resolution pixels
+  StaticVector<RowEnd, kMaxRows> hidden_;  // as far as the columns reach
 };
 
 }  // namespace polygmap
