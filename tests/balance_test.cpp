@@ -210,6 +210,9 @@ TEST(WrenchDistribution, ForceFarAheadOfTwoSoles_IsPressedTwiceAsFarAheadAsOfOne
     EXPECT_LE(far.centre_m[f].x(), limits.toe_m + 1e-9);
   }
   EXPECT_GT(far.zmp_m.x(), 1.9 * limits.ahead_m);
+  PressureLimits short_soles;
+  short_soles.toe_m = 0.1;
+  EXPECT_NEAR(distribute(standing(), short_soles, {0.3, 0.0, 0.8}, Vec2::Zero()).zmp_m.x(), 0.1, 1e-9);
 }
 
 // Of all shares, with what remains pressed within both soles: how close to a vertical line through the point they come.
@@ -226,7 +229,7 @@ double closest_m(const Support& support, const PressureLimits& limits, const Vec
     Vec2 zmp_m = Vec2::Zero();
     for (std::size_t f = 0; f < kFootCount; ++f) {
       const Vec2 local_m = rest_m - Vec2{0.0, side[f] * limits.inward_m};
-      const double ahead_m = std::min(limits.ahead_m / std::max(share[f], 0.1), limits.toe_m);
+      const double ahead_m = std::min(limits.ahead_m / std::max(share[f], 1e-3), limits.toe_m);
       zmp_m += share[f] *
                (support.odom_T_sole[f].p_m.head<2>() + Vec2{math::clamp(local_m.x(), -limits.behind_m, ahead_m),
                                                             math::clamp(local_m.y(), -limits.aside_m, limits.aside_m)});

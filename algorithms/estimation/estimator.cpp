@@ -63,7 +63,7 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
 void Estimator::add_lio(const LioSample& sample, std::int64_t now_ns) noexcept {
   LioVerdict verdict = odometry_.fusion().check(sample, now_ns);
   if (verdict == LioVerdict::kAccepted) {
-    // Until initialised the base has not moved; where it stood in odom is known from then on (rebase).
+    // Until initialised the base has swayed by millimetres only; where it stood in odom is known from then on (rebase).
     StateEstimate then;
     bool known = standstill_.collecting() && sample.stamp_ns >= standstill_.start_ns();
     if (state_.initialised) {

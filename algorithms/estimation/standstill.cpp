@@ -60,7 +60,7 @@ bool StandstillCalibration::try_finish(const ImuSample& imu, const JointFeedback
   times_.sum_s2 += math::square(time_s);
   turn_.add(time_s, felt_rad_ - turned_rad);
   velocity_.add(time_s, felt_mps_ - first_base_R_base_ * base_v_mps);
-  return time_s >= params_.duration_s;
+  return time_s >= params_.duration_s && times_.spread() > 0.0;
 }
 
 Vec3 StandstillCalibration::first_base_g_mps2() const noexcept {

@@ -8,7 +8,7 @@
 namespace polygmap {
 namespace {
 
-constexpr std::int32_t kLower_ticks = 130;  // of the torso where a foot needs a longer leg: faster, it would fall
+constexpr std::int32_t kLower_ticks = 130;  // of the torso where a foot needs a longer leg
 constexpr std::int32_t kCrouch_ticks = 100;
 constexpr double kCrouchStep_m = 0.005;
 constexpr std::int32_t kOff_ticks = 5;  // a body is off its plan for longer than an estimate jumps
@@ -202,8 +202,9 @@ void Gait::settle_between_feet() noexcept {
   const TorsoPose here = torso_at(params_.geometry, params_.step.torso, soles, plan_T_base_.p_m.head<2>());
   crouched_m_ = crouch_m();
   upright_ = {std::min(middle.position_m.z(), here.position_m.z()), middle.yaw_rad};
-  move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, params_.settle_ticks,
-             crouched_m_ > 0.0 ? kLower_ticks : params_.settle_ticks);
+  const double height_m = upright_.height_m - crouched_m_;
+  const bool soon = crouched_m_ > 0.0 && height_m < torso_state_[2].position;
+  move_torso(height_m, upright_.yaw_rad, params_.settle_ticks, soon ? kLower_ticks : params_.settle_ticks);
   const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{params_.step.zmp_ahead_m, 0, 0};
   rest_over((middle.position_m + ahead_m).head<2>());
   tick_ = 0;

@@ -38,6 +38,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   tick_ = 0;
   shifts_ = 0;
   idle_ticks_ = 0;
+  if (settles_) posture_.restart();
   unloaded_ = retried_ = settles_ = false;
   felt_ = false;
   touched_ticks_ = 0;

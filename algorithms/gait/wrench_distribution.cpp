@@ -27,7 +27,7 @@ Pressure press(const Support& support, const PressureLimits& limits, const Carri
     const Transform& sole = support.odom_T_sole[f];
     const Vec3 carried_m = carriers.odom_p_m[f] - sole.p_m;
     const Vec3 local_m = sole.R.transpose() * Vec3{carried_m.x() + rest_m.x(), carried_m.y() + rest_m.y(), 0.0};
-    const double ahead_m = std::min(limits.ahead_m / std::max(pressure.share[f], 0.1), limits.toe_m);
+    const double ahead_m = std::min(limits.ahead_m / std::max(pressure.share[f], 1e-3), limits.toe_m);
     pressure.centre_m[f] = sole * Vec3{math::clamp(local_m.x(), -limits.behind_m, ahead_m),
                                        math::clamp(local_m.y(), -limits.aside_m, limits.aside_m), 0.0};
     pressure.zmp_m += pressure.share[f] * pressure.centre_m[f];

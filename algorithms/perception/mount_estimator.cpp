@@ -41,7 +41,7 @@ void MountEstimator::update(const SurfaceFrame& frame, const Stance& stance) noe
   last_ns_ = frame.stamp_ns;
 
   // Level is what the standing soles lie on: treads are parallel to it, and a foot is put down by the same kinematics.
-  // Gravity as the estimator has it errs by twice as much, and alike in everything but the camera.
+  // Gravity as the estimator has it errs by more than twice as much, and alike in everything but the camera.
   std::array<Vec3, kFootCount> up;
   std::array<bool, kFootCount> flat{};
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
