@@ -37,6 +37,8 @@ std::string why_stopped(Obstruction reason, double measured_m) {
                               : "its legs could not do the next step";
     case Obstruction::kUnsteady:
       return "what it saw kept changing";
+    case Obstruction::kNotLinedUp:
+      return "it did not come to stand straight before the stairs";
     case Obstruction::kGroundMissing:
       return "there was no ground where a foot came down, and it put the foot back";
     case Obstruction::kStateStale:

@@ -42,6 +42,7 @@ enum class Obstruction : std::uint8_t {
   kEdgeUncertain,  // the foot fits the next tread, but not with its edges known so vaguely
   kLegsCannot,     // the legs cannot do the next step: of this rise when it is a leading one, 0 otherwise
   kUnsteady,       // what the search offers keeps changing
+  kNotLinedUp,     // so many steps on the floor, and it does not stand straight before the stairs
   kGroundMissing,  // no ground where the foot came down: it was put back where it had stood
   kStateStale,     // IMU or joint feedback fell silent
 };

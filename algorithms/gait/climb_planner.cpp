@@ -205,9 +205,9 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
   }
   decision.has_step = true;
   if (treads_climbed_ == 0 && floor_goal(situation, footholds, decision.goal)) {
-    if (corrections_ < params_.max_corrections) return decision;
+    if (corrections_ < params_.max_corrections && floor_steps_ < params_.max_floor_steps) return decision;
     decision = {};
-    decision.obstruction = Obstruction::kUnsteady;
+    decision.obstruction = Obstruction::kNotLinedUp;
     return decision;
   }
   decision.has_step = !walks_up;

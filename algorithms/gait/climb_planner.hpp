@@ -24,6 +24,7 @@ class ClimbPlanner {
     std::uint32_t strict_corrections = 2;  // steps in place before the tolerance relaxes, by half of itself per step
     double max_relaxation = 2.5;
     std::uint32_t max_corrections = 12;  // not lined up after so many: it will not be. 200 climbs took up to 7
+    std::uint32_t max_floor_steps = 60;  // nor after so many of any length
     FloorStepLimits floor;
     double floor_clearance_m = 0.02;  // of a toe on the way to the line of the first nosing
     SwingRule rule;

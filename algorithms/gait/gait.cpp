@@ -8,13 +8,20 @@
 namespace polygmap {
 namespace {
 
-constexpr std::int32_t kLower_ticks = 130;  // of the torso where a foot needs a longer leg
+constexpr std::int32_t kLower_ticks = 130;  // of the torso where a foot needs a longer leg, at least:
+constexpr double kLower_mps2 = 4.0;         // falling faster, it would press the ground too little to balance
 constexpr std::int32_t kCrouch_ticks = 100;
 constexpr double kCrouchStep_m = 0.005;
 constexpr std::int32_t kOff_ticks = 5;  // a body is off its plan for longer than an estimate jumps
 constexpr double kInward_m = 0.01;
 constexpr double kSpare_m = 0.02;               // of its height: the base is not right over the centre of mass
 constexpr std::int32_t kTickLimit = 1'000'000;  // far beyond every duration
+
+std::int32_t lowering_ticks(double drop_m) noexcept {
+  constexpr double kQuintic = 5.78;  // greatest acceleration between two rests, of distance over time squared
+  const double least_s = math::sqrt(kQuintic * std::max(drop_m, 0.0) / kLower_mps2);
+  return std::max(static_cast<std::int32_t>(least_s / kTick_s), kLower_ticks);
+}
 
 bool finite(const Transform& T) noexcept { return math::all_finite(T.R) && math::all_finite(T.p_m); }
 
@@ -155,8 +162,9 @@ void Gait::lower_torso(const SolePose& sole) noexcept {
   SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   soles[index_of(foot)] = sole;
   const TorsoPose low = torso_over(params_.geometry, params_.step.torso, other(foot), soles);
-  move_torso(std::min(low.position_m.z() - kSpare_m, torso_state_[2].position), low.yaw_rad, kLower_ticks,
-             kLower_ticks);
+  const double height_m = std::min(low.position_m.z() - kSpare_m, torso_state_[2].position);
+  const std::int32_t ticks = lowering_ticks(torso_state_[2].position - height_m);
+  move_torso(height_m, low.yaw_rad, ticks, ticks);
 }
 
 // No ground: the weight rests over the stance foot, as far towards the free foot as the sole carries. The ankle roll of
@@ -204,7 +212,8 @@ void Gait::settle_between_feet() noexcept {
   upright_ = {std::min(middle.position_m.z(), here.position_m.z()), middle.yaw_rad};
   const double height_m = upright_.height_m - crouched_m_;
   const bool soon = crouched_m_ > 0.0 && height_m < torso_state_[2].position;
-  move_torso(height_m, upright_.yaw_rad, params_.settle_ticks, soon ? kLower_ticks : params_.settle_ticks);
+  const std::int32_t soon_ticks = lowering_ticks(torso_state_[2].position - height_m);
+  move_torso(height_m, upright_.yaw_rad, params_.settle_ticks, soon ? soon_ticks : params_.settle_ticks);
   const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{params_.step.zmp_ahead_m, 0, 0};
   rest_over((middle.position_m + ahead_m).head<2>());
   tick_ = 0;
