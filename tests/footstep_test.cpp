@@ -137,9 +137,10 @@ TEST(StepKnots_Eq30Eq37, WholeStep_KnotsAreEvenInTimeAndEndOnTheTarget) {
   std::array<Transform, kFootCount> soles;
   TorsoTrajectory::State from;
   const StepPlan plan = stair_step(StepKind::kLeading, 0.13, 0.28, soles, from);
-  const StepKnots knots({}, {}, plan, from, soles);
-  ASSERT_EQ(knots.count(), 1 + (plan.shift_ticks + plan.swing_ticks + 9) / 10);
-  for (std::int32_t i = 0; i < knots.count(); ++i) EXPECT_EQ(knots[i].tick, 10 * i);
+  const StepParams params;
+  const StepKnots knots({}, params, plan, from, soles);
+  ASSERT_EQ(knots.count(), 1 + (plan.shift_ticks + plan.swing_ticks + params.knot_ticks - 1) / params.knot_ticks);
+  for (std::int32_t i = 0; i < knots.count(); ++i) EXPECT_EQ(knots[i].tick, params.knot_ticks * i);
   const StepKnot last = knots[knots.count() - 1];
   EXPECT_LT((last.odom_T_sole[0].p_m - plan.goal.target.position_m).norm(), 1e-9);
   EXPECT_NEAR(last.odom_T_base.p_m.z(), knots.torso_at_landing().position_m.z(), 1e-9);

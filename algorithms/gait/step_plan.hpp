@@ -67,7 +67,7 @@ struct StepParams {
   std::int32_t leave_ticks = 30;         // the rear leg still reaches the ground so long after its foot has left it
   double rise_share = 0.5;               // of a swing onto a tread in which the torso rises, to give the foot room
   double passing_rise_share = 0.6;
-  std::int32_t knot_ticks = 10;    // eq. (37): 20 ms
+  std::int32_t knot_ticks = 15;    // eq. (37): 30 ms; between them a drive is up to 2 % faster than its knots say
   double joint_margin_rad = 0.03;  // what a plan keeps from the joints' ranges
   double knee_min_rad = 0.08;      // and from the stretched leg
   double speed_share = 0.95;       // of the drives' speed that a plan may use
