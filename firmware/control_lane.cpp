@@ -62,7 +62,7 @@ Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
   estimator_.tick(gait_.status().stands);
   LioSample lio;
   for (int i = 0; i < kMaxReadsPerFrame && lio_port_.try_read(lio); ++i) estimator_.add_lio(lio, now_ns);
-  answer_pose_request();
+  answer_pose_request(now_ns);
   return Progress::kDone;
 }
 
@@ -78,8 +78,10 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   const GaitStatus& status = gait_.status();
   SearchContext& context = link_.search_context.back();
   context.state = estimator_.state();
-  // Standing on two feet, the foot that landed last is on the highest tread reached.
-  context.stance = status.phase == GaitPhase::kSwing ? other(status.step.foot) : status.step.foot;
+  // The foot that landed last is on the highest tread reached; one in the air, or put back, has not landed.
+  const LatchedStep& step = status.step;
+  const bool stands = step.touch_down_stamp_ns != 0 || step.sequence == 0;
+  context.stance = stands ? step.foot : other(step.foot);
   context.climbing = status.treads_climbed > 0 || status.step.onto_tread;
   link_.search_context.publish();
   return Progress::kDone;
@@ -141,23 +143,22 @@ void ControlLane::report_gait(std::int64_t now_ns) noexcept {
   gait_seen_ = now;
 }
 
-void ControlLane::answer_pose_request() noexcept {
+void ControlLane::answer_pose_request(std::int64_t now_ns) noexcept {
   if (!link_.pose_request.try_take()) return;
   const PoseRequest& request = link_.pose_request.front();
   PoseAnswer& answer = link_.pose_answer.back();
   answer.number = request.number;
   answer.found = estimator_.try_state_at(request.stamp_ns, answer.state);
-  if (!answer.found && estimator_.state().initialised) health_.raise(Limit::kStateRingMissed, request.stamp_ns);
+  if (!answer.found && estimator_.state().initialised) health_.raise(Limit::kStateRingMissed, now_ns);
   link_.pose_answer.publish();
 }
 
-// A tread's height enters the estimator once, as it was frozen at the latch: the map never hears its own echo. The
-// target of a step on the floor is the estimator's own height: no news at all.
+// A tread's height enters the estimator once, as it was frozen at the latch: the map never hears its own echo.
 void ControlLane::hand_over_touch_down() noexcept {
   const LatchedStep& step = gait_.status().step;
   if (step.touch_down_stamp_ns == 0 || step.sequence == step_handed_over_) return;
   step_handed_over_ = step.sequence;
-  if (!step.onto_tread) return;
+  if (!step.height_mapped) return;  // no news at all
   estimator_.set_tread_height(step.foot, step.odom_T_target.p_m.z(), params_.tread_height_sigma_m);
 }
 

@@ -34,7 +34,7 @@ class ControlLane {
   [[nodiscard]] const Health& faults() const noexcept { return health_; }
 
  private:
-  void answer_pose_request() noexcept;
+  void answer_pose_request(std::int64_t now_ns) noexcept;
   void report_lidar(std::int64_t now_ns) noexcept;
   void report_rejections(std::int64_t now_ns) noexcept;
   void report_gait(std::int64_t now_ns) noexcept;

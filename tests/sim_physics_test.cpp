@@ -397,6 +397,31 @@ TEST(PhysicalFailure, ForceSensorDead_FootThatDoesNotGoDownStands) {
   }
 }
 
+// 60 ms without the joint bus: the torques go on as planned, as if the body were too.
+TEST(PhysicalFailure, JointsSilentForAMoment_TorquesDoNotLeap) {
+  for (const double after_s : {0.25, 1.0, 1.2}) {  // in the swing, and while the weight moves
+    PhysicalClimb climb(few_steps(2));
+    ASSERT_TRUE(run_to_swing_onto(climb, 2));
+    climb.run(after_s);
+    double leap_nm = 0.0;
+    for (int tick = 0; tick < 100; ++tick) {
+      const JointCommand before = climb.command();
+      climb.joints_silent = tick < 30;
+      (void)climb.tick();
+      if (tick > 30) continue;
+      for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+        if (!climb.status().stands[index_of(foot)]) continue;
+        const std::size_t n = joint_index(foot, kAnklePitch);
+        leap_nm = std::max(leap_nm, std::abs(climb.command().joints[n].tau_ff_nm - before.joints[n].tau_ff_nm));
+      }
+    }
+    EXPECT_LT(leap_nm, 15.0) << after_s;
+    climb.run(60.0);
+    EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
+    EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+  }
+}
+
 // Failures that a study of this climb met (six of them; the drives' and soles' are in footstep_test and above).
 double worst_torque_ratio(PhysicalClimb& climb) {
   double worst = 0.0;

@@ -24,6 +24,8 @@ struct LatchedStep {
   std::uint32_t sequence = 0;  // counts swings from 1; 0: none yet
   Foot foot = Foot::kLeft;
   bool onto_tread = false;  // false: a step on the floor while walking up
+  // The target's height is a mapped tread's; false where it is the estimate's own: on the floor, beside the other foot.
+  bool height_mapped = false;
   std::int64_t latch_stamp_ns = 0;
   std::int64_t map_stamp_ns = 0;         // exposure of the newest fused frame at the latch
   Foothold target;                       // world frame at the latch

@@ -57,11 +57,11 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
   decision.has_step = true;
   StepGoal& goal = decision.goal;
   goal.kind = StepKind::kTrailing;
-  goal.foot = other(leading_);
+  goal.foot = other(memory_.leading);
   // The search looks from the foot that stands and soon offers the tread above: then the memory holds.
   const Foothold& seen = footholds.p_star_feet[index_of(goal.foot)];
-  const bool same_tread = footholds.has_p_star && seen.polygon_id == trailing_foothold_.polygon_id && usable(seen);
-  goal.foothold = same_tread ? seen : trailing_foothold_;
+  const bool same_tread = footholds.has_p_star && seen.polygon_id == memory_.trailing_foothold.polygon_id && usable(seen);
+  goal.foothold = same_tread ? seen : memory_.trailing_foothold;
   goal.target = in_odom(situation.world_T_odom, goal.foothold);
   return decision;
 }
@@ -75,8 +75,8 @@ bool ClimbPlanner::passing_step(const Situation& situation, const FootholdSet& f
   if (footholds.obstruction != Obstruction::kNone || !footholds.has_p_star || !usable(footholds.p_star_feet)) {
     return false;
   }
-  const Foot foot = other(leading_);
-  const double standing_m = situation.soles[index_of(leading_)].position_m.z();
+  const Foot foot = other(memory_.leading);
+  const double standing_m = situation.soles[index_of(memory_.leading)].position_m.z();
   const auto rise_m = [&](const std::array<Foothold, kFootCount>& feet) {
     return in_odom(situation.world_T_odom, feet[index_of(foot)]).position_m.z() - standing_m;
   };
@@ -92,7 +92,7 @@ bool ClimbPlanner::passing_step(const Situation& situation, const FootholdSet& f
     return {kind, f, in_odom(situation.world_T_odom, foothold), foothold};
   };
   decision.goal = goal(StepKind::kPassing, foot);
-  decision.trailing = goal(StepKind::kTrailing, leading_);
+  decision.trailing = goal(StepKind::kTrailing, memory_.leading);
   return true;
 }
 
@@ -104,10 +104,10 @@ Foot ClimbPlanner::leading_foot(const Situation& situation, const SolePair& targ
   constexpr double kReasonToTurnRound = 2.5;  // times the dead bands
   if (situation.leads || treads_climbed_ > 0) {
     return swing_foot(
-        step, situation.leads ? situation.leading : leading_,
+        step, situation.leads ? situation.leading : memory_.leading,
         {kReasonToTurnRound * params_.rule.lateral_dead_band_m, kReasonToTurnRound * params_.rule.turn_dead_band_rad});
   }
-  return swing_foot(step, has_leading_ ? leading_ : other(last_swing_), params_.rule);
+  return swing_foot(step, memory_.has_leading ? memory_.leading : other(memory_.last_swing), params_.rule);
 }
 
 bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& footholds, StepGoal& goal) const noexcept {
@@ -144,7 +144,7 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   if (lined_up[0] && lined_up[1]) return false;
 
   const TorsoPose torso_goal = middle_of(stand_off);
-  Foot foot = other(last_swing_);
+  Foot foot = other(memory_.last_swing);
   if (lined_up[index_of(foot)]) {
     foot = other(foot);
   } else if (floor_steps_ == 0) {
@@ -221,13 +221,14 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
 
 void ClimbPlanner::latched(const Situation& situation, const Decision& decision) noexcept {
   latched_ = decision;
-  last_swing_ = decision.goal.foot;
-  const Vec3 travel_m = decision.goal.target.position_m - situation.soles[index_of(last_swing_)].position_m;
+  before_latch_ = memory_;
+  memory_.last_swing = decision.goal.foot;
+  const Vec3 travel_m = decision.goal.target.position_m - situation.soles[index_of(memory_.last_swing)].position_m;
   if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < kCorrection_m) ++corrections_;
   if (leads(decision.goal.kind)) {
-    leading_ = decision.goal.foot;
-    has_leading_ = true;
-    trailing_foothold_ = decision.trailing.foothold;
+    memory_.leading = decision.goal.foot;
+    memory_.has_leading = true;
+    memory_.trailing_foothold = decision.trailing.foothold;
   }
 }
 
@@ -239,8 +240,10 @@ bool ClimbPlanner::shorten_floor_steps() noexcept {
 
 void ClimbPlanner::passing_ends_beside(const StepGoal& goal) noexcept {
   latched_.goal = goal;
-  leading_ = other(goal.foot);
+  memory_.leading = other(goal.foot);
 }
+
+void ClimbPlanner::put_back() noexcept { memory_ = before_latch_; }
 
 void ClimbPlanner::landed() noexcept {
   stride_share_ = 1.0;

@@ -61,8 +61,9 @@ class ClimbPlanner {
   void refuse_passing() noexcept { passing_refused_ = true; }
   // The passing foot that is in the air lands beside the standing one instead.
   void passing_ends_beside(const StepGoal& goal) noexcept;
-  // Its foot stands.
+  // Its foot stands on its goal, or where it stood before: as if nothing had been latched.
   void landed() noexcept;
+  void put_back() noexcept;
   [[nodiscard]] std::uint32_t tread_id() const noexcept { return tread_id_; }  // under the foot that landed last
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
 
@@ -77,10 +78,13 @@ class ClimbPlanner {
 
   Params params_;
   Decision latched_;
-  Foothold trailing_foothold_;  // remembered from the leading latch, world
-  Foot last_swing_ = Foot::kRight;
-  Foot leading_ = Foot::kLeft;
-  bool has_leading_ = false;
+  // What a latch changes, and what it was before.
+  struct Memory {
+    Foothold trailing_foothold;  // from the leading latch, world
+    Foot last_swing = Foot::kRight;
+    Foot leading = Foot::kLeft;
+    bool has_leading = false;
+  } memory_, before_latch_;
   bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this
   bool passing_refused_ = false;
   std::uint32_t tread_id_ = 0;  // under the foot that landed last

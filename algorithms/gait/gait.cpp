@@ -125,13 +125,14 @@ void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback
   reference.plan_T_sole = plan_T_sole_;
   reference.stands = status_.stands;
   const bool seen = started_ && usable_ && math::all_finite(feedback.dq_radps);
-  // Blind, it feeds forward to where the plan has itself.
+  // Blind, it feeds forward to where the plan has itself, and as fast: at rest it would brake.
+  const Vec3 plan_v_base_mps{torso_state_[0].speed, torso_state_[1].speed, torso_state_[2].speed};
   const JointVector torque_nm =
       seen ? balance_.torques_nm(params_.balance, params_.geometry, reference,
                                  {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad},
                                  feedback, kTick_s)
            : balance_.torques_nm(params_.balance, params_.geometry, reference,
-                                 {plan_T_base_, Vec3::Zero(), Vec3::Zero(), joints_.reference_rad()}, {}, kTick_s);
+                                 {plan_T_base_, plan_v_base_mps, Vec3::Zero(), joints_.reference_rad()}, {}, kTick_s);
   if (seen) dcm_error_m_ = balance_.dcm_error_m();
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const double limit_nm = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg).torque_nm;
@@ -290,6 +291,7 @@ bool Gait::close_to_planned(const StepGoal& goal) const noexcept {
 }
 
 void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexcept {
+  if (stop_requested_ || lost(state)) return begin_hold();
   if (search_.step() == StepSearch::State::kImpossible) {
     if (decision_.goal.kind == StepKind::kPassing) {
       if (!usable_) return;
@@ -302,7 +304,6 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
     const double rise_m = decision_.goal.kind == StepKind::kLeading ? decision_.rise_m : 0.0;
     return end(GaitPhase::kStopped, Obstruction::kLegsCannot, rise_m);
   }
-  if (stop_requested_ || lost(state)) return begin_hold();
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
   if (!usable_) return;
   if (!(dcm_error_m_.norm() <= params_.steady_m)) {

@@ -86,7 +86,7 @@ class Gait {
   void swing(const StateEstimate& state, const JointFeedback& feedback) noexcept;
   void put_back(const JointFeedback& feedback) noexcept;
   [[nodiscard]] Transform beside_path(const Transform& odom_T_sole) const noexcept;
-  void land_soon() noexcept;
+  void land_soon(const StateEstimate& state) noexcept;
   void set_pace() noexcept;
 
   void observe_reference() noexcept;
@@ -151,7 +151,8 @@ class Gait {
   std::int32_t shifts_ = 0;  // since the last swing
   Obstruction waiting_for_ = Obstruction::kNone;
   std::int32_t wait_ticks_ = 0;     // for that reason, without a break
-  std::int32_t touched_ticks_ = 0;  // for which the swing foot has been felt to touch
+  std::int32_t touched_ticks_ = 0;  // for which the swing foot has been felt to touch,
+  std::int64_t felt_stamp_ns_ = 0;  // as told by then
   std::int32_t idle_ticks_ = 0;     // without a step to do since the last swing
   bool usable_ = false;             // this tick's estimate: fresh, and all of it numbers
   bool armed_ = false;

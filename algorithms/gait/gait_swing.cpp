@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The gait's swings: from lift-off to touch-down, or back to where the foot stood.
 #include <algorithm>
+#include <utility>
 
 #include "algorithms/gait/gait.hpp"
 
@@ -26,6 +27,7 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
   step = {.sequence = step.sequence + 1,
           .foot = goal.foot,
           .onto_tread = onto_tread(goal.kind),
+          .height_mapped = onto_tread(goal.kind),
           .latch_stamp_ns = now_ns_,
           .map_stamp_ns = footholds.map_stamp_ns,
           .target = goal.foothold,
@@ -47,12 +49,15 @@ void Gait::lift_off(const StateEstimate& state, const FootholdSet& footholds,
 
 void Gait::swing(const StateEstimate& state, const JointFeedback& feedback) noexcept {
   if (pace_.goes_back()) return put_back(feedback);
-  if (pace_.hurries() && decision_.goal.kind == StepKind::kPassing) land_soon();
+  if (usable_ && pace_.hurries() && decision_.goal.kind == StepKind::kPassing) land_soon(state);
   const Foot foot = decision_.goal.foot;
   const std::size_t i = index_of(foot);
   const bool loaded = feedback.foot_force_n[i] > params_.touch_force_n;
   if (!loaded) unloaded_ = true;
-  touched_ticks_ = loaded ? touched_ticks_ + 1 : 0;
+  // Each sample once: of a bus that falls silent the last one is read on and on.
+  if (std::exchange(felt_stamp_ns_, feedback.stamp_ns) != feedback.stamp_ns) {
+    touched_ticks_ = loaded ? touched_ticks_ + 1 : 0;
+  }
   const bool descending = 2.0 * pace_.tick() > swing_.duration_ticks();
   // What does not go down any more stands on something, whatever its force sensor says.
   const Transform odom_T_sole = swing_.at(pace_.tick());
@@ -118,7 +123,7 @@ void Gait::set_pace() noexcept {
 
 // Of a passing foot, the rest of the way straight to the target, or beside the standing foot while it is still behind
 // it.
-void Gait::land_soon() noexcept {
+void Gait::land_soon(const StateEstimate& state) noexcept {
   StepGoal& goal = decision_.goal;
   const Foot foot = goal.foot;
   const Transform odom_T_plan = correction_.odom_T_plan(plan_T_base_);
@@ -140,9 +145,15 @@ void Gait::land_soon() noexcept {
   if (beside) {
     goal.kind = StepKind::kTrailing;
     goal.target = target;
-    goal.foothold.polygon_id = planner_.tread_id();
+    const Transform world_T_sole = state.world_T_odom * target.transform();
+    goal.foothold = {.position_m = world_T_sole.p_m,
+                     .yaw_rad = yaw_of(world_T_sole.R),
+                     .polygon_id = planner_.tread_id(),
+                     .last_seen_ns = goal.foothold.last_seen_ns};
     planner_.passing_ends_beside(goal);
+    status_.step.target = goal.foothold;
     status_.step.odom_T_target = target.transform();
+    status_.step.height_mapped = false;
   }
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
   StepPlan plan = plan_step(params_.step, goal, soles, search_.plan().tried);
@@ -165,6 +176,7 @@ void Gait::put_back(const JointFeedback& feedback) noexcept {
   if ((loaded && (all_the_way || above_m < params_.put_back_m)) || (all_the_way && above_m < -params_.put_back_m)) {
     status_.stands[i] = true;
     ++status_.put_back;
+    planner_.put_back();
     posture_.restart();
     carry_plan_to_odometry();
     status_.phase = GaitPhase::kDoubleSupport;
