@@ -90,7 +90,7 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
     health_.raise(Limit::kPlanesFull, now_ns, now.plane_overflow - extractor_seen_.plane_overflow);
     extractor_seen_ = now;
     if (params_.estimate_mount) learn_mount();
-    begin_map();
+    begin_map(now_ns);
     stage_ = FrameStage::kWaiting;
   }
   return progress;
@@ -109,7 +109,7 @@ void PerceptionLane::learn_mount() noexcept {
   mount_.update(extractor_.result(), stance);
 }
 
-void PerceptionLane::begin_map() noexcept {
+void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   PolygonMap::View view;
   view.world_T_camera = exposure_state_.world_T_base() * mount_.base_T_camera();
   view.position_sigma_m = exposure_state_.position_sigma_m.maxCoeff();
@@ -120,6 +120,10 @@ void PerceptionLane::begin_map() noexcept {
   view.body_margin = body_margin(params_.body, params_.legs, params_.mount.prior_tilt_sigma_rad);
   map_.begin(extractor_.result(), view);
   mapping_ = true;
+  const PolygonMap::Counters& counters = map_.counters();
+  const std::uint32_t lost = counters.abandoned_frames + counters.stale_frames + counters.rejected_frames;
+  health_.raise(Limit::kFrameLost, now_ns, lost - frames_lost_seen_);
+  frames_lost_seen_ = lost;
 }
 
 Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
@@ -135,7 +139,7 @@ Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
   return progress;
 }
 
-void PerceptionLane::begin_search(std::int64_t now_ns) noexcept {
+void PerceptionLane::begin_search() noexcept {
   (void)link_.search_context.try_take();  // the newest, or the last one again
   const SearchContext& context = link_.search_context.front();
   FootholdSearch::Query query;
@@ -143,15 +147,14 @@ void PerceptionLane::begin_search(std::int64_t now_ns) noexcept {
   for (const Foot foot : {Foot::kLeft, Foot::kRight})
     query.world_T_sole[index_of(foot)] = context.state.world_T_sole(foot);
   query.stance = context.stance;
-  query.now_ns = now_ns;
   query.climbing = context.climbing;
   search_.begin(map_.snapshot(), query);
   search_due_ = false;
   searching_ = true;
 }
 
-Progress PerceptionLane::footholds(std::int64_t now_ns, WorkBudget& budget) noexcept {
-  if (!searching_ && search_due_) begin_search(now_ns);
+Progress PerceptionLane::footholds(std::int64_t, WorkBudget& budget) noexcept {
+  if (!searching_ && search_due_) begin_search();
   if (!searching_) return Progress::kIdle;
   const Progress progress = search_.step(budget);
   if (progress == Progress::kDone) {

@@ -33,9 +33,9 @@ class PerceptionLane {
   enum class FrameStage : std::uint8_t { kWaiting, kPoseAsked, kExtracting };
 
   void begin_extraction(std::int64_t now_ns) noexcept;
-  void begin_map() noexcept;
+  void begin_map(std::int64_t now_ns) noexcept;
   void learn_mount() noexcept;
-  void begin_search(std::int64_t now_ns) noexcept;
+  void begin_search() noexcept;
 
   hal::DepthCamera& camera_port_;
   LaneLink& link_;
@@ -53,7 +53,7 @@ class PerceptionLane {
   std::int64_t last_frame_ns_ = -1;            // taken; from the start until there is one
   std::uint32_t request_ = 0;                  // number of the last pose request
   SurfaceExtractor::Counters extractor_seen_;  // the stages' counters as last reported
-  std::uint32_t map_full_seen_ = 0;
+  std::uint32_t map_full_seen_ = 0, frames_lost_seen_ = 0;
   SurfaceExtractor extractor_;
   MountEstimator mount_;
   PolygonMap map_;

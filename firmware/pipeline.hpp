@@ -51,7 +51,7 @@ class Pipeline {
 // The module's static memory, stage by stage: sizeof(Pipeline), where "other" is what its stages do not account for,
 // the executives and the stacks of both lanes.
 inline constexpr std::size_t kMemoryBudget_bytes = 16U * 1024U * 1024U;
-// Of a lane's thread: what it is to be given. toolchain/checks/stack prints the deepest chain of calls.
+// Of a lane's thread: what it is to be given. toolchain/checks/stack refuses chains of calls of half of it.
 inline constexpr std::size_t kLaneStack_bytes = 64U * 1024U;
 inline constexpr std::size_t kMemoryStages = 10;
 [[nodiscard]] std::array<StageMemory, kMemoryStages> static_memory() noexcept;

@@ -24,7 +24,7 @@ enum class Fault : std::uint8_t {
   kJointCommandRefused,  // the bus would not take a command
   kJointCommandInvalid,  // the module's own command was not finite and was not sent
   kDepthMissing,         // no frame within the camera's time-out
-  kDepthRejected,        // wrong size, out of order, no data
+  kDepthRejected,        // wrong size, out of order, no data, or of a camera that cannot be
   kLioMissing,
   kLioRejected,  // not finite, out of order, or too far from the odometry
   kPoseMissing,  // control did not say in time where a frame was exposed; the frame was given back
@@ -49,6 +49,7 @@ enum class Limit : std::uint8_t {
   kRunsFull,        // runs, intervals and pairs of planes of a frame that found no room
   kHeightRejected,  // a mapped tread's height that disagrees with the sole that landed on it
   kFootPutBack,     // a foot went back in the air to where it had stood
+  kFrameLost,       // a frame whose surfaces never reached the map: the next one came before, or it was not usable
   kEnd,             // not a limit
 };
 
@@ -82,7 +83,7 @@ inline constexpr std::array<std::string_view, kCodeCount<Fault>> kFaultNames{"fr
 inline constexpr std::array<std::string_view, kCodeCount<Limit>> kLimitNames{
     "row_shed",          "row_deferred",    "frame_caught_up", "planes_full",   "map_full",
     "state_ring_missed", "depth_unplaced",  "reach_limited",   "contact_early", "contact_late",
-    "runs_full",         "height_rejected", "foot_put_back"};
+    "runs_full",         "height_rejected", "foot_put_back",   "frame_lost"};
 static_assert(!kFaultNames.back().empty() && !kLimitNames.back().empty(), "a code without a name");
 
 // "unknown" outside the enumeration.

@@ -63,7 +63,8 @@ std::string text(double number) {
 class CameraFile {
  public:
   explicit CameraFile(const std::string& path) : path_(path), parsed_(toml::parse_file(path)) {
-    if (std::filesystem::is_directory(path)) fail("it is a folder");
+    std::error_code none;
+    if (std::filesystem::is_directory(path, none)) fail("it is a folder");
     if (!parsed_) {
       throw FileError("Cannot read the camera file \"" + path + "\": " + std::string(parsed_.error().description()) +
                       ".");

@@ -90,6 +90,9 @@ void CsvTable::refuse_other_dialects(std::string_view line) const {
       throw FileError("\"" + path_ + "\" line 1: the columns are separated by " + name + ", not by commas.");
     }
   }
+  if (trimmed(line).find('\r') != std::string_view::npos) {
+    throw FileError("\"" + path_ + "\": its lines end in CR alone, not in LF or CR LF.");
+  }
   if (line.find('"') != std::string_view::npos) {
     throw FileError("\"" + path_ + "\" line 1: the columns' names stand in quotes, which are not read.");
   }
@@ -121,7 +124,8 @@ double CsvTable::number(std::size_t row, std::size_t column, double limit) const
   if (cell.empty() || end != cell.data() + cell.size() || error == std::errc::invalid_argument) {
     fail(row, name + " is " + (cell.empty() ? "empty" : shown(cell)) + ", not a number");
   }
-  if (error != std::errc{} || !std::isfinite(value)) fail(row, name + " is " + shown(cell) + ", not a finite number");
+  if (error == std::errc::result_out_of_range) fail(row, name + " is " + shown(cell) + ", which no double can hold");
+  if (!std::isfinite(value)) fail(row, name + " is " + shown(cell) + ", not a finite number");
   if (!(std::abs(value) <= limit)) {
     std::ostringstream sentence;
     sentence << name << " is " << value << ", beyond what can be true (" << limit << ")";

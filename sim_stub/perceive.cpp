@@ -36,7 +36,10 @@ Json piece(const Surface& surface) {
 }
 
 void save(const std::string& path, const std::vector<unsigned char>& bytes) {
-  if (lodepng::save_file(bytes, path) != 0) fail("Cannot write \"" + path + "\".");
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) fail("Cannot write \"" + path + "\".");
 }
 
 // Of the normal and d of m = -normal / d, from that of m.

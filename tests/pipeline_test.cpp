@@ -337,6 +337,30 @@ TEST_F(PipelineAmongBoxes, MorePolygonsThanTheMapHolds_IsCounted) {
   EXPECT_GT(count(Limit::kMapFull), 0U);
 }
 
+// Too little time for the map in every frame: pictures are taken and thrown away, and it says so; then it goes on.
+TEST_F(PipelineAmongBoxes, MapShedForLong_LostFramesAreCountedAndControlGoesOn) {
+  constexpr std::uint32_t kMapRow = 7;
+  static_assert(kOneLaneSchedule[kMapRow].task == "map");
+  stand(kInitialised_ticks);
+  show(2, 3, -0.1);
+  const PerceptionLane& perception = module_.pipeline().perception();
+  const std::int64_t mapped_ns = perception.map_snapshot().stamp_ns;
+  for (int frame = 0; frame < 3; ++frame) {
+    feed(2, 3, -0.1);
+    for (int i = 0; i < 100; ++i) {
+      module_.executive().shed_in_next_frame(1U << kMapRow);
+      stand(1);
+    }
+  }
+  EXPECT_EQ(count(Limit::kFrameLost), 2U);  // the third may still come
+  EXPECT_GE(count(Limit::kRowShed), 299U);  // the last one is told a frame later
+  EXPECT_EQ(perception.map_snapshot().stamp_ns, mapped_ns);
+  EXPECT_EQ(joints_.commands().newest().stamp_ns, control().state().stamp_ns);
+  show(2, 3, -0.1);
+  EXPECT_GT(perception.map_snapshot().stamp_ns, mapped_ns);
+  EXPECT_EQ(count(Limit::kFrameLost), 2U);
+}
+
 TEST(PipelineMemory, Stages_SumUpWithinTheBudget) {
   const auto memory = static_memory();
   const std::size_t sum = std::accumulate(memory.begin(), memory.end(), std::size_t{0},

@@ -98,6 +98,13 @@ TEST(ClimbCommand, Camera_IsReadFromItsFile) {
   EXPECT_EQ(c.options->camera->noise.quadratic_per_m, 0.002);
   EXPECT_EQ(c.options->camera_file, path);
   expect_refused({"climb", "--camera", temporary("none.toml")}, "none.toml");
+  expect_refused({"climb", "--camera", std::string(300, 'x') + ".toml"}, "Cannot read");
+  for (const std::string size : {"644x480", "640x482", "1024x768", "63x64"}) {  // more than the module's memory, or odd
+    const std::size_t x = size.find('x');
+    std::ofstream(path) << "width = " << size.substr(0, x) << "\nheight = " << size.substr(x + 1)
+                        << "\nfx = 365\nfy = 365\ncx = 256\ncy = 212\ndepth_unit_m = 0.001\n";
+    expect_refused({"climb", "--camera", path}, "not " + size);
+  }
 }
 
 TEST(ClimbCommand, NoOptions_RunsWithTheDefaults) {
@@ -202,6 +209,7 @@ TEST(ClimbCommand, BadWord_IsRefused) {
   expect_refused({"climb", "climb"}, "not expected: climb");
   expect_refused({"climb", "--steps", "3", "--steps", "4"}, "--steps");
   expect_refused({"climb", "--render-shift", "", "", ""}, "--render-shift");
+  EXPECT_EQ(call({"climb", "--render-shift", "-.01", "0", ".02"}).options->render_dx_m, -0.01);
   expect_refused({"--bogus"}, "--bogus");
   expect_refused({"dance"}, "dance");
   expect_refused({}, "subcommand");

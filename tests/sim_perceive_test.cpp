@@ -141,6 +141,14 @@ TEST_F(PerceiveCommand, FilesThatAreNone_AreNamedInOneSentence) {
                  "overwritten");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--gravity", "nan", "0", "1"}, "--gravity");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--repeat", "0"}, "--repeat");
+  expect_refused({"perceive", at("good.png"), "--camera", camera, "--json", ""}, "--json");
+  expect_refused({"perceive"}, "DEPTH.png");
+  for (const std::string output : {"--labels", "--json", "--picture"}) {
+    expect_refused({"perceive", at("good.png"), "--camera", camera, output, "/dev/full"}, "/dev/full");
+  }
+  const std::string here = std::filesystem::relative(at("new")).string();  // one file by two names
+  expect_refused({"perceive", at("good.png"), "--camera", camera, "--json", here, "--labels", at("new")},
+                 "overwritten");
 }
 
 TEST_F(PerceiveCommand, OneBadPictureAmongGoodOnes_IsNamedAndTheOthersAreWritten) {

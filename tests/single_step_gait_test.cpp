@@ -199,7 +199,8 @@ TEST(SingleStepGait, ToppledOnTheWay_LandsBesideTheFrontFootAndTakesNoHeightForN
   EXPECT_TRUE(climb.status().step.height_mapped);
   climb.run(60.0);
   EXPECT_EQ(climb.status().put_back, 0U);
-  // It lands as far out as it may: from there the next shift asks more of the ankle than a plan takes, by a milliradian.
+  // It lands as far out as it may: from there the next shift asks more of the ankle than a plan takes, by a
+  // milliradian.
   EXPECT_EQ(climb.status().stop_reason, Obstruction::kLegsCannot);
   EXPECT_EQ(treads_of(climb), (std::vector<int>{1, 2, 2}));
   EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);

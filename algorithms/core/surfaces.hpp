@@ -60,10 +60,9 @@ struct SurfaceFrame {
 // One remembered surface, world frame.
 struct MapPolygon {
   SurfacePatch surface;
-  std::uint32_t id = 0;            // never reused
-  std::uint32_t sightings = 0;     // frames fused
-  std::int64_t first_seen_ns = 0;  // exposure stamps
-  std::int64_t last_seen_ns = 0;
+  std::uint32_t id = 0;           // never reused
+  std::uint32_t sightings = 0;    // frames fused
+  std::int64_t last_seen_ns = 0;  // exposure stamp
 };
 using MapPolygons = StaticVector<MapPolygon, kMaxMapPolygons>;
 

@@ -413,9 +413,6 @@ void FootholdSearch::finish() noexcept {
         judge_tread(levels_[next_next_], levels_[next_].height_m, pending_.p_star.position_m.head<2>(),
                     params_.step_max_m, pending_.p_star_star_feet) == Obstruction::kNone;
   }
-  if (map_.stamp_ns != 0 && query_.now_ns - map_.stamp_ns > params_.stale_after_ns) {
-    pending_.obstruction = Obstruction::kMapStale;
-  }
   result_ = moved(pending_, map_.drift_m);
   ++counters_.searches;
 }

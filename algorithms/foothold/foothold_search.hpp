@@ -43,14 +43,12 @@ class FootholdSearch {
     double top_half_width_m = 0.15;
     double top_fraction = 0.5;
     std::uint32_t confirmed_sightings = 5;
-    std::int64_t stale_after_ns = 500 * kNsPerMs;
   };
   struct Query {
     Transform world_T_base;
     std::array<Transform, kFootCount> world_T_sole;
     Foot stance = Foot::kLeft;  // the foot that stays
-    std::int64_t now_ns = 0;
-    bool climbing = false;  // a tread has been climbed already
+    bool climbing = false;      // a tread has been climbed already
   };
   struct Counters {
     std::uint32_t searches = 0;

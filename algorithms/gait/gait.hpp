@@ -69,7 +69,7 @@ class Gait {
             const JointFeedback& feedback, JointCommand& command) noexcept;
   [[nodiscard]] const GaitStatus& status() const noexcept { return status_; }
   [[nodiscard]] const Balance& balance() const noexcept { return balance_; }
-  // Finishes the committed step, then holds in double support.
+  // Finishes the committed step, then holds in double support. From the thread of tick().
   void request_stop() noexcept { stop_requested_ = true; }
 
  private:

@@ -82,7 +82,6 @@ struct MapTrack {
   std::uint32_t sightings = 0;
   std::uint32_t misses = 0;
   std::uint32_t outliers = 0;  // consecutive sightings of its plane elsewhere
-  std::int64_t first_seen_ns = 0;
   std::int64_t last_seen_ns = 0;
   Viewpoint seen_from;
   Transform world_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up

@@ -60,7 +60,6 @@ void PolygonMap::write(const MapTrack& track, MapPolygon& out) const noexcept {
   }
   out.id = track.id;
   out.sightings = track.sightings;
-  out.first_seen_ns = track.first_seen_ns;
   out.last_seen_ns = track.last_seen_ns;
 }
 

@@ -52,7 +52,7 @@ void PolygonMap::create() noexcept {
   track.id = next_id_++;
   track.kind = seen_.kind;
   track.sightings = 1;
-  track.first_seen_ns = track.last_seen_ns = newest_ns_;
+  track.last_seen_ns = newest_ns_;
   track.seen_from = viewpoint();
   const Vec3 normal = seen_.plane.normal;
   const Vec3 level = Vec3::UnitZ().cross(normal);  // horizontal; x of an upright surface, so that y is up
@@ -169,7 +169,6 @@ void PolygonMap::merge(MapTrack& into, MapTrack& from) noexcept {
     }
   }
   into.sightings = std::max(into.sightings, from.sightings);
-  into.first_seen_ns = std::min(into.first_seen_ns, from.first_seen_ns);
   from.dead = true;
   ++counters_.merged;
 }

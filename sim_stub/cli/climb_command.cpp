@@ -77,12 +77,14 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       .add_option("--contacts", a.contacts,
                   "Foot forces: sensed, or, on the kinematic plant, inferred from joint torques")
       ->capture_default_str();
-  climb.add_option("--push", a.pushes, "Pushes of the torso, over 0.1 s: when, s; along x or y; how much, N s")
+  climb
+      .add_option("--push", a.pushes,
+                  "Pushes of the torso, over 0.1 s: when, s; along x (up the stairs) or y (to the left); how much, N s")
       ->expected(1, 16)
       ->type_name("\"T,AXIS,NS\"");
   climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
 
-  climb.add_option("--camera", a.camera, "The robot's camera; the module is told its noise and range")
+  climb.add_option("--camera", a.camera, "The robot's camera, 640x480 at most; the module is told what the file says")
       ->type_name("CAMERA.toml");
   climb
       .add_option("--scan-ms", a.options.scan_ms,
@@ -111,7 +113,6 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_flag("--no-mount-estimate", a.no_mount_estimate, "The module believes the mount's data sheet")
       ->group(causality);
   climb.add_flag("--no-self-filter", a.no_self_filter, "The module does not mask its own legs")->group(causality);
-  for (CLI::Option* option : climb.get_options()) option->check(not_empty);
 }
 
 std::string number(double value) {
@@ -214,6 +215,12 @@ std::string complaint(ClimbArguments& a) {
     } catch (const FileError& error) {
       return error.what();
     }
+    const CameraIntrinsics& k = a.options.camera->intrinsics;
+    if (k.width_px > kDepthWidth_px || k.height_px > kDepthHeight_px || k.width_px % 2 != 0 || k.height_px % 2 != 0) {
+      return "Camera file \"" + a.camera + "\": the robot's camera is at most " + std::to_string(kDepthWidth_px) + "x" +
+             std::to_string(kDepthHeight_px) + ", width and height even, not " + std::to_string(k.width_px) + "x" +
+             std::to_string(k.height_px) + ".";
+    }
   }
   if (a.missing_step) {
     if (*a.missing_step < 1 || *a.missing_step > stairs.steps) {
@@ -294,12 +301,19 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   a.options.out_dir = "climb_out";
   declare(*climb, a);
   PerceiveArguments perceive_arguments;
-  const CLI::App* perceive = declare_perceive(app, perceive_arguments);
+  CLI::App* perceive = declare_perceive(app, perceive_arguments);
   EstimateArguments estimate_arguments;
-  const CLI::App* estimate = declare_estimate(app, estimate_arguments);
+  CLI::App* estimate = declare_estimate(app, estimate_arguments);
+  for (CLI::App* command : {climb, perceive, estimate}) {
+    for (CLI::Option* option : command->get_options()) option->check(not_empty);
+  }
 
   try {
-    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 wants the last one first
+    std::vector<std::string> last_first(arguments.rbegin(), arguments.rend());  // as CLI11 wants them
+    for (std::string& word : last_first) {                                      // and -.9 is an option to it
+      if (word.size() > 2 && word[0] == '-' && word[1] == '.' && word[2] >= '0' && word[2] <= '9') word.insert(1, "0");
+    }
+    app.parse(std::move(last_first));
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {

@@ -4,12 +4,12 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <ostream>
 #include <set>
 
 #include "sim_stub/camera_profile.hpp"
 #include "sim_stub/cli/climb_command.hpp"
+#include "sim_stub/cli/paths.hpp"
 #include "sim_stub/estimate_report.hpp"
 
 namespace polygmap::sim {
@@ -21,8 +21,7 @@ std::string complaint(const EstimateArguments& a) {
   std::set<std::string> taken;  // nothing that is read, and nothing written for another option, is overwritten
   for (const std::string& file : {a.log, a.lio, a.json, a.csv}) {
     if (file.empty()) continue;
-    std::error_code error;
-    const bool fresh = taken.insert(std::filesystem::weakly_canonical(file, error).string()).second;
+    const bool fresh = taken.insert(one_name(file)).second;
     if (!fresh && (file == a.json || file == a.csv)) return "\"" + file + "\" would be overwritten.";
   }
   for (std::size_t i = 0; i < a.lidar_mount.size(); ++i) {
@@ -72,7 +71,7 @@ void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
   }
   if (replay.imu_invalid > 0) {
     out << replay.imu_invalid
-        << " rows of the IMU are beyond what the module takes for true (rad/s? m/s^2?): not felt.\n";
+        << " rows have an IMU beyond what can be true and were left out: are its units rad/s and m/s^2?\n";
   }
   if (!log.has_truth) {
     out << "No truth columns: nothing is scored.\n";
@@ -93,12 +92,12 @@ void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
 CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
   CLI::App* estimate = app.add_subcommand("estimate", "Run the state estimation on a recorded log");
   estimate
-      ->add_option("log", a.log,
+      ->add_option("LOG.csv", a.log,
                    "t_s, gyro_{x,y,z}_radps, accel_{x,y,z}_mps2, {left,right}_contact (0 to 1), "
                    "{left,right}_foot_{x,y,z}_m (base frame); optional truth: truth_p{x,y,z}_m, truth_v{x,y,z}_mps, "
                    "truth_q{w,x,y,z}; the first row of it is the initial state, the rest is scored only")
       ->required()
-      ->type_name("LOG.csv");
+      ->type_name("");
   estimate
       ->add_option("--lio", a.lio,
                    "stamp_s, arrival_s, p{x,y,z}_m, q{w,x,y,z}: the base in the lidar odometry's own world, as it "

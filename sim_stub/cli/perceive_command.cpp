@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "sim_stub/cli/climb_command.hpp"
+#include "sim_stub/cli/paths.hpp"
 #include "sim_stub/perceive.hpp"
 
 namespace polygmap::sim {
@@ -26,11 +27,6 @@ std::string place(const std::string& out, const std::string& depth, bool several
   return (std::filesystem::path(out) / (std::filesystem::path(depth).stem().string() + suffix)).string();
 }
 
-std::string absolute(const std::string& path) {
-  std::error_code error;
-  return std::filesystem::weakly_canonical(path, error).string();
-}
-
 std::string complaint(const PerceiveArguments& a) {
   if (a.repeat < 1 || a.repeat > kMaxRepeat) return "--repeat must be from 1 to " + std::to_string(kMaxRepeat) + ".";
   if (a.depth.size() > 1 && !(a.labels + a.json + a.picture).empty()) {
@@ -42,15 +38,15 @@ std::string complaint(const PerceiveArguments& a) {
     }
   }
   // Nothing that is read, and nothing written for another option, is overwritten.
-  std::set<std::string> taken{absolute(a.camera)};
-  for (const std::string& path : a.depth) taken.insert(absolute(path));
+  std::set<std::string> taken{one_name(a.camera)};
+  for (const std::string& path : a.depth) taken.insert(one_name(path));
   for (const std::string& path : a.depth) {
     const std::array<std::pair<std::string, const char*>, 3> outputs{
         {{a.labels, kLabels}, {a.json, kPlanes}, {a.picture, kPicture}}};
     for (const auto& [out, suffix] : outputs) {
       if (out.empty()) continue;
       const std::string file = place(out, path, a.depth.size() > 1, suffix);
-      if (!taken.insert(absolute(file)).second) return "\"" + file + "\" would be overwritten.";
+      if (!taken.insert(one_name(file)).second) return "\"" + file + "\" would be overwritten.";
     }
   }
   if (a.gravity.empty()) return {};
@@ -95,7 +91,7 @@ std::string one_picture(const PerceiveArguments& a, const CameraProfile& camera,
 
 CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
   CLI::App* perceive = app.add_subcommand("perceive", "Find the planes in depth pictures (PNG, 16 bits)");
-  perceive->add_option("depth", a.depth, "Depth pictures")->required()->type_name("DEPTH.png");
+  perceive->add_option("DEPTH.png", a.depth, "Depth pictures")->required()->type_name("");
   perceive
       ->add_option(
           "--camera", a.camera,
@@ -115,7 +111,7 @@ CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
   perceive->add_option("--json", a.json, "The planes" + folder)->type_name("OUT.json");
   perceive->add_option("--picture", a.picture, "Planes, polygons and nosings over the depth" + folder)
       ->type_name("OUT.png");
-  perceive->add_option("--repeat", a.repeat, "Extract as often, and say how long it took")->type_name("N");
+  perceive->add_option("--repeat", a.repeat, "Extract N times, for the median and the longest time")->type_name("N");
   return perceive;
 }
 

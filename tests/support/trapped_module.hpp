@@ -27,6 +27,7 @@ class TrappedModule {
     const heap::ModuleCall call("CyclicExecutive::tick");
     memory_->executive->tick(clock_.now_ns());
   }
+  [[nodiscard]] Executive& executive() { return *memory_->executive; }
   [[nodiscard]] Pipeline& pipeline() { return *memory_->pipeline; }
   [[nodiscard]] const Pipeline& pipeline() const { return *memory_->pipeline; }
 
