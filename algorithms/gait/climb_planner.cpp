@@ -60,7 +60,8 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
   goal.foot = other(memory_.leading);
   // The search looks from the foot that stands and soon offers the tread above: then the memory holds.
   const Foothold& seen = footholds.p_star_feet[index_of(goal.foot)];
-  const bool same_tread = footholds.has_p_star && seen.polygon_id == memory_.trailing_foothold.polygon_id && usable(seen);
+  const bool same_tread =
+      footholds.has_p_star && seen.polygon_id == memory_.trailing_foothold.polygon_id && usable(seen);
   goal.foothold = same_tread ? seen : memory_.trailing_foothold;
   goal.target = in_odom(situation.world_T_odom, goal.foothold);
   return decision;

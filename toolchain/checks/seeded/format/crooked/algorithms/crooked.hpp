@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
 // expect: clang-formatted
 #pragma once
-inline int crooked( int a ) noexcept
-{
-        return a ;}
+inline int crooked(int a) noexcept { return a; }
