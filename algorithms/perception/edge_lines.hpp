@@ -33,7 +33,7 @@ class EdgeLineFinder {
     double face_m = 0.006;          // an overhang's front face stands out from the riser by more than this ...
     double face_max_m = 0.08;       // ... and less than this
     double slow_error_m = 0.0012;   // of a segment's change-point, shared by its columns
-    double least_local_m = 0.0003;  // error of where the planes meet locally, however well its columns agree
+    double least_local_m = 0.0004;  // error of where the planes meet locally, however well its columns agree
   };
   enum class Outcome : std::uint8_t { kFound, kAgain, kFewColumns, kNoLine, kNotStraight, kShort };
 
