@@ -56,7 +56,7 @@ struct Bench {
       finder->add_guess(static_cast<std::int32_t>(c) / kColumn_px, static_cast<std::int32_t>(r + error_px));
     }
   }
-  EdgeLineFinder::Outcome find(const InversePlane* other, bool nosing, EdgeLine& line) {
+  EdgeLineFinder::Outcome find(const InversePlane* other, bool nosing, EdgeLine& line, double variance = 1e-6) {
     RawRange range;
     range.set({}, scene.intrinsics.depth_unit_m);
     for (std::int32_t r = 0; r < 480; ++r) {
@@ -64,8 +64,10 @@ struct Bench {
                         columns->valid.row(r));
     }
     if (!finder->try_guess({}, 1)) return EdgeLineFinder::Outcome::kNoLine;
-    const EdgeLineFinder::Beyond beyond{other != nullptr ? *other : InversePlane{}, 1e-6 * Mat3::Identity()};
-    finder->begin({}, {}, scene.intrinsics, rays, *columns, tread(), other != nullptr ? &beyond : nullptr, nosing);
+    const Mat3 covariance = variance * Mat3::Identity();
+    const EdgeLineFinder::Measured surface{tread(), covariance};
+    const EdgeLineFinder::Measured beyond{other != nullptr ? *other : InversePlane{}, covariance};
+    finder->begin({}, {}, scene.intrinsics, rays, *columns, surface, other != nullptr ? &beyond : nullptr, nosing);
     EdgeLineFinder::Outcome outcome = EdgeLineFinder::Outcome::kAgain;
     for (int pass = 0; pass < 2 && outcome == EdgeLineFinder::Outcome::kAgain; ++pass) {
       while (!finder->step(48)) {
@@ -103,6 +105,21 @@ TEST_P(NosingNoise, EdgeLine_NosingAndBackLine_WithinThreePointOneMillimetres) {
   }
 }
 INSTANTIATE_TEST_SUITE_P(WhiteAndCorrelated, NosingNoise, ::testing::Bool());
+
+// A camera's slow errors put a plane's best fit where its pixels beside the edge are not.
+TEST(EdgeLine, RiserFittedAside_PixelsBesideTheEdgeSayWhereItIs) {
+  Bench bench(0.0);
+  for (std::uint32_t seed = 1; seed <= 3; ++seed) {
+    bench.draw({.correlated = false}, seed);
+    for (const double aside_m : {-0.001, 0.001}) {
+      const InversePlane below = bench.plane(-Vec3::UnitX(), {bench.stairs.first_riser_x_m + aside_m, 0, 0});
+      EdgeLine line;
+      bench.guess(bench.stairs.first_riser_x_m, bench.stairs.rise_m, 2.0);
+      ASSERT_EQ(bench.find(&below, true, line, 1e-5), EdgeLineFinder::Outcome::kFound);
+      EXPECT_LT(bench.error_m(line, bench.stairs.first_riser_x_m), 0.0008) << seed << " " << aside_m;
+    }
+  }
+}
 
 TEST(EdgeLine, NoPlaneBeyond_DepthJumpIsFound) {
   // Without the riser in front, the floor shows below the slab's edge.

@@ -30,9 +30,10 @@ class EdgeLineFinder {
     double agree_m = 0.003;
     double agree_max_m = 0.008;
     double agree_px = 0.3;
-    double face_m = 0.006;         // an overhang's front face stands out from the riser by more than this ...
-    double face_max_m = 0.08;      // ... and less than this
-    double slow_error_m = 0.0012;  // of a segment's change-point, shared by its columns
+    double face_m = 0.006;          // an overhang's front face stands out from the riser by more than this ...
+    double face_max_m = 0.08;       // ... and less than this
+    double slow_error_m = 0.0012;   // of a segment's change-point, shared by its columns
+    double least_local_m = 0.0004;  // error of where the planes meet locally, however well its columns agree
   };
   enum class Outcome : std::uint8_t { kFound, kAgain, kFewColumns, kNoLine, kNotStraight, kShort };
 
@@ -42,15 +43,14 @@ class EdgeLineFinder {
   // A line through most of the guesses; false when there is none.
   [[nodiscard]] bool try_guess(const Params& params, std::uint32_t seed) noexcept;
 
-  // The plane beyond an edge and the covariance of its m.
-  struct Beyond {
+  struct Measured {
     InversePlane plane;
-    Mat3 covariance = Mat3::Zero();
+    Mat3 covariance = Mat3::Zero();  // of its m
   };
   // surface_above: the surface lies above its boundary in the picture (a nosing), else below it (a back line). other:
   // the plane on the far side; null when that is not known, then only leaving the surface's plane counts.
   void begin(const Params& params, const DepthSigma& noise, const CameraIntrinsics& intrinsics, const ColumnRays& rays,
-             const ColumnImage& image, const InversePlane& surface, const Beyond* other, bool surface_above) noexcept;
+             const ColumnImage& image, const Measured& own, const Measured* other, bool surface_above) noexcept;
   // Searches the next columns; true when all are done. At most max_columns columns, a multiple of kLanes.
   bool step(std::int32_t max_columns) noexcept;
   // kAgain: the tread overhangs the riser with a face of its own; step() once more, against that face.
@@ -91,6 +91,18 @@ class EdgeLineFinder {
   // How far the first pixels past the change-point stand out from the other plane; false when there are too few.
   [[nodiscard]] bool try_face_offset(double& offset_m) const noexcept;
   [[nodiscard]] double pixel_m(double along_m, double across_m) const noexcept;
+  // Where across the surface the picture's row is that many below the one of (along, across).
+  [[nodiscard]] double below_m(double along_m, double across_m, double rows) const noexcept;
+  // By how many rows the planes meet below where they meet as a whole, as the few rows on both sides say: what a slow
+  // error of the camera adds to both planes' pixels at the edge does not move it there, but each plane's fit.
+  struct Shift {
+    double start_px = 0.0, at_px = 0.0, per_column = 0.0;  // at_px at start_px
+    double sigma_px = 0.0;                                 // at the line's ends
+    [[nodiscard]] double at(double column_px) const noexcept {
+      return at_px + per_column * (column_px - start_px) / kColumn_px;
+    }
+  };
+  [[nodiscard]] bool try_local_shift(Shift& shift) const noexcept;
   [[nodiscard]] bool try_segment_point(const Segment& segment, Vec2& point_m) const noexcept;
 
   std::array<Guess, kColumns> guess_{};
@@ -108,6 +120,7 @@ class EdgeLineFinder {
   InversePlane surface_;
   InversePlane other_;
   Mat3 other_covariance_ = Mat3::Zero();
+  Mat3 both_covariance_ = Mat3::Zero();  // of the difference of both planes' m
   bool other_known_ = false;
   bool surface_above_ = true;
   std::int32_t next_column_ = 0;

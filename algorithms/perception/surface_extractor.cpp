@@ -344,8 +344,9 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
     ++counters_.rejected_lines;
     return false;
   }
-  const EdgeLineFinder::Beyond far_side{planes_[other].plane, planes_[other].covariance};
-  line_finder_.begin(params_.edge_lines, noise_, view_.intrinsics, picture_.column_rays, picture_.columns, own.plane,
+  const EdgeLineFinder::Measured near_side{own.plane, own.covariance};
+  const EdgeLineFinder::Measured far_side{planes_[other].plane, planes_[other].covariance};
+  line_finder_.begin(params_.edge_lines, noise_, view_.intrinsics, picture_.column_rays, picture_.columns, near_side,
                      &far_side, nosing);
   if (!nosing && riser == 0) {
     lines_.occluder = line_finder_.guessed_line();
