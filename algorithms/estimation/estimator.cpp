@@ -156,6 +156,12 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
   has_joints_ = new_joints_ = true;
 }
 
+void Estimator::to_encoders(JointCommand& command) const noexcept {
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    command.joints[n].q_rad += encoders_.offset_rad()[static_cast<Eigen::Index>(n)];
+  }
+}
+
 void Estimator::take_joints(const std::array<bool, kFootCount>& planned_stance) noexcept {
   contacts_.update(joints_.foot_force_n, planned_stance, joints_.stamp_ns);
   for (std::size_t i = 0; i < kFootCount; ++i) {

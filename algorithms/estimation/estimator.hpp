@@ -67,8 +67,9 @@ class Estimator {
   // has_joints() is false before the first.
   [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
   [[nodiscard]] bool has_joints() const noexcept { return has_joints_; }
-  // A drive that is to take an angle of joints() or of the state has to be told this much more.
   [[nodiscard]] const JointVector& encoder_offset_rad() const noexcept { return encoders_.offset_rad(); }
+  // A command in angles of joints() or of the state, to what the drives' encoders will read.
+  void to_encoders(JointCommand& command) const noexcept;
   [[nodiscard]] std::int64_t newest_imu_ns() const noexcept { return imu_.stamp_ns; }  // accepted; 0: none yet
   // The state at a stamp of the last half second. False, and out untouched, outside, before initialisation, and where a
   // sensor was silent for longer than max_step_s.

@@ -46,9 +46,7 @@ class PhysicalClimb {
       if (tamper_footholds) tamper_footholds(footholds_);
     }
     gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
-    for (std::size_t n = 0; n < kJointCount; ++n) {
-      command_.joints[n].q_rad += estimator_.encoder_offset_rad()[static_cast<Eigen::Index>(n)];
-    }
+    estimator_.to_encoders(command_);
     (void)robot_.try_write(command_);
     const GaitPhase phase = gait_.status().phase;
     return phase != GaitPhase::kFinished && phase != GaitPhase::kStopped && !robot_.truth().fell;
