@@ -19,6 +19,7 @@ using Contacts = std::array<FootContact, kFootCount>;
 struct StandingRobot {
   JointVector true_q_rad = JointVector::Zero();
   JointVector offset_rad = JointVector::Zero();  // reading minus true angle
+  JointVector torque_nm = JointVector::Zero();
 
   explicit StandingRobot(double base_pitch_rad = 0.0) {
     const Transform base_T_true{rotation_y(base_pitch_rad).transpose(), Vec3::Zero()};
@@ -43,7 +44,7 @@ struct StandingRobot {
     for (double t_s = 0.0; t_s < time_s; t_s += kTick_s) {
       JointVector q_rad = true_q_rad + offset_rad - encoders.offset_rad();
       for (double& q : q_rad) q += noise_rad * normal(random);
-      encoders.update(measured(q_rad), contacts, kTick_s);
+      encoders.update(measured(q_rad), contacts, torque_nm, kTick_s);
     }
   }
 };
@@ -125,7 +126,8 @@ TEST(EncoderOffsets, FootStandsOnAnEdge_IsBoundedAndSlow) {
   JointVector before_rad = encoders.offset_rad();
   double fastest_radps = 0.0;
   for (int i = 0; i < 3000; ++i) {
-    encoders.update(StandingRobot::measured(robot.true_q_rad + robot.offset_rad - before_rad), both_stand(), kTick_s);
+    encoders.update(StandingRobot::measured(robot.true_q_rad + robot.offset_rad - before_rad), both_stand(),
+                    robot.torque_nm, kTick_s);
     fastest_radps = std::max(fastest_radps, (encoders.offset_rad() - before_rad).cwiseAbs().maxCoeff() / kTick_s);
     before_rad = encoders.offset_rad();
   }
@@ -152,7 +154,7 @@ TEST(EncoderOffsets, GroundIsNotLevelAlike_SigmaSaysSo) {
       robot.offset_rad[kAnklePitch] += params.level_noise_radprs * normal(random);
       for (int i = 0; i < 500; ++i) {
         encoders.update(StandingRobot::measured(robot.true_q_rad + robot.offset_rad - encoders.offset_rad()),
-                        both_stand(), kTick_s);
+                        both_stand(), robot.torque_nm, kTick_s);
       }
     }
     const auto pitch_rad = [](const JointVector& q, int leg) {
@@ -164,6 +166,39 @@ TEST(EncoderOffsets, GroundIsNotLevelAlike_SigmaSaysSo) {
   }
   EXPECT_GT(squares, 0.5);
   EXPECT_LT(squares, 1.6);
+}
+
+// An ankle that leans on the inner edge of its sole tilts it with the ground.
+TEST(EncoderOffsets, AnklesLeanInwards_IsTheGroundsGiveAndNoOffset) {
+  const EncoderOffsets::Params params;
+  StandingRobot robot;
+  constexpr double kLean_nm = 6.0;
+  robot.torque_nm[kAnkleRoll] = kLean_nm;
+  robot.torque_nm[kJointsPerLeg + kAnkleRoll] = -kLean_nm;
+  robot.true_q_rad[kAnkleRoll] += params.give_radpnm * kLean_nm;
+  robot.true_q_rad[kJointsPerLeg + kAnkleRoll] -= params.give_radpnm * kLean_nm;
+  EncoderOffsets encoders = fresh();
+  robot.stand(encoders, 2.0, both_stand());
+  EXPECT_LT(encoders.offset_rad().cwiseAbs().maxCoeff(), 5e-5);
+  // Drives that tell no torque: a fourth of the tilt is taken for each joint's.
+  robot.torque_nm.setConstant(std::nan(""));
+  EncoderOffsets blind = fresh();
+  robot.stand(blind, 2.0, both_stand());
+  EXPECT_NEAR(blind.offset_rad()[kHipRoll], 0.5 * params.give_radpnm * kLean_nm, 1e-4);
+}
+
+// Later ground may give more: what the first seconds told is kept.
+TEST(EncoderOffsets, EnoughIsKnown_NothingIsLearntAnyMore) {
+  StandingRobot robot;
+  robot.offset_rad[kHipRoll] = 2e-3;
+  EncoderOffsets encoders = fresh();
+  robot.stand(encoders, 3.0, both_stand());
+  const JointVector before_rad = encoders.offset_rad();
+  EXPECT_LE(encoders.apart_sigma_rad().maxCoeff(), EncoderOffsets::Params{}.enough_sigma_rad);
+  EXPECT_NEAR(before_rad[kHipRoll], 0.5e-3, 5e-5);
+  robot.true_q_rad[kAnkleRoll] += 0.01;
+  robot.stand(encoders, 3.0, both_stand());
+  EXPECT_EQ(encoders.offset_rad(), before_rad);
 }
 
 // The estimator's own angles are the corrected ones; a drive is told what its encoder will read.

@@ -2,6 +2,7 @@
 #include "algorithms/estimation/encoder_offsets.hpp"
 
 #include <Eigen/Geometry>
+#include <cmath>
 
 namespace polygmap {
 namespace {
@@ -21,7 +22,8 @@ void EncoderOffsets::reset(const Params& params) noexcept {
 }
 
 void EncoderOffsets::update(const std::array<LegMeasurement, kFootCount>& legs,
-                            const std::array<FootContact, kFootCount>& contacts, double dt_s) noexcept {
+                            const std::array<FootContact, kFootCount>& contacts, const JointVector& torque_nm,
+                            double dt_s) noexcept {
   if (!(contacts[kLeft].probability >= 1.0 && contacts[kRight].probability >= 1.0)) {
     stood_s_ = 0.0;
     return;
@@ -33,11 +35,14 @@ void EncoderOffsets::update(const std::array<LegMeasurement, kFootCount>& legs,
     return axis == 0 ? offset_rad_[kHipRoll] * kRollJoints.size() : offset_rad_[kHipPitch] * kPitchJoints.size();
   };
   // The turn from the right sole's normal to the left one's; what is taken off already was there too.
-  const Vec3 turn = legs[kRight].base_T_sole.R.col(2).cross(legs[kLeft].base_T_sole.R.col(2));
+  Vec3 turn = legs[kRight].base_T_sole.R.col(2).cross(legs[kLeft].base_T_sole.R.col(2));
+  const double leaning_nm = torque_nm[kAnkleRoll] - torque_nm[kJointsPerLeg + kAnkleRoll];
+  if (std::isfinite(leaning_nm)) turn.x() -= params_.give_radpnm * leaning_nm;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
     const double seen_rad = turn[a] + kFootCount * share_of(axis);
     double& variance_rad2 = apart_variance_rad2_[a];
+    if (variance_rad2 < math::square(params_.enough_sigma_rad)) continue;
     const double gain = variance_rad2 / (variance_rad2 + math::square(params_.level_noise_radprs) / dt_s);
     apart_rad_[a] += gain * (seen_rad - apart_rad_[a]);
     variance_rad2 *= 1.0 - gain;

@@ -174,7 +174,7 @@ void Estimator::take_joints(const std::array<bool, kFootCount>& planned_stance) 
     ground_.touch_downs[i].now = contact.landed && ring_.try_at(contact.touch_ns, then);
     if (ground_.touch_downs[i].now) ground_.touch_downs[i].odom_T_sole = then.odom_T_sole[i];
   }
-  encoders_.update(legs_, contacts_.feet(), std::min(joints_dt_s_, params_.max_step_s));
+  encoders_.update(legs_, contacts_.feet(), joints_.tau_nm, std::min(joints_dt_s_, params_.max_step_s));
 }
 
 void Estimator::calibrate() noexcept {
