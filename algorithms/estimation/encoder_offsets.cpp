@@ -31,21 +31,18 @@ void EncoderOffsets::update(const std::array<LegMeasurement, kFootCount>& legs,
   stood_s_ += dt_s;
   if (stood_s_ < params_.settle_s || !(dt_s > 0.0)) return;
 
-  const auto share_of = [this](std::size_t axis) -> double {
-    return axis == 0 ? offset_rad_[kHipRoll] * kRollJoints.size() : offset_rad_[kHipPitch] * kPitchJoints.size();
-  };
-  // The turn from the right sole's normal to the left one's; what is taken off already was there too.
-  Vec3 turn = legs[kRight].base_T_sole.R.col(2).cross(legs[kLeft].base_T_sole.R.col(2));
-  const double leaning_nm = torque_nm[kAnkleRoll] - torque_nm[kJointsPerLeg + kAnkleRoll];
-  if (std::isfinite(leaning_nm)) turn.x() -= params_.give_radpnm * leaning_nm;
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    const auto a = static_cast<Eigen::Index>(axis);
-    const double seen_rad = turn[a] + kFootCount * share_of(axis);
-    double& variance_rad2 = apart_variance_rad2_[a];
-    if (variance_rad2 < math::square(params_.enough_sigma_rad)) continue;
-    const double gain = variance_rad2 / (variance_rad2 + math::square(params_.level_noise_radprs) / dt_s);
-    apart_rad_[a] += gain * (seen_rad - apart_rad_[a]);
-    variance_rad2 *= 1.0 - gain;
+  if (apart_sigma_rad().maxCoeff() > params_.enough_sigma_rad) {
+    // The turn from the right sole's normal to the left one's.
+    Vec2 turn_rad = legs[kRight].base_T_sole.R.col(2).cross(legs[kLeft].base_T_sole.R.col(2)).head<2>();
+    const double leaning_nm = torque_nm[kAnkleRoll] - torque_nm[kJointsPerLeg + kAnkleRoll];
+    if (std::isfinite(leaning_nm)) turn_rad.x() -= params_.give_radpnm * leaning_nm;
+    const double noise_rad2 = math::square(params_.level_noise_radprs) / dt_s;
+    for (int axis = 0; axis < 2; ++axis) {
+      const double gain = apart_variance_rad2_[axis] / (apart_variance_rad2_[axis] + noise_rad2);
+      apart_rad_[axis] += gain * (turn_rad[axis] - apart_rad_[axis]);
+      apart_variance_rad2_[axis] *= 1.0 - gain;
+    }
+    return;
   }
 
   const double step_rad = params_.slew_radps * dt_s;

@@ -15,20 +15,21 @@ namespace polygmap {
 class EncoderOffsets {
  public:
   struct Params {
-    double encoder_sigma_rad = 2e-3;   // of one joint, from its data sheet
-    double level_noise_radprs = 1e-3;  // of the soles against each other, after a second: a foot rocks, ground differs
+    double encoder_sigma_rad = 2e-3;     // of one joint, from its data sheet
+    double level_noise_radprs = 0.5e-3;  // of the soles against each other, after a second: feet rock, ground differs
     // What ground and sole give way by under an ankle that leans on its sole's edge. Two ankles that hold 5 Nm inwards
     // each, as they do at the start, tilt the soles by 3 mrad against each other on the simulated floor; on its treads
-    // by twice that, so no more is learnt once enough is known.
+    // by twice that, so no more is learnt once enough is known: half a second, while the robot stands to be calibrated.
+    // Nothing is taken off before: it moves the legs, and what they stand on need not press them flat again.
     double give_radpnm = 0.33e-3;
     double enough_sigma_rad = 0.75e-3;
     double settle_s = 0.1;     // both stand for so long before they are flat
-    double slew_radps = 2e-3;  // of a joint: nothing that stands on the legs feels it
+    double slew_radps = 5e-3;  // of a joint
     double most_rad = 5e-3;
   };
   void reset(const Params& params) noexcept;
-  // One tick. legs: by joints that offset_rad() was taken off. torque_nm: of the joints; what is not finite is taken
-  // for none.
+  // One tick. legs: by joints that offset_rad() was taken off, nothing in the beginning. torque_nm: of the joints; what
+  // is not finite is taken for none.
   void update(const std::array<LegMeasurement, kFootCount>& legs, const std::array<FootContact, kFootCount>& contacts,
               const JointVector& torque_nm, double dt_s) noexcept;
 
