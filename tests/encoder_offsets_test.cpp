@@ -61,8 +61,8 @@ EncoderOffsets fresh() {
   return encoders;
 }
 
-// Half of a hip's offset is told by the soles' roll, and of the pitch's three joints more: the feet's distance is known
-// the better for it. Without, 2.3 and 2.3 mm along and across.
+// Half of a hip's offset is told by the soles' roll, and of the pitch's three joints more: the feet's distance, of 200
+// robots, is known to .9 instead of 1.8 mm along and to 1.3 instead of 1.9 mm across.
 TEST(EncoderOffsets, BothFeetStand_DistanceOfTheFeetIsBetterKnown) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
