@@ -72,6 +72,7 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   if (!estimator_.has_joints()) return Progress::kIdle;  // where the legs are is not known yet
   if (link_.footholds.try_take()) footholds_ = link_.footholds.front();
   gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
+  estimator_.to_encoders(command_);
   command_ready_ = true;
   hand_over_touch_down();
 

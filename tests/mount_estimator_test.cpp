@@ -183,26 +183,6 @@ TEST(MountEstimator, FloorThenNarrowTreadsForTwentySeconds_FloorIsNotForgotten) 
   EXPECT_GT(std::abs(treads_only.pitch_rad()), 0.007);  // where they are all there is, they count
 }
 
-// What both soles said together holds when one of them stands alone.
-TEST(MountEstimator, SolesNotParallel_OneAloneCountsAsBoth) {
-  MountEstimator mount = estimator();
-  Robot robot(0.0, 0.0, Vec3::Zero());
-  robot.stance().base_T_sole[0].R = rotation_y(0.006);
-  robot.stance().base_T_sole[1].R = rotation_y(-0.002);
-  const auto look = [&](bool left, bool right, int frames) {
-    robot.stance().stands = {left, right};
-    for (int i = 0; i < frames; ++i) {
-      robot.see(0.0);
-      robot.deliver(mount);
-    }
-    return mount.pitch_rad();
-  };
-  const double both_rad = look(true, true, 100);
-  EXPECT_NEAR(std::abs(both_rad), 0.002, 0.0003);
-  EXPECT_NEAR(look(true, false, 300), both_rad, 0.0003);
-  EXPECT_NEAR(look(false, true, 300), both_rad, 0.0003);
-}
-
 TEST(MountEstimator, OneBadFrame_MovesItByLittle) {
   MountEstimator mount = estimator();
   Robot robot(0.0, 0.0, Vec3::Zero());

@@ -157,6 +157,24 @@ TEST_F(PipelineOnARobot, TouchDown_OnlyATreadsHeightIsNews) {
   EXPECT_EQ(control().estimator().counters().height_taken, 1U);
 }
 
+// Hips and ankles that are off in roll by as much: the module finds all of it, and its commands hold where it is.
+TEST_F(PipelineOnARobot, EncodersOffAgainstEachOther_FeetAreWhereTheModuleHasThem) {
+  start(kToeGap_m);
+  for (const std::size_t joint : {std::size_t{kHipRoll}, std::size_t{kAnkleRoll}}) {
+    robot_->encoder_offset_rad[static_cast<Eigen::Index>(joint_index(Foot::kLeft, joint))] = 2e-3;
+    robot_->encoder_offset_rad[static_cast<Eigen::Index>(joint_index(Foot::kRight, joint))] = -2e-3;
+  }
+  ASSERT_TRUE(run_until(GaitPhase::kSwing, 1));
+  const auto right_p_left_m = [](const Transform& left, const Transform& right) {
+    return (right.inverse() * left).p_m;
+  };
+  const auto& sole = control().state().odom_T_sole;
+  const auto& desired = gait().odom_T_sole_desired;
+  const Vec3 true_m = right_p_left_m(robot_->true_T_sole(Foot::kLeft), robot_->true_T_sole(Foot::kRight));
+  EXPECT_LT((right_p_left_m(sole[0], sole[1]) - true_m).norm(), 5e-4);  // 3 mm before they are found
+  EXPECT_LT((right_p_left_m(desired[0], desired[1]) - true_m).norm(), 8e-4);
+}
+
 TEST_F(PipelineOnARobot, TreadElsewhereThanTheSoleOnIt_IsCounted) {
   Params params;
   params.estimator.max_height_error_m = 0.0;

@@ -16,6 +16,7 @@ void Estimator::reset(const Params& params) noexcept {
   counters_ = {};
   standstill_.reset(params.standstill);
   contacts_.reset(params.contacts);
+  encoders_.reset(params.encoders);
   imu_noise_.reset();
   forces_.reset(params.forces);
   odometry_.reset(params);
@@ -140,16 +141,25 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
   // The bound grows until the next accepted sample, so a true move is taken up again by itself.
   const double most_rad =
       kEncoderSlack_rad + params_.max_joint_speed_radps * seconds(joints.stamp_ns - joints_.stamp_ns);
-  if (has_joints_ && (joints.q_rad - joints_.q_rad).cwiseAbs().maxCoeff() > most_rad) {
+  const JointVector q_rad = joints.q_rad - encoders_.offset_rad();
+  if (has_joints_ && (q_rad - joints_.q_rad).cwiseAbs().maxCoeff() > most_rad) {
     ++counters_.joints_jump;
     return;
   }
+  joints_dt_s_ = has_joints_ ? seconds(joints.stamp_ns - joints_.stamp_ns) : 0.0;
   joints_ = joints;
+  joints_.q_rad = q_rad;
   if (params_.infer_forces) {  // until there is an attitude, upright
     joints_.foot_force_n = forces_.update(params_.geometry, joints, state_.odom_T_base.R.row(2).transpose());
   }
   for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
   has_joints_ = new_joints_ = true;
+}
+
+void Estimator::to_encoders(JointCommand& command) const noexcept {
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    command.joints[n].q_rad += encoders_.offset_rad()[static_cast<Eigen::Index>(n)];
+  }
 }
 
 void Estimator::take_joints(const std::array<bool, kFootCount>& planned_stance) noexcept {
@@ -164,6 +174,7 @@ void Estimator::take_joints(const std::array<bool, kFootCount>& planned_stance) 
     ground_.touch_downs[i].now = contact.landed && ring_.try_at(contact.touch_ns, then);
     if (ground_.touch_downs[i].now) ground_.touch_downs[i].odom_T_sole = then.odom_T_sole[i];
   }
+  encoders_.update(legs_, contacts_.feet(), joints_.tau_nm, std::min(joints_dt_s_, params_.max_step_s));
 }
 
 void Estimator::calibrate() noexcept {

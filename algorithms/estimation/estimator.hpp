@@ -2,6 +2,7 @@
 // State estimation as one stage: samples in as they arrive, StateEstimate out once per 2 ms.
 #pragma once
 
+#include "algorithms/estimation/encoder_offsets.hpp"
 #include "algorithms/estimation/force_inference.hpp"
 #include "algorithms/estimation/odometry.hpp"
 #include "algorithms/estimation/standstill.hpp"
@@ -15,6 +16,7 @@ class Estimator {
     LegGeometry geometry;
     StandstillCalibration::Params standstill;
     ContactEstimator::Params contacts;
+    EncoderOffsets::Params encoders;
     bool infer_forces = false;  // foot forces from joint torques: no sensor measures them
     ForceInference::Params forces;
     double max_torque_nm = 1000.0;
@@ -61,9 +63,13 @@ class Estimator {
   void set_tread_height(Foot foot, double odom_z_m, double sigma_m) noexcept;
 
   [[nodiscard]] const StateEstimate& state() const noexcept { return state_; }
-  // The last accepted feedback, its forces inferred where they are not sensed; has_joints() is false before the first.
+  // The last accepted feedback, its angles without encoder_offset_rad(), its forces inferred where they are not sensed;
+  // has_joints() is false before the first.
   [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
   [[nodiscard]] bool has_joints() const noexcept { return has_joints_; }
+  [[nodiscard]] const JointVector& encoder_offset_rad() const noexcept { return encoders_.offset_rad(); }
+  // A command in angles of joints() or of the state, to what the drives' encoders will read.
+  void to_encoders(JointCommand& command) const noexcept;
   [[nodiscard]] std::int64_t newest_imu_ns() const noexcept { return imu_.stamp_ns; }  // accepted; 0: none yet
   // The state at a stamp of the last half second. False, and out untouched, outside, before initialisation, and where a
   // sensor was silent for longer than max_step_s.
@@ -85,6 +91,7 @@ class Estimator {
   Counters counters_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;
+  EncoderOffsets encoders_;
   ImuNoise imu_noise_;
   ForceInference forces_;
   Odometry odometry_;
@@ -93,6 +100,7 @@ class Estimator {
   EstimateQuality quality_;
   ImuSample imu_;               // last accepted; rates: the mean of those of its tick
   JointFeedback joints_;        // last accepted
+  double joints_dt_s_ = 0.0;    // between it and the one before
   std::uint32_t new_imus_ = 0;  // accepted since the last tick
   bool new_joints_ = false;
   bool has_imu_ = false;

@@ -7,7 +7,6 @@ namespace polygmap {
 namespace {
 
 constexpr double kLongestStep_s = 0.1;  // between two frames, for the fading
-constexpr double kPairs = 60.0;         // frames that the soles' difference is the mean of
 
 bool is_unit(const Vec3& v) noexcept { return std::abs(v.squaredNorm() - 1.0) < 1e-3; }  // false for NaN
 
@@ -48,14 +47,12 @@ void MountEstimator::update(const SurfaceFrame& frame, const Stance& stance) noe
     up[foot] = stance.base_T_sole[foot].R.col(2);
     flat[foot] = stance.stands[foot] && up[foot].dot(stance.base_up) > math::cos(params_.max_sole_tilt_rad);
   }
-  // Each is off by its own encoders. A sole that stands alone is turned by what it was off from the middle of both.
+  // What their encoders are off against each other was taken off before, so that one alone says what both do.
   Vec3 level = stance.base_up;
   if (flat[0] && flat[1]) {
-    pairs_ = std::min(pairs_ + 1.0, kPairs);
-    apart_ += (0.5 * (up[0] - up[1]) - apart_) / pairs_;
     level = (up[0] + up[1]).normalized();
   } else if (flat[0] || flat[1]) {
-    level = (flat[0] ? Vec3{up[0] - apart_} : Vec3{up[1] + apart_}).normalized();
+    level = flat[0] ? up[0] : up[1];
   }
 
   Vec2 sum = Vec2::Zero();

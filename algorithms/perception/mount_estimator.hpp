@@ -85,8 +85,6 @@ class MountEstimator {
   FadingMean<double> height_{0.0, 0.0};
   double seen_as_well_ = 0.0;  // 1/rad^2, of level by its surfaces: mean of the frames that the tilt is made of
   double by_gravity_ = 0.0;    // share of that information whose level was gravity's
-  Vec3 apart_ = Vec3::Zero();  // half of the left sole's normal less the right one's, base frame
-  double pairs_ = 0.0;         // frames with both on the ground, up to a bound
   std::int64_t last_ns_ = 0;
   Counters counters_;
 };

@@ -83,7 +83,8 @@ void FakeRobot::move() {
   dq_radps_ = (q_rad_ - before_rad) / kTick_s;
   if (!joints.commands().empty()) {
     for (std::size_t n = 0; n < kJointCount; ++n) {
-      followed_rad_[static_cast<Eigen::Index>(n)] = joints.commands().newest().joints[n].q_rad;
+      followed_rad_[static_cast<Eigen::Index>(n)] =
+          joints.commands().newest().joints[n].q_rad - encoder_offset_rad[static_cast<Eigen::Index>(n)];
     }
   }
   std::array<Transform, kFootCount> base_T_foot;
@@ -122,7 +123,7 @@ void FakeRobot::sense() {
   if (joints_speak) {
     JointFeedback feedback;
     feedback.stamp_ns = now_ns;
-    feedback.q_rad = q_rad_;
+    feedback.q_rad = q_rad_ + encoder_offset_rad;
     feedback.dq_radps = dq_radps_;
     const bool both = feet_[0].stands && feet_[1].stands;
     for (std::size_t f = 0; f < kFootCount; ++f) {

@@ -47,6 +47,7 @@ class FakeRobot {
   bool imu_speaks = true;
   bool joints_speak = true;
   bool camera_speaks = true;
+  JointVector encoder_offset_rad = JointVector::Zero();  // reading minus true angle
 
  private:
   struct FootState {

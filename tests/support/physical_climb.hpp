@@ -46,6 +46,7 @@ class PhysicalClimb {
       if (tamper_footholds) tamper_footholds(footholds_);
     }
     gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
+    estimator_.to_encoders(command_);
     (void)robot_.try_write(command_);
     const GaitPhase phase = gait_.status().phase;
     return phase != GaitPhase::kFinished && phase != GaitPhase::kStopped && !robot_.truth().fell;
