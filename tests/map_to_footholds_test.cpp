@@ -63,7 +63,6 @@ ClimbErrors climb(const Stairs& stairs, const Noise& noise, const PoseError& pos
     FootholdSearch::Query query;
     query.world_T_base = test::base_above(to + drift, stairs.yaw_rad);
     query.world_T_sole = test::soles_at(to + drift, stairs.yaw_rad);
-    query.now_ns = stamp;
     query.climbing = k > 0;
     search->begin(map->snapshot(), query);
     WorkBudget budget(1 << 20);
@@ -136,7 +135,7 @@ TEST(MapToFootholds, WideDeepLanding_EndsInTop) {
     WorkBudget budget(1 << 20);
     ASSERT_EQ(map->step(budget), Progress::kDone);
   }
-  FootholdSearch::Query query{base, test::soles_at(top, 0.0), Foot::kLeft, map->snapshot().stamp_ns, true};
+  FootholdSearch::Query query{base, test::soles_at(top, 0.0), Foot::kLeft, true};
   search->begin(map->snapshot(), query);
   WorkBudget budget(1 << 20);
   ASSERT_EQ(search->step(budget), Progress::kDone);

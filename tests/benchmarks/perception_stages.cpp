@@ -25,9 +25,7 @@ void fuse(Workbench& bench) {
 }
 
 void find_footholds(Workbench& bench) {
-  FootholdSearch::Query query = bench.scene.query;
-  query.now_ns = bench.now_ns;
-  bench.search->begin(bench.map->snapshot(), query);
+  bench.search->begin(bench.map->snapshot(), bench.scene.query);
   WorkBudget whole_search(1 << 20);
   static_cast<void>(bench.search->step(whole_search));
 }
