@@ -125,6 +125,7 @@ void SurfaceExtractor::solve_planes() noexcept {
     p.pixels = p.moments.count;
     p.centre_m = p.plane.point(p.moments.mean_ray());
     boundaries_.set_plane(i, p.plane);
+    boundaries_.set_covariance(i, p.kind != SurfaceKind::kOther ? p.covariance : Mat3{Mat3::Zero()});
   }
 }
 
