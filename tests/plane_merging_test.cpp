@@ -64,6 +64,7 @@ class SeenPlanes {
     PlaneMerging::merge_pieces({}, {}, kNoise, *planes_, to_plane_, measured);
     return ((*planes_)[1].alive ? 1 : 0) + ((*planes_)[2].alive ? 1 : 0);
   }
+  void make_risers() { (*planes_)[1].kind = (*planes_)[2].kind = SurfaceKind::kRiser; }
   void make_facets() { (*planes_)[1].facet = (*planes_)[2].facet = true; }
   [[nodiscard]] const FramePlane& plane(std::size_t i) const { return (*planes_)[i]; }
   [[nodiscard]] std::uint8_t to_plane(std::size_t i) const { return to_plane_[i]; }
@@ -171,6 +172,18 @@ TEST(PlaneMerging, LargePiecesALittleApart_AreOneOnceTheyAreMeasured) {
 }
 
 // A tread and its riser bend by a right angle: nothing joins them however few their pixels.
+// Noise has turned both by a degree. Twenty rows high, they cannot touch along more.
+TEST(PlaneMerging, PiecesOfALowRiserSideBySide_AreOne_OfAnyOtherSurface_Two) {
+  for (const bool riser : {false, true}) {
+    SeenPlanes seen;
+    seen.show(1, Vec3{0.01, 0.8, -0.6}.normalized(), {0.0, -0.45, 0.85}, 10, 39, 0, 19);
+    seen.show(2, Vec3{-0.01, 0.8, -0.6}.normalized(), {0.0, -0.45, 0.85}, 40, 69, 0, 19);
+    if (riser) seen.make_risers();
+    EXPECT_EQ(seen.join(), riser ? 1 : 2);
+    EXPECT_EQ(seen.plane(1).low_parts, riser);
+  }
+}
+
 TEST(PlaneMerging, TreadAndRiser_StayTwo) {
   SeenPlanes planes;
   planes.show(1, leaning(0.9), {0.0, 0.0, 3.0}, 30, 49, 232, 239);

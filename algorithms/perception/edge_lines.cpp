@@ -306,7 +306,7 @@ bool EdgeLineFinder::try_local_shift(Shift& shift) const noexcept {
   static constexpr Lanes kSteps{0, 1, 2, 3, 4, 5, 6, 7};
   const Vec3 apart = surface_.m - other_.m;
   if (!(std::abs(apart.y()) > 1e-6)) return false;
-  const InversePlane &upper = surface_above_ ? surface_ : other_, &lower = surface_above_ ? other_ : surface_;
+  const InversePlane &upper = surface_, &lower = other_;
   const auto all = [](double x) { return cv::vx_setall_f32(static_cast<float>(x)); };
   const Wide zero = all(0.0), one = all(1.0), from_px = all(kFrom_px), to_px = all(kTo_px), least = all(kLeastRows);
   const Wide upper_b = all(upper.m.y()), lower_b = all(lower.m.y());
@@ -446,7 +446,7 @@ EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
       constexpr double kSeenLess = 2.0, kShared = 0.3;
       const double seen = 1.0 / (kSeenLess * math::square(line.sigma_m));
       Shift shift;
-      const bool any_local = try_local_shift(shift);
+      const bool any_local = surface_above_ && try_local_shift(shift);
       const auto join = [&](double s, double meet, double& t) {
         const Vec3 p = origin_m_ + s * along_ + meet * across_;
         const double met = 1.0 / math::square(plane_sigma_m(other_, other_covariance_, p / p.z()));

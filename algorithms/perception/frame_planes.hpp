@@ -35,6 +35,7 @@ struct FramePlane {
   bool alive = false;
   bool facet = false;        // too small to be a plane by itself
   std::uint8_t facets = 1;   // planes that were joined into this one
+  bool low_parts = false;    // among them some that are too low to say how they lean
   std::uint8_t surface = 0;  // 1 + index in the result
   std::uint8_t source = 0;   // the plane whose pixels these are
   std::uint8_t same = 0;     // the first surface of those that count as one plane

@@ -101,12 +101,13 @@ void PlaneMerging::begin_facets(const Params& params, const PlaneGrowing::Params
     normals_[p] = planes[p].alive ? planes[p].plane.normal() : Vec3{Vec3::Zero()};
   }
   for (std::size_t p = 0; p <= planes.count; ++p) seam_of_[p].fill(0);
+  spans_of_.fill(0);
   seam_count_ = joined_ = 0;
   next_open_ = 1;
   overflow_ = 0;
 }
 
-void PlaneMerging::touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px) noexcept {
+void PlaneMerging::touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px, bool beside) noexcept {
   if (a == b) return;
   SeamIndex& seam = seam_of(a, b);
   if (seam == 0) {
@@ -121,27 +122,32 @@ void PlaneMerging::touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px)
     seams_[seam].b = std::max(a, b);
   }
   seams_[seam].length_px += length_px;
+  seams_[seam].beside_px += beside ? length_px : 0;
 }
 
 // Spans above or beside one another in the picture.
 void PlaneMerging::add_column(const SurfaceBoundaries::Column& spans, const SurfaceBoundaries::Column* right,
                               const PlaneIndex& to_plane) noexcept {
+  for (const ColumnSpan& span : spans) ++spans_of_[to_plane[span.plane]];
   for (std::size_t k = 0; k + 1 < spans.size(); ++k) {
     if (spans[k + 1].top - spans[k].bottom > kMaxGap_px) continue;
-    touch(to_plane[spans[k].plane], to_plane[spans[k + 1].plane], kColumn_px);
+    touch(to_plane[spans[k].plane], to_plane[spans[k + 1].plane], kColumn_px, false);
   }
   if (right == nullptr) return;
   for (std::size_t k = 0, i = 0; k < spans.size() && i < right->size();) {  // both from top to bottom
     const ColumnSpan &here = spans[k], &there = (*right)[i];
     const std::int32_t shared = std::min(here.bottom, there.bottom) - std::max(here.top, there.top) + 1;
-    if (shared > 0) touch(to_plane[here.plane], to_plane[there.plane], shared);
+    if (shared > 0) touch(to_plane[here.plane], to_plane[there.plane], shared, true);
     ++(here.bottom < there.bottom ? k : i);
   }
 }
 
 void PlaneMerging::judge(const FramePlanes& planes, Seam& seam) const noexcept {
   const FramePlane &p = planes[seam.a], &q = planes[seam.b];
-  if (seam.length_px < params_.facet_seam * math::sqrt(std::min(p.pixels, q.pixels))) {
+  const auto height_px = [&](std::size_t i) { return planes[i].pixels / (kColumn_px * std::max(spans_of_[i], 1)); };
+  const bool steps = p.kind == q.kind && p.kind != SurfaceKind::kOther;
+  seam.low = seam.length_px < params_.facet_seam * math::sqrt(std::min(p.pixels, q.pixels));
+  if (seam.low && !(steps && seam.beside_px >= params_.facet_seam * std::min(height_px(seam.a), height_px(seam.b)))) {
     seam.verdict = Seam::Verdict::kShort;
   } else {
     const bool one = try_contradiction(params_, noise_, p, q, seam.chi2) && seam.chi2 < params_.facet_chi2;
@@ -155,9 +161,11 @@ bool PlaneMerging::try_join(FramePlanes& planes, PlaneIndex& to_plane, Seam& bes
   p.moments.add(q.moments);
   if (!try_fit(p.moments, p.plane.m)) return false;
   p.pixels += q.pixels;
+  spans_of_[kept] += spans_of_[gone];
   p.facet = p.facet && q.facet && p.pixels < min_plane_px_;
   p.residual2 += q.residual2;
   p.centre_m = p.plane.point(p.moments.mean_ray());
+  p.low_parts = p.low_parts || q.low_parts || best.low;
   p.facets = static_cast<std::uint8_t>(std::min(p.facets + q.facets, 255));
   q.alive = false;
   redirect(to_plane, gone, kept);
@@ -171,7 +179,10 @@ bool PlaneMerging::try_join(FramePlanes& planes, PlaneIndex& to_plane, Seam& bes
     const bool counts = alike(kept, other);
     SeamIndex& both = seam_of(kept, other);
     if (both != 0) {
-      if (counts) seams_[both].length_px += seam.length_px;
+      if (counts) {
+        seams_[both].length_px += seam.length_px;
+        seams_[both].beside_px += seam.beside_px;
+      }
       seam.verdict = Seam::Verdict::kGone;
     } else if (counts) {
       both = static_cast<SeamIndex>(i);

@@ -24,7 +24,9 @@ class PlaneMerging {
                                      // this: 95 % of what noise does to three parameters
     double facet_floor_m = 0.002;    // what surfaces themselves are uneven by, added to the noise
     double facet_tilt_rad = 0.6;
-    double facet_seam = 0.7;  // neighbours touch along this times the root of the smaller one's pixels
+    // Neighbours touch along this times the root of the smaller one's pixels. Of a tread or a riser that is low in the
+    // picture two pieces cannot: side by side, along this times the lower one's height.
+    double facet_seam = 0.7;
   };
   using PlaneIndex = std::array<std::uint8_t, FramePlanes::kMaxPlanes + 1>;  // of a plane that may have been merged
 
@@ -56,8 +58,10 @@ class PlaneMerging {
     enum class Verdict : std::uint8_t { kOpen, kShort, kContradicted, kOne, kGone };
     std::uint8_t a = 0, b = 0;
     Verdict verdict = Verdict::kOpen;
+    bool low = false;  // touch along no more than the lower one's height
     std::int32_t length_px = 0;
-    double chi2 = 0.0;  // if kOne
+    std::int32_t beside_px = 0;  // of that, side by side
+    double chi2 = 0.0;           // if kOne
   };
   using SeamIndex = std::uint16_t;  // 0 = none
   [[nodiscard]] SeamIndex& seam_of(std::size_t a, std::size_t b) noexcept {
@@ -66,7 +70,7 @@ class PlaneMerging {
   [[nodiscard]] bool alike(std::size_t a, std::size_t b) const noexcept {
     return normals_[a].dot(normals_[b]) >= least_cosine_;
   }
-  void touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px) noexcept;
+  void touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px, bool beside) noexcept;
   void judge(const FramePlanes& planes, Seam& seam) const noexcept;
   [[nodiscard]] bool try_join(FramePlanes& planes, PlaneIndex& to_plane, Seam& best) noexcept;
 
@@ -74,7 +78,8 @@ class PlaneMerging {
   double min_plane_px_ = 0.0;
   DepthSigma noise_;
   double least_cosine_ = 1.0;
-  std::array<Vec3, FramePlanes::kMaxPlanes + 1> normals_{};  // before any were joined; zero: no plane
+  std::array<std::int32_t, FramePlanes::kMaxPlanes + 1> spans_of_{};  // columns of a plane
+  std::array<Vec3, FramePlanes::kMaxPlanes + 1> normals_{};           // before any were joined; zero: no plane
   std::array<std::array<SeamIndex, FramePlanes::kMaxPlanes + 1>, FramePlanes::kMaxPlanes + 1> seam_of_{};
   std::array<Seam, kMaxSeams + 1> seams_{};  // 1-based
   std::size_t seam_count_ = 0;

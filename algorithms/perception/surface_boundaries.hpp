@@ -45,10 +45,11 @@ class SurfaceBoundaries {
   using Columns = std::array<Column, kColumns>;
   struct Plane {
     InversePlane plane;
-    float norm = 1.0F;       // of plane.m
-    PlaneMoments moments;    // of the last refit, weights 1 / sigma^2
-    double residual2 = 0.0;  // sum of squared normal distances, per pixel
-    double seen_px = 0.0;    // measured in the rows refitted to, among them those that the plane does not explain
+    Mat3 covariance = Mat3::Zero();  // of plane.m, zero while it is not measured
+    float norm = 1.0F;               // of plane.m
+    PlaneMoments moments;            // of the last refit, weights 1 / sigma^2
+    double residual2 = 0.0;          // sum of squared normal distances, per pixel
+    double seen_px = 0.0;  // measured in the rows refitted to, among them those that the plane does not explain
   };
 
   void begin(const Params& params, const DepthSigma& noise, const ColumnRays& rays, double fy_px, double cy_px,
@@ -58,6 +59,8 @@ class SurfaceBoundaries {
     planes_[i].plane = plane;
     planes_[i].norm = static_cast<float>(plane.m.norm());
   }
+  // A plane of few pixels is uncertain beside them: what it may claim knows that.
+  void set_covariance(std::size_t i, const Mat3& covariance) noexcept { planes_[i].covariance = covariance; }
   [[nodiscard]] const Plane& plane(std::size_t i) const noexcept { return planes_[i]; }
 
   // One column's runs to intervals, each run's plane looked up in to_plane.
@@ -115,9 +118,10 @@ class SurfaceBoundaries {
     std::array<std::array<float, kBins + 2 * kRowsAtOnce>, 2> gain{};
   };
   static constexpr float kTruncation = 9.0F;  // of a cost: an outlier says no more than three sigmas do
-  // A plane in one column: inverse depth a + b y, and its tolerance per sigma.
+  // A plane in one column: inverse depth a + b y, its tolerance per sigma, and its own variance, both times inverse
+  // depth.
   struct Line {
-    float a, b, norm;
+    float a, b, norm, own = 0.0F;
   };
   [[nodiscard]] Line line_of(std::uint8_t plane, std::int32_t column) const noexcept;
   [[nodiscard]] float inverse_sigma(float w) const noexcept { return (base_ * w + per_metre_) * w + quadratic_; }
@@ -135,6 +139,8 @@ class SurfaceBoundaries {
   [[nodiscard]] Depths depths_of(std::int32_t column, std::int32_t first, std::int32_t last) const noexcept;
   [[nodiscard]] bool reaches(const Line& line, std::int32_t top, std::int32_t bottom,
                              const Depths& depths) const noexcept;
+  // See Line.
+  [[nodiscard]] float own_variance(std::uint8_t plane, std::int32_t column, std::int32_t row) const noexcept;
   struct Rows {  // a bit for each of kRowsAtOnce
     std::uint32_t measured = 0, fit = 0;
   };

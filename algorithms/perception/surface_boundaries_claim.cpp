@@ -22,7 +22,8 @@ SurfaceBoundaries::Rows SurfaceBoundaries::fitting(const Line& line, std::int32_
     const Wide pixels =
         cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand_q(image_->valid_down.row(column) + first + i)));
     const Wide most =
-        all(kTruncation) * sigma * sigma * (all(correlated_share_) * pixels + all(1.0F - correlated_share_));
+        all(kTruncation) *
+        (sigma * sigma * (all(correlated_share_) * pixels + all(1.0F - correlated_share_)) + all(line.own) * pixels);
     const Wide measured = w > all(0.0F), fits = measured & (residual * residual * pixels < most);
     rows.measured |= static_cast<std::uint32_t>(cv::v_signmask(measured)) << i;
     rows.fit |= static_cast<std::uint32_t>(cv::v_signmask(fits)) << i;
@@ -101,17 +102,25 @@ bool SurfaceBoundaries::reaches(const Line& line, std::int32_t top, std::int32_t
                                 const Depths& depths) const noexcept {
   const float at_top = line.a + line.b * rays_->y[static_cast<std::size_t>(top)];
   const float at_bottom = line.a + line.b * rays_->y[static_cast<std::size_t>(bottom)];
-  // No row's tolerance is larger.
+  // Without what the plane's own place is uncertain by: some row comes nearer than that.
   const float most =
       math::sqrt(kTruncation) * line.norm * (base_ * depths.nearest + per_metre_ + quadratic_ / depths.farthest);
   return std::max(at_top, at_bottom) + most >= depths.farthest && std::min(at_top, at_bottom) - most <= depths.nearest;
 }
 
+float SurfaceBoundaries::own_variance(std::uint8_t plane, std::int32_t column, std::int32_t row) const noexcept {
+  const Vec3 ray{static_cast<double>(rays_->x[static_cast<std::size_t>(column)]),
+                 static_cast<double>(rays_->y[static_cast<std::size_t>(row)]), 1.0};
+  const Plane& p = planes_[plane];
+  return static_cast<float>(ray.dot(p.covariance * ray) * math::square(p.plane.inverse_depth(ray)));
+}
+
 void SurfaceBoundaries::consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
                                  const Depths& depths, std::int32_t& most, ColumnSpan& claimed) const noexcept {
   if (!gap.may_be(plane) || bottom - top < most || !depths.any()) return;
-  const Line line = line_of(plane, gap.column);
+  Line line = line_of(plane, gap.column);
   if (!reaches(line, top, bottom, depths)) return;
+  line.own = own_variance(plane, gap.column, (top + bottom) / 2);
   ColumnSpan candidate;
   candidate.plane = plane;
   candidate.top = static_cast<std::int16_t>(top);

@@ -60,6 +60,9 @@ std::int32_t SurfaceExtractor::facet_step() noexcept {
     FramePlane& p = planes_[i];
     if (p.alive && p.facet) drop(i);
     if (!p.alive || p.facets == 1) continue;
+    if (p.low_parts) {
+      static_cast<void>(try_solve_leaning(params_.planes, noise_, p.moments, view_.camera_up, p.plane, &p.covariance));
+    }
     p.kind = kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad);
     boundaries_.set_plane(i, p.plane);
   }
@@ -122,6 +125,7 @@ void SurfaceExtractor::solve_planes() noexcept {
     p.pixels = p.moments.count;
     p.centre_m = p.plane.point(p.moments.mean_ray());
     boundaries_.set_plane(i, p.plane);
+    boundaries_.set_covariance(i, p.kind != SurfaceKind::kOther ? p.covariance : Mat3{Mat3::Zero()});
   }
 }
 
