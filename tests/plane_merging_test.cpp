@@ -171,7 +171,6 @@ TEST(PlaneMerging, LargePiecesALittleApart_AreOneOnceTheyAreMeasured) {
   EXPECT_EQ(same.merge(false), 1);
 }
 
-// A tread and its riser bend by a right angle: nothing joins them however few their pixels.
 // Noise has turned both by a degree. Twenty rows high, they cannot touch along more.
 TEST(PlaneMerging, PiecesOfALowRiserSideBySide_AreOne_OfAnyOtherSurface_Two) {
   for (const bool riser : {false, true}) {
@@ -184,6 +183,7 @@ TEST(PlaneMerging, PiecesOfALowRiserSideBySide_AreOne_OfAnyOtherSurface_Two) {
   }
 }
 
+// A tread and its riser bend by a right angle: nothing joins them however few their pixels.
 TEST(PlaneMerging, TreadAndRiser_StayTwo) {
   SeenPlanes planes;
   planes.show(1, leaning(0.9), {0.0, 0.0, 3.0}, 30, 49, 232, 239);

@@ -21,6 +21,16 @@ void EncoderOffsets::reset(const Params& params) noexcept {
   apart_variance_rad2_ = kFootCount * joint_rad2 * Vec2{kRollJoints.size(), kPitchJoints.size()};
 }
 
+void EncoderOffsets::learn_anew() noexcept {
+  if (offset_rad_.isZero()) reset(Params{params_});
+}
+
+double EncoderOffsets::share_rad(double apart_rad, std::size_t joints) const noexcept {
+  const auto all = static_cast<double>(kFootCount * joints);
+  return std::abs(apart_rad) <= params_.most_sigmas * params_.encoder_sigma_rad * math::sqrt(all) ? apart_rad / all
+                                                                                                  : 0.0;
+}
+
 void EncoderOffsets::update(const std::array<LegMeasurement, kFootCount>& legs,
                             const std::array<FootContact, kFootCount>& contacts, const JointVector& torque_nm,
                             double dt_s) noexcept {
@@ -48,12 +58,11 @@ void EncoderOffsets::update(const std::array<LegMeasurement, kFootCount>& legs,
   const double step_rad = params_.slew_radps * dt_s;
   const auto follow = [&](LegJoint joint, double left_rad) {
     double& offset_rad = offset_rad_[static_cast<Eigen::Index>(joint_index(Foot::kLeft, joint))];
-    const double wanted_rad = math::clamp(left_rad, -params_.most_rad, params_.most_rad);
-    offset_rad += math::clamp(wanted_rad - offset_rad, -step_rad, step_rad);
+    offset_rad += math::clamp(left_rad - offset_rad, -step_rad, step_rad);
     offset_rad_[static_cast<Eigen::Index>(joint_index(Foot::kRight, joint))] = -offset_rad;
   };
-  for (const LegJoint joint : kRollJoints) follow(joint, apart_rad_.x() / (kFootCount * kRollJoints.size()));
-  for (const LegJoint joint : kPitchJoints) follow(joint, apart_rad_.y() / (kFootCount * kPitchJoints.size()));
+  for (const LegJoint joint : kRollJoints) follow(joint, share_rad(apart_rad_.x(), kRollJoints.size()));
+  for (const LegJoint joint : kPitchJoints) follow(joint, share_rad(apart_rad_.y(), kPitchJoints.size()));
 }
 
 }  // namespace polygmap

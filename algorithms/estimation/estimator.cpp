@@ -150,7 +150,7 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
   joints_ = joints;
   joints_.q_rad = q_rad;
   if (params_.infer_forces) {  // until there is an attitude, upright
-    joints_.foot_force_n = forces_.update(params_.geometry, joints, state_.odom_T_base.R.row(2).transpose());
+    joints_.foot_force_n = forces_.update(params_.geometry, joints_, state_.odom_T_base.R.row(2).transpose());
   }
   for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
   has_joints_ = new_joints_ = true;
@@ -158,7 +158,9 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
 
 void Estimator::to_encoders(JointCommand& command) const noexcept {
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    command.joints[n].q_rad += encoders_.offset_rad()[static_cast<Eigen::Index>(n)];
+    const JointLimits& limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg);
+    double& q_rad = command.joints[n].q_rad;
+    q_rad = math::clamp(q_rad + encoders_.offset_rad()[static_cast<Eigen::Index>(n)], limits.min_rad, limits.max_rad);
   }
 }
 
@@ -174,7 +176,9 @@ void Estimator::take_joints(const std::array<bool, kFootCount>& planned_stance) 
     ground_.touch_downs[i].now = contact.landed && ring_.try_at(contact.touch_ns, then);
     if (ground_.touch_downs[i].now) ground_.touch_downs[i].odom_T_sole = then.odom_T_sole[i];
   }
-  encoders_.update(legs_, contacts_.feet(), joints_.tau_nm, std::min(joints_dt_s_, params_.max_step_s));
+  // A robot that is being put down rocks on its soles.
+  if (state_.initialised || standstill_.collecting())
+    encoders_.update(legs_, contacts_.feet(), joints_.tau_nm, std::min(joints_dt_s_, params_.max_step_s));
 }
 
 void Estimator::calibrate() noexcept {
@@ -182,6 +186,7 @@ void Estimator::calibrate() noexcept {
   if (counters_.standstill_restarts != standstill_.restarts()) {
     counters_.standstill_restarts = standstill_.restarts();
     odometry_.fusion().reset(params_.fusion);  // what it averaged was another place
+    encoders_.learn_anew();
   }
   if (!standstill_.collecting()) return;
 

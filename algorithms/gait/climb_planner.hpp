@@ -61,7 +61,7 @@ class ClimbPlanner {
   void refuse_passing() noexcept { passing_refused_ = true; }
   // The passing foot that is in the air lands beside the standing one instead.
   void passing_ends_beside(const StepGoal& goal) noexcept;
-  // Its foot stands on its goal, or where it stood before: as if nothing had been latched.
+  // Its foot stands on its goal, or where it stood before: with which foot to lead as before the latch.
   void landed() noexcept;
   void put_back() noexcept;
   [[nodiscard]] std::uint32_t tread_id() const noexcept { return tread_id_; }  // under the foot that landed last

@@ -149,7 +149,8 @@ void Gait::land_soon(const StateEstimate& state) noexcept {
     goal.foothold = {.position_m = world_T_sole.p_m,
                      .yaw_rad = yaw_of(world_T_sole.R),
                      .polygon_id = planner_.tread_id(),
-                     .last_seen_ns = goal.foothold.last_seen_ns};
+                     .last_seen_ns = goal.foothold.last_seen_ns,
+                     .side_room_m = goal.foothold.side_room_m};  // as much as above: both are of one staircase
     planner_.passing_ends_beside(goal);
     status_.step.target = goal.foothold;
     status_.step.odom_T_target = target.transform();

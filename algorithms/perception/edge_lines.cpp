@@ -426,8 +426,8 @@ EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
     const double middle_s = 0.5 * (lo + hi), middle_t = 0.25 * (t_lo + t_hi + meet_lo + meet_hi);
     const Vec3 centre = origin_m_ + middle_s * along_ + middle_t * across_;
     const double met_sigma_m = plane_sigma_m(other_, both_covariance_, centre / centre.z());
-    const double three_sigmas_m = 1.5 * math::sqrt(math::square(line.sigma_m) + math::square(met_sigma_m));
-    const double limit_m = std::max(math::clamp(three_sigmas_m, params_.agree_m, params_.agree_max_m),
+    const double apart_m = 1.5 * math::sqrt(math::square(line.sigma_m) + math::square(met_sigma_m));
+    const double limit_m = std::max(math::clamp(apart_m, params_.agree_m, params_.agree_max_m),
                                     params_.agree_px * pixel_m(middle_s, middle_t));
     const bool agree = std::abs(apart) < limit_m;
     double face_m = 0.0;
@@ -442,7 +442,8 @@ EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
     }
     if (agree) {
       // All three by their information. Change-points are also skewed towards the less noisy plane, which their scatter
-      // hides. Errors of the three are correlated by .28 (meeting, change-points), .49 (meeting, local) and .17.
+      // hides. Errors of the three are correlated by .28 (meeting, change-points), .49 (meeting, local) and .17
+      // (generated stairs, the robot's camera, correlated noise).
       constexpr double kSeenLess = 2.0, kShared = 0.3;
       const double seen = 1.0 / (kSeenLess * math::square(line.sigma_m));
       Shift shift;

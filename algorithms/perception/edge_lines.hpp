@@ -25,8 +25,8 @@ class EdgeLineFinder {
     double max_rms_m = 0.006;
     double min_inlier_share = 0.5;
     // Where the two planes meet is the sharper answer when no overhang lies between: it uses every pixel of both. It is
-    // taken when it lies within agree_m or three sigmas of the change-points, but never beyond agree_max_m; far away,
-    // where a pixel is centimetres of the surface, within agree_px.
+    // taken when it lies within agree_m, or three sigmas of the change-points and one and a half of the planes, but
+    // never beyond agree_max_m; far away, where a pixel is centimetres of the surface, within agree_px.
     double agree_m = 0.003;
     double agree_max_m = 0.008;
     double agree_px = 0.3;

@@ -8,7 +8,7 @@
 
 namespace polygmap {
 
-// As offset() has it.
+// As offset() has it, and as uncertain as the plane is there.
 SurfaceBoundaries::Rows SurfaceBoundaries::fitting(const Line& line, std::int32_t column,
                                                    std::int32_t first) const noexcept {
   using Wide = cv::v_float32;
