@@ -195,10 +195,10 @@ TEST(GaitStop, NeverLinedUpBeforeTheStairs_SaysSo) {
     double off_m;
     std::uint32_t least_steps, most_steps;
   };
-  for (const auto& [off_m, least_steps, most_steps] : {Case{0.04, 9, 19}, Case{0.1, 60, 61}}) {
+  for (const Case& one : {Case{0.04, 9, 19}, Case{0.1, 60, 61}}) {
     IdealClimb climb({});
     climb.tamper = [&](StateEstimate&, FootholdSet& set, JointFeedback&) {
-      const double x_m = climb.status().step.sequence / 2 % 2 == 0 ? 0.0 : -off_m;
+      const double x_m = climb.status().step.sequence / 2 % 2 == 0 ? 0.0 : -one.off_m;
       const Vec3 shift_m = rotation_z(set.p_star_feet[0].yaw_rad) * Vec3{x_m, 0, 0};
       for (Vec3* p : {&set.p_star_feet[0].position_m, &set.p_star_feet[1].position_m, &set.tread.nosing_a_m,
                       &set.tread.nosing_b_m}) {
@@ -209,8 +209,8 @@ TEST(GaitStop, NeverLinedUpBeforeTheStairs_SaysSo) {
     EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
     EXPECT_EQ(climb.status().stop_reason, Obstruction::kNotLinedUp);
     EXPECT_FALSE(climb.status().step.onto_tread);
-    EXPECT_GE(climb.status().step.sequence, least_steps);
-    EXPECT_LE(climb.status().step.sequence, most_steps);
+    EXPECT_GE(climb.status().step.sequence, one.least_steps);
+    EXPECT_LE(climb.status().step.sequence, one.most_steps);
     EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);
   }
 }
