@@ -36,7 +36,9 @@ ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometr
                          const Params& params) noexcept
     : imu_port_(imu), joint_port_(joints), lio_port_(lio), link_(link), params_(params) {
   estimator_.reset(params.estimator);
-  gait_.reset(params.gait);
+  Gait::Params gait = params.gait;
+  if (!params.estimate_mount) gait.look_ticks = 0;
+  gait_.reset(gait);
 }
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {

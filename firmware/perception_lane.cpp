@@ -9,6 +9,8 @@ namespace {
 constexpr std::int64_t kCameraTimeout_ns = 200 * kNsPerMs;  // six frames
 constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers within two minor frames
 
+constexpr std::int32_t kLearnMountUnits = 190;  // both toes in sight: 95,000 instructions
+
 }  // namespace
 
 PerceptionLane::PerceptionLane(hal::DepthCamera& camera, LaneLink& link, const Params& params) noexcept
@@ -84,12 +86,15 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
   if (stage_ != FrameStage::kExtracting) return Progress::kIdle;
   const Progress progress = extractor_.step(budget);
   if (progress == Progress::kDone) {
+    if (params_.estimate_mount) {
+      learn_mount();
+      budget.spend(kLearnMountUnits);
+    }
     camera_port_.release();
     const SurfaceExtractor::Counters& now = extractor_.counters();
     health_.raise(Limit::kRunsFull, now_ns, now.run_overflow - extractor_seen_.run_overflow);
     health_.raise(Limit::kPlanesFull, now_ns, now.plane_overflow - extractor_seen_.plane_overflow);
     extractor_seen_ = now;
-    if (params_.estimate_mount) learn_mount();
     begin_map(now_ns);
     stage_ = FrameStage::kWaiting;
   }
@@ -102,9 +107,15 @@ void PerceptionLane::learn_mount() noexcept {
   const Transform base_T_odom = state.odom_T_base.inverse();
   MountEstimator::Stance stance;
   stance.base_up = base_T_odom.R.col(2);
+  stance.speed_mps = math::sqrt(state.odom_v_base_mps.squaredNorm());
+  RawRange range;
+  range.set(params_.surfaces.limits, intrinsics_.depth_unit_m);
+  const Transform camera_T_base = mount_.base_T_camera().inverse();
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     stance.base_T_sole[foot] = base_T_odom * state.odom_T_sole[foot];
     stance.stands[foot] = state.contact_probability[foot] > kStands;
+    if (stance.stands[foot])
+      stance.toes[foot] = see_toe(frame_, intrinsics_, range, camera_T_base * stance.base_T_sole[foot]);
   }
   mount_.update(extractor_.result(), stance);
 }

@@ -129,7 +129,8 @@ Json to_json(const ClimbSummary& s) {
       {"mount_found",
        {{"roll_deg", degrees(camera.mount_found_deg.x())},
         {"pitch_deg", degrees(camera.mount_found_deg.y())},
-        {"height_mm", mm(camera.mount_found_height_m)}}}};
+        {"height_mm", mm(camera.mount_found_height_m)},
+        {"ahead_mm", mm(camera.mount_found_ahead_m)}}}};
   j["steps_total"] = s.steps_total;
   j["steps_climbed"] = s.steps_climbed;
   j["climb_time_s"] = seconds_of(s.climb_time_s);

@@ -67,6 +67,7 @@ struct CameraFigures {
   Vec3 mount_error_m = Vec3::Zero();    // base frame
   Vec2 mount_found_deg = Vec2::Zero();  // roll, pitch, by the module, at the end
   double mount_found_height_m = 0.0;    // absorbs scale and leg lengths
+  double mount_found_ahead_m = 0.0;     // the same, and encoders
 };
 
 struct ClimbSummary {

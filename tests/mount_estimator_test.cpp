@@ -39,12 +39,19 @@ class Robot {
     patch.area_m2 = 0.3;
     ASSERT_TRUE(frame_.surfaces.try_push_back(patch));
   }
+  // A standing foot's toe, where it is; the picture shows the mount's error as the toe's.
+  void see_toe(const MountEstimator& mount, std::size_t foot, double noise_m = 0.0) {
+    std::normal_distribution<> noise(0.0, noise_m);
+    const double off_m = true_mount_.p_m.x() - mount.base_T_camera().p_m.x();
+    stance_.toes[foot] = ToeSighting{-off_m + (noise_m > 0.0 ? noise(random_) : 0.0), 0.0006};
+  }
   SurfacePatch& last() { return frame_.surfaces.back(); }
   MountEstimator::Stance& stance() { return stance_; }
   void deliver(MountEstimator& mount) {
     frame_.stamp_ns += kFrame_ns;
     mount.update(frame_, stance_);
     frame_.surfaces.clear();
+    stance_.toes.fill(std::nullopt);
   }
 
  private:
@@ -227,6 +234,57 @@ TEST(MountEstimator, GravityOffByHalfADegree_SolesSayWhatIsLevel) {
     robot.deliver(mount);
   }
   EXPECT_NEAR(mount.pitch_rad(), 0.5 * kDegree, 0.02 * kDegree);
+}
+
+TEST(MountEstimator, CameraAheadOfItsPlace_FoundByTheToes) {
+  for (const double off_m : {-0.004, 0.004}) {
+    MountEstimator mount = estimator();
+    Robot robot(0.0, 0.0, {off_m, 0.0, 0.0});
+    for (int i = 0; i < 30; ++i) {
+      robot.see(0.0);
+      robot.see_toe(mount, 0, 0.001);
+      robot.deliver(mount);
+    }
+    EXPECT_NEAR(mount.ahead_m(), off_m, 0.0006);
+    EXPECT_NEAR(mount.base_T_camera().p_m.x() - base_T_camera().p_m.x(), mount.ahead_m(), 1e-9);
+    EXPECT_EQ(mount.counters().toes, 30U);
+    // Frames in which no surface is seen tell of the toes all the same.
+    MountEstimator blind = estimator();
+    for (int i = 0; i < 30; ++i) {
+      robot.see_toe(blind, 1, 0.001);
+      robot.deliver(blind);
+    }
+    EXPECT_NEAR(blind.ahead_m(), off_m, 0.0006);
+  }
+}
+
+TEST(MountEstimator, ToeSeenFarOffOrWhileTheBaseMoves_MovesTheCameraNoFartherThanTheBoundsOrLittle) {
+  MountEstimator far = estimator(), moving = estimator();
+  Robot robot(0.0, 0.0, {0.05, 0.0, 0.0}), other(0.0, 0.0, {0.004, 0.0, 0.0});
+  for (int i = 0; i < 300; ++i) {
+    robot.see_toe(far, 0);
+    robot.deliver(far);
+  }
+  EXPECT_NEAR(far.ahead_m(), 0.010, 1e-9);
+  other.stance().speed_mps = 0.3;
+  for (int i = 0; i < 10; ++i) {
+    other.see_toe(moving, 0);
+    other.deliver(moving);
+  }
+  EXPECT_LT(std::abs(moving.ahead_m()), 0.002);
+}
+
+TEST(MountEstimator, ToeOfAFootInTheAirOrNoNumber_TellsNothing) {
+  MountEstimator mount = estimator();
+  Robot robot(0.0, 0.0, {0.004, 0.0, 0.0});
+  robot.stance().stands = {false, true};
+  for (int i = 0; i < 30; ++i) {
+    robot.see_toe(mount, 0);
+    robot.stance().toes[1] = ToeSighting{std::numeric_limits<double>::quiet_NaN(), 0.0006};
+    robot.deliver(mount);
+  }
+  EXPECT_EQ(mount.ahead_m(), 0.0);
+  EXPECT_EQ(mount.counters().toes, 0U);
 }
 
 TEST(MountEstimator, NoStandingSole_LeavesTheHeight_NextStepIsNotTheSolesOwn) {

@@ -39,7 +39,8 @@ void Gait::reset(const Params& params) noexcept {
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
   tick_ = shifts_ = wait_ticks_ = idle_ticks_ = off_ticks_ = 0;
-  armed_ = started_ = unloaded_ = retried_ = settles_ = stop_requested_ = false;
+  armed_ = started_ = unloaded_ = retried_ = settles_ = looks_ = stop_requested_ = false;
+  looked_ = params.look_ticks <= 0;
   pace_.begin();
   // All else is set before it is read: by arming, by start() and by what begins a shift or a swing. A fresh object to
   // copy from would take 7 KB of stack.
@@ -206,9 +207,11 @@ void Gait::crouch() noexcept {
 
 void Gait::settle_between_feet() noexcept {
   const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
-  const TorsoPose middle = torso_between(params_.geometry, params_.step.torso, soles);
+  TorsoParams torso = params_.step.torso;
+  if (looks_) torso.height_m = params_.look_height_m;
+  const TorsoPose middle = torso_between(params_.geometry, torso, soles);
   // The base is still elsewhere: rising at once would take the ground from the leg that it is far from.
-  const TorsoPose here = torso_at(params_.geometry, params_.step.torso, soles, plan_T_base_.p_m.head<2>());
+  const TorsoPose here = torso_at(params_.geometry, torso, soles, plan_T_base_.p_m.head<2>());
   crouched_m_ = crouch_m();
   upright_ = {std::min(middle.position_m.z(), here.position_m.z()), middle.yaw_rad};
   const double height_m = upright_.height_m - crouched_m_;
@@ -226,6 +229,7 @@ void Gait::begin_hold() noexcept {
 }
 
 void Gait::end(GaitPhase phase, Obstruction reason, double measured_m) noexcept {
+  if (std::exchange(looks_, false)) settle_between_feet();  // down again
   activity_ = Activity::kEnd;
   status_.phase = phase;
   status_.stop_reason = reason;
@@ -256,6 +260,10 @@ void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexc
                 plan_T_sole_);
 }
 
+bool Gait::looks_first(const ClimbPlanner::Decision& decision) const noexcept {
+  return !looked_ && decision.goal.kind == StepKind::kLeading && planner_.treads_climbed() == 0;
+}
+
 void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexcept {
   if (stop_requested_) return end(GaitPhase::kStopped, Obstruction::kNone, 0.0);
   if (lost(state)) return end(GaitPhase::kStopped, Obstruction::kStateStale, 0.0);
@@ -263,11 +271,18 @@ void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexce
   // A body that sways sideways is best off between the feet.
   const bool sways = !(std::abs(plan_T_base_.R.col(1).head<2>().dot(dcm_error_m_)) <= params_.steady_m);
   if ((retried_ || sways) && tick_ < params_.settle_ticks) return;
+  // What it learns while it looks may be that it does not stand straight yet: the whole look first, and once.
+  if (looks_ && tick_ < params_.look_ticks) return;
+  const bool has_looked = std::exchange(looks_, false);
+  looked_ = looked_ || has_looked;
   const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (decision.has_step) {
     wait_ticks_ = 0;
-    return begin_shift(decision, false);
+    if (!looks_first(decision)) return begin_shift(decision, false);
+    looks_ = true;
+    return settle_between_feet();
   }
+  if (has_looked) settle_between_feet();
   Obstruction reason = decision.obstruction;
   if (reason == Obstruction::kTop || reason == Obstruction::kNoStaircase) {  // nothing higher is mapped
     reason = planner_.treads_climbed() > 0 ? Obstruction::kTop : Obstruction::kNoStaircase;
@@ -316,6 +331,7 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
     return;
   }
   if (close_to_planned(decision.goal)) return lift_off(state, footholds, decision);
+  if (looks_first(decision)) return begin_hold();
   // Over the other foot the weight has its whole way to go.
   const StepGoal& planned = decision_.goal;
   begin_shift(decision,

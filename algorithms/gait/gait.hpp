@@ -37,6 +37,10 @@ class Gait {
     std::int32_t patience_ticks = 500;         // and later, or the top: 1 s
     std::int32_t unsteady_patience = 3;        // as many times longer for obstructions that change
     std::int32_t settle_ticks = 300;           // to the middle between the feet when there is nothing to do
+    // Before the first step onto the stairs both legs stretch: past straight knees the camera sees the toes, which tell
+    // where it sits (toe_sight.hpp). Up in settle_ticks, then half a second: 15 pictures. 0: no look.
+    double look_height_m = 0.86;
+    std::int32_t look_ticks = 550;
     double touch_force_n = 15.0;
     double hold_force_n = 100.0;            // pressed less, a foot that landed is held where it landed,
     std::int64_t hold_ns = 200 * kNsPerMs;  // not longer: it may be the sensor, unless that told of the ground
@@ -95,6 +99,7 @@ class Gait {
   void observe_links() noexcept;
   void add_torques(const StateEstimate& state, const JointFeedback& feedback, JointCommand& command) noexcept;
   void begin_hold() noexcept;
+  [[nodiscard]] bool looks_first(const ClimbPlanner::Decision& decision) const noexcept;
   void begin_shift(const ClimbPlanner::Decision& decision, bool again) noexcept;
   void lift_off(const StateEstimate& state, const FootholdSet& footholds,
                 const ClimbPlanner::Decision& decision) noexcept;
@@ -159,6 +164,8 @@ class Gait {
   bool started_ = false;
   bool unloaded_ = false;  // the swing foot was felt to leave the ground
   bool retried_ = false;   // the legs could not do a step from the motion the plan was in: once more, from rest
+  bool looks_ = false;     // stands tall, to see its toes
+  bool looked_ = false;    // has, once
   bool settles_ = false;   // the last swing foot landed and carries little yet
   bool felt_ = false;      // its force told of the ground
   bool stop_requested_ = false;

@@ -7,6 +7,7 @@ namespace polygmap {
 namespace {
 
 constexpr double kLongestStep_s = 0.1;  // between two frames, for the fading
+constexpr double kFramesAlike = 20.0;   // in a row see a toe from a base that moves the same way
 
 bool is_unit(const Vec3& v) noexcept { return std::abs(v.squaredNorm() - 1.0) < 1e-3; }  // false for NaN
 
@@ -38,6 +39,7 @@ void MountEstimator::update(const SurfaceFrame& frame, const Stance& stance) noe
   }
   const double dt_s = last_ns_ == 0 ? 0.0 : std::min(seconds(frame.stamp_ns - last_ns_), kLongestStep_s);
   last_ns_ = frame.stamp_ns;
+  learn_ahead(stance, dt_s);
 
   // Level is what the standing soles lie on: treads are parallel to it, and a foot is put down by the same kinematics.
   // Gravity as the estimator has it errs by more than twice as much, and alike in everything but the camera.
@@ -70,17 +72,12 @@ void MountEstimator::update(const SurfaceFrame& frame, const Stance& stance) noe
     sum += weight * (nominal_.R * patch.normal).cross(level).head<2>();
     weights += weight;
   }
-  if (!(weights > 0.0)) return;
+  if (!(weights > 0.0)) return place(level);
   ++counters_.frames;
   // A surface errs in every frame alike: on the stairs many frames of narrow treads, 4 mrad off, must not outvote the
   // few of the floor, 1 mrad off, neither by their number nor by age. So what sees level worse than what is known has
   // been seen counts, and lets fade, by the square of that.
   const double trust = math::square(seen_as_well_ > weights ? weights / seen_as_well_ : 1.0);
-  const auto fuse = [](auto& mean, const auto& value, double fade, double information, double prior_sigma) {
-    mean.information = fade * mean.information + information;
-    mean.weighted = fade * mean.weighted + information * value;
-    return 1.0 / (mean.information + 1.0 / math::square(prior_sigma));
-  };
   const double information = trust / math::square(params_.frame_tilt_sigma_rad);
   const double tilt_variance = fuse(tilt_, Vec2{sum / weights}, math::exp(-trust * dt_s / params_.window_s),
                                     information, params_.prior_tilt_sigma_rad);
@@ -119,7 +116,30 @@ void MountEstimator::update(const SurfaceFrame& frame, const Stance& stance) noe
                                  1.0 / math::square(params_.frame_height_sigma_m), params_.prior_height_sigma_m);
     height_m_ = math::clamp(variance * height_.weighted, -params_.max_height_m, params_.max_height_m);
   }
-  base_T_camera_.p_m = nominal_.p_m + height_m_ * level;
+  place(level);
+}
+
+void MountEstimator::place(const Vec3& base_level) noexcept {
+  const Vec3 ahead = (Vec3::UnitX() - base_level.x() * base_level).normalized();
+  base_T_camera_.p_m = nominal_.p_m + height_m_ * base_level + ahead_m_ * ahead;
+}
+
+void MountEstimator::learn_ahead(const Stance& stance, double dt_s) noexcept {
+  double sum_m = 0.0, information = 0.0;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    const std::optional<ToeSighting>& toe = stance.toes[foot];
+    if (!stance.stands[foot] || !toe || !std::isfinite(toe->ahead_m) || !std::isfinite(toe->sigma_m)) continue;
+    // The toe is in the last rows of a picture: a base that moves alike in many frames shows it off alike in all.
+    const double variance_m2 = math::square(params_.frame_ahead_sigma_m) + math::square(toe->sigma_m) +
+                               kFramesAlike * math::square(params_.half_scan_s * stance.speed_mps);
+    sum_m += toe->ahead_m / variance_m2;
+    information += 1.0 / variance_m2;
+  }
+  if (!(information > 0.0)) return;
+  ++counters_.toes;
+  const double variance_m2 = fuse(ahead_, ahead_m_ - sum_m / information, math::exp(-dt_s / params_.window_s),
+                                  information, params_.prior_ahead_sigma_m);
+  ahead_m_ = math::clamp(variance_m2 * ahead_.weighted, -params_.max_ahead_m, params_.max_ahead_m);
 }
 
 }  // namespace polygmap

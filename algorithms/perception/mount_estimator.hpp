@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the camera really sits on the base: roll, pitch and height, found slowly from the ground that the robot stands
-// on. A mount is known to a degree at best, and a degree is 13 mm at the camera's height. Yaw and the place along the
-// ground cannot be told from level surfaces and stay as the data sheet says.
+// on, and how far ahead, from the toes that it sees. A mount is known to a degree at best, and a degree is 13 mm at the
+// camera's height. Yaw and the place sideways stay as the data sheet says.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "algorithms/core/samples.hpp"
 #include "algorithms/core/surfaces.hpp"
 #include "algorithms/core/transform.hpp"
+#include "algorithms/perception/toe_sight.hpp"
 
 namespace polygmap {
 
@@ -18,9 +20,11 @@ class MountEstimator {
   struct Params {
     double prior_tilt_sigma_rad = 0.0175;  // of the data sheet's roll and pitch
     double prior_height_sigma_m = 0.005;
+    double prior_ahead_sigma_m = 0.003;  // of the data sheet, and of where encoders and leg lengths have a foot
     // Of one frame. Far more than the pixels' noise: frames err alike, and one frame must not decide.
     double frame_tilt_sigma_rad = 0.03;
     double frame_height_sigma_m = 0.010;
+    double frame_ahead_sigma_m = 0.003;
     // What all frames err by alike, which no number of them takes away: soles are as level as their encoders have it (2
     // mrad a joint), gravity as the IMU's mount and bias. With what the surfaces err by, in 24 climbs, from 1 to 10 s
     // after the first frame, 2.5 mrad with white noise and 3.0 with correlated, roll and pitch together.
@@ -30,6 +34,8 @@ class MountEstimator {
     double window_s = 6.0;
     double max_tilt_rad = 2.0 * kPi / 180.0;  // bounds of the estimate
     double max_height_m = 0.008;
+    double max_ahead_m = 0.010;
+    double half_scan_s = 0.008;                // by how much a row of the picture may be older or newer than its stamp
     double tilt_gate_rad = 3.0 * kPi / 180.0;  // from level, as the mount is believed: more is a ramp
     double height_gate_m = 0.020;              // below half of the least step
     double max_tilt_sigma_rad = 0.006;         // of a surface: vaguer ones say what gravity told the fit before
@@ -43,10 +49,14 @@ class MountEstimator {
     Vec3 base_up = Vec3::UnitZ();  // by gravity, unit
     std::array<Transform, kFootCount> base_T_sole;
     std::array<bool, kFootCount> stands{};
+    // By how much a toe is seen ahead of where base_T_sole and base_T_camera() have it; of standing feet.
+    std::array<std::optional<ToeSighting>, kFootCount> toes;
+    double speed_mps = 0.0;  // of the base
   };
   struct Counters {
     std::uint32_t frames = 0;             // that said something about the tilt
     std::uint32_t heights = 0;            // ... about the height
+    std::uint32_t toes = 0;               // ... about how far ahead it sits
     std::uint32_t rejected_frames = 0;    // stance not finite, or not newer than the last frame
     std::uint32_t rejected_surfaces = 0;  // level ones: not finite, or beyond the gate
   };
@@ -62,6 +72,8 @@ class MountEstimator {
   [[nodiscard]] double roll_rad() const noexcept { return tilt_rad_.x(); }
   [[nodiscard]] double pitch_rad() const noexcept { return tilt_rad_.y(); }
   [[nodiscard]] double height_m() const noexcept { return height_m_; }
+  // Along the ground. What legs and encoders are off goes into it: a foot put down by them meets what the camera saw.
+  [[nodiscard]] double ahead_m() const noexcept { return ahead_m_; }
   // One sigma of roll and pitch: what of the data sheet's error is left, and what frames err by alike: the surfaces
   // that were seen, and what told which way is up.
   [[nodiscard]] double tilt_sigma_rad() const noexcept;
@@ -74,15 +86,27 @@ class MountEstimator {
     double information = 0.0;
     T weighted;
   };
+  // Puts one value of a frame into a mean; its variance, the prior's information included.
+  template <typename T>
+  [[nodiscard]] static double fuse(FadingMean<T>& mean, const T& value, double fade, double information,
+                                   double prior_sigma) noexcept {
+    mean.information = fade * mean.information + information;
+    mean.weighted = fade * mean.weighted + information * value;
+    return 1.0 / (mean.information + 1.0 / math::square(prior_sigma));
+  }
   [[nodiscard]] bool usable(const SurfacePatch& patch) const noexcept;
+  void learn_ahead(const Stance& stance, double dt_s) noexcept;
+  void place(const Vec3& base_level) noexcept;
 
   Params params_;
   Transform nominal_;
   Transform base_T_camera_;
   Vec2 tilt_rad_ = Vec2::Zero();
   double height_m_ = 0.0;
+  double ahead_m_ = 0.0;
   FadingMean<Vec2> tilt_{0.0, Vec2::Zero()};
   FadingMean<double> height_{0.0, 0.0};
+  FadingMean<double> ahead_{0.0, 0.0};
   double seen_as_well_ = 0.0;  // 1/rad^2, of level by its surfaces: mean of the frames that the tilt is made of
   double by_gravity_ = 0.0;    // share of that information whose level was gravity's
   std::int64_t last_ns_ = 0;
