@@ -240,17 +240,6 @@ TEST(PhysicalClimb, SameSeedTwice_RepeatsBitForBit) {
   EXPECT_GT(one.status().step.sequence, 1U);
 }
 
-TEST(PhysicalClimb, WithoutFeedbackOfTheDcm_Falls) {
-  Gait::Params params;
-  params.balance.dcm.gain = 0.0;
-  params.balance.dcm.integral_per_s = 0.0;
-  PhysicalClimb climb(few_steps(1), params);
-  climb.run(60.0);
-  while (climb.time_s() < 60.0 && !climb.truth().fell) (void)climb.tick();  // it may stop first
-  EXPECT_TRUE(climb.truth().fell);
-  EXPECT_EQ(climb.status().treads_climbed, 0U);
-}
-
 // Runs on for for_s after the gait ended: upright, on both feet, its centre of mass at rest where planned.
 bool stands_for(PhysicalClimb& climb, double for_s) {
   const double end_s = climb.time_s() + for_s;
@@ -267,6 +256,32 @@ bool run_to_swing_onto(PhysicalClimb& climb, std::uint32_t nth, double limit_s =
     if (onto == nth) return true;
   }
   return false;
+}
+
+// Two gaits that differ in nothing but the feedback see the same climb. From a lift-off on the other one's commands are
+// sent: the swing is under way, and no reason to stop comes before it ends.
+TEST(PhysicalClimb, WithoutFeedbackOfTheDcmFromALiftOffOn_FallsInThatSwing) {
+  for (const bool feedback : {true, false}) {
+    Gait::Params params;
+    if (!feedback) params.balance.dcm.gain = params.balance.dcm.integral_per_s = 0.0;
+    const auto other = std::make_unique<Gait>();
+    other->reset(params);
+    PhysicalClimb climb(few_steps(1));
+    JointCommand its_command;
+    bool lifted = false;
+    climb.tamper_command = [&](JointCommand& command, const FootholdSet& footholds, const JointFeedback& joints) {
+      other->tick(command.stamp_ns, climb.state(), footholds, joints, its_command);
+      if (lifted) command = its_command;
+    };
+    ASSERT_TRUE(run_to_swing_onto(climb, 1));
+    lifted = true;
+    const std::uint32_t swing = climb.status().step.sequence;
+    climb.run(60.0);
+    EXPECT_EQ(climb.truth().fell, !feedback) << climb.truth().fall_reason;
+    if (feedback) continue;
+    EXPECT_EQ(climb.status().step.sequence, swing);
+    EXPECT_NE(climb.status().phase, GaitPhase::kStopped);
+  }
 }
 
 TEST(PhysicalStop, RequestedAtAnyPhase_EndsOnBothFeet) {

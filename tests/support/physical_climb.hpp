@@ -46,6 +46,7 @@ class PhysicalClimb {
       if (tamper_footholds) tamper_footholds(footholds_);
     }
     gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
+    if (tamper_command) tamper_command(command_, footholds_, estimator_.joints());
     estimator_.to_encoders(command_);
     (void)robot_.try_write(command_);
     const GaitPhase phase = gait_.status().phase;
@@ -69,6 +70,8 @@ class PhysicalClimb {
   // May change what the module sees, after it was made.
   std::function<void(JointFeedback&)> tamper;
   std::function<void(FootholdSet&)> tamper_footholds;
+  // The command before it is sent, with what else the gait was told.
+  std::function<void(JointCommand&, const FootholdSet&, const JointFeedback&)> tamper_command;
   bool joints_silent = false;
 
  private:
