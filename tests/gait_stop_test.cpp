@@ -215,6 +215,30 @@ TEST(GaitStop, NeverLinedUpBeforeTheStairs_SaysSo) {
   }
 }
 
+// The body seems to topple towards every foot that lifts.
+TEST(GaitStop, EveryFootGoesBack_StopsAfterSomeAndSaysSo) {
+  for (const bool at_last_it_stands : {false, true}) {
+    IdealClimb climb({});
+    const std::uint32_t most = Gait::Params{}.max_put_back;
+    climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback&) {
+      const LatchedStep& step = climb.status().step;
+      if (climb.status().phase != GaitPhase::kSwing || !step.onto_tread) return;
+      if (at_last_it_stands && climb.status().put_back + 1 == most) return;
+      const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns;
+      if (since_ns > 20 * kNsPerMs && since_ns < 80 * kNsPerMs) {
+        state.odom_v_base_mps.y() += side_sign(step.foot) * 0.15;
+      }
+    };
+    climb.run(60.0);
+    EXPECT_EQ(climb.status().put_back, at_last_it_stands ? most - 1 : most);
+    EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);
+    if (at_last_it_stands) continue;
+    EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+    EXPECT_EQ(climb.status().stop_reason, Obstruction::kToppling);
+    EXPECT_EQ(climb.status().treads_climbed, 0U);
+  }
+}
+
 TEST(GaitFinish, TopSeenAfterAnotherObstruction_WaitsAWholeSecondOfTop) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {

@@ -39,6 +39,7 @@ void Gait::reset(const Params& params) noexcept {
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
   tick_ = shifts_ = wait_ticks_ = idle_ticks_ = off_ticks_ = 0;
+  put_back_ = 0;
   armed_ = started_ = unloaded_ = retried_ = settles_ = stop_requested_ = false;
   pace_.begin();
   // All else is set before it is read: by arming, by start() and by what begins a shift or a swing. A fresh object to
