@@ -239,6 +239,23 @@ TEST(GaitStop, EveryFootGoesBack_StopsAfterSomeAndSaysSo) {
   }
 }
 
+// Stopped with the weight all but over the front foot, where the rear leg allows less height than in the middle.
+TEST(GaitStop, BetweenTwoLevels_RisesAsFarAsTheLegsReachOnceSettled) {
+  IdealClimb climb({});
+  while (!climb.status().step.onto_tread || climb.status().phase == GaitPhase::kSwing) ASSERT_TRUE(climb.tick());
+  for (int i = 0; i < 155; ++i) ASSERT_TRUE(climb.tick());
+  ASSERT_EQ(climb.status().phase, GaitPhase::kDoubleSupport);
+  climb.gait().request_stop();
+  climb.run(5.0);
+  ASSERT_EQ(climb.status().phase, GaitPhase::kStopped);
+  for (int i = 0; i < 1000; ++i) climb.tick();
+  const SolePair soles{sole_pose(climb.true_T_sole(Foot::kLeft)), sole_pose(climb.true_T_sole(Foot::kRight))};
+  ASSERT_GT(std::abs(soles[0].position_m.z() - soles[1].position_m.z()), 0.1);
+  const Gait::Params params;
+  const double height_m = torso_between(params.geometry, params.step.torso, soles).position_m.z();
+  EXPECT_NEAR(climb.true_T_base().p_m.z(), height_m, 0.005);
+}
+
 TEST(GaitFinish, TopSeenAfterAnotherObstruction_WaitsAWholeSecondOfTop) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {

@@ -106,6 +106,7 @@ class Gait {
   [[nodiscard]] double crouch_m() const noexcept;
   void crouch() noexcept;
   void settle_between_feet() noexcept;
+  void rise_between_feet() noexcept;
   void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
   void lower_torso(const SolePose& sole) noexcept;
   void wait_over_stance(const SolePose& sole) noexcept;
