@@ -127,4 +127,30 @@ class PhysicalClimb {
   int ticks_ = 0;
 };
 
+[[nodiscard]] inline SimOptions few_steps(std::uint64_t seed) {
+  SimOptions options;
+  options.seed = seed;
+  options.stairs.steps = 2;
+  return options;
+}
+
+// Runs on for for_s after the gait ended: upright, on both feet, its centre of mass at rest where planned.
+[[nodiscard]] inline bool stands_for(PhysicalClimb& climb, double for_s) {
+  const double end_s = climb.time_s() + for_s;
+  while (climb.time_s() < end_s && !climb.truth().fell) (void)climb.tick();
+  return !climb.truth().fell && climb.truth().in_contact[0] && climb.truth().in_contact[1] &&
+         climb.gait().balance().com_error_m().norm() < 0.02;
+}
+// Until the nth swing onto a tread; false when that never came.
+[[nodiscard]] inline bool run_to_swing_onto(PhysicalClimb& climb, std::uint32_t nth, double limit_s = 40.0) {
+  std::uint32_t onto = 0, sequence = 0;
+  while (climb.time_s() < limit_s && climb.tick()) {
+    const LatchedStep& step = climb.status().step;
+    if (step.sequence != sequence && step.onto_tread) ++onto;
+    sequence = step.sequence;
+    if (onto == nth) return true;
+  }
+  return false;
+}
+
 }  // namespace polygmap::sim
