@@ -36,6 +36,12 @@ Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
       return Progress::kIdle;
     }
     last_frame_ns_ = now_ns;
+    // The map was shed since the last picture: another one would be looked at for nothing, in time that is short.
+    if (mapping_) {
+      camera_port_.release();
+      health_.raise(Limit::kFrameLost, now_ns);
+      return Progress::kIdle;
+    }
     link_.pose_request.back() = {++request_, frame_.stamp_ns};
     link_.pose_request.publish();
     stage_ = FrameStage::kPoseAsked;

@@ -49,7 +49,7 @@ enum class Limit : std::uint8_t {
   kRunsFull,        // runs, intervals and pairs of planes of a frame that found no room
   kHeightRejected,  // a mapped tread's height that disagrees with the sole that landed on it
   kFootPutBack,     // a foot went back in the air to where it had stood
-  kFrameLost,       // a frame whose surfaces never reached the map: the next one came before, or it was not usable
+  kFrameLost,       // a frame that never reached the map: the last one still waited for it, or it was not usable
   kEnd,             // not a limit
 };
 

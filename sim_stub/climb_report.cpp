@@ -156,13 +156,12 @@ void ClimbReport::observe_footsteps(const Truth& truth, const Telemetry& telemet
     f.sequence = step.sequence;
     f.foot = step.foot;
     f.onto_tread = step.onto_tread;
-    f.true_T_planned = true_T_world_ * Transform{rotation_z(step.target.yaw_rad), step.target.position_m};
     if (step.onto_tread) f.map_age_at_latch_ms = ms(step.latch_stamp_ns - step.map_stamp_ns);
     footsteps_.push_back(f);
-    target_ = step.target;
-    const Transform& odom_T_stance = telemetry.state.odom_T_sole[index_of(other(step.foot))];
-    latched_across_m_ = level_frame_p(odom_T_stance, step.odom_T_target.p_m).y();
     landing_pending_ = true;
+    take_target(telemetry);
+  } else if (step.target.position_m != target_.position_m) {  // in the air, beside the standing foot instead
+    take_target(telemetry);
   }
 
   Footstep& f = footsteps_.back();
@@ -181,6 +180,15 @@ void ClimbReport::observe_footsteps(const Truth& truth, const Telemetry& telemet
   if (landing_pending_ && truth.in_contact[index_of(f.foot)]) observe_landing(truth);
 }
 
+void ClimbReport::take_target(const Telemetry& telemetry) {
+  const LatchedStep& step = telemetry.gait.step;
+  target_ = step.target;
+  target_mapped_ = step.height_mapped;
+  footsteps_.back().true_T_planned = true_T_world_ * Transform{rotation_z(step.target.yaw_rad), step.target.position_m};
+  const Transform& odom_T_stance = telemetry.state.odom_T_sole[index_of(other(step.foot))];
+  latched_across_m_ = level_frame_p(odom_T_stance, step.odom_T_target.p_m).y();
+}
+
 void ClimbReport::observe_landing(const Truth& truth) {
   Footstep& f = footsteps_.back();
   const std::size_t foot = index_of(f.foot);
@@ -192,10 +200,10 @@ void ClimbReport::observe_landing(const Truth& truth) {
   standing_footstep_[foot] = static_cast<int>(footsteps_.size()) - 1;
   if (!f.onto_tread || world_.steps.empty()) return;
 
-  if (f.step_index >= 0) {
+  if (target_mapped_ && f.step_index >= 0) {
     f.along_error_m = target_.nosing_distance_m -
                       nosing_distance_m(world_.steps[static_cast<std::size_t>(f.step_index)], true_T_sole);
-  } else {
+  } else if (target_mapped_) {
     // It stands on the floor although a tread was meant: the nosing that makes the error least is the meant one.
     for (const Step& step : world_.steps) {
       const double error_m = target_.nosing_distance_m - nosing_distance_m(step, true_T_sole);
@@ -357,9 +365,9 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
       last_seen.push_back(f.target_last_seen_ms);
     }
     if (!f.landed) continue;
-    along.push_back(std::abs(f.along_error_m));
     across.push_back(std::abs(f.across_error_m));
-    foothold.push_back(std::max(along.back(), across.back()));
+    if (!std::isnan(f.along_error_m)) along.push_back(std::abs(f.along_error_m));
+    foothold.push_back(std::fmax(std::abs(f.along_error_m), across.back()));  // of one that is no number: the other
   }
   s.execution_error_m = spread_of(execution);
   s.foothold_error_m = spread_of(foothold);

@@ -72,6 +72,7 @@ class ClimbReport {
   void observe_surfaces(const SurfaceFrame& frame);
   void observe_map(const Telemetry& telemetry);
   void observe_footsteps(const Truth& truth, const Telemetry& telemetry);
+  void take_target(const Telemetry& telemetry);
   void observe_landing(const Truth& truth);
   void observe_tracking(const Truth& truth, const GaitStatus& gait);
   void observe_balance(const Truth& truth, const Telemetry& telemetry);
@@ -114,7 +115,8 @@ class ClimbReport {
 
   std::vector<Footstep> footsteps_;
   Foothold target_;              // of the newest footstep
-  double latched_across_m_ = 0;  // the same: target's lateral place seen from the stance sole
+  double latched_across_m_ = 0;  // the same: target's lateral place seen from the stance sole when it was chosen
+  bool target_mapped_ = false;   // the same: on a mapped tread, not beside the standing foot
   bool landing_pending_ = false;
   double com_tracking_max_m_ = kNotMeasured, zmp_margin_min_m_ = kNotMeasured;
   std::array<double, kJointsPerLeg> torque_peak_ratio_{}, joint_speed_peak_ratio_{};

@@ -41,6 +41,8 @@ std::string why_stopped(Obstruction reason, double measured_m) {
       return "it did not come to stand straight before the stairs";
     case Obstruction::kGroundMissing:
       return "there was no ground where a foot came down, and it put the foot back";
+    case Obstruction::kToppling:
+      return "its body kept toppling towards the foot it lifted, and it put every one back";
     case Obstruction::kStateStale:
       return "its IMU or its joints fell silent";
   }

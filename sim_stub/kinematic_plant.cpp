@@ -49,7 +49,7 @@ double smooth_step(double x) {
 
 KinematicPlant::KinematicPlant(const Params& params, const StairWorld& world, const RobotErrors& errors,
                                const Transform& true_T_start, const JointVector& q_rad)
-    : params_(params), world_(world), errors_(errors), solids_(stair_solids(world)), q_(q_rad) {
+    : params_(params), world_(world), errors_(errors), solids_(stair_solids(world)), q_(q_rad), led_q_(q_rad) {
   update_leg_kinematics();
   for (FootState& foot : feet_) {
     foot.true_T_sole = flattened(true_T_start * foot.base_T_sole, 0.0);
@@ -59,6 +59,8 @@ KinematicPlant::KinematicPlant(const Params& params, const StairWorld& world, co
   transfer_load();
   share_rate_ = 0.0;
   move_base();
+  give_way(1.0);
+  q_ = led_q_ + given_;
   for (std::size_t f = 0; f < kFootCount; ++f) {
     feet_[f].gap_m = gap_m(f);
     feet_[f].base_offset.p_rate.setZero();
@@ -111,6 +113,7 @@ void KinematicPlant::step(const JointCommand& command) {
   transfer_load();
   lift_feet();
   move_base();
+  give_way(1.0 - std::exp(-kPlantTick_s / params_.drive_lag_s));
   move_swing_feet();
   load_drives();
   check_falls();
@@ -150,15 +153,16 @@ void KinematicPlant::move_joints(const JointVector& command_rad, const JointVect
     const double reach = limits.speed_radps * dt;
     const double target_rad = command_rad[i] + params_.drive_lag_s * rate_radps[i];
     for (int k = 0; k < kDriveSubsteps; ++k) {
-      q_[i] += math::clamp(gain * (target_rad - q_[i]), -reach, reach);
-      q_[i] = math::clamp(q_[i], limits.min_rad, limits.max_rad);
+      led_q_[i] += math::clamp(gain * (target_rad - led_q_[i]), -reach, reach);
+      led_q_[i] = math::clamp(led_q_[i], limits.min_rad, limits.max_rad);
     }
   }
+  q_ = led_q_ + given_;
   dq_ = (q_ - before) / kPlantTick_s;
 }
 
 void KinematicPlant::update_leg_kinematics() {
-  const JointVector q = true_q_rad();
+  const JointVector q = led_q_ - errors_.encoder_offset_rad;
   for (std::size_t f = 0; f < kFootCount; ++f) {
     FootState& foot = feet_[f];
     foot.base_T_sole = base_T_sole(errors_.legs[f], static_cast<Foot>(f), leg_joints(q, static_cast<Foot>(f)));
@@ -269,6 +273,21 @@ void KinematicPlant::move_base() {
     const Vec3 turn_rad = rotation_vector(foot.true_T_base.R.transpose() * true_T_base_.R);
     foot.base_offset = {p_m, (p_m - foot.base_offset.p_m) / kPlantTick_s, turn_rad,
                         (turn_rad - foot.base_offset.turn_rad) / kPlantTick_s};
+  }
+}
+
+// Of what is missing until the standing soles are flat under the base and the others are where they are led, a share.
+void KinematicPlant::give_way(double share) {
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    const FootState& foot = feet_[f];
+    const Mat3 flat_R_led = foot.true_T_sole.R.transpose() * true_T_base_.R * foot.base_T_sole.R;
+    const Vec3 off_rad = foot.anchored ? rotation_vector(flat_R_led) : Vec3::Zero();
+    const auto give = [&](LegJoint joint, double by_rad) {
+      double& given_rad = given_[static_cast<Eigen::Index>(joint_index(static_cast<Foot>(f), joint))];
+      given_rad += share * (by_rad - given_rad);
+    };
+    give(kAnkleRoll, -off_rad.x());
+    give(kAnklePitch, -off_rad.y());
   }
 }
 

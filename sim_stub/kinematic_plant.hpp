@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The robot without dynamics: 12 joints that follow their commands, and a base that stands on the feet that touch.
+// The robot without dynamics: 12 joints that follow their commands, and a base that stands on the feet that touch. The
+// ankles of these give way to what stands flat: where two legs disagree about the base's attitude, the encoders say so.
 #pragma once
 
 #include <array>
@@ -21,7 +22,9 @@ class KinematicPlant final : public Plant {
  public:
   struct Params {
     double drive_lag_s = 0.010;
-    double share_bandwidth_radps = 20.0;  // of the critically damped load transfer: 0.2 s to move nine tenths
+    // Of the critically damped load transfer: 0.1 s to move nine tenths. Twice as slow, half of the weight was still on
+    // a foot that lifts when the zero-moment point has been over the other one for 30 ms.
+    double share_bandwidth_radps = 40.0;
     double lift_height_m = 0.002;         // a sole this far above its anchor has left it
     double lift_share = 0.1;              // unless it carries more than this
     double loaded_lift_height_m = 0.010;  // raised this far it is off in any case,
@@ -77,6 +80,7 @@ class KinematicPlant final : public Plant {
   void transfer_load();
   void lift_feet();
   void move_base();
+  void give_way(double share);
   void move_swing_feet();
   void load_drives();
   [[nodiscard]] Vec3 true_p_mass_m() const;
@@ -92,7 +96,9 @@ class KinematicPlant final : public Plant {
   std::vector<SolidBox> solids_;
   std::array<FootState, kFootCount> feet_;
   JointVector q_, dq_ = JointVector::Zero();
-  JointVector tau_ = JointVector::Zero();  // of massless legs that stand, quasi-static
+  JointVector led_q_;                        // as the commands have led the joints:
+  JointVector given_ = JointVector::Zero();  // and this further, by which the ankles have given way
+  JointVector tau_ = JointVector::Zero();    // of massless legs that stand, quasi-static
   Transform true_T_base_;
   Slack slack_;
   double share_ = 0.5, share_rate_ = 0.0;  // of the left foot

@@ -129,7 +129,7 @@ class FootholdTest : public ::testing::Test {
 
 LevelSurface prepared(const MapPolygon& polygon) {
   LevelSurface out;
-  EXPECT_TRUE(prepare(polygon, 0.0, out));
+  EXPECT_TRUE(prepare(polygon, 0.0, EdgeMargin{}, out));
   return out;
 }
 
@@ -532,19 +532,35 @@ TEST_F(FootholdTest, ShortLanding_SaysTopWhenItsEndWasSeen) {
 // What the map does not know well is given away from the clearance.
 TEST_F(FootholdTest, EdgesKnownVaguely_FootholdIsRefusedWithThatReason) {
   const Stairs s{.tread_m = 0.275};
-  const auto with_sigma = [&](double nosing_m, double back_m) {
+  const auto with_sigma = [&](double sigma_m) {
     MapSnapshot map = ideal_map(s);
-    for (MapPolygon& p : map.polygons) {
-      p.surface.nosing.sigma_m = nosing_m;
-      p.surface.back.sigma_m = back_m;
-    }
+    for (MapPolygon& p : map.polygons) p.surface.nosing.sigma_m = p.surface.back.sigma_m = sigma_m;
     return map;
   };
-  // 11.5 mm of room at either end, 3 mm of them always kept, the rest is 4.25 mm twice.
-  EXPECT_EQ(search(with_sigma(0.0041, 0.0041), standing(s, 0)).obstruction, Obstruction::kNone);
-  for (const auto& [nosing_m, back_m] : {std::pair{0.0045, 0.001}, std::pair{0.001, 0.0045}}) {
-    EXPECT_EQ(search(with_sigma(nosing_m, back_m), standing(s, 0)).obstruction, Obstruction::kEdgeUncertain);
-    EXPECT_FALSE(search_->result().has_p_star);
+  // 11.5 mm of room at either end: two sigmas of the edge and of the foot's 2.2 mm.
+  EXPECT_EQ(search(with_sigma(0.0052), standing(s, 0)).obstruction, Obstruction::kNone);
+  EXPECT_EQ(search(with_sigma(0.0054), standing(s, 0)).obstruction, Obstruction::kEdgeUncertain);
+  EXPECT_FALSE(search_->result().has_p_star);
+}
+
+// A foot in the middle would be refused for the nosing alone, with room to spare behind.
+TEST_F(FootholdTest, NosingKnownWorseThanTheRiser_FootStandsFartherFromIt) {
+  const Stairs s{.tread_m = 0.275};
+  MapSnapshot map = ideal_map(s);
+  const auto tread = std::find_if(map.polygons.begin(), map.polygons.end(), [&](const MapPolygon& p) {
+    return p.surface.kind == SurfaceKind::kTread && std::abs(p.surface.centroid_m.z() - s.rise_m) < 0.01;
+  });
+  ASSERT_NE(tread, map.polygons.end());
+  for (const auto& [nosing_m, back_m] : {std::pair{0.0060, 0.001}, std::pair{0.001, 0.0060}}) {
+    tread->surface.nosing.sigma_m = nosing_m;
+    tread->surface.back.sigma_m = back_m;
+    const FootholdSet& r = search(map, standing(s, 0));
+    EXPECT_EQ(r.obstruction, Obstruction::kNone);
+    const double more_m = 2.0 * (std::hypot(nosing_m, 0.0022) - std::hypot(back_m, 0.0022));
+    for (const Foothold& foot : r.p_star_feet) {
+      const double heel_m = foot.nosing_distance_m + kContactRectangle.heel_x_m;
+      EXPECT_NEAR(heel_m - foot.toe_clearance_m, more_m, 1e-9);
+    }
   }
 }
 

@@ -236,7 +236,7 @@ TEST(StepSearch, PassingStepThatIsPossibleWithNoTrailingStepAfterIt_IsImpossible
 }
 
 // The left foot onto a tread, and the right one after it.
-StepSearch leading_search(double rise_m, double ahead_m) {
+StepSearch leading_search(double rise_m, double ahead_m, const StepParams& params = {}) {
   std::array<Transform, kFootCount> soles;
   TorsoTrajectory::State from;
   const StepPlan plan = stair_step(StepKind::kLeading, rise_m, ahead_m, soles, from);
@@ -245,14 +245,16 @@ StepSearch leading_search(double rise_m, double ahead_m) {
   trailing.foot = Foot::kRight;
   trailing.target.position_m.y() = -0.1;
   StepSearch search;
-  search.begin({}, {}, plan.goal, trailing, StepParams{}.stair_shift_ticks, from, soles);
+  search.begin({}, params, plan.goal, trailing, params.stair_shift_ticks, from, soles);
   return search;
 }
 
 TEST(StepSearch, RiseTooFastForTheDrives_IsDoneInALongerSwing) {
-  StepSearch search = leading_search(0.182, 0.35);
+  StepParams fast;
+  fast.stair_swing_ticks = 430;
+  StepSearch search = leading_search(0.182, 0.35, fast);
   EXPECT_EQ(finish(search), StepSearch::State::kFound);
-  EXPECT_GT(search.plan().swing_ticks, StepParams{}.stair_swing_ticks);
+  EXPECT_GT(search.plan().swing_ticks, fast.stair_swing_ticks);
 }
 
 TEST(StepSearch, RiseBeyondTheLegs_IsImpossibleBeforeTheFirstLiftOff) {

@@ -215,6 +215,47 @@ TEST(GaitStop, NeverLinedUpBeforeTheStairs_SaysSo) {
   }
 }
 
+// The body seems to topple towards every foot that lifts.
+TEST(GaitStop, EveryFootGoesBack_StopsAfterSomeAndSaysSo) {
+  for (const bool at_last_it_stands : {false, true}) {
+    IdealClimb climb({});
+    const std::uint32_t most = Gait::Params{}.max_put_back;
+    climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback&) {
+      const LatchedStep& step = climb.status().step;
+      if (climb.status().phase != GaitPhase::kSwing || !step.onto_tread) return;
+      if (at_last_it_stands && climb.status().put_back + 1 == most) return;
+      const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns;
+      if (since_ns > 20 * kNsPerMs && since_ns < 80 * kNsPerMs) {
+        state.odom_v_base_mps.y() += side_sign(step.foot) * 0.15;
+      }
+    };
+    climb.run(60.0);
+    EXPECT_EQ(climb.status().put_back, at_last_it_stands ? most - 1 : most);
+    EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);
+    if (at_last_it_stands) continue;
+    EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+    EXPECT_EQ(climb.status().stop_reason, Obstruction::kToppling);
+    EXPECT_EQ(climb.status().treads_climbed, 0U);
+  }
+}
+
+// Stopped with the weight all but over the front foot, where the rear leg allows less height than in the middle.
+TEST(GaitStop, BetweenTwoLevels_RisesAsFarAsTheLegsReachOnceSettled) {
+  IdealClimb climb({});
+  while (!climb.status().step.onto_tread || climb.status().phase == GaitPhase::kSwing) ASSERT_TRUE(climb.tick());
+  for (int i = 0; i < 155; ++i) ASSERT_TRUE(climb.tick());
+  ASSERT_EQ(climb.status().phase, GaitPhase::kDoubleSupport);
+  climb.gait().request_stop();
+  climb.run(5.0);
+  ASSERT_EQ(climb.status().phase, GaitPhase::kStopped);
+  for (int i = 0; i < 1000; ++i) climb.tick();
+  const SolePair soles{sole_pose(climb.true_T_sole(Foot::kLeft)), sole_pose(climb.true_T_sole(Foot::kRight))};
+  ASSERT_GT(std::abs(soles[0].position_m.z() - soles[1].position_m.z()), 0.1);
+  const Gait::Params params;
+  const double height_m = torso_between(params.geometry, params.step.torso, soles).position_m.z();
+  EXPECT_NEAR(climb.true_T_base().p_m.z(), height_m, 0.005);
+}
+
 TEST(GaitFinish, TopSeenAfterAnotherObstruction_WaitsAWholeSecondOfTop) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {

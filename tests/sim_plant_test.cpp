@@ -178,6 +178,25 @@ TEST(SimPlant, Encoders_OfManySeeds_HaveOffsetAndNoise) {
   EXPECT_NEAR(std::sqrt(noise2 / count), 2e-4, 2e-5);
 }
 
+// Drives give way where two legs cannot both be as they are led: else no encoder would tell of its own offset.
+TEST(SimPlant, LegsThatDisagreeAboutTheAttitude_StandFlatByTheirTrueAngles) {
+  double given_rad = 0.0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimOptions options = ideal();
+    options.errors = {};
+    options.seed = seed;
+    SimRobot robot(options);
+    for (int i = 0; i < 100; ++i) robot.advance();
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const LegVector q = leg_joints(robot.true_q_rad(), foot);
+      const Mat3 R = robot.truth().true_T_base.R * base_T_sole(robot.errors().legs[index_of(foot)], foot, q).R;
+      EXPECT_LT(R.col(2).head<2>().norm(), 1e-4) << seed;
+      given_rad = std::max(given_rad, std::abs(leg_joints(robot.plant().drive_q_rad(), foot)[kAnkleRoll]));
+    }
+  }
+  EXPECT_GT(given_rad, 2e-3);
+}
+
 TEST(SimPlant, LegLengths_OfManySeeds_DifferFromTheDataSheet) {
   double squares = 0, apart = 0;
   for (std::uint64_t seed = 1; seed <= 500; ++seed) {
@@ -259,7 +278,7 @@ TEST(SimPlant, StepInPlace_LiftsAndTouchesWithoutJumpsOfTheBase) {
     EXPECT_NEAR(robot.truth().load_share[0], 0.5, 0.1);
     EXPECT_FALSE(robot.truth().fell) << robot.truth().fall_reason;
     EXPECT_LT(hardest_mps2, with_errors ? 2.5 : 2.0);  // the script itself asks for 0.9
-    EXPECT_LT(jump_share, 0.01);
+    EXPECT_LT(jump_share, 0.015);                      // from one foot to the other at once it would be 0.029
   }
 }
 

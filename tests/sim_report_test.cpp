@@ -261,6 +261,46 @@ TEST(ClimbReport, FootholdError_IsMeasuredAlongATurnedFoot) {
   EXPECT_NEAR(climb.finish().footsteps[0].along_error_m, 0.1 - 0.1 / std::cos(0.2), kUm);
 }
 
+// A passing foot that lands beside the standing one was sent there: it missed nothing.
+TEST(ClimbReport, TargetChangedInTheAir_LandingIsScoredAgainstTheNewOne) {
+  ScriptedClimb climb(plain_stairs(3));
+  climb.wait(100 * kNsPerMs);
+  climb.swing(Foot::kLeft, climb.on_step(0, Foot::kLeft), 0);
+  LatchedStep& step = climb.gait.step;
+  step.sequence = 2;
+  step.foot = Foot::kRight;
+  step.touch_down_stamp_ns = 0;
+  Transform target = climb.on_step(1, Foot::kRight, 0.11);
+  const auto aim = [&] {
+    step.target.position_m = climb.world_T_true() * target.p_m;
+    step.odom_T_target = climb.odom_T_true * target;
+  };
+  aim();
+  step.target.nosing_distance_m = 0.11;
+  climb.truth.in_contact[1] = false;
+  climb.tick();
+  target = climb.on_step(0, Foot::kRight);
+  target.p_m.y() += 0.02;
+  aim();
+  step.target.nosing_distance_m = 0.0;
+  step.height_mapped = false;
+  climb.tick();
+  climb.truth.in_contact[1] = true;
+  climb.truth.step_index[1] = 0;
+  climb.truth.true_T_sole[1] = target;
+  climb.truth.true_T_sole[1].p_m.y() -= 0.003;
+  step.touch_down_stamp_ns = climb.now_ns;
+  step.odom_T_executed = step.odom_T_target;
+  climb.tick();
+  const ClimbSummary s = climb.finish();
+  ASSERT_TRUE(s.footsteps[1].landed);
+  EXPECT_NEAR((s.footsteps[1].true_T_planned.p_m - target.p_m).norm(), 0.0, kUm);
+  EXPECT_TRUE(std::isnan(s.footsteps[1].along_error_m));
+  EXPECT_NEAR(s.footsteps[1].across_error_m, 0.003, kUm);
+  EXPECT_NEAR(s.foothold_error_m.max, 0.003, kUm);
+  EXPECT_NEAR(s.foothold_error_along_m.max, 0.0, kUm);
+}
+
 TEST(ClimbReport, EarlyTouchDownReport_TakesTheTruthWhenTheSoleStands) {
   ScriptedClimb climb(plain_stairs(1));
   climb.wait(100 * kNsPerMs);

@@ -61,13 +61,19 @@ TEST(Swing_Eq32Eq33, WholePath_IsContinuousInPositionAndSpeed) {
 
 TEST(Swing_Eq33, Forward_NeverOvershootsAndEndsBeforeTheLanding) {
   const Swing swing = make({0.13, 0.3});
+  const SwingShape shape;
   for (int i = 0; i <= kTicks; ++i) EXPECT_LE(front_m(swing.at(i)), 0.28 + kCollisionRectangle.toe_x_m + 1e-9) << i;
   for (int i = 0; i <= kTicks; ++i) {
     const Transform sole = swing.at(i);
-    if (i > kTicks / 2 && lowest_m(sole) < 0.13 + 0.03) {
-      EXPECT_NEAR(sole.p_m.x(), 0.28, 1e-3) << i;  // straight down over the last 30 mm
-    }
+    if (i <= kTicks / 2) continue;
+    // Nearly straight down over the last 30 mm, and straight over the last 5.
+    const double above_m = lowest_m(sole) - 0.13;
+    const double off_m = above_m < 0.005 ? 1e-4 : above_m < 0.03 ? shape.short_m + 1e-3 : 1.0;
+    EXPECT_NEAR(sole.p_m.x(), 0.28, off_m) << i;
   }
+  // Where it stops it may come too far.
+  const double stops = shape.forward_end * kTicks;
+  EXPECT_LT(front_m(swing.at(stops)), 0.28 + kCollisionRectangle.toe_x_m - 0.003);
 }
 
 TEST(Swing, RiserAtTheToe_RisesBeforeItGoesForward) {

@@ -44,6 +44,7 @@ enum class Obstruction : std::uint8_t {
   kUnsteady,       // what the search offers keeps changing
   kNotLinedUp,     // so many steps on the floor, and it does not stand straight before the stairs
   kGroundMissing,  // no ground where the foot came down: it was put back where it had stood
+  kToppling,       // one foot after the other went back to where it had stood, since the body toppled towards it
   kStateStale,     // IMU or joint feedback fell silent
 };
 

@@ -18,8 +18,7 @@ class FootholdRaster {
 
   struct Cell {
     float z_m = -std::numeric_limits<float>::infinity();
-    float clearance_m = 0.0F;       // signed: contact rectangle to the edges (eq. 25)
-    float toe_clearance_m = 0.0F;   // signed: collision box to what rises behind
+    float spare_m = 0.0F;           // signed: of a foot here to the edges and what rises behind, beyond its margins
     std::uint8_t layer = kNoLayer;  // index of the surface: one layer per mapped surface (eq. 24)
   };
 
@@ -45,7 +44,7 @@ class FootholdRaster {
       // tilted one (a floor tilted by 5 mrad is 5 mm off at 1 m).
       const auto z_m = static_cast<float>(surface.plane.height_m(at(column, row)));
       Cell& cell = cells_(column, row);
-      if (z_m > cell.z_m) cell = {z_m, 0.0F, 0.0F, layer};
+      if (z_m > cell.z_m) cell = {z_m, 0.0F, layer};
     }
   }
 

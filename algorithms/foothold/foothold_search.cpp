@@ -113,7 +113,7 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
   const bool confirmed = polygon.sightings >= params_.confirmed_sightings;
   if (surface.kind == SurfaceKind::kTread && surface.area_m2 >= params_.area_min_m2) {
     LevelSurface level;
-    if (!prepare(polygon, yaw_of(query_.world_T_base.R), level)) return;
+    if (!prepare(polygon, yaw_of(query_.world_T_base.R), params_.margin, level)) return;
     if (confirmed) {
       (void)levels_.try_push_back(level);  // as many as the map holds
     } else if (level.height_m > z_foot_ + params_.delta_foot_m &&
@@ -144,12 +144,13 @@ void FootholdSearch::link(std::size_t i) noexcept {
     const LevelSurface& other = levels_[j];
     const double rise_m = other.height_m - tread.height_m;
     if (j == i || !other.has_nosing || rise_m < params_.delta_foot_m) continue;
-    add_toe_limit(tread, {other.nosing_middle_m(), other.left}, other.nosing_sigma_m, kNearestBack_m, kFarthestBack_m);
+    add_toe_limit(tread, {other.nosing_middle_m(), other.left}, other.nosing_margin_m, kNearestBack_m, kFarthestBack_m);
   }
   for (const Upright& upright : uprights_) {
     if (upright.top_m < tread.height_m + params_.delta_foot_m || upright.outward.dot(tread.heading) > -kFacing)
       continue;
-    add_toe_limit(tread, {upright.point_m, upright.direction}, upright.sigma_m, kNearestBack_m, kFarthestBack_m);
+    add_toe_limit(tread, {upright.point_m, upright.direction}, params_.margin.of(upright.sigma_m), kNearestBack_m,
+                  kFarthestBack_m);
   }
   const Vec2& sole_p_m = sole_.origin_m();
   const double along_m = tread.along_m(sole_p_m);
@@ -192,8 +193,7 @@ void FootholdSearch::raster_row(std::int32_t row) noexcept {
 
 bool FootholdSearch::fits(const FootholdRaster::Cell& cell) const noexcept {
   // A cell survives when a foot may fit somewhere in it: half its diagonal is forgiven here and not in the refinement.
-  const double least_m = params_.clearance_min_m - params_.g_res_m * std::numbers::sqrt2 / 2.0;
-  return cell.layer != FootholdRaster::kNoLayer && cell.clearance_m >= least_m && cell.toe_clearance_m >= least_m;
+  return cell.layer != FootholdRaster::kNoLayer && cell.spare_m >= -params_.g_res_m * std::numbers::sqrt2 / 2.0;
 }
 
 // Erosion of each layer, eqs (24)-(25). A layer is a mapped surface, since the map has already put together what lies
@@ -206,8 +206,7 @@ void FootholdSearch::erode_row(std::int32_t row) noexcept {
     if (cell.layer == FootholdRaster::kNoLayer) continue;
     const LevelSurface& surface = levels_[cell.layer];
     const Vec2 p = raster_.at(column, row);
-    cell.clearance_m = static_cast<float>(surface.contact_clearance_m(p, params_.edge_sigmas));
-    cell.toe_clearance_m = static_cast<float>(surface.toe_clearance_m(p, params_.edge_sigmas));
+    cell.spare_m = static_cast<float>(surface.spare_m(p));
     if (!fits(cell)) continue;
     // Eq. (26), on the tread that comes next.
     const double distance2 = (p - base_.origin_m()).squaredNorm();
@@ -219,23 +218,27 @@ void FootholdSearch::erode_row(std::int32_t row) noexcept {
   }
 }
 
-// Sole origin behind the nosing for a foot between two lateral positions: centred between heel and toe limits, but not
-// deep into a long tread.
+// Sole origin behind the nosing for a foot between two lateral positions: as much to spare at the heel as at the toe,
+// but not deep into a long tread.
 double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, double right_m) const noexcept {
   const double heel_m = -kContactRectangle.heel_x_m;
-  double room_m = 2.0 * params_.heel_inset_m;
+  const double margin_m = tread.nosing_margin_m;
+  double spare_m = 2.0 * (params_.heel_inset_m - margin_m);  // where nothing is mapped behind
   if (!tread.toe.empty()) {
-    room_m = kInfinity;
+    spare_m = kInfinity;
     for (const FootLimit& limit : tread.toe) {
       for (const double lateral_m : {left_m, right_m}) {
         const double closing = -limit.inside.inward.dot(tread.heading);  // over 0.86, see add_toe_limit
-        room_m = std::min(room_m, limit.clearance_m(tread.at(heel_m, lateral_m)) / closing);
+        spare_m = std::min(spare_m, limit.spare_m(tread.at(heel_m, lateral_m)) / closing - margin_m);
       }
     }
   }
   // A tread that ends in nothing ends all the same: the next riser may be there and not be seen.
-  if (tread.far_end_m) room_m = std::min(room_m, *tread.far_end_m - heel_m - kCollisionRectangle.toe_x_m);
-  return heel_m + math::clamp(0.5 * room_m, 0.0, params_.heel_inset_max_m);
+  if (tread.far_end_m) {
+    const double room_m = *tread.far_end_m - heel_m - kCollisionRectangle.toe_x_m;
+    spare_m = std::min(spare_m, room_m - margin_m - tread.back_margin_m);
+  }
+  return heel_m + math::clamp(margin_m + 0.5 * spare_m, 0.0, params_.heel_inset_max_m);
 }
 
 Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept {
@@ -339,14 +342,8 @@ Obstruction FootholdSearch::without_next() const noexcept {
 Obstruction FootholdSearch::judge_feet(const LevelSurface& tread, const Feet& feet) const noexcept {
   for (const Foothold& f : feet) {
     // Reaching over the end of what has been seen of it.
-    if (f.clearance_m < params_.clearance_min_m || f.toe_clearance_m < params_.clearance_min_m) {
-      return Obstruction::kNothingSeen;
-    }
-    const Vec2 p = f.position_m.head<2>();
-    if (std::min(tread.contact_clearance_m(p, params_.edge_sigmas), tread.toe_clearance_m(p, params_.edge_sigmas)) <
-        params_.clearance_min_m) {
-      return Obstruction::kEdgeUncertain;
-    }
+    if (std::min(f.clearance_m, f.toe_clearance_m) < params_.margin.least_m) return Obstruction::kNothingSeen;
+    if (tread.spare_m(f.position_m.head<2>()) < 0.0) return Obstruction::kEdgeUncertain;
   }
   return Obstruction::kNone;
 }

@@ -12,10 +12,10 @@ double reach_m(const SoleRectangle& foot, const Vec2& heading, const Vec2& inwar
   return std::max(-ahead * foot.toe_x_m, -ahead * foot.heel_x_m) + foot.half_width_m * std::abs(cross(heading, inward));
 }
 
-double least_m(const auto& limits, const Vec2& p_m, double sigmas) noexcept {
-  double clearance_m = std::numeric_limits<double>::infinity();
-  for (const FootLimit& limit : limits) clearance_m = std::min(clearance_m, limit.clearance_m(p_m, sigmas));
-  return clearance_m;
+double least_m(const auto& limits, auto&& of) noexcept {
+  double least_m = std::numeric_limits<double>::infinity();
+  for (const FootLimit& limit : limits) least_m = std::min(least_m, of(limit));
+  return least_m;
 }
 
 constexpr double kSide = 0.2;  // sine of an edge's turn against the nosing from which it bounds a side
@@ -44,14 +44,18 @@ void note_ends(const SurfacePatch& surface, LevelSurface& out) noexcept {
 
 }  // namespace
 
-double LevelSurface::contact_clearance_m(const Vec2& p_m, double sigmas) const noexcept {
-  return least_m(edges, p_m, sigmas);
+double LevelSurface::contact_clearance_m(const Vec2& p_m) const noexcept {
+  return least_m(edges, [&](const FootLimit& limit) { return limit.clearance_m(p_m); });
 }
-double LevelSurface::toe_clearance_m(const Vec2& p_m, double sigmas) const noexcept {
-  return least_m(toe, p_m, sigmas);
+double LevelSurface::toe_clearance_m(const Vec2& p_m) const noexcept {
+  return least_m(toe, [&](const FootLimit& limit) { return limit.clearance_m(p_m); });
+}
+double LevelSurface::spare_m(const Vec2& p_m) const noexcept {
+  const auto of = [&](const FootLimit& limit) { return limit.spare_m(p_m); };
+  return std::min(least_m(edges, of), least_m(toe, of));
 }
 
-bool prepare(const MapPolygon& polygon, double base_yaw_rad, LevelSurface& out) noexcept {
+bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& margin, LevelSurface& out) noexcept {
   const SurfacePatch& surface = polygon.surface;
   out = {};
   out.id = polygon.id;
@@ -79,28 +83,29 @@ bool prepare(const MapPolygon& polygon, double base_yaw_rad, LevelSurface& out) 
     const bool a_is_left = out.left.dot((surface.nosing.a_m - surface.nosing.b_m).head<2>()) > 0.0;
     out.nosing_a_m = a_is_left ? surface.nosing.a_m : surface.nosing.b_m;
     out.nosing_b_m = a_is_left ? surface.nosing.b_m : surface.nosing.a_m;
-    out.nosing_sigma_m = surface.nosing.sigma_m;
+    out.nosing_margin_m = margin.of(surface.nosing.sigma_m);
   }
+  out.back_margin_m = surface.back.valid ? margin.of(surface.back.sigma_m) : out.nosing_margin_m;
   out.height_m = out.plane.height_m(out.has_nosing ? out.nosing_middle_m() : centre);
 
   note_ends(surface, out);
   for (std::size_t i = 0; i < out.hull.size(); ++i) {
     const HalfPlane inside = edge_half_plane(out.hull, i);
     const double facing = inside.inward.dot(out.heading);
-    double sigma_m = 0.0;  // the sides keep a margin of their own
-    if (facing > kCos30 && surface.nosing.valid) sigma_m = surface.nosing.sigma_m;
-    if (facing < -kCos30 && surface.back.valid) sigma_m = surface.back.sigma_m;
-    (void)out.edges.try_push_back({inside, reach_m(kContactRectangle, out.heading, inside.inward), sigma_m,
+    double margin_m = margin.least_m;  // the sides keep one of their own
+    if (facing > kCos30 && surface.nosing.valid) margin_m = out.nosing_margin_m;
+    if (facing < -kCos30 && surface.back.valid) margin_m = out.back_margin_m;
+    (void)out.edges.try_push_back({inside, reach_m(kContactRectangle, out.heading, inside.inward), margin_m,
                                    std::abs(inside.inward.dot(out.left)) > kSide});
   }
   if (out.has_nosing && surface.back.valid) {
     const std::optional<Line2> back = line_through(surface.back.a_m.head<2>(), surface.back.b_m.head<2>());
-    if (back) add_toe_limit(out, *back, surface.back.sigma_m, 0.0, std::numeric_limits<double>::infinity());
+    if (back) add_toe_limit(out, *back, out.back_margin_m, 0.0, std::numeric_limits<double>::infinity());
   }
   return true;
 }
 
-void add_toe_limit(LevelSurface& surface, const Line2& line, double sigma_m, double min_m, double max_m) noexcept {
+void add_toe_limit(LevelSurface& surface, const Line2& line, double margin_m, double min_m, double max_m) noexcept {
   const auto& [point_m, direction] = line;
   const double across = direction.dot(surface.left);
   if (std::abs(across) < kCos30) return;
@@ -110,7 +115,7 @@ void add_toe_limit(LevelSurface& surface, const Line2& line, double sigma_m, dou
   if (!(depth_m > min_m) || !(depth_m < max_m)) return;
   const Vec2 inward = -left_of(direction) * (left_of(direction).dot(surface.heading) > 0.0 ? 1.0 : -1.0);
   const FootLimit limit{
-      {inward, inward.dot(point_m)}, reach_m(kCollisionRectangle, surface.heading, inward), sigma_m, false};
+      {inward, inward.dot(point_m)}, reach_m(kCollisionRectangle, surface.heading, inward), margin_m, false};
   if (!surface.toe.try_push_back(limit)) {  // keep the nearest
     FootLimit* farthest = surface.toe.begin();
     const Vec2 middle = surface.nosing_middle_m();

@@ -2,6 +2,7 @@
 // A mapped level surface prepared for the foothold search, and how a foot lies on it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -13,17 +14,28 @@
 
 namespace polygmap {
 
+// What a foot keeps from an edge: where the edge is and where the foot lands err independently.
+struct EdgeMargin {
+  double least_m = 0.0;
+  double sigmas = 0.0;
+  double landing_sigma_m = 0.0;  // of the foot, along it
+  [[nodiscard]] double of(double edge_sigma_m) const noexcept {
+    return std::max(least_m, sigmas * math::sqrt(math::square(edge_sigma_m) + math::square(landing_sigma_m)));
+  }
+};
+
 // A foot on the surface has its yaw, so each edge takes the same part of every foot: what is left of the edge's
 // distance to the sole's origin is distance - reach. Plan view, world frame.
 struct FootLimit {
   HalfPlane inside;
-  double reach_m = 0.0;  // from the sole's origin towards the edge
-  double sigma_m = 0.0;  // of the edge's place across itself
-  bool side = false;     // bounds the surface to the left or right
-  // `sigmas` nearer than it is mapped.
-  [[nodiscard]] double clearance_m(const Vec2& sole_p_m, double sigmas = 0.0) const noexcept {
-    return inside.distance_m(sole_p_m) - reach_m - sigmas * sigma_m;
+  double reach_m = 0.0;   // from the sole's origin towards the edge
+  double margin_m = 0.0;  // to be kept
+  bool side = false;      // bounds the surface to the left or right
+  [[nodiscard]] double clearance_m(const Vec2& sole_p_m) const noexcept {
+    return inside.distance_m(sole_p_m) - reach_m;
   }
+  // Beyond the margin.
+  [[nodiscard]] double spare_m(const Vec2& sole_p_m) const noexcept { return clearance_m(sole_p_m) - margin_m; }
 };
 
 struct LevelSurface {
@@ -39,7 +51,8 @@ struct LevelSurface {
   Vec2 left = Vec2::UnitY();
   Vec3 nosing_a_m = Vec3::Zero();  // left end
   Vec3 nosing_b_m = Vec3::Zero();
-  double nosing_sigma_m = 0.0;
+  double nosing_margin_m = 0.0;
+  double back_margin_m = 0.0;                          // of the nosing where there is no back line
   StaticVector<FootLimit, kMaxPolygonVertices> edges;  // contact rectangle
   StaticVector<FootLimit, 3> toe;                      // collision box to back edge, next nosing, next riser
   double depth_m = 0.0;                                // nosing to the nearest of these, 0: none
@@ -54,20 +67,22 @@ struct LevelSurface {
   [[nodiscard]] double lateral_m(const Vec2& p_m) const noexcept { return left.dot(p_m - nosing_middle_m()); }
   [[nodiscard]] double along_m(const Vec2& p_m) const noexcept { return heading.dot(p_m - nosing_middle_m()); }
 
-  // Signed: least distance from the contact rectangle of a sole at p to the surface's edges, eq. (25), each of them so
-  // many of its sigmas nearer than it is mapped.
-  [[nodiscard]] double contact_clearance_m(const Vec2& p_m, double sigmas = 0.0) const noexcept;
+  // Signed: least distance from the contact rectangle of a sole at p to the surface's edges, eq. (25).
+  [[nodiscard]] double contact_clearance_m(const Vec2& p_m) const noexcept;
   // Signed: collision box to what rises behind the surface; +inf when nothing is mapped.
-  [[nodiscard]] double toe_clearance_m(const Vec2& p_m, double sigmas = 0.0) const noexcept;
+  [[nodiscard]] double toe_clearance_m(const Vec2& p_m) const noexcept;
+  // Signed: least of both beyond the margins.
+  [[nodiscard]] double spare_m(const Vec2& p_m) const noexcept;
 };
 
 // Eqs (14)-(16) and the foot limits of the edges; base_yaw_rad is the heading of surfaces without a nosing. False when
 // the polygon has no area.
-[[nodiscard]] bool prepare(const MapPolygon& polygon, double base_yaw_rad, LevelSurface& out) noexcept;
+[[nodiscard]] bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& margin,
+                           LevelSurface& out) noexcept;
 
 // Adds something that the collision box must not reach: a line in plan that rises behind the surface, through point_m
-// along the unit vector direction, known to sigma_m. Ignored unless it runs roughly across the heading (within 30
-// degrees) and lies between min_m and max_m behind the nosing.
-void add_toe_limit(LevelSurface& surface, const Line2& line, double sigma_m, double min_m, double max_m) noexcept;
+// along the unit vector direction. Ignored unless it runs roughly across the heading (within 30 degrees) and lies
+// between min_m and max_m behind the nosing.
+void add_toe_limit(LevelSurface& surface, const Line2& line, double margin_m, double min_m, double max_m) noexcept;
 
 }  // namespace polygmap

@@ -39,6 +39,7 @@ void Gait::reset(const Params& params) noexcept {
   activity_ = Activity::kHold;
   waiting_for_ = Obstruction::kNone;
   tick_ = shifts_ = wait_ticks_ = idle_ticks_ = off_ticks_ = 0;
+  put_back_ = 0;
   armed_ = started_ = unloaded_ = retried_ = settles_ = looks_ = stop_requested_ = false;
   looked_ = params.look_ticks <= 0;
   pace_.begin();
@@ -223,6 +224,15 @@ void Gait::settle_between_feet() noexcept {
   tick_ = 0;
 }
 
+// Settled, the legs reach higher than on the way there: between two levels by centimetres.
+void Gait::rise_between_feet() noexcept {
+  const SolePair soles{sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])};
+  const double height_m = torso_between(params_.geometry, params_.step.torso, soles).position_m.z();
+  if (height_m < upright_.height_m + kCrouchStep_m) return;
+  upright_.height_m = height_m;
+  move_torso(upright_.height_m - crouched_m_, upright_.yaw_rad, params_.settle_ticks, params_.settle_ticks);
+}
+
 void Gait::begin_hold() noexcept {
   activity_ = Activity::kHold;
   settle_between_feet();
@@ -382,6 +392,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   if (activity_ == Activity::kSwing) {
     set_pace();
   } else {
+    if (activity_ != Activity::kShift && tick_ == params_.settle_ticks) rise_between_feet();
     crouch();
   }
   tick_ = std::min(tick_ + 1, kTickLimit);

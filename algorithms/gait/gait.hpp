@@ -61,6 +61,7 @@ class Gait {
     double late_m = 0.005;                      // and this far below as late
     double blocked_m = 0.008;                   // a foot this far above where it is asked to be does not go down
     double max_lowering_m = 0.055;              // no ground found: the foot goes back
+    std::uint32_t max_put_back = 4;             // feet in a row that a toppling body takes back
     double put_back_m = 0.01;                   // about where it stood: weight counts as the ground; below, it is there
     std::int64_t steer_age_ns = 20 * kNsPerMs;  // of IMU and joint samples: older ones steer nothing and start nothing
     std::int64_t stop_age_ns = 100 * kNsPerMs;  // of the same on two feet: then the gait stops
@@ -110,6 +111,7 @@ class Gait {
   [[nodiscard]] double crouch_m() const noexcept;
   void crouch() noexcept;
   void settle_between_feet() noexcept;
+  void rise_between_feet() noexcept;
   void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
   void lower_torso(const SolePose& sole) noexcept;
   void wait_over_stance(const SolePose& sole) noexcept;
@@ -153,7 +155,8 @@ class Gait {
   std::int32_t torso_tick_ = 0;  // of the torso's plan, likewise
   std::int32_t com_tick_ = 0;    // of the plan of the centre of mass, likewise
   std::int32_t shift_ticks_ = 0;
-  std::int32_t shifts_ = 0;  // since the last swing
+  std::int32_t shifts_ = 0;     // since the last swing
+  std::uint32_t put_back_ = 0;  // feet since the last one that landed
   Obstruction waiting_for_ = Obstruction::kNone;
   std::int32_t wait_ticks_ = 0;     // for that reason, without a break
   std::int32_t touched_ticks_ = 0;  // for which the swing foot has been felt to touch,

@@ -183,7 +183,11 @@ void Gait::put_back(const JointFeedback& feedback) noexcept {
     status_.phase = GaitPhase::kDoubleSupport;
     begin_hold();
     retried_ = true;
-    if (pace_.no_ground()) end(GaitPhase::kStopped, Obstruction::kGroundMissing, 0.0);
+    if (pace_.no_ground()) {
+      end(GaitPhase::kStopped, Obstruction::kGroundMissing, 0.0);
+    } else if (++put_back_ >= params_.max_put_back) {
+      end(GaitPhase::kStopped, Obstruction::kToppling, 0.0);
+    }
     return;
   }
   plan_T_sole_[i] = beside_path(odom_T_sole);
@@ -199,6 +203,7 @@ void Gait::touch_down(const StateEstimate& state) noexcept {
   settles_ = true;
   posture_.restart();  // the swing foot is where it was steered to, and stops
   plan_T_landed_ = plan_T_sole_[i];
+  put_back_ = 0;
   planner_.landed();
   status_.treads_climbed = planner_.treads_climbed();
   status_.phase = GaitPhase::kDoubleSupport;

@@ -39,6 +39,7 @@ struct StepParams {
                          .forward_begin = 0.12,
                          .forward_end = 0.80,
                          .landing_begin = 0.55,
+                         .short_m = 0.0,
                          .clearance_m = 0.05,
                          .retreat_m = 0.0};
   // Two rises up and past the nosing of the tread that the other foot stands on.

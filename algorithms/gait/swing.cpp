@@ -86,6 +86,8 @@ Transform Swing::at(double tick) const noexcept {
   const double u = tick / duration_ticks_;
   const double forward = smooth_window(u, s.forward_begin, s.forward_end);
   const double retreat_m = s.retreat_m * smooth_window(u, 0.0, s.retreat_end) * (1.0 - forward);
+  const double short_m = s.short_m * smooth_window(u, s.forward_begin, s.forward_end) *
+                         (1.0 - smooth_window(u, s.short_begin, s.short_end));
   const double toe_down_rad = s.toe_down_rad * smooth_window(u, s.toe_down_begin, s.toe_down_full) *
                               (1.0 - smooth_window(u, s.toe_up_begin, s.toe_up_end));
   const double yaw_rad = start_yaw_rad_ + turn_rad_ * forward;
@@ -99,7 +101,7 @@ Transform Swing::at(double tick) const noexcept {
 
   Transform sole;
   const Vec3 heading{turn.cos, turn.sin, 0.0};
-  sole.p_m = start_m_ + (target_.position_m - start_m_) * forward - (retreat_m + lean_m) * heading;
+  sole.p_m = start_m_ + (target_.position_m - start_m_) * forward - (retreat_m + short_m + lean_m) * heading;
   sole.p_m.z() = height_m(tick) + lift_m;
   const double level = 1.0 - smooth_window(u, 0.0, s.forward_end);  // the start's small tilt fades
   sole.R = rotation_zyx(yaw_rad, toe_down_rad + start_pitch_rad_ * level, start_roll_rad_ * level);

@@ -15,6 +15,11 @@ struct SwingShape {
   double forward_begin = 0.40;  // horizontal motion
   double forward_end = 0.84;
   double landing_begin = 0.74;
+  // A foot that stops before a riser comes 2 mm too far by its inertia, 3 mm at most: it goes the last part on the way
+  // down, when it has stopped.
+  double short_m = 0.004;
+  double short_begin = 0.80;
+  double short_end = 0.92;
   double clearance_m = 0.05;  // of the lowest point of the foot at the apex above the higher of start and target
   double retreat_m = 0.015;   // away from the riser while rising
   double retreat_end = 0.25;

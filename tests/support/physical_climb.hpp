@@ -46,6 +46,7 @@ class PhysicalClimb {
       if (tamper_footholds) tamper_footholds(footholds_);
     }
     gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
+    if (tamper_command) tamper_command(command_, footholds_, estimator_.joints());
     estimator_.to_encoders(command_);
     (void)robot_.try_write(command_);
     const GaitPhase phase = gait_.status().phase;
@@ -69,6 +70,8 @@ class PhysicalClimb {
   // May change what the module sees, after it was made.
   std::function<void(JointFeedback&)> tamper;
   std::function<void(FootholdSet&)> tamper_footholds;
+  // The command before it is sent, with what else the gait was told.
+  std::function<void(JointCommand&, const FootholdSet&, const JointFeedback&)> tamper_command;
   bool joints_silent = false;
 
  private:
@@ -123,5 +126,31 @@ class PhysicalClimb {
   FootholdSet footholds_;
   int ticks_ = 0;
 };
+
+[[nodiscard]] inline SimOptions few_steps(std::uint64_t seed) {
+  SimOptions options;
+  options.seed = seed;
+  options.stairs.steps = 2;
+  return options;
+}
+
+// Runs on for for_s after the gait ended: upright, on both feet, its centre of mass at rest where planned.
+[[nodiscard]] inline bool stands_for(PhysicalClimb& climb, double for_s) {
+  const double end_s = climb.time_s() + for_s;
+  while (climb.time_s() < end_s && !climb.truth().fell) (void)climb.tick();
+  return !climb.truth().fell && climb.truth().in_contact[0] && climb.truth().in_contact[1] &&
+         climb.gait().balance().com_error_m().norm() < 0.02;
+}
+// Until the nth swing onto a tread; false when that never came.
+[[nodiscard]] inline bool run_to_swing_onto(PhysicalClimb& climb, std::uint32_t nth, double limit_s = 40.0) {
+  std::uint32_t onto = 0, sequence = 0;
+  while (climb.time_s() < limit_s && climb.tick()) {
+    const LatchedStep& step = climb.status().step;
+    if (step.sequence != sequence && step.onto_tread) ++onto;
+    sequence = step.sequence;
+    if (onto == nth) return true;
+  }
+  return false;
+}
 
 }  // namespace polygmap::sim

@@ -74,7 +74,7 @@ class ScriptedClimb {
     latched = LatchedStep{};
     latched.sequence = sequence;
     latched.foot = foot;
-    latched.onto_tread = step >= 0;
+    latched.onto_tread = latched.height_mapped = step >= 0;
     latched.latch_stamp_ns = now_ns + kTick_ns;
     latched.map_stamp_ns = latched.latch_stamp_ns - errors.map_age_ns;
     Transform planned = true_T_target;

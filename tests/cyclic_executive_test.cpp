@@ -1,32 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
+// The table's checks; one lane: phase, catching up, shedding, overdrafts, statistics.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <functional>
-#include <thread>
-#include <vector>
-
-#include "algorithms/core/exchange.hpp"
-#include "scheduler/cyclic_executive.hpp"
 #include "scheduler/health.hpp"
-#include "scheduler/schedule_table.hpp"
+#include "tests/support/example_schedule.hpp"
 #include "tests/support/fakes/fake_clock.hpp"
 
 namespace polygmap {
 namespace {
 
 using fakes::FakeClock;
-
-// An example of the table that the firmware owns: control in every slot, then resumable work in two lanes.
-enum Row : std::size_t { kSense, kControl, kHealth, kPlanes, kFootholds };
-constexpr ScheduleTable<5> kTable{{
-    {.task = "sense", .lane = 0, .slots = kEverySlot, .budget_us = 100},
-    {.task = "control", .lane = 0, .slots = kEverySlot, .budget_us = 400},
-    {.task = "health", .lane = 0, .slots = slots_from(15, 16), .budget_us = 100},
-    {.task = "planes", .lane = 1, .slots = kEverySlot, .budget_us = 800, .unit_cost_ns = 20, .shed_order = 1},
-    {.task = "footholds", .lane = 1, .slots = slots_from(1, 2), .budget_us = 600, .unit_cost_ns = 150, .shed_order = 2},
-}};
-constexpr ScheduleTable<5> kOneLane = in_one_lane(kTable);
+using namespace test;
 
 static_assert(lane_count(kTable) == 2 && lane_count(kOneLane) == 1);
 static_assert(worst_minor_frame_us(kTable) == 1400);
@@ -57,25 +41,6 @@ static_assert(rows_out_of_lane_order(with(1, {.task = "b", .lane = 1, .budget_us
 static_assert(rows_out_of_lane_order(with(1, {.task = "b", .lane = 2, .budget_us = 10})) == 1);
 static_assert(rows_out_of_lane_order(with(0, {.task = "a", .lane = 1, .budget_us = 10})) == 2);
 static_assert(worst_minor_frame_us(with(1, {.task = "b", .budget_us = 1991})) == 2001);
-
-struct Call {
-  std::size_t row;
-  std::int64_t frame_ns;
-  std::int32_t units;
-};
-
-// Records every call; `work` decides what a call does.
-struct RecordingTasks {
-  std::vector<Call> calls;
-  std::vector<FrameReport> frames;
-  std::function<Progress(const Call&, WorkBudget&)> work = [](const Call&, WorkBudget&) { return Progress::kDone; };
-
-  Progress run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& budget) noexcept {
-    calls.push_back({row, frame_ns, budget.left()});
-    return work(calls.back(), budget);
-  }
-  void frame_done(std::size_t, const FrameReport& report) noexcept { frames.push_back(report); }
-};
 
 class SingleLane : public ::testing::Test {
  protected:
@@ -434,224 +399,6 @@ TEST(CyclicExecutive, Tick_ShortOfTimeBeforeTheMoreImportantRow_ShedsTheOtherOne
   executive.tick(0);
   EXPECT_EQ(executive.last_frame().ran, 0b011U);
   EXPECT_EQ(executive.last_frame().shed, 0b100U);
-}
-
-TEST(CyclicExecutive, Tick_TwoLanes_EachRunsItsOwnRowsOnly) {
-  FakeClock clock;
-  RecordingTasks control, perception;
-  Health health;
-  CyclicExecutive<RecordingTasks, kTable, 0> lane0(control, clock, health);
-  CyclicExecutive<RecordingTasks, kTable, 1> lane1(perception, clock, health);
-  lane0.start(0);
-  lane1.start(0);
-  for (std::int64_t i = 0; i < 16; ++i) {
-    lane0.tick(i * kMinorFrame_ns);
-    lane1.tick(i * kMinorFrame_ns);
-  }
-  for (const Call& call : control.calls) EXPECT_LE(call.row, kHealth);
-  for (const Call& call : perception.calls) EXPECT_GE(call.row, kPlanes);
-  EXPECT_EQ(control.calls.size(), 33U);
-  EXPECT_EQ(perception.calls.size(), 24U);
-  EXPECT_EQ(lane0.row_statistics(kPlanes).runs, 0U);
-}
-
-// Two lanes on two threads: perception hands its newest result to control, and its health to lane 0.
-struct HandOver {
-  std::int64_t stamp_ns = 0;
-  std::array<std::int64_t, 63> payload{};
-};
-struct TwoLaneTasks {
-  Exchange<HandOver> planes;
-  Exchange<Health> perception_health;
-  Health lane_health[2];
-  std::int64_t newest_ns = -1;
-  std::uint64_t taken = 0;
-  std::uint64_t torn = 0;
-  std::uint64_t backwards = 0;
-
-  Progress run_row(std::size_t row, std::int64_t frame_ns, WorkBudget&) noexcept {
-    if (row == kPlanes) {
-      HandOver& out = planes.back();
-      out.stamp_ns = frame_ns;
-      out.payload.fill(frame_ns);
-      planes.publish();
-      lane_health[1].raise(Limit::kPlanesFull, frame_ns);
-      perception_health.back() = lane_health[1];
-      perception_health.publish();
-    } else if (row == kControl) {
-      if (!planes.try_take()) return Progress::kIdle;
-      const HandOver& in = planes.front();
-      ++taken;
-      if (in.stamp_ns <= newest_ns) ++backwards;
-      newest_ns = in.stamp_ns;
-      for (const std::int64_t value : in.payload) torn += value != in.stamp_ns ? 1U : 0U;
-    }
-    return Progress::kDone;
-  }
-};
-
-TEST(CyclicExecutive, Tick_TwoLanesOnTwoThreads_HandOverWholeValuesInOrder) {
-  constexpr std::int64_t kFrames = 50'000;
-  TwoLaneTasks tasks;
-  FakeClock clock0, clock1;
-  CyclicExecutive<TwoLaneTasks, kTable, 0> lane0(tasks, clock0, tasks.lane_health[0]);
-  CyclicExecutive<TwoLaneTasks, kTable, 1> lane1(tasks, clock1, tasks.lane_health[1]);
-  lane0.start(0);
-  lane1.start(0);
-  std::atomic<int> ready{0};
-  const auto drive = [&ready](auto& lane, FakeClock& clock) {
-    ready.fetch_add(1);
-    while (ready.load() < 2) std::this_thread::yield();
-    for (std::int64_t i = 0; i < kFrames; ++i) {
-      lane.tick(clock.now_ns());
-      clock.advance_ns(kMinorFrame_ns);
-      if (i % 64 == 0) std::this_thread::yield();
-    }
-  };
-  std::thread control([&] { drive(lane0, clock0); });
-  std::thread perception([&] { drive(lane1, clock1); });
-  control.join();
-  perception.join();
-  WorkBudget none(0);
-  (void)tasks.run_row(kControl, kFrames * kMinorFrame_ns, none);  // takes what is left, if any
-  EXPECT_EQ(tasks.torn, 0U);
-  EXPECT_EQ(tasks.backwards, 0U);
-  EXPECT_GT(tasks.taken, 0U);
-  EXPECT_EQ(tasks.newest_ns, (kFrames - 1) * kMinorFrame_ns) << "the last value is never lost";
-  EXPECT_EQ(lane0.lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
-  EXPECT_EQ(lane1.lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
-
-  ASSERT_TRUE(tasks.perception_health.try_take());
-  Health all = tasks.lane_health[0];
-  all.merge(tasks.perception_health.front());
-  EXPECT_EQ(all.count(Limit::kPlanesFull).count, static_cast<std::uint32_t>(kFrames));
-}
-
-TEST(DurationStatistics, BucketOf_PowersOfTwo_StartsANewBucketAtEach) {
-  EXPECT_EQ(DurationStatistics::bucket_of(0), 0U);
-  for (std::size_t b = 1; b < DurationStatistics::kBuckets; ++b) {
-    const std::uint64_t low = DurationStatistics::bucket_low_ns(b);
-    EXPECT_EQ(DurationStatistics::bucket_of(low), b);
-    EXPECT_EQ(DurationStatistics::bucket_of(low - 1), b - 1);
-  }
-  EXPECT_EQ(DurationStatistics::bucket_of(UINT64_MAX), DurationStatistics::kBuckets - 1);
-}
-
-TEST(DurationStatistics, Add_Nothing_IsAllZero) {
-  const DurationStatistics statistics;
-  EXPECT_EQ(statistics.min_ns(), 0U);
-  EXPECT_EQ(statistics.mean_ns(), 0U);
-  EXPECT_EQ(statistics.max_ns(), 0U);
-}
-
-TEST(DurationStatistics, Add_ManyValues_HistogramHoldsThemAll) {
-  DurationStatistics statistics;
-  for (std::uint64_t ns = 0; ns < 10'000; ++ns) statistics.add(ns);
-  std::uint64_t total = 0;
-  for (const std::uint32_t n : statistics.histogram()) total += n;
-  EXPECT_EQ(total, 10'000U);
-  EXPECT_EQ(statistics.count(), 10'000U);
-  EXPECT_EQ(statistics.mean_ns(), 4999U);
-  EXPECT_EQ(statistics.histogram()[4], 8U);  // 8 to 15 ns
-}
-
-TEST(CountUp, AtTheTop_Stays) {
-  std::uint8_t n = 254;
-  count_up(n);
-  count_up(n);
-  EXPECT_EQ(n, 255);
-}
-
-TEST(CycleScale, ToNs_RatesOfRealCounters_IsExactToAPartInAMillion) {
-  for (const double rate : {1.0, 19.2, 31.25, 1000.0, 2496.0, 10'000.0}) {
-    const CycleScale scale(rate);
-    for (const std::uint64_t us : {1U, 100U, 2000U, 1'000'000U}) {
-      const auto cycles = static_cast<std::uint64_t>(static_cast<double>(us) * rate);
-      const double expected_ns = static_cast<double>(cycles) * 1000.0 / rate;
-      EXPECT_NEAR(static_cast<double>(scale.to_ns(cycles)), expected_ns, 0.51 + 1e-6 * expected_ns) << rate;
-    }
-  }
-}
-
-TEST(CycleScale, ToNs_Anything_SaturatesInsteadOfWrapping) {
-  for (const double rate : {1.0, 2496.0, 10'000.0}) {
-    const CycleScale scale(rate);
-    EXPECT_GT(scale.to_ns(UINT64_MAX), std::uint64_t{200'000'000'000});
-    EXPECT_EQ(scale.to_ns(UINT64_MAX), scale.to_ns(UINT64_MAX / 2));
-  }
-}
-
-template <typename Code>
-class HealthCodes : public ::testing::Test {
- public:
-  static Code at(std::size_t i) { return static_cast<Code>(kFirstCode<Code> + i); }
-};
-using CodeTypes = ::testing::Types<Fault, Limit>;
-TYPED_TEST_SUITE(HealthCodes, CodeTypes);
-
-TYPED_TEST(HealthCodes, Raise_EachCode_CountsThatOneAlone) {
-  for (std::size_t i = 0; i < kCodeCount<TypeParam>; ++i) {
-    Health health;
-    health.raise(this->at(i), 10);
-    health.raise(this->at(i), 30);
-    for (std::size_t j = 0; j < kCodeCount<TypeParam>; ++j) {
-      EXPECT_EQ(health.count(this->at(j)).count, i == j ? 2U : 0U);
-    }
-    EXPECT_EQ(health.count(this->at(i)).first_ns, 10);
-    EXPECT_EQ(health.count(this->at(i)).last_ns, 30);
-    EXPECT_EQ(health.any_fault(), (std::is_same_v<TypeParam, Fault>));
-    EXPECT_EQ(health.any_limit(), (std::is_same_v<TypeParam, Limit>));
-    health.clear(this->at(i));
-    EXPECT_EQ(health.count(this->at(i)).count, 0U);
-    EXPECT_FALSE(health.any_fault() || health.any_limit());
-  }
-}
-
-TYPED_TEST(HealthCodes, NameOf_EachCode_IsItsOwn) {
-  for (std::size_t i = 0; i < kCodeCount<TypeParam>; ++i) {
-    EXPECT_FALSE(name_of(this->at(i)).empty());
-    EXPECT_NE(name_of(this->at(i)), "unknown");
-    for (std::size_t j = 0; j < i; ++j) EXPECT_NE(name_of(this->at(i)), name_of(this->at(j)));
-  }
-  EXPECT_EQ(name_of(TypeParam::kEnd), "unknown");
-  EXPECT_EQ(name_of(static_cast<TypeParam>(0)), "unknown");
-}
-
-TYPED_TEST(HealthCodes, Raise_OutsideTheEnumeration_ChangesNothing) {
-  Health health;
-  for (const int code : {0, static_cast<int>(TypeParam::kEnd), 255}) {
-    health.raise(static_cast<TypeParam>(code), 1);
-    EXPECT_EQ(health.count(static_cast<TypeParam>(code)).count, 0U);
-  }
-  EXPECT_FALSE(health.any_fault() || health.any_limit());
-}
-
-TYPED_TEST(HealthCodes, Raise_ManyTimes_Saturates) {
-  Health health;
-  health.raise(this->at(0), 1, UINT32_MAX - 1);
-  health.raise(this->at(0), 2, 5);
-  EXPECT_EQ(health.count(this->at(0)).count, UINT32_MAX);
-  health.raise(this->at(1), 3, 0);
-  EXPECT_EQ(health.count(this->at(1)).count, 0U);
-}
-
-TYPED_TEST(HealthCodes, Merge_TwoLanes_AddsCountsAndWidensTheStamps) {
-  Health a, b;
-  a.raise(this->at(0), 10);
-  b.raise(this->at(0), 5, 2);
-  b.raise(this->at(1), 7);
-  a.merge(b);
-  EXPECT_EQ(a.count(this->at(0)).count, 3U);
-  EXPECT_EQ(a.count(this->at(0)).first_ns, 5);
-  EXPECT_EQ(a.count(this->at(0)).last_ns, 10);
-  EXPECT_EQ(a.count(this->at(1)).first_ns, 7);
-  a.clear();
-  EXPECT_FALSE(a.any_fault() || a.any_limit());
-}
-
-TEST(HealthCodesApart, FaultsAndLimits_ShareNoNumber) {
-  EXPECT_LT(static_cast<int>(Fault::kEnd), 100);
-  EXPECT_GT(static_cast<int>(Limit::kRowShed), 100);
 }
 
 }  // namespace
