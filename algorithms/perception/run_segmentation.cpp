@@ -106,7 +106,7 @@ void RunSegmentation::add_rows(std::int32_t first, std::int32_t last) noexcept {
   }
 }
 
-// A register of columns over a block of rows, of which most go on as their columns' lines say: one update for four rows.
+// A register of columns over a block of rows. Most blocks go on as their columns' lines say: one update for four rows.
 struct RunSegmentation::Block {
   const Wides& c;
   std::size_t g;  // first column
