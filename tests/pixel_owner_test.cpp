@@ -75,6 +75,32 @@ TEST_F(PixelOwner, PlanesThatMeetAskew_EndWhereTheyMeetInEveryColumnOfPixels) {
   EXPECT_GT(wrong_by_columns, 20);
 }
 
+TEST_F(PixelOwner, ATreadWithANosing_EndsAtItAndBesideItWhereThePlanesMeet) {
+  set_plane(1, Vec3{0.0, -0.86, -0.5}, {0.0, 0.0, 1.2});
+  set_plane(2, Vec3{0.0, 0.45, -0.89}, {0.0, 0.0, 1.2});  // they meet in row 240
+  (*planes_)[1].kind = SurfaceKind::kTread;
+  (*planes_)[2].kind = SurfaceKind::kRiser;
+  for (std::int32_t g = 35; g < 45; ++g) own(1, g, 200, 239), own(2, g, 240, 280);
+  // Beyond those rows by 1.4 to 2.6 px, from pixel 304 to 336.
+  const auto on_tread = [&](double column, double row) -> Vec3 {
+    return Vec3{(column - 320.0) / 400.0, (row - 240.0) / 400.0, 1.0} / inverse_depth(1, column, row);
+  };
+  EdgeLine& nosing = (*planes_)[1].nosing;
+  nosing = {on_tread(304.0, 241.4), on_tread(336.0, 242.6), 0.001, true};
+  EXPECT_EQ(owner(306, 241), 1U);
+  EXPECT_EQ(owner(306, 242), 2U);
+  EXPECT_EQ(owner(334, 242), 1U);
+  EXPECT_EQ(owner(334, 243), 2U);
+  EXPECT_EQ(owner(302, 241), 2U) << "beside its end";
+  std::swap(nosing.a_m, nosing.b_m);
+  EXPECT_EQ(owner(334, 242), 1U);
+  (*planes_)[2].kind = SurfaceKind::kOther;
+  EXPECT_EQ(owner(334, 242), 2U) << "no nosing without a riser";
+  (*planes_)[2].kind = SurfaceKind::kRiser;
+  nosing = {on_tread(304.0, 245.0), on_tread(336.0, 245.0), 0.001, true};
+  EXPECT_EQ(owner(320, 242), 2U) << "another edge than the one that ends these rows";
+}
+
 TEST_F(PixelOwner, AColumnOfTwoThings_IsTheSurfacesUpToWhereItsPixelsLeaveIt) {
   set_plane(1, Vec3{0.0, 0.0, -1.0}, {0.0, 0.0, 1.0});
   set_plane(2, Vec3{0.0, 0.0, -1.0}, {0.0, 0.0, 1.5});

@@ -44,10 +44,12 @@ Words pairs(const Range& range, const std::uint16_t* raw, [[maybe_unused]] const
   return (depths & cv::vx_setall_u32(0xffff)) + (depths >> 16) - (cv::v_reinterpret_as_u32(minus_count) << kCountShift);
 }
 
-// Sums of neighbours, those of a before those of b.
-Words add_neighbours(const Words& a, const Words& b) noexcept {
-  const cv::v_uint64 a2 = cv::v_reinterpret_as_u64(a), b2 = cv::v_reinterpret_as_u64(b);
-  return cv::v_pack(a2 + (a2 >> 32), b2 + (b2 >> 32));  // keeps the lower halves
+// Sums of the pairs of each column, of which a register of pixels has one or, with AVX2, two.
+Words sum_columns(const Words& a, const Words& b, const Words& c, const Words& d) noexcept {
+  static_assert(kColumn_px == 2 * 4);
+  Words first, second, third, fourth;
+  cv::v_transpose4x4(a, b, c, d, first, second, third, fourth);  // each half by itself
+  return halves_in_turn((first + second) + (third + fourth));
 }
 
 Wide to_float(const Words& x) noexcept { return cv::v_cvt_f32(cv::v_reinterpret_as_s32(x)); }
@@ -77,8 +79,7 @@ void reduce_registers(const RawRange& raw_range, const RawPixels& pixels, const 
     const auto pairs_of = [&](std::int32_t k) {
       return pairs<kBody>(range, raw + k * Raw::nlanes, kBody ? body + k * Words::nlanes : nullptr);
     };
-    const Words sum =
-        add_neighbours(add_neighbours(pairs_of(0), pairs_of(1)), add_neighbours(pairs_of(2), pairs_of(3))) & seen;
+    const Words sum = sum_columns(pairs_of(0), pairs_of(1), pairs_of(2), pairs_of(3)) & seen;
     count = sum >> kCountShift;
     const Wide depths = to_float(sum & cv::vx_setall_u32((1U << kCountShift) - 1U));
     cv::v_store(inverse_depth, to_float(count) * per_metre / cv::v_max(depths, least));

@@ -3,30 +3,37 @@
 
 #include <algorithm>
 
+#include "algorithms/perception/vectors.hpp"
+
 namespace polygmap {
 namespace {
 
-std::int16_t median(std::int16_t a, std::int16_t b, std::int16_t c, std::int16_t d, std::int16_t e) noexcept {
-  const auto low = [](std::int16_t x, std::int16_t y) { return x < y ? x : y; };
-  const auto high = [](std::int16_t x, std::int16_t y) { return x < y ? y : x; };
+using Rows = cv::v_int16x8;
+constexpr std::int32_t kAtOnce = Rows::nlanes / 2;  // columns of two ends each
+static_assert(sizeof(ColumnEnds) == 2 * sizeof(std::int16_t));
+
+Rows median(const Rows& a, const Rows& b, const Rows& c, const Rows& d, const Rows& e) noexcept {
   // Neither the least nor the largest of four is the median of five; of the other two and the fifth it is the middle.
-  const std::int16_t f = high(low(a, b), low(c, d));
-  const std::int16_t g = low(high(a, b), high(c, d));
-  return high(low(f, g), low(high(f, g), e));
+  const Rows f = cv::v_max(cv::v_min(a, b), cv::v_min(c, d));
+  const Rows g = cv::v_min(cv::v_max(a, b), cv::v_max(c, d));
+  return cv::v_max(cv::v_min(f, g), cv::v_min(cv::v_max(f, g), e));
 }
 
 // A hull follows its outermost points, and with them the noise: the median of five columns, where there are five.
 void smooth(const SurfaceProfile& profile, std::int32_t first, std::int32_t last,
             std::array<ColumnEnds, kColumns>& smoothed) noexcept {
-  for (std::int32_t g = first; g <= last; ++g) {
-    const ColumnEnds* ends = &profile.columns[static_cast<std::size_t>(g)];
-    ColumnEnds& out = smoothed[static_cast<std::size_t>(g)];
-    out = *ends;
-    if (g < first + 2 || g > last - 2) continue;
-    if ((ends[-2].top | ends[-1].top | ends[0].top | ends[1].top | ends[2].top) < 0) continue;
-    out.top = median(ends[-2].top, ends[-1].top, ends[0].top, ends[1].top, ends[2].top);
-    out.bottom = median(ends[-2].bottom, ends[-1].bottom, ends[0].bottom, ends[1].bottom, ends[2].bottom);
+  const ColumnEnds* ends = profile.columns.data();
+  std::copy(ends + first, ends + last + 1, smoothed.begin() + first);
+  for (std::int32_t g = first + 2; g <= last - 2; g += kAtOnce) {
+    // The picture's last ones are looked at with others before them, which become the same again.
+    const std::int32_t from = std::min(g, kColumns - 2 - kAtOnce);
+    const auto beside = [&](std::int32_t columns) { return cv::v_load(&ends[from + columns].top); };
+    const Rows a = beside(-2), b = beside(-1), c = beside(0), d = beside(1), e = beside(2);
+    // A column without the surface has -1 twice.
+    const Rows all = cv::v_min(cv::v_min(cv::v_min(a, b), cv::v_min(c, d)), e) >= cv::v_setzero_s16();
+    cv::v_store(&smoothed[static_cast<std::size_t>(from)].top, cv::v_select(all, median(a, b, c, d, e), c));
   }
+  std::copy(ends + std::max(last - 1, first), ends + last + 1, smoothed.begin() + std::max(last - 1, first));
 }
 
 }  // namespace

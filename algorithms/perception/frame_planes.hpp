@@ -41,6 +41,7 @@ struct FramePlane {
   std::uint8_t same = 0;     // the first surface of those that count as one plane
   std::uint16_t main_piece = 0;
   double piece_px = 0.0;
+  EdgeLine nosing;  // of a surface, camera frame
 };
 
 struct FramePlanes {  // 1-based

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algorithms/perception/pixel_owner.hpp"
 
+#include <limits>
+
 namespace polygmap {
 namespace {
 
@@ -8,6 +10,18 @@ constexpr double kSteepest = 2.0;  // rows per pixel that a boundary may climb
 constexpr std::int32_t kReach_px = kColumn_px;
 constexpr double kRounded_px = 0.51;   // between a boundary and the row it was rounded to
 constexpr double kParallel_px = 16.0;  // a boundary this near to where its planes meet runs along with that line
+constexpr double kNosing_px = 4.0;     // a boundary this near to a nosing is that nosing
+
+// Where a line crosses a column of pixels; not a number beyond its ends.
+double row_of(const CameraIntrinsics& k, const EdgeLine& line, std::int32_t column) noexcept {
+  const auto project = [&k](const Vec3& p_m) {
+    return Vec2{k.cx_px + k.fx_px * p_m.x() / p_m.z(), k.cy_px + k.fy_px * p_m.y() / p_m.z()};
+  };
+  const Vec2 a = project(line.a_m), b = project(line.b_m);
+  const double share = (column - a.x()) / (b.x() - a.x());
+  if (!line.valid || !(share >= 0.0 && share <= 1.0)) return std::numeric_limits<double>::quiet_NaN();
+  return a.y() + share * (b.y() - a.y());
+}
 
 // Whether a row belongs to the upper of two planes. last_upper: where it ends in the middle of the column of eight
 // pixels, off_px to the left.
@@ -79,9 +93,15 @@ std::size_t pixel_owner(const FramePicture& picture, const RawPicture& raw, cons
       if (other == own) continue;
       if (other == 0) return own;
       const bool below = side > 0;
-      const InversePlane &upper = planes[below ? own : other].plane, &lower = planes[below ? other : own].plane;
-      const bool of_upper = is_upper(raw.intrinsics, upper, lower, middle_px, column - middle_px,
-                                     below ? row + side - 1 : row + side, row);
+      const FramePlane &upper = planes[below ? own : other], &lower = planes[below ? other : own];
+      const std::int32_t last_upper = below ? row + side - 1 : row + side;
+      // A nosing knows more than where two planes meet: what its own rows say, too.
+      const double nosing = lower.kind == SurfaceKind::kRiser ? row_of(raw.intrinsics, upper.nosing, column)
+                                                              : std::numeric_limits<double>::quiet_NaN();
+      const bool of_upper =
+          std::abs(nosing - (last_upper + 0.5)) < kNosing_px
+              ? row < nosing
+              : is_upper(raw.intrinsics, upper.plane, lower.plane, middle_px, column - middle_px, last_upper, row);
       return of_upper == below ? own : other;
     }
   }

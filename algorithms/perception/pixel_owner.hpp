@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whose a single pixel is. Columns of eight pixels end a surface at one row; the line in which two planes meet crosses
-// those eight at an angle.
+// Whose a single pixel is. Columns of eight pixels end a surface at one row; a tread's nosing, or else the line in
+// which two planes meet, crosses those eight at an angle.
 #pragma once
 
 #include <cstddef>

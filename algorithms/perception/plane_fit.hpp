@@ -15,9 +15,12 @@ struct InversePlane {
 
   [[nodiscard]] double d_m() const noexcept { return 1.0 / m.norm(); }
   [[nodiscard]] Vec3 normal() const noexcept { return -m / m.norm(); }
-  [[nodiscard]] double inverse_depth(const Vec3& ray) const noexcept { return m.dot(ray); }
+  // Coordinate by coordinate: what dot() loads as a vector was mostly just stored as numbers, and waits for them.
+  [[nodiscard]] double inverse_depth(const Vec3& ray) const noexcept {
+    return m.x() * ray.x() + m.y() * ray.y() + m.z() * ray.z();
+  }
   // Where a ray meets the plane; only for rays with inverse_depth > 0.
-  [[nodiscard]] Vec3 point(const Vec3& ray) const noexcept { return ray / m.dot(ray); }
+  [[nodiscard]] Vec3 point(const Vec3& ray) const noexcept { return ray / inverse_depth(ray); }
   // Signed distance of a point, positive on the camera's side.
   [[nodiscard]] double distance_m(const Vec3& point_m) const noexcept { return (1.0 - m.dot(point_m)) * d_m(); }
 };

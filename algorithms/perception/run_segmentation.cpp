@@ -17,6 +17,8 @@ constexpr float kNoSpread = 1e-9F;  // added to a sum of squares that may be 0
 constexpr float kFitted = 3.0F;     // rows that make a line
 constexpr float kBends = 7.0F;      // a run of more rows may bend away
 constexpr std::int32_t kBentRows = 3;
+constexpr std::int32_t kBlockColumns = 2 * Wide::nlanes;  // columns whose blocks are tried together
+static_assert(kColumns % kBlockColumns == 0);
 
 Wide all(float x) noexcept { return cv::vx_setall_f32(x); }
 
@@ -81,9 +83,12 @@ void RunSegmentation::add_rows(std::int32_t first, std::int32_t last) noexcept {
   // the next: a column's rows wait for one another, columns do not.
   std::array<std::int32_t, kColumns / kGroup + 1> singly;
   std::size_t count = 0;
-  for (std::int32_t column = 0; column < column_count_; column += kGroup) {
-    singly[count] = column;
-    count += last - first + 1 == kBlock && try_block(c, column, first) ? 0U : 1U;
+  for (std::int32_t column = 0; column < column_count_; column += kBlockColumns) {
+    const std::uint32_t done = last - first + 1 == kBlock ? try_blocks(c, column, first) : 0U;
+    for (std::int32_t i = 0; i < kBlockColumns / kGroup && column + i * kGroup < column_count_; ++i) {
+      singly[count] = column + i * kGroup;
+      count += (done >> i & 1U) != 0 ? 0U : 1U;
+    }
   }
   if (count == 0) return;
   for (std::int32_t row = first; row <= last; ++row) {
@@ -101,80 +106,86 @@ void RunSegmentation::add_rows(std::int32_t first, std::int32_t last) noexcept {
   }
 }
 
-// Most blocks of rows go on as their columns' lines say: one update for four rows. What is decided here is the same for
-// every register width: all columns of the group or none.
-bool RunSegmentation::try_block(const Wides& c, std::int32_t column, std::int32_t row) noexcept {
-  constexpr std::size_t kRegisters = kGroup / Wide::nlanes;
-  static_assert(kGroup % Wide::nlanes == 0);
-  const Wide to_centre = all(cy_ - static_cast<float>(row));
-  struct Next {
-    Wide idle, rows, value, slope, lever, squares, drift, absent;
-  };
-  std::array<Next, kRegisters> next;
+// A register of columns over a block of rows. Most blocks go on as their columns' lines say: one update for four rows.
+struct RunSegmentation::Block {
+  const Wides& c;
+  std::size_t g;  // first column
+  Wide rows, slope, lever, value, drift, absent, w2, leans, spread, limit;
+  // Sums over the block's rows that join, x from the row before the block, and of residuals from the line so far.
+  Wide n = c.zero, sum_x = c.zero, sum_xx = c.zero, sum_r = c.zero, sum_xr = c.zero;
+  Wide moved = c.zero;  // by how much, nearly, these rows have moved the line
+  Wide any = c.zero, longest = c.zero;
+
+  Block(const Wides& wides, const Open& open, std::int32_t column) noexcept
+      : c(wides), g(static_cast<std::size_t>(column)), rows(cv::vx_load(open.rows.data() + g)) {}
   // Runs too young for a block are none.
-  Wide may_go_on = c.zero == c.zero;
-  for (std::int32_t g = column; g < column + kGroup; g += Wide::nlanes) {
-    const Wide rows = cv::vx_load(open_.rows.data() + g);
-    may_go_on = may_go_on & ((rows >= c.fitted) | (rows == c.zero));
-  }
-  if (!cv::v_check_all(may_go_on)) return false;
-  for (std::size_t i = 0; i < kRegisters; ++i) {
-    const std::size_t g = static_cast<std::size_t>(column) + i * Wide::nlanes;
-    const auto load = [g](const Floats& x) { return cv::vx_load(x.data() + g); };
-    const Wide rows = load(open_.rows), slope = load(open_.slope), lever = load(open_.lever);
-    Wide value = load(open_.value) + slope, drift = load(open_.drift), absent = load(open_.absent);
+  [[nodiscard]] bool may_go_on() const noexcept { return cv::v_check_all((rows >= c.fitted) | (rows == c.zero)); }
 
-    // As in add_row, but once, at the block's first row: what is nearer is held to the noise of the line's own depth.
+  // As in add_row, but once, at the block's first row: what is nearer is held to the noise of the line's own depth.
+  void begin(const Open& open, const Wide& to_centre) noexcept {
+    const auto load = [this](const Floats& x) { return cv::vx_load(x.data() + g); };
+    slope = load(open.slope), lever = load(open.lever), drift = load(open.drift), absent = load(open.absent);
+    value = load(open.value) + slope;
     const Wide my = slope * c.fy, m0 = value + slope * to_centre;
-    const Wide w2 = value * value, sigma = (c.base * value + c.per_metre) * value + c.quadratic;
-    const Wide share = c.one / (rows + c.four), leans = c.four * share;
-    const Wide spread = (my * my + m0 * m0) * (sigma * sigma + c.floor2 * w2 * w2) * (c.one + leans);
-    const Wide limit = c.outlier2 * spread;
-
-    // Sums over the block's rows that join, x from the row before the block, and of residuals from the line so far.
-    Wide n = c.zero, sum_x = c.zero, sum_xx = c.zero, sum_r = c.zero, sum_xr = c.zero;
-    Wide moved = c.zero;  // by how much, nearly, these rows have moved the line
-    Wide any = c.zero, longest = c.zero, x = c.one;
-    for (std::int32_t r = row; r < row + kBlock; ++r, value = value + slope, x = x + c.one) {
-      const Wide w = cv::vx_load(image_->inverse_depth.row(r) + g), valid = w > c.zero;
-      const Wide residual = w - value, off = residual - moved;
-      const Wide in = valid & (off * off * cv::v_max(w2, w * w) < limit);
-      const Wide joined = residual & in, at = x & in, jumped = off & in;
-      any = any | valid;
-      n = n + (c.one & in), sum_x = sum_x + at, sum_xx = sum_xx + at * x;
-      sum_r = sum_r + joined, sum_xr = sum_xr + joined * x;
-      moved = moved + leans * jumped;
-      drift = drift + ((jumped - drift) * c.memory & in);
-      absent = cv::v_select(in, c.zero, absent + cv::v_select(valid, c.outlier_weight, c.one));
-      longest = cv::v_max(longest, absent);
-    }
+    const Wide sigma = (c.base * value + c.per_metre) * value + c.quadratic, share = c.one / (rows + c.four);
+    w2 = value * value, leans = c.four * share;
+    spread = (my * my + m0 * m0) * (sigma * sigma + c.floor2 * w2 * w2) * (c.one + leans);
+    limit = c.outlier2 * spread;
+  }
+  // The next row, x from the row before the block.
+  void add(const Wide& w, const Wide& x) noexcept {
+    const Wide valid = w > c.zero, residual = w - value, off = residual - moved;
+    const Wide in = valid & (off * off * cv::v_max(w2, w * w) < limit);
+    const Wide joined = residual & in, at = x & in, jumped = off & in;
+    any = any | valid;
+    n = n + (c.one & in), sum_x = sum_x + at, sum_xx = sum_xx + at * x;
+    sum_r = sum_r + joined, sum_xr = sum_xr + joined * x;
+    moved = moved + leans * jumped;
+    drift = drift + ((jumped - drift) * c.memory & in);
+    absent = cv::v_select(in, c.zero, absent + cv::v_select(valid, c.outlier_weight, c.one));
+    longest = cv::v_max(longest, absent);
+    value = value + slope;
+  }
+  [[nodiscard]] Wide idle() const noexcept { return (rows == c.zero) & (any == c.zero); }
+  [[nodiscard]] bool goes_on() const noexcept {
     const Wide bent = (rows + n > c.long_run) & (drift * drift * w2 > c.bend2 * spread);
-    const Wide goes_on = (rows >= c.fitted) & (longest <= c.max_gap) & ~bent;
-    const Wide idle = (rows == c.zero) & (any == c.zero);
-    if (!cv::v_check_all(goes_on | idle)) return false;
-
-    // Recursive least squares with all of them at once; lever: from the mean of the rows so far.
+    return cv::v_check_all(((rows >= c.fitted) & (longest <= c.max_gap) & ~bent) | idle());
+  }
+  // Recursive least squares with all of them at once; lever: from the mean of the rows so far.
+  void store(Open& open) const noexcept {
     const Wide rows1 = rows + n, mean = c.one / rows1;
     const Wide x_sum = lever * n + sum_x, shift = x_sum * mean;
-    const Wide squares = load(open_.squares) + lever * (lever * n + c.two * sum_x) + sum_xx - x_sum * shift;
+    const Wide squares =
+        cv::vx_load(open.squares.data() + g) + lever * (lever * n + c.two * sum_x) + sum_xx - x_sum * shift;
     const Wide gain = (lever * sum_r + sum_xr - shift * sum_r) / squares, lever1 = lever + c.four - shift;
-    next[i] = {idle, rows1, value - slope + sum_r * mean + gain * lever1, slope + gain, lever1, squares, drift, absent};
-  }
-  for (std::size_t i = 0; i < kRegisters; ++i) {
-    const std::size_t g = static_cast<std::size_t>(column) + i * Wide::nlanes;
-    const Wide& idle = next[i].idle;
-    const auto store = [g, &idle](Floats& to, const Wide& x) {
-      cv::v_store(to.data() + g, cv::v_select(idle, cv::vx_load(to.data() + g), x));
+    const Wide stays = idle();
+    const auto put = [this, &stays](Floats& to, const Wide& x) {
+      cv::v_store(to.data() + g, cv::v_select(stays, cv::vx_load(to.data() + g), x));
     };
-    store(open_.rows, next[i].rows);
-    store(open_.value, next[i].value);
-    store(open_.slope, next[i].slope);
-    store(open_.lever, next[i].lever);
-    store(open_.squares, next[i].squares);
-    store(open_.drift, next[i].drift);
-    store(open_.absent, next[i].absent);
+    put(open.rows, rows1), put(open.value, value - slope + sum_r * mean + gain * lever1), put(open.slope, slope + gain);
+    put(open.lever, lever1), put(open.squares, squares), put(open.drift, drift), put(open.absent, absent);
   }
-  return true;
+};
+
+// Two registers at once: a row waits for the one before, registers do not. What is decided is the same for every
+// register width: all columns of a group or none. A bit for each group that went on.
+std::uint32_t RunSegmentation::try_blocks(const Wides& c, std::int32_t column, std::int32_t row) noexcept {
+  constexpr bool kOneGroup = kBlockColumns == kGroup;
+  static_assert(kBlockColumns == 2 * Wide::nlanes && (kOneGroup || kGroup == Wide::nlanes));
+  Block a(c, open_, column), b(c, open_, column + Wide::nlanes);
+  const bool any_a = a.may_go_on(), any_b = b.may_go_on();
+  if (kOneGroup ? !any_a || !any_b : !any_a && !any_b) return 0;
+  const Wide to_centre = all(cy_ - static_cast<float>(row));
+  a.begin(open_, to_centre), b.begin(open_, to_centre);
+  Wide x = c.one;
+  for (std::int32_t r = row; r < row + kBlock; ++r, x = x + c.one) {
+    const float* w = image_->inverse_depth.row(r) + column;
+    a.add(cv::vx_load(w), x), b.add(cv::vx_load(w + Wide::nlanes), x);
+  }
+  const bool on_a = a.goes_on(), on_b = b.goes_on(), both = on_a && on_b;
+  if (kOneGroup ? both : on_a) a.store(open_);
+  if (kOneGroup ? both : on_b) b.store(open_);
+  return kOneGroup ? static_cast<std::uint32_t>(both) : static_cast<std::uint32_t>(on_a) | (on_b ? 2U : 0U);
 }
 
 // A bit for each of the group's columns in which something ends.

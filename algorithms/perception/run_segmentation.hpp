@@ -67,8 +67,9 @@ class RunSegmentation {
   };
 
   struct Wides;  // the parameters in vector registers
+  struct Block;
   struct OneColumn;
-  [[nodiscard]] bool try_block(const Wides& c, std::int32_t column, std::int32_t row) noexcept;
+  [[nodiscard]] std::uint32_t try_blocks(const Wides& c, std::int32_t column, std::int32_t row) noexcept;
   [[nodiscard]] std::uint32_t add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept;
   void handle(std::int32_t g, std::int32_t row) noexcept;
   void replay(std::int32_t g, std::int32_t from, std::int32_t row) noexcept;

@@ -39,12 +39,12 @@ void SurfaceBoundaries::gather(std::int32_t column, const RunSegmentation::Colum
       int other = 0, own = 0;
       for (std::int32_t r = out.back().bottom + 1; r < run.top; ++r) {
         const float w = image_->down(r, column);
-        if (!(w > 0.0F)) continue;
         const float off = std::abs(w - (line.a + line.b * rays_->y[static_cast<std::size_t>(r)])) * w;
         const float limit = (static_cast<float>(params_.same_gap_sigmas) * inverse_sigma(w) +
                              static_cast<float>(params_.gap_floor_m) * w * w) *
                             line.norm;
-        ++(off > limit ? other : own);
+        const int measured = static_cast<int>(w > 0.0F), is_off = measured & static_cast<int>(off > limit);
+        other += is_off, own += measured - is_off;
       }
       if (other < kElsewhere || 2 * other < own) {
         out.back().bottom = run.bottom;
@@ -163,9 +163,9 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
     bin = (half_px >> 1) + kBins / 2;
   }
   const float *ws = image_->down.row(column), *ys = rays_->y.data();
-  Four sum = cv::v_setzero_f32();
-  float best = 0.0F;
-  std::int32_t at = first - 1;
+  // Each lane's least sum so far and the first row that has it: which of them is least is asked at the end.
+  const Four four_steps = cv::v_load(kSteps.data()), none = cv::v_setall_f32(static_cast<float>(first - 1));
+  Four sum = cv::v_setzero_f32(), best = sum, at = none;
   for (std::int32_t from = first; from <= last; from += kAtOnce, bin += kAtOnce) {
     // The last rows of the picture are looked at with others before them.
     const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce);
@@ -190,10 +190,10 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
       sums = sums + cv::v_rotate_left<1>(sums);
       sums = sums + cv::v_rotate_left<2>(sums) + sum;
       sum = cv::v_broadcast_element<3>(sums);
-      const float least = cv::v_reduce_min(sums);
-      if (least >= best) continue;
-      best = least;
-      at = start + i + std::countr_zero(static_cast<std::uint32_t>(cv::v_signmask(sums <= cv::v_setall_f32(least))));
+      const Four row = cv::v_setall_f32(static_cast<float>(start + i)) + four_steps;
+      const Four better = (sums < best) & (row >= cv::v_setall_f32(static_cast<float>(from)));
+      best = cv::v_select(better, sums, best);
+      at = cv::v_select(better, row, at);
     }
     const std::int32_t first_bin = bin - (from - start);
     if (bins == nullptr || first_bin < -kAtOnce || first_bin > kBins) continue;
@@ -202,7 +202,8 @@ std::int32_t SurfaceBoundaries::change_point(std::int32_t column, const Line& up
       cv::v_store(to, cv::vx_load(to) + cv::vx_load(gains.data() + i));
     }
   }
-  return at;
+  const Four least = best == cv::v_setall_f32(cv::v_reduce_min(best));
+  return static_cast<std::int32_t>(cv::v_reduce_min(cv::v_select(least, at, cv::v_setall_f32(kDepthHeight_px))));
 }
 
 void SurfaceBoundaries::meet(std::int32_t column, bool by_planes) noexcept {

@@ -96,14 +96,14 @@ void SurfaceBoundaries::refit(std::int32_t first_column, const Strip& strip, boo
   const Wide least = all(1e-3F), base = all(base_), per_metre = all(per_metre_), one = all(1.0F);
   const Wide quadratic = all(quadratic_), share1 = all(correlated_share_), share0 = all(1.0F - correlated_share_);
   const Wide most = of(math::square(params_.inlier_sigmas) * plane_m.squaredNorm());
-  const Wide b = of(b0);
+  const Wide b = of(b0), next_row = all(static_cast<float>(stride));
   for (std::int32_t k = 0; k < kRefitColumns; k += Wide::nlanes) {
     const Wide first = cv::vx_load(from.data() + k), last = cv::vx_load(to.data() + k);
     const Wide x = cv::vx_load(rays_->x.data() + first_column + k), a = of(plane_m.x()) * x + of(a0);
     Wide sum_n = all(0.0F), sum_t = sum_n, sum_tt = sum_n, sum_r = sum_n, sum_tr = sum_n;
     Wide sum_off2 = sum_n, sum_count = sum_n, sum_seen = sum_n;
-    for (std::int32_t r = top; r <= bottom; r += stride) {
-      const Wide t = all(static_cast<float>(r - top));
+    Wide t = all(0.0F);
+    for (std::int32_t r = top; r <= bottom; r += stride, t += next_row) {
       const Wide w = cv::v_max(cv::vx_load(image_->inverse_depth.row(r) + first_column + k), least);
       const Wide pixels =
           cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand_q(image_->valid.row(r) + first_column + k)));

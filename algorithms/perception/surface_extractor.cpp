@@ -393,6 +393,7 @@ void SurfaceExtractor::build_polygon() noexcept {
     return;
   }
   own.surface = static_cast<std::uint8_t>(next().surfaces.size());
+  own.nosing = lines_.nosing;
 }
 
 void SurfaceExtractor::finish() noexcept {

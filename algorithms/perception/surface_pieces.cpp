@@ -38,7 +38,7 @@ void SurfacePieces::find(SurfaceBoundaries::Columns& columns, std::int32_t colum
       while (next < lefts.size() && lefts[next].bottom < span.top) ++next;
       for (std::size_t i = next; i < lefts.size() && lefts[i].top <= span.bottom; ++i) {
         const ColumnSpan& left = lefts[i];
-        if (left.plane != span.plane || left.bottom < span.top) continue;
+        if ((static_cast<int>(left.plane == span.plane) & static_cast<int>(left.bottom >= span.top)) == 0) continue;
         const std::uint16_t a = root(left.piece), b = root(span.piece);
         parent_[std::max(a, b)] = std::min(a, b);
       }

@@ -28,14 +28,11 @@ struct RowRays {
 
 // A plane in one row: inverse depth at + slope * column, and the tolerance of measured over expected depth.
 struct RowPlane {
-  float at = 0.0F;
-  float slope = 0.0F;
-  float per_sigma = 0.0F;
-  bool valid = false;
+  float at, slope, per_sigma;
+  bool valid;
 
-  RowPlane() noexcept = default;
   // Near one pixel of the row.
-  RowPlane(const InversePlane& plane, const DepthSigma& noise, const RowRays& rays, std::int32_t column) noexcept {
+  void set(const InversePlane& plane, const DepthSigma& noise, const RowRays& rays, std::int32_t column) noexcept {
     const double x = rays.x0 + rays.pitch * column, ray2 = x * x + rays.y * rays.y + 1.0;
     const double constant = plane.m.y() * rays.y + plane.m.z(), w = plane.m.x() * x + constant;
     valid = w > 0.05;
@@ -137,20 +134,32 @@ void SurfaceSides::begin(const Params& params, const DepthSigma& noise, const Ra
   pitch_ = 1.0 / raw.intrinsics.fx_px;
 }
 
-SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t row, std::int32_t column, bool right,
-                                              double& end_px) const noexcept {
+// From inside outwards.
+struct SurfaceSides::RowView {
+  std::int32_t row, column;  // the outermost of the surface's columns
+  Raws raw;
+  RowPlane own, other;      // other: of what lies beyond, if that is known
+  std::int32_t first, out;  // pixel, and step outwards
+  Ending ending;            // kSeen: the pixels will tell
+};
+
+void SurfaceSides::look(std::size_t index, bool right, RowView& view) const noexcept {
   const CameraIntrinsics& k = raw_->intrinsics;
   const FramePlanes& planes = *planes_;
-  const std::int32_t out = right ? 1 : -1;
+  const std::int32_t row = view.row, column = view.column, out = right ? 1 : -1;
   const std::int32_t border = kColumn_px * column + (right ? kColumn_px - 1 : 0);  // the outermost column's last pixel
-  // The picture's last columns hide what comes after them.
-  if (border + 2 * out < 0 || border + 2 * out >= k.width_px) return Ending::kHidden;
   const std::int32_t first = border - out * (kInside_px - 1);
-  if (first < 0 || first >= k.width_px) return Ending::kNone;
+  view.first = first;
+  view.out = out;
+  // The picture's last columns hide what comes after them.
+  view.ending = Ending::kHidden;
+  if (border + 2 * out < 0 || border + 2 * out >= k.width_px) return;
+  view.ending = Ending::kNone;
+  if (first < 0 || first >= k.width_px) return;
   const RowRays rays{-k.cx_px * pitch_, pitch_,
                      static_cast<double>(picture_->column_rays.y[static_cast<std::size_t>(row)])};
-  const RowPlane own(planes[index].plane, noise_, rays, border);
-  if (!own.valid) return Ending::kNone;
+  view.own.set(planes[index].plane, noise_, rays, border);
+  if (!view.own.valid) return;
   // The plane beyond, if there is one.
   std::size_t beyond = 0;
   for (std::int32_t g = column + out; g != column + 3 * out; g += out) {
@@ -158,9 +167,9 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
     const std::size_t p = picture_->owner(g, row);
     if (p != 0 && p != index) beyond = p;
   }
-  const RowPlane other = beyond != 0 ? RowPlane(planes[beyond].plane, noise_, rays, border) : RowPlane();
+  view.other.valid = false;
+  if (beyond != 0) view.other.set(planes[beyond].plane, noise_, rays, border);
   const std::uint16_t* pixels = raw_->row(row);
-  Raws raw;
   std::int32_t count = std::min(kReach_px, right ? k.width_px - first : first + 1);
   if (picture_->body_rows[static_cast<std::size_t>(row / 2)]) {
     const std::uint8_t* flags = picture_->flags.row(row / 2);
@@ -173,14 +182,18 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
     static_assert(kReach_px == 2 * Eight::nlanes);
     const std::uint16_t* leftmost = pixels + (right ? first : first - (kReach_px - 1));
     const Eight a = cv::v_load(leftmost), b = cv::v_load(leftmost + Eight::nlanes);
-    cv::v_store(raw.data(), right ? a : reversed(b));
-    cv::v_store(raw.data() + Eight::nlanes, right ? b : reversed(a));
+    cv::v_store(view.raw.data(), right ? a : reversed(b));
+    cv::v_store(view.raw.data() + Eight::nlanes, right ? b : reversed(a));
   } else {
-    raw.fill(0);
-    for (std::int32_t i = 0; i < count; ++i) raw[static_cast<std::size_t>(i)] = pixels[first + out * i];
+    view.raw.fill(0);
+    for (std::int32_t i = 0; i < count; ++i) view.raw[static_cast<std::size_t>(i)] = pixels[first + out * i];
   }
-  if (count < kInside_px) return Ending::kHidden;  // by the robot's own body
-  const PixelGains gains = weigh(params_, *raw_, own, other, first, out, raw);
+  view.ending = count < kInside_px ? Ending::kHidden : Ending::kSeen;  // by the robot's own body
+}
+
+SurfaceSides::Ending SurfaceSides::end_of_row(const RowView& view, double& end_px) const noexcept {
+  if (view.ending != Ending::kSeen) return view.ending;
+  const PixelGains gains = weigh(params_, *raw_, view.own, view.other, view.first, view.out, view.raw);
   // The boundary with the least cost; between equally good ones (a pixel without data or of neither) in their middle.
   const std::uint32_t equal = least_costs(gains.gain);
   const auto from = std::countr_zero(equal);
@@ -191,7 +204,7 @@ SurfaceSides::Ending SurfaceSides::end_of_row(std::size_t index, std::int32_t ro
   const std::uint32_t between = gains.measured & ((2U << to) - (2U << from));
   const std::int32_t of_neither = std::popcount(between) - 2 * std::popcount(between & gains.before);
   if (std::abs(of_neither) > kMixed_px) to = from;  // something narrow stands between: the surface ends at it
-  end_px = first + out * (0.5 * (from + to) + 0.5);
+  end_px = view.first + view.out * (0.5 * (from + to) + 0.5);
   return Ending::kSeen;
 }
 
@@ -271,7 +284,7 @@ void SurfaceSides::find_ends(std::size_t index, const SurfaceProfile& profile) n
 OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile, bool right) noexcept {
   const FramePlane& plane = (*planes_)[index];
   const double out = right ? 1.0 : -1.0;
-  const auto outer_edge = [right](std::uint8_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
+  const auto outer_edge = [right](std::int32_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
   seen_.clear();
   hidden_.clear();
   const std::uint8_t* ends = (right ? right_ : left_).data() + kPad;
@@ -291,7 +304,9 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
   }
   const std::int32_t most = plane.kind == SurfaceKind::kTread ? kMaxRows : kOtherRows;
   const std::int32_t stride = (count + most - 1) / most;
-  double outermost = -1e9;
+  // Rows are asked for, then looked at, then decided on: each step takes its time, and none waits for another row's.
+  std::array<RowView, kMaxRows> views;
+  std::size_t row_count = 0;
   std::int32_t above = 0;  // such rows above r0
   for (std::int32_t i = stride / 2, r0 = first_row; i < count; i += stride) {
     const auto bits = [&] { return upright[static_cast<std::size_t>((r0 - first_row) / Bytes::nlanes)]; };
@@ -299,13 +314,20 @@ OutlineSide SurfaceSides::find(std::size_t index, const SurfaceProfile& profile,
     std::uint32_t from_it = bits();
     for (std::int32_t before = above; before < i; ++before) from_it &= from_it - 1U;
     const std::int32_t r = r0 + std::countr_zero(from_it);
-    const std::uint8_t g = ends[r];
-    RowEnd end{static_cast<double>(r), 0.0};
-    const Ending ending = end_of_row(index, r, g, right, end.column);
+    views[row_count].row = r;
+    views[row_count++].column = ends[r];
+    __builtin_prefetch(raw_->row(r) + kColumn_px * ends[r]);
+  }
+  for (std::size_t i = 0; i < row_count; ++i) look(index, right, views[i]);
+  double outermost = -1e9;
+  for (std::size_t i = 0; i < row_count; ++i) {
+    double column = 0.0;
+    const Ending ending = end_of_row(views[i], column);
     if (ending == Ending::kNone) continue;
-    if (ending == Ending::kHidden) end.column = outer_edge(g);
-    static_cast<void>((ending == Ending::kSeen ? seen_ : hidden_).try_push_back(end));
-    outermost = std::max(outermost, out * end.column);
+    if (ending == Ending::kHidden) column = outer_edge(views[i].column);
+    static_cast<void>(
+        (ending == Ending::kSeen ? seen_ : hidden_).try_push_back({static_cast<double>(views[i].row), column}));
+    outermost = std::max(outermost, out * column);
   }
   // Half-resolution pixel i is where full-resolution 2 i + 0.5 is.
   OutlineSide side;

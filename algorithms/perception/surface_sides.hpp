@@ -39,9 +39,10 @@ class SurfaceSides {
   // kHidden: by the picture's end, the robot's own body or missing data. kNone: the row's pixels there are not the
   // surface's.
   enum class Ending : std::uint8_t { kSeen, kHidden, kNone };
+  struct RowView;  // what is seen around the end of one row
+  void look(std::size_t index, bool right, RowView& view) const noexcept;
   // Between which columns one row's pixels leave the surface (pixel c reaches from c - 0.5 to c + 0.5).
-  [[nodiscard]] Ending end_of_row(std::size_t index, std::int32_t row, std::int32_t column, bool right,
-                                  double& end_px) const noexcept;
+  [[nodiscard]] Ending end_of_row(const RowView& view, double& end_px) const noexcept;
   struct Line {  // column = at + slope * row
     double at = 0.0;
     double slope = 0.0;

@@ -17,3 +17,16 @@
 #ifdef __AVX2__
 static_assert(cv::v_float32::nlanes == 8, "something included OpenCV's headers before and made them SSE2");
 #endif
+
+namespace polygmap {
+
+// A register of 256 bits: the first of its lower half, the first of its upper half, the second ... One of 128 as it is.
+inline cv::v_uint32 halves_in_turn(const cv::v_uint32& a) noexcept {
+#ifdef __AVX2__
+  return cv::v_uint32(_mm256_permutevar8x32_epi32(a.val, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7)));
+#else
+  return a;
+#endif
+}
+
+}  // namespace polygmap
