@@ -39,7 +39,7 @@ TEST(PhysicalClimb, WithoutFeedbackOfTheDcmFromALiftOffOn_FallsInThatSwing) {
     if (!feedback) params.balance.dcm.gain = params.balance.dcm.integral_per_s = 0.0;
     const auto other = std::make_unique<Gait>();
     other->reset(params);
-    PhysicalClimb climb(few_steps(1));
+    PhysicalClimb climb(few_steps(4));
     JointCommand its_command;
     bool lifted = false;
     climb.tamper_command = [&](JointCommand& command, const FootholdSet& footholds, const JointFeedback& joints) {

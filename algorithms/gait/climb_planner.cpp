@@ -130,7 +130,7 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
 
   const double relaxed =
       corrections_ > params_.strict_corrections ? 1.0 + 0.5 * (corrections_ - params_.strict_corrections) : 1.0;
-  // With the weight on its way for the leading step, a little more is no reason to line up again.
+  // With the leading step under way a little more is no reason to line up again.
   constexpr double kUnderWay = 0.5;
   const double tolerance = std::min(relaxed, params_.max_relaxation) + (situation.leads ? kUnderWay : 0.0);
   std::array<bool, kFootCount> lined_up{};

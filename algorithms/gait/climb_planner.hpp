@@ -37,8 +37,8 @@ class ClimbPlanner {
     std::int64_t stamp_ns = 0;
     Transform world_T_odom;
     SolePair soles;
-    // The weight is on its way over the other foot for a leading step of this one: no reason to turn round
-    // but a large one.
+    // The weight is on its way over the other foot for a leading step of this one, or it looks at its toes for it: no
+    // reason to turn round but a large one.
     bool leads = false;
     Foot leading = Foot::kLeft;
   };

@@ -60,7 +60,7 @@ ClimbPlanner::Situation Gait::situation(const StateEstimate& state) const noexce
   return {now_ns_,
           state.world_T_odom,
           {sole_pose(state.odom_T_sole[0]), sole_pose(state.odom_T_sole[1])},
-          activity_ == Activity::kShift && decision_.goal.kind == StepKind::kLeading,
+          (activity_ == Activity::kShift || looks_) && decision_.goal.kind == StepKind::kLeading,
           decision_.goal.foot};
 }
 
@@ -283,12 +283,13 @@ void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexce
   if ((retried_ || sways) && tick_ < params_.settle_ticks) return;
   // What it learns while it looks may be that it does not stand straight yet: the whole look first, and once.
   if (looks_ && tick_ < params_.look_ticks) return;
+  const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   const bool has_looked = std::exchange(looks_, false);
   looked_ = looked_ || has_looked;
-  const ClimbPlanner::Decision decision = planner_.decide(situation(state), footholds);
   if (decision.has_step) {
     wait_ticks_ = 0;
     if (!looks_first(decision)) return begin_shift(decision, false);
+    decision_ = decision;
     looks_ = true;
     return settle_between_feet();
   }
