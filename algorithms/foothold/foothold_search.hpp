@@ -27,10 +27,9 @@ class FootholdSearch {
     // Contact rectangle to the tread's front and back edge, collision toe to the riser: the least, and two sigmas of
     // where edge and foot are. An edge errs by as much as its own sigma says, 2.3 mm rms in 620 steps on treads of
     // 270 mm; beside that a foot lands 2.2 mm off, by its legs' errors and the camera's yaw. Two sigmas of both, 6.4
-    // mm of the 9 there are, keep a normal error on the tread in 97.7 % of the steps, 5 mm over its edge comes once in
-    // 4000.
+    // mm of the 9 there are, keep a normal error on the tread in 97.7 % of the steps.
     EdgeMargin margin{0.003, 2.0, 0.0022};
-    double tread_min_m = 0.260;     // collision toe and contact heel, 252 mm, fit with 4 mm at either end
+    double tread_min_m = 0.260;     // collision toe and contact heel, 252 mm, and 4 mm at either end
     double side_margin_m = 0.020;   // contact rectangle to the tread's sides
     double veer_max_m = 0.02;       // sideways per tread, towards the middle of the staircase
     double half_spacing_m = 0.100;  // soles from their common middle

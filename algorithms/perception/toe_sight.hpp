@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a picture shows the toe of a standing foot, against where the encoders have it. Where a camera sits along the
 // ground cannot be told from level surfaces, and a foothold is off by as much; the robot's own toe tells, whenever a
-// leg reaches so far ahead that its knee does not hide it. The foot's shape is the collision box of robot/model.hpp.
+// standing leg is so straight that its knee does not hide it. The foot's shape is the collision box of robot/model.hpp.
 #pragma once
 
 #include <cstdint>
