@@ -140,8 +140,8 @@ void ControlLane::report_gait(std::int64_t now_ns) noexcept {
   health_.raise(Limit::kFootPutBack, now_ns, now.put_back - gait_seen_.put_back);
   if (now.phase == GaitPhase::kStopped && gait_seen_.phase != GaitPhase::kStopped) {
     health_.raise(Fault::kGaitStopped, now_ns);
-    if (now.stop_reason == Obstruction::kMapStale) health_.raise(Fault::kMapStale, now_ns);
-    if (now.stop_reason == Obstruction::kStateStale) health_.raise(Fault::kStateStale, now_ns);
+    if (now.stop_reason == StopReason::kMapStale) health_.raise(Fault::kMapStale, now_ns);
+    if (now.stop_reason == StopReason::kStateStale) health_.raise(Fault::kStateStale, now_ns);
   }
   gait_seen_ = now;
 }

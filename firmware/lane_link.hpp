@@ -3,10 +3,10 @@
 // reader.
 #pragma once
 
-#include "algorithms/core/exchange.hpp"
-#include "algorithms/core/footholds.hpp"
-#include "algorithms/core/gait_status.hpp"
-#include "algorithms/core/state.hpp"
+#include "algorithms/core/containers/exchange.hpp"
+#include "algorithms/core/messages/footholds.hpp"
+#include "algorithms/core/messages/gait_status.hpp"
+#include "algorithms/core/messages/state.hpp"
 #include "scheduler/health.hpp"
 
 namespace polygmap {

@@ -5,8 +5,8 @@
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/foothold/foothold_search.hpp"
 #include "algorithms/gait/gait.hpp"
-#include "algorithms/perception/mount_estimator.hpp"
-#include "algorithms/perception/polygon_map.hpp"
+#include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
+#include "algorithms/perception/map/polygon_map.hpp"
 #include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/model.hpp"
 
@@ -15,7 +15,7 @@ namespace polygmap {
 struct Params {
   Estimator::Params estimator;
   SurfaceExtractor::Params surfaces;
-  MountEstimator::Params mount;
+  CameraExtrinsicsEstimator::Params mount;
   PolygonMap::Params map;
   FootholdSearch::Params footholds;
   Gait::Params gait;

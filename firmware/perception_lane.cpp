@@ -111,7 +111,7 @@ void PerceptionLane::learn_mount() noexcept {
   constexpr double kStands = 0.9;
   const StateEstimate& state = exposure_state_;
   const Transform base_T_odom = state.odom_T_base.inverse();
-  MountEstimator::Stance stance;
+  CameraExtrinsicsEstimator::Stance stance;
   stance.base_up = base_T_odom.R.col(2);
   stance.speed_mps = math::sqrt(state.odom_v_base_mps.squaredNorm());
   RawRange range;
@@ -121,7 +121,7 @@ void PerceptionLane::learn_mount() noexcept {
     stance.base_T_sole[foot] = base_T_odom * state.odom_T_sole[foot];
     stance.stands[foot] = state.contact_probability[foot] > kStands;
     if (stance.stands[foot])
-      stance.toes[foot] = see_toe(frame_, intrinsics_, range, camera_T_base * stance.base_T_sole[foot]);
+      stance.toes[foot] = detect_toe(frame_, intrinsics_, range, camera_T_base * stance.base_T_sole[foot]);
   }
   mount_.update(extractor_.result(), stance);
 }

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "algorithms/core/work.hpp"
-#include "algorithms/perception/mount_estimator.hpp"
+#include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
 #include "firmware/lane_link.hpp"
 #include "firmware/params.hpp"
 #include "hal/ports/depth_camera.hpp"
@@ -24,7 +24,7 @@ class PerceptionLane {
 
   [[nodiscard]] const SurfaceFrame& surface_frame() const noexcept { return extractor_.result(); }
   [[nodiscard]] const MapSnapshot& map_snapshot() const noexcept { return map_.snapshot(); }
-  [[nodiscard]] const MountEstimator& mount() const noexcept { return mount_; }
+  [[nodiscard]] const CameraExtrinsicsEstimator& mount() const noexcept { return mount_; }
   [[nodiscard]] const SurfaceExtractor& extractor() const noexcept { return extractor_; }
   [[nodiscard]] Health& faults() noexcept { return health_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_; }
@@ -55,7 +55,7 @@ class PerceptionLane {
   SurfaceExtractor::Counters extractor_seen_;  // the stages' counters as last reported
   std::uint32_t map_full_seen_ = 0, frames_lost_seen_ = 0;
   SurfaceExtractor extractor_;
-  MountEstimator mount_;
+  CameraExtrinsicsEstimator mount_;
   PolygonMap map_;
   FootholdSearch search_;
   Health health_;

@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "algorithms/core/gait_status.hpp"
-#include "algorithms/core/state.hpp"
-#include "algorithms/core/surfaces.hpp"
-#include "algorithms/estimation/estimate_quality.hpp"
+#include "algorithms/core/messages/gait_status.hpp"
+#include "algorithms/core/messages/state.hpp"
+#include "algorithms/core/messages/surfaces.hpp"
+#include "algorithms/estimation/quality/estimate_quality.hpp"
 
 namespace polygmap {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "sim_stub/counter_noise.hpp"
+#include "sim_stub/camera/counter_noise.hpp"
 
 namespace polygmap::sim {
 namespace {

@@ -8,20 +8,20 @@
 #include <optional>
 #include <vector>
 
-#include "algorithms/core/ring_buffer.hpp"
+#include "algorithms/core/containers/ring_buffer.hpp"
 #include "hal/ports/clock.hpp"
 #include "hal/ports/depth_camera.hpp"
 #include "hal/ports/imu.hpp"
 #include "hal/ports/joint_bus.hpp"
 #include "hal/ports/lidar_odometry.hpp"
-#include "sim_stub/depth_camera.hpp"
-#include "sim_stub/kinematic_plant.hpp"
-#include "sim_stub/mujoco_plant.hpp"
-#include "sim_stub/robot_errors.hpp"
-#include "sim_stub/sensor_models.hpp"
-#include "sim_stub/stair_world.hpp"
-#include "sim_stub/truth.hpp"
-#include "sim_stub/virtual_clock.hpp"
+#include "sim_stub/camera/depth_camera.hpp"
+#include "sim_stub/plant/kinematic_plant.hpp"
+#include "sim_stub/plant/mujoco_plant.hpp"
+#include "sim_stub/sensors/robot_errors.hpp"
+#include "sim_stub/sensors/sensor_models.hpp"
+#include "sim_stub/sensors/virtual_clock.hpp"
+#include "sim_stub/world/stair_world.hpp"
+#include "sim_stub/world/truth.hpp"
 
 namespace polygmap::sim {
 
@@ -37,9 +37,9 @@ struct StartPose {
 struct SimOptions {
   std::uint64_t seed = 1;
   StairParams stairs;
-  DepthNoise noise = DepthNoise::kWhite;
+  NoiseKind noise = NoiseKind::kWhite;
   CameraIntrinsics intrinsics = robot_camera_intrinsics();
-  DepthSigma depth_sigma;
+  DepthNoiseModel depth_sigma;
   ErrorParams errors;
   std::optional<StartPose> start;  // drawn from the seed when absent
   DepthCameraOptions camera;

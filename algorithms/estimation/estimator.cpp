@@ -197,7 +197,7 @@ void Estimator::calibrate() noexcept {
   }
   if (!still) return;
 
-  AttitudeFilter::Start start;
+  ContactInEkf::Start start;
   start.odom_R_base = initial_odom_T_base_.R;
   start.odom_p_base_m = initial_odom_T_base_.p_m;
   start.odom_v_base_mps = standstill_.odom_v_base_mps();

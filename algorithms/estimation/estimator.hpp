@@ -2,17 +2,17 @@
 // State estimation as one stage: samples in as they arrive, StateEstimate out once per 2 ms.
 #pragma once
 
-#include "algorithms/estimation/encoder_offsets.hpp"
-#include "algorithms/estimation/force_inference.hpp"
-#include "algorithms/estimation/odometry.hpp"
-#include "algorithms/estimation/standstill.hpp"
-#include "algorithms/estimation/state_ring.hpp"
+#include "algorithms/estimation/calibration/encoder_offsets.hpp"
+#include "algorithms/estimation/calibration/standstill.hpp"
+#include "algorithms/estimation/contact/force_inference.hpp"
+#include "algorithms/estimation/proprioceptive_odometry.hpp"
+#include "algorithms/estimation/state_history.hpp"
 
 namespace polygmap {
 
 class Estimator {
  public:
-  struct Params : Odometry::Params {
+  struct Params : ProprioceptiveOdometry::Params {
     LegGeometry geometry;
     StandstillCalibration::Params standstill;
     ContactEstimator::Params contacts;
@@ -94,8 +94,8 @@ class Estimator {
   EncoderOffsets encoders_;
   ImuNoise imu_noise_;
   ForceInference forces_;
-  Odometry odometry_;
-  StateRing ring_;
+  ProprioceptiveOdometry odometry_;
+  StateHistory ring_;
   StateEstimate state_;
   EstimateQuality quality_;
   ImuSample imu_;               // last accepted; rates: the mean of those of its tick
@@ -106,8 +106,8 @@ class Estimator {
   bool has_imu_ = false;
   bool has_joints_ = false;
   bool has_state_ = false;
-  Odometry::Legs legs_;
-  Odometry::Ground ground_;
+  ProprioceptiveOdometry::Legs legs_;
+  ProprioceptiveOdometry::Ground ground_;
   std::array<bool, kFootCount> stood_{};
   Transform initial_odom_T_base_;  // stood still there until initialised_ns_
   std::int64_t initialised_ns_ = 0;

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "algorithms/core/raster.hpp"
+#include "algorithms/core/containers/raster.hpp"
 #include "algorithms/foothold/level_surface.hpp"
 
 namespace polygmap {

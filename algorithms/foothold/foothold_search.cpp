@@ -330,59 +330,59 @@ bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) c
   return false;
 }
 
-Obstruction FootholdSearch::without_next() const noexcept {
-  if (unconfirmed_ahead_) return Obstruction::kNothingSeen;
-  if (!query_.climbing) return Obstruction::kNoStaircase;
+StopReason FootholdSearch::without_next() const noexcept {
+  if (unconfirmed_ahead_) return StopReason::kNothingSeen;
+  if (!query_.climbing) return StopReason::kNoStaircase;
   // Nothing higher is known: is that because nothing rises there, or because nobody looked?
   const bool looked =
       top_cells_ > 0 && static_cast<double>(top_cells_seen_) >= params_.top_fraction * static_cast<double>(top_cells_);
-  return looked ? Obstruction::kTop : Obstruction::kNothingSeen;
+  return looked ? StopReason::kTop : StopReason::kNothingSeen;
 }
 
-Obstruction FootholdSearch::judge_feet(const LevelSurface& tread, const Feet& feet) const noexcept {
+StopReason FootholdSearch::judge_feet(const LevelSurface& tread, const Feet& feet) const noexcept {
   for (const Foothold& f : feet) {
     // Reaching over the end of what has been seen of it.
-    if (std::min(f.clearance_m, f.toe_clearance_m) < params_.margin.least_m) return Obstruction::kNothingSeen;
-    if (tread.spare_m(f.position_m.head<2>()) < 0.0) return Obstruction::kEdgeUncertain;
+    if (std::min(f.clearance_m, f.toe_clearance_m) < params_.margin.least_m) return StopReason::kNothingSeen;
+    if (tread.spare_m(f.position_m.head<2>()) < 0.0) return StopReason::kEdgeUncertain;
   }
-  return Obstruction::kNone;
+  return StopReason::kNone;
 }
 
-Obstruction FootholdSearch::judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
-                                        double step_max_m, Feet& feet) const noexcept {
-  if (tread.height_m - from_height_m > params_.rise_max_m) return Obstruction::kRiseTooHigh;
-  if (!tread.has_nosing) return Obstruction::kNothingSeen;
-  if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return Obstruction::kTreadTooShort;
-  if (!place_feet(tread, feet)) return Obstruction::kTooNarrow;
+StopReason FootholdSearch::judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
+                                       double step_max_m, Feet& feet) const noexcept {
+  if (tread.height_m - from_height_m > params_.rise_max_m) return StopReason::kRiseTooHigh;
+  if (!tread.has_nosing) return StopReason::kNothingSeen;
+  if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return StopReason::kTreadTooShort;
+  if (!place_feet(tread, feet)) return StopReason::kTooNarrow;
   const Foothold& foot = feet[index_of(query_.stance)];
-  if (foot.nosing_distance_m - tread.along_m(from_p_m) > step_max_m) return Obstruction::kNoStaircase;
+  if (foot.nosing_distance_m - tread.along_m(from_p_m) > step_max_m) return StopReason::kNoStaircase;
   return judge_feet(tread, feet);
 }
 
-Obstruction FootholdSearch::judge_next() noexcept {
+StopReason FootholdSearch::judge_next() noexcept {
   const LevelSurface& tread = levels_[next_];
   pending_.measured_rise_m = tread.height_m - z_foot_;
   pending_.measured_tread_m = tread.depth_m;
   pending_.tread = {tread.nosing_a_m, tread.nosing_b_m};
   double step_max_m = kInfinity;
   if (query_.climbing) step_max_m = params_.step_max_m;
-  const Obstruction found = judge_tread(tread, z_foot_, sole_.origin_m(), step_max_m, pending_.p_star_feet);
-  if (found == Obstruction::kNoStaircase) return without_next();  // another flight
-  if (found != Obstruction::kNone) return found;
-  return has_p_star_cell_ ? Obstruction::kNone : Obstruction::kNothingSeen;
+  const StopReason found = judge_tread(tread, z_foot_, sole_.origin_m(), step_max_m, pending_.p_star_feet);
+  if (found == StopReason::kNoStaircase) return without_next();  // another flight
+  if (found != StopReason::kNone) return found;
+  return has_p_star_cell_ ? StopReason::kNone : StopReason::kNothingSeen;
 }
 
 void FootholdSearch::choose() noexcept {
   double top_m = 0.0;
   if (map_.stamp_ns == 0 || (levels_.empty() && uprights_.empty())) {
-    pending_.obstruction = Obstruction::kNothingSeen;
+    pending_.obstruction = StopReason::kNothingSeen;
   } else if (blocked_by_upright(math::sqrt(next_distance2_m2_), top_m)) {
-    pending_.obstruction = Obstruction::kRiseTooHigh;
+    pending_.obstruction = StopReason::kRiseTooHigh;
     pending_.measured_rise_m = top_m - z_foot_;
   } else {
     pending_.obstruction = next_ == kNone ? without_next() : judge_next();
   }
-  if (pending_.obstruction != Obstruction::kNone) return;
+  if (pending_.obstruction != StopReason::kNone) return;
 
   const LevelSurface& tread = levels_[next_];
   const double lateral_m = tread.lateral_m(p_star_cell_m_);
@@ -408,7 +408,7 @@ void FootholdSearch::finish() noexcept {
   if (next_next_ != kNone) {
     pending_.has_p_star_star =
         judge_tread(levels_[next_next_], levels_[next_].height_m, pending_.p_star.position_m.head<2>(),
-                    params_.step_max_m, pending_.p_star_star_feet) == Obstruction::kNone;
+                    params_.step_max_m, pending_.p_star_star_feet) == StopReason::kNone;
   }
   result_ = moved(pending_, map_.drift_m);
   ++counters_.searches;

@@ -5,9 +5,9 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/core/footholds.hpp"
-#include "algorithms/core/surfaces.hpp"
-#include "algorithms/core/transform.hpp"
+#include "algorithms/core/math/transform.hpp"
+#include "algorithms/core/messages/footholds.hpp"
+#include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/core/work.hpp"
 #include "algorithms/foothold/foothold_raster.hpp"
 #include "algorithms/foothold/level_surface.hpp"
@@ -94,14 +94,14 @@ class FootholdSearch {
   [[nodiscard]] double middle_m(const LevelSurface& tread) const noexcept;
   using Feet = std::array<Foothold, kFootCount>;
   [[nodiscard]] bool place_feet(const LevelSurface& tread, Feet& feet) const noexcept;
-  [[nodiscard]] Obstruction judge_feet(const LevelSurface& tread, const Feet& feet) const noexcept;
+  [[nodiscard]] StopReason judge_feet(const LevelSurface& tread, const Feet& feet) const noexcept;
   // Of a step onto the tread from soles at a point before it; places the feet. kNoStaircase: it is too far for a step.
-  [[nodiscard]] Obstruction judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
-                                        double step_max_m, Feet& feet) const noexcept;
+  [[nodiscard]] StopReason judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
+                                       double step_max_m, Feet& feet) const noexcept;
   [[nodiscard]] static bool carries(const Upright& riser, const LevelSurface& tread) noexcept;
   [[nodiscard]] bool blocked_by_upright(double next_distance_m, double& top_m) const noexcept;
-  [[nodiscard]] Obstruction without_next() const noexcept;
-  [[nodiscard]] Obstruction judge_next() noexcept;
+  [[nodiscard]] StopReason without_next() const noexcept;
+  [[nodiscard]] StopReason judge_next() noexcept;
 
   Params params_;
   Counters counters_;

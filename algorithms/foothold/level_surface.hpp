@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "algorithms/core/surfaces.hpp"
+#include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/geometry/convex.hpp"
 #include "algorithms/geometry/plane.hpp"
 #include "algorithms/robot/model.hpp"

@@ -37,7 +37,7 @@ void Gait::reset(const Params& params) noexcept {
   base_com_bias_m_.setZero();
   status_ = {};
   activity_ = Activity::kHold;
-  waiting_for_ = Obstruction::kNone;
+  waiting_for_ = StopReason::kNone;
   tick_ = shifts_ = wait_ticks_ = idle_ticks_ = off_ticks_ = 0;
   put_back_ = 0;
   armed_ = started_ = unloaded_ = retried_ = settles_ = looks_ = stop_requested_ = false;
@@ -238,7 +238,7 @@ void Gait::begin_hold() noexcept {
   settle_between_feet();
 }
 
-void Gait::end(GaitPhase phase, Obstruction reason, double measured_m) noexcept {
+void Gait::end(GaitPhase phase, StopReason reason, double measured_m) noexcept {
   if (std::exchange(looks_, false)) settle_between_feet();  // down again
   activity_ = Activity::kEnd;
   status_.phase = phase;
@@ -249,7 +249,7 @@ void Gait::end(GaitPhase phase, Obstruction reason, double measured_m) noexcept 
 void Gait::begin_shift(const ClimbPlanner::Decision& decision, bool again) noexcept {
   if (++shifts_ > params_.max_shifts) {
     begin_hold();
-    return end(GaitPhase::kStopped, Obstruction::kUnsteady, 0.0);
+    return end(GaitPhase::kStopped, StopReason::kUnsteady, 0.0);
   }
   carry_plan_to_odometry();
   decision_ = decision;
@@ -275,8 +275,8 @@ bool Gait::looks_first(const ClimbPlanner::Decision& decision) const noexcept {
 }
 
 void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexcept {
-  if (stop_requested_) return end(GaitPhase::kStopped, Obstruction::kNone, 0.0);
-  if (lost(state)) return end(GaitPhase::kStopped, Obstruction::kStateStale, 0.0);
+  if (stop_requested_) return end(GaitPhase::kStopped, StopReason::kNone, 0.0);
+  if (lost(state)) return end(GaitPhase::kStopped, StopReason::kStateStale, 0.0);
   if (!state.initialised || !usable_) return;
   // A body that sways sideways is best off between the feet.
   const bool sways = !(std::abs(plan_T_base_.R.col(1).head<2>().dot(dcm_error_m_)) <= params_.steady_m);
@@ -294,19 +294,19 @@ void Gait::hold(const StateEstimate& state, const FootholdSet& footholds) noexce
     return settle_between_feet();
   }
   if (has_looked) settle_between_feet();
-  Obstruction reason = decision.obstruction;
-  if (reason == Obstruction::kTop || reason == Obstruction::kNoStaircase) {  // nothing higher is mapped
-    reason = planner_.treads_climbed() > 0 ? Obstruction::kTop : Obstruction::kNoStaircase;
+  StopReason reason = decision.obstruction;
+  if (reason == StopReason::kTop || reason == StopReason::kNoStaircase) {  // nothing higher is mapped
+    reason = planner_.treads_climbed() > 0 ? StopReason::kTop : StopReason::kNoStaircase;
   }
   wait_ticks_ = reason == waiting_for_ ? wait_ticks_ + 1 : 1;
   waiting_for_ = reason;
   ++idle_ticks_;
   const std::int32_t patience = status_.step.sequence == 0 ? params_.start_patience_ticks : params_.patience_ticks;
   if (wait_ticks_ >= patience) {
-    if (reason == Obstruction::kTop) return end(GaitPhase::kFinished, Obstruction::kNone, 0.0);
+    if (reason == StopReason::kTop) return end(GaitPhase::kFinished, StopReason::kNone, 0.0);
     return end(GaitPhase::kStopped, reason, decision.measured_m);
   }
-  if (idle_ticks_ >= params_.unsteady_patience * patience) end(GaitPhase::kStopped, Obstruction::kUnsteady, 0.0);
+  if (idle_ticks_ >= params_.unsteady_patience * patience) end(GaitPhase::kStopped, StopReason::kUnsteady, 0.0);
 }
 
 bool Gait::close_to_planned(const StepGoal& goal) const noexcept {
@@ -328,7 +328,7 @@ void Gait::shift(const StateEstimate& state, const FootholdSet& footholds) noexc
     if (decision_.goal.kind == StepKind::kFloor && planner_.shorten_floor_steps()) return;
     if (!std::exchange(retried_, true)) return;
     const double rise_m = decision_.goal.kind == StepKind::kLeading ? decision_.rise_m : 0.0;
-    return end(GaitPhase::kStopped, Obstruction::kLegsCannot, rise_m);
+    return end(GaitPhase::kStopped, StopReason::kLegsCannot, rise_m);
   }
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound) return;
   if (!usable_) return;

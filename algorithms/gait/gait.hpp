@@ -4,16 +4,16 @@
 
 #include <array>
 
-#include "algorithms/core/footholds.hpp"
-#include "algorithms/core/gait_status.hpp"
-#include "algorithms/core/state.hpp"
-#include "algorithms/gait/balance.hpp"
-#include "algorithms/gait/base_correction.hpp"
-#include "algorithms/gait/climb_planner.hpp"
-#include "algorithms/gait/joint_reference.hpp"
-#include "algorithms/gait/planned_posture.hpp"
-#include "algorithms/gait/step_plan.hpp"
-#include "algorithms/gait/swing_pace.hpp"
+#include "algorithms/core/messages/footholds.hpp"
+#include "algorithms/core/messages/gait_status.hpp"
+#include "algorithms/core/messages/state.hpp"
+#include "algorithms/gait/balance/balance.hpp"
+#include "algorithms/gait/footsteps/climb_planner.hpp"
+#include "algorithms/gait/joints/base_correction.hpp"
+#include "algorithms/gait/joints/joint_reference.hpp"
+#include "algorithms/gait/joints/planned_posture.hpp"
+#include "algorithms/gait/trajectories/step_plan.hpp"
+#include "algorithms/gait/trajectories/swing_timing.hpp"
 
 namespace polygmap {
 
@@ -46,7 +46,7 @@ class Gait {
     std::int64_t hold_ns = 200 * kNsPerMs;  // not longer: it may be the sensor, unless that told of the ground
     std::int64_t felt_hold_ns = 600 * kNsPerMs;
     double steady_m = 0.015;  // of the divergent component's error: beyond it no foot lifts
-    SwingPace::Params pace;
+    SwingTiming::Params pace;
     double turn_share = 0.38;         // of a swing, in which a toppling body's foot goes back to where it stood;
     double turn_ticks = 45.0;         // of a passing one
     double soon_ticks = 100.0;        // of the rest of a swing, straight to its target, when the body topples:
@@ -106,7 +106,7 @@ class Gait {
                 const ClimbPlanner::Decision& decision) noexcept;
   void touch_down(const StateEstimate& state) noexcept;
   void hold_landed_foot(const JointFeedback& feedback) noexcept;
-  void end(GaitPhase phase, Obstruction reason, double measured_m) noexcept;
+  void end(GaitPhase phase, StopReason reason, double measured_m) noexcept;
   void carry_plan_to_odometry() noexcept;
   [[nodiscard]] double crouch_m() const noexcept;
   void crouch() noexcept;
@@ -143,7 +143,7 @@ class Gait {
   Vec2 dcm_error_m_ = Vec2::Zero();   // of the divergent component, as last measured, odometry
   Vec2 zmp_stance_m_ = Vec2::Zero();  // of the swing, plan frame
   Swing swing_;                       // odometry
-  SwingPace pace_;
+  SwingTiming pace_;
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
   // The last swing foot as it was asked to be when it landed; in the plan frame it follows no correction.
@@ -157,7 +157,7 @@ class Gait {
   std::int32_t shift_ticks_ = 0;
   std::int32_t shifts_ = 0;     // since the last swing
   std::uint32_t put_back_ = 0;  // feet since the last one that landed
-  Obstruction waiting_for_ = Obstruction::kNone;
+  StopReason waiting_for_ = StopReason::kNone;
   std::int32_t wait_ticks_ = 0;     // for that reason, without a break
   std::int32_t touched_ticks_ = 0;  // for which the swing foot has been felt to touch,
   std::int64_t felt_stamp_ns_ = 0;  // as told by then

@@ -184,9 +184,9 @@ void Gait::put_back(const JointFeedback& feedback) noexcept {
     begin_hold();
     retried_ = true;
     if (pace_.no_ground()) {
-      end(GaitPhase::kStopped, Obstruction::kGroundMissing, 0.0);
+      end(GaitPhase::kStopped, StopReason::kGroundMissing, 0.0);
     } else if (++put_back_ >= params_.max_put_back) {
-      end(GaitPhase::kStopped, Obstruction::kToppling, 0.0);
+      end(GaitPhase::kStopped, StopReason::kToppling, 0.0);
     }
     return;
   }

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "algorithms/core/capacities.hpp"
-#include "algorithms/core/static_vector.hpp"
+#include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/geometry/line.hpp"
 
 namespace polygmap {

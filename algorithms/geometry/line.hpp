@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "algorithms/core/math.hpp"
+#include "algorithms/core/math/math.hpp"
 
 namespace polygmap {
 

@@ -2,7 +2,7 @@
 // A rectangle in the ground plane at any heading: the space a foot occupies (eq. 34).
 #pragma once
 
-#include "algorithms/core/math.hpp"
+#include "algorithms/core/math/math.hpp"
 
 namespace polygmap {
 

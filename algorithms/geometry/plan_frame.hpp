@@ -2,7 +2,7 @@
 // Points in plan as seen from a pose.
 #pragma once
 
-#include "algorithms/core/transform.hpp"
+#include "algorithms/core/math/transform.hpp"
 #include "algorithms/geometry/line.hpp"
 
 namespace polygmap {

@@ -2,7 +2,7 @@
 // Planes in space: normal . p + d = 0, metres.
 #pragma once
 
-#include "algorithms/core/transform.hpp"
+#include "algorithms/core/math/transform.hpp"
 
 namespace polygmap {
 

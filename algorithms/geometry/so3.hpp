@@ -4,7 +4,7 @@
 
 #include <Eigen/Geometry>
 
-#include "algorithms/core/math.hpp"
+#include "algorithms/core/math/math.hpp"
 
 namespace polygmap {
 

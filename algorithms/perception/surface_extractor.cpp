@@ -5,7 +5,7 @@
 #include <bit>
 #include <cstring>
 
-#include "algorithms/perception/pixel_owner.hpp"
+#include "algorithms/perception/regions/pixel_labels.hpp"
 
 namespace polygmap {
 namespace {
@@ -150,7 +150,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       // Round 0 sharpens the grown planes, round 1 measures them within their final boundaries.
       if (row_ == 0) boundaries_.begin_refit();
       boundaries_.refit(row_, round_ == 0);
-      row_ += SurfaceBoundaries::kRefitColumns;
+      row_ += SpanBoundaries::kRefitColumns;
       if (row_ >= picture_.column_rays.columns) {
         solve_planes();
         if (round_ == 0) {
@@ -227,7 +227,7 @@ void SurfaceExtractor::reduce_row() noexcept {
       picture_.columns.valid.row(row_), raw_.row(std::min(row_ + kLater, last)));
   measured_px_ += reduced.measured_px;
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
-  constexpr std::int32_t kBlock = RunSegmentation::kBlock;
+  constexpr std::int32_t kBlock = ScanlineSegmentation::kBlock;
   if (row_ % kBlock == kBlock - 1 || row_ + 1 == picture_.column_rays.height_px) {
     static_assert(kBlock % ColumnImage::kTurn == 0);
     picture_.columns.turn(row_ - row_ % kBlock, row_);
@@ -238,9 +238,9 @@ void SurfaceExtractor::reduce_row() noexcept {
 std::size_t SurfaceExtractor::surface_at(std::int32_t column, std::int32_t row,
                                          const std::uint16_t* depth) const noexcept {
   if (column / kColumn_px >= picture_.column_rays.columns) return 0;
-  RawPicture raw = raw_;
+  RawImage raw = raw_;
   raw.depth = depth;
-  return planes_[pixel_owner(picture_, raw, noise_, planes_, column, row)].surface;
+  return planes_[pixel_label(picture_, raw, noise_, planes_, column, row)].surface;
 }
 
 void SurfaceExtractor::pieces_step() noexcept {
@@ -267,7 +267,7 @@ std::int32_t SurfaceExtractor::evidence_step() noexcept {
   const std::size_t i = index_++;
   FramePlane& plane = planes_[i];
   if (!plane.alive || plane.piece_px > params_.evidence_px) return 1;
-  if (pixel_evidence(picture_, raw_, noise_, plane, i, profiles_[i]) < params_.min_evidence) plane.alive = false;
+  if (inlier_ratio(picture_, raw_, noise_, plane, i, profiles_[i]) < params_.min_evidence) plane.alive = false;
   return 3;
 }
 
@@ -299,11 +299,11 @@ bool SurfaceExtractor::begin_line(bool nosing) noexcept {
   constexpr std::int32_t kProbe_px = 8;
   // Per column: the plane beyond, 0 where there is none, or the body or the picture's end hides it.
   std::array<std::uint8_t, kColumns> beyond{};
-  std::array<std::int32_t, FramePlanes::kMaxPlanes + 1> votes{};
+  std::array<std::int32_t, PlaneSet::kMaxPlanes + 1> votes{};
   const std::int32_t down = nosing ? 1 : -1;
-  const SurfaceProfile& profile = profiles_[index_];
+  const ColumnExtents& profile = profiles_[index_];
   const auto end_of = [&](std::int32_t g) -> std::int32_t {
-    const ColumnEnds& ends = profile.columns[static_cast<std::size_t>(g)];
+    const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
     return nosing ? ends.bottom : ends.top;
   };
   for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {

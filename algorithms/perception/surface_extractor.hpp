@@ -11,40 +11,40 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/core/surfaces.hpp"
+#include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/core/work.hpp"
-#include "algorithms/perception/column_image.hpp"
-#include "algorithms/perception/column_outline.hpp"
-#include "algorithms/perception/depth_noise.hpp"
-#include "algorithms/perception/depth_range.hpp"
-#include "algorithms/perception/edge_lines.hpp"
-#include "algorithms/perception/frame_planes.hpp"
-#include "algorithms/perception/images.hpp"
-#include "algorithms/perception/pixel_evidence.hpp"
-#include "algorithms/perception/plane_fit.hpp"
-#include "algorithms/perception/plane_growing.hpp"
-#include "algorithms/perception/plane_merging.hpp"
-#include "algorithms/perception/remainder_search.hpp"
-#include "algorithms/perception/run_segmentation.hpp"
-#include "algorithms/perception/self_filter.hpp"
-#include "algorithms/perception/surface_boundaries.hpp"
-#include "algorithms/perception/surface_pieces.hpp"
-#include "algorithms/perception/surface_polygons.hpp"
-#include "algorithms/perception/surface_profiles.hpp"
-#include "algorithms/perception/surface_sides.hpp"
+#include "algorithms/perception/image/column_image.hpp"
+#include "algorithms/perception/image/depth_image.hpp"
+#include "algorithms/perception/image/depth_range.hpp"
+#include "algorithms/perception/image/noise_tracker.hpp"
+#include "algorithms/perception/image/self_filter.hpp"
+#include "algorithms/perception/planes/plane_fit.hpp"
+#include "algorithms/perception/planes/plane_growing.hpp"
+#include "algorithms/perception/planes/plane_merging.hpp"
+#include "algorithms/perception/planes/plane_set.hpp"
+#include "algorithms/perception/planes/residual_planes.hpp"
+#include "algorithms/perception/planes/scanline_segments.hpp"
+#include "algorithms/perception/planes/span_boundaries.hpp"
+#include "algorithms/perception/polygons/column_outline.hpp"
+#include "algorithms/perception/polygons/edge_lines.hpp"
+#include "algorithms/perception/polygons/polygon_builder.hpp"
+#include "algorithms/perception/polygons/side_lines.hpp"
+#include "algorithms/perception/regions/column_extents.hpp"
+#include "algorithms/perception/regions/connected_components.hpp"
+#include "algorithms/perception/regions/inlier_ratio.hpp"
 
 namespace polygmap {
 
 class SurfaceExtractor {
  public:
   struct Params {
-    DepthSigma noise;
-    DepthNoise::Params depth_noise;  // how it is followed from frame to frame
+    DepthNoiseModel noise;
+    NoiseTracker::Params depth_noise;  // how it is followed from frame to frame
     DepthLimits limits;
-    RunSegmentation::Params runs;
+    ScanlineSegmentation::Params runs;
     PlaneGrowing::Params growing;
-    SurfaceBoundaries::Params boundaries;
-    RemainderSearch::Params remainder;
+    SpanBoundaries::Params boundaries;
+    ResidualPlaneSearch::Params remainder;
     PlaneFit::Params planes;
     EdgeLineFinder::Params edge_lines;
     double kind_tilt_rad = 0.21;  // a fitted plane within this of level is a tread, of upright a riser
@@ -53,9 +53,9 @@ class SurfaceExtractor {
     double min_explained_curved = 0.55;  // that of several facets
     double evidence_px = 3000.0;         // of a surface no larger than this are single pixels looked at ...
     double min_evidence = 0.6;           // ... and this share of them lies on its plane
-    SurfacePieces::Params pieces;
-    SurfaceSides::Params sides;
-    SurfacePolygons::Params polygons;
+    ConnectedComponents::Params pieces;
+    SideLines::Params sides;
+    PolygonBuilder::Params polygons;
   };
   // What the module knows about this frame, in the camera frame at the exposure.
   struct View {
@@ -97,7 +97,7 @@ class SurfaceExtractor {
   [[nodiscard]] const SurfaceFrame& result() const noexcept { return frames_[done_]; }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
   // For the next frame.
-  [[nodiscard]] DepthSigma noise() const noexcept { return depth_noise_.of(params_.noise); }
+  [[nodiscard]] DepthNoiseModel noise() const noexcept { return depth_noise_.of(params_.noise); }
   [[nodiscard]] std::int32_t units_spent() const noexcept { return units_spent_; }  // on the last frame
 
   // What a pixel was taken for: 1 + index in result().surfaces, 0 = none. For pictures and tests; valid until the next
@@ -158,8 +158,8 @@ class SurfaceExtractor {
   void finish() noexcept;
 
   Params params_;
-  DepthSigma noise_;  // of this frame
-  DepthNoise depth_noise_;
+  DepthNoiseModel noise_;  // of this frame
+  NoiseTracker depth_noise_;
   View view_;
   Counters counters_;
   std::array<SurfaceFrame, 2> frames_;  // the last finished one and the next
@@ -177,26 +177,26 @@ class SurfaceExtractor {
   std::int32_t outside_body_px_ = 0;
 
   SelfFilter self_filter_;
-  RawPicture raw_;
-  FramePicture picture_;
-  RunSegmentation runs_;
+  RawImage raw_;
+  FrameImage picture_;
+  ScanlineSegmentation runs_;
   PlaneGrowing growing_;
-  SurfaceBoundaries boundaries_;
-  RemainderSearch search_;
+  SpanBoundaries boundaries_;
+  ResidualPlaneSearch search_;
   std::size_t first_found_ = 1;          // planes first_found_ .. planes_.count came from the search
   PlaneMerging::PlaneIndex to_plane_{};  // from a grown plane
   PlaneMerging merging_;
 
-  FramePlanes planes_;
-  SurfacePieces pieces_;
-  SurfaceProfiles profiles_;
-  SurfaceSides side_finder_;
+  PlaneSet planes_;
+  ConnectedComponents pieces_;
+  SurfaceExtents profiles_;
+  SideLines side_finder_;
   OutlineSides sides_;
   ColumnOutline column_outline_;
   Outline2 outline_;
   EdgeLineFinder line_finder_;
   SurfaceLines lines_;
-  SurfacePolygons polygons_;
+  PolygonBuilder polygons_;
 };
 
 }  // namespace polygmap

@@ -21,7 +21,7 @@ void SurfaceExtractor::take_grown_planes() noexcept {
                     picture_.columns);
   counters_.plane_overflow += growing_.overflow();
   to_plane_.fill(0);
-  planes_.count = std::min(growing_.count(), FramePlanes::kMaxPlanes);
+  planes_.count = std::min(growing_.count(), PlaneSet::kMaxPlanes);
   for (std::size_t i = 1; i <= planes_.count; ++i) {
     const GrownPlane& grown = growing_.plane(i);
     FramePlane& p = planes_[i];
@@ -48,7 +48,7 @@ void SurfaceExtractor::drop(std::size_t plane) noexcept {
 }
 
 std::int32_t SurfaceExtractor::facet_step() noexcept {
-  const SurfaceBoundaries::Columns& columns = boundaries_.columns();
+  const SpanBoundaries::Columns& columns = boundaries_.columns();
   if (row_ < picture_.column_rays.columns) {
     const auto g = static_cast<std::size_t>(row_++);
     merging_.add_column(columns[g], row_ < picture_.column_rays.columns ? &columns[g + 1] : nullptr, to_plane_);
@@ -85,7 +85,7 @@ void SurfaceExtractor::take_found_planes() noexcept {
   search_.finish();
   first_found_ = planes_.count + 1;
   for (const InversePlane& found : search_.found()) {
-    if (planes_.count == FramePlanes::kMaxPlanes) {
+    if (planes_.count == PlaneSet::kMaxPlanes) {
       ++counters_.plane_overflow;
       break;
     }
@@ -112,7 +112,7 @@ void SurfaceExtractor::solve_planes() noexcept {
   for (std::size_t i = 1; i <= planes_.count; ++i) {
     FramePlane& p = planes_[i];
     if (!p.alive) continue;
-    const SurfaceBoundaries::Plane& fitted = boundaries_.plane(i);
+    const SpanBoundaries::Plane& fitted = boundaries_.plane(i);
     p.moments = fitted.moments;
     p.residual2 = fitted.residual2;
     const double least = p.facets > 1 ? least_curved : least_share;

@@ -8,8 +8,8 @@
 #include <array>
 
 #include "algorithms/core/capacities.hpp"
-#include "algorithms/core/samples.hpp"
-#include "algorithms/core/transform.hpp"
+#include "algorithms/core/math/transform.hpp"
+#include "algorithms/core/messages/samples.hpp"
 
 namespace polygmap {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "algorithms/core/samples.hpp"
+#include "algorithms/core/messages/samples.hpp"
 
 namespace polygmap::hal {
 

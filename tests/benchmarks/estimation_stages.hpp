@@ -27,8 +27,8 @@ struct EstimationTick {
 // Every form of the filter and the estimator, as they are when the ticks begin: on both feet, before a step up.
 struct EstimationBench {
   Estimator estimator;
-  OdometryFusion fusion;
-  StateRing ring;
+  LioFusion fusion;
+  StateHistory ring;
   BaseFilter axes;
   reference::DenseFilter dense;
   reference::SequentialFilter sequential;

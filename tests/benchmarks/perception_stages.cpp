@@ -66,8 +66,8 @@ std::string_view Workbench::complaint() const noexcept {
   if (surfaces.surfaces.size() < kLeastSurfaces) return "the extractor finds hardly a surface";
   if (map->snapshot().polygons.size() < kLeastSurfaces) return "the map keeps hardly a polygon";
   // The map sees the same noise again and again, which leaves an edge as uncertain as one look does.
-  const Obstruction obstruction = search->result().obstruction;
-  if (obstruction != Obstruction::kNone && obstruction != Obstruction::kEdgeUncertain) {
+  const StopReason obstruction = search->result().obstruction;
+  if (obstruction != StopReason::kNone && obstruction != StopReason::kEdgeUncertain) {
     return "the search finds no next tread";
   }
   return {};
@@ -129,8 +129,8 @@ void stage_reduction(Workbench& bench) { reduce(bench); }
 void stage_runs(Workbench& bench) {
   const CameraIntrinsics& k = bench.scene.view.intrinsics;
   bench.runs->begin({}, {}, k, *bench.columns);
-  for (std::int32_t r = 0; r < k.height_px; r += RunSegmentation::kBlock)
-    bench.runs->add_rows(r, r + RunSegmentation::kBlock - 1);
+  for (std::int32_t r = 0; r < k.height_px; r += ScanlineSegmentation::kBlock)
+    bench.runs->add_rows(r, r + ScanlineSegmentation::kBlock - 1);
   bench.runs->finish();
 }
 void stage_whole_frame(Workbench& bench) { extract(bench); }

@@ -30,7 +30,7 @@ struct Workbench {
   std::unique_ptr<PaperRoute> paper = std::make_unique<PaperRoute>(PaperRoute::Params{});
   RawRange range;  // this and the next two: reduction and runs by themselves
   std::unique_ptr<ColumnImage> columns = std::make_unique<ColumnImage>();
-  std::unique_ptr<RunSegmentation> runs = std::make_unique<RunSegmentation>();
+  std::unique_ptr<ScanlineSegmentation> runs = std::make_unique<ScanlineSegmentation>();
   std::uint32_t sum = 0;
 };
 

@@ -5,10 +5,10 @@
 
 #include "algorithms/robot/body_shapes.hpp"
 #include "algorithms/robot/model.hpp"
-#include "sim_stub/clearance.hpp"
-#include "sim_stub/depth_noise.hpp"
-#include "sim_stub/depth_renderer.hpp"
-#include "sim_stub/stair_world.hpp"
+#include "sim_stub/camera/depth_noise.hpp"
+#include "sim_stub/camera/depth_renderer.hpp"
+#include "sim_stub/world/clearance.hpp"
+#include "sim_stub/world/stair_world.hpp"
 
 namespace polygmap::bench {
 namespace {
@@ -16,7 +16,7 @@ namespace {
 struct Place {
   std::uint64_t seed;  // of stairs and noise
   sim::StairParams stairs;
-  sim::DepthNoise noise;
+  sim::NoiseKind noise;
   int step;  // that the robot stands on, 0 = the floor
   double yaw_rad;
   double lift_m;  // of the left foot
@@ -28,12 +28,12 @@ constexpr double kCrouch_m = 0.02;        // below the nominal base height, so t
 constexpr double kLiftedForward_m = 0.15;
 
 constexpr std::array<Place, 6> kPlaces{{
-    {1, {.rise_m = 0.13}, sim::DepthNoise::kWhite, 0, 0.03, 0.0},
-    {6, {.rise_m = 0.17, .width_m = 0.9}, sim::DepthNoise::kCorrelated, 2, -0.05, 0.0},
-    {3, {.rise_m = 0.15}, sim::DepthNoise::kWhite, 4, 0.0, 0.12},
-    {3, {.rise_m = 0.10, .tread_m = 0.30}, sim::DepthNoise::kCorrelated, 5, 0.08, 0.0},
-    {5, {.rise_m = 0.14, .nosing_m = 0.02}, sim::DepthNoise::kWhite, 1, -0.02, 0.0},
-    {6, {.rise_m = 0.16}, sim::DepthNoise::kCorrelated, 3, 0.02, 0.1},
+    {1, {.rise_m = 0.13}, sim::NoiseKind::kWhite, 0, 0.03, 0.0},
+    {6, {.rise_m = 0.17, .width_m = 0.9}, sim::NoiseKind::kCorrelated, 2, -0.05, 0.0},
+    {3, {.rise_m = 0.15}, sim::NoiseKind::kWhite, 4, 0.0, 0.12},
+    {3, {.rise_m = 0.10, .tread_m = 0.30}, sim::NoiseKind::kCorrelated, 5, 0.08, 0.0},
+    {5, {.rise_m = 0.14, .nosing_m = 0.02}, sim::NoiseKind::kWhite, 1, -0.02, 0.0},
+    {6, {.rise_m = 0.16}, sim::NoiseKind::kCorrelated, 3, 0.02, 0.1},
 }};
 
 StairScene scene_at(const Place& place) {
@@ -69,7 +69,7 @@ StairScene scene_at(const Place& place) {
 
   sim::DepthRenderer renderer(robot_camera_intrinsics());
   renderer.render(picture);
-  sim::DepthNoiseModel noise({.kind = place.noise}, robot_camera_intrinsics(), place.seed);
+  sim::CameraNoise noise({.kind = place.noise}, robot_camera_intrinsics(), place.seed);
   scene.depth.resize(static_cast<std::size_t>(kDepthWidth_px) * kDepthHeight_px);
   noise.apply(renderer, place.seed, 0.0, scene.depth.data());
   return scene;

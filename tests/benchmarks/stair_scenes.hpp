@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "algorithms/foothold/foothold_search.hpp"
-#include "algorithms/perception/polygon_map.hpp"
+#include "algorithms/perception/map/polygon_map.hpp"
 #include "algorithms/perception/surface_extractor.hpp"
 
 namespace polygmap::bench {

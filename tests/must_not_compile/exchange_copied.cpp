@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two threads hold references into it.
 // expect: deleted
-#include "algorithms/core/exchange.hpp"
+#include "algorithms/core/containers/exchange.hpp"
 
 int newest(const polygmap::Exchange<int>& exchange) {
 #ifdef POSITIVE_CONTROL

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Without the answer an old value is taken for news.
 // expect: nodiscard
-#include "algorithms/core/exchange.hpp"
+#include "algorithms/core/containers/exchange.hpp"
 
 int newest(polygmap::Exchange<int>& exchange) {
 #ifdef POSITIVE_CONTROL

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The consumer reads; only the producer's back() may be written.
 // expect: (read-only|cannot assign to return value)
-#include "algorithms/core/exchange.hpp"
+#include "algorithms/core/containers/exchange.hpp"
 
 void write(polygmap::Exchange<int>& exchange) {
 #ifdef POSITIVE_CONTROL

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cells are filled and copied as memory.
 // expect: cells are plain values
-#include "algorithms/core/raster.hpp"
+#include "algorithms/core/containers/raster.hpp"
 
 struct Cell {
 #ifndef POSITIVE_CONTROL

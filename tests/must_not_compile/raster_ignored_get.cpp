@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Outside the grid there is no value.
 // expect: nodiscard
-#include "algorithms/core/raster.hpp"
+#include "algorithms/core/containers/raster.hpp"
 
 int at(const polygmap::Raster<int, 2, 2>& r) {
   int value = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A width of zero.
 // expect: a raster without cells is a mistake
-#include "algorithms/core/raster.hpp"
+#include "algorithms/core/containers/raster.hpp"
 
 #ifdef POSITIVE_CONTROL
 polygmap::Raster<int, 1, 4> r;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Without the answer the value may be an old one.
 // expect: nodiscard
-#include "algorithms/core/ring_buffer.hpp"
+#include "algorithms/core/containers/ring_buffer.hpp"
 
 int next(polygmap::RingBuffer<int, 2>& r) {
   int value = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A refused value must not go unnoticed; push_overwrite() says that the oldest may go.
 // expect: nodiscard
-#include "algorithms/core/ring_buffer.hpp"
+#include "algorithms/core/containers/ring_buffer.hpp"
 
 void append(polygmap::RingBuffer<int, 2>& r) {
 #ifdef POSITIVE_CONTROL

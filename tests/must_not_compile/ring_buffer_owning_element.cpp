@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Elements are overwritten: one that owns something would leak.
 // expect: never destroyed one by one
-#include "algorithms/core/ring_buffer.hpp"
+#include "algorithms/core/containers/ring_buffer.hpp"
 
 struct Element {
 #ifndef POSITIVE_CONTROL

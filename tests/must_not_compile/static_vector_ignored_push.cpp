@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Full is an answer: ignoring it loses data silently.
 // expect: nodiscard
-#include "algorithms/core/static_vector.hpp"
+#include "algorithms/core/containers/static_vector.hpp"
 
 void append(polygmap::StaticVector<int, 2>& v) {
 #ifdef POSITIVE_CONTROL

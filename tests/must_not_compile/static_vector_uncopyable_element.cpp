@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Elements are values: one that cannot be copied has no place in an array of them.
 // expect: they need a default constructor and copy
-#include "algorithms/core/static_vector.hpp"
+#include "algorithms/core/containers/static_vector.hpp"
 
 struct Element {
 #ifndef POSITIVE_CONTROL

@@ -6,8 +6,8 @@
 #include <memory>
 #include <random>
 
-#include "algorithms/perception/column_image.hpp"
-#include "algorithms/perception/plane_fit.hpp"
+#include "algorithms/perception/image/column_image.hpp"
+#include "algorithms/perception/planes/plane_fit.hpp"
 
 namespace polygmap::test {
 

@@ -93,21 +93,21 @@ FootholdSet IdealClimb::search() const {
     lateral_m += 0.5 * feet_[f].true_T_sole.p_m.y();
     if (gait_.status().stands[f]) stance_m = std::max(stance_m, feet_[f].true_T_sole.p_m.z());
   }
-  set.obstruction = Obstruction::kNone;
+  set.obstruction = StopReason::kNone;
   if (stairs.rise_m > 0.19) {
-    set.obstruction = Obstruction::kRiseTooHigh;
+    set.obstruction = StopReason::kRiseTooHigh;
     set.measured_rise_m = stairs.rise_m;
     return set;
   }
   if (stairs.tread_m < 0.26) {
-    set.obstruction = Obstruction::kTreadTooShort;
+    set.obstruction = StopReason::kTreadTooShort;
     set.measured_tread_m = stairs.tread_m;
     return set;
   }
   int next = 0;
   while (next < stairs.steps && stairs.top_m(next) < stance_m + 0.04) ++next;
   if (next == stairs.steps) {
-    set.obstruction = Obstruction::kTop;
+    set.obstruction = StopReason::kTop;
     return set;
   }
   const double side_m = stairs.half_width_m - kStanceHalfWidth_m - 0.07;

@@ -83,7 +83,7 @@ class PhysicalClimb {
     const Transform world_T_true = state.world_T_base() * truth.true_T_base.inverse();
     FootholdSet set;
     set.map_stamp_ns = state.stamp_ns - 40 * kNsPerMs;
-    set.obstruction = Obstruction::kNone;
+    set.obstruction = StopReason::kNone;
     double stance_m = -1e9;
     for (std::size_t f = 0; f < kFootCount; ++f) {
       if (gait_.status().stands[f]) stance_m = std::max(stance_m, truth.true_T_sole[f].p_m.z());
@@ -92,7 +92,7 @@ class PhysicalClimb {
     std::size_t next = 0;
     while (next < steps.size() && steps[next].height_m < stance_m + 0.04) ++next;
     if (next == steps.size()) {
-      set.obstruction = Obstruction::kTop;
+      set.obstruction = StopReason::kTop;
       return set;
     }
     const auto place = [&](std::size_t index, std::array<Foothold, kFootCount>& feet) {

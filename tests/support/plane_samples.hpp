@@ -9,7 +9,7 @@
 
 namespace polygmap::test {
 
-inline constexpr DepthSigma kSampleNoise;
+inline constexpr DepthNoiseModel kSampleNoise;
 
 // Rays up to half_field from the optical axis; a share outliers of them measures anything between 0.5 and 1.5 / m.
 [[nodiscard]] inline std::vector<PlaneSample> sample_plane(const Vec3& normal, double d_m, std::size_t count,

@@ -20,7 +20,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "algorithms/core/math.hpp"
+#include "algorithms/core/math/math.hpp"
 #include "hal/ports/clock.hpp"
 #include "hal/ports/depth_camera.hpp"
 #include "hal/ports/imu.hpp"

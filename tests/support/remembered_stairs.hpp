@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "algorithms/perception/polygon_map.hpp"
+#include "algorithms/perception/map/polygon_map.hpp"
 #include "tests/support/seen_stairs.hpp"
 
 namespace polygmap::test {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "algorithms/robot/model.hpp"
-#include "sim_stub/climb_report.hpp"
+#include "sim_stub/host/climb/climb_report.hpp"
 
 namespace polygmap::sim {
 

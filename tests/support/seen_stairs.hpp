@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "algorithms/core/surfaces.hpp"
+#include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/robot/model.hpp"
 
 namespace polygmap::test {

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "algorithms/core/samples.hpp"
+#include "algorithms/core/messages/samples.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
 
 namespace polygmap::test {

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "algorithms/estimation/base_filter.hpp"
+#include "algorithms/estimation/filters/base_filter.hpp"
 #include "tests/support/synthetic_walk.hpp"
 
 namespace polygmap::test {

@@ -15,7 +15,7 @@ inline float flux(float a, float b, float base, float per_metre) noexcept {
 
 }  // namespace
 
-void AnisotropicDiffusion::step_row(const Params& params, const DepthSigma& noise, InverseDepthImage& image,
+void AnisotropicDiffusion::step_row(const Params& params, const DepthNoiseModel& noise, InverseDepthImage& image,
                                     std::int32_t row, std::int32_t width_px, std::int32_t height_px) noexcept {
   const auto base = static_cast<float>(params.kappa_sigmas * noise.base_m);
   const auto per_metre = static_cast<float>(params.kappa_sigmas * noise.per_metre);

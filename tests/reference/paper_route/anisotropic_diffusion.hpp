@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/perception/depth_sigma.hpp"
+#include "algorithms/perception/image/depth_noise_model.hpp"
 #include "tests/reference/paper_route/half_depth.hpp"
 
 namespace polygmap {
@@ -25,7 +25,7 @@ class AnisotropicDiffusion {
   void begin_iteration() noexcept { flux_above_.fill(0.0F); }
   // Row row of image, which must still hold the old values of this row and the next. Empty pixels (0) neither give nor
   // take.
-  void step_row(const Params& params, const DepthSigma& noise, InverseDepthImage& image, std::int32_t row,
+  void step_row(const Params& params, const DepthNoiseModel& noise, InverseDepthImage& image, std::int32_t row,
                 std::int32_t width_px, std::int32_t height_px) noexcept;
 
  private:

@@ -9,7 +9,7 @@
 namespace polygmap {
 namespace {
 
-void diffuse(const AnisotropicDiffusion::Params& params, const DepthSigma& noise, InverseDepthImage& image,
+void diffuse(const AnisotropicDiffusion::Params& params, const DepthNoiseModel& noise, InverseDepthImage& image,
              std::int32_t width, std::int32_t height) {
   AnisotropicDiffusion diffusion;
   for (std::int32_t i = 0; i < params.iterations; ++i) {
@@ -21,7 +21,7 @@ void diffuse(const AnisotropicDiffusion::Params& params, const DepthSigma& noise
 TEST(AnisotropicDiffusion, Eq13_OneIteration_IsTheSumOverFourNeighboursOfOldValues) {
   constexpr std::int32_t kWidth = 12, kHeight = 9;
   const AnisotropicDiffusion::Params params{.iterations = 1, .lambda = 0.2, .kappa_sigmas = 4.0};
-  const DepthSigma noise;
+  const DepthNoiseModel noise;
   std::mt19937 random(3);
   std::uniform_real_distribution<float> uniform(0.9F, 1.1F);
   auto image = std::make_unique<InverseDepthImage>();

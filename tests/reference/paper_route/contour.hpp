@@ -5,9 +5,9 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/core/static_vector.hpp"
-#include "algorithms/perception/images.hpp"
-#include "algorithms/perception/outline.hpp"
+#include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/perception/image/depth_image.hpp"
+#include "algorithms/perception/polygons/convex_outline.hpp"
 
 namespace polygmap {
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/perception/depth_range.hpp"
+#include "algorithms/perception/image/depth_range.hpp"
 #include "tests/reference/paper_route/half_depth.hpp"
 
 namespace polygmap {

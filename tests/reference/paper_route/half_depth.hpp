@@ -2,7 +2,7 @@
 // The picture that the paper's route works on: inverse depth at half resolution.
 #pragma once
 
-#include "algorithms/perception/images.hpp"
+#include "algorithms/perception/image/depth_image.hpp"
 
 namespace polygmap {
 

@@ -6,8 +6,8 @@
 #include <Eigen/Geometry>
 #include <memory>
 
-#include "algorithms/perception/back_projection.hpp"
 #include "algorithms/robot/model.hpp"
+#include "tests/reference/paper_route/back_projection.hpp"
 
 namespace polygmap {
 namespace {

@@ -9,7 +9,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/core/surfaces.hpp"
+#include "algorithms/core/messages/surfaces.hpp"
 #include "tests/reference/paper_route/anisotropic_diffusion.hpp"
 #include "tests/reference/paper_route/contour.hpp"
 #include "tests/reference/paper_route/depth_reduction.hpp"
@@ -29,7 +29,7 @@ struct PaperPlane {
 class PaperRoute {
  public:
   struct Params {
-    DepthSigma noise;
+    DepthNoiseModel noise;
     DepthReduction::Params reduction;
     AnisotropicDiffusion::Params diffusion;
     NormalEstimation::Params normals;

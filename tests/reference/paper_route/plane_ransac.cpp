@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
-#include "algorithms/perception/counter_random.hpp"
+#include "algorithms/perception/polygons/counter_random.hpp"
 
 namespace polygmap {
 namespace {
@@ -22,7 +22,7 @@ bool agrees(const InversePlane& plane, Lean lean, const Vec3& up) noexcept {
 
 // |w - predicted| against the tolerance, without a division per sample: both times w; cos(incidence) = w d / |ray|.
 struct Gate {
-  DepthSigma noise;
+  DepthNoiseModel noise;
   double floor, k, inverse_d;
   [[nodiscard]] bool inside(double residual, double w, double ray_norm) const noexcept {
     const double sigma = noise.inverse_sigma(w) * ray_norm * inverse_d;
@@ -30,13 +30,13 @@ struct Gate {
   }
 };
 
-Gate gate_of(const PlaneRansac::Params& params, const DepthSigma& noise, const InversePlane& plane) noexcept {
+Gate gate_of(const PlaneRansac::Params& params, const DepthNoiseModel& noise, const InversePlane& plane) noexcept {
   return {noise, params.inlier_floor_m, params.inlier_sigmas, plane.m.norm()};
 }
 
 }  // namespace
 
-double inverse_depth_sigma(const DepthSigma& noise, const InversePlane& plane, const Vec3& ray) noexcept {
+double inverse_depth_sigma(const DepthNoiseModel& noise, const InversePlane& plane, const Vec3& ray) noexcept {
   const double w = std::max(plane.inverse_depth(ray), kMinInverseDepth);
   return noise.inverse_sigma(w) / w * ray.norm() * plane.m.norm();
 }
@@ -48,7 +48,7 @@ void PlaneRansac::begin(std::uint32_t seed, std::span<const PlaneSample> samples
   best_inliers_ = 0;
 }
 
-bool PlaneRansac::step(const Params& params, const DepthSigma& noise, Lean lean, const Vec3& up) noexcept {
+bool PlaneRansac::step(const Params& params, const DepthNoiseModel& noise, Lean lean, const Vec3& up) noexcept {
   const auto n = static_cast<std::uint32_t>(samples_.size());
   if (n < 3) return true;
   const std::int32_t trial = trial_++;
@@ -87,7 +87,7 @@ bool PlaneRansac::step(const Params& params, const DepthSigma& noise, Lean lean,
   return last || best_inliers_ >= static_cast<std::int32_t>(params.enough_inliers * n);
 }
 
-bool PlaneRansac::try_finish(const Params& params, const DepthSigma& noise, Lean lean, const Vec3& up,
+bool PlaneRansac::try_finish(const Params& params, const DepthNoiseModel& noise, Lean lean, const Vec3& up,
                              InversePlane& plane, std::int32_t& inliers) const noexcept {
   if (best_inliers_ < 3) return false;
   plane = best_;

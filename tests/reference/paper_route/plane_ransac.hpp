@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "algorithms/perception/plane_fit.hpp"
+#include "algorithms/perception/planes/plane_fit.hpp"
 
 namespace polygmap {
 
@@ -17,7 +17,8 @@ struct PlaneSample {
 };
 
 // sigma of an inverse depth on the plane: sigma_z w^2 with sigma_z of the noise model and cos(incidence) = w d / |ray|.
-[[nodiscard]] double inverse_depth_sigma(const DepthSigma& noise, const InversePlane& plane, const Vec3& ray) noexcept;
+[[nodiscard]] double inverse_depth_sigma(const DepthNoiseModel& noise, const InversePlane& plane,
+                                         const Vec3& ray) noexcept;
 
 // RANSAC over a list of samples, one trial per call so that it can be resumed.
 class PlaneRansac {
@@ -32,9 +33,9 @@ class PlaneRansac {
 
   void begin(std::uint32_t seed, std::span<const PlaneSample> samples) noexcept;
   // Draw number trial; true when no further draw is wanted.
-  bool step(const Params& params, const DepthSigma& noise, Lean lean, const Vec3& up) noexcept;
+  bool step(const Params& params, const DepthNoiseModel& noise, Lean lean, const Vec3& up) noexcept;
   // Refines the best draw by two rounds of truncated least squares. False when nothing was found.
-  [[nodiscard]] bool try_finish(const Params& params, const DepthSigma& noise, Lean lean, const Vec3& up,
+  [[nodiscard]] bool try_finish(const Params& params, const DepthNoiseModel& noise, Lean lean, const Vec3& up,
                                 InversePlane& plane, std::int32_t& inliers) const noexcept;
   [[nodiscard]] std::int32_t trials() const noexcept { return trial_; }
 

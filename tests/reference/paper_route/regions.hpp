@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "algorithms/perception/images.hpp"
+#include "algorithms/perception/image/depth_image.hpp"
 
 namespace polygmap {
 

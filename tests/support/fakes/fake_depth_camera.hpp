@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "algorithms/core/ring_buffer.hpp"
+#include "algorithms/core/containers/ring_buffer.hpp"
 #include "hal/ports/depth_camera.hpp"
 #include "tests/support/fakes/call_script.hpp"
 

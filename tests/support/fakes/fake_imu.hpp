@@ -2,7 +2,7 @@
 // Plays back the samples a test feeds, whatever is in them.
 #pragma once
 
-#include "algorithms/core/ring_buffer.hpp"
+#include "algorithms/core/containers/ring_buffer.hpp"
 #include "hal/ports/imu.hpp"
 #include "tests/support/fakes/call_script.hpp"
 

@@ -2,7 +2,7 @@
 // Gives the feedback a test feeds and remembers the commands it was given.
 #pragma once
 
-#include "algorithms/core/ring_buffer.hpp"
+#include "algorithms/core/containers/ring_buffer.hpp"
 #include "hal/ports/joint_bus.hpp"
 #include "tests/support/fakes/call_script.hpp"
 

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the foothold search offers and what the gait decided to do with it. World frame unless named otherwise.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+
+#include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/core/math/math.hpp"
+#include "algorithms/core/messages/samples.hpp"
+#include "algorithms/core/messages/surfaces.hpp"
+
+namespace polygmap {
+
+// A pose of a sole that lies on mapped polygons.
+struct Foothold {
+  Vec3 position_m = Vec3::Zero();  // of the sole frame's origin (below the ankle, see robot/model.hpp)
+  double yaw_rad = 0.0;            // of the sole, perpendicular to the nosing
+  double clearance_m = 0.0;        // signed: least distance from the contact rectangle to the polygon's edges
+  double toe_clearance_m = 0.0;    // signed: collision box to the next riser; +inf when none is mapped
+  std::uint32_t polygon_id = 0;
+  std::int64_t last_seen_ns = 0;   // exposure of the last frame that saw the polygon
+  double nosing_distance_m = 0.0;  // along the foot axis from the mapped nosing to the sole frame's origin
+  // Signed: from the contact rectangle across to what is mapped of the tread on the left and on the right; +inf:
+  // unknown.
+  std::array<double, kFootCount> side_room_m{std::numeric_limits<double>::infinity(),
+                                             std::numeric_limits<double>::infinity()};
+};
+
+// Why the climb does not go on: what the search found in the map's way, or from kLegsCannot on what the gait met.
+// Anything but kNone and kTop is a reason to stop.
+enum class StopReason : std::uint8_t {
+  kNone,
+  kNothingSeen,    // no frame, no surface in it, or too little of the next tread
+  kNoStaircase,    // level ground, no higher tread in the map
+  kTop,            // standing on the highest tread of a staircase just climbed
+  kRiseTooHigh,    // the next tread is out of reach: measured_rise_m
+  kTreadTooShort,  // the foot does not fit: measured_tread_m
+  kTooNarrow,      // both feet do not fit side by side
+  kMapStale,       // the newest fused frame is too old
+  kEdgeUncertain,  // the foot fits the next tread, but not with its edges known so vaguely
+  kLegsCannot,     // the legs cannot do the next step: of this rise when it is a leading one, 0 otherwise
+  kUnsteady,       // what the search offers keeps changing
+  kNotLinedUp,     // so many steps on the floor, and it does not stand straight before the stairs
+  kGroundMissing,  // no ground where the foot came down: it was put back where it had stood
+  kToppling,       // one foot after the other went back to where it had stood, since the body toppled towards it
+  kStateStale,     // IMU or joint feedback fell silent
+};
+
+// The edge of the next tread.
+struct TreadView {
+  Vec3 nosing_a_m = Vec3::Zero();  // left end seen when climbing
+  Vec3 nosing_b_m = Vec3::Zero();  // right end
+};
+
+// Result of one search (eqs 14-28).
+struct FootholdSet {
+  std::int64_t map_stamp_ns = 0;  // exposure of the newest fused frame
+  Foothold p_star;                // eq. 26: on the nearest tread higher than the stance
+  bool has_p_star = false;
+  bool has_p_star_star = false;
+  std::array<Foothold, kFootCount> p_star_feet;       // p* spread to left and right sole, both on the same tread
+  std::array<Foothold, kFootCount> p_star_star_feet;  // p** likewise, on the tread after p*'s
+  TreadView tread;                                    // of p*
+  double theta_rel_rad = 0.0;                         // eq. 27: bearing of p* from the robot, relative to its heading
+  StopReason obstruction = StopReason::kNothingSeen;
+  double measured_rise_m = 0.0;   // stance to the next tread, valid unless nothing was seen
+  double measured_tread_m = 0.0;  // nosing to what rises behind it; 0: nothing is mapped there
+};
+
+}  // namespace polygmap

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// What estimation tells everybody else.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/capacities.hpp"
+#include "algorithms/core/math/transform.hpp"
+#include "algorithms/core/messages/samples.hpp"
+
+namespace polygmap {
+
+// The state of one tick. odom: smooth, drifts slowly, never jumps. world: odom corrected by LIO (eqs 5-10).
+struct StateEstimate {
+  std::int64_t stamp_ns = 0;
+  std::int64_t oldest_input_ns = 0;  // of the newest IMU and the newest joint sample, the older one's stamp
+  Transform odom_T_base;
+  Transform world_T_odom;  // the low-passed LIO offset: changes slowly
+  Vec3 odom_v_base_mps = Vec3::Zero();
+  Vec3 base_w_base_radps = Vec3::Zero();
+  JointVector q_rad = JointVector::Zero();        // as measured
+  std::array<Transform, kFootCount> odom_T_sole;  // leg kinematics on odom_T_base; sole frame: robot/model.hpp
+  std::array<double, kFootCount> contact_probability{};
+  Vec3 position_sigma_m = Vec3::Zero();  // of world_p_base
+  Vec3 velocity_sigma_mps = Vec3::Zero();
+  double yaw_sigma_rad = 0.0;
+  double tilt_sigma_rad = 0.0;   // of odom's roll and pitch against those of the start
+  std::int64_t lio_age_ns = -1;  // since the stamp of the last accepted LIO pose; -1: none yet
+  bool initialised = false;      // false while the robot must stand still for bias and alignment
+
+  [[nodiscard]] Transform world_T_base() const noexcept { return world_T_odom * odom_T_base; }
+  [[nodiscard]] Transform world_T_sole(Foot foot) const noexcept { return world_T_odom * odom_T_sole[index_of(foot)]; }
+};
+
+}  // namespace polygmap

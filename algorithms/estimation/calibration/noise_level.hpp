@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// One sigma of a white noise, measured as it goes from differences in which the signal itself cancels.
+#pragma once
+
+#include <algorithm>
+
+#include "algorithms/core/math/math.hpp"
+
+namespace polygmap {
+
+class NoiseLevel {
+ public:
+  struct Params {
+    double first = 0.0;     // sigma until something is measured ...
+    double first_s = 0.0;   // ... which counts like so much time of measurement
+    double memory_s = 1.0;  // of what was measured
+    double min = 0.0, max = 1e9;
+  };
+  void reset(const Params& params) noexcept {
+    params_ = params;
+    sigma_ = params.first;
+    time_s_ = params.first_s;
+  }
+  // square: of one difference, in units of the noise's variance, per axis. One that is far out (an impact) counts as
+  // little more than usual.
+  void take(double square, double dt_s) noexcept {
+    time_s_ = std::min(time_s_ + dt_s, params_.memory_s);
+    const double usual = math::square(sigma_);
+    const double seen = std::min(square, kMostRatio * usual);
+    sigma_ = math::clamp(math::sqrt(usual + std::min(dt_s / time_s_, 1.0) * (seen - usual)), params_.min, params_.max);
+  }
+  [[nodiscard]] double sigma() const noexcept { return sigma_; }
+
+ private:
+  static constexpr double kMostRatio = 4.0;
+  Params params_;
+  double sigma_ = 0.0;
+  double time_s_ = 0.0;
+};
+
+}  // namespace polygmap

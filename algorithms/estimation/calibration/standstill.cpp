@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/estimation/calibration/standstill.hpp"
+
+#include <algorithm>
+
+#include "algorithms/geometry/so3.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr double kLine_s = 0.3;  // a shorter line has no slope to speak of
+
+}  // namespace
+
+void StandstillCalibration::reset(const Params& params) noexcept {
+  *this = StandstillCalibration{};
+  params_ = params;
+}
+
+void StandstillCalibration::begin(const ImuSample& imu, const JointFeedback& joints, const Legs& legs) noexcept {
+  felt_rad_.setZero();
+  felt_mps_.setZero();
+  times_ = {};
+  turn_ = velocity_ = {};
+  time_s_ = 0.0;
+  first_q_rad_ = joints.q_rad;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) first_base_R_sole_[foot] = legs[foot].base_T_sole.R;
+  start_ns_ = imu.stamp_ns;
+}
+
+bool StandstillCalibration::try_finish(const ImuSample& imu, const JointFeedback& joints, const Legs& legs) noexcept {
+  const bool moves =
+      imu.gyro_radps.cwiseAbs().maxCoeff() > params_.max_rate_radps ||
+      std::abs(imu.accel_mps2.norm() - kGravity_mps2) > params_.max_accel_error_mps2 ||
+      std::min(joints.foot_force_n[0], joints.foot_force_n[1]) < params_.min_foot_force_n ||
+      (samples_ > 0.0 && (joints.q_rad - first_q_rad_).cwiseAbs().maxCoeff() > params_.max_joint_move_rad);
+  if (moves) {
+    if (samples_ > 0.0) ++restarts_;
+    samples_ = 0.0;
+    return false;
+  }
+  if (samples_ == 0.0) begin(imu, joints, legs);
+  samples_ += 1.0;
+  const double time_s = seconds(imu.stamp_ns - start_ns_), dt_s = time_s - time_s_;
+  time_s_ = time_s;
+
+  // The soles rest: the base turns against them, and moves.
+  Vec3 turned_rad = Vec3::Zero(), base_v_mps = Vec3::Zero();
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    const LegMeasurement& leg = legs[foot];
+    constexpr double kShare = 1.0 / kFootCount;
+    turned_rad += kShare * so3_log(first_base_R_sole_[foot] * leg.base_T_sole.R.transpose());
+    base_v_mps += kShare * (leg.base_w_sole_radps.cross(leg.base_T_sole.p_m) - leg.base_v_sole_mps);
+  }
+  first_base_R_base_ = so3_exp(turned_rad);
+  felt_rad_ += dt_s * imu.gyro_radps;
+  felt_mps_ += dt_s * (first_base_R_base_ * imu.accel_mps2);
+  times_.count += 1.0;
+  times_.sum_s += time_s;
+  times_.sum_s2 += math::square(time_s);
+  turn_.add(time_s, felt_rad_ - turned_rad);
+  velocity_.add(time_s, felt_mps_ - first_base_R_base_ * base_v_mps);
+  return time_s >= params_.duration_s && times_.spread() > 0.0;
+}
+
+Vec3 StandstillCalibration::first_base_g_mps2() const noexcept {
+  if (time_s_ >= kLine_s) return velocity_.slope(times_);
+  return time_s_ > 0.0 ? Vec3(felt_mps_ / time_s_) : Vec3(kGravity_mps2 * Vec3::UnitZ());
+}
+
+Mat3 StandstillCalibration::odom_R_base() const noexcept {
+  const Vec3 up = first_base_R_base_.transpose() * first_base_g_mps2();
+  const double roll_rad = math::atan2(up.y(), up.z());
+  const double pitch_rad = math::atan2(-up.x(), math::sqrt(math::square(up.y()) + math::square(up.z())));
+  return rotation_y(pitch_rad) * rotation_x(roll_rad);
+}
+
+Vec3 StandstillCalibration::odom_v_base_mps() const noexcept {
+  return odom_R_base() * first_base_R_base_.transpose() * (felt_mps_ - velocity_.at(times_, time_s_));
+}
+
+}  // namespace polygmap

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gyro bias and the direction of gravity while the robot stands at the start. It sways there by some millirad, on soft
+// drives for seconds: what the legs know of that motion is taken off what the IMU feels.
+#pragma once
+
+#include "algorithms/core/messages/samples.hpp"
+#include "algorithms/estimation/contact/leg_measurement.hpp"
+
+namespace polygmap {
+
+class StandstillCalibration {
+ public:
+  struct Params {
+    double duration_s = 1.0;
+    double max_rate_radps = 0.05;       // bias, noise and sway stay below
+    double max_accel_error_mps2 = 1.0;  // of the measured gravity
+    double max_joint_move_rad = 0.01;
+    double min_foot_force_n = 50.0;
+  };
+  using Legs = std::array<LegMeasurement, kFootCount>;
+  void reset(const Params& params) noexcept;
+  // True when the whole duration was still but for sway. Motion or a foot in the air starts over.
+  [[nodiscard]] bool try_finish(const ImuSample& imu, const JointFeedback& joints, const Legs& legs) noexcept;
+
+  [[nodiscard]] std::uint32_t restarts() const noexcept { return restarts_; }
+  [[nodiscard]] std::int64_t start_ns() const noexcept { return start_ns_; }
+  [[nodiscard]] bool collecting() const noexcept { return samples_ > 0; }
+  // As of the last sample. Roll and pitch from gravity, yaw 0.
+  [[nodiscard]] Mat3 odom_R_base() const noexcept;
+  [[nodiscard]] double gravity_mps2() const noexcept { return first_base_g_mps2().norm(); }
+  // Once finished.
+  [[nodiscard]] Vec3 gyro_bias_radps() const noexcept { return turn_.slope(times_); }
+  [[nodiscard]] Vec3 odom_v_base_mps() const noexcept;
+
+ private:
+  // A straight line through samples over time, by least squares.
+  struct Times {
+    double count = 0.0, sum_s = 0.0, sum_s2 = 0.0;
+    [[nodiscard]] double spread() const noexcept { return count * sum_s2 - math::square(sum_s); }
+  };
+  struct Line {
+    Vec3 sum = Vec3::Zero(), sum_by_time = Vec3::Zero();
+    void add(double time_s, const Vec3& value) noexcept {
+      sum += value;
+      sum_by_time += time_s * value;
+    }
+    [[nodiscard]] Vec3 slope(const Times& t) const noexcept {
+      return (t.count * sum_by_time - t.sum_s * sum) / t.spread();
+    }
+    [[nodiscard]] Vec3 at(const Times& t, double time_s) const noexcept {
+      return sum / t.count + (time_s - t.sum_s / t.count) * slope(t);
+    }
+  };
+  void begin(const ImuSample& imu, const JointFeedback& joints, const Legs& legs) noexcept;
+  [[nodiscard]] Vec3 first_base_g_mps2() const noexcept;
+
+  Params params_;
+  // In axes of the base as it was at the first sample, from there on.
+  Vec3 felt_rad_ = Vec3::Zero(), felt_mps_ = Vec3::Zero();  // integrals of what the IMU feels
+  Mat3 first_base_R_base_ = Mat3::Identity();               // by the legs
+  Times times_;
+  Line turn_, velocity_;  // these integrals less the motion that the legs tell
+  JointVector first_q_rad_ = JointVector::Zero();
+  std::array<Mat3, kFootCount> first_base_R_sole_{Mat3::Identity(), Mat3::Identity()};
+  double samples_ = 0.0;
+  double time_s_ = 0.0;  // of the last sample
+  std::int64_t start_ns_ = 0;
+  std::uint32_t restarts_ = 0;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which feet stand, from force and phase. A force alone comes late and goes late; the plan alone does not know the
+// ground.
+#pragma once
+
+#include "algorithms/core/messages/samples.hpp"
+
+namespace polygmap {
+
+struct FootContact {
+  double probability = 0.0;   // that the foot rests on the ground
+  double load_share = 0.5;    // of the force on both feet
+  bool stands = false;        // from certainty until nothing is left of it
+  bool landed = false;        // began to stand in this tick
+  double walk_m2ps = 0.0;     // random walk that its motion over the ground stands for (FootMotion)
+  std::int64_t touch_ns = 0;  // when it met the ground, the force sensor's delay taken off
+};
+
+class ContactEstimator {
+ public:
+  struct Params {
+    double force_air_n = 10.0;       // at and below: in the air
+    double force_standing_n = 25.0;  // at and above: stands (a foot that touches weighs at least its own leg)
+    double force_delay_s = 0.006;    // of the sensor
+    double settle_s = 0.006;         // blanking at touch-down: from 0 to 1 at the earliest in this time
+    double stated_standing = 0.5;    // a stated probability at and above: stands ...
+    double stated_air = 0.4;         // ... until it falls below this
+    double flicker_s = 0.003;        // a stated contact that ends fades in this time
+    double stuck_swing_s = 0.15;     // a planned swing whose force never went away stands after all
+  };
+  void reset(const Params& params) noexcept;
+  // planned_stance releases a foot at once at lift-off (forces lag); once unloaded, force alone brings it back, so an
+  // early touch-down counts.
+  void update(const std::array<double, kFootCount>& force_n, const std::array<bool, kFootCount>& planned_stance,
+              std::int64_t stamp_ns) noexcept;
+  // The same for contacts as a log states them, a probability or 0 and 1. A drop of some milliseconds is bridged: a
+  // foot that really lifts is seen to move.
+  void update_stated(const std::array<double, kFootCount>& probability, std::int64_t stamp_ns) noexcept;
+  [[nodiscard]] const std::array<FootContact, kFootCount>& feet() const noexcept { return feet_; }
+
+ private:
+  Params params_;
+  std::array<FootContact, kFootCount> feet_{};
+  std::array<bool, kFootCount> was_planned_{true, true};
+  std::array<bool, kFootCount> unloaded_{};
+  std::array<std::int64_t, kFootCount> swing_since_ns_{};
+  std::array<std::int64_t, kFootCount> touched_ns_{};
+  std::int64_t stamp_ns_ = -1;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/estimation/lidar/lio_fusion.hpp"
+
+#include <algorithm>
+
+#include "algorithms/geometry/so3.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr double kMaxCoordinate_m = 1e5;
+constexpr double kOrthonormalTolerance = 1e-3;
+
+bool plausible_sigma(const Vec3& sigma, double max) noexcept {
+  return math::all_finite(sigma) && sigma.minCoeff() >= 0.0 && sigma.maxCoeff() <= max;
+}
+double stated_or(double stated, double otherwise) noexcept { return stated > 0.0 ? stated : otherwise; }
+
+// Gravity tells the odometry its tilt, for good, better than a pose of LIO can: of its rotation yaw alone is news.
+Transform turned_by_yaw(const Transform& predicted, const Transform& measured) noexcept {
+  const double yaw_rad = so3_log(measured.R * predicted.R.transpose()).z();
+  return {rotation_z(yaw_rad) * predicted.R, measured.p_m};
+}
+
+double share_within(double length, double limit) noexcept { return length > limit ? limit / length : 1.0; }
+
+}  // namespace
+
+Transform base_from_lidar(const Transform& lio_T_lidar, const Transform& base_T_lidar) noexcept {
+  return lio_T_lidar * base_T_lidar.inverse();
+}
+
+double complementary_gain(double dt_s, double tau_s) noexcept { return dt_s / (tau_s + dt_s); }
+
+Transform fuse_pose(const Transform& world_T_base, const Transform& lio_world_T_base, double gain) noexcept {
+  const Vec3 turn_rad = so3_log(world_T_base.R.transpose() * lio_world_T_base.R);  // eq. (7)
+  return {world_T_base.R * so3_exp(gain * turn_rad),                               // eq. (8)
+          (1.0 - gain) * world_T_base.p_m + gain * lio_world_T_base.p_m};          // eq. (6)
+}
+
+void LioFusion::reset(const Params& params) noexcept {
+  *this = LioFusion{};
+  params_ = params;
+  uncertainty_.reset(params.uncertainty);
+  position_noise_m_.reset(params.unstated_position_m);
+  rotation_noise_rad_.reset(params.unstated_rotation_rad);
+  position_sigma_m_ = uncertainty_.position_sigma_m(Vec3::Zero());
+}
+
+LioVerdict LioFusion::check(const LioSample& sample, std::int64_t now_ns) const noexcept {
+  if (!math::all_finite(sample.lio_T_lidar.R) || !math::all_finite(sample.lio_T_lidar.p_m)) {
+    return LioVerdict::kNonFinite;
+  }
+  if (sample.lio_T_lidar.p_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) return LioVerdict::kOutOfRange;
+  if (!is_rotation(sample.lio_T_lidar.R, kOrthonormalTolerance)) return LioVerdict::kNotRotation;
+  if (!plausible_sigma(sample.position_sigma_m, params_.max_position_sigma_m) ||
+      !plausible_sigma(sample.rotation_sigma_rad, params_.max_rotation_sigma_rad)) {
+    return LioVerdict::kCovariance;
+  }
+  if (sample.stamp_ns > now_ns) return LioVerdict::kFuture;
+  if (seconds(now_ns - sample.stamp_ns) > params_.max_age_s) return LioVerdict::kTooOld;
+  if (sample.stamp_ns <= last_stamp_ns_) return LioVerdict::kOrder;
+  return LioVerdict::kAccepted;
+}
+
+LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base) noexcept {
+  last_stamp_ns_ = sample.stamp_ns;
+  const Transform lidar{so3_renormalised(sample.lio_T_lidar.R), sample.lio_T_lidar.p_m};
+  const Transform lio_T_base = base_from_lidar(lidar, params_.base_T_lidar);
+  const LioSigmas sigmas = sigmas_of(sample);
+  if (count_ == 0) {
+    world_T_lio_ = odom_T_base * lio_T_base.inverse();
+    count_ = 1;
+    last_accepted_ns_ = sample.stamp_ns;
+    last_lio_T_odom_ = world_T_lio_.inverse();
+    tie(odom_T_base, sigmas, count_);
+    return LioVerdict::kAccepted;
+  }
+
+  const double silence_s = seconds(sample.stamp_ns - last_accepted_ns_);
+  const Transform predicted = fused_world_T_odom_ * odom_T_base;
+  const Transform measured = world_T_lio_ * lio_T_base;
+  if (is_jump(predicted, measured, silence_s)) {
+    if (!try_realign(lio_T_base, odom_T_base, sigmas)) return LioVerdict::kJump;
+    last_accepted_ns_ = sample.stamp_ns;
+    last_lio_T_odom_ = lio_T_base * odom_T_base.inverse();
+    return LioVerdict::kRealigned;
+  }
+  jumped_count_ = 0;
+  last_accepted_ns_ = sample.stamp_ns;
+  const bool stated = sample.position_sigma_m.maxCoeff() > 0.0 && sample.rotation_sigma_rad.maxCoeff() > 0.0;
+  if (!stated) measure_noise(lio_T_base, odom_T_base, silence_s);
+
+  const double gain = complementary_gain(std::min(silence_s, params_.max_gap_s),
+                                         std::max(params_.tau_s, params_.tau_spm * sigmas.position_m));
+  if (aligned_) {
+    observe(predicted, measured, sigmas, sample.stamp_ns);
+    fused_world_T_odom_ = fuse_pose(predicted, turned_by_yaw(predicted, measured), gain) * odom_T_base.inverse();
+    fused_world_T_odom_.R = so3_renormalised(fused_world_T_odom_.R);
+    uncertainty_.blend(gain, sigmas.position_m, sigmas.rotation_rad);
+  } else {
+    align(predicted, lio_T_base, sigmas, gain);
+  }
+  return LioVerdict::kAccepted;
+}
+
+void LioFusion::rebase(const Transform& new_T_old) noexcept {
+  world_T_lio_ = new_T_old * fused_world_T_odom_.inverse() * world_T_lio_;
+  fused_world_T_odom_ = {};
+  last_lio_T_odom_ = last_lio_T_odom_ * new_T_old.inverse();
+  uncertainty_.rebase(new_T_old);
+  jumped_count_ = 0;
+}
+
+void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept {
+  uncertainty_.move(world_T_odom_.R * odom_step_m);
+  const Transform wanted = fused_world_T_odom_ * odom_T_base;
+  const Transform now = world_T_odom_ * odom_T_base;
+  const Vec3 move_m = wanted.p_m - now.p_m;
+  const Vec3 turn_rad = so3_log(wanted.R * now.R.transpose());
+  const double slew_s = std::min(dt_s, params_.max_slew_s);
+  const double move_share = share_within(move_m.norm(), params_.slew_mps * slew_s);
+  const double turn_share = share_within(turn_rad.norm(), params_.slew_radps * slew_s);
+  if (move_share >= 1.0 && turn_share >= 1.0) {
+    world_T_odom_ = fused_world_T_odom_;
+  } else {
+    const Transform next{so3_renormalised(so3_exp(turn_share * turn_rad) * now.R), now.p_m + move_share * move_m};
+    world_T_odom_ = next * odom_T_base.inverse();
+  }
+  const Vec3 held_back_m = (1.0 - move_share) * move_m;
+  position_sigma_m_ = (uncertainty_.position_sigma_m(wanted.p_m).cwiseAbs2() + held_back_m.cwiseAbs2()).cwiseSqrt();
+}
+
+bool LioFusion::is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept {
+  const double bound_m = std::min(params_.jump_m + params_.jump_growth_mps * silence_s, params_.max_jump_m);
+  const double bound_rad = std::min(params_.jump_rad + params_.jump_growth_radps * silence_s, params_.max_jump_rad);
+  return (measured.p_m - predicted.p_m).norm() > bound_m ||
+         so3_log(predicted.R.transpose() * measured.R).norm() > bound_rad;
+}
+
+bool LioFusion::try_realign(const Transform& lio_T_base, const Transform& odom_T_base,
+                            const LioSigmas& sigmas) noexcept {
+  const bool agrees = jumped_count_ > 0 && !is_jump(jumped_lio_T_odom_ * odom_T_base, lio_T_base, 0.0);
+  jumped_count_ = agrees ? jumped_count_ + 1 : 1;
+  const Transform before = agrees ? jumped_lio_T_odom_ * odom_T_base : lio_T_base;
+  jumped_lio_T_odom_ = fuse_pose(before, lio_T_base, 1.0 / static_cast<double>(jumped_count_)) * odom_T_base.inverse();
+  jumped_lio_T_odom_.R = so3_renormalised(jumped_lio_T_odom_.R);
+  const bool first_pose_contradicted = !aligned_ && count_ == 1;
+  if (jumped_count_ < params_.realign_count && !first_pose_contradicted) return false;
+  world_T_lio_ = fused_world_T_odom_ * jumped_lio_T_odom_.inverse();  // our world stays where it is
+  tie(odom_T_base, sigmas, jumped_count_);
+  count_ = jumped_count_;
+  jumped_count_ = 0;
+  return true;
+}
+
+LioFusion::LioSigmas LioFusion::sigmas_of(const LioSample& sample) const noexcept {
+  const double rotation_rad = stated_or(sample.rotation_sigma_rad.maxCoeff(), rotation_noise_rad_.sigma());
+  const bool stated = sample.position_sigma_m.maxCoeff() > 0.0;  // of the lidar; what is measured is the base's
+  const double lidar_m = stated_or(sample.position_sigma_m.maxCoeff(), position_noise_m_.sigma());
+  const double lever_m = stated ? params_.base_T_lidar.p_m.norm() * rotation_rad : 0.0;
+  return {math::sqrt(math::square(lidar_m) + math::square(lever_m)), rotation_rad};
+}
+
+void LioFusion::measure_noise(const Transform& lio_T_base, const Transform& odom_T_base, double silence_s) noexcept {
+  const Transform expected = last_lio_T_odom_ * odom_T_base;
+  last_lio_T_odom_ = lio_T_base * odom_T_base.inverse();
+  if (silence_s > params_.max_gap_s) return;
+  constexpr double kRows = 2.0 * 3.0;
+  position_noise_m_.take((lio_T_base.p_m - expected.p_m).squaredNorm() / kRows, silence_s);
+  rotation_noise_rad_.take(so3_log(lio_T_base.R * expected.R.transpose()).squaredNorm() / kRows, silence_s);
+}
+
+void LioFusion::observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,
+                        std::int64_t stamp_ns) noexcept {
+  LioInnovations& i = innovations_;
+  i.last.head<3>() = measured.p_m - predicted.p_m;
+  i.last[3] = so3_log(measured.R * predicted.R.transpose()).z();
+  LioUncertainty::Quantities variance = uncertainty_.offset_variance();
+  variance.head<3>().array() += math::square(sigmas.position_m);
+  variance[3] += math::square(sigmas.rotation_rad);
+  const LioUncertainty::Quantities normalised = i.last.cwiseAbs2().cwiseQuotient(variance);
+  i.position.take({normalised.head<3>().sum(), 3}, stamp_ns);
+  i.yaw.take({normalised[3], 1}, stamp_ns);
+}
+
+// Moves LIO's world against ours, so that its pose comes nearer to the odometry's by the tie's share of the innovation.
+void LioFusion::align(const Transform& predicted, const Transform& lio_T_base, const LioSigmas& sigmas,
+                      double gain) noexcept {
+  const LioUncertainty::TieGains gains = uncertainty_.tie_gains(sigmas.position_m, sigmas.rotation_rad);
+  const Transform measured = world_T_lio_ * lio_T_base;
+  const Transform nearer{fuse_pose(measured, predicted, gains.rotation).R,
+                         fuse_pose(measured, predicted, gains.position).p_m};
+  world_T_lio_ = nearer * lio_T_base.inverse();
+  world_T_lio_.R = so3_renormalised(world_T_lio_.R);
+  uncertainty_.average(gains, sigmas.position_m, sigmas.rotation_rad);
+  ++count_;
+  aligned_ = gains.position <= gain * (1.0 + 1e-9);
+}
+
+// LIO's world, as the mean of so many poses has it, is where ours is now.
+void LioFusion::tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept {
+  const double share = 1.0 / math::sqrt(static_cast<double>(poses));
+  uncertainty_.tie(fused_world_T_odom_ * odom_T_base.p_m, share * sigmas.position_m, share * sigmas.rotation_rad);
+}
+
+}  // namespace polygmap

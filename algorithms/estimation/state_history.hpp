@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// The last half second of states, so that late data meets the pose of its own stamp.
+#pragma once
+
+#include "algorithms/core/containers/ring_buffer.hpp"
+#include "algorithms/core/messages/state.hpp"
+
+namespace polygmap {
+
+class StateHistory {
+ public:
+  void clear() noexcept { states_.clear(); }
+  // Stamps must increase: an older or equal one is not stored.
+  void push(const StateEstimate& state) noexcept;
+  static constexpr std::int64_t kMaxGap_ns = 50 * kNsPerMs;  // what happened in a longer one is unknown
+  // The state at a stamp between the oldest and the newest: linear in positions and joints, constant rotation rate
+  // between ticks. False, and out untouched, outside and in a gap.
+  [[nodiscard]] bool try_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept;
+
+ private:
+  RingBuffer<StateEstimate, kStateRingCapacity> states_;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/balance/balance.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace polygmap {
+namespace {
+
+constexpr int kBias_ticks = 4;  // the observer is slow
+
+// What each foot says of the place of the plan: those that stand, alike, but one that is hardly pressed hangs and
+// moves.
+std::array<double, kFootCount> held_by(const std::array<bool, kFootCount>& stands,
+                                       const std::array<double, kFootCount>& force_n) noexcept {
+  constexpr double kPressed_n = 60.0;
+  std::array<double, kFootCount> holds{};
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    if (stands[f]) holds[f] = math::clamp(force_n[f] / kPressed_n, 0.0, 1.0);
+  }
+  if (!(holds[0] + holds[1] > 0.5) || !std::isfinite(force_n[0] + force_n[1])) {  // no force is told, or none is there
+    holds = {stands[0] ? 1.0 : 0.0, stands[1] ? 1.0 : 0.0};
+  }
+  const double sum = holds[0] + holds[1];
+  return {holds[0] / sum, holds[1] / sum};
+}
+
+}  // namespace
+
+void Balance::reset() noexcept {
+  stabiliser_.reset();
+  bias_.reset();
+  bias_tick_ = 0;
+  share_ = {0.5, 0.5};
+  odom_p_com_planned_m_.setZero();
+  com_error_m_.setZero();
+  slope_.setZero();
+}
+
+JointVector Balance::torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
+                                const Body& body, const JointFeedback& feedback, double tick_s) noexcept {
+  const Mat3& R = body.odom_T_base.R;
+  const BodyFrames frames = body_frames(geometry, body.q_rad);
+  const PerLink base_p_m = base_p_links_m(params.masses, frames);
+  const Vec3 base_p_com_m = centre_of_mass_m(params.masses, base_p_m);
+  const Vec3 base_v_com = base_v_com_mps(params.masses, frames, base_p_m, feedback.dq_radps);
+  Vec3 odom_p_com_m = body.odom_T_base * base_p_com_m;
+  const Vec3 odom_v_com_mps = body.odom_v_base_mps + R * (base_v_com + body.base_w_base_radps.cross(base_p_com_m));
+
+  Support support;
+  support.stands = reference.stands;
+  Vec3 odom_p_plan_m = Vec3::Zero();
+  double ground_m = 0.0;
+  const std::array<double, kFootCount> holds = held_by(reference.stands, feedback.foot_force_n);
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const std::size_t f = index_of(leg);
+    support.odom_T_sole[f] = body.odom_T_base * frames[f].sole;
+    odom_p_plan_m += holds[f] * (support.odom_T_sole[f].p_m - reference.plan_T_sole[f].p_m);
+  }
+  for (std::size_t f = 0; f < kFootCount; ++f) ground_m += share_[f] * support.odom_T_sole[f].p_m.z();
+
+  constexpr double kLeastHeight_m = 0.3;  // a falling robot still gets finite numbers
+  const double height_m = std::max(odom_p_com_m.z() - ground_m, kLeastHeight_m);
+  const PerLink& links_mps2 = reference.links.plan_mps2;
+  double lift_n = params.masses.torso.mass_kg * links_mps2.torso.z();
+  for (const auto& leg : links_mps2.leg) {
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) lift_n += params.masses.leg[j].mass_kg * leg[j].z();
+  }
+  constexpr double kLeastUp_mps2 = 0.2 * kGravity_mps2;  // no plan falls freely
+  const double up_mps2 = std::max(kGravity_mps2 + lift_n / params.masses.total_kg(), kLeastUp_mps2);
+  const double omega_radps = math::sqrt(up_mps2 / height_m);
+  // Legs that swing turn the body: the ground's force passes beside the centre of mass by as much as that takes.
+  PerLink turned_m;
+  turned_m.torso = R * base_p_m.torso;
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) turned_m.leg[f][j] = R * base_p_m.leg[f][j];
+  }
+  const Vec3 turning_nm = angular_momentum_rate_nm(params.masses, turned_m, links_mps2);
+  const double vertical_n = params.masses.total_kg() * up_mps2;
+  const Vec2 beside_m{-turning_nm.y() / vertical_n, turning_nm.x() / vertical_n};
+
+  if (++bias_tick_ >= kBias_ticks) {
+    bias_tick_ = 0;
+    const Vec2 ahead = R.col(0).head<2>().normalized();
+    Mat2 odom_R_heading;
+    odom_R_heading << ahead.x(), -ahead.y(), ahead.y(), ahead.x();
+    Vec2 zmp_felt_m;
+    if (try_measure_zmp(params.masses, geometry, feedback, support.odom_T_sole, slope_, zmp_felt_m)) {
+      bias_.update(params.bias, odom_p_com_m.head<2>() + odom_v_com_mps.head<2>() / omega_radps, zmp_felt_m - beside_m,
+                   odom_R_heading, omega_radps, kBias_ticks * tick_s);
+    } else {
+      bias_.missed(odom_R_heading);
+    }
+  }
+  odom_p_com_m.head<2>() -= bias_.odom_bias_m();
+
+  HorizontalMotion planned = reference.com;
+  planned.position_m += odom_p_plan_m.head<2>();
+  odom_p_com_planned_m_ = planned.position_m;
+  com_error_m_ = planned.position_m - odom_p_com_m.head<2>();
+  const Vec2 zmp_m =
+      stabiliser_.zmp_m(params.dcm, planned, odom_p_com_m.head<2>(), odom_v_com_mps.head<2>(), omega_radps, tick_s);
+  const Vec2 slope = (odom_p_com_m.head<2>() - zmp_m) / height_m;
+  const Pressure pressure =
+      distribute(support, params.pressure,
+                 {odom_p_com_m.x() + beside_m.x(), odom_p_com_m.y() + beside_m.y(), odom_p_com_m.z()}, slope);
+  share_ = pressure.share;
+
+  // The force that the clamped centres of pressure can give.
+  const Vec2 given = (odom_p_com_m.head<2>() + beside_m - pressure.zmp_m.head<2>()) / height_m;
+  slope_ = given;
+  const Vec3 force_n{vertical_n * given.x(), vertical_n * given.y(), vertical_n};
+  JointVector torque_nm;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const SoleWrench ground = sole_wrench(pressure, support, leg, force_n, R);
+    std::array<Vec3, kJointsPerLeg> specific_mps2;
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      specific_mps2[j] = R.transpose() * (Vec3{0, 0, -kGravity_mps2} - links_mps2.leg[index_of(leg)][j]);
+    }
+    torque_nm.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
+        leg_torques_nm(params.masses, leg, frames[index_of(leg)], specific_mps2, ground);
+  }
+  return torque_nm + params.armature_kgm2 * reference.links.joint_radps2;
+}
+
+}  // namespace polygmap

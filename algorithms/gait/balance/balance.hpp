@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// From where the centre of mass should be and where it is to torques of the drives: feedback of the divergent component
+// of motion, a ground force through the centre of mass, its split over the standing soles, the legs' statics.
+#pragma once
+
+#include "algorithms/gait/balance/dcm_bias.hpp"
+#include "algorithms/gait/balance/dcm_stabiliser.hpp"
+#include "algorithms/gait/balance/link_motion.hpp"
+#include "algorithms/gait/balance/wrench_distribution.hpp"
+#include "algorithms/gait/balance/zmp_measurement.hpp"
+
+namespace polygmap {
+
+class Balance {
+ public:
+  struct Params {
+    DcmStabiliser::Params dcm;
+    DcmBias::Params bias;
+    PressureLimits pressure;
+    MassModel masses;
+    double armature_kgm2 = 0.05;  // of a drive, seen at its joint
+  };
+  struct Reference {  // plan frame
+    HorizontalMotion com;
+    LinkMotion::Acceleration links;
+    std::array<Transform, kFootCount> plan_T_sole;
+    std::array<bool, kFootCount> stands{true, true};
+  };
+  struct Body {  // as estimated
+    Transform odom_T_base;
+    Vec3 odom_v_base_mps = Vec3::Zero();
+    Vec3 base_w_base_radps = Vec3::Zero();
+    JointVector q_rad = JointVector::Zero();
+  };
+
+  void reset() noexcept;
+  // One tick. feedback: rates, torques and forces on the feet, as measured. The plan frame is laid on the estimate by
+  // the standing soles: an error of the base is what is fed back.
+  [[nodiscard]] JointVector torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
+                                       const Body& body, const JointFeedback& feedback, double tick_s) noexcept;
+  // Of the last tick, horizontal: the planned centre of mass, and how far ahead of the estimated one, without its bias,
+  // it is.
+  [[nodiscard]] const Vec2& odom_p_com_planned_m() const noexcept { return odom_p_com_planned_m_; }
+  [[nodiscard]] const Vec2& com_error_m() const noexcept { return com_error_m_; }
+  // Likewise, how far the divergent component is ahead of its plan.
+  [[nodiscard]] const Vec2& dcm_error_m() const noexcept { return stabiliser_.error_m(); }
+  // How far the centre of mass is from where body and masses have it: theirs minus the true one.
+  [[nodiscard]] const Vec2& odom_com_bias_m() const noexcept { return bias_.odom_bias_m(); }
+
+ private:
+  DcmStabiliser stabiliser_;
+  DcmBias bias_;
+  int bias_tick_ = 0;
+  std::array<double, kFootCount> share_{0.5, 0.5};
+  Vec2 odom_p_com_planned_m_ = Vec2::Zero();
+  Vec2 com_error_m_ = Vec2::Zero();
+  Vec2 slope_ = Vec2::Zero();  // of the ground's force asked for
+};
+
+}  // namespace polygmap

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each standing sole must press, so that together they give one force through the centre of mass.
+#pragma once
+
+#include "algorithms/core/messages/samples.hpp"
+#include "algorithms/robot/leg_dynamics.hpp"
+
+namespace polygmap {
+
+// Where the centre of pressure may be in a sole, about the sole frame's origin.
+struct PressureLimits {
+  double ahead_m = 0.066;  // where it carries all: the ankle's 36 Nm hold 67 mm of 540 N; farther with a smaller share,
+  double toe_m = 0.155;    // to here: the contact ends at 171 mm
+  double behind_m = 0.066;
+  double inward_m = 0.03;  // from a sole's middle line towards the other sole: there it carries all of the weight
+  double aside_m = 0.045;  // of a half width of 48 mm
+};
+
+struct Support {
+  std::array<Transform, kFootCount> odom_T_sole;
+  std::array<bool, kFootCount> stands{true, true};
+};
+
+struct Pressure {
+  std::array<double, kFootCount> share{};                             // of the force
+  std::array<Vec3, kFootCount> centre_m{Vec3::Zero(), Vec3::Zero()};  // odom
+  Vec3 zmp_m = Vec3::Zero();                                          // what comes of it, odom
+};
+
+// The split of a ground force whose line meets the ground at the zero-moment point p_zmp(z) = p_com - (z_com - z)
+// slope, slope = horizontal over vertical force. Shares by the place between the soles, what remains by the centres of
+// pressure, clamped to their limits; where those miss the line, by the shares that come closest. Feet on different
+// treads: the line is cut where the shares put the ground.
+[[nodiscard]] Pressure distribute(const Support& support, const PressureLimits& limits, const Vec3& odom_p_com_m,
+                                  const Vec2& slope) noexcept;
+
+// One foot's part of force_n (odom axes) as a wrench at its sole's origin, base axes.
+[[nodiscard]] SoleWrench sole_wrench(const Pressure& pressure, const Support& support, Foot foot, const Vec3& force_n,
+                                     const Mat3& odom_R_base) noexcept;
+
+}  // namespace polygmap

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/footsteps/climb_planner.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+namespace {
+
+constexpr double kCorrection_m = 0.05;  // a shorter step of the walk up only corrects
+
+bool usable(const Foothold& f) noexcept { return math::all_finite(f.position_m) && std::isfinite(f.yaw_rad); }
+
+SolePose in_odom(const Transform& world_T_odom, const Foothold& foothold) noexcept {
+  const Transform world_T_sole{rotation_z(foothold.yaw_rad), foothold.position_m};
+  return sole_pose(world_T_odom.inverse() * world_T_sole);
+}
+
+bool usable(const std::array<Foothold, kFootCount>& feet) noexcept { return usable(feet[0]) && usable(feet[1]); }
+
+double measured(const FootholdSet& set) noexcept {
+  switch (set.obstruction) {
+    case StopReason::kRiseTooHigh:
+      return set.measured_rise_m;
+    case StopReason::kTreadTooShort:
+      return set.measured_tread_m;
+    default:
+      return 0.0;
+  }
+}
+
+// Distance from the foremost corner of the foot to the line through the nosing, along `yaw_rad`; positive before it.
+// odom_p_a and odom_p_b: two points of the nosing.
+double toe_to_line_m(const SolePose& sole, const Vec3& odom_p_a, const Vec3& odom_p_b, double yaw_rad) noexcept {
+  const Mat3 R = rotation_z(yaw_rad).transpose();
+  const Vec3 a = R * odom_p_a, b = R * odom_p_b;
+  double least_m = 1e9;
+  for (const double side : {-1.0, 1.0}) {
+    const Vec3 corner =
+        sole.transform() * Vec3{kCollisionRectangle.toe_x_m, side * kCollisionRectangle.half_width_m, 0};
+    const Vec3 p = R * corner;
+    const double along = std::abs(b.y() - a.y()) > 0.05 ? (p.y() - a.y()) / (b.y() - a.y()) : 0.5;
+    least_m = std::min(least_m, a.x() + along * (b.x() - a.x()) - p.x());
+  }
+  return least_m;
+}
+
+}  // namespace
+
+void ClimbPlanner::reset(const Params& params) noexcept {
+  *this = ClimbPlanner{};
+  params_ = params;
+}
+
+ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
+                                                   const FootholdSet& footholds) const noexcept {
+  Decision decision;
+  decision.has_step = true;
+  StepGoal& goal = decision.goal;
+  goal.kind = StepKind::kTrailing;
+  goal.foot = other(memory_.leading);
+  // The search looks from the foot that stands and soon offers the tread above: then the memory holds.
+  const Foothold& seen = footholds.p_star_feet[index_of(goal.foot)];
+  const bool same_tread =
+      footholds.has_p_star && seen.polygon_id == memory_.trailing_foothold.polygon_id && usable(seen);
+  goal.foothold = same_tread ? seen : memory_.trailing_foothold;
+  goal.target = in_odom(situation.world_T_odom, goal.foothold);
+  return decision;
+}
+
+// The rear foot's p** is the standing foot's p*. A search from before the standing foot landed has its tread for p* and
+// the one beyond for p**: the weight need not wait for the next one.
+bool ClimbPlanner::passing_step(const Situation& situation, const FootholdSet& footholds,
+                                Decision& decision) const noexcept {
+  if (params_.pattern != GaitPattern::kSingleStep || passing_refused_) return false;
+  if (footholds.map_stamp_ns <= 0 || situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) return false;
+  if (footholds.obstruction != StopReason::kNone || !footholds.has_p_star || !usable(footholds.p_star_feet)) {
+    return false;
+  }
+  const Foot foot = other(memory_.leading);
+  const double standing_m = situation.soles[index_of(memory_.leading)].position_m.z();
+  const auto rise_m = [&](const std::array<Foothold, kFootCount>& feet) {
+    return in_odom(situation.world_T_odom, feet[index_of(foot)]).position_m.z() - standing_m;
+  };
+  const auto* feet = &footholds.p_star_feet;
+  if ((*feet)[0].polygon_id == tread_id_ || rise_m(*feet) < params_.min_rise_m) {
+    feet = &footholds.p_star_star_feet;
+    if (!footholds.has_p_star_star || !usable(*feet) || rise_m(*feet) < params_.min_rise_m) return false;
+  }
+  decision.has_step = true;
+  decision.rise_m = rise_m(*feet);
+  const auto goal = [&](StepKind kind, Foot f) -> StepGoal {
+    const Foothold& foothold = (*feet)[index_of(f)];
+    return {kind, f, in_odom(situation.world_T_odom, foothold), foothold};
+  };
+  decision.goal = goal(StepKind::kPassing, foot);
+  decision.trailing = goal(StepKind::kTrailing, memory_.leading);
+  return true;
+}
+
+Foot ClimbPlanner::leading_foot(const Situation& situation, const SolePair& targets) const noexcept {
+  const TorsoDisplacement step = displacement(middle_of(situation.soles), middle_of(targets));
+  // With the weight on its way, and from tread to tread, the foot stays the one it was: a footstep may go that far
+  // sideways with either, and the other one just landed (seed 16 of ten steps toppled by 20 mm when it had to lead at
+  // once).
+  constexpr double kReasonToTurnRound = 2.5;  // times the dead bands
+  if (situation.leads || treads_climbed_ > 0) {
+    return swing_foot(
+        step, situation.leads ? situation.leading : memory_.leading,
+        {kReasonToTurnRound * params_.rule.lateral_dead_band_m, kReasonToTurnRound * params_.rule.turn_dead_band_rad});
+  }
+  return swing_foot(step, memory_.has_leading ? memory_.leading : other(memory_.last_swing), params_.rule);
+}
+
+bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& footholds, StepGoal& goal) const noexcept {
+  const Transform odom_T_world = situation.world_T_odom.inverse();
+  const TreadView& tread = footholds.tread;
+  const Vec3 a = odom_T_world * tread.nosing_a_m, b = odom_T_world * tread.nosing_b_m;
+  const SolePair on_tread{in_odom(situation.world_T_odom, footholds.p_star_feet[0]),
+                          in_odom(situation.world_T_odom, footholds.p_star_feet[1])};
+  const double yaw_rad = middle_of(on_tread).yaw_rad;
+  const double floor_m = middle_of(situation.soles).position_m.z();
+
+  // The stand-off: straight back from the footholds until the toes are that far from the nosing.
+  SolePair stand_off;
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    const double back_m = params_.stand_off_m - toe_to_line_m(on_tread[i], a, b, yaw_rad);
+    stand_off[i] = {on_tread[i].position_m - rotation_z(yaw_rad) * Vec3{back_m, 0, 0}, yaw_rad};
+    stand_off[i].position_m.z() = floor_m;
+  }
+
+  const double relaxed =
+      corrections_ > params_.strict_corrections ? 1.0 + 0.5 * (corrections_ - params_.strict_corrections) : 1.0;
+  // With the leading step under way a little more is no reason to line up again.
+  constexpr double kUnderWay = 0.5;
+  const double tolerance = std::min(relaxed, params_.max_relaxation) + (situation.leads ? kUnderWay : 0.0);
+  std::array<bool, kFootCount> lined_up{};
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    const SolePose& sole = situation.soles[i];
+    const Vec3 off_m = rotation_z(yaw_rad).transpose() * (sole.position_m - stand_off[i].position_m);
+    lined_up[i] = std::abs(off_m.x()) <= tolerance * params_.line_up_m &&
+                  std::abs(off_m.y()) <= tolerance * params_.line_up_lateral_m &&
+                  std::abs(math::wrap_angle(sole.yaw_rad - yaw_rad)) <= tolerance * params_.line_up_yaw_rad &&
+                  toe_to_line_m(sole, a, b, yaw_rad) >= params_.min_stand_off_m;
+  }
+  if (lined_up[0] && lined_up[1]) return false;
+
+  const TorsoPose torso_goal = middle_of(stand_off);
+  Foot foot = other(memory_.last_swing);
+  if (lined_up[index_of(foot)]) {
+    foot = other(foot);
+  } else if (floor_steps_ == 0) {
+    foot = swing_foot(displacement(middle_of(situation.soles), torso_goal), foot, params_.rule);
+  }
+  const double half_width_m =
+      math::clamp(0.5 * (stand_off[0].position_m - stand_off[1].position_m).norm(), 0.08, kStanceHalfWidth_m + 0.03);
+  const SolePose& stance = situation.soles[index_of(other(foot))];
+  goal = {};
+  goal.kind = StepKind::kFloor;
+  goal.foot = foot;
+  FloorStepLimits limits = params_.floor;
+  limits.forward_m *= stride_share_;
+  limits.backward_m *= stride_share_;
+  limits.lateral_m *= stride_share_;
+  limits.turn_rad *= stride_share_;
+  goal.target = floor_step(stance, foot, torso_goal, half_width_m, limits);
+  // On the way, with the heading still wrong, no toe comes near the riser.
+  const double short_m = params_.floor_clearance_m - toe_to_line_m(goal.target, a, b, yaw_rad);
+  if (short_m > 0.0) goal.target.position_m -= rotation_z(yaw_rad) * Vec3{short_m, 0, 0};
+  const Vec3 world_p = situation.world_T_odom * goal.target.position_m;
+  goal.foothold.position_m = world_p;
+  goal.foothold.yaw_rad = math::wrap_angle(goal.target.yaw_rad + yaw_of(situation.world_T_odom.R));
+  goal.foothold.last_seen_ns = footholds.map_stamp_ns;
+  return true;
+}
+
+ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const FootholdSet& footholds) const noexcept {
+  Decision decision;
+  if (split_stance_) {
+    return passing_step(situation, footholds, decision) ? decision : trailing_step(situation, footholds);
+  }
+  decision.obstruction = footholds.obstruction;
+  decision.measured_m = measured(footholds);
+  if (footholds.map_stamp_ns <= 0) {
+    decision.obstruction = StopReason::kNothingSeen;
+    return decision;
+  }
+  if (situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) {
+    decision.obstruction = StopReason::kMapStale;
+    return decision;
+  }
+  // From nearer by, an edge that is known too vaguely may be known better.
+  const bool walks_up = decision.obstruction == StopReason::kEdgeUncertain && treads_climbed_ == 0;
+  if (decision.obstruction != StopReason::kNone && !walks_up) return decision;
+  const auto& feet = footholds.p_star_feet;
+  if (!(footholds.has_p_star || walks_up) || !usable(feet) || !math::all_finite(footholds.tread.nosing_a_m) ||
+      !math::all_finite(footholds.tread.nosing_b_m)) {
+    decision.obstruction = StopReason::kNoStaircase;
+    return decision;
+  }
+  const SolePair targets{in_odom(situation.world_T_odom, feet[0]), in_odom(situation.world_T_odom, feet[1])};
+  decision.rise_m = middle_of(targets).position_m.z() - middle_of(situation.soles).position_m.z();
+  const bool underfoot = treads_climbed_ > 0 && feet[0].polygon_id == tread_id_;
+  if (decision.rise_m < params_.min_rise_m || underfoot) {  // a search from before the last step
+    decision.obstruction = StopReason::kMapStale;
+    return decision;
+  }
+  decision.has_step = true;
+  if (treads_climbed_ == 0 && floor_goal(situation, footholds, decision.goal)) {
+    if (corrections_ < params_.max_corrections && floor_steps_ < params_.max_floor_steps) return decision;
+    decision = {};
+    decision.obstruction = StopReason::kNotLinedUp;
+    return decision;
+  }
+  decision.has_step = !walks_up;
+  if (walks_up) return decision;
+
+  const Foot lead = leading_foot(situation, targets), trail = other(lead);
+  decision.goal = {StepKind::kLeading, lead, targets[index_of(lead)], feet[index_of(lead)]};
+  decision.trailing = {StepKind::kTrailing, trail, targets[index_of(trail)], feet[index_of(trail)]};
+  return decision;
+}
+
+void ClimbPlanner::latched(const Situation& situation, const Decision& decision) noexcept {
+  latched_ = decision;
+  before_latch_ = memory_;
+  memory_.last_swing = decision.goal.foot;
+  const Vec3 travel_m = decision.goal.target.position_m - situation.soles[index_of(memory_.last_swing)].position_m;
+  if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < kCorrection_m) ++corrections_;
+  if (leads(decision.goal.kind)) {
+    memory_.leading = decision.goal.foot;
+    memory_.has_leading = true;
+    memory_.trailing_foothold = decision.trailing.foothold;
+  }
+}
+
+bool ClimbPlanner::shorten_floor_steps() noexcept {
+  constexpr double kShorter = 0.6, kShortest = 0.2;
+  stride_share_ *= kShorter;
+  return stride_share_ > kShortest;
+}
+
+void ClimbPlanner::passing_ends_beside(const StepGoal& goal) noexcept {
+  latched_.goal = goal;
+  memory_.leading = other(goal.foot);
+}
+
+void ClimbPlanner::put_back() noexcept { memory_ = before_latch_; }
+
+void ClimbPlanner::landed() noexcept {
+  stride_share_ = 1.0;
+  switch (latched_.goal.kind) {
+    case StepKind::kFloor:
+      ++floor_steps_;
+      break;
+    case StepKind::kPassing:
+      ++treads_climbed_;
+      break;
+    case StepKind::kLeading:
+      split_stance_ = true;
+      break;
+    case StepKind::kTrailing:
+      split_stance_ = passing_refused_ = false;
+      ++treads_climbed_;
+      break;
+  }
+  if (onto_tread(latched_.goal.kind)) tread_id_ = latched_.goal.foothold.polygon_id;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Footsteps from torso poses (eqs 29-31), which foot swings (35-36) and where it goes on level floor (34).
+// All poses in one frame with z up; the gait uses odom.
+#pragma once
+
+#include <array>
+
+#include "algorithms/core/messages/samples.hpp"
+#include "algorithms/geometry/oriented_rectangle.hpp"
+#include "algorithms/robot/model.hpp"
+
+namespace polygmap {
+
+// Eq. (29): the torso as the planner sees it, upright.
+struct TorsoPose {
+  Vec3 position_m = Vec3::Zero();
+  double yaw_rad = 0.0;
+};
+
+// A flat sole. position: of the sole frame's origin.
+struct SolePose {
+  Vec3 position_m = Vec3::Zero();
+  double yaw_rad = 0.0;
+  [[nodiscard]] Transform transform() const noexcept { return {rotation_z(yaw_rad), position_m}; }
+};
+using SolePair = std::array<SolePose, kFootCount>;
+
+// Flattens a pose: estimates are tilted by a fraction of a degree, plans are not.
+[[nodiscard]] inline SolePose sole_pose(const Transform& sole) noexcept { return {sole.p_m, yaw_of(sole.R)}; }
+
+// Eq. (31): the foot below a torso pose; half_width_m is the paper's y_b, z of the torso pose is height_m above it.
+[[nodiscard]] SolePose foot_of_torso(const TorsoPose& torso, Foot foot, double half_width_m, double height_m) noexcept;
+// Its inverse: the torso pose that the foot belongs to.
+[[nodiscard]] TorsoPose torso_of_foot(const SolePose& sole, Foot foot, double half_width_m, double height_m) noexcept;
+
+// Between the feet, at their mean height and heading.
+[[nodiscard]] TorsoPose middle_of(const SolePair& soles) noexcept;
+
+struct TorsoDisplacement {
+  Vec3 local_m = Vec3::Zero();
+  double turn_rad = 0.0;
+};
+// Eq. (35), in the frame of the previous pose.
+[[nodiscard]] TorsoDisplacement displacement(const TorsoPose& previous, const TorsoPose& next) noexcept;
+
+struct SwingRule {
+  double lateral_dead_band_m = 0.01;
+  double turn_dead_band_rad = 0.035;
+};
+// Eq. (36). The printed rule always answers "right" for straight motion and swings the same foot twice in a turn: here
+// it decides only where the displacement is beyond a dead band, otherwise the gait state does (by_gait_state).
+[[nodiscard]] Foot swing_foot(const TorsoDisplacement& step, Foot by_gait_state, const SwingRule& rule) noexcept;
+
+// Eq. (34): the ground a foot occupies, with a margin around the collision rectangle.
+[[nodiscard]] OrientedRectangle foot_rectangle(const SolePose& sole, double margin_m) noexcept;
+
+struct FloorStepLimits {
+  double forward_m = 0.2;  // beyond the place beside the stance foot
+  double backward_m = 0.1;
+  double lateral_m = 0.05;  // wider, and the ankle roll of the leg left behind reaches its limit (0.262 rad)
+  double turn_rad = 0.14;
+  double overlap_margin_m = 0.01;  // around each foot
+};
+// The next step of `swing` on level floor towards the goal torso pose: the torso's displacement from the pose that the
+// stance foot belongs to is limited (35), the foot follows from it (31) and moves outwards until the feet are apart
+// (34).
+[[nodiscard]] SolePose floor_step(const SolePose& stance, Foot swing, const TorsoPose& goal, double half_width_m,
+                                  const FloorStepLimits& limits) noexcept;
+
+}  // namespace polygmap

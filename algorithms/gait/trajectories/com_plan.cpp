@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/trajectories/com_plan.hpp"
+
+#include <algorithm>
+
+#include "algorithms/gait/trajectories/blend.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr std::int32_t kRest_ticks = 1'000'000;
+
+// Of the push, 0..1: up in 15 %, full until 75 %, gone at the end.
+constexpr double kPushUp = 0.15, kPushDown = 0.75;
+double push_share(double u) noexcept {
+  if (u >= 1.0) return 0.0;
+  return std::min({u / kPushUp, 1.0, (1.0 - u) / (1.0 - kPushDown)});
+}
+
+}  // namespace
+
+void ComPlan::plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept {
+  const double w = omega_radps_ = params.omega_radps;
+  const Vec2 start_m = zmp_under(params, from);
+
+  // The knots of plan and push together, in their order.
+  StaticVector<ZmpKnot, kSegments> all;
+  const std::int32_t push = std::min(params.push_ticks, knots.back().tick);
+  const double push_ticks = push;
+  const std::array<std::int32_t, 3> extra{static_cast<std::int32_t>(kPushUp * push_ticks),
+                                          static_cast<std::int32_t>(kPushDown * push_ticks), push};
+  const auto straight = [&](std::int32_t tick) -> Vec2 {
+    ZmpKnot before{0, start_m};
+    for (const ZmpKnot& knot : knots) {
+      if (tick <= knot.tick) {
+        const double share = static_cast<double>(tick - before.tick) / std::max(knot.tick - before.tick, 1);
+        return before.zmp_m + share * (knot.zmp_m - before.zmp_m);
+      }
+      before = knot;
+    }
+    return before.zmp_m;
+  };
+  (void)all.try_push_back({0, start_m});
+  std::size_t next_extra = 0;
+  for (const ZmpKnot& knot : knots) {
+    for (; next_extra < extra.size() && extra[next_extra] <= knot.tick; ++next_extra) {
+      if (extra[next_extra] < knot.tick) (void)all.try_push_back({extra[next_extra], straight(extra[next_extra])});
+    }
+    if (knot.tick > all.back().tick) (void)all.try_push_back(knot);
+  }
+  count_ = all.size();
+
+  // The divergent component xi = x + v/w must meet every segment so that the last one rests: backwards. The push's part
+  // of xi(0) per metre of push goes along.
+  Vec2 xi_m = all.back().zmp_m;
+  double push_xi = 0.0;
+  const auto share_at = [&](std::size_t i) { return push_share(all[i].tick / push_ticks); };
+  for (std::size_t i = count_ - 1; i-- > 0;) {
+    const double T = (all[i + 1].tick - all[i].tick) * kTick_s, decay = math::exp(-w * T);
+    const Vec2 slope = (all[i + 1].zmp_m - all[i].zmp_m) / T;
+    xi_m = all[i].zmp_m + slope / w + decay * (xi_m - all[i + 1].zmp_m - slope / w);
+    const double rate = (share_at(i + 1) - share_at(i)) / T;
+    push_xi = share_at(i) + rate / w + decay * (push_xi - share_at(i + 1) - rate / w);
+  }
+  const Vec2 push_m = (from.position_m + from.velocity_mps / w - xi_m) / std::max(push_xi, 0.05);
+  push_m_ = push_m.norm();
+  for (std::size_t i = 0; i < count_; ++i) all[i].zmp_m += share_at(i) * push_m;
+
+  // Backwards again for the growing part, forwards for the dying one.
+  Segment& rest = segments_[count_ - 1];
+  rest = {all.back().tick, kRest_ticks, all.back().zmp_m, Vec2::Zero(), Vec2::Zero(), Vec2::Zero()};
+  xi_m = rest.zmp_m;
+  for (std::size_t i = count_ - 1; i-- > 0;) {
+    Segment& s = segments_[i];
+    s.begin = all[i].tick;
+    s.ticks = all[i + 1].tick - all[i].tick;
+    const double T = s.ticks * kTick_s;
+    s.zmp_m = all[i].zmp_m;
+    s.slope_mps = (all[i + 1].zmp_m - s.zmp_m) / T;
+    s.a_m = 0.5 * (xi_m - all[i + 1].zmp_m - s.slope_mps / w);
+    xi_m = s.zmp_m + s.slope_mps / w + 2.0 * math::exp(-w * T) * s.a_m;
+  }
+  Vec2 position_m = from.position_m;
+  for (std::size_t i = 0; i < count_; ++i) {
+    Segment& s = segments_[i];
+    const double decay = math::exp(-w * s.ticks * kTick_s);
+    s.b_m = position_m - s.zmp_m - decay * s.a_m;
+    position_m = s.zmp_m + s.ticks * kTick_s * s.slope_mps + s.a_m + decay * s.b_m;
+  }
+}
+
+const ComPlan::Segment& ComPlan::segment(std::int32_t tick) const noexcept {
+  std::size_t i = 0;
+  while (i + 1 < count_ && tick >= segments_[i + 1].begin) ++i;
+  return segments_[i];
+}
+
+HorizontalMotion ComPlan::at(std::int32_t tick) const noexcept {
+  const Segment& s = segment(std::max(tick, 0));
+  const double w = omega_radps_;
+  const std::int32_t ticks = std::max(tick, 0) - s.begin;
+  const double t = ticks * kTick_s;
+  const Vec2 growing_m = math::exp(w * (ticks - s.ticks) * kTick_s) * s.a_m, dying_m = math::exp(-w * t) * s.b_m;
+  return {s.zmp_m + t * s.slope_mps + growing_m + dying_m, s.slope_mps + w * (growing_m - dying_m),
+          w * w * (growing_m + dying_m)};
+}
+
+Vec2 ComPlan::zmp_m(std::int32_t tick) const noexcept {
+  const Segment& s = segment(std::max(tick, 0));
+  return s.zmp_m + (std::max(tick, 0) - s.begin) * kTick_s * s.slope_mps;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the centre of mass goes while the zero-moment point follows a plan: the linear inverted pendulum, solved in
+// closed form between the plan's knots, from any motion to rest over the last of them.
+#pragma once
+
+#include <array>
+
+#include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/gait/balance/dcm_stabiliser.hpp"
+
+namespace polygmap {
+
+// The zero-moment point is here at this tick and moves straight from knot to knot.
+struct ZmpKnot {
+  std::int32_t tick = 0;
+  Vec2 zmp_m = Vec2::Zero();
+};
+inline constexpr std::size_t kMaxZmpKnots = 8;
+using ZmpKnots = StaticVector<ZmpKnot, kMaxZmpKnots>;
+
+class ComPlan {
+ public:
+  struct Params {
+    double omega_radps = 3.5;       // sqrt(g / 0.80 m)
+    std::int32_t push_ticks = 200;  // the start's motion is met by pushing off to the side in that time
+  };
+
+  [[nodiscard]] static Vec2 zmp_under(const Params& params, const HorizontalMotion& com) noexcept {
+    return com.position_m - com.acceleration_mps2 / math::square(params.omega_radps);
+  }
+  // knots: at ticks > 0 that rise, at least one; after the last one everything rests. from: at tick 0. The zero-moment
+  // point starts under `from`'s acceleration. What the pendulum would need of speed at the start and does not have is
+  // made up by a push: the zero-moment point leaves its straight way for push_ticks.
+  void plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept;
+  [[nodiscard]] HorizontalMotion at(std::int32_t tick) const noexcept;
+  [[nodiscard]] Vec2 zmp_m(std::int32_t tick) const noexcept;
+  [[nodiscard]] double push_m() const noexcept { return push_m_; }  // how far it leaves it at the start
+
+ private:
+  // x(t) = p + s t + a e^(w (t - T)) + b e^(-w t), T the duration: neither exponential overflows.
+  struct Segment {
+    std::int32_t begin = 0;
+    std::int32_t ticks = 1;
+    Vec2 zmp_m = Vec2::Zero();
+    Vec2 slope_mps = Vec2::Zero();
+    Vec2 a_m = Vec2::Zero();
+    Vec2 b_m = Vec2::Zero();
+  };
+  [[nodiscard]] const Segment& segment(std::int32_t tick) const noexcept;
+
+  static constexpr std::size_t kSegments = kMaxZmpKnots + 4;  // three for the push, one at rest
+  std::array<Segment, kSegments> segments_;
+  std::size_t count_ = 0;
+  double omega_radps_ = 1.0;
+  double push_m_ = 0.0;
+};
+
+}  // namespace polygmap

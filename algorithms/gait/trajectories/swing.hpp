@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// The path of the swing foot (eqs 32-33), with what a real staircase asks for: rise before moving forward, keep away
+// from the riser, cross the nosing high, come down straight, seek the ground at an even speed (swing_pace.hpp: faster
+// where it is late).
+#pragma once
+
+#include "algorithms/gait/footsteps/footstep_plan.hpp"
+#include "algorithms/gait/trajectories/blend.hpp"
+
+namespace polygmap {
+
+// Times as fractions of the swing.
+struct SwingShape {
+  double lift_end = 0.46;       // apex reached
+  double forward_begin = 0.40;  // horizontal motion
+  double forward_end = 0.84;
+  double landing_begin = 0.74;
+  // A foot that stops before a riser comes 2 mm too far by its inertia, 3 mm at most: it goes the last part on the way
+  // down, when it has stopped.
+  double short_m = 0.004;
+  double short_begin = 0.80;
+  double short_end = 0.92;
+  double clearance_m = 0.05;  // of the lowest point of the foot at the apex above the higher of start and target
+  double retreat_m = 0.015;   // away from the riser while rising
+  double retreat_end = 0.25;
+  double toe_down_rad = 0.0;  // pitch at the top of the rise: folds the leg without the ankle's limit
+  double toe_down_begin = 0.04;
+  double toe_down_full = 0.38;
+  double toe_up_begin = 0.44;
+  double toe_up_end = 0.80;
+  double approach_m = 0.008;  // the last part is done at approach_mps until something is felt
+  double approach_mps = 0.08;
+};
+
+class Swing {
+ public:
+  // start may be tilted a little; target is flat. duration_ticks: until the target height is reached.
+  void plan(const Transform& start, const SolePose& target, const SwingShape& shape,
+            std::int32_t duration_ticks) noexcept;
+  // Leaves the path at that tick, reached at that pace (ticks of the path in a tick), for another one to a flat target:
+  // ticks count from 0 again.
+  void redirect(double tick, double pace, const SolePose& target, std::int32_t duration_ticks) noexcept;
+  // Pose of the sole. After duration_ticks, and before 0 on the way back, the foot goes on downwards at approach_mps:
+  // the caller ends it.
+  [[nodiscard]] Transform at(double tick) const noexcept;
+  [[nodiscard]] double start_height_m() const noexcept { return start_m_.z(); }  // where the foot stood
+  [[nodiscard]] std::int32_t duration_ticks() const noexcept { return duration_ticks_; }
+  [[nodiscard]] double approach_mps() const noexcept { return shape_.approach_mps; }
+  // How far below the target it has been lowered, m; negative before the end.
+  [[nodiscard]] double lowered_m(double tick) const noexcept;
+
+ private:
+  // Eq. (32) made continuous: height of the lowest point of the foot.
+  [[nodiscard]] double height_m(double tick) const noexcept;
+
+  // Another way: along, across, pitch; up and down again.
+  struct Redirected {
+    Quintic x, y, pitch, up, down;
+    double yaw_rad = 0.0, up_s = 0.0;
+  };
+  [[nodiscard]] Transform redirected_at(double tick) const noexcept;
+
+  Vec3 start_m_ = Vec3::Zero();
+  double start_yaw_rad_ = 0.0, start_pitch_rad_ = 0.0, start_roll_rad_ = 0.0;
+  SolePose target_;
+  double turn_rad_ = 0.0;
+  double apex_m_ = 0.0;
+  SwingShape shape_;
+  Quintic landing_;
+  double approach_s_ = 0.0;
+  std::int32_t duration_ticks_ = 1;
+  Redirected other_;
+  bool redirected_ = false;
+};
+
+}  // namespace polygmap

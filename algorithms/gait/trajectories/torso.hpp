@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// The torso: where it must be over the feet, how high the legs let it be, and the way from one such pose to the next.
+#pragma once
+
+#include <array>
+
+#include "algorithms/gait/balance/dcm_stabiliser.hpp"
+#include "algorithms/gait/footsteps/footstep_plan.hpp"
+#include "algorithms/gait/trajectories/blend.hpp"
+
+namespace polygmap {
+
+struct TorsoParams {
+  double height_m = 0.795;      // above the higher foot, at most
+  double lead_height_m = 0.86;  // above the lower foot when the leading one lands
+  double max_leg_m = 0.612;     // hip pitch to ankle, of 0.630 stretched
+  double inward_m = 0.022;      // of the base at rest over one foot, from its middle line towards the other one
+  double ahead_m = 0.0;         // and before its sole's origin
+};
+
+// Base height at which the leg to `sole` is max_leg_m long, for a base at (x, y) with that heading.
+[[nodiscard]] double reach_height_m(const LegGeometry& geometry, const Vec3& base_m, double yaw_rad, Foot leg,
+                                    const SolePose& sole, double max_leg_m) noexcept;
+
+// With its base there, heading between the soles; height: the highest that both feet allow.
+[[nodiscard]] TorsoPose torso_at(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles,
+                                 const Vec2& base_m) noexcept;
+// At rest over the foot that stands alone.
+[[nodiscard]] TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance,
+                                   const SolePair& soles) noexcept;
+// Between both feet.
+[[nodiscard]] TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params,
+                                      const SolePair& soles) noexcept;
+
+// x, y, z, roll, pitch, yaw: height and attitude move from any motion to an upright rest; x and y are the centre of
+// mass's and come from elsewhere (com_plan.hpp).
+class TorsoTrajectory {
+ public:
+  static constexpr std::size_t kAxes = 6;
+  using State = std::array<Motion, kAxes>;
+
+  [[nodiscard]] static State at_rest(const Transform& base) noexcept;
+  [[nodiscard]] static Transform pose(const State& state) noexcept;
+  // The state in another frame that differs by a small rigid motion, in which base and centre of mass are there: speeds
+  // stay.
+  [[nodiscard]] static State placed(const State& state, const Transform& base, const Vec2& com_m) noexcept;
+
+  [[nodiscard]] static HorizontalMotion horizontal(const State& state) noexcept;
+  static void set_horizontal(State& state, const HorizontalMotion& motion) noexcept;
+
+  // height_ticks: the height may arrive earlier than the rest.
+  void plan(const State& from, double height_m, double yaw_rad, std::int32_t duration_ticks,
+            std::int32_t height_ticks) noexcept;
+  // x and y as set in `horizontal`.
+  [[nodiscard]] State at(std::int32_t tick, const HorizontalMotion& horizontal) const noexcept;
+
+ private:
+  std::array<Quintic, kAxes - 2> axes_;  // from z on
+};
+
+}  // namespace polygmap

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+namespace {
+
+constexpr double kLongestStep_s = 0.1;  // between two frames, for the fading
+constexpr double kFramesAlike = 20.0;   // in a row see a toe from a base that moves the same way
+
+bool is_unit(const Vec3& v) noexcept { return std::abs(v.squaredNorm() - 1.0) < 1e-3; }  // false for NaN
+
+}  // namespace
+
+CameraExtrinsicsEstimator::CameraExtrinsicsEstimator(const Params& params,
+                                                     const Transform& nominal_base_T_camera) noexcept
+    : params_(params), nominal_(nominal_base_T_camera), base_T_camera_(nominal_base_T_camera) {}
+
+double CameraExtrinsicsEstimator::tilt_sigma_rad() const noexcept {
+  const double left = 1.0 / (1.0 + tilt_.information * math::square(params_.prior_tilt_sigma_rad));  // of the prior
+  const double alike_rad2 = math::square((1.0 - by_gravity_) * params_.soles_tilt_sigma_rad) +
+                            math::square(by_gravity_ * params_.gravity_tilt_sigma_rad) +
+                            (seen_as_well_ > 0.0 ? 1.0 / seen_as_well_ : 0.0);
+  return math::sqrt(math::square(left * params_.prior_tilt_sigma_rad) + math::square(1.0 - left) * alike_rad2);
+}
+
+bool CameraExtrinsicsEstimator::usable(const SurfacePatch& patch) const noexcept {
+  return is_unit(patch.normal) && std::isfinite(patch.d_m) && math::all_finite(patch.centroid_m) &&
+         patch.tilt_sigma_rad >= 0.0;
+}
+
+void CameraExtrinsicsEstimator::update(const SurfaceFrame& frame, const Stance& stance) noexcept {
+  bool good = is_unit(stance.base_up) && frame.stamp_ns > last_ns_;
+  for (const Transform& sole : stance.base_T_sole)
+    good = good && math::all_finite(sole.R) && math::all_finite(sole.p_m);
+  if (!good) {
+    ++counters_.rejected_frames;
+    return;
+  }
+  const double dt_s = last_ns_ == 0 ? 0.0 : std::min(seconds(frame.stamp_ns - last_ns_), kLongestStep_s);
+  last_ns_ = frame.stamp_ns;
+  learn_ahead(stance, dt_s);
+
+  // Level is what the standing soles lie on: treads are parallel to it, and a foot is put down by the same kinematics.
+  // Gravity as the estimator has it errs by more than twice as much, and alike in everything but the camera.
+  std::array<Vec3, kFootCount> up;
+  std::array<bool, kFootCount> flat{};
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    up[foot] = stance.base_T_sole[foot].R.col(2);
+    flat[foot] = stance.stands[foot] && up[foot].dot(stance.base_up) > math::cos(params_.max_sole_tilt_rad);
+  }
+  // What their encoders are off against each other was taken off before, so that one alone says what both do.
+  Vec3 level = stance.base_up;
+  if (flat[0] && flat[1]) {
+    level = (up[0] + up[1]).normalized();
+  } else if (flat[0] || flat[1]) {
+    level = flat[0] ? up[0] : up[1];
+  }
+
+  Vec2 sum = Vec2::Zero();
+  double weights = 0.0;
+  const auto near_level = [&](const SurfacePatch& patch) {
+    return (base_T_camera_.R * patch.normal).dot(level) > math::cos(params_.tilt_gate_rad);
+  };
+  for (const SurfacePatch& patch : frame.surfaces) {
+    if (patch.kind != SurfaceKind::kTread || patch.tilt_sigma_rad > params_.max_tilt_sigma_rad) continue;
+    if (!usable(patch) || !near_level(patch)) {
+      ++counters_.rejected_surfaces;
+      continue;
+    }
+    const double weight = 1.0 / (math::square(patch.tilt_sigma_rad) + math::square(params_.systematic_tilt_rad));
+    sum += weight * (nominal_.R * patch.normal).cross(level).head<2>();
+    weights += weight;
+  }
+  if (!(weights > 0.0)) return place(level);
+  ++counters_.frames;
+  // A surface errs in every frame alike: on the stairs many frames of narrow treads, 4 mrad off, must not outvote the
+  // few of the floor, 1 mrad off, neither by their number nor by age. So what sees level worse than what is known has
+  // been seen counts, and lets fade, by the square of that.
+  const double trust = math::square(seen_as_well_ > weights ? weights / seen_as_well_ : 1.0);
+  const double information = trust / math::square(params_.frame_tilt_sigma_rad);
+  const double tilt_variance = fuse(tilt_, Vec2{sum / weights}, math::exp(-trust * dt_s / params_.window_s),
+                                    information, params_.prior_tilt_sigma_rad);
+  const double share = information / tilt_.information;
+  seen_as_well_ += share * (weights - seen_as_well_);
+  by_gravity_ += share * ((flat[0] || flat[1] ? 0.0 : 1.0) - by_gravity_);
+  for (int i = 0; i < 2; ++i) {
+    tilt_rad_[i] = math::clamp(tilt_variance * tilt_.weighted[i], -params_.max_tilt_rad, params_.max_tilt_rad);
+  }
+  base_T_camera_.R = rotation_y(tilt_rad_.y()) * rotation_x(tilt_rad_.x()) * nominal_.R;
+
+  // How far each standing sole lies above the largest surface that can be what it stands on.
+  double above_m = 0.0;
+  int soles = 0;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    if (!flat[foot]) continue;
+    const Vec3 camera_p_sole = base_T_camera_.R.transpose() * (stance.base_T_sole[foot].p_m - nominal_.p_m);
+    double largest_m2 = 0.0, best_m = 0.0;
+    for (const SurfacePatch& patch : frame.surfaces) {
+      if (patch.kind != SurfaceKind::kTread || patch.tilt_sigma_rad > params_.max_tilt_sigma_rad || !usable(patch) ||
+          !near_level(patch) || !(patch.area_m2 > largest_m2)) {
+        continue;
+      }
+      const double height_m = patch.normal.dot(camera_p_sole) + patch.d_m;
+      if (std::abs(height_m - height_m_) > params_.height_gate_m) continue;
+      largest_m2 = patch.area_m2;
+      best_m = height_m;
+    }
+    if (!(largest_m2 > 0.0)) continue;
+    above_m += best_m;
+    ++soles;
+  }
+  if (soles > 0) {
+    ++counters_.heights;
+    const double variance = fuse(height_, above_m / soles, math::exp(-dt_s / params_.window_s),
+                                 1.0 / math::square(params_.frame_height_sigma_m), params_.prior_height_sigma_m);
+    height_m_ = math::clamp(variance * height_.weighted, -params_.max_height_m, params_.max_height_m);
+  }
+  place(level);
+}
+
+void CameraExtrinsicsEstimator::place(const Vec3& base_level) noexcept {
+  const Vec3 ahead = (Vec3::UnitX() - base_level.x() * base_level).normalized();
+  base_T_camera_.p_m = nominal_.p_m + height_m_ * base_level + ahead_m_ * ahead;
+}
+
+void CameraExtrinsicsEstimator::learn_ahead(const Stance& stance, double dt_s) noexcept {
+  double sum_m = 0.0, information = 0.0;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    const std::optional<ToeSighting>& toe = stance.toes[foot];
+    if (!stance.stands[foot] || !toe || !std::isfinite(toe->ahead_m) || !std::isfinite(toe->sigma_m)) continue;
+    // The toe is in the last rows of a picture: a base that moves alike in many frames shows it off alike in all.
+    const double variance_m2 = math::square(params_.frame_ahead_sigma_m) + math::square(toe->sigma_m) +
+                               kFramesAlike * math::square(params_.half_scan_s * stance.speed_mps);
+    sum_m += toe->ahead_m / variance_m2;
+    information += 1.0 / variance_m2;
+  }
+  if (!(information > 0.0)) return;
+  ++counters_.toes;
+  const double variance_m2 = fuse(ahead_, ahead_m_ - sum_m / information, math::exp(-dt_s / params_.window_s),
+                                  information, params_.prior_ahead_sigma_m);
+  ahead_m_ = math::clamp(variance_m2 * ahead_.weighted, -params_.max_ahead_m, params_.max_ahead_m);
+}
+
+}  // namespace polygmap

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the camera really sits on the base: roll, pitch and height, found slowly from the ground that the robot stands
+// on, and how far ahead, from the toes that it sees. A mount is known to a degree at best, and a degree is 13 mm at the
+// camera's height. Yaw and the place sideways stay as the data sheet says.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "algorithms/core/math/transform.hpp"
+#include "algorithms/core/messages/samples.hpp"
+#include "algorithms/core/messages/surfaces.hpp"
+#include "algorithms/perception/extrinsics/toe_detector.hpp"
+
+namespace polygmap {
+
+class CameraExtrinsicsEstimator {
+ public:
+  struct Params {
+    double prior_tilt_sigma_rad = 0.0175;  // of the data sheet's roll and pitch
+    double prior_height_sigma_m = 0.005;
+    double prior_ahead_sigma_m = 0.003;  // of the data sheet, and of where encoders and leg lengths have a foot
+    // Of one frame. Far more than the pixels' noise: frames err alike, and one frame must not decide.
+    double frame_tilt_sigma_rad = 0.03;
+    double frame_height_sigma_m = 0.010;
+    double frame_ahead_sigma_m = 0.003;
+    // What all frames err by alike, which no number of them takes away: soles are as level as their encoders have it (2
+    // mrad a joint), gravity as the IMU's mount and bias. With what the surfaces err by, in 24 climbs, from 1 to 10 s
+    // after the first frame, 2.5 mrad with white noise and 3.0 with correlated, roll and pitch together.
+    double soles_tilt_sigma_rad = 0.0023;
+    double gravity_tilt_sigma_rad = 0.006;
+    // Information fades to 1/e, slower under surfaces that see level worse; time without any does not count.
+    double window_s = 6.0;
+    double max_tilt_rad = 2.0 * kPi / 180.0;  // bounds of the estimate
+    double max_height_m = 0.008;
+    double max_ahead_m = 0.010;
+    double half_scan_s = 0.008;                // by how much a row of the picture may be older or newer than its stamp
+    double tilt_gate_rad = 3.0 * kPi / 180.0;  // from level, as the mount is believed: more is a ramp
+    double height_gate_m = 0.020;              // below half of the least step
+    double max_tilt_sigma_rad = 0.006;         // of a surface: vaguer ones say what gravity told the fit before
+    // Of a surface, added to its sigma. Those below 2 mrad err by 1.0 to 1.5, vaguer ones by what they say, and the
+    // same in every frame: with 3 mrad three treads ahead, 8 mrad off, outvoted the floor (seed 64).
+    double systematic_tilt_rad = 0.001;
+    double max_sole_tilt_rad = 3.0 * kPi / 180.0;  // from gravity: more, and the foot does not stand flat
+  };
+  // The robot at the exposure, base frame.
+  struct Stance {
+    Vec3 base_up = Vec3::UnitZ();  // by gravity, unit
+    std::array<Transform, kFootCount> base_T_sole;
+    std::array<bool, kFootCount> stands{};
+    // By how much a toe is seen ahead of where base_T_sole and base_T_camera() have it; of standing feet.
+    std::array<std::optional<ToeSighting>, kFootCount> toes;
+    double speed_mps = 0.0;  // of the base
+  };
+  struct Counters {
+    std::uint32_t frames = 0;             // that said something about the tilt
+    std::uint32_t heights = 0;            // ... about the height
+    std::uint32_t toes = 0;               // ... about how far ahead it sits
+    std::uint32_t rejected_frames = 0;    // stance not finite, or not newer than the last frame
+    std::uint32_t rejected_surfaces = 0;  // level ones: not finite, or beyond the gate
+  };
+
+  CameraExtrinsicsEstimator() noexcept : CameraExtrinsicsEstimator(Params{}, Transform{}) {}
+  CameraExtrinsicsEstimator(const Params& params, const Transform& nominal_base_T_camera) noexcept;
+
+  // One finished frame, seen through the mount as believed when it was begun.
+  void update(const SurfaceFrame& frame, const Stance& stance) noexcept;
+
+  [[nodiscard]] const Transform& base_T_camera() const noexcept { return base_T_camera_; }
+  // What was added to the data sheet's mount.
+  [[nodiscard]] double roll_rad() const noexcept { return tilt_rad_.x(); }
+  [[nodiscard]] double pitch_rad() const noexcept { return tilt_rad_.y(); }
+  [[nodiscard]] double height_m() const noexcept { return height_m_; }
+  // Along the ground. What legs and encoders are off goes into it: a foot put down by them meets what the camera saw.
+  [[nodiscard]] double ahead_m() const noexcept { return ahead_m_; }
+  // One sigma of roll and pitch: what of the data sheet's error is left, and what frames err by alike: the surfaces
+  // that were seen, and what told which way is up.
+  [[nodiscard]] double tilt_sigma_rad() const noexcept;
+  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+
+ private:
+  // A mean whose information fades, drawn towards zero by the prior.
+  template <typename T>
+  struct FadingMean {
+    double information = 0.0;
+    T weighted;
+  };
+  // Puts one value of a frame into a mean; its variance, the prior's information included.
+  template <typename T>
+  [[nodiscard]] static double fuse(FadingMean<T>& mean, const T& value, double fade, double information,
+                                   double prior_sigma) noexcept {
+    mean.information = fade * mean.information + information;
+    mean.weighted = fade * mean.weighted + information * value;
+    return 1.0 / (mean.information + 1.0 / math::square(prior_sigma));
+  }
+  [[nodiscard]] bool usable(const SurfacePatch& patch) const noexcept;
+  void learn_ahead(const Stance& stance, double dt_s) noexcept;
+  void place(const Vec3& base_level) noexcept;
+
+  Params params_;
+  Transform nominal_;
+  Transform base_T_camera_;
+  Vec2 tilt_rad_ = Vec2::Zero();
+  double height_m_ = 0.0;
+  double ahead_m_ = 0.0;
+  FadingMean<Vec2> tilt_{0.0, Vec2::Zero()};
+  FadingMean<double> height_{0.0, 0.0};
+  FadingMean<double> ahead_{0.0, 0.0};
+  double seen_as_well_ = 0.0;  // 1/rad^2, of level by its surfaces: mean of the frames that the tilt is made of
+  double by_gravity_ = 0.0;    // share of that information whose level was gravity's
+  std::int64_t last_ns_ = 0;
+  Counters counters_;
+};
+
+}  // namespace polygmap

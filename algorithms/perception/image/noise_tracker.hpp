@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// How noisy the frames are, by depth, and the camera's noise as it is believed from frame to frame.
+//
+// A profile may be too optimistic by a factor, and it may lack the part that grows with the square of the depth: the
+// disparity noise and quantization of stereo and structured light, and warp. One factor cannot follow both: what is far
+// away then makes the near too coarse, or the near makes the far shatter.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/perception/image/depth_noise_model.hpp"
+
+namespace polygmap {
+
+// Squared residuals of rows from their planes, over the variance that is believed.
+class NoiseSamples {
+ public:
+  struct Seen {
+    double z_m = 0.0;    // mean depth
+    double scale = 0.0;  // the noise there over what is believed
+    double rows = 0.0;   // that say so
+  };
+  static constexpr std::size_t kDepths = 8;
+
+  void clear() noexcept { depths_ = {}; }
+  // inverse_depth: 1/m, more than 0.
+  void add(float inverse_depth, float cost) noexcept;
+  // Ranges of depth with too few rows are left out.
+  [[nodiscard]] StaticVector<Seen, kDepths> seen() const noexcept;
+
+ private:
+  static constexpr std::int32_t kCostBins = 128;  // of 0.25: up to 5.7 sigmas
+  struct AtDepth {
+    std::array<std::int32_t, kCostBins + 1> rows{};
+    double sum_z_m = 0.0;
+  };
+  std::array<AtDepth, kDepths> depths_{};
+};
+
+class NoiseTracker {
+ public:
+  struct Params {
+    double gain = 0.1;  // per frame
+    double min_scale = 1.0;
+    double max_scale = 4.0;
+    double max_quadratic_per_m = 0.005;  // more than stereo of 50 mm base line has
+  };
+  // The profile as it is believed.
+  [[nodiscard]] DepthNoiseModel of(const DepthNoiseModel& profile) const noexcept;
+  // Least squares of scale x profile + quadratic z^2 against what was seen while `of` was believed.
+  void follow(const Params& params, const DepthNoiseModel& profile, const NoiseSamples& samples) noexcept;
+
+ private:
+  double scale_ = 1.0;
+  double quadratic_per_m_ = 0.0;
+};
+
+}  // namespace polygmap

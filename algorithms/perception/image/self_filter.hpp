@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which pixels may show the robot's own legs, by forward kinematics.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/perception/image/depth_image.hpp"
+#include "algorithms/robot/body_shapes.hpp"
+
+namespace polygmap {
+
+// The shapes moved to another frame.
+[[nodiscard]] LegShapes transformed(const Transform& to_T_from, const LegShapes& shapes) noexcept;
+
+// What is not known of the legs. One sigma each, as a data sheet has it.
+struct BodyUncertainty {
+  double shape_m = 0.008;     // not a sigma: covers beyond the shapes, and a leg's way in half an exposure
+  double leg_length = 0.005;  // relative
+  double encoder_rad = 2e-3;  // offset of a joint
+  double sigmas = 2.5;
+};
+// At the foot, which is worst off. turn_rad: of the camera's mount.
+[[nodiscard]] BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& legs,
+                                     double turn_rad) noexcept;
+
+// The picture of convex shapes, each grown by a margin: one column interval per row and shape. A pixel whose ray meets
+// a grown shape is body whatever depth it measured, so that flying pixels around a leg go with it.
+class SelfFilter {
+ public:
+  static constexpr std::size_t kShapes = 3 * kFootCount;
+
+  void clear() noexcept;
+  // Slots 0..2 of a foot: thigh, shank, foot. Camera frame, m.
+  void add_shape(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body, const BodyMargin& margin,
+                 std::size_t slot) noexcept;
+  // Writes one row of flags, of kPixelBody; false, and nothing written, when there is none in it.
+  [[nodiscard]] bool try_mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept;
+
+ private:
+  struct Interval {
+    std::int16_t first = 1;
+    std::int16_t last = 0;  // inclusive; empty when before first
+  };
+  using Outline = std::array<Interval, kHalfHeight_px>;
+
+  static void extend(Outline& outline, std::int32_t row, std::int32_t width_px, double first, double last) noexcept;
+  static void add_sphere(Outline& outline, const HalfRays& rays, const Vec3& centre_m, double radius_m) noexcept;
+  static void add_segment(Outline& outline, const HalfRays& rays, const Vec3& a_m, const Vec3& b_m) noexcept;
+
+  std::array<Outline, kShapes> outlines_{};
+};
+
+}  // namespace polygmap

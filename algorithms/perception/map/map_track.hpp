@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the polygon map keeps about one surface.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/math/transform.hpp"
+#include "algorithms/core/messages/surfaces.hpp"
+#include "algorithms/geometry/convex.hpp"
+#include "algorithms/geometry/plane.hpp"
+
+namespace polygmap {
+
+inline constexpr std::size_t kMapSides = 8;  // side k looks along k * 45 degrees from the local x axis
+inline constexpr std::size_t kLeftSide = 2, kRightSide = 6;
+// Of a polygon's edges; tags below are those of sides.
+inline constexpr std::uint8_t kNosingTag = 8;
+inline constexpr std::uint8_t kBackTag = 9;
+inline constexpr double kMinSeenSigma_m = 0.0005;  // a frame that claims more than this is not believed
+
+[[nodiscard]] inline Vec2 side_direction(std::size_t side) noexcept {
+  return unit_at(static_cast<double>(side) * (kPi / 4.0));
+}
+[[nodiscard]] inline Vec2 local_xy(const Transform& world_T_local, const Vec3& world_m) noexcept {
+  return (world_T_local.R.transpose() * (world_m - world_T_local.p_m)).head<2>();
+}
+// A right-handed frame with z along the unit normal and x as near to the given direction as that allows.
+[[nodiscard]] Mat3 frame_from(const Vec3& normal, const Vec3& x_hint) noexcept;
+// Is the farthest end of the polygon in direction u one that was really seen to end? The edges along that end decide;
+// a mere corner counts when both its edges were seen. support: of the polygon in that direction.
+[[nodiscard]] bool end_observed(const ConvexPolygon& polygon, const std::array<EdgeKind, kMaxPolygonVertices>& edges,
+                                const Vec2& u, double support) noexcept;
+
+// Where the camera was at the last sighting, and how well its mount was known then.
+struct Viewpoint {
+  Vec3 world_p_camera_m = Vec3::Zero();
+  double mount_sigma_rad = 0.0;
+};
+// A seen line, local coordinates.
+struct SeenLine {
+  Vec2 a_m, b_m;
+  double variance_m2;
+};
+// x = offset + slope * y in local coordinates, with the 2x2 information of (offset, slope).
+struct TrackedLine {
+  Vec2 state = Vec2::Zero();
+  Mat2 information = Mat2::Zero();
+  std::int64_t seen_ns = 0;
+  Viewpoint seen_from;
+  std::uint32_t sightings = 0;
+  std::uint32_t outliers = 0;
+  [[nodiscard]] double at_m(double y_m) const noexcept { return state[0] + state[1] * y_m; }
+  [[nodiscard]] double variance_m2(double y_m) const noexcept;
+};
+struct TrackedSide {
+  double support_m = 0.0;
+  double reach_m = 0.0;  // of the last sighting: one frame alone does not make an unknown end grow
+  double information = 0.0;
+  std::int64_t seen_ns = 0;
+  std::uint32_t outliers = 0;
+  bool observed = false;
+};
+// A surface of the frame, world coordinates.
+struct SeenSurface {
+  SurfaceKind kind = SurfaceKind::kOther;
+  Plane plane;
+  Vec3 centroid_m = Vec3::Zero();
+  double offset_variance_m2 = 0.0;
+  double tilt_variance_rad2 = 0.0;
+  double pose_variance_m2 = 0.0;
+  double rmse_m = 0.0;
+  double invalid_fraction = 0.0;
+  PolygonVertices polygon;
+  std::array<EdgeKind, kMaxPolygonVertices> edges{};
+  EdgeLine nosing;
+  EdgeLine back;
+};
+struct MapTrack {
+  std::uint32_t id = 0;
+  SurfaceKind kind = SurfaceKind::kOther;
+  std::uint32_t sightings = 0;
+  std::uint32_t misses = 0;
+  std::uint32_t outliers = 0;  // consecutive sightings of its plane elsewhere
+  std::int64_t last_seen_ns = 0;
+  Viewpoint seen_from;
+  Transform world_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up
+  double offset_information = 0.0;
+  double tilt_information = 0.0;
+  double rmse_m = 0.0;
+  double invalid_fraction = 0.0;
+  std::array<TrackedSide, kMapSides> sides{};
+  TrackedLine nosing;
+  TrackedLine back;
+  ConvexPolygon polygon;  // local
+  EdgeTags tags{};
+  bool dirty = false;
+  bool dead = false;
+};
+
+}  // namespace polygmap

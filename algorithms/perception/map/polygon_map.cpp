@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/map/polygon_map.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <limits>
+
+namespace polygmap {
+namespace {
+
+// Work units, of 300 to 500 instructions.
+constexpr std::int32_t kLoadUnits = 2;
+constexpr std::int32_t kMeasureUnits = 2;
+constexpr std::int32_t kFuseUnits = 12;
+constexpr std::int32_t kEvictUnits = 20;
+
+constexpr double kMinTilt_rad = 0.0005;  // a frame that claims more than this is not believed
+constexpr double kMaxRange_m = 10.0;
+
+bool valid(const SurfacePatch& patch) noexcept {
+  if (patch.polygon.size() < 3 || !math::all_finite(patch.normal) || !math::all_finite(patch.centroid_m)) return false;
+  if (!(std::abs(patch.normal.squaredNorm() - 1.0) < 1e-3) ||
+      !(patch.centroid_m.squaredNorm() < math::square(kMaxRange_m))) {
+    return false;
+  }
+  if (!std::isfinite(patch.d_m) || !(patch.offset_sigma_m >= 0.0) || !(patch.offset_sigma_m < 1.0)) return false;
+  if (!(patch.tilt_sigma_rad >= 0.0) || !(patch.tilt_sigma_rad < 1.0)) return false;
+  for (const Vec3& v : patch.polygon) {
+    if (!(v.squaredNorm() < math::square(kMaxRange_m))) return false;
+  }
+  for (const EdgeLine* line : {&patch.nosing, &patch.back}) {
+    if (!line->valid) continue;
+    if (!math::all_finite(line->a_m) || !math::all_finite(line->b_m) || !(line->sigma_m >= 0.0) ||
+        !(line->sigma_m < 1.0)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool valid(const PolygonMap::View& view) noexcept {
+  const Mat3& R = view.world_T_camera.R;
+  return math::all_finite(R) && math::all_finite(view.world_T_camera.p_m) &&
+         (R * R.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-6 && view.position_sigma_m >= 0.0 &&
+         std::isfinite(view.position_sigma_m) && view.tilt_sigma_rad >= 0.0 && std::isfinite(view.tilt_sigma_rad) &&
+         view.mount_sigma_rad >= 0.0 && std::isfinite(view.mount_sigma_rad) && view.intrinsics.fx_px > 0.0 &&
+         view.intrinsics.fy_px > 0.0;
+}
+
+EdgeLine moved(const Transform& a_T_b, const EdgeLine& line) noexcept {
+  EdgeLine out = line;
+  out.a_m = a_T_b * line.a_m;
+  out.b_m = a_T_b * line.b_m;
+  return out;
+}
+
+}  // namespace
+
+void PolygonMap::clear() noexcept {
+  tracks_.clear();
+  snapshot_.polygons.clear();
+  snapshot_.stamp_ns = 0;
+  snapshot_.drift_m.setZero();
+  drift_.clear();
+  any_frame_ = false;
+  newest_ns_ = 0;
+  stage_ = Stage::kIdle;
+}
+
+void PolygonMap::begin(const SurfaceFrame& frame, const View& view) noexcept {
+  if (stage_ != Stage::kIdle) ++counters_.abandoned_frames;
+  stage_ = Stage::kIdle;
+  if (!valid(view)) {
+    ++counters_.rejected_frames;
+    return;
+  }
+  if (any_frame_ && frame.stamp_ns <= newest_ns_) {
+    ++counters_.stale_frames;
+    return;
+  }
+  frame_ = frame;
+  view_ = view;
+  newest_ns_ = frame.stamp_ns;
+  any_frame_ = true;
+  fused_in_frame_ = 0;
+  order_surfaces();
+  drift_.begin_frame(frame.stamp_ns, view.position_sigma_m);
+  map_T_camera_ = view.world_T_camera;
+  map_T_camera_.p_m -= drift_.drift_m();
+  measuring_ = drift_.possible();
+  patch_ = 0;
+  stage_ = Stage::kLoad;
+  if (!measuring_) begin_fusing();
+}
+
+// Where the map is nearly full, what a foot needs finds its place first.
+void PolygonMap::order_surfaces() noexcept {
+  order_.clear();
+  for (const bool others : {false, true}) {
+    for (std::size_t i = 0; i < frame_.surfaces.size(); ++i) {
+      if ((frame_.surfaces[i].kind == SurfaceKind::kOther) != others) continue;
+      (void)order_.try_push_back(static_cast<std::uint8_t>(i));
+    }
+    if (!others) telling_ = order_.size();
+  }
+}
+
+void PolygonMap::begin_fusing() noexcept {
+  if (measuring_) drift_.end_frame();
+  measuring_ = false;
+  map_T_camera_.p_m = view_.world_T_camera.p_m - drift_.frame_offset_m();
+  patch_ = 0;
+}
+
+void PolygonMap::next_surface() noexcept {
+  track_ = 0;
+  if (measuring_ && patch_ >= telling_) return begin_fusing();
+  if (patch_ >= order_.size()) {
+    stage_ = Stage::kAge;
+  } else if (load(frame_.surfaces[order_[patch_]])) {
+    best_ = second_ = kMaxMapPolygons;
+    best_cost_ = second_cost_ = std::numeric_limits<double>::infinity();
+    stage_ = Stage::kCompare;
+  } else {
+    if (!measuring_) ++counters_.rejected_surfaces;
+    ++patch_;
+  }
+}
+
+Progress PolygonMap::step(WorkBudget& budget) noexcept {
+  if (stage_ == Stage::kIdle) return Progress::kIdle;
+  while (!budget.exhausted()) {
+    switch (stage_) {
+      case Stage::kLoad:
+        budget.spend(kLoadUnits);
+        next_surface();
+        break;
+      case Stage::kCompare:
+        budget.spend(compare_some());
+        if (track_ >= tracks_.size()) stage_ = Stage::kFuse;
+        break;
+      case Stage::kFuse:
+        if (measuring_) {
+          budget.spend(kMeasureUnits);
+          measure_offset();
+        } else {
+          budget.spend(kFuseUnits + (best_ >= tracks_.size() && tracks_.full() ? kEvictUnits : 0));
+          fuse_best();
+        }
+        ++patch_;
+        stage_ = Stage::kLoad;
+        break;
+      case Stage::kAge:
+        if (track_ < tracks_.size()) {
+          budget.spend(age(tracks_[track_++]));
+        } else {
+          stage_ = Stage::kPublish;
+        }
+        break;
+      case Stage::kPublish:
+        budget.spend(publish());
+        stage_ = Stage::kIdle;
+        return Progress::kDone;
+      case Stage::kIdle:
+        return Progress::kIdle;
+    }
+  }
+  return Progress::kBusy;
+}
+
+bool PolygonMap::load(const SurfacePatch& patch) noexcept {
+  if (!valid(patch)) return false;
+  seen_.kind = patch.kind;
+  seen_.plane = map_T_camera_ * Plane{patch.normal.normalized(), patch.d_m};
+  const double up = seen_.plane.normal.z();
+  if (seen_.plane.distance_m(map_T_camera_.p_m) <= 0.0) return false;  // seen from behind
+  if (patch.kind == SurfaceKind::kTread && up < 0.8) return false;
+  if (patch.kind == SurfaceKind::kRiser && std::abs(up) > 0.5) return false;
+  seen_.centroid_m = seen_.plane.project(map_T_camera_ * patch.centroid_m);
+  seen_.offset_variance_m2 = math::square(std::max(patch.offset_sigma_m, kMinSeenSigma_m));
+  seen_.tilt_variance_rad2 = math::square(std::max(patch.tilt_sigma_rad, kMinTilt_rad));
+  const double range2_m2 = (seen_.centroid_m - map_T_camera_.p_m).squaredNorm();
+  seen_.pose_variance_m2 = math::square(view_.position_sigma_m) +
+                           (math::square(view_.tilt_sigma_rad) + math::square(view_.mount_sigma_rad)) * range2_m2;
+  seen_.rmse_m = patch.rmse_m;
+  seen_.invalid_fraction = patch.invalid_fraction;
+  seen_.polygon.clear();
+  for (const Vec3& v : patch.polygon) (void)seen_.polygon.try_push_back(seen_.plane.project(map_T_camera_ * v));
+  seen_.edges = patch.edges;
+  seen_.nosing = moved(map_T_camera_, patch.nosing);
+  seen_.back = moved(map_T_camera_, patch.back);
+  return true;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+// The polygon map: what perception saw in single frames, fused in the world frame and remembered.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "algorithms/core/math/transform.hpp"
+#include "algorithms/core/messages/samples.hpp"
+#include "algorithms/core/messages/surfaces.hpp"
+#include "algorithms/core/work.hpp"
+#include "algorithms/perception/map/map_drift.hpp"
+#include "algorithms/perception/map/map_track.hpp"
+#include "algorithms/robot/body_shapes.hpp"
+
+namespace polygmap {
+
+// Each remembered surface is a plane with eight ends in directions 45 degrees apart, and for level surfaces the nosing
+// and the back edge as lines. Every quantity is a mean weighted by information that fades with window_s. Only an
+// observed end can pull an end inwards; where the picture ends, the surface is taken to reach at least as far as it was
+// seen. What a whole frame is off by, as far as its pose's covariance allows, is the pose's (MapDrift) and moves
+// nothing: surfaces out of view stay in place against those in view. The map's world is that of the pose at the start.
+class PolygonMap {
+ public:
+  struct Params {
+    double window_s = 1.5;             // information fades to 1/e
+    double height_gate_min_m = 0.008;  // level surfaces within 3 sigma, but between these two, are one
+    double height_gate_max_m = 0.018;  // below half of the least step, 40 mm
+    double upright_gate_m = 0.06;      // risers stand a tread apart
+    double tilt_gate_rad = 0.17;
+    double upright_turn_gate_rad = 0.35;
+    double overlap_fraction = 0.3;  // of the shorter one, along the stairs or up the riser
+    double lateral_gap_m = 0.5;     // the robot's own leg may split a tread in two
+    double other_gap_m = 0.1;
+    double line_gate_min_m = 0.012;  // an edge further off than 4 sigma, but between these two, is an outlier
+    double line_gate_max_m = 0.025;
+    double line_turn_gate = 0.15;  // slope against the remembered line
+    double line_min_length_m = 0.05;
+    double side_sigma_m = 0.005;  // of an observed end
+    double side_gate_m = 0.025;
+    double unknown_margin_m = 0.010;      // two sigma of a vertex: noise must not make unknown ends grow
+    std::uint32_t outliers_to_reset = 8;  // consecutive, then the new evidence wins
+    std::uint32_t line_min_sightings = 3;
+    std::uint32_t confirmed_sightings = 5;
+    std::uint32_t misses_unconfirmed = 4;  // consecutive frames in plain view without a sighting
+    std::uint32_t misses_confirmed = 90;
+    double unconfirmed_age_s = 2.0;      // unconfirmed and out of view
+    double systematic_sigma_m = 0.0015;  // of depth errors that repeat from frame to frame and do not average out
+    double view_margin_px = 30.0;
+    double view_range_m = 2.5;
+    double view_min_incidence = 0.25;  // sine of the angle between ray and surface
+    double reach_m = 1.5;              // beyond it a polygon makes room first when the map is full
+    double other_area_min_m2 = 0.02;  // smaller ones, and those out of reach, are not worth a place: nothing reads them
+    MapDrift::Params drift;
+  };
+  struct View {
+    Transform world_T_camera;       // at the exposure
+    double position_sigma_m = 0.0;  // of that pose
+    double tilt_sigma_rad = 0.0;    // of the base
+    CameraIntrinsics intrinsics;
+    std::array<LegShapes, kFootCount> body{};  // camera frame; what it hides is not seen to be empty
+    BodyMargin body_margin{0.02, 0.0};
+    double mount_sigma_rad = 0.0;  // of the camera's roll and pitch on the base: between what is seen and the feet
+  };
+  struct Counters {
+    std::uint32_t frames = 0;
+    std::uint32_t rejected_frames = 0;   // not finite, or no camera model
+    std::uint32_t stale_frames = 0;      // not newer than the newest
+    std::uint32_t abandoned_frames = 0;  // begin() before the last one was done
+    std::uint32_t rejected_surfaces = 0;
+    std::uint32_t created = 0;
+    std::uint32_t fused = 0;
+    std::uint32_t merged = 0;  // two remembered surfaces turned out to be one
+    std::uint32_t plane_outliers = 0;
+    std::uint32_t line_outliers = 0;
+    std::uint32_t side_outliers = 0;
+    std::uint32_t resets = 0;      // outliers that persisted
+    std::uint32_t degenerate = 0;  // lines that left no polygon; the ends were used
+    std::uint32_t dropped_unconfirmed = 0;
+    std::uint32_t dropped_vanished = 0;  // confirmed, in view, not there any more
+    std::uint32_t passed_over = 0;       // not worth a place: other_area_min_m2
+    std::uint32_t forgotten = 0;         // out of reach: made room
+    std::uint32_t evicted = 0;           // within reach: made room
+    std::uint32_t refused = 0;           // found no room
+  };
+
+  PolygonMap() noexcept : PolygonMap(Params{}) {}
+  explicit PolygonMap(const Params& params) noexcept : params_(params), drift_(params.drift) {}
+
+  // Copies the frame. A frame that is invalid or not newer is counted and leaves nothing to do.
+  void begin(const SurfaceFrame& frame, const View& view) noexcept;
+  // A unit is a glance at kGlancesPerUnit remembered surfaces, or as much work: a comparison with one that is near is
+  // two. The largest piece publishes all that a frame changed: kMaxPieceUnits. Eight surfaces take about 220 units.
+  static constexpr std::size_t kGlancesPerUnit = 8;
+  static constexpr std::int32_t kMaxPieceUnits = 1 + kMaxMapPolygons / kGlancesPerUnit + kMaxMapPolygons;
+  Progress step(WorkBudget& budget) noexcept;
+  // Changes only in the step that returns kDone. The stamp moves on only with a frame in which something was seen.
+  [[nodiscard]] const MapSnapshot& snapshot() const noexcept { return snapshot_; }
+  void clear() noexcept;
+  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+
+ private:
+  enum class Stage : std::uint8_t { kIdle, kLoad, kCompare, kFuse, kAge, kPublish };
+
+  // Of the seen surface to a remembered one that may be the same.
+  struct Nearness {
+    double across_m = 0.0;  // along the remembered normal, at the seen middle
+    double gate_m = 0.0;
+    double variance_m2 = 0.0;  // of across, but for the pose's
+  };
+
+  void order_surfaces() noexcept;
+  void begin_fusing() noexcept;
+  void next_surface() noexcept;
+  [[nodiscard]] bool load(const SurfacePatch& patch) noexcept;
+  [[nodiscard]] bool is_near(const MapTrack& track, Nearness& out) const noexcept;
+  [[nodiscard]] bool matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept;
+  [[nodiscard]] std::int32_t compare_some() noexcept;
+  void measure_offset() noexcept;
+  void fuse_best() noexcept;
+  void create() noexcept;
+  void admit(const MapTrack& track) noexcept;
+  [[nodiscard]] int claim(const MapTrack& track) const noexcept;
+  // offset_m: of the seen plane along the remembered normal, at the track's origin; fade: of what was known.
+  void fuse(MapTrack& track, double offset_m, double fade) noexcept;
+  void merge(MapTrack& into, MapTrack& from) noexcept;
+  [[nodiscard]] std::int32_t age(MapTrack& track) noexcept;
+  [[nodiscard]] std::int32_t publish() noexcept;
+
+  [[nodiscard]] ConvexPolygon local_polygon(const MapTrack& track) const noexcept;
+  [[nodiscard]] std::optional<SeenLine> local_line(const MapTrack& track, const EdgeLine& line) const noexcept;
+  [[nodiscard]] std::optional<Vec3> heading_from_lines() const noexcept;
+  [[nodiscard]] bool agrees(const TrackedLine& line, const SeenLine& seen) const noexcept;
+  void turn_to(MapTrack& track, const Vec3& world_x) noexcept;
+  void update_line(TrackedLine& line, const SeenLine& seen) noexcept;
+  void update_sides(MapTrack& track, bool first) noexcept;
+  void update_side(TrackedSide& side, double seen_m, bool observed) noexcept;
+  void rebuild(MapTrack& track) noexcept;
+  [[nodiscard]] bool in_view(const MapTrack& track, const Transform& camera_T_local) const noexcept;
+  [[nodiscard]] bool hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept;
+  [[nodiscard]] double faded(std::int64_t since_ns) const noexcept;
+  void write(const MapTrack& track, MapPolygon& out) const noexcept;
+  [[nodiscard]] Viewpoint viewpoint() const noexcept { return {map_T_camera_.p_m, view_.mount_sigma_rad}; }
+  void write_sigmas(const MapTrack& track, SurfacePatch& out) const noexcept;
+
+  Params params_;
+  Counters counters_;
+  MapSnapshot snapshot_;
+  StaticVector<MapTrack, kMaxMapPolygons> tracks_;  // index i is snapshot polygon i once published
+  MapDrift drift_;
+  SurfaceFrame frame_;
+  StaticVector<std::uint8_t, kMaxPlanesPerFrame> order_;  // of the frame's surfaces: treads and risers first
+  std::size_t telling_ = 0;                               // how many of these say where the frame lies
+  View view_;
+  Transform map_T_camera_;  // at first by the last drift, then by the frame's own offset
+  SeenSurface seen_;
+  ConvexPolygon seen_local_;  // in the frame of the track being updated
+  std::int64_t newest_ns_ = 0;
+  std::uint32_t next_id_ = 1;
+  std::uint32_t fused_in_frame_ = 0;
+  bool any_frame_ = false;
+  Stage stage_ = Stage::kIdle;
+  bool measuring_ = false;  // the first pass, in which nothing changes yet
+  std::size_t patch_ = 0;   // in order_
+  std::size_t track_ = 0;
+  std::size_t best_ = kMaxMapPolygons;
+  std::size_t second_ = kMaxMapPolygons;
+  double best_cost_ = 0.0;
+  double second_cost_ = 0.0;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// The polygon map: which remembered surface is it, and what does it say about where the frame lies?
+#include <algorithm>
+#include <utility>
+
+#include "algorithms/perception/map/polygon_map.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr std::int32_t kMatchUnits = 2;
+
+// The shorter interval's part that both cover; negative: minus the gap.
+double overlap_m(const Interval& a, const Interval& b) noexcept {
+  return std::min(a.max_m, b.max_m) - std::max(a.min_m, b.min_m);
+}
+double length_m(const Interval& a) noexcept { return a.max_m - a.min_m; }
+
+}  // namespace
+
+ConvexPolygon PolygonMap::local_polygon(const MapTrack& track) const noexcept {
+  ConvexPolygon out;
+  for (const Vec3& v : seen_.polygon) (void)out.try_push_back(local_xy(track.world_T_local, v));
+  return out;
+}
+
+// The cheap part of the comparison, which most pairs do not pass.
+bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
+  if (track.dead || track.kind != seen_.kind || track.polygon.size() < 3) return false;
+  const bool upright = track.kind == SurfaceKind::kRiser;
+  const Vec3 normal = track.world_T_local.R.col(2);
+  if (normal.dot(seen_.plane.normal) < math::cos(upright ? params_.upright_turn_gate_rad : params_.tilt_gate_rad)) {
+    return false;
+  }
+  const Vec3 offset = seen_.centroid_m - track.world_T_local.p_m;
+  out.across_m = normal.dot(offset);
+  if (std::abs(out.across_m) > (upright ? params_.upright_gate_m : params_.height_gate_max_m)) return false;
+  out.variance_m2 =
+      seen_.offset_variance_m2 + 1.0 / track.offset_information + offset.squaredNorm() / track.tilt_information;
+  out.gate_m = upright ? params_.upright_gate_m
+                       : math::clamp(3.0 * math::sqrt(out.variance_m2 + seen_.pose_variance_m2),
+                                     params_.height_gate_min_m, params_.height_gate_max_m);
+  return std::abs(out.across_m) <= out.gate_m;
+}
+
+bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept {
+  const bool upright = track.kind == SurfaceKind::kRiser;
+  const BoundingBox seen = bounding_box(local_polygon(track)), known = bounding_box(track.polygon);
+  const Interval seen_x{seen.min_m.x(), seen.max_m.x()}, known_x{known.min_m.x(), known.max_m.x()};
+  const Interval seen_y{seen.min_m.y(), seen.max_m.y()}, known_y{known.min_m.y(), known.max_m.y()};
+  const double overlap_x_m = overlap_m(seen_x, known_x), overlap_y_m = overlap_m(seen_y, known_y);
+  if (track.kind == SurfaceKind::kOther) {
+    if (std::min(overlap_x_m, overlap_y_m) < -params_.other_gap_m) return false;
+  } else {
+    const double shorter_m =
+        upright ? std::min(length_m(seen_y), length_m(known_y)) : std::min(length_m(seen_x), length_m(known_x));
+    if ((upright ? overlap_y_m : overlap_x_m) < params_.overlap_fraction * shorter_m) return false;
+    if ((upright ? overlap_x_m : overlap_y_m) < -params_.lateral_gap_m) return false;
+  }
+  cost = std::abs(near.across_m) / near.gate_m + (std::min(overlap_x_m, overlap_y_m) > 0.0 ? 0.0 : 1.0);
+  return true;
+}
+
+std::int32_t PolygonMap::compare_some() noexcept {
+  std::int32_t units = 1;
+  for (std::size_t glances = 0; glances < kGlancesPerUnit && track_ < tracks_.size(); ++glances, ++track_) {
+    Nearness near;
+    if (!is_near(tracks_[track_], near)) continue;
+    units += kMatchUnits;
+    double cost = 0.0;
+    if (!matches(tracks_[track_], near, cost)) continue;
+    if (cost < best_cost_) {
+      second_ = best_;
+      second_cost_ = best_cost_;
+      best_ = track_;
+      best_cost_ = cost;
+    } else if (cost < second_cost_) {
+      second_ = track_;
+      second_cost_ = cost;
+    }
+  }
+  return units;
+}
+
+// What the seen surface says about the frame's offset: along the remembered normal, and across the edges of a tread.
+void PolygonMap::measure_offset() noexcept {
+  if (best_ >= tracks_.size()) return;
+  const MapTrack& track = tracks_[best_];
+  Nearness near;
+  if (track.sightings < params_.confirmed_sightings || !is_near(track, near)) return;
+  const double common_m2 = math::square(params_.systematic_sigma_m);
+  // A riser is matched from further off than it may lie; a plane's normal says nothing about its place beside it.
+  if (std::abs(near.across_m) < params_.line_gate_max_m) {
+    drift_.add(track.world_T_local.R.col(2), near.across_m, near.variance_m2 + common_m2);
+  }
+  for (const auto& [edge, line] : {std::pair{&seen_.nosing, &track.nosing}, std::pair{&seen_.back, &track.back}}) {
+    const std::optional<SeenLine> seen = local_line(track, *edge);
+    if (!seen || line->sightings < params_.line_min_sightings || !agrees(*line, *seen)) continue;
+    const Vec2 middle_m = 0.5 * (seen->a_m + seen->b_m);
+    const double norm = math::sqrt(1.0 + math::square(line->state[1]));
+    drift_.add(track.world_T_local.R * Vec3{1.0 / norm, -line->state[1] / norm, 0.0},
+               (middle_m.x() - line->at_m(middle_m.y())) / norm,
+               seen->variance_m2 + std::min(line->variance_m2(middle_m.y()), 1.0) + common_m2);
+  }
+  if (track.kind != SurfaceKind::kTread) return;
+  const ConvexPolygon seen = local_polygon(track);
+  for (const std::size_t k : {kLeftSide, kRightSide}) {
+    const TrackedSide& side = track.sides[k];
+    const Vec2 u = side_direction(k);
+    const double support = support_m(seen, u);
+    if (!side.observed || std::abs(support - side.support_m) > params_.side_gate_m) continue;
+    if (!end_observed(seen, seen_.edges, u, support)) continue;
+    drift_.add(track.world_T_local.R * Vec3{u.x(), u.y(), 0.0}, support - side.support_m,
+               math::square(params_.side_sigma_m) + 1.0 / side.information + common_m2);
+  }
+}
+
+}  // namespace polygmap

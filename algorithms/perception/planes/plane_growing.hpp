@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gathers straight runs of neighbouring columns into planes: longest runs first, breadth first, each plane refitted as
+// it grows. Resumable.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/perception/planes/plane_fit.hpp"
+#include "algorithms/perception/planes/scanline_segments.hpp"
+
+namespace polygmap {
+
+struct GrownPlane {
+  InversePlane plane;
+  double pixels = 0.0;
+  Vec3 mean_ray = Vec3::UnitZ();
+};
+
+class PlaneGrowing {
+ public:
+  struct Params {
+    double join_sigmas = 1.5;  // a run whose line is join_floor_m + join_sigmas sigma_z off a plane belongs to it
+    double join_floor_m = 0.003;
+    std::int32_t min_rows = 3;        // of a run that starts a plane
+    std::int32_t min_columns = 3;     // of a plane
+    std::int32_t min_plane_px = 800;  // full-resolution pixels; of a plane that is to be one by itself ...
+    std::int32_t min_facet_px = 400;  // ... and of one that may be part of another
+  };
+  static constexpr std::size_t kMaxPlanes = 96;
+
+  void begin(const Params& params, const DepthNoiseModel& noise, const ColumnRays& rays,
+             ScanlineSegmentation::Columns& runs) noexcept;
+  // A bounded piece of work; true when all is done. Then every run knows its plane, 1-based.
+  [[nodiscard]] bool step() noexcept;
+
+  [[nodiscard]] std::size_t count() const noexcept { return count_; }
+  [[nodiscard]] const GrownPlane& plane(std::size_t i) const noexcept { return planes_[i]; }  // 1-based
+  [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
+
+ private:
+  static constexpr std::size_t kQueue = static_cast<std::size_t>(kColumns) * ScanlineSegmentation::kMaxRunsPerColumn;
+  static constexpr std::uint8_t kTried = 255;  // a run that grew into nothing
+
+  struct Place {
+    std::int16_t column = 0;
+    std::int16_t index = 0;
+  };
+  // Sums over pixels in the coordinates of rays; enough for a fit.
+  struct Sums {
+    double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, w = 0, xw = 0, yw = 0, ww = 0;
+    void add(double ray_x, const ColumnRays& rays, const Run& run) noexcept;
+    [[nodiscard]] bool try_solve(Vec3& m) const noexcept;
+    [[nodiscard]] double mean_square(const Vec3& m) const noexcept;
+  };
+
+  [[nodiscard]] Run& at(Place p) noexcept {
+    return (*runs_)[static_cast<std::size_t>(p.column)][static_cast<std::size_t>(p.index)];
+  }
+  void sort_seeds() noexcept;
+  void index_rows() noexcept;
+  // Of the first run of a column that ends at this row or below, or of one a little above it.
+  [[nodiscard]] std::size_t first_near(std::int32_t column, std::int32_t row) const noexcept {
+    return first_near_[static_cast<std::size_t>(column)][static_cast<std::size_t>(row / kIndexRows)];
+  }
+  [[nodiscard]] bool try_seed(Place place) noexcept;
+  [[nodiscard]] bool try_neighbour(Place from, std::int32_t side, Place& best) noexcept;
+  void visit(Place place) noexcept;
+  void consider(Place place) noexcept;
+  void close() noexcept;
+  // The tolerance of a distance times inverse depth.
+  [[nodiscard]] double tolerance_w(double w) const noexcept {
+    return params_.join_floor_m * w + params_.join_sigmas * noise_.inverse_sigma(w) / w;
+  }
+
+  Params params_;
+  DepthNoiseModel noise_;
+  const ColumnRays* rays_ = nullptr;
+  ScanlineSegmentation::Columns* runs_ = nullptr;
+
+  static constexpr std::int32_t kIndexRows = 16;
+  std::array<std::array<std::uint8_t, kDepthHeight_px / kIndexRows + 1>, kColumns> first_near_{};
+  std::array<Place, kQueue> seeds_{};
+  std::size_t seed_count_ = 0;
+  std::size_t next_seed_ = 0;
+
+  std::array<Place, kQueue> queue_{};
+  std::size_t queue_size_ = 0;
+  std::size_t queue_next_ = 0;
+  bool growing_ = false;
+  Sums sums_;
+  Vec3 m_ = Vec3::UnitZ();
+  double norm2_ = 1.0;  // of m_
+  double next_fit_px_ = 0.0;
+  std::int32_t first_column_ = 0;
+  std::int32_t last_column_ = 0;
+
+  std::array<GrownPlane, kMaxPlanes + 1> planes_{};
+  std::size_t count_ = 0;
+  std::uint32_t overflow_ = 0;
+};
+
+}  // namespace polygmap

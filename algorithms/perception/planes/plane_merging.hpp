@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which planes of a frame are one: pieces that a leg, a hole or noise has split, and facets of one curved or rough
+// surface.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/perception/planes/plane_growing.hpp"
+#include "algorithms/perception/planes/plane_set.hpp"
+#include "algorithms/perception/planes/span_boundaries.hpp"
+
+namespace polygmap {
+
+class PlaneMerging {
+ public:
+  struct Params {
+    double merge_m = 0.015;  // pieces whose planes are this close at each other's centre are one surface; large ones
+                             // where a run of one could join the other, too
+    double merge_tilt_rad = 0.12;
+    double small_plane_px = 4000.0;  // smaller planes' tilt is known half as well
+    double pieces_chi2 = 6.5;        // large pieces need not touch: 91 % of what noise does to three parameters
+    double facet_chi2 = 8.0;         // neighbours are one surface unless their pixels contradict one plane for both by
+                                     // this: 95 % of what noise does to three parameters
+    double facet_floor_m = 0.002;    // what surfaces themselves are uneven by, added to the noise
+    double facet_tilt_rad = 0.6;
+    // Neighbours touch along this times the root of the smaller one's pixels. Of a tread or a riser that is low in the
+    // picture two pieces cannot: side by side, along this times the lower one's height.
+    double facet_seam = 0.7;
+  };
+  using PlaneIndex = std::array<std::uint8_t, PlaneSet::kMaxPlanes + 1>;  // of a plane that may have been merged
+
+  // Pieces share the plane of the largest. measured: the planes' moments say what their pixels are worth; before, large
+  // planes are one only where there is no doubt. Facets too small to be planes are left to join_facets.
+  static void merge_pieces(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,
+                           PlaneSet& planes, PlaneIndex& to_plane, bool measured) noexcept;
+  // Facets get a plane of their own, fitted to all of them, and may together be large enough to be one: begin_facets,
+  // the columns of spans that the planes were fitted to, from left to right, then join_some until it is done.
+  void begin_facets(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,
+                    const PlaneSet& planes) noexcept;
+  // right: the next column, null for the last.
+  void add_column(const SpanBoundaries::Column& spans, const SpanBoundaries::Column* right,
+                  const PlaneIndex& to_plane) noexcept;
+  // Looks at kSeamsAtOnce seams, or joins two planes; true when nothing is left to join.
+  [[nodiscard]] bool join_some(PlaneSet& planes, PlaneIndex& to_plane) noexcept;
+  // Seams that found no room.
+  [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
+
+ private:
+  static constexpr std::int32_t kMaxGap_px = 24;  // rows between two surfaces that still touch
+  static constexpr std::size_t kMaxFacets = 32;   // joined per frame
+  static constexpr std::size_t kMaxSeams = 512;
+  static constexpr std::size_t kSeamsAtOnce = 8;
+
+  // Where two planes that face much the same way touch in the picture. What was said of them holds until either plane
+  // changes.
+  struct Seam {
+    enum class Verdict : std::uint8_t { kOpen, kShort, kContradicted, kOne, kGone };
+    std::uint8_t a = 0, b = 0;
+    Verdict verdict = Verdict::kOpen;
+    bool low = false;  // touch along no more than the lower one's height
+    std::int32_t length_px = 0;
+    std::int32_t beside_px = 0;  // of that, side by side
+    double chi2 = 0.0;           // if kOne
+  };
+  using SeamIndex = std::uint16_t;  // 0 = none
+  [[nodiscard]] SeamIndex& seam_of(std::size_t a, std::size_t b) noexcept {
+    return seam_of_[a < b ? a : b][a < b ? b : a];
+  }
+  [[nodiscard]] bool alike(std::size_t a, std::size_t b) const noexcept {
+    return normals_[a].dot(normals_[b]) >= least_cosine_;
+  }
+  void touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px, bool beside) noexcept;
+  void judge(const PlaneSet& planes, Seam& seam) const noexcept;
+  [[nodiscard]] bool try_join(PlaneSet& planes, PlaneIndex& to_plane, Seam& best) noexcept;
+
+  Params params_;
+  double min_plane_px_ = 0.0;
+  DepthNoiseModel noise_;
+  double least_cosine_ = 1.0;
+  std::array<std::int32_t, PlaneSet::kMaxPlanes + 1> spans_of_{};  // columns of a plane
+  std::array<Vec3, PlaneSet::kMaxPlanes + 1> normals_{};           // before any were joined; zero: no plane
+  std::array<std::array<SeamIndex, PlaneSet::kMaxPlanes + 1>, PlaneSet::kMaxPlanes + 1> seam_of_{};
+  std::array<Seam, kMaxSeams + 1> seams_{};  // 1-based
+  std::size_t seam_count_ = 0;
+  std::size_t next_open_ = 1;  // none before it is open
+  std::size_t joined_ = 0;
+  std::uint32_t overflow_ = 0;
+};
+
+}  // namespace polygmap

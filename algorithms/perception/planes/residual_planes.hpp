@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Level and upright planes in what the grown planes left over.
+//
+// A far tread cut off by the picture's upper end is a few rows high: its runs are too short to say how it lies. But
+// gravity does, and which way the other risers face: all its pixels have one height, or one distance from the riser
+// before. Histograms of both over all rows that belong to no plane find it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/perception/planes/span_boundaries.hpp"
+
+namespace polygmap {
+
+class ResidualPlaneSearch {
+ public:
+  struct Params {
+    std::int32_t min_rows = 50;    // of a peak, in column rows (eight pixels each)
+    double min_contrast = 2.5;     // of a peak against what lies around it
+    double known_apart_m = 0.015;  // nearer to a known plane it is that one
+  };
+  static constexpr std::size_t kMaxFound = 8;
+
+  void begin(const Params& params, const Vec3& up) noexcept;
+  // Planes that are known already. The largest upright one says which way risers face.
+  void know_level(const InversePlane& plane) noexcept;
+  void know_upright(const InversePlane& plane, double pixels) noexcept;
+  // A plane that was given up: what its spans hold is searched as if it were in none.
+  void give_back(std::size_t plane) noexcept { given_back_[plane] = true; }
+  // Adds the rows of a column that are in none of its spans.
+  void add_column(const ColumnRays& rays, const ColumnImage& image, std::int32_t column,
+                  const SpanBoundaries::Column& spans) noexcept;
+  void finish() noexcept;
+
+  [[nodiscard]] const StaticVector<InversePlane, kMaxFound>& found() const noexcept { return found_; }
+
+ private:
+  // Rows by their distance from the camera along an axis.
+  struct Axis {
+    static constexpr std::int32_t kBins = 1024;
+    static constexpr double kBin_m = 0.005;
+    Vec3 direction = Vec3::Zero();               // unit, the planes' normal; zero: not in use
+    std::array<std::int32_t, kBins + 1> rows{};  // the last: in none
+    [[nodiscard]] static std::int32_t bin_of(double distance_m) noexcept {
+      return static_cast<std::int32_t>(std::floor(distance_m / kBin_m));
+    }
+  };
+  void find(Axis& axis) noexcept;
+  static void forget(Axis& axis, double distance_m, double apart_m) noexcept;
+
+  Params params_;
+  Axis level_;
+  Axis upright_;
+  double upright_pixels_ = 0.0;
+  std::array<bool, SpanBoundaries::kMaxPlanes + 1> given_back_{};
+  StaticVector<InversePlane, SpanBoundaries::kMaxPlanes> known_;
+  StaticVector<InversePlane, kMaxFound> found_;
+};
+
+}  // namespace polygmap

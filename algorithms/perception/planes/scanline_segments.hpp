@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cuts every column of the picture into straight runs: on a plane, inverse depth is linear in the row. All columns
+// advance together, row by row, so that the loop over them is vector code without branches.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/perception/image/column_image.hpp"
+#include "algorithms/perception/image/depth_noise_model.hpp"
+
+namespace polygmap {
+
+// Rows top .. bottom of one column; the line through them is inverse_depth + slope (row - top).
+struct Run {
+  std::int16_t top = 0;
+  std::int16_t bottom = 0;
+  float inverse_depth = 0.0F;  // 1/m, at top
+  float slope = 0.0F;          // 1/m per row
+  std::uint8_t plane = 0;      // that it was given to, 0 = none
+  [[nodiscard]] std::int32_t rows() const noexcept { return bottom - top + 1; }
+};
+
+class ScanlineSegmentation {
+ public:
+  struct Params {
+    double outlier_sigmas = 3.5;  // a row this far off the run's line does not belong to it
+    double bend_sigmas = 1.7;     // mean of the last rows' residuals: the run bends away
+    double jump_share = 0.03;     // the first rows of a run differ by less than this share of the depth per row
+    double floor_m = 0.001;       // slow depth errors, added to the noise
+    std::int32_t max_gap_px = 8;  // rows without data inside a run
+  };
+  static constexpr std::size_t kMaxRunsPerColumn = 48;
+  using Column = StaticVector<Run, kMaxRunsPerColumn>;
+  using Columns = std::array<Column, kColumns>;
+
+  void begin(const Params& params, const DepthNoiseModel& noise, const CameraIntrinsics& intrinsics,
+             const ColumnImage& image) noexcept;
+  static constexpr std::int32_t kBlock = 4;  // rows that are best added together
+  // Rows must come in order, 0 .. height - 1.
+  void add_rows(std::int32_t first, std::int32_t last) noexcept;
+  void finish() noexcept;
+
+  [[nodiscard]] Columns& columns() noexcept { return runs_; }
+  [[nodiscard]] const Columns& columns() const noexcept { return runs_; }
+  [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }  // runs that found no room
+
+ private:
+  static constexpr std::int32_t kPending = 3;  // outliers in a row that end a run
+  static constexpr std::int32_t kMinRows = 3;
+  static constexpr float kMemory = 0.7F;     // of the mean of residuals, per row
+  static constexpr std::int32_t kGroup = 8;  // columns that are decided on together, for every register width
+  static_assert(kColumns % kGroup == 0);
+  using Floats = std::array<float, kColumns>;
+
+  // The state of all columns' open runs: the least-squares line through the accepted rows, updated row by row, so that
+  // nothing large is ever subtracted and single precision is enough.
+  struct Open {
+    Floats rows;     // accepted, 0: no run is open
+    Floats value;    // of the line at the row last stepped, 1/m
+    Floats slope;    // 1/m per row
+    Floats lever;    // from the mean of the accepted rows to the row last stepped
+    Floats squares;  // sum of squared rows from that mean
+    Floats drift;    // recursive mean of residuals, 1/m
+    Floats absent;   // rows since the last accepted one, an outlier counts outlier_weight_; whole numbers
+  };
+
+  struct Wides;  // the parameters in vector registers
+  struct Block;
+  struct OneColumn;
+  [[nodiscard]] std::uint32_t try_blocks(const Wides& c, std::int32_t column, std::int32_t row) noexcept;
+  [[nodiscard]] std::uint32_t add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept;
+  void handle(std::int32_t g, std::int32_t row) noexcept;
+  void replay(std::int32_t g, std::int32_t from, std::int32_t row) noexcept;
+  void forget(std::int32_t g, std::int32_t from, std::int32_t row) noexcept;
+  [[nodiscard]] std::int32_t last_accepted(std::int32_t g, std::int32_t row) const noexcept;
+  void close(std::int32_t g, std::int32_t bottom, std::int32_t row) noexcept;
+  void clear(std::int32_t g) noexcept;
+
+  const ColumnImage* image_ = nullptr;
+  std::int32_t column_count_ = 0;
+  std::int32_t height_px_ = 0;
+  float outlier2_ = 0.0F, bend2_ = 0.0F, max_gap_ = 0.0F, outlier_weight_ = 1.0F, fy_ = 1.0F, cy_ = 0.0F;
+  float base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F, floor2_ = 0.0F;
+  std::array<float, 3> jump_{};  // a polynomial of inverse depth
+  Open open_;
+  std::array<std::int16_t, kColumns> top_{};
+  Columns runs_;
+  std::uint32_t overflow_ = 0;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where one plane ends and the next begins in every column, and the planes' final fit to what lies between.
+//
+// Two planes that meet in space meet in the picture on a straight line that is known far better than any one column's
+// pixels tell. Where they do not meet (an overhang, something in front), the columns' most likely change-points decide,
+// all columns of a pair of planes together.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/perception/image/noise_tracker.hpp"
+#include "algorithms/perception/planes/plane_fit.hpp"
+#include "algorithms/perception/planes/scanline_segments.hpp"
+
+namespace polygmap {
+
+// Rows top .. bottom of a column show one plane.
+struct ColumnSpan {
+  std::int16_t top = 0;
+  std::int16_t bottom = 0;
+  std::uint8_t plane = 0;
+  std::uint16_t piece = 0;  // for whoever joins intervals into pieces
+};
+
+// Rows that belong to no plane are searched for the rest of known or cut-off surfaces this far from the nearest span's
+// or the picture's end; what lies deeper in them is clutter.
+inline constexpr std::int32_t kRemainderReach_px = 48;
+
+class SpanBoundaries {
+ public:
+  struct Params {
+    double inlier_sigmas = 3.0;    // of a row in a refit, and of a row that extends a surface
+    double same_gap_sigmas = 3.0;  // rows between two runs of one plane that are this far off it are something else
+    double gap_floor_m = 0.006;
+    double meet_px = 2.0;          // planes meet where their line is no farther than this from the change-point ...
+    double meet_gain = 1.0;        // ... or hardly worse: of the columns' mean cost
+    std::int32_t window_px = 6;    // rows searched beyond where the runs ended
+    std::int32_t max_gap_px = 24;  // rows between two surfaces that are still next to each other
+  };
+  static constexpr std::size_t kMaxPlanes = 96;
+  static constexpr std::size_t kMaxIntervals = 32;
+  static constexpr std::int32_t kRefitColumns = 8;  // per call, the same number for every vector width
+  using Column = StaticVector<ColumnSpan, kMaxIntervals>;
+  using Columns = std::array<Column, kColumns>;
+  struct Plane {
+    InversePlane plane;
+    Mat3 covariance = Mat3::Zero();  // of plane.m, zero while it is not measured
+    float norm = 1.0F;               // of plane.m
+    PlaneMoments moments;            // of the last refit, weights 1 / sigma^2
+    double residual2 = 0.0;          // sum of squared normal distances, per pixel
+    double seen_px = 0.0;  // measured in the rows refitted to, among them those that the plane does not explain
+  };
+
+  void begin(const Params& params, const DepthNoiseModel& noise, const ColumnRays& rays, double fy_px, double cy_px,
+             const ColumnImage& image) noexcept;
+  // Planes are set by the caller between the passes; 1-based.
+  void set_plane(std::size_t i, const InversePlane& plane) noexcept {
+    planes_[i].plane = plane;
+    planes_[i].norm = static_cast<float>(plane.m.norm());
+  }
+  // A plane of few pixels is uncertain beside them: what it may claim knows that.
+  void set_covariance(std::size_t i, const Mat3& covariance) noexcept { planes_[i].covariance = covariance; }
+  [[nodiscard]] const Plane& plane(std::size_t i) const noexcept { return planes_[i]; }
+
+  // One column's runs to intervals, each run's plane looked up in to_plane.
+  void gather(std::int32_t column, const ScanlineSegmentation::Column& runs,
+              const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept;
+  // A run's ends may reach over an edge: takes away rows that the plane, known better than the run's line, does not
+  // explain.
+  void trim(std::int32_t column) noexcept;
+  // Gives rows that are in none of the column's spans to planes that the column beside shows there, or to one of the
+  // planes first .. last. Such rows are too few for a run of their own.
+  void claim(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
+  void begin_meeting() noexcept;
+  // Change-points between the column's surfaces. by_planes: where planes meet near them, that is believed unmeasured.
+  void meet(std::int32_t column, bool by_planes) noexcept;
+  void settle() noexcept;  // one decision per pair of planes, then all columns follow it ...
+  void follow() noexcept;  // ... and again when the planes have changed
+  void begin_refit() noexcept;
+  // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments. roughly: of fewer of their
+  // rows, and without looking at the noise.
+  void refit(std::int32_t first_column, bool roughly) noexcept;
+
+  // The noise as the rows of the last refit's surfaces show it.
+  [[nodiscard]] const NoiseSamples& noise_samples() const noexcept { return noise_samples_; }
+
+  // visit(other plane, columns in which the two meet), of the last meeting.
+  template <typename Visit>
+  void for_each_meeting(std::uint8_t plane, const Visit& visit) const noexcept {
+    for (std::size_t i = 0; i < pair_count_; ++i) {
+      const Pair& pair = pairs_[i];
+      if (pair.upper == plane) visit(pair.lower, pair.columns);
+      if (pair.lower == plane) visit(pair.upper, pair.columns);
+    }
+  }
+  [[nodiscard]] Columns& columns() noexcept { return columns_; }
+  [[nodiscard]] const Columns& columns() const noexcept { return columns_; }
+  [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
+
+ private:
+  static constexpr std::size_t kMaxJoints = 26 * static_cast<std::size_t>(kColumns);  // ten steps have 20 a column
+  static constexpr std::uint8_t kMaxPairs = 192;
+  static constexpr std::int32_t kRowsAtOnce = 8;
+  static constexpr std::int32_t kBins = 32;  // of a pixel, -16 .. 16
+  struct Joint {
+    std::int16_t column = 0;
+    std::uint8_t pair = 0;
+    std::uint8_t upper = 0;  // interval
+  };
+  struct Pair {
+    std::uint8_t upper = 0;
+    std::uint8_t lower = 0;
+    double columns = 0.0;
+    double shift_px = 0.0;  // of the boundary from where the planes meet
+    // Sum of cost(upper) - cost(lower), by distance from where the planes meet: rows in the upper halves of the bins,
+    // then those in the lower halves. Eight rows are added at once, beyond both ends, too.
+    std::array<std::array<float, kBins + 2 * kRowsAtOnce>, 2> gain{};
+  };
+  static constexpr float kTruncation = 9.0F;  // of a cost: an outlier says no more than three sigmas do
+  // A plane in one column: inverse depth a + b y, its tolerance per sigma, and its own variance, both times inverse
+  // depth.
+  struct Line {
+    float a, b, norm, own = 0.0F;
+  };
+  [[nodiscard]] Line line_of(std::uint8_t plane, std::int32_t column) const noexcept;
+  [[nodiscard]] float inverse_sigma(float w) const noexcept { return (base_ * w + per_metre_) * w + quadratic_; }
+  // A row against a line: residual over sigma, squared, is off2 / variance.
+  struct Offset {
+    float off2, variance;
+    [[nodiscard]] bool within(float cost) const noexcept { return off2 < cost * variance; }
+  };
+  [[nodiscard]] Offset offset(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
+  void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
+  struct Depths {  // the range of some rows' inverse depths, 1/m
+    float farthest, nearest;
+    [[nodiscard]] bool any() const noexcept { return nearest >= farthest; }
+  };
+  [[nodiscard]] Depths depths_of(std::int32_t column, std::int32_t first, std::int32_t last) const noexcept;
+  [[nodiscard]] bool reaches(const Line& line, std::int32_t top, std::int32_t bottom,
+                             const Depths& depths) const noexcept;
+  // See Line.
+  [[nodiscard]] float own_variance(std::uint8_t plane, std::int32_t column, std::int32_t row) const noexcept;
+  struct Rows {  // a bit for each of kRowsAtOnce
+    std::uint32_t measured = 0, fit = 0;
+  };
+  // Which of the rows from first on have data, and which of them lie on the line.
+  [[nodiscard]] Rows fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept;
+  // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
+  void weigh_claim(std::int32_t column, const Line& line, const ColumnSpan& candidate, std::int32_t& most,
+                   ColumnSpan& claimed) const noexcept;
+  struct Gap {  // rows of a column between spans of two planes, 0 = none
+    std::int32_t column, from, until;
+    std::uint8_t above, below;
+    [[nodiscard]] bool may_be(std::uint8_t plane) const noexcept { return plane != above && plane != below; }
+  };
+  // A plane for rows top .. bottom of the gap, whose depths are known; or several planes for its ends.
+  void consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom, const Depths& depths,
+                std::int32_t& most, ColumnSpan& claimed) const noexcept;
+  void consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
+                ColumnSpan& claimed) const noexcept;
+  // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
+  struct Strip {
+    std::array<std::int16_t, kRefitColumns> top{}, bottom{};
+    std::uint8_t plane = 0;
+  };
+  void refit(std::int32_t first_column, const Strip& strip, bool roughly) noexcept;
+  void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
+  [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
+                                          std::int32_t last, float meeting_row, Pair* pair) const noexcept;
+  // The row, real, where the lines meet; not finite for parallel ones.
+  [[nodiscard]] double meeting_row(const Line& upper, const Line& lower) const noexcept {
+    return static_cast<double>(lower.a - upper.a) / static_cast<double>(upper.b - lower.b) * fy_px_ + cy_px_;
+  }
+  void sample_noise(std::int32_t column) noexcept;
+  [[nodiscard]] std::uint8_t pair_of(std::uint8_t upper, std::uint8_t lower) noexcept;
+
+  Params params_;
+  const ColumnRays* rays_ = nullptr;
+  const ColumnImage* image_ = nullptr;
+  double fy_px_ = 1.0, cy_px_ = 0.0;
+  float base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F, correlated_share_ = 0.0F;
+  std::array<float, kColumn_px + 1> share_{};  // of a pixel's variance that the mean of n pixels has
+
+  std::array<Plane, kMaxPlanes + 1> planes_{};
+  Columns columns_{};
+  std::array<Joint, kMaxJoints> joints_{};
+  std::size_t joint_count_ = 0;
+  std::array<Pair, kMaxPairs> pairs_{};
+  std::size_t pair_count_ = 0;
+  std::array<std::array<std::uint8_t, kMaxPlanes + 1>, kMaxPlanes + 1> pair_of_{};  // by upper and lower
+  NoiseSamples noise_samples_;
+  std::uint32_t overflow_ = 0;
+};
+
+inline SpanBoundaries::Line SpanBoundaries::line_of(std::uint8_t plane, std::int32_t column) const noexcept {
+  const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(column)]);
+  const Vec3& m = planes_[plane].plane.m;
+  return {static_cast<float>(m.x() * x + m.z()), static_cast<float>(m.y()), planes_[plane].norm};
+}
+
+inline SpanBoundaries::Offset SpanBoundaries::offset(const Line& line, std::int32_t column,
+                                                     std::int32_t row) const noexcept {
+  const float w = image_->down(row, column);
+  const float residual = (w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)])) * w;
+  const float sigma = inverse_sigma(w) * line.norm;
+  return {residual * residual, sigma * sigma * share_[image_->valid_down(row, column)]};
+}
+
+}  // namespace polygmap

@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/polygons/polygon_builder.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <utility>
+
+#include "algorithms/perception/image/simd.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr double kLeastSlope = 0.5;  // sine between a riser and the tread that ends it
+constexpr double kOnLine_m = 0.002;  // a polygon's edge lies on a line
+
+using SeenPolygon = StaticVector<Vec2, kMaxPolygonVertices>;  // its corners in the picture, half-resolution pixels
+
+// Adds a row's columns first .. last that are not the robot's own, and the valid pixels in them. flags: null where
+// nothing is the robot's own.
+void count_pixels(const std::uint8_t* flags, const std::uint8_t* valid, std::int32_t first, std::int32_t last,
+                  std::int32_t& free_columns, std::int32_t& valid_px) noexcept {
+  using Bytes = cv::v_uint8x16;
+  static_assert(kColumns % Bytes::nlanes == 0 && kColumns <= 256, "columns are counted in whole registers of bytes");
+  static constexpr std::array<std::uint8_t, kColumns> kIndices = [] {
+    std::array<std::uint8_t, kColumns> indices{};
+    for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = static_cast<std::uint8_t>(i);
+    return indices;
+  }();
+  const Bytes from = cv::v_setall_u8(static_cast<std::uint8_t>(first)),
+              to = cv::v_setall_u8(static_cast<std::uint8_t>(last)), is_body = cv::v_setall_u8(kPixelBody),
+              none = cv::v_setzero_u8();
+  // No lane gets more than 8 * kColumns / nlanes.
+  Bytes free_sum = none, valid_sum = none;
+  if (flags == nullptr) {
+    for (std::int32_t g = first / Bytes::nlanes * Bytes::nlanes; g <= last; g += Bytes::nlanes) {
+      const Bytes index = cv::v_load(kIndices.data() + g);
+      const Bytes wanted = (cv::v_max(index, from) == index) & (cv::v_min(index, to) == index);
+      valid_sum = cv::v_add_wrap(valid_sum, cv::v_load(valid + g) & wanted);
+    }
+    free_columns += last - first + 1;
+    valid_px += static_cast<std::int32_t>(cv::v_reduce_sum(valid_sum));
+    return;
+  }
+  for (std::int32_t g = first / Bytes::nlanes * Bytes::nlanes; g <= last; g += Bytes::nlanes) {
+    const Bytes index = cv::v_load(kIndices.data() + g);
+    const Bytes wanted = (cv::v_max(index, from) == index) & (cv::v_min(index, to) == index);
+    Bytes a, b, c, d;
+    cv::v_load_deinterleave(flags + 4 * static_cast<std::ptrdiff_t>(g), a, b, c, d);
+    const Bytes seen = ((((a | b) | (c | d)) & is_body) == none) & wanted;
+    free_sum = cv::v_sub_wrap(free_sum, seen);
+    valid_sum = cv::v_add_wrap(valid_sum, cv::v_load(valid + g) & seen);
+  }
+  free_columns += static_cast<std::int32_t>(cv::v_reduce_sum(free_sum));
+  valid_px += static_cast<std::int32_t>(cv::v_reduce_sum(valid_sum));
+}
+
+// Of a point, in half-resolution pixels.
+Vec2 project(const HalfRays& rays, const Vec3& p_m) noexcept {
+  const double w = 1.0 / p_m.z();
+  return {p_m.x() * w * rays.fx_px + rays.cx_px, p_m.y() * w * rays.fy_px + rays.cy_px};
+}
+
+// Share of a polygon's pixels without data, over its columns in the picture in some of its rows.
+double invalid_share(const FrameImage& picture, const SeenPolygon& polygon) noexcept {
+  constexpr std::int32_t kRows = 32;  // more say the same
+  const HalfRays& rays = picture.rays;
+  const auto first_from = [&](double y) {
+    return static_cast<std::int32_t>(std::ceil(math::clamp(y, 0.0, rays.height_px)));
+  };
+  const auto last_until = [&](double y) {
+    return static_cast<std::int32_t>(std::floor(math::clamp(y, -1.0, rays.height_px - 1.0)));
+  };
+  double highest = 1e9, lowest = -1e9;
+  for (const Vec2& p : polygon) highest = std::min(highest, p.y()), lowest = std::max(lowest, p.y());
+  const std::int32_t first_row = first_from(highest), last_row = last_until(lowest);
+  const std::int32_t stride = 1 + std::max(last_row - first_row, 0) / kRows;
+  // From which column to which the convex polygon reaches in each of these rows: two of its edges cross it.
+  struct Reach {
+    double left = 1e9, right = -1e9;
+  };
+  std::array<Reach, kRows + 1> reach;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vec2 *upper = &polygon[i], *lower = &polygon[i + 1 < polygon.size() ? i + 1 : 0];
+    if (lower->y() < upper->y()) std::swap(upper, lower);
+    const std::int32_t first = (first_from(upper->y()) - first_row + stride - 1) / stride;
+    const std::int32_t last = last_until(lower->y()) - first_row;
+    const double step = (lower->x() - upper->x()) / std::max(lower->y() - upper->y(), 1e-9);
+    double x = upper->x() + (first_row + first * stride - upper->y()) * step;
+    for (std::int32_t k = first; k * stride <= last; ++k) {
+      Reach& row = reach[static_cast<std::size_t>(k)];
+      row.left = std::min(row.left, x);
+      row.right = std::max(row.right, x);
+      x += step * stride;
+    }
+  }
+  std::int32_t free = 0, valid = 0;
+  for (std::int32_t r = first_row; r <= last_row; r += stride) {
+    const Reach& row = reach[static_cast<std::size_t>((r - first_row) / stride)];
+    // Columns whose middles, at 4 g + 1.5 in steps of two pixels, lie within.
+    const auto left =
+        static_cast<std::int32_t>(std::ceil(math::clamp((row.left + 0.5) / (0.5 * kColumn_px) - 0.5, 0.0, kColumns)));
+    const auto right = static_cast<std::int32_t>(
+        std::floor(math::clamp((row.right + 0.5) / (0.5 * kColumn_px) - 0.5, -1.0, picture.column_rays.columns - 1.0)));
+    const std::uint8_t* flags = picture.body_rows[static_cast<std::size_t>(r)] ? picture.flags.row(r) : nullptr;
+    if (left <= right) count_pixels(flags, picture.columns.valid.row(2 * r), left, right, free, valid);
+  }
+  return free > 0 ? 1.0 - static_cast<double>(valid) / (kColumn_px * free) : 0.0;
+}
+
+}  // namespace
+
+// What is just outside an edge decides whether the surface ends there or only the view of it.
+EdgeKind PolygonBuilder::judge_edge(const FrameImage& picture, const InversePlane& plane, const Vec2& a, const Vec2& b,
+                                    const Vec2& inside) const noexcept {
+  constexpr int kProbes = 5;
+  Vec2 outward{(b - a).y(), -(b - a).x()};
+  if (outward.norm() < 1e-9) return EdgeKind::kUnknown;
+  outward.normalize();
+  if (outward.dot(a - inside) < 0.0) outward = -outward;
+  const auto reach_px = static_cast<std::int32_t>(1.5 * params_.probe_px);
+  // Nearer than the probe only the body is asked for.
+  const auto nearest_px = picture.any_body ? 0 : static_cast<std::int32_t>(std::ceil(0.5 * params_.probe_px));
+  int observed = 0;
+  // Until enough of them say so, or too few are left that could.
+  for (int i = 0; i < kProbes && 2 * observed <= kProbes && 2 * (observed + kProbes - i) > kProbes; ++i) {
+    const Vec2 on = a + (b - a) * ((i + 0.5) / kProbes);
+    // The first measured pixel outside, up to twice the probe's distance; the body or the picture's end before it hides
+    // the end of the surface.
+    for (std::int32_t k = nearest_px; k <= reach_px; ++k) {
+      const double out = 0.5 * params_.probe_px + k;
+      const Vec2 p = on + out * outward;
+      const auto c = static_cast<std::int32_t>(std::floor(p.x() + 0.5)),
+                 r = static_cast<std::int32_t>(std::floor(p.y() + 0.5));
+      if (c < 0 || c >= picture.rays.width_px || r < 0 || r >= picture.rays.height_px || picture.body(c, r)) break;
+      if (out < params_.probe_px) continue;
+      const auto w = static_cast<double>(picture.inverse_depth_at(c, r));
+      if (!(w > 0.0)) continue;
+      const double expected = plane.inverse_depth(picture.rays.ray(c, r));
+      // Something well in front hides it, unless it stands on the surface right here (a riser's foot).
+      const bool hidden = expected > 1e-3 && w - expected > params_.apart_m * expected * w;
+      observed += hidden ? 0 : 1;
+      break;
+    }
+  }
+  return 2 * observed > kProbes ? EdgeKind::kObserved : EdgeKind::kUnknown;
+}
+
+// The tread that most columns of this surface show right below (or above) it in the picture; 0 = none.
+std::size_t PolygonBuilder::tread_beside(const FrameImage& picture, const PlaneSet& planes,
+                                         const ColumnExtents& profile, bool below) const noexcept {
+  constexpr std::int32_t kProbe_px = 6;
+  std::array<std::int32_t, PlaneSet::kMaxPlanes + 1> votes{};
+  for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
+    const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
+    if (ends.empty()) continue;
+    const std::int32_t row = below ? ends.bottom + kProbe_px : ends.top - kProbe_px;
+    if (row >= 0 && row < picture.column_rays.height_px) ++votes[picture.owner(g, row)];
+  }
+  std::size_t best = 0;
+  for (std::size_t p = 1; p <= planes.count; ++p) {
+    if (votes[p] < params_.min_tread_columns || !planes[p].alive || planes[p].kind != SurfaceKind::kTread) continue;
+    if (best == 0 || votes[p] > votes[best]) best = p;
+  }
+  return best;
+}
+
+bool PolygonBuilder::try_build(const FrameImage& picture, const PlaneSet& planes, std::size_t index,
+                               const ColumnExtents& profile, const Outline2& outline, const SurfaceLines& lines,
+                               SurfacePatch& patch) const noexcept {
+  const FramePlane& own = planes[index];
+  const InversePlane& plane = own.plane;
+  const Vec3 n = plane.normal();
+  // Plane coordinates with x along the nosing, else along the picture's rows; x cross y = n.
+  Vec3 x_axis = Vec3::UnitX();
+  if (lines.nosing.valid) {
+    x_axis = lines.nosing.b_m - lines.nosing.a_m;
+  } else if (lines.back.valid) {
+    x_axis = lines.back.b_m - lines.back.a_m;
+  }
+  x_axis -= n * n.dot(x_axis);
+  if (x_axis.norm() < 1e-6) x_axis = n.unitOrthogonal();
+  x_axis.normalize();
+  const Vec3 y_axis = n.cross(x_axis);
+  const Vec3 origin = own.centre_m - n * plane.distance_m(own.centre_m);
+  const auto to_plane = [&](const Vec3& p) { return Vec2{(p - origin).dot(x_axis), (p - origin).dot(y_axis)}; };
+  const auto to_space = [&](const Vec2& p) { return Vec3{origin + p.x() * x_axis + p.y() * y_axis}; };
+
+  // The picture's outline onto the plane: a projection keeps it convex, and turns clockwise in the picture into
+  // clockwise seen from the camera, so the order is reversed.
+  Outline2 flat;
+  for (std::size_t i = outline.size(); i-- > 0;) {
+    const Vec3 ray = picture.rays.ray(outline[i].x(), outline[i].y());
+    if (plane.inverse_depth(ray) > 0.1) static_cast<void>(flat.try_push_back(to_plane(plane.point(ray))));
+  }
+  if (flat.size() < 3 || !(twice_area(flat) > 0.0)) return false;
+  const Vec2 middle = centroid(flat);
+  const auto cut = [&](const EdgeLine& line) {
+    const Vec2 a = to_plane(line.a_m), b = to_plane(line.b_m);
+    Vec2 inward{-(b - a).y(), (b - a).x()};
+    inward.normalize();
+    if (inward.dot(middle - a) < 0.0) inward = -inward;
+    // Corners just short of the line go onto it, those beyond are cut off: either way the edge is the line. Moving only
+    // the two extreme ones keeps the outline convex.
+    for (Vec2& p : flat) {
+      const double distance = inward.dot(p - a);
+      if (distance > 0.0 && distance < params_.snap_m) p -= (distance + 1e-6) * inward;
+    }
+    clip(flat, a, inward);
+  };
+  if (lines.nosing.valid) cut(lines.nosing);
+  if (lines.back.valid) cut(lines.back);
+  if (lines.occluder.valid) cut(lines.occluder);
+  if (own.kind == SurfaceKind::kRiser) {
+    // Seen nearly edge-on, half a pixel is decimetres of a riser: it ends where the treads above and below it say.
+    for (const bool below : {true, false}) {
+      const std::size_t tread = tread_beside(picture, planes, profile, below);
+      if (tread == 0) continue;
+      const InversePlane& level = planes[tread].plane;
+      const double side = below ? 1.0 : -1.0;
+      const Vec3 up = side * level.normal();
+      const Vec2 inward{up.dot(x_axis), up.dot(y_axis)};
+      if (!(inward.norm() > kLeastSlope)) continue;
+      clip(flat, -side * level.distance_m(origin) * inward / inward.squaredNorm(), inward.normalized());
+    }
+  }
+  if (flat.size() >= 3) reduce(flat, kMaxPolygonVertices, 1e-6);
+  const double area_m2 = flat.size() >= 3 ? 0.5 * twice_area(flat) : 0.0;
+  if (!(area_m2 > 1e-4)) return false;
+
+  patch = SurfacePatch{};
+  patch.kind = own.kind;
+  patch.plane = own.same;
+  patch.covariance = own.covariance;
+  patch.normal = n;
+  patch.d_m = plane.d_m();
+  patch.area_m2 = area_m2;
+  patch.centroid_m = to_space(centroid(flat));
+  patch.rmse_m = math::sqrt(own.residual2 / std::max(own.moments.count, 1.0));
+  patch.offset_sigma_m = plane_sigma_m(plane, own.covariance, patch.centroid_m / patch.centroid_m.z());
+  const Mat3 across = Mat3::Identity() - n * n.transpose();
+  patch.tilt_sigma_rad = patch.d_m * math::sqrt(std::max((across * own.covariance * across).trace(), 0.0));
+  patch.nosing = lines.nosing;
+  patch.back = lines.back;
+  // An edge on a nosing or back line is observed if the line was seen along most of it.
+  const auto seen_on = [&](const EdgeLine& line, const Vec2& a, const Vec2& b) {
+    if (!line.valid) return false;
+    const Vec2 p = to_plane(line.a_m), q = to_plane(line.b_m);
+    const Vec2 along = (q - p) / std::max((q - p).norm(), 1e-9), normal{-along.y(), along.x()};
+    if (std::abs(normal.dot(a - p)) > kOnLine_m || std::abs(normal.dot(b - p)) > kOnLine_m) return false;
+    const double from = std::min(along.dot(a - p), along.dot(b - p)), to = std::max(along.dot(a - p), along.dot(b - p));
+    return 2.0 * (std::min(to, (q - p).norm()) - std::max(from, 0.0)) > to - from;
+  };
+  SeenPolygon seen;
+  for (const Vec2& p : flat) {
+    static_cast<void>(patch.polygon.try_push_back(to_space(p)));
+    static_cast<void>(seen.try_push_back(project(picture.rays, patch.polygon.back())));
+  }
+  const Vec2 inside = project(picture.rays, patch.centroid_m);
+  for (std::size_t i = 0; i < flat.size(); ++i) {
+    const std::size_t next = i + 1 < flat.size() ? i + 1 : 0;
+    const bool on_line = seen_on(lines.nosing, flat[i], flat[next]) || seen_on(lines.back, flat[i], flat[next]);
+    patch.edges[i] = on_line ? EdgeKind::kObserved : judge_edge(picture, plane, seen[i], seen[next], inside);
+  }
+  patch.invalid_fraction = invalid_share(picture, seen);
+  return true;
+}
+
+}  // namespace polygmap

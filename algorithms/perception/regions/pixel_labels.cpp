@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/regions/pixel_labels.hpp"
+
+#include <limits>
+
+namespace polygmap {
+namespace {
+
+constexpr double kSteepest = 2.0;  // rows per pixel that a boundary may climb
+constexpr std::int32_t kReach_px = kColumn_px;
+constexpr double kRounded_px = 0.51;   // between a boundary and the row it was rounded to
+constexpr double kParallel_px = 16.0;  // a boundary this near to where its planes meet runs along with that line
+constexpr double kNosing_px = 4.0;     // a boundary this near to a nosing is that nosing
+
+// Where a line crosses a column of pixels; not a number beyond its ends.
+double row_of(const CameraIntrinsics& k, const EdgeLine& line, std::int32_t column) noexcept {
+  const auto project = [&k](const Vec3& p_m) {
+    return Vec2{k.cx_px + k.fx_px * p_m.x() / p_m.z(), k.cy_px + k.fy_px * p_m.y() / p_m.z()};
+  };
+  const Vec2 a = project(line.a_m), b = project(line.b_m);
+  const double share = (column - a.x()) / (b.x() - a.x());
+  if (!line.valid || !(share >= 0.0 && share <= 1.0)) return std::numeric_limits<double>::quiet_NaN();
+  return a.y() + share * (b.y() - a.y());
+}
+
+// Whether a row belongs to the upper of two planes. last_upper: where it ends in the middle of the column of eight
+// pixels, off_px to the left.
+bool is_upper(const CameraIntrinsics& k, const InversePlane& upper, const InversePlane& lower, double middle_px,
+              double off_px, std::int32_t last_upper, std::int32_t row) noexcept {
+  // The planes meet where d . ray = 0.
+  const Vec3 d = lower.m - upper.m;
+  const double slope = -d.x() / d.y() * k.fy_px / k.fx_px;  // rows per pixel
+  const double meeting = k.cy_px - (d.x() * (middle_px - k.cx_px) / k.fx_px + d.z()) / d.y() * k.fy_px;
+  const double rounded = last_upper + 0.5, apart_px = std::abs(meeting - rounded);
+  if (!(std::abs(slope) <= kSteepest) || !(apart_px < kParallel_px)) return row <= last_upper;
+  return row < (apart_px < kRounded_px ? meeting : rounded) + slope * off_px;
+}
+
+// Of a plane, in standard deviations; more than kOff where nothing is measured.
+constexpr double kOff = 3.0;
+double residual(const FrameImage& picture, const RawImage& raw, const DepthNoiseModel& noise, const InversePlane& plane,
+                std::int32_t column, std::int32_t row) noexcept {
+  const std::uint16_t depth = raw.row(row)[column];
+  if (!raw.range.valid(depth) || picture.body(column / 2, row / 2)) return 2.0 * kOff;
+  const CameraIntrinsics& k = raw.intrinsics;
+  const double w = 1.0 / (depth * k.depth_unit_m);
+  const Vec3 ray{(column - k.cx_px) / k.fx_px, (row - k.cy_px) / k.fy_px, 1.0};
+  return std::abs(w - plane.inverse_depth(ray)) * w / (plane.m.norm() * noise.inverse_sigma(w));
+}
+
+// A column without an owner may be one in which two things are seen: its pixels up to where they leave the surface that
+// the column beside it shows are that surface's.
+std::size_t owner_beside(const FrameImage& picture, const RawImage& raw, const DepthNoiseModel& noise,
+                         const PlaneSet& planes, std::int32_t column, std::int32_t row) noexcept {
+  const std::int32_t g = column / kColumn_px, columns = picture.column_rays.columns;
+  std::size_t best = 0;
+  double least = kOff;
+  for (const std::int32_t side : {-1, 1}) {
+    if (g + side < 0 || g + side >= columns) continue;
+    const std::size_t p = picture.owner(g + side, row);
+    if (p == 0 || p == best) continue;
+    bool ends_here = false;  // the column itself says in which of its rows the surface ends
+    for (std::int32_t k = 1; k <= kReach_px && !ends_here; ++k) {
+      ends_here = picture.owner(g, std::max(row - k, 0)) == p ||
+                  picture.owner(g, std::min(row + k, picture.column_rays.height_px - 1)) == p;
+    }
+    if (ends_here) continue;
+    const std::int32_t nearest = side < 0 ? kColumn_px * g : kColumn_px * g + kColumn_px - 1;
+    std::int32_t off = 0;
+    for (std::int32_t c = nearest; c != column && off < 2; c -= side) {
+      off += residual(picture, raw, noise, planes[p].plane, c, row) < kOff ? 0 : 1;
+    }
+    const double own = residual(picture, raw, noise, planes[p].plane, column, row);
+    if (off >= 2 || !(own < least)) continue;
+    least = own;
+    best = p;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::size_t pixel_label(const FrameImage& picture, const RawImage& raw, const DepthNoiseModel& noise,
+                        const PlaneSet& planes, std::int32_t column, std::int32_t row) noexcept {
+  const std::int32_t g = column / kColumn_px;
+  const double middle_px = kColumn_px * g + 0.5 * (kColumn_px - 1);
+  const std::size_t own = picture.owner(g, row);
+  if (own == 0) return raw.depth != nullptr ? owner_beside(picture, raw, noise, planes, column, row) : 0;
+  for (std::int32_t k = 1; k <= kReach_px; ++k) {
+    for (const std::int32_t side : {k, -k}) {
+      if (row + side < 0 || row + side >= picture.column_rays.height_px) continue;
+      const std::size_t other = picture.owner(g, row + side);
+      if (other == own) continue;
+      if (other == 0) return own;
+      const bool below = side > 0;
+      const FramePlane &upper = planes[below ? own : other], &lower = planes[below ? other : own];
+      const std::int32_t last_upper = below ? row + side - 1 : row + side;
+      // A nosing knows more than where two planes meet: what its own rows say, too.
+      const double nosing = lower.kind == SurfaceKind::kRiser ? row_of(raw.intrinsics, upper.nosing, column)
+                                                              : std::numeric_limits<double>::quiet_NaN();
+      const bool of_upper =
+          std::abs(nosing - (last_upper + 0.5)) < kNosing_px
+              ? row < nosing
+              : is_upper(raw.intrinsics, upper.plane, lower.plane, middle_px, column - middle_px, last_upper, row);
+      return of_upper == below ? own : other;
+    }
+  }
+  return own;
+}
+
+}  // namespace polygmap

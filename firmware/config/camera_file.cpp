@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "firmware/config/camera_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <iomanip>
+#include <limits>
+#include <sstream>
+#include <string_view>
+#define TOML_EXCEPTIONS 0
+#include <toml++/toml.h>
+
+namespace polygmap::config {
+namespace {
+
+// What a camera file may say: beyond these bounds the plane extraction refuses, or what it makes means nothing.
+struct Key {
+  std::string_view name;
+  double least, most;
+  double otherwise;  // NaN: required
+};
+constexpr double kRequired = std::numeric_limits<double>::quiet_NaN();
+constexpr DepthNoiseModel kNoise;
+constexpr Key kWidth{"width", kLeastSide_px, kMaxWidth_px, kRequired};
+constexpr Key kHeight{"height", kLeastSide_px, kMaxHeight_px, kRequired};
+constexpr Key kFx{"fx", 1.0, 1e5, kRequired};
+constexpr Key kFy{"fy", 1.0, 1e5, kRequired};
+constexpr Key kCx{"cx", -1e5, 1e5, kRequired};
+constexpr Key kCy{"cy", -1e5, 1e5, kRequired};
+constexpr Key kDepthUnit{"depth_unit_m", 1e-6, 0.1, kRequired};
+constexpr Key kMinDepth{"min_depth_m", 0.001, 1000.0, 0.2};
+constexpr Key kMaxDepth{"max_depth_m", 0.001, 1000.0, 6.0};
+constexpr Key kNoiseBase{"noise_base_m", 1e-6, 1.0, kNoise.base_m};
+constexpr Key kNoisePerMetre{"noise_per_metre", 0.0, 1.0, kNoise.per_metre};
+constexpr Key kNoiseQuadratic{"noise_quadratic_per_m", 0.0, 1.0, kNoise.quadratic_per_m};
+constexpr Key kCorrelatedShare{"noise_correlated_share", 0.0, 1.0, kNoise.correlated_share};
+constexpr Key kCorrelated{"noise_correlated_px", 1.0, 1e6, kNoise.correlated_px};
+constexpr std::array kKeys{kWidth,
+                           kHeight,
+                           kFx,
+                           kFy,
+                           kCx,
+                           kCy,
+                           kDepthUnit,
+                           kMinDepth,
+                           kMaxDepth,
+                           kNoiseBase,
+                           kNoisePerMetre,
+                           kNoiseQuadratic,
+                           kCorrelatedShare,
+                           kCorrelated};
+
+std::string text(double number) {
+  std::ostringstream out;
+  out << std::setprecision(10) << number;
+  return out.str();
+}
+
+class CameraFile {
+ public:
+  explicit CameraFile(const std::string& path) : path_(path), parsed_(toml::parse_file(path)) {
+    std::error_code none;
+    if (std::filesystem::is_directory(path, none)) fail("it is a folder");
+    if (!parsed_) {
+      throw FileError("Cannot read the camera file \"" + path + "\": " + std::string(parsed_.error().description()) +
+                      ".");
+    }
+    for (const auto& entry : parsed_.table()) {
+      const std::string_view name = entry.first.str();
+      if (std::none_of(kKeys.begin(), kKeys.end(), [name](const Key& key) { return key.name == name; })) {
+        fail("\"" + std::string(name) + "\" is no key of a camera");
+      }
+    }
+  }
+  [[noreturn]] void fail(const std::string& what) const {
+    throw FileError("Camera file \"" + path_ + "\": " + what + ".");
+  }
+  [[nodiscard]] double number(const Key& key) const {
+    const std::string name(key.name);
+    const toml::node* node = parsed_.table().get(key.name);
+    if (node == nullptr && std::isnan(key.otherwise)) fail(name + " is missing");
+    if (node != nullptr && !node->is_number()) fail(name + " must be a number");
+    const double value = node == nullptr ? key.otherwise : *node->value<double>();
+    if (!(value >= key.least && value <= key.most)) {
+      fail(name + " must be from " + text(key.least) + " to " + text(key.most) + ", not " + text(value));
+    }
+    return value;
+  }
+  [[nodiscard]] std::int32_t whole(const Key& key) const {
+    const double value = number(key);
+    if (value != std::floor(value)) fail(std::string(key.name) + " must be a whole number, not " + text(value));
+    return static_cast<std::int32_t>(value);
+  }
+
+ private:
+  std::string path_;
+  toml::parse_result parsed_;
+};
+
+}  // namespace
+
+CameraProfile read_camera(const std::string& path) {
+  const CameraFile file(path);
+  CameraProfile camera;
+  camera.intrinsics = {file.whole(kWidth), file.whole(kHeight), file.number(kFx),       file.number(kFy),
+                       file.number(kCx),   file.number(kCy),    file.number(kDepthUnit)};
+  camera.min_depth_m = file.number(kMinDepth);
+  camera.max_depth_m = file.number(kMaxDepth);
+  camera.noise = {file.number(kNoiseBase), file.number(kNoisePerMetre), file.number(kNoiseQuadratic),
+                  file.number(kCorrelatedShare), file.number(kCorrelated)};
+  if (!(camera.min_depth_m < camera.max_depth_m)) {
+    file.fail("min_depth_m, " + text(camera.min_depth_m) + ", must be less than max_depth_m, " +
+              text(camera.max_depth_m));
+  }
+  if (const double most_m = 65534.0 * camera.intrinsics.depth_unit_m; camera.min_depth_m > most_m) {
+    file.fail("16 bits of depth_unit_m reach " + text(most_m) + " m, less than min_depth_m");
+  }
+  return camera;
+}
+
+}  // namespace polygmap::config

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/camera/depth_camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace polygmap::sim {
+namespace {
+
+std::vector<SolidBox> rendered_solids(const StairWorld& world, const DepthCameraOptions& options) {
+  std::vector<SolidBox> solids;
+  for (SolidBox solid : stair_solids(world)) {
+    if (solid.step == options.missing_step) continue;
+    solid.min_m += options.stairs_shift_m;
+    solid.max_m += options.stairs_shift_m;
+    solids.push_back(solid);
+  }
+  return solids;
+}
+
+}  // namespace
+
+SimDepthCamera::SimDepthCamera(const DepthCameraOptions& options, const CameraNoise::Params& noise,
+                               const CameraIntrinsics& intrinsics, const Transform& base_T_camera,
+                               const StairWorld& world, std::uint64_t seed)
+    : options_(options),
+      half_scan_ticks_(std::llround(0.5 * options.scan_s / seconds(VirtualClock::kTick_ns))),
+      base_T_camera_(base_T_camera),
+      solids_(rendered_solids(world, options)),
+      renderer_(intrinsics),
+      noise_(noise, intrinsics, seed) {
+  const CameraIntrinsics& k = renderer_.intrinsics();
+  for (Slot& slot : slots_)
+    slot.depth.resize(static_cast<std::size_t>(k.width_px) * static_cast<std::size_t>(k.height_px));
+}
+
+SimDepthCamera::~SimDepthCamera() {
+  if (rendering_.valid()) rendering_.wait();
+}
+
+void SimDepthCamera::tick(std::int64_t tick, const Transform& true_T_base,
+                          const std::array<LegShapes, kFootCount>& base_legs) {
+  Slot* due = oldest(SlotState::kExposed);
+  if (due != nullptr && tick >= due->arrival_tick) {
+    if (rendering_.valid()) rendering_.get();
+    due->state = SlotState::kArrived;
+  }
+  past_.push_back({true_T_base * base_T_camera_, solids_, base_legs, base_T_camera_, options_.legs_visible});
+  if (past_.size() > static_cast<std::size_t>(2 * half_scan_ticks_ + 1)) past_.pop_front();
+  if (tick >= exposure_tick(next_frame_) + half_scan_ticks_) expose();
+}
+
+void SimDepthCamera::expose() {
+  const std::int64_t frame = next_frame_++, tick = exposure_tick(frame);
+  const std::int64_t stamp_ns = VirtualClock::stamp_ns(tick);
+  if (any_contains(options_.silent, stamp_ns)) return;
+  Slot& slot = free_slot();
+  slot.state = SlotState::kExposed;
+  slot.stamp_ns = stamp_ns;
+  slot.arrival_tick = tick + kLatency_ticks;
+  slot.sequence = static_cast<std::uint32_t>(frame);
+  std::uint16_t* depth = slot.depth.data();
+  if (any_contains(options_.blank, stamp_ns)) {
+    std::fill(slot.depth.begin(), slot.depth.end(), std::uint16_t{0});
+    return;
+  }
+  const double time_s = seconds(stamp_ns - VirtualClock::kStart_ns);
+  const auto render = [this, first = past_.front(), last = past_.back(), frame, time_s, depth] {
+    renderer_.render(first, last);
+    noise_.apply(renderer_, static_cast<std::uint64_t>(frame), time_s, depth);
+  };
+  if (options_.threaded) {
+    rendering_ = std::async(std::launch::async, render);
+  } else {
+    render();
+  }
+}
+
+SimDepthCamera::Slot& SimDepthCamera::free_slot() {
+  Slot* slot = oldest(SlotState::kFree);
+  if (slot == nullptr) {  // nobody fetches frames: the oldest one that waits is lost, as in a driver
+    slot = oldest(SlotState::kArrived);
+    ++overwritten_;
+  }
+  return *slot;
+}
+
+SimDepthCamera::Slot* SimDepthCamera::oldest(SlotState state) noexcept {
+  Slot* found = nullptr;
+  for (Slot& slot : slots_) {
+    if (slot.state == state && (found == nullptr || slot.stamp_ns < found->stamp_ns)) found = &slot;
+  }
+  return found;
+}
+
+bool SimDepthCamera::try_acquire(DepthFrameView& frame) noexcept {
+  if (oldest(SlotState::kHeld) != nullptr) return false;
+  Slot* slot = oldest(SlotState::kArrived);
+  if (slot == nullptr) return false;
+  slot->state = SlotState::kHeld;
+  const CameraIntrinsics& k = intrinsics();
+  frame = {slot->stamp_ns, slot->sequence, k.width_px, k.height_px, slot->depth.data()};
+  return true;
+}
+
+void SimDepthCamera::release() noexcept {
+  if (Slot* slot = oldest(SlotState::kHeld)) slot->state = SlotState::kFree;
+}
+
+}  // namespace polygmap::sim

@@ -1,0 +1,361 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/cli/climb_command.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <ostream>
+
+#include "sim_stub/host/cli/estimate_command.hpp"
+#include "sim_stub/host/cli/perceive_command.hpp"
+#include "sim_stub/sensors/virtual_clock.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+constexpr double kMaxLength_m = 2.0;
+constexpr double kMinStep_m = 0.01;  // rise or tread
+constexpr int kMaxSteps = 200;
+constexpr double kTimeLimit_s = 60.0;        // simulated: walking up and ending, ...
+constexpr double kTimeLimitPerStep_s = 6.0;  // ... and nearly twice what a step may take
+constexpr double kFirstPush_s = seconds(VirtualClock::kStart_ns), kLastPush_s = 1000.0, kHardestPush_ns = 100.0;
+constexpr double kQuietPeriod_s = 5.0;  // simulated, between progress lines of a log
+
+struct ClimbArguments {
+  ClimbOptions options;
+  std::string noise = "white";
+  std::string plant = name_of(ClimbOptions{}.plant);
+  std::string gait = "ds";
+  std::string contacts = "sensed";
+  std::vector<double> render_shift_m;
+  std::optional<int> missing_step;  // 1-based as people count
+  bool no_self_filter = false;
+  bool no_mount_estimate = false;
+  std::string camera;
+  std::vector<std::string> pushes;
+};
+
+// CLI11 2.1 lets -1 and 2^64 wrap around.
+std::string whole_number(const std::string& text) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool good = error == std::errc{} && end == text.data() + text.size();
+  return good ? "" : "must be a whole number from 0 to 2^64 - 1, not " + text;
+}
+
+// CLI11 2.1 takes an empty word for the number 0.
+std::string not_empty(const std::string& text) { return text.empty() ? "must not be empty" : ""; }
+
+void declare(CLI::App& climb, ClimbArguments& a) {
+  StairParams& stairs = a.options.stairs;
+  climb.add_option("--steps", stairs.steps, "Number of steps; the last one is the landing")->capture_default_str();
+  climb.add_option("--rise", stairs.rise_m, "Rise of a step, m")->capture_default_str();
+  climb.add_option("--tread", stairs.tread_m, "Depth of a tread, m")->capture_default_str();
+  climb.add_option("--width", stairs.width_m, "Width of the staircase, m")->capture_default_str();
+  climb.add_option("--nosing", stairs.nosing_m, "Overhang of a tread over its riser, m")->capture_default_str();
+  climb.add_option("--landing", stairs.landing_m, "Depth of the landing, m")->capture_default_str();
+  climb.add_option("--jitter", stairs.jitter_m, "Rise and tread of each step differ by up to this much, m")
+      ->capture_default_str();
+  climb
+      .add_option("--plant", a.plant,
+                  "mujoco: under physics, it balances or falls; kinematic: follows and never tips over, quicker")
+      ->capture_default_str();
+  climb.add_option("--gait", a.gait, "ds: both feet on every tread; ss: one foot on every tread, both on the last")
+      ->capture_default_str();
+  climb.add_option("--seed", a.options.seed, "Draws the start, the steps' jitter, the robot's errors and all noise")
+      ->check(whole_number)
+      ->capture_default_str();
+  climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
+  climb
+      .add_option("--contacts", a.contacts,
+                  "Foot forces: sensed, or, on the kinematic plant, inferred from joint torques")
+      ->capture_default_str();
+  climb
+      .add_option("--push", a.pushes,
+                  "Pushes of the torso, over 0.1 s: when, s; along x (up the stairs) or y (to the left); how much, N s")
+      ->expected(1, 16)
+      ->type_name("\"T,AXIS,NS\"");
+  climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
+
+  climb.add_option("--camera", a.camera, "The robot's camera, 640x480 at most; the module is told what the file says")
+      ->type_name("CAMERA.toml");
+  climb
+      .add_option("--scan-ms", a.options.scan_ms,
+                  "Time from a picture's first row to its last, ms; the nearest of 0, 4, 8 ... is simulated")
+      ->capture_default_str();
+  climb
+      .add_option("--mount-error", a.options.mount_error_deg,
+                  "How far the camera's mount may be off, unknown to the module: degrees about each axis, and 3 mm for "
+                  "each degree")
+      ->capture_default_str();
+  climb
+      .add_option("--scale-error", a.options.scale_error,
+                  "How far the depths' scale may be off, unknown to the module: share of the depth")
+      ->capture_default_str();
+
+  // What the camera shows may differ from what the robot stands on: shows that the module lives on what it sees.
+  const std::string causality = "causality (experiments on what the module sees)";
+  climb.add_option("--render-shift", a.render_shift_m, "Shift of the rendered staircase, m")
+      ->expected(3)
+      ->type_name("X Y Z")
+      ->group(causality);
+  climb.add_option("--render-missing-step", a.missing_step, "Leave step K (1 is the lowest) out of the picture")
+      ->type_name("K")
+      ->group(causality);
+  climb.add_flag("--blank-depth", a.options.blank_depth, "The camera delivers no depth")->group(causality);
+  climb.add_flag("--no-mount-estimate", a.no_mount_estimate, "The module believes the mount's data sheet")
+      ->group(causality);
+  climb.add_flag("--no-self-filter", a.no_self_filter, "The module does not mask its own legs")->group(causality);
+}
+
+std::string number(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%g", value);
+  return buffer;
+}
+
+// As in "12.5,x,10"; nothing when it is no push.
+std::optional<Push> read_push(const std::string& text) {
+  Push push;
+  char axis = 0;
+  int end = 0;
+  if (std::sscanf(text.c_str(), "%lf,%c,%lf%n", &push.at_s, &axis, &push.impulse_ns, &end) != 3) return {};
+  if (end != static_cast<int>(text.size()) || (axis != 'x' && axis != 'y')) return {};
+  if (!(push.at_s >= kFirstPush_s && push.at_s <= kLastPush_s && std::abs(push.impulse_ns) <= kHardestPush_ns)) {
+    return {};
+  }
+  push.axis = axis == 'x' ? 0 : 1;
+  return push;
+}
+
+// Empty when the arguments are good, else one sentence. Completes the options.
+std::string complaint(ClimbArguments& a) {
+  const StairParams& stairs = a.options.stairs;
+  if (stairs.steps < 1 || stairs.steps > kMaxSteps) {
+    return "--steps must be from 1 to " + std::to_string(kMaxSteps) + ", not " + std::to_string(stairs.steps) + ".";
+  }
+  struct Length {
+    const char* name;
+    double value_m;
+    double min_m;
+  };
+  for (const Length& length :
+       {Length{"--rise", stairs.rise_m, kMinStep_m}, Length{"--tread", stairs.tread_m, kMinStep_m},
+        Length{"--width", stairs.width_m, kMinStep_m}, Length{"--nosing", stairs.nosing_m, 0.0},
+        Length{"--landing", stairs.landing_m, kMinStep_m}}) {
+    if (!(length.value_m >= length.min_m && length.value_m <= kMaxLength_m)) {
+      return std::string(length.name) + " must be from " + number(length.min_m) + " to " + number(kMaxLength_m) +
+             " m, not " + number(length.value_m) + ".";
+    }
+  }
+  const double most_jitter_m = 0.5 * std::min(stairs.rise_m, stairs.tread_m);
+  if (!(stairs.jitter_m >= 0.0 && stairs.jitter_m <= most_jitter_m)) {
+    return "--jitter must be from 0 to half of rise and tread, " + number(most_jitter_m) + " m, not " +
+           number(stairs.jitter_m) + ".";
+  }
+  const double shortest_tread_m = stairs.tread_m - stairs.jitter_m;
+  if (!(stairs.nosing_m < shortest_tread_m)) {
+    return "--nosing must be shorter than the shortest tread, " + number(shortest_tread_m) + " m, not " +
+           number(stairs.nosing_m) + ".";
+  }
+  if (a.gait != "ds" && a.gait != "ss") return "--gait must be ds or ss, not \"" + a.gait + "\".";
+  a.options.gait = a.gait == "ss" ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
+  if (a.plant != "kinematic" && a.plant != "mujoco") {
+    return "--plant must be kinematic or mujoco, not \"" + a.plant + "\".";
+  }
+  a.options.plant = a.plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kKinematic;
+  if (!a.pushes.empty() && a.options.plant != PlantKind::kMujoco) {
+    return "--push needs --plant mujoco: forces do not move the kinematic plant.";
+  }
+  for (const std::string& text : a.pushes) {
+    const std::optional<Push> push = read_push(text);
+    if (!push) {
+      return "--push must be a time from " + number(kFirstPush_s) + " to " + number(kLastPush_s) +
+             " s, x or y and up to " + number(kHardestPush_ns) + " N s, as in 12.5,x,10, not \"" + text + "\".";
+    }
+    a.options.pushes.push_back(*push);
+  }
+  if (a.noise != "white" && a.noise != "correlated") {
+    return "--noise must be white or correlated, not \"" + a.noise + "\".";
+  }
+  a.options.noise = a.noise == "white" ? NoiseKind::kWhite : NoiseKind::kCorrelated;
+
+  if (a.contacts != "sensed" && a.contacts != "inferred") {
+    return "--contacts must be sensed or inferred, not \"" + a.contacts + "\".";
+  }
+  a.options.infer_contacts = a.contacts == "inferred";
+  if (a.options.infer_contacts && a.options.plant != PlantKind::kKinematic) {
+    return "--contacts inferred needs --plant kinematic: under physics a leg that swings feigns a touch-down.";
+  }
+
+  struct Error {
+    const char* name;
+    double value, most;
+    const char* unit;
+  };
+  for (const Error& error : {Error{"--scan-ms", a.options.scan_ms, 32.0, " ms"},
+                             Error{"--mount-error", a.options.mount_error_deg, 5.0, " degrees"},
+                             Error{"--scale-error", a.options.scale_error, 0.05, ""}}) {
+    if (!(error.value >= 0.0 && error.value <= error.most)) {
+      return std::string(error.name) + " must be from 0 to " + number(error.most) + error.unit + ", not " +
+             number(error.value) + ".";
+    }
+  }
+  if (!a.camera.empty()) {
+    try {
+      a.options.camera = config::read_camera(a.camera);
+      a.options.camera_file = a.camera;
+    } catch (const config::FileError& error) {
+      return error.what();
+    }
+    const CameraIntrinsics& k = a.options.camera->intrinsics;
+    if (k.width_px > kDepthWidth_px || k.height_px > kDepthHeight_px || k.width_px % 2 != 0 || k.height_px % 2 != 0) {
+      return "Camera file \"" + a.camera + "\": the robot's camera is at most " + std::to_string(kDepthWidth_px) + "x" +
+             std::to_string(kDepthHeight_px) + ", width and height even, not " + std::to_string(k.width_px) + "x" +
+             std::to_string(k.height_px) + ".";
+    }
+  }
+  if (a.missing_step) {
+    if (*a.missing_step < 1 || *a.missing_step > stairs.steps) {
+      return "--render-missing-step must be a step from 1 to " + std::to_string(stairs.steps) + ", not " +
+             std::to_string(*a.missing_step) + ".";
+    }
+    a.options.render_missing_step = *a.missing_step - 1;
+  }
+  if (!a.render_shift_m.empty()) {
+    for (const double shift_m : a.render_shift_m) {
+      if (!(std::abs(shift_m) <= kMaxLength_m)) {
+        return "--render-shift must be three lengths within +-" + number(kMaxLength_m) + " m, not " + number(shift_m) +
+               ".";
+      }
+    }
+    a.options.render_dx_m = a.render_shift_m[0];
+    a.options.render_dy_m = a.render_shift_m[1];
+    a.options.render_dz_m = a.render_shift_m[2];
+  }
+  a.options.self_filter = !a.no_self_filter;
+  a.options.estimate_mount = !a.no_mount_estimate;
+  a.options.time_limit_s = std::max(a.options.time_limit_s, kTimeLimit_s + kTimeLimitPerStep_s * stairs.steps);
+  return {};
+}
+
+// Makes the directory and tries to write into it before a minute of climbing is spent.
+std::string output_complaint(const std::string& directory) {
+  namespace fs = std::filesystem;
+  if (directory.empty()) return "--out must name a directory.";
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (!fs::is_directory(directory, error)) return "Cannot create the directory \"" + directory + "\" given by --out.";
+  const fs::path probe = fs::path(directory) / ".polygmap_probe";
+  std::ofstream file(probe);
+  file << "x";
+  file.close();
+  const bool written = static_cast<bool>(file);
+  fs::remove(probe, error);
+  if (!written) return "Cannot write into the directory \"" + directory + "\" given by --out.";
+  return {};
+}
+
+class ProgressLine {
+ public:
+  ProgressLine(std::ostream& out, int steps, bool live) : out_(out), steps_(steps), live_(live) {}
+
+  void show(const ClimbProgress& p) {
+    if (!live_ && p.time_s < next_s_) return;
+    next_s_ = p.time_s + kQuietPeriod_s;
+    char line[160];
+    std::snprintf(line, sizeof line, "%6.1f s  step %d of %d  %-16s worst row %s %.0f us", p.time_s, p.treads_climbed,
+                  steps_, p.phase, p.worst_row, p.worst_row_us);
+    out_ << (live_ ? "\r" : "") << line << (live_ ? "\x1b[K" : "\n") << std::flush;
+    shown_ = true;
+  }
+  void end() {
+    if (live_ && shown_) out_ << "\n";
+  }
+
+ private:
+  std::ostream& out_;
+  int steps_;
+  bool live_;
+  bool shown_ = false;
+  double next_s_ = 0.0;
+};
+
+}  // namespace
+
+int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& run, std::ostream& out,
+                  std::ostream& err, bool live) {
+  CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
+  app.require_subcommand(0, 1);
+  app.footer("Exit codes: 0 pass or done, 1 the climb failed, 2 a bad argument, file or output.");
+  CLI::App* climb = app.add_subcommand(
+      "climb", "Climb a simulated staircase; writes summary.json and climb.svg, exit code 0 only on pass");
+  ClimbArguments a;
+  a.options.out_dir = "climb_out";
+  declare(*climb, a);
+  PerceiveArguments perceive_arguments;
+  CLI::App* perceive = declare_perceive(app, perceive_arguments);
+  EstimateArguments estimate_arguments;
+  CLI::App* estimate = declare_estimate(app, estimate_arguments);
+  for (CLI::App* command : {climb, perceive, estimate}) {
+    for (CLI::Option* option : command->get_options()) option->check(not_empty);
+  }
+
+  try {
+    std::vector<std::string> last_first(arguments.rbegin(), arguments.rend());  // as CLI11 wants them
+    for (std::string& word : last_first) {                                      // and -.9 is an option to it
+      if (word.size() > 2 && word[0] == '-' && word[1] == '.' && word[2] >= '0' && word[2] <= '9') word.insert(1, "0");
+    }
+    app.parse(std::move(last_first));
+  } catch (const CLI::Success& success) {
+    return app.exit(success, out, err);
+  } catch (const CLI::ParseError& error) {
+    constexpr std::array<std::string_view, 3> kCommands{"climb", "perceive", "estimate"};
+    const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
+    err << "polygmap: " << error.what() << "; see polygmap " << (named ? arguments[0] + " " : "") << "--help.\n";
+    return kExitUsage;
+  }
+  if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);
+  if (estimate->parsed()) return run_estimate(estimate_arguments, out, err);
+  if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
+    err << "polygmap: A subcommand is required; see polygmap --help.\n";
+    return kExitUsage;
+  }
+  std::string sentence = complaint(a);
+  if (sentence.empty()) sentence = output_complaint(a.options.out_dir);
+  if (!sentence.empty()) {
+    err << "polygmap: " << sentence << "\n";
+    return kExitUsage;
+  }
+
+  ProgressLine progress(out, a.options.stairs.steps, live);
+  ClimbSummary summary;
+  std::string not_written;
+  try {
+    summary = run(a.options, [&progress](const ClimbProgress& p) { progress.show(p); });
+  } catch (const ClimbNotWritten& error) {
+    summary = error.summary;
+    not_written = error.what();
+  } catch (const std::exception& error) {  // no memory, no thread for the camera
+    progress.end();
+    err << "polygmap: " << error.what() << "\n";
+    return kExitUsage;
+  }
+  progress.end();
+  out << verdict_line(summary) << "\n" << std::flush;
+  if (!out && not_written.empty()) not_written = "Cannot write the verdict to the standard output.";
+  if (!not_written.empty()) {
+    err << "polygmap: " << not_written << "\n";
+    return kExitUsage;
+  }
+  return summary.pass ? kExitPass : kExitFail;
+}
+
+}  // namespace polygmap::sim

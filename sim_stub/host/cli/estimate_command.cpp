@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/cli/estimate_command.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+#include <ostream>
+#include <set>
+
+#include "firmware/config/camera_file.hpp"
+#include "sim_stub/host/cli/climb_command.hpp"
+#include "sim_stub/host/cli/paths.hpp"
+#include "sim_stub/host/estimate/estimate_report.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+constexpr double kMaxMount_m = 10.0, kMaxAngle_deg = 360.0, kMaxTau_s = 1000.0;
+
+std::string complaint(const EstimateArguments& a) {
+  std::set<std::string> taken;  // nothing that is read, and nothing written for another option, is overwritten
+  for (const std::string& file : {a.log, a.lio, a.json, a.csv}) {
+    if (file.empty()) continue;
+    const bool fresh = taken.insert(one_name(file)).second;
+    if (!fresh && (file == a.json || file == a.csv)) return "\"" + file + "\" would be overwritten.";
+  }
+  for (std::size_t i = 0; i < a.lidar_mount.size(); ++i) {
+    const double limit = i < 3 ? kMaxMount_m : kMaxAngle_deg;
+    if (!(std::abs(a.lidar_mount[i]) <= limit)) {
+      return "--lidar-mount takes three lengths within 10 m and three angles within 360 degrees.";
+    }
+  }
+  if (!a.lidar_mount.empty() && a.lio.empty()) return "--lidar-mount is of no use without --lio.";
+  if (a.lio_tau_s != 0.0 && a.lio.empty()) return "--lio-tau is of no use without --lio.";
+  if (!(a.lio_tau_s >= 0.0 && a.lio_tau_s <= kMaxTau_s)) return "--lio-tau must be from 0 to 1000 s.";
+  return {};
+}
+
+ReplayOptions options_of(const EstimateArguments& a) {
+  ReplayOptions options;
+  if (a.lio_tau_s > 0.0) {
+    options.odometry.fusion.tau_s = a.lio_tau_s;
+    options.odometry.fusion.tau_spm = 0.0;
+  }
+  if (!a.lidar_mount.empty()) {
+    const auto rad = [&a](std::size_t i) { return a.lidar_mount[i] * kPi / 180.0; };
+    options.odometry.fusion.base_T_lidar = {rotation_zyx(rad(5), rad(4), rad(3)),
+                                            Vec3{a.lidar_mount[0], a.lidar_mount[1], a.lidar_mount[2]}};
+  }
+  return options;
+}
+
+// What a user must know before trusting the rest.
+void print_lio(const Replay& replay, std::size_t poses, std::ostream& out) {
+  const auto count = [&replay](LioVerdict verdict) { return replay.lio[static_cast<std::size_t>(verdict)]; };
+  const ReplayTick& last = replay.ticks.back();
+  out << "LIO: " << count(LioVerdict::kAccepted) + count(LioVerdict::kRealigned) << " of " << poses
+      << " poses accepted; " << count(LioVerdict::kJump) << " too far from the odometry, " << count(LioVerdict::kTooOld)
+      << " too old, " << count(LioVerdict::kFuture) << " of the future, " << replay.lio_not_arrived << " not arrived";
+  if (last.lio_age_ns >= 0) out << "; the last one is " << 1e-9 * static_cast<double>(last.lio_age_ns) << " s old";
+  out << "\n";
+}
+
+void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
+  char line[224];
+  std::snprintf(line, sizeof line, "%zu rows, %.3f s; start: %s; feet's noise %.2f mm\n", log.rows.size(),
+                seconds(log.rows.back().stamp_ns), name_of(replay.start), 1e3 * replay.foot_position_sigma_m);
+  out << line;
+  if (replay.rows_without_contact == log.rows.size()) {
+    out << "No foot ever stands (contact of 0.5 or more): this is dead reckoning by the IMU alone.\n";
+  }
+  if (replay.imu_invalid > 0) {
+    out << replay.imu_invalid
+        << " rows have an IMU beyond what can be true and were left out: are its units rad/s and m/s^2?\n";
+  }
+  if (!log.has_truth) {
+    out << "No truth columns: nothing is scored.\n";
+    return;
+  }
+  const Score s = score(log, replay);
+  std::snprintf(
+      line, sizeof line,
+      "position %.2f mm, velocity %.2f mm/s, attitude %.3f deg RMSE; drift %.2f %% of %.2f m, horizontal %.2f %%; "
+      "NEES in bounds in %.1f %% of the rows\n",
+      1e3 * s.position_rmse_m, 1e3 * s.velocity_rmse_mps, s.attitude_rmse_rad * 180.0 / kPi, drift_percent(s),
+      s.distance_m, horizontal_drift_percent(s), 100.0 * s.nees_in_bounds);
+  out << line;
+}
+
+}  // namespace
+
+CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
+  CLI::App* estimate = app.add_subcommand("estimate", "Run the state estimation on a recorded log");
+  estimate
+      ->add_option("LOG.csv", a.log,
+                   "t_s, gyro_{x,y,z}_radps, accel_{x,y,z}_mps2, {left,right}_contact (0 to 1), "
+                   "{left,right}_foot_{x,y,z}_m (base frame); optional truth: truth_p{x,y,z}_m, truth_v{x,y,z}_mps, "
+                   "truth_q{w,x,y,z}; the first row of it is the initial state, the rest is scored only")
+      ->required()
+      ->type_name("");
+  estimate
+      ->add_option("--lio", a.lio,
+                   "stamp_s, arrival_s, p{x,y,z}_m, q{w,x,y,z}: the base in the lidar odometry's own world, as it "
+                   "arrived")
+      ->type_name("LIO.csv");
+  estimate
+      ->add_option("--lidar-mount", a.lidar_mount,
+                   "The poses are the lidar's, and this is its place in the base: m, and degrees about x, y, z "
+                   "(R = Rz Ry Rx)")
+      ->expected(6)
+      ->type_name("X Y Z ROLL PITCH YAW");
+  estimate
+      ->add_option(
+          "--lio-tau", a.lio_tau_s,
+          "Time constant of the offset's low-pass, s; 0: 0.4 s per mm of LIO's noise as measured, 1 s at least")
+      ->type_name("TAU");
+  estimate->add_option("--json", a.json, "Scores, biases, innovations, rejections")->type_name("OUT.json");
+  estimate->add_option("--csv", a.csv, "Pose, twist, sigmas, contact probabilities, LIO's age, row by row")
+      ->type_name("OUT.csv");
+  return estimate;
+}
+
+int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& err) {
+  if (const std::string sentence = complaint(a); !sentence.empty()) {
+    err << "polygmap: " << sentence << "\n";
+    return kExitUsage;
+  }
+  try {
+    const EstimateLog log = read_estimate_log(a.log);
+    const std::vector<LioRow> lio = a.lio.empty() ? std::vector<LioRow>{} : read_lio_log(a.lio, log.start_s);
+    const Replay result = replay(log, lio, options_of(a));
+    if (!is_finite(result))
+      throw config::FileError("\"" + a.log + "\": the estimate is not finite, so nothing is written.");
+    if (!a.json.empty()) write_estimate_json(a.json, log, lio, result);
+    if (!a.csv.empty()) write_estimate_csv(a.csv, log, result);
+    print(log, result, out);
+    if (!a.lio.empty()) print_lio(result, lio.size(), out);
+  } catch (const std::exception& error) {
+    err << "polygmap: " << error.what() << "\n";
+    return kExitUsage;
+  }
+  out << std::flush;
+  if (!out) {
+    err << "polygmap: Cannot write to the standard output.\n";
+    return kExitUsage;
+  }
+  return kExitPass;
+}
+
+}  // namespace polygmap::sim

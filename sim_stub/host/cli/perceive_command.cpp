@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/cli/perceive_command.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <ostream>
+#include <set>
+#include <utility>
+
+#include "sim_stub/host/cli/climb_command.hpp"
+#include "sim_stub/host/cli/paths.hpp"
+#include "sim_stub/host/perceive/perceive.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+constexpr int kMaxRepeat = 100000;
+constexpr const char *kLabels = ".labels.png", *kPlanes = ".planes.json", *kPicture = ".picture.png";
+
+// Where one picture's output goes: OUT itself, or NAME + suffix in the folder OUT when there are several pictures.
+std::string place(const std::string& out, const std::string& depth, bool several, const char* suffix) {
+  if (!several) return out;
+  return (std::filesystem::path(out) / (std::filesystem::path(depth).stem().string() + suffix)).string();
+}
+
+std::string complaint(const PerceiveArguments& a) {
+  if (a.repeat < 1 || a.repeat > kMaxRepeat) return "--repeat must be from 1 to " + std::to_string(kMaxRepeat) + ".";
+  if (a.depth.size() > 1 && !(a.labels + a.json + a.picture).empty()) {
+    std::set<std::string> names;
+    for (const std::string& path : a.depth) {
+      const std::string name = std::filesystem::path(path).stem().string();
+      if (!names.insert(name).second)
+        return "Two pictures are called \"" + name + "\": one would overwrite the other's output.";
+    }
+  }
+  // Nothing that is read, and nothing written for another option, is overwritten.
+  std::set<std::string> taken{one_name(a.camera)};
+  for (const std::string& path : a.depth) taken.insert(one_name(path));
+  for (const std::string& path : a.depth) {
+    const std::array<std::pair<std::string, const char*>, 3> outputs{
+        {{a.labels, kLabels}, {a.json, kPlanes}, {a.picture, kPicture}}};
+    for (const auto& [out, suffix] : outputs) {
+      if (out.empty()) continue;
+      const std::string file = place(out, path, a.depth.size() > 1, suffix);
+      if (!taken.insert(one_name(file)).second) return "\"" + file + "\" would be overwritten.";
+    }
+  }
+  if (a.gravity.empty()) return {};
+  const double norm = std::hypot(a.gravity[0], a.gravity[1], a.gravity[2]);
+  if (!(norm > 1e-6) || !(norm < 1e6)) return "--gravity must be three finite numbers, not all zero.";
+  return {};
+}
+
+void make_folders(const std::vector<std::string>& folders) {
+  for (const std::string& folder : folders) {
+    if (folder.empty()) continue;
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (!std::filesystem::is_directory(folder, error))
+      throw config::FileError("Cannot create the folder \"" + folder + "\".");
+  }
+}
+
+// The line that says what was found. Throws config::FileError.
+std::string one_picture(const PerceiveArguments& a, const config::CameraProfile& camera, const std::string& path,
+                        bool several) {
+  const DepthPng picture = read_depth(path);
+  const std::string own = size_text(picture.width_px, picture.height_px);
+  const std::string expected = size_text(camera.intrinsics.width_px, camera.intrinsics.height_px);
+  if (own != expected)
+    throw config::FileError("\"" + path + "\" is " + own + ", but the camera file says " + expected + ".");
+  std::optional<Vec3> gravity;
+  if (!a.gravity.empty()) gravity = Vec3{a.gravity[0], a.gravity[1], a.gravity[2]};
+  Perceived perceived = perceive(camera, picture, gravity, a.repeat);
+  if (!a.labels.empty()) write_labels(place(a.labels, path, several, kLabels), picture, perceived);
+  if (!a.json.empty()) write_planes(place(a.json, path, several, kPlanes), perceived);
+  if (!a.picture.empty()) write_picture(place(a.picture, path, several, kPicture), camera, picture, perceived);
+  std::vector<double>& times = perceived.microseconds;
+  std::sort(times.begin(), times.end());
+  const Vec3& up = perceived.camera_up;
+  const char* source = gravity ? "given" : (perceived.up_assumed ? "assumed: no plane looks level" : "found");
+  char line[192];
+  std::snprintf(line, sizeof line, ": %zu planes, median %.0f us, max %.0f us, up (%.3f, %.3f, %.3f) %s\n",
+                perceived.planes.size(), times[times.size() / 2], times.back(), up.x(), up.y(), up.z(), source);
+  return path + line;
+}
+
+}  // namespace
+
+CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
+  CLI::App* perceive = app.add_subcommand("perceive", "Find the planes in depth pictures (PNG, 16 bits)");
+  perceive->add_option("DEPTH.png", a.depth, "Depth pictures")->required()->type_name("");
+  perceive
+      ->add_option(
+          "--camera", a.camera,
+          "width, height, fx, fy, cx, cy (px), depth_unit_m; optional: min_depth_m, max_depth_m, noise_base_m, "
+          "noise_per_metre, noise_quadratic_per_m, noise_correlated_share, noise_correlated_px")
+      ->required()
+      ->type_name("CAMERA.toml");
+  perceive
+      ->add_option(
+          "--gravity", a.gravity,
+          "Down in the camera frame (x right, y down, z forward); without it the largest level-looking plane says")
+      ->expected(3)
+      ->allow_extra_args(false)  // the pictures may follow
+      ->type_name("X Y Z");
+  const std::string folder = "; a folder when there are several pictures";
+  perceive->add_option("--labels", a.labels, "Each pixel's plane, 0 = none" + folder)->type_name("OUT.png");
+  perceive->add_option("--json", a.json, "The planes" + folder)->type_name("OUT.json");
+  perceive->add_option("--picture", a.picture, "Planes, polygons and nosings over the depth" + folder)
+      ->type_name("OUT.png");
+  perceive->add_option("--repeat", a.repeat, "Extract N times, for the median and the longest time")->type_name("N");
+  return perceive;
+}
+
+int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& err) {
+  if (const std::string sentence = complaint(a); !sentence.empty()) {
+    err << "polygmap: " << sentence << "\n";
+    return kExitUsage;
+  }
+  const bool several = a.depth.size() > 1;
+  int code = kExitPass;
+  const auto complain = [&](const std::exception& error) {
+    err << "polygmap: " << error.what() << "\n";
+    code = kExitUsage;
+  };
+  config::CameraProfile camera;
+  try {
+    camera = config::read_camera(a.camera);
+    if (several) make_folders({a.labels, a.json, a.picture});
+  } catch (const std::exception& error) {
+    complain(error);
+    return code;
+  }
+  for (const std::string& path : a.depth) {
+    try {
+      out << one_picture(a, camera, path, several) << std::flush;
+    } catch (const std::exception& error) {
+      complain(error);
+    }
+  }
+  if (!out) {
+    err << "polygmap: Cannot write to the standard output.\n";
+    return kExitUsage;
+  }
+  return code;
+}
+
+}  // namespace polygmap::sim

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/climb/climb.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "firmware/pipeline.hpp"
+#include "scheduler/cyclic_executive.hpp"
+#include "sim_stub/heap_trap.hpp"
+#include "sim_stub/host/climb/climb_report.hpp"
+#include "sim_stub/sim_robot.hpp"
+#include "sim_stub/world/clearance.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+using WallClock = std::chrono::steady_clock;
+
+// The module's rows, timed by the wall clock on the way: virtual time has no cost.
+class TimedPipeline {
+ public:
+  explicit TimedPipeline(Pipeline& pipeline) noexcept : pipeline_(pipeline) {}
+
+  Progress run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& budget) noexcept {
+    const auto begin = WallClock::now();
+    const Progress progress = pipeline_.run_row(row, frame_ns, budget);
+    if (progress != Progress::kIdle) {
+      wall_[row].add(static_cast<std::uint64_t>(std::chrono::nanoseconds(WallClock::now() - begin).count()));
+    }
+    return progress;
+  }
+  [[nodiscard]] const DurationStatistics& wall(std::size_t row) const noexcept { return wall_[row]; }
+
+ private:
+  Pipeline& pipeline_;
+  std::array<DurationStatistics, kRowCount> wall_;
+};
+
+// The lidar's port on the way to the module: the report wants to see what the module accepts.
+class WatchedLidar final : public hal::LidarOdometry {
+ public:
+  explicit WatchedLidar(hal::LidarOdometry& lidar) noexcept : lidar_(lidar) {}
+  [[nodiscard]] bool try_read(LioSample& sample) noexcept override {
+    if (!lidar_.try_read(sample)) return false;
+    last_ = sample;
+    return true;
+  }
+  // Once per sample: it is the one that the newest estimate is as old as.
+  [[nodiscard]] bool accepted(const StateEstimate& state) noexcept {
+    const bool fresh =
+        last_.stamp_ns > told_ns_ && state.lio_age_ns >= 0 && state.stamp_ns - state.lio_age_ns == last_.stamp_ns;
+    if (fresh) told_ns_ = last_.stamp_ns;
+    return fresh;
+  }
+  [[nodiscard]] const LioSample& last() const noexcept { return last_; }
+
+ private:
+  hal::LidarOdometry& lidar_;
+  LioSample last_;
+  std::int64_t told_ns_ = 0;
+};
+
+using Executive = CyclicExecutive<TimedPipeline, kOneLaneSchedule>;
+
+// Memory that is there before the module is: the heap is watched from its first instruction on.
+struct Module {
+  std::optional<Pipeline> pipeline;
+  std::optional<TimedPipeline> tasks;
+  std::optional<Executive> executive;
+};
+
+static_assert(VirtualClock::kTick_ns == kMinorFrame_ns);
+
+SimOptions sim_options(const ClimbOptions& options) {
+  SimOptions sim;
+  sim.seed = options.seed;
+  sim.stairs = options.stairs;
+  sim.noise = options.noise;
+  sim.plant_kind = options.plant;
+  sim.pushes = options.pushes;
+  sim.camera.stairs_shift_m = {options.render_dx_m, options.render_dy_m, options.render_dz_m};
+  sim.camera.missing_step = options.render_missing_step;
+  sim.camera.threaded = options.threaded_render;
+  sim.camera.scan_s = 1e-3 * options.scan_ms;
+  sim.errors.camera_mount_rad = options.mount_error_deg * kPi / 180.0;
+  sim.errors.camera_mount_m = 0.003 * options.mount_error_deg;
+  sim.errors.depth_scale = options.scale_error;
+  if (options.camera) {
+    sim.intrinsics = options.camera->intrinsics;
+    sim.depth_sigma = options.camera->noise;
+  }
+  sim.force_sensors = !options.infer_contacts;
+  if (options.blank_depth) sim.camera.blank = {{0, INT64_MAX}};
+  return sim;
+}
+
+const char* name_of(GaitPhase phase) {
+  switch (phase) {
+    case GaitPhase::kStandstill:
+      return "standing";
+    case GaitPhase::kDoubleSupport:
+      return "double support";
+    case GaitPhase::kSwing:
+      return "swing";
+    case GaitPhase::kFinished:
+      return "on top";
+    case GaitPhase::kStopped:
+      return "stopped";
+  }
+  return "?";
+}
+
+ClimbProgress progress_of(std::int64_t now_ns, const GaitStatus& gait, const TimedPipeline& tasks) {
+  ClimbProgress progress{seconds(now_ns), static_cast<int>(gait.treads_climbed), name_of(gait.phase), "", 0.0};
+  double worst_share = -1.0;
+  for (std::size_t row = 0; row < kRowCount; ++row) {
+    const double max_us = 1e-3 * static_cast<double>(tasks.wall(row).max_ns());
+    if (max_us / kOneLaneSchedule[row].budget_us <= worst_share) continue;
+    worst_share = max_us / kOneLaneSchedule[row].budget_us;
+    progress.worst_row = kOneLaneSchedule[row].task.data();
+    progress.worst_row_us = max_us;
+  }
+  return progress;
+}
+
+std::vector<ScheduleRow> schedule_of(const Executive& executive, const TimedPipeline& tasks) {
+  std::vector<ScheduleRow> rows;
+  for (std::size_t row = 0; row < kRowCount; ++row) {
+    const RowStatistics& statistics = executive.row_statistics(row);
+    rows.push_back({std::string(kSchedule[row].task), kSchedule[row].lane == 0 ? "control" : "perception",
+                    static_cast<double>(kSchedule[row].budget_us), statistics.runs, statistics.overruns,
+                    1e-3 * static_cast<double>(tasks.wall(row).mean_ns()),
+                    1e-3 * static_cast<double>(tasks.wall(row).max_ns())});
+  }
+  return rows;
+}
+
+CameraFigures camera_figures(const SimRobot& robot, const CameraExtrinsicsEstimator& mount) {
+  constexpr double kDegrees = 180.0 / kPi;
+  const RobotErrors& errors = robot.errors();
+  const Mat3 turn = errors.base_T_camera.R * base_T_camera().R.transpose();
+  CameraFigures f;
+  f.scan_ms = 1e3 * robot.depth_camera().scan_s();
+  f.scale_error = errors.depth_scale - 1.0;
+  f.mount_error_deg = kDegrees * Vec3{std::atan2(turn(2, 1), turn(2, 2)), -std::asin(turn(2, 0)), yaw_of(turn)};
+  f.mount_error_m = errors.base_T_camera.p_m - base_T_camera().p_m;
+  f.mount_found_deg = kDegrees * Vec2{mount.roll_rad(), mount.pitch_rad()};
+  f.mount_found_height_m = mount.height_m();
+  f.mount_found_ahead_m = mount.ahead_m();
+  return f;
+}
+
+// Of all lanes, by name; only what was raised.
+std::vector<std::pair<std::string, std::uint32_t>> raised(const Health& health) {
+  std::vector<std::pair<std::string, std::uint32_t>> out;
+  const auto add = [&]<typename Code>(std::size_t i, Code) {
+    const auto code = static_cast<Code>(kFirstCode<Code> + i);
+    if (const std::uint32_t count = health.count(code).count; count > 0) out.emplace_back(name_of(code), count);
+  };
+  for (std::size_t i = 0; i < kCodeCount<Fault>; ++i) add(i, Fault{});
+  for (std::size_t i = 0; i < kCodeCount<Limit>; ++i) add(i, Limit{});
+  return out;
+}
+
+}  // namespace
+
+ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction& progress) {
+  constexpr std::int64_t kRestAfterEnd_ns = 2 * kNsPerS;  // a robot that topples takes its time
+  const auto wall_begin = WallClock::now();
+  heap::set_on_call(heap::OnCall::kCount);
+  heap::reset();
+
+  SimRobot robot(sim_options(options));
+  Params params;
+  params.gait.planner.pattern = options.gait;
+  params.self_filter = options.self_filter;
+  params.estimator.infer_forces = options.infer_contacts;
+  params.estimate_mount = options.estimate_mount;
+  if (options.camera) {
+    params.surfaces.noise = options.camera->noise;
+    params.surfaces.limits.min_depth_m = options.camera->min_depth_m;
+    params.surfaces.limits.max_depth_m = options.camera->max_depth_m;
+  }
+  WatchedLidar lidar(robot);
+  const auto module = std::make_unique<Module>();
+  {
+    const heap::ModuleCall call("Pipeline::Pipeline");
+    module->pipeline.emplace(Ports{robot, robot, robot, lidar}, params);
+    module->tasks.emplace(*module->pipeline);
+    module->executive.emplace(*module->tasks, robot, module->pipeline->lane_health(0));
+    module->executive->start(robot.now_ns() + kMinorFrame_ns);
+  }
+  Pipeline& pipeline = *module->pipeline;
+  TimedPipeline& tasks = *module->tasks;
+  Executive& executive = *module->executive;
+  ClimbReport report(robot.stairs(), robot.errors().base_T_camera);
+
+  std::int64_t end_ns = -1;
+  std::int64_t next_progress_ns = 0;
+  while (seconds(robot.now_ns()) < options.time_limit_s) {
+    robot.advance();
+    {
+      const heap::ModuleCall call("CyclicExecutive::tick");
+      executive.tick(robot.now_ns());
+    }
+    const Telemetry telemetry = pipeline.telemetry(robot.now_ns());
+    report.observe(robot.truth(), telemetry);
+    if (lidar.accepted(telemetry.state)) report.observe_lio(lidar.last());
+    if (progress && robot.now_ns() >= next_progress_ns) {
+      progress(progress_of(robot.now_ns(), telemetry.gait, tasks));
+      next_progress_ns += kNsPerS;
+    }
+    const bool over = telemetry.gait.phase == GaitPhase::kFinished || telemetry.gait.phase == GaitPhase::kStopped;
+    if (over && end_ns < 0) end_ns = robot.now_ns() + kRestAfterEnd_ns;
+    if (robot.truth().fell || (over && robot.now_ns() >= end_ns)) break;
+  }
+
+  RunFigures figures;
+  figures.options = options;
+  figures.camera = camera_figures(robot, pipeline.perception().mount());
+  figures.heap_calls = heap::report().calls;
+  figures.faults = raised(module->pipeline->health());
+  figures.heap_first_caller = heap::report().first_caller;
+  const auto memory = static_memory();
+  figures.static_memory.assign(memory.begin(), memory.end());
+  figures.schedule = schedule_of(executive, tasks);
+  figures.wall_seconds = std::chrono::duration<double>(WallClock::now() - wall_begin).count();
+  const ClimbSummary summary = report.finish(figures);
+  if (!options.out_dir.empty()) {
+    try {
+      write_climb_files(options.out_dir, report, summary);
+    } catch (const std::runtime_error& error) {
+      throw ClimbNotWritten(error.what(), summary);
+    }
+  }
+  return summary;
+}
+
+}  // namespace polygmap::sim

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a simulated climb is told: the stairs, the camera, and which errors the robot has.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "algorithms/gait/footsteps/climb_planner.hpp"
+#include "firmware/config/camera_file.hpp"
+#include "sim_stub/camera/noise_kind.hpp"
+#include "sim_stub/plant/plant.hpp"
+#include "sim_stub/world/stair_world.hpp"
+
+namespace polygmap::sim {
+
+[[nodiscard]] inline std::string name_of(GaitPattern gait) { return gait == GaitPattern::kSingleStep ? "ss" : "ds"; }
+
+struct ClimbOptions {
+  StairParams stairs;
+  std::uint64_t seed = 1;
+  NoiseKind noise = NoiseKind::kWhite;
+  PlantKind plant = PlantKind::kMujoco;
+  std::vector<Push> pushes;
+  GaitPattern gait = GaitPattern::kDoubleStep;
+  std::string out_dir;          // empty: no files
+  double time_limit_s = 150.0;  // simulated
+  bool threaded_render = true;
+  // Causality tests: the picture shows something else than the plant stands on.
+  double render_dx_m = 0.0, render_dy_m = 0.0, render_dz_m = 0.0;
+  int render_missing_step = -1;  // 0-based, -1: none
+  bool blank_depth = false;
+  bool self_filter = true;
+  // The camera, and what the module is not told of it. Of a seed's errors, half ranges.
+  std::optional<config::CameraProfile> camera;  // the robot's own when absent; the module is told its noise and range
+  std::string camera_file;                      // that it was read from
+  double scan_ms = 16.0;                        // one exposure, top to bottom; SimDepthCamera rounds it
+  double mount_error_deg = 1.0;                 // roll, pitch, yaw; and 3 mm per degree in each direction
+  double scale_error = 0.003;
+  bool estimate_mount = true;
+  bool infer_contacts = false;  // from joint torques: the feet have no force sensors
+};
+
+}  // namespace polygmap::sim

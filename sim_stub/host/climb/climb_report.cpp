@@ -1,0 +1,430 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/climb/climb_report.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+#include <utility>
+
+#include "algorithms/robot/body_shapes.hpp"
+#include "sim_stub/host/climb/surface_match.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+constexpr std::int64_t kPast_ns = 2 * kNsPerS;    // covers the latest LIO pose and the latest frame
+constexpr std::int64_t kRest_ns = 50 * kNsPerMs;  // both soles stand this long: they rest
+constexpr std::uint64_t kTrailEvery_ticks = 10;   // 20 ms
+
+double ms(std::int64_t duration_ns) { return static_cast<double>(duration_ns) * 1e-6; }
+
+void keep_min(double& least, double value) {
+  if (!std::isnan(value) && !(least <= value)) least = value;
+}
+void keep_max(double& greatest, double value) {
+  if (!std::isnan(value) && !(greatest >= value)) greatest = value;
+}
+
+// a_T_b from one body's pose in both worlds, heading and place only.
+Transform aligned_worlds(const Transform& a_T_body, const Transform& b_T_body) {
+  const Mat3 R = rotation_z(yaw_of(a_T_body.R) - yaw_of(b_T_body.R));
+  return {R, a_T_body.p_m - R * b_T_body.p_m};
+}
+
+// The point seen from a sole: along its heading, across it, up.
+Vec3 level_frame_p(const Transform& any_T_sole, const Vec3& any_p_m) {
+  return rotation_z(yaw_of(any_T_sole.R)).transpose() * (any_p_m - any_T_sole.p_m);
+}
+
+// Along the sole's axis from the nosing to the sole's origin.
+double nosing_distance_m(const Step& step, const Transform& true_T_sole) {
+  return (true_T_sole.p_m.x() - step.nosing_x_m) / std::cos(yaw_of(true_T_sole.R));
+}
+
+}  // namespace
+
+void ClimbReport::PositionError::add(const Vec3& error_m) {
+  sum_m2 += error_m.squaredNorm();
+  ++count;
+}
+double ClimbReport::PositionError::rmse_m() const {
+  return count == 0 ? kNotMeasured : std::sqrt(sum_m2 / static_cast<double>(count));
+}
+
+ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera)
+    : world_(std::move(world)),
+      solids_(stair_solids(world_)),
+      true_base_T_camera_(true_base_T_camera),
+      climbed_(world_.steps.size(), false) {}
+
+std::optional<Transform> ClimbReport::true_T_base_at(std::int64_t stamp_ns) const {
+  const auto after = std::lower_bound(past_.begin(), past_.end(), stamp_ns,
+                                      [](const TruePose& p, std::int64_t stamp) { return p.stamp_ns < stamp; });
+  if (after == past_.end()) return std::nullopt;
+  if (after->stamp_ns == stamp_ns) return after->true_T_base;
+  if (after == past_.begin()) return std::nullopt;
+  const TruePose& a = *std::prev(after);
+  const TruePose& b = *after;
+  const double s = seconds(stamp_ns - a.stamp_ns) / seconds(b.stamp_ns - a.stamp_ns);
+  const Eigen::Quaterniond qa(a.true_T_base.R), qb(b.true_T_base.R);
+  return Transform{qa.slerp(s, qb).toRotationMatrix(), a.true_T_base.p_m + s * (b.true_T_base.p_m - a.true_T_base.p_m)};
+}
+
+void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
+  past_.push_back({truth.stamp_ns, truth.true_T_base});
+  while (truth.stamp_ns - past_.front().stamp_ns > kPast_ns) past_.pop_front();
+  last_stamp_ns_ = truth.stamp_ns;
+  if (truth.fell && !fell_) {
+    fell_ = true;
+    ending_.fall_reason = truth.fall_reason;
+  }
+  observe_odometry(truth, telemetry.state);
+  if (aligned_) {
+    observe_surfaces(telemetry.surfaces);
+    observe_map(telemetry);
+    observe_footsteps(truth, telemetry);
+    observe_tracking(truth, telemetry.gait);
+    observe_balance(truth, telemetry);
+  }
+  observe_soles(truth, telemetry.gait.step.onto_tread);
+  observe_stance(truth);
+  observe_steps_climbed(truth);
+  if (ticks_ % kTrailEvery_ticks == 0) observe_trails(truth);
+  ++ticks_;
+}
+
+void ClimbReport::observe_odometry(const Truth& truth, const StateEstimate& state) {
+  if (!aligned_) {
+    if (!state.initialised) return;
+    true_T_odom_ = aligned_worlds(truth.true_T_base, state.odom_T_base);
+    true_T_world_ = aligned_worlds(truth.true_T_base, state.world_T_base());
+    aligned_ = true;
+    aligned_stamp_ns_ = truth.stamp_ns;
+  }
+  base_error_.add(true_T_odom_ * state.odom_T_base.p_m - truth.true_T_base.p_m);
+  fused_error_.add(true_T_world_ * state.world_T_base().p_m - truth.true_T_base.p_m);
+}
+
+void ClimbReport::observe_lio(const LioSample& sample) {
+  const std::optional<Transform> true_T_base = true_T_base_at(sample.stamp_ns);
+  if (!true_T_base) return;
+  // Through the nominal mount to the base: all three errors are about the same point.
+  const Transform lio_T_base = sample.lio_T_lidar * base_T_lidar().inverse();
+  if (!true_T_lio_) true_T_lio_ = aligned_worlds(*true_T_base, lio_T_base);
+  lio_error_.add(*true_T_lio_ * lio_T_base.p_m - true_T_base->p_m);
+}
+
+void ClimbReport::observe_surfaces(const SurfaceFrame& frame) {
+  if (frame.sequence == frame_sequence_ && frame.stamp_ns == frame_stamp_ns_) return;
+  frame_sequence_ = frame.sequence;
+  frame_stamp_ns_ = frame.stamp_ns;
+  ++frames_;
+  const std::optional<Transform> true_T_base = true_T_base_at(frame.stamp_ns);
+  std::uint64_t matching = 0;
+  for (const SurfacePatch& patch : frame.surfaces) {
+    if (true_T_base && matches_true_surface(world_, patch, *true_T_base * true_base_T_camera_)) ++matching;
+  }
+  surfaces_ += frame.surfaces.size();
+  surfaces_unmatched_ += frame.surfaces.size() - matching;
+  if (matching > 0 && matching == frame.surfaces.size()) ++frames_matching_;
+}
+
+void ClimbReport::observe_map(const Telemetry& telemetry) {
+  const MapSnapshot& map = telemetry.map;
+  if (map.stamp_ns == map_stamp_ns_) return;
+  map_stamp_ns_ = map.stamp_ns;
+  exposure_to_map_ms_.push_back(ms(telemetry.now_ns - map.stamp_ns));
+  for (auto& [id, seen] : polygons_) seen.remembered = false;
+  for (const MapPolygon& polygon : map.polygons) {
+    auto& seen = polygons_[polygon.id] = {polygon.surface, true};
+    for (Vec3& vertex_m : seen.surface.polygon) vertex_m += map.drift_m;  // from the map's world to the estimator's
+  }
+}
+
+void ClimbReport::observe_footsteps(const Truth& truth, const Telemetry& telemetry) {
+  const GaitStatus& gait = telemetry.gait;
+  const LatchedStep& step = gait.step;
+  ending_.phase = gait.phase;
+  ending_.stop_reason = gait.stop_reason;
+  ending_.stop_measured_m = gait.stop_measured_m;
+  if (step.sequence == 0) return;
+
+  if (footsteps_.empty() || footsteps_.back().sequence != step.sequence) {
+    Footstep f;
+    f.sequence = step.sequence;
+    f.foot = step.foot;
+    f.onto_tread = step.onto_tread;
+    if (step.onto_tread) f.map_age_at_latch_ms = ms(step.latch_stamp_ns - step.map_stamp_ns);
+    footsteps_.push_back(f);
+    landing_pending_ = true;
+    take_target(telemetry);
+  } else if (step.target.position_m != target_.position_m) {  // in the air, beside the standing foot instead
+    take_target(telemetry);
+  }
+
+  Footstep& f = footsteps_.back();
+  if (step.touch_down_stamp_ns == 0) return;
+  if (std::isnan(f.execution_error_m)) {
+    f.execution_error_m = (step.odom_T_executed.p_m - step.odom_T_target.p_m).norm();
+    if (f.onto_tread) {
+      std::int64_t last_seen_ns = target_.last_seen_ns;
+      for (const MapPolygon& polygon : telemetry.map.polygons) {
+        if (polygon.id == target_.polygon_id) last_seen_ns = std::max(last_seen_ns, polygon.last_seen_ns);
+      }
+      f.target_last_seen_ms = ms(step.touch_down_stamp_ns - last_seen_ns);
+    }
+  }
+  // The module may report touch-down before the sole truly stands: the truth is taken when it does.
+  if (landing_pending_ && truth.in_contact[index_of(f.foot)]) observe_landing(truth);
+}
+
+void ClimbReport::take_target(const Telemetry& telemetry) {
+  const LatchedStep& step = telemetry.gait.step;
+  target_ = step.target;
+  target_mapped_ = step.height_mapped;
+  footsteps_.back().true_T_planned = true_T_world_ * Transform{rotation_z(step.target.yaw_rad), step.target.position_m};
+  const Transform& odom_T_stance = telemetry.state.odom_T_sole[index_of(other(step.foot))];
+  latched_across_m_ = level_frame_p(odom_T_stance, step.odom_T_target.p_m).y();
+}
+
+void ClimbReport::observe_landing(const Truth& truth) {
+  Footstep& f = footsteps_.back();
+  const std::size_t foot = index_of(f.foot);
+  const Transform& true_T_sole = truth.true_T_sole[foot];
+  landing_pending_ = false;
+  f.landed = true;
+  f.step_index = truth.step_index[foot];
+  f.true_T_landed = true_T_sole;
+  standing_footstep_[foot] = static_cast<int>(footsteps_.size()) - 1;
+  if (!f.onto_tread || world_.steps.empty()) return;
+
+  if (target_mapped_ && f.step_index >= 0) {
+    f.along_error_m = target_.nosing_distance_m -
+                      nosing_distance_m(world_.steps[static_cast<std::size_t>(f.step_index)], true_T_sole);
+  } else if (target_mapped_) {
+    // It stands on the floor although a tread was meant: the nosing that makes the error least is the meant one.
+    for (const Step& step : world_.steps) {
+      const double error_m = target_.nosing_distance_m - nosing_distance_m(step, true_T_sole);
+      if (!(std::abs(f.along_error_m) <= std::abs(error_m))) f.along_error_m = error_m;
+    }
+  }
+  const Transform& true_T_stance = truth.true_T_sole[index_of(other(f.foot))];
+  f.across_error_m = latched_across_m_ - level_frame_p(true_T_stance, true_T_sole.p_m).y();
+}
+
+void ClimbReport::observe_tracking(const Truth& truth, const GaitStatus& gait) {
+  if (gait.phase != GaitPhase::kSwing) return;
+  const std::size_t swing = index_of(gait.step.foot), stance = index_of(other(gait.step.foot));
+  const Vec3 desired_m = level_frame_p(gait.odom_T_sole_desired[stance], gait.odom_T_sole_desired[swing].p_m);
+  const Vec3 actual_m = level_frame_p(truth.true_T_sole[stance], truth.true_T_sole[swing].p_m);
+  keep_max(tracking_x_max_m_, std::abs(desired_m.x() - actual_m.x()));
+  keep_max(tracking_z_max_m_, std::abs(desired_m.z() - actual_m.z()));
+}
+
+void ClimbReport::observe_balance(const Truth& truth, const Telemetry& telemetry) {
+  const GaitStatus& gait = telemetry.gait;
+  keep_min(zmp_margin_min_m_, truth.zmp_margin_m);
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const std::size_t j = n % kJointsPerLeg;
+    const auto i = static_cast<Eigen::Index>(n);
+    const JointLimits& limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), j);
+    keep_max(torque_peak_ratio_[j], std::abs(truth.drive_tau_nm[i]) / limits.torque_nm);
+    keep_max(joint_speed_peak_ratio_[j], std::abs(truth.drive_dq_radps[i]) / limits.speed_radps);
+  }
+  if (gait.step.sequence == 0) return;  // it may not have begun to balance
+  const std::size_t stance = gait.stands[0] ? 0 : 1;
+  const Vec2& com_m = gait.odom_p_com_desired_m;
+  const Vec3 desired_m = level_frame_p(telemetry.state.odom_T_sole[stance], {com_m.x(), com_m.y(), 0.0});
+  const Vec3 actual_m = level_frame_p(truth.true_T_sole[stance], truth.true_p_com_m);
+  keep_max(com_tracking_max_m_, (desired_m - actual_m).head<2>().norm());
+}
+
+double ClimbReport::flight_clearance_m(const Flight& flight, int to_step, double at_most_m) const {
+  const std::array excluded{flight.from_step, to_step};
+  for (const Transform& true_T_sole : flight.true_T_sole) {
+    at_most_m = clearance_m(collision_box(true_T_sole), solids_, excluded, at_most_m);
+  }
+  return at_most_m;
+}
+
+void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
+  flight_onto_tread_ = onto_tread;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    const Transform& true_T_sole = truth.true_T_sole[foot];
+    if (!truth.in_contact[foot]) {
+      swung_ = true;
+      if (!flights_[foot]) flights_[foot] = Flight{last_step_[foot], truth.stamp_ns, {}};
+      flights_[foot]->true_T_sole.push_back(true_T_sole);
+      standing_footstep_[foot] = -1;
+      continue;
+    }
+    const int step = truth.step_index[foot];
+    if (flights_[foot]) {
+      if (step >= 0 && first_lift_off_ns_ < 0) first_lift_off_ns_ = flights_[foot]->lift_off_ns;
+      clearance_min_m_ = flight_clearance_m(*flights_[foot], step, clearance_min_m_);
+      flights_[foot].reset();
+    }
+    last_step_[foot] = step;
+    clearance_min_m_ = clearance_m(collision_box(true_T_sole), solids_, std::array{step}, clearance_min_m_);
+    if (step < 0) continue;
+    const double margin_m = sole_margin_m(true_T_sole, world_, step);
+    keep_min(sole_margin_min_m_, margin_m);
+    const int footstep = standing_footstep_[foot];
+    if (footstep >= 0) keep_min(footsteps_[static_cast<std::size_t>(footstep)].sole_margin_m, margin_m);
+  }
+}
+
+void ClimbReport::observe_stance(const Truth& truth) {
+  if (!truth.in_contact[0] || !truth.in_contact[1]) return;
+  closure_error_m_.push_back(truth.closure_error_m);
+  if (world_.steps.empty() || first_lift_off_ns_ >= 0) return;
+  double toe_x_m = -std::numeric_limits<double>::infinity();
+  for (const Transform& true_T_sole : truth.true_T_sole) {
+    const OrientedBox box = collision_box(true_T_sole);
+    toe_x_m = std::max(toe_x_m, box.centre.p_m.x() + box.centre.R.row(0).cwiseAbs().dot(box.half_m));
+  }
+  stand_off_m_ = world_.steps.front().nosing_x_m - toe_x_m;
+}
+
+void ClimbReport::observe_steps_climbed(const Truth& truth) {
+  const int step = std::min(truth.step_index[0], truth.step_index[1]);
+  bool rests = step >= 0 && truth.in_contact[0] && truth.in_contact[1];
+  for (std::size_t foot = 0; rests && foot < kFootCount; ++foot) {
+    rests = sole_margin_m(truth.true_T_sole[foot], world_, truth.step_index[foot]) >= 0.0;
+  }
+  if (!rests) {
+    resting_step_ = -1;
+    return;
+  }
+  if (step != resting_step_) {
+    resting_step_ = step;
+    resting_since_ns_ = truth.stamp_ns;
+  }
+  const auto index = static_cast<std::size_t>(step);
+  if (truth.stamp_ns - resting_since_ns_ < kRest_ns || climbed_[index]) return;
+  climbed_[index] = true;
+  ++steps_climbed_;
+  if (index + 1 == world_.steps.size()) on_top_ns_ = resting_since_ns_;
+}
+
+void ClimbReport::observe_trails(const Truth& truth) {
+  base_trail_m_.push_back(truth.true_T_base.p_m);
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) sole_trail_m_[foot].push_back(truth.true_T_sole[foot].p_m);
+}
+
+int ClimbReport::meant_step(Foot foot, const Flight& flight) const {
+  if (!flight_onto_tread_) return flight.from_step;
+  if (footsteps_.empty() || footsteps_.back().foot != foot) return flight.from_step + 1;
+  const auto off_m = [this](const Step& step) {
+    return std::abs(footsteps_.back().true_T_planned.p_m.z() - step.height_m);
+  };
+  const auto nearest = std::ranges::min_element(world_.steps, {}, off_m);
+  return static_cast<int>(nearest - world_.steps.begin());
+}
+
+double ClimbReport::clearance_min_m() const {
+  if (!swung_) return kNotMeasured;  // the feet stand clear of the stairs, which says nothing
+  double least_m = clearance_min_m_;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const std::optional<Flight>& flight = flights_[index_of(foot)];
+    if (flight) least_m = flight_clearance_m(*flight, meant_step(foot, *flight), least_m);  // the run ended in the air
+  }
+  return std::isinf(least_m) ? kNotMeasured : least_m;
+}
+
+ClimbSummary ClimbReport::finish(const RunFigures& run) const {
+  ClimbSummary s;
+  s.options = run.options;
+  s.camera = run.camera;
+  s.fell = fell_;
+  s.steps_total = static_cast<int>(world_.steps.size());
+  s.steps_climbed = steps_climbed_;
+  const bool module_ended = ending_.phase == GaitPhase::kFinished || ending_.phase == GaitPhase::kStopped;
+  s.ended_at_s = seconds(last_stamp_ns_);
+  s.ended_by = fell_ ? "fall" : module_ended ? "module" : "time limit";
+  if (on_top_ns_ >= 0 && first_lift_off_ns_ >= 0) {
+    s.climb_time_s = seconds(on_top_ns_ - first_lift_off_ns_);
+    s.seconds_per_step = s.climb_time_s / s.steps_total;
+  }
+
+  const double run_s = aligned_ ? seconds(last_stamp_ns_ - aligned_stamp_ns_) : 0.0;
+  s.plane_rate_hz = run_s > 0.0 ? static_cast<double>(frames_matching_) / run_s : 0.0;
+  s.frames = frames_;
+  s.frames_matching = frames_matching_;
+  s.surfaces = surfaces_;
+  s.surfaces_unmatched = surfaces_unmatched_;
+
+  std::vector<double> execution, foothold, along, across, map_age, last_seen;
+  for (const Footstep& f : footsteps_) {
+    if (!f.onto_tread) continue;
+    map_age.push_back(f.map_age_at_latch_ms);
+    if (!std::isnan(f.execution_error_m)) {
+      execution.push_back(f.execution_error_m);
+      last_seen.push_back(f.target_last_seen_ms);
+    }
+    if (!f.landed) continue;
+    across.push_back(std::abs(f.across_error_m));
+    if (!std::isnan(f.along_error_m)) along.push_back(std::abs(f.along_error_m));
+    foothold.push_back(std::fmax(std::abs(f.along_error_m), across.back()));  // of one that is no number: the other
+  }
+  s.execution_error_m = spread_of(execution);
+  s.foothold_error_m = spread_of(foothold);
+  s.foothold_error_along_m = spread_of(along);
+  s.foothold_error_across_m = spread_of(across);
+  s.map_age_at_latch_ms = spread_of(map_age);
+  s.target_last_seen_ms = spread_of(last_seen);
+  s.exposure_to_map_ms = spread_of(exposure_to_map_ms_);
+  s.sole_margin_min_m = sole_margin_min_m_;
+  s.swing_clearance_min_m = clearance_min_m();
+  s.stand_off_m = stand_off_m_;
+  s.closure_error_m = spread_of(closure_error_m_);
+  s.tracking_error_x_max_m = tracking_x_max_m_;
+  s.tracking_error_z_max_m = tracking_z_max_m_;
+  s.com_tracking_max_m = com_tracking_max_m_;
+  s.zmp_margin_min_m = zmp_margin_min_m_;
+  s.torque_peak_ratio = torque_peak_ratio_;
+  s.joint_speed_peak_ratio = joint_speed_peak_ratio_;
+  s.odometry_rmse_base_m = base_error_.rmse_m();
+  s.odometry_rmse_lio_m = lio_error_.rmse_m();
+  s.odometry_rmse_fused_m = fused_error_.rmse_m();
+
+  s.heap_calls = run.heap_calls;
+  s.faults = run.faults;
+  for (const StageMemory& stage : run.static_memory) s.static_memory.push_back({stage.stage, stage.bytes});
+  s.schedule = run.schedule;
+  s.footsteps = footsteps_;
+  s.wall_seconds = run.wall_seconds;
+
+  ClimbEnding ending = ending_;
+  ending.heap_first_caller = run.heap_first_caller;
+  judge(s, ending);
+  return s;
+}
+
+ClimbDrawing ClimbReport::drawing() const {
+  ClimbDrawing d;
+  for (const auto& [id, seen] : polygons_) {
+    ClimbDrawing::Polygon polygon{seen.surface.kind, {}, seen.remembered};
+    for (const Vec3& vertex_m : seen.surface.polygon) polygon.vertices_m.push_back(true_T_world_ * vertex_m);
+    d.polygons.push_back(std::move(polygon));
+  }
+  d.base_trail_m = base_trail_m_;
+  d.sole_trail_m = sole_trail_m_;
+  return d;
+}
+
+void write_climb_files(const std::string& directory, const ClimbReport& report, const ClimbSummary& summary) {
+  const auto write = [&directory](const char* name, const std::string& text) {
+    const std::string path = directory + "/" + name;
+    std::ofstream file(path, std::ios::binary);
+    file << text;
+    file.close();
+    if (!file) throw std::runtime_error("Cannot write " + path + ".");
+  };
+  write("summary.json", summary_text(summary));
+  write("climb.svg", climb_svg(report.world(), report.drawing(), summary));
+}
+
+}  // namespace polygmap::sim

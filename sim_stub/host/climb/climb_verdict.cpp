@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/climb/climb_verdict.hpp"
+
+#include <cstdio>
+
+namespace polygmap::sim {
+namespace {
+
+std::string sentence(const char* format, double a = 0.0, double b = 0.0, double c = 0.0, double d = 0.0) {
+  char buffer[200];
+  std::snprintf(buffer, sizeof buffer, format, a, b, c, d);
+  return buffer;
+}
+
+std::string why_stopped(StopReason reason, double measured_m) {
+  switch (reason) {
+    case StopReason::kNone:
+      return "it gave no reason";
+    case StopReason::kNothingSeen:
+      return "it saw no surface to step on";
+    case StopReason::kNoStaircase:
+      return "it saw level ground and no higher tread";
+    case StopReason::kTop:
+      return "it took the tread it stood on for the highest";
+    case StopReason::kRiseTooHigh:
+      return sentence("it measured a rise of %.3f m, too high to climb", measured_m);
+    case StopReason::kTreadTooShort:
+      return sentence("it measured a tread of %.3f m, too short for the foot", measured_m);
+    case StopReason::kTooNarrow:
+      return "it measured a tread too narrow for two feet";
+    case StopReason::kMapStale:
+      return "its map was stale";
+    case StopReason::kEdgeUncertain:
+      return "it knew the edges of the next tread too vaguely";
+    case StopReason::kLegsCannot:
+      return measured_m > 0.0 ? sentence("its legs could not do the next step, of %.3f m rise", measured_m)
+                              : "its legs could not do the next step";
+    case StopReason::kUnsteady:
+      return "what it saw kept changing";
+    case StopReason::kNotLinedUp:
+      return "it did not come to stand straight before the stairs";
+    case StopReason::kGroundMissing:
+      return "there was no ground where a foot came down, and it put the foot back";
+    case StopReason::kToppling:
+      return "its body kept toppling towards the foot it lifted, and it put every one back";
+    case StopReason::kStateStale:
+      return "its IMU or its joints fell silent";
+  }
+  return "it gave no known reason";
+}
+
+std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
+  const std::string climbed = sentence("%.0f of %.0f steps", s.steps_climbed, s.steps_total);
+  const std::string over_the_edge =
+      sentence("A sole stood %.1f mm over the edge of its tread", -s.sole_margin_min_m * 1e3);
+  const bool over = s.sole_margin_min_m < 0.0;
+  const bool all_climbed = s.steps_total > 0 && s.steps_climbed == s.steps_total;
+  const std::string why = why_stopped(ending.stop_reason, ending.stop_measured_m);
+  if (s.pass) {
+    std::string reason =
+        "Climbed " + climbed +
+        sentence(" in %.1f s (%.2f s per step), least sole margin %.1f mm, least swing clearance %.1f mm",
+                 s.climb_time_s, s.seconds_per_step, s.sole_margin_min_m * 1e3, s.swing_clearance_min_m * 1e3);
+    if (ending.phase == GaitPhase::kStopped) return reason + "; the module stopped there: " + why + ".";
+    return reason + (ending.phase == GaitPhase::kFinished ? "." : "; the run ended before the module did.");
+  }
+  if (s.fell) return "Fell after " + climbed + ": " + ending.fall_reason;
+  if (!all_climbed && ending.phase == GaitPhase::kStopped) {
+    return "The module stopped after " + climbed + ": " + why + ".";
+  }
+  // A step counts where both soles rest inside its edges, so a sole over one may be why the count is short.
+  if (!all_climbed && ending.phase == GaitPhase::kFinished) {
+    if (over) return over_the_edge + "; " + climbed + " count.";
+    return "The module ended the climb after " + climbed + ": " + why_stopped(StopReason::kTop, 0.0) + ".";
+  }
+  if (!all_climbed) return "Time ran out after " + climbed + ".";
+  if (s.heap_calls != 0) {
+    return "The module called the heap, " + std::to_string(s.heap_calls) + " times in all, first from " +
+           (ending.heap_first_caller.empty() ? "an unknown function" : ending.heap_first_caller) + ".";
+  }
+  if (!(s.sole_margin_min_m >= 0.0)) return over_the_edge + ".";
+  return sentence("A foot came within %.1f mm of the stairs (0 or less is a collision).",
+                  s.swing_clearance_min_m * 1e3);
+}
+
+}  // namespace
+
+void judge(ClimbSummary& s, const ClimbEnding& ending) {
+  const bool all_climbed = s.steps_total > 0 && s.steps_climbed == s.steps_total;
+  s.pass = all_climbed && !s.fell && s.sole_margin_min_m >= 0.0 && s.swing_clearance_min_m > 0.0 && s.heap_calls == 0;
+  s.reason = reason_of(s, ending);
+  for (const Push& push : s.options.pushes) {
+    if (push.at_s < s.ended_at_s) continue;
+    s.reason += sentence(" The push at %g s never came: the run ended at %.1f s.", push.at_s, s.ended_at_s);
+  }
+}
+
+}  // namespace polygmap::sim

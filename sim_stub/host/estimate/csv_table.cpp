@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/estimate/csv_table.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include "firmware/config/file_error.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+constexpr std::size_t kMostShown = 24;  // of a cell, in a sentence
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r\n";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+std::vector<std::string_view> split(std::string_view line) {
+  std::vector<std::string_view> cells;
+  for (std::size_t from = 0;;) {
+    const std::size_t comma = line.find(',', from);
+    cells.push_back(trimmed(line.substr(from, comma - from)));
+    if (comma == std::string_view::npos) return cells;
+    from = comma + 1;
+  }
+}
+
+std::string read_text(const std::string& path) {
+  std::error_code none;
+  if (!std::filesystem::exists(path, none)) throw config::FileError("There is no file \"" + path + "\".");
+  if (std::filesystem::is_directory(path, none)) throw config::FileError("\"" + path + "\" is a folder, not a file.");
+  std::ifstream file(path, std::ios::binary);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  if (!file.is_open() || file.bad()) throw config::FileError("Cannot read \"" + path + "\".");
+  if (text.empty()) throw config::FileError("\"" + path + "\" is empty.");
+  return text;
+}
+
+// As it may stand in a sentence on one line.
+std::string shown(std::string_view text) {
+  std::string clean(text.substr(0, kMostShown));
+  std::replace_if(
+      clean.begin(), clean.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return "\"" + clean + (text.size() > kMostShown ? "...\"" : "\"");
+}
+
+}  // namespace
+
+CsvTable::CsvTable(std::string path) : path_(std::move(path)), text_(read_text(path_)) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  std::string_view rest = text_;
+  if (rest.substr(0, kByteOrderMark.size()) == kByteOrderMark) rest.remove_prefix(kByteOrderMark.size());
+  for (std::size_t number = 1; !rest.empty(); ++number) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    const std::string_view line = rest.substr(0, end);
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    if (trimmed(line).empty() && trimmed(rest).empty() && number > 1) break;  // the file's end
+    const std::vector<std::string_view> cells = split(line);
+    if (number == 1) {
+      header_ = cells;
+      refuse_other_dialects(line);
+      for (auto name = header_.begin(); name != header_.end(); ++name) {
+        if (!name->empty() && std::find(name + 1, header_.end(), *name) != header_.end()) {
+          throw config::FileError("\"" + path_ + "\" line 1: the column " + shown(*name) + " is named twice.");
+        }
+      }
+      continue;
+    }
+    lines_.push_back({number, cells_.size()});
+    if (cells.size() != header_.size()) {
+      fail(lines_.size() - 1, "has " + std::to_string(cells.size()) + " values, but the header names " +
+                                  std::to_string(header_.size()) + " columns");
+    }
+    cells_.insert(cells_.end(), cells.begin(), cells.end());
+  }
+  if (lines_.empty()) throw config::FileError("\"" + path_ + "\" has no rows of data.");
+}
+
+void CsvTable::refuse_other_dialects(std::string_view line) const {
+  for (const auto& [separator, name] : {std::pair{';', "semicolons"}, std::pair{'\t', "tabs"}}) {
+    if (trimmed(line).find(separator) != std::string_view::npos) {
+      throw config::FileError("\"" + path_ + "\" line 1: the columns are separated by " + name + ", not by commas.");
+    }
+  }
+  if (trimmed(line).find('\r') != std::string_view::npos) {
+    throw config::FileError("\"" + path_ + "\": its lines end in CR alone, not in LF or CR LF.");
+  }
+  if (line.find('"') != std::string_view::npos) {
+    throw config::FileError("\"" + path_ + "\" line 1: the columns' names stand in quotes, which are not read.");
+  }
+}
+
+bool CsvTable::has_any(std::string_view prefix) const noexcept {
+  return std::any_of(header_.begin(), header_.end(),
+                     [prefix](std::string_view name) { return name.substr(0, prefix.size()) == prefix; });
+}
+
+std::size_t CsvTable::find(std::string_view column) const noexcept {
+  return static_cast<std::size_t>(std::find(header_.begin(), header_.end(), column) - header_.begin());
+}
+
+std::size_t CsvTable::column(std::string_view name) const {
+  const std::size_t index = find(name);
+  if (index == header_.size()) {
+    throw config::FileError("\"" + path_ + "\" line 1: the column \"" + std::string(name) + "\" is missing.");
+  }
+  return index;
+}
+
+double CsvTable::number(std::size_t row, std::size_t column, double limit) const {
+  const std::string_view cell = cells_[lines_[row].first_cell + column];
+  const std::string name(header_[column]);
+  double value = 0.0;
+  const char* const begin = cell.data() + (cell.size() > 1 && cell[0] == '+' && cell[1] != '-' ? 1 : 0);
+  const auto [end, error] = std::from_chars(begin, cell.data() + cell.size(), value);
+  if (cell.empty() || end != cell.data() + cell.size() || error == std::errc::invalid_argument) {
+    fail(row, name + " is " + (cell.empty() ? "empty" : shown(cell)) + ", not a number");
+  }
+  if (error == std::errc::result_out_of_range) fail(row, name + " is " + shown(cell) + ", which no double can hold");
+  if (!std::isfinite(value)) fail(row, name + " is " + shown(cell) + ", not a finite number");
+  if (!(std::abs(value) <= limit)) {
+    std::ostringstream sentence;
+    sentence << name << " is " << value << ", beyond what can be true (" << limit << ")";
+    fail(row, sentence.str());
+  }
+  return value;
+}
+
+void CsvTable::fail(std::size_t row, const std::string& sentence) const {
+  throw config::FileError("\"" + path_ + "\" line " + std::to_string(lines_[row].number) + ": " + sentence + ".");
+}
+
+}  // namespace polygmap::sim

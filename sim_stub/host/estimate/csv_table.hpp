@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Numbers from a comma-separated file with a header line. Strict: what is not a finite number is an error that names
+// file and line. (Debian's libcsv splits cells, which is the little of it, and knows no lines.)
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace polygmap::sim {
+
+class CsvTable {
+ public:
+  // Reads the whole file. Throws config::FileError: absent, a folder, unreadable, empty, not separated by commas, names
+  // in quotes, a column named twice, a row of another length.
+  explicit CsvTable(std::string path);
+
+  [[nodiscard]] std::size_t rows() const noexcept { return lines_.size(); }
+  // Does any column's name begin so?
+  [[nodiscard]] bool has_any(std::string_view prefix) const noexcept;
+  // Index of a column. Throws config::FileError when it is missing.
+  [[nodiscard]] std::size_t column(std::string_view name) const;
+  // Throws config::FileError when the cell is no finite number within +-limit.
+  [[nodiscard]] double number(std::size_t row, std::size_t column, double limit) const;
+  // Throws config::FileError: "FILE line N: sentence."
+  [[noreturn]] void fail(std::size_t row, const std::string& sentence) const;
+
+ private:
+  struct Line {
+    std::size_t number;  // in the file, from 1
+    std::size_t first_cell;
+  };
+  void refuse_other_dialects(std::string_view header) const;
+  [[nodiscard]] std::size_t find(std::string_view column) const noexcept;
+
+  std::string path_, text_;
+  std::vector<std::string_view> header_;
+  std::vector<std::string_view> cells_;
+  std::vector<Line> lines_;
+};
+
+}  // namespace polygmap::sim

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/estimate/estimate_replay.hpp"
+
+#include <algorithm>
+#include <memory>
+
+#include "algorithms/geometry/so3.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+constexpr std::int64_t kRingPeriod_ns = 2 * kNsPerMs;  // the ring holds half a second at this rate
+// Standing still at the start, for so long at least and at most. What is noise is smoothed away, and the last of it is
+// left out: it was motion before it could be seen.
+constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0, kSmoothing_s = 0.05, kUnseenMotion_s = 0.15;
+constexpr double kStillRate_radps = 0.1, kStillAccel_mps2 = 1.0, kStillMove_m = 0.004;
+constexpr double kUnseenTurn_rad = 2e-4, kUnseenSpeed_mps = 5e-3;  // in that time
+
+Mat3 level_R_base(const Vec3& up) {
+  const double roll_rad = std::atan2(up.y(), up.z());
+  const double pitch_rad = std::atan2(-up.x(), std::hypot(up.y(), up.z()));
+  return rotation_y(pitch_rad) * rotation_x(roll_rad);
+}
+
+// Means over the standstill at the start.
+struct Opening {
+  Vec3 gyro_radps = Vec3::Zero(), accel_mps2 = Vec3::Zero();
+  double still_s = 0.0;
+  double gyro_sigma_radps = 0.0;  // of the mean: noise, and a turn too slow to be seen
+};
+
+// Signals of one row, smoothed.
+struct Smoothed {
+  Vec3 gyro_radps = Vec3::Zero(), accel_mps2 = Vec3::Zero();
+  std::array<Vec3, kFootCount> base_p_foot_m{Vec3::Zero(), Vec3::Zero()};
+  void take(const LogRow& row, double share) {
+    gyro_radps += share * (row.gyro_radps - gyro_radps);
+    accel_mps2 += share * (row.accel_mps2 - accel_mps2);
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      base_p_foot_m[f] += share * (row.base_p_foot_m[f] - base_p_foot_m[f]);
+    }
+  }
+};
+
+std::int64_t end_of_standstill_ns(const EstimateLog& log) {
+  Smoothed now, mean;
+  double count = 0.0;
+  std::int64_t last_ns = 0;
+  for (const LogRow& row : log.rows) {
+    count += 1.0;
+    const double dt_s = seconds(row.stamp_ns - last_ns);
+    now.take(row, std::max(1.0 / count, dt_s / (kSmoothing_s + dt_s)));
+    mean.take(row, 1.0 / count);
+    bool still = now.gyro_radps.cwiseAbs().maxCoeff() < kStillRate_radps &&
+                 std::abs(now.accel_mps2.norm() - kGravity_mps2) < kStillAccel_mps2 &&
+                 seconds(row.stamp_ns) < kMaxStill_s;
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      still = still && row.contact[f] >= 0.5 && (now.base_p_foot_m[f] - mean.base_p_foot_m[f]).norm() < kStillMove_m;
+    }
+    if (!still) break;
+    last_ns = row.stamp_ns;
+  }
+  return last_ns;
+}
+
+Opening opening(const EstimateLog& log) {
+  const std::int64_t end_ns = end_of_standstill_ns(log) - static_cast<std::int64_t>(kUnseenMotion_s * 1e9);
+  Opening o;
+  double count = 0.0;
+  Vec3 squares = Vec3::Zero();
+  for (const LogRow& row : log.rows) {
+    if (row.stamp_ns > end_ns) break;
+    count += 1.0;
+    const Vec3 off_radps = row.gyro_radps - o.gyro_radps;
+    o.gyro_radps += off_radps / count;
+    squares += off_radps.cwiseProduct(row.gyro_radps - o.gyro_radps);
+    o.accel_mps2 += (row.accel_mps2 - o.accel_mps2) / count;
+    o.still_s = seconds(row.stamp_ns);
+  }
+  o.gyro_sigma_radps = std::hypot(std::sqrt(squares.maxCoeff()) / count, kUnseenTurn_rad / o.still_s);
+  return o;
+}
+
+class LogReplay {
+ public:
+  LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log), options_(options) {
+    felt_.stamp_ns = -1;
+    odometry_.reset(options.odometry);
+    contacts_.reset({});
+    imu_noise_.reset();
+    begin();
+  }
+
+  void add_lio(const LioRow& row, std::int64_t now_ns) {
+    LioSample sample;
+    sample.stamp_ns = row.stamp_ns;
+    sample.lio_T_lidar = row.pose;
+    LioVerdict verdict = odometry_.fusion().check(sample, now_ns);
+    StateEstimate then;
+    if (verdict == LioVerdict::kAccepted) {
+      if (sample.stamp_ns > last_ring_ns_) keep();  // as young as this row
+      verdict = ring_.try_at(sample.stamp_ns, then) ? odometry_.fusion().fuse(sample, then.odom_T_base)
+                                                    : LioVerdict::kNoOdometry;
+    }
+    ++result_.lio[static_cast<std::size_t>(verdict)];
+  }
+
+  void step(std::size_t i) {
+    const LogRow& row = log_.rows[i];
+    contacts_.update_stated(row.contact, row.stamp_ns);
+    const LogRow before = felt_;
+    if (odometry_.is_valid_imu(row.gyro_radps, row.accel_mps2)) {
+      felt_ = row;
+      imu_noise_.update(row.stamp_ns, row.gyro_radps, row.accel_mps2);
+    } else {
+      ++result_.imu_invalid;
+    }
+    if (i > 0) {
+      ProprioceptiveOdometry::Step step;
+      step.stamp_ns = row.stamp_ns;
+      step.dt_s = seconds(row.stamp_ns - log_.rows[i - 1].stamp_ns);
+      if (step.dt_s > options_.odometry.max_step_s) ++result_.gaps;
+      // Samples of a moment: over the step, the mean of both its ends. The last ones bridge some that are invalid.
+      step.gyro_radps = 0.5 * (felt_.gyro_radps + before.gyro_radps);
+      step.accel_mps2 = 0.5 * (felt_.accel_mps2 + before.accel_mps2);
+      step.felt = felt_.stamp_ns >= 0 && seconds(row.stamp_ns - felt_.stamp_ns) <= options_.odometry.max_step_s;
+      step.imu_noise = imu_noise_.density();
+      odometry_.step(step, legs_of(row), contacts_.feet(), {});
+    }
+    publish(row, i);
+  }
+
+  [[nodiscard]] Replay take() {
+    result_.gyro_bias_radps = odometry_.attitude().gyro_bias_radps();
+    result_.accel_bias_mps2 = odometry_.attitude().accel_bias_mps2();
+    result_.foot_position_sigma_m = odometry_.motion().position_sigma_m();
+    result_.contact_walk_mprs = odometry_.attitude().contact_walk_mprs();
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] ProprioceptiveOdometry::Legs legs_of(const LogRow& row) const {
+    ProprioceptiveOdometry::Legs legs;
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      legs[f].base_T_sole.p_m = row.base_p_foot_m[f];
+      legs[f].sole_known = false;
+      legs[f].position_sigma_m = odometry_.motion().position_sigma_m();
+    }
+    return legs;
+  }
+
+  void begin() {
+    const LogRow& first = log_.rows.front();
+    const Opening o = opening(log_);
+    const bool stood = o.still_s >= kMinStill_s;
+    ContactInEkf::Start start;
+    start.gyro_bias_sigma_radps = stood ? o.gyro_sigma_radps : options_.gyro_bias_sigma_radps;
+    start.accel_bias_sigma_mps2 = options_.accel_bias_sigma_mps2;
+    if (stood) start.gyro_bias_radps = o.gyro_radps;
+    if (log_.has_truth) {
+      start.odom_R_base = first.truth.true_T_base.R;
+      // The filter's errors turn about its origin, so that is the start, wherever on earth the truth counts from.
+      start_m_ = first.truth.true_T_base.p_m;
+      start.odom_v_base_mps = first.truth.true_v_base_mps;
+      if (stood) {
+        start.accel_bias_mps2 = o.accel_mps2 - start.odom_R_base.transpose() * Vec3{0, 0, kGravity_mps2};
+        start.accel_bias_sigma_mps2 = kUnseenSpeed_mps / o.still_s;
+      }
+    } else {
+      result_.start = stood ? StartSource::kStandstill : StartSource::kFirstAcceleration;
+      start.odom_R_base = level_R_base(stood ? o.accel_mps2 : first.accel_mps2);
+      for (const Vec3& foot_m : first.base_p_foot_m) {  // the feet's mean at height 0
+        start.odom_p_base_m.z() -= (start.odom_R_base * foot_m).z() / static_cast<double>(kFootCount);
+      }
+      start.tilt_sigma_rad = stood ? start.accel_bias_sigma_mps2 / kGravity_mps2 : 0.2;
+      start.velocity_sigma_mps = stood ? 0.01 : 1.0;
+    }
+    contacts_.update_stated(first.contact, 0);
+    odometry_.initialise(start, legs_of(first), 0.01);
+  }
+
+  void keep() {
+    ring_.push(now_);
+    last_ring_ns_ = now_.stamp_ns;
+  }
+
+  void publish(const LogRow& row, std::size_t i) {
+    StateEstimate& state = now_;
+    state.stamp_ns = row.stamp_ns;
+    odometry_.describe(row.stamp_ns, state);
+    if (row.stamp_ns - last_ring_ns_ >= kRingPeriod_ns || i == 0) keep();
+    const Mat3& world_R_odom = state.world_T_odom.R;
+    ReplayTick tick;
+    tick.stamp_ns = row.stamp_ns;
+    tick.odom_T_base = {state.odom_T_base.R, start_m_ + state.odom_T_base.p_m};
+    tick.world_T_base = {world_R_odom * state.odom_T_base.R, start_m_ + state.world_T_base().p_m};
+    tick.world_v_base_mps = world_R_odom * state.odom_v_base_mps;
+    tick.base_w_base_radps = state.base_w_base_radps;
+    odometry_.describe(row.stamp_ns, tick.quality);
+    tick.contact_probability = state.contact_probability;
+    tick.lio_age_ns = state.lio_age_ns;
+    result_.ticks.push_back(tick);
+    if (i > 0) {  // as the fusion's limit counts: the new offset against the old one, at the same place
+      const double slew_m = (state.world_T_base().p_m - last_world_T_odom_ * state.odom_T_base.p_m).norm();
+      result_.largest_slew_m = std::max(result_.largest_slew_m, slew_m);
+    }
+    last_world_T_odom_ = state.world_T_odom;
+    const auto& feet = contacts_.feet();
+    if (!feet[0].stands && !feet[1].stands) ++result_.rows_without_contact;
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      if (contacts_.feet()[f].stands && odometry_.motion().walk_m2ps(f) > 0.0) ++result_.slipping_rows;
+    }
+  }
+
+  const EstimateLog& log_;
+  const ReplayOptions& options_;
+  LogRow felt_;  // the last whose IMU was valid; before there is one: stamp -1
+  ProprioceptiveOdometry odometry_;
+  ContactEstimator contacts_;
+  ImuNoise imu_noise_;
+  StateHistory ring_;
+  StateEstimate now_;
+  Vec3 start_m_ = Vec3::Zero();  // world minus the filter's axes
+  std::int64_t last_ring_ns_ = 0;
+  Transform last_world_T_odom_;
+  Replay result_;
+};
+
+}  // namespace
+
+ProprioceptiveOdometry::Params log_params() {
+  ProprioceptiveOdometry::Params params;
+  // How much contacts creep is soon found out, where nothing is known of the feet.
+  params.attitude.contact_walk_mprs = 1e-2;
+  params.attitude.whiteness_start_gain = params.attitude.whiteness_gain_ps = 2.0;
+  params.fusion.base_T_lidar = {};
+  params.fusion.uncertainty.initial_sigma_m = 1e-4;  // the start is the truth's, or defined there
+  params.fusion.uncertainty.initial_sigma_rad = 1e-4;
+  // As the module's 4 s are to its lidar's 10 mm: what comes through grows with LIO's noise, drift does not.
+  params.fusion.tau_s = 1.0;
+  params.fusion.tau_spm = 400.0;
+  return params;
+}
+
+bool is_finite(const Replay& replay) {
+  return std::all_of(replay.ticks.begin(), replay.ticks.end(), [](const ReplayTick& tick) {
+    return math::all_finite(tick.world_T_base.p_m) && math::all_finite(tick.world_T_base.R) &&
+           math::all_finite(tick.world_v_base_mps) && math::all_finite(tick.quality.covariance);
+  });
+}
+
+Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options) {
+  const auto estimator = std::make_unique<LogReplay>(log, options);  // its ring is too large for a stack
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < log.rows.size(); ++i) {
+    const std::int64_t now_ns = log.rows[i].stamp_ns;
+    estimator->step(i);  // first, so that a pose stamped with this row finds it
+    for (; next < lio.size() && lio[next].arrival_ns <= now_ns; ++next) estimator->add_lio(lio[next], now_ns);
+  }
+  Replay result = estimator->take();
+  result.lio_not_arrived = lio.size() - next;
+  return result;
+}
+
+}  // namespace polygmap::sim

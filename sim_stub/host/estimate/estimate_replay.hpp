@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recorded log through the module's estimation: what `polygmap estimate` does.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "algorithms/estimation/proprioceptive_odometry.hpp"
+#include "sim_stub/host/estimate/estimate_log.hpp"
+
+namespace polygmap::sim {
+
+// The module's, but for what no data sheet says of a robot that is only known by its log.
+[[nodiscard]] ProprioceptiveOdometry::Params log_params();
+
+struct ReplayOptions {
+  ProprioceptiveOdometry::Params odometry = log_params();  // its lidar mount: none, LIO gives the base's pose
+  // One sigma, where no standstill at the start says what they are.
+  double gyro_bias_sigma_radps = 0.01, accel_bias_sigma_mps2 = 0.2;
+};
+
+enum class StartSource : std::uint8_t { kTruth, kStandstill, kFirstAcceleration };
+
+// After one row.
+struct ReplayTick {
+  std::int64_t stamp_ns = 0;
+  Transform world_T_base, odom_T_base;
+  Vec3 world_v_base_mps = Vec3::Zero();
+  Vec3 base_w_base_radps = Vec3::Zero();
+  EstimateQuality quality;
+  std::array<double, kFootCount> contact_probability{};
+  std::int64_t lio_age_ns = -1;
+};
+
+struct Replay {
+  std::vector<ReplayTick> ticks;  // one per row
+  StartSource start = StartSource::kTruth;
+  Vec3 gyro_bias_radps = Vec3::Zero(), accel_bias_mps2 = Vec3::Zero();  // at the end
+  double foot_position_sigma_m = 0.0, contact_walk_mprs = 0.0;          // measured
+  std::uint32_t imu_invalid = 0;  // rows beyond what the module takes for true: left out
+  std::uint32_t gaps = 0;         // rows that came after more than 50 ms
+  std::uint32_t slipping_rows = 0;
+  std::uint32_t rows_without_contact = 0;
+  std::array<std::uint32_t, kLioVerdictCount> lio{};
+  std::size_t lio_not_arrived = 0;  // by the last row
+  double largest_slew_m = 0.0;      // most that one tick moved the fused pose against the odometry
+};
+
+// False: the log's numbers, each possible by itself, broke the filter.
+[[nodiscard]] bool is_finite(const Replay& replay);
+[[nodiscard]] Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options);
+
+}  // namespace polygmap::sim

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/perceive/perceive.hpp"
+
+#include <lodepng.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+namespace polygmap::sim {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using polygmap_frames::Kind;
+constexpr double kMinLevelArea_m2 = 0.02;
+
+[[noreturn]] void fail(const std::string& sentence) { throw config::FileError(sentence); }
+
+Json point(const Vec3& p) { return Json::array({p.x(), p.y(), p.z()}); }
+
+// What is a surface's own; the rest is its plane's.
+Json piece(const Surface& surface) {
+  Json j;
+  j["centroid"] = point(surface.centroid_m);
+  j["area_m2"] = surface.area_m2;
+  j["invalid_fraction"] = surface.invalid_fraction;
+  j["polygon"] = Json::array();
+  for (const Vec3& v : surface.polygon_m) j["polygon"].push_back(point(v));
+  j["nosing"] = surface.nosing_m ? Json::array({point((*surface.nosing_m)[0]), point((*surface.nosing_m)[1])}) : Json();
+  return j;
+}
+
+void save(const std::string& path, const std::vector<unsigned char>& bytes) {
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) fail("Cannot write \"" + path + "\".");
+}
+
+// Of the normal and d of m = -normal / d, from that of m.
+Eigen::Matrix4d plane_covariance(const Surface& surface) {
+  const Vec3& n = surface.normal;
+  Eigen::Matrix<double, 4, 3> jacobian;
+  jacobian.topRows<3>() = -surface.d_m * (Mat3::Identity() - n * n.transpose());
+  jacobian.bottomRows<1>() = surface.d_m * surface.d_m * n.transpose();
+  return jacobian * surface.covariance * jacobian.transpose();
+}
+
+class Extraction {
+ public:
+  Extraction(const config::CameraProfile& profile, const DepthPng& picture) {
+    const CameraIntrinsics& k = profile.intrinsics;
+    const DepthNoiseModel& noise = profile.noise;
+    // Whole columns of eight pixels and pairs of rows: what is left over at the right and below is not looked at.
+    camera_ = {k.width_px / 8 * 8,
+               k.height_px / 2 * 2,
+               k.fx_px,
+               k.fy_px,
+               k.cx_px,
+               k.cy_px,
+               k.depth_unit_m,
+               profile.min_depth_m,
+               profile.max_depth_m,
+               noise.base_m,
+               noise.per_metre,
+               noise.quadratic_per_m,
+               noise.correlated_share,
+               noise.correlated_px};
+    for (std::int32_t r = 0; r < camera_.height_px; ++r) {
+      const auto row = picture.depth.begin() + static_cast<std::ptrdiff_t>(r) * picture.width_px;
+      depth_.insert(depth_.end(), row, row + camera_.width_px);
+    }
+    extractor_ = holds(camera_) ? make_extractor(camera_) : polygmap_1024x768::make_extractor(camera_);
+  }
+  // A camera delivers many frames; here one has to say by itself how noisy it is.
+  void settle_noise(const Vec3& up) {
+    constexpr int kMostRounds = 6;
+    constexpr double kSettled = 0.03;
+    const auto settled = [this](double z_m, double before_m) {
+      return std::abs(extractor_->noise_sigma_m(z_m) - before_m) < kSettled * before_m;
+    };
+    for (int i = 0; i < kMostRounds; ++i) {
+      const double near_m = extractor_->noise_sigma_m(1.0), far_m = extractor_->noise_sigma_m(3.0);
+      static_cast<void>(run(up));
+      if (settled(1.0, near_m) && settled(3.0, far_m)) break;
+    }
+    extractor_->hold_noise();
+  }
+  double run(const Vec3& up) {
+    const std::optional<double> microseconds = extractor_->extract(depth_.data(), up);
+    if (!microseconds) fail("The plane extraction refuses this camera or gravity.");
+    return *microseconds;
+  }
+  [[nodiscard]] std::vector<Surface> surfaces() const { return extractor_->surfaces(); }
+  [[nodiscard]] std::size_t surface_at(std::int32_t column, std::int32_t row) const {
+    return column < camera_.width_px && row < camera_.height_px ? extractor_->surface_at(column, row) : 0U;
+  }
+
+ private:
+  polygmap_frames::Camera camera_;
+  std::vector<std::uint16_t> depth_;
+  std::unique_ptr<polygmap_frames::Extractor> extractor_;
+};
+
+// The normal of the largest surface that faces upwards in the picture.
+std::optional<Vec3> find_up(const std::vector<Surface>& surfaces) {
+  std::optional<Vec3> up;
+  double most_m2 = kMinLevelArea_m2;
+  for (const Surface& surface : surfaces) {
+    if (surface.normal.y() > -0.35 || std::abs(surface.normal.x()) > 0.5 || surface.area_m2 < most_m2) continue;
+    most_m2 = surface.area_m2;
+    up = surface.normal;
+  }
+  return up;
+}
+
+}  // namespace
+
+std::string size_text(std::int64_t width, std::int64_t height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
+DepthPng read_depth(const std::string& path) {
+  std::vector<unsigned char> file;
+  if (lodepng::load_file(file, path) != 0) fail("Cannot read the picture \"" + path + "\".");
+  if (file.empty()) fail("The picture \"" + path + "\" is empty.");
+  lodepng::State state;
+  unsigned width = 0, height = 0;
+  if (const unsigned error = lodepng_inspect(&width, &height, &state, file.data(), file.size()); error != 0) {
+    fail("\"" + path + "\" is no PNG: " + lodepng_error_text(error) + ".");
+  }
+  if (state.info_png.color.colortype != LCT_GREY || state.info_png.color.bitdepth != 16) {
+    fail("\"" + path + "\" is no depth picture: it must be a PNG of one channel of 16 bits.");
+  }
+  if (width > polygmap_frames::kMaxWidth_px || height > polygmap_frames::kMaxHeight_px) {  // before memory is taken
+    fail("\"" + path + "\" is " + size_text(width, height) + ", more than the " +
+         size_text(polygmap_frames::kMaxWidth_px, polygmap_frames::kMaxHeight_px) + " that are read.");
+  }
+  state.info_raw.colortype = LCT_GREY;
+  state.info_raw.bitdepth = 16;
+  std::vector<unsigned char> bytes;
+  if (const unsigned error = lodepng::decode(bytes, width, height, state, file); error != 0) {
+    fail("\"" + path + "\" is broken: " + lodepng_error_text(error) + ".");
+  }
+  DepthPng picture{static_cast<std::int32_t>(width), static_cast<std::int32_t>(height), {}};
+  picture.depth.resize(std::size_t{width} * height);
+  for (std::size_t i = 0; i < picture.depth.size(); ++i) {
+    picture.depth[i] = static_cast<std::uint16_t>(256 * bytes[2 * i] + bytes[2 * i + 1]);
+  }
+  return picture;
+}
+
+Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture, const std::optional<Vec3>& gravity,
+                   int repeat) {
+  Extraction extraction(camera, picture);
+  Perceived out;
+  if (gravity) {
+    out.camera_up = -gravity->normalized();
+  } else {
+    const Vec3 along_the_picture{0.0, -1.0, 0.0};
+    static_cast<void>(extraction.run(along_the_picture));
+    const std::optional<Vec3> found = find_up(extraction.surfaces());
+    out.up_assumed = !found;
+    out.camera_up = found.value_or(along_the_picture);
+  }
+  extraction.settle_noise(out.camera_up);
+  for (int i = 0; i < std::max(repeat, 1); ++i) out.microseconds.push_back(extraction.run(out.camera_up));
+
+  std::map<std::uint8_t, std::size_t> index_of_plane;
+  std::vector<std::uint8_t> label_of_surface{0};
+  for (Surface& surface : extraction.surfaces()) {
+    const auto [place, fresh] = index_of_plane.try_emplace(surface.plane, out.planes.size());
+    label_of_surface.push_back(static_cast<std::uint8_t>(place->second + 1));
+    if (fresh) out.planes.emplace_back();
+    out.planes[place->second].push_back(std::move(surface));
+  }
+  for (PerceivedPlane& plane : out.planes) {
+    std::stable_sort(plane.begin(), plane.end(),
+                     [](const Surface& a, const Surface& b) { return a.area_m2 > b.area_m2; });
+  }
+  out.labels.reserve(picture.depth.size());
+  for (std::int32_t r = 0; r < picture.height_px; ++r) {
+    for (std::int32_t c = 0; c < picture.width_px; ++c) {
+      out.labels.push_back(label_of_surface[extraction.surface_at(c, r)]);
+    }
+  }
+  return out;
+}
+
+void write_labels(const std::string& path, const DepthPng& picture, const Perceived& perceived) {
+  lodepng::State state;
+  state.encoder.auto_convert = 0;  // it would turn labels into a palette
+  state.info_raw.colortype = state.info_png.color.colortype = LCT_GREY;
+  state.info_raw.bitdepth = state.info_png.color.bitdepth = 8;
+  std::vector<unsigned char> bytes;
+  const unsigned error = lodepng::encode(bytes, perceived.labels, static_cast<unsigned>(picture.width_px),
+                                         static_cast<unsigned>(picture.height_px), state);
+  if (error != 0) fail("Cannot encode \"" + path + "\": " + lodepng_error_text(error) + ".");
+  save(path, bytes);
+}
+
+void write_planes(const std::string& path, const Perceived& perceived) {
+  Json planes = Json::array();
+  for (std::size_t i = 0; i < perceived.planes.size(); ++i) {
+    const PerceivedPlane& pieces = perceived.planes[i];
+    const Surface& largest = pieces.front();
+    Json j;
+    j["id"] = i + 1;
+    j["kind"] = largest.kind == Kind::kTread ? "tread" : (largest.kind == Kind::kRiser ? "riser" : "other");
+    j["normal"] = point(largest.normal);
+    j["d_m"] = largest.d_m;
+    j["covariance"] = Json::array();
+    const Eigen::Matrix4d covariance = plane_covariance(largest);
+    for (int r = 0; r < 4; ++r) {
+      j["covariance"].push_back({covariance(r, 0), covariance(r, 1), covariance(r, 2), covariance(r, 3)});
+    }
+    j["rmse_mm"] = 1e3 * largest.rmse_m;
+    j.update(piece(largest));
+    j["area_m2"] = std::accumulate(pieces.begin(), pieces.end(), 0.0,
+                                   [](double sum, const Surface& s) { return sum + s.area_m2; });
+    j["pieces"] = Json::array();
+    for (const Surface& s : pieces) j["pieces"].push_back(piece(s));
+    planes.push_back(j);
+  }
+  std::ofstream file(path);
+  file << Json{{"planes", planes}, {"up", point(perceived.camera_up)}}.dump(1) << "\n";
+  file.close();
+  if (!file) fail("Cannot write \"" + path + "\".");
+}
+
+void write_picture(const std::string& path, const config::CameraProfile& camera, const DepthPng& picture,
+                   const Perceived& perceived) {
+  const auto width = static_cast<std::size_t>(picture.width_px);
+  std::vector<unsigned char> rgb(3 * picture.depth.size());
+  for (std::size_t i = 0; i < picture.depth.size(); ++i) {
+    const double z_m = picture.depth[i] * camera.intrinsics.depth_unit_m;
+    const double grey = picture.depth[i] == 0 ? 0.0 : 60.0 + 140.0 * std::max(0.0, 1.0 - z_m / camera.max_depth_m);
+    const unsigned label = perceived.labels[i];
+    const std::array<unsigned, 3> hue{(label * 67U) % 200U + 55U, (label * 131U + 80U) % 200U + 55U,
+                                      (label * 29U + 160U) % 200U + 55U};
+    for (std::size_t k = 0; k < 3; ++k) {
+      rgb[3 * i + k] = static_cast<unsigned char>(label == 0 ? grey : 0.5 * grey + 0.5 * hue[k]);
+    }
+  }
+  const CameraIntrinsics& intrinsics = camera.intrinsics;
+  const auto draw = [&](const Vec3& a, const Vec3& b, const std::array<unsigned char, 3>& colour) {
+    constexpr int kSteps = 800;
+    for (int s = 0; s <= kSteps; ++s) {
+      const Vec3 p = a + (b - a) * (static_cast<double>(s) / kSteps);
+      if (!(p.z() > 0.01)) continue;
+      const auto u = static_cast<std::int64_t>(std::lround(p.x() / p.z() * intrinsics.fx_px + intrinsics.cx_px));
+      const auto v = static_cast<std::int64_t>(std::lround(p.y() / p.z() * intrinsics.fy_px + intrinsics.cy_px));
+      if (u < 0 || v < 0 || u >= picture.width_px || v >= picture.height_px) continue;
+      for (std::size_t k = 0; k < 3; ++k) {
+        rgb[3 * (static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u)) + k] = colour[k];
+      }
+    }
+  };
+  for (const PerceivedPlane& pieces : perceived.planes) {
+    for (const Surface& s : pieces) {
+      for (std::size_t i = 0; i < s.polygon_m.size(); ++i) {
+        draw(s.polygon_m[i], s.polygon_m[(i + 1) % s.polygon_m.size()], {255, 255, 255});
+      }
+      if (s.nosing_m) draw((*s.nosing_m)[0], (*s.nosing_m)[1], {255, 40, 40});
+    }
+  }
+  std::vector<unsigned char> bytes;
+  const unsigned error = lodepng::encode(bytes, rgb, static_cast<unsigned>(picture.width_px),
+                                         static_cast<unsigned>(picture.height_px), LCT_RGB, 8);
+  if (error != 0) fail("Cannot encode \"" + path + "\": " + lodepng_error_text(error) + ".");
+  save(path, bytes);
+}
+
+}  // namespace polygmap::sim

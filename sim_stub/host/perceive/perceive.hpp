@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// The module's plane extraction on depth pictures from files: what `polygmap perceive` does.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "firmware/config/camera_file.hpp"
+#include "sim_stub/host/perceive/frame_extraction.hpp"
+
+namespace polygmap::sim {
+
+struct DepthPng {
+  std::int32_t width_px = 0;
+  std::int32_t height_px = 0;
+  std::vector<std::uint16_t> depth;
+};
+
+[[nodiscard]] std::string size_text(std::int64_t width, std::int64_t height);  // as people write it
+
+// Throws config::FileError.
+[[nodiscard]] DepthPng read_depth(const std::string& path);
+
+using polygmap_frames::Surface;
+// The surfaces that were cut from one plane (on both sides of a leg, of a staircase), the largest first; never none.
+using PerceivedPlane = std::vector<Surface>;
+
+struct Perceived {
+  std::vector<PerceivedPlane> planes;  // id is the index + 1
+  std::vector<std::uint8_t> labels;    // per pixel, 0 = none
+  Vec3 camera_up = Vec3::Zero();       // given, or found
+  bool up_assumed = false;             // neither: no plane looks level, up is up in the picture
+  std::vector<double> microseconds;    // one per repetition
+};
+
+// gravity: down, camera frame; without it, the largest plane that looks level says where up is.
+[[nodiscard]] Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture,
+                                 const std::optional<Vec3>& gravity, int repeat);
+
+// Throw config::FileError when the file cannot be written.
+void write_labels(const std::string& path, const DepthPng& picture, const Perceived& perceived);
+void write_planes(const std::string& path, const Perceived& perceived);
+void write_picture(const std::string& path, const config::CameraProfile& camera, const DepthPng& picture,
+                   const Perceived& perceived);
+
+}  // namespace polygmap::sim

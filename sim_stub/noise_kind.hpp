@@ -1,9 +1,0 @@
-// SPDX-License-Identifier: Apache-2.0
-#pragma once
-
-namespace polygmap::sim {
-
-// Correlated noise is what real cameras have; what is tuned on white noise shatters on it.
-enum class DepthNoise { kWhite, kCorrelated };
-
-}  // namespace polygmap::sim

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/plant/mujoco_model.hpp"
+
+#include <cstdarg>
+#include <cstdio>
+
+#include "sim_stub/world/clearance.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+class Xml {
+ public:
+  void add(const char* format, ...) __attribute__((format(printf, 2, 3))) {
+    std::array<char, 512> line{};
+    va_list arguments;
+    va_start(arguments, format);
+    std::vsnprintf(line.data(), line.size(), format, arguments);
+    va_end(arguments);
+    text_ += line.data();
+    text_ += '\n';
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+constexpr double kSoleThickness_m = 0.03;
+
+// Shapes that give a link its inertia and touch nothing: of each leg link, half extents of a box about its centre.
+constexpr std::array<std::array<double, 3>, kJointsPerLeg> kLinkHalf_m{{{0.04, 0.04, 0.04},
+                                                                        {0.04, 0.04, 0.04},
+                                                                        {0.06, 0.06, 0.12},
+                                                                        {0.04, 0.04, 0.15},
+                                                                        {0.02, 0.02, 0.02},
+                                                                        {0.12, 0.04, 0.015}}};
+
+void add_link(Xml& xml, Foot leg, std::size_t joint, const LegGeometry& g) {
+  constexpr std::array<const char*, kJointsPerLeg> kAxis{"1 0 0", "0 0 1", "0 1 0", "0 1 0", "0 1 0", "1 0 0"};
+  const char* side = leg == Foot::kLeft ? "left" : "right";
+  const double sign = side_sign(leg);
+  const std::array<Vec3, kJointsPerLeg> origin_m{g.base_p_hip_m,         Vec3::Zero(),           g.hip_p_hip_pitch_m,
+                                                 Vec3{0, 0, -g.thigh_m}, Vec3{0, 0, -g.shank_m}, Vec3::Zero()};
+  const Vec3& p = origin_m[joint];
+  const JointLimits& limits = joint_limits(leg, joint);
+  const LinkMass link = MassModel{}.leg[joint];
+  const auto& half = kLinkHalf_m[joint];
+  xml.add("<body name='%s_%zu' pos='%.9g %.9g %.9g'>", side, joint + 1, p.x(), sign * p.y(), p.z());
+  xml.add("<joint axis='%s' range='%.9g %.9g'/>", kAxis[joint], limits.min_rad, limits.max_rad);
+  xml.add("<geom class='mass' type='box' pos='%.9g %.9g %.9g' size='%g %g %g' mass='%.9g'/>", link.centre_m.x(),
+          sign * link.centre_m.y(), link.centre_m.z(), half[0], half[1], half[2], link.mass_kg);
+  if (joint == kHipPitch || joint == kKnee) {
+    const bool thigh = joint == kHipPitch;
+    xml.add("<geom class='skin' type='capsule' fromto='0 0 0 0 0 %.9g' size='%g'/>", thigh ? -g.thigh_m : -g.shank_m,
+            thigh ? kThighRadius_m : kShankRadius_m);
+  }
+  if (joint == kAnkleRoll) {
+    xml.add("<geom class='skin' name='%s_sole' type='box' pos='%.9g 0 %.9g' size='%.9g %.9g %.9g'/>", side,
+            kCollisionRectangle.centre_x_m(), 0.5 * kSoleThickness_m - g.ankle_to_sole_m,
+            0.5 * kCollisionRectangle.length_m(), kCollisionRectangle.half_width_m, 0.5 * kSoleThickness_m);
+  }
+}
+
+}  // namespace
+
+std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& world, const RobotErrors& errors) {
+  Xml xml;
+  xml.add("<mujoco><compiler angle='radian' autolimits='true'/><size nuser_geom='1'/>");
+  xml.add("<option timestep='0.001' gravity='0 0 %.9g' cone='elliptic' impratio='10'/>", -kGravity_mps2);
+  xml.add("<default><joint armature='%.9g'/>", params.armature_kgm2);
+  xml.add("<geom friction='%.9g 0.005 0.0001' condim='4' solref='0.008 1'/>", params.friction);
+  xml.add("<default class='mass'><geom contype='0' conaffinity='0'/></default>");
+  xml.add("<default class='skin'><geom contype='2' conaffinity='1' mass='0'/></default>");
+  xml.add("<default class='ground'><geom contype='1' conaffinity='2'/></default></default>");
+  xml.add("<worldbody><geom class='ground' name='floor' type='plane' size='0 0 1'/>");
+  std::size_t number = 0;
+  for (const SolidBox& box : stair_solids(world)) {
+    const Vec3 centre = 0.5 * (box.min_m + box.max_m), half = 0.5 * (box.max_m - box.min_m);
+    xml.add("<geom class='ground' name='solid_%zu' type='box' pos='%.9g %.9g %.9g' size='%.9g %.9g %.9g' user='%d'/>",
+            number++, centre.x(), centre.y(), centre.z(), half.x(), half.y(), half.z(), box.step);
+  }
+  const LinkMass torso = MassModel{}.torso;
+  xml.add("<body name='base'><freejoint/>");
+  xml.add("<geom class='mass' type='box' pos='%.9g %.9g %.9g' size='0.1 0.17 0.28' mass='%.9g'/>",
+          torso.centre_m.x() + params.torso_offset_x_m, torso.centre_m.y(), torso.centre_m.z(),
+          params.torso_mass_scale * torso.mass_kg);
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) add_link(xml, leg, j, errors.legs[index_of(leg)]);
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) xml.add("</body>");
+  }
+  xml.add("</body></worldbody></mujoco>");
+  return xml.text();
+}
+
+}  // namespace polygmap::sim

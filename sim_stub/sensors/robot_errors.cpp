@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/sensors/robot_errors.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "sim_stub/camera/counter_noise.hpp"
+
+namespace polygmap::sim {
+
+RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
+  RobotErrors errors;
+  const CounterNoise lengths(seed, Stream::kLegLengths), offsets(seed, Stream::kEncoderOffsets);
+  const CounterNoise lio(seed, Stream::kLioWorld);
+
+  // One production batch: what a data sheet gets wrong is mostly the same in both legs.
+  const double common = params.leg_length * std::sqrt(0.9), own = params.leg_length * std::sqrt(0.1);
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    errors.legs[f].thigh_m *= 1.0 + common * lengths.normal(0) + own * lengths.normal(2 + 2 * f);
+    errors.legs[f].shank_m *= 1.0 + common * lengths.normal(1) + own * lengths.normal(3 + 2 * f);
+  }
+  for (std::size_t j = 0; j < kJointCount; ++j) {
+    errors.encoder_offset_rad[static_cast<Eigen::Index>(j)] = params.encoder_offset_rad * offsets.normal(j);
+  }
+  const Vec3 imu_rad = params.imu_mount_rad * CounterNoise(seed, Stream::kImuMount).normal3(0);
+  errors.base_R_imu = rotation_zyx(imu_rad.z(), imu_rad.y(), imu_rad.x());
+  errors.gyro_bias_radps = params.gyro_bias_radps * CounterNoise(seed, Stream::kGyroBias).normal3(0);
+  errors.accel_bias_mps2 = params.accel_bias_mps2 * CounterNoise(seed, Stream::kAccelBias).normal3(0);
+  errors.depth_scale =
+      1.0 + CounterNoise(seed, Stream::kDepthScale).uniform(0, -params.depth_scale, params.depth_scale);
+  const CounterNoise mount(seed, Stream::kCameraMount);
+  const auto within = [&mount](std::uint64_t index, double half) { return mount.uniform(index, -half, half); };
+  const double turn_rad = params.camera_mount_rad, shift_m = params.camera_mount_m;
+  const Transform nominal = base_T_camera();
+  errors.base_T_camera = {rotation_zyx(within(2, turn_rad), within(1, turn_rad), within(0, turn_rad)) * nominal.R,
+                          nominal.p_m + Vec3{within(3, shift_m), within(4, shift_m), within(5, shift_m)}};
+  errors.lio_T_true = {rotation_z(lio.uniform(0, -kPi, kPi)),
+                       Vec3{lio.uniform(1, -5, 5), lio.uniform(2, -5, 5), lio.uniform(3, -1, 1)}};
+  return errors;
+}
+
+}  // namespace polygmap::sim

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/sensors/sensor_models.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace polygmap::sim {
+
+ImuModel::ImuModel(const ErrorParams& params, const RobotErrors& errors, std::uint64_t seed,
+                   const Transform& true_T_base)
+    : params_(params),
+      errors_(errors),
+      gyro_noise_(seed, Stream::kGyro),
+      accel_noise_(seed, Stream::kAccel),
+      previous_(true_T_base) {}
+
+ImuSample ImuModel::sample(const Transform& true_T_base, std::int64_t stamp_ns, double tick_s) {
+  const Eigen::AngleAxisd turn(Mat3(previous_.R.transpose() * true_T_base.R));
+  const Vec3 base_w = turn.angle() * turn.axis() / tick_s;
+  const Vec3 velocity_mps = (true_T_base.p_m - previous_.p_m) / tick_s;
+  const Vec3 acceleration = (velocity_mps - previous_velocity_mps_) / tick_s;  // centred on the previous tick
+  const Vec3 base_f = previous_.R.transpose() * (acceleration + Vec3{0, 0, kGravity_mps2});
+  previous_ = true_T_base;
+  previous_velocity_mps_ = velocity_mps;
+
+  const Mat3 imu_R_base = errors_.base_R_imu.transpose();
+  ImuSample sample;
+  sample.stamp_ns = stamp_ns;
+  sample.gyro_radps =
+      imu_R_base * base_w + errors_.gyro_bias_radps + params_.gyro_noise_radps * gyro_noise_.normal3(index_);
+  sample.accel_mps2 =
+      imu_R_base * base_f + errors_.accel_bias_mps2 + params_.accel_noise_mps2 * accel_noise_.normal3(index_);
+  ++index_;
+  return sample;
+}
+
+JointFeedback JointModel::sample(const JointVector& drive_q_rad, const JointVector& drive_dq_radps,
+                                 std::int64_t stamp_ns) {
+  JointFeedback feedback;
+  feedback.stamp_ns = stamp_ns;
+  for (std::size_t j = 0; j < kJointCount; ++j) {
+    const auto i = static_cast<Eigen::Index>(j);
+    const std::uint64_t n = index_ * kJointCount + j;
+    feedback.q_rad[i] = drive_q_rad[i] + params_.encoder_noise_rad * angle_noise_.normal(n);
+    feedback.dq_radps[i] = drive_dq_radps[i] + params_.joint_rate_noise_radps * rate_noise_.normal(n);
+  }
+  ++index_;
+  return feedback;
+}
+
+JointVector TorqueModel::sample(const JointVector& drive_tau_nm, const JointVector& dq_radps) {
+  JointVector tau_nm = drive_tau_nm;
+  constexpr double kCreep_radps = 0.02;  // friction turns round smoothly about here
+  for (Eigen::Index j = 0; j < tau_nm.size(); ++j) {
+    tau_nm[j] += params_.friction_nm * std::tanh(dq_radps[j] / kCreep_radps) +
+                 params_.torque_noise_nm * noise_.normal(index_ * kJointCount + static_cast<std::uint64_t>(j));
+  }
+  ++index_;
+  return tau_nm;
+}
+
+LioSample LioModel::sample(const Transform& true_T_base, std::int64_t stamp_ns) {
+  const Vec3 turn_rad = params_.lio_rotation_rad * rotation_noise_.normal3(index_);
+  const Transform noise{rotation_z(turn_rad.z()) * rotation_y(turn_rad.y()) * rotation_x(turn_rad.x()), Vec3::Zero()};
+  LioSample sample;
+  sample.stamp_ns = stamp_ns;
+  sample.lio_T_lidar = errors_.lio_T_true * true_T_base * base_T_lidar() * noise;
+  sample.lio_T_lidar.p_m += params_.lio_position_m * position_noise_.normal3(index_);
+  constexpr double kLeastSigma = 1e-3;  // no odometry claims to be perfect
+  sample.position_sigma_m.setConstant(std::max(params_.lio_position_m, kLeastSigma));
+  sample.rotation_sigma_rad.setConstant(std::max(params_.lio_rotation_rad, kLeastSigma));
+  ++index_;
+  return sample;
+}
+
+}  // namespace polygmap::sim

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far a foot is from the true stairs: what the plant judges collisions by and the report measures.
+#pragma once
+
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "algorithms/robot/body_shapes.hpp"
+#include "sim_stub/world/stair_world.hpp"
+
+namespace polygmap::sim {
+
+inline constexpr int kFloorStep = -1;  // the floor among step indices
+
+// An axis-aligned solid of the staircase, true world frame.
+struct SolidBox {
+  Vec3 min_m;
+  Vec3 max_m;
+  int step;
+};
+// Every step as a solid standing on the ground; with a nosing, its slab as a second solid. The solids reach below the
+// floor, so that nothing is ever pushed out downwards.
+[[nodiscard]] std::vector<SolidBox> stair_solids(const StairWorld& world);
+
+// Signed distance between a box and a solid, m: exact gap when apart, minus the penetration depth (the shortest way
+// apart) otherwise.
+[[nodiscard]] double signed_distance_m(const OrientedBox& box, const SolidBox& solid) noexcept;
+
+// Least signed distance of a box in the true world frame to the floor and the solids, leaving out the steps in excluded
+// (kFloorStep: the floor); at_most_m when that is less, and cheap then. +inf when nothing is left.
+[[nodiscard]] double clearance_m(const OrientedBox& box, std::span<const SolidBox> solids,
+                                 std::span<const int> excluded = {},
+                                 double at_most_m = std::numeric_limits<double>::infinity()) noexcept;
+
+// Least signed distance of the contact rectangle's corners, seen from above, to the edges of the tread of one step
+// (nosing, next riser, sides; the landing's far end); negative = overhang. For kFloorStep the edge is the staircase.
+[[nodiscard]] double sole_margin_m(const Transform& true_T_sole, const StairWorld& world, int step) noexcept;
+// The same for one point.
+[[nodiscard]] double tread_margin_m(const Vec3& point_m, const StairWorld& world, int step) noexcept;
+
+}  // namespace polygmap::sim

@@ -1,0 +1,596 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "algorithms/estimation/estimator.hpp"
+#include "algorithms/geometry/so3.hpp"
+#include "tests/support/slow_machine.hpp"
+#include "tests/support/synthetic_walk.hpp"
+
+namespace polygmap {
+namespace {
+
+using test::SyntheticWalk;
+using test::WalkSpec;
+using test::WalkTruth;
+
+constexpr std::int64_t kTick_ns = SyntheticWalk::kTick_ns;
+constexpr double kTick_s = 0.002;
+constexpr std::array<bool, kFootCount> kBothStand{true, true};
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// --- SO(3) ---------------------------------------------------------------------------------------------------------
+
+TEST(So3, LogOfExp_AnglesUpToHalfATurn_ReturnsTheVector) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  for (const double angle : {1e-12, 1e-8, 1e-5, 1e-4, 1e-3, 0.1, 1.0, 2.0, 3.0, kPi - 1e-6, kPi - 1e-9}) {
+    for (int i = 0; i < 200; ++i) {
+      const Vec3 v = angle * Vec3{normal(random), normal(random), normal(random)}.normalized();
+      const Mat3 R = so3_exp(v);
+      EXPECT_TRUE(is_rotation(R, 1e-12));
+      ASSERT_LT((so3_log(R) - v).norm(), 1e-9 + 1e-12 / (kPi + 1e-7 - angle)) << angle;
+    }
+  }
+}
+
+TEST(So3, Renormalised_ProductsOfManyRotations_StayRotations) {
+  Mat3 R = Mat3::Identity();
+  for (int i = 0; i < (test::kSlowMachine ? 100000 : 1000000); ++i)
+    R = so3_renormalised(R * so3_exp({1e-3, -2e-3, 3e-3}));
+  EXPECT_TRUE(is_rotation(R, 1e-14));
+}
+
+// --- Eqs (1)-(4) ---------------------------------------------------------------------------------------------------
+
+ContactRows rows_of(const BaseFilter& filter, const WalkTruth& truth, const JointFeedback& joints,
+                    const std::array<FootContact, kFootCount>& contacts,
+                    const std::array<KnownHeight, kFootCount>& heights) {
+  const LegGeometry geometry;
+  return filter.make_rows(truth.true_T_base.R, Vec3::Zero(),
+                          {measure_leg(geometry, Foot::kLeft, joints.q_rad, joints.dq_radps),
+                           measure_leg(geometry, Foot::kRight, joints.q_rad, joints.dq_radps)},
+                          contacts, {}, heights, kTick_s);
+}
+
+TEST(BaseFilter, Eq2Prediction_ConstantAcceleration_IsTheParabola) {
+  AxisFilter axis;
+  axis.initialise(AxisFilter::State::Zero(), AxisFilter::State::Constant(1e-6));
+  for (int i = 0; i < 500; ++i) axis.predict(0.4, kTick_s, AxisFilter::State::Zero());
+  EXPECT_NEAR(axis.velocity_mps(), 0.4, 1e-12);
+  EXPECT_NEAR(axis.position_m(), 0.2, 1e-12);
+  EXPECT_DOUBLE_EQ(axis.contact_m(3), 0.0);
+  EXPECT_NEAR(axis.covariance()(0, 0), 2e-6, 1e-15);  // 1e-6 + (1 s)^2 1e-6
+}
+
+TEST(BaseFilter, Eq3Rows_PoseAndRates_AreContactsMinusBaseInOdomAxes) {
+  BaseFilter filter;
+  filter.reset({});
+  const Mat3 R = rotation_z(0.4) * rotation_y(0.1);
+  LegMeasurement leg;
+  leg.base_T_sole = {rotation_y(0.2), Vec3{0.1, 0.1, -0.7}};
+  leg.base_v_sole_mps = {0.3, 0, 0.1};
+  leg.base_w_sole_radps = {0, 0.5, 0};
+  const Vec3 w{0.1, -0.2, 0.3};
+  const ContactRows rows =
+      filter.make_rows(R, w, {leg, leg}, {FootContact{1.0, 0.5}, FootContact{1.0, 0.5}}, {}, {}, kTick_s);
+  for (std::size_t i = 0; i < kContactsPerFoot; ++i) {
+    const Vec3 sole_p = sole_contacts_m()[i];
+    EXPECT_LT((rows[i].odom_r_contact_m - R * (leg.base_T_sole * sole_p)).norm(), 1e-15);
+    // The rate by differences: base turns with w, sole with its own rates.
+    const double h = 1e-6;
+    const auto at = [&](double t) -> Vec3 {
+      const Transform sole{so3_exp(leg.base_w_sole_radps * t) * leg.base_T_sole.R,
+                           leg.base_T_sole.p_m + leg.base_v_sole_mps * t};
+      return R * so3_exp(w * t) * (sole * sole_p);
+    };
+    EXPECT_LT((rows[i].odom_dr_contact_mps - (at(h) - at(-h)) / (2 * h)).norm(), 1e-8);
+    EXPECT_LT(rows[i].height_m2, 0.0);
+  }
+}
+
+TEST(BaseFilter, Closure_LegsDisagreeAndTheWeightGoesOver_PoseGoesFromOneToTheOther) {
+  WalkSpec spec;
+  spec.noise_scale = 0.0;
+  SyntheticWalk walk(spec);
+  BaseFilter filter;
+  filter.reset({});
+  const WalkTruth truth = walk.truth(0);
+  const JointFeedback joints = walk.joints(0);
+  filter.initialise(truth.true_T_base.p_m, Vec3::Zero(), rows_of(filter, truth, joints, {}, {}));
+  const LegGeometry geometry;
+  std::array<LegMeasurement, kFootCount> legs{measure_leg(geometry, Foot::kLeft, joints.q_rad, joints.dq_radps),
+                                              measure_leg(geometry, Foot::kRight, joints.q_rad, joints.dq_radps)};
+  const auto run = [&](double left_share, int ticks) {
+    double largest = 0.0;
+    for (int i = 0; i < ticks; ++i) {
+      const double before = filter.odom_p_base_m().x();
+      const ContactRows rows =
+          filter.make_rows(truth.true_T_base.R, Vec3::Zero(), legs,
+                           {FootContact{1.0, left_share, true}, {1.0, 1.0 - left_share, true}}, {}, {}, kTick_s);
+      filter.predict(Vec3::Zero(), kTick_s, rows);
+      filter.correct(rows);
+      largest = std::max(largest, std::abs(filter.odom_p_base_m().x() - before));
+    }
+    return largest;
+  };
+  run(1.0, 500);
+  const double start_x = filter.odom_p_base_m().x();
+  legs[1].base_T_sole.p_m.x() -= 0.006;  // the right leg now says the base stands 6 mm further ahead
+  EXPECT_LT(run(1.0, 100), 1e-4);
+  EXPECT_NEAR(filter.odom_p_base_m().x(), start_x, 5e-4);
+  double largest = 0.0;
+  for (int i = 0; i <= 200; ++i) largest = std::max(largest, run(1.0 - i / 200.0, 1));
+  largest = std::max(largest, run(0.0, 50));
+  EXPECT_NEAR(filter.odom_p_base_m().x() - start_x, 0.006, 1.5e-3);
+  EXPECT_LT(largest, 2e-4);
+}
+
+TEST(BaseFilter, Eq4Heights_FloorTenMillimetresOff_PullsSlowlyAndNeverJumps) {
+  BaseFilter filter;
+  WalkSpec spec;
+  spec.noise_scale = 0.0;
+  SyntheticWalk walk(spec);
+  filter.reset({});
+  const std::array<FootContact, kFootCount> standing{FootContact{1.0, 0.5, true}, FootContact{1.0, 0.5, true}};
+  const std::array<KnownHeight, kFootCount> raised{KnownHeight{0.01, 0.003}, KnownHeight{0.01, 0.003}};
+  const WalkTruth truth = walk.truth(0);
+  const JointFeedback joints = walk.joints(0);
+  filter.initialise(truth.true_T_base.p_m, Vec3::Zero(), rows_of(filter, truth, joints, {}, {}));
+  const double start_z = filter.odom_p_base_m().z();
+  double before = start_z;
+  for (int i = 0; i < 5000; ++i) {
+    const ContactRows rows = rows_of(filter, truth, joints, standing, raised);
+    filter.predict(Vec3::Zero(), kTick_s, rows);
+    filter.correct(rows);
+    const double z = filter.odom_p_base_m().z();
+    EXPECT_LT(std::abs(z - before), 5e-5);
+    before = z;
+  }
+  EXPECT_GT(before - start_z, 0.002);
+  EXPECT_LT(before - start_z, 0.0101);
+  EXPECT_NEAR(filter.odom_p_base_m().x(), truth.true_T_base.p_m.x(), 1e-9);
+}
+
+// --- Contacts ------------------------------------------------------------------------------------------------------
+
+TEST(Contacts, Touchdown_ForceRises_BecomesCertainAfterTheBlankingOnly) {
+  ContactEstimator contacts;
+  contacts.reset({});
+  std::int64_t t = 0;
+  for (int i = 0; i < 50; ++i) contacts.update({500.0, 0.0}, {true, false}, t += kTick_ns);
+  EXPECT_DOUBLE_EQ(contacts.feet()[0].probability, 1.0);
+  EXPECT_DOUBLE_EQ(contacts.feet()[1].probability, 0.0);
+  for (int i = 1; i <= 2; ++i) {
+    contacts.update({400.0, 140.0}, {true, false}, t += kTick_ns);  // earlier than planned
+    EXPECT_NEAR(contacts.feet()[1].probability, i / 3.0, 1e-12);
+    EXPECT_FALSE(contacts.feet()[1].stands);
+  }
+  contacts.update({400.0, 140.0}, {true, false}, t += kTick_ns);
+  EXPECT_NEAR(contacts.feet()[1].probability, 1.0, 1e-12);
+  EXPECT_TRUE(contacts.feet()[1].landed);
+  EXPECT_EQ(contacts.feet()[1].touch_ns, t - 2 * kTick_ns - 6 * kNsPerMs);  // the first force, less the sensor's delay
+  EXPECT_NEAR(contacts.feet()[1].load_share, 140.0 / 540.0, 1e-12);
+  contacts.update({400.0, 140.0}, {true, false}, t += kTick_ns);
+  EXPECT_TRUE(contacts.feet()[1].stands);
+  EXPECT_FALSE(contacts.feet()[1].landed);
+}
+
+TEST(Contacts, LiftOff_ForceStillReported_FootIsReleasedAtOnce) {
+  ContactEstimator contacts;
+  contacts.reset({});
+  std::int64_t t = 0;
+  for (int i = 0; i < 50; ++i) contacts.update({270.0, 270.0}, kBothStand, t += kTick_ns);
+  contacts.update({270.0, 270.0}, {true, false}, t += kTick_ns);
+  EXPECT_DOUBLE_EQ(contacts.feet()[1].probability, 0.0);
+}
+
+TEST(Contacts, PlannedSwing_FootNeverUnloads_StandsAgainAfterTheTimeout) {
+  ContactEstimator contacts;
+  contacts.reset({});
+  std::int64_t t = 0;
+  for (int i = 0; i < 50; ++i) contacts.update({270.0, 270.0}, kBothStand, t += kTick_ns);
+  for (int i = 0; i < 70; ++i) contacts.update({270.0, 270.0}, {true, false}, t += kTick_ns);
+  EXPECT_DOUBLE_EQ(contacts.feet()[1].probability, 0.0);  // 0.14 s
+  for (int i = 0; i < 30; ++i) contacts.update({270.0, 270.0}, {true, false}, t += kTick_ns);
+  EXPECT_DOUBLE_EQ(contacts.feet()[1].probability, 1.0);
+}
+
+TEST(ForceInference, StaticTorquesOfAStandingLeg_GiveItsForce_FrictionOfALightOneNone) {
+  const LegGeometry geometry;
+  JointFeedback joints;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const Transform sole{rotation_z(0.1), Vec3{0.05, side_sign(leg) * 0.1, -0.72}};
+    const LegVector q = solve_leg(geometry, leg, sole).q_rad;
+    Eigen::Matrix<double, 6, 1> wrench = Eigen::Matrix<double, 6, 1>::Zero();
+    wrench[2] = 300.0;
+    const auto at = static_cast<Eigen::Index>(joint_index(leg, 0));
+    joints.q_rad.segment<6>(at) = q;
+    joints.tau_nm.segment<6>(at) = -leg_jacobian(geometry, leg, q).transpose() * wrench;
+  }
+  joints.tau_nm.tail<6>().setConstant(1.0);  // the right leg: friction alone
+  ForceInference inference;
+  inference.reset({});
+  const auto force_n = inference.update(geometry, joints, Vec3::UnitZ());
+  EXPECT_NEAR(force_n[0], 300.0, 6.0);
+  EXPECT_EQ(force_n[1], 0.0);
+}
+
+// --- Slips ---------------------------------------------------------------------------------------------------------
+
+TEST(ContactInEkf, SilentImu_TiltAndYawGetUnsureAsNobodyFeelsThem) {
+  ContactInEkf filter;
+  filter.reset({});
+  filter.initialise({}, {});
+  const Vec3 rest_mps2{0, 0, kGravity_mps2};
+  for (int i = 0; i < 50; ++i) filter.predict(Vec3::Zero(), rest_mps2, kTick_s, ContactInEkf::Motion::kFelt);
+  EXPECT_LT(filter.yaw_sigma_rad(), 1e-3);
+  for (int i = 0; i < 50; ++i) filter.predict(Vec3::Zero(), rest_mps2, kTick_s, ContactInEkf::Motion::kUnfelt);
+  EXPECT_NEAR(filter.yaw_sigma_rad(), 0.1 * std::sqrt(0.1), 1e-3);
+  EXPECT_NEAR(filter.tilt_sigma_rad(), 0.1 * std::sqrt(0.1), 1e-3);
+}
+
+TEST(FootMotion, RestingFootWithNoise_IsRest_SlippingFootIsLetGo_AndTheNoiseIsMeasured) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0.0, 2e-3);
+  FootMotion motion;
+  motion.reset({});
+  Vec3 before = Vec3::Zero();
+  double slid_m = 0.0;
+  const auto run = [&](int ticks, double speed_mps) {
+    int let_go = 0;
+    for (int i = 0; i < ticks; ++i) {
+      slid_m += speed_mps * kTick_s;
+      const Vec3 now{slid_m + noise(random), noise(random), noise(random)};
+      motion.update(0, now - before, 0.005, true, kTick_s);
+      before = now;
+      let_go += motion.walk_m2ps(0) > 0.0 ? 1 : 0;
+    }
+    return let_go;
+  };
+  run(500, 0.0);
+  EXPECT_EQ(run(1000, 0.0), 0);
+  EXPECT_NEAR(motion.position_sigma_m(), 2e-3, 3e-4);
+  EXPECT_GT(run(100, 0.3), 60);  // of 0.2 s
+  run(100, 0.0);
+  EXPECT_EQ(run(100, 0.0), 0);
+}
+
+// --- The stage -----------------------------------------------------------------------------------------------------
+
+class EstimatorTest : public ::testing::Test {
+ protected:
+  void tick(const ImuSample& imu, const JointFeedback& joints, const std::array<bool, kFootCount>& stance) {
+    estimator_.add_imu(imu, t_ns_);
+    estimator_.add_joints(joints, t_ns_);
+    estimator_.tick(stance);
+  }
+  // Runs to `until_ns` (exclusive), LIO arriving late; each(tick) after every tick.
+  template <typename Each>
+  void run(SyntheticWalk& walk, const WalkSpec& spec, std::int64_t until_ns, bool with_lio, const Each& each) {
+    for (; t_ns_ < std::min(until_ns, walk.end_ns()); t_ns_ += kTick_ns) {
+      const ImuSample imu = walk.imu(t_ns_);
+      const JointFeedback joints = walk.joints(t_ns_);
+      tick(imu, joints, walk.truth(t_ns_).stance);
+      const std::int64_t stamp_ns = t_ns_ - spec.lio_delay_ns;
+      if (with_lio && stamp_ns >= 0 && t_ns_ % (100 * kNsPerMs) == 0) estimator_.add_lio(walk.lio(stamp_ns), t_ns_);
+      each(t_ns_);
+    }
+  }
+  void run(SyntheticWalk& walk, const WalkSpec& spec, std::int64_t until_ns) {
+    run(walk, spec, until_ns, false, [](std::int64_t) {});
+  }
+  // Odom in the truth's world, fixed at the first initialised tick.
+  bool align(const SyntheticWalk& walk) {
+    if (!aligned_ && estimator_.state().initialised) {
+      true_T_odom_ = walk.truth(t_ns_).true_T_base * estimator_.state().odom_T_base.inverse();
+      aligned_ = true;
+    }
+    return aligned_;
+  }
+  void SetUp() override { estimator_.reset({}); }
+
+  static Estimator estimator_;  // its ring is too large for a stack
+  std::int64_t t_ns_ = 0;
+  Transform true_T_odom_;
+  bool aligned_ = false;
+};
+Estimator EstimatorTest::estimator_;
+
+TEST_F(EstimatorTest, Standstill_BiasedSensors_FindsBiasTiltAndFloor) {
+  const WalkSpec spec;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 990 * kNsPerMs);
+  EXPECT_FALSE(estimator_.state().initialised);
+  run(walk, spec, 1100 * kNsPerMs);
+  const StateEstimate& state = estimator_.state();
+  ASSERT_TRUE(state.initialised);
+  EXPECT_LT((estimator_.gyro_bias_radps() - walk.gyro_bias_radps()).norm(), 4e-4);
+  EXPECT_NEAR(yaw_of(state.odom_T_base.R), 0.0, 5e-4);
+  EXPECT_LT(so3_log(state.odom_T_base.R).head<2>().norm(),
+            0.02);  // accelerometer bias and mount: 0.4 deg each, 1 sigma
+  EXPECT_NEAR(0.5 * (state.odom_T_sole[0].p_m.z() + state.odom_T_sole[1].p_m.z()), 0.0, 5e-4);
+  EXPECT_NEAR(state.odom_T_base.p_m.x(), 0.0, 5e-4);
+  EXPECT_NEAR(state.odom_T_base.p_m.y(), 0.0, 5e-4);
+  EXPECT_NEAR(state.odom_T_base.p_m.z(), 0.77, 0.01);
+  EXPECT_EQ(state.lio_age_ns, -1);
+}
+
+TEST_F(EstimatorTest, Standstill_RobotIsMoved_StartsOver) {
+  const WalkSpec spec;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 800 * kNsPerMs);
+  ImuSample pushed = walk.imu(t_ns_);
+  pushed.gyro_radps.x() = 0.3;
+  tick(pushed, walk.joints(t_ns_), kBothStand);
+  t_ns_ += kTick_ns;
+  EXPECT_EQ(estimator_.counters().standstill_restarts, 1U);
+  run(walk, spec, 1700 * kNsPerMs);
+  EXPECT_FALSE(estimator_.state().initialised);
+  run(walk, spec, 1900 * kNsPerMs);
+  EXPECT_TRUE(estimator_.state().initialised);
+}
+
+TEST_F(EstimatorTest, Walk_PerfectSensors_FollowsTheTruth) {
+  WalkSpec spec;
+  spec.noise_scale = 0.0;
+  spec.steps = 3;
+  spec.yaw_per_step_rad = 0.1;
+  SyntheticWalk walk(spec);
+  double worst_m = 0.0, worst_rad = 0.0, worst_mps = 0.0;
+  run(walk, spec, walk.end_ns(), false, [&](std::int64_t t_ns) {
+    if (!align(walk)) return;
+    const StateEstimate& s = estimator_.state();
+    const Transform estimated = true_T_odom_ * s.odom_T_base, truth = walk.truth(t_ns).true_T_base;
+    worst_m = std::max(worst_m, (estimated.p_m - truth.p_m).norm());
+    worst_rad = std::max(worst_rad, so3_log(truth.R.transpose() * estimated.R).norm());
+    const Vec3 v = (walk.truth(t_ns + kNsPerMs).true_T_base.p_m - walk.truth(t_ns - kNsPerMs).true_T_base.p_m) / 2e-3;
+    worst_mps = std::max(worst_mps, (true_T_odom_.R * s.odom_v_base_mps - v).norm());
+  });
+  EXPECT_LT(worst_m, 2e-3);
+  EXPECT_LT(worst_rad, 1e-3);
+  EXPECT_LT(worst_mps, 8e-3);
+}
+
+TEST_F(EstimatorTest, Walk_NoisySensorsWithoutLio_DriftStaysBelowOnePercentAndIsSmooth) {
+  double sum2_m2 = 0.0;
+  constexpr int kSeeds = test::kSlowMachine ? 2 : 8;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    WalkSpec spec;
+    spec.seed = seed;
+    spec.steps = 6;
+    SyntheticWalk walk(spec);
+    estimator_.reset({});
+    t_ns_ = 0;
+    aligned_ = false;
+    Transform estimated_before, truth_before;
+    double worst_tick_m = 0.0, worst_yaw_rad = 0.0, worst_tilt_rad = 0.0, worst_mps = 0.0;
+    bool have_before = false;
+    run(walk, spec, walk.end_ns(), false, [&](std::int64_t t_ns) {
+      if (!align(walk)) return;
+      const Transform estimated = true_T_odom_ * estimator_.state().odom_T_base, truth = walk.truth(t_ns).true_T_base;
+      if (have_before) {
+        worst_tick_m =
+            std::max(worst_tick_m, ((estimated.p_m - estimated_before.p_m) - (truth.p_m - truth_before.p_m)).norm());
+      }
+      const Vec3 turn = so3_log(truth.R.transpose() * estimated.R);
+      worst_yaw_rad = std::max(worst_yaw_rad, std::abs(turn.z()));
+      worst_tilt_rad = std::max(worst_tilt_rad, turn.head<2>().norm());
+      const Vec3 v = (truth.p_m - truth_before.p_m) / kTick_s;
+      if (have_before) {
+        worst_mps = std::max(worst_mps, (true_T_odom_.R * estimator_.state().odom_v_base_mps - v).norm());
+      }
+      estimated_before = estimated;
+      truth_before = truth;
+      have_before = true;
+    });
+    const Vec3 error_m = estimated_before.p_m - truth_before.p_m;
+    sum2_m2 += error_m.squaredNorm();
+    EXPECT_LT(worst_tick_m, 3e-4) << seed;
+    EXPECT_LT(worst_yaw_rad, 5e-3) << seed;
+    EXPECT_LT(worst_tilt_rad, 2.5e-3) << seed;
+    EXPECT_LT(worst_mps, 0.03) << seed;
+    for (int a = 0; a < 3; ++a) EXPECT_LT(std::abs(error_m[a]), 3.0 * estimator_.state().position_sigma_m[a]) << seed;
+  }
+  constexpr double kWay_m = 1.85;  // six steps up
+  EXPECT_LT(std::sqrt(sum2_m2 / kSeeds), 0.01 * kWay_m);
+}
+
+TEST_F(EstimatorTest, TreadHeight_SlightlyOff_IsTakenSoftlyAndForgottenAtLiftOff) {
+  WalkSpec spec;
+  spec.steps = 1;
+  spec.noise_scale = 0.0;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 4500 * kNsPerMs);  // the right foot swings, the left one is on the tread
+  ASSERT_FALSE(walk.truth(t_ns_).stance[1]);
+  ASSERT_DOUBLE_EQ(estimator_.state().contact_probability[0], 1.0);
+  const double tread_z = estimator_.state().odom_T_sole[0].p_m.z();
+  estimator_.set_tread_height(Foot::kLeft, tread_z + 0.015, 0.004);
+  double before = tread_z, largest = 0.0;
+  run(walk, spec, walk.end_ns(), false, [&](std::int64_t) {
+    const double z = estimator_.state().odom_T_sole[0].p_m.z();
+    largest = std::max(largest, std::abs(z - before));
+    before = z;
+  });
+  EXPECT_GT(before - tread_z, 3e-4);
+  EXPECT_LT(before - tread_z, 0.0155);
+  EXPECT_LT(largest, 1e-4);
+  EXPECT_EQ(estimator_.counters().height_rejected, 0U);
+}
+
+TEST_F(EstimatorTest, TreadHeight_FarOffOrNonsense_IsRejectedAndCounted) {
+  WalkSpec spec;
+  SyntheticWalk walk(spec);
+  estimator_.set_tread_height(Foot::kLeft, 0.0, 0.003);  // not initialised yet
+  EXPECT_EQ(estimator_.counters().height_invalid, 1U);
+  run(walk, spec, 1500 * kNsPerMs);
+  estimator_.set_tread_height(Foot::kLeft, 0.05, 0.003);
+  EXPECT_EQ(estimator_.counters().height_rejected, 1U);
+  estimator_.set_tread_height(Foot::kLeft, kNaN, 0.003);
+  estimator_.set_tread_height(Foot::kLeft, 0.0, 0.0);
+  EXPECT_EQ(estimator_.counters().height_invalid, 3U);
+  const double z = estimator_.state().odom_T_base.p_m.z();
+  run(walk, spec, 2000 * kNsPerMs);
+  EXPECT_NEAR(estimator_.state().odom_T_base.p_m.z(), z, 1e-3);
+}
+
+TEST_F(EstimatorTest, BadSamples_EveryKind_IsCountedAndTheStateStaysGood) {
+  const WalkSpec spec;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 1500 * kNsPerMs);
+  const Transform before = estimator_.state().odom_T_base;
+  const auto spoilt = [&](auto&& spoil) {
+    ImuSample imu = walk.imu(t_ns_);
+    JointFeedback joints = walk.joints(t_ns_);
+    spoil(imu, joints);
+    tick(imu, joints, kBothStand);
+    t_ns_ += kTick_ns;
+  };
+  spoilt([](ImuSample& imu, JointFeedback&) { imu.gyro_radps.y() = kNaN; });
+  spoilt([](ImuSample& imu, JointFeedback&) { imu.accel_mps2.z() = 1e9; });
+  spoilt([](ImuSample& imu, JointFeedback&) { imu.stamp_ns -= 4 * kTick_ns; });
+  spoilt([](ImuSample&, JointFeedback& joints) { joints.q_rad[3] = kNaN; });
+  spoilt([](ImuSample&, JointFeedback& joints) { joints.foot_force_n[0] = std::numeric_limits<double>::infinity(); });
+  spoilt([](ImuSample&, JointFeedback& joints) { joints.stamp_ns -= 10 * kTick_ns; });
+  spoilt([](ImuSample&, JointFeedback& joints) { joints.q_rad[3] += 0.5; });
+  spoilt([](ImuSample& imu, JointFeedback& joints) {
+    imu.stamp_ns = -1;
+    joints.stamp_ns = -1;
+  });
+  t_ns_ += 60 * kTick_ns;
+  spoilt([](ImuSample&, JointFeedback&) {});
+  const Estimator::Counters& counters = estimator_.counters();
+  EXPECT_EQ(counters.imu_invalid, 2U);
+  EXPECT_EQ(counters.imu_stale, 2U);
+  EXPECT_EQ(counters.joints_invalid, 2U);
+  EXPECT_EQ(counters.joints_stale, 2U);
+  EXPECT_EQ(counters.joints_jump, 1U);
+  EXPECT_EQ(counters.gaps, 1U);
+  const StateEstimate& state = estimator_.state();
+  EXPECT_EQ(state.stamp_ns, t_ns_ - kTick_ns);
+  EXPECT_LT((state.odom_T_base.p_m - before.p_m).norm(), 1e-3);
+  EXPECT_LT(so3_log(before.R.transpose() * state.odom_T_base.R).norm(), 2e-3);
+}
+
+// A wrong clock, once: were its stamp taken, every later sample would be a stale one.
+TEST_F(EstimatorTest, StampsOfTheFuture_OfEitherSensor_AreCountedAndTheNextSampleIsTaken) {
+  const WalkSpec spec;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 1500 * kNsPerMs);
+  ImuSample imu = walk.imu(t_ns_);
+  JointFeedback joints = walk.joints(t_ns_);
+  imu.stamp_ns = joints.stamp_ns = t_ns_ + kNsPerS;
+  tick(imu, joints, kBothStand);
+  t_ns_ += kTick_ns;
+  EXPECT_EQ(estimator_.counters().imu_future, 1U);
+  EXPECT_EQ(estimator_.counters().joints_future, 1U);
+  run(walk, spec, 1600 * kNsPerMs);
+  EXPECT_EQ(estimator_.counters().imu_stale + estimator_.counters().joints_stale, 0U);
+  EXPECT_EQ(estimator_.state().oldest_input_ns, t_ns_ - kTick_ns);
+}
+
+// A frame that catches up gets samples of after its own time.
+TEST_F(EstimatorTest, StampsSixMillisecondsAhead_OfALateTick_AreTaken) {
+  const WalkSpec spec;
+  SyntheticWalk walk(spec);
+  estimator_.add_imu(walk.imu(6 * kNsPerMs), 0);
+  estimator_.add_joints(walk.joints(6 * kNsPerMs), 0);
+  EXPECT_EQ(estimator_.newest_imu_ns(), 6 * kNsPerMs);
+  EXPECT_EQ(estimator_.joints().stamp_ns, 6 * kNsPerMs);
+}
+
+TEST_F(EstimatorTest, ImuFasterThanTheTick_EverySampleCounts) {
+  WalkSpec spec;
+  spec.noise_scale = 0.0;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 1500 * kNsPerMs);
+  ASSERT_TRUE(estimator_.state().initialised);
+  for (int i = 3; i >= 0; --i) {  // all of the turn is in the oldest of four
+    ImuSample imu = walk.imu(t_ns_);
+    imu.stamp_ns -= i * kTick_ns / 4;
+    if (i == 3) imu.gyro_radps.z() = 0.4;
+    estimator_.add_imu(imu, t_ns_);
+  }
+  estimator_.add_joints(walk.joints(t_ns_), t_ns_);
+  estimator_.tick(kBothStand);
+  EXPECT_NEAR(estimator_.state().base_w_base_radps.z(), 0.1, 1e-3);
+}
+
+TEST_F(EstimatorTest, OneSensorSilentInSwing_OtherOneCarriesTheStateOn) {
+  for (const bool imu_silent : {true, false}) {
+    WalkSpec spec;
+    spec.steps = 1;
+    SyntheticWalk walk(spec);
+    estimator_.reset({});
+    t_ns_ = 0;
+    aligned_ = false;
+    run(walk, spec, 3000 * kNsPerMs, false, [&](std::int64_t) { align(walk); });
+    ASSERT_FALSE(walk.truth(t_ns_).stance[0]);
+    const std::int64_t silent_since_ns = t_ns_;
+    // Legs alone for the rest of the swing; the IMU alone for half as long as it takes to drift away.
+    const std::int64_t until_ns = t_ns_ + (imu_silent ? 400 : 100) * kNsPerMs;
+    for (; t_ns_ < until_ns; t_ns_ += kTick_ns) {
+      const ImuSample imu = walk.imu(t_ns_);
+      const JointFeedback joints = walk.joints(t_ns_);
+      if (imu_silent) {
+        estimator_.add_joints(joints, t_ns_);
+      } else {
+        estimator_.add_imu(imu, t_ns_);
+      }
+      estimator_.tick(walk.truth(t_ns_).stance);
+    }
+    const StateEstimate& state = estimator_.state();
+    EXPECT_EQ(state.stamp_ns, t_ns_ - kTick_ns);
+    EXPECT_EQ(state.oldest_input_ns, silent_since_ns - kTick_ns);
+    const Transform truth = walk.truth(state.stamp_ns).true_T_base;
+    EXPECT_LT(((true_T_odom_ * state.odom_T_base).p_m - truth.p_m).norm(), 0.01) << imu_silent;
+    StateEstimate then;  // nothing late is fused with a state on one leg
+    EXPECT_TRUE(estimator_.try_state_at(silent_since_ns + 20 * kNsPerMs, then));
+    EXPECT_FALSE(estimator_.try_state_at(state.stamp_ns, then));
+    run(walk, spec, t_ns_ + 200 * kNsPerMs);
+    EXPECT_EQ(estimator_.state().oldest_input_ns, t_ns_ - kTick_ns);
+    EXPECT_TRUE(estimator_.try_state_at(t_ns_ - kTick_ns, then));
+    EXPECT_FALSE(estimator_.try_state_at(until_ns - 30 * kNsPerMs, then)) << "in the gap";
+  }
+}
+
+TEST_F(EstimatorTest, StateAt_BetweenTicks_IsInterpolatedAndOutsideRefused) {
+  WalkSpec spec;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 4000 * kNsPerMs);
+  StateEstimate a, b, middle;
+  const std::int64_t at_ns = t_ns_ - 100 * kTick_ns;
+  ASSERT_TRUE(estimator_.try_state_at(at_ns, a));
+  ASSERT_TRUE(estimator_.try_state_at(at_ns + kTick_ns, b));
+  ASSERT_TRUE(estimator_.try_state_at(at_ns + kTick_ns / 2, middle));
+  EXPECT_EQ(middle.stamp_ns, at_ns + kTick_ns / 2);
+  EXPECT_LT((middle.odom_T_base.p_m - 0.5 * (a.odom_T_base.p_m + b.odom_T_base.p_m)).norm(), 1e-12);
+  EXPECT_LT((so3_log(a.odom_T_base.R.transpose() * middle.odom_T_base.R) -
+             0.5 * so3_log(a.odom_T_base.R.transpose() * b.odom_T_base.R))
+                .norm(),
+            1e-12);
+  EXPECT_LT((middle.q_rad - 0.5 * (a.q_rad + b.q_rad)).norm(), 1e-12);
+  EXPECT_LT((middle.odom_T_sole[1].p_m - 0.5 * (a.odom_T_sole[1].p_m + b.odom_T_sole[1].p_m)).norm(), 1e-12);
+  EXPECT_FALSE(estimator_.try_state_at(t_ns_ + kTick_ns, middle));
+  EXPECT_FALSE(estimator_.try_state_at(t_ns_ - 600 * kNsPerMs, middle));
+  EXPECT_TRUE(estimator_.try_state_at(t_ns_ - 500 * kNsPerMs, middle));
+}
+
+TEST_F(EstimatorTest, SameInputs_RunTwice_SameBits) {
+  std::array<StateEstimate, 2> end;
+  for (StateEstimate& state : end) {
+    WalkSpec spec;
+    spec.steps = 1;
+    SyntheticWalk walk(spec);
+    estimator_.reset({});
+    t_ns_ = 0;
+    run(walk, spec, walk.end_ns(), true, [](std::int64_t) {});
+    state = estimator_.state();
+  }
+  EXPECT_EQ(end[0].odom_T_base.p_m, end[1].odom_T_base.p_m);
+  EXPECT_EQ(end[0].world_T_odom.R, end[1].world_T_odom.R);
+}
+
+}  // namespace
+}  // namespace polygmap

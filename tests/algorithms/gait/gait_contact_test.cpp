@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// Ground that comes early, late or not at all, and legs that do not reach.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/support/gait_checks.hpp"
+
+namespace polygmap {
+namespace {
+
+using test::ClimbSetup;
+using test::IdealClimb;
+
+// The nth swing onto a tread finds nothing: 1 is a leading foot, 2 a trailing one.
+bool in_swing_onto_tread(const IdealClimb& climb, int nth) {
+  const auto& done = climb.record().steps;
+  const auto landed = std::count_if(done.begin(), done.end(), [](const LatchedStep& step) { return step.onto_tread; });
+  return climb.status().phase == GaitPhase::kSwing && climb.status().step.onto_tread && landed + 1 == nth;
+}
+
+void expect_put_back(IdealClimb& climb, int nth) {
+  while (climb.tick() && !in_swing_onto_tread(climb, nth)) {
+  }
+  const Foot foot = climb.status().step.foot;
+  const Transform stood = climb.true_T_sole(foot);  // the tick of the lift-off
+  climb.run(40.0);
+  const GaitStatus& status = climb.status();
+  EXPECT_EQ(status.phase, GaitPhase::kStopped);
+  EXPECT_EQ(status.stop_reason, StopReason::kGroundMissing);
+  EXPECT_EQ(status.stop_measured_m, 0.0);
+  EXPECT_TRUE(status.stands[0] && status.stands[1]);
+  EXPECT_EQ(status.late_contacts, 1U);
+  EXPECT_EQ(status.put_back, 1U);
+  EXPECT_EQ(status.treads_climbed, 0U);
+  EXPECT_EQ(status.step.touch_down_stamp_ns, 0);
+  for (int i = 0; i < 500; ++i) climb.tick();
+  EXPECT_TRUE(climb.touches(Foot::kLeft) && climb.touches(Foot::kRight));
+  EXPECT_LT((climb.true_T_sole(foot).p_m - stood.p_m).norm(), 0.003);
+  EXPECT_EQ(climb.status().ik_limited_ticks, 0U);
+  EXPECT_LT(climb.record().penetration_m, 0.002);
+  test::expect_sound_commands(climb);
+}
+
+TEST(GaitContact, TreadFarLowerThanMapped_PutsTheFootBackAndSaysSo) {
+  ClimbSetup setup;
+  setup.stairs.rise_m = 0.10;
+  setup.map_shift_z_m = 0.07;
+  IdealClimb climb(setup);
+  expect_put_back(climb, 1);
+}
+
+TEST(GaitContact, ForceSensorStuckOn_LandsByThePlan) {
+  IdealClimb climb({});
+  climb.tamper = [](StateEstimate&, FootholdSet&, JointFeedback& feedback) { feedback.foot_force_n = {300.0, 300.0}; };
+  climb.run(60.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+  EXPECT_EQ(climb.status().treads_climbed, 4U);
+}
+
+// A toe that goes down along the next riser.
+TEST(GaitContact, ForceForAMomentInTheAir_GoesOnToTheGround) {
+  IdealClimb climb({});
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
+    const LatchedStep& step = climb.status().step;
+    const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns - 540 * kNsPerMs;
+    if (climb.status().phase != GaitPhase::kSwing || step.sequence != 2 || since_ns < 0) return;
+    if (since_ns < 8 * kNsPerMs) feedback.foot_force_n[index_of(step.foot)] = 60.0;
+  };
+  ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
+  EXPECT_EQ(climb.status().early_contacts, 0U);
+  EXPECT_LT(climb.record().execution_z_m, 0.003);
+}
+
+// The last sample before the bus falls silent is of a toe that scrapes: it is one, however often it is read.
+TEST(GaitContact, BusSilentAfterAScrape_IsNoGround) {
+  IdealClimb climb({});
+  JointFeedback last;
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
+    const LatchedStep& step = climb.status().step;
+    const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns - 540 * kNsPerMs;
+    if (climb.status().phase != GaitPhase::kSwing || step.sequence != 2 || since_ns < 0) return;
+    if (since_ns == 0) {
+      last = feedback;
+      last.foot_force_n[index_of(step.foot)] = 60.0;
+    }
+    if (since_ns < 16 * kNsPerMs) feedback = last;
+  };
+  ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
+  EXPECT_EQ(climb.status().early_contacts, 0U);
+  EXPECT_LT(climb.record().execution_z_m, 0.003);
+}
+
+// The base comes 10 mm off its plan: a foot that is hardly pressed must not go along.
+TEST(GaitContact, LandedFootHardlyPressed_StaysWhereItLanded) {
+  IdealClimb climb({});
+  bool off = false;
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
+    double& force_n = feedback.foot_force_n[index_of(climb.status().step.foot)];
+    if (climb.status().step.sequence == 2) force_n = std::min(force_n, 60.0);
+    if (off) state.odom_T_base.p_m.x() += 0.01;
+  };
+  ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
+  const std::size_t i = index_of(climb.status().step.foot);
+  const Vec3 landed_m = climb.status().odom_T_sole_desired[i].p_m;
+  for (int n = 0; n < 280; ++n) {
+    off = n >= 150;
+    climb.tick();
+    ASSERT_EQ(climb.status().phase, GaitPhase::kDoubleSupport);
+    EXPECT_LT((climb.status().odom_T_sole_desired[i].p_m - landed_m).norm(), 1e-3) << n;
+  }
+}
+
+TEST(GaitContact, BumpInTheAir_HoldsTheReferenceWithoutAJump) {
+  IdealClimb climb({});
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
+    const LatchedStep& step = climb.status().step;
+    if (climb.status().phase == GaitPhase::kSwing && step.sequence == 2 &&
+        state.stamp_ns - step.latch_stamp_ns > 540 * kNsPerMs) {
+      feedback.foot_force_n[index_of(step.foot)] = 100.0;  // 30 mm above the floor, in the fastest part of the landing
+    }
+  };
+  ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
+  EXPECT_EQ(climb.status().early_contacts, 1U);
+  const std::size_t i = index_of(climb.status().step.foot);
+  const auto relative = [&] {
+    const auto& soles = climb.status().odom_T_sole_desired;
+    return Vec3((soles[1 - i].inverse() * soles[i]).p_m);
+  };
+  const Vec3 held = relative();
+  for (int n = 0; n < 100; ++n) {
+    climb.tick();
+    EXPECT_LT((relative() - held).norm(), 1e-4);
+  }
+  EXPECT_EQ(climb.status().ik_limited_ticks, 0U);
+  test::expect_sound_commands(climb);
+}
+
+TEST(GaitReach, EstimateJumpsInMidSwing_LegStopsAtItsReachAndIsCounted) {
+  IdealClimb climb({});
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback&) {
+    if (climb.status().phase == GaitPhase::kSwing) state.odom_T_base.p_m.x() += 1.0;
+  };
+  ASSERT_TRUE(climb.run_until(GaitPhase::kSwing, 1));
+  for (int i = 0; i < 300; ++i) climb.tick();
+  EXPECT_GT(climb.status().ik_limited_ticks, 0U);
+  EXPECT_LE(*std::max_element(climb.record().speed_share.begin(), climb.record().speed_share.end()), 1.0 + 1e-9);
+  EXPECT_GE(climb.record().joint_margin_rad, 0.0);
+}
+
+}  // namespace
+}  // namespace polygmap

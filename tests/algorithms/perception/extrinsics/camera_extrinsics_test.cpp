@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "algorithms/robot/model.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr double kDegree = kPi / 180.0;
+constexpr std::int64_t kFrame_ns = 33 * kNsPerMs;
+
+// A robot on level ground whose camera is mounted otherwise than its data sheet says.
+class Robot {
+ public:
+  Robot(double roll_rad, double pitch_rad, const Vec3& shift_m) {
+    const Transform nominal = base_T_camera();
+    true_mount_ = {rotation_y(pitch_rad) * rotation_x(roll_rad) * nominal.R, nominal.p_m + shift_m};
+    for (const double side : {1.0, -1.0}) {
+      stance_.base_T_sole[side > 0 ? 0 : 1].p_m = {0.0, side * kStanceHalfWidth_m, -kNominalBaseHeight_m};
+    }
+    stance_.stands = {true, true};
+  }
+  // A surface at a height above the soles that rises by tilt_rad ahead.
+  void see(double height_m, double tilt_rad = 0.0, double noise_rad = 0.0) {
+    const Transform camera_T_base = true_mount_.inverse();
+    std::normal_distribution<> noise(0.0, noise_rad);
+    SurfacePatch patch;
+    patch.kind = SurfaceKind::kTread;
+    const Vec3 normal = rotation_y(-tilt_rad + noise(random_)) * rotation_x(noise(random_)) * Vec3::UnitZ();
+    patch.normal = camera_T_base.R * normal;
+    patch.centroid_m = camera_T_base * Vec3{0.6, 0.0, height_m - kNominalBaseHeight_m};
+    patch.d_m = -patch.normal.dot(patch.centroid_m);
+    patch.tilt_sigma_rad = 0.002;
+    patch.area_m2 = 0.3;
+    ASSERT_TRUE(frame_.surfaces.try_push_back(patch));
+  }
+  // A standing foot's toe, where it is; the picture shows the mount's error as the toe's.
+  void detect_toe(const CameraExtrinsicsEstimator& mount, std::size_t foot, double noise_m = 0.0) {
+    std::normal_distribution<> noise(0.0, noise_m);
+    const double off_m = true_mount_.p_m.x() - mount.base_T_camera().p_m.x();
+    stance_.toes[foot] = ToeSighting{-off_m + (noise_m > 0.0 ? noise(random_) : 0.0), 0.0006};
+  }
+  SurfacePatch& last() { return frame_.surfaces.back(); }
+  CameraExtrinsicsEstimator::Stance& stance() { return stance_; }
+  void deliver(CameraExtrinsicsEstimator& mount) {
+    frame_.stamp_ns += kFrame_ns;
+    mount.update(frame_, stance_);
+    frame_.surfaces.clear();
+    stance_.toes.fill(std::nullopt);
+  }
+
+ private:
+  Transform true_mount_;
+  CameraExtrinsicsEstimator::Stance stance_;
+  SurfaceFrame frame_;
+  std::mt19937 random_{1};
+};
+
+CameraExtrinsicsEstimator estimator() { return {CameraExtrinsicsEstimator::Params{}, base_T_camera()}; }
+
+TEST(CameraExtrinsicsEstimator, TiltedAndRaisedMount_FoundWithinATenthOfADegreeAndAMillimetre) {
+  for (const double sign : {1.0, -1.0}) {
+    CameraExtrinsicsEstimator mount = estimator();
+    Robot robot(sign * 0.7 * kDegree, sign * -0.9 * kDegree, {0.0, 0.0, sign * 0.003});
+    for (int i = 0; i < 300; ++i) {
+      robot.see(0.0, 0.0, 0.003);
+      robot.see(0.15, 0.0, 0.003);
+      robot.deliver(mount);
+    }
+    EXPECT_NEAR(mount.roll_rad(), sign * 0.7 * kDegree, 0.1 * kDegree);
+    EXPECT_NEAR(mount.pitch_rad(), sign * -0.9 * kDegree, 0.1 * kDegree);
+    EXPECT_NEAR(mount.height_m(), sign * 0.003, 0.001);
+    // A point of the ground, seen through the mount that was found.
+    const Transform nominal = base_T_camera();
+    const Transform truth{rotation_y(sign * -0.9 * kDegree) * rotation_x(sign * 0.7 * kDegree) * nominal.R,
+                          nominal.p_m + Vec3{0, 0, sign * 0.003}};
+    const Vec3 base_p{0.5, 0.1, -0.79};
+    EXPECT_LT((mount.base_T_camera() * (truth.inverse() * base_p) - base_p).norm(), 0.002);
+    EXPECT_LT(mount.tilt_sigma_rad(), 0.2 * kDegree);
+  }
+}
+
+TEST(CameraExtrinsicsEstimator, OneSecond_FindsMost_OneFrame_Little) {
+  CameraExtrinsicsEstimator mount = estimator();
+  Robot robot(0.0, 1.0 * kDegree, Vec3::Zero());
+  robot.see(0.0);
+  robot.deliver(mount);
+  EXPECT_LT(mount.pitch_rad(), 0.35 * kDegree);
+  for (int i = 0; i < 30; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  EXPECT_GT(mount.pitch_rad(), 0.85 * kDegree);
+}
+
+// Squared error of roll and pitch over the claimed variance, mean of many robots: 1 is honest. Soles are as level as
+// three encoders in pitch and two in roll make them; gravity is, and the surface is seen, as much off in every frame.
+struct Level {
+  double seen_rad = 0.001;  // of the surface, claimed too
+  bool soles_stand = true;
+  int frames = 300;
+};
+double squares_over_variance(const Level& level) {
+  constexpr int kRobots = 200;
+  constexpr double kEncoder_rad = 0.002, kGravity_rad = 0.006;
+  const double prior_rad = CameraExtrinsicsEstimator::Params{}.prior_tilt_sigma_rad;
+  std::mt19937 random(1);
+  std::normal_distribution<> normal;
+  std::uniform_real_distribution<> data_sheet(-std::sqrt(3.0) * prior_rad, std::sqrt(3.0) * prior_rad);
+  double squares = 0.0;
+  for (int i = 0; i < kRobots; ++i) {
+    CameraExtrinsicsEstimator mount = estimator();
+    const double roll_rad = data_sheet(random), pitch_rad = data_sheet(random);
+    const double seen_rad = level.seen_rad * normal(random);
+    Robot robot(roll_rad, pitch_rad, Vec3::Zero());
+    robot.stance().base_up =
+        rotation_y(kGravity_rad * normal(random)) * rotation_x(kGravity_rad * normal(random)) * Vec3::UnitZ();
+    robot.stance().stands.fill(level.soles_stand);
+    for (Transform& sole : robot.stance().base_T_sole) {
+      sole.R = rotation_y(std::sqrt(3.0) * kEncoder_rad * normal(random)) *
+               rotation_x(std::sqrt(2.0) * kEncoder_rad * normal(random));
+    }
+    for (int frame = 0; frame < level.frames; ++frame) {
+      robot.see(0.0, seen_rad, 0.001);
+      robot.last().tilt_sigma_rad = level.seen_rad;
+      robot.deliver(mount);
+    }
+    const Vec2 error_rad{mount.roll_rad() - roll_rad, mount.pitch_rad() - pitch_rad};
+    squares += 0.5 * error_rad.squaredNorm() / math::square(mount.tilt_sigma_rad());
+  }
+  return squares / kRobots;
+}
+
+TEST(CameraExtrinsicsEstimator, ManyRobots_SigmaIsHonestAfterHalfASecondAndAfterTen) {
+  for (const int frames : {15, 300}) {
+    EXPECT_GT(squares_over_variance({.frames = frames}), 0.6) << frames;
+    EXPECT_LT(squares_over_variance({.frames = frames}), 1.2) << frames;
+  }
+}
+
+// Of narrow treads only, and where no sole stood flat, the mount is known less well, and says so. (The surface is seen
+// off in pitch alone, the sigma is of both.)
+TEST(CameraExtrinsicsEstimator, OnlyTreadsOrOnlyGravity_SigmaIsHonest) {
+  const double treads = squares_over_variance({.seen_rad = 0.0045}),
+               gravity = squares_over_variance({.soles_stand = false});
+  EXPECT_GT(treads, 0.4);
+  EXPECT_LT(treads, 1.2);
+  EXPECT_GT(gravity, 0.6);
+  EXPECT_LT(gravity, 1.2);
+}
+
+// A floor is a better level than a tread 1 m ahead, whose tilt a warped picture shows 8 mrad off in every frame.
+TEST(CameraExtrinsicsEstimator, NarrowTreadSeenTilted_FloorDecides) {
+  CameraExtrinsicsEstimator mount = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero());
+  for (int i = 0; i < 300; ++i) {
+    robot.see(0.0);
+    robot.last().tilt_sigma_rad = 0.001;
+    for (const double height_m : {0.13, 0.26}) {
+      robot.see(height_m, 0.008);
+      robot.last().tilt_sigma_rad = 0.0045;
+    }
+    robot.deliver(mount);
+  }
+  EXPECT_LT(std::abs(mount.pitch_rad()), 0.0015);
+}
+
+// On the stairs nothing but such treads may be in view for longer than the window.
+TEST(CameraExtrinsicsEstimator, FloorThenNarrowTreadsForTwentySeconds_FloorIsNotForgotten) {
+  CameraExtrinsicsEstimator mount = estimator(), treads_only = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero());
+  const auto see_treads = [&](CameraExtrinsicsEstimator& m) {
+    robot.see(0.13, 0.008);
+    robot.last().tilt_sigma_rad = 0.0045;
+    robot.deliver(m);
+  };
+  for (int i = 0; i < 60; ++i) {
+    robot.see(0.0);
+    robot.last().tilt_sigma_rad = 0.001;
+    robot.deliver(mount);
+  }
+  for (int i = 0; i < 600; ++i) see_treads(mount);
+  for (int i = 0; i < 600; ++i) see_treads(treads_only);
+  EXPECT_LT(std::abs(mount.pitch_rad()), 0.002);
+  EXPECT_GT(std::abs(treads_only.pitch_rad()), 0.007);  // where they are all there is, they count
+}
+
+TEST(CameraExtrinsicsEstimator, OneBadFrame_MovesItByLittle) {
+  CameraExtrinsicsEstimator mount = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero());
+  for (int i = 0; i < 150; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  robot.see(0.015, 2.5 * kDegree);
+  robot.deliver(mount);
+  EXPECT_LT(std::abs(mount.pitch_rad()), 0.03 * kDegree);
+  EXPECT_LT(std::abs(mount.height_m()), 2e-4);
+}
+
+TEST(CameraExtrinsicsEstimator, RampAhead_IsNoLevelSurface_AndAFlatOnePullsNoFartherThanTheBounds) {
+  CameraExtrinsicsEstimator steep = estimator(), flat = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero()), other(0.0, 0.0, Vec3::Zero());
+  for (int i = 0; i < 3000; ++i) {
+    robot.see(0.0, 6.0 * kDegree);
+    robot.deliver(steep);
+    other.see(0.0, 2.9 * kDegree);
+    other.deliver(flat);
+  }
+  EXPECT_EQ(steep.pitch_rad(), 0.0);
+  EXPECT_EQ(steep.counters().rejected_surfaces, 3000U);
+  EXPECT_LE(std::abs(flat.pitch_rad()), 2.0 * kDegree);
+  EXPECT_LE(std::abs(flat.height_m()), 0.008);
+}
+
+TEST(CameraExtrinsicsEstimator, GravityOffByHalfADegree_SolesSayWhatIsLevel) {
+  CameraExtrinsicsEstimator mount = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero());
+  robot.stance().base_up = rotation_y(0.5 * kDegree) * Vec3::UnitZ();
+  for (int i = 0; i < 300; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  EXPECT_LT(std::abs(mount.pitch_rad()), 0.01 * kDegree);
+  // No foot flat on the ground: gravity says.
+  robot.stance().stands = {false, false};
+  for (int i = 0; i < 3000; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  EXPECT_NEAR(mount.pitch_rad(), 0.5 * kDegree, 0.02 * kDegree);
+}
+
+TEST(CameraExtrinsicsEstimator, CameraAheadOfItsPlace_FoundByTheToes) {
+  for (const double off_m : {-0.004, 0.004}) {
+    CameraExtrinsicsEstimator mount = estimator();
+    Robot robot(0.0, 0.0, {off_m, 0.0, 0.0});
+    for (int i = 0; i < 30; ++i) {
+      robot.see(0.0);
+      robot.detect_toe(mount, 0, 0.001);
+      robot.deliver(mount);
+    }
+    EXPECT_NEAR(mount.ahead_m(), off_m, 0.0006);
+    EXPECT_NEAR(mount.base_T_camera().p_m.x() - base_T_camera().p_m.x(), mount.ahead_m(), 1e-9);
+    EXPECT_EQ(mount.counters().toes, 30U);
+    // Frames in which no surface is seen tell of the toes all the same.
+    CameraExtrinsicsEstimator blind = estimator();
+    for (int i = 0; i < 30; ++i) {
+      robot.detect_toe(blind, 1, 0.001);
+      robot.deliver(blind);
+    }
+    EXPECT_NEAR(blind.ahead_m(), off_m, 0.0006);
+  }
+}
+
+TEST(CameraExtrinsicsEstimator, ToeSeenFarOffOrWhileTheBaseMoves_MovesTheCameraNoFartherThanTheBoundsOrLittle) {
+  CameraExtrinsicsEstimator far = estimator(), moving = estimator();
+  Robot robot(0.0, 0.0, {0.05, 0.0, 0.0}), other(0.0, 0.0, {0.004, 0.0, 0.0});
+  for (int i = 0; i < 300; ++i) {
+    robot.detect_toe(far, 0);
+    robot.deliver(far);
+  }
+  EXPECT_NEAR(far.ahead_m(), 0.010, 1e-9);
+  other.stance().speed_mps = 0.3;
+  for (int i = 0; i < 10; ++i) {
+    other.detect_toe(moving, 0);
+    other.deliver(moving);
+  }
+  EXPECT_LT(std::abs(moving.ahead_m()), 0.002);
+}
+
+TEST(CameraExtrinsicsEstimator, ToeOfAFootInTheAirOrNoNumber_TellsNothing) {
+  CameraExtrinsicsEstimator mount = estimator();
+  Robot robot(0.0, 0.0, {0.004, 0.0, 0.0});
+  robot.stance().stands = {false, true};
+  for (int i = 0; i < 30; ++i) {
+    robot.detect_toe(mount, 0);
+    robot.stance().toes[1] = ToeSighting{std::numeric_limits<double>::quiet_NaN(), 0.0006};
+    robot.deliver(mount);
+  }
+  EXPECT_EQ(mount.ahead_m(), 0.0);
+  EXPECT_EQ(mount.counters().toes, 0U);
+}
+
+TEST(CameraExtrinsicsEstimator, NoStandingSole_LeavesTheHeight_NextStepIsNotTheSolesOwn) {
+  CameraExtrinsicsEstimator mount = estimator();
+  Robot robot(0.0, 0.0, {0.0, 0.0, 0.003});
+  for (int i = 0; i < 60; ++i) {
+    robot.see(0.04);  // a step of 40 mm
+    robot.deliver(mount);
+  }
+  robot.stance().stands = {false, false};
+  for (int i = 0; i < 60; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  EXPECT_EQ(mount.height_m(), 0.0);
+  EXPECT_EQ(mount.counters().heights, 0U);
+}
+
+TEST(CameraExtrinsicsEstimator, NumbersThatAreNone_AreCountedAndChangeNothing) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  CameraExtrinsicsEstimator mount = estimator();
+  Robot robot(0.0, 1.0 * kDegree, Vec3::Zero());
+  robot.see(0.0);
+  robot.last().normal.x() = kNan;
+  robot.see(0.0);
+  robot.last().d_m = kNan;
+  robot.deliver(mount);
+  EXPECT_EQ(mount.counters().rejected_surfaces, 2U);
+  robot.see(0.0);
+  robot.stance().base_up.z() = kNan;
+  robot.deliver(mount);
+  robot.stance().base_up = Vec3::UnitZ();
+  robot.stance().base_T_sole[1].p_m.x() = kNan;
+  robot.see(0.0);
+  robot.deliver(mount);
+  EXPECT_EQ(mount.counters().rejected_frames, 2U);
+  EXPECT_EQ(mount.pitch_rad(), 0.0);
+  EXPECT_EQ((mount.base_T_camera().R - base_T_camera().R).norm(), 0.0);
+}
+
+}  // namespace
+}  // namespace polygmap

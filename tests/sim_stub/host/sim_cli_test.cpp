@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+
+#include "sim_stub/host/cli/climb_command.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+struct Call {
+  int code = -1;
+  std::string out, err;
+  std::optional<ClimbOptions> options;  // what the runner got, if it was called
+};
+
+std::string temporary(const std::string& name) { return testing::TempDir() + "polygmap_cli_test_" + name; }
+
+std::vector<std::string> words(const std::string& line) {
+  std::istringstream in(line);
+  return {std::istream_iterator<std::string>(in), {}};
+}
+
+// Runs the command with a runner that records its options and says pass or fail.
+Call call(std::vector<std::string> arguments, bool pass = true) {
+  Call c;
+  std::ostringstream out, err;
+  if (std::find(arguments.begin(), arguments.end(), "--out") == arguments.end() && !arguments.empty()) {
+    arguments.insert(arguments.end(), {"--out", temporary("default")});
+  }
+  const auto run = [&c, pass](const ClimbOptions& options, const ClimbProgressFunction& progress) {
+    c.options = options;
+    progress({1.0, 2, "swing", "perception", 812.0});
+    progress({2.0, 2, "swing", "perception", 812.0});
+    ClimbSummary s;
+    s.pass = pass;
+    s.reason = "Because.";
+    return s;
+  };
+  c.code = polygmap_main(arguments, run, out, err, false);
+  c.out = out.str();
+  c.err = err.str();
+  return c;
+}
+
+// Refused: exit 2, one sentence on one line that names the culprit, and no climb.
+void expect_refused(const std::vector<std::string>& arguments, const std::string& culprit) {
+  const Call c = call(arguments);
+  EXPECT_EQ(c.code, kExitUsage) << culprit;
+  EXPECT_FALSE(c.options) << culprit;
+  EXPECT_NE(c.err.find(culprit), std::string::npos) << c.err;
+  EXPECT_EQ(std::count(c.err.begin(), c.err.end(), '\n'), 1) << c.err;
+  ASSERT_GE(c.err.size(), 2U);
+  EXPECT_EQ(c.err.substr(c.err.size() - 2), ".\n") << c.err;
+  EXPECT_EQ(c.out, "");
+}
+
+TEST(ClimbCommand, Contacts_SensedUnlessInferred) {
+  EXPECT_FALSE(call({"climb"}).options->infer_contacts);
+  EXPECT_TRUE(call({"climb", "--contacts", "inferred", "--plant", "kinematic"}).options->infer_contacts);
+  expect_refused({"climb", "--contacts", "inferred"}, "--contacts inferred needs --plant kinematic");
+  expect_refused({"climb", "--plant", "mujoco", "--contacts", "inferred"}, "--plant kinematic");
+  expect_refused({"climb", "--contacts", "guessed"}, "--contacts");
+}
+
+TEST(ClimbCommand, CameraErrors_OnByDefault_EachCanBeTurnedOff) {
+  const Call usual = call({"climb"});
+  ASSERT_TRUE(usual.options) << usual.err;
+  EXPECT_EQ(usual.options->scan_ms, 16.0);
+  EXPECT_EQ(usual.options->mount_error_deg, 1.0);
+  EXPECT_EQ(usual.options->scale_error, 0.003);
+  EXPECT_TRUE(usual.options->estimate_mount);
+  const Call none =
+      call({"climb", "--scan-ms", "0", "--mount-error", "0", "--scale-error", "0", "--no-mount-estimate"});
+  ASSERT_TRUE(none.options) << none.err;
+  EXPECT_EQ(none.options->scan_ms, 0.0);
+  EXPECT_EQ(none.options->mount_error_deg, 0.0);
+  EXPECT_EQ(none.options->scale_error, 0.0);
+  EXPECT_FALSE(none.options->estimate_mount);
+  expect_refused({"climb", "--scan-ms", "40"}, "--scan-ms");
+  expect_refused({"climb", "--mount-error", "-1"}, "--mount-error");
+  expect_refused({"climb", "--scale-error", "nan"}, "--scale-error");
+}
+
+TEST(ClimbCommand, Camera_IsReadFromItsFile) {
+  const std::string path = temporary("camera.toml");
+  std::ofstream(path) << "width = 512\nheight = 424\nfx = 365\nfy = 365\ncx = 256\ncy = 212\ndepth_unit_m = 0.001\n"
+                         "noise_quadratic_per_m = 0.002\n";
+  const Call c = call({"climb", "--camera", path});
+  ASSERT_TRUE(c.options && c.options->camera) << c.err;
+  EXPECT_EQ(c.options->camera->intrinsics.width_px, 512);
+  EXPECT_EQ(c.options->camera->noise.quadratic_per_m, 0.002);
+  EXPECT_EQ(c.options->camera_file, path);
+  expect_refused({"climb", "--camera", temporary("none.toml")}, "none.toml");
+  expect_refused({"climb", "--camera", std::string(300, 'x') + ".toml"}, "Cannot read");
+  for (const std::string size : {"644x480", "640x482", "1024x768", "63x64"}) {  // more than the module's memory, or odd
+    const std::size_t x = size.find('x');
+    std::ofstream(path) << "width = " << size.substr(0, x) << "\nheight = " << size.substr(x + 1)
+                        << "\nfx = 365\nfy = 365\ncx = 256\ncy = 212\ndepth_unit_m = 0.001\n";
+    expect_refused({"climb", "--camera", path}, "not " + size);
+  }
+}
+
+TEST(ClimbCommand, NoOptions_RunsWithTheDefaults) {
+  const Call c = call({"climb"});
+  ASSERT_TRUE(c.options) << c.err;
+  EXPECT_EQ(c.code, kExitPass);
+  EXPECT_EQ(c.options->stairs.steps, 10);
+  EXPECT_EQ(c.options->stairs.rise_m, 0.13);
+  EXPECT_EQ(c.options->stairs.tread_m, 0.28);
+  EXPECT_EQ(c.options->stairs.width_m, 1.2);
+  EXPECT_EQ(c.options->stairs.nosing_m, 0.0);
+  EXPECT_EQ(c.options->stairs.landing_m, 1.0);
+  EXPECT_EQ(c.options->seed, 1U);
+  EXPECT_EQ(c.options->noise, NoiseKind::kWhite);
+  EXPECT_EQ(c.options->plant, PlantKind::kMujoco);
+  EXPECT_EQ(c.options->render_missing_step, -1);
+  EXPECT_FALSE(c.options->blank_depth);
+  EXPECT_TRUE(c.options->self_filter);
+  EXPECT_EQ(c.err, "");
+}
+
+TEST(ClimbCommand, EveryOption_ReachesTheRun) {
+  const Call c =
+      call(words("climb --steps 4 --rise 0.15 --tread 0.3 --width 0.8 --nosing 0.02 --landing 1.5 --jitter 0.01 "
+                 "--gait ss --seed 42 --noise correlated --render-shift 0.03 -0.01 0.02 "
+                 "--render-missing-step 3 --blank-depth --no-self-filter --push 5,x,10 --push 7.5,y,-8 --out " +
+                 temporary("every/deep")));
+  ASSERT_TRUE(c.options) << c.err;
+  EXPECT_EQ(c.options->stairs.steps, 4);
+  EXPECT_EQ(c.options->stairs.rise_m, 0.15);
+  EXPECT_EQ(c.options->stairs.tread_m, 0.3);
+  EXPECT_EQ(c.options->stairs.width_m, 0.8);
+  EXPECT_EQ(c.options->stairs.nosing_m, 0.02);
+  EXPECT_EQ(c.options->stairs.landing_m, 1.5);
+  EXPECT_EQ(c.options->stairs.jitter_m, 0.01);
+  EXPECT_EQ(c.options->gait, GaitPattern::kSingleStep);
+  ASSERT_EQ(c.options->pushes.size(), 2U);
+  EXPECT_EQ(c.options->pushes[0].axis, 0);
+  EXPECT_EQ(c.options->pushes[1].at_s, 7.5);
+  EXPECT_EQ(c.options->pushes[1].axis, 1);
+  EXPECT_EQ(c.options->pushes[1].impulse_ns, -8.0);
+  EXPECT_EQ(c.options->seed, 42U);
+  EXPECT_EQ(c.options->noise, NoiseKind::kCorrelated);
+  EXPECT_EQ(c.options->out_dir, temporary("every/deep"));
+  EXPECT_EQ(c.options->render_dx_m, 0.03);
+  EXPECT_EQ(c.options->render_dy_m, -0.01);
+  EXPECT_EQ(c.options->render_dz_m, 0.02);
+  EXPECT_EQ(c.options->render_missing_step, 2);  // 0-based inside
+  EXPECT_TRUE(c.options->blank_depth);
+  EXPECT_FALSE(c.options->self_filter);
+  EXPECT_TRUE(std::filesystem::is_directory(temporary("every/deep")));
+}
+
+TEST(ClimbCommand, BadLength_IsRefusedWithOneSentence) {
+  for (const char* option : {"--rise", "--tread", "--width", "--landing"}) {
+    for (const char* value : {"nan", "inf", "-inf", "0", "-0.1", "0.0099", "2.01", "1e9", "1e300", "abc", ""}) {
+      expect_refused({"climb", option, value}, option);
+    }
+  }
+  // 0.276: below the tread, but not below the shortest that the jitter may draw.
+  for (const char* value : {"nan", "inf", "-0.01", "2.5", "0.276", "x", ""}) {
+    expect_refused({"climb", "--nosing", value}, "--nosing");
+  }
+  for (const char* value : {"nan", "-0.001", "0.066", "x", ""}) {
+    expect_refused({"climb", "--jitter", value}, "--jitter");
+  }
+}
+
+TEST(ClimbCommand, UnclimbableStairs_Run) {
+  EXPECT_TRUE(call({"climb", "--rise", "0.5", "--tread", "0.1"}).options);
+  EXPECT_TRUE(call({"climb", "--rise", "2", "--tread", "2", "--width", "2", "--landing", "2"}).options);
+}
+
+TEST(ClimbCommand, LongStairs_GetTheTimeTheyNeed) {
+  EXPECT_EQ(call({"climb"}).options->time_limit_s, ClimbOptions{}.time_limit_s);
+  EXPECT_GE(call({"climb", "--steps", "200"}).options->time_limit_s, 200 * 3.7 + 30.0);
+}
+
+TEST(ClimbCommand, BadCount_IsRefused) {
+  for (const char* value : {"0", "-3", "201", "1.5", "99999999999999999999", "many"}) {
+    expect_refused({"climb", "--steps", value}, "--steps");
+  }
+  for (const char* value : {"-1", "1.5", "99999999999999999999999", "x"}) {
+    expect_refused({"climb", "--seed", value}, "--seed");
+  }
+  expect_refused({"climb", "--steps", "4", "--render-missing-step", "5"}, "--render-missing-step");
+  expect_refused({"climb", "--render-missing-step", "-1"}, "--render-missing-step");
+  expect_refused({"climb", "--render-missing-step", "0"}, "--render-missing-step");
+}
+
+TEST(ClimbCommand, BadWord_IsRefused) {
+  expect_refused({"climb", "--gait", "trot"}, "--gait");
+  expect_refused({"climb", "--plant", "rubber"}, "--plant");
+  expect_refused({"climb", "--plant", "kinematic", "--push", "5,x,10"}, "--push");
+  for (const std::string push : {"x", "5,x", "5,z,10", "5,x,10,", "1.0,x,10", "nan,x,10", "5,y,1000", "5,y,nan"}) {
+    expect_refused({"climb", "--push", push}, "--push");
+  }
+  expect_refused({"climb", "--noise", "pink"}, "--noise");
+  expect_refused({"climb", "--render-shift", "0.01", "nan", "0"}, "--render-shift");
+  expect_refused({"climb", "--render-shift", "0.01", "0.02"}, "--render-shift");
+  expect_refused({"climb", "--bogus"}, "--bogus");
+  expect_refused({"climb", "climb"}, "not expected: climb");
+  expect_refused({"climb", "--steps", "3", "--steps", "4"}, "--steps");
+  expect_refused({"climb", "--render-shift", "", "", ""}, "--render-shift");
+  EXPECT_EQ(call({"climb", "--render-shift", "-.01", "0", ".02"}).options->render_dx_m, -0.01);
+  expect_refused({"--bogus"}, "--bogus");
+  expect_refused({"dance"}, "dance");
+  expect_refused({}, "subcommand");
+}
+
+TEST(ClimbCommand, UnwritableOut_IsRefused) {
+  const std::string file = temporary("a_file");
+  std::ofstream(file) << "x";
+  expect_refused({"climb", "--out", file}, file);
+  expect_refused({"climb", "--out", file + "/inside"}, file);
+  expect_refused({"climb", "--out", "/proc/polygmap"}, "/proc/polygmap");
+  expect_refused({"climb", "--out", "/proc"}, "/proc");
+  expect_refused({"climb", "--out", ""}, "--out");
+}
+
+TEST(ClimbCommand, BadArguments_LeaveNoDirectory) {
+  const std::string directory = temporary("never_made");
+  std::filesystem::remove_all(directory);
+  expect_refused({"climb", "--rise", "nan", "--out", directory}, "--rise");
+  EXPECT_FALSE(std::filesystem::exists(directory));
+}
+
+TEST(ClimbCommand, Verdict_IsOneLineAndTheExitCode) {
+  const Call pass = call({"climb"});
+  EXPECT_EQ(pass.code, 0);
+  EXPECT_NE(pass.out.find("\nPASS: Because.\n"), std::string::npos) << pass.out;
+  const Call fail = call({"climb"}, false);
+  EXPECT_EQ(fail.code, 1);
+  EXPECT_NE(fail.out.find("\nFAIL: Because.\n"), std::string::npos) << fail.out;
+}
+
+TEST(ClimbCommand, Progress_IsALineNowAndThenInALog) {
+  const Call c = call({"climb", "--steps", "7"});
+  EXPECT_NE(c.out.find("step 2 of 7"), std::string::npos) << c.out;
+  EXPECT_NE(c.out.find("perception 812 us"), std::string::npos) << c.out;
+  EXPECT_EQ(std::count(c.out.begin(), c.out.end(), '\n'), 2)
+      << "one progress line (the second is too soon), one verdict";
+}
+
+TEST(ClimbCommand, RunThatCannotWrite_StillTellsTheVerdictAndExits2) {
+  std::ostringstream out, err;
+  const int code = polygmap_main(
+      {"climb", "--out", temporary("throws")},
+      [](const ClimbOptions&, const ClimbProgressFunction&) -> ClimbSummary {
+        ClimbSummary climbed;
+        climbed.pass = true;
+        climbed.reason = "Because.";
+        throw ClimbNotWritten("Cannot write it.", climbed);
+      },
+      out, err, false);
+  EXPECT_EQ(code, kExitUsage);
+  EXPECT_EQ(out.str(), "PASS: Because.\n");
+  EXPECT_EQ(err.str(), "polygmap: Cannot write it.\n");
+}
+
+TEST(ClimbCommand, StandardOutputFull_SaysSoAndExits2) {
+  std::ofstream out("/dev/full");
+  std::ostringstream err;
+  const auto run = [](const ClimbOptions&, const ClimbProgressFunction&) { return ClimbSummary{}; };
+  EXPECT_EQ(polygmap_main({"climb", "--out", temporary("full")}, run, out, err, false), kExitUsage);
+  EXPECT_EQ(err.str(), "polygmap: Cannot write the verdict to the standard output.\n");
+}
+
+TEST(ClimbCommand, Help_ExplainsExitCodesAndOptions) {
+  const Call app = call({"--help"});
+  EXPECT_EQ(app.code, 0);
+  EXPECT_NE(app.out.find("Exit codes"), std::string::npos);
+  const Call climb = call({"climb", "--help"});
+  EXPECT_EQ(climb.code, 0);
+  for (const char* part : {"--rise", "0.13", "causality", "--render-shift"}) {
+    EXPECT_NE(climb.out.find(part), std::string::npos) << part << "\n" << climb.out;
+  }
+}
+
+}  // namespace
+}  // namespace polygmap::sim

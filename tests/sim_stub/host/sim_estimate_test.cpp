@@ -1,0 +1,540 @@
+// SPDX-License-Identifier: Apache-2.0
+// `polygmap estimate`: what it makes of logs, and what it says about files that are none.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <random>
+#include <sstream>
+
+#include "algorithms/geometry/so3.hpp"
+#include "sim_stub/host/cli/climb_command.hpp"
+#include "sim_stub/host/estimate/estimate_report.hpp"
+#include "tests/support/slow_machine.hpp"
+#include "tests/support/synthetic_walk.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+using test::SyntheticWalk;
+using test::WalkSpec;
+
+constexpr double kFootNoise_m = 1e-3;
+
+// A climb as a log: feet by the data sheet's kinematics, with noise; contacts are the plan's.
+EstimateLog climb_log(const WalkSpec& spec) {
+  SyntheticWalk walk(spec);
+  std::mt19937 random(spec.seed + 100);
+  std::normal_distribution<double> noise(0.0, spec.noise_scale * kFootNoise_m);
+  EstimateLog log;
+  log.has_truth = true;
+  for (std::int64_t t_ns = SyntheticWalk::kTick_ns; t_ns < walk.end_ns(); t_ns += SyntheticWalk::kTick_ns) {
+    const ImuSample imu = walk.imu(t_ns);
+    const JointFeedback joints = walk.joints(t_ns);
+    const test::WalkTruth truth = walk.truth(t_ns);
+    LogRow row;
+    row.stamp_ns = t_ns - SyntheticWalk::kTick_ns;
+    row.gyro_radps = imu.gyro_radps;
+    row.accel_mps2 = imu.accel_mps2;
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      const auto leg = static_cast<Foot>(f);
+      row.contact[f] = truth.stance[f] ? 1.0 : 0.0;
+      row.base_p_foot_m[f] =
+          base_T_sole({}, leg, leg_joints(joints.q_rad, leg)).p_m + Vec3{noise(random), noise(random), noise(random)};
+    }
+    const Vec3 after_m = walk.truth(t_ns + kNsPerMs).true_T_base.p_m,
+               before_m = walk.truth(t_ns - kNsPerMs).true_T_base.p_m;
+    row.truth = {truth.true_T_base, (after_m - before_m) / 2e-3};
+    log.rows.push_back(row);
+  }
+  return log;
+}
+
+// The left foot slips forwards from at_ns on while it stands, and stays there until it lifts.
+void add_slip(EstimateLog& log, std::int64_t at_ns, double speed_mps, double duration_s) {
+  bool lifted = false;
+  for (LogRow& row : log.rows) {
+    if (row.stamp_ns < at_ns) continue;
+    lifted = lifted || row.contact[0] < 0.5;
+    if (lifted) break;
+    const double slid_m = speed_mps * std::min(seconds(row.stamp_ns - at_ns), duration_s);
+    row.base_p_foot_m[0] += row.truth.true_T_base.R.transpose() * Vec3{slid_m, 0, 0};
+  }
+}
+
+double worst_error_m(const EstimateLog& log, const Replay& result) {
+  double worst_m = 0.0;
+  for (std::size_t i = 0; i < log.rows.size(); ++i) {
+    worst_m = std::max(worst_m, (result.ticks[i].world_T_base.p_m - log.rows[i].truth.true_T_base.p_m).norm());
+  }
+  return worst_m;
+}
+
+double end_error_over_variance(const EstimateLog& log, const Replay& result) {
+  const Vec3 error_m = result.ticks.back().world_T_base.p_m - log.rows.back().truth.true_T_base.p_m;
+  const Mat3 P = result.ticks.back().quality.covariance.topLeftCorner<3, 3>();
+  return error_m.dot(P.inverse() * error_m);
+}
+
+std::vector<LioRow> lio_of(const EstimateLog& log, std::uint32_t seed, double sigma_m = 0.005) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, sigma_m);
+  const Transform lio_T_true{rotation_z(1.2), Vec3{3.0, -2.0, 0.5}};
+  std::vector<LioRow> lio;
+  for (std::size_t i = 0; i < log.rows.size(); i += 50) {
+    LioRow row;
+    row.stamp_ns = log.rows[i].stamp_ns;
+    row.arrival_ns = row.stamp_ns + 100 * kNsPerMs;
+    row.pose = lio_T_true * log.rows[i].truth.true_T_base;
+    row.pose.p_m += Vec3{noise(random), noise(random), noise(random)};
+    lio.push_back(row);
+  }
+  return lio;
+}
+
+// --- Climbs ----------------------------------------------------------------------------------------------------------
+
+TEST(EstimateReplay, ClimbWithBiasedNoisySensors_DriftsByLittle_AndKnowsHowFar) {
+  constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 4;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    WalkSpec spec;
+    spec.seed = seed;
+    spec.steps = 6;
+    spec.gyro_bias_radps = 5e-3;
+    const EstimateLog log = climb_log(spec);
+    const Replay result = replay(log, {}, {});
+    const Score s = score(log, result);
+    EXPECT_LT(drift_percent(s), 1.5) << seed;
+    EXPECT_LT(s.velocity_rmse_mps, 0.010) << seed;
+    EXPECT_LT(s.attitude_rmse_rad, 0.03) << seed;  // yaw, which nothing observes
+    EXPECT_NEAR(result.foot_position_sigma_m, kFootNoise_m, 0.2 * kFootNoise_m) << seed;
+    EXPECT_LT(end_error_over_variance(log, result), 25.0) << seed;
+    EXPECT_GT(result.ticks.back().quality.covariance(8, 8), result.ticks[10].quality.covariance(8, 8))
+        << "yaw gets no surer";
+  }
+}
+
+TEST(EstimateReplay, FootSlipsThreeTenthsForAFifthOfASecond_PositionStaysWithinTwentyMillimetres) {
+  ReplayOptions careless;
+  careless.odometry.motion.gain = 0.0;
+  constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    WalkSpec spec;
+    spec.seed = seed;
+    spec.steps = 2;
+    EstimateLog log = climb_log(spec);
+    const Replay firm = replay(log, {}, {});
+    add_slip(log, (2200 + 50 * seed) * kNsPerMs, 0.3, 0.2);
+    const Replay slipped = replay(log, {}, {});
+    EXPECT_LT(worst_error_m(log, slipped), 0.020) << seed;
+    EXPECT_GT(slipped.slipping_rows, firm.slipping_rows + 50) << seed;
+    EXPECT_GT(worst_error_m(log, replay(log, {}, careless)), 0.020) << seed;
+  }
+}
+
+TEST(EstimateReplay, NoSlip_VelocityIsAsGoodAsThatOfAFilterThatLetsNothingGo) {
+  ReplayOptions careless;
+  careless.odometry.motion.gain = 0.0;
+  constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
+  for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+    WalkSpec spec;
+    spec.seed = seed;
+    spec.steps = 4;
+    const EstimateLog log = climb_log(spec);
+    const double with_mps = score(log, replay(log, {}, {})).velocity_rmse_mps;
+    const double without_mps = score(log, replay(log, {}, careless)).velocity_rmse_mps;
+    EXPECT_LT(with_mps, 1.05 * without_mps) << seed;
+  }
+}
+
+// Ten times a good IMU's biases: the standstill at the start tells them.
+TEST(EstimateReplay, ImuOfLargeBiasesAndNoise_StandingAtTheStart_IsAsGoodAsAnother) {
+  constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 4;
+  for (std::uint32_t seed = 21; seed < 21 + kSeeds; ++seed) {
+    WalkSpec spec;
+    spec.seed = seed;
+    spec.steps = 6;
+    const Score good = score(climb_log(spec), replay(climb_log(spec), {}, {}));
+    spec.gyro_bias_radps = 0.02;
+    spec.accel_bias_mps2 = 0.3;
+    const Score biased = score(climb_log(spec), replay(climb_log(spec), {}, {}));
+    EXPECT_LT(biased.position_rmse_m, good.position_rmse_m + 2e-3) << seed;
+    spec.gyro_noise_radps = 0.01;
+    spec.accel_noise_mps2 = 0.3;
+    const EstimateLog log = climb_log(spec);
+    const Score noisy = score(log, replay(log, {}, {}));
+    EXPECT_LT(noisy.position_rmse_m, 0.02) << seed;
+    EXPECT_LT(drift_percent(noisy), 1.0) << seed;
+    EXPECT_LT(noisy.nees_mean, 9.0) << seed;
+  }
+}
+
+TEST(EstimateReplay, LioOfTwentyMillimetres_CountsForWhatItsNoiseIsMeasuredToBe) {
+  WalkSpec spec;
+  spec.seed = 31;
+  spec.steps = 6;
+  spec.gyro_bias_radps = 5e-3;
+  const EstimateLog log = climb_log(spec);
+  const Score with = score(log, replay(log, lio_of(log, 31, 0.02), {}));
+  EXPECT_LT(with.position_rmse_m, 0.012);
+  EXPECT_LT(with.nees_mean, 9.0);
+  EXPECT_GT(with.nees_in_bounds, 0.6);
+  EXPECT_LT(with.tilt_rmse_rad, 1.001 * score(log, replay(log, {}, {})).tilt_rmse_rad) << "LIO tells no tilt";
+}
+
+TEST(EstimateReplay, NoTruth_StartsLevelAtStandstill_OrByTheFirstAcceleration) {
+  WalkSpec spec;
+  spec.steps = 1;
+  EstimateLog log = climb_log(spec);
+  const std::vector<LogRow> all = log.rows;
+  const Mat3 true_R = all.front().truth.true_T_base.R;
+  log.has_truth = false;
+  const Replay stood = replay(log, {}, {});
+  EXPECT_EQ(stood.start, StartSource::kStandstill);
+  EXPECT_LT(so3_log(true_R.transpose() * stood.ticks.front().world_T_base.R).head<2>().norm(), 0.02);
+  log.rows.assign(all.begin() + 1150, all.end());  // in the middle of a shift
+  const Replay moved = replay(log, {}, {});
+  EXPECT_EQ(moved.start, StartSource::kFirstAcceleration);
+  for (const Replay* result : {&stood, &moved}) {
+    const Vec3 went_m = result->ticks.back().world_T_base.p_m - result->ticks.front().world_T_base.p_m;
+    const Vec3 true_m =
+        log.rows.back().truth.true_T_base.p_m - (result == &stood ? all : log.rows).front().truth.true_T_base.p_m;
+    EXPECT_NEAR(went_m.z(), true_m.z(), 0.02);
+  }
+}
+
+TEST(EstimateReplay, LateLioWithOutliersAndFutureStamps_IsCountedAndNeverMakesAStep) {
+  WalkSpec spec;
+  spec.steps = 4;
+  const EstimateLog log = climb_log(spec);
+  std::vector<LioRow> lio = lio_of(log, 7);
+  lio[60].pose.p_m.x() += 0.5;
+  lio[70].stamp_ns += kNsPerS;
+  LioRow early = lio.front(), old = lio.front();  // both of before the log, where no odometry is known
+  early.stamp_ns = -50 * kNsPerMs;
+  old.stamp_ns = -kNsPerS;
+  early.arrival_ns = old.arrival_ns = 0;
+  lio.insert(lio.begin(), {early, old});
+  const ReplayOptions options;
+  const Replay result = replay(log, lio, options);
+  const auto count = [&result](LioVerdict verdict) { return result.lio[static_cast<std::size_t>(verdict)]; };
+  EXPECT_EQ(count(LioVerdict::kJump), 1U);
+  EXPECT_EQ(count(LioVerdict::kFuture), 1U);
+  EXPECT_EQ(count(LioVerdict::kNoOdometry), 1U);
+  EXPECT_EQ(count(LioVerdict::kTooOld), 1U);
+  EXPECT_GT(count(LioVerdict::kAccepted), lio.size() - 8);
+  EXPECT_GT(result.lio_not_arrived, 0U);
+  EXPECT_EQ(std::accumulate(result.lio.begin(), result.lio.end(), result.lio_not_arrived), lio.size());
+  EXPECT_LE(result.largest_slew_m, options.odometry.fusion.slew_mps * seconds(SyntheticWalk::kTick_ns) + 1e-9);
+  EXPECT_EQ(result.ticks[10].lio_age_ns, -1);
+  EXPECT_LT(result.ticks.back().lio_age_ns, 210 * kNsPerMs);
+}
+
+TEST(EstimateReplay, TruthCountsFromFarAway_ScoresAreThoseOfAStartAtTheOrigin) {
+  WalkSpec spec;
+  spec.steps = 2;
+  EstimateLog log = climb_log(spec);
+  const Score near = score(log, replay(log, {}, {}));
+  const Vec3 away_m{5e5, -5e5, 1e3};
+  for (LogRow& row : log.rows) row.truth.true_T_base.p_m += away_m;
+  const Replay result = replay(log, lio_of(log, 7), {});
+  EXPECT_LT((result.ticks.back().world_T_base.p_m - log.rows.back().truth.true_T_base.p_m).norm(), 0.05);
+  const Score far = score(log, replay(log, {}, {}));
+  EXPECT_NEAR(far.position_rmse_m, near.position_rmse_m, 1e-6);
+  EXPECT_NEAR(far.velocity_rmse_mps, near.velocity_rmse_mps, 1e-6);
+  EXPECT_NEAR(far.nees_mean, near.nees_mean, 1e-3);
+}
+
+TEST(EstimateReplay, RowsMissingInTheMiddleOfAStep_AreBridged_AndTheSigmasSayHowWell) {
+  WalkSpec spec;
+  spec.steps = 3;
+  const EstimateLog whole = climb_log(spec);
+  for (const auto& [gap_ns, bound_m] : {std::pair{200 * kNsPerMs, 0.1}, {1000 * kNsPerMs, 0.6}}) {
+    for (const std::int64_t from_ns : {2700 * kNsPerMs, 3400 * kNsPerMs}) {
+      EstimateLog log = whole;
+      std::erase_if(log.rows, [&, until_ns = from_ns + gap_ns](const LogRow& row) {
+        return row.stamp_ns > from_ns && row.stamp_ns < until_ns;
+      });
+      const Replay result = replay(log, {}, {});
+      EXPECT_EQ(result.gaps, 1U);
+      EXPECT_LT(worst_error_m(log, result), bound_m) << gap_ns << " " << from_ns;
+      EXPECT_LT(score(log, result).velocity_rmse_mps, 0.05) << gap_ns << " " << from_ns;
+      EXPECT_LT(end_error_over_variance(log, result), 16.0) << gap_ns << " " << from_ns;
+    }
+  }
+}
+
+TEST(EstimateReplay, ImuBeyondTheModulesRange_IsCountedAndNotFelt) {
+  WalkSpec spec;
+  spec.steps = 2;
+  EstimateLog log = climb_log(spec);
+  const Score clean = score(log, replay(log, {}, {}));
+  for (std::size_t i = 700; i < 1700; i += 100) {
+    log.rows[i].accel_mps2.x() = 500.0;
+    log.rows[i + 1].gyro_radps.z() = -50.0;
+  }
+  const Replay result = replay(log, {}, {});
+  EXPECT_EQ(result.imu_invalid, 20U);
+  EXPECT_LT(score(log, result).position_rmse_m, clean.position_rmse_m + 2e-3);
+}
+
+TEST(EstimateReplay, ContactsNoSurerThanAsLikelyAsNot_StillHoldTheRobot) {
+  WalkSpec spec;
+  spec.steps = 2;
+  EstimateLog log = climb_log(spec);
+  for (LogRow& row : log.rows) {
+    for (double& contact : row.contact) contact *= 0.6;
+  }
+  const Replay result = replay(log, {}, {});
+  EXPECT_EQ(result.rows_without_contact, 0U);
+  const double certain_m = worst_error_m(climb_log(spec), replay(climb_log(spec), {}, {}));
+  EstimateLog likely = climb_log(spec);
+  for (LogRow& row : likely.rows) {
+    for (double& contact : row.contact) contact *= 0.85;
+  }
+  EXPECT_NEAR(worst_error_m(likely, replay(likely, {}, {})), certain_m, 2e-3);
+  EXPECT_LT(worst_error_m(log, result), 0.05);
+  for (LogRow& row : log.rows) row.contact.fill(0.1);
+  EXPECT_EQ(replay(log, {}, {}).rows_without_contact, log.rows.size());
+}
+
+TEST(EstimateReplay, LioWithoutDelay_IsAccepted_AtAnyRateOfRows) {
+  WalkSpec spec;
+  spec.steps = 1;
+  EstimateLog log = climb_log(spec);
+  for (LogRow& row : log.rows) row.stamp_ns /= 2;  // 1 kHz
+  std::vector<LioRow> lio = lio_of(log, 7);
+  for (std::size_t i = 0; i < lio.size(); ++i) {
+    lio[i].stamp_ns = lio[i].arrival_ns = log.rows[50 * i + i % 2].stamp_ns;
+  }
+  const Replay result = replay(log, lio, {});
+  EXPECT_EQ(result.lio[static_cast<std::size_t>(LioVerdict::kNoOdometry)], 0U);
+}
+
+// The biases are unknown at the start, and half of the robots set out after 0.2 s. Where the odometry is better than
+// LIO (5 mm) some of LIO's noise comes through: 3.3 mm at tau 1 s.
+TEST(EstimateReplay, BiasedLogWithLateLio_IsNoWorseThanWithoutAndKnowsHowGoodItIs) {
+  constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
+  for (std::uint32_t seed = 11; seed < 11 + kSeeds; ++seed) {
+    WalkSpec spec;
+    spec.seed = seed;
+    spec.steps = 6;
+    spec.stand_s = seed % 2 == 0 ? 0.2 : 2.0;
+    spec.gyro_bias_radps = 5e-3;
+    const EstimateLog log = climb_log(spec);
+    const std::vector<LioRow> lio = lio_of(log, seed);
+    const Score without = score(log, replay(log, {}, {}));
+    for (const double tau_s : {0.0, 1.0, 4.0}) {  // 0: by LIO's noise
+      ReplayOptions options;
+      if (tau_s > 0.0) options.odometry.fusion.tau_s = tau_s;
+      if (tau_s > 0.0) options.odometry.fusion.tau_spm = 0.0;
+      const Score with = score(log, replay(log, lio, options));
+      EXPECT_LT(with.position_rmse_m, std::max(without.position_rmse_m, 0.004)) << seed << ", tau " << tau_s;
+      EXPECT_GT(with.nees_in_bounds, 0.65) << seed << ", tau " << tau_s;
+      EXPECT_LT(with.nees_mean, 7.0) << seed << ", tau " << tau_s;  // 6: honest; more: too sure of itself
+    }
+    const Score single = score(log, replay(log, {lio.front()}, {}));  // says where LIO's world is, and nothing else
+    EXPECT_EQ(single.position_rmse_m, without.position_rmse_m) << seed;
+    EXPECT_NEAR(single.nees_in_bounds, without.nees_in_bounds, 0.02) << seed;
+  }
+}
+
+TEST(EstimateReplay, LidarMount_PosesOfTheLidar_AreThoseOfTheBase) {
+  WalkSpec spec;
+  spec.steps = 1;
+  spec.noise_scale = 0.0;
+  const EstimateLog log = climb_log(spec);
+  std::vector<LioRow> lio = lio_of(log, 7);
+  const Transform mount{rotation_y(0.3), Vec3{0.1, 0.0, 0.6}};
+  ReplayOptions options;
+  const Replay plain = replay(log, lio, options);
+  for (LioRow& row : lio) row.pose = row.pose * mount;
+  options.odometry.fusion.base_T_lidar = mount;
+  const Replay mounted = replay(log, lio, options);
+  EXPECT_LT((plain.ticks.back().world_T_base.p_m - mounted.ticks.back().world_T_base.p_m).norm(), 1e-6);
+}
+
+// --- Cassie: a robot of another make, its truth from its own simulator
+// ------------------------------------------------
+
+TEST(EstimateReplay, CassieWalk_OwnAttitude_StaysWithinNineMillimetres) {
+  const char* folder = std::getenv("POLYGMAP_SHARED_DATA");
+  const std::string path =
+      std::string(folder != nullptr ? folder : POLYGMAP_SHARED_DATA_DEFAULT) + "/cassie/cassie_walk_open.csv";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "No " << path << ": set POLYGMAP_SHARED_DATA.";
+  const EstimateLog log = read_estimate_log(path);
+  const Score s = score(log, replay(log, {}, {}));
+  EXPECT_LT(s.position_rmse_m, 0.009);
+  EXPECT_LT(s.velocity_rmse_mps, 0.018);
+  EXPECT_LT(drift_percent(s), 0.95);
+}
+
+// --- The command -----------------------------------------------------------------------------------------------------
+
+class EstimateCommand : public testing::Test {
+ protected:
+  EstimateCommand() { std::filesystem::create_directories(folder_); }
+  [[nodiscard]] std::string at(const std::string& name) const { return folder_ + "/" + name; }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(at(name), std::ios::binary) << text;
+    return at(name);
+  }
+  int call(const std::vector<std::string>& arguments) {
+    std::ostringstream out, err;
+    const int code = polygmap_main(
+        arguments, [](const ClimbOptions&, const ClimbProgressFunction&) { return ClimbSummary{}; }, out, err, false);
+    out_ = out.str();
+    err_ = err.str();
+    return code;
+  }
+  void expect_refused(const std::vector<std::string>& arguments, const std::string& culprit) {
+    EXPECT_EQ(call(arguments), kExitUsage) << culprit;
+    EXPECT_NE(err_.find(culprit), std::string::npos) << culprit << " is not in: " << err_;
+    EXPECT_EQ(std::count(err_.begin(), err_.end(), '\n'), 1) << err_;
+    EXPECT_EQ(out_, "") << culprit;
+  }
+  // Standing still on two feet, a row every 2 ms.
+  static std::string log_text(int rows) {
+    std::string text = std::string(kHeader) + "\n";
+    for (int i = 0; i < rows; ++i) text += std::to_string(100.0 + 0.002 * i) + kRow + "\n";
+    return text;
+  }
+  static constexpr const char* kHeader =
+      "t_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2,left_contact,right_contact,"
+      "left_foot_x_m,left_foot_y_m,left_foot_z_m,right_foot_x_m,right_foot_y_m,right_foot_z_m,truth_px_m,truth_py_m,"
+      "truth_pz_m,truth_vx_mps,truth_vy_mps,truth_vz_mps,truth_qw,truth_qx,truth_qy,truth_qz";
+  static constexpr const char* kRow = ",0,0,0,0,0,9.81,1,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,1,0,0,0";
+  static constexpr const char* kLioHeader = "stamp_s,arrival_s,px_m,py_m,pz_m,qw,qx,qy,qz\n";
+  std::string folder_ = testing::TempDir() + "polygmap_estimate_test";
+  std::string out_, err_;
+};
+
+TEST_F(EstimateCommand, StandingLog_WritesScoresAndOneRowPerRow) {
+  const std::string lio = write("lio.csv", std::string(kLioHeader) + "100.1,100.15,5,5,1,1,0,0,0\n");
+  ASSERT_EQ(call({"estimate", write("log.csv", log_text(500)), "--lio", lio, "--json", at("out.json"), "--csv",
+                  at("out.csv")}),
+            kExitPass)
+      << err_;
+  const nlohmann::json json = nlohmann::json::parse(std::ifstream(at("out.json")));
+  for (const char* key :
+       {"position_rmse_mm", "velocity_rmse_mmps", "attitude_rmse_deg", "drift_percent", "horizontal_drift_percent"}) {
+    EXPECT_LT(json.at(key).get<double>(), 0.1) << key;
+  }
+  EXPECT_TRUE(json.contains("nees_in_bounds_percent"));
+  EXPECT_EQ(json["lio"]["accepted"], 1);
+  EXPECT_EQ(json["innovations"]["foot_position"]["updates"], 499);
+  EXPECT_EQ(json["innovations"]["lio_position"]["updates"], 0);
+  std::ifstream csv(at("out.csv"));
+  std::string line;
+  std::getline(csv, line);
+  EXPECT_EQ(line.rfind("t_s,px_m,py_m,pz_m,qw", 0), 0U) << line;
+  const auto columns = std::count(line.begin(), line.end(), ',');
+  int rows = 0;
+  for (; std::getline(csv, line); ++rows) EXPECT_EQ(std::count(line.begin(), line.end(), ','), columns);
+  EXPECT_EQ(rows, 500);
+  EXPECT_EQ(line.empty(), true);
+}
+
+TEST_F(EstimateCommand, BlankLinesAtTheEnd_AreNoRows) {
+  EXPECT_EQ(call({"estimate", write("log.csv", log_text(20) + "\n  \n\r\n\n")}), kExitPass) << err_;
+}
+
+TEST_F(EstimateCommand, BadLogs_AreNamedInOneSentenceWithTheirLine) {
+  const std::string good = log_text(5);
+  const auto spoilt = [&good](int line, const std::string& text) {
+    std::istringstream in(good);
+    std::string out, one;
+    for (int n = 1; std::getline(in, one); ++n) out += (n == line ? text : one) + "\n";
+    return out;
+  };
+  const auto swapped = [](const std::string& column, const std::string& by) {
+    const std::string header = kHeader;
+    const std::size_t where = header.find(column);
+    std::string changed = header.substr(0, where);
+    changed += by;
+    changed += header.substr(where + column.size());
+    return changed;
+  };
+  const std::string row = std::string("100.004") + kRow;
+  const struct {
+    std::string text, culprit;
+  } kCases[] = {
+      {"", "is empty"},
+      {"t_s;gyro_x_radps;gyro_y_radps\n1;2;3\n", "line 1: the columns are separated by semicolons"},
+      {"t_s\tgyro_x_radps\n1\t2\n", "line 1: the columns are separated by tabs"},
+      {"\"t_s\",\"gyro_x_radps\"\n1,2\n", "line 1: the columns' names stand in quotes"},
+      {"t_s,gyro_x_radps\r1,2\r3,4\r", "end in CR alone"},
+      {std::string(kHeader) + "\n", "no rows"},
+      {spoilt(1, "t_s,gyro_x_radps"), "line 2"},
+      {spoilt(1, swapped("t_s", "t_x")), "\"t_s\" is missing"},
+      {spoilt(1, swapped("gyro_x_radps", "gyro_x")), "is missing"},
+      {spoilt(1, swapped("truth_px_m,", "px_m,")), "\"truth_px_m\" is missing"},
+      {spoilt(1, swapped("truth_qz", "qz")), "\"truth_qz\" is missing"},
+      {spoilt(1, swapped("gyro_y_radps", "gyro_x_radps")), "twice"},
+      {spoilt(4, "100.004,0,0"), "line 4: has 3 values"},
+      {spoilt(4, row + ",1"), "line 4: has 26 values"},
+      {spoilt(4, std::string("100.000") + kRow), "line 4: t_s"},
+      {spoilt(4, std::string("nan") + kRow), "line 4: t_s is \"nan\", not a finite"},
+      {spoilt(4, "100.004,inf,0,0,0,0,9.81,1,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,1,0,0,0"), "line 4: gyro_x_radps"},
+      {spoilt(4, "100.004,1e-400,0,0,0,0,9.81,1,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,1,0,0,0"), "no double can hold"},
+      {spoilt(4, "100.004,one,0,0,0,0,9.81,1,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,1,0,0,0"), "not a number"},
+      {spoilt(4, "100.004,0x,0,0,0,0,9.81,1,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,1,0,0,0"), "not a number"},
+      {spoilt(4, "100.004,,0,0,0,0,9.81,1,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,1,0,0,0"), "empty"},
+      {spoilt(4, "100.004,0,0,0,0,0,1e9,1,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,1,0,0,0"), "beyond"},
+      {spoilt(4, "100.004,0,0,0,0,0,9.81,2,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,1,0,0,0"), "left_contact"},
+      {spoilt(4, "100.004,0,0,0,0,0,9.81,1,1,0,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,0,0,0,0"), "quaternion"},
+      {spoilt(4, ""), "line 4"},
+      {std::string(kHeader) + "\n100.0" + kRow + "\n", "line 2: is the only row"},
+      {spoilt(4, std::string("106.1") + kRow), "line 4: t_s is 6.098 s after"},
+      {std::string(kHeader) + "\n100" + kRow + "\n102" + kRow + "\n104" + kRow + "\n", "line 4: the rows"},
+  };
+  for (const auto& c : kCases) expect_refused({"estimate", write("bad.csv", c.text)}, c.culprit);
+  expect_refused({"estimate", at("absent.csv")}, "There is no file");
+  expect_refused({"estimate", folder_}, "is a folder");
+  expect_refused({"estimate", write("log.csv", good), "--json", folder_}, folder_);
+  expect_refused({"estimate", at("log.csv"), "--csv", at("no/such/folder.csv")}, "folder.csv");
+  expect_refused({"estimate", at("log.csv"), "--lio", write("lio.csv", "stamp_s\n1\n")}, "\"arrival_s\" is missing");
+  const std::string backwards = std::string(kLioHeader) + "100.1,100.2,0,0,0,1,0,0,0\n100.2,100.1,0,0,0,1,0,0,0\n";
+  expect_refused({"estimate", at("log.csv"), "--lio", write("lio.csv", backwards)}, "line 3: arrival_s");
+  expect_refused({"estimate", at("log.csv"), "--lidar-mount", "0", "0", "0", "0", "0", "0"}, "--lio");
+  expect_refused({"estimate", at("log.csv"), "--csv", at("log.csv")}, "would be overwritten");
+  expect_refused({"estimate", at("log.csv"), "--lio", at("lio.csv"), "--json", folder_ + "/./lio.csv"}, "overwritten");
+  expect_refused({"estimate", at("log.csv"), "--csv", at("one.out"), "--json", at("one.out")}, "overwritten");
+  expect_refused({"estimate", at("log.csv"), "--lio-tau", "2"}, "--lio-tau is of no use");
+}
+
+TEST_F(EstimateCommand, Garbage_OfEveryKind_IsReadOrRefusedButNeverACrash) {
+  const std::string good = log_text(20);
+  std::mt19937 random(1);
+  const auto below = [&random](std::size_t n) { return static_cast<std::size_t>(random() % n); };
+  constexpr std::string_view kSpice = "0123456789.,,,-+eEnaif\n\r\t \"#\0\xff";
+  for (int i = 0; i < (test::kSlowMachine ? 100 : 1000); ++i) {
+    std::string text = good;
+    for (std::size_t k = 1 + below(8); k > 0; --k) {
+      const std::size_t where = below(text.size());
+      switch (below(4)) {
+        case 0:
+          text[where] = kSpice[below(kSpice.size())];
+          break;
+        case 1:
+          text.insert(where, 1, kSpice[below(kSpice.size())]);
+          break;
+        case 2:
+          text.erase(where, 1 + below(30));
+          break;
+        default:
+          text.resize(std::max<std::size_t>(where, 1));
+      }
+      if (text.empty()) text.assign(1, 'x');
+    }
+    const int code = call({"estimate", write("fuzz.csv", text)});
+    ASSERT_TRUE(code == kExitPass || code == kExitUsage) << text;
+    ASSERT_EQ(std::count(err_.begin(), err_.end(), '\n'), code == kExitPass ? 0 : 1) << err_;
+  }
+}
+
+}  // namespace
+}  // namespace polygmap::sim

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "tests/support/scripted_climb.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+TEST(ClimbVerdict, Fall_FailsWithThePlantsReason) {
+  ScriptedClimb climb(plain_stairs(2));
+  climb.climb_all();
+  climb.truth.fell = true;
+  climb.truth.fall_reason = "the left foot hit step 2 by 7.1 mm.";
+  climb.tick();
+  climb.truth.fall_reason = "something later";
+  climb.tick();
+  const ClimbSummary s = climb.finish();
+  EXPECT_TRUE(s.fell);
+  EXPECT_FALSE(s.pass);
+  EXPECT_EQ(s.reason, "Fell after 2 of 2 steps: the left foot hit step 2 by 7.1 mm.");
+}
+
+TEST(ClimbVerdict, HeapCall_Fails) {
+  ScriptedClimb climb(plain_stairs(1));
+  climb.climb_all();
+  RunFigures run;
+  run.heap_calls = 3;
+  run.heap_first_caller = "polygmap::fuse";
+  const ClimbSummary s = climb.report.finish(run);
+  EXPECT_FALSE(s.pass);
+  EXPECT_EQ(s.heap_calls, 3U);
+  EXPECT_EQ(s.reason, "The module called the heap, 3 times in all, first from polygmap::fuse.");
+}
+
+TEST(ClimbVerdict, ModuleStopped_NamesWhatItMeasured) {
+  ScriptedClimb climb(plain_stairs(2));
+  climb.wait(100 * kNsPerMs);
+  climb.gait.phase = GaitPhase::kStopped;
+  climb.gait.stop_reason = StopReason::kRiseTooHigh;
+  climb.gait.stop_measured_m = 0.498;
+  climb.tick();
+  const ClimbSummary s = climb.finish();
+  EXPECT_FALSE(s.pass);
+  EXPECT_EQ(s.reason, "The module stopped after 0 of 2 steps: it measured a rise of 0.498 m, too high to climb.");
+  EXPECT_TRUE(std::isnan(s.climb_time_s));
+  EXPECT_TRUE(std::isnan(s.swing_clearance_min_m));  // nothing swung
+}
+
+TEST(ClimbVerdict, RunCutShort_SaysSo) {
+  ScriptedClimb climb(plain_stairs(2));
+  climb.wait(100 * kNsPerMs);
+  EXPECT_EQ(climb.finish().reason, "Time ran out after 0 of 2 steps.");
+}
+
+TEST(ClimbVerdict, StoppedOnTop_PassesAndSaysWhy) {
+  ScriptedClimb climb(plain_stairs(1));
+  climb.climb_all();
+  climb.gait.phase = GaitPhase::kStopped;
+  climb.gait.stop_reason = StopReason::kMapStale;
+  climb.tick();
+  const ClimbSummary s = climb.finish();
+  EXPECT_TRUE(s.pass);
+  EXPECT_TRUE(s.reason.ends_with("; the module stopped there: its map was stale.")) << s.reason;
+}
+
+// No step counts, but not because the module thought itself on top.
+TEST(ClimbVerdict, FinishedOverAnEdge_NamesTheEdge) {
+  ScriptedClimb climb(plain_stairs(2));
+  climb.climb_all({}, 0.07);
+  climb.gait.phase = GaitPhase::kFinished;
+  climb.tick();
+  EXPECT_EQ(climb.finish().reason, "A sole stood 3.2 mm over the edge of its tread; 0 of 2 steps count.");
+}
+
+TEST(ClimbVerdict, PushAfterTheEnd_IsNamed) {
+  ScriptedClimb climb(plain_stairs(1));
+  climb.climb_all();
+  RunFigures run;
+  run.options.pushes = {{.at_s = 0.01, .axis = 0, .impulse_ns = 10.0}, {.at_s = 99.0, .axis = 1, .impulse_ns = 10.0}};
+  const std::string reason = climb.report.finish(run).reason;
+  EXPECT_EQ(reason.find("0.01 s never"), std::string::npos) << reason;
+  EXPECT_NE(reason.find(" The push at 99 s never came: the run ended at "), std::string::npos) << reason;
+}
+
+TEST(VerdictLine, OneLine_WithTheWord) {
+  ScriptedClimb climb(plain_stairs(1));
+  climb.climb_all();
+  const std::string line = verdict_line(climb.finish());
+  EXPECT_EQ(line.rfind("PASS: Climbed 1 of 1 steps in 0.9 s", 0), 0U) << line;
+  EXPECT_EQ(line.find('\n'), std::string::npos);
+}
+
+}  // namespace
+}  // namespace polygmap::sim
