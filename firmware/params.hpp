@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every stage's parameters and the robot's mounts, in one place.
+// The robot and every stage's parameters, in one place.
 #pragma once
 
 #include "algorithms/estimation/estimator.hpp"
@@ -8,19 +8,18 @@
 #include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
 #include "algorithms/perception/map/polygon_map.hpp"
 #include "algorithms/perception/surface_extractor.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
 struct Params {
+  RobotModel robot;
   Estimator::Params estimator;
   SurfaceExtractor::Params surfaces;
   CameraExtrinsicsEstimator::Params mount;
   PolygonMap::Params map;
   FootholdSearch::Params footholds;
   Gait::Params gait;
-  LegGeometry legs;
-  Transform base_T_camera = polygmap::base_T_camera();  // as the data sheet says
   bool estimate_mount = true;
   bool self_filter = true;              // false only to show what the camera then takes for ground
   BodyUncertainty body;                 // of the robot's own shapes

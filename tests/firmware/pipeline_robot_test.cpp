@@ -8,6 +8,7 @@
 
 #include "firmware/pipeline.hpp"
 #include "tests/support/fake_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/trapped_module.hpp"
 
 namespace polygmap {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/support/nominal_robot.hpp"
+
 namespace polygmap::test {
 namespace {
 
@@ -43,7 +45,7 @@ IdealClimb::IdealClimb(const ClimbSetup& setup, const Gait::Params& params) : se
   odom_T_true_ = {rotation_z(-setup.yaw_rad), Vec3{0.3, -0.2, 0.01}};
   // Its forces know no pendulum: drives that tell no torque.
   feedback_.tau_nm.setConstant(std::numeric_limits<double>::quiet_NaN());
-  gait_.reset(params);
+  gait_.reset(params, nominal_robot());
 }
 
 double IdealClimb::noise() {  // about normal, sigma 1

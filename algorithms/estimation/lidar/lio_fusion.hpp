@@ -15,7 +15,7 @@
 #include "algorithms/estimation/calibration/noise_level.hpp"
 #include "algorithms/estimation/lidar/lio_uncertainty.hpp"
 #include "algorithms/estimation/quality/innovation.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
@@ -51,7 +51,6 @@ struct LioInnovations {
 class LioFusion {
  public:
   struct Params {
-    Transform base_T_lidar = polygmap::base_T_lidar();
     double max_age_s = 0.4;  // of a pose on arrival; the state ring holds 0.5 s
     double tau_s = 4.0;      // LIO of 10 mm at 10 Hz: 2.2 mm come through. At least this ...
     double tau_spm = 0.0;    // ... and so much per metre of LIO's sigma
@@ -73,7 +72,7 @@ class LioFusion {
     double max_slew_s = 0.01;          // longer ticks move it by no more than one of these: 1 mm
     LioUncertainty::Params uncertainty;
   };
-  void reset(const Params& params) noexcept;
+  void reset(const Params& params, const Transform& base_T_lidar) noexcept;
 
   // What can be said of a pose by itself: kAccepted or the reason against it.
   [[nodiscard]] LioVerdict check(const LioSample& sample, std::int64_t now_ns) const noexcept;
@@ -113,6 +112,7 @@ class LioFusion {
   void tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept;
 
   Params params_;
+  Transform base_T_lidar_;
   // LIO's world is not ours. The first poses say where it lies, while world is odom: each by its weight against the
   // drift since the first. Once that is no more than eq. (9)'s gain the tie stays and odom moves as it drifts.
   Transform world_T_lio_;

@@ -3,15 +3,9 @@
 // motion, x + v/omega, in the horizontal plane.
 #pragma once
 
-#include "algorithms/core/math/math.hpp"
+#include "algorithms/gait/trajectories/motion.hpp"
 
 namespace polygmap {
-
-struct HorizontalMotion {
-  Vec2 position_m = Vec2::Zero();
-  Vec2 velocity_mps = Vec2::Zero();
-  Vec2 acceleration_mps2 = Vec2::Zero();
-};
 
 class DcmStabiliser {
  public:

@@ -5,7 +5,7 @@
 
 #include "algorithms/core/messages/footholds.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
-#include "algorithms/gait/trajectories/step_plan.hpp"
+#include "algorithms/gait/footsteps/step_goal.hpp"
 
 namespace polygmap {
 
@@ -51,7 +51,8 @@ class ClimbPlanner {
     double rise_m = 0.0;  // of a leading step
   };
 
-  void reset(const Params& params) noexcept;
+  // robot: outlives the planner.
+  void reset(const Params& params, const RobotModel& robot) noexcept;
   [[nodiscard]] Decision decide(const Situation& situation, const FootholdSet& footholds) const noexcept;
   // A swing was latched: its goal is what the next decisions build on.
   void latched(const Situation& situation, const Decision& decision) noexcept;
@@ -63,7 +64,7 @@ class ClimbPlanner {
   void passing_ends_beside(const StepGoal& goal) noexcept;
   // Its foot stands on its goal, or where it stood before: with which foot to lead as before the latch.
   void landed() noexcept;
-  void put_back() noexcept;
+  void swing_aborted() noexcept;
   [[nodiscard]] std::uint32_t tread_id() const noexcept { return tread_id_; }  // under the foot that landed last
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
 
@@ -74,9 +75,15 @@ class ClimbPlanner {
                                   Decision& decision) const noexcept;
   [[nodiscard]] bool floor_goal(const Situation& situation, const FootholdSet& footholds,
                                 StepGoal& goal) const noexcept;
+  [[nodiscard]] StopReason reason_against(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  // Soles straight back from the footholds, so far that the toes are stand_off_m from the nosing.
+  struct StandOff;
+  [[nodiscard]] StandOff stand_off(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  [[nodiscard]] bool lined_up(const Situation& situation, const StandOff& to, std::size_t foot) const noexcept;
   [[nodiscard]] Foot leading_foot(const Situation& situation, const SolePair& targets) const noexcept;
 
   Params params_;
+  const RobotModel* robot_ = nullptr;
   Decision latched_;
   // What a latch changes, and what it was before.
   struct Memory {

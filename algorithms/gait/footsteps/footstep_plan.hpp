@@ -7,7 +7,7 @@
 
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/geometry/oriented_rectangle.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
@@ -52,7 +52,8 @@ struct SwingRule {
 [[nodiscard]] Foot swing_foot(const TorsoDisplacement& step, Foot by_gait_state, const SwingRule& rule) noexcept;
 
 // Eq. (34): the ground a foot occupies, with a margin around the collision rectangle.
-[[nodiscard]] OrientedRectangle foot_rectangle(const SolePose& sole, double margin_m) noexcept;
+[[nodiscard]] OrientedRectangle foot_rectangle(const SoleRectangle& collision, const SolePose& sole,
+                                               double margin_m) noexcept;
 
 struct FloorStepLimits {
   double forward_m = 0.2;  // beyond the place beside the stance foot
@@ -64,7 +65,7 @@ struct FloorStepLimits {
 // The next step of `swing` on level floor towards the goal torso pose: the torso's displacement from the pose that the
 // stance foot belongs to is limited (35), the foot follows from it (31) and moves outwards until the feet are apart
 // (34).
-[[nodiscard]] SolePose floor_step(const SolePose& stance, Foot swing, const TorsoPose& goal, double half_width_m,
-                                  const FloorStepLimits& limits) noexcept;
+[[nodiscard]] SolePose floor_step(const SoleRectangle& collision, const SolePose& stance, Foot swing,
+                                  const TorsoPose& goal, double half_width_m, const FloorStepLimits& limits) noexcept;
 
 }  // namespace polygmap

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The path of the swing foot (eqs 32-33), with what a real staircase asks for: rise before moving forward, keep away
-// from the riser, cross the nosing high, come down straight, seek the ground at an even speed (swing_pace.hpp: faster
-// where it is late).
+// from the riser, cross the nosing high, come down straight, search the ground at an even speed (swing_timing.hpp:
+// faster where it is late).
 #pragma once
 
 #include "algorithms/gait/footsteps/footstep_plan.hpp"
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/gait/trajectories/quintic.hpp"
 
 namespace polygmap {
 
@@ -35,7 +35,7 @@ struct SwingShape {
 class Swing {
  public:
   // start may be tilted a little; target is flat. duration_ticks: until the target height is reached.
-  void plan(const Transform& start, const SolePose& target, const SwingShape& shape,
+  void plan(const SoleModel& sole, const Transform& start, const SolePose& target, const SwingShape& shape,
             std::int32_t duration_ticks) noexcept;
   // Leaves the path at that tick, reached at that pace (ticks of the path in a tick), for another one to a flat target:
   // ticks count from 0 again.
@@ -66,6 +66,7 @@ class Swing {
   double turn_rad_ = 0.0;
   double apex_m_ = 0.0;
   SwingShape shape_;
+  double toe_m_ = 0.0, foot_height_m_ = 0.0;  // of the collision box
   Quintic landing_;
   double approach_s_ = 0.0;
   std::int32_t duration_ticks_ = 1;

@@ -4,9 +4,8 @@
 
 #include <array>
 
-#include "algorithms/gait/balance/dcm_stabiliser.hpp"
 #include "algorithms/gait/footsteps/footstep_plan.hpp"
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/gait/trajectories/quintic.hpp"
 
 namespace polygmap {
 
@@ -28,6 +27,8 @@ struct TorsoParams {
 // At rest over the foot that stands alone.
 [[nodiscard]] TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance,
                                    const SolePair& soles) noexcept;
+// Time for the torso to come down by that much without falling faster than a foot pressed enough to balance allows.
+[[nodiscard]] std::int32_t lowering_ticks(double drop_m) noexcept;
 // Between both feet.
 [[nodiscard]] TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params,
                                       const SolePair& soles) noexcept;

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap::sim {
 namespace {
