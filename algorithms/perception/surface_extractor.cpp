@@ -127,22 +127,22 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       }
       return 1;
     case Phase::kGather:
-      boundaries_.gather(row_, runs_.columns()[static_cast<std::size_t>(row_)], to_plane_);
-      if (round_ == 1) boundaries_.trim(row_);
+      boundaries_.build_spans(row_, runs_.columns()[static_cast<std::size_t>(row_)], to_plane_);
+      if (round_ == 1) boundaries_.trim_ends(row_);
       if (++row_ == picture_.column_rays.columns) enter(round_ == 0 ? Phase::kMeet : Phase::kClaim);
       return 1;
     case Phase::kClaim: {  // from left to right and back
       const std::int32_t last = picture_.column_rays.columns - 1, g = row_ <= last ? row_ : 2 * last + 1 - row_;
-      boundaries_.claim(g, row_ <= last ? g - 1 : g + 1, row_ <= last ? first_found_ : planes_.count + 1,
-                        planes_.count);
+      boundaries_.fill_gaps(g, row_ <= last ? g - 1 : g + 1, row_ <= last ? first_found_ : planes_.count + 1,
+                            planes_.count);
       if (++row_ == 2 * picture_.column_rays.columns) enter(Phase::kMeet);
       return 1;
     }
     case Phase::kMeet:
-      if (row_ == 0) boundaries_.begin_meeting();
-      boundaries_.meet(row_, round_ == 0);
+      if (row_ == 0) boundaries_.begin_scores();
+      boundaries_.score(row_, round_ == 0);
       if (++row_ == picture_.column_rays.columns) {
-        boundaries_.settle();
+        boundaries_.place();
         enter(Phase::kRefit);
       }
       return 1;
@@ -157,7 +157,7 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
           merge_planes(true);
           merging_.begin_facets(params_.merging, params_.growing, noise_, planes_);
         } else {
-          boundaries_.follow();
+          boundaries_.reproject();
         }
         enter(round_ == 0 ? Phase::kFacets : Phase::kPieces);
         ++round_;

@@ -74,10 +74,10 @@ void SurfaceExtractor::begin_search() noexcept {
   search_.begin(params_.remainder, view_.camera_up);
   for (std::size_t i = 1; i <= planes_.count; ++i) {
     const FramePlane& p = planes_[i];
-    if (!p.alive && p.facet && to_plane_[i] == 0 && p.kind != SurfaceKind::kOther) search_.give_back(i);
+    if (!p.alive && p.facet && to_plane_[i] == 0 && p.kind != SurfaceKind::kOther) search_.release(i);
     if (!p.alive) continue;
-    if (p.kind == SurfaceKind::kTread) search_.know_level(p.plane);
-    if (p.kind == SurfaceKind::kRiser) search_.know_upright(p.plane, p.pixels);
+    if (p.kind == SurfaceKind::kTread) search_.add_known_level(p.plane);
+    if (p.kind == SurfaceKind::kRiser) search_.add_known_riser(p.plane, p.pixels);
   }
 }
 

@@ -16,7 +16,7 @@ void SurfaceExtents::add_column(const SpanBoundaries::Columns& columns, const Co
   std::uint8_t* owners = picture.owners.row(column);
   std::fill(owners, owners + kDepthHeight_px, std::uint8_t{0});
   for (const ColumnSpan& span : columns[static_cast<std::size_t>(column)]) {
-    const std::uint8_t surface = span.piece == 0 ? std::uint8_t{0} : pieces.plane_of(span.piece);
+    const std::uint8_t surface = span.component == 0 ? std::uint8_t{0} : pieces.plane_of(span.component);
     if (surface == 0) continue;
     std::fill(owners + span.top, owners + span.bottom + 1, surface);
     profiles_[surface].add(column, span.top, span.bottom);

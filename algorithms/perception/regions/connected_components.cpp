@@ -31,7 +31,7 @@ void ConnectedComponents::find(SpanBoundaries::Columns& columns, std::int32_t co
   for (std::int32_t g = 0; g < column_count; ++g) {
     std::size_t next = 0;  // on the left, the first span that ends no higher than this one begins
     for (ColumnSpan& span : columns[static_cast<std::size_t>(g)]) {
-      span.piece = ++count;
+      span.component = ++count;
       parent_[count] = count;
       if (g == 0) continue;
       const SpanBoundaries::Column& lefts = columns[static_cast<std::size_t>(g - 1)];
@@ -39,7 +39,7 @@ void ConnectedComponents::find(SpanBoundaries::Columns& columns, std::int32_t co
       for (std::size_t i = next; i < lefts.size() && lefts[i].top <= span.bottom; ++i) {
         const ColumnSpan& left = lefts[i];
         if ((static_cast<int>(left.plane == span.plane) & static_cast<int>(left.bottom >= span.top)) == 0) continue;
-        const std::uint16_t a = root(left.piece), b = root(span.piece);
+        const std::uint16_t a = root(left.component), b = root(span.component);
         parent_[std::max(a, b)] = std::min(a, b);
       }
     }
@@ -61,9 +61,9 @@ void ConnectedComponents::find(SpanBoundaries::Columns& columns, std::int32_t co
   }
   for (std::int32_t g = 0; g < column_count; ++g) {
     for (ColumnSpan& span : columns[static_cast<std::size_t>(g)]) {
-      span.piece = parent_[span.piece];
-      if (span.piece == 0) continue;
-      Piece& piece = pieces_[span.piece];
+      span.component = parent_[span.component];
+      if (span.component == 0) continue;
+      Piece& piece = pieces_[span.component];
       if (piece.area_px == 0.0) {
         piece.left = g;
         piece.top = span.top;

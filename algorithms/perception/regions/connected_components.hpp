@@ -46,7 +46,7 @@ class ConnectedComponents {
   std::array<Piece, kMaxPieces + 1> pieces_{};
   std::size_t piece_count_ = 0;
   // Union-find over all intervals.
-  std::array<std::uint16_t, static_cast<std::size_t>(kColumns) * SpanBoundaries::kMaxIntervals + 1> parent_{};
+  std::array<std::uint16_t, static_cast<std::size_t>(kColumns) * SpanBoundaries::kMaxSpans + 1> parent_{};
   std::uint32_t overflow_ = 0;
 };
 
