@@ -11,6 +11,7 @@
 
 #include "algorithms/perception/image/noise_tracker.hpp"
 #include "algorithms/perception/planes/plane_fit.hpp"
+#include "algorithms/perception/planes/plane_id.hpp"
 #include "algorithms/perception/planes/scanline_segments.hpp"
 
 namespace polygmap {
@@ -19,7 +20,7 @@ namespace polygmap {
 struct ColumnSpan {
   std::int16_t top = 0;
   std::int16_t bottom = 0;
-  std::uint8_t plane = 0;
+  PlaneId plane = kNoPlane;
   std::uint16_t component = 0;  // connected component of its plane's spans, numbered by ConnectedComponents
 };
 
