@@ -14,6 +14,7 @@
 #include <ostream>
 
 #include "sim_stub/host/cli/estimate_command.hpp"
+#include "sim_stub/host/cli/params_command.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
 
@@ -304,6 +305,8 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   CLI::App* perceive = declare_perceive(app, perceive_arguments);
   EstimateArguments estimate_arguments;
   CLI::App* estimate = declare_estimate(app, estimate_arguments);
+  ParamsArguments params_arguments;
+  CLI::App* params = declare_params(app, params_arguments);
   for (CLI::App* command : {climb, perceive, estimate}) {
     for (CLI::Option* option : command->get_options()) option->check(not_empty);
   }
@@ -317,13 +320,14 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
-    constexpr std::array<std::string_view, 3> kCommands{"climb", "perceive", "estimate"};
+    constexpr std::array<std::string_view, 4> kCommands{"climb", "perceive", "estimate", "params"};
     const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
     err << "polygmap: " << error.what() << "; see polygmap " << (named ? arguments[0] + " " : "") << "--help.\n";
     return kExitUsage;
   }
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);
   if (estimate->parsed()) return run_estimate(estimate_arguments, out, err);
+  if (params->parsed()) return run_params(params_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
     err << "polygmap: A subcommand is required; see polygmap --help.\n";
     return kExitUsage;
