@@ -22,6 +22,7 @@ class Estimator {
     double max_torque_nm = 1000.0;
     double max_joint_rad = 4.0;
     double max_joint_speed_radps = 15.0;
+    double joint_slack_rad = 0.01;
     double max_force_n = 5000.0;
     std::int64_t max_lead_ns = 10 * kNsPerMs;
     double max_height_error_m = 0.03;
@@ -38,6 +39,8 @@ class Estimator {
       field("max_joint_rad", p.max_joint_rad, 1.0, 100.0, "A joint sample of a larger angle is invalid.");
       field("max_joint_speed_radps", p.max_joint_speed_radps, 0.1, 1000.0,
             "A faster joint sample is invalid, also against the last one: a single wrong angle is not a motion.");
+      field("joint_slack_rad", p.joint_slack_rad, 0.0, 1.0,
+            "An encoder may jump by this besides what the joint's speed allows.");
       field("max_force_n", p.max_force_n, 100.0, 1e6, "A foot that presses harder makes the sample invalid.");
       field("max_lead_ns", p.max_lead_ns, 0, 1000000000,
             "A stamp may lie so far after now: frames caught up run up to 6 ms late.");

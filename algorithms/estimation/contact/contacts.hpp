@@ -37,8 +37,9 @@ class ContactEstimator {
             "The force sensor's delay, taken off the time of a touch-down.");
       field("settle_s", p.settle_s, 0.001, 0.1,
             "A contact's probability rises from 0 to 1 in this time at the earliest, which blanks the impact.");
-      field("stated_standing", p.stated_standing, 0.05, 1.0, "A foot whose stated probability is as high stands ...");
-      field("stated_air", p.stated_air, 0.0, 0.95, "... until its stated probability falls below this.");
+      field("stated_standing", p.stated_standing, 0.05, 1.0, "A foot whose stated probability is as high stands.");
+      field("stated_air", p.stated_air, 0.0, 0.95,
+            "A foot that stands does so until its stated probability falls below this.");
       field.ordered("stated_air", "stated_standing");
       field("flicker_s", p.flicker_s, 0.001, 0.1, "A stated contact that ends fades in this time.");
       field("stuck_swing_s", p.stuck_swing_s, 0.02, 2.0,

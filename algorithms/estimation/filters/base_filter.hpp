@@ -44,7 +44,10 @@ class BaseFilter {
     double stance_walk_z_mprs = 5e-4;
     double anchor_sigma_m = 1e-5;
     double swing_walk_mprs = 2.0;
+    double swing_velocity_sigma_mps = 200.0;
     double height_correlation_s = 1.0;
+    double initial_contact_sigma_m = 1e-3;
+    double initial_velocity_sigma_mps = 1e-2;
 
     static void visit(auto& p, auto& field) {
       field("accel_noise_mpsrs", p.accel_noise_mpsrs, 1e-4, 1.0,
@@ -61,8 +64,13 @@ class BaseFilter {
       field("anchor_sigma_m", p.anchor_sigma_m, 1e-7, 0.1, "Place of a contact at touch-down against the legs.");
       field("swing_walk_mprs", p.swing_walk_mprs, 0.01, 100.0,
             "A swinging foot walks like this, so that a landing one is a new contact.");
+      field("swing_velocity_sigma_mps", p.swing_velocity_sigma_mps, 1.0, 1e4,
+            "Noise of a swinging foot's velocity row, which says nothing of the base.");
       field("height_correlation_s", p.height_correlation_s, 0.002, 100.0,
             "A frozen height errs alike in every step of this time.");
+      field("initial_contact_sigma_m", p.initial_contact_sigma_m, 1e-6, 0.1, "Place of a contact at the start.");
+      field("initial_velocity_sigma_mps", p.initial_velocity_sigma_mps, 1e-5, 1.0,
+            "Velocity of the base at the start.");
     }
   };
   void reset(const Params& params) noexcept { *this = BaseFilter{params}; }

@@ -38,6 +38,7 @@ class ContactInEkf {
     double whiteness_window_s = 0.2;
     double whiteness_gain_ps = 1.0;
     double whiteness_start_gain = 1.0;
+    double whiteness_most_ratio = 5.0;
     double outlier_sigmas = 5.0;
 
     static void visit(auto& p, auto& field) {
@@ -57,7 +58,7 @@ class ContactInEkf {
       field("foot_walk_radprs", p.foot_walk_radprs, 1e-6, 1.0,
             "A loaded foot's creep and the kinematic error turn its attitude like this as the legs move.");
       field("contact_walk_mprs", p.contact_walk_mprs, 1e-5, 1.0,
-            "The same moves its place like this at the start; then it is measured.");
+            "A loaded foot's place walks like this at the start; then the walk is measured.");
       field("min_contact_walk_mprs", p.min_contact_walk_mprs, 1e-6, 0.1, "The measured walk is at least this.");
       field("full_walk_speed_mps", p.full_walk_speed_mps, 0.001, 2.0,
             "A contact walks less when the base moves more slowly, turning included.");
@@ -65,9 +66,11 @@ class ContactInEkf {
       field.ordered("min_contact_walk_mprs", "max_contact_walk_mprs");
       field("whiteness_window_s", p.whiteness_window_s, 0.002, 10.0,
             "The walk is right when innovations averaged over this time are white.");
-      field("whiteness_gain_ps", p.whiteness_gain_ps, 0.0, 20.0, "Gain of the walk's logarithm in the long run ...");
+      field("whiteness_gain_ps", p.whiteness_gain_ps, 0.0, 20.0, "Gain of the walk's logarithm in the long run.");
       field("whiteness_start_gain", p.whiteness_start_gain, 0.0, 10.0,
-            "... and this over the time measured, at the start.");
+            "Gain of the walk's logarithm at the start, over the time measured.");
+      field("whiteness_most_ratio", p.whiteness_most_ratio, 1.01, 1000.0,
+            "Innovations count as no more than this times what white ones are.");
       field("outlier_sigmas", p.outlier_sigmas, 0.5, 100.0, "Rows farther out weigh less, in proportion (Huber).");
     }
   };

@@ -77,26 +77,27 @@ class LioFusion {
       field("base_T_lidar", p.base_T_lidar, "Mount of the lidar.");
       field("max_age_s", p.max_age_s, 0.0, 0.5, "A pose is no older on arrival; the history of states holds 0.5 s.");
       field("tau_s", p.tau_s, 0.0, 1000.0,
-            "Time constant of the offset's low-pass at least: of a LIO of 10 mm at 10 Hz, 2.2 mm come through 4 s ...");
-      field("tau_spm", p.tau_spm, 0.0, 1e5, "... and this for each metre of LIO's sigma.");
+            "Time constant of the offset's low-pass at least: of a LIO of 10 mm at 10 Hz, 2.2 mm come through 4 s.");
+      field("tau_spm", p.tau_spm, 0.0, 1e5,
+            "Time constant of the low-pass for each metre of LIO's sigma, where that is more than tau_s.");
       field("max_gap_s", p.max_gap_s, 0.002, 100.0,
             "Longest time that one pose stands for, so that after a silence no single one decides.");
       field("unstated_position_m", p.unstated_position_m);
       field("unstated_rotation_rad", p.unstated_rotation_rad);
       field("max_position_sigma_m", p.max_position_sigma_m, 1e-4, 100.0, "A pose that states more is refused.");
       field("max_rotation_sigma_rad", p.max_rotation_sigma_rad, 1e-4, 3.2, "A pose that states more is refused.");
-      field("jump_m", p.jump_m, 0.001, 10.0, "A pose farther from its prediction is a jump, at full rate ...");
+      field("jump_m", p.jump_m, 0.001, 10.0, "A pose farther from its prediction is a jump, at full rate.");
       field("jump_growth_mps", p.jump_growth_mps, 0.0, 10.0,
-            "... and this more for each second of silence, as odometry drifts.");
-      field("jump_rad", p.jump_rad, 0.001, 3.2,
-            "A pose turned farther from its prediction is a jump, at full rate ...");
-      field("jump_growth_radps", p.jump_growth_radps, 0.0, 3.2, "... and this more for each second of silence.");
+            "The bound grows by this for each second of silence, as odometry drifts.");
+      field("jump_rad", p.jump_rad, 0.001, 3.2, "A pose turned farther from its prediction is a jump, at full rate.");
+      field("jump_growth_radps", p.jump_growth_radps, 0.0, 3.2,
+            "The bound of turns grows by this for each second of silence.");
       field("max_jump_m", p.max_jump_m, 0.001, 100.0, "A pose farther off is a jump however long the silence.");
       field("max_jump_rad", p.max_jump_rad, 0.001, 3.2, "A pose turned farther is a jump however long the silence.");
       field("realign_count", p.realign_count, 1, 1000000,
             "Jumped poses in a row that agree among themselves are LIO's new world after as many.");
-      field("slew_mps", p.slew_mps, 0.001, 10.0, "The fused pose moves no faster: 0.2 mm in a tick of 2 ms ...");
-      field("slew_radps", p.slew_radps, 0.001, 10.0, "... and turns no faster: 0.02 degrees.");
+      field("slew_mps", p.slew_mps, 0.001, 10.0, "The fused pose moves no faster: 0.2 mm in a tick of 2 ms.");
+      field("slew_radps", p.slew_radps, 0.001, 10.0, "The fused pose turns no faster: 0.02 degrees in a tick.");
       field("max_slew_s", p.max_slew_s, 0.001, 1.0, "A longer tick moves it no farther than one of these: 1 mm.");
       field("uncertainty", p.uncertainty);
     }

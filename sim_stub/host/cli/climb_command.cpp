@@ -13,6 +13,7 @@
 #include <optional>
 #include <ostream>
 
+#include "firmware/config/param_file.hpp"
 #include "sim_stub/host/cli/estimate_command.hpp"
 #include "sim_stub/host/cli/params_command.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
@@ -41,6 +42,7 @@ struct ClimbArguments {
   bool no_mount_estimate = false;
   std::string camera;
   std::vector<std::string> pushes;
+  const CLI::App* said = nullptr;  // which options were
 };
 
 // CLI11 2.1 lets -1 and 2^64 wrap around.
@@ -101,6 +103,9 @@ void declare(CLI::App& climb, ClimbArguments& a) {
                   "How far the depths' scale may be off, unknown to the module: share of the depth")
       ->capture_default_str();
 
+  climb.add_option("--params", a.options.params_file, "Parameters of the module; other options go before what it says")
+      ->type_name("PARAMS.toml");
+
   // What the camera shows may differ from what the robot stands on: shows that the module lives on what it sees.
   const std::string causality = "causality (experiments on what the module sees)";
   climb.add_option("--render-shift", a.render_shift_m, "Shift of the rendered staircase, m")
@@ -136,8 +141,24 @@ std::optional<Push> read_push(const std::string& text) {
   return push;
 }
 
+// What the file says holds where no option says otherwise. Throws config::FileError.
+void take_params(ClimbArguments& a) {
+  if (a.options.params_file.empty()) return;
+  Params& params = a.options.params;
+  config::read_params(a.options.params_file, params);
+  if (a.said->count("--gait") == 0) a.gait = name_of(params.gait.planner.pattern);
+  if (a.said->count("--contacts") == 0 && params.estimator.infer_forces) a.contacts = "inferred";
+  a.no_self_filter |= !params.self_filter;
+  a.no_mount_estimate |= !params.estimate_mount;
+}
+
 // Empty when the arguments are good, else one sentence. Completes the options.
 std::string complaint(ClimbArguments& a) {
+  try {
+    take_params(a);
+  } catch (const config::FileError& error) {
+    return error.what();
+  }
   const StairParams& stairs = a.options.stairs;
   if (stairs.steps < 1 || stairs.steps > kMaxSteps) {
     return "--steps must be from 1 to " + std::to_string(kMaxSteps) + ", not " + std::to_string(stairs.steps) + ".";
@@ -301,6 +322,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   ClimbArguments a;
   a.options.out_dir = "climb_out";
   declare(*climb, a);
+  a.said = climb;
   PerceiveArguments perceive_arguments;
   CLI::App* perceive = declare_perceive(app, perceive_arguments);
   EstimateArguments estimate_arguments;

@@ -79,11 +79,12 @@ std::string params_json(const Params& params) {
 std::string params_markdown() {
   Params defaults;
   const config::ParamTable all = config::param_table(defaults);
-  std::string out =
-      "# Parameters\n\nMade by `polygmap params docs`; do not edit. The module has " +
-      std::to_string(all.params.size()) + " parameters, hash `" + config::hash_of(defaults) +
-      "` as they are here. `polygmap climb --params FILE.toml` changes those that the file names; `polygmap params "
-      "list` prints such a file with all of them.\n";
+  std::string out = "# Parameters\n\nWritten by `toolchain/checks/docs --write`, not by hand.\n\nThe module has " +
+                    std::to_string(all.params.size()) + " parameters; as they are here their hash is `" +
+                    config::hash_of(defaults) +
+                    "`. `--params FILE.toml` changes those that the file names, and `polygmap params list` prints such "
+                    "a file with all "
+                    "of them.\n";
   std::string last_table = "\n";
   for (const Param& param : all.params) {
     const auto [table, key] = table_and_key(param.name);

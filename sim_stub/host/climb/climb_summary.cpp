@@ -79,6 +79,7 @@ Json arguments_json(const ClimbOptions& o) {
           {"scan_ms", o.scan_ms},
           {"mount_error_deg", o.mount_error_deg},
           {"scale_error", o.scale_error},
+          {"params", o.params_file.empty() ? Json(nullptr) : Json(o.params_file)},
           {"estimate_mount", o.estimate_mount},
           {"self_filter", o.self_filter},
           {"contacts", o.infer_contacts ? "inferred" : "sensed"},
@@ -115,6 +116,7 @@ Json to_json(const ClimbSummary& s) {
   j["gait"] = name_of(s.options.gait);
   j["seed"] = s.options.seed;
   j["arguments"] = arguments_json(s.options);
+  j["params_hash"] = s.params_hash;
   const CameraFigures& camera = s.camera;
   const auto degrees = [](double x) { return rounded(x, 1e3); };
   j["camera"] = {
