@@ -29,7 +29,10 @@ struct Params {
   // Of the parameters' table, firmware/config/param_table.hpp.
   static void visit(auto& p, auto& field) {
     field("estimator", p.estimator);
+    field("surfaces", p.surfaces);
     field("mount", p.mount);
+    field("map", p.map);
+    field("footholds", p.footholds);
     field("base_T_camera", p.base_T_camera, "The camera's mount, as the data sheet says.");
     field("estimate_mount", p.estimate_mount, "The mount is estimated, starting from the data sheet.");
     field("self_filter", p.self_filter,

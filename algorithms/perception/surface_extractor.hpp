@@ -39,7 +39,7 @@ class SurfaceExtractor {
  public:
   struct Params {
     DepthNoiseModel noise;
-    NoiseTracker::Params depth_noise;  // how it is followed from frame to frame
+    NoiseTracker::Params depth_noise;
     DepthLimits limits;
     ScanlineSegmentation::Params runs;
     PlaneGrowing::Params growing;
@@ -47,15 +47,39 @@ class SurfaceExtractor {
     ResidualPlaneSearch::Params remainder;
     PlaneFit::Params planes;
     EdgeLineFinder::Params edge_lines;
-    double kind_tilt_rad = 0.21;  // a fitted plane within this of level is a tread, of upright a riser
+    double kind_tilt_rad = 0.21;
     PlaneMerging::Params merging;
-    double min_explained = 0.75;  // share of a surface's pixels that its plane explains, over that of all surfaces
-    double min_explained_curved = 0.55;  // that of several facets
-    double evidence_px = 3000.0;         // of a surface no larger than this are single pixels looked at ...
-    double min_evidence = 0.6;           // ... and this share of them lies on its plane
+    double min_explained = 0.75;
+    double min_explained_curved = 0.55;
+    double evidence_px = 3000.0;
+    double min_evidence = 0.6;
     ConnectedComponents::Params pieces;
     SideLines::Params sides;
     PolygonBuilder::Params polygons;
+
+    static void visit(auto& p, auto& field) {
+      field("noise", p.noise);
+      field("depth_noise", p.depth_noise);
+      field("limits", p.limits);
+      field("runs", p.runs);
+      field("growing", p.growing);
+      field("boundaries", p.boundaries);
+      field("remainder", p.remainder);
+      field("planes", p.planes);
+      field("edge_lines", p.edge_lines);
+      field("kind_tilt_rad", p.kind_tilt_rad, 0.01, 0.7,
+            "A fitted plane as near to level is a tread, to upright a riser.");
+      field("merging", p.merging);
+      field("min_explained", p.min_explained, 0.0, 1.0,
+            "A surface's plane explains this share of its pixels, over that of all surfaces.");
+      field("min_explained_curved", p.min_explained_curved, 0.0, 1.0, "That of a surface of several facets.");
+      field("evidence_px", p.evidence_px, 0.0, 307200.0, "Single pixels are looked at of a surface that is no larger.");
+      field("min_evidence", p.min_evidence, 0.0, 1.0,
+            "At least this share of the pixels looked at lies on the surface's plane.");
+      field("pieces", p.pieces);
+      field("sides", p.sides);
+      field("polygons", p.polygons);
+    }
   };
   // What the module knows about this frame, in the camera frame at the exposure.
   struct View {

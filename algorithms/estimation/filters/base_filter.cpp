@@ -5,7 +5,6 @@
 #include <algorithm>
 
 namespace polygmap {
-namespace {}  // namespace
 
 void BaseFilter::initialise(const Vec3& odom_p_base_m, const Vec3& odom_v_base_mps, const ContactRows& rows) noexcept {
   for (int a = 0; a < 3; ++a) {
