@@ -13,7 +13,6 @@ namespace polygmap {
 class Estimator {
  public:
   struct Params : ProprioceptiveOdometry::Params {
-    LegGeometry geometry;
     StandstillCalibration::Params standstill;
     ContactEstimator::Params contacts;
     EncoderOffsets::Params encoders;
@@ -70,7 +69,8 @@ class Estimator {
     }
   };
 
-  void reset(const Params& params) noexcept;
+  // robot: outlives the estimator.
+  void reset(const Params& params, const RobotModel& robot) noexcept;
 
   // Samples as they arrive, the oldest first. A bad, stale or future one is counted and left out. IMU samples of one
   // tick count as their mean.
@@ -110,6 +110,7 @@ class Estimator {
   void publish(std::int64_t now_ns) noexcept;
 
   Params params_;
+  const RobotModel* robot_ = nullptr;
   Counters counters_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;

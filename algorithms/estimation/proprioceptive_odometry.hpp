@@ -72,7 +72,7 @@ class ProprioceptiveOdometry {
     std::array<KnownHeight, kFootCount> heights{};
   };
 
-  void reset(const Params& params) noexcept;
+  void reset(const Params& params, const RobotModel& robot) noexcept;
   // Finite and in range.
   [[nodiscard]] bool is_valid_imu(const Vec3& gyro_radps, const Vec3& accel_mps2) const noexcept;
   void initialise(const ContactInEkf::Start& start, const Legs& legs, double dt_s) noexcept;

@@ -94,8 +94,8 @@ class FootholdSearch {
     std::uint32_t abandoned = 0;  // begin() before the last search was done
   };
 
-  FootholdSearch() noexcept : FootholdSearch(Params{}) {}
-  explicit FootholdSearch(const Params& params) noexcept : params_(params) {}
+  // foot: outlives the search.
+  FootholdSearch(const Params& params, const SoleModel& foot) noexcept : params_(params), foot_(foot) {}
 
   // Copies what it needs. Query and result are in the world of the pose; the search itself is in that of the map, which
   // knows how far the two have drifted apart. An invalid query is counted and leaves nothing to do.
@@ -142,6 +142,7 @@ class FootholdSearch {
   [[nodiscard]] StopReason judge_next() noexcept;
 
   Params params_;
+  const SoleModel& foot_;
   Counters counters_;
   FootholdSet result_;   // of the last finished search
   FootholdSet pending_;  // being filled

@@ -9,6 +9,7 @@
 
 #include "tests/benchmarks/stair_scenes.hpp"
 #include "tests/reference/paper_route/paper_route.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::bench {
 
@@ -26,7 +27,8 @@ struct Workbench {
   std::unique_ptr<SurfaceExtractor> extractor = std::make_unique<SurfaceExtractor>();
   SurfaceFrame surfaces;
   std::unique_ptr<PolygonMap> map = std::make_unique<PolygonMap>();
-  std::unique_ptr<FootholdSearch> search = std::make_unique<FootholdSearch>();
+  std::unique_ptr<FootholdSearch> search =
+      std::make_unique<FootholdSearch>(FootholdSearch::Params{}, nominal_robot().sole);
   std::unique_ptr<PaperRoute> paper = std::make_unique<PaperRoute>(PaperRoute::Params{});
   RawRange range;  // this and the next two: reduction and runs by themselves
   std::unique_ptr<ColumnImage> columns = std::make_unique<ColumnImage>();

@@ -26,7 +26,6 @@ ContactRows BaseFilter::make_rows(const Mat3& odom_R_base, const Vec3& base_w_ba
                                   const std::array<FootContact, kFootCount>& contacts,
                                   const std::array<TouchDown, kFootCount>& touch_downs,
                                   const std::array<KnownHeight, kFootCount>& heights, double dt_s) const noexcept {
-  const std::array<Vec3, kContactsPerFoot> sole_p_contact_m = sole_contacts_m();
   const Vec3 odom_p_predicted_m = odom_p_base_m() + dt_s * odom_v_base_mps();
   ContactRows rows;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
@@ -40,10 +39,10 @@ ContactRows BaseFilter::make_rows(const Mat3& odom_R_base, const Vec3& base_w_ba
     const KnownHeight& height = heights[foot];
     const bool height_counts = height.sigma_m > 0.0 && stands;
     for (std::size_t i = 0; i < kContactsPerFoot; ++i) {
-      const Vec3 base_r_m = leg.base_T_sole.R * sole_p_contact_m[i];  // from the sole's origin
+      const Vec3 base_r_m = leg.base_T_sole.R * sole_p_contact_m_[i];  // from the sole's origin
       const Vec3 base_p_m = leg.base_T_sole.p_m + base_r_m;
       ContactRow& row = rows[foot * kContactsPerFoot + i];
-      row.odom_r_contact_m = touch_down.now ? Vec3(touch_down.odom_T_sole * sole_p_contact_m[i] - odom_p_predicted_m)
+      row.odom_r_contact_m = touch_down.now ? Vec3(touch_down.odom_T_sole * sole_p_contact_m_[i] - odom_p_predicted_m)
                                             : Vec3(odom_R_base * base_p_m);
       row.odom_dr_contact_mps = odom_R_base * (leg.base_v_sole_mps + leg.base_w_sole_radps.cross(base_r_m) +
                                                base_w_base_radps.cross(base_p_m));

@@ -73,7 +73,7 @@ class BaseFilter {
             "Velocity of the base at the start.");
     }
   };
-  void reset(const Params& params) noexcept { *this = BaseFilter{params}; }
+  void reset(const Params& params, const SoleModel& sole) noexcept { *this = BaseFilter{params, sole}; }
   BaseFilter() noexcept = default;
 
   // Contacts by kinematics.
@@ -101,7 +101,8 @@ class BaseFilter {
   [[nodiscard]] Vec2 base_process(double dt_s) const noexcept;
 
  private:
-  explicit BaseFilter(const Params& params) noexcept : params_(params) {}
+  BaseFilter(const Params& params, const SoleModel& sole) noexcept
+      : params_(params), sole_p_contact_m_(sole.contacts_m()) {}
   [[nodiscard]] Vec3 per_axis(double (AxisFilter::*value)() const noexcept) const noexcept {
     return {(axes_[0].*value)(), (axes_[1].*value)(), (axes_[2].*value)()};
   }
@@ -112,6 +113,7 @@ class BaseFilter {
   void share_closure(const std::array<FootContact, kFootCount>& contacts, ContactRows& rows) const noexcept;
 
   Params params_;
+  std::array<Vec3, kContactsPerFoot> sole_p_contact_m_{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
   std::array<AxisFilter, 3> axes_;
   NormalisedRows velocity_rows_, height_rows_;
 };

@@ -15,7 +15,7 @@
 #include "algorithms/estimation/calibration/noise_level.hpp"
 #include "algorithms/estimation/lidar/lio_uncertainty.hpp"
 #include "algorithms/estimation/quality/innovation.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
@@ -51,7 +51,6 @@ struct LioInnovations {
 class LioFusion {
  public:
   struct Params {
-    Transform base_T_lidar = polygmap::base_T_lidar();
     double max_age_s = 0.4;
     double tau_s = 4.0;
     double tau_spm = 0.0;
@@ -74,7 +73,6 @@ class LioFusion {
     LioUncertainty::Params uncertainty;
 
     static void visit(auto& p, auto& field) {
-      field("base_T_lidar", p.base_T_lidar, "Mount of the lidar.");
       field("max_age_s", p.max_age_s, 0.0, 0.5, "A pose is no older on arrival; the history of states holds 0.5 s.");
       field("tau_s", p.tau_s, 0.0, 1000.0,
             "Time constant of the offset's low-pass at least: of a LIO of 10 mm at 10 Hz, 2.2 mm come through 4 s.");
@@ -102,7 +100,7 @@ class LioFusion {
       field("uncertainty", p.uncertainty);
     }
   };
-  void reset(const Params& params) noexcept;
+  void reset(const Params& params, const Transform& base_T_lidar) noexcept;
 
   // What can be said of a pose by itself: kAccepted or the reason against it.
   [[nodiscard]] LioVerdict check(const LioSample& sample, std::int64_t now_ns) const noexcept;
@@ -142,6 +140,7 @@ class LioFusion {
   void tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept;
 
   Params params_;
+  Transform base_T_lidar_;
   // LIO's world is not ours. The first poses say where it lies, while world is odom: each by its weight against the
   // drift since the first. Once that is no more than eq. (9)'s gain the tie stays and odom moves as it drifts.
   Transform world_T_lio_;

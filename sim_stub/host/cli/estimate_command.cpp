@@ -44,8 +44,8 @@ ReplayOptions options_of(const EstimateArguments& a) {
   }
   if (!a.lidar_mount.empty()) {
     const auto rad = [&a](std::size_t i) { return a.lidar_mount[i] * kPi / 180.0; };
-    options.odometry.fusion.base_T_lidar = {rotation_zyx(rad(5), rad(4), rad(3)),
-                                            Vec3{a.lidar_mount[0], a.lidar_mount[1], a.lidar_mount[2]}};
+    options.robot.mounts.base_T_lidar = {rotation_zyx(rad(5), rad(4), rad(3)),
+                                         Vec3{a.lidar_mount[0], a.lidar_mount[1], a.lidar_mount[2]}};
   }
   return options;
 }

@@ -16,7 +16,9 @@
 
 namespace polygmap::sim {
 
-[[nodiscard]] inline std::string name_of(GaitPattern gait) { return gait == GaitPattern::kSingleStep ? "ss" : "ds"; }
+[[nodiscard]] inline std::string name_of(GaitPattern gait) {
+  return std::string(kGaitPatternNames[static_cast<std::size_t>(gait)]);
+}
 
 struct ClimbOptions {
   StairParams stairs;

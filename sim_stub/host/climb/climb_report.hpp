@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/robot/model.hpp"
 #include "firmware/telemetry.hpp"
 #include "sim_stub/host/climb/climb_summary.hpp"
 #include "sim_stub/host/climb/climb_svg.hpp"
 #include "sim_stub/host/climb/climb_verdict.hpp"
 #include "sim_stub/host/climb/odometry_report.hpp"
+#include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
 #include "sim_stub/world/truth.hpp"
@@ -37,7 +37,7 @@ struct RunFigures {
 
 class ClimbReport {
  public:
-  explicit ClimbReport(StairWorld world, const Transform& true_base_T_camera = base_T_camera());
+  explicit ClimbReport(StairWorld world, const Transform& true_base_T_camera = nominal_robot().mounts.base_T_camera);
 
   // Once per tick, after the module's tick, with the truth of the same instant.
   void observe(const Truth& truth, const Telemetry& telemetry);

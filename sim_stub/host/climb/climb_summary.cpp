@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -27,10 +27,8 @@ Json spread_mm(const Spread& s) { return {{"median", mm(s.median)}, {"max", mm(s
 Json spread_ms(const Spread& s) { return {{"median", ms(s.median)}, {"max", ms(s.max)}}; }
 
 Json per_joint(const std::array<double, kJointsPerLeg>& ratio) {
-  constexpr std::array<const char*, kJointsPerLeg> kNames{"hip_roll", "hip_yaw",     "hip_pitch",
-                                                          "knee",     "ankle_pitch", "ankle_roll"};
   Json j = Json::object();
-  for (std::size_t i = 0; i < kJointsPerLeg; ++i) j[kNames[i]] = rounded(ratio[i], 1e3);
+  for (std::size_t i = 0; i < kJointsPerLeg; ++i) j[std::string(kLegJointNames[i])] = rounded(ratio[i], 1e3);
   return j;
 }
 

@@ -114,7 +114,7 @@ struct ClimbSummary {
   // sole that stands alone.
   double com_tracking_max_m = kNotMeasured;
   double zmp_margin_min_m = kNotMeasured;
-  // Greatest of both legs, over the drives' limits (robot/model.hpp).
+  // Greatest of both legs, over the drives' limits.
   std::array<double, kJointsPerLeg> torque_peak_ratio{}, joint_speed_peak_ratio{};
   OdometryFigures odometry;
   Spread exposure_to_map_ms;

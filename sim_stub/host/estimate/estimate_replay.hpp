@@ -13,9 +13,12 @@ namespace polygmap::sim {
 
 // The module's, but for what no data sheet says of a robot that is only known by its log.
 [[nodiscard]] ProprioceptiveOdometry::Params log_params();
+// Of which a log needs the lidar mount alone: none, LIO gives the base's pose.
+[[nodiscard]] RobotModel log_robot();
 
 struct ReplayOptions {
-  ProprioceptiveOdometry::Params odometry = log_params();  // its lidar mount: none, LIO gives the base's pose
+  ProprioceptiveOdometry::Params odometry = log_params();
+  RobotModel robot = log_robot();
   // One sigma, where no standstill at the start says what they are.
   double gyro_bias_sigma_radps = 0.01, accel_bias_sigma_mps2 = 0.2;
 };

@@ -56,14 +56,14 @@ TEST(ParamFile, Part_ChangesThatAlone) {
 TEST(ParamFile, EveryKind_IsRead) {
   const Params params = read(
       "self_filter = false\nestimator.max_lead_ns = 20_000_000\n"
-      "gait.planner.pattern = \"ss\"\ngait.joints.kp_nmprad = [1, 2, 3, 4, 5, 6.5]\n"
-      "base_T_camera.p_m = [0.1, 0, -0.01]\nbase_T_camera.rpy_rad = [0.1, 0.2, 0.3]\n");
+      "gait.planner.pattern = \"ss\"\nrobot.drives.kp_nmprad = [1, 2, 3, 4, 5, 6.5]\n"
+      "robot.mounts.base_T_camera.p_m = [0.1, 0, -0.01]\nrobot.mounts.base_T_camera.rpy_rad = [0.1, 0.2, 0.3]\n");
   EXPECT_FALSE(params.self_filter);
   EXPECT_EQ(params.estimator.max_lead_ns, 20'000'000);
   EXPECT_EQ(params.gait.planner.pattern, GaitPattern::kSingleStep);
-  EXPECT_EQ(params.gait.joints.kp_nmprad[5], 6.5);
-  EXPECT_TRUE(params.base_T_camera.p_m.isApprox(Vec3(0.1, 0.0, -0.01)));
-  EXPECT_TRUE(params.base_T_camera.R.isApprox(rotation_zyx(0.3, 0.2, 0.1)));
+  EXPECT_EQ(params.robot.drives.kp_nmprad[5], 6.5);
+  EXPECT_TRUE(params.robot.mounts.base_T_camera.p_m.isApprox(Vec3(0.1, 0.0, -0.01)));
+  EXPECT_TRUE(params.robot.mounts.base_T_camera.R.isApprox(rotation_zyx(0.3, 0.2, 0.1)));
 }
 
 TEST(ParamFile, Empty_ChangesNothing) { EXPECT_EQ(hash_of(read("# nothing\n")), hash_of(Params{})); }
@@ -83,8 +83,9 @@ TEST(ParamFile, WrongType_IsRefused) {
   expect_refused("estimator.infer_forces = 1\n", "estimator.infer_forces must be true or false, not a whole number.");
   expect_refused("estimator.fusion.realign_count = 2.5\n", "must be a whole number, not 2.5.");
   expect_refused("estimator.fusion = 3\n", "estimator.fusion is a table of parameters, not a whole number.");
-  expect_refused("base_T_camera.p_m = [0.1, 0.2]\n", "base_T_camera.p_m must be 3 numbers in brackets.");
-  expect_refused("base_T_camera.p_m = [0.1, 0.2, \"x\"]\n", "must be a number, not a text.");
+  expect_refused("robot.mounts.base_T_camera.p_m = [0.1, 0.2]\n",
+                 "robot.mounts.base_T_camera.p_m must be 3 numbers in brackets.");
+  expect_refused("robot.mounts.base_T_camera.p_m = [0.1, 0.2, \"x\"]\n", "must be a number, not a text.");
   expect_refused("gait.planner.pattern = \"hop\"\n", "gait.planner.pattern must be \"ds\" or \"ss\".");
 }
 
@@ -97,7 +98,7 @@ TEST(ParamFile, OutOfRange_SaysTheRange) {
   expect_refused("estimator.fusion.realign_count = 4294967297\n", "must be from 1 to ");
   expect_refused("estimator.fusion.realign_count = 1e300\n", "must be from 1 to ");
   expect_refused("estimator.fusion.realign_count = 99999999999999999999\n", "line 1: ");
-  expect_refused("base_T_camera.p_m = [0.1, 0.2, nan]\n", "from -2 to 2 m, not nan.");
+  expect_refused("robot.mounts.base_T_camera.p_m = [0.1, 0.2, nan]\n", "from -2 to 2 m, not nan.");
 }
 
 TEST(ParamFile, LessAboveMore_IsRefused) {
