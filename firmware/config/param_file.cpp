@@ -167,21 +167,13 @@ class ParamFile {
 
   void check(const ParamOrder& order) const {
     const Param *less = find(order.less), *more = find(order.more);
-    if (less == nullptr || more == nullptr || scalar(*less) <= scalar(*more)) return;
+    if (less == nullptr || more == nullptr || number_of(*less) <= number_of(*more)) return;
     // Of the two, the one that the file says last.
     toml::source_index line = 0;
     for (const auto& [name, at] : lines_) {
       if (name == order.less || name == order.more) line = std::max(line, at);
     }
     fail(line, order.less + ", " + text_of(*less) + ", must not be more than " + order.more + ", " + text_of(*more));
-  }
-  [[nodiscard]] static double scalar(const Param& param) {
-    double out = 0.0;
-    if (const auto* real = std::get_if<double*>(&param.value)) out = **real;
-    if (const auto* whole = std::get_if<std::int32_t*>(&param.value)) out = **whole;
-    if (const auto* count = std::get_if<std::uint32_t*>(&param.value)) out = **count;
-    if (const auto* nanoseconds = std::get_if<std::int64_t*>(&param.value)) out = static_cast<double>(**nanoseconds);
-    return out;
   }
 
   const std::string& path_;

@@ -113,6 +113,18 @@ std::string text_of(const Param& param) {
                     param.value);
 }
 
+double number_of(const Param& param) {
+  return std::visit(
+      [](auto value) {
+        if constexpr (requires { static_cast<double>(*value); }) {
+          return static_cast<double>(*value);
+        } else {
+          return 0.0;
+        }
+      },
+      param.value);
+}
+
 bool same_value(const Param& a, const Param& b) { return exact_text(a) == exact_text(b); }
 
 std::string hash_of(const ParamTable& table) {

@@ -58,6 +58,8 @@ struct ParamTable {
 [[nodiscard]] std::string text_of(const Param& param);
 [[nodiscard]] std::string text_of(double number);
 [[nodiscard]] std::array<double, 3> roll_pitch_yaw(const Mat3& R);
+// Of one number, else 0.
+[[nodiscard]] double number_of(const Param& param);
 [[nodiscard]] bool same_value(const Param& a, const Param& b);
 // FNV-1a of all names and values to the last bit, 16 hexadecimal digits.
 [[nodiscard]] std::string hash_of(const ParamTable& table);
