@@ -45,12 +45,12 @@ class PlaneMerging {
             "Neighbours touch along this times the root of the smaller one's pixels.");
     }
   };
-  using PlaneIndex = std::array<std::uint8_t, PlaneSet::kMaxPlanes + 1>;  // of a plane that may have been merged
+  using PlaneIndex = std::array<PlaneId, PlaneSet::kMaxPlanes + 1>;  // of a plane that may have been merged
 
   // Pieces share the plane of the largest. measured: the planes' moments say what their pixels are worth; before, large
   // planes are one only where there is no doubt. Facets too small to be planes are left to join_facets.
-  static void merge_pieces(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,
-                           PlaneSet& planes, PlaneIndex& to_plane, bool measured) noexcept;
+  static void merge_coplanar(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,
+                             PlaneSet& planes, PlaneIndex& to_plane, bool measured) noexcept;
   // Facets get a plane of their own, fitted to all of them, and may together be large enough to be one: begin_facets,
   // the columns of spans that the planes were fitted to, from left to right, then join_some until it is done.
   void begin_facets(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,

@@ -31,10 +31,10 @@ class ResidualPlaneSearch {
 
   void begin(const Params& params, const Vec3& up) noexcept;
   // Planes that are known already. The largest upright one says which way risers face.
-  void know_level(const InversePlane& plane) noexcept;
-  void know_upright(const InversePlane& plane, double pixels) noexcept;
-  // A plane that was given up: what its spans hold is searched as if it were in none.
-  void give_back(std::size_t plane) noexcept { given_back_[plane] = true; }
+  void add_known_level(const InversePlane& plane) noexcept;
+  void add_known_riser(const InversePlane& plane, double pixels) noexcept;
+  // The spans of a plane that was given up are searched as if their rows were in none.
+  void release(std::size_t plane) noexcept { released_[plane] = true; }
   // Adds the rows of a column that are in none of its spans.
   void add_column(const ColumnRays& rays, const ColumnImage& image, std::int32_t column,
                   const SpanBoundaries::Column& spans) noexcept;
@@ -60,7 +60,7 @@ class ResidualPlaneSearch {
   Axis level_;
   Axis upright_;
   double upright_pixels_ = 0.0;
-  std::array<bool, SpanBoundaries::kMaxPlanes + 1> given_back_{};
+  std::array<bool, SpanBoundaries::kMaxPlanes + 1> released_{};
   StaticVector<InversePlane, SpanBoundaries::kMaxPlanes> known_;
   StaticVector<InversePlane, kMaxFound> found_;
 };

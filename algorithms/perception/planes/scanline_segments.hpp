@@ -9,6 +9,7 @@
 #include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/perception/image/column_image.hpp"
 #include "algorithms/perception/image/depth_noise_model.hpp"
+#include "algorithms/perception/planes/plane_id.hpp"
 
 namespace polygmap {
 
@@ -18,7 +19,7 @@ struct Run {
   std::int16_t bottom = 0;
   float inverse_depth = 0.0F;  // 1/m, at top
   float slope = 0.0F;          // 1/m per row
-  std::uint8_t plane = 0;      // that it was given to, 0 = none
+  PlaneId plane = kNoPlane;    // that it was given to
   [[nodiscard]] std::int32_t rows() const noexcept { return bottom - top + 1; }
 };
 

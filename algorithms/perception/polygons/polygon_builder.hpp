@@ -6,9 +6,10 @@
 #include <cstdint>
 
 #include "algorithms/core/messages/surfaces.hpp"
-#include "algorithms/perception/planes/plane_set.hpp"
+#include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/polygons/column_outline.hpp"
 #include "algorithms/perception/polygons/convex_outline.hpp"
+#include "algorithms/perception/regions/region.hpp"
 
 namespace polygmap {
 
@@ -36,15 +37,14 @@ class PolygonBuilder {
   };
   void configure(const Params& params) noexcept { params_ = params; }
 
-  // The patch of planes[index]; false when its outline encloses no area.
-  [[nodiscard]] bool try_build(const FrameImage& picture, const PlaneSet& planes, std::size_t index,
-                               const ColumnExtents& profile, const Outline2& outline, const SurfaceLines& lines,
-                               SurfacePatch& patch) const noexcept;
+  // The patch of regions[id]; false when its outline encloses no area.
+  [[nodiscard]] bool try_build(const FrameImage& picture, const Regions& regions, RegionId id, const Outline2& outline,
+                               const SurfaceLines& lines, SurfacePatch& patch) const noexcept;
 
  private:
-  // The tread that most columns of the surface show right below (or above) it in the picture; 0 = none.
-  [[nodiscard]] std::size_t tread_beside(const FrameImage& picture, const PlaneSet& planes,
-                                         const ColumnExtents& profile, bool below) const noexcept;
+  // The tread that most columns of the surface show right below (or above) it in the picture.
+  [[nodiscard]] RegionId tread_beside(const FrameImage& picture, const Regions& regions, RegionId id,
+                                      bool below) const noexcept;
   // All in half-resolution pixels: the edge's ends, a point of the surface.
   [[nodiscard]] EdgeKind judge_edge(const FrameImage& picture, const InversePlane& plane, const Vec2& a, const Vec2& b,
                                     const Vec2& inside) const noexcept;

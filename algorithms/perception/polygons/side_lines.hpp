@@ -6,8 +6,9 @@
 #include <cstdint>
 #include <limits>
 
-#include "algorithms/perception/planes/plane_set.hpp"
+#include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/polygons/column_outline.hpp"
+#include "algorithms/perception/regions/region.hpp"
 
 namespace polygmap {
 
@@ -40,12 +41,12 @@ class SideLines {
 
   // All but the parameters are read again by find.
   void begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw, const FrameImage& picture,
-             const PlaneSet& planes) noexcept;
+             const Regions& regions) noexcept;
   // Of the next surface: the first and the last column of each of its rows.
-  void find_ends(std::size_t index, const ColumnExtents& profile) noexcept;
+  void find_ends(RegionId id) noexcept;
   // The line through the ends of that surface's rows on one side; not fitted, as far as the columns reach, where the
   // ends are not seen (the picture's or the robot's own) or not straight.
-  [[nodiscard]] OutlineSide find(std::size_t index, const ColumnExtents& profile, bool right) noexcept;
+  [[nodiscard]] OutlineSide find(RegionId id, bool right) noexcept;
 
  private:
   static constexpr std::int32_t kMaxRows = 14;   // of a tread
@@ -54,7 +55,7 @@ class SideLines {
   // surface's.
   enum class Ending : std::uint8_t { kSeen, kHidden, kNone };
   struct RowView;  // what is seen around the end of one row
-  void look(std::size_t index, bool right, RowView& view) const noexcept;
+  void look(RegionId id, bool right, RowView& view) const noexcept;
   // Between which columns one row's pixels leave the surface (pixel c reaches from c - 0.5 to c + 0.5).
   [[nodiscard]] Ending end_of_row(const RowView& view, double& end_px) const noexcept;
   struct Line {  // column = at + slope * row
@@ -70,7 +71,7 @@ class SideLines {
   DepthNoiseModel noise_;
   const RawImage* raw_ = nullptr;
   const FrameImage* picture_ = nullptr;
-  const PlaneSet* planes_ = nullptr;
+  const Regions* regions_ = nullptr;
   double pitch_ = 0.0;                      // of rays from pixel to pixel
   static constexpr std::int32_t kPad = 32;  // rows before the first and after the last: whole registers
   using RowColumns = std::array<std::uint8_t, kDepthHeight_px + 2 * kPad>;

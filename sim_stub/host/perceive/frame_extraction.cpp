@@ -60,8 +60,9 @@ class FrameExtractor final : public polygmap_frames::Extractor {
     params_.limits = {c.min_depth_m, c.max_depth_m};
     // What fills an eighth of a picture is a surface, however few pixels the picture has.
     const std::int32_t eighth_px = c.width_px * c.height_px / 8;
-    for (std::int32_t* least_px : {&params_.growing.min_plane_px, &params_.growing.min_facet_px,
-                                   &params_.pieces.min_surface_px, &params_.pieces.min_other_px}) {
+    for (std::int32_t* least_px :
+         {&params_.planes.growing.min_plane_px, &params_.planes.growing.min_facet_px,
+          &params_.regions.components.min_surface_px, &params_.regions.components.min_other_px}) {
       *least_px = std::min(*least_px, eighth_px);
     }
     Assign assign(values);
