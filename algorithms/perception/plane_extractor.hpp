@@ -29,9 +29,23 @@ class PlaneExtractor {
     PlaneMerging::Params merging;
     ResidualPlaneSearch::Params residual;
     PlaneFit::Params fit;
-    double kind_tilt_rad = 0.21;         // a fitted plane within this of level is a tread, of upright a riser
-    double min_explained = 0.75;         // share of a plane's pixels that it explains, over that of all planes
-    double min_explained_curved = 0.55;  // the same, of several facets
+    double kind_tilt_rad = 0.21;
+    double min_explained = 0.75;
+    double min_explained_curved = 0.55;
+
+    static void visit(auto& p, auto& field) {
+      field("growing", p.growing);
+      field("boundaries", p.boundaries);
+      field("merging", p.merging);
+      field("residual", p.residual);
+      field("fit", p.fit);
+      field("kind_tilt_rad", p.kind_tilt_rad, 0.01, 0.7,
+            "A fitted plane as near to level is a tread, to upright a riser.");
+      field("min_explained", p.min_explained, 0.0, 1.0,
+            "A plane explains this share of its pixels, over that of all planes.");
+      field("min_explained_curved", p.min_explained_curved, 0.0, 1.0,
+            "A plane of several facets explains this share of its pixels, over that of all planes.");
+    }
   };
   // What the next step begins with; a benchmark charges time to it.
   enum class Part : std::uint8_t { kGrowing, kSharpening, kFacets, kResidual, kMeasuring, kDone };

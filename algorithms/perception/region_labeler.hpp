@@ -19,8 +19,16 @@ class RegionLabeler {
  public:
   struct Params {
     ConnectedComponents::Params components;
-    double inlier_check_px = 3000.0;  // a larger region is wider than what columns mix, and is not looked at again
-    double min_inlier_ratio = 0.6;    // of a smaller one, the share of single pixels that lie on its plane
+    double inlier_check_px = 3000.0;
+    double min_inlier_ratio = 0.6;
+
+    static void visit(auto& p, auto& field) {
+      field("components", p.components);
+      field("inlier_check_px", p.inlier_check_px, 0.0, 307200.0,
+            "A larger region is wider than what columns mix, and is not looked at again.");
+      field("min_inlier_ratio", p.min_inlier_ratio, 0.0, 1.0,
+            "Of a smaller region, this share of single pixels lies on its plane.");
+    }
   };
   // What the next step begins with.
   enum class Part : std::uint8_t { kComponents, kJoin, kLabels, kInliers, kDone };

@@ -25,6 +25,12 @@ class SurfaceBuilder {
     SideLines::Params sides;
     EdgeLineFinder::Params edge_lines;
     PolygonBuilder::Params polygons;
+
+    static void visit(auto& p, auto& field) {
+      field("sides", p.sides);
+      field("edge_lines", p.edge_lines);
+      field("polygons", p.polygons);
+    }
   };
   // What the next step begins with: for each region its sides, its outline, a tread's two lines, its polygon.
   enum class Part : std::uint8_t { kSideLeft, kSideRight, kOutline, kNosing, kBack, kPolygon, kDone };

@@ -28,12 +28,22 @@ class SurfaceExtractor {
  public:
   struct Params {
     DepthNoiseModel noise;
-    NoiseTracker::Params depth_noise;  // how it is followed from frame to frame
+    NoiseTracker::Params depth_noise;
     DepthLimits limits;
     ScanlineSegmentation::Params segments;
     PlaneExtractor::Params planes;
     RegionLabeler::Params regions;
     SurfaceBuilder::Params surfaces;
+
+    static void visit(auto& p, auto& field) {
+      field("noise", p.noise);
+      field("depth_noise", p.depth_noise);
+      field("limits", p.limits);
+      field("segments", p.segments);
+      field("planes", p.planes);
+      field("regions", p.regions);
+      field("surfaces", p.surfaces);
+    }
   };
   // What the module knows about this frame, in the camera frame at the exposure.
   struct View {

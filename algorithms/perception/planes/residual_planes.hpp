@@ -17,9 +17,15 @@ namespace polygmap {
 class ResidualPlaneSearch {
  public:
   struct Params {
-    std::int32_t min_rows = 50;    // of a peak, in column rows (eight pixels each)
-    double min_contrast = 2.5;     // of a peak against what lies around it
-    double known_apart_m = 0.015;  // nearer to a known plane it is that one
+    std::int32_t min_rows = 50;
+    double min_contrast = 2.5;
+    double known_apart_m = 0.015;
+
+    static void visit(auto& p, auto& field) {
+      field("min_rows", p.min_rows, 1, 10000, "A peak has as many column rows of eight pixels.");
+      field("min_contrast", p.min_contrast, 1.0, 100.0, "A peak stands out this many times from what lies around it.");
+      field("known_apart_m", p.known_apart_m, 0.0, 0.2, "A peak nearer to a known plane is that plane.");
+    }
   };
   static constexpr std::size_t kMaxFound = 8;
 

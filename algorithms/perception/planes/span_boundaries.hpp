@@ -31,13 +31,27 @@ inline constexpr std::int32_t kRemainderReach_px = 48;
 class SpanBoundaries {
  public:
   struct Params {
-    double inlier_sigmas = 3.0;    // of a row in a refit, and of a row that extends a surface
-    double same_gap_sigmas = 3.0;  // rows between two runs of one plane that are this far off it are something else
+    double inlier_sigmas = 3.0;
+    double same_gap_sigmas = 3.0;
     double gap_floor_m = 0.006;
-    double meet_px = 2.0;          // planes meet where their line is no farther than this from the change-point ...
-    double meet_gain = 1.0;        // ... or hardly worse: of the columns' mean cost
-    std::int32_t window_px = 6;    // rows searched beyond where the runs ended
-    std::int32_t max_gap_px = 24;  // rows between two surfaces that are still next to each other
+    double meet_px = 2.0;
+    double meet_gain = 1.0;
+    std::int32_t window_px = 6;
+    std::int32_t max_gap_px = 24;
+
+    static void visit(auto& p, auto& field) {
+      field("inlier_sigmas", p.inlier_sigmas, 0.5, 20.0,
+            "A row nearer to a plane counts in its refit, and extends the surface.");
+      field("same_gap_sigmas", p.same_gap_sigmas, 0.5, 20.0,
+            "Rows between two runs of one plane that are farther off it are something else.");
+      field("gap_floor_m", p.gap_floor_m, 0.0, 0.1, "Slow depth errors, added to the noise of rows in a gap.");
+      field("meet_px", p.meet_px, 0.0, 50.0, "Planes meet where their line is no farther from the change-point.");
+      field("meet_gain", p.meet_gain, 0.0, 100.0,
+            "Planes meet where their line costs no more than this of the columns' mean, too.");
+      field("window_px", p.window_px, 1, 64, "As many rows are searched beyond where the runs ended.");
+      field("max_gap_px", p.max_gap_px, 1, 480,
+            "Surfaces with as many rows between them are still next to each other.");
+    }
   };
   static constexpr std::size_t kMaxPlanes = 96;
   static constexpr std::size_t kMaxSpans = 32;

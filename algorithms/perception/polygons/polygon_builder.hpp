@@ -22,10 +22,18 @@ struct SurfaceLines {  // each only if valid
 class PolygonBuilder {
  public:
   struct Params {
-    double snap_m = 0.015;               // corners this close to a nosing or back line go onto it
-    double probe_px = 3.0;               // half-resolution pixels outside a polygon's edge where its end is judged
-    double apart_m = 0.04;               // seen this far in front of a plane: something hides it
-    std::int32_t min_tread_columns = 3;  // of a tread that ends a riser
+    double snap_m = 0.015;
+    double probe_px = 3.0;
+    double apart_m = 0.04;
+    std::int32_t min_tread_columns = 3;
+
+    static void visit(auto& p, auto& field) {
+      field("snap_m", p.snap_m, 0.0, 0.1, "Corners as close to a nosing or back line go onto it.");
+      field("probe_px", p.probe_px, 0.0, 20.0,
+            "A polygon's end is judged as many pixels of half resolution outside its edge.");
+      field("apart_m", p.apart_m, 0.001, 0.5, "What is seen as far in front of a plane hides it.");
+      field("min_tread_columns", p.min_tread_columns, 1, 80, "A tread that ends a riser has as many columns.");
+    }
   };
   void configure(const Params& params) noexcept { params_ = params; }
 

@@ -16,13 +16,27 @@ class SideLines {
  public:
   struct Params {
     double truncate_sigmas = 3.0;
-    double leave_sigmas = 2.0;  // a pixel this far off has left the surface, when what lies beyond is no known plane
-    double max_lean = 1.0;      // on the plane, along over across the picture's rows: a front or a back leans more
+    double leave_sigmas = 2.0;
+    double max_lean = 1.0;
     double inlier_px = 2.0;
-    double outside_px = 3.0;    // what of the surface's pixels lies farther than this outside the line ...
-    double max_cut = 0.03;      // ... is no more than this share of them
-    std::int32_t min_rows = 6;  // looked at and on the line
-    double min_share = 0.5;     // of the rows between the line's ends
+    double outside_px = 3.0;
+    double max_cut = 0.03;
+    std::int32_t min_rows = 6;
+    double min_share = 0.5;
+
+    static void visit(auto& p, auto& field) {
+      field("truncate_sigmas", p.truncate_sigmas, 0.5, 20.0, "A pixel farther off its plane costs no more.");
+      field("leave_sigmas", p.leave_sigmas, 0.1, 20.0,
+            "A pixel as far off has left the surface when what lies beyond is no known plane.");
+      field("max_lean", p.max_lean, 0.01, 10.0,
+            "A side leans no more on the plane, along over across the picture's rows: a front or a back does.");
+      field("inlier_px", p.inlier_px, 0.1, 20.0, "A row's end as near lies on the line.");
+      field("outside_px", p.outside_px, 0.0, 50.0,
+            "A pixel of the surface that lies farther outside the line is cut off by it.");
+      field("max_cut", p.max_cut, 0.0, 1.0, "A line cuts off no more than this share of the surface's pixels.");
+      field("min_rows", p.min_rows, 2, 240, "As many rows are looked at, and lie on the line.");
+      field("min_share", p.min_share, 0.0, 1.0, "At least this share of the rows between the line's ends lies on it.");
+    }
   };
 
   // All but the parameters are read again by find.

@@ -16,10 +16,19 @@ namespace polygmap {
 class ConnectedComponents {
  public:
   struct Params {
-    double apart_m = 0.04;                // seen this far from a plane: something else is there
-    std::int32_t min_component_px = 160;  // of a component of a region
-    std::int32_t min_surface_px = 440;    // of a tread that meets a riser, or the reverse
-    std::int32_t min_other_px = 1500;     // of any other region: curved things have facets of this size
+    double apart_m = 0.04;
+    std::int32_t min_component_px = 160;
+    std::int32_t min_surface_px = 440;
+    std::int32_t min_other_px = 1500;
+
+    static void visit(auto& p, auto& field) {
+      field("apart_m", p.apart_m, 0.001, 0.5, "What is seen as far from a plane is something else.");
+      field("min_component_px", p.min_component_px, 1, 100000, "A piece of a surface has as many pixels.");
+      field("min_surface_px", p.min_surface_px, 1, 100000,
+            "A tread that meets a riser, or the reverse, has as many pixels.");
+      field("min_other_px", p.min_other_px, 1, 100000,
+            "Any other surface has as many pixels: curved things have facets of this size.");
+    }
   };
 
   // Numbers the components that the planes' spans form, and writes each span's number into it: 0 for those without
