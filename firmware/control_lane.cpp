@@ -46,10 +46,10 @@ ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometr
       healths_(health),
       health_(health[kControlLane].own),
       params_(params) {
-  estimator_.reset(params.estimator);
+  estimator_.reset(params.estimator, params.robot);
   Gait::Params gait = params.gait;
-  if (!params.estimate_mount) gait.look_ticks = 0;
-  gait_.reset(gait);
+  if (!params.estimate_mount) gait.standing.toe_calibration.ticks = 0;
+  gait_.reset(gait, params.robot);
 }
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {
@@ -145,7 +145,7 @@ void ControlLane::report_gait(std::int64_t now_ns) noexcept {
   health_.follow(Limit::kReachLimited, now_ns, gait.ik_limited_ticks);
   health_.follow(Limit::kContactEarly, now_ns, gait.early_contacts);
   health_.follow(Limit::kContactLate, now_ns, gait.late_contacts);
-  health_.follow(Limit::kFootPutBack, now_ns, gait.put_back);
+  health_.follow(Limit::kFootPutBack, now_ns, gait.aborted_swings);
   const bool stopped = gait.phase == GaitPhase::kStopped;
   if (stopped && !gait_stopped_) {
     health_.raise(Fault::kGaitStopped, now_ns);

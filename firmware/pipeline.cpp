@@ -4,7 +4,7 @@
 #include <array>
 #include <numeric>
 
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/core/time.hpp"
 #include "firmware/schedule.hpp"
 
 namespace polygmap {

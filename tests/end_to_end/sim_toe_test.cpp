@@ -6,6 +6,7 @@
 
 #include "firmware/schedule.hpp"
 #include "sim_stub/sim_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {

@@ -12,6 +12,7 @@
 
 #include "firmware/schedule.hpp"
 #include "tests/support/fake_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/trapped_module.hpp"
 
 namespace polygmap {

@@ -10,6 +10,7 @@
 #include "firmware/schedule.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "tests/support/fake_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
