@@ -21,9 +21,26 @@ struct Params {
   FootholdSearch::Params footholds;
   Gait::Params gait;
   bool estimate_mount = true;
-  bool self_filter = true;              // false only to show what the camera then takes for ground
-  BodyUncertainty body;                 // of the robot's own shapes
-  double tread_height_sigma_m = 0.004;  // of a mapped tread under a foot that has just landed on it
+  bool self_filter = true;
+  BodyUncertainty body;
+  double tread_height_sigma_m = 0.004;
+
+  // Of the parameters' table, firmware/config/param_table.hpp.
+  static void visit(auto& p, auto& field) {
+    field("robot", p.robot);
+    field("estimator", p.estimator);
+    field("surfaces", p.surfaces);
+    field("mount", p.mount);
+    field("map", p.map);
+    field("footholds", p.footholds);
+    field("gait", p.gait);
+    field("estimate_mount", p.estimate_mount, "The mount is estimated, starting from the data sheet.");
+    field("self_filter", p.self_filter,
+          "The robot's own legs are masked; false only shows what is taken for ground then.");
+    field("body", p.body);
+    field("tread_height_sigma_m", p.tread_height_sigma_m, 1e-5, 0.1,
+          "Height of a mapped tread under a foot that has just landed on it.");
+  }
 };
 
 }  // namespace polygmap

@@ -5,11 +5,6 @@
 #include <utility>
 
 namespace polygmap {
-namespace {
-
-constexpr double kEncoderSlack_rad = 0.01;
-
-}  // namespace
 
 void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   params_ = params;
@@ -143,7 +138,7 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
   }
   // The bound grows until the next accepted sample, so a true move is taken up again by itself.
   const double most_rad =
-      kEncoderSlack_rad + params_.max_joint_speed_radps * seconds(joints.stamp_ns - joints_.stamp_ns);
+      params_.joint_slack_rad + params_.max_joint_speed_radps * seconds(joints.stamp_ns - joints_.stamp_ns);
   const JointVector q_rad = joints.q_rad - encoders_.offset_rad();
   if (has_joints_ && (q_rad - joints_.q_rad).cwiseAbs().maxCoeff() > most_rad) {
     ++counters_.joints_jump;

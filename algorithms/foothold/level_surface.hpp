@@ -18,9 +18,15 @@ namespace polygmap {
 struct EdgeMargin {
   double least_m = 0.0;
   double sigmas = 0.0;
-  double landing_sigma_m = 0.0;  // of the foot, along it
+  double landing_sigma_m = 0.0;
   [[nodiscard]] double of(double edge_sigma_m) const noexcept {
     return std::max(least_m, sigmas * math::sqrt(math::square(edge_sigma_m) + math::square(landing_sigma_m)));
+  }
+
+  static void visit(auto& p, auto& field) {
+    field("least_m", p.least_m, 0.0, 0.1, "The margin at least.");
+    field("sigmas", p.sigmas, 0.0, 10.0, "The margin is as many sigmas of where edge and foot are.");
+    field("landing_sigma_m", p.landing_sigma_m, 0.0, 0.1, "A foot lands this far off, one sigma.");
   }
 };
 

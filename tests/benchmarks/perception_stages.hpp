@@ -87,15 +87,15 @@ inline constexpr std::array<Stage, 7> kOtherStages{{{"whole_frame", stage_whole_
                                                     {"footholds", stage_footholds},
                                                     {"paper_route", stage_paper_route}}};
 
-// The stage that a phase of the extractor belongs to.
-[[nodiscard]] ExtractorStage extractor_stage(SurfaceExtractor::Phase phase) noexcept;
+// The stage that the extractor's next step belongs to.
+[[nodiscard]] ExtractorStage extractor_stage(const SurfaceExtractor& extractor) noexcept;
 
 // One frame through the extractor. around(stage) must call stage.run(bench), and may do so between two looks at a
 // clock.
 template <typename Around>
 void extract_in_stages(Workbench& bench, const Around& around) {
   do {
-    around(kExtractorStages[extractor_stage(bench.extractor->phase())]);
+    around(kExtractorStages[extractor_stage(*bench.extractor)]);
   } while (bench.extractor->busy());
 }
 

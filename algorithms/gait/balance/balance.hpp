@@ -17,6 +17,12 @@ class Balance {
     DcmStabiliser::Params dcm;
     DcmBias::Params bias;
     PressureLimits pressure;
+
+    static void visit(auto& p, auto& field) {
+      field("dcm", p.dcm);
+      field("bias", p.bias);
+      field("pressure", p.pressure);
+    }
   };
   struct Reference {  // plan frame
     HorizontalMotion com;

@@ -12,9 +12,17 @@ class JointReference {
  public:
   static constexpr double kEncoderOffset_rad = 0.02;
   struct Params {
-    double swing_gain = 2.0;       // times the drives' gains in the leg that swings
-    double hold_kp_nmprad = 2000;  // before there is an estimate to balance by: stiffer than the robot is top-heavy
+    double swing_gain = 2.0;
+    double hold_kp_nmprad = 2000;
     double hold_kd_nmsprad = 40;
+
+    static void visit(auto& p, auto& field) {
+      field("swing_gain", p.swing_gain, 0.1, 10.0,
+            "The drives' gains are this many times as large in the leg that swings.");
+      field("hold_kp_nmprad", p.hold_kp_nmprad, 0.0, 10000.0,
+            "Stiffness before there is an estimate to balance by: more than the robot is top-heavy.");
+      field("hold_kd_nmsprad", p.hold_kd_nmsprad, 0.0, 1000.0, "Damping before there is an estimate to balance by.");
+    }
   };
 
   // Starts from measured angles, moved into the joints' ranges. False, and nothing changes, when one is not finite or

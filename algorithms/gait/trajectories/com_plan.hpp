@@ -21,8 +21,14 @@ using ZmpKnots = StaticVector<ZmpKnot, kMaxZmpKnots>;
 class ComPlan {
  public:
   struct Params {
-    double omega_radps = 3.5;             // sqrt(g / 0.80 m)
-    std::int32_t zmp_offset_ticks = 200;  // for which the zero-moment point leaves its way to meet the start's motion
+    double omega_radps = 3.5;
+    std::int32_t zmp_offset_ticks = 200;
+
+    static void visit(auto& p, auto& field) {
+      field("omega_radps", p.omega_radps, 1.0, 10.0, "Natural frequency of the body over its feet, sqrt(g / 0.80 m).");
+      field("zmp_offset_ticks", p.zmp_offset_ticks, 1, 2000,
+            "The zero-moment point leaves its way for so long to meet the start's motion.");
+    }
   };
 
   [[nodiscard]] static Vec2 zmp_under(const Params& params, const HorizontalMotion& com) noexcept {

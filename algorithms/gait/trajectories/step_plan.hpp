@@ -33,24 +33,57 @@ struct StepParams {
                            .toe_down_full = 0.29,
                            .toe_up_begin = 0.30,
                            .toe_up_end = 0.70};
-  std::int32_t stair_shift_ticks = 165;    // 0.33 s of double support
-  std::int32_t stair_swing_ticks = 450;    // 0.90 s
-  std::int32_t passing_swing_ticks = 460;  // 0.92 s
+  std::int32_t stair_shift_ticks = 165;
+  std::int32_t stair_swing_ticks = 450;
+  std::int32_t passing_swing_ticks = 460;
   std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
   ComPlan::Params com;
-  double max_zmp_offset_m = 0.03;        // of the zero-moment point, to set off
-  double zmp_ahead_m = 0.0;              // of the ankle: what it holds ahead and behind is the same
-  double zmp_inward_m = 0.022;           // and towards the other foot
-  std::int32_t landing_hold_ticks = 50;  // the foot may land that much late before the weight sets off for it
-  std::int32_t lift_hold_ticks = 15;     // and the weight is over the stance foot that long before the other one lifts
-  std::int32_t leave_ticks = 30;         // the rear leg still reaches the ground so long after its foot has left it
-  double rise_share = 0.5;               // of a swing onto a tread in which the torso rises, to give the foot room
+  double max_zmp_offset_m = 0.03;
+  double zmp_ahead_m = 0.0;
+  double zmp_inward_m = 0.022;
+  std::int32_t landing_hold_ticks = 50;
+  std::int32_t lift_hold_ticks = 15;
+  std::int32_t leave_ticks = 30;
+  double rise_share = 0.5;
   double passing_rise_share = 0.6;
-  std::int32_t knot_ticks = 15;    // eq. (37): 30 ms; between them a drive is up to 2 % faster than its knots say
-  double joint_margin_rad = 0.03;  // what a plan keeps from the joints' ranges
-  double knee_min_rad = 0.08;      // and from the stretched leg
-  double speed_share = 0.95;       // of the drives' speed that a plan may use
+  std::int32_t knot_ticks = 15;
+  double joint_margin_rad = 0.03;
+  double knee_min_rad = 0.08;
+  double speed_share = 0.95;
+
+  static void visit(auto& p, auto& field) {
+    field("torso", p.torso);
+    field("stair_swing", p.stair_swing);
+    field("floor_swing", p.floor_swing);
+    field("passing_swing", p.passing_swing);
+    field("stair_shift_ticks", p.stair_shift_ticks, 66, 2000, "Double support before a step on the stairs: 0.33 s.");
+    field("stair_swing_ticks", p.stair_swing_ticks, 50, 2000, "A swing onto a tread: 0.90 s.");
+    field("passing_swing_ticks", p.passing_swing_ticks, 50, 2000, "A swing past a tread: 0.92 s.");
+    field("floor_shift_ticks", p.floor_shift_ticks, 66, 2000, "Double support before a step on the floor.");
+    field("floor_swing_ticks", p.floor_swing_ticks, 50, 2000, "A swing on the floor.");
+    field("com", p.com);
+    field("max_zmp_offset_m", p.max_zmp_offset_m, 0.0, 0.1, "The zero-moment point goes no farther, to set off.");
+    field("zmp_ahead_m", p.zmp_ahead_m, -0.05, 0.1,
+          "Zero-moment point ahead of the ankle: what it holds ahead and behind is the same.");
+    field("zmp_inward_m", p.zmp_inward_m, -0.04, 0.04,
+          "Zero-moment point from the sole's middle line towards the other foot.");
+    field("landing_hold_ticks", p.landing_hold_ticks, 0, 60,
+          "The foot may land this late before the weight sets off for it.");
+    field("lift_hold_ticks", p.lift_hold_ticks, 0, 60,
+          "The weight is over the stance foot for so long before the other one lifts.");
+    field("leave_ticks", p.leave_ticks, 0, 200,
+          "The rear leg still reaches the ground as long after its foot has left it.");
+    field("rise_share", p.rise_share, 0.05, 1.0,
+          "The torso rises in this share of a swing onto a tread, to give the foot room.");
+    field("passing_rise_share", p.passing_rise_share, 0.05, 1.0,
+          "The torso rises in this share of a swing past a tread.");
+    field("knot_ticks", p.knot_ticks, 1, 200,
+          "Eq. 37: time between two knots; a drive is up to 2 % faster between them than its knots say.");
+    field("joint_margin_rad", p.joint_margin_rad, 0.0, 0.3, "A plan keeps this from the joints' ranges.");
+    field("knee_min_rad", p.knee_min_rad, 0.0, 0.5, "A plan keeps the knee this far from the stretched leg.");
+    field("speed_share", p.speed_share, 0.1, 1.0, "A plan uses this share of the drives' speed.");
+  }
 };
 
 // What is tried to make a step possible, in this order: the ankles ask for toes that point down, the drives for time.

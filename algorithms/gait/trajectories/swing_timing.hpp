@@ -14,15 +14,31 @@ namespace polygmap {
 class SwingTiming {
  public:
   struct Params {
-    double falling_outward_m = 0.02;  // of the divergent component's error towards the free foot:
-    double speed_up = 1.6;            // beyond, the foot goes so many times as fast where its drives can,
+    double falling_outward_m = 0.02;
+    double speed_up = 1.6;
     // or back, earlier in the swing than Seen says;
-    double widen_m = 0.06;  // and it lands that much farther out
+    double widen_m = 0.06;
     double widen_mps = 0.25;
-    std::int32_t late_ticks = 10;    // after the path's end it goes down
-    double descend_search = 5.0;     // so many times as fast
-    std::int32_t pause_ticks = 200;  // where there is no ground it waits,
-    double retreat = 0.5;            // then goes back so many times as fast: the torso is elsewhere
+    std::int32_t late_ticks = 10;
+    double descend_search = 5.0;
+    std::int32_t pause_ticks = 200;
+    double retreat = 0.5;
+
+    static void visit(auto& p, auto& field) {
+      field("falling_outward_m", p.falling_outward_m, 0.001, 0.5,
+            "The body falls outward when the divergent component's error towards the free foot is larger.");
+      field("speed_up", p.speed_up, 1.0, 5.0,
+            "The foot of a body that falls outward goes this many times as fast where its drives can.");
+      field("widen_m", p.widen_m, 0.0, 0.3, "The foot of a body that falls outward lands this much farther out.");
+      field("widen_mps", p.widen_mps, 0.0, 2.0, "The foot goes farther out at this speed.");
+      field("late_ticks", p.late_ticks, 0, 500,
+            "The foot searches downwards for the ground so long after the path's end.");
+      field("descend_search", p.descend_search, 0.1, 20.0,
+            "The foot searches downwards this many times as fast as its path ends.");
+      field("pause_ticks", p.pause_ticks, 0, 2000, "The foot waits for so long where there is no ground.");
+      field("retreat", p.retreat, 0.05, 2.0,
+            "A foot that found no ground goes back this many times as fast, since the torso is elsewhere.");
+    }
   };
   // What decides on a tick.
   struct Seen {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "firmware/config/param_table.hpp"
 #include "firmware/pipeline.hpp"
 #include "scheduler/cyclic_executive.hpp"
 #include "sim_stub/heap_trap.hpp"
@@ -175,8 +176,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   heap::reset();
 
   SimRobot robot(sim_options(options));
-  Params params;
-  params.robot = nominal_robot();
+  Params params = options.params;
   params.gait.planner.pattern = options.gait;
   params.self_filter = options.self_filter;
   params.estimator.infer_forces = options.infer_contacts;
@@ -222,6 +222,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
 
   RunFigures figures;
   figures.options = options;
+  figures.params_hash = config::hash_of(params);
   figures.camera = camera_figures(robot, pipeline.perception().mount());
   figures.heap_calls = heap::report().calls;
   figures.faults = raised(module->pipeline->health());

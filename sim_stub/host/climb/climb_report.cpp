@@ -289,6 +289,7 @@ double ClimbReport::clearance_min_m() const {
 ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   ClimbSummary s;
   s.options = run.options;
+  s.params_hash = run.params_hash;
   s.camera = run.camera;
   s.fell = fell_;
   s.steps_total = static_cast<int>(world_.steps.size());

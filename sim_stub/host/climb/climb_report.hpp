@@ -25,6 +25,7 @@ namespace polygmap::sim {
 // What the run knows beside truth and telemetry.
 struct RunFigures {
   ClimbOptions options;
+  std::string params_hash;  // of what the module was given
   CameraFigures camera;
   std::uint64_t heap_calls = 0;
   std::vector<std::pair<std::string, std::uint32_t>> faults;  // raised faults and limits by name

@@ -87,6 +87,7 @@ struct ClimbSummary {
   std::string ended_by;              // "module": by itself; "fall"; "time limit"
   double ended_at_s = kNotMeasured;  // simulation's clock
   ClimbOptions options;
+  std::string params_hash;  // of what the module was given
   CameraFigures camera;
   int steps_total = 0;
   int steps_climbed = 0;  // both true soles rested on it or above, inside their treads' edges

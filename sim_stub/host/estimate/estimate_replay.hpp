@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "algorithms/estimation/proprioceptive_odometry.hpp"
@@ -17,6 +18,7 @@ namespace polygmap::sim {
 [[nodiscard]] RobotModel log_robot();
 
 struct ReplayOptions {
+  std::string params_hash;  // of what --params says, before the other options
   ProprioceptiveOdometry::Params odometry = log_params();
   RobotModel robot = log_robot();
   // One sigma, where no standstill at the start says what they are.
