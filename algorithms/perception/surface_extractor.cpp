@@ -229,8 +229,8 @@ void SurfaceExtractor::reduce_row() noexcept {
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
   constexpr std::int32_t kBlock = ScanlineSegmentation::kBlock;
   if (row_ % kBlock == kBlock - 1 || row_ + 1 == picture_.column_rays.height_px) {
-    static_assert(kBlock % ColumnImage::kTurn == 0);
-    picture_.columns.turn(row_ - row_ % kBlock, row_);
+    static_assert(kBlock % ColumnImage::kTransposeRows == 0);
+    picture_.columns.transpose(row_ - row_ % kBlock, row_);
     runs_.add_rows(row_ - row_ % kBlock, row_);
   }
 }

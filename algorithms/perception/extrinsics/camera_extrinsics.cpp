@@ -40,7 +40,7 @@ void CameraExtrinsicsEstimator::update(const SurfaceFrame& frame, const Stance& 
   }
   const double dt_s = last_ns_ == 0 ? 0.0 : std::min(seconds(frame.stamp_ns - last_ns_), kLongestStep_s);
   last_ns_ = frame.stamp_ns;
-  learn_ahead(stance, dt_s);
+  learn_x(stance, dt_s);
 
   // Level is what the standing soles lie on: treads are parallel to it, and a foot is put down by the same kinematics.
   // Gravity as the estimator has it errs by more than twice as much, and alike in everything but the camera.
@@ -122,25 +122,25 @@ void CameraExtrinsicsEstimator::update(const SurfaceFrame& frame, const Stance& 
 
 void CameraExtrinsicsEstimator::place(const Vec3& base_level) noexcept {
   const Vec3 ahead = (Vec3::UnitX() - base_level.x() * base_level).normalized();
-  base_T_camera_.p_m = nominal_.p_m + height_m_ * base_level + ahead_m_ * ahead;
+  base_T_camera_.p_m = nominal_.p_m + height_m_ * base_level + x_m_ * ahead;
 }
 
-void CameraExtrinsicsEstimator::learn_ahead(const Stance& stance, double dt_s) noexcept {
+void CameraExtrinsicsEstimator::learn_x(const Stance& stance, double dt_s) noexcept {
   double sum_m = 0.0, information = 0.0;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     const std::optional<ToeSighting>& toe = stance.toes[foot];
     if (!stance.stands[foot] || !toe || !std::isfinite(toe->ahead_m) || !std::isfinite(toe->sigma_m)) continue;
-    // The toe is in the last rows of a picture: a base that moves alike in many frames shows it off alike in all.
-    const double variance_m2 = math::square(params_.frame_ahead_sigma_m) + math::square(toe->sigma_m) +
+    // The toe is in the last rows of a image: a base that moves alike in many frames shows it off alike in all.
+    const double variance_m2 = math::square(params_.frame_x_sigma_m) + math::square(toe->sigma_m) +
                                kFramesAlike * math::square(params_.half_scan_s * stance.speed_mps);
     sum_m += toe->ahead_m / variance_m2;
     information += 1.0 / variance_m2;
   }
   if (!(information > 0.0)) return;
   ++counters_.toes;
-  const double variance_m2 = fuse(ahead_, ahead_m_ - sum_m / information, math::exp(-dt_s / params_.window_s),
-                                  information, params_.prior_ahead_sigma_m);
-  ahead_m_ = math::clamp(variance_m2 * ahead_.weighted, -params_.max_ahead_m, params_.max_ahead_m);
+  const double variance_m2 =
+      fuse(x_, x_m_ - sum_m / information, math::exp(-dt_s / params_.window_s), information, params_.prior_x_sigma_m);
+  x_m_ = math::clamp(variance_m2 * x_.weighted, -params_.max_x_m, params_.max_x_m);
 }
 
 }  // namespace polygmap

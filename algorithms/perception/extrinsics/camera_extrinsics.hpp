@@ -20,11 +20,11 @@ class CameraExtrinsicsEstimator {
   struct Params {
     double prior_tilt_sigma_rad = 0.0175;  // of the data sheet's roll and pitch
     double prior_height_sigma_m = 0.005;
-    double prior_ahead_sigma_m = 0.003;  // of the data sheet, and of where encoders and leg lengths have a foot
+    double prior_x_sigma_m = 0.003;  // of the data sheet, and of where encoders and leg lengths have a foot
     // Of one frame. Far more than the pixels' noise: frames err alike, and one frame must not decide.
     double frame_tilt_sigma_rad = 0.03;
     double frame_height_sigma_m = 0.010;
-    double frame_ahead_sigma_m = 0.003;
+    double frame_x_sigma_m = 0.003;
     // What all frames err by alike, which no number of them takes away: soles are as level as their encoders have it (2
     // mrad a joint), gravity as the IMU's mount and bias. With what the surfaces err by, in 24 climbs, from 1 to 10 s
     // after the first frame, 2.5 mrad with white noise and 3.0 with correlated, roll and pitch together.
@@ -34,8 +34,8 @@ class CameraExtrinsicsEstimator {
     double window_s = 6.0;
     double max_tilt_rad = 2.0 * kPi / 180.0;  // bounds of the estimate
     double max_height_m = 0.008;
-    double max_ahead_m = 0.010;
-    double half_scan_s = 0.008;                // by how much a row of the picture may be older or newer than its stamp
+    double max_x_m = 0.010;
+    double half_scan_s = 0.008;                // by how much a row of the image may be older or newer than its stamp
     double tilt_gate_rad = 3.0 * kPi / 180.0;  // from level, as the mount is believed: more is a ramp
     double height_gate_m = 0.020;              // below half of the least step
     double max_tilt_sigma_rad = 0.006;         // of a surface: vaguer ones say what gravity told the fit before
@@ -73,7 +73,7 @@ class CameraExtrinsicsEstimator {
   [[nodiscard]] double pitch_rad() const noexcept { return tilt_rad_.y(); }
   [[nodiscard]] double height_m() const noexcept { return height_m_; }
   // Along the ground. What legs and encoders are off goes into it: a foot put down by them meets what the camera saw.
-  [[nodiscard]] double ahead_m() const noexcept { return ahead_m_; }
+  [[nodiscard]] double x_m() const noexcept { return x_m_; }
   // One sigma of roll and pitch: what of the data sheet's error is left, and what frames err by alike: the surfaces
   // that were seen, and what told which way is up.
   [[nodiscard]] double tilt_sigma_rad() const noexcept;
@@ -95,7 +95,7 @@ class CameraExtrinsicsEstimator {
     return 1.0 / (mean.information + 1.0 / math::square(prior_sigma));
   }
   [[nodiscard]] bool usable(const SurfacePatch& patch) const noexcept;
-  void learn_ahead(const Stance& stance, double dt_s) noexcept;
+  void learn_x(const Stance& stance, double dt_s) noexcept;
   void place(const Vec3& base_level) noexcept;
 
   Params params_;
@@ -103,10 +103,10 @@ class CameraExtrinsicsEstimator {
   Transform base_T_camera_;
   Vec2 tilt_rad_ = Vec2::Zero();
   double height_m_ = 0.0;
-  double ahead_m_ = 0.0;
+  double x_m_ = 0.0;
   FadingMean<Vec2> tilt_{0.0, Vec2::Zero()};
   FadingMean<double> height_{0.0, 0.0};
-  FadingMean<double> ahead_{0.0, 0.0};
+  FadingMean<double> x_{0.0, 0.0};
   double seen_as_well_ = 0.0;  // 1/rad^2, of level by its surfaces: mean of the frames that the tilt is made of
   double by_gravity_ = 0.0;    // share of that information whose level was gravity's
   std::int64_t last_ns_ = 0;

@@ -12,7 +12,7 @@ namespace {
 // A capsule is drawn as this many spheres: 20 mm apart on a 0.35 m shank the scallops are under 1 mm deep.
 constexpr int kSpheresPerCapsule = 18;
 constexpr double kNear_m = 0.02;
-constexpr double kOutside_px = 1.0;  // a shape that ends farther from the picture covers none of its pixels
+constexpr double kOutside_px = 1.0;  // a shape that ends farther from the image covers none of its pixels
 
 }  // namespace
 
@@ -46,7 +46,7 @@ void SelfFilter::extend(Outline& outline, std::int32_t row, std::int32_t width_p
 SelfFilter::Rows SelfFilter::rows_of(const HalfRays& rays, const Vec3& c, double a) noexcept {
   const Rows all{0, rays.height_px - 1};
   const double square = math::square(c.y()) + a, half = c.y() * c.z(), constant = math::square(c.z()) + a;
-  if (!(square < -1e-9)) return all;  // up to the picture's end, at least to one side
+  if (!(square < -1e-9)) return all;  // up to the image's end, at least to one side
   const double discriminant = math::square(half) - square * constant;
   if (!(discriminant >= 0.0)) return {0, -1};
   const double root = math::sqrt(discriminant), top = (-half + root) / square, bottom = (-half - root) / square;
@@ -63,7 +63,7 @@ void SelfFilter::add_sphere(Outline& outline, const HalfRays& rays, const Vec3& 
   const double g = c.squaredNorm() - math::square(radius_m);
   if (!(g > 1e-6)) return;  // the camera is inside the grown shape: nothing can be said
   const double a = math::square(c.x()) - g;
-  if (!(a < -1e-9)) return;  // beside the camera, at 90 degrees: out of any picture
+  if (!(a < -1e-9)) return;  // beside the camera, at 90 degrees: out of any image
   const auto all = [](double x) { return cv::vx_setall_f64(x); };
   const Wide cx = all(c.x()), cy = all(c.y()), cz = all(c.z()), wide_a = all(a), wide_g = all(g);
   const Wide zero = all(0.0), half = all(0.5), one = all(1.0), fx = all(rays.fx_px), centre = all(rays.cx_px);
@@ -77,7 +77,7 @@ void SelfFilter::add_sphere(Outline& outline, const HalfRays& rays, const Vec3& 
     const Wide root = cv::v_sqrt(cv::v_max(discriminant, zero));
     const Wide x0 = (root - cx_k) / wide_a, x1 = (zero - cx_k - root) / wide_a;
     const Wide first = cv::v_min(x0, x1) * fx + centre, last = cv::v_max(x0, x1) * fx + centre;
-    // Met at all, before the camera and in the picture.
+    // Met at all, before the camera and in the image.
     const Wide seen = (discriminant >= zero) & (half * (x0 + x1) * cx + k > zero) & (last >= least) & (first <= most);
     double *firsts = &outline.first_px[at], *lasts = &outline.last_px[at];
     const Wide first0 = cv::vx_load(firsts), last0 = cv::vx_load(lasts);

@@ -24,7 +24,7 @@ struct BodyUncertainty {
 [[nodiscard]] BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& legs,
                                      double turn_rad) noexcept;
 
-// The picture of convex shapes, each grown by a margin: one column interval per row and shape. A pixel whose ray meets
+// The image of convex shapes, each grown by a margin: one column interval per row and shape. A pixel whose ray meets
 // a grown shape is body whatever depth it measured, so that flying pixels around a leg go with it.
 class SelfFilter {
  public:

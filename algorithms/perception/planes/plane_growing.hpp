@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gathers straight runs of neighbouring columns into planes: longest runs first, breadth first, each plane refitted as
-// it grows. Resumable.
+// Gathers straight segments of neighbouring columns into planes: longest segments first, breadth first, each plane
+// refitted as it grows. Resumable.
 #pragma once
 
 #include <array>
@@ -20,9 +20,9 @@ struct GrownPlane {
 class PlaneGrowing {
  public:
   struct Params {
-    double join_sigmas = 1.5;  // a run whose line is join_floor_m + join_sigmas sigma_z off a plane belongs to it
+    double join_sigmas = 1.5;  // a segment whose line is join_floor_m + join_sigmas sigma_z off a plane belongs to it
     double join_floor_m = 0.003;
-    std::int32_t min_rows = 3;        // of a run that starts a plane
+    std::int32_t min_rows = 3;        // of a segment that starts a plane
     std::int32_t min_columns = 3;     // of a plane
     std::int32_t min_plane_px = 800;  // full-resolution pixels; of a plane that is to be one by itself ...
     std::int32_t min_facet_px = 400;  // ... and of one that may be part of another
@@ -30,8 +30,8 @@ class PlaneGrowing {
   static constexpr std::size_t kMaxPlanes = 96;
 
   void begin(const Params& params, const DepthNoiseModel& noise, const ColumnRays& rays,
-             ScanlineSegmentation::Columns& runs) noexcept;
-  // A bounded piece of work; true when all is done. Then every run knows its plane, 1-based.
+             ScanlineSegmentation::Columns& segments) noexcept;
+  // A bounded piece of work; true when all is done. Then every segment knows its plane, 1-based.
   [[nodiscard]] bool step() noexcept;
 
   [[nodiscard]] std::size_t count() const noexcept { return count_; }
@@ -39,27 +39,29 @@ class PlaneGrowing {
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
 
  private:
-  static constexpr std::size_t kQueue = static_cast<std::size_t>(kColumns) * ScanlineSegmentation::kMaxRunsPerColumn;
-  static constexpr std::uint8_t kTried = 255;  // a run that grew into nothing
+  static constexpr std::size_t kQueue =
+      static_cast<std::size_t>(kColumns) * ScanlineSegmentation::kMaxSegmentsPerColumn;
+  static constexpr std::uint8_t kTried = 255;  // a segment that grew into nothing
 
   struct Place {
     std::int16_t column = 0;
     std::int16_t index = 0;
   };
-  // Sums over pixels in the coordinates of rays; enough for a fit.
+  // Over the pixels of segments.
   struct Sums {
-    double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, w = 0, xw = 0, yw = 0, ww = 0;
-    void add(double ray_x, const ColumnRays& rays, const Run& run) noexcept;
-    [[nodiscard]] bool try_solve(Vec3& m) const noexcept;
-    [[nodiscard]] double mean_square(const Vec3& m) const noexcept;
+    PlaneMoments m;   // each pixel weighs 1
+    double ww = 0.0;  // of squared inverse depths
+    void add(double ray_x, const ColumnRays& rays, const ScanlineSegment& segment) noexcept;
+    [[nodiscard]] bool try_solve(Vec3& plane) const noexcept;
+    [[nodiscard]] double mean_square(const Vec3& plane) const noexcept;  // residual of inverse depth
   };
 
-  [[nodiscard]] Run& at(Place p) noexcept {
-    return (*runs_)[static_cast<std::size_t>(p.column)][static_cast<std::size_t>(p.index)];
+  [[nodiscard]] ScanlineSegment& at(Place p) noexcept {
+    return (*segments_)[static_cast<std::size_t>(p.column)][static_cast<std::size_t>(p.index)];
   }
   void sort_seeds() noexcept;
   void index_rows() noexcept;
-  // Of the first run of a column that ends at this row or below, or of one a little above it.
+  // Of the first segment of a column that ends at this row or below, or of one a little above it.
   [[nodiscard]] std::size_t first_near(std::int32_t column, std::int32_t row) const noexcept {
     return first_near_[static_cast<std::size_t>(column)][static_cast<std::size_t>(row / kIndexRows)];
   }
@@ -76,7 +78,7 @@ class PlaneGrowing {
   Params params_;
   DepthNoiseModel noise_;
   const ColumnRays* rays_ = nullptr;
-  ScanlineSegmentation::Columns* runs_ = nullptr;
+  ScanlineSegmentation::Columns* segments_ = nullptr;
 
   static constexpr std::int32_t kIndexRows = 16;
   std::array<std::array<std::uint8_t, kDepthHeight_px / kIndexRows + 1>, kColumns> first_near_{};

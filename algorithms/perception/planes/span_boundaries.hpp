@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where one plane ends and the next begins in every column, and the planes' final fit to what lies between.
 //
-// Two planes that meet in space meet in the picture on a straight line that is known far better than any one column's
+// Two planes that meet in space meet in the image on a straight line that is known far better than any one column's
 // pixels tell. Where they do not meet (an overhang, something in front), the columns' most likely change-points decide,
 // all columns of a pair of planes together.
 #pragma once
@@ -24,18 +24,18 @@ struct ColumnSpan {
 };
 
 // Rows that belong to no plane are searched for the rest of known or cut-off surfaces this far from the nearest span's
-// or the picture's end; what lies deeper in them is clutter.
+// or the image's end; what lies deeper in them is clutter.
 inline constexpr std::int32_t kRemainderReach_px = 48;
 
 class SpanBoundaries {
  public:
   struct Params {
     double inlier_sigmas = 3.0;    // of a row in a refit, and of a row that extends a surface
-    double same_gap_sigmas = 3.0;  // rows between two runs of one plane that are this far off it are something else
+    double same_gap_sigmas = 3.0;  // rows between two segments of one plane that are this far off it are something else
     double gap_floor_m = 0.006;
     double meet_px = 2.0;          // planes meet where their line is no farther than this from the change-point ...
     double meet_gain = 1.0;        // ... or hardly worse: of the columns' mean cost
-    std::int32_t window_px = 6;    // rows searched beyond where the runs ended
+    std::int32_t window_px = 6;    // rows searched beyond where the segments ended
     std::int32_t max_gap_px = 24;  // rows between two surfaces that are still next to each other
   };
   static constexpr std::size_t kMaxPlanes = 96;
@@ -63,14 +63,14 @@ class SpanBoundaries {
   void set_covariance(std::size_t i, const Mat3& covariance) noexcept { planes_[i].covariance = covariance; }
   [[nodiscard]] const Plane& plane(std::size_t i) const noexcept { return planes_[i]; }
 
-  // One column's runs to intervals, each run's plane looked up in to_plane.
-  void gather(std::int32_t column, const ScanlineSegmentation::Column& runs,
+  // One column's segments to intervals, each segment's plane looked up in to_plane.
+  void gather(std::int32_t column, const ScanlineSegmentation::Column& segments,
               const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept;
-  // A run's ends may reach over an edge: takes away rows that the plane, known better than the run's line, does not
-  // explain.
+  // A segment's ends may reach over an edge: takes away rows that the plane, known better than the segment's line, does
+  // not explain.
   void trim(std::int32_t column) noexcept;
   // Gives rows that are in none of the column's spans to planes that the column beside shows there, or to one of the
-  // planes first .. last. Such rows are too few for a run of their own.
+  // planes first .. last. Such rows are too few for a segment of their own.
   void claim(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
   void begin_meeting() noexcept;
   // Change-points between the column's surfaces. by_planes: where planes meet near them, that is believed unmeasured.
@@ -124,7 +124,6 @@ class SpanBoundaries {
     float a, b, norm, own = 0.0F;
   };
   [[nodiscard]] Line line_of(std::uint8_t plane, std::int32_t column) const noexcept;
-  [[nodiscard]] float inverse_sigma(float w) const noexcept { return (base_ * w + per_metre_) * w + quadratic_; }
   // A row against a line: residual over sigma, squared, is off2 / variance.
   struct Offset {
     float off2, variance;
@@ -164,7 +163,13 @@ class SpanBoundaries {
     std::array<std::int16_t, kRefitColumns> top{}, bottom{};
     std::uint8_t plane = 0;
   };
+  struct StripRows;
+  struct StripSums;
+  [[nodiscard]] StripRows rows_of(const Strip& strip, bool roughly) const noexcept;
+  void add_up(std::int32_t first_column, const Strip& strip, const StripRows& rows, StripSums& sums) const noexcept;
   void refit(std::int32_t first_column, const Strip& strip, bool roughly) noexcept;
+  struct RowGains;
+  struct BinnedGains;
   void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
                                           std::int32_t last, float meeting_row, Pair* pair) const noexcept;
@@ -179,7 +184,8 @@ class SpanBoundaries {
   const ColumnRays* rays_ = nullptr;
   const ColumnImage* image_ = nullptr;
   double fy_px_ = 1.0, cy_px_ = 0.0;
-  float base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F, correlated_share_ = 0.0F;
+  InverseSigma<float> inverse_sigma_{};
+  MeanShare<float> mean_share_{};
   std::array<float, kColumn_px + 1> share_{};  // of a pixel's variance that the mean of n pixels has
 
   std::array<Plane, kMaxPlanes + 1> planes_{};
@@ -201,10 +207,10 @@ inline SpanBoundaries::Line SpanBoundaries::line_of(std::uint8_t plane, std::int
 
 inline SpanBoundaries::Offset SpanBoundaries::offset(const Line& line, std::int32_t column,
                                                      std::int32_t row) const noexcept {
-  const float w = image_->down(row, column);
+  const float w = image_->by_column(row, column);
   const float residual = (w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)])) * w;
-  const float sigma = inverse_sigma(w) * line.norm;
-  return {residual * residual, sigma * sigma * share_[image_->valid_down(row, column)]};
+  const float sigma = inverse_sigma_(w) * line.norm;
+  return {residual * residual, sigma * sigma * share_[image_->valid_by_column(row, column)]};
 }
 
 }  // namespace polygmap

@@ -146,7 +146,7 @@ void EdgeLineFinder::search_columns(std::int32_t first_column) noexcept {
     other_a[k] = static_cast<float>(other_.m.x() * x + other_.m.z());
     const double y = (guess - intrinsics_.cy_px) / intrinsics_.fy_px;
     inverse_norm[k] = static_cast<float>(1.0 / (scale * math::sqrt(x * x + y * y + 1.0)));
-    // The picture's end is no edge.
+    // The image's end is no edge.
     const bool searched = g >= first_column_ && g <= last_column_ && g < rays_->columns && row > params_.min_side_px &&
                           row < intrinsics_.height_px - 1 - params_.min_side_px;
     reach[k] = searched ? static_cast<float>(params_.window_px) + 0.5F : -1.0F;
@@ -294,7 +294,7 @@ double EdgeLineFinder::below_m(double along_m, double across_m, double rows) con
   return ((p * w + Vec3::UnitY() * down) / (w + dw) - origin_m_).dot(across_);
 }
 
-// How far across the surface one row of the picture reaches there.
+// How far across the surface one row of the image reaches there.
 double EdgeLineFinder::pixel_m(double along_m, double across_m) const noexcept {
   return std::abs(below_m(along_m, across_m, 1.0) - across_m);
 }

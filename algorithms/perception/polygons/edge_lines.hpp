@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a surface ends, to a fraction of a pixel: change-points in the columns of the picture, one line through all.
+// Where a surface ends, to a fraction of a pixel: change-points in the columns of the image, one line through all.
 #pragma once
 
 #include <array>
@@ -47,7 +47,7 @@ class EdgeLineFinder {
     InversePlane plane;
     Mat3 covariance = Mat3::Zero();  // of its m
   };
-  // surface_above: the surface lies above its boundary in the picture (a nosing), else below it (a back line). other:
+  // surface_above: the surface lies above its boundary in the image (a nosing), else below it (a back line). other:
   // the plane on the far side; null when that is not known, then only leaving the surface's plane counts.
   void begin(const Params& params, const DepthNoiseModel& noise, const CameraIntrinsics& intrinsics,
              const ColumnRays& rays, const ColumnImage& image, const Measured& own, const Measured* other,
@@ -92,7 +92,7 @@ class EdgeLineFinder {
   // How far the first pixels past the change-point stand out from the other plane; false when there are too few.
   [[nodiscard]] bool try_face_offset(double& offset_m) const noexcept;
   [[nodiscard]] double pixel_m(double along_m, double across_m) const noexcept;
-  // Where across the surface the picture's row is that many below the one of (along, across).
+  // Where across the surface the image's row is that many below the one of (along, across).
   [[nodiscard]] double below_m(double along_m, double across_m, double rows) const noexcept;
   // By how many rows the planes meet below where they meet as a whole, as the few rows on both sides say: what a slow
   // error of the camera adds to both planes' pixels at the edge does not move it there, but each plane's fit. Nosings

@@ -90,7 +90,7 @@ cv::v_uint16x8 reversed(const cv::v_uint16x8& a) noexcept {
 
 // What every pixel says for the plane beyond and against our own: twice the negative logarithms of the likelihoods, but
 // for a constant. Nothing where there is no data.
-PixelGains weigh(const SideLines::Params& params, const RawImage& picture, const RowPlane& own, const RowPlane& other,
+PixelGains weigh(const SideLines::Params& params, const RawImage& image, const RowPlane& own, const RowPlane& other,
                  std::int32_t first, std::int32_t out, const Raws& raw) noexcept {
   PixelGains gains;
   static_assert(kReach_px % Wide::nlanes == 0);
@@ -103,8 +103,8 @@ PixelGains weigh(const SideLines::Params& params, const RawImage& picture, const
   const Wide most = all(static_cast<float>(math::square(params.truncate_sigmas)));
   const Wide leave = all(static_cast<float>(math::square(params.leave_sigmas)));
   const Wide more = all(other.valid ? other.wider_than(own) : 0.0F);
-  const Wide unit_m = all(static_cast<float>(picture.intrinsics.depth_unit_m));
-  const Wide least = all(static_cast<float>(picture.range.min)), largest = all(static_cast<float>(picture.range.max));
+  const Wide unit_m = all(static_cast<float>(image.intrinsics.depth_unit_m));
+  const Wide least = all(static_cast<float>(image.range.min)), largest = all(static_cast<float>(image.range.max));
   for (std::int32_t i = 0; i < kReach_px; i += Wide::nlanes) {
     const Wide depth = cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand(raw.data() + i)));
     const Wide column = all(static_cast<float>(first)) + all(static_cast<float>(out)) * cv::vx_load(kSteps.data() + i);
@@ -124,12 +124,12 @@ PixelGains weigh(const SideLines::Params& params, const RawImage& picture, const
 
 }  // namespace
 
-void SideLines::begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw,
-                      const FrameImage& picture, const PlaneSet& planes) noexcept {
+void SideLines::begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw, const FrameImage& image,
+                      const PlaneSet& planes) noexcept {
   params_ = params;
   noise_ = noise;
   raw_ = &raw;
-  picture_ = &picture;
+  image_ = &image;
   planes_ = &planes;
   pitch_ = 1.0 / raw.intrinsics.fx_px;
 }
@@ -151,28 +151,28 @@ void SideLines::look(std::size_t index, bool right, RowView& view) const noexcep
   const std::int32_t first = border - out * (kInside_px - 1);
   view.first = first;
   view.out = out;
-  // The picture's last columns hide what comes after them.
+  // The image's last columns hide what comes after them.
   view.ending = Ending::kHidden;
   if (border + 2 * out < 0 || border + 2 * out >= k.width_px) return;
   view.ending = Ending::kNone;
   if (first < 0 || first >= k.width_px) return;
   const RowRays rays{-k.cx_px * pitch_, pitch_,
-                     static_cast<double>(picture_->column_rays.y[static_cast<std::size_t>(row)])};
+                     static_cast<double>(image_->column_rays.y[static_cast<std::size_t>(row)])};
   view.own.set(planes[index].plane, noise_, rays, border);
   if (!view.own.valid) return;
   // The plane beyond, if there is one.
   std::size_t beyond = 0;
   for (std::int32_t g = column + out; g != column + 3 * out; g += out) {
-    if (g < 0 || g >= picture_->column_rays.columns) break;
-    const std::size_t p = picture_->owner(g, row);
+    if (g < 0 || g >= image_->column_rays.columns) break;
+    const std::size_t p = image_->owner(g, row);
     if (p != 0 && p != index) beyond = p;
   }
   view.other.valid = false;
   if (beyond != 0) view.other.set(planes[beyond].plane, noise_, rays, border);
   const std::uint16_t* pixels = raw_->row(row);
   std::int32_t count = std::min(kReach_px, right ? k.width_px - first : first + 1);
-  if (picture_->body_rows[static_cast<std::size_t>(row / 2)]) {
-    const std::uint8_t* flags = picture_->flags.row(row / 2);
+  if (image_->body_rows[static_cast<std::size_t>(row / 2)]) {
+    const std::uint8_t* flags = image_->flags.row(row / 2);
     std::int32_t free = 0;
     while (free < count && (flags[(first + out * free) / 2] & kPixelBody) == 0) ++free;
     count = free;
@@ -266,7 +266,7 @@ void SideLines::find_ends(std::size_t index, const ColumnExtents& profile) noexc
   for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
     if (ends.empty()) continue;
-    const std::uint8_t* owners = picture_->owners.row(g);
+    const std::uint8_t* owners = image_->owners.row(g);
     const Bytes here = cv::vx_setall_u8(static_cast<std::uint8_t>(g));
     for (std::int32_t r = ends.top / Bytes::nlanes * Bytes::nlanes; r <= ends.bottom; r += Bytes::nlanes) {
       // From left to right, and no column is more than none.

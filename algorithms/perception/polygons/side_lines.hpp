@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The left and right sides of a surface in the picture: where its rows of pixels end, one straight line through all.
+// The left and right sides of a surface in the image: where its rows of pixels end, one straight line through all.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ class SideLines {
   struct Params {
     double truncate_sigmas = 3.0;
     double leave_sigmas = 2.0;  // a pixel this far off has left the surface, when what lies beyond is no known plane
-    double max_lean = 1.0;      // on the plane, along over across the picture's rows: a front or a back leans more
+    double max_lean = 1.0;      // on the plane, along over across the image's rows: a front or a back leans more
     double inlier_px = 2.0;
     double outside_px = 3.0;    // what of the surface's pixels lies farther than this outside the line ...
     double max_cut = 0.03;      // ... is no more than this share of them
@@ -25,18 +25,18 @@ class SideLines {
   };
 
   // All but the parameters are read again by find.
-  void begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw, const FrameImage& picture,
+  void begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw, const FrameImage& image,
              const PlaneSet& planes) noexcept;
   // Of the next surface: the first and the last column of each of its rows.
   void find_ends(std::size_t index, const ColumnExtents& profile) noexcept;
   // The line through the ends of that surface's rows on one side; not fitted, as far as the columns reach, where the
-  // ends are not seen (the picture's or the robot's own) or not straight.
+  // ends are not seen (the image's or the robot's own) or not straight.
   [[nodiscard]] OutlineSide find(std::size_t index, const ColumnExtents& profile, bool right) noexcept;
 
  private:
   static constexpr std::int32_t kMaxRows = 14;   // of a tread
   static constexpr std::int32_t kOtherRows = 8;  // of what nobody steps on
-  // kHidden: by the picture's end, the robot's own body or missing data. kNone: the row's pixels there are not the
+  // kHidden: by the image's end, the robot's own body or missing data. kNone: the row's pixels there are not the
   // surface's.
   enum class Ending : std::uint8_t { kSeen, kHidden, kNone };
   struct RowView;  // what is seen around the end of one row
@@ -55,7 +55,7 @@ class SideLines {
   Params params_;
   DepthNoiseModel noise_;
   const RawImage* raw_ = nullptr;
-  const FrameImage* picture_ = nullptr;
+  const FrameImage* image_ = nullptr;
   const PlaneSet* planes_ = nullptr;
   double pitch_ = 0.0;                      // of rays from pixel to pixel
   static constexpr std::int32_t kPad = 32;  // rows before the first and after the last: whole registers
