@@ -94,7 +94,22 @@ class CameraExtrinsicsEstimator {
     mean.weighted = fade * mean.weighted + information * value;
     return 1.0 / (mean.information + 1.0 / math::square(prior_sigma));
   }
-  [[nodiscard]] bool usable(const SurfacePatch& patch) const noexcept;
+  // Level as that frame had it, by standing soles or, flat being none, by gravity.
+  struct Level {
+    Vec3 up;
+    std::array<bool, kFootCount> flat{};
+    [[nodiscard]] bool by_soles() const noexcept { return flat[0] || flat[1]; }
+  };
+  [[nodiscard]] Level level_of(const Stance& stance) const noexcept;
+  [[nodiscard]] static bool usable(const SurfacePatch& patch) noexcept;
+  [[nodiscard]] bool says_level(const SurfacePatch& patch) const noexcept;
+  [[nodiscard]] bool near_level(const SurfacePatch& patch, const Vec3& up) const noexcept;
+  // False when no surface says anything.
+  [[nodiscard]] bool try_learn_tilt(const SurfaceFrame& frame, const Level& level, double dt_s) noexcept;
+  void learn_height(const SurfaceFrame& frame, const Stance& stance, const Level& level, double dt_s) noexcept;
+  // How far a sole lies above the largest surface that can be what it stands on; false when there is none.
+  [[nodiscard]] bool try_height(const SurfaceFrame& frame, const Vec3& camera_p_sole, const Vec3& up,
+                                double& height_m) const noexcept;
   void learn_x(const Stance& stance, double dt_s) noexcept;
   void place(const Vec3& base_level) noexcept;
 

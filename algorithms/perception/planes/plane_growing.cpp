@@ -71,7 +71,7 @@ void PlaneGrowing::begin(const Params& params, const DepthNoiseModel& noise, con
   count_ = 0;
   overflow_ = 0;
   growing_ = false;
-  next_seed_ = 0;
+  seeds_.next = 0;
   sort_seeds();
   index_rows();
 }
@@ -99,13 +99,13 @@ void PlaneGrowing::sort_seeds() noexcept {
     }
   }
   for (std::size_t i = 1; i < start.size(); ++i) start[i] = static_cast<std::uint16_t>(start[i] + start[i - 1]);
-  seed_count_ = start.back();
+  seeds_.size = start.back();
   for (std::int32_t g = 0; g < rays_->columns; ++g) {
     const ScanlineSegmentation::Column& column = (*segments_)[static_cast<std::size_t>(g)];
     for (std::size_t k = 0; k < column.size(); ++k) {
       if (column[k].rows() < params_.min_rows) continue;
-      seeds_[start[static_cast<std::size_t>(kDepthHeight_px - column[k].rows())]++] = {static_cast<std::int16_t>(g),
-                                                                                       static_cast<std::int16_t>(k)};
+      seeds_.places[start[static_cast<std::size_t>(kDepthHeight_px - column[k].rows())]++] = {
+          static_cast<std::int16_t>(g), static_cast<std::int16_t>(k)};
     }
   }
 }
@@ -148,11 +148,11 @@ bool PlaneGrowing::try_seed(Place place) noexcept {
   sums_ = Sums{};
   // The first fit waits until the plane itself has more than the seed had.
   next_fit_px_ = kGrowth * sums.m.one;
-  queue_size_ = queue_next_ = 0;
+  queue_.size = queue_.next = 0;
   first_column_ = last_column_ = place.column;
   growing_ = true;
   consider(place);
-  if (queue_size_ == 0) growing_ = false;
+  if (queue_.size == 0) growing_ = false;
   return growing_;
 }
 
@@ -170,7 +170,7 @@ void PlaneGrowing::consider(Place place) noexcept {
   if (!(middle.w > kLeastNorm) || off2 > math::square(tolerance_w(middle.w)) * norm2_) return;
   segment.plane = static_cast<std::uint8_t>(count_ + 1);
   sums_.add(ray_x, *rays_, segment);
-  queue_[queue_size_++] = place;
+  queue_.places[queue_.size++] = place;
   first_column_ = std::min<std::int32_t>(first_column_, place.column);
   last_column_ = std::max<std::int32_t>(last_column_, place.column);
   if (sums_.m.one > next_fit_px_ && sums_.try_solve(m_)) {
@@ -201,7 +201,7 @@ void PlaneGrowing::close() noexcept {
                     count_ < kMaxPlanes && sums_.try_solve(m_) && m_.dot(sums_.m.mean_ray()) > kLeastNorm;
   if (!kept) {
     overflow_ += count_ == kMaxPlanes ? 1U : 0U;
-    for (std::size_t i = 0; i < queue_size_; ++i) at(queue_[i]).plane = i == 0 ? kTried : std::uint8_t{0};
+    for (std::size_t i = 0; i < queue_.size; ++i) at(queue_.places[i]).plane = i == 0 ? kTried : std::uint8_t{0};
     return;
   }
   GrownPlane& plane = planes_[++count_];
@@ -214,13 +214,13 @@ bool PlaneGrowing::step() noexcept {
   constexpr int kPiece = 8;
   for (int i = 0; i < kPiece; ++i) {
     if (growing_) {
-      if (queue_next_ < queue_size_) {
-        visit(queue_[queue_next_++]);
+      if (queue_.next < queue_.size) {
+        visit(queue_.places[queue_.next++]);
       } else {
         close();
       }
-    } else if (next_seed_ < seed_count_) {
-      static_cast<void>(try_seed(seeds_[next_seed_++]));
+    } else if (seeds_.next < seeds_.size) {
+      static_cast<void>(try_seed(seeds_.places[seeds_.next++]));
     } else {
       for (ScanlineSegmentation::Column& column : *segments_) {
         for (ScanlineSegment& segment : column)

@@ -47,6 +47,11 @@ class PlaneGrowing {
     std::int16_t column = 0;
     std::int16_t index = 0;
   };
+  struct Queue {
+    std::array<Place, kQueue> places{};
+    std::size_t size = 0;
+    std::size_t next = 0;
+  };
   // Over the pixels of segments.
   struct Sums {
     PlaneMoments m;   // each pixel weighs 1
@@ -82,13 +87,9 @@ class PlaneGrowing {
 
   static constexpr std::int32_t kIndexRows = 16;
   std::array<std::array<std::uint8_t, kDepthHeight_px / kIndexRows + 1>, kColumns> first_near_{};
-  std::array<Place, kQueue> seeds_{};
-  std::size_t seed_count_ = 0;
-  std::size_t next_seed_ = 0;
+  Queue seeds_;
 
-  std::array<Place, kQueue> queue_{};
-  std::size_t queue_size_ = 0;
-  std::size_t queue_next_ = 0;
+  Queue queue_;  // of the plane that grows: all its segments, those before next visited
   bool growing_ = false;
   Sums sums_;
   Vec3 m_ = Vec3::UnitZ();

@@ -153,11 +153,14 @@ class SpanBoundaries {
     std::uint8_t above, below;
     [[nodiscard]] bool may_be(std::uint8_t plane) const noexcept { return plane != above && plane != below; }
   };
-  // A plane for rows top .. bottom of the gap, whose depths are known; or several planes for its ends.
+  // A plane for rows top .. bottom of the gap, whose depths are known; or several planes for its ends; or those of the
+  // column beside, of whose spans next is the first that reaches down to the gap.
   void consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom, const Depths& depths,
                 std::int32_t& most, ColumnSpan& claimed) const noexcept;
   void consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
                 ColumnSpan& claimed) const noexcept;
+  void consider_beside(const Gap& gap, const Column& others, std::size_t& next, std::int32_t& most,
+                       ColumnSpan& claimed) const noexcept;
   // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
   struct Strip {
     std::array<std::int16_t, kRefitColumns> top{}, bottom{};

@@ -140,38 +140,40 @@ void SpanBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size
   }
 }
 
+void SpanBoundaries::consider_beside(const Gap& gap, const Column& others, std::size_t& next, std::int32_t& most,
+                                     ColumnSpan& claimed) const noexcept {
+  constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
+  while (next < others.size() && others[next].bottom + kReach_px < gap.from) ++next;
+  for (std::size_t i = next; i < others.size() && others[i].top - kReach_px <= gap.until; ++i) {
+    const ColumnSpan& other = others[i];
+    const std::int32_t top = std::max(gap.from, other.top - kReach_px);
+    const std::int32_t bottom = std::min(gap.until, other.bottom + kReach_px);
+    if (!gap.may_be(other.plane) || bottom - top < most) continue;
+    consider(gap, other.plane, top, bottom, depths_of(gap.column, top, bottom), most, claimed);
+  }
+}
+
 void SpanBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t first_plane,
                            std::size_t last_plane) noexcept {
-  constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
-  constexpr std::int32_t kMinRows = 2;   // that fit
+  constexpr std::int32_t kMinRows = 2;  // that fit
   Column& spans = columns_[static_cast<std::size_t>(column)];
   const bool any_beside = beside >= 0 && beside < rays_->columns;
+  const Column& others = columns_[static_cast<std::size_t>(any_beside ? beside : column)];
   std::int32_t from = 0;
   std::size_t next_beside = 0;  // the first span there that reaches down to this gap
   for (std::size_t k = 0; k <= spans.size(); ++k) {
-    const std::int32_t until = k < spans.size() ? spans[k].top - 1 : rays_->height_px - 1;
-    const std::int32_t gap_from = from;
-    if (k < spans.size()) from = spans[k].bottom + 1;
-    if (until <= gap_from) continue;
+    const bool last = k == spans.size();
+    const Gap gap{column, from, last ? rays_->height_px - 1 : spans[k].top - 1,
+                  k > 0 ? spans[k - 1].plane : std::uint8_t{0}, last ? std::uint8_t{0} : spans[k].plane};
+    if (!last) from = spans[k].bottom + 1;
+    if (gap.until <= gap.from) continue;
     if (spans.full()) {
       ++overflow_;
       return;
     }
-    const Gap gap{column, gap_from, until, k > 0 ? spans[k - 1].plane : std::uint8_t{0},
-                  k < spans.size() ? spans[k].plane : std::uint8_t{0}};
     std::int32_t most = kMinRows - 1;
     ColumnSpan claimed;
-    if (any_beside) {
-      const Column& others = columns_[static_cast<std::size_t>(beside)];
-      while (next_beside < others.size() && others[next_beside].bottom + kReach_px < gap_from) ++next_beside;
-      for (std::size_t i = next_beside; i < others.size() && others[i].top - kReach_px <= until; ++i) {
-        const ColumnSpan& other = others[i];
-        const std::int32_t top = std::max(gap_from, other.top - kReach_px);
-        const std::int32_t bottom = std::min(until, other.bottom + kReach_px);
-        if (!gap.may_be(other.plane) || bottom - top < most) continue;
-        consider(gap, other.plane, top, bottom, depths_of(column, top, bottom), most, claimed);
-      }
-    }
+    if (any_beside) consider_beside(gap, others, next_beside, most, claimed);
     if (first_plane <= last_plane) consider(gap, first_plane, last_plane, most, claimed);
     if (most < kMinRows || !spans.try_push_back(claimed)) continue;
     std::rotate(spans.begin() + static_cast<std::ptrdiff_t>(k), spans.end() - 1, spans.end());

@@ -40,14 +40,31 @@ class SideLines {
   // surface's.
   enum class Ending : std::uint8_t { kSeen, kHidden, kNone };
   struct RowView;  // what is seen around the end of one row
+  struct Views;
+  struct UprightRows;
+  [[nodiscard]] UprightRows upright_rows(const ColumnExtents& profile, const std::uint8_t* ends) const noexcept;
+  // Rows at equal distances among those.
+  void choose_rows(const UprightRows& rows, std::int32_t most, const std::uint8_t* ends, Views& views) const noexcept;
   void look(std::size_t index, bool right, RowView& view) const noexcept;
+  [[nodiscard]] std::size_t plane_beyond(std::size_t index, std::int32_t out, const RowView& view) const noexcept;
+  // How many of those of its pixels, from inside outwards, that are searched are in the image and not the robot's own.
+  [[nodiscard]] std::int32_t count_free(bool right, const RowView& view) const noexcept;
+  void copy_pixels(bool right, std::int32_t count, RowView& view) const noexcept;
   // Between which columns one row's pixels leave the surface (pixel c reaches from c - 0.5 to c + 0.5).
   [[nodiscard]] Ending end_of_row(const RowView& view, double& end_px) const noexcept;
+  // Where the rows end, into seen_ and hidden_; the outermost of those columns, times out.
+  double find_row_ends(const Views& views, bool right) noexcept;
   struct Line {  // column = at + slope * row
     double at = 0.0;
     double slope = 0.0;
   };
   [[nodiscard]] bool try_line(const InversePlane& plane, Line& line) const noexcept;
+  [[nodiscard]] bool try_propose(const InversePlane& plane, Line& line) const noexcept;
+  [[nodiscard]] bool is_upright(const InversePlane& plane, const Line& line) const noexcept;
+  // Whether enough of the rows that were looked at end on the line; between which rows those are.
+  [[nodiscard]] bool holds(const Line& line, double& first_row, double& last_row) const noexcept;
+  // Of the surface's pixels.
+  [[nodiscard]] double count_outside(const Line& line, const ColumnExtents& profile, bool right) const noexcept;
 
   struct RowEnd {
     double row, column;
@@ -62,6 +79,9 @@ class SideLines {
   using RowColumns = std::array<std::uint8_t, kDepthHeight_px + 2 * kPad>;
   static constexpr std::uint8_t kNoColumn = std::numeric_limits<std::uint8_t>::max();
   static_assert(kColumns <= kNoColumn);
+  [[nodiscard]] const std::uint8_t* ends_of(bool right) const noexcept {
+    return (right ? right_ : left_).data() + kPad;
+  }
   RowColumns left_{}, right_{};            // from kPad on; of the rows next to the surface's, too
   StaticVector<RowEnd, kMaxRows> seen_;    // full-resolution pixels
   StaticVector<RowEnd, kMaxRows> hidden_;  // as far as the columns reach
