@@ -42,7 +42,7 @@ void FootholdSearch::begin(const MapSnapshot& map, const Query& query) noexcept 
   for (Transform& sole : query_.world_T_sole) sole.p_m -= map.drift_m;
   base_ = PlanFrame(query_.world_T_base);
   sole_ = PlanFrame(query_.world_T_sole[index_of(query.stance)]);
-  z_foot_ = z_foot_m(query_.world_T_sole[index_of(query.stance)]);
+  z_foot_ = z_foot_m(foot_, query_.world_T_sole[index_of(query.stance)]);
   pending_ = {};
   pending_.map_stamp_ns = map.stamp_ns;
   levels_.clear();
@@ -113,7 +113,7 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
   const bool confirmed = polygon.sightings >= params_.confirmed_sightings;
   if (surface.kind == SurfaceKind::kTread && surface.area_m2 >= params_.area_min_m2) {
     LevelSurface level;
-    if (!prepare(polygon, yaw_of(query_.world_T_base.R), params_.margin, level)) return;
+    if (!prepare(polygon, yaw_of(query_.world_T_base.R), params_.margin, foot_, level)) return;
     if (confirmed) {
       (void)levels_.try_push_back(level);  // as many as the map holds
     } else if (level.height_m > z_foot_ + params_.delta_foot_m &&
@@ -144,13 +144,14 @@ void FootholdSearch::link(std::size_t i) noexcept {
     const LevelSurface& other = levels_[j];
     const double rise_m = other.height_m - tread.height_m;
     if (j == i || !other.has_nosing || rise_m < params_.delta_foot_m) continue;
-    add_toe_limit(tread, {other.nosing_middle_m(), other.left}, other.nosing_margin_m, kNearestBack_m, kFarthestBack_m);
+    add_toe_limit(tread, foot_, {other.nosing_middle_m(), other.left}, other.nosing_margin_m, kNearestBack_m,
+                  kFarthestBack_m);
   }
   for (const Upright& upright : uprights_) {
     if (upright.top_m < tread.height_m + params_.delta_foot_m || upright.outward.dot(tread.heading) > -kFacing)
       continue;
-    add_toe_limit(tread, {upright.point_m, upright.direction}, params_.margin.of(upright.sigma_m), kNearestBack_m,
-                  kFarthestBack_m);
+    add_toe_limit(tread, foot_, {upright.point_m, upright.direction}, params_.margin.of(upright.sigma_m),
+                  kNearestBack_m, kFarthestBack_m);
   }
   const Vec2& sole_p_m = sole_.origin_m();
   const double along_m = tread.along_m(sole_p_m);
@@ -221,7 +222,7 @@ void FootholdSearch::erode_row(std::int32_t row) noexcept {
 // Sole origin behind the nosing for a foot between two lateral positions: as much to spare at the heel as at the toe,
 // but not deep into a long tread.
 double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, double right_m) const noexcept {
-  const double heel_m = -kContactRectangle.heel_x_m;
+  const double heel_m = -foot_.contact.heel_x_m;
   const double margin_m = tread.nosing_margin_m;
   double spare_m = 2.0 * (params_.heel_inset_m - margin_m);  // where nothing is mapped behind
   if (!tread.toe.empty()) {
@@ -235,7 +236,7 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
   }
   // A tread that ends in nothing ends all the same: the next riser may be there and not be seen.
   if (tread.far_end_m) {
-    const double room_m = *tread.far_end_m - heel_m - kCollisionRectangle.toe_x_m;
+    const double room_m = *tread.far_end_m - heel_m - foot_.collision.toe_x_m;
     spare_m = std::min(spare_m, room_m - margin_m - tread.back_margin_m);
   }
   return heel_m + math::clamp(margin_m + 0.5 * spare_m, 0.0, params_.heel_inset_max_m);

@@ -55,7 +55,8 @@ double LevelSurface::spare_m(const Vec2& p_m) const noexcept {
   return std::min(least_m(edges, of), least_m(toe, of));
 }
 
-bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& margin, LevelSurface& out) noexcept {
+bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& margin, const SoleModel& sole,
+             LevelSurface& out) noexcept {
   const SurfacePatch& surface = polygon.surface;
   out = {};
   out.id = polygon.id;
@@ -95,17 +96,18 @@ bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& m
     double margin_m = margin.least_m;  // the sides keep one of their own
     if (facing > kCos30 && surface.nosing.valid) margin_m = out.nosing_margin_m;
     if (facing < -kCos30 && surface.back.valid) margin_m = out.back_margin_m;
-    (void)out.edges.try_push_back({inside, reach_m(kContactRectangle, out.heading, inside.inward), margin_m,
+    (void)out.edges.try_push_back({inside, reach_m(sole.contact, out.heading, inside.inward), margin_m,
                                    std::abs(inside.inward.dot(out.left)) > kSide});
   }
   if (out.has_nosing && surface.back.valid) {
     const std::optional<Line2> back = line_through(surface.back.a_m.head<2>(), surface.back.b_m.head<2>());
-    if (back) add_toe_limit(out, *back, out.back_margin_m, 0.0, std::numeric_limits<double>::infinity());
+    if (back) add_toe_limit(out, sole, *back, out.back_margin_m, 0.0, std::numeric_limits<double>::infinity());
   }
   return true;
 }
 
-void add_toe_limit(LevelSurface& surface, const Line2& line, double margin_m, double min_m, double max_m) noexcept {
+void add_toe_limit(LevelSurface& surface, const SoleModel& sole, const Line2& line, double margin_m, double min_m,
+                   double max_m) noexcept {
   const auto& [point_m, direction] = line;
   const double across = direction.dot(surface.left);
   if (std::abs(across) < kCos30) return;
@@ -115,7 +117,7 @@ void add_toe_limit(LevelSurface& surface, const Line2& line, double margin_m, do
   if (!(depth_m > min_m) || !(depth_m < max_m)) return;
   const Vec2 inward = -left_of(direction) * (left_of(direction).dot(surface.heading) > 0.0 ? 1.0 : -1.0);
   const FootLimit limit{
-      {inward, inward.dot(point_m)}, reach_m(kCollisionRectangle, surface.heading, inward), margin_m, false};
+      {inward, inward.dot(point_m)}, reach_m(sole.collision, surface.heading, inward), margin_m, false};
   if (!surface.toe.try_push_back(limit)) {  // keep the nearest
     FootLimit* farthest = surface.toe.begin();
     const Vec2 middle = surface.nosing_middle_m();

@@ -46,9 +46,10 @@ Transform fuse_pose(const Transform& world_T_base, const Transform& lio_world_T_
           (1.0 - gain) * world_T_base.p_m + gain * lio_world_T_base.p_m};          // eq. (6)
 }
 
-void LioFusion::reset(const Params& params) noexcept {
+void LioFusion::reset(const Params& params, const Transform& base_T_lidar) noexcept {
   *this = LioFusion{};
   params_ = params;
+  base_T_lidar_ = base_T_lidar;
   uncertainty_.reset(params.uncertainty);
   position_noise_m_.reset(params.unstated_position_m);
   rotation_noise_rad_.reset(params.unstated_rotation_rad);
@@ -74,7 +75,7 @@ LioVerdict LioFusion::check(const LioSample& sample, std::int64_t now_ns) const 
 LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base) noexcept {
   last_stamp_ns_ = sample.stamp_ns;
   const Transform lidar{so3_renormalised(sample.lio_T_lidar.R), sample.lio_T_lidar.p_m};
-  const Transform lio_T_base = base_from_lidar(lidar, params_.base_T_lidar);
+  const Transform lio_T_base = base_from_lidar(lidar, base_T_lidar_);
   const LioSigmas sigmas = sigmas_of(sample);
   if (count_ == 0) {
     world_T_lio_ = tied_level(odom_T_base, lio_T_base);
@@ -167,7 +168,7 @@ LioFusion::LioSigmas LioFusion::sigmas_of(const LioSample& sample) const noexcep
   const double rotation_rad = stated_or(sample.rotation_sigma_rad.maxCoeff(), rotation_noise_rad_.sigma());
   const bool stated = sample.position_sigma_m.maxCoeff() > 0.0;  // of the lidar; what is measured is the base's
   const double lidar_m = stated_or(sample.position_sigma_m.maxCoeff(), position_noise_m_.sigma());
-  const double lever_m = stated ? params_.base_T_lidar.p_m.norm() * rotation_rad : 0.0;
+  const double lever_m = stated ? base_T_lidar_.p_m.norm() * rotation_rad : 0.0;
   return {math::sqrt(math::square(lidar_m) + math::square(lever_m)), rotation_rad};
 }
 

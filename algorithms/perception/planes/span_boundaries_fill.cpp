@@ -32,8 +32,8 @@ SpanBoundaries::Rows SpanBoundaries::fitting(const Line& line, std::int32_t colu
   return rows;
 }
 
-void SpanBoundaries::weigh_claim(std::int32_t column, const Line& line, const ColumnSpan& candidate, std::int32_t& most,
-                                 ColumnSpan& claimed) const noexcept {
+void SpanBoundaries::weigh_candidate(std::int32_t column, const Line& line, const ColumnSpan& candidate,
+                                     std::int32_t& most, ColumnSpan& filled) const noexcept {
   // A bit for each row that fits, from the first of the candidate's on.
   constexpr std::int32_t kBits = 64;
   std::array<std::uint64_t, kDepthHeight_px / kBits + 2> fits{};
@@ -71,9 +71,9 @@ void SpanBoundaries::weigh_claim(std::int32_t column, const Line& line, const Co
     }
     if (rows <= most) continue;
     most = rows;
-    claimed.top = static_cast<std::int16_t>(candidate.top + top);
-    claimed.bottom = static_cast<std::int16_t>(candidate.top + at - 1);
-    claimed.plane = candidate.plane;
+    filled.top = static_cast<std::int16_t>(candidate.top + top);
+    filled.bottom = static_cast<std::int16_t>(candidate.top + at - 1);
+    filled.plane = candidate.plane;
   }
 }
 
@@ -114,7 +114,7 @@ float SpanBoundaries::own_variance(std::uint8_t plane, std::int32_t column, std:
 }
 
 void SpanBoundaries::consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
-                              const Depths& depths, std::int32_t& most, ColumnSpan& claimed) const noexcept {
+                              const Depths& depths, std::int32_t& most, ColumnSpan& filled) const noexcept {
   if (!gap.may_be(plane) || bottom - top < most || !depths.any()) return;
   Line line = line_of(plane, gap.column);
   if (!reaches(line, top, bottom, depths)) return;
@@ -123,11 +123,11 @@ void SpanBoundaries::consider(const Gap& gap, std::uint8_t plane, std::int32_t t
   candidate.plane = plane;
   candidate.top = static_cast<std::int16_t>(top);
   candidate.bottom = static_cast<std::int16_t>(bottom);
-  weigh_claim(gap.column, line, candidate, most, claimed);
+  weigh_candidate(gap.column, line, candidate, most, filled);
 }
 
 void SpanBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
-                              ColumnSpan& claimed) const noexcept {
+                              ColumnSpan& filled) const noexcept {
   const bool deep = gap.until - gap.from >= 2 * kRemainderReach_px;
   const std::int32_t upper_end = deep ? gap.from + kRemainderReach_px - 1 : gap.until;
   const std::int32_t lower_start = gap.until - kRemainderReach_px + 1;
@@ -135,13 +135,13 @@ void SpanBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size
   const Depths lower = deep ? depths_of(gap.column, lower_start, gap.until) : upper;
   for (std::size_t p = first_plane; p <= last_plane; ++p) {
     const auto plane = static_cast<std::uint8_t>(p);
-    consider(gap, plane, gap.from, upper_end, upper, most, claimed);
-    if (deep) consider(gap, plane, lower_start, gap.until, lower, most, claimed);
+    consider(gap, plane, gap.from, upper_end, upper, most, filled);
+    if (deep) consider(gap, plane, lower_start, gap.until, lower, most, filled);
   }
 }
 
 void SpanBoundaries::consider_beside(const Gap& gap, const Column& others, std::size_t& next, std::int32_t& most,
-                                     ColumnSpan& claimed) const noexcept {
+                                     ColumnSpan& filled) const noexcept {
   constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
   while (next < others.size() && others[next].bottom + kReach_px < gap.from) ++next;
   for (std::size_t i = next; i < others.size() && others[i].top - kReach_px <= gap.until; ++i) {
@@ -149,12 +149,12 @@ void SpanBoundaries::consider_beside(const Gap& gap, const Column& others, std::
     const std::int32_t top = std::max(gap.from, other.top - kReach_px);
     const std::int32_t bottom = std::min(gap.until, other.bottom + kReach_px);
     if (!gap.may_be(other.plane) || bottom - top < most) continue;
-    consider(gap, other.plane, top, bottom, depths_of(gap.column, top, bottom), most, claimed);
+    consider(gap, other.plane, top, bottom, depths_of(gap.column, top, bottom), most, filled);
   }
 }
 
-void SpanBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t first_plane,
-                           std::size_t last_plane) noexcept {
+void SpanBoundaries::fill_gaps(std::int32_t column, std::int32_t beside, std::size_t first_plane,
+                               std::size_t last_plane) noexcept {
   constexpr std::int32_t kMinRows = 2;  // that fit
   Column& spans = columns_[static_cast<std::size_t>(column)];
   const bool any_beside = beside >= 0 && beside < rays_->columns;
@@ -172,12 +172,12 @@ void SpanBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t
       return;
     }
     std::int32_t most = kMinRows - 1;
-    ColumnSpan claimed;
-    if (any_beside) consider_beside(gap, others, next_beside, most, claimed);
-    if (first_plane <= last_plane) consider(gap, first_plane, last_plane, most, claimed);
-    if (most < kMinRows || !spans.try_push_back(claimed)) continue;
+    ColumnSpan filled;
+    if (any_beside) consider_beside(gap, others, next_beside, most, filled);
+    if (first_plane <= last_plane) consider(gap, first_plane, last_plane, most, filled);
+    if (most < kMinRows || !spans.try_push_back(filled)) continue;
     std::rotate(spans.begin() + static_cast<std::ptrdiff_t>(k), spans.end() - 1, spans.end());
-    from = claimed.bottom + 1;
+    from = filled.bottom + 1;
   }
 }
 

@@ -119,12 +119,12 @@ double outer_edge(std::int32_t g, bool right) noexcept { return kColumn_px * g +
 }  // namespace
 
 void SideLines::begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw, const FrameImage& image,
-                      const PlaneSet& planes) noexcept {
+                      const Regions& regions) noexcept {
   params_ = params;
   noise_ = noise;
   raw_ = &raw;
   image_ = &image;
-  planes_ = &planes;
+  regions_ = &regions;
   pitch_ = 1.0 / raw.intrinsics.fx_px;
 }
 
@@ -141,12 +141,12 @@ struct SideLines::Views {
   std::size_t count = 0;
 };
 
-std::size_t SideLines::plane_beyond(std::size_t index, std::int32_t out, const RowView& view) const noexcept {
-  std::size_t beyond = 0;
+RegionId SideLines::plane_beyond(RegionId id, std::int32_t out, const RowView& view) const noexcept {
+  RegionId beyond = kNoRegion;
   for (std::int32_t g = view.column + out; g != view.column + 3 * out; g += out) {
     if (g < 0 || g >= image_->column_rays.columns) break;
-    const std::size_t p = image_->owner(g, view.row);
-    if (p != 0 && p != index) beyond = p;
+    const RegionId p = regions_->labels.at(g, view.row);
+    if (p != kNoRegion && p != id) beyond = p;
   }
   return beyond;
 }
@@ -175,7 +175,7 @@ void SideLines::copy_pixels(bool right, std::int32_t count, RowView& view) const
   cv::v_store(view.raw.data() + Eight::nlanes, right ? b : reversed(a));
 }
 
-void SideLines::look(std::size_t index, bool right, RowView& view) const noexcept {
+void SideLines::look(RegionId id, bool right, RowView& view) const noexcept {
   const CameraIntrinsics& k = raw_->intrinsics;
   const std::int32_t out = right ? 1 : -1;
   const std::int32_t border = kColumn_px * view.column + (right ? kColumn_px - 1 : 0);  // the outermost column's last
@@ -188,11 +188,11 @@ void SideLines::look(std::size_t index, bool right, RowView& view) const noexcep
   if (view.first < 0 || view.first >= k.width_px) return;
   const RowRays rays{-k.cx_px * pitch_, pitch_,
                      static_cast<double>(image_->column_rays.y[static_cast<std::size_t>(view.row)])};
-  view.own.set((*planes_)[index].plane, noise_, rays, border);
+  view.own.set((*regions_)[id].plane, noise_, rays, border);
   if (!view.own.valid) return;
-  const std::size_t beyond = plane_beyond(index, out, view);
+  const RegionId beyond = plane_beyond(id, out, view);
   view.other.valid = false;
-  if (beyond != 0) view.other.set((*planes_)[beyond].plane, noise_, rays, border);
+  if (beyond != kNoRegion) view.other.set((*regions_)[beyond].plane, noise_, rays, border);
   const std::int32_t count = count_free(right, view);
   copy_pixels(right, count, view);
   view.ending = count < kInside_px ? Ending::kHidden : Ending::kSeen;  // by the robot's own body
@@ -262,22 +262,23 @@ bool SideLines::try_line(const InversePlane& plane, Line& line) const noexcept {
   return is_upright(plane, line);
 }
 
-void SideLines::find_ends(std::size_t index, const ColumnExtents& profile) noexcept {
+void SideLines::find_ends(RegionId id) noexcept {
+  const ColumnExtents& profile = regions_->extents[id];
   using Bytes = cv::v_uint8;
   static_assert(kDepthHeight_px % Bytes::nlanes == 0);
   const std::int32_t from = profile.first_row / Bytes::nlanes * Bytes::nlanes;
   std::uint8_t *left = left_.data() + kPad, *right = right_.data() + kPad;
   std::fill(left + from, left + profile.last_row + 1, kNoColumn);
   std::fill(right + from, right + profile.last_row + 1, kNoColumn);
-  const Bytes wanted = cv::vx_setall_u8(static_cast<std::uint8_t>(index));
+  const Bytes wanted = cv::vx_setall_u8(id);
   for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
     if (ends.empty()) continue;
-    const std::uint8_t* owners = image_->owners.row(g);
+    const RegionId* labels = regions_->labels.column(g);
     const Bytes here = cv::vx_setall_u8(static_cast<std::uint8_t>(g));
     for (std::int32_t r = ends.top / Bytes::nlanes * Bytes::nlanes; r <= ends.bottom; r += Bytes::nlanes) {
       // From left to right, and no column is more than none.
-      const Bytes own = cv::vx_load(owners + r) == wanted;
+      const Bytes own = cv::vx_load(labels + r) == wanted;
       cv::v_store(left + r, cv::v_min(cv::vx_load(left + r), here | ~own));
       cv::v_store(right + r, cv::v_select(own, here, cv::vx_load(right + r)));
     }
@@ -373,13 +374,14 @@ double SideLines::count_outside(const Line& line, const ColumnExtents& profile, 
   return count_px;
 }
 
-OutlineSide SideLines::find(std::size_t index, const ColumnExtents& profile, bool right) noexcept {
-  const FramePlane& plane = (*planes_)[index];
+OutlineSide SideLines::find(RegionId id, bool right) noexcept {
+  const Region& plane = (*regions_)[id];
+  const ColumnExtents& profile = regions_->extents[id];
   const std::uint8_t* ends = ends_of(right);
   // Rows are asked for, then looked at, then decided on: each step takes its time, and none waits for another row's.
   Views views;
   choose_rows(upright_rows(profile, ends), plane.kind == SurfaceKind::kTread ? kMaxRows : kOtherRows, ends, views);
-  for (std::size_t i = 0; i < views.count; ++i) look(index, right, views.of[i]);
+  for (std::size_t i = 0; i < views.count; ++i) look(id, right, views.of[i]);
   double outermost = find_row_ends(views, right);
   if (!(outermost > kNowhere)) {  // no row but flat ones
     for (std::int32_t r = profile.first_row; r <= profile.last_row; ++r) {
@@ -392,7 +394,7 @@ OutlineSide SideLines::find(std::size_t index, const ColumnExtents& profile, boo
   Line line;
   double first_row = 0.0, last_row = 0.0;
   if (!try_line(plane.plane, line) || !holds(line, first_row, last_row)) return side;
-  if (count_outside(line, profile, right) > params_.max_cut * plane.piece_px) return side;
+  if (count_outside(line, profile, right) > params_.max_cut * plane.area_px) return side;
   side.fitted = true;
   side.column_px = 0.5 * (line.at + 0.5 * line.slope - 0.5);
   side.slope = line.slope;

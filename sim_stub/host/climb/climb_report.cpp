@@ -10,6 +10,7 @@
 
 #include "algorithms/robot/body_shapes.hpp"
 #include "sim_stub/host/climb/surface_match.hpp"
+#include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -179,7 +180,7 @@ void ClimbReport::observe_balance(const Truth& truth, const Telemetry& telemetry
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const std::size_t j = n % kJointsPerLeg;
     const auto i = static_cast<Eigen::Index>(n);
-    const JointLimits& limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), j);
+    const JointLimits& limits = nominal_robot().drives.limits[n];
     keep_max(torque_peak_ratio_[j], std::abs(truth.drive_tau_nm[i]) / limits.torque_nm);
     keep_max(joint_speed_peak_ratio_[j], std::abs(truth.drive_dq_radps[i]) / limits.speed_radps);
   }
@@ -194,7 +195,7 @@ void ClimbReport::observe_balance(const Truth& truth, const Telemetry& telemetry
 double ClimbReport::flight_clearance_m(const Flight& flight, int to_step, double at_most_m) const {
   const std::array excluded{flight.from_step, to_step};
   for (const Transform& true_T_sole : flight.true_T_sole) {
-    at_most_m = clearance_m(collision_box(true_T_sole), solids_, excluded, at_most_m);
+    at_most_m = clearance_m(collision_box(nominal_robot().sole, true_T_sole), solids_, excluded, at_most_m);
   }
   return at_most_m;
 }
@@ -217,7 +218,8 @@ void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
       flights_[foot].reset();
     }
     last_step_[foot] = step;
-    clearance_min_m_ = clearance_m(collision_box(true_T_sole), solids_, std::array{step}, clearance_min_m_);
+    clearance_min_m_ =
+        clearance_m(collision_box(nominal_robot().sole, true_T_sole), solids_, std::array{step}, clearance_min_m_);
     if (step < 0) continue;
     const double margin_m = sole_margin_m(true_T_sole, world_, step);
     keep_min(sole_margin_min_m_, margin_m);
@@ -232,7 +234,7 @@ void ClimbReport::observe_stance(const Truth& truth) {
   if (world_.steps.empty() || first_lift_off_ns_ >= 0) return;
   double toe_x_m = -std::numeric_limits<double>::infinity();
   for (const Transform& true_T_sole : truth.true_T_sole) {
-    const OrientedBox box = collision_box(true_T_sole);
+    const OrientedBox box = collision_box(nominal_robot().sole, true_T_sole);
     toe_x_m = std::max(toe_x_m, box.centre.p_m.x() + box.centre.R.row(0).cwiseAbs().dot(box.half_m));
   }
   stand_off_m_ = world_.steps.front().nosing_x_m - toe_x_m;
@@ -287,6 +289,7 @@ double ClimbReport::clearance_min_m() const {
 ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   ClimbSummary s;
   s.options = run.options;
+  s.params_hash = run.params_hash;
   s.camera = run.camera;
   s.fell = fell_;
   s.steps_total = static_cast<int>(world_.steps.size());

@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/robot/model.hpp"
 #include "firmware/telemetry.hpp"
 #include "sim_stub/host/climb/climb_summary.hpp"
 #include "sim_stub/host/climb/climb_svg.hpp"
 #include "sim_stub/host/climb/climb_verdict.hpp"
 #include "sim_stub/host/climb/odometry_report.hpp"
+#include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
 #include "sim_stub/world/truth.hpp"
@@ -25,6 +25,7 @@ namespace polygmap::sim {
 // What the run knows beside truth and telemetry.
 struct RunFigures {
   ClimbOptions options;
+  std::string params_hash;  // of what the module was given
   CameraFigures camera;
   std::uint64_t heap_calls = 0;
   std::vector<std::pair<std::string, std::uint32_t>> faults;  // raised faults and limits by name
@@ -36,7 +37,7 @@ struct RunFigures {
 
 class ClimbReport {
  public:
-  explicit ClimbReport(StairWorld world, const Transform& true_base_T_camera = base_T_camera());
+  explicit ClimbReport(StairWorld world, const Transform& true_base_T_camera = nominal_robot().mounts.base_T_camera);
 
   // Once per tick, after the module's tick, with the truth of the same instant.
   void observe(const Truth& truth, const Telemetry& telemetry);

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -27,10 +27,8 @@ Json spread_mm(const Spread& s) { return {{"median", mm(s.median)}, {"max", mm(s
 Json spread_ms(const Spread& s) { return {{"median", ms(s.median)}, {"max", ms(s.max)}}; }
 
 Json per_joint(const std::array<double, kJointsPerLeg>& ratio) {
-  constexpr std::array<const char*, kJointsPerLeg> kNames{"hip_roll", "hip_yaw",     "hip_pitch",
-                                                          "knee",     "ankle_pitch", "ankle_roll"};
   Json j = Json::object();
-  for (std::size_t i = 0; i < kJointsPerLeg; ++i) j[kNames[i]] = rounded(ratio[i], 1e3);
+  for (std::size_t i = 0; i < kJointsPerLeg; ++i) j[std::string(kLegJointNames[i])] = rounded(ratio[i], 1e3);
   return j;
 }
 
@@ -79,6 +77,7 @@ Json arguments_json(const ClimbOptions& o) {
           {"scan_ms", o.scan_ms},
           {"mount_error_deg", o.mount_error_deg},
           {"scale_error", o.scale_error},
+          {"params", o.params_file.empty() ? Json(nullptr) : Json(o.params_file)},
           {"estimate_mount", o.estimate_mount},
           {"self_filter", o.self_filter},
           {"contacts", o.infer_contacts ? "inferred" : "sensed"},
@@ -115,6 +114,7 @@ Json to_json(const ClimbSummary& s) {
   j["gait"] = name_of(s.options.gait);
   j["seed"] = s.options.seed;
   j["arguments"] = arguments_json(s.options);
+  j["params_hash"] = s.params_hash;
   const CameraFigures& camera = s.camera;
   const auto degrees = [](double x) { return rounded(x, 1e3); };
   j["camera"] = {

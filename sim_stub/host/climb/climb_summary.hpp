@@ -87,6 +87,7 @@ struct ClimbSummary {
   std::string ended_by;              // "module": by itself; "fall"; "time limit"
   double ended_at_s = kNotMeasured;  // simulation's clock
   ClimbOptions options;
+  std::string params_hash;  // of what the module was given
   CameraFigures camera;
   int steps_total = 0;
   int steps_climbed = 0;  // both true soles rested on it or above, inside their treads' edges
@@ -113,7 +114,7 @@ struct ClimbSummary {
   // sole that stands alone.
   double com_tracking_max_m = kNotMeasured;
   double zmp_margin_min_m = kNotMeasured;
-  // Greatest of both legs, over the drives' limits (robot/model.hpp).
+  // Greatest of both legs, over the drives' limits.
   std::array<double, kJointsPerLeg> torque_peak_ratio{}, joint_speed_peak_ratio{};
   OdometryFigures odometry;
   Spread exposure_to_map_ms;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <complex>
 
-#include "algorithms/robot/model.hpp"
+#include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/plant/plant.hpp"
 
 namespace polygmap::sim {
@@ -107,7 +107,7 @@ void OdometryReport::observe_lio(const LioSample& sample) {
   const std::optional<Transform> true_T_base = true_T_base_at(sample.stamp_ns);
   if (!true_T_base) return;
   // Through the nominal mount to the base: all three errors are about the same point.
-  const Transform lio_T_base = sample.lio_T_lidar * base_T_lidar().inverse();
+  const Transform lio_T_base = sample.lio_T_lidar * nominal_robot().mounts.base_T_lidar.inverse();
   if (!true_T_lio_) true_T_lio_ = aligned_worlds(*true_T_base, lio_T_base);
   held_lio_m_ = *true_T_lio_ * lio_T_base.p_m;
   lio_.add(*held_lio_m_ - true_T_base->p_m);

@@ -7,6 +7,7 @@
 
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/geometry/so3.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
 
@@ -25,7 +26,7 @@ class EstimatorLioTest : public ::testing::Test {
  protected:
   void SetUp() override { start(); }
   void start() {
-    estimator_.reset({});
+    estimator_.reset({}, nominal_robot());
     t_ns_ = 0;
     aligned_ = false;
     worst_m_ = most_slewed_m_ = most_slewed_rad_ = 0.0;

@@ -8,6 +8,7 @@
 
 #include "sim_stub/host/climb/climb_report.hpp"
 #include "sim_stub/host/climb/surface_match.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/scripted_climb.hpp"
 
 namespace polygmap::sim {
