@@ -58,8 +58,8 @@ void Segmenter::reduce_row() noexcept {
   outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
   constexpr std::int32_t kBlock = ScanlineSegmentation::kBlock;
   if (row_ % kBlock == kBlock - 1 || row_ == last) {
-    static_assert(kBlock % ColumnImage::kTurn == 0);
-    image_.columns.turn(row_ - row_ % kBlock, row_);
+    static_assert(kBlock % ColumnImage::kTransposeRows == 0);
+    image_.columns.transpose(row_ - row_ % kBlock, row_);
     segmentation_.add_rows(row_ - row_ % kBlock, row_);
   }
 }

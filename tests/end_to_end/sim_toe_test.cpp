@@ -42,7 +42,7 @@ Looked before_the_stairs(std::uint64_t seed, bool estimate_mount = true) {
   }
   const CameraExtrinsicsEstimator& mount = pipeline->perception().mount();
   const double off_m = robot.errors().base_T_camera.p_m.x() - base_T_camera().p_m.x();
-  return {mount.ahead_m() - off_m, off_m, mount.counters().toes};
+  return {mount.x_m() - off_m, off_m, mount.counters().toes};
 }
 
 TEST(SimToe, CameraMillimetresAheadOrBehind_IsFoundBeforeTheFirstStep) {

@@ -43,7 +43,7 @@ struct ColumnScene {
         image->valid(g, r) = z > 0.0 ? std::uint8_t{kColumn_px} : std::uint8_t{0};
       }
     }
-    image->turn(0, kDepthHeight_px - 1);
+    image->transpose(0, kDepthHeight_px - 1);
   }
 };
 

@@ -25,9 +25,35 @@ double CameraExtrinsicsEstimator::tilt_sigma_rad() const noexcept {
   return math::sqrt(math::square(left * params_.prior_tilt_sigma_rad) + math::square(1.0 - left) * alike_rad2);
 }
 
-bool CameraExtrinsicsEstimator::usable(const SurfacePatch& patch) const noexcept {
+bool CameraExtrinsicsEstimator::usable(const SurfacePatch& patch) noexcept {
   return is_unit(patch.normal) && std::isfinite(patch.d_m) && math::all_finite(patch.centroid_m) &&
          patch.tilt_sigma_rad >= 0.0;
+}
+
+bool CameraExtrinsicsEstimator::says_level(const SurfacePatch& patch) const noexcept {
+  return patch.kind == SurfaceKind::kTread && !(patch.tilt_sigma_rad > params_.max_tilt_sigma_rad);
+}
+
+bool CameraExtrinsicsEstimator::near_level(const SurfacePatch& patch, const Vec3& up) const noexcept {
+  return (base_T_camera_.R * patch.normal).dot(up) > math::cos(params_.tilt_gate_rad);
+}
+
+// Level is what the standing soles lie on: treads are parallel to it, and a foot is put down by the same kinematics.
+// Gravity as the estimator has it errs by more than twice as much, and alike in everything but the camera.
+CameraExtrinsicsEstimator::Level CameraExtrinsicsEstimator::level_of(const Stance& stance) const noexcept {
+  Level level{stance.base_up, {}};
+  std::array<Vec3, kFootCount> up;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    up[foot] = stance.base_T_sole[foot].R.col(2);
+    level.flat[foot] = stance.stands[foot] && up[foot].dot(stance.base_up) > math::cos(params_.max_sole_tilt_rad);
+  }
+  // What their encoders are off against each other was taken off before, so that one alone says what both do.
+  if (level.flat[0] && level.flat[1]) {
+    level.up = (up[0] + up[1]).normalized();
+  } else if (level.by_soles()) {
+    level.up = level.flat[0] ? up[0] : up[1];
+  }
+  return level;
 }
 
 void CameraExtrinsicsEstimator::update(const SurfaceFrame& frame, const Stance& stance) noexcept {
@@ -40,40 +66,26 @@ void CameraExtrinsicsEstimator::update(const SurfaceFrame& frame, const Stance& 
   }
   const double dt_s = last_ns_ == 0 ? 0.0 : std::min(seconds(frame.stamp_ns - last_ns_), kLongestStep_s);
   last_ns_ = frame.stamp_ns;
-  learn_ahead(stance, dt_s);
+  learn_x(stance, dt_s);
+  const Level level = level_of(stance);
+  if (try_learn_tilt(frame, level, dt_s)) learn_height(frame, stance, level, dt_s);
+  place(level.up);
+}
 
-  // Level is what the standing soles lie on: treads are parallel to it, and a foot is put down by the same kinematics.
-  // Gravity as the estimator has it errs by more than twice as much, and alike in everything but the camera.
-  std::array<Vec3, kFootCount> up;
-  std::array<bool, kFootCount> flat{};
-  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-    up[foot] = stance.base_T_sole[foot].R.col(2);
-    flat[foot] = stance.stands[foot] && up[foot].dot(stance.base_up) > math::cos(params_.max_sole_tilt_rad);
-  }
-  // What their encoders are off against each other was taken off before, so that one alone says what both do.
-  Vec3 level = stance.base_up;
-  if (flat[0] && flat[1]) {
-    level = (up[0] + up[1]).normalized();
-  } else if (flat[0] || flat[1]) {
-    level = flat[0] ? up[0] : up[1];
-  }
-
+bool CameraExtrinsicsEstimator::try_learn_tilt(const SurfaceFrame& frame, const Level& level, double dt_s) noexcept {
   Vec2 sum = Vec2::Zero();
   double weights = 0.0;
-  const auto near_level = [&](const SurfacePatch& patch) {
-    return (base_T_camera_.R * patch.normal).dot(level) > math::cos(params_.tilt_gate_rad);
-  };
   for (const SurfacePatch& patch : frame.surfaces) {
-    if (patch.kind != SurfaceKind::kTread || patch.tilt_sigma_rad > params_.max_tilt_sigma_rad) continue;
-    if (!usable(patch) || !near_level(patch)) {
+    if (!says_level(patch)) continue;
+    if (!usable(patch) || !near_level(patch, level.up)) {
       ++counters_.rejected_surfaces;
       continue;
     }
     const double weight = 1.0 / (math::square(patch.tilt_sigma_rad) + math::square(params_.systematic_tilt_rad));
-    sum += weight * (nominal_.R * patch.normal).cross(level).head<2>();
+    sum += weight * (nominal_.R * patch.normal).cross(level.up).head<2>();
     weights += weight;
   }
-  if (!(weights > 0.0)) return place(level);
+  if (!(weights > 0.0)) return false;
   ++counters_.frames;
   // A surface errs in every frame alike: on the stairs many frames of narrow treads, 4 mrad off, must not outvote the
   // few of the floor, 1 mrad off, neither by their number nor by age. So what sees level worse than what is known has
@@ -84,63 +96,67 @@ void CameraExtrinsicsEstimator::update(const SurfaceFrame& frame, const Stance& 
                                     information, params_.prior_tilt_sigma_rad);
   const double share = information / tilt_.information;
   seen_as_well_ += share * (weights - seen_as_well_);
-  by_gravity_ += share * ((flat[0] || flat[1] ? 0.0 : 1.0) - by_gravity_);
+  by_gravity_ += share * ((level.by_soles() ? 0.0 : 1.0) - by_gravity_);
   for (int i = 0; i < 2; ++i) {
     tilt_rad_[i] = math::clamp(tilt_variance * tilt_.weighted[i], -params_.max_tilt_rad, params_.max_tilt_rad);
   }
   base_T_camera_.R = rotation_y(tilt_rad_.y()) * rotation_x(tilt_rad_.x()) * nominal_.R;
+  return true;
+}
 
-  // How far each standing sole lies above the largest surface that can be what it stands on.
-  double above_m = 0.0;
+bool CameraExtrinsicsEstimator::try_height(const SurfaceFrame& frame, const Vec3& camera_p_sole, const Vec3& up,
+                                           double& height_m) const noexcept {
+  double largest_m2 = 0.0;
+  for (const SurfacePatch& patch : frame.surfaces) {
+    if (!says_level(patch) || !usable(patch) || !near_level(patch, up) || !(patch.area_m2 > largest_m2)) continue;
+    const double above_m = patch.normal.dot(camera_p_sole) + patch.d_m;
+    if (std::abs(above_m - height_m_) > params_.height_gate_m) continue;
+    largest_m2 = patch.area_m2;
+    height_m = above_m;
+  }
+  return largest_m2 > 0.0;
+}
+
+void CameraExtrinsicsEstimator::learn_height(const SurfaceFrame& frame, const Stance& stance, const Level& level,
+                                             double dt_s) noexcept {
+  double sum_m = 0.0;
   int soles = 0;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-    if (!flat[foot]) continue;
+    if (!level.flat[foot]) continue;
     const Vec3 camera_p_sole = base_T_camera_.R.transpose() * (stance.base_T_sole[foot].p_m - nominal_.p_m);
-    double largest_m2 = 0.0, best_m = 0.0;
-    for (const SurfacePatch& patch : frame.surfaces) {
-      if (patch.kind != SurfaceKind::kTread || patch.tilt_sigma_rad > params_.max_tilt_sigma_rad || !usable(patch) ||
-          !near_level(patch) || !(patch.area_m2 > largest_m2)) {
-        continue;
-      }
-      const double height_m = patch.normal.dot(camera_p_sole) + patch.d_m;
-      if (std::abs(height_m - height_m_) > params_.height_gate_m) continue;
-      largest_m2 = patch.area_m2;
-      best_m = height_m;
-    }
-    if (!(largest_m2 > 0.0)) continue;
-    above_m += best_m;
+    double height_m = 0.0;
+    if (!try_height(frame, camera_p_sole, level.up, height_m)) continue;
+    sum_m += height_m;
     ++soles;
   }
-  if (soles > 0) {
-    ++counters_.heights;
-    const double variance = fuse(height_, above_m / soles, math::exp(-dt_s / params_.window_s),
-                                 1.0 / math::square(params_.frame_height_sigma_m), params_.prior_height_sigma_m);
-    height_m_ = math::clamp(variance * height_.weighted, -params_.max_height_m, params_.max_height_m);
-  }
-  place(level);
+  if (soles == 0) return;
+  ++counters_.heights;
+  const double variance = fuse(height_, sum_m / soles, math::exp(-dt_s / params_.window_s),
+                               1.0 / math::square(params_.frame_height_sigma_m), params_.prior_height_sigma_m);
+  height_m_ = math::clamp(variance * height_.weighted, -params_.max_height_m, params_.max_height_m);
 }
 
 void CameraExtrinsicsEstimator::place(const Vec3& base_level) noexcept {
   const Vec3 ahead = (Vec3::UnitX() - base_level.x() * base_level).normalized();
-  base_T_camera_.p_m = nominal_.p_m + height_m_ * base_level + ahead_m_ * ahead;
+  base_T_camera_.p_m = nominal_.p_m + height_m_ * base_level + x_m_ * ahead;
 }
 
-void CameraExtrinsicsEstimator::learn_ahead(const Stance& stance, double dt_s) noexcept {
+void CameraExtrinsicsEstimator::learn_x(const Stance& stance, double dt_s) noexcept {
   double sum_m = 0.0, information = 0.0;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     const std::optional<ToeSighting>& toe = stance.toes[foot];
     if (!stance.stands[foot] || !toe || !std::isfinite(toe->ahead_m) || !std::isfinite(toe->sigma_m)) continue;
-    // The toe is in the last rows of a picture: a base that moves alike in many frames shows it off alike in all.
-    const double variance_m2 = math::square(params_.frame_ahead_sigma_m) + math::square(toe->sigma_m) +
+    // The toe is in the last rows of a image: a base that moves alike in many frames shows it off alike in all.
+    const double variance_m2 = math::square(params_.frame_x_sigma_m) + math::square(toe->sigma_m) +
                                kFramesAlike * math::square(params_.half_scan_s * stance.speed_mps);
     sum_m += toe->ahead_m / variance_m2;
     information += 1.0 / variance_m2;
   }
   if (!(information > 0.0)) return;
   ++counters_.toes;
-  const double variance_m2 = fuse(ahead_, ahead_m_ - sum_m / information, math::exp(-dt_s / params_.window_s),
-                                  information, params_.prior_ahead_sigma_m);
-  ahead_m_ = math::clamp(variance_m2 * ahead_.weighted, -params_.max_ahead_m, params_.max_ahead_m);
+  const double variance_m2 =
+      fuse(x_, x_m_ - sum_m / information, math::exp(-dt_s / params_.window_s), information, params_.prior_x_sigma_m);
+  x_m_ = math::clamp(variance_m2 * x_.weighted, -params_.max_x_m, params_.max_x_m);
 }
 
 }  // namespace polygmap

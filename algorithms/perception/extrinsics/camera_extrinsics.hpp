@@ -20,11 +20,11 @@ class CameraExtrinsicsEstimator {
   struct Params {
     double prior_tilt_sigma_rad = 0.0175;
     double prior_height_sigma_m = 0.005;
-    double prior_ahead_sigma_m = 0.003;
+    double prior_x_sigma_m = 0.003;
     // Of one frame. Far more than the pixels' noise: frames err alike, and one frame must not decide.
     double frame_tilt_sigma_rad = 0.03;
     double frame_height_sigma_m = 0.010;
-    double frame_ahead_sigma_m = 0.003;
+    double frame_x_sigma_m = 0.003;
     // What all frames err by alike, which no number of them takes away: soles are as level as their encoders have it (2
     // mrad a joint), gravity as the IMU's mount and bias. With what the surfaces err by, in 24 climbs, from 1 to 10 s
     // after the first frame, 2.5 mrad with white noise and 3.0 with correlated, roll and pitch together.
@@ -34,7 +34,7 @@ class CameraExtrinsicsEstimator {
     double window_s = 6.0;
     double max_tilt_rad = 2.0 * kPi / 180.0;  // bounds of the estimate
     double max_height_m = 0.008;
-    double max_ahead_m = 0.010;
+    double max_x_m = 0.010;
     double half_scan_s = 0.008;
     double tilt_gate_rad = 3.0 * kPi / 180.0;  // from level, as the mount is believed: more is a ramp
     double height_gate_m = 0.020;
@@ -48,11 +48,11 @@ class CameraExtrinsicsEstimator {
       field("prior_tilt_sigma_rad", p.prior_tilt_sigma_rad, 1e-5, 0.2,
             "Roll and pitch of the mount, by the data sheet.");
       field("prior_height_sigma_m", p.prior_height_sigma_m, 1e-5, 0.1, "Height of the mount, by the data sheet.");
-      field("prior_ahead_sigma_m", p.prior_ahead_sigma_m, 1e-5, 0.1,
+      field("prior_x_sigma_m", p.prior_x_sigma_m, 1e-5, 0.1,
             "The mount's place ahead by the data sheet, and where encoders and leg lengths have a foot.");
       field("frame_tilt_sigma_rad", p.frame_tilt_sigma_rad, 1e-4, 1.0, "Tilt that one frame sees.");
       field("frame_height_sigma_m", p.frame_height_sigma_m, 1e-4, 1.0, "Height that one frame sees.");
-      field("frame_ahead_sigma_m", p.frame_ahead_sigma_m, 1e-4, 1.0, "Place ahead that one frame sees.");
+      field("frame_x_sigma_m", p.frame_x_sigma_m, 1e-4, 1.0, "Place ahead that one frame sees.");
       field("soles_tilt_sigma_rad", p.soles_tilt_sigma_rad, 1e-5, 0.1,
             "Tilt of the soles by their encoders, in all frames alike.");
       field("gravity_tilt_sigma_rad", p.gravity_tilt_sigma_rad, 1e-5, 0.1,
@@ -62,7 +62,7 @@ class CameraExtrinsicsEstimator {
             "does not count.");
       field("max_tilt_rad", p.max_tilt_rad, 0.0, 0.2, "Roll and pitch are believed up to this.");
       field("max_height_m", p.max_height_m, 0.0, 0.1, "Height is believed up to this far from the data sheet's.");
-      field("max_ahead_m", p.max_ahead_m, 0.0, 0.1, "Place ahead is believed up to this far from the data sheet's.");
+      field("max_x_m", p.max_x_m, 0.0, 0.1, "Place ahead is believed up to this far from the data sheet's.");
       field("half_scan_s", p.half_scan_s, 0.0, 0.1,
             "A row of the picture is older or newer than its stamp by up to this.");
       field("tilt_gate_rad", p.tilt_gate_rad, 0.001, 0.5,
@@ -105,7 +105,7 @@ class CameraExtrinsicsEstimator {
   [[nodiscard]] double pitch_rad() const noexcept { return tilt_rad_.y(); }
   [[nodiscard]] double height_m() const noexcept { return height_m_; }
   // Along the ground. What legs and encoders are off goes into it: a foot put down by them meets what the camera saw.
-  [[nodiscard]] double ahead_m() const noexcept { return ahead_m_; }
+  [[nodiscard]] double x_m() const noexcept { return x_m_; }
   // One sigma of roll and pitch: what of the data sheet's error is left, and what frames err by alike: the surfaces
   // that were seen, and what told which way is up.
   [[nodiscard]] double tilt_sigma_rad() const noexcept;
@@ -126,8 +126,23 @@ class CameraExtrinsicsEstimator {
     mean.weighted = fade * mean.weighted + information * value;
     return 1.0 / (mean.information + 1.0 / math::square(prior_sigma));
   }
-  [[nodiscard]] bool usable(const SurfacePatch& patch) const noexcept;
-  void learn_ahead(const Stance& stance, double dt_s) noexcept;
+  // Level as that frame had it, by standing soles or, flat being none, by gravity.
+  struct Level {
+    Vec3 up;
+    std::array<bool, kFootCount> flat{};
+    [[nodiscard]] bool by_soles() const noexcept { return flat[0] || flat[1]; }
+  };
+  [[nodiscard]] Level level_of(const Stance& stance) const noexcept;
+  [[nodiscard]] static bool usable(const SurfacePatch& patch) noexcept;
+  [[nodiscard]] bool says_level(const SurfacePatch& patch) const noexcept;
+  [[nodiscard]] bool near_level(const SurfacePatch& patch, const Vec3& up) const noexcept;
+  // False when no surface says anything.
+  [[nodiscard]] bool try_learn_tilt(const SurfaceFrame& frame, const Level& level, double dt_s) noexcept;
+  void learn_height(const SurfaceFrame& frame, const Stance& stance, const Level& level, double dt_s) noexcept;
+  // How far a sole lies above the largest surface that can be what it stands on; false when there is none.
+  [[nodiscard]] bool try_height(const SurfaceFrame& frame, const Vec3& camera_p_sole, const Vec3& up,
+                                double& height_m) const noexcept;
+  void learn_x(const Stance& stance, double dt_s) noexcept;
   void place(const Vec3& base_level) noexcept;
 
   Params params_;
@@ -135,10 +150,10 @@ class CameraExtrinsicsEstimator {
   Transform base_T_camera_;
   Vec2 tilt_rad_ = Vec2::Zero();
   double height_m_ = 0.0;
-  double ahead_m_ = 0.0;
+  double x_m_ = 0.0;
   FadingMean<Vec2> tilt_{0.0, Vec2::Zero()};
   FadingMean<double> height_{0.0, 0.0};
-  FadingMean<double> ahead_{0.0, 0.0};
+  FadingMean<double> x_{0.0, 0.0};
   double seen_as_well_ = 0.0;  // 1/rad^2, of level by its surfaces: mean of the frames that the tilt is made of
   double by_gravity_ = 0.0;    // share of that information whose level was gravity's
   std::int64_t last_ns_ = 0;

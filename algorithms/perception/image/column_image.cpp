@@ -11,7 +11,7 @@ namespace {
 
 using Raw = cv::v_uint16;
 using Words = cv::v_uint32;
-using Wide = cv::v_float32;
+using simd::all, simd::Wide;
 static_assert(kColumns % Raw::nlanes == 0 && kColumn_px == 8);
 
 constexpr std::int32_t kMostBody = kColumn_px / 4;  // half-resolution pixels: a column of more body is not seen
@@ -49,7 +49,7 @@ Words sum_columns(const Words& a, const Words& b, const Words& c, const Words& d
   static_assert(kColumn_px == 2 * 4);
   Words first, second, third, fourth;
   cv::v_transpose4x4(a, b, c, d, first, second, third, fourth);  // each half by itself
-  return halves_in_turn((first + second) + (third + fourth));
+  return simd::halves_in_turn((first + second) + (third + fourth));
 }
 
 Wide to_float(const Words& x) noexcept { return cv::v_cvt_f32(cv::v_reinterpret_as_s32(x)); }
@@ -67,7 +67,7 @@ void reduce_registers(const RawRange& raw_range, const RawPixels& pixels, const 
   const std::uint16_t *raw = pixels.now, *later_raw = pixels.later;
   const Words none = cv::vx_setzero_u32(), any = raw_range.min <= raw_range.max ? none == none : none;
   const cv::v_uint8 is_body = cv::vx_setall_u8(kPixelBody);
-  const Wide per_metre = cv::vx_setall_f32(raw_range.per_metre), least = cv::vx_setall_f32(1.0F);
+  const Wide per_metre = all(raw_range.per_metre), least = all(1.0F);
   const auto half = [&](Words& count) {
     Words seen = any;
     if constexpr (kBody) {
@@ -101,21 +101,21 @@ void reduce_registers(const RawRange& raw_range, const RawPixels& pixels, const 
 
 }  // namespace
 
-void ColumnImage::turn(std::int32_t first_row, std::int32_t last_row) noexcept {
+void ColumnImage::transpose(std::int32_t first_row, std::int32_t last_row) noexcept {
   using Four = cv::v_float32x4;
-  static_assert(kColumns % Four::nlanes == 0 && kTurn == Four::nlanes);
+  static_assert(kColumns % Four::nlanes == 0 && kTransposeRows == Four::nlanes);
   std::int32_t r = first_row;
-  for (; r + kTurn - 1 <= last_row; r += kTurn) {
+  for (; r + kTransposeRows - 1 <= last_row; r += kTransposeRows) {
     for (std::int32_t g = 0; g < kColumns; g += Four::nlanes) {
       Four a, b, c, d;
       cv::v_transpose4x4(cv::v_load(inverse_depth.row(r) + g), cv::v_load(inverse_depth.row(r + 1) + g),
                          cv::v_load(inverse_depth.row(r + 2) + g), cv::v_load(inverse_depth.row(r + 3) + g), a, b, c,
                          d);
-      cv::v_store(down.row(g) + r, a), cv::v_store(down.row(g + 1) + r, b);
-      cv::v_store(down.row(g + 2) + r, c), cv::v_store(down.row(g + 3) + r, d);
+      cv::v_store(by_column.row(g) + r, a), cv::v_store(by_column.row(g + 1) + r, b);
+      cv::v_store(by_column.row(g + 2) + r, c), cv::v_store(by_column.row(g + 3) + r, d);
     }
     using Bytes = cv::v_uint8x16;
-    static_assert(kColumns % Bytes::nlanes == 0 && kTurn == sizeof(std::uint32_t));
+    static_assert(kColumns % Bytes::nlanes == 0 && kTransposeRows == sizeof(std::uint32_t));
     for (std::int32_t g = 0; g < kColumns; g += Bytes::nlanes) {
       const auto row = [&](std::int32_t i) { return cv::v_load(valid.row(r + i) + g); };
       std::array<Bytes, 2> low, high;
@@ -128,15 +128,16 @@ void ColumnImage::turn(std::int32_t first_row, std::int32_t last_row) noexcept {
         std::array<std::uint32_t, 4> four;
         cv::v_store(four.data(), cv::v_reinterpret_as_u32(fours[static_cast<std::size_t>(i)]));
         for (std::int32_t k = 0; k < 4; ++k) {
-          std::memcpy(valid_down.row(g + 4 * i + k) + r, &four[static_cast<std::size_t>(k)], sizeof(std::uint32_t));
+          std::memcpy(valid_by_column.row(g + 4 * i + k) + r, &four[static_cast<std::size_t>(k)],
+                      sizeof(std::uint32_t));
         }
       }
     }
   }
   for (; r <= last_row; ++r) {
     for (std::int32_t g = 0; g < kColumns; ++g) {
-      down(r, g) = inverse_depth(g, r);
-      valid_down(r, g) = valid(g, r);
+      by_column(r, g) = inverse_depth(g, r);
+      valid_by_column(r, g) = valid(g, r);
     }
   }
 }

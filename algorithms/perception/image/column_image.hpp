@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The picture as columns of eight pixels' width, at full resolution downwards: the inverse of the valid depths' mean.
+// The image as columns of eight pixels' width, at full resolution downwards: the inverse of the valid depths' mean.
 // Stairs change from row to row and hardly within eight pixels of a row, over which depth errors are correlated: four
 // pixels find the same edges in 1.6 times the time. (The mean of the inverses, linear on a plane, takes twice the work;
 // the two differ by the square of the depths' relative spread.)
@@ -19,14 +19,14 @@ inline constexpr std::int32_t kColumns = kDepthWidth_px / kColumn_px;
 struct ColumnImage {
   Raster<float, kColumns, kDepthHeight_px> inverse_depth;  // 1/m, 0 = nothing measured, or the robot's own body
   Raster<std::uint8_t, kColumns, kDepthHeight_px> valid;   // of the column's eight pixels
-  Raster<float, kDepthHeight_px, kColumns> down;           // inverse_depth again, a column a line: see turn
-  Raster<std::uint8_t, kDepthHeight_px, kColumns> valid_down;
-  // Copies some rows, first a multiple of kTurn, into down and valid_down.
-  static constexpr std::int32_t kTurn = 4;  // rows that are best copied together
-  void turn(std::int32_t first_row, std::int32_t last_row) noexcept;
+  Raster<float, kDepthHeight_px, kColumns> by_column;      // inverse_depth again, a column a line: see transpose
+  Raster<std::uint8_t, kDepthHeight_px, kColumns> valid_by_column;
+  // Copies some rows, first a multiple of kTransposeRows, into by_column and valid_by_column.
+  static constexpr std::int32_t kTransposeRows = 4;  // rows that are best copied together
+  void transpose(std::int32_t first_row, std::int32_t last_row) noexcept;
 };
 
-// Rays through the columns' middles and through rows of the full picture.
+// Rays through the columns' middles and through rows of the full image.
 struct ColumnRays {
   std::array<float, kColumns> x{};
   std::array<float, kDepthHeight_px> y{};
@@ -52,8 +52,8 @@ struct ReducedRow {
 };
 // One row of raw depth to one row of columns. body: half-resolution flags of that row, or null;
 // what it covers does not count, and a column that it covers by more than half is empty. Works in whole vector
-// registers: body and the outputs are as long as the rasters' rows, and columns beyond the picture's come out empty.
-// later_raw: a row that will be read soon, or null. The driver's picture is in no near cache, and what the processor
+// registers: body and the outputs are as long as the rasters' rows, and columns beyond the image's come out empty.
+// later_raw: a row that will be read soon, or null. The driver's image is in no near cache, and what the processor
 // fetches by itself ends with every page of memory.
 ReducedRow reduce_to_columns(const RawRange& range, const std::uint16_t* raw, const std::uint8_t* body,
                              std::int32_t columns, float* inverse_depth, std::uint8_t* valid,

@@ -4,6 +4,26 @@
 
 namespace polygmap {
 
+// Standard deviation of an inverse depth w, 1/m: sigma_z w^2, a polynomial of w. T: a number, or a vector of them.
+template <typename T>
+struct InverseSigma {
+  T base, per_metre, quadratic;
+  [[nodiscard]] T operator()(const T& w) const noexcept { return (base * w + per_metre) * w + quadratic; }
+  // At least the same over w, of every w from farthest to nearest.
+  [[nodiscard]] T most_relative(const T& farthest, const T& nearest) const noexcept {
+    return base * nearest + per_metre + quadratic / farthest;
+  }
+};
+
+// The mean of n pixels next to each other in a row has shared + own / n of a pixel's variance.
+template <typename T>
+struct MeanShare {
+  T shared, own;
+  [[nodiscard]] T times(const T& n) const noexcept {
+    return shared * n + own;
+  }  // n times that: 0 pixels divide nothing
+};
+
 // A camera's depth noise. Standard deviation along the optical axis: (base + per_metre z + quadratic z^2) /
 // cos(incidence); the last term is that of stereo, whose disparities are equally uncertain at any range.
 struct DepthNoiseModel {
@@ -19,8 +39,18 @@ struct DepthNoiseModel {
     return {factor * base_m, factor * per_metre, factor * quadratic_per_m, correlated_share, correlated_px};
   }
   [[nodiscard]] double sigma_m(double z_m) const noexcept { return base_m + z_m * (per_metre + quadratic_per_m * z_m); }
-  // Of the inverse depth w = 1 / z: sigma_z w^2, 1/m.
-  [[nodiscard]] double inverse_sigma(double w) const noexcept { return (base_m * w + per_metre) * w + quadratic_per_m; }
+  [[nodiscard]] double inverse_sigma(double w) const noexcept {
+    return InverseSigma<double>{base_m, per_metre, quadratic_per_m}(w);
+  }
+  [[nodiscard]] double mean_share(double n) const noexcept { return correlated_share + (1.0 - correlated_share) / n; }
+  // For kernels.
+  [[nodiscard]] InverseSigma<float> inverse_sigma_f() const noexcept {
+    return {static_cast<float>(base_m), static_cast<float>(per_metre), static_cast<float>(quadratic_per_m)};
+  }
+  [[nodiscard]] MeanShare<float> mean_share_f() const noexcept {
+    const auto shared = static_cast<float>(correlated_share);
+    return {shared, 1.0F - shared};
+  }
 
   static void visit(auto& p, auto& field) {
     field("base_m", p.base_m, 1e-6, 0.05, "Noise of a depth at no distance.");

@@ -2,6 +2,9 @@
 #include "algorithms/perception/image/self_filter.hpp"
 
 #include <algorithm>
+#include <limits>
+
+#include "algorithms/perception/image/simd.hpp"
 
 namespace polygmap {
 namespace {
@@ -9,6 +12,7 @@ namespace {
 // A capsule is drawn as this many spheres: 20 mm apart on a 0.35 m shank the scallops are under 1 mm deep.
 constexpr int kSpheresPerCapsule = 18;
 constexpr double kNear_m = 0.02;
+constexpr double kOutside_px = 1.0;  // a shape that ends farther from the image covers none of its pixels
 
 }  // namespace
 
@@ -27,38 +31,58 @@ BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& le
 }
 
 void SelfFilter::clear() noexcept {
-  for (Outline& outline : outlines_) outline.fill(Interval{});
+  for (auto& intervals : intervals_) intervals.fill(Interval{});
 }
 
 void SelfFilter::extend(Outline& outline, std::int32_t row, std::int32_t width_px, double first, double last) noexcept {
-  if (!(last >= -1.0) || !(first <= width_px)) return;
-  // Half a pixel outwards: a pixel is body when any part of it may be.
-  const auto a = static_cast<std::int16_t>(math::clamp(std::floor(first), 0.0, width_px - 1.0));
-  const auto b = static_cast<std::int16_t>(math::clamp(std::ceil(last), 0.0, width_px - 1.0));
-  Interval& interval = outline[static_cast<std::size_t>(row)];
-  if (interval.last < interval.first) {
-    interval = {a, b};
-  } else {
-    interval = {std::min(interval.first, a), std::max(interval.last, b)};
-  }
+  if (!(last >= -kOutside_px) || !(first <= width_px - 1 + kOutside_px)) return;
+  const auto r = static_cast<std::size_t>(row);
+  outline.first_px[r] = std::min(outline.first_px[r], first);
+  outline.last_px[r] = std::max(outline.last_px[r], last);
 }
 
-// The cone around a sphere, cut row by row: (ray . c)^2 >= |ray|^2 (|c|^2 - r^2) is quadratic in the ray's x.
+// The rows whose plane of rays may meet the cone around a sphere: where its discriminant, over g a quadratic in the
+// ray's y, is not negative. A row to each side is added for what rounding does.
+SelfFilter::Rows SelfFilter::rows_of(const HalfRays& rays, const Vec3& c, double a) noexcept {
+  const Rows all{0, rays.height_px - 1};
+  const double square = math::square(c.y()) + a, half = c.y() * c.z(), constant = math::square(c.z()) + a;
+  if (!(square < -1e-9)) return all;  // up to the image's end, at least to one side
+  const double discriminant = math::square(half) - square * constant;
+  if (!(discriminant >= 0.0)) return {0, -1};
+  const double root = math::sqrt(discriminant), top = (-half + root) / square, bottom = (-half - root) / square;
+  const auto row_of = [&](double y) { return math::clamp(y * rays.fy_px + rays.cy_px, -2.0, rays.height_px + 1.0); };
+  return {std::max(static_cast<std::int32_t>(std::floor(row_of(top))) - 1, all.first),
+          std::min(static_cast<std::int32_t>(std::ceil(row_of(bottom))) + 1, all.last)};
+}
+
+// The cone around a sphere, cut row by row: (ray . c)^2 >= |ray|^2 (|c|^2 - r^2) is quadratic in the ray's x. Several
+// rows at once: most of what the filter costs is here.
 void SelfFilter::add_sphere(Outline& outline, const HalfRays& rays, const Vec3& c, double radius_m) noexcept {
+  using Wide = cv::v_float64;
+  static_assert(kHalfHeight_px % Wide::nlanes == 0);
   const double g = c.squaredNorm() - math::square(radius_m);
   if (!(g > 1e-6)) return;  // the camera is inside the grown shape: nothing can be said
   const double a = math::square(c.x()) - g;
-  if (!(a < -1e-9)) return;  // beside the camera, at 90 degrees: out of any picture
-  for (std::int32_t row = 0; row < rays.height_px; ++row) {
-    const double y = static_cast<double>(rays.y[static_cast<std::size_t>(row)]);
-    const double k = y * c.y() + c.z();
-    const double discriminant = math::square(c.x() * k) - a * (k * k - (y * y + 1.0) * g);
-    if (!(discriminant >= 0.0)) continue;
-    const double root = math::sqrt(discriminant);
-    const double x0 = (-c.x() * k + root) / a, x1 = (-c.x() * k - root) / a;
-    if (!(0.5 * (x0 + x1) * c.x() + k > 0.0)) continue;  // behind the camera
-    extend(outline, row, rays.width_px, std::min(x0, x1) * rays.fx_px + rays.cx_px,
-           std::max(x0, x1) * rays.fx_px + rays.cx_px);
+  if (!(a < -1e-9)) return;  // beside the camera, at 90 degrees: out of any image
+  const auto all = [](double x) { return cv::vx_setall_f64(x); };
+  const Wide cx = all(c.x()), cy = all(c.y()), cz = all(c.z()), wide_a = all(a), wide_g = all(g);
+  const Wide zero = all(0.0), half = all(0.5), one = all(1.0), fx = all(rays.fx_px), centre = all(rays.cx_px);
+  const Wide least = all(-kOutside_px), most = all(rays.width_px - 1 + kOutside_px);
+  const Rows rows = rows_of(rays, c, a);
+  for (std::int32_t row = rows.first / Wide::nlanes * Wide::nlanes; row <= rows.last; row += Wide::nlanes) {
+    const auto at = static_cast<std::size_t>(row);
+    const Wide y = cv::v_cvt_f64(cv::vx_load_low(&rays.y[at]));
+    const Wide k = y * cy + cz, cx_k = cx * k;
+    const Wide discriminant = cx_k * cx_k - wide_a * (k * k - (y * y + one) * wide_g);
+    const Wide root = cv::v_sqrt(cv::v_max(discriminant, zero));
+    const Wide x0 = (root - cx_k) / wide_a, x1 = (zero - cx_k - root) / wide_a;
+    const Wide first = cv::v_min(x0, x1) * fx + centre, last = cv::v_max(x0, x1) * fx + centre;
+    // Met at all, before the camera and in the image.
+    const Wide seen = (discriminant >= zero) & (half * (x0 + x1) * cx + k > zero) & (last >= least) & (first <= most);
+    double *firsts = &outline.first_px[at], *lasts = &outline.last_px[at];
+    const Wide first0 = cv::vx_load(firsts), last0 = cv::vx_load(lasts);
+    cv::v_store(firsts, cv::v_select(seen, cv::v_min(first0, first), first0));
+    cv::v_store(lasts, cv::v_select(seen, cv::v_max(last0, last), last0));
   }
 }
 
@@ -91,35 +115,52 @@ void SelfFilter::add_shape(const HalfRays& rays, const std::array<LegShapes, kFo
                            const BodyMargin& margin, std::size_t slot) noexcept {
   if (slot >= kShapes) return;
   const LegShapes& leg = body[slot / 3];
-  Outline& outline = outlines_[slot];
-  if (slot % 3 != 2) {
-    const Capsule& capsule = slot % 3 == 0 ? leg.thigh : leg.shank;
-    if (!(capsule.radius_m > 0.0)) return;
-    for (int i = 0; i < kSpheresPerCapsule; ++i) {
-      const double along = static_cast<double>(i) / (kSpheresPerCapsule - 1);
-      const Vec3 centre_m = capsule.a_m + along * (capsule.b_m - capsule.a_m);
-      add_sphere(outline, rays, centre_m, capsule.radius_m + margin.at(centre_m.norm()));
-    }
-    return;
+  outline_.first_px.fill(std::numeric_limits<double>::infinity());
+  outline_.last_px.fill(-std::numeric_limits<double>::infinity());
+  if (slot % 3 == 2) {
+    add_foot(rays, leg.foot, margin);
+  } else {
+    add_capsule(rays, slot % 3 == 0 ? leg.thigh : leg.shank, margin);
   }
-  if (!(leg.foot.half_m.minCoeff() > 0.0)) return;
+  // Outwards to whole pixels: a pixel is body when any part of it may be.
+  for (std::size_t row = 0; row < static_cast<std::size_t>(rays.height_px); ++row) {
+    const double first = outline_.first_px[row], last = outline_.last_px[row];
+    if (!(first <= last)) continue;
+    const auto whole = [&](double column) {
+      return static_cast<std::int16_t>(math::clamp(column, 0.0, rays.width_px - 1.0));
+    };
+    intervals_[slot][row] = {whole(std::floor(first)), whole(std::ceil(last))};
+  }
+}
+
+void SelfFilter::add_capsule(const HalfRays& rays, const Capsule& capsule, const BodyMargin& margin) noexcept {
+  if (!(capsule.radius_m > 0.0)) return;
+  for (int i = 0; i < kSpheresPerCapsule; ++i) {
+    const double along = static_cast<double>(i) / (kSpheresPerCapsule - 1);
+    const Vec3 centre_m = capsule.a_m + along * (capsule.b_m - capsule.a_m);
+    add_sphere(outline_, rays, centre_m, capsule.radius_m + margin.at(centre_m.norm()));
+  }
+}
+
+void SelfFilter::add_foot(const HalfRays& rays, const OrientedBox& foot, const BodyMargin& margin) noexcept {
+  if (!(foot.half_m.minCoeff() > 0.0)) return;
   std::array<Vec3, 8> corners;
-  const double farthest_m = leg.foot.centre.p_m.norm() + leg.foot.half_m.norm();
-  const Vec3 half = leg.foot.half_m + Vec3::Constant(margin.at(farthest_m));
+  const double farthest_m = foot.centre.p_m.norm() + foot.half_m.norm();
+  const Vec3 half = foot.half_m + Vec3::Constant(margin.at(farthest_m));
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Vec3 sign{(i & 1U) != 0 ? 1.0 : -1.0, (i & 2U) != 0 ? 1.0 : -1.0, (i & 4U) != 0 ? 1.0 : -1.0};
-    corners[i] = leg.foot.centre * half.cwiseProduct(sign);
+    corners[i] = foot.centre * half.cwiseProduct(sign);
   }
   // All pairs: the outline of a convex shape needs no hull when every chord is drawn.
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    for (std::size_t j = i + 1; j < corners.size(); ++j) add_segment(outline, rays, corners[i], corners[j]);
+    for (std::size_t j = i + 1; j < corners.size(); ++j) add_segment(outline_, rays, corners[i], corners[j]);
   }
 }
 
 bool SelfFilter::try_mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept {
   bool any = false;
-  for (const Outline& outline : outlines_) {
-    const Interval interval = outline[static_cast<std::size_t>(row)];
+  for (const auto& intervals : intervals_) {
+    const Interval interval = intervals[static_cast<std::size_t>(row)];
     const std::int32_t last = std::min<std::int32_t>(interval.last, width_px - 1);
     if (interval.first > last) continue;
     if (!any) std::fill(flags, flags + width_px, std::uint8_t{0});

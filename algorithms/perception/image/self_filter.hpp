@@ -31,7 +31,7 @@ struct BodyUncertainty {
 [[nodiscard]] BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& legs,
                                      double turn_rad) noexcept;
 
-// The picture of convex shapes, each grown by a margin: one column interval per row and shape. A pixel whose ray meets
+// The image of convex shapes, each grown by a margin: one column interval per row and shape. A pixel whose ray meets
 // a grown shape is body whatever depth it measured, so that flying pixels around a leg go with it.
 class SelfFilter {
  public:
@@ -49,13 +49,23 @@ class SelfFilter {
     std::int16_t first = 1;
     std::int16_t last = 0;  // inclusive; empty when before first
   };
-  using Outline = std::array<Interval, kHalfHeight_px>;
+  struct Outline {  // of one shape, by row, real columns; none where first is beyond last
+    std::array<double, kHalfHeight_px> first_px, last_px;
+  };
+  struct Rows {
+    std::int32_t first, last;
+  };
 
+  [[nodiscard]] static Rows rows_of(const HalfRays& rays, const Vec3& centre_m, double a) noexcept;
   static void extend(Outline& outline, std::int32_t row, std::int32_t width_px, double first, double last) noexcept;
   static void add_sphere(Outline& outline, const HalfRays& rays, const Vec3& centre_m, double radius_m) noexcept;
   static void add_segment(Outline& outline, const HalfRays& rays, const Vec3& a_m, const Vec3& b_m) noexcept;
 
-  std::array<Outline, kShapes> outlines_{};
+  void add_capsule(const HalfRays& rays, const Capsule& capsule, const BodyMargin& margin) noexcept;
+  void add_foot(const HalfRays& rays, const OrientedBox& foot, const BodyMargin& margin) noexcept;
+
+  Outline outline_{};
+  std::array<std::array<Interval, kHalfHeight_px>, kShapes> intervals_{};
 };
 
 }  // namespace polygmap

@@ -41,6 +41,17 @@ struct PlaneMoments {
     xw += o.xw, yw += o.yw, w1 += o.w1;
     count += o.count;
   }
+  // These of samples in a frame of their own, at y and w: of the same ones at y0 + pitch y, and w + plane . (x, y, 1).
+  [[nodiscard]] PlaneMoments moved(double y0, double pitch, const Vec3& plane) const noexcept {
+    PlaneMoments to;
+    to.xx = xx, to.xy = y0 * x1 + pitch * xy, to.x1 = x1, to.one = one, to.y1 = y0 * one + pitch * y1;
+    to.yy = y0 * to.y1 + pitch * (y0 * y1 + pitch * yy);
+    to.w1 = w1 + plane.x() * x1 + plane.z() * one + plane.y() * y1;
+    to.xw = xw + plane.x() * xx + plane.z() * x1 + plane.y() * xy;
+    to.yw = y0 * to.w1 + pitch * (yw + plane.x() * xy + plane.z() * y1 + plane.y() * yy);
+    to.count = count;
+    return to;
+  }
   [[nodiscard]] Mat3 matrix() const noexcept { return (Mat3() << xx, xy, x1, xy, yy, y1, x1, y1, one).finished(); }
   [[nodiscard]] Vec3 vector() const noexcept { return {xw, yw, w1}; }
   [[nodiscard]] Vec3 mean_ray() const noexcept { return {x1 / one, y1 / one, 1.0}; }

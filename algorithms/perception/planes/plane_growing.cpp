@@ -14,111 +14,113 @@ struct Middle {
   double y = 0.0;  // ray
   double w = 0.0;  // 1/m
 };
-Middle middle_of(const ColumnRays& rays, const Run& run) noexcept {
-  const double top = static_cast<double>(rays.y[static_cast<std::size_t>(run.top)]);
-  const double bottom = static_cast<double>(rays.y[static_cast<std::size_t>(run.bottom)]);
+Middle middle_of(const ColumnRays& rays, const ScanlineSegment& segment) noexcept {
+  const double top = static_cast<double>(rays.y[static_cast<std::size_t>(segment.top)]);
+  const double bottom = static_cast<double>(rays.y[static_cast<std::size_t>(segment.bottom)]);
   return {0.5 * (top + bottom),
-          static_cast<double>(run.inverse_depth) + 0.5 * (run.rows() - 1) * static_cast<double>(run.slope)};
+          static_cast<double>(segment.inverse_depth) + 0.5 * (segment.rows() - 1) * static_cast<double>(segment.slope)};
 }
 
 }  // namespace
 
-void PlaneGrowing::Sums::add(double ray_x, const ColumnRays& rays, const Run& run) noexcept {
-  const Middle middle = middle_of(rays, run);
-  const double rows = run.rows(), pixels = rows * kColumn_px;
+void PlaneGrowing::Sums::add(double ray_x, const ColumnRays& rays, const ScanlineSegment& segment) noexcept {
+  const Middle middle = middle_of(rays, segment);
+  const double rows = segment.rows(), pixels = rows * kColumn_px;
   const double pitch = static_cast<double>(rays.y[1] - rays.y[0]);
   const double variance = (rows * rows - 1.0) / 12.0 * pitch * pitch;
-  const double slope = static_cast<double>(run.slope) / pitch;
-  n += pixels;
-  x += pixels * ray_x;
-  y += pixels * middle.y;
-  xx += pixels * ray_x * ray_x;
-  xy += pixels * ray_x * middle.y;
-  yy += pixels * (middle.y * middle.y + variance);
-  w += pixels * middle.w;
-  xw += pixels * ray_x * middle.w;
-  yw += pixels * (middle.y * middle.w + variance * slope);
+  const double slope = static_cast<double>(segment.slope) / pitch;
+  m.one += pixels;
+  m.x1 += pixels * ray_x;
+  m.y1 += pixels * middle.y;
+  m.xx += pixels * ray_x * ray_x;
+  m.xy += pixels * ray_x * middle.y;
+  m.yy += pixels * (middle.y * middle.y + variance);
+  m.w1 += pixels * middle.w;
+  m.xw += pixels * ray_x * middle.w;
+  m.yw += pixels * (middle.y * middle.w + variance * slope);
   ww += pixels * (middle.w * middle.w + variance * slope * slope);
 }
 
-bool PlaneGrowing::Sums::try_solve(Vec3& m) const noexcept {
-  const double mx = x / n, my = y / n, mw = w / n;
-  const double cxx = xx / n - mx * mx, cxy = xy / n - mx * my, cyy = yy / n - my * my;
-  const double cxw = xw / n - mx * mw, cyw = yw / n - my * mw;
+// About the mean, and without a prior: what grows has no covariance yet.
+bool PlaneGrowing::Sums::try_solve(Vec3& plane) const noexcept {
+  const double n = m.one, mx = m.x1 / n, my = m.y1 / n, mw = m.w1 / n;
+  const double cxx = m.xx / n - mx * mx, cxy = m.xy / n - mx * my, cyy = m.yy / n - my * my;
+  const double cxw = m.xw / n - mx * mw, cyw = m.yw / n - my * mw;
   const double determinant = cxx * cyy - cxy * cxy;
   if (!(determinant > 1e-14)) return false;
   const double a = (cxw * cyy - cyw * cxy) / determinant, b = (cyw * cxx - cxw * cxy) / determinant;
   const Vec3 solved{a, b, mw - a * mx - b * my};
   if (!(solved.squaredNorm() > kLeastNorm * kLeastNorm)) return false;
-  m = solved;
+  plane = solved;
   return true;
 }
 
-double PlaneGrowing::Sums::mean_square(const Vec3& m) const noexcept {
-  const double sum = ww - 2.0 * (m.x() * xw + m.y() * yw + m.z() * w) + m.x() * m.x() * xx + m.y() * m.y() * yy +
-                     m.z() * m.z() * n + 2.0 * (m.x() * m.y() * xy + m.x() * m.z() * x + m.y() * m.z() * y);
-  return std::max(sum / n, 0.0);
+double PlaneGrowing::Sums::mean_square(const Vec3& p) const noexcept {
+  const double sum = ww - 2.0 * (p.x() * m.xw + p.y() * m.yw + p.z() * m.w1) + p.x() * p.x() * m.xx +
+                     p.y() * p.y() * m.yy + p.z() * p.z() * m.one +
+                     2.0 * (p.x() * p.y() * m.xy + p.x() * p.z() * m.x1 + p.y() * p.z() * m.y1);
+  return std::max(sum / m.one, 0.0);
 }
 
 void PlaneGrowing::begin(const Params& params, const DepthNoiseModel& noise, const ColumnRays& rays,
-                         ScanlineSegmentation::Columns& runs) noexcept {
+                         ScanlineSegmentation::Columns& segments) noexcept {
   params_ = params;
   noise_ = noise;
   rays_ = &rays;
-  runs_ = &runs;
+  segments_ = &segments;
   count_ = 0;
   overflow_ = 0;
   growing_ = false;
-  next_seed_ = 0;
+  seeds_.next = 0;
   sort_seeds();
   index_rows();
 }
 
-// A column of clutter has dozens of runs, of which a neighbour overlaps one or two. Runs that end above a row are
-// counted, not looked for.
+// A column of clutter has dozens of segments, of which a neighbour overlaps one or two. Segments that end above a row
+// are counted, not looked for.
 void PlaneGrowing::index_rows() noexcept {
-  static_assert(ScanlineSegmentation::kMaxRunsPerColumn <= std::numeric_limits<std::uint8_t>::max());
+  static_assert(ScanlineSegmentation::kMaxSegmentsPerColumn <= std::numeric_limits<std::uint8_t>::max());
   for (std::int32_t g = 0; g < rays_->columns; ++g) {
     auto& first = first_near_[static_cast<std::size_t>(g)];
     first.fill(0);
-    for (const Run& run : (*runs_)[static_cast<std::size_t>(g)]) {
-      ++first[static_cast<std::size_t>(run.bottom / kIndexRows + 1)];
+    for (const ScanlineSegment& segment : (*segments_)[static_cast<std::size_t>(g)]) {
+      ++first[static_cast<std::size_t>(segment.bottom / kIndexRows + 1)];
     }
     for (std::size_t i = 1; i < first.size(); ++i) first[i] = static_cast<std::uint8_t>(first[i] + first[i - 1]);
   }
 }
 
-// By length, longest first; equal lengths in the order of the picture.
+// By length, longest first; equal lengths in the order of the image.
 void PlaneGrowing::sort_seeds() noexcept {
   std::array<std::uint16_t, kDepthHeight_px + 2> start{};
   for (std::int32_t g = 0; g < rays_->columns; ++g) {
-    for (const Run& run : (*runs_)[static_cast<std::size_t>(g)]) {
-      if (run.rows() >= params_.min_rows) ++start[static_cast<std::size_t>(kDepthHeight_px - run.rows() + 1)];
+    for (const ScanlineSegment& segment : (*segments_)[static_cast<std::size_t>(g)]) {
+      if (segment.rows() >= params_.min_rows) ++start[static_cast<std::size_t>(kDepthHeight_px - segment.rows() + 1)];
     }
   }
   for (std::size_t i = 1; i < start.size(); ++i) start[i] = static_cast<std::uint16_t>(start[i] + start[i - 1]);
-  seed_count_ = start.back();
+  seeds_.size = start.back();
   for (std::int32_t g = 0; g < rays_->columns; ++g) {
-    const ScanlineSegmentation::Column& column = (*runs_)[static_cast<std::size_t>(g)];
+    const ScanlineSegmentation::Column& column = (*segments_)[static_cast<std::size_t>(g)];
     for (std::size_t k = 0; k < column.size(); ++k) {
       if (column[k].rows() < params_.min_rows) continue;
-      seeds_[start[static_cast<std::size_t>(kDepthHeight_px - column[k].rows())]++] = {static_cast<std::int16_t>(g),
-                                                                                       static_cast<std::int16_t>(k)};
+      seeds_.places[start[static_cast<std::size_t>(kDepthHeight_px - column[k].rows())]++] = {
+          static_cast<std::int16_t>(g), static_cast<std::int16_t>(k)};
     }
   }
 }
 
-// The run in the next column that shares most rows with this one, at least half of what both cover.
+// The segment in the next column that shares most rows with this one, at least half of what both cover.
 bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noexcept {
   const std::int32_t g = from.column + side;
   if (g < 0 || g >= rays_->columns) return false;
-  const Run& run = at(from);
-  const ScanlineSegmentation::Column& column = (*runs_)[static_cast<std::size_t>(g)];
+  const ScanlineSegment& segment = at(from);
+  const ScanlineSegmentation::Column& column = (*segments_)[static_cast<std::size_t>(g)];
   std::int32_t most = 0;
-  for (std::size_t k = first_near(g, run.top); k < column.size() && column[k].top <= run.bottom; ++k) {
-    const Run& other = column[k];
-    const std::int32_t shared = std::min(run.bottom, other.bottom) - std::max(run.top, other.top) + 1;
-    const std::int32_t covered = std::max(run.bottom, other.bottom) - std::min(run.top, other.top) + 1;
+  for (std::size_t k = first_near(g, segment.top); k < column.size() && column[k].top <= segment.bottom; ++k) {
+    const ScanlineSegment& other = column[k];
+    const std::int32_t shared = std::min(segment.bottom, other.bottom) - std::max(segment.top, other.top) + 1;
+    const std::int32_t covered = std::max(segment.bottom, other.bottom) - std::min(segment.top, other.top) + 1;
     // Clutter has no habits that a branch could learn.
     const int free = static_cast<int>(other.plane == 0) | static_cast<int>(other.plane == kTried);
     if ((free & static_cast<int>(2 * shared > covered) & static_cast<int>(shared > most)) == 0) continue;
@@ -130,7 +132,7 @@ bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noe
 
 bool PlaneGrowing::try_seed(Place place) noexcept {
   if (at(place).plane != 0) return false;
-  // Three runs beside one another: most seeds have no such neighbours.
+  // Three segments beside one another: most seeds have no such neighbours.
   Place left, right;
   if (!try_neighbour(place, -1, left) || !try_neighbour(place, 1, right)) return false;
   Sums sums;
@@ -139,90 +141,90 @@ bool PlaneGrowing::try_seed(Place place) noexcept {
   }
   Vec3 m;
   if (!sums.try_solve(m)) return false;
-  const double w = sums.w / sums.n;
+  const double w = sums.m.w1 / sums.m.one;
   if (sums.mean_square(m) > math::square(tolerance_w(w)) * m.squaredNorm()) return false;
   m_ = m;
   norm2_ = m.squaredNorm();
   sums_ = Sums{};
   // The first fit waits until the plane itself has more than the seed had.
-  next_fit_px_ = kGrowth * sums.n;
-  queue_size_ = queue_next_ = 0;
+  next_fit_px_ = kGrowth * sums.m.one;
+  queue_.size = queue_.next = 0;
   first_column_ = last_column_ = place.column;
   growing_ = true;
   consider(place);
-  if (queue_size_ == 0) growing_ = false;
+  if (queue_.size == 0) growing_ = false;
   return growing_;
 }
 
 void PlaneGrowing::consider(Place place) noexcept {
-  Run& run = at(place);
-  if (run.plane != 0) return;
-  // Mean square distance of the run's line from the plane.
+  ScanlineSegment& segment = at(place);
+  if (segment.plane != 0) return;
+  // Mean square distance of the segment's line from the plane.
   const double ray_x = static_cast<double>(rays_->x[static_cast<std::size_t>(place.column)]);
   const double pitch = static_cast<double>(rays_->y[1] - rays_->y[0]);
-  const Middle middle = middle_of(*rays_, run);
+  const Middle middle = middle_of(*rays_, segment);
   const double offset = middle.w - (m_.x() * ray_x + m_.y() * middle.y + m_.z());
-  const double tilt = static_cast<double>(run.slope) - m_.y() * pitch;
-  const double rows = run.rows();
+  const double tilt = static_cast<double>(segment.slope) - m_.y() * pitch;
+  const double rows = segment.rows();
   const double off2 = offset * offset + tilt * tilt * (rows * rows - 1.0) * (1.0 / 12.0);
   if (!(middle.w > kLeastNorm) || off2 > math::square(tolerance_w(middle.w)) * norm2_) return;
-  run.plane = static_cast<std::uint8_t>(count_ + 1);
-  sums_.add(ray_x, *rays_, run);
-  queue_[queue_size_++] = place;
+  segment.plane = static_cast<std::uint8_t>(count_ + 1);
+  sums_.add(ray_x, *rays_, segment);
+  queue_.places[queue_.size++] = place;
   first_column_ = std::min<std::int32_t>(first_column_, place.column);
   last_column_ = std::max<std::int32_t>(last_column_, place.column);
-  if (sums_.n > next_fit_px_ && sums_.try_solve(m_)) {
+  if (sums_.m.one > next_fit_px_ && sums_.try_solve(m_)) {
     norm2_ = m_.squaredNorm();
-    next_fit_px_ = kGrowth * sums_.n;
+    next_fit_px_ = kGrowth * sums_.m.one;
   }
 }
 
 void PlaneGrowing::visit(Place place) noexcept {
-  const Run run = at(place);
+  const ScanlineSegment segment = at(place);
   for (const std::int32_t side : {-1, 1}) {
     const std::int32_t g = place.column + side;
     if (g < 0 || g >= rays_->columns) continue;
-    const ScanlineSegmentation::Column& column = (*runs_)[static_cast<std::size_t>(g)];
-    for (std::size_t k = first_near(g, run.top); k < column.size() && column[k].top <= run.bottom; ++k) {
-      if (column[k].bottom < run.top) continue;
+    const ScanlineSegmentation::Column& column = (*segments_)[static_cast<std::size_t>(g)];
+    for (std::size_t k = first_near(g, segment.top); k < column.size() && column[k].top <= segment.bottom; ++k) {
+      if (column[k].bottom < segment.top) continue;
       consider({static_cast<std::int16_t>(g), static_cast<std::int16_t>(k)});
     }
   }
-  const auto column_size = static_cast<std::int16_t>((*runs_)[static_cast<std::size_t>(place.column)].size());
+  const auto column_size = static_cast<std::int16_t>((*segments_)[static_cast<std::size_t>(place.column)].size());
   if (place.index > 0) consider({place.column, static_cast<std::int16_t>(place.index - 1)});
   if (place.index + 1 < column_size) consider({place.column, static_cast<std::int16_t>(place.index + 1)});
 }
 
 void PlaneGrowing::close() noexcept {
   growing_ = false;
-  const bool kept = sums_.n >= params_.min_facet_px && last_column_ - first_column_ + 1 >= params_.min_columns &&
-                    count_ < kMaxPlanes && sums_.try_solve(m_) &&
-                    m_.dot(Vec3{sums_.x / sums_.n, sums_.y / sums_.n, 1.0}) > kLeastNorm;
+  const bool kept = sums_.m.one >= params_.min_facet_px && last_column_ - first_column_ + 1 >= params_.min_columns &&
+                    count_ < kMaxPlanes && sums_.try_solve(m_) && m_.dot(sums_.m.mean_ray()) > kLeastNorm;
   if (!kept) {
     overflow_ += count_ == kMaxPlanes ? 1U : 0U;
-    for (std::size_t i = 0; i < queue_size_; ++i) at(queue_[i]).plane = i == 0 ? kTried : std::uint8_t{0};
+    for (std::size_t i = 0; i < queue_.size; ++i) at(queue_.places[i]).plane = i == 0 ? kTried : std::uint8_t{0};
     return;
   }
   GrownPlane& plane = planes_[++count_];
   plane.plane.m = m_;
-  plane.pixels = sums_.n;
-  plane.mean_ray = {sums_.x / sums_.n, sums_.y / sums_.n, 1.0};
+  plane.pixels = sums_.m.one;
+  plane.mean_ray = sums_.m.mean_ray();
 }
 
 bool PlaneGrowing::step() noexcept {
   constexpr int kPiece = 8;
   for (int i = 0; i < kPiece; ++i) {
     if (growing_) {
-      if (queue_next_ < queue_size_) {
-        visit(queue_[queue_next_++]);
+      if (queue_.next < queue_.size) {
+        visit(queue_.places[queue_.next++]);
       } else {
         close();
       }
-    } else if (next_seed_ < seed_count_) {
-      static_cast<void>(try_seed(seeds_[next_seed_++]));
+    } else if (seeds_.next < seeds_.size) {
+      static_cast<void>(try_seed(seeds_.places[seeds_.next++]));
     } else {
-      for (ScanlineSegmentation::Column& column : *runs_) {
-        for (Run& run : column) run.plane = run.plane == kTried ? std::uint8_t{0} : run.plane;
+      for (ScanlineSegmentation::Column& column : *segments_) {
+        for (ScanlineSegment& segment : column)
+          segment.plane = segment.plane == kTried ? std::uint8_t{0} : segment.plane;
       }
       return true;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gathers straight runs of neighbouring columns into planes: longest runs first, breadth first, each plane refitted as
-// it grows. Resumable.
+// Gathers straight segments of neighbouring columns into planes: longest segments first, breadth first, each plane
+// refitted as it grows. Resumable.
 #pragma once
 
 #include <array>
@@ -28,12 +28,13 @@ class PlaneGrowing {
     std::int32_t min_facet_px = 400;
 
     static void visit(auto& p, auto& field) {
-      field("join_sigmas", p.join_sigmas, 0.1, 20.0,
-            "A run belongs to a plane when its line is no more than join_floor_m and as many sigmas of the depth off "
-            "it.");
+      field(
+          "join_sigmas", p.join_sigmas, 0.1, 20.0,
+          "A segment belongs to a plane when its line is no more than join_floor_m and as many sigmas of the depth off "
+          "it.");
       field("join_floor_m", p.join_floor_m, 0.0, 0.1,
-            "Slow depth errors, which a run may be off a plane besides join_sigmas.");
-      field("min_rows", p.min_rows, 2, 100, "A run that starts a plane has as many rows.");
+            "Slow depth errors, which a segment may be off a plane besides join_sigmas.");
+      field("min_rows", p.min_rows, 2, 100, "A segment that starts a plane has as many rows.");
       field("min_columns", p.min_columns, 1, 40, "A plane has as many columns.");
       field("min_plane_px", p.min_plane_px, 1, 100000,
             "A plane that is to be one by itself has as many pixels of full resolution.");
@@ -44,8 +45,8 @@ class PlaneGrowing {
   static constexpr std::size_t kMaxPlanes = 96;
 
   void begin(const Params& params, const DepthNoiseModel& noise, const ColumnRays& rays,
-             ScanlineSegmentation::Columns& runs) noexcept;
-  // A bounded piece of work; true when all is done. Then every run knows its plane, 1-based.
+             ScanlineSegmentation::Columns& segments) noexcept;
+  // A bounded piece of work; true when all is done. Then every segment knows its plane, 1-based.
   [[nodiscard]] bool step() noexcept;
 
   [[nodiscard]] std::size_t count() const noexcept { return count_; }
@@ -53,27 +54,34 @@ class PlaneGrowing {
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
 
  private:
-  static constexpr std::size_t kQueue = static_cast<std::size_t>(kColumns) * ScanlineSegmentation::kMaxRunsPerColumn;
-  static constexpr std::uint8_t kTried = 255;  // a run that grew into nothing
+  static constexpr std::size_t kQueue =
+      static_cast<std::size_t>(kColumns) * ScanlineSegmentation::kMaxSegmentsPerColumn;
+  static constexpr std::uint8_t kTried = 255;  // a segment that grew into nothing
 
   struct Place {
     std::int16_t column = 0;
     std::int16_t index = 0;
   };
-  // Sums over pixels in the coordinates of rays; enough for a fit.
+  struct Queue {
+    std::array<Place, kQueue> places{};
+    std::size_t size = 0;
+    std::size_t next = 0;
+  };
+  // Over the pixels of segments.
   struct Sums {
-    double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, w = 0, xw = 0, yw = 0, ww = 0;
-    void add(double ray_x, const ColumnRays& rays, const Run& run) noexcept;
-    [[nodiscard]] bool try_solve(Vec3& m) const noexcept;
-    [[nodiscard]] double mean_square(const Vec3& m) const noexcept;
+    PlaneMoments m;   // each pixel weighs 1
+    double ww = 0.0;  // of squared inverse depths
+    void add(double ray_x, const ColumnRays& rays, const ScanlineSegment& segment) noexcept;
+    [[nodiscard]] bool try_solve(Vec3& plane) const noexcept;
+    [[nodiscard]] double mean_square(const Vec3& plane) const noexcept;  // residual of inverse depth
   };
 
-  [[nodiscard]] Run& at(Place p) noexcept {
-    return (*runs_)[static_cast<std::size_t>(p.column)][static_cast<std::size_t>(p.index)];
+  [[nodiscard]] ScanlineSegment& at(Place p) noexcept {
+    return (*segments_)[static_cast<std::size_t>(p.column)][static_cast<std::size_t>(p.index)];
   }
   void sort_seeds() noexcept;
   void index_rows() noexcept;
-  // Of the first run of a column that ends at this row or below, or of one a little above it.
+  // Of the first segment of a column that ends at this row or below, or of one a little above it.
   [[nodiscard]] std::size_t first_near(std::int32_t column, std::int32_t row) const noexcept {
     return first_near_[static_cast<std::size_t>(column)][static_cast<std::size_t>(row / kIndexRows)];
   }
@@ -90,17 +98,13 @@ class PlaneGrowing {
   Params params_;
   DepthNoiseModel noise_;
   const ColumnRays* rays_ = nullptr;
-  ScanlineSegmentation::Columns* runs_ = nullptr;
+  ScanlineSegmentation::Columns* segments_ = nullptr;
 
   static constexpr std::int32_t kIndexRows = 16;
   std::array<std::array<std::uint8_t, kDepthHeight_px / kIndexRows + 1>, kColumns> first_near_{};
-  std::array<Place, kQueue> seeds_{};
-  std::size_t seed_count_ = 0;
-  std::size_t next_seed_ = 0;
+  Queue seeds_;
 
-  std::array<Place, kQueue> queue_{};
-  std::size_t queue_size_ = 0;
-  std::size_t queue_next_ = 0;
+  Queue queue_;  // of the plane that grows: all its segments, those before next visited
   bool growing_ = false;
   Sums sums_;
   Vec3 m_ = Vec3::UnitZ();

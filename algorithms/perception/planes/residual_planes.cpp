@@ -49,7 +49,7 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
   static_assert(kAtOnce % Wide::nlanes == 0 && kDepthHeight_px % kAtOnce == 0);
   const auto all = [](float value) { return cv::vx_setall_f32(value); };
   const Wide zero = all(0.0F), end = all(static_cast<float>(Axis::kBins)), none = end;
-  const float *ws = image.down.row(column), *ys = rays.y.data();
+  const float *ws = image.by_column.row(column), *ys = rays.y.data();
   const auto add_stretch = [&](std::int32_t first, std::int32_t last) {
     for (std::int32_t from = first; from <= last; from += kAtOnce) {
       const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce), until = std::min(last + 1 - start, kAtOnce);

@@ -9,34 +9,30 @@
 namespace polygmap {
 namespace {
 
-using Wide = cv::v_float32;
+using simd::all, simd::Wide;
 
-constexpr float kNowhere = -1e9F;   // 1/m: the line of a column without a run, which no row fits: not a depth of 1 mm
-constexpr float kNever = -1e9F;     // its absent rows
+constexpr float kNowhere =
+    -1e9F;                       // 1/m: the line of a column without a segment, which no row fits: not a depth of 1 mm
+constexpr float kNever = -1e9F;  // its absent rows
 constexpr float kNoSpread = 1e-9F;  // added to a sum of squares that may be 0
 constexpr float kFitted = 3.0F;     // rows that make a line
-constexpr float kBends = 7.0F;      // a run of more rows may bend away
+constexpr float kBends = 7.0F;      // a segment of more rows may bend away
 constexpr std::int32_t kBentRows = 3;
 constexpr std::int32_t kBlockColumns = 2 * Wide::nlanes;  // columns whose blocks are tried together
 static_assert(kColumns % kBlockColumns == 0);
-
-Wide all(float x) noexcept { return cv::vx_setall_f32(x); }
 
 }  // namespace
 
 struct ScanlineSegmentation::Wides {
   Wide zero = all(0.0F), one = all(1.0F), two = all(2.0F), four = all(4.0F);
-  Wide memory = all(1.0F - kMemory), fitted = all(kFitted), long_run = all(kBends);
-  Wide outlier_weight, base, per_metre, quadratic, floor2, jump0, jump1, jump2, outlier2, bend2, max_gap, fy;
+  Wide memory = all(1.0F - kMemory), fitted = all(kFitted), long_segment = all(kBends);
+  InverseSigma<Wide> sigma, jump;
+  Wide outlier_weight, floor2, outlier2, bend2, max_gap, fy;
   explicit Wides(const ScanlineSegmentation& s) noexcept
-      : outlier_weight(all(s.outlier_weight_)),
-        base(all(s.base_)),
-        per_metre(all(s.per_metre_)),
-        quadratic(all(s.quadratic_)),
+      : sigma(all(s.sigma_)),
+        jump(all(s.jump_)),
+        outlier_weight(all(s.outlier_weight_)),
         floor2(all(s.floor2_)),
-        jump0(all(s.jump_[0])),
-        jump1(all(s.jump_[1])),
-        jump2(all(s.jump_[2])),
         outlier2(all(s.outlier2_)),
         bend2(all(s.bend2_)),
         max_gap(all(s.max_gap_)),
@@ -48,15 +44,13 @@ void ScanlineSegmentation::begin(const Params& params, const DepthNoiseModel& no
   image_ = &image;
   column_count_ = intrinsics.width_px / kColumn_px;
   height_px_ = intrinsics.height_px;
-  const double share = math::sqrt(noise.correlated_share + (1.0 - noise.correlated_share) / kColumn_px);
   outlier2_ = static_cast<float>(math::square(params.outlier_sigmas));
   bend2_ = static_cast<float>(math::square(params.bend_sigmas));
-  base_ = static_cast<float>(noise.base_m * share);
-  per_metre_ = static_cast<float>(noise.per_metre * share);
-  quadratic_ = static_cast<float>(noise.quadratic_per_m * share);
+  sigma_ = noise.scaled(math::sqrt(noise.mean_share(kColumn_px))).inverse_sigma_f();
   floor2_ = static_cast<float>(math::square(params.floor_m));
   // jump_share w + 4 sigma
-  jump_ = {4.0F * quadratic_, static_cast<float>(params.jump_share) + 4.0F * per_metre_, 4.0F * base_};
+  jump_ = {4.0F * sigma_.base, static_cast<float>(params.jump_share) + 4.0F * sigma_.per_metre,
+           4.0F * sigma_.quadratic};
   max_gap_ = static_cast<float>(params.max_gap_px);
   const std::int32_t outlier_weight = params.max_gap_px / kPending + 1;
   outlier_weight_ = static_cast<float>(outlier_weight);
@@ -64,7 +58,7 @@ void ScanlineSegmentation::begin(const Params& params, const DepthNoiseModel& no
   cy_ = static_cast<float>(intrinsics.cy_px);
   for (std::int32_t g = 0; g < kColumns; ++g) {
     clear(g);
-    runs_[static_cast<std::size_t>(g)].clear();
+    segments_[static_cast<std::size_t>(g)].clear();
   }
   overflow_ = 0;
 }
@@ -118,7 +112,7 @@ struct ScanlineSegmentation::Block {
 
   Block(const Wides& wides, const Open& open, std::int32_t column) noexcept
       : c(wides), g(static_cast<std::size_t>(column)), rows(cv::vx_load(open.rows.data() + g)) {}
-  // Runs too young for a block are none.
+  // Segments too young for a block are none.
   [[nodiscard]] bool may_go_on() const noexcept { return cv::v_check_all((rows >= c.fitted) | (rows == c.zero)); }
 
   // As in add_row, but once, at the block's first row: what is nearer is held to the noise of the line's own depth.
@@ -127,7 +121,7 @@ struct ScanlineSegmentation::Block {
     slope = load(open.slope), lever = load(open.lever), drift = load(open.drift), absent = load(open.absent);
     value = load(open.value) + slope;
     const Wide my = slope * c.fy, m0 = value + slope * to_centre;
-    const Wide sigma = (c.base * value + c.per_metre) * value + c.quadratic, share = c.one / (rows + c.four);
+    const Wide sigma = c.sigma(value), share = c.one / (rows + c.four);
     w2 = value * value, leans = c.four * share;
     spread = (my * my + m0 * m0) * (sigma * sigma + c.floor2 * w2 * w2) * (c.one + leans);
     limit = c.outlier2 * spread;
@@ -148,7 +142,7 @@ struct ScanlineSegmentation::Block {
   }
   [[nodiscard]] Wide idle() const noexcept { return (rows == c.zero) & (any == c.zero); }
   [[nodiscard]] bool goes_on() const noexcept {
-    const Wide bent = (rows + n > c.long_run) & (drift * drift * w2 > c.bend2 * spread);
+    const Wide bent = (rows + n > c.long_segment) & (drift * drift * w2 > c.bend2 * spread);
     return cv::v_check_all(((rows >= c.fitted) & (longest <= c.max_gap) & ~bent) | idle());
   }
   // Recursive least squares with all of them at once; lever: from the mean of the rows so far.
@@ -192,7 +186,7 @@ std::uint32_t ScanlineSegmentation::try_blocks(const Wides& c, std::int32_t colu
 std::uint32_t ScanlineSegmentation::add_row(const Wides& c, std::int32_t first_column, std::int32_t row) noexcept {
   std::uint32_t events = 0;
   const Wide to_centre = all(cy_ - static_cast<float>(row));
-  // Whole registers: what columns beyond a narrower picture say is never read.
+  // Whole registers: what columns beyond a narrower image say is never read.
   for (std::int32_t column = first_column; column < first_column + kGroup; column += Wide::nlanes) {
     const auto g = static_cast<std::size_t>(column);
     const auto load = [g](const Floats& x) { return cv::vx_load(x.data() + g); };
@@ -205,13 +199,13 @@ std::uint32_t ScanlineSegmentation::add_row(const Wides& c, std::int32_t first_c
     // Residual across the line in space against sigma_z: dw^2 / (|m|^2 w^2) with m of the line in the column's plane.
     // Both sides are multiplied by w^2, so that sigma is that of the inverse depth.
     const Wide my = slope * c.fy, m0 = value + slope * to_centre;
-    const Wide w2 = w * w, sigma = (c.base * w + c.per_metre) * w + c.quadratic;
+    const Wide w2 = w * w, sigma = c.sigma(w);
     // Predicting one row past n has about (1 + 4 / n) of a row's variance.
     const Wide share = c.one / (n + c.one);
     const Wide spread = (my * my + m0 * m0) * (sigma * sigma + c.floor2 * w2 * w2) * (c.one + c.four * share);
     // Two rows make no slope: the third is held against the second.
     const Wide off = residual + cv::v_select(fitted, c.zero, slope);
-    const Wide jump = (c.jump2 * w + c.jump1) * w + c.jump0;
+    const Wide jump = c.jump(w);
     const Wide fits = off * off * w2 < cv::v_select(fitted, c.outlier2 * spread, jump * jump * w2);
     const Wide in = valid & fits;
 
@@ -231,14 +225,13 @@ std::uint32_t ScanlineSegmentation::add_row(const Wides& c, std::int32_t first_c
     store(open_.absent, absent);
 
     const Wide strange = cv::v_select(fitted, c.zero, valid) & ~fits;
-    const Wide bent = in & (n1 > c.long_run) & (drift * drift * w2 > c.bend2 * spread);
-    events |= static_cast<std::uint32_t>(cv::v_signmask(strange | bent | (absent > c.max_gap)))
-              << (column - first_column);
+    const Wide bent = in & (n1 > c.long_segment) & (drift * drift * w2 > c.bend2 * spread);
+    events |= simd::bits(strange | bent | (absent > c.max_gap)) << (column - first_column);
   }
   return events;
 }
 
-// Ends the column's run where it stopped fitting and starts the next one with the rows since.
+// Ends the column's segment where it stopped fitting and starts the next one with the rows since.
 void ScanlineSegmentation::handle(std::int32_t column, std::int32_t row) noexcept {
   const auto g = static_cast<std::size_t>(column);
   std::int32_t from = row;
@@ -271,55 +264,55 @@ struct ScanlineSegmentation::OneColumn {
   }
 };
 
-// Opens a run at the first row with data. Rows this few make no line: each is held against the one before.
+// Opens a segment at the first row with data. Rows this few make no line: each is held against the one before.
 void ScanlineSegmentation::replay(std::int32_t column, std::int32_t from, std::int32_t row) noexcept {
   const auto g = static_cast<std::size_t>(column);
-  OneColumn run;
+  OneColumn segment;
   for (std::int32_t r = from; r <= row; ++r) {
-    const float w = image_->inverse_depth(column, r), jump = (jump_[2] * w + jump_[1]) * w + jump_[0];
-    run.value += run.slope;
-    run.lever += 1.0F;
-    const float residual = w - run.value, off = residual + run.slope;
+    const float w = image_->inverse_depth(column, r), jump = jump_(w);
+    segment.value += segment.slope;
+    segment.lever += 1.0F;
+    const float residual = w - segment.value, off = residual + segment.slope;
     if (!(w > 0.0F)) {
-      run.absent += 1.0F;
-    } else if (run.rows > 0.0F && off * off < jump * jump) {
-      const float share = 1.0F / (run.rows + 1.0F);
-      run.rows += 1.0F;
-      run.squares += run.lever * (run.lever - run.lever * share);
-      run.lever -= run.lever * share;
-      const float gain = residual * (run.lever / run.squares);
-      run.value += residual * share + gain * run.lever;
-      run.slope += gain;
-      run.absent = 0.0F;
+      segment.absent += 1.0F;
+    } else if (segment.rows > 0.0F && off * off < jump * jump) {
+      const float share = 1.0F / (segment.rows + 1.0F);
+      segment.rows += 1.0F;
+      segment.squares += segment.lever * (segment.lever - segment.lever * share);
+      segment.lever -= segment.lever * share;
+      const float gain = residual * (segment.lever / segment.squares);
+      segment.value += residual * share + gain * segment.lever;
+      segment.slope += gain;
+      segment.absent = 0.0F;
     } else {
-      run = OneColumn();
-      run.rows = 1.0F;
-      run.value = w;
-      run.absent = 0.0F;
+      segment = OneColumn();
+      segment.rows = 1.0F;
+      segment.value = w;
+      segment.absent = 0.0F;
       top_[g] = static_cast<std::int16_t>(r);
     }
   }
-  run.store(open_, g);
+  segment.store(open_, g);
 }
 
 // Takes accepted rows, the last ones up to row, out of the line again.
 void ScanlineSegmentation::forget(std::int32_t column, std::int32_t from, std::int32_t row) noexcept {
   const auto g = static_cast<std::size_t>(column);
-  OneColumn run(open_, g);
+  OneColumn segment(open_, g);
   for (std::int32_t r = from; r <= row; ++r) {
     const float w = image_->inverse_depth(column, r), back = static_cast<float>(r - row);
-    const float n = run.rows - 1.0F, x = run.lever + back;
-    const float squares = run.squares - x * x * run.rows / n;
+    const float n = segment.rows - 1.0F, x = segment.lever + back;
+    const float squares = segment.squares - x * x * segment.rows / n;
     if (!(w > 0.0F) || n < kFitted || !(squares > 0.0F)) continue;
-    const float residual = w - (run.value + run.slope * back);
-    const float gain = residual * (x * run.rows / n / squares);
-    run.rows = n;
-    run.squares = squares;
-    run.lever += x / n;
-    run.value -= residual / n + gain * run.lever;
-    run.slope -= gain;
+    const float residual = w - (segment.value + segment.slope * back);
+    const float gain = residual * (x * segment.rows / n / squares);
+    segment.rows = n;
+    segment.squares = squares;
+    segment.lever += x / n;
+    segment.value -= residual / n + gain * segment.lever;
+    segment.slope -= gain;
   }
-  run.store(open_, g);
+  segment.store(open_, g);
 }
 
 std::int32_t ScanlineSegmentation::last_accepted(std::int32_t column, std::int32_t row) const noexcept {
@@ -333,12 +326,12 @@ std::int32_t ScanlineSegmentation::last_accepted(std::int32_t column, std::int32
 void ScanlineSegmentation::close(std::int32_t column, std::int32_t bottom, std::int32_t row) noexcept {
   const auto g = static_cast<std::size_t>(column);
   if (open_.rows[g] < static_cast<float>(kMinRows)) return;
-  Run run;
-  run.top = top_[g];
-  run.bottom = static_cast<std::int16_t>(bottom);
-  run.inverse_depth = open_.value[g] - open_.slope[g] * static_cast<float>(row - run.top);
-  run.slope = open_.slope[g];
-  if (!runs_[g].try_push_back(run)) ++overflow_;
+  ScanlineSegment segment;
+  segment.top = top_[g];
+  segment.bottom = static_cast<std::int16_t>(bottom);
+  segment.inverse_depth = open_.value[g] - open_.slope[g] * static_cast<float>(row - segment.top);
+  segment.slope = open_.slope[g];
+  if (!segments_[g].try_push_back(segment)) ++overflow_;
 }
 
 void ScanlineSegmentation::finish() noexcept {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cuts every column of the picture into straight runs: on a plane, inverse depth is linear in the row. All columns
+// Cuts every column of the image into straight segments: on a plane, inverse depth is linear in the row. All columns
 // advance together, row by row, so that the loop over them is vector code without branches.
 #pragma once
 
@@ -14,7 +14,7 @@
 namespace polygmap {
 
 // Rows top .. bottom of one column; the line through them is inverse_depth + slope (row - top).
-struct Run {
+struct ScanlineSegment {
   std::int16_t top = 0;
   std::int16_t bottom = 0;
   float inverse_depth = 0.0F;  // 1/m, at top
@@ -33,17 +33,17 @@ class ScanlineSegmentation {
     std::int32_t max_gap_px = 8;
 
     static void visit(auto& p, auto& field) {
-      field("outlier_sigmas", p.outlier_sigmas, 0.5, 20.0, "A row farther off a run's line does not belong to it.");
+      field("outlier_sigmas", p.outlier_sigmas, 0.5, 20.0, "A row farther off a segment's line does not belong to it.");
       field("bend_sigmas", p.bend_sigmas, 0.1, 20.0,
-            "A run bends away where the mean residual of its last rows is larger.");
+            "A segment bends away where the mean residual of its last rows is larger.");
       field("jump_share", p.jump_share, 0.001, 0.5,
-            "The first rows of a run differ by less than this share of the depth per row.");
+            "The first rows of a segment differ by less than this share of the depth per row.");
       field("floor_m", p.floor_m, 0.0, 0.1, "Slow depth errors, added to the noise.");
-      field("max_gap_px", p.max_gap_px, 0, 200, "A run may miss as many rows in a row.");
+      field("max_gap_px", p.max_gap_px, 0, 200, "A segment may miss as many rows in a row.");
     }
   };
-  static constexpr std::size_t kMaxRunsPerColumn = 48;
-  using Column = StaticVector<Run, kMaxRunsPerColumn>;
+  static constexpr std::size_t kMaxSegmentsPerColumn = 48;
+  using Column = StaticVector<ScanlineSegment, kMaxSegmentsPerColumn>;
   using Columns = std::array<Column, kColumns>;
 
   void begin(const Params& params, const DepthNoiseModel& noise, const CameraIntrinsics& intrinsics,
@@ -53,22 +53,22 @@ class ScanlineSegmentation {
   void add_rows(std::int32_t first, std::int32_t last) noexcept;
   void finish() noexcept;
 
-  [[nodiscard]] Columns& columns() noexcept { return runs_; }
-  [[nodiscard]] const Columns& columns() const noexcept { return runs_; }
-  [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }  // runs that found no room
+  [[nodiscard]] Columns& columns() noexcept { return segments_; }
+  [[nodiscard]] const Columns& columns() const noexcept { return segments_; }
+  [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }  // segments that found no room
 
  private:
-  static constexpr std::int32_t kPending = 3;  // outliers in a row that end a run
+  static constexpr std::int32_t kPending = 3;  // outliers in a row that end a segment
   static constexpr std::int32_t kMinRows = 3;
   static constexpr float kMemory = 0.7F;     // of the mean of residuals, per row
   static constexpr std::int32_t kGroup = 8;  // columns that are decided on together, for every register width
   static_assert(kColumns % kGroup == 0);
   using Floats = std::array<float, kColumns>;
 
-  // The state of all columns' open runs: the least-squares line through the accepted rows, updated row by row, so that
-  // nothing large is ever subtracted and single precision is enough.
+  // The state of all columns' open segments: the least-squares line through the accepted rows, updated row by row, so
+  // that nothing large is ever subtracted and single precision is enough.
   struct Open {
-    Floats rows;     // accepted, 0: no run is open
+    Floats rows;     // accepted, 0: no segment is open
     Floats value;    // of the line at the row last stepped, 1/m
     Floats slope;    // 1/m per row
     Floats lever;    // from the mean of the accepted rows to the row last stepped
@@ -93,11 +93,12 @@ class ScanlineSegmentation {
   std::int32_t column_count_ = 0;
   std::int32_t height_px_ = 0;
   float outlier2_ = 0.0F, bend2_ = 0.0F, max_gap_ = 0.0F, outlier_weight_ = 1.0F, fy_ = 1.0F, cy_ = 0.0F;
-  float base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F, floor2_ = 0.0F;
-  std::array<float, 3> jump_{};  // a polynomial of inverse depth
+  float floor2_ = 0.0F;
+  InverseSigma<float> sigma_{};  // of a column's inverse depth
+  InverseSigma<float> jump_{};   // the most that a segment's first rows differ by from row to row: a polynomial like it
   Open open_;
   std::array<std::int16_t, kColumns> top_{};
-  Columns runs_;
+  Columns segments_;
   std::uint32_t overflow_ = 0;
 };
 

@@ -4,9 +4,16 @@
 #include <algorithm>
 #include <bit>
 
+#include "algorithms/perception/image/change_point.hpp"
 #include "algorithms/perception/image/simd.hpp"
 
 namespace polygmap {
+namespace {
+
+using simd::all, simd::Four, simd::Wide;
+
+}  // namespace
+
 void SpanBoundaries::begin(const Params& params, const DepthNoiseModel& noise, const ColumnRays& rays, double fy_px,
                            double cy_px, const ColumnImage& image) noexcept {
   params_ = params;
@@ -14,46 +21,44 @@ void SpanBoundaries::begin(const Params& params, const DepthNoiseModel& noise, c
   image_ = &image;
   fy_px_ = fy_px;
   cy_px_ = cy_px;
-  base_ = static_cast<float>(noise.base_m);
-  per_metre_ = static_cast<float>(noise.per_metre);
-  quadratic_ = static_cast<float>(noise.quadratic_per_m);
-  correlated_share_ = static_cast<float>(noise.correlated_share);
+  inverse_sigma_ = noise.inverse_sigma_f();
+  mean_share_ = noise.mean_share_f();
   share_[0] = 1.0F;
   for (std::size_t n = 1; n < share_.size(); ++n) {
-    share_[n] = static_cast<float>(noise.correlated_share + (1.0 - noise.correlated_share) / static_cast<double>(n));
+    share_[n] = static_cast<float>(noise.mean_share(static_cast<double>(n)));
   }
   for (Plane& plane : planes_) plane = Plane{};
   overflow_ = 0;
 }
 
-void SpanBoundaries::build_spans(std::int32_t column, const ScanlineSegmentation::Column& runs,
+void SpanBoundaries::build_spans(std::int32_t column, const ScanlineSegmentation::Column& segments,
                                  const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept {
   constexpr int kElsewhere = 3;
   Column& out = columns_[static_cast<std::size_t>(column)];
   out.clear();
-  for (const Run& run : runs) {
-    const std::uint8_t plane = run.plane <= kMaxPlanes ? to_plane[run.plane] : std::uint8_t{0};
+  for (const ScanlineSegment& segment : segments) {
+    const std::uint8_t plane = segment.plane <= kMaxPlanes ? to_plane[segment.plane] : std::uint8_t{0};
     if (plane == 0) continue;
     if (!out.empty() && out.back().plane == plane) {
       const Line line = line_of(plane, column);
       int other = 0, own = 0;
-      for (std::int32_t r = out.back().bottom + 1; r < run.top; ++r) {
-        const float w = image_->down(r, column);
+      for (std::int32_t r = out.back().bottom + 1; r < segment.top; ++r) {
+        const float w = image_->by_column(r, column);
         const float off = std::abs(w - (line.a + line.b * rays_->y[static_cast<std::size_t>(r)])) * w;
-        const float limit = (static_cast<float>(params_.same_gap_sigmas) * inverse_sigma(w) +
+        const float limit = (static_cast<float>(params_.same_gap_sigmas) * inverse_sigma_(w) +
                              static_cast<float>(params_.gap_floor_m) * w * w) *
                             line.norm;
         const int measured = static_cast<int>(w > 0.0F), is_off = measured & static_cast<int>(off > limit);
         other += is_off, own += measured - is_off;
       }
       if (other < kElsewhere || 2 * other < own) {
-        out.back().bottom = run.bottom;
+        out.back().bottom = segment.bottom;
         continue;
       }
     }
     ColumnSpan interval;
-    interval.top = run.top;
-    interval.bottom = run.bottom;
+    interval.top = segment.top;
+    interval.bottom = segment.bottom;
     interval.plane = plane;
     if (!out.try_push_back(interval)) ++overflow_;
   }
@@ -85,7 +90,7 @@ void SpanBoundaries::trim_ends(std::int32_t column, ColumnSpan& interval) const 
     for (std::int32_t i = 0; i < kMost_px && good < kGood; ++i) {
       const std::int32_t r = from + i * step;
       if (r < interval.top || r > interval.bottom) return from;
-      if (!(image_->down(r, column) > 0.0F)) continue;
+      if (!(image_->by_column(r, column) > 0.0F)) continue;
       if (!offset(line, column, r).within(kTruncation)) {
         good = 0;
         at = r + step;
@@ -129,7 +134,7 @@ void SpanBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::int3
   std::int16_t& end = step > 0 ? interval.bottom : interval.top;
   int empty = 0, off = 0;
   for (std::int32_t r = end + step; step > 0 ? r <= limit : r >= limit; r += step) {
-    if (!(image_->down(r, column) > 0.0F)) {
+    if (!(image_->by_column(r, column) > 0.0F)) {
       if (++empty > kMaxEmpty) return;
     } else if (offset(line, column, r).within(most)) {
       end = static_cast<std::int16_t>(r);
@@ -140,68 +145,91 @@ void SpanBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::int3
   }
 }
 
+// What each row of a column says for the lower of two planes: cost(upper) - cost(lower), nothing where there is no
+// data.
+struct SpanBoundaries::RowGains {
+  using Eight = std::array<float, kRowsAtOnce>;
+  const float *ws, *ys;
+  const std::uint8_t* pixels_of;
+  Wide upper_a, upper_b, lower_a, lower_b, norm2, zero = all(0.0F), most = all(kTruncation);
+  InverseSigma<Wide> sigma_of;
+  MeanShare<Wide> share;
+
+  // One sigma for both: with each its own, the boundary drifts towards the less noisy plane.
+  RowGains(const SpanBoundaries& s, std::int32_t column, const Line& upper, const Line& lower) noexcept
+      : ws(s.image_->by_column.row(column)),
+        ys(s.rays_->y.data()),
+        pixels_of(s.image_->valid_by_column.row(column)),
+        upper_a(all(upper.a)),
+        upper_b(all(upper.b)),
+        lower_a(all(lower.a)),
+        lower_b(all(lower.b)),
+        norm2(all(upper.norm * lower.norm)),
+        sigma_of(all(s.inverse_sigma_)),
+        share(all(s.mean_share_)) {}
+
+  // Of kRowsAtOnce rows from start on; nothing of those that are not between first and last.
+  void weigh(std::int32_t start, std::int32_t first, std::int32_t last, Eight& gains) const noexcept {
+    static_assert(kRowsAtOnce % Wide::nlanes == 0);
+    const Wide first_step = all(first - start), last_step = all(last - start);
+    for (std::int32_t i = 0; i < kRowsAtOnce; i += Wide::nlanes) {
+      const Wide w = cv::vx_load(ws + start + i), y = cv::vx_load(ys + start + i);
+      const Wide off_upper = (w - (upper_a + upper_b * y)) * w, off_lower = (w - (lower_a + lower_b * y)) * w;
+      const Wide sigma = sigma_of(w), pixels = simd::load_u8(pixels_of + start + i);
+      const Wide information = pixels / (sigma * sigma * norm2 * share.times(pixels));
+      const Wide gain =
+          cv::v_min(off_upper * off_upper * information, most) - cv::v_min(off_lower * off_lower * information, most);
+      const Wide step = simd::steps_from(i);
+      cv::v_store(gains.data() + i, gain & (w > zero) & (step >= first_step) & (step <= last_step));
+    }
+  }
+};
+
+// Those of one column, into the sums of all columns in which two planes meet.
+struct SpanBoundaries::BinnedGains {
+  float* bins = nullptr;
+  std::int32_t bin = 0;  // of row 0: a row further is a bin further
+
+  BinnedGains(Pair* pair, float meeting_row, std::int32_t first) noexcept {
+    if (pair == nullptr) return;
+    const auto half_px = static_cast<std::int32_t>(std::floor(2.0F * (static_cast<float>(first) - meeting_row)));
+    bins = pair->gain[static_cast<std::size_t>(half_px & 1)].data();
+    bin = (half_px >> 1) + kBins / 2 - first;
+  }
+  void add(std::int32_t start, const RowGains::Eight& gains) const noexcept {
+    const std::int32_t first_bin = bin + start;
+    if (bins == nullptr || first_bin < -kRowsAtOnce || first_bin > kBins) return;
+    for (std::int32_t i = 0; i < kRowsAtOnce; i += Wide::nlanes) {
+      float* to = bins + kRowsAtOnce + first_bin + i;
+      cv::v_store(to, cv::vx_load(to) + cv::vx_load(gains.data() + i));
+    }
+  }
+};
+
 // Rows first .. last belong to either; the last row of the upper one, first - 1 when all are the lower one's. What the
 // rows say goes into the pair, too, if there is one.
 std::int32_t SpanBoundaries::change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
                                           std::int32_t last, float meeting_row, Pair* pair) const noexcept {
-  using Wide = cv::v_float32;
-  using Four = cv::v_float32x4;
-  constexpr std::int32_t kAtOnce = kRowsAtOnce;
-  static_assert(kAtOnce % Wide::nlanes == 0 && kAtOnce % Four::nlanes == 0);
-  static constexpr std::array<float, kAtOnce> kSteps{0, 1, 2, 3, 4, 5, 6, 7};
-  const auto all = [](float x) { return cv::vx_setall_f32(x); };
-  // One sigma for both: with each its own, the boundary drifts towards the less noisy plane.
-  const Wide norm2 = all(upper.norm * lower.norm), zero = all(0.0F), most = all(kTruncation);
-  const Wide share1 = all(correlated_share_), share0 = all(1.0F - correlated_share_);
-  float* bins = nullptr;
-  std::int32_t bin = 0;  // a row further is a bin further
-  if (pair != nullptr) {
-    const auto half_px = static_cast<std::int32_t>(std::floor(2.0F * (static_cast<float>(first) - meeting_row)));
-    bins = pair->gain[static_cast<std::size_t>(half_px & 1)].data();
-    bin = (half_px >> 1) + kBins / 2;
-  }
-  const float *ws = image_->down.row(column), *ys = rays_->y.data();
-  // Each lane's least sum so far and the first row that has it: which of them is least is asked at the end.
-  const Four four_steps = cv::v_load(kSteps.data()), none = cv::v_setall_f32(static_cast<float>(first - 1));
-  Four sum = cv::v_setzero_f32(), best = sum, at = none;
-  for (std::int32_t from = first; from <= last; from += kAtOnce, bin += kAtOnce) {
-    // The last rows of the picture are looked at with others before them.
-    const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce);
-    const Wide first_step = all(static_cast<float>(from - start)), last_step = all(static_cast<float>(last - start));
-    std::array<float, kAtOnce> gains;
-    for (std::int32_t i = 0; i < kAtOnce; i += Wide::nlanes) {
-      const Wide w = cv::vx_load(ws + start + i), y = cv::vx_load(ys + start + i);
-      const Wide off_upper = (w - (all(upper.a) + all(upper.b) * y)) * w;
-      const Wide off_lower = (w - (all(lower.a) + all(lower.b) * y)) * w;
-      const Wide sigma = (all(base_) * w + all(per_metre_)) * w + all(quadratic_);
-      const Wide pixels =
-          cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand_q(image_->valid_down.row(column) + start + i)));
-      const Wide information = pixels / (sigma * sigma * norm2 * (share1 * pixels + share0));
-      const Wide gain =
-          cv::v_min(off_upper * off_upper * information, most) - cv::v_min(off_lower * off_lower * information, most);
-      // Nothing where there is no data.
-      const Wide step = cv::vx_load(kSteps.data() + i);
-      cv::v_store(gains.data() + i, gain & (w > zero) & (step >= first_step) & (step <= last_step));
-    }
-    for (std::int32_t i = 0; i < kAtOnce; i += Four::nlanes) {
-      Four sums = cv::v_load(gains.data() + i);
-      sums = sums + cv::v_rotate_left<1>(sums);
-      sums = sums + cv::v_rotate_left<2>(sums) + sum;
-      sum = cv::v_broadcast_element<3>(sums);
+  static_assert(kRowsAtOnce % Four::nlanes == 0);
+  const RowGains rows(*this, column, upper, lower);
+  const BinnedGains binned(pair, meeting_row, first);
+  const Four four_steps = cv::v_load(simd::kSteps.data()), zero = cv::v_setzero_f32();
+  // Each slot's own least sum and the first row that has it: which of them is least is asked at the end.
+  ChangePoint<Four> point{zero, zero, cv::v_setall_f32(static_cast<float>(first - 1))};
+  for (std::int32_t from = first; from <= last; from += kRowsAtOnce) {
+    // The last rows of the image are looked at with others before them.
+    const std::int32_t start = std::min(from, kDepthHeight_px - kRowsAtOnce);
+    RowGains::Eight gains;
+    rows.weigh(start, from, last, gains);
+    for (std::int32_t i = 0; i < kRowsAtOnce; i += Four::nlanes) {
+      const Four sums = simd::running_sums(cv::v_load(gains.data() + i), point.sum);
       const Four row = cv::v_setall_f32(static_cast<float>(start + i)) + four_steps;
-      const Four better = (sums < best) & (row >= cv::v_setall_f32(static_cast<float>(from)));
-      best = cv::v_select(better, sums, best);
-      at = cv::v_select(better, row, at);
+      point.offer(sums, row, (sums < point.least) & (row >= cv::v_setall_f32(static_cast<float>(from))));
     }
-    const std::int32_t first_bin = bin - (from - start);
-    if (bins == nullptr || first_bin < -kAtOnce || first_bin > kBins) continue;
-    for (std::int32_t i = 0; i < kAtOnce; i += Wide::nlanes) {
-      float* to = bins + kAtOnce + first_bin + i;
-      cv::v_store(to, cv::vx_load(to) + cv::vx_load(gains.data() + i));
-    }
+    binned.add(start, gains);
   }
-  const Four least = best == cv::v_setall_f32(cv::v_reduce_min(best));
-  return static_cast<std::int32_t>(cv::v_reduce_min(cv::v_select(least, at, cv::v_setall_f32(kDepthHeight_px))));
+  const Four least = point.least == cv::v_setall_f32(cv::v_reduce_min(point.least));
+  return static_cast<std::int32_t>(cv::v_reduce_min(cv::v_select(least, point.at, cv::v_setall_f32(kDepthHeight_px))));
 }
 
 void SpanBoundaries::score(std::int32_t column, bool by_planes) noexcept {
@@ -250,19 +278,16 @@ void SpanBoundaries::score(std::int32_t column, bool by_planes) noexcept {
 
 void SpanBoundaries::place() noexcept {
   for (std::size_t i = 0; i < pair_count_; ++i) {
-    double sum = 0.0, best = 0.0, meeting = 0.0;
-    std::size_t at = 0;  // half bins above the boundary
-    for (std::size_t bin = 0; bin < kBins; ++bin) {
-      if (bin == kBins / 2) meeting = sum;
-      for (std::size_t half = 0; half < 2; ++half) {
-        sum += static_cast<double>(pairs_[i].gain[half][kRowsAtOnce + bin]);
-        if (sum >= best) continue;
-        best = sum;
-        at = 2 * bin + half + 1;
-      }
+    ChangePoint<double> point{0.0, 0.0, 0.0};  // in half bins from the first
+    double meeting = 0.0;
+    for (std::size_t half_bin = 0; half_bin < 2 * kBins; ++half_bin) {
+      if (half_bin == kBins) meeting = point.sum;
+      point.add(static_cast<double>(pairs_[i].gain[half_bin % 2][kRowsAtOnce + half_bin / 2]),
+                static_cast<double>(half_bin + 1));
     }
-    const double offset_px = 0.5 * static_cast<double>(at) - 0.5 * kBins;
-    const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].columns;
+    const double offset_px = 0.5 * point.at - 0.5 * kBins;
+    const bool meets =
+        std::abs(offset_px) < params_.meet_px || meeting - point.least < params_.meet_gain * pairs_[i].columns;
     pairs_[i].shift_px = meets ? 0.0 : offset_px;
   }
   reproject();

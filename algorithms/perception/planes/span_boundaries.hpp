@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where one plane ends and the next begins in every column, and the planes' final fit to what lies between.
 //
-// Two planes that meet in space meet in the picture on a straight line that is known far better than any one column's
+// Two planes that meet in space meet in the image on a straight line that is known far better than any one column's
 // pixels tell. Where they do not meet (an overhang, something in front), the columns' most likely change-points decide,
 // all columns of a pair of planes together.
 #pragma once
@@ -25,7 +25,7 @@ struct ColumnSpan {
 };
 
 // Rows that belong to no plane are searched for the rest of known or cut-off surfaces this far from the nearest span's
-// or the picture's end; what lies deeper in them is clutter.
+// or the image's end; what lies deeper in them is clutter.
 inline constexpr std::int32_t kRemainderReach_px = 48;
 
 class SpanBoundaries {
@@ -43,12 +43,12 @@ class SpanBoundaries {
       field("inlier_sigmas", p.inlier_sigmas, 0.5, 20.0,
             "A row nearer to a plane counts in its refit, and extends the surface.");
       field("same_gap_sigmas", p.same_gap_sigmas, 0.5, 20.0,
-            "Rows between two runs of one plane that are farther off it are something else.");
+            "Rows between two segments of one plane that are farther off it are something else.");
       field("gap_floor_m", p.gap_floor_m, 0.0, 0.1, "Slow depth errors, added to the noise of rows in a gap.");
       field("meet_px", p.meet_px, 0.0, 50.0, "Planes meet where their line is no farther from the change-point.");
       field("meet_gain", p.meet_gain, 0.0, 100.0,
             "Planes meet where their line costs no more than this of the columns' mean, too.");
-      field("window_px", p.window_px, 1, 64, "As many rows are searched beyond where the runs ended.");
+      field("window_px", p.window_px, 1, 64, "As many rows are searched beyond where the segments ended.");
       field("max_gap_px", p.max_gap_px, 1, 480,
             "Surfaces with as many rows between them are still next to each other.");
     }
@@ -78,14 +78,14 @@ class SpanBoundaries {
   void set_covariance(std::size_t i, const Mat3& covariance) noexcept { planes_[i].covariance = covariance; }
   [[nodiscard]] const Plane& plane(std::size_t i) const noexcept { return planes_[i]; }
 
-  // One column's runs to spans, each run's plane looked up in to_plane.
-  void build_spans(std::int32_t column, const ScanlineSegmentation::Column& runs,
+  // One column's segments to spans, each segment's plane looked up in to_plane.
+  void build_spans(std::int32_t column, const ScanlineSegmentation::Column& segments,
                    const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept;
-  // A run's ends may reach over an edge: takes away rows that the plane, known better than the run's line, does not
-  // explain.
+  // A segment's ends may reach over an edge: takes away rows that the plane, known better than the segment's line, does
+  // not explain.
   void trim_ends(std::int32_t column) noexcept;
   // Gives rows that are in none of the column's spans to planes that the column beside shows there, or to one of the
-  // planes first .. last. Such rows are too few for a run of their own.
+  // planes first .. last. Such rows are too few for a segment of their own.
   void fill_gaps(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
   void begin_scores() noexcept;
   // Scores where the column's surfaces change, and ends its spans there. by_planes: where planes meet near a change,
@@ -143,7 +143,6 @@ class SpanBoundaries {
     float a, b, norm, own = 0.0F;
   };
   [[nodiscard]] Line line_of(std::uint8_t plane, std::int32_t column) const noexcept;
-  [[nodiscard]] float inverse_sigma(float w) const noexcept { return (base_ * w + per_metre_) * w + quadratic_; }
   // A row against a line: residual over sigma, squared, is off2 / variance.
   struct Offset {
     float off2, variance;
@@ -173,17 +172,26 @@ class SpanBoundaries {
     std::uint8_t above, below;
     [[nodiscard]] bool may_be(std::uint8_t plane) const noexcept { return plane != above && plane != below; }
   };
-  // A plane for rows top .. bottom of the gap, whose depths are known; or several planes for its ends.
+  // A plane for rows top .. bottom of the gap, whose depths are known; or several planes for its ends; or those of the
+  // column beside, of whose spans next is the first that reaches down to the gap.
   void consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom, const Depths& depths,
                 std::int32_t& most, ColumnSpan& filled) const noexcept;
   void consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
                 ColumnSpan& filled) const noexcept;
+  void consider_beside(const Gap& gap, const Column& others, std::size_t& next, std::int32_t& most,
+                       ColumnSpan& filled) const noexcept;
   // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
   struct Strip {
     std::array<std::int16_t, kRefitColumns> top{}, bottom{};
     std::uint8_t plane = 0;
   };
+  struct StripRows;
+  struct StripSums;
+  [[nodiscard]] StripRows rows_of(const Strip& strip, bool roughly) const noexcept;
+  void add_up(std::int32_t first_column, const Strip& strip, const StripRows& rows, StripSums& sums) const noexcept;
   void refit(std::int32_t first_column, const Strip& strip, bool roughly) noexcept;
+  struct RowGains;
+  struct BinnedGains;
   void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
                                           std::int32_t last, float meeting_row, Pair* pair) const noexcept;
@@ -198,7 +206,8 @@ class SpanBoundaries {
   const ColumnRays* rays_ = nullptr;
   const ColumnImage* image_ = nullptr;
   double fy_px_ = 1.0, cy_px_ = 0.0;
-  float base_ = 0.0F, per_metre_ = 0.0F, quadratic_ = 0.0F, correlated_share_ = 0.0F;
+  InverseSigma<float> inverse_sigma_{};
+  MeanShare<float> mean_share_{};
   std::array<float, kColumn_px + 1> share_{};  // of a pixel's variance that the mean of n pixels has
 
   std::array<Plane, kMaxPlanes + 1> planes_{};
@@ -220,10 +229,10 @@ inline SpanBoundaries::Line SpanBoundaries::line_of(std::uint8_t plane, std::int
 
 inline SpanBoundaries::Offset SpanBoundaries::offset(const Line& line, std::int32_t column,
                                                      std::int32_t row) const noexcept {
-  const float w = image_->down(row, column);
+  const float w = image_->by_column(row, column);
   const float residual = (w - (line.a + line.b * rays_->y[static_cast<std::size_t>(row)])) * w;
-  const float sigma = inverse_sigma(w) * line.norm;
-  return {residual * residual, sigma * sigma * share_[image_->valid_down(row, column)]};
+  const float sigma = inverse_sigma_(w) * line.norm;
+  return {residual * residual, sigma * sigma * share_[image_->valid_by_column(row, column)]};
 }
 
 }  // namespace polygmap

@@ -7,25 +7,27 @@
 #include "algorithms/perception/planes/span_boundaries.hpp"
 
 namespace polygmap {
+namespace {
+
+using simd::all, simd::Wide;
+
+}  // namespace
 
 // As offset() has it, and as uncertain as the plane is there.
 SpanBoundaries::Rows SpanBoundaries::fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept {
-  using Wide = cv::v_float32;
   static_assert(kRowsAtOnce % Wide::nlanes == 0 && kDepthHeight_px % kRowsAtOnce == 0);
-  const auto all = [](float x) { return cv::vx_setall_f32(x); };
+  const InverseSigma<Wide> sigma_of = all(inverse_sigma_);
+  const MeanShare<Wide> share = all(mean_share_);
   Rows rows;
   for (std::int32_t i = 0; i < kRowsAtOnce; i += Wide::nlanes) {
-    const Wide w = cv::vx_load(image_->down.row(column) + first + i), y = cv::vx_load(rays_->y.data() + first + i);
-    const Wide residual = (w - (all(line.a) + all(line.b) * y)) * w;
-    const Wide sigma = ((all(base_) * w + all(per_metre_)) * w + all(quadratic_)) * all(line.norm);
-    const Wide pixels =
-        cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand_q(image_->valid_down.row(column) + first + i)));
-    const Wide most =
-        all(kTruncation) *
-        (sigma * sigma * (all(correlated_share_) * pixels + all(1.0F - correlated_share_)) + all(line.own) * pixels);
+    const Wide w = cv::vx_load(image_->by_column.row(column) + first + i);
+    const Wide y = cv::vx_load(rays_->y.data() + first + i);
+    const Wide residual = (w - (all(line.a) + all(line.b) * y)) * w, sigma = sigma_of(w) * all(line.norm);
+    const Wide pixels = simd::load_u8(image_->valid_by_column.row(column) + first + i);
+    const Wide most = all(kTruncation) * (sigma * sigma * share.times(pixels) + all(line.own) * pixels);
     const Wide measured = w > all(0.0F), fits = measured & (residual * residual * pixels < most);
-    rows.measured |= static_cast<std::uint32_t>(cv::v_signmask(measured)) << i;
-    rows.fit |= static_cast<std::uint32_t>(cv::v_signmask(fits)) << i;
+    rows.measured |= simd::bits(measured) << i;
+    rows.fit |= simd::bits(fits) << i;
   }
   return rows;
 }
@@ -38,7 +40,7 @@ void SpanBoundaries::weigh_candidate(std::int32_t column, const Line& line, cons
   const std::int32_t count = candidate.bottom - candidate.top + 1;
   std::int32_t fit = 0;
   for (std::int32_t at = 0; at < count; at += kRowsAtOnce) {
-    // The last rows of the picture are looked at with others before them.
+    // The last rows of the image are looked at with others before them.
     const std::int32_t first = std::min(candidate.top + at, kDepthHeight_px - kRowsAtOnce);
     const std::uint32_t rows = fitting(line, column, first).fit >> (candidate.top + at - first);
     const std::uint64_t bits = rows & ((1U << std::min(count - at, kRowsAtOnce)) - 1U);
@@ -77,18 +79,15 @@ void SpanBoundaries::weigh_candidate(std::int32_t column, const Line& line, cons
 
 SpanBoundaries::Depths SpanBoundaries::depths_of(std::int32_t column, std::int32_t first,
                                                  std::int32_t last) const noexcept {
-  using Wide = cv::v_float32;
   constexpr float kNone = 1e9F;  // 1/m
-  static constexpr std::array<float, kRowsAtOnce> kSteps{0, 1, 2, 3, 4, 5, 6, 7};
-  const float* w = image_->down.row(column);
-  const Wide zero = cv::vx_setall_f32(0.0F), none = cv::vx_setall_f32(kNone);
+  const float* w = image_->by_column.row(column);
+  const Wide zero = all(0.0F), none = all(kNone);
   Wide least = none, most = zero;
   // Whole registers; the last one begins earlier, and what it has besides does not count if it is the only one.
   for (std::int32_t r = first;; r += Wide::nlanes) {
     const std::int32_t start = std::max(std::min(r, last + 1 - Wide::nlanes), 0);
-    const Wide row = cv::vx_load(kSteps.data()) + cv::vx_setall_f32(static_cast<float>(start));
-    const Wide some = cv::vx_load(w + start) & (row >= cv::vx_setall_f32(static_cast<float>(first))) &
-                      (row <= cv::vx_setall_f32(static_cast<float>(last)));
+    const Wide row = simd::steps_from(0) + all(start);
+    const Wide some = cv::vx_load(w + start) & (row >= all(first)) & (row <= all(last));
     least = cv::v_min(least, cv::v_select(some > zero, some, none));
     most = cv::v_max(most, some);
     if (r + Wide::nlanes > last) break;
@@ -103,7 +102,7 @@ bool SpanBoundaries::reaches(const Line& line, std::int32_t top, std::int32_t bo
   const float at_bottom = line.a + line.b * rays_->y[static_cast<std::size_t>(bottom)];
   // Without what the plane's own place is uncertain by: some row comes nearer than that.
   const float most =
-      math::sqrt(kTruncation) * line.norm * (base_ * depths.nearest + per_metre_ + quadratic_ / depths.farthest);
+      math::sqrt(kTruncation) * line.norm * inverse_sigma_.most_relative(depths.farthest, depths.nearest);
   return std::max(at_top, at_bottom) + most >= depths.farthest && std::min(at_top, at_bottom) - most <= depths.nearest;
 }
 
@@ -141,38 +140,40 @@ void SpanBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size
   }
 }
 
+void SpanBoundaries::consider_beside(const Gap& gap, const Column& others, std::size_t& next, std::int32_t& most,
+                                     ColumnSpan& filled) const noexcept {
+  constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
+  while (next < others.size() && others[next].bottom + kReach_px < gap.from) ++next;
+  for (std::size_t i = next; i < others.size() && others[i].top - kReach_px <= gap.until; ++i) {
+    const ColumnSpan& other = others[i];
+    const std::int32_t top = std::max(gap.from, other.top - kReach_px);
+    const std::int32_t bottom = std::min(gap.until, other.bottom + kReach_px);
+    if (!gap.may_be(other.plane) || bottom - top < most) continue;
+    consider(gap, other.plane, top, bottom, depths_of(gap.column, top, bottom), most, filled);
+  }
+}
+
 void SpanBoundaries::fill_gaps(std::int32_t column, std::int32_t beside, std::size_t first_plane,
                                std::size_t last_plane) noexcept {
-  constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
-  constexpr std::int32_t kMinRows = 2;   // that fit
+  constexpr std::int32_t kMinRows = 2;  // that fit
   Column& spans = columns_[static_cast<std::size_t>(column)];
   const bool any_beside = beside >= 0 && beside < rays_->columns;
+  const Column& others = columns_[static_cast<std::size_t>(any_beside ? beside : column)];
   std::int32_t from = 0;
   std::size_t next_beside = 0;  // the first span there that reaches down to this gap
   for (std::size_t k = 0; k <= spans.size(); ++k) {
-    const std::int32_t until = k < spans.size() ? spans[k].top - 1 : rays_->height_px - 1;
-    const std::int32_t gap_from = from;
-    if (k < spans.size()) from = spans[k].bottom + 1;
-    if (until <= gap_from) continue;
+    const bool last = k == spans.size();
+    const Gap gap{column, from, last ? rays_->height_px - 1 : spans[k].top - 1,
+                  k > 0 ? spans[k - 1].plane : std::uint8_t{0}, last ? std::uint8_t{0} : spans[k].plane};
+    if (!last) from = spans[k].bottom + 1;
+    if (gap.until <= gap.from) continue;
     if (spans.full()) {
       ++overflow_;
       return;
     }
-    const Gap gap{column, gap_from, until, k > 0 ? spans[k - 1].plane : std::uint8_t{0},
-                  k < spans.size() ? spans[k].plane : std::uint8_t{0}};
     std::int32_t most = kMinRows - 1;
     ColumnSpan filled;
-    if (any_beside) {
-      const Column& others = columns_[static_cast<std::size_t>(beside)];
-      while (next_beside < others.size() && others[next_beside].bottom + kReach_px < gap_from) ++next_beside;
-      for (std::size_t i = next_beside; i < others.size() && others[i].top - kReach_px <= until; ++i) {
-        const ColumnSpan& other = others[i];
-        const std::int32_t top = std::max(gap_from, other.top - kReach_px);
-        const std::int32_t bottom = std::min(until, other.bottom + kReach_px);
-        if (!gap.may_be(other.plane) || bottom - top < most) continue;
-        consider(gap, other.plane, top, bottom, depths_of(column, top, bottom), most, filled);
-      }
-    }
+    if (any_beside) consider_beside(gap, others, next_beside, most, filled);
     if (first_plane <= last_plane) consider(gap, first_plane, last_plane, most, filled);
     if (most < kMinRows || !spans.try_push_back(filled)) continue;
     std::rotate(spans.begin() + static_cast<std::ptrdiff_t>(k), spans.end() - 1, spans.end());

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a surface ends, to a fraction of a pixel: change-points in the columns of the picture, one line through all.
+// Where a surface ends, to a fraction of a pixel: change-points in the columns of the image, one line through all.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
+#include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/perception/image/column_image.hpp"
 #include "algorithms/perception/image/depth_noise_model.hpp"
@@ -16,7 +17,7 @@ class EdgeLineFinder {
  public:
   struct Params {
     std::int32_t window_px = 12;
-    std::int32_t segment_px = 24;
+    std::int32_t group_px = 24;
     double truncate_sigmas = 3.0;
     std::int32_t min_side_px = 3;
     std::int32_t max_gap_px = 6;
@@ -37,7 +38,7 @@ class EdgeLineFinder {
 
     static void visit(auto& p, auto& field) {
       field("window_px", p.window_px, 4, 16, "As many rows are searched to each side of the first guess.");
-      field("segment_px", p.segment_px, 8, 640, "As many columns share one change-point.");
+      field("group_px", p.group_px, 8, 640, "As many columns share one change-point.");
       field("truncate_sigmas", p.truncate_sigmas, 0.5, 20.0, "A pixel farther off its plane costs no more.");
       field("min_side_px", p.min_side_px, 1, 16,
             "As many rows of the window fit their plane on each side of the change-point.");
@@ -57,7 +58,8 @@ class EdgeLineFinder {
       field("face_m", p.face_m, 0.0, 0.1, "An overhang's front face stands out from the riser by more.");
       field("face_max_m", p.face_max_m, 0.0, 0.5, "An overhang's front face stands out from the riser by less.");
       field.ordered("face_m", "face_max_m");
-      field("slow_error_m", p.slow_error_m, 0.0, 0.1, "Error of a segment's change-point that its columns share.");
+      field("slow_error_m", p.slow_error_m, 0.0, 0.1,
+            "Error of the change-point of group_px columns that its columns share.");
       field("least_local_m", p.least_local_m, 0.0, 0.1,
             "Error of where the planes meet locally, however well its columns agree.");
     }
@@ -65,7 +67,7 @@ class EdgeLineFinder {
   enum class Outcome : std::uint8_t { kFound, kAgain, kFewColumns, kNoLine, kNotStraight, kShort };
 
   // The surface's last row in a column, as a first guess.
-  void begin_guess() noexcept { guess_count_ = 0; }
+  void begin_guess() noexcept { guesses_.clear(); }
   void add_guess(std::int32_t column, std::int32_t row) noexcept;
   // A line through most of the guesses; false when there is none.
   [[nodiscard]] bool try_guess(const Params& params, std::uint32_t seed) noexcept;
@@ -74,72 +76,137 @@ class EdgeLineFinder {
     InversePlane plane;
     Mat3 covariance = Mat3::Zero();  // of its m
   };
-  // surface_above: the surface lies above its boundary in the picture (a nosing), else below it (a back line). other:
+  // surface_above: the surface lies above its boundary in the image (a nosing), else below it (a back line). other:
   // the plane on the far side; null when that is not known, then only leaving the surface's plane counts.
   void begin(const Params& params, const DepthNoiseModel& noise, const CameraIntrinsics& intrinsics,
              const ColumnRays& rays, const ColumnImage& image, const Measured& own, const Measured* other,
              bool surface_above) noexcept;
-  // Searches the next columns; true when all are done. At most max_columns columns, a multiple of kLanes.
+  // Searches the next columns; true when all are done. At most max_columns columns, a multiple of kSlots.
   bool step(std::int32_t max_columns) noexcept;
   // kAgain: the tread overhangs the riser with a face of its own; step() once more, against that face.
   [[nodiscard]] Outcome finish(EdgeLine& line) noexcept;
   // The first guess on the surface's plane, after begin(); good to a pixel.
-  [[nodiscard]] EdgeLine guessed_line() const noexcept { return {guess_a_m_, guess_b_m_, 0.01, true}; }
+  [[nodiscard]] EdgeLine guessed_line() const noexcept { return {guess_ends_m_[0], guess_ends_m_[1], 0.01, true}; }
 
-  [[nodiscard]] std::int32_t column_count() const noexcept { return count_; }
+  [[nodiscard]] std::int32_t column_count() const noexcept { return groups_.columns; }
 
  private:
+  static constexpr std::int32_t kSlots = 8;  // columns that are searched together, on every machine
+  static constexpr std::int32_t kMaxWindow_px = 16;
+  static constexpr std::int32_t kOffsets = 2 * kMaxWindow_px + 1;
+  static constexpr std::int32_t kMaxGroups = 24;
+  using Slots = std::array<float, kSlots>;
+
   struct Guess {
     std::int16_t column, row;
   };
-  static constexpr std::int32_t kLanes = 8;  // columns that are searched together, on every machine
-  static constexpr std::int32_t kMaxWindow_px = 16;
-  static constexpr std::int32_t kOffsets = 2 * kMaxWindow_px + 1;
-  static constexpr std::int32_t kMaxSegments = 24;
-  using Lanes = std::array<float, kLanes>;
-
-  // Columns are pooled in segments: one column's change-point is skewed towards the less noisy plane by up to a pixel,
-  // the pooled one is not.
-  struct Segment {
+  struct GuessLine {
+    double row = 0.0;  // at pixel column 0
+    double slope = 0.0;
+    std::int32_t first_column = 0, last_column = -1;
+    [[nodiscard]] double at(double column_px) const noexcept { return row + slope * column_px; }
+  };
+  struct OtherPlane {
+    bool known = false;
+    InversePlane plane;
+    Mat3 covariance = Mat3::Zero();       // of its m
+    Mat3 both_covariance = Mat3::Zero();  // of the difference of both planes' m
+  };
+  // Coordinates (along, across) on the surface's plane.
+  struct Axes {
+    Vec3 origin_m = Vec3::Zero();
+    Vec3 along = Vec3::UnitX();
+    Vec3 across = Vec3::UnitY();
+    [[nodiscard]] Vec3 point(double along_m, double across_m) const noexcept {
+      return origin_m + along_m * along + across_m * across;
+    }
+  };
+  // Columns next to each other: one column's change-point is skewed towards the less noisy plane by up to a pixel, that
+  // of all their gains is not.
+  struct Group {
     std::array<float, kOffsets> gain{};  // sum of cost(surface) - cost(other), by rows from the guess, outwards
     double columns = 0.0;
     double column_sum = 0.0;   // of their middles, pixels
     double rounded_sum = 0.0;  // of the guess less the row that it was rounded to
   };
-  [[nodiscard]] double guess_at(double column_px) const noexcept { return guess_row_ + guess_slope_ * column_px; }
-  [[nodiscard]] static double middle_px(std::int32_t column) noexcept {
-    return kColumn_px * column + 0.5 * (kColumn_px - 1);
-  }
-  // kLanes columns from a multiple of kLanes on.
-  void search_columns(std::int32_t first_column) noexcept;
-  void take_column(std::int32_t column, std::int32_t centre, std::int32_t first_row, std::int32_t last_row,
-                   std::size_t lane) noexcept;
-  void restart() noexcept;
-  void add_face(std::int32_t column, std::int32_t from_row, std::int32_t last_row) noexcept;
-  // How far the first pixels past the change-point stand out from the other plane; false when there are too few.
-  [[nodiscard]] bool try_face_offset(double& offset_m) const noexcept;
-  [[nodiscard]] double pixel_m(double along_m, double across_m) const noexcept;
-  // Where across the surface the picture's row is that many below the one of (along, across).
-  [[nodiscard]] double below_m(double along_m, double across_m, double rows) const noexcept;
+  struct Groups {
+    std::array<Group, kMaxGroups> of{};
+    std::int32_t count = 0;
+    std::int32_t columns = 0;  // in all of them
+  };
+  // By how much the first pixels past the change-point stand out from the other plane.
+  struct Face {
+    static constexpr std::int32_t kBins = 64;
+    static constexpr double kBin_m = 0.002;
+    std::array<std::int32_t, kBins> counts{};  // of offsets of 0, 2, ... mm; below 0 counts as 0
+    bool tried = false;
+  };
+  // The groups' change-points, in the axes.
+  struct Points {
+    std::array<Vec2, kMaxGroups> at_m{};
+    std::array<double, kMaxGroups> weight{};
+    std::array<double, kMaxGroups> scratch{};
+    std::size_t count = 0;
+    [[nodiscard]] double median_of_scratch() noexcept;
+  };
+  // across = a + b along, from lo to hi.
+  struct Fit {
+    double a = 0.0, b = 0.0;
+    double lo_m = 0.0, hi_m = 0.0;
+    double sigma_m = 0.0;  // at the line's ends: twice the one in the middle
+    [[nodiscard]] double at(double along_m) const noexcept { return a + b * along_m; }
+  };
   // By how many rows the planes meet below where they meet as a whole, as the few rows on both sides say: what a slow
   // error of the camera adds to both planes' pixels at the edge does not move it there, but each plane's fit. Nosings
   // only: it takes .25 % of a frame's instructions.
   struct Shift {
+    bool known = false;
     double start_px = 0.0, at_px = 0.0, per_column = 0.0;  // at_px at start_px
     double sigma_px = 0.0;                                 // at the line's ends
     [[nodiscard]] double at(double column_px) const noexcept {
       return at_px + per_column * (column_px - start_px) / kColumn_px;
     }
   };
-  [[nodiscard]] bool try_local_shift(Shift& shift) const noexcept;
-  [[nodiscard]] bool try_segment_point(const Segment& segment, Vec2& point_m) const noexcept;
+  struct Windows;   // what kSlots columns are searched for, and where
+  struct Found;     // what was found in them
+  struct NearRows;  // rows on both sides of where the planes meet
+  struct ShiftSums;
 
-  std::array<Guess, kColumns> guess_{};
-  std::size_t guess_count_ = 0;
-  double guess_row_ = 0.0;  // row of the guessed line at pixel column 0
-  double guess_slope_ = 0.0;
-  std::int32_t first_column_ = 0;
-  std::int32_t last_column_ = -1;
+  [[nodiscard]] static double middle_px(std::int32_t column) noexcept {
+    return kColumn_px * column + 0.5 * (kColumn_px - 1);
+  }
+  [[nodiscard]] Vec3 ray_at(double column_px, double row_px) const noexcept {
+    return {(column_px - intrinsics_.cx_px) / intrinsics_.fx_px, (row_px - intrinsics_.cy_px) / intrinsics_.fy_px, 1.0};
+  }
+  void restart() noexcept;
+  // kSlots columns from a multiple of kSlots on.
+  void search_columns(std::int32_t first_column) noexcept;
+  [[nodiscard]] Windows windows_of(std::int32_t first_column) const noexcept;
+  void weigh_rows(const Windows& windows, Found& found) noexcept;
+  void take_column(const Windows& windows, std::size_t slot) noexcept;
+  void add_face(std::int32_t column, std::int32_t from_row, std::int32_t last_row) noexcept;
+  // False when too few pixels stand out.
+  [[nodiscard]] bool try_face_offset(double& offset_m) const noexcept;
+  // A line through the change-points that holds for most columns.
+  void gather_points() noexcept;
+  [[nodiscard]] bool try_group_point(const Group& group, Vec2& point_m) const noexcept;
+  [[nodiscard]] bool try_robust_line(Fit& fit, double& limit_m) noexcept;
+  [[nodiscard]] Outcome measure(Fit& fit, double limit_m) const noexcept;
+  // Where the planes meet, if that agrees with the fit, goes into the line's ends; false when the search is to begin
+  // again, against an overhang's face.
+  [[nodiscard]] bool try_meet_other(const Fit& fit, EdgeLine& line) noexcept;
+  [[nodiscard]] bool begins_at_face() noexcept;
+  // All that is known of the edge at one place along it, by information: where across it lies, and its sigma.
+  double join(const Fit& fit, const Shift& shift, double along_m, double meet_m, double& across_m) const noexcept;
+  [[nodiscard]] double meet_m(double along_m) const noexcept;
+  [[nodiscard]] double pixel_m(double along_m, double across_m) const noexcept;
+  // Where across the surface the image's row is that many below the one of (along, across).
+  [[nodiscard]] double below_m(double along_m, double across_m, double rows) const noexcept;
+  [[nodiscard]] Shift local_shift() const noexcept;
+  void add_shifts(const NearRows& near, ShiftSums& sums) const noexcept;
+
+  StaticVector<Guess, kColumns> guesses_;
+  GuessLine guess_;
 
   Params params_;
   DepthNoiseModel noise_;
@@ -147,31 +214,16 @@ class EdgeLineFinder {
   const ColumnRays* rays_ = nullptr;
   const ColumnImage* image_ = nullptr;
   InversePlane surface_;
-  InversePlane other_;
-  Mat3 other_covariance_ = Mat3::Zero();
-  Mat3 both_covariance_ = Mat3::Zero();  // of the difference of both planes' m
-  bool other_known_ = false;
+  OtherPlane other_;
   bool surface_above_ = true;
+  Axes axes_;
+  std::array<Vec3, 2> guess_ends_m_{Vec3::Zero(), Vec3::Zero()};
+
   std::int32_t next_column_ = 0;
-
-  // Coordinates (along, across) on the surface's plane.
-  Vec3 origin_m_ = Vec3::Zero();
-  Vec3 guess_a_m_ = Vec3::Zero();
-  Vec3 guess_b_m_ = Vec3::Zero();
-  Vec3 along_ = Vec3::UnitX();
-  Vec3 across_ = Vec3::UnitY();
-
-  std::array<Lanes, kDepthHeight_px> gains_{};  // of the columns searched together, by row
-  std::array<Segment, kMaxSegments> segments_{};
-  std::int32_t segment_count_ = 0;
-  static constexpr std::int32_t kFaceBins = 64;
-  static constexpr double kFaceBin_m = 0.002;
-  std::array<std::int32_t, kFaceBins> face_{};  // offsets of 0, 2, ... mm; below 0 counts as 0
-  bool face_tried_ = false;
-  std::array<Vec2, kMaxSegments> points_m_{};
-  std::array<double, kMaxSegments> weights_{};
-  std::array<double, kMaxSegments> scratch_{};
-  std::int32_t count_ = 0;
+  std::array<Slots, kDepthHeight_px> gains_{};  // of the columns searched together, by row
+  Groups groups_;
+  Face face_;
+  Points points_;
 };
 
 }  // namespace polygmap

@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "algorithms/perception/image/simd.hpp"
+#include "algorithms/perception/polygons/line_sums.hpp"
 
 namespace polygmap {
 namespace {
@@ -17,7 +18,9 @@ constexpr std::int32_t kInside_px = 8;                   // of the outermost col
 constexpr std::int32_t kOutside_px = 8;                  // searched beyond
 constexpr std::int32_t kReach_px = kInside_px + kOutside_px;
 
-using Wide = cv::v_float32;
+constexpr double kNowhere = -1e9;  // beyond the other end of any image
+
+using simd::all, simd::Four, simd::Wide;
 using Reach = std::array<float, kReach_px>;  // from inside outwards
 using Raws = std::array<std::uint16_t, kReach_px>;
 
@@ -45,7 +48,6 @@ struct RowPlane {
   }
   // Over sigma.
   [[nodiscard]] Wide residual(const Wide& column, const Wide& depth_m) const noexcept {
-    const auto all = [](float x) { return cv::vx_setall_f32(x); };
     return ((all(at) + all(slope) * column) * depth_m - all(1.0F)) * all(per_sigma);
   }
   // 2 ln(sigma over the other's), near enough: with residuals alone a crease moves towards the plane of less noise.
@@ -61,23 +63,18 @@ struct PixelGains {
 
 // A bit for each step outwards at which the sum of the gains so far is least, or hardly more.
 std::uint32_t least_costs(const Reach& gain) noexcept {
-  using Four = cv::v_float32x4;  // the same order of summing for every register width
   constexpr float kTie = 1e-3F;
   constexpr std::size_t kFours = kReach_px / Four::nlanes;
   std::array<Four, kFours> cost;
   Four before = cv::v_setzero_f32(), least = cv::v_setall_f32(1e9F);
   for (std::size_t i = 0; i < kFours; ++i) {
-    Four sum = cv::v_load(gain.data() + i * Four::nlanes);
-    sum = sum + cv::v_rotate_left<1>(sum);
-    sum = sum + cv::v_rotate_left<2>(sum) + before;
-    before = cv::v_broadcast_element<3>(sum);
-    least = cv::v_min(least, sum);
-    cost[i] = sum;
+    cost[i] = simd::running_sums(cv::v_load(gain.data() + i * Four::nlanes), before);
+    least = cv::v_min(least, cost[i]);
   }
   const Four most = cv::v_setall_f32(cv::v_reduce_min(least) + kTie);
   std::uint32_t bits = 0;
   for (std::size_t i = 0; i < kFours; ++i) {
-    bits |= static_cast<std::uint32_t>(cv::v_signmask(cost[i] < most)) << (i * Four::nlanes);
+    bits |= simd::bits(cost[i] < most) << (i * Four::nlanes);
   }
   return bits;
 }
@@ -90,24 +87,17 @@ cv::v_uint16x8 reversed(const cv::v_uint16x8& a) noexcept {
 
 // What every pixel says for the plane beyond and against our own: twice the negative logarithms of the likelihoods, but
 // for a constant. Nothing where there is no data.
-PixelGains weigh(const SideLines::Params& params, const RawImage& picture, const RowPlane& own, const RowPlane& other,
+PixelGains weigh(const SideLines::Params& params, const RawImage& image, const RowPlane& own, const RowPlane& other,
                  std::int32_t first, std::int32_t out, const Raws& raw) noexcept {
   PixelGains gains;
   static_assert(kReach_px % Wide::nlanes == 0);
-  const auto all = [](float x) { return cv::vx_setall_f32(x); };
-  static constexpr Reach kSteps = [] {
-    Reach steps{};
-    for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = static_cast<float>(i);
-    return steps;
-  }();
-  const Wide most = all(static_cast<float>(math::square(params.truncate_sigmas)));
-  const Wide leave = all(static_cast<float>(math::square(params.leave_sigmas)));
+  const Wide most = all(math::square(params.truncate_sigmas));
+  const Wide leave = all(math::square(params.leave_sigmas));
   const Wide more = all(other.valid ? other.wider_than(own) : 0.0F);
-  const Wide unit_m = all(static_cast<float>(picture.intrinsics.depth_unit_m));
-  const Wide least = all(static_cast<float>(picture.range.min)), largest = all(static_cast<float>(picture.range.max));
+  const Wide unit_m = all(image.intrinsics.depth_unit_m);
+  const Wide least = all(image.range.min), largest = all(image.range.max);
   for (std::int32_t i = 0; i < kReach_px; i += Wide::nlanes) {
-    const Wide depth = cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::vx_load_expand(raw.data() + i)));
-    const Wide column = all(static_cast<float>(first)) + all(static_cast<float>(out)) * cv::vx_load(kSteps.data() + i);
+    const Wide depth = simd::load_u16(raw.data() + i), column = all(first) + all(out) * simd::steps_from(i);
     const Wide r = own.residual(column, depth * unit_m);
     Wide beyond = leave;
     if (other.valid) {
@@ -116,20 +106,24 @@ PixelGains weigh(const SideLines::Params& params, const RawImage& picture, const
     }
     const Wide measured = (depth >= least) & (depth <= largest);
     cv::v_store(gains.gain.data() + i, (cv::v_min(r * r, most) - beyond) & measured);
-    gains.measured |= static_cast<std::uint32_t>(cv::v_signmask(measured)) << i;
-    gains.before |= static_cast<std::uint32_t>(cv::v_signmask(r)) << i;
+    gains.measured |= simd::bits(measured) << i;
+    gains.before |= simd::bits(r) << i;
   }
   return gains;
 }
 
+double outwards(bool right) noexcept { return right ? 1.0 : -1.0; }
+// Of a column of pixels.
+double outer_edge(std::int32_t g, bool right) noexcept { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); }
+
 }  // namespace
 
-void SideLines::begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw,
-                      const FrameImage& picture, const Regions& regions) noexcept {
+void SideLines::begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw, const FrameImage& image,
+                      const Regions& regions) noexcept {
   params_ = params;
   noise_ = noise;
   raw_ = &raw;
-  picture_ = &picture;
+  image_ = &image;
   regions_ = &regions;
   pitch_ = 1.0 / raw.intrinsics.fx_px;
 }
@@ -142,52 +136,65 @@ struct SideLines::RowView {
   std::int32_t first, out;  // pixel, and step outwards
   Ending ending;            // kSeen: the pixels will tell
 };
+struct SideLines::Views {
+  std::array<RowView, kMaxRows> of;
+  std::size_t count = 0;
+};
+
+RegionId SideLines::plane_beyond(RegionId id, std::int32_t out, const RowView& view) const noexcept {
+  RegionId beyond = kNoRegion;
+  for (std::int32_t g = view.column + out; g != view.column + 3 * out; g += out) {
+    if (g < 0 || g >= image_->column_rays.columns) break;
+    const RegionId p = regions_->labels.at(g, view.row);
+    if (p != kNoRegion && p != id) beyond = p;
+  }
+  return beyond;
+}
+
+std::int32_t SideLines::count_free(bool right, const RowView& view) const noexcept {
+  const std::int32_t count = std::min(kReach_px, right ? raw_->intrinsics.width_px - view.first : view.first + 1);
+  if (!image_->body_rows[static_cast<std::size_t>(view.row / 2)]) return count;
+  const std::uint8_t* flags = image_->flags.row(view.row / 2);
+  std::int32_t free = 0;
+  while (free < count && (flags[(view.first + view.out * free) / 2] & kPixelBody) == 0) ++free;
+  return free;
+}
+
+void SideLines::copy_pixels(bool right, std::int32_t count, RowView& view) const noexcept {
+  const std::uint16_t* pixels = raw_->row(view.row);
+  if (count < kReach_px) {
+    view.raw.fill(0);
+    for (std::int32_t i = 0; i < count; ++i) view.raw[static_cast<std::size_t>(i)] = pixels[view.first + view.out * i];
+    return;
+  }
+  using Eight = cv::v_uint16x8;
+  static_assert(kReach_px == 2 * Eight::nlanes);
+  const std::uint16_t* leftmost = pixels + (right ? view.first : view.first - (kReach_px - 1));
+  const Eight a = cv::v_load(leftmost), b = cv::v_load(leftmost + Eight::nlanes);
+  cv::v_store(view.raw.data(), right ? a : reversed(b));
+  cv::v_store(view.raw.data() + Eight::nlanes, right ? b : reversed(a));
+}
 
 void SideLines::look(RegionId id, bool right, RowView& view) const noexcept {
   const CameraIntrinsics& k = raw_->intrinsics;
-  const Regions& regions = *regions_;
-  const std::int32_t row = view.row, column = view.column, out = right ? 1 : -1;
-  const std::int32_t border = kColumn_px * column + (right ? kColumn_px - 1 : 0);  // the outermost column's last pixel
-  const std::int32_t first = border - out * (kInside_px - 1);
-  view.first = first;
+  const std::int32_t out = right ? 1 : -1;
+  const std::int32_t border = kColumn_px * view.column + (right ? kColumn_px - 1 : 0);  // the outermost column's last
+  view.first = border - out * (kInside_px - 1);
   view.out = out;
-  // The picture's last columns hide what comes after them.
+  // The image's last columns hide what comes after them.
   view.ending = Ending::kHidden;
   if (border + 2 * out < 0 || border + 2 * out >= k.width_px) return;
   view.ending = Ending::kNone;
-  if (first < 0 || first >= k.width_px) return;
+  if (view.first < 0 || view.first >= k.width_px) return;
   const RowRays rays{-k.cx_px * pitch_, pitch_,
-                     static_cast<double>(picture_->column_rays.y[static_cast<std::size_t>(row)])};
-  view.own.set(regions[id].plane, noise_, rays, border);
+                     static_cast<double>(image_->column_rays.y[static_cast<std::size_t>(view.row)])};
+  view.own.set((*regions_)[id].plane, noise_, rays, border);
   if (!view.own.valid) return;
-  // The plane beyond, if there is one.
-  RegionId beyond = kNoRegion;
-  for (std::int32_t g = column + out; g != column + 3 * out; g += out) {
-    if (g < 0 || g >= picture_->column_rays.columns) break;
-    const RegionId p = regions.labels.at(g, row);
-    if (p != kNoRegion && p != id) beyond = p;
-  }
+  const RegionId beyond = plane_beyond(id, out, view);
   view.other.valid = false;
-  if (beyond != kNoRegion) view.other.set(regions[beyond].plane, noise_, rays, border);
-  const std::uint16_t* pixels = raw_->row(row);
-  std::int32_t count = std::min(kReach_px, right ? k.width_px - first : first + 1);
-  if (picture_->body_rows[static_cast<std::size_t>(row / 2)]) {
-    const std::uint8_t* flags = picture_->flags.row(row / 2);
-    std::int32_t free = 0;
-    while (free < count && (flags[(first + out * free) / 2] & kPixelBody) == 0) ++free;
-    count = free;
-  }
-  if (count == kReach_px) {
-    using Eight = cv::v_uint16x8;
-    static_assert(kReach_px == 2 * Eight::nlanes);
-    const std::uint16_t* leftmost = pixels + (right ? first : first - (kReach_px - 1));
-    const Eight a = cv::v_load(leftmost), b = cv::v_load(leftmost + Eight::nlanes);
-    cv::v_store(view.raw.data(), right ? a : reversed(b));
-    cv::v_store(view.raw.data() + Eight::nlanes, right ? b : reversed(a));
-  } else {
-    view.raw.fill(0);
-    for (std::int32_t i = 0; i < count; ++i) view.raw[static_cast<std::size_t>(i)] = pixels[first + out * i];
-  }
+  if (beyond != kNoRegion) view.other.set((*regions_)[beyond].plane, noise_, rays, border);
+  const std::int32_t count = count_free(right, view);
+  copy_pixels(right, count, view);
   view.ending = count < kInside_px ? Ending::kHidden : Ending::kSeen;  // by the robot's own body
 }
 
@@ -208,21 +215,20 @@ SideLines::Ending SideLines::end_of_row(const RowView& view, double& end_px) con
   return Ending::kSeen;
 }
 
-// The steep line that most of the seen ends lie on: pairs of them propose, least squares of those near by decide.
-bool SideLines::try_line(const InversePlane& plane, Line& line) const noexcept {
+bool SideLines::is_upright(const InversePlane& plane, const Line& line) const noexcept {
   const CameraIntrinsics& k = raw_->intrinsics;
-  const auto n = static_cast<std::int32_t>(seen_.size());
-  if (n < params_.min_rows) return false;
   const Vec3 normal = plane.normal();
   const Vec3 along = (Vec3::UnitX() - normal * normal.x()).normalized(), across = normal.cross(along);
-  const double first_row = seen_.front().row, last_row = seen_.back().row;
-  const auto upright = [&](const Line& l) {
-    const auto point = [&](double row) {
-      return plane.point({(l.at + l.slope * row - k.cx_px) / k.fx_px, (row - k.cy_px) / k.fy_px, 1.0});
-    };
-    const Vec3 direction = point(last_row) - point(first_row);
-    return std::abs(along.dot(direction)) <= params_.max_lean * std::abs(across.dot(direction));
+  const auto point = [&](double row) {
+    return plane.point({(line.at + line.slope * row - k.cx_px) / k.fx_px, (row - k.cy_px) / k.fy_px, 1.0});
   };
+  const Vec3 direction = point(seen_.back().row) - point(seen_.front().row);
+  return std::abs(along.dot(direction)) <= params_.max_lean * std::abs(across.dot(direction));
+}
+
+// Of lines through two of the seen ends, the one nearest to all.
+bool SideLines::try_propose(const InversePlane& plane, Line& line) const noexcept {
+  const auto n = static_cast<std::int32_t>(seen_.size());
   double best = 1e9;
   for (const std::int32_t apart : {n / 2, n / 4}) {
     const std::int32_t stride = std::max(apart / 3, 1);
@@ -235,24 +241,25 @@ bool SideLines::try_line(const InversePlane& plane, Line& line) const noexcept {
         cost += std::min(off * off, params_.inlier_px * params_.inlier_px);
       }
       const Line candidate{a.column - slope * a.row, slope};
-      if (cost >= best || !upright(candidate)) continue;
+      if (cost >= best || !is_upright(plane, candidate)) continue;
       best = cost;
       line = candidate;
     }
   }
-  if (best > 1e8) return false;
+  return best <= 1e8;
+}
+
+// The steep line that most of the seen ends lie on: pairs of them propose, least squares of those near by decide.
+bool SideLines::try_line(const InversePlane& plane, Line& line) const noexcept {
+  if (static_cast<std::int32_t>(seen_.size()) < params_.min_rows || !try_propose(plane, line)) return false;
   for (int round = 0; round < 3; ++round) {
-    double count = 0.0, row = 0.0, column = 0.0, row2 = 0.0, both = 0.0;
+    LineSums<double> sums{};
     for (const RowEnd& e : seen_) {
-      if (std::abs(e.column - line.at - line.slope * e.row) > params_.inlier_px) continue;
-      count += 1.0, row += e.row, column += e.column, row2 += e.row * e.row, both += e.row * e.column;
+      if (std::abs(e.column - line.at - line.slope * e.row) <= params_.inlier_px) sums.add(1.0, e.row, e.column);
     }
-    const double spread = count * row2 - row * row;
-    if (count < params_.min_rows || !(spread > 0.0)) return false;
-    line.slope = (count * both - row * column) / spread;
-    line.at = (column - line.slope * row) / count;
+    if (sums.n < params_.min_rows || !try_solve(sums, line.at, line.slope)) return false;
   }
-  return upright(line);
+  return is_upright(plane, line);
 }
 
 void SideLines::find_ends(RegionId id) noexcept {
@@ -282,91 +289,117 @@ void SideLines::find_ends(RegionId id) noexcept {
   }
 }
 
+// Where the surface's end runs off sideways from row to row it is a front or a back, no side: a bit for each row that
+// may end at one.
+struct SideLines::UprightRows {
+  using Bytes = cv::v_uint8x16;
+  std::int32_t first_row;
+  std::int32_t count = 0;
+  std::array<std::uint32_t, kDepthHeight_px / Bytes::nlanes + 1> bits;
+};
+
+SideLines::UprightRows SideLines::upright_rows(const ColumnExtents& profile, const std::uint8_t* ends) const noexcept {
+  using Bytes = UprightRows::Bytes;
+  UprightRows rows;
+  rows.first_row = profile.first_row;
+  const Bytes flat = cv::v_setall_u8(kFlatColumns), none = cv::v_setall_u8(kNoColumn);
+  std::size_t i = 0;
+  for (std::int32_t r = profile.first_row; r <= profile.last_row; r += Bytes::nlanes, ++i) {
+    const Bytes drift = cv::v_absdiff(cv::v_load(ends + r + kFlatRows / 2), cv::v_load(ends + r - kFlatRows / 2));
+    const Bytes may = (cv::v_max(drift, flat) == flat) & (cv::v_load(ends + r) != none);
+    rows.bits[i] = simd::bits(may) & ((2U << std::min(profile.last_row - r, Bytes::nlanes - 1)) - 1U);
+    rows.count += std::popcount(rows.bits[i]);
+  }
+  return rows;
+}
+
+void SideLines::choose_rows(const UprightRows& rows, std::int32_t most, const std::uint8_t* ends,
+                            Views& views) const noexcept {
+  constexpr std::int32_t kBits = UprightRows::Bytes::nlanes;
+  const std::int32_t stride = (rows.count + most - 1) / most;
+  std::int32_t above = 0;  // such rows above r0
+  for (std::int32_t i = stride / 2, r0 = rows.first_row; i < rows.count; i += stride) {
+    const auto bits = [&] { return rows.bits[static_cast<std::size_t>((r0 - rows.first_row) / kBits)]; };
+    for (; above + std::popcount(bits()) <= i; r0 += kBits) above += std::popcount(bits());
+    std::uint32_t from_it = bits();
+    for (std::int32_t before = above; before < i; ++before) from_it &= from_it - 1U;
+    RowView& view = views.of[views.count++];
+    view.row = r0 + std::countr_zero(from_it);
+    view.column = ends[view.row];
+    __builtin_prefetch(raw_->row(view.row) + kColumn_px * view.column);
+  }
+}
+
+double SideLines::find_row_ends(const Views& views, bool right) noexcept {
+  double outermost = kNowhere;
+  seen_.clear();
+  hidden_.clear();
+  for (std::size_t i = 0; i < views.count; ++i) {
+    double column = 0.0;
+    const Ending ending = end_of_row(views.of[i], column);
+    if (ending == Ending::kNone) continue;
+    if (ending == Ending::kHidden) column = outer_edge(views.of[i].column, right);
+    static_cast<void>(
+        (ending == Ending::kSeen ? seen_ : hidden_).try_push_back({static_cast<double>(views.of[i].row), column}));
+    outermost = std::max(outermost, outwards(right) * column);
+  }
+  return outermost;
+}
+
+bool SideLines::holds(const Line& line, double& first_row, double& last_row) const noexcept {
+  std::int32_t on = 0, between = 0;
+  first_row = 1e9;
+  last_row = -1e9;
+  for (const RowEnd& e : seen_) {
+    if (std::abs(e.column - line.at - line.slope * e.row) > params_.inlier_px) continue;
+    ++on;
+    first_row = std::min(first_row, e.row);
+    last_row = std::max(last_row, e.row);
+  }
+  for (const auto* ends : {&seen_, &hidden_}) {
+    for (const RowEnd& e : *ends) between += e.row >= first_row && e.row <= last_row ? 1 : 0;
+  }
+  return on >= params_.min_rows && on >= params_.min_share * between;
+}
+
+double SideLines::count_outside(const Line& line, const ColumnExtents& profile, bool right) const noexcept {
+  const std::uint8_t* ends = ends_of(right);
+  double count_px = 0.0;
+  const std::int32_t step = 1 + (profile.last_row - profile.first_row) / kManyRows;
+  for (std::int32_t r = profile.first_row; r <= profile.last_row; r += step) {
+    if (ends[r] == kNoColumn) continue;
+    const double beyond_px = outwards(right) * (outer_edge(ends[r], right) - line.at - line.slope * r);
+    count_px += step * std::max(beyond_px - params_.outside_px, 0.0);
+  }
+  return count_px;
+}
+
 OutlineSide SideLines::find(RegionId id, bool right) noexcept {
   const Region& plane = (*regions_)[id];
   const ColumnExtents& profile = regions_->extents[id];
-  const double out = right ? 1.0 : -1.0;
-  const auto outer_edge = [right](std::int32_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
-  seen_.clear();
-  hidden_.clear();
-  const std::uint8_t* ends = (right ? right_ : left_).data() + kPad;
-  // Where the surface's end runs off sideways from row to row it is a front or a back, no side: a bit for each row that
-  // may end at one.
-  using Bytes = cv::v_uint8x16;
-  std::array<std::uint32_t, kDepthHeight_px / Bytes::nlanes + 1> upright;
-  std::int32_t count = 0;
-  const std::int32_t first_row = profile.first_row, last_row = profile.last_row;
-  const Bytes flat = cv::v_setall_u8(kFlatColumns), none = cv::v_setall_u8(kNoColumn);
-  for (std::int32_t r = first_row, i = 0; r <= last_row; r += Bytes::nlanes, ++i) {
-    const Bytes drift = cv::v_absdiff(cv::v_load(ends + r + kFlatRows / 2), cv::v_load(ends + r - kFlatRows / 2));
-    const Bytes may = (cv::v_max(drift, flat) == flat) & (cv::v_load(ends + r) != none);
-    const std::uint32_t rows = (2U << std::min(last_row - r, Bytes::nlanes - 1)) - 1U;
-    upright[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(cv::v_signmask(may)) & rows;
-    count += std::popcount(upright[static_cast<std::size_t>(i)]);
-  }
-  const std::int32_t most = plane.kind == SurfaceKind::kTread ? kMaxRows : kOtherRows;
-  const std::int32_t stride = (count + most - 1) / most;
+  const std::uint8_t* ends = ends_of(right);
   // Rows are asked for, then looked at, then decided on: each step takes its time, and none waits for another row's.
-  std::array<RowView, kMaxRows> views;
-  std::size_t row_count = 0;
-  std::int32_t above = 0;  // such rows above r0
-  for (std::int32_t i = stride / 2, r0 = first_row; i < count; i += stride) {
-    const auto bits = [&] { return upright[static_cast<std::size_t>((r0 - first_row) / Bytes::nlanes)]; };
-    for (; above + std::popcount(bits()) <= i; r0 += Bytes::nlanes) above += std::popcount(bits());
-    std::uint32_t from_it = bits();
-    for (std::int32_t before = above; before < i; ++before) from_it &= from_it - 1U;
-    const std::int32_t r = r0 + std::countr_zero(from_it);
-    views[row_count].row = r;
-    views[row_count++].column = ends[r];
-    __builtin_prefetch(raw_->row(r) + kColumn_px * ends[r]);
-  }
-  for (std::size_t i = 0; i < row_count; ++i) look(id, right, views[i]);
-  double outermost = -1e9;
-  for (std::size_t i = 0; i < row_count; ++i) {
-    double column = 0.0;
-    const Ending ending = end_of_row(views[i], column);
-    if (ending == Ending::kNone) continue;
-    if (ending == Ending::kHidden) column = outer_edge(views[i].column);
-    static_cast<void>(
-        (ending == Ending::kSeen ? seen_ : hidden_).try_push_back({static_cast<double>(views[i].row), column}));
-    outermost = std::max(outermost, out * column);
+  Views views;
+  choose_rows(upright_rows(profile, ends), plane.kind == SurfaceKind::kTread ? kMaxRows : kOtherRows, ends, views);
+  for (std::size_t i = 0; i < views.count; ++i) look(id, right, views.of[i]);
+  double outermost = find_row_ends(views, right);
+  if (!(outermost > kNowhere)) {  // no row but flat ones
+    for (std::int32_t r = profile.first_row; r <= profile.last_row; ++r) {
+      if (ends[r] != kNoColumn) outermost = std::max(outermost, outwards(right) * outer_edge(ends[r], right));
+    }
   }
   // Half-resolution pixel i is where full-resolution 2 i + 0.5 is.
   OutlineSide side;
-  if (outermost < -1e8) {  // no row but flat ones
-    for (std::int32_t r = first_row; r <= last_row; ++r) {
-      const std::uint8_t g = ends[r];
-      if (g != kNoColumn) outermost = std::max(outermost, out * outer_edge(g));
-    }
-  }
-  side.column_px = 0.5 * (out * outermost - 0.5);
+  side.column_px = 0.5 * (outwards(right) * outermost - 0.5);
   Line line;
-  if (!try_line(plane.plane, line)) return side;
-  std::int32_t on = 0, between = 0;
-  double first = 1e9, last = -1e9;
-  const auto beyond = [&](double row, double column) { return out * (column - line.at - line.slope * row); };
-  for (const RowEnd& e : seen_) {
-    if (std::abs(beyond(e.row, e.column)) > params_.inlier_px) continue;
-    ++on;
-    first = std::min(first, e.row);
-    last = std::max(last, e.row);
-  }
-  for (const auto* all : {&seen_, &hidden_}) {
-    for (const RowEnd& e : *all) between += e.row >= first && e.row <= last ? 1 : 0;
-  }
-  double cut_px = 0.0;
-  const std::int32_t step = 1 + (last_row - first_row) / kManyRows;
-  for (std::int32_t r = first_row; r <= last_row; r += step) {
-    const std::uint8_t g = ends[r];
-    if (g != kNoColumn) cut_px += step * std::max(beyond(r, outer_edge(g)) - params_.outside_px, 0.0);
-  }
-  if (on < params_.min_rows || on < params_.min_share * between) return side;
-  if (cut_px > params_.max_cut * plane.area_px) return side;
+  double first_row = 0.0, last_row = 0.0;
+  if (!try_line(plane.plane, line) || !holds(line, first_row, last_row)) return side;
+  if (count_outside(line, profile, right) > params_.max_cut * plane.area_px) return side;
   side.fitted = true;
   side.column_px = 0.5 * (line.at + 0.5 * line.slope - 0.5);
   side.slope = line.slope;
-  side.top_px = 0.5 * (first - 1.0);
-  side.bottom_px = 0.5 * last;
+  side.top_px = 0.5 * (first_row - 1.0);
+  side.bottom_px = 0.5 * last_row;
   return side;
 }
 

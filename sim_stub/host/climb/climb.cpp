@@ -151,7 +151,7 @@ CameraFigures camera_figures(const SimRobot& robot, const CameraExtrinsicsEstima
   f.mount_error_m = errors.base_T_camera.p_m - nominal_robot().mounts.base_T_camera.p_m;
   f.mount_found_deg = kDegrees * Vec2{mount.roll_rad(), mount.pitch_rad()};
   f.mount_found_height_m = mount.height_m();
-  f.mount_found_ahead_m = mount.ahead_m();
+  f.mount_found_ahead_m = mount.x_m();
   return f;
 }
 

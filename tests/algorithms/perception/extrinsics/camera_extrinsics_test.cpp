@@ -245,8 +245,8 @@ TEST(CameraExtrinsicsEstimator, CameraAheadOfItsPlace_FoundByTheToes) {
       robot.detect_toe(mount, 0, 0.001);
       robot.deliver(mount);
     }
-    EXPECT_NEAR(mount.ahead_m(), off_m, 0.0006);
-    EXPECT_NEAR(mount.base_T_camera().p_m.x() - base_T_camera().p_m.x(), mount.ahead_m(), 1e-9);
+    EXPECT_NEAR(mount.x_m(), off_m, 0.0006);
+    EXPECT_NEAR(mount.base_T_camera().p_m.x() - base_T_camera().p_m.x(), mount.x_m(), 1e-9);
     EXPECT_EQ(mount.counters().toes, 30U);
     // Frames in which no surface is seen tell of the toes all the same.
     CameraExtrinsicsEstimator blind = estimator();
@@ -254,7 +254,7 @@ TEST(CameraExtrinsicsEstimator, CameraAheadOfItsPlace_FoundByTheToes) {
       robot.detect_toe(blind, 1, 0.001);
       robot.deliver(blind);
     }
-    EXPECT_NEAR(blind.ahead_m(), off_m, 0.0006);
+    EXPECT_NEAR(blind.x_m(), off_m, 0.0006);
   }
 }
 
@@ -265,13 +265,13 @@ TEST(CameraExtrinsicsEstimator, ToeSeenFarOffOrWhileTheBaseMoves_MovesTheCameraN
     robot.detect_toe(far, 0);
     robot.deliver(far);
   }
-  EXPECT_NEAR(far.ahead_m(), 0.010, 1e-9);
+  EXPECT_NEAR(far.x_m(), 0.010, 1e-9);
   other.stance().speed_mps = 0.3;
   for (int i = 0; i < 10; ++i) {
     other.detect_toe(moving, 0);
     other.deliver(moving);
   }
-  EXPECT_LT(std::abs(moving.ahead_m()), 0.002);
+  EXPECT_LT(std::abs(moving.x_m()), 0.002);
 }
 
 TEST(CameraExtrinsicsEstimator, ToeOfAFootInTheAirOrNoNumber_TellsNothing) {
@@ -283,7 +283,7 @@ TEST(CameraExtrinsicsEstimator, ToeOfAFootInTheAirOrNoNumber_TellsNothing) {
     robot.stance().toes[1] = ToeSighting{std::numeric_limits<double>::quiet_NaN(), 0.0006};
     robot.deliver(mount);
   }
-  EXPECT_EQ(mount.ahead_m(), 0.0);
+  EXPECT_EQ(mount.x_m(), 0.0);
   EXPECT_EQ(mount.counters().toes, 0U);
 }
 

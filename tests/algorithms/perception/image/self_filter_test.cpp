@@ -121,6 +121,35 @@ TEST(SelfFilter, Mask_ShapesBehindTheCamera_IsEmpty) {
   }
 }
 
+bool meets(const Vec3& ray, const Vec3& centre_m, double radius_m) {
+  const double along = ray.dot(centre_m);
+  return along > 0.0 && along * along >= ray.squaredNorm() * (centre_m.squaredNorm() - radius_m * radius_m);
+}
+
+// Also of those whose cone goes on beyond the image, upwards or downwards.
+TEST(SelfFilter, Mask_OneSphere_IsEveryRayThatMeetsItToAPixel) {
+  HalfRays rays;
+  rays.set(robot_camera_intrinsics());
+  constexpr double kRadius_m = 0.1;
+  for (const Vec3& centre_m : {Vec3{0.0, 0.25, 0.3}, Vec3{0.1, 0.25, 0.05}, Vec3{-0.4, 0.1, 0.5}, Vec3{0.0, -0.2, 0.5},
+                               Vec3{0.05, -0.2, 0.08}, Vec3{0.2, 0.6, 0.9}, Vec3{0.0, 0.2, 0.0999}}) {
+    std::array<LegShapes, kFootCount> legs{};
+    legs[1].shank = {centre_m, centre_m, kRadius_m};
+    const HalfImage<std::uint8_t> mask = mask_of(rays, legs, {0.0, 0.0});
+    int hit = 0, wrong = 0;
+    for (std::int32_t r = 0; r < rays.height_px; ++r) {
+      for (std::int32_t c = 0; c < rays.width_px; ++c) {
+        const bool body = (mask(c, r) & kPixelBody) != 0;
+        const auto near = [&](double off) { return meets(rays.ray(c + off, r), centre_m, kRadius_m); };
+        hit += near(0.0) ? 1 : 0;
+        wrong += body ? (near(-1.0) || near(0.0) || near(1.0) ? 0 : 1) : (near(0.0) ? 1 : 0);
+      }
+    }
+    EXPECT_GT(hit, 100) << centre_m.transpose();
+    EXPECT_LE(wrong, 2) << centre_m.transpose();  // rows where the cone is narrower than two pixels
+  }
+}
+
 TEST(SelfFilter, Mask_AbsentShapes_IsEmpty) {
   HalfRays rays;
   rays.set(robot_camera_intrinsics());

@@ -78,6 +78,21 @@ TEST(PlaneFit, Moments_OfTwoHalves_AddUpToTheWhole) {
   EXPECT_LT((first.matrix() - whole.matrix()).norm() + (first.vector() - whole.vector()).norm(), 1e-9);
 }
 
+TEST(PlaneFit, Moments_OfAFrameOfTheirOwn_MovedAreThoseOfTheSamples) {
+  const double y0 = -0.3, pitch = 0.002;
+  const Vec3 plane{0.1, 0.004, 1.2};
+  PlaneMoments own, samples;
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    const double x = 0.01 * i, t = counter_random(1, i) % 50, g = 1.0 + i % 4, r = 0.001 * (i % 5);
+    own.add(g, x, t, r);
+    samples.add(g, x, y0 + pitch * t, r + plane.dot(Vec3{x, t, 1.0}));
+  }
+  const PlaneMoments moved = own.moved(y0, pitch, plane);
+  EXPECT_LT((moved.matrix() - samples.matrix()).norm(), 1e-9 * samples.matrix().norm());
+  EXPECT_LT((moved.vector() - samples.vector()).norm(), 1e-9 * samples.vector().norm());
+  EXPECT_EQ(moved.count, samples.count);
+}
+
 TEST(PlaneFit, Solve_NoOrDegenerateMoments_IsRefused) {
   InversePlane plane;
   EXPECT_FALSE(try_solve({}, {}, {}, Lean::kAny, Vec3::UnitZ(), plane, nullptr));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Growing planes from runs, and the boundaries between them.
+// Growing planes from segments, and the boundaries between them.
 #include "algorithms/perception/planes/plane_growing.hpp"
 
 #include <gtest/gtest.h>
@@ -15,11 +15,11 @@ using test::ColumnScene;
 class PlanesFromRuns : public testing::Test {
  protected:
   void grow(const PlaneGrowing::Params& params = {}) {
-    runs_->begin({}, {}, scene_.intrinsics, *scene_.image);
+    segments_->begin({}, {}, scene_.intrinsics, *scene_.image);
     for (std::int32_t r = 0; r < kDepthHeight_px; r += ScanlineSegmentation::kBlock)
-      runs_->add_rows(r, r + ScanlineSegmentation::kBlock - 1);
-    runs_->finish();
-    growing_->begin(params, {}, scene_.rays, runs_->columns());
+      segments_->add_rows(r, r + ScanlineSegmentation::kBlock - 1);
+    segments_->finish();
+    growing_->begin(params, {}, scene_.rays, segments_->columns());
     while (!growing_->step()) {
     }
   }
@@ -33,7 +33,7 @@ class PlanesFromRuns : public testing::Test {
     }
     boundaries_->begin_scores();
     for (std::int32_t g = 0; g < kColumns; ++g) {
-      boundaries_->build_spans(g, runs_->columns()[static_cast<std::size_t>(g)], to_plane);
+      boundaries_->build_spans(g, segments_->columns()[static_cast<std::size_t>(g)], to_plane);
       boundaries_->score(g, false);
     }
     boundaries_->place();
@@ -53,7 +53,7 @@ class PlanesFromRuns : public testing::Test {
         sigma_m, seed);
   }
   ColumnScene scene_;
-  std::unique_ptr<ScanlineSegmentation> runs_ = std::make_unique<ScanlineSegmentation>();
+  std::unique_ptr<ScanlineSegmentation> segments_ = std::make_unique<ScanlineSegmentation>();
   std::unique_ptr<PlaneGrowing> growing_ = std::make_unique<PlaneGrowing>();
   std::unique_ptr<SpanBoundaries> boundaries_ = std::make_unique<SpanBoundaries>();
   InversePlane tread_ = test::plane_of({0.0, -0.86, -0.5}, 0.6);

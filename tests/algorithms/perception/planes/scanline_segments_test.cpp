@@ -17,13 +17,13 @@ using test::ColumnScene;
 class RunSegmentationTest : public testing::Test {
  protected:
   const ScanlineSegmentation::Columns& segment(std::int32_t rows = ScanlineSegmentation::kBlock) {
-    runs_->begin({}, {}, scene_.intrinsics, *scene_.image);
-    for (std::int32_t r = 0; r < kDepthHeight_px; r += rows) runs_->add_rows(r, r + rows - 1);
-    runs_->finish();
-    return runs_->columns();
+    segments_->begin({}, {}, scene_.intrinsics, *scene_.image);
+    for (std::int32_t r = 0; r < kDepthHeight_px; r += rows) segments_->add_rows(r, r + rows - 1);
+    segments_->finish();
+    return segments_->columns();
   }
   ColumnScene scene_;
-  std::unique_ptr<ScanlineSegmentation> runs_ = std::make_unique<ScanlineSegmentation>();
+  std::unique_ptr<ScanlineSegmentation> segments_ = std::make_unique<ScanlineSegmentation>();
   InversePlane floor_ = test::plane_of({0.1, -0.8, -0.6}, 0.8);
   InversePlane riser_ = test::plane_of({0.0, 0.6, -0.8}, 0.6);
 };
@@ -31,12 +31,12 @@ class RunSegmentationTest : public testing::Test {
 TEST_F(RunSegmentationTest, OnePlane_OneExactRunPerColumn) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 40 && r < 470 ? &floor_ : nullptr; });
   for (std::int32_t g = 0; g < kColumns; ++g) {
-    const ScanlineSegmentation::Column& runs = segment()[static_cast<std::size_t>(g)];
-    ASSERT_EQ(runs.size(), 1U) << g;
-    EXPECT_EQ(runs[0].top, 40);
-    EXPECT_EQ(runs[0].bottom, 469);
-    EXPECT_NEAR(static_cast<double>(runs[0].inverse_depth), floor_.inverse_depth(scene_.ray(g, 40)), 2e-5);
-    EXPECT_NEAR(static_cast<double>(runs[0].slope), floor_.m.y() / scene_.intrinsics.fy_px, 1e-7);
+    const ScanlineSegmentation::Column& segments = segment()[static_cast<std::size_t>(g)];
+    ASSERT_EQ(segments.size(), 1U) << g;
+    EXPECT_EQ(segments[0].top, 40);
+    EXPECT_EQ(segments[0].bottom, 469);
+    EXPECT_NEAR(static_cast<double>(segments[0].inverse_depth), floor_.inverse_depth(scene_.ray(g, 40)), 2e-5);
+    EXPECT_NEAR(static_cast<double>(segments[0].slope), floor_.m.y() / scene_.intrinsics.fy_px, 1e-7);
     if (g > 5) break;
   }
 }
@@ -50,12 +50,12 @@ TEST_F(RunSegmentationTest, CreaseJumpAndGap_EndTheRun_NoiseDoesNot) {
       },
       0.0015, 3);
   std::size_t exact = 0;
-  for (const ScanlineSegmentation::Column& runs : segment()) {
-    if (runs.size() != 3) continue;
+  for (const ScanlineSegmentation::Column& segments : segment()) {
+    if (segments.size() != 3) continue;
     ++exact;
-    EXPECT_NEAR(runs[0].bottom, 199, 3);
-    EXPECT_NEAR(runs[1].bottom, 299, 1);
-    EXPECT_NEAR(runs[2].top, 320, 1);
+    EXPECT_NEAR(segments[0].bottom, 199, 3);
+    EXPECT_NEAR(segments[1].bottom, 299, 1);
+    EXPECT_NEAR(segments[2].top, 320, 1);
   }
   EXPECT_GE(exact, std::size_t{kColumns} * 9 / 10);
 }
@@ -67,21 +67,21 @@ TEST_F(RunSegmentationTest, SingleOutliersAndShortGaps_StayInsideTheRun) {
     scene_.image->inverse_depth(g, 101) *= 0.8F;
     for (std::int32_t r = 200; r < 206; ++r) scene_.image->inverse_depth(g, r) = 0.0F;
   }
-  for (const ScanlineSegmentation::Column& runs : segment()) {
-    ASSERT_EQ(runs.size(), 1U);
-    EXPECT_EQ(runs[0].rows(), kDepthHeight_px - 40);
+  for (const ScanlineSegmentation::Column& segments : segment()) {
+    ASSERT_EQ(segments.size(), 1U);
+    EXPECT_EQ(segments[0].rows(), kDepthHeight_px - 40);
   }
 }
 
-// So near that a column without a run once took them for rows of the one it has not: it then began at row 0.
+// So near that a column without a segment once took them for rows of the one it has not: it then began at row 0.
 TEST_F(RunSegmentationTest, DepthsOfOneMillimetre_BeginTheirOwnRun) {
   for (std::int32_t g = 0; g < kColumns; ++g) {
     for (std::int32_t r = 50; r < 90; ++r) scene_.image->inverse_depth(g, r) = 1000.0F;
   }
-  for (const ScanlineSegmentation::Column& runs : segment()) {
-    ASSERT_EQ(runs.size(), 1U);
-    EXPECT_EQ(runs[0].top, 50);
-    EXPECT_EQ(runs[0].bottom, 89);
+  for (const ScanlineSegmentation::Column& segments : segment()) {
+    ASSERT_EQ(segments.size(), 1U);
+    EXPECT_EQ(segments[0].top, 50);
+    EXPECT_EQ(segments[0].bottom, 89);
   }
 }
 
@@ -93,12 +93,12 @@ TEST_F(RunSegmentationTest, EqualColumns_GiveEqualRuns) {
   }
   const ScanlineSegmentation::Columns& columns = segment();
   ASSERT_GE(columns[0].size(), 8U);
-  for (const ScanlineSegmentation::Column& runs : columns) {
-    ASSERT_EQ(runs.size(), columns[0].size());
-    for (std::size_t k = 0; k < runs.size(); ++k) {
-      EXPECT_EQ(runs[k].top, columns[0][k].top);
-      EXPECT_EQ(runs[k].bottom, columns[0][k].bottom);
-      EXPECT_EQ(runs[k].slope, columns[0][k].slope);
+  for (const ScanlineSegmentation::Column& segments : columns) {
+    ASSERT_EQ(segments.size(), columns[0].size());
+    for (std::size_t k = 0; k < segments.size(); ++k) {
+      EXPECT_EQ(segments[k].top, columns[0][k].top);
+      EXPECT_EQ(segments[k].bottom, columns[0][k].bottom);
+      EXPECT_EQ(segments[k].slope, columns[0][k].slope);
     }
   }
 }
@@ -116,13 +116,13 @@ TEST_F(RunSegmentationTest, VectorsOfAnyWidth_GiveTheSameRuns) {
   }
   const auto add = [&hash](std::uint32_t value) { hash = (hash ^ value) * 16777619U; };
   std::size_t count = 0;
-  for (const ScanlineSegmentation::Column& runs : segment()) {
-    count += runs.size();
-    for (const polygmap::Run& run : runs) {
-      add(static_cast<std::uint32_t>(run.top));
-      add(static_cast<std::uint32_t>(run.bottom));
-      add(std::bit_cast<std::uint32_t>(run.inverse_depth));
-      add(std::bit_cast<std::uint32_t>(run.slope));
+  for (const ScanlineSegmentation::Column& segments : segment()) {
+    count += segments.size();
+    for (const polygmap::ScanlineSegment& segment : segments) {
+      add(static_cast<std::uint32_t>(segment.top));
+      add(static_cast<std::uint32_t>(segment.bottom));
+      add(std::bit_cast<std::uint32_t>(segment.inverse_depth));
+      add(std::bit_cast<std::uint32_t>(segment.slope));
     }
   }
   EXPECT_GT(count, std::size_t{kColumns} * 12);
@@ -134,11 +134,11 @@ TEST_F(RunSegmentationTest, RowsInBlocks_GiveTheRunsOfRowsOneByOne) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r / 37 % 2 == 0 ? &riser_ : &floor_; }, 0.002, 5);
   const ScanlineSegmentation::Columns one_by_one = segment(1);
   const ScanlineSegmentation::Columns& in_blocks = segment();
-  std::size_t runs = 0, same_ends = 0, same_lines = 0;
+  std::size_t segments = 0, same_ends = 0, same_lines = 0;
   for (std::size_t g = 0; g < kColumns; ++g) {
-    runs += one_by_one[g].size();
+    segments += one_by_one[g].size();
     for (std::size_t k = 0; k < std::min(one_by_one[g].size(), in_blocks[g].size()); ++k) {
-      const polygmap::Run &a = one_by_one[g][k], &b = in_blocks[g][k];
+      const polygmap::ScanlineSegment &a = one_by_one[g][k], &b = in_blocks[g][k];
       if (a.top != b.top || a.bottom != b.bottom) continue;
       ++same_ends;
       // A row that is an outlier to one of them only moves the line.
@@ -146,17 +146,17 @@ TEST_F(RunSegmentationTest, RowsInBlocks_GiveTheRunsOfRowsOneByOne) {
           std::abs(a.slope - b.slope) < 1e-7F && std::abs(a.inverse_depth - b.inverse_depth) < 1e-5F ? 1U : 0U;
     }
   }
-  EXPECT_GT(runs, std::size_t{kColumns} * 12);
-  EXPECT_GT(static_cast<double>(same_ends), 0.95 * static_cast<double>(runs));
-  EXPECT_GT(static_cast<double>(same_lines), 0.95 * static_cast<double>(runs));
+  EXPECT_GT(segments, std::size_t{kColumns} * 12);
+  EXPECT_GT(static_cast<double>(same_ends), 0.95 * static_cast<double>(segments));
+  EXPECT_GT(static_cast<double>(same_lines), 0.95 * static_cast<double>(segments));
 }
 
 TEST_F(RunSegmentationTest, MoreRunsThanFit_AreCounted) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r / 5 % 2 == 0 ? &riser_ : &floor_; });
   static_cast<void>(segment());
-  EXPECT_GT(runs_->overflow(), 0U);
-  for (const ScanlineSegmentation::Column& runs : runs_->columns()) {
-    for (const polygmap::Run& run : runs) EXPECT_LE(run.top, run.bottom);
+  EXPECT_GT(segments_->overflow(), 0U);
+  for (const ScanlineSegmentation::Column& segments : segments_->columns()) {
+    for (const polygmap::ScanlineSegment& segment : segments) EXPECT_LE(segment.top, segment.bottom);
   }
 }
 

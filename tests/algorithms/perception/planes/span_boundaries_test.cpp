@@ -33,19 +33,19 @@ class Boundaries : public testing::Test {
     to_plane_[kTread] = kTread;
     to_plane_[kRiser] = kRiser;
   }
-  // Runs that end short of the boundary, as runs do.
+  // Segments that end short of the boundary, as segments do.
   void gather(std::int32_t column) {
-    ScanlineSegmentation::Column runs;
+    ScanlineSegmentation::Column segments;
     const auto row = static_cast<std::int16_t>(meeting_row(column));
-    polygmap::Run upper, lower;
+    polygmap::ScanlineSegment upper, lower;
     upper.top = static_cast<std::int16_t>(row - 60);
     upper.bottom = static_cast<std::int16_t>(row - 4);
     upper.plane = kTread;
     lower.top = static_cast<std::int16_t>(row + 8);
     lower.bottom = static_cast<std::int16_t>(row + 60);
     lower.plane = kRiser;
-    ASSERT_TRUE(runs.try_push_back(upper) && runs.try_push_back(lower));
-    boundaries_->build_spans(column, runs, to_plane_);
+    ASSERT_TRUE(segments.try_push_back(upper) && segments.try_push_back(lower));
+    boundaries_->build_spans(column, segments, to_plane_);
   }
   void meet() {
     boundaries_->begin_scores();
@@ -114,7 +114,7 @@ TEST_F(Boundaries, RowsOfSomethingElse_AreNotClaimed) {
   for (std::int32_t r = 0; r < kDepthHeight_px; ++r) {
     scene_.image->inverse_depth(11, r) = static_cast<float>(far.inverse_depth(scene_.ray(11, r)));
   }
-  scene_.image->turn(0, kDepthHeight_px - 1);
+  scene_.image->transpose(0, kDepthHeight_px - 1);
   boundaries_->build_spans(11, {}, to_plane_);
   boundaries_->fill_gaps(11, 10, 1, 0);
   EXPECT_TRUE(boundaries_->columns()[11].empty());
@@ -130,13 +130,13 @@ class ClaimedRows : public Boundaries {
     boundaries_->begin({}, {}, scene_.rays, scene_.intrinsics.fy_px, scene_.intrinsics.cy_px, *scene_.image);
     boundaries_->set_plane(kTread, wall_);
     to_plane_[kTread] = kTread;
-    ScanlineSegmentation::Column runs;
-    polygmap::Run run;
-    run.top = kFirst + 4;
-    run.bottom = kLast - 4;
-    run.plane = kTread;
-    ASSERT_TRUE(runs.try_push_back(run));
-    boundaries_->build_spans(10, runs, to_plane_);
+    ScanlineSegmentation::Column segments;
+    polygmap::ScanlineSegment segment;
+    segment.top = kFirst + 4;
+    segment.bottom = kLast - 4;
+    segment.plane = kTread;
+    ASSERT_TRUE(segments.try_push_back(segment));
+    boundaries_->build_spans(10, segments, to_plane_);
     boundaries_->build_spans(11, {}, to_plane_);
     boundaries_->fill_gaps(11, 10, 1, 0);
   }
@@ -174,13 +174,13 @@ TEST_F(ClaimedRows, ASingleRow_IsNotClaimed) {
 TEST_F(Boundaries, ARunThatReachesOverTheEdge_IsTrimmed) {
   paint(0.0, 0.0, 6);
   const auto row = static_cast<std::int16_t>(meeting_row(40));
-  ScanlineSegmentation::Column runs;
-  polygmap::Run run;
-  run.top = static_cast<std::int16_t>(row - 60);
-  run.bottom = static_cast<std::int16_t>(row + 5);
-  run.plane = kTread;
-  ASSERT_TRUE(runs.try_push_back(run));
-  boundaries_->build_spans(40, runs, to_plane_);
+  ScanlineSegmentation::Column segments;
+  polygmap::ScanlineSegment segment;
+  segment.top = static_cast<std::int16_t>(row - 60);
+  segment.bottom = static_cast<std::int16_t>(row + 5);
+  segment.plane = kTread;
+  ASSERT_TRUE(segments.try_push_back(segment));
+  boundaries_->build_spans(40, segments, to_plane_);
   EXPECT_EQ(boundaries_->columns()[40][0].bottom, row + 5);
   boundaries_->trim_ends(40);
   EXPECT_LT(boundaries_->columns()[40][0].bottom, row + 5);
