@@ -38,6 +38,16 @@ struct FootLimit {
   [[nodiscard]] double spare_m(const Vec2& sole_p_m) const noexcept { return clearance_m(sole_p_m) - margin_m; }
 };
 
+// What rises from the surface, or before it, and does not reach across both feet: they may stand beside it.
+struct TreadObstacle {
+  double depth_m = 0.0;   // its near end behind the nosing
+  double margin_m = 0.0;  // to be kept before it
+  Interval lateral_m;     // left of the nosing's middle, with the margin beside it
+  [[nodiscard]] bool meets(double right_m, double left_m) const noexcept {
+    return lateral_m.min_m < left_m && lateral_m.max_m > right_m;
+  }
+};
+
 struct LevelSurface {
   std::uint32_t id = 0;
   std::int64_t last_seen_ns = 0;
@@ -56,6 +66,7 @@ struct LevelSurface {
   StaticVector<FootLimit, kMaxPolygonVertices> edges;  // contact rectangle
   StaticVector<FootLimit, 3> toe;                      // collision box to back edge, next nosing, next riser
   double depth_m = 0.0;                                // nosing to the nearest of these, 0: none
+  StaticVector<TreadObstacle, 6> obstacles;
   // Where they were seen: lateral places of its sides, and how far behind the nosing it ends, in a riser or in nothing.
   std::optional<double> left_end_m, right_end_m, far_end_m;
 
@@ -84,5 +95,8 @@ struct LevelSurface {
 // along the unit vector direction. Ignored unless it runs roughly across the heading (within 30 degrees) and lies
 // between min_m and max_m behind the nosing.
 void add_toe_limit(LevelSurface& surface, const Line2& line, double margin_m, double min_m, double max_m) noexcept;
+
+// Adds an obstacle; those farthest to the side of middle_m give way when there are too many.
+void add_obstacle(LevelSurface& surface, const TreadObstacle& obstacle, double middle_m) noexcept;
 
 }  // namespace polygmap

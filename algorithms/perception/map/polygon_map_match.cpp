@@ -45,7 +45,8 @@ bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
 
 bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept {
   const bool upright = track.kind == SurfaceKind::kRiser;
-  const BoundingBox seen = bounding_box(local_polygon(track)), known = bounding_box(track.polygon);
+  const ConvexPolygon seen_polygon = local_polygon(track);
+  const BoundingBox seen = bounding_box(seen_polygon), known = bounding_box(track.polygon);
   const Interval seen_x{seen.min_m.x(), seen.max_m.x()}, known_x{known.min_m.x(), known.max_m.x()};
   const Interval seen_y{seen.min_m.y(), seen.max_m.y()}, known_y{known.min_m.y(), known.max_m.y()};
   const double overlap_x_m = overlap_m(seen_x, known_x), overlap_y_m = overlap_m(seen_y, known_y);
@@ -56,6 +57,15 @@ bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& co
         upright ? std::min(length_m(seen_y), length_m(known_y)) : std::min(length_m(seen_x), length_m(known_x));
     if ((upright ? overlap_y_m : overlap_x_m) < params_.overlap_fraction * shorter_m) return false;
     if ((upright ? overlap_x_m : overlap_y_m) < -params_.lateral_gap_m) return false;
+    // The robot's leg leaves unknown ends. Where both were seen to end towards each other, they are two posts.
+    if (upright && overlap_x_m < 0.0) {
+      const bool behind = seen_x.min_m > known_x.min_m;  // the seen one lies on the known one's side 0
+      const Vec2 u = side_direction(behind ? 4 : 0);
+      if (track.sides[behind ? 0 : 4].observed &&
+          end_observed(seen_polygon, seen_.edges, u, support_m(seen_polygon, u))) {
+        return false;
+      }
+    }
   }
   cost = std::abs(near.across_m) / near.gate_m + (std::min(overlap_x_m, overlap_y_m) > 0.0 ? 0.0 : 1.0);
   return true;
