@@ -18,12 +18,13 @@ double StairWorld::height_m(double x_m, double y_m, int* step) const noexcept {
 
 namespace {
 
-// Posts in two rows, spaced evenly from the first riser to the far end. One beside the staircase stands on the floor.
+// Posts in two rows, spaced evenly from half a spacing behind the first riser to the far end: set into the treads, not
+// flush with a riser. One beside the staircase stands on the floor.
 void add_balusters(const Balusters& posts, StairWorld& world) {
   if (!(posts.spacing_m > 0.0) || world.steps.empty()) return;
   const double half_m = 0.5 * posts.size_m, y_m = world.half_width_m - posts.inset_m - half_m;
   const double last_x_m = world.steps.back().back_x_m - half_m;
-  for (double x_m = world.steps.front().riser_x_m + half_m; x_m <= last_x_m; x_m += posts.spacing_m) {
+  for (double x_m = world.steps.front().riser_x_m + 0.5 * posts.spacing_m; x_m <= last_x_m; x_m += posts.spacing_m) {
     const double tread_m = world.height_m(x_m, 0.0), top_m = tread_m + posts.height_m;
     const double bottom_m = y_m - half_m >= world.half_width_m ? 0.0 : tread_m;
     for (const double side : {1.0, -1.0}) {
