@@ -35,10 +35,10 @@ std::uint32_t joint_rejections(const Estimator::Counters& counters) noexcept {
 ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometry& lio, LaneLink& link,
                          const Params& params) noexcept
     : imu_port_(imu), joint_port_(joints), lio_port_(lio), link_(link), params_(params) {
-  estimator_.reset(params.estimator);
+  estimator_.reset(params.estimator, params.robot);
   Gait::Params gait = params.gait;
-  if (!params.estimate_mount) gait.look_ticks = 0;
-  gait_.reset(gait);
+  if (!params.estimate_mount) gait.standing.toe_calibration.ticks = 0;
+  gait_.reset(gait, params.robot);
 }
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {
@@ -137,7 +137,7 @@ void ControlLane::report_gait(std::int64_t now_ns) noexcept {
   health_.raise(Limit::kReachLimited, now_ns, now.ik_limited_ticks - gait_seen_.ik_limited_ticks);
   health_.raise(Limit::kContactEarly, now_ns, now.early_contacts - gait_seen_.early_contacts);
   health_.raise(Limit::kContactLate, now_ns, now.late_contacts - gait_seen_.late_contacts);
-  health_.raise(Limit::kFootPutBack, now_ns, now.put_back - gait_seen_.put_back);
+  health_.raise(Limit::kFootPutBack, now_ns, now.aborted_swings - gait_seen_.aborted_swings);
   if (now.phase == GaitPhase::kStopped && gait_seen_.phase != GaitPhase::kStopped) {
     health_.raise(Fault::kGaitStopped, now_ns);
     if (now.stop_reason == StopReason::kMapStale) health_.raise(Fault::kMapStale, now_ns);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every stage's parameters and the robot's mounts, in one place.
+// The robot and every stage's parameters, in one place.
 #pragma once
 
 #include "algorithms/estimation/estimator.hpp"
@@ -8,23 +8,39 @@
 #include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
 #include "algorithms/perception/map/polygon_map.hpp"
 #include "algorithms/perception/surface_extractor.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
 struct Params {
+  RobotModel robot;
   Estimator::Params estimator;
   SurfaceExtractor::Params surfaces;
   CameraExtrinsicsEstimator::Params mount;
   PolygonMap::Params map;
   FootholdSearch::Params footholds;
   Gait::Params gait;
-  LegGeometry legs;
-  Transform base_T_camera = polygmap::base_T_camera();  // as the data sheet says
   bool estimate_mount = true;
-  bool self_filter = true;              // false only to show what the camera then takes for ground
-  BodyUncertainty body;                 // of the robot's own shapes
-  double tread_height_sigma_m = 0.004;  // of a mapped tread under a foot that has just landed on it
+  bool self_filter = true;
+  BodyUncertainty body;
+  double tread_height_sigma_m = 0.004;
+
+  // Of the parameters' table, firmware/config/param_table.hpp.
+  static void visit(auto& p, auto& field) {
+    field("robot", p.robot);
+    field("estimator", p.estimator);
+    field("surfaces", p.surfaces);
+    field("mount", p.mount);
+    field("map", p.map);
+    field("footholds", p.footholds);
+    field("gait", p.gait);
+    field("estimate_mount", p.estimate_mount, "The mount is estimated, starting from the data sheet.");
+    field("self_filter", p.self_filter,
+          "The robot's own legs are masked; false only shows what is taken for ground then.");
+    field("body", p.body);
+    field("tread_height_sigma_m", p.tread_height_sigma_m, 1e-5, 0.1,
+          "Height of a mapped tread under a foot that has just landed on it.");
+  }
 };
 
 }  // namespace polygmap

@@ -19,9 +19,9 @@ PerceptionLane::PerceptionLane(hal::DepthCamera& camera, LaneLink& link, const P
       params_(params),
       intrinsics_(camera.intrinsics()),
       extractor_(params.surfaces),
-      mount_(params.mount, params.base_T_camera),
+      mount_(params.mount, params.robot.mounts.base_T_camera),
       map_(params.map),
-      search_(params.footholds) {}
+      search_(params.footholds, params.robot.sole) {}
 
 Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
   link_.health.back() = health_;
@@ -72,11 +72,11 @@ void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
     view.intrinsics = intrinsics_;
     view.camera_up = (camera_T_base.R * exposure_state_.odom_T_base.R.transpose()) * Vec3::UnitZ();
     // Yaw of the mount stays as vague as the data sheet.
-    view.body_margin = body_margin(params_.body, params_.legs, params_.mount.prior_tilt_sigma_rad);
+    view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior_tilt_sigma_rad);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       if (!params_.self_filter) break;
       body_[index_of(foot)] =
-          transformed(camera_T_base, base_leg_shapes(params_.legs, foot, leg_joints(exposure_state_.q_rad, foot)));
+          transformed(camera_T_base, base_leg_shapes(params_.robot, foot, leg_joints(exposure_state_.q_rad, foot)));
     }
     view.body = body_;
     if (extractor_.try_begin(frame_, view)) {
@@ -121,7 +121,8 @@ void PerceptionLane::learn_mount() noexcept {
     stance.base_T_sole[foot] = base_T_odom * state.odom_T_sole[foot];
     stance.stands[foot] = state.contact_probability[foot] > kStands;
     if (stance.stands[foot])
-      stance.toes[foot] = detect_toe(frame_, intrinsics_, range, camera_T_base * stance.base_T_sole[foot]);
+      stance.toes[foot] =
+          detect_toe(frame_, intrinsics_, range, params_.robot.sole, camera_T_base * stance.base_T_sole[foot]);
   }
   mount_.update(extractor_.result(), stance);
 }
@@ -134,7 +135,7 @@ void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   if (params_.estimate_mount) view.mount_sigma_rad = mount_.tilt_sigma_rad();  // else the data sheet is believed
   view.intrinsics = intrinsics_;
   view.body = body_;
-  view.body_margin = body_margin(params_.body, params_.legs, params_.mount.prior_tilt_sigma_rad);
+  view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior_tilt_sigma_rad);
   map_.begin(extractor_.result(), view);
   mapping_ = true;
   const PolygonMap::Counters& counters = map_.counters();

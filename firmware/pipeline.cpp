@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/pipeline.hpp"
 
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/core/time.hpp"
 #include "scheduler/cyclic_executive.hpp"
 
 namespace polygmap {

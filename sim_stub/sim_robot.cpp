@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "sim_stub/camera/counter_noise.hpp"
+#include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -13,9 +14,10 @@ namespace {
 JointVector standing_q_rad() {
   JointVector q;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    const Transform sole{Mat3::Identity(), Vec3{0, side_sign(foot) * kStanceHalfWidth_m, -kNominalBaseHeight_m}};
+    const NominalStance& stance = nominal_robot().stance;
+    const Transform sole{Mat3::Identity(), Vec3{0, side_sign(foot) * stance.half_width_m, -stance.base_height_m}};
     q.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(foot, 0))) =
-        solve_leg({}, foot, sole).q_rad;
+        solve_leg(nominal_robot().legs, foot, sole).q_rad;
   }
   return q;
 }
@@ -30,8 +32,14 @@ JointCommand standing_command() {
   return command;
 }
 
+LegShapes leg_shapes(const LegGeometry& true_lengths, Foot leg, const JointVector& q_rad) {
+  RobotModel robot = nominal_robot();
+  robot.legs = true_lengths;
+  return base_leg_shapes(robot, leg, leg_joints(q_rad, leg));
+}
+
 Transform start_transform(const StartPose& start) {
-  return {rotation_z(start.yaw_rad), Vec3{-start.distance_m, start.lateral_m, kNominalBaseHeight_m}};
+  return {rotation_z(start.yaw_rad), Vec3{-start.distance_m, start.lateral_m, nominal_robot().stance.base_height_m}};
 }
 
 std::unique_ptr<Plant> make_plant(const SimOptions& options, const StairWorld& stairs, const RobotErrors& errors,
@@ -109,8 +117,7 @@ void SimRobot::sense() {
   }
   const JointVector q = plant_->true_q_rad();
   camera_.tick(clock_.tick(), plant_->true_T_base(),
-               {base_leg_shapes(errors_.legs[0], Foot::kLeft, leg_joints(q, Foot::kLeft)),
-                base_leg_shapes(errors_.legs[1], Foot::kRight, leg_joints(q, Foot::kRight))});
+               {leg_shapes(errors_.legs[0], Foot::kLeft, q), leg_shapes(errors_.legs[1], Foot::kRight, q)});
 }
 
 void SimRobot::update_truth() {

@@ -5,21 +5,17 @@
 #include <utility>
 
 namespace polygmap {
-namespace {
 
-constexpr double kEncoderSlack_rad = 0.01;
-
-}  // namespace
-
-void Estimator::reset(const Params& params) noexcept {
+void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   params_ = params;
+  robot_ = &robot;
   counters_ = {};
   standstill_.reset(params.standstill);
   contacts_.reset(params.contacts);
   encoders_.reset(params.encoders);
   imu_noise_.reset();
   forces_.reset(params.forces);
-  odometry_.reset(params);
+  odometry_.reset(params, robot);
   ring_.clear();
   state_ = {};
   quality_ = {};
@@ -108,10 +104,12 @@ void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
   imu_noise_.update(imu.stamp_ns, imu.gyro_radps, imu.accel_mps2);
   const Vec3 gyro_radps = imu_.gyro_radps, accel_mps2 = imu_.accel_mps2;
   imu_ = imu;
+  imu_.gyro_radps = robot_->mounts.base_R_imu * imu.gyro_radps;
+  imu_.accel_mps2 = robot_->mounts.base_R_imu * imu.accel_mps2;
   if (++new_imus_ > 1) {  // samples come evenly
     const double share = 1.0 / new_imus_;
-    imu_.gyro_radps = gyro_radps + share * (imu.gyro_radps - gyro_radps);
-    imu_.accel_mps2 = accel_mps2 + share * (imu.accel_mps2 - accel_mps2);
+    imu_.gyro_radps = gyro_radps + share * (imu_.gyro_radps - gyro_radps);
+    imu_.accel_mps2 = accel_mps2 + share * (imu_.accel_mps2 - accel_mps2);
   }
   has_imu_ = true;
 }
@@ -140,7 +138,7 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
   }
   // The bound grows until the next accepted sample, so a true move is taken up again by itself.
   const double most_rad =
-      kEncoderSlack_rad + params_.max_joint_speed_radps * seconds(joints.stamp_ns - joints_.stamp_ns);
+      params_.joint_slack_rad + params_.max_joint_speed_radps * seconds(joints.stamp_ns - joints_.stamp_ns);
   const JointVector q_rad = joints.q_rad - encoders_.offset_rad();
   if (has_joints_ && (q_rad - joints_.q_rad).cwiseAbs().maxCoeff() > most_rad) {
     ++counters_.joints_jump;
@@ -150,7 +148,7 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
   joints_ = joints;
   joints_.q_rad = q_rad;
   if (params_.infer_forces) {  // until there is an attitude, upright
-    joints_.foot_force_n = forces_.update(params_.geometry, joints_, state_.odom_T_base.R.row(2).transpose());
+    joints_.foot_force_n = forces_.update(robot_->legs, joints_, state_.odom_T_base.R.row(2).transpose());
   }
   for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
   has_joints_ = new_joints_ = true;
@@ -158,7 +156,7 @@ void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noe
 
 void Estimator::to_encoders(JointCommand& command) const noexcept {
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    const JointLimits& limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg);
+    const JointLimits& limits = robot_->drives.limits[n];
     double& q_rad = command.joints[n].q_rad;
     q_rad = math::clamp(q_rad + encoders_.offset_rad()[static_cast<Eigen::Index>(n)], limits.min_rad, limits.max_rad);
   }
@@ -167,7 +165,7 @@ void Estimator::to_encoders(JointCommand& command) const noexcept {
 void Estimator::take_joints(const std::array<bool, kFootCount>& planned_stance) noexcept {
   contacts_.update(joints_.foot_force_n, planned_stance, joints_.stamp_ns);
   for (std::size_t i = 0; i < kFootCount; ++i) {
-    legs_[i] = measure_leg(params_.geometry, static_cast<Foot>(i), joints_.q_rad, joints_.dq_radps);
+    legs_[i] = measure_leg(robot_->legs, static_cast<Foot>(i), joints_.q_rad, joints_.dq_radps);
     const FootContact& contact = contacts_.feet()[i];
     if (stood_[i] && !contact.stands) ground_.heights[i] = {};  // lifted: its tread's height is history
     stood_[i] = contact.stands;
@@ -185,7 +183,7 @@ void Estimator::calibrate() noexcept {
   const bool still = standstill_.try_finish(imu_, joints_, legs_);
   if (counters_.standstill_restarts != standstill_.restarts()) {
     counters_.standstill_restarts = standstill_.restarts();
-    odometry_.fusion().reset(params_.fusion);  // what it averaged was another place
+    odometry_.fusion().reset(params_.fusion, robot_->mounts.base_T_lidar);  // what it averaged was another place
     encoders_.learn_anew();
   }
   if (!standstill_.collecting()) return;

@@ -13,19 +13,40 @@ namespace polygmap {
 class Estimator {
  public:
   struct Params : ProprioceptiveOdometry::Params {
-    LegGeometry geometry;
     StandstillCalibration::Params standstill;
     ContactEstimator::Params contacts;
     EncoderOffsets::Params encoders;
-    bool infer_forces = false;  // foot forces from joint torques: no sensor measures them
+    bool infer_forces = false;
     ForceInference::Params forces;
     double max_torque_nm = 1000.0;
-    double max_joint_rad = 4.0;           // sensor samples beyond these are invalid
-    double max_joint_speed_radps = 15.0;  // also against the last sample: a single wrong angle is not a motion
+    double max_joint_rad = 4.0;
+    double max_joint_speed_radps = 15.0;
+    double joint_slack_rad = 0.01;
     double max_force_n = 5000.0;
-    std::int64_t max_lead_ns = 10 * kNsPerMs;  // of a stamp before now: frames caught up run up to 6 ms late
-    double max_height_error_m = 0.03;          // of a tread against the sole on it
-    double floor_sigma_m = 0.003;              // of the floor under the feet at the start
+    std::int64_t max_lead_ns = 10 * kNsPerMs;
+    double max_height_error_m = 0.03;
+    double floor_sigma_m = 0.003;
+
+    static void visit(auto& p, auto& field) {
+      ProprioceptiveOdometry::Params::visit(p, field);
+      field("standstill", p.standstill);
+      field("contacts", p.contacts);
+      field("encoders", p.encoders);
+      field("infer_forces", p.infer_forces, "Foot forces come from joint torques, since no sensor measures them.");
+      field("forces", p.forces);
+      field("max_torque_nm", p.max_torque_nm, 1.0, 100000.0, "A joint sample of a higher torque is invalid.");
+      field("max_joint_rad", p.max_joint_rad, 1.0, 100.0, "A joint sample of a larger angle is invalid.");
+      field("max_joint_speed_radps", p.max_joint_speed_radps, 0.1, 1000.0,
+            "A faster joint sample is invalid, also against the last one: a single wrong angle is not a motion.");
+      field("joint_slack_rad", p.joint_slack_rad, 0.0, 1.0,
+            "An encoder may jump by this besides what the joint's speed allows.");
+      field("max_force_n", p.max_force_n, 100.0, 1e6, "A foot that presses harder makes the sample invalid.");
+      field("max_lead_ns", p.max_lead_ns, 0, 1000000000,
+            "A stamp may lie so far after now: frames caught up run up to 6 ms late.");
+      field("max_height_error_m", p.max_height_error_m, 0.001, 1.0,
+            "A tread's height this far from the sole on it is refused.");
+      field("floor_sigma_m", p.floor_sigma_m, 1e-5, 1.0, "Height of the floor under the feet at the start.");
+    }
   };
   struct Counters {
     std::int64_t stamp_ns = 0;  // of the last tick's state
@@ -48,7 +69,8 @@ class Estimator {
     }
   };
 
-  void reset(const Params& params) noexcept;
+  // robot: outlives the estimator.
+  void reset(const Params& params, const RobotModel& robot) noexcept;
 
   // Samples as they arrive, the oldest first. A bad, stale or future one is counted and left out. IMU samples of one
   // tick count as their mean.
@@ -88,6 +110,7 @@ class Estimator {
   void publish(std::int64_t now_ns) noexcept;
 
   Params params_;
+  const RobotModel* robot_ = nullptr;
   Counters counters_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;

@@ -20,12 +20,12 @@ LioUncertainty::Quantities fusion_variances(const Eigen::Matrix<double, 9, 9>& P
 
 }  // namespace
 
-void ProprioceptiveOdometry::reset(const Params& params) noexcept {
+void ProprioceptiveOdometry::reset(const Params& params, const RobotModel& robot) noexcept {
   params_ = params;
   attitude_.reset(params.attitude);
-  base_.reset(params.base);
+  base_.reset(params.base, robot.sole);
   motion_.reset(params.motion);
-  fusion_.reset(params.fusion);
+  fusion_.reset(params.fusion, robot.mounts.base_T_lidar);
   contacts_ = {};
   odom_p_foot_m_.fill(Vec3::Zero());
   since_legs_s_ = unrested_s_ = 0.0;

@@ -27,14 +27,33 @@ class ProprioceptiveOdometry {
     ContactInEkf::Params attitude;
     BaseFilter::Params base;
     LioFusion::Params fusion;
-    double max_rate_radps = 20.0;  // IMU samples beyond these are invalid
+    double max_rate_radps = 20.0;
     double max_accel_mps2 = 100.0;
-    double max_step_s = 0.05;   // a longer gap is bridged without feeling; older rates are not believed
-    double max_gap_s = 5.0;     // bridged by no more than this
-    double coast_s = 1.0;       // the base is thought to stop within about this time when nothing is felt for long
-    double lost_s = 0.25;       // a standing robot none of whose feet rest for so long has lost its velocity
-    double sure_contact = 0.8;  // a probability at and above is as good as certain
-    double doubtful_walk_m2ps = 1e-3;  // random walk of a contact half as likely as that: 1 mm in 1 ms
+    double max_step_s = 0.05;
+    double max_gap_s = 5.0;
+    double coast_s = 1.0;
+    double lost_s = 0.25;
+    double sure_contact = 0.8;
+    double doubtful_walk_m2ps = 1e-3;
+
+    static void visit(auto& p, auto& field) {
+      field("motion", p.motion);
+      field("attitude", p.attitude);
+      field("base", p.base);
+      field("fusion", p.fusion);
+      field("max_rate_radps", p.max_rate_radps, 0.1, 1000.0, "An IMU sample that turns faster is invalid.");
+      field("max_accel_mps2", p.max_accel_mps2, 15.0, 10000.0, "An IMU sample that accelerates harder is invalid.");
+      field("max_step_s", p.max_step_s, 0.004, 0.5,
+            "A longer gap is bridged without feeling, and older rates are not believed.");
+      field("max_gap_s", p.max_gap_s, 0.05, 60.0, "A gap is bridged by no more than this.");
+      field("coast_s", p.coast_s, 0.01, 10.0,
+            "The base is thought to stop within about this time when nothing is felt for long.");
+      field("lost_s", p.lost_s, 0.01, 10.0,
+            "A standing robot none of whose feet rest for so long has lost its velocity.");
+      field("sure_contact", p.sure_contact, 0.01, 1.0, "A contact as probable is as good as certain.");
+      field("doubtful_walk_m2ps", p.doubtful_walk_m2ps, 0.0, 1.0,
+            "Random walk of a contact half as likely: 1 mm in 1 ms.");
+    }
   };
   // What is new since the last step. Rates hold over dt.
   struct Step {
@@ -53,7 +72,7 @@ class ProprioceptiveOdometry {
     std::array<KnownHeight, kFootCount> heights{};
   };
 
-  void reset(const Params& params) noexcept;
+  void reset(const Params& params, const RobotModel& robot) noexcept;
   // Finite and in range.
   [[nodiscard]] bool is_valid_imu(const Vec3& gyro_radps, const Vec3& accel_mps2) const noexcept;
   void initialise(const ContactInEkf::Start& start, const Legs& legs, double dt_s) noexcept;

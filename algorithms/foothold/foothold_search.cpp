@@ -44,7 +44,7 @@ void FootholdSearch::begin(const MapSnapshot& map, const Query& query) noexcept 
   for (Transform& sole : query_.world_T_sole) sole.p_m -= map.drift_m;
   base_ = PlanFrame(query_.world_T_base);
   sole_ = PlanFrame(query_.world_T_sole[index_of(query.stance)]);
-  z_foot_ = z_foot_m(query_.world_T_sole[index_of(query.stance)]);
+  z_foot_ = z_foot_m(foot_, query_.world_T_sole[index_of(query.stance)]);
   pending_ = {};
   pending_.map_stamp_ns = map.stamp_ns;
   levels_.clear();
@@ -112,7 +112,7 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
   const bool confirmed = polygon.sightings >= params_.confirmed_sightings;
   if (surface.kind == SurfaceKind::kTread && surface.area_m2 >= params_.area_min_m2) {
     LevelSurface level;
-    if (!prepare(polygon, yaw_of(query_.world_T_base.R), params_.margin, level)) return;
+    if (!prepare(polygon, yaw_of(query_.world_T_base.R), params_.margin, foot_, level)) return;
     if (confirmed) {
       (void)levels_.try_push_back(level);  // as many as the map holds
     } else if (level.height_m > z_foot_ + params_.delta_foot_m &&
@@ -128,7 +128,7 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
 FootholdSearch::Extent FootholdSearch::extent_on(const LevelSurface& tread, const Vec2& a_m,
                                                  const Vec2& b_m) const noexcept {
   const double a = tread.lateral_m(a_m), b = tread.lateral_m(b_m), middle_m = this->middle_m(tread);
-  const double feet_m = params_.half_spacing_m + kCollisionRectangle.half_width_m + params_.side_margin_m;
+  const double feet_m = params_.half_spacing_m + foot_.collision.half_width_m + params_.side_margin_m;
   if (std::min(a, b) < middle_m - feet_m && std::max(a, b) > middle_m + feet_m) return Extent::kAcross;
   const bool near = std::max(a, b) > middle_m - feet_m - params_.evade_max_m &&
                     std::min(a, b) < middle_m + feet_m + params_.evade_max_m;
@@ -148,21 +148,19 @@ void FootholdSearch::link_upright(LevelSurface& tread, const Upright& u) const n
   const Extent extent = extent_on(tread, u.left_m(), u.right_m());
   const double margin_m = params_.margin.of(u.sigma_m);
   if (extent == Extent::kAcross && facing <= -kFacing) {
-    add_toe_limit(tread, {u.point_m, u.direction}, margin_m, kNearestBack_m, kFarthestBack_m);
+    add_toe_limit(tread, foot_, {u.point_m, u.direction}, margin_m, kNearestBack_m, kFarthestBack_m);
   }
   if (extent != Extent::kPartial || facing > kBesideFacing) return;
   const double a = tread.along_m(u.left_m()), b = tread.along_m(u.right_m());
-  const double passed_m = tread.along_m(sole_.origin_m()) + kCollisionRectangle.toe_x_m;
+  const double passed_m = tread.along_m(sole_.origin_m()) + foot_.collision.toe_x_m;
   if (std::max(a, b) < passed_m || std::min(a, b) > kFarthestBack_m) return;
   const bool own_riser =
       std::max(a, b) < kNearestBack_m && u.bottom_m < tread.height_m - kBelow_m && u.top_m < tread.height_m + kTaller_m;
   if (own_riser) return;
   const double left = tread.lateral_m(u.left_m()), right = tread.lateral_m(u.right_m());
-  add_obstacle(tread,
-               {std::min(a, b),
-                margin_m,
-                {std::min(left, right) - params_.side_margin_m, std::max(left, right) + params_.side_margin_m}},
-               middle_m(tread));
+  const double aside_m = foot_.collision.half_width_m + params_.side_margin_m;
+  const Interval met{std::min(left, right) - aside_m, std::max(left, right) + aside_m};
+  add_obstacle(tread, {std::min(a, b) - foot_.collision.toe_x_m, margin_m, met}, middle_m(tread));
 }
 
 // What the toe must not reach: the next tread's nosing and the next riser, beside the tread's own back edge.
@@ -176,7 +174,8 @@ void FootholdSearch::link(std::size_t i) noexcept {
     const Vec2 a_m = other.nosing_a_m.head<2>(), b_m = other.nosing_b_m.head<2>();
     // A tread seen in part goes on; the top of a box beside the way does not.
     if (extent_on(tread, a_m, b_m) == Extent::kAside) continue;
-    add_toe_limit(tread, {other.nosing_middle_m(), other.left}, other.nosing_margin_m, kNearestBack_m, kFarthestBack_m);
+    add_toe_limit(tread, foot_, {other.nosing_middle_m(), other.left}, other.nosing_margin_m, kNearestBack_m,
+                  kFarthestBack_m);
   }
   for (const Upright& upright : uprights_) link_upright(tread, upright);
   const Vec2& sole_p_m = sole_.origin_m();
@@ -265,7 +264,7 @@ void FootholdSearch::erode_row(std::int32_t row) noexcept {
 // Sole origin behind the nosing for a foot between two lateral positions: as much to spare at the heel as at the toe,
 // but not deep into a long tread.
 double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, double right_m) const noexcept {
-  const double heel_m = -kContactRectangle.heel_x_m;
+  const double heel_m = -foot_.contact.heel_x_m;
   const double margin_m = tread.nosing_margin_m;
   double spare_m = 2.0 * (params_.heel_inset_m - margin_m);  // where nothing is mapped behind
   if (!tread.toe.empty()) {
@@ -278,12 +277,11 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
     }
   }
   for (const TreadObstacle& o : tread.obstacles) {
-    if (!o.meets(right_m - kCollisionRectangle.half_width_m, left_m + kCollisionRectangle.half_width_m)) continue;
-    spare_m = std::min(spare_m, o.depth_m - o.margin_m - heel_m - kCollisionRectangle.toe_x_m - margin_m);
+    if (o.meets(right_m, left_m)) spare_m = std::min(spare_m, o.sole_end_m - o.margin_m - heel_m - margin_m);
   }
   // A tread that ends in nothing ends all the same: the next riser may be there and not be seen.
   if (tread.far_end_m) {
-    const double room_m = *tread.far_end_m - heel_m - kCollisionRectangle.toe_x_m;
+    const double room_m = *tread.far_end_m - heel_m - foot_.collision.toe_x_m;
     spare_m = std::min(spare_m, room_m - margin_m - tread.back_margin_m);
   }
   return heel_m + math::clamp(margin_m + 0.5 * spare_m, 0.0, params_.heel_inset_max_m);
@@ -339,19 +337,18 @@ Interval FootholdSearch::between_sides(const LevelSurface& tread, double along_m
 
 // Do feet about that middle meet something that leaves them too little of the tread?
 bool FootholdSearch::blocked(const LevelSurface& tread, double middle_m, double half_m) const noexcept {
-  const double feet_m = half_m + kCollisionRectangle.half_width_m;
+  const double least_m = params_.tread_min_m - foot_.collision.toe_x_m;
   return std::any_of(tread.obstacles.begin(), tread.obstacles.end(), [&](const TreadObstacle& o) {
-    return o.depth_m < params_.tread_min_m && o.meets(middle_m - feet_m, middle_m + feet_m);
+    return o.sole_end_m < least_m && o.meets(middle_m - half_m, middle_m + half_m);
   });
 }
 
 // The nearest middle between the sides at which the feet stand beside all that blocks them.
 std::optional<double> FootholdSearch::beside_obstacles(const LevelSurface& tread, const Interval& sides,
                                                        double middle_m, double half_m) const noexcept {
-  const double feet_m = half_m + kCollisionRectangle.half_width_m;
   std::optional<double> best;
   for (const TreadObstacle& o : tread.obstacles) {
-    for (const double beside_m : {o.lateral_m.max_m + feet_m, o.lateral_m.min_m - feet_m}) {
+    for (const double beside_m : {o.sole_lateral_m.max_m + half_m, o.sole_lateral_m.min_m - half_m}) {
       const double moved_m = std::abs(beside_m - middle_m);
       if (moved_m > params_.evade_max_m || beside_m < sides.min_m || beside_m > sides.max_m) continue;
       if (best && moved_m >= std::abs(*best - middle_m)) continue;

@@ -24,32 +24,71 @@ class FootholdSearch {
  public:
   struct Params {
     double g_res_m = 0.01;
-    double g_range_m = 1.2;       // eq. 20
-    double g_z_m = 0.40;          // eq. 23: two rises of 0.175 m and margin
-    double delta_foot_m = 0.025;  // eqs 26, 28; the published 0.04 steps over a 40 mm step
-    double rise_max_m = 0.19;     // above the highest rise we climb, 0.175 m; below two of the least, 0.2 m
+    double g_range_m = 1.2;
+    double g_z_m = 0.40;
+    double delta_foot_m = 0.025;
+    double rise_max_m = 0.19;
     // Contact rectangle to the tread's front and back edge, collision toe to the riser: the least, and two sigmas of
     // where edge and foot are. An edge errs by as much as its own sigma says, 2.3 mm rms in 620 steps on treads of
     // 270 mm; beside that a foot lands 2.2 mm off, by its legs' errors and the camera's yaw. Two sigmas of both, 6.4
     // mm of the 9 there are, keep a normal error on the tread in 97.7 % of the steps.
     EdgeMargin margin{0.003, 2.0, 0.0022};
-    double tread_min_m = 0.260;     // collision toe and contact heel, 252 mm, and 4 mm at either end
-    double side_margin_m = 0.020;   // contact rectangle to the tread's sides
-    double veer_max_m = 0.02;       // sideways per tread, towards the middle of the staircase
-    double half_spacing_m = 0.100;  // soles from their common middle
+    double tread_min_m = 0.260;
+    double side_margin_m = 0.020;
+    double veer_max_m = 0.02;
+    double half_spacing_m = 0.100;
     double half_spacing_min_m = 0.085;
-    double heel_inset_m = 0.014;      // heel edge behind the nosing where the back edge is not mapped
-    double heel_inset_max_m = 0.030;  // on deep treads
-    // What lies further to the side is not the next tread: both feet, 0.15 m, and as much as a body sways. 0.4 m took a
-    // box beside the way for it (2026-11).
+    double heel_inset_m = 0.014;
+    double heel_inset_max_m = 0.030;
     double corridor_half_width_m = 0.25;
-    double evade_max_m = 0.06;  // sideways of the feet, to stand beside an obstacle: what a step of the legs allows
-    double step_max_m = 0.45;   // along the stairs from the standing sole, when climbing
-    double area_min_m2 = 0.01;  // a smaller surface is no tread
-    double top_from_m = 0.20, top_to_m = 0.45;  // floor seen this far ahead of the sole says that nothing rises there
+    double evade_max_m = 0.06;
+    double step_max_m = 0.45;
+    double area_min_m2 = 0.01;
+    double top_from_m = 0.20, top_to_m = 0.45;
     double top_half_width_m = 0.15;
     double top_fraction = 0.5;
     std::uint32_t confirmed_sightings = 5;
+
+    static void visit(auto& p, auto& field) {
+      field("g_res_m", p.g_res_m, 0.005, 0.1, "Side of a raster cell.");
+      field("g_range_m", p.g_range_m, 0.1, 5.0, "Eq. 20: the search goes as far.");
+      field("g_z_m", p.g_z_m, 0.01, 2.0, "Eq. 23: a foothold is no higher, two rises of 0.175 m and margin.");
+      field("delta_foot_m", p.delta_foot_m, 0.0, 0.039,
+            "Eqs 26, 28: heights as close are one level; the published 0.04 steps over a 40 mm step.");
+      field("rise_max_m", p.rise_max_m, 0.02, 0.5,
+            "A step rises no higher: above the highest rise we climb, 0.175 m; below two of the least, 0.2 m.");
+      field("margin", p.margin);
+      field("tread_min_m", p.tread_min_m, 0.1, 1.0,
+            "A tread is as deep: collision toe and contact heel, 252 mm, and 4 mm at either end.");
+      field("side_margin_m", p.side_margin_m, 0.0, 0.5, "Contact rectangle to the tread's sides.");
+      field("veer_max_m", p.veer_max_m, 0.0, 0.2,
+            "Feet go no farther sideways per tread, towards the middle of the staircase.");
+      field("half_spacing_m", p.half_spacing_m, 0.05, 0.3, "Soles from their common middle.");
+      field("half_spacing_min_m", p.half_spacing_min_m, 0.05, 0.3,
+            "Soles from their common middle where the tread has no room.");
+      field.ordered("half_spacing_min_m", "half_spacing_m");
+      field("heel_inset_m", p.heel_inset_m, 0.0, 0.2, "Heel edge behind the nosing where the back edge is not mapped.");
+      field("heel_inset_max_m", p.heel_inset_max_m, 0.0, 0.5, "Heel edge behind the nosing at most, on deep treads.");
+      field.ordered("heel_inset_m", "heel_inset_max_m");
+      field("corridor_half_width_m", p.corridor_half_width_m, 0.05, 5.0,
+            "What lies farther to the side is not the next tread: both feet, 0.15 m, and as much as a body sways; 0.4 "
+            "m took "
+            "a box beside the way for it (2026-11).");
+      field("evade_max_m", p.evade_max_m, 0.0, 0.3, "Feet go no farther sideways to stand beside an obstacle.");
+      field("step_max_m", p.step_max_m, 0.05, 2.0,
+            "The next tread begins no farther along the stairs from the standing sole, when climbing.");
+      field("area_min_m2", p.area_min_m2, 0.0, 1.0, "A smaller surface is no tread.");
+      field("top_from_m", p.top_from_m, 0.0, 2.0,
+            "Floor seen from this far ahead of the sole says that nothing rises there.");
+      field("top_to_m", p.top_to_m, 0.0, 2.0,
+            "Floor seen up to this far ahead of the sole says that nothing rises there.");
+      field.ordered("top_from_m", "top_to_m");
+      field("top_half_width_m", p.top_half_width_m, 0.01, 2.0,
+            "Floor is looked for this far to either side of the sole.");
+      field("top_fraction", p.top_fraction, 0.0, 1.0, "At least this share of that floor has been seen.");
+      field("confirmed_sightings", p.confirmed_sightings, 0, 1000,
+            "A foot goes on a surface that has been seen as often.");
+    }
   };
   struct Query {
     Transform world_T_base;
@@ -63,8 +102,8 @@ class FootholdSearch {
     std::uint32_t abandoned = 0;  // begin() before the last search was done
   };
 
-  FootholdSearch() noexcept : FootholdSearch(Params{}) {}
-  explicit FootholdSearch(const Params& params) noexcept : params_(params) {}
+  // foot: outlives the search.
+  FootholdSearch(const Params& params, const SoleModel& foot) noexcept : params_(params), foot_(foot) {}
 
   // Copies what it needs. Query and result are in the world of the pose; the search itself is in that of the map, which
   // knows how far the two have drifted apart. An invalid query is counted and leaves nothing to do.
@@ -128,6 +167,7 @@ class FootholdSearch {
   [[nodiscard]] StopReason judge_next() noexcept;
 
   Params params_;
+  const SoleModel& foot_;
   Counters counters_;
   FootholdSet result_;   // of the last finished search
   FootholdSet pending_;  // being filled

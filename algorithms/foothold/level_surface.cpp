@@ -18,13 +18,12 @@ double least_m(const auto& limits, auto&& of) noexcept {
   return least_m;
 }
 
-// Before the obstacles that the collision box of a sole at p meets.
-double before_obstacles_m(const LevelSurface& surface, const Vec2& p_m, double margin) noexcept {
+// Before the obstacles that a foot with its sole at p meets.
+double before_obstacles_m(const LevelSurface& surface, const Vec2& p_m, double margins) noexcept {
   double least_m = std::numeric_limits<double>::infinity();
-  const double lateral_m = surface.lateral_m(p_m), toe_m = surface.along_m(p_m) + kCollisionRectangle.toe_x_m;
+  const double lateral_m = surface.lateral_m(p_m), along_m = surface.along_m(p_m);
   for (const TreadObstacle& o : surface.obstacles) {
-    if (!o.meets(lateral_m - kCollisionRectangle.half_width_m, lateral_m + kCollisionRectangle.half_width_m)) continue;
-    least_m = std::min(least_m, o.depth_m - margin * o.margin_m - toe_m);
+    if (o.meets(lateral_m, lateral_m)) least_m = std::min(least_m, o.sole_end_m - margins * o.margin_m - along_m);
   }
   return least_m;
 }
@@ -67,7 +66,8 @@ double LevelSurface::spare_m(const Vec2& p_m) const noexcept {
   return std::min({least_m(edges, of), least_m(toe, of), before_obstacles_m(*this, p_m, 1.0)});
 }
 
-bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& margin, LevelSurface& out) noexcept {
+bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& margin, const SoleModel& sole,
+             LevelSurface& out) noexcept {
   const SurfacePatch& surface = polygon.surface;
   out = {};
   out.id = polygon.id;
@@ -107,17 +107,18 @@ bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& m
     double margin_m = margin.least_m;  // the sides keep one of their own
     if (facing > kCos30 && surface.nosing.valid) margin_m = out.nosing_margin_m;
     if (facing < -kCos30 && surface.back.valid) margin_m = out.back_margin_m;
-    (void)out.edges.try_push_back({inside, reach_m(kContactRectangle, out.heading, inside.inward), margin_m,
+    (void)out.edges.try_push_back({inside, reach_m(sole.contact, out.heading, inside.inward), margin_m,
                                    std::abs(inside.inward.dot(out.left)) > kSide});
   }
   if (out.has_nosing && surface.back.valid) {
     const std::optional<Line2> back = line_through(surface.back.a_m.head<2>(), surface.back.b_m.head<2>());
-    if (back) add_toe_limit(out, *back, out.back_margin_m, 0.0, std::numeric_limits<double>::infinity());
+    if (back) add_toe_limit(out, sole, *back, out.back_margin_m, 0.0, std::numeric_limits<double>::infinity());
   }
   return true;
 }
 
-void add_toe_limit(LevelSurface& surface, const Line2& line, double margin_m, double min_m, double max_m) noexcept {
+void add_toe_limit(LevelSurface& surface, const SoleModel& sole, const Line2& line, double margin_m, double min_m,
+                   double max_m) noexcept {
   const auto& [point_m, direction] = line;
   const double across = direction.dot(surface.left);
   if (std::abs(across) < kCos30) return;
@@ -127,7 +128,7 @@ void add_toe_limit(LevelSurface& surface, const Line2& line, double margin_m, do
   if (!(depth_m > min_m) || !(depth_m < max_m)) return;
   const Vec2 inward = -left_of(direction) * (left_of(direction).dot(surface.heading) > 0.0 ? 1.0 : -1.0);
   const FootLimit limit{
-      {inward, inward.dot(point_m)}, reach_m(kCollisionRectangle, surface.heading, inward), margin_m, false};
+      {inward, inward.dot(point_m)}, reach_m(sole.collision, surface.heading, inward), margin_m, false};
   if (!surface.toe.try_push_back(limit)) {  // keep the nearest
     FootLimit* farthest = surface.toe.begin();
     const Vec2 middle = surface.nosing_middle_m();
@@ -142,7 +143,7 @@ void add_toe_limit(LevelSurface& surface, const Line2& line, double margin_m, do
 void add_obstacle(LevelSurface& surface, const TreadObstacle& obstacle, double middle_m) noexcept {
   if (surface.obstacles.try_push_back(obstacle)) return;
   const auto aside_m = [middle_m](const TreadObstacle& o) {
-    return std::max(o.lateral_m.min_m - middle_m, middle_m - o.lateral_m.max_m);
+    return std::max(o.sole_lateral_m.min_m - middle_m, middle_m - o.sole_lateral_m.max_m);
   };
   TreadObstacle* farthest = surface.obstacles.begin();
   for (TreadObstacle& o : surface.obstacles) {

@@ -10,7 +10,7 @@
 #include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/geometry/convex.hpp"
 #include "algorithms/geometry/plane.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
@@ -18,9 +18,15 @@ namespace polygmap {
 struct EdgeMargin {
   double least_m = 0.0;
   double sigmas = 0.0;
-  double landing_sigma_m = 0.0;  // of the foot, along it
+  double landing_sigma_m = 0.0;
   [[nodiscard]] double of(double edge_sigma_m) const noexcept {
     return std::max(least_m, sigmas * math::sqrt(math::square(edge_sigma_m) + math::square(landing_sigma_m)));
+  }
+
+  static void visit(auto& p, auto& field) {
+    field("least_m", p.least_m, 0.0, 0.1, "The margin at least.");
+    field("sigmas", p.sigmas, 0.0, 10.0, "The margin is as many sigmas of where edge and foot are.");
+    field("landing_sigma_m", p.landing_sigma_m, 0.0, 0.1, "A foot lands this far off, one sigma.");
   }
 };
 
@@ -40,11 +46,11 @@ struct FootLimit {
 
 // What rises from the surface, or before it, and does not reach across both feet: they may stand beside it.
 struct TreadObstacle {
-  double depth_m = 0.0;   // its near end behind the nosing
-  double margin_m = 0.0;  // to be kept before it
-  Interval lateral_m;     // left of the nosing's middle, with the margin beside it
+  double sole_end_m = 0.0;  // behind the nosing, of a sole whose toe touches it
+  double margin_m = 0.0;    // to be kept before it
+  Interval sole_lateral_m;  // left of the nosing's middle, of soles that meet it or the margin beside it
   [[nodiscard]] bool meets(double right_m, double left_m) const noexcept {
-    return lateral_m.min_m < left_m && lateral_m.max_m > right_m;
+    return sole_lateral_m.min_m < left_m && sole_lateral_m.max_m > right_m;
   }
 };
 
@@ -89,12 +95,13 @@ struct LevelSurface {
 // Eqs (14)-(16) and the foot limits of the edges; base_yaw_rad is the heading of surfaces without a nosing. False when
 // the polygon has no area.
 [[nodiscard]] bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& margin,
-                           LevelSurface& out) noexcept;
+                           const SoleModel& sole, LevelSurface& out) noexcept;
 
 // Adds something that the collision box must not reach: a line in plan that rises behind the surface, through point_m
 // along the unit vector direction. Ignored unless it runs roughly across the heading (within 30 degrees) and lies
 // between min_m and max_m behind the nosing.
-void add_toe_limit(LevelSurface& surface, const Line2& line, double margin_m, double min_m, double max_m) noexcept;
+void add_toe_limit(LevelSurface& surface, const SoleModel& sole, const Line2& line, double margin_m, double min_m,
+                   double max_m) noexcept;
 
 // Adds an obstacle; those farthest to the side of middle_m give way when there are too many.
 void add_obstacle(LevelSurface& surface, const TreadObstacle& obstacle, double middle_m) noexcept;

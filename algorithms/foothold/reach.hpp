@@ -5,8 +5,9 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
@@ -17,9 +18,9 @@ namespace polygmap {
 
 // Lowest of toe and heel, eq. (22), but of the foot that stays only: with the lower of both, the tread under the upper
 // foot would be found again in split stance.
-[[nodiscard]] inline double z_foot_m(const Transform& world_T_sole) noexcept {
-  double lowest = (world_T_sole * sole_contacts_m()[0]).z();
-  for (const Vec3& contact : sole_contacts_m()) lowest = std::min(lowest, (world_T_sole * contact).z());
+[[nodiscard]] inline double z_foot_m(const SoleModel& model, const Transform& world_T_sole) noexcept {
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const Vec3& contact : model.contacts_m()) lowest = std::min(lowest, (world_T_sole * contact).z());
   return lowest;
 }
 

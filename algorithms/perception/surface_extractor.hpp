@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // From one raw depth frame to the planar surfaces in it: polygons, nosings, back lines. Static memory, resumable.
 //
-// Route: self filter -> columns of eight pixels -> straight runs -> planes grown from runs -> boundaries where the
-// planes meet, weighted least squares, facets of curved surfaces joined -> level and upright planes in what is left
-// over, rows claimed beside them -> boundaries and least squares again -> connected pieces, small ones held against
-// single pixels -> outlines, with sides fitted in the raw picture -> convex polygons, cut to nosing and back lines that
-// are found in the columns.
+// A frame goes through four stages, each a class with begin(inputs), step(budget) and its results:
+//   Segmenter       raw depths        -> columns of eight pixels, straight segments in them
+//   PlaneExtractor  segments          -> planes, and the spans of the columns that show them
+//   RegionLabeler   planes and spans  -> regions of the picture, a label for every row of every column
+//   SurfaceBuilder  regions           -> surfaces
 #pragma once
 
 #include <array>
@@ -13,25 +13,14 @@
 
 #include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/core/work.hpp"
-#include "algorithms/perception/image/column_image.hpp"
-#include "algorithms/perception/image/depth_image.hpp"
 #include "algorithms/perception/image/depth_range.hpp"
+#include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/image/noise_tracker.hpp"
-#include "algorithms/perception/image/self_filter.hpp"
-#include "algorithms/perception/planes/plane_fit.hpp"
-#include "algorithms/perception/planes/plane_growing.hpp"
-#include "algorithms/perception/planes/plane_merging.hpp"
-#include "algorithms/perception/planes/plane_set.hpp"
-#include "algorithms/perception/planes/residual_planes.hpp"
-#include "algorithms/perception/planes/scanline_segments.hpp"
-#include "algorithms/perception/planes/span_boundaries.hpp"
-#include "algorithms/perception/polygons/column_outline.hpp"
-#include "algorithms/perception/polygons/edge_lines.hpp"
-#include "algorithms/perception/polygons/polygon_builder.hpp"
-#include "algorithms/perception/polygons/side_lines.hpp"
-#include "algorithms/perception/regions/column_extents.hpp"
-#include "algorithms/perception/regions/connected_components.hpp"
-#include "algorithms/perception/regions/inlier_ratio.hpp"
+#include "algorithms/perception/image/work_units.hpp"
+#include "algorithms/perception/plane_extractor.hpp"
+#include "algorithms/perception/region_labeler.hpp"
+#include "algorithms/perception/segmenter.hpp"
+#include "algorithms/perception/surface_builder.hpp"
 
 namespace polygmap {
 
@@ -39,23 +28,22 @@ class SurfaceExtractor {
  public:
   struct Params {
     DepthNoiseModel noise;
-    NoiseTracker::Params depth_noise;  // how it is followed from frame to frame
+    NoiseTracker::Params depth_noise;
     DepthLimits limits;
-    ScanlineSegmentation::Params runs;
-    PlaneGrowing::Params growing;
-    SpanBoundaries::Params boundaries;
-    ResidualPlaneSearch::Params remainder;
-    PlaneFit::Params planes;
-    EdgeLineFinder::Params edge_lines;
-    double kind_tilt_rad = 0.21;  // a fitted plane within this of level is a tread, of upright a riser
-    PlaneMerging::Params merging;
-    double min_explained = 0.75;  // share of a surface's pixels that its plane explains, over that of all surfaces
-    double min_explained_curved = 0.55;  // that of several facets
-    double evidence_px = 3000.0;         // of a surface no larger than this are single pixels looked at ...
-    double min_evidence = 0.6;           // ... and this share of them lies on its plane
-    ConnectedComponents::Params pieces;
-    SideLines::Params sides;
-    PolygonBuilder::Params polygons;
+    ScanlineSegmentation::Params segments;
+    PlaneExtractor::Params planes;
+    RegionLabeler::Params regions;
+    SurfaceBuilder::Params surfaces;
+
+    static void visit(auto& p, auto& field) {
+      field("noise", p.noise);
+      field("depth_noise", p.depth_noise);
+      field("limits", p.limits);
+      field("segments", p.segments);
+      field("planes", p.planes);
+      field("regions", p.regions);
+      field("surfaces", p.surfaces);
+    }
   };
   // What the module knows about this frame, in the camera frame at the exposure.
   struct View {
@@ -71,16 +59,15 @@ class SurfaceExtractor {
     std::uint32_t bad_order = 0;       // rejected: not newer than the frame before
     std::uint32_t busy = 0;            // rejected: the frame before is not finished
     std::uint32_t blank_frames = 0;    // nothing measured at all
-    std::uint32_t run_overflow = 0;    // runs, intervals and pairs of planes that found no room
+    std::uint32_t run_overflow = 0;    // segments, spans, components and pairs of planes that found no room
     std::uint32_t plane_overflow = 0;  // planes or surfaces that found no room
     std::uint32_t no_polygon = 0;      // surfaces whose outline encloses no area
     std::uint32_t rejected_lines = 0;  // nosings and back lines that were looked for and not good enough
   };
 
-  // One unit is a row of 80 columns through reduction and segmentation, or as much work (its cost:
-  // firmware/schedule.hpp). Stairs take 2,300-2,900, a cluttered desk 3,550. With every capacity full a frame takes at
-  // most kMaxUnitsPerFrame. No piece is larger than kMaxPieceUnits.
-  static constexpr std::int32_t kMaxPieceUnits = 40;
+  // Stairs take 2,300-2,900 units, a cluttered desk 3,550. With every capacity full a frame takes at most
+  // kMaxUnitsPerFrame.
+  static constexpr std::int32_t kMaxPieceUnits = polygmap::kMaxPieceUnits;
   static constexpr std::int32_t kMaxUnitsPerFrame = 12000;
 
   SurfaceExtractor() noexcept = default;
@@ -92,7 +79,7 @@ class SurfaceExtractor {
   [[nodiscard]] bool try_begin(const DepthFrameView& frame, const View& view) noexcept;
   // kDone exactly once per frame, then kIdle.
   Progress step(WorkBudget& budget) noexcept;
-  [[nodiscard]] bool busy() const noexcept { return phase_ != Phase::kIdle; }
+  [[nodiscard]] bool busy() const noexcept { return stage_ != Stage::kIdle; }
   // Of the last finished frame.
   [[nodiscard]] const SurfaceFrame& result() const noexcept { return frames_[done_]; }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
@@ -106,55 +93,19 @@ class SurfaceExtractor {
   [[nodiscard]] std::size_t surface_at(std::int32_t column, std::int32_t row,
                                        const std::uint16_t* depth = nullptr) const noexcept;
   [[nodiscard]] bool body_at(std::int32_t column, std::int32_t row) const noexcept {
-    return picture_.body(column, row);
+    return segmenter_.image().body(column, row);
   }
 
   // What the next step begins with; a benchmark charges time to it.
-  enum class Phase : std::uint8_t {
-    kIdle,
-    kMask,
-    kReduce,
-    kGrow,
-    kGather,
-    kClaim,
-    kMeet,
-    kRefit,
-    kFacets,
-    kSearch,
-    kPieces,
-    kProfile,
-    kEvidence,
-    kSides,
-    kOutline,
-    kNosing,
-    kBack,
-    kPolygon,
-    kFinish,
-  };
-  [[nodiscard]] Phase phase() const noexcept { return phase_; }
+  enum class Stage : std::uint8_t { kIdle, kSegments, kPlanes, kRegions, kSurfaces, kFinish };
+  [[nodiscard]] Stage stage() const noexcept { return stage_; }
+  [[nodiscard]] const Segmenter& segmenter() const noexcept { return segmenter_; }
+  [[nodiscard]] const PlaneExtractor& plane_extractor() const noexcept { return planes_; }
 
  private:
-  static constexpr std::int32_t kColumnsPerPiece = 48;
-
   [[nodiscard]] SurfaceFrame& next() noexcept { return frames_[1 - done_]; }
-  void enter(Phase phase) noexcept;
-  std::int32_t run_piece() noexcept;  // does one piece, returns its units
-
-  void reduce_row() noexcept;
-  void take_grown_planes() noexcept;
-  void begin_search() noexcept;
-  void take_found_planes() noexcept;
-  void merge_planes(bool measured) noexcept;
-  std::int32_t facet_step() noexcept;
-  void drop(std::size_t plane) noexcept;
-  void solve_planes() noexcept;
-  void pieces_step() noexcept;
-  std::int32_t evidence_step() noexcept;
-  std::int32_t side_step() noexcept;
-  void outline() noexcept;
-  [[nodiscard]] bool begin_line(bool nosing) noexcept;
-  std::int32_t line_step(bool nosing) noexcept;
-  void build_polygon() noexcept;
+  void begin_frame(const DepthFrameView& frame) noexcept;
+  void run_stage(WorkBudget& budget) noexcept;
   void finish() noexcept;
 
   Params params_;
@@ -165,38 +116,16 @@ class SurfaceExtractor {
   std::array<SurfaceFrame, 2> frames_;  // the last finished one and the next
   std::size_t done_ = 0;
 
-  Phase phase_ = Phase::kIdle;
-  std::int32_t row_ = 0;
-  std::size_t index_ = 0;
-  std::int32_t round_ = 0;
-  bool started_ = false;  // sub-step of a phase
+  Stage stage_ = Stage::kIdle;
   std::int32_t units_spent_ = 0;
   std::int64_t last_stamp_ns_ = 0;
   bool any_frame_ = false;
-  std::int32_t measured_px_ = 0;
-  std::int32_t outside_body_px_ = 0;
 
-  SelfFilter self_filter_;
   RawImage raw_;
-  FrameImage picture_;
-  ScanlineSegmentation runs_;
-  PlaneGrowing growing_;
-  SpanBoundaries boundaries_;
-  ResidualPlaneSearch search_;
-  std::size_t first_found_ = 1;          // planes first_found_ .. planes_.count came from the search
-  PlaneMerging::PlaneIndex to_plane_{};  // from a grown plane
-  PlaneMerging merging_;
-
-  PlaneSet planes_;
-  ConnectedComponents pieces_;
-  SurfaceExtents profiles_;
-  SideLines side_finder_;
-  OutlineSides sides_;
-  ColumnOutline column_outline_;
-  Outline2 outline_;
-  EdgeLineFinder line_finder_;
-  SurfaceLines lines_;
-  PolygonBuilder polygons_;
+  Segmenter segmenter_;
+  PlaneExtractor planes_;
+  RegionLabeler regions_;
+  SurfaceBuilder surfaces_;
 };
 
 }  // namespace polygmap

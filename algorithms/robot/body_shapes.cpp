@@ -5,17 +5,18 @@
 
 namespace polygmap {
 
-OrientedBox collision_box(const Transform& sole) noexcept {
-  constexpr SoleRectangle r = kCollisionRectangle;
-  const Transform sole_T_centre{Mat3::Identity(), Vec3{r.centre_x_m(), 0, 0.5 * kCollisionHeight_m}};
-  return {sole * sole_T_centre, Vec3{0.5 * r.length_m(), r.half_width_m, 0.5 * kCollisionHeight_m}};
+OrientedBox collision_box(const SoleModel& model, const Transform& sole) noexcept {
+  const SoleRectangle& r = model.collision;
+  const double half_height_m = 0.5 * model.collision_height_m;
+  const Transform sole_T_centre{Mat3::Identity(), Vec3{r.centre_x_m(), 0, half_height_m}};
+  return {sole * sole_T_centre, Vec3{0.5 * r.length_m(), r.half_width_m, half_height_m}};
 }
 
-LegShapes base_leg_shapes(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept {
-  const LegPoints points = base_p_leg(geometry, leg, q_rad);
-  return {{points.hip_pitch_m, points.knee_m, kThighRadius_m},
-          {points.knee_m, points.ankle_m, kShankRadius_m},
-          collision_box(base_T_sole(geometry, leg, q_rad))};
+LegShapes base_leg_shapes(const RobotModel& robot, Foot leg, const LegVector& q_rad) noexcept {
+  const LegPoints points = base_p_leg(robot.legs, leg, q_rad);
+  return {{points.hip_pitch_m, points.knee_m, robot.radii.thigh_m},
+          {points.knee_m, points.ankle_m, robot.radii.shank_m},
+          collision_box(robot.sole, base_T_sole(robot.legs, leg, q_rad))};
 }
 
 double signed_distance_m(const Capsule& capsule, const Vec3& point_m) noexcept {

@@ -22,14 +22,11 @@ struct LegShapes {
   OrientedBox foot;
 };
 
-inline constexpr double kThighRadius_m = 0.07;
-inline constexpr double kShankRadius_m = 0.055;
-
 // In the base frame.
-[[nodiscard]] LegShapes base_leg_shapes(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept;
+[[nodiscard]] LegShapes base_leg_shapes(const RobotModel& robot, Foot leg, const LegVector& q_rad) noexcept;
 
 // The foot's collision box for a sole pose, in the frame of that pose.
-[[nodiscard]] OrientedBox collision_box(const Transform& sole) noexcept;
+[[nodiscard]] OrientedBox collision_box(const SoleModel& model, const Transform& sole) noexcept;
 
 // Signed distance of a point to a shape's surface, m; negative inside. Same frame for both.
 [[nodiscard]] double signed_distance_m(const Capsule& capsule, const Vec3& point_m) noexcept;

@@ -2,7 +2,7 @@
 // The frames of one leg's joints: what kinematics and dynamics are both made of.
 #pragma once
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 

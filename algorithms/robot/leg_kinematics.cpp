@@ -118,10 +118,10 @@ LegSolution solve_leg(const LegGeometry& g, Foot leg, const Transform& base_T_so
   return solution;
 }
 
-double limit_margin_rad(Foot leg, const LegVector& q_rad) noexcept {
+double limit_margin_rad(const DriveModel& drives, Foot leg, const LegVector& q_rad) noexcept {
   double margin = 1e9;
   for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-    const JointLimits& limits = joint_limits(leg, j);
+    const JointLimits& limits = drives.limits_of(leg, j);
     const double q = q_rad[static_cast<Eigen::Index>(j)];
     margin = std::min({margin, q - limits.min_rad, limits.max_rad - q});
   }

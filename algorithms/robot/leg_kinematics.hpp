@@ -2,7 +2,7 @@
 // Leg kinematics both ways, closed form.
 #pragma once
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
@@ -32,6 +32,6 @@ struct LegSolution {
 [[nodiscard]] LegSolution solve_leg(const LegGeometry& geometry, Foot leg, const Transform& base_T_sole) noexcept;
 
 // Least margin of q to the joint limits of that leg, rad; negative outside.
-[[nodiscard]] double limit_margin_rad(Foot leg, const LegVector& q_rad) noexcept;
+[[nodiscard]] double limit_margin_rad(const DriveModel& drives, Foot leg, const LegVector& q_rad) noexcept;
 
 }  // namespace polygmap

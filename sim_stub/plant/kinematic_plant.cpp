@@ -7,6 +7,8 @@
 #include <cstdarg>
 #include <cstdio>
 
+#include "sim_stub/nominal_robot.hpp"
+
 namespace polygmap::sim {
 namespace {
 
@@ -78,7 +80,7 @@ double KinematicPlant::foot_force_n(std::size_t foot) const noexcept {
 // The feet's forces through the Jacobians. Where in its sole each presses is what the body's place and acceleration
 // leave over beyond the shares, within the sole.
 void KinematicPlant::load_drives() {
-  constexpr SoleRectangle kSole = kContactRectangle;
+  const SoleRectangle& sole = nominal_robot().sole.contact;
   const Vec3 between_m = load_share(0) * feet_[0].true_T_sole.p_m + load_share(1) * feet_[1].true_T_sole.p_m;
   const Vec3 rest_m = pressed_m() - between_m;
   for (std::size_t f = 0; f < kFootCount; ++f) {
@@ -87,8 +89,8 @@ void KinematicPlant::load_drives() {
     const Vec3 base_f = true_T_base_.R.transpose() * Vec3{0, 0, foot_force_n(f)};
     const Vec3 local_m = feet_[f].true_T_sole.R.transpose() * rest_m;
     const Vec3 base_r = base_T_sole(errors_.legs[f], leg, q).R *
-                        Vec3{math::clamp(local_m.x(), kSole.heel_x_m, kSole.toe_x_m),
-                             math::clamp(local_m.y(), -kSole.half_width_m, kSole.half_width_m), 0.0};
+                        Vec3{math::clamp(local_m.x(), sole.heel_x_m, sole.toe_x_m),
+                             math::clamp(local_m.y(), -sole.half_width_m, sole.half_width_m), 0.0};
     Eigen::Matrix<double, 6, 1> wrench;
     wrench.head<3>() = base_f;
     wrench.tail<3>() = base_r.cross(base_f);
@@ -123,7 +125,7 @@ bool KinematicPlant::accept_command(const JointVector& command_rad, const JointV
   for (std::size_t j = 0; j < kJointCount; ++j) {
     const double q = command_rad[static_cast<Eigen::Index>(j)];
     const std::size_t foot = j / kJointsPerLeg, joint = j % kJointsPerLeg;
-    const JointLimits& limits = joint_limits(static_cast<Foot>(foot), joint);
+    const JointLimits& limits = nominal_robot().drives.limits[j];
     const double rate = rate_radps[static_cast<Eigen::Index>(j)];
     if (!std::isfinite(rate)) {
       fall("The rate commanded to %s leg joint %zu is not finite (%g).", name_of(foot), joint, rate);
@@ -148,7 +150,7 @@ void KinematicPlant::move_joints(const JointVector& command_rad, const JointVect
   const double dt = kPlantTick_s / kDriveSubsteps;
   const double gain = 1.0 - std::exp(-dt / params_.drive_lag_s);
   for (std::size_t j = 0; j < kJointCount; ++j) {
-    const JointLimits& limits = joint_limits(static_cast<Foot>(j / kJointsPerLeg), j % kJointsPerLeg);
+    const JointLimits& limits = nominal_robot().drives.limits[j];
     const auto i = static_cast<Eigen::Index>(j);
     const double reach = limits.speed_radps * dt;
     const double target_rad = command_rad[i] + params_.drive_lag_s * rate_radps[i];
@@ -297,7 +299,7 @@ void KinematicPlant::move_swing_feet() {
     if (foot.anchored) continue;
     const Transform previous = foot.true_T_sole;
     foot.true_T_sole = true_T_base_ * foot.base_T_sole;
-    const std::array<Vec3, kContactsPerFoot> contacts = sole_contacts_m();
+    const std::array<Vec3, kContactsPerFoot> contacts = nominal_robot().sole.contacts_m();
     for (std::size_t c = 0; c < kContactsPerFoot; ++c) {
       const Vec3 corner = foot.true_T_sole * contacts[c];
       const double fallen_m = (previous * contacts[c]).z() - corner.z();
@@ -324,14 +326,14 @@ void KinematicPlant::check_falls() {
   double highest_m = -1e9;
   for (std::size_t f = 0; f < kFootCount; ++f) {
     const FootState& foot = feet_[f];
-    const double depth_m = -clearance_m(collision_box(foot.true_T_sole), solids_);
+    const double depth_m = -clearance_m(collision_box(nominal_robot().sole, foot.true_T_sole), solids_);
     if (depth_m > params_.collision_depth_m) {
       fall("The %s foot collided with the staircase, %.1f mm deep.", name_of(f), mm(depth_m));
       return;
     }
     if (!foot.anchored) continue;
     highest_m = std::max(highest_m, foot.true_T_sole.p_m.z());
-    const Vec3 centre = foot.true_T_sole * Vec3{kContactRectangle.centre_x_m(), 0, 0};
+    const Vec3 centre = foot.true_T_sole * Vec3{nominal_robot().sole.contact.centre_x_m(), 0, 0};
     int below = kFloorStep;
     static_cast<void>(world_.height_m(centre.x(), centre.y(), &below));
     if (below != foot.step && load_share(f) > params_.lift_share) {

@@ -4,6 +4,7 @@
 #include <cstdarg>
 #include <cstdio>
 
+#include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/world/clearance.hpp"
 
 namespace polygmap::sim {
@@ -43,8 +44,8 @@ void add_link(Xml& xml, Foot leg, std::size_t joint, const LegGeometry& g) {
   const std::array<Vec3, kJointsPerLeg> origin_m{g.base_p_hip_m,         Vec3::Zero(),           g.hip_p_hip_pitch_m,
                                                  Vec3{0, 0, -g.thigh_m}, Vec3{0, 0, -g.shank_m}, Vec3::Zero()};
   const Vec3& p = origin_m[joint];
-  const JointLimits& limits = joint_limits(leg, joint);
-  const LinkMass link = MassModel{}.leg[joint];
+  const JointLimits& limits = nominal_robot().drives.limits_of(leg, joint);
+  const LinkMass link = nominal_robot().masses.leg[joint];
   const auto& half = kLinkHalf_m[joint];
   xml.add("<body name='%s_%zu' pos='%.9g %.9g %.9g'>", side, joint + 1, p.x(), sign * p.y(), p.z());
   xml.add("<joint axis='%s' range='%.9g %.9g'/>", kAxis[joint], limits.min_rad, limits.max_rad);
@@ -53,12 +54,13 @@ void add_link(Xml& xml, Foot leg, std::size_t joint, const LegGeometry& g) {
   if (joint == kHipPitch || joint == kKnee) {
     const bool thigh = joint == kHipPitch;
     xml.add("<geom class='skin' type='capsule' fromto='0 0 0 0 0 %.9g' size='%g'/>", thigh ? -g.thigh_m : -g.shank_m,
-            thigh ? kThighRadius_m : kShankRadius_m);
+            thigh ? nominal_robot().radii.thigh_m : nominal_robot().radii.shank_m);
   }
   if (joint == kAnkleRoll) {
+    const SoleRectangle& sole = nominal_robot().sole.collision;
     xml.add("<geom class='skin' name='%s_sole' type='box' pos='%.9g 0 %.9g' size='%.9g %.9g %.9g'/>", side,
-            kCollisionRectangle.centre_x_m(), 0.5 * kSoleThickness_m - g.ankle_to_sole_m,
-            0.5 * kCollisionRectangle.length_m(), kCollisionRectangle.half_width_m, 0.5 * kSoleThickness_m);
+            sole.centre_x_m(), 0.5 * kSoleThickness_m - g.ankle_to_sole_m, 0.5 * sole.length_m(), sole.half_width_m,
+            0.5 * kSoleThickness_m);
   }
 }
 
@@ -80,7 +82,7 @@ std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& wo
     xml.add("<geom class='ground' name='solid_%zu' type='box' pos='%.9g %.9g %.9g' size='%.9g %.9g %.9g' user='%d'/>",
             number++, centre.x(), centre.y(), centre.z(), half.x(), half.y(), half.z(), box.step);
   }
-  const LinkMass torso = MassModel{}.torso;
+  const LinkMass torso = nominal_robot().masses.torso;
   xml.add("<body name='base'><freejoint/>");
   xml.add("<geom class='mass' type='box' pos='%.9g %.9g %.9g' size='0.1 0.17 0.28' mass='%.9g'/>",
           torso.centre_m.x() + params.torso_offset_x_m, torso.centre_m.y(), torso.centre_m.z(),

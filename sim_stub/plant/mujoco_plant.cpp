@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "algorithms/robot/leg_kinematics.hpp"
+#include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/plant/mujoco_model.hpp"
 #include "sim_stub/world/clearance.hpp"
 
@@ -75,7 +76,7 @@ void MujocoPlant::step(const JointCommand& command) {
     for (std::size_t j = 0; j < kJointCount; ++j) {
       const auto i = static_cast<Eigen::Index>(j);
       const JointSetpoint& set = command.joints[j];
-      const double limit_nm = joint_limits(static_cast<Foot>(j / kJointsPerLeg), j % kJointsPerLeg).torque_nm;
+      const double limit_nm = nominal_robot().drives.limits[j].torque_nm;
       const double q = data_->qpos[kFreeQ + j] + errors_.encoder_offset_rad[i];
       const double asked_nm =
           set.tau_ff_nm + set.kp_nmprad * (set.q_rad - q) + set.kd_nmsprad * (set.dq_radps - data_->qvel[kFreeV + j]);
@@ -166,7 +167,7 @@ double MujocoPlant::zmp_margin_m() const noexcept {
   if (in_contact(0) == in_contact(1)) return Plant::zmp_margin_m();
   const FootState& foot = feet_[in_contact(0) ? 0 : 1];
   const Vec3 local_m = foot.true_T_sole.inverse() * Vec3(foot.pressure_nm / foot.force_n);
-  const SoleRectangle& sole = kContactRectangle;
+  const SoleRectangle& sole = nominal_robot().sole.contact;
   return std::min({local_m.x() - sole.heel_x_m, sole.toe_x_m - local_m.x(), sole.half_width_m - std::abs(local_m.y())});
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The robot under physics (MuJoCo): it balances or falls. Links and masses are robot/model.hpp's, box soles, drives
+// The robot under physics (MuJoCo): it balances or falls. Links and masses are the nominal robot's, box soles, drives
 // with a PD law and torque limits at 1 kHz, stairs as boxes.
 #pragma once
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "sim_stub/camera/counter_noise.hpp"
+#include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
 
@@ -31,7 +32,7 @@ RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
   const CounterNoise mount(seed, Stream::kCameraMount);
   const auto within = [&mount](std::uint64_t index, double half) { return mount.uniform(index, -half, half); };
   const double turn_rad = params.camera_mount_rad, shift_m = params.camera_mount_m;
-  const Transform nominal = base_T_camera();
+  const Transform nominal = nominal_robot().mounts.base_T_camera;
   errors.base_T_camera = {rotation_zyx(within(2, turn_rad), within(1, turn_rad), within(0, turn_rad)) * nominal.R,
                           nominal.p_m + Vec3{within(3, shift_m), within(4, shift_m), within(5, shift_m)}};
   errors.lio_T_true = {rotation_z(lio.uniform(0, -kPi, kPi)),

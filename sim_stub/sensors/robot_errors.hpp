@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/robot/model.hpp"
+#include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
 
@@ -36,14 +36,14 @@ struct ErrorParams {
 
 // What a seed makes of one robot, constant over its run.
 struct RobotErrors {
-  std::array<LegGeometry, kFootCount> legs;              // true lengths
+  std::array<LegGeometry, kFootCount> legs{nominal_robot().legs, nominal_robot().legs};  // true lengths
   JointVector encoder_offset_rad = JointVector::Zero();  // encoder reading minus true angle
   Mat3 base_R_imu = Mat3::Identity();
   Vec3 gyro_bias_radps = Vec3::Zero();
   Vec3 accel_bias_mps2 = Vec3::Zero();
   double depth_scale = 1.0;
-  Transform base_T_camera = polygmap::base_T_camera();  // true mount
-  Transform lio_T_true;                                 // LIO's own world: level, with its own origin and yaw
+  Transform base_T_camera = nominal_robot().mounts.base_T_camera;  // true mount
+  Transform lio_T_true;  // LIO's own world: level, with its own origin and yaw
 };
 
 [[nodiscard]] RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed);

@@ -6,6 +6,8 @@
 #include <array>
 #include <limits>
 
+#include "sim_stub/nominal_robot.hpp"
+
 namespace polygmap::sim {
 namespace {
 
@@ -127,7 +129,7 @@ double tread_margin_m(const Vec3& point_m, const StairWorld& world, int step) no
 
 double sole_margin_m(const Transform& true_T_sole, const StairWorld& world, int step) noexcept {
   double least = kInf;
-  for (const Vec3& corner : sole_contacts_m())
+  for (const Vec3& corner : nominal_robot().sole.contacts_m())
     least = std::min(least, tread_margin_m(true_T_sole * corner, world, step));
   return least;
 }

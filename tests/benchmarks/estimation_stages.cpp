@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/walk_rows.hpp"
 
 namespace polygmap::bench {
@@ -34,8 +35,8 @@ EstimationWalk::EstimationWalk() {
   spec.steps = 1;
   SyntheticWalk walk(spec);
   WalkRows rows(spec);
-  start.estimator.reset({});
-  start.fusion.reset({});
+  start.estimator.reset({}, nominal_robot());
+  start.fusion.reset({}, base_T_lidar());
   for (std::int64_t t_ns = kLioDelay_ns; t_ns < kEnd_ns; t_ns += SyntheticWalk::kTick_ns) {
     EstimationTick tick;
     tick.now_ns = t_ns;

@@ -2,6 +2,7 @@
 #include "tests/benchmarks/gait_stages.hpp"
 
 #include "tests/support/ideal_climb.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::bench {
 namespace {
@@ -43,7 +44,8 @@ StairPlan::StairPlan() {
     goals[f].target.position_m += Vec3{kTread_m, 0.0, kRise_m};
   }
   soles[1] = {goals[0].target.transform(), soles[0][1]};
-  const TorsoPose middle = torso_between(geometry, params.torso, {sole_pose(soles[0][0]), sole_pose(soles[0][1])});
+  const TorsoPose middle =
+      torso_between(nominal_robot().legs, params.torso, {sole_pose(soles[0][0]), sole_pose(soles[0][1])});
   from[0] = TorsoTrajectory::at_rest({rotation_z(middle.yaw_rad), middle.position_m});
 }
 
@@ -68,11 +70,11 @@ void stage_gait_plan(StairPlan& p) {
     StepPlan plan = plan_step(p.params, p.goals[i], flat, kStepTries[0]);
     const HorizontalMotion com = TorsoTrajectory::horizontal(p.from[i]);
     p.com.plan(p.params.com, com, zmp_of_shift(p.params, plan, ComPlan::zmp_under(p.params.com, com)));
-    plan_torso(p.geometry, p.params, flat, p.com, plan.shift_ticks, plan);
+    plan_torso(nominal_robot().legs, p.params, flat, p.com, plan.shift_ticks, plan);
     const HorizontalMotion lift_off = p.com.at(plan.shift_ticks);
     p.com.plan(p.params.com, lift_off, zmp_of_swing(p.params, plan));
-    plan_torso(p.geometry, p.params, flat, p.com, 0, plan);
-    p.swing.plan(p.soles[i][index_of(plan.goal.foot)], plan.goal.target, plan.shape, plan.swing_ticks);
+    plan_torso(nominal_robot().legs, p.params, flat, p.com, 0, plan);
+    p.swing.plan(kSole, p.soles[i][index_of(plan.goal.foot)], plan.goal.target, plan.shape, plan.swing_ticks);
     if (i > 0) continue;
     p.from[1] = TorsoTrajectory::at_rest({rotation_z(plan.touch_down.yaw_rad), plan.touch_down.position_m});
     TorsoTrajectory::set_horizontal(p.from[1], p.com.at(plan.swing_ticks));
@@ -82,8 +84,8 @@ void stage_gait_plan(StairPlan& p) {
 void stage_gait_proof(StairPlan& p) {
   for (std::size_t i = 0; i < p.goals.size(); ++i) {
     StepSearch& search = p.searches[i];
-    search.begin(p.geometry, p.params, p.goals[i], p.goals[1], p.params.stair_shift_ticks, p.from[i], p.soles[i]);
-    while (search.step() == StepSearch::State::kSearching) {
+    search.begin(nominal_robot(), p.params, p.goals[i], p.goals[1], p.params.stair_shift_ticks, p.from[i], p.soles[i]);
+    while (search.step(nominal_robot(), p.params) == StepSearch::State::kSearching) {
     }
   }
 }

@@ -34,7 +34,6 @@ struct GaitStair {
 // the legs can do them.
 struct StairPlan {
   StairPlan();
-  LegGeometry geometry;
   StepParams params;
   std::array<StepGoal, 2> goals;  // leading, trailing
   // Before each of them, as the one before leaves it.

@@ -38,12 +38,30 @@ void reduce(Workbench& bench) {
   }
 }
 
-// As long as the extractor's phase belongs to that stage; a budget of one unit is one piece of work.
+ExtractorStage plane_stage(const PlaneExtractor& planes) noexcept {
+  using Part = PlaneExtractor::Part;
+  switch (planes.part()) {
+    case Part::kGrowing:
+      return kGrowing;
+    case Part::kSharpening:
+    case Part::kMeasuring:
+      return planes.fit_part() == SpanFit::Part::kSums ? kRefit : kMeeting;
+    case Part::kFacets:
+      return kRefit;
+    case Part::kResidual:
+      return kRemainder;
+    case Part::kDone:
+      break;
+  }
+  return kPieces;
+}
+
+// As long as the extractor's next step belongs to that stage; a budget of one unit is one piece of work.
 void run_through(Workbench& bench, ExtractorStage stage) {
   do {
     WorkBudget piece(1);
     static_cast<void>(bench.extractor->step(piece));
-  } while (bench.extractor->busy() && extractor_stage(bench.extractor->phase()) == stage);
+  } while (bench.extractor->busy() && extractor_stage(*bench.extractor) == stage);
 }
 
 }  // namespace
@@ -73,36 +91,19 @@ std::string_view Workbench::complaint() const noexcept {
   return {};
 }
 
-ExtractorStage extractor_stage(SurfaceExtractor::Phase phase) noexcept {
-  using Phase = SurfaceExtractor::Phase;
-  switch (phase) {
-    case Phase::kIdle:
+ExtractorStage extractor_stage(const SurfaceExtractor& extractor) noexcept {
+  using At = SurfaceExtractor::Stage;
+  switch (extractor.stage()) {
+    case At::kIdle:
       return kIntake;
-    case Phase::kMask:
-      return kMask;
-    case Phase::kReduce:
-      return kColumnRuns;
-    case Phase::kGrow:
-      return kGrowing;
-    case Phase::kGather:
-    case Phase::kClaim:
-    case Phase::kMeet:
-      return kMeeting;
-    case Phase::kRefit:
-    case Phase::kFacets:
-      return kRefit;
-    case Phase::kSearch:
-      return kRemainder;
-    case Phase::kPieces:
-    case Phase::kProfile:
-    case Phase::kEvidence:
+    case At::kSegments:
+      return extractor.segmenter().part() == Segmenter::Part::kMask ? kMask : kColumnRuns;
+    case At::kPlanes:
+      return plane_stage(extractor.plane_extractor());
+    case At::kRegions:
       return kPieces;
-    case Phase::kSides:
-    case Phase::kOutline:
-    case Phase::kNosing:
-    case Phase::kBack:
-    case Phase::kPolygon:
-    case Phase::kFinish:
+    case At::kSurfaces:
+    case At::kFinish:
       return kPolygons;
   }
   return kPolygons;

@@ -9,6 +9,7 @@
 
 #include "tests/benchmarks/stair_scenes.hpp"
 #include "tests/reference/paper_route/paper_route.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::bench {
 
@@ -26,7 +27,8 @@ struct Workbench {
   std::unique_ptr<SurfaceExtractor> extractor = std::make_unique<SurfaceExtractor>();
   SurfaceFrame surfaces;
   std::unique_ptr<PolygonMap> map = std::make_unique<PolygonMap>();
-  std::unique_ptr<FootholdSearch> search = std::make_unique<FootholdSearch>();
+  std::unique_ptr<FootholdSearch> search =
+      std::make_unique<FootholdSearch>(FootholdSearch::Params{}, nominal_robot().sole);
   std::unique_ptr<PaperRoute> paper = std::make_unique<PaperRoute>(PaperRoute::Params{});
   RawRange range;  // this and the next two: reduction and runs by themselves
   std::unique_ptr<ColumnImage> columns = std::make_unique<ColumnImage>();
@@ -85,15 +87,15 @@ inline constexpr std::array<Stage, 7> kOtherStages{{{"whole_frame", stage_whole_
                                                     {"footholds", stage_footholds},
                                                     {"paper_route", stage_paper_route}}};
 
-// The stage that a phase of the extractor belongs to.
-[[nodiscard]] ExtractorStage extractor_stage(SurfaceExtractor::Phase phase) noexcept;
+// The stage that the extractor's next step belongs to.
+[[nodiscard]] ExtractorStage extractor_stage(const SurfaceExtractor& extractor) noexcept;
 
 // One frame through the extractor. around(stage) must call stage.run(bench), and may do so between two looks at a
 // clock.
 template <typename Around>
 void extract_in_stages(Workbench& bench, const Around& around) {
   do {
-    around(kExtractorStages[extractor_stage(bench.extractor->phase())]);
+    around(kExtractorStages[extractor_stage(*bench.extractor)]);
   } while (bench.extractor->busy());
 }
 

@@ -4,11 +4,11 @@
 #include <array>
 
 #include "algorithms/robot/body_shapes.hpp"
-#include "algorithms/robot/model.hpp"
 #include "sim_stub/camera/depth_noise.hpp"
 #include "sim_stub/camera/depth_renderer.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::bench {
 namespace {

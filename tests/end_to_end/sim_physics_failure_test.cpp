@@ -7,6 +7,7 @@
 #include <array>
 
 #include "sim_stub/world/clearance.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/physical_climb.hpp"
 
 namespace polygmap::sim {
@@ -118,7 +119,7 @@ TEST(PhysicalFailure, TreadsTenMillimetresNearer_ToesMissTheRisers) {
     const std::size_t f = index_of(climb.status().step.foot);
     const int to = static_cast<int>(climb.status().treads_climbed);
     const std::array excluded{to - 1, to};
-    least_m = std::min(least_m, clearance_m(collision_box(climb.truth().true_T_sole[f]), solids, excluded));
+    least_m = std::min(least_m, clearance_m(collision_box(kSole, climb.truth().true_T_sole[f]), solids, excluded));
   }
   EXPECT_GT(least_m, 0.0);
   EXPECT_LT(least_m, 0.014);  // it was that near at all

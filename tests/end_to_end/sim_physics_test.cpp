@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/physical_climb.hpp"
 #include "tests/support/slow_machine.hpp"
 
@@ -38,7 +39,7 @@ TEST(PhysicalClimb, WithoutFeedbackOfTheDcmFromALiftOffOn_FallsInThatSwing) {
     Gait::Params params;
     if (!feedback) params.balance.dcm.gain = params.balance.dcm.integral_per_s = 0.0;
     const auto other = std::make_unique<Gait>();
-    other->reset(params);
+    other->reset(params, nominal_robot());
     PhysicalClimb climb(few_steps(4));
     JointCommand its_command;
     bool lifted = false;

@@ -7,6 +7,7 @@
 #include "firmware/pipeline.hpp"
 #include "scheduler/cyclic_executive.hpp"
 #include "sim_stub/sim_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {

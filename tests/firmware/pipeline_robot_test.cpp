@@ -8,6 +8,7 @@
 
 #include "firmware/pipeline.hpp"
 #include "tests/support/fake_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/trapped_module.hpp"
 
 namespace polygmap {
@@ -89,6 +90,25 @@ class PipelineOnARobot : public testing::Test {
   std::unique_ptr<TrappedModule> module_;
   bool started_ = false;
 };
+
+// One robot for all stages: the estimator's lengths, the balance's masses.
+TEST_F(PipelineOnARobot, AnotherRobotInParams_EstimatorAndBalanceFollow) {
+  constexpr double kLonger_m = 0.02, kHeavier_kg = 20.0;
+  const auto stand = [&](const Params& params) {
+    start(0.2, params);
+    started_ = false;
+    run(400);
+  };
+  stand({});
+  const double height_m = control().state().odom_T_base.p_m.z();
+  const double knee_nm = control().last_command().joints[kKnee].tau_ff_nm;
+  Params params;
+  params.robot.legs.shank_m += kLonger_m;
+  params.robot.masses.torso.mass_kg += kHeavier_kg;
+  stand(params);
+  EXPECT_NEAR(control().state().odom_T_base.p_m.z() - height_m, kLonger_m, 0.5 * kLonger_m);
+  EXPECT_GT(std::abs(control().last_command().joints[kKnee].tau_ff_nm), 1.2 * std::abs(knee_nm));
+}
 
 TEST_F(PipelineOnARobot, JointsFallSilentInSwing_FootComesDownAsPlannedAndTheGaitStops) {
   ASSERT_NO_FATAL_FAILURE(fly());

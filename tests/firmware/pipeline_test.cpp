@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tests/support/fake_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/trapped_module.hpp"
 
 namespace polygmap {

@@ -11,6 +11,7 @@
 #include "scheduler/cyclic_executive.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "tests/support/fake_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "algorithms/geometry/so3.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/slow_machine.hpp"
 
 namespace polygmap::test {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/support/nominal_robot.hpp"
+
 namespace polygmap::test {
 namespace {
 
@@ -34,7 +36,7 @@ double Staircase::height_m(double x_m) const {
   return x_m > riser_x_m(steps - 1) + landing_m ? 0.0 : top_m(step);
 }
 
-IdealClimb::IdealClimb(const ClimbSetup& setup, const Gait::Params& params) : setup_(setup) {
+IdealClimb::IdealClimb(const ClimbSetup& setup, const Gait::Params& params, const RobotModel& robot) : setup_(setup) {
   q_ = sent_ = active_ = standing_joints();
   true_T_base_ = {rotation_z(setup.yaw_rad), Vec3{-setup.distance_m, setup.lateral_m, kNominalBaseHeight_m}};
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
@@ -43,7 +45,7 @@ IdealClimb::IdealClimb(const ClimbSetup& setup, const Gait::Params& params) : se
   odom_T_true_ = {rotation_z(-setup.yaw_rad), Vec3{0.3, -0.2, 0.01}};
   // Its forces know no pendulum: drives that tell no torque.
   feedback_.tau_nm.setConstant(std::numeric_limits<double>::quiet_NaN());
-  gait_.reset(params);
+  gait_.reset(params, robot);
 }
 
 double IdealClimb::noise() {  // about normal, sigma 1

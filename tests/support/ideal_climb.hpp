@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "algorithms/gait/gait.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::test {
 
@@ -61,7 +62,9 @@ struct ClimbRecord {
 
 class IdealClimb {
  public:
-  explicit IdealClimb(const ClimbSetup& setup, const Gait::Params& params = {});
+  // robot: as the gait has it, which it must outlive; the true one is the nominal one.
+  explicit IdealClimb(const ClimbSetup& setup, const Gait::Params& params = {},
+                      const RobotModel& robot = nominal_robot());
   // One tick; false when the gait has ended.
   bool tick();
   // Until the gait is in that phase of its nth swing (1-based; the double support after it belongs to it); false when
@@ -75,6 +78,7 @@ class IdealClimb {
   [[nodiscard]] const Transform& true_T_base() const { return true_T_base_; }
   [[nodiscard]] const Transform& true_T_sole(Foot f) const { return feet_[index_of(f)].true_T_sole; }
   [[nodiscard]] const JointVector& q_rad() const { return q_; }
+  [[nodiscard]] const JointCommand& command() const { return command_; }
   [[nodiscard]] bool touches(Foot f) const { return feet_[index_of(f)].anchored; }
   [[nodiscard]] int tick_count() const { return record_.ticks; }
 

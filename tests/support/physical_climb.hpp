@@ -10,6 +10,7 @@
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/gait/gait.hpp"
 #include "sim_stub/sim_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::sim {
 
@@ -22,8 +23,8 @@ namespace polygmap::sim {
 class PhysicalClimb {
  public:
   explicit PhysicalClimb(const SimOptions& options, const Gait::Params& gait = {}) : robot_(without_pictures(options)) {
-    estimator_.reset({});
-    gait_.reset(gait);
+    estimator_.reset({}, nominal_robot());
+    gait_.reset(gait, nominal_robot());
   }
 
   // One tick; false when the gait has ended or the robot fell.

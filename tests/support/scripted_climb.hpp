@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 #include "sim_stub/host/climb/climb_report.hpp"
 
 namespace polygmap::sim {

@@ -5,6 +5,7 @@
 
 #include "algorithms/geometry/convex.hpp"
 #include "algorithms/geometry/plane.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::test {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "algorithms/core/messages/surfaces.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap::test {
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "algorithms/geometry/so3.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::test {
 namespace {

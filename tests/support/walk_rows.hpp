@@ -5,6 +5,7 @@
 #include <random>
 
 #include "algorithms/estimation/filters/base_filter.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/synthetic_walk.hpp"
 
 namespace polygmap::test {
@@ -17,7 +18,7 @@ class WalkRows {
 
   explicit WalkRows(const WalkSpec& spec) : walk_(spec) {
     contacts_.reset({});
-    axes.reset({});
+    axes.reset({}, nominal_robot().sole);
     heights_.fill({0.0, 0.003});
   }
 

@@ -30,7 +30,7 @@ struct LatchedStep {
   std::int64_t map_stamp_ns = 0;         // exposure of the newest fused frame at the latch
   Foothold target;                       // world frame at the latch
   Transform odom_T_target;               // the same sole pose in the odometry frame that the swing is steered in
-  std::int64_t touch_down_stamp_ns = 0;  // 0 while in the air, and for ever when the foot was put back
+  std::int64_t touch_down_stamp_ns = 0;  // 0 while in the air, and for ever when the swing was aborted
   Transform odom_T_executed;             // estimated sole pose at touch-down
 };
 
@@ -47,7 +47,7 @@ struct GaitStatus {
   std::uint32_t ik_limited_ticks = 0;        // ticks in which a leg could not reach what was asked
   std::uint32_t early_contacts = 0;
   std::uint32_t late_contacts = 0;
-  std::uint32_t put_back = 0;  // feet that turned back in the air to where they had stood
+  std::uint32_t aborted_swings = 0;  // feet that turned back in the air to where they had stood
 };
 
 }  // namespace polygmap

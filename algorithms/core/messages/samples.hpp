@@ -8,14 +8,9 @@
 #include "algorithms/core/capacities.hpp"
 #include "algorithms/core/math/math.hpp"
 #include "algorithms/core/math/transform.hpp"
+#include "algorithms/core/time.hpp"
 
 namespace polygmap {
-
-inline constexpr std::int64_t kNsPerMs = 1'000'000;
-inline constexpr std::int64_t kNsPerS = 1'000'000'000;
-[[nodiscard]] constexpr double seconds(std::int64_t duration_ns) noexcept {
-  return static_cast<double>(duration_ns) * 1e-9;
-}
 
 enum class Foot : std::uint8_t { kLeft = 0, kRight = 1 };
 [[nodiscard]] constexpr std::size_t index_of(Foot foot) noexcept { return static_cast<std::size_t>(foot); }

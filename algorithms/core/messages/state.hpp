@@ -20,7 +20,7 @@ struct StateEstimate {
   Vec3 odom_v_base_mps = Vec3::Zero();
   Vec3 base_w_base_radps = Vec3::Zero();
   JointVector q_rad = JointVector::Zero();        // as measured
-  std::array<Transform, kFootCount> odom_T_sole;  // leg kinematics on odom_T_base; sole frame: robot/model.hpp
+  std::array<Transform, kFootCount> odom_T_sole;  // leg kinematics on odom_T_base; sole frame: robot_model.hpp
   std::array<double, kFootCount> contact_probability{};
   Vec3 position_sigma_m = Vec3::Zero();  // of world_p_base
   Vec3 velocity_sigma_mps = Vec3::Zero();

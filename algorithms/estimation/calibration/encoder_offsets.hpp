@@ -15,8 +15,8 @@ namespace polygmap {
 class EncoderOffsets {
  public:
   struct Params {
-    double encoder_sigma_rad = 2e-3;     // of one joint, from its data sheet
-    double level_noise_radprs = 0.5e-3;  // of the soles against each other, after a second: feet rock, ground differs
+    double encoder_sigma_rad = 2e-3;
+    double level_noise_radprs = 0.5e-3;
     // What ground and sole give way by under an ankle that leans on its sole's edge: known of the simulated floor only.
     // Two ankles that hold 5 Nm inwards each, as they do at the start, tilt the soles by 3 mrad against each other on
     // the simulated floor; on its treads by twice that, so no more is learnt once enough is known: half a second, while
@@ -24,9 +24,23 @@ class EncoderOffsets {
     // not press them flat again.
     double give_radpnm = 0.33e-3;
     double enough_sigma_rad = 0.75e-3;
-    double settle_s = 0.1;     // both stand for so long before they are flat
-    double slew_radps = 5e-3;  // of a joint
-    double most_sigmas = 3.0;  // of what both legs' joints make of it: soles farther apart stand on uneven ground
+    double settle_s = 0.1;
+    double slew_radps = 5e-3;
+    double most_sigmas = 3.0;
+
+    static void visit(auto& p, auto& field) {
+      field("encoder_sigma_rad", p.encoder_sigma_rad, 0.0, 0.05, "Offset of one joint's encoder, by its data sheet.");
+      field("level_noise_radprs", p.level_noise_radprs, 1e-6, 0.1,
+            "Noise of the soles' tilt against each other, after a second: feet rock and ground differs.");
+      field("give_radpnm", p.give_radpnm, 0.0, 0.01,
+            "Ground and sole give way by this under an ankle that leans on its sole's edge.");
+      field("enough_sigma_rad", p.enough_sigma_rad, 1e-5, 0.05,
+            "Learning ends when the tilt of the soles against each other is known as well.");
+      field("settle_s", p.settle_s, 0.0, 2.0, "Both feet stand for so long before they count as flat.");
+      field("slew_radps", p.slew_radps, 1e-4, 0.1, "An offset changes no faster, since it moves the legs.");
+      field("most_sigmas", p.most_sigmas, 0.1, 10.0,
+            "Soles farther apart than this many sigmas of both legs' joints stand on uneven ground.");
+    }
   };
   void reset(const Params& params) noexcept;
   // The robot was moved: what was learnt of where it stood is forgotten, unless it is taken off already.

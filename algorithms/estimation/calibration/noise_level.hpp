@@ -11,10 +11,19 @@ namespace polygmap {
 class NoiseLevel {
  public:
   struct Params {
-    double first = 0.0;     // sigma until something is measured ...
-    double first_s = 0.0;   // ... which counts like so much time of measurement
-    double memory_s = 1.0;  // of what was measured
+    double first = 0.0;
+    double first_s = 0.0;
+    double memory_s = 1.0;
     double min = 0.0, max = 1e9;
+
+    static void visit(auto& p, auto& field) {
+      field("first", p.first, 0.0, 10.0, "Sigma until something is measured, in units of the signal.");
+      field("first_s", p.first_s, 0.0, 1000.0, "The first sigma counts like so much time of measurement.");
+      field("memory_s", p.memory_s, 0.01, 1000.0, "What was measured longer ago is forgotten.");
+      field("min", p.min, 0.0, 10.0, "The measured sigma is believed down to this.");
+      field("max", p.max, 0.0, 1e9, "The measured sigma is believed up to this.");
+      field.ordered("min", "max");
+    }
   };
   void reset(const Params& params) noexcept {
     params_ = params;

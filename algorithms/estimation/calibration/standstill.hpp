@@ -12,10 +12,19 @@ class StandstillCalibration {
  public:
   struct Params {
     double duration_s = 1.0;
-    double max_rate_radps = 0.05;       // bias, noise and sway stay below
-    double max_accel_error_mps2 = 1.0;  // of the measured gravity
+    double max_rate_radps = 0.05;
+    double max_accel_error_mps2 = 1.0;
     double max_joint_move_rad = 0.01;
     double min_foot_force_n = 50.0;
+
+    static void visit(auto& p, auto& field) {
+      field("duration_s", p.duration_s, 0.05, 30.0, "The robot stands still for so long at the start.");
+      field("max_rate_radps", p.max_rate_radps, 1e-4, 1.0,
+            "Bias, noise and sway of the gyro stay below this while the robot stands.");
+      field("max_accel_error_mps2", p.max_accel_error_mps2, 0.01, 10.0, "The measured gravity is off by no more.");
+      field("max_joint_move_rad", p.max_joint_move_rad, 1e-4, 0.5, "No joint moves farther while the robot stands.");
+      field("min_foot_force_n", p.min_foot_force_n, 0.0, 500.0, "A standing foot presses at least as hard.");
+    }
   };
   using Legs = std::array<LegMeasurement, kFootCount>;
   void reset(const Params& params) noexcept;

@@ -19,14 +19,32 @@ struct FootContact {
 class ContactEstimator {
  public:
   struct Params {
-    double force_air_n = 10.0;       // at and below: in the air
-    double force_standing_n = 25.0;  // at and above: stands (a foot that touches weighs at least its own leg)
-    double force_delay_s = 0.006;    // of the sensor
-    double settle_s = 0.006;         // blanking at touch-down: from 0 to 1 at the earliest in this time
-    double stated_standing = 0.5;    // a stated probability at and above: stands ...
-    double stated_air = 0.4;         // ... until it falls below this
-    double flicker_s = 0.003;        // a stated contact that ends fades in this time
-    double stuck_swing_s = 0.15;     // a planned swing whose force never went away stands after all
+    double force_air_n = 10.0;
+    double force_standing_n = 25.0;
+    double force_delay_s = 0.006;
+    double settle_s = 0.006;
+    double stated_standing = 0.5;
+    double stated_air = 0.4;
+    double flicker_s = 0.003;
+    double stuck_swing_s = 0.15;
+
+    static void visit(auto& p, auto& field) {
+      field("force_air_n", p.force_air_n, 0.0, 200.0, "A foot that presses no harder is in the air.");
+      field("force_standing_n", p.force_standing_n, 1.0, 500.0,
+            "A foot that presses as hard stands; one that touches weighs at least its own leg.");
+      field.ordered("force_air_n", "force_standing_n");
+      field("force_delay_s", p.force_delay_s, 0.0, 0.05,
+            "The force sensor's delay, taken off the time of a touch-down.");
+      field("settle_s", p.settle_s, 0.001, 0.1,
+            "A contact's probability rises from 0 to 1 in this time at the earliest, which blanks the impact.");
+      field("stated_standing", p.stated_standing, 0.05, 1.0, "A foot whose stated probability is as high stands.");
+      field("stated_air", p.stated_air, 0.0, 0.95,
+            "A foot that stands does so until its stated probability falls below this.");
+      field.ordered("stated_air", "stated_standing");
+      field("flicker_s", p.flicker_s, 0.001, 0.1, "A stated contact that ends fades in this time.");
+      field("stuck_swing_s", p.stuck_swing_s, 0.02, 2.0,
+            "A planned swing whose force has not gone away for so long stands after all.");
+    }
   };
   void reset(const Params& params) noexcept;
   // planned_stance releases a foot at once at lift-off (forces lag); once unloaded, force alone brings it back, so an

@@ -17,13 +17,27 @@ namespace polygmap {
 class FootMotion {
  public:
   struct Params {
-    double speed_sigma_mps = 0.04;  // wanted of the measured speed: how long to average follows from the noise
+    double speed_sigma_mps = 0.04;
     double min_window_s = 0.010;
     double max_window_s = 0.060;
-    NoiseLevel::Params noise{1e-3, 0.0, 2.0, 3e-4, 0.02};  // of a resting foot's position, m
-    double rest_sigma_mps = 0.05;                          // of a foot that rests: it rolls and creeps
-    double rest_sigmas = 3.0;                              // a speed below this many of its sigmas is rest
-    double gain = 4.0;  // of the walk that a speed stands for: speed^2 times the window
+    NoiseLevel::Params noise{1e-3, 0.0, 2.0, 3e-4, 0.02};
+    double rest_sigma_mps = 0.05;
+    double rest_sigmas = 3.0;
+    double gain = 4.0;
+
+    static void visit(auto& p, auto& field) {
+      field("speed_sigma_mps", p.speed_sigma_mps, 0.001, 1.0,
+            "The measured speed of a foot is averaged until it is as good as this.");
+      field("min_window_s", p.min_window_s, 0.002, 0.1, "The speed is averaged over no less.");
+      field("max_window_s", p.max_window_s, 0.002, 0.5, "The speed is averaged over no more.");
+      field.ordered("min_window_s", "max_window_s");
+      field("noise", p.noise);
+      field("rest_sigma_mps", p.rest_sigma_mps, 0.001, 1.0,
+            "A foot that rests moves like this all the same: it rolls and creeps.");
+      field("rest_sigmas", p.rest_sigmas, 0.0, 10.0, "A speed below this many of its sigmas is rest.");
+      field("gain", p.gain, 0.0, 100.0,
+            "The random walk that a speed stands for is this times its square times the window.");
+    }
   };
   void reset(const Params& params) noexcept;
 

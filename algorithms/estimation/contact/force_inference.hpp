@@ -13,8 +13,15 @@ class ForceInference {
  public:
   struct Params {
     double smoothing_s = 0.008;
-    double friction_n = 20.0;  // what the joints' friction may feign: a smaller force is none
-    double damping_m = 0.02;   // of the inverse, against a stretched knee: takes 1 to 2 % of the force
+    double friction_n = 20.0;
+    double damping_m = 0.02;
+
+    static void visit(auto& p, auto& field) {
+      field("smoothing_s", p.smoothing_s, 0.0, 0.1, "Time constant of the inferred forces' low-pass.");
+      field("friction_n", p.friction_n, 0.0, 200.0, "The joints' friction may feign as much: a smaller force is none.");
+      field("damping_m", p.damping_m, 0.001, 0.2,
+            "Damping of the inverse against a stretched knee: 0.02 takes 1 to 2 % of the force.");
+    }
   };
   void reset(const Params& params) noexcept;
   // base_up: the vertical in base axes. Forces in N, upwards on the foot, never negative.

@@ -5,22 +5,15 @@
 #include <algorithm>
 
 namespace polygmap {
-namespace {
-
-constexpr double kSwingVelocity_mps = 200.0;  // a swinging foot says nothing of the base
-constexpr double kInitialContact_m = 1e-3;
-constexpr double kInitialVelocity_mps = 1e-2;
-
-}  // namespace
 
 void BaseFilter::initialise(const Vec3& odom_p_base_m, const Vec3& odom_v_base_mps, const ContactRows& rows) noexcept {
   for (int a = 0; a < 3; ++a) {
     AxisFilter::State x = AxisFilter::State::Zero();
-    AxisFilter::State variance = AxisFilter::State::Constant(math::square(kInitialContact_m));
+    AxisFilter::State variance = AxisFilter::State::Constant(math::square(params_.initial_contact_sigma_m));
     x[0] = odom_p_base_m[a];
     x[1] = odom_v_base_mps[a];
     variance[0] = 0.0;  // the origin is defined here
-    variance[1] = math::square(kInitialVelocity_mps);
+    variance[1] = math::square(params_.initial_velocity_sigma_mps);
     for (std::size_t c = 0; c < kContactCount; ++c) {
       x[2 + static_cast<int>(c)] = odom_p_base_m[a] + rows[c].odom_r_contact_m[a];
     }
@@ -33,7 +26,6 @@ ContactRows BaseFilter::make_rows(const Mat3& odom_R_base, const Vec3& base_w_ba
                                   const std::array<FootContact, kFootCount>& contacts,
                                   const std::array<TouchDown, kFootCount>& touch_downs,
                                   const std::array<KnownHeight, kFootCount>& heights, double dt_s) const noexcept {
-  const std::array<Vec3, kContactsPerFoot> sole_p_contact_m = sole_contacts_m();
   const Vec3 odom_p_predicted_m = odom_p_base_m() + dt_s * odom_v_base_mps();
   ContactRows rows;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
@@ -43,14 +35,14 @@ ContactRows BaseFilter::make_rows(const Mat3& odom_R_base, const Vec3& base_w_ba
     const Vec3 walk_mprs = stands ? Vec3{params_.stance_walk_mprs, params_.stance_walk_mprs, params_.stance_walk_z_mprs}
                                   : Vec3::Constant(params_.swing_walk_mprs);
     const double position_m = touch_down.now ? params_.anchor_sigma_m : params_.position_sigma_m;
-    const double velocity_mps = stands ? params_.velocity_sigma_mps : kSwingVelocity_mps;
+    const double velocity_mps = stands ? params_.velocity_sigma_mps : params_.swing_velocity_sigma_mps;
     const KnownHeight& height = heights[foot];
     const bool height_counts = height.sigma_m > 0.0 && stands;
     for (std::size_t i = 0; i < kContactsPerFoot; ++i) {
-      const Vec3 base_r_m = leg.base_T_sole.R * sole_p_contact_m[i];  // from the sole's origin
+      const Vec3 base_r_m = leg.base_T_sole.R * sole_p_contact_m_[i];  // from the sole's origin
       const Vec3 base_p_m = leg.base_T_sole.p_m + base_r_m;
       ContactRow& row = rows[foot * kContactsPerFoot + i];
-      row.odom_r_contact_m = touch_down.now ? Vec3(touch_down.odom_T_sole * sole_p_contact_m[i] - odom_p_predicted_m)
+      row.odom_r_contact_m = touch_down.now ? Vec3(touch_down.odom_T_sole * sole_p_contact_m_[i] - odom_p_predicted_m)
                                             : Vec3(odom_R_base * base_p_m);
       row.odom_dr_contact_mps = odom_R_base * (leg.base_v_sole_mps + leg.base_w_sole_radps.cross(base_r_m) +
                                                base_w_base_radps.cross(base_p_m));

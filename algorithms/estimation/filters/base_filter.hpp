@@ -36,17 +36,44 @@ struct KnownHeight {
 class BaseFilter {
  public:
   struct Params {
-    double accel_noise_mpsrs = 0.0134;  // m/s/sqrt(s); 0.3 m/s^2 at 500 Hz: 6 Hz between legs and acceleration
-    double velocity_sigma_mps = 0.2;    // of one contact's velocity row
-    double position_sigma_m = 4e-4;     // of one contact's position row; four per foot share their error
-    double closure_share = 0.97;        // of two legs' disagreement that is shared by load instead of filtered away
-    double stance_walk_mprs = 1e-4;     // m/sqrt(s): creep of a standing foot, and how soon a wrong anchor is forgiven
-    double stance_walk_z_mprs = 5e-4;   // vertical: so that a tread's height is believed within about 6 s
-    double anchor_sigma_m = 1e-5;       // of a contact at touch-down
-    double swing_walk_mprs = 2.0;       // so that a landing foot is a new contact
-    double height_correlation_s = 1.0;  // a frozen height errs alike in every step of this time
+    double accel_noise_mpsrs = 0.0134;
+    double velocity_sigma_mps = 0.2;
+    double position_sigma_m = 4e-4;
+    double closure_share = 0.97;
+    double stance_walk_mprs = 1e-4;
+    double stance_walk_z_mprs = 5e-4;
+    double anchor_sigma_m = 1e-5;
+    double swing_walk_mprs = 2.0;
+    double swing_velocity_sigma_mps = 200.0;
+    double height_correlation_s = 1.0;
+    double initial_contact_sigma_m = 1e-3;
+    double initial_velocity_sigma_mps = 1e-2;
+
+    static void visit(auto& p, auto& field) {
+      field("accel_noise_mpsrs", p.accel_noise_mpsrs, 1e-4, 1.0,
+            "Noise of the acceleration: 0.0134 is 0.3 m/s^2 at 500 Hz and puts 6 Hz between legs and acceleration.");
+      field("velocity_sigma_mps", p.velocity_sigma_mps, 0.001, 10.0, "Noise of one contact's velocity row.");
+      field("position_sigma_m", p.position_sigma_m, 1e-5, 0.1,
+            "Noise of one contact's position row; four of a foot share their error.");
+      field("closure_share", p.closure_share, 0.0, 1.0,
+            "Share of two legs' disagreement that is shared by load instead of filtered away.");
+      field("stance_walk_mprs", p.stance_walk_mprs, 1e-6, 0.1,
+            "A standing foot creeps like this, which is also how soon a wrong anchor is forgiven.");
+      field("stance_walk_z_mprs", p.stance_walk_z_mprs, 1e-6, 0.1,
+            "A standing foot creeps like this vertically, so that a tread's height is believed within about 6 s.");
+      field("anchor_sigma_m", p.anchor_sigma_m, 1e-7, 0.1, "Place of a contact at touch-down against the legs.");
+      field("swing_walk_mprs", p.swing_walk_mprs, 0.01, 100.0,
+            "A swinging foot walks like this, so that a landing one is a new contact.");
+      field("swing_velocity_sigma_mps", p.swing_velocity_sigma_mps, 1.0, 1e4,
+            "Noise of a swinging foot's velocity row, which says nothing of the base.");
+      field("height_correlation_s", p.height_correlation_s, 0.002, 100.0,
+            "A frozen height errs alike in every step of this time.");
+      field("initial_contact_sigma_m", p.initial_contact_sigma_m, 1e-6, 0.1, "Place of a contact at the start.");
+      field("initial_velocity_sigma_mps", p.initial_velocity_sigma_mps, 1e-5, 1.0,
+            "Velocity of the base at the start.");
+    }
   };
-  void reset(const Params& params) noexcept { *this = BaseFilter{params}; }
+  void reset(const Params& params, const SoleModel& sole) noexcept { *this = BaseFilter{params, sole}; }
   BaseFilter() noexcept = default;
 
   // Contacts by kinematics.
@@ -74,7 +101,8 @@ class BaseFilter {
   [[nodiscard]] Vec2 base_process(double dt_s) const noexcept;
 
  private:
-  explicit BaseFilter(const Params& params) noexcept : params_(params) {}
+  BaseFilter(const Params& params, const SoleModel& sole) noexcept
+      : params_(params), sole_p_contact_m_(sole.contacts_m()) {}
   [[nodiscard]] Vec3 per_axis(double (AxisFilter::*value)() const noexcept) const noexcept {
     return {(axes_[0].*value)(), (axes_[1].*value)(), (axes_[2].*value)()};
   }
@@ -85,6 +113,7 @@ class BaseFilter {
   void share_closure(const std::array<FootContact, kFootCount>& contacts, ContactRows& rows) const noexcept;
 
   Params params_;
+  std::array<Vec3, kContactsPerFoot> sole_p_contact_m_{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
   std::array<AxisFilter, 3> axes_;
   NormalisedRows velocity_rows_, height_rows_;
 };

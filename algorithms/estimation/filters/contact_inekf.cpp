@@ -180,9 +180,8 @@ void ContactInEkf::measure_walk(std::size_t foot, const Vec3& innovation_m, doub
   w.mean_m += share * (innovation_m - w.mean_m);
   w.age_s += dt_s;
   if (w.age_s < params_.whiteness_window_s) return;
-  constexpr double kMostRatio = 5.0;
   const double white_m2 = 3.0 * variance_m2 * share / (2.0 - share);
-  const double ratio = std::min(w.mean_m.squaredNorm() / white_m2, kMostRatio);
+  const double ratio = std::min(w.mean_m.squaredNorm() / white_m2, params_.whiteness_most_ratio);
   walk_time_s_ += dt_s;
   const double gain_ps =
       std::max(params_.whiteness_gain_ps, params_.whiteness_start_gain / (walk_time_s_ + params_.whiteness_window_s));

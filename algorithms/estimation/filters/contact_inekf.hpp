@@ -22,23 +22,57 @@ namespace polygmap {
 class ContactInEkf {
  public:
   struct Params {
-    double gyro_noise_radprs = 1e-4;  // at least, rad/sqrt(s); 2e-3 rad/s at 500 Hz is 0.9e-4
-    double accel_noise_mpsrs = 3e-3;  // at least, m/s/sqrt(s); 0.05 m/s^2 at 500 Hz is 2.2e-3
+    double gyro_noise_radprs = 1e-4;
+    double accel_noise_mpsrs = 3e-3;
     double lost_accel_noise_mpsrs = 2.0;
-    double lost_gyro_noise_radprs = 0.1;   // of a walking base whose turning nobody feels: 0.03 rad in 0.1 s
-    double dynamic_accel_share = 0.02;     // of what differs from gravity: sampling, scale, mount
-    double gyro_bias_walk_radpsrs = 5e-6;  // rad/s/sqrt(s)
+    double lost_gyro_noise_radprs = 0.1;
+    double dynamic_accel_share = 0.02;
+    double gyro_bias_walk_radpsrs = 5e-6;
     double accel_bias_walk_mps2rs = 1e-4;
-    double foot_sigma_rad = 1e-3;     // of one kinematic attitude of a sole, encoder noise
-    double foot_walk_radprs = 1e-3;   // rad/sqrt(s): creep of a loaded foot and kinematic error as the legs move
-    double contact_walk_mprs = 2e-3;  // m/sqrt(s): the same of its place, at the start; then measured
+    double foot_sigma_rad = 1e-3;
+    double foot_walk_radprs = 1e-3;
+    double contact_walk_mprs = 2e-3;
     double min_contact_walk_mprs = 3e-4;
-    double full_walk_speed_mps = 0.1;  // of the base, turning included; below it a contact walks less
+    double full_walk_speed_mps = 0.1;
     double max_contact_walk_mprs = 2e-2;
-    double whiteness_window_s = 0.2;    // the walk is right when innovations averaged over this are white
-    double whiteness_gain_ps = 1.0;     // of the walk's logarithm, in the long run ...
-    double whiteness_start_gain = 1.0;  // ... and this over the time measured, at the start
-    double outlier_sigmas = 5.0;        // rows further out weigh less, in proportion (Huber)
+    double whiteness_window_s = 0.2;
+    double whiteness_gain_ps = 1.0;
+    double whiteness_start_gain = 1.0;
+    double whiteness_most_ratio = 5.0;
+    double outlier_sigmas = 5.0;
+
+    static void visit(auto& p, auto& field) {
+      field("gyro_noise_radprs", p.gyro_noise_radprs, 1e-6, 0.1,
+            "Noise of the gyro at least: 2e-3 rad/s at 500 Hz is 0.9e-4.");
+      field("accel_noise_mpsrs", p.accel_noise_mpsrs, 1e-5, 1.0,
+            "Noise of the accelerometer at least: 0.05 m/s^2 at 500 Hz is 2.2e-3.");
+      field("lost_accel_noise_mpsrs", p.lost_accel_noise_mpsrs, 0.01, 20.0,
+            "The acceleration of a base that nobody feels.");
+      field("lost_gyro_noise_radprs", p.lost_gyro_noise_radprs, 0.001, 1.0,
+            "The turning of a walking base that nobody feels: 0.03 rad in 0.1 s.");
+      field("dynamic_accel_share", p.dynamic_accel_share, 0.0, 0.5,
+            "Sampling, scale and mount falsify this share of what differs from gravity.");
+      field("gyro_bias_walk_radpsrs", p.gyro_bias_walk_radpsrs, 0.0, 0.01, "Random walk of the gyro's bias.");
+      field("accel_bias_walk_mps2rs", p.accel_bias_walk_mps2rs, 0.0, 0.1, "Random walk of the accelerometer's bias.");
+      field("foot_sigma_rad", p.foot_sigma_rad, 1e-5, 0.1, "Encoder noise of one attitude of a sole.");
+      field("foot_walk_radprs", p.foot_walk_radprs, 1e-6, 1.0,
+            "A loaded foot's creep and the kinematic error turn its attitude like this as the legs move.");
+      field("contact_walk_mprs", p.contact_walk_mprs, 1e-5, 1.0,
+            "A loaded foot's place walks like this at the start; then the walk is measured.");
+      field("min_contact_walk_mprs", p.min_contact_walk_mprs, 1e-6, 0.1, "The measured walk is at least this.");
+      field("full_walk_speed_mps", p.full_walk_speed_mps, 0.001, 2.0,
+            "A contact walks less when the base moves more slowly, turning included.");
+      field("max_contact_walk_mprs", p.max_contact_walk_mprs, 1e-5, 10.0, "The measured walk is at most this.");
+      field.ordered("min_contact_walk_mprs", "max_contact_walk_mprs");
+      field("whiteness_window_s", p.whiteness_window_s, 0.002, 10.0,
+            "The walk is right when innovations averaged over this time are white.");
+      field("whiteness_gain_ps", p.whiteness_gain_ps, 0.0, 20.0, "Gain of the walk's logarithm in the long run.");
+      field("whiteness_start_gain", p.whiteness_start_gain, 0.0, 10.0,
+            "Gain of the walk's logarithm at the start, over the time measured.");
+      field("whiteness_most_ratio", p.whiteness_most_ratio, 1.01, 1000.0,
+            "Innovations count as no more than this times what white ones are.");
+      field("outlier_sigmas", p.outlier_sigmas, 0.5, 100.0, "Rows farther out weigh less, in proportion (Huber).");
+    }
   };
   // One sigma each, of what is known at the start.
   struct Start {

@@ -15,7 +15,7 @@
 #include "algorithms/estimation/calibration/noise_level.hpp"
 #include "algorithms/estimation/lidar/lio_uncertainty.hpp"
 #include "algorithms/estimation/quality/innovation.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
@@ -51,29 +51,56 @@ struct LioInnovations {
 class LioFusion {
  public:
   struct Params {
-    Transform base_T_lidar = polygmap::base_T_lidar();
-    double max_age_s = 0.4;  // of a pose on arrival; the state ring holds 0.5 s
-    double tau_s = 4.0;      // LIO of 10 mm at 10 Hz: 2.2 mm come through. At least this ...
-    double tau_spm = 0.0;    // ... and so much per metre of LIO's sigma
-    double max_gap_s = 1.0;  // dt of eq. (9) at most, so that after a silence no single pose decides
+    double max_age_s = 0.4;
+    double tau_s = 4.0;
+    double tau_spm = 0.0;
+    double max_gap_s = 1.0;
     // Where samples state 0: measured from one pose to the next, and until then these.
     NoiseLevel::Params unstated_position_m{0.01, 0.5, 10.0, 1e-3, 0.3};
     NoiseLevel::Params unstated_rotation_rad{0.0035, 0.5, 10.0, 2e-4, 0.2};
     double max_position_sigma_m = 0.3;
     double max_rotation_sigma_rad = 0.2;
-    double jump_m = 0.08;           // bound at full rate ...
-    double jump_growth_mps = 0.02;  // ... and its growth with silence, as odometry drifts
+    double jump_m = 0.08;
+    double jump_growth_mps = 0.02;
     double jump_rad = 0.06;
     double jump_growth_radps = 0.004;
     double max_jump_m = 0.5;
     double max_jump_rad = 0.3;
-    std::uint32_t realign_count = 20;  // jumped poses in a row that agree among themselves
-    double slew_mps = 0.1;             // most that the fused pose moves by: 0.2 mm in a tick of 2 ms ...
-    double slew_radps = 0.175;         // ... and 0.02 deg
-    double max_slew_s = 0.01;          // longer ticks move it by no more than one of these: 1 mm
+    std::uint32_t realign_count = 20;
+    double slew_mps = 0.1;
+    double slew_radps = 0.175;
+    double max_slew_s = 0.01;
     LioUncertainty::Params uncertainty;
+
+    static void visit(auto& p, auto& field) {
+      field("max_age_s", p.max_age_s, 0.0, 0.5, "A pose is no older on arrival; the history of states holds 0.5 s.");
+      field("tau_s", p.tau_s, 0.0, 1000.0,
+            "Time constant of the offset's low-pass at least: of a LIO of 10 mm at 10 Hz, 2.2 mm come through 4 s.");
+      field("tau_spm", p.tau_spm, 0.0, 1e5,
+            "Time constant of the low-pass for each metre of LIO's sigma, where that is more than tau_s.");
+      field("max_gap_s", p.max_gap_s, 0.002, 100.0,
+            "Longest time that one pose stands for, so that after a silence no single one decides.");
+      field("unstated_position_m", p.unstated_position_m);
+      field("unstated_rotation_rad", p.unstated_rotation_rad);
+      field("max_position_sigma_m", p.max_position_sigma_m, 1e-4, 100.0, "A pose that states more is refused.");
+      field("max_rotation_sigma_rad", p.max_rotation_sigma_rad, 1e-4, 3.2, "A pose that states more is refused.");
+      field("jump_m", p.jump_m, 0.001, 10.0, "A pose farther from its prediction is a jump, at full rate.");
+      field("jump_growth_mps", p.jump_growth_mps, 0.0, 10.0,
+            "The bound grows by this for each second of silence, as odometry drifts.");
+      field("jump_rad", p.jump_rad, 0.001, 3.2, "A pose turned farther from its prediction is a jump, at full rate.");
+      field("jump_growth_radps", p.jump_growth_radps, 0.0, 3.2,
+            "The bound of turns grows by this for each second of silence.");
+      field("max_jump_m", p.max_jump_m, 0.001, 100.0, "A pose farther off is a jump however long the silence.");
+      field("max_jump_rad", p.max_jump_rad, 0.001, 3.2, "A pose turned farther is a jump however long the silence.");
+      field("realign_count", p.realign_count, 1, 1000000,
+            "Jumped poses in a row that agree among themselves are LIO's new world after as many.");
+      field("slew_mps", p.slew_mps, 0.001, 10.0, "The fused pose moves no faster: 0.2 mm in a tick of 2 ms.");
+      field("slew_radps", p.slew_radps, 0.001, 10.0, "The fused pose turns no faster: 0.02 degrees in a tick.");
+      field("max_slew_s", p.max_slew_s, 0.001, 1.0, "A longer tick moves it no farther than one of these: 1 mm.");
+      field("uncertainty", p.uncertainty);
+    }
   };
-  void reset(const Params& params) noexcept;
+  void reset(const Params& params, const Transform& base_T_lidar) noexcept;
 
   // What can be said of a pose by itself: kAccepted or the reason against it.
   [[nodiscard]] LioVerdict check(const LioSample& sample, std::int64_t now_ns) const noexcept;
@@ -113,6 +140,7 @@ class LioFusion {
   void tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept;
 
   Params params_;
+  Transform base_T_lidar_;
   // LIO's world is not ours. The first poses say where it lies, while world is odom: each by its weight against the
   // drift since the first. Once that is no more than eq. (9)'s gain the tie stays and odom moves as it drifts.
   Transform world_T_lio_;

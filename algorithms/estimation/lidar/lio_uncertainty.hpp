@@ -16,6 +16,14 @@ class LioUncertainty {
     double drift_per_m = 0.0011;
     double initial_sigma_m = 1e-3;
     double initial_sigma_rad = 1e-3;
+
+    static void visit(auto& p, auto& field) {
+      field("drift_per_m", p.drift_per_m, 0.0, 0.1,
+            "Odometry drifts by this along each axis besides what its filter and the heading say: legs are longer than "
+            "thought.");
+      field("initial_sigma_m", p.initial_sigma_m, 0.0, 1.0, "Position at the start.");
+      field("initial_sigma_rad", p.initial_sigma_rad, 0.0, 1.0, "Yaw at the start.");
+    }
   };
   // x, y, z in m and yaw in rad, world axes.
   using Quantities = Eigen::Vector4d;

@@ -17,8 +17,12 @@ class Balance {
     DcmStabiliser::Params dcm;
     DcmBias::Params bias;
     PressureLimits pressure;
-    MassModel masses;
-    double armature_kgm2 = 0.05;  // of a drive, seen at its joint
+
+    static void visit(auto& p, auto& field) {
+      field("dcm", p.dcm);
+      field("bias", p.bias);
+      field("pressure", p.pressure);
+    }
   };
   struct Reference {  // plan frame
     HorizontalMotion com;
@@ -36,7 +40,7 @@ class Balance {
   void reset() noexcept;
   // One tick. feedback: rates, torques and forces on the feet, as measured. The plan frame is laid on the estimate by
   // the standing soles: an error of the base is what is fed back.
-  [[nodiscard]] JointVector torques_nm(const Params& params, const LegGeometry& geometry, const Reference& reference,
+  [[nodiscard]] JointVector torques_nm(const Params& params, const RobotModel& robot, const Reference& reference,
                                        const Body& body, const JointFeedback& feedback, double tick_s) noexcept;
   // Of the last tick, horizontal: the planned centre of mass, and how far ahead of the estimated one, without its bias,
   // it is.
@@ -48,6 +52,27 @@ class Balance {
   [[nodiscard]] const Vec2& odom_com_bias_m() const noexcept { return bias_.odom_bias_m(); }
 
  private:
+  // The body as a pendulum under the reference's motion.
+  struct Pendulum {
+    Vec3 odom_p_com_m = Vec3::Zero();
+    Vec3 odom_v_com_mps = Vec3::Zero();
+    double height_m = 1.0;
+    double omega_radps = 1.0;
+    double vertical_n = 0.0;       // of the ground's force
+    Vec2 beside_m = Vec2::Zero();  // by which the ground's force passes beside the centre of mass
+  };
+  // Frames of both legs, as the body has them.
+  [[nodiscard]] static Pendulum pendulum_of(const MassModel& masses, const BodyFrames& frames, const Body& body,
+                                            const JointVector& dq_radps, const PerLink& links_mps2,
+                                            double ground_m) noexcept;
+  void observe_bias(const Params& params, const RobotModel& robot, const Body& body, const JointFeedback& feedback,
+                    const Support& support, const Pendulum& pendulum, double tick_s) noexcept;
+  // Of both legs, when the ground gives that force where it is pressed.
+  [[nodiscard]] static JointVector leg_torques(const MassModel& masses, const BodyFrames& frames,
+                                               const PerLink& links_mps2, const Mat3& odom_R_base,
+                                               const Support& support, const Pressure& pressure,
+                                               const Vec3& force_n) noexcept;
+
   DcmStabiliser stabiliser_;
   DcmBias bias_;
   int bias_tick_ = 0;

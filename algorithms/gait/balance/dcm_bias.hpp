@@ -13,10 +13,20 @@ namespace polygmap {
 class DcmBias {
  public:
   struct Params {
-    double rate_radps = 1.0;   // of the observer's slow pole pair; in the beginning,
-    double haste = 2.0;        // when all that is known of the bias is that it is small, this over the time since then
-    double surprise_m = 0.02;  // an estimate farther from the observer's: a push, which says nothing of the bias
+    double rate_radps = 1.0;
+    double haste = 2.0;
+    double surprise_m = 0.02;
     double most_m = 0.04;
+
+    static void visit(auto& p, auto& field) {
+      field("rate_radps", p.rate_radps, 0.0, 20.0, "The observer's slow pole pair.");
+      field("haste", p.haste, 0.0, 20.0,
+            "In the beginning, when all that is known of the bias is that it is small, the rate is this over the time "
+            "since then.");
+      field("surprise_m", p.surprise_m, 0.0, 1.0,
+            "An estimate farther from the observer's is a push, which says nothing of the bias.");
+      field("most_m", p.most_m, 0.0, 0.2, "The bias is believed up to this.");
+    }
   };
   void reset() noexcept { *this = {}; }
   // One tick. dcm_m: as estimated; zmp_m: as measured; odometry. odom_R_heading: what biases them turns with the robot.

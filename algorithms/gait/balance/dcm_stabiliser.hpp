@@ -3,22 +3,22 @@
 // motion, x + v/omega, in the horizontal plane.
 #pragma once
 
-#include "algorithms/core/math/math.hpp"
+#include "algorithms/gait/trajectories/motion.hpp"
 
 namespace polygmap {
-
-struct HorizontalMotion {
-  Vec2 position_m = Vec2::Zero();
-  Vec2 velocity_mps = Vec2::Zero();
-  Vec2 acceleration_mps2 = Vec2::Zero();
-};
 
 class DcmStabiliser {
  public:
   struct Params {
-    double gain = 3.0;            // metres of ZMP for each metre of DCM; at 1 and below nothing is stable
-    double integral_per_s = 0.3;  // of the same
+    double gain = 3.0;
+    double integral_per_s = 0.3;
     double integral_max_m = 0.02;
+
+    static void visit(auto& p, auto& field) {
+      field("gain", p.gain, 1.01, 20.0, "Metres of ZMP for each metre of DCM; at 1 and below nothing is stable.");
+      field("integral_per_s", p.integral_per_s, 0.0, 10.0, "Integral gain of the same.");
+      field("integral_max_m", p.integral_max_m, 0.0, 0.2, "The integral's share is bounded by this.");
+    }
   };
   void reset() noexcept {
     integral_m_.setZero();

@@ -2,7 +2,7 @@
 // How the planned motion accelerates every link: second differences of the plan, which is smooth.
 #pragma once
 
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/core/time.hpp"
 #include "algorithms/robot/leg_dynamics.hpp"
 
 namespace polygmap {

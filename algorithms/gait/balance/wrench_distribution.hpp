@@ -9,11 +9,23 @@ namespace polygmap {
 
 // Where the centre of pressure may be in a sole, about the sole frame's origin.
 struct PressureLimits {
-  double ahead_m = 0.066;  // where it carries all: the ankle's 36 Nm hold 67 mm of 540 N; farther with a smaller share,
-  double toe_m = 0.155;    // to here: the contact ends at 171 mm
+  double ahead_m = 0.066;
+  double toe_m = 0.155;
   double behind_m = 0.066;
-  double inward_m = 0.03;  // from a sole's middle line towards the other sole: there it carries all of the weight
-  double aside_m = 0.045;  // of a half width of 48 mm
+  double inward_m = 0.03;
+  double aside_m = 0.045;
+
+  static void visit(auto& p, auto& field) {
+    field("ahead_m", p.ahead_m, 0.001, 0.17,
+          "Centre of pressure ahead of the ankle of a foot that carries all: 36 Nm hold 67 mm of 540 N.");
+    field("toe_m", p.toe_m, 0.001, 0.17,
+          "Centre of pressure ahead of the ankle of a foot with a small share: the contact ends at 171 mm.");
+    field("behind_m", p.behind_m, 0.001, 0.07, "Centre of pressure behind the ankle of a foot that carries all.");
+    field("inward_m", p.inward_m, 0.001, 0.048,
+          "Centre of pressure from a sole's middle line towards the other sole, where it carries all.");
+    field("aside_m", p.aside_m, 0.001, 0.048,
+          "Centre of pressure from the middle line at most, of a half width of 48 mm.");
+  }
 };
 
 struct Support {

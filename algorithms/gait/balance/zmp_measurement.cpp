@@ -5,7 +5,7 @@
 
 namespace polygmap {
 
-bool try_measure_zmp(const MassModel& masses, const LegGeometry& geometry, const JointFeedback& felt,
+bool try_measure_zmp(const RobotModel& robot, const JointFeedback& felt,
                      const std::array<Transform, kFootCount>& odom_T_sole, const Vec2& odom_slope,
                      Vec2& odom_p_zmp_m) noexcept {
   if (!math::all_finite(felt.tau_nm)) return false;
@@ -22,16 +22,16 @@ bool try_measure_zmp(const MassModel& masses, const LegGeometry& geometry, const
     if (tau_nm[kAnklePitch] == 0.0 && tau_nm[kAnkleRoll] == 0.0) return false;  // drives that tell none
     const Transform& sole = odom_T_sole[f];
     const Vec3 slope = sole.R.transpose() * Vec3{odom_slope.x(), odom_slope.y(), 0.0};
-    const LinkMass& foot = masses.leg[kAnkleRoll];
+    const LinkMass& foot = robot.masses.leg[kAnkleRoll];
     // The ankle's balance: the ground's force, as far below it as the sole is, and the foot's weight.
     const double ahead_m = (tau_nm[kAnklePitch] + foot.mass_kg * kGravity_mps2 * foot.centre_m.x()) / up_n -
-                           geometry.ankle_to_sole_m * slope.x();
-    const double left_m = -tau_nm[kAnkleRoll] / up_n - geometry.ankle_to_sole_m * slope.y();
-    constexpr SoleRectangle kSole = kContactRectangle;
-    moment_nm += up_n * (sole * Vec3{math::clamp(ahead_m, kSole.heel_x_m, kSole.toe_x_m),
-                                     math::clamp(left_m, -kSole.half_width_m, kSole.half_width_m), 0.0});
+                           robot.legs.ankle_to_sole_m * slope.x();
+    const double left_m = -tau_nm[kAnkleRoll] / up_n - robot.legs.ankle_to_sole_m * slope.y();
+    const SoleRectangle& contact = robot.sole.contact;
+    moment_nm += up_n * (sole * Vec3{math::clamp(ahead_m, contact.heel_x_m, contact.toe_x_m),
+                                     math::clamp(left_m, -contact.half_width_m, contact.half_width_m), 0.0});
   }
-  const double weight_n = masses.total_kg() * kGravity_mps2;
+  const double weight_n = robot.masses.total_kg() * kGravity_mps2;
   if (!(sum_n > kLeast * weight_n && sum_n < kMost * weight_n)) return false;
   odom_p_zmp_m = moment_nm.head<2>() / sum_n;
   return true;

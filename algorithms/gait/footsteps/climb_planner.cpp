@@ -28,15 +28,17 @@ double measured(const FootholdSet& set) noexcept {
   }
 }
 
+struct Nosing {
+  Vec3 odom_p_a, odom_p_b;
+};
 // Distance from the foremost corner of the foot to the line through the nosing, along `yaw_rad`; positive before it.
-// odom_p_a and odom_p_b: two points of the nosing.
-double toe_to_line_m(const SolePose& sole, const Vec3& odom_p_a, const Vec3& odom_p_b, double yaw_rad) noexcept {
+double toe_to_line_m(const SoleRectangle& collision, const SolePose& sole, const Nosing& nosing,
+                     double yaw_rad) noexcept {
   const Mat3 R = rotation_z(yaw_rad).transpose();
-  const Vec3 a = R * odom_p_a, b = R * odom_p_b;
+  const Vec3 a = R * nosing.odom_p_a, b = R * nosing.odom_p_b;
   double least_m = 1e9;
   for (const double side : {-1.0, 1.0}) {
-    const Vec3 corner =
-        sole.transform() * Vec3{kCollisionRectangle.toe_x_m, side * kCollisionRectangle.half_width_m, 0};
+    const Vec3 corner = sole.transform() * Vec3{collision.toe_x_m, side * collision.half_width_m, 0};
     const Vec3 p = R * corner;
     const double along = std::abs(b.y() - a.y()) > 0.05 ? (p.y() - a.y()) / (b.y() - a.y()) : 0.5;
     least_m = std::min(least_m, a.x() + along * (b.x() - a.x()) - p.x());
@@ -46,9 +48,16 @@ double toe_to_line_m(const SolePose& sole, const Vec3& odom_p_a, const Vec3& odo
 
 }  // namespace
 
-void ClimbPlanner::reset(const Params& params) noexcept {
+struct ClimbPlanner::StandOff {
+  Nosing nosing;
+  double yaw_rad = 0.0;
+  SolePair soles;
+};
+
+void ClimbPlanner::reset(const Params& params, const RobotModel& robot) noexcept {
   *this = ClimbPlanner{};
   params_ = params;
+  robot_ = &robot;
 }
 
 ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
@@ -111,48 +120,51 @@ Foot ClimbPlanner::leading_foot(const Situation& situation, const SolePair& targ
   return swing_foot(step, memory_.has_leading ? memory_.leading : other(memory_.last_swing), params_.rule);
 }
 
-bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& footholds, StepGoal& goal) const noexcept {
+ClimbPlanner::StandOff ClimbPlanner::stand_off(const Situation& situation,
+                                               const FootholdSet& footholds) const noexcept {
   const Transform odom_T_world = situation.world_T_odom.inverse();
   const TreadView& tread = footholds.tread;
-  const Vec3 a = odom_T_world * tread.nosing_a_m, b = odom_T_world * tread.nosing_b_m;
   const SolePair on_tread{in_odom(situation.world_T_odom, footholds.p_star_feet[0]),
                           in_odom(situation.world_T_odom, footholds.p_star_feet[1])};
-  const double yaw_rad = middle_of(on_tread).yaw_rad;
+  StandOff to{{odom_T_world * tread.nosing_a_m, odom_T_world * tread.nosing_b_m}, middle_of(on_tread).yaw_rad, {}};
   const double floor_m = middle_of(situation.soles).position_m.z();
-
-  // The stand-off: straight back from the footholds until the toes are that far from the nosing.
-  SolePair stand_off;
   for (std::size_t i = 0; i < kFootCount; ++i) {
-    const double back_m = params_.stand_off_m - toe_to_line_m(on_tread[i], a, b, yaw_rad);
-    stand_off[i] = {on_tread[i].position_m - rotation_z(yaw_rad) * Vec3{back_m, 0, 0}, yaw_rad};
-    stand_off[i].position_m.z() = floor_m;
+    const double back_m =
+        params_.stand_off_m - toe_to_line_m(robot_->sole.collision, on_tread[i], to.nosing, to.yaw_rad);
+    to.soles[i] = {on_tread[i].position_m - rotation_z(to.yaw_rad) * Vec3{back_m, 0, 0}, to.yaw_rad};
+    to.soles[i].position_m.z() = floor_m;
   }
+  return to;
+}
 
+bool ClimbPlanner::lined_up(const Situation& situation, const StandOff& to, std::size_t foot) const noexcept {
   const double relaxed =
       corrections_ > params_.strict_corrections ? 1.0 + 0.5 * (corrections_ - params_.strict_corrections) : 1.0;
   // With the leading step under way a little more is no reason to line up again.
   constexpr double kUnderWay = 0.5;
   const double tolerance = std::min(relaxed, params_.max_relaxation) + (situation.leads ? kUnderWay : 0.0);
-  std::array<bool, kFootCount> lined_up{};
-  for (std::size_t i = 0; i < kFootCount; ++i) {
-    const SolePose& sole = situation.soles[i];
-    const Vec3 off_m = rotation_z(yaw_rad).transpose() * (sole.position_m - stand_off[i].position_m);
-    lined_up[i] = std::abs(off_m.x()) <= tolerance * params_.line_up_m &&
-                  std::abs(off_m.y()) <= tolerance * params_.line_up_lateral_m &&
-                  std::abs(math::wrap_angle(sole.yaw_rad - yaw_rad)) <= tolerance * params_.line_up_yaw_rad &&
-                  toe_to_line_m(sole, a, b, yaw_rad) >= params_.min_stand_off_m;
-  }
-  if (lined_up[0] && lined_up[1]) return false;
+  const SolePose& sole = situation.soles[foot];
+  const Vec3 off_m = rotation_z(to.yaw_rad).transpose() * (sole.position_m - to.soles[foot].position_m);
+  return std::abs(off_m.x()) <= tolerance * params_.line_up_m &&
+         std::abs(off_m.y()) <= tolerance * params_.line_up_lateral_m &&
+         std::abs(math::wrap_angle(sole.yaw_rad - to.yaw_rad)) <= tolerance * params_.line_up_yaw_rad &&
+         toe_to_line_m(robot_->sole.collision, sole, to.nosing, to.yaw_rad) >= params_.min_stand_off_m;
+}
 
-  const TorsoPose torso_goal = middle_of(stand_off);
+bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& footholds, StepGoal& goal) const noexcept {
+  const StandOff to = stand_off(situation, footholds);
+  const std::array<bool, kFootCount> lined{lined_up(situation, to, 0), lined_up(situation, to, 1)};
+  if (lined[0] && lined[1]) return false;
+
+  const TorsoPose torso_goal = middle_of(to.soles);
   Foot foot = other(memory_.last_swing);
-  if (lined_up[index_of(foot)]) {
+  if (lined[index_of(foot)]) {
     foot = other(foot);
   } else if (floor_steps_ == 0) {
     foot = swing_foot(displacement(middle_of(situation.soles), torso_goal), foot, params_.rule);
   }
-  const double half_width_m =
-      math::clamp(0.5 * (stand_off[0].position_m - stand_off[1].position_m).norm(), 0.08, kStanceHalfWidth_m + 0.03);
+  const double half_width_m = math::clamp(0.5 * (to.soles[0].position_m - to.soles[1].position_m).norm(), 0.08,
+                                          robot_->stance.half_width_m + 0.03);
   const SolePose& stance = situation.soles[index_of(other(foot))];
   goal = {};
   goal.kind = StepKind::kFloor;
@@ -162,10 +174,11 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   limits.backward_m *= stride_share_;
   limits.lateral_m *= stride_share_;
   limits.turn_rad *= stride_share_;
-  goal.target = floor_step(stance, foot, torso_goal, half_width_m, limits);
+  goal.target = floor_step(robot_->sole.collision, stance, foot, torso_goal, half_width_m, limits);
   // On the way, with the heading still wrong, no toe comes near the riser.
-  const double short_m = params_.floor_clearance_m - toe_to_line_m(goal.target, a, b, yaw_rad);
-  if (short_m > 0.0) goal.target.position_m -= rotation_z(yaw_rad) * Vec3{short_m, 0, 0};
+  const double short_m =
+      params_.floor_clearance_m - toe_to_line_m(robot_->sole.collision, goal.target, to.nosing, to.yaw_rad);
+  if (short_m > 0.0) goal.target.position_m -= rotation_z(to.yaw_rad) * Vec3{short_m, 0, 0};
   const Vec3 world_p = situation.world_T_odom * goal.target.position_m;
   goal.foothold.position_m = world_p;
   goal.foothold.yaw_rad = math::wrap_angle(goal.target.yaw_rad + yaw_of(situation.world_T_odom.R));
@@ -173,30 +186,30 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   return true;
 }
 
+// From nearer by, an edge that is known too vaguely may be known better: no reason against the walk up.
+StopReason ClimbPlanner::reason_against(const Situation& situation, const FootholdSet& footholds) const noexcept {
+  if (footholds.map_stamp_ns <= 0) return StopReason::kNothingSeen;
+  if (situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) return StopReason::kMapStale;
+  const bool walks_up = footholds.obstruction == StopReason::kEdgeUncertain && treads_climbed_ == 0;
+  if (footholds.obstruction != StopReason::kNone && !walks_up) return footholds.obstruction;
+  if (!(footholds.has_p_star || walks_up) || !usable(footholds.p_star_feet) ||
+      !math::all_finite(footholds.tread.nosing_a_m) || !math::all_finite(footholds.tread.nosing_b_m)) {
+    return StopReason::kNoStaircase;
+  }
+  return StopReason::kNone;
+}
+
 ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const FootholdSet& footholds) const noexcept {
   Decision decision;
   if (split_stance_) {
     return passing_step(situation, footholds, decision) ? decision : trailing_step(situation, footholds);
   }
-  decision.obstruction = footholds.obstruction;
   decision.measured_m = measured(footholds);
-  if (footholds.map_stamp_ns <= 0) {
-    decision.obstruction = StopReason::kNothingSeen;
-    return decision;
-  }
-  if (situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) {
-    decision.obstruction = StopReason::kMapStale;
-    return decision;
-  }
-  // From nearer by, an edge that is known too vaguely may be known better.
-  const bool walks_up = decision.obstruction == StopReason::kEdgeUncertain && treads_climbed_ == 0;
-  if (decision.obstruction != StopReason::kNone && !walks_up) return decision;
+  decision.obstruction = reason_against(situation, footholds);
+  if (decision.obstruction != StopReason::kNone) return decision;
+  const bool walks_up = footholds.obstruction != StopReason::kNone;
+  decision.obstruction = footholds.obstruction;
   const auto& feet = footholds.p_star_feet;
-  if (!(footholds.has_p_star || walks_up) || !usable(feet) || !math::all_finite(footholds.tread.nosing_a_m) ||
-      !math::all_finite(footholds.tread.nosing_b_m)) {
-    decision.obstruction = StopReason::kNoStaircase;
-    return decision;
-  }
   const SolePair targets{in_odom(situation.world_T_odom, feet[0]), in_odom(situation.world_T_odom, feet[1])};
   decision.rise_m = middle_of(targets).position_m.z() - middle_of(situation.soles).position_m.z();
   const bool underfoot = treads_climbed_ > 0 && feet[0].polygon_id == tread_id_;
@@ -204,9 +217,9 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     decision.obstruction = StopReason::kMapStale;
     return decision;
   }
-  decision.has_step = true;
   if (treads_climbed_ == 0 && floor_goal(situation, footholds, decision.goal)) {
-    if (corrections_ < params_.max_corrections && floor_steps_ < params_.max_floor_steps) return decision;
+    decision.has_step = corrections_ < params_.max_corrections && floor_steps_ < params_.max_floor_steps;
+    if (decision.has_step) return decision;
     decision = {};
     decision.obstruction = StopReason::kNotLinedUp;
     return decision;
@@ -244,7 +257,7 @@ void ClimbPlanner::passing_ends_beside(const StepGoal& goal) noexcept {
   memory_.leading = other(goal.foot);
 }
 
-void ClimbPlanner::put_back() noexcept { memory_ = before_latch_; }
+void ClimbPlanner::swing_aborted() noexcept { memory_ = before_latch_; }
 
 void ClimbPlanner::landed() noexcept {
   stride_share_ = 1.0;

@@ -3,33 +3,61 @@
 // (SS).
 #pragma once
 
+#include <array>
+#include <string_view>
+
 #include "algorithms/core/messages/footholds.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
-#include "algorithms/gait/trajectories/step_plan.hpp"
+#include "algorithms/gait/footsteps/step_goal.hpp"
 
 namespace polygmap {
 
 // The paper's two gaits. A single step passes the standing foot and lands one tread beyond it.
 enum class GaitPattern : std::uint8_t { kDoubleStep, kSingleStep };
+inline constexpr std::array<std::string_view, 2> kGaitPatternNames{"ds", "ss"};
 
 class ClimbPlanner {
  public:
   struct Params {
     GaitPattern pattern = GaitPattern::kDoubleStep;
-    double stand_off_m = 0.032;      // collision toe to the first nosing or riser
-    double min_stand_off_m = 0.022;  // nearer than this is not lined up, whatever the tolerance
-    double line_up_m = 0.004;        // along the heading, of either foot
+    double stand_off_m = 0.032;
+    double min_stand_off_m = 0.022;
+    double line_up_m = 0.004;
     double line_up_lateral_m = 0.012;
-    double line_up_yaw_rad = 0.009;        // 0.5 degrees
-    std::uint32_t strict_corrections = 2;  // steps in place before the tolerance relaxes, by half of itself per step
+    double line_up_yaw_rad = 0.009;
+    std::uint32_t strict_corrections = 2;
     double max_relaxation = 2.5;
-    std::uint32_t max_corrections = 12;  // not lined up after so many: it will not be. 200 climbs took up to 7
-    std::uint32_t max_floor_steps = 60;  // nor after so many of any length
+    std::uint32_t max_corrections = 12;
+    std::uint32_t max_floor_steps = 60;
     FloorStepLimits floor;
-    double floor_clearance_m = 0.02;  // of a toe on the way to the line of the first nosing
+    double floor_clearance_m = 0.02;
     SwingRule rule;
-    double min_rise_m = 0.02;  // Delta_foot: below it is the tread already underfoot
+    double min_rise_m = 0.02;
     std::int64_t max_map_age_ns = 500 * kNsPerMs;
+
+    static void visit(auto& p, auto& field) {
+      field("pattern", p.pattern, kGaitPatternNames,
+            "Both feet on every tread (ds), or one foot on every tread and both on the last (ss).");
+      field("stand_off_m", p.stand_off_m, 0.0, 0.3, "Collision toe to the first nosing or riser.");
+      field("min_stand_off_m", p.min_stand_off_m, 0.0, 0.3, "Nearer is not lined up, whatever the tolerance.");
+      field.ordered("min_stand_off_m", "stand_off_m");
+      field("line_up_m", p.line_up_m, 0.001, 0.1, "Either foot is lined up within this along the heading.");
+      field("line_up_lateral_m", p.line_up_lateral_m, 0.001, 0.2, "Either foot is lined up within this to the side.");
+      field("line_up_yaw_rad", p.line_up_yaw_rad, 0.001, 0.3, "Either foot is lined up within this turn.");
+      field("strict_corrections", p.strict_corrections, 0, 1000,
+            "The tolerance relaxes by half of itself per step in place after as many.");
+      field("max_relaxation", p.max_relaxation, 1.0, 10.0, "The tolerance relaxes up to this many times.");
+      field("max_corrections", p.max_corrections, 0, 1000,
+            "The feet will not be lined up when they are not after as many: 200 climbs took up to 7.");
+      field("max_floor_steps", p.max_floor_steps, 0, 10000,
+            "The feet will not be lined up when they are not after as many floor steps of any length.");
+      field("floor", p.floor);
+      field("floor_clearance_m", p.floor_clearance_m, 0.0, 0.5,
+            "Clearance of a toe from the line of the first nosing on the way.");
+      field("rule", p.rule);
+      field("min_rise_m", p.min_rise_m, 0.001, 0.039, "Delta_foot: a tread that is not higher is already underfoot.");
+      field("max_map_age_ns", p.max_map_age_ns, 1000000, 10000000000, "An older map is no reason to step.");
+    }
   };
 
   // What the planner looks at; poses in odom.
@@ -51,7 +79,8 @@ class ClimbPlanner {
     double rise_m = 0.0;  // of a leading step
   };
 
-  void reset(const Params& params) noexcept;
+  // robot: outlives the planner.
+  void reset(const Params& params, const RobotModel& robot) noexcept;
   [[nodiscard]] Decision decide(const Situation& situation, const FootholdSet& footholds) const noexcept;
   // A swing was latched: its goal is what the next decisions build on.
   void latched(const Situation& situation, const Decision& decision) noexcept;
@@ -63,7 +92,7 @@ class ClimbPlanner {
   void passing_ends_beside(const StepGoal& goal) noexcept;
   // Its foot stands on its goal, or where it stood before: with which foot to lead as before the latch.
   void landed() noexcept;
-  void put_back() noexcept;
+  void swing_aborted() noexcept;
   [[nodiscard]] std::uint32_t tread_id() const noexcept { return tread_id_; }  // under the foot that landed last
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
 
@@ -74,9 +103,15 @@ class ClimbPlanner {
                                   Decision& decision) const noexcept;
   [[nodiscard]] bool floor_goal(const Situation& situation, const FootholdSet& footholds,
                                 StepGoal& goal) const noexcept;
+  [[nodiscard]] StopReason reason_against(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  // Soles straight back from the footholds, so far that the toes are stand_off_m from the nosing.
+  struct StandOff;
+  [[nodiscard]] StandOff stand_off(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  [[nodiscard]] bool lined_up(const Situation& situation, const StandOff& to, std::size_t foot) const noexcept;
   [[nodiscard]] Foot leading_foot(const Situation& situation, const SolePair& targets) const noexcept;
 
   Params params_;
+  const RobotModel* robot_ = nullptr;
   Decision latched_;
   // What a latch changes, and what it was before.
   struct Memory {

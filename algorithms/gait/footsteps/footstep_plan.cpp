@@ -31,15 +31,14 @@ Foot swing_foot(const TorsoDisplacement& step, Foot by_gait_state, const SwingRu
   return by_gait_state;
 }
 
-OrientedRectangle foot_rectangle(const SolePose& sole, double margin_m) noexcept {
-  constexpr SoleRectangle r = kCollisionRectangle;
+OrientedRectangle foot_rectangle(const SoleRectangle& collision, const SolePose& sole, double margin_m) noexcept {
   const Vec2 heading{math::cos(sole.yaw_rad), math::sin(sole.yaw_rad)};
-  return {sole.position_m.head<2>() + r.centre_x_m() * heading, 0.5 * r.length_m() + margin_m,
-          r.half_width_m + margin_m, sole.yaw_rad};
+  return {sole.position_m.head<2>() + collision.centre_x_m() * heading, 0.5 * collision.length_m() + margin_m,
+          collision.half_width_m + margin_m, sole.yaw_rad};
 }
 
-SolePose floor_step(const SolePose& stance, Foot swing, const TorsoPose& goal, double half_width_m,
-                    const FloorStepLimits& limits) noexcept {
+SolePose floor_step(const SoleRectangle& collision, const SolePose& stance, Foot swing, const TorsoPose& goal,
+                    double half_width_m, const FloorStepLimits& limits) noexcept {
   const TorsoPose previous = torso_of_foot(stance, other(swing), half_width_m, 0.0);
   const TorsoDisplacement wanted = displacement(previous, goal);
   const double turn_rad = math::clamp(wanted.turn_rad, -limits.turn_rad, limits.turn_rad);
@@ -48,13 +47,14 @@ SolePose floor_step(const SolePose& stance, Foot swing, const TorsoPose& goal, d
 
   constexpr double kOutwards_m = 0.01;
   constexpr int kTries = 12;
+  const OrientedRectangle ground_of_stance = foot_rectangle(collision, stance, limits.overlap_margin_m);
   SolePose foot;
   for (int i = 0; i < kTries; ++i) {
     const Vec3 local_m{forward_m, lateral_m, 0.0};
     const TorsoPose next{previous.position_m + rotation_z(previous.yaw_rad) * local_m,
                          math::wrap_angle(previous.yaw_rad + turn_rad)};
     foot = foot_of_torso(next, swing, half_width_m, 0.0);
-    if (!overlap(foot_rectangle(foot, limits.overlap_margin_m), foot_rectangle(stance, limits.overlap_margin_m))) break;
+    if (!overlap(foot_rectangle(collision, foot, limits.overlap_margin_m), ground_of_stance)) break;
     lateral_m += side_sign(swing) * kOutwards_m;
   }
   foot.position_m.z() = stance.position_m.z();

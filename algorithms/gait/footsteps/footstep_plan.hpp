@@ -7,7 +7,7 @@
 
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/geometry/oriented_rectangle.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
@@ -46,25 +46,43 @@ struct TorsoDisplacement {
 struct SwingRule {
   double lateral_dead_band_m = 0.01;
   double turn_dead_band_rad = 0.035;
+
+  static void visit(auto& p, auto& field) {
+    field("lateral_dead_band_m", p.lateral_dead_band_m, 0.0, 0.5,
+          "Eq. 36 decides on a step that goes farther to the side.");
+    field("turn_dead_band_rad", p.turn_dead_band_rad, 0.0, 1.5, "Eq. 36 decides on a step that turns farther.");
+  }
 };
 // Eq. (36). The printed rule always answers "right" for straight motion and swings the same foot twice in a turn: here
 // it decides only where the displacement is beyond a dead band, otherwise the gait state does (by_gait_state).
 [[nodiscard]] Foot swing_foot(const TorsoDisplacement& step, Foot by_gait_state, const SwingRule& rule) noexcept;
 
 // Eq. (34): the ground a foot occupies, with a margin around the collision rectangle.
-[[nodiscard]] OrientedRectangle foot_rectangle(const SolePose& sole, double margin_m) noexcept;
+[[nodiscard]] OrientedRectangle foot_rectangle(const SoleRectangle& collision, const SolePose& sole,
+                                               double margin_m) noexcept;
 
 struct FloorStepLimits {
-  double forward_m = 0.2;  // beyond the place beside the stance foot
+  double forward_m = 0.2;
   double backward_m = 0.1;
-  double lateral_m = 0.05;  // wider, and the ankle roll of the leg left behind reaches its limit (0.262 rad)
+  double lateral_m = 0.05;
   double turn_rad = 0.14;
-  double overlap_margin_m = 0.01;  // around each foot
+  double overlap_margin_m = 0.01;
+
+  static void visit(auto& p, auto& field) {
+    field("forward_m", p.forward_m, 0.01, 0.5,
+          "A step on the floor goes no farther ahead of the place beside the stance foot.");
+    field("backward_m", p.backward_m, 0.01, 0.5, "A step on the floor goes no farther back.");
+    field("lateral_m", p.lateral_m, 0.005, 0.2,
+          "A step on the floor goes no farther out: there the ankle roll of the leg left behind reaches its limit, "
+          "0.262 rad.");
+    field("turn_rad", p.turn_rad, 0.01, 0.8, "A step on the floor turns no more.");
+    field("overlap_margin_m", p.overlap_margin_m, 0.0, 0.1, "Room around each foot.");
+  }
 };
 // The next step of `swing` on level floor towards the goal torso pose: the torso's displacement from the pose that the
 // stance foot belongs to is limited (35), the foot follows from it (31) and moves outwards until the feet are apart
 // (34).
-[[nodiscard]] SolePose floor_step(const SolePose& stance, Foot swing, const TorsoPose& goal, double half_width_m,
-                                  const FloorStepLimits& limits) noexcept;
+[[nodiscard]] SolePose floor_step(const SoleRectangle& collision, const SolePose& stance, Foot swing,
+                                  const TorsoPose& goal, double half_width_m, const FloorStepLimits& limits) noexcept;
 
 }  // namespace polygmap

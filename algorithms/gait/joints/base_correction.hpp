@@ -5,7 +5,7 @@
 #pragma once
 
 #include "algorithms/core/math/transform.hpp"
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/core/time.hpp"
 
 namespace polygmap {
 

@@ -3,19 +3,19 @@
 
 #include <algorithm>
 
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/core/time.hpp"
 
 namespace polygmap {
 
-bool JointReference::try_arm(const LegGeometry& geometry, const Params& params, const JointVector& q_rad) noexcept {
+bool JointReference::try_arm(const RobotModel& robot, const Params& params, const JointVector& q_rad) noexcept {
   JointVector inside_rad;
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const auto i = static_cast<Eigen::Index>(n);
-    const JointLimits& limits = joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg);
+    const JointLimits& limits = robot.drives.limits[n];
     inside_rad[i] = math::clamp(q_rad[i], limits.min_rad, limits.max_rad);
     if (!(std::abs(q_rad[i] - inside_rad[i]) <= kEncoderOffset_rad)) return false;
   }
-  geometry_ = geometry;
+  robot_ = &robot;
   params_ = params;
   reference_rad_ = inside_rad;
   commanded_rad_ = inside_rad;
@@ -25,15 +25,16 @@ bool JointReference::try_arm(const LegGeometry& geometry, const Params& params, 
 bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole,
                             const std::array<bool, kFootCount>& stands, JointCommand& command) noexcept {
   constexpr double kRounding_rad = 1e-9;
+  const DriveModel& drives = robot_->drives;
   bool limited = false;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    const LegSolution solution = solve_leg(geometry_, leg, base_T_sole[index_of(leg)]);
+    const LegSolution solution = solve_leg(robot_->legs, leg, base_T_sole[index_of(leg)]);
     const bool solved = math::all_finite(solution.q_rad);
     const double gain = stands[index_of(leg)] ? 1.0 : params_.swing_gain;
     limited = limited || !solution.reachable || !solved;
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-      const JointLimits& limits = joint_limits(leg, j);
       const std::size_t n = joint_index(leg, j);
+      const JointLimits& limits = drives.limits[n];
       const auto i = static_cast<Eigen::Index>(n);
       const double before_rad = reference_rad_[i];
       const double step_rad = limits.speed_radps * kTick_s;
@@ -46,9 +47,9 @@ bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole
       // The lead may change faster than the reference, never faster than the drive.
       const double sent_rad = commanded_rad_[i];
       commanded_rad_[i] =
-          math::clamp(math::clamp(q_rad + params_.drive_delay_s * dq_radps, sent_rad - step_rad, sent_rad + step_rad),
+          math::clamp(math::clamp(q_rad + drives.delay_s * dq_radps, sent_rad - step_rad, sent_rad + step_rad),
                       limits.min_rad, limits.max_rad);
-      command.joints[n] = {commanded_rad_[i], dq_radps, 0.0, gain * params_.kp_nmprad[j], gain * params_.kd_nmsprad[j]};
+      command.joints[n] = {commanded_rad_[i], dq_radps, 0.0, gain * drives.kp_nmprad[j], gain * drives.kd_nmsprad[j]};
     }
   }
   return limited;
@@ -62,7 +63,7 @@ void JointReference::hold(JointCommand& command) const noexcept {
 }
 
 Transform JointReference::base_T_sole_reference(Foot leg) const noexcept {
-  return base_T_sole(geometry_, leg, leg_joints(reference_rad_, leg));
+  return base_T_sole(robot_->legs, leg, leg_joints(reference_rad_, leg));
 }
 
 }  // namespace polygmap

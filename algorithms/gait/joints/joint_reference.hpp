@@ -12,17 +12,22 @@ class JointReference {
  public:
   static constexpr double kEncoderOffset_rad = 0.02;
   struct Params {
-    double drive_delay_s = 0.003;  // by the data sheet: 2 ms on the bus, half a tick of hold
-    std::array<double, kJointsPerLeg> kp_nmprad{400, 400, 400, 400, 120, 120};
-    std::array<double, kJointsPerLeg> kd_nmsprad{10, 10, 10, 10, 4, 4};
-    double swing_gain = 2.0;       // of both, in the leg that swings
-    double hold_kp_nmprad = 2000;  // before there is an estimate to balance by: stiffer than the robot is top-heavy
+    double swing_gain = 2.0;
+    double hold_kp_nmprad = 2000;
     double hold_kd_nmsprad = 40;
+
+    static void visit(auto& p, auto& field) {
+      field("swing_gain", p.swing_gain, 0.1, 10.0,
+            "The drives' gains are this many times as large in the leg that swings.");
+      field("hold_kp_nmprad", p.hold_kp_nmprad, 0.0, 10000.0,
+            "Stiffness before there is an estimate to balance by: more than the robot is top-heavy.");
+      field("hold_kd_nmsprad", p.hold_kd_nmsprad, 0.0, 1000.0, "Damping before there is an estimate to balance by.");
+    }
   };
 
   // Starts from measured angles, moved into the joints' ranges. False, and nothing changes, when one is not finite or
-  // further outside than an encoder may be off.
-  [[nodiscard]] bool try_arm(const LegGeometry& geometry, const Params& params, const JointVector& q_rad) noexcept;
+  // further outside than an encoder may be off. robot: outlives this.
+  [[nodiscard]] bool try_arm(const RobotModel& robot, const Params& params, const JointVector& q_rad) noexcept;
   // True when a leg could not do what was asked: out of reach, range or speed, or not a number, upon which the leg
   // stays. The command never leaves the limits.
   bool follow(const std::array<Transform, kFootCount>& base_T_sole, const std::array<bool, kFootCount>& stands,
@@ -34,7 +39,7 @@ class JointReference {
   [[nodiscard]] Transform base_T_sole_reference(Foot leg) const noexcept;
 
  private:
-  LegGeometry geometry_;
+  const RobotModel* robot_ = nullptr;
   Params params_;
   JointVector reference_rad_ = JointVector::Zero();
   JointVector commanded_rad_ = JointVector::Zero();  // with the lead for the drives' delay

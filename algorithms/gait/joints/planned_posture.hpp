@@ -16,11 +16,11 @@ class PlannedPosture {
   void carry(const Transform& to_T_plan) noexcept { motion_.carry(to_T_plan); }
   // One tick. torso: the base's height and attitude; where it is follows from the centre of mass, as the masses
   // have it. The result belongs to the tick before.
-  [[nodiscard]] LinkMotion::Acceleration update(const LegGeometry& geometry, const MassModel& masses,
-                                                const Transform& torso, const Vec2& plan_p_com_m,
+  [[nodiscard]] LinkMotion::Acceleration update(const RobotModel& robot, const Transform& torso,
+                                                const Vec2& plan_p_com_m,
                                                 const std::array<Transform, kFootCount>& plan_T_sole) noexcept;
   // Of the leg's fastest drive in the last tick, over its limit; 0 after a restart.
-  [[nodiscard]] double drive_share(Foot leg) const noexcept;
+  [[nodiscard]] double drive_share(const DriveModel& drives, Foot leg) const noexcept;
 
  private:
   LinkMotion motion_;

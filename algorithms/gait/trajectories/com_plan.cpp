@@ -3,73 +3,84 @@
 
 #include <algorithm>
 
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/core/time.hpp"
 
 namespace polygmap {
 namespace {
 
-constexpr std::int32_t kRest_ticks = 1'000'000;
+constexpr std::int32_t kRest_ticks = 1'000'000;  // beyond every plan
 
-// Of the push, 0..1: up in 15 %, full until 75 %, gone at the end.
-constexpr double kPushUp = 0.15, kPushDown = 0.75;
-double push_share(double u) noexcept {
+// The zero-moment point leaves its straight way by the offset: up in 15 % of the time, full until 75 %, gone at the
+// end.
+constexpr double kOffsetUp = 0.15, kOffsetDown = 0.75;
+double offset_share(double u) noexcept {
   if (u >= 1.0) return 0.0;
-  return std::min({u / kPushUp, 1.0, (1.0 - u) / (1.0 - kPushDown)});
+  return std::min({u / kOffsetUp, 1.0, (1.0 - u) / (1.0 - kOffsetDown)});
+}
+
+// Where the zero-moment point is without the offset.
+Vec2 straight_m(const Vec2& start_m, const ZmpKnots& knots, std::int32_t tick) noexcept {
+  ZmpKnot before{0, start_m};
+  for (const ZmpKnot& knot : knots) {
+    if (tick <= knot.tick) {
+      const double share = static_cast<double>(tick - before.tick) / std::max(knot.tick - before.tick, 1);
+      return before.zmp_m + share * (knot.zmp_m - before.zmp_m);
+    }
+    before = knot;
+  }
+  return before.zmp_m;
 }
 
 }  // namespace
 
-void ComPlan::plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept {
-  const double w = omega_radps_ = params.omega_radps;
-  const Vec2 start_m = zmp_under(params, from);
-
-  // The knots of plan and push together, in their order.
-  StaticVector<ZmpKnot, kSegments> all;
-  const std::int32_t push = std::min(params.push_ticks, knots.back().tick);
-  const double push_ticks = push;
-  const std::array<std::int32_t, 3> extra{static_cast<std::int32_t>(kPushUp * push_ticks),
-                                          static_cast<std::int32_t>(kPushDown * push_ticks), push};
-  const auto straight = [&](std::int32_t tick) -> Vec2 {
-    ZmpKnot before{0, start_m};
-    for (const ZmpKnot& knot : knots) {
-      if (tick <= knot.tick) {
-        const double share = static_cast<double>(tick - before.tick) / std::max(knot.tick - before.tick, 1);
-        return before.zmp_m + share * (knot.zmp_m - before.zmp_m);
-      }
-      before = knot;
-    }
-    return before.zmp_m;
-  };
+// The knots of plan and offset together, in their order.
+ComPlan::Knots ComPlan::with_offset_knots(const Vec2& start_m, const ZmpKnots& knots, double offset_ticks) noexcept {
+  const std::array<std::int32_t, 3> extra{static_cast<std::int32_t>(kOffsetUp * offset_ticks),
+                                          static_cast<std::int32_t>(kOffsetDown * offset_ticks),
+                                          static_cast<std::int32_t>(offset_ticks)};
+  Knots all;
   (void)all.try_push_back({0, start_m});
   std::size_t next_extra = 0;
   for (const ZmpKnot& knot : knots) {
     for (; next_extra < extra.size() && extra[next_extra] <= knot.tick; ++next_extra) {
-      if (extra[next_extra] < knot.tick) (void)all.try_push_back({extra[next_extra], straight(extra[next_extra])});
+      const std::int32_t tick = extra[next_extra];
+      if (tick < knot.tick) (void)all.try_push_back({tick, straight_m(start_m, knots, tick)});
     }
     if (knot.tick > all.back().tick) (void)all.try_push_back(knot);
   }
-  count_ = all.size();
+  return all;
+}
 
-  // The divergent component xi = x + v/w must meet every segment so that the last one rests: backwards. The push's part
-  // of xi(0) per metre of push goes along.
+// The divergent component xi = x + v/w must meet every segment so that the last one rests: backwards. The offset's part
+// of xi(0) per metre of offset goes along.
+Vec2 ComPlan::add_offset(const HorizontalMotion& from, double offset_ticks, Knots& all) const noexcept {
+  const double w = omega_radps_;
   Vec2 xi_m = all.back().zmp_m;
-  double push_xi = 0.0;
-  const auto share_at = [&](std::size_t i) { return push_share(all[i].tick / push_ticks); };
-  for (std::size_t i = count_ - 1; i-- > 0;) {
+  double offset_xi = 0.0;
+  const auto share_at = [&](std::size_t i) { return offset_share(all[i].tick / offset_ticks); };
+  for (std::size_t i = all.size() - 1; i-- > 0;) {
     const double T = (all[i + 1].tick - all[i].tick) * kTick_s, decay = math::exp(-w * T);
     const Vec2 slope = (all[i + 1].zmp_m - all[i].zmp_m) / T;
     xi_m = all[i].zmp_m + slope / w + decay * (xi_m - all[i + 1].zmp_m - slope / w);
     const double rate = (share_at(i + 1) - share_at(i)) / T;
-    push_xi = share_at(i) + rate / w + decay * (push_xi - share_at(i + 1) - rate / w);
+    offset_xi = share_at(i) + rate / w + decay * (offset_xi - share_at(i + 1) - rate / w);
   }
-  const Vec2 push_m = (from.position_m + from.velocity_mps / w - xi_m) / std::max(push_xi, 0.05);
-  push_m_ = push_m.norm();
-  for (std::size_t i = 0; i < count_; ++i) all[i].zmp_m += share_at(i) * push_m;
+  const Vec2 offset_m = (from.position_m + from.velocity_mps / w - xi_m) / std::max(offset_xi, 0.05);
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].zmp_m += share_at(i) * offset_m;
+  return offset_m;
+}
+
+void ComPlan::plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept {
+  const double w = omega_radps_ = params.omega_radps;
+  const double offset_ticks = std::min(params.zmp_offset_ticks, knots.back().tick);
+  Knots all = with_offset_knots(zmp_under(params, from), knots, offset_ticks);
+  zmp_offset_m_ = add_offset(from, offset_ticks, all).norm();
+  count_ = all.size();
 
   // Backwards again for the growing part, forwards for the dying one.
   Segment& rest = segments_[count_ - 1];
   rest = {all.back().tick, kRest_ticks, all.back().zmp_m, Vec2::Zero(), Vec2::Zero(), Vec2::Zero()};
-  xi_m = rest.zmp_m;
+  Vec2 xi_m = rest.zmp_m;
   for (std::size_t i = count_ - 1; i-- > 0;) {
     Segment& s = segments_[i];
     s.begin = all[i].tick;

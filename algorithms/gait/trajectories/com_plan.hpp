@@ -6,7 +6,7 @@
 #include <array>
 
 #include "algorithms/core/containers/static_vector.hpp"
-#include "algorithms/gait/balance/dcm_stabiliser.hpp"
+#include "algorithms/gait/trajectories/motion.hpp"
 
 namespace polygmap {
 
@@ -21,8 +21,14 @@ using ZmpKnots = StaticVector<ZmpKnot, kMaxZmpKnots>;
 class ComPlan {
  public:
   struct Params {
-    double omega_radps = 3.5;       // sqrt(g / 0.80 m)
-    std::int32_t push_ticks = 200;  // the start's motion is met by pushing off to the side in that time
+    double omega_radps = 3.5;
+    std::int32_t zmp_offset_ticks = 200;
+
+    static void visit(auto& p, auto& field) {
+      field("omega_radps", p.omega_radps, 1.0, 10.0, "Natural frequency of the body over its feet, sqrt(g / 0.80 m).");
+      field("zmp_offset_ticks", p.zmp_offset_ticks, 1, 2000,
+            "The zero-moment point leaves its way for so long to meet the start's motion.");
+    }
   };
 
   [[nodiscard]] static Vec2 zmp_under(const Params& params, const HorizontalMotion& com) noexcept {
@@ -30,11 +36,11 @@ class ComPlan {
   }
   // knots: at ticks > 0 that rise, at least one; after the last one everything rests. from: at tick 0. The zero-moment
   // point starts under `from`'s acceleration. What the pendulum would need of speed at the start and does not have is
-  // made up by a push: the zero-moment point leaves its straight way for push_ticks.
+  // made up by an offset: the zero-moment point leaves its straight way for zmp_offset_ticks.
   void plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept;
   [[nodiscard]] HorizontalMotion at(std::int32_t tick) const noexcept;
   [[nodiscard]] Vec2 zmp_m(std::int32_t tick) const noexcept;
-  [[nodiscard]] double push_m() const noexcept { return push_m_; }  // how far it leaves it at the start
+  [[nodiscard]] double zmp_offset_m() const noexcept { return zmp_offset_m_; }  // how far it leaves it at the start
 
  private:
   // x(t) = p + s t + a e^(w (t - T)) + b e^(-w t), T the duration: neither exponential overflows.
@@ -46,13 +52,18 @@ class ComPlan {
     Vec2 a_m = Vec2::Zero();
     Vec2 b_m = Vec2::Zero();
   };
+  static constexpr std::size_t kSegments = kMaxZmpKnots + 4;  // three for the offset, one at rest
+  using Knots = StaticVector<ZmpKnot, kSegments>;
+  [[nodiscard]] static Knots with_offset_knots(const Vec2& start_m, const ZmpKnots& knots,
+                                               double offset_ticks) noexcept;
+  // Moves the knots by the offset, which it returns.
+  [[nodiscard]] Vec2 add_offset(const HorizontalMotion& from, double offset_ticks, Knots& all) const noexcept;
   [[nodiscard]] const Segment& segment(std::int32_t tick) const noexcept;
 
-  static constexpr std::size_t kSegments = kMaxZmpKnots + 4;  // three for the push, one at rest
   std::array<Segment, kSegments> segments_;
   std::size_t count_ = 0;
   double omega_radps_ = 1.0;
-  double push_m_ = 0.0;
+  double zmp_offset_m_ = 0.0;
 };
 
 }  // namespace polygmap

@@ -3,11 +3,15 @@
 
 #include <algorithm>
 
+#include "algorithms/core/time.hpp"
+
 namespace polygmap {
 
-void Swing::plan(const Transform& start, const SolePose& target, const SwingShape& shape,
+void Swing::plan(const SoleModel& sole, const Transform& start, const SolePose& target, const SwingShape& shape,
                  std::int32_t duration_ticks) noexcept {
   redirected_ = false;
+  toe_m_ = sole.collision.toe_x_m;
+  foot_height_m_ = sole.collision_height_m;
   start_m_ = start.p_m;
   start_yaw_rad_ = yaw_of(start.R);
   start_pitch_rad_ = math::asin(math::clamp(-start.R(2, 0), -1.0, 1.0));
@@ -94,10 +98,9 @@ Transform Swing::at(double tick) const noexcept {
 
   // Pitched, the lowest point is the toe's edge and the foremost one the upper front edge of the collision box: these
   // two follow the planned path.
-  const double toe_m = kCollisionRectangle.toe_x_m;
   const math::SinCos toe = math::sin_cos(toe_down_rad), turn = math::sin_cos(yaw_rad);
-  const double lift_m = toe_m * toe.sin;
-  const double lean_m = toe_m * (toe.cos - 1.0) + kCollisionHeight_m * toe.sin;
+  const double lift_m = toe_m_ * toe.sin;
+  const double lean_m = toe_m_ * (toe.cos - 1.0) + foot_height_m_ * toe.sin;
 
   Transform sole;
   const Vec3 heading{turn.cos, turn.sin, 0.0};

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // The path of the swing foot (eqs 32-33), with what a real staircase asks for: rise before moving forward, keep away
-// from the riser, cross the nosing high, come down straight, seek the ground at an even speed (swing_pace.hpp: faster
-// where it is late).
+// from the riser, cross the nosing high, come down straight, search the ground at an even speed (swing_timing.hpp:
+// faster where it is late).
 #pragma once
 
 #include "algorithms/gait/footsteps/footstep_plan.hpp"
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/gait/trajectories/quintic.hpp"
 
 namespace polygmap {
 
 // Times as fractions of the swing.
 struct SwingShape {
-  double lift_end = 0.46;       // apex reached
-  double forward_begin = 0.40;  // horizontal motion
+  double lift_end = 0.46;
+  double forward_begin = 0.40;
   double forward_end = 0.84;
   double landing_begin = 0.74;
   // A foot that stops before a riser comes 2 mm too far by its inertia, 3 mm at most: it goes the last part on the way
@@ -20,22 +20,50 @@ struct SwingShape {
   double short_m = 0.004;
   double short_begin = 0.80;
   double short_end = 0.92;
-  double clearance_m = 0.05;  // of the lowest point of the foot at the apex above the higher of start and target
-  double retreat_m = 0.015;   // away from the riser while rising
+  double clearance_m = 0.05;
+  double retreat_m = 0.015;
   double retreat_end = 0.25;
-  double toe_down_rad = 0.0;  // pitch at the top of the rise: folds the leg without the ankle's limit
+  double toe_down_rad = 0.0;
   double toe_down_begin = 0.04;
   double toe_down_full = 0.38;
   double toe_up_begin = 0.44;
   double toe_up_end = 0.80;
-  double approach_m = 0.008;  // the last part is done at approach_mps until something is felt
+  double approach_m = 0.008;
   double approach_mps = 0.08;
+
+  static void visit(auto& p, auto& field) {
+    field("lift_end", p.lift_end, 0.05, 1.0, "The apex is reached at this share of the swing.");
+    field("forward_begin", p.forward_begin, 0.0, 0.9, "Horizontal motion begins.");
+    field("forward_end", p.forward_end, 0.1, 1.0, "Horizontal motion ends but for the last part.");
+    field.ordered("forward_begin", "forward_end");
+    field("landing_begin", p.landing_begin, 0.05, 0.99, "The way down begins.");
+    field("short_m", p.short_m, 0.0, 0.05,
+          "The last part of the way ahead, which the foot goes on the way down: it comes 2 mm too far by its inertia, "
+          "3 at most.");
+    field("short_begin", p.short_begin, 0.0, 0.95, "That last part begins.");
+    field("short_end", p.short_end, 0.05, 1.0, "That last part ends.");
+    field.ordered("short_begin", "short_end");
+    field("clearance_m", p.clearance_m, 0.005, 0.3,
+          "Lowest point of the foot at the apex above the higher of start and target.");
+    field("retreat_m", p.retreat_m, 0.0, 0.2, "The foot goes this far away from the riser while rising.");
+    field("retreat_end", p.retreat_end, 0.01, 1.0, "The retreat ends.");
+    field("toe_down_rad", p.toe_down_rad, 0.0, 1.0,
+          "Pitch at the top of the rise: folds the leg without the ankle's limit.");
+    field("toe_down_begin", p.toe_down_begin, 0.0, 0.95, "The toe begins to point down.");
+    field("toe_down_full", p.toe_down_full, 0.01, 1.0, "The toe points down in full.");
+    field.ordered("toe_down_begin", "toe_down_full");
+    field("toe_up_begin", p.toe_up_begin, 0.0, 0.95, "The toe begins to come up.");
+    field("toe_up_end", p.toe_up_end, 0.05, 1.0, "The toe is level.");
+    field.ordered("toe_up_begin", "toe_up_end");
+    field("approach_m", p.approach_m, 0.0, 0.1, "The last part down goes at approach_mps until something is felt.");
+    field("approach_mps", p.approach_mps, 0.005, 1.0, "Speed of the last part down.");
+  }
 };
 
 class Swing {
  public:
   // start may be tilted a little; target is flat. duration_ticks: until the target height is reached.
-  void plan(const Transform& start, const SolePose& target, const SwingShape& shape,
+  void plan(const SoleModel& sole, const Transform& start, const SolePose& target, const SwingShape& shape,
             std::int32_t duration_ticks) noexcept;
   // Leaves the path at that tick, reached at that pace (ticks of the path in a tick), for another one to a flat target:
   // ticks count from 0 again.
@@ -66,6 +94,7 @@ class Swing {
   double turn_rad_ = 0.0;
   double apex_m_ = 0.0;
   SwingShape shape_;
+  double toe_m_ = 0.0, foot_height_m_ = 0.0;  // of the collision box
   Quintic landing_;
   double approach_s_ = 0.0;
   std::int32_t duration_ticks_ = 1;

@@ -6,55 +6,72 @@
 
 #include <algorithm>
 
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/core/math/math.hpp"
+#include "algorithms/core/time.hpp"
 
 namespace polygmap {
 
 class SwingTiming {
  public:
   struct Params {
-    double topples_m = 0.02;  // of the divergent component's error towards the free foot:
-    double hurry = 1.6;       // beyond, the foot goes so many times as fast where its drives can,
+    double falling_outward_m = 0.02;
+    double speed_up = 1.6;
     // or back, earlier in the swing than Seen says;
-    double wider_m = 0.06;  // and it lands that much farther out
-    double wider_mps = 0.25;
-    std::int32_t late_ticks = 10;    // after the path's end it goes down
-    double seek = 5.0;               // so many times as fast
-    std::int32_t pause_ticks = 200;  // where there is no ground it waits,
-    double retreat = 0.5;            // then goes back so many times as fast: the torso is elsewhere
+    double widen_m = 0.06;
+    double widen_mps = 0.25;
+    std::int32_t late_ticks = 10;
+    double descend_search = 5.0;
+    std::int32_t pause_ticks = 200;
+    double retreat = 0.5;
+
+    static void visit(auto& p, auto& field) {
+      field("falling_outward_m", p.falling_outward_m, 0.001, 0.5,
+            "The body falls outward when the divergent component's error towards the free foot is larger.");
+      field("speed_up", p.speed_up, 1.0, 5.0,
+            "The foot of a body that falls outward goes this many times as fast where its drives can.");
+      field("widen_m", p.widen_m, 0.0, 0.3, "The foot of a body that falls outward lands this much farther out.");
+      field("widen_mps", p.widen_mps, 0.0, 2.0, "The foot goes farther out at this speed.");
+      field("late_ticks", p.late_ticks, 0, 500,
+            "The foot searches downwards for the ground so long after the path's end.");
+      field("descend_search", p.descend_search, 0.1, 20.0,
+            "The foot searches downwards this many times as fast as its path ends.");
+      field("pause_ticks", p.pause_ticks, 0, 2000, "The foot waits for so long where there is no ground.");
+      field("retreat", p.retreat, 0.05, 2.0,
+            "A foot that found no ground goes back this many times as fast, since the torso is elsewhere.");
+    }
   };
   // What decides on a tick.
   struct Seen {
-    double toppling_m = 0.0;       // of the divergent component's error, towards the free foot
-    double turn_until_tick = 0.0;  // of the path: earlier a foot may still go back to where it stood
-    double drive_share = 0.0;      // of the leg's fastest drive in the last tick, over its limit
-    double side_room_m = 1e9;      // beside the target, away from the standing foot
+    double falling_outward_m = 0.0;  // of the divergent component's error, towards the free foot
+    double turn_until_tick = 0.0;    // of the path: earlier a foot may still go back to where it stood
+    double drive_share = 0.0;        // of the leg's fastest drive in the last tick, over its limit
+    double side_room_m = 1e9;        // beside the target, away from the standing foot
   };
 
   void begin() noexcept { *this = {}; }
   void advance(const Params& params, const Seen& seen, std::int32_t duration_ticks) noexcept {
     if (no_ground_) {
-      wider_m_ = std::max(wider_m_ - params.wider_mps * kTick_s, 0.0);
+      widened_m_ = std::max(widened_m_ - params.widen_mps * kTick_s, 0.0);
       pace_ = --pause_ticks_ >= 0 ? 0.0 : -params.retreat;
       tick_ += pace_;
       return;
     }
-    if (!topples_ && seen.toppling_m > params.topples_m) {
-      topples_ = true;
+    if (!falling_outward_ && seen.falling_outward_m > params.falling_outward_m) {
+      falling_outward_ = true;
       turns_back_ = tick_ < seen.turn_until_tick;
     }
     constexpr double kHarderPerTick = 0.05;
     // The plan's own pace is proved for the drives; they are as fast as the pace is, about.
     const double most = std::max(std::abs(pace_) / std::max(seen.drive_share, 1e-3), 1.0);
-    const double hurry = std::min(params.hurry, most);
-    const double usual = tick_ > duration_ticks + params.late_ticks ? params.seek
-                         : topples_ && !straight_                   ? hurry
+    const double speed_up = std::min(params.speed_up, most);
+    const double usual = tick_ > duration_ticks + params.late_ticks ? params.descend_search
+                         : falling_outward_ && !straight_           ? speed_up
                                                                     : 1.0;
     const double wanted = turns_back_ ? -1.0 : usual;
     pace_ += math::clamp(wanted - pace_, -kHarderPerTick, kHarderPerTick);
     tick_ += pace_;
-    if (topples_ && !turns_back_) {
-      wider_m_ = std::min({wider_m_ + params.wider_mps * kTick_s, params.wider_m, std::max(seen.side_room_m, 0.0)});
+    if (falling_outward_ && !turns_back_) {
+      widened_m_ = std::min({widened_m_ + params.widen_mps * kTick_s, params.widen_m, std::max(seen.side_room_m, 0.0)});
     }
   }
   // From here on another path, which is short enough not to be hurried.
@@ -73,16 +90,16 @@ class SwingTiming {
   [[nodiscard]] double last_tick() const noexcept { return tick_ - pace_; }  // before that
   [[nodiscard]] double pace() const noexcept { return pace_; }               // ticks of the path in the last tick
   [[nodiscard]] bool goes_back() const noexcept { return turns_back_ || no_ground_; }
-  [[nodiscard]] bool hurries() const noexcept { return topples_ && !turns_back_ && !straight_; }
+  [[nodiscard]] bool speeds_up() const noexcept { return falling_outward_ && !turns_back_ && !straight_; }
   [[nodiscard]] bool no_ground() const noexcept { return no_ground_; }
-  [[nodiscard]] double wider_m() const noexcept { return wider_m_; }  // away from the standing foot
+  [[nodiscard]] double widened_m() const noexcept { return widened_m_; }  // away from the standing foot
 
  private:
   double tick_ = 0.0;
   double pace_ = 1.0;
-  double wider_m_ = 0.0;
+  double widened_m_ = 0.0;
   std::int32_t pause_ticks_ = 0;
-  bool topples_ = false;
+  bool falling_outward_ = false;
   bool turns_back_ = false;
   bool straight_ = false;
   bool no_ground_ = false;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "algorithms/core/time.hpp"
+
 namespace polygmap {
 
 double reach_height_m(const LegGeometry& g, const Vec3& base_m, double yaw_rad, Foot leg, const SolePose& sole,
@@ -50,6 +52,14 @@ TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params, 
   TorsoPose torso = middle_of(soles);
   torso.position_m.z() = allowed_height_m(geometry, params, soles, torso);
   return torso;
+}
+
+std::int32_t lowering_ticks(double drop_m) noexcept {
+  constexpr std::int32_t kLeast_ticks = 130;
+  constexpr double kMost_mps2 = 4.0;
+  constexpr double kQuintic = 5.78;  // greatest acceleration between two rests, of distance over time squared
+  const double least_s = math::sqrt(kQuintic * std::max(drop_m, 0.0) / kMost_mps2);
+  return std::max(static_cast<std::int32_t>(least_s / kTick_s), kLeast_ticks);
 }
 
 TorsoTrajectory::State TorsoTrajectory::at_rest(const Transform& base) noexcept {

@@ -4,18 +4,25 @@
 
 #include <array>
 
-#include "algorithms/gait/balance/dcm_stabiliser.hpp"
 #include "algorithms/gait/footsteps/footstep_plan.hpp"
-#include "algorithms/gait/trajectories/blend.hpp"
+#include "algorithms/gait/trajectories/quintic.hpp"
 
 namespace polygmap {
 
 struct TorsoParams {
-  double height_m = 0.795;      // above the higher foot, at most
-  double lead_height_m = 0.86;  // above the lower foot when the leading one lands
-  double max_leg_m = 0.612;     // hip pitch to ankle, of 0.630 stretched
-  double inward_m = 0.022;      // of the base at rest over one foot, from its middle line towards the other one
-  double ahead_m = 0.0;         // and before its sole's origin
+  double height_m = 0.795;
+  double lead_height_m = 0.86;
+  double max_leg_m = 0.612;
+  double inward_m = 0.022;
+  double ahead_m = 0.0;
+
+  static void visit(auto& p, auto& field) {
+    field("height_m", p.height_m, 0.5, 0.9, "Torso above the higher foot, at most.");
+    field("lead_height_m", p.lead_height_m, 0.5, 1.0, "Torso above the lower foot when the leading one lands.");
+    field("max_leg_m", p.max_leg_m, 0.4, 0.63, "Hip pitch to ankle, of 0.630 stretched.");
+    field("inward_m", p.inward_m, -0.1, 0.1, "Base at rest over one foot, from its middle line towards the other one.");
+    field("ahead_m", p.ahead_m, -0.1, 0.1, "Base at rest over one foot, ahead of its sole's origin.");
+  }
 };
 
 // Base height at which the leg to `sole` is max_leg_m long, for a base at (x, y) with that heading.
@@ -28,6 +35,8 @@ struct TorsoParams {
 // At rest over the foot that stands alone.
 [[nodiscard]] TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance,
                                    const SolePair& soles) noexcept;
+// Time for the torso to come down by that much without falling faster than a foot pressed enough to balance allows.
+[[nodiscard]] std::int32_t lowering_ticks(double drop_m) noexcept;
 // Between both feet.
 [[nodiscard]] TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params,
                                       const SolePair& soles) noexcept;

@@ -18,9 +18,9 @@ namespace polygmap {
 class CameraExtrinsicsEstimator {
  public:
   struct Params {
-    double prior_tilt_sigma_rad = 0.0175;  // of the data sheet's roll and pitch
+    double prior_tilt_sigma_rad = 0.0175;
     double prior_height_sigma_m = 0.005;
-    double prior_ahead_sigma_m = 0.003;  // of the data sheet, and of where encoders and leg lengths have a foot
+    double prior_ahead_sigma_m = 0.003;
     // Of one frame. Far more than the pixels' noise: frames err alike, and one frame must not decide.
     double frame_tilt_sigma_rad = 0.03;
     double frame_height_sigma_m = 0.010;
@@ -35,14 +35,46 @@ class CameraExtrinsicsEstimator {
     double max_tilt_rad = 2.0 * kPi / 180.0;  // bounds of the estimate
     double max_height_m = 0.008;
     double max_ahead_m = 0.010;
-    double half_scan_s = 0.008;                // by how much a row of the picture may be older or newer than its stamp
+    double half_scan_s = 0.008;
     double tilt_gate_rad = 3.0 * kPi / 180.0;  // from level, as the mount is believed: more is a ramp
-    double height_gate_m = 0.020;              // below half of the least step
-    double max_tilt_sigma_rad = 0.006;         // of a surface: vaguer ones say what gravity told the fit before
+    double height_gate_m = 0.020;
+    double max_tilt_sigma_rad = 0.006;
     // Of a surface, added to its sigma. Those below 2 mrad err by 1.0 to 1.5, vaguer ones by what they say, and the
     // same in every frame: with 3 mrad three treads ahead, 8 mrad off, outvoted the floor (seed 64).
     double systematic_tilt_rad = 0.001;
     double max_sole_tilt_rad = 3.0 * kPi / 180.0;  // from gravity: more, and the foot does not stand flat
+
+    static void visit(auto& p, auto& field) {
+      field("prior_tilt_sigma_rad", p.prior_tilt_sigma_rad, 1e-5, 0.2,
+            "Roll and pitch of the mount, by the data sheet.");
+      field("prior_height_sigma_m", p.prior_height_sigma_m, 1e-5, 0.1, "Height of the mount, by the data sheet.");
+      field("prior_ahead_sigma_m", p.prior_ahead_sigma_m, 1e-5, 0.1,
+            "The mount's place ahead by the data sheet, and where encoders and leg lengths have a foot.");
+      field("frame_tilt_sigma_rad", p.frame_tilt_sigma_rad, 1e-4, 1.0, "Tilt that one frame sees.");
+      field("frame_height_sigma_m", p.frame_height_sigma_m, 1e-4, 1.0, "Height that one frame sees.");
+      field("frame_ahead_sigma_m", p.frame_ahead_sigma_m, 1e-4, 1.0, "Place ahead that one frame sees.");
+      field("soles_tilt_sigma_rad", p.soles_tilt_sigma_rad, 1e-5, 0.1,
+            "Tilt of the soles by their encoders, in all frames alike.");
+      field("gravity_tilt_sigma_rad", p.gravity_tilt_sigma_rad, 1e-5, 0.1,
+            "Tilt of gravity by the IMU's mount and bias, in all frames alike.");
+      field("window_s", p.window_s, 0.1, 1000.0,
+            "Information fades to 1/e in this time, more slowly under surfaces that see level worse; time without any "
+            "does not count.");
+      field("max_tilt_rad", p.max_tilt_rad, 0.0, 0.2, "Roll and pitch are believed up to this.");
+      field("max_height_m", p.max_height_m, 0.0, 0.1, "Height is believed up to this far from the data sheet's.");
+      field("max_ahead_m", p.max_ahead_m, 0.0, 0.1, "Place ahead is believed up to this far from the data sheet's.");
+      field("half_scan_s", p.half_scan_s, 0.0, 0.1,
+            "A row of the picture is older or newer than its stamp by up to this.");
+      field("tilt_gate_rad", p.tilt_gate_rad, 0.001, 0.5,
+            "A surface farther from level, as the mount is believed, is a ramp.");
+      field("height_gate_m", p.height_gate_m, 0.001, 0.02,
+            "A surface farther from the soles' height is another one: at most half of the least step, 40 mm.");
+      field("max_tilt_sigma_rad", p.max_tilt_sigma_rad, 1e-4, 1.0,
+            "Vaguer surfaces say only what gravity told the fit before.");
+      field("systematic_tilt_rad", p.systematic_tilt_rad, 0.0, 0.1, "A surface's tilt errs by this besides its sigma.");
+      field("max_sole_tilt_rad", p.max_sole_tilt_rad, 0.001, 0.5,
+            "A foot tilted farther from gravity does not stand flat.");
+    }
   };
   // The robot at the exposure, base frame.
   struct Stance {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "algorithms/core/containers/static_vector.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 namespace {
@@ -73,14 +73,14 @@ std::optional<double> end_of_line(const Line& line) noexcept {
 }  // namespace
 
 std::optional<ToeSighting> detect_toe(const DepthFrameView& frame, const CameraIntrinsics& k, const RawRange& range,
-                                      const Transform& camera_T_sole) noexcept {
+                                      const SoleModel& sole, const Transform& camera_T_sole) noexcept {
   constexpr double kNear_m = 0.1;
-  constexpr double kFirst_m = kCollisionRectangle.toe_x_m - kStep_m * (kOnFoot + kSearch);
+  const double first_m = sole.collision.toe_x_m - kStep_m * (kOnFoot + kSearch);
   constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
   StaticVector<double, kLines> ends_m;
   for (int n = 0; n < kLines; ++n) {
-    const double y_m = kCollisionRectangle.half_width_m * ((2.0 * n + 1.0) / kLines - 1.0);
-    const Vec3 from = camera_T_sole * Vec3{kFirst_m, y_m, kCollisionHeight_m};
+    const double y_m = sole.collision.half_width_m * ((2.0 * n + 1.0) / kLines - 1.0);
+    const Vec3 from = camera_T_sole * Vec3{first_m, y_m, sole.collision_height_m};
     const Vec3 step = kStep_m * camera_T_sole.R.col(0);
     Line line;
     line.fill(kNothing);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a picture shows the toe of a standing foot, against where the encoders have it. Where a camera sits along the
 // ground cannot be told from level surfaces, and a foothold is off by as much; the robot's own toe tells, whenever a
-// standing leg is so straight that its knee does not hide it. The foot's shape is the collision box of robot/model.hpp.
+// standing leg is so straight that its knee does not hide it. The foot's shape is its collision box.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,7 @@
 #include "algorithms/core/math/transform.hpp"
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/perception/image/depth_range.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
 
@@ -22,6 +23,7 @@ struct ToeSighting {
 // lines along the foot's upper face over its front edge, beyond which depth jumps; nothing where too few lines show one
 // jump at one place, because the toe is hidden, out of the picture or close to a riser.
 [[nodiscard]] std::optional<ToeSighting> detect_toe(const DepthFrameView& frame, const CameraIntrinsics& intrinsics,
-                                                    const RawRange& range, const Transform& camera_T_sole) noexcept;
+                                                    const RawRange& range, const SoleModel& sole,
+                                                    const Transform& camera_T_sole) noexcept;
 
 }  // namespace polygmap

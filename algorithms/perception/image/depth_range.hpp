@@ -12,6 +12,12 @@ namespace polygmap {
 struct DepthLimits {
   double min_depth_m = 0.2;
   double max_depth_m = 4.0;
+
+  static void visit(auto& p, auto& field) {
+    field("min_depth_m", p.min_depth_m, 0.001, 5.0, "A nearer depth is no measurement.");
+    field("max_depth_m", p.max_depth_m, 0.3, 20.0, "A farther depth is no measurement.");
+    field.ordered("min_depth_m", "max_depth_m");
+  }
 };
 
 // The same in raw units; pixels outside [min, max] count as not measured.

@@ -42,10 +42,19 @@ class NoiseSamples {
 class NoiseTracker {
  public:
   struct Params {
-    double gain = 0.1;  // per frame
+    double gain = 0.1;
     double min_scale = 1.0;
     double max_scale = 4.0;
-    double max_quadratic_per_m = 0.005;  // more than stereo of 50 mm base line has
+    double max_quadratic_per_m = 0.005;
+
+    static void visit(auto& p, auto& field) {
+      field("gain", p.gain, 0.0, 1.0, "Share of a frame's noise in what is believed after it.");
+      field("min_scale", p.min_scale, 0.1, 10.0, "The noise is believed down to this times the stated one.");
+      field("max_scale", p.max_scale, 0.1, 100.0, "The noise is believed up to this times the stated one.");
+      field.ordered("min_scale", "max_scale");
+      field("max_quadratic_per_m", p.max_quadratic_per_m, 0.0, 0.1,
+            "The noise grows no faster with the square of the depth: more than stereo of 50 mm base line has.");
+    }
   };
   // The profile as it is believed.
   [[nodiscard]] DepthNoiseModel of(const DepthNoiseModel& profile) const noexcept;

@@ -15,10 +15,17 @@ namespace polygmap {
 
 // What is not known of the legs. One sigma each, as a data sheet has it.
 struct BodyUncertainty {
-  double shape_m = 0.008;     // not a sigma: covers beyond the shapes, and a leg's way in half an exposure
-  double leg_length = 0.005;  // relative
-  double encoder_rad = 2e-3;  // offset of a joint
+  double shape_m = 0.008;
+  double leg_length = 0.005;
+  double encoder_rad = 2e-3;
   double sigmas = 2.5;
+
+  static void visit(auto& p, auto& field) {
+    field("shape_m", p.shape_m, 0.0, 0.1, "Covers beyond the shapes, and a leg's way in half an exposure; no sigma.");
+    field("leg_length", p.leg_length, 0.0, 0.1, "Lengths of the legs, relative.");
+    field("encoder_rad", p.encoder_rad, 0.0, 0.05, "Offset of a joint's encoder.");
+    field("sigmas", p.sigmas, 0.0, 10.0, "The shapes are grown by as many sigmas.");
+  }
 };
 // At the foot, which is worst off. turn_rad: of the camera's mount.
 [[nodiscard]] BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& legs,

@@ -15,14 +15,25 @@ namespace polygmap {
 class MapDrift {
  public:
   struct Params {
-    double bound_sigmas = 3.0;          // of the pose, along each axis: what is further off is no drift
-    double walk_m_per_sqrt_s = 0.0015;  // while the pose's sigma does not grow; of what is out of view, too
+    double bound_sigmas = 3.0;
+    double walk_m_per_sqrt_s = 0.0015;
     // What is common to a frame and gone in the next: of the depth image, of the pose at the exposure. With it and the
     // walk, half of a step in the pose's world is in the drift after 13 frames.
     double frame_sigma_m = 0.005;
     // From the start the jitter of the poses averages out in the map; fused against the offsets of the frames
     // themselves, it would keep that of the first few.
     double settle_s = 1.5;
+
+    static void visit(auto& p, auto& field) {
+      field("bound_sigmas", p.bound_sigmas, 0.1, 20.0,
+            "What lies farther off, in sigmas of the pose along each axis, is no drift.");
+      field("walk_m_per_sqrt_s", p.walk_m_per_sqrt_s, 1e-5, 0.1,
+            "The drift walks like this while the pose's sigma does not grow, that of what is out of view too.");
+      field("frame_sigma_m", p.frame_sigma_m, 1e-5, 0.1,
+            "Error of one frame that is gone in the next: of the depth image, of the pose at the exposure.");
+      field("settle_s", p.settle_s, 0.0, 60.0,
+            "Nothing drifts for so long from the start, while the jitter of the poses averages out in the map.");
+    }
   };
 
   MapDrift() noexcept : MapDrift(Params{}) {}

@@ -24,35 +24,89 @@ namespace polygmap {
 class PolygonMap {
  public:
   struct Params {
-    double window_s = 1.5;             // information fades to 1/e
-    double height_gate_min_m = 0.008;  // level surfaces within 3 sigma, but between these two, are one
-    double height_gate_max_m = 0.018;  // below half of the least step, 40 mm
-    double upright_gate_m = 0.06;      // risers stand a tread apart
+    double window_s = 1.5;
+    double height_gate_min_m = 0.008;
+    double height_gate_max_m = 0.018;
+    double upright_gate_m = 0.06;
     double tilt_gate_rad = 0.17;
     double upright_turn_gate_rad = 0.35;
-    double overlap_fraction = 0.3;  // of the shorter one, along the stairs or up the riser
-    double lateral_gap_m = 0.5;     // the robot's own leg may split a tread in two
+    double overlap_fraction = 0.3;
+    double lateral_gap_m = 0.5;
     double other_gap_m = 0.1;
-    double line_gate_min_m = 0.012;  // an edge further off than 4 sigma, but between these two, is an outlier
+    double line_gate_min_m = 0.012;
     double line_gate_max_m = 0.025;
-    double line_turn_gate = 0.15;  // slope against the remembered line
+    double line_turn_gate = 0.15;
     double line_min_length_m = 0.05;
-    double side_sigma_m = 0.005;  // of an observed end
+    double side_sigma_m = 0.005;
     double side_gate_m = 0.025;
-    double unknown_margin_m = 0.010;      // two sigma of a vertex: noise must not make unknown ends grow
-    std::uint32_t outliers_to_reset = 8;  // consecutive, then the new evidence wins
+    double unknown_margin_m = 0.010;
+    std::uint32_t outliers_to_reset = 8;
     std::uint32_t line_min_sightings = 3;
     std::uint32_t confirmed_sightings = 5;
-    std::uint32_t misses_unconfirmed = 4;  // consecutive frames in plain view without a sighting
+    std::uint32_t misses_unconfirmed = 4;
     std::uint32_t misses_confirmed = 90;
-    double unconfirmed_age_s = 2.0;      // unconfirmed and out of view
-    double systematic_sigma_m = 0.0015;  // of depth errors that repeat from frame to frame and do not average out
+    double unconfirmed_age_s = 2.0;
+    double systematic_sigma_m = 0.0015;
     double view_margin_px = 30.0;
     double view_range_m = 2.5;
-    double view_min_incidence = 0.25;  // sine of the angle between ray and surface
-    double reach_m = 1.5;              // beyond it a polygon makes room first when the map is full
-    double other_area_min_m2 = 0.02;  // smaller ones, and those out of reach, are not worth a place: nothing reads them
+    double view_min_incidence = 0.25;
+    double reach_m = 1.5;
+    double other_area_min_m2 = 0.02;
     MapDrift::Params drift;
+
+    static void visit(auto& p, auto& field) {
+      field("window_s", p.window_s, 0.05, 1000.0, "Information fades to 1/e in this time.");
+      field("height_gate_min_m", p.height_gate_min_m, 0.0, 0.02,
+            "Level surfaces as near in height are one whatever their sigmas.");
+      field("height_gate_max_m", p.height_gate_max_m, 0.0, 0.02,
+            "Level surfaces farther apart in height are two, whatever their sigmas: below half of the least step, 40 "
+            "mm.");
+      field.ordered("height_gate_min_m", "height_gate_max_m");
+      field("upright_gate_m", p.upright_gate_m, 0.001, 0.12,
+            "Risers nearer to each other are one, since they stand a tread apart.");
+      field("tilt_gate_rad", p.tilt_gate_rad, 0.001, 1.5,
+            "Level surfaces turned no farther against each other may be one.");
+      field("upright_turn_gate_rad", p.upright_turn_gate_rad, 0.001, 1.5,
+            "Risers turned no farther against each other may be one.");
+      field("overlap_fraction", p.overlap_fraction, 0.0, 1.0,
+            "One surface overlaps by this share of the shorter one, along the stairs or up the riser.");
+      field("lateral_gap_m", p.lateral_gap_m, 0.0, 5.0,
+            "Parts of one tread lie this far apart at most: the robot's own leg may split it in two.");
+      field("other_gap_m", p.other_gap_m, 0.0, 5.0, "Parts of any other surface lie this far apart at most.");
+      field("line_gate_min_m", p.line_gate_min_m, 0.0, 0.1,
+            "An edge as near to the remembered one is no outlier, whatever its sigmas.");
+      field("line_gate_max_m", p.line_gate_max_m, 0.0, 0.2,
+            "An edge farther from the remembered one is an outlier, whatever its sigmas.");
+      field.ordered("line_gate_min_m", "line_gate_max_m");
+      field("line_turn_gate", p.line_turn_gate, 0.001, 10.0, "An edge's slope against the remembered line is no more.");
+      field("line_min_length_m", p.line_min_length_m, 0.0, 1.0, "A shorter edge says nothing.");
+      field("side_sigma_m", p.side_sigma_m, 1e-4, 0.1, "Place of an observed end.");
+      field("side_gate_m", p.side_gate_m, 0.001, 0.5, "An observed end farther off is an outlier.");
+      field("unknown_margin_m", p.unknown_margin_m, 0.0, 0.1,
+            "Two sigmas of a vertex, so that noise does not make unknown ends grow.");
+      field("outliers_to_reset", p.outliers_to_reset, 1, 1000,
+            "After as many outliers in a row the new evidence wins.");
+      field("line_min_sightings", p.line_min_sightings, 1, 1000, "A line is told once it has been seen as often.");
+      field("confirmed_sightings", p.confirmed_sightings, 1, 1000,
+            "A surface is confirmed once it has been seen as often.");
+      field("misses_unconfirmed", p.misses_unconfirmed, 1, 1000,
+            "An unconfirmed surface goes after as many frames in plain view without a sighting.");
+      field("misses_confirmed", p.misses_confirmed, 1, 100000,
+            "A confirmed surface goes after as many frames in plain view without a sighting.");
+      field("unconfirmed_age_s", p.unconfirmed_age_s, 0.01, 1000.0,
+            "An unconfirmed surface out of view goes after so long.");
+      field("systematic_sigma_m", p.systematic_sigma_m, 0.0, 0.1,
+            "Depth errors that repeat from frame to frame do not average out.");
+      field("view_margin_px", p.view_margin_px, 0.0, 200.0,
+            "What is as near to the picture's rim is not in plain view.");
+      field("view_range_m", p.view_range_m, 0.1, 20.0, "What is farther is not in plain view.");
+      field("view_min_incidence", p.view_min_incidence, 0.01, 1.0,
+            "What is seen at a smaller sine of the angle between ray and surface is not in plain view.");
+      field("reach_m", p.reach_m, 0.1, 20.0, "A polygon farther off makes room first when the map is full.");
+      field("other_area_min_m2", p.other_area_min_m2, 0.0, 10.0,
+            "A smaller other surface, or one out of reach, is not worth a place: nothing reads it.");
+      field("drift", p.drift);
+    }
   };
   struct View {
     Transform world_T_camera;       // at the exposure
@@ -110,6 +164,17 @@ class PolygonMap {
     double variance_m2 = 0.0;  // of across, but for the pose's
   };
 
+  // Where a pass over the frame's surfaces stands, and what of the map the present one may be.
+  struct Pass {
+    bool measuring = false;  // the first pass, in which nothing changes yet
+    std::size_t patch = 0;   // in order_
+    std::size_t track = 0;
+    std::size_t best = kMaxMapPolygons;
+    std::size_t second = kMaxMapPolygons;
+    double best_cost = 0.0;
+    double second_cost = 0.0;
+  };
+
   void order_surfaces() noexcept;
   void begin_fusing() noexcept;
   void next_surface() noexcept;
@@ -121,7 +186,7 @@ class PolygonMap {
   void fuse_best() noexcept;
   void create() noexcept;
   void admit(const MapTrack& track) noexcept;
-  [[nodiscard]] int claim(const MapTrack& track) const noexcept;
+  [[nodiscard]] int priority(const MapTrack& track) const noexcept;
   // offset_m: of the seen plane along the remembered normal, at the track's origin; fade: of what was known.
   void fuse(MapTrack& track, double offset_m, double fade) noexcept;
   void merge(MapTrack& into, MapTrack& from) noexcept;
@@ -151,7 +216,7 @@ class PolygonMap {
   MapDrift drift_;
   SurfaceFrame frame_;
   StaticVector<std::uint8_t, kMaxPlanesPerFrame> order_;  // of the frame's surfaces: treads and risers first
-  std::size_t telling_ = 0;                               // how many of these say where the frame lies
+  std::size_t alignment_count_ = 0;                       // how many of these say where the frame lies
   View view_;
   Transform map_T_camera_;  // at first by the last drift, then by the frame's own offset
   SeenSurface seen_;
@@ -161,13 +226,7 @@ class PolygonMap {
   std::uint32_t fused_in_frame_ = 0;
   bool any_frame_ = false;
   Stage stage_ = Stage::kIdle;
-  bool measuring_ = false;  // the first pass, in which nothing changes yet
-  std::size_t patch_ = 0;   // in order_
-  std::size_t track_ = 0;
-  std::size_t best_ = kMaxMapPolygons;
-  std::size_t second_ = kMaxMapPolygons;
-  double best_cost_ = 0.0;
-  double second_cost_ = 0.0;
+  Pass pass_;
 };
 
 }  // namespace polygmap

@@ -26,7 +26,7 @@ ConvexPolygon PolygonMap::local_polygon(const MapTrack& track) const noexcept {
 
 // The cheap part of the comparison, which most pairs do not pass.
 bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
-  if (track.dead || track.kind != seen_.kind || track.polygon.size() < 3) return false;
+  if (track.erased || track.kind != seen_.kind || track.polygon.size() < 3) return false;
   const bool upright = track.kind == SurfaceKind::kRiser;
   const Vec3 normal = track.world_T_local.R.col(2);
   if (normal.dot(seen_.plane.normal) < math::cos(upright ? params_.upright_turn_gate_rad : params_.tilt_gate_rad)) {
@@ -73,20 +73,20 @@ bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& co
 
 std::int32_t PolygonMap::compare_some() noexcept {
   std::int32_t units = 1;
-  for (std::size_t glances = 0; glances < kGlancesPerUnit && track_ < tracks_.size(); ++glances, ++track_) {
+  for (std::size_t glances = 0; glances < kGlancesPerUnit && pass_.track < tracks_.size(); ++glances, ++pass_.track) {
     Nearness near;
-    if (!is_near(tracks_[track_], near)) continue;
+    if (!is_near(tracks_[pass_.track], near)) continue;
     units += kMatchUnits;
     double cost = 0.0;
-    if (!matches(tracks_[track_], near, cost)) continue;
-    if (cost < best_cost_) {
-      second_ = best_;
-      second_cost_ = best_cost_;
-      best_ = track_;
-      best_cost_ = cost;
-    } else if (cost < second_cost_) {
-      second_ = track_;
-      second_cost_ = cost;
+    if (!matches(tracks_[pass_.track], near, cost)) continue;
+    if (cost < pass_.best_cost) {
+      pass_.second = pass_.best;
+      pass_.second_cost = pass_.best_cost;
+      pass_.best = pass_.track;
+      pass_.best_cost = cost;
+    } else if (cost < pass_.second_cost) {
+      pass_.second = pass_.track;
+      pass_.second_cost = cost;
     }
   }
   return units;
@@ -94,8 +94,8 @@ std::int32_t PolygonMap::compare_some() noexcept {
 
 // What the seen surface says about the frame's offset: along the remembered normal, and across the edges of a tread.
 void PolygonMap::measure_offset() noexcept {
-  if (best_ >= tracks_.size()) return;
-  const MapTrack& track = tracks_[best_];
+  if (pass_.best >= tracks_.size()) return;
+  const MapTrack& track = tracks_[pass_.best];
   Nearness near;
   if (track.sightings < params_.confirmed_sightings || !is_near(track, near)) return;
   const double common_m2 = math::square(params_.systematic_sigma_m);

@@ -51,9 +51,17 @@ enum class Lean : std::uint8_t { kAny, kLevel, kUpright };
 
 struct PlaneFit {
   struct Params {
-    double lean_sigma_rad = 0.006;  // how level treads and how upright risers are, the estimator's up included
-    double lean_tilt_rad = 0.5;     // further from level or upright, a plane is neither ...
-    double lean_sigmas = 3.0;       // ... nor when its pixels contradict it by this
+    double lean_sigma_rad = 0.006;
+    double lean_tilt_rad = 0.5;
+    double lean_sigmas = 3.0;
+
+    static void visit(auto& p, auto& field) {
+      field("lean_sigma_rad", p.lean_sigma_rad, 1e-4, 1.0,
+            "Treads are as level and risers as upright, the estimator's up included.");
+      field("lean_tilt_rad", p.lean_tilt_rad, 0.01, 1.5, "A plane farther from level or upright is neither.");
+      field("lean_sigmas", p.lean_sigmas, 0.1, 20.0,
+            "A plane whose pixels contradict level or upright by as many sigmas is neither.");
+    }
   };
 };
 

@@ -20,12 +20,26 @@ struct GrownPlane {
 class PlaneGrowing {
  public:
   struct Params {
-    double join_sigmas = 1.5;  // a run whose line is join_floor_m + join_sigmas sigma_z off a plane belongs to it
+    double join_sigmas = 1.5;
     double join_floor_m = 0.003;
-    std::int32_t min_rows = 3;        // of a run that starts a plane
-    std::int32_t min_columns = 3;     // of a plane
-    std::int32_t min_plane_px = 800;  // full-resolution pixels; of a plane that is to be one by itself ...
-    std::int32_t min_facet_px = 400;  // ... and of one that may be part of another
+    std::int32_t min_rows = 3;
+    std::int32_t min_columns = 3;
+    std::int32_t min_plane_px = 800;
+    std::int32_t min_facet_px = 400;
+
+    static void visit(auto& p, auto& field) {
+      field("join_sigmas", p.join_sigmas, 0.1, 20.0,
+            "A run belongs to a plane when its line is no more than join_floor_m and as many sigmas of the depth off "
+            "it.");
+      field("join_floor_m", p.join_floor_m, 0.0, 0.1,
+            "Slow depth errors, which a run may be off a plane besides join_sigmas.");
+      field("min_rows", p.min_rows, 2, 100, "A run that starts a plane has as many rows.");
+      field("min_columns", p.min_columns, 1, 40, "A plane has as many columns.");
+      field("min_plane_px", p.min_plane_px, 1, 100000,
+            "A plane that is to be one by itself has as many pixels of full resolution.");
+      field("min_facet_px", p.min_facet_px, 1, 100000,
+            "A plane that may be part of another has as many pixels of full resolution.");
+    }
   };
   static constexpr std::size_t kMaxPlanes = 96;
 

@@ -11,7 +11,7 @@ constexpr double kLeastDeterminant = 1e-13;  // of moments scaled to a trace of 
 constexpr double kBetween = 0.1;             // rad: so far may the plane of two facets lie from between theirs
 
 void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t to) noexcept {
-  for (std::uint8_t& plane : to_plane) plane = plane == from ? static_cast<std::uint8_t>(to) : plane;
+  for (PlaneId& plane : to_plane) plane = plane == from ? static_cast<PlaneId>(to) : plane;
 }
 
 [[nodiscard]] bool try_fit(const PlaneMoments& moments, Vec3& m) noexcept {
@@ -33,14 +33,14 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
 // How much the pixels of both planes contradict the plane that fits them together best: chi^2 of the three parameters
 // that it has fewer. Neighbouring pixels' errors count once per correlated_px.
 [[nodiscard]] bool try_contradiction(const PlaneMerging::Params& params, const DepthNoiseModel& noise,
-                                     const FramePlane& p, const FramePlane& q, double& chi2) noexcept {
+                                     const FittedPlane& p, const FittedPlane& q, double& chi2) noexcept {
   PlaneMoments both = p.moments;
   both.add(q.moments);
   Vec3 m;
   if (!try_fit(both, m)) return false;
   if (!lies_between({m}, p.plane, q.plane)) return false;
   chi2 = 0.0;
-  for (const FramePlane* plane : {&p, &q}) {
+  for (const FittedPlane* plane : {&p, &q}) {
     Vec3 own;
     if (!try_fit(plane->moments, own)) return false;
     const Vec3 off = own - m;
@@ -53,8 +53,9 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
 
 }  // namespace
 
-void PlaneMerging::merge_pieces(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,
-                                PlaneSet& planes, PlaneIndex& to_plane, bool measured) noexcept {
+void PlaneMerging::merge_coplanar(const Params& params, const PlaneGrowing::Params& growing,
+                                  const DepthNoiseModel& noise, PlaneSet& planes, PlaneIndex& to_plane,
+                                  bool measured) noexcept {
   const double least_cosine = math::cos(params.merge_tilt_rad), least_small = math::cos(2.0 * params.merge_tilt_rad);
   struct Candidate {
     Vec3 normal;
@@ -71,7 +72,7 @@ void PlaneMerging::merge_pieces(const Params& params, const PlaneGrowing::Params
       const std::size_t b = candidates[j].plane;
       if (cosine < least_small || !planes[b].alive) continue;
       const std::size_t keep = planes[a].pixels >= planes[b].pixels ? a : b, gone = keep == a ? b : a;
-      FramePlane &p = planes[keep], &q = planes[gone];
+      FittedPlane &p = planes[keep], &q = planes[gone];
       const bool small = q.pixels < params.small_plane_px;
       if (!small && cosine < least_cosine) continue;
       // Where a large plane lies is known well: apart by more than what lets a run join a plane, the two are not one.
@@ -143,7 +144,7 @@ void PlaneMerging::add_column(const SpanBoundaries::Column& spans, const SpanBou
 }
 
 void PlaneMerging::judge(const PlaneSet& planes, Seam& seam) const noexcept {
-  const FramePlane &p = planes[seam.a], &q = planes[seam.b];
+  const FittedPlane &p = planes[seam.a], &q = planes[seam.b];
   const auto height_px = [&](std::size_t i) { return planes[i].pixels / (kColumn_px * std::max(spans_of_[i], 1)); };
   const bool steps = p.kind == q.kind && p.kind != SurfaceKind::kOther;
   seam.low = seam.length_px < params_.facet_seam * math::sqrt(std::min(p.pixels, q.pixels));
@@ -157,7 +158,7 @@ void PlaneMerging::judge(const PlaneSet& planes, Seam& seam) const noexcept {
 
 bool PlaneMerging::try_join(PlaneSet& planes, PlaneIndex& to_plane, Seam& best) noexcept {
   const std::size_t kept = best.a, gone = best.b;
-  FramePlane &p = planes[kept], &q = planes[gone];
+  FittedPlane &p = planes[kept], &q = planes[gone];
   p.moments.add(q.moments);
   if (!try_fit(p.moments, p.plane.m)) return false;
   p.pixels += q.pixels;

@@ -15,15 +15,15 @@ void ResidualPlaneSearch::begin(const Params& params, const Vec3& up) noexcept {
   upright_.rows.fill(0);
   upright_pixels_ = 0.0;
   known_.clear();
-  given_back_.fill(false);
+  released_.fill(false);
   found_.clear();
 }
 
-void ResidualPlaneSearch::know_level(const InversePlane& plane) noexcept {
+void ResidualPlaneSearch::add_known_level(const InversePlane& plane) noexcept {
   static_cast<void>(known_.try_push_back(plane));
 }
 
-void ResidualPlaneSearch::know_upright(const InversePlane& plane, double pixels) noexcept {
+void ResidualPlaneSearch::add_known_riser(const InversePlane& plane, double pixels) noexcept {
   static_cast<void>(known_.try_push_back(plane));
   if (pixels <= upright_pixels_) return;
   const Vec3 normal = plane.normal(), flat = normal - level_.direction * level_.direction.dot(normal);
@@ -77,7 +77,7 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
   };
   std::int32_t next = 0;
   for (const ColumnSpan& span : spans) {
-    if (given_back_[span.plane]) continue;
+    if (released_[span.plane]) continue;
     add_rows(next, span.top - 1);
     next = span.bottom + 1;
   }

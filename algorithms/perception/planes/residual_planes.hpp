@@ -17,18 +17,24 @@ namespace polygmap {
 class ResidualPlaneSearch {
  public:
   struct Params {
-    std::int32_t min_rows = 50;    // of a peak, in column rows (eight pixels each)
-    double min_contrast = 2.5;     // of a peak against what lies around it
-    double known_apart_m = 0.015;  // nearer to a known plane it is that one
+    std::int32_t min_rows = 50;
+    double min_contrast = 2.5;
+    double known_apart_m = 0.015;
+
+    static void visit(auto& p, auto& field) {
+      field("min_rows", p.min_rows, 1, 10000, "A peak has as many column rows of eight pixels.");
+      field("min_contrast", p.min_contrast, 1.0, 100.0, "A peak stands out this many times from what lies around it.");
+      field("known_apart_m", p.known_apart_m, 0.0, 0.2, "A peak nearer to a known plane is that plane.");
+    }
   };
   static constexpr std::size_t kMaxFound = 8;
 
   void begin(const Params& params, const Vec3& up) noexcept;
   // Planes that are known already. The largest upright one says which way risers face.
-  void know_level(const InversePlane& plane) noexcept;
-  void know_upright(const InversePlane& plane, double pixels) noexcept;
-  // A plane that was given up: what its spans hold is searched as if it were in none.
-  void give_back(std::size_t plane) noexcept { given_back_[plane] = true; }
+  void add_known_level(const InversePlane& plane) noexcept;
+  void add_known_riser(const InversePlane& plane, double pixels) noexcept;
+  // The spans of a plane that was given up are searched as if their rows were in none.
+  void release(std::size_t plane) noexcept { released_[plane] = true; }
   // Adds the rows of a column that are in none of its spans.
   void add_column(const ColumnRays& rays, const ColumnImage& image, std::int32_t column,
                   const SpanBoundaries::Column& spans) noexcept;
@@ -54,7 +60,7 @@ class ResidualPlaneSearch {
   Axis level_;
   Axis upright_;
   double upright_pixels_ = 0.0;
-  std::array<bool, SpanBoundaries::kMaxPlanes + 1> given_back_{};
+  std::array<bool, SpanBoundaries::kMaxPlanes + 1> released_{};
   StaticVector<InversePlane, SpanBoundaries::kMaxPlanes> known_;
   StaticVector<InversePlane, kMaxFound> found_;
 };

@@ -9,6 +9,7 @@
 #include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/perception/image/column_image.hpp"
 #include "algorithms/perception/image/depth_noise_model.hpp"
+#include "algorithms/perception/planes/plane_id.hpp"
 
 namespace polygmap {
 
@@ -18,18 +19,28 @@ struct Run {
   std::int16_t bottom = 0;
   float inverse_depth = 0.0F;  // 1/m, at top
   float slope = 0.0F;          // 1/m per row
-  std::uint8_t plane = 0;      // that it was given to, 0 = none
+  PlaneId plane = kNoPlane;    // that it was given to
   [[nodiscard]] std::int32_t rows() const noexcept { return bottom - top + 1; }
 };
 
 class ScanlineSegmentation {
  public:
   struct Params {
-    double outlier_sigmas = 3.5;  // a row this far off the run's line does not belong to it
-    double bend_sigmas = 1.7;     // mean of the last rows' residuals: the run bends away
-    double jump_share = 0.03;     // the first rows of a run differ by less than this share of the depth per row
-    double floor_m = 0.001;       // slow depth errors, added to the noise
-    std::int32_t max_gap_px = 8;  // rows without data inside a run
+    double outlier_sigmas = 3.5;
+    double bend_sigmas = 1.7;
+    double jump_share = 0.03;
+    double floor_m = 0.001;
+    std::int32_t max_gap_px = 8;
+
+    static void visit(auto& p, auto& field) {
+      field("outlier_sigmas", p.outlier_sigmas, 0.5, 20.0, "A row farther off a run's line does not belong to it.");
+      field("bend_sigmas", p.bend_sigmas, 0.1, 20.0,
+            "A run bends away where the mean residual of its last rows is larger.");
+      field("jump_share", p.jump_share, 0.001, 0.5,
+            "The first rows of a run differ by less than this share of the depth per row.");
+      field("floor_m", p.floor_m, 0.0, 0.1, "Slow depth errors, added to the noise.");
+      field("max_gap_px", p.max_gap_px, 0, 200, "A run may miss as many rows in a row.");
+    }
   };
   static constexpr std::size_t kMaxRunsPerColumn = 48;
   using Column = StaticVector<Run, kMaxRunsPerColumn>;

@@ -26,8 +26,8 @@ void SpanBoundaries::begin(const Params& params, const DepthNoiseModel& noise, c
   overflow_ = 0;
 }
 
-void SpanBoundaries::gather(std::int32_t column, const ScanlineSegmentation::Column& runs,
-                            const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept {
+void SpanBoundaries::build_spans(std::int32_t column, const ScanlineSegmentation::Column& runs,
+                                 const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept {
   constexpr int kElsewhere = 3;
   Column& out = columns_[static_cast<std::size_t>(column)];
   out.clear();
@@ -59,11 +59,11 @@ void SpanBoundaries::gather(std::int32_t column, const ScanlineSegmentation::Col
   }
 }
 
-void SpanBoundaries::trim(std::int32_t column) noexcept {
-  for (ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) trim(column, span);
+void SpanBoundaries::trim_ends(std::int32_t column) noexcept {
+  for (ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) trim_ends(column, span);
 }
 
-void SpanBoundaries::trim(std::int32_t column, ColumnSpan& interval) const noexcept {
+void SpanBoundaries::trim_ends(std::int32_t column, ColumnSpan& interval) const noexcept {
   constexpr std::int32_t kMost_px = kRowsAtOnce, kGood = 2;
   const Line line = line_of(interval.plane, column);
   if (interval.bottom - interval.top + 1 >= kRowsAtOnce) {
@@ -99,7 +99,7 @@ void SpanBoundaries::trim(std::int32_t column, ColumnSpan& interval) const noexc
   interval.bottom = static_cast<std::int16_t>(cut(interval.bottom, -1));
 }
 
-void SpanBoundaries::begin_meeting() noexcept {
+void SpanBoundaries::begin_scores() noexcept {
   joint_count_ = 0;
   pair_count_ = 0;
   for (auto& lower : pair_of_) lower.fill(kMaxPairs);
@@ -204,7 +204,7 @@ std::int32_t SpanBoundaries::change_point(std::int32_t column, const Line& upper
   return static_cast<std::int32_t>(cv::v_reduce_min(cv::v_select(least, at, cv::v_setall_f32(kDepthHeight_px))));
 }
 
-void SpanBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
+void SpanBoundaries::score(std::int32_t column, bool by_planes) noexcept {
   Column& intervals = columns_[static_cast<std::size_t>(column)];
   for (std::size_t k = 0; k < intervals.size(); ++k) {
     ColumnSpan& upper = intervals[k];
@@ -248,7 +248,7 @@ void SpanBoundaries::meet(std::int32_t column, bool by_planes) noexcept {
   }
 }
 
-void SpanBoundaries::settle() noexcept {
+void SpanBoundaries::place() noexcept {
   for (std::size_t i = 0; i < pair_count_; ++i) {
     double sum = 0.0, best = 0.0, meeting = 0.0;
     std::size_t at = 0;  // half bins above the boundary
@@ -265,10 +265,10 @@ void SpanBoundaries::settle() noexcept {
     const bool meets = std::abs(offset_px) < params_.meet_px || meeting - best < params_.meet_gain * pairs_[i].columns;
     pairs_[i].shift_px = meets ? 0.0 : offset_px;
   }
-  follow();
+  reproject();
 }
 
-void SpanBoundaries::follow() noexcept {
+void SpanBoundaries::reproject() noexcept {
   for (std::size_t i = 0; i < joint_count_; ++i) {
     const Joint& joint = joints_[i];
     Column& intervals = columns_[static_cast<std::size_t>(joint.column)];

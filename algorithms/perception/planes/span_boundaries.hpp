@@ -11,6 +11,7 @@
 
 #include "algorithms/perception/image/noise_tracker.hpp"
 #include "algorithms/perception/planes/plane_fit.hpp"
+#include "algorithms/perception/planes/plane_id.hpp"
 #include "algorithms/perception/planes/scanline_segments.hpp"
 
 namespace polygmap {
@@ -19,8 +20,8 @@ namespace polygmap {
 struct ColumnSpan {
   std::int16_t top = 0;
   std::int16_t bottom = 0;
-  std::uint8_t plane = 0;
-  std::uint16_t piece = 0;  // for whoever joins intervals into pieces
+  PlaneId plane = kNoPlane;
+  std::uint16_t component = 0;  // connected component of its plane's spans, numbered by ConnectedComponents
 };
 
 // Rows that belong to no plane are searched for the rest of known or cut-off surfaces this far from the nearest span's
@@ -30,18 +31,32 @@ inline constexpr std::int32_t kRemainderReach_px = 48;
 class SpanBoundaries {
  public:
   struct Params {
-    double inlier_sigmas = 3.0;    // of a row in a refit, and of a row that extends a surface
-    double same_gap_sigmas = 3.0;  // rows between two runs of one plane that are this far off it are something else
+    double inlier_sigmas = 3.0;
+    double same_gap_sigmas = 3.0;
     double gap_floor_m = 0.006;
-    double meet_px = 2.0;          // planes meet where their line is no farther than this from the change-point ...
-    double meet_gain = 1.0;        // ... or hardly worse: of the columns' mean cost
-    std::int32_t window_px = 6;    // rows searched beyond where the runs ended
-    std::int32_t max_gap_px = 24;  // rows between two surfaces that are still next to each other
+    double meet_px = 2.0;
+    double meet_gain = 1.0;
+    std::int32_t window_px = 6;
+    std::int32_t max_gap_px = 24;
+
+    static void visit(auto& p, auto& field) {
+      field("inlier_sigmas", p.inlier_sigmas, 0.5, 20.0,
+            "A row nearer to a plane counts in its refit, and extends the surface.");
+      field("same_gap_sigmas", p.same_gap_sigmas, 0.5, 20.0,
+            "Rows between two runs of one plane that are farther off it are something else.");
+      field("gap_floor_m", p.gap_floor_m, 0.0, 0.1, "Slow depth errors, added to the noise of rows in a gap.");
+      field("meet_px", p.meet_px, 0.0, 50.0, "Planes meet where their line is no farther from the change-point.");
+      field("meet_gain", p.meet_gain, 0.0, 100.0,
+            "Planes meet where their line costs no more than this of the columns' mean, too.");
+      field("window_px", p.window_px, 1, 64, "As many rows are searched beyond where the runs ended.");
+      field("max_gap_px", p.max_gap_px, 1, 480,
+            "Surfaces with as many rows between them are still next to each other.");
+    }
   };
   static constexpr std::size_t kMaxPlanes = 96;
-  static constexpr std::size_t kMaxIntervals = 32;
+  static constexpr std::size_t kMaxSpans = 32;
   static constexpr std::int32_t kRefitColumns = 8;  // per call, the same number for every vector width
-  using Column = StaticVector<ColumnSpan, kMaxIntervals>;
+  using Column = StaticVector<ColumnSpan, kMaxSpans>;
   using Columns = std::array<Column, kColumns>;
   struct Plane {
     InversePlane plane;
@@ -59,24 +74,28 @@ class SpanBoundaries {
     planes_[i].plane = plane;
     planes_[i].norm = static_cast<float>(plane.m.norm());
   }
-  // A plane of few pixels is uncertain beside them: what it may claim knows that.
+  // A plane of few pixels is uncertain beside them: the gaps it may fill know that.
   void set_covariance(std::size_t i, const Mat3& covariance) noexcept { planes_[i].covariance = covariance; }
   [[nodiscard]] const Plane& plane(std::size_t i) const noexcept { return planes_[i]; }
 
-  // One column's runs to intervals, each run's plane looked up in to_plane.
-  void gather(std::int32_t column, const ScanlineSegmentation::Column& runs,
-              const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept;
+  // One column's runs to spans, each run's plane looked up in to_plane.
+  void build_spans(std::int32_t column, const ScanlineSegmentation::Column& runs,
+                   const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept;
   // A run's ends may reach over an edge: takes away rows that the plane, known better than the run's line, does not
   // explain.
-  void trim(std::int32_t column) noexcept;
+  void trim_ends(std::int32_t column) noexcept;
   // Gives rows that are in none of the column's spans to planes that the column beside shows there, or to one of the
   // planes first .. last. Such rows are too few for a run of their own.
-  void claim(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
-  void begin_meeting() noexcept;
-  // Change-points between the column's surfaces. by_planes: where planes meet near them, that is believed unmeasured.
-  void meet(std::int32_t column, bool by_planes) noexcept;
-  void settle() noexcept;  // one decision per pair of planes, then all columns follow it ...
-  void follow() noexcept;  // ... and again when the planes have changed
+  void fill_gaps(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
+  void begin_scores() noexcept;
+  // Scores where the column's surfaces change, and ends its spans there. by_planes: where planes meet near a change,
+  // that is believed unmeasured.
+  void score(std::int32_t column, bool by_planes) noexcept;
+  // Decides for each pair of planes how far its boundary lies from where the planes meet, by the scores of all columns,
+  // and ends all its spans there.
+  void place() noexcept;
+  // Ends them there again, after the planes have changed.
+  void reproject() noexcept;
   void begin_refit() noexcept;
   // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments. roughly: of fewer of their
   // rows, and without looking at the noise.
@@ -85,7 +104,7 @@ class SpanBoundaries {
   // The noise as the rows of the last refit's surfaces show it.
   [[nodiscard]] const NoiseSamples& noise_samples() const noexcept { return noise_samples_; }
 
-  // visit(other plane, columns in which the two meet), of the last meeting.
+  // visit(other plane, columns in which the two meet), of the last scores.
   template <typename Visit>
   void for_each_meeting(std::uint8_t plane, const Visit& visit) const noexcept {
     for (std::size_t i = 0; i < pair_count_; ++i) {
@@ -131,7 +150,7 @@ class SpanBoundaries {
     [[nodiscard]] bool within(float cost) const noexcept { return off2 < cost * variance; }
   };
   [[nodiscard]] Offset offset(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
-  void trim(std::int32_t column, ColumnSpan& interval) const noexcept;
+  void trim_ends(std::int32_t column, ColumnSpan& interval) const noexcept;
   struct Depths {  // the range of some rows' inverse depths, 1/m
     float farthest, nearest;
     [[nodiscard]] bool any() const noexcept { return nearest >= farthest; }
@@ -147,8 +166,8 @@ class SpanBoundaries {
   // Which of the rows from first on have data, and which of them lie on the line.
   [[nodiscard]] Rows fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept;
   // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
-  void weigh_claim(std::int32_t column, const Line& line, const ColumnSpan& candidate, std::int32_t& most,
-                   ColumnSpan& claimed) const noexcept;
+  void weigh_candidate(std::int32_t column, const Line& line, const ColumnSpan& candidate, std::int32_t& most,
+                       ColumnSpan& filled) const noexcept;
   struct Gap {  // rows of a column between spans of two planes, 0 = none
     std::int32_t column, from, until;
     std::uint8_t above, below;
@@ -156,9 +175,9 @@ class SpanBoundaries {
   };
   // A plane for rows top .. bottom of the gap, whose depths are known; or several planes for its ends.
   void consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom, const Depths& depths,
-                std::int32_t& most, ColumnSpan& claimed) const noexcept;
+                std::int32_t& most, ColumnSpan& filled) const noexcept;
   void consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
-                ColumnSpan& claimed) const noexcept;
+                ColumnSpan& filled) const noexcept;
   // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
   struct Strip {
     std::array<std::int16_t, kRefitColumns> top{}, bottom{};

@@ -30,8 +30,8 @@ SpanBoundaries::Rows SpanBoundaries::fitting(const Line& line, std::int32_t colu
   return rows;
 }
 
-void SpanBoundaries::weigh_claim(std::int32_t column, const Line& line, const ColumnSpan& candidate, std::int32_t& most,
-                                 ColumnSpan& claimed) const noexcept {
+void SpanBoundaries::weigh_candidate(std::int32_t column, const Line& line, const ColumnSpan& candidate,
+                                     std::int32_t& most, ColumnSpan& filled) const noexcept {
   // A bit for each row that fits, from the first of the candidate's on.
   constexpr std::int32_t kBits = 64;
   std::array<std::uint64_t, kDepthHeight_px / kBits + 2> fits{};
@@ -69,9 +69,9 @@ void SpanBoundaries::weigh_claim(std::int32_t column, const Line& line, const Co
     }
     if (rows <= most) continue;
     most = rows;
-    claimed.top = static_cast<std::int16_t>(candidate.top + top);
-    claimed.bottom = static_cast<std::int16_t>(candidate.top + at - 1);
-    claimed.plane = candidate.plane;
+    filled.top = static_cast<std::int16_t>(candidate.top + top);
+    filled.bottom = static_cast<std::int16_t>(candidate.top + at - 1);
+    filled.plane = candidate.plane;
   }
 }
 
@@ -115,7 +115,7 @@ float SpanBoundaries::own_variance(std::uint8_t plane, std::int32_t column, std:
 }
 
 void SpanBoundaries::consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
-                              const Depths& depths, std::int32_t& most, ColumnSpan& claimed) const noexcept {
+                              const Depths& depths, std::int32_t& most, ColumnSpan& filled) const noexcept {
   if (!gap.may_be(plane) || bottom - top < most || !depths.any()) return;
   Line line = line_of(plane, gap.column);
   if (!reaches(line, top, bottom, depths)) return;
@@ -124,11 +124,11 @@ void SpanBoundaries::consider(const Gap& gap, std::uint8_t plane, std::int32_t t
   candidate.plane = plane;
   candidate.top = static_cast<std::int16_t>(top);
   candidate.bottom = static_cast<std::int16_t>(bottom);
-  weigh_claim(gap.column, line, candidate, most, claimed);
+  weigh_candidate(gap.column, line, candidate, most, filled);
 }
 
 void SpanBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
-                              ColumnSpan& claimed) const noexcept {
+                              ColumnSpan& filled) const noexcept {
   const bool deep = gap.until - gap.from >= 2 * kRemainderReach_px;
   const std::int32_t upper_end = deep ? gap.from + kRemainderReach_px - 1 : gap.until;
   const std::int32_t lower_start = gap.until - kRemainderReach_px + 1;
@@ -136,13 +136,13 @@ void SpanBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size
   const Depths lower = deep ? depths_of(gap.column, lower_start, gap.until) : upper;
   for (std::size_t p = first_plane; p <= last_plane; ++p) {
     const auto plane = static_cast<std::uint8_t>(p);
-    consider(gap, plane, gap.from, upper_end, upper, most, claimed);
-    if (deep) consider(gap, plane, lower_start, gap.until, lower, most, claimed);
+    consider(gap, plane, gap.from, upper_end, upper, most, filled);
+    if (deep) consider(gap, plane, lower_start, gap.until, lower, most, filled);
   }
 }
 
-void SpanBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t first_plane,
-                           std::size_t last_plane) noexcept {
+void SpanBoundaries::fill_gaps(std::int32_t column, std::int32_t beside, std::size_t first_plane,
+                               std::size_t last_plane) noexcept {
   constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
   constexpr std::int32_t kMinRows = 2;   // that fit
   Column& spans = columns_[static_cast<std::size_t>(column)];
@@ -161,7 +161,7 @@ void SpanBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t
     const Gap gap{column, gap_from, until, k > 0 ? spans[k - 1].plane : std::uint8_t{0},
                   k < spans.size() ? spans[k].plane : std::uint8_t{0}};
     std::int32_t most = kMinRows - 1;
-    ColumnSpan claimed;
+    ColumnSpan filled;
     if (any_beside) {
       const Column& others = columns_[static_cast<std::size_t>(beside)];
       while (next_beside < others.size() && others[next_beside].bottom + kReach_px < gap_from) ++next_beside;
@@ -170,13 +170,13 @@ void SpanBoundaries::claim(std::int32_t column, std::int32_t beside, std::size_t
         const std::int32_t top = std::max(gap_from, other.top - kReach_px);
         const std::int32_t bottom = std::min(until, other.bottom + kReach_px);
         if (!gap.may_be(other.plane) || bottom - top < most) continue;
-        consider(gap, other.plane, top, bottom, depths_of(column, top, bottom), most, claimed);
+        consider(gap, other.plane, top, bottom, depths_of(column, top, bottom), most, filled);
       }
     }
-    if (first_plane <= last_plane) consider(gap, first_plane, last_plane, most, claimed);
-    if (most < kMinRows || !spans.try_push_back(claimed)) continue;
+    if (first_plane <= last_plane) consider(gap, first_plane, last_plane, most, filled);
+    if (most < kMinRows || !spans.try_push_back(filled)) continue;
     std::rotate(spans.begin() + static_cast<std::ptrdiff_t>(k), spans.end() - 1, spans.end());
-    from = claimed.bottom + 1;
+    from = filled.bottom + 1;
   }
 }
 

@@ -15,12 +15,12 @@ namespace polygmap {
 class EdgeLineFinder {
  public:
   struct Params {
-    std::int32_t window_px = 12;   // rows searched to each side of the first guess
-    std::int32_t segment_px = 24;  // that share one change-point
+    std::int32_t window_px = 12;
+    std::int32_t segment_px = 24;
     double truncate_sigmas = 3.0;
-    std::int32_t min_side_px = 3;  // rows of the window on each side of the change-point that fit their plane
-    std::int32_t max_gap_px = 6;   // rows without data at the first guess: beyond, the column says nothing
-    std::int32_t min_columns = 3;  // of eight pixels
+    std::int32_t min_side_px = 3;
+    std::int32_t max_gap_px = 6;
+    std::int32_t min_columns = 3;
     double min_length_m = 0.06;
     double max_rms_m = 0.006;
     double min_inlier_share = 0.5;
@@ -30,10 +30,37 @@ class EdgeLineFinder {
     double agree_m = 0.003;
     double agree_max_m = 0.008;
     double agree_px = 0.3;
-    double face_m = 0.006;          // an overhang's front face stands out from the riser by more than this ...
-    double face_max_m = 0.08;       // ... and less than this
-    double slow_error_m = 0.0012;   // of a segment's change-point, shared by its columns
-    double least_local_m = 0.0004;  // error of where the planes meet locally, however well its columns agree
+    double face_m = 0.006;
+    double face_max_m = 0.08;
+    double slow_error_m = 0.0012;
+    double least_local_m = 0.0004;
+
+    static void visit(auto& p, auto& field) {
+      field("window_px", p.window_px, 4, 16, "As many rows are searched to each side of the first guess.");
+      field("segment_px", p.segment_px, 8, 640, "As many columns share one change-point.");
+      field("truncate_sigmas", p.truncate_sigmas, 0.5, 20.0, "A pixel farther off its plane costs no more.");
+      field("min_side_px", p.min_side_px, 1, 16,
+            "As many rows of the window fit their plane on each side of the change-point.");
+      field("max_gap_px", p.max_gap_px, 0, 100,
+            "A column with more rows without data at the first guess says nothing.");
+      field("min_columns", p.min_columns, 1, 80, "A line has as many columns of eight pixels.");
+      field("min_length_m", p.min_length_m, 0.0, 1.0, "A line is as long.");
+      field("max_rms_m", p.max_rms_m, 1e-4, 0.1, "Change-points lie no farther off their line.");
+      field("min_inlier_share", p.min_inlier_share, 0.0, 1.0, "This share of the change-points lies on their line.");
+      field("agree_m", p.agree_m, 0.0, 0.1,
+            "The line where two planes meet is taken when it is no farther from the change-points, or within their "
+            "sigmas.");
+      field("agree_max_m", p.agree_max_m, 0.0, 0.2,
+            "The line where two planes meet is never taken when it is farther from the change-points.");
+      field("agree_px", p.agree_px, 0.0, 20.0,
+            "Far away, where a pixel is centimetres of the surface, agreement is counted in pixels.");
+      field("face_m", p.face_m, 0.0, 0.1, "An overhang's front face stands out from the riser by more.");
+      field("face_max_m", p.face_max_m, 0.0, 0.5, "An overhang's front face stands out from the riser by less.");
+      field.ordered("face_m", "face_max_m");
+      field("slow_error_m", p.slow_error_m, 0.0, 0.1, "Error of a segment's change-point that its columns share.");
+      field("least_local_m", p.least_local_m, 0.0, 0.1,
+            "Error of where the planes meet locally, however well its columns agree.");
+    }
   };
   enum class Outcome : std::uint8_t { kFound, kAgain, kFewColumns, kNoLine, kNotStraight, kShort };
 

@@ -145,29 +145,29 @@ EdgeKind PolygonBuilder::judge_edge(const FrameImage& picture, const InversePlan
   return 2 * observed > kProbes ? EdgeKind::kObserved : EdgeKind::kUnknown;
 }
 
-// The tread that most columns of this surface show right below (or above) it in the picture; 0 = none.
-std::size_t PolygonBuilder::tread_beside(const FrameImage& picture, const PlaneSet& planes,
-                                         const ColumnExtents& profile, bool below) const noexcept {
+// The tread that most columns of this surface show right below (or above) it in the picture.
+RegionId PolygonBuilder::tread_beside(const FrameImage& picture, const Regions& regions, RegionId id,
+                                      bool below) const noexcept {
   constexpr std::int32_t kProbe_px = 6;
-  std::array<std::int32_t, PlaneSet::kMaxPlanes + 1> votes{};
+  const ColumnExtents& profile = regions.extents[id];
+  std::array<std::int32_t, Regions::kMaxRegions + 1> votes{};
   for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
     if (ends.empty()) continue;
     const std::int32_t row = below ? ends.bottom + kProbe_px : ends.top - kProbe_px;
-    if (row >= 0 && row < picture.column_rays.height_px) ++votes[picture.owner(g, row)];
+    if (row >= 0 && row < picture.column_rays.height_px) ++votes[regions.labels.at(g, row)];
   }
-  std::size_t best = 0;
-  for (std::size_t p = 1; p <= planes.count; ++p) {
-    if (votes[p] < params_.min_tread_columns || !planes[p].alive || planes[p].kind != SurfaceKind::kTread) continue;
-    if (best == 0 || votes[p] > votes[best]) best = p;
+  RegionId best = kNoRegion;
+  for (RegionId p = 1; p <= regions.count; ++p) {
+    if (votes[p] < params_.min_tread_columns || !regions[p].alive || regions[p].kind != SurfaceKind::kTread) continue;
+    if (best == kNoRegion || votes[p] > votes[best]) best = p;
   }
   return best;
 }
 
-bool PolygonBuilder::try_build(const FrameImage& picture, const PlaneSet& planes, std::size_t index,
-                               const ColumnExtents& profile, const Outline2& outline, const SurfaceLines& lines,
-                               SurfacePatch& patch) const noexcept {
-  const FramePlane& own = planes[index];
+bool PolygonBuilder::try_build(const FrameImage& picture, const Regions& regions, RegionId id, const Outline2& outline,
+                               const SurfaceLines& lines, SurfacePatch& patch) const noexcept {
+  const Region& own = regions[id];
   const InversePlane& plane = own.plane;
   const Vec3 n = plane.normal();
   // Plane coordinates with x along the nosing, else along the picture's rows; x cross y = n.
@@ -213,9 +213,9 @@ bool PolygonBuilder::try_build(const FrameImage& picture, const PlaneSet& planes
   if (own.kind == SurfaceKind::kRiser) {
     // Seen nearly edge-on, half a pixel is decimetres of a riser: it ends where the treads above and below it say.
     for (const bool below : {true, false}) {
-      const std::size_t tread = tread_beside(picture, planes, profile, below);
-      if (tread == 0) continue;
-      const InversePlane& level = planes[tread].plane;
+      const RegionId tread = tread_beside(picture, regions, id, below);
+      if (tread == kNoRegion) continue;
+      const InversePlane& level = regions[tread].plane;
       const double side = below ? 1.0 : -1.0;
       const Vec3 up = side * level.normal();
       const Vec2 inward{up.dot(x_axis), up.dot(y_axis)};
@@ -229,13 +229,13 @@ bool PolygonBuilder::try_build(const FrameImage& picture, const PlaneSet& planes
 
   patch = SurfacePatch{};
   patch.kind = own.kind;
-  patch.plane = own.same;
+  patch.plane = own.coplanar;
   patch.covariance = own.covariance;
   patch.normal = n;
   patch.d_m = plane.d_m();
   patch.area_m2 = area_m2;
   patch.centroid_m = to_space(centroid(flat));
-  patch.rmse_m = math::sqrt(own.residual2 / std::max(own.moments.count, 1.0));
+  patch.rmse_m = own.rmse_m;
   patch.offset_sigma_m = plane_sigma_m(plane, own.covariance, patch.centroid_m / patch.centroid_m.z());
   const Mat3 across = Mat3::Identity() - n * n.transpose();
   patch.tilt_sigma_rad = patch.d_m * math::sqrt(std::max((across * own.covariance * across).trace(), 0.0));

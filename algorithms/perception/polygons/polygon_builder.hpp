@@ -6,9 +6,10 @@
 #include <cstdint>
 
 #include "algorithms/core/messages/surfaces.hpp"
-#include "algorithms/perception/planes/plane_set.hpp"
+#include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/polygons/column_outline.hpp"
 #include "algorithms/perception/polygons/convex_outline.hpp"
+#include "algorithms/perception/regions/region.hpp"
 
 namespace polygmap {
 
@@ -21,22 +22,29 @@ struct SurfaceLines {  // each only if valid
 class PolygonBuilder {
  public:
   struct Params {
-    double snap_m = 0.015;               // corners this close to a nosing or back line go onto it
-    double probe_px = 3.0;               // half-resolution pixels outside a polygon's edge where its end is judged
-    double apart_m = 0.04;               // seen this far in front of a plane: something hides it
-    std::int32_t min_tread_columns = 3;  // of a tread that ends a riser
+    double snap_m = 0.015;
+    double probe_px = 3.0;
+    double apart_m = 0.04;
+    std::int32_t min_tread_columns = 3;
+
+    static void visit(auto& p, auto& field) {
+      field("snap_m", p.snap_m, 0.0, 0.1, "Corners as close to a nosing or back line go onto it.");
+      field("probe_px", p.probe_px, 0.0, 20.0,
+            "A polygon's end is judged as many pixels of half resolution outside its edge.");
+      field("apart_m", p.apart_m, 0.001, 0.5, "What is seen as far in front of a plane hides it.");
+      field("min_tread_columns", p.min_tread_columns, 1, 80, "A tread that ends a riser has as many columns.");
+    }
   };
   void configure(const Params& params) noexcept { params_ = params; }
 
-  // The patch of planes[index]; false when its outline encloses no area.
-  [[nodiscard]] bool try_build(const FrameImage& picture, const PlaneSet& planes, std::size_t index,
-                               const ColumnExtents& profile, const Outline2& outline, const SurfaceLines& lines,
-                               SurfacePatch& patch) const noexcept;
+  // The patch of regions[id]; false when its outline encloses no area.
+  [[nodiscard]] bool try_build(const FrameImage& picture, const Regions& regions, RegionId id, const Outline2& outline,
+                               const SurfaceLines& lines, SurfacePatch& patch) const noexcept;
 
  private:
-  // The tread that most columns of the surface show right below (or above) it in the picture; 0 = none.
-  [[nodiscard]] std::size_t tread_beside(const FrameImage& picture, const PlaneSet& planes,
-                                         const ColumnExtents& profile, bool below) const noexcept;
+  // The tread that most columns of the surface show right below (or above) it in the picture.
+  [[nodiscard]] RegionId tread_beside(const FrameImage& picture, const Regions& regions, RegionId id,
+                                      bool below) const noexcept;
   // All in half-resolution pixels: the edge's ends, a point of the surface.
   [[nodiscard]] EdgeKind judge_edge(const FrameImage& picture, const InversePlane& plane, const Vec2& a, const Vec2& b,
                                     const Vec2& inside) const noexcept;

@@ -125,12 +125,12 @@ PixelGains weigh(const SideLines::Params& params, const RawImage& picture, const
 }  // namespace
 
 void SideLines::begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw,
-                      const FrameImage& picture, const PlaneSet& planes) noexcept {
+                      const FrameImage& picture, const Regions& regions) noexcept {
   params_ = params;
   noise_ = noise;
   raw_ = &raw;
   picture_ = &picture;
-  planes_ = &planes;
+  regions_ = &regions;
   pitch_ = 1.0 / raw.intrinsics.fx_px;
 }
 
@@ -143,9 +143,9 @@ struct SideLines::RowView {
   Ending ending;            // kSeen: the pixels will tell
 };
 
-void SideLines::look(std::size_t index, bool right, RowView& view) const noexcept {
+void SideLines::look(RegionId id, bool right, RowView& view) const noexcept {
   const CameraIntrinsics& k = raw_->intrinsics;
-  const PlaneSet& planes = *planes_;
+  const Regions& regions = *regions_;
   const std::int32_t row = view.row, column = view.column, out = right ? 1 : -1;
   const std::int32_t border = kColumn_px * column + (right ? kColumn_px - 1 : 0);  // the outermost column's last pixel
   const std::int32_t first = border - out * (kInside_px - 1);
@@ -158,17 +158,17 @@ void SideLines::look(std::size_t index, bool right, RowView& view) const noexcep
   if (first < 0 || first >= k.width_px) return;
   const RowRays rays{-k.cx_px * pitch_, pitch_,
                      static_cast<double>(picture_->column_rays.y[static_cast<std::size_t>(row)])};
-  view.own.set(planes[index].plane, noise_, rays, border);
+  view.own.set(regions[id].plane, noise_, rays, border);
   if (!view.own.valid) return;
   // The plane beyond, if there is one.
-  std::size_t beyond = 0;
+  RegionId beyond = kNoRegion;
   for (std::int32_t g = column + out; g != column + 3 * out; g += out) {
     if (g < 0 || g >= picture_->column_rays.columns) break;
-    const std::size_t p = picture_->owner(g, row);
-    if (p != 0 && p != index) beyond = p;
+    const RegionId p = regions.labels.at(g, row);
+    if (p != kNoRegion && p != id) beyond = p;
   }
   view.other.valid = false;
-  if (beyond != 0) view.other.set(planes[beyond].plane, noise_, rays, border);
+  if (beyond != kNoRegion) view.other.set(regions[beyond].plane, noise_, rays, border);
   const std::uint16_t* pixels = raw_->row(row);
   std::int32_t count = std::min(kReach_px, right ? k.width_px - first : first + 1);
   if (picture_->body_rows[static_cast<std::size_t>(row / 2)]) {
@@ -255,22 +255,23 @@ bool SideLines::try_line(const InversePlane& plane, Line& line) const noexcept {
   return upright(line);
 }
 
-void SideLines::find_ends(std::size_t index, const ColumnExtents& profile) noexcept {
+void SideLines::find_ends(RegionId id) noexcept {
+  const ColumnExtents& profile = regions_->extents[id];
   using Bytes = cv::v_uint8;
   static_assert(kDepthHeight_px % Bytes::nlanes == 0);
   const std::int32_t from = profile.first_row / Bytes::nlanes * Bytes::nlanes;
   std::uint8_t *left = left_.data() + kPad, *right = right_.data() + kPad;
   std::fill(left + from, left + profile.last_row + 1, kNoColumn);
   std::fill(right + from, right + profile.last_row + 1, kNoColumn);
-  const Bytes wanted = cv::vx_setall_u8(static_cast<std::uint8_t>(index));
+  const Bytes wanted = cv::vx_setall_u8(id);
   for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
     if (ends.empty()) continue;
-    const std::uint8_t* owners = picture_->owners.row(g);
+    const RegionId* labels = regions_->labels.column(g);
     const Bytes here = cv::vx_setall_u8(static_cast<std::uint8_t>(g));
     for (std::int32_t r = ends.top / Bytes::nlanes * Bytes::nlanes; r <= ends.bottom; r += Bytes::nlanes) {
       // From left to right, and no column is more than none.
-      const Bytes own = cv::vx_load(owners + r) == wanted;
+      const Bytes own = cv::vx_load(labels + r) == wanted;
       cv::v_store(left + r, cv::v_min(cv::vx_load(left + r), here | ~own));
       cv::v_store(right + r, cv::v_select(own, here, cv::vx_load(right + r)));
     }
@@ -281,8 +282,9 @@ void SideLines::find_ends(std::size_t index, const ColumnExtents& profile) noexc
   }
 }
 
-OutlineSide SideLines::find(std::size_t index, const ColumnExtents& profile, bool right) noexcept {
-  const FramePlane& plane = (*planes_)[index];
+OutlineSide SideLines::find(RegionId id, bool right) noexcept {
+  const Region& plane = (*regions_)[id];
+  const ColumnExtents& profile = regions_->extents[id];
   const double out = right ? 1.0 : -1.0;
   const auto outer_edge = [right](std::int32_t g) { return kColumn_px * g + (right ? kColumn_px - 0.5 : -0.5); };
   seen_.clear();
@@ -318,7 +320,7 @@ OutlineSide SideLines::find(std::size_t index, const ColumnExtents& profile, boo
     views[row_count++].column = ends[r];
     __builtin_prefetch(raw_->row(r) + kColumn_px * ends[r]);
   }
-  for (std::size_t i = 0; i < row_count; ++i) look(index, right, views[i]);
+  for (std::size_t i = 0; i < row_count; ++i) look(id, right, views[i]);
   double outermost = -1e9;
   for (std::size_t i = 0; i < row_count; ++i) {
     double column = 0.0;
@@ -359,7 +361,7 @@ OutlineSide SideLines::find(std::size_t index, const ColumnExtents& profile, boo
     if (g != kNoColumn) cut_px += step * std::max(beyond(r, outer_edge(g)) - params_.outside_px, 0.0);
   }
   if (on < params_.min_rows || on < params_.min_share * between) return side;
-  if (cut_px > params_.max_cut * plane.piece_px) return side;
+  if (cut_px > params_.max_cut * plane.area_px) return side;
   side.fitted = true;
   side.column_px = 0.5 * (line.at + 0.5 * line.slope - 0.5);
   side.slope = line.slope;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whose each pixel is, and where every surface begins and ends in the picture's columns.
+// Where a region begins and ends in the picture's columns.
 #pragma once
 
 #include <algorithm>
@@ -7,14 +7,11 @@
 #include <cstdint>
 
 #include "algorithms/perception/image/column_image.hpp"
-#include "algorithms/perception/planes/plane_set.hpp"
-#include "algorithms/perception/planes/span_boundaries.hpp"
-#include "algorithms/perception/regions/connected_components.hpp"
 
 namespace polygmap {
 
 struct ColumnExtent {
-  std::int16_t top = -1;  // full-resolution rows, inclusive; -1 = the surface is not in this column
+  std::int16_t top = -1;  // full-resolution rows, inclusive; -1 = the region is not in this column
   std::int16_t bottom = -1;
   [[nodiscard]] bool empty() const noexcept { return top < 0; }
   void add(std::int16_t first, std::int16_t last) noexcept {
@@ -36,18 +33,6 @@ struct ColumnExtents {
     first_column = std::min(first_column, static_cast<std::int16_t>(column));
     last_column = std::max(last_column, static_cast<std::int16_t>(column));
   }
-};
-
-class SurfaceExtents {
- public:
-  void begin(const PlaneSet& planes) noexcept;
-  // Columns come from left to right. Writes the column's owners into the picture.
-  void add_column(const SpanBoundaries::Columns& columns, const ConnectedComponents& pieces, std::int32_t column,
-                  FrameImage& picture) noexcept;
-  [[nodiscard]] const ColumnExtents& operator[](std::size_t plane) const noexcept { return profiles_[plane]; }
-
- private:
-  std::array<ColumnExtents, PlaneSet::kMaxPlanes + 1> profiles_{};
 };
 
 }  // namespace polygmap

@@ -7,22 +7,40 @@ namespace polygmap {
 namespace {
 
 // A tread that meets a riser, or a riser that meets a tread.
-bool on_a_step(const SpanBoundaries& boundaries, const PlaneSet& planes, const FramePlane& plane) noexcept {
+bool on_a_step(const SpanBoundaries& boundaries, const PlaneSet& planes, const Region& region) noexcept {
   constexpr double kLeastColumns = 2.0;
   bool found = false;
-  if (plane.kind == SurfaceKind::kOther) return false;
-  const SurfaceKind wanted = plane.kind == SurfaceKind::kTread ? SurfaceKind::kRiser : SurfaceKind::kTread;
-  boundaries.for_each_meeting(plane.source, [&](std::uint8_t other, double columns) {
+  if (region.kind == SurfaceKind::kOther) return false;
+  const SurfaceKind wanted = region.kind == SurfaceKind::kTread ? SurfaceKind::kRiser : SurfaceKind::kTread;
+  boundaries.for_each_meeting(region.source, [&](PlaneId other, double columns) {
     found = found || (columns >= kLeastColumns && planes[other].kind == wanted && planes[other].alive);
   });
   return found;
 }
 
+Region region_in(const FittedPlane& fitted, PlaneId id) noexcept {
+  Region region;
+  region.plane = fitted.plane;
+  region.kind = fitted.kind;
+  region.covariance = fitted.covariance;
+  region.rmse_m = math::sqrt(fitted.residual2 / std::max(fitted.moments.count, 1.0));
+  region.source = id;
+  region.coplanar = id;
+  region.centre_m = fitted.centre_m;
+  region.alive = fitted.alive;
+  return region;
+}
+
 }  // namespace
 
-// Intervals of one plane that share rows in neighbouring columns hang together. Pieces come out by area.
 void ConnectedComponents::find(SpanBoundaries::Columns& columns, std::int32_t column_count) noexcept {
   overflow_ = 0;
+  number(link(columns, column_count));
+  measure(columns, column_count);
+}
+
+// Spans of one plane that share rows in neighbouring columns hang together. Returns how many spans there are.
+std::uint16_t ConnectedComponents::link(SpanBoundaries::Columns& columns, std::int32_t column_count) noexcept {
   const auto root = [this](std::uint16_t i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
@@ -31,7 +49,7 @@ void ConnectedComponents::find(SpanBoundaries::Columns& columns, std::int32_t co
   for (std::int32_t g = 0; g < column_count; ++g) {
     std::size_t next = 0;  // on the left, the first span that ends no higher than this one begins
     for (ColumnSpan& span : columns[static_cast<std::size_t>(g)]) {
-      span.piece = ++count;
+      span.component = ++count;
       parent_[count] = count;
       if (g == 0) continue;
       const SpanBoundaries::Column& lefts = columns[static_cast<std::size_t>(g - 1)];
@@ -39,154 +57,164 @@ void ConnectedComponents::find(SpanBoundaries::Columns& columns, std::int32_t co
       for (std::size_t i = next; i < lefts.size() && lefts[i].top <= span.bottom; ++i) {
         const ColumnSpan& left = lefts[i];
         if ((static_cast<int>(left.plane == span.plane) & static_cast<int>(left.bottom >= span.top)) == 0) continue;
-        const std::uint16_t a = root(left.piece), b = root(span.piece);
+        const std::uint16_t a = root(left.component), b = root(span.component);
         parent_[std::max(a, b)] = std::min(a, b);
       }
     }
   }
-  // Roots are numbered in the order of the picture; parent_ then holds the pieces' numbers, 0 for those without room.
-  piece_count_ = 0;
-  for (std::uint16_t i = 1; i <= count; ++i) {
+  return count;
+}
+
+// Roots are numbered in the order of the picture; parent_ then holds the components' numbers, 0 for those without room.
+void ConnectedComponents::number(std::uint16_t span_count) noexcept {
+  component_count_ = 0;
+  for (std::uint16_t i = 1; i <= span_count; ++i) {
     if (parent_[i] != i) {
       parent_[i] = parent_[parent_[i]];  // a root comes before its members and has its number by now
       continue;
     }
     parent_[i] = 0;
-    if (piece_count_ == kMaxPieces) {
+    if (component_count_ == kMaxComponents) {
       ++overflow_;
       continue;
     }
-    pieces_[++piece_count_] = Piece{};
-    parent_[i] = static_cast<std::uint16_t>(piece_count_);
+    components_[++component_count_] = Component{};
+    parent_[i] = static_cast<std::uint16_t>(component_count_);
   }
+}
+
+void ConnectedComponents::measure(SpanBoundaries::Columns& columns, std::int32_t column_count) noexcept {
   for (std::int32_t g = 0; g < column_count; ++g) {
     for (ColumnSpan& span : columns[static_cast<std::size_t>(g)]) {
-      span.piece = parent_[span.piece];
-      if (span.piece == 0) continue;
-      Piece& piece = pieces_[span.piece];
-      if (piece.area_px == 0.0) {
-        piece.left = g;
-        piece.top = span.top;
+      span.component = parent_[span.component];
+      if (span.component == 0) continue;
+      Component& component = components_[span.component];
+      if (component.area_px == 0.0) {
+        component.left = g;
+        component.top = span.top;
       }
-      piece.right = g;
-      piece.top = std::min<std::int32_t>(piece.top, span.top);
-      piece.bottom = std::max<std::int32_t>(piece.bottom, span.bottom);
+      component.right = g;
+      component.top = std::min<std::int32_t>(component.top, span.top);
+      component.bottom = std::max<std::int32_t>(component.bottom, span.bottom);
       const double area_px = kColumn_px * (span.bottom - span.top + 1);
-      piece.plane = span.plane;
-      piece.area_px += area_px;
-      piece.sum_column += area_px * (0.5 * kColumn_px * g + 0.25 * kColumn_px - 0.5);
-      piece.sum_row += area_px * 0.25 * (span.top + span.bottom);
+      component.plane = span.plane;
+      component.area_px += area_px;
+      component.sum_column += area_px * (0.5 * kColumn_px * g + 0.25 * kColumn_px - 0.5);
+      component.sum_row += area_px * 0.25 * (span.top + span.bottom);
     }
   }
 }
 
-// Two pieces belong together when nothing but missing data (the robot's leg, dropouts) or their own plane lies between.
-// Something seen behind the plane is a hole; something in front of it hides what nobody knows.
-bool ConnectedComponents::apart(double apart_m, const FrameImage& picture, const Piece& a, const Piece& b,
+// Two components belong together when nothing but missing data (the robot's leg, dropouts) or their own plane lies
+// between. Something seen behind the plane is a hole; something in front of it hides what nobody knows.
+bool ConnectedComponents::apart(double apart_m, const FrameImage& image, const Component& a, const Component& b,
                                 const InversePlane& plane) noexcept {
   constexpr int kProbes = 24;
   constexpr int kEnough = 3;
-  const Vec2 from = Vec2{a.sum_column, a.sum_row} / a.area_px, to = Vec2{b.sum_column, b.sum_row} / b.area_px;
+  const Vec2 from = a.centre(), to = b.centre();
   int elsewhere = 0;
   for (int i = 0; i <= kProbes && elsewhere < kEnough; ++i) {
     const Vec2 p = from + (to - from) * (static_cast<double>(i) / kProbes);
     const auto c = static_cast<std::int32_t>(p.x() + 0.5), r = static_cast<std::int32_t>(p.y() + 0.5);
-    const float w = picture.inverse_depth_at(c, r);
+    const float w = image.inverse_depth_at(c, r);
     if (!(w > 0.0F)) continue;
-    const double expected = plane.inverse_depth(picture.rays.ray(c, r));
+    const double expected = plane.inverse_depth(image.rays.ray(c, r));
     elsewhere += expected > 1e-3 && std::abs(1.0 / static_cast<double>(w) - 1.0 / expected) > apart_m ? 1 : 0;
   }
   return elsewhere >= kEnough;
 }
 
-// That a piece is coplanar with others of a plane says little about one farther away than it is wide: another box of
-// the same height, the wall below a table. One that leaves the picture may hang together outside.
-std::uint8_t ConnectedComponents::same_plane(const FrameImage& picture, const PlaneSet& planes, const Piece& piece,
-                                             std::uint8_t source) const noexcept {
-  const bool leaves = piece.left == 0 || piece.top == 0 || piece.right + 1 == picture.column_rays.columns ||
-                      piece.bottom + 1 == picture.column_rays.height_px;
-  if (leaves) return source;
-  double nearest2 = piece.area_px;
-  std::uint8_t same = 0;
-  for (std::size_t p = 1; p <= planes.count; ++p) {
-    if (planes[p].source != source || planes[p].main_piece == 0) continue;
-    const Piece& other = pieces_[planes[p].main_piece];
-    const double across = kColumn_px * std::max({0, other.left - piece.right - 1, piece.left - other.right - 1});
-    const double down = std::max({0, other.top - piece.bottom - 1, piece.top - other.bottom - 1});
+// That a component is coplanar with others of a plane says little about one farther away than it is wide: another box
+// of the same height, the wall below a table. One that leaves the picture may hang together outside.
+RegionId ConnectedComponents::coplanar_region(const FrameImage& image, const Regions& regions,
+                                              const Component& component) const noexcept {
+  const bool leaves = component.left == 0 || component.top == 0 || component.right + 1 == image.column_rays.columns ||
+                      component.bottom + 1 == image.column_rays.height_px;
+  if (leaves) return component.plane;
+  double nearest2 = component.area_px;
+  RegionId coplanar = kNoRegion;
+  for (RegionId id = 1; id <= regions.count; ++id) {
+    const Region& region = regions[id];
+    if (region.source != component.plane || region.main_component == 0) continue;
+    const Component& other = components_[region.main_component];
+    const double across =
+        kColumn_px * std::max({0, other.left - component.right - 1, component.left - other.right - 1});
+    const double down = std::max({0, other.top - component.bottom - 1, component.top - other.bottom - 1});
     const double gap2 = across * across + down * down;
     if (gap2 >= nearest2) continue;
     nearest2 = gap2;
-    same = planes[p].same;
+    coplanar = region.coplanar;
   }
-  return same;
+  return coplanar;
 }
 
-// The largest piece of a plane keeps it. A piece apart from that becomes a surface of its own in the same plane.
-std::uint32_t ConnectedComponents::join(const Params& params, const SpanBoundaries& boundaries,
-                                        const FrameImage& picture, PlaneSet& planes) noexcept {
-  std::uint32_t without_room = 0;
-  const std::size_t fitted = planes.count;
-  for (std::size_t p = 1; p <= fitted; ++p) {
-    planes[p].source = static_cast<std::uint8_t>(p);
-    planes[p].same = static_cast<std::uint8_t>(p);
-    planes[p].main_piece = 0;
-    planes[p].piece_px = 0.0;
-  }
-  StaticVector<std::uint8_t, kMaxPieces> order;
-  for (std::size_t k = 1; k <= piece_count_; ++k) {
-    if (pieces_[k].area_px < params.min_component_px || !planes[pieces_[k].plane].alive) {
-      pieces_[k].plane = 0;
-    } else {
-      static_cast<void>(order.try_push_back(static_cast<std::uint8_t>(k)));
-    }
+ConnectedComponents::Order ConnectedComponents::large_ones(const Params& params,
+                                                           const PlaneSet& planes) const noexcept {
+  Order order;
+  for (std::size_t k = 1; k <= component_count_; ++k) {
+    if (components_[k].area_px < params.min_component_px || !planes[components_[k].plane].alive) continue;
+    static_cast<void>(order.try_push_back(static_cast<std::uint8_t>(k)));
   }
   std::sort(order.begin(), order.end(), [this](std::uint8_t a, std::uint8_t b) {
-    return pieces_[a].area_px != pieces_[b].area_px ? pieces_[a].area_px > pieces_[b].area_px : a < b;
+    const double area_a_px = components_[a].area_px, area_b_px = components_[b].area_px;
+    return area_a_px != area_b_px ? area_a_px > area_b_px : a < b;
   });
-  for (const std::uint8_t number : order) {
-    Piece& piece = pieces_[number];
-    const std::uint8_t source = piece.plane;
-    piece.plane = 0;
-    // The plane itself and those that pieces of it have become.
-    for (std::size_t p = source; p <= planes.count && piece.plane == 0; p = p == source ? fitted + 1 : p + 1) {
-      const FramePlane& plane = planes[p];
-      if (plane.source != source) continue;
-      if (plane.main_piece == 0 || !apart(params.apart_m, picture, pieces_[plane.main_piece], piece, plane.plane)) {
-        piece.plane = static_cast<std::uint8_t>(p);
-      }
-    }
-    if (piece.plane == 0) {
-      if (piece.area_px < params.min_surface_px) continue;
-      if (planes.count == PlaneSet::kMaxPlanes) {
-        ++without_room;
-        continue;
-      }
-      const std::uint8_t same = same_plane(picture, planes, piece, source);
-      planes[++planes.count] = planes[source];
-      planes[planes.count].same = same != 0 ? same : static_cast<std::uint8_t>(planes.count);
-      planes[planes.count].main_piece = 0;
-      planes[planes.count].piece_px = 0.0;
-      piece.plane = static_cast<std::uint8_t>(planes.count);
-    }
-    FramePlane& plane = planes[piece.plane];
-    if (plane.main_piece == 0) {
-      plane.main_piece = number;
-      const Vec3 ray = picture.rays.ray(piece.sum_column / piece.area_px, piece.sum_row / piece.area_px);
-      if (plane.plane.inverse_depth(ray) > 1e-3) plane.centre_m = plane.plane.point(ray);
-    }
-    plane.piece_px += piece.area_px;
+  return order;
+}
+
+RegionId ConnectedComponents::find_region(const Params& params, const FrameImage& image, RegionId first_new,
+                                          const Component& component, Regions& regions) noexcept {
+  const PlaneId source = component.plane;
+  for (RegionId id = source; id <= regions.count; id = id == source ? first_new : static_cast<RegionId>(id + 1)) {
+    const Region& region = regions[id];
+    if (region.source != source) continue;
+    if (region.main_component == 0 ||
+        !apart(params.apart_m, image, components_[region.main_component], component, region.plane))
+      return id;
   }
-  // All are judged by what all were, whatever their order.
-  std::array<bool, PlaneSet::kMaxPlanes + 1> kept{};
-  for (std::size_t p = 1; p <= planes.count; ++p) {
-    const FramePlane& plane = planes[p];
-    kept[p] = plane.alive && plane.piece_px >= params.min_surface_px &&
-              (plane.piece_px >= params.min_other_px || on_a_step(boundaries, planes, plane));
+  if (component.area_px < params.min_surface_px) return kNoRegion;
+  if (regions.count == Regions::kMaxRegions) {
+    ++region_overflow_;
+    return kNoRegion;
   }
-  for (std::size_t p = 1; p <= planes.count; ++p) planes[p].alive = kept[p];
-  for (std::size_t k = 1; k <= piece_count_; ++k)
-    pieces_[k].plane = kept[pieces_[k].plane] ? pieces_[k].plane : std::uint8_t{0};
-  return without_room;
+  const RegionId coplanar = coplanar_region(image, regions, component), id = ++regions.count;
+  Region& region = regions[id] = regions[source];
+  region.coplanar = coplanar != kNoRegion ? coplanar : id;
+  region.main_component = 0;
+  region.area_px = 0.0;
+  return id;
+}
+
+// The largest component of a plane keeps it. A component apart from that becomes a region of its own in the same plane.
+std::uint32_t ConnectedComponents::join(const Params& params, const SpanBoundaries& boundaries, const FrameImage& image,
+                                        const PlaneSet& planes, Regions& regions) noexcept {
+  region_overflow_ = 0;
+  regions.count = planes.count;
+  for (PlaneId p = 1; p <= planes.count; ++p) regions[p] = region_in(planes[p], p);
+  const auto first_new = static_cast<RegionId>(planes.count + 1);
+  for (const std::uint8_t number : large_ones(params, planes)) {
+    Component& component = components_[number];
+    component.region = find_region(params, image, first_new, component, regions);
+    if (component.region == kNoRegion) continue;
+    Region& region = regions[component.region];
+    if (region.main_component == 0) {
+      region.main_component = number;
+      const Vec2 centre = component.centre();
+      const Vec3 ray = image.rays.ray(centre.x(), centre.y());
+      if (region.plane.inverse_depth(ray) > 1e-3) region.centre_m = region.plane.point(ray);
+    }
+    region.area_px += component.area_px;
+  }
+  for (RegionId id = 1; id <= regions.count; ++id) {
+    Region& region = regions[id];
+    region.alive = region.alive && region.area_px >= params.min_surface_px &&
+                   (region.area_px >= params.min_other_px || on_a_step(boundaries, planes, region));
+  }
+  for (std::size_t k = 1; k <= component_count_; ++k) {
+    RegionId& region = components_[k].region;
+    if (!regions[region].alive) region = kNoRegion;
+  }
+  return region_overflow_;
 }
 
 }  // namespace polygmap

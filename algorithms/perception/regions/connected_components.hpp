@@ -1,53 +1,81 @@
 // SPDX-License-Identifier: Apache-2.0
-// The connected pieces of every plane's pixels, and which of them are one surface.
+// The connected components of every plane's pixels, and which of them are one region.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
+#include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/planes/plane_set.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
+#include "algorithms/perception/regions/region.hpp"
 
 namespace polygmap {
 
 class ConnectedComponents {
  public:
   struct Params {
-    double apart_m = 0.04;                // seen this far from a plane: something else is there
-    std::int32_t min_component_px = 160;  // of a piece of a surface
-    std::int32_t min_surface_px = 440;    // of a tread that meets a riser, or the reverse
-    std::int32_t min_other_px = 1500;     // of any other surface: curved things have facets of this size
+    double apart_m = 0.04;
+    std::int32_t min_component_px = 160;
+    std::int32_t min_surface_px = 440;
+    std::int32_t min_other_px = 1500;
+
+    static void visit(auto& p, auto& field) {
+      field("apart_m", p.apart_m, 0.001, 0.5, "What is seen as far from a plane is something else.");
+      field("min_component_px", p.min_component_px, 1, 100000, "A piece of a surface has as many pixels.");
+      field("min_surface_px", p.min_surface_px, 1, 100000,
+            "A tread that meets a riser, or the reverse, has as many pixels.");
+      field("min_other_px", p.min_other_px, 1, 100000,
+            "Any other surface has as many pixels: curved things have facets of this size.");
+    }
   };
 
-  // Numbers the pieces that the planes' spans form, and writes each span's number into it: 0 for those without room.
+  // Numbers the components that the planes' spans form, and writes each span's number into it: 0 for those without
+  // room.
   void find(SpanBoundaries::Columns& columns, std::int32_t column_count) noexcept;
-  // Gives every piece a plane, and planes without enough of them up. Returns how many surfaces found no room.
-  std::uint32_t join(const Params& params, const SpanBoundaries& boundaries, const FrameImage& picture,
-                     PlaneSet& planes) noexcept;
-  // Of a piece, after join: a plane that is kept, 0 = none.
-  [[nodiscard]] std::uint8_t plane_of(std::uint16_t piece) const noexcept { return pieces_[piece].plane; }
-  // Pieces that found no room.
+  // Begins regions with the planes; gives every component a region, and regions without enough of them up. Returns how
+  // many regions found no room.
+  std::uint32_t join(const Params& params, const SpanBoundaries& boundaries, const FrameImage& image,
+                     const PlaneSet& planes, Regions& regions) noexcept;
+  // Of a component, after join: a region that is kept, or none.
+  [[nodiscard]] RegionId region_of(std::uint16_t component) const noexcept { return components_[component].region; }
+  // Components that found no room.
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
 
  private:
-  static constexpr std::size_t kMaxPieces = 255;
-  struct Piece {             // a connected piece of a plane's pixels
-    std::uint8_t plane = 0;  // 1-based; 0: dropped
+  static constexpr std::size_t kMaxComponents = 255;
+  struct Component {
+    PlaneId plane = kNoPlane;
+    RegionId region = kNoRegion;
     double area_px = 0.0;
     double sum_column = 0.0, sum_row = 0.0;                 // half resolution
     std::int32_t left = 0, right = 0, top = 0, bottom = 0;  // columns and rows, inclusive
+    [[nodiscard]] Vec2 centre() const noexcept { return Vec2{sum_column, sum_row} / area_px; }
   };
-  [[nodiscard]] static bool apart(double apart_m, const FrameImage& picture, const Piece& a, const Piece& b,
-                                  const InversePlane& plane) noexcept;
-  // Of the surfaces of one fitted plane, that of the nearest which the piece belongs to; 0 = none.
-  [[nodiscard]] std::uint8_t same_plane(const FrameImage& picture, const PlaneSet& planes, const Piece& piece,
-                                        std::uint8_t source) const noexcept;
+  using Order = StaticVector<std::uint8_t, kMaxComponents>;
 
-  std::array<Piece, kMaxPieces + 1> pieces_{};
-  std::size_t piece_count_ = 0;
-  // Union-find over all intervals.
-  std::array<std::uint16_t, static_cast<std::size_t>(kColumns) * SpanBoundaries::kMaxIntervals + 1> parent_{};
-  std::uint32_t overflow_ = 0;
+  std::uint16_t link(SpanBoundaries::Columns& columns, std::int32_t column_count) noexcept;
+  void number(std::uint16_t span_count) noexcept;
+  void measure(SpanBoundaries::Columns& columns, std::int32_t column_count) noexcept;
+  // Those of living planes that are large enough, by area.
+  [[nodiscard]] Order large_ones(const Params& params, const PlaneSet& planes) const noexcept;
+  [[nodiscard]] static bool apart(double apart_m, const FrameImage& image, const Component& a, const Component& b,
+                                  const InversePlane& plane) noexcept;
+  // Of the regions of one fitted plane, that of the nearest which the component belongs to.
+  [[nodiscard]] RegionId coplanar_region(const FrameImage& image, const Regions& regions,
+                                         const Component& component) const noexcept;
+  // A region for a component: that of its plane, one from first_new on that a component of that plane has become, or a
+  // new one; none for a small component, or without room.
+  [[nodiscard]] RegionId find_region(const Params& params, const FrameImage& image, RegionId first_new,
+                                     const Component& component, Regions& regions) noexcept;
+
+  std::array<Component, kMaxComponents + 1> components_{};
+  std::size_t component_count_ = 0;
+  // Union-find over all spans.
+  std::array<std::uint16_t, static_cast<std::size_t>(kColumns) * SpanBoundaries::kMaxSpans + 1> parent_{};
+  std::uint32_t overflow_ = 0;         // components
+  std::uint32_t region_overflow_ = 0;  // of the last join
 };
 
 }  // namespace polygmap

@@ -5,16 +5,18 @@
 
 namespace polygmap {
 
-double inlier_ratio(const FrameImage& picture, const RawImage& raw, const DepthNoiseModel& noise,
-                    const FramePlane& plane, std::size_t index, const ColumnExtents& profile) noexcept {
+double inlier_ratio(const FrameImage& image, const RawImage& raw, const DepthNoiseModel& noise, const Regions& regions,
+                    RegionId id) noexcept {
   constexpr double kSigmas = 3.0;
   constexpr std::int32_t kNextPixel = 3;  // across a column from sample to sample: all eight have their turn
   const CameraIntrinsics& k = raw.intrinsics;
-  const auto stride = std::max(1, static_cast<std::int32_t>(plane.piece_px / (kColumn_px * kEvidence_px)));
-  const double most2 = kSigmas * kSigmas * plane.plane.m.squaredNorm();
+  const Region& region = regions[id];
+  const ColumnExtents& extents = regions.extents[id];
+  const auto stride = std::max(1, static_cast<std::int32_t>(region.area_px / (kColumn_px * kInlierSamples_px)));
+  const double most2 = kSigmas * kSigmas * region.plane.m.squaredNorm();
   std::int32_t seen = 0, on = 0, across = 0, skip = 0;
-  for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
-    const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
+  for (std::int32_t g = extents.first_column; g <= extents.last_column; ++g) {
+    const ColumnExtent& ends = extents.columns[static_cast<std::size_t>(g)];
     if (ends.empty()) continue;
     std::int32_t row = ends.top + skip;
     for (; row <= ends.bottom; row += stride) {
@@ -22,11 +24,11 @@ double inlier_ratio(const FrameImage& picture, const RawImage& raw, const DepthN
       const std::int32_t column = kColumn_px * g + across;
       const std::uint16_t value = raw.row(row)[column];
       // Which samples count is as good as random: nothing here branches on it.
-      const bool own = picture.owner(g, row) == index, measured = raw.range.valid(value);
+      const bool own = regions.labels.at(g, row) == id, measured = raw.range.valid(value);
       const double w = 1.0 / (value * k.depth_unit_m);
       const Vec3 ray{(column - k.cx_px) / k.fx_px,
-                     static_cast<double>(picture.column_rays.y[static_cast<std::size_t>(row)]), 1.0};
-      const double off = (w - plane.plane.m.dot(ray)) * w;
+                     static_cast<double>(image.column_rays.y[static_cast<std::size_t>(row)]), 1.0};
+      const double off = (w - region.plane.m.dot(ray)) * w;
       const int counts = static_cast<int>(own) & static_cast<int>(measured);
       seen += counts;
       on += counts & static_cast<int>(off * off < most2 * math::square(noise.inverse_sigma(w)));

@@ -38,39 +38,39 @@ bool is_upper(const CameraIntrinsics& k, const InversePlane& upper, const Invers
 
 // Of a plane, in standard deviations; more than kOff where nothing is measured.
 constexpr double kOff = 3.0;
-double residual(const FrameImage& picture, const RawImage& raw, const DepthNoiseModel& noise, const InversePlane& plane,
+double residual(const FrameImage& image, const RawImage& raw, const DepthNoiseModel& noise, const InversePlane& plane,
                 std::int32_t column, std::int32_t row) noexcept {
   const std::uint16_t depth = raw.row(row)[column];
-  if (!raw.range.valid(depth) || picture.body(column / 2, row / 2)) return 2.0 * kOff;
+  if (!raw.range.valid(depth) || image.body(column / 2, row / 2)) return 2.0 * kOff;
   const CameraIntrinsics& k = raw.intrinsics;
   const double w = 1.0 / (depth * k.depth_unit_m);
   const Vec3 ray{(column - k.cx_px) / k.fx_px, (row - k.cy_px) / k.fy_px, 1.0};
   return std::abs(w - plane.inverse_depth(ray)) * w / (plane.m.norm() * noise.inverse_sigma(w));
 }
 
-// A column without an owner may be one in which two things are seen: its pixels up to where they leave the surface that
+// A column without a label may be one in which two things are seen: its pixels up to where they leave the surface that
 // the column beside it shows are that surface's.
-std::size_t owner_beside(const FrameImage& picture, const RawImage& raw, const DepthNoiseModel& noise,
-                         const PlaneSet& planes, std::int32_t column, std::int32_t row) noexcept {
-  const std::int32_t g = column / kColumn_px, columns = picture.column_rays.columns;
-  std::size_t best = 0;
+RegionId label_beside(const FrameImage& image, const RawImage& raw, const DepthNoiseModel& noise,
+                      const Regions& regions, std::int32_t column, std::int32_t row) noexcept {
+  const std::int32_t g = column / kColumn_px, columns = image.column_rays.columns;
+  RegionId best = kNoRegion;
   double least = kOff;
   for (const std::int32_t side : {-1, 1}) {
     if (g + side < 0 || g + side >= columns) continue;
-    const std::size_t p = picture.owner(g + side, row);
-    if (p == 0 || p == best) continue;
+    const RegionId p = regions.labels.at(g + side, row);
+    if (p == kNoRegion || p == best) continue;
     bool ends_here = false;  // the column itself says in which of its rows the surface ends
     for (std::int32_t k = 1; k <= kReach_px && !ends_here; ++k) {
-      ends_here = picture.owner(g, std::max(row - k, 0)) == p ||
-                  picture.owner(g, std::min(row + k, picture.column_rays.height_px - 1)) == p;
+      ends_here = regions.labels.at(g, std::max(row - k, 0)) == p ||
+                  regions.labels.at(g, std::min(row + k, image.column_rays.height_px - 1)) == p;
     }
     if (ends_here) continue;
     const std::int32_t nearest = side < 0 ? kColumn_px * g : kColumn_px * g + kColumn_px - 1;
     std::int32_t off = 0;
     for (std::int32_t c = nearest; c != column && off < 2; c -= side) {
-      off += residual(picture, raw, noise, planes[p].plane, c, row) < kOff ? 0 : 1;
+      off += residual(image, raw, noise, regions[p].plane, c, row) < kOff ? 0 : 1;
     }
-    const double own = residual(picture, raw, noise, planes[p].plane, column, row);
+    const double own = residual(image, raw, noise, regions[p].plane, column, row);
     if (off >= 2 || !(own < least)) continue;
     least = own;
     best = p;
@@ -80,23 +80,26 @@ std::size_t owner_beside(const FrameImage& picture, const RawImage& raw, const D
 
 }  // namespace
 
-std::size_t pixel_label(const FrameImage& picture, const RawImage& raw, const DepthNoiseModel& noise,
-                        const PlaneSet& planes, std::int32_t column, std::int32_t row) noexcept {
+RegionId pixel_label(const FrameImage& image, const RawImage& raw, const DepthNoiseModel& noise, const Regions& regions,
+                     const PublishedSurfaces& published, std::int32_t column, std::int32_t row) noexcept {
   const std::int32_t g = column / kColumn_px;
   const double middle_px = kColumn_px * g + 0.5 * (kColumn_px - 1);
-  const std::size_t own = picture.owner(g, row);
-  if (own == 0) return raw.depth != nullptr ? owner_beside(picture, raw, noise, planes, column, row) : 0;
+  const RegionId own = regions.labels.at(g, row);
+  if (own == kNoRegion) {
+    return raw.depth != nullptr ? label_beside(image, raw, noise, regions, column, row) : kNoRegion;
+  }
   for (std::int32_t k = 1; k <= kReach_px; ++k) {
     for (const std::int32_t side : {k, -k}) {
-      if (row + side < 0 || row + side >= picture.column_rays.height_px) continue;
-      const std::size_t other = picture.owner(g, row + side);
+      if (row + side < 0 || row + side >= image.column_rays.height_px) continue;
+      const RegionId other = regions.labels.at(g, row + side);
       if (other == own) continue;
-      if (other == 0) return own;
+      if (other == kNoRegion) return own;
       const bool below = side > 0;
-      const FramePlane &upper = planes[below ? own : other], &lower = planes[below ? other : own];
+      const RegionId above = below ? own : other;
+      const Region &upper = regions[above], &lower = regions[below ? other : own];
       const std::int32_t last_upper = below ? row + side - 1 : row + side;
       // A nosing knows more than where two planes meet: what its own rows say, too.
-      const double nosing = lower.kind == SurfaceKind::kRiser ? row_of(raw.intrinsics, upper.nosing, column)
+      const double nosing = lower.kind == SurfaceKind::kRiser ? row_of(raw.intrinsics, published[above].nosing, column)
                                                               : std::numeric_limits<double>::quiet_NaN();
       const bool of_upper =
           std::abs(nosing - (last_upper + 0.5)) < kNosing_px

@@ -13,8 +13,10 @@
 #include <optional>
 #include <ostream>
 
+#include "firmware/config/param_file.hpp"
 #include "sim_stub/host/cli/estimate_command.hpp"
 #include "sim_stub/host/cli/obstacle_options.hpp"
+#include "sim_stub/host/cli/params_command.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
 
@@ -41,6 +43,7 @@ struct ClimbArguments {
   bool no_mount_estimate = false;
   std::string camera;
   std::vector<std::string> pushes;
+  const CLI::App* said = nullptr;  // which options were
 };
 
 // CLI11 2.1 lets -1 and 2^64 wrap around.
@@ -102,6 +105,9 @@ void declare(CLI::App& climb, ClimbArguments& a) {
                   "How far the depths' scale may be off, unknown to the module: share of the depth")
       ->capture_default_str();
 
+  climb.add_option("--params", a.options.params_file, "Parameters of the module; other options go before what it says")
+      ->type_name("PARAMS.toml");
+
   // What the camera shows may differ from what the robot stands on: shows that the module lives on what it sees.
   const std::string causality = "causality (experiments on what the module sees)";
   climb.add_option("--render-shift", a.render_shift_m, "Shift of the rendered staircase, m")
@@ -137,8 +143,24 @@ std::optional<Push> read_push(const std::string& text) {
   return push;
 }
 
+// What the file says holds where no option says otherwise. Throws config::FileError.
+void take_params(ClimbArguments& a) {
+  if (a.options.params_file.empty()) return;
+  Params& params = a.options.params;
+  config::read_params(a.options.params_file, params);
+  if (a.said->count("--gait") == 0) a.gait = name_of(params.gait.planner.pattern);
+  if (a.said->count("--contacts") == 0 && params.estimator.infer_forces) a.contacts = "inferred";
+  a.no_self_filter |= !params.self_filter;
+  a.no_mount_estimate |= !params.estimate_mount;
+}
+
 // Empty when the arguments are good, else one sentence. Completes the options.
 std::string complaint(ClimbArguments& a) {
+  try {
+    take_params(a);
+  } catch (const config::FileError& error) {
+    return error.what();
+  }
   const StairParams& stairs = a.options.stairs;
   if (stairs.steps < 1 || stairs.steps > kMaxSteps) {
     return "--steps must be from 1 to " + std::to_string(kMaxSteps) + ", not " + std::to_string(stairs.steps) + ".";
@@ -302,10 +324,13 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   ClimbArguments a;
   a.options.out_dir = "climb_out";
   declare(*climb, a);
+  a.said = climb;
   PerceiveArguments perceive_arguments;
   CLI::App* perceive = declare_perceive(app, perceive_arguments);
   EstimateArguments estimate_arguments;
   CLI::App* estimate = declare_estimate(app, estimate_arguments);
+  ParamsArguments params_arguments;
+  CLI::App* params = declare_params(app, params_arguments);
   for (CLI::App* command : {climb, perceive, estimate}) {
     for (CLI::Option* option : command->get_options()) option->check(not_empty);
   }
@@ -319,13 +344,14 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
-    constexpr std::array<std::string_view, 3> kCommands{"climb", "perceive", "estimate"};
+    constexpr std::array<std::string_view, 4> kCommands{"climb", "perceive", "estimate", "params"};
     const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
     err << "polygmap: " << error.what() << "; see polygmap " << (named ? arguments[0] + " " : "") << "--help.\n";
     return kExitUsage;
   }
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);
   if (estimate->parsed()) return run_estimate(estimate_arguments, out, err);
+  if (params->parsed()) return run_params(params_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
     err << "polygmap: A subcommand is required; see polygmap --help.\n";
     return kExitUsage;

@@ -7,7 +7,8 @@
 #include <ostream>
 #include <set>
 
-#include "firmware/config/camera_file.hpp"
+#include "firmware/config/param_file.hpp"
+#include "firmware/params.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/estimate/estimate_report.hpp"
@@ -19,7 +20,7 @@ constexpr double kMaxMount_m = 10.0, kMaxAngle_deg = 360.0, kMaxTau_s = 1000.0;
 
 std::string complaint(const EstimateArguments& a) {
   std::set<std::string> taken;  // nothing that is read, and nothing written for another option, is overwritten
-  for (const std::string& file : {a.log, a.lio, a.json, a.csv}) {
+  for (const std::string& file : {a.log, a.lio, a.params, a.json, a.csv}) {
     if (file.empty()) continue;
     const bool fresh = taken.insert(one_name(file)).second;
     if (!fresh && (file == a.json || file == a.csv)) return "\"" + file + "\" would be overwritten.";
@@ -38,14 +39,21 @@ std::string complaint(const EstimateArguments& a) {
 
 ReplayOptions options_of(const EstimateArguments& a) {
   ReplayOptions options;
+  Params params;
+  static_cast<ProprioceptiveOdometry::Params&>(params.estimator) = options.odometry;
+  params.robot = options.robot;
+  if (!a.params.empty()) config::read_params(a.params, params);
+  options.odometry = params.estimator;
+  options.robot = params.robot;
+  options.params_hash = config::hash_of(params);
   if (a.lio_tau_s > 0.0) {
     options.odometry.fusion.tau_s = a.lio_tau_s;
     options.odometry.fusion.tau_spm = 0.0;
   }
   if (!a.lidar_mount.empty()) {
     const auto rad = [&a](std::size_t i) { return a.lidar_mount[i] * kPi / 180.0; };
-    options.odometry.fusion.base_T_lidar = {rotation_zyx(rad(5), rad(4), rad(3)),
-                                            Vec3{a.lidar_mount[0], a.lidar_mount[1], a.lidar_mount[2]}};
+    options.robot.mounts.base_T_lidar = {rotation_zyx(rad(5), rad(4), rad(3)),
+                                         Vec3{a.lidar_mount[0], a.lidar_mount[1], a.lidar_mount[2]}};
   }
   return options;
 }
@@ -114,6 +122,9 @@ CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
           "--lio-tau", a.lio_tau_s,
           "Time constant of the offset's low-pass, s; 0: 0.4 s per mm of LIO's noise as measured, 1 s at least")
       ->type_name("TAU");
+  estimate
+      ->add_option("--params", a.params, "Parameters of the module; of the estimator, the odometry's, and of the robot")
+      ->type_name("PARAMS.toml");
   estimate->add_option("--json", a.json, "Scores, biases, innovations, rejections")->type_name("OUT.json");
   estimate->add_option("--csv", a.csv, "Pose, twist, sigmas, contact probabilities, LIO's age, row by row")
       ->type_name("OUT.csv");
@@ -128,10 +139,11 @@ int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& er
   try {
     const EstimateLog log = read_estimate_log(a.log);
     const std::vector<LioRow> lio = a.lio.empty() ? std::vector<LioRow>{} : read_lio_log(a.lio, log.start_s);
-    const Replay result = replay(log, lio, options_of(a));
+    const ReplayOptions options = options_of(a);
+    const Replay result = replay(log, lio, options);
     if (!is_finite(result))
       throw config::FileError("\"" + a.log + "\": the estimate is not finite, so nothing is written.");
-    if (!a.json.empty()) write_estimate_json(a.json, log, lio, result);
+    if (!a.json.empty()) write_estimate_json(a.json, log, lio, result, options.params_hash);
     if (!a.csv.empty()) write_estimate_csv(a.csv, log, result);
     print(log, result, out);
     if (!a.lio.empty()) print_lio(result, lio.size(), out);

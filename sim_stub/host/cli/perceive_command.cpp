@@ -11,6 +11,8 @@
 #include <set>
 #include <utility>
 
+#include "firmware/config/param_file.hpp"
+#include "firmware/params.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/perceive/perceive.hpp"
@@ -39,6 +41,7 @@ std::string complaint(const PerceiveArguments& a) {
   }
   // Nothing that is read, and nothing written for another option, is overwritten.
   std::set<std::string> taken{one_name(a.camera)};
+  if (!a.params.empty()) taken.insert(one_name(a.params));
   for (const std::string& path : a.depth) taken.insert(one_name(path));
   for (const std::string& path : a.depth) {
     const std::array<std::pair<std::string, const char*>, 3> outputs{
@@ -65,9 +68,30 @@ void make_folders(const std::vector<std::string>& folders) {
   }
 }
 
+struct Tuning {
+  std::string hash;
+  polygmap_frames::Values values;
+};
+// Of the surfaces' parameters, but for noise and range, which the camera's file says. Throws config::FileError.
+Tuning tuning_of(const PerceiveArguments& a) {
+  Params params, defaults;
+  if (!a.params.empty()) config::read_params(a.params, params);
+  const config::ParamTable table = config::param_table(params), usual = config::param_table(defaults);
+  const std::string surfaces = "surfaces.";
+  Tuning tuning{config::hash_of(table), {}};
+  for (std::size_t i = 0; i < table.params.size(); ++i) {
+    const config::Param& param = table.params[i];
+    if (!param.name.starts_with(surfaces) || config::same_value(param, usual.params[i])) continue;
+    const std::string name = param.name.substr(surfaces.size());
+    if (name.starts_with("noise.") || name.starts_with("limits.")) continue;
+    tuning.values.emplace_back(name, config::number_of(param));
+  }
+  return tuning;
+}
+
 // The line that says what was found. Throws config::FileError.
-std::string one_picture(const PerceiveArguments& a, const config::CameraProfile& camera, const std::string& path,
-                        bool several) {
+std::string one_picture(const PerceiveArguments& a, const config::CameraProfile& camera, const Tuning& tuning,
+                        const std::string& path, bool several) {
   const DepthPng picture = read_depth(path);
   const std::string own = size_text(picture.width_px, picture.height_px);
   const std::string expected = size_text(camera.intrinsics.width_px, camera.intrinsics.height_px);
@@ -75,9 +99,9 @@ std::string one_picture(const PerceiveArguments& a, const config::CameraProfile&
     throw config::FileError("\"" + path + "\" is " + own + ", but the camera file says " + expected + ".");
   std::optional<Vec3> gravity;
   if (!a.gravity.empty()) gravity = Vec3{a.gravity[0], a.gravity[1], a.gravity[2]};
-  Perceived perceived = perceive(camera, picture, gravity, a.repeat);
+  Perceived perceived = perceive(camera, picture, gravity, a.repeat, tuning.values);
   if (!a.labels.empty()) write_labels(place(a.labels, path, several, kLabels), picture, perceived);
-  if (!a.json.empty()) write_planes(place(a.json, path, several, kPlanes), perceived);
+  if (!a.json.empty()) write_planes(place(a.json, path, several, kPlanes), perceived, tuning.hash);
   if (!a.picture.empty()) write_picture(place(a.picture, path, several, kPicture), camera, picture, perceived);
   std::vector<double>& times = perceived.microseconds;
   std::sort(times.begin(), times.end());
@@ -108,6 +132,9 @@ CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
       ->expected(3)
       ->allow_extra_args(false)  // the pictures may follow
       ->type_name("X Y Z");
+  perceive
+      ->add_option("--params", a.params, "Parameters of the module; of the surfaces, but the camera's noise and range")
+      ->type_name("PARAMS.toml");
   const std::string folder = "; a folder when there are several pictures";
   perceive->add_option("--labels", a.labels, "Each pixel's plane, 0 = none" + folder)->type_name("OUT.png");
   perceive->add_option("--json", a.json, "The planes" + folder)->type_name("OUT.json");
@@ -129,7 +156,9 @@ int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& er
     code = kExitUsage;
   };
   config::CameraProfile camera;
+  Tuning tuning;
   try {
+    tuning = tuning_of(a);
     camera = config::read_camera(a.camera);
     if (several) make_folders({a.labels, a.json, a.picture});
   } catch (const std::exception& error) {
@@ -138,7 +167,7 @@ int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& er
   }
   for (const std::string& path : a.depth) {
     try {
-      out << one_picture(a, camera, path, several) << std::flush;
+      out << one_picture(a, camera, tuning, path, several) << std::flush;
     } catch (const std::exception& error) {
       complain(error);
     }

@@ -14,7 +14,7 @@ namespace polygmap::sim {
 
 struct PerceiveArguments {
   std::vector<std::string> depth;
-  std::string camera;
+  std::string camera, params;
   std::vector<double> gravity;
   std::string labels, json, picture;
   int repeat = 1;

@@ -7,10 +7,12 @@
 #include <memory>
 #include <optional>
 
+#include "firmware/config/param_table.hpp"
 #include "firmware/pipeline.hpp"
 #include "scheduler/cyclic_executive.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "sim_stub/host/climb/climb_report.hpp"
+#include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/sim_robot.hpp"
 #include "sim_stub/world/clearance.hpp"
 
@@ -141,12 +143,12 @@ std::vector<ScheduleRow> schedule_of(const Executive& executive, const TimedPipe
 CameraFigures camera_figures(const SimRobot& robot, const CameraExtrinsicsEstimator& mount) {
   constexpr double kDegrees = 180.0 / kPi;
   const RobotErrors& errors = robot.errors();
-  const Mat3 turn = errors.base_T_camera.R * base_T_camera().R.transpose();
+  const Mat3 turn = errors.base_T_camera.R * nominal_robot().mounts.base_T_camera.R.transpose();
   CameraFigures f;
   f.scan_ms = 1e3 * robot.depth_camera().scan_s();
   f.scale_error = errors.depth_scale - 1.0;
   f.mount_error_deg = kDegrees * Vec3{std::atan2(turn(2, 1), turn(2, 2)), -std::asin(turn(2, 0)), yaw_of(turn)};
-  f.mount_error_m = errors.base_T_camera.p_m - base_T_camera().p_m;
+  f.mount_error_m = errors.base_T_camera.p_m - nominal_robot().mounts.base_T_camera.p_m;
   f.mount_found_deg = kDegrees * Vec2{mount.roll_rad(), mount.pitch_rad()};
   f.mount_found_height_m = mount.height_m();
   f.mount_found_ahead_m = mount.ahead_m();
@@ -174,7 +176,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   heap::reset();
 
   SimRobot robot(sim_options(options));
-  Params params;
+  Params params = options.params;
   params.gait.planner.pattern = options.gait;
   params.self_filter = options.self_filter;
   params.estimator.infer_forces = options.infer_contacts;
@@ -220,6 +222,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
 
   RunFigures figures;
   figures.options = options;
+  figures.params_hash = config::hash_of(params);
   figures.camera = camera_figures(robot, pipeline.perception().mount());
   figures.heap_calls = heap::report().calls;
   figures.faults = raised(module->pipeline->health());

@@ -9,13 +9,16 @@
 
 #include "algorithms/gait/footsteps/climb_planner.hpp"
 #include "firmware/config/camera_file.hpp"
+#include "firmware/params.hpp"
 #include "sim_stub/camera/noise_kind.hpp"
 #include "sim_stub/plant/plant.hpp"
 #include "sim_stub/world/stair_world.hpp"
 
 namespace polygmap::sim {
 
-[[nodiscard]] inline std::string name_of(GaitPattern gait) { return gait == GaitPattern::kSingleStep ? "ss" : "ds"; }
+[[nodiscard]] inline std::string name_of(GaitPattern gait) {
+  return std::string(kGaitPatternNames[static_cast<std::size_t>(gait)]);
+}
 
 struct ClimbOptions {
   StairParams stairs;
@@ -38,6 +41,9 @@ struct ClimbOptions {
   double scan_ms = 16.0;                        // one exposure, top to bottom; SimDepthCamera rounds it
   double mount_error_deg = 1.0;                 // roll, pitch, yaw; and 3 mm per degree in each direction
   double scale_error = 0.003;
+  // The module's parameters; what else is said here of the module goes before.
+  Params params;
+  std::string params_file;  // that they were read from
   bool estimate_mount = true;
   bool infer_contacts = false;  // from joint torques: the feet have no force sensors
 };

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -27,10 +27,8 @@ Json spread_mm(const Spread& s) { return {{"median", mm(s.median)}, {"max", mm(s
 Json spread_ms(const Spread& s) { return {{"median", ms(s.median)}, {"max", ms(s.max)}}; }
 
 Json per_joint(const std::array<double, kJointsPerLeg>& ratio) {
-  constexpr std::array<const char*, kJointsPerLeg> kNames{"hip_roll", "hip_yaw",     "hip_pitch",
-                                                          "knee",     "ankle_pitch", "ankle_roll"};
   Json j = Json::object();
-  for (std::size_t i = 0; i < kJointsPerLeg; ++i) j[kNames[i]] = rounded(ratio[i], 1e3);
+  for (std::size_t i = 0; i < kJointsPerLeg; ++i) j[std::string(kLegJointNames[i])] = rounded(ratio[i], 1e3);
   return j;
 }
 
@@ -79,6 +77,7 @@ Json arguments_json(const ClimbOptions& o) {
                {"scan_ms", o.scan_ms},
                {"mount_error_deg", o.mount_error_deg},
                {"scale_error", o.scale_error},
+               {"params", o.params_file.empty() ? Json(nullptr) : Json(o.params_file)},
                {"estimate_mount", o.estimate_mount},
                {"self_filter", o.self_filter},
                {"contacts", o.infer_contacts ? "inferred" : "sensed"},
@@ -128,6 +127,7 @@ Json to_json(const ClimbSummary& s) {
   j["gait"] = name_of(s.options.gait);
   j["seed"] = s.options.seed;
   j["arguments"] = arguments_json(s.options);
+  j["params_hash"] = s.params_hash;
   const CameraFigures& camera = s.camera;
   const auto degrees = [](double x) { return rounded(x, 1e3); };
   j["camera"] = {
@@ -162,8 +162,11 @@ Json to_json(const ClimbSummary& s) {
   j["zmp_margin_mm_min"] = mm(s.zmp_margin_min_m);
   j["torque_peak_ratio"] = per_joint(s.torque_peak_ratio);
   j["joint_speed_peak_ratio"] = per_joint(s.joint_speed_peak_ratio);
-  j["odometry_rmse_mm"] = {
-      {"base", mm(s.odometry_rmse_base_m)}, {"lio", mm(s.odometry_rmse_lio_m)}, {"fused", mm(s.odometry_rmse_fused_m)}};
+  const OdometryFigures& o = s.odometry;
+  j["odometry_rmse_mm"] = {{"base", mm(o.rmse_base_m)}, {"lio", mm(o.rmse_lio_m)}, {"fused", mm(o.rmse_fused_m)}};
+  j["odometry_drift_mm"] = {{"base", mm(o.drift_base_m)}, {"fused", mm(o.drift_fused_m)}};
+  j["odometry_jitter_mm"] = {{"lio", mm(o.jitter_lio_m)}, {"fused", mm(o.jitter_fused_m)}};
+  j["odometry_nees"] = {{"mean", rounded(o.nees_mean, 100.0)}, {"in_bounds", rounded(o.nees_in_bounds, 1e3)}};
   j["exposure_to_map_ms"] = spread_ms(s.exposure_to_map_ms);
   j["map_age_at_latch_ms"] = spread_ms(s.map_age_at_latch_ms);
   j["target_last_seen_ms"] = spread_ms(s.target_last_seen_ms);

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <span>
 
-#include "algorithms/robot/model.hpp"
+#include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -145,12 +145,13 @@ std::array<Vec3, 4> rectangle_m(const Transform& T, double heel_x_m, double toe_
 
 // From above the contact rectangle; from the side the foot's box standing on its sole.
 std::array<Vec3, 4> foot_outline_m(const View& view, const Transform& true_T_sole) {
+  const SoleModel& sole = nominal_robot().sole;
   if (view.up == 1) {
-    return rectangle_m(true_T_sole, kContactRectangle.heel_x_m, kContactRectangle.toe_x_m,
-                       true_T_sole.R.col(1) * kContactRectangle.half_width_m);
+    const SoleRectangle& contact = sole.contact;
+    return rectangle_m(true_T_sole, contact.heel_x_m, contact.toe_x_m, true_T_sole.R.col(1) * contact.half_width_m);
   }
-  const Vec3 up_m = true_T_sole.R.col(2) * (0.5 * kCollisionHeight_m);
-  std::array<Vec3, 4> box = rectangle_m(true_T_sole, kCollisionRectangle.heel_x_m, kCollisionRectangle.toe_x_m, up_m);
+  const Vec3 up_m = true_T_sole.R.col(2) * (0.5 * sole.collision_height_m);
+  std::array<Vec3, 4> box = rectangle_m(true_T_sole, sole.collision.heel_x_m, sole.collision.toe_x_m, up_m);
   for (Vec3& corner_m : box) corner_m += up_m;
   return box;
 }
@@ -172,7 +173,7 @@ void add_footsteps(std::string& out, const View& view, const std::vector<Footste
   if (view.up != 1 || view.scale_pxpm < kLabelScale_pxpm) return;
   for (const Footstep& f : footsteps) {
     if (!f.landed || !std::isfinite(f.sole_margin_m)) continue;
-    const Vec3 centre_m = f.true_T_landed * Vec3(kContactRectangle.centre_x_m(), 0, 0);
+    const Vec3 centre_m = f.true_T_landed * Vec3(nominal_robot().sole.contact.centre_x_m(), 0, 0);
     std::string margin;
     add(margin, "%.1f", f.sole_margin_m * 1e3);
     char style[120];
@@ -383,8 +384,8 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
                value("execution error max", s.execution_error_m.max * 1e3, "mm") + "   \u00b7   " +
                value("sole margin min", s.sole_margin_min_m * 1e3, "mm") + "   \u00b7   " +
                value("swing clearance min", s.swing_clearance_min_m * 1e3, "mm") + "   \u00b7   " +
-               value("odometry RMSE base / fused", s.odometry_rmse_base_m * 1e3, "") +
-               value("/", s.odometry_rmse_fused_m * 1e3, "mm") + "   \u00b7   " +
+               value("odometry RMSE base / fused", s.odometry.rmse_base_m * 1e3, "") +
+               value("/", s.odometry.rmse_fused_m * 1e3, "mm") + "   \u00b7   " +
                value("planes", s.plane_rate_hz, "Hz"));
 
   add_text(out, kBorder_px, side_top_px - 8.0, 13.0, "font-weight=\"600\" fill=\"#555\"", "Side");

@@ -17,7 +17,7 @@ std::string why_stopped(StopReason reason, double measured_m) {
     case StopReason::kNone:
       return "it gave no reason";
     case StopReason::kNothingSeen:
-      return "it saw no surface to step on";
+      return "it saw no surface to step on, or too little of the next one";
     case StopReason::kNoStaircase:
       return "it saw level ground and no higher tread";
     case StopReason::kTop:

@@ -85,7 +85,7 @@ class LogReplay {
  public:
   LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log), options_(options) {
     felt_.stamp_ns = -1;
-    odometry_.reset(options.odometry);
+    odometry_.reset(options.odometry, options.robot);
     contacts_.reset({});
     imu_noise_.reset();
     begin();
@@ -233,13 +233,18 @@ ProprioceptiveOdometry::Params log_params() {
   // How much contacts creep is soon found out, where nothing is known of the feet.
   params.attitude.contact_walk_mprs = 1e-2;
   params.attitude.whiteness_start_gain = params.attitude.whiteness_gain_ps = 2.0;
-  params.fusion.base_T_lidar = {};
   params.fusion.uncertainty.initial_sigma_m = 1e-4;  // the start is the truth's, or defined there
   params.fusion.uncertainty.initial_sigma_rad = 1e-4;
   // As the module's 4 s are to its lidar's 10 mm: what comes through grows with LIO's noise, drift does not.
   params.fusion.tau_s = 1.0;
   params.fusion.tau_spm = 400.0;
   return params;
+}
+
+RobotModel log_robot() {
+  RobotModel robot;
+  robot.mounts.base_T_lidar = {};
+  return robot;
 }
 
 bool is_finite(const Replay& replay) {

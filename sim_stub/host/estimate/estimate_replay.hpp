@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "algorithms/estimation/proprioceptive_odometry.hpp"
@@ -13,9 +14,13 @@ namespace polygmap::sim {
 
 // The module's, but for what no data sheet says of a robot that is only known by its log.
 [[nodiscard]] ProprioceptiveOdometry::Params log_params();
+// Of which a log needs the lidar mount alone: none, LIO gives the base's pose.
+[[nodiscard]] RobotModel log_robot();
 
 struct ReplayOptions {
-  ProprioceptiveOdometry::Params odometry = log_params();  // its lidar mount: none, LIO gives the base's pose
+  std::string params_hash;  // of what --params says, before the other options
+  ProprioceptiveOdometry::Params odometry = log_params();
+  RobotModel robot = log_robot();
   // One sigma, where no standstill at the start says what they are.
   double gyro_bias_sigma_radps = 0.01, accel_bias_sigma_mps2 = 0.2;
 };

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <string>
+#include <string_view>
+#include <utility>
 
 #include "algorithms/perception/surface_extractor.hpp"
 
@@ -24,9 +27,32 @@ double least_noise_scale(const DepthNoiseModel& noise) {
   return math::clamp(DepthNoiseModel{}.sigma_m(kDepth_m) / noise.sigma_m(kDepth_m), 0.5, 1.0);
 }
 
+// Walks a field list of the parameters (firmware/config/param_table.hpp) and sets what is named.
+class Assign {
+ public:
+  explicit Assign(const polygmap_frames::Values& values, std::string prefix = "")
+      : values_(values), prefix_(std::move(prefix)) {}
+  template <class T>
+  void operator()(std::string_view name, T& field, double, double, std::string_view) {
+    for (const auto& [key, value] : values_) {
+      if (key == prefix_ + std::string(name)) field = static_cast<T>(value);
+    }
+  }
+  template <class T>
+  void operator()(std::string_view name, T& field) {
+    Assign inner(values_, prefix_ + std::string(name) + ".");
+    T::visit(field, inner);
+  }
+  void ordered(std::string_view, std::string_view) {}
+
+ private:
+  const polygmap_frames::Values& values_;
+  std::string prefix_;
+};
+
 class FrameExtractor final : public polygmap_frames::Extractor {
  public:
-  explicit FrameExtractor(const Camera& c) {
+  FrameExtractor(const Camera& c, const polygmap_frames::Values& values) {
     params_.noise = {c.noise_base_m, c.noise_per_metre, c.noise_quadratic_per_m, c.noise_correlated_share,
                      c.noise_correlated_px};
     params_.depth_noise.gain = 0.5;
@@ -34,10 +60,13 @@ class FrameExtractor final : public polygmap_frames::Extractor {
     params_.limits = {c.min_depth_m, c.max_depth_m};
     // What fills an eighth of a picture is a surface, however few pixels the picture has.
     const std::int32_t eighth_px = c.width_px * c.height_px / 8;
-    for (std::int32_t* least_px : {&params_.growing.min_plane_px, &params_.growing.min_facet_px,
-                                   &params_.pieces.min_surface_px, &params_.pieces.min_other_px}) {
+    for (std::int32_t* least_px :
+         {&params_.planes.growing.min_plane_px, &params_.planes.growing.min_facet_px,
+          &params_.regions.components.min_surface_px, &params_.regions.components.min_other_px}) {
       *least_px = std::min(*least_px, eighth_px);
     }
+    Assign assign(values);
+    SurfaceExtractor::Params::visit(params_, assign);
     extractor_.configure(params_);
     view_.intrinsics = {c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.depth_unit_m};
     view_.body_margin = {};
@@ -96,8 +125,9 @@ class FrameExtractor final : public polygmap_frames::Extractor {
 
 bool holds(const Camera& camera) { return camera.width_px <= kDepthWidth_px && camera.height_px <= kDepthHeight_px; }
 
-std::unique_ptr<polygmap_frames::Extractor> make_extractor(const Camera& camera) {
-  return std::make_unique<FrameExtractor>(camera);
+std::unique_ptr<polygmap_frames::Extractor> make_extractor(const Camera& camera,
+                                                           const polygmap_frames::Values& values) {
+  return std::make_unique<FrameExtractor>(camera, values);
 }
 
 }  // namespace polygmap

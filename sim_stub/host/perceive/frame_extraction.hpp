@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace polygmap_frames {
@@ -24,6 +26,9 @@ struct Camera {  // as CameraIntrinsics, DepthLimits and DepthNoiseModel have it
   double noise_base_m = 0.0, noise_per_metre = 0.0, noise_quadratic_per_m = 0.0;
   double noise_correlated_share = 0.0, noise_correlated_px = 0.0;
 };
+
+// Numbers of SurfaceExtractor::Params that are not the default, by their names in the table of parameters.
+using Values = std::vector<std::pair<std::string, double>>;
 
 enum class Kind : std::uint8_t { kTread, kRiser, kOther };
 
@@ -54,9 +59,11 @@ class Extractor {
 
 namespace polygmap {
 [[nodiscard]] bool holds(const polygmap_frames::Camera& camera);
-[[nodiscard]] std::unique_ptr<polygmap_frames::Extractor> make_extractor(const polygmap_frames::Camera& camera);
+[[nodiscard]] std::unique_ptr<polygmap_frames::Extractor> make_extractor(const polygmap_frames::Camera& camera,
+                                                                         const polygmap_frames::Values& values = {});
 }  // namespace polygmap
 
 namespace polygmap_1024x768 {
-[[nodiscard]] std::unique_ptr<polygmap_frames::Extractor> make_extractor(const polygmap_frames::Camera& camera);
+[[nodiscard]] std::unique_ptr<polygmap_frames::Extractor> make_extractor(const polygmap_frames::Camera& camera,
+                                                                         const polygmap_frames::Values& values = {});
 }  // namespace polygmap_1024x768

@@ -53,7 +53,7 @@ Eigen::Matrix4d plane_covariance(const Surface& surface) {
 
 class Extraction {
  public:
-  Extraction(const config::CameraProfile& profile, const DepthPng& picture) {
+  Extraction(const config::CameraProfile& profile, const DepthPng& picture, const polygmap_frames::Values& values) {
     const CameraIntrinsics& k = profile.intrinsics;
     const DepthNoiseModel& noise = profile.noise;
     // Whole columns of eight pixels and pairs of rows: what is left over at the right and below is not looked at.
@@ -75,7 +75,7 @@ class Extraction {
       const auto row = picture.depth.begin() + static_cast<std::ptrdiff_t>(r) * picture.width_px;
       depth_.insert(depth_.end(), row, row + camera_.width_px);
     }
-    extractor_ = holds(camera_) ? make_extractor(camera_) : polygmap_1024x768::make_extractor(camera_);
+    extractor_ = holds(camera_) ? make_extractor(camera_, values) : polygmap_1024x768::make_extractor(camera_, values);
   }
   // A camera delivers many frames; here one has to say by itself how noisy it is.
   void settle_noise(const Vec3& up) {
@@ -156,8 +156,8 @@ DepthPng read_depth(const std::string& path) {
 }
 
 Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture, const std::optional<Vec3>& gravity,
-                   int repeat) {
-  Extraction extraction(camera, picture);
+                   int repeat, const polygmap_frames::Values& values) {
+  Extraction extraction(camera, picture, values);
   Perceived out;
   if (gravity) {
     out.camera_up = -gravity->normalized();
@@ -204,7 +204,7 @@ void write_labels(const std::string& path, const DepthPng& picture, const Percei
   save(path, bytes);
 }
 
-void write_planes(const std::string& path, const Perceived& perceived) {
+void write_planes(const std::string& path, const Perceived& perceived, const std::string& params_hash) {
   Json planes = Json::array();
   for (std::size_t i = 0; i < perceived.planes.size(); ++i) {
     const PerceivedPlane& pieces = perceived.planes[i];
@@ -228,7 +228,7 @@ void write_planes(const std::string& path, const Perceived& perceived) {
     planes.push_back(j);
   }
   std::ofstream file(path);
-  file << Json{{"planes", planes}, {"up", point(perceived.camera_up)}}.dump(1) << "\n";
+  file << Json{{"planes", planes}, {"up", point(perceived.camera_up)}, {"params_hash", params_hash}}.dump(1) << "\n";
   file.close();
   if (!file) fail("Cannot write \"" + path + "\".");
 }

@@ -37,11 +37,12 @@ struct Perceived {
 
 // gravity: down, camera frame; without it, the largest plane that looks level says where up is.
 [[nodiscard]] Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture,
-                                 const std::optional<Vec3>& gravity, int repeat);
+                                 const std::optional<Vec3>& gravity, int repeat,
+                                 const polygmap_frames::Values& values = {});
 
 // Throw config::FileError when the file cannot be written.
 void write_labels(const std::string& path, const DepthPng& picture, const Perceived& perceived);
-void write_planes(const std::string& path, const Perceived& perceived);
+void write_planes(const std::string& path, const Perceived& perceived, const std::string& params_hash);
 void write_picture(const std::string& path, const config::CameraProfile& camera, const DepthPng& picture,
                    const Perceived& perceived);
 

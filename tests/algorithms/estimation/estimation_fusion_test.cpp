@@ -6,6 +6,7 @@
 #include "algorithms/estimation/lidar/lio_fusion.hpp"
 #include "algorithms/estimation/state_history.hpp"
 #include "algorithms/geometry/so3.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -53,7 +54,7 @@ TEST(FusionEquations, Eq10_GainOfZeroAndOne_AreTheTwoPoses) {
 
 class FusionTest : public ::testing::Test {
  protected:
-  void SetUp() override { fusion_.reset(params_); }
+  void SetUp() override { fusion_.reset(params_, mount_); }
 
   // One LIO pose of the true base, now; the odometry's pose of the same moment beside it.
   LioVerdict feed(const Transform& true_T_base, const Transform& odom_T_base) {
@@ -76,6 +77,7 @@ class FusionTest : public ::testing::Test {
   static constexpr double kLioSigma_m = 0.01, kLioSigma_rad = 0.0035;
   LioFusion::Params params_;
   LioFusion fusion_;
+  Transform mount_ = base_T_lidar();
   Transform lio_T_true_{rotation_z(2.0), Vec3{12, -7, 1}};
   std::int64_t now_ns_ = 0;
 };
@@ -284,7 +286,7 @@ class NoisyFusionTest : public FusionTest {
  protected:
   // Poses of a robot at rest, white noise of kLioSigma_m on every axis and kLioSigma_rad on yaw and tilt.
   void feed_noisy(int poses, bool stated, double scale) {
-    params_.base_T_lidar = {};
+    mount_ = {};
     SetUp();
     for (int i = 0; i < poses; ++i) {
       const auto draw = [&](double sigma) { return scale * sigma * normal_(random_); };
@@ -339,7 +341,7 @@ double fused_rmse_m(bool at_stamp) {
   LioFusion::Params params;
   params.tau_s = 0.5;
   LioFusion fusion;
-  fusion.reset(params);
+  fusion.reset(params, base_T_lidar());
   StateHistory ring;
   std::mt19937 random(1);
   std::normal_distribution<double> noise_m(0.0, 0.005);

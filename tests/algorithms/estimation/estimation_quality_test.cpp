@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "algorithms/estimation/estimator.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
 
@@ -27,7 +28,7 @@ class EstimateQualityTest : public ::testing::Test {
   template <typename Each>
   void run(const WalkSpec& spec, const Estimator::Params& params, bool with_lio, const Each& each) {
     SyntheticWalk walk(spec);
-    estimator_.reset(params);
+    estimator_.reset(params, nominal_robot());
     for (std::int64_t t_ns = 0; t_ns < walk.end_ns(); t_ns += kTick_ns) {
       estimator_.add_imu(walk.imu(t_ns), t_ns);
       estimator_.add_joints(walk.joints(t_ns), t_ns);

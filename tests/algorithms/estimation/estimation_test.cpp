@@ -5,6 +5,7 @@
 
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/geometry/so3.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
 
@@ -66,7 +67,7 @@ TEST(BaseFilter, Eq2Prediction_ConstantAcceleration_IsTheParabola) {
 
 TEST(BaseFilter, Eq3Rows_PoseAndRates_AreContactsMinusBaseInOdomAxes) {
   BaseFilter filter;
-  filter.reset({});
+  filter.reset({}, kSole);
   const Mat3 R = rotation_z(0.4) * rotation_y(0.1);
   LegMeasurement leg;
   leg.base_T_sole = {rotation_y(0.2), Vec3{0.1, 0.1, -0.7}};
@@ -95,7 +96,7 @@ TEST(BaseFilter, Closure_LegsDisagreeAndTheWeightGoesOver_PoseGoesFromOneToTheOt
   spec.noise_scale = 0.0;
   SyntheticWalk walk(spec);
   BaseFilter filter;
-  filter.reset({});
+  filter.reset({}, kSole);
   const WalkTruth truth = walk.truth(0);
   const JointFeedback joints = walk.joints(0);
   filter.initialise(truth.true_T_base.p_m, Vec3::Zero(), rows_of(filter, truth, joints, {}, {}));
@@ -132,7 +133,7 @@ TEST(BaseFilter, Eq4Heights_FloorTenMillimetresOff_PullsSlowlyAndNeverJumps) {
   WalkSpec spec;
   spec.noise_scale = 0.0;
   SyntheticWalk walk(spec);
-  filter.reset({});
+  filter.reset({}, kSole);
   const std::array<FootContact, kFootCount> standing{FootContact{1.0, 0.5, true}, FootContact{1.0, 0.5, true}};
   const std::array<KnownHeight, kFootCount> raised{KnownHeight{0.01, 0.003}, KnownHeight{0.01, 0.003}};
   const WalkTruth truth = walk.truth(0);
@@ -289,7 +290,7 @@ class EstimatorTest : public ::testing::Test {
     }
     return aligned_;
   }
-  void SetUp() override { estimator_.reset({}); }
+  void SetUp() override { estimator_.reset({}, nominal_robot()); }
 
   static Estimator estimator_;  // its ring is too large for a stack
   std::int64_t t_ns_ = 0;
@@ -361,7 +362,7 @@ TEST_F(EstimatorTest, Walk_NoisySensorsWithoutLio_DriftStaysBelowOnePercentAndIs
     spec.seed = seed;
     spec.steps = 6;
     SyntheticWalk walk(spec);
-    estimator_.reset({});
+    estimator_.reset({}, nominal_robot());
     t_ns_ = 0;
     aligned_ = false;
     Transform estimated_before, truth_before;
@@ -522,7 +523,7 @@ TEST_F(EstimatorTest, OneSensorSilentInSwing_OtherOneCarriesTheStateOn) {
     WalkSpec spec;
     spec.steps = 1;
     SyntheticWalk walk(spec);
-    estimator_.reset({});
+    estimator_.reset({}, nominal_robot());
     t_ns_ = 0;
     aligned_ = false;
     run(walk, spec, 3000 * kNsPerMs, false, [&](std::int64_t) { align(walk); });
@@ -583,7 +584,7 @@ TEST_F(EstimatorTest, SameInputs_RunTwice_SameBits) {
     WalkSpec spec;
     spec.steps = 1;
     SyntheticWalk walk(spec);
-    estimator_.reset({});
+    estimator_.reset({}, nominal_robot());
     t_ns_ = 0;
     run(walk, spec, walk.end_ns(), true, [](std::int64_t) {});
     state = estimator_.state();

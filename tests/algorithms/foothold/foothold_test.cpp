@@ -5,6 +5,7 @@
 
 #include "algorithms/foothold/foothold_search.hpp"
 #include "algorithms/foothold/reach.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/seen_stairs.hpp"
 
 namespace polygmap {
@@ -122,14 +123,15 @@ class FootholdTest : public ::testing::Test {
     }
   }
 
-  std::unique_ptr<FootholdSearch> search_ = std::make_unique<FootholdSearch>();
+  std::unique_ptr<FootholdSearch> search_ =
+      std::make_unique<FootholdSearch>(FootholdSearch::Params{}, nominal_robot().sole);
 };
 
 // ---- the equations one by one
 
 LevelSurface prepared(const MapPolygon& polygon) {
   LevelSurface out;
-  EXPECT_TRUE(prepare(polygon, 0.0, EdgeMargin{}, out));
+  EXPECT_TRUE(prepare(polygon, 0.0, EdgeMargin{}, kSole, out));
   return out;
 }
 
@@ -192,7 +194,7 @@ TEST(FootholdEq21, OverlappingSurfaces_TheHighestStays) {
 
 TEST(FootholdEq22And23, HeightLimit_CountsFromTheLowestPointOfTheStandingFoot) {
   const Transform sole{rotation_y(0.1), Vec3{0, 0, 0.5}};  // toes down
-  EXPECT_NEAR(z_foot_m(sole), 0.5 - 0.17084 * std::sin(0.1), 1e-12);
+  EXPECT_NEAR(z_foot_m(kSole, sole), 0.5 - 0.17084 * std::sin(0.1), 1e-12);
   EXPECT_TRUE(below_limit(0.9, 0.5, 0.4));
   EXPECT_FALSE(below_limit(0.901, 0.5, 0.4));
 }

@@ -7,6 +7,7 @@
 
 #include "algorithms/foothold/foothold_search.hpp"
 #include "algorithms/perception/map/polygon_map.hpp"
+#include "tests/support/nominal_robot.hpp"
 #include "tests/support/seen_stairs.hpp"
 
 namespace polygmap {
@@ -33,7 +34,7 @@ struct PoseError {
 ClimbErrors climb(const Stairs& stairs, const Noise& noise, const PoseError& pose, unsigned seed,
                   bool half_lost = false) {
   auto map = std::make_unique<PolygonMap>();
-  auto search = std::make_unique<FootholdSearch>();
+  auto search = std::make_unique<FootholdSearch>(FootholdSearch::Params{}, nominal_robot().sole);
   std::mt19937 random(seed);
   std::normal_distribution<> jitter(0.0, 1.0);
   ClimbErrors errors;
@@ -124,7 +125,7 @@ TEST(MapToFootholds, Nosing20mm_FeetKeepClearOfTheOverhang) {
 
 TEST(MapToFootholds, WideDeepLanding_EndsInTop) {
   auto map = std::make_unique<PolygonMap>();
-  auto search = std::make_unique<FootholdSearch>();
+  auto search = std::make_unique<FootholdSearch>(FootholdSearch::Params{}, nominal_robot().sole);
   std::mt19937 random(1);
   const Stairs stairs{.steps = 2};
   const Vec3 top{stairs.nosing_x_m(2) + 0.0872, 0, 0.26};

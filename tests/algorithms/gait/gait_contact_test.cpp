@@ -19,7 +19,7 @@ bool in_swing_onto_tread(const IdealClimb& climb, int nth) {
   return climb.status().phase == GaitPhase::kSwing && climb.status().step.onto_tread && landed + 1 == nth;
 }
 
-void expect_put_back(IdealClimb& climb, int nth) {
+void expect_swing_aborted(IdealClimb& climb, int nth) {
   while (climb.tick() && !in_swing_onto_tread(climb, nth)) {
   }
   const Foot foot = climb.status().step.foot;
@@ -31,7 +31,7 @@ void expect_put_back(IdealClimb& climb, int nth) {
   EXPECT_EQ(status.stop_measured_m, 0.0);
   EXPECT_TRUE(status.stands[0] && status.stands[1]);
   EXPECT_EQ(status.late_contacts, 1U);
-  EXPECT_EQ(status.put_back, 1U);
+  EXPECT_EQ(status.aborted_swings, 1U);
   EXPECT_EQ(status.treads_climbed, 0U);
   EXPECT_EQ(status.step.touch_down_stamp_ns, 0);
   for (int i = 0; i < 500; ++i) climb.tick();
@@ -47,7 +47,7 @@ TEST(GaitContact, TreadFarLowerThanMapped_PutsTheFootBackAndSaysSo) {
   setup.stairs.rise_m = 0.10;
   setup.map_shift_z_m = 0.07;
   IdealClimb climb(setup);
-  expect_put_back(climb, 1);
+  expect_swing_aborted(climb, 1);
 }
 
 TEST(GaitContact, ForceSensorStuckOn_LandsByThePlan) {

@@ -56,7 +56,7 @@ TEST(GaitCrouch, BodyOffItsPlan_CrouchesByAsMuch_NotForOneTick) {
   EXPECT_LT(crouched_m([](int tick) { return tick % 8 < 4; }), 0.001);  // four ticks at a time are none either
   const double lasting_m = crouched_m([](int tick) { return tick > 400; });
   EXPECT_GT(lasting_m, 0.025);
-  EXPECT_LT(lasting_m, Gait::Params{}.crouch_max_m + 0.001);
+  EXPECT_LT(lasting_m, Gait::Params{}.crouch.max_m + 0.001);
 }
 
 // Ticks from the beginning of the hold to the first shift.
@@ -67,7 +67,7 @@ int first_shift(const Vec2& off_m, int until_tick) {
 }
 
 TEST(GaitHold, BodySwaysSideways_RestsBetweenTheFeetFirst_NoLongerThanThatTakes) {
-  const int settle_ticks = Gait::Params{}.settle_ticks;
+  const int settle_ticks = Gait::Params{}.standing.settle_ticks;
   EXPECT_LT(first_shift({0.0, 0.03}, 0), 25);
   EXPECT_LT(first_shift({0.0, 0.012}, 500), 25);  // steady enough
   EXPECT_LT(first_shift({0.03, 0.0}, 500), 25);   // ahead the soles are long
@@ -89,7 +89,7 @@ ClimbSetup from(double distance_m) {
   setup.distance_m = distance_m;
   return setup;
 }
-const double kTall_m = Gait::Params{}.look_height_m - 0.008;
+const double kTall_m = Gait::Params{}.standing.toe_calibration.height_m - 0.008;
 
 // Ticks for which both feet stand level and the base is as high as it looks from, before each of the swings.
 std::vector<int> looks(IdealClimb& climb) {
@@ -116,7 +116,7 @@ TEST(GaitLook, BeforeTheFirstStepOntoTheStairs_StandsTallForHalfASecond_OnceAndT
 
 TEST(GaitLook, NoTicksForIt_NeverLooks) {
   Gait::Params params;
-  params.look_ticks = 0;
+  params.standing.toe_calibration.ticks = 0;
   IdealClimb climb(from(0.5), params);
   const std::vector<int> ticks = looks(climb);
   EXPECT_EQ(*std::max_element(ticks.begin(), ticks.end()), 0);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "tests/support/gait_checks.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -13,7 +14,7 @@ using test::IdealClimb;
 
 TEST(GaitInput, NotInitialised_HoldsTheMeasuredJointsAndNeverMoves) {
   Gait gait;
-  gait.reset({});
+  gait.reset({}, nominal_robot());
   JointFeedback feedback;
   for (int i = 0; i < 12; ++i) feedback.q_rad[i] = 0.01 * i;
   JointCommand command;
@@ -32,7 +33,7 @@ TEST(GaitInput, NotInitialised_HoldsTheMeasuredJointsAndNeverMoves) {
 TEST(GaitInput, NoGoodReading_DrivesGetNoStiffness) {
   for (const double knee_rad : {std::numeric_limits<double>::quiet_NaN(), -0.1, 2.7, 1e9}) {
     Gait gait;
-    gait.reset({});
+    gait.reset({}, nominal_robot());
     JointFeedback feedback;
     feedback.q_rad[kKnee] = knee_rad;
     JointCommand command;
@@ -47,7 +48,7 @@ TEST(GaitInput, NoGoodReading_DrivesGetNoStiffness) {
 
 TEST(GaitInput, EncoderALittleOutsideTheRange_HoldsAtTheLimit) {
   Gait gait;
-  gait.reset({});
+  gait.reset({}, nominal_robot());
   JointFeedback feedback;
   feedback.q_rad[kKnee] = -0.01;
   JointCommand command;
@@ -81,7 +82,7 @@ class JointReferenceTest : public testing::Test {
       q_rad_.segment<6>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
           solve_leg({}, leg, base_T_sole_[index_of(leg)]).q_rad;
     }
-    EXPECT_TRUE(reference_.try_arm({}, {}, q_rad_));
+    EXPECT_TRUE(reference_.try_arm(nominal_robot(), {}, q_rad_));
   }
   JointReference reference_;
   JointVector q_rad_;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/ideal_climb.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -37,9 +38,9 @@ TEST(GaitReset, AfterAClimb_RepeatsItExactly) {
   IdealClimb first({}), second({});
   first.run(60.0);
   Gait gait;
-  gait.reset({});
+  gait.reset({}, nominal_robot());
   second.gait() = first.gait();
-  second.gait().reset({});
+  second.gait().reset({}, nominal_robot());
   second.run(60.0);
   ASSERT_EQ(first.record().steps.size(), second.record().steps.size());
   for (std::size_t i = 0; i < first.record().steps.size(); ++i) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/gait_checks.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -219,20 +220,20 @@ TEST(GaitStop, NeverLinedUpBeforeTheStairs_SaysSo) {
 TEST(GaitStop, EveryFootGoesBack_StopsAfterSomeAndSaysSo) {
   for (const bool at_last_it_stands : {false, true}) {
     IdealClimb climb({});
-    const std::uint32_t most = Gait::Params{}.max_put_back;
+    const std::uint32_t most = Gait::Params{}.swing.max_aborted;
     climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback&) {
       const LatchedStep& step = climb.status().step;
       if (climb.status().phase != GaitPhase::kSwing || !step.onto_tread) return;
       // The last one before it would stop lands; a tread on, one more goes back.
-      if (at_last_it_stands && climb.status().put_back >= most) return;
-      if (at_last_it_stands && climb.status().put_back + 1 == most && climb.status().treads_climbed == 0) return;
+      if (at_last_it_stands && climb.status().aborted_swings >= most) return;
+      if (at_last_it_stands && climb.status().aborted_swings + 1 == most && climb.status().treads_climbed == 0) return;
       const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns;
       if (since_ns > 20 * kNsPerMs && since_ns < 80 * kNsPerMs) {
         state.odom_v_base_mps.y() += side_sign(step.foot) * 0.15;
       }
     };
     climb.run(60.0);
-    EXPECT_EQ(climb.status().put_back, most);
+    EXPECT_EQ(climb.status().aborted_swings, most);
     EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);
     if (at_last_it_stands) {
       EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
@@ -257,7 +258,7 @@ TEST(GaitStop, BetweenTwoLevels_RisesAsFarAsTheLegsReachOnceSettled) {
   const SolePair soles{sole_pose(climb.true_T_sole(Foot::kLeft)), sole_pose(climb.true_T_sole(Foot::kRight))};
   ASSERT_GT(std::abs(soles[0].position_m.z() - soles[1].position_m.z()), 0.1);
   const Gait::Params params;
-  const double height_m = torso_between(params.geometry, params.step.torso, soles).position_m.z();
+  const double height_m = torso_between(nominal_robot().legs, params.step.torso, soles).position_m.z();
   EXPECT_NEAR(climb.true_T_base().p_m.z(), height_m, 0.005);
 }
 

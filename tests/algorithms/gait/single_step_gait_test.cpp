@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "tests/support/ideal_climb.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -172,7 +173,7 @@ TEST(SingleStepGait, PassingStepBeyondTheDrives_ClimbsWithBothFeetOnEveryTread) 
 // The body seems to topple towards the foot in the air, from that tick of the nth swing onto a tread on, for 60 ms.
 void topple(IdealClimb& climb, std::size_t nth_onto_tread, int from_tick) {
   climb.tamper = [&climb, nth_onto_tread, from_tick](StateEstimate& state, FootholdSet&, JointFeedback&) {
-    if (!in_swing(climb, nth_onto_tread) || climb.status().put_back > 0) return;
+    if (!in_swing(climb, nth_onto_tread) || climb.status().aborted_swings > 0) return;
     const LatchedStep& step = climb.status().step;
     const auto tick = static_cast<int>((state.stamp_ns - step.latch_stamp_ns) / (2 * kNsPerMs));
     if (tick >= from_tick && tick < from_tick + 30) state.odom_v_base_mps.y() += side_sign(step.foot) * 0.15;
@@ -184,7 +185,7 @@ TEST(SingleStepGait, PassingFootPutBack_PassesAgain) {
     IdealClimb climb({}, single_step());
     topple(climb, swing, 10);
     climb.run(60.0);
-    EXPECT_EQ(climb.status().put_back, 1U);
+    EXPECT_EQ(climb.status().aborted_swings, 1U);
     EXPECT_EQ(climb.status().phase, GaitPhase::kFinished) << static_cast<int>(climb.status().stop_reason);
     EXPECT_EQ(climb.status().treads_climbed, 4U);
     EXPECT_EQ(treads_of(climb), (std::vector<int>{1, 2, 3, 4, 4})) << swing;
@@ -197,7 +198,7 @@ TEST(SingleStepGait, ToppledOnTheWay_LandsBesideTheFrontFootAndTakesNoHeightForN
   run_to_swing(climb, 3);
   EXPECT_TRUE(climb.status().step.height_mapped);
   climb.run(60.0);
-  EXPECT_EQ(climb.status().put_back, 0U);
+  EXPECT_EQ(climb.status().aborted_swings, 0U);
   // It lands as far out as it may: from there the next shift asks more of the ankle than a plan takes, by a
   // milliradian.
   EXPECT_EQ(climb.status().stop_reason, StopReason::kLegsCannot);

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "algorithms/robot/leg_kinematics.hpp"
-#include "algorithms/robot/model.hpp"
 #include "tests/support/depth_scene.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "algorithms/robot/leg_kinematics.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {

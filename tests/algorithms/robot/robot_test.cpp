@@ -5,6 +5,7 @@
 
 #include "algorithms/robot/body_shapes.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -31,7 +32,7 @@ TEST(LegKinematics, SolveLeg_SolesOfRandomJoints_ReturnsTheJoints) {
     ++checked;
     const LegSolution solution = solve_leg(geometry, leg, base_T_sole(geometry, leg, q));
     EXPECT_TRUE(solution.reachable);
-    EXPECT_GE(limit_margin_rad(leg, solution.q_rad), -1e-9);
+    EXPECT_GE(limit_margin_rad(nominal_robot().drives, leg, solution.q_rad), -1e-9);
     ASSERT_LT((solution.q_rad - q).cwiseAbs().maxCoeff(), 1e-9) << q.transpose();
   }
   EXPECT_GT(checked, 50000);

@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <memory>
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 #include "tests/reference/paper_route/back_projection.hpp"
 
 namespace polygmap {

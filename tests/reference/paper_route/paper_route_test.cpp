@@ -5,7 +5,7 @@
 
 #include <memory>
 
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 #include "tests/support/depth_scene.hpp"
 
 namespace polygmap {

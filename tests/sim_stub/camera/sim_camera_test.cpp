@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "sim_stub/sim_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {

@@ -352,7 +352,7 @@ TEST(EstimateReplay, LidarMount_PosesOfTheLidar_AreThoseOfTheBase) {
   ReplayOptions options;
   const Replay plain = replay(log, lio, options);
   for (LioRow& row : lio) row.pose = row.pose * mount;
-  options.odometry.fusion.base_T_lidar = mount;
+  options.robot.mounts.base_T_lidar = mount;
   const Replay mounted = replay(log, lio, options);
   EXPECT_LT((plain.ticks.back().world_T_base.p_m - mounted.ticks.back().world_T_base.p_m).norm(), 1e-6);
 }

@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "algorithms/perception/surface_extractor.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/perceive/perceive.hpp"
 #include "tests/support/depth_scene.hpp"

@@ -9,6 +9,7 @@
 
 #include "algorithms/robot/leg_dynamics.hpp"
 #include "sim_stub/sim_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {

@@ -11,6 +11,7 @@
 
 #include "algorithms/robot/leg_kinematics.hpp"
 #include "sim_stub/sim_robot.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -72,7 +73,7 @@ class Script {
           const Transform tip{rotation_y(0.02 * (k + 1)), Vec3::Zero()};
           leg = solve_leg({}, foot, base_.inverse() * sole(foot) * tip);
         }
-        ASSERT_TRUE(leg.reachable && limit_margin_rad(foot, leg.q_rad) >= 0.0)
+        ASSERT_TRUE(leg.reachable && limit_margin_rad(nominal_robot().drives, foot, leg.q_rad) >= 0.0)
             << "the script asks too much: " << leg.q_rad.transpose();
         for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
           command.joints[joint_index(foot, j)].q_rad = leg.q_rad[static_cast<Eigen::Index>(j)];
@@ -338,7 +339,7 @@ TEST(SimPlant, ScriptedClimb_TwoTreads_StandsOnTheSecond) {
   const std::vector<SolidBox> solids = stair_solids(robot.stairs());
   script.watch = [&] {
     for (const Transform& sole : robot.truth().true_T_sole) {
-      least_clearance = std::min(least_clearance, clearance_m(collision_box(sole), solids));
+      least_clearance = std::min(least_clearance, clearance_m(collision_box(kSole, sole), solids));
     }
   };
   script.base_to(script.base_m() + Vec3{0, 0, -0.08}, 200);

@@ -8,6 +8,7 @@
 #include "sim_stub/camera/counter_noise.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -130,7 +131,7 @@ TEST(Clearance, RandomFeetNearStairs_AgreesWithSampledPoints) {
     const double z = world.height_m(x, 0.0) + noise.uniform(8 * i + 2, -0.02, 0.25);
     const Mat3 R = rotation_z(noise.uniform(8 * i + 3, -1, 1)) * rotation_y(noise.uniform(8 * i + 4, -0.5, 0.5)) *
                    rotation_x(noise.uniform(8 * i + 5, -0.5, 0.5));
-    const OrientedBox box = collision_box({R, Vec3{x, y, z}});
+    const OrientedBox box = collision_box(kSole, {R, Vec3{x, y, z}});
     double least = std::numeric_limits<double>::infinity();
     for (const Vec3& p : sampled(box, kSpacing_m)) {
       least = std::min(least, p.z());
@@ -162,7 +163,7 @@ TEST(Clearance, KnownPlaces_HaveTheirGapAndDepth) {
   const StairWorld world = make_stairs({.steps = 3, .jitter_m = 0.0}, 1);
   const std::vector<SolidBox> solids = stair_solids(world);
   const auto foot = [](double x, double z, double yaw = 0.0) {
-    return collision_box({rotation_z(yaw), Vec3{x, 0, z}});
+    return collision_box(kSole, {rotation_z(yaw), Vec3{x, 0, z}});
   };
   const double toe = kCollisionRectangle.toe_x_m, half = kCollisionRectangle.half_width_m;
   EXPECT_NEAR(clearance_m(foot(-toe - 0.02, 0.0), solids), 0.0, 1e-12);       // stands on the floor
@@ -180,7 +181,8 @@ TEST(Clearance, KnownPlaces_HaveTheirGapAndDepth) {
 TEST(Clearance, ExcludedSteps_AreLeftOut) {
   const StairWorld world = make_stairs({.steps = 3, .jitter_m = 0.0}, 1);
   const std::vector<SolidBox> solids = stair_solids(world);
-  const OrientedBox foot = collision_box({Mat3::Identity(), Vec3{-0.1, 0, 0.0}});  // its toe is in the first riser
+  const OrientedBox foot =
+      collision_box(kSole, {Mat3::Identity(), Vec3{-0.1, 0, 0.0}});  // its toe is in the first riser
   EXPECT_LT(clearance_m(foot, solids), -0.05);
   const std::array<int, 1> step{0};
   EXPECT_NEAR(clearance_m(foot, solids, step), 0.0, 1e-12);  // the floor remains

@@ -7,6 +7,7 @@
 
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/geometry/so3.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -226,7 +227,7 @@ TEST(EncoderOffsets, EnoughIsKnown_NothingIsLearntAnyMore) {
 // The estimator's own angles are the corrected ones; a drive is told what its encoder will read.
 TEST(EncoderOffsets, EstimatorStands_AnglesAreWithoutThem) {
   static Estimator estimator;  // its ring is too large for a stack
-  estimator.reset({});
+  estimator.reset({}, nominal_robot());
   StandingRobot robot;
   robot.offset_rad[kHipRoll] = 3e-3;
   for (int i = 1; i <= 1000; ++i) {

@@ -6,6 +6,7 @@
 
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/geometry/so3.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -52,7 +53,7 @@ struct SwayingRobot {
 
 TEST(Standstill, RobotSways_IsNoBiasAndNoTilt) {
   static Estimator estimator;  // its ring is too large for a stack
-  estimator.reset({});
+  estimator.reset({}, nominal_robot());
   SwayingRobot robot;
   ImuSample imu;
   JointFeedback joints;

@@ -10,6 +10,7 @@
 
 #include "algorithms/gait/trajectories/com_plan.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -50,7 +51,7 @@ TEST(ComPlan, FromRest_StartsAndEndsAtRestAndKeepsThePendulumsLaw) {
 TEST(ComPlan, AfterThePush_ZmpIsOnItsStraightWay) {
   ComPlan plan;
   plan.plan({}, {}, kWalk);
-  EXPECT_GT(plan.push_m(), 0.005);
+  EXPECT_GT(plan.zmp_offset_m(), 0.005);
   EXPECT_LT((plan.zmp_m(200) - (200.0 - 75.0) / 280.0 * Vec2(0.1, 0.09)).norm(), 1e-12);
   EXPECT_EQ(plan.zmp_m(600), Vec2(0.1, 0.09));
 }
@@ -60,7 +61,7 @@ TEST(ComPlan, MadeAgainOnItsWay_NeedsNoPush) {
   plan.plan({}, {}, kWalk);
   ComPlan again;
   again.plan({}, plan.at(400), knots({{450, {0.1, 0.09}}, {730, {0.35, -0.09}}}));
-  EXPECT_LT(again.push_m(), 1e-9);
+  EXPECT_LT(again.zmp_offset_m(), 1e-9);
   EXPECT_LT((again.at(300).position_m - plan.at(700).position_m).norm(), 1e-9);
 }
 
@@ -124,7 +125,7 @@ struct PressedSoles {
     }
   }
   [[nodiscard]] bool try_measure(Vec2& measured_m) const {
-    return try_measure_zmp(masses, {}, felt, odom_T_sole, slope, measured_m);
+    return try_measure_zmp(nominal_robot(), felt, odom_T_sole, slope, measured_m);
   }
 };
 
@@ -270,7 +271,7 @@ TEST(Balance, FootThatHangs_DoesNotMoveThePlan) {
     body.q_rad = q_rad;
     JointFeedback feedback;
     feedback.foot_force_n = {500.0, right_n};
-    (void)balance.torques_nm({}, {}, reference, body, feedback, kTick_s);
+    (void)balance.torques_nm({}, nominal_robot(), reference, body, feedback, kTick_s);
     return balance.odom_p_com_planned_m().norm();
   };
   EXPECT_LT(moved_m(0.0), 1e-12);

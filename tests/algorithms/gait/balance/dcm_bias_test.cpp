@@ -9,6 +9,7 @@
 
 #include "algorithms/gait/balance/balance.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -118,7 +119,7 @@ struct MisweighedRobot {
       felt.dq_radps = (q - before_rad_) / kTick_s;
       if (tick == 0) felt.dq_radps.setZero();
       before_rad_ = q;
-      torque_nm = balance.torques_nm({}, {}, reference, body, felt, kTick_s);
+      torque_nm = balance.torques_nm({}, nominal_robot(), reference, body, felt, kTick_s);
       press(q);
       moves_mps += kTick_s * math::square(kOmega_radps) * (true_com_m() - zmp_m);
       moved_m += kTick_s * moves_mps;

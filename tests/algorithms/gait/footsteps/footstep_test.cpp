@@ -4,7 +4,9 @@
 #include <random>
 
 #include "algorithms/gait/footsteps/footstep_plan.hpp"
-#include "algorithms/gait/trajectories/step_plan.hpp"
+#include "algorithms/gait/trajectories/step_search.hpp"
+#include "algorithms/robot/leg_kinematics.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -88,8 +90,9 @@ TEST(FloorStep_Eq34, RandomGoals_FeetNeverOverlapAndStayInLimits) {
     const Foot foot = i % 2 == 0 ? Foot::kLeft : Foot::kRight;
     const SolePose stance{{place(random), place(random), 0.02}, angle(random)};
     const TorsoPose goal{{place(random), place(random), 0.0}, angle(random)};
-    const SolePose step = floor_step(stance, foot, goal, kStanceHalfWidth_m, limits);
-    EXPECT_FALSE(overlap(foot_rectangle(step, 0.0), foot_rectangle(stance, 0.0)));
+    const SolePose step = floor_step(kCollisionRectangle, stance, foot, goal, kStanceHalfWidth_m, limits);
+    EXPECT_FALSE(
+        overlap(foot_rectangle(kCollisionRectangle, step, 0.0), foot_rectangle(kCollisionRectangle, stance, 0.0)));
     EXPECT_DOUBLE_EQ(step.position_m.z(), stance.position_m.z());
     EXPECT_LE(std::abs(math::wrap_angle(step.yaw_rad - stance.yaw_rad)), limits.turn_rad + 1e-12);
     const Vec3 local = rotation_z(stance.yaw_rad).transpose() * (step.position_m - stance.position_m);
@@ -101,7 +104,7 @@ TEST(FloorStep_Eq34, RandomGoals_FeetNeverOverlapAndStayInLimits) {
 
 TEST(FloorStep, GoalWithinOneStep_LandsBesideIt) {
   const SolePose stance{{0, -0.1, 0}, 0};
-  const SolePose step = floor_step(stance, Foot::kLeft, {{0.15, 0.03, 0}, 0.1}, 0.1, {});
+  const SolePose step = floor_step(kCollisionRectangle, stance, Foot::kLeft, {{0.15, 0.03, 0}, 0.1}, 0.1, {});
   const SolePose wanted = foot_of_torso({{0.15, 0.03, 0}, 0.1}, Foot::kLeft, 0.1, 0.0);
   EXPECT_LT((step.position_m - wanted.position_m).norm(), 1e-12);
 }
@@ -124,7 +127,8 @@ StepPlan stair_step(StepKind kind, double rise_m, double ahead_m, std::array<Tra
     lead.target = left;
     const StepPlan before = plan_step(params, lead, {SolePose{{0, 0.1, 0}, 0}, right}, kStepTries[0]);
     const auto start = TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.0, 0.79}});
-    const StepKnots knots({}, params, before, start, {SolePose{{0, 0.1, 0}, 0}.transform(), right.transform()});
+    const StepKnots knots(nominal_robot(), params, params.knot_ticks, before, start,
+                          {SolePose{{0, 0.1, 0}, 0}.transform(), right.transform()});
     from = TorsoTrajectory::at_rest({Mat3::Identity(), knots.torso_at_landing().position_m});
     TorsoTrajectory::set_horizontal(from, knots.com_at_landing());
   } else {
@@ -138,7 +142,7 @@ TEST(StepKnots_Eq30Eq37, WholeStep_KnotsAreEvenInTimeAndEndOnTheTarget) {
   TorsoTrajectory::State from;
   const StepPlan plan = stair_step(StepKind::kLeading, 0.13, 0.28, soles, from);
   const StepParams params;
-  const StepKnots knots({}, params, plan, from, soles);
+  const StepKnots knots(nominal_robot(), params, params.knot_ticks, plan, from, soles);
   ASSERT_EQ(knots.count(), 1 + (plan.shift_ticks + plan.swing_ticks + params.knot_ticks - 1) / params.knot_ticks);
   for (std::int32_t i = 0; i < knots.count(); ++i) EXPECT_EQ(knots[i].tick, params.knot_ticks * i);
   const StepKnot last = knots[knots.count() - 1];
@@ -157,10 +161,10 @@ TEST(StepSearch, RisesAndTreadsOfTheStairs_LegsCanDoAllOfThem) {
         std::array<Transform, kFootCount> soles;
         TorsoTrajectory::State from;
         const StepPlan plan = stair_step(kind, rise, ahead, soles, from);
-        const StepKnots knots({}, params, plan, from, soles);
+        const StepKnots knots(nominal_robot(), params, params.knot_ticks, plan, from, soles);
         StepFeasibility proof;
-        proof.begin({}, params, knots);
-        ASSERT_TRUE(proof.advance(knots.count()));
+        proof.begin(nominal_robot(), knots);
+        ASSERT_TRUE(proof.advance(nominal_robot(), params, knots.count()));
         const StepCheck& check = proof.check();
         EXPECT_TRUE(check.feasible) << rise << " " << ahead << " kind " << static_cast<int>(kind) << ": margin "
                                     << check.joint_margin_rad << " knee " << check.knee_rad << " speed "
@@ -179,18 +183,18 @@ TEST(StepFeasibility, TrailingSwingWithALevelSole_MeetsTheAnklesLimitThatAPitche
   params.joint_margin_rad = 0.0;
   const auto ankle_margin_rad = [&](double toe_down_rad) {
     plan.shape.toe_down_rad = toe_down_rad;
-    const StepKnots knots({}, params, plan, from, soles);
+    const StepKnots knots(nominal_robot(), params, params.knot_ticks, plan, from, soles);
     StepFeasibility proof;
-    proof.begin({}, params, knots);
-    EXPECT_TRUE(proof.advance(knots.count()));
+    proof.begin(nominal_robot(), knots);
+    EXPECT_TRUE(proof.advance(nominal_robot(), params, knots.count()));
     return proof.check().joint_margin_rad;
   };
   EXPECT_LT(ankle_margin_rad(0.0), 0.0);
   EXPECT_GT(ankle_margin_rad(kStepTries[0].toe_down_rad), StepParams{}.joint_margin_rad);
 }
 
-StepSearch::State finish(StepSearch& search, int most_calls = 1000) {
-  while (most_calls-- > 0 && search.step() == StepSearch::State::kSearching) {
+StepSearch::State finish(StepSearch& search, const StepParams& params = {}, int most_calls = 1000) {
+  while (most_calls-- > 0 && search.step(nominal_robot(), params) == StepSearch::State::kSearching) {
   }
   return search.state();
 }
@@ -210,8 +214,8 @@ PassingStep passing_step(double rise_m, double ahead_m) {
 }
 StepSearch searched(const PassingStep& step, const StepParams& params = {}) {
   StepSearch search;
-  search.begin({}, params, step.goal, step.trailing, params.stair_shift_ticks, step.from, step.soles);
-  finish(search);
+  search.begin(nominal_robot(), params, step.goal, step.trailing, params.stair_shift_ticks, step.from, step.soles);
+  finish(search, params);
   return search;
 }
 
@@ -245,7 +249,7 @@ StepSearch leading_search(double rise_m, double ahead_m, const StepParams& param
   trailing.foot = Foot::kRight;
   trailing.target.position_m.y() = -0.1;
   StepSearch search;
-  search.begin({}, params, plan.goal, trailing, params.stair_shift_ticks, from, soles);
+  search.begin(nominal_robot(), params, plan.goal, trailing, params.stair_shift_ticks, from, soles);
   return search;
 }
 
@@ -253,7 +257,7 @@ TEST(StepSearch, RiseTooFastForTheDrives_IsDoneInALongerSwing) {
   StepParams fast;
   fast.stair_swing_ticks = 430;
   StepSearch search = leading_search(0.182, 0.35, fast);
-  EXPECT_EQ(finish(search), StepSearch::State::kFound);
+  EXPECT_EQ(finish(search, fast), StepSearch::State::kFound);
   EXPECT_GT(search.plan().swing_ticks, fast.stair_swing_ticks);
 }
 
@@ -261,7 +265,7 @@ TEST(StepSearch, RiseBeyondTheLegs_IsImpossibleBeforeTheFirstLiftOff) {
   constexpr int kHalfAShift = 160;  // calls, one a tick: it is known before the foot would leave
   for (const double rise : {0.30, 0.5}) {
     StepSearch search = leading_search(rise, 0.3);
-    EXPECT_EQ(finish(search, kHalfAShift), StepSearch::State::kImpossible) << rise;
+    EXPECT_EQ(finish(search, {}, kHalfAShift), StepSearch::State::kImpossible) << rise;
   }
 }
 
@@ -272,7 +276,7 @@ TEST(StepSearch, ShiftFasterThanTheDrives_IsNotProvenByASlowerOne) {
   from[2].position -= 0.05;  // the torso has a way to go
   for (const std::int32_t shift_ticks : {StepParams{}.stair_shift_ticks, 15}) {
     StepSearch search;
-    search.begin({}, {}, plan.goal, {}, shift_ticks, from, soles);
+    search.begin(nominal_robot(), {}, plan.goal, {}, shift_ticks, from, soles);
     EXPECT_EQ(finish(search) == StepSearch::State::kFound, shift_ticks > 15);
   }
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "algorithms/gait/trajectories/step_plan.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -22,7 +23,7 @@ Swing make(const Case& c, double retreat_m = 0.015) {
   shape.toe_down_rad = c.toe_down_rad;
   shape.retreat_m = retreat_m;
   Swing swing;
-  swing.plan({Mat3::Identity(), {0, 0.1, 0}}, {{0.28, 0.1, c.rise_m}, 0.0}, shape, kTicks);
+  swing.plan(kSole, {Mat3::Identity(), {0, 0.1, 0}}, {{0.28, 0.1, c.rise_m}, 0.0}, shape, kTicks);
   return swing;
 }
 double lowest_m(const Transform& sole) {
@@ -102,7 +103,7 @@ TEST(Swing, TwoRisersAhead_ClearsBothNosings) {
       SwingShape shape = params.passing_swing;
       shape.toe_down_rad = tried.toe_down_rad;
       Swing swing;
-      swing.plan({Mat3::Identity(), {0, 0.1, 0}}, {{2 * kTread_m, 0.1, 2 * rise_m}, 0.0}, shape,
+      swing.plan(kSole, {Mat3::Identity(), {0, 0.1, 0}}, {{2 * kTread_m, 0.1, 2 * rise_m}, 0.0}, shape,
                  params.passing_swing_ticks);
       const double riser_x_m = kCollisionRectangle.toe_x_m + kGap_m;
       double middle_m = 1e9, last_m = 1e9;  // least distance of a corner from the solid behind each riser
@@ -141,7 +142,7 @@ TEST(Swing, BackBeyondTheStart_GoesOnDownAtApproachSpeed) {
 TEST(Swing, TiltedAndTurnedStart_LeavesItContinuouslyAndLandsFlat) {
   const Transform start{rotation_z(0.15) * rotation_y(0.004) * rotation_x(-0.003), {0, 0.1, 0}};
   Swing swing;
-  swing.plan(start, {{0.2, 0.12, 0.0}, -0.05}, {}, kTicks);
+  swing.plan(kSole, start, {{0.2, 0.12, 0.0}, -0.05}, {}, kTicks);
   EXPECT_LT((swing.at(0).R - start.R).norm(), 1e-12);
   EXPECT_LT((swing.at(kTicks).R - rotation_z(-0.05)).norm(), 1e-9);
 }

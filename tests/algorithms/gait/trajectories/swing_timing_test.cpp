@@ -11,7 +11,7 @@ namespace {
 constexpr std::int32_t kSwing_ticks = 450;
 constexpr double kTurn_tick = 170.0;
 constexpr SwingTiming::Params kParams;
-constexpr double kToppling_m = kParams.topples_m + 0.001;
+constexpr double kToppling_m = kParams.falling_outward_m + 0.001;
 
 // So many ticks under the same circumstances.
 void advance(SwingTiming& pace, int ticks, const SwingTiming::Seen& seen) {
@@ -26,9 +26,9 @@ int ticks_to_the_end(SwingTiming pace, const SwingTiming::Seen& seen) {
 TEST(SwingTiming, BodyOnItsPlan_RunsAsPlanned) {
   SwingTiming pace;
   advance(pace, kSwing_ticks,
-          {.toppling_m = 0.9 * kParams.topples_m, .turn_until_tick = kTurn_tick, .drive_share = 0.95});
+          {.falling_outward_m = 0.9 * kParams.falling_outward_m, .turn_until_tick = kTurn_tick, .drive_share = 0.95});
   EXPECT_EQ(pace.tick(), kSwing_ticks);
-  EXPECT_EQ(pace.wider_m(), 0.0);
+  EXPECT_EQ(pace.widened_m(), 0.0);
   EXPECT_FALSE(pace.goes_back());
 }
 
@@ -36,23 +36,23 @@ TEST(SwingTiming, TopplesTowardsTheFreeFoot_HurriesAndLandsWider) {
   SwingTiming pace;
   const auto half = static_cast<int>(0.5 * kSwing_ticks);
   advance(pace, half, {});
-  advance(pace, 1, {.toppling_m = kToppling_m, .turn_until_tick = kTurn_tick});
+  advance(pace, 1, {.falling_outward_m = kToppling_m, .turn_until_tick = kTurn_tick});
   EXPECT_FALSE(pace.goes_back());
   // Once it topples it hurries to the end, whatever the feedback makes of it; nothing leaps.
-  EXPECT_LT(ticks_to_the_end(pace, {}), 1.1 * (kSwing_ticks - half) / kParams.hurry);
+  EXPECT_LT(ticks_to_the_end(pace, {}), 1.1 * (kSwing_ticks - half) / kParams.speed_up);
   EXPECT_LT(pace.pace(), 1.1);
   advance(pace, 1, {});
-  EXPECT_LE(pace.wider_m(), 2.0 * kParams.wider_mps * kTick_s + 1e-12);
+  EXPECT_LE(pace.widened_m(), 2.0 * kParams.widen_mps * kTick_s + 1e-12);
   advance(pace, 200, {});
-  EXPECT_EQ(pace.wider_m(), kParams.wider_m);
+  EXPECT_EQ(pace.widened_m(), kParams.widen_m);
 }
 
 TEST(SwingTiming, Toppling_LandsNoWiderThanTheTread) {
   for (const double room_m : {0.02, 0.0, -0.01}) {
     SwingTiming pace;
     advance(pace, 200, {});
-    advance(pace, 200, {.toppling_m = kToppling_m, .side_room_m = room_m});
-    EXPECT_EQ(pace.wider_m(), std::max(room_m, 0.0));
+    advance(pace, 200, {.falling_outward_m = kToppling_m, .side_room_m = room_m});
+    EXPECT_EQ(pace.widened_m(), std::max(room_m, 0.0));
   }
 }
 
@@ -63,10 +63,10 @@ TEST(SwingTiming, Hurrying_TakesNoMoreThanTheDrivesHave) {
     advance(pace, 200, {});
     double most = 0.0;
     for (int i = 0; i < 150; ++i) {
-      pace.advance(kParams, {.toppling_m = kToppling_m, .drive_share = at_plan * pace.pace()}, kSwing_ticks);
+      pace.advance(kParams, {.falling_outward_m = kToppling_m, .drive_share = at_plan * pace.pace()}, kSwing_ticks);
       most = std::max(most, pace.pace());
     }
-    EXPECT_NEAR(most, math::clamp(1.0 / at_plan, 1.0, kParams.hurry), 1e-9) << at_plan;
+    EXPECT_NEAR(most, math::clamp(1.0 / at_plan, 1.0, kParams.speed_up), 1e-9) << at_plan;
   }
 }
 
@@ -74,12 +74,12 @@ TEST(SwingTiming, TopplesEarly_TurnsBackWhereItMay) {
   for (const bool may : {true, false}) {
     SwingTiming pace;
     advance(pace, static_cast<int>(0.9 * kTurn_tick), {});
-    advance(pace, 1, {.toppling_m = kToppling_m, .turn_until_tick = may ? kTurn_tick : 0.0});
+    advance(pace, 1, {.falling_outward_m = kToppling_m, .turn_until_tick = may ? kTurn_tick : 0.0});
     EXPECT_EQ(pace.goes_back(), may);
     const double before = pace.tick();
     advance(pace, 100, {});
     EXPECT_EQ(pace.tick() < before, may);
-    EXPECT_EQ(pace.wider_m() == 0.0, may);  // back is where it stood
+    EXPECT_EQ(pace.widened_m() == 0.0, may);  // back is where it stood
     EXPECT_FALSE(pace.no_ground());
   }
 }
@@ -89,7 +89,7 @@ TEST(SwingTiming, GroundLate_GoesDownFaster) {
   advance(pace, kSwing_ticks + kParams.late_ticks, {});
   EXPECT_EQ(pace.pace(), 1.0);
   advance(pace, 100, {});
-  EXPECT_NEAR(pace.pace(), kParams.seek, 1e-9);
+  EXPECT_NEAR(pace.pace(), kParams.descend_search, 1e-9);
 }
 
 TEST(SwingTiming, NoGround_WaitsAndGoesBackSlowly) {
@@ -98,11 +98,11 @@ TEST(SwingTiming, NoGround_WaitsAndGoesBackSlowly) {
   const double lowest = pace.tick();
   pace.retreat(kParams);
   EXPECT_TRUE(pace.goes_back() && pace.no_ground());
-  advance(pace, kParams.pause_ticks, {.toppling_m = kToppling_m});
+  advance(pace, kParams.pause_ticks, {.falling_outward_m = kToppling_m});
   EXPECT_EQ(pace.tick(), lowest);
-  advance(pace, 100, {.toppling_m = kToppling_m});
+  advance(pace, 100, {.falling_outward_m = kToppling_m});
   EXPECT_NEAR(pace.tick(), lowest - 100 * kParams.retreat, 1e-9);
-  EXPECT_EQ(pace.wider_m(), 0.0);
+  EXPECT_EQ(pace.widened_m(), 0.0);
   pace.begin();
   EXPECT_FALSE(pace.goes_back());
 }

@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "algorithms/robot/model.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {

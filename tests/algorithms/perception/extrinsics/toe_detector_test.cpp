@@ -11,8 +11,8 @@
 
 #include "algorithms/perception/image/self_filter.hpp"
 #include "algorithms/robot/body_shapes.hpp"
-#include "algorithms/robot/model.hpp"
 #include "tests/support/depth_scene.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -45,7 +45,8 @@ class ToeSight : public testing::Test {
     const Transform base_T_sole{Mat3::Identity(), stand.sole_p_m - world_T_base.p_m};
     const LegSolution leg = solve_leg(geometry, Foot::kLeft, base_T_sole);
     ASSERT_TRUE(leg.reachable);
-    if (stand.legs) scene.legs[0] = transformed(mount.inverse(), base_leg_shapes(geometry, Foot::kLeft, leg.q_rad));
+    if (stand.legs)
+      scene.legs[0] = transformed(mount.inverse(), base_leg_shapes(nominal_robot(), Foot::kLeft, leg.q_rad));
     test::DepthPicture picture = test::render(scene);
     if (stand.noise_seed > 0) test::add_noise(picture, {.correlated = stand.noise_seed % 2 == 0}, stand.noise_seed);
     raw_ = picture.raw();
@@ -55,7 +56,7 @@ class ToeSight : public testing::Test {
     const CameraIntrinsics k = robot_camera_intrinsics();
     RawRange range;
     range.set({}, k.depth_unit_m);
-    return detect_toe({1, 1, k.width_px, k.height_px, raw_.data()}, k, range, camera_T_sole);
+    return detect_toe({1, 1, k.width_px, k.height_px, raw_.data()}, k, range, kSole, camera_T_sole);
   }
   [[nodiscard]] std::optional<ToeSighting> see() const { return see(camera_T_sole_); }
 

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "algorithms/robot/model.hpp"
 #include "tests/support/depth_scene.hpp"
+#include "tests/support/nominal_robot.hpp"
 
 namespace polygmap {
 namespace {
@@ -76,9 +76,9 @@ TEST(SelfFilter, Mask_LegsOfSeveralPoses_CoversEveryRayThatHitsThemAndLittleElse
 int unmasked(double hip_rad, double sign, const BodyMargin& margin) {
   HalfRays rays;
   rays.set(robot_camera_intrinsics());
-  LegGeometry longer;
-  longer.thigh_m *= 1.0 + sign * 0.01;
-  longer.shank_m *= 1.0 + sign * 0.01;
+  RobotModel longer;
+  longer.legs.thigh_m *= 1.0 + sign * 0.01;
+  longer.legs.shank_m *= 1.0 + sign * 0.01;
   const double turn_rad = sign * kPi / 180.0;
   const Transform nominal = base_T_camera();
   const Transform mount{rotation_y(turn_rad) * rotation_z(turn_rad) * nominal.R, nominal.p_m};

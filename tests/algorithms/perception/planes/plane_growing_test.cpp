@@ -31,12 +31,12 @@ class PlanesFromRuns : public testing::Test {
       boundaries_->set_plane(i, growing_->plane(i).plane);
       to_plane[i] = static_cast<std::uint8_t>(i);
     }
-    boundaries_->begin_meeting();
+    boundaries_->begin_scores();
     for (std::int32_t g = 0; g < kColumns; ++g) {
-      boundaries_->gather(g, runs_->columns()[static_cast<std::size_t>(g)], to_plane);
-      boundaries_->meet(g, false);
+      boundaries_->build_spans(g, runs_->columns()[static_cast<std::size_t>(g)], to_plane);
+      boundaries_->score(g, false);
     }
-    boundaries_->settle();
+    boundaries_->place();
     boundaries_->begin_refit();
     for (std::int32_t g = 0; g < kColumns; g += SpanBoundaries::kRefitColumns) boundaries_->refit(g, false);
   }

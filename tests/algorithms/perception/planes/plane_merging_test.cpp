@@ -16,14 +16,14 @@ class SeenPlanes {
  public:
   explicit SeenPlanes(std::size_t count = 2) {
     rays_.set({640, 480, 460.0, 460.0, 319.5, 239.5, 0.001});
-    planes_->count = count;
+    planes_->count = static_cast<PlaneId>(count);
     for (std::size_t i = 0; i < to_plane_.size(); ++i) to_plane_[i] = static_cast<std::uint8_t>(i);
   }
   // Columns and rows from .. to - 1 of the picture show n . p + d = 0.
   void show(std::uint8_t index, const Vec3& normal, const Vec3& through_m, std::int32_t first_column,
             std::int32_t last_column, std::int16_t top, std::int16_t bottom) {
-    FramePlane& plane = (*planes_)[index];
-    plane = FramePlane{};
+    FittedPlane& plane = (*planes_)[index];
+    plane = FittedPlane{};
     plane.alive = true;
     plane.plane.m = normal / normal.dot(through_m);
     for (std::int32_t g = first_column; g <= last_column; ++g) {
@@ -49,7 +49,7 @@ class SeenPlanes {
     begin();
     while (!merging_->join_some(*planes_, to_plane_)) ++calls_;
     return static_cast<int>(std::count_if(planes_->planes.begin() + 1, planes_->planes.end(),
-                                          [](const FramePlane& plane) { return plane.alive; }));
+                                          [](const FittedPlane& plane) { return plane.alive; }));
   }
   void begin() {
     merging_->begin_facets({}, {}, kNoise, *planes_);
@@ -61,12 +61,12 @@ class SeenPlanes {
   [[nodiscard]] int calls() const { return calls_; }  // of join_some, but for the last
   [[nodiscard]] std::uint32_t overflow() const { return merging_->overflow(); }
   int merge(bool measured) {
-    PlaneMerging::merge_pieces({}, {}, kNoise, *planes_, to_plane_, measured);
+    PlaneMerging::merge_coplanar({}, {}, kNoise, *planes_, to_plane_, measured);
     return ((*planes_)[1].alive ? 1 : 0) + ((*planes_)[2].alive ? 1 : 0);
   }
   void make_risers() { (*planes_)[1].kind = (*planes_)[2].kind = SurfaceKind::kRiser; }
   void make_facets() { (*planes_)[1].facet = (*planes_)[2].facet = true; }
-  [[nodiscard]] const FramePlane& plane(std::size_t i) const { return (*planes_)[i]; }
+  [[nodiscard]] const FittedPlane& plane(std::size_t i) const { return (*planes_)[i]; }
   [[nodiscard]] std::uint8_t to_plane(std::size_t i) const { return to_plane_[i]; }
 
  private:

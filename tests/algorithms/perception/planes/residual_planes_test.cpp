@@ -55,7 +55,7 @@ TEST_F(Remainder, RowsOfAPlaneGivenUp_AreSearchedAgain) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 10 && r < 13 ? &tread_ : nullptr; });
   for (const bool given_back : {false, true}) {
     search_->begin({}, up_);
-    if (given_back) search_->give_back(1);
+    if (given_back) search_->release(1);
     search(spans_from(5));
     EXPECT_EQ(search_->found().size(), given_back ? 1U : 0U);
   }
@@ -67,7 +67,7 @@ TEST_F(Remainder, UprightRows_AreFoundParallelToTheKnownRiser) {
   search();
   EXPECT_EQ(search_->found().size(), 0U);  // which way risers face is not known
   search_->begin({}, up_);
-  search_->know_upright(test::plane_of(riser_.normal(), 0.8), 5000.0);
+  search_->add_known_riser(test::plane_of(riser_.normal(), 0.8), 5000.0);
   search();
   ASSERT_EQ(search_->found().size(), 1U);
   EXPECT_NEAR(search_->found()[0].d_m(), 1.1, 0.003);
@@ -76,7 +76,7 @@ TEST_F(Remainder, UprightRows_AreFoundParallelToTheKnownRiser) {
 TEST_F(Remainder, AKnownPlane_IsNotFoundAgain) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r < 20 ? &tread_ : nullptr; }, 0.002);
   search_->begin({}, up_);
-  search_->know_level(test::plane_of(up_, 0.606));
+  search_->add_known_level(test::plane_of(up_, 0.606));
   search();
   EXPECT_EQ(search_->found().size(), 0U);
 }

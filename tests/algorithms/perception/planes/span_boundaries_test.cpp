@@ -45,15 +45,15 @@ class Boundaries : public testing::Test {
     lower.bottom = static_cast<std::int16_t>(row + 60);
     lower.plane = kRiser;
     ASSERT_TRUE(runs.try_push_back(upper) && runs.try_push_back(lower));
-    boundaries_->gather(column, runs, to_plane_);
+    boundaries_->build_spans(column, runs, to_plane_);
   }
   void meet() {
-    boundaries_->begin_meeting();
+    boundaries_->begin_scores();
     for (std::int32_t g = 0; g < kColumns; ++g) {
       gather(g);
-      boundaries_->meet(g, false);
+      boundaries_->score(g, false);
     }
-    boundaries_->settle();
+    boundaries_->place();
   }
   // Columns whose tread ends more than a row from where it should.
   [[nodiscard]] int wrong(double overhang_px) const {
@@ -90,15 +90,15 @@ TEST_F(Boundaries, PlanesThatChange_TakeTheirBoundaryAlong) {
   tread_ = test::plane_of({0.01, -0.86, -0.5}, 0.605);
   EXPECT_GT(wrong(0.0), kColumns / 2);
   boundaries_->set_plane(kTread, tread_);
-  boundaries_->follow();
+  boundaries_->reproject();
   EXPECT_EQ(wrong(0.0), 0);
 }
 
 TEST_F(Boundaries, AColumnWithoutARun_TakesTheRowsThatTheOneBesideShows) {
   paint(0.0, 0.003, 4);
   gather(10);
-  boundaries_->gather(11, {}, to_plane_);
-  boundaries_->claim(11, 10, 1, 0);
+  boundaries_->build_spans(11, {}, to_plane_);
+  boundaries_->fill_gaps(11, 10, 1, 0);
   const SpanBoundaries::Column& claimed = boundaries_->columns()[11];
   ASSERT_EQ(claimed.size(), 2U);
   EXPECT_EQ(claimed[0].plane, kTread);
@@ -115,8 +115,8 @@ TEST_F(Boundaries, RowsOfSomethingElse_AreNotClaimed) {
     scene_.image->inverse_depth(11, r) = static_cast<float>(far.inverse_depth(scene_.ray(11, r)));
   }
   scene_.image->turn(0, kDepthHeight_px - 1);
-  boundaries_->gather(11, {}, to_plane_);
-  boundaries_->claim(11, 10, 1, 0);
+  boundaries_->build_spans(11, {}, to_plane_);
+  boundaries_->fill_gaps(11, 10, 1, 0);
   EXPECT_TRUE(boundaries_->columns()[11].empty());
 }
 
@@ -136,9 +136,9 @@ class ClaimedRows : public Boundaries {
     run.bottom = kLast - 4;
     run.plane = kTread;
     ASSERT_TRUE(runs.try_push_back(run));
-    boundaries_->gather(10, runs, to_plane_);
-    boundaries_->gather(11, {}, to_plane_);
-    boundaries_->claim(11, 10, 1, 0);
+    boundaries_->build_spans(10, runs, to_plane_);
+    boundaries_->build_spans(11, {}, to_plane_);
+    boundaries_->fill_gaps(11, 10, 1, 0);
   }
   void expect_claimed(std::int32_t top, std::int32_t bottom) const {
     const SpanBoundaries::Column& claimed = boundaries_->columns()[11];
@@ -180,9 +180,9 @@ TEST_F(Boundaries, ARunThatReachesOverTheEdge_IsTrimmed) {
   run.bottom = static_cast<std::int16_t>(row + 5);
   run.plane = kTread;
   ASSERT_TRUE(runs.try_push_back(run));
-  boundaries_->gather(40, runs, to_plane_);
+  boundaries_->build_spans(40, runs, to_plane_);
   EXPECT_EQ(boundaries_->columns()[40][0].bottom, row + 5);
-  boundaries_->trim(40);
+  boundaries_->trim_ends(40);
   EXPECT_LT(boundaries_->columns()[40][0].bottom, row + 5);
   EXPECT_GE(boundaries_->columns()[40][0].bottom, row - 1);
   EXPECT_EQ(boundaries_->columns()[40][0].top, row - 60);

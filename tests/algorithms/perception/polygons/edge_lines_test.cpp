@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "algorithms/perception/polygons/counter_random.hpp"
-#include "algorithms/robot/model.hpp"
+#include "algorithms/robot/robot_model.hpp"
 #include "tests/support/depth_scene.hpp"
 
 namespace polygmap {

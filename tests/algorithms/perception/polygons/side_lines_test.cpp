@@ -10,7 +10,7 @@
 namespace polygmap {
 namespace {
 
-constexpr std::size_t kNear = 1, kFar = 2;
+constexpr RegionId kNear = 1, kFar = 2;
 constexpr std::int32_t kTop = 100, kBottom = 299;
 
 // A board across the picture's axis, 1 m away, before a wall at 1.3 m, between two straight sides.
@@ -27,17 +27,17 @@ class SurfaceSidesOfABoard : public testing::Test {
     raw_.depth = depth_->data();
     raw_.intrinsics = intrinsics_;
     raw_.range.set({}, intrinsics_.depth_unit_m);
-    planes_->count = 2;
-    (*planes_)[kNear].plane = test::plane_of(-Vec3::UnitZ(), 1.0);
-    (*planes_)[kFar].plane = test::plane_of(-Vec3::UnitZ(), 1.3);
+    regions_->count = 2;
+    (*regions_)[kNear].plane = test::plane_of(-Vec3::UnitZ(), 1.0);
+    (*regions_)[kFar].plane = test::plane_of(-Vec3::UnitZ(), 1.3);
   }
   void own(std::int32_t g, std::int32_t r) {
-    picture_->owners(r, g) = kNear;
-    profile_->add(g, static_cast<std::int16_t>(r), static_cast<std::int16_t>(r));
+    regions_->labels.at(g, r) = kNear;
+    regions_->extents[kNear].add(g, static_cast<std::int16_t>(r), static_cast<std::int16_t>(r));
   }
-  // beyond_mm: what is seen past the board; its columns belong to owner.
-  void paint(Side left, Side right, std::uint16_t beyond_mm, std::size_t owner) {
-    profile_ = std::make_unique<ColumnExtents>();
+  // beyond_mm: what is seen past the board; its columns are labelled so.
+  void paint(Side left, Side right, std::uint16_t beyond_mm, RegionId label) {
+    regions_->extents[kNear] = ColumnExtents{};
     double pixels = 0.0;
     for (std::int32_t r = 0; r < intrinsics_.height_px; ++r) {
       const double first = left.at + left.slope * r, past = right.at + right.slope * r;
@@ -49,16 +49,16 @@ class SurfaceSidesOfABoard : public testing::Test {
       for (std::int32_t g = 0; g < picture_->column_rays.columns; ++g) {
         const double middle = kColumn_px * g + 0.5 * (kColumn_px - 1);
         const bool inside = r >= kTop && r <= kBottom && middle >= first && middle < past;
-        picture_->owners(r, g) = static_cast<std::uint8_t>(owner);
+        regions_->labels.at(g, r) = label;
         if (inside) own(g, r);
       }
     }
-    (*planes_)[kNear].piece_px = pixels;
+    (*regions_)[kNear].area_px = pixels;
   }
   [[nodiscard]] OutlineSide find(bool right) {
-    sides_->begin({}, {}, raw_, *picture_, *planes_);
-    sides_->find_ends(kNear, *profile_);
-    return sides_->find(kNear, *profile_, right);
+    sides_->begin({}, {}, raw_, *picture_, *regions_);
+    sides_->find_ends(kNear);
+    return sides_->find(kNear, right);
   }
   // The border between pixels c - 1 and c is at c - 0.5; half-resolution pixel i is where 2 i + 0.5 is.
   static void expect_on(const OutlineSide& found, Side truth) {
@@ -75,15 +75,14 @@ class SurfaceSidesOfABoard : public testing::Test {
   using Depth = Raster<std::uint16_t, kDepthWidth_px, kDepthHeight_px>;
   std::unique_ptr<Depth> depth_ = std::make_unique<Depth>();
   std::unique_ptr<FrameImage> picture_ = std::make_unique<FrameImage>();
-  std::unique_ptr<PlaneSet> planes_ = std::make_unique<PlaneSet>();
-  std::unique_ptr<ColumnExtents> profile_;
+  std::unique_ptr<Regions> regions_ = std::make_unique<Regions>();
   std::unique_ptr<SideLines> sides_ = std::make_unique<SideLines>();
   RawImage raw_;
   static constexpr Side kLeft{150.3, -0.11}, kRight{402.7, 0.17};
 };
 
 TEST_F(SurfaceSidesOfABoard, StraightSides_AreFoundWhetherOrNotThePlaneBeyondIsKnown) {
-  for (const std::size_t beyond : {std::size_t{0}, kFar}) {
+  for (const RegionId beyond : {kNoRegion, kFar}) {
     paint(kLeft, kRight, 1300, beyond);
     expect_on(find(false), kLeft);
     expect_on(find(true), kRight);
@@ -92,7 +91,7 @@ TEST_F(SurfaceSidesOfABoard, StraightSides_AreFoundWhetherOrNotThePlaneBeyondIsK
 
 TEST_F(SurfaceSidesOfABoard, WallCloseBehind_EndsTheBoardOnlyWhereItIsKnown) {
   // 4 mm are 1.6 sigmas: nothing that has left the board, but another plane if there is one.
-  (*planes_)[kFar].plane = test::plane_of(-Vec3::UnitZ(), 1.004);
+  (*regions_)[kFar].plane = test::plane_of(-Vec3::UnitZ(), 1.004);
   paint(kLeft, kRight, 1004, kFar);
   expect_on(find(true), kRight);
   paint(kLeft, kRight, 1004, 0);

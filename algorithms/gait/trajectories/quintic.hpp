@@ -2,11 +2,9 @@
 // Polynomials of degree five: continuous in position, speed and acceleration wherever two of them meet.
 #pragma once
 
-#include "algorithms/core/math/math.hpp"
+#include "algorithms/gait/trajectories/motion.hpp"
 
 namespace polygmap {
-
-inline constexpr double kTick_s = 0.002;  // one minor frame; times in the gait are integer ticks of it
 
 // 0 -> 1 for u in 0..1, with zero speed and acceleration at both ends; held outside.
 [[nodiscard]] constexpr double smooth_step(double u) noexcept {
@@ -17,12 +15,6 @@ inline constexpr double kTick_s = 0.002;  // one minor frame; times in the gait 
 [[nodiscard]] constexpr double smooth_window(double u, double begin, double end) noexcept {
   return smooth_step((u - begin) / (end - begin));
 }
-
-struct Motion {  // of one coordinate, SI units per second
-  double position = 0.0;
-  double speed = 0.0;
-  double acceleration = 0.0;
-};
 
 class Quintic {
  public:

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a step is to reach: what the planner of footsteps decides and the trajectories carry out.
+#pragma once
+
+#include "algorithms/core/messages/footholds.hpp"
+#include "algorithms/gait/footsteps/footstep_plan.hpp"
+
+namespace polygmap {
+
+enum class StepKind : std::uint8_t {
+  kFloor,     // while walking up
+  kLeading,   // the first foot onto the next tread
+  kTrailing,  // the second, beside it
+  kPassing,   // or past it onto the tread beyond
+};
+[[nodiscard]] constexpr bool onto_tread(StepKind kind) noexcept { return kind != StepKind::kFloor; }
+// It lands higher than the other foot stands, and the weight goes on to it.
+[[nodiscard]] constexpr bool leads(StepKind kind) noexcept {
+  return kind == StepKind::kLeading || kind == StepKind::kPassing;
+}
+
+struct StepGoal {
+  StepKind kind = StepKind::kFloor;
+  Foot foot = Foot::kLeft;
+  SolePose target;    // odom
+  Foothold foothold;  // the same, world
+};
+
+}  // namespace polygmap

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/states/body_plan.hpp"
+
+#include <algorithm>
+
+#include "algorithms/core/time.hpp"
+#include "algorithms/gait/states/state.hpp"
+#include "algorithms/robot/leg_dynamics.hpp"
+
+namespace polygmap {
+
+// What else there is, is set before it is read: a fresh object to copy from would take kilobytes of stack.
+void BodyPlan::reset() noexcept {
+  correction_ = {};
+  base_com_bias_m_.setZero();
+  landed_ = {};
+}
+
+void BodyPlan::place(const JointReference& joints, const Transform& plan_T_base) noexcept {
+  plan_T_base_ = plan_T_base;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    plan_T_sole_[index_of(leg)] = plan_T_base_ * joints.base_T_sole_reference(leg);
+  }
+  torso_state_ = TorsoTrajectory::placed({}, plan_T_base_, (plan_T_base_ * reference_p_com_m_).head<2>());
+}
+
+void BodyPlan::start(const JointReference& joints, const Transform& plan_T_base) noexcept {
+  place(joints, plan_T_base);
+  posture_.reset(joints.reference_rad(), reference_p_com_m_);
+}
+
+// The horizontal part of the torso's trajectory is the centre of mass's: the base follows from the legs' places, one
+// tick old.
+void BodyPlan::advance() noexcept {
+  torso_state_ = torso_.at(torso_tick_, com_.at(com_tick_));
+  plan_T_base_ = TorsoTrajectory::pose(torso_state_);
+  plan_T_base_.p_m.head<2>() -= (plan_T_base_.R * reference_p_com_m_).head<2>();
+}
+
+void BodyPlan::correct(const StateEstimate& state, double correction_time_s) noexcept {
+  correction_.update(state.odom_T_base, state.odom_v_base_mps, state.odom_T_base.R * state.base_w_base_radps,
+                     plan_T_base_, correction_time_s);
+}
+
+void BodyPlan::observe_reference(const RobotModel& robot, const JointVector& reference_rad,
+                                 const Vec2& odom_com_bias_m) noexcept {
+  // Evened out: neither the observer's steps nor those of the plan, when it is carried, may accelerate the links.
+  constexpr double kEven_s = 0.1;
+  const BodyFrames frames = body_frames(robot.legs, reference_rad);
+  const Vec3 base_bias_m = plan_T_base_.R.transpose() * Vec3{odom_com_bias_m.x(), odom_com_bias_m.y(), 0.0};
+  base_com_bias_m_ += kTick_s / kEven_s * (base_bias_m - base_com_bias_m_);
+  reference_p_com_m_ = centre_of_mass_m(robot.masses, base_p_links_m(robot.masses, frames)) - base_com_bias_m_;
+}
+
+LinkMotion::Acceleration BodyPlan::observe_links(const RobotModel& robot,
+                                                 std::array<Transform, kFootCount> plan_T_sole) noexcept {
+  if (landed_.held()) plan_T_sole[index_of(landed_.foot())] = landed_.plan_T_sole();
+  const Vec2 plan_p_com_m = com().position_m + (plan_T_base_.R * base_com_bias_m_).head<2>();
+  return posture_.update(robot, plan_T_base_, plan_p_com_m, plan_T_sole);
+}
+
+void BodyPlan::count_tick() noexcept {
+  com_tick_ = next_tick(com_tick_);
+  torso_tick_ = next_tick(torso_tick_);
+}
+
+void BodyPlan::carry_to_odometry() noexcept {
+  const Transform to_odom = odom_T_plan();
+  for (Transform& sole : plan_T_sole_) sole = to_odom * sole;
+  plan_T_base_ = to_odom * plan_T_base_;
+  torso_state_ = TorsoTrajectory::placed(torso_state_, plan_T_base_, (plan_T_base_ * reference_p_com_m_).head<2>());
+  landed_.carry(to_odom);
+  posture_.carry(to_odom);
+  correction_.reset();
+}
+
+void BodyPlan::move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept {
+  torso_.plan(torso_state_, height_m, yaw_rad, ticks, height_ticks);
+  torso_tick_ = 0;
+}
+
+ComPlan& BodyPlan::renewed_com() noexcept {
+  com_tick_ = 0;
+  return com_;
+}
+
+void BodyPlan::rest_over(const ComPlan::Params& params, const Vec2& plan_p_m) noexcept {
+  ZmpKnots knots;
+  (void)knots.try_push_back({params.zmp_offset_ticks, plan_p_m});
+  renewed_com().plan(params, com(), knots);
+}
+
+void BodyPlan::land(Foot foot, bool felt, std::int64_t now_ns) noexcept {
+  landed_.land(foot, felt, now_ns, odom_T_plan() * plan_T_sole(foot), plan_T_sole(foot));
+  posture_.restart();  // the swing foot is where it was steered to, and stops
+}
+
+void BodyPlan::hold_landed_foot(const LandedFootParams& params, const JointFeedback& feedback,
+                                std::int64_t now_ns) noexcept {
+  if (!landed_.held()) return;
+  landed_.update(params, feedback, now_ns);
+  if (landed_.held()) {
+    set_sole(landed_.foot(), plan_T_odom() * landed_.odom_T_sole());
+  } else {
+    posture_.restart();  // from where it was planned to where it was held
+  }
+}
+
+void BodyPlan::release_landed_foot() noexcept {
+  if (landed_.held()) posture_.restart();
+  landed_.release();
+}
+
+}  // namespace polygmap

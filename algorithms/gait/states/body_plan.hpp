@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the plan has the body, tick by tick. The plan frame is odometry as it was when the last shift or swing began,
+// in which standing feet do not move and the joint commands never jump.
+#pragma once
+
+#include "algorithms/core/messages/state.hpp"
+#include "algorithms/gait/joints/base_correction.hpp"
+#include "algorithms/gait/joints/joint_reference.hpp"
+#include "algorithms/gait/joints/planned_posture.hpp"
+#include "algorithms/gait/states/landed_foot.hpp"
+#include "algorithms/gait/trajectories/com_plan.hpp"
+#include "algorithms/gait/trajectories/torso.hpp"
+
+namespace polygmap {
+
+class BodyPlan {
+ public:
+  void reset() noexcept;
+  // At rest where the joints' reference puts the feet.
+  void place(const JointReference& joints, const Transform& plan_T_base) noexcept;
+  // The same, and the links' motion is that of a body at rest.
+  void start(const JointReference& joints, const Transform& plan_T_base) noexcept;
+
+  // One tick: the plan's next pose, then, where the estimate is known, how far it is off.
+  void advance() noexcept;
+  void correct(const StateEstimate& state, double correction_time_s) noexcept;
+  void correction_missed() noexcept { correction_.missed(); }
+  // Once the tick's joint references are known: where they have the centre of mass, without what the masses have too
+  // much of it.
+  void observe_reference(const RobotModel& robot, const JointVector& reference_rad,
+                         const Vec2& odom_com_bias_m) noexcept;
+  // How the plan accelerates the links, without the steering of the feet: those of plan_T_sole are planned.
+  [[nodiscard]] LinkMotion::Acceleration observe_links(const RobotModel& robot,
+                                                       std::array<Transform, kFootCount> plan_T_sole) noexcept;
+  void count_tick() noexcept;
+
+  // The plan goes on in odometry as it is now.
+  void carry_to_odometry() noexcept;
+  void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
+  // The plan of the centre of mass, to be made anew from this tick on.
+  [[nodiscard]] ComPlan& renewed_com() noexcept;
+  // The centre of mass comes to rest there.
+  void rest_over(const ComPlan::Params& params, const Vec2& plan_p_m) noexcept;
+  void set_sole(Foot foot, const Transform& plan_T_sole) noexcept { plan_T_sole_[index_of(foot)] = plan_T_sole; }
+  void restart_posture() noexcept { posture_.restart(); }
+
+  // The foot stands where it is planned to be, and is held there in odometry.
+  void land(Foot foot, bool felt, std::int64_t now_ns) noexcept;
+  void hold_landed_foot(const LandedFootParams& params, const JointFeedback& feedback, std::int64_t now_ns) noexcept;
+  void release_landed_foot() noexcept;
+
+  [[nodiscard]] const Transform& plan_T_base() const noexcept { return plan_T_base_; }
+  [[nodiscard]] const std::array<Transform, kFootCount>& plan_T_sole() const noexcept { return plan_T_sole_; }
+  [[nodiscard]] const Transform& plan_T_sole(Foot foot) const noexcept { return plan_T_sole_[index_of(foot)]; }
+  [[nodiscard]] SolePair soles() const noexcept { return {sole_pose(plan_T_sole_[0]), sole_pose(plan_T_sole_[1])}; }
+  [[nodiscard]] Transform odom_T_plan() const noexcept { return correction_.odom_T_plan(plan_T_base_); }
+  [[nodiscard]] Transform plan_T_odom() const noexcept { return odom_T_plan().inverse(); }
+  // x and y: of the centre of mass.
+  [[nodiscard]] const TorsoTrajectory::State& torso() const noexcept { return torso_state_; }
+  [[nodiscard]] double height_m() const noexcept { return torso_state_[2].position; }
+  [[nodiscard]] HorizontalMotion com() const noexcept { return TorsoTrajectory::horizontal(torso_state_); }
+  [[nodiscard]] double drive_share(const DriveModel& drives, Foot leg) const noexcept {
+    return posture_.drive_share(drives, leg);
+  }
+
+ private:
+  TorsoTrajectory torso_;
+  TorsoTrajectory::State torso_state_{};
+  std::int32_t torso_tick_ = 0;  // of the torso's plan, saturates
+  ComPlan com_;
+  std::int32_t com_tick_ = 0;  // of the plan of the centre of mass, likewise
+  Transform plan_T_base_;
+  std::array<Transform, kFootCount> plan_T_sole_;
+  BaseCorrection correction_;
+  PlannedPosture posture_;
+  Vec3 reference_p_com_m_ = Vec3::Zero();  // centre of mass of the posture last asked for, base frame, without the next
+  Vec3 base_com_bias_m_ = Vec3::Zero();    // what the masses have too much of it
+  LandedFoot landed_;
+};
+
+}  // namespace polygmap

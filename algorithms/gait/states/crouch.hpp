@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// On two feet a body off its plan needs longer legs than planned: the torso is lower by as much.
+#pragma once
+
+#include "algorithms/gait/states/state.hpp"
+
+namespace polygmap {
+
+class Crouch {
+ public:
+  static constexpr double kStep_m = 0.005;  // less is not worth a new plan of the torso
+
+  // The torso is to be there when nothing is off: as low as the body is off now.
+  void begin(const GaitInput& in, const GaitShared& gait, double height_m, double yaw_rad) noexcept {
+    height_m_ = height_m;
+    yaw_rad_ = yaw_rad;
+    crouched_m_ = wanted_m(in, gait.params);
+  }
+  // One tick: lower, as soon as it is needed for longer than an estimate jumps. rest_ticks: of the torso's plan.
+  void update(const GaitInput& in, GaitShared& gait, std::int32_t rest_ticks) noexcept {
+    constexpr std::int32_t kOff_ticks = 5, kCrouch_ticks = 100;
+    const double wanted = wanted_m(in, gait.params);
+    if (wanted < crouched_m_ + kStep_m) {
+      off_ticks_ = 0;
+      return;
+    }
+    if (++off_ticks_ < kOff_ticks) return;
+    crouched_m_ = wanted;
+    gait.plan.move_torso(height_m(), yaw_rad_, std::max(rest_ticks, kCrouch_ticks), kCrouch_ticks);
+  }
+  void set_upright_height_m(double height_m) noexcept { height_m_ = height_m; }
+
+  [[nodiscard]] bool crouches() const noexcept { return crouched_m_ > 0.0; }
+  [[nodiscard]] double height_m() const noexcept { return height_m_ - crouched_m_; }
+  [[nodiscard]] double upright_height_m() const noexcept { return height_m_; }
+  [[nodiscard]] double yaw_rad() const noexcept { return yaw_rad_; }
+
+ private:
+  [[nodiscard]] static double wanted_m(const GaitInput& in, const GaitParams& params) noexcept {
+    const double off_m = in.odom_dcm_error_m.norm();
+    const bool falls = off_m > params.swing.timing.falling_outward_m;
+    return falls ? std::min(params.crouch.gain * off_m, params.crouch.max_m) : 0.0;
+  }
+
+  double height_m_ = 0.0, yaw_rad_ = 0.0;  // plan frame, upright
+  double crouched_m_ = 0.0;
+  std::int32_t off_ticks_ = 0;  // for which more was wanted
+};
+
+}  // namespace polygmap

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+// What of the gait can be tuned.
+#pragma once
+
+#include "algorithms/gait/balance/balance.hpp"
+#include "algorithms/gait/footsteps/climb_planner.hpp"
+#include "algorithms/gait/joints/joint_reference.hpp"
+#include "algorithms/gait/trajectories/step_plan.hpp"
+#include "algorithms/gait/trajectories/swing_timing.hpp"
+
+namespace polygmap {
+
+// On two feet, a body off its plan stands lower.
+struct CrouchParams {
+  double gain = 1.0;
+  double max_m = 0.04;
+
+  static void visit(auto& p, auto& field) {
+    field("gain", p.gain, 0.0, 10.0, "The torso goes lower by this for each metre of the divergent component's error.");
+    field("max_m", p.max_m, 0.0, 0.2, "The torso goes no lower.");
+  }
+};
+
+// Before the first step onto the stairs both legs stretch: past straight knees the camera sees the toes, which tell
+// where it sits (toe_detector.hpp).
+struct ToeCalibrationParams {
+  double height_m = 0.86;
+  std::int32_t ticks = 550;
+
+  static void visit(auto& p, auto& field) {
+    field("height_m", p.height_m, 0.7, 0.95, "Base above the soles: past straight knees the camera sees the toes.");
+    field("ticks", p.ticks, 0, 5000,
+          "The robot stands tall for so long: up in settle_ticks, then half a second, 15 pictures; 0: never.");
+  }
+};
+
+struct StandingParams {
+  std::int32_t settle_ticks = 300;
+  std::int32_t start_patience_ticks = 1500;
+  std::int32_t patience_ticks = 500;
+  std::int32_t unsteady_patience = 3;
+  ToeCalibrationParams toe_calibration;
+
+  static void visit(auto& p, auto& field) {
+    field("settle_ticks", p.settle_ticks, 2, 5000, "The body goes to the middle between the feet in this time.");
+    field("start_patience_ticks", p.start_patience_ticks, 0, 100000,
+          "Before the first step the gait stops when one obstruction lasts so long without a break.");
+    field("patience_ticks", p.patience_ticks, 0, 100000,
+          "After the first step, or at the top, the gait stops when one obstruction lasts so long: 1 s.");
+    field("unsteady_patience", p.unsteady_patience, 1, 100,
+          "Obstructions that change are waited for this many times as long.");
+    field("toe_calibration", p.toe_calibration);
+  }
+};
+
+struct WeightShiftParams {
+  double absorb_m = 0.015;
+  double absorb_rad = 0.035;
+  std::int32_t reshift_ticks = 125;
+  std::int32_t max_shifts = 9;
+
+  static void visit(auto& p, auto& field) {
+    field("absorb_m", p.absorb_m, 0.0, 0.1, "A target that moves no farther up to lift-off needs no new shift.");
+    field("absorb_rad", p.absorb_rad, 0.0, 0.5, "A target that turns no farther up to lift-off needs no new shift.");
+    field("reshift_ticks", p.reshift_ticks, 2, 2000, "Another shift over the same foot takes so long.");
+    field("max_shifts", p.max_shifts, 1, 1000, "There are no more shifts for one swing.");
+  }
+};
+
+struct SwingParams {
+  SwingTiming::Params timing;
+  double touch_force_n = 15.0;
+  double early_m = 0.005;
+  std::int32_t scrape_ticks = 5;
+  double late_m = 0.005;
+  double blocked_m = 0.008;
+  double max_lowering_m = 0.055;
+  double abort_share = 0.38;
+  double abort_passing_ticks = 45.0;
+  double abort_landing_m = 0.01;
+  std::uint32_t max_aborted = 4;
+  double soon_ticks = 100.0;
+  double soon_ticks_per_m = 450.0;
+  double soon_below_m = 0.03;
+  double beside_from_m = 0.1;
+  double side_margin_m = 0.01;
+
+  static void visit(auto& p, auto& field) {
+    field("timing", p.timing);
+    field("touch_force_n", p.touch_force_n, 1.0, 200.0, "A sole that feels this force touches something.");
+    field("early_m", p.early_m, 0.0, 0.1, "Contact this far above the target counts as early.");
+    field("scrape_ticks", p.scrape_ticks, 0, 200, "Early contact that lasts so long is ground and no scraping toe.");
+    field("late_m", p.late_m, 0.0, 0.1, "Contact this far below the target counts as late.");
+    field("blocked_m", p.blocked_m, 0.001, 0.1, "A foot this far above where it is asked to be does not go down.");
+    field("max_lowering_m", p.max_lowering_m, 0.0, 0.15,
+          "A foot that finds no ground so far below its target goes back.");
+    field("abort_share", p.abort_share, 0.0, 1.0,
+          "In this share of a swing a foot that falls outward goes back to where it stood.");
+    field("abort_passing_ticks", p.abort_passing_ticks, 0.0, 2000.0, "That of a passing swing, in ticks.");
+    field("abort_landing_m", p.abort_landing_m, 0.0, 0.1,
+          "A foot that goes back feels the ground within this of where it stood.");
+    field("max_aborted", p.max_aborted, 0, 1000, "As many swings in a row are aborted, then the gait stops.");
+    field("soon_ticks", p.soon_ticks, 1.0, 2000.0,
+          "A passing foot that falls outward goes straight to its target in this time at least.");
+    field("soon_ticks_per_m", p.soon_ticks_per_m, 0.0, 10000.0,
+          "It takes so much longer for each metre of that way, for the drives.");
+    field("soon_below_m", p.soon_below_m, 0.0, 0.5,
+          "A passing foot farther below its target does not go straight to it.");
+    field("beside_from_m", p.beside_from_m, 0.0, 1.0,
+          "A passing foot that far behind the standing one lands beside it.");
+    field("side_margin_m", p.side_margin_m, 0.0, 0.2,
+          "A sole that lands farther out keeps this from the end of its tread.");
+  }
+};
+
+// Until a foot that landed is pressed, it would go along with what the base is off its plan.
+struct LandedFootParams {
+  double pressed_n = 100.0;
+  std::int64_t hold_ns = 200 * kNsPerMs;
+  std::int64_t felt_hold_ns = 600 * kNsPerMs;
+
+  static void visit(auto& p, auto& field) {
+    field("pressed_n", p.pressed_n, 0.0, 500.0, "A foot that is pressed less is held where it landed.");
+    field("hold_ns", p.hold_ns, 0, 5000000000,
+          "A landed foot is held no longer where its force told nothing of the ground: it may be the sensor.");
+    field("felt_hold_ns", p.felt_hold_ns, 0, 5000000000,
+          "A landed foot is held no longer where its force told of the ground.");
+  }
+};
+
+struct GaitParams {
+  StepParams step;
+  ClimbPlanner::Params planner;
+  JointReference::Params joints;
+  Balance::Params balance;
+  StandingParams standing;
+  WeightShiftParams weight_shift;
+  SwingParams swing;
+  CrouchParams crouch;
+  LandedFootParams landed_foot;
+  double steady_m = 0.015;
+  double correction_time_s = 0.03;
+  std::int64_t steer_age_ns = 20 * kNsPerMs;
+  std::int64_t stop_age_ns = 100 * kNsPerMs;
+
+  static void visit(auto& p, auto& field) {
+    field("step", p.step);
+    field("planner", p.planner);
+    field("joints", p.joints);
+    field("balance", p.balance);
+    field("standing", p.standing);
+    field("weight_shift", p.weight_shift);
+    field("swing", p.swing);
+    field("crouch", p.crouch);
+    field("landed_foot", p.landed_foot);
+    field("steady_m", p.steady_m, 0.001, 0.5, "No foot lifts when the divergent component's error is larger.");
+    field("correction_time_s", p.correction_time_s, 0.002, 2.0,
+          "Time constant of the low-pass of the base's difference to the plan.");
+    field("steer_age_ns", p.steer_age_ns, 2000000, 1000000000,
+          "Older IMU and joint samples steer nothing and start nothing.");
+    field("stop_age_ns", p.stop_age_ns, 2000000, 5000000000,
+          "Two feet on the ground and samples as old: the gait stops.");
+  }
+};
+
+}  // namespace polygmap

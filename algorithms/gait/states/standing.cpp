@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/states/standing.hpp"
+
+#include <utility>
+
+namespace polygmap {
+
+void Standing::begin(const GaitInput& in, GaitShared& gait) noexcept {
+  rest_.settle(in, gait, gait.params.step.torso.height_m);
+}
+
+BetweenFeet Standing::end(const GaitInput& in, GaitShared& gait) noexcept {
+  if (std::exchange(toe_calibration_.active, false)) begin(in, gait);
+  return rest_;
+}
+
+void Standing::begin_toe_calibration(const GaitInput& in, GaitShared& gait, Foot leading) noexcept {
+  toe_calibration_ = {true, leading};
+  rest_.settle(in, gait, gait.params.standing.toe_calibration.height_m);
+}
+
+Transition Standing::tick(const GaitInput& in, GaitShared& gait) noexcept {
+  const StandingParams& params = gait.params.standing;
+  if (in.stop_requested) return Transition::stop(StopReason::kNone);
+  if (in.lost) return Transition::stop(StopReason::kStateStale);
+  if (!in.state.initialised || !in.usable) return {};
+  // A body that sways sideways is best off between the feet.
+  const Vec2 left = gait.plan.plan_T_base().R.col(1).head<2>();
+  const bool sways = !(std::abs(left.dot(in.odom_dcm_error_m)) <= gait.params.steady_m);
+  if ((gait.memory.retried || sways) && rest_.tick() < params.settle_ticks) return {};
+  // What it learns meanwhile may be that it does not stand straight yet: all of the time first, and once.
+  if (toe_calibration_.active && rest_.tick() < params.toe_calibration.ticks) return {};
+  const ClimbPlanner::Decision decision =
+      gait.planner.decide(situation(in, toe_calibration_.active, toe_calibration_.leading), in.footholds);
+  const bool was_tall = std::exchange(toe_calibration_.active, false);
+  gait.memory.toes_calibrated = gait.memory.toes_calibrated || was_tall;
+  if (decision.has_step) {
+    wait_ticks_ = 0;
+    if (!needs_toe_calibration(gait, decision.goal)) return Transition::shift(decision, false);
+    begin_toe_calibration(in, gait, decision.goal.foot);
+    return {};
+  }
+  if (was_tall) begin(in, gait);
+  return wait(gait, decision);
+}
+
+Transition Standing::wait(const GaitShared& gait, const ClimbPlanner::Decision& decision) noexcept {
+  const StandingParams& params = gait.params.standing;
+  StopReason reason = decision.obstruction;
+  if (reason == StopReason::kTop || reason == StopReason::kNoStaircase) {  // nothing higher is mapped
+    reason = gait.planner.treads_climbed() > 0 ? StopReason::kTop : StopReason::kNoStaircase;
+  }
+  wait_ticks_ = reason == waiting_for_ ? wait_ticks_ + 1 : 1;
+  waiting_for_ = reason;
+  ++gait.memory.idle_ticks;
+  const std::int32_t patience = gait.status.step.sequence == 0 ? params.start_patience_ticks : params.patience_ticks;
+  if (wait_ticks_ >= patience) {
+    return reason == StopReason::kTop ? Transition::finish() : Transition::stop(reason, decision.measured_m);
+  }
+  const bool unsteady = gait.memory.idle_ticks >= params.unsteady_patience * patience;
+  return unsteady ? Transition::stop(StopReason::kUnsteady) : Transition{};
+}
+
+}  // namespace polygmap

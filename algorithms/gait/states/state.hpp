@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the gait's states are given, what they share, and what they answer. A state is constructed afresh when it is
+// entered; whatever outlives it stands here.
+#pragma once
+
+#include <algorithm>
+
+#include "algorithms/core/messages/gait_status.hpp"
+#include "algorithms/gait/states/body_plan.hpp"
+
+namespace polygmap {
+
+// Ticks saturate far beyond every duration.
+[[nodiscard]] constexpr std::int32_t next_tick(std::int32_t tick) noexcept { return std::min(tick + 1, 1'000'000); }
+
+// Of one tick.
+struct GaitInput {
+  std::int64_t now_ns;
+  const StateEstimate& state;
+  const FootholdSet& footholds;  // the newest finished search
+  const JointFeedback& feedback;
+  Vec2 odom_dcm_error_m;  // of the divergent component, as last measured
+  bool usable;            // the estimate is fresh, and all of it numbers
+  bool lost;              // it is so old that the gait stops
+  bool stop_requested;
+};
+
+struct GaitMemory {
+  std::int32_t shifts = 0;      // since the last swing
+  std::int32_t idle_ticks = 0;  // without a step to do since the last swing
+  bool retried = false;         // the legs could not do a step from the motion the plan was in: once more, from rest
+  std::uint32_t aborted_swings = 0;  // since the last foot that landed
+  bool toes_calibrated = false;      // stood tall for it, or need not
+};
+
+struct GaitShared {
+  const RobotModel& robot;
+  const GaitParams& params;
+  BodyPlan& plan;
+  ClimbPlanner& planner;
+  GaitMemory& memory;
+  GaitStatus& status;
+};
+
+// Where the soles are, not where the plan has them: legs that carry more than believed give way by some millimetres.
+// leads: the weight is on its way for a leading step of that foot.
+[[nodiscard]] inline ClimbPlanner::Situation situation(const GaitInput& in, bool leads = false,
+                                                       Foot leading = Foot::kLeft) noexcept {
+  return {in.now_ns,
+          in.state.world_T_odom,
+          {sole_pose(in.state.odom_T_sole[0]), sole_pose(in.state.odom_T_sole[1])},
+          leads,
+          leading};
+}
+
+// Before the first leading step the toes are looked at, once.
+[[nodiscard]] inline bool needs_toe_calibration(const GaitShared& gait, const StepGoal& goal) noexcept {
+  return !gait.memory.toes_calibrated && goal.kind == StepKind::kLeading && gait.planner.treads_climbed() == 0;
+}
+
+// What a state wants next.
+struct Transition {
+  enum class To : std::uint8_t { kStay, kStanding, kWeightShift, kSwing, kEnd };
+  To to = To::kStay;
+  ClimbPlanner::Decision decision;  // of a shift or a swing
+  bool same_foot = false;           // of a shift: the weight is over the stance foot already
+  StepTry tried;                    // of a swing: the shape that the legs can do
+  GaitPhase phase = GaitPhase::kStopped;
+  StopReason reason = StopReason::kNone;  // of an end, both feet standing
+  double measured_m = 0.0;
+
+  [[nodiscard]] static Transition stand() noexcept { return {.to = To::kStanding, .decision = {}, .tried = {}}; }
+  [[nodiscard]] static Transition shift(const ClimbPlanner::Decision& decision, bool same_foot) noexcept {
+    return {.to = To::kWeightShift, .decision = decision, .same_foot = same_foot, .tried = {}};
+  }
+  [[nodiscard]] static Transition swing(const ClimbPlanner::Decision& decision, const StepTry& tried) noexcept {
+    return {.to = To::kSwing, .decision = decision, .tried = tried};
+  }
+  [[nodiscard]] static Transition stop(StopReason reason, double measured_m = 0.0) noexcept {
+    return {.to = To::kEnd, .decision = {}, .tried = {}, .reason = reason, .measured_m = measured_m};
+  }
+  [[nodiscard]] static Transition finish() noexcept {
+    return {.to = To::kEnd, .decision = {}, .tried = {}, .phase = GaitPhase::kFinished};
+  }
+};
+
+}  // namespace polygmap

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/states/swing_phase.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace polygmap {
+
+void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner::Decision& decision,
+                       const StepTry& tried) noexcept {
+  const StepParams& params = gait.params.step;
+  BodyPlan& body = gait.plan;
+  // The leg that carries now puts the base elsewhere than the two of them did: take it from there, and level it.
+  body.carry_to_odometry();
+  goal_ = decision.goal;
+  tried_ = tried;
+  const SolePair soles = body.soles();
+  StepPlan plan = plan_step(params, goal_, soles, tried_);
+  ComPlan& com = body.renewed_com();
+  com.plan(params.com, body.com(), zmp_of_swing(params, plan));
+  plan_torso(gait.robot.legs, params, soles, com, 0, plan);
+  path_.plan(gait.robot.sole, body.plan_T_sole(goal_.foot), goal_.target, plan.shape, plan.swing_ticks);
+  body.move_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
+  zmp_stance_m_ = plan.zmp_stance_m;
+  gait.planner.latched(situation(in), decision);
+
+  LatchedStep& step = gait.status.step;
+  step = {.sequence = step.sequence + 1,
+          .foot = goal_.foot,
+          .onto_tread = onto_tread(goal_.kind),
+          .height_mapped = onto_tread(goal_.kind),
+          .latch_stamp_ns = in.now_ns,
+          .map_stamp_ns = in.footholds.map_stamp_ns,
+          .target = goal_.foothold,
+          .odom_T_target = goal_.target.transform(),
+          .touch_down_stamp_ns = 0,
+          .odom_T_executed = {}};
+  gait.status.phase = GaitPhase::kSwing;
+  gait.status.stands[index_of(goal_.foot)] = false;
+  gait.memory.shifts = gait.memory.idle_ticks = 0;
+  gait.memory.retried = false;
+  body.release_landed_foot();
+}
+
+SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& params,
+                                     const Transform& odom_T_sole) noexcept {
+  const std::size_t i = index_of(goal_.foot);
+  Contact contact;
+  contact.loaded = in.feedback.foot_force_n[i] > params.touch_force_n;
+  if (!contact.loaded) unloaded_ = true;
+  // Each sample once: of a bus that falls silent the last one is read on and on.
+  if (std::exchange(felt_stamp_ns_, in.feedback.stamp_ns) != in.feedback.stamp_ns) {
+    touched_ticks_ = contact.loaded ? touched_ticks_ + 1 : 0;
+  }
+  const bool descending = 2.0 * timing_.tick() > path_.duration_ticks();
+  // What does not go down any more stands on something, whatever its force sensor says.
+  const double above_m = in.usable ? in.state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
+  const bool blocked = path_.lowered_m(timing_.tick()) > params.late_m && above_m > params.blocked_m;
+  // A toe that scrapes along the next riser feels a force too, for a moment: ground that comes early has to stay.
+  contact.early = path_.at(timing_.last_tick()).p_m.z() > goal_.target.position_m.z() + params.early_m;
+  const bool touches = contact.loaded && touched_ticks_ >= (contact.early ? params.scrape_ticks : 1);
+  contact.ground = (descending && unloaded_ && touches) || blocked;
+  return contact;
+}
+
+Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
+  const SwingParams& params = gait.params.swing;
+  if (timing_.goes_back()) return abort_swing(in, gait);
+  if (in.usable && timing_.speeds_up() && goal_.kind == StepKind::kPassing) land_soon(in, gait);
+  const Transform odom_T_sole = sole();
+  const double lowered_m = path_.lowered_m(timing_.tick());
+  const Contact contact = feel(in, params, odom_T_sole);
+  if (contact.ground) {
+    if (contact.early) ++gait.status.early_contacts;
+    if (lowered_m > params.late_m) ++gait.status.late_contacts;
+    return touch_down(in, gait, contact.loaded);
+  }
+  // A force that never left or is no longer told: the plan's end is the touch-down.
+  const bool told = in.now_ns - in.feedback.stamp_ns <= gait.params.steer_age_ns;
+  if (!(unloaded_ && told) && timing_.tick() > path_.duration_ticks()) return touch_down(in, gait, false);
+  if (lowered_m > params.max_lowering_m) {  // the ground that was seen is not there
+    ++gait.status.late_contacts;
+    timing_.retreat(params.timing);
+    gait.plan.restart_posture();
+    wait_over_stance(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
+    return {};
+  }
+  // The ground is late: the leg is to reach farther down.
+  const double late_tick = path_.duration_ticks() + gait.params.step.landing_hold_ticks;
+  if (timing_.tick() >= late_tick && timing_.last_tick() < late_tick) {
+    SolePose lowest = sole_pose(gait.plan.plan_T_sole(goal_.foot));
+    lowest.position_m.z() -= params.max_lowering_m;
+    lower_torso(gait, lowest);
+  }
+  gait.plan.set_sole(goal_.foot, beside_path(gait.plan, odom_T_sole));
+  return {};
+}
+
+// In the plan's frame, as far beside the path as the timing has it.
+Transform SwingPhase::beside_path(const BodyPlan& plan, const Transform& odom_T_sole) const noexcept {
+  Transform plan_T_sole = plan.plan_T_odom() * odom_T_sole;
+  plan_T_sole.p_m += plan.plan_T_sole(other(goal_.foot)).R.col(1) * (side_sign(goal_.foot) * timing_.widened_m());
+  return plan_T_sole;
+}
+
+void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
+  const SwingParams& params = gait.params.swing;
+  const Transform& stance = gait.plan.plan_T_sole(other(goal_.foot));
+  const bool reaches_back = goal_.kind == StepKind::kFloor || goal_.kind == StepKind::kLeading;
+  const bool reaches_shortly = goal_.kind == StepKind::kPassing;  // the torso rises, and leaves its leg too short
+  const double until = reaches_back      ? params.abort_share * path_.duration_ticks()
+                       : reaches_shortly ? params.abort_passing_ticks
+                                         : 0.0;
+  const bool went_back = timing_.goes_back();
+  timing_.advance(params.timing,
+                  {.falling_outward_m = side_sign(goal_.foot) * in.odom_dcm_error_m.dot(stance.R.col(1).head<2>()),
+                   .turn_until_tick = until,
+                   .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
+                   .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m},
+                  path_.duration_ticks());
+  // The torso is on its way up: the foot is to reach where it stood all the same.
+  if (timing_.goes_back() && !went_back) lower_torso(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
+}
+
+// Of a passing foot, the rest of the way straight to the target, or beside the standing foot while it is still behind
+// it.
+void SwingPhase::land_soon(const GaitInput& in, GaitShared& gait) noexcept {
+  const SwingParams& params = gait.params.swing;
+  const StepParams& step = gait.params.step;
+  BodyPlan& body = gait.plan;
+  const SolePose stance = sole_pose(body.odom_T_plan() * body.plan_T_sole(other(goal_.foot)));
+  const Mat3 R = rotation_z(stance.yaw_rad);
+  const Transform now = sole();
+  const bool beside = (R.transpose() * (now.p_m - stance.position_m)).x() < -params.beside_from_m;
+  const double apart_m = 2.0 * gait.robot.stance.half_width_m;
+  const Vec3 beside_m = stance.position_m + R * Vec3{0.0, side_sign(goal_.foot) * apart_m, 0.0};
+  const SolePose target = beside ? SolePose{beside_m, stance.yaw_rad} : goal_.target;
+  const Vec3 way_m = target.position_m - now.p_m;
+  const auto ticks = static_cast<std::int32_t>(params.soon_ticks + params.soon_ticks_per_m * way_m.head<2>().norm());
+  // Below its nosing the tread is not to be had straight, and toes point down.
+  const double toe_m = (now * Vec3{gait.robot.sole.collision.toe_x_m, 0.0, 0.0}).z();
+  const bool from_below = target.position_m.z() - std::min(toe_m, now.p_m.z()) > params.soon_below_m;
+  if (from_below || timing_.tick() + ticks >= path_.duration_ticks()) return;
+  body.carry_to_odometry();
+  if (beside) land_beside(in, gait, target);
+  const SolePair soles = body.soles();
+  StepPlan plan = plan_step(step, goal_, soles, tried_);
+  plan.swing_ticks = ticks;
+  ComPlan& com = body.renewed_com();
+  com.plan(step.com, body.com(), zmp_of_swing(step, plan));
+  plan_torso(gait.robot.legs, step, soles, com, 0, plan);
+  body.move_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, ticks, ticks);
+  path_.redirect(timing_.tick(), timing_.pace(), target, ticks);
+  timing_.begin_straight();
+  zmp_stance_m_ = plan.zmp_stance_m;
+}
+
+// The step's new goal: the standing foot's tread.
+void SwingPhase::land_beside(const GaitInput& in, GaitShared& gait, const SolePose& target) noexcept {
+  goal_.kind = StepKind::kTrailing;
+  goal_.target = target;
+  const Transform world_T_sole = in.state.world_T_odom * target.transform();
+  goal_.foothold = {.position_m = world_T_sole.p_m,
+                    .yaw_rad = yaw_of(world_T_sole.R),
+                    .polygon_id = gait.planner.tread_id(),
+                    .last_seen_ns = goal_.foothold.last_seen_ns,
+                    .side_room_m = goal_.foothold.side_room_m};  // as much as above: both are of one staircase
+  gait.planner.passing_ends_beside(goal_);
+  LatchedStep& step = gait.status.step;
+  step.target = goal_.foothold;
+  step.odom_T_target = target.transform();
+  step.height_mapped = false;
+}
+
+// The only way that is known to be free is the one it came: the swing backwards.
+Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexcept {
+  const SwingParams& params = gait.params.swing;
+  const std::size_t i = index_of(goal_.foot);
+  const Transform odom_T_sole = sole();
+  const double above_m = odom_T_sole.p_m.z() - path_.start_height_m();
+  const bool loaded = in.feedback.foot_force_n[i] > params.touch_force_n, all_the_way = timing_.tick() < 0.0;
+  const bool lands = loaded && (all_the_way || above_m < params.abort_landing_m);
+  if (!lands && !(all_the_way && above_m < -params.abort_landing_m)) {
+    gait.plan.set_sole(goal_.foot, beside_path(gait.plan, odom_T_sole));
+    return {};
+  }
+  gait.status.stands[i] = true;
+  ++gait.status.aborted_swings;
+  gait.planner.swing_aborted();
+  gait.plan.restart_posture();
+  gait.plan.carry_to_odometry();
+  gait.status.phase = GaitPhase::kDoubleSupport;
+  gait.memory.retried = true;
+  if (timing_.no_ground()) return Transition::stop(StopReason::kGroundMissing);
+  if (++gait.memory.aborted_swings >= params.max_aborted) return Transition::stop(StopReason::kToppling);
+  return Transition::stand();
+}
+
+Transition SwingPhase::touch_down(const GaitInput& in, GaitShared& gait, bool felt) noexcept {
+  const std::size_t i = index_of(goal_.foot);
+  BodyPlan& body = gait.plan;
+  LatchedStep& step = gait.status.step;
+  step.touch_down_stamp_ns = in.now_ns;
+  step.odom_T_executed = in.usable ? in.state.odom_T_sole[i] : body.odom_T_plan() * body.plan_T_sole(goal_.foot);
+  gait.status.stands[i] = true;
+  body.land(goal_.foot, felt, in.now_ns);
+  gait.memory.aborted_swings = 0;
+  gait.planner.landed();
+  gait.status.treads_climbed = gait.planner.treads_climbed();
+  gait.status.phase = GaitPhase::kDoubleSupport;
+  body.carry_to_odometry();
+  return Transition::stand();
+}
+
+// As low as the sole asks for, plan frame, and the standing one allows.
+void SwingPhase::lower_torso(GaitShared& gait, const SolePose& sole) const noexcept {
+  constexpr double kSpare_m = 0.02;  // of its height: the base is not right over the centre of mass
+  SolePair soles = gait.plan.soles();
+  soles[index_of(goal_.foot)] = sole;
+  const TorsoPose low = torso_over(gait.robot.legs, gait.params.step.torso, other(goal_.foot), soles);
+  const double height_m = std::min(low.position_m.z() - kSpare_m, gait.plan.height_m());
+  const std::int32_t ticks = lowering_ticks(gait.plan.height_m() - height_m);
+  gait.plan.move_torso(height_m, low.yaw_rad, ticks, ticks);
+}
+
+// No ground: the weight rests over the stance foot, as far towards the free foot as the sole carries. The ankle roll of
+// a folded leg has little range.
+void SwingPhase::wait_over_stance(GaitShared& gait, const SolePose& sole) const noexcept {
+  constexpr double kInward_m = 0.01;
+  lower_torso(gait, sole);
+  const Vec3 inward_m = gait.plan.plan_T_sole(other(goal_.foot)).R.col(1) * (side_sign(goal_.foot) * kInward_m);
+  gait.plan.rest_over(gait.params.step.com, zmp_stance_m_ + inward_m.head<2>());
+}
+
+}  // namespace polygmap

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// One foot swings, from lift-off to touch-down, or back to where it stood. It is steered in odometry.
+#pragma once
+
+#include "algorithms/gait/states/state.hpp"
+
+namespace polygmap {
+
+class SwingPhase {
+ public:
+  // The foot lifts off for the decision's goal, which is latched; tried: the shape that the legs can do.
+  void begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner::Decision& decision,
+             const StepTry& tried) noexcept;
+  [[nodiscard]] Transition tick(const GaitInput& in, GaitShared& gait) noexcept;
+  // The pace of the next tick.
+  void follow(const GaitInput& in, GaitShared& gait) noexcept;
+  // On its path, without steering.
+  [[nodiscard]] Transform sole() const noexcept { return path_.at(timing_.tick()); }
+  [[nodiscard]] Foot foot() const noexcept { return goal_.foot; }
+
+ private:
+  struct Contact {
+    bool loaded = false;  // felt by the sole
+    bool early = false;   // above the target
+    bool ground = false;  // the foot stands on something
+  };
+  [[nodiscard]] Contact feel(const GaitInput& in, const SwingParams& params, const Transform& odom_T_sole) noexcept;
+  [[nodiscard]] Transition abort_swing(const GaitInput& in, GaitShared& gait) noexcept;
+  [[nodiscard]] Transition touch_down(const GaitInput& in, GaitShared& gait, bool felt) noexcept;
+  [[nodiscard]] Transform beside_path(const BodyPlan& plan, const Transform& odom_T_sole) const noexcept;
+  void land_soon(const GaitInput& in, GaitShared& gait) noexcept;
+  void land_beside(const GaitInput& in, GaitShared& gait, const SolePose& target) noexcept;
+  void lower_torso(GaitShared& gait, const SolePose& sole) const noexcept;
+  void wait_over_stance(GaitShared& gait, const SolePose& sole) const noexcept;
+
+  StepGoal goal_;
+  StepTry tried_;
+  Swing path_;  // odometry
+  SwingTiming timing_;
+  Vec2 zmp_stance_m_ = Vec2::Zero();  // plan frame
+  std::int32_t touched_ticks_ = 0;    // for which the foot has been felt to touch,
+  std::int64_t felt_stamp_ns_ = 0;    // as told by then
+  bool unloaded_ = false;             // the foot was felt to leave the ground
+};
+
+}  // namespace polygmap

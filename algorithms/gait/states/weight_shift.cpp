@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/states/weight_shift.hpp"
+
+#include <utility>
+
+namespace polygmap {
+
+void WeightShift::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner::Decision& decision,
+                        bool same_foot) noexcept {
+  const StepParams& params = gait.params.step;
+  const std::int32_t reshift_ticks = gait.params.weight_shift.reshift_ticks;
+  BodyPlan& body = gait.plan;
+  body.carry_to_odometry();
+  decision_ = decision;
+  gait.status.phase = GaitPhase::kDoubleSupport;
+  const SolePair soles = body.soles();
+  StepPlan plan = plan_step(params, decision.goal, soles, kStepTries[0]);
+  if (same_foot) plan.shift_ticks = reshift_ticks;
+  ComPlan& com = body.renewed_com();
+  plan_shift(params, body.com(), reshift_ticks, plan, com);
+  shift_ticks_ = plan.shift_ticks;
+  plan_torso(gait.robot.legs, params, soles, com, shift_ticks_, plan);
+  crouch_.begin(in, gait, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad);
+  body.move_torso(crouch_.height_m(), crouch_.yaw_rad(), shift_ticks_, shift_ticks_);
+  search_.begin(gait.robot, params, decision.goal, decision.trailing, shift_ticks_, body.torso(), body.plan_T_sole());
+}
+
+Transition WeightShift::tick(const GaitInput& in, GaitShared& gait) noexcept {
+  const WeightShiftParams& params = gait.params.weight_shift;
+  if (in.stop_requested || in.lost) return Transition::stand();
+  if (search_.step(gait.robot, gait.params.step) == StepSearch::State::kImpossible) return legs_cannot(in, gait);
+  if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound || !in.usable) return {};
+  if (!(in.odom_dcm_error_m.norm() <= gait.params.steady_m)) return wait(params);
+  const StepGoal& planned = decision_.goal;
+  const ClimbPlanner::Decision decision =
+      gait.planner.decide(situation(in, planned.kind == StepKind::kLeading, planned.foot), in.footholds);
+  if (!decision.has_step) return wait(params);
+  if (close_to_planned(params, decision.goal)) return Transition::swing(decision, search_.plan().tried);
+  if (needs_toe_calibration(gait, decision.goal)) return Transition::stand();
+  // Over the other foot the weight has its whole way to go.
+  const bool same_foot =
+      decision.goal.foot == planned.foot && onto_tread(decision.goal.kind) == onto_tread(planned.kind);
+  return Transition::shift(decision, same_foot);
+}
+
+Transition WeightShift::legs_cannot(const GaitInput& in, GaitShared& gait) const noexcept {
+  const StepKind kind = decision_.goal.kind;
+  if (kind == StepKind::kPassing) {
+    if (!in.usable) return {};
+    gait.planner.refuse_passing();
+    return Transition::shift(gait.planner.decide(situation(in), in.footholds), false);
+  }
+  if (kind == StepKind::kFloor && gait.planner.shorten_floor_steps()) return Transition::stand();
+  if (!std::exchange(gait.memory.retried, true)) return Transition::stand();
+  return Transition::stop(StopReason::kLegsCannot, kind == StepKind::kLeading ? decision_.rise_m : 0.0);
+}
+
+void WeightShift::follow(const GaitInput& in, GaitShared& gait) noexcept {
+  crouch_.update(in, gait, shift_ticks_ - tick_);
+  tick_ = next_tick(tick_);
+}
+
+bool WeightShift::close_to_planned(const WeightShiftParams& params, const StepGoal& goal) const noexcept {
+  const StepGoal& planned = decision_.goal;
+  return goal.kind == planned.kind && goal.foot == planned.foot &&
+         (goal.target.position_m - planned.target.position_m).norm() <= params.absorb_m &&
+         std::abs(math::wrap_angle(goal.target.yaw_rad - planned.target.yaw_rad)) <= params.absorb_rad;
+}
+
+}  // namespace polygmap

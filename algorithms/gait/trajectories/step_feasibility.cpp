@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/trajectories/step_feasibility.hpp"
+
+#include <algorithm>
+
+#include "algorithms/core/time.hpp"
+#include "algorithms/robot/leg_dynamics.hpp"
+#include "algorithms/robot/leg_kinematics.hpp"
+
+namespace polygmap {
+
+StepKnots::StepKnots(const RobotModel& robot, const StepParams& params, std::int32_t knot_ticks, const StepPlan& step,
+                     const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept
+    : foot_(step.goal.foot),
+      soles_(soles),
+      shift_ticks_(step.shift_ticks),
+      swing_ticks_(step.swing_ticks),
+      knot_ticks_(std::max(knot_ticks, 1)),
+      count_(1 + (step.shift_ticks + step.swing_ticks + knot_ticks_ - 1) / knot_ticks_) {
+  const HorizontalMotion com = TorsoTrajectory::horizontal(from);
+  com_.plan(params.com, com, zmp_of_shift(params, step, ComPlan::zmp_under(params.com, com)));
+  StepPlan plan = step;
+  plan_torso(robot.legs, params, {sole_pose(soles[0]), sole_pose(soles[1])}, com_, plan.shift_ticks, plan);
+  torso_at_landing_ = plan.touch_down;
+  shift_.plan(from, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, plan.shift_ticks, plan.shift_ticks);
+  lean_.plan(shift_.at(plan.shift_ticks, com), plan.touch_down.position_m.z(), plan.touch_down.yaw_rad,
+             plan.swing_ticks, plan.rise_ticks);
+  swing_.plan(robot.sole, soles[index_of(foot_)], plan.goal.target, plan.shape, plan.swing_ticks);
+}
+
+StepKnot StepKnots::operator[](std::int32_t i) const noexcept {
+  StepKnot knot;
+  knot.tick = i * knot_ticks_;
+  knot.odom_T_sole = soles_;
+  const std::int32_t swing_tick = std::min(knot.tick - shift_ticks_, swing_.duration_ticks());
+  if (swing_tick < 0) {
+    knot.odom_T_base = TorsoTrajectory::pose(shift_.at(knot.tick, com_.at(knot.tick)));
+  } else {
+    knot.odom_T_base = TorsoTrajectory::pose(lean_.at(swing_tick, com_.at(knot.tick)));
+    knot.odom_T_sole[index_of(foot_)] = swing_.at(swing_tick);
+  }
+  return knot;
+}
+
+void StepFeasibility::begin(const RobotModel& robot, const StepKnots& knots) noexcept {
+  knots_ = knots;
+  check_ = {true, 1e9, 1e9, 0.0};
+  next_ = 0;
+  constexpr int kPasses = 3;  // of base and legs that follow each other
+  previous_.setZero();
+  for (int i = 0; i < kPasses; ++i) (void)solve(robot, 0, previous_, previous_);
+}
+
+bool StepFeasibility::solve(const RobotModel& robot, std::int32_t i, const JointVector& before_rad,
+                            JointVector& q_rad) const noexcept {
+  StepKnot knot = knots_[i];
+  const Vec3 base_p_com =
+      centre_of_mass_m(robot.masses, base_p_links_m(robot.masses, body_frames(robot.legs, before_rad)));
+  knot.odom_T_base.p_m.head<2>() -= (knot.odom_T_base.R * base_p_com).head<2>();
+  const Transform base_T_odom = knot.odom_T_base.inverse();
+  bool reachable = true;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const LegSolution s = solve_leg(robot.legs, leg, base_T_odom * knot.odom_T_sole[index_of(leg)]);
+    reachable = reachable && s.reachable;
+    q_rad.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
+  }
+  return reachable;
+}
+
+void StepFeasibility::check_joints(const DriveModel& drives, const JointVector& q_rad) noexcept {
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const JointLimits& limits = drives.limits[n];
+    const auto i = static_cast<Eigen::Index>(n);
+    // The knee's lower end is the stretched leg, which has a margin of its own.
+    double& low = n % kJointsPerLeg == kKnee ? check_.knee_rad : check_.joint_margin_rad;
+    low = std::min(low, q_rad[i] - limits.min_rad);
+    check_.joint_margin_rad = std::min(check_.joint_margin_rad, limits.max_rad - q_rad[i]);
+    if (next_ > 0) {
+      const double speed_radps = std::abs(q_rad[i] - previous_[i]) / (knots_.knot_ticks() * kTick_s);
+      check_.speed_share = std::max(check_.speed_share, speed_radps / limits.speed_radps);
+    }
+  }
+}
+
+bool StepFeasibility::advance(const RobotModel& robot, const StepParams& params, std::int32_t count) noexcept {
+  const std::int32_t end = std::min(next_ + count, knots_.count());
+  for (; next_ < end; ++next_) {
+    JointVector q_rad;
+    if (!solve(robot, next_, previous_, q_rad)) check_.feasible = false;
+    check_joints(robot.drives, q_rad);
+    previous_ = q_rad;
+    check_.feasible = check_.feasible && check_.joint_margin_rad >= params.joint_margin_rad &&
+                      check_.knee_rad >= params.knee_min_rad && check_.speed_share <= params.speed_share;
+    if (!check_.feasible) return true;
+  }
+  return next_ == knots_.count();
+}
+
+}  // namespace polygmap

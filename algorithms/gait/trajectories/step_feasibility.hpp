@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Can the legs do a step? Its knots (eqs 30, 37), followed with the leg kinematics.
+#pragma once
+
+#include "algorithms/gait/trajectories/step_plan.hpp"
+
+namespace polygmap {
+
+// One of the N knots of a step: foot and torso poses {p_f, p_t, t_i} of eq. (30), t_i = i dt of eq. (37). The paper's
+// robot is led from knot to knot; here they are a proof of feasibility only, and what is carried out are the smooth
+// trajectories that the knots are taken from (Swing, TorsoTrajectory, ComPlan).
+struct StepKnot {
+  std::array<Transform, kFootCount> odom_T_sole;
+  Transform odom_T_base;
+  std::int32_t tick = 0;
+};
+
+// The knots of a plan, each made when asked for: nothing is stored.
+class StepKnots {
+ public:
+  StepKnots() noexcept = default;
+  // knot_ticks: between two knots, at least 1.
+  StepKnots(const RobotModel& robot, const StepParams& params, std::int32_t knot_ticks, const StepPlan& plan,
+            const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept;
+  [[nodiscard]] const TorsoPose& torso_at_landing() const noexcept { return torso_at_landing_; }
+  [[nodiscard]] HorizontalMotion com_at_landing() const noexcept { return com_.at(shift_ticks_ + swing_ticks_); }
+  [[nodiscard]] std::int32_t count() const noexcept { return count_; }
+  [[nodiscard]] std::int32_t knot_ticks() const noexcept { return knot_ticks_; }
+  [[nodiscard]] StepKnot operator[](std::int32_t i) const noexcept;
+
+ private:
+  Foot foot_ = Foot::kLeft;
+  std::array<Transform, kFootCount> soles_;
+  TorsoTrajectory shift_, lean_;
+  ComPlan com_;
+  Swing swing_;
+  TorsoPose torso_at_landing_;
+  std::int32_t shift_ticks_ = 0, swing_ticks_ = 0, knot_ticks_ = 1, count_ = 0;
+};
+
+struct StepCheck {
+  bool feasible = false;
+  double joint_margin_rad = 0.0;  // least, over all knots and joints
+  double knee_rad = 0.0;          // least
+  double speed_share = 0.0;       // greatest, of the drive's limit
+};
+
+// Follows the knots with the leg kinematics, as many per call as the tick can spare. Every call is given the same robot
+// and parameters.
+class StepFeasibility {
+ public:
+  void begin(const RobotModel& robot, const StepKnots& knots) noexcept;
+  // Up to `count` knots; true when all are done or one cannot be. A knot costs two leg solutions and a centre of mass.
+  bool advance(const RobotModel& robot, const StepParams& params, std::int32_t count) noexcept;
+  [[nodiscard]] const StepCheck& check() const noexcept { return check_; }
+  [[nodiscard]] const StepKnots& knots() const noexcept { return knots_; }
+
+ private:
+  // Both legs at a knot; false when one is out of reach. The plan says where the centre of mass is: the base follows
+  // from the legs' places in `before`.
+  bool solve(const RobotModel& robot, std::int32_t i, const JointVector& before_rad, JointVector& q_rad) const noexcept;
+  void check_joints(const DriveModel& drives, const JointVector& q_rad) noexcept;
+
+  StepKnots knots_;
+  StepCheck check_;
+  JointVector previous_ = JointVector::Zero();
+  std::int32_t next_ = 0;
+};
+
+}  // namespace polygmap

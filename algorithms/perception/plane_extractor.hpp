@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Second stage of a frame: straight segments -> planes, and the spans of every column that show them.
+//
+// Planes grow from segments and are sharpened within spans that end where they meet. Facets of curved surfaces are
+// joined. Level and upright planes are found in what is left over, and all are measured within their final spans.
+#pragma once
+
+#include <cstdint>
+
+#include "algorithms/core/work.hpp"
+#include "algorithms/perception/image/depth_noise_model.hpp"
+#include "algorithms/perception/image/frame_image.hpp"
+#include "algorithms/perception/planes/plane_fit.hpp"
+#include "algorithms/perception/planes/plane_growing.hpp"
+#include "algorithms/perception/planes/plane_merging.hpp"
+#include "algorithms/perception/planes/plane_set.hpp"
+#include "algorithms/perception/planes/residual_planes.hpp"
+#include "algorithms/perception/planes/scanline_segments.hpp"
+#include "algorithms/perception/planes/span_boundaries.hpp"
+#include "algorithms/perception/planes/span_fit.hpp"
+
+namespace polygmap {
+
+class PlaneExtractor {
+ public:
+  struct Params {
+    PlaneGrowing::Params growing;
+    SpanBoundaries::Params boundaries;
+    PlaneMerging::Params merging;
+    ResidualPlaneSearch::Params residual;
+    PlaneFit::Params fit;
+    double kind_tilt_rad = 0.21;
+    double min_explained = 0.75;
+    double min_explained_curved = 0.55;
+
+    static void visit(auto& p, auto& field) {
+      field("growing", p.growing);
+      field("boundaries", p.boundaries);
+      field("merging", p.merging);
+      field("residual", p.residual);
+      field("fit", p.fit);
+      field("kind_tilt_rad", p.kind_tilt_rad, 0.01, 0.7,
+            "A fitted plane as near to level is a tread, to upright a riser.");
+      field("min_explained", p.min_explained, 0.0, 1.0,
+            "A plane explains this share of its pixels, over that of all planes.");
+      field("min_explained_curved", p.min_explained_curved, 0.0, 1.0,
+            "A plane of several facets explains this share of its pixels, over that of all planes.");
+    }
+  };
+  // What the next step begins with; a benchmark charges time to it.
+  enum class Part : std::uint8_t { kGrowing, kSharpening, kFacets, kResidual, kMeasuring, kDone };
+
+  // All but params, noise, intrinsics and up are read until the stage is done. Each segment is given its grown plane.
+  void begin(const Params& params, const DepthNoiseModel& noise, const CameraIntrinsics& intrinsics, const Vec3& up,
+             const FrameImage& image, ScanlineSegmentation::Columns& segments) noexcept;
+  Progress step(WorkBudget& budget) noexcept;
+  [[nodiscard]] Part part() const noexcept { return part_; }
+  // Of the fit that goes on, if part() is one.
+  [[nodiscard]] SpanFit::Part fit_part() const noexcept { return fit_.part(); }
+
+  [[nodiscard]] const PlaneSet& planes() const noexcept { return planes_; }
+  // The planes' spans, and where they meet. Writable: whoever numbers connected components writes them into the spans.
+  [[nodiscard]] SpanBoundaries& boundaries() noexcept { return boundaries_; }
+  // The noise as the measured planes' rows show it.
+  [[nodiscard]] const NoiseSamples& noise_samples() const noexcept { return boundaries_.noise_samples(); }
+  // Planes that found no room; spans, and pairs of planes.
+  [[nodiscard]] std::uint32_t plane_overflow() const noexcept { return plane_overflow_; }
+  [[nodiscard]] std::uint32_t span_overflow() const noexcept { return boundaries_.overflow() + merging_.overflow(); }
+
+ private:
+  std::int32_t do_piece() noexcept;  // returns its units
+  std::int32_t grow() noexcept;
+  std::int32_t sharpen() noexcept;
+  std::int32_t join_facets() noexcept;
+  std::int32_t search_residual() noexcept;
+  std::int32_t measure() noexcept;
+
+  void take_grown_planes() noexcept;
+  void take_joined_planes() noexcept;
+  void begin_search() noexcept;
+  // The first plane that was found.
+  [[nodiscard]] PlaneId take_found_planes() noexcept;
+  // Of all planes' pixels, the share that they explain.
+  [[nodiscard]] double explained_share() const noexcept;
+  // Solves for all planes, and drops those that explain less than the least shares of their pixels.
+  void solve(double least_share, double least_share_curved) noexcept;
+  void drop(PlaneId plane) noexcept;
+  [[nodiscard]] SurfaceKind kind_of(const InversePlane& plane) const noexcept;
+
+  Params params_;
+  DepthNoiseModel noise_;
+  CameraIntrinsics intrinsics_;
+  Vec3 up_ = -Vec3::UnitY();
+  const FrameImage* image_ = nullptr;
+  ScanlineSegmentation::Columns* segments_ = nullptr;
+  Part part_ = Part::kDone;
+  std::int32_t column_ = 0;  // next, of facets and of the residual
+  PlaneGrowing growing_;
+  SpanBoundaries boundaries_;
+  SpanFit fit_;
+  PlaneMerging merging_;
+  ResidualPlaneSearch search_;
+  PlaneMerging::PlaneIndex to_plane_{};  // from a grown plane
+  PlaneSet planes_;
+  std::uint32_t plane_overflow_ = 0;
+};
+
+}  // namespace polygmap

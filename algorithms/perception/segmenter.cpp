@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/segmenter.hpp"
+
+#include <algorithm>
+
+#include "algorithms/perception/image/work_units.hpp"
+
+namespace polygmap {
+
+void Segmenter::begin(const ScanlineSegmentation::Params& params, const DepthNoiseModel& noise, const RawImage& raw,
+                      const std::array<LegShapes, kFootCount>& body, const BodyMargin& margin) noexcept {
+  raw_ = &raw;
+  body_ = &body;
+  margin_ = margin;
+  shape_ = 0;
+  row_ = 0;
+  measured_px_ = outside_body_px_ = 0;
+  image_.rays.set(raw.intrinsics);
+  image_.column_rays.set(raw.intrinsics);
+  image_.any_body = false;
+  self_filter_.clear();
+  segmentation_.begin(params, noise, raw.intrinsics, image_.columns);
+  part_ = Part::kMask;
+}
+
+Progress Segmenter::step(WorkBudget& budget) noexcept {
+  while (part_ != Part::kDone && !budget.exhausted()) budget.spend(do_piece());
+  return part_ == Part::kDone ? Progress::kDone : Progress::kBusy;
+}
+
+std::int32_t Segmenter::do_piece() noexcept {
+  if (part_ == Part::kMask) {
+    self_filter_.add_shape(image_.rays, *body_, margin_, shape_);
+    if (++shape_ == SelfFilter::kShapes) part_ = Part::kRows;
+    return kMaxPieceUnits;
+  }
+  reduce_row();
+  if (++row_ != image_.column_rays.height_px) return kRowUnits;
+  segmentation_.finish();
+  part_ = Part::kDone;
+  return kMaxPieceUnits;
+}
+
+void Segmenter::reduce_row() noexcept {
+  std::uint8_t* flags = image_.flags.row(row_ / 2);
+  if (row_ % 2 == 0) {
+    const bool marked = self_filter_.try_mark_row(row_ / 2, image_.rays.width_px, flags);
+    image_.body_rows[static_cast<std::size_t>(row_ / 2)] = marked;
+    image_.any_body = image_.any_body || marked;
+  }
+  const bool body = image_.body_rows[static_cast<std::size_t>(row_ / 2)];
+  constexpr std::int32_t kLater = 2;  // rows
+  const std::int32_t columns = image_.column_rays.columns, last = image_.column_rays.height_px - 1;
+  const ReducedRow reduced = reduce_to_columns(raw_->range, raw_->row(row_), body ? flags : nullptr, columns,
+                                               image_.columns.inverse_depth.row(row_), image_.columns.valid.row(row_),
+                                               raw_->row(std::min(row_ + kLater, last)));
+  measured_px_ += reduced.measured_px;
+  outside_body_px_ += kColumn_px * (columns - reduced.body_columns);
+  constexpr std::int32_t kBlock = ScanlineSegmentation::kBlock;
+  if (row_ % kBlock == kBlock - 1 || row_ == last) {
+    static_assert(kBlock % ColumnImage::kTurn == 0);
+    image_.columns.turn(row_ - row_ % kBlock, row_);
+    segmentation_.add_rows(row_ - row_ % kBlock, row_);
+  }
+}
+
+double Segmenter::invalid_fraction() const noexcept {
+  return outside_body_px_ > 0 ? 1.0 - static_cast<double>(measured_px_) / outside_body_px_ : 1.0;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/surface_builder.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+namespace polygmap {
+namespace {
+
+// Pieces of a surface in units, none of which is measured apart: their sum over a frame is (firmware/schedule.hpp).
+constexpr std::int32_t kSkipUnits = 1;         // of a region that was given up, and the end
+constexpr std::int32_t kSideUnits = 4;         // one side: pixels of at most 14 rows, and a line through them
+constexpr std::int32_t kOutlineUnits = 5;      // columns' ends, smoothed, and their hull
+constexpr std::int32_t kNoLineUnits = 5;       // what lies beyond an end, without a line to look for
+constexpr std::int32_t kBeginLineUnits = 20;   // the same, and a line through the guesses
+constexpr std::int32_t kSearchLineUnits = 12;  // kColumnsPerPiece columns' change-points
+constexpr std::int32_t kFitLineUnits = 20;     // a line through the change-points
+constexpr std::int32_t kPolygonUnits = 10;     // cut, judged edge by edge
+
+constexpr std::int32_t kColumnsPerPiece = 48;
+constexpr double kStepLeast_m = 0.01;  // a neighbour's centre is this far above or below to count as such
+
+}  // namespace
+
+void SurfaceBuilder::begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw,
+                           const FrameImage& image, Regions& regions, SurfaceFrame& frame) noexcept {
+  params_ = params;
+  noise_ = noise;
+  raw_ = &raw;
+  image_ = &image;
+  regions_ = &regions;
+  frame_ = &frame;
+  id_ = 1;
+  line_begun_ = false;
+  std::fill_n(published_.begin(), regions.count + 1, PublishedSurface{});
+  counts_ = Counts{};
+  side_lines_.begin(params_.sides, noise_, raw, image, regions);
+  polygons_.configure(params_.polygons);
+  part_ = Part::kSideLeft;
+}
+
+Progress SurfaceBuilder::step(WorkBudget& budget) noexcept {
+  while (part_ != Part::kDone && !budget.exhausted()) budget.spend(do_piece());
+  return part_ == Part::kDone ? Progress::kDone : Progress::kBusy;
+}
+
+std::int32_t SurfaceBuilder::do_piece() noexcept {
+  switch (part_) {
+    case Part::kSideLeft:
+      return find_left_side();
+    case Part::kSideRight:
+      return find_right_side();
+    case Part::kOutline:
+      return build_outline();
+    case Part::kNosing:
+      return find_line(Edge::kNosing);
+    case Part::kBack:
+      return find_line(Edge::kBack);
+    case Part::kPolygon:
+      return build_polygon();
+    case Part::kDone:
+      break;
+  }
+  return 0;
+}
+
+std::int32_t SurfaceBuilder::find_left_side() noexcept {
+  if (id_ > regions_->count) {
+    part_ = Part::kDone;
+    return kSkipUnits;
+  }
+  if (!(*regions_)[id_].alive) {
+    ++id_;
+    return kSkipUnits;
+  }
+  side_lines_.find_ends(id_);
+  sides_.left = side_lines_.find(id_, false);
+  part_ = Part::kSideRight;
+  return kSideUnits;
+}
+
+std::int32_t SurfaceBuilder::find_right_side() noexcept {
+  sides_.right = side_lines_.find(id_, true);
+  part_ = Part::kOutline;
+  return kSideUnits;
+}
+
+std::int32_t SurfaceBuilder::build_outline() noexcept {
+  column_outline_.build(regions_->extents[id_], sides_, kMaxPolygonVertices - 4, outline_);
+  lines_ = SurfaceLines{};
+  part_ = (*regions_)[id_].kind == SurfaceKind::kTread ? Part::kNosing : Part::kPolygon;
+  return kOutlineUnits;
+}
+
+void SurfaceBuilder::look_beyond(Edge edge, Beyond& beyond) const noexcept {
+  constexpr std::int32_t kProbe_px = 8;
+  const std::int32_t down = edge == Edge::kNosing ? 1 : -1;
+  const ColumnExtents& extents = regions_->extents[id_];
+  for (std::int32_t g = extents.first_column; g <= extents.last_column; ++g) {
+    const std::int32_t end = end_of(edge, g), far = end + down * kProbe_px;
+    if (end < 0 || far < 0 || far >= image_->column_rays.height_px || image_->body(kColumn_px / 2 * g, far / 2))
+      continue;
+    // The first label from the end on: rows lie next to one another.
+    static_assert(kProbe_px == sizeof(std::uint64_t) && std::endian::native == std::endian::little);
+    std::uint64_t labels = 0;
+    std::memcpy(&labels, regions_->labels.column(g) + std::min(end + down, far), sizeof(labels));
+    const int first_bit = edge == Edge::kNosing ? std::countr_zero(labels) : 63 - std::countl_zero(labels);
+    const auto found = static_cast<RegionId>(labels != 0 ? labels >> (first_bit & ~7) : 0U);
+    beyond.region[static_cast<std::size_t>(g)] = found;
+    ++beyond.columns[found];
+  }
+}
+
+// In most columns, and on the right side of the surface (a nosing has it below, a back line above).
+RegionId SurfaceBuilder::most_beyond(Edge edge, const Beyond& beyond, bool riser_only) const noexcept {
+  const Regions& regions = *regions_;
+  const InversePlane& plane = regions[id_].plane;
+  RegionId most = kNoRegion;
+  for (RegionId p = 1; p <= regions.count; ++p) {
+    if (2 * beyond.columns[p] < params_.edge_lines.min_columns || p == id_ || !regions[p].alive) continue;
+    const double height_m = plane.distance_m(regions[p].centre_m);
+    if (edge == Edge::kNosing ? height_m > -kStepLeast_m : height_m < kStepLeast_m) continue;
+    if (riser_only && regions[p].kind != SurfaceKind::kRiser) continue;
+    if (most == kNoRegion || beyond.columns[p] > beyond.columns[most]) most = p;
+  }
+  return most;
+}
+
+bool SurfaceBuilder::begin_line(Edge edge) noexcept {
+  Beyond beyond;
+  look_beyond(edge, beyond);
+  // Above, a riser is the back; without one, a higher tread whose nosing hides the rest of this surface.
+  const RegionId riser = edge == Edge::kNosing ? kNoRegion : most_beyond(edge, beyond, true);
+  const RegionId other = riser != kNoRegion ? riser : most_beyond(edge, beyond, false);
+  if (other == kNoRegion) return false;
+  const ColumnExtents& extents = regions_->extents[id_];
+  edge_lines_.begin_guess();
+  for (std::int32_t g = extents.first_column; g <= extents.last_column; ++g) {
+    if (beyond.region[static_cast<std::size_t>(g)] == other) edge_lines_.add_guess(g, end_of(edge, g));
+  }
+  if (!edge_lines_.try_guess(params_.edge_lines, id_)) {
+    ++counts_.rejected_lines;
+    return false;
+  }
+  const Region &own = (*regions_)[id_], &far = (*regions_)[other];
+  const EdgeLineFinder::Measured near_side{own.plane, own.covariance}, far_side{far.plane, far.covariance};
+  edge_lines_.begin(params_.edge_lines, noise_, raw_->intrinsics, image_->column_rays, image_->columns, near_side,
+                    &far_side, edge == Edge::kNosing);
+  if (edge == Edge::kBack && riser == kNoRegion) {
+    lines_.occluder = edge_lines_.guessed_line();
+    return false;
+  }
+  return true;
+}
+
+std::int32_t SurfaceBuilder::find_line(Edge edge) noexcept {
+  const Part next = edge == Edge::kNosing ? Part::kBack : Part::kPolygon;
+  if (!line_begun_) {
+    line_begun_ = begin_line(edge);
+    if (line_begun_) return kBeginLineUnits;
+    part_ = next;
+    return kNoLineUnits;
+  }
+  if (!edge_lines_.step(kColumnsPerPiece)) return kSearchLineUnits;
+  EdgeLine line;
+  const EdgeLineFinder::Outcome outcome = edge_lines_.finish(line);
+  if (outcome == EdgeLineFinder::Outcome::kAgain) return kFitLineUnits;
+  counts_.rejected_lines += outcome == EdgeLineFinder::Outcome::kFound ? 0U : 1U;
+  (edge == Edge::kNosing ? lines_.nosing : lines_.back) = line;
+  line_begun_ = false;
+  part_ = next;
+  return kFitLineUnits;
+}
+
+std::int32_t SurfaceBuilder::build_polygon() noexcept {
+  Region& own = (*regions_)[id_];
+  SurfacePatch patch;
+  if (!polygons_.try_build(*image_, *regions_, id_, outline_, lines_, patch)) {
+    own.alive = false;
+    ++counts_.no_polygon;
+  } else if (!frame_->surfaces.try_push_back(patch)) {
+    own.alive = false;
+    ++frame_->dropped;
+    ++counts_.overflow;
+  } else {
+    published_[id_] = {static_cast<std::uint8_t>(frame_->surfaces.size()), lines_.nosing};
+  }
+  ++id_;
+  part_ = Part::kSideLeft;
+  return kPolygonUnits;
+}
+
+}  // namespace polygmap

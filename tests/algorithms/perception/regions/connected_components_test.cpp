@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/regions/connected_components.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "tests/support/column_scene.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr PlaneId kWall = 1;
+constexpr std::int16_t kTop = 200, kBottom = 259;
+
+// One plane 1 m ahead, seen in some columns of the picture; elsewhere nothing is measured.
+class ComponentsOfAPlane : public testing::Test {
+ protected:
+  ComponentsOfAPlane() {
+    const CameraIntrinsics intrinsics = test::ColumnScene().intrinsics;
+    image_->rays.set(intrinsics);
+    image_->column_rays.set(intrinsics);
+    image_->columns.inverse_depth.fill(0.0F);
+    planes_->count = 1;
+    FittedPlane& wall = (*planes_)[kWall];
+    wall.plane = test::plane_of(-Vec3::UnitZ(), 1.0);
+    wall.kind = SurfaceKind::kRiser;
+    wall.alive = true;
+    wall.moments.count = 4.0;
+    wall.residual2 = 4e-6;
+  }
+  void show(std::int32_t first_column, std::int32_t last_column, std::int16_t top = kTop,
+            std::int16_t bottom = kBottom) {
+    for (std::int32_t g = first_column; g <= last_column; ++g) {
+      ColumnSpan span;
+      span.top = top;
+      span.bottom = bottom;
+      span.plane = kWall;
+      ASSERT_TRUE(boundaries_->columns()[static_cast<std::size_t>(g)].try_push_back(span));
+    }
+  }
+  // What lies in those columns, m.
+  void see(std::int32_t first_column, std::int32_t last_column, float depth_m) {
+    for (std::int32_t g = first_column; g <= last_column; ++g) {
+      for (std::int32_t r = 0; r < kDepthHeight_px; ++r) image_->columns.inverse_depth(g, r) = 1.0F / depth_m;
+    }
+  }
+  void join() {
+    components_->find(boundaries_->columns(), image_->column_rays.columns);
+    EXPECT_EQ(components_->join({}, *boundaries_, *image_, *planes_, *regions_), 0U);
+  }
+  [[nodiscard]] RegionId region_in(std::int32_t column, std::size_t span = 0) const {
+    return components_->region_of(boundaries_->columns()[static_cast<std::size_t>(column)][span].component);
+  }
+
+  std::unique_ptr<FrameImage> image_ = std::make_unique<FrameImage>();
+  std::unique_ptr<PlaneSet> planes_ = std::make_unique<PlaneSet>();
+  std::unique_ptr<SpanBoundaries> boundaries_ = std::make_unique<SpanBoundaries>();
+  std::unique_ptr<ConnectedComponents> components_ = std::make_unique<ConnectedComponents>();
+  std::unique_ptr<Regions> regions_ = std::make_unique<Regions>();
+};
+
+TEST_F(ComponentsOfAPlane, WithNothingMeasuredBetween_AreOneRegion) {
+  show(20, 29), show(34, 39);
+  join();
+  ASSERT_EQ(regions_->count, 1U);
+  const Region& region = (*regions_)[kWall];
+  EXPECT_TRUE(region.alive);
+  EXPECT_EQ(region.source, kWall);
+  EXPECT_EQ(region.coplanar, kWall);
+  EXPECT_EQ(region.area_px, 16.0 * kColumn_px * (kBottom - kTop + 1));
+  EXPECT_NEAR(region.rmse_m, 1e-3, 1e-12);
+  EXPECT_EQ(region_in(20), kWall);
+  EXPECT_EQ(region_in(39), kWall);
+}
+
+TEST_F(ComponentsOfAPlane, WithSomethingFartherBetween_AreTwoRegionsOfThatPlane) {
+  show(20, 29), show(34, 39);
+  see(30, 33, 1.5F);
+  join();
+  ASSERT_EQ(regions_->count, 2U);
+  EXPECT_EQ(region_in(20), kWall) << "the larger one keeps the plane's number";
+  EXPECT_EQ(region_in(39), 2U);
+  EXPECT_EQ((*regions_)[2].source, kWall);
+  EXPECT_EQ((*regions_)[2].coplanar, kWall) << "the gap is narrower than the smaller one is wide";
+  EXPECT_LT((*regions_)[kWall].centre_m.x(), (*regions_)[2].centre_m.x());
+}
+
+TEST_F(ComponentsOfAPlane, FartherApartThanTheSmallerOneIsWide_CountAsTwoPlanes) {
+  show(10, 29), show(60, 65);
+  see(30, 59, 1.5F);
+  join();
+  ASSERT_EQ(regions_->count, 2U);
+  EXPECT_EQ((*regions_)[2].coplanar, 2U);
+}
+
+TEST_F(ComponentsOfAPlane, ThatAreTooSmall_AreInNoRegion) {
+  show(20, 29);
+  show(40, 41, 100, 108);  // 144 pixels
+  join();
+  EXPECT_EQ(regions_->count, 1U);
+  EXPECT_EQ(region_in(20), kWall);
+  EXPECT_EQ(region_in(40), kNoRegion);
+}
+
+TEST_F(ComponentsOfAPlane, OfAPlaneThatWasGivenUp_AreInNoRegion) {
+  (*planes_)[kWall].alive = false;
+  show(20, 29);
+  join();
+  EXPECT_FALSE((*regions_)[kWall].alive);
+  EXPECT_EQ(region_in(20), kNoRegion);
+}
+
+TEST_F(ComponentsOfAPlane, SpansThatShareNoRows_DoNotHangTogether) {
+  show(20, 29);
+  show(30, 39, kBottom + 1, kBottom + 60);
+  join();
+  const auto component = [&](std::size_t g) { return boundaries_->columns()[g][0].component; };
+  EXPECT_EQ(component(20), component(29));
+  EXPECT_EQ(component(30), component(39));
+  EXPECT_NE(component(29), component(30));
+}
+
+}  // namespace
+}  // namespace polygmap

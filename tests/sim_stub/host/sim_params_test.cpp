@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// `polygmap params`, and --params of the commands that run the module.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+
+#include "firmware/config/param_file.hpp"
+#include "sim_stub/host/cli/climb_command.hpp"
+#include "sim_stub/host/cli/params_command.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+struct Call {
+  int code = -1;
+  std::string out, err;
+};
+Call call(const std::vector<std::string>& arguments) {
+  std::ostringstream out, err;
+  const int code = polygmap_main(arguments, run_climb, out, err, false);
+  return {code, out.str(), err.str()};
+}
+
+std::string write(const std::string& text) {
+  const std::string path = testing::TempDir() + "polygmap_params_command_" +
+                           testing::UnitTest::GetInstance()->current_test_info()->name() + ".toml";
+  std::ofstream(path) << text;
+  return path;
+}
+
+TEST(ParamsCommand, List_ReadsBackToTheLastBit) {
+  const Call listed = call({"params", "list"});
+  EXPECT_EQ(listed.code, kExitPass);
+  Params params;
+  params.estimator.fusion.tau_s = 0.1;  // the file must bring it back
+  config::read_params(write(listed.out), params);
+  EXPECT_EQ(config::hash_of(params), config::hash_of(Params{}));
+  EXPECT_EQ(listed.out.find("# Parameters, hash " + config::hash_of(params)), 0U);
+}
+
+TEST(ParamsCommand, ListOfAFile_ShowsItsValues) {
+  const std::string file = write("estimator.fusion.tau_s = 2.5\n");
+  EXPECT_NE(call({"params", "list", "--params", file}).out.find("\ntau_s = 2.5  # 0 to 1000 s: "), std::string::npos);
+  const auto json = nlohmann::json::parse(call({"params", "list", "--json", "--params", file}).out);
+  bool found = false;
+  for (const auto& param : json.at("params")) {
+    if (param.at("name") != "estimator.fusion.tau_s") continue;
+    found = true;
+    EXPECT_EQ(param.at("value"), 2.5);
+    EXPECT_EQ(param.at("default"), 4.0);
+    EXPECT_EQ(param.at("unit"), "s");
+    EXPECT_EQ(param.at("max"), 1000.0);
+  }
+  EXPECT_TRUE(found);
+}
+
+TEST(ParamsCommand, Diff_SaysWhatIsNotTheDefault) {
+  const Call same = call({"params", "diff", write("estimator.fusion.tau_s = 4.0\n")});
+  EXPECT_EQ(same.out, "No parameter differs from its default.\n");
+  const Call other = call({"params", "diff", write("estimator.fusion.tau_s = 2\nself_filter = false\n")});
+  EXPECT_EQ(other.code, kExitPass);
+  EXPECT_EQ(other.out, "estimator.fusion.tau_s = 2  # default 4\nself_filter = false  # default true\n");
+}
+
+TEST(ParamsCommand, BadFile_IsOneSentenceAndExit2) {
+  const std::string file = write("estimator.fusion.tau = 2\n");
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"params", "diff", file},
+                                                {"params", "list", "--params", file},
+                                                {"climb", "--params", file},
+                                                {"params", "diff", "/nowhere"},
+                                                {"params"},
+                                                {"params", "list", "--params", ""}}) {
+    const Call refused = call(words);
+    EXPECT_EQ(refused.code, kExitUsage) << words[0];
+    EXPECT_EQ(refused.out, "");
+    EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+    EXPECT_TRUE(refused.err.starts_with("polygmap: ") && refused.err.ends_with(".\n")) << refused.err;
+  }
+}
+
+TEST(ParamsCommand, Docs_NameEveryParameterWithItsRange) {
+  const std::string out = call({"params", "docs"}).out;
+  Params params;
+  const auto rows = static_cast<std::size_t>(std::count(out.begin(), out.end(), '\n'));
+  EXPECT_GT(rows, config::param_table(params).params.size());
+  EXPECT_NE(out.find("| `max_age_s` | 0.4 | 0 to 0.5 s | A pose is no older"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace polygmap::sim
