@@ -2,17 +2,18 @@
 #include "firmware/control_lane.hpp"
 
 #include <cmath>
+#include <numeric>
 
 #include "scheduler/schedule_table.hpp"
 
 namespace polygmap {
 namespace {
 
-// A sensor that delivers every frame is missing when nothing came and its newest sample is at least this old. Frames
-// that catch up find everything read by the first of them; for a latency below one frame none of them is misled.
-constexpr std::int64_t kMissing_ns = kMinorFrame_ns;
+// A sensor that delivers every cycle is missing when nothing came and its newest sample is at least this old. Cycles
+// that catch up find everything read by the first of them; for a latency below one cycle none of them is misled.
+constexpr std::int64_t kMissing_ns = kCycle_ns;
 constexpr std::int64_t kLioTimeout_ns = 2 * kNsPerS;  // twenty poses
-constexpr int kMaxReadsPerFrame = 4;  // of one port: a backlog is worked off, a babbling driver is not followed
+constexpr int kMaxReadsPerCycle = 4;  // of one port: a backlog is worked off, a babbling driver is not followed
 
 bool all_finite(const JointCommand& command) noexcept {
   for (const JointSetpoint& joint : command.joints) {
@@ -29,12 +30,22 @@ std::uint32_t imu_rejections(const Estimator::Counters& counters) noexcept {
 std::uint32_t joint_rejections(const Estimator::Counters& counters) noexcept {
   return counters.joints_invalid + counters.joints_stale + counters.joints_future + counters.joints_jump;
 }
+std::uint32_t lio_rejections(const Estimator::Counters& counters) noexcept {
+  return std::accumulate(counters.lio.begin(), counters.lio.end(), 0U) - counters.lio_of(LioVerdict::kAccepted) -
+         counters.lio_of(LioVerdict::kRealigned);
+}
 
 }  // namespace
 
-ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometry& lio, LaneLink& link,
-                         const Params& params) noexcept
-    : imu_port_(imu), joint_port_(joints), lio_port_(lio), link_(link), params_(params) {
+ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometry& lio, ControlPerceptionLink& link,
+                         LaneHealths& health, const Params& params) noexcept
+    : imu_port_(imu),
+      joint_port_(joints),
+      lio_port_(lio),
+      link_(link),
+      healths_(health),
+      health_(health[kControlLane].own),
+      params_(params) {
   estimator_.reset(params.estimator, params.robot);
   Gait::Params gait = params.gait;
   if (!params.estimate_mount) gait.standing.toe_calibration.ticks = 0;
@@ -45,7 +56,7 @@ Progress ControlLane::sense(std::int64_t now_ns) noexcept {
   if (first_ns_ < 0) first_ns_ = now_ns;
   bool imu_came = false;
   ImuSample imu;
-  for (int i = 0; i < kMaxReadsPerFrame && imu_port_.try_read(imu); ++i) {
+  for (int i = 0; i < kMaxReadsPerCycle && imu_port_.try_read(imu); ++i) {
     estimator_.add_imu(imu, now_ns);
     imu_came = true;
   }
@@ -59,11 +70,11 @@ Progress ControlLane::sense(std::int64_t now_ns) noexcept {
   return Progress::kDone;
 }
 
-// A LIO pose meets the state of its stamp, which may be this frame's: after the tick. It moves the next one.
+// A LIO pose meets the state of its stamp, which may be this cycle's: after the tick. It moves the next one.
 Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
   estimator_.tick(gait_.status().stands);
   LioSample lio;
-  for (int i = 0; i < kMaxReadsPerFrame && lio_port_.try_read(lio); ++i) estimator_.add_lio(lio, now_ns);
+  for (int i = 0; i < kMaxReadsPerCycle && lio_port_.try_read(lio); ++i) estimator_.add_lio(lio, now_ns);
   answer_pose_request(now_ns);
   return Progress::kDone;
 }
@@ -104,24 +115,21 @@ Progress ControlLane::health(std::int64_t now_ns) noexcept {
   report_rejections(now_ns);
   report_lidar(now_ns);
   report_gait(now_ns);
-  (void)link_.health.try_take();  // the newest, or the last one again
   all_faults_ = health_;
-  all_faults_.merge(link_.health.front());
+  for (LaneHealth& lane : healths_) {
+    if (&lane.own == &health_) continue;
+    (void)lane.published.try_take();  // the newest, or the last one again
+    all_faults_.merge(lane.published.front());
+  }
   return Progress::kDone;
 }
 
 void ControlLane::report_rejections(std::int64_t now_ns) noexcept {
-  const Estimator::Counters& now = estimator_.counters();
-  const Estimator::Counters& seen = estimator_seen_;
-  health_.raise(Fault::kImuRejected, now_ns, imu_rejections(now) - imu_rejections(seen));
-  health_.raise(Fault::kJointFeedbackRejected, now_ns, joint_rejections(now) - joint_rejections(seen));
-  health_.raise(Limit::kHeightRejected, now_ns, now.height_rejected - seen.height_rejected);
-  for (std::size_t v = 0; v < kLioVerdictCount; ++v) {
-    const auto verdict = static_cast<LioVerdict>(v);
-    if (verdict == LioVerdict::kAccepted || verdict == LioVerdict::kRealigned) continue;
-    health_.raise(Fault::kLioRejected, now_ns, now.lio[v] - seen.lio[v]);
-  }
-  estimator_seen_ = now;
+  const Estimator::Counters& counters = estimator_.counters();
+  health_.follow(Fault::kImuRejected, now_ns, imu_rejections(counters));
+  health_.follow(Fault::kJointFeedbackRejected, now_ns, joint_rejections(counters));
+  health_.follow(Fault::kLioRejected, now_ns, lio_rejections(counters));
+  health_.follow(Limit::kHeightRejected, now_ns, counters.height_rejected);
 }
 
 void ControlLane::report_lidar(std::int64_t now_ns) noexcept {
@@ -133,17 +141,18 @@ void ControlLane::report_lidar(std::int64_t now_ns) noexcept {
 }
 
 void ControlLane::report_gait(std::int64_t now_ns) noexcept {
-  const GaitStatus& now = gait_.status();
-  health_.raise(Limit::kReachLimited, now_ns, now.ik_limited_ticks - gait_seen_.ik_limited_ticks);
-  health_.raise(Limit::kContactEarly, now_ns, now.early_contacts - gait_seen_.early_contacts);
-  health_.raise(Limit::kContactLate, now_ns, now.late_contacts - gait_seen_.late_contacts);
-  health_.raise(Limit::kFootPutBack, now_ns, now.aborted_swings - gait_seen_.aborted_swings);
-  if (now.phase == GaitPhase::kStopped && gait_seen_.phase != GaitPhase::kStopped) {
+  const GaitStatus& gait = gait_.status();
+  health_.follow(Limit::kReachLimited, now_ns, gait.ik_limited_ticks);
+  health_.follow(Limit::kContactEarly, now_ns, gait.early_contacts);
+  health_.follow(Limit::kContactLate, now_ns, gait.late_contacts);
+  health_.follow(Limit::kFootPutBack, now_ns, gait.aborted_swings);
+  const bool stopped = gait.phase == GaitPhase::kStopped;
+  if (stopped && !gait_stopped_) {
     health_.raise(Fault::kGaitStopped, now_ns);
-    if (now.stop_reason == StopReason::kMapStale) health_.raise(Fault::kMapStale, now_ns);
-    if (now.stop_reason == StopReason::kStateStale) health_.raise(Fault::kStateStale, now_ns);
+    if (gait.stop_reason == StopReason::kMapStale) health_.raise(Fault::kMapStale, now_ns);
+    if (gait.stop_reason == StopReason::kStateStale) health_.raise(Fault::kStateStale, now_ns);
   }
-  gait_seen_ = now;
+  gait_stopped_ = stopped;
 }
 
 void ControlLane::answer_pose_request(std::int64_t now_ns) noexcept {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sense, estimate, gait, command: in every minor frame.
+// Sense, estimate, gait, command: in every cycle.
 #pragma once
 
 #include "algorithms/core/work.hpp"
@@ -8,14 +8,13 @@
 #include "hal/ports/imu.hpp"
 #include "hal/ports/joint_bus.hpp"
 #include "hal/ports/lidar_odometry.hpp"
-#include "scheduler/health.hpp"
 
 namespace polygmap {
 
 class ControlLane {
  public:
-  ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometry& lio, LaneLink& link,
-              const Params& params) noexcept;
+  ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometry& lio, ControlPerceptionLink& link,
+              LaneHealths& health, const Params& params) noexcept;
 
   Progress sense(std::int64_t now_ns) noexcept;
   Progress estimate(std::int64_t now_ns) noexcept;
@@ -28,10 +27,9 @@ class ControlLane {
   [[nodiscard]] const StateEstimate& state() const noexcept { return estimator_.state(); }
   [[nodiscard]] const GaitStatus& gait_status() const noexcept { return gait_.status(); }
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
-  [[nodiscard]] const Health& all_faults() const noexcept { return all_faults_; }  // of both lanes, as of this frame
+  [[nodiscard]] const Health& all_faults() const noexcept { return all_faults_; }  // of all lanes, as of this cycle
   [[nodiscard]] const JointCommand& last_command() const noexcept { return command_; }
-  [[nodiscard]] Health& faults() noexcept { return health_; }
-  [[nodiscard]] const Health& faults() const noexcept { return health_; }
+  [[nodiscard]] const Health& faults() const noexcept { return health_; }  // of this lane
 
  private:
   void answer_pose_request(std::int64_t now_ns) noexcept;
@@ -43,20 +41,20 @@ class ControlLane {
   hal::Imu& imu_port_;
   hal::JointBus& joint_port_;
   hal::LidarOdometry& lio_port_;
-  LaneLink& link_;
+  ControlPerceptionLink& link_;
+  LaneHealths& healths_;
+  Health& health_;  // this lane's
   const Params& params_;
 
   Estimator estimator_;
   Gait gait_;
-  Health health_;
   Health all_faults_;
   FootholdSet footholds_;
   JointCommand command_;
   bool command_ready_ = false;
   bool lio_missing_ = false;
-  std::int64_t first_ns_ = -1;          // of the first frame: the time-out of a lidar that never speaks starts there
-  Estimator::Counters estimator_seen_;  // as of the last frame: what grew since is reported
-  GaitStatus gait_seen_;
+  bool gait_stopped_ = false;
+  std::int64_t first_ns_ = -1;          // of the first cycle: the time-out of a lidar that never speaks starts there
   std::uint32_t step_handed_over_ = 0;  // sequence of the last touch-down told to the estimator
 };
 

@@ -7,15 +7,17 @@ namespace polygmap {
 namespace {
 
 constexpr std::int64_t kCameraTimeout_ns = 200 * kNsPerMs;  // six frames
-constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers within two minor frames
+constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers within two cycles
 
 constexpr std::int32_t kLearnMountUnits = 190;  // both toes in sight: 95,000 instructions
 
 }  // namespace
 
-PerceptionLane::PerceptionLane(hal::DepthCamera& camera, LaneLink& link, const Params& params) noexcept
+PerceptionLane::PerceptionLane(hal::DepthCamera& camera, ControlPerceptionLink& link, LaneHealth& health,
+                               const Params& params) noexcept
     : camera_port_(camera),
       link_(link),
+      health_(health),
       params_(params),
       intrinsics_(camera.intrinsics()),
       extractor_(params.surfaces),
@@ -24,13 +26,12 @@ PerceptionLane::PerceptionLane(hal::DepthCamera& camera, LaneLink& link, const P
       search_(params.footholds, params.robot.sole) {}
 
 Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
-  link_.health.back() = health_;
-  link_.health.publish();
+  health_.publish();
   if (last_frame_ns_ < 0) last_frame_ns_ = now_ns;
   if (stage_ == FrameStage::kWaiting) {
     if (!camera_port_.try_acquire(frame_)) {
       if (now_ns - last_frame_ns_ > kCameraTimeout_ns) {
-        health_.raise(Fault::kDepthMissing, now_ns);
+        health_.own.raise(Fault::kDepthMissing, now_ns);
         last_frame_ns_ = now_ns;
       }
       return Progress::kIdle;
@@ -39,7 +40,7 @@ Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
     // The map was shed since the last picture: another one would be looked at for nothing, in time that is short.
     if (mapping_) {
       camera_port_.release();
-      health_.raise(Limit::kFrameLost, now_ns);
+      health_.own.raise(Limit::kFrameLost, now_ns);
       return Progress::kIdle;
     }
     link_.pose_request.back() = {++request_, frame_.stamp_ns};
@@ -54,7 +55,7 @@ Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
     return Progress::kDone;
   }
   if (now_ns - last_frame_ns_ <= kPoseTimeout_ns) return Progress::kIdle;
-  health_.raise(Fault::kPoseMissing, now_ns);
+  health_.own.raise(Fault::kPoseMissing, now_ns);
   stage_ = FrameStage::kWaiting;
   camera_port_.release();
   return Progress::kDone;
@@ -64,7 +65,7 @@ void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
   const PoseAnswer& answer = link_.pose_answer.front();
   stage_ = FrameStage::kWaiting;
   if (!answer.found) {
-    health_.raise(Limit::kDepthUnplaced, now_ns);
+    health_.own.raise(Limit::kDepthUnplaced, now_ns);
   } else {
     exposure_state_ = answer.state;
     const Transform camera_T_base = mount_.base_T_camera().inverse();
@@ -83,7 +84,7 @@ void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
       stage_ = FrameStage::kExtracting;
       return;
     }
-    health_.raise(Fault::kDepthRejected, now_ns);
+    health_.own.raise(Fault::kDepthRejected, now_ns);
   }
   camera_port_.release();
 }
@@ -97,10 +98,9 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
       budget.spend(kLearnMountUnits);
     }
     camera_port_.release();
-    const SurfaceExtractor::Counters& now = extractor_.counters();
-    health_.raise(Limit::kRunsFull, now_ns, now.run_overflow - extractor_seen_.run_overflow);
-    health_.raise(Limit::kPlanesFull, now_ns, now.plane_overflow - extractor_seen_.plane_overflow);
-    extractor_seen_ = now;
+    health_.own.follow(Limit::kRunsFull, now_ns, extractor_.counters().run_overflow);
+    health_.own.follow(Limit::kPlanesFull, now_ns, extractor_.counters().plane_overflow);
+    if (watcher_ != nullptr) watcher_->surfaces.publish(extractor_.result());
     begin_map(now_ns);
     stage_ = FrameStage::kWaiting;
   }
@@ -140,8 +140,7 @@ void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   mapping_ = true;
   const PolygonMap::Counters& counters = map_.counters();
   const std::uint32_t lost = counters.abandoned_frames + counters.stale_frames + counters.rejected_frames;
-  health_.raise(Limit::kFrameLost, now_ns, lost - frames_lost_seen_);
-  frames_lost_seen_ = lost;
+  health_.own.follow(Limit::kFrameLost, now_ns, lost);
 }
 
 Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
@@ -150,9 +149,8 @@ Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
   if (progress != Progress::kBusy) {
     mapping_ = false;
     search_due_ = true;
-    const std::uint32_t map_full = map_.counters().evicted + map_.counters().refused;
-    health_.raise(Limit::kMapFull, now_ns, map_full - map_full_seen_);
-    map_full_seen_ = map_full;
+    health_.own.follow(Limit::kMapFull, now_ns, map_.counters().evicted + map_.counters().refused);
+    if (watcher_ != nullptr) watcher_->map.publish(map_.snapshot());
   }
   return progress;
 }
@@ -175,10 +173,7 @@ Progress PerceptionLane::footholds(std::int64_t, WorkBudget& budget) noexcept {
   if (!searching_ && search_due_) begin_search();
   if (!searching_) return Progress::kIdle;
   const Progress progress = search_.step(budget);
-  if (progress == Progress::kDone) {
-    link_.footholds.back() = search_.result();
-    link_.footholds.publish();
-  }
+  if (progress == Progress::kDone) link_.footholds.publish(search_.result());
   if (progress != Progress::kBusy) searching_ = false;
   return progress;
 }

@@ -7,13 +7,14 @@
 #include "firmware/lane_link.hpp"
 #include "firmware/params.hpp"
 #include "hal/ports/depth_camera.hpp"
-#include "scheduler/health.hpp"
 
 namespace polygmap {
 
 class PerceptionLane {
  public:
-  PerceptionLane(hal::DepthCamera& camera, LaneLink& link, const Params& params) noexcept;
+  PerceptionLane(hal::DepthCamera& camera, ControlPerceptionLink& link, LaneHealth& health,
+                 const Params& params) noexcept;
+  void watch(PerceptionTelemetry& watcher) noexcept { watcher_ = &watcher; }
 
   // Takes a frame from the driver, asks for the pose at its exposure, and starts the extraction when it is known. Gives
   // the frame back where it is not, and tells control of this lane's faults.
@@ -26,8 +27,7 @@ class PerceptionLane {
   [[nodiscard]] const MapSnapshot& map_snapshot() const noexcept { return map_.snapshot(); }
   [[nodiscard]] const CameraExtrinsicsEstimator& mount() const noexcept { return mount_; }
   [[nodiscard]] const SurfaceExtractor& extractor() const noexcept { return extractor_; }
-  [[nodiscard]] Health& faults() noexcept { return health_; }
-  [[nodiscard]] const Health& faults() const noexcept { return health_; }
+  [[nodiscard]] const Health& faults() const noexcept { return health_.own; }  // of this lane
 
  private:
   enum class FrameStage : std::uint8_t { kWaiting, kPoseAsked, kExtracting };
@@ -38,7 +38,9 @@ class PerceptionLane {
   void begin_search() noexcept;
 
   hal::DepthCamera& camera_port_;
-  LaneLink& link_;
+  ControlPerceptionLink& link_;
+  LaneHealth& health_;
+  PerceptionTelemetry* watcher_ = nullptr;  // none on a robot that nobody watches
   const Params& params_;
   CameraIntrinsics intrinsics_;
 
@@ -49,16 +51,13 @@ class PerceptionLane {
   bool searching_ = false;
   DepthFrameView frame_;
   StateEstimate exposure_state_;
-  std::array<LegShapes, kFootCount> body_{};   // camera frame, at the exposure
-  std::int64_t last_frame_ns_ = -1;            // taken; from the start until there is one
-  std::uint32_t request_ = 0;                  // number of the last pose request
-  SurfaceExtractor::Counters extractor_seen_;  // the stages' counters as last reported
-  std::uint32_t map_full_seen_ = 0, frames_lost_seen_ = 0;
+  std::array<LegShapes, kFootCount> body_{};  // camera frame, at the exposure
+  std::int64_t last_frame_ns_ = -1;           // taken; from the start until there is one
+  std::uint32_t request_ = 0;                 // number of the last pose request
   SurfaceExtractor extractor_;
   CameraExtrinsicsEstimator mount_;
   PolygonMap map_;
   FootholdSearch search_;
-  Health health_;
 };
 
 }  // namespace polygmap

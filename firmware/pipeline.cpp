@@ -1,73 +1,75 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/pipeline.hpp"
 
+#include <array>
+#include <numeric>
+
 #include "algorithms/core/time.hpp"
-#include "scheduler/cyclic_executive.hpp"
+#include "firmware/schedule.hpp"
 
 namespace polygmap {
-
 namespace {
 
-static_assert(1e6 * kTick_s == kMinorFrame_us, "the gait counts minor frames");
+static_assert(1e6 * kTick_s == kCycle_us, "the gait counts cycles");
+
+constexpr std::size_t kControlStages_bytes = sizeof(Estimator) + sizeof(Gait);
+constexpr std::size_t kPerceptionStages_bytes =
+    sizeof(SurfaceExtractor) + sizeof(CameraExtrinsicsEstimator) + sizeof(PolygonMap) + sizeof(FootholdSearch);
+
+// What Pipeline is made of. The lanes: what they hold beside their stages.
+constexpr auto kPipelineMemory = std::to_array<StageMemory>({
+    {"estimation", sizeof(Estimator)},
+    {"perception", sizeof(SurfaceExtractor)},
+    {"camera_extrinsics", sizeof(CameraExtrinsicsEstimator)},
+    {"polygon_map", sizeof(PolygonMap)},
+    {"foothold", sizeof(FootholdSearch)},
+    {"gait", sizeof(Gait)},
+    {"control_lane", sizeof(ControlLane) - kControlStages_bytes},
+    {"perception_lane", sizeof(PerceptionLane) - kPerceptionStages_bytes},
+    {"lane_link", sizeof(ControlPerceptionLink)},
+    {"health", sizeof(LaneHealths)},
+    {"params", sizeof(Params)},
+});
+constexpr std::size_t sum_bytes(std::span<const StageMemory> parts) noexcept {
+  return std::accumulate(parts.begin(), parts.end(), std::size_t{0},
+                         [](std::size_t sum, const StageMemory& part) { return sum + part.bytes; });
+}
+// Alignment takes the rest; a part that the list lacks would be larger.
+constexpr std::size_t kPadding_bytes = sizeof(Pipeline) - sum_bytes(kPipelineMemory);
+static_assert(kPadding_bytes < 2 * alignof(Pipeline) * (kPipelineMemory.size()), "a part is not in the list");
 
 // As the robot runs it; all rows in one lane take less.
-constexpr std::size_t kExecutives_bytes =
-    sizeof(CyclicExecutive<Pipeline, kSchedule, 0>) + sizeof(CyclicExecutive<Pipeline, kSchedule, 1>);
-constexpr std::size_t kStacks_bytes = lane_count(kSchedule) * kLaneStack_bytes;
-static_assert(lane_count(kSchedule) == 2);
-static_assert(sizeof(Pipeline) + kExecutives_bytes + kStacks_bytes <= kMemoryBudget_bytes);
+template <std::size_t... Lanes>
+constexpr std::size_t executives_bytes(std::index_sequence<Lanes...>) noexcept {
+  return (sizeof(LaneExecutive<Lanes>) + ...);
+}
+constexpr auto kMemory = [] {
+  std::array<StageMemory, kPipelineMemory.size() + 3> table{};
+  auto end = std::ranges::copy(kPipelineMemory, table.begin()).out;
+  *end++ = {"padding", kPadding_bytes};
+  *end++ = {"executive", executives_bytes(std::make_index_sequence<kLaneCount>{})};
+  *end = {"stacks", kLaneCount * kLaneStack_bytes};
+  return table;
+}();
+static_assert(sum_bytes(kMemory) <= kMemoryBudget_bytes);
 
 }  // namespace
 
-Progress Pipeline::run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& budget) noexcept {
-  switch (static_cast<Row>(row)) {
-    case kSense:
-      return control_.sense(frame_ns);
-    case kEstimate:
-      return control_.estimate(frame_ns);
-    case kGait:
-      return control_.gait(frame_ns);
-    case kCommand:
-      return control_.command(frame_ns);
-    case kHealth:
-      return control_.health(frame_ns);
-    case kIntake:
-      return perception_.intake(frame_ns);
-    case kSurfaces:
-      return perception_.surfaces(frame_ns, budget);
-    case kMap:
-      return perception_.map(frame_ns, budget);
-    case kFootholds:
-      return perception_.footholds(frame_ns, budget);
-    case kRowCount:
-      break;
-  }
-  return Progress::kIdle;
+Progress Pipeline::run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
+  return kTasks[row].function.run(*this, cycle_ns, budget);
 }
 
-Telemetry Pipeline::telemetry(std::int64_t now_ns) const noexcept {
+Telemetry Pipeline::telemetry(std::int64_t now_ns, PerceptionTelemetry& perception) const noexcept {
+  (void)perception.surfaces.try_take();  // the newest, or the last one again
+  (void)perception.map.try_take();
   return {now_ns,
           control_.state(),
           control_.estimator().quality(),
-          perception_.surface_frame(),
-          perception_.map_snapshot(),
+          perception.surfaces.front(),
+          perception.map.front(),
           control_.gait_status()};
 }
 
-std::array<StageMemory, kMemoryStages> static_memory() noexcept {
-  constexpr std::size_t kHealth = sizeof(Health) * 3;  // of either lane and of both
-  constexpr std::size_t kStages = sizeof(Estimator) + sizeof(SurfaceExtractor) + sizeof(PolygonMap) +
-                                  sizeof(FootholdSearch) + sizeof(Gait) + sizeof(LaneLink) + kHealth;
-  return {{{"estimation", sizeof(Estimator)},
-           {"perception", sizeof(SurfaceExtractor)},
-           {"polygon_map", sizeof(PolygonMap)},
-           {"foothold", sizeof(FootholdSearch)},
-           {"gait", sizeof(Gait)},
-           {"lane_link", sizeof(LaneLink)},
-           {"health", kHealth},
-           {"other", sizeof(Pipeline) - kStages},
-           {"executive", kExecutives_bytes},
-           {"stacks", kStacks_bytes}}};
-}
+std::span<const StageMemory> static_memory() noexcept { return kMemory; }
 
 }  // namespace polygmap

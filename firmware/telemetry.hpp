@@ -12,7 +12,7 @@
 
 namespace polygmap {
 
-// References into the module's static object, valid until its next tick.
+// References into the module's static object, valid until its next tick or telemetry.
 struct Telemetry {
   std::int64_t now_ns;
   const StateEstimate& state;

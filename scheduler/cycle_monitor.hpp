@@ -54,7 +54,7 @@ class DurationStatistics {
   std::array<std::uint32_t, kBuckets> histogram_{};
 };
 
-// One table row. Every slot of the row ends in exactly one of: runs, idle, shed, deferred (or in a slipped frame).
+// One table row. Every slot of the row ends in exactly one of: runs, idle, shed, deferred (or in a slipped cycle).
 struct RowStatistics {
   DurationStatistics time;      // of runs that had work
   std::uint64_t runs = 0;       // calls that returned kBusy or kDone
@@ -68,38 +68,38 @@ struct RowStatistics {
 
 // One lane.
 struct LaneStatistics {
-  std::array<DurationStatistics, kMinorFramesPerMajor> slot_time;  // all rows of the frame together, per slot
-  DurationStatistics lateness;                                     // from a frame's due time to its tick
-  std::uint64_t frames = 0;                                        // minor frames run
-  std::uint64_t overruns = 0;                                      // frames longer than kMinorFrame_us
-  std::uint64_t slips = 0;                                         // frames skipped because the tick came too late
-  std::uint64_t caught_up = 0;  // frames run late, after the following one was already due
-  std::uint64_t early = 0;      // ticks with no frame due (too early, or before start)
+  std::array<DurationStatistics, kCyclesPerMajor> slot_time;  // all rows of the cycle together, per slot
+  DurationStatistics lateness;                                // from a cycle's due time to its tick
+  std::uint64_t cycles = 0;                                   // cycles run
+  std::uint64_t overruns = 0;                                 // cycles longer than kCycle_us
+  std::uint64_t slips = 0;                                    // cycles skipped because the tick came too late
+  std::uint64_t caught_up = 0;  // cycles run late, after the following one was already due
+  std::uint64_t early = 0;      // ticks with no cycle due (too early, or before start)
 };
 
 // Converts differences of a free-running counter to ns without a division or floating point in the cycle.
-class CycleScale {
+class CounterScale {
  public:
   static constexpr double kMinRate_per_us = 1.0;
   static constexpr double kMaxRate_per_us = 10'000.0;
-  [[nodiscard]] static constexpr bool valid(double cycles_per_us) noexcept {
-    return cycles_per_us >= kMinRate_per_us && cycles_per_us <= kMaxRate_per_us;  // false for NaN
+  [[nodiscard]] static constexpr bool valid(double counts_per_us) noexcept {
+    return counts_per_us >= kMinRate_per_us && counts_per_us <= kMaxRate_per_us;  // false for NaN
   }
   // A rate outside the range counts as kMinRate_per_us.
-  explicit constexpr CycleScale(double cycles_per_us) noexcept
-      : ns_per_cycle_q24_(static_cast<std::uint64_t>(
-            1000.0 * static_cast<double>(kOne) / (valid(cycles_per_us) ? cycles_per_us : kMinRate_per_us) + 0.5)),
-        max_cycles_((std::uint64_t{1} << 62) / ns_per_cycle_q24_) {}
+  explicit constexpr CounterScale(double counts_per_us) noexcept
+      : ns_per_count_q24_(static_cast<std::uint64_t>(
+            1000.0 * static_cast<double>(kOne) / (valid(counts_per_us) ? counts_per_us : kMinRate_per_us) + 0.5)),
+        max_count_((std::uint64_t{1} << 62) / ns_per_count_q24_) {}
 
   // Relative error at most 3e-7 (at 10 GHz); saturates at 2^38 ns (275 s).
-  [[nodiscard]] constexpr std::uint64_t to_ns(std::uint64_t cycles) const noexcept {
-    return (std::min(cycles, max_cycles_) * ns_per_cycle_q24_ + kOne / 2) / kOne;
+  [[nodiscard]] constexpr std::uint64_t to_ns(std::uint64_t counts) const noexcept {
+    return (std::min(counts, max_count_) * ns_per_count_q24_ + kOne / 2) / kOne;
   }
 
  private:
   static constexpr std::uint64_t kOne = std::uint64_t{1} << 24;
-  std::uint64_t ns_per_cycle_q24_;
-  std::uint64_t max_cycles_;
+  std::uint64_t ns_per_count_q24_;
+  std::uint64_t max_count_;
 };
 
 }  // namespace polygmap

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs one lane of a schedule table, minor frame by minor frame. A template over the tasks, so the same code runs the
+// Runs one lane of a schedule table, cycle by cycle. A template over the tasks, so the same code runs the
 // module on the robot, in simulation and in tests.
 #pragma once
 
@@ -12,56 +12,64 @@
 #include "algorithms/core/work.hpp"
 #include "hal/ports/clock.hpp"
 #include "scheduler/cycle_monitor.hpp"
-#include "scheduler/health.hpp"
+#include "scheduler/executive_event.hpp"
 #include "scheduler/schedule_table.hpp"
 
 namespace polygmap {
 
-// What a tick did in one minor frame: the recorder's entry. Masks have bit r for table row r.
-struct FrameReport {
-  std::uint64_t frame = 0;  // minor frames since start, skipped ones included
+// What a tick did in one cycle: the recorder's entry. Masks have bit r for table row r.
+struct CycleReport {
+  std::uint64_t cycle = 0;  // cycles since start, skipped ones included
   std::int64_t due_ns = 0;
   std::size_t slot = 0;
   std::uint32_t ran = 0;             // rows called, idle ones included
   std::uint32_t shed = 0;            // rows given up for lack of time
   std::uint32_t deferred = 0;        // rows that paid back an overdraft
   std::uint32_t overran = 0;         // rows longer than their budget
-  bool overrun = false;              // the frame was longer than kMinorFrame_us
-  std::uint64_t skipped_before = 0;  // frames that slipped right before this one
+  bool overrun = false;              // the cycle was longer than kCycle_us
+  std::uint64_t skipped_before = 0;  // cycles that slipped right before this one
   std::uint64_t time_ns = 0;
 };
 
-// run_row(row, frame_ns, budget) does one slot's worth of table row `row`.
-//   frame_ns  the frame's due time: the same for all rows of the frame and free of the tick's jitter
+// run_row(row, cycle_ns, budget) does one slot's worth of table row `row`.
+//   cycle_ns  the cycle's due time: the same for all rows of the cycle and free of the tick's jitter
 //   budget    units to spend if the row is resumable, 0 units otherwise
 //   returns   kIdle: had nothing to do; kBusy: goes on in the row's next slot; kDone: did it or finished it
 // Lanes call it from their own threads, each for its own rows only.
 template <typename T>
-concept RunsRows = requires(T& tasks, std::size_t row, std::int64_t frame_ns, WorkBudget& budget) {
-  { tasks.run_row(row, frame_ns, budget) }
+concept RunsRows = requires(T& tasks, std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) {
+  { tasks.run_row(row, cycle_ns, budget) }
   noexcept->std::same_as<Progress>;
 };
 
-// Optional: told of every frame after its last row, on the lane's own thread.
+// Optional: told of every cycle after its last row, on the lane's own thread.
 template <typename T>
-concept WatchesFrames = requires(T& tasks, std::size_t lane, const FrameReport& report) {
-  { tasks.frame_done(lane, report) }
+concept WatchesCycles = requires(T& tasks, std::size_t lane, const CycleReport& report) {
+  { tasks.cycle_done(lane, report) }
   noexcept;
 };
 
-// Late ticks: frames whose successor is already due are caught up, at most kMaxCaughtUp of them per tick; older ones
+// Where an executive counts what happened to its lane; written on the lane's own thread.
+template <typename T>
+concept CountsExecutiveEvents = requires(T& counters, ExecutiveEvent event, std::int64_t now_ns, std::uint32_t times) {
+  { counters.raise(event, now_ns, times) }
+  noexcept;
+};
+
+// Late ticks: cycles whose successor is already due are caught up, at most kMaxCaughtUp of them per tick; older ones
 // are skipped (slips), so the slot number stays tied to time.
 // Shedding: (1) a sheddable row whose budget, with those of the rows that matter more, does not fit what is left of the
-// frame is given up; (2) after a frame that overran or came late the rows of one more shed order are left out, and one
-// less again after kRecoveryFrames frames in time. Rows with shed order 0 always run.
+// cycle is given up; (2) after a cycle that overran or came late the rows of one more shed order are left out, and one
+// less again after kRecoveryCycles cycles in time. Rows with shed order 0 always run.
 // Overdrafts: a resumable row that spent more units than it was given is given less in its next slots until it is paid.
-template <typename Tasks, const auto& Table, std::size_t Lane = 0>
+template <typename Tasks, const auto& Table, std::size_t Lane = 0, typename Counters = EventCounters<ExecutiveEvent>>
 class CyclicExecutive {
   static constexpr std::size_t kRows = Table.size();
   static_assert(RunsRows<Tasks>, "Tasks needs: Progress run_row(std::size_t, std::int64_t, WorkBudget&) noexcept");
+  static_assert(CountsExecutiveEvents<Counters>, "Counters needs: raise(ExecutiveEvent, now_ns, times) noexcept");
   static_assert(kRows > 0 && kRows <= kMaxScheduleRows, "a schedule has 1 to kMaxScheduleRows rows");
   static_assert(Lane < lane_count(Table), "the schedule has no row in this lane");
-  static_assert(worst_minor_frame_us(Table) <= kMinorFrame_us, "the rows of a lane do not fit one minor frame");
+  static_assert(worst_cycle_us(Table) <= kCycle_us, "the rows of a lane do not fit one cycle");
   static_assert(rows_without_unique_name(Table) == 0, "every schedule row needs a name of its own");
   static_assert(rows_without_slot(Table) == 0, "a schedule row runs in no slot");
   static_assert(rows_without_budget(Table) == 0, "a schedule row has no budget");
@@ -71,56 +79,56 @@ class CyclicExecutive {
 
  public:
   static constexpr std::int64_t kMaxCaughtUp = 2;
-  static constexpr std::uint32_t kRecoveryFrames = kMinorFramesPerMajor;
-  static constexpr std::int64_t kDispatch_ns = 20'000;  // the executive's own time: a full frame is not shed for it
+  static constexpr std::uint32_t kRecoveryCycles = kCyclesPerMajor;
+  static constexpr std::int64_t kDispatch_ns = 20'000;  // the executive's own time: a full cycle is not shed for it
 
-  CyclicExecutive(Tasks& tasks, const hal::Clock& clock, Health& health) noexcept
-      : tasks_(tasks), clock_(clock), health_(health), scale_(clock.cycles_per_us()) {}
+  CyclicExecutive(Tasks& tasks, const hal::Clock& clock, Counters& counters) noexcept
+      : tasks_(tasks), clock_(clock), counters_(counters), scale_(clock.counts_per_us()) {}
 
-  // The first frame, in slot 0, is due at first_due_ns. Lanes that share data start at the same time.
+  // The first cycle, in slot 0, is due at first_due_ns. Lanes that share data start at the same time.
   void start(std::int64_t first_due_ns) noexcept {
     start_ns_ = first_due_ns;
-    next_frame_ = 0;
+    next_cycle_ = 0;
     started_ = true;
-    if (!CycleScale::valid(clock_.cycles_per_us())) health_.raise(Fault::kClockRate, first_due_ns);
+    if (!CounterScale::valid(clock_.counts_per_us())) counters_.raise(ExecutiveEvent::kClockRate, first_due_ns, 1);
   }
 
-  // Runs what is due at now_ns, at most kMaxCaughtUp + 1 frames; returns how many frames ran.
+  // Runs what is due at now_ns, at most kMaxCaughtUp + 1 cycles; returns how many cycles ran.
   std::size_t tick(std::int64_t now_ns) noexcept {
     if (!started_ || now_ns < next_due_ns()) {
       count_up(lane_.early);
       return 0;
     }
     lane_.lateness.add(static_cast<std::uint64_t>(now_ns - next_due_ns()));
-    const std::int64_t missed = (now_ns - next_due_ns()) / kMinorFrame_ns;
+    const std::int64_t missed = (now_ns - next_due_ns()) / kCycle_ns;
     const std::int64_t caught_up = std::min(missed, kMaxCaughtUp);
     const auto skipped = static_cast<std::uint64_t>(missed - caught_up);
     if (skipped > 0) {
       lane_.slips += skipped;
-      health_.raise(Fault::kFrameSlip, now_ns, clamp_to_u32(skipped));
-      next_frame_ += skipped;
+      counters_.raise(ExecutiveEvent::kCycleSlip, now_ns, clamp_to_u32(skipped));
+      next_cycle_ += skipped;
     }
     if (missed > 0) note_time_short();
     for (std::int64_t i = 0; i <= caught_up; ++i) {
       if (i < caught_up) {
         count_up(lane_.caught_up);
-        health_.raise(Limit::kFrameCaughtUp, now_ns);
+        counters_.raise(ExecutiveEvent::kCycleCaughtUp, now_ns, 1);
       }
-      run_frame(i == 0 ? skipped : 0);
+      run_cycle(i == 0 ? skipped : 0);
     }
     return static_cast<std::size_t>(caught_up) + 1;
   }
 
-  // Gives up these rows in the next frame as well, as far as they have a shed order: a replay repeats what was
+  // Gives up these rows in the next cycle as well, as far as they have a shed order: a replay repeats what was
   // recorded.
-  void shed_in_next_frame(std::uint32_t rows) noexcept { requested_shed_ |= rows; }
+  void shed_in_next_cycle(std::uint32_t rows) noexcept { requested_shed_ |= rows; }
 
   [[nodiscard]] std::int64_t next_due_ns() const noexcept {
-    return start_ns_ + static_cast<std::int64_t>(next_frame_) * kMinorFrame_ns;
+    return start_ns_ + static_cast<std::int64_t>(next_cycle_) * kCycle_ns;
   }
   // Rows with a shed order up to this one are left out for now; 0: none.
   [[nodiscard]] std::uint8_t shed_level() const noexcept { return shed_level_; }
-  [[nodiscard]] const FrameReport& last_frame() const noexcept { return report_; }
+  [[nodiscard]] const CycleReport& last_cycle() const noexcept { return report_; }
   [[nodiscard]] const LaneStatistics& lane_statistics() const noexcept { return lane_; }
   // Of the table's row; zero for the rows of other lanes.
   [[nodiscard]] const RowStatistics& row_statistics(std::size_t row) const noexcept { return rows_[row]; }
@@ -136,26 +144,26 @@ class CyclicExecutive {
     return static_cast<std::uint32_t>(std::min<std::uint64_t>(x, UINT32_MAX));
   }
 
-  void run_frame(std::uint64_t skipped_before) noexcept {
-    report_ = {.frame = next_frame_,
+  void run_cycle(std::uint64_t skipped_before) noexcept {
+    report_ = {.cycle = next_cycle_,
                .due_ns = next_due_ns(),
-               .slot = static_cast<std::size_t>(next_frame_ % kMinorFramesPerMajor),
+               .slot = static_cast<std::size_t>(next_cycle_ % kCyclesPerMajor),
                .skipped_before = skipped_before};
-    const std::uint64_t begin_cycles = clock_.cycles();
+    const std::uint64_t begin_count = clock_.count();
     for (std::size_t row = 0; row < kRows; ++row) {
       if (Table[row].lane != Lane || !Table[row].runs_in(report_.slot)) continue;
-      const std::uint64_t elapsed_ns = scale_.to_ns(clock_.cycles() - begin_cycles);
+      const std::uint64_t elapsed_ns = scale_.to_ns(clock_.count() - begin_count);
       if (must_shed(row, elapsed_ns)) {
         pay_overdraft(row);
         count_up(rows_[row].shed);
         report_.shed |= 1U << row;
-        health_.raise(Limit::kRowShed, report_.due_ns);
+        counters_.raise(ExecutiveEvent::kRowShed, report_.due_ns, 1);
       } else {
         run_row(row);
       }
     }
-    report_.time_ns = scale_.to_ns(clock_.cycles() - begin_cycles);
-    finish_frame();
+    report_.time_ns = scale_.to_ns(clock_.count() - begin_count);
+    finish_cycle();
   }
 
   void run_row(std::size_t row) noexcept {
@@ -165,13 +173,13 @@ class CyclicExecutive {
     if (Table[row].resumable() && allowance <= 0) {
       count_up(statistics.deferred);
       report_.deferred |= 1U << row;
-      health_.raise(Limit::kRowDeferred, report_.due_ns);
+      counters_.raise(ExecutiveEvent::kRowDeferred, report_.due_ns, 1);
       return;
     }
     WorkBudget budget(allowance);
-    const std::uint64_t begin_cycles = clock_.cycles();
+    const std::uint64_t begin_count = clock_.count();
     const Progress progress = tasks_.run_row(row, report_.due_ns, budget);
-    const std::uint64_t time_ns = scale_.to_ns(clock_.cycles() - begin_cycles);
+    const std::uint64_t time_ns = scale_.to_ns(clock_.count() - begin_count);
     report_.ran |= 1U << row;
     if (progress == Progress::kIdle) {
       count_up(statistics.idle);
@@ -189,7 +197,7 @@ class CyclicExecutive {
     if (time_ns > static_cast<std::uint64_t>(Table[row].budget_us) * 1000U) {
       count_up(statistics.overruns);
       report_.overran |= 1U << row;
-      health_.raise(Fault::kRowOverrun, report_.due_ns);
+      counters_.raise(ExecutiveEvent::kRowOverrun, report_.due_ns, 1);
     }
   }
 
@@ -198,7 +206,7 @@ class CyclicExecutive {
     overdraft_[row] = std::max(overdraft_[row] - Table[row].units_per_slot(), 0);
   }
 
-  // What is left of the frame must hold this row and the later rows that matter at least as much.
+  // What is left of the cycle must hold this row and the later rows that matter at least as much.
   [[nodiscard]] bool must_shed(std::size_t row, std::uint64_t elapsed_ns) const noexcept {
     const std::uint8_t order = Table[row].shed_order;
     if (order == 0) return false;
@@ -209,42 +217,42 @@ class CyclicExecutive {
       if (other.lane != Lane || !other.runs_in(report_.slot)) continue;
       if (other.shed_order == 0 || other.shed_order > order) needed_us += other.budget_us;
     }
-    return static_cast<std::int64_t>(elapsed_ns) + needed_us * 1000 > kMinorFrame_ns + kDispatch_ns;
+    return static_cast<std::int64_t>(elapsed_ns) + needed_us * 1000 > kCycle_ns + kDispatch_ns;
   }
 
-  void finish_frame() noexcept {
+  void finish_cycle() noexcept {
     requested_shed_ = 0;
-    count_up(lane_.frames);
+    count_up(lane_.cycles);
     lane_.slot_time[report_.slot].add(report_.time_ns);
-    report_.overrun = report_.time_ns > static_cast<std::uint64_t>(kMinorFrame_ns);
+    report_.overrun = report_.time_ns > static_cast<std::uint64_t>(kCycle_ns);
     if (report_.overrun) {
       count_up(lane_.overruns);
-      health_.raise(Fault::kFrameOverrun, report_.due_ns);
+      counters_.raise(ExecutiveEvent::kCycleOverrun, report_.due_ns, 1);
       note_time_short();
-    } else if (shed_level_ > 0 && ++frames_in_time_ >= kRecoveryFrames) {
+    } else if (shed_level_ > 0 && ++cycles_in_time_ >= kRecoveryCycles) {
       --shed_level_;
-      frames_in_time_ = 0;
+      cycles_in_time_ = 0;
     }
-    ++next_frame_;
-    if constexpr (WatchesFrames<Tasks>) tasks_.frame_done(Lane, report_);
+    ++next_cycle_;
+    if constexpr (WatchesCycles<Tasks>) tasks_.cycle_done(Lane, report_);
   }
 
   void note_time_short() noexcept {
     if (shed_level_ < kMaxShedOrder) ++shed_level_;
-    frames_in_time_ = 0;
+    cycles_in_time_ = 0;
   }
 
   Tasks& tasks_;
   const hal::Clock& clock_;
-  Health& health_;
-  CycleScale scale_;
+  Counters& counters_;
+  CounterScale scale_;
   std::int64_t start_ns_ = 0;
-  std::uint64_t next_frame_ = 0;
+  std::uint64_t next_cycle_ = 0;
   std::uint32_t requested_shed_ = 0;
-  std::uint32_t frames_in_time_ = 0;
+  std::uint32_t cycles_in_time_ = 0;
   std::uint8_t shed_level_ = 0;
   bool started_ = false;
-  FrameReport report_;
+  CycleReport report_;
   LaneStatistics lane_;
   std::array<RowStatistics, kRows> rows_{};
   std::array<std::int32_t, kRows> overdraft_{};

@@ -11,20 +11,20 @@
 
 namespace polygmap {
 
-inline constexpr std::int32_t kMinorFrame_us = 2000;
-inline constexpr std::int64_t kMinorFrame_ns = std::int64_t{kMinorFrame_us} * 1000;
-inline constexpr std::size_t kMinorFramesPerMajor = 16;
+inline constexpr std::int32_t kCycle_us = 2000;
+inline constexpr std::int64_t kCycle_ns = std::int64_t{kCycle_us} * 1000;
+inline constexpr std::size_t kCyclesPerMajor = 16;
 inline constexpr std::size_t kMaxLanes = 4;
-inline constexpr std::size_t kMaxScheduleRows = 32;  // rows fit the 32-bit masks of a FrameReport
+inline constexpr std::size_t kMaxScheduleRows = 32;  // rows fit the 32-bit masks of a CycleReport
 
-using SlotMask = std::uint16_t;  // bit s: the row runs in minor frame s of the major frame
+using SlotMask = std::uint16_t;  // bit s: the row runs in cycle s of the major cycle
 inline constexpr SlotMask kEverySlot = 0xFFFF;
-static_assert(sizeof(SlotMask) * 8 == kMinorFramesPerMajor);
+static_assert(sizeof(SlotMask) * 8 == kCyclesPerMajor);
 
-// Slots first, first + stride, ... of the major frame.
+// Slots first, first + stride, ... of the major cycle.
 [[nodiscard]] constexpr SlotMask slots_from(std::size_t first, std::size_t stride) noexcept {
   std::uint32_t mask = 0;
-  for (std::size_t s = first; s < kMinorFramesPerMajor && stride > 0; s += stride) mask |= 1U << s;
+  for (std::size_t s = first; s < kCyclesPerMajor && stride > 0; s += stride) mask |= 1U << s;
   return static_cast<SlotMask>(mask);
 }
 
@@ -62,6 +62,14 @@ template <std::size_t RowCount>
   return count;
 }
 
+// Of the row with that name; RowCount when there is none.
+template <std::size_t RowCount>
+[[nodiscard]] constexpr std::size_t row_named(const ScheduleTable<RowCount>& table, std::string_view task) noexcept {
+  std::size_t i = 0;
+  while (i < RowCount && table[i].task != task) ++i;
+  return i;
+}
+
 // Sum of the budgets of a lane's rows in one slot.
 template <std::size_t RowCount>
 [[nodiscard]] constexpr std::int64_t slot_load_us(const ScheduleTable<RowCount>& table, std::size_t lane,
@@ -75,10 +83,10 @@ template <std::size_t RowCount>
 
 // The fullest slot of the fullest lane.
 template <std::size_t RowCount>
-[[nodiscard]] constexpr std::int64_t worst_minor_frame_us(const ScheduleTable<RowCount>& table) noexcept {
+[[nodiscard]] constexpr std::int64_t worst_cycle_us(const ScheduleTable<RowCount>& table) noexcept {
   std::int64_t worst_us = 0;
   for (std::size_t lane = 0; lane < lane_count(table); ++lane) {
-    for (std::size_t slot = 0; slot < kMinorFramesPerMajor; ++slot) {
+    for (std::size_t slot = 0; slot < kCyclesPerMajor; ++slot) {
       worst_us = std::max(worst_us, slot_load_us(table, lane, slot));
     }
   }

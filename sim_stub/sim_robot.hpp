@@ -75,8 +75,8 @@ class SimRobot final : public hal::Clock,
   [[nodiscard]] VirtualClock& clock() noexcept { return clock_; }  // for tests that inject work
 
   [[nodiscard]] std::int64_t now_ns() const noexcept override { return clock_.now_ns(); }
-  [[nodiscard]] std::uint64_t cycles() const noexcept override { return clock_.cycles(); }
-  [[nodiscard]] double cycles_per_us() const noexcept override { return VirtualClock::kCyclesPerUs; }
+  [[nodiscard]] std::uint64_t count() const noexcept override { return clock_.count(); }
+  [[nodiscard]] double counts_per_us() const noexcept override { return VirtualClock::kCountsPerUs; }
   [[nodiscard]] CameraIntrinsics intrinsics() const noexcept override { return camera_.intrinsics(); }
   [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept override { return camera_.try_acquire(frame); }
   void release() noexcept override { camera_.release(); }

@@ -86,14 +86,14 @@ void Gait::enter(const GaitInput& in, GaitShared& gait, const Transition& next) 
       break;
     case Transition::To::kWeightShift:
       if (++memory_.shifts <= params_.weight_shift.max_shifts) {
-        state_.emplace<WeightShift>().begin(in, gait, next.decision, next.same_foot);
+        state_.emplace<WeightShift>().begin(in, gait, *next.decision, next.same_foot);
       } else {
         state_.emplace<Standing>().begin(in, gait);
         end(in, gait, Transition::stop(StopReason::kUnsteady));
       }
       break;
     case Transition::To::kSwing:
-      state_.emplace<SwingPhase>().begin(in, gait, next.decision, next.tried);
+      state_.emplace<SwingPhase>().begin(in, gait, *next.decision, *next.tried);
       break;
     case Transition::To::kEnd:
       if (!std::holds_alternative<Standing>(state_)) state_.emplace<Standing>().begin(in, gait);

@@ -13,7 +13,7 @@ class VirtualClock {
   static constexpr std::int64_t kTick_ns = 2 * kNsPerMs;
   // 0 means "never" in many stamps, so time starts later: at 32 whole major frames of 32 ms.
   static constexpr std::int64_t kStart_ns = 32 * 32 * kNsPerMs;
-  static constexpr double kCyclesPerUs = 1000.0;
+  static constexpr double kCountsPerUs = 1000.0;
 
   [[nodiscard]] std::int64_t tick() const noexcept { return tick_; }
   [[nodiscard]] static constexpr std::int64_t stamp_ns(std::int64_t tick) noexcept {
@@ -21,10 +21,10 @@ class VirtualClock {
   }
   [[nodiscard]] std::int64_t now_ns() const noexcept { return stamp_ns(tick_); }
   // Stands still within a tick unless a test injects work, so a run is the same every time.
-  [[nodiscard]] std::uint64_t cycles() const noexcept { return static_cast<std::uint64_t>(now_ns()) + injected_; }
+  [[nodiscard]] std::uint64_t count() const noexcept { return static_cast<std::uint64_t>(now_ns()) + injected_; }
 
   void advance() noexcept { ++tick_; }
-  void inject_cycles(std::uint64_t cycles) noexcept { injected_ += cycles; }
+  void inject_count(std::uint64_t counts) noexcept { injected_ += counts; }
 
  private:
   std::int64_t tick_ = 0;

@@ -4,8 +4,7 @@
 
 #include <memory>
 
-#include "firmware/pipeline.hpp"
-#include "scheduler/cyclic_executive.hpp"
+#include "firmware/schedule.hpp"
 #include "sim_stub/sim_robot.hpp"
 #include "tests/support/nominal_robot.hpp"
 
@@ -32,13 +31,13 @@ Looked before_the_stairs(std::uint64_t seed, bool estimate_mount = true) {
   Params params;
   params.estimate_mount = estimate_mount;
   const auto pipeline = std::make_unique<Pipeline>(Ports{robot, robot, robot, robot}, params);
-  CyclicExecutive<Pipeline, kOneLaneSchedule> executive(*pipeline, robot, pipeline->lane_health(0));
-  executive.start(robot.now_ns() + kMinorFrame_ns);
+  OneLaneExecutive<> executive(*pipeline, robot, pipeline->lane_health(0));
+  executive.start(robot.now_ns() + kCycle_ns);
   const std::int64_t end_ns = robot.now_ns() + 20 * kNsPerS;
   for (bool climbs = false; !climbs && robot.now_ns() < end_ns;) {
     robot.advance();
     executive.tick(robot.now_ns());
-    const GaitStatus gait = pipeline->telemetry(robot.now_ns()).gait;
+    const GaitStatus& gait = pipeline->control().gait_status();
     climbs = gait.phase == GaitPhase::kSwing && gait.step.onto_tread;
   }
   const CameraExtrinsicsEstimator& mount = pipeline->perception().mount();

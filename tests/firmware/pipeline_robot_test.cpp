@@ -38,7 +38,7 @@ class PipelineOnARobot : public testing::Test {
       ASSERT_EQ(robot_->joints.writes.calls(), writes + 1);
       for (std::size_t n = 0; n < kJointCount; ++n) {
         const double most_rad =
-            joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg).speed_radps * 1e-6 * kMinorFrame_us;
+            joint_limits(static_cast<Foot>(n / kJointsPerLeg), n % kJointsPerLeg).speed_radps * 1e-6 * kCycle_us;
         ASSERT_LE(std::abs(sent.newest().joints[n].q_rad - before.joints[n].q_rad), most_rad + 1e-9) << n;
       }
     }

@@ -2,8 +2,6 @@
 // The wiring, on fakes fed by hand: every fault and limit that firmware raises by itself, raised (kReachLimited,
 // kContactEarly, kContactLate and kFootPutBack repeat the gait's counters, which its own tests raise); no heap call,
 // init included; static memory within its budget.
-#include "firmware/pipeline.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,6 +10,7 @@
 #include <numeric>
 #include <vector>
 
+#include "firmware/schedule.hpp"
 #include "tests/support/fake_robot.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/trapped_module.hpp"
@@ -45,7 +44,7 @@ class PipelineTest : public testing::Test {
   }
   void stand(int ticks) {
     for (int i = 0; i < ticks; ++i) {
-      clock_.advance_ns(kMinorFrame_ns);
+      clock_.advance_ns(kCycle_ns);
       const ImuSample imu = imu_at(clock_.now_ns());
       const JointFeedback joints = joints_at(clock_.now_ns());
       tick_with(&imu, &joints);
@@ -78,7 +77,7 @@ TEST_F(PipelineTest, StandingStill_InitialisesCommandsAndRaisesNothingOfControl)
 
 TEST_F(PipelineTest, SensorsSilent_AreCountedAsMissing) {
   stand(10);
-  clock_.advance_ns(kMinorFrame_ns);
+  clock_.advance_ns(kCycle_ns);
   tick_with(nullptr, nullptr);
   EXPECT_EQ(count(Fault::kImuMissing), 1U);
   EXPECT_EQ(count(Fault::kJointFeedbackMissing), 1U);
@@ -86,7 +85,7 @@ TEST_F(PipelineTest, SensorsSilent_AreCountedAsMissing) {
 
 TEST_F(PipelineTest, SensorsNotFinite_AreRejectedAndTheCommandStaysFinite) {
   stand(kInitialised_ticks);
-  clock_.advance_ns(kMinorFrame_ns);
+  clock_.advance_ns(kCycle_ns);
   ImuSample imu = imu_at(clock_.now_ns());
   imu.gyro_radps.x() = std::numeric_limits<double>::quiet_NaN();
   JointFeedback joints = joints_at(clock_.now_ns());
@@ -121,7 +120,7 @@ TEST_F(PipelineTest, LidarFromTheFuture_IsRejected) {
 TEST_F(PipelineTest, LidarWithoutDelay_MeetsTheStateOfItsOwnFrame) {
   stand(kInitialised_ticks);
   LioSample sample;
-  sample.stamp_ns = clock_.now_ns() + kMinorFrame_ns;  // when the next frame begins
+  sample.stamp_ns = clock_.now_ns() + kCycle_ns;  // when the next frame begins
   sample.lio_T_lidar = Transform{Mat3::Identity(), Vec3{0, 0, kNominalBaseHeight_m}} * base_T_lidar();
   lidar_.feed(sample);
   stand(1);
@@ -177,7 +176,7 @@ TEST_F(PipelineTest, NothingToSee_StopsStandingAndSaysSo) {
 TEST_F(PipelineTest, TickComesTwoFramesLate_NothingIsMissingAndTheGaitKeepsTime) {
   stand(kInitialised_ticks);
   for (int i = 0; i < 3; ++i) {
-    clock_.advance_ns(kMinorFrame_ns);
+    clock_.advance_ns(kCycle_ns);
     imu_.feed(imu_at(clock_.now_ns()));
   }
   joints_.feed(joints_at(clock_.now_ns()));
@@ -192,9 +191,9 @@ TEST_F(PipelineTest, TickComesTwoFramesLate_NothingIsMissingAndTheGaitKeepsTime)
 
 TEST_F(PipelineTest, ImuFasterThanTheFrame_EverySampleCounts) {
   stand(kInitialised_ticks);
-  clock_.advance_ns(kMinorFrame_ns);
+  clock_.advance_ns(kCycle_ns);
   for (int i = 3; i >= 0; --i) {
-    ImuSample imu = imu_at(clock_.now_ns() - i * kMinorFrame_ns / 4);
+    ImuSample imu = imu_at(clock_.now_ns() - i * kCycle_ns / 4);
     if (i == 3) imu.gyro_radps.z() = 0.4;
     imu_.feed(imu);
   }
@@ -205,7 +204,7 @@ TEST_F(PipelineTest, ImuFasterThanTheFrame_EverySampleCounts) {
 
 TEST_F(PipelineTest, SamplesOfTheFuture_AreRejectedOnceAndForgotten) {
   stand(kInitialised_ticks);
-  clock_.advance_ns(kMinorFrame_ns);
+  clock_.advance_ns(kCycle_ns);
   const ImuSample imu = imu_at(clock_.now_ns() + kNsPerS);
   const JointFeedback joints = joints_at(clock_.now_ns() + kNsPerS);
   tick_with(&imu, &joints);
@@ -340,8 +339,8 @@ TEST_F(PipelineAmongBoxes, MorePolygonsThanTheMapHolds_IsCounted) {
 
 // Too little time for the map in every frame: pictures are thrown away unseen, and it says so; then it goes on.
 TEST_F(PipelineAmongBoxes, MapShedForLong_LostFramesAreCountedAndControlGoesOn) {
-  constexpr std::uint32_t kSurfacesRow = 6, kMapRow = 7;
-  static_assert(kOneLaneSchedule[kSurfacesRow].task == "surfaces" && kOneLaneSchedule[kMapRow].task == "map");
+  constexpr std::size_t kSurfacesRow = row_named(kOneLaneSchedule, "surfaces");
+  constexpr std::size_t kMapRow = row_named(kOneLaneSchedule, "map");
   stand(kInitialised_ticks);
   show(2, 3, -0.1);
   const PerceptionLane& perception = module_.pipeline().perception();
@@ -352,7 +351,7 @@ TEST_F(PipelineAmongBoxes, MapShedForLong_LostFramesAreCountedAndControlGoesOn) 
     const std::uint64_t before = extraction.units;
     feed(2, 3, -0.1);
     for (int i = 0; i < 100; ++i) {
-      module_.executive().shed_in_next_frame(1U << kMapRow);
+      module_.executive().shed_in_next_cycle(1U << kMapRow);
       stand(1);
     }
     spent = extraction.units - before;
@@ -373,8 +372,8 @@ TEST(PipelineMemory, Stages_SumUpWithinTheBudget) {
   const auto memory = static_memory();
   const std::size_t sum = std::accumulate(memory.begin(), memory.end(), std::size_t{0},
                                           [](std::size_t s, const StageMemory& m) { return s + m.bytes; });
-  EXPECT_EQ(sum, sizeof(Pipeline) + sizeof(CyclicExecutive<Pipeline, kSchedule, 0>) +
-                     sizeof(CyclicExecutive<Pipeline, kSchedule, 1>) + 2 * kLaneStack_bytes);
+  EXPECT_EQ(sum, sizeof(Pipeline) + sizeof(LaneExecutive<kControlLane>) + sizeof(LaneExecutive<kPerceptionLane>) +
+                     kLaneCount * kLaneStack_bytes);
   EXPECT_LE(sum, kMemoryBudget_bytes);
   for (const StageMemory& stage : memory) EXPECT_GT(stage.bytes, 0U) << stage.stage;
 }

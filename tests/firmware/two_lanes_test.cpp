@@ -7,8 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "firmware/pipeline.hpp"
-#include "scheduler/cyclic_executive.hpp"
+#include "firmware/schedule.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "tests/support/fake_robot.hpp"
 #include "tests/support/nominal_robot.hpp"
@@ -20,15 +19,15 @@ class PipelineInTwoLanes : public testing::Test {
  protected:
   PipelineInTwoLanes() : camera_(robot_camera_intrinsics()) {
     pipeline_ = std::make_unique<Pipeline>(Ports{camera_, imu_, joints_, lidar_}, Params{});
-    control_ = std::make_unique<CyclicExecutive<Pipeline, kSchedule, 0>>(*pipeline_, control_clock_,
-                                                                         pipeline_->lane_health(0));
-    perception_ = std::make_unique<CyclicExecutive<Pipeline, kSchedule, 1>>(*pipeline_, perception_clock_,
-                                                                            pipeline_->lane_health(1));
-    control_->start(control_clock_.now_ns() + kMinorFrame_ns);
-    perception_->start(perception_clock_.now_ns() + kMinorFrame_ns);
+    control_ =
+        std::make_unique<LaneExecutive<kControlLane>>(*pipeline_, control_clock_, pipeline_->lane_health(kControlLane));
+    perception_ = std::make_unique<LaneExecutive<kPerceptionLane>>(*pipeline_, perception_clock_,
+                                                                   pipeline_->lane_health(kPerceptionLane));
+    control_->start(control_clock_.now_ns() + kCycle_ns);
+    perception_->start(perception_clock_.now_ns() + kCycle_ns);
   }
   void control_frame() {
-    control_clock_.advance_ns(kMinorFrame_ns);
+    control_clock_.advance_ns(kCycle_ns);
     const std::int64_t now_ns = control_clock_.now_ns();
     imu_.feed({now_ns, Vec3::Zero(), Vec3{0, 0, kGravity_mps2}});
     JointFeedback feedback;
@@ -40,7 +39,7 @@ class PipelineInTwoLanes : public testing::Test {
     control_->tick(now_ns);
   }
   void perception_frame() {
-    perception_clock_.advance_ns(kMinorFrame_ns);
+    perception_clock_.advance_ns(kCycle_ns);
     const heap::ModuleCall call("perception lane");
     perception_->tick(perception_clock_.now_ns());
   }
@@ -52,8 +51,8 @@ class PipelineInTwoLanes : public testing::Test {
   fakes::FakeJointBus joints_;
   fakes::FakeLidarOdometry lidar_;
   std::unique_ptr<Pipeline> pipeline_;
-  std::unique_ptr<CyclicExecutive<Pipeline, kSchedule, 0>> control_;
-  std::unique_ptr<CyclicExecutive<Pipeline, kSchedule, 1>> perception_;
+  std::unique_ptr<LaneExecutive<kControlLane>> control_;
+  std::unique_ptr<LaneExecutive<kPerceptionLane>> perception_;
 };
 
 TEST_F(PipelineInTwoLanes, TwoSecondsBeforeStairs_PosesFootholdsAndFaultsCross) {
@@ -75,13 +74,13 @@ TEST_F(PipelineInTwoLanes, TwoSecondsBeforeStairs_PosesFootholdsAndFaultsCross) 
     perception_frame();
   }
   control.join();
-  EXPECT_EQ(control_->lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
-  EXPECT_EQ(perception_->lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
+  EXPECT_EQ(control_->lane_statistics().cycles, static_cast<std::uint64_t>(kFrames));
+  EXPECT_EQ(perception_->lane_statistics().cycles, static_cast<std::uint64_t>(kFrames));
   EXPECT_GE(pipeline_->perception().extractor().counters().frames, 15U);
   EXPECT_FALSE(camera_.holding());
   EXPECT_FALSE(pipeline_->perception().map_snapshot().polygons.empty());
   EXPECT_NE(pipeline_->control().gait_status().phase, GaitPhase::kStandstill);  // a foothold came across
-  EXPECT_EQ(pipeline_->lane_health(0).count(Fault::kDepthMissing).count, 0U);
+  EXPECT_EQ(pipeline_->lane_health(kControlLane).count(Fault::kDepthMissing).count, 0U);
   EXPECT_GE(pipeline_->health().count(Fault::kDepthMissing).count, 6U);  // so did perception's faults
   EXPECT_EQ(pipeline_->health().count(Fault::kPoseMissing).count, 0U);
 }

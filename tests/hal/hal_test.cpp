@@ -21,7 +21,7 @@ struct FakeClockHarness {
   hal::Clock& port() { return clock; }
   void pass(std::int64_t duration_ns) {
     clock.advance_ns(duration_ns);
-    clock.advance_cycles(UINT64_MAX / 3);  // wraps around in the course of a test
+    clock.advance_count(UINT64_MAX / 3);  // wraps around in the course of a test
   }
 };
 INSTANTIATE_TYPED_TEST_SUITE_P(Fake, ClockContract, FakeClockHarness);
@@ -165,7 +165,7 @@ TEST(FakeDepthCamera, Feed_PictureOfAnotherSize_IsCutOrFilledWithInvalid) {
 TEST(FakeClock, WorkUs_AtItsRate_MovesCyclesAndNotTime) {
   FakeClock clock(2500.0);
   clock.work_us(4.0);
-  EXPECT_EQ(clock.cycles(), 10'000U);
+  EXPECT_EQ(clock.count(), 10'000U);
   EXPECT_EQ(clock.now_ns(), 0);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The budgets of one slot add up to 2001 us: the build fails, not the robot.
-// expect: the rows of a lane do not fit one minor frame
+// expect: the rows of a lane do not fit one cycle
 #include "tests/must_not_compile/schedule.hpp"
 
 namespace polygmap {

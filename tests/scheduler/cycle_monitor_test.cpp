@@ -41,20 +41,20 @@ TEST(CountUp, AtTheTop_Stays) {
   EXPECT_EQ(n, 255);
 }
 
-TEST(CycleScale, ToNs_RatesOfRealCounters_IsExactToAPartInAMillion) {
+TEST(CounterScale, ToNs_RatesOfRealCounters_IsExactToAPartInAMillion) {
   for (const double rate : {1.0, 19.2, 31.25, 1000.0, 2496.0, 10'000.0}) {
-    const CycleScale scale(rate);
+    const CounterScale scale(rate);
     for (const std::uint64_t us : {1U, 100U, 2000U, 1'000'000U}) {
-      const auto cycles = static_cast<std::uint64_t>(static_cast<double>(us) * rate);
-      const double expected_ns = static_cast<double>(cycles) * 1000.0 / rate;
-      EXPECT_NEAR(static_cast<double>(scale.to_ns(cycles)), expected_ns, 0.51 + 1e-6 * expected_ns) << rate;
+      const auto counts = static_cast<std::uint64_t>(static_cast<double>(us) * rate);
+      const double expected_ns = static_cast<double>(counts) * 1000.0 / rate;
+      EXPECT_NEAR(static_cast<double>(scale.to_ns(counts)), expected_ns, 0.51 + 1e-6 * expected_ns) << rate;
     }
   }
 }
 
-TEST(CycleScale, ToNs_Anything_SaturatesInsteadOfWrapping) {
+TEST(CounterScale, ToNs_Anything_SaturatesInsteadOfWrapping) {
   for (const double rate : {1.0, 2496.0, 10'000.0}) {
-    const CycleScale scale(rate);
+    const CounterScale scale(rate);
     EXPECT_GT(scale.to_ns(UINT64_MAX), std::uint64_t{200'000'000'000});
     EXPECT_EQ(scale.to_ns(UINT64_MAX), scale.to_ns(UINT64_MAX / 2));
   }

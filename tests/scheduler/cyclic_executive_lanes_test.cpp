@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "algorithms/core/containers/exchange.hpp"
-#include "scheduler/health.hpp"
+#include "scheduler/executive_event.hpp"
 #include "tests/support/example_schedule.hpp"
 #include "tests/support/fakes/fake_clock.hpp"
 
@@ -20,14 +20,14 @@ using namespace test;
 TEST(CyclicExecutive, Tick_TwoLanes_EachRunsItsOwnRowsOnly) {
   FakeClock clock;
   RecordingTasks control, perception;
-  Health health;
+  Counters health;
   CyclicExecutive<RecordingTasks, kTable, 0> lane0(control, clock, health);
   CyclicExecutive<RecordingTasks, kTable, 1> lane1(perception, clock, health);
   lane0.start(0);
   lane1.start(0);
   for (std::int64_t i = 0; i < 16; ++i) {
-    lane0.tick(i * kMinorFrame_ns);
-    lane1.tick(i * kMinorFrame_ns);
+    lane0.tick(i * kCycle_ns);
+    lane1.tick(i * kCycle_ns);
   }
   for (const Call& call : control.calls) EXPECT_LE(call.row, kHealth);
   for (const Call& call : perception.calls) EXPECT_GE(call.row, kPlanes);
@@ -43,20 +43,20 @@ struct HandOver {
 };
 struct TwoLaneTasks {
   Exchange<HandOver> planes;
-  Exchange<Health> perception_health;
-  Health lane_health[2];
+  Exchange<Counters> perception_health;
+  Counters lane_health[2];
   std::int64_t newest_ns = -1;
   std::uint64_t taken = 0;
   std::uint64_t torn = 0;
   std::uint64_t backwards = 0;
 
-  Progress run_row(std::size_t row, std::int64_t frame_ns, WorkBudget&) noexcept {
+  Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget&) noexcept {
     if (row == kPlanes) {
       HandOver& out = planes.back();
-      out.stamp_ns = frame_ns;
-      out.payload.fill(frame_ns);
+      out.stamp_ns = cycle_ns;
+      out.payload.fill(cycle_ns);
       planes.publish();
-      lane_health[1].raise(Limit::kPlanesFull, frame_ns);
+      lane_health[1].raise(ExecutiveEvent::kRowShed, cycle_ns);
       perception_health.back() = lane_health[1];
       perception_health.publish();
     } else if (row == kControl) {
@@ -72,7 +72,7 @@ struct TwoLaneTasks {
 };
 
 TEST(CyclicExecutive, Tick_TwoLanesOnTwoThreads_HandOverWholeValuesInOrder) {
-  constexpr std::int64_t kFrames = 50'000;
+  constexpr std::int64_t kCycles = 50'000;
   TwoLaneTasks tasks;
   FakeClock clock0, clock1;
   CyclicExecutive<TwoLaneTasks, kTable, 0> lane0(tasks, clock0, tasks.lane_health[0]);
@@ -83,9 +83,9 @@ TEST(CyclicExecutive, Tick_TwoLanesOnTwoThreads_HandOverWholeValuesInOrder) {
   const auto drive = [&ready](auto& lane, FakeClock& clock) {
     ready.fetch_add(1);
     while (ready.load() < 2) std::this_thread::yield();
-    for (std::int64_t i = 0; i < kFrames; ++i) {
+    for (std::int64_t i = 0; i < kCycles; ++i) {
       lane.tick(clock.now_ns());
-      clock.advance_ns(kMinorFrame_ns);
+      clock.advance_ns(kCycle_ns);
       if (i % 64 == 0) std::this_thread::yield();
     }
   };
@@ -94,18 +94,18 @@ TEST(CyclicExecutive, Tick_TwoLanesOnTwoThreads_HandOverWholeValuesInOrder) {
   control.join();
   perception.join();
   WorkBudget none(0);
-  (void)tasks.run_row(kControl, kFrames * kMinorFrame_ns, none);  // takes what is left, if any
+  (void)tasks.run_row(kControl, kCycles * kCycle_ns, none);  // takes what is left, if any
   EXPECT_EQ(tasks.torn, 0U);
   EXPECT_EQ(tasks.backwards, 0U);
   EXPECT_GT(tasks.taken, 0U);
-  EXPECT_EQ(tasks.newest_ns, (kFrames - 1) * kMinorFrame_ns) << "the last value is never lost";
-  EXPECT_EQ(lane0.lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
-  EXPECT_EQ(lane1.lane_statistics().frames, static_cast<std::uint64_t>(kFrames));
+  EXPECT_EQ(tasks.newest_ns, (kCycles - 1) * kCycle_ns) << "the last value is never lost";
+  EXPECT_EQ(lane0.lane_statistics().cycles, static_cast<std::uint64_t>(kCycles));
+  EXPECT_EQ(lane1.lane_statistics().cycles, static_cast<std::uint64_t>(kCycles));
 
   ASSERT_TRUE(tasks.perception_health.try_take());
-  Health all = tasks.lane_health[0];
+  Counters all = tasks.lane_health[0];
   all.merge(tasks.perception_health.front());
-  EXPECT_EQ(all.count(Limit::kPlanesFull).count, static_cast<std::uint32_t>(kFrames));
+  EXPECT_EQ(all.count(ExecutiveEvent::kRowShed).count, static_cast<std::uint32_t>(kCycles));
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 // The table's checks; one lane: phase, catching up, shedding, overdrafts, statistics.
 #include <gtest/gtest.h>
 
-#include "scheduler/health.hpp"
+#include "scheduler/executive_event.hpp"
 #include "tests/support/example_schedule.hpp"
 #include "tests/support/fakes/fake_clock.hpp"
 
@@ -13,8 +13,8 @@ using fakes::FakeClock;
 using namespace test;
 
 static_assert(lane_count(kTable) == 2 && lane_count(kOneLane) == 1);
-static_assert(worst_minor_frame_us(kTable) == 1400);
-static_assert(worst_minor_frame_us(kOneLane) == 2000);
+static_assert(worst_cycle_us(kTable) == 1400);
+static_assert(worst_cycle_us(kOneLane) == 2000);
 static_assert(slot_load_us(kTable, 0, 15) == 600 && slot_load_us(kTable, 1, 0) == 800);
 static_assert(kTable[kPlanes].units_per_slot() == 40'000 && kTable[kFootholds].units_per_slot() == 4000);
 static_assert(!kTable[kControl].resumable() && kTable[kControl].units_per_slot() == 0);
@@ -40,7 +40,7 @@ static_assert(rows_shed_but_not_resumable(with(1, {.task = "b", .budget_us = 10,
 static_assert(rows_out_of_lane_order(with(1, {.task = "b", .lane = 1, .budget_us = 10})) == 0);
 static_assert(rows_out_of_lane_order(with(1, {.task = "b", .lane = 2, .budget_us = 10})) == 1);
 static_assert(rows_out_of_lane_order(with(0, {.task = "a", .lane = 1, .budget_us = 10})) == 2);
-static_assert(worst_minor_frame_us(with(1, {.task = "b", .budget_us = 1991})) == 2001);
+static_assert(worst_cycle_us(with(1, {.task = "b", .budget_us = 1991})) == 2001);
 
 class SingleLane : public ::testing::Test {
  protected:
@@ -48,9 +48,9 @@ class SingleLane : public ::testing::Test {
   static constexpr std::int64_t kStart_ns = 5'000'000'123;
 
   void SetUp() override { executive.start(kStart_ns); }
-  // Ticks in time, frame after frame.
-  void run(std::size_t frames) {
-    for (std::size_t i = 0; i < frames; ++i) ASSERT_EQ(executive.tick(executive.next_due_ns()), 1U);
+  // Ticks in time, cycle after cycle.
+  void run(std::size_t cycles) {
+    for (std::size_t i = 0; i < cycles; ++i) ASSERT_EQ(executive.tick(executive.next_due_ns()), 1U);
   }
   // The given row takes this long in its next call.
   void make_long(std::size_t row, double duration_us) {
@@ -69,19 +69,19 @@ class SingleLane : public ::testing::Test {
 
   FakeClock clock;
   RecordingTasks tasks;
-  Health health;
+  Counters health;
   Executive executive{tasks, clock, health};
 };
 
-TEST_F(SingleLane, Tick_OneMajorFrame_RunsEveryRowOfEverySlotInTableOrder) {
-  run(kMinorFramesPerMajor);
+TEST_F(SingleLane, Tick_OneMajorCycle_RunsEveryRowOfEverySlotInTableOrder) {
+  run(kCyclesPerMajor);
   std::size_t next = 0;
-  for (std::size_t slot = 0; slot < kMinorFramesPerMajor; ++slot) {
+  for (std::size_t slot = 0; slot < kCyclesPerMajor; ++slot) {
     for (std::size_t row = 0; row < kOneLane.size(); ++row) {
       if (!kOneLane[row].runs_in(slot)) continue;
       ASSERT_LT(next, tasks.calls.size());
       EXPECT_EQ(tasks.calls[next].row, row);
-      EXPECT_EQ(tasks.calls[next].frame_ns, kStart_ns + static_cast<std::int64_t>(slot) * kMinorFrame_ns);
+      EXPECT_EQ(tasks.calls[next].cycle_ns, kStart_ns + static_cast<std::int64_t>(slot) * kCycle_ns);
       EXPECT_EQ(tasks.calls[next].units, kOneLane[row].units_per_slot());
       ++next;
     }
@@ -90,134 +90,133 @@ TEST_F(SingleLane, Tick_OneMajorFrame_RunsEveryRowOfEverySlotInTableOrder) {
   EXPECT_EQ(executive.row_statistics(kSense).runs, 16U);
   EXPECT_EQ(executive.row_statistics(kHealth).runs, 1U);
   EXPECT_EQ(executive.row_statistics(kFootholds).runs, 8U);
-  EXPECT_EQ(executive.lane_statistics().frames, 16U);
-  EXPECT_FALSE(health.any_fault());
-  EXPECT_FALSE(health.any_limit());
+  EXPECT_EQ(executive.lane_statistics().cycles, 16U);
+  EXPECT_FALSE(health.any<ExecutiveEvent>());
 }
 
 TEST_F(SingleLane, Tick_BeforeDueOrBeforeStart_RunsNothingAndCountsEarly) {
   EXPECT_EQ(executive.tick(kStart_ns - 1), 0U);
   EXPECT_EQ(executive.tick(kStart_ns), 1U);
   EXPECT_EQ(executive.tick(kStart_ns), 0U);
-  EXPECT_EQ(executive.tick(kStart_ns + kMinorFrame_ns - 1), 0U);
+  EXPECT_EQ(executive.tick(kStart_ns + kCycle_ns - 1), 0U);
   EXPECT_EQ(executive.lane_statistics().early, 3U);
   Executive idle(tasks, clock, health);
   EXPECT_EQ(idle.tick(kStart_ns), 0U);
   EXPECT_EQ(idle.lane_statistics().early, 1U);
 }
 
-TEST_F(SingleLane, Tick_LateWithinTheFrame_KeepsThePhaseAndRecordsTheLateness) {
+TEST_F(SingleLane, Tick_LateWithinTheCycle_KeepsThePhaseAndRecordsTheLateness) {
   EXPECT_EQ(executive.tick(kStart_ns + 300'000), 1U);
-  EXPECT_EQ(executive.tick(kStart_ns + kMinorFrame_ns), 1U);
-  EXPECT_EQ(tasks.frames[0].due_ns, kStart_ns);
-  EXPECT_EQ(tasks.frames[1].due_ns, kStart_ns + kMinorFrame_ns);
+  EXPECT_EQ(executive.tick(kStart_ns + kCycle_ns), 1U);
+  EXPECT_EQ(tasks.cycles[0].due_ns, kStart_ns);
+  EXPECT_EQ(tasks.cycles[1].due_ns, kStart_ns + kCycle_ns);
   EXPECT_EQ(executive.lane_statistics().lateness.max_ns(), 300'000U);
   EXPECT_EQ(executive.lane_statistics().lateness.min_ns(), 0U);
   EXPECT_EQ(executive.lane_statistics().slips, 0U);
 }
 
-TEST_F(SingleLane, Tick_TwoFramesLate_CatchesThemUp) {
-  EXPECT_EQ(executive.tick(kStart_ns + 2 * kMinorFrame_ns), 3U);
+TEST_F(SingleLane, Tick_TwoCyclesLate_CatchesThemUp) {
+  EXPECT_EQ(executive.tick(kStart_ns + 2 * kCycle_ns), 3U);
   EXPECT_EQ(executive.lane_statistics().caught_up, 2U);
   EXPECT_EQ(executive.lane_statistics().slips, 0U);
-  EXPECT_EQ(health.count(Limit::kFrameCaughtUp).count, 2U);
-  EXPECT_EQ(health.count(Fault::kFrameSlip).count, 0U);
+  EXPECT_EQ(health.count(ExecutiveEvent::kCycleCaughtUp).count, 2U);
+  EXPECT_EQ(health.count(ExecutiveEvent::kCycleSlip).count, 0U);
   EXPECT_EQ(calls_of(kControl), 3U);
   EXPECT_EQ(executive.shed_level(), 1U) << "late is short of time, whatever the reason";
   EXPECT_EQ(calls_of(kPlanes), 0U);
   EXPECT_EQ(executive.row_statistics(kPlanes).shed, 3U);
 }
 
-TEST_F(SingleLane, Tick_SevenFramesLate_SkipsFiveAndStaysInPhase) {
-  EXPECT_EQ(executive.tick(kStart_ns + 7 * kMinorFrame_ns + 10), 3U);
+TEST_F(SingleLane, Tick_SevenCyclesLate_SkipsFiveAndStaysInPhase) {
+  EXPECT_EQ(executive.tick(kStart_ns + 7 * kCycle_ns + 10), 3U);
   EXPECT_EQ(executive.lane_statistics().slips, 5U);
   EXPECT_EQ(executive.lane_statistics().caught_up, 2U);
-  EXPECT_EQ(health.count(Fault::kFrameSlip).count, 5U);
-  ASSERT_EQ(tasks.frames.size(), 3U);
-  EXPECT_EQ(tasks.frames[0].frame, 5U);
-  EXPECT_EQ(tasks.frames[0].skipped_before, 5U);
-  EXPECT_EQ(tasks.frames[2].slot, 7U);
-  EXPECT_EQ(tasks.frames[2].due_ns, kStart_ns + 7 * kMinorFrame_ns);
-  EXPECT_EQ(tasks.frames[2].skipped_before, 0U);
-  EXPECT_EQ(executive.next_due_ns(), kStart_ns + 8 * kMinorFrame_ns);
+  EXPECT_EQ(health.count(ExecutiveEvent::kCycleSlip).count, 5U);
+  ASSERT_EQ(tasks.cycles.size(), 3U);
+  EXPECT_EQ(tasks.cycles[0].cycle, 5U);
+  EXPECT_EQ(tasks.cycles[0].skipped_before, 5U);
+  EXPECT_EQ(tasks.cycles[2].slot, 7U);
+  EXPECT_EQ(tasks.cycles[2].due_ns, kStart_ns + 7 * kCycle_ns);
+  EXPECT_EQ(tasks.cycles[2].skipped_before, 0U);
+  EXPECT_EQ(executive.next_due_ns(), kStart_ns + 8 * kCycle_ns);
 }
 
 TEST_F(SingleLane, Tick_YearsLate_StaysBounded) {
   constexpr std::int64_t kThreeYears_ns = 94'608'000'000'000'000;
   EXPECT_EQ(executive.tick(kStart_ns + kThreeYears_ns), 3U);
-  EXPECT_EQ(executive.lane_statistics().slips, static_cast<std::uint64_t>(kThreeYears_ns / kMinorFrame_ns - 2));
-  EXPECT_EQ(health.count(Fault::kFrameSlip).count, UINT32_MAX);
+  EXPECT_EQ(executive.lane_statistics().slips, static_cast<std::uint64_t>(kThreeYears_ns / kCycle_ns - 2));
+  EXPECT_EQ(health.count(ExecutiveEvent::kCycleSlip).count, UINT32_MAX);
 }
 
 TEST_F(SingleLane, Tick_ControlUsesTheSlack_ShedsThePerceptionRowThatNoLongerFits) {
   run(1);  // slot 1 is full: 100 + 400 + 800 + 600 us
   make_long(kControl, 800.0);
   run(1);
-  EXPECT_EQ(tasks.frames.back().overran, 1U << kControl);
-  EXPECT_EQ(tasks.frames.back().shed, 1U << kPlanes) << "footholds still fit and matter more";
-  EXPECT_FALSE(tasks.frames.back().overrun);
+  EXPECT_EQ(tasks.cycles.back().overran, 1U << kControl);
+  EXPECT_EQ(tasks.cycles.back().shed, 1U << kPlanes) << "footholds still fit and matter more";
+  EXPECT_FALSE(tasks.cycles.back().overrun);
   EXPECT_EQ(executive.row_statistics(kControl).overruns, 1U);
   EXPECT_EQ(executive.row_statistics(kPlanes).shed, 1U);
-  EXPECT_EQ(health.count(Fault::kRowOverrun).count, 1U);
-  EXPECT_EQ(health.count(Limit::kRowShed).count, 1U);
-  EXPECT_EQ(health.count(Fault::kFrameOverrun).count, 0U);
+  EXPECT_EQ(health.count(ExecutiveEvent::kRowOverrun).count, 1U);
+  EXPECT_EQ(health.count(ExecutiveEvent::kRowShed).count, 1U);
+  EXPECT_EQ(health.count(ExecutiveEvent::kCycleOverrun).count, 0U);
   EXPECT_EQ(executive.shed_level(), 0U);
   run(1);
-  EXPECT_EQ(tasks.frames.back().shed, 0U);
+  EXPECT_EQ(tasks.cycles.back().shed, 0U);
 }
 
 TEST_F(SingleLane, Tick_WorkExactlyAtItsBounds_IsNeitherOverrunNorShed) {
-  const auto next_odd_frame = [this](std::size_t row, double duration_us) {  // 100 + 400 + 800 + 600 us
+  const auto next_odd_cycle = [this](std::size_t row, double duration_us) {  // 100 + 400 + 800 + 600 us
     run(1);
     make_long(row, duration_us);
     run(1);
-    return tasks.frames.back();
+    return tasks.cycles.back();
   };
-  EXPECT_EQ(next_odd_frame(kControl, 400.0).overran, 0U);
-  EXPECT_EQ(next_odd_frame(kControl, 400.001).overran, 1U << kControl);
-  EXPECT_EQ(next_odd_frame(kControl, 620.0).shed, 0U) << "with 800 + 600 us the frame and the dispatch allowance";
-  EXPECT_EQ(next_odd_frame(kControl, 620.001).shed, 1U << kPlanes);
-  EXPECT_FALSE(next_odd_frame(kFootholds, 2000.0).overrun);
-  EXPECT_TRUE(next_odd_frame(kFootholds, 2000.001).overrun);
+  EXPECT_EQ(next_odd_cycle(kControl, 400.0).overran, 0U);
+  EXPECT_EQ(next_odd_cycle(kControl, 400.001).overran, 1U << kControl);
+  EXPECT_EQ(next_odd_cycle(kControl, 620.0).shed, 0U) << "with 800 + 600 us the cycle and the dispatch allowance";
+  EXPECT_EQ(next_odd_cycle(kControl, 620.001).shed, 1U << kPlanes);
+  EXPECT_FALSE(next_odd_cycle(kFootholds, 2000.0).overrun);
+  EXPECT_TRUE(next_odd_cycle(kFootholds, 2000.001).overrun);
 }
 
 TEST_F(SingleLane, Tick_OverrunWhileRecovering_StartsTheRecoveryAnew) {
   make_long(kSense, 2500.0);
   run(1);
-  run(Executive::kRecoveryFrames - 1);
+  run(Executive::kRecoveryCycles - 1);
   make_long(kSense, 2500.0);
   run(1);
   EXPECT_EQ(executive.shed_level(), 2U);
-  run(Executive::kRecoveryFrames - 1);
+  run(Executive::kRecoveryCycles - 1);
   EXPECT_EQ(executive.shed_level(), 2U);
   run(1);
   EXPECT_EQ(executive.shed_level(), 1U);
-  run(Executive::kRecoveryFrames - 1);
+  run(Executive::kRecoveryCycles - 1);
   EXPECT_EQ(executive.shed_level(), 1U);
   run(1);
   EXPECT_EQ(executive.shed_level(), 0U);
 }
 
-TEST_F(SingleLane, Tick_FrameOverrun_ShedsTheFirstOrderUntilAMajorFrameWentWell) {
+TEST_F(SingleLane, Tick_CycleOverrun_ShedsTheFirstOrderUntilAMajorCycleWentWell) {
   run(1);
   make_long(kFootholds, 2500.0);
   run(1);
-  EXPECT_TRUE(tasks.frames.back().overrun);
+  EXPECT_TRUE(tasks.cycles.back().overrun);
   EXPECT_EQ(executive.lane_statistics().overruns, 1U);
-  EXPECT_EQ(health.count(Fault::kFrameOverrun).count, 1U);
+  EXPECT_EQ(health.count(ExecutiveEvent::kCycleOverrun).count, 1U);
   EXPECT_EQ(executive.shed_level(), 1U);
   const std::size_t planes_before = calls_of(kPlanes);
   const std::size_t control_before = calls_of(kControl);
-  run(Executive::kRecoveryFrames);
+  run(Executive::kRecoveryCycles);
   EXPECT_EQ(calls_of(kPlanes), planes_before);
-  EXPECT_EQ(calls_of(kControl), control_before + Executive::kRecoveryFrames);
-  EXPECT_EQ(executive.row_statistics(kPlanes).shed, Executive::kRecoveryFrames);
+  EXPECT_EQ(calls_of(kControl), control_before + Executive::kRecoveryCycles);
+  EXPECT_EQ(executive.row_statistics(kPlanes).shed, Executive::kRecoveryCycles);
   EXPECT_EQ(executive.shed_level(), 0U);
   run(1);
   EXPECT_EQ(calls_of(kPlanes), planes_before + 1);
 }
 
-TEST_F(SingleLane, Tick_OverrunsEveryFrame_ShedsAllPerceptionAndNeverControl) {
+TEST_F(SingleLane, Tick_OverrunsEveryCycle_ShedsAllPerceptionAndNeverControl) {
   tasks.work = [this](const Call& call, WorkBudget&) {
     if (call.row == kSense) clock.work_us(2100.0);
     return Progress::kDone;
@@ -233,42 +232,42 @@ TEST_F(SingleLane, Tick_OverrunsEveryFrame_ShedsAllPerceptionAndNeverControl) {
   EXPECT_EQ(executive.row_statistics(kFootholds).shed, 16U);
 }
 
-TEST_F(SingleLane, ShedInNextFrame_Mask_ShedsThoseRowsOnceButNeverControl) {
-  executive.shed_in_next_frame(1U << kPlanes | 1U << kControl);
+TEST_F(SingleLane, ShedInNextCycle_Mask_ShedsThoseRowsOnceButNeverControl) {
+  executive.shed_in_next_cycle(1U << kPlanes | 1U << kControl);
   run(1);
-  EXPECT_EQ(tasks.frames.back().shed, 1U << kPlanes);
+  EXPECT_EQ(tasks.cycles.back().shed, 1U << kPlanes);
   EXPECT_EQ(calls_of(kControl), 1U);
   run(1);
-  EXPECT_EQ(tasks.frames.back().shed, 0U);
+  EXPECT_EQ(tasks.cycles.back().shed, 0U);
 }
 
 TEST_F(SingleLane, RunRow_RecordedShedsReplayed_GivesTheSameCalls) {
   tasks.work = [this](const Call& call, WorkBudget& budget) {
-    budget.spend(call.units + static_cast<std::int32_t>(call.frame_ns % 7));
-    if (call.row == kControl && call.frame_ns / kMinorFrame_ns % 5 == 0) clock.work_us(1200.0);
+    budget.spend(call.units + static_cast<std::int32_t>(call.cycle_ns % 7));
+    if (call.row == kControl && call.cycle_ns / kCycle_ns % 5 == 0) clock.work_us(1200.0);
     return Progress::kBusy;
   };
   run(64);
   RecordingTasks replayed;
   replayed.work = [](const Call& call, WorkBudget& budget) {
-    budget.spend(call.units + static_cast<std::int32_t>(call.frame_ns % 7));
+    budget.spend(call.units + static_cast<std::int32_t>(call.cycle_ns % 7));
     return Progress::kBusy;
   };
-  Health replay_health;
+  Counters replay_health;
   CyclicExecutive<RecordingTasks, kOneLane> replay(replayed, clock, replay_health);
   replay.start(kStart_ns);
   std::size_t shed = 0;
-  for (const FrameReport& frame : tasks.frames) {
-    shed += frame.shed != 0 ? 1U : 0U;
-    replay.shed_in_next_frame(frame.shed);
-    ASSERT_EQ(replay.tick(frame.due_ns), 1U);
+  for (const CycleReport& cycle : tasks.cycles) {
+    shed += cycle.shed != 0 ? 1U : 0U;
+    replay.shed_in_next_cycle(cycle.shed);
+    ASSERT_EQ(replay.tick(cycle.due_ns), 1U);
   }
   EXPECT_GT(shed, 5U);
   ASSERT_EQ(replayed.calls.size(), tasks.calls.size());
   for (std::size_t i = 0; i < tasks.calls.size(); ++i) {
     ASSERT_EQ(replayed.calls[i].row, tasks.calls[i].row);
     ASSERT_EQ(replayed.calls[i].units, tasks.calls[i].units);
-    ASSERT_EQ(replayed.calls[i].frame_ns, tasks.calls[i].frame_ns);
+    ASSERT_EQ(replayed.calls[i].cycle_ns, tasks.calls[i].cycle_ns);
   }
 }
 
@@ -303,7 +302,7 @@ TEST_F(SingleLane, RunRow_Times_GiveMinMeanMaxAndHistogramPerRowAndSlot) {
 }
 
 TEST_F(SingleLane, RunRow_CycleCounterWrapsAround_TimesStayRight) {
-  clock.advance_cycles(UINT64_MAX - 1000);
+  clock.advance_count(UINT64_MAX - 1000);
   make_long(kControl, 150.0);
   run(1);
   EXPECT_EQ(executive.row_statistics(kControl).time.max_ns(), 150'000U);
@@ -324,7 +323,7 @@ TEST_F(SingleLane, RunRow_Overdraft_IsPaidBackByTheFollowingSlots) {
   EXPECT_EQ(executive.row_statistics(kPlanes).deferred, 6U);
   EXPECT_EQ(executive.row_statistics(kPlanes).overdrawn, 4U);
   EXPECT_EQ(executive.row_statistics(kPlanes).units, static_cast<std::uint64_t>(10 * kUnits));
-  EXPECT_EQ(health.count(Limit::kRowDeferred).count, 6U);
+  EXPECT_EQ(health.count(ExecutiveEvent::kRowDeferred).count, 6U);
 }
 
 TEST_F(SingleLane, RunRow_ShedWhileOverdrawn_PaysWithTheShedSlot) {
@@ -334,7 +333,7 @@ TEST_F(SingleLane, RunRow_ShedWhileOverdrawn_PaysWithTheShedSlot) {
     return Progress::kBusy;
   };
   run(1);
-  executive.shed_in_next_frame(1U << kPlanes);
+  executive.shed_in_next_cycle(1U << kPlanes);
   run(2);
   EXPECT_EQ(executive.row_statistics(kPlanes).deferred, 0U);
   EXPECT_EQ(tasks.calls.back().row, kPlanes);
@@ -353,16 +352,16 @@ TEST_F(SingleLane, RunRow_EverySlotOfARow_IsRunIdleShedDeferredOrSlipped) {
   std::int64_t now_ns = kStart_ns;
   for (int i = 0; i < 20'000; ++i) {
     random = random * 1664525U + 1013904223U;
-    now_ns += (random >> 16) % 64 == 0 ? 9 * kMinorFrame_ns : kMinorFrame_ns;
+    now_ns += (random >> 16) % 64 == 0 ? 9 * kCycle_ns : kCycle_ns;
     executive.tick(now_ns);
   }
   const LaneStatistics& lane = executive.lane_statistics();
   EXPECT_GT(lane.slips, 100U);
   const RowStatistics& planes = executive.row_statistics(kPlanes);  // in every slot
-  EXPECT_EQ(planes.runs + planes.idle + planes.shed + planes.deferred, lane.frames);
+  EXPECT_EQ(planes.runs + planes.idle + planes.shed + planes.deferred, lane.cycles);
   const RowStatistics& control = executive.row_statistics(kControl);
-  EXPECT_EQ(control.runs + control.idle, lane.frames);
-  EXPECT_EQ(lane.frames + lane.slips, static_cast<std::uint64_t>((now_ns - kStart_ns) / kMinorFrame_ns + 1));
+  EXPECT_EQ(control.runs + control.idle, lane.cycles);
+  EXPECT_EQ(lane.cycles + lane.slips, static_cast<std::uint64_t>((now_ns - kStart_ns) / kCycle_ns + 1));
   for (const std::uint64_t seen : {planes.shed, planes.deferred, planes.overruns, planes.idle, lane.overruns}) {
     EXPECT_GT(seen, 100U);
   }
@@ -372,10 +371,10 @@ TEST(CyclicExecutive, Start_ClockRateOutOfRange_RaisesTheFault) {
   for (const double rate : {0.0, -1.0, 1e9, std::numeric_limits<double>::quiet_NaN()}) {
     FakeClock clock(rate);
     RecordingTasks tasks;
-    Health health;
+    Counters health;
     CyclicExecutive<RecordingTasks, kOneLane> executive(tasks, clock, health);
     executive.start(0);
-    EXPECT_EQ(health.count(Fault::kClockRate).count, 1U);
+    EXPECT_EQ(health.count(ExecutiveEvent::kClockRate).count, 1U);
     EXPECT_EQ(executive.tick(0), 1U);
   }
 }
@@ -389,7 +388,7 @@ constexpr ScheduleTable<3> kImportantFirst{{
 TEST(CyclicExecutive, Tick_ShortOfTimeBeforeTheMoreImportantRow_ShedsTheOtherOne) {
   FakeClock clock;
   RecordingTasks tasks;
-  Health health;
+  Counters health;
   CyclicExecutive<RecordingTasks, kImportantFirst> executive(tasks, clock, health);
   tasks.work = [&clock](const Call& call, WorkBudget&) {
     clock.work_us(call.row == 0 ? 1000.0 : 590.0);
@@ -397,8 +396,8 @@ TEST(CyclicExecutive, Tick_ShortOfTimeBeforeTheMoreImportantRow_ShedsTheOtherOne
   };
   executive.start(0);
   executive.tick(0);
-  EXPECT_EQ(executive.last_frame().ran, 0b011U);
-  EXPECT_EQ(executive.last_frame().shed, 0b100U);
+  EXPECT_EQ(executive.last_cycle().ran, 0b011U);
+  EXPECT_EQ(executive.last_cycle().shed, 0b100U);
 }
 
 }  // namespace

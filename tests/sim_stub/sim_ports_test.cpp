@@ -40,7 +40,7 @@ struct SimClockHarness : BlindRobot {
   hal::Clock& port() { return robot; }
   void pass(std::int64_t duration_ns) {
     advance((duration_ns + VirtualClock::kTick_ns - 1) / VirtualClock::kTick_ns);
-    robot.clock().inject_cycles(std::numeric_limits<std::uint64_t>::max() / 3);  // wraps around in a test
+    robot.clock().inject_count(std::numeric_limits<std::uint64_t>::max() / 3);  // wraps around in a test
   }
 };
 INSTANTIATE_TYPED_TEST_SUITE_P(Sim, ClockContract, SimClockHarness);

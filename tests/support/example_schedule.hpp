@@ -21,23 +21,25 @@ inline constexpr ScheduleTable<5> kTable{{
 }};
 inline constexpr ScheduleTable<5> kOneLane = in_one_lane(kTable);
 
+using Counters = EventCounters<ExecutiveEvent>;
+
 struct Call {
   std::size_t row;
-  std::int64_t frame_ns;
+  std::int64_t cycle_ns;
   std::int32_t units;
 };
 
 // Records every call; `work` decides what a call does.
 struct RecordingTasks {
   std::vector<Call> calls;
-  std::vector<FrameReport> frames;
+  std::vector<CycleReport> cycles;
   std::function<Progress(const Call&, WorkBudget&)> work = [](const Call&, WorkBudget&) { return Progress::kDone; };
 
-  Progress run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& budget) noexcept {
-    calls.push_back({row, frame_ns, budget.left()});
+  Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
+    calls.push_back({row, cycle_ns, budget.left()});
     return work(calls.back(), budget);
   }
-  void frame_done(std::size_t, const FrameReport& report) noexcept { frames.push_back(report); }
+  void cycle_done(std::size_t, const CycleReport& report) noexcept { cycles.push_back(report); }
 };
 
 }  // namespace polygmap::test

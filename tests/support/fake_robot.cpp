@@ -6,13 +6,14 @@
 
 #include "algorithms/geometry/so3.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
+#include "scheduler/schedule_table.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/slow_machine.hpp"
 
 namespace polygmap::test {
 namespace {
 
-constexpr double kTick_s = 1e-6 * kMinorFrame_us;
+constexpr double kTick_s = 1e-6 * kCycle_us;
 constexpr double kWeight_n = 540.0, kLeg_n = 30.0;
 constexpr int kPicture_ticks = kSlowMachine ? 48 : 16;
 
@@ -62,7 +63,7 @@ FakeRobot::FakeRobot(double toe_gap_m)
 }
 
 void FakeRobot::advance() {
-  clock.advance_ns(kMinorFrame_ns);
+  clock.advance_ns(kCycle_ns);
   move();
   sense();
   ++tick_;
@@ -137,7 +138,7 @@ void FakeRobot::sense() {
     camera.feed(now_ns, render_for_robot(scene_));
   }
   if (tick_ % 50 == 49) {
-    const std::int64_t scan_ns = now_ns - 2 * kMinorFrame_ns;
+    const std::int64_t scan_ns = now_ns - 2 * kCycle_ns;
     lidar.feed({scan_ns, true_T_base_before_[2] * base_T_lidar(), Vec3::Constant(0.01), Vec3::Constant(0.003)});
   }
 }

@@ -60,24 +60,24 @@ TYPED_TEST_P(ClockContract, NowNs_TimePasses_AdvancesByAtLeastThat) {
   this->harness.pass(2'000'000);
   EXPECT_GE(this->harness.port().now_ns() - begin_ns, 2'000'000);
 }
-TYPED_TEST_P(ClockContract, Cycles_ReadRepeatedly_NeverGoBack) {
+TYPED_TEST_P(ClockContract, Count_ReadRepeatedly_NeverGoesBack) {
   const hal::Clock& clock = this->harness.port();
-  std::uint64_t last = clock.cycles();
+  std::uint64_t last = clock.count();
   for (int i = 0; i < 10'000; ++i) {
     if (i % 2000 == 0) this->harness.pass(10'000);
-    const std::uint64_t cycles = clock.cycles();
-    ASSERT_LT(cycles - last, std::uint64_t{1} << 63);  // modulo 2^64
-    last = cycles;
+    const std::uint64_t count = clock.count();
+    ASSERT_LT(count - last, std::uint64_t{1} << 63);  // modulo 2^64
+    last = count;
   }
 }
-TYPED_TEST_P(ClockContract, CyclesPerUs_AnyTime_IsOneRateInRange) {
-  const double rate = this->harness.port().cycles_per_us();
-  EXPECT_TRUE(CycleScale::valid(rate)) << rate;
+TYPED_TEST_P(ClockContract, CountsPerUs_AnyTime_IsOneRateInRange) {
+  const double rate = this->harness.port().counts_per_us();
+  EXPECT_TRUE(CounterScale::valid(rate)) << rate;
   this->harness.pass(1'000'000);
-  EXPECT_EQ(this->harness.port().cycles_per_us(), rate);
+  EXPECT_EQ(this->harness.port().counts_per_us(), rate);
 }
 REGISTER_TYPED_TEST_SUITE_P(ClockContract, NowNs_ReadRepeatedly_NeverGoesBack, NowNs_TimePasses_AdvancesByAtLeastThat,
-                            Cycles_ReadRepeatedly_NeverGoBack, CyclesPerUs_AnyTime_IsOneRateInRange);
+                            Count_ReadRepeatedly_NeverGoesBack, CountsPerUs_AnyTime_IsOneRateInRange);
 
 // Ports that deliver a queue of stamped samples: the same contract for the IMU and the lidar odometry.
 template <typename Sample, typename Port>

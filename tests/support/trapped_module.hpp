@@ -6,22 +6,21 @@
 #include <memory>
 #include <optional>
 
-#include "firmware/pipeline.hpp"
-#include "scheduler/cyclic_executive.hpp"
+#include "firmware/schedule.hpp"
 #include "sim_stub/heap_trap.hpp"
 
 namespace polygmap::test {
 
 class TrappedModule {
  public:
-  using Executive = CyclicExecutive<Pipeline, kOneLaneSchedule>;
+  using Executive = OneLaneExecutive<>;
 
   TrappedModule(const Ports& ports, const Params& params, const hal::Clock& clock)
       : clock_(clock), memory_(std::make_unique<Memory>()) {
     const heap::ModuleCall call("Pipeline::Pipeline");
     memory_->pipeline.emplace(ports, params);
     memory_->executive.emplace(pipeline(), clock, pipeline().lane_health(0));
-    memory_->executive->start(clock.now_ns() + kMinorFrame_ns);
+    memory_->executive->start(clock.now_ns() + kCycle_ns);
   }
   void tick() {
     const heap::ModuleCall call("CyclicExecutive::tick");

@@ -21,6 +21,10 @@ class Exchange {
   // Producer only: the buffer to fill before publish(). It holds some older value: fill all of it.
   [[nodiscard]] T& back() noexcept { return slots_[back_]; }
   void publish() noexcept { back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex; }
+  void publish(const T& value) noexcept {
+    back() = value;
+    publish();
+  }
 
   // Consumer only: false when nothing new was published since the last take; front() then stays as it was.
   [[nodiscard]] bool try_take() noexcept {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 
 #include "algorithms/core/messages/gait_status.hpp"
 #include "algorithms/gait/states/body_plan.hpp"
@@ -62,26 +63,24 @@ struct GaitShared {
 struct Transition {
   enum class To : std::uint8_t { kStay, kStanding, kWeightShift, kSwing, kEnd };
   To to = To::kStay;
-  ClimbPlanner::Decision decision;  // of a shift or a swing
-  bool same_foot = false;           // of a shift: the weight is over the stance foot already
-  StepTry tried;                    // of a swing: the shape that the legs can do
-  GaitPhase phase = GaitPhase::kStopped;
-  StopReason reason = StopReason::kNone;  // of an end, both feet standing
-  double measured_m = 0.0;
+  bool same_foot = false;                 // of a shift: the weight is over the stance foot already
+  GaitPhase phase = GaitPhase::kStopped;  // of an end, both feet standing:
+  StopReason reason = StopReason::kNone;  // why,
+  double measured_m = 0.0;                // and the rise or tread behind it
+  std::optional<ClimbPlanner::Decision> decision = std::nullopt;  // of a shift or a swing
+  std::optional<StepTry> tried = std::nullopt;                    // of a swing: the shape that the legs can do
 
-  [[nodiscard]] static Transition stand() noexcept { return {.to = To::kStanding, .decision = {}, .tried = {}}; }
+  [[nodiscard]] static Transition stand() noexcept { return {.to = To::kStanding}; }
   [[nodiscard]] static Transition shift(const ClimbPlanner::Decision& decision, bool same_foot) noexcept {
-    return {.to = To::kWeightShift, .decision = decision, .same_foot = same_foot, .tried = {}};
+    return {.to = To::kWeightShift, .same_foot = same_foot, .decision = decision};
   }
   [[nodiscard]] static Transition swing(const ClimbPlanner::Decision& decision, const StepTry& tried) noexcept {
     return {.to = To::kSwing, .decision = decision, .tried = tried};
   }
   [[nodiscard]] static Transition stop(StopReason reason, double measured_m = 0.0) noexcept {
-    return {.to = To::kEnd, .decision = {}, .tried = {}, .reason = reason, .measured_m = measured_m};
+    return {.to = To::kEnd, .reason = reason, .measured_m = measured_m};
   }
-  [[nodiscard]] static Transition finish() noexcept {
-    return {.to = To::kEnd, .decision = {}, .tried = {}, .phase = GaitPhase::kFinished};
-  }
+  [[nodiscard]] static Transition finish() noexcept { return {.to = To::kEnd, .phase = GaitPhase::kFinished}; }
 };
 
 }  // namespace polygmap

@@ -8,8 +8,7 @@
 #include <optional>
 
 #include "firmware/config/param_table.hpp"
-#include "firmware/pipeline.hpp"
-#include "scheduler/cyclic_executive.hpp"
+#include "firmware/schedule.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "sim_stub/host/climb/climb_report.hpp"
 #include "sim_stub/nominal_robot.hpp"
@@ -26,9 +25,9 @@ class TimedPipeline {
  public:
   explicit TimedPipeline(Pipeline& pipeline) noexcept : pipeline_(pipeline) {}
 
-  Progress run_row(std::size_t row, std::int64_t frame_ns, WorkBudget& budget) noexcept {
+  Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
     const auto begin = WallClock::now();
-    const Progress progress = pipeline_.run_row(row, frame_ns, budget);
+    const Progress progress = pipeline_.run_row(row, cycle_ns, budget);
     if (progress != Progress::kIdle) {
       wall_[row].add(static_cast<std::uint64_t>(std::chrono::nanoseconds(WallClock::now() - begin).count()));
     }
@@ -38,7 +37,7 @@ class TimedPipeline {
 
  private:
   Pipeline& pipeline_;
-  std::array<DurationStatistics, kRowCount> wall_;
+  std::array<DurationStatistics, kTasks.size()> wall_;
 };
 
 // The lidar's port on the way to the module: the report wants to see what the module accepts.
@@ -65,16 +64,17 @@ class WatchedLidar final : public hal::LidarOdometry {
   std::int64_t told_ns_ = 0;
 };
 
-using Executive = CyclicExecutive<TimedPipeline, kOneLaneSchedule>;
+using Executive = OneLaneExecutive<TimedPipeline>;
 
 // Memory that is there before the module is: the heap is watched from its first instruction on.
 struct Module {
   std::optional<Pipeline> pipeline;
   std::optional<TimedPipeline> tasks;
   std::optional<Executive> executive;
+  PerceptionTelemetry watched;
 };
 
-static_assert(VirtualClock::kTick_ns == kMinorFrame_ns);
+static_assert(VirtualClock::kTick_ns == kCycle_ns);
 
 SimOptions sim_options(const ClimbOptions& options) {
   SimOptions sim;
@@ -118,7 +118,7 @@ const char* name_of(GaitPhase phase) {
 ClimbProgress progress_of(std::int64_t now_ns, const GaitStatus& gait, const TimedPipeline& tasks) {
   ClimbProgress progress{seconds(now_ns), static_cast<int>(gait.treads_climbed), name_of(gait.phase), "", 0.0};
   double worst_share = -1.0;
-  for (std::size_t row = 0; row < kRowCount; ++row) {
+  for (std::size_t row = 0; row < kTasks.size(); ++row) {
     const double max_us = 1e-3 * static_cast<double>(tasks.wall(row).max_ns());
     if (max_us / kOneLaneSchedule[row].budget_us <= worst_share) continue;
     worst_share = max_us / kOneLaneSchedule[row].budget_us;
@@ -130,9 +130,9 @@ ClimbProgress progress_of(std::int64_t now_ns, const GaitStatus& gait, const Tim
 
 std::vector<ScheduleRow> schedule_of(const Executive& executive, const TimedPipeline& tasks) {
   std::vector<ScheduleRow> rows;
-  for (std::size_t row = 0; row < kRowCount; ++row) {
+  for (std::size_t row = 0; row < kTasks.size(); ++row) {
     const RowStatistics& statistics = executive.row_statistics(row);
-    rows.push_back({std::string(kSchedule[row].task), kSchedule[row].lane == 0 ? "control" : "perception",
+    rows.push_back({std::string(kSchedule[row].task), kSchedule[row].lane == kControlLane ? "control" : "perception",
                     static_cast<double>(kSchedule[row].budget_us), statistics.runs, statistics.overruns,
                     1e-3 * static_cast<double>(tasks.wall(row).mean_ns()),
                     1e-3 * static_cast<double>(tasks.wall(row).max_ns())});
@@ -158,12 +158,13 @@ CameraFigures camera_figures(const SimRobot& robot, const CameraExtrinsicsEstima
 // Of all lanes, by name; only what was raised.
 std::vector<std::pair<std::string, std::uint32_t>> raised(const Health& health) {
   std::vector<std::pair<std::string, std::uint32_t>> out;
-  const auto add = [&]<typename Code>(std::size_t i, Code) {
-    const auto code = static_cast<Code>(kFirstCode<Code> + i);
-    if (const std::uint32_t count = health.count(code).count; count > 0) out.emplace_back(name_of(code), count);
+  const auto add = [&](const auto& table) {
+    for (const auto& line : table) {
+      if (const std::uint32_t count = health.count(line.code).count; count > 0) out.emplace_back(line.name, count);
+    }
   };
-  for (std::size_t i = 0; i < kCodeCount<Fault>; ++i) add(i, Fault{});
-  for (std::size_t i = 0; i < kCodeCount<Limit>; ++i) add(i, Limit{});
+  add(kFaultTable);
+  add(kLimitTable);
   return out;
 }
 
@@ -191,9 +192,10 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   {
     const heap::ModuleCall call("Pipeline::Pipeline");
     module->pipeline.emplace(Ports{robot, robot, robot, lidar}, params);
+    module->pipeline->watch(module->watched);
     module->tasks.emplace(*module->pipeline);
     module->executive.emplace(*module->tasks, robot, module->pipeline->lane_health(0));
-    module->executive->start(robot.now_ns() + kMinorFrame_ns);
+    module->executive->start(robot.now_ns() + kCycle_ns);
   }
   Pipeline& pipeline = *module->pipeline;
   TimedPipeline& tasks = *module->tasks;
@@ -208,7 +210,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
       const heap::ModuleCall call("CyclicExecutive::tick");
       executive.tick(robot.now_ns());
     }
-    const Telemetry telemetry = pipeline.telemetry(robot.now_ns());
+    const Telemetry telemetry = pipeline.telemetry(robot.now_ns(), module->watched);
     report.observe(robot.truth(), telemetry);
     if (lidar.accepted(telemetry.state)) report.observe_lio(lidar.last());
     if (progress && robot.now_ns() >= next_progress_ns) {

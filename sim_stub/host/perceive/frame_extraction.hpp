@@ -65,5 +65,5 @@ namespace polygmap {
 
 namespace polygmap_1024x768 {
 [[nodiscard]] std::unique_ptr<polygmap_frames::Extractor> make_extractor(const polygmap_frames::Camera& camera,
-                                                                         const polygmap_frames::Values& values = {});
+                                                                         const polygmap_frames::Values& values);
 }  // namespace polygmap_1024x768

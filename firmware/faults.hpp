@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// What went wrong (faults) and what ran into a bound and was held there (limits): number, name and meaning, in one
+// table each. A number is in logs and manuals: it stays with its line, and that of a line that goes is not used again.
+#pragma once
+
+#include "scheduler/event_counters.hpp"
+#include "scheduler/executive_event.hpp"
+
+namespace polygmap {
+
+// Something does not work as it should; the module degrades. Numbers 1-99.
+#define POLYGMAP_FAULTS(X)                                                                                         \
+  X(1, kFrameOverrun, "frame_overrun", "A lane's cycle took longer than kCycle_us.")                               \
+  X(2, kRowOverrun, "row_overrun", "A row took longer than its budget.")                                           \
+  X(3, kFrameSlip, "frame_slip", "A tick came so late that cycles were skipped.")                                  \
+  X(4, kClockRate, "clock_rate", "The clock's counter has a rate outside CounterScale's range.")                   \
+  X(5, kImuMissing, "imu_missing", "No IMU sample came in a cycle, and none was read ahead.")                      \
+  X(6, kImuRejected, "imu_rejected", "An IMU sample was not finite, out of range or order, or of the future.")     \
+  X(7, kJointFeedbackMissing, "joint_feedback_missing", "No joint feedback came in a cycle.")                      \
+  X(8, kJointFeedbackRejected, "joint_feedback_rejected",                                                          \
+    "Joint feedback was not finite, out of range or order, of the future, or jumped.")                             \
+  X(9, kJointCommandRefused, "joint_command_refused", "The bus did not take a command.")                           \
+  X(10, kJointCommandInvalid, "joint_command_invalid", "The module's own command was not finite: not sent.")       \
+  X(11, kDepthMissing, "depth_missing", "No depth frame came within the camera's time-out.")                       \
+  X(12, kDepthRejected, "depth_rejected",                                                                          \
+    "A depth frame had a wrong size, no data, an old stamp, or a camera that cannot be.")                          \
+  X(13, kLioMissing, "lio_missing", "No lidar pose was accepted for two seconds.")                                 \
+  X(14, kLioRejected, "lio_rejected", "A lidar pose was not finite, out of order, or too far from the odometry.")  \
+  X(15, kPoseMissing, "pose_missing", "Control did not say in time where a frame was exposed; it was given back.") \
+  X(16, kMapStale, "map_stale", "The newest fused frame was too old to step on.")                                  \
+  X(17, kStateStale, "state_stale", "IMU or joints were silent for so long that the gait stopped.")                \
+  X(18, kGaitStopped, "gait_stopped", "The gait stopped in double support, not on top.")
+
+// A bound was met; the module goes on with what it has. Numbers 101-199.
+#define POLYGMAP_LIMITS(X)                                                                                         \
+  X(101, kRowShed, "row_shed", "A slot was given up for lack of time.")                                            \
+  X(102, kRowDeferred, "row_deferred", "A slot paid back an overdraft of work units.")                             \
+  X(103, kFrameCaughtUp, "frame_caught_up", "A cycle was run late.")                                               \
+  X(104, kPlanesFull, "planes_full", "A plane or surface of a frame found no room.")                               \
+  X(105, kMapFull, "map_full", "A polygon found no room in the map.")                                              \
+  X(106, kStateRingMissed, "state_ring_missed", "The past states do not cover a frame's stamp.")                   \
+  X(107, kDepthUnplaced, "depth_unplaced", "A frame was given back for that, or is from before the start.")        \
+  X(108, kReachLimited, "reach_limited", "A leg could not reach the pose asked for.")                              \
+  X(109, kContactEarly, "contact_early", "A foot touched before its planned time.")                                \
+  X(110, kContactLate, "contact_late", "A foot touched after its planned time.")                                   \
+  X(111, kRunsFull, "runs_full", "A run, interval or pair of planes of a frame found no room.")                    \
+  X(112, kHeightRejected, "height_rejected", "A mapped tread's height disagreed with the sole that landed on it.") \
+  X(113, kFootPutBack, "foot_put_back", "A foot in the air went back to where it had stood.")                      \
+  X(114, kFrameLost, "frame_lost", "A frame never reached the map: it was unusable, or the last one still waited.")
+
+#define POLYGMAP_ENUMERATOR(number, code, name, text) code = number,
+#define POLYGMAP_FAULT_LINE(number, code, name, text) EventInfo<Fault>{Fault::code, name, text},
+#define POLYGMAP_LIMIT_LINE(number, code, name, text) EventInfo<Limit>{Limit::code, name, text},
+
+enum class Fault : std::uint8_t { POLYGMAP_FAULTS(POLYGMAP_ENUMERATOR) };
+enum class Limit : std::uint8_t { POLYGMAP_LIMITS(POLYGMAP_ENUMERATOR) };
+
+inline constexpr std::array kFaultTable{POLYGMAP_FAULTS(POLYGMAP_FAULT_LINE)};
+inline constexpr std::array kLimitTable{POLYGMAP_LIMITS(POLYGMAP_LIMIT_LINE)};
+
+#undef POLYGMAP_FAULTS
+#undef POLYGMAP_LIMITS
+#undef POLYGMAP_ENUMERATOR
+#undef POLYGMAP_FAULT_LINE
+#undef POLYGMAP_LIMIT_LINE
+
+template <>
+inline constexpr auto kEventTable<Fault> = kFaultTable;
+template <>
+inline constexpr auto kEventTable<Limit> = kLimitTable;
+static_assert(bad_event_lines<Fault>(1, 99) == 0 && bad_event_lines<Limit>(101, 199) == 0);
+
+[[nodiscard]] constexpr std::string_view name_of(Fault fault) noexcept { return name_of_event(fault); }
+[[nodiscard]] constexpr std::string_view name_of(Limit limit) noexcept { return name_of_event(limit); }
+
+// Faults and limits of a lane, those of its executive among them.
+class Health : public EventCounters<Fault, Limit> {
+ public:
+  using EventCounters::raise;
+  constexpr void raise(ExecutiveEvent event, std::int64_t now_ns, std::uint32_t times = 1) noexcept {
+    switch (event) {
+      case ExecutiveEvent::kCycleOverrun:
+        return raise(Fault::kFrameOverrun, now_ns, times);
+      case ExecutiveEvent::kRowOverrun:
+        return raise(Fault::kRowOverrun, now_ns, times);
+      case ExecutiveEvent::kCycleSlip:
+        return raise(Fault::kFrameSlip, now_ns, times);
+      case ExecutiveEvent::kClockRate:
+        return raise(Fault::kClockRate, now_ns, times);
+      case ExecutiveEvent::kRowShed:
+        return raise(Limit::kRowShed, now_ns, times);
+      case ExecutiveEvent::kRowDeferred:
+        return raise(Limit::kRowDeferred, now_ns, times);
+      case ExecutiveEvent::kCycleCaughtUp:
+        return raise(Limit::kFrameCaughtUp, now_ns, times);
+    }
+  }
+  [[nodiscard]] constexpr bool any_fault() const noexcept { return any<Fault>(); }
+  [[nodiscard]] constexpr bool any_limit() const noexcept { return any<Limit>(); }
+};
+
+}  // namespace polygmap
