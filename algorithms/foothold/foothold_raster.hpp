@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The foothold cells around the robot, eqs (16)-(25): world-aligned, fixed size, filled row by row.
+// The foothold cells around the robot, eqs (16)-(21): world-aligned, fixed size, filled row by row. A cell names its
+// surface and nothing else; height, range and room for a foot follow from the surface where they are asked for.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
+#include <span>
 
 #include "algorithms/core/containers/raster.hpp"
 #include "algorithms/foothold/level_surface.hpp"
@@ -16,22 +17,17 @@ class FootholdRaster {
   static constexpr std::int32_t kSide = static_cast<std::int32_t>(kFootholdRasterSide_cells);
   static constexpr std::uint8_t kNoLayer = 255;
 
-  struct Cell {
-    float z_m = -std::numeric_limits<float>::infinity();
-    float spare_m = 0.0F;           // signed: of a foot here to the edges and what rises behind, beyond its margins
-    std::uint8_t layer = kNoLayer;  // index of the surface: one layer per mapped surface (eq. 24)
-  };
-
   // Cells lie on world multiples of g_res, so that they do not jitter with the pose.
   void centre_on(const Vec2& world_m, double g_res_m) noexcept {
     g_res_m_ = g_res_m;
     first_x_ = std::lround(world_m.x() / g_res_m) - kSide / 2;
     first_y_ = std::lround(world_m.y() / g_res_m) - kSide / 2;
   }
-  void clear_row(std::int32_t row) noexcept { std::fill_n(cells_.row(row), kSide, Cell{}); }
+  void clear_row(std::int32_t row) noexcept { std::fill_n(cells_.row(row), kSide, kNoLayer); }
 
   // The part of one surface in one row: eqs (17)-(19), and the highest surface stays, eq. (21).
-  void add_row(std::int32_t row, const LevelSurface& surface, std::uint8_t layer) noexcept {
+  void add_row(std::int32_t row, std::span<const LevelSurface> surfaces, std::uint8_t layer) noexcept {
+    const LevelSurface& surface = surfaces[layer];
     const double y_m = at(0, row).y();
     if (y_m < surface.box.min_m.y() || y_m > surface.box.max_m.y()) return;  // eq. (16)
     Interval x;
@@ -40,24 +36,22 @@ class FootholdRaster {
     const double first = math::clamp(std::ceil(x.min_m / g_res_m_ - static_cast<double>(first_x_)), 0.0, limit);
     const double last = math::clamp(std::floor(x.max_m / g_res_m_ - static_cast<double>(first_x_)), -1.0, limit - 1.0);
     for (auto column = static_cast<std::int32_t>(first); column <= static_cast<std::int32_t>(last); ++column) {
+      std::uint8_t& cell = cells_(column, row);
       // Eq. (18) takes the mean of the vertices; the plane's own height is the same on a level surface and right on a
       // tilted one (a floor tilted by 5 mrad is 5 mm off at 1 m).
-      const auto z_m = static_cast<float>(surface.plane.height_m(at(column, row)));
-      Cell& cell = cells_(column, row);
-      if (z_m > cell.z_m) cell = {z_m, 0.0F, layer};
+      const auto height_m = [&](std::uint8_t i) { return surfaces[i].plane.height_m(at(column, row)); };
+      if (cell == kNoLayer || height_m(layer) > height_m(cell)) cell = layer;
     }
   }
 
   [[nodiscard]] Vec2 at(std::int32_t column, std::int32_t row) const noexcept {
     return {g_res_m_ * static_cast<double>(first_x_ + column), g_res_m_ * static_cast<double>(first_y_ + row)};
   }
-  [[nodiscard]] Cell& operator()(std::int32_t column, std::int32_t row) noexcept { return cells_(column, row); }
-  [[nodiscard]] const Cell& operator()(std::int32_t column, std::int32_t row) const noexcept {
-    return cells_(column, row);
-  }
+  // Index of the surface: one layer per mapped surface, eq. (24).
+  [[nodiscard]] std::uint8_t layer(std::int32_t column, std::int32_t row) const noexcept { return cells_(column, row); }
 
  private:
-  Raster<Cell, kSide, kSide> cells_;
+  Raster<std::uint8_t, kSide, kSide> cells_;
   double g_res_m_ = 0.01;
   long first_x_ = 0;
   long first_y_ = 0;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algorithms/foothold/foothold_search.hpp"
 
+#include <algorithm>
+
 namespace polygmap {
 namespace {
 
@@ -47,10 +49,7 @@ void FootholdSearch::begin(const MapSnapshot& map, const Query& query) noexcept 
   pending_.map_stamp_ns = map.stamp_ns;
   levels_.clear();
   uprights_.clear();
-  unconfirmed_ahead_ = has_p_star_cell_ = false;
-  next_ = next_next_ = underfoot_ = kNone;
-  next_distance2_m2_ = p_star_distance2_m2_ = p_star_star_distance2_m2_ = kInfinity;
-  top_cells_ = top_cells_seen_ = 0;
+  found_ = {};
   raster_.centre_on(base_.origin_m() + kCentreAhead_m * base_.heading(), params_.g_res_m);
   index_ = 0;
   row_ = 0;
@@ -118,22 +117,50 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
       (void)levels_.try_push_back(level);  // as many as the map holds
     } else if (level.height_m > z_foot_ + params_.delta_foot_m &&
                in_range(base_(centroid_m(level.hull)), params_.g_range_m)) {
-      unconfirmed_ahead_ = true;
+      found_.unconfirmed_ahead = true;
     }
   }
   if (surface.kind == SurfaceKind::kRiser && confirmed) {
-    const Vec2 outward = surface.normal.head<2>().normalized();
-    Upright upright{surface.centroid_m.head<2>(), left_of(outward), outward, 0.0, 0.0, kInfinity, -kInfinity,
-                    surface.offset_sigma_m};
-    for (const Vec3& v : surface.polygon) {
-      const double along_m = upright.direction.dot(v.head<2>() - upright.point_m);
-      upright.reach_left_m = std::max(upright.reach_left_m, along_m);
-      upright.reach_right_m = std::min(upright.reach_right_m, along_m);
-      upright.bottom_m = std::min(upright.bottom_m, v.z());
-      upright.top_m = std::max(upright.top_m, v.z());
-    }
-    (void)uprights_.try_push_back(upright);
+    (void)uprights_.try_push_back(upright_of(surface));
   }
+}
+
+FootholdSearch::Extent FootholdSearch::extent_on(const LevelSurface& tread, const Vec2& a_m,
+                                                 const Vec2& b_m) const noexcept {
+  const double a = tread.lateral_m(a_m), b = tread.lateral_m(b_m), middle_m = this->middle_m(tread);
+  const double feet_m = params_.half_spacing_m + foot_.collision.half_width_m + params_.side_margin_m;
+  if (std::min(a, b) < middle_m - feet_m && std::max(a, b) > middle_m + feet_m) return Extent::kAcross;
+  const bool near = std::max(a, b) > middle_m - feet_m - params_.evade_max_m &&
+                    std::min(a, b) < middle_m + feet_m + params_.evade_max_m;
+  return near ? Extent::kPartial : Extent::kAside;
+}
+
+// A riser ends the tread. A post on it or before it, a box, the end of a wall is in the way only where a foot, or the
+// leg above it, would meet it: as an endless line, balusters ended a tread of 0.28 m after 0.121 m (2026-11).
+void FootholdSearch::link_upright(LevelSurface& tread, const Upright& u) const noexcept {
+  constexpr double kLeg_m = 0.5;  // above the sole: what hangs higher is in no leg's way
+  constexpr double kBesideFacing = 0.3;
+  // A face at the nosing is the tread's own riser, which measures up to 0.09 m too tall, see carries(); what stands on
+  // the tread does not reach below it.
+  constexpr double kTaller_m = 0.25, kBelow_m = 0.05;
+  if (u.top_m < tread.height_m + params_.delta_foot_m || u.bottom_m > tread.height_m + kLeg_m) return;
+  const double facing = u.outward.dot(tread.heading);
+  const Extent extent = extent_on(tread, u.left_m(), u.right_m());
+  const double margin_m = params_.margin.of(u.sigma_m);
+  if (extent == Extent::kAcross && facing <= -kFacing) {
+    add_toe_limit(tread, foot_, {u.point_m, u.direction}, margin_m, kNearestBack_m, kFarthestBack_m);
+  }
+  if (extent != Extent::kPartial || facing > kBesideFacing) return;
+  const double a = tread.along_m(u.left_m()), b = tread.along_m(u.right_m());
+  const double passed_m = tread.along_m(sole_.origin_m()) + foot_.collision.toe_x_m;
+  if (std::max(a, b) < passed_m || std::min(a, b) > kFarthestBack_m) return;
+  const bool own_riser =
+      std::max(a, b) < kNearestBack_m && u.bottom_m < tread.height_m - kBelow_m && u.top_m < tread.height_m + kTaller_m;
+  if (own_riser) return;
+  const double left = tread.lateral_m(u.left_m()), right = tread.lateral_m(u.right_m());
+  const double aside_m = foot_.collision.half_width_m + params_.side_margin_m;
+  const Interval met{std::min(left, right) - aside_m, std::max(left, right) + aside_m};
+  add_obstacle(tread, {std::min(a, b) - foot_.collision.toe_x_m, margin_m, met}, middle_m(tread));
 }
 
 // What the toe must not reach: the next tread's nosing and the next riser, beside the tread's own back edge.
@@ -144,78 +171,93 @@ void FootholdSearch::link(std::size_t i) noexcept {
     const LevelSurface& other = levels_[j];
     const double rise_m = other.height_m - tread.height_m;
     if (j == i || !other.has_nosing || rise_m < params_.delta_foot_m) continue;
+    const Vec2 a_m = other.nosing_a_m.head<2>(), b_m = other.nosing_b_m.head<2>();
+    // A tread seen in part goes on; the top of a box beside the way does not.
+    if (extent_on(tread, a_m, b_m) == Extent::kAside) continue;
     add_toe_limit(tread, foot_, {other.nosing_middle_m(), other.left}, other.nosing_margin_m, kNearestBack_m,
                   kFarthestBack_m);
   }
-  for (const Upright& upright : uprights_) {
-    if (upright.top_m < tread.height_m + params_.delta_foot_m || upright.outward.dot(tread.heading) > -kFacing)
-      continue;
-    add_toe_limit(tread, foot_, {upright.point_m, upright.direction}, params_.margin.of(upright.sigma_m),
-                  kNearestBack_m, kFarthestBack_m);
-  }
+  for (const Upright& upright : uprights_) link_upright(tread, upright);
   const Vec2& sole_p_m = sole_.origin_m();
   const double along_m = tread.along_m(sole_p_m);
   if (tread.far_end_m && along_m > 0.0 && along_m < *tread.far_end_m &&
       in_sole_layer(tread.plane.height_m(sole_p_m), z_foot_, params_.delta_foot_m)) {
-    underfoot_ = i;
+    found_.underfoot = i;
   }
 }
 
 void FootholdSearch::raster_row(std::int32_t row) noexcept {
   raster_.clear_row(row);
-  for (std::size_t i = 0; i < levels_.size(); ++i) raster_.add_row(row, levels_[i], static_cast<std::uint8_t>(i));
+  const std::span<const LevelSurface> levels(levels_.begin(), levels_.size());
+  for (std::size_t i = 0; i < levels_.size(); ++i) raster_.add_row(row, levels, static_cast<std::uint8_t>(i));
+  look_at_top(row);
+  find_next(row);
+}
 
+// How much of the floor before the standing foot was seen, eq. (28): where nothing rises, that says so.
+void FootholdSearch::look_at_top(std::int32_t row) noexcept {
+  if (std::abs(raster_.at(0, row).y() - sole_.origin_m().y()) > params_.top_to_m + params_.top_half_width_m) return;
+  const Vec2 first = sole_(raster_.at(0, row)), step = sole_(raster_.at(1, row)) - first;
   for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
-    FootholdRaster::Cell& cell = raster_(column, row);
-    const Vec2 p = raster_.at(column, row);
-    const Vec2 sole_p = sole_(p);
-    // Where the tread underfoot was seen to end there is nothing to look at behind.
-    const bool ended = underfoot_ != kNone && levels_[underfoot_].along_m(p) > *levels_[underfoot_].far_end_m;
-    if (sole_p.x() >= params_.top_from_m && sole_p.x() <= params_.top_to_m &&
-        std::abs(sole_p.y()) <= params_.top_half_width_m && !ended) {
-      ++top_cells_;
-      if (in_sole_layer(cell.z_m, z_foot_, params_.delta_foot_m)) ++top_cells_seen_;  // eq. (28)
-    }
-    if (cell.layer == FootholdRaster::kNoLayer) continue;
-    const Vec2 base_p = base_(p);
-    if (!in_range(base_p, params_.g_range_m)) {  // eq. (20)
-      cell = {};
+    const Vec2 sole_p = first + static_cast<double>(column) * step;
+    if (sole_p.x() < params_.top_from_m || sole_p.x() > params_.top_to_m ||
+        std::abs(sole_p.y()) > params_.top_half_width_m) {
       continue;
     }
-    // What comes next is decided before the height limit and the erosion: an obstacle is not skipped over.
-    if (cell.z_m > z_foot_ + params_.delta_foot_m && std::abs(base_p.y()) <= params_.corridor_half_width_m &&
-        base_p.squaredNorm() < next_distance2_m2_) {
-      next_distance2_m2_ = base_p.squaredNorm();
-      next_ = cell.layer;
+    const Vec2 p = raster_.at(column, row);
+    // Where the tread underfoot was seen to end there is nothing to look at behind.
+    if (found_.underfoot != kNone) {
+      const LevelSurface& underfoot = levels_[found_.underfoot];
+      if (underfoot.along_m(p) > *underfoot.far_end_m) continue;
     }
-    if (!below_limit(cell.z_m, z_foot_, params_.g_z_m)) cell = {};  // eq. (23)
+    ++found_.top_cells;
+    const std::uint8_t layer = raster_.layer(column, row);
+    const bool seen = layer != FootholdRaster::kNoLayer &&
+                      in_sole_layer(levels_[layer].plane.height_m(p), z_foot_, params_.delta_foot_m);
+    if (seen) ++found_.top_cells_seen;
   }
 }
 
-bool FootholdSearch::fits(const FootholdRaster::Cell& cell) const noexcept {
-  // A cell survives when a foot may fit somewhere in it: half its diagonal is forgiven here and not in the refinement.
-  return cell.layer != FootholdRaster::kNoLayer && cell.spare_m >= -params_.g_res_m * std::numbers::sqrt2 / 2.0;
+// The nearest higher cell in the corridor, before the height limit and the erosion: an obstacle is not skipped over.
+void FootholdSearch::find_next(std::int32_t row) noexcept {
+  const Vec2 first = base_(raster_.at(0, row)), step = base_(raster_.at(1, row)) - first;
+  for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
+    const std::uint8_t layer = raster_.layer(column, row);
+    if (layer == FootholdRaster::kNoLayer) continue;
+    const Vec2 base_p = first + static_cast<double>(column) * step;
+    const double distance2 = base_p.squaredNorm();
+    if (distance2 >= found_.next_distance2_m2 || std::abs(base_p.y()) > params_.corridor_half_width_m) continue;
+    const double z_m = levels_[layer].plane.height_m(raster_.at(column, row));
+    if (z_m <= z_foot_ + params_.delta_foot_m || !in_range(base_p, params_.g_range_m)) continue;  // eq. (20)
+    found_.next_distance2_m2 = distance2;
+    found_.next = layer;
+  }
+}
+
+// May a foot be put at a cell, eqs (20), (23), (25)? It survives when a foot may fit somewhere in it: half its diagonal
+// is forgiven here and not in the refinement.
+bool FootholdSearch::fits(const Vec2& p_m, const LevelSurface& surface) const noexcept {
+  return in_range(base_(p_m), params_.g_range_m) && below_limit(surface.plane.height_m(p_m), z_foot_, params_.g_z_m) &&
+         surface.spare_m(p_m) >= -params_.g_res_m * std::numbers::sqrt2 / 2.0;
 }
 
 // Erosion of each layer, eqs (24)-(25). A layer is a mapped surface, since the map has already put together what lies
 // within its height gate; floor(z / 1 mm) would split a noisy or tilted tread. The structuring element is the contact
 // rectangle at the tread's yaw, exact, instead of N pixels in all directions (13 of them leave nothing of a 0.28 m
 // tread).
+// A cell is asked only where its answer decides, so no eroded layer is kept.
 void FootholdSearch::erode_row(std::int32_t row) noexcept {
+  if (found_.next == kNone) return;
+  const LevelSurface& surface = levels_[found_.next];
   for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
-    FootholdRaster::Cell& cell = raster_(column, row);
-    if (cell.layer == FootholdRaster::kNoLayer) continue;
-    const LevelSurface& surface = levels_[cell.layer];
+    if (raster_.layer(column, row) != found_.next) continue;
     const Vec2 p = raster_.at(column, row);
-    cell.spare_m = static_cast<float>(surface.spare_m(p));
-    if (!fits(cell)) continue;
     // Eq. (26), on the tread that comes next.
     const double distance2 = (p - base_.origin_m()).squaredNorm();
-    if (cell.layer == next_ && cell.z_m > z_foot_ + params_.delta_foot_m && distance2 < p_star_distance2_m2_) {
-      p_star_distance2_m2_ = distance2;
-      p_star_cell_m_ = p;
-      has_p_star_cell_ = true;
-    }
+    if (distance2 >= found_.p_star_distance2_m2) continue;
+    if (surface.plane.height_m(p) <= z_foot_ + params_.delta_foot_m || !fits(p, surface)) continue;
+    found_.p_star_distance2_m2 = distance2;
+    found_.p_star_cell_m = p;
   }
 }
 
@@ -233,6 +275,9 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
         spare_m = std::min(spare_m, limit.spare_m(tread.at(heel_m, lateral_m)) / closing - margin_m);
       }
     }
+  }
+  for (const TreadObstacle& o : tread.obstacles) {
+    if (o.meets(right_m, left_m)) spare_m = std::min(spare_m, o.sole_end_m - o.margin_m - heel_m - margin_m);
   }
   // A tread that ends in nothing ends all the same: the next riser may be there and not be seen.
   if (tread.far_end_m) {
@@ -272,34 +317,75 @@ double FootholdSearch::middle_m(const LevelSurface& tread) const noexcept {
   return math::clamp(centre_m, own_m - params_.veer_max_m, own_m + params_.veer_max_m);
 }
 
-// Both soles side by side on the tread, as near to that middle as the sides allow, closer together when they must. Eq.
-// (26) picks the tread and says that a foot fits there; its nearest cell is no aim, being the one with the least room
-// at the heel: least sole margins of 7.2 and 5.5 mm in two climbs of ten steps, against 11.7 and 9.7 mm centred (seeds
-// 1 and 4, both noises).
-bool FootholdSearch::place_feet(const LevelSurface& tread, Feet& feet) const noexcept {
+// For the middle of the feet; the one nearer to a side keeps the margin.
+Interval FootholdSearch::between_sides(const LevelSurface& tread, double along_m, double half_m) const noexcept {
+  Interval out{-kInfinity, kInfinity};
+  for (const FootLimit& edge : tread.edges) {
+    if (!edge.side) continue;
+    // Clearance of the foot nearer to the edge is base + inward . left * middle.
+    const double across = edge.inside.inward.dot(tread.left);
+    const double base_m = edge.clearance_m(tread.at(along_m, 0.0)) - half_m * std::abs(across);
+    const double bound_m = (params_.side_margin_m - base_m) / across;
+    if (across > 0.0) {
+      out.min_m = std::max(out.min_m, bound_m);
+    } else {
+      out.max_m = std::min(out.max_m, bound_m);
+    }
+  }
+  return out;
+}
+
+// Do feet about that middle meet something that leaves them too little of the tread?
+bool FootholdSearch::blocked(const LevelSurface& tread, double middle_m, double half_m) const noexcept {
+  const double least_m = params_.tread_min_m - foot_.collision.toe_x_m;
+  return std::any_of(tread.obstacles.begin(), tread.obstacles.end(), [&](const TreadObstacle& o) {
+    return o.sole_end_m < least_m && o.meets(middle_m - half_m, middle_m + half_m);
+  });
+}
+
+// The nearest middle between the sides at which the feet stand beside all that blocks them.
+std::optional<double> FootholdSearch::beside_obstacles(const LevelSurface& tread, const Interval& sides,
+                                                       double middle_m, double half_m) const noexcept {
+  std::optional<double> best;
+  for (const TreadObstacle& o : tread.obstacles) {
+    for (const double beside_m : {o.sole_lateral_m.max_m + half_m, o.sole_lateral_m.min_m - half_m}) {
+      const double moved_m = std::abs(beside_m - middle_m);
+      if (moved_m > params_.evade_max_m || beside_m < sides.min_m || beside_m > sides.max_m) continue;
+      if (best && moved_m >= std::abs(*best - middle_m)) continue;
+      if (!blocked(tread, beside_m, half_m)) best = beside_m;
+    }
+  }
+  return best;
+}
+
+// Both soles side by side on the tread, as near to that middle as sides and obstacles allow, closer together when they
+// must. Eq. (26) picks the tread and says that a foot fits there; its nearest cell is no aim, being the one with the
+// least room at the heel: least sole margins of 7.2 and 5.5 mm in two climbs of ten steps, against 11.7 and 9.7 mm
+// centred (seeds 1 and 4, both noises).
+StopReason FootholdSearch::place_feet(const LevelSurface& tread, Feet& feet) const noexcept {
   const double middle_m = this->middle_m(tread);
   constexpr int kSpacings = 7;
+  StopReason reason = StopReason::kTooNarrow;
   for (int i = 0; i < kSpacings; ++i) {
     const double half_m = params_.half_spacing_m - (params_.half_spacing_m - params_.half_spacing_min_m) *
                                                        static_cast<double>(i) / (kSpacings - 1);
-    const double along_m = aim_along_m(tread, middle_m + half_m, middle_m - half_m);
-    double low_m = -kInfinity, high_m = kInfinity;
-    for (const FootLimit& edge : tread.edges) {
-      if (!edge.side) continue;
-      // Clearance of the foot nearer to the edge is base + inward . left * middle.
-      const double across = edge.inside.inward.dot(tread.left);
-      const double base_m = edge.clearance_m(tread.at(along_m, 0.0)) - half_m * std::abs(across);
-      const double bound_m = (params_.side_margin_m - base_m) / across;
-      (across > 0.0 ? low_m : high_m) = across > 0.0 ? std::max(low_m, bound_m) : std::min(high_m, bound_m);
+    double along_m = aim_along_m(tread, middle_m + half_m, middle_m - half_m);
+    const Interval sides = between_sides(tread, along_m, half_m);
+    if (sides.min_m > sides.max_m) continue;
+    double placed_m = std::min(std::max(middle_m, sides.min_m), sides.max_m);
+    if (blocked(tread, placed_m, half_m)) {
+      reason = StopReason::kObstacle;
+      const std::optional<double> beside_m = beside_obstacles(tread, sides, placed_m, half_m);
+      if (!beside_m) continue;
+      placed_m = *beside_m;
+      along_m = aim_along_m(tread, placed_m + half_m, placed_m - half_m);
     }
-    if (low_m > high_m) continue;
-    const double placed_m = std::min(std::max(middle_m, low_m), high_m);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       feet[index_of(foot)] = foothold_at(tread, along_m, placed_m + side_sign(foot) * half_m);
     }
-    return true;
+    return StopReason::kNone;
   }
-  return false;
+  return reason;
 }
 
 // The riser beneath a mapped tread: the tread says how high it is. Seen from close above, a riser's own ends are the
@@ -318,8 +404,9 @@ bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) c
       std::min(query_.climbing ? sole_p_m.x() + params_.step_max_m : params_.g_range_m, next_distance_m + 0.1);
   for (const Upright& u : uprights_) {
     if (u.top_m - z_foot_ <= params_.rise_max_m || u.bottom_m > z_foot_ + 2.0 * params_.delta_foot_m) continue;
-    if (u.outward.dot(base_.heading()) > -kFacing) continue;
-    if (next_ != kNone && carries(u, levels_[next_])) continue;
+    // A post is no rise: the feet may go beside it, see link_upright().
+    if (u.outward.dot(base_.heading()) > -kFacing || u.width_m() < 2.0 * params_.top_half_width_m) continue;
+    if (found_.next != kNone && carries(u, levels_[found_.next])) continue;
     const Vec2 a = base_(u.point_m + u.reach_left_m * u.direction);
     const Vec2 b = base_(u.point_m + u.reach_right_m * u.direction);
     const double gap_m = std::max(std::min(a.y(), b.y()), -std::max(a.y(), b.y()));
@@ -332,11 +419,11 @@ bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) c
 }
 
 StopReason FootholdSearch::without_next() const noexcept {
-  if (unconfirmed_ahead_) return StopReason::kNothingSeen;
+  if (found_.unconfirmed_ahead) return StopReason::kNothingSeen;
   if (!query_.climbing) return StopReason::kNoStaircase;
   // Nothing higher is known: is that because nothing rises there, or because nobody looked?
-  const bool looked =
-      top_cells_ > 0 && static_cast<double>(top_cells_seen_) >= params_.top_fraction * static_cast<double>(top_cells_);
+  const bool looked = found_.top_cells > 0 && static_cast<double>(found_.top_cells_seen) >=
+                                                  params_.top_fraction * static_cast<double>(found_.top_cells);
   return looked ? StopReason::kTop : StopReason::kNothingSeen;
 }
 
@@ -354,14 +441,15 @@ StopReason FootholdSearch::judge_tread(const LevelSurface& tread, double from_he
   if (tread.height_m - from_height_m > params_.rise_max_m) return StopReason::kRiseTooHigh;
   if (!tread.has_nosing) return StopReason::kNothingSeen;
   if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return StopReason::kTreadTooShort;
-  if (!place_feet(tread, feet)) return StopReason::kTooNarrow;
+  const StopReason placed = place_feet(tread, feet);
+  if (placed != StopReason::kNone) return placed;
   const Foothold& foot = feet[index_of(query_.stance)];
   if (foot.nosing_distance_m - tread.along_m(from_p_m) > step_max_m) return StopReason::kNoStaircase;
   return judge_feet(tread, feet);
 }
 
 StopReason FootholdSearch::judge_next() noexcept {
-  const LevelSurface& tread = levels_[next_];
+  const LevelSurface& tread = levels_[found_.next];
   pending_.measured_rise_m = tread.height_m - z_foot_;
   pending_.measured_tread_m = tread.depth_m;
   pending_.tread = {tread.nosing_a_m, tread.nosing_b_m};
@@ -370,45 +458,49 @@ StopReason FootholdSearch::judge_next() noexcept {
   const StopReason found = judge_tread(tread, z_foot_, sole_.origin_m(), step_max_m, pending_.p_star_feet);
   if (found == StopReason::kNoStaircase) return without_next();  // another flight
   if (found != StopReason::kNone) return found;
-  return has_p_star_cell_ ? StopReason::kNone : StopReason::kNothingSeen;
+  return found_.p_star_distance2_m2 < kFarAway_m2 ? StopReason::kNone : StopReason::kNothingSeen;
 }
 
 void FootholdSearch::choose() noexcept {
   double top_m = 0.0;
   if (map_.stamp_ns == 0 || (levels_.empty() && uprights_.empty())) {
     pending_.obstruction = StopReason::kNothingSeen;
-  } else if (blocked_by_upright(math::sqrt(next_distance2_m2_), top_m)) {
+  } else if (blocked_by_upright(math::sqrt(found_.next_distance2_m2), top_m)) {
     pending_.obstruction = StopReason::kRiseTooHigh;
     pending_.measured_rise_m = top_m - z_foot_;
   } else {
-    pending_.obstruction = next_ == kNone ? without_next() : judge_next();
+    pending_.obstruction = found_.next == kNone ? without_next() : judge_next();
   }
   if (pending_.obstruction != StopReason::kNone) return;
 
-  const LevelSurface& tread = levels_[next_];
-  const double lateral_m = tread.lateral_m(p_star_cell_m_);
+  const LevelSurface& tread = levels_[found_.next];
+  const double lateral_m = tread.lateral_m(found_.p_star_cell_m);
   pending_.p_star = foothold_at(tread, aim_along_m(tread, lateral_m, lateral_m), lateral_m);
   pending_.has_p_star = true;
-  pending_.theta_rel_rad = relative_bearing_rad(query_.world_T_base, pending_.p_star.position_m.head<2>());
 }
 
 // p**: the candidate nearest to p* that is higher by more than delta_foot.
 void FootholdSearch::look_ahead_row(std::int32_t row) noexcept {
+  const Vec2 p_star_m = pending_.p_star.position_m.head<2>();
   for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
-    const FootholdRaster::Cell& cell = raster_(column, row);
-    if (!fits(cell) || cell.z_m <= pending_.p_star.position_m.z() + params_.delta_foot_m) continue;
+    const std::uint8_t layer = raster_.layer(column, row);
+    if (layer == FootholdRaster::kNoLayer) continue;
     const Vec2 p = raster_.at(column, row);
-    const double distance2 = (p - pending_.p_star.position_m.head<2>()).squaredNorm();
-    if (distance2 >= p_star_star_distance2_m2_) continue;
-    p_star_star_distance2_m2_ = distance2;
-    next_next_ = cell.layer;
+    const double distance2 = (p - p_star_m).squaredNorm();
+    if (distance2 >= found_.p_star_star_distance2_m2) continue;
+    const LevelSurface& surface = levels_[layer];
+    if (surface.plane.height_m(p) <= pending_.p_star.position_m.z() + params_.delta_foot_m || !fits(p, surface)) {
+      continue;
+    }
+    found_.p_star_star_distance2_m2 = distance2;
+    found_.next_next = layer;
   }
 }
 
 void FootholdSearch::finish() noexcept {
-  if (next_next_ != kNone) {
+  if (found_.next_next != kNone) {
     pending_.has_p_star_star =
-        judge_tread(levels_[next_next_], levels_[next_].height_m, pending_.p_star.position_m.head<2>(),
+        judge_tread(levels_[found_.next_next], levels_[found_.next].height_m, pending_.p_star.position_m.head<2>(),
                     params_.step_max_m, pending_.p_star_star_feet) == StopReason::kNone;
   }
   result_ = moved(pending_, map_.drift_m);

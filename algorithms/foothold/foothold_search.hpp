@@ -4,6 +4,9 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
+#include <numbers>
+#include <optional>
 
 #include "algorithms/core/math/transform.hpp"
 #include "algorithms/core/messages/footholds.hpp"
@@ -12,6 +15,7 @@
 #include "algorithms/foothold/foothold_raster.hpp"
 #include "algorithms/foothold/level_surface.hpp"
 #include "algorithms/foothold/reach.hpp"
+#include "algorithms/foothold/upright.hpp"
 #include "algorithms/geometry/plan_frame.hpp"
 
 namespace polygmap {
@@ -36,7 +40,8 @@ class FootholdSearch {
     double half_spacing_min_m = 0.085;
     double heel_inset_m = 0.014;
     double heel_inset_max_m = 0.030;
-    double corridor_half_width_m = 0.4;
+    double corridor_half_width_m = 0.25;
+    double evade_max_m = 0.06;
     double step_max_m = 0.45;
     double area_min_m2 = 0.01;
     double top_from_m = 0.20, top_to_m = 0.45;
@@ -66,7 +71,10 @@ class FootholdSearch {
       field("heel_inset_max_m", p.heel_inset_max_m, 0.0, 0.5, "Heel edge behind the nosing at most, on deep treads.");
       field.ordered("heel_inset_m", "heel_inset_max_m");
       field("corridor_half_width_m", p.corridor_half_width_m, 0.05, 5.0,
-            "What lies farther to the side is not the next tread.");
+            "What lies farther to the side is not the next tread: both feet, 0.15 m, and as much as a body sways; 0.4 "
+            "m took "
+            "a box beside the way for it (2026-11).");
+      field("evade_max_m", p.evade_max_m, 0.0, 0.3, "Feet go no farther sideways to stand beside an obstacle.");
       field("step_max_m", p.step_max_m, 0.05, 2.0,
             "The next tread begins no farther along the stairs from the standing sole, when climbing.");
       field("area_min_m2", p.area_min_m2, 0.0, 1.0, "A smaller surface is no tread.");
@@ -109,29 +117,46 @@ class FootholdSearch {
  private:
   enum class Stage : std::uint8_t { kIdle, kPrepare, kLink, kRaster, kErode, kChoose, kLookAhead, kFinish };
 
-  // A mapped upright surface, plan view.
-  struct Upright {
-    Vec2 point_m, direction, outward;
-    double reach_left_m, reach_right_m;  // along direction from the point
-    double bottom_m, top_m;
-    double sigma_m;  // of its place along outward
-  };
   static constexpr std::size_t kNone = kMaxMapPolygons;
+  static constexpr double kFarAway_m2 = std::numeric_limits<double>::infinity();
+  // What the rows of one search have told so far.
+  struct Found {
+    bool unconfirmed_ahead = false;
+    std::size_t next = kNone;  // the tread that comes next: owner of the nearest higher cell
+    double next_distance2_m2 = kFarAway_m2;
+    double p_star_distance2_m2 = kFarAway_m2;
+    Vec2 p_star_cell_m = Vec2::Zero();
+    std::size_t next_next = kNone;
+    double p_star_star_distance2_m2 = kFarAway_m2;
+    std::size_t underfoot = kNone;  // the tread under the standing foot, when its far end was seen
+    std::uint32_t top_cells = 0;
+    std::uint32_t top_cells_seen = 0;
+  };
 
   void prepare_one(const MapPolygon& polygon) noexcept;
   void link(std::size_t i) noexcept;
+  // What the feet meet of the segment from a to b, world plan: across both of them it ends the tread.
+  enum class Extent : std::uint8_t { kAside, kPartial, kAcross };
+  [[nodiscard]] Extent extent_on(const LevelSurface& tread, const Vec2& a_m, const Vec2& b_m) const noexcept;
+  void link_upright(LevelSurface& tread, const Upright& upright) const noexcept;
   void raster_row(std::int32_t row) noexcept;
+  void look_at_top(std::int32_t row) noexcept;
+  void find_next(std::int32_t row) noexcept;
   void erode_row(std::int32_t row) noexcept;
   void choose() noexcept;
   void look_ahead_row(std::int32_t row) noexcept;
   void finish() noexcept;
 
-  [[nodiscard]] bool fits(const FootholdRaster::Cell& cell) const noexcept;
+  [[nodiscard]] bool fits(const Vec2& p_m, const LevelSurface& surface) const noexcept;
   [[nodiscard]] double aim_along_m(const LevelSurface& tread, double left_m, double right_m) const noexcept;
   [[nodiscard]] Foothold foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept;
   [[nodiscard]] double middle_m(const LevelSurface& tread) const noexcept;
   using Feet = std::array<Foothold, kFootCount>;
-  [[nodiscard]] bool place_feet(const LevelSurface& tread, Feet& feet) const noexcept;
+  [[nodiscard]] Interval between_sides(const LevelSurface& tread, double along_m, double half_m) const noexcept;
+  [[nodiscard]] bool blocked(const LevelSurface& tread, double middle_m, double half_m) const noexcept;
+  [[nodiscard]] std::optional<double> beside_obstacles(const LevelSurface& tread, const Interval& sides,
+                                                       double middle_m, double half_m) const noexcept;
+  [[nodiscard]] StopReason place_feet(const LevelSurface& tread, Feet& feet) const noexcept;
   [[nodiscard]] StopReason judge_feet(const LevelSurface& tread, const Feet& feet) const noexcept;
   // Of a step onto the tread from soles at a point before it; places the feet. kNoStaircase: it is too far for a step.
   [[nodiscard]] StopReason judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
@@ -157,19 +182,7 @@ class FootholdSearch {
   Stage stage_ = Stage::kIdle;
   std::int32_t row_ = 0;
   std::size_t index_ = 0;
-
-  // Found on the way.
-  bool unconfirmed_ahead_ = false;
-  std::size_t next_ = kNone;  // the tread that comes next: owner of the nearest higher cell
-  double next_distance2_m2_ = 0.0;
-  double p_star_distance2_m2_ = 0.0;
-  Vec2 p_star_cell_m_ = Vec2::Zero();
-  bool has_p_star_cell_ = false;
-  std::size_t next_next_ = kNone;
-  std::size_t underfoot_ = kNone;  // the tread under the standing foot, when its far end was seen
-  double p_star_star_distance2_m2_ = 0.0;
-  std::uint32_t top_cells_ = 0;
-  std::uint32_t top_cells_seen_ = 0;
+  Found found_;
 };
 
 }  // namespace polygmap

@@ -18,6 +18,16 @@ double least_m(const auto& limits, auto&& of) noexcept {
   return least_m;
 }
 
+// Before the obstacles that a foot with its sole at p meets.
+double before_obstacles_m(const LevelSurface& surface, const Vec2& p_m, double margins) noexcept {
+  double least_m = std::numeric_limits<double>::infinity();
+  const double lateral_m = surface.lateral_m(p_m), along_m = surface.along_m(p_m);
+  for (const TreadObstacle& o : surface.obstacles) {
+    if (o.meets(lateral_m, lateral_m)) least_m = std::min(least_m, o.sole_end_m - margins * o.margin_m - along_m);
+  }
+  return least_m;
+}
+
 constexpr double kSide = 0.2;  // sine of an edge's turn against the nosing from which it bounds a side
 constexpr double kParallel = 0.95, kAcross = 0.2;  // cosines of turns against the heading: a side, a far end
 constexpr double kEndMin_m = 0.08;
@@ -48,11 +58,12 @@ double LevelSurface::contact_clearance_m(const Vec2& p_m) const noexcept {
   return least_m(edges, [&](const FootLimit& limit) { return limit.clearance_m(p_m); });
 }
 double LevelSurface::toe_clearance_m(const Vec2& p_m) const noexcept {
-  return least_m(toe, [&](const FootLimit& limit) { return limit.clearance_m(p_m); });
+  return std::min(least_m(toe, [&](const FootLimit& limit) { return limit.clearance_m(p_m); }),
+                  before_obstacles_m(*this, p_m, 0.0));
 }
 double LevelSurface::spare_m(const Vec2& p_m) const noexcept {
   const auto of = [&](const FootLimit& limit) { return limit.spare_m(p_m); };
-  return std::min(least_m(edges, of), least_m(toe, of));
+  return std::min({least_m(edges, of), least_m(toe, of), before_obstacles_m(*this, p_m, 1.0)});
 }
 
 bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& margin, const SoleModel& sole,
@@ -127,6 +138,18 @@ void add_toe_limit(LevelSurface& surface, const SoleModel& sole, const Line2& li
     if (farthest->clearance_m(middle) > limit.clearance_m(middle)) *farthest = limit;
   }
   if (surface.depth_m == 0.0 || depth_m < surface.depth_m) surface.depth_m = depth_m;
+}
+
+void add_obstacle(LevelSurface& surface, const TreadObstacle& obstacle, double middle_m) noexcept {
+  if (surface.obstacles.try_push_back(obstacle)) return;
+  const auto aside_m = [middle_m](const TreadObstacle& o) {
+    return std::max(o.sole_lateral_m.min_m - middle_m, middle_m - o.sole_lateral_m.max_m);
+  };
+  TreadObstacle* farthest = surface.obstacles.begin();
+  for (TreadObstacle& o : surface.obstacles) {
+    if (aside_m(o) > aside_m(*farthest)) farthest = &o;
+  }
+  if (aside_m(*farthest) > aside_m(obstacle)) *farthest = obstacle;
 }
 
 }  // namespace polygmap

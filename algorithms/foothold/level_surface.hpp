@@ -44,6 +44,16 @@ struct FootLimit {
   [[nodiscard]] double spare_m(const Vec2& sole_p_m) const noexcept { return clearance_m(sole_p_m) - margin_m; }
 };
 
+// What rises from the surface, or before it, and does not reach across both feet: they may stand beside it.
+struct TreadObstacle {
+  double sole_end_m = 0.0;  // behind the nosing, of a sole whose toe touches it
+  double margin_m = 0.0;    // to be kept before it
+  Interval sole_lateral_m;  // left of the nosing's middle, of soles that meet it or the margin beside it
+  [[nodiscard]] bool meets(double right_m, double left_m) const noexcept {
+    return sole_lateral_m.min_m < left_m && sole_lateral_m.max_m > right_m;
+  }
+};
+
 struct LevelSurface {
   std::uint32_t id = 0;
   std::int64_t last_seen_ns = 0;
@@ -62,6 +72,7 @@ struct LevelSurface {
   StaticVector<FootLimit, kMaxPolygonVertices> edges;  // contact rectangle
   StaticVector<FootLimit, 3> toe;                      // collision box to back edge, next nosing, next riser
   double depth_m = 0.0;                                // nosing to the nearest of these, 0: none
+  StaticVector<TreadObstacle, 6> obstacles;
   // Where they were seen: lateral places of its sides, and how far behind the nosing it ends, in a riser or in nothing.
   std::optional<double> left_end_m, right_end_m, far_end_m;
 
@@ -91,5 +102,8 @@ struct LevelSurface {
 // between min_m and max_m behind the nosing.
 void add_toe_limit(LevelSurface& surface, const SoleModel& sole, const Line2& line, double margin_m, double min_m,
                    double max_m) noexcept;
+
+// Adds an obstacle; those farthest to the side of middle_m give way when there are too many.
+void add_obstacle(LevelSurface& surface, const TreadObstacle& obstacle, double middle_m) noexcept;
 
 }  // namespace polygmap

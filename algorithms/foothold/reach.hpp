@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a foot may go as seen from the robot, eqs (20), (22), (23), (27), (28).
+// Where a foot may go as seen from the robot, eqs (20), (22), (23), (28). The bearing of eq. (27)
+// turns the published robot towards the stairs; here a foot's yaw is that of the nosing, which the map knows better
+// than a bearing does, so nothing reads a bearing.
 #pragma once
 
 #include <algorithm>
@@ -27,14 +29,8 @@ namespace polygmap {
   return z_m <= z_foot_m + g_z_m;
 }
 
-// Bearing of a point from the robot relative to its heading, eq. (27), in (-pi, pi]. As printed it is the bearing from
-// the world's origin.
-[[nodiscard]] inline double relative_bearing_rad(const Transform& world_T_base, const Vec2& world_p_m) noexcept {
-  const Vec2 d = world_p_m - world_T_base.p_m.head<2>();
-  return math::wrap_angle(math::atan2(d.y(), d.x()) - yaw_of(world_T_base.R));
-}
-
-// The layer that the stance foot stands on, eq. (28).
+// The layer that the stance foot stands on, eq. (28). The published search erodes this layer apart from the others;
+// here every mapped surface is a layer of its own, and the one underfoot is only asked how much of the floor was seen.
 [[nodiscard]] constexpr bool in_sole_layer(double z_m, double z_foot_m, double delta_foot_m) noexcept {
   return z_foot_m - delta_foot_m <= z_m && z_m <= z_foot_m + delta_foot_m;
 }

@@ -87,6 +87,9 @@ std::vector<SolidBox> stair_solids(const StairWorld& world) {
       solids.push_back({Vec3{s.nosing_x_m, -w, s.height_m - kTreadSlab_m}, Vec3{s.back_x_m, w, s.height_m}, step});
     }
   }
+  for (const Obstacle& o : world.obstacles) {
+    solids.push_back({o.centre_m - 0.5 * o.size_m, o.centre_m + 0.5 * o.size_m, kObstacleStep});
+  }
   return solids;
 }
 
@@ -114,7 +117,7 @@ double clearance_m(const OrientedBox& box, std::span<const SolidBox> solids, std
 }
 
 double tread_margin_m(const Vec3& point_m, const StairWorld& world, int step) noexcept {
-  if (step == kFloorStep) {
+  if (step < 0) {
     if (world.steps.empty()) return kInf;
     const double outside_x =
         std::max(world.steps.front().riser_x_m - point_m.x(), point_m.x() - world.steps.back().back_x_m);

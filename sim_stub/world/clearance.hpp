@@ -11,7 +11,8 @@
 
 namespace polygmap::sim {
 
-inline constexpr int kFloorStep = -1;  // the floor among step indices
+inline constexpr int kFloorStep = -1;     // the floor among step indices
+inline constexpr int kObstacleStep = -2;  // what is no step: posts, boxes
 
 // An axis-aligned solid of the staircase, true world frame.
 struct SolidBox {
@@ -19,8 +20,8 @@ struct SolidBox {
   Vec3 max_m;
   int step;
 };
-// Every step as a solid standing on the ground; with a nosing, its slab as a second solid. The solids reach below the
-// floor, so that nothing is ever pushed out downwards.
+// Every step as a solid standing on the ground; with a nosing, its slab as a second solid; then the obstacles. The
+// steps reach below the floor, so that nothing is ever pushed out downwards.
 [[nodiscard]] std::vector<SolidBox> stair_solids(const StairWorld& world);
 
 // Signed distance between a box and a solid, m: exact gap when apart, minus the penetration depth (the shortest way

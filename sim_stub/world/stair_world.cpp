@@ -16,6 +16,27 @@ double StairWorld::height_m(double x_m, double y_m, int* step) const noexcept {
   return top < 0 ? 0.0 : steps[static_cast<std::size_t>(top)].height_m;
 }
 
+namespace {
+
+// Posts in two rows, spaced evenly from half a spacing behind the first riser to the far end: set into the treads, not
+// flush with a riser. One beside the staircase stands on the floor.
+void add_balusters(const Balusters& posts, StairWorld& world) {
+  if (!(posts.spacing_m > 0.0) || world.steps.empty()) return;
+  const double half_m = 0.5 * posts.size_m, y_m = world.half_width_m - posts.inset_m - half_m;
+  const double last_x_m = world.steps.back().back_x_m - half_m;
+  for (double x_m = world.steps.front().riser_x_m + 0.5 * posts.spacing_m; x_m <= last_x_m; x_m += posts.spacing_m) {
+    const double tread_m = world.height_m(x_m, 0.0), top_m = tread_m + posts.height_m;
+    const double bottom_m = y_m - half_m >= world.half_width_m ? 0.0 : tread_m;
+    for (const double side : {1.0, -1.0}) {
+      if (!(side > 0.0 ? posts.left : posts.right)) continue;
+      world.obstacles.push_back(
+          {Vec3{x_m, side * y_m, 0.5 * (bottom_m + top_m)}, Vec3{posts.size_m, posts.size_m, top_m - bottom_m}});
+    }
+  }
+}
+
+}  // namespace
+
 StairWorld make_stairs(const StairParams& params, std::uint64_t seed) {
   const CounterNoise noise(seed, Stream::kStairs);
   StairWorld world;
@@ -35,6 +56,8 @@ StairWorld make_stairs(const StairParams& params, std::uint64_t seed) {
     step.height_m = z_m;
     world.steps.push_back(step);
   }
+  world.obstacles = params.obstacles;
+  add_balusters(params.balusters, world);
   return world;
 }
 

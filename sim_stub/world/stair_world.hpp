@@ -6,7 +6,25 @@
 #include <cstdint>
 #include <vector>
 
+#include "algorithms/core/math/math.hpp"
+
 namespace polygmap::sim {
+
+// A box that stands on, beside or over the staircase, axis-aligned.
+struct Obstacle {
+  Vec3 centre_m = Vec3::Zero();
+  Vec3 size_m = Vec3::Constant(0.3);
+};
+
+// Upright square posts along the edges of the staircase, one row on each side.
+struct Balusters {
+  double spacing_m = 0.0;  // between the middles of two posts; 0: no posts
+  double inset_m = 0.02;   // from the edge of the tread to the post; negative: the posts stand beside the staircase
+  double size_m = 0.04;    // side of a post
+  double height_m = 0.9;   // above the tread
+  bool left = true;
+  bool right = true;
+};
 
 struct StairParams {
   int steps = 10;  // step N is the landing
@@ -16,6 +34,8 @@ struct StairParams {
   double nosing_m = 0.0;    // overhang of every tread's front edge over its riser
   double landing_m = 1.0;   // length of step N
   double jitter_m = 0.005;  // each step's rise and tread differ by up to this much
+  Balusters balusters;
+  std::vector<Obstacle> obstacles;
 };
 
 // A tread with a nosing is a slab of this thickness that overhangs its riser.
@@ -32,8 +52,9 @@ struct Step {
 struct StairWorld {
   std::vector<Step> steps;
   double half_width_m = 0.6;
+  std::vector<Obstacle> obstacles;  // posts among them; seen and collided with, never stood on
 
-  // Height of the highest surface at (x, y): 0 beside, before and behind the staircase. Index of its step in *step
+  // Height of the highest step at (x, y): 0 beside, before and behind the staircase. Index of its step in *step
   // (-1: floor).
   [[nodiscard]] double height_m(double x_m, double y_m, int* step = nullptr) const noexcept;
 };

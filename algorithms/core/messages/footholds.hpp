@@ -40,6 +40,7 @@ enum class StopReason : std::uint8_t {
   kTooNarrow,      // both feet do not fit side by side
   kMapStale,       // the newest fused frame is too old
   kEdgeUncertain,  // the foot fits the next tread, but not with its edges known so vaguely
+  kObstacle,       // something stands on the next tread or before it, and both feet do not fit beside it
   kLegsCannot,     // the legs cannot do the next step: of this rise when it is a leading one, 0 otherwise
   kUnsteady,       // what the search offers keeps changing
   kNotLinedUp,     // so many steps on the floor, and it does not stand straight before the stairs
@@ -63,7 +64,6 @@ struct FootholdSet {
   std::array<Foothold, kFootCount> p_star_feet;       // p* spread to left and right sole, both on the same tread
   std::array<Foothold, kFootCount> p_star_star_feet;  // p** likewise, on the tread after p*'s
   TreadView tread;                                    // of p*
-  double theta_rel_rad = 0.0;                         // eq. 27: bearing of p* from the robot, relative to its heading
   StopReason obstruction = StopReason::kNothingSeen;
   double measured_rise_m = 0.0;   // stance to the next tread, valid unless nothing was seen
   double measured_tread_m = 0.0;  // nosing to what rises behind it; 0: nothing is mapped there

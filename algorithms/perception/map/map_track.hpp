@@ -95,7 +95,7 @@ struct MapTrack {
   ConvexPolygon polygon;  // local
   EdgeTags tags{};
   bool dirty = false;
-  bool dead = false;
+  bool erased = false;
 };
 
 }  // namespace polygmap

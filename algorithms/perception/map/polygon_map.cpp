@@ -87,10 +87,10 @@ void PolygonMap::begin(const SurfaceFrame& frame, const View& view) noexcept {
   drift_.begin_frame(frame.stamp_ns, view.position_sigma_m);
   map_T_camera_ = view.world_T_camera;
   map_T_camera_.p_m -= drift_.drift_m();
-  measuring_ = drift_.possible();
-  patch_ = 0;
+  pass_.measuring = drift_.possible();
+  pass_.patch = 0;
   stage_ = Stage::kLoad;
-  if (!measuring_) begin_fusing();
+  if (!pass_.measuring) begin_fusing();
 }
 
 // Where the map is nearly full, what a foot needs finds its place first.
@@ -101,29 +101,29 @@ void PolygonMap::order_surfaces() noexcept {
       if ((frame_.surfaces[i].kind == SurfaceKind::kOther) != others) continue;
       (void)order_.try_push_back(static_cast<std::uint8_t>(i));
     }
-    if (!others) telling_ = order_.size();
+    if (!others) alignment_count_ = order_.size();
   }
 }
 
 void PolygonMap::begin_fusing() noexcept {
-  if (measuring_) drift_.end_frame();
-  measuring_ = false;
+  if (pass_.measuring) drift_.end_frame();
+  pass_.measuring = false;
   map_T_camera_.p_m = view_.world_T_camera.p_m - drift_.frame_offset_m();
-  patch_ = 0;
+  pass_.patch = 0;
 }
 
 void PolygonMap::next_surface() noexcept {
-  track_ = 0;
-  if (measuring_ && patch_ >= telling_) return begin_fusing();
-  if (patch_ >= order_.size()) {
+  pass_.track = 0;
+  if (pass_.measuring && pass_.patch >= alignment_count_) return begin_fusing();
+  if (pass_.patch >= order_.size()) {
     stage_ = Stage::kAge;
-  } else if (load(frame_.surfaces[order_[patch_]])) {
-    best_ = second_ = kMaxMapPolygons;
-    best_cost_ = second_cost_ = std::numeric_limits<double>::infinity();
+  } else if (load(frame_.surfaces[order_[pass_.patch]])) {
+    pass_.best = pass_.second = kMaxMapPolygons;
+    pass_.best_cost = pass_.second_cost = std::numeric_limits<double>::infinity();
     stage_ = Stage::kCompare;
   } else {
-    if (!measuring_) ++counters_.rejected_surfaces;
-    ++patch_;
+    if (!pass_.measuring) ++counters_.rejected_surfaces;
+    ++pass_.patch;
   }
 }
 
@@ -137,22 +137,22 @@ Progress PolygonMap::step(WorkBudget& budget) noexcept {
         break;
       case Stage::kCompare:
         budget.spend(compare_some());
-        if (track_ >= tracks_.size()) stage_ = Stage::kFuse;
+        if (pass_.track >= tracks_.size()) stage_ = Stage::kFuse;
         break;
       case Stage::kFuse:
-        if (measuring_) {
+        if (pass_.measuring) {
           budget.spend(kMeasureUnits);
           measure_offset();
         } else {
-          budget.spend(kFuseUnits + (best_ >= tracks_.size() && tracks_.full() ? kEvictUnits : 0));
+          budget.spend(kFuseUnits + (pass_.best >= tracks_.size() && tracks_.full() ? kEvictUnits : 0));
           fuse_best();
         }
-        ++patch_;
+        ++pass_.patch;
         stage_ = Stage::kLoad;
         break;
       case Stage::kAge:
-        if (track_ < tracks_.size()) {
-          budget.spend(age(tracks_[track_++]));
+        if (pass_.track < tracks_.size()) {
+          budget.spend(age(tracks_[pass_.track++]));
         } else {
           stage_ = Stage::kPublish;
         }

@@ -164,6 +164,17 @@ class PolygonMap {
     double variance_m2 = 0.0;  // of across, but for the pose's
   };
 
+  // Where a pass over the frame's surfaces stands, and what of the map the present one may be.
+  struct Pass {
+    bool measuring = false;  // the first pass, in which nothing changes yet
+    std::size_t patch = 0;   // in order_
+    std::size_t track = 0;
+    std::size_t best = kMaxMapPolygons;
+    std::size_t second = kMaxMapPolygons;
+    double best_cost = 0.0;
+    double second_cost = 0.0;
+  };
+
   void order_surfaces() noexcept;
   void begin_fusing() noexcept;
   void next_surface() noexcept;
@@ -175,7 +186,7 @@ class PolygonMap {
   void fuse_best() noexcept;
   void create() noexcept;
   void admit(const MapTrack& track) noexcept;
-  [[nodiscard]] int claim(const MapTrack& track) const noexcept;
+  [[nodiscard]] int priority(const MapTrack& track) const noexcept;
   // offset_m: of the seen plane along the remembered normal, at the track's origin; fade: of what was known.
   void fuse(MapTrack& track, double offset_m, double fade) noexcept;
   void merge(MapTrack& into, MapTrack& from) noexcept;
@@ -205,7 +216,7 @@ class PolygonMap {
   MapDrift drift_;
   SurfaceFrame frame_;
   StaticVector<std::uint8_t, kMaxPlanesPerFrame> order_;  // of the frame's surfaces: treads and risers first
-  std::size_t telling_ = 0;                               // how many of these say where the frame lies
+  std::size_t alignment_count_ = 0;                       // how many of these say where the frame lies
   View view_;
   Transform map_T_camera_;  // at first by the last drift, then by the frame's own offset
   SeenSurface seen_;
@@ -215,13 +226,7 @@ class PolygonMap {
   std::uint32_t fused_in_frame_ = 0;
   bool any_frame_ = false;
   Stage stage_ = Stage::kIdle;
-  bool measuring_ = false;  // the first pass, in which nothing changes yet
-  std::size_t patch_ = 0;   // in order_
-  std::size_t track_ = 0;
-  std::size_t best_ = kMaxMapPolygons;
-  std::size_t second_ = kMaxMapPolygons;
-  double best_cost_ = 0.0;
-  double second_cost_ = 0.0;
+  Pass pass_;
 };
 
 }  // namespace polygmap

@@ -26,7 +26,7 @@ ConvexPolygon PolygonMap::local_polygon(const MapTrack& track) const noexcept {
 
 // The cheap part of the comparison, which most pairs do not pass.
 bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
-  if (track.dead || track.kind != seen_.kind || track.polygon.size() < 3) return false;
+  if (track.erased || track.kind != seen_.kind || track.polygon.size() < 3) return false;
   const bool upright = track.kind == SurfaceKind::kRiser;
   const Vec3 normal = track.world_T_local.R.col(2);
   if (normal.dot(seen_.plane.normal) < math::cos(upright ? params_.upright_turn_gate_rad : params_.tilt_gate_rad)) {
@@ -45,7 +45,8 @@ bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
 
 bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept {
   const bool upright = track.kind == SurfaceKind::kRiser;
-  const BoundingBox seen = bounding_box(local_polygon(track)), known = bounding_box(track.polygon);
+  const ConvexPolygon seen_polygon = local_polygon(track);
+  const BoundingBox seen = bounding_box(seen_polygon), known = bounding_box(track.polygon);
   const Interval seen_x{seen.min_m.x(), seen.max_m.x()}, known_x{known.min_m.x(), known.max_m.x()};
   const Interval seen_y{seen.min_m.y(), seen.max_m.y()}, known_y{known.min_m.y(), known.max_m.y()};
   const double overlap_x_m = overlap_m(seen_x, known_x), overlap_y_m = overlap_m(seen_y, known_y);
@@ -56,6 +57,15 @@ bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& co
         upright ? std::min(length_m(seen_y), length_m(known_y)) : std::min(length_m(seen_x), length_m(known_x));
     if ((upright ? overlap_y_m : overlap_x_m) < params_.overlap_fraction * shorter_m) return false;
     if ((upright ? overlap_x_m : overlap_y_m) < -params_.lateral_gap_m) return false;
+    // The robot's leg leaves unknown ends. Where both were seen to end towards each other, they are two posts.
+    if (upright && overlap_x_m < 0.0) {
+      const bool behind = seen_x.min_m > known_x.min_m;  // the seen one lies on the known one's side 0
+      const Vec2 u = side_direction(behind ? 4 : 0);
+      if (track.sides[behind ? 0 : 4].observed &&
+          end_observed(seen_polygon, seen_.edges, u, support_m(seen_polygon, u))) {
+        return false;
+      }
+    }
   }
   cost = std::abs(near.across_m) / near.gate_m + (std::min(overlap_x_m, overlap_y_m) > 0.0 ? 0.0 : 1.0);
   return true;
@@ -63,20 +73,20 @@ bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& co
 
 std::int32_t PolygonMap::compare_some() noexcept {
   std::int32_t units = 1;
-  for (std::size_t glances = 0; glances < kGlancesPerUnit && track_ < tracks_.size(); ++glances, ++track_) {
+  for (std::size_t glances = 0; glances < kGlancesPerUnit && pass_.track < tracks_.size(); ++glances, ++pass_.track) {
     Nearness near;
-    if (!is_near(tracks_[track_], near)) continue;
+    if (!is_near(tracks_[pass_.track], near)) continue;
     units += kMatchUnits;
     double cost = 0.0;
-    if (!matches(tracks_[track_], near, cost)) continue;
-    if (cost < best_cost_) {
-      second_ = best_;
-      second_cost_ = best_cost_;
-      best_ = track_;
-      best_cost_ = cost;
-    } else if (cost < second_cost_) {
-      second_ = track_;
-      second_cost_ = cost;
+    if (!matches(tracks_[pass_.track], near, cost)) continue;
+    if (cost < pass_.best_cost) {
+      pass_.second = pass_.best;
+      pass_.second_cost = pass_.best_cost;
+      pass_.best = pass_.track;
+      pass_.best_cost = cost;
+    } else if (cost < pass_.second_cost) {
+      pass_.second = pass_.track;
+      pass_.second_cost = cost;
     }
   }
   return units;
@@ -84,8 +94,8 @@ std::int32_t PolygonMap::compare_some() noexcept {
 
 // What the seen surface says about the frame's offset: along the remembered normal, and across the edges of a tread.
 void PolygonMap::measure_offset() noexcept {
-  if (best_ >= tracks_.size()) return;
-  const MapTrack& track = tracks_[best_];
+  if (pass_.best >= tracks_.size()) return;
+  const MapTrack& track = tracks_[pass_.best];
   Nearness near;
   if (track.sightings < params_.confirmed_sightings || !is_near(track, near)) return;
   const double common_m2 = math::square(params_.systematic_sigma_m);

@@ -21,7 +21,7 @@ std::int32_t PolygonMap::publish() noexcept {
     write_sigmas(tracks_[i], out[i].surface);
   }
   for (std::size_t i = tracks_.size(); i-- > 0;) {
-    if (!tracks_[i].dead) continue;
+    if (!tracks_[i].erased) continue;
     (void)tracks_.try_swap_remove(i);
     (void)out.try_swap_remove(i);
   }

@@ -18,16 +18,16 @@ constexpr double kMaxLocalSlope = 0.05;  // steeper: the local axes turn to the 
 }  // namespace
 
 void PolygonMap::fuse_best() noexcept {
-  if (best_ >= tracks_.size()) {
+  if (pass_.best >= tracks_.size()) {
     ++fused_in_frame_;
     create();
     return;
   }
-  MapTrack* keep = &tracks_[best_];
+  MapTrack* keep = &tracks_[pass_.best];
   MapTrack* gone = nullptr;
   // One surface that lies on two remembered ones says that they are one.
-  if (second_ < tracks_.size() && best_cost_ < 1.0 && second_cost_ < 1.0) {
-    gone = &tracks_[second_];
+  if (pass_.second < tracks_.size() && pass_.best_cost < 1.0 && pass_.second_cost < 1.0) {
+    gone = &tracks_[pass_.second];
     if (gone->sightings > keep->sightings || (gone->sightings == keep->sightings && gone->id < keep->id)) {
       std::swap(keep, gone);
     }
@@ -77,7 +77,7 @@ void PolygonMap::create() noexcept {
     return;
   }
   const bool worth_a_place =
-      track.kind != SurfaceKind::kOther || (area_m2(track.polygon) >= params_.other_area_min_m2 && claim(track) > 0);
+      track.kind != SurfaceKind::kOther || (area_m2(track.polygon) >= params_.other_area_min_m2 && priority(track) > 0);
   if (!worth_a_place) {
     ++counters_.passed_over;
     return;
@@ -86,13 +86,13 @@ void PolygonMap::create() noexcept {
 }
 
 // What is worth keeping when the map is full.
-int PolygonMap::claim(const MapTrack& track) const noexcept {
+int PolygonMap::priority(const MapTrack& track) const noexcept {
   const Vec2 eye_m = local_xy(track.world_T_local, map_T_camera_.p_m);
   // A long floor's middle may be far from where the robot stands on it.
   const double distance_m = track.kind == SurfaceKind::kTread
                                 ? -signed_distance_m(track.polygon, eye_m)
                                 : (track.world_T_local.p_m - map_T_camera_.p_m).head<2>().norm();
-  if (track.dead || distance_m > params_.reach_m) return 0;
+  if (track.erased || distance_m > params_.reach_m) return 0;
   return (track.kind == SurfaceKind::kOther ? 1 : 3) + (track.sightings < params_.confirmed_sightings ? 0 : 1);
 }
 
@@ -100,17 +100,17 @@ void PolygonMap::admit(const MapTrack& track) noexcept {
   if (!tracks_.try_push_back(track)) {
     // The least worth keeping goes, of these the one not seen for longest.
     std::size_t victim = 0;
-    int least = claim(tracks_[0]);
+    int least = priority(tracks_[0]);
     for (std::size_t i = 1; i < tracks_.size(); ++i) {
-      const int worth = claim(tracks_[i]);
+      const int worth = priority(tracks_[i]);
       if (worth < least || (worth == least && tracks_[i].last_seen_ns < tracks_[victim].last_seen_ns)) {
         victim = i;
         least = worth;
       }
     }
     // Never for something of less worth, nor one surface of this frame for its like.
-    const int claimed = claim(track);
-    if (least > claimed || (least == claimed && tracks_[victim].last_seen_ns == newest_ns_)) {
+    const int own_priority = priority(track);
+    if (least > own_priority || (least == own_priority && tracks_[victim].last_seen_ns == newest_ns_)) {
       ++counters_.refused;
       return;
     }
@@ -169,7 +169,7 @@ void PolygonMap::merge(MapTrack& into, MapTrack& from) noexcept {
     }
   }
   into.sightings = std::max(into.sightings, from.sightings);
-  from.dead = true;
+  from.erased = true;
   ++counters_.merged;
 }
 
@@ -207,17 +207,17 @@ bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) 
 }
 
 std::int32_t PolygonMap::age(MapTrack& track) noexcept {
-  if (track.dead || track.last_seen_ns == newest_ns_) return kAgeUnits;
+  if (track.erased || track.last_seen_ns == newest_ns_) return kAgeUnits;
   const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
   const bool looked = in_view(track, camera_T_local);
   if (looked && !hidden(track, camera_T_local)) ++track.misses;
   const bool confirmed = track.sightings >= params_.confirmed_sightings;
   if (confirmed && track.misses >= params_.misses_confirmed) {
-    track.dead = true;
+    track.erased = true;
     ++counters_.dropped_vanished;
   } else if (!confirmed && (track.misses >= params_.misses_unconfirmed ||
                             seconds(newest_ns_ - track.last_seen_ns) > params_.unconfirmed_age_s)) {
-    track.dead = true;
+    track.erased = true;
     ++counters_.dropped_unconfirmed;
   }
   return looked ? kAgeUnits + kHiddenUnits : kAgeUnits;

@@ -15,6 +15,7 @@
 
 #include "firmware/config/param_file.hpp"
 #include "sim_stub/host/cli/estimate_command.hpp"
+#include "sim_stub/host/cli/obstacle_options.hpp"
 #include "sim_stub/host/cli/params_command.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
@@ -63,6 +64,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_option("--tread", stairs.tread_m, "Depth of a tread, m")->capture_default_str();
   climb.add_option("--width", stairs.width_m, "Width of the staircase, m")->capture_default_str();
   climb.add_option("--nosing", stairs.nosing_m, "Overhang of a tread over its riser, m")->capture_default_str();
+  declare_obstacles(climb, stairs);
   climb.add_option("--landing", stairs.landing_m, "Depth of the landing, m")->capture_default_str();
   climb.add_option("--jitter", stairs.jitter_m, "Rise and tread of each step differ by up to this much, m")
       ->capture_default_str();

@@ -65,26 +65,39 @@ Json pushes_json(const std::vector<Push>& pushes) {
 // What the command line said beside gait and seed, defaults included: enough to run it again.
 Json arguments_json(const ClimbOptions& o) {
   const StairParams& stairs = o.stairs;
-  return {{"steps", stairs.steps},
-          {"rise_m", stairs.rise_m},
-          {"tread_m", stairs.tread_m},
-          {"width_m", stairs.width_m},
-          {"nosing_m", stairs.nosing_m},
-          {"landing_m", stairs.landing_m},
-          {"jitter_m", stairs.jitter_m},
-          {"noise", o.noise == NoiseKind::kWhite ? "white" : "correlated"},
-          {"camera", o.camera ? Json(o.camera_file) : Json(nullptr)},
-          {"scan_ms", o.scan_ms},
-          {"mount_error_deg", o.mount_error_deg},
-          {"scale_error", o.scale_error},
-          {"params", o.params_file.empty() ? Json(nullptr) : Json(o.params_file)},
-          {"estimate_mount", o.estimate_mount},
-          {"self_filter", o.self_filter},
-          {"contacts", o.infer_contacts ? "inferred" : "sensed"},
-          {"pushes", pushes_json(o.pushes)},
-          {"render_shift_m", {o.render_dx_m, o.render_dy_m, o.render_dz_m}},
-          {"render_missing_step", o.render_missing_step < 0 ? Json(nullptr) : Json(o.render_missing_step + 1)},
-          {"blank_depth", o.blank_depth}};
+  Json json = {{"steps", stairs.steps},
+               {"rise_m", stairs.rise_m},
+               {"tread_m", stairs.tread_m},
+               {"width_m", stairs.width_m},
+               {"nosing_m", stairs.nosing_m},
+               {"landing_m", stairs.landing_m},
+               {"jitter_m", stairs.jitter_m},
+               {"noise", o.noise == NoiseKind::kWhite ? "white" : "correlated"},
+               {"camera", o.camera ? Json(o.camera_file) : Json(nullptr)},
+               {"scan_ms", o.scan_ms},
+               {"mount_error_deg", o.mount_error_deg},
+               {"scale_error", o.scale_error},
+               {"params", o.params_file.empty() ? Json(nullptr) : Json(o.params_file)},
+               {"estimate_mount", o.estimate_mount},
+               {"self_filter", o.self_filter},
+               {"contacts", o.infer_contacts ? "inferred" : "sensed"},
+               {"pushes", pushes_json(o.pushes)},
+               {"render_shift_m", {o.render_dx_m, o.render_dy_m, o.render_dz_m}},
+               {"render_missing_step", o.render_missing_step < 0 ? Json(nullptr) : Json(o.render_missing_step + 1)},
+               {"blank_depth", o.blank_depth}};
+  if (stairs.balusters.spacing_m > 0.0) {
+    const Balusters& posts = stairs.balusters;
+    json["balusters"] = {{"spacing_m", posts.spacing_m},
+                         {"inset_m", posts.inset_m},
+                         {"size_m", posts.size_m},
+                         {"height_m", posts.height_m},
+                         {"side", posts.left && posts.right ? "both" : (posts.left ? "left" : "right")}};
+  }
+  for (const Obstacle& box : stairs.obstacles) {
+    json["obstacles"].push_back({{"centre_m", {box.centre_m.x(), box.centre_m.y(), box.centre_m.z()}},
+                                 {"size_m", {box.size_m.x(), box.size_m.y(), box.size_m.z()}}});
+  }
+  return json;
 }
 
 std::string format(const char* text, double a, double b) {

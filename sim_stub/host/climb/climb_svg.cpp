@@ -217,6 +217,11 @@ void add_stairs_from_above(std::string& out, const View& view, const StairWorld&
         {{s.nosing_x_m, -w, 0}, {s.back_x_m, -w, 0}, {s.back_x_m, w, 0}, {s.nosing_x_m, w, 0}}};
     add_polygon(out, view, tread_m, style.c_str());
   }
+  for (const Obstacle& o : world.obstacles) {
+    const Vec3 x{0.5 * o.size_m.x(), 0, 0}, y{0, 0.5 * o.size_m.y(), 0}, c = o.centre_m;
+    const std::array<Vec3, 4> box_m{{c - x - y, c + x - y, c + x + y, c - x + y}};
+    add_polygon(out, view, box_m, "fill=\"#857d70\" stroke=\"none\"");
+  }
 }
 
 void add_step_numbers(std::string& out, const View& view, const StairWorld& world, bool from_the_side) {

@@ -17,7 +17,7 @@ std::string why_stopped(StopReason reason, double measured_m) {
     case StopReason::kNone:
       return "it gave no reason";
     case StopReason::kNothingSeen:
-      return "it saw no surface to step on";
+      return "it saw no surface to step on, or too little of the next one";
     case StopReason::kNoStaircase:
       return "it saw level ground and no higher tread";
     case StopReason::kTop:
@@ -32,6 +32,8 @@ std::string why_stopped(StopReason reason, double measured_m) {
       return "its map was stale";
     case StopReason::kEdgeUncertain:
       return "it knew the edges of the next tread too vaguely";
+    case StopReason::kObstacle:
+      return "something stood where its feet would have gone next";
     case StopReason::kLegsCannot:
       return measured_m > 0.0 ? sentence("its legs could not do the next step, of %.3f m rise", measured_m)
                               : "its legs could not do the next step";

@@ -28,6 +28,15 @@ std::vector<TrueSurface> stair_surfaces(const StairWorld& world) {
     all.push_back({1, -1.0, {s.riser_x_m, -w, 0.0}, {s.back_x_m, -w, s.height_m}});
     below_m = s.height_m;
   }
+  for (const Obstacle& o : world.obstacles) {
+    for (const int axis : {0, 1, 2}) {
+      for (const double sign : {1.0, -1.0}) {
+        TrueSurface face{axis, sign, o.centre_m - 0.5 * o.size_m, o.centre_m + 0.5 * o.size_m};
+        (sign > 0.0 ? face.low_m : face.high_m)[axis] = (sign > 0.0 ? face.high_m : face.low_m)[axis];
+        all.push_back(face);
+      }
+    }
+  }
   return all;
 }
 

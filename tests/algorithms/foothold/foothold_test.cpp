@@ -152,10 +152,10 @@ TEST(FootholdEq17To19, RasterOfATurnedTread_HasExactlyTheCellsInside) {
   int inside = 0;
   for (std::int32_t row = 0; row < FootholdRaster::kSide; ++row) {
     raster->clear_row(row);
-    raster->add_row(row, s, 3);
+    raster->add_row(row, {&s, 1}, 0);
     for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
       const bool in = signed_distance_m(s.hull, raster->at(column, row)) >= 0.0;
-      EXPECT_EQ((*raster)(column, row).layer, in ? 3 : FootholdRaster::kNoLayer);
+      EXPECT_EQ(raster->layer(column, row), in ? 0 : FootholdRaster::kNoLayer);
       inside += in ? 1 : 0;
     }
   }
@@ -163,19 +163,13 @@ TEST(FootholdEq17To19, RasterOfATurnedTread_HasExactlyTheCellsInside) {
 }
 
 TEST(FootholdEq18, CellHeight_IsTheVertexMeanOnALevelTreadAndThePlaneOnATiltedOne) {
-  const auto raster = std::make_unique<FootholdRaster>();
-  raster->centre_on({0, 0}, 0.01);
   MapPolygon p = level(1, {}, 0.13, -0.2, 0.2, 0.2, true, true);
   double mean_z = 0.0;
   for (const Vec3& v : p.surface.polygon) mean_z += 0.25 * v.z();
-  raster->clear_row(80);
-  raster->add_row(80, prepared(p), 0);
-  EXPECT_NEAR((*raster)(80, 80).z_m, mean_z, 1e-6);
+  EXPECT_NEAR(prepared(p).plane.height_m({0.0, 0.0}), mean_z, 1e-6);
   p.surface.normal = Vec3{0.02, 0, 1}.normalized();
   p.surface.d_m = -p.surface.normal.dot(Vec3{0, 0, 0.13});
-  raster->clear_row(80);
-  raster->add_row(80, prepared(p), 0);
-  EXPECT_NEAR((*raster)(80 + 15, 80).z_m, 0.13 - 0.02 * 0.15, 1e-6);
+  EXPECT_NEAR(prepared(p).plane.height_m({0.15, 0.0}), 0.13 - 0.02 * 0.15, 1e-6);
 }
 
 TEST(FootholdEq20, RangeFilter_LimitsAheadAndAsideOfTheTurnedBase) {
@@ -190,10 +184,12 @@ TEST(FootholdEq21, OverlappingSurfaces_TheHighestStays) {
   const auto raster = std::make_unique<FootholdRaster>();
   raster->centre_on({0, 0}, 0.01);
   raster->clear_row(80);
-  raster->add_row(80, prepared(level(1, {}, 0.13, -0.1, 0.3, 0.2, true, true)), 1);
-  raster->add_row(80, prepared(level(2, {}, 0.0, -0.5, 0.2, 0.2, false, true)), 0);
-  EXPECT_EQ((*raster)(80, 80).layer, 1);
-  EXPECT_EQ((*raster)(60, 80).layer, 0);
+  const std::array<LevelSurface, 2> surfaces{prepared(level(2, {}, 0.0, -0.5, 0.2, 0.2, false, true)),
+                                             prepared(level(1, {}, 0.13, -0.1, 0.3, 0.2, true, true))};
+  raster->add_row(80, surfaces, 1);
+  raster->add_row(80, surfaces, 0);
+  EXPECT_EQ(raster->layer(80, 80), 1);
+  EXPECT_EQ(raster->layer(60, 80), 0);
 }
 
 TEST(FootholdEq22And23, HeightLimit_CountsFromTheLowestPointOfTheStandingFoot) {
@@ -320,28 +316,88 @@ TEST_F(FootholdTest, Eq26_SplitStance_SearchesFromTheFootThatStays) {
   EXPECT_NEAR(search(ideal_map(s), q).p_star.position_m.z(), 2 * s.rise_m, 1e-9);
 }
 
-TEST(FootholdEq27, Bearing_CountsFromTheRobotNotFromTheWorldOrigin) {
-  const Transform base{rotation_z(3.0), Vec3{10, -4, 0.8}};
-  const Vec3 p = base * Vec3{1, 1, 0};
-  EXPECT_NEAR(relative_bearing_rad(base, p.head<2>()), kPi / 4, 1e-12);
-}
-
-TEST_F(FootholdTest, Eq27_RobotTurned_BearingOfPStarIsFromItsHeading) {
-  const Stairs s{.yaw_rad = 0.5, .origin_m = {3.0, -2.0, 0.0}};
-  for (const double yaw : {-0.15, 0.0, 0.15}) {
-    const FootholdSearch::Query q = standing(s, 0, 0.5, 0.0, yaw);
-    const FootholdSet& r = search(ideal_map(s), q);
-    ASSERT_TRUE(r.has_p_star) << yaw;
-    const Vec3 base_p = q.world_T_base.inverse() * r.p_star.position_m;
-    EXPECT_NEAR(r.theta_rel_rad, math::atan2(base_p.y(), base_p.x()), 0.01) << yaw;
-  }
-}
-
 TEST(FootholdEq28, SoleLayer_IsWithinDeltaFootOnBothSides) {
   EXPECT_TRUE(in_sole_layer(0.539, 0.5, 0.04));
   EXPECT_TRUE(in_sole_layer(0.461, 0.5, 0.04));
   EXPECT_FALSE(in_sole_layer(0.541, 0.5, 0.04));
   EXPECT_FALSE(in_sole_layer(0.459, 0.5, 0.04));
+}
+
+// ---- what stands on the treads
+
+// A post of 40 mm on the floor or a tread, as the map knows it: its front.
+MapPolygon post(std::uint32_t id, const Transform& world_T_stairs, double x_m, double y_m, double z_m) {
+  MapPolygon p = riser(id, world_T_stairs, x_m, z_m, z_m + 0.9, 0.02);
+  const Vec3 aside = world_T_stairs.R * Vec3{0, y_m, 0};
+  for (Vec3& v : p.surface.polygon) v += aside;
+  p.surface.centroid_m += aside;
+  return p;
+}
+
+TEST_F(FootholdTest, BalustersAlongBothEdges_FeetLieAsWithoutThem) {
+  const Stairs s{.yaw_rad = 0.4, .origin_m = {1.0, -2.0, 0.0}};
+  for (const int on : {0, 1, 2}) {
+    MapSnapshot map = ideal_map(s);
+    const FootholdSet without = search(map, standing(s, on));
+    std::uint32_t id = 1000;
+    for (double x_m = 0.05; x_m < 0.8; x_m += 0.11) {
+      for (const double side : {1.0, -1.0}) {
+        const double z_m = (1 + std::floor(x_m / s.tread_m)) * s.rise_m;
+        ASSERT_TRUE(map.polygons.try_push_back(post(id++, s.world_T_stairs(), x_m, side * 0.4, z_m)));
+      }
+    }
+    const FootholdSet& r = search(map, standing(s, on));
+    ASSERT_EQ(r.obstruction, StopReason::kNone) << on;
+    EXPECT_EQ(r.measured_tread_m, without.measured_tread_m);
+    for (const std::size_t f : {0U, 1U}) {
+      EXPECT_EQ(r.p_star_feet[f].position_m, without.p_star_feet[f].position_m);
+      EXPECT_EQ(r.p_star_feet[f].toe_clearance_m, without.p_star_feet[f].toe_clearance_m);
+    }
+  }
+}
+
+TEST_F(FootholdTest, PostAtTheSideOfTheFeet_TheyStandBesideIt) {
+  const Stairs s;
+  for (const double side : {1.0, -1.0}) {
+    MapSnapshot map = ideal_map(s);
+    const double y_m = side * 0.15;  // 18 mm of the outer foot's box would meet it
+    ASSERT_TRUE(map.polygons.try_push_back(post(1000, s.world_T_stairs(), 0.12, y_m, s.rise_m)));
+    const FootholdSet& r = search(map, standing(s, 0));
+    ASSERT_EQ(r.obstruction, StopReason::kNone) << side;
+    for (const Foothold& foot : r.p_star_feet) {
+      const Vec3 p = s.world_T_stairs().inverse() * foot.position_m;
+      EXPECT_GT(std::abs(p.y() - y_m), kCollisionRectangle.half_width_m + 0.02 + 0.019) << side;
+      EXPECT_LT(side * p.y(), 0.15) << "not around it";
+    }
+  }
+}
+
+TEST_F(FootholdTest, PostInTheMiddleOfATread_SaysThatSomethingStandsThere) {
+  const Stairs s;
+  MapSnapshot map = ideal_map(s);
+  ASSERT_TRUE(map.polygons.try_push_back(post(1000, s.world_T_stairs(), 0.12, 0.0, s.rise_m)));
+  EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kObstacle);
+}
+
+TEST_F(FootholdTest, PostBetweenTheRobotAndTheStairs_SaysThatSomethingStandsThere) {
+  const Stairs s;
+  MapSnapshot map = ideal_map(s);
+  ASSERT_TRUE(map.polygons.try_push_back(post(1000, s.world_T_stairs(), -0.05, 0.0, 0.0)));
+  EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kObstacle);
+}
+
+TEST_F(FootholdTest, BoxOnTheTreadAtItsSide_ChangesNothing) {
+  const Stairs s;
+  MapSnapshot map = ideal_map(s);
+  const FootholdSet without = search(map, standing(s, 0));
+  const Transform world_T_box = s.world_T_stairs() * Transform{Mat3::Identity(), Vec3{0.0, 0.42, 0.0}};
+  const double top_m = s.rise_m + 0.3;
+  ASSERT_TRUE(map.polygons.try_push_back(level(1000, world_T_box, top_m, 0.1, 0.4, 0.15, true, false)));
+  ASSERT_TRUE(map.polygons.try_push_back(riser(1001, world_T_box, 0.1, s.rise_m, top_m, 0.15)));
+  const FootholdSet& r = search(map, standing(s, 0));
+  ASSERT_EQ(r.obstruction, StopReason::kNone);
+  EXPECT_EQ(r.measured_tread_m, without.measured_tread_m);
+  EXPECT_EQ(r.p_star_feet[0].position_m, without.p_star_feet[0].position_m);
 }
 
 // ---- whole staircases
