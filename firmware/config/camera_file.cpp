@@ -64,8 +64,10 @@ class CameraFile {
     std::error_code none;
     if (std::filesystem::is_directory(path, none)) fail("it is a folder");
     if (!parsed_) {
-      throw FileError("Cannot read the camera file \"" + path + "\": " + std::string(parsed_.error().description()) +
-                      ".");
+      const toml::source_position at = parsed_.error().source().begin;  // line 0: it could not be opened
+      throw FileError("Cannot read the camera file \"" + path + "\"" +
+                      (at ? " line " + std::to_string(at.line) : std::string()) + ": " +
+                      std::string(parsed_.error().description()) + ".");
     }
     for (const auto& entry : parsed_.table()) {
       const std::string_view name = entry.first.str();
@@ -81,10 +83,13 @@ class CameraFile {
     const std::string name(key.name);
     const toml::node* node = parsed_.table().get(key.name);
     if (node == nullptr && std::isnan(key.otherwise)) fail(name + " is missing");
-    if (node != nullptr && !node->is_number()) fail(name + " must be a number");
-    const double value = node == nullptr ? key.otherwise : *node->value<double>();
+    if (node == nullptr) return key.otherwise;
+    const std::string line = "line " + std::to_string(node->source().begin.line) + ": ";
+    if (!node->is_number()) fail(line + name + " must be a number");
+    // A whole number that no double holds has no value<double>(), and is beyond every range here.
+    const double value = node->is_integer() ? static_cast<double>(node->as_integer()->get()) : *node->value<double>();
     if (!(value >= key.least && value <= key.most)) {
-      fail(name + " must be from " + text(key.least) + " to " + text(key.most) + ", not " + text(value));
+      fail(line + name + " must be from " + text(key.least) + " to " + text(key.most) + ", not " + text(value));
     }
     return value;
   }

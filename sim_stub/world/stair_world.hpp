@@ -34,8 +34,8 @@ struct StairParams {
   double nosing_m = 0.0;    // overhang of every tread's front edge over its riser
   double landing_m = 1.0;   // length of step N
   double jitter_m = 0.005;  // each step's rise and tread differ by up to this much
-  Balusters balusters;
-  std::vector<Obstacle> obstacles;
+  Balusters balusters{};
+  std::vector<Obstacle> obstacles{};
 };
 
 // A tread with a nosing is a slab of this thickness that overhangs its riser.

@@ -18,6 +18,7 @@
 #include "sim_stub/host/cli/obstacle_options.hpp"
 #include "sim_stub/host/cli/params_command.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
+#include "sim_stub/host/output_file.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
 
 namespace polygmap::sim {
@@ -54,12 +55,24 @@ std::string whole_number(const std::string& text) {
   return good ? "" : "must be a whole number from 0 to 2^64 - 1, not " + text;
 }
 
+// CLI11 2.1 reads 010 as eight: here digits are decimal.
+std::string decimal(std::string& text) {
+  const std::size_t first = text.find_first_not_of("+-");
+  if (first == std::string::npos || text[first] != '0') return "";
+  if (text.find_first_not_of("0123456789", first) != std::string::npos)
+    return "must be a whole decimal number, not " + text;
+  text.erase(first, std::min(text.find_first_not_of('0', first), text.size() - 1) - first);
+  return "";
+}
+
 // CLI11 2.1 takes an empty word for the number 0.
 std::string not_empty(const std::string& text) { return text.empty() ? "must not be empty" : ""; }
 
 void declare(CLI::App& climb, ClimbArguments& a) {
   StairParams& stairs = a.options.stairs;
-  climb.add_option("--steps", stairs.steps, "Number of steps; the last one is the landing")->capture_default_str();
+  climb.add_option("--steps", stairs.steps, "Number of steps; the last one is the landing")
+      ->transform(CLI::Validator(decimal, ""))
+      ->capture_default_str();
   climb.add_option("--rise", stairs.rise_m, "Rise of a step, m")->capture_default_str();
   climb.add_option("--tread", stairs.tread_m, "Depth of a tread, m")->capture_default_str();
   climb.add_option("--width", stairs.width_m, "Width of the staircase, m")->capture_default_str();
@@ -76,6 +89,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->capture_default_str();
   climb.add_option("--seed", a.options.seed, "Draws the start, the steps' jitter, the robot's errors and all noise")
       ->check(whole_number)
+      ->transform(CLI::Validator(decimal, ""))
       ->capture_default_str();
   climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
   climb
@@ -115,6 +129,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->type_name("X Y Z")
       ->group(causality);
   climb.add_option("--render-missing-step", a.missing_step, "Leave step K (1 is the lowest) out of the picture")
+      ->transform(CLI::Validator(decimal, ""))
       ->type_name("K")
       ->group(causality);
   climb.add_flag("--blank-depth", a.options.blank_depth, "The camera delivers no depth")->group(causality);
@@ -284,6 +299,11 @@ std::string output_complaint(const std::string& directory) {
   const bool written = static_cast<bool>(file);
   fs::remove(probe, error);
   if (!written) return "Cannot write into the directory \"" + directory + "\" given by --out.";
+  try {  // a former run's verdict is none of this one
+    for (const char* name : {"summary.json", "climb.svg"}) remove_output(directory + "/" + name);
+  } catch (const config::FileError& complaint) {
+    return complaint.what();
+  }
   return {};
 }
 
@@ -318,7 +338,8 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
                   std::ostream& err, bool live) {
   CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
   app.require_subcommand(0, 1);
-  app.footer("Exit codes: 0 pass or done, 1 the climb failed, 2 a bad argument, file or output.");
+  app.footer(
+      "Exit codes: 0 pass or done, 1 the climb failed, 2 a bad argument, file or output, 130 or 143 interrupted.");
   CLI::App* climb = app.add_subcommand(
       "climb", "Climb a simulated staircase; writes summary.json and climb.svg, exit code 0 only on pass");
   ClimbArguments a;
@@ -383,6 +404,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
     err << "polygmap: " << not_written << "\n";
     return kExitUsage;
   }
+  if (summary.interrupted_by != 0) return kExitSignal + summary.interrupted_by;
   return summary.pass ? kExitPass : kExitFail;
 }
 

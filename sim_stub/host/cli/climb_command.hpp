@@ -12,9 +12,10 @@
 namespace polygmap::sim {
 
 enum ExitCode : int {
-  kExitPass = 0,   // the climb passed, or help was asked for
-  kExitFail = 1,   // the climb failed
-  kExitUsage = 2,  // a bad argument, or output that cannot be written
+  kExitPass = 0,      // the climb passed, or help was asked for
+  kExitFail = 1,      // the climb failed
+  kExitUsage = 2,     // a bad argument, or output that cannot be written
+  kExitSignal = 128,  // and the number of the signal that ended the climb
 };
 
 using ClimbRunner = std::function<ClimbSummary(const ClimbOptions&, const ClimbProgressFunction&)>;

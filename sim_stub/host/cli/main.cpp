@@ -1,14 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <unistd.h>
 
+#include <atomic>
+#include <csignal>
 #include <iostream>
 #include <string>
 #include <vector>
 
 #include "sim_stub/host/cli/climb_command.hpp"
 
+namespace {
+
+std::atomic<int> interrupt_signal{0};
+static_assert(std::atomic<int>::is_always_lock_free, "set by a signal handler");
+
+void interrupt(int signal) { interrupt_signal = signal; }
+
+// The first SIGINT or SIGTERM ends the climb with its files written; the second one kills.
+polygmap::sim::ClimbSummary run_until_interrupted(polygmap::sim::ClimbOptions options,
+                                                  const polygmap::sim::ClimbProgressFunction& progress) {
+  struct sigaction action {};
+  action.sa_handler = interrupt;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
+  options.interrupt = &interrupt_signal;
+  return polygmap::sim::run_climb(options, progress);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + (argc > 0 ? 1 : 0), argv + argc);
-  return polygmap::sim::polygmap_main(arguments, polygmap::sim::run_climb, std::cout, std::cerr,
+  return polygmap::sim::polygmap_main(arguments, run_until_interrupted, std::cout, std::cerr,
                                       isatty(STDOUT_FILENO) != 0);
 }

@@ -220,10 +220,12 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     const bool over = telemetry.gait.phase == GaitPhase::kFinished || telemetry.gait.phase == GaitPhase::kStopped;
     if (over && end_ns < 0) end_ns = robot.now_ns() + kRestAfterEnd_ns;
     if (robot.truth().fell || (over && robot.now_ns() >= end_ns)) break;
+    if (options.interrupt != nullptr && *options.interrupt != 0) break;
   }
 
   RunFigures figures;
   figures.options = options;
+  figures.interrupted_by = options.interrupt != nullptr ? options.interrupt->load() : 0;
   figures.params_hash = config::hash_of(params);
   figures.camera = camera_figures(robot, pipeline.perception().mount());
   figures.heap_calls = heap::report().calls;

@@ -2,6 +2,7 @@
 // What a simulated climb is told: the stairs, the camera, and which errors the robot has.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -29,6 +30,8 @@ struct ClimbOptions {
   GaitPattern gait = GaitPattern::kDoubleStep;
   std::string out_dir;          // empty: no files
   double time_limit_s = 150.0;  // simulated
+  // Becomes the number of the signal that asks for the end; the climb then ends with what there is. Null: none may.
+  const std::atomic<int>* interrupt = nullptr;
   bool threaded_render = true;
   // Causality tests: the picture shows something else than the plant stands on.
   double render_dx_m = 0.0, render_dy_m = 0.0, render_dz_m = 0.0;

@@ -4,12 +4,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <stdexcept>
 #include <utility>
 
 #include "algorithms/robot/body_shapes.hpp"
 #include "sim_stub/host/climb/surface_match.hpp"
+#include "sim_stub/host/output_file.hpp"
 #include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
@@ -296,7 +296,8 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.steps_climbed = steps_climbed_;
   const bool module_ended = ending_.phase == GaitPhase::kFinished || ending_.phase == GaitPhase::kStopped;
   s.ended_at_s = seconds(last_stamp_ns_);
-  s.ended_by = fell_ ? "fall" : module_ended ? "module" : "time limit";
+  s.interrupted_by = fell_ || module_ended ? 0 : run.interrupted_by;
+  s.ended_by = fell_ ? "fall" : module_ended ? "module" : s.interrupted_by != 0 ? "interrupted" : "time limit";
   if (on_top_ns_ >= 0 && first_lift_off_ns_ >= 0) {
     s.climb_time_s = seconds(on_top_ns_ - first_lift_off_ns_);
     s.seconds_per_step = s.climb_time_s / s.steps_total;
@@ -367,15 +368,8 @@ ClimbDrawing ClimbReport::drawing() const {
 }
 
 void write_climb_files(const std::string& directory, const ClimbReport& report, const ClimbSummary& summary) {
-  const auto write = [&directory](const char* name, const std::string& text) {
-    const std::string path = directory + "/" + name;
-    std::ofstream file(path, std::ios::binary);
-    file << text;
-    file.close();
-    if (!file) throw std::runtime_error("Cannot write " + path + ".");
-  };
-  write("summary.json", summary_text(summary));
-  write("climb.svg", climb_svg(report.world(), report.drawing(), summary));
+  write_output(directory + "/summary.json", summary_text(summary));
+  write_output(directory + "/climb.svg", climb_svg(report.world(), report.drawing(), summary));
 }
 
 }  // namespace polygmap::sim

@@ -25,6 +25,7 @@ namespace polygmap::sim {
 // What the run knows beside truth and telemetry.
 struct RunFigures {
   ClimbOptions options;
+  int interrupted_by = 0;   // the signal; 0: none
   std::string params_hash;  // of what the module was given
   CameraFigures camera;
   std::uint64_t heap_calls = 0;

@@ -118,7 +118,7 @@ Spread spread_of(std::vector<double> values) {
 
 Json to_json(const ClimbSummary& s) {
   Json j;
-  j["verdict"] = s.pass ? "pass" : "fail";
+  j["verdict"] = s.interrupted_by != 0 ? "interrupted" : s.pass ? "pass" : "fail";
   j["reason"] = s.reason;
   j["fell"] = s.fell;
   j["ended_by"] = s.ended_by;
@@ -205,10 +205,12 @@ Json to_json(const ClimbSummary& s) {
   return j;
 }
 
-std::string summary_text(const ClimbSummary& s) { return to_json(s).dump(2) + "\n"; }
+std::string summary_text(const ClimbSummary& s) {
+  return to_json(s).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
 
 std::string verdict_line(const ClimbSummary& s) {
-  std::string line = (s.pass ? "PASS: " : "FAIL: ") + s.reason;
+  std::string line = (s.interrupted_by != 0 ? "INTERRUPTED: " : s.pass ? "PASS: " : "FAIL: ") + s.reason;
   if (std::isfinite(s.foothold_error_m.max)) {
     line += format(" Foothold error up to %.1f mm, execution error up to %.1f mm", s.foothold_error_m.max * 1e3,
                    s.execution_error_m.max * 1e3);

@@ -84,7 +84,8 @@ struct ClimbSummary {
   bool pass = false;
   std::string reason;  // one sentence
   bool fell = false;
-  std::string ended_by;              // "module": by itself; "fall"; "time limit"
+  std::string ended_by;              // "module": by itself; "fall"; "time limit"; "interrupted"
+  int interrupted_by = 0;            // the signal; 0: none
   double ended_at_s = kNotMeasured;  // simulation's clock
   ClimbOptions options;
   std::string params_hash;  // of what the module was given

@@ -66,6 +66,7 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
     if (ending.phase == GaitPhase::kStopped) return reason + "; the module stopped there: " + why + ".";
     return reason + (ending.phase == GaitPhase::kFinished ? "." : "; the run ended before the module did.");
   }
+  if (s.interrupted_by != 0) return "The run was interrupted after " + climbed + ".";
   if (s.fell) return "Fell after " + climbed + ": " + ending.fall_reason;
   if (!all_climbed && ending.phase == GaitPhase::kStopped) {
     return "The module stopped after " + climbed + ": " + why + ".";
@@ -89,7 +90,8 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
 
 void judge(ClimbSummary& s, const ClimbEnding& ending) {
   const bool all_climbed = s.steps_total > 0 && s.steps_climbed == s.steps_total;
-  s.pass = all_climbed && !s.fell && s.sole_margin_min_m >= 0.0 && s.swing_clearance_min_m > 0.0 && s.heap_calls == 0;
+  s.pass = all_climbed && !s.fell && s.sole_margin_min_m >= 0.0 && s.swing_clearance_min_m > 0.0 && s.heap_calls == 0 &&
+           s.interrupted_by == 0;
   s.reason = reason_of(s, ending);
   for (const Push& push : s.options.pushes) {
     if (push.at_s < s.ended_at_s) continue;

@@ -2,11 +2,11 @@
 #include "sim_stub/host/estimate/csv_table.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 
 #include "firmware/config/file_error.hpp"
@@ -14,7 +14,9 @@
 namespace polygmap::sim {
 namespace {
 
-constexpr std::size_t kMostShown = 24;  // of a cell, in a sentence
+constexpr std::size_t kMostShown = 24;                            // of a cell, in a sentence
+constexpr std::size_t kMostFile_bytes = std::size_t{512} << 20U;  // an hour of a log at 1 kHz
+constexpr std::ptrdiff_t kMostColumns = 1000;
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r\n";
@@ -38,7 +40,14 @@ std::string read_text(const std::string& path) {
   if (!std::filesystem::exists(path, none)) throw config::FileError("There is no file \"" + path + "\".");
   if (std::filesystem::is_directory(path, none)) throw config::FileError("\"" + path + "\" is a folder, not a file.");
   std::ifstream file(path, std::ios::binary);
-  std::string text(std::istreambuf_iterator<char>(file), {});
+  std::string text;
+  for (std::array<char, 1 << 16> block{}; file.read(block.data(), block.size()) || file.gcount() > 0;) {
+    text.append(block.data(), static_cast<std::size_t>(file.gcount()));
+    if (text.size() > kMostFile_bytes) {
+      throw config::FileError("\"" + path + "\" has more than " + std::to_string(kMostFile_bytes >> 20U) +
+                              " MiB, more than a log that is read.");
+    }
+  }
   if (!file.is_open() || file.bad()) throw config::FileError("Cannot read \"" + path + "\".");
   if (text.empty()) throw config::FileError("\"" + path + "\" is empty.");
   return text;
@@ -63,6 +72,10 @@ CsvTable::CsvTable(std::string path) : path_(std::move(path)), text_(read_text(p
     const std::string_view line = rest.substr(0, end);
     rest.remove_prefix(std::min(end + 1, rest.size()));
     if (trimmed(line).empty() && trimmed(rest).empty() && number > 1) break;  // the file's end
+    if (std::ranges::count(line, ',') >= kMostColumns) {
+      throw config::FileError("\"" + path_ + "\" line " + std::to_string(number) + ": has more than " +
+                              std::to_string(kMostColumns) + " columns.");
+    }
     const std::vector<std::string_view> cells = split(line);
     if (number == 1) {
       header_ = cells;

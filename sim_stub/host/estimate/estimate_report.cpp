@@ -4,10 +4,11 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "firmware/config/file_error.hpp"
+#include "sim_stub/host/output_file.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -102,13 +103,11 @@ void write_estimate_json(const std::string& path, const EstimateLog& log, const 
   json["lio"] = lio_counts(lio, replay);
   json["lio"]["age_at_end_s"] = last.lio_age_ns < 0 ? Json(nullptr) : Json(seconds(last.lio_age_ns));
   json["slew_max_mm_per_tick"] = 1e3 * replay.largest_slew_m;
-  std::ofstream file(path);
-  file << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n" << std::flush;
-  if (!file) throw config::FileError("Cannot write \"" + path + "\".");
+  write_output(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 void write_estimate_csv(const std::string& path, const EstimateLog& log, const Replay& replay) {
-  std::ofstream file(path);
+  std::ostringstream file;
   file << "t_s,px_m,py_m,pz_m,qw,qx,qy,qz,vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps,"
           "sigma_px_m,sigma_py_m,sigma_pz_m,sigma_vx_mps,sigma_vy_mps,sigma_vz_mps,sigma_roll_rad,sigma_pitch_rad,"
           "sigma_yaw_rad,left_contact,right_contact,lio_age_s,"
@@ -139,8 +138,7 @@ void write_estimate_csv(const std::string& path, const EstimateLog& log, const R
     }
     file << "\n";
   }
-  file << std::flush;
-  if (!file) throw config::FileError("Cannot write \"" + path + "\".");
+  write_output(path, file.str());
 }
 
 }  // namespace polygmap::sim

@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
+
+#include "sim_stub/host/output_file.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -18,6 +20,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using polygmap_frames::Kind;
 constexpr double kMinLevelArea_m2 = 0.02;
+constexpr std::uintmax_t kMostFile_bytes = 16U << 20U;  // ten times what the largest picture takes unpacked
 
 [[noreturn]] void fail(const std::string& sentence) { throw config::FileError(sentence); }
 
@@ -36,10 +39,7 @@ Json piece(const Surface& surface) {
 }
 
 void save(const std::string& path, const std::vector<unsigned char>& bytes) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  file.close();
-  if (!file) fail("Cannot write \"" + path + "\".");
+  write_output(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 // Of the normal and d of m = -normal / d, from that of m.
@@ -126,6 +126,11 @@ std::string size_text(std::int64_t width, std::int64_t height) {
 }
 
 DepthPng read_depth(const std::string& path) {
+  std::error_code none;
+  if (std::filesystem::is_directory(path, none)) fail("\"" + path + "\" is a folder, not a picture.");
+  if (const auto bytes = std::filesystem::file_size(path, none); !none && bytes > kMostFile_bytes) {
+    fail("\"" + path + "\" has " + std::to_string(bytes) + " bytes, more than any depth picture that is read.");
+  }
   std::vector<unsigned char> file;
   if (lodepng::load_file(file, path) != 0) fail("Cannot read the picture \"" + path + "\".");
   if (file.empty()) fail("The picture \"" + path + "\" is empty.");
@@ -141,6 +146,9 @@ DepthPng read_depth(const std::string& path) {
     fail("\"" + path + "\" is " + size_text(width, height) + ", more than the " +
          size_text(polygmap_frames::kMaxWidth_px, polygmap_frames::kMaxHeight_px) + " that are read.");
   }
+  // Pixels and a filter byte a row: a stream that holds more is broken, and is not unpacked. Texts are not looked at.
+  state.decoder.zlibsettings.max_output_size = 2 * std::size_t{width} * height + height + 64;
+  state.decoder.read_text_chunks = 0;
   state.info_raw.colortype = LCT_GREY;
   state.info_raw.bitdepth = 16;
   std::vector<unsigned char> bytes;
@@ -227,10 +235,8 @@ void write_planes(const std::string& path, const Perceived& perceived, const std
     for (const Surface& s : pieces) j["pieces"].push_back(piece(s));
     planes.push_back(j);
   }
-  std::ofstream file(path);
-  file << Json{{"planes", planes}, {"up", point(perceived.camera_up)}, {"params_hash", params_hash}}.dump(1) << "\n";
-  file.close();
-  if (!file) fail("Cannot write \"" + path + "\".");
+  const Json json{{"planes", planes}, {"up", point(perceived.camera_up)}, {"params_hash", params_hash}};
+  write_output(path, json.dump(1) + "\n");
 }
 
 void write_picture(const std::string& path, const config::CameraProfile& camera, const DepthPng& picture,
