@@ -166,6 +166,8 @@ std::int32_t SurfaceExtractor::run_piece() noexcept {
       return 8;
     case Phase::kFacets:
       return facet_step();
+    case Phase::kSplit:
+      return split_step();
     case Phase::kSearch:
       if (row_ == 0) begin_search();
       search_.add_column(picture_.column_rays, picture_.columns, row_,

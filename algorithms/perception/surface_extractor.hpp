@@ -18,6 +18,7 @@
 #include "algorithms/perception/image/depth_range.hpp"
 #include "algorithms/perception/image/noise_tracker.hpp"
 #include "algorithms/perception/image/self_filter.hpp"
+#include "algorithms/perception/planes/overhang_split.hpp"
 #include "algorithms/perception/planes/plane_fit.hpp"
 #include "algorithms/perception/planes/plane_growing.hpp"
 #include "algorithms/perception/planes/plane_merging.hpp"
@@ -49,6 +50,7 @@ class SurfaceExtractor {
     EdgeLineFinder::Params edge_lines;
     double kind_tilt_rad = 0.21;  // a fitted plane within this of level is a tread, of upright a riser
     PlaneMerging::Params merging;
+    OverhangSplit::Params overhangs;
     double min_explained = 0.75;  // share of a surface's pixels that its plane explains, over that of all surfaces
     double min_explained_curved = 0.55;  // that of several facets
     double evidence_px = 3000.0;         // of a surface no larger than this are single pixels looked at ...
@@ -120,6 +122,7 @@ class SurfaceExtractor {
     kMeet,
     kRefit,
     kFacets,
+    kSplit,
     kSearch,
     kPieces,
     kProfile,
@@ -142,6 +145,9 @@ class SurfaceExtractor {
 
   void reduce_row() noexcept;
   void take_grown_planes() noexcept;
+  std::int32_t split_step() noexcept;
+  void split_overhangs() noexcept;
+  void add_plane(const InversePlane& plane) noexcept;
   void begin_search() noexcept;
   void take_found_planes() noexcept;
   void merge_planes(bool measured) noexcept;
@@ -183,9 +189,10 @@ class SurfaceExtractor {
   PlaneGrowing growing_;
   SpanBoundaries boundaries_;
   ResidualPlaneSearch search_;
-  std::size_t first_found_ = 1;          // planes first_found_ .. planes_.count came from the search
+  std::size_t first_found_ = 1;  // planes first_found_ .. planes_.count came from the search, or from another plane
   PlaneMerging::PlaneIndex to_plane_{};  // from a grown plane
   PlaneMerging merging_;
+  OverhangSplit overhangs_;
 
   PlaneSet planes_;
   ConnectedComponents pieces_;

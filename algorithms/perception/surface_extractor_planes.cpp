@@ -66,8 +66,46 @@ std::int32_t SurfaceExtractor::facet_step() noexcept {
     p.kind = kind_of(p.plane, view_.camera_up, params_.kind_tilt_rad);
     boundaries_.set_plane(i, p.plane);
   }
+  overhangs_.begin(params_.overhangs, view_.camera_up, planes_);
+  first_found_ = planes_.count + 1;
+  enter(overhangs_.any() ? Phase::kSplit : Phase::kSearch);
+  return 4;
+}
+
+std::int32_t SurfaceExtractor::split_step() noexcept {
+  overhangs_.add_column(picture_, row_, boundaries_.columns()[static_cast<std::size_t>(row_)], to_plane_);
+  if (++row_ < picture_.column_rays.columns) return 1;
+  split_overhangs();
   enter(Phase::kSearch);
   return 4;
+}
+
+// The larger half keeps the plane and what is left of its runs when their ends are trimmed; the other claims the rest.
+void SurfaceExtractor::split_overhangs() noexcept {
+  counters_.run_overflow += overhangs_.overflow();
+  for (std::size_t i = 1; i < first_found_; ++i) {
+    FramePlane& p = planes_[i];
+    OverhangSplit::Halves halves;
+    if (!p.alive || !overhangs_.try_split(i, halves)) continue;
+    p.plane = halves.larger;
+    p.kind = SurfaceKind::kRiser;
+    p.pixels -= halves.smaller_px;
+    boundaries_.set_plane(i, p.plane);
+    add_plane(halves.smaller);
+  }
+}
+
+void SurfaceExtractor::add_plane(const InversePlane& plane) noexcept {
+  if (planes_.count == PlaneSet::kMaxPlanes) {
+    ++counters_.plane_overflow;
+    return;
+  }
+  FramePlane& p = planes_[++planes_.count];
+  p = FramePlane{};
+  p.plane = plane;
+  p.kind = kind_of(plane, view_.camera_up, params_.kind_tilt_rad);
+  p.alive = true;
+  boundaries_.set_plane(planes_.count, plane);
 }
 
 void SurfaceExtractor::begin_search() noexcept {
@@ -83,19 +121,7 @@ void SurfaceExtractor::begin_search() noexcept {
 
 void SurfaceExtractor::take_found_planes() noexcept {
   search_.finish();
-  first_found_ = planes_.count + 1;
-  for (const InversePlane& found : search_.found()) {
-    if (planes_.count == PlaneSet::kMaxPlanes) {
-      ++counters_.plane_overflow;
-      break;
-    }
-    FramePlane& p = planes_[++planes_.count];
-    p = FramePlane{};
-    p.plane = found;
-    p.kind = kind_of(found, view_.camera_up, params_.kind_tilt_rad);
-    p.alive = true;
-    boundaries_.set_plane(planes_.count, found);
-  }
+  for (const InversePlane& found : search_.found()) add_plane(found);
 }
 
 void SurfaceExtractor::solve_planes() noexcept {

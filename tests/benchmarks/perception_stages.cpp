@@ -90,6 +90,7 @@ ExtractorStage extractor_stage(SurfaceExtractor::Phase phase) noexcept {
       return kMeeting;
     case Phase::kRefit:
     case Phase::kFacets:
+    case Phase::kSplit:
       return kRefit;
     case Phase::kSearch:
       return kRemainder;
