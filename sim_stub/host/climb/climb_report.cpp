@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "algorithms/robot/body_shapes.hpp"
-#include "sim_stub/host/climb/surface_match.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -53,27 +52,30 @@ double ClimbReport::PositionError::rmse_m() const {
   return count == 0 ? kNotMeasured : std::sqrt(sum_m2 / static_cast<double>(count));
 }
 
-ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera)
+ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera, const CameraIntrinsics& intrinsics)
     : world_(std::move(world)),
       solids_(stair_solids(world_)),
       true_base_T_camera_(true_base_T_camera),
+      visibility_(world_, intrinsics),
       climbed_(world_.steps.size(), false) {}
 
-std::optional<Transform> ClimbReport::true_T_base_at(std::int64_t stamp_ns) const {
+std::optional<ClimbReport::TruePose> ClimbReport::true_pose_at(std::int64_t stamp_ns) const {
   const auto after = std::lower_bound(past_.begin(), past_.end(), stamp_ns,
                                       [](const TruePose& p, std::int64_t stamp) { return p.stamp_ns < stamp; });
   if (after == past_.end()) return std::nullopt;
-  if (after->stamp_ns == stamp_ns) return after->true_T_base;
+  if (after->stamp_ns == stamp_ns) return *after;
   if (after == past_.begin()) return std::nullopt;
   const TruePose& a = *std::prev(after);
   const TruePose& b = *after;
   const double s = seconds(stamp_ns - a.stamp_ns) / seconds(b.stamp_ns - a.stamp_ns);
   const Eigen::Quaterniond qa(a.true_T_base.R), qb(b.true_T_base.R);
-  return Transform{qa.slerp(s, qb).toRotationMatrix(), a.true_T_base.p_m + s * (b.true_T_base.p_m - a.true_T_base.p_m)};
+  return TruePose{stamp_ns,
+                  {qa.slerp(s, qb).toRotationMatrix(), a.true_T_base.p_m + s * (b.true_T_base.p_m - a.true_T_base.p_m)},
+                  s < 0.5 ? a.base_legs : b.base_legs};
 }
 
 void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
-  past_.push_back({truth.stamp_ns, truth.true_T_base});
+  past_.push_back({truth.stamp_ns, truth.true_T_base, truth.base_legs});
   while (truth.stamp_ns - past_.front().stamp_ns > kPast_ns) past_.pop_front();
   last_stamp_ns_ = truth.stamp_ns;
   if (truth.fell && !fell_) {
@@ -108,12 +110,12 @@ void ClimbReport::observe_odometry(const Truth& truth, const StateEstimate& stat
 }
 
 void ClimbReport::observe_lio(const LioSample& sample) {
-  const std::optional<Transform> true_T_base = true_T_base_at(sample.stamp_ns);
-  if (!true_T_base) return;
+  const std::optional<TruePose> pose = true_pose_at(sample.stamp_ns);
+  if (!pose) return;
   // Through the nominal mount to the base: all three errors are about the same point.
   const Transform lio_T_base = sample.lio_T_lidar * base_T_lidar().inverse();
-  if (!true_T_lio_) true_T_lio_ = aligned_worlds(*true_T_base, lio_T_base);
-  lio_error_.add(*true_T_lio_ * lio_T_base.p_m - true_T_base->p_m);
+  if (!true_T_lio_) true_T_lio_ = aligned_worlds(pose->true_T_base, lio_T_base);
+  lio_error_.add(*true_T_lio_ * lio_T_base.p_m - pose->true_T_base.p_m);
 }
 
 void ClimbReport::observe_surfaces(const SurfaceFrame& frame) {
@@ -121,14 +123,23 @@ void ClimbReport::observe_surfaces(const SurfaceFrame& frame) {
   frame_sequence_ = frame.sequence;
   frame_stamp_ns_ = frame.stamp_ns;
   ++frames_;
-  const std::optional<Transform> true_T_base = true_T_base_at(frame.stamp_ns);
-  std::uint64_t matching = 0;
-  for (const SurfacePatch& patch : frame.surfaces) {
-    if (true_T_base && matches_true_surface(world_, patch, *true_T_base * true_base_T_camera_)) ++matching;
-  }
   surfaces_ += frame.surfaces.size();
-  surfaces_unmatched_ += frame.surfaces.size() - matching;
-  if (matching > 0 && matching == frame.surfaces.size()) ++frames_matching_;
+  const std::optional<TruePose> pose = true_pose_at(frame.stamp_ns);
+  if (!pose) {
+    surfaces_unmatched_ += frame.surfaces.size();
+    return;
+  }
+  const Transform true_T_camera = pose->true_T_base * true_base_T_camera_;
+  std::vector<int> found;
+  for (const SurfacePatch& patch : frame.surfaces) found.push_back(matching_surface(world_, patch, true_T_camera));
+  const auto unmatched = static_cast<std::uint64_t>(std::count(found.begin(), found.end(), kNoSurface));
+  std::uint64_t missed = 0;
+  const std::vector<int>& in_view = visibility_.in_view(true_T_camera, true_base_T_camera_, pose->base_legs);
+  for (const int id : in_view) missed += std::find(found.begin(), found.end(), id) == found.end() ? 1U : 0U;
+  surfaces_unmatched_ += unmatched;
+  in_view_ += in_view.size();
+  missed_ += missed;
+  if (!found.empty() && unmatched == 0 && missed == 0) ++frames_matching_;
 }
 
 void ClimbReport::observe_map(const Telemetry& telemetry) {
@@ -355,6 +366,8 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.frames_matching = frames_matching_;
   s.surfaces = surfaces_;
   s.surfaces_unmatched = surfaces_unmatched_;
+  s.surfaces_in_view = in_view_;
+  s.surfaces_missed = missed_;
 
   std::vector<double> execution, foothold, along, across, map_age, last_seen;
   for (const Footstep& f : footsteps_) {

@@ -16,6 +16,7 @@
 #include "sim_stub/host/climb/climb_summary.hpp"
 #include "sim_stub/host/climb/climb_svg.hpp"
 #include "sim_stub/host/climb/climb_verdict.hpp"
+#include "sim_stub/host/climb/surface_match.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
 #include "sim_stub/world/truth.hpp"
@@ -36,7 +37,8 @@ struct RunFigures {
 
 class ClimbReport {
  public:
-  explicit ClimbReport(StairWorld world, const Transform& true_base_T_camera = base_T_camera());
+  explicit ClimbReport(StairWorld world, const Transform& true_base_T_camera = base_T_camera(),
+                       const CameraIntrinsics& intrinsics = robot_camera_intrinsics());
 
   // Once per tick, after the module's tick, with the truth of the same instant.
   void observe(const Truth& truth, const Telemetry& telemetry);
@@ -51,6 +53,7 @@ class ClimbReport {
   struct TruePose {
     std::int64_t stamp_ns;
     Transform true_T_base;
+    std::array<LegShapes, kFootCount> base_legs;
   };
   // Positions are compared in the true world after one alignment of heading and place: both worlds know which way is
   // up.
@@ -67,7 +70,7 @@ class ClimbReport {
     std::vector<Transform> true_T_sole;
   };
 
-  [[nodiscard]] std::optional<Transform> true_T_base_at(std::int64_t stamp_ns) const;
+  [[nodiscard]] std::optional<TruePose> true_pose_at(std::int64_t stamp_ns) const;
   void observe_odometry(const Truth& truth, const StateEstimate& state);
   void observe_surfaces(const SurfaceFrame& frame);
   void observe_map(const Telemetry& telemetry);
@@ -89,6 +92,7 @@ class ClimbReport {
   StairWorld world_;
   std::vector<SolidBox> solids_;
   Transform true_base_T_camera_;
+  SurfaceVisibility visibility_;
 
   std::uint64_t ticks_ = 0;
   std::int64_t last_stamp_ns_ = 0;
@@ -105,6 +109,7 @@ class ClimbReport {
   std::uint32_t frame_sequence_ = 0;
   std::int64_t frame_stamp_ns_ = 0;
   std::uint64_t frames_ = 0, frames_matching_ = 0, surfaces_ = 0, surfaces_unmatched_ = 0;
+  std::uint64_t in_view_ = 0, missed_ = 0;  // true surfaces
   std::int64_t map_stamp_ns_ = 0;
   std::vector<double> exposure_to_map_ms_;
   struct Seen {
