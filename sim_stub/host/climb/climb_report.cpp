@@ -13,7 +13,7 @@
 namespace polygmap::sim {
 namespace {
 
-constexpr std::int64_t kPast_ns = 2 * kNsPerS;    // covers the latest LIO pose and the latest frame
+constexpr std::int64_t kPast_ns = kNsPerS;        // covers the latest frame
 constexpr std::int64_t kRest_ns = 50 * kNsPerMs;  // both soles stand this long: they rest
 constexpr std::uint64_t kTrailEvery_ticks = 10;   // 20 ms
 
@@ -24,12 +24,6 @@ void keep_min(double& least, double value) {
 }
 void keep_max(double& greatest, double value) {
   if (!std::isnan(value) && !(greatest >= value)) greatest = value;
-}
-
-// a_T_b from one body's pose in both worlds, heading and place only.
-Transform aligned_worlds(const Transform& a_T_body, const Transform& b_T_body) {
-  const Mat3 R = rotation_z(yaw_of(a_T_body.R) - yaw_of(b_T_body.R));
-  return {R, a_T_body.p_m - R * b_T_body.p_m};
 }
 
 // The point seen from a sole: along its heading, across it, up.
@@ -44,14 +38,6 @@ double nosing_distance_m(const Step& step, const Transform& true_T_sole) {
 
 }  // namespace
 
-void ClimbReport::PositionError::add(const Vec3& error_m) {
-  sum_m2 += error_m.squaredNorm();
-  ++count;
-}
-double ClimbReport::PositionError::rmse_m() const {
-  return count == 0 ? kNotMeasured : std::sqrt(sum_m2 / static_cast<double>(count));
-}
-
 ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera, const CameraIntrinsics& intrinsics)
     : world_(std::move(world)),
       solids_(stair_solids(world_)),
@@ -59,31 +45,16 @@ ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera, 
       visibility_(world_, intrinsics),
       climbed_(world_.steps.size(), false) {}
 
-std::optional<ClimbReport::TruePose> ClimbReport::true_pose_at(std::int64_t stamp_ns) const {
-  const auto after = std::lower_bound(past_.begin(), past_.end(), stamp_ns,
-                                      [](const TruePose& p, std::int64_t stamp) { return p.stamp_ns < stamp; });
-  if (after == past_.end()) return std::nullopt;
-  if (after->stamp_ns == stamp_ns) return *after;
-  if (after == past_.begin()) return std::nullopt;
-  const TruePose& a = *std::prev(after);
-  const TruePose& b = *after;
-  const double s = seconds(stamp_ns - a.stamp_ns) / seconds(b.stamp_ns - a.stamp_ns);
-  const Eigen::Quaterniond qa(a.true_T_base.R), qb(b.true_T_base.R);
-  return TruePose{stamp_ns,
-                  {qa.slerp(s, qb).toRotationMatrix(), a.true_T_base.p_m + s * (b.true_T_base.p_m - a.true_T_base.p_m)},
-                  s < 0.5 ? a.base_legs : b.base_legs};
-}
-
 void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
-  past_.push_back({truth.stamp_ns, truth.true_T_base, truth.base_legs});
-  while (truth.stamp_ns - past_.front().stamp_ns > kPast_ns) past_.pop_front();
+  past_legs_.push_back({truth.stamp_ns, truth.base_legs});
+  while (truth.stamp_ns - past_legs_.front().stamp_ns > kPast_ns) past_legs_.pop_front();
   last_stamp_ns_ = truth.stamp_ns;
   if (truth.fell && !fell_) {
     fell_ = true;
     ending_.fall_reason = truth.fall_reason;
   }
-  observe_odometry(truth, telemetry.state);
-  if (aligned_) {
+  odometry_.observe(truth, telemetry.state, telemetry.gait.phase);
+  if (odometry_.aligned()) {
     observe_surfaces(telemetry.surfaces);
     observe_map(telemetry);
     observe_footsteps(truth, telemetry);
@@ -97,44 +68,25 @@ void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
   ++ticks_;
 }
 
-void ClimbReport::observe_odometry(const Truth& truth, const StateEstimate& state) {
-  if (!aligned_) {
-    if (!state.initialised) return;
-    true_T_odom_ = aligned_worlds(truth.true_T_base, state.odom_T_base);
-    true_T_world_ = aligned_worlds(truth.true_T_base, state.world_T_base());
-    aligned_ = true;
-    aligned_stamp_ns_ = truth.stamp_ns;
-  }
-  base_error_.add(true_T_odom_ * state.odom_T_base.p_m - truth.true_T_base.p_m);
-  fused_error_.add(true_T_world_ * state.world_T_base().p_m - truth.true_T_base.p_m);
-}
-
-void ClimbReport::observe_lio(const LioSample& sample) {
-  const std::optional<TruePose> pose = true_pose_at(sample.stamp_ns);
-  if (!pose) return;
-  // Through the nominal mount to the base: all three errors are about the same point.
-  const Transform lio_T_base = sample.lio_T_lidar * base_T_lidar().inverse();
-  if (!true_T_lio_) true_T_lio_ = aligned_worlds(pose->true_T_base, lio_T_base);
-  lio_error_.add(*true_T_lio_ * lio_T_base.p_m - pose->true_T_base.p_m);
-}
-
 void ClimbReport::observe_surfaces(const SurfaceFrame& frame) {
   if (frame.sequence == frame_sequence_ && frame.stamp_ns == frame_stamp_ns_) return;
   frame_sequence_ = frame.sequence;
   frame_stamp_ns_ = frame.stamp_ns;
   ++frames_;
   surfaces_ += frame.surfaces.size();
-  const std::optional<TruePose> pose = true_pose_at(frame.stamp_ns);
-  if (!pose) {
+  const std::optional<Transform> true_T_base = odometry_.true_T_base_at(frame.stamp_ns);
+  const auto legs = std::lower_bound(past_legs_.begin(), past_legs_.end(), frame.stamp_ns,
+                                     [](const PastLegs& past, std::int64_t stamp) { return past.stamp_ns < stamp; });
+  if (!true_T_base || legs == past_legs_.end()) {
     surfaces_unmatched_ += frame.surfaces.size();
     return;
   }
-  const Transform true_T_camera = pose->true_T_base * true_base_T_camera_;
+  const Transform true_T_camera = *true_T_base * true_base_T_camera_;
   std::vector<int> found;
   for (const SurfacePatch& patch : frame.surfaces) found.push_back(matching_surface(world_, patch, true_T_camera));
   const auto unmatched = static_cast<std::uint64_t>(std::count(found.begin(), found.end(), kNoSurface));
   std::uint64_t missed = 0;
-  const std::vector<int>& in_view = visibility_.in_view(true_T_camera, true_base_T_camera_, pose->base_legs);
+  const std::vector<int>& in_view = visibility_.in_view(true_T_camera, true_base_T_camera_, legs->base_legs);
   for (const int id : in_view) missed += std::find(found.begin(), found.end(), id) == found.end() ? 1U : 0U;
   surfaces_unmatched_ += unmatched;
   in_view_ += in_view.size();
@@ -195,7 +147,8 @@ void ClimbReport::take_target(const Telemetry& telemetry) {
   const LatchedStep& step = telemetry.gait.step;
   target_ = step.target;
   target_mapped_ = step.height_mapped;
-  footsteps_.back().true_T_planned = true_T_world_ * Transform{rotation_z(step.target.yaw_rad), step.target.position_m};
+  footsteps_.back().true_T_planned =
+      odometry_.true_T_world() * Transform{rotation_z(step.target.yaw_rad), step.target.position_m};
   const Transform& odom_T_stance = telemetry.state.odom_T_sole[index_of(other(step.foot))];
   latched_across_m_ = level_frame_p(odom_T_stance, step.odom_T_target.p_m).y();
 }
@@ -360,7 +313,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
     s.seconds_per_step = s.climb_time_s / s.steps_total;
   }
 
-  const double run_s = aligned_ ? seconds(last_stamp_ns_ - aligned_stamp_ns_) : 0.0;
+  const double run_s = odometry_.aligned() ? seconds(last_stamp_ns_ - odometry_.aligned_stamp_ns()) : 0.0;
   s.plane_rate_hz = run_s > 0.0 ? static_cast<double>(frames_matching_) / run_s : 0.0;
   s.frames = frames_;
   s.frames_matching = frames_matching_;
@@ -399,9 +352,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.zmp_margin_min_m = zmp_margin_min_m_;
   s.torque_peak_ratio = torque_peak_ratio_;
   s.joint_speed_peak_ratio = joint_speed_peak_ratio_;
-  s.odometry_rmse_base_m = base_error_.rmse_m();
-  s.odometry_rmse_lio_m = lio_error_.rmse_m();
-  s.odometry_rmse_fused_m = fused_error_.rmse_m();
+  s.odometry = odometry_.figures();
 
   s.heap_calls = run.heap_calls;
   s.faults = run.faults;
@@ -420,7 +371,7 @@ ClimbDrawing ClimbReport::drawing() const {
   ClimbDrawing d;
   for (const auto& [id, seen] : polygons_) {
     ClimbDrawing::Polygon polygon{seen.surface.kind, {}, seen.remembered};
-    for (const Vec3& vertex_m : seen.surface.polygon) polygon.vertices_m.push_back(true_T_world_ * vertex_m);
+    for (const Vec3& vertex_m : seen.surface.polygon) polygon.vertices_m.push_back(odometry_.true_T_world() * vertex_m);
     d.polygons.push_back(std::move(polygon));
   }
   d.base_trail_m = base_trail_m_;

@@ -16,6 +16,7 @@
 #include "sim_stub/host/climb/climb_summary.hpp"
 #include "sim_stub/host/climb/climb_svg.hpp"
 #include "sim_stub/host/climb/climb_verdict.hpp"
+#include "sim_stub/host/climb/odometry_report.hpp"
 #include "sim_stub/host/climb/surface_match.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
@@ -43,25 +44,16 @@ class ClimbReport {
   // Once per tick, after the module's tick, with the truth of the same instant.
   void observe(const Truth& truth, const Telemetry& telemetry);
   // Every LIO pose that the module accepted, at its arrival; the truth of its stamp must lie within the last 2 s.
-  void observe_lio(const LioSample& sample);
+  void observe_lio(const LioSample& sample) { odometry_.observe_lio(sample); }
 
   [[nodiscard]] ClimbSummary finish(const RunFigures& run) const;
   [[nodiscard]] ClimbDrawing drawing() const;
   [[nodiscard]] const StairWorld& world() const { return world_; }
 
  private:
-  struct TruePose {
+  struct PastLegs {
     std::int64_t stamp_ns;
-    Transform true_T_base;
     std::array<LegShapes, kFootCount> base_legs;
-  };
-  // Positions are compared in the true world after one alignment of heading and place: both worlds know which way is
-  // up.
-  struct PositionError {
-    double sum_m2 = 0.0;
-    std::uint64_t count = 0;
-    void add(const Vec3& error_m);
-    [[nodiscard]] double rmse_m() const;
   };
   // A foot in the air: where it came from and where it has been, judged once it is known where it lands.
   struct Flight {
@@ -70,8 +62,6 @@ class ClimbReport {
     std::vector<Transform> true_T_sole;
   };
 
-  [[nodiscard]] std::optional<TruePose> true_pose_at(std::int64_t stamp_ns) const;
-  void observe_odometry(const Truth& truth, const StateEstimate& state);
   void observe_surfaces(const SurfaceFrame& frame);
   void observe_map(const Telemetry& telemetry);
   void observe_footsteps(const Truth& truth, const Telemetry& telemetry);
@@ -93,18 +83,14 @@ class ClimbReport {
   std::vector<SolidBox> solids_;
   Transform true_base_T_camera_;
   SurfaceVisibility visibility_;
+  std::deque<PastLegs> past_legs_;
 
   std::uint64_t ticks_ = 0;
   std::int64_t last_stamp_ns_ = 0;
-  std::deque<TruePose> past_;
   bool fell_ = false;
   ClimbEnding ending_;
 
-  bool aligned_ = false;
-  std::int64_t aligned_stamp_ns_ = 0;
-  Transform true_T_odom_, true_T_world_;
-  std::optional<Transform> true_T_lio_;
-  PositionError base_error_, lio_error_, fused_error_;
+  OdometryReport odometry_;
 
   std::uint32_t frame_sequence_ = 0;
   std::int64_t frame_stamp_ns_ = 0;

@@ -149,8 +149,11 @@ Json to_json(const ClimbSummary& s) {
   j["zmp_margin_mm_min"] = mm(s.zmp_margin_min_m);
   j["torque_peak_ratio"] = per_joint(s.torque_peak_ratio);
   j["joint_speed_peak_ratio"] = per_joint(s.joint_speed_peak_ratio);
-  j["odometry_rmse_mm"] = {
-      {"base", mm(s.odometry_rmse_base_m)}, {"lio", mm(s.odometry_rmse_lio_m)}, {"fused", mm(s.odometry_rmse_fused_m)}};
+  const OdometryFigures& o = s.odometry;
+  j["odometry_rmse_mm"] = {{"base", mm(o.rmse_base_m)}, {"lio", mm(o.rmse_lio_m)}, {"fused", mm(o.rmse_fused_m)}};
+  j["odometry_drift_mm"] = {{"base", mm(o.drift_base_m)}, {"fused", mm(o.drift_fused_m)}};
+  j["odometry_jitter_mm"] = {{"lio", mm(o.jitter_lio_m)}, {"fused", mm(o.jitter_fused_m)}};
+  j["odometry_nees"] = {{"mean", rounded(o.nees_mean, 100.0)}, {"in_bounds", rounded(o.nees_in_bounds, 1e3)}};
   j["exposure_to_map_ms"] = spread_ms(s.exposure_to_map_ms);
   j["map_age_at_latch_ms"] = spread_ms(s.map_age_at_latch_ms);
   j["target_last_seen_ms"] = spread_ms(s.target_last_seen_ms);

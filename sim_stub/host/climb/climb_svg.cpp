@@ -378,8 +378,8 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
                value("execution error max", s.execution_error_m.max * 1e3, "mm") + "   \u00b7   " +
                value("sole margin min", s.sole_margin_min_m * 1e3, "mm") + "   \u00b7   " +
                value("swing clearance min", s.swing_clearance_min_m * 1e3, "mm") + "   \u00b7   " +
-               value("odometry RMSE base / fused", s.odometry_rmse_base_m * 1e3, "") +
-               value("/", s.odometry_rmse_fused_m * 1e3, "mm") + "   \u00b7   " +
+               value("odometry RMSE base / fused", s.odometry.rmse_base_m * 1e3, "") +
+               value("/", s.odometry.rmse_fused_m * 1e3, "mm") + "   \u00b7   " +
                value("planes", s.plane_rate_hz, "Hz"));
 
   add_text(out, kBorder_px, side_top_px - 8.0, 13.0, "font-weight=\"600\" fill=\"#555\"", "Side");

@@ -42,7 +42,7 @@ class EstimatorLioTest : public ::testing::Test {
       if (t_ns_ % kLioPeriod_ns == 0 && t_ns_ >= kLioPeriod_ns) deliver(walk.lio(t_ns_ - kLioPeriod_ns));
       const StateEstimate& state = estimator_.state();
       if (!state.initialised) continue;
-      if (!aligned_) true_T_world_ = truth.true_T_base * state.world_T_base().inverse();
+      if (!aligned_) true_T_world_ = level_tie(truth.true_T_base, state.world_T_base());
       aligned_ = true;
       error_m_ = true_T_world_ * state.world_T_base().p_m - truth.true_T_base.p_m;
       worst_m_ = std::max(worst_m_, error_m_.norm());
@@ -63,6 +63,12 @@ class EstimatorLioTest : public ::testing::Test {
     EXPECT_LE(most_slewed_rad_, params.slew_radps * seconds(kTick_ns) * (1.0 + 1e-6));
   }
   void silent_in_the_climb(double silent_s, int steps);
+  // By heading and place: both worlds know which way is up, and a tie that took the tilt's first error over would hide
+  // what it does on the way.
+  static Transform level_tie(const Transform& true_T_base, const Transform& world_T_base) {
+    const Mat3 R = rotation_z(yaw_of(true_T_base.R) - yaw_of(world_T_base.R));
+    return {R, true_T_base.p_m - R * world_T_base.p_m};
+  }
   auto deliver() {
     return [this](const LioSample& sample) { estimator_.add_lio(sample, t_ns_); };
   }

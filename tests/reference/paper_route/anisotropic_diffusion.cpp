@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/reference/paper_route/anisotropic_diffusion.hpp"
 
+#include <cmath>
+
 namespace polygmap {
 namespace {
 
@@ -13,6 +15,13 @@ inline float flux(float a, float b, float base, float per_metre) noexcept {
   return difference * kappa2 / (kappa2 + difference * difference + 1e-20F);
 }
 
+// As published: exp(-(depth difference / kappa)^2).
+inline float published_flux(float a, float b, float kappa_m) noexcept {
+  if (a <= 0.0F || b <= 0.0F) return 0.0F;
+  const float difference = a - b, ratio = difference / (a * b * kappa_m);
+  return difference * static_cast<float>(std::exp(-static_cast<double>(ratio * ratio)));
+}
+
 }  // namespace
 
 void AnisotropicDiffusion::step_row(const Params& params, const DepthNoiseModel& noise, InverseDepthImage& image,
@@ -20,16 +29,20 @@ void AnisotropicDiffusion::step_row(const Params& params, const DepthNoiseModel&
   const auto base = static_cast<float>(params.kappa_sigmas * noise.base_m);
   const auto per_metre = static_cast<float>(params.kappa_sigmas * noise.per_metre);
   const auto lambda = static_cast<float>(math::clamp(params.lambda, 0.0, 0.25));
+  const auto kappa_m = static_cast<float>(params.kappa_m);
+  const auto between = [&](float a, float b) noexcept {
+    return kappa_m > 0.0F ? published_flux(a, b, kappa_m) : flux(a, b, base, per_metre);
+  };
   float* w = image.row(row);
   float* above = flux_above_.data();
   float* left = flux_left_.data();
   float* below = flux_below_.data();
   left[0] = 0.0F;
-  for (std::int32_t i = 1; i < width_px; ++i) left[i] = flux(w[i - 1], w[i], base, per_metre);
+  for (std::int32_t i = 1; i < width_px; ++i) left[i] = between(w[i - 1], w[i]);
   left[width_px] = 0.0F;
   if (row + 1 < height_px) {
     const float* next = image.row(row + 1);
-    for (std::int32_t i = 0; i < width_px; ++i) below[i] = flux(w[i], next[i], base, per_metre);
+    for (std::int32_t i = 0; i < width_px; ++i) below[i] = between(w[i], next[i]);
   } else {
     flux_below_.fill(0.0F);
   }

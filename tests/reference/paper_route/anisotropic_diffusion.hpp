@@ -12,15 +12,16 @@ namespace polygmap {
 
 // One pass over all rows, in order, is one iteration of eq. (13) over the four neighbours, in place. I is inverse depth
 // rather than the paper's depth: a slanted plane then has no curvature that diffusion would bend. The conductivity is
-// c = 1 / (1 + (difference / kappa)^2), kappa following the noise with distance.
+// c = 1 / (1 + (difference / kappa)^2), kappa following the noise with distance; or, as published, exp(-(difference /
+// kappa)^2) with one kappa for all distances.
 class AnisotropicDiffusion {
  public:
   struct Params {
     std::int32_t iterations = 5;
     double lambda = 0.2;        // stable up to 1/4
     double kappa_sigmas = 4.0;  // a depth difference of this many sigmas conducts half
+    double kappa_m = 0.0;       // above 0: the published conductivity, with this kappa
   };
-  static constexpr std::int32_t kMaxIterations = 12;
 
   void begin_iteration() noexcept { flux_above_.fill(0.0F); }
   // Row row of image, which must still hold the old values of this row and the next. Empty pixels (0) neither give nor

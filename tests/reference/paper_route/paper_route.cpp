@@ -3,6 +3,20 @@
 
 namespace polygmap {
 
+PaperRoute::Params PaperRoute::published() noexcept {
+  Params params;
+  params.diffusion.iterations = 60;
+  params.diffusion.kappa_m = 0.0335;
+  params.min_region_px = 5000 / 4;
+  params.planes.trials = 20;
+  params.planes.inlier_sigmas = 0.0;
+  params.planes.inlier_floor_m = 0.010;
+  params.planes.enough_inliers = 0.95;
+  params.min_inlier_share = 0.95;
+  params.seed_tilt_rad = 0.436;
+  return params;
+}
+
 void PaperRoute::run(const std::uint16_t* depth, const CameraIntrinsics& intrinsics, const Vec3& camera_up) noexcept {
   planes_.clear();
   rays_.set(intrinsics);
@@ -16,9 +30,12 @@ void PaperRoute::run(const std::uint16_t* depth, const CameraIntrinsics& intrins
   find_regions();
   for (std::size_t k = 1; k <= regions_.region_count(); ++k) {
     PaperPlane found;
+    plane_of_[k] = RegionLabelling::kMaxRegions;
     if (!try_fit(k, camera_up, found)) continue;
     outline(k, found);
-    if (found.polygon.size() >= 3) static_cast<void>(planes_.try_push_back(found));
+    if (found.polygon.size() < 3) continue;
+    plane_of_[k] = planes_.size();
+    static_cast<void>(planes_.try_push_back(found));
   }
 }
 

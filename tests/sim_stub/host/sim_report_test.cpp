@@ -55,7 +55,7 @@ TEST(ClimbReport, FlawlessClimb_Passes) {
   EXPECT_EQ(s.steps_climbed, 3);
   EXPECT_NEAR(s.execution_error_m.max, 0.0, kUm);
   EXPECT_NEAR(s.foothold_error_m.max, 0.0, kUm);
-  EXPECT_NEAR(s.odometry_rmse_fused_m, 0.0, kUm);
+  EXPECT_NEAR(s.odometry.rmse_fused_m, 0.0, kUm);
   EXPECT_NEAR(s.tracking_error_x_max_m, 0.0, kUm);
   ASSERT_EQ(s.footsteps.size(), 6U);
   EXPECT_EQ(s.footsteps[5].step_index, 2);
@@ -340,7 +340,7 @@ TEST(ClimbReport, OdometryRmse_IsAlignedOnceAtTheFirstInitialisedTick) {
   climb.wait(20 * kTick_ns);
   climb.state.initialised = true;
   climb.wait(50 * kTick_ns);
-  EXPECT_NEAR(climb.finish().odometry_rmse_base_m, 0.0, kUm);
+  EXPECT_NEAR(climb.finish().odometry.rmse_base_m, 0.0, kUm);
 
   const Vec3 drift_m(0.003, 0.004, 0.0);
   climb.drift_m += drift_m;
@@ -349,8 +349,8 @@ TEST(ClimbReport, OdometryRmse_IsAlignedOnceAtTheFirstInitialisedTick) {
       climb.world_T_true().R * drift_m;  // LIO takes the drift out of the world, not of odom
   climb.wait(25 * kTick_ns);
   const ClimbSummary s = climb.finish();
-  EXPECT_NEAR(s.odometry_rmse_base_m, 0.005 * std::sqrt(50.0 / 100.0), kUm);
-  EXPECT_NEAR(s.odometry_rmse_fused_m, 0.005 * std::sqrt(25.0 / 100.0), kUm);
+  EXPECT_NEAR(s.odometry.rmse_base_m, 0.005 * std::sqrt(50.0 / 100.0), kUm);
+  EXPECT_NEAR(s.odometry.rmse_fused_m, 0.005 * std::sqrt(25.0 / 100.0), kUm);
 }
 
 TEST(ClimbReport, LioRmse_ComparesAtTheStampOfTheScan) {
@@ -374,9 +374,9 @@ TEST(ClimbReport, LioRmse_ComparesAtTheStampOfTheScan) {
   between.p_m.x() += 0.001;
   climb.wait(50 * kTick_ns);
   climb.report.observe_lio(lio(scan_ns, between, Vec3(0, 0, 0.006)));
-  EXPECT_NEAR(climb.finish().odometry_rmse_lio_m, 0.006 / std::sqrt(2.0), kUm);
+  EXPECT_NEAR(climb.finish().odometry.rmse_lio_m, 0.006 / std::sqrt(2.0), kUm);
   climb.report.observe_lio(lio(-5, between, Vec3(9, 9, 9)));  // no truth of that moment: not judged
-  EXPECT_NEAR(climb.finish().odometry_rmse_lio_m, 0.006 / std::sqrt(2.0), kUm);
+  EXPECT_NEAR(climb.finish().odometry.rmse_lio_m, 0.006 / std::sqrt(2.0), kUm);
 }
 
 TEST(ClimbReport, Freshness_CountsFromTheExposure) {
@@ -511,7 +511,8 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
       "plane_rate_hz "
       "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min stand_off_mm "
       "closure_error_mm tracking_error_mm com_tracking_mm_max zmp_margin_mm_min torque_peak_ratio "
-      "joint_speed_peak_ratio odometry_rmse_mm exposure_to_map_ms map_age_at_latch_ms "
+      "joint_speed_peak_ratio odometry_rmse_mm odometry_drift_mm odometry_jitter_mm odometry_nees exposure_to_map_ms "
+      "map_age_at_latch_ms "
       "target_last_seen_ms heap_calls faults "
       "static_memory_bytes static_memory schedule surfaces footsteps wall ");
   EXPECT_EQ(j["verdict"], "pass");

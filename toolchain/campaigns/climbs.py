@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of whole climbs, all with perception in the loop."""
+import collections
+import random
+
+from campaigns.engine import Page, Table, rows
+
+NOISES = ("white", "correlated")
+
+
+def own_noise(seed):
+    """Odd seeds have white noise, even ones correlated."""
+    return NOISES[(seed + 1) % 2]
+
+
+def worst(summaries, *path, best=max):
+    """The worst of a figure over the climbs that have it, None where none does."""
+    values = []
+    for s in summaries:
+        for key in path:
+            s = s.get(key) if isinstance(s, dict) else None
+        if s is not None:
+            values.append(s)
+    return best(values) if values else None
+
+
+def number(value, digits=1, unit=""):
+    return "-" if value is None else f"{value:.{digits}f}{unit}"
+
+
+def ratio(summaries, what):
+    values = [v for s in summaries for v in (s.get(what) or {}).values()]
+    return max(values) if values else None
+
+
+FIGURES = {  # column: function of the summaries
+    "climbed": lambda s: f"{sum(x.get('verdict') == 'pass' for x in s)} of {len(s)}",
+    "s/step": lambda s: f"{number(worst(s, 'seconds_per_step', best=min), 2)}-{number(worst(s, 'seconds_per_step'), 2)}",
+    "foothold mm, median; max": lambda s: f"{number(worst(s, 'foothold_error_mm', 'median'))}; {number(worst(s, 'foothold_error_mm', 'max'))}",
+    "execution mm": lambda s: number(worst(s, "execution_error_mm", "max")),
+    "tracking x; z mm": lambda s: f"{number(worst(s, 'tracking_error_mm', 'x_max'))}; {number(worst(s, 'tracking_error_mm', 'z_max'))}",
+    "CoM mm": lambda s: number(worst(s, "com_tracking_mm_max")),
+    "sole margin mm": lambda s: number(worst(s, "sole_margin_mm_min", best=min)),
+    "clearance mm": lambda s: number(worst(s, "swing_clearance_mm_min", best=min)),
+    "torque; speed": lambda s: f"{number(ratio(s, 'torque_peak_ratio'), 2)}; {number(ratio(s, 'joint_speed_peak_ratio'), 2)}",
+    "planes Hz": lambda s: number(worst(s, "plane_rate_hz", best=min)),
+    "map age ms": lambda s: number(worst(s, "map_age_at_latch_ms", "max"), 0),
+}
+SHORT = ("climbed", "s/step", "foothold mm, median; max", "execution mm", "sole margin mm", "clearance mm", "planes Hz")
+
+
+def figures(groups, columns=tuple(FIGURES)):
+    """A table with a line for each group of climbs, worst figure of each."""
+    return rows(("climbs", *columns), [(name, *(FIGURES[c](summaries) for c in columns)) for name, summaries in groups.items()])
+
+
+def not_climbed(summaries):
+    """Every climb that did not pass, with its own sentence and how to run it again."""
+    bad = [s for s in summaries if s.get("verdict") != "pass"]
+    if not bad:
+        return ""
+    return "\n\nNot climbed:\n\n" + "\n".join(f"- `polygmap climb {s['run']}`: {s.get('reason', '')}" for s in bad)
+
+
+def grouped(engine, what, named):
+    """named: {group: [arguments]} -> {group: summaries}, one run of the engine."""
+    flat = [(group, a) for group, all_arguments in named.items() for a in all_arguments]
+    groups = collections.defaultdict(list)
+    for (group, _), summary in zip(flat, engine.climbs(what, [a for _, a in flat])):
+        groups[group].append(summary)
+    return dict(groups)
+
+
+def span(seeds):
+    return f"seeds {min(seeds)}-{max(seeds)}"
+
+
+def physics(engine, seeds):
+    named = {}
+    for gait, steps in (("ds", 10), ("ds", 4), ("ss", 10)):
+        for noise in NOISES:
+            named[f"{gait}, {steps} steps, {noise}"] = [
+                ["--gait", gait, "--steps", steps, "--noise", noise, "--seed", s] for s in seeds if gait == "ds" or s <= 10]
+    groups = grouped(engine, "physics", named)
+    everything = [s for g in groups.values() for s in g]
+    ds = [s for name, g in groups.items() if name.startswith("ds, 10") for s in g]
+    ss = [s for name, g in groups.items() if name.startswith("ss") for s in g]
+    text = (f"Stairs of 0.13 x 0.28 m under physics (`polygmap climb --gait G --steps N --noise K --seed S`), {span(seeds)}, `ss` up to 10; "
+            "worst figure of each line's climbs.\n\n" + figures(groups) + not_climbed(everything) +
+            "\n\nBeside the paper's trials (its Tables I and II; it has no figure of the other columns):\n\n" +
+            rows(("", "s/step", "e_m mm", "planes Hz"), [
+                ("paper, simulated, DS, 5 trials", "3.4-3.75", "10.3-12.4", "20-29"),
+                ("this, simulated, `ds`", *(FIGURES[c](ds) for c in ("s/step", "execution mm", "planes Hz"))),
+                ("paper, real, DS, 2 trials", "2.4-2.55", "11.4-12.1", "20-21"),
+                ("paper, real, SS, 3 trials", "1.87-1.96", "22.2-33.4", "20-23"),
+                ("this, simulated, `ss`", *(FIGURES[c](ss) for c in ("s/step", "execution mm", "planes Hz")))]))
+    return Page(text, {
+        "1 climbed": ("stairs of 0.13 x 0.28 m climbed under physics, both gaits and noises", FIGURES["climbed"](everything), "all"),
+        "2 pace": ("seconds a step, both feet on every tread; one foot", f"{FIGURES['s/step'](ds)}; {FIGURES['s/step'](ss)}", "2.7; 1.6"),
+        "3 foothold": ("foothold error, worst median and worst of all", FIGURES["foothold mm, median; max"](ds + ss) + " mm", "5; 12 mm"),
+        "4 margin": ("sole to its tread's edge, swing to the stairs, least",
+                     f"{FIGURES['sole margin mm'](ds + ss)}; {FIGURES['clearance mm'](ds + ss)} mm", "0"),
+        "5 planes": ("frames with every surface found and none invented, least", FIGURES["planes Hz"](ds + ss) + " of 30 Hz", "20-29 (paper)")})
+
+
+def kinematic(engine, seeds):
+    rises = (0.13, 0.10, 0.17, 0.15, 0.12)
+    groups = grouped(engine, "kinematic", {f"{n} noise": [
+        ["--plant", "kinematic", "--seed", s, "--rise", rises[s % 5], "--noise", n] for s in seeds if own_noise(s) == n] for n in NOISES})
+    everything = [s for g in groups.values() for s in g]
+    return Page(f"Ten steps on the kinematic plant, rises of 0.10 to 0.17 m by the seed, {span(seeds)}.\n\n" +
+                figures({**groups, "all": everything}) + not_climbed(everything), {})
+
+
+def drawn(seed):
+    """A climb drawn at random, the same for ever."""
+    rng = random.Random(seed)
+    return ["--rise", round(rng.uniform(0.10, 0.17), 3), "--tread", round(rng.uniform(0.28, 0.35), 3), "--steps", rng.randint(4, 10),
+            "--gait", rng.choice(("ds", "ss")), "--noise", rng.choice(NOISES), "--seed", seed]
+
+
+def at_random(engine, seeds):
+    summaries = engine.climbs("random", [drawn(s) for s in seeds])
+    groups = {g: [s for s in summaries if f"--gait {g}" in s["run"]] for g in ("ds", "ss")}
+    return Page(f"Rises of 0.10 to 0.17 m, treads of 0.28 to 0.35 m, 4 to 10 steps, gait and noise drawn by the seed ({span(seeds)}), "
+                "under physics.\n\n" + figures(groups) + not_climbed(summaries),
+                {"1 climbed": ("climbs drawn at random", FIGURES["climbed"](summaries), "all")})
+
+
+def stairs(engine, seeds):
+    named = collections.defaultdict(list)
+    for seed in seeds:
+        for rise in (0.10, 0.12, 0.15, 0.17):
+            for tread in (0.28, 0.31, 0.35):
+                named[f"tread {tread:.2f} m"].append(["--rise", rise, "--tread", tread, "--steps", 6, "--seed", seed, "--noise", own_noise(seed)])
+            named["tread 0.27 m, built evenly"].append(
+                ["--rise", rise, "--tread", 0.27, "--jitter", 0, "--steps", 6, "--seed", seed, "--noise", own_noise(seed)])
+    groups = grouped(engine, "stairs", named)
+    return Page(f"Rises of 0.10, 0.12, 0.15 and 0.17 m, six steps, `ds`, {span(seeds)}, under physics.\n\n" + figures(groups) +
+                not_climbed([s for g in groups.values() for s in g]), {})
+
+
+def nosing(engine, seeds):
+    named = {}
+    for depth in (0.01, 0.02, 0.025, 0.03, 0.04):
+        for plant in ("mujoco", "kinematic"):
+            for noise in NOISES:
+                named[f"{1000 * depth:.0f} mm, {plant}, {noise}"] = [
+                    ["--steps", 4, "--nosing", depth, "--plant", plant, "--noise", noise, "--seed", s] for s in seeds]
+    groups = grouped(engine, "nosing", named)
+    everything = [s for g in groups.values() for s in g]
+    return Page(f"Treads that overhang their risers, the paper's failure (its Fig. 8), {span(seeds)}. A frame counts where every "
+                "surface well in view was found and none was invented.\n\n" + figures(groups, SHORT) + not_climbed(everything),
+                {"1 rate": ("the same under nosings of 10 to 40 mm", FIGURES["planes Hz"](everything) + " of 30 Hz", "28")})
+
+
+def odometry(engine, seeds):
+    """The paper's Fig. 4 and the honesty of the covariance, under physics."""
+    lines, everything = [], []
+    for name, group in (("seeds on which the drift constant was set", [s for s in seeds if s <= 20]), ("others", [s for s in seeds if s > 20])):
+        summaries = [s for s in engine.climbs("odometry", [["--seed", s] for s in group]) if s.get("odometry_drift_mm")]
+        everything += summaries
+
+        def of(*path, best=max, digits=1):
+            return number(worst(summaries, *path, best=best), digits)
+
+        def mean(*path, digits=2):
+            values = [v for s in summaries if (v := s[path[0]][path[1]]) is not None]
+            return number(sum(values) / len(values), digits) if values else "-"
+
+        lines.append((name, len(summaries), of("odometry_jitter_mm", "lio"), of("odometry_jitter_mm", "fused", digits=2),
+                      of("odometry_drift_mm", "base"), of("odometry_drift_mm", "fused"), mean("odometry_nees", "mean"),
+                      mean("odometry_nees", "in_bounds")))
+    return Page("Ten steps under physics, from the first lift-off on; worst climb of each line, NEES the mean over its climbs. Jitter: 1 to 5 Hz, "
+                "LIO as held between arrivals. NEES: squared error of the fused position over its variance, 3 is honest.\n\n" +
+                rows(("climbs", "number", "LIO jitter mm", "fused jitter mm", "odometry drift mm", "fused drift mm", "NEES", "ticks in 95 % bounds"),
+                     lines), {"1 drift": ("drift after ten stairs: odometry; fused with LIO",
+                                          f"{number(worst(everything, 'odometry_drift_mm', 'base'))}; "
+                                          f"{number(worst(everything, 'odometry_drift_mm', 'fused'))} mm", "-")})
+
+
+def pushes(engine, seeds):
+    """Eight moments of the second stair of four, four directions. The unpushed climb says when that stair is taken."""
+    named = collections.defaultdict(list)
+    for gait in ("ds", "ss"):
+        common = [["--gait", gait, "--steps", 4, "--noise", own_noise(s), "--seed", s] for s in seeds]
+        for arguments, summary in zip(common, engine.climbs(f"pushes, {gait} unpushed", common)):
+            if summary.get("verdict") != "pass":
+                continue
+            step_s = summary["seconds_per_step"]
+            begin_s = summary["ended_at_s"] - summary["climb_time_s"] + step_s
+            for k in range(8):
+                for axis, impulse in (("x", 10), ("x", -10), ("y", 10), ("y", -10)):
+                    named[f"{gait}, {'forward back left right'.split()[2 * (axis == 'y') + (impulse < 0)]}"].append(
+                        [*arguments, "--push", f"{begin_s + k * step_s / 8:.3f},{axis},{impulse}"])
+    groups = grouped(engine, "pushes", named)
+    everything = [s for g in groups.values() for s in g]
+
+    def outcome(summaries):
+        fell = sum(bool(s.get("fell")) for s in summaries)
+        climbed = sum(s.get("verdict") == "pass" for s in summaries)
+        over = sum((s.get("sole_margin_mm_min") or 0) < 0 for s in summaries)
+        return len(summaries), climbed, len(summaries) - climbed - fell, fell, over, FIGURES["sole margin mm"](summaries)
+
+    table = rows(("pushed", "climbs", "climbed", "stopped on both feet", "fell", "a sole over an edge", "least margin mm"),
+                 [(name, *outcome(s)) for name, s in groups.items()])
+    text = (f"10 N s on the torso at eight moments of the second of four stairs, perception in the loop, {span(seeds)}, under physics.\n\n" +
+            table + not_climbed(everything))
+    return Page(text, {"1 falls": ("falls after pushes of 10 N s on the stairs", f"{outcome(everything)[3]} of {len(everything)}", "0")})
+
+
+TABLES = {
+    "physics": Table("Climbs under physics, beside the paper's tables", range(1, 21), physics, 8),
+    "random": Table("Climbs drawn at random", range(200, 280), at_random, 5),
+    "stairs": Table("Other stairs", range(1, 3), stairs, 2),
+    "kinematic": Table("Climbs on the kinematic plant", range(1, 51), kinematic, 4),
+    "nosing": Table("Overhanging nosings", range(1, 6), nosing, 6),
+    "odometry": Table("Odometry, lidar odometry and the fused pose (the paper's Fig. 4)", (*range(1, 21), *range(101, 121)), odometry, 4),
+    "pushes": Table("Pushes on the stairs", (3, 5, 8, 11), pushes, 12),
+}

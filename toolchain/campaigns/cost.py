@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of instructions and memory."""
+import re
+import subprocess
+
+from campaigns.engine import ROOT, Page, Table, rows
+
+WANTED = {"whole_frame": 3_600_000, "footholds": 1_200_000, "gait_swing_tick": 20_000, "gait_shift_tick": 20_000}
+
+
+def cost(engine, _):
+    programs = ["perception_instructions", "estimation_instructions", "gait_instructions"]
+    built = subprocess.run(["cmake", "--build", ROOT / "build/release", "--target", *programs], capture_output=True, text=True)
+    if built.returncode:
+        raise SystemExit(f"campaign: the benchmarks were not built: {built.stdout[-400:]}")
+    counted = subprocess.run([ROOT / "toolchain/checks/instructions", *(ROOT / "build/release/tests/benchmarks" / p for p in programs)],
+                             capture_output=True, text=True).stdout
+    stages = {m[1]: int(m[2].replace(",", "")) for m in re.finditer(r"^\s*(?:instructions: \w+: )?(\w+) ([\d,]+)(?:,|$)", counted, re.M)}
+    summary = engine.climb(["--steps", 1])
+    memory, total = summary["static_memory"], summary["static_memory_bytes"]
+    stacks = memory.get("stacks", 0)
+    text = ("Instructions (callgrind, x86-64 with AVX2) of one run of each stage: perception per frame, estimation and gait per tick.\n\n" +
+            rows(("stage", "instructions", "at most"), [(s, f"{n:,}", f"{WANTED[s]:,}" if s in WANTED else "") for s, n in sorted(stages.items())]) +
+            "\n\nStatic memory, bytes:\n\n" + rows(("stage", "bytes"), [*memory.items(), ("all", total), ("all but the stacks", total - stacks)]))
+    return Page(text, {"1 frame": ("a frame of stairs; a foothold search; a gait tick, instructions",
+                                   f"{stages.get('whole_frame', 0) / 1e6:.2f} M; {stages.get('footholds', 0) / 1e6:.2f} M; "
+                                   f"{max(stages.get('gait_swing_tick', 0), stages.get('gait_shift_tick', 0)) / 1e3:.1f} k", "3.6 M; 1.2 M; 20 k"),
+                       "2 memory": ("static memory without stacks; heap calls", f"{(total - stacks) / 1e6:.2f} MB; {summary['heap_calls']}", "2.0 MB; 0")})
+
+
+TABLES = {"cost": Table("Instructions and memory", (0,), cost, 2)}

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs what a table needs, some at a time, each only once for the same code."""
+import concurrent.futures
+import dataclasses
+import hashlib
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+CODE = ("algorithms", "hal", "scheduler", "firmware", "sim_stub")
+COMMENT = re.compile(r'//[^\n]*|/\*.*?\*/|("(?:\\.|[^"\\\n])*")', re.S)
+
+
+def code_hash(root=ROOT):
+    """Of the module and the simulation as the compiler sees them: comments and white space do not count."""
+    digest = hashlib.sha256()
+    for path in sorted(p for top in CODE for p in (root / top).rglob("*") if p.suffix in (".hpp", ".cpp", ".h", ".toml")):
+        text = path.read_text(errors="replace")
+        if path.suffix != ".toml":
+            text = COMMENT.sub(lambda m: m[1] or " ", text)
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + " ".join(text.split()).encode() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+@dataclasses.dataclass
+class Page:
+    text: str       # Markdown, without the title
+    headline: dict  # name -> (what it is, value, bound): rows that README may show
+
+
+@dataclasses.dataclass
+class Table:
+    title: str
+    seeds: object
+    measure: object  # (engine, seeds) -> Page, or None where its inputs are missing
+    minutes: int = 1  # on two idle cores, to tell how long
+
+
+class Engine:
+    def __init__(self, tool, jobs):
+        self.tool, self.jobs = pathlib.Path(tool), jobs
+        if not self.tool.exists():
+            sys.exit(f"campaign: there is no tool {self.tool}")
+        self.code = hashlib.sha256(self.tool.read_bytes()).hexdigest()[:16]
+        self.kept = ROOT / "build/campaign" / self.code
+        self.kept.mkdir(parents=True, exist_ok=True)
+
+    def climb(self, arguments, timeout_s=900):
+        """The summary of one climb; {} with the tool's own sentence under "reason" where it wrote none."""
+        key = hashlib.sha256("\0".join(map(str, arguments)).encode()).hexdigest()[:24]
+        kept = self.kept / f"{key}.json"
+        if kept.exists():
+            return json.loads(kept.read_text())
+        with tempfile.TemporaryDirectory() as out:
+            done = subprocess.run([self.tool, "climb", *map(str, arguments), "--out", out], capture_output=True, text=True,
+                                  timeout=timeout_s)
+            written = pathlib.Path(out, "summary.json")
+            summary = json.loads(written.read_text()) if written.exists() else {}
+        if not summary:
+            summary = {"verdict": "none", "reason": (done.stderr or done.stdout).strip()[-300:], "exit": done.returncode}
+        summary["run"] = " ".join(map(str, arguments))
+        partial = kept.with_suffix(".part")
+        partial.write_text(json.dumps(summary))
+        partial.rename(kept)
+        return summary
+
+    def climbs(self, what, all_arguments):
+        """The summaries, in the order asked for; says how far it is."""
+        all_arguments = [list(a) for a in all_arguments]
+        done = 0
+        with concurrent.futures.ThreadPoolExecutor(self.jobs) as pool:
+            futures = [pool.submit(self.climb, a) for a in all_arguments]
+            try:
+                for _ in concurrent.futures.as_completed(futures):
+                    done += 1
+                    print(f"\r{what}: {done} of {len(futures)}", end="", file=sys.stderr, flush=True)
+            except KeyboardInterrupt:
+                for future in futures:
+                    future.cancel()
+                raise
+        print(file=sys.stderr)
+        return [f.result() for f in futures]
+
+
+def commit():
+    done = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=10"], cwd=ROOT, capture_output=True, text=True)
+    return done.stdout.strip() or "no repository"
+
+
+def rows(header, lines):
+    """A Markdown table."""
+    out = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    return "\n".join(out + ["| " + " | ".join(str(c) for c in line) + " |" for line in lines])
