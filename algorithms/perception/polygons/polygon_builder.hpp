@@ -24,6 +24,7 @@ class PolygonBuilder {
     double snap_m = 0.015;               // corners this close to a nosing or back line go onto it
     double probe_px = 3.0;               // half-resolution pixels outside a polygon's edge where its end is judged
     double apart_m = 0.04;               // seen this far in front of a plane: something hides it
+    double most_foreign = 0.05;          // of a polygon's pixels; more are cut off
     std::int32_t min_tread_columns = 3;  // of a tread that ends a riser
   };
   void configure(const Params& params) noexcept { params_ = params; }
