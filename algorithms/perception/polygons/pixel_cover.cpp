@@ -8,6 +8,8 @@ namespace polygmap {
 namespace {
 
 constexpr std::int32_t kColumnStride = 4, kRowStride = 12;  // 800 pixels of a whole picture
+// What others' pixels cost against its own: a smaller polygon is safe, one over a hole is not (2026-11).
+constexpr std::int32_t kForeignWorth = -4;
 constexpr std::int32_t kGridColumns = kColumns / kColumnStride, kGridRows = kDepthHeight_px / kRowStride;
 
 // In half-resolution pixels: of a column of eight pixels, and of a full-resolution row.
@@ -76,7 +78,7 @@ bool PixelCover::try_best_cut(const Outline2& polygon, Vec3& line) const noexcep
   std::array<std::int32_t, PlaneSet::kMaxPlanes + 1> votes{};
   std::int32_t total = 0;
   for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
-    const std::int32_t worth = own ? 1 : -1;
+    const std::int32_t worth = own ? 1 : kForeignWorth;
     by_column[static_cast<std::size_t>(g / kColumnStride)] += worth;
     by_row[static_cast<std::size_t>(r / kRowStride)] += worth;
     total += worth;
@@ -109,7 +111,7 @@ bool PixelCover::try_best_cut(const Outline2& polygon, Vec3& line) const noexcep
     const Vec3 meeting = planes_[index_].plane.m - planes_[static_cast<std::size_t>(most - votes.begin())].plane.m;
     std::int32_t positive = 0;
     for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
-      if (meeting.dot(ray_of(g, r)) > 0.0) positive += own ? 1 : -1;
+      if (meeting.dot(ray_of(g, r)) > 0.0) positive += own ? 1 : kForeignWorth;
     });
     if (positive > best) best = positive, line = meeting;
     if (total - positive > best) best = total - positive, line = -meeting;
