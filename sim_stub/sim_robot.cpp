@@ -115,14 +115,14 @@ void SimRobot::sense() {
   if (clock_.tick() % kLioPeriod_ticks == 0 && !any_contains(lio_silent_, now_ns)) {
     lio_queue_.push_overwrite(lio_.sample(plant_->true_T_base(), now_ns));
   }
-  const JointVector q = plant_->true_q_rad();
-  camera_.tick(clock_.tick(), plant_->true_T_base(),
-               {leg_shapes(errors_.legs[0], Foot::kLeft, q), leg_shapes(errors_.legs[1], Foot::kRight, q)});
+  camera_.tick(clock_.tick(), truth_.true_T_base, truth_.base_legs);
 }
 
 void SimRobot::update_truth() {
   truth_.stamp_ns = clock_.now_ns();
   truth_.true_T_base = plant_->true_T_base();
+  const JointVector q = plant_->true_q_rad();
+  truth_.base_legs = {leg_shapes(errors_.legs[0], Foot::kLeft, q), leg_shapes(errors_.legs[1], Foot::kRight, q)};
   for (std::size_t f = 0; f < kFootCount; ++f) {
     truth_.true_T_sole[f] = plant_->true_T_sole(f);
     truth_.in_contact[f] = plant_->in_contact(f);

@@ -41,6 +41,8 @@ std::int32_t PlaneExtractor::do_piece() noexcept {
       return sharpen();
     case Part::kFacets:
       return join_facets();
+    case Part::kOverhangs:
+      return split_overhangs();
     case Part::kResidual:
       return search_residual();
     case Part::kMeasuring:
@@ -83,9 +85,20 @@ std::int32_t PlaneExtractor::join_facets() noexcept {
   }
   if (merging_.join_some(planes_, to_plane_)) {
     take_joined_planes();
+    overhangs_.begin(params_.overhangs, up_, planes_);
+    first_new_ = static_cast<PlaneId>(planes_.count + 1);
     column_ = 0;
-    part_ = Part::kResidual;
+    part_ = overhangs_.any() ? Part::kOverhangs : Part::kResidual;
   }
+  return kJoinUnits;
+}
+
+std::int32_t PlaneExtractor::split_overhangs() noexcept {
+  overhangs_.add_column(*image_, column_, boundaries_.columns()[static_cast<std::size_t>(column_)], to_plane_);
+  if (++column_ < image_->column_rays.columns) return kColumnUnits;
+  take_split_planes();
+  column_ = 0;
+  part_ = Part::kResidual;
   return kJoinUnits;
 }
 
@@ -94,8 +107,8 @@ std::int32_t PlaneExtractor::search_residual() noexcept {
   search_.add_column(image_->column_rays, image_->columns, column_,
                      boundaries_.columns()[static_cast<std::size_t>(column_)]);
   if (++column_ < image_->column_rays.columns) return kColumnUnits;
-  const PlaneId first_found = take_found_planes();
-  fit_.begin(SpanFit::kMeasuring, *segments_, to_plane_, first_found, planes_.count, image_->column_rays.columns,
+  take_found_planes();
+  fit_.begin(SpanFit::kMeasuring, *segments_, to_plane_, first_new_, planes_.count, image_->column_rays.columns,
              boundaries_);
   part_ = Part::kMeasuring;
   return kMaxPieceUnits;
@@ -155,22 +168,36 @@ void PlaneExtractor::begin_search() noexcept {
   }
 }
 
-PlaneId PlaneExtractor::take_found_planes() noexcept {
-  search_.finish();
-  const auto first_found = static_cast<PlaneId>(planes_.count + 1);
-  for (const InversePlane& found : search_.found()) {
-    if (planes_.count == PlaneSet::kMaxPlanes) {
-      ++plane_overflow_;
-      break;
-    }
-    FittedPlane& p = planes_[++planes_.count];
-    p = FittedPlane{};
-    p.plane = found;
-    p.kind = kind_of(found);
-    p.alive = true;
-    boundaries_.set_plane(planes_.count, found);
+// The larger half keeps the plane and what is left of its spans when their ends are trimmed; the other claims the rest.
+void PlaneExtractor::take_split_planes() noexcept {
+  for (PlaneId i = 1; i < first_new_; ++i) {
+    FittedPlane& p = planes_[i];
+    OverhangSplit::Halves halves;
+    if (!p.alive || !overhangs_.try_split(i, halves)) continue;
+    p.plane = halves.larger;
+    p.kind = SurfaceKind::kRiser;
+    p.pixels -= halves.smaller_px;
+    boundaries_.set_plane(i, p.plane);
+    add_plane(halves.smaller);
   }
-  return first_found;
+}
+
+void PlaneExtractor::take_found_planes() noexcept {
+  search_.finish();
+  for (const InversePlane& found : search_.found()) add_plane(found);
+}
+
+void PlaneExtractor::add_plane(const InversePlane& plane) noexcept {
+  if (planes_.count == PlaneSet::kMaxPlanes) {
+    ++plane_overflow_;
+    return;
+  }
+  FittedPlane& p = planes_[++planes_.count];
+  p = FittedPlane{};
+  p.plane = plane;
+  p.kind = kind_of(plane);
+  p.alive = true;
+  boundaries_.set_plane(planes_.count, plane);
 }
 
 double PlaneExtractor::explained_share() const noexcept {

@@ -2,7 +2,8 @@
 // Second stage of a frame: straight segments -> planes, and the spans of every column that show them.
 //
 // Planes grow from segments and are sharpened within spans that end where they meet. Facets of curved surfaces are
-// joined. Level and upright planes are found in what is left over, and all are measured within their final spans.
+// joined, and leaning planes that are a nosing's face and the riser behind it are split. Level and upright planes are
+// found in what is left over, and all are measured within their final spans.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/depth_noise_model.hpp"
 #include "algorithms/perception/image/frame_image.hpp"
+#include "algorithms/perception/planes/overhang_split.hpp"
 #include "algorithms/perception/planes/plane_fit.hpp"
 #include "algorithms/perception/planes/plane_growing.hpp"
 #include "algorithms/perception/planes/plane_merging.hpp"
@@ -27,6 +29,7 @@ class PlaneExtractor {
     PlaneGrowing::Params growing;
     SpanBoundaries::Params boundaries;
     PlaneMerging::Params merging;
+    OverhangSplit::Params overhangs;
     ResidualPlaneSearch::Params residual;
     PlaneFit::Params fit;
     double kind_tilt_rad = 0.21;
@@ -37,6 +40,7 @@ class PlaneExtractor {
       field("growing", p.growing);
       field("boundaries", p.boundaries);
       field("merging", p.merging);
+      field("overhangs", p.overhangs);
       field("residual", p.residual);
       field("fit", p.fit);
       field("kind_tilt_rad", p.kind_tilt_rad, 0.01, 0.7,
@@ -48,7 +52,7 @@ class PlaneExtractor {
     }
   };
   // What the next step begins with; a benchmark charges time to it.
-  enum class Part : std::uint8_t { kGrowing, kSharpening, kFacets, kResidual, kMeasuring, kDone };
+  enum class Part : std::uint8_t { kGrowing, kSharpening, kFacets, kOverhangs, kResidual, kMeasuring, kDone };
 
   // All but params, noise, intrinsics and up are read until the stage is done. Each segment is given its grown plane.
   void begin(const Params& params, const DepthNoiseModel& noise, const CameraIntrinsics& intrinsics, const Vec3& up,
@@ -65,21 +69,25 @@ class PlaneExtractor {
   [[nodiscard]] const NoiseSamples& noise_samples() const noexcept { return boundaries_.noise_samples(); }
   // Planes that found no room; spans, and pairs of planes.
   [[nodiscard]] std::uint32_t plane_overflow() const noexcept { return plane_overflow_; }
-  [[nodiscard]] std::uint32_t span_overflow() const noexcept { return boundaries_.overflow() + merging_.overflow(); }
+  [[nodiscard]] std::uint32_t span_overflow() const noexcept {
+    return boundaries_.overflow() + merging_.overflow() + overhangs_.overflow();
+  }
 
  private:
   std::int32_t do_piece() noexcept;  // returns its units
   std::int32_t grow() noexcept;
   std::int32_t sharpen() noexcept;
   std::int32_t join_facets() noexcept;
+  std::int32_t split_overhangs() noexcept;
   std::int32_t search_residual() noexcept;
   std::int32_t measure() noexcept;
 
   void take_grown_planes() noexcept;
   void take_joined_planes() noexcept;
   void begin_search() noexcept;
-  // The first plane that was found.
-  [[nodiscard]] PlaneId take_found_planes() noexcept;
+  void take_split_planes() noexcept;
+  void take_found_planes() noexcept;
+  void add_plane(const InversePlane& plane) noexcept;
   // Of all planes' pixels, the share that they explain.
   [[nodiscard]] double explained_share() const noexcept;
   // Solves for all planes, and drops those that explain less than the least shares of their pixels.
@@ -99,6 +107,8 @@ class PlaneExtractor {
   SpanBoundaries boundaries_;
   SpanFit fit_;
   PlaneMerging merging_;
+  OverhangSplit overhangs_;
+  PlaneId first_new_ = 1;  // planes from here on did not grow: halves of others, and those found in the residual
   ResidualPlaneSearch search_;
   PlaneMerging::PlaneIndex to_plane_{};  // from a grown plane
   PlaneSet planes_;

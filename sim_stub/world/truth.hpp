@@ -9,6 +9,7 @@
 
 #include "algorithms/core/math/transform.hpp"
 #include "algorithms/core/messages/samples.hpp"
+#include "algorithms/robot/body_shapes.hpp"
 
 namespace polygmap::sim {
 
@@ -17,6 +18,7 @@ struct Truth {
   std::int64_t stamp_ns = 0;
   Transform true_T_base;
   std::array<Transform, kFootCount> true_T_sole;
+  std::array<LegShapes, kFootCount> base_legs{};        // base frame, what the camera sees of them
   std::array<bool, kFootCount> in_contact{true, true};  // the sole stands on a surface
   std::array<double, kFootCount> load_share{0.5, 0.5};  // of the weight, sums to 1
   std::array<int, kFootCount> step_index{-1, -1};       // step under each standing sole (0-based), -1: floor

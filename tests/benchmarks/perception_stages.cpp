@@ -47,6 +47,7 @@ ExtractorStage plane_stage(const PlaneExtractor& planes) noexcept {
     case Part::kMeasuring:
       return planes.fit_part() == SpanFit::Part::kSums ? kRefit : kMeeting;
     case Part::kFacets:
+    case Part::kOverhangs:
       return kRefit;
     case Part::kResidual:
       return kRemainder;

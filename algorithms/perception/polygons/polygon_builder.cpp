@@ -6,12 +6,20 @@
 #include <utility>
 
 #include "algorithms/perception/image/simd.hpp"
+#include "algorithms/perception/polygons/pixel_cover.hpp"
 
 namespace polygmap {
 namespace {
 
 constexpr double kLeastSlope = 0.5;  // sine between a riser and the tread that ends it
 constexpr double kOnLine_m = 0.002;  // a polygon's edge lies on a line
+
+constexpr std::size_t kMaxCuts = 4;        // that rid a polygon of what is not its own
+constexpr std::int32_t kLeastForeign = 4;  // pixels of the grid, see pixel_cover.cpp
+
+struct HalfPlane {  // inward . (p - point) >= 0
+  Vec2 point, inward;
+};
 
 using SeenPolygon = StaticVector<Vec2, kMaxPolygonVertices>;  // its corners in the picture, half-resolution pixels
 
@@ -193,12 +201,19 @@ bool PolygonBuilder::try_build(const FrameImage& picture, const Regions& regions
     if (plane.inverse_depth(ray) > 0.1) static_cast<void>(flat.try_push_back(to_plane(plane.point(ray))));
   }
   if (flat.size() < 3 || !(twice_area(flat) > 0.0)) return false;
-  const Vec2 middle = centroid(flat);
-  const auto cut = [&](const EdgeLine& line) {
-    const Vec2 a = to_plane(line.a_m), b = to_plane(line.b_m);
+  const PixelCover cover(picture, regions, id, params_.apart_m);
+  // The positive side of a line in the picture, where line . ray = 0, on the plane.
+  const auto side_of = [&](const Vec3& line) {
+    const Vec2 inward{line.dot(x_axis), line.dot(y_axis)};
+    return HalfPlane{-line.dot(origin) * inward / std::max(inward.squaredNorm(), 1e-12), inward.normalized()};
+  };
+  const auto cut = [&](const EdgeLine& edge) {
+    const Vec2 a = to_plane(edge.a_m), b = to_plane(edge.b_m);
     Vec2 inward{-(b - a).y(), (b - a).x()};
     inward.normalize();
-    if (inward.dot(middle - a) < 0.0) inward = -inward;
+    // The hull of a surface around another has its middle where the other is: its pixels say on which side it lies.
+    const Vec3 line = edge.a_m.cross(edge.b_m);
+    if ((inward.dot(side_of(line).inward) > 0.0) != cover.mostly_positive(outline, line)) inward = -inward;
     // Corners just short of the line go onto it, those beyond are cut off: either way the edge is the line. Moving only
     // the two extreme ones keeps the outline convex.
     for (Vec2& p : flat) {
@@ -222,6 +237,19 @@ bool PolygonBuilder::try_build(const FrameImage& picture, const Regions& regions
       if (!(inward.norm() > kLeastSlope)) continue;
       clip(flat, -side * level.distance_m(origin) * inward / inward.squaredNorm(), inward.normalized());
     }
+  }
+  // No line says so, but a hull around a corner covers what is not its own: that is cut back.
+  StaticVector<HalfPlane, kMaxCuts> cuts;
+  while (flat.size() >= 3) {
+    Outline2 seen;
+    for (const Vec2& p : flat) static_cast<void>(seen.try_push_back(project(picture.rays, to_space(p))));
+    const PixelCover::Count pixels = cover.count(seen);
+    Vec3 line;
+    if (pixels.foreign < kLeastForeign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign) ||
+        !cover.try_best_cut(seen, line) || !cuts.try_push_back(side_of(line))) {
+      break;
+    }
+    clip(flat, cuts.back().point, cuts.back().inward);
   }
   if (flat.size() >= 3) reduce(flat, kMaxPolygonVertices, 1e-6);
   const double area_m2 = flat.size() >= 3 ? 0.5 * twice_area(flat) : 0.0;
@@ -250,6 +278,13 @@ bool PolygonBuilder::try_build(const FrameImage& picture, const Regions& regions
     const double from = std::min(along.dot(a - p), along.dot(b - p)), to = std::max(along.dot(a - p), along.dot(b - p));
     return 2.0 * (std::min(to, (q - p).norm()) - std::max(from, 0.0)) > to - from;
   };
+  // Where it was cut back, the surface goes on.
+  const auto cut_back = [&](const Vec2& a, const Vec2& b) {
+    return std::any_of(cuts.begin(), cuts.end(), [&](const HalfPlane& side) {
+      return std::abs(side.inward.dot(a - side.point)) < kOnLine_m &&
+             std::abs(side.inward.dot(b - side.point)) < kOnLine_m;
+    });
+  };
   SeenPolygon seen;
   for (const Vec2& p : flat) {
     static_cast<void>(patch.polygon.try_push_back(to_space(p)));
@@ -259,6 +294,8 @@ bool PolygonBuilder::try_build(const FrameImage& picture, const Regions& regions
   for (std::size_t i = 0; i < flat.size(); ++i) {
     const std::size_t next = i + 1 < flat.size() ? i + 1 : 0;
     const bool on_line = seen_on(lines.nosing, flat[i], flat[next]) || seen_on(lines.back, flat[i], flat[next]);
+    patch.edges[i] = EdgeKind::kUnknown;
+    if (cut_back(flat[i], flat[next])) continue;
     patch.edges[i] = on_line ? EdgeKind::kObserved : judge_edge(picture, plane, seen[i], seen[next], inside);
   }
   patch.invalid_fraction = invalid_share(picture, seen);

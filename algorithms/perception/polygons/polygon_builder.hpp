@@ -25,6 +25,7 @@ class PolygonBuilder {
     double snap_m = 0.015;
     double probe_px = 3.0;
     double apart_m = 0.04;
+    double most_foreign = 0.05;
     std::int32_t min_tread_columns = 3;
 
     static void visit(auto& p, auto& field) {
@@ -32,6 +33,8 @@ class PolygonBuilder {
       field("probe_px", p.probe_px, 0.0, 20.0,
             "A polygon's end is judged as many pixels of half resolution outside its edge.");
       field("apart_m", p.apart_m, 0.001, 0.5, "What is seen as far in front of a plane hides it.");
+      field("most_foreign", p.most_foreign, 0.0, 1.0,
+            "A polygon of which a larger share of pixels is another plane's is cut back.");
       field("min_tread_columns", p.min_tread_columns, 1, 80, "A tread that ends a riser has as many columns.");
     }
   };

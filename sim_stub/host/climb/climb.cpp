@@ -200,7 +200,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   Pipeline& pipeline = *module->pipeline;
   TimedPipeline& tasks = *module->tasks;
   Executive& executive = *module->executive;
-  ClimbReport report(robot.stairs(), robot.errors().base_T_camera);
+  ClimbReport report(robot.stairs(), robot.errors().base_T_camera, robot.depth_camera().intrinsics());
 
   std::int64_t end_ns = -1;
   std::int64_t next_progress_ns = 0;

@@ -8,13 +8,13 @@
 #include <utility>
 
 #include "algorithms/robot/body_shapes.hpp"
-#include "sim_stub/host/climb/surface_match.hpp"
 #include "sim_stub/host/output_file.hpp"
 #include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {
 
+constexpr std::int64_t kPast_ns = kNsPerS;        // covers the latest frame
 constexpr std::int64_t kRest_ns = 50 * kNsPerMs;  // both soles stand this long: they rest
 constexpr std::uint64_t kTrailEvery_ticks = 10;   // 20 ms
 
@@ -39,13 +39,16 @@ double nosing_distance_m(const Step& step, const Transform& true_T_sole) {
 
 }  // namespace
 
-ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera)
+ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera, const CameraIntrinsics& intrinsics)
     : world_(std::move(world)),
       solids_(stair_solids(world_)),
       true_base_T_camera_(true_base_T_camera),
+      visibility_(world_, intrinsics),
       climbed_(world_.steps.size(), false) {}
 
 void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
+  past_legs_.push_back({truth.stamp_ns, truth.base_legs});
+  while (truth.stamp_ns - past_legs_.front().stamp_ns > kPast_ns) past_legs_.pop_front();
   last_stamp_ns_ = truth.stamp_ns;
   if (truth.fell && !fell_) {
     fell_ = true;
@@ -71,14 +74,25 @@ void ClimbReport::observe_surfaces(const SurfaceFrame& frame) {
   frame_sequence_ = frame.sequence;
   frame_stamp_ns_ = frame.stamp_ns;
   ++frames_;
-  const std::optional<Transform> true_T_base = odometry_.true_T_base_at(frame.stamp_ns);
-  std::uint64_t matching = 0;
-  for (const SurfacePatch& patch : frame.surfaces) {
-    if (true_T_base && matches_true_surface(world_, patch, *true_T_base * true_base_T_camera_)) ++matching;
-  }
   surfaces_ += frame.surfaces.size();
-  surfaces_unmatched_ += frame.surfaces.size() - matching;
-  if (matching > 0 && matching == frame.surfaces.size()) ++frames_matching_;
+  const std::optional<Transform> true_T_base = odometry_.true_T_base_at(frame.stamp_ns);
+  const auto legs = std::lower_bound(past_legs_.begin(), past_legs_.end(), frame.stamp_ns,
+                                     [](const PastLegs& past, std::int64_t stamp) { return past.stamp_ns < stamp; });
+  if (!true_T_base || legs == past_legs_.end()) {
+    surfaces_unmatched_ += frame.surfaces.size();
+    return;
+  }
+  const Transform true_T_camera = *true_T_base * true_base_T_camera_;
+  std::vector<int> found;
+  for (const SurfacePatch& patch : frame.surfaces) found.push_back(matching_surface(world_, patch, true_T_camera));
+  const auto unmatched = static_cast<std::uint64_t>(std::count(found.begin(), found.end(), kNoSurface));
+  std::uint64_t missed = 0;
+  const std::vector<int>& in_view = visibility_.in_view(true_T_camera, true_base_T_camera_, legs->base_legs);
+  for (const int id : in_view) missed += std::find(found.begin(), found.end(), id) == found.end() ? 1U : 0U;
+  surfaces_unmatched_ += unmatched;
+  in_view_ += in_view.size();
+  missed_ += missed;
+  if (!found.empty() && unmatched == 0 && missed == 0) ++frames_matching_;
 }
 
 void ClimbReport::observe_map(const Telemetry& telemetry) {
@@ -309,6 +323,8 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.frames_matching = frames_matching_;
   s.surfaces = surfaces_;
   s.surfaces_unmatched = surfaces_unmatched_;
+  s.surfaces_in_view = in_view_;
+  s.surfaces_missed = missed_;
 
   std::vector<double> execution, foothold, along, across, map_age, last_seen;
   for (const Footstep& f : footsteps_) {

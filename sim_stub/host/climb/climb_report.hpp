@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <map>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "sim_stub/host/climb/climb_svg.hpp"
 #include "sim_stub/host/climb/climb_verdict.hpp"
 #include "sim_stub/host/climb/odometry_report.hpp"
+#include "sim_stub/host/climb/surface_match.hpp"
 #include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
@@ -38,7 +40,8 @@ struct RunFigures {
 
 class ClimbReport {
  public:
-  explicit ClimbReport(StairWorld world, const Transform& true_base_T_camera = nominal_robot().mounts.base_T_camera);
+  explicit ClimbReport(StairWorld world, const Transform& true_base_T_camera = nominal_robot().mounts.base_T_camera,
+                       const CameraIntrinsics& intrinsics = robot_camera_intrinsics());
 
   // Once per tick, after the module's tick, with the truth of the same instant.
   void observe(const Truth& truth, const Telemetry& telemetry);
@@ -50,6 +53,10 @@ class ClimbReport {
   [[nodiscard]] const StairWorld& world() const { return world_; }
 
  private:
+  struct PastLegs {
+    std::int64_t stamp_ns;
+    std::array<LegShapes, kFootCount> base_legs;
+  };
   // A foot in the air: where it came from and where it has been, judged once it is known where it lands.
   struct Flight {
     int from_step = -1;
@@ -77,6 +84,8 @@ class ClimbReport {
   StairWorld world_;
   std::vector<SolidBox> solids_;
   Transform true_base_T_camera_;
+  SurfaceVisibility visibility_;
+  std::deque<PastLegs> past_legs_;
 
   std::uint64_t ticks_ = 0;
   std::int64_t last_stamp_ns_ = 0;
@@ -88,6 +97,7 @@ class ClimbReport {
   std::uint32_t frame_sequence_ = 0;
   std::int64_t frame_stamp_ns_ = 0;
   std::uint64_t frames_ = 0, frames_matching_ = 0, surfaces_ = 0, surfaces_unmatched_ = 0;
+  std::uint64_t in_view_ = 0, missed_ = 0;  // true surfaces
   std::int64_t map_stamp_ns_ = 0;
   std::vector<double> exposure_to_map_ms_;
   struct Seen {

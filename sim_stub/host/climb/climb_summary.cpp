@@ -194,10 +194,16 @@ Json to_json(const ClimbSummary& s) {
     wall_tasks[row.task] = {{"mean_us", rounded(row.wall_mean_us, 1e3)}, {"max_us", rounded(row.wall_max_us, 1e3)}};
   }
   j["schedule"] = schedule;
+  const double recall = s.surfaces_in_view > 0
+                            ? 1.0 - static_cast<double>(s.surfaces_missed) / static_cast<double>(s.surfaces_in_view)
+                            : kNotMeasured;
   j["surfaces"] = {{"frames", s.frames},
                    {"frames_matching", s.frames_matching},
                    {"seen", s.surfaces},
-                   {"unmatched", s.surfaces_unmatched}};
+                   {"unmatched", s.surfaces_unmatched},
+                   {"in_view", s.surfaces_in_view},
+                   {"missed", s.surfaces_missed},
+                   {"recall", rounded(recall, 1e4)}};
   Json footsteps = Json::array();
   for (const Footstep& f : s.footsteps) footsteps.push_back(footstep_json(f));
   j["footsteps"] = footsteps;

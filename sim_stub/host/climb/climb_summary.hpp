@@ -96,9 +96,11 @@ struct ClimbSummary {
   double seconds_per_step = kNotMeasured;
   double plane_rate_hz = 0.0;
   std::uint64_t frames = 0;              // behind plane_rate_hz: frames finished, ...
-  std::uint64_t frames_matching = 0;     // ... frames with surfaces, each of them a true one,
+  std::uint64_t frames_matching = 0;     // ... frames in which every surface is a true one and none in view is missing,
   std::uint64_t surfaces = 0;            // surfaces in all frames, ...
-  std::uint64_t surfaces_unmatched = 0;  // ... those that are no true surface (a leg, a ghost)
+  std::uint64_t surfaces_unmatched = 0;  // ... those that are no true surface (a leg, a ghost);
+  std::uint64_t surfaces_in_view = 0;    // true surfaces that were well in view in all frames, ...
+  std::uint64_t surfaces_missed = 0;     // ... those that were not reported
   Spread execution_error_m;
   Spread foothold_error_m;  // of each footstep the larger of the next two
   Spread foothold_error_along_m;

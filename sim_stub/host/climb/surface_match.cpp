@@ -1,37 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_stub/host/climb/surface_match.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <span>
-#include <vector>
 
 namespace polygmap::sim {
 namespace {
 
-// An axis-aligned rectangle in the true world: flat along `axis`, facing `sign` along it. Its place on the axis may be
-// a range: a riser under a nosing shows two planes.
-struct TrueSurface {
-  int axis;
-  double sign;
-  Vec3 low_m;
-  Vec3 high_m;
-};
+constexpr double kOnSurface_m = 0.001;  // what is rendered lies on its surface but for single precision
+constexpr int kCoarse_px = 8;           // one ray stands for as many columns and rows
+
+// Floor 0; of step k (0-based) tread 1 + 2 k and riser 2 + 2 k; then the left side, the right side.
+constexpr int kFloorSurface = 0;
+// Of all faces of all obstacles: they may be seen, and need not be.
+constexpr int kObstacleSurface = -2;
 
 std::vector<TrueSurface> stair_surfaces(const StairWorld& world) {
   const double w = world.half_width_m;
   std::vector<TrueSurface> all;
   double below_m = 0.0;
+  const int left = 1 + 2 * static_cast<int>(world.steps.size());
+  int id = kFloorSurface;
   for (const Step& s : world.steps) {
-    all.push_back({2, 1.0, {s.nosing_x_m, -w, s.height_m}, {s.back_x_m, w, s.height_m}});
-    all.push_back({0, -1.0, {s.nosing_x_m, -w, below_m}, {s.riser_x_m, w, s.height_m}});
-    all.push_back({1, 1.0, {s.riser_x_m, w, 0.0}, {s.back_x_m, w, s.height_m}});
-    all.push_back({1, -1.0, {s.riser_x_m, -w, 0.0}, {s.back_x_m, -w, s.height_m}});
+    all.push_back({++id, 2, 1.0, {s.nosing_x_m, -w, s.height_m}, {s.back_x_m, w, s.height_m}});
+    all.push_back({++id, 0, -1.0, {s.nosing_x_m, -w, below_m}, {s.riser_x_m, w, s.height_m}});
+    all.push_back({left, 1, 1.0, {s.riser_x_m, w, 0.0}, {s.back_x_m, w, s.height_m}});
+    all.push_back({left + 1, 1, -1.0, {s.riser_x_m, -w, 0.0}, {s.back_x_m, -w, s.height_m}});
     below_m = s.height_m;
   }
   for (const Obstacle& o : world.obstacles) {
     for (const int axis : {0, 1, 2}) {
       for (const double sign : {1.0, -1.0}) {
-        TrueSurface face{axis, sign, o.centre_m - 0.5 * o.size_m, o.centre_m + 0.5 * o.size_m};
+        TrueSurface face{kObstacleSurface, axis, sign, o.centre_m - 0.5 * o.size_m, o.centre_m + 0.5 * o.size_m};
         (sign > 0.0 ? face.low_m : face.high_m)[axis] = (sign > 0.0 ? face.high_m : face.low_m)[axis];
         all.push_back(face);
       }
@@ -70,18 +71,69 @@ bool is_on_floor(const StairWorld& world, const Vec3& normal, std::span<const Ve
 
 }  // namespace
 
-bool matches_true_surface(const StairWorld& world, const SurfacePatch& patch, const Transform& true_T_camera,
-                          const SurfaceMatchLimits& limits) {
-  if (patch.polygon.size() < 3) return false;
+int matching_surface(const StairWorld& world, const SurfacePatch& patch, const Transform& true_T_camera,
+                     const SurfaceMatchLimits& limits) {
+  if (patch.polygon.size() < 3) return kNoSurface;
   const Vec3 normal = true_T_camera.R * patch.normal;
   const Vec3 centroid_m = true_T_camera * patch.centroid_m;
   std::vector<Vec3> polygon_m;
   for (const Vec3& vertex_m : patch.polygon) polygon_m.push_back(true_T_camera * vertex_m);
-  if (is_on_floor(world, normal, polygon_m, limits)) return true;
+  if (is_on_floor(world, normal, polygon_m, limits)) return kFloorSurface;
   for (const TrueSurface& surface : stair_surfaces(world)) {
-    if (is_on(surface, normal, centroid_m, polygon_m, limits)) return true;
+    if (is_on(surface, normal, centroid_m, polygon_m, limits)) return surface.id;
   }
-  return false;
+  return kNoSurface;
+}
+
+SurfaceVisibility::SurfaceVisibility(const StairWorld& world, const CameraIntrinsics& intrinsics)
+    : solids_(stair_solids(world)),
+      surfaces_(stair_surfaces(world)),
+      pixels_(3 + 2 * world.steps.size()),
+      renderer_([&] {
+        CameraIntrinsics coarse = intrinsics;
+        coarse.width_px /= kCoarse_px, coarse.height_px /= kCoarse_px;
+        coarse.fx_px /= kCoarse_px, coarse.fy_px /= kCoarse_px;
+        coarse.cx_px = (coarse.cx_px + 0.5) / kCoarse_px - 0.5, coarse.cy_px = (coarse.cy_px + 0.5) / kCoarse_px - 0.5;
+        return coarse;
+      }()) {}
+
+const std::vector<int>& SurfaceVisibility::in_view(const Transform& true_T_camera, const Transform& base_T_camera,
+                                                   const std::array<LegShapes, kFootCount>& base_legs,
+                                                   const InViewLimits& limits) {
+  DepthScene scene{true_T_camera, solids_, base_legs, base_T_camera, true};
+  for (LegShapes& leg : scene.base_legs) {  // what is masked around the legs is not in view either
+    if (leg.thigh.radius_m > 0.0) leg.thigh.radius_m += limits.body_margin_m;
+    if (leg.shank.radius_m > 0.0) leg.shank.radius_m += limits.body_margin_m;
+    if (leg.foot.half_m.norm() > 0.0) leg.foot.half_m.array() += limits.body_margin_m;
+  }
+  renderer_.render(scene);
+  std::fill(pixels_.begin(), pixels_.end(), 0);
+  const CameraIntrinsics& k = renderer_.intrinsics();
+  for (int v = 0; v < k.height_px; ++v) {
+    for (int u = 0; u < k.width_px; ++u) {
+      const auto w = static_cast<double>(renderer_.inverse_depth(v)[u]);
+      const double cosine = w * static_cast<double>(renderer_.plane_distance(v)[u] * renderer_.inverse_length(v)[u]);
+      if (!(w * limits.range_m > 1.0) || cosine < std::cos(limits.grazing_rad)) continue;
+      const Vec3 ray{(u - k.cx_px) / k.fx_px, (v - k.cy_px) / k.fy_px, 1.0};
+      if (const int id = surface_at(true_T_camera * Vec3(ray / w)); id >= 0) {
+        pixels_[static_cast<std::size_t>(id)] += kCoarse_px * kCoarse_px;
+      }
+    }
+  }
+  in_view_.clear();
+  for (std::size_t id = 0; id < pixels_.size(); ++id) {
+    if (pixels_[id] >= limits.least_px) in_view_.push_back(static_cast<int>(id));
+  }
+  return in_view_;
+}
+
+int SurfaceVisibility::surface_at(const Vec3& point_m) const {
+  for (const TrueSurface& s : surfaces_) {
+    if (((point_m - s.low_m).array() >= -kOnSurface_m).all() && ((s.high_m - point_m).array() >= -kOnSurface_m).all()) {
+      return s.id;
+    }
+  }
+  return std::abs(point_m.z()) <= kOnSurface_m ? kFloorSurface : kNoSurface;
 }
 
 }  // namespace polygmap::sim

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Is a surface that perception reports one that truly exists?
+// Is a surface that perception reports one that truly exists, and does it report those that are well in view?
 #pragma once
+
+#include <array>
+#include <vector>
 
 #include "algorithms/core/math/transform.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
+#include "sim_stub/camera/depth_renderer.hpp"
+#include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
 
 namespace polygmap::sim {
@@ -16,8 +21,48 @@ struct SurfaceMatchLimits {
   double overhang_m = 0.05;   // of the centroid beyond the true surface's edges
 };
 
-// patch in the camera frame, true_T_camera at its exposure. True surfaces: floor, treads, risers and the sides.
-[[nodiscard]] bool matches_true_surface(const StairWorld& world, const SurfacePatch& patch,
-                                        const Transform& true_T_camera, const SurfaceMatchLimits& limits = {});
+// An axis-aligned rectangle in the true world: flat along `axis`, facing `sign` along it. Its place on the axis may be
+// a range: a riser under a nosing shows two planes. Rectangles of one id are one surface.
+struct TrueSurface {
+  int id;
+  int axis;
+  double sign;
+  Vec3 low_m;
+  Vec3 high_m;
+};
+
+inline constexpr int kNoSurface = -1;
+// Which true surface the patch is: the floor, a tread, a riser, a side of the staircase. patch in the camera frame,
+// true_T_camera at its exposure.
+[[nodiscard]] int matching_surface(const StairWorld& world, const SurfacePatch& patch, const Transform& true_T_camera,
+                                   const SurfaceMatchLimits& limits = {});
+
+// A true surface is well in view where at least least_px of its pixels are: seen past the legs, not grazing, near. (The
+// scorer of generated frames counts planes from 1500 pixels on, without the other two; a tread 0.3 m deep and 1.2 m
+// wide has 20,000 at 1 m.) 2026-11.
+struct InViewLimits {
+  int least_px = 3000;
+  double grazing_rad = 1.309;    // angle of incidence: 75 deg, where depth noise is four times that of a facing surface
+  double range_m = 2.0;          // depth; the map is of what lies within 1.5 m
+  double body_margin_m = 0.025;  // around the legs, as the self filter masks
+};
+
+class SurfaceVisibility {
+ public:
+  SurfaceVisibility(const StairWorld& world, const CameraIntrinsics& intrinsics);
+  // Ids as of matching_surface; valid until the next call.
+  [[nodiscard]] const std::vector<int>& in_view(const Transform& true_T_camera, const Transform& base_T_camera,
+                                                const std::array<LegShapes, kFootCount>& base_legs,
+                                                const InViewLimits& limits = {});
+
+ private:
+  [[nodiscard]] int surface_at(const Vec3& point_m) const;
+
+  std::vector<SolidBox> solids_;
+  std::vector<TrueSurface> surfaces_;
+  std::vector<int> pixels_;  // by id
+  std::vector<int> in_view_;
+  DepthRenderer renderer_;
+};
 
 }  // namespace polygmap::sim

@@ -221,6 +221,83 @@ TEST(SurfaceExtractor, Polygon_OfANarrowStaircase_EndsWhereTheTreadEnds) {
   EXPECT_NEAR(sides_m[sides_m.size() / 2], 0.0, 0.001);
 }
 
+// Whether the polygon holds what lies at a place of the world, seen from above.
+bool holds(const SurfacePatch& patch, const DepthScene& scene, double x_m, double y_m) {
+  const std::size_t n = patch.polygon.size();
+  const auto side = [&](std::size_t i) {
+    const Vec3 a = scene.world_T_camera * patch.polygon[i], b = scene.world_T_camera * patch.polygon[(i + 1) % n];
+    return (b.x() - a.x()) * (y_m - a.y()) - (b.y() - a.y()) * (x_m - a.x());
+  };
+  for (std::size_t i = 0; i < n; ++i) {
+    if (side(i) < 0.0) return false;
+  }
+  return n >= 3;
+}
+
+TEST(SurfaceExtractor, FloorAroundAStaircase_LiesBeforeTheFirstRiserAndNotUnderTheSteps) {
+  for (const double width_m : {0.6, 0.9, 1.2}) {
+    for (const double yaw_rad : {-0.2, 0.1}) {
+      SCOPED_TRACE(testing::Message() << "width " << width_m << " yaw " << yaw_rad);
+      StairSpec stairs;
+      stairs.width_m = width_m;
+      stairs.first_riser_x_m = 0.5;
+      const DepthScene scene = stair_scene(stairs, yaw_rad);
+      Extraction extraction;
+      const SurfaceFrame& frame = extraction.run(scene, {}, 31);
+      expect_well_formed(frame);
+      int before = 0;
+      for (const SurfacePatch& patch : frame.surfaces) {
+        if (std::abs((scene.world_T_camera * patch.centroid_m).z()) > 0.02) continue;
+        before += holds(patch, scene, 0.45, 0.0) ? 1 : 0;
+        for (const double y_m : {-0.25, 0.0, 0.25}) EXPECT_FALSE(holds(patch, scene, 0.6, y_m)) << y_m;
+      }
+      EXPECT_EQ(before, 1);
+    }
+  }
+}
+
+TEST(SurfaceExtractor, LandingAroundAStairwell_DoesNotCoverTheHole) {
+  DepthScene scene;
+  scene.intrinsics = robot_camera_intrinsics();
+  scene.place_camera(0.97, 1.047, 0.05, 0.01);
+  scene.boxes = {{{-1.0, -1.5, 0.0}, {0.45, 1.5, 0.2}}, {{0.45, 0.0, 0.0}, {2.0, 1.5, 0.2}}};
+  Extraction extraction;
+  const SurfaceFrame& frame = extraction.run(scene, {}, 32);
+  expect_well_formed(frame);
+  const SurfacePatch* landing = tread_at(frame, scene, 0.2);
+  ASSERT_NE(landing, nullptr);
+  EXPECT_FALSE(holds(*landing, scene, 0.65, -0.15)) << "the hole lies deeper";
+  EXPECT_GT(landing->area_m2, 0.25);
+}
+
+TEST(SurfaceExtractor, OverhangingNosings_AreNoLeaningPlanes) {
+  const auto leaning = [](bool split, double nosing_m, bool correlated) {
+    SurfaceExtractor::Params params;
+    if (!split) params.overhangs.most_lean_rad = 0.0;
+    Extraction extraction(params);
+    StairSpec stairs;
+    stairs.nosing_m = nosing_m;
+    int count = 0;
+    for (std::uint32_t seed = 41; seed < 44; ++seed) {
+      const DepthScene scene = stair_scene(stairs, 0.02 * seed - 0.9);
+      for (const SurfacePatch& patch : extraction.run(scene, {.correlated = correlated}, seed).surfaces) {
+        const double up = std::abs(patch.normal.dot(scene.camera_up()));
+        count += up > 0.1 && up < 0.9 ? 1 : 0;
+      }
+    }
+    return count;
+  };
+  int without = 0;
+  for (const double nosing_m : {0.02, 0.03}) {
+    for (const bool correlated : {false, true}) {
+      SCOPED_TRACE(testing::Message() << nosing_m << " correlated " << correlated);
+      EXPECT_LE(leaning(true, nosing_m, correlated), 1);
+      without += leaning(false, nosing_m, correlated);
+    }
+  }
+  EXPECT_GT(without, 2) << "the scenes no longer show the fault";
+}
+
 TEST(SurfaceExtractor, RiserSeenNearlyEdgeOn_EndsAtTheTreads) {
   StairSpec stairs;
   stairs.first_riser_x_m = 0.05;

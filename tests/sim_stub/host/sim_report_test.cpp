@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -407,13 +408,26 @@ TEST(ClimbReport, Freshness_CountsFromTheExposure) {
   EXPECT_DOUBLE_EQ(s.footsteps[1].target_last_seen_ms, 100.0);
 }
 
-TEST(ClimbReport, PlaneRate_CountsFramesWhoseEverySurfaceIsTrue) {
+// What is well in view from the scripted robot's start, as patches that perception should report.
+std::vector<SurfacePatch> patches_in_view(const StairWorld& world, const Transform& true_T_camera) {
+  std::vector<SurfacePatch> all;
+  all.push_back(patch_of(true_T_camera, {-0.3, 0, 0}, Vec3::UnitZ(), Vec3(0.2, 0, 0), Vec3(0, 0.3, 0)));
+  for (std::size_t k = 0; k < world.steps.size(); ++k) {
+    const Step& s = world.steps[k];
+    all.push_back(patch_of(true_T_camera, {s.riser_x_m, 0, s.height_m - 0.06}, -Vec3::UnitX(), Vec3(0, 0.3, 0),
+                           Vec3(0, 0, 0.05)));
+    all.push_back(tread_patch(true_T_camera, world, k));
+  }
+  return all;
+}
+
+TEST(ClimbReport, PlaneRate_CountsFramesWhoseEverySurfaceIsTrueAndThatMissNone) {
   const StairWorld world = plain_stairs(3);
   ScriptedClimb climb(world);
   climb.tick();
   const Transform true_T_camera = climb.truth.true_T_base * base_T_camera();
   const std::int64_t exposure_ns = climb.now_ns;
-  const auto frame = [&](std::initializer_list<SurfacePatch> patches) {
+  const auto frame = [&](const std::vector<SurfacePatch>& patches) {
     ++climb.surfaces.sequence;
     climb.surfaces.stamp_ns = exposure_ns;
     climb.surfaces.surfaces.clear();
@@ -422,25 +436,41 @@ TEST(ClimbReport, PlaneRate_CountsFramesWhoseEverySurfaceIsTrue) {
     climb.truth.true_T_base.p_m.x() += 0.2;
     climb.wait(32 * kNsPerMs);
   };
-  const SurfacePatch tread = tread_patch(true_T_camera, world, 0);
-  const SurfacePatch ghost = tread_patch(true_T_camera, world, 0, 0.07);
-  frame({tread, tread_patch(true_T_camera, world, 1)});
-  frame({tread});
-  frame({tread, ghost});
+  const std::vector<SurfacePatch> all = patches_in_view(world, true_T_camera);
+  std::vector<SurfacePatch> with_ghost = all;
+  with_ghost.push_back(tread_patch(true_T_camera, world, 0, 0.07));
+  frame(all);
+  frame({all[0]});  // the floor alone
+  frame(with_ghost);
   frame({});
+  frame(all);
   const ClimbSummary s = climb.finish();
-  EXPECT_EQ(s.frames, 4U);
+  EXPECT_EQ(s.frames, 5U);
   EXPECT_EQ(s.frames_matching, 2U);
-  EXPECT_EQ(s.surfaces, 5U);
+  EXPECT_EQ(s.surfaces, 3 * all.size() + 2);
   EXPECT_EQ(s.surfaces_unmatched, 1U);
-  EXPECT_NEAR(s.plane_rate_hz, 2.0 / 0.128, 1e-9);
+  EXPECT_GE(s.surfaces_in_view, 5 * 3U) << "floor, first riser and first tread at least";
+  EXPECT_EQ(s.surfaces_missed, 2 * s.surfaces_in_view / 5 - 1)
+      << "all of the blank frame, all but the floor of another";
+  EXPECT_NEAR(s.plane_rate_hz, 2.0 / 0.160, 1e-9);
+}
+
+TEST(SurfaceVisibility, LegBeforeATread_TakesItOutOfView) {
+  const StairWorld world = plain_stairs(3);
+  const Transform base{Mat3::Identity(), Vec3(-0.3, 0, 0.79)};
+  SurfaceVisibility visibility(world, robot_camera_intrinsics());
+  std::array<LegShapes, kFootCount> legs{};
+  const std::vector<int> without = visibility.in_view(base * base_T_camera(), base_T_camera(), legs);
+  EXPECT_NE(std::find(without.begin(), without.end(), 1), without.end());
+  legs[0].thigh = {base_T_camera() * Vec3(-1, 0, 0.3), base_T_camera() * Vec3(1, 0, 0.3), 0.25};
+  EXPECT_TRUE(visibility.in_view(base * base_T_camera(), base_T_camera(), legs).empty());
 }
 
 TEST(SurfaceMatch, TrueSurfaces_MatchAndOthersDoNot) {
   const StairWorld world = plain_stairs(3);
   const Transform camera{rotation_y(0.3), Vec3(-0.4, 0, 0.8)};
   const auto matches = [&](const Vec3& centre_m, const Vec3& normal, const Vec3& u_m, const Vec3& v_m) {
-    return matches_true_surface(world, patch_of(camera, centre_m, normal, u_m, v_m), camera);
+    return matching_surface(world, patch_of(camera, centre_m, normal, u_m, v_m), camera) != kNoSurface;
   };
   const Vec3 x(0.1, 0, 0), y(0, 0.2, 0), z(0, 0, 0.05);
   EXPECT_TRUE(matches({0.14, 0, 0.135}, Vec3::UnitZ(), x, y));    // tread, 5 mm high

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/polygons/pixel_cover.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace polygmap {
+namespace {
+
+constexpr std::int32_t kColumnStride = 4, kRowStride = 12;  // 800 pixels of a whole picture
+// What others' pixels cost against its own: a smaller polygon is safe, one over a hole is not (2026-11).
+constexpr std::int32_t kForeignWorth = -4;
+constexpr std::int32_t kGridColumns = kColumns / kColumnStride, kGridRows = kDepthHeight_px / kRowStride;
+
+// In half-resolution pixels: of a column of eight pixels, and of a full-resolution row.
+double middle_px(std::int32_t column) noexcept { return 0.5 * kColumn_px * column + 0.25 * kColumn_px - 0.5; }
+double half_row(std::int32_t row) noexcept { return 0.5 * row - 0.25; }
+
+}  // namespace
+
+Vec3 PixelCover::ray_of(std::int32_t column, std::int32_t row) const noexcept {
+  return {static_cast<double>(picture_.column_rays.x[static_cast<std::size_t>(column)]),
+          static_cast<double>(picture_.column_rays.y[static_cast<std::size_t>(row)]), 1.0};
+}
+
+PixelCover::Owner PixelCover::owner_of(std::int32_t column, std::int32_t row) const noexcept {
+  const RegionId owner = regions_.labels.at(column, row);
+  if (owner != kNoRegion) {
+    if (regions_[owner].coplanar == regions_[id_].coplanar) return Owner::kOwn;
+    return regions_[owner].alive ? Owner::kForeign : Owner::kNobody;
+  }
+  const auto w = static_cast<double>(picture_.columns.inverse_depth(column, row));
+  const double expected = regions_[id_].plane.inverse_depth(ray_of(column, row));
+  return w > 0.0 && expected - w > apart_m_ * expected * w ? Owner::kForeign : Owner::kNobody;
+}
+
+template <typename Visit>
+void PixelCover::for_each_pixel(const Outline2& polygon, const Visit& visit) const noexcept {
+  const std::size_t n = polygon.size();
+  for (std::int32_t g = kColumnStride / 2; g < picture_.column_rays.columns; g += kColumnStride) {
+    const double x = middle_px(g);
+    double top = 1e9, bottom = -1e9;  // where two edges of the convex polygon cross the column
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec2 &a = polygon[i], &b = polygon[i + 1 < n ? i + 1 : 0];
+      if ((a.x() <= x) == (b.x() <= x)) continue;
+      const double y = a.y() + (x - a.x()) / (b.x() - a.x()) * (b.y() - a.y());
+      top = std::min(top, y);
+      bottom = std::max(bottom, y);
+    }
+    const double last = std::min(2.0 * bottom + 0.5, picture_.column_rays.height_px - 1.0);
+    const double first = std::max(2.0 * top + 0.5, 0.0) / kRowStride;
+    if (!(first * kRowStride <= last)) continue;
+    for (auto r = kRowStride * static_cast<std::int32_t>(std::ceil(first)); r <= last; r += kRowStride) {
+      const Owner owner = owner_of(g, r);
+      if (owner != Owner::kNobody) visit(g, r, owner == Owner::kOwn);
+    }
+  }
+}
+
+PixelCover::Count PixelCover::count(const Outline2& polygon) const noexcept {
+  Count count;
+  for_each_pixel(polygon, [&](std::int32_t, std::int32_t, bool own) { ++(own ? count.own : count.foreign); });
+  return count;
+}
+
+bool PixelCover::mostly_positive(const Outline2& polygon, const Vec3& line) const noexcept {
+  std::int32_t balance = 0;
+  for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
+    if (own) balance += line.dot(ray_of(g, r)) > 0.0 ? 1 : -1;
+  });
+  return balance > 0;
+}
+
+bool PixelCover::try_best_cut(const Outline2& polygon, Vec3& line) const noexcept {
+  // What a pixel is worth: its own are to be kept, the others to be cut off.
+  std::array<std::int32_t, kGridColumns> by_column{};
+  std::array<std::int32_t, kGridRows + 1> by_row{};
+  std::array<std::int32_t, Regions::kMaxRegions + 1> votes{};
+  std::int32_t total = 0;
+  for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
+    const std::int32_t worth = own ? 1 : kForeignWorth;
+    by_column[static_cast<std::size_t>(g / kColumnStride)] += worth;
+    by_row[static_cast<std::size_t>(r / kRowStride)] += worth;
+    total += worth;
+    if (!own) ++votes[regions_.labels.at(g, r)];
+  });
+  std::int32_t best = total;
+  // Columns from .. on the right, or up to the one before on the left; the same for rows.
+  const auto scan = [&](const auto& sums, const auto& line_before) {
+    std::int32_t before = 0;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      if (before > best) best = before, line = -line_before(static_cast<std::int32_t>(i));
+      if (total - before > best) best = total - before, line = line_before(static_cast<std::int32_t>(i));
+      before += sums[i];
+    }
+  };
+  const HalfRays& rays = picture_.rays;
+  scan(by_column, [&](std::int32_t i) {
+    const double x = middle_px(kColumnStride * i + kColumnStride / 2) - 0.25 * kColumnStride * kColumn_px;
+    return Vec3{1.0, 0.0, -(x - rays.cx_px) / rays.fx_px};
+  });
+  scan(by_row, [&](std::int32_t i) {
+    return Vec3{0.0, 1.0, -(half_row(kRowStride * i) - 0.25 * kRowStride - rays.cy_px) / rays.fy_px};
+  });
+  votes[kNoRegion] = 0;
+  constexpr int kNeighbours = 3;
+  for (int k = 0; k < kNeighbours; ++k) {
+    const auto most = std::max_element(votes.begin(), votes.end());
+    if (*most == 0) break;
+    *most = 0;
+    const Vec3 meeting = regions_[id_].plane.m - regions_[static_cast<std::size_t>(most - votes.begin())].plane.m;
+    std::int32_t positive = 0;
+    for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
+      if (meeting.dot(ray_of(g, r)) > 0.0) positive += own ? 1 : kForeignWorth;
+    });
+    if (positive > best) best = positive, line = meeting;
+    if (total - positive > best) best = total - positive, line = -meeting;
+  }
+  return best > total;
+}
+
+}  // namespace polygmap

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whose pixels a convex polygon in the picture covers, and the straight cut that rids it best of what is not its own.
+#pragma once
+
+#include <cstdint>
+
+#include "algorithms/perception/image/frame_image.hpp"
+#include "algorithms/perception/polygons/convex_outline.hpp"
+#include "algorithms/perception/regions/region.hpp"
+
+namespace polygmap {
+
+class PixelCover {
+ public:
+  // apart_m: seen this far behind the plane, a pixel shows something else.
+  PixelCover(const FrameImage& picture, const Regions& regions, RegionId id, double apart_m) noexcept
+      : picture_(picture), regions_(regions), id_(id), apart_m_(apart_m) {}
+
+  struct Count {
+    std::int32_t own = 0, foreign = 0;
+  };
+  // Of a grid's pixels within the polygon, whose corners are half-resolution pixels.
+  [[nodiscard]] Count count(const Outline2& polygon) const noexcept;
+  // A line in the picture is where line . ray = 0. Whether most of the surface's pixels lie on its positive side.
+  [[nodiscard]] bool mostly_positive(const Outline2& polygon, const Vec3& line) const noexcept;
+  // The line whose positive side keeps most of the surface's pixels and least of others': where a neighbour's plane
+  // meets this one, or a column or a row of the picture. False where every cut costs more than it rids of.
+  [[nodiscard]] bool try_best_cut(const Outline2& polygon, Vec3& line) const noexcept;
+
+ private:
+  enum class Owner : std::uint8_t { kNobody, kOwn, kForeign };
+  [[nodiscard]] Owner owner_of(std::int32_t column, std::int32_t row) const noexcept;
+  // visit(column, row, whether its own) for those that have an owner.
+  template <typename Visit>
+  void for_each_pixel(const Outline2& polygon, const Visit& visit) const noexcept;
+  [[nodiscard]] Vec3 ray_of(std::int32_t column, std::int32_t row) const noexcept;
+
+  const FrameImage& picture_;
+  const Regions& regions_;
+  RegionId id_;
+  double apart_m_;
+};
+
+}  // namespace polygmap
