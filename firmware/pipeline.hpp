@@ -10,6 +10,10 @@
 
 namespace polygmap {
 
+static_assert(EIGEN_MAX_ALIGN_BYTES == POLYGMAP_EIGEN_ALIGN_BYTES,
+              "Eigen aligns its types in another way here than in the module: compile both with the same -mavx2 or "
+              "-march, or set POLYGMAP_AVX2");
+
 struct Ports {
   hal::DepthCamera& camera;
   hal::Imu& imu;

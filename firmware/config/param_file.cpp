@@ -156,7 +156,8 @@ class ParamFile {
 
   [[nodiscard]] double number(const toml::node& node, const Param& param) const {
     if (!node.is_number()) fail(node, param.name + " must be a number, not " + kind_of(node));
-    const double value = *node.value<double>();
+    // A whole number that no double holds has no value<double>().
+    const double value = node.is_integer() ? static_cast<double>(node.as_integer()->get()) : *node.value<double>();
     if (!(value >= param.least && value <= param.most)) {
       const std::string_view unit = unit_of(param.name);
       fail(node, param.name + " must be from " + text_of(param.least) + " to " + text_of(param.most) +

@@ -25,7 +25,9 @@ int write_all(int file, std::string_view content) {
     if (written < 0) return errno;
     content.remove_prefix(static_cast<std::size_t>(written));
   }
-  return ::fsync(file) == 0 || errno == EINVAL || errno == EROFS ? 0 : errno;  // what is no file has nothing to sync
+  return ::fsync(file) == 0 || errno == EINTR || errno == EINVAL || errno == EROFS
+             ? 0
+             : errno;  // what is no file has nothing to sync
 }
 
 }  // namespace
@@ -34,12 +36,14 @@ void write_output(const std::string& path, std::string_view content) {
   namespace fs = std::filesystem;
   std::error_code none;
   const bool direct = fs::exists(path, none) && !fs::is_regular_file(path, none);
-  const std::string written = direct ? path : path + ".part";
+  // A link is followed, and the name beside is of this process alone.
+  const std::string whole = direct || !fs::is_symlink(path, none) ? path : fs::weakly_canonical(path, none).string();
+  const std::string written = direct ? path : whole + "." + std::to_string(::getpid()) + ".part";
   const int file = ::open(written.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file < 0) fail(path, errno);
   int error = write_all(file, content);
   if (::close(file) != 0 && error == 0) error = errno;
-  if (error == 0 && !direct && ::rename(written.c_str(), path.c_str()) != 0) error = errno;
+  if (error == 0 && !direct && ::rename(written.c_str(), whole.c_str()) != 0) error = errno;
   if (error == 0) return;
   if (!direct) ::unlink(written.c_str());
   fail(path, error);

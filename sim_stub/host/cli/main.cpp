@@ -14,14 +14,16 @@ namespace {
 std::atomic<int> interrupt_signal{0};
 static_assert(std::atomic<int>::is_always_lock_free, "set by a signal handler");
 
-void interrupt(int signal) { interrupt_signal = signal; }
+void interrupt(int received) {
+  interrupt_signal = received;
+  for (const int other : {SIGINT, SIGTERM}) std::signal(other, SIG_DFL);
+}
 
 // The first SIGINT or SIGTERM ends the climb with its files written; the second one kills.
 polygmap::sim::ClimbSummary run_until_interrupted(polygmap::sim::ClimbOptions options,
                                                   const polygmap::sim::ClimbProgressFunction& progress) {
   struct sigaction action {};
   action.sa_handler = interrupt;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
   for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
   options.interrupt = &interrupt_signal;
   return polygmap::sim::run_climb(options, progress);
