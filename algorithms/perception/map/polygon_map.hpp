@@ -180,6 +180,8 @@ class PolygonMap {
   void next_surface() noexcept;
   [[nodiscard]] bool load(const SurfacePatch& patch) noexcept;
   [[nodiscard]] bool is_near(const MapTrack& track, Nearness& out) const noexcept;
+  // The robot's leg leaves unknown ends. Where both were seen to end towards each other, they are two posts.
+  [[nodiscard]] bool two_posts(const MapTrack& track, const ConvexPolygon& seen_polygon, bool behind) const noexcept;
   [[nodiscard]] bool matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept;
   [[nodiscard]] std::int32_t compare_some() noexcept;
   void measure_offset() noexcept;

@@ -43,6 +43,12 @@ bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
   return std::abs(out.across_m) <= out.gate_m;
 }
 
+bool PolygonMap::two_posts(const MapTrack& track, const ConvexPolygon& seen_polygon, bool behind) const noexcept {
+  const Vec2 u = side_direction(behind ? 4 : 0);
+  return track.sides[behind ? 0 : 4].observed &&
+         end_observed(seen_polygon, seen_.edges, u, support_m(seen_polygon, u));
+}
+
 bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept {
   const bool upright = track.kind == SurfaceKind::kRiser;
   const ConvexPolygon seen_polygon = local_polygon(track);
@@ -57,15 +63,7 @@ bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& co
         upright ? std::min(length_m(seen_y), length_m(known_y)) : std::min(length_m(seen_x), length_m(known_x));
     if ((upright ? overlap_y_m : overlap_x_m) < params_.overlap_fraction * shorter_m) return false;
     if ((upright ? overlap_x_m : overlap_y_m) < -params_.lateral_gap_m) return false;
-    // The robot's leg leaves unknown ends. Where both were seen to end towards each other, they are two posts.
-    if (upright && overlap_x_m < 0.0) {
-      const bool behind = seen_x.min_m > known_x.min_m;  // the seen one lies on the known one's side 0
-      const Vec2 u = side_direction(behind ? 4 : 0);
-      if (track.sides[behind ? 0 : 4].observed &&
-          end_observed(seen_polygon, seen_.edges, u, support_m(seen_polygon, u))) {
-        return false;
-      }
-    }
+    if (upright && overlap_x_m < 0.0 && two_posts(track, seen_polygon, seen_x.min_m > known_x.min_m)) return false;
   }
   cost = std::abs(near.across_m) / near.gate_m + (std::min(overlap_x_m, overlap_y_m) > 0.0 ? 0.0 : 1.0);
   return true;

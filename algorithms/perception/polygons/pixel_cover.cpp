@@ -71,6 +71,14 @@ bool PixelCover::mostly_positive(const Outline2& polygon, const Vec3& line) cons
   return balance > 0;
 }
 
+std::int32_t PixelCover::worth_beyond(const Outline2& polygon, const Vec3& line) const noexcept {
+  std::int32_t worth = 0;
+  for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
+    if (line.dot(ray_of(g, r)) > 0.0) worth += own ? 1 : kForeignWorth;
+  });
+  return worth;
+}
+
 bool PixelCover::try_best_cut(const Outline2& polygon, Vec3& line) const noexcept {
   // What a pixel is worth: its own are to be kept, the others to be cut off.
   std::array<std::int32_t, kGridColumns> by_column{};
@@ -84,6 +92,7 @@ bool PixelCover::try_best_cut(const Outline2& polygon, Vec3& line) const noexcep
     total += worth;
     if (!own) ++votes[regions_.labels.at(g, r)];
   });
+  votes[kNoRegion] = 0;
   std::int32_t best = total;
   // Columns from .. on the right, or up to the one before on the left; the same for rows.
   const auto scan = [&](const auto& sums, const auto& line_before) {
@@ -102,17 +111,13 @@ bool PixelCover::try_best_cut(const Outline2& polygon, Vec3& line) const noexcep
   scan(by_row, [&](std::int32_t i) {
     return Vec3{0.0, 1.0, -(half_row(kRowStride * i) - 0.25 * kRowStride - rays.cy_px) / rays.fy_px};
   });
-  votes[kNoRegion] = 0;
   constexpr int kNeighbours = 3;
   for (int k = 0; k < kNeighbours; ++k) {
     const auto most = std::max_element(votes.begin(), votes.end());
     if (*most == 0) break;
     *most = 0;
     const Vec3 meeting = regions_[id_].plane.m - regions_[static_cast<std::size_t>(most - votes.begin())].plane.m;
-    std::int32_t positive = 0;
-    for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
-      if (meeting.dot(ray_of(g, r)) > 0.0) positive += own ? 1 : kForeignWorth;
-    });
+    const std::int32_t positive = worth_beyond(polygon, meeting);
     if (positive > best) best = positive, line = meeting;
     if (total - positive > best) best = total - positive, line = -meeting;
   }

@@ -33,6 +33,8 @@ class PixelCover {
   // visit(column, row, whether its own) for those that have an owner.
   template <typename Visit>
   void for_each_pixel(const Outline2& polygon, const Visit& visit) const noexcept;
+  // Of the pixels on the line's positive side: its own are to be kept, the others to be cut off.
+  [[nodiscard]] std::int32_t worth_beyond(const Outline2& polygon, const Vec3& line) const noexcept;
   [[nodiscard]] Vec3 ray_of(std::int32_t column, std::int32_t row) const noexcept;
 
   const FrameImage& picture_;

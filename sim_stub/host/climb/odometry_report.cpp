@@ -14,7 +14,7 @@ namespace {
 constexpr std::int64_t kPast_ns = 2 * kNsPerS;
 constexpr std::size_t kSecond_ticks = static_cast<std::size_t>(1.0 / kPlantTick_s);
 // Two-sided 95 % bounds of chi squared with three degrees of freedom.
-constexpr double kNeesLow = 0.2158, kNeesHigh = 9.3484;
+constexpr double kPositionNeesLow = 0.2158, kPositionNeesHigh = 9.3484;
 
 // World a in world b, from two poses of one body: heading and place.
 Transform aligned_worlds(const Transform& a_T_body, const Transform& b_T_body) {
@@ -100,7 +100,7 @@ void OdometryReport::observe(const Truth& truth, const StateEstimate& state, Gai
   const Vec3 world_error_m = true_T_world_.R.transpose() * fused_error_m;
   const double nees = world_error_m.cwiseQuotient(state.position_sigma_m).squaredNorm();
   nees_sum_ += nees;
-  nees_in_bounds_ += nees > kNeesLow && nees < kNeesHigh ? 1 : 0;
+  nees_in_bounds_ += nees > kPositionNeesLow && nees < kPositionNeesHigh ? 1 : 0;
 }
 
 void OdometryReport::observe_lio(const LioSample& sample) {

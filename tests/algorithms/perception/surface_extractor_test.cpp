@@ -273,7 +273,7 @@ TEST(SurfaceExtractor, LandingAroundAStairwell_DoesNotCoverTheHole) {
 TEST(SurfaceExtractor, OverhangingNosings_AreNoLeaningPlanes) {
   const auto leaning = [](bool split, double nosing_m, bool correlated) {
     SurfaceExtractor::Params params;
-    if (!split) params.overhangs.most_lean_rad = 0.0;
+    if (!split) params.planes.overhangs.most_lean_rad = 0.0;
     Extraction extraction(params);
     StairSpec stairs;
     stairs.nosing_m = nosing_m;
