@@ -44,6 +44,24 @@ class FootholdRaster {
     }
   }
 
+  // The columns of a row at which a quantity that grows by `step` a column, from `first` at column 0, may lie within an
+  // interval: two more at either end, for the rounding. The caller still asks every cell.
+  struct Columns {
+    std::int32_t begin = 0, end = kSide;
+    [[nodiscard]] Columns operator&(const Columns& other) const noexcept {
+      return {std::max(begin, other.begin), std::min(end, other.end)};
+    }
+  };
+  [[nodiscard]] static Columns columns_within(double first, double step, const Interval& within) noexcept {
+    if (std::abs(step) * kSide < 1e-6) {
+      return first < within.min_m - 1e-6 || first > within.max_m + 1e-6 ? Columns{0, 0} : Columns{};
+    }
+    const double a = (within.min_m - first) / step, b = (within.max_m - first) / step;
+    constexpr double kLimit = kSide;
+    return {static_cast<std::int32_t>(math::clamp(std::min(a, b) - 2.0, 0.0, kLimit)),
+            static_cast<std::int32_t>(math::clamp(std::max(a, b) + 3.0, 0.0, kLimit))};
+  }
+
   [[nodiscard]] Vec2 at(std::int32_t column, std::int32_t row) const noexcept {
     return {g_res_m_ * static_cast<double>(first_x_ + column), g_res_m_ * static_cast<double>(first_y_ + row)};
   }

@@ -194,11 +194,19 @@ void FootholdSearch::raster_row(std::int32_t row) noexcept {
   find_next(row);
 }
 
+double FootholdSearch::distance2_to_row_m2(const Vec2& from_m, std::int32_t row) const noexcept {
+  return math::square(raster_.at(0, row).y() - from_m.y());
+}
+
 // How much of the floor before the standing foot was seen, eq. (28): where nothing rises, that says so.
 void FootholdSearch::look_at_top(std::int32_t row) noexcept {
   if (std::abs(raster_.at(0, row).y() - sole_.origin_m().y()) > params_.top_to_m + params_.top_half_width_m) return;
   const Vec2 first = sole_(raster_.at(0, row)), step = sole_(raster_.at(1, row)) - first;
-  for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
+  const double half_width_m = params_.top_half_width_m;
+  const FootholdRaster::Columns ahead =
+      FootholdRaster::columns_within(first.x(), step.x(), {params_.top_from_m, params_.top_to_m}) &
+      FootholdRaster::columns_within(first.y(), step.y(), {-half_width_m, half_width_m});
+  for (std::int32_t column = ahead.begin; column < ahead.end; ++column) {
     const Vec2 sole_p = first + static_cast<double>(column) * step;
     if (sole_p.x() < params_.top_from_m || sole_p.x() > params_.top_to_m ||
         std::abs(sole_p.y()) > params_.top_half_width_m) {
@@ -220,8 +228,13 @@ void FootholdSearch::look_at_top(std::int32_t row) noexcept {
 
 // The nearest higher cell in the corridor, before the height limit and the erosion: an obstacle is not skipped over.
 void FootholdSearch::find_next(std::int32_t row) noexcept {
+  if (distance2_to_row_m2(base_.origin_m(), row) >= found_.next_distance2_m2) return;
   const Vec2 first = base_(raster_.at(0, row)), step = base_(raster_.at(1, row)) - first;
-  for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
+  const double range_m = params_.g_range_m, half_width_m = params_.corridor_half_width_m;
+  const FootholdRaster::Columns corridor =
+      FootholdRaster::columns_within(first.x(), step.x(), {-range_m, range_m}) &
+      FootholdRaster::columns_within(first.y(), step.y(), {-half_width_m, half_width_m});
+  for (std::int32_t column = corridor.begin; column < corridor.end; ++column) {
     const std::uint8_t layer = raster_.layer(column, row);
     if (layer == FootholdRaster::kNoLayer) continue;
     const Vec2 base_p = first + static_cast<double>(column) * step;
@@ -248,6 +261,7 @@ bool FootholdSearch::fits(const Vec2& p_m, const LevelSurface& surface) const no
 // A cell is asked only where its answer decides, so no eroded layer is kept.
 void FootholdSearch::erode_row(std::int32_t row) noexcept {
   if (found_.next == kNone) return;
+  if (distance2_to_row_m2(base_.origin_m(), row) >= found_.p_star_distance2_m2) return;
   const LevelSurface& surface = levels_[found_.next];
   for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
     if (raster_.layer(column, row) != found_.next) continue;
@@ -482,6 +496,7 @@ void FootholdSearch::choose() noexcept {
 // p**: the candidate nearest to p* that is higher by more than delta_foot.
 void FootholdSearch::look_ahead_row(std::int32_t row) noexcept {
   const Vec2 p_star_m = pending_.p_star.position_m.head<2>();
+  if (distance2_to_row_m2(p_star_m, row) >= found_.p_star_star_distance2_m2) return;
   for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
     const std::uint8_t layer = raster_.layer(column, row);
     if (layer == FootholdRaster::kNoLayer) continue;

@@ -140,6 +140,8 @@ class FootholdSearch {
   [[nodiscard]] Extent extent_on(const LevelSurface& tread, const Vec2& a_m, const Vec2& b_m) const noexcept;
   void link_upright(LevelSurface& tread, const Upright& upright) const noexcept;
   void raster_row(std::int32_t row) noexcept;
+  // At least as much from a point to every cell of a row: one that is no nearer than what was found is not looked at.
+  [[nodiscard]] double distance2_to_row_m2(const Vec2& from_m, std::int32_t row) const noexcept;
   void look_at_top(std::int32_t row) noexcept;
   void find_next(std::int32_t row) noexcept;
   void erode_row(std::int32_t row) noexcept;

@@ -26,7 +26,7 @@ class ComPlan {
 
     static void visit(auto& p, auto& field) {
       field("omega_radps", p.omega_radps, 1.0, 10.0, "Natural frequency of the body over its feet, sqrt(g / 0.80 m).");
-      field("zmp_offset_ticks", p.zmp_offset_ticks, 1, 2000,
+      field("zmp_offset_ticks", p.zmp_offset_ticks, 20, 2000,
             "The zero-moment point leaves its way for so long to meet the start's motion.");
     }
   };

@@ -60,7 +60,7 @@ class Extractor {
 namespace polygmap {
 [[nodiscard]] bool holds(const polygmap_frames::Camera& camera);
 [[nodiscard]] std::unique_ptr<polygmap_frames::Extractor> make_extractor(const polygmap_frames::Camera& camera,
-                                                                         const polygmap_frames::Values& values = {});
+                                                                         const polygmap_frames::Values& values);
 }  // namespace polygmap
 
 namespace polygmap_1024x768 {

@@ -132,7 +132,7 @@ TEST(PerceiveSize, BothExtractors_SayTheSameOfAPictureThatBothHold) {
   const std::vector<std::uint16_t> raw = picture.raw();
   const polygmap_frames::Camera camera = camera_of(scene.intrinsics, DepthNoiseModel{});
   EXPECT_TRUE(holds(camera));
-  const auto own = make_extractor(camera), large = polygmap_1024x768::make_extractor(camera);
+  const auto own = make_extractor(camera, {}), large = polygmap_1024x768::make_extractor(camera, {});
   ASSERT_TRUE(own->extract(raw.data(), scene.camera_up()) && large->extract(raw.data(), scene.camera_up()));
   const std::vector<Surface> a = own->surfaces(), b = large->surfaces();
   EXPECT_EQ(own->noise_sigma_m(1.0), large->noise_sigma_m(1.0));
@@ -161,7 +161,7 @@ TEST(PerceiveNoise, MoreThanThePictureShows_IsHalvedAtMostAndNeverBelowTheUsual)
   const std::vector<std::uint16_t> raw = picture.raw();
   const DepthNoiseModel usual;
   for (const auto& [said, believed] : {std::pair{1.0, 1.0}, std::pair{1.5, 1.0}, std::pair{3.0, 1.5}}) {
-    const auto extractor = make_extractor(camera_of(scene.intrinsics, usual.scaled(said)));
+    const auto extractor = make_extractor(camera_of(scene.intrinsics, usual.scaled(said)), {});
     for (int i = 0; i < kPictures; ++i) ASSERT_TRUE(extractor->extract(raw.data(), scene.camera_up()));
     EXPECT_NEAR(extractor->noise_sigma_m(1.0) / usual.sigma_m(1.0), believed, 0.02) << said;
   }
@@ -176,8 +176,8 @@ TEST(PerceiveSize, LargerThanTheModulesPictures_OnlyTheLargerExtractorTakes) {
   camera.max_depth_m = 4.0;
   EXPECT_FALSE(holds(camera));
   const std::vector<std::uint16_t> raw(644 * 480, 1000);
-  EXPECT_FALSE(make_extractor(camera)->extract(raw.data(), -Vec3::UnitY()));
-  EXPECT_TRUE(polygmap_1024x768::make_extractor(camera)->extract(raw.data(), -Vec3::UnitY()));
+  EXPECT_FALSE(make_extractor(camera, {})->extract(raw.data(), -Vec3::UnitY()));
+  EXPECT_TRUE(polygmap_1024x768::make_extractor(camera, {})->extract(raw.data(), -Vec3::UnitY()));
 }
 
 }  // namespace
