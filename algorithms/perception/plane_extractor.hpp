@@ -17,7 +17,7 @@
 #include "algorithms/perception/planes/residual_planes.hpp"
 #include "algorithms/perception/planes/scanline_segments.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
-#include "algorithms/perception/planes/span_fit.hpp"
+#include "algorithms/perception/span_fit.hpp"
 
 namespace polygmap {
 

@@ -9,6 +9,10 @@
 
 namespace polygmap {
 
+// The number of a plane in its frame, from 1 on. A byte: a picture has one for each of its columns' rows.
+using PlaneId = std::uint8_t;
+inline constexpr PlaneId kNoPlane = 0;
+
 // m = -normal / d for normal . p + d = 0, normal towards the camera, d > 0.
 struct InversePlane {
   Vec3 m = Vec3::UnitZ();

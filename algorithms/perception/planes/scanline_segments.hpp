@@ -9,7 +9,7 @@
 #include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/perception/image/column_image.hpp"
 #include "algorithms/perception/image/depth_noise_model.hpp"
-#include "algorithms/perception/planes/plane_id.hpp"
+#include "algorithms/perception/planes/plane_fit.hpp"
 
 namespace polygmap {
 

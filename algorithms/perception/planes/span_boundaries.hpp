@@ -11,7 +11,6 @@
 
 #include "algorithms/perception/image/noise_tracker.hpp"
 #include "algorithms/perception/planes/plane_fit.hpp"
-#include "algorithms/perception/planes/plane_id.hpp"
 #include "algorithms/perception/planes/scanline_segments.hpp"
 
 namespace polygmap {

@@ -6,7 +6,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/perception/planes/plane_id.hpp"
+#include "algorithms/perception/planes/plane_fit.hpp"
 #include "algorithms/perception/planes/scanline_segments.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
 
