@@ -17,9 +17,9 @@
 #include "algorithms/perception/planes/plane_merging.hpp"
 #include "algorithms/perception/planes/plane_set.hpp"
 #include "algorithms/perception/planes/residual_planes.hpp"
-#include "algorithms/perception/planes/scanline_segments.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
-#include "algorithms/perception/planes/span_fit.hpp"
+#include "algorithms/perception/segments/scanline_segments.hpp"
+#include "algorithms/perception/span_fit.hpp"
 
 namespace polygmap {
 

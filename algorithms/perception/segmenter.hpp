@@ -10,7 +10,7 @@
 #include "algorithms/perception/image/depth_noise_model.hpp"
 #include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/image/self_filter.hpp"
-#include "algorithms/perception/planes/scanline_segments.hpp"
+#include "algorithms/perception/segments/scanline_segments.hpp"
 
 namespace polygmap {
 

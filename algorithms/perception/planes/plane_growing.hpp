@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "algorithms/perception/planes/plane_fit.hpp"
-#include "algorithms/perception/planes/scanline_segments.hpp"
+#include "algorithms/perception/segments/scanline_segments.hpp"
 
 namespace polygmap {
 

@@ -51,12 +51,30 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
   return true;
 }
 
+// Whether a plane is part of one with as many pixels or more; cosine: of the angle between them.
+[[nodiscard]] bool part_of(const PlaneMerging::Params& params, const PlaneGrowing::Params& growing,
+                           const DepthNoiseModel& noise, const FittedPlane& p, const FittedPlane& q, double cosine,
+                           bool measured) noexcept {
+  const bool small = q.pixels < params.small_plane_px;
+  if (!small && cosine < math::cos(params.merge_tilt_rad)) return false;
+  // Where a large plane lies is known well: apart by more than what lets a run join a plane, the two are not one.
+  const double noise_m = growing.join_floor_m + growing.join_sigmas * noise.sigma_m(q.centre_m.z());
+  const double merge_m = small ? params.merge_m : std::min(noise_m, params.merge_m);
+  const double apart_m = std::abs(p.plane.distance_m(q.centre_m));
+  const double both_apart_m = small ? apart_m : apart_m + std::abs(q.plane.distance_m(p.centre_m));
+  if (both_apart_m > (small || !measured ? 1.0 : 2.0) * merge_m) return false;
+  if (small || !measured) return true;
+  // Once large ones are measured their pixels have the last word: two floors that the camera bends are two.
+  double chi2 = 0.0;
+  return try_contradiction(params, noise, p, q, chi2) && !(chi2 > params.pieces_chi2);
+}
+
 }  // namespace
 
 void PlaneMerging::merge_coplanar(const Params& params, const PlaneGrowing::Params& growing,
                                   const DepthNoiseModel& noise, PlaneSet& planes, PlaneIndex& to_plane,
                                   bool measured) noexcept {
-  const double least_cosine = math::cos(params.merge_tilt_rad), least_small = math::cos(2.0 * params.merge_tilt_rad);
+  const double least_cosine = math::cos(2.0 * params.merge_tilt_rad);
   struct Candidate {
     Vec3 normal;
     std::size_t plane;
@@ -70,20 +88,10 @@ void PlaneMerging::merge_coplanar(const Params& params, const PlaneGrowing::Para
     for (std::size_t j = i + 1; j < candidates.size() && planes[a].alive; ++j) {
       const double cosine = candidates[i].normal.dot(candidates[j].normal);
       const std::size_t b = candidates[j].plane;
-      if (cosine < least_small || !planes[b].alive) continue;
+      if (cosine < least_cosine || !planes[b].alive) continue;
       const std::size_t keep = planes[a].pixels >= planes[b].pixels ? a : b, gone = keep == a ? b : a;
       FittedPlane &p = planes[keep], &q = planes[gone];
-      const bool small = q.pixels < params.small_plane_px;
-      if (!small && cosine < least_cosine) continue;
-      // Where a large plane lies is known well: apart by more than what lets a run join a plane, the two are not one.
-      const double noise_m = growing.join_floor_m + growing.join_sigmas * noise.sigma_m(q.centre_m.z());
-      const double merge_m = small ? params.merge_m : std::min(noise_m, params.merge_m);
-      const double apart_m = std::abs(p.plane.distance_m(q.centre_m));
-      const double both_apart_m = small ? apart_m : apart_m + std::abs(q.plane.distance_m(p.centre_m));
-      if (both_apart_m > (small || !measured ? 1.0 : 2.0) * merge_m) continue;
-      // Once large ones are measured their pixels have the last word: two floors that the camera bends are two.
-      double chi2 = 0.0;
-      if (!small && measured && (!try_contradiction(params, noise, p, q, chi2) || chi2 > params.pieces_chi2)) continue;
+      if (!part_of(params, growing, noise, p, q, cosine, measured)) continue;
       p.pixels += q.pixels;
       q.alive = false;
       redirect(to_plane, gone, keep);

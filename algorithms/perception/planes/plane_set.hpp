@@ -7,7 +7,6 @@
 
 #include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/perception/planes/plane_fit.hpp"
-#include "algorithms/perception/planes/plane_id.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
 
 namespace polygmap {

@@ -11,8 +11,7 @@
 
 #include "algorithms/perception/image/noise_tracker.hpp"
 #include "algorithms/perception/planes/plane_fit.hpp"
-#include "algorithms/perception/planes/plane_id.hpp"
-#include "algorithms/perception/planes/scanline_segments.hpp"
+#include "algorithms/perception/segments/scanline_segments.hpp"
 
 namespace polygmap {
 

@@ -78,12 +78,29 @@ RegionId label_beside(const FrameImage& image, const RawImage& raw, const DepthN
   return best;
 }
 
+// Of a row next to a border: its column says own, and another region side rows away.
+RegionId label_at_border(const RawImage& raw, const Regions& regions, const PublishedSurfaces& published, RegionId own,
+                         RegionId other, std::int32_t column, std::int32_t row, std::int32_t side) noexcept {
+  const double middle_px = kColumn_px * (column / kColumn_px) + 0.5 * (kColumn_px - 1);
+  const bool below = side > 0;
+  const RegionId above = below ? own : other;
+  const Region &upper = regions[above], &lower = regions[below ? other : own];
+  const std::int32_t last_upper = below ? row + side - 1 : row + side;
+  // A nosing knows more than where two planes meet: what its own rows say, too.
+  const double nosing = lower.kind == SurfaceKind::kRiser ? row_of(raw.intrinsics, published[above].nosing, column)
+                                                          : std::numeric_limits<double>::quiet_NaN();
+  const bool of_upper =
+      std::abs(nosing - (last_upper + 0.5)) < kNosing_px
+          ? row < nosing
+          : is_upper(raw.intrinsics, upper.plane, lower.plane, middle_px, column - middle_px, last_upper, row);
+  return of_upper == below ? own : other;
+}
+
 }  // namespace
 
 RegionId pixel_label(const FrameImage& image, const RawImage& raw, const DepthNoiseModel& noise, const Regions& regions,
                      const PublishedSurfaces& published, std::int32_t column, std::int32_t row) noexcept {
   const std::int32_t g = column / kColumn_px;
-  const double middle_px = kColumn_px * g + 0.5 * (kColumn_px - 1);
   const RegionId own = regions.labels.at(g, row);
   if (own == kNoRegion) {
     return raw.depth != nullptr ? label_beside(image, raw, noise, regions, column, row) : kNoRegion;
@@ -94,18 +111,7 @@ RegionId pixel_label(const FrameImage& image, const RawImage& raw, const DepthNo
       const RegionId other = regions.labels.at(g, row + side);
       if (other == own) continue;
       if (other == kNoRegion) return own;
-      const bool below = side > 0;
-      const RegionId above = below ? own : other;
-      const Region &upper = regions[above], &lower = regions[below ? other : own];
-      const std::int32_t last_upper = below ? row + side - 1 : row + side;
-      // A nosing knows more than where two planes meet: what its own rows say, too.
-      const double nosing = lower.kind == SurfaceKind::kRiser ? row_of(raw.intrinsics, published[above].nosing, column)
-                                                              : std::numeric_limits<double>::quiet_NaN();
-      const bool of_upper =
-          std::abs(nosing - (last_upper + 0.5)) < kNosing_px
-              ? row < nosing
-              : is_upper(raw.intrinsics, upper.plane, lower.plane, middle_px, column - middle_px, last_upper, row);
-      return of_upper == below ? own : other;
+      return label_at_border(raw, regions, published, own, other, column, row, side);
     }
   }
   return own;

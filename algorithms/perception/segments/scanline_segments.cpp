@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/perception/planes/scanline_segments.hpp"
+#include "algorithms/perception/segments/scanline_segments.hpp"
 
 #include <algorithm>
 #include <bit>

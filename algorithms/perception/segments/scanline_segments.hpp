@@ -9,9 +9,12 @@
 #include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/perception/image/column_image.hpp"
 #include "algorithms/perception/image/depth_noise_model.hpp"
-#include "algorithms/perception/planes/plane_id.hpp"
 
 namespace polygmap {
+
+// The number of a plane in its frame, from 1 on. A byte: a picture has one for each of its columns' rows.
+using PlaneId = std::uint8_t;
+inline constexpr PlaneId kNoPlane = 0;
 
 // Rows top .. bottom of one column; the line through them is inverse_depth + slope (row - top).
 struct ScanlineSegment {

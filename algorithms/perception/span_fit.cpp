@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/perception/planes/span_fit.hpp"
+#include "algorithms/perception/span_fit.hpp"
 
 #include "algorithms/perception/image/work_units.hpp"
 

@@ -6,9 +6,9 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/perception/planes/plane_id.hpp"
-#include "algorithms/perception/planes/scanline_segments.hpp"
+#include "algorithms/perception/planes/plane_fit.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
+#include "algorithms/perception/segments/scanline_segments.hpp"
 
 namespace polygmap {
 
