@@ -45,8 +45,7 @@ bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
 
 bool PolygonMap::two_posts(const MapTrack& track, const ConvexPolygon& seen_polygon, bool behind) const noexcept {
   const Vec2 u = side_direction(behind ? 4 : 0);
-  return track.sides[behind ? 0 : 4].observed &&
-         end_observed(seen_polygon, seen_.edges, u, support_m(seen_polygon, u));
+  return track.sides[behind ? 0 : 4].observed && end_observed(seen_polygon, seen_.edges, u, support_m(seen_polygon, u));
 }
 
 bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept {
