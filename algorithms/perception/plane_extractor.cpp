@@ -2,6 +2,7 @@
 #include "algorithms/perception/plane_extractor.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "algorithms/perception/image/work_units.hpp"
 
@@ -56,7 +57,7 @@ std::int32_t PlaneExtractor::do_piece() noexcept {
 std::int32_t PlaneExtractor::grow() noexcept {
   if (!growing_.step()) return kGrowUnits;
   take_grown_planes();
-  PlaneMerging::merge_coplanar(params_.merging, params_.growing, noise_, planes_, to_plane_, false);
+  merge_coplanar(false);
   for (PlaneId i = 1; i <= planes_.count; ++i) boundaries_.set_plane(i, planes_[i].plane);
   fit_.begin(SpanFit::kSharpening, *segments_, to_plane_, 1, kNoPlane, image_->column_rays.columns, boundaries_);
   part_ = Part::kSharpening;
@@ -68,7 +69,7 @@ std::int32_t PlaneExtractor::sharpen() noexcept {
   if (!fit_.done()) return units;
   // While planes are rough, what they do not explain says little.
   solve(0.0, 0.0);
-  PlaneMerging::merge_coplanar(params_.merging, params_.growing, noise_, planes_, to_plane_, true);
+  merge_coplanar(true);
   merging_.begin_facets(params_.merging, params_.growing, noise_, planes_);
   column_ = 0;
   part_ = Part::kFacets;
@@ -136,11 +137,26 @@ void PlaneExtractor::take_grown_planes() noexcept {
     p = FittedPlane{};
     p.plane = grown.plane;
     p.kind = kind_of(grown.plane);
-    p.pixels = grown.pixels;
+    p.moments = grown.moments;
+    p.pixels = grown.moments.one;
     p.alive = true;
-    p.facet = grown.pixels < params_.growing.min_plane_px;
-    p.centre_m = grown.plane.point(grown.mean_ray);
+    p.facet = p.pixels < params_.growing.min_plane_px;
+    p.centre_m = grown.plane.point(grown.moments.mean_ray());
     to_plane_[i] = i;
+  }
+}
+
+// Two halves of a tread, left and right of the legs, are each known to a centimetre: the plane of one of them would not
+// explain the other.
+void PlaneExtractor::merge_coplanar(bool measured) noexcept {
+  PlaneMerging::merge_coplanar(params_.merging, params_.growing, noise_, planes_, to_plane_, measured);
+  for (PlaneId i = 1; i <= planes_.count; ++i) {
+    FittedPlane& p = planes_[i];
+    if (!std::exchange(p.merged, false) || !p.alive) continue;
+    if (!try_solve_leaning(params_.fit, noise_, p.moments, up_, p.plane, &p.covariance)) continue;
+    p.kind = kind_of(p.plane);
+    p.centre_m = p.plane.point(p.moments.mean_ray());
+    boundaries_.set_plane(i, p.plane);
   }
 }
 

@@ -83,6 +83,7 @@ class PlaneExtractor {
   std::int32_t measure() noexcept;
 
   void take_grown_planes() noexcept;
+  void merge_coplanar(bool measured) noexcept;
   void take_joined_planes() noexcept;
   void begin_search() noexcept;
   void take_split_planes() noexcept;

@@ -206,8 +206,7 @@ void PlaneGrowing::close() noexcept {
   }
   GrownPlane& plane = planes_[++count_];
   plane.plane.m = m_;
-  plane.pixels = sums_.m.one;
-  plane.mean_ray = sums_.m.mean_ray();
+  plane.moments = sums_.m;
 }
 
 bool PlaneGrowing::step() noexcept {

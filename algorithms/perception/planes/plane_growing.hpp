@@ -13,8 +13,7 @@ namespace polygmap {
 
 struct GrownPlane {
   InversePlane plane;
-  double pixels = 0.0;
-  Vec3 mean_ray = Vec3::UnitZ();
+  PlaneMoments moments;  // of its segments' pixels
 };
 
 class PlaneGrowing {

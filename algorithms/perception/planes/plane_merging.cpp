@@ -93,6 +93,8 @@ void PlaneMerging::merge_coplanar(const Params& params, const PlaneGrowing::Para
       FittedPlane &p = planes[keep], &q = planes[gone];
       if (!part_of(params, growing, noise, p, q, cosine, measured)) continue;
       p.pixels += q.pixels;
+      p.moments.add(q.moments);
+      p.merged = true;
       q.alive = false;
       redirect(to_plane, gone, keep);
     }

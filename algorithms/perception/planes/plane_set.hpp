@@ -21,6 +21,7 @@ struct FittedPlane {
   double pixels = 0.0;
   bool alive = false;
   bool facet = false;       // too small to be a plane by itself
+  bool merged = false;      // with a coplanar one, and not solved since
   std::uint8_t facets = 1;  // planes that were joined into this one
   bool low_parts = false;   // some of them are too low in the picture to say how they lean
 };
