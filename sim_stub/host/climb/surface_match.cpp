@@ -9,7 +9,7 @@ namespace polygmap::sim {
 namespace {
 
 constexpr double kOnSurface_m = 0.001;  // what is rendered lies on its surface but for single precision
-constexpr int kCoarse_px = 8;           // one ray stands for as many columns and rows
+constexpr int kCoarse_px = 4;           // one ray stands for as many columns and rows
 
 // Floor 0; of step k (0-based) tread 1 + 2 k and riser 2 + 2 k; then the left side, the right side.
 constexpr int kFloorSurface = 0;
@@ -88,7 +88,7 @@ int matching_surface(const StairWorld& world, const SurfacePatch& patch, const T
 SurfaceVisibility::SurfaceVisibility(const StairWorld& world, const CameraIntrinsics& intrinsics)
     : solids_(stair_solids(world)),
       surfaces_(stair_surfaces(world)),
-      pixels_(3 + 2 * world.steps.size()),
+      seen_(3 + 2 * world.steps.size()),
       renderer_([&] {
         CameraIntrinsics coarse = intrinsics;
         coarse.width_px /= kCoarse_px, coarse.height_px /= kCoarse_px;
@@ -107,7 +107,7 @@ const std::vector<int>& SurfaceVisibility::in_view(const Transform& true_T_camer
     if (leg.foot.half_m.norm() > 0.0) leg.foot.half_m.array() += limits.body_margin_m;
   }
   renderer_.render(scene);
-  std::fill(pixels_.begin(), pixels_.end(), 0);
+  std::fill(seen_.begin(), seen_.end(), SeenSurface{});
   const CameraIntrinsics& k = renderer_.intrinsics();
   for (int v = 0; v < k.height_px; ++v) {
     for (int u = 0; u < k.width_px; ++u) {
@@ -115,25 +115,39 @@ const std::vector<int>& SurfaceVisibility::in_view(const Transform& true_T_camer
       const double cosine = w * static_cast<double>(renderer_.plane_distance(v)[u] * renderer_.inverse_length(v)[u]);
       if (!(w * limits.range_m > 1.0) || cosine < std::cos(limits.grazing_rad)) continue;
       const Vec3 ray{(u - k.cx_px) / k.fx_px, (v - k.cy_px) / k.fy_px, 1.0};
-      if (const int id = surface_at(true_T_camera * Vec3(ray / w)); id >= 0) {
-        pixels_[static_cast<std::size_t>(id)] += kCoarse_px * kCoarse_px;
-      }
+      see(true_T_camera * Vec3(ray / w), kCoarse_px * kCoarse_px);
     }
   }
   in_view_.clear();
-  for (std::size_t id = 0; id < pixels_.size(); ++id) {
-    if (pixels_[id] >= limits.least_px) in_view_.push_back(static_cast<int>(id));
+  for (std::size_t id = 0; id < seen_.size(); ++id) {
+    if (seen_[id][0].well(limits) || seen_[id][1].well(limits)) in_view_.push_back(static_cast<int>(id));
   }
   return in_view_;
 }
 
-int SurfaceVisibility::surface_at(const Vec3& point_m) const {
+void SurfaceVisibility::see(const Vec3& point_m, int px) {
+  int id = std::abs(point_m.z()) <= kOnSurface_m ? kFloorSurface : kNoSurface;
+  bool farther = false;
   for (const TrueSurface& s : surfaces_) {
-    if (((point_m - s.low_m).array() >= -kOnSurface_m).all() && ((s.high_m - point_m).array() >= -kOnSurface_m).all()) {
-      return s.id;
+    if (((point_m - s.low_m).array() < -kOnSurface_m).any() || ((s.high_m - point_m).array() < -kOnSurface_m).any()) {
+      continue;
     }
+    id = s.id;
+    farther = 2.0 * point_m[s.axis] > s.low_m[s.axis] + s.high_m[s.axis];
+    break;
   }
-  return std::abs(point_m.z()) <= kOnSurface_m ? kFloorSurface : kNoSurface;
+  if (id < 0) return;
+  Seen& seen = seen_[static_cast<std::size_t>(id)][farther ? 1 : 0];
+  seen.px += px;
+  seen.low_m = seen.low_m.cwiseMin(point_m);
+  seen.high_m = seen.high_m.cwiseMax(point_m);
+}
+
+bool SurfaceVisibility::Seen::well(const InViewLimits& limits) const {
+  if (px < limits.least_px) return false;
+  Vec3 extent_m = high_m - low_m;
+  std::sort(extent_m.begin(), extent_m.end());  // the least is across the plane
+  return extent_m[1] >= limits.least_extent_m;
 }
 
 }  // namespace polygmap::sim

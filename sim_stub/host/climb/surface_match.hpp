@@ -37,11 +37,12 @@ inline constexpr int kNoSurface = -1;
 [[nodiscard]] int matching_surface(const StairWorld& world, const SurfacePatch& patch, const Transform& true_T_camera,
                                    const SurfaceMatchLimits& limits = {});
 
-// A true surface is well in view where at least least_px of its pixels are: seen past the legs, not grazing, near. (The
-// scorer of generated frames counts planes from 1500 pixels on, without the other two; a tread 0.3 m deep and 1.2 m
-// wide has 20,000 at 1 m.) 2026-11.
+// A true surface is well in view where at least least_px of one of its planes are seen past the legs, not grazing,
+// near, and over least_extent_m both ways. (The scorer of generated frames counts planes from 1500 pixels on, without
+// the other limits; a tread 0.3 m deep and 1.2 m wide has 20,000 at 1 m.) 2026-11.
 struct InViewLimits {
   int least_px = 3000;
+  double least_extent_m = 0.06;  // 3 mm of depth error at one end of it are 3 deg, a third of the angle that matches
   double grazing_rad = 1.309;    // angle of incidence: 75 deg, where depth noise is four times that of a facing surface
   double range_m = 2.0;          // depth; the map is of what lies within 1.5 m
   double body_margin_m = 0.025;  // around the legs, as the self filter masks
@@ -56,11 +57,19 @@ class SurfaceVisibility {
                                                 const InViewLimits& limits = {});
 
  private:
-  [[nodiscard]] int surface_at(const Vec3& point_m) const;
+  // What is seen of a plane.
+  struct Seen {
+    int px = 0;
+    Vec3 low_m = Vec3::Constant(1e9), high_m = Vec3::Constant(-1e9);
+    [[nodiscard]] bool well(const InViewLimits& limits) const;
+  };
+  // Of a surface its nearer plane and its farther one: a riser under a nosing shows both.
+  using SeenSurface = std::array<Seen, 2>;
+  void see(const Vec3& point_m, int px);
 
   std::vector<SolidBox> solids_;
   std::vector<TrueSurface> surfaces_;
-  std::vector<int> pixels_;  // by id
+  std::vector<SeenSurface> seen_;  // by id
   std::vector<int> in_view_;
   DepthRenderer renderer_;
 };

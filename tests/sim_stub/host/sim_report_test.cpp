@@ -466,6 +466,19 @@ TEST(SurfaceVisibility, LegBeforeATread_TakesItOutOfView) {
   EXPECT_TRUE(visibility.in_view(base * base_T_camera(), base_T_camera(), legs).empty());
 }
 
+// Of a riser under a nosing 40 mm deep, seen from steeply above, a strip of each plane is left.
+TEST(SurfaceVisibility, RiserSeenInStrips_IsNotWellInView) {
+  const Transform base{Mat3::Identity(), Vec3(-0.3, 0, 0.79)};
+  constexpr int kFirstRiser = 2;
+  for (const double nosing_m : {0.0, 0.04}) {
+    StairWorld world = plain_stairs(3);
+    for (Step& step : world.steps) step.riser_x_m = step.nosing_x_m + nosing_m;
+    SurfaceVisibility visibility(world, robot_camera_intrinsics());
+    const std::vector<int> seen = visibility.in_view(base * base_T_camera(), base_T_camera(), {});
+    EXPECT_EQ(std::find(seen.begin(), seen.end(), kFirstRiser) != seen.end(), nosing_m == 0.0) << nosing_m;
+  }
+}
+
 TEST(SurfaceMatch, TrueSurfaces_MatchAndOthersDoNot) {
   const StairWorld world = plain_stairs(3);
   const Transform camera{rotation_y(0.3), Vec3(-0.4, 0, 0.8)};
