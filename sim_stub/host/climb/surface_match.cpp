@@ -126,15 +126,17 @@ const std::vector<int>& SurfaceVisibility::in_view(const Transform& true_T_camer
 }
 
 void SurfaceVisibility::see(const Vec3& point_m, int px) {
+  // The floor first: under a nosing it reaches to the riser.
   int id = std::abs(point_m.z()) <= kOnSurface_m ? kFloorSurface : kNoSurface;
   bool farther = false;
-  for (const TrueSurface& s : surfaces_) {
+  for (std::size_t i = 0; i < surfaces_.size() && id == kNoSurface; ++i) {
+    const TrueSurface& s = surfaces_[i];
     if (((point_m - s.low_m).array() < -kOnSurface_m).any() || ((s.high_m - point_m).array() < -kOnSurface_m).any()) {
       continue;
     }
     id = s.id;
     farther = 2.0 * point_m[s.axis] > s.low_m[s.axis] + s.high_m[s.axis];
-    break;
+    if (id < 0) return;  // an obstacle's
   }
   if (id < 0) return;
   Seen& seen = seen_[static_cast<std::size_t>(id)][farther ? 1 : 0];
