@@ -352,7 +352,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   CLI::App* estimate = declare_estimate(app, estimate_arguments);
   ParamsArguments params_arguments;
   CLI::App* params = declare_params(app, params_arguments);
-  for (CLI::App* command : {climb, perceive, estimate}) {
+  for (CLI::App* command : {climb, perceive, estimate, params_arguments.list, params_arguments.diff}) {
     for (CLI::Option* option : command->get_options()) option->check(not_empty);
   }
 

@@ -63,7 +63,8 @@ TEST(ParamsCommand, Diff_SaysWhatIsNotTheDefault) {
   EXPECT_EQ(same.out, "No parameter differs from its default.\n");
   const Call other = call({"params", "diff", write("estimator.fusion.tau_s = 2\nself_filter = false\n")});
   EXPECT_EQ(other.code, kExitPass);
-  EXPECT_EQ(other.out, "estimator.fusion.tau_s = 2  # default 4\nself_filter = false  # default true\n");
+  EXPECT_EQ(other.out, "self_filter = false  # default true\nestimator.fusion.tau_s = 2  # default 4\n")
+      << "of a file, what stands before its tables comes first";
 }
 
 TEST(ParamsCommand, BadFile_IsOneSentenceAndExit2) {

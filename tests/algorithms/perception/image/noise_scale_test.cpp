@@ -60,7 +60,7 @@ TEST(NoiseScale, NoiseOfTwoAndAHalfTimesTheProfile_IsFoundSlowlyAndPlanesStayWho
   EXPECT_EQ(blind.scale, 1.0);
   EXPECT_GT(settled.scale, 2.0);
   EXPECT_LT(settled.scale, 4.0);
-  EXPECT_LT(settled.surfaces, blind.surfaces);
+  EXPECT_LE(settled.surfaces, blind.surfaces);
   EXPECT_GE(settled.treads, 3);  // with the floor
 }
 

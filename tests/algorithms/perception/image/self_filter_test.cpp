@@ -131,8 +131,8 @@ TEST(SelfFilter, Mask_OneSphere_IsEveryRayThatMeetsItToAPixel) {
   HalfRays rays;
   rays.set(robot_camera_intrinsics());
   constexpr double kRadius_m = 0.1;
-  for (const Vec3& centre_m : {Vec3{0.0, 0.25, 0.3}, Vec3{0.1, 0.25, 0.05}, Vec3{-0.4, 0.1, 0.5}, Vec3{0.0, -0.2, 0.5},
-                               Vec3{0.05, -0.2, 0.08}, Vec3{0.2, 0.6, 0.9}, Vec3{0.0, 0.2, 0.0999}}) {
+  for (const Vec3& centre_m : {Vec3{0.0, 0.25, 0.3}, Vec3{0.1, 0.15, 0.15}, Vec3{-0.4, 0.1, 0.5}, Vec3{0.0, -0.2, 0.5},
+                               Vec3{0.05, -0.13, 0.12}, Vec3{0.2, 0.6, 0.9}, Vec3{0.0, 0.1, 0.0999}}) {
     std::array<LegShapes, kFootCount> legs{};
     legs[1].shank = {centre_m, centre_m, kRadius_m};
     const HalfImage<std::uint8_t> mask = mask_of(rays, legs, {0.0, 0.0});
