@@ -175,16 +175,15 @@ std::int32_t SurfaceBuilder::find_line(Edge edge) noexcept {
 
 std::int32_t SurfaceBuilder::build_polygon() noexcept {
   Region& own = (*regions_)[id_];
-  SurfacePatch patch;
-  if (!polygons_.try_build(*image_, *regions_, id_, outline_, lines_, patch)) {
-    own.alive = false;
-    ++counts_.no_polygon;
-  } else if (!frame_->surfaces.try_push_back(patch)) {
-    own.alive = false;
-    ++frame_->dropped;
-    ++counts_.overflow;
+  const auto first = static_cast<std::uint8_t>(frame_->surfaces.size() + 1);
+  const PolygonBuilder::Built built = polygons_.build(*image_, *regions_, id_, outline_, lines_, frame_->surfaces);
+  frame_->dropped += static_cast<std::uint32_t>(built.without_room);
+  counts_.overflow += static_cast<std::uint32_t>(built.without_room);
+  if (built.pieces > 0) {
+    published_[id_] = {first, lines_.nosing};
   } else {
-    published_[id_] = {static_cast<std::uint8_t>(frame_->surfaces.size()), lines_.nosing};
+    own.alive = false;
+    counts_.no_polygon += built.without_room == 0 ? 1U : 0U;
   }
   ++id_;
   part_ = Part::kSideLeft;

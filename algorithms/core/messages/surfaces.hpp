@@ -48,13 +48,15 @@ struct SurfacePatch {
   EdgeLine back;    // treads: the far edge where the next riser starts
 };
 
+using SurfacePatches = StaticVector<SurfacePatch, kMaxPlanesPerFrame>;
+
 // Everything seen in one frame.
 struct SurfaceFrame {
   std::int64_t stamp_ns = 0;  // exposure
   std::uint32_t sequence = 0;
-  StaticVector<SurfacePatch, kMaxPlanesPerFrame> surfaces;  // camera frame
-  double invalid_fraction = 0.0;                            // of the picture outside the robot's own body
-  std::uint32_t dropped = 0;                                // surfaces that found no room
+  SurfacePatches surfaces;        // camera frame
+  double invalid_fraction = 0.0;  // of the picture outside the robot's own body
+  std::uint32_t dropped = 0;      // surfaces that found no room
 };
 
 // One remembered surface, world frame.

@@ -63,12 +63,12 @@ PixelCover::Count PixelCover::count(const Outline2& polygon) const noexcept {
   return count;
 }
 
-bool PixelCover::mostly_positive(const Outline2& polygon, const Vec3& line) const noexcept {
-  std::int32_t balance = 0;
+PixelCover::Sides PixelCover::own_by_side(const Outline2& polygon, const Vec3& line) const noexcept {
+  Sides sides;
   for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
-    if (own) balance += line.dot(ray_of(g, r)) > 0.0 ? 1 : -1;
+    if (own) ++(line.dot(ray_of(g, r)) > 0.0 ? sides.positive : sides.negative);
   });
-  return balance > 0;
+  return sides;
 }
 
 std::int32_t PixelCover::worth_beyond(const Outline2& polygon, const Vec3& line) const noexcept {

@@ -21,8 +21,11 @@ class PixelCover {
   };
   // Of a grid's pixels within the polygon, whose corners are half-resolution pixels.
   [[nodiscard]] Count count(const Outline2& polygon) const noexcept;
-  // A line in the picture is where line . ray = 0. Whether most of the surface's pixels lie on its positive side.
-  [[nodiscard]] bool mostly_positive(const Outline2& polygon, const Vec3& line) const noexcept;
+  struct Sides {
+    std::int32_t positive = 0, negative = 0;
+  };
+  // A line in the picture is where line . ray = 0. How many of the surface's pixels lie on either side of it.
+  [[nodiscard]] Sides own_by_side(const Outline2& polygon, const Vec3& line) const noexcept;
   // The line whose positive side keeps most of the surface's pixels and least of others': where a neighbour's plane
   // meets this one, or a column or a row of the picture. False where every cut costs more than it rids of.
   [[nodiscard]] bool try_best_cut(const Outline2& polygon, Vec3& line) const noexcept;

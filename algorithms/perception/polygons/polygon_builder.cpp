@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "algorithms/perception/image/simd.hpp"
-#include "algorithms/perception/polygons/pixel_cover.hpp"
 
 namespace polygmap {
 namespace {
@@ -14,12 +13,9 @@ namespace {
 constexpr double kLeastSlope = 0.5;  // sine between a riser and the tread that ends it
 constexpr double kOnLine_m = 0.002;  // a polygon's edge lies on a line
 
-constexpr std::size_t kMaxCuts = 4;        // that rid a polygon of what is not its own
-constexpr std::int32_t kLeastForeign = 4;  // pixels of the grid, see pixel_cover.cpp
-
-struct HalfPlane {  // inward . (p - point) >= 0
-  Vec2 point, inward;
-};
+// Pixels of the grid, see pixel_cover.cpp: a piece of more that others own is parted; one cut off has as many of its
+// own.
+constexpr std::int32_t kLeastForeign = 4, kLeastOwn = 6;
 
 using SeenPolygon = StaticVector<Vec2, kMaxPolygonVertices>;  // its corners in the picture, half-resolution pixels
 
@@ -66,6 +62,12 @@ void count_pixels(const std::uint8_t* flags, const std::uint8_t* valid, std::int
 Vec2 project(const HalfRays& rays, const Vec3& p_m) noexcept {
   const double w = 1.0 / p_m.z();
   return {p_m.x() * w * rays.fx_px + rays.cx_px, p_m.y() * w * rays.fy_px + rays.cy_px};
+}
+
+[[nodiscard]] Outline2 seen_of(const HalfRays& rays, const PlaneAxes& axes, const Outline2& flat) noexcept {
+  Outline2 seen;
+  for (const Vec2& p : flat) static_cast<void>(seen.try_push_back(project(rays, axes.to_space(p))));
+  return seen;
 }
 
 // Share of a polygon's pixels without data, over its columns in the picture in some of its rows.
@@ -173,106 +175,129 @@ RegionId PolygonBuilder::tread_beside(const FrameImage& picture, const Regions& 
   return best;
 }
 
-bool PolygonBuilder::try_build(const FrameImage& picture, const Regions& regions, RegionId id, const Outline2& outline,
-                               const SurfaceLines& lines, SurfacePatch& patch) const noexcept {
-  const Region& own = regions[id];
-  const InversePlane& plane = own.plane;
-  const Vec3 n = plane.normal();
-  // Plane coordinates with x along the nosing, else along the picture's rows; x cross y = n.
-  Vec3 x_axis = Vec3::UnitX();
+// Plane coordinates with x along the nosing, else along the picture's rows; x cross y = normal.
+PlaneAxes PolygonBuilder::axes_of(const Region& own, const SurfaceLines& lines) noexcept {
+  PlaneAxes axes;
+  axes.normal = own.plane.normal();
+  const Vec3& n = axes.normal;
+  axes.x = Vec3::UnitX();
   if (lines.nosing.valid) {
-    x_axis = lines.nosing.b_m - lines.nosing.a_m;
+    axes.x = lines.nosing.b_m - lines.nosing.a_m;
   } else if (lines.back.valid) {
-    x_axis = lines.back.b_m - lines.back.a_m;
+    axes.x = lines.back.b_m - lines.back.a_m;
   }
-  x_axis -= n * n.dot(x_axis);
-  if (x_axis.norm() < 1e-6) x_axis = n.unitOrthogonal();
-  x_axis.normalize();
-  const Vec3 y_axis = n.cross(x_axis);
-  const Vec3 origin = own.centre_m - n * plane.distance_m(own.centre_m);
-  const auto to_plane = [&](const Vec3& p) { return Vec2{(p - origin).dot(x_axis), (p - origin).dot(y_axis)}; };
-  const auto to_space = [&](const Vec2& p) { return Vec3{origin + p.x() * x_axis + p.y() * y_axis}; };
+  axes.x -= n * n.dot(axes.x);
+  if (axes.x.norm() < 1e-6) axes.x = n.unitOrthogonal();
+  axes.x.normalize();
+  axes.y = n.cross(axes.x);
+  axes.origin_m = own.centre_m - n * own.plane.distance_m(own.centre_m);
+  return axes;
+}
 
-  // The picture's outline onto the plane: a projection keeps it convex, and turns clockwise in the picture into
-  // clockwise seen from the camera, so the order is reversed.
-  Outline2 flat;
-  for (std::size_t i = outline.size(); i-- > 0;) {
-    const Vec3 ray = picture.rays.ray(outline[i].x(), outline[i].y());
-    if (plane.inverse_depth(ray) > 0.1) static_cast<void>(flat.try_push_back(to_plane(plane.point(ray))));
+PlaneSide PlaneAxes::side_of(const Vec3& line) const noexcept {
+  const Vec2 inward{line.dot(x), line.dot(y)};
+  return {-line.dot(origin_m) * inward / std::max(inward.squaredNorm(), 1e-12), inward.normalized()};
+}
+
+// The surface ends at the line, where most of its pixels lie. What goes on beyond the line's end, as a floor does
+// beside the stairs, is a piece by itself.
+void PolygonBuilder::cut_at_line(const EdgeLine& edge, const PlaneAxes& axes, const PixelCover& cover,
+                                 const Outline2& outline, Pieces& pieces) const noexcept {
+  if (!edge.valid) return;
+  const Vec2 a = axes.to_plane(edge.a_m), b = axes.to_plane(edge.b_m);
+  Vec2 inward{-(b - a).y(), (b - a).x()};
+  inward.normalize();
+  const Vec3 line = edge.a_m.cross(edge.b_m);
+  const PixelCover::Sides own = cover.own_by_side(outline, line);
+  const bool positive = own.positive > own.negative;
+  if ((inward.dot(axes.side_of(line).inward) > 0.0) != positive) inward = -inward;
+  Piece& piece = pieces.front();
+  if (std::min(own.positive, own.negative) >= kLeastOwn && pieces.try_push_back(piece)) {
+    clip(pieces.back().flat, a, -inward);
+    static_cast<void>(pieces.back().cuts.try_push_back({a, -inward}));
   }
-  if (flat.size() < 3 || !(twice_area(flat) > 0.0)) return false;
-  const PixelCover cover(picture, regions, id, params_.apart_m);
-  // The positive side of a line in the picture, where line . ray = 0, on the plane.
-  const auto side_of = [&](const Vec3& line) {
-    const Vec2 inward{line.dot(x_axis), line.dot(y_axis)};
-    return HalfPlane{-line.dot(origin) * inward / std::max(inward.squaredNorm(), 1e-12), inward.normalized()};
-  };
-  const auto cut = [&](const EdgeLine& edge) {
-    const Vec2 a = to_plane(edge.a_m), b = to_plane(edge.b_m);
-    Vec2 inward{-(b - a).y(), (b - a).x()};
-    inward.normalize();
-    // The hull of a surface around another has its middle where the other is: its pixels say on which side it lies.
-    const Vec3 line = edge.a_m.cross(edge.b_m);
-    if ((inward.dot(side_of(line).inward) > 0.0) != cover.mostly_positive(outline, line)) inward = -inward;
-    // Corners just short of the line go onto it, those beyond are cut off: either way the edge is the line. Moving only
-    // the two extreme ones keeps the outline convex.
-    for (Vec2& p : flat) {
-      const double distance = inward.dot(p - a);
-      if (distance > 0.0 && distance < params_.snap_m) p -= (distance + 1e-6) * inward;
-    }
-    clip(flat, a, inward);
-  };
-  if (lines.nosing.valid) cut(lines.nosing);
-  if (lines.back.valid) cut(lines.back);
-  if (lines.occluder.valid) cut(lines.occluder);
-  if (own.kind == SurfaceKind::kRiser) {
-    // Seen nearly edge-on, half a pixel is decimetres of a riser: it ends where the treads above and below it say.
-    for (const bool below : {true, false}) {
-      const RegionId tread = tread_beside(picture, regions, id, below);
-      if (tread == kNoRegion) continue;
-      const InversePlane& level = regions[tread].plane;
-      const double side = below ? 1.0 : -1.0;
-      const Vec3 up = side * level.normal();
-      const Vec2 inward{up.dot(x_axis), up.dot(y_axis)};
-      if (!(inward.norm() > kLeastSlope)) continue;
-      clip(flat, -side * level.distance_m(origin) * inward / inward.squaredNorm(), inward.normalized());
+  // Corners just short of the line go onto it, those beyond are cut off: either way the edge is the line. Moving only
+  // the two extreme ones keeps the outline convex.
+  for (Vec2& p : piece.flat) {
+    const double distance = inward.dot(p - a);
+    if (distance > 0.0 && distance < params_.snap_m) p -= (distance + 1e-6) * inward;
+  }
+  clip(piece.flat, a, inward);
+}
+
+// Seen nearly edge-on, half a pixel is decimetres of a riser: it ends where the treads above and below it say.
+void PolygonBuilder::cut_at_treads(const FrameImage& picture, const Regions& regions, RegionId id,
+                                   const PlaneAxes& axes, Outline2& flat) const noexcept {
+  for (const bool below : {true, false}) {
+    const RegionId tread = tread_beside(picture, regions, id, below);
+    if (tread == kNoRegion) continue;
+    const InversePlane& level = regions[tread].plane;
+    const double side = below ? 1.0 : -1.0;
+    const Vec3 up = side * level.normal();
+    const Vec2 inward{up.dot(axes.x), up.dot(axes.y)};
+    if (!(inward.norm() > kLeastSlope)) continue;
+    clip(flat, -side * level.distance_m(axes.origin_m) * inward / inward.squaredNorm(), inward.normalized());
+  }
+}
+
+// No line says so, but a hull around a corner covers what is not its own: the best cut parts it, and what it cuts off
+// is a piece by itself where enough of the surface lies there.
+void PolygonBuilder::part_pieces(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
+                                 Pieces& pieces) const noexcept {
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    for (;;) {
+      Piece& piece = pieces[i];
+      if (piece.flat.size() < 3) break;
+      const Outline2 seen = seen_of(picture.rays, axes, piece.flat);
+      const PixelCover::Count pixels = cover.count(seen);
+      if (i > 0 && pixels.own < kLeastOwn) piece.flat.clear();
+      if (piece.flat.empty()) break;
+      Vec3 line;
+      if (pixels.foreign < kLeastForeign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign) ||
+          piece.cuts.size() == kMaxCuts || !cover.try_best_cut(seen, line)) {
+        break;
+      }
+      const PlaneSide kept = axes.side_of(line), rest{kept.point, -kept.inward};
+      if (pieces.try_push_back(piece)) {
+        clip(pieces.back().flat, rest.point, rest.inward);
+        static_cast<void>(pieces.back().cuts.try_push_back(rest));
+      }
+      clip(piece.flat, kept.point, kept.inward);
+      static_cast<void>(piece.cuts.try_push_back(kept));
     }
   }
-  // No line says so, but a hull around a corner covers what is not its own: that is cut back.
-  StaticVector<HalfPlane, kMaxCuts> cuts;
-  while (flat.size() >= 3) {
-    Outline2 seen;
-    for (const Vec2& p : flat) static_cast<void>(seen.try_push_back(project(picture.rays, to_space(p))));
-    const PixelCover::Count pixels = cover.count(seen);
-    Vec3 line;
-    if (pixels.foreign < kLeastForeign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign) ||
-        !cover.try_best_cut(seen, line) || !cuts.try_push_back(side_of(line))) {
-      break;
-    }
-    clip(flat, cuts.back().point, cuts.back().inward);
-  }
+}
+
+std::optional<SurfacePatch> PolygonBuilder::patch_of(const FrameImage& picture, const Region& own,
+                                                     const SurfaceLines& lines, const PlaneAxes& axes,
+                                                     Piece& piece) const noexcept {
+  Outline2& flat = piece.flat;
   if (flat.size() >= 3) reduce(flat, kMaxPolygonVertices, 1e-6);
   const double area_m2 = flat.size() >= 3 ? 0.5 * twice_area(flat) : 0.0;
-  if (!(area_m2 > 1e-4)) return false;
-
-  patch = SurfacePatch{};
+  if (!(area_m2 > 1e-4)) return std::nullopt;
+  SurfacePatch patch;
   patch.kind = own.kind;
   patch.plane = own.coplanar;
   patch.covariance = own.covariance;
-  patch.normal = n;
-  patch.d_m = plane.d_m();
+  patch.normal = axes.normal;
+  patch.d_m = own.plane.d_m();
   patch.area_m2 = area_m2;
-  patch.centroid_m = to_space(centroid(flat));
+  patch.centroid_m = axes.to_space(centroid(flat));
   patch.rmse_m = own.rmse_m;
-  patch.offset_sigma_m = plane_sigma_m(plane, own.covariance, patch.centroid_m / patch.centroid_m.z());
-  const Mat3 across = Mat3::Identity() - n * n.transpose();
+  patch.offset_sigma_m = plane_sigma_m(own.plane, own.covariance, patch.centroid_m / patch.centroid_m.z());
+  const Mat3 across = Mat3::Identity() - axes.normal * axes.normal.transpose();
   patch.tilt_sigma_rad = patch.d_m * math::sqrt(std::max((across * own.covariance * across).trace(), 0.0));
-  patch.nosing = lines.nosing;
-  patch.back = lines.back;
+  for (const Vec2& p : flat) static_cast<void>(patch.polygon.try_push_back(axes.to_space(p)));
+  judge_edges(picture, own.plane, lines, axes, piece, patch);
+  return patch;
+}
+
+void PolygonBuilder::judge_edges(const FrameImage& picture, const InversePlane& plane, const SurfaceLines& lines,
+                                 const PlaneAxes& axes, const Piece& piece, SurfacePatch& patch) const noexcept {
   // An edge on a nosing or back line is observed if the line was seen along most of it.
   const auto seen_on = [&](const EdgeLine& line, const Vec2& a, const Vec2& b) {
     if (!line.valid) return false;
-    const Vec2 p = to_plane(line.a_m), q = to_plane(line.b_m);
+    const Vec2 p = axes.to_plane(line.a_m), q = axes.to_plane(line.b_m);
     const Vec2 along = (q - p) / std::max((q - p).norm(), 1e-9), normal{-along.y(), along.x()};
     if (std::abs(normal.dot(a - p)) > kOnLine_m || std::abs(normal.dot(b - p)) > kOnLine_m) return false;
     const double from = std::min(along.dot(a - p), along.dot(b - p)), to = std::max(along.dot(a - p), along.dot(b - p));
@@ -280,26 +305,57 @@ bool PolygonBuilder::try_build(const FrameImage& picture, const Regions& regions
   };
   // Where it was cut back, the surface goes on.
   const auto cut_back = [&](const Vec2& a, const Vec2& b) {
-    return std::any_of(cuts.begin(), cuts.end(), [&](const HalfPlane& side) {
+    return std::any_of(piece.cuts.begin(), piece.cuts.end(), [&](const PlaneSide& side) {
       return std::abs(side.inward.dot(a - side.point)) < kOnLine_m &&
              std::abs(side.inward.dot(b - side.point)) < kOnLine_m;
     });
   };
   SeenPolygon seen;
-  for (const Vec2& p : flat) {
-    static_cast<void>(patch.polygon.try_push_back(to_space(p)));
-    static_cast<void>(seen.try_push_back(project(picture.rays, patch.polygon.back())));
-  }
+  for (const Vec3& p_m : patch.polygon) static_cast<void>(seen.try_push_back(project(picture.rays, p_m)));
   const Vec2 inside = project(picture.rays, patch.centroid_m);
-  for (std::size_t i = 0; i < flat.size(); ++i) {
-    const std::size_t next = i + 1 < flat.size() ? i + 1 : 0;
-    const bool on_line = seen_on(lines.nosing, flat[i], flat[next]) || seen_on(lines.back, flat[i], flat[next]);
+  for (std::size_t i = 0; i < piece.flat.size(); ++i) {
+    const std::size_t next = i + 1 < piece.flat.size() ? i + 1 : 0;
+    const Vec2 &a = piece.flat[i], &b = piece.flat[next];
+    const bool on_nosing = seen_on(lines.nosing, a, b), on_back = seen_on(lines.back, a, b);
     patch.edges[i] = EdgeKind::kUnknown;
-    if (cut_back(flat[i], flat[next])) continue;
+    if (cut_back(a, b)) continue;
+    const bool on_line = on_nosing || on_back;
     patch.edges[i] = on_line ? EdgeKind::kObserved : judge_edge(picture, plane, seen[i], seen[next], inside);
+    if (on_nosing) patch.nosing = lines.nosing;
+    if (on_back) patch.back = lines.back;
   }
   patch.invalid_fraction = invalid_share(picture, seen);
-  return true;
+}
+
+PolygonBuilder::Built PolygonBuilder::build(const FrameImage& picture, const Regions& regions, RegionId id,
+                                            const Outline2& outline, const SurfaceLines& lines,
+                                            SurfacePatches& patches) const noexcept {
+  const Region& own = regions[id];
+  const PlaneAxes axes = axes_of(own, lines);
+  // The picture's outline onto the plane: a projection keeps it convex, and turns clockwise in the picture into
+  // clockwise seen from the camera, so the order is reversed.
+  Outline2 flat;
+  for (std::size_t i = outline.size(); i-- > 0;) {
+    const Vec3 ray = picture.rays.ray(outline[i].x(), outline[i].y());
+    if (own.plane.inverse_depth(ray) > 0.1) static_cast<void>(flat.try_push_back(axes.to_plane(own.plane.point(ray))));
+  }
+  if (flat.size() < 3 || !(twice_area(flat) > 0.0)) return {};
+  const PixelCover cover(picture, regions, id, params_.apart_m);
+  if (own.kind == SurfaceKind::kRiser) cut_at_treads(picture, regions, id, axes, flat);
+  Pieces pieces;
+  static_cast<void>(pieces.try_push_back({flat, {}}));
+  for (const EdgeLine* line : {&lines.nosing, &lines.back, &lines.occluder}) {
+    cut_at_line(*line, axes, cover, outline, pieces);
+  }
+  part_pieces(picture, axes, cover, pieces);
+  Built built;
+  for (Piece& piece : pieces) {
+    std::optional<SurfacePatch> patch = patch_of(picture, own, lines, axes, piece);
+    if (!patch) continue;
+    if (built.pieces == 0) patch->nosing = lines.nosing, patch->back = lines.back;
+    ++(patches.try_push_back(*patch) ? built.pieces : built.without_room);
+  }
+  return built;
 }
 
 }  // namespace polygmap

@@ -3,12 +3,15 @@
 // every edge judged.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/polygons/column_outline.hpp"
 #include "algorithms/perception/polygons/convex_outline.hpp"
+#include "algorithms/perception/polygons/pixel_cover.hpp"
 #include "algorithms/perception/regions/region.hpp"
 
 namespace polygmap {
@@ -17,6 +20,20 @@ struct SurfaceLines {  // each only if valid
   EdgeLine nosing;
   EdgeLine back;
   EdgeLine occluder;  // where a nearer surface hides the rest: cuts the polygon, but is no end of it
+};
+
+struct PlaneSide {  // inward . (p - point) >= 0
+  Vec2 point = Vec2::Zero(), inward = Vec2::UnitX();
+};
+// Coordinates on a plane, in m.
+struct PlaneAxes {
+  Vec3 origin_m = Vec3::Zero(), x = Vec3::UnitX(), y = Vec3::UnitY(), normal = Vec3::UnitZ();
+  [[nodiscard]] Vec2 to_plane(const Vec3& p_m) const noexcept {
+    return {(p_m - origin_m).dot(x), (p_m - origin_m).dot(y)};
+  }
+  [[nodiscard]] Vec3 to_space(const Vec2& p_m) const noexcept { return origin_m + p_m.x() * x + p_m.y() * y; }
+  // The positive side of a line in the picture, where line . ray = 0.
+  [[nodiscard]] PlaneSide side_of(const Vec3& line) const noexcept;
 };
 
 class PolygonBuilder {
@@ -40,11 +57,36 @@ class PolygonBuilder {
   };
   void configure(const Params& params) noexcept { params_ = params; }
 
-  // The patch of regions[id]; false when its outline encloses no area.
-  [[nodiscard]] bool try_build(const FrameImage& picture, const Regions& regions, RegionId id, const Outline2& outline,
-                               const SurfaceLines& lines, SurfacePatch& patch) const noexcept;
+  struct Built {
+    std::size_t pieces = 0, without_room = 0;
+  };
+  // Adds the patches of regions[id]: convex pieces of one plane, the first with the surface's lines, another one with
+  // those that bound it. None when the outline encloses no area.
+  Built build(const FrameImage& picture, const Regions& regions, RegionId id, const Outline2& outline,
+              const SurfaceLines& lines, SurfacePatches& patches) const noexcept;
 
  private:
+  static constexpr std::size_t kMaxPieces = 4, kMaxCuts = 4;
+  struct Piece {
+    Outline2 flat;                           // on the plane
+    StaticVector<PlaneSide, kMaxCuts> cuts;  // that rid it of what is not its own
+  };
+  using Pieces = StaticVector<Piece, kMaxPieces>;
+
+  [[nodiscard]] static PlaneAxes axes_of(const Region& own, const SurfaceLines& lines) noexcept;
+  // outline: the surface in the picture.
+  void cut_at_line(const EdgeLine& edge, const PlaneAxes& axes, const PixelCover& cover, const Outline2& outline,
+                   Pieces& pieces) const noexcept;
+  void cut_at_treads(const FrameImage& picture, const Regions& regions, RegionId id, const PlaneAxes& axes,
+                     Outline2& flat) const noexcept;
+  void part_pieces(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
+                   Pieces& pieces) const noexcept;
+  // Nothing where the piece has no area.
+  [[nodiscard]] std::optional<SurfacePatch> patch_of(const FrameImage& picture, const Region& own,
+                                                     const SurfaceLines& lines, const PlaneAxes& axes,
+                                                     Piece& piece) const noexcept;
+  void judge_edges(const FrameImage& picture, const InversePlane& plane, const SurfaceLines& lines,
+                   const PlaneAxes& axes, const Piece& piece, SurfacePatch& patch) const noexcept;
   // The tread that most columns of the surface show right below (or above) it in the picture.
   [[nodiscard]] RegionId tread_beside(const FrameImage& picture, const Regions& regions, RegionId id,
                                       bool below) const noexcept;
