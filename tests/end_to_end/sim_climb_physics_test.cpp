@@ -41,10 +41,6 @@ ClimbSummary climb(const Case& c, GaitPattern gait) {
 int steps_onto_treads(const ClimbSummary& summary) {
   return static_cast<int>(std::ranges::count(summary.footsteps, true, &Footstep::onto_tread));
 }
-double share_on_their_treads(const ClimbSummary& summary) {
-  const auto inside = [](const Footstep& step) { return step.onto_tread && step.sole_margin_m >= 0.0; };
-  return static_cast<double>(std::ranges::count_if(summary.footsteps, inside)) / steps_onto_treads(summary);
-}
 
 // What either gait must show.
 void expect_climbed(const ClimbSummary& summary, int steps) {
@@ -70,8 +66,7 @@ TEST_P(PhysicsClimb, DoubleStep_ClimbedWithinTheFigures) {
   EXPECT_LE(summary.execution_error_m.max, 0.010);
   EXPECT_LE(summary.tracking_error_x_max_m, 0.030);
   EXPECT_LE(summary.tracking_error_z_max_m, 0.030);
-  EXPECT_GE(summary.sole_margin_min_m, -0.005);
-  EXPECT_GE(share_on_their_treads(summary), 0.95);
+  EXPECT_GE(summary.sole_margin_min_m, 0.0);
 }
 
 class SingleStepClimb : public testing::TestWithParam<Case> {};

@@ -1,146 +1,161 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gait on the robot under physics, with every sensor's errors and the module's own estimator, and footholds read
-// from the true stairs: what perception adds is left out, so that a climb takes a second or two.
+// The whole module on the robot under physics, with every sensor's errors and perception in the loop. A test tampers at
+// the ports, where a robot's sensors, drives and stairs would go wrong.
 #pragma once
 
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <memory>
+#include <vector>
 
-#include "algorithms/estimation/estimator.hpp"
-#include "algorithms/gait/gait.hpp"
+#include "firmware/pipeline.hpp"
+#include "firmware/schedule.hpp"
 #include "sim_stub/sim_robot.hpp"
-#include "tests/support/nominal_robot.hpp"
+#include "sim_stub/world/clearance.hpp"
 
 namespace polygmap::sim {
 
-[[nodiscard]] inline SimOptions without_pictures(SimOptions options) {
-  options.plant_kind = PlantKind::kMujoco;
-  options.camera.silent = {{0, std::numeric_limits<std::int64_t>::max()}};
-  return options;
-}
+class TamperedJoints final : public hal::JointBus {
+ public:
+  explicit TamperedJoints(hal::JointBus& bus) noexcept : bus_(bus) {}
+  [[nodiscard]] bool try_read(JointFeedback& feedback) noexcept override {
+    if (silent || !bus_.try_read(feedback)) return false;
+    if (tamper) tamper(feedback);
+    return true;
+  }
+  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override {
+    return bus_.try_write(instead ? *instead : command);
+  }
+
+  std::function<void(JointFeedback&)> tamper;
+  const JointCommand* instead = nullptr;  // another module's command goes to the drives
+  bool silent = false;
+
+ private:
+  hal::JointBus& bus_;
+};
+
+class TamperedCamera final : public hal::DepthCamera {
+ public:
+  explicit TamperedCamera(hal::DepthCamera& camera)
+      : camera_(camera), no_depth_(static_cast<std::size_t>(kDepthWidth_px) * kDepthHeight_px, 0) {}
+  [[nodiscard]] CameraIntrinsics intrinsics() const noexcept override { return camera_.intrinsics(); }
+  [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept override {
+    if (silent || !camera_.try_acquire(frame)) return false;
+    if (blank) frame.depth = no_depth_.data();
+    return true;
+  }
+  void release() noexcept override { camera_.release(); }
+
+  bool blank = false;   // frames arrive without one valid pixel
+  bool silent = false;  // no frame arrives
+
+ private:
+  hal::DepthCamera& camera_;
+  std::vector<std::uint16_t> no_depth_;
+};
+
+class TamperedLidar final : public hal::LidarOdometry {
+ public:
+  explicit TamperedLidar(hal::LidarOdometry& lidar) noexcept : lidar_(lidar) {}
+  [[nodiscard]] bool try_read(LioSample& sample) noexcept override { return !silent && lidar_.try_read(sample); }
+
+  bool silent = false;
+
+ private:
+  hal::LidarOdometry& lidar_;
+};
 
 class PhysicalClimb {
  public:
-  explicit PhysicalClimb(const SimOptions& options, const Gait::Params& gait = {}) : robot_(without_pictures(options)) {
-    estimator_.reset({}, nominal_robot());
-    gait_.reset(gait, nominal_robot());
+  explicit PhysicalClimb(const SimOptions& options, const Params& params = {})
+      : robot_(under_physics(options)),
+        pipeline_(std::make_unique<Pipeline>(Ports{camera, robot_, joints, lidar}, params)),
+        executive_(*pipeline_, robot_, pipeline_->lane_health(0)) {
+    executive_.start(robot_.now_ns() + kCycle_ns);
   }
 
-  // One tick; false when the gait has ended or the robot fell.
+  // One cycle; false when the gait has ended or the robot fell.
   bool tick() {
     robot_.advance();
-    const std::int64_t now_ns = robot_.now_ns();
-    ImuSample imu;
-    while (robot_.try_read(imu)) estimator_.add_imu(imu, now_ns);
-    JointFeedback joints;
-    if (robot_.try_read(joints) && !joints_silent) {
-      if (tamper) tamper(joints);
-      estimator_.add_joints(joints, now_ns);
+    executive_.tick(robot_.now_ns());
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      const int step = truth().step_index[f];
+      if (!status().stands[f] || !truth().in_contact[f] || step < 0) continue;  // or it brushed the step
+      sole_margin_min_m_ =
+          std::min(sole_margin_min_m_, sim::sole_margin_m(truth().true_T_sole[f], robot_.stairs(), step));
     }
-    LioSample lio;
-    while (robot_.try_read(lio)) estimator_.add_lio(lio, now_ns);
-    estimator_.tick(gait_.status().stands);
-    constexpr int kFrame_ticks = 16;
-    if (ticks_++ % kFrame_ticks == 0) {
-      footholds_ = search();
-      if (tamper_footholds) tamper_footholds(footholds_);
-    }
-    gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
-    if (tamper_command) tamper_command(command_, footholds_, estimator_.joints());
-    estimator_.to_encoders(command_);
-    (void)robot_.try_write(command_);
-    const GaitPhase phase = gait_.status().phase;
-    return phase != GaitPhase::kFinished && phase != GaitPhase::kStopped && !robot_.truth().fell;
+    const GaitPhase phase = status().phase;
+    return phase != GaitPhase::kFinished && phase != GaitPhase::kStopped && !truth().fell;
   }
   void run(double limit_s) {
     const double end_s = time_s() + limit_s;
     while (time_s() < end_s && tick()) {
     }
   }
+  // Goes on after the gait has ended, until the robot falls.
+  void run_on(double for_s) {
+    const double end_s = time_s() + for_s;
+    while (time_s() < end_s && !truth().fell) (void)tick();
+  }
+  void push(const Push& push) {
+    Vec3 force_n = Vec3::Zero();
+    force_n[push.axis] = push.impulse_ns / Push::kDuration_s;
+    robot_.plant().push(force_n);
+    run_on(Push::kDuration_s);
+    robot_.plant().push(Vec3::Zero());
+  }
 
   [[nodiscard]] const Truth& truth() const { return robot_.truth(); }
-  [[nodiscard]] const GaitStatus& status() const { return gait_.status(); }
-  [[nodiscard]] const StateEstimate& state() const { return estimator_.state(); }
-  [[nodiscard]] const JointCommand& command() const { return command_; }
-  [[nodiscard]] SimRobot& robot() { return robot_; }
-  [[nodiscard]] MujocoPlant& plant() { return dynamic_cast<MujocoPlant&>(robot_.plant()); }
-  [[nodiscard]] Gait& gait() { return gait_; }
+  [[nodiscard]] const StairWorld& stairs() const { return robot_.stairs(); }
+  [[nodiscard]] const GaitStatus& status() const { return pipeline_->control().gait_status(); }
+  [[nodiscard]] const JointCommand& command() const { return pipeline_->control().last_command(); }
   [[nodiscard]] double time_s() const { return seconds(robot_.now_ns()); }
-
-  // May change what the module sees, after it was made.
-  std::function<void(JointFeedback&)> tamper;
-  std::function<void(FootholdSet&)> tamper_footholds;
-  // The command before it is sent, with what else the gait was told.
-  std::function<void(JointCommand&, const FootholdSet&, const JointFeedback&)> tamper_command;
-  bool joints_silent = false;
+  // Of every sole that stood on a step, at any time, to its tread's edge; negative over it.
+  [[nodiscard]] double sole_margin_min_m() const { return sole_margin_min_m_; }
+  void request_stop() { pipeline_->control().request_stop(); }
+  // Planned against true centre of mass, seen from the left sole, which stands.
+  [[nodiscard]] double com_error_m() const {
+    const Transform& odom_T_sole = status().odom_T_sole_desired[0];
+    const Vec2& odom_p_com_m = status().odom_p_com_desired_m;
+    const Vec3 planned_m = odom_T_sole.inverse() * Vec3{odom_p_com_m.x(), odom_p_com_m.y(), odom_T_sole.p_m.z()};
+    const Vec3 true_m = truth().true_T_sole[0].inverse() * truth().true_p_com_m;
+    return (planned_m - true_m).head<2>().norm();
+  }
 
  private:
-  // What a map without errors would give at this moment.
-  [[nodiscard]] FootholdSet search() const {
-    const Truth& truth = robot_.truth();
-    const StateEstimate& state = estimator_.state();
-    // Seen from the base, as a camera sees it: legs and camera share an error of the attitude.
-    const Transform world_T_true = state.world_T_base() * truth.true_T_base.inverse();
-    FootholdSet set;
-    set.map_stamp_ns = state.stamp_ns - 40 * kNsPerMs;
-    set.obstruction = StopReason::kNone;
-    double stance_m = -1e9;
-    for (std::size_t f = 0; f < kFootCount; ++f) {
-      if (gait_.status().stands[f]) stance_m = std::max(stance_m, truth.true_T_sole[f].p_m.z());
-    }
-    const auto& steps = robot_.stairs().steps;
-    std::size_t next = 0;
-    while (next < steps.size() && steps[next].height_m < stance_m + 0.04) ++next;
-    if (next == steps.size()) {
-      set.obstruction = StopReason::kTop;
-      return set;
-    }
-    const auto place = [&](std::size_t index, std::array<Foothold, kFootCount>& feet) {
-      const Step& on = steps[index];
-      const double inset_m = std::min(0.5 * (on.back_x_m - on.nosing_x_m - 0.252), 0.014);
-      for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-        Foothold& hold = feet[index_of(foot)];
-        hold.position_m = world_T_true * Vec3{on.nosing_x_m + inset_m - kContactRectangle.heel_x_m,
-                                              side_sign(foot) * kStanceHalfWidth_m, on.height_m};
-        hold.yaw_rad = yaw_of(world_T_true.R);
-        hold.polygon_id = static_cast<std::uint32_t>(index) + 10;
-        hold.last_seen_ns = set.map_stamp_ns;
-      }
-    };
-    const Step& step = steps[next];
-    set.has_p_star = true;
-    place(next, set.p_star_feet);
-    set.p_star = set.p_star_feet[0];
-    set.has_p_star_star = next + 1 < steps.size();
-    if (set.has_p_star_star) place(next + 1, set.p_star_star_feet);
-    set.tread.nosing_a_m = world_T_true * Vec3{step.nosing_x_m, 0.6, step.height_m};
-    set.tread.nosing_b_m = world_T_true * Vec3{step.nosing_x_m, -0.6, step.height_m};
-    set.measured_rise_m = step.height_m - stance_m;
-    return set;
+  static SimOptions under_physics(SimOptions options) {
+    options.plant_kind = PlantKind::kMujoco;
+    return options;
   }
 
   SimRobot robot_;
-  Estimator estimator_;
-  Gait gait_;
-  JointCommand command_;
-  FootholdSet footholds_;
-  int ticks_ = 0;
+
+ public:
+  TamperedJoints joints{robot_};
+  TamperedCamera camera{robot_};
+  TamperedLidar lidar{robot_};
+
+ private:
+  std::unique_ptr<Pipeline> pipeline_;
+  OneLaneExecutive<> executive_;
+  double sole_margin_min_m_ = std::numeric_limits<double>::infinity();
 };
 
-[[nodiscard]] inline SimOptions few_steps(std::uint64_t seed) {
+[[nodiscard]] inline SimOptions stairs_of(int steps, std::uint64_t seed) {
   SimOptions options;
   options.seed = seed;
-  options.stairs.steps = 2;
+  options.stairs.steps = steps;
+  options.noise = seed % 2 == 0 ? NoiseKind::kCorrelated : NoiseKind::kWhite;
   return options;
 }
 
 // Runs on for for_s after the gait ended: upright, on both feet, its centre of mass at rest where planned.
 [[nodiscard]] inline bool stands_for(PhysicalClimb& climb, double for_s) {
-  const double end_s = climb.time_s() + for_s;
-  while (climb.time_s() < end_s && !climb.truth().fell) (void)climb.tick();
+  climb.run_on(for_s);
   return !climb.truth().fell && climb.truth().in_contact[0] && climb.truth().in_contact[1] &&
-         climb.gait().balance().com_error_m().norm() < 0.02;
+         climb.com_error_m() < 0.02;
 }
 // Until the nth swing onto a tread; false when that never came.
 [[nodiscard]] inline bool run_to_swing_onto(PhysicalClimb& climb, std::uint32_t nth, double limit_s = 40.0) {

@@ -62,6 +62,20 @@ def not_climbed(summaries):
     return "\n\nNot climbed:\n\n" + "\n".join(f"- `polygmap climb {s['run']}`: {s.get('reason', '')}" for s in bad)
 
 
+def outcomes(what, groups):
+    """A table of how each group's climbs ended."""
+    def line(summaries):
+        fell = sum(bool(s.get("fell")) for s in summaries)
+        climbed = sum(s.get("verdict") == "pass" for s in summaries)
+        stopped = sum(s.get("ended_by") == "module" and s["steps_climbed"] < s["steps_total"] for s in summaries)
+        over = sum((s.get("sole_margin_mm_min") or 0) < 0 for s in summaries)
+        rest = len(summaries) - climbed - stopped - fell
+        return len(summaries), climbed, stopped, fell, rest, over, FIGURES["sole margin mm"](summaries)
+
+    return rows((what, "climbs", "climbed", "stopped on both feet", "fell", "failed otherwise", "a sole over an edge", "least margin mm"),
+                [(name, *line(s)) for name, s in groups.items()])
+
+
 def grouped(engine, what, named):
     """named: {group: [arguments]} -> {group: summaries}, one run of the engine."""
     flat = [(group, a) for group, all_arguments in named.items() for a in all_arguments]
@@ -69,6 +83,10 @@ def grouped(engine, what, named):
     for (group, _), summary in zip(flat, engine.climbs(what, [a for _, a in flat])):
         groups[group].append(summary)
     return dict(groups)
+
+
+def falls(summaries):
+    return f"{sum(bool(s.get('fell')) for s in summaries)} of {len(summaries)}"
 
 
 def span(seeds):
@@ -196,17 +214,43 @@ def pushes(engine, seeds):
     groups = grouped(engine, "pushes", named)
     everything = [s for g in groups.values() for s in g]
 
-    def outcome(summaries):
-        fell = sum(bool(s.get("fell")) for s in summaries)
-        climbed = sum(s.get("verdict") == "pass" for s in summaries)
-        over = sum((s.get("sole_margin_mm_min") or 0) < 0 for s in summaries)
-        return len(summaries), climbed, len(summaries) - climbed - fell, fell, over, FIGURES["sole margin mm"](summaries)
-
-    table = rows(("pushed", "climbs", "climbed", "stopped on both feet", "fell", "a sole over an edge", "least margin mm"),
-                 [(name, *outcome(s)) for name, s in groups.items()])
     text = (f"10 N s on the torso at eight moments of the second of four stairs, perception in the loop, {span(seeds)}, under physics.\n\n" +
-            table + not_climbed(everything))
-    return Page(text, {"1 falls": ("falls after pushes of 10 N s on the stairs", f"{outcome(everything)[3]} of {len(everything)}", "0")})
+            outcomes("pushed", groups) + not_climbed(everything))
+    return Page(text, {"1 falls": ("falls after pushes of 10 N s on the stairs", falls(everything), "0")})
+
+
+BODIES = {
+    "as believed": [],
+    "torso 10 % lighter": ["--mass-scale", 0.9],
+    "torso 20 % heavier": ["--mass-scale", 1.2],
+    "its centre 15 mm behind": ["--torso-offset-x", -0.015],
+    "its centre 30 mm ahead": ["--torso-offset-x", 0.030],
+    "friction 0.4 instead of 0.8": ["--friction", 0.4],
+}
+
+
+def bodies(engine, seeds):
+    """Another body or ground than the module believes."""
+    groups = grouped(engine, "bodies", {f"{gait}, {body}": [
+        ["--gait", gait, "--steps", 4, "--noise", own_noise(s), *arguments, "--seed", s] for s in seeds]
+        for gait in ("ds", "ss") for body, arguments in BODIES.items()})
+    everything = [s for g in groups.values() for s in g]
+    return Page(f"Four steps under physics with a body or a ground that the module does not know of, perception in the loop, {span(seeds)}.\n\n" +
+                figures(groups, ("climbed", "s/step", "CoM mm", "foothold mm, median; max", "sole margin mm", "clearance mm", "torque; speed")) +
+                not_climbed(everything),
+                {"1 climbed": ("with another body or ground than believed", FIGURES["climbed"](everything), "all")})
+
+
+def balusters(engine, seeds):
+    """Posts along both edges, beside the stairs and on the treads, as close together as one tread and as half of one."""
+    groups = grouped(engine, "balusters", {f"{1000 * spacing:.0f} mm apart, {place}, stairs {width} m wide": [
+        ["--steps", 4, "--balusters", spacing, "--baluster-inset", inset, "--width", width, "--noise", own_noise(s), "--seed", s]
+        for s in seeds]
+        for width in (1.2, 0.9) for place, inset in (("beside the treads", -0.06), ("20 mm inside their ends", 0.02)) for spacing in (0.28, 0.14)})
+    everything = [s for g in groups.values() for s in g]
+    return Page(f"Four steps under physics with posts of 40 mm along both edges, {span(seeds)}. A climb passes, or stops on both feet and says "
+                "why.\n\n" + outcomes("posts", groups) + not_climbed(everything),
+                {"1 falls": ("falls between balusters", falls(everything), "0")})
 
 
 TABLES = {
@@ -216,5 +260,7 @@ TABLES = {
     "kinematic": Table("Climbs on the kinematic plant", range(1, 51), kinematic, 4),
     "nosing": Table("Overhanging nosings", range(1, 6), nosing, 6),
     "odometry": Table("Odometry, lidar odometry and the fused pose (the paper's Fig. 4)", (*range(1, 21), *range(101, 121)), odometry, 4),
-    "pushes": Table("Pushes on the stairs", (3, 5, 8, 11), pushes, 12),
+    "pushes": Table("Pushes on the stairs", range(1, 5), pushes, 12),
+    "bodies": Table("Other bodies and grounds than believed", range(1, 7), bodies, 4),
+    "balusters": Table("Stairs between balusters", range(1, 5), balusters, 3),
 }

@@ -101,6 +101,16 @@ void declare(CLI::App& climb, ClimbArguments& a) {
                   "Pushes of the torso, over 0.1 s: when, s; along x (up the stairs) or y (to the left); how much, N s")
       ->expected(1, 16)
       ->type_name("\"T,AXIS,NS\"");
+  climb
+      .add_option("--mass-scale", a.options.mujoco.torso_mass_scale,
+                  "The torso's true mass over the mass that the module believes")
+      ->capture_default_str();
+  climb
+      .add_option("--torso-offset-x", a.options.mujoco.torso_offset_x_m,
+                  "How far the torso's centre of mass truly is ahead of where the module believes it, m")
+      ->capture_default_str();
+  climb.add_option("--friction", a.options.mujoco.friction, "Friction of the soles on floor and stairs")
+      ->capture_default_str();
   climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
 
   climb.add_option("--camera", a.camera, "The robot's camera, 640x480 at most; the module is told what the file says")
@@ -213,6 +223,10 @@ std::string complaint(ClimbArguments& a) {
   if (!a.pushes.empty() && a.options.plant != PlantKind::kMujoco) {
     return "--push needs --plant mujoco: forces do not move the kinematic plant.";
   }
+  for (const char* name : {"--mass-scale", "--torso-offset-x", "--friction"}) {
+    if (a.said->count(name) == 0 || a.options.plant == PlantKind::kMujoco) continue;
+    return std::string(name) + " needs --plant mujoco: the kinematic plant has neither masses nor friction.";
+  }
   for (const std::string& text : a.pushes) {
     const std::optional<Push> push = read_push(text);
     if (!push) {
@@ -234,17 +248,20 @@ std::string complaint(ClimbArguments& a) {
     return "--contacts inferred needs --plant kinematic: under physics a leg that swings feigns a touch-down.";
   }
 
-  struct Error {
+  struct Range {
     const char* name;
-    double value, most;
+    double value, least, most;
     const char* unit;
   };
-  for (const Error& error : {Error{"--scan-ms", a.options.scan_ms, 32.0, " ms"},
-                             Error{"--mount-error", a.options.mount_error_deg, 5.0, " degrees"},
-                             Error{"--scale-error", a.options.scale_error, 0.05, ""}}) {
-    if (!(error.value >= 0.0 && error.value <= error.most)) {
-      return std::string(error.name) + " must be from 0 to " + number(error.most) + error.unit + ", not " +
-             number(error.value) + ".";
+  for (const Range& range : {Range{"--scan-ms", a.options.scan_ms, 0.0, 32.0, " ms"},
+                             Range{"--mount-error", a.options.mount_error_deg, 0.0, 5.0, " degrees"},
+                             Range{"--scale-error", a.options.scale_error, 0.0, 0.05, ""},
+                             Range{"--mass-scale", a.options.mujoco.torso_mass_scale, 0.5, 2.0, ""},
+                             Range{"--torso-offset-x", a.options.mujoco.torso_offset_x_m, -0.1, 0.1, " m"},
+                             Range{"--friction", a.options.mujoco.friction, 0.05, 2.0, ""}}) {
+    if (!(range.value >= range.least && range.value <= range.most)) {
+      return std::string(range.name) + " must be from " + number(range.least) + " to " + number(range.most) +
+             range.unit + ", not " + number(range.value) + ".";
     }
   }
   if (!a.camera.empty()) {

@@ -83,6 +83,7 @@ SimOptions sim_options(const ClimbOptions& options) {
   sim.noise = options.noise;
   sim.plant_kind = options.plant;
   sim.pushes = options.pushes;
+  sim.mujoco = options.mujoco;
   sim.camera.stairs_shift_m = {options.render_dx_m, options.render_dy_m, options.render_dz_m};
   sim.camera.missing_step = options.render_missing_step;
   sim.camera.threaded = options.threaded_render;

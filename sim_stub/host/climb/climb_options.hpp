@@ -12,7 +12,7 @@
 #include "firmware/config/camera_file.hpp"
 #include "firmware/params.hpp"
 #include "sim_stub/camera/noise_kind.hpp"
-#include "sim_stub/plant/plant.hpp"
+#include "sim_stub/plant/mujoco_plant.hpp"
 #include "sim_stub/world/stair_world.hpp"
 
 namespace polygmap::sim {
@@ -27,6 +27,7 @@ struct ClimbOptions {
   NoiseKind noise = NoiseKind::kWhite;
   PlantKind plant = PlantKind::kMujoco;
   std::vector<Push> pushes;
+  MujocoPlant::Params mujoco;  // the body and the ground as they are; the module believes the data sheet
   GaitPattern gait = GaitPattern::kDoubleStep;
   std::string out_dir;          // empty: no files
   double time_limit_s = 150.0;  // simulated

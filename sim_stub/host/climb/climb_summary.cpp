@@ -82,6 +82,9 @@ Json arguments_json(const ClimbOptions& o) {
                {"self_filter", o.self_filter},
                {"contacts", o.infer_contacts ? "inferred" : "sensed"},
                {"pushes", pushes_json(o.pushes)},
+               {"mass_scale", o.mujoco.torso_mass_scale},
+               {"torso_offset_x_m", o.mujoco.torso_offset_x_m},
+               {"friction", o.mujoco.friction},
                {"render_shift_m", {o.render_dx_m, o.render_dy_m, o.render_dz_m}},
                {"render_missing_step", o.render_missing_step < 0 ? Json(nullptr) : Json(o.render_missing_step + 1)},
                {"blank_depth", o.blank_depth}};

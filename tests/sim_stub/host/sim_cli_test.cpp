@@ -130,7 +130,8 @@ TEST(ClimbCommand, EveryOption_ReachesTheRun) {
   const Call c =
       call(words("climb --steps 4 --rise 0.15 --tread 0.3 --width 0.8 --nosing 0.02 --landing 1.5 --jitter 0.01 "
                  "--gait ss --seed 42 --noise correlated --render-shift 0.03 -0.01 0.02 "
-                 "--render-missing-step 3 --blank-depth --no-self-filter --push 5,x,10 --push 7.5,y,-8 --out " +
+                 "--render-missing-step 3 --blank-depth --no-self-filter --push 5,x,10 --push 7.5,y,-8 "
+                 "--mass-scale 1.2 --torso-offset-x -0.015 --friction 0.4 --out " +
                  temporary("every/deep")));
   ASSERT_TRUE(c.options) << c.err;
   EXPECT_EQ(c.options->stairs.steps, 4);
@@ -146,6 +147,9 @@ TEST(ClimbCommand, EveryOption_ReachesTheRun) {
   EXPECT_EQ(c.options->pushes[1].at_s, 7.5);
   EXPECT_EQ(c.options->pushes[1].axis, 1);
   EXPECT_EQ(c.options->pushes[1].impulse_ns, -8.0);
+  EXPECT_EQ(c.options->mujoco.torso_mass_scale, 1.2);
+  EXPECT_EQ(c.options->mujoco.torso_offset_x_m, -0.015);
+  EXPECT_EQ(c.options->mujoco.friction, 0.4);
   EXPECT_EQ(c.options->seed, 42U);
   EXPECT_EQ(c.options->noise, NoiseKind::kCorrelated);
   EXPECT_EQ(c.options->out_dir, temporary("every/deep"));
@@ -170,6 +174,23 @@ TEST(ClimbCommand, BadLength_IsRefusedWithOneSentence) {
   }
   for (const char* value : {"nan", "-0.001", "0.066", "x", ""}) {
     expect_refused({"climb", "--jitter", value}, "--jitter");
+  }
+}
+
+TEST(ClimbCommand, BodyOutsideItsRangeOrOnTheKinematicPlant_IsRefused) {
+  for (const char* value : {"nan", "inf", "0.49", "2.1", "x", ""}) {
+    expect_refused({"climb", "--mass-scale", value}, "--mass-scale");
+  }
+  for (const char* value : {"nan", "-0.11", "0.11", "x", ""}) {
+    expect_refused({"climb", "--torso-offset-x", value}, "--torso-offset-x");
+  }
+  for (const char* value : {"nan", "0", "-0.4", "2.1", "x", ""}) {
+    expect_refused({"climb", "--friction", value}, "--friction");
+  }
+  for (const char* option : {"--mass-scale", "--torso-offset-x", "--friction"}) {
+    const char* value = option == std::string("--torso-offset-x") ? "0.03" : "0.9";
+    expect_refused({"climb", "--plant", "kinematic", option, value}, option);
+    EXPECT_TRUE(call({"climb", option, value}).options) << option;
   }
 }
 
