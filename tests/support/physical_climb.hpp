@@ -46,9 +46,9 @@ class PhysicalClimb {
       footholds_ = search();
       if (tamper_footholds) tamper_footholds(footholds_);
     }
-    gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
-    if (tamper_command) tamper_command(command_, footholds_, estimator_.joints());
-    estimator_.to_encoders(command_);
+    gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.leg_sensing().joints(), command_);
+    if (tamper_command) tamper_command(command_, footholds_, estimator_.leg_sensing().joints());
+    estimator_.leg_sensing().to_encoders(command_);
     (void)robot_.try_write(command_);
     const GaitPhase phase = gait_.status().phase;
     return phase != GaitPhase::kFinished && phase != GaitPhase::kStopped && !robot_.truth().fell;

@@ -164,7 +164,7 @@ void take_params(ClimbArguments& a) {
   Params& params = a.options.params;
   config::read_params(a.options.params_file, params);
   if (a.said->count("--gait") == 0) a.gait = name_of(params.gait.planner.pattern);
-  if (a.said->count("--contacts") == 0 && params.estimator.infer_forces) a.contacts = "inferred";
+  if (a.said->count("--contacts") == 0 && params.estimator.legs.infer_forces) a.contacts = "inferred";
   a.no_self_filter |= !params.self_filter;
   a.no_mount_estimate |= !params.estimate_mount;
 }

@@ -40,15 +40,15 @@ std::string complaint(const EstimateArguments& a) {
 ReplayOptions options_of(const EstimateArguments& a) {
   ReplayOptions options;
   Params params;
-  static_cast<ProprioceptiveOdometry::Params&>(params.estimator) = options.odometry;
+  params.estimator = options.estimator;
   params.robot = options.robot;
   if (!a.params.empty()) config::read_params(a.params, params);
-  options.odometry = params.estimator;
+  options.estimator = params.estimator;
   options.robot = params.robot;
   options.params_hash = config::hash_of(params);
   if (a.lio_tau_s > 0.0) {
-    options.odometry.fusion.tau_s = a.lio_tau_s;
-    options.odometry.fusion.tau_spm = 0.0;
+    options.estimator.fusion.tau_s = a.lio_tau_s;
+    options.estimator.fusion.tau_spm = 0.0;
   }
   if (!a.lidar_mount.empty()) {
     const auto rad = [&a](std::size_t i) { return a.lidar_mount[i] * kPi / 180.0; };
@@ -122,8 +122,7 @@ CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
           "--lio-tau", a.lio_tau_s,
           "Time constant of the offset's low-pass, s; 0: 0.4 s per mm of LIO's noise as measured, 1 s at least")
       ->type_name("TAU");
-  estimate
-      ->add_option("--params", a.params, "Parameters of the module; of the estimator, the odometry's, and of the robot")
+  estimate->add_option("--params", a.params, "Parameters of the module; of the estimator and of the robot")
       ->type_name("PARAMS.toml");
   estimate->add_option("--json", a.json, "Scores, biases, innovations, rejections")->type_name("OUT.json");
   estimate->add_option("--csv", a.csv, "Pose, twist, sigmas, contact probabilities, LIO's age, row by row")

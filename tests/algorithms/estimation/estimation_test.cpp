@@ -307,7 +307,7 @@ TEST_F(EstimatorTest, Standstill_BiasedSensors_FindsBiasTiltAndFloor) {
   run(walk, spec, 1100 * kNsPerMs);
   const StateEstimate& state = estimator_.state();
   ASSERT_TRUE(state.initialised);
-  EXPECT_LT((estimator_.gyro_bias_radps() - walk.gyro_bias_radps()).norm(), 4e-4);
+  EXPECT_LT((estimator_.odometry().attitude().gyro_bias_radps() - walk.gyro_bias_radps()).norm(), 4e-4);
   EXPECT_NEAR(yaw_of(state.odom_T_base.R), 0.0, 5e-4);
   EXPECT_LT(so3_log(state.odom_T_base.R).head<2>().norm(),
             0.02);  // accelerometer bias and mount: 0.4 deg each, 1 sigma
@@ -464,9 +464,9 @@ TEST_F(EstimatorTest, BadSamples_EveryKind_IsCountedAndTheStateStaysGood) {
   const Estimator::Counters& counters = estimator_.counters();
   EXPECT_EQ(counters.imu_invalid, 2U);
   EXPECT_EQ(counters.imu_stale, 2U);
-  EXPECT_EQ(counters.joints_invalid, 2U);
-  EXPECT_EQ(counters.joints_stale, 2U);
-  EXPECT_EQ(counters.joints_jump, 1U);
+  EXPECT_EQ(estimator_.leg_sensing().counters().invalid, 2U);
+  EXPECT_EQ(estimator_.leg_sensing().counters().stale, 2U);
+  EXPECT_EQ(estimator_.leg_sensing().counters().jump, 1U);
   EXPECT_EQ(counters.gaps, 1U);
   const StateEstimate& state = estimator_.state();
   EXPECT_EQ(state.stamp_ns, t_ns_ - kTick_ns);
@@ -485,9 +485,9 @@ TEST_F(EstimatorTest, StampsOfTheFuture_OfEitherSensor_AreCountedAndTheNextSampl
   tick(imu, joints, kBothStand);
   t_ns_ += kTick_ns;
   EXPECT_EQ(estimator_.counters().imu_future, 1U);
-  EXPECT_EQ(estimator_.counters().joints_future, 1U);
+  EXPECT_EQ(estimator_.leg_sensing().counters().future, 1U);
   run(walk, spec, 1600 * kNsPerMs);
-  EXPECT_EQ(estimator_.counters().imu_stale + estimator_.counters().joints_stale, 0U);
+  EXPECT_EQ(estimator_.counters().imu_stale + estimator_.leg_sensing().counters().stale, 0U);
   EXPECT_EQ(estimator_.state().oldest_input_ns, t_ns_ - kTick_ns);
 }
 
@@ -498,7 +498,7 @@ TEST_F(EstimatorTest, StampsSixMillisecondsAhead_OfALateTick_AreTaken) {
   estimator_.add_imu(walk.imu(6 * kNsPerMs), 0);
   estimator_.add_joints(walk.joints(6 * kNsPerMs), 0);
   EXPECT_EQ(estimator_.newest_imu_ns(), 6 * kNsPerMs);
-  EXPECT_EQ(estimator_.joints().stamp_ns, 6 * kNsPerMs);
+  EXPECT_EQ(estimator_.leg_sensing().joints().stamp_ns, 6 * kNsPerMs);
 }
 
 TEST_F(EstimatorTest, ImuFasterThanTheTick_EverySampleCounts) {

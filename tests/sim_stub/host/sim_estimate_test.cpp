@@ -119,7 +119,7 @@ TEST(EstimateReplay, ClimbWithBiasedNoisySensors_DriftsByLittle_AndKnowsHowFar) 
 
 TEST(EstimateReplay, FootSlipsThreeTenthsForAFifthOfASecond_PositionStaysWithinTwentyMillimetres) {
   ReplayOptions careless;
-  careless.odometry.motion.gain = 0.0;
+  careless.estimator.motion.gain = 0.0;
   constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
   for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
     WalkSpec spec;
@@ -137,7 +137,7 @@ TEST(EstimateReplay, FootSlipsThreeTenthsForAFifthOfASecond_PositionStaysWithinT
 
 TEST(EstimateReplay, NoSlip_VelocityIsAsGoodAsThatOfAFilterThatLetsNothingGo) {
   ReplayOptions careless;
-  careless.odometry.motion.gain = 0.0;
+  careless.estimator.motion.gain = 0.0;
   constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
   for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
     WalkSpec spec;
@@ -228,7 +228,7 @@ TEST(EstimateReplay, LateLioWithOutliersAndFutureStamps_IsCountedAndNeverMakesAS
   EXPECT_GT(count(LioVerdict::kAccepted), lio.size() - 8);
   EXPECT_GT(result.lio_not_arrived, 0U);
   EXPECT_EQ(std::accumulate(result.lio.begin(), result.lio.end(), result.lio_not_arrived), lio.size());
-  EXPECT_LE(result.largest_slew_m, options.odometry.fusion.slew_mps * seconds(SyntheticWalk::kTick_ns) + 1e-9);
+  EXPECT_LE(result.largest_slew_m, options.estimator.fusion.slew_mps * seconds(SyntheticWalk::kTick_ns) + 1e-9);
   EXPECT_EQ(result.ticks[10].lio_age_ns, -1);
   EXPECT_LT(result.ticks.back().lio_age_ns, 210 * kNsPerMs);
 }
@@ -329,8 +329,8 @@ TEST(EstimateReplay, BiasedLogWithLateLio_IsNoWorseThanWithoutAndKnowsHowGoodItI
     const Score without = score(log, replay(log, {}, {}));
     for (const double tau_s : {0.0, 1.0, 4.0}) {  // 0: by LIO's noise
       ReplayOptions options;
-      if (tau_s > 0.0) options.odometry.fusion.tau_s = tau_s;
-      if (tau_s > 0.0) options.odometry.fusion.tau_spm = 0.0;
+      if (tau_s > 0.0) options.estimator.fusion.tau_s = tau_s;
+      if (tau_s > 0.0) options.estimator.fusion.tau_spm = 0.0;
       const Score with = score(log, replay(log, lio, options));
       EXPECT_LT(with.position_rmse_m, std::max(without.position_rmse_m, 0.004)) << seed << ", tau " << tau_s;
       EXPECT_GT(with.nees_in_bounds, 0.65) << seed << ", tau " << tau_s;
