@@ -12,6 +12,8 @@
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/estimate/estimate_report.hpp"
+#include "sim_stub/host/estimate/log_plausibility.hpp"
+#include "sim_stub/host/output_file.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -136,13 +138,18 @@ int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& er
     return kExitUsage;
   }
   try {
+    for (const std::string& file : {a.json, a.csv}) {
+      if (!file.empty()) remove_output(file);  // a former run's is none of this one
+    }
     const EstimateLog log = read_estimate_log(a.log);
     const std::vector<LioRow> lio = a.lio.empty() ? std::vector<LioRow>{} : read_lio_log(a.lio, log.start_s);
+    const std::vector<std::string> warnings = doubts_about(log, a.log);
+    for (const std::string& warning : warnings) err << "polygmap: warning: " << warning << "\n";
     const ReplayOptions options = options_of(a);
     const Replay result = replay(log, lio, options);
     if (!is_finite(result))
       throw config::FileError("\"" + a.log + "\": the estimate is not finite, so nothing is written.");
-    if (!a.json.empty()) write_estimate_json(a.json, log, lio, result, options.params_hash);
+    if (!a.json.empty()) write_estimate_json(a.json, log, lio, result, options.params_hash, warnings);
     if (!a.csv.empty()) write_estimate_csv(a.csv, log, result);
     print(log, result, out);
     if (!a.lio.empty()) print_lio(result, lio.size(), out);
