@@ -147,7 +147,8 @@ double CsvTable::number(std::size_t row, std::size_t column, double limit) const
   if (!std::isfinite(value)) fail(row, name + " is " + shown(cell) + ", not a finite number");
   if (!(std::abs(value) <= limit)) {
     std::ostringstream sentence;
-    sentence << name << " is " << value << ", beyond what can be true (" << limit << ")";
+    sentence << name << " is " << value << ", beyond what can be true (" << limit
+             << "): is it in the unit that the column is named after?";
     fail(row, sentence.str());
   }
   return value;

@@ -11,8 +11,10 @@
 #include <sstream>
 
 #include "algorithms/geometry/so3.hpp"
+#include "firmware/config/file_error.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/estimate/estimate_report.hpp"
+#include "sim_stub/host/estimate/log_plausibility.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
 
@@ -372,6 +374,75 @@ TEST(EstimateReplay, CassieWalk_OwnAttitude_StaysWithinNineMillimetres) {
   EXPECT_LT(drift_percent(s), 0.95);
 }
 
+// --- Units and axes --------------------------------------------------------------------------------------------------
+
+class LogDoubts : public testing::Test {
+ protected:
+  LogDoubts() {
+    WalkSpec spec;
+    spec.steps = 3;
+    log_ = climb_log(spec);
+  }
+  // What is said of the log when every row is changed so; "refused: " in front where it is refused.
+  template <typename Change>
+  std::string said(const Change& change, bool with_truth = true) const {
+    EstimateLog changed = log_;
+    changed.has_truth = with_truth;
+    for (LogRow& row : changed.rows) change(row);
+    try {
+      std::string all;
+      for (const std::string& doubt : doubts_about(changed, "log.csv")) all += doubt;
+      return all;
+    } catch (const config::FileError& error) {
+      return std::string("refused: ") + error.what();
+    }
+  }
+  static void expect(const std::string& said, const std::string& wanted, bool refused) {
+    EXPECT_EQ(said.starts_with("refused: "), refused) << said;
+    EXPECT_NE(said.find(wanted), std::string::npos) << said;
+  }
+  EstimateLog log_;
+};
+
+TEST_F(LogDoubts, LogAsItShouldBe_HasNone) {
+  for (const bool with_truth : {true, false}) EXPECT_EQ(said([](LogRow&) {}, with_truth), "");
+}
+
+TEST_F(LogDoubts, WrongUnits_AreRefused) {
+  for (const bool with_truth : {true, false}) {
+    expect(said([](LogRow& row) { row.accel_mps2 /= kGravity_mps2; }, with_truth), "it is in g, but", true);
+    expect(said([](LogRow& row) { row.gyro_radps *= 180.0 / kPi; }, with_truth), "degrees per second", true);
+    expect(said([](LogRow& row) { row.accel_mps2 *= 100.0; }, with_truth), "other units", true);
+    const auto in_decimetres = [](LogRow& row) {
+      for (Vec3& foot_m : row.base_p_foot_m) foot_m *= 10.0;
+    };
+    expect(said(in_decimetres, with_truth), "are they in metres", true);
+  }
+}
+
+TEST_F(LogDoubts, UpOfTheAccelerometerIsNotThatOfTheFeet_IsRefused) {
+  expect(said([](LogRow& row) { row.accel_mps2.z() *= -1.0; }), "swapped or flipped", true);
+  expect(said([](LogRow& row) { std::swap(row.accel_mps2.x(), row.accel_mps2.z()); }), "swapped or flipped", true);
+}
+
+TEST_F(LogDoubts, OddNumbersThatMayBeRight_AreTold) {
+  expect(said([](LogRow& row) { row.accel_mps2 *= 1.5; }), "gravity's 9.81", false);
+  expect(said([](LogRow& row) { row.gyro_radps = -row.gyro_radps; }), "truth's quaternion", false);
+  expect(said([](LogRow& row) { row.accel_mps2.x() += 2.0; }), "leans out of the vertical", false);
+}
+
+TEST(EstimateLogs, RecordedOnRobots_AreInTheRightUnitsAndAxes) {
+  const char* given = std::getenv("POLYGMAP_SHARED_DATA");
+  const std::string folder = given != nullptr ? given : POLYGMAP_SHARED_DATA_DEFAULT;
+  int read = 0;
+  for (const std::string name : {"/cassie/cassie_walk_open.csv", "/icub/walk.csv", "/icub/gazebo_0_35.csv"}) {
+    if (!std::filesystem::exists(folder + name)) continue;
+    ++read;
+    EXPECT_TRUE(doubts_about(read_estimate_log(folder + name), name).empty()) << name;
+  }
+  if (read == 0) GTEST_SKIP() << "No logs in " << folder << ": set POLYGMAP_SHARED_DATA.";
+}
+
 // --- The command -----------------------------------------------------------------------------------------------------
 
 class EstimateCommand : public testing::Test {
@@ -436,6 +507,32 @@ TEST_F(EstimateCommand, StandingLog_WritesScoresAndOneRowPerRow) {
   for (; std::getline(csv, line); ++rows) EXPECT_EQ(std::count(line.begin(), line.end(), ','), columns);
   EXPECT_EQ(rows, 500);
   EXPECT_EQ(line.empty(), true);
+}
+
+TEST_F(EstimateCommand, LogThatIsOdd_IsEstimatedWithAWarning) {
+  std::string text = log_text(500);
+  for (std::size_t at = 0; (at = text.find("9.81", at)) != std::string::npos; at += 4) text.replace(at, 4, "6.50");
+  ASSERT_EQ(call({"estimate", write("odd.csv", text), "--json", at("out.json")}), kExitPass) << err_;
+  EXPECT_EQ(err_.rfind("polygmap: warning: The median acceleration is 6.5", 0), 0U) << err_;
+  EXPECT_EQ(nlohmann::json::parse(std::ifstream(at("out.json"))).at("warnings").size(), 1U);
+}
+
+TEST_F(EstimateCommand, LogThatIsRefused_LeavesNoFormerOutput) {
+  write("out.json", "{}");
+  write("out.csv", "old");
+  std::string text = log_text(50);
+  for (std::size_t at = 0; (at = text.find("9.81", at)) != std::string::npos; at += 4) text.replace(at, 4, "1.00");
+  expect_refused({"estimate", write("g.csv", text), "--json", at("out.json"), "--csv", at("out.csv")}, "it is in g");
+  EXPECT_FALSE(std::filesystem::exists(at("out.json")));
+  EXPECT_FALSE(std::filesystem::exists(at("out.csv")));
+}
+
+TEST_F(EstimateCommand, StampsInMilliseconds_OrFeetInMillimetres_AreNamed) {
+  std::string stamps = std::string(kHeader) + "\n", feet = log_text(5);
+  for (int i = 0; i < 50; ++i) stamps += std::to_string(100000 + 2 * i) + kRow + "\n";
+  expect_refused({"estimate", write("ms.csv", stamps)}, "are the stamps in seconds?");
+  for (std::size_t at = 0; (at = feet.find("-0.8", at)) != std::string::npos; at += 4) feet.replace(at, 4, "-800");
+  expect_refused({"estimate", write("mm.csv", feet)}, "left_foot_z_m is -800, beyond what can be true (20)");
 }
 
 TEST_F(EstimateCommand, BlankLinesAtTheEnd_AreNoRows) {
