@@ -10,15 +10,15 @@
 namespace polygmap::sim {
 namespace {
 
-// CLI11 names them from the last to the first.
-std::string unexpected(const CLI::App& app, const std::vector<std::string>& words) {
-  const std::vector<std::string> left = app.remaining(true);
-  const auto is_left = [&left](const std::string& word) { return std::ranges::find(left, word) != left.end(); };
+// "The following arguments were not expected: 3 --stepz", from the last to the first.
+std::string unexpected(const std::string& message, const std::vector<std::string>& words) {
+  const std::string left = message.substr(std::min(message.find(": "), message.size() - 1) + 1) + " ";
+  const auto is_left = [&left](const std::string& word) { return left.find(" " + word + " ") != std::string::npos; };
   const auto is_option = [&is_left](const std::string& word) { return word.starts_with("-") && is_left(word); };
   auto culprit = std::ranges::find_if(words, is_option);
   if (culprit != words.end()) return "There is no option " + *culprit;
   culprit = std::ranges::find_if(words, is_left);
-  if (culprit == words.end()) return "There is a word too many";
+  if (culprit == words.end()) return message;
   return "\"" + *culprit + "\" is " + (culprit == words.begin() ? "no command" : "a word too many");
 }
 
@@ -52,11 +52,20 @@ std::string mismatched(const std::string& message) {
 }  // namespace
 
 std::string complaint_of(const CLI::ParseError& error, const CLI::App& app, const std::vector<std::string>& words) {
-  const std::string kind = error.get_name();
-  if (kind == "ExtrasError") return unexpected(app, words);
-  if (kind == "ConversionError") return unconverted(error.what(), app);
-  if (kind == "ArgumentMismatch") return mismatched(error.what());
-  return error.what();
+  std::string message = error.what();
+  switch (static_cast<CLI::ExitCodes>(error.get_exit_code())) {
+    case CLI::ExitCodes::ExtrasError:
+      return unexpected(message, words);
+    case CLI::ExitCodes::ConversionError:
+      return unconverted(message, app);
+    case CLI::ExitCodes::ArgumentMismatch:
+      return mismatched(message);
+    case CLI::ExitCodes::ValidationError:  // "--seed: must be a whole number"
+      if (const std::size_t end = message.find(": must "); end != std::string::npos) message.erase(end, 1);
+      return message;
+    default:
+      return message;
+  }
 }
 
 // CLI11 2.1 lets -1 and 2^64 wrap around.

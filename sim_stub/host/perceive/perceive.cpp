@@ -221,15 +221,16 @@ const char* name_of(UpSource source) {
 std::string doubt_of_gravity(const Perceived& perceived) {
   constexpr double kLevel = 0.97;  // cosine of 14 degrees
   if (perceived.up_source != UpSource::kGiven) return {};
-  double upright_m2 = 0.0, upside_down_m2 = 0.0;
+  double upright_m2 = 0.0, upside_down_m2 = 0.0, all_m2 = 0.0;
   for (const PerceivedPlane& pieces : perceived.planes) {
     for (const Surface& s : pieces) {
       const double cosine = s.normal.dot(perceived.camera_up);
+      all_m2 += s.area_m2;
       if (cosine > kLevel) upright_m2 += s.area_m2;
       if (cosine < -kLevel) upside_down_m2 += s.area_m2;
     }
   }
-  if (upright_m2 > 0.05 * upside_down_m2 || upside_down_m2 < kMinLevelArea_m2) return {};
+  if (upright_m2 > 0.05 * upside_down_m2 || upside_down_m2 < std::max(kMinLevelArea_m2, 0.1 * all_m2)) return {};
   return "By --gravity every level surface in view is a ceiling: does it point down, x right, y down, z forward?";
 }
 
