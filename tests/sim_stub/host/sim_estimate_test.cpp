@@ -410,7 +410,7 @@ TEST_F(LogDoubts, LogAsItShouldBe_HasNone) {
 
 TEST_F(LogDoubts, WrongUnits_AreRefused) {
   for (const bool with_truth : {true, false}) {
-    expect(said([](LogRow& row) { row.accel_mps2 /= kGravity_mps2; }, with_truth), "it is in g, but", true);
+    expect(said([](LogRow& row) { row.accel_mps2 /= kGravity_mps2; }, with_truth), "is in g, but", true);
     expect(said([](LogRow& row) { row.gyro_radps *= 180.0 / kPi; }, with_truth), "degrees per second", true);
     expect(said([](LogRow& row) { row.accel_mps2 *= 100.0; }, with_truth), "other units", true);
     const auto in_decimetres = [](LogRow& row) {
@@ -522,7 +522,7 @@ TEST_F(EstimateCommand, LogThatIsRefused_LeavesNoFormerOutput) {
   write("out.csv", "old");
   std::string text = log_text(50);
   for (std::size_t at = 0; (at = text.find("9.81", at)) != std::string::npos; at += 4) text.replace(at, 4, "1.00");
-  expect_refused({"estimate", write("g.csv", text), "--json", at("out.json"), "--csv", at("out.csv")}, "it is in g");
+  expect_refused({"estimate", write("g.csv", text), "--json", at("out.json"), "--csv", at("out.csv")}, "is in g, but");
   EXPECT_FALSE(std::filesystem::exists(at("out.json")));
   EXPECT_FALSE(std::filesystem::exists(at("out.csv")));
 }
