@@ -173,7 +173,7 @@ TEST_F(PerceiveCommand, FilesThatAreNone_AreNamedInOneSentence) {
   expect_refused({"perceive", at("cut.png"), "--camera", camera}, "cut.png");
   expect_refused({"perceive", at("text.png"), "--camera", camera}, "text.png");
   expect_refused({"perceive", at("empty.png"), "--camera", camera}, "is empty");
-  expect_refused({"perceive", folder_, "--camera", camera}, "Cannot read the picture");
+  expect_refused({"perceive", folder_, "--camera", camera}, "is a folder, not a picture");
   expect_refused({"perceive", at("large.png"), "--camera", camera}, "is 1025x32, more than the 1024x768 that are read");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--json", "/proc/none/x.json"}, "/proc/none");
   expect_refused({"perceive", at("good.png"), "--camera", camera, "--gravity", "0", "0", "0"}, "--gravity");
