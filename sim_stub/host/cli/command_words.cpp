@@ -11,15 +11,17 @@ namespace polygmap::sim {
 namespace {
 
 // "The following arguments were not expected: 3 --stepz", from the last to the first.
-std::string unexpected(const std::string& message, const std::vector<std::string>& words) {
+std::string unexpected(const std::string& message, const CLI::App& app, const std::vector<std::string>& words) {
   const std::string left = message.substr(std::min(message.find(": "), message.size() - 1) + 1) + " ";
   const auto is_left = [&left](const std::string& word) { return left.find(" " + word + " ") != std::string::npos; };
   const auto is_option = [&is_left](const std::string& word) { return word.starts_with("-") && is_left(word); };
+  if (words.empty()) return message;
+  const bool commanded = !app.get_subcommands().empty();
+  if (!commanded && !words[0].starts_with("-")) return "\"" + words[0] + "\" is no command";
   auto culprit = std::ranges::find_if(words, is_option);
   if (culprit != words.end()) return "There is no option " + *culprit;
-  culprit = std::ranges::find_if(words, is_left);
-  if (culprit == words.end()) return message;
-  return "\"" + *culprit + "\" is " + (culprit == words.begin() ? "no command" : "a word too many");
+  culprit = std::find_if(words.begin() + 1, words.end(), is_left);
+  return culprit == words.end() ? message : "\"" + *culprit + "\" is a word too many";
 }
 
 // "Could not convert: --steps = abc"
@@ -55,7 +57,7 @@ std::string complaint_of(const CLI::ParseError& error, const CLI::App& app, cons
   std::string message = error.what();
   switch (static_cast<CLI::ExitCodes>(error.get_exit_code())) {
     case CLI::ExitCodes::ExtrasError:
-      return unexpected(message, words);
+      return unexpected(message, app, words);
     case CLI::ExitCodes::ConversionError:
       return unconverted(message, app);
     case CLI::ExitCodes::ArgumentMismatch:
