@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "firmware/sensor_reading.hpp"
 #include "scheduler/schedule_table.hpp"
 
 namespace polygmap {
@@ -13,7 +14,6 @@ namespace {
 // that catch up find everything read by the first of them; for a latency below one cycle none of them is misled.
 constexpr std::int64_t kMissing_ns = kCycle_ns;
 constexpr std::int64_t kLioTimeout_ns = 2 * kNsPerS;  // twenty poses
-constexpr int kMaxReadsPerCycle = 4;  // of one port: a backlog is worked off, a babbling driver is not followed
 
 bool all_finite(const JointCommand& command) noexcept {
   for (const JointSetpoint& joint : command.joints) {
@@ -27,8 +27,8 @@ bool all_finite(const JointCommand& command) noexcept {
 std::uint32_t imu_rejections(const Estimator::Counters& counters) noexcept {
   return counters.imu_invalid + counters.imu_stale + counters.imu_future;
 }
-std::uint32_t joint_rejections(const Estimator::Counters& counters) noexcept {
-  return counters.joints_invalid + counters.joints_stale + counters.joints_future + counters.joints_jump;
+std::uint32_t joint_rejections(const LegSensing::Counters& counters) noexcept {
+  return counters.invalid + counters.stale + counters.future + counters.jump;
 }
 std::uint32_t lio_rejections(const Estimator::Counters& counters) noexcept {
   return std::accumulate(counters.lio.begin(), counters.lio.end(), 0U) - counters.lio_of(LioVerdict::kAccepted) -
@@ -54,27 +54,20 @@ ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometr
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {
   if (first_ns_ < 0) first_ns_ = now_ns;
-  bool imu_came = false;
-  ImuSample imu;
-  for (int i = 0; i < kMaxReadsPerCycle && imu_port_.try_read(imu); ++i) {
-    estimator_.add_imu(imu, now_ns);
-    imu_came = true;
-  }
+  const bool imu_came = read_imu(imu_port_, now_ns, estimator_);
   if (!imu_came && now_ns - estimator_.newest_imu_ns() >= kMissing_ns) health_.raise(Fault::kImuMissing, now_ns);
   JointFeedback joints;
   if (joint_port_.try_read(joints)) {
     estimator_.add_joints(joints, now_ns);
-  } else if (now_ns - estimator_.joints().stamp_ns >= kMissing_ns) {
+  } else if (now_ns - estimator_.leg_sensing().joints().stamp_ns >= kMissing_ns) {
     health_.raise(Fault::kJointFeedbackMissing, now_ns);
   }
   return Progress::kDone;
 }
 
-// A LIO pose meets the state of its stamp, which may be this cycle's: after the tick. It moves the next one.
 Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
   estimator_.tick(gait_.status().stands);
-  LioSample lio;
-  for (int i = 0; i < kMaxReadsPerCycle && lio_port_.try_read(lio); ++i) estimator_.add_lio(lio, now_ns);
+  read_lio(lio_port_, now_ns, estimator_);
   answer_pose_request(now_ns);
   return Progress::kDone;
 }
@@ -82,10 +75,10 @@ Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
 // Whatever is silent, the gait runs: a foot in the air has to come down.
 Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   command_ready_ = false;
-  if (!estimator_.has_joints()) return Progress::kIdle;  // where the legs are is not known yet
+  if (!estimator_.leg_sensing().any()) return Progress::kIdle;  // where the legs are is not known yet
   if (link_.footholds.try_take()) footholds_ = link_.footholds.front();
-  gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.joints(), command_);
-  estimator_.to_encoders(command_);
+  gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.leg_sensing().joints(), command_);
+  estimator_.leg_sensing().to_encoders(command_);
   command_ready_ = true;
   hand_over_touch_down();
 
@@ -127,7 +120,7 @@ Progress ControlLane::health(std::int64_t now_ns) noexcept {
 void ControlLane::report_rejections(std::int64_t now_ns) noexcept {
   const Estimator::Counters& counters = estimator_.counters();
   health_.follow(Fault::kImuRejected, now_ns, imu_rejections(counters));
-  health_.follow(Fault::kJointFeedbackRejected, now_ns, joint_rejections(counters));
+  health_.follow(Fault::kJointFeedbackRejected, now_ns, joint_rejections(estimator_.leg_sensing().counters()));
   health_.follow(Fault::kLioRejected, now_ns, lio_rejections(counters));
   health_.follow(Limit::kHeightRejected, now_ns, counters.height_rejected);
 }

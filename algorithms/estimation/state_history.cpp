@@ -13,7 +13,13 @@ Transform between(const Transform& a, const Transform& b, double share) noexcept
 }  // namespace
 
 void StateHistory::push(const StateEstimate& state) noexcept {
-  if (states_.empty() || state.stamp_ns > states_.newest().stamp_ns) states_.push_overwrite(state);
+  if (!states_.empty() && state.stamp_ns <= states_.newest().stamp_ns) return;
+  const std::size_t count = states_.size();
+  if (count >= 2 && states_.newest().stamp_ns - states_[count - 2].stamp_ns < kMinPeriod_ns) {
+    states_.replace_newest(state);
+  } else {
+    states_.push_overwrite(state);
+  }
 }
 
 bool StateHistory::try_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {

@@ -30,6 +30,15 @@ int write_all(int file, std::string_view content) {
              : errno;  // what is no file has nothing to sync
 }
 
+// The name is on the disk only once its folder is. A file system that cannot say so is none the worse for it.
+void sync_folder_of(const std::filesystem::path& path) {
+  const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  (void)::fsync(descriptor);
+  (void)::close(descriptor);
+}
+
 }  // namespace
 
 void write_output(const std::string& path, std::string_view content) {
@@ -44,12 +53,20 @@ void write_output(const std::string& path, std::string_view content) {
   int error = write_all(file, content);
   if (::close(file) != 0 && error == 0) error = errno;
   if (error == 0 && !direct && ::rename(written.c_str(), whole.c_str()) != 0) error = errno;
+  if (error == 0 && !direct) sync_folder_of(whole);
   if (error == 0) return;
   if (!direct) ::unlink(written.c_str());
   fail(path, error);
 }
 
 void remove_output(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code none;
+  if (fs::is_symlink(path, none)) {  // the link is its owner's, /dev/stdout for one: what it leads to is emptied
+    if (fs::is_regular_file(path, none) && ::truncate(path.c_str(), 0) != 0) fail(path, errno);
+    return;
+  }
+  if (fs::exists(path, none) && !fs::is_regular_file(path, none) && !fs::is_directory(path, none)) return;
   if (::unlink(path.c_str()) != 0 && errno != ENOENT) fail(path, errno);
 }
 

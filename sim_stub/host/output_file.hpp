@@ -11,7 +11,8 @@ namespace polygmap::sim {
 // regular file, as /dev/stdout, is written to directly. Throws config::FileError.
 void write_output(const std::string& path, std::string_view content);
 
-// What a former run left at path must not be taken for this one's. Nothing there is fine. Throws config::FileError.
+// What a former run left at path must not be taken for this one's: a file goes, one behind a link is emptied, a device
+// stays. Nothing there is fine. Throws config::FileError.
 void remove_output(const std::string& path);
 
 }  // namespace polygmap::sim

@@ -72,7 +72,8 @@ std::string_view complaint(const EstimationBench& end, const EstimationWalk& wal
     return (form.state().template head<3>() - end.axes.odom_p_base_m()).norm();
   };
   if (grown(LioVerdict::kAccepted) != walk.ticks.size()) return "LIO poses were rejected";
-  if (end.estimator.lio_innovations().position.count == 0 || end.fusion.innovations().position.count == 0)
+  if (end.estimator.odometry().fusion().innovations().position.count == 0 ||
+      end.fusion.innovations().position.count == 0)
     return "LIO is not aligned";
   if (!end.estimator.state().initialised) return "the estimator is not initialised";
   if (walk.ticks.front().stance[0] == walk.ticks[walk.ticks.size() / 2].stance[0]) return "no foot swings";

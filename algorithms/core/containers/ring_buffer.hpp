@@ -32,6 +32,11 @@ class RingBuffer {
       ++size_;
     }
   }
+  // Needs one to replace.
+  constexpr void replace_newest(const T& value) noexcept {
+    assert(size_ > 0);
+    data_[(head_ + size_ - 1) % Capacity] = value;
+  }
   // False, and no change, when full.
   [[nodiscard]] constexpr bool try_push(const T& value) noexcept {
     if (full()) return false;

@@ -3,6 +3,8 @@
 // another.
 #pragma once
 
+#include <optional>
+
 #include "algorithms/robot/leg_kinematics.hpp"
 
 namespace polygmap {
@@ -13,7 +15,16 @@ struct LegMeasurement {
   Vec3 base_v_sole_mps = Vec3::Zero();
   Vec3 base_w_sole_radps = Vec3::Zero();
   bool sole_known = true;          // its rotation and motion; without them the foot is one point
-  double position_sigma_m = 3e-4;  // white noise of the position, per axis
+  double position_sigma_m = 3e-4;  // white noise of the position, per axis; 0: as measured (FootMotion)
+};
+
+// Both legs at one moment.
+struct LegSample {
+  std::int64_t stamp_ns = 0;
+  std::array<LegMeasurement, kFootCount> legs;
+  std::array<double, kFootCount> foot_force_n{};  // 0 in the air
+  // Probability of contact, where somebody else has judged it: then forces do not count.
+  std::optional<std::array<double, kFootCount>> stated_contact;
 };
 
 [[nodiscard]] LegMeasurement measure_leg(const LegGeometry& geometry, Foot leg, const JointVector& q_rad,

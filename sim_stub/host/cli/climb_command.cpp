@@ -4,7 +4,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -14,6 +13,7 @@
 #include <ostream>
 
 #include "firmware/config/param_file.hpp"
+#include "sim_stub/host/cli/command_words.hpp"
 #include "sim_stub/host/cli/estimate_command.hpp"
 #include "sim_stub/host/cli/obstacle_options.hpp"
 #include "sim_stub/host/cli/params_command.hpp"
@@ -46,27 +46,6 @@ struct ClimbArguments {
   std::vector<std::string> pushes;
   const CLI::App* said = nullptr;  // which options were
 };
-
-// CLI11 2.1 lets -1 and 2^64 wrap around.
-std::string whole_number(const std::string& text) {
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool good = error == std::errc{} && end == text.data() + text.size();
-  return good ? "" : "must be a whole number from 0 to 2^64 - 1, not " + text;
-}
-
-// CLI11 2.1 reads 010 as eight: here digits are decimal.
-std::string decimal(std::string& text) {
-  const std::size_t first = text.find_first_not_of("+-");
-  if (first == std::string::npos || text[first] != '0') return "";
-  if (text.find_first_not_of("0123456789", first) != std::string::npos)
-    return "must be a whole decimal number, not " + text;
-  text.erase(first, std::min(text.find_first_not_of('0', first), text.size() - 1) - first);
-  return "";
-}
-
-// CLI11 2.1 takes an empty word for the number 0.
-std::string not_empty(const std::string& text) { return text.empty() ? "must not be empty" : ""; }
 
 void declare(CLI::App& climb, ClimbArguments& a) {
   StairParams& stairs = a.options.stairs;
@@ -174,19 +153,13 @@ void take_params(ClimbArguments& a) {
   Params& params = a.options.params;
   config::read_params(a.options.params_file, params);
   if (a.said->count("--gait") == 0) a.gait = name_of(params.gait.planner.pattern);
-  if (a.said->count("--contacts") == 0 && params.estimator.infer_forces) a.contacts = "inferred";
+  if (a.said->count("--contacts") == 0 && params.estimator.legs.infer_forces) a.contacts = "inferred";
   a.no_self_filter |= !params.self_filter;
   a.no_mount_estimate |= !params.estimate_mount;
 }
 
-// Empty when the arguments are good, else one sentence. Completes the options.
-std::string complaint(ClimbArguments& a) {
-  try {
-    take_params(a);
-  } catch (const config::FileError& error) {
-    return error.what();
-  }
-  const StairParams& stairs = a.options.stairs;
+// Parts of complaint(): empty, or one sentence. Those that take all arguments complete the options.
+std::string stairs_complaint(const StairParams& stairs) {
   if (stairs.steps < 1 || stairs.steps > kMaxSteps) {
     return "--steps must be from 1 to " + std::to_string(kMaxSteps) + ", not " + std::to_string(stairs.steps) + ".";
   }
@@ -214,12 +187,28 @@ std::string complaint(ClimbArguments& a) {
     return "--nosing must be shorter than the shortest tread, " + number(shortest_tread_m) + " m, not " +
            number(stairs.nosing_m) + ".";
   }
+  return {};
+}
+
+std::string plant_complaint(ClimbArguments& a) {
   if (a.gait != "ds" && a.gait != "ss") return "--gait must be ds or ss, not \"" + a.gait + "\".";
   a.options.gait = a.gait == "ss" ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
   if (a.plant != "kinematic" && a.plant != "mujoco") {
     return "--plant must be kinematic or mujoco, not \"" + a.plant + "\".";
   }
   a.options.plant = a.plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kKinematic;
+  if (a.contacts != "sensed" && a.contacts != "inferred") {
+    return "--contacts must be sensed or inferred, not \"" + a.contacts + "\".";
+  }
+  a.options.infer_contacts = a.contacts == "inferred";
+  if (a.options.infer_contacts && a.options.plant != PlantKind::kKinematic) {
+    return "--contacts inferred needs --plant kinematic: under physics a leg that swings feigns a touch-down.";
+  }
+
+  return {};
+}
+
+std::string pushes_complaint(ClimbArguments& a) {
   if (!a.pushes.empty() && a.options.plant != PlantKind::kMujoco) {
     return "--push needs --plant mujoco: forces do not move the kinematic plant.";
   }
@@ -235,19 +224,14 @@ std::string complaint(ClimbArguments& a) {
     }
     a.options.pushes.push_back(*push);
   }
+  return {};
+}
+
+std::string errors_complaint(ClimbArguments& a) {
   if (a.noise != "white" && a.noise != "correlated") {
     return "--noise must be white or correlated, not \"" + a.noise + "\".";
   }
   a.options.noise = a.noise == "white" ? NoiseKind::kWhite : NoiseKind::kCorrelated;
-
-  if (a.contacts != "sensed" && a.contacts != "inferred") {
-    return "--contacts must be sensed or inferred, not \"" + a.contacts + "\".";
-  }
-  a.options.infer_contacts = a.contacts == "inferred";
-  if (a.options.infer_contacts && a.options.plant != PlantKind::kKinematic) {
-    return "--contacts inferred needs --plant kinematic: under physics a leg that swings feigns a touch-down.";
-  }
-
   struct Range {
     const char* name;
     double value, least, most;
@@ -264,20 +248,25 @@ std::string complaint(ClimbArguments& a) {
              range.unit + ", not " + number(range.value) + ".";
     }
   }
-  if (!a.camera.empty()) {
-    try {
-      a.options.camera = config::read_camera(a.camera);
-      a.options.camera_file = a.camera;
-    } catch (const config::FileError& error) {
-      return error.what();
-    }
-    const CameraIntrinsics& k = a.options.camera->intrinsics;
-    if (k.width_px > kDepthWidth_px || k.height_px > kDepthHeight_px || k.width_px % 2 != 0 || k.height_px % 2 != 0) {
-      return "Camera file \"" + a.camera + "\": the robot's camera is at most " + std::to_string(kDepthWidth_px) + "x" +
-             std::to_string(kDepthHeight_px) + ", width and height even, not " + std::to_string(k.width_px) + "x" +
-             std::to_string(k.height_px) + ".";
-    }
+  return {};
+}
+
+// Throws config::FileError.
+std::string camera_complaint(ClimbArguments& a) {
+  if (a.camera.empty()) return {};
+  a.options.camera = config::read_camera(a.camera);
+  a.options.camera_file = a.camera;
+  const CameraIntrinsics& k = a.options.camera->intrinsics;
+  if (k.width_px > kDepthWidth_px || k.height_px > kDepthHeight_px || k.width_px % 2 != 0 || k.height_px % 2 != 0) {
+    return "Camera file \"" + a.camera + "\": the robot's camera is at most " + std::to_string(kDepthWidth_px) + "x" +
+           std::to_string(kDepthHeight_px) + ", width and height even, not " + std::to_string(k.width_px) + "x" +
+           std::to_string(k.height_px) + ".";
   }
+  return {};
+}
+
+std::string picture_complaint(ClimbArguments& a) {
+  const StairParams& stairs = a.options.stairs;
   if (a.missing_step) {
     if (*a.missing_step < 1 || *a.missing_step > stairs.steps) {
       return "--render-missing-step must be a step from 1 to " + std::to_string(stairs.steps) + ", not " +
@@ -296,9 +285,25 @@ std::string complaint(ClimbArguments& a) {
     a.options.render_dy_m = a.render_shift_m[1];
     a.options.render_dz_m = a.render_shift_m[2];
   }
+  return {};
+}
+
+// Empty when the arguments are good, else one sentence. Completes the options.
+std::string complaint(ClimbArguments& a) {
+  try {
+    take_params(a);
+    std::string sentence = stairs_complaint(a.options.stairs);
+    for (const auto part : {plant_complaint, pushes_complaint, errors_complaint, camera_complaint, picture_complaint}) {
+      if (sentence.empty()) sentence = part(a);
+    }
+    if (!sentence.empty()) return sentence;
+  } catch (const config::FileError& error) {
+    return error.what();
+  }
   a.options.self_filter = !a.no_self_filter;
   a.options.estimate_mount = !a.no_mount_estimate;
-  a.options.time_limit_s = std::max(a.options.time_limit_s, kTimeLimit_s + kTimeLimitPerStep_s * stairs.steps);
+  a.options.time_limit_s =
+      std::max(a.options.time_limit_s, kTimeLimit_s + kTimeLimitPerStep_s * a.options.stairs.steps);
   return {};
 }
 
@@ -384,7 +389,8 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   } catch (const CLI::ParseError& error) {
     constexpr std::array<std::string_view, 4> kCommands{"climb", "perceive", "estimate", "params"};
     const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
-    err << "polygmap: " << error.what() << "; see polygmap " << (named ? arguments[0] + " " : "") << "--help.\n";
+    err << "polygmap: " << complaint_of(error, app, arguments) << "; see polygmap " << (named ? arguments[0] + " " : "")
+        << "--help.\n";
     return kExitUsage;
   }
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);

@@ -12,6 +12,8 @@
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/estimate/estimate_report.hpp"
+#include "sim_stub/host/estimate/log_plausibility.hpp"
+#include "sim_stub/host/output_file.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -40,15 +42,15 @@ std::string complaint(const EstimateArguments& a) {
 ReplayOptions options_of(const EstimateArguments& a) {
   ReplayOptions options;
   Params params;
-  static_cast<ProprioceptiveOdometry::Params&>(params.estimator) = options.odometry;
+  params.estimator = options.estimator;
   params.robot = options.robot;
   if (!a.params.empty()) config::read_params(a.params, params);
-  options.odometry = params.estimator;
+  options.estimator = params.estimator;
   options.robot = params.robot;
   options.params_hash = config::hash_of(params);
   if (a.lio_tau_s > 0.0) {
-    options.odometry.fusion.tau_s = a.lio_tau_s;
-    options.odometry.fusion.tau_spm = 0.0;
+    options.estimator.fusion.tau_s = a.lio_tau_s;
+    options.estimator.fusion.tau_spm = 0.0;
   }
   if (!a.lidar_mount.empty()) {
     const auto rad = [&a](std::size_t i) { return a.lidar_mount[i] * kPi / 180.0; };
@@ -122,8 +124,7 @@ CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
           "--lio-tau", a.lio_tau_s,
           "Time constant of the offset's low-pass, s; 0: 0.4 s per mm of LIO's noise as measured, 1 s at least")
       ->type_name("TAU");
-  estimate
-      ->add_option("--params", a.params, "Parameters of the module; of the estimator, the odometry's, and of the robot")
+  estimate->add_option("--params", a.params, "Parameters of the module; of the estimator and of the robot")
       ->type_name("PARAMS.toml");
   estimate->add_option("--json", a.json, "Scores, biases, innovations, rejections")->type_name("OUT.json");
   estimate->add_option("--csv", a.csv, "Pose, twist, sigmas, contact probabilities, LIO's age, row by row")
@@ -137,13 +138,18 @@ int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& er
     return kExitUsage;
   }
   try {
+    for (const std::string& file : {a.json, a.csv}) {
+      if (!file.empty()) remove_output(file);  // a former run's is none of this one
+    }
     const EstimateLog log = read_estimate_log(a.log);
     const std::vector<LioRow> lio = a.lio.empty() ? std::vector<LioRow>{} : read_lio_log(a.lio, log.start_s);
+    const std::vector<std::string> warnings = doubts_about(log, a.log);
+    for (const std::string& warning : warnings) err << "polygmap: warning: " << warning << "\n";
     const ReplayOptions options = options_of(a);
     const Replay result = replay(log, lio, options);
     if (!is_finite(result))
       throw config::FileError("\"" + a.log + "\": the estimate is not finite, so nothing is written.");
-    if (!a.json.empty()) write_estimate_json(a.json, log, lio, result, options.params_hash);
+    if (!a.json.empty()) write_estimate_json(a.json, log, lio, result, options.params_hash, warnings);
     if (!a.csv.empty()) write_estimate_csv(a.csv, log, result);
     print(log, result, out);
     if (!a.lio.empty()) print_lio(result, lio.size(), out);

@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -14,7 +13,9 @@
 #include "firmware/config/param_file.hpp"
 #include "firmware/params.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
+#include "sim_stub/host/cli/command_words.hpp"
 #include "sim_stub/host/cli/paths.hpp"
+#include "sim_stub/host/output_file.hpp"
 #include "sim_stub/host/perceive/perceive.hpp"
 
 namespace polygmap::sim {
@@ -27,6 +28,16 @@ constexpr const char *kLabels = ".labels.png", *kPlanes = ".planes.json", *kPict
 std::string place(const std::string& out, const std::string& depth, bool several, const char* suffix) {
   if (!several) return out;
   return (std::filesystem::path(out) / (std::filesystem::path(depth).stem().string() + suffix)).string();
+}
+
+// The files that are written of one picture.
+std::vector<std::string> outputs_of(const PerceiveArguments& a, const std::string& depth) {
+  std::vector<std::string> files;
+  for (const auto& [out, suffix] :
+       {std::pair{&a.labels, kLabels}, std::pair{&a.json, kPlanes}, std::pair{&a.picture, kPicture}}) {
+    if (!out->empty()) files.push_back(place(*out, depth, a.depth.size() > 1, suffix));
+  }
+  return files;
 }
 
 std::string complaint(const PerceiveArguments& a) {
@@ -44,11 +55,7 @@ std::string complaint(const PerceiveArguments& a) {
   if (!a.params.empty()) taken.insert(one_name(a.params));
   for (const std::string& path : a.depth) taken.insert(one_name(path));
   for (const std::string& path : a.depth) {
-    const std::array<std::pair<std::string, const char*>, 3> outputs{
-        {{a.labels, kLabels}, {a.json, kPlanes}, {a.picture, kPicture}}};
-    for (const auto& [out, suffix] : outputs) {
-      if (out.empty()) continue;
-      const std::string file = place(out, path, a.depth.size() > 1, suffix);
+    for (const std::string& file : outputs_of(a, path)) {
       if (!taken.insert(one_name(file)).second) return "\"" + file + "\" would be overwritten.";
     }
   }
@@ -89,9 +96,9 @@ Tuning tuning_of(const PerceiveArguments& a) {
   return tuning;
 }
 
-// The line that says what was found. Throws config::FileError.
+// The line that says what was found; what is doubtful goes to err. Throws config::FileError.
 std::string one_picture(const PerceiveArguments& a, const config::CameraProfile& camera, const Tuning& tuning,
-                        const std::string& path, bool several) {
+                        const std::string& path, bool several, std::ostream& err) {
   const DepthPng picture = read_depth(path);
   const std::string own = size_text(picture.width_px, picture.height_px);
   const std::string expected = size_text(camera.intrinsics.width_px, camera.intrinsics.height_px);
@@ -106,10 +113,14 @@ std::string one_picture(const PerceiveArguments& a, const config::CameraProfile&
   std::vector<double>& times = perceived.microseconds;
   std::sort(times.begin(), times.end());
   const Vec3& up = perceived.camera_up;
-  const char* source = gravity ? "given" : (perceived.up_assumed ? "assumed: no plane looks level" : "found");
+  if (const std::string doubt = doubt_of_gravity(perceived); !doubt.empty()) {
+    err << "polygmap: warning: \"" << path << "\": " << doubt << "\n";
+  }
+  const std::string source = name_of(perceived.up_source) +
+                             std::string(perceived.up_source == UpSource::kAssumed ? ": no plane looks level" : "");
   char line[192];
   std::snprintf(line, sizeof line, ": %zu planes, median %.0f us, max %.0f us, up (%.3f, %.3f, %.3f) %s\n",
-                perceived.planes.size(), times[times.size() / 2], times.back(), up.x(), up.y(), up.z(), source);
+                perceived.planes.size(), times[times.size() / 2], times.back(), up.x(), up.y(), up.z(), source.c_str());
   return path + line;
 }
 
@@ -140,7 +151,9 @@ CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
   perceive->add_option("--json", a.json, "The planes" + folder)->type_name("OUT.json");
   perceive->add_option("--picture", a.picture, "Planes, polygons and nosings over the depth" + folder)
       ->type_name("OUT.png");
-  perceive->add_option("--repeat", a.repeat, "Extract N times, for the median and the longest time")->type_name("N");
+  perceive->add_option("--repeat", a.repeat, "Extract N times, for the median and the longest time")
+      ->transform(CLI::Validator(decimal, ""))
+      ->type_name("N");
   return perceive;
 }
 
@@ -158,6 +171,9 @@ int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& er
   config::CameraProfile camera;
   Tuning tuning;
   try {
+    for (const std::string& path : a.depth) {
+      for (const std::string& file : outputs_of(a, path)) remove_output(file);  // a former run's is none of this one
+    }
     tuning = tuning_of(a);
     camera = config::read_camera(a.camera);
     if (several) make_folders({a.labels, a.json, a.picture});
@@ -167,7 +183,7 @@ int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& er
   }
   for (const std::string& path : a.depth) {
     try {
-      out << one_picture(a, camera, tuning, path, several) << std::flush;
+      out << one_picture(a, camera, tuning, path, several, err) << std::flush;
     } catch (const std::exception& error) {
       complain(error);
     }

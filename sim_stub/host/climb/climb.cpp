@@ -181,7 +181,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   Params params = options.params;
   params.gait.planner.pattern = options.gait;
   params.self_filter = options.self_filter;
-  params.estimator.infer_forces = options.infer_contacts;
+  params.estimator.legs.infer_forces = options.infer_contacts;
   params.estimate_mount = options.estimate_mount;
   if (options.camera) {
     params.surfaces.noise = options.camera->noise;

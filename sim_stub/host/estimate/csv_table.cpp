@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::size_t kMostShown = 24;                            // of a cell, in a sentence
 constexpr std::size_t kMostFile_bytes = std::size_t{512} << 20U;  // an hour of a log at 1 kHz
-constexpr std::ptrdiff_t kMostColumns = 1000;
+constexpr std::size_t kMostColumns = 1000;
+constexpr std::size_t kMostRows = 2'000'000;  // half an hour at 1 kHz: what is made of a row takes 2 KB
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r\n";
@@ -25,14 +26,10 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> cells;
-  for (std::size_t from = 0;;) {
-    const std::size_t comma = line.find(',', from);
-    cells.push_back(trimmed(line.substr(from, comma - from)));
-    if (comma == std::string_view::npos) return cells;
-    from = comma + 1;
-  }
+// The line has as many.
+std::string_view nth_cell(std::string_view line, std::size_t n) {
+  for (; n > 0; --n) line.remove_prefix(line.find(',') + 1);
+  return trimmed(line.substr(0, line.find(',')));
 }
 
 std::string read_text(const std::string& path) {
@@ -72,29 +69,38 @@ CsvTable::CsvTable(std::string path) : path_(std::move(path)), text_(read_text(p
     const std::string_view line = rest.substr(0, end);
     rest.remove_prefix(std::min(end + 1, rest.size()));
     if (trimmed(line).empty() && trimmed(rest).empty() && number > 1) break;  // the file's end
-    if (std::ranges::count(line, ',') >= kMostColumns) {
+    const auto cells = static_cast<std::size_t>(1 + std::ranges::count(line, ','));
+    if (cells > kMostColumns) {
       throw config::FileError("\"" + path_ + "\" line " + std::to_string(number) + ": has more than " +
                               std::to_string(kMostColumns) + " columns.");
     }
-    const std::vector<std::string_view> cells = split(line);
     if (number == 1) {
-      header_ = cells;
-      refuse_other_dialects(line);
-      for (auto name = header_.begin(); name != header_.end(); ++name) {
-        if (!name->empty() && std::find(name + 1, header_.end(), *name) != header_.end()) {
-          throw config::FileError("\"" + path_ + "\" line 1: the column " + shown(*name) + " is named twice.");
-        }
-      }
+      read_header(line);
       continue;
     }
-    lines_.push_back({number, cells_.size()});
-    if (cells.size() != header_.size()) {
-      fail(lines_.size() - 1, "has " + std::to_string(cells.size()) + " values, but the header names " +
+    if (lines_.size() == kMostRows) {
+      throw config::FileError("\"" + path_ + "\" has more than " + std::to_string(kMostRows) +
+                              " rows, more than a log that is read.");
+    }
+    lines_.push_back({number, line});
+    if (cells != header_.size()) {
+      fail(lines_.size() - 1, "has " + std::to_string(cells) + " values, but the header names " +
                                   std::to_string(header_.size()) + " columns");
     }
-    cells_.insert(cells_.end(), cells.begin(), cells.end());
   }
   if (lines_.empty()) throw config::FileError("\"" + path_ + "\" has no rows of data.");
+}
+
+void CsvTable::read_header(std::string_view line) {
+  for (std::size_t i = 0; i <= static_cast<std::size_t>(std::ranges::count(line, ',')); ++i) {
+    header_.push_back(nth_cell(line, i));
+  }
+  refuse_other_dialects(line);
+  for (auto name = header_.begin(); name != header_.end(); ++name) {
+    if (!name->empty() && std::find(name + 1, header_.end(), *name) != header_.end()) {
+      throw config::FileError("\"" + path_ + "\" line 1: the column " + shown(*name) + " is named twice.");
+    }
+  }
 }
 
 void CsvTable::refuse_other_dialects(std::string_view line) const {
@@ -129,7 +135,7 @@ std::size_t CsvTable::column(std::string_view name) const {
 }
 
 double CsvTable::number(std::size_t row, std::size_t column, double limit) const {
-  const std::string_view cell = cells_[lines_[row].first_cell + column];
+  const std::string_view cell = nth_cell(lines_[row].text, column);
   const std::string name(header_[column]);
   double value = 0.0;
   const char* const begin = cell.data() + (cell.size() > 1 && cell[0] == '+' && cell[1] != '-' ? 1 : 0);
@@ -141,7 +147,8 @@ double CsvTable::number(std::size_t row, std::size_t column, double limit) const
   if (!std::isfinite(value)) fail(row, name + " is " + shown(cell) + ", not a finite number");
   if (!(std::abs(value) <= limit)) {
     std::ostringstream sentence;
-    sentence << name << " is " << value << ", beyond what can be true (" << limit << ")";
+    sentence << name << " is " << value << ", beyond what can be true (" << limit
+             << "): is it in the unit that the column is named after?";
     fail(row, sentence.str());
   }
   return value;

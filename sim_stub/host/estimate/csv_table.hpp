@@ -12,7 +12,8 @@ namespace polygmap::sim {
 class CsvTable {
  public:
   // Reads the whole file. Throws config::FileError: absent, a folder, unreadable, empty, not separated by commas, names
-  // in quotes, a column named twice, a row of another length.
+  // in quotes, a column named twice, a row of another length, too many
+  // rows.
   explicit CsvTable(std::string path);
 
   [[nodiscard]] std::size_t rows() const noexcept { return lines_.size(); }
@@ -28,14 +29,14 @@ class CsvTable {
  private:
   struct Line {
     std::size_t number;  // in the file, from 1
-    std::size_t first_cell;
+    std::string_view text;
   };
+  void read_header(std::string_view line);
   void refuse_other_dialects(std::string_view header) const;
   [[nodiscard]] std::size_t find(std::string_view column) const noexcept;
 
   std::string path_, text_;
   std::vector<std::string_view> header_;
-  std::vector<std::string_view> cells_;
   std::vector<Line> lines_;
 };
 

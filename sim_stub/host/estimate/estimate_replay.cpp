@@ -5,11 +5,12 @@
 #include <memory>
 
 #include "algorithms/geometry/so3.hpp"
+#include "firmware/sensor_reading.hpp"
+#include "sim_stub/host/estimate/log_ports.hpp"
 
 namespace polygmap::sim {
 namespace {
 
-constexpr std::int64_t kRingPeriod_ns = 2 * kNsPerMs;  // the ring holds half a second at this rate
 // Standing still at the start, for so long at least and at most. What is noise is smoothed away, and the last of it is
 // left out: it was motion before it could be seen.
 constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0, kSmoothing_s = 0.05, kUnseenMotion_s = 0.15;
@@ -81,155 +82,133 @@ Opening opening(const EstimateLog& log) {
   return o;
 }
 
+// The feet of a row, as points whose contact the log states.
+LegSample legs_of(const LogRow& row) {
+  LegSample sample;
+  sample.stamp_ns = row.stamp_ns;
+  sample.stated_contact = row.contact;
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    LegMeasurement& leg = sample.legs[f];
+    leg.base_T_sole.p_m = row.base_p_foot_m[f];
+    leg.sole_known = false;
+    leg.position_sigma_m = 0.0;
+  }
+  return sample;
+}
+
+struct KnownStart {
+  StartSource source = StartSource::kTruth;
+  ContactInEkf::Start state;
+  Vec3 world_p_odom_m = Vec3::Zero();
+};
+
+KnownStart start_of(const EstimateLog& log, const ReplayOptions& options) {
+  const LogRow& first = log.rows.front();
+  const Opening o = opening(log);
+  const bool stood = o.still_s >= kMinStill_s;
+  KnownStart known;
+  ContactInEkf::Start& start = known.state;
+  start.gyro_bias_sigma_radps = stood ? o.gyro_sigma_radps : options.gyro_bias_sigma_radps;
+  start.accel_bias_sigma_mps2 = options.accel_bias_sigma_mps2;
+  if (stood) start.gyro_bias_radps = o.gyro_radps;
+  if (log.has_truth) {
+    start.odom_R_base = first.truth.true_T_base.R;
+    // The filter's errors turn about its origin, so that is the start, wherever on earth the truth counts from.
+    known.world_p_odom_m = first.truth.true_T_base.p_m;
+    start.odom_v_base_mps = first.truth.true_v_base_mps;
+    if (stood) {
+      start.accel_bias_mps2 = o.accel_mps2 - start.odom_R_base.transpose() * Vec3{0, 0, kGravity_mps2};
+      start.accel_bias_sigma_mps2 = kUnseenSpeed_mps / o.still_s;
+    }
+    return known;
+  }
+  known.source = stood ? StartSource::kStandstill : StartSource::kFirstAcceleration;
+  start.odom_R_base = level_R_base(stood ? o.accel_mps2 : first.accel_mps2);
+  for (const Vec3& foot_m : first.base_p_foot_m) {  // the feet's mean at height 0
+    start.odom_p_base_m.z() -= (start.odom_R_base * foot_m).z() / static_cast<double>(kFootCount);
+  }
+  start.tilt_sigma_rad = stood ? start.accel_bias_sigma_mps2 / kGravity_mps2 : 0.2;
+  start.velocity_sigma_mps = stood ? 0.01 : 1.0;
+  return known;
+}
+
 class LogReplay {
  public:
-  LogReplay(const EstimateLog& log, const ReplayOptions& options) : log_(log), options_(options) {
-    felt_.stamp_ns = -1;
-    odometry_.reset(options.odometry, options.robot);
-    contacts_.reset({});
-    imu_noise_.reset();
-    begin();
+  LogReplay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options)
+      : imu_(log.rows), lio_(lio), robot_(options.robot), start_(start_of(log, options)) {
+    estimator_.reset(options.estimator, robot_);
+    result_.start = start_.source;
   }
 
-  void add_lio(const LioRow& row, std::int64_t now_ns) {
-    LioSample sample;
-    sample.stamp_ns = row.stamp_ns;
-    sample.lio_T_lidar = row.pose;
-    LioVerdict verdict = odometry_.fusion().check(sample, now_ns);
-    StateEstimate then;
-    if (verdict == LioVerdict::kAccepted) {
-      if (sample.stamp_ns > last_ring_ns_) keep();  // as young as this row
-      verdict = ring_.try_at(sample.stamp_ns, then) ? odometry_.fusion().fuse(sample, then.odom_T_base)
-                                                    : LioVerdict::kNoOdometry;
-    }
-    ++result_.lio[static_cast<std::size_t>(verdict)];
-  }
-
-  void step(std::size_t i) {
-    const LogRow& row = log_.rows[i];
-    contacts_.update_stated(row.contact, row.stamp_ns);
-    const LogRow before = felt_;
-    if (odometry_.is_valid_imu(row.gyro_radps, row.accel_mps2)) {
-      felt_ = row;
-      imu_noise_.update(row.stamp_ns, row.gyro_radps, row.accel_mps2);
+  void step(const LogRow& row) {
+    const std::int64_t now_ns = row.stamp_ns;
+    imu_.advance(now_ns);
+    lio_.advance(now_ns);
+    (void)read_imu(imu_, now_ns, estimator_);
+    estimator_.add_legs(legs_of(row));
+    if (estimator_.state().initialised) {
+      estimator_.tick({true, true});
     } else {
-      ++result_.imu_invalid;
+      estimator_.start(start_.state);
     }
-    if (i > 0) {
-      ProprioceptiveOdometry::Step step;
-      step.stamp_ns = row.stamp_ns;
-      step.dt_s = seconds(row.stamp_ns - log_.rows[i - 1].stamp_ns);
-      if (step.dt_s > options_.odometry.max_step_s) ++result_.gaps;
-      // Samples of a moment: over the step, the mean of both its ends. The last ones bridge some that are invalid.
-      step.gyro_radps = 0.5 * (felt_.gyro_radps + before.gyro_radps);
-      step.accel_mps2 = 0.5 * (felt_.accel_mps2 + before.accel_mps2);
-      step.felt = felt_.stamp_ns >= 0 && seconds(row.stamp_ns - felt_.stamp_ns) <= options_.odometry.max_step_s;
-      step.imu_noise = imu_noise_.density();
-      odometry_.step(step, legs_of(row), contacts_.feet(), {});
-    }
-    publish(row, i);
+    keep();
+    read_lio(lio_, now_ns, estimator_);
   }
 
   [[nodiscard]] Replay take() {
-    result_.gyro_bias_radps = odometry_.attitude().gyro_bias_radps();
-    result_.accel_bias_mps2 = odometry_.attitude().accel_bias_mps2();
-    result_.foot_position_sigma_m = odometry_.motion().position_sigma_m();
-    result_.contact_walk_mprs = odometry_.attitude().contact_walk_mprs();
+    const ProprioceptiveOdometry& odometry = estimator_.odometry();
+    const Estimator::Counters& counters = estimator_.counters();
+    result_.gyro_bias_radps = odometry.attitude().gyro_bias_radps();
+    result_.accel_bias_mps2 = odometry.attitude().accel_bias_mps2();
+    result_.foot_position_sigma_m = odometry.motion().position_sigma_m();
+    result_.contact_walk_mprs = odometry.attitude().contact_walk_mprs();
+    result_.imu_invalid = counters.imu_invalid;
+    result_.gaps = counters.gaps;
+    result_.lio = counters.lio;
+    result_.lio_not_arrived = lio_.unread();
     return std::move(result_);
   }
 
  private:
-  [[nodiscard]] ProprioceptiveOdometry::Legs legs_of(const LogRow& row) const {
-    ProprioceptiveOdometry::Legs legs;
-    for (std::size_t f = 0; f < kFootCount; ++f) {
-      legs[f].base_T_sole.p_m = row.base_p_foot_m[f];
-      legs[f].sole_known = false;
-      legs[f].position_sigma_m = odometry_.motion().position_sigma_m();
-    }
-    return legs;
-  }
-
-  void begin() {
-    const LogRow& first = log_.rows.front();
-    const Opening o = opening(log_);
-    const bool stood = o.still_s >= kMinStill_s;
-    ContactInEkf::Start start;
-    start.gyro_bias_sigma_radps = stood ? o.gyro_sigma_radps : options_.gyro_bias_sigma_radps;
-    start.accel_bias_sigma_mps2 = options_.accel_bias_sigma_mps2;
-    if (stood) start.gyro_bias_radps = o.gyro_radps;
-    if (log_.has_truth) {
-      start.odom_R_base = first.truth.true_T_base.R;
-      // The filter's errors turn about its origin, so that is the start, wherever on earth the truth counts from.
-      start_m_ = first.truth.true_T_base.p_m;
-      start.odom_v_base_mps = first.truth.true_v_base_mps;
-      if (stood) {
-        start.accel_bias_mps2 = o.accel_mps2 - start.odom_R_base.transpose() * Vec3{0, 0, kGravity_mps2};
-        start.accel_bias_sigma_mps2 = kUnseenSpeed_mps / o.still_s;
-      }
-    } else {
-      result_.start = stood ? StartSource::kStandstill : StartSource::kFirstAcceleration;
-      start.odom_R_base = level_R_base(stood ? o.accel_mps2 : first.accel_mps2);
-      for (const Vec3& foot_m : first.base_p_foot_m) {  // the feet's mean at height 0
-        start.odom_p_base_m.z() -= (start.odom_R_base * foot_m).z() / static_cast<double>(kFootCount);
-      }
-      start.tilt_sigma_rad = stood ? start.accel_bias_sigma_mps2 / kGravity_mps2 : 0.2;
-      start.velocity_sigma_mps = stood ? 0.01 : 1.0;
-    }
-    contacts_.update_stated(first.contact, 0);
-    odometry_.initialise(start, legs_of(first), 0.01);
-  }
-
   void keep() {
-    ring_.push(now_);
-    last_ring_ns_ = now_.stamp_ns;
-  }
-
-  void publish(const LogRow& row, std::size_t i) {
-    StateEstimate& state = now_;
-    state.stamp_ns = row.stamp_ns;
-    odometry_.describe(row.stamp_ns, state);
-    if (row.stamp_ns - last_ring_ns_ >= kRingPeriod_ns || i == 0) keep();
+    const StateEstimate& state = estimator_.state();
     const Mat3& world_R_odom = state.world_T_odom.R;
     ReplayTick tick;
-    tick.stamp_ns = row.stamp_ns;
-    tick.odom_T_base = {state.odom_T_base.R, start_m_ + state.odom_T_base.p_m};
-    tick.world_T_base = {world_R_odom * state.odom_T_base.R, start_m_ + state.world_T_base().p_m};
+    tick.stamp_ns = state.stamp_ns;
+    tick.odom_T_base = {state.odom_T_base.R, start_.world_p_odom_m + state.odom_T_base.p_m};
+    tick.world_T_base = {world_R_odom * state.odom_T_base.R, start_.world_p_odom_m + state.world_T_base().p_m};
     tick.world_v_base_mps = world_R_odom * state.odom_v_base_mps;
     tick.base_w_base_radps = state.base_w_base_radps;
-    odometry_.describe(row.stamp_ns, tick.quality);
+    tick.quality = estimator_.quality();
     tick.contact_probability = state.contact_probability;
     tick.lio_age_ns = state.lio_age_ns;
-    result_.ticks.push_back(tick);
-    if (i > 0) {  // as the fusion's limit counts: the new offset against the old one, at the same place
+    if (!result_.ticks.empty()) {  // as the fusion's limit counts: the new offset against the old one, at one place
       const double slew_m = (state.world_T_base().p_m - last_world_T_odom_ * state.odom_T_base.p_m).norm();
       result_.largest_slew_m = std::max(result_.largest_slew_m, slew_m);
     }
+    result_.ticks.push_back(tick);
     last_world_T_odom_ = state.world_T_odom;
-    const auto& feet = contacts_.feet();
+    const auto& feet = estimator_.contacts();
     if (!feet[0].stands && !feet[1].stands) ++result_.rows_without_contact;
     for (std::size_t f = 0; f < kFootCount; ++f) {
-      if (contacts_.feet()[f].stands && odometry_.motion().walk_m2ps(f) > 0.0) ++result_.slipping_rows;
+      if (feet[f].stands && estimator_.odometry().motion().walk_m2ps(f) > 0.0) ++result_.slipping_rows;
     }
   }
 
-  const EstimateLog& log_;
-  const ReplayOptions& options_;
-  LogRow felt_;  // the last whose IMU was valid; before there is one: stamp -1
-  ProprioceptiveOdometry odometry_;
-  ContactEstimator contacts_;
-  ImuNoise imu_noise_;
-  StateHistory ring_;
-  StateEstimate now_;
-  Vec3 start_m_ = Vec3::Zero();  // world minus the filter's axes
-  std::int64_t last_ring_ns_ = 0;
+  LogImu imu_;
+  LogLidarOdometry lio_;
+  RobotModel robot_;
+  KnownStart start_;
+  Estimator estimator_;
   Transform last_world_T_odom_;
   Replay result_;
 };
 
 }  // namespace
 
-ProprioceptiveOdometry::Params log_params() {
-  ProprioceptiveOdometry::Params params;
+Estimator::Params log_params() {
+  Estimator::Params params;
+  params.imu_of_moments = true;
   // How much contacts creep is soon found out, where nothing is known of the feet.
   params.attitude.contact_walk_mprs = 1e-2;
   params.attitude.whiteness_start_gain = params.attitude.whiteness_gain_ps = 2.0;
@@ -255,16 +234,9 @@ bool is_finite(const Replay& replay) {
 }
 
 Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options) {
-  const auto estimator = std::make_unique<LogReplay>(log, options);  // its ring is too large for a stack
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < log.rows.size(); ++i) {
-    const std::int64_t now_ns = log.rows[i].stamp_ns;
-    estimator->step(i);  // first, so that a pose stamped with this row finds it
-    for (; next < lio.size() && lio[next].arrival_ns <= now_ns; ++next) estimator->add_lio(lio[next], now_ns);
-  }
-  Replay result = estimator->take();
-  result.lio_not_arrived = lio.size() - next;
-  return result;
+  const auto whole = std::make_unique<LogReplay>(log, lio, options);  // the estimator is too large for a stack
+  for (const LogRow& row : log.rows) whole->step(row);
+  return whole->take();
 }
 
 }  // namespace polygmap::sim

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recorded log through the module's estimation: what `polygmap estimate` does.
+// A recorded log through the ports into the estimator that flies: what `polygmap estimate` does.
 #pragma once
 
 #include <array>
@@ -7,19 +7,19 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/estimation/proprioceptive_odometry.hpp"
+#include "algorithms/estimation/estimator.hpp"
 #include "sim_stub/host/estimate/estimate_log.hpp"
 
 namespace polygmap::sim {
 
 // The module's, but for what no data sheet says of a robot that is only known by its log.
-[[nodiscard]] ProprioceptiveOdometry::Params log_params();
+[[nodiscard]] Estimator::Params log_params();
 // Of which a log needs the lidar mount alone: none, LIO gives the base's pose.
 [[nodiscard]] RobotModel log_robot();
 
 struct ReplayOptions {
   std::string params_hash;  // of what --params says, before the other options
-  ProprioceptiveOdometry::Params odometry = log_params();
+  Estimator::Params estimator = log_params();
   RobotModel robot = log_robot();
   // One sigma, where no standstill at the start says what they are.
   double gyro_bias_sigma_radps = 0.01, accel_bias_sigma_mps2 = 0.2;

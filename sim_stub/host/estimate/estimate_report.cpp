@@ -80,11 +80,13 @@ double horizontal_drift_percent(const Score& score) {
 }
 
 void write_estimate_json(const std::string& path, const EstimateLog& log, const std::vector<LioRow>& lio,
-                         const Replay& replay, const std::string& params_hash) {
+                         const Replay& replay, const std::string& params_hash,
+                         const std::vector<std::string>& warnings) {
   Json json{{"params_hash", params_hash},
             {"rows", log.rows.size()},
             {"duration_s", seconds(log.rows.back().stamp_ns)},
-            {"start", name_of(replay.start)}};
+            {"start", name_of(replay.start)},
+            {"warnings", warnings}};
   if (log.has_truth) json.update(scores(log, replay));
   const ReplayTick& last = replay.ticks.back();
   json["gyro_bias_radps"] = vector(replay.gyro_bias_radps);

@@ -15,7 +15,8 @@ namespace polygmap::sim {
 
 // Throw config::FileError when the file cannot be written.
 void write_estimate_json(const std::string& path, const EstimateLog& log, const std::vector<LioRow>& lio,
-                         const Replay& replay, const std::string& params_hash);
+                         const Replay& replay, const std::string& params_hash,
+                         const std::vector<std::string>& warnings);
 void write_estimate_csv(const std::string& path, const EstimateLog& log, const Replay& replay);
 
 }  // namespace polygmap::sim

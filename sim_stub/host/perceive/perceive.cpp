@@ -26,6 +26,11 @@ constexpr std::uintmax_t kMostFile_bytes = 16U << 20U;  // ten times what the la
 
 Json point(const Vec3& p) { return Json::array({p.x(), p.y(), p.z()}); }
 
+const char* kind_of(const Surface& surface, UpSource up) {
+  if (up == UpSource::kAssumed) return "unknown";
+  return surface.kind == Kind::kTread ? "tread" : (surface.kind == Kind::kRiser ? "riser" : "other");
+}
+
 // What is a surface's own; the rest is its plane's.
 Json piece(const Surface& surface) {
   Json j;
@@ -169,11 +174,12 @@ Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture,
   Perceived out;
   if (gravity) {
     out.camera_up = -gravity->normalized();
+    out.up_source = UpSource::kGiven;
   } else {
     const Vec3 along_the_picture{0.0, -1.0, 0.0};
     static_cast<void>(extraction.run(along_the_picture));
     const std::optional<Vec3> found = find_up(extraction.surfaces());
-    out.up_assumed = !found;
+    out.up_source = found ? UpSource::kFound : UpSource::kAssumed;
     out.camera_up = found.value_or(along_the_picture);
   }
   extraction.settle_noise(out.camera_up);
@@ -200,6 +206,34 @@ Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture,
   return out;
 }
 
+const char* name_of(UpSource source) {
+  switch (source) {
+    case UpSource::kGiven:
+      return "given";
+    case UpSource::kFound:
+      return "found";
+    case UpSource::kAssumed:
+      return "assumed";
+  }
+  return "?";
+}
+
+std::string doubt_of_gravity(const Perceived& perceived) {
+  constexpr double kLevel = 0.97;  // cosine of 14 degrees
+  if (perceived.up_source != UpSource::kGiven) return {};
+  double upright_m2 = 0.0, upside_down_m2 = 0.0, all_m2 = 0.0;
+  for (const PerceivedPlane& pieces : perceived.planes) {
+    for (const Surface& s : pieces) {
+      const double cosine = s.normal.dot(perceived.camera_up);
+      all_m2 += s.area_m2;
+      if (cosine > kLevel) upright_m2 += s.area_m2;
+      if (cosine < -kLevel) upside_down_m2 += s.area_m2;
+    }
+  }
+  if (upright_m2 > 0.05 * upside_down_m2 || upside_down_m2 < std::max(kMinLevelArea_m2, 0.1 * all_m2)) return {};
+  return "By --gravity every level surface in view is a ceiling: does it point down, x right, y down, z forward?";
+}
+
 void write_labels(const std::string& path, const DepthPng& picture, const Perceived& perceived) {
   lodepng::State state;
   state.encoder.auto_convert = 0;  // it would turn labels into a palette
@@ -219,7 +253,7 @@ void write_planes(const std::string& path, const Perceived& perceived, const std
     const Surface& largest = pieces.front();
     Json j;
     j["id"] = i + 1;
-    j["kind"] = largest.kind == Kind::kTread ? "tread" : (largest.kind == Kind::kRiser ? "riser" : "other");
+    j["kind"] = kind_of(largest, perceived.up_source);
     j["normal"] = point(largest.normal);
     j["d_m"] = largest.d_m;
     j["covariance"] = Json::array();
@@ -235,7 +269,13 @@ void write_planes(const std::string& path, const Perceived& perceived, const std
     for (const Surface& s : pieces) j["pieces"].push_back(piece(s));
     planes.push_back(j);
   }
-  const Json json{{"planes", planes}, {"up", point(perceived.camera_up)}, {"params_hash", params_hash}};
+  Json warnings = Json::array();
+  if (const std::string doubt = doubt_of_gravity(perceived); !doubt.empty()) warnings.push_back(doubt);
+  const Json json{{"planes", planes},
+                  {"up", point(perceived.camera_up)},
+                  {"up_source", name_of(perceived.up_source)},
+                  {"warnings", warnings},
+                  {"params_hash", params_hash}};
   write_output(path, json.dump(1) + "\n");
 }
 

@@ -27,18 +27,29 @@ using polygmap_frames::Surface;
 // The surfaces that were cut from one plane (on both sides of a leg, of a staircase), the largest first; never none.
 using PerceivedPlane = std::vector<Surface>;
 
+enum class UpSource : std::uint8_t {
+  kGiven,
+  kFound,   // in the picture
+  kAssumed  // no plane looks level: up is up in the picture, and what is a tread is not known
+};
+[[nodiscard]] const char* name_of(UpSource source);
+
 struct Perceived {
   std::vector<PerceivedPlane> planes;  // id is the index + 1
   std::vector<std::uint8_t> labels;    // per pixel, 0 = none
-  Vec3 camera_up = Vec3::Zero();       // given, or found
-  bool up_assumed = false;             // neither: no plane looks level, up is up in the picture
-  std::vector<double> microseconds;    // one per repetition
+  Vec3 camera_up = Vec3::Zero();
+  UpSource up_source = UpSource::kAssumed;
+  std::vector<double> microseconds;  // one per repetition
 };
 
 // gravity: down, camera frame; without it, the largest plane that looks level says where up is.
 [[nodiscard]] Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture,
                                  const std::optional<Vec3>& gravity, int repeat,
                                  const polygmap_frames::Values& values = {});
+
+// One sentence where the picture says that the direction given is upside down: what is level in it faces downwards, and
+// nothing level faces upwards. Else empty.
+[[nodiscard]] std::string doubt_of_gravity(const Perceived& perceived);
 
 // Throw config::FileError when the file cannot be written.
 void write_labels(const std::string& path, const DepthPng& picture, const Perceived& perceived);

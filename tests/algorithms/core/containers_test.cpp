@@ -225,6 +225,16 @@ TEST(RingBuffer, RandomOperations_AgainstStdDeque_AgreeAlways) {
   compare_ring_buffer_with_std<32>(3);
 }
 
+TEST(RingBuffer, ReplaceNewest_ChangesTheLastAloneAlsoWhereTheRingWraps) {
+  RingBuffer<int, 3> r;
+  for (int i = 1; i <= 4; ++i) r.push_overwrite(i);
+  r.replace_newest(9);
+  EXPECT_EQ(r.size(), 3U);
+  EXPECT_EQ(r.oldest(), 2);
+  EXPECT_EQ(r[1], 3);
+  EXPECT_EQ(r.newest(), 9);
+}
+
 TEST(RingBuffer, PushOverwrite_ItsOwnOldestElementWhenFull_KeepsItsValue) {
   RingBuffer<Pair, 2> r;
   r.push_overwrite({1, 1});

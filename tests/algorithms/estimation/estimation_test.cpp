@@ -307,7 +307,7 @@ TEST_F(EstimatorTest, Standstill_BiasedSensors_FindsBiasTiltAndFloor) {
   run(walk, spec, 1100 * kNsPerMs);
   const StateEstimate& state = estimator_.state();
   ASSERT_TRUE(state.initialised);
-  EXPECT_LT((estimator_.gyro_bias_radps() - walk.gyro_bias_radps()).norm(), 4e-4);
+  EXPECT_LT((estimator_.odometry().attitude().gyro_bias_radps() - walk.gyro_bias_radps()).norm(), 4e-4);
   EXPECT_NEAR(yaw_of(state.odom_T_base.R), 0.0, 5e-4);
   EXPECT_LT(so3_log(state.odom_T_base.R).head<2>().norm(),
             0.02);  // accelerometer bias and mount: 0.4 deg each, 1 sigma
@@ -464,14 +464,80 @@ TEST_F(EstimatorTest, BadSamples_EveryKind_IsCountedAndTheStateStaysGood) {
   const Estimator::Counters& counters = estimator_.counters();
   EXPECT_EQ(counters.imu_invalid, 2U);
   EXPECT_EQ(counters.imu_stale, 2U);
-  EXPECT_EQ(counters.joints_invalid, 2U);
-  EXPECT_EQ(counters.joints_stale, 2U);
-  EXPECT_EQ(counters.joints_jump, 1U);
+  EXPECT_EQ(estimator_.leg_sensing().counters().invalid, 2U);
+  EXPECT_EQ(estimator_.leg_sensing().counters().stale, 2U);
+  EXPECT_EQ(estimator_.leg_sensing().counters().jump, 1U);
   EXPECT_EQ(counters.gaps, 1U);
   const StateEstimate& state = estimator_.state();
   EXPECT_EQ(state.stamp_ns, t_ns_ - kTick_ns);
   EXPECT_LT((state.odom_T_base.p_m - before.p_m).norm(), 1e-3);
   EXPECT_LT(so3_log(before.R.transpose() * state.odom_T_base.R).norm(), 2e-3);
+}
+
+// A robot that is known by its feet alone, on the way already: no standstill, no joints.
+TEST_F(EstimatorTest, StartGiven_PointFeetWithStatedContact_CarryTheStateOn) {
+  const Vec3 base_p_left_m{0.0, 0.1, -0.8};
+  const auto legs_at = [&](std::int64_t stamp_ns, double gone_m) {
+    LegSample sample;
+    sample.stamp_ns = stamp_ns;
+    sample.stated_contact = {1.0, 0.0};
+    for (LegMeasurement& leg : sample.legs) {
+      leg.sole_known = false;
+      leg.position_sigma_m = 0.0;
+      leg.base_T_sole.p_m = base_p_left_m - Vec3{gone_m, 0.0, 0.0};
+    }
+    return sample;
+  };
+  constexpr double kSpeed_mps = 0.2;
+  estimator_.add_imu({0, Vec3::Zero(), Vec3{0, 0, kGravity_mps2}}, 0);
+  estimator_.add_legs(legs_at(0, 0.0));
+  estimator_.tick({true, true});
+  EXPECT_FALSE(estimator_.state().initialised) << "legs alone are no standstill";
+  ContactInEkf::Start start;
+  start.odom_v_base_mps = {kSpeed_mps, 0.0, 0.0};
+  start.odom_p_base_m = {0.0, 0.0, 0.8};
+  estimator_.start(start);
+  EXPECT_TRUE(estimator_.state().initialised);
+  EXPECT_EQ(estimator_.state().odom_T_base.p_m, start.odom_p_base_m);
+  std::int64_t t_ns = 0;
+  for (int i = 0; i < 500; ++i) {
+    t_ns += kTick_ns;
+    estimator_.add_imu({t_ns, Vec3::Zero(), Vec3{0, 0, kGravity_mps2}}, t_ns);
+    estimator_.add_legs(legs_at(t_ns, kSpeed_mps * seconds(t_ns)));
+    estimator_.tick({true, true});
+  }
+  EXPECT_EQ(estimator_.state().stamp_ns, t_ns);
+  EXPECT_NEAR(estimator_.state().odom_T_base.p_m.x(), kSpeed_mps * seconds(t_ns), 1e-3);
+  EXPECT_TRUE(estimator_.contacts()[0].stands);
+  EXPECT_FALSE(estimator_.contacts()[1].stands);
+}
+
+// Of samples of moments, a turn that grows evenly: the mean of both ends is right, the end is half a sample ahead.
+TEST_F(EstimatorTest, ImuOfMoments_CountsAsTheMeanOfBothEnds) {
+  Estimator::Params params;
+  params.imu_of_moments = true;
+  const RobotModel robot;
+  for (const bool of_moments : {true, false}) {
+    params.imu_of_moments = of_moments;
+    estimator_.reset(params, robot);
+    constexpr std::int64_t kPeriod_ns = 10 * kNsPerMs;
+    constexpr double kTurn_radps2 = 1.0;
+    LegSample legs;
+    legs.stated_contact = {0.0, 0.0};
+    for (LegMeasurement& leg : legs.legs) leg.sole_known = false;
+    for (std::int64_t t_ns = 0; t_ns <= 500 * kNsPerMs; t_ns += kPeriod_ns) {
+      estimator_.add_imu({t_ns, Vec3{0, 0, kTurn_radps2 * seconds(t_ns)}, Vec3{0, 0, kGravity_mps2}}, t_ns);
+      legs.stamp_ns = t_ns;
+      estimator_.add_legs(legs);
+      if (t_ns == 0) {
+        estimator_.start({});
+      } else {
+        estimator_.tick({true, true});
+      }
+    }
+    const Mat3& R = estimator_.state().odom_T_base.R;
+    EXPECT_NEAR(std::atan2(R(1, 0), R(0, 0)), of_moments ? 0.125 : 0.125 + 0.5 * 0.5 * seconds(kPeriod_ns), 2e-4);
+  }
 }
 
 // A wrong clock, once: were its stamp taken, every later sample would be a stale one.
@@ -485,9 +551,9 @@ TEST_F(EstimatorTest, StampsOfTheFuture_OfEitherSensor_AreCountedAndTheNextSampl
   tick(imu, joints, kBothStand);
   t_ns_ += kTick_ns;
   EXPECT_EQ(estimator_.counters().imu_future, 1U);
-  EXPECT_EQ(estimator_.counters().joints_future, 1U);
+  EXPECT_EQ(estimator_.leg_sensing().counters().future, 1U);
   run(walk, spec, 1600 * kNsPerMs);
-  EXPECT_EQ(estimator_.counters().imu_stale + estimator_.counters().joints_stale, 0U);
+  EXPECT_EQ(estimator_.counters().imu_stale + estimator_.leg_sensing().counters().stale, 0U);
   EXPECT_EQ(estimator_.state().oldest_input_ns, t_ns_ - kTick_ns);
 }
 
@@ -498,7 +564,7 @@ TEST_F(EstimatorTest, StampsSixMillisecondsAhead_OfALateTick_AreTaken) {
   estimator_.add_imu(walk.imu(6 * kNsPerMs), 0);
   estimator_.add_joints(walk.joints(6 * kNsPerMs), 0);
   EXPECT_EQ(estimator_.newest_imu_ns(), 6 * kNsPerMs);
-  EXPECT_EQ(estimator_.joints().stamp_ns, 6 * kNsPerMs);
+  EXPECT_EQ(estimator_.leg_sensing().joints().stamp_ns, 6 * kNsPerMs);
 }
 
 TEST_F(EstimatorTest, ImuFasterThanTheTick_EverySampleCounts) {

@@ -80,7 +80,8 @@ TEST(ParamFile, WrongType_IsRefused) {
   expect_refused("estimator.fusion.tau_s = \"2\"\n", "line 1: estimator.fusion.tau_s must be a number, not a text.");
   expect_refused("estimator.fusion.tau_s = [2.0]\n", "must be a number, not an array.");
   expect_refused("estimator.fusion.tau_s = 1979-05-27\n", "must be a number, not a date or time.");
-  expect_refused("estimator.infer_forces = 1\n", "estimator.infer_forces must be true or false, not a whole number.");
+  expect_refused("estimator.legs.infer_forces = 1\n",
+                 "estimator.legs.infer_forces must be true or false, not a whole number.");
   expect_refused("estimator.fusion.realign_count = 2.5\n", "must be a whole number, not 2.5.");
   expect_refused("estimator.fusion = 3\n", "estimator.fusion is a table of parameters, not a whole number.");
   expect_refused("robot.mounts.base_T_camera.p_m = [0.1, 0.2]\n",

@@ -225,14 +225,16 @@ TEST(ClimbCommand, BadWord_IsRefused) {
   }
   expect_refused({"climb", "--noise", "pink"}, "--noise");
   expect_refused({"climb", "--render-shift", "0.01", "nan", "0"}, "--render-shift");
-  expect_refused({"climb", "--render-shift", "0.01", "0.02"}, "--render-shift");
-  expect_refused({"climb", "--bogus"}, "--bogus");
-  expect_refused({"climb", "climb"}, "not expected: climb");
-  expect_refused({"climb", "--steps", "3", "--steps", "4"}, "--steps");
+  expect_refused({"climb", "--render-shift", "0.01", "0.02"}, "--render-shift needs 3 values;");
+  expect_refused({"climb", "--bogus", "3"}, "There is no option --bogus; see polygmap climb --help.");
+  expect_refused({"climb", "--steps", "many"}, "\"many\" is no whole number that --steps can take");
+  expect_refused({"climb", "--rise", "1..2"}, "\"1..2\" is no number that --rise can take");
+  expect_refused({"climb", "climb"}, "\"climb\" is a word too many");
+  expect_refused({"climb", "--steps", "3", "--steps", "4"}, "--steps is given more than once");
   expect_refused({"climb", "--render-shift", "", "", ""}, "--render-shift");
   EXPECT_EQ(call({"climb", "--render-shift", "-.01", "0", ".02"}).options->render_dx_m, -0.01);
   expect_refused({"--bogus"}, "--bogus");
-  expect_refused({"dance"}, "dance");
+  expect_refused({"dance"}, "\"dance\" is no command; see polygmap --help.");
   expect_refused({}, "subcommand");
 }
 

@@ -11,8 +11,10 @@
 #include <sstream>
 
 #include "algorithms/geometry/so3.hpp"
+#include "firmware/config/file_error.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/estimate/estimate_report.hpp"
+#include "sim_stub/host/estimate/log_plausibility.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
 
@@ -119,7 +121,7 @@ TEST(EstimateReplay, ClimbWithBiasedNoisySensors_DriftsByLittle_AndKnowsHowFar) 
 
 TEST(EstimateReplay, FootSlipsThreeTenthsForAFifthOfASecond_PositionStaysWithinTwentyMillimetres) {
   ReplayOptions careless;
-  careless.odometry.motion.gain = 0.0;
+  careless.estimator.motion.gain = 0.0;
   constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
   for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
     WalkSpec spec;
@@ -137,7 +139,7 @@ TEST(EstimateReplay, FootSlipsThreeTenthsForAFifthOfASecond_PositionStaysWithinT
 
 TEST(EstimateReplay, NoSlip_VelocityIsAsGoodAsThatOfAFilterThatLetsNothingGo) {
   ReplayOptions careless;
-  careless.odometry.motion.gain = 0.0;
+  careless.estimator.motion.gain = 0.0;
   constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
   for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
     WalkSpec spec;
@@ -228,7 +230,7 @@ TEST(EstimateReplay, LateLioWithOutliersAndFutureStamps_IsCountedAndNeverMakesAS
   EXPECT_GT(count(LioVerdict::kAccepted), lio.size() - 8);
   EXPECT_GT(result.lio_not_arrived, 0U);
   EXPECT_EQ(std::accumulate(result.lio.begin(), result.lio.end(), result.lio_not_arrived), lio.size());
-  EXPECT_LE(result.largest_slew_m, options.odometry.fusion.slew_mps * seconds(SyntheticWalk::kTick_ns) + 1e-9);
+  EXPECT_LE(result.largest_slew_m, options.estimator.fusion.slew_mps * seconds(SyntheticWalk::kTick_ns) + 1e-9);
   EXPECT_EQ(result.ticks[10].lio_age_ns, -1);
   EXPECT_LT(result.ticks.back().lio_age_ns, 210 * kNsPerMs);
 }
@@ -329,8 +331,8 @@ TEST(EstimateReplay, BiasedLogWithLateLio_IsNoWorseThanWithoutAndKnowsHowGoodItI
     const Score without = score(log, replay(log, {}, {}));
     for (const double tau_s : {0.0, 1.0, 4.0}) {  // 0: by LIO's noise
       ReplayOptions options;
-      if (tau_s > 0.0) options.odometry.fusion.tau_s = tau_s;
-      if (tau_s > 0.0) options.odometry.fusion.tau_spm = 0.0;
+      if (tau_s > 0.0) options.estimator.fusion.tau_s = tau_s;
+      if (tau_s > 0.0) options.estimator.fusion.tau_spm = 0.0;
       const Score with = score(log, replay(log, lio, options));
       EXPECT_LT(with.position_rmse_m, std::max(without.position_rmse_m, 0.004)) << seed << ", tau " << tau_s;
       EXPECT_GT(with.nees_in_bounds, 0.65) << seed << ", tau " << tau_s;
@@ -370,6 +372,75 @@ TEST(EstimateReplay, CassieWalk_OwnAttitude_StaysWithinNineMillimetres) {
   EXPECT_LT(s.position_rmse_m, 0.009);
   EXPECT_LT(s.velocity_rmse_mps, 0.018);
   EXPECT_LT(drift_percent(s), 0.95);
+}
+
+// --- Units and axes --------------------------------------------------------------------------------------------------
+
+class LogDoubts : public testing::Test {
+ protected:
+  LogDoubts() {
+    WalkSpec spec;
+    spec.steps = 3;
+    log_ = climb_log(spec);
+  }
+  // What is said of the log when every row is changed so; "refused: " in front where it is refused.
+  template <typename Change>
+  std::string said(const Change& change, bool with_truth = true) const {
+    EstimateLog changed = log_;
+    changed.has_truth = with_truth;
+    for (LogRow& row : changed.rows) change(row);
+    try {
+      std::string all;
+      for (const std::string& doubt : doubts_about(changed, "log.csv")) all += doubt;
+      return all;
+    } catch (const config::FileError& error) {
+      return std::string("refused: ") + error.what();
+    }
+  }
+  static void expect(const std::string& said, const std::string& wanted, bool refused) {
+    EXPECT_EQ(said.starts_with("refused: "), refused) << said;
+    EXPECT_NE(said.find(wanted), std::string::npos) << said;
+  }
+  EstimateLog log_;
+};
+
+TEST_F(LogDoubts, LogAsItShouldBe_HasNone) {
+  for (const bool with_truth : {true, false}) EXPECT_EQ(said([](LogRow&) {}, with_truth), "");
+}
+
+TEST_F(LogDoubts, WrongUnits_AreRefused) {
+  for (const bool with_truth : {true, false}) {
+    expect(said([](LogRow& row) { row.accel_mps2 /= kGravity_mps2; }, with_truth), "is in g, but", true);
+    expect(said([](LogRow& row) { row.gyro_radps *= 180.0 / kPi; }, with_truth), "degrees per second", true);
+    expect(said([](LogRow& row) { row.accel_mps2 *= 100.0; }, with_truth), "other units", true);
+    const auto in_decimetres = [](LogRow& row) {
+      for (Vec3& foot_m : row.base_p_foot_m) foot_m *= 10.0;
+    };
+    expect(said(in_decimetres, with_truth), "are they in metres", true);
+  }
+}
+
+TEST_F(LogDoubts, UpOfTheAccelerometerIsNotThatOfTheFeet_IsRefused) {
+  expect(said([](LogRow& row) { row.accel_mps2.z() *= -1.0; }), "swapped or flipped", true);
+  expect(said([](LogRow& row) { std::swap(row.accel_mps2.x(), row.accel_mps2.z()); }), "swapped or flipped", true);
+}
+
+TEST_F(LogDoubts, OddNumbersThatMayBeRight_AreTold) {
+  expect(said([](LogRow& row) { row.accel_mps2 *= 1.5; }), "gravity's 9.81", false);
+  expect(said([](LogRow& row) { row.gyro_radps = -row.gyro_radps; }), "truth's quaternion", false);
+  expect(said([](LogRow& row) { row.accel_mps2.x() += 2.0; }), "leans out of the vertical", false);
+}
+
+TEST(EstimateLogs, RecordedOnRobots_AreInTheRightUnitsAndAxes) {
+  const char* given = std::getenv("POLYGMAP_SHARED_DATA");
+  const std::string folder = given != nullptr ? given : POLYGMAP_SHARED_DATA_DEFAULT;
+  int read = 0;
+  for (const std::string name : {"/cassie/cassie_walk_open.csv", "/icub/walk.csv", "/icub/gazebo_0_35.csv"}) {
+    if (!std::filesystem::exists(folder + name)) continue;
+    ++read;
+    EXPECT_TRUE(doubts_about(read_estimate_log(folder + name), name).empty()) << name;
+  }
+  if (read == 0) GTEST_SKIP() << "No logs in " << folder << ": set POLYGMAP_SHARED_DATA.";
 }
 
 // --- The command -----------------------------------------------------------------------------------------------------
@@ -436,6 +507,32 @@ TEST_F(EstimateCommand, StandingLog_WritesScoresAndOneRowPerRow) {
   for (; std::getline(csv, line); ++rows) EXPECT_EQ(std::count(line.begin(), line.end(), ','), columns);
   EXPECT_EQ(rows, 500);
   EXPECT_EQ(line.empty(), true);
+}
+
+TEST_F(EstimateCommand, LogThatIsOdd_IsEstimatedWithAWarning) {
+  std::string text = log_text(500);
+  for (std::size_t at = 0; (at = text.find("9.81", at)) != std::string::npos; at += 4) text.replace(at, 4, "6.50");
+  ASSERT_EQ(call({"estimate", write("odd.csv", text), "--json", at("out.json")}), kExitPass) << err_;
+  EXPECT_EQ(err_.rfind("polygmap: warning: The median acceleration is 6.5", 0), 0U) << err_;
+  EXPECT_EQ(nlohmann::json::parse(std::ifstream(at("out.json"))).at("warnings").size(), 1U);
+}
+
+TEST_F(EstimateCommand, LogThatIsRefused_LeavesNoFormerOutput) {
+  write("out.json", "{}");
+  write("out.csv", "old");
+  std::string text = log_text(50);
+  for (std::size_t at = 0; (at = text.find("9.81", at)) != std::string::npos; at += 4) text.replace(at, 4, "1.00");
+  expect_refused({"estimate", write("g.csv", text), "--json", at("out.json"), "--csv", at("out.csv")}, "is in g, but");
+  EXPECT_FALSE(std::filesystem::exists(at("out.json")));
+  EXPECT_FALSE(std::filesystem::exists(at("out.csv")));
+}
+
+TEST_F(EstimateCommand, StampsInMilliseconds_OrFeetInMillimetres_AreNamed) {
+  std::string stamps = std::string(kHeader) + "\n", feet = log_text(5);
+  for (int i = 0; i < 50; ++i) stamps += std::to_string(100000 + 2 * i) + kRow + "\n";
+  expect_refused({"estimate", write("ms.csv", stamps)}, "are the stamps in seconds?");
+  for (std::size_t at = 0; (at = feet.find("-0.8", at)) != std::string::npos; at += 4) feet.replace(at, 4, "-800");
+  expect_refused({"estimate", write("mm.csv", feet)}, "left_foot_z_m is -800, beyond what can be true (20)");
 }
 
 TEST_F(EstimateCommand, BlankLinesAtTheEnd_AreNoRows) {

@@ -2,10 +2,12 @@
 // What a run leaves on the disk, and what hostile input may cost: nothing half written, nothing of a former run, no
 // memory that a file's header asks for.
 #include <gtest/gtest.h>
+#include <lodepng.h>
 
 #include <algorithm>
 #include <atomic>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -134,6 +136,72 @@ TEST(CsvTable, MillionsOfColumnsOrGigabytes_AreRefused) {
   EXPECT_NE(complaint_of([&] { CsvTable table(path); }).find("more than 1000 columns"), std::string::npos);
   fs::resize_file(path, std::uintmax_t{2} << 30U);
   EXPECT_NE(complaint_of([&] { CsvTable table(path); }).find("MiB"), std::string::npos);
+}
+
+TEST(CsvTable, MillionsOfShortRows_AreRefused) {
+  const std::string path = fresh_folder("rows") + "/log.csv";
+  std::string text = "t_s\n";
+  for (int i = 0; i < 2'000'001; ++i) text += "1\n";
+  std::ofstream(path) << text;
+  EXPECT_NE(complaint_of([&] { CsvTable table(path); }).find("more than 2000000 rows"), std::string::npos);
+  text.resize(text.size() - 2);
+  std::ofstream(path) << text;
+  EXPECT_EQ(complaint_of([&] { CsvTable table(path); }), "");
+}
+
+TEST(OutputFile, Removed_FileGoes_LinkAndDeviceStay_AndWhatTheLinkLeadsToIsEmptied) {
+  const std::string folder = fresh_folder("removed"), file = folder + "/file", link = folder + "/link";
+  std::ofstream(file) << "old";
+  fs::create_symlink(file, link);
+  remove_output(link);
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_EQ(text_of(file), "");
+  EXPECT_TRUE(fs::exists(file));
+  remove_output(file);
+  EXPECT_FALSE(fs::exists(file));
+  remove_output(file);
+  remove_output("/dev/null");
+  EXPECT_TRUE(fs::exists("/dev/null"));
+}
+
+// A picture's bytes: signature, and chunks with their checksums.
+std::string png(std::uint32_t width, std::uint32_t height, const std::string& unpacked) {
+  const auto number = [](std::uint32_t n) {
+    std::string bytes;
+    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(n >> static_cast<unsigned>(shift) & 0xFFU);
+    return bytes;
+  };
+  const auto chunk = [&number](const std::string& type, const std::string& data) {
+    const std::string body = type + data;
+    const unsigned crc = lodepng_crc32(reinterpret_cast<const unsigned char*>(body.data()), body.size());
+    return number(static_cast<std::uint32_t>(data.size())) + body + number(crc);
+  };
+  unsigned char* packed = nullptr;
+  std::size_t size = 0;
+  LodePNGCompressSettings settings;
+  lodepng_compress_settings_init(&settings);
+  EXPECT_EQ(lodepng_zlib_compress(&packed, &size, reinterpret_cast<const unsigned char*>(unpacked.data()),
+                                  unpacked.size(), &settings),
+            0U);
+  const std::string stream(reinterpret_cast<const char*>(packed), size);
+  std::free(packed);
+  return std::string("\x89PNG\r\n\x1a\n") +
+         chunk("IHDR", number(width) + number(height) + std::string("\x10\0\0\0\0", 5)) + chunk("IDAT", stream) +
+         chunk("IEND", "");
+}
+
+TEST(DepthPicture, HeaderThatAsksForGigabytes_OrStreamThatUnpacksToThem_IsRefused) {
+  const std::string path = fresh_folder("bomb") + "/bomb.png";
+  std::ofstream(path, std::ios::binary) << png(0x7fffffff, 0x7fffffff, "x");
+  EXPECT_NE(complaint_of([&] { (void)read_depth(path); }).find("bomb.png"), std::string::npos);
+  std::ofstream(path, std::ios::binary) << png(40000, 40000, "x");
+  EXPECT_NE(complaint_of([&] { (void)read_depth(path); }).find("is 40000x40000, more than"), std::string::npos);
+  const std::string bomb(std::size_t{64} << 20U, '\0');
+  std::ofstream(path, std::ios::binary) << png(32, 32, bomb);
+  ASSERT_LT(fs::file_size(path), 1U << 20U);
+  EXPECT_NE(complaint_of([&] { (void)read_depth(path); }).find("is broken"), std::string::npos);
+  std::ofstream(path, std::ios::binary) << png(32, 32, bomb.substr(0, 32 * 65));
+  EXPECT_EQ(complaint_of([&] { (void)read_depth(path); }), "") << "the same with as many bytes as it says";
 }
 
 }  // namespace

@@ -106,6 +106,48 @@ TEST_F(PerceiveCommand, Stairs_AreTreadsAndRisersWithNosings_GravityGivenOrNot) 
   }
 }
 
+TEST_F(PerceiveCommand, GravityUpsideDown_GetsOneSentence_AndTheRightOneNone) {
+  test::DepthPicture picture = test::render(scene_);
+  test::add_noise(picture, {}, 3);
+  write_depth("stairs.png", picture.raw(), 640, 480);
+  for (const double sign : {1.0, -1.0}) {
+    const Vec3 given = -sign * scene_.camera_up();
+    ASSERT_EQ(
+        call({"perceive", "--gravity", std::to_string(given.x()), std::to_string(given.y()), std::to_string(given.z()),
+              at("stairs.png"), "--camera", at("camera.toml"), "--json", at("out.json")}),
+        kExitPass);
+    const bool wrong = sign < 0.0;
+    EXPECT_EQ(err_.find("is a ceiling") != std::string::npos, wrong) << err_;
+    const nlohmann::json json = nlohmann::json::parse(std::ifstream(at("out.json")));
+    EXPECT_EQ(json["warnings"].size(), wrong ? 1U : 0U);
+    EXPECT_EQ(json["up_source"], "given");
+  }
+}
+
+// A wall alone: which way is up is not in the picture.
+TEST_F(PerceiveCommand, UpAssumed_KindsAreUnknown) {
+  write_depth("wall.png", std::vector<std::uint16_t>(640 * 480, 1000), 640, 480);
+  const std::vector<std::string> call_it{"perceive",        at("wall.png"), "--camera",
+                                         at("camera.toml"), "--json",       at("out.json")};
+  ASSERT_EQ(call(call_it), kExitPass) << err_;
+  const nlohmann::json json = nlohmann::json::parse(std::ifstream(at("out.json")));
+  EXPECT_EQ(json["up_source"], "assumed");
+  ASSERT_FALSE(json["planes"].empty());
+  for (const auto& plane : json["planes"]) EXPECT_EQ(plane["kind"], "unknown");
+}
+
+TEST_F(PerceiveCommand, RunThatFails_LeavesNoFormerOutput_AndRepeatIsDecimal) {
+  write_depth("wall.png", std::vector<std::uint16_t>(640 * 480, 1000), 640, 480);
+  write("out.json", "{}");
+  write("text.png", "no picture");
+  expect_refused({"perceive", at("text.png"), "--camera", at("camera.toml"), "--json", at("out.json")}, "text.png");
+  EXPECT_FALSE(std::filesystem::exists(at("out.json")));
+  write("out.json", "{}");
+  expect_refused({"perceive", at("wall.png"), "--camera", at("none.toml"), "--json", at("out.json")}, "none.toml");
+  EXPECT_FALSE(std::filesystem::exists(at("out.json")));
+  EXPECT_EQ(call({"perceive", at("wall.png"), "--camera", at("camera.toml"), "--repeat", "08"}), kExitPass) << err_;
+}
+
 TEST_F(PerceiveCommand, NothingMeasured_IsAnEmptyResult) {
   write_depth("blank.png", std::vector<std::uint16_t>(640 * 480, 0), 640, 480);
   ASSERT_EQ(call({"perceive", at("blank.png"), "--camera", at("camera.toml"), "--json", at("out.json")}), kExitPass);

@@ -238,13 +238,13 @@ TEST(EncoderOffsets, EstimatorStands_AnglesAreWithoutThem) {
     joints.q_rad = robot.true_q_rad + robot.offset_rad;
     joints.foot_force_n = {270.0, 270.0};
     estimator.add_imu(imu, imu.stamp_ns);
-    const JointVector taken_off_rad = estimator.encoder_offset_rad();
+    const JointVector taken_off_rad = estimator.leg_sensing().offset_rad();
     estimator.add_joints(joints, joints.stamp_ns);
-    EXPECT_LT((estimator.joints().q_rad + taken_off_rad - joints.q_rad).cwiseAbs().maxCoeff(), 1e-15);
+    EXPECT_LT((estimator.leg_sensing().joints().q_rad + taken_off_rad - joints.q_rad).cwiseAbs().maxCoeff(), 1e-15);
     estimator.tick({true, true});
   }
   EXPECT_TRUE(estimator.state().initialised);
-  EXPECT_NEAR(estimator.encoder_offset_rad()[kHipRoll], 0.75e-3, 0.1e-3);  // a fourth: two joints of two legs
+  EXPECT_NEAR(estimator.leg_sensing().offset_rad()[kHipRoll], 0.75e-3, 0.1e-3);  // a fourth: two joints of two legs
   const auto& sole = estimator.state().odom_T_sole;
   EXPECT_LT(sole[0].R.col(2).cross(sole[1].R.col(2)).norm(), 2e-4);
 }

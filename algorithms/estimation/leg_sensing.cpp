@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/estimation/leg_sensing.hpp"
+
+#include <algorithm>
+
+namespace polygmap {
+
+void LegSensing::reset(const Params& params, const RobotModel& robot) noexcept {
+  params_ = params;
+  robot_ = &robot;
+  counters_ = {};
+  encoders_.reset(params.encoders);
+  forces_.reset(params.forces);
+  joints_ = {};
+  dt_s_ = 0.0;
+  any_ = false;
+}
+
+bool LegSensing::is_valid(const JointFeedback& joints) const noexcept {
+  bool good = math::all_finite(joints.q_rad) && math::all_finite(joints.dq_radps) &&
+              joints.q_rad.cwiseAbs().maxCoeff() <= params_.max_joint_rad &&
+              joints.dq_radps.cwiseAbs().maxCoeff() <= params_.max_joint_speed_radps;
+  for (const double force_n : joints.foot_force_n) {
+    good = good && (params_.infer_forces || std::abs(force_n) <= params_.max_force_n);
+  }
+  if (params_.infer_forces) {
+    good = good && math::all_finite(joints.tau_nm) && joints.tau_nm.cwiseAbs().maxCoeff() <= params_.max_torque_nm;
+  }
+  return good;
+}
+
+bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, const Vec3& base_up) noexcept {
+  if (!is_valid(joints)) {
+    ++counters_.invalid;
+    return false;
+  }
+  if (joints.stamp_ns > latest_ns) {
+    ++counters_.future;
+    return false;
+  }
+  if (any_ && joints.stamp_ns <= joints_.stamp_ns) {
+    ++counters_.stale;
+    return false;
+  }
+  // The bound grows until the next accepted sample, so a true move is taken up again by itself.
+  const double most_rad =
+      params_.joint_slack_rad + params_.max_joint_speed_radps * seconds(joints.stamp_ns - joints_.stamp_ns);
+  const JointVector q_rad = joints.q_rad - encoders_.offset_rad();
+  if (any_ && (q_rad - joints_.q_rad).cwiseAbs().maxCoeff() > most_rad) {
+    ++counters_.jump;
+    return false;
+  }
+  dt_s_ = any_ ? seconds(joints.stamp_ns - joints_.stamp_ns) : 0.0;
+  joints_ = joints;
+  joints_.q_rad = q_rad;
+  if (params_.infer_forces) joints_.foot_force_n = forces_.update(robot_->legs, joints_, base_up);
+  for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
+  any_ = true;
+  return true;
+}
+
+LegSample LegSensing::legs() const noexcept {
+  LegSample sample;
+  sample.stamp_ns = joints_.stamp_ns;
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    sample.legs[i] = measure_leg(robot_->legs, static_cast<Foot>(i), joints_.q_rad, joints_.dq_radps);
+  }
+  sample.foot_force_n = joints_.foot_force_n;
+  return sample;
+}
+
+void LegSensing::learn_offsets(const std::array<LegMeasurement, kFootCount>& legs,
+                               const std::array<FootContact, kFootCount>& contacts, double longest_s) noexcept {
+  if (any_) encoders_.update(legs, contacts, joints_.tau_nm, std::min(dt_s_, longest_s));
+}
+
+void LegSensing::to_encoders(JointCommand& command) const noexcept {
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const JointLimits& limits = robot_->drives.limits[n];
+    double& q_rad = command.joints[n].q_rad;
+    q_rad = math::clamp(q_rad + encoders_.offset_rad()[static_cast<Eigen::Index>(n)], limits.min_rad, limits.max_rad);
+  }
+}
+
+}  // namespace polygmap

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/cli/command_words.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <system_error>
+
+namespace polygmap::sim {
+namespace {
+
+// "The following arguments were not expected: 3 --stepz", from the last to the first.
+std::string unexpected(const std::string& message, const CLI::App& app, const std::vector<std::string>& words) {
+  const std::string left = message.substr(std::min(message.find(": "), message.size() - 1) + 1) + " ";
+  const auto is_left = [&left](const std::string& word) { return left.find(" " + word + " ") != std::string::npos; };
+  const auto is_option = [&is_left](const std::string& word) { return word.starts_with("-") && is_left(word); };
+  if (words.empty()) return message;
+  const bool commanded = !app.get_subcommands().empty();
+  if (!commanded && !words[0].starts_with("-")) return "\"" + words[0] + "\" is no command";
+  auto culprit = std::ranges::find_if(words, is_option);
+  if (culprit != words.end()) return "There is no option " + *culprit;
+  culprit = std::find_if(words.begin() + 1, words.end(), is_left);
+  return culprit == words.end() ? message : "\"" + *culprit + "\" is a word too many";
+}
+
+// "Could not convert: --steps = abc"
+std::string unconverted(const std::string& message, const CLI::App& app) {
+  const std::size_t name_at = message.find(": "), value_at = message.find(" = ");
+  if (name_at == std::string::npos || value_at == std::string::npos) return message;
+  const std::string name = message.substr(name_at + 2, value_at - name_at - 2);
+  std::string type;
+  for (const CLI::App* command : app.get_subcommands()) {
+    const CLI::Option* option = command->get_option_no_throw(name);
+    if (option != nullptr) type = option->get_type_name();
+  }
+  const std::string number = type == "INT" ? "no whole number" : (type == "FLOAT" ? "no number" : "no value");
+  return "\"" + message.substr(value_at + 3) + "\" is " + number + " that " + name + " can take";
+}
+
+// "--steps: 1 required INT missing", "--gravity: At least 3 required but received 2", "--steps: At Most 1 required ..."
+std::string mismatched(const std::string& message) {
+  const std::size_t end = message.find(": ");
+  const std::size_t count_at = message.find_first_of("0123456789", end);
+  if (end == std::string::npos || count_at == std::string::npos) return message;
+  const std::string name = message.substr(0, end);
+  const std::string count = message.substr(count_at, message.find(' ', count_at) - count_at);
+  if (message.find("At Most") != std::string::npos) {
+    return name + (count == "1" ? " is given more than once" : " takes no more than " + count + " values");
+  }
+  return name + (count == "1" ? " needs a value" : " needs " + count + " values");
+}
+
+}  // namespace
+
+std::string complaint_of(const CLI::ParseError& error, const CLI::App& app, const std::vector<std::string>& words) {
+  std::string message = error.what();
+  switch (static_cast<CLI::ExitCodes>(error.get_exit_code())) {
+    case CLI::ExitCodes::ExtrasError:
+      return unexpected(message, app, words);
+    case CLI::ExitCodes::ConversionError:
+      return unconverted(message, app);
+    case CLI::ExitCodes::ArgumentMismatch:
+      return mismatched(message);
+    case CLI::ExitCodes::ValidationError:  // "--seed: must be a whole number"
+      if (const std::size_t end = message.find(": must "); end != std::string::npos) message.erase(end, 1);
+      return message;
+    default:
+      return message;
+  }
+}
+
+// CLI11 2.1 lets -1 and 2^64 wrap around.
+std::string whole_number(const std::string& text) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool good = error == std::errc{} && end == text.data() + text.size();
+  return good ? "" : "must be a whole number from 0 to 2^64 - 1, not " + text;
+}
+
+// CLI11 2.1 reads 010 as eight: here digits are decimal.
+std::string decimal(std::string& text) {
+  const std::size_t first = text.find_first_not_of("+-");
+  if (first == std::string::npos || text[first] != '0') return "";
+  if (text.find_first_not_of("0123456789", first) != std::string::npos)
+    return "must be a whole decimal number, not " + text;
+  text.erase(first, std::min(text.find_first_not_of('0', first), text.size() - 1) - first);
+  return "";
+}
+
+// CLI11 2.1 takes an empty word for the number 0.
+std::string not_empty(const std::string& text) { return text.empty() ? "must not be empty" : ""; }
+
+}  // namespace polygmap::sim

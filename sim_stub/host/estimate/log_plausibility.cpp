@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/estimate/log_plausibility.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "algorithms/geometry/so3.hpp"
+#include "firmware/config/file_error.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+constexpr double kGravityWindow_s = 2.0, kTruthWindow_s = 0.1;
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// By the gyro, from one row to the next.
+Mat3 turn_between(const LogRow& from, const LogRow& to, double gyro_scale) {
+  return so3_exp(0.5 * gyro_scale * seconds(to.stamp_ns - from.stamp_ns) * (from.gyro_radps + to.gyro_radps));
+}
+
+// Accelerations turned into one frame by the gyro add up to gravity; by a gyro of wrong units they cancel each other.
+double gravity_kept(const EstimateLog& log, double gyro_scale) {
+  double least = 1.0;
+  Mat3 R = Mat3::Identity();
+  Vec3 turned = Vec3::Zero(), plain = Vec3::Zero();
+  std::int64_t begin_ns = 0;
+  for (std::size_t i = 0; i < log.rows.size(); ++i) {
+    const LogRow& row = log.rows[i];
+    if (i > 0) R = R * turn_between(log.rows[i - 1], row, gyro_scale);
+    turned += R * row.accel_mps2;
+    plain += row.accel_mps2;
+    if (seconds(row.stamp_ns - begin_ns) < kGravityWindow_s) continue;
+    least = std::min(least, turned.norm() / std::max(plain.norm(), 1e-9));
+    R.setIdentity();
+    turned.setZero();
+    plain.setZero();
+    begin_ns = row.stamp_ns;
+  }
+  return least;
+}
+
+void hold_against_truth(const EstimateLog& log, double gyro_scale, LogFigures& figures) {
+  double squares = 0.0, error = 0.0, time_s = 0.0;
+  Mat3 R = Mat3::Identity();
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i < log.rows.size(); ++i) {
+    R = R * turn_between(log.rows[i - 1], log.rows[i], gyro_scale);
+    const double window_s = seconds(log.rows[i].stamp_ns - log.rows[begin].stamp_ns);
+    if (window_s < kTruthWindow_s) continue;
+    const Vec3 felt_rad = so3_log(R);
+    const Vec3 true_rad = so3_log(log.rows[begin].truth.true_T_base.R.transpose() * log.rows[i].truth.true_T_base.R);
+    squares += true_rad.squaredNorm();
+    error += (felt_rad - true_rad).squaredNorm();
+    time_s += window_s;
+    R.setIdentity();
+    begin = i;
+  }
+  if (!(squares > 0.0)) return;
+  figures.true_turn_radps = std::sqrt(squares * kTruthWindow_s / time_s) / kTruthWindow_s;
+  figures.gyro_error_share = error / squares;
+}
+
+struct Doubt {
+  std::string sentence;  // empty: none
+  bool impossible = false;
+};
+
+template <class... Values>
+std::string text(const char* format, Values... values) {
+  char line[256];
+  std::snprintf(line, sizeof line, format, values...);
+  return line;
+}
+
+// Walking jerks a base about, but half of the time it feels less than gravity and half of the time more.
+Doubt doubt_of_acceleration(const LogFigures& figures) {
+  const double felt_mps2 = figures.accel_mps2;
+  if (felt_mps2 > 0.8 && felt_mps2 < 1.25) {
+    return {text("The median acceleration is %.2f: that is in g, but accel_* are in m/s^2.", felt_mps2), true};
+  }
+  const bool impossible = felt_mps2 < 3.0 || felt_mps2 > 30.0;
+  if (!impossible && felt_mps2 > 7.0 && felt_mps2 < 13.0) return {};
+  return {text("The median acceleration is %.3g m/s^2, but a robot on its feet feels gravity's 9.81 (other units, or "
+               "gravity taken off?).",
+               felt_mps2),
+          impossible};
+}
+
+Doubt doubt_of_feet(const LogFigures& figures) {
+  const bool impossible = figures.leg_m > 3.0;
+  if (!impossible && figures.leg_m > 0.03) return {};
+  return {text("The feet are %.3g m from the base, in the median: are they in metres, and in the base's frame?",
+               figures.leg_m),
+          impossible};
+}
+
+Doubt doubt_of_up(const LogFigures& figures) {
+  const Vec3& felt = figures.base_up_felt;
+  const double cosine = felt.normalized().dot(figures.base_up_by_feet.normalized());
+  const double apart_deg = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / kPi;
+  if (!(apart_deg > 25.0)) return {};
+  return {
+      text("The mean acceleration, (%.1f, %.1f, %.1f) m/s^2, points %.0f degrees away from where the base lies above "
+           "its feet: an axis of the accelerometer or of the feet is swapped or flipped.",
+           felt.x(), felt.y(), felt.z(), apart_deg),
+      apart_deg > 60.0};
+}
+
+Doubt doubt_of_gyro(const EstimateLog& log, const LogFigures& figures) {
+  const bool loses_gravity = figures.gravity_kept < 0.9;
+  const bool denies_truth = figures.true_turn_radps > 0.03 && figures.gyro_error_share > 0.8;
+  if (!loses_gravity && !denies_truth) return {};
+  const LogFigures in_degrees = figures_of(log, kPi / 180.0);
+  if ((!loses_gravity || in_degrees.gravity_kept > 0.95) && (!denies_truth || in_degrees.gyro_error_share < 0.8)) {
+    return {
+        "The gyro turns 57 times as fast as the rest of the log: it is in degrees per second, but gyro_* are in "
+        "rad/s.",
+        true};
+  }
+  if (denies_truth) {
+    return {
+        "The gyro turns otherwise than the truth's quaternion: an axis is swapped or flipped, or the quaternion is "
+        "not that of the base in the world."};
+  }
+  return {
+      "Turned by the gyro, the acceleration does not keep to one direction: other units, or an axis that is swapped "
+      "or flipped?"};
+}
+
+Doubt doubt_of_truth(const LogFigures& figures, double duration_s) {
+  const double most_mps2 = 0.35 + 0.5 / std::max(duration_s, 0.1);  // a bias, and what the base gained in speed
+  if (!(figures.felt_lean_mps2 > most_mps2)) return {};
+  return {
+      text("By the truth's attitude the mean acceleration leans out of the vertical by %.2f m/s^2: an axis is "
+           "swapped or flipped, or the accelerometer has a large bias.",
+           figures.felt_lean_mps2)};
+}
+
+}  // namespace
+
+LogFigures figures_of(const EstimateLog& log, double gyro_scale) {
+  LogFigures figures;
+  Vec3 true_felt_mps2 = Vec3::Zero();
+  std::vector<double> accels_mps2, legs_m;
+  const double share = 1.0 / static_cast<double>(log.rows.size());
+  for (const LogRow& row : log.rows) {
+    accels_mps2.push_back(row.accel_mps2.norm());
+    figures.base_up_felt += share * row.accel_mps2;
+    true_felt_mps2 += share * (row.truth.true_T_base.R * row.accel_mps2);
+    for (const Vec3& foot_m : row.base_p_foot_m) {
+      legs_m.push_back(foot_m.norm());
+      figures.base_up_by_feet -= share / kFootCount * foot_m;
+    }
+  }
+  figures.accel_mps2 = median(std::move(accels_mps2));
+  figures.leg_m = median(std::move(legs_m));
+  figures.gravity_kept = gravity_kept(log, gyro_scale);
+  if (log.has_truth) {
+    hold_against_truth(log, gyro_scale, figures);
+    figures.felt_lean_mps2 = true_felt_mps2.head<2>().norm();
+  }
+  return figures;
+}
+
+std::vector<std::string> doubts_about(const EstimateLog& log, const std::string& path) {
+  const LogFigures figures = figures_of(log);
+  std::vector<std::string> doubts;
+  for (const Doubt& doubt : {doubt_of_acceleration(figures), doubt_of_feet(figures), doubt_of_up(figures),
+                             doubt_of_gyro(log, figures), doubt_of_truth(figures, seconds(log.rows.back().stamp_ns))}) {
+    if (doubt.impossible) throw config::FileError("\"" + path + "\": " + doubt.sentence);
+    if (!doubt.sentence.empty()) doubts.push_back(doubt.sentence);
+  }
+  return doubts;
+}
+
+}  // namespace polygmap::sim

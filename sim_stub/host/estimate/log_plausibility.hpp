@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Is a log in the units and axes that its columns name? What cannot be is refused, what is odd is told.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sim_stub/host/estimate/estimate_log.hpp"
+
+namespace polygmap::sim {
+
+// What the answer hangs on.
+struct LogFigures {
+  double accel_mps2 = 0.0;              // median of the acceleration's length
+  Vec3 base_up_felt = Vec3::Zero();     // mean acceleration: points up where a robot stays upright
+  Vec3 base_up_by_feet = Vec3::Zero();  // from the feet to the base, in the mean
+  double leg_m = 0.0;                   // median distance of a foot
+  double gravity_kept = 1.0;            // share of gravity that the gyro's turns leave, at worst
+  // Against the truth, 0 without it.
+  double true_turn_radps = 0.0;   // RMS
+  double gyro_error_share = 0.0;  // of the turns, squared
+  double felt_lean_mps2 = 0.0;    // of the mean acceleration, out of the vertical
+};
+// gyro_scale: as if the gyro had said so much.
+[[nodiscard]] LogFigures figures_of(const EstimateLog& log, double gyro_scale = 1.0);
+
+// One sentence each. Throws config::FileError, one sentence, where the log cannot be what it says.
+[[nodiscard]] std::vector<std::string> doubts_about(const EstimateLog& log, const std::string& path);
+
+}  // namespace polygmap::sim
