@@ -99,8 +99,11 @@ void SurfaceBuilder::look_beyond(Edge edge, Beyond& beyond) const noexcept {
   const ColumnExtents& extents = regions_->extents[id_];
   for (std::int32_t g = extents.first_column; g <= extents.last_column; ++g) {
     const std::int32_t end = end_of(edge, g), far = end + down * kProbe_px;
-    if (end < 0 || far < 0 || far >= image_->column_rays.height_px || image_->body(kColumn_px / 2 * g, far / 2))
-      continue;
+    if (end < 0) continue;
+    const bool outside = far < 0 || far >= image_->column_rays.height_px;
+    if (!outside && image_->body(kColumn_px / 2 * g, far / 2)) continue;
+    ++beyond.all_columns;
+    if (outside) continue;
     // The first label from the end on: rows lie next to one another.
     static_assert(kProbe_px == sizeof(std::uint64_t) && std::endian::native == std::endian::little);
     std::uint64_t labels = 0;
@@ -119,6 +122,8 @@ RegionId SurfaceBuilder::most_beyond(Edge edge, const Beyond& beyond, bool riser
   RegionId most = kNoRegion;
   for (RegionId p = 1; p <= regions.count; ++p) {
     if (2 * beyond.columns[p] < params_.edge_lines.min_columns || p == id_ || !regions[p].alive) continue;
+    // The foot of a post is no end of a tread.
+    if (edge == Edge::kBack && beyond.columns[p] < params_.least_back_share * beyond.all_columns) continue;
     const double height_m = plane.distance_m(regions[p].centre_m);
     if (edge == Edge::kNosing ? height_m > -kStepLeast_m : height_m < kStepLeast_m) continue;
     if (riser_only && regions[p].kind != SurfaceKind::kRiser) continue;

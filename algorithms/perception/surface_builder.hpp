@@ -25,11 +25,14 @@ class SurfaceBuilder {
     SideLines::Params sides;
     EdgeLineFinder::Params edge_lines;
     PolygonBuilder::Params polygons;
+    double least_back_share = 0.4;  // six posts along a landing are a tenth of its columns (2026-11)
 
     static void visit(auto& p, auto& field) {
       field("sides", p.sides);
       field("edge_lines", p.edge_lines);
       field("polygons", p.polygons);
+      field("least_back_share", p.least_back_share, 0.0, 1.0,
+            "What ends a surface at its back is seen beyond it in this share of its columns.");
     }
   };
   // What the next step begins with: for each region its sides, its outline, a tread's two lines, its polygon.
@@ -54,10 +57,11 @@ class SurfaceBuilder {
  private:
   enum class Edge : std::uint8_t { kNosing, kBack };  // a tread's end below and above in the picture
   // The regions beyond one of a surface's ends: by column, none where there is none, or the body or the picture's end
-  // hides it; and each region's columns.
+  // hides it; each region's columns; and all of the surface's but where the body is.
   struct Beyond {
     std::array<RegionId, kColumns> region{};
     std::array<std::int32_t, Regions::kMaxRegions + 1> columns{};
+    std::int32_t all_columns = 0;
   };
 
   std::int32_t do_piece() noexcept;  // returns its units

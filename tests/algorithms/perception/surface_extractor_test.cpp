@@ -64,15 +64,19 @@ class Extraction {
 };
 
 // The level surface at a world height, if there is exactly one.
-const SurfacePatch* tread_at(const SurfaceFrame& frame, const DepthScene& scene, double height_m) {
-  const SurfacePatch* found = nullptr;
+// The convex pieces of a level surface.
+std::vector<const SurfacePatch*> pieces_at(const SurfaceFrame& frame, const DepthScene& scene, double height_m) {
+  std::vector<const SurfacePatch*> found;
   for (const SurfacePatch& s : frame.surfaces) {
     if (s.kind != SurfaceKind::kTread) continue;
-    if (std::abs((scene.world_T_camera * s.centroid_m).z() - height_m) > 0.02) continue;
-    if (found != nullptr) return nullptr;
-    found = &s;
+    if (std::abs((scene.world_T_camera * s.centroid_m).z() - height_m) < 0.02) found.push_back(&s);
   }
   return found;
+}
+// The one piece there is, else null.
+const SurfacePatch* tread_at(const SurfaceFrame& frame, const DepthScene& scene, double height_m) {
+  const auto pieces = pieces_at(frame, scene, height_m);
+  return pieces.size() == 1 ? pieces.front() : nullptr;
 }
 
 double line_error_m(const DepthScene& scene, const EdgeLine& line, double x_m) {
@@ -164,7 +168,7 @@ TEST(SurfaceExtractor, StepOfFortyMillimetres_StaysApartFromTheFloor) {
   Extraction extraction;
   for (const bool correlated : {false, true}) {
     const SurfaceFrame& frame = extraction.run(scene, {.correlated = correlated}, 5);
-    EXPECT_NE(tread_at(frame, scene, 0.0), nullptr);
+    EXPECT_FALSE(pieces_at(frame, scene, 0.0).empty());  // before and beside the step
     const SurfacePatch* step = tread_at(frame, scene, 0.04);
     ASSERT_NE(step, nullptr);
     EXPECT_TRUE(step->nosing.valid);
@@ -256,7 +260,7 @@ TEST(SurfaceExtractor, FloorAroundAStaircase_LiesBeforeTheFirstRiserAndNotUnderT
   }
 }
 
-TEST(SurfaceExtractor, LandingAroundAStairwell_DoesNotCoverTheHole) {
+TEST(SurfaceExtractor, LandingAroundAStairwell_IsConvexPiecesThatDoNotCoverTheHole) {
   DepthScene scene;
   scene.intrinsics = robot_camera_intrinsics();
   scene.place_camera(0.97, 1.047, 0.05, 0.01);
@@ -264,10 +268,17 @@ TEST(SurfaceExtractor, LandingAroundAStairwell_DoesNotCoverTheHole) {
   Extraction extraction;
   const SurfaceFrame& frame = extraction.run(scene, {}, 32);
   expect_well_formed(frame);
-  const SurfacePatch* landing = tread_at(frame, scene, 0.2);
-  ASSERT_NE(landing, nullptr);
-  EXPECT_FALSE(holds(*landing, scene, 0.65, -0.15)) << "the hole lies deeper";
-  EXPECT_GT(landing->area_m2, 0.25);
+  const auto landing = pieces_at(frame, scene, 0.2);
+  EXPECT_GE(landing.size(), 2U);
+  int before = 0, beside = 0;
+  for (const SurfacePatch* piece : landing) {
+    EXPECT_EQ(piece->plane, landing.front()->plane);
+    EXPECT_FALSE(holds(*piece, scene, 0.65, -0.15)) << "the hole lies deeper";
+    before += holds(*piece, scene, 0.35, -0.15) ? 1 : 0;
+    beside += holds(*piece, scene, 0.65, 0.2) ? 1 : 0;
+  }
+  EXPECT_EQ(before, 1);
+  EXPECT_EQ(beside, 1);
 }
 
 TEST(SurfaceExtractor, OverhangingNosings_AreNoLeaningPlanes) {
