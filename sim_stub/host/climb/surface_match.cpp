@@ -86,10 +86,7 @@ int matching_surface(const StairWorld& world, const SurfacePatch& patch, const T
 }
 
 SurfaceVisibility::SurfaceVisibility(const StairWorld& world, const CameraIntrinsics& intrinsics)
-    : solids_(stair_solids(world)),
-      surfaces_(stair_surfaces(world)),
-      seen_(3 + 2 * world.steps.size()),
-      renderer_([&] {
+    : solids_(stair_solids(world)), surfaces_(stair_surfaces(world)), seen_(3 + 2 * world.steps.size()), renderer_([&] {
         CameraIntrinsics coarse = intrinsics;
         coarse.width_px /= kCoarse_px, coarse.height_px /= kCoarse_px;
         coarse.fx_px /= kCoarse_px, coarse.fy_px /= kCoarse_px;
