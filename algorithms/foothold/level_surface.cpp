@@ -52,6 +52,46 @@ void note_ends(const SurfacePatch& surface, LevelSurface& out) noexcept {
   }
 }
 
+// From the nosing's or the back line's direction; of a surface without either, the base's.
+void find_heading(const SurfacePatch& surface, double base_yaw_rad, const Vec2& centre, const EdgeMargin& margin,
+                  LevelSurface& out) noexcept {
+  out.has_nosing = surface.nosing.valid;
+  const EdgeLine& line = surface.nosing.valid ? surface.nosing : surface.back;
+  out.yaw_rad = base_yaw_rad;
+  if (line.valid) {
+    const Vec2 along = (line.b_m - line.a_m).head<2>();
+    const double into = (out.has_nosing ? 1.0 : -1.0) * cross(along, centre - line.a_m.head<2>());
+    const Vec2 heading = into >= 0.0 ? left_of(along) : Vec2{-left_of(along)};
+    out.yaw_rad = math::atan2(heading.y(), heading.x());
+  }
+  out.heading = unit_at(out.yaw_rad);
+  out.left = left_of(out.heading);
+  if (out.has_nosing) {
+    const bool a_is_left = out.left.dot((surface.nosing.a_m - surface.nosing.b_m).head<2>()) > 0.0;
+    out.nosing_a_m = a_is_left ? surface.nosing.a_m : surface.nosing.b_m;
+    out.nosing_b_m = a_is_left ? surface.nosing.b_m : surface.nosing.a_m;
+    out.nosing_margin_m = margin.of(surface.nosing.sigma_m);
+  }
+}
+
+// Contact rectangle to every edge, collision box to the back line.
+void add_edge_limits(const SurfacePatch& surface, const EdgeMargin& margin, const SoleModel& sole,
+                     LevelSurface& out) noexcept {
+  for (std::size_t i = 0; i < out.hull.size(); ++i) {
+    const HalfPlane inside = edge_half_plane(out.hull, i);
+    const double facing = inside.inward.dot(out.heading);
+    double margin_m = margin.least_m;  // the sides keep one of their own
+    if (facing > kCos30 && surface.nosing.valid) margin_m = out.nosing_margin_m;
+    if (facing < -kCos30 && surface.back.valid) margin_m = out.back_margin_m;
+    (void)out.edges.try_push_back({inside, reach_m(sole.contact, out.heading, inside.inward), margin_m,
+                                   std::abs(inside.inward.dot(out.left)) > kSide});
+  }
+  if (out.has_nosing && surface.back.valid) {
+    const std::optional<Line2> back = line_through(surface.back.a_m.head<2>(), surface.back.b_m.head<2>());
+    if (back) add_toe_limit(out, sole, *back, out.back_margin_m, 0.0, std::numeric_limits<double>::infinity());
+  }
+}
+
 }  // namespace
 
 double LevelSurface::contact_clearance_m(const Vec2& p_m) const noexcept {
@@ -80,40 +120,12 @@ bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& m
   if (!(area_m2(out.hull) > 0.0) || !(std::abs(surface.normal.z()) > 0.5)) return false;
   const Vec2 centre = centroid_m(out.hull);
 
-  out.has_nosing = surface.nosing.valid;
-  const EdgeLine& line = surface.nosing.valid ? surface.nosing : surface.back;
-  out.yaw_rad = base_yaw_rad;
-  if (line.valid) {
-    const Vec2 along = (line.b_m - line.a_m).head<2>();
-    const double into = (out.has_nosing ? 1.0 : -1.0) * cross(along, centre - line.a_m.head<2>());
-    const Vec2 heading = into >= 0.0 ? left_of(along) : Vec2{-left_of(along)};
-    out.yaw_rad = math::atan2(heading.y(), heading.x());
-  }
-  out.heading = unit_at(out.yaw_rad);
-  out.left = left_of(out.heading);
-  if (out.has_nosing) {
-    const bool a_is_left = out.left.dot((surface.nosing.a_m - surface.nosing.b_m).head<2>()) > 0.0;
-    out.nosing_a_m = a_is_left ? surface.nosing.a_m : surface.nosing.b_m;
-    out.nosing_b_m = a_is_left ? surface.nosing.b_m : surface.nosing.a_m;
-    out.nosing_margin_m = margin.of(surface.nosing.sigma_m);
-  }
+  find_heading(surface, base_yaw_rad, centre, margin, out);
   out.back_margin_m = surface.back.valid ? margin.of(surface.back.sigma_m) : out.nosing_margin_m;
   out.height_m = out.plane.height_m(out.has_nosing ? out.nosing_middle_m() : centre);
 
   note_ends(surface, out);
-  for (std::size_t i = 0; i < out.hull.size(); ++i) {
-    const HalfPlane inside = edge_half_plane(out.hull, i);
-    const double facing = inside.inward.dot(out.heading);
-    double margin_m = margin.least_m;  // the sides keep one of their own
-    if (facing > kCos30 && surface.nosing.valid) margin_m = out.nosing_margin_m;
-    if (facing < -kCos30 && surface.back.valid) margin_m = out.back_margin_m;
-    (void)out.edges.try_push_back({inside, reach_m(sole.contact, out.heading, inside.inward), margin_m,
-                                   std::abs(inside.inward.dot(out.left)) > kSide});
-  }
-  if (out.has_nosing && surface.back.valid) {
-    const std::optional<Line2> back = line_through(surface.back.a_m.head<2>(), surface.back.b_m.head<2>());
-    if (back) add_toe_limit(out, sole, *back, out.back_margin_m, 0.0, std::numeric_limits<double>::infinity());
-  }
+  add_edge_limits(surface, margin, sole, out);
   return true;
 }
 

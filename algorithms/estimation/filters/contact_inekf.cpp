@@ -58,7 +58,7 @@ void ContactInEkf::anchor(std::size_t foot, const LegMeasurement& leg) noexcept 
     P_.diagonal().segment<3>(to).array() += variance;
   };
   copy(of_foot(kContact, foot), kPosition, math::square(leg.position_sigma_m));
-  if (leg.sole_known) copy(of_foot(kSole, foot), kAttitude, math::square(params_.foot_sigma_rad));
+  if (leg.sole_known) copy(of_foot(kSoleRotation, foot), kAttitude, math::square(params_.foot_sigma_rad));
 }
 
 void ContactInEkf::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion,
@@ -131,7 +131,7 @@ void ContactInEkf::correct_by_feet(const std::array<LegMeasurement, kFootCount>&
       continue;
     }
     const double share = std::max(contacts[foot].load_share * contacts[foot].probability, 0.05);
-    const int contact = of_foot(kContact, foot), sole = of_foot(kSole, foot);
+    const int contact = of_foot(kContact, foot), sole = of_foot(kSoleRotation, foot);
     P_.diagonal().segment<3>(contact).array() += dt_s * (math::square(walk_mprs) / share + contacts[foot].walk_m2ps);
     const Vec3 off_m = odom_R_base_ * leg.base_T_sole.p_m - (odom_p_contact_m_[foot] - odom_p_base_m_);
     if (contacts[foot].walk_m2ps > 0.0) {
@@ -198,7 +198,7 @@ void ContactInEkf::apply(const Vector& error) noexcept {
   accel_bias_mps2_ += error.segment<3>(kAccelBias);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     odom_p_contact_m_[foot] = turn * odom_p_contact_m_[foot] + error.segment<3>(of_foot(kContact, foot));
-    odom_R_foot_[foot] = so3_renormalised(so3_exp(error.segment<3>(of_foot(kSole, foot))) * odom_R_foot_[foot]);
+    odom_R_foot_[foot] = so3_renormalised(so3_exp(error.segment<3>(of_foot(kSoleRotation, foot))) * odom_R_foot_[foot]);
   }
 }
 

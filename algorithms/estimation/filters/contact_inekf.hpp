@@ -134,7 +134,7 @@ class ContactInEkf {
     kGyroBias = 9,
     kAccelBias = 12,
     kContact = 15,
-    kSole = 21
+    kSoleRotation = 21
   };
   using Covariance = Eigen::Matrix<double, kStates, kStates>;
   using Vector = Eigen::Matrix<double, kStates, 1>;

@@ -51,6 +51,26 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
   return true;
 }
 
+struct Candidate {
+  Vec3 normal;
+  std::size_t plane;
+};
+using Candidates = StaticVector<Candidate, PlaneSet::kMaxPlanes>;
+[[nodiscard]] Candidates candidates_of(const PlaneSet& planes) noexcept {
+  Candidates candidates;
+  for (std::size_t p = 1; p <= planes.count; ++p) {
+    if (planes[p].alive && !planes[p].facet) static_cast<void>(candidates.try_push_back({planes[p].plane.normal(), p}));
+  }
+  return candidates;
+}
+
+void take_over(FittedPlane& kept, FittedPlane& gone) noexcept {
+  kept.pixels += gone.pixels;
+  kept.moments.add(gone.moments);
+  kept.merged = true;
+  gone.alive = false;
+}
+
 // Whether a plane is part of one with as many pixels or more; cosine: of the angle between them.
 [[nodiscard]] bool part_of(const PlaneMerging::Params& params, const PlaneGrowing::Params& growing,
                            const DepthNoiseModel& noise, const FittedPlane& p, const FittedPlane& q, double cosine,
@@ -75,14 +95,7 @@ void PlaneMerging::merge_coplanar(const Params& params, const PlaneGrowing::Para
                                   const DepthNoiseModel& noise, PlaneSet& planes, PlaneIndex& to_plane,
                                   bool measured) noexcept {
   const double least_cosine = math::cos(2.0 * params.merge_tilt_rad);
-  struct Candidate {
-    Vec3 normal;
-    std::size_t plane;
-  };
-  StaticVector<Candidate, PlaneSet::kMaxPlanes> candidates;
-  for (std::size_t p = 1; p <= planes.count; ++p) {
-    if (planes[p].alive && !planes[p].facet) static_cast<void>(candidates.try_push_back({planes[p].plane.normal(), p}));
-  }
+  const auto candidates = candidates_of(planes);
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const std::size_t a = candidates[i].plane;
     for (std::size_t j = i + 1; j < candidates.size() && planes[a].alive; ++j) {
@@ -90,12 +103,8 @@ void PlaneMerging::merge_coplanar(const Params& params, const PlaneGrowing::Para
       const std::size_t b = candidates[j].plane;
       if (cosine < least_cosine || !planes[b].alive) continue;
       const std::size_t keep = planes[a].pixels >= planes[b].pixels ? a : b, gone = keep == a ? b : a;
-      FittedPlane &p = planes[keep], &q = planes[gone];
-      if (!part_of(params, growing, noise, p, q, cosine, measured)) continue;
-      p.pixels += q.pixels;
-      p.moments.add(q.moments);
-      p.merged = true;
-      q.alive = false;
+      if (!part_of(params, growing, noise, planes[keep], planes[gone], cosine, measured)) continue;
+      take_over(planes[keep], planes[gone]);
       redirect(to_plane, gone, keep);
     }
   }

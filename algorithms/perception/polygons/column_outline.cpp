@@ -38,21 +38,32 @@ void smooth(const ColumnExtents& profile, std::int32_t first, std::int32_t last,
 
 }  // namespace
 
+// Keeps the corners from base on a chain that turns one way only.
+void ColumnOutline::push(const Vec2& p, std::size_t base) noexcept {
+  const auto turn = [&] {
+    const Vec2 &a = chain_[count_ - 2], &b = chain_[count_ - 1];
+    return (b.x() - a.x()) * (p.y() - a.y()) - (b.y() - a.y()) * (p.x() - a.x());
+  };
+  while (count_ >= base + 2 && turn() <= 0.0) --count_;
+  chain_[count_++] = p;
+}
+
+// Too many corners for an outline: every second one goes first, which only shrinks it.
+void ColumnOutline::thin() noexcept {
+  while (count_ > kMaxOutline) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count_; i += 2) chain_[kept++] = chain_[i];
+    count_ = kept;
+  }
+}
+
 void ColumnOutline::build(const ColumnExtents& profile, const OutlineSides& sides, std::size_t max_vertices,
                           Outline2& outline) noexcept {
   outline.clear();
   const std::int32_t first = profile.first_column, last = profile.last_column;
   const auto ends = [&profile](std::int32_t g) { return profile.columns[static_cast<std::size_t>(g)]; };
   if (first > last) return;
-  std::size_t count = 0;
-  const auto push = [&](const Vec2& p, std::size_t base) {
-    const auto turn = [&] {
-      const Vec2 &a = chain_[count - 2], &b = chain_[count - 1];
-      return (b.x() - a.x()) * (p.y() - a.y()) - (b.y() - a.y()) * (p.x() - a.x());
-    };
-    while (count >= base + 2 && turn() <= 0.0) --count;
-    chain_[count++] = p;
-  };
+  count_ = 0;
   smooth(profile, first, last, smooth_);
   // A column's ends are those at its middle; only the sides reach farther. Full-resolution row r covers half-resolution
   // (r - 1) / 2 to r / 2.
@@ -89,20 +100,15 @@ void ColumnOutline::build(const ColumnExtents& profile, const OutlineSides& side
     push({middle(g), upper(g)}, 0);
   }
   push(top_right, 0);
-  const std::size_t base = count - 1;
+  const std::size_t base = count_ - 1;
   push(bottom_right, base);
   for (std::int32_t g = bottom.last; g >= bottom.first; --g) {
     if (!inside(g, lower(g)) || middle(g) <= bottom_left.x() || middle(g) >= bottom_right.x()) continue;
     push({middle(g), lower(g)}, base);
   }
   push(bottom_left, base);
-  // Too many corners for an outline: every second one goes first, which only shrinks it.
-  while (count > kMaxOutline) {
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < count; i += 2) chain_[kept++] = chain_[i];
-    count = kept;
-  }
-  for (std::size_t i = 0; i < count; ++i) static_cast<void>(outline.try_push_back(chain_[i]));
+  thin();
+  for (std::size_t i = 0; i < count_; ++i) static_cast<void>(outline.try_push_back(chain_[i]));
   reduce(outline, max_vertices, 0.0);
 }
 

@@ -33,7 +33,11 @@ class ColumnOutline {
              Outline2& outline) noexcept;
 
  private:
+  void push(const Vec2& p, std::size_t base) noexcept;
+  void thin() noexcept;
+
   std::array<Vec2, 2 * (kColumns + 2)> chain_{};
+  std::size_t count_ = 0;  // corners in chain_
   std::array<ColumnExtent, kColumns> smooth_{};
 };
 
