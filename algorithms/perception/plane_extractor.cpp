@@ -153,7 +153,8 @@ void PlaneExtractor::merge_coplanar(bool measured) noexcept {
   for (PlaneId i = 1; i <= planes_.count; ++i) {
     FittedPlane& p = planes_[i];
     if (!std::exchange(p.merged, false) || !p.alive) continue;
-    if (!try_solve_leaning(params_.fit, noise_, p.moments, up_, p.plane, &p.covariance)) continue;
+    // Pixels of grown segments all weigh 1, which says nothing of how well they know the plane.
+    if (measured) static_cast<void>(try_solve_leaning(params_.fit, noise_, p.moments, up_, p.plane, &p.covariance));
     p.kind = kind_of(p.plane);
     p.centre_m = p.plane.point(p.moments.mean_ray());
     boundaries_.set_plane(i, p.plane);

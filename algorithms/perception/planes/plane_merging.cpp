@@ -69,6 +69,8 @@ void take_over(FittedPlane& kept, FittedPlane& gone) noexcept {
   kept.moments.add(gone.moments);
   kept.merged = true;
   gone.alive = false;
+  Vec3 m;
+  if (try_fit(kept.moments, m)) kept.plane.m = m;
 }
 
 // Whether a plane is part of one with as many pixels or more; cosine: of the angle between them.
