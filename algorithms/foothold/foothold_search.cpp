@@ -140,6 +140,7 @@ FootholdSearch::Extent FootholdSearch::extent_on(const LevelSurface& tread, cons
 void FootholdSearch::link_upright(LevelSurface& tread, const Upright& u) const noexcept {
   constexpr double kLeg_m = 0.5;  // above the sole: what hangs higher is in no leg's way
   constexpr double kBesideFacing = 0.3;
+  constexpr double kSquare = 0.866;  // cosine of 30 degrees, as add_toe_limit() has it
   // A face at the nosing is the tread's own riser, which measures up to 0.09 m too tall, see carries(); what stands on
   // the tread does not reach below it.
   constexpr double kTaller_m = 0.25, kBelow_m = 0.05;
@@ -147,10 +148,12 @@ void FootholdSearch::link_upright(LevelSurface& tread, const Upright& u) const n
   const double facing = u.outward.dot(tread.heading);
   const Extent extent = extent_on(tread, u.left_m(), u.right_m());
   const double margin_m = params_.margin.of(u.sigma_m);
-  if (extent == Extent::kAcross && facing <= -kFacing) {
+  // A wall that crosses both feet at a slant ends the tread at no one place: it is in the way.
+  if (extent == Extent::kAcross && facing <= -kSquare) {
     add_toe_limit(tread, foot_, {u.point_m, u.direction}, margin_m, kNearestBack_m, kFarthestBack_m);
+    return;
   }
-  if (extent != Extent::kPartial || facing > kBesideFacing) return;
+  if (extent == Extent::kAside || facing > kBesideFacing) return;
   const double a = tread.along_m(u.left_m()), b = tread.along_m(u.right_m());
   const double passed_m = tread.along_m(sole_.origin_m()) + foot_.collision.toe_x_m;
   if (std::max(a, b) < passed_m || std::min(a, b) > kFarthestBack_m) return;

@@ -191,6 +191,10 @@ void PlaneExtractor::take_split_planes() noexcept {
     FittedPlane& p = planes_[i];
     OverhangSplit::Halves halves;
     if (!p.alive || !overhangs_.try_split(i, halves)) continue;
+    if (planes_.count == PlaneSet::kMaxPlanes) {  // one leaning plane is better than half a riser
+      ++plane_overflow_;
+      continue;
+    }
     p.plane = halves.larger;
     p.kind = SurfaceKind::kRiser;
     p.pixels -= halves.smaller_px;

@@ -41,7 +41,7 @@ void expect_a_good_climb(const ClimbSummary& summary, int steps) {
   EXPECT_GT(summary.swing_clearance_min_m, 0.0);
   EXPECT_GE(summary.seconds_per_step, 2.35);  // four steps from a standstill: 2.398
   EXPECT_LE(summary.seconds_per_step, 3.7);
-  // 30 Hz frames; a few hold a surface that is none, more of them where nosings overhang (README, limits).
+  // Of 30 Hz: in a few frames a surface is missed or one is none, in more of them where nosings overhang.
   EXPECT_GE(summary.plane_rate_hz, summary.options.stairs.nosing_m > 0.0 ? 28.5 : 29.0);
   EXPECT_LE(summary.exposure_to_map_ms.max, 64.0);
   EXPECT_LE(summary.map_age_at_latch_ms.max, 100.0);

@@ -57,12 +57,14 @@ class Engine:
             return json.loads(kept.read_text())
         with tempfile.TemporaryDirectory() as out:
             done = subprocess.run([self.tool, "climb", *map(str, arguments), "--out", out], capture_output=True, text=True,
-                                  timeout=timeout_s)
+                                  timeout=timeout_s, start_new_session=True)  # Ctrl-C is for the campaign alone
             written = pathlib.Path(out, "summary.json")
             summary = json.loads(written.read_text()) if written.exists() else {}
         if not summary:
             summary = {"verdict": "none", "reason": (done.stderr or done.stdout).strip()[-300:], "exit": done.returncode}
         summary["run"] = " ".join(map(str, arguments))
+        if summary["verdict"] not in ("pass", "fail"):  # crashed, or interrupted from outside: no result to keep
+            return summary
         partial = kept.with_suffix(".part")
         partial.write_text(json.dumps(summary))
         partial.rename(kept)
@@ -87,8 +89,11 @@ class Engine:
 
 
 def commit():
-    done = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=10"], cwd=ROOT, capture_output=True, text=True)
-    return done.stdout.strip() or "no repository"
+    """The code's: pages that a campaign has just written do not count."""
+    def git(*words):
+        return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True).stdout.strip()
+    at = git("rev-parse", "--short=10", "HEAD")
+    return at + ("-dirty" if git("status", "--porcelain", "--", *CODE) else "") if at else "no repository"
 
 
 def rows(header, lines):

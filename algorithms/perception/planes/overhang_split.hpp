@@ -19,7 +19,7 @@ class OverhangSplit {
   struct Params {
     double least_lean_rad = 0.04;
     double most_lean_rad = 0.5;
-    double most_left = 0.5;
+    double most_left = 0.9;
     double least_step_m = 0.005;
     std::int32_t least_rows = 30;
 
@@ -29,7 +29,7 @@ class OverhangSplit {
       field("most_lean_rad", p.most_lean_rad, 0.1, 1.5,
             "A plane that leans more from upright is no pair of upright ones.");
       field("most_left", p.most_left, 0.0, 1.0,
-            "A step leaves less than this share of what a slope leaves unexplained.");
+            "A step leaves less than this share of what a slope leaves unexplained: 1 asks which explains more.");
       field("least_step_m", p.least_step_m, 0.001, 0.1, "The two upright planes are at least as far apart.");
       field("least_rows", p.least_rows, 4, 10000, "Each of the two shows as many rows of columns.");
     }

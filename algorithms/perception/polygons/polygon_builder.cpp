@@ -201,9 +201,9 @@ PlaneSide PlaneAxes::side_of(const Vec3& line) const noexcept {
 
 // The surface ends at the line, where most of its pixels lie. What goes on beyond the line's end, as a floor does
 // beside the stairs, is a piece by itself.
-void PolygonBuilder::cut_at_line(const EdgeLine& edge, const PlaneAxes& axes, const PixelCover& cover,
-                                 const Outline2& outline, Pieces& pieces) const noexcept {
-  if (!edge.valid) return;
+bool PolygonBuilder::try_cut_at_line(const FrameImage& picture, const EdgeLine& edge, const PlaneAxes& axes,
+                                     const PixelCover& cover, const Outline2& outline, Pieces& pieces) const noexcept {
+  if (!edge.valid) return true;
   const Vec2 a = axes.to_plane(edge.a_m), b = axes.to_plane(edge.b_m);
   Vec2 inward{-(b - a).y(), (b - a).x()};
   inward.normalize();
@@ -212,10 +212,8 @@ void PolygonBuilder::cut_at_line(const EdgeLine& edge, const PlaneAxes& axes, co
   const bool positive = own.positive > own.negative;
   if ((inward.dot(axes.side_of(line).inward) > 0.0) != positive) inward = -inward;
   Piece& piece = pieces.front();
-  if (std::min(own.positive, own.negative) >= kLeastOwn && pieces.try_push_back(piece)) {
-    clip(pieces.back().flat, a, -inward);
-    static_cast<void>(pieces.back().cuts.try_push_back({a, -inward}));
-  }
+  const bool goes_on = std::min(own.positive, own.negative) >= kLeastOwn;
+  const bool has_room = !goes_on || try_split_off(picture, axes, cover, piece, {a, -inward}, pieces);
   // Corners just short of the line go onto it, those beyond are cut off: either way the edge is the line. Moving only
   // the two extreme ones keeps the outline convex.
   for (Vec2& p : piece.flat) {
@@ -223,6 +221,7 @@ void PolygonBuilder::cut_at_line(const EdgeLine& edge, const PlaneAxes& axes, co
     if (distance > 0.0 && distance < params_.snap_m) p -= (distance + 1e-6) * inward;
   }
   clip(piece.flat, a, inward);
+  return has_room;
 }
 
 // Seen nearly edge-on, half a pixel is decimetres of a riser: it ends where the treads above and below it say.
@@ -240,32 +239,41 @@ void PolygonBuilder::cut_at_treads(const FrameImage& picture, const Regions& reg
   }
 }
 
-// No line says so, but a hull around a corner covers what is not its own: the best cut parts it, and what it cuts off
-// is a piece by itself where enough of the surface lies there.
-void PolygonBuilder::part_pieces(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
-                                 Pieces& pieces) const noexcept {
+// The side of a cut that is not kept becomes a piece. False where there is no room for one that has enough of the
+// surface.
+bool PolygonBuilder::try_split_off(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
+                                   const Piece& from, const PlaneSide& side, Pieces& pieces) const noexcept {
+  Piece piece = from;
+  clip(piece.flat, side.point, side.inward);
+  static_cast<void>(piece.cuts.try_push_back(side));
+  if (piece.flat.size() < 3 || cover.count(seen_of(picture.rays, axes, piece.flat)).own < kLeastOwn) return true;
+  return pieces.try_push_back(piece);
+}
+
+// No line says so, but a hull around a corner covers what is not its own: the best cut parts it. A piece that was split
+// off and stays over what others own is no piece. Returns how many found no room.
+std::size_t PolygonBuilder::part_pieces(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
+                                        Pieces& pieces) const noexcept {
+  std::size_t without_room = 0;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    for (;;) {
-      Piece& piece = pieces[i];
-      if (piece.flat.size() < 3) break;
+    Piece& piece = pieces[i];
+    while (piece.flat.size() >= 3) {
       const Outline2 seen = seen_of(picture.rays, axes, piece.flat);
       const PixelCover::Count pixels = cover.count(seen);
-      if (i > 0 && pixels.own < kLeastOwn) piece.flat.clear();
-      if (piece.flat.empty()) break;
+      if (pixels.foreign < kLeastForeign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign))
+        break;
       Vec3 line;
-      if (pixels.foreign < kLeastForeign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign) ||
-          piece.cuts.size() == kMaxCuts || !cover.try_best_cut(seen, line)) {
+      if (piece.cuts.size() == kMaxCuts || !cover.try_best_cut(seen, line)) {
+        if (i > 0) piece.flat.clear();
         break;
       }
-      const PlaneSide kept = axes.side_of(line), rest{kept.point, -kept.inward};
-      if (pieces.try_push_back(piece)) {
-        clip(pieces.back().flat, rest.point, rest.inward);
-        static_cast<void>(pieces.back().cuts.try_push_back(rest));
-      }
+      const PlaneSide kept = axes.side_of(line);
+      if (!try_split_off(picture, axes, cover, piece, {kept.point, -kept.inward}, pieces)) ++without_room;
       clip(piece.flat, kept.point, kept.inward);
       static_cast<void>(piece.cuts.try_push_back(kept));
     }
   }
+  return without_room;
 }
 
 std::optional<SurfacePatch> PolygonBuilder::patch_of(const FrameImage& picture, const Region& own,
@@ -344,15 +352,15 @@ PolygonBuilder::Built PolygonBuilder::build(const FrameImage& picture, const Reg
   if (own.kind == SurfaceKind::kRiser) cut_at_treads(picture, regions, id, axes, flat);
   Pieces pieces;
   static_cast<void>(pieces.try_push_back({flat, {}}));
-  for (const EdgeLine* line : {&lines.nosing, &lines.back, &lines.occluder}) {
-    cut_at_line(*line, axes, cover, outline, pieces);
-  }
-  part_pieces(picture, axes, cover, pieces);
   Built built;
+  for (const EdgeLine* line : {&lines.nosing, &lines.back, &lines.occluder}) {
+    if (!try_cut_at_line(picture, *line, axes, cover, outline, pieces)) ++built.without_room;
+  }
+  built.without_room += part_pieces(picture, axes, cover, pieces);
   for (Piece& piece : pieces) {
     std::optional<SurfacePatch> patch = patch_of(picture, own, lines, axes, piece);
     if (!patch) continue;
-    if (built.pieces == 0) patch->nosing = lines.nosing, patch->back = lines.back;
+    if (&piece == pieces.begin()) patch->nosing = lines.nosing, patch->back = lines.back;
     ++(patches.try_push_back(*patch) ? built.pieces : built.without_room);
   }
   return built;

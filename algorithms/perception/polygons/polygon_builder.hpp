@@ -66,7 +66,7 @@ class PolygonBuilder {
               const SurfaceLines& lines, SurfacePatches& patches) const noexcept;
 
  private:
-  static constexpr std::size_t kMaxPieces = 4, kMaxCuts = 4;
+  static constexpr std::size_t kMaxPieces = 6, kMaxCuts = 4;
   struct Piece {
     Outline2 flat;                           // on the plane
     StaticVector<PlaneSide, kMaxCuts> cuts;  // that rid it of what is not its own
@@ -75,12 +75,14 @@ class PolygonBuilder {
 
   [[nodiscard]] static PlaneAxes axes_of(const Region& own, const SurfaceLines& lines) noexcept;
   // outline: the surface in the picture.
-  void cut_at_line(const EdgeLine& edge, const PlaneAxes& axes, const PixelCover& cover, const Outline2& outline,
-                   Pieces& pieces) const noexcept;
+  [[nodiscard]] bool try_cut_at_line(const FrameImage& picture, const EdgeLine& edge, const PlaneAxes& axes,
+                                     const PixelCover& cover, const Outline2& outline, Pieces& pieces) const noexcept;
   void cut_at_treads(const FrameImage& picture, const Regions& regions, RegionId id, const PlaneAxes& axes,
                      Outline2& flat) const noexcept;
-  void part_pieces(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
-                   Pieces& pieces) const noexcept;
+  [[nodiscard]] bool try_split_off(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
+                                   const Piece& from, const PlaneSide& side, Pieces& pieces) const noexcept;
+  [[nodiscard]] std::size_t part_pieces(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
+                                        Pieces& pieces) const noexcept;
   // Nothing where the piece has no area.
   [[nodiscard]] std::optional<SurfacePatch> patch_of(const FrameImage& picture, const Region& own,
                                                      const SurfaceLines& lines, const PlaneAxes& axes,

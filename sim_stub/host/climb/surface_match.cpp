@@ -5,6 +5,8 @@
 #include <cmath>
 #include <span>
 
+#include "algorithms/geometry/convex.hpp"
+
 namespace polygmap::sim {
 namespace {
 
@@ -56,17 +58,26 @@ bool is_on(const TrueSurface& surface, const Vec3& normal, const Vec3& centroid_
   return true;
 }
 
-// Seen on both sides of the staircase the floor is one surface, and its convex polygon runs beneath the steps.
+// On the floor, and not beneath the steps: a polygon that runs through there covers what it has not seen.
 bool is_on_floor(const StairWorld& world, const Vec3& normal, std::span<const Vec3> polygon_m,
                  const SurfaceMatchLimits& limits) {
   if (!(normal.z() >= std::cos(limits.angle_rad))) return false;
-  bool any_beside_the_stairs = world.steps.empty();
+  ConvexPolygon plan;
   for (const Vec3& vertex_m : polygon_m) {
     if (!(std::abs(vertex_m.z()) <= limits.distance_m)) return false;
-    any_beside_the_stairs = any_beside_the_stairs || std::abs(vertex_m.y()) > world.half_width_m ||
-                            vertex_m.x() < world.steps.front().riser_x_m || vertex_m.x() > world.steps.back().back_x_m;
+    static_cast<void>(plan.try_push_back(vertex_m.head<2>()));
   }
-  return any_beside_the_stairs;
+  if (world.steps.empty()) return true;
+  const double first_m = world.steps.front().riser_x_m + limits.overhang_m;
+  const double last_m = world.steps.back().back_x_m - limits.overhang_m;
+  const double half_m = world.half_width_m - limits.overhang_m;
+  ConvexPolygon steps;
+  for (const Vec2& corner_m :
+       {Vec2{first_m, -half_m}, Vec2{last_m, -half_m}, Vec2{last_m, half_m}, Vec2{first_m, half_m}}) {
+    static_cast<void>(steps.try_push_back(corner_m));
+  }
+  constexpr double kTouched_m2 = 1e-3;
+  return area_m2(intersection(convex_hull(plan), steps)) < kTouched_m2;
 }
 
 }  // namespace

@@ -15,9 +15,9 @@ namespace polygmap::sim {
 namespace {
 
 constexpr std::size_t kMostShown = 24;                            // of a cell, in a sentence
-constexpr std::size_t kMostFile_bytes = std::size_t{512} << 20U;  // an hour of a log at 1 kHz
+constexpr std::size_t kMostFile_bytes = std::size_t{512} << 20U;  // of as many rows with 900 characters each
 constexpr std::size_t kMostColumns = 1000;
-constexpr std::size_t kMostRows = 2'000'000;  // half an hour at 1 kHz: what is made of a row takes 2 KB
+constexpr std::size_t kMostRows = 600'000;  // ten minutes at 1 kHz: what is made of a row takes 2 KB
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r\n";

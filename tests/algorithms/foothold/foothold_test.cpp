@@ -379,6 +379,16 @@ TEST_F(FootholdTest, PostInTheMiddleOfATread_SaysThatSomethingStandsThere) {
   EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kObstacle);
 }
 
+TEST_F(FootholdTest, WallAcrossBothFeetAtASlant_SaysThatSomethingStandsThere) {
+  const Stairs s;
+  for (const double slant_rad : {0.7, -0.7, 1.0}) {
+    MapSnapshot map = ideal_map(s);
+    const Transform world_T_wall = s.world_T_stairs() * Transform{rotation_z(slant_rad), Vec3{0.15, 0.0, 0.0}};
+    ASSERT_TRUE(map.polygons.try_push_back(riser(1000, world_T_wall, 0.0, s.rise_m, s.rise_m + 0.5, 0.6)));
+    EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kObstacle) << slant_rad;
+  }
+}
+
 TEST_F(FootholdTest, PostBetweenTheRobotAndTheStairs_SaysThatSomethingStandsThere) {
   const Stairs s;
   MapSnapshot map = ideal_map(s);

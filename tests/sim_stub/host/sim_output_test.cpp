@@ -141,9 +141,9 @@ TEST(CsvTable, MillionsOfColumnsOrGigabytes_AreRefused) {
 TEST(CsvTable, MillionsOfShortRows_AreRefused) {
   const std::string path = fresh_folder("rows") + "/log.csv";
   std::string text = "t_s\n";
-  for (int i = 0; i < 2'000'001; ++i) text += "1\n";
+  for (int i = 0; i < 600'001; ++i) text += "1\n";
   std::ofstream(path) << text;
-  EXPECT_NE(complaint_of([&] { CsvTable table(path); }).find("more than 2000000 rows"), std::string::npos);
+  EXPECT_NE(complaint_of([&] { CsvTable table(path); }).find("more than 600000 rows"), std::string::npos);
   text.resize(text.size() - 2);
   std::ofstream(path) << text;
   EXPECT_EQ(complaint_of([&] { CsvTable table(path); }), "");

@@ -486,17 +486,17 @@ TEST(SurfaceMatch, TrueSurfaces_MatchAndOthersDoNot) {
     return matching_surface(world, patch_of(camera, centre_m, normal, u_m, v_m), camera) != kNoSurface;
   };
   const Vec3 x(0.1, 0, 0), y(0, 0.2, 0), z(0, 0, 0.05);
-  EXPECT_TRUE(matches({0.14, 0, 0.135}, Vec3::UnitZ(), x, y));    // tread, 5 mm high
-  EXPECT_TRUE(matches({-0.3, 0.4, 0.0}, Vec3::UnitZ(), x, y));    // floor
-  EXPECT_TRUE(matches({0.285, 0, 0.20}, -Vec3::UnitX(), y, z));   // riser of step 2
-  EXPECT_TRUE(matches({0.14, 0.61, 0.06}, Vec3::UnitY(), x, z));  // left side
-  EXPECT_FALSE(matches({0.14, 0, 0.20}, Vec3::UnitZ(), x, y));    // a foot's top
-  EXPECT_FALSE(matches({0.14, 0, 0.135}, -Vec3::UnitZ(), x, y));  // from below
-  EXPECT_FALSE(matches({0.14, 0, 0.0}, Vec3::UnitZ(), x, y));     // the floor is not under the stairs
-  // Seen on both sides, its polygon runs beneath the stairs.
-  EXPECT_TRUE(matches({0.3, 0, 0.0}, Vec3::UnitZ(), x, Vec3(0, 0.9, 0)));
-  EXPECT_FALSE(matches({0.20, 0, 0.06}, -Vec3::UnitX(), y, z));   // upright, amid a tread
-  EXPECT_FALSE(matches({0.14, 0.9, 0.13}, Vec3::UnitZ(), x, y));  // beside the staircase
+  EXPECT_TRUE(matches({0.14, 0, 0.135}, Vec3::UnitZ(), x, y));                // tread, 5 mm high
+  EXPECT_TRUE(matches({-0.3, 0.4, 0.0}, Vec3::UnitZ(), x, y));                // floor
+  EXPECT_TRUE(matches({0.285, 0, 0.20}, -Vec3::UnitX(), y, z));               // riser of step 2
+  EXPECT_TRUE(matches({0.14, 0.61, 0.06}, Vec3::UnitY(), x, z));              // left side
+  EXPECT_FALSE(matches({0.14, 0, 0.20}, Vec3::UnitZ(), x, y));                // a foot's top
+  EXPECT_FALSE(matches({0.14, 0, 0.135}, -Vec3::UnitZ(), x, y));              // from below
+  EXPECT_FALSE(matches({0.14, 0, 0.0}, Vec3::UnitZ(), x, y));                 // the floor is not under the stairs
+  EXPECT_FALSE(matches({0.3, 0, 0.0}, Vec3::UnitZ(), x, Vec3(0, 0.9, 0)));    // from one side to the other, under them
+  EXPECT_TRUE(matches({0.3, 0.75, 0.0}, Vec3::UnitZ(), x, Vec3(0, 0.1, 0)));  // beside them
+  EXPECT_FALSE(matches({0.20, 0, 0.06}, -Vec3::UnitX(), y, z));               // upright, amid a tread
+  EXPECT_FALSE(matches({0.14, 0.9, 0.13}, Vec3::UnitZ(), x, y));              // beside the staircase
   const Vec3 sloped_x = rotation_y(-0.44) * x;
   EXPECT_FALSE(matches({0.14, 0, 0.13}, rotation_y(-0.44) * Vec3::UnitZ(), sloped_x, y));  // along the nosings
   const Vec3 tilted_x = rotation_y(-0.1) * Vec3(0.5, 0, 0);
