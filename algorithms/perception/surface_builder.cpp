@@ -9,7 +9,7 @@ namespace polygmap {
 namespace {
 
 // Pieces of a surface in units, none of which is measured apart: their sum over a frame is (firmware/schedule.hpp).
-constexpr std::int32_t kSkipUnits = 1;         // of a region that was given up, and the end
+constexpr std::int32_t kGivenUpUnits = 1;      // of a region that was given up, and the end
 constexpr std::int32_t kSideUnits = 4;         // one side: pixels of at most 14 rows, and a line through them
 constexpr std::int32_t kOutlineUnits = 5;      // columns' ends, smoothed, and their hull
 constexpr std::int32_t kNoLineUnits = 5;       // what lies beyond an end, without a line to look for
@@ -68,11 +68,11 @@ std::int32_t SurfaceBuilder::do_piece() noexcept {
 std::int32_t SurfaceBuilder::find_left_side() noexcept {
   if (id_ > regions_->count) {
     part_ = Part::kDone;
-    return kSkipUnits;
+    return kGivenUpUnits;
   }
   if (!(*regions_)[id_].alive) {
     ++id_;
-    return kSkipUnits;
+    return kGivenUpUnits;
   }
   side_lines_.find_ends(id_);
   sides_.left = side_lines_.find(id_, false);

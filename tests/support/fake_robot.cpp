@@ -14,7 +14,7 @@ namespace polygmap::test {
 namespace {
 
 constexpr double kTick_s = 1e-6 * kCycle_us;
-constexpr double kWeight_n = 540.0, kLeg_n = 30.0;
+constexpr double kLeg_n = 30.0;
 constexpr int kPicture_ticks = kSlowMachine ? 48 : 16;
 
 }  // namespace

@@ -24,6 +24,7 @@ namespace polygmap::test {
 [[nodiscard]] fakes::FakeClock three_days_up();
 // Joint angles of a robot standing upright.
 [[nodiscard]] JointVector standing_joints();
+inline constexpr double kWeight_n = 540.0;
 
 class FakeRobot {
  public:

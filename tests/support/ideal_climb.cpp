@@ -5,22 +5,13 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/support/fake_robot.hpp"
 #include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::test {
 namespace {
 
-constexpr double kWeight_n = 540.0;
 constexpr int kFrame_ticks = 16;
-
-JointVector standing_joints() {
-  JointVector q;
-  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    const Transform sole{Mat3::Identity(), Vec3{0.0, side_sign(leg) * kStanceHalfWidth_m, -kNominalBaseHeight_m}};
-    q.segment<6>(static_cast<Eigen::Index>(joint_index(leg, 0))) = solve_leg({}, leg, sole).q_rad;
-  }
-  return q;
-}
 
 double lowest_corner_m(const Transform& sole) {
   double z = 1e9;

@@ -58,29 +58,30 @@ SelfFilter::Rows SelfFilter::rows_of(const HalfRays& rays, const Vec3& c, double
 // The cone around a sphere, cut row by row: (ray . c)^2 >= |ray|^2 (|c|^2 - r^2) is quadratic in the ray's x. Several
 // rows at once: most of what the filter costs is here.
 void SelfFilter::add_sphere(Outline& outline, const HalfRays& rays, const Vec3& c, double radius_m) noexcept {
-  using Wide = cv::v_float64;
-  static_assert(kHalfHeight_px % Wide::nlanes == 0);
+  using Doubles = cv::v_float64;
+  static_assert(kHalfHeight_px % Doubles::nlanes == 0);
   const double g = c.squaredNorm() - math::square(radius_m);
   if (!(g > 1e-6)) return;  // the camera is inside the grown shape: nothing can be said
   const double a = math::square(c.x()) - g;
   if (!(a < -1e-9)) return;  // beside the camera, at 90 degrees: out of any image
   const auto all = [](double x) { return cv::vx_setall_f64(x); };
-  const Wide cx = all(c.x()), cy = all(c.y()), cz = all(c.z()), wide_a = all(a), wide_g = all(g);
-  const Wide zero = all(0.0), half = all(0.5), one = all(1.0), fx = all(rays.fx_px), centre = all(rays.cx_px);
-  const Wide least = all(-kOutside_px), most = all(rays.width_px - 1 + kOutside_px);
+  const Doubles cx = all(c.x()), cy = all(c.y()), cz = all(c.z()), wide_a = all(a), wide_g = all(g);
+  const Doubles zero = all(0.0), half = all(0.5), one = all(1.0), fx = all(rays.fx_px), centre = all(rays.cx_px);
+  const Doubles least = all(-kOutside_px), most = all(rays.width_px - 1 + kOutside_px);
   const Rows rows = rows_of(rays, c, a);
-  for (std::int32_t row = rows.first / Wide::nlanes * Wide::nlanes; row <= rows.last; row += Wide::nlanes) {
+  for (std::int32_t row = rows.first / Doubles::nlanes * Doubles::nlanes; row <= rows.last; row += Doubles::nlanes) {
     const auto at = static_cast<std::size_t>(row);
-    const Wide y = cv::v_cvt_f64(cv::vx_load_low(&rays.y[at]));
-    const Wide k = y * cy + cz, cx_k = cx * k;
-    const Wide discriminant = cx_k * cx_k - wide_a * (k * k - (y * y + one) * wide_g);
-    const Wide root = cv::v_sqrt(cv::v_max(discriminant, zero));
-    const Wide x0 = (root - cx_k) / wide_a, x1 = (zero - cx_k - root) / wide_a;
-    const Wide first = cv::v_min(x0, x1) * fx + centre, last = cv::v_max(x0, x1) * fx + centre;
+    const Doubles y = cv::v_cvt_f64(cv::vx_load_low(&rays.y[at]));
+    const Doubles k = y * cy + cz, cx_k = cx * k;
+    const Doubles discriminant = cx_k * cx_k - wide_a * (k * k - (y * y + one) * wide_g);
+    const Doubles root = cv::v_sqrt(cv::v_max(discriminant, zero));
+    const Doubles x0 = (root - cx_k) / wide_a, x1 = (zero - cx_k - root) / wide_a;
+    const Doubles first = cv::v_min(x0, x1) * fx + centre, last = cv::v_max(x0, x1) * fx + centre;
     // Met at all, before the camera and in the image.
-    const Wide seen = (discriminant >= zero) & (half * (x0 + x1) * cx + k > zero) & (last >= least) & (first <= most);
+    const Doubles seen =
+        (discriminant >= zero) & (half * (x0 + x1) * cx + k > zero) & (last >= least) & (first <= most);
     double *firsts = &outline.first_px[at], *lasts = &outline.last_px[at];
-    const Wide first0 = cv::vx_load(firsts), last0 = cv::vx_load(lasts);
+    const Doubles first0 = cv::vx_load(firsts), last0 = cv::vx_load(lasts);
     cv::v_store(firsts, cv::v_select(seen, cv::v_min(first0, first), first0));
     cv::v_store(lasts, cv::v_select(seen, cv::v_max(last0, last), last0));
   }

@@ -7,13 +7,14 @@
 #include "algorithms/estimation/state_history.hpp"
 #include "algorithms/geometry/so3.hpp"
 #include "tests/support/nominal_robot.hpp"
+#include "tests/support/ticks.hpp"
 
 namespace polygmap {
 namespace {
 
-constexpr std::int64_t kLioPeriod_ns = 100 * kNsPerMs;
-constexpr std::int64_t kTick_ns = 2 * kNsPerMs;
-constexpr double kTick_s = seconds(kTick_ns);
+using test::kLioPeriod_ns;
+using test::kTick_ns;
+using test::kTick_s;
 
 // --- Eqs (5)-(10), each by itself -----------------------------------------------------------------------------------
 

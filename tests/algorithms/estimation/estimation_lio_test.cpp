@@ -10,17 +10,17 @@
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
+#include "tests/support/ticks.hpp"
 
 namespace polygmap {
 namespace {
 
+using test::kLioPeriod_ns;
+using test::kNaN;
+using test::kTick_ns;
 using test::SyntheticWalk;
 using test::WalkSpec;
 using test::WalkTruth;
-
-constexpr std::int64_t kTick_ns = SyntheticWalk::kTick_ns;
-constexpr std::int64_t kLioPeriod_ns = 100 * kNsPerMs;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 class EstimatorLioTest : public ::testing::Test {
  protected:

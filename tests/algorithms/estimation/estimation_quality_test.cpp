@@ -9,14 +9,14 @@
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
+#include "tests/support/ticks.hpp"
 
 namespace polygmap {
 namespace {
 
+using test::kTick_ns;
 using test::SyntheticWalk;
 using test::WalkSpec;
-
-constexpr std::int64_t kTick_ns = SyntheticWalk::kTick_ns;
 
 struct WalkErrors {
   double worst_m = 0.0;

@@ -8,18 +8,19 @@
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
+#include "tests/support/ticks.hpp"
 
 namespace polygmap {
 namespace {
 
+using test::kNaN;
+using test::kTick_ns;
+using test::kTick_s;
 using test::SyntheticWalk;
 using test::WalkSpec;
 using test::WalkTruth;
 
-constexpr std::int64_t kTick_ns = SyntheticWalk::kTick_ns;
-constexpr double kTick_s = 0.002;
 constexpr std::array<bool, kFootCount> kBothStand{true, true};
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // --- SO(3) ---------------------------------------------------------------------------------------------------------
 

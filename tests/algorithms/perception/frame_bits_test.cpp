@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One picture gives one result, bit for bit, whatever the compiler, its optimisation and the registers' width: AVX2,
-// SSE2 (frame_bits_sse2_test) and NEON (orin). What is recorded here is what every build must give.
+// SSE2 (tests/consumer) and NEON (orin). What is recorded here is what every build must give.
 #include <gtest/gtest.h>
 
 #include <bit>

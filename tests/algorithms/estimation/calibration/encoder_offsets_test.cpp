@@ -8,11 +8,13 @@
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/geometry/so3.hpp"
 #include "tests/support/nominal_robot.hpp"
+#include "tests/support/ticks.hpp"
 
 namespace polygmap {
 namespace {
 
-constexpr double kTick_s = 0.002;
+using test::kTick_s;
+
 using Legs = std::array<LegMeasurement, kFootCount>;
 using Contacts = std::array<FootContact, kFootCount>;
 

@@ -7,11 +7,12 @@
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/geometry/so3.hpp"
 #include "tests/support/nominal_robot.hpp"
+#include "tests/support/ticks.hpp"
 
 namespace polygmap {
 namespace {
 
-constexpr double kTick_s = 0.002;
+using test::kTick_s;
 
 // On soft drives a robot that stands sways about its ankles: here as seed 50 did under physics, with 36 mrad/s and less
 // and less.
