@@ -10,9 +10,9 @@ namespace polygmap {
 
 // Something does not work as it should; the module degrades. Numbers 1-99.
 #define POLYGMAP_FAULTS(X)                                                                                         \
-  X(1, kFrameOverrun, "frame_overrun", "A lane's cycle took longer than kCycle_us.")                               \
+  X(1, kCycleOverrun, "cycle_overrun", "A lane's cycle took longer than kCycle_us.")                               \
   X(2, kRowOverrun, "row_overrun", "A row took longer than its budget.")                                           \
-  X(3, kFrameSlip, "frame_slip", "A tick came so late that cycles were skipped.")                                  \
+  X(3, kCycleSlip, "cycle_slip", "A tick came so late that cycles were skipped.")                                  \
   X(4, kClockRate, "clock_rate", "The clock's counter has a rate outside CounterScale's range.")                   \
   X(5, kImuMissing, "imu_missing", "No IMU sample came in a cycle, and none was read ahead.")                      \
   X(6, kImuRejected, "imu_rejected", "An IMU sample was not finite, out of range or order, or of the future.")     \
@@ -35,7 +35,7 @@ namespace polygmap {
 #define POLYGMAP_LIMITS(X)                                                                                         \
   X(101, kRowShed, "row_shed", "A slot was given up for lack of time.")                                            \
   X(102, kRowDeferred, "row_deferred", "A slot paid back an overdraft of work units.")                             \
-  X(103, kFrameCaughtUp, "frame_caught_up", "A cycle was run late.")                                               \
+  X(103, kCycleCaughtUp, "cycle_caught_up", "A cycle was run late.")                                               \
   X(104, kPlanesFull, "planes_full", "A plane or surface of a frame found no room.")                               \
   X(105, kMapFull, "map_full", "A polygon found no room in the map.")                                              \
   X(106, kStateRingMissed, "state_ring_missed", "The past states do not cover a frame's stamp.")                   \
@@ -80,11 +80,11 @@ class Health : public EventCounters<Fault, Limit> {
   constexpr void raise(ExecutiveEvent event, std::int64_t now_ns, std::uint32_t times = 1) noexcept {
     switch (event) {
       case ExecutiveEvent::kCycleOverrun:
-        return raise(Fault::kFrameOverrun, now_ns, times);
+        return raise(Fault::kCycleOverrun, now_ns, times);
       case ExecutiveEvent::kRowOverrun:
         return raise(Fault::kRowOverrun, now_ns, times);
       case ExecutiveEvent::kCycleSlip:
-        return raise(Fault::kFrameSlip, now_ns, times);
+        return raise(Fault::kCycleSlip, now_ns, times);
       case ExecutiveEvent::kClockRate:
         return raise(Fault::kClockRate, now_ns, times);
       case ExecutiveEvent::kRowShed:
@@ -92,7 +92,7 @@ class Health : public EventCounters<Fault, Limit> {
       case ExecutiveEvent::kRowDeferred:
         return raise(Limit::kRowDeferred, now_ns, times);
       case ExecutiveEvent::kCycleCaughtUp:
-        return raise(Limit::kFrameCaughtUp, now_ns, times);
+        return raise(Limit::kCycleCaughtUp, now_ns, times);
     }
   }
   [[nodiscard]] constexpr bool any_fault() const noexcept { return any<Fault>(); }

@@ -10,11 +10,11 @@ namespace polygmap {
 namespace {
 
 // A line that is put in or taken out moves no other number.
-static_assert(static_cast<int>(Fault::kFrameOverrun) == 1 && static_cast<int>(Fault::kDepthMissing) == 11);
+static_assert(static_cast<int>(Fault::kCycleOverrun) == 1 && static_cast<int>(Fault::kDepthMissing) == 11);
 static_assert(static_cast<int>(Fault::kGaitStopped) == 18);
 static_assert(static_cast<int>(Limit::kRowShed) == 101 && static_cast<int>(Limit::kStateRingMissed) == 106);
 static_assert(static_cast<int>(Limit::kFrameLost) == 114);
-static_assert(kFaultTable.front().code == Fault::kFrameOverrun && kLimitTable.back().code == Limit::kFrameLost);
+static_assert(kFaultTable.front().code == Fault::kCycleOverrun && kLimitTable.back().code == Limit::kFrameLost);
 
 TEST(Faults, NameOf_EachCode_IsItsTables) {
   for (const auto& line : kFaultTable) EXPECT_EQ(name_of(line.code), line.name);
@@ -25,13 +25,13 @@ TEST(Faults, NameOf_EachCode_IsItsTables) {
 }
 
 TEST(Health, Raise_AnExecutivesEvent_CountsItsFaultOrLimitAlone) {
-  const std::pair<ExecutiveEvent, Fault> faults[] = {{ExecutiveEvent::kCycleOverrun, Fault::kFrameOverrun},
+  const std::pair<ExecutiveEvent, Fault> faults[] = {{ExecutiveEvent::kCycleOverrun, Fault::kCycleOverrun},
                                                      {ExecutiveEvent::kRowOverrun, Fault::kRowOverrun},
-                                                     {ExecutiveEvent::kCycleSlip, Fault::kFrameSlip},
+                                                     {ExecutiveEvent::kCycleSlip, Fault::kCycleSlip},
                                                      {ExecutiveEvent::kClockRate, Fault::kClockRate}};
   const std::pair<ExecutiveEvent, Limit> limits[] = {{ExecutiveEvent::kRowShed, Limit::kRowShed},
                                                      {ExecutiveEvent::kRowDeferred, Limit::kRowDeferred},
-                                                     {ExecutiveEvent::kCycleCaughtUp, Limit::kFrameCaughtUp}};
+                                                     {ExecutiveEvent::kCycleCaughtUp, Limit::kCycleCaughtUp}};
   static_assert(std::size(faults) + std::size(limits) == kEventTable<ExecutiveEvent>.size());
   for (const auto& [event, fault] : faults) {
     Health health;

@@ -182,7 +182,7 @@ TEST_F(PipelineTest, TickComesTwoFramesLate_NothingIsMissingAndTheGaitKeepsTime)
   joints_.feed(joints_at(clock_.now_ns()));
   const std::uint64_t commands = joints_.writes.calls();
   module_.tick();
-  EXPECT_EQ(count(Limit::kFrameCaughtUp), 2U);
+  EXPECT_EQ(count(Limit::kCycleCaughtUp), 2U);
   EXPECT_FALSE(control().faults().any_fault());
   EXPECT_EQ(joints_.writes.calls(), commands + 3);
   EXPECT_EQ(control().gait_status().stamp_ns, clock_.now_ns());

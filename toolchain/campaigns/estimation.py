@@ -14,9 +14,12 @@ LOGS = {"cassie/cassie_walk_open.csv": "Cassie, simulated walk, 5 s", "icub/walk
 
 def logs(engine, _):
     place = pathlib.Path(os.environ.get("POLYGMAP_SHARED_DATA", ROOT.parent / "shared/data"))
+    if not any((place / name).exists() for name in LOGS):
+        return None
     lines = []
     for name, what in LOGS.items():
         if not (place / name).exists():
+            lines.append((what, "-", "-", "-", "-", "is not there"))
             continue
         with tempfile.TemporaryDirectory() as out:
             done = subprocess.run([engine.tool, "estimate", place / name, "--json", f"{out}/scores.json"], capture_output=True, text=True)
@@ -27,8 +30,6 @@ def logs(engine, _):
         s = s.get("score", s)
         lines.append((what, f"{s['position_rmse_mm']:.1f}", f"{s['velocity_rmse_mmps']:.1f}", f"{s['drift_percent']:.2f}",
                       f"{s['nees_in_bounds_percent']:.0f}", ""))
-    if not lines:
-        return None
     return Page("`polygmap estimate LOG.csv`, scored against the log's truth. The logs are third-party data (../shared/data).\n\n" +
                 rows(("log", "position RMSE mm", "velocity RMSE mm/s", "drift % of the way", "rows within the 95 % bounds %", ""), lines),
                 {})

@@ -91,6 +91,9 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_option("--friction", a.options.mujoco.friction, "Friction of the soles on floor and stairs")
       ->capture_default_str();
   climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
+  climb.add_flag(
+      "--save-inputs", a.options.save_inputs,
+      "Also write what the sensors said, for perceive and estimate: OUT/inputs/depth_NN.png, log.csv, lio.csv");
 
   climb.add_option("--camera", a.camera, "The robot's camera, 640x480 at most; the module is told what the file says")
       ->type_name("CAMERA.toml");
@@ -308,11 +311,11 @@ std::string complaint(ClimbArguments& a) {
 }
 
 // Makes the directory and tries to write into it before a minute of climbing is spent.
-std::string output_complaint(const std::string& directory) {
+std::string output_complaint(const std::string& directory, bool with_inputs) {
   namespace fs = std::filesystem;
   if (directory.empty()) return "--out must name a directory.";
   std::error_code error;
-  fs::create_directories(directory, error);
+  fs::create_directories(with_inputs ? directory + "/inputs" : directory, error);
   if (!fs::is_directory(directory, error)) return "Cannot create the directory \"" + directory + "\" given by --out.";
   const fs::path probe = fs::path(directory) / ".polygmap_probe";
   std::ofstream file(probe);
@@ -401,7 +404,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
     return kExitUsage;
   }
   std::string sentence = complaint(a);
-  if (sentence.empty()) sentence = output_complaint(a.options.out_dir);
+  if (sentence.empty()) sentence = output_complaint(a.options.out_dir, a.options.save_inputs);
   if (!sentence.empty()) {
     err << "polygmap: " << sentence << "\n";
     return kExitUsage;

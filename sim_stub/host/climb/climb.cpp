@@ -11,6 +11,7 @@
 #include "firmware/schedule.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "sim_stub/host/climb/climb_report.hpp"
+#include "sim_stub/host/record/climb_recorder.hpp"
 #include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/sim_robot.hpp"
 #include "sim_stub/world/clearance.hpp"
@@ -189,10 +190,13 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     params.surfaces.limits.max_depth_m = options.camera->max_depth_m;
   }
   WatchedLidar lidar(robot);
+  std::optional<ClimbRecorder> recorder;
+  if (options.save_inputs) recorder.emplace(robot, robot, robot, lidar);
   const auto module = std::make_unique<Module>();
   {
     const heap::ModuleCall call("Pipeline::Pipeline");
-    module->pipeline.emplace(Ports{robot, robot, robot, lidar}, params);
+    module->pipeline.emplace(
+        recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{robot, robot, robot, lidar}, params);
     module->pipeline->watch(module->watched);
     module->tasks.emplace(*module->pipeline);
     module->executive.emplace(*module->tasks, robot, module->pipeline->lane_health(0));
@@ -213,6 +217,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     }
     const Telemetry telemetry = pipeline.telemetry(robot.now_ns(), module->watched);
     report.observe(robot.truth(), telemetry);
+    if (recorder) recorder->observe(robot.truth(), telemetry.state);
     if (lidar.accepted(telemetry.state)) report.observe_lio(lidar.last());
     if (progress && robot.now_ns() >= next_progress_ns) {
       progress(progress_of(robot.now_ns(), telemetry.gait, tasks));
@@ -240,6 +245,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   if (!options.out_dir.empty()) {
     try {
       write_climb_files(options.out_dir, report, summary);
+      if (recorder) recorder->write(options.out_dir + "/inputs");
     } catch (const std::runtime_error& error) {
       throw ClimbNotWritten(error.what(), summary);
     }
