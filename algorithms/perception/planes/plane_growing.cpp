@@ -8,7 +8,6 @@ namespace polygmap {
 namespace {
 
 constexpr double kLeastNorm = 0.05;  // 1/m: planes farther than 20 m are none
-constexpr double kGrowth = 1.3;      // refit when a plane has grown by this
 
 struct Middle {
   double y = 0.0;  // ray
@@ -147,7 +146,7 @@ bool PlaneGrowing::try_seed(Place place) noexcept {
   norm2_ = m.squaredNorm();
   sums_ = Sums{};
   // The first fit waits until the plane itself has more than the seed had.
-  next_fit_px_ = kGrowth * sums.m.one;
+  next_fit_px_ = params_.refit_growth * sums.m.one;
   queue_.size = queue_.next = 0;
   first_column_ = last_column_ = place.column;
   growing_ = true;
@@ -175,7 +174,7 @@ void PlaneGrowing::consider(Place place) noexcept {
   last_column_ = std::max<std::int32_t>(last_column_, place.column);
   if (sums_.m.one > next_fit_px_ && sums_.try_solve(m_)) {
     norm2_ = m_.squaredNorm();
-    next_fit_px_ = kGrowth * sums_.m.one;
+    next_fit_px_ = params_.refit_growth * sums_.m.one;
   }
 }
 
@@ -210,7 +209,7 @@ void PlaneGrowing::close() noexcept {
 }
 
 bool PlaneGrowing::step() noexcept {
-  constexpr int kPiece = 8;
+  constexpr int kPiece = 8;  // which PlaneExtractor counts as one unit
   for (int i = 0; i < kPiece; ++i) {
     if (growing_) {
       if (queue_.next < queue_.size) {
