@@ -7,8 +7,6 @@
 namespace polygmap {
 namespace {
 
-constexpr double kLeastNorm = 0.05;  // 1/m: planes farther than 20 m are none
-
 struct Middle {
   double y = 0.0;  // ray
   double w = 0.0;  // 1/m
@@ -49,7 +47,7 @@ bool PlaneGrowing::Sums::try_solve(Vec3& plane) const noexcept {
   if (!(determinant > 1e-14)) return false;
   const double a = (cxw * cyy - cyw * cxy) / determinant, b = (cyw * cxx - cxw * cxy) / determinant;
   const Vec3 solved{a, b, mw - a * mx - b * my};
-  if (!(solved.squaredNorm() > kLeastNorm * kLeastNorm)) return false;
+  if (!(solved.squaredNorm() > kLeastInverseDepth * kLeastInverseDepth)) return false;
   plane = solved;
   return true;
 }
@@ -166,7 +164,7 @@ void PlaneGrowing::consider(Place place) noexcept {
   const double tilt = static_cast<double>(segment.slope) - m_.y() * pitch;
   const double rows = segment.rows();
   const double off2 = offset * offset + tilt * tilt * (rows * rows - 1.0) * (1.0 / 12.0);
-  if (!(middle.w > kLeastNorm) || off2 > math::square(tolerance_w(middle.w)) * norm2_) return;
+  if (!(middle.w > kLeastInverseDepth) || off2 > math::square(tolerance_w(middle.w)) * norm2_) return;
   segment.plane = static_cast<std::uint8_t>(count_ + 1);
   sums_.add(ray_x, *rays_, segment);
   queue_.places[queue_.size++] = place;
@@ -197,7 +195,7 @@ void PlaneGrowing::visit(Place place) noexcept {
 void PlaneGrowing::close() noexcept {
   growing_ = false;
   const bool kept = sums_.m.one >= params_.min_facet_px && last_column_ - first_column_ + 1 >= params_.min_columns &&
-                    count_ < kMaxPlanes && sums_.try_solve(m_) && m_.dot(sums_.m.mean_ray()) > kLeastNorm;
+                    count_ < kMaxPlanes && sums_.try_solve(m_) && m_.dot(sums_.m.mean_ray()) > kLeastInverseDepth;
   if (!kept) {
     overflow_ += count_ == kMaxPlanes ? 1U : 0U;
     for (std::size_t i = 0; i < queue_.size; ++i) at(queue_.places[i]).plane = i == 0 ? kTried : std::uint8_t{0};

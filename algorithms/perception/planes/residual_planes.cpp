@@ -45,7 +45,7 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
   const float x = rays.x[static_cast<std::size_t>(column)];
   const Steps level(level_, x), upright(upright_, x);
   using Wide = cv::v_float32;
-  constexpr std::int32_t kAtOnce = 8;
+  constexpr std::int32_t kAtOnce = 8;  // rows, for every register width
   static_assert(kAtOnce % Wide::nlanes == 0 && kDepthHeight_px % kAtOnce == 0);
   const auto all = [](float value) { return cv::vx_setall_f32(value); };
   const Wide zero = all(0.0F), end = all(static_cast<float>(Axis::kBins)), none = end;

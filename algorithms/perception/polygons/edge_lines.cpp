@@ -400,7 +400,7 @@ void EdgeLineFinder::gather_points() noexcept {
 
 // Tukey's, from the median, along the guess: the guess defines the axis. limit_m: points farther off do not count.
 bool EdgeLineFinder::try_robust_line(Fit& fit, double& limit_m) noexcept {
-  constexpr int kRounds = 8;        // nothing moves any more
+  constexpr int kRounds = 8;        // of a search that converges
   constexpr double kTukey = 4.685;  // 95 % as good as least squares where errors are normal
   Points& p = points_;
   for (std::size_t i = 0; i < p.count; ++i) p.scratch[i] = p.at_m[i].y();

@@ -36,7 +36,7 @@ struct RowPlane {
            std::int32_t column) noexcept {
     const double x = rays.x0 + rays.pitch * column, ray2 = x * x + rays.y * rays.y + 1.0;
     const double constant = plane.m.y() * rays.y + plane.m.z(), w = plane.m.x() * x + constant;
-    valid = w > 0.05;
+    valid = w > kLeastInverseDepth;
     if (!valid) return;
     // The cosine of the incidence is w over this.
     const double over = math::clamp(math::sqrt(plane.m.squaredNorm() * ray2), w, w * most_slant);
@@ -61,7 +61,7 @@ struct PixelGains {
 
 // A bit for each step outwards at which the sum of the gains so far is least, or hardly more.
 std::uint32_t least_costs(const Reach& gain) noexcept {
-  constexpr float kTie = 1e-3F;
+  constexpr float kTie = 1e-3F;  // of rounding
   constexpr std::size_t kFours = kReach_px / Four::nlanes;
   std::array<Four, kFours> cost;
   Four before = cv::v_setzero_f32(), least = cv::v_setall_f32(1e9F);
