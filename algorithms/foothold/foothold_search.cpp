@@ -412,7 +412,8 @@ bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) c
   for (const Upright& u : uprights_) {
     if (u.top_m - z_foot_ <= params_.rise_max_m || u.bottom_m > z_foot_ + 2.0 * params_.delta_foot_m) continue;
     // A post is no rise: the feet may go beside it, see link_upright().
-    if (u.outward.dot(base_.heading()) > -params_.uprights.facing_cos || u.width_m() < 2.0 * params_.top_half_width_m) continue;
+    if (u.outward.dot(base_.heading()) > -params_.uprights.facing_cos || u.width_m() < 2.0 * params_.top_half_width_m)
+      continue;
     if (found_.next != kNone && carries(u, levels_[found_.next])) continue;
     const Vec2 a = base_(u.point_m + u.reach_left_m * u.direction);
     const Vec2 b = base_(u.point_m + u.reach_right_m * u.direction);

@@ -83,7 +83,8 @@ void add_edge_limits(const SurfacePatch& surface, const LevelSurfaceParams& para
   }
   if (out.has_nosing && surface.back.valid) {
     const std::optional<Line2> back = line_through(surface.back.a_m.head<2>(), surface.back.b_m.head<2>());
-    if (back) add_toe_limit(out, params, sole, *back, out.back_margin_m, {0.0, std::numeric_limits<double>::infinity()});
+    if (back)
+      add_toe_limit(out, params, sole, *back, out.back_margin_m, {0.0, std::numeric_limits<double>::infinity()});
   }
 }
 
@@ -101,8 +102,8 @@ double LevelSurface::spare_m(const Vec2& p_m) const noexcept {
   return std::min({least_m(edges, of), least_m(toe, of), before_obstacles_m(*this, p_m, 1.0)});
 }
 
-bool prepare(const MapPolygon& polygon, double base_yaw_rad, const LevelSurfaceParams& params,
-             const EdgeMargin& margin, const SoleModel& sole, LevelSurface& out) noexcept {
+bool prepare(const MapPolygon& polygon, double base_yaw_rad, const LevelSurfaceParams& params, const EdgeMargin& margin,
+             const SoleModel& sole, LevelSurface& out) noexcept {
   const SurfacePatch& surface = polygon.surface;
   out = {};
   out.id = polygon.id;
