@@ -121,8 +121,8 @@ void PerceptionLane::learn_mount() noexcept {
     stance.base_T_sole[foot] = base_T_odom * state.odom_T_sole[foot];
     stance.stands[foot] = state.contact_probability[foot] > kStands;
     if (stance.stands[foot])
-      stance.toes[foot] =
-          detect_toe(frame_, intrinsics_, range, params_.robot.sole, camera_T_base * stance.base_T_sole[foot]);
+      stance.toes[foot] = detect_toe(params_.mount.toe, frame_, intrinsics_, range, params_.robot.sole,
+                                     camera_T_base * stance.base_T_sole[foot]);
   }
   mount_.update(extractor_.result(), stance);
 }

@@ -7,7 +7,6 @@
 namespace polygmap {
 namespace {
 
-constexpr double kGapEnd_s = 0.002;     // the rates of a gap's last sample hold for so long
 constexpr int kVelocity = 3, kYaw = 8;  // in the covariance
 
 // Of x, y, z besides what the heading does, and of yaw.
@@ -72,7 +71,7 @@ void ProprioceptiveOdometry::step(const Step& whole, const Legs& legs, const Con
   const Vec3 before_m = odom_p_base_m();
   Step step = whole;
   if (whole.dt_s > params_.max_step_s) {  // the last of it is felt
-    step.dt_s = kGapEnd_s;
+    step.dt_s = params_.gap_end_s;
     bridge(std::min(whole.dt_s, params_.max_gap_s) - step.dt_s);
   }
   const Vec3 gyro_radps = step.felt ? step.gyro_radps : attitude_.gyro_bias_radps();

@@ -35,6 +35,7 @@ class ProprioceptiveOdometry {
     double lost_s = 0.25;
     double sure_contact = 0.8;
     double doubtful_walk_m2ps = 1e-3;
+    double gap_end_s = 0.002;
 
     static void visit(auto& p, auto& field) {
       field("motion", p.motion);
@@ -53,6 +54,7 @@ class ProprioceptiveOdometry {
       field("sure_contact", p.sure_contact, 0.01, 1.0, "A contact as probable is as good as certain.");
       field("doubtful_walk_m2ps", p.doubtful_walk_m2ps, 0.0, 1.0,
             "Random walk of a contact half as likely: 1 mm in 1 ms.");
+      field("gap_end_s", p.gap_end_s, 0.0001, 0.004, "The rates of the sample that ends a gap hold for so long.");
     }
   };
   // What is new since the last step. Rates hold over dt.

@@ -7,11 +7,6 @@ namespace polygmap {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// The raster reaches g_range ahead of the base: it is centred this far ahead.
-constexpr double kCentreAhead_m = 0.4;
-// A riser or nosing this far behind a nosing bounds that tread; nearer is the tread's own, farther another one's.
-constexpr double kNearestBack_m = 0.05, kFarthestBack_m = 0.8;
-constexpr double kFacing = 0.7;  // cosine: an upright surface that the robot looks at
 
 bool valid(const FootholdSearch::Query& q) noexcept {
   const auto finite = [](const Transform& t) { return math::all_finite(t.R) && math::all_finite(t.p_m); };
@@ -50,7 +45,7 @@ void FootholdSearch::begin(const MapSnapshot& map, const Query& query) noexcept 
   levels_.clear();
   uprights_.clear();
   found_ = {};
-  raster_.centre_on(base_.origin_m() + kCentreAhead_m * base_.heading(), params_.g_res_m);
+  raster_.centre_on(base_.origin_m() + params_.centre_ahead_m * base_.heading(), params_.g_res_m);
   index_ = 0;
   row_ = 0;
   stage_ = Stage::kPrepare;
@@ -112,7 +107,7 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
   const bool confirmed = polygon.sightings >= params_.confirmed_sightings;
   if (surface.kind == SurfaceKind::kTread && surface.area_m2 >= params_.area_min_m2) {
     LevelSurface level;
-    if (!prepare(polygon, yaw_of(query_.world_T_base.R), params_.margin, foot_, level)) return;
+    if (!prepare(polygon, yaw_of(query_.world_T_base.R), params_.levels, params_.margin, foot_, level)) return;
     if (confirmed) {
       (void)levels_.try_push_back(level);  // as many as the map holds
     } else if (level.height_m > z_foot_ + params_.delta_foot_m &&
@@ -138,27 +133,23 @@ FootholdSearch::Extent FootholdSearch::extent_on(const LevelSurface& tread, cons
 // A riser ends the tread. A post on it or before it, a box, the end of a wall is in the way only where a foot, or the
 // leg above it, would meet it: as an endless line, balusters ended a tread of 0.28 m after 0.121 m (2026-11).
 void FootholdSearch::link_upright(LevelSurface& tread, const Upright& u) const noexcept {
-  constexpr double kLeg_m = 0.5;  // above the sole: what hangs higher is in no leg's way
-  constexpr double kBesideFacing = 0.3;
-  constexpr double kSquare = 0.866;  // cosine of 30 degrees, as add_toe_limit() has it
-  // A face at the nosing is the tread's own riser, which measures up to 0.09 m too tall, see carries(); what stands on
-  // the tread does not reach below it.
-  constexpr double kTaller_m = 0.25, kBelow_m = 0.05;
-  if (u.top_m < tread.height_m + params_.delta_foot_m || u.bottom_m > tread.height_m + kLeg_m) return;
+  const UprightParams& p = params_.uprights;
+  if (u.top_m < tread.height_m + params_.delta_foot_m || u.bottom_m > tread.height_m + p.leg_m) return;
   const double facing = u.outward.dot(tread.heading);
   const Extent extent = extent_on(tread, u.left_m(), u.right_m());
   const double margin_m = params_.margin.of(u.sigma_m);
   // A wall that crosses both feet at a slant ends the tread at no one place: it is in the way.
-  if (extent == Extent::kAcross && facing <= -kSquare) {
-    add_toe_limit(tread, foot_, {u.point_m, u.direction}, margin_m, kNearestBack_m, kFarthestBack_m);
+  if (extent == Extent::kAcross && facing <= -params_.levels.square_cos) {
+    add_toe_limit(tread, params_.levels, foot_, {u.point_m, u.direction}, margin_m,
+                  {params_.back_min_m, params_.back_max_m});
     return;
   }
-  if (extent == Extent::kAside || facing > kBesideFacing) return;
+  if (extent == Extent::kAside || facing > p.aside_cos) return;
   const double a = tread.along_m(u.left_m()), b = tread.along_m(u.right_m());
   const double passed_m = tread.along_m(sole_.origin_m()) + foot_.collision.toe_x_m;
-  if (std::max(a, b) < passed_m || std::min(a, b) > kFarthestBack_m) return;
-  const bool own_riser =
-      std::max(a, b) < kNearestBack_m && u.bottom_m < tread.height_m - kBelow_m && u.top_m < tread.height_m + kTaller_m;
+  if (std::max(a, b) < passed_m || std::min(a, b) > params_.back_max_m) return;
+  const bool own_riser = std::max(a, b) < params_.back_min_m && u.bottom_m < tread.height_m - p.below_m &&
+                         u.top_m < tread.height_m + p.taller_m;
   if (own_riser) return;
   const double left = tread.lateral_m(u.left_m()), right = tread.lateral_m(u.right_m());
   const double aside_m = foot_.collision.half_width_m + params_.side_margin_m;
@@ -177,8 +168,8 @@ void FootholdSearch::link(std::size_t i) noexcept {
     const Vec2 a_m = other.nosing_a_m.head<2>(), b_m = other.nosing_b_m.head<2>();
     // A tread seen in part goes on; the top of a box beside the way does not.
     if (extent_on(tread, a_m, b_m) == Extent::kAside) continue;
-    add_toe_limit(tread, foot_, {other.nosing_middle_m(), other.left}, other.nosing_margin_m, kNearestBack_m,
-                  kFarthestBack_m);
+    add_toe_limit(tread, params_.levels, foot_, {other.nosing_middle_m(), other.left}, other.nosing_margin_m,
+                  {params_.back_min_m, params_.back_max_m});
   }
   for (const Upright& upright : uprights_) link_upright(tread, upright);
   const Vec2& sole_p_m = sole_.origin_m();
@@ -288,7 +279,7 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
     spare_m = kInfinity;
     for (const FootLimit& limit : tread.toe) {
       for (const double lateral_m : {left_m, right_m}) {
-        const double closing = -limit.inside.inward.dot(tread.heading);  // over 0.86, see add_toe_limit
+        const double closing = -limit.inside.inward.dot(tread.heading);  // over square_cos, see add_toe_limit
         spare_m = std::min(spare_m, limit.spare_m(tread.at(heel_m, lateral_m)) / closing - margin_m);
       }
     }
@@ -381,11 +372,10 @@ std::optional<double> FootholdSearch::beside_obstacles(const LevelSurface& tread
 // centred (seeds 1 and 4, both noises).
 StopReason FootholdSearch::place_feet(const LevelSurface& tread, Feet& feet) const noexcept {
   const double middle_m = this->middle_m(tread);
-  constexpr int kSpacings = 7;
   StopReason reason = StopReason::kTooNarrow;
-  for (int i = 0; i < kSpacings; ++i) {
+  for (std::int32_t i = 0; i < params_.spacings; ++i) {
     const double half_m = params_.half_spacing_m - (params_.half_spacing_m - params_.half_spacing_min_m) *
-                                                       static_cast<double>(i) / (kSpacings - 1);
+                                                       static_cast<double>(i) / (params_.spacings - 1);
     double along_m = aim_along_m(tread, middle_m + half_m, middle_m - half_m);
     const Interval sides = between_sides(tread, along_m, half_m);
     if (sides.min_m > sides.max_m) continue;
@@ -407,11 +397,11 @@ StopReason FootholdSearch::place_feet(const LevelSurface& tread, Feet& feet) con
 
 // The riser beneath a mapped tread: the tread says how high it is. Seen from close above, a riser's own ends are the
 // worst known part of the map: 0.12 m of riser measured 0.21 m.
-bool FootholdSearch::carries(const Upright& riser, const LevelSurface& tread) noexcept {
-  constexpr double kMaxNosing_m = 0.06, kTolerance_m = 0.02;
+bool FootholdSearch::carries(const Upright& riser, const LevelSurface& tread) const noexcept {
+  const double tolerance_m = params_.uprights.overhang_tolerance_m;
   if (!tread.has_nosing) return false;
   const double behind_m = tread.along_m(riser.point_m);
-  return behind_m >= -kTolerance_m && behind_m <= kMaxNosing_m + kTolerance_m;
+  return behind_m >= -tolerance_m && behind_m <= params_.uprights.overhang_max_m + tolerance_m;
 }
 
 // A face that rises from the level the robot stands on higher than it may climb, before the next tread.
@@ -422,7 +412,8 @@ bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) c
   for (const Upright& u : uprights_) {
     if (u.top_m - z_foot_ <= params_.rise_max_m || u.bottom_m > z_foot_ + 2.0 * params_.delta_foot_m) continue;
     // A post is no rise: the feet may go beside it, see link_upright().
-    if (u.outward.dot(base_.heading()) > -kFacing || u.width_m() < 2.0 * params_.top_half_width_m) continue;
+    if (u.outward.dot(base_.heading()) > -params_.uprights.facing_cos || u.width_m() < 2.0 * params_.top_half_width_m)
+      continue;
     if (found_.next != kNone && carries(u, levels_[found_.next])) continue;
     const Vec2 a = base_(u.point_m + u.reach_left_m * u.direction);
     const Vec2 b = base_(u.point_m + u.reach_right_m * u.direction);

@@ -48,6 +48,11 @@ class FootholdSearch {
     double top_half_width_m = 0.15;
     double top_fraction = 0.5;
     std::uint32_t confirmed_sightings = 5;
+    double centre_ahead_m = 0.4;
+    double back_min_m = 0.05, back_max_m = 0.8;
+    std::int32_t spacings = 7;
+    LevelSurfaceParams levels;
+    UprightParams uprights;
 
     static void visit(auto& p, auto& field) {
       field("g_res_m", p.g_res_m, 0.005, 0.1, "Side of a raster cell.");
@@ -88,6 +93,17 @@ class FootholdSearch {
       field("top_fraction", p.top_fraction, 0.0, 1.0, "At least this share of that floor has been seen.");
       field("confirmed_sightings", p.confirmed_sightings, 0, 1000,
             "A foot goes on a surface that has been seen as often.");
+      field("centre_ahead_m", p.centre_ahead_m, -0.8, 0.8,
+            "The raster's centre lies this far ahead of the base, so that the raster reaches g_range_m ahead.");
+      field("back_min_m", p.back_min_m, 0.0, 0.5,
+            "A riser or nosing that bounds a tread lies farther behind its nosing: what is nearer is the tread's own.");
+      field("back_max_m", p.back_max_m, 0.1, 3.0,
+            "A riser or nosing that bounds a tread lies nearer behind its nosing: what is farther bounds another one.");
+      field.ordered("back_min_m", "back_max_m");
+      field("spacings", p.spacings, 2, 100,
+            "As many distances between the feet are tried, from half_spacing_m to half_spacing_min_m.");
+      field("levels", p.levels);
+      field("uprights", p.uprights);
     }
   };
   struct Query {
@@ -163,7 +179,7 @@ class FootholdSearch {
   // Of a step onto the tread from soles at a point before it; places the feet. kNoStaircase: it is too far for a step.
   [[nodiscard]] StopReason judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
                                        double step_max_m, Feet& feet) const noexcept;
-  [[nodiscard]] static bool carries(const Upright& riser, const LevelSurface& tread) noexcept;
+  [[nodiscard]] bool carries(const Upright& riser, const LevelSurface& tread) const noexcept;
   [[nodiscard]] bool blocked_by_upright(double next_distance_m, double& top_m) const noexcept;
   [[nodiscard]] StopReason without_next() const noexcept;
   [[nodiscard]] StopReason judge_next() noexcept;

@@ -28,25 +28,20 @@ double before_obstacles_m(const LevelSurface& surface, const Vec2& p_m, double m
   return least_m;
 }
 
-constexpr double kSide = 0.2;  // sine of an edge's turn against the nosing from which it bounds a side
-constexpr double kParallel = 0.95, kAcross = 0.2;  // cosines of turns against the heading: a side, a far end
-constexpr double kEndMin_m = 0.08;
-constexpr double kCos30 = 0.866;  // of an edge's turn against the nosing up to which it is a front or a back
-
 // The ends that were seen, at the middle of their edges.
-void note_ends(const SurfacePatch& surface, LevelSurface& out) noexcept {
+void note_ends(const SurfacePatch& surface, const LevelSurfaceParams& params, LevelSurface& out) noexcept {
   if (!out.has_nosing) return;
   const std::size_t n = surface.polygon.size();
   for (std::size_t i = 0; i < n; ++i) {
     if (surface.edges[i] != EdgeKind::kObserved) continue;
     const Vec2 a = surface.polygon[i].head<2>(), b = surface.polygon[i + 1 < n ? i + 1 : 0].head<2>();
     const double length_m = math::sqrt((b - a).squaredNorm());
-    if (length_m < kEndMin_m) continue;
+    if (length_m < params.end_min_m) continue;
     const Vec2 middle_m = 0.5 * (a + b);
     const double turn = std::abs(out.heading.dot(b - a)) / length_m;  // cosine against the heading
-    if (turn > kParallel) {
+    if (turn > params.end_parallel_cos) {
       (out.lateral_m(middle_m) > 0.0 ? out.left_end_m : out.right_end_m) = out.lateral_m(middle_m);
-    } else if (turn < kAcross && out.along_m(middle_m) > kEndMin_m) {
+    } else if (turn < params.end_across_cos && out.along_m(middle_m) > params.end_min_m) {
       out.far_end_m = out.along_m(middle_m);
     }
   }
@@ -75,20 +70,21 @@ void find_heading(const SurfacePatch& surface, double base_yaw_rad, const Vec2& 
 }
 
 // Contact rectangle to every edge, collision box to the back line.
-void add_edge_limits(const SurfacePatch& surface, const EdgeMargin& margin, const SoleModel& sole,
-                     LevelSurface& out) noexcept {
+void add_edge_limits(const SurfacePatch& surface, const LevelSurfaceParams& params, const EdgeMargin& margin,
+                     const SoleModel& sole, LevelSurface& out) noexcept {
   for (std::size_t i = 0; i < out.hull.size(); ++i) {
     const HalfPlane inside = edge_half_plane(out.hull, i);
     const double facing = inside.inward.dot(out.heading);
     double margin_m = margin.least_m;  // the sides keep one of their own
-    if (facing > kCos30 && surface.nosing.valid) margin_m = out.nosing_margin_m;
-    if (facing < -kCos30 && surface.back.valid) margin_m = out.back_margin_m;
+    if (facing > params.square_cos && surface.nosing.valid) margin_m = out.nosing_margin_m;
+    if (facing < -params.square_cos && surface.back.valid) margin_m = out.back_margin_m;
     (void)out.edges.try_push_back({inside, reach_m(sole.contact, out.heading, inside.inward), margin_m,
-                                   std::abs(inside.inward.dot(out.left)) > kSide});
+                                   std::abs(inside.inward.dot(out.left)) > params.side_sin});
   }
   if (out.has_nosing && surface.back.valid) {
     const std::optional<Line2> back = line_through(surface.back.a_m.head<2>(), surface.back.b_m.head<2>());
-    if (back) add_toe_limit(out, sole, *back, out.back_margin_m, 0.0, std::numeric_limits<double>::infinity());
+    if (back)
+      add_toe_limit(out, params, sole, *back, out.back_margin_m, {0.0, std::numeric_limits<double>::infinity()});
   }
 }
 
@@ -106,8 +102,8 @@ double LevelSurface::spare_m(const Vec2& p_m) const noexcept {
   return std::min({least_m(edges, of), least_m(toe, of), before_obstacles_m(*this, p_m, 1.0)});
 }
 
-bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& margin, const SoleModel& sole,
-             LevelSurface& out) noexcept {
+bool prepare(const MapPolygon& polygon, double base_yaw_rad, const LevelSurfaceParams& params, const EdgeMargin& margin,
+             const SoleModel& sole, LevelSurface& out) noexcept {
   const SurfacePatch& surface = polygon.surface;
   out = {};
   out.id = polygon.id;
@@ -124,20 +120,20 @@ bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& m
   out.back_margin_m = surface.back.valid ? margin.of(surface.back.sigma_m) : out.nosing_margin_m;
   out.height_m = out.plane.height_m(out.has_nosing ? out.nosing_middle_m() : centre);
 
-  note_ends(surface, out);
-  add_edge_limits(surface, margin, sole, out);
+  note_ends(surface, params, out);
+  add_edge_limits(surface, params, margin, sole, out);
   return true;
 }
 
-void add_toe_limit(LevelSurface& surface, const SoleModel& sole, const Line2& line, double margin_m, double min_m,
-                   double max_m) noexcept {
+void add_toe_limit(LevelSurface& surface, const LevelSurfaceParams& params, const SoleModel& sole, const Line2& line,
+                   double margin_m, const Interval& behind) noexcept {
   const auto& [point_m, direction] = line;
   const double across = direction.dot(surface.left);
-  if (std::abs(across) < kCos30) return;
+  if (std::abs(across) < params.square_cos) return;
   // Where it crosses the middle of the surface.
   const Vec2 d = direction / across;
   const double depth_m = surface.along_m(point_m - surface.lateral_m(point_m) * d);
-  if (!(depth_m > min_m) || !(depth_m < max_m)) return;
+  if (!(depth_m > behind.min_m) || !(depth_m < behind.max_m)) return;
   const Vec2 inward = -left_of(direction) * (left_of(direction).dot(surface.heading) > 0.0 ? 1.0 : -1.0);
   const FootLimit limit{
       {inward, inward.dot(point_m)}, reach_m(sole.collision, surface.heading, inward), margin_m, false};

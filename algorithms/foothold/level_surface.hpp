@@ -30,6 +30,28 @@ struct EdgeMargin {
   }
 };
 
+// How a surface's edges and the lines behind it are read. Cosines and sines are of turns in plan.
+struct LevelSurfaceParams {
+  double square_cos = 0.866;  // 30 degrees
+  double side_sin = 0.2;
+  double end_parallel_cos = 0.95, end_across_cos = 0.2;
+  double end_min_m = 0.08;
+
+  static void visit(auto& p, auto& field) {
+    field("square_cos", p.square_cos, 0.5, 1.0,
+          "A line whose turn against the nosing has a larger cosine lies across the stairs: a front, a back, a riser "
+          "that ends a tread.");
+    field("side_sin", p.side_sin, 0.0, 1.0,
+          "An edge whose turn against the nosing has a larger sine bounds the tread to the side.");
+    field("end_parallel_cos", p.end_parallel_cos, 0.5, 1.0,
+          "An observed edge whose turn against the heading has a larger cosine is a side end of the tread.");
+    field("end_across_cos", p.end_across_cos, 0.0, 0.5,
+          "An observed edge whose turn against the heading has a smaller cosine is the tread's far end.");
+    field("end_min_m", p.end_min_m, 0.0, 1.0,
+          "A shorter observed edge, or a far end nearer to the nosing, is no end of a tread.");
+  }
+};
+
 // A foot on the surface has its yaw, so each edge takes the same part of every foot: what is left of the edge's
 // distance to the sole's origin is distance - reach. Plan view, world frame.
 struct FootLimit {
@@ -94,14 +116,14 @@ struct LevelSurface {
 
 // Eqs (14)-(16) and the foot limits of the edges; base_yaw_rad is the heading of surfaces without a nosing. False when
 // the polygon has no area.
-[[nodiscard]] bool prepare(const MapPolygon& polygon, double base_yaw_rad, const EdgeMargin& margin,
-                           const SoleModel& sole, LevelSurface& out) noexcept;
+[[nodiscard]] bool prepare(const MapPolygon& polygon, double base_yaw_rad, const LevelSurfaceParams& params,
+                           const EdgeMargin& margin, const SoleModel& sole, LevelSurface& out) noexcept;
 
 // Adds something that the collision box must not reach: a line in plan that rises behind the surface, through point_m
-// along the unit vector direction. Ignored unless it runs roughly across the heading (within 30 degrees) and lies
-// between min_m and max_m behind the nosing.
-void add_toe_limit(LevelSurface& surface, const SoleModel& sole, const Line2& line, double margin_m, double min_m,
-                   double max_m) noexcept;
+// along the unit vector direction. Ignored unless it lies across the stairs, by params.square_cos, and between
+// behind.min_m and behind.max_m behind the nosing.
+void add_toe_limit(LevelSurface& surface, const LevelSurfaceParams& params, const SoleModel& sole, const Line2& line,
+                   double margin_m, const Interval& behind) noexcept;
 
 // Adds an obstacle; those farthest to the side of middle_m give way when there are too many.
 void add_obstacle(LevelSurface& surface, const TreadObstacle& obstacle, double middle_m) noexcept;

@@ -10,6 +10,34 @@
 
 namespace polygmap {
 
+// Which uprights are in a foot's way, and which are a tread's own riser.
+struct UprightParams {
+  double facing_cos = 0.7;
+  double aside_cos = 0.3;
+  double leg_m = 0.5;
+  double taller_m = 0.25;
+  double below_m = 0.05;
+  double overhang_max_m = 0.06;
+  double overhang_tolerance_m = 0.02;
+
+  static void visit(auto& p, auto& field) {
+    field("facing_cos", p.facing_cos, 0.0, 1.0,
+          "An upright surface that may be too high a rise faces the robot with a larger cosine.");
+    field("aside_cos", p.aside_cos, 0.0, 1.0,
+          "An upright surface that faces along the heading with a larger cosine is in no foot's way.");
+    field("leg_m", p.leg_m, 0.0, 2.0, "What hangs higher above a tread is in no leg's way.");
+    field("taller_m", p.taller_m, 0.0, 1.0,
+          "A face at the nosing that ends no higher above the tread may be its own riser, which measures up to 0.09 m "
+          "too tall.");
+    field("below_m", p.below_m, 0.0, 0.5,
+          "A face at the nosing that begins farther below the tread may be its own riser: what stands on the tread "
+          "does not.");
+    field("overhang_max_m", p.overhang_max_m, 0.0, 0.3, "A riser lies no farther behind the nosing of its tread.");
+    field("overhang_tolerance_m", p.overhang_tolerance_m, 0.0, 0.1,
+          "A riser's place against its nosing is taken with this tolerance, both ways.");
+  }
+};
+
 struct Upright {
   Vec2 point_m, direction, outward;
   double reach_left_m = 0.0, reach_right_m = 0.0;  // along direction from the point

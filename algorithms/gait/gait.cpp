@@ -31,7 +31,7 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
 
 bool Gait::try_arm(const JointFeedback& feedback) noexcept {
   if (!joints_.try_arm(*robot_, params_.joints, feedback.q_rad)) return false;
-  plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m());
+  plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m(), params_.bias_time_s);
   return true;
 }
 
@@ -163,7 +163,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   if (joints_.follow({base_T_plan * plan_T_sole[0], base_T_plan * plan_T_sole[1]}, status_.stands, command)) {
     ++status_.ik_limited_ticks;
   }
-  plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m());
+  plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m(), params_.bias_time_s);
   add_torques(state, feedback, in.usable, command);
   status_.odom_p_com_desired_m = balance_.odom_p_com_planned_m();
   const Transform odom_T_plan = plan_.odom_T_plan();

@@ -232,7 +232,6 @@ double PlaneExtractor::explained_share() const noexcept {
 }
 
 void PlaneExtractor::solve(double least_share, double least_share_curved) noexcept {
-  constexpr double kLeast_px = 64.0;
   for (PlaneId i = 1; i <= planes_.count; ++i) {
     FittedPlane& p = planes_[i];
     if (!p.alive) continue;
@@ -240,7 +239,7 @@ void PlaneExtractor::solve(double least_share, double least_share_curved) noexce
     p.moments = fitted.moments;
     p.residual2 = fitted.residual2;
     const double least = p.facets > 1 ? least_share_curved : least_share;
-    if (p.moments.count < kLeast_px || p.moments.count < least * fitted.seen_px ||
+    if (p.moments.count < params_.min_fitted_px || p.moments.count < least * fitted.seen_px ||
         !try_solve_leaning(params_.fit, noise_, p.moments, up_, p.plane, &p.covariance)) {
       drop(i);
       continue;

@@ -35,6 +35,7 @@ class PlaneExtractor {
     double kind_tilt_rad = 0.21;
     double min_explained = 0.75;
     double min_explained_curved = 0.55;
+    double min_fitted_px = 64.0;
 
     static void visit(auto& p, auto& field) {
       field("growing", p.growing);
@@ -49,6 +50,7 @@ class PlaneExtractor {
             "A plane explains this share of its pixels, over that of all planes.");
       field("min_explained_curved", p.min_explained_curved, 0.0, 1.0,
             "A plane of several facets explains this share of its pixels, over that of all planes.");
+      field("min_fitted_px", p.min_fitted_px, 3.0, 100000.0, "A plane is fitted to as many pixels.");
     }
   };
   // What the next step begins with; a benchmark charges time to it.

@@ -85,7 +85,8 @@ std::int32_t RegionLabeler::check_inliers() noexcept {
   }
   Region& region = regions_[++checked_];
   if (!region.alive || region.area_px > params_.inlier_check_px) return kSkipUnits;
-  if (inlier_ratio(*image_, *raw_, noise_, regions_, checked_) < params_.min_inlier_ratio) region.alive = false;
+  const double ratio = inlier_ratio(*image_, *raw_, noise_, regions_, checked_, params_.inlier_sigmas);
+  if (ratio < params_.min_inlier_ratio) region.alive = false;
   return kInliersUnits;
 }
 

@@ -21,6 +21,7 @@ class RegionLabeler {
     ConnectedComponents::Params components;
     double inlier_check_px = 3000.0;
     double min_inlier_ratio = 0.6;
+    double inlier_sigmas = 3.0;
 
     static void visit(auto& p, auto& field) {
       field("components", p.components);
@@ -28,6 +29,8 @@ class RegionLabeler {
             "A larger region is wider than what columns mix, and is not looked at again.");
       field("min_inlier_ratio", p.min_inlier_ratio, 0.0, 1.0,
             "Of a smaller region, this share of single pixels lies on its plane.");
+      field("inlier_sigmas", p.inlier_sigmas, 0.5, 20.0,
+            "A single pixel that is nearer to a region's plane lies on it.");
     }
   };
   // What the next step begins with.

@@ -49,7 +49,7 @@ void Segmenter::reduce_row() noexcept {
     image_.any_body = image_.any_body || marked;
   }
   const bool body = image_.body_rows[static_cast<std::size_t>(row_ / 2)];
-  constexpr std::int32_t kLater = 2;  // rows
+  constexpr std::int32_t kLater = 2;  // rows ahead that are fetched from memory
   const std::int32_t columns = image_.column_rays.columns, last = image_.column_rays.height_px - 1;
   const ReducedRow reduced = reduce_to_columns(raw_->range, raw_->row(row_), body ? flags : nullptr, columns,
                                                image_.columns.inverse_depth.row(row_), image_.columns.valid.row(row_),

@@ -18,8 +18,7 @@ constexpr std::int32_t kSearchLineUnits = 12;  // kColumnsPerPiece columns' chan
 constexpr std::int32_t kFitLineUnits = 20;     // a line through the change-points
 constexpr std::int32_t kPolygonUnits = 10;     // cut, judged edge by edge
 
-constexpr std::int32_t kColumnsPerPiece = 48;
-constexpr double kStepLeast_m = 0.01;  // a neighbour's centre is this far above or below to count as such
+constexpr std::int32_t kColumnsPerPiece = 48;  // of which kSearchLineUnits are the work
 
 }  // namespace
 
@@ -87,14 +86,14 @@ std::int32_t SurfaceBuilder::find_right_side() noexcept {
 }
 
 std::int32_t SurfaceBuilder::build_outline() noexcept {
-  column_outline_.build(regions_->extents[id_], sides_, kMaxPolygonVertices - 4, outline_);
+  column_outline_.build(regions_->extents[id_], sides_, params_.corner_px, kMaxPolygonVertices - 4, outline_);
   lines_ = SurfaceLines{};
   part_ = (*regions_)[id_].kind == SurfaceKind::kTread ? Part::kNosing : Part::kPolygon;
   return kOutlineUnits;
 }
 
 void SurfaceBuilder::look_beyond(Edge edge, Beyond& beyond) const noexcept {
-  constexpr std::int32_t kProbe_px = 8;
+  constexpr std::int32_t kProbe_px = 8;  // labels in one word
   const std::int32_t down = edge == Edge::kNosing ? 1 : -1;
   const ColumnExtents& extents = regions_->extents[id_];
   for (std::int32_t g = extents.first_column; g <= extents.last_column; ++g) {
@@ -125,7 +124,7 @@ RegionId SurfaceBuilder::most_beyond(Edge edge, const Beyond& beyond, bool riser
     // The foot of a post is no end of a tread.
     if (edge == Edge::kBack && beyond.columns[p] < params_.least_back_share * beyond.all_columns) continue;
     const double height_m = plane.distance_m(regions[p].centre_m);
-    if (edge == Edge::kNosing ? height_m > -kStepLeast_m : height_m < kStepLeast_m) continue;
+    if (edge == Edge::kNosing ? height_m > -params_.least_step_m : height_m < params_.least_step_m) continue;
     if (riser_only && regions[p].kind != SurfaceKind::kRiser) continue;
     if (most == kNoRegion || beyond.columns[p] > beyond.columns[most]) most = p;
   }

@@ -26,6 +26,8 @@ class SurfaceBuilder {
     EdgeLineFinder::Params edge_lines;
     PolygonBuilder::Params polygons;
     double least_back_share = 0.4;  // six posts along a landing are a tenth of its columns (2026-11)
+    double least_step_m = 0.01;
+    double corner_px = 4.0;
 
     static void visit(auto& p, auto& field) {
       field("sides", p.sides);
@@ -33,6 +35,13 @@ class SurfaceBuilder {
       field("polygons", p.polygons);
       field("least_back_share", p.least_back_share, 0.0, 1.0,
             "What ends a surface at its back is seen beyond it in this share of its columns.");
+      field("least_step_m", p.least_step_m, 0.0, 0.1,
+            "The middle of what ends a surface lies farther below its plane at the nosing, farther above it at the "
+            "back.");
+      field(
+          "corner_px", p.corner_px, 0.0, 100.0,
+          "A side that was seen to end as many pixels of half resolution from the columns beside it, or fewer, ends at "
+          "the corner with them.");
     }
   };
   // What the next step begins with: for each region its sides, its outline, a tread's two lines, its polygon.

@@ -6,7 +6,7 @@
 namespace polygmap {
 namespace {
 
-constexpr std::int32_t kMinSide_px = 32;
+constexpr std::int32_t kMinSide_px = 32;  // a picture of less shows nothing
 
 bool finite(const LegShapes& s) noexcept {
   return math::all_finite(s.thigh.a_m) && math::all_finite(s.thigh.b_m) && std::isfinite(s.thigh.radius_m) &&

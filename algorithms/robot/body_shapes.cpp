@@ -32,6 +32,7 @@ double signed_distance_m(const OrientedBox& box, const Vec3& point_m) noexcept {
 }
 
 bool hides(const LegShapes& leg, double margin_m, const Vec3& point_m) noexcept {
+  // Of the way along the ray: numbers of a search, which bound its time.
   constexpr int kMaxSteps = 64;
   constexpr double kStep_m = 0.02;
   const double range_m = point_m.norm();

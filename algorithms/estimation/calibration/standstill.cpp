@@ -6,11 +6,6 @@
 #include "algorithms/geometry/so3.hpp"
 
 namespace polygmap {
-namespace {
-
-constexpr double kLine_s = 0.3;  // a shorter line has no slope to speak of
-
-}  // namespace
 
 void StandstillCalibration::reset(const Params& params) noexcept {
   *this = StandstillCalibration{};
@@ -64,7 +59,7 @@ bool StandstillCalibration::try_finish(const ImuSample& imu, const JointFeedback
 }
 
 Vec3 StandstillCalibration::first_base_g_mps2() const noexcept {
-  if (time_s_ >= kLine_s) return velocity_.slope(times_);
+  if (time_s_ >= params_.min_line_s) return velocity_.slope(times_);
   return time_s_ > 0.0 ? Vec3(felt_mps_ / time_s_) : Vec3(kGravity_mps2 * Vec3::UnitZ());
 }
 

@@ -16,6 +16,7 @@ class StandstillCalibration {
     double max_accel_error_mps2 = 1.0;
     double max_joint_move_rad = 0.01;
     double min_foot_force_n = 50.0;
+    double min_line_s = 0.3;
 
     static void visit(auto& p, auto& field) {
       field("duration_s", p.duration_s, 0.05, 30.0, "The robot stands still for so long at the start.");
@@ -24,6 +25,8 @@ class StandstillCalibration {
       field("max_accel_error_mps2", p.max_accel_error_mps2, 0.01, 10.0, "The measured gravity is off by no more.");
       field("max_joint_move_rad", p.max_joint_move_rad, 1e-4, 0.5, "No joint moves farther while the robot stands.");
       field("min_foot_force_n", p.min_foot_force_n, 0.0, 500.0, "A standing foot presses at least as hard.");
+      field("min_line_s", p.min_line_s, 0.01, 10.0,
+            "Gravity is the mean of what was felt for less, and the slope of its integral from then on.");
     }
   };
   using Legs = std::array<LegMeasurement, kFootCount>;

@@ -64,8 +64,7 @@ void ContactInEkf::anchor(std::size_t foot, const LegMeasurement& leg) noexcept 
 void ContactInEkf::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion,
                            const ImuNoiseDensity& noise) noexcept {
   const Vec3 turn_rad = (gyro_radps - gyro_bias_radps_) * dt_s;
-  constexpr double kLeg_m = 0.5;
-  const double speed_mps = odom_v_base_mps_.norm() + kLeg_m * turn_rad.norm() / dt_s;
+  const double speed_mps = odom_v_base_mps_.norm() + params_.turn_lever_m * turn_rad.norm() / dt_s;
   pace_ = std::min(speed_mps / params_.full_walk_speed_mps, 1.0);
   const Vec3 force_mps2 = odom_R_base_ * so3_exp(0.5 * turn_rad) * (accel_mps2 - accel_bias_mps2_);
   const Vec3 odom_a_mps2 = force_mps2 - Vec3{0, 0, gravity_mps2_};

@@ -40,6 +40,7 @@ class ContactInEkf {
     double whiteness_start_gain = 1.0;
     double whiteness_most_ratio = 5.0;
     double outlier_sigmas = 5.0;
+    double turn_lever_m = 0.5;
 
     static void visit(auto& p, auto& field) {
       field("gyro_noise_radprs", p.gyro_noise_radprs, 1e-6, 0.1,
@@ -72,6 +73,8 @@ class ContactInEkf {
       field("whiteness_most_ratio", p.whiteness_most_ratio, 1.01, 1000.0,
             "Innovations count as no more than this times what white ones are.");
       field("outlier_sigmas", p.outlier_sigmas, 0.5, 100.0, "Rows farther out weigh less, in proportion (Huber).");
+      field("turn_lever_m", p.turn_lever_m, 0.0, 2.0,
+            "Turning counts as the speed that it gives a point so far from the base.");
     }
   };
   // One sigma each, of what is known at the start.

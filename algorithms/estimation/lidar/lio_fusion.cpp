@@ -8,6 +8,7 @@
 namespace polygmap {
 namespace {
 
+// A pose beyond these is none: it is rejected as input.
 constexpr double kMaxCoordinate_m = 1e5;
 constexpr double kOrthonormalTolerance = 1e-3;
 

@@ -8,16 +8,13 @@
 namespace polygmap {
 namespace {
 
-constexpr int kBias_ticks = 4;  // the observer is slow
-
-// What each foot says of the place of the plan: those that stand, alike, but one that is hardly pressed hangs and
-// moves.
-std::array<double, kFootCount> held_by(const std::array<bool, kFootCount>& stands,
+// What each foot says of the place of the plan: those that stand, alike, but one that is pressed less than pressed_n
+// hangs and moves.
+std::array<double, kFootCount> held_by(double pressed_n, const std::array<bool, kFootCount>& stands,
                                        const std::array<double, kFootCount>& force_n) noexcept {
-  constexpr double kPressed_n = 60.0;
   std::array<double, kFootCount> holds{};
   for (std::size_t f = 0; f < kFootCount; ++f) {
-    if (stands[f]) holds[f] = math::clamp(force_n[f] / kPressed_n, 0.0, 1.0);
+    if (stands[f]) holds[f] = math::clamp(force_n[f] / pressed_n, 0.0, 1.0);
   }
   if (!(holds[0] + holds[1] > 0.5) || !std::isfinite(force_n[0] + force_n[1])) {  // no force is told, or none is there
     holds = {stands[0] ? 1.0 : 0.0, stands[1] ? 1.0 : 0.0};
@@ -73,18 +70,18 @@ Balance::Pendulum Balance::pendulum_of(const MassModel& masses, const BodyFrames
 void Balance::observe_bias(const Params& params, const RobotModel& robot, const Body& body,
                            const JointFeedback& feedback, const Support& support, const Pendulum& pendulum,
                            double tick_s) noexcept {
-  if (++bias_tick_ < kBias_ticks) return;
+  if (++bias_tick_ < params.bias_ticks) return;
   bias_tick_ = 0;
   const Vec2 ahead = body.odom_T_base.R.col(0).head<2>().normalized();
   Mat2 odom_R_heading;
   odom_R_heading << ahead.x(), -ahead.y(), ahead.y(), ahead.x();
   Vec2 zmp_felt_m;
-  if (!try_measure_zmp(robot, feedback, support.odom_T_sole, slope_, zmp_felt_m)) {
+  if (!try_measure_zmp(params.zmp, robot, feedback, support.odom_T_sole, slope_, zmp_felt_m)) {
     bias_.missed(odom_R_heading);
     return;
   }
   bias_.update(params.bias, pendulum.odom_p_com_m.head<2>() + pendulum.odom_v_com_mps.head<2>() / pendulum.omega_radps,
-               zmp_felt_m - pendulum.beside_m, odom_R_heading, pendulum.omega_radps, kBias_ticks * tick_s);
+               zmp_felt_m - pendulum.beside_m, odom_R_heading, pendulum.omega_radps, params.bias_ticks * tick_s);
 }
 
 JointVector Balance::leg_torques(const MassModel& masses, const BodyFrames& frames, const PerLink& links_mps2,
@@ -110,7 +107,7 @@ JointVector Balance::torques_nm(const Params& params, const RobotModel& robot, c
   support.stands = reference.stands;
   Vec3 odom_p_plan_m = Vec3::Zero();
   double ground_m = 0.0;
-  const std::array<double, kFootCount> holds = held_by(reference.stands, feedback.foot_force_n);
+  const std::array<double, kFootCount> holds = held_by(params.pressed_n, reference.stands, feedback.foot_force_n);
   for (std::size_t f = 0; f < kFootCount; ++f) {
     support.odom_T_sole[f] = body.odom_T_base * frames[f].sole;
     odom_p_plan_m += holds[f] * (support.odom_T_sole[f].p_m - reference.plan_T_sole[f].p_m);

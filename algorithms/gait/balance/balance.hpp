@@ -17,11 +17,18 @@ class Balance {
     DcmStabiliser::Params dcm;
     DcmBias::Params bias;
     PressureLimits pressure;
+    ZmpMeasurementParams zmp;
+    double pressed_n = 60.0;
+    std::int32_t bias_ticks = 4;
 
     static void visit(auto& p, auto& field) {
       field("dcm", p.dcm);
       field("bias", p.bias);
       field("pressure", p.pressure);
+      field("zmp", p.zmp);
+      field("pressed_n", p.pressed_n, 1.0, 500.0,
+            "A standing foot that is pressed less says the less of where the plan lies: it hangs and moves.");
+      field("bias_ticks", p.bias_ticks, 1, 100, "The bias is observed once in as many ticks, since it is slow.");
     }
   };
   struct Reference {  // plan frame

@@ -6,7 +6,7 @@
 namespace polygmap {
 namespace {
 
-constexpr double kLimit_mps2 = 60.0;  // beyond any planned motion
+constexpr double kLimit_mps2 = 60.0;  // a guard beyond any planned motion
 
 Vec3 second_difference(const Vec3& now, const Vec3& before, const Vec3& first) noexcept {
   const Vec3 mps2 = (now - 2.0 * before + first) / math::square(kTick_s);

@@ -63,12 +63,10 @@ Pressure distribute(const Support& support, const PressureLimits& limits, const 
     share = math::clamp(off_m.dot(between_m) / std::max(between_m.squaredNorm(), 1e-6), 0.0, 1.0);
   }
   Pressure pressure = press_with(share, missed_m);
-  constexpr double kMissed_m = 0.005;
-  if (missed_m < kMissed_m) return pressure;
+  if (missed_m < limits.missed_m) return pressure;
   // Beyond the soles' limits with these shares: with those that come closest, where that gains anything.
-  constexpr double kGained_m = 0.0005;
-  double least_m = missed_m - kGained_m, low = 0.0, high = 1.0;
-  constexpr int kThirds = 8;
+  double least_m = missed_m - limits.gained_m, low = 0.0, high = 1.0;
+  constexpr int kThirds = 8;  // each leaves two thirds: 4 % of the shares
   for (int i = 0; i < kThirds; ++i) {
     const double third = (high - low) / 3.0;
     std::array<double, 2> tried_m{};

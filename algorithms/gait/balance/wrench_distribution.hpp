@@ -7,13 +7,15 @@
 
 namespace polygmap {
 
-// Where the centre of pressure may be in a sole, about the sole frame's origin.
+// Where the centre of pressure may be in a sole, about the sole frame's origin, and what follows when it may not.
 struct PressureLimits {
   double ahead_m = 0.066;
   double toe_m = 0.155;
   double behind_m = 0.066;
   double inward_m = 0.03;
   double aside_m = 0.045;
+  double missed_m = 0.005;
+  double gained_m = 0.0005;
 
   static void visit(auto& p, auto& field) {
     field("ahead_m", p.ahead_m, 0.001, 0.17,
@@ -25,6 +27,9 @@ struct PressureLimits {
           "Centre of pressure from a sole's middle line towards the other sole, where it carries all.");
     field("aside_m", p.aside_m, 0.001, 0.048,
           "Centre of pressure from the middle line at most, of a half width of 48 mm.");
+    field("missed_m", p.missed_m, 0.0, 0.1,
+          "Other shares of the soles are tried where the pressure misses the force's line by more.");
+    field("gained_m", p.gained_m, 0.0, 0.1, "Other shares of the soles are taken where they miss it by so much less.");
   }
 };
 

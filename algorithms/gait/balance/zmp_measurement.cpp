@@ -5,19 +5,17 @@
 
 namespace polygmap {
 
-bool try_measure_zmp(const RobotModel& robot, const JointFeedback& felt,
+bool try_measure_zmp(const ZmpMeasurementParams& params, const RobotModel& robot, const JointFeedback& felt,
                      const std::array<Transform, kFootCount>& odom_T_sole, const Vec2& odom_slope,
                      Vec2& odom_p_zmp_m) noexcept {
   if (!math::all_finite(felt.tau_nm)) return false;
-  constexpr double kLeast = 0.7, kMost = 1.4;  // of the weight: beyond, a sensor is wrong or the robot not on its feet
-  constexpr double kPressed_n = 30.0;          // less has no place to speak of
   double sum_n = 0.0;
   Vec3 moment_nm = Vec3::Zero();
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const std::size_t f = index_of(leg);
     const double up_n = felt.foot_force_n[f];
     sum_n += up_n;
-    if (up_n < kPressed_n) continue;
+    if (up_n < params.pressed_n) continue;
     const LegVector tau_nm = leg_joints(felt.tau_nm, leg);
     if (tau_nm[kAnklePitch] == 0.0 && tau_nm[kAnkleRoll] == 0.0) return false;  // drives that tell none
     const Transform& sole = odom_T_sole[f];
@@ -32,7 +30,7 @@ bool try_measure_zmp(const RobotModel& robot, const JointFeedback& felt,
                                      math::clamp(left_m, -contact.half_width_m, contact.half_width_m), 0.0});
   }
   const double weight_n = robot.masses.total_kg() * kGravity_mps2;
-  if (!(sum_n > kLeast * weight_n && sum_n < kMost * weight_n)) return false;
+  if (!(sum_n > params.min_weight_share * weight_n && sum_n < params.max_weight_share * weight_n)) return false;
   odom_p_zmp_m = moment_nm.head<2>() / sum_n;
   return true;
 }

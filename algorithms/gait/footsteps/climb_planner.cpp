@@ -6,8 +6,6 @@
 namespace polygmap {
 namespace {
 
-constexpr double kCorrection_m = 0.05;  // a shorter step of the walk up only corrects
-
 bool usable(const Foothold& f) noexcept { return math::all_finite(f.position_m) && std::isfinite(f.yaw_rad); }
 
 SolePose in_odom(const Transform& world_T_odom, const Foothold& foothold) noexcept {
@@ -111,11 +109,10 @@ Foot ClimbPlanner::leading_foot(const Situation& situation, const SolePair& targ
   // With the weight on its way, and from tread to tread, the foot stays the one it was: a footstep may go that far
   // sideways with either, and the other one just landed (seed 16 of ten steps toppled by 20 mm when it had to lead at
   // once).
-  constexpr double kReasonToTurnRound = 2.5;  // times the dead bands
   if (situation.leads || treads_climbed_ > 0) {
     return swing_foot(
         step, situation.leads ? situation.leading : memory_.leading,
-        {kReasonToTurnRound * params_.rule.lateral_dead_band_m, kReasonToTurnRound * params_.rule.turn_dead_band_rad});
+        {params_.turn_round * params_.rule.lateral_dead_band_m, params_.turn_round * params_.rule.turn_dead_band_rad});
   }
   return swing_foot(step, memory_.has_leading ? memory_.leading : other(memory_.last_swing), params_.rule);
 }
@@ -141,8 +138,7 @@ bool ClimbPlanner::lined_up(const Situation& situation, const StandOff& to, std:
   const double relaxed =
       corrections_ > params_.strict_corrections ? 1.0 + 0.5 * (corrections_ - params_.strict_corrections) : 1.0;
   // With the leading step under way a little more is no reason to line up again.
-  constexpr double kUnderWay = 0.5;
-  const double tolerance = std::min(relaxed, params_.max_relaxation) + (situation.leads ? kUnderWay : 0.0);
+  const double tolerance = std::min(relaxed, params_.max_relaxation) + (situation.leads ? params_.under_way : 0.0);
   const SolePose& sole = situation.soles[foot];
   const Vec3 off_m = rotation_z(to.yaw_rad).transpose() * (sole.position_m - to.soles[foot].position_m);
   return std::abs(off_m.x()) <= tolerance * params_.line_up_m &&
@@ -238,7 +234,7 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
   before_latch_ = memory_;
   memory_.last_swing = decision.goal.foot;
   const Vec3 travel_m = decision.goal.target.position_m - situation.soles[index_of(memory_.last_swing)].position_m;
-  if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < kCorrection_m) ++corrections_;
+  if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < params_.correction_m) ++corrections_;
   if (leads(decision.goal.kind)) {
     memory_.leading = decision.goal.foot;
     memory_.has_leading = true;
@@ -247,9 +243,8 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
 }
 
 bool ClimbPlanner::shorten_floor_steps() noexcept {
-  constexpr double kShorter = 0.6, kShortest = 0.2;
-  stride_share_ *= kShorter;
-  return stride_share_ > kShortest;
+  stride_share_ *= params_.shorter;
+  return stride_share_ > params_.shortest;
 }
 
 void ClimbPlanner::passing_ends_beside(const StepGoal& goal) noexcept {

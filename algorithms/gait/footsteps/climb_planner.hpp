@@ -34,6 +34,11 @@ class ClimbPlanner {
     SwingRule rule;
     double min_rise_m = 0.02;
     std::int64_t max_map_age_ns = 500 * kNsPerMs;
+    double correction_m = 0.05;
+    double turn_round = 2.5;
+    double under_way = 0.5;
+    double shorter = 0.6;
+    double shortest = 0.2;
 
     static void visit(auto& p, auto& field) {
       field("pattern", p.pattern, kGaitPatternNames,
@@ -57,6 +62,13 @@ class ClimbPlanner {
       field("rule", p.rule);
       field("min_rise_m", p.min_rise_m, 0.001, 0.039, "Delta_foot: a tread that is not higher is already underfoot.");
       field("max_map_age_ns", p.max_map_age_ns, 1000000, 10000000000, "An older map is no reason to step.");
+      field("correction_m", p.correction_m, 0.0, 0.5, "A shorter step on the floor only corrects.");
+      field("turn_round", p.turn_round, 1.0, 100.0,
+            "The other foot leads than the one that was to only for a displacement beyond this times the dead bands.");
+      field("under_way", p.under_way, 0.0, 10.0,
+            "The tolerance relaxes by this times itself while the weight is on its way for the first leading step.");
+      field("shorter", p.shorter, 0.1, 0.95, "Floor steps become this times as long when the legs cannot do one.");
+      field("shortest", p.shortest, 0.01, 1.0, "Floor steps that would be no longer than this share are given up.");
     }
   };
 

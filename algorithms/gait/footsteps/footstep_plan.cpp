@@ -45,8 +45,7 @@ SolePose floor_step(const SoleRectangle& collision, const SolePose& stance, Foot
   const double forward_m = math::clamp(wanted.local_m.x(), -limits.backward_m, limits.forward_m);
   double lateral_m = math::clamp(wanted.local_m.y(), -limits.lateral_m, limits.lateral_m);
 
-  constexpr double kOutwards_m = 0.01;
-  constexpr int kTries = 12;
+  constexpr int kTries = 12;  // which bound the time
   const OrientedRectangle ground_of_stance = foot_rectangle(collision, stance, limits.overlap_margin_m);
   SolePose foot;
   for (int i = 0; i < kTries; ++i) {
@@ -55,7 +54,7 @@ SolePose floor_step(const SoleRectangle& collision, const SolePose& stance, Foot
                          math::wrap_angle(previous.yaw_rad + turn_rad)};
     foot = foot_of_torso(next, swing, half_width_m, 0.0);
     if (!overlap(foot_rectangle(collision, foot, limits.overlap_margin_m), ground_of_stance)) break;
-    lateral_m += side_sign(swing) * kOutwards_m;
+    lateral_m += side_sign(swing) * limits.outwards_m;
   }
   foot.position_m.z() = stance.position_m.z();
   return foot;

@@ -67,6 +67,7 @@ struct FloorStepLimits {
   double lateral_m = 0.05;
   double turn_rad = 0.14;
   double overlap_margin_m = 0.01;
+  double outwards_m = 0.01;
 
   static void visit(auto& p, auto& field) {
     field("forward_m", p.forward_m, 0.01, 0.5,
@@ -77,6 +78,8 @@ struct FloorStepLimits {
           "0.262 rad.");
     field("turn_rad", p.turn_rad, 0.01, 0.8, "A step on the floor turns no more.");
     field("overlap_margin_m", p.overlap_margin_m, 0.0, 0.1, "Room around each foot.");
+    field("outwards_m", p.outwards_m, 0.001, 0.05,
+          "A foot that would land on the other one goes farther out by this until it does not.");
   }
 };
 // The next step of `swing` on level floor towards the goal torso pose: the torso's displacement from the pose that the

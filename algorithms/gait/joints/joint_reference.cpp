@@ -24,7 +24,7 @@ bool JointReference::try_arm(const RobotModel& robot, const Params& params, cons
 
 bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole,
                             const std::array<bool, kFootCount>& stands, JointCommand& command) noexcept {
-  constexpr double kRounding_rad = 1e-9;
+  constexpr double kRounding_rad = 1e-9;  // beyond a limit is none
   const DriveModel& drives = robot_->drives;
   bool limited = false;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {

@@ -18,7 +18,8 @@ void BetweenFeet::settle(const GaitInput& in, GaitShared& gait, double height_m)
   crouch_.begin(in, gait, std::min(middle.position_m.z(), here.position_m.z()), middle.yaw_rad);
   const double drop_m = plan.height_m() - crouch_.height_m();
   const bool soon = crouch_.crouches() && drop_m > 0.0;
-  plan.move_torso(crouch_.height_m(), crouch_.yaw_rad(), settle_ticks, soon ? lowering_ticks(drop_m) : settle_ticks);
+  const std::int32_t height_ticks = soon ? lowering_ticks(step.torso, drop_m) : settle_ticks;
+  plan.move_torso(crouch_.height_m(), crouch_.yaw_rad(), settle_ticks, height_ticks);
   const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{step.zmp_ahead_m, 0, 0};
   plan.rest_over(step.com, (middle.position_m + ahead_m).head<2>());
   tick_ = 0;

@@ -42,13 +42,12 @@ void BodyPlan::correct(const StateEstimate& state, double correction_time_s) noe
                      plan_T_base_, correction_time_s);
 }
 
-void BodyPlan::observe_reference(const RobotModel& robot, const JointVector& reference_rad,
-                                 const Vec2& odom_com_bias_m) noexcept {
+void BodyPlan::observe_reference(const RobotModel& robot, const JointVector& reference_rad, const Vec2& odom_com_bias_m,
+                                 double bias_time_s) noexcept {
   // Evened out: neither the observer's steps nor those of the plan, when it is carried, may accelerate the links.
-  constexpr double kEven_s = 0.1;
   const BodyFrames frames = body_frames(robot.legs, reference_rad);
   const Vec3 base_bias_m = plan_T_base_.R.transpose() * Vec3{odom_com_bias_m.x(), odom_com_bias_m.y(), 0.0};
-  base_com_bias_m_ += kTick_s / kEven_s * (base_bias_m - base_com_bias_m_);
+  base_com_bias_m_ += kTick_s / bias_time_s * (base_bias_m - base_com_bias_m_);
   reference_p_com_m_ = centre_of_mass_m(robot.masses, base_p_links_m(robot.masses, frames)) - base_com_bias_m_;
 }
 

@@ -27,8 +27,8 @@ class BodyPlan {
   void correction_missed() noexcept { correction_.missed(); }
   // Once the tick's joint references are known: where they have the centre of mass, without what the masses have too
   // much of it.
-  void observe_reference(const RobotModel& robot, const JointVector& reference_rad,
-                         const Vec2& odom_com_bias_m) noexcept;
+  void observe_reference(const RobotModel& robot, const JointVector& reference_rad, const Vec2& odom_com_bias_m,
+                         double bias_time_s) noexcept;
   // How the plan accelerates the links, without the steering of the feet: those of plan_T_sole are planned.
   [[nodiscard]] LinkMotion::Acceleration observe_links(const RobotModel& robot,
                                                        std::array<Transform, kFootCount> plan_T_sole) noexcept;

@@ -84,6 +84,8 @@ struct SwingParams {
   double soon_below_m = 0.03;
   double beside_from_m = 0.1;
   double side_margin_m = 0.01;
+  double lowering_spare_m = 0.02;
+  double wait_inward_m = 0.01;
 
   static void visit(auto& p, auto& field) {
     field("timing", p.timing);
@@ -110,6 +112,10 @@ struct SwingParams {
           "A passing foot that far behind the standing one lands beside it.");
     field("side_margin_m", p.side_margin_m, 0.0, 0.2,
           "A sole that lands farther out keeps this from the end of its tread.");
+    field("lowering_spare_m", p.lowering_spare_m, 0.0, 0.1,
+          "The torso goes lower by this than a lowered foot asks for: the base is not right over the centre of mass.");
+    field("wait_inward_m", p.wait_inward_m, -0.04, 0.04,
+          "The weight waits this far from the standing sole's middle line, towards the foot that found no ground.");
   }
 };
 
@@ -140,6 +146,7 @@ struct GaitParams {
   LandedFootParams landed_foot;
   double steady_m = 0.015;
   double correction_time_s = 0.03;
+  double bias_time_s = 0.1;
   std::int64_t steer_age_ns = 20 * kNsPerMs;
   std::int64_t stop_age_ns = 100 * kNsPerMs;
 
@@ -156,6 +163,8 @@ struct GaitParams {
     field("steady_m", p.steady_m, 0.001, 0.5, "No foot lifts when the divergent component's error is larger.");
     field("correction_time_s", p.correction_time_s, 0.002, 2.0,
           "Time constant of the low-pass of the base's difference to the plan.");
+    field("bias_time_s", p.bias_time_s, 0.002, 10.0,
+          "Time constant of the low-pass of the centre of mass's bias: its steps must not accelerate the links.");
     field("steer_age_ns", p.steer_age_ns, 2000000, 1000000000,
           "Older IMU and joint samples steer nothing and start nothing.");
     field("stop_age_ns", p.stop_age_ns, 2000000, 5000000000,

@@ -214,21 +214,20 @@ Transition SwingPhase::touch_down(const GaitInput& in, GaitShared& gait, bool fe
 
 // As low as the sole asks for, plan frame, and the standing one allows.
 void SwingPhase::lower_torso(GaitShared& gait, const SolePose& sole) const noexcept {
-  constexpr double kSpare_m = 0.02;  // of its height: the base is not right over the centre of mass
   SolePair soles = gait.plan.soles();
   soles[index_of(goal_.foot)] = sole;
   const TorsoPose low = torso_over(gait.robot.legs, gait.params.step.torso, other(goal_.foot), soles);
-  const double height_m = std::min(low.position_m.z() - kSpare_m, gait.plan.height_m());
-  const std::int32_t ticks = lowering_ticks(gait.plan.height_m() - height_m);
+  const double height_m = std::min(low.position_m.z() - gait.params.swing.lowering_spare_m, gait.plan.height_m());
+  const std::int32_t ticks = lowering_ticks(gait.params.step.torso, gait.plan.height_m() - height_m);
   gait.plan.move_torso(height_m, low.yaw_rad, ticks, ticks);
 }
 
 // No ground: the weight rests over the stance foot, as far towards the free foot as the sole carries. The ankle roll of
 // a folded leg has little range.
 void SwingPhase::wait_over_stance(GaitShared& gait, const SolePose& sole) const noexcept {
-  constexpr double kInward_m = 0.01;
   lower_torso(gait, sole);
-  const Vec3 inward_m = gait.plan.plan_T_sole(other(goal_.foot)).R.col(1) * (side_sign(goal_.foot) * kInward_m);
+  const Vec3 inward_m =
+      gait.plan.plan_T_sole(other(goal_.foot)).R.col(1) * (side_sign(goal_.foot) * gait.params.swing.wait_inward_m);
   gait.plan.rest_over(gait.params.step.com, zmp_stance_m_ + inward_m.head<2>());
 }
 

@@ -10,12 +10,10 @@ namespace {
 
 constexpr std::int32_t kRest_ticks = 1'000'000;  // beyond every plan
 
-// The zero-moment point leaves its straight way by the offset: up in 15 % of the time, full until 75 %, gone at the
-// end.
-constexpr double kOffsetUp = 0.15, kOffsetDown = 0.75;
-double offset_share(double u) noexcept {
+// The zero-moment point leaves its straight way by the offset: up, then full, gone at the end.
+double offset_share(const ComPlan::Params& params, double u) noexcept {
   if (u >= 1.0) return 0.0;
-  return std::min({u / kOffsetUp, 1.0, (1.0 - u) / (1.0 - kOffsetDown)});
+  return std::min({u / params.offset_up, 1.0, (1.0 - u) / (1.0 - params.offset_down)});
 }
 
 // Where the zero-moment point is without the offset.
@@ -34,9 +32,10 @@ Vec2 straight_m(const Vec2& start_m, const ZmpKnots& knots, std::int32_t tick) n
 }  // namespace
 
 // The knots of plan and offset together, in their order.
-ComPlan::Knots ComPlan::with_offset_knots(const Vec2& start_m, const ZmpKnots& knots, double offset_ticks) noexcept {
-  const std::array<std::int32_t, 3> extra{static_cast<std::int32_t>(kOffsetUp * offset_ticks),
-                                          static_cast<std::int32_t>(kOffsetDown * offset_ticks),
+ComPlan::Knots ComPlan::with_offset_knots(const Params& params, const Vec2& start_m, const ZmpKnots& knots,
+                                          double offset_ticks) noexcept {
+  const std::array<std::int32_t, 3> extra{static_cast<std::int32_t>(params.offset_up * offset_ticks),
+                                          static_cast<std::int32_t>(params.offset_down * offset_ticks),
                                           static_cast<std::int32_t>(offset_ticks)};
   Knots all;
   (void)all.try_push_back({0, start_m});
@@ -53,11 +52,12 @@ ComPlan::Knots ComPlan::with_offset_knots(const Vec2& start_m, const ZmpKnots& k
 
 // The divergent component xi = x + v/w must meet every segment so that the last one rests: backwards. The offset's part
 // of xi(0) per metre of offset goes along.
-Vec2 ComPlan::add_offset(const HorizontalMotion& from, double offset_ticks, Knots& all) const noexcept {
+Vec2 ComPlan::add_offset(const Params& params, const HorizontalMotion& from, double offset_ticks,
+                         Knots& all) const noexcept {
   const double w = omega_radps_;
   Vec2 xi_m = all.back().zmp_m;
   double offset_xi = 0.0;
-  const auto share_at = [&](std::size_t i) { return offset_share(all[i].tick / offset_ticks); };
+  const auto share_at = [&](std::size_t i) { return offset_share(params, all[i].tick / offset_ticks); };
   for (std::size_t i = all.size() - 1; i-- > 0;) {
     const double T = (all[i + 1].tick - all[i].tick) * kTick_s, decay = math::exp(-w * T);
     const Vec2 slope = (all[i + 1].zmp_m - all[i].zmp_m) / T;
@@ -73,8 +73,8 @@ Vec2 ComPlan::add_offset(const HorizontalMotion& from, double offset_ticks, Knot
 void ComPlan::plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept {
   const double w = omega_radps_ = params.omega_radps;
   const double offset_ticks = std::min(params.zmp_offset_ticks, knots.back().tick);
-  Knots all = with_offset_knots(zmp_under(params, from), knots, offset_ticks);
-  zmp_offset_m_ = add_offset(from, offset_ticks, all).norm();
+  Knots all = with_offset_knots(params, zmp_under(params, from), knots, offset_ticks);
+  zmp_offset_m_ = add_offset(params, from, offset_ticks, all).norm();
   count_ = all.size();
 
   // Backwards again for the growing part, forwards for the dying one.

@@ -23,11 +23,16 @@ class ComPlan {
   struct Params {
     double omega_radps = 3.5;
     std::int32_t zmp_offset_ticks = 200;
+    double offset_up = 0.15, offset_down = 0.75;
 
     static void visit(auto& p, auto& field) {
       field("omega_radps", p.omega_radps, 1.0, 10.0, "Natural frequency of the body over its feet, sqrt(g / 0.80 m).");
       field("zmp_offset_ticks", p.zmp_offset_ticks, 20, 2000,
             "The zero-moment point leaves its way for so long to meet the start's motion.");
+      field("offset_up", p.offset_up, 0.1, 0.45,
+            "The zero-moment point is off its way in full from this share of the time.");
+      field("offset_down", p.offset_down, 0.5, 0.95,
+            "The zero-moment point goes back to its way from this share of the time.");
     }
   };
 
@@ -54,10 +59,11 @@ class ComPlan {
   };
   static constexpr std::size_t kSegments = kMaxZmpKnots + 4;  // three for the offset, one at rest
   using Knots = StaticVector<ZmpKnot, kSegments>;
-  [[nodiscard]] static Knots with_offset_knots(const Vec2& start_m, const ZmpKnots& knots,
+  [[nodiscard]] static Knots with_offset_knots(const Params& params, const Vec2& start_m, const ZmpKnots& knots,
                                                double offset_ticks) noexcept;
   // Moves the knots by the offset, which it returns.
-  [[nodiscard]] Vec2 add_offset(const HorizontalMotion& from, double offset_ticks, Knots& all) const noexcept;
+  [[nodiscard]] Vec2 add_offset(const Params& params, const HorizontalMotion& from, double offset_ticks,
+                                Knots& all) const noexcept;
   [[nodiscard]] const Segment& segment(std::int32_t tick) const noexcept;
 
   std::array<Segment, kSegments> segments_;

@@ -28,17 +28,16 @@ void Swing::plan(const SoleModel& sole, const Transform& start, const SolePose& 
 }
 
 void Swing::redirect(double tick, double pace, const SolePose& target, std::int32_t duration_ticks) noexcept {
-  constexpr double kUpShare = 0.4;    // of the time
-  constexpr double kStopShare = 0.4;  // of its height at full speed, in which a rise comes to rest
   const Transform now = at(tick), before = at(tick - pace);
   const Vec3 v_mps = (now.p_m - before.p_m) / kTick_s;
   const double pitch_rad = math::asin(math::clamp(-now.R(2, 0), -1.0, 1.0));
   const double before_rad = math::asin(math::clamp(-before.R(2, 0), -1.0, 1.0));
   const double whole_s = std::max(duration_ticks * kTick_s - approach_s_, 2.0 * kTick_s);
   // Over the nosing of the target's tread, and high enough to stop the rise.
-  const double apex_m = std::max(target.position_m.z() + shape_.clearance_m,
-                                 now.p_m.z() + std::max(v_mps.z(), 0.0) * kUpShare * whole_s * kStopShare);
-  other_.up_s = kUpShare * whole_s;
+  const double apex_m =
+      std::max(target.position_m.z() + shape_.clearance_m,
+               now.p_m.z() + std::max(v_mps.z(), 0.0) * shape_.redirect_up * whole_s * shape_.redirect_stop);
+  other_.up_s = shape_.redirect_up * whole_s;
   other_.up = Quintic({now.p_m.z(), v_mps.z(), 0.0}, {apex_m, 0.0, 0.0}, other_.up_s);
   other_.down = Quintic({apex_m, 0.0, 0.0}, {target.position_m.z() + shape_.approach_m, -shape_.approach_mps, 0.0},
                         whole_s - other_.up_s);

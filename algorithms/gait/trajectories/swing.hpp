@@ -30,6 +30,8 @@ struct SwingShape {
   double toe_up_end = 0.80;
   double approach_m = 0.008;
   double approach_mps = 0.08;
+  double redirect_up = 0.4;
+  double redirect_stop = 0.4;
 
   static void visit(auto& p, auto& field) {
     field("lift_end", p.lift_end, 0.05, 1.0, "The apex is reached at this share of the swing.");
@@ -57,6 +59,10 @@ struct SwingShape {
     field.ordered("toe_up_begin", "toe_up_end");
     field("approach_m", p.approach_m, 0.0, 0.1, "The last part down goes at approach_mps until something is felt.");
     field("approach_mps", p.approach_mps, 0.005, 1.0, "Speed of the last part down.");
+    field("redirect_up", p.redirect_up, 0.05, 0.95,
+          "A foot that goes to another target is at the apex after this share of the time.");
+    field("redirect_stop", p.redirect_stop, 0.0, 1.0,
+          "A foot that goes to another target while it rises stops within this share of what it would rise otherwise.");
   }
 };
 

@@ -54,12 +54,10 @@ TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params, 
   return torso;
 }
 
-std::int32_t lowering_ticks(double drop_m) noexcept {
-  constexpr std::int32_t kLeast_ticks = 130;
-  constexpr double kMost_mps2 = 4.0;
+std::int32_t lowering_ticks(const TorsoParams& params, double drop_m) noexcept {
   constexpr double kQuintic = 5.78;  // greatest acceleration between two rests, of distance over time squared
-  const double least_s = math::sqrt(kQuintic * std::max(drop_m, 0.0) / kMost_mps2);
-  return std::max(static_cast<std::int32_t>(least_s / kTick_s), kLeast_ticks);
+  const double least_s = math::sqrt(kQuintic * std::max(drop_m, 0.0) / params.max_lowering_mps2);
+  return std::max(static_cast<std::int32_t>(least_s / kTick_s), params.min_lowering_ticks);
 }
 
 TorsoTrajectory::State TorsoTrajectory::at_rest(const Transform& base) noexcept {

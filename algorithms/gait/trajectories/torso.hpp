@@ -15,6 +15,8 @@ struct TorsoParams {
   double max_leg_m = 0.612;
   double inward_m = 0.022;
   double ahead_m = 0.0;
+  std::int32_t min_lowering_ticks = 130;
+  double max_lowering_mps2 = 4.0;
 
   static void visit(auto& p, auto& field) {
     field("height_m", p.height_m, 0.5, 0.9, "Torso above the higher foot, at most.");
@@ -22,6 +24,9 @@ struct TorsoParams {
     field("max_leg_m", p.max_leg_m, 0.4, 0.63, "Hip pitch to ankle, of 0.630 stretched.");
     field("inward_m", p.inward_m, -0.1, 0.1, "Base at rest over one foot, from its middle line towards the other one.");
     field("ahead_m", p.ahead_m, -0.1, 0.1, "Base at rest over one foot, ahead of its sole's origin.");
+    field("min_lowering_ticks", p.min_lowering_ticks, 2, 2000, "The torso comes down in no less time.");
+    field("max_lowering_mps2", p.max_lowering_mps2, 0.1, 9.0,
+          "The torso comes down with no larger acceleration, so that the foot stays pressed enough to balance.");
   }
 };
 
@@ -36,7 +41,7 @@ struct TorsoParams {
 [[nodiscard]] TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance,
                                    const SolePair& soles) noexcept;
 // Time for the torso to come down by that much without falling faster than a foot pressed enough to balance allows.
-[[nodiscard]] std::int32_t lowering_ticks(double drop_m) noexcept;
+[[nodiscard]] std::int32_t lowering_ticks(const TorsoParams& params, double drop_m) noexcept;
 // Between both feet.
 [[nodiscard]] TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params,
                                       const SolePair& soles) noexcept;

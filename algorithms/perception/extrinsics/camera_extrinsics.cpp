@@ -6,9 +6,6 @@
 namespace polygmap {
 namespace {
 
-constexpr double kLongestStep_s = 0.1;  // between two frames, for the fading
-constexpr double kFramesAlike = 20.0;   // in a row see a toe from a base that moves the same way
-
 bool is_unit(const Vec3& v) noexcept { return std::abs(v.squaredNorm() - 1.0) < 1e-3; }  // false for NaN
 
 }  // namespace
@@ -64,7 +61,7 @@ void CameraExtrinsicsEstimator::update(const SurfaceFrame& frame, const Stance& 
     ++counters_.rejected_frames;
     return;
   }
-  const double dt_s = last_ns_ == 0 ? 0.0 : std::min(seconds(frame.stamp_ns - last_ns_), kLongestStep_s);
+  const double dt_s = last_ns_ == 0 ? 0.0 : std::min(seconds(frame.stamp_ns - last_ns_), params_.longest_step_s);
   last_ns_ = frame.stamp_ns;
   learn_x(stance, dt_s);
   const Level level = level_of(stance);
@@ -148,7 +145,7 @@ void CameraExtrinsicsEstimator::learn_x(const Stance& stance, double dt_s) noexc
     if (!stance.stands[foot] || !toe || !std::isfinite(toe->ahead_m) || !std::isfinite(toe->sigma_m)) continue;
     // The toe is in the last rows of a image: a base that moves alike in many frames shows it off alike in all.
     const double variance_m2 = math::square(params_.frame_x_sigma_m) + math::square(toe->sigma_m) +
-                               kFramesAlike * math::square(params_.half_scan_s * stance.speed_mps);
+                               params_.frames_alike * math::square(params_.half_scan_s * stance.speed_mps);
     sum_m += toe->ahead_m / variance_m2;
     information += 1.0 / variance_m2;
   }

@@ -43,6 +43,9 @@ class CameraExtrinsicsEstimator {
     // same in every frame: with 3 mrad three treads ahead, 8 mrad off, outvoted the floor (seed 64).
     double systematic_tilt_rad = 0.001;
     double max_sole_tilt_rad = 3.0 * kPi / 180.0;  // from gravity: more, and the foot does not stand flat
+    double longest_step_s = 0.1;
+    double frames_alike = 20.0;
+    ToeDetectorParams toe;
 
     static void visit(auto& p, auto& field) {
       field("prior_tilt_sigma_rad", p.prior_tilt_sigma_rad, 1e-5, 0.2,
@@ -74,6 +77,10 @@ class CameraExtrinsicsEstimator {
       field("systematic_tilt_rad", p.systematic_tilt_rad, 0.0, 0.1, "A surface's tilt errs by this besides its sigma.");
       field("max_sole_tilt_rad", p.max_sole_tilt_rad, 0.001, 0.5,
             "A foot tilted farther from gravity does not stand flat.");
+      field("longest_step_s", p.longest_step_s, 0.001, 10.0, "What was learnt fades by no more from frame to frame.");
+      field("frames_alike", p.frames_alike, 1.0, 1000.0,
+            "As many frames in a row see a toe from a base that moves the same way, and err alike.");
+      field("toe", p.toe);
     }
   };
   // The robot at the exposure, base frame.

@@ -11,19 +11,13 @@
 namespace polygmap {
 namespace {
 
+// What lines are sampled at is compiled in: their arrays have these sizes.
 constexpr int kLines = 16;         // across the foot, 6 mm apart: three pixels at 0.7 m
 constexpr double kStep_m = 0.001;  // along a line; a pixel is 1.9 mm there
 constexpr int kOnFoot = 12;        // steps on the foot before its end: a shank hides what lies farther back
 constexpr int kBeyond = 6;         // steps past its end: what lies there a riser may hide after a centimetre
 constexpr int kSearch = 14;        // the toe is looked for this far to both sides of where it is believed
 constexpr int kSteps = kOnFoot + 2 * kSearch + kBeyond;
-
-constexpr double kMostOff_m =
-    0.012;  // of a pixel on the upper face from where that is believed, along the optical axis
-constexpr double kLeastJump_m = 0.015;  // eight sigma of a pixel
-constexpr double kInlier_m = 0.003;     // from the median of all lines
-constexpr int kLeastLines = 4;
-constexpr double kLeastSigma_m = 0.0006;  // the edge runs along a row of pixels, and all lines round alike
 
 // What is measured behind the upper face, m; not a number where nothing is.
 using Line = std::array<double, kSteps>;
@@ -50,14 +44,14 @@ Excess excess_of(const Line& line, int first, int last) noexcept {
 }
 
 // Where a line leaves the foot, in steps; nothing when that is not seen. A pixel at the edge may show a mixture.
-std::optional<double> end_of_line(const Line& line) noexcept {
-  constexpr int kMixed = 2;
+std::optional<double> end_of_line(const ToeDetectorParams& params, const Line& line) noexcept {
+  constexpr int kMixed = 2;  // steps, a pixel
   for (int end = kOnFoot; end + kBeyond <= kSteps; ++end) {
     // What most steps fail, first.
-    if (line[static_cast<std::size_t>(end + kMixed)] < kLeastJump_m) continue;
+    if (line[static_cast<std::size_t>(end + kMixed)] < params.least_jump_m) continue;
     const Excess on = excess_of(line, end - kOnFoot, end), beyond = excess_of(line, end + kMixed, end + kBeyond);
-    if (2 * on.count < kOnFoot || on.least_m < -kMostOff_m || on.most_m > kMostOff_m) continue;
-    if (2 * beyond.count < kBeyond - kMixed || beyond.least_m < kLeastJump_m) continue;
+    if (2 * on.count < kOnFoot || on.least_m < -params.most_off_m || on.most_m > params.most_off_m) continue;
+    if (2 * beyond.count < kBeyond - kMixed || beyond.least_m < params.least_jump_m) continue;
     const double half_m = 0.5 * (on.mean_m + beyond.mean_m);
     int last_on = end - 1, first_beyond = end + kMixed;
     for (int i = end; i < first_beyond; ++i) {
@@ -72,9 +66,10 @@ std::optional<double> end_of_line(const Line& line) noexcept {
 
 }  // namespace
 
-std::optional<ToeSighting> detect_toe(const DepthFrameView& frame, const CameraIntrinsics& k, const RawRange& range,
-                                      const SoleModel& sole, const Transform& camera_T_sole) noexcept {
-  constexpr double kNear_m = 0.1;
+std::optional<ToeSighting> detect_toe(const ToeDetectorParams& params, const DepthFrameView& frame,
+                                      const CameraIntrinsics& k, const RawRange& range, const SoleModel& sole,
+                                      const Transform& camera_T_sole) noexcept {
+  constexpr double kNear_m = 0.1;  // a guard of the division: no toe is nearer
   const double first_m = sole.collision.toe_x_m - kStep_m * (kOnFoot + kSearch);
   constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
   StaticVector<double, kLines> ends_m;
@@ -96,27 +91,28 @@ std::optional<ToeSighting> detect_toe(const DepthFrameView& frame, const CameraI
     // On the foot wherever it ends within half of the search; mostly a knee is there.
     constexpr int kProbe = kOnFoot + kSearch / 2;
     measure(kProbe);
-    if (line[kProbe] < -kMostOff_m) continue;
+    if (line[kProbe] < -params.most_off_m) continue;
     for (int i = 0; i < kSteps; ++i) measure(i);
-    if (const std::optional<double> end = end_of_line(line)) {
+    if (const std::optional<double> end = end_of_line(params, line)) {
       (void)ends_m.try_push_back(kStep_m * (*end - (kOnFoot + kSearch)));
     }
   }
-  if (ends_m.size() < kLeastLines) return std::nullopt;
+  const std::int32_t least_lines = params.min_lines;
+  if (static_cast<std::int32_t>(ends_m.size()) < least_lines) return std::nullopt;
   std::sort(ends_m.begin(), ends_m.end());
   const double median_m = ends_m[ends_m.size() / 2];
   double sum = 0.0, squares = 0.0;
   int inliers = 0;
   for (const double end_m : ends_m) {
-    if (std::abs(end_m - median_m) > kInlier_m) continue;
+    if (std::abs(end_m - median_m) > params.inlier_m) continue;
     sum += end_m;
     squares += end_m * end_m;
     ++inliers;
   }
-  if (inliers < kLeastLines || 3 * inliers < 2 * static_cast<int>(ends_m.size())) return std::nullopt;
+  if (inliers < least_lines || 3 * inliers < 2 * static_cast<int>(ends_m.size())) return std::nullopt;
   const double mean_m = sum / inliers;
   const double variance_m2 = std::max(0.0, squares / inliers - mean_m * mean_m);
-  return ToeSighting{mean_m, std::max(kLeastSigma_m, math::sqrt(variance_m2 / inliers))};
+  return ToeSighting{mean_m, std::max(params.least_sigma_m, math::sqrt(variance_m2 / inliers))};
 }
 
 }  // namespace polygmap

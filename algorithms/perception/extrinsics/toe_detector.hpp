@@ -14,6 +14,25 @@
 
 namespace polygmap {
 
+struct ToeDetectorParams {
+  double most_off_m = 0.012;
+  double least_jump_m = 0.015;  // eight sigma of a pixel
+  double inlier_m = 0.003;
+  std::int32_t min_lines = 4;
+  double least_sigma_m = 0.0006;
+
+  static void visit(auto& p, auto& field) {
+    field("most_off_m", p.most_off_m, 0.0, 0.1,
+          "A pixel on the foot's upper face is no farther, along the optical axis, from where that is believed.");
+    field("least_jump_m", p.least_jump_m, 0.0, 0.2, "Beyond the toe the depth is larger than on it by as much.");
+    field("inlier_m", p.inlier_m, 0.0, 0.05, "A line that ends nearer to the median of all lines shows the toe.");
+    field("min_lines", p.min_lines, 1, 16, "As many of 16 lines across the foot show the toe.");
+    field("least_sigma_m", p.least_sigma_m, 1e-6, 0.05,
+          "The toe's place is taken for no better known: its edge runs along a row of pixels, and all lines round "
+          "alike.");
+  }
+};
+
 struct ToeSighting {
   double ahead_m = 0.0;  // by how much the toe is seen ahead of where the encoders have it, along the sole's x axis
   double sigma_m = 0.0;  // of the image alone
@@ -22,8 +41,8 @@ struct ToeSighting {
 // frame: of the size of the intrinsics. camera_T_sole: at the exposure, by encoders and the mount as believed. Follows
 // lines along the foot's upper face over its front edge, beyond which depth jumps; nothing where too few lines show one
 // jump at one place, because the toe is hidden, out of the image or close to a riser.
-[[nodiscard]] std::optional<ToeSighting> detect_toe(const DepthFrameView& frame, const CameraIntrinsics& intrinsics,
-                                                    const RawRange& range, const SoleModel& sole,
-                                                    const Transform& camera_T_sole) noexcept;
+[[nodiscard]] std::optional<ToeSighting> detect_toe(const ToeDetectorParams& params, const DepthFrameView& frame,
+                                                    const CameraIntrinsics& intrinsics, const RawRange& range,
+                                                    const SoleModel& sole, const Transform& camera_T_sole) noexcept;
 
 }  // namespace polygmap

@@ -8,7 +8,7 @@
 namespace polygmap {
 namespace {
 
-constexpr float kCostsPerUnit = 4.0F;
+constexpr float kCostsPerUnit = 4.0F;  // bins of a histogram, kCostBins
 
 }  // namespace
 
@@ -23,14 +23,13 @@ void NoiseSamples::add(float inverse_depth, float cost) noexcept {
 }
 
 // The median forgives half of the rows being something else; a squared normal variable's is 0.455.
-StaticVector<NoiseSamples::Seen, NoiseSamples::kDepths> NoiseSamples::seen() const noexcept {
-  constexpr std::int32_t kLeastRows = 60;
+StaticVector<NoiseSamples::Seen, NoiseSamples::kDepths> NoiseSamples::seen(std::int32_t min_rows) const noexcept {
   constexpr double kMedian = 0.455;
   StaticVector<Seen, kDepths> out;
   for (const AtDepth& depth : depths_) {
     std::int32_t all = 0;
     for (const std::int32_t n : depth.rows) all += n;
-    if (all < kLeastRows) continue;
+    if (all < min_rows) continue;
     std::int32_t below = 0;
     std::size_t bin = 0;
     while (2 * (below + depth.rows[bin]) < all) below += depth.rows[bin++];
@@ -52,7 +51,7 @@ void NoiseTracker::follow(const Params& params, const DepthNoiseModel& profile, 
   const DepthNoiseModel believed = of(profile);
   // Relative errors: 1 = scale p + quadratic q in every range.
   double pp = 0.0, pq = 0.0, qq = 0.0, p1 = 0.0, q1 = 0.0;
-  for (const NoiseSamples::Seen& at : samples.seen()) {
+  for (const NoiseSamples::Seen& at : samples.seen(params.min_rows)) {
     const double sigma_m = std::max(at.scale * believed.sigma_m(at.z_m), 1e-6);
     const double p = profile.sigma_m(at.z_m) / sigma_m, q = at.z_m * at.z_m / sigma_m;
     pp += at.rows * p * p, pq += at.rows * p * q, qq += at.rows * q * q, p1 += at.rows * p, q1 += at.rows * q;

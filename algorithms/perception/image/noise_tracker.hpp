@@ -27,8 +27,8 @@ class NoiseSamples {
   void clear() noexcept { depths_ = {}; }
   // inverse_depth: 1/m, more than 0.
   void add(float inverse_depth, float cost) noexcept;
-  // Ranges of depth with too few rows are left out.
-  [[nodiscard]] StaticVector<Seen, kDepths> seen() const noexcept;
+  // Ranges of depth with fewer rows are left out.
+  [[nodiscard]] StaticVector<Seen, kDepths> seen(std::int32_t min_rows) const noexcept;
 
  private:
   static constexpr std::int32_t kCostBins = 128;  // of 0.25: up to 5.7 sigmas
@@ -46,6 +46,7 @@ class NoiseTracker {
     double min_scale = 1.0;
     double max_scale = 4.0;
     double max_quadratic_per_m = 0.005;
+    std::int32_t min_rows = 60;
 
     static void visit(auto& p, auto& field) {
       field("gain", p.gain, 0.0, 1.0, "Share of a frame's noise in what is believed after it.");
@@ -54,6 +55,7 @@ class NoiseTracker {
       field.ordered("min_scale", "max_scale");
       field("max_quadratic_per_m", p.max_quadratic_per_m, 0.0, 0.1,
             "The noise grows no faster with the square of the depth: more than stereo of 50 mm base line has.");
+      field("min_rows", p.min_rows, 1, 100000, "A range of depths with fewer rows says nothing of the noise.");
     }
   };
   // The profile as it is believed.

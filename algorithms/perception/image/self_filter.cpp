@@ -11,7 +11,7 @@ namespace {
 
 // A capsule is drawn as this many spheres: 20 mm apart on a 0.35 m shank the scallops are under 1 mm deep.
 constexpr int kSpheresPerCapsule = 18;
-constexpr double kNear_m = 0.02;
+constexpr double kNear_m = 0.02;     // edges are cut off there: what is behind the camera has no place in the image
 constexpr double kOutside_px = 1.0;  // a shape that ends farther from the image covers none of its pixels
 
 }  // namespace

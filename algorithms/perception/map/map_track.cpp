@@ -6,12 +6,6 @@
 #include <limits>
 
 namespace polygmap {
-namespace {
-
-constexpr double kEndTolerance_m = 0.015;  // edges this near the farthest vertex make up an end
-constexpr double kMinEndLength_m = 0.02;
-
-}  // namespace
 
 double TrackedLine::variance_m2(double y_m) const noexcept {
   const double det = information.determinant();
@@ -28,8 +22,8 @@ Mat3 frame_from(const Vec3& normal, const Vec3& x_hint) noexcept {
   return R;
 }
 
-bool end_observed(const ConvexPolygon& polygon, const std::array<EdgeKind, kMaxPolygonVertices>& edges, const Vec2& u,
-                  double support) noexcept {
+bool end_observed(const SeenEndParams& params, const ConvexPolygon& polygon,
+                  const std::array<EdgeKind, kMaxPolygonVertices>& edges, const Vec2& u, double support) noexcept {
   const std::size_t n = polygon.size();
   double observed_m = 0.0, unknown_m = 0.0;
   std::size_t corner = 0;
@@ -37,10 +31,10 @@ bool end_observed(const ConvexPolygon& polygon, const std::array<EdgeKind, kMaxP
     const Vec2& a = polygon[i];
     const Vec2& b = polygon[i + 1 == n ? 0 : i + 1];
     if (u.dot(a) > u.dot(polygon[corner])) corner = i;
-    if (u.dot(a) < support - kEndTolerance_m || u.dot(b) < support - kEndTolerance_m) continue;
+    if (u.dot(a) < support - params.tolerance_m || u.dot(b) < support - params.tolerance_m) continue;
     (edges[i] == EdgeKind::kObserved ? observed_m : unknown_m) += math::sqrt((b - a).squaredNorm());
   }
-  if (observed_m + unknown_m > kMinEndLength_m) return observed_m > unknown_m;
+  if (observed_m + unknown_m > params.min_length_m) return observed_m > unknown_m;
   return edges[corner] == EdgeKind::kObserved && edges[corner == 0 ? n - 1 : corner - 1] == EdgeKind::kObserved;
 }
 

@@ -17,8 +17,6 @@ inline constexpr std::size_t kLeftSide = 2, kRightSide = 6;
 // Of a polygon's edges; tags below are those of sides.
 inline constexpr std::uint8_t kNosingTag = 8;
 inline constexpr std::uint8_t kBackTag = 9;
-inline constexpr double kMinSeenSigma_m = 0.0005;  // a frame that claims more than this is not believed
-
 [[nodiscard]] inline Vec2 side_direction(std::size_t side) noexcept {
   return unit_at(static_cast<double>(side) * (kPi / 4.0));
 }
@@ -27,10 +25,21 @@ inline constexpr double kMinSeenSigma_m = 0.0005;  // a frame that claims more t
 }
 // A right-handed frame with z along the unit normal and x as near to the given direction as that allows.
 [[nodiscard]] Mat3 frame_from(const Vec3& normal, const Vec3& x_hint) noexcept;
+struct SeenEndParams {
+  double tolerance_m = 0.015;
+  double min_length_m = 0.02;
+
+  static void visit(auto& p, auto& field) {
+    field("tolerance_m", p.tolerance_m, 0.0, 0.2, "Edges as near to the farthest vertex make up a surface's end.");
+    field("min_length_m", p.min_length_m, 0.0, 0.5,
+          "A shorter end is a corner: both its edges say whether it was seen.");
+  }
+};
 // Is the farthest end of the polygon in direction u one that was really seen to end? The edges along that end decide;
 // a mere corner counts when both its edges were seen. support: of the polygon in that direction.
-[[nodiscard]] bool end_observed(const ConvexPolygon& polygon, const std::array<EdgeKind, kMaxPolygonVertices>& edges,
-                                const Vec2& u, double support) noexcept;
+[[nodiscard]] bool end_observed(const SeenEndParams& params, const ConvexPolygon& polygon,
+                                const std::array<EdgeKind, kMaxPolygonVertices>& edges, const Vec2& u,
+                                double support) noexcept;
 
 // Where the camera was at the last sighting, and how well its mount was known then.
 struct Viewpoint {

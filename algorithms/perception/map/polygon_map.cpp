@@ -14,19 +14,16 @@ constexpr std::int32_t kMeasureUnits = 2;
 constexpr std::int32_t kFuseUnits = 12;
 constexpr std::int32_t kEvictUnits = 20;
 
-constexpr double kMinTilt_rad = 0.0005;  // a frame that claims more than this is not believed
-constexpr double kMaxRange_m = 10.0;
-
-bool valid(const SurfacePatch& patch) noexcept {
+bool valid(const SurfacePatch& patch, double max_range_m) noexcept {
   if (patch.polygon.size() < 3 || !math::all_finite(patch.normal) || !math::all_finite(patch.centroid_m)) return false;
   if (!(std::abs(patch.normal.squaredNorm() - 1.0) < 1e-3) ||
-      !(patch.centroid_m.squaredNorm() < math::square(kMaxRange_m))) {
+      !(patch.centroid_m.squaredNorm() < math::square(max_range_m))) {
     return false;
   }
   if (!std::isfinite(patch.d_m) || !(patch.offset_sigma_m >= 0.0) || !(patch.offset_sigma_m < 1.0)) return false;
   if (!(patch.tilt_sigma_rad >= 0.0) || !(patch.tilt_sigma_rad < 1.0)) return false;
   for (const Vec3& v : patch.polygon) {
-    if (!(v.squaredNorm() < math::square(kMaxRange_m))) return false;
+    if (!(v.squaredNorm() < math::square(max_range_m))) return false;
   }
   for (const EdgeLine* line : {&patch.nosing, &patch.back}) {
     if (!line->valid) continue;
@@ -169,7 +166,7 @@ Progress PolygonMap::step(WorkBudget& budget) noexcept {
 }
 
 bool PolygonMap::load(const SurfacePatch& patch) noexcept {
-  if (!valid(patch)) return false;
+  if (!valid(patch, params_.max_range_m)) return false;
   seen_.kind = patch.kind;
   seen_.plane = map_T_camera_ * Plane{patch.normal.normalized(), patch.d_m};
   const double up = seen_.plane.normal.z();
@@ -177,8 +174,8 @@ bool PolygonMap::load(const SurfacePatch& patch) noexcept {
   if (patch.kind == SurfaceKind::kTread && up < 0.8) return false;
   if (patch.kind == SurfaceKind::kRiser && std::abs(up) > 0.5) return false;
   seen_.centroid_m = seen_.plane.project(map_T_camera_ * patch.centroid_m);
-  seen_.offset_variance_m2 = math::square(std::max(patch.offset_sigma_m, kMinSeenSigma_m));
-  seen_.tilt_variance_rad2 = math::square(std::max(patch.tilt_sigma_rad, kMinTilt_rad));
+  seen_.offset_variance_m2 = math::square(std::max(patch.offset_sigma_m, params_.least_sigma_m));
+  seen_.tilt_variance_rad2 = math::square(std::max(patch.tilt_sigma_rad, params_.least_tilt_sigma_rad));
   const double range2_m2 = (seen_.centroid_m - map_T_camera_.p_m).squaredNorm();
   seen_.pose_variance_m2 = math::square(view_.position_sigma_m) +
                            (math::square(view_.tilt_sigma_rad) + math::square(view_.mount_sigma_rad)) * range2_m2;

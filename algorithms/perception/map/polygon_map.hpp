@@ -52,6 +52,11 @@ class PolygonMap {
     double view_min_incidence = 0.25;
     double reach_m = 1.5;
     double other_area_min_m2 = 0.02;
+    double least_sigma_m = 0.0005;
+    double least_tilt_sigma_rad = 0.0005;
+    double max_range_m = 10.0;
+    double turn_slope = 0.05;
+    SeenEndParams ends;
     MapDrift::Params drift;
 
     static void visit(auto& p, auto& field) {
@@ -105,6 +110,14 @@ class PolygonMap {
       field("reach_m", p.reach_m, 0.1, 20.0, "A polygon farther off makes room first when the map is full.");
       field("other_area_min_m2", p.other_area_min_m2, 0.0, 10.0,
             "A smaller other surface, or one out of reach, is not worth a place: nothing reads it.");
+      field("least_sigma_m", p.least_sigma_m, 1e-6, 0.1,
+            "A frame that knows the place of a surface or an edge better by its own account is believed only so far.");
+      field("least_tilt_sigma_rad", p.least_tilt_sigma_rad, 1e-6, 0.1,
+            "A frame that knows the tilt of a surface better by its own account is believed only so far.");
+      field("max_range_m", p.max_range_m, 0.5, 100.0, "A surface that reaches farther from the camera is rejected.");
+      field("turn_slope", p.turn_slope, 0.0, 1.0,
+            "A tread's axes turn to its nosing, or its back line, where that has a larger slope in them.");
+      field("ends", p.ends);
       field("drift", p.drift);
     }
   };

@@ -10,7 +10,7 @@
 namespace polygmap {
 namespace {
 
-constexpr double kMinArea_m2 = 1e-4;
+constexpr double kMinArea_m2 = 1e-4;  // a polygon of less is degenerate
 
 }  // namespace
 
@@ -30,7 +30,7 @@ std::optional<Vec3> PolygonMap::heading_from_lines() const noexcept {
 std::optional<SeenLine> PolygonMap::local_line(const MapTrack& track, const EdgeLine& line) const noexcept {
   if (!line.valid || track.kind != SurfaceKind::kTread) return std::nullopt;
   const SeenLine seen{local_xy(track.world_T_local, line.a_m), local_xy(track.world_T_local, line.b_m),
-                      math::square(std::max(line.sigma_m, kMinSeenSigma_m))};
+                      math::square(std::max(line.sigma_m, params_.least_sigma_m))};
   const Vec2 along = seen.b_m - seen.a_m;
   // More than 45 degrees off is no edge across the stairs.
   if (std::abs(along.y()) < params_.line_min_length_m || std::abs(along.x()) > std::abs(along.y())) return std::nullopt;
@@ -105,7 +105,7 @@ void PolygonMap::update_sides(MapTrack& track, bool first) noexcept {
   for (std::size_t k = 0; k < kMapSides; ++k) {
     const Vec2 u = side_direction(k);
     const double support = support_m(seen_local_, u);
-    const bool observed = end_observed(seen_local_, seen_.edges, u, support);
+    const bool observed = end_observed(params_.ends, seen_local_, seen_.edges, u, support);
     TrackedSide& side = track.sides[k];
     if (first) {
       const double reach_m = support - params_.unknown_margin_m;

@@ -45,7 +45,8 @@ bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
 
 bool PolygonMap::two_posts(const MapTrack& track, const ConvexPolygon& seen_polygon, bool behind) const noexcept {
   const Vec2 u = side_direction(behind ? 4 : 0);
-  return track.sides[behind ? 0 : 4].observed && end_observed(seen_polygon, seen_.edges, u, support_m(seen_polygon, u));
+  return track.sides[behind ? 0 : 4].observed &&
+         end_observed(params_.ends, seen_polygon, seen_.edges, u, support_m(seen_polygon, u));
 }
 
 bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept {
@@ -116,7 +117,7 @@ void PolygonMap::measure_offset() noexcept {
     const Vec2 u = side_direction(k);
     const double support = support_m(seen, u);
     if (!side.observed || std::abs(support - side.support_m) > params_.side_gate_m) continue;
-    if (!end_observed(seen, seen_.edges, u, support)) continue;
+    if (!end_observed(params_.ends, seen, seen_.edges, u, support)) continue;
     drift_.add(track.world_T_local.R * Vec3{u.x(), u.y(), 0.0}, support - side.support_m,
                math::square(params_.side_sigma_m) + 1.0 / side.information + common_m2);
   }

@@ -13,8 +13,6 @@ namespace {
 constexpr std::int32_t kAgeUnits = 1;
 constexpr std::int32_t kHiddenUnits = 20;
 
-constexpr double kMaxLocalSlope = 0.05;  // steeper: the local axes turn to the line
-
 }  // namespace
 
 void PolygonMap::fuse_best() noexcept {
@@ -149,7 +147,7 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
     if (const auto line = local_line(track, seen_.nosing)) update_line(track.nosing, *line);
     if (const auto line = local_line(track, seen_.back)) update_line(track.back, *line);
     const TrackedLine& reference = track.nosing.sightings >= params_.line_min_sightings ? track.nosing : track.back;
-    if (reference.sightings >= params_.line_min_sightings && std::abs(reference.state[1]) > kMaxLocalSlope) {
+    if (reference.sightings >= params_.line_min_sightings && std::abs(reference.state[1]) > params_.turn_slope) {
       turn_to(track, frame.R * Vec3{1.0, -reference.state[1], 0.0});
     }
   }

@@ -4,11 +4,6 @@
 #include <algorithm>
 
 namespace polygmap {
-namespace {
-
-constexpr float kFarthest_m = 0.06F;  // of a row from the plane's middle: it shows something else
-
-}  // namespace
 
 void OverhangSplit::begin(const Params& params, const Vec3& up, const PlaneSet& planes) noexcept {
   params_ = params;
@@ -38,6 +33,7 @@ void OverhangSplit::begin(const Params& params, const Vec3& up, const PlaneSet& 
 void OverhangSplit::add_column(const FrameImage& picture, std::int32_t column, const SpanBoundaries::Column& spans,
                                const PlaneMerging::PlaneIndex& to_plane) noexcept {
   constexpr std::int32_t kStride = 2;  // rows next to each other say nearly the same
+  const auto farthest_m = static_cast<float>(params_.farthest_m);
   const float* inverse_depths = picture.columns.by_column.row(column);
   const Vec3 middle{static_cast<double>(picture.column_rays.x[static_cast<std::size_t>(column)]), 0.0, 1.0};
   for (const ColumnSpan& span : spans) {
@@ -57,7 +53,7 @@ void OverhangSplit::add_column(const FrameImage& picture, std::int32_t column, c
         continue;
       }
       const float distance_m = (back_at + back_by * y) / w - middle_m;
-      if (!(std::abs(distance_m) < kFarthest_m)) continue;
+      if (!(std::abs(distance_m) < farthest_m)) continue;
       Bin& sums = profile.bins[static_cast<std::size_t>(bin)];
       sums.rows += 1.0F;
       sums.distance_m += distance_m;
@@ -99,23 +95,22 @@ OverhangSplit::Step OverhangSplit::best_step(const Profile& profile) const noexc
 }
 
 // Where the surface ends, rows of a neighbour are among its own: few, and far from it.
-void OverhangSplit::drop_sparse(Profile& profile) noexcept {
-  constexpr float kSparse = 0.02F;  // of all rows
+void OverhangSplit::drop_sparse(Profile& profile) const noexcept {
+  const auto sparse = static_cast<float>(params_.sparse);
   float rows = 0.0F;
   for (const Bin& bin : profile.bins) rows += bin.rows;
   for (Bin& bin : profile.bins) {
-    if (bin.rows < kSparse * rows) bin = Bin{};
+    if (bin.rows < sparse * rows) bin = Bin{};
   }
 }
 
 bool OverhangSplit::try_split(std::size_t plane, Halves& halves) noexcept {
-  constexpr double kBeyond = 0.1;  // share of the rows: more is no step
   if (profile_of_[plane] == 0) return false;
   Profile& profile = profiles_[profile_of_[plane] - 1U];
   drop_sparse(profile);
   const Step step = best_step(profile);
   const double rows = step.lower_rows + step.upper_rows;
-  if (step.first_upper == 0 || profile.beyond > kBeyond * rows) return false;
+  if (step.first_upper == 0 || profile.beyond > params_.most_beyond * rows) return false;
   if (std::abs(step.upper_m - step.lower_m) < params_.least_step_m) return false;
   if (!(step.left_m2 < params_.most_left * left_by_slope_m2(profile))) return false;
   const double lower_m = profile.middle_m + step.lower_m, upper_m = profile.middle_m + step.upper_m;

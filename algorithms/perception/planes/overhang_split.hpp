@@ -22,6 +22,9 @@ class OverhangSplit {
     double most_left = 0.9;
     double least_step_m = 0.005;
     std::int32_t least_rows = 30;
+    double farthest_m = 0.06;
+    double sparse = 0.02;
+    double most_beyond = 0.1;
 
     static void visit(auto& p, auto& field) {
       field("least_lean_rad", p.least_lean_rad, 0.0, 0.5,
@@ -32,6 +35,11 @@ class OverhangSplit {
             "A step leaves less than this share of what a slope leaves unexplained: 1 asks which explains more.");
       field("least_step_m", p.least_step_m, 0.001, 0.1, "The two upright planes are at least as far apart.");
       field("least_rows", p.least_rows, 4, 10000, "Each of the two shows as many rows of columns.");
+      field("farthest_m", p.farthest_m, 0.001, 0.5, "A row farther from the plane's middle shows something else.");
+      field("sparse", p.sparse, 0.0, 0.5, "A height with less than this share of the rows shows a neighbour.");
+      field("most_beyond", p.most_beyond, 0.0, 1.0,
+            "A plane is no pair of upright ones when a larger share of its rows lies above or below all heights looked "
+            "at.");
     }
   };
   struct Halves {
@@ -67,7 +75,7 @@ class OverhangSplit {
     double lower_rows = 0.0, upper_rows = 0.0;
     double left_m2 = 1e9;  // unexplained, summed over rows
   };
-  static void drop_sparse(Profile& profile) noexcept;
+  void drop_sparse(Profile& profile) const noexcept;
   [[nodiscard]] static double left_by_slope_m2(const Profile& profile) noexcept;
   [[nodiscard]] Step best_step(const Profile& profile) const noexcept;
 

@@ -5,15 +5,10 @@
 #include <algorithm>
 
 namespace polygmap {
-namespace {
-
-constexpr double kMinInverseDepth = 0.05;  // 20 m
-
-}  // namespace
 
 double plane_sigma_m(const InversePlane& plane, const Mat3& covariance, const Vec3& ray) noexcept {
   // The plane's distance at a fixed depth z moves by d z (ray . dm).
-  const double w = std::max(plane.inverse_depth(ray), kMinInverseDepth);
+  const double w = std::max(plane.inverse_depth(ray), kLeastInverseDepth);
   return plane.d_m() / w * math::sqrt(std::max(ray.dot(covariance * ray), 0.0));
 }
 
@@ -43,7 +38,7 @@ bool try_solve(const PlaneFit::Params& params, const DepthNoiseModel& noise, con
   if (!(determinant > 1e-13)) return false;
   const Mat3 inverse = (a / scale).inverse() / scale;
   const Vec3 m = inverse * b;
-  if (!math::all_finite(m) || !(m.norm() > kMinInverseDepth) || !(m.dot(moments.mean_ray()) > kMinInverseDepth)) {
+  if (!math::all_finite(m) || !(m.norm() > kLeastInverseDepth) || !(m.dot(moments.mean_ray()) > kLeastInverseDepth)) {
     return false;
   }
   plane.m = m;

@@ -25,6 +25,9 @@ struct InversePlane {
   [[nodiscard]] double distance_m(const Vec3& point_m) const noexcept { return (1.0 - m.dot(point_m)) * d_m(); }
 };
 
+// 1/m: planes farther than 20 m, beyond every depth camera, are none.
+inline constexpr double kLeastInverseDepth = 0.05;
+
 // Weighted moments of samples: sum of g ray ray^T and g ray w, enough for a fit, and they add.
 struct PlaneMoments {
   double xx = 0, xy = 0, x1 = 0, yy = 0, y1 = 0, one = 0;  // of g ray ray^T

@@ -7,9 +7,6 @@
 namespace polygmap {
 namespace {
 
-constexpr double kLeastNorm = 0.05;  // 1/m: planes farther than 20 m are none
-constexpr double kGrowth = 1.3;      // refit when a plane has grown by this
-
 struct Middle {
   double y = 0.0;  // ray
   double w = 0.0;  // 1/m
@@ -50,7 +47,7 @@ bool PlaneGrowing::Sums::try_solve(Vec3& plane) const noexcept {
   if (!(determinant > 1e-14)) return false;
   const double a = (cxw * cyy - cyw * cxy) / determinant, b = (cyw * cxx - cxw * cxy) / determinant;
   const Vec3 solved{a, b, mw - a * mx - b * my};
-  if (!(solved.squaredNorm() > kLeastNorm * kLeastNorm)) return false;
+  if (!(solved.squaredNorm() > kLeastInverseDepth * kLeastInverseDepth)) return false;
   plane = solved;
   return true;
 }
@@ -147,7 +144,7 @@ bool PlaneGrowing::try_seed(Place place) noexcept {
   norm2_ = m.squaredNorm();
   sums_ = Sums{};
   // The first fit waits until the plane itself has more than the seed had.
-  next_fit_px_ = kGrowth * sums.m.one;
+  next_fit_px_ = params_.refit_growth * sums.m.one;
   queue_.size = queue_.next = 0;
   first_column_ = last_column_ = place.column;
   growing_ = true;
@@ -167,7 +164,7 @@ void PlaneGrowing::consider(Place place) noexcept {
   const double tilt = static_cast<double>(segment.slope) - m_.y() * pitch;
   const double rows = segment.rows();
   const double off2 = offset * offset + tilt * tilt * (rows * rows - 1.0) * (1.0 / 12.0);
-  if (!(middle.w > kLeastNorm) || off2 > math::square(tolerance_w(middle.w)) * norm2_) return;
+  if (!(middle.w > kLeastInverseDepth) || off2 > math::square(tolerance_w(middle.w)) * norm2_) return;
   segment.plane = static_cast<std::uint8_t>(count_ + 1);
   sums_.add(ray_x, *rays_, segment);
   queue_.places[queue_.size++] = place;
@@ -175,7 +172,7 @@ void PlaneGrowing::consider(Place place) noexcept {
   last_column_ = std::max<std::int32_t>(last_column_, place.column);
   if (sums_.m.one > next_fit_px_ && sums_.try_solve(m_)) {
     norm2_ = m_.squaredNorm();
-    next_fit_px_ = kGrowth * sums_.m.one;
+    next_fit_px_ = params_.refit_growth * sums_.m.one;
   }
 }
 
@@ -198,7 +195,7 @@ void PlaneGrowing::visit(Place place) noexcept {
 void PlaneGrowing::close() noexcept {
   growing_ = false;
   const bool kept = sums_.m.one >= params_.min_facet_px && last_column_ - first_column_ + 1 >= params_.min_columns &&
-                    count_ < kMaxPlanes && sums_.try_solve(m_) && m_.dot(sums_.m.mean_ray()) > kLeastNorm;
+                    count_ < kMaxPlanes && sums_.try_solve(m_) && m_.dot(sums_.m.mean_ray()) > kLeastInverseDepth;
   if (!kept) {
     overflow_ += count_ == kMaxPlanes ? 1U : 0U;
     for (std::size_t i = 0; i < queue_.size; ++i) at(queue_.places[i]).plane = i == 0 ? kTried : std::uint8_t{0};
@@ -210,7 +207,7 @@ void PlaneGrowing::close() noexcept {
 }
 
 bool PlaneGrowing::step() noexcept {
-  constexpr int kPiece = 8;
+  constexpr int kPiece = 8;  // which PlaneExtractor counts as one unit
   for (int i = 0; i < kPiece; ++i) {
     if (growing_) {
       if (queue_.next < queue_.size) {

@@ -25,6 +25,7 @@ class PlaneGrowing {
     std::int32_t min_columns = 3;
     std::int32_t min_plane_px = 800;
     std::int32_t min_facet_px = 400;
+    double refit_growth = 1.3;
 
     static void visit(auto& p, auto& field) {
       field(
@@ -39,6 +40,7 @@ class PlaneGrowing {
             "A plane that is to be one by itself has as many pixels of full resolution.");
       field("min_facet_px", p.min_facet_px, 1, 100000,
             "A plane that may be part of another has as many pixels of full resolution.");
+      field("refit_growth", p.refit_growth, 1.01, 10.0, "A plane is refitted when it has grown by this factor.");
     }
   };
   static constexpr std::size_t kMaxPlanes = 96;

@@ -8,7 +8,6 @@ namespace polygmap {
 namespace {
 
 constexpr double kLeastDeterminant = 1e-13;  // of moments scaled to a trace of 1
-constexpr double kBetween = 0.1;             // rad: so far may the plane of two facets lie from between theirs
 
 void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t to) noexcept {
   for (PlaneId& plane : to_plane) plane = plane == from ? static_cast<PlaneId>(to) : plane;
@@ -24,9 +23,10 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
 
 // The plane through a bend lies between its facets. That through a step leans against both: an overhanging nosing's
 // face and the foot of the riser behind it are no ramp.
-[[nodiscard]] bool lies_between(const InversePlane& both, const InversePlane& p, const InversePlane& q) noexcept {
+[[nodiscard]] bool lies_between(const PlaneMerging::Params& params, const InversePlane& both, const InversePlane& p,
+                                const InversePlane& q) noexcept {
   const Vec3 n = both.normal();
-  const double bend = (p.normal() - q.normal()).norm() + kBetween;
+  const double bend = (p.normal() - q.normal()).norm() + params.between_rad;
   return (n - p.normal()).norm() < bend && (n - q.normal()).norm() < bend;
 }
 
@@ -38,7 +38,7 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
   both.add(q.moments);
   Vec3 m;
   if (!try_fit(both, m)) return false;
-  if (!lies_between({m}, p.plane, q.plane)) return false;
+  if (!lies_between(params, {m}, p.plane, q.plane)) return false;
   chi2 = 0.0;
   for (const FittedPlane* plane : {&p, &q}) {
     Vec3 own;

@@ -25,6 +25,7 @@ class PlaneMerging {
     // Neighbours touch along this times the root of the smaller one's pixels. Of a tread or a riser that is low in the
     // picture two pieces cannot: side by side, along this times the lower one's height.
     double facet_seam = 0.7;
+    double between_rad = 0.1;
 
     static void visit(auto& p, auto& field) {
       field("merge_m", p.merge_m, 0.0, 0.1,
@@ -43,6 +44,7 @@ class PlaneMerging {
             "Facets of one surface are turned no farther against each other.");
       field("facet_seam", p.facet_seam, 0.01, 10.0,
             "Neighbours touch along this times the root of the smaller one's pixels.");
+      field("between_rad", p.between_rad, 0.0, 1.0, "The plane through two facets may lie as far from between theirs.");
     }
   };
   using PlaneIndex = std::array<PlaneId, PlaneSet::kMaxPlanes + 1>;  // of a plane that may have been merged

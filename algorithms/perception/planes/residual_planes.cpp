@@ -45,7 +45,7 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
   const float x = rays.x[static_cast<std::size_t>(column)];
   const Steps level(level_, x), upright(upright_, x);
   using Wide = cv::v_float32;
-  constexpr std::int32_t kAtOnce = 8;
+  constexpr std::int32_t kAtOnce = 8;  // rows, for every register width
   static_assert(kAtOnce % Wide::nlanes == 0 && kDepthHeight_px % kAtOnce == 0);
   const auto all = [](float value) { return cv::vx_setall_f32(value); };
   const Wide zero = all(0.0F), end = all(static_cast<float>(Axis::kBins)), none = end;
@@ -91,47 +91,48 @@ void ResidualPlaneSearch::forget(Axis& axis, double distance_m, double apart_m) 
 }
 
 void ResidualPlaneSearch::find(Axis& axis) noexcept {
-  constexpr std::int32_t kPeak = 1;     // bins to each side that belong to a peak, see peak_at
-  constexpr std::int32_t kAround = 10;  // bins to each side that it is compared with
+  constexpr std::int32_t kPeak = 1;  // bins to each side that belong to a peak, see peak_at
+  const std::int32_t around_bins = params_.around_bins, first = around_bins, end = Axis::kBins - around_bins;
   for (int guard = 0; guard < 4; ++guard) {
     // The largest peak, the first of those.
     using Wide = cv::v_int32;
     const auto load = [&axis](std::int32_t b) { return cv::vx_load(axis.rows.data() + b); };
-    constexpr std::int32_t kFirst = kAround, kEnd = Axis::kBins - kAround, kWhole = (kEnd - kFirst) / Wide::nlanes;
+    const std::int32_t whole = first + (end - first) / Wide::nlanes * Wide::nlanes;
     const auto peak_at = [&axis](std::int32_t b) {
       const std::int32_t* rows = axis.rows.data() + b;
       return rows[-1] + rows[0] + rows[1];
     };
     Wide most = cv::vx_setzero_s32();
-    for (std::int32_t b = kFirst; b < kFirst + kWhole * Wide::nlanes; b += Wide::nlanes) {
+    for (std::int32_t b = first; b < whole; b += Wide::nlanes) {
       most = cv::v_max(most, load(b - 1) + load(b) + load(b + 1));
     }
-    std::int32_t best = cv::v_reduce_max(most), at = kFirst;
-    for (std::int32_t b = kFirst + kWhole * Wide::nlanes; b < kEnd; ++b) best = std::max(best, peak_at(b));
+    std::int32_t best = cv::v_reduce_max(most), at = first;
+    for (std::int32_t b = whole; b < end; ++b) best = std::max(best, peak_at(b));
     if (best < std::max(params_.min_rows, 1)) return;
     while (peak_at(at) != best) ++at;
     std::int32_t around = 0;
     double sum = 0.0;
-    for (std::int32_t i = at - kAround; i <= at + kAround; ++i) around += axis.rows[static_cast<std::size_t>(i)];
+    for (std::int32_t i = at - around_bins; i <= at + around_bins; ++i)
+      around += axis.rows[static_cast<std::size_t>(i)];
     for (std::int32_t i = at - kPeak; i <= at + kPeak; ++i) sum += axis.rows[static_cast<std::size_t>(i)] * (i + 0.5);
     const double distance_m = sum / best * Axis::kBin_m;
     // Per bin, peak against surroundings.
-    const double peak = best / (2.0 * kPeak + 1.0), base = (around - best) / (2.0 * (kAround - kPeak));
+    const double peak = best / (2.0 * kPeak + 1.0), base = (around - best) / (2.0 * (around_bins - kPeak));
     if (peak > params_.min_contrast * base && distance_m > params_.known_apart_m) {
       InversePlane plane;
       plane.m = -axis.direction / distance_m;
       if (!found_.try_push_back(plane)) return;
     }
-    forget(axis, distance_m, 0.04);
+    forget(axis, distance_m, params_.peaks_apart_m);
   }
 }
 
 void ResidualPlaneSearch::finish() noexcept {
   // What lies near a known plane is that plane, seen past a leg or through a hole.
-  constexpr double kParallel = 0.98;
   for (const InversePlane& known : known_) {
     for (Axis* axis : {&level_, &upright_}) {
-      if (known.normal().dot(axis->direction) > kParallel) forget(*axis, known.d_m(), params_.known_apart_m);
+      if (known.normal().dot(axis->direction) > params_.known_parallel_cos)
+        forget(*axis, known.d_m(), params_.known_apart_m);
     }
   }
   find(level_);

@@ -20,11 +20,19 @@ class ResidualPlaneSearch {
     std::int32_t min_rows = 50;
     double min_contrast = 2.5;
     double known_apart_m = 0.015;
+    double known_parallel_cos = 0.98;
+    double peaks_apart_m = 0.04;
+    std::int32_t around_bins = 10;
 
     static void visit(auto& p, auto& field) {
       field("min_rows", p.min_rows, 1, 10000, "A peak has as many column rows of eight pixels.");
       field("min_contrast", p.min_contrast, 1.0, 100.0, "A peak stands out this many times from what lies around it.");
       field("known_apart_m", p.known_apart_m, 0.0, 0.2, "A peak nearer to a known plane is that plane.");
+      field("known_parallel_cos", p.known_parallel_cos, 0.5, 1.0,
+            "A known plane whose turn against the axis has a larger cosine has a place along it.");
+      field("peaks_apart_m", p.peaks_apart_m, 0.0, 0.5, "A peak nearer to one that was looked at is not looked at.");
+      field("around_bins", p.around_bins, 2, 100,
+            "A peak is compared with as many bins of 5 mm to each side of its middle.");
     }
   };
   static constexpr std::size_t kMaxFound = 8;

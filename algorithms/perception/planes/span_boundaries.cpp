@@ -33,7 +33,6 @@ void SpanBoundaries::begin(const Params& params, const DepthNoiseModel& noise, c
 
 void SpanBoundaries::build_spans(std::int32_t column, const ScanlineSegmentation::Column& segments,
                                  const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept {
-  constexpr int kElsewhere = 3;
   Column& out = columns_[static_cast<std::size_t>(column)];
   out.clear();
   for (const ScanlineSegment& segment : segments) {
@@ -51,7 +50,7 @@ void SpanBoundaries::build_spans(std::int32_t column, const ScanlineSegmentation
         const int measured = static_cast<int>(w > 0.0F), is_off = measured & static_cast<int>(off > limit);
         other += is_off, own += measured - is_off;
       }
-      if (other < kElsewhere || 2 * other < own) {
+      if (other < params_.min_gap_rows || 2 * other < own) {
         out.back().bottom = segment.bottom;
         continue;
       }
@@ -69,7 +68,7 @@ void SpanBoundaries::trim_ends(std::int32_t column) noexcept {
 }
 
 void SpanBoundaries::trim_ends(std::int32_t column, ColumnSpan& interval) const noexcept {
-  constexpr std::int32_t kMost_px = kRowsAtOnce, kGood = 2;
+  constexpr std::int32_t kMost_px = kRowsAtOnce, kGood = 2;  // rows looked at, and good ones next to each other
   const Line line = line_of(interval.plane, column);
   if (interval.bottom - interval.top + 1 >= kRowsAtOnce) {
     constexpr std::uint32_t kAll = (1U << kRowsAtOnce) - 1U;
@@ -128,14 +127,13 @@ std::uint8_t SpanBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower) noe
 
 // Grows one end while rows without data or two rows off the plane do not stop it.
 void SpanBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept {
-  constexpr int kMaxEmpty = 3;
   const Line line = line_of(interval.plane, column);
   const auto most = static_cast<float>(math::square(params_.inlier_sigmas));
   std::int16_t& end = step > 0 ? interval.bottom : interval.top;
   int empty = 0, off = 0;
   for (std::int32_t r = end + step; step > 0 ? r <= limit : r >= limit; r += step) {
     if (!(image_->by_column(r, column) > 0.0F)) {
-      if (++empty > kMaxEmpty) return;
+      if (++empty > params_.max_empty_rows) return;
     } else if (offset(line, column, r).within(most)) {
       end = static_cast<std::int16_t>(r);
       empty = off = 0;

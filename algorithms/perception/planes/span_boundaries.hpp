@@ -37,6 +37,11 @@ class SpanBoundaries {
     double meet_gain = 1.0;
     std::int32_t window_px = 6;
     std::int32_t max_gap_px = 24;
+    std::int32_t min_gap_rows = 3;
+    std::int32_t max_empty_rows = 3;
+    std::int32_t beside_px = 4;
+    std::int32_t min_filled_rows = 2;
+    std::int32_t thick_px = 8;
 
     static void visit(auto& p, auto& field) {
       field("inlier_sigmas", p.inlier_sigmas, 0.5, 20.0,
@@ -50,6 +55,15 @@ class SpanBoundaries {
       field("window_px", p.window_px, 1, 64, "As many rows are searched beyond where the segments ended.");
       field("max_gap_px", p.max_gap_px, 1, 480,
             "Surfaces with as many rows between them are still next to each other.");
+      field("min_gap_rows", p.min_gap_rows, 1, 100,
+            "As many rows of something else part two segments of one plane, if they are half as many as its own.");
+      field("max_empty_rows", p.max_empty_rows, 0, 100, "A surface is extended over no more rows without data.");
+      field("beside_px", p.beside_px, 0, 64,
+            "A plane in the column beside is looked for in as many rows more, above and below.");
+      field("min_filled_rows", p.min_filled_rows, 1, 100,
+            "A plane is given rows that are in no surface when as many in one stretch fit it.");
+      field("thick_px", p.thick_px, 2, 480,
+            "A surface of more rows in a column is refitted without the two next to others.");
     }
   };
   static constexpr std::size_t kMaxPlanes = 96;

@@ -35,7 +35,7 @@ SpanBoundaries::Rows SpanBoundaries::fitting(const Line& line, std::int32_t colu
 void SpanBoundaries::weigh_candidate(std::int32_t column, const Line& line, const ColumnSpan& candidate,
                                      std::int32_t& most, ColumnSpan& filled) const noexcept {
   // A bit for each row that fits, from the first of the candidate's on.
-  constexpr std::int32_t kBits = 64;
+  constexpr std::int32_t kBits = 64;  // of a word
   std::array<std::uint64_t, kDepthHeight_px / kBits + 2> fits{};
   const std::int32_t count = candidate.bottom - candidate.top + 1;
   std::int32_t fit = 0;
@@ -79,7 +79,7 @@ void SpanBoundaries::weigh_candidate(std::int32_t column, const Line& line, cons
 
 SpanBoundaries::Depths SpanBoundaries::depths_of(std::int32_t column, std::int32_t first,
                                                  std::int32_t last) const noexcept {
-  constexpr float kNone = 1e9F;  // 1/m
+  constexpr float kNone = 1e9F;  // 1/m, more than any
   const float* w = image_->by_column.row(column);
   const Wide zero = all(0.0F), none = all(kNone);
   Wide least = none, most = zero;
@@ -142,12 +142,12 @@ void SpanBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size
 
 void SpanBoundaries::consider_beside(const Gap& gap, const Column& others, std::size_t& next, std::int32_t& most,
                                      ColumnSpan& filled) const noexcept {
-  constexpr std::int32_t kReach_px = 4;  // beyond the rows of the span beside
-  while (next < others.size() && others[next].bottom + kReach_px < gap.from) ++next;
-  for (std::size_t i = next; i < others.size() && others[i].top - kReach_px <= gap.until; ++i) {
+  const std::int32_t reach_px = params_.beside_px;
+  while (next < others.size() && others[next].bottom + reach_px < gap.from) ++next;
+  for (std::size_t i = next; i < others.size() && others[i].top - reach_px <= gap.until; ++i) {
     const ColumnSpan& other = others[i];
-    const std::int32_t top = std::max(gap.from, other.top - kReach_px);
-    const std::int32_t bottom = std::min(gap.until, other.bottom + kReach_px);
+    const std::int32_t top = std::max(gap.from, other.top - reach_px);
+    const std::int32_t bottom = std::min(gap.until, other.bottom + reach_px);
     if (!gap.may_be(other.plane) || bottom - top < most) continue;
     consider(gap, other.plane, top, bottom, depths_of(gap.column, top, bottom), most, filled);
   }
@@ -155,7 +155,7 @@ void SpanBoundaries::consider_beside(const Gap& gap, const Column& others, std::
 
 void SpanBoundaries::fill_gaps(std::int32_t column, std::int32_t beside, std::size_t first_plane,
                                std::size_t last_plane) noexcept {
-  constexpr std::int32_t kMinRows = 2;  // that fit
+  const std::int32_t min_rows = params_.min_filled_rows;
   Column& spans = columns_[static_cast<std::size_t>(column)];
   const bool any_beside = beside >= 0 && beside < rays_->columns;
   const Column& others = columns_[static_cast<std::size_t>(any_beside ? beside : column)];
@@ -171,11 +171,11 @@ void SpanBoundaries::fill_gaps(std::int32_t column, std::int32_t beside, std::si
       ++overflow_;
       return;
     }
-    std::int32_t most = kMinRows - 1;
+    std::int32_t most = min_rows - 1;
     ColumnSpan filled;
     if (any_beside) consider_beside(gap, others, next_beside, most, filled);
     if (first_plane <= last_plane) consider(gap, first_plane, last_plane, most, filled);
-    if (most < kMinRows || !spans.try_push_back(filled)) continue;
+    if (most < min_rows || !spans.try_push_back(filled)) continue;
     std::rotate(spans.begin() + static_cast<std::ptrdiff_t>(k), spans.end() - 1, spans.end());
     from = filled.bottom + 1;
   }

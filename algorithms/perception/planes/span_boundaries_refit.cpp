@@ -32,7 +32,7 @@ void SpanBoundaries::begin_refit() noexcept {
 }
 
 void SpanBoundaries::refit(std::int32_t first_column, bool roughly) noexcept {
-  constexpr std::int32_t kThick_px = 8;  // thicker surfaces do without the rows next to another
+  const std::int32_t thick_px = params_.thick_px;
   if (!roughly) sample_noise(first_column);
   std::array<std::size_t, kRefitColumns> next{};
   const std::int32_t count = std::min(kRefitColumns, rays_->columns - first_column);
@@ -56,7 +56,7 @@ void SpanBoundaries::refit(std::int32_t first_column, bool roughly) noexcept {
       const Column& spans = columns_[static_cast<std::size_t>(first_column + k)];
       if (next[slot] == spans.size() || spans[next[slot]].plane != strip.plane) continue;
       const ColumnSpan& span = spans[next[slot]++];
-      const int margin = span.bottom - span.top >= kThick_px ? 1 : 0;
+      const int margin = span.bottom - span.top >= thick_px ? 1 : 0;
       strip.top[slot] = static_cast<std::int16_t>(span.top + margin);
       strip.bottom[slot] = static_cast<std::int16_t>(span.bottom - margin);
     }

@@ -57,8 +57,8 @@ void ColumnOutline::thin() noexcept {
   }
 }
 
-void ColumnOutline::build(const ColumnExtents& profile, const OutlineSides& sides, std::size_t max_vertices,
-                          Outline2& outline) noexcept {
+void ColumnOutline::build(const ColumnExtents& profile, const OutlineSides& sides, double corner_px,
+                          std::size_t max_vertices, Outline2& outline) noexcept {
   outline.clear();
   const std::int32_t first = profile.first_column, last = profile.last_column;
   const auto ends = [&profile](std::int32_t g) { return profile.columns[static_cast<std::size_t>(g)]; };
@@ -85,9 +85,8 @@ void ColumnOutline::build(const ColumnExtents& profile, const OutlineSides& side
   const Chain top = between(upper), bottom = between(lower);
   if (top.first > top.last || bottom.first > bottom.last) return;
   // A side ends where it was last seen, or at the corner with the columns next to it if that is near.
-  constexpr double kCorner_px = 4.0;
-  const auto corner = [](const OutlineSide& side, double seen, double column_end) {
-    const double row = !side.fitted || std::abs(seen - column_end) < kCorner_px ? column_end : seen;
+  const auto corner = [corner_px](const OutlineSide& side, double seen, double column_end) {
+    const double row = !side.fitted || std::abs(seen - column_end) < corner_px ? column_end : seen;
     return Vec2{side.at(row), row};
   };
   const Vec2 top_left = corner(sides.left, sides.left.top_px, upper(top.first));

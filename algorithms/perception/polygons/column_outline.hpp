@@ -28,8 +28,9 @@ struct OutlineSides {
 class ColumnOutline {
  public:
   // Corner points in half-resolution pixel coordinates (x right, y down), right-hand turns in the picture (clockwise as
-  // seen), at most max_vertices: the corners that cost least area go first.
-  void build(const ColumnExtents& profile, const OutlineSides& sides, std::size_t max_vertices,
+  // seen), at most max_vertices: the corners that cost least area go first. corner_px: a side that was seen to end as
+  // near to the columns beside it ends at the corner with them.
+  void build(const ColumnExtents& profile, const OutlineSides& sides, double corner_px, std::size_t max_vertices,
              Outline2& outline) noexcept;
 
  private:

@@ -13,8 +13,6 @@ namespace {
 
 using simd::all, simd::Wide;
 
-constexpr double kNear_px = 4.5;  // of rows that tell a local shift, from where the planes meet
-
 }  // namespace
 
 void EdgeLineFinder::add_guess(std::int32_t column, std::int32_t row) noexcept {
@@ -22,17 +20,16 @@ void EdgeLineFinder::add_guess(std::int32_t column, std::int32_t row) noexcept {
 }
 
 bool EdgeLineFinder::try_guess(const Params& params, std::uint32_t seed) noexcept {
-  constexpr int kTrials = 32;
-  constexpr float kTolerance_px = 5.0F;
-  constexpr double kEnough = 0.9;
+  const auto tolerance_px = static_cast<float>(params.guess.tolerance_px);
+  const auto trials = static_cast<std::uint32_t>(params.guess.trials);
   const auto n = static_cast<std::uint32_t>(guesses_.size());
   if (guesses_.size() < static_cast<std::size_t>(params.min_columns)) return false;
   float best_a = 0.0F, best_b = 0.0F;
   std::int32_t best = 0;
-  const auto fits = [](const Guess& guess, float a, float b) {
-    return std::abs(static_cast<float>(guess.row) - (a + b * static_cast<float>(guess.column))) < kTolerance_px;
+  const auto fits = [tolerance_px](const Guess& guess, float a, float b) {
+    return std::abs(static_cast<float>(guess.row) - (a + b * static_cast<float>(guess.column))) < tolerance_px;
   };
-  for (std::uint32_t trial = 0; trial < kTrials && best < kEnough * n; ++trial) {
+  for (std::uint32_t trial = 0; trial < trials && best < params.guess.enough * n; ++trial) {
     const Guess& p = guesses_[counter_random(seed, 2 * trial) % n];
     const Guess& q = guesses_[counter_random(seed, 2 * trial + 1) % n];
     if (std::abs(p.column - q.column) < 2) continue;
@@ -231,13 +228,12 @@ void EdgeLineFinder::take_column(const Windows& windows, std::size_t slot) noexc
 }
 
 void EdgeLineFinder::add_face(std::int32_t column, std::int32_t from_row, std::int32_t last_row) noexcept {
-  constexpr std::int32_t kRows = 4;  // a face 30 mm high is 7 pixels high at 0.8 m
-  constexpr std::int32_t kBefore_px = 6;
   const auto x = static_cast<double>(rays_->x[static_cast<std::size_t>(column)]);
   const double surface_a = surface_.m.x() * x + surface_.m.z(), other_a = other_.plane.m.x() * x + other_.plane.m.z();
   const double surface_d_m = surface_.d_m(), other_d_m = other_.plane.d_m();
   std::int32_t taken = 0;
-  for (std::int32_t r = std::max(from_row - kBefore_px, 0); r <= last_row && taken < kRows; ++r) {
+  for (std::int32_t r = std::max(from_row - params_.face_before_px, 0); r <= last_row && taken < params_.face_rows;
+       ++r) {
     const auto w = static_cast<double>(image_->inverse_depth(column, r));
     if (!(w > 0.0)) continue;
     const auto y = static_cast<double>(rays_->y[static_cast<std::size_t>(r)]);
@@ -323,12 +319,11 @@ struct EdgeLineFinder::ShiftSums {
 };
 
 void EdgeLineFinder::add_shifts(const NearRows& near, ShiftSums& sums) const noexcept {
-  constexpr double kFrom_px = 0.5;
-  constexpr double kLeastRows = 1.5, kMost_px = 3.0;
+  const ShiftParams& p = params_.shift;
   const Vec3 &upper = surface_.m, &lower = other_.plane.m;
-  const Wide zero = all(0.0), one = all(1.0), from_px = all(kFrom_px), to_px = all(kNear_px), least = all(kLeastRows);
+  const Wide zero = all(0.0), one = all(1.0), from_px = all(p.from_px), to_px = all(p.to_px), least = all(p.min_rows);
   const Wide upper_b = all(upper.y()), lower_b = all(lower.y()), most = all(near.most);
-  const Wide px = all(intrinsics_.fy_px / (upper.y() - lower.y())), most_px = all(kMost_px);
+  const Wide px = all(intrinsics_.fy_px / (upper.y() - lower.y())), most_px = all(p.max_px);
   const double dx = kColumn_px / intrinsics_.fx_px;
   for (std::size_t i = 0; i < ShiftSums::kRegisters; ++i) {
     const auto k = static_cast<std::int32_t>(i) * Wide::nlanes;
@@ -367,8 +362,8 @@ EdgeLineFinder::Shift EdgeLineFinder::local_shift() const noexcept {
     const double x = (middle_px(first) - intrinsics_.cx_px) / intrinsics_.fx_px,
                  y = -(apart.x() * x + apart.z()) / apart.y();
     const double row = intrinsics_.cy_px + intrinsics_.fy_px * y, last_row = row + (kSlots - 1) * meet_slope;
-    const auto from = static_cast<std::int32_t>(std::ceil(std::min(row, last_row) - kNear_px));
-    const auto until = static_cast<std::int32_t>(std::floor(std::max(row, last_row) + kNear_px));
+    const auto from = static_cast<std::int32_t>(std::ceil(std::min(row, last_row) - params_.shift.to_px));
+    const auto until = static_cast<std::int32_t>(std::floor(std::max(row, last_row) + params_.shift.to_px));
     const double w0 = surface_.inverse_depth({x, y, 1.0});
     if (from < 0 || until >= intrinsics_.height_px || !(w0 > 0.0)) continue;
     add_shifts({first, from, until, x, row, meet_slope, limit * noise_.inverse_sigma(w0) / w0}, sums);
@@ -405,15 +400,14 @@ void EdgeLineFinder::gather_points() noexcept {
 
 // Tukey's, from the median, along the guess: the guess defines the axis. limit_m: points farther off do not count.
 bool EdgeLineFinder::try_robust_line(Fit& fit, double& limit_m) noexcept {
-  constexpr int kRounds = 8;
-  constexpr double kTukey = 4.685;
-  constexpr double kLeastScale_m = 0.0008;
+  constexpr int kRounds = 8;        // of a search that converges
+  constexpr double kTukey = 4.685;  // 95 % as good as least squares where errors are normal
   Points& p = points_;
   for (std::size_t i = 0; i < p.count; ++i) p.scratch[i] = p.at_m[i].y();
   fit.a = p.median_of_scratch();
   for (int round = 0; round < kRounds; ++round) {
     for (std::size_t i = 0; i < p.count; ++i) p.scratch[i] = std::abs(p.at_m[i].y() - fit.at(p.at_m[i].x()));
-    limit_m = kTukey * std::max(1.4826 * p.median_of_scratch(), kLeastScale_m);
+    limit_m = kTukey * std::max(1.4826 * p.median_of_scratch(), params_.least_scale_m);
     LineSums<double> sums{};
     for (std::size_t i = 0; i < p.count; ++i) {
       const double r = (p.at_m[i].y() - fit.at(p.at_m[i].x())) / limit_m;
@@ -461,8 +455,7 @@ double EdgeLineFinder::meet_m(double along_m) const noexcept {
 // (generated stairs, the robot's camera, correlated noise).
 double EdgeLineFinder::join(const Fit& fit, const Shift& shift, double along_m, double meet_m,
                             double& across_m) const noexcept {
-  constexpr double kSeenLess = 2.0, kShared = 0.3;
-  const double seen = 1.0 / (kSeenLess * math::square(fit.sigma_m));
+  const double shared = params_.shared, seen = 1.0 / (params_.seen_variance_gain * math::square(fit.sigma_m));
   const Vec3 p = axes_.point(along_m, meet_m);
   const double met = 1.0 / math::square(plane_sigma_m(other_.plane, other_.covariance, p / p.z()));
   double local = 0.0, local_m = 0.0;
@@ -474,7 +467,7 @@ double EdgeLineFinder::join(const Fit& fit, const Shift& shift, double along_m, 
   const double sum = met + seen + local;
   across_m = (met * meet_m + seen * fit.at(along_m) + local * local_m) / sum;
   const double roots = math::sqrt(met) + math::sqrt(seen) + math::sqrt(local);
-  return math::sqrt((1.0 - kShared) * sum + kShared * roots * roots) / sum;
+  return math::sqrt((1.0 - shared) * sum + shared * roots * roots) / sum;
 }
 
 // The face is taken as parallel to the riser: n . p + d - face = 0.

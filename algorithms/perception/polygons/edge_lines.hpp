@@ -15,6 +15,32 @@ namespace polygmap {
 
 class EdgeLineFinder {
  public:
+  // A line through most of the surface's last rows.
+  struct GuessParams {
+    std::int32_t trials = 32;
+    double tolerance_px = 5.0;
+    double enough = 0.9;
+
+    static void visit(auto& p, auto& field) {
+      field("trials", p.trials, 1, 64, "As many lines through two of the last rows are tried.");
+      field("tolerance_px", p.tolerance_px, 0.5, 50.0, "A last row that is nearer lies on such a line.");
+      field("enough", p.enough, 0.0, 1.0, "A line that holds for this share of the last rows ends the search.");
+    }
+  };
+  // By how much two planes meet elsewhere than their fits say, as the rows near the edge have it.
+  struct ShiftParams {
+    double from_px = 0.5, to_px = 4.5;
+    double min_rows = 1.5;
+    double max_px = 3.0;
+
+    static void visit(auto& p, auto& field) {
+      field("from_px", p.from_px, 0.0, 5.0, "Rows that tell the shift are farther from where the planes meet.");
+      field("to_px", p.to_px, 1.0, 16.0, "Rows that tell the shift are nearer to where the planes meet.");
+      field.ordered("from_px", "to_px");
+      field("min_rows", p.min_rows, 0.5, 16.0, "A column that tells the shift has more such rows on each plane.");
+      field("max_px", p.max_px, 0.1, 50.0, "A column that tells a larger shift does not count.");
+    }
+  };
   struct Params {
     std::int32_t window_px = 12;
     std::int32_t group_px = 24;
@@ -35,6 +61,13 @@ class EdgeLineFinder {
     double face_max_m = 0.08;
     double slow_error_m = 0.0012;
     double least_local_m = 0.0004;
+    double least_scale_m = 0.0008;
+    double seen_variance_gain = 2.0;
+    double shared = 0.3;
+    std::int32_t face_rows = 4;  // a face 30 mm high is 7 pixels high at 0.8 m
+    std::int32_t face_before_px = 6;
+    GuessParams guess;
+    ShiftParams shift;
 
     static void visit(auto& p, auto& field) {
       field("window_px", p.window_px, 4, 16, "As many rows are searched to each side of the first guess.");
@@ -62,6 +95,19 @@ class EdgeLineFinder {
             "Error of the change-point of group_px columns that its columns share.");
       field("least_local_m", p.least_local_m, 0.0, 0.1,
             "Error of where the planes meet locally, however well its columns agree.");
+      field("least_scale_m", p.least_scale_m, 1e-5, 0.1,
+            "The scatter of the change-points is taken for no less when outliers are told from them.");
+      field(
+          "seen_variance_gain", p.seen_variance_gain, 1.0, 100.0,
+          "The variance of the line through the change-points is this many times what their scatter says, which hides "
+          "that they are skewed towards the less noisy plane.");
+      field("shared", p.shared, 0.0, 1.0,
+            "The change-points, the planes' meeting and the local shift share this part of their errors.");
+      field("face_rows", p.face_rows, 1, 64, "As many rows of a column tell how far an overhang's face stands out.");
+      field("face_before_px", p.face_before_px, 0, 16,
+            "The rows of an overhang's face are looked for from as far before the change-point.");
+      field("guess", p.guess);
+      field("shift", p.shift);
     }
   };
   enum class Outcome : std::uint8_t { kFound, kAgain, kFewColumns, kNoLine, kNotStraight, kShort };

@@ -8,8 +8,6 @@ namespace polygmap {
 namespace {
 
 constexpr std::int32_t kColumnStride = 4, kRowStride = 12;  // 800 pixels of a whole picture
-// What others' pixels cost against its own: a smaller polygon is safe, one over a hole is not (2026-11).
-constexpr std::int32_t kForeignWorth = -4;
 constexpr std::int32_t kGridColumns = kColumns / kColumnStride, kGridRows = kDepthHeight_px / kRowStride;
 
 // In half-resolution pixels: of a column of eight pixels, and of a full-resolution row.
@@ -72,9 +70,10 @@ PixelCover::Sides PixelCover::own_by_side(const Outline2& polygon, const Vec3& l
 }
 
 std::int32_t PixelCover::worth_beyond(const Outline2& polygon, const Vec3& line) const noexcept {
+  const std::int32_t foreign_worth = -params_.foreign_cost;
   std::int32_t worth = 0;
   for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
-    if (line.dot(ray_of(g, r)) > 0.0) worth += own ? 1 : kForeignWorth;
+    if (line.dot(ray_of(g, r)) > 0.0) worth += own ? 1 : foreign_worth;
   });
   return worth;
 }
@@ -84,9 +83,10 @@ bool PixelCover::try_best_cut(const Outline2& polygon, Vec3& line) const noexcep
   std::array<std::int32_t, kGridColumns> by_column{};
   std::array<std::int32_t, kGridRows + 1> by_row{};
   std::array<std::int32_t, Regions::kMaxRegions + 1> votes{};
+  const std::int32_t foreign_worth = -params_.foreign_cost;
   std::int32_t total = 0;
   for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
-    const std::int32_t worth = own ? 1 : kForeignWorth;
+    const std::int32_t worth = own ? 1 : foreign_worth;
     by_column[static_cast<std::size_t>(g / kColumnStride)] += worth;
     by_row[static_cast<std::size_t>(r / kRowStride)] += worth;
     total += worth;
@@ -111,8 +111,7 @@ bool PixelCover::try_best_cut(const Outline2& polygon, Vec3& line) const noexcep
   scan(by_row, [&](std::int32_t i) {
     return Vec3{0.0, 1.0, -(half_row(kRowStride * i) - 0.25 * kRowStride - rays.cy_px) / rays.fy_px};
   });
-  constexpr int kNeighbours = 3;
-  for (int k = 0; k < kNeighbours; ++k) {
+  for (std::int32_t k = 0; k < params_.neighbours; ++k) {
     const auto most = std::max_element(votes.begin(), votes.end());
     if (*most == 0) break;
     *most = 0;

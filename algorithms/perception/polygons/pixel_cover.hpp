@@ -12,9 +12,22 @@ namespace polygmap {
 
 class PixelCover {
  public:
+  struct Params {
+    std::int32_t foreign_cost = 4;  // a smaller polygon is safe, one over a hole is not (2026-11)
+    std::int32_t neighbours = 3;
+
+    static void visit(auto& p, auto& field) {
+      field("foreign_cost", p.foreign_cost, 1, 100,
+            "A cut that rids a polygon of another surface's pixel may cost as many of its own.");
+      field("neighbours", p.neighbours, 0, 16,
+            "A cut is tried where the plane meets those of as many neighbours, the ones with most pixels in the "
+            "polygon.");
+    }
+  };
   // apart_m: seen this far behind the plane, a pixel shows something else.
-  PixelCover(const FrameImage& picture, const Regions& regions, RegionId id, double apart_m) noexcept
-      : picture_(picture), regions_(regions), id_(id), apart_m_(apart_m) {}
+  PixelCover(const Params& params, const FrameImage& picture, const Regions& regions, RegionId id,
+             double apart_m) noexcept
+      : params_(params), picture_(picture), regions_(regions), id_(id), apart_m_(apart_m) {}
 
   struct Count {
     std::int32_t own = 0, foreign = 0;
@@ -40,6 +53,7 @@ class PixelCover {
   [[nodiscard]] std::int32_t worth_beyond(const Outline2& polygon, const Vec3& line) const noexcept;
   [[nodiscard]] Vec3 ray_of(std::int32_t column, std::int32_t row) const noexcept;
 
+  Params params_;
   const FrameImage& picture_;
   const Regions& regions_;
   RegionId id_;

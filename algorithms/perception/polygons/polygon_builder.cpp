@@ -10,13 +10,6 @@
 namespace polygmap {
 namespace {
 
-constexpr double kLeastSlope = 0.5;  // sine between a riser and the tread that ends it
-constexpr double kOnLine_m = 0.002;  // a polygon's edge lies on a line
-
-// Pixels of the grid, see pixel_cover.cpp: a piece of more that others own is parted; one cut off has as many of its
-// own.
-constexpr std::int32_t kLeastForeign = 4, kLeastOwn = 6;
-
 using SeenPolygon = StaticVector<Vec2, kMaxPolygonVertices>;  // its corners in the picture, half-resolution pixels
 
 // Adds a row's columns first .. last that are not the robot's own, and the valid pixels in them. flags: null where
@@ -122,7 +115,7 @@ double invalid_share(const FrameImage& picture, const SeenPolygon& polygon) noex
 // What is just outside an edge decides whether the surface ends there or only the view of it.
 EdgeKind PolygonBuilder::judge_edge(const FrameImage& picture, const InversePlane& plane, const Vec2& a, const Vec2& b,
                                     const Vec2& inside) const noexcept {
-  constexpr int kProbes = 5;
+  const std::int32_t probes = params_.probes;
   Vec2 outward{(b - a).y(), -(b - a).x()};
   if (outward.norm() < 1e-9) return EdgeKind::kUnknown;
   outward.normalize();
@@ -130,10 +123,10 @@ EdgeKind PolygonBuilder::judge_edge(const FrameImage& picture, const InversePlan
   const auto reach_px = static_cast<std::int32_t>(1.5 * params_.probe_px);
   // Nearer than the probe only the body is asked for.
   const auto nearest_px = picture.any_body ? 0 : static_cast<std::int32_t>(std::ceil(0.5 * params_.probe_px));
-  int observed = 0;
+  std::int32_t observed = 0;
   // Until enough of them say so, or too few are left that could.
-  for (int i = 0; i < kProbes && 2 * observed <= kProbes && 2 * (observed + kProbes - i) > kProbes; ++i) {
-    const Vec2 on = a + (b - a) * ((i + 0.5) / kProbes);
+  for (std::int32_t i = 0; i < probes && 2 * observed <= probes && 2 * (observed + probes - i) > probes; ++i) {
+    const Vec2 on = a + (b - a) * ((i + 0.5) / probes);
     // The first measured pixel outside, up to twice the probe's distance; the body or the picture's end before it hides
     // the end of the surface.
     for (std::int32_t k = nearest_px; k <= reach_px; ++k) {
@@ -152,19 +145,19 @@ EdgeKind PolygonBuilder::judge_edge(const FrameImage& picture, const InversePlan
       break;
     }
   }
-  return 2 * observed > kProbes ? EdgeKind::kObserved : EdgeKind::kUnknown;
+  return 2 * observed > probes ? EdgeKind::kObserved : EdgeKind::kUnknown;
 }
 
 // The tread that most columns of this surface show right below (or above) it in the picture.
 RegionId PolygonBuilder::tread_beside(const FrameImage& picture, const Regions& regions, RegionId id,
                                       bool below) const noexcept {
-  constexpr std::int32_t kProbe_px = 6;
+  const std::int32_t probe_px = params_.tread_probe_px;
   const ColumnExtents& profile = regions.extents[id];
   std::array<std::int32_t, Regions::kMaxRegions + 1> votes{};
   for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
     if (ends.empty()) continue;
-    const std::int32_t row = below ? ends.bottom + kProbe_px : ends.top - kProbe_px;
+    const std::int32_t row = below ? ends.bottom + probe_px : ends.top - probe_px;
     if (row >= 0 && row < picture.column_rays.height_px) ++votes[regions.labels.at(g, row)];
   }
   RegionId best = kNoRegion;
@@ -212,7 +205,7 @@ bool PolygonBuilder::try_cut_at_line(const FrameImage& picture, const EdgeLine& 
   const bool positive = own.positive > own.negative;
   if ((inward.dot(axes.side_of(line).inward) > 0.0) != positive) inward = -inward;
   Piece& piece = pieces.front();
-  const bool goes_on = std::min(own.positive, own.negative) >= kLeastOwn;
+  const bool goes_on = std::min(own.positive, own.negative) >= params_.min_own;
   const bool has_room = !goes_on || try_split_off(picture, axes, cover, piece, {a, -inward}, pieces);
   // Corners just short of the line go onto it, those beyond are cut off: either way the edge is the line. Moving only
   // the two extreme ones keeps the outline convex.
@@ -234,7 +227,7 @@ void PolygonBuilder::cut_at_treads(const FrameImage& picture, const Regions& reg
     const double side = below ? 1.0 : -1.0;
     const Vec3 up = side * level.normal();
     const Vec2 inward{up.dot(axes.x), up.dot(axes.y)};
-    if (!(inward.norm() > kLeastSlope)) continue;
+    if (!(inward.norm() > params_.min_tread_sin)) continue;
     clip(flat, -side * level.distance_m(axes.origin_m) * inward / inward.squaredNorm(), inward.normalized());
   }
 }
@@ -246,7 +239,7 @@ bool PolygonBuilder::try_split_off(const FrameImage& picture, const PlaneAxes& a
   Piece piece = from;
   clip(piece.flat, side.point, side.inward);
   static_cast<void>(piece.cuts.try_push_back(side));
-  if (piece.flat.size() < 3 || cover.count(seen_of(picture.rays, axes, piece.flat)).own < kLeastOwn) return true;
+  if (piece.flat.size() < 3 || cover.count(seen_of(picture.rays, axes, piece.flat)).own < params_.min_own) return true;
   return pieces.try_push_back(piece);
 }
 
@@ -260,7 +253,7 @@ std::size_t PolygonBuilder::part_pieces(const FrameImage& picture, const PlaneAx
     while (piece.flat.size() >= 3) {
       const Outline2 seen = seen_of(picture.rays, axes, piece.flat);
       const PixelCover::Count pixels = cover.count(seen);
-      if (pixels.foreign < kLeastForeign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign))
+      if (pixels.foreign < params_.min_foreign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign))
         break;
       Vec3 line;
       if (piece.cuts.size() == kMaxCuts || !cover.try_best_cut(seen, line)) {
@@ -307,15 +300,16 @@ void PolygonBuilder::judge_edges(const FrameImage& picture, const InversePlane& 
     if (!line.valid) return false;
     const Vec2 p = axes.to_plane(line.a_m), q = axes.to_plane(line.b_m);
     const Vec2 along = (q - p) / std::max((q - p).norm(), 1e-9), normal{-along.y(), along.x()};
-    if (std::abs(normal.dot(a - p)) > kOnLine_m || std::abs(normal.dot(b - p)) > kOnLine_m) return false;
+    if (std::abs(normal.dot(a - p)) > params_.on_line_m || std::abs(normal.dot(b - p)) > params_.on_line_m)
+      return false;
     const double from = std::min(along.dot(a - p), along.dot(b - p)), to = std::max(along.dot(a - p), along.dot(b - p));
     return 2.0 * (std::min(to, (q - p).norm()) - std::max(from, 0.0)) > to - from;
   };
   // Where it was cut back, the surface goes on.
   const auto cut_back = [&](const Vec2& a, const Vec2& b) {
     return std::any_of(piece.cuts.begin(), piece.cuts.end(), [&](const PlaneSide& side) {
-      return std::abs(side.inward.dot(a - side.point)) < kOnLine_m &&
-             std::abs(side.inward.dot(b - side.point)) < kOnLine_m;
+      return std::abs(side.inward.dot(a - side.point)) < params_.on_line_m &&
+             std::abs(side.inward.dot(b - side.point)) < params_.on_line_m;
     });
   };
   SeenPolygon seen;
@@ -348,7 +342,7 @@ PolygonBuilder::Built PolygonBuilder::build(const FrameImage& picture, const Reg
     if (own.plane.inverse_depth(ray) > 0.1) static_cast<void>(flat.try_push_back(axes.to_plane(own.plane.point(ray))));
   }
   if (flat.size() < 3 || !(twice_area(flat) > 0.0)) return {};
-  const PixelCover cover(picture, regions, id, params_.apart_m);
+  const PixelCover cover(params_.cover, picture, regions, id, params_.apart_m);
   if (own.kind == SurfaceKind::kRiser) cut_at_treads(picture, regions, id, axes, flat);
   Pieces pieces;
   static_cast<void>(pieces.try_push_back({flat, {}}));

@@ -44,6 +44,13 @@ class PolygonBuilder {
     double apart_m = 0.04;
     double most_foreign = 0.05;
     std::int32_t min_tread_columns = 3;
+    std::int32_t probes = 5;
+    std::int32_t tread_probe_px = 6;
+    double min_tread_sin = 0.5;
+    double on_line_m = 0.002;
+    std::int32_t min_foreign = 4;
+    std::int32_t min_own = 6;
+    PixelCover::Params cover;
 
     static void visit(auto& p, auto& field) {
       field("snap_m", p.snap_m, 0.0, 0.1, "Corners as close to a nosing or back line go onto it.");
@@ -53,6 +60,17 @@ class PolygonBuilder {
       field("most_foreign", p.most_foreign, 0.0, 1.0,
             "A polygon of which a larger share of pixels is another plane's is cut back.");
       field("min_tread_columns", p.min_tread_columns, 1, 80, "A tread that ends a riser has as many columns.");
+      field("probes", p.probes, 1, 25, "A polygon's edge is judged in as many places.");
+      field("tread_probe_px", p.tread_probe_px, 1, 64,
+            "A tread that ends a riser is looked for as many rows beyond the riser's end.");
+      field("min_tread_sin", p.min_tread_sin, 0.0, 0.99,
+            "A tread that ends a riser is turned against it by an angle of a larger sine.");
+      field("on_line_m", p.on_line_m, 0.0, 0.05, "A polygon's edge that is nearer to a line lies on it.");
+      field("min_foreign", p.min_foreign, 1, 800,
+            "A polygon is cut back when as many pixels of the grid of 800 are another surface's.");
+      field("min_own", p.min_own, 1, 800,
+            "A piece that is cut off is kept when as many pixels of that grid are its own.");
+      field("cover", p.cover);
     }
   };
   void configure(const Params& params) noexcept { params_ = params; }

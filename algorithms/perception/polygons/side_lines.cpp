@@ -10,12 +10,9 @@
 namespace polygmap {
 namespace {
 
-constexpr double kLeastCosine = 0.26;                    // of the incidence; the noise model ends there
-constexpr std::int32_t kFlatRows = 4, kFlatColumns = 2;  // more columns in these rows: too flat
-constexpr std::int32_t kManyRows = 64;                   // of more, every second one (third, ...) says the same
-constexpr std::int32_t kMixed_px = 2;                    // of neither plane, where one pixel sees both
-constexpr std::int32_t kInside_px = 8;                   // of the outermost column and the one beside it
-constexpr std::int32_t kOutside_px = 8;                  // searched beyond
+constexpr std::int32_t kManyRows = 64;   // of more, every second one (third, ...) says the same
+constexpr std::int32_t kInside_px = 8;   // of the outermost column and the one beside it
+constexpr std::int32_t kOutside_px = 8;  // searched beyond
 constexpr std::int32_t kReach_px = kInside_px + kOutside_px;
 
 constexpr double kNowhere = -1e9;  // beyond the other end of any image
@@ -34,14 +31,15 @@ struct RowPlane {
   float at, slope, per_sigma;
   bool valid;
 
-  // Near one pixel of the row.
-  void set(const InversePlane& plane, const DepthNoiseModel& noise, const RowRays& rays, std::int32_t column) noexcept {
+  // Near one pixel of the row. most_slant: one over the least cosine of the incidence.
+  void set(const InversePlane& plane, const DepthNoiseModel& noise, const RowRays& rays, double most_slant,
+           std::int32_t column) noexcept {
     const double x = rays.x0 + rays.pitch * column, ray2 = x * x + rays.y * rays.y + 1.0;
     const double constant = plane.m.y() * rays.y + plane.m.z(), w = plane.m.x() * x + constant;
-    valid = w > 0.05;
+    valid = w > kLeastInverseDepth;
     if (!valid) return;
     // The cosine of the incidence is w over this.
-    const double over = math::clamp(math::sqrt(plane.m.squaredNorm() * ray2), w, w * (1.0 / kLeastCosine));
+    const double over = math::clamp(math::sqrt(plane.m.squaredNorm() * ray2), w, w * most_slant);
     at = static_cast<float>(constant + plane.m.x() * rays.x0);
     slope = static_cast<float>(plane.m.x() * rays.pitch);
     per_sigma = static_cast<float>(w * w / (over * noise.inverse_sigma(w)));
@@ -63,7 +61,7 @@ struct PixelGains {
 
 // A bit for each step outwards at which the sum of the gains so far is least, or hardly more.
 std::uint32_t least_costs(const Reach& gain) noexcept {
-  constexpr float kTie = 1e-3F;
+  constexpr float kTie = 1e-3F;  // of rounding
   constexpr std::size_t kFours = kReach_px / Four::nlanes;
   std::array<Four, kFours> cost;
   Four before = cv::v_setzero_f32(), least = cv::v_setall_f32(1e9F);
@@ -188,11 +186,12 @@ void SideLines::look(RegionId id, bool right, RowView& view) const noexcept {
   if (view.first < 0 || view.first >= k.width_px) return;
   const RowRays rays{-k.cx_px * pitch_, pitch_,
                      static_cast<double>(image_->column_rays.y[static_cast<std::size_t>(view.row)])};
-  view.own.set((*regions_)[id].plane, noise_, rays, border);
+  const double most_slant = 1.0 / params_.least_incidence_cos;
+  view.own.set((*regions_)[id].plane, noise_, rays, most_slant, border);
   if (!view.own.valid) return;
   const RegionId beyond = plane_beyond(id, out, view);
   view.other.valid = false;
-  if (beyond != kNoRegion) view.other.set((*regions_)[beyond].plane, noise_, rays, border);
+  if (beyond != kNoRegion) view.other.set((*regions_)[beyond].plane, noise_, rays, most_slant, border);
   const std::int32_t count = count_free(right, view);
   copy_pixels(right, count, view);
   view.ending = count < kInside_px ? Ending::kHidden : Ending::kSeen;  // by the robot's own body
@@ -210,7 +209,7 @@ SideLines::Ending SideLines::end_of_row(const RowView& view, double& end_px) con
   // Pixels with data between from and to, those behind the surface less those before it.
   const std::uint32_t between = gains.measured & ((2U << to) - (2U << from));
   const std::int32_t of_neither = std::popcount(between) - 2 * std::popcount(between & gains.before);
-  if (std::abs(of_neither) > kMixed_px) to = from;  // something narrow stands between: the surface ends at it
+  if (std::abs(of_neither) > params_.mixed_px) to = from;  // something narrow stands between: the surface ends at it
   end_px = view.first + view.out * (0.5 * (from + to) + 0.5);
   return Ending::kSeen;
 }
@@ -283,9 +282,10 @@ void SideLines::find_ends(RegionId id) noexcept {
       cv::v_store(right + r, cv::v_select(own, here, cv::vx_load(right + r)));
     }
   }
+  const std::int32_t half = params_.flat_rows / 2;
   for (std::uint8_t* ends : {left, right}) {
-    std::fill_n(ends + profile.first_row - kFlatRows / 2, kFlatRows / 2, ends[profile.first_row]);
-    std::fill_n(ends + profile.last_row + 1, kFlatRows / 2, ends[profile.last_row]);
+    std::fill_n(ends + profile.first_row - half, half, ends[profile.first_row]);
+    std::fill_n(ends + profile.last_row + 1, half, ends[profile.last_row]);
   }
 }
 
@@ -302,10 +302,12 @@ SideLines::UprightRows SideLines::upright_rows(const ColumnExtents& profile, con
   using Bytes = UprightRows::Bytes;
   UprightRows rows;
   rows.first_row = profile.first_row;
-  const Bytes flat = cv::v_setall_u8(kFlatColumns), none = cv::v_setall_u8(kNoColumn);
+  const Bytes flat = cv::v_setall_u8(static_cast<std::uint8_t>(params_.flat_columns)),
+              none = cv::v_setall_u8(kNoColumn);
+  const std::int32_t half = params_.flat_rows / 2;
   std::size_t i = 0;
   for (std::int32_t r = profile.first_row; r <= profile.last_row; r += Bytes::nlanes, ++i) {
-    const Bytes drift = cv::v_absdiff(cv::v_load(ends + r + kFlatRows / 2), cv::v_load(ends + r - kFlatRows / 2));
+    const Bytes drift = cv::v_absdiff(cv::v_load(ends + r + half), cv::v_load(ends + r - half));
     const Bytes may = (cv::v_max(drift, flat) == flat) & (cv::v_load(ends + r) != none);
     rows.bits[i] = simd::bits(may) & ((2U << std::min(profile.last_row - r, Bytes::nlanes - 1)) - 1U);
     rows.count += std::popcount(rows.bits[i]);

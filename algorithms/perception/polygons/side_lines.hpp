@@ -23,6 +23,10 @@ class SideLines {
     double max_cut = 0.03;
     std::int32_t min_rows = 6;
     double min_share = 0.5;
+    double least_incidence_cos = 0.26;
+    std::int32_t flat_rows = 4;
+    std::int32_t flat_columns = 2;
+    std::int32_t mixed_px = 2;
 
     static void visit(auto& p, auto& field) {
       field("truncate_sigmas", p.truncate_sigmas, 0.5, 20.0, "A pixel farther off its plane costs no more.");
@@ -36,6 +40,17 @@ class SideLines {
       field("max_cut", p.max_cut, 0.0, 1.0, "A line cuts off no more than this share of the surface's pixels.");
       field("min_rows", p.min_rows, 2, 240, "As many rows are looked at, and lie on the line.");
       field("min_share", p.min_share, 0.0, 1.0, "At least this share of the rows between the line's ends lies on it.");
+      field(
+          "least_incidence_cos", p.least_incidence_cos, 0.01, 1.0,
+          "The noise of a pixel that is seen at a smaller cosine of the incidence is that at this one, where the noise "
+          "model ends.");
+      field("flat_rows", p.flat_rows, 2, 16,
+            "The end of a row is compared with those half as many rows above and below.");
+      field("flat_columns", p.flat_columns, 0, 40,
+            "A surface's end that runs off by more columns of eight pixels within flat_rows is a front or a back.");
+      field(
+          "mixed_px", p.mixed_px, 0, 16,
+          "As many pixels of neither plane may lie between two where one pixel sees both; more are something narrow.");
     }
   };
 

@@ -7,13 +7,13 @@ namespace polygmap {
 namespace {
 
 // A tread that meets a riser, or a riser that meets a tread.
-bool on_a_step(const SpanBoundaries& boundaries, const PlaneSet& planes, const Region& region) noexcept {
-  constexpr double kLeastColumns = 2.0;
+bool on_a_step(double min_columns, const SpanBoundaries& boundaries, const PlaneSet& planes,
+               const Region& region) noexcept {
   bool found = false;
   if (region.kind == SurfaceKind::kOther) return false;
   const SurfaceKind wanted = region.kind == SurfaceKind::kTread ? SurfaceKind::kRiser : SurfaceKind::kTread;
   boundaries.for_each_meeting(region.source, [&](PlaneId other, double columns) {
-    found = found || (columns >= kLeastColumns && planes[other].kind == wanted && planes[other].alive);
+    found = found || (columns >= min_columns && planes[other].kind == wanted && planes[other].alive);
   });
   return found;
 }
@@ -107,21 +107,19 @@ void ConnectedComponents::measure(SpanBoundaries::Columns& columns, std::int32_t
 
 // Two components belong together when nothing but missing data (the robot's leg, dropouts) or their own plane lies
 // between. Something seen behind the plane is a hole; something in front of it hides what nobody knows.
-bool ConnectedComponents::apart(double apart_m, const FrameImage& image, const Component& a, const Component& b,
+bool ConnectedComponents::apart(const Params& params, const FrameImage& image, const Component& a, const Component& b,
                                 const InversePlane& plane) noexcept {
-  constexpr int kProbes = 24;
-  constexpr int kEnough = 3;
   const Vec2 from = a.centre(), to = b.centre();
-  int elsewhere = 0;
-  for (int i = 0; i <= kProbes && elsewhere < kEnough; ++i) {
-    const Vec2 p = from + (to - from) * (static_cast<double>(i) / kProbes);
+  std::int32_t elsewhere = 0;
+  for (std::int32_t i = 0; i <= params.apart_probes && elsewhere < params.min_apart_probes; ++i) {
+    const Vec2 p = from + (to - from) * (static_cast<double>(i) / params.apart_probes);
     const auto c = static_cast<std::int32_t>(p.x() + 0.5), r = static_cast<std::int32_t>(p.y() + 0.5);
     const float w = image.inverse_depth_at(c, r);
     if (!(w > 0.0F)) continue;
     const double expected = plane.inverse_depth(image.rays.ray(c, r));
-    elsewhere += expected > 1e-3 && std::abs(1.0 / static_cast<double>(w) - 1.0 / expected) > apart_m ? 1 : 0;
+    elsewhere += expected > 1e-3 && std::abs(1.0 / static_cast<double>(w) - 1.0 / expected) > params.apart_m ? 1 : 0;
   }
-  return elsewhere >= kEnough;
+  return elsewhere >= params.min_apart_probes;
 }
 
 // That a component is coplanar with others of a plane says little about one farther away than it is wide: another box
@@ -169,7 +167,7 @@ RegionId ConnectedComponents::find_region(const Params& params, const FrameImage
     const Region& region = regions[id];
     if (region.source != source) continue;
     if (region.main_component == 0 ||
-        !apart(params.apart_m, image, components_[region.main_component], component, region.plane))
+        !apart(params, image, components_[region.main_component], component, region.plane))
       return id;
   }
   if (component.area_px < params.min_surface_px) return kNoRegion;
@@ -207,8 +205,9 @@ std::uint32_t ConnectedComponents::join(const Params& params, const SpanBoundari
   }
   for (RegionId id = 1; id <= regions.count; ++id) {
     Region& region = regions[id];
-    region.alive = region.alive && region.area_px >= params.min_surface_px &&
-                   (region.area_px >= params.min_other_px || on_a_step(boundaries, planes, region));
+    region.alive =
+        region.alive && region.area_px >= params.min_surface_px &&
+        (region.area_px >= params.min_other_px || on_a_step(params.min_step_columns, boundaries, planes, region));
   }
   for (std::size_t k = 1; k <= component_count_; ++k) {
     RegionId& region = components_[k].region;

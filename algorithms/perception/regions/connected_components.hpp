@@ -20,6 +20,9 @@ class ConnectedComponents {
     std::int32_t min_component_px = 160;
     std::int32_t min_surface_px = 440;
     std::int32_t min_other_px = 1500;
+    double min_step_columns = 2.0;
+    std::int32_t apart_probes = 24;
+    std::int32_t min_apart_probes = 3;
 
     static void visit(auto& p, auto& field) {
       field("apart_m", p.apart_m, 0.001, 0.5, "What is seen as far from a plane is something else.");
@@ -28,6 +31,13 @@ class ConnectedComponents {
             "A tread that meets a riser, or the reverse, has as many pixels.");
       field("min_other_px", p.min_other_px, 1, 100000,
             "Any other surface has as many pixels: curved things have facets of this size.");
+      field("min_step_columns", p.min_step_columns, 1.0, 80.0,
+            "A tread meets a riser, or the reverse, in as many columns of eight pixels.");
+      field(
+          "apart_probes", p.apart_probes, 1, 200,
+          "As many steps on the straight way from one piece of a plane to another tell whether they are one surface.");
+      field("min_apart_probes", p.min_apart_probes, 1, 200,
+            "Two pieces of a plane are two surfaces when something else is seen in as many places on that way.");
     }
   };
 
@@ -60,7 +70,7 @@ class ConnectedComponents {
   void measure(SpanBoundaries::Columns& columns, std::int32_t column_count) noexcept;
   // Those of living planes that are large enough, by area.
   [[nodiscard]] Order large_ones(const Params& params, const PlaneSet& planes) const noexcept;
-  [[nodiscard]] static bool apart(double apart_m, const FrameImage& image, const Component& a, const Component& b,
+  [[nodiscard]] static bool apart(const Params& params, const FrameImage& image, const Component& a, const Component& b,
                                   const InversePlane& plane) noexcept;
   // Of the regions of one fitted plane, that of the nearest which the component belongs to.
   [[nodiscard]] RegionId coplanar_region(const FrameImage& image, const Regions& regions,

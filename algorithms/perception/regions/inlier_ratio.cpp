@@ -6,14 +6,13 @@
 namespace polygmap {
 
 double inlier_ratio(const FrameImage& image, const RawImage& raw, const DepthNoiseModel& noise, const Regions& regions,
-                    RegionId id) noexcept {
-  constexpr double kSigmas = 3.0;
+                    RegionId id, double sigmas) noexcept {
   constexpr std::int32_t kNextPixel = 3;  // across a column from sample to sample: all eight have their turn
   const CameraIntrinsics& k = raw.intrinsics;
   const Region& region = regions[id];
   const ColumnExtents& extents = regions.extents[id];
   const auto stride = std::max(1, static_cast<std::int32_t>(region.area_px / (kColumn_px * kInlierSamples_px)));
-  const double most2 = kSigmas * kSigmas * region.plane.m.squaredNorm();
+  const double most2 = sigmas * sigmas * region.plane.m.squaredNorm();
   std::int32_t seen = 0, on = 0, across = 0, skip = 0;
   for (std::int32_t g = extents.first_column; g <= extents.last_column; ++g) {
     const ColumnExtent& ends = extents.columns[static_cast<std::size_t>(g)];

@@ -7,11 +7,11 @@
 
 namespace polygmap {
 
-// Share of the region's own pixels that lie on its plane, of about kInlierSamples_px that have data; 1 without any.
-// Where a pole narrower than a column stands before a wall, the columns' means lie on a plane in which there is
-// nothing.
+// Share of the region's own pixels that lie within as many sigmas of its plane, of about kInlierSamples_px that have
+// data; 1 without any. Where a pole narrower than a column stands before a wall, the columns' means lie on a plane in
+// which there is nothing.
 inline constexpr std::int32_t kInlierSamples_px = 64;
 [[nodiscard]] double inlier_ratio(const FrameImage& image, const RawImage& raw, const DepthNoiseModel& noise,
-                                  const Regions& regions, RegionId id) noexcept;
+                                  const Regions& regions, RegionId id, double sigmas) noexcept;
 
 }  // namespace polygmap

@@ -6,6 +6,7 @@
 namespace polygmap {
 namespace {
 
+// Pictures and tests ask for pixels, and nothing that is published depends on them: none of these is a parameter.
 constexpr double kSteepest = 2.0;  // rows per pixel that a boundary may climb
 constexpr std::int32_t kReach_px = kColumn_px;
 constexpr double kRounded_px = 0.51;   // between a boundary and the row it was rounded to

@@ -14,10 +14,9 @@ using simd::all, simd::Wide;
 constexpr float kNowhere =
     -1e9F;                       // 1/m: the line of a column without a segment, which no row fits: not a depth of 1 mm
 constexpr float kNever = -1e9F;  // its absent rows
-constexpr float kNoSpread = 1e-9F;  // added to a sum of squares that may be 0
-constexpr float kFitted = 3.0F;     // rows that make a line
-constexpr float kBends = 7.0F;      // a segment of more rows may bend away
-constexpr std::int32_t kBentRows = 3;
+constexpr float kNoSpread = 1e-9F;                        // added to a sum of squares that may be 0
+constexpr float kFitted = 3.0F;                           // rows that make a line
+constexpr std::int32_t kBentRows = 3;                     // whose residuals kMemory still knows
 constexpr std::int32_t kBlockColumns = 2 * Wide::nlanes;  // columns whose blocks are tried together
 static_assert(kColumns % kBlockColumns == 0);
 
@@ -25,9 +24,9 @@ static_assert(kColumns % kBlockColumns == 0);
 
 struct ScanlineSegmentation::Wides {
   Wide zero = all(0.0F), one = all(1.0F), two = all(2.0F), four = all(4.0F);
-  Wide memory = all(1.0F - kMemory), fitted = all(kFitted), long_segment = all(kBends);
+  Wide memory = all(1.0F - kMemory), fitted = all(kFitted);
   InverseSigma<Wide> sigma, jump;
-  Wide outlier_weight, floor2, outlier2, bend2, max_gap, fy;
+  Wide outlier_weight, floor2, outlier2, bend2, long_segment, max_gap, fy;
   explicit Wides(const ScanlineSegmentation& s) noexcept
       : sigma(all(s.sigma_)),
         jump(all(s.jump_)),
@@ -35,6 +34,7 @@ struct ScanlineSegmentation::Wides {
         floor2(all(s.floor2_)),
         outlier2(all(s.outlier2_)),
         bend2(all(s.bend2_)),
+        long_segment(all(s.bend_rows_)),
         max_gap(all(s.max_gap_)),
         fy(all(s.fy_)) {}
 };
@@ -46,6 +46,7 @@ void ScanlineSegmentation::begin(const Params& params, const DepthNoiseModel& no
   height_px_ = intrinsics.height_px;
   outlier2_ = static_cast<float>(math::square(params.outlier_sigmas));
   bend2_ = static_cast<float>(math::square(params.bend_sigmas));
+  bend_rows_ = static_cast<float>(params.bend_rows);
   sigma_ = noise.scaled(math::sqrt(noise.mean_share(kColumn_px))).inverse_sigma_f();
   floor2_ = static_cast<float>(math::square(params.floor_m));
   // jump_share w + 4 sigma

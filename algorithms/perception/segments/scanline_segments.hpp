@@ -34,6 +34,7 @@ class ScanlineSegmentation {
     double jump_share = 0.03;
     double floor_m = 0.001;
     std::int32_t max_gap_px = 8;
+    std::int32_t bend_rows = 7;
 
     static void visit(auto& p, auto& field) {
       field("outlier_sigmas", p.outlier_sigmas, 0.5, 20.0, "A row farther off a segment's line does not belong to it.");
@@ -43,6 +44,7 @@ class ScanlineSegmentation {
             "The first rows of a segment differ by less than this share of the depth per row.");
       field("floor_m", p.floor_m, 0.0, 0.1, "Slow depth errors, added to the noise.");
       field("max_gap_px", p.max_gap_px, 0, 200, "A segment may miss as many rows in a row.");
+      field("bend_rows", p.bend_rows, 3, 480, "A segment of more rows may bend away.");
     }
   };
   static constexpr std::size_t kMaxSegmentsPerColumn = 48;
@@ -95,7 +97,8 @@ class ScanlineSegmentation {
   const ColumnImage* image_ = nullptr;
   std::int32_t column_count_ = 0;
   std::int32_t height_px_ = 0;
-  float outlier2_ = 0.0F, bend2_ = 0.0F, max_gap_ = 0.0F, outlier_weight_ = 1.0F, fy_ = 1.0F, cy_ = 0.0F;
+  float outlier2_ = 0.0F, bend2_ = 0.0F, bend_rows_ = 0.0F, max_gap_ = 0.0F, outlier_weight_ = 1.0F, fy_ = 1.0F,
+        cy_ = 0.0F;
   float floor2_ = 0.0F;
   InverseSigma<float> sigma_{};  // of a column's inverse depth
   InverseSigma<float> jump_{};   // the most that a segment's first rows differ by from row to row: a polynomial like it

@@ -131,7 +131,7 @@ class FootholdTest : public ::testing::Test {
 
 LevelSurface prepared(const MapPolygon& polygon) {
   LevelSurface out;
-  EXPECT_TRUE(prepare(polygon, 0.0, EdgeMargin{}, kSole, out));
+  EXPECT_TRUE(prepare(polygon, 0.0, LevelSurfaceParams{}, EdgeMargin{}, kSole, out));
   return out;
 }
 

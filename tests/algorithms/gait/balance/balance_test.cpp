@@ -125,7 +125,7 @@ struct PressedSoles {
     }
   }
   [[nodiscard]] bool try_measure(Vec2& measured_m) const {
-    return try_measure_zmp(nominal_robot(), felt, odom_T_sole, slope, measured_m);
+    return try_measure_zmp({}, nominal_robot(), felt, odom_T_sole, slope, measured_m);
   }
 };
 

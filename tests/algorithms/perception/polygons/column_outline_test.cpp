@@ -6,6 +6,8 @@
 namespace polygmap {
 namespace {
 
+constexpr double kCorner_px = 4.0;
+
 ColumnExtents rectangle(std::int32_t first, std::int32_t last, std::int16_t top, std::int16_t bottom) {
   ColumnExtents profile;
   for (std::int32_t g = first; g <= last; ++g) profile.add(g, top, bottom);
@@ -23,7 +25,7 @@ OutlineSides upright_sides(std::int32_t first, std::int32_t last) {
 TEST(ColumnOutline, Rectangle_HasFourCornersInTheOrderOfThePicture) {
   ColumnOutline builder;
   Outline2 outline;
-  builder.build(rectangle(10, 20, 100, 199), upright_sides(10, 20), 20, outline);
+  builder.build(rectangle(10, 20, 100, 199), upright_sides(10, 20), kCorner_px, 20, outline);
   ASSERT_EQ(outline.size(), 4U);
   EXPECT_NEAR(twice_area(outline), 2.0 * 44.0 * 50.0, 1e-9);  // y down: right-hand turns count as positive
   for (const Vec2& p : outline) {
@@ -37,7 +39,7 @@ TEST(ColumnOutline, OneColumnThatRunsOver_DoesNotCarryTheHullAlong) {
   profile.columns[25].add(60, 230);
   ColumnOutline builder;
   Outline2 outline;
-  builder.build(profile, upright_sides(10, 40), 20, outline);
+  builder.build(profile, upright_sides(10, 40), kCorner_px, 20, outline);
   for (const Vec2& p : outline) EXPECT_TRUE(p.y() > 49.0 && p.y() < 100.0);
 }
 
@@ -48,7 +50,7 @@ TEST(ColumnOutline, FittedSides_CutWhatReachesBeyondAndCloseWhatFallsShort) {
   sides.right = {90.0, -0.05, 49.5, 99.5, true};
   ColumnOutline builder;
   Outline2 outline;
-  builder.build(rectangle(6, 20, 100, 199), sides, 20, outline);
+  builder.build(rectangle(6, 20, 100, 199), sides, kCorner_px, 20, outline);
   ASSERT_EQ(outline.size(), 4U);
   for (const Vec2& p : outline) {
     EXPECT_LT(std::min(std::abs(p.x() - sides.left.at(p.y())), std::abs(p.x() - sides.right.at(p.y()))), 1e-9);
@@ -63,7 +65,7 @@ TEST(ColumnOutline, SideSeenInItsLowerHalfOnly_IsNotExtendedUpwards) {
   sides.left = {39.0, 0.0, 74.5, 99.5, true};
   ColumnOutline builder;
   Outline2 outline;
-  builder.build(profile, sides, 20, outline);
+  builder.build(profile, sides, kCorner_px, 20, outline);
   double top = 1e9;
   for (const Vec2& p : outline) {
     EXPECT_GE(p.x(), 39.0 - 1e-9);
@@ -75,7 +77,7 @@ TEST(ColumnOutline, SideSeenInItsLowerHalfOnly_IsNotExtendedUpwards) {
 TEST(ColumnOutline, NoColumn_NoOutline) {
   ColumnOutline builder;
   Outline2 outline;
-  builder.build(ColumnExtents{}, {}, 20, outline);
+  builder.build(ColumnExtents{}, {}, kCorner_px, 20, outline);
   EXPECT_TRUE(outline.empty());
 }
 
@@ -87,7 +89,7 @@ TEST(ColumnOutline, RoundSurface_KeepsToItsVerticesAndInside) {
   }
   ColumnOutline builder;
   Outline2 outline;
-  builder.build(profile, upright_sides(0, 49), 12, outline);
+  builder.build(profile, upright_sides(0, 49), kCorner_px, 12, outline);
   EXPECT_LE(outline.size(), 12U);
   EXPECT_GT(0.5 * twice_area(outline), 0.85 * kPi * 100.0 * 50.0);
   EXPECT_LT(0.5 * twice_area(outline), 1.05 * kPi * 100.0 * 50.0);

@@ -35,7 +35,7 @@ double ratio(double even_z_m, double odd_z_m, double plane_z_m, bool measured = 
   raw.range.set({}, k.depth_unit_m);
   (*regions)[1].plane.m = Vec3::UnitZ() / plane_z_m;
   (*regions)[1].area_px = 200.0 * 16.0;
-  return inlier_ratio(*picture, raw, {}, *regions, 1);
+  return inlier_ratio(*picture, raw, {}, *regions, 1, 3.0);
 }
 
 TEST(InlierRatio, PixelsOnThePlane_AllSaySo) { EXPECT_EQ(ratio(2.0, 2.0, 2.0), 1.0); }
