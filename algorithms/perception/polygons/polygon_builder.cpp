@@ -239,7 +239,9 @@ bool PolygonBuilder::try_split_off(const FrameImage& picture, const PlaneAxes& a
   Piece piece = from;
   clip(piece.flat, side.point, side.inward);
   static_cast<void>(piece.cuts.try_push_back(side));
-  if (piece.flat.size() < 3 || cover.count(seen_of(picture.rays, axes, piece.flat)).own < params_.min_own) return true;
+  if (piece.flat.size() < 3) return true;
+  piece.pixels = cover.count(seen_of(picture.rays, axes, piece.flat));
+  if (piece.pixels->own < params_.min_own) return true;
   return pieces.try_push_back(piece);
 }
 
@@ -252,7 +254,8 @@ std::size_t PolygonBuilder::part_pieces(const FrameImage& picture, const PlaneAx
     Piece& piece = pieces[i];
     while (piece.flat.size() >= 3) {
       const Outline2 seen = seen_of(picture.rays, axes, piece.flat);
-      const PixelCover::Count pixels = cover.count(seen);
+      const PixelCover::Count pixels = piece.pixels ? *piece.pixels : cover.count(seen);
+      piece.pixels.reset();
       if (pixels.foreign < params_.min_foreign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign))
         break;
       Vec3 line;
@@ -345,7 +348,7 @@ PolygonBuilder::Built PolygonBuilder::build(const FrameImage& picture, const Reg
   const PixelCover cover(params_.cover, picture, regions, id, params_.apart_m);
   if (own.kind == SurfaceKind::kRiser) cut_at_treads(picture, regions, id, axes, flat);
   Pieces pieces;
-  static_cast<void>(pieces.try_push_back({flat, {}}));
+  static_cast<void>(pieces.try_push_back({flat, {}, {}}));
   Built built;
   for (const EdgeLine* line : {&lines.nosing, &lines.back, &lines.occluder}) {
     if (!try_cut_at_line(picture, *line, axes, cover, outline, pieces)) ++built.without_room;

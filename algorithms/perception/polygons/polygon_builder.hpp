@@ -86,8 +86,9 @@ class PolygonBuilder {
  private:
   static constexpr std::size_t kMaxPieces = 6, kMaxCuts = 4;
   struct Piece {
-    Outline2 flat;                           // on the plane
-    StaticVector<PlaneSide, kMaxCuts> cuts;  // that rid it of what is not its own
+    Outline2 flat;                            // on the plane
+    StaticVector<PlaneSide, kMaxCuts> cuts;   // that rid it of what is not its own
+    std::optional<PixelCover::Count> pixels;  // below it, where they are counted
   };
   using Pieces = StaticVector<Piece, kMaxPieces>;
 

@@ -82,8 +82,7 @@ RegionId label_beside(const FrameImage& image, const RawImage& raw, const DepthN
 // Of a row next to a border: its column says own, and another region side rows away.
 RegionId label_at_border(const RawImage& raw, const Regions& regions, const PublishedSurfaces& published, RegionId own,
                          RegionId other, std::int32_t column, std::int32_t row, std::int32_t side) noexcept {
-  // NOLINTNEXTLINE(bugprone-integer-division): the first pixel of the column of eight
-  const double middle_px = kColumn_px * (column / kColumn_px) + 0.5 * (kColumn_px - 1);
+  const double middle_px = column - column % kColumn_px + 0.5 * (kColumn_px - 1);
   const bool below = side > 0;
   const RegionId above = below ? own : other;
   const Region &upper = regions[above], &lower = regions[below ? other : own];
