@@ -3,10 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <ostream>
 #include <string>
 
 #include "sim_stub/host/climb/climb.hpp"
+#include "sim_stub/host/estimate/estimate_replay.hpp"
+#include "sim_stub/host/estimate/estimate_score.hpp"
+#include "sim_stub/host/perceive/perceive.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -89,6 +93,24 @@ TEST(ClimbOneStep, ThreadedRendering_Climbed) {
   EXPECT_TRUE(summary.pass) << summary.reason;
   EXPECT_EQ(summary.steps_climbed, 1);
   EXPECT_EQ(summary.heap_calls, 0U);
+}
+
+TEST(ClimbOneStep, SavedInputs_AreRead_AndTheEstimatorFollowsItsTruth) {
+  const std::string folder = testing::TempDir() + "polygmap_saved_inputs";
+  std::filesystem::create_directories(folder + "/inputs");
+  ClimbOptions options = options_of(6, 1);
+  options.out_dir = folder;
+  options.save_inputs = true;
+  EXPECT_EQ(climb(options).heap_calls, 0U);
+  const EstimateLog log = read_estimate_log(folder + "/inputs/log.csv");
+  const std::vector<LioRow> lio = read_lio_log(folder + "/inputs/lio.csv", log.start_s);
+  ASSERT_TRUE(log.has_truth);
+  const Score scored = score(log, replay(log, lio, {}));
+  EXPECT_GT(scored.distance_m, 1.0);
+  EXPECT_LT(scored.position_rmse_m, 0.02);
+  const DepthPng picture = read_depth(folder + "/inputs/depth_02.png");
+  EXPECT_EQ(picture.width_px, 640);
+  EXPECT_EQ(picture.height_px, 480);
 }
 
 TEST(ClimbContacts, InferredFromTorques_ClimbedWithinTheFigures) {
