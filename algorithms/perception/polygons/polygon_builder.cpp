@@ -339,7 +339,9 @@ PolygonBuilder::Built PolygonBuilder::build(const FrameImage& picture, const Reg
   const PlaneAxes axes = axes_of(own, lines);
   // The picture's outline onto the plane: a projection keeps it convex, and turns clockwise in the picture into
   // clockwise seen from the camera, so the order is reversed.
-  Outline2 flat;
+  Pieces pieces;
+  static_cast<void>(pieces.try_push_back({}));
+  Outline2& flat = pieces.front().flat;
   for (std::size_t i = outline.size(); i-- > 0;) {
     const Vec3 ray = picture.rays.ray(outline[i].x(), outline[i].y());
     if (own.plane.inverse_depth(ray) > 0.1) static_cast<void>(flat.try_push_back(axes.to_plane(own.plane.point(ray))));
@@ -347,8 +349,6 @@ PolygonBuilder::Built PolygonBuilder::build(const FrameImage& picture, const Reg
   if (flat.size() < 3 || !(twice_area(flat) > 0.0)) return {};
   const PixelCover cover(params_.cover, picture, regions, id, params_.apart_m);
   if (own.kind == SurfaceKind::kRiser) cut_at_treads(picture, regions, id, axes, flat);
-  Pieces pieces;
-  static_cast<void>(pieces.try_push_back({flat, {}, {}}));
   Built built;
   for (const EdgeLine* line : {&lines.nosing, &lines.back, &lines.occluder}) {
     if (!try_cut_at_line(picture, *line, axes, cover, outline, pieces)) ++built.without_room;

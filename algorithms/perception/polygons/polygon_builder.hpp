@@ -84,7 +84,7 @@ class PolygonBuilder {
               const SurfaceLines& lines, SurfacePatches& patches) const noexcept;
 
  private:
-  static constexpr std::size_t kMaxPieces = 6, kMaxCuts = 4;
+  static constexpr std::size_t kMaxPieces = 5, kMaxCuts = 4;
   struct Piece {
     Outline2 flat;                            // on the plane
     StaticVector<PlaneSide, kMaxCuts> cuts;   // that rid it of what is not its own

@@ -11,7 +11,7 @@
 namespace polygmap::sim {
 namespace {
 
-constexpr std::int64_t kPast_ns = 2 * kNsPerS;
+constexpr std::int64_t kTruthPast_ns = 2 * kNsPerS;
 constexpr std::size_t kSecond_ticks = static_cast<std::size_t>(1.0 / kPlantTick_s);
 // Two-sided 95 % bounds of chi squared with three degrees of freedom.
 constexpr double kPositionNeesLow = 0.2158, kPositionNeesHigh = 9.3484;
@@ -79,7 +79,7 @@ std::optional<Transform> OdometryReport::true_T_base_at(std::int64_t stamp_ns) c
 
 void OdometryReport::observe(const Truth& truth, const StateEstimate& state, GaitPhase phase) {
   past_.push_back({truth.stamp_ns, truth.true_T_base});
-  while (truth.stamp_ns - past_.front().stamp_ns > kPast_ns) past_.pop_front();
+  while (truth.stamp_ns - past_.front().stamp_ns > kTruthPast_ns) past_.pop_front();
   if (!aligned_) {
     if (!state.initialised) return;
     true_T_odom_ = aligned_worlds(truth.true_T_base, state.odom_T_base);
