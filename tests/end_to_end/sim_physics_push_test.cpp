@@ -66,7 +66,7 @@ INSTANTIATE_TEST_SUITE_P(SingleStep, Pushed, testing::ValuesIn(every_moment(1, G
 // Over four seeds every way at every moment. Of 64 such pushes one felled the robot (ss, seed 3, to the right) and one
 // left a sole 0.5 mm over an edge (ss, seed 2), 2026-11-23; toolchain/campaign pushes counts more of them.
 class LongPushed : public testing::TestWithParam<GaitPattern> {};
-TEST_P(LongPushed, FourSeedsEveryWayAtEveryMoment_AtMostOneFalls) {
+TEST_P(LongPushed, FourSeedsEveryWayAtEveryMoment_AtMostOneFallsAndNoneOnBothFeet) {
   int falls = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     for (const PushCase& c : every_moment(seed, GetParam())) {
@@ -78,7 +78,7 @@ TEST_P(LongPushed, FourSeedsEveryWayAtEveryMoment_AtMostOneFalls) {
       EXPECT_GE(out.sole_margin_m, -0.001) << "seed " << c.seed << ", moment " << c.moment;
     }
   }
-  EXPECT_LE(falls, 1);
+  EXPECT_LE(falls, GetParam() == GaitPattern::kSingleStep ? 1 : 0);
 }
 INSTANTIATE_TEST_SUITE_P(Long, LongPushed, testing::Values(GaitPattern::kDoubleStep, GaitPattern::kSingleStep));
 
