@@ -98,9 +98,10 @@ class FootholdSearch {
       field("back_min_m", p.back_min_m, 0.0, 0.5,
             "A riser or nosing that bounds a tread lies farther behind its nosing: what is nearer is the tread's own.");
       field("back_max_m", p.back_max_m, 0.1, 3.0,
-            "A riser or nosing that bounds a tread lies nearer behind its nosing: what is farther bounds another one.");
+            "A riser or nosing that bounds a tread lies nearer behind its nosing: what is farther, an obstacle too, is "
+            "another one's.");
       field.ordered("back_min_m", "back_max_m");
-      field("spacings", p.spacings, 2, 100,
+      field("spacings", p.spacings, 2, 14,
             "As many distances between the feet are tried, from half_spacing_m to half_spacing_min_m.");
       field("levels", p.levels);
       field("uprights", p.uprights);

@@ -28,7 +28,7 @@ class Balance {
       field("zmp", p.zmp);
       field("pressed_n", p.pressed_n, 1.0, 500.0,
             "A standing foot that is pressed less says the less of where the plan lies: it hangs and moves.");
-      field("bias_ticks", p.bias_ticks, 1, 100, "The bias is observed once in as many ticks, since it is slow.");
+      field("bias_ticks", p.bias_ticks, 1, 20, "The bias is observed once in as many ticks, since it is slow.");
     }
   };
   struct Reference {  // plan frame

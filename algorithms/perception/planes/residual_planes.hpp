@@ -31,7 +31,7 @@ class ResidualPlaneSearch {
       field("known_parallel_cos", p.known_parallel_cos, 0.5, 1.0,
             "A known plane whose turn against the axis has a larger cosine has a place along it.");
       field("peaks_apart_m", p.peaks_apart_m, 0.0, 0.5, "A peak nearer to one that was looked at is not looked at.");
-      field("around_bins", p.around_bins, 2, 100,
+      field("around_bins", p.around_bins, 2, 20,
             "A peak is compared with as many bins of 5 mm to each side of its middle.");
     }
   };

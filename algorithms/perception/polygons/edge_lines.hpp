@@ -22,9 +22,9 @@ class EdgeLineFinder {
     double enough = 0.9;
 
     static void visit(auto& p, auto& field) {
-      field("trials", p.trials, 1, 64, "As many lines through two of the last rows are tried.");
+      field("trials", p.trials, 1, 32, "As many lines through two of the last rows are tried.");
       field("tolerance_px", p.tolerance_px, 0.5, 50.0, "A last row that is nearer lies on such a line.");
-      field("enough", p.enough, 0.0, 1.0, "A line that holds for this share of the last rows ends the search.");
+      field("enough", p.enough, 0.1, 1.0, "A line that holds for this share of the last rows ends the search.");
     }
   };
   // By how much two planes meet elsewhere than their fits say, as the rows near the edge have it.

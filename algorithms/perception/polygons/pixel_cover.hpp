@@ -19,7 +19,7 @@ class PixelCover {
     static void visit(auto& p, auto& field) {
       field("foreign_cost", p.foreign_cost, 1, 100,
             "A cut that rids a polygon of another surface's pixel may cost as many of its own.");
-      field("neighbours", p.neighbours, 0, 16,
+      field("neighbours", p.neighbours, 0, 6,
             "A cut is tried where the plane meets those of as many neighbours, the ones with most pixels in the "
             "polygon.");
     }

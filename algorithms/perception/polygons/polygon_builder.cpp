@@ -246,7 +246,7 @@ bool PolygonBuilder::try_split_off(const FrameImage& picture, const PlaneAxes& a
 }
 
 // No line says so, but a hull around a corner covers what is not its own: the best cut parts it. A piece that was split
-// off and stays over what others own is no piece. Returns how many found no room.
+// off and keeps too little of the surface, or stays over what others own, is no piece. Returns how many found no room.
 std::size_t PolygonBuilder::part_pieces(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
                                         Pieces& pieces) const noexcept {
   std::size_t without_room = 0;
@@ -256,6 +256,10 @@ std::size_t PolygonBuilder::part_pieces(const FrameImage& picture, const PlaneAx
       const Outline2 seen = seen_of(picture.rays, axes, piece.flat);
       const PixelCover::Count pixels = piece.pixels ? *piece.pixels : cover.count(seen);
       piece.pixels.reset();
+      if (i > 0 && pixels.own < params_.min_own) {
+        piece.flat.clear();
+        break;
+      }
       if (pixels.foreign < params_.min_foreign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign))
         break;
       Vec3 line;

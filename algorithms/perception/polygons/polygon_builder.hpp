@@ -60,7 +60,7 @@ class PolygonBuilder {
       field("most_foreign", p.most_foreign, 0.0, 1.0,
             "A polygon of which a larger share of pixels is another plane's is cut back.");
       field("min_tread_columns", p.min_tread_columns, 1, 80, "A tread that ends a riser has as many columns.");
-      field("probes", p.probes, 1, 25, "A polygon's edge is judged in as many places.");
+      field("probes", p.probes, 1, 10, "A polygon's edge is judged in as many places.");
       field("tread_probe_px", p.tread_probe_px, 1, 64,
             "A tread that ends a riser is looked for as many rows beyond the riser's end.");
       field("min_tread_sin", p.min_tread_sin, 0.0, 0.99,

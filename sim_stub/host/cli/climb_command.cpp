@@ -311,11 +311,10 @@ std::string complaint(ClimbArguments& a) {
 }
 
 // Makes the directory and tries to write into it before a minute of climbing is spent.
-std::string output_complaint(const std::string& directory, bool with_inputs) {
+std::string directory_complaint(const std::string& directory) {
   namespace fs = std::filesystem;
-  if (directory.empty()) return "--out must name a directory.";
   std::error_code error;
-  fs::create_directories(with_inputs ? directory + "/inputs" : directory, error);
+  fs::create_directories(directory, error);
   if (!fs::is_directory(directory, error)) return "Cannot create the directory \"" + directory + "\" given by --out.";
   const fs::path probe = fs::path(directory) / ".polygmap_probe";
   std::ofstream file(probe);
@@ -323,11 +322,25 @@ std::string output_complaint(const std::string& directory, bool with_inputs) {
   file.close();
   const bool written = static_cast<bool>(file);
   fs::remove(probe, error);
-  if (!written) return "Cannot write into the directory \"" + directory + "\" given by --out.";
-  try {  // a former run's verdict is none of this one
+  return written ? "" : "Cannot write into the directory \"" + directory + "\" given by --out.";
+}
+
+std::string output_complaint(const std::string& directory, bool with_inputs) {
+  if (directory.empty()) return "--out must name a directory.";
+  std::string complaint = directory_complaint(directory);
+  if (complaint.empty() && with_inputs) complaint = directory_complaint(directory + "/inputs");
+  if (!complaint.empty()) return complaint;
+  try {  // what a former run left is none of this one's
     for (const char* name : {"summary.json", "climb.svg"}) remove_output(directory + "/" + name);
-  } catch (const config::FileError& complaint) {
-    return complaint.what();
+    if (with_inputs) {
+      for (const auto& entry : std::filesystem::directory_iterator(directory + "/inputs")) {
+        const std::string name = entry.path().filename().string();
+        const bool picture = name.starts_with("depth_") && name.ends_with(".png");
+        if (picture || name == "log.csv" || name == "lio.csv") remove_output(entry.path().string());
+      }
+    }
+  } catch (const std::exception& error) {
+    return error.what();
   }
   return {};
 }

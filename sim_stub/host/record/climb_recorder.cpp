@@ -93,12 +93,12 @@ void ClimbRecorder::observe(const Truth& truth, const StateEstimate& state) {
         base_T_sole(nominal_robot().legs, foot, leg_joints(last_joints_.q_rad, foot)).p_m;
   }
   row.truth.true_T_base = truth.true_T_base;
-  if (!rows_.empty()) {
-    const LogRow& before = rows_.back();
-    row.truth.true_v_base_mps =
-        (row.truth.true_T_base.p_m - before.truth.true_T_base.p_m) / seconds(row.stamp_ns - before.stamp_ns);
-  }
   rows_.push_back(row);
+  if (rows_.size() < 3) return;
+  // The velocity of the row before the newest, by central difference: without its delay.
+  const LogRow& before = rows_[rows_.size() - 3];
+  rows_[rows_.size() - 2].truth.true_v_base_mps =
+      (row.truth.true_T_base.p_m - before.truth.true_T_base.p_m) / seconds(row.stamp_ns - before.stamp_ns);
 }
 
 void ClimbRecorder::write(const std::string& folder) const {
