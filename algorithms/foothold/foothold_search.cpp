@@ -407,8 +407,8 @@ bool FootholdSearch::carries(const Upright& riser, const LevelSurface& tread) co
 // A face that rises from the level the robot stands on higher than it may climb, before the next tread.
 bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) const noexcept {
   const Vec2 sole_p_m = base_(sole_.origin_m());
-  const double farthest_m =
-      std::min(query_.climbing ? sole_p_m.x() + params_.step_max_m : params_.g_range_m, next_distance_m + 0.1);
+  const double farthest_m = std::min(query_.climbing ? sole_p_m.x() + params_.step_max_m : params_.g_range_m,
+                                     next_distance_m + params_.upright_beyond_m);
   for (const Upright& u : uprights_) {
     if (u.top_m - z_foot_ <= params_.rise_max_m || u.bottom_m > z_foot_ + 2.0 * params_.delta_foot_m) continue;
     // A post is no rise: the feet may go beside it, see link_upright().

@@ -50,6 +50,7 @@ class FootholdSearch {
     std::uint32_t confirmed_sightings = 5;
     double centre_ahead_m = 0.4;
     double back_min_m = 0.05, back_max_m = 0.8;
+    double upright_beyond_m = 0.1;
     std::int32_t spacings = 7;
     LevelSurfaceParams levels;
     UprightParams uprights;
@@ -101,6 +102,8 @@ class FootholdSearch {
             "A riser or nosing that bounds a tread lies nearer behind its nosing: what is farther, an obstacle too, is "
             "another one's.");
       field.ordered("back_min_m", "back_max_m");
+      field("upright_beyond_m", p.upright_beyond_m, 0.0, 0.5,
+            "An upright surface this much farther away than the next tread's nearest point is not looked at.");
       field("spacings", p.spacings, 2, 14,
             "As many distances between the feet are tried, from half_spacing_m to half_spacing_min_m.");
       field("levels", p.levels);

@@ -159,8 +159,8 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   } else if (floor_steps_ == 0) {
     foot = swing_foot(displacement(middle_of(situation.soles), torso_goal), foot, params_.rule);
   }
-  const double half_width_m = math::clamp(0.5 * (to.soles[0].position_m - to.soles[1].position_m).norm(), 0.08,
-                                          robot_->stance.half_width_m + 0.03);
+  const double half_width_m = math::clamp(0.5 * (to.soles[0].position_m - to.soles[1].position_m).norm(),
+                                          params_.least_half_width_m, robot_->stance.half_width_m + params_.wider_m);
   const SolePose& stance = situation.soles[index_of(other(foot))];
   goal = {};
   goal.kind = StepKind::kFloor;

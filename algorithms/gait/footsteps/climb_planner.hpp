@@ -39,6 +39,8 @@ class ClimbPlanner {
     double under_way = 0.5;
     double shorter = 0.6;
     double shortest = 0.2;
+    double least_half_width_m = 0.08;
+    double wider_m = 0.03;
 
     static void visit(auto& p, auto& field) {
       field("pattern", p.pattern, kGaitPatternNames,
@@ -69,6 +71,10 @@ class ClimbPlanner {
             "The tolerance relaxes by this times itself while the weight is on its way for the first leading step.");
       field("shorter", p.shorter, 0.1, 0.95, "Floor steps become this times as long when the legs cannot do one.");
       field("shortest", p.shortest, 0.01, 1.0, "Floor steps that would be no longer than this share are given up.");
+      field("least_half_width_m", p.least_half_width_m, 0.03, 0.08,
+            "Floor steps keep the soles at least this far from their middle.");
+      field("wider_m", p.wider_m, 0.0, 0.2,
+            "Floor steps keep the soles no farther from their middle than the stance's half width and this.");
     }
   };
 

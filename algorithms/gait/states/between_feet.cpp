@@ -36,7 +36,7 @@ void BetweenFeet::follow(const GaitInput& in, GaitShared& gait) noexcept {
 void BetweenFeet::rise(GaitShared& gait) noexcept {
   const std::int32_t settle_ticks = gait.params.standing.settle_ticks;
   const double height_m = torso_between(gait.robot.legs, gait.params.step.torso, gait.plan.soles()).position_m.z();
-  if (height_m < crouch_.upright_height_m() + Crouch::kStep_m) return;
+  if (height_m < crouch_.upright_height_m() + gait.params.crouch.step_m) return;
   crouch_.set_upright_height_m(height_m);
   gait.plan.move_torso(crouch_.height_m(), crouch_.yaw_rad(), settle_ticks, settle_ticks);
 }

@@ -8,8 +8,6 @@ namespace polygmap {
 
 class Crouch {
  public:
-  static constexpr double kStep_m = 0.005;  // less is not worth a new plan of the torso
-
   // The torso is to be there when nothing is off: as low as the body is off now.
   void begin(const GaitInput& in, const GaitShared& gait, double height_m, double yaw_rad) noexcept {
     height_m_ = height_m;
@@ -18,15 +16,15 @@ class Crouch {
   }
   // One tick: lower, as soon as it is needed for longer than an estimate jumps. rest_ticks: of the torso's plan.
   void update(const GaitInput& in, GaitShared& gait, std::int32_t rest_ticks) noexcept {
-    constexpr std::int32_t kOff_ticks = 5, kCrouch_ticks = 100;
+    const CrouchParams& params = gait.params.crouch;
     const double wanted = wanted_m(in, gait.params);
-    if (wanted < crouched_m_ + kStep_m) {
+    if (wanted < crouched_m_ + params.step_m) {
       off_ticks_ = 0;
       return;
     }
-    if (++off_ticks_ < kOff_ticks) return;
+    if (++off_ticks_ < params.off_ticks) return;
     crouched_m_ = wanted;
-    gait.plan.move_torso(height_m(), yaw_rad_, std::max(rest_ticks, kCrouch_ticks), kCrouch_ticks);
+    gait.plan.move_torso(height_m(), yaw_rad_, std::max(rest_ticks, params.plan_ticks), params.plan_ticks);
   }
   void set_upright_height_m(double height_m) noexcept { height_m_ = height_m; }
 

@@ -14,10 +14,16 @@ namespace polygmap {
 struct CrouchParams {
   double gain = 1.0;
   double max_m = 0.04;
+  double step_m = 0.005;
+  std::int32_t off_ticks = 5;
+  std::int32_t plan_ticks = 100;
 
   static void visit(auto& p, auto& field) {
     field("gain", p.gain, 0.0, 10.0, "The torso goes lower by this for each metre of the divergent component's error.");
     field("max_m", p.max_m, 0.0, 0.2, "The torso goes no lower.");
+    field("step_m", p.step_m, 0.001, 0.1, "A smaller change of height is not worth a new plan of the torso.");
+    field("off_ticks", p.off_ticks, 1, 100, "More crouch is wanted for as long: an estimate that jumps is no fall.");
+    field("plan_ticks", p.plan_ticks, 2, 2000, "The torso takes so long.");
   }
 };
 

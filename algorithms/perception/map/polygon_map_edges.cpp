@@ -68,8 +68,9 @@ bool PolygonMap::agrees(const TrackedLine& line, const SeenLine& seen) const noe
   const Vec2 along = seen.b_m - seen.a_m, middle = 0.5 * (seen.a_m + seen.b_m);
   const double half_m = std::abs(along.y()) / math::sqrt(12.0);
   const double sigma = math::sqrt(seen.variance_m2 + std::min(line.variance_m2(middle.y()), 1.0));
-  const double gate = math::clamp(4.0 * sigma, params_.line_gate_min_m, params_.line_gate_max_m);
-  const double turn_gate = std::max(params_.line_turn_gate, 4.0 * math::sqrt(seen.variance_m2) / half_m);
+  const double gate = math::clamp(params_.line_sigmas * sigma, params_.line_gate_min_m, params_.line_gate_max_m);
+  const double turn_gate =
+      std::max(params_.line_turn_gate, params_.line_sigmas * math::sqrt(seen.variance_m2) / half_m);
   return std::abs(middle.x() - line.at_m(middle.y())) <= gate &&
          std::abs(along.x() / along.y() - line.state[1]) <= turn_gate;
 }

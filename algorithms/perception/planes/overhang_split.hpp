@@ -19,6 +19,7 @@ class OverhangSplit {
   struct Params {
     double least_lean_rad = 0.04;
     double most_lean_rad = 0.5;
+    // Nosings of 20 to 40 mm, both noises and both plants: planes at 28.0 Hz or more with 0.9, 27.0 with 0.5 (2026-11).
     double most_left = 0.9;
     double least_step_m = 0.005;
     std::int32_t least_rows = 30;

@@ -488,7 +488,7 @@ bool EdgeLineFinder::try_meet_other(const Fit& fit, EdgeLine& line) noexcept {
   const double middle_s = 0.5 * (fit.lo_m + fit.hi_m), middle_t = 0.25 * (t_lo + t_hi + meet_lo + meet_hi);
   const Vec3 centre = axes_.point(middle_s, middle_t);
   const double met_sigma_m = plane_sigma_m(other_.plane, other_.both_covariance, centre / centre.z());
-  const double apart_m = 1.5 * math::sqrt(math::square(fit.sigma_m) + math::square(met_sigma_m));
+  const double apart_m = params_.agree_sigmas * math::sqrt(math::square(fit.sigma_m) + math::square(met_sigma_m));
   const double limit_m = std::max(math::clamp(apart_m, params_.agree_m, params_.agree_max_m),
                                   params_.agree_px * pixel_m(middle_s, middle_t));
   if (!(std::abs(apart) < limit_m)) return !begins_at_face();

@@ -57,6 +57,7 @@ class EdgeLineFinder {
     double agree_m = 0.003;
     double agree_max_m = 0.008;
     double agree_px = 0.3;
+    double agree_sigmas = 1.5;
     double face_m = 0.006;
     double face_max_m = 0.08;
     double slow_error_m = 0.0012;
@@ -88,6 +89,8 @@ class EdgeLineFinder {
             "The line where two planes meet is never taken when it is farther from the change-points.");
       field("agree_px", p.agree_px, 0.0, 20.0,
             "Far away, where a pixel is centimetres of the surface, agreement is counted in pixels.");
+      field("agree_sigmas", p.agree_sigmas, 0.1, 10.0,
+            "Agreement within as many sigmas of both, between agree_m and agree_max_m.");
       field("face_m", p.face_m, 0.0, 0.1, "An overhang's front face stands out from the riser by more.");
       field("face_max_m", p.face_max_m, 0.0, 0.5, "An overhang's front face stands out from the riser by less.");
       field.ordered("face_m", "face_max_m");
