@@ -15,11 +15,11 @@
 namespace polygmap::sim {
 namespace {
 
-struct Call {
+struct ToolCall {
   int code = -1;
   std::string out, err;
 };
-Call call(const std::vector<std::string>& arguments) {
+ToolCall call_tool(const std::vector<std::string>& arguments) {
   std::ostringstream out, err;
   const int code = polygmap_main(arguments, run_climb, out, err, false);
   return {code, out.str(), err.str()};
@@ -33,7 +33,7 @@ std::string write(const std::string& text) {
 }
 
 TEST(ParamsCommand, List_ReadsBackToTheLastBit) {
-  const Call listed = call({"params", "list"});
+  const ToolCall listed = call_tool({"params", "list"});
   EXPECT_EQ(listed.code, kExitPass);
   Params params;
   params.estimator.fusion.tau_s = 0.1;  // the file must bring it back
@@ -44,8 +44,9 @@ TEST(ParamsCommand, List_ReadsBackToTheLastBit) {
 
 TEST(ParamsCommand, ListOfAFile_ShowsItsValues) {
   const std::string file = write("estimator.fusion.tau_s = 2.5\n");
-  EXPECT_NE(call({"params", "list", "--params", file}).out.find("\ntau_s = 2.5  # 0 to 1000 s: "), std::string::npos);
-  const auto json = nlohmann::json::parse(call({"params", "list", "--json", "--params", file}).out);
+  EXPECT_NE(call_tool({"params", "list", "--params", file}).out.find("\ntau_s = 2.5  # 0 to 1000 s: "),
+            std::string::npos);
+  const auto json = nlohmann::json::parse(call_tool({"params", "list", "--json", "--params", file}).out);
   bool found = false;
   for (const auto& param : json.at("params")) {
     if (param.at("name") != "estimator.fusion.tau_s") continue;
@@ -59,9 +60,9 @@ TEST(ParamsCommand, ListOfAFile_ShowsItsValues) {
 }
 
 TEST(ParamsCommand, Diff_SaysWhatIsNotTheDefault) {
-  const Call same = call({"params", "diff", write("estimator.fusion.tau_s = 4.0\n")});
+  const ToolCall same = call_tool({"params", "diff", write("estimator.fusion.tau_s = 4.0\n")});
   EXPECT_EQ(same.out, "No parameter differs from its default.\n");
-  const Call other = call({"params", "diff", write("estimator.fusion.tau_s = 2\nself_filter = false\n")});
+  const ToolCall other = call_tool({"params", "diff", write("estimator.fusion.tau_s = 2\nself_filter = false\n")});
   EXPECT_EQ(other.code, kExitPass);
   EXPECT_EQ(other.out, "self_filter = false  # default true\nestimator.fusion.tau_s = 2  # default 4\n")
       << "of a file, what stands before its tables comes first";
@@ -75,7 +76,7 @@ TEST(ParamsCommand, BadFile_IsOneSentenceAndExit2) {
                                                 {"params", "diff", "/nowhere"},
                                                 {"params"},
                                                 {"params", "list", "--params", ""}}) {
-    const Call refused = call(words);
+    const ToolCall refused = call_tool(words);
     EXPECT_EQ(refused.code, kExitUsage) << words[0];
     EXPECT_EQ(refused.out, "");
     EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
@@ -84,7 +85,7 @@ TEST(ParamsCommand, BadFile_IsOneSentenceAndExit2) {
 }
 
 TEST(ParamsCommand, Docs_NameEveryParameterWithItsRange) {
-  const std::string out = call({"params", "docs"}).out;
+  const std::string out = call_tool({"params", "docs"}).out;
   Params params;
   const auto rows = static_cast<std::size_t>(std::count(out.begin(), out.end(), '\n'));
   EXPECT_GT(rows, config::param_table(params).params.size());
