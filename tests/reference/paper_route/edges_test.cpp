@@ -10,14 +10,14 @@
 namespace polygmap {
 namespace {
 
-struct Scene {
+struct EdgeScene {
   HalfRays rays;
   std::unique_ptr<InverseDepthImage> w = std::make_unique<InverseDepthImage>();
   std::unique_ptr<NormalImage> normals = std::make_unique<NormalImage>();
   std::unique_ptr<NormalEstimation> estimation = std::make_unique<NormalEstimation>();
   std::unique_ptr<EdgeDetection> stage = std::make_unique<EdgeDetection>();
 
-  Scene() { rays.set(robot_camera_intrinsics()); }
+  EdgeScene() { rays.set(robot_camera_intrinsics()); }
   void run(const EdgeDetection::Params& params = {}) {
     const std::int32_t height = rays.height_px;
     for (std::int32_t r = 0; r < height; ++r) estimation->estimate_row({}, rays, *w, r, *normals);
@@ -49,7 +49,7 @@ float inverse_depth(const Vec3& ray, const Vec3& normal, double d_m) {
 }
 
 TEST(Edges, CreaseBetweenTreadAndRiser_IsOneThinLineAtTheCrease) {
-  Scene scene;
+  EdgeScene scene;
   const Vec3 tread = Vec3{0, -0.5, -0.866}.normalized(), riser = Vec3{0, 0.866, -0.5}.normalized();
   // Both meet where n_t . ray / d_t = n_r . ray / d_r.
   for (std::int32_t r = 0; r < kHalfHeight_px; ++r) {
@@ -79,7 +79,7 @@ TEST(Edges, CreaseBetweenTreadAndRiser_IsOneThinLineAtTheCrease) {
 }
 
 TEST(Edges, DepthJumpBetweenParallelPlanes_IsAnEdge) {
-  Scene scene;
+  EdgeScene scene;
   const Vec3 tread = Vec3{0, -0.5, -0.866}.normalized();
   for (std::int32_t r = 0; r < kHalfHeight_px; ++r) {
     for (std::int32_t c = 0; c < kHalfWidth_px; ++c) {
@@ -95,7 +95,7 @@ TEST(Edges, DepthJumpBetweenParallelPlanes_IsAnEdge) {
 }
 
 TEST(Edges, PlainPlane_HasNone) {
-  Scene scene;
+  EdgeScene scene;
   for (std::int32_t r = 0; r < kHalfHeight_px; ++r) {
     for (std::int32_t c = 0; c < kHalfWidth_px; ++c) {
       (*scene.w)(c, r) = inverse_depth(scene.rays.ray(c, r), Vec3{0.1, -0.5, -0.85}.normalized(), 0.7);
@@ -113,7 +113,7 @@ TEST(Edges, PlainPlane_HasNone) {
 TEST(Edges, Hysteresis_WeakPixelsNextToStrongOnes_AreKeptAndLoneOnesAreNot) {
   // A jump whose height grows along the row from nothing: weak first, strong later.
   const auto edges_with = [](double high) {
-    Scene scene;
+    EdgeScene scene;
     for (std::int32_t r = 0; r < kHalfHeight_px; ++r) {
       for (std::int32_t c = 0; c < kHalfWidth_px; ++c) {
         (*scene.w)(c, r) = r < 120 ? 1.0F : 1.0F + 0.00012F * static_cast<float>(c);
