@@ -171,8 +171,8 @@ bool PolygonMap::load(const SurfacePatch& patch) noexcept {
   seen_.plane = map_T_camera_ * Plane{patch.normal.normalized(), patch.d_m};
   const double up = seen_.plane.normal.z();
   if (seen_.plane.distance_m(map_T_camera_.p_m) <= 0.0) return false;  // seen from behind
-  if (patch.kind == SurfaceKind::kTread && up < params_.tread_up_min) return false;
-  if (patch.kind == SurfaceKind::kRiser && std::abs(up) > params_.riser_up_max) return false;
+  if (patch.kind == SurfaceKind::kTread && up < params_.kinds.tread_up_min) return false;
+  if (patch.kind == SurfaceKind::kRiser && std::abs(up) > params_.kinds.riser_up_max) return false;
   seen_.centroid_m = seen_.plane.project(map_T_camera_ * patch.centroid_m);
   seen_.offset_variance_m2 = math::square(std::max(patch.offset_sigma_m, params_.least_sigma_m));
   seen_.tilt_variance_rad2 = math::square(std::max(patch.tilt_sigma_rad, params_.least_tilt_sigma_rad));

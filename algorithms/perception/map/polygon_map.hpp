@@ -23,6 +23,18 @@ namespace polygmap {
 // nothing: surfaces out of view stay in place against those in view. The map's world is that of the pose at the start.
 class PolygonMap {
  public:
+  // What a surface of a kind cannot be: its normal in the map says so.
+  struct KindParams {
+    double tread_up_min = 0.8;
+    double riser_up_max = 0.5;
+
+    static void visit(auto& p, auto& field) {
+      field("tread_up_min", p.tread_up_min, 0.0, 1.0,
+            "A tread whose normal has a smaller upward part in the map is rejected.");
+      field("riser_up_max", p.riser_up_max, 0.0, 1.0,
+            "A riser whose normal has a larger upward or downward part in the map is rejected.");
+    }
+  };
   struct Params {
     double window_s = 1.5;
     double height_gate_min_m = 0.008;
@@ -56,9 +68,8 @@ class PolygonMap {
     double least_tilt_sigma_rad = 0.0005;
     double max_range_m = 10.0;
     double turn_slope = 0.05;
-    double tread_up_min = 0.8;
-    double riser_up_max = 0.5;
     double line_sigmas = 4.0;
+    KindParams kinds;
     SeenEndParams ends;
     MapDrift::Params drift;
 
@@ -120,12 +131,9 @@ class PolygonMap {
       field("max_range_m", p.max_range_m, 0.5, 100.0, "A surface that reaches farther from the camera is rejected.");
       field("turn_slope", p.turn_slope, 0.0, 1.0,
             "A tread's axes turn to its nosing, or its back line, where that has a larger slope in them.");
-      field("tread_up_min", p.tread_up_min, 0.0, 1.0,
-            "A tread whose normal has a smaller upward part in the map is rejected.");
-      field("riser_up_max", p.riser_up_max, 0.0, 1.0,
-            "A riser whose normal has a larger upward or downward part in the map is rejected.");
       field("line_sigmas", p.line_sigmas, 1.0, 20.0,
             "An edge as many sigmas from the remembered one is an outlier, between the two gates.");
+      field("kinds", p.kinds);
       field("ends", p.ends);
       field("drift", p.drift);
     }
