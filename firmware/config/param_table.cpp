@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "firmware/params.hpp"
+
 namespace polygmap::config {
 namespace {
 
@@ -140,5 +142,48 @@ std::string hash_of(const ParamTable& table) {
   std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
   return digits;
 }
+
+namespace detail {
+
+Collector::Collector(std::string prefix) : prefix_(std::move(prefix)) {}
+
+void Collector::operator()(std::string_view name, bool& value, std::string_view text) {
+  add(name, &value, 0.0, 1.0, text);
+}
+
+void Collector::operator()(std::string_view name, Mat3& value, std::string_view text) {
+  add(name, RotationValue{&value}, -kPi, kPi, text);
+}
+
+void Collector::operator()(std::string_view name, Transform& value, std::string_view text) {
+  Collector inner(full(name) + ".");
+  inner("p_m", value.p_m, -2.0, 2.0, text);
+  inner("rpy_rad", value.R, "Roll, pitch and yaw of the same, R = Rz Ry Rx.");
+  append(std::move(inner).take());
+}
+
+void Collector::ordered(std::string_view less, std::string_view more) {
+  own_.orders.push_back({full(less), full(more)});
+}
+
+ParamTable Collector::take() && {
+  own_.params.insert(own_.params.end(), nested_.begin(), nested_.end());
+  return std::move(own_);
+}
+
+std::string Collector::full(std::string_view name) const { return prefix_ + std::string(name); }
+
+void Collector::add(std::string_view name, ParamValue value, double least, double most, std::string_view text) {
+  own_.params.push_back({full(name), value, least, most, text});
+}
+
+void Collector::append(ParamTable inner) {
+  nested_.insert(nested_.end(), inner.params.begin(), inner.params.end());
+  own_.orders.insert(own_.orders.end(), inner.orders.begin(), inner.orders.end());
+}
+
+}  // namespace detail
+
+template ParamTable param_table(Params& root);
 
 }  // namespace polygmap::config

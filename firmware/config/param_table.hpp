@@ -23,7 +23,9 @@
 
 #include "algorithms/core/math/transform.hpp"
 
-namespace polygmap::config {
+namespace polygmap {
+struct Params;
+namespace config {
 
 struct EnumValue {
   std::uint8_t* value;
@@ -75,7 +77,7 @@ inline constexpr bool kIsReals<Eigen::Matrix<double, N, 1>> = true;
 
 class Collector {
  public:
-  explicit Collector(std::string prefix) : prefix_(std::move(prefix)) {}
+  explicit Collector(std::string prefix);
 
   template <class T>
   void operator()(std::string_view name, T& value, double least, double most, std::string_view text) {
@@ -85,22 +87,15 @@ class Collector {
       add(name, &value, least, most, text);
     }
   }
-  void operator()(std::string_view name, bool& value, std::string_view text) { add(name, &value, 0.0, 1.0, text); }
+  void operator()(std::string_view name, bool& value, std::string_view text);
   template <class Enum, std::size_t N>
   requires std::is_enum_v<Enum> &&(sizeof(Enum) == 1) void operator()(std::string_view name, Enum& value,
                                                                       const std::array<std::string_view, N>& names,
                                                                       std::string_view text) {
     add(name, EnumValue{reinterpret_cast<std::uint8_t*>(&value), names}, 0.0, static_cast<double>(N - 1), text);
   }
-  void operator()(std::string_view name, Mat3& value, std::string_view text) {
-    add(name, RotationValue{&value}, -kPi, kPi, text);
-  }
-  void operator()(std::string_view name, Transform& value, std::string_view text) {
-    Collector inner(full(name) + ".");
-    inner("p_m", value.p_m, -2.0, 2.0, text);
-    inner("rpy_rad", value.R, "Roll, pitch and yaw of the same, R = Rz Ry Rx.");
-    append(std::move(inner).take());
-  }
+  void operator()(std::string_view name, Mat3& value, std::string_view text);
+  void operator()(std::string_view name, Transform& value, std::string_view text);
   template <class T, std::size_t N>
   requires std::is_class_v<T>
   void operator()(std::string_view name, std::array<T, N>& values, const std::array<std::string_view, N>& names) {
@@ -113,23 +108,15 @@ class Collector {
     T::visit(value, inner);
     append(std::move(inner).take());
   }
-  void ordered(std::string_view less, std::string_view more) { own_.orders.push_back({full(less), full(more)}); }
+  void ordered(std::string_view less, std::string_view more);
 
   // A struct's own fields, then those of the structs in it: each table in one piece, as a file has it.
-  [[nodiscard]] ParamTable take() && {
-    own_.params.insert(own_.params.end(), nested_.begin(), nested_.end());
-    return std::move(own_);
-  }
+  [[nodiscard]] ParamTable take() &&;
 
  private:
-  [[nodiscard]] std::string full(std::string_view name) const { return prefix_ + std::string(name); }
-  void add(std::string_view name, ParamValue value, double least, double most, std::string_view text) {
-    own_.params.push_back({full(name), value, least, most, text});
-  }
-  void append(ParamTable inner) {
-    nested_.insert(nested_.end(), inner.params.begin(), inner.params.end());
-    own_.orders.insert(own_.orders.end(), inner.orders.begin(), inner.orders.end());
-  }
+  [[nodiscard]] std::string full(std::string_view name) const;
+  void add(std::string_view name, ParamValue value, double least, double most, std::string_view text);
+  void append(ParamTable inner);
   std::string prefix_;
   ParamTable own_;
   std::vector<Param> nested_;
@@ -144,10 +131,13 @@ template <class T>
   T::visit(root, collector);
   return std::move(collector).take();
 }
+// Compiled once: the walk over all fields is large.
+extern template ParamTable param_table(Params& root);
 template <class T>
 [[nodiscard]] std::string hash_of(const T& root) {
   T copy = root;
   return hash_of(param_table(copy));
 }
 
-}  // namespace polygmap::config
+}  // namespace config
+}  // namespace polygmap

@@ -35,6 +35,28 @@ class PolygonMap {
             "A riser whose normal has a larger upward or downward part in the map is rejected.");
     }
   };
+  // Edges that are remembered as lines.
+  struct LineParams {
+    double gate_min_m = 0.012;
+    double gate_max_m = 0.025;
+    double turn_gate = 0.15;
+    double sigmas = 4.0;
+    double min_length_m = 0.05;
+    std::uint32_t min_sightings = 3;
+
+    static void visit(auto& p, auto& field) {
+      field("gate_min_m", p.gate_min_m, 0.0, 0.1,
+            "An edge as near to the remembered one is no outlier, whatever its sigmas.");
+      field("gate_max_m", p.gate_max_m, 0.0, 0.2,
+            "An edge farther from the remembered one is an outlier, whatever its sigmas.");
+      field.ordered("gate_min_m", "gate_max_m");
+      field("turn_gate", p.turn_gate, 0.001, 10.0, "An edge's slope against the remembered line is no more.");
+      field("sigmas", p.sigmas, 1.0, 20.0,
+            "An edge as many sigmas from the remembered one is an outlier, between the two gates.");
+      field("min_length_m", p.min_length_m, 0.0, 1.0, "A shorter edge says nothing.");
+      field("min_sightings", p.min_sightings, 1, 1000, "A line is told once it has been seen as often.");
+    }
+  };
   struct Params {
     double window_s = 1.5;
     double height_gate_min_m = 0.008;
@@ -45,15 +67,10 @@ class PolygonMap {
     double overlap_fraction = 0.3;
     double lateral_gap_m = 0.5;
     double other_gap_m = 0.1;
-    double line_gate_min_m = 0.012;
-    double line_gate_max_m = 0.025;
-    double line_turn_gate = 0.15;
-    double line_min_length_m = 0.05;
     double side_sigma_m = 0.005;
     double side_gate_m = 0.025;
     double unknown_margin_m = 0.010;
     std::uint32_t outliers_to_reset = 8;
-    std::uint32_t line_min_sightings = 3;
     std::uint32_t confirmed_sightings = 5;
     std::uint32_t misses_unconfirmed = 4;
     std::uint32_t misses_confirmed = 90;
@@ -68,8 +85,8 @@ class PolygonMap {
     double least_tilt_sigma_rad = 0.0005;
     double max_range_m = 10.0;
     double turn_slope = 0.05;
-    double line_sigmas = 4.0;
     KindParams kinds;
+    LineParams lines;
     SeenEndParams ends;
     MapDrift::Params drift;
 
@@ -92,20 +109,12 @@ class PolygonMap {
       field("lateral_gap_m", p.lateral_gap_m, 0.0, 5.0,
             "Parts of one tread lie this far apart at most: the robot's own leg may split it in two.");
       field("other_gap_m", p.other_gap_m, 0.0, 5.0, "Parts of any other surface lie this far apart at most.");
-      field("line_gate_min_m", p.line_gate_min_m, 0.0, 0.1,
-            "An edge as near to the remembered one is no outlier, whatever its sigmas.");
-      field("line_gate_max_m", p.line_gate_max_m, 0.0, 0.2,
-            "An edge farther from the remembered one is an outlier, whatever its sigmas.");
-      field.ordered("line_gate_min_m", "line_gate_max_m");
-      field("line_turn_gate", p.line_turn_gate, 0.001, 10.0, "An edge's slope against the remembered line is no more.");
-      field("line_min_length_m", p.line_min_length_m, 0.0, 1.0, "A shorter edge says nothing.");
       field("side_sigma_m", p.side_sigma_m, 1e-4, 0.1, "Place of an observed end.");
       field("side_gate_m", p.side_gate_m, 0.001, 0.5, "An observed end farther off is an outlier.");
       field("unknown_margin_m", p.unknown_margin_m, 0.0, 0.1,
             "Two sigmas of a vertex, so that noise does not make unknown ends grow.");
       field("outliers_to_reset", p.outliers_to_reset, 1, 1000,
             "After as many outliers in a row the new evidence wins.");
-      field("line_min_sightings", p.line_min_sightings, 1, 1000, "A line is told once it has been seen as often.");
       field("confirmed_sightings", p.confirmed_sightings, 1, 1000,
             "A surface is confirmed once it has been seen as often.");
       field("misses_unconfirmed", p.misses_unconfirmed, 1, 1000,
@@ -131,9 +140,8 @@ class PolygonMap {
       field("max_range_m", p.max_range_m, 0.5, 100.0, "A surface that reaches farther from the camera is rejected.");
       field("turn_slope", p.turn_slope, 0.0, 1.0,
             "A tread's axes turn to its nosing, or its back line, where that has a larger slope in them.");
-      field("line_sigmas", p.line_sigmas, 1.0, 20.0,
-            "An edge as many sigmas from the remembered one is an outlier, between the two gates.");
       field("kinds", p.kinds);
+      field("lines", p.lines);
       field("ends", p.ends);
       field("drift", p.drift);
     }

@@ -18,7 +18,7 @@ std::optional<Vec3> PolygonMap::heading_from_lines() const noexcept {
   for (const EdgeLine* line : {&seen_.nosing, &seen_.back}) {
     if (!line->valid) continue;
     const Vec3 along = line->b_m - line->a_m;
-    if (along.squaredNorm() < math::square(params_.line_min_length_m)) continue;
+    if (along.squaredNorm() < math::square(params_.lines.min_length_m)) continue;
     const Vec3 heading = along.cross(seen_.plane.normal).normalized();
     // From the nosing into the surface, out of it over the back edge.
     const double into = heading.dot(seen_.centroid_m - line->a_m) * (line == &seen_.nosing ? 1.0 : -1.0);
@@ -33,7 +33,8 @@ std::optional<SeenLine> PolygonMap::local_line(const MapTrack& track, const Edge
                       math::square(std::max(line.sigma_m, params_.least_sigma_m))};
   const Vec2 along = seen.b_m - seen.a_m;
   // More than 45 degrees off is no edge across the stairs.
-  if (std::abs(along.y()) < params_.line_min_length_m || std::abs(along.x()) > std::abs(along.y())) return std::nullopt;
+  if (std::abs(along.y()) < params_.lines.min_length_m || std::abs(along.x()) > std::abs(along.y()))
+    return std::nullopt;
   return seen;
 }
 
@@ -68,9 +69,9 @@ bool PolygonMap::agrees(const TrackedLine& line, const SeenLine& seen) const noe
   const Vec2 along = seen.b_m - seen.a_m, middle = 0.5 * (seen.a_m + seen.b_m);
   const double half_m = std::abs(along.y()) / math::sqrt(12.0);
   const double sigma = math::sqrt(seen.variance_m2 + std::min(line.variance_m2(middle.y()), 1.0));
-  const double gate = math::clamp(params_.line_sigmas * sigma, params_.line_gate_min_m, params_.line_gate_max_m);
+  const double gate = math::clamp(params_.lines.sigmas * sigma, params_.lines.gate_min_m, params_.lines.gate_max_m);
   const double turn_gate =
-      std::max(params_.line_turn_gate, params_.line_sigmas * math::sqrt(seen.variance_m2) / half_m);
+      std::max(params_.lines.turn_gate, params_.lines.sigmas * math::sqrt(seen.variance_m2) / half_m);
   return std::abs(middle.x() - line.at_m(middle.y())) <= gate &&
          std::abs(along.x() / along.y() - line.state[1]) <= turn_gate;
 }
@@ -147,8 +148,8 @@ void PolygonMap::update_side(TrackedSide& side, double seen_m, bool observed) no
 
 void PolygonMap::rebuild(MapTrack& track) noexcept {
   const std::array<TrackedSide, kMapSides>& s = track.sides;
-  const bool has_nosing = track.nosing.sightings >= params_.line_min_sightings;
-  const bool has_back = track.back.sightings >= params_.line_min_sightings;
+  const bool has_nosing = track.nosing.sightings >= params_.lines.min_sightings;
+  const bool has_back = track.back.sightings >= params_.lines.min_sightings;
   const auto build = [&](bool use_nosing, bool use_back, EdgeTags& tags) {
     // Where a line decides, the box gives way to it at both ends.
     double x_min = -s[4].support_m, x_max = s[0].support_m;

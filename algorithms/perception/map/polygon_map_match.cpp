@@ -98,12 +98,12 @@ void PolygonMap::measure_offset() noexcept {
   if (track.sightings < params_.confirmed_sightings || !is_near(track, near)) return;
   const double common_m2 = math::square(params_.systematic_sigma_m);
   // A riser is matched from further off than it may lie; a plane's normal says nothing about its place beside it.
-  if (std::abs(near.across_m) < params_.line_gate_max_m) {
+  if (std::abs(near.across_m) < params_.lines.gate_max_m) {
     drift_.add(track.world_T_local.R.col(2), near.across_m, near.variance_m2 + common_m2);
   }
   for (const auto& [edge, line] : {std::pair{&seen_.nosing, &track.nosing}, std::pair{&seen_.back, &track.back}}) {
     const std::optional<SeenLine> seen = local_line(track, *edge);
-    if (!seen || line->sightings < params_.line_min_sightings || !agrees(*line, *seen)) continue;
+    if (!seen || line->sightings < params_.lines.min_sightings || !agrees(*line, *seen)) continue;
     const Vec2 middle_m = 0.5 * (seen->a_m + seen->b_m);
     const double norm = math::sqrt(1.0 + math::square(line->state[1]));
     drift_.add(track.world_T_local.R * Vec3{1.0 / norm, -line->state[1] / norm, 0.0},

@@ -33,7 +33,7 @@ void PolygonMap::fuse_best() noexcept {
   // A riser is matched from further off than it may have moved.
   const Transform& frame = keep->world_T_local;
   const double offset_m = -seen_.plane.distance_m(frame.p_m) / frame.R.col(2).dot(seen_.plane.normal);
-  const bool outlier = std::abs(offset_m) > params_.line_gate_max_m;
+  const bool outlier = std::abs(offset_m) > params_.lines.gate_max_m;
   if (outlier) {
     ++counters_.plane_outliers;
     if (++keep->outliers < params_.outliers_to_reset) return;
@@ -146,8 +146,8 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
     }
     if (const auto line = local_line(track, seen_.nosing)) update_line(track.nosing, *line);
     if (const auto line = local_line(track, seen_.back)) update_line(track.back, *line);
-    const TrackedLine& reference = track.nosing.sightings >= params_.line_min_sightings ? track.nosing : track.back;
-    if (reference.sightings >= params_.line_min_sightings && std::abs(reference.state[1]) > params_.turn_slope) {
+    const TrackedLine& reference = track.nosing.sightings >= params_.lines.min_sightings ? track.nosing : track.back;
+    if (reference.sightings >= params_.lines.min_sightings && std::abs(reference.state[1]) > params_.turn_slope) {
       turn_to(track, frame.R * Vec3{1.0, -reference.state[1], 0.0});
     }
   }
