@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Time per tick of estimation's stages and of the base filter's other forms, on the same ticks.
+// Time per tick of estimation's stages, on the same ticks.
 #include <benchmark/benchmark.h>
 
 #include <cstdio>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Time of every stage of perception, of the whole frame, the map, the foothold search, the paper's route and the
-// streaming floor, on the same frames. Time is the mean over scenes; the counters say how it spreads over them.
+// Time of every stage of perception, of the whole frame, the map, the foothold search and the streaming floor, on the
+// same frames. Time is the mean over scenes; the counters say how it spreads over them.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

@@ -138,8 +138,5 @@ void stage_runs(Workbench& bench) {
 void stage_whole_frame(Workbench& bench) { extract(bench); }
 void stage_map(Workbench& bench) { fuse(bench); }
 void stage_footholds(Workbench& bench) { find_footholds(bench); }
-void stage_paper_route(Workbench& bench) {
-  bench.paper->run(bench.scene.depth.data(), bench.scene.view.intrinsics, bench.scene.view.camera_up);
-}
 
 }  // namespace polygmap::bench

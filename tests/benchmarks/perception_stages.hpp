@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "tests/benchmarks/stair_scenes.hpp"
-#include "tests/reference/paper_route/paper_route.hpp"
 #include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::bench {
@@ -29,7 +28,6 @@ struct Workbench {
   std::unique_ptr<PolygonMap> map = std::make_unique<PolygonMap>();
   std::unique_ptr<FootholdSearch> search =
       std::make_unique<FootholdSearch>(FootholdSearch::Params{}, nominal_robot().sole);
-  std::unique_ptr<PaperRoute> paper = std::make_unique<PaperRoute>(PaperRoute::Params{});
   RawRange range;  // this and the next two: reduction and runs by themselves
   std::unique_ptr<ColumnImage> columns = std::make_unique<ColumnImage>();
   std::unique_ptr<ScanlineSegmentation> runs = std::make_unique<ScanlineSegmentation>();
@@ -53,7 +51,6 @@ void stage_runs(Workbench& bench);
 void stage_whole_frame(Workbench& bench);
 void stage_map(Workbench& bench);
 void stage_footholds(Workbench& bench);
-void stage_paper_route(Workbench& bench);
 
 struct Stage {
   std::string_view name;
@@ -79,13 +76,12 @@ inline constexpr std::array<Stage, 9> kExtractorStages{{{"intake", stage_intake}
                                                         {"remainder", stage_remainder},
                                                         {"pieces", stage_pieces},
                                                         {"polygons", stage_polygons}}};
-inline constexpr std::array<Stage, 7> kOtherStages{{{"whole_frame", stage_whole_frame},
+inline constexpr std::array<Stage, 6> kOtherStages{{{"whole_frame", stage_whole_frame},
                                                     {"streaming_floor", stage_streaming_floor},
                                                     {"reduction", stage_reduction},
                                                     {"runs", stage_runs},
                                                     {"map", stage_map},
-                                                    {"footholds", stage_footholds},
-                                                    {"paper_route", stage_paper_route}}};
+                                                    {"footholds", stage_footholds}}};
 
 // The stage that the extractor's next step belongs to.
 [[nodiscard]] ExtractorStage extractor_stage(const SurfaceExtractor& extractor) noexcept;

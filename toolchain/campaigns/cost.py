@@ -9,12 +9,15 @@ WANTED = {"whole_frame": 3_600_000, "footholds": 1_200_000, "gait_swing_tick": 2
 
 
 def cost(engine, _):
-    programs = ["perception_instructions", "estimation_instructions", "gait_instructions"]
-    built = subprocess.run(["cmake", "--build", ROOT / "build/release", "--target", *programs], capture_output=True, text=True)
+    records = {"instructions.txt": ("perception_instructions", "estimation_instructions", "gait_instructions"),
+               "reference_instructions.txt": ("reference_instructions",)}
+    built = subprocess.run(["cmake", "--build", ROOT / "build/release", "--target", *(p for programs in records.values() for p in programs)],
+                           capture_output=True, text=True)
     if built.returncode:
         raise SystemExit(f"campaign: the benchmarks were not built: {built.stdout[-400:]}")
-    counted = subprocess.run([ROOT / "toolchain/checks/instructions", *(ROOT / "build/release/tests/benchmarks" / p for p in programs)],
-                             capture_output=True, text=True).stdout
+    counted = "".join(subprocess.run([ROOT / "toolchain/checks/instructions", "--recorded", ROOT / "tests/benchmarks" / record,
+                                      *(ROOT / "build/release/tests/benchmarks" / p for p in programs)],
+                                     capture_output=True, text=True).stdout for record, programs in records.items())
     stages = {m[1]: int(m[2].replace(",", "")) for m in re.finditer(r"^\s*(?:instructions: \w+: )?(\w+) ([\d,]+)(?:,|$)", counted, re.M)}
     summary = engine.climb(["--steps", 1])
     memory, total = summary["static_memory"], summary["static_memory_bytes"]

@@ -41,9 +41,9 @@ ROUTE = ("recall_treads", "recall_risers", "precision", "over_segmentation", "tr
 
 
 def route_instructions():
-    """Of a frame through the module and through the paper's route, as recorded (tests/benchmarks/instructions.txt)."""
-    recorded = dict(line.split()[:2] for line in (ROOT / "tests/benchmarks/instructions.txt").read_text().splitlines()
-                    if line and line[0] not in "#" and len(line.split()) >= 2)
+    """Of a frame through the module and through the paper's route, as recorded (tests/benchmarks)."""
+    recorded = dict(line.split()[:2] for record in (ROOT / "tests/benchmarks").glob("*instructions.txt")
+                    for line in record.read_text().splitlines() if line and line[0] not in "#" and len(line.split()) >= 2)
     return {"module": int(recorded["whole_frame"]), "paper": int(recorded["paper_route"])}
 
 
