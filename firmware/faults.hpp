@@ -39,7 +39,7 @@ namespace polygmap {
   X(104, kPlanesFull, "planes_full", "A plane or surface of a frame found no room.")                               \
   X(105, kMapFull, "map_full", "A polygon found no room in the map.")                                              \
   X(106, kStateRingMissed, "state_ring_missed", "The past states do not cover a frame's stamp.")                   \
-  X(107, kDepthUnplaced, "depth_unplaced", "A frame was given back for that, or is from before the start.")        \
+  X(107, kDepthUnplaced, "depth_unplaced", "A frame was given back: no past state covers its stamp.")              \
   X(108, kReachLimited, "reach_limited", "A leg could not reach the pose asked for.")                              \
   X(109, kContactEarly, "contact_early", "A foot touched before its planned time.")                                \
   X(110, kContactLate, "contact_late", "A foot touched after its planned time.")                                   \

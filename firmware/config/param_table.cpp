@@ -94,7 +94,7 @@ std::string_view unit_of(std::string_view name) {
 
 std::array<double, 3> roll_pitch_yaw(const Mat3& R) {
   const double across = std::hypot(R(0, 0), R(1, 0));
-  return {std::atan2(R(2, 1), R(2, 2)), std::atan2(-R(2, 0), across), std::atan2(R(1, 0), R(0, 0))};
+  return {std::atan2(R(2, 1), R(2, 2)), std::atan2(0.0 - R(2, 0), across), std::atan2(R(1, 0), R(0, 0))};
 }
 
 std::string text_of(double number) {

@@ -17,10 +17,11 @@
 namespace polygmap {
 
 // Each remembered surface is a plane with eight ends in directions 45 degrees apart, and for level surfaces the nosing
-// and the back edge as lines. Every quantity is a mean weighted by information that fades with window_s. Only an
-// observed end can pull an end inwards; where the picture ends, the surface is taken to reach at least as far as it was
-// seen. What a whole frame is off by, as far as its pose's covariance allows, is the pose's (MapDrift) and moves
-// nothing: surfaces out of view stay in place against those in view. The map's world is that of the pose at the start.
+// and the back edge as lines. Planes, lines and observed ends are means weighted by information that fades with
+// window_s. Only an observed end can pull an end inwards; where the picture ends, the surface is taken to reach at
+// least as far as it was seen. An offset that all surfaces of a frame share is taken for an error of its pose
+// (MapDrift), as far as that pose's covariance allows, and moves nothing: surfaces out of view stay in place against
+// those in view. The map's world is that of the pose at the start.
 class PolygonMap {
  public:
   // What a surface of a kind cannot be: its normal in the map says so.
@@ -48,9 +49,12 @@ class PolygonMap {
       field("gate_min_m", p.gate_min_m, 0.0, 0.1,
             "An edge as near to the remembered one is no outlier, whatever its sigmas.");
       field("gate_max_m", p.gate_max_m, 0.0, 0.2,
-            "An edge farther from the remembered one is an outlier, whatever its sigmas.");
+            "A plane or an edge farther from the remembered one is an outlier, whatever its sigmas.");
       field.ordered("gate_min_m", "gate_max_m");
-      field("turn_gate", p.turn_gate, 0.001, 10.0, "An edge's slope against the remembered line is no more.");
+      field(
+          "turn_gate", p.turn_gate, 0.001, 10.0,
+          "An edge whose slope against the remembered line is no more is no outlier by its turn; a short or noisy one "
+          "may turn by as many sigmas.");
       field("sigmas", p.sigmas, 1.0, 20.0,
             "An edge as many sigmas from the remembered one is an outlier, between the two gates.");
       field("min_length_m", p.min_length_m, 0.0, 1.0, "A shorter edge says nothing.");
@@ -93,21 +97,21 @@ class PolygonMap {
     static void visit(auto& p, auto& field) {
       field("window_s", p.window_s, 0.05, 1000.0, "Information fades to 1/e in this time.");
       field("height_gate_min_m", p.height_gate_min_m, 0.0, 0.02,
-            "Level surfaces as near in height are one whatever their sigmas.");
+            "Surfaces other than risers that are as near in height are one, whatever their sigmas.");
       field("height_gate_max_m", p.height_gate_max_m, 0.0, 0.02,
-            "Level surfaces farther apart in height are two, whatever their sigmas: below half of the least step, 40 "
-            "mm.");
+            "Surfaces other than risers that are farther apart in height are two, whatever their sigmas; half of the "
+            "least step is 20 mm.");
       field.ordered("height_gate_min_m", "height_gate_max_m");
       field("upright_gate_m", p.upright_gate_m, 0.001, 0.12,
             "Risers nearer to each other are one, since they stand a tread apart.");
       field("tilt_gate_rad", p.tilt_gate_rad, 0.001, 1.5,
-            "Level surfaces turned no farther against each other may be one.");
+            "Surfaces other than risers that are turned no farther against each other may be one.");
       field("upright_turn_gate_rad", p.upright_turn_gate_rad, 0.001, 1.5,
             "Risers turned no farther against each other may be one.");
       field("overlap_fraction", p.overlap_fraction, 0.0, 1.0,
             "One surface overlaps by this share of the shorter one, along the stairs or up the riser.");
       field("lateral_gap_m", p.lateral_gap_m, 0.0, 5.0,
-            "Parts of one tread lie this far apart at most: the robot's own leg may split it in two.");
+            "Parts of one tread or riser lie this far apart at most: the robot's own leg may split it in two.");
       field("other_gap_m", p.other_gap_m, 0.0, 5.0, "Parts of any other surface lie this far apart at most.");
       field("side_sigma_m", p.side_sigma_m, 1e-4, 0.1, "Place of an observed end.");
       field("side_gate_m", p.side_gate_m, 0.001, 0.5, "An observed end farther off is an outlier.");
@@ -122,7 +126,7 @@ class PolygonMap {
       field("misses_confirmed", p.misses_confirmed, 1, 100000,
             "A confirmed surface goes after as many frames in plain view without a sighting.");
       field("unconfirmed_age_s", p.unconfirmed_age_s, 0.01, 1000.0,
-            "An unconfirmed surface out of view goes after so long.");
+            "An unconfirmed surface out of view goes when it was not seen for so long.");
       field("systematic_sigma_m", p.systematic_sigma_m, 0.0, 0.1,
             "Depth errors that repeat from frame to frame do not average out.");
       field("view_margin_px", p.view_margin_px, 0.0, 200.0,

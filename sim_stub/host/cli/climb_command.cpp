@@ -353,8 +353,8 @@ class ProgressLine {
     if (!live_ && p.time_s < next_s_) return;
     next_s_ = p.time_s + kQuietPeriod_s;
     char line[160];
-    std::snprintf(line, sizeof line, "%6.1f s  step %d of %d  %-16s worst row %s %.0f us", p.time_s, p.treads_climbed,
-                  steps_, p.phase, p.worst_row, p.worst_row_us);
+    std::snprintf(line, sizeof line, "%6.1f s  step %d of %d  %-16s worst row %s %.0f us (host)", p.time_s,
+                  p.treads_climbed, steps_, p.phase, p.worst_row, p.worst_row_us);
     out_ << (live_ ? "\r" : "") << line << (live_ ? "\x1b[K" : "\n") << std::flush;
     shown_ = true;
   }

@@ -39,12 +39,32 @@ std::string complaint(const EstimateArguments& a) {
   return {};
 }
 
-ReplayOptions options_of(const EstimateArguments& a) {
+// A file made by `params list` says every default of the module, and a log wants others of some. Empty when it undoes
+// none.
+std::string doubt_about_params(const std::string& file, Params for_logs, Params read) {
+  Params defaults;
+  const config::ParamTable wanted = config::param_table(for_logs), now = config::param_table(read),
+                           usual = config::param_table(defaults);
+  std::string undone;
+  for (std::size_t i = 0; i < wanted.params.size(); ++i) {
+    if (same_value(wanted.params[i], usual.params[i]) || !same_value(now.params[i], usual.params[i])) continue;
+    undone += (undone.empty() ? "" : ", ") + wanted.params[i].name + " (" + text_of(wanted.params[i]) + ")";
+  }
+  if (undone.empty()) return {};
+  return "\"" + file + "\" has the module's default where a log wants another value (in brackets): " + undone +
+         "; leave out what is not meant.";
+}
+
+ReplayOptions options_of(const EstimateArguments& a, std::vector<std::string>& warnings) {
   ReplayOptions options;
   Params params;
   params.estimator = options.estimator;
   params.robot = options.robot;
-  if (!a.params.empty()) config::read_params(a.params, params);
+  if (!a.params.empty()) {
+    const Params for_logs = params;
+    config::read_params(a.params, params);
+    if (std::string doubt = doubt_about_params(a.params, for_logs, params); !doubt.empty()) warnings.push_back(doubt);
+  }
   options.estimator = params.estimator;
   options.robot = params.robot;
   options.params_hash = config::hash_of(params);
@@ -143,9 +163,9 @@ int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& er
     }
     const EstimateLog log = read_estimate_log(a.log);
     const std::vector<LioRow> lio = a.lio.empty() ? std::vector<LioRow>{} : read_lio_log(a.lio, log.start_s);
-    const std::vector<std::string> warnings = doubts_about(log, a.log);
+    std::vector<std::string> warnings = doubts_about(log, a.log);
+    const ReplayOptions options = options_of(a, warnings);
     for (const std::string& warning : warnings) err << "polygmap: warning: " << warning << "\n";
-    const ReplayOptions options = options_of(a);
     const Replay result = replay(log, lio, options);
     if (!is_finite(result))
       throw config::FileError("\"" + a.log + "\": the estimate is not finite, so nothing is written.");

@@ -13,6 +13,7 @@
 #include "algorithms/geometry/so3.hpp"
 #include "firmware/config/file_error.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
+#include "sim_stub/host/cli/params_command.hpp"
 #include "sim_stub/host/estimate/estimate_report.hpp"
 #include "sim_stub/host/estimate/log_plausibility.hpp"
 #include "tests/support/slow_machine.hpp"
@@ -515,6 +516,20 @@ TEST_F(EstimateCommand, LogThatIsOdd_IsEstimatedWithAWarning) {
   ASSERT_EQ(call({"estimate", write("odd.csv", text), "--json", at("out.json")}), kExitPass) << err_;
   EXPECT_EQ(err_.rfind("polygmap: warning: The median acceleration is 6.5", 0), 0U) << err_;
   EXPECT_EQ(nlohmann::json::parse(std::ifstream(at("out.json"))).at("warnings").size(), 1U);
+}
+
+TEST_F(EstimateCommand, ParamsOfAllDefaults_AreTakenWithAWarning) {
+  const std::string log = write("log.csv", log_text(500));
+  ASSERT_EQ(call({"estimate", log, "--params", write("all.toml", params_toml({})), "--json", at("out.json")}),
+            kExitPass);
+  EXPECT_NE(err_.find("all.toml\" has the module's default where a log wants another value (in brackets): "),
+            std::string::npos)
+      << err_;
+  EXPECT_NE(err_.find("estimator.fusion.tau_s (1)"), std::string::npos) << err_;
+  EXPECT_EQ(nlohmann::json::parse(std::ifstream(at("out.json"))).at("warnings").size(), 1U);
+  const std::string one = write("one.toml", "[estimator.fusion]\ntau_s = 2.0\n");
+  ASSERT_EQ(call({"estimate", log, "--params", one}), kExitPass);
+  EXPECT_EQ(err_, "");
 }
 
 TEST_F(EstimateCommand, LogThatIsRefused_LeavesNoFormerOutput) {
