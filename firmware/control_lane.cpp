@@ -158,7 +158,8 @@ void ControlLane::answer_pose_request(std::int64_t now_ns) noexcept {
   link_.pose_answer.publish();
 }
 
-// A tread's height enters the estimator once, as it was frozen at the latch: the map never hears its own echo.
+// A tread's height enters the estimator once, as it was frozen at the latch: what the map has learnt from this pose
+// since is left out.
 void ControlLane::hand_over_touch_down() noexcept {
   const LatchedStep& step = gait_.status().step;
   if (step.touch_down_stamp_ns == 0 || step.sequence == step_handed_over_) return;

@@ -25,7 +25,8 @@ namespace polygmap {
   X(12, kDepthRejected, "depth_rejected",                                                                          \
     "A depth frame had a wrong size, no data, an old stamp, or a camera that cannot be.")                          \
   X(13, kLioMissing, "lio_missing", "No lidar pose was accepted for two seconds.")                                 \
-  X(14, kLioRejected, "lio_rejected", "A lidar pose was not finite, out of order, or too far from the odometry.")  \
+  X(14, kLioRejected, "lio_rejected",                                                                              \
+    "A lidar pose was not finite, out of order, from before the start, or too far from the odometry.")             \
   X(15, kPoseMissing, "pose_missing", "Control did not say in time where a frame was exposed; it was given back.") \
   X(16, kMapStale, "map_stale", "The newest fused frame was too old to step on.")                                  \
   X(17, kStateStale, "state_stale", "IMU or joints were silent for so long that the gait stopped.")                \

@@ -118,7 +118,7 @@ def physics(engine, seeds):
         "3 foothold": ("foothold error on those stairs, worst median and worst of all", FIGURES["foothold mm, median; max"](ds + ss) + " mm", "5; 12 mm"),
         "4 margin": ("sole to its tread's edge, swing to the stairs, least, on those stairs",
                      f"{FIGURES['sole margin mm'](ds + ss)}; {FIGURES['clearance mm'](ds + ss)} mm", "0"),
-        "5 planes": ("plane rate, least, on those stairs", FIGURES["planes Hz"](ds + ss) + " of 30 Hz (the paper: 20-29)", "20")})
+        "5 planes": ("plane rate, least, on those stairs", FIGURES["planes Hz"](ds + ss) + " of 30 Hz", "20-29 in the paper")})
 
 
 def kinematic(engine, seeds):

@@ -19,6 +19,8 @@ def cost(engine, _):
                                       *(ROOT / "build/release/tests/benchmarks" / p for p in programs)],
                                      capture_output=True, text=True).stdout for record, programs in records.items())
     stages = {m[1]: int(m[2].replace(",", "")) for m in re.finditer(r"^\s*(?:instructions: \w+: )?(\w+) ([\d,]+)(?:,|$)", counted, re.M)}
+    if missing := {"paper_route", *WANTED} - set(stages):
+        raise SystemExit(f"campaign: not counted: {', '.join(sorted(missing))}")
     summary = engine.climb(["--steps", 1])
     memory, total = summary["static_memory"], summary["static_memory_bytes"]
     stacks = memory.get("stacks", 0)

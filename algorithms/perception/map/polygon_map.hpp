@@ -19,9 +19,9 @@ namespace polygmap {
 // Each remembered surface is a plane with eight ends in directions 45 degrees apart, and for level surfaces the nosing
 // and the back edge as lines. Planes, lines and observed ends are means weighted by information that fades with
 // window_s. Only an observed end can pull an end inwards; where the picture ends, the surface is taken to reach at
-// least as far as it was seen. An offset that all surfaces of a frame share is taken for an error of its pose
-// (MapDrift), as far as that pose's covariance allows, and moves nothing: surfaces out of view stay in place against
-// those in view. The map's world is that of the pose at the start.
+// least about as far as it was seen. An offset that a frame's confirmed treads and risers share is taken for an error
+// of its pose (MapDrift), as far as that pose's covariance allows, and moves nothing: surfaces out of view stay in
+// place against those in view. The map's world is that of the pose at the start.
 class PolygonMap {
  public:
   // What a surface of a kind cannot be: its normal in the map says so.
@@ -54,7 +54,7 @@ class PolygonMap {
       field(
           "turn_gate", p.turn_gate, 0.001, 10.0,
           "An edge whose slope against the remembered line is no more is no outlier by its turn; a short or noisy one "
-          "may turn by as many sigmas.");
+          "may turn by `sigmas` of its own.");
       field("sigmas", p.sigmas, 1.0, 20.0,
             "An edge as many sigmas from the remembered one is an outlier, between the two gates.");
       field("min_length_m", p.min_length_m, 0.0, 1.0, "A shorter edge says nothing.");
@@ -97,13 +97,14 @@ class PolygonMap {
     static void visit(auto& p, auto& field) {
       field("window_s", p.window_s, 0.05, 1000.0, "Information fades to 1/e in this time.");
       field("height_gate_min_m", p.height_gate_min_m, 0.0, 0.02,
-            "Surfaces other than risers that are as near in height are one, whatever their sigmas.");
+            "Surfaces other than risers that are as near along their normal may be one, whatever their sigmas.");
       field("height_gate_max_m", p.height_gate_max_m, 0.0, 0.02,
-            "Surfaces other than risers that are farther apart in height are two, whatever their sigmas; half of the "
+            "Surfaces other than risers that are farther apart along their normal are two, whatever their sigmas; half "
+            "of the "
             "least step is 20 mm.");
       field.ordered("height_gate_min_m", "height_gate_max_m");
       field("upright_gate_m", p.upright_gate_m, 0.001, 0.12,
-            "Risers nearer to each other are one, since they stand a tread apart.");
+            "Risers nearer to each other may be one, since they stand a tread apart.");
       field("tilt_gate_rad", p.tilt_gate_rad, 0.001, 1.5,
             "Surfaces other than risers that are turned no farther against each other may be one.");
       field("upright_turn_gate_rad", p.upright_turn_gate_rad, 0.001, 1.5,
@@ -126,7 +127,7 @@ class PolygonMap {
       field("misses_confirmed", p.misses_confirmed, 1, 100000,
             "A confirmed surface goes after as many frames in plain view without a sighting.");
       field("unconfirmed_age_s", p.unconfirmed_age_s, 0.01, 1000.0,
-            "An unconfirmed surface out of view goes when it was not seen for so long.");
+            "An unconfirmed surface goes when it was not seen for so long, in view or not.");
       field("systematic_sigma_m", p.systematic_sigma_m, 0.0, 0.1,
             "Depth errors that repeat from frame to frame do not average out.");
       field("view_margin_px", p.view_margin_px, 0.0, 200.0,

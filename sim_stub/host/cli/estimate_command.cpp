@@ -55,28 +55,30 @@ std::string doubt_about_params(const std::string& file, Params for_logs, Params 
          "; leave out what is not meant.";
 }
 
-ReplayOptions options_of(const EstimateArguments& a, std::vector<std::string>& warnings) {
-  ReplayOptions options;
-  Params params;
-  params.estimator = options.estimator;
-  params.robot = options.robot;
-  if (!a.params.empty()) {
-    const Params for_logs = params;
-    config::read_params(a.params, params);
-    if (std::string doubt = doubt_about_params(a.params, for_logs, params); !doubt.empty()) warnings.push_back(doubt);
-  }
-  options.estimator = params.estimator;
-  options.robot = params.robot;
-  options.params_hash = config::hash_of(params);
+void set_by_options(const EstimateArguments& a, Params& params) {
   if (a.lio_tau_s > 0.0) {
-    options.estimator.fusion.tau_s = a.lio_tau_s;
-    options.estimator.fusion.tau_spm = 0.0;
+    params.estimator.fusion.tau_s = a.lio_tau_s;
+    params.estimator.fusion.tau_spm = 0.0;
   }
   if (!a.lidar_mount.empty()) {
     const auto rad = [&a](std::size_t i) { return a.lidar_mount[i] * kPi / 180.0; };
-    options.robot.mounts.base_T_lidar = {rotation_zyx(rad(5), rad(4), rad(3)),
-                                         Vec3{a.lidar_mount[0], a.lidar_mount[1], a.lidar_mount[2]}};
+    params.robot.mounts.base_T_lidar = {rotation_zyx(rad(5), rad(4), rad(3)),
+                                        Vec3{a.lidar_mount[0], a.lidar_mount[1], a.lidar_mount[2]}};
   }
+}
+
+ReplayOptions options_of(const EstimateArguments& a, std::vector<std::string>& warnings) {
+  ReplayOptions options;
+  Params params, for_logs;
+  params.estimator = for_logs.estimator = options.estimator;
+  params.robot = for_logs.robot = options.robot;
+  if (!a.params.empty()) config::read_params(a.params, params);
+  options.params_hash = config::hash_of(params);
+  set_by_options(a, params);
+  set_by_options(a, for_logs);
+  if (std::string doubt = doubt_about_params(a.params, for_logs, params); !doubt.empty()) warnings.push_back(doubt);
+  options.estimator = params.estimator;
+  options.robot = params.robot;
   return options;
 }
 
@@ -86,7 +88,8 @@ void print_lio(const Replay& replay, std::size_t poses, std::ostream& out) {
   const ReplayTick& last = replay.ticks.back();
   out << "LIO: " << count(LioVerdict::kAccepted) + count(LioVerdict::kRealigned) << " of " << poses
       << " poses accepted; " << count(LioVerdict::kJump) << " too far from the odometry, " << count(LioVerdict::kTooOld)
-      << " too old, " << count(LioVerdict::kFuture) << " of the future, " << replay.lio_not_arrived << " not arrived";
+      << " too old, " << count(LioVerdict::kFuture) << " of the future, " << count(LioVerdict::kNoOdometry)
+      << " from before the start, " << replay.lio_not_arrived << " not arrived";
   if (last.lio_age_ns >= 0) out << "; the last one is " << 1e-9 * static_cast<double>(last.lio_age_ns) << " s old";
   out << "\n";
 }
