@@ -261,7 +261,7 @@ TABLES = {
     "random": Table("Climbs drawn at random", range(200, 260), at_random, 4),
     "stairs": Table("Other stairs", range(1, 3), stairs, 2),
     "kinematic": Table("Climbs on the kinematic plant", range(1, 25), kinematic, 2),
-    "nosing": Table("Overhanging nosings", range(1, 4), nosing, 4),
+    "nosing": Table("Overhanging nosings", range(1, 9), nosing, 4),
     "odometry": Table("Odometry, lidar odometry and the fused pose (the paper's Fig. 4)", (*range(1, 13), *range(101, 109)), odometry, 2),
     "pushes": Table("Pushes on the stairs", range(1, 5), pushes, 6),
     "bodies": Table("Other bodies and grounds than believed", range(1, 4), bodies, 2),

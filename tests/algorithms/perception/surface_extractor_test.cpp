@@ -298,7 +298,7 @@ TEST(SurfaceExtractor, OverhangingNosings_AreNoLeaningPlanes) {
     return count;
   };
   int without = 0;
-  for (const double nosing_m : {0.02, 0.03}) {
+  for (const double nosing_m : {0.02, 0.03, 0.04}) {
     for (const bool correlated : {false, true}) {
       SCOPED_TRACE(testing::Message() << nosing_m << " correlated " << correlated);
       EXPECT_EQ(leaning(true, nosing_m, correlated), 0);
