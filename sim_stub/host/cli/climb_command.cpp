@@ -211,6 +211,15 @@ std::string plant_complaint(ClimbArguments& a) {
   return {};
 }
 
+std::string balusters_complaint(ClimbArguments& a) {
+  for (const char* name : {"--baluster-side", "--baluster-inset", "--baluster-size"}) {
+    if (a.said->count(name) > 0 && a.said->count("--balusters") == 0) {
+      return std::string(name) + " is of no use without --balusters.";
+    }
+  }
+  return {};
+}
+
 std::string pushes_complaint(ClimbArguments& a) {
   if (!a.pushes.empty() && a.options.plant != PlantKind::kMujoco) {
     return "--push needs --plant mujoco: forces do not move the kinematic plant.";
@@ -296,7 +305,8 @@ std::string complaint(ClimbArguments& a) {
   try {
     take_params(a);
     std::string sentence = stairs_complaint(a.options.stairs);
-    for (const auto part : {plant_complaint, pushes_complaint, errors_complaint, camera_complaint, picture_complaint}) {
+    for (const auto part : {balusters_complaint, plant_complaint, pushes_complaint, errors_complaint, camera_complaint,
+                            picture_complaint}) {
       if (sentence.empty()) sentence = part(a);
     }
     if (!sentence.empty()) return sentence;
@@ -373,7 +383,7 @@ class ProgressLine {
 }  // namespace
 
 int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& run, std::ostream& out,
-                  std::ostream& err, bool live) {
+                  std::ostream& err, bool live, const std::atomic<int>* interrupt) {
   CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
   app.require_subcommand(0, 1);
   app.footer(
@@ -409,8 +419,8 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
         << "--help.\n";
     return kExitUsage;
   }
-  if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);
-  if (estimate->parsed()) return run_estimate(estimate_arguments, out, err);
+  if (perceive->parsed()) return run_perceive(perceive_arguments, out, err, interrupt);
+  if (estimate->parsed()) return run_estimate(estimate_arguments, out, err, interrupt);
   if (params->parsed()) return run_params(params_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
     err << "polygmap: A subcommand is required; see polygmap --help.\n";

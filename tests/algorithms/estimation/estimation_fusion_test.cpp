@@ -182,6 +182,62 @@ TEST_F(FusionTest, FirstPose_ContradictedByTheSecond_IsThrownAway) {
   EXPECT_EQ(feed(kPose, kPose), LioVerdict::kAccepted);
 }
 
+// As of positions in millimetres: every pose contradicts the one before. The first two cannot be told from a first pose
+// that was wrong; all others are refused, and what is known of the odometry is what is known without LIO.
+TEST_F(FusionTest, PosesThatContradictEachOtherForEver_AreJumps_AndLeaveTimeAndSigmasAlone) {
+  LioFusion without;
+  without.reset(params_, mount_);
+  Transform odom_T_base = kPose;
+  const auto walk = [&] {
+    const Vec3 step_m{5e-4, 1e-4, 0};
+    for (int i = 0; i < 50; ++i) {
+      odom_T_base.p_m += step_m;
+      for (LioFusion* fusion : {&fusion_, &without}) {
+        fusion->follow(LioUncertainty::Quantities::Constant(1e-6 * odom_T_base.p_m.x()));
+        fusion->tick(odom_T_base, step_m, kTick_s);
+      }
+    }
+  };
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal(0.0, 5.0);
+  std::array<int, kLioVerdictCount> verdicts{};
+  for (int i = 0; i < 100; ++i) {
+    walk();
+    Transform wrong = odom_T_base;
+    for (int a = 0; a < 3; ++a) wrong.p_m[a] += normal(random);
+    ++verdicts[static_cast<std::size_t>(feed(wrong, odom_T_base))];
+  }
+  walk();
+  EXPECT_EQ(verdicts[static_cast<std::size_t>(LioVerdict::kAccepted)], 1);
+  EXPECT_EQ(verdicts[static_cast<std::size_t>(LioVerdict::kRealigned)], 1);
+  EXPECT_EQ(verdicts[static_cast<std::size_t>(LioVerdict::kJump)], 98);
+  EXPECT_EQ(fusion_.last_accepted_ns(), kLioPeriod_ns);  // the first one: a realigned pose shows nothing
+  EXPECT_FALSE(fusion_.aligned());
+  EXPECT_EQ(fusion_.position_sigma_m(), without.position_sigma_m());
+  EXPECT_EQ(fusion_.yaw_sigma_rad(), without.yaw_sigma_rad());
+}
+
+// As of a quaternion whose numbers stand in another order: alike among themselves, but no heading makes them upright.
+TEST_F(FusionTest, PosesTiltedAgainstGravity_AreNeverTaken) {
+  const Transform tilted{rotation_x(1.0) * kPose.R, kPose.p_m};
+  for (int i = 0; i < 100; ++i) ASSERT_EQ(feed(tilted, kPose), LioVerdict::kJump) << i;
+  EXPECT_EQ(fusion_.last_accepted_ns(), -1);
+  align();
+  const Vec3 sigma_m = fusion_.position_sigma_m();
+  for (int i = 0; i < 100; ++i) ASSERT_EQ(feed(tilted, kPose), LioVerdict::kJump) << i;
+  tick(kPose, 1);
+  EXPECT_LT((fusion_.position_sigma_m() - sigma_m).norm(), 1e-3);
+}
+
+TEST_F(FusionTest, FirstPoseReplaced_TwentyPosesThatAgree_AreTheNewWorld) {
+  ASSERT_EQ(feed(kPose, kPose), LioVerdict::kAccepted);
+  ASSERT_EQ(feed({kPose.R, kPose.p_m + Vec3{3, 0, 0}}, kPose), LioVerdict::kRealigned);
+  for (std::uint32_t i = 1; i < params_.realign_count; ++i) ASSERT_EQ(feed(kPose, kPose), LioVerdict::kJump);
+  EXPECT_EQ(feed(kPose, kPose), LioVerdict::kRealigned);
+  align();
+  EXPECT_TRUE(fusion_.aligned());
+}
+
 TEST_F(FusionTest, LastingJump_LioRelocalises_RealignsAndTheWorldStays) {
   align();
   const Transform drifted = Transform{Mat3::Identity(), Vec3{0.01, 0, 0}} * kPose;

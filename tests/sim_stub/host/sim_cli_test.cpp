@@ -238,6 +238,14 @@ TEST(ClimbCommand, BadWord_IsRefused) {
   expect_refused({}, "subcommand");
 }
 
+TEST(ClimbCommand, BalustersOfNoUse_AreRefused) {
+  for (const auto& [option, value] :
+       {std::pair{"--baluster-side", "left"}, {"--baluster-inset", "0.02"}, {"--baluster-size", "0.04"}}) {
+    expect_refused({"climb", option, value}, std::string(option) + " is of no use without --balusters.");
+    EXPECT_TRUE(call({"climb", option, value, "--balusters", "0.2"}).options) << option;
+  }
+}
+
 TEST(ClimbCommand, UnwritableOut_IsRefused) {
   const std::string file = temporary("a_file");
   std::ofstream(file) << "x";
