@@ -14,7 +14,7 @@ constexpr double kSuspect = 0.02;    // share of the rows: worth a look
 constexpr double kSure = 0.15;       // no walk slips so much
 constexpr double kExplained = 0.25;  // what a change must leave of it, to be named
 constexpr std::size_t kLeastRows = 20;
-constexpr std::size_t kMostRows = 20'000;  // that are replayed for each change
+constexpr std::size_t kMostReplayed_rows = 20'000;  // that are replayed for each change
 
 struct Change {
   const char* name;
@@ -30,7 +30,7 @@ constexpr std::array<Change, 9> kChanges{{
     {"accel_x_mps2 and accel_y_mps2 exchanged", [](LogRow& row) { std::swap(row.accel_mps2.x(), row.accel_mps2.y()); }},
     {"the left and the right foot (or their contacts) exchanged",
      [](LogRow& row) { std::swap(row.base_p_foot_m[0], row.base_p_foot_m[1]); }},
-    {"1 for 0 in both contacts",
+    {"0 and 1 exchanged in both contacts",
      [](LogRow& row) {
        for (double& contact : row.contact) contact = 1.0 - contact;
      }},
@@ -46,18 +46,20 @@ double moving(const Replay& replay) { return share(replay.slipping_rows, replay)
 std::string doubt_about_contacts(const EstimateLog& log, const Replay& whole, const ReplayOptions& options) {
   if (whole.slipping_rows < kLeastRows || moving(whole) < kSuspect) return {};
   EstimateLog beginning = log;
-  beginning.rows.resize(std::min(beginning.rows.size(), kMostRows));
+  beginning.rows.resize(std::min(beginning.rows.size(), kMostReplayed_rows));
   const Replay as_it_is = replay(beginning, {}, options);
   const double in_the_air = share(as_it_is.rows_without_contact, as_it_is);
-  double least = kExplained * moving(as_it_is);
+  double least = 1.0, moving_then = 0.0;
   const Change* best = nullptr;
   for (const Change& change : kChanges) {
     EstimateLog changed = beginning;
     for (LogRow& row : changed.rows) change.apply(row);
     const Replay by_change = replay(changed, {}, options);
-    if (!is_finite(by_change) || share(by_change.rows_without_contact, by_change) > in_the_air + 0.05) continue;
-    if (moving(by_change) >= least) continue;
-    least = moving(by_change);
+    const double unheld = share(by_change.rows_without_contact, by_change), moves = moving(by_change);
+    if (!is_finite(by_change) || unheld > in_the_air + 0.05 || moves > kExplained * moving(as_it_is)) continue;
+    if (moves + unheld >= least) continue;  // of two that explain it, that with which the robot stands
+    least = moves + unheld;
+    moving_then = moves;
     best = &change;
   }
   if (best == nullptr && moving(whole) < kSure) return {};
@@ -65,8 +67,8 @@ std::string doubt_about_contacts(const EstimateLog& log, const Replay& whole, co
                          " rows a foot moves by gyro, accelerometer and feet while its contact says that it stands: "
                          "they contradict each other";
   if (best != nullptr) {
-    const double percent = 100.0 * least;
-    sentence += ", but with " + std::string(best->name) + " they would in " +
+    const double percent = 100.0 * moving_then;
+    sentence += "; with " + std::string(best->name) + " it does so in " +
                 (percent < 0.05 ? "no row" : "only " + std::to_string(percent).substr(0, 3) + " % of the rows");
   }
   return sentence + ".";

@@ -245,12 +245,13 @@ std::string doubt_of_gravity(const Perceived& perceived) {
   const Vec3 &given = perceived.camera_up, &found = *perceived.found_up;
   const double cosine = given.dot(found);
   if (cosine > kLevel || upright_m2 >= level_looking_m2) return {};
+  const auto tidy = [](double x) { return std::round(100.0 * x) / 100.0 + 0.0; };  // no -0.00
   char line[256];
   std::snprintf(
       line, sizeof line,
       "By --gravity up is (%.2f, %.2f, %.2f), but the largest level-looking plane says (%.2f, %.2f, %.2f), %.0f "
       "degrees apart: does it point down in the camera frame, x right, y down, z forward?",
-      given.x(), given.y(), given.z(), found.x(), found.y(), found.z(),
+      tidy(given.x()), tidy(given.y()), tidy(given.z()), tidy(found.x()), tidy(found.y()), tidy(found.z()),
       std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / kPi);
   return line;
 }
