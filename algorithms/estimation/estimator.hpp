@@ -21,12 +21,14 @@ class Estimator {
     std::int64_t max_lead_ns = 10 * kNsPerMs;
     double max_height_error_m = 0.03;
     double floor_sigma_m = 0.003;
+    ImuNoise::Params imu_noise;
 
     static void visit(auto& p, auto& field) {
       ProprioceptiveOdometry::Params::visit(p, field);
       field("standstill", p.standstill);
       field("contacts", p.contacts);
       field("legs", p.legs);
+      field("imu_noise", p.imu_noise);
       field("imu_of_moments", p.imu_of_moments,
             "An IMU sample holds for its moment, not for the time since the last: the mean of both ends counts.");
       field("max_lead_ns", p.max_lead_ns, 0, 1000000000,
