@@ -6,8 +6,6 @@
 namespace polygmap {
 namespace {
 
-using test::kTick_s;
-
 ZmpKnots knots(std::initializer_list<ZmpKnot> list) {
   ZmpKnots result;
   for (const ZmpKnot& knot : list) EXPECT_TRUE(result.try_push_back(knot));
