@@ -28,7 +28,6 @@ class Estimator {
       field("standstill", p.standstill);
       field("contacts", p.contacts);
       field("legs", p.legs);
-      field("imu_noise", p.imu_noise);
       field("imu_of_moments", p.imu_of_moments,
             "An IMU sample holds for its moment, not for the time since the last: the mean of both ends counts.");
       field("max_lead_ns", p.max_lead_ns, 0, 1000000000,
@@ -36,6 +35,7 @@ class Estimator {
       field("max_height_error_m", p.max_height_error_m, 0.001, 1.0,
             "A tread's height this far from the sole on it is refused.");
       field("floor_sigma_m", p.floor_sigma_m, 1e-5, 1.0, "Height of the floor under the feet at the start.");
+      field("imu_noise", p.imu_noise);
     }
   };
   struct Counters {
