@@ -44,7 +44,7 @@ namespace polygmap {
   X(108, kReachLimited, "reach_limited", "A leg could not reach the pose asked for.")                              \
   X(109, kContactEarly, "contact_early", "A foot touched before its planned time.")                                \
   X(110, kContactLate, "contact_late", "A foot touched after its planned time.")                                   \
-  X(111, kRunsFull, "runs_full", "A run, interval or pair of planes of a frame found no room.")                    \
+  X(111, kSegmentsFull, "segments_full", "A scanline segment, a span or a pair of planes found no room.")          \
   X(112, kHeightRejected, "height_rejected", "A mapped tread's height disagreed with the sole that landed on it.") \
   X(113, kFootPutBack, "foot_put_back", "A foot in the air went back to where it had stood.")                      \
   X(114, kFrameLost, "frame_lost", "A frame never reached the map: it was unusable, or the last one still waited.")

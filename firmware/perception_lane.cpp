@@ -73,7 +73,7 @@ void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
     view.intrinsics = intrinsics_;
     view.camera_up = (camera_T_base.R * exposure_state_.odom_T_base.R.transpose()) * Vec3::UnitZ();
     // Yaw of the mount stays as vague as the data sheet.
-    view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior_tilt_sigma_rad);
+    view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior.tilt_sigma_rad);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       if (!params_.self_filter) break;
       body_[index_of(foot)] =
@@ -98,7 +98,7 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
       budget.spend(kLearnMountUnits);
     }
     camera_port_.release();
-    health_.own.follow(Limit::kRunsFull, now_ns, extractor_.counters().run_overflow);
+    health_.own.follow(Limit::kSegmentsFull, now_ns, extractor_.counters().segment_overflow);
     health_.own.follow(Limit::kPlanesFull, now_ns, extractor_.counters().plane_overflow);
     if (watcher_ != nullptr) watcher_->surfaces.publish(extractor_.result());
     begin_map(now_ns);
@@ -135,7 +135,7 @@ void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   if (params_.estimate_mount) view.mount_sigma_rad = mount_.tilt_sigma_rad();  // else the data sheet is believed
   view.intrinsics = intrinsics_;
   view.body = body_;
-  view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior_tilt_sigma_rad);
+  view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior.tilt_sigma_rad);
   map_.begin(extractor_.result(), view);
   mapping_ = true;
   const PolygonMap::Counters& counters = map_.counters();

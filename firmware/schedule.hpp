@@ -41,9 +41,10 @@ inline constexpr TaskFunction kPerceptionWork{[](Pipeline& p, std::int64_t cycle
 // quartile of 25 times, on the desk of 81), 0.16-0.18 us (map) and 0.83-0.86 us (footholds: thread CPU time over the
 // units spent, both taken around run_row() in `polygmap climb --steps 4 --seed 1`, three times). The table allows for
 // more than twice these means, footholds for half as much again, which also covers what other programs on that machine
-// take. It does not hold for each piece: on the desk a fourth row, in which four are cut into runs, takes 1.4-2.1 us of
-// its one unit, eight columns' refit up to 1.3 us a unit, and the end of a meeting, where all boundaries are decided,
-// 6 us of its one. A slot hands out hundreds. Shed first: what the next frame repeats anyway.
+// take. It does not hold for each piece: on the desk a fourth row, in which four are cut into segments, takes 1.4-2.1
+// us of its one unit, eight columns' refit up to 1.3 us a unit, and the end of the pass in which neighbours meet, where
+// all boundaries are decided, 6 us of its one. A slot hands out hundreds. Shed first: what the next frame repeats
+// anyway.
 // clang-format off
 inline constexpr std::array kTasks = std::to_array<Task>({
     {{.task = "sense", .lane = 0, .budget_us = 40}, kControl<&ControlLane::sense>},

@@ -17,6 +17,7 @@
 #include "sim_stub/camera/depth_camera.hpp"
 #include "sim_stub/plant/kinematic_plant.hpp"
 #include "sim_stub/plant/mujoco_plant.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "sim_stub/sensors/robot_errors.hpp"
 #include "sim_stub/sensors/sensor_models.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"

@@ -12,7 +12,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   standstill_.reset(params.standstill);
   contacts_.reset(params.contacts);
   leg_sensing_.reset(params.legs, robot);
-  imu_noise_.reset();
+  imu_noise_.reset(params.imu_noise);
   odometry_.reset(params, robot);
   ring_.clear();
   state_ = {};

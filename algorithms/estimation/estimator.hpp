@@ -21,6 +21,7 @@ class Estimator {
     std::int64_t max_lead_ns = 10 * kNsPerMs;
     double max_height_error_m = 0.03;
     double floor_sigma_m = 0.003;
+    ImuNoise::Params imu_noise;
 
     static void visit(auto& p, auto& field) {
       ProprioceptiveOdometry::Params::visit(p, field);
@@ -34,6 +35,7 @@ class Estimator {
       field("max_height_error_m", p.max_height_error_m, 0.001, 1.0,
             "A tread's height this far from the sole on it is refused.");
       field("floor_sigma_m", p.floor_sigma_m, 1e-5, 1.0, "Height of the floor under the feet at the start.");
+      field("imu_noise", p.imu_noise);
     }
   };
   struct Counters {

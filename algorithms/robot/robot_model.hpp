@@ -235,8 +235,4 @@ struct RobotModel {
   }
 };
 
-[[nodiscard]] inline CameraIntrinsics robot_camera_intrinsics() noexcept {
-  return {kDepthWidth_px, kDepthHeight_px, 366.7, 366.8, 322.7, 242.3, 0.00025};
-}
-
 }  // namespace polygmap

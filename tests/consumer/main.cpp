@@ -22,7 +22,9 @@ class Robot final : public polygmap::hal::Clock,
   std::int64_t now_ns() const noexcept override { return now; }
   std::uint64_t count() const noexcept override { return static_cast<std::uint64_t>(now); }
   double counts_per_us() const noexcept override { return 1000.0; }
-  polygmap::CameraIntrinsics intrinsics() const noexcept override { return polygmap::robot_camera_intrinsics(); }
+  polygmap::CameraIntrinsics intrinsics() const noexcept override {
+    return {640, 480, 390.0, 390.0, 320.0, 240.0, 0.001};
+  }
   bool try_acquire(polygmap::DepthFrameView&) noexcept override { return false; }
   void release() noexcept override {}
   bool try_read(polygmap::ImuSample&) noexcept override { return false; }

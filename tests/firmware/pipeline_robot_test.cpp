@@ -227,7 +227,7 @@ TEST_F(PipelineOnARobot, MountIsUncertain_EdgesAre) {
   run(1000);
   const PerceptionLane& perception = module_->pipeline().perception();
   const double learnt_rad = perception.mount().tilt_sigma_rad();
-  EXPECT_LT(learnt_rad, 0.5 * params.mount.prior_tilt_sigma_rad);
+  EXPECT_LT(learnt_rad, 0.5 * params.mount.prior.tilt_sigma_rad);
   int edges = 0;
   for (const MapPolygon& polygon : perception.map_snapshot().polygons) {
     if (!polygon.surface.nosing.valid) continue;

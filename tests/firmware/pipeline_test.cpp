@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "firmware/schedule.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/fake_robot.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/trapped_module.hpp"
@@ -259,8 +260,8 @@ class PipelineAmongBoxes : public PipelineTest {
   PipelineAmongBoxes() : PipelineTest(params()) {}
   static Params params() {
     Params params;
-    params.map.misses_unconfirmed = 1000;  // it shall fill, whatever is seen next
-    params.map.unconfirmed_age_s = 1000.0;
+    params.map.memory.misses_unconfirmed = 1000;  // it shall fill, whatever is seen next
+    params.map.memory.unconfirmed_age_s = 1000.0;
     return params;
   }
   void feed(int rows, int columns, double lowest_m) {
@@ -317,7 +318,7 @@ TEST_F(PipelineAmongBoxes, MoreSurfacesThanAFrameMayHave_IsCounted) {
 TEST_F(PipelineAmongBoxes, MoreRunsThanAColumnMayHave_IsCounted) {
   stand(kInitialised_ticks);
   show(2, 3, -0.1);
-  EXPECT_EQ(count(Limit::kRunsFull), 0U);
+  EXPECT_EQ(count(Limit::kSegmentsFull), 0U);
   const CameraIntrinsics camera = robot_camera_intrinsics();
   std::vector<std::uint16_t> slats(camera_.pixels());
   for (std::size_t i = 0; i < slats.size(); ++i) {
@@ -326,7 +327,7 @@ TEST_F(PipelineAmongBoxes, MoreRunsThanAColumnMayHave_IsCounted) {
   }
   camera_.feed(clock_.now_ns(), slats);
   stand(100);
-  EXPECT_GT(count(Limit::kRunsFull), 0U);
+  EXPECT_GT(count(Limit::kSegmentsFull), 0U);
 }
 
 TEST_F(PipelineAmongBoxes, MorePolygonsThanTheMapHolds_IsCounted) {

@@ -9,6 +9,7 @@
 
 #include "firmware/schedule.hpp"
 #include "sim_stub/heap_trap.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/fake_robot.hpp"
 #include "tests/support/nominal_robot.hpp"
 

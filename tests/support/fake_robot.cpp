@@ -7,6 +7,7 @@
 #include "algorithms/geometry/so3.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
 #include "scheduler/schedule_table.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/slow_machine.hpp"
 

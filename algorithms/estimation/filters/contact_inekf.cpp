@@ -129,7 +129,7 @@ void ContactInEkf::correct_by_feet(const std::array<LegMeasurement, kFootCount>&
       whiteness_[foot] = {};
       continue;
     }
-    const double share = std::max(contacts[foot].load_share * contacts[foot].probability, 0.05);
+    const double share = std::max(contacts[foot].load_share * contacts[foot].probability, params_.least_load_share);
     const int contact = of_foot(kContact, foot), sole = of_foot(kSoleRotation, foot);
     P_.diagonal().segment<3>(contact).array() += dt_s * (math::square(walk_mprs) / share + contacts[foot].walk_m2ps);
     const Vec3 off_m = odom_R_base_ * leg.base_T_sole.p_m - (odom_p_contact_m_[foot] - odom_p_base_m_);

@@ -13,7 +13,7 @@ bool JointReference::try_arm(const RobotModel& robot, const Params& params, cons
     const auto i = static_cast<Eigen::Index>(n);
     const JointLimits& limits = robot.drives.limits[n];
     inside_rad[i] = math::clamp(q_rad[i], limits.min_rad, limits.max_rad);
-    if (!(std::abs(q_rad[i] - inside_rad[i]) <= kEncoderOffset_rad)) return false;
+    if (!(std::abs(q_rad[i] - inside_rad[i]) <= params.encoder_offset_rad)) return false;
   }
   robot_ = &robot;
   params_ = params;

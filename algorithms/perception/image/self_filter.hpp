@@ -31,7 +31,7 @@ struct BodyUncertainty {
 [[nodiscard]] BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& legs,
                                      double turn_rad) noexcept;
 
-// The image of convex shapes, each grown by a margin: one column interval per row and shape. A pixel whose ray meets
+// The image of convex shapes, each grown by a margin: one range of columns per row and shape. A pixel whose ray meets
 // a grown shape is body whatever depth it measured, so that flying pixels around a leg go with it.
 class SelfFilter {
  public:
@@ -45,7 +45,7 @@ class SelfFilter {
   [[nodiscard]] bool try_mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept;
 
  private:
-  struct Interval {
+  struct ColumnRange {
     std::int16_t first = 1;
     std::int16_t last = 0;  // inclusive; empty when before first
   };
@@ -65,7 +65,7 @@ class SelfFilter {
   void add_foot(const HalfRays& rays, const OrientedBox& foot, const BodyMargin& margin) noexcept;
 
   Outline outline_{};
-  std::array<std::array<Interval, kHalfHeight_px>, kShapes> intervals_{};
+  std::array<std::array<ColumnRange, kHalfHeight_px>, kShapes> covered_{};
 };
 
 }  // namespace polygmap

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A leaning plane that is two upright ones: the face of a nosing and, set back beneath it, the riser.
 //
-// Both are a few rows high, and a straight run through both fits them hardly worse than the noise. Over their height
+// Both are a few rows high, and one segment through both fits them hardly worse than the noise. Over their height
 // they differ: how far away an upright surface is jumps once where a leaning one's distance rises evenly.
 #pragma once
 

@@ -79,7 +79,7 @@ void take_over(FittedPlane& kept, FittedPlane& gone) noexcept {
                            bool measured) noexcept {
   const bool small = q.pixels < params.small_plane_px;
   if (!small && cosine < math::cos(params.merge_tilt_rad)) return false;
-  // Where a large plane lies is known well: apart by more than what lets a run join a plane, the two are not one.
+  // Where a large plane lies is known well: apart by more than what lets a segment join a plane, the two are not one.
   const double noise_m = growing.join_floor_m + growing.join_sigmas * noise.sigma_m(q.centre_m.z());
   const double merge_m = small ? params.merge_m : std::min(noise_m, params.merge_m);
   const double apart_m = std::abs(p.plane.distance_m(q.centre_m));
@@ -88,7 +88,7 @@ void take_over(FittedPlane& kept, FittedPlane& gone) noexcept {
   if (small || !measured) return true;
   // Once large ones are measured their pixels have the last word: two floors that the camera bends are two.
   double chi2 = 0.0;
-  return try_contradiction(params, noise, p, q, chi2) && !(chi2 > params.pieces_chi2);
+  return try_contradiction(params, noise, p, q, chi2) && !(chi2 > params.apart_chi2);
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "sim_stub/host/climb/odometry_report.hpp"
 #include "sim_stub/host/climb/surface_match.hpp"
 #include "sim_stub/nominal_robot.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
 #include "sim_stub/world/truth.hpp"

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "sim_stub/robot_camera.hpp"
 #include "sim_stub/sim_robot.hpp"
 #include "tests/support/nominal_robot.hpp"
 

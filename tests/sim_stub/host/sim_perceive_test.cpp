@@ -16,6 +16,7 @@
 #include "algorithms/robot/robot_model.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/perceive/perceive.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/depth_scene.hpp"
 
 namespace polygmap::sim {

@@ -23,7 +23,7 @@ struct WalkErrors {
   double velocity_rmse_mps = 0.0;
 };
 
-class EstimateQualityTest : public ::testing::Test {
+class EstimatorQualityTest : public ::testing::Test {
  protected:
   template <typename Each>
   void run(const WalkSpec& spec, const Estimator::Params& params, bool with_lio, const Each& each) {
@@ -59,9 +59,9 @@ class EstimateQualityTest : public ::testing::Test {
 
   static Estimator estimator_;  // its ring is too large for a stack
 };
-Estimator EstimateQualityTest::estimator_;
+Estimator EstimatorQualityTest::estimator_;
 
-TEST_F(EstimateQualityTest, Climb_EveryTick_CovarianceIsSymmetricPositiveAndHasTheStatesSigmas) {
+TEST_F(EstimatorQualityTest, Climb_EveryTick_CovarianceIsSymmetricPositiveAndHasTheStatesSigmas) {
   WalkSpec spec;
   spec.steps = 2;
   run(spec, {}, true, [&](const SyntheticWalk&, std::int64_t) {
@@ -78,7 +78,7 @@ TEST_F(EstimateQualityTest, Climb_EveryTick_CovarianceIsSymmetricPositiveAndHasT
   });
 }
 
-TEST_F(EstimateQualityTest, Climb_Innovations_AreCountedByGroupAndStamped) {
+TEST_F(EstimatorQualityTest, Climb_Innovations_AreCountedByGroupAndStamped) {
   WalkSpec spec;
   spec.steps = 4;
   run(spec, {}, true, [](const SyntheticWalk&, std::int64_t) {});
@@ -102,37 +102,8 @@ TEST_F(EstimateQualityTest, Climb_Innovations_AreCountedByGroupAndStamped) {
   }
 }
 
-TEST(InnovationStatistics, NoisierMeasurements_ShowInTheLastSecondAtOnceAndInTheMeanLater) {
-  InnovationStatistics statistics;
-  statistics.take({}, 1);  // no rows: no update
-  EXPECT_EQ(statistics.stamp_ns, -1);
-  for (int i = 0; i < 5000; ++i) statistics.take({3.0, 3}, i * kTick_ns);
-  for (int i = 5000; i < 6000; ++i) statistics.take({27.0, 3}, i * kTick_ns);
-  EXPECT_EQ(statistics.count, 6000U);
-  EXPECT_EQ(statistics.last, 9.0);
-  EXPECT_NEAR(statistics.recent, 9.0 - 8.0 * std::exp(-2.0), 0.01);
-  EXPECT_NEAR(statistics.mean, (5000.0 + 9.0 * 1000.0) / 6000.0, 1e-9);
-}
-
-TEST(ImuNoise, WhiteNoiseOnMotion_IsMeasuredAtAnyRate) {
-  for (const double rate_hz : {200.0, 500.0, 1000.0}) {
-    std::mt19937 random(1);
-    std::normal_distribution<double> normal;
-    ImuNoise noise;
-    noise.reset();
-    for (int i = 0; i < 5000; ++i) {
-      const double t_s = i / rate_hz, swing = std::sin(2.0 * kPi * 1.5 * t_s);
-      const auto draw = [&](double sigma) { return Vec3{sigma * normal(random), sigma * normal(random), swing}; };
-      noise.update(static_cast<std::int64_t>(1e9 * t_s), 0.5 * draw(8e-3), 2.0 * draw(0.1) + Vec3{0, 0, kGravity_mps2});
-    }
-    const double two_of_three = std::sqrt(2.0 / 3.0);
-    EXPECT_NEAR(noise.density().gyro_radprs * std::sqrt(rate_hz), two_of_three * 4e-3, 4e-4) << rate_hz;
-    EXPECT_NEAR(noise.density().accel_mpsrs * std::sqrt(rate_hz), two_of_three * 0.2, 2e-2) << rate_hz;
-  }
-}
-
 // In double support, alone, and early: the left foot stands on the first step from 3.4 to 5.5 s, alone from 4.1 to 4.8.
-TEST_F(EstimateQualityTest, FootSlipsThreeTenthsForAFifthOfASecond_PositionStaysWithinTwentyMillimetres) {
+TEST_F(EstimatorQualityTest, FootSlipsThreeTenthsForAFifthOfASecond_PositionStaysWithinTwentyMillimetres) {
   Estimator::Params careless;
   careless.motion.gain = 0.0;
   constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 4;
@@ -151,7 +122,7 @@ TEST_F(EstimateQualityTest, FootSlipsThreeTenthsForAFifthOfASecond_PositionStays
   EXPECT_GT(walk_errors(spec, careless).worst_m, 0.020);
 }
 
-TEST_F(EstimateQualityTest, Climb_VelocityErrors_AreWithinThreeOfTheirSigmas) {
+TEST_F(EstimatorQualityTest, Climb_VelocityErrors_AreWithinThreeOfTheirSigmas) {
   constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 4;
   double ticks = 0.0, within = 0.0, squares = 0.0;
   for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
@@ -173,7 +144,7 @@ TEST_F(EstimateQualityTest, Climb_VelocityErrors_AreWithinThreeOfTheirSigmas) {
   EXPECT_GT(squares / ticks, 0.3);  // of 3: they mean something
 }
 
-TEST_F(EstimateQualityTest, NoSlip_VelocityIsAsGoodAsThatOfAFilterThatLetsNothingGo) {
+TEST_F(EstimatorQualityTest, NoSlip_VelocityIsAsGoodAsThatOfAFilterThatLetsNothingGo) {
   Estimator::Params careless;
   careless.motion.gain = 0.0;
   constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
@@ -184,6 +155,5 @@ TEST_F(EstimateQualityTest, NoSlip_VelocityIsAsGoodAsThatOfAFilterThatLetsNothin
     EXPECT_LT(walk_errors(spec, {}).velocity_rmse_mps, 1.05 * walk_errors(spec, careless).velocity_rmse_mps) << seed;
   }
 }
-
 }  // namespace
 }  // namespace polygmap

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "algorithms/foothold/foothold_search.hpp"
+
 #include <gtest/gtest.h>
 
 #include <memory>
 
-#include "algorithms/foothold/foothold_search.hpp"
 #include "algorithms/foothold/reach.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/seen_stairs.hpp"
@@ -82,7 +83,7 @@ FootholdSearch::Query standing(const Stairs& s, int on, double before_m = 0.3, d
   return q;
 }
 
-class FootholdTest : public ::testing::Test {
+class FootholdSearchTest : public ::testing::Test {
  protected:
   const FootholdSet& search(const MapSnapshot& map, const FootholdSearch::Query& query, std::int32_t units = 1 << 20) {
     search_->begin(map, query);
@@ -135,7 +136,7 @@ LevelSurface prepared(const MapPolygon& polygon) {
   return out;
 }
 
-TEST(FootholdEq14To16, TiltedTread_BecomesItsPlanViewHullAndBox) {
+TEST(FootholdSearchEq14To16, TiltedTread_BecomesItsPlanViewHullAndBox) {
   MapPolygon p = level(1, {}, 0.13, 0, 0.28, 0.6, true, true);
   p.surface.polygon[1].z() += 0.01;
   EXPECT_TRUE(p.surface.polygon.try_push_back({0.1, 0.1, 0.5}));  // inside in plan: not of the hull
@@ -145,7 +146,7 @@ TEST(FootholdEq14To16, TiltedTread_BecomesItsPlanViewHullAndBox) {
   EXPECT_EQ(s.box.max_m, Vec2(0.28, 0.6));
 }
 
-TEST(FootholdEq17To19, RasterOfATurnedTread_HasExactlyTheCellsInside) {
+TEST(FootholdSearchEq17To19, RasterOfATurnedTread_HasExactlyTheCellsInside) {
   const auto raster = std::make_unique<FootholdRaster>();
   const LevelSurface s = prepared(level(1, {rotation_z(0.3), Vec3{0.2, 0.1, 0}}, 0.13, 0, 0.28, 0.5, true, true));
   raster->centre_on({0.2, 0.1}, 0.01);
@@ -162,7 +163,7 @@ TEST(FootholdEq17To19, RasterOfATurnedTread_HasExactlyTheCellsInside) {
   EXPECT_NEAR(inside * 1e-4, 0.28 * 1.0, 0.02);
 }
 
-TEST(FootholdEq18, CellHeight_IsTheVertexMeanOnALevelTreadAndThePlaneOnATiltedOne) {
+TEST(FootholdSearchEq18, CellHeight_IsTheVertexMeanOnALevelTreadAndThePlaneOnATiltedOne) {
   MapPolygon p = level(1, {}, 0.13, -0.2, 0.2, 0.2, true, true);
   double mean_z = 0.0;
   for (const Vec3& v : p.surface.polygon) mean_z += 0.25 * v.z();
@@ -172,7 +173,7 @@ TEST(FootholdEq18, CellHeight_IsTheVertexMeanOnALevelTreadAndThePlaneOnATiltedOn
   EXPECT_NEAR(prepared(p).plane.height_m({0.15, 0.0}), 0.13 - 0.02 * 0.15, 1e-6);
 }
 
-TEST(FootholdEq20, RangeFilter_LimitsAheadAndAsideOfTheTurnedBase) {
+TEST(FootholdSearchEq20, RangeFilter_LimitsAheadAndAsideOfTheTurnedBase) {
   const Transform base{rotation_z(kPi / 2), Vec3{1, 1, 0.8}};
   EXPECT_NEAR((PlanFrame(base)({1, 2}) - Vec2(1, 0)).norm(), 0, 1e-12);
   EXPECT_TRUE(in_range({1.2, -1.2}, 1.2));
@@ -180,7 +181,7 @@ TEST(FootholdEq20, RangeFilter_LimitsAheadAndAsideOfTheTurnedBase) {
   EXPECT_FALSE(in_range({0, -1.21}, 1.2));
 }
 
-TEST(FootholdEq21, OverlappingSurfaces_TheHighestStays) {
+TEST(FootholdSearchEq21, OverlappingSurfaces_TheHighestStays) {
   const auto raster = std::make_unique<FootholdRaster>();
   raster->centre_on({0, 0}, 0.01);
   raster->clear_row(80);
@@ -192,14 +193,14 @@ TEST(FootholdEq21, OverlappingSurfaces_TheHighestStays) {
   EXPECT_EQ(raster->layer(60, 80), 0);
 }
 
-TEST(FootholdEq22And23, HeightLimit_CountsFromTheLowestPointOfTheStandingFoot) {
+TEST(FootholdSearchEq22And23, HeightLimit_CountsFromTheLowestPointOfTheStandingFoot) {
   const Transform sole{rotation_y(0.1), Vec3{0, 0, 0.5}};  // toes down
   EXPECT_NEAR(z_foot_m(kSole, sole), 0.5 - 0.17084 * std::sin(0.1), 1e-12);
   EXPECT_TRUE(below_limit(0.9, 0.5, 0.4));
   EXPECT_FALSE(below_limit(0.901, 0.5, 0.4));
 }
 
-TEST(FootholdEq24And25, Clearance_AgainstSampledContactRectangle_Agrees) {
+TEST(FootholdSearchEq24And25, Clearance_AgainstSampledContactRectangle_Agrees) {
   std::mt19937 random(25);
   std::uniform_real_distribution<> u(-0.5, 0.5);
   for (int trial = 0; trial < 500; ++trial) {
@@ -220,7 +221,7 @@ TEST(FootholdEq24And25, Clearance_AgainstSampledContactRectangle_Agrees) {
   }
 }
 
-TEST_F(FootholdTest, Eq25_ErodedTreadOf280mm_KeepsCellsAndNoFootHangsOver) {
+TEST_F(FootholdSearchTest, Eq25_ErodedTreadOf280mm_KeepsCellsAndNoFootHangsOver) {
   // 13 erosions by a 1 cm pixel leave nothing of this tread.
   const Stairs s{.yaw_rad = 0.1};
   const FootholdSet& r = search(s, 0);
@@ -228,7 +229,7 @@ TEST_F(FootholdTest, Eq25_ErodedTreadOf280mm_KeepsCellsAndNoFootHangsOver) {
   for (const Foothold& f : r.p_star_feet) EXPECT_GT(f.clearance_m, 0.010);
 }
 
-TEST_F(FootholdTest, Eq26_PStar_IsOnTheNearestHigherTreadAndPStarStarOnTheNext) {
+TEST_F(FootholdSearchTest, Eq26_PStar_IsOnTheNearestHigherTreadAndPStarStarOnTheNext) {
   const Stairs s{};
   for (int on = 0; on <= 2; ++on) {
     const FootholdSet& r = search(s, on);
@@ -244,7 +245,7 @@ TEST_F(FootholdTest, Eq26_PStar_IsOnTheNearestHigherTreadAndPStarStarOnTheNext) 
   }
 }
 
-TEST_F(FootholdTest, Eq26_PStarStarOfBothFeet_LieSideBySideOnTheTreadAfterTheNext) {
+TEST_F(FootholdSearchTest, Eq26_PStarStarOfBothFeet_LieSideBySideOnTheTreadAfterTheNext) {
   const Stairs s{};
   MapSnapshot map = ideal_map(s);
   map.drift_m = {0.02, -0.01, 0.03};
@@ -263,7 +264,7 @@ TEST_F(FootholdTest, Eq26_PStarStarOfBothFeet_LieSideBySideOnTheTreadAfterTheNex
   }
 }
 
-TEST_F(FootholdTest, SecondRiseTooHigh_IsNoPStarStar) {
+TEST_F(FootholdSearchTest, SecondRiseTooHigh_IsNoPStarStar) {
   const Stairs s{};
   MapSnapshot map = ideal_map(s);
   for (MapPolygon& polygon : map.polygons) {
@@ -279,7 +280,7 @@ TEST_F(FootholdTest, SecondRiseTooHigh_IsNoPStarStar) {
   EXPECT_FALSE(r.has_p_star_star);
 }
 
-TEST_F(FootholdTest, SecondTreadTooShort_IsNoPStarStar) {
+TEST_F(FootholdSearchTest, SecondTreadTooShort_IsNoPStarStar) {
   const Stairs s{};
   constexpr double kShorter_m = 0.0205;  // 259.5 mm: the foot fits, by 3.75 mm at either end, but 260 mm are asked for
   MapSnapshot map = ideal_map(s);
@@ -306,7 +307,7 @@ TEST_F(FootholdTest, SecondTreadTooShort_IsNoPStarStar) {
   EXPECT_FALSE(r.has_p_star_star);
 }
 
-TEST_F(FootholdTest, Eq26_SplitStance_SearchesFromTheFootThatStays) {
+TEST_F(FootholdSearchTest, Eq26_SplitStance_SearchesFromTheFootThatStays) {
   const Stairs s{};
   FootholdSearch::Query q = standing(s, 1);
   q.world_T_sole[index_of(Foot::kRight)].p_m = Vec3{s.nosing_x_m(2) + 0.0872, -0.1, 2 * s.rise_m};
@@ -316,7 +317,7 @@ TEST_F(FootholdTest, Eq26_SplitStance_SearchesFromTheFootThatStays) {
   EXPECT_NEAR(search(ideal_map(s), q).p_star.position_m.z(), 2 * s.rise_m, 1e-9);
 }
 
-TEST(FootholdEq28, SoleLayer_IsWithinDeltaFootOnBothSides) {
+TEST(FootholdSearchEq28, SoleLayer_IsWithinDeltaFootOnBothSides) {
   EXPECT_TRUE(in_sole_layer(0.539, 0.5, 0.04));
   EXPECT_TRUE(in_sole_layer(0.461, 0.5, 0.04));
   EXPECT_FALSE(in_sole_layer(0.541, 0.5, 0.04));
@@ -334,7 +335,7 @@ MapPolygon post(std::uint32_t id, const Transform& world_T_stairs, double x_m, d
   return p;
 }
 
-TEST_F(FootholdTest, BalustersAlongBothEdges_FeetLieAsWithoutThem) {
+TEST_F(FootholdSearchTest, BalustersAlongBothEdges_FeetLieAsWithoutThem) {
   const Stairs s{.yaw_rad = 0.4, .origin_m = {1.0, -2.0, 0.0}};
   for (const int on : {0, 1, 2}) {
     MapSnapshot map = ideal_map(s);
@@ -356,7 +357,7 @@ TEST_F(FootholdTest, BalustersAlongBothEdges_FeetLieAsWithoutThem) {
   }
 }
 
-TEST_F(FootholdTest, PostAtTheSideOfTheFeet_TheyStandBesideIt) {
+TEST_F(FootholdSearchTest, PostAtTheSideOfTheFeet_TheyStandBesideIt) {
   const Stairs s;
   for (const double side : {1.0, -1.0}) {
     MapSnapshot map = ideal_map(s);
@@ -372,14 +373,14 @@ TEST_F(FootholdTest, PostAtTheSideOfTheFeet_TheyStandBesideIt) {
   }
 }
 
-TEST_F(FootholdTest, PostInTheMiddleOfATread_SaysThatSomethingStandsThere) {
+TEST_F(FootholdSearchTest, PostInTheMiddleOfATread_SaysThatSomethingStandsThere) {
   const Stairs s;
   MapSnapshot map = ideal_map(s);
   ASSERT_TRUE(map.polygons.try_push_back(post(1000, s.world_T_stairs(), 0.12, 0.0, s.rise_m)));
   EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kObstacle);
 }
 
-TEST_F(FootholdTest, WallAcrossBothFeetAtASlant_SaysThatSomethingStandsThere) {
+TEST_F(FootholdSearchTest, WallAcrossBothFeetAtASlant_SaysThatSomethingStandsThere) {
   const Stairs s;
   for (const double slant_rad : {0.7, -0.7, 1.0}) {
     MapSnapshot map = ideal_map(s);
@@ -389,14 +390,14 @@ TEST_F(FootholdTest, WallAcrossBothFeetAtASlant_SaysThatSomethingStandsThere) {
   }
 }
 
-TEST_F(FootholdTest, PostBetweenTheRobotAndTheStairs_SaysThatSomethingStandsThere) {
+TEST_F(FootholdSearchTest, PostBetweenTheRobotAndTheStairs_SaysThatSomethingStandsThere) {
   const Stairs s;
   MapSnapshot map = ideal_map(s);
   ASSERT_TRUE(map.polygons.try_push_back(post(1000, s.world_T_stairs(), -0.05, 0.0, 0.0)));
   EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kObstacle);
 }
 
-TEST_F(FootholdTest, BoxOnTheTreadAtItsSide_ChangesNothing) {
+TEST_F(FootholdSearchTest, BoxOnTheTreadAtItsSide_ChangesNothing) {
   const Stairs s;
   MapSnapshot map = ideal_map(s);
   const FootholdSet without = search(map, standing(s, 0));
@@ -412,7 +413,7 @@ TEST_F(FootholdTest, BoxOnTheTreadAtItsSide_ChangesNothing) {
 
 // ---- whole staircases
 
-TEST_F(FootholdTest, TreadsRisesYawsAndNosings_FeetLieCentredOnTheNextTread) {
+TEST_F(FootholdSearchTest, TreadsRisesYawsAndNosings_FeetLieCentredOnTheNextTread) {
   for (const double tread : {0.275, 0.28, 0.285, 0.30}) {
     for (const double rise : {0.10, 0.13, 0.17}) {
       for (const double yaw : {-0.17, 0.0, 0.17, 2.0}) {
@@ -429,14 +430,14 @@ TEST_F(FootholdTest, TreadsRisesYawsAndNosings_FeetLieCentredOnTheNextTread) {
   }
 }
 
-TEST_F(FootholdTest, RobotTurned10Degrees_TargetsStillFollowTheNosing) {
+TEST_F(FootholdSearchTest, RobotTurned10Degrees_TargetsStillFollowTheNosing) {
   const Stairs s{.yaw_rad = 0.4};
   for (const double yaw : {-0.175, 0.175}) {
     expect_feet_on(search(ideal_map(s), standing(s, 0, 0.5, 0.1, yaw)), s, 1);
   }
 }
 
-TEST_F(FootholdTest, FirstRiser800mmAhead_IsFoundFromTheFloor) {
+TEST_F(FootholdSearchTest, FirstRiser800mmAhead_IsFoundFromTheFloor) {
   const Stairs s{};
   expect_feet_on(search(ideal_map(s), standing(s, 0, 0.8, -0.15, 0.1)), s, 1);
 }
@@ -446,7 +447,7 @@ double middle_y(const FootholdSet& r) {
   return 0.5 * (r.p_star_feet[0].position_m + r.p_star_feet[1].position_m).y();
 }
 
-TEST_F(FootholdTest, SidesNotSeen_LateralPositionIsKeptUntilTheSideMarginStopsIt) {
+TEST_F(FootholdSearchTest, SidesNotSeen_LateralPositionIsKeptUntilTheSideMarginStopsIt) {
   const Stairs s{.width_m = 0.8};
   MapSnapshot map = ideal_map(s);
   for (MapPolygon& polygon : map.polygons) polygon.surface.edges.fill(EdgeKind::kUnknown);
@@ -454,14 +455,14 @@ TEST_F(FootholdTest, SidesNotSeen_LateralPositionIsKeptUntilTheSideMarginStopsIt
   EXPECT_NEAR(middle_y(search(map, standing(s, 1, 0, 0.4))), 0.4 - 0.1 - kContactRectangle.half_width_m - 0.02, 1e-9);
 }
 
-TEST_F(FootholdTest, SidesSeen_FeetGoToTheMiddleAtOnceFromTheFloorAndSlowlyOnTheWayUp) {
+TEST_F(FootholdSearchTest, SidesSeen_FeetGoToTheMiddleAtOnceFromTheFloorAndSlowlyOnTheWayUp) {
   const Stairs s{.width_m = 0.8};
   EXPECT_NEAR(middle_y(search(ideal_map(s), standing(s, 0, 0.5, 0.07))), 0.0, 1e-9);
-  EXPECT_NEAR(middle_y(search(ideal_map(s), standing(s, 1, 0, 0.07))), 0.07 - FootholdSearch::Params{}.veer_max_m,
+  EXPECT_NEAR(middle_y(search(ideal_map(s), standing(s, 1, 0, 0.07))), 0.07 - FootholdSearch::Params{}.feet.veer_max_m,
               1e-9);
 }
 
-TEST_F(FootholdTest, NarrowTread_FeetCloseUpThenItSaysTooNarrow) {
+TEST_F(FootholdSearchTest, NarrowTread_FeetCloseUpThenItSaysTooNarrow) {
   Stairs s{.width_m = 0.32};
   const FootholdSet& r = search(s, 1);
   ASSERT_EQ(r.obstruction, StopReason::kNone);
@@ -473,7 +474,7 @@ TEST_F(FootholdTest, NarrowTread_FeetCloseUpThenItSaysTooNarrow) {
   EXPECT_FALSE(search_->result().has_p_star);
 }
 
-TEST_F(FootholdTest, TreadEndsInNothing_ToeStaysOnItAsBeforeARiser) {
+TEST_F(FootholdSearchTest, TreadEndsInNothing_ToeStaysOnItAsBeforeARiser) {
   const Stairs s{};
   MapSnapshot map = ideal_map(s), only;
   only.stamp_ns = kNow_ns;
@@ -486,7 +487,7 @@ TEST_F(FootholdTest, TreadEndsInNothing_ToeStaysOnItAsBeforeARiser) {
   EXPECT_NEAR(heel_m, toe_m, 1e-9);
 }
 
-TEST_F(FootholdTest, BackEdgeNotMapped_HeelGoes14mmBehindTheNosing) {
+TEST_F(FootholdSearchTest, BackEdgeNotMapped_HeelGoes14mmBehindTheNosing) {
   const Stairs s{};
   MapSnapshot map = ideal_map(s), only;
   only.stamp_ns = kNow_ns;
@@ -502,7 +503,7 @@ TEST_F(FootholdTest, BackEdgeNotMapped_HeelGoes14mmBehindTheNosing) {
   EXPECT_FALSE(r.has_p_star_star);
 }
 
-TEST_F(FootholdTest, TreadSeenOnlyInFront_NoFootholdReachesOverWhatWasSeen) {
+TEST_F(FootholdSearchTest, TreadSeenOnlyInFront_NoFootholdReachesOverWhatWasSeen) {
   const Stairs s{};
   MapSnapshot map;
   map.stamp_ns = kNow_ns;
@@ -512,7 +513,7 @@ TEST_F(FootholdTest, TreadSeenOnlyInFront_NoFootholdReachesOverWhatWasSeen) {
   EXPECT_FALSE(search_->result().has_p_star);
 }
 
-TEST_F(FootholdTest, StepMissing_SaysRiseTooHighAndPlacesNothing) {
+TEST_F(FootholdSearchTest, StepMissing_SaysRiseTooHighAndPlacesNothing) {
   for (const double rise : {0.13, 0.17}) {
     for (int on = 0; on <= 2; ++on) {
       Stairs s{.rise_m = rise};
@@ -538,7 +539,7 @@ TEST_F(FootholdTest, StepMissing_SaysRiseTooHighAndPlacesNothing) {
   }
 }
 
-TEST_F(FootholdTest, StepOf500mm_SaysRiseTooHighFromTheTreadOrFromItsFaceAlone) {
+TEST_F(FootholdSearchTest, StepOf500mm_SaysRiseTooHighFromTheTreadOrFromItsFaceAlone) {
   const Stairs s{.steps = 1, .rise_m = 0.5};
   EXPECT_EQ(search(s, 0).obstruction, StopReason::kRiseTooHigh);
   EXPECT_NEAR(search_->result().measured_rise_m, 0.5, 1e-9);
@@ -550,7 +551,7 @@ TEST_F(FootholdTest, StepOf500mm_SaysRiseTooHighFromTheTreadOrFromItsFaceAlone) 
   EXPECT_NEAR(search_->result().measured_rise_m, 0.4, 1e-9);
 }
 
-TEST_F(FootholdTest, RiserMeasuredTooTall_TheTreadOnItDecides) {
+TEST_F(FootholdSearchTest, RiserMeasuredTooTall_TheTreadOnItDecides) {
   const Stairs s{.rise_m = 0.12};
   MapSnapshot map = ideal_map(s);
   map.polygons[2] = riser(map.polygons[2].id, {}, 0.0, 0.0, 0.21, 0.6);  // seen from close above
@@ -559,14 +560,14 @@ TEST_F(FootholdTest, RiserMeasuredTooTall_TheTreadOnItDecides) {
   EXPECT_EQ(search(map, standing(s, 0, 0.5)).obstruction, StopReason::kRiseTooHigh);
 }
 
-TEST_F(FootholdTest, TreadOf100mm_SaysTooShort) {
+TEST_F(FootholdSearchTest, TreadOf100mm_SaysTooShort) {
   const FootholdSet& r = search(Stairs{.tread_m = 0.1}, 0);
   EXPECT_EQ(r.obstruction, StopReason::kTreadTooShort);
   EXPECT_NEAR(r.measured_tread_m, 0.1, 1e-9);
   EXPECT_FALSE(r.has_p_star);
 }
 
-TEST_F(FootholdTest, Landing_SaysTopOnlyWhenClimbingAndTheWayAheadWasSeen) {
+TEST_F(FootholdSearchTest, Landing_SaysTopOnlyWhenClimbingAndTheWayAheadWasSeen) {
   const Stairs s{.steps = 3};
   FootholdSearch::Query q = standing(s, 3);
   EXPECT_EQ(search(ideal_map(s), q).obstruction, StopReason::kTop);
@@ -582,7 +583,7 @@ TEST_F(FootholdTest, Landing_SaysTopOnlyWhenClimbingAndTheWayAheadWasSeen) {
 }
 
 // A landing shorter than the way that is looked at: where it was seen to end, nothing rises behind.
-TEST_F(FootholdTest, ShortLanding_SaysTopWhenItsEndWasSeen) {
+TEST_F(FootholdSearchTest, ShortLanding_SaysTopWhenItsEndWasSeen) {
   const Stairs s{.steps = 3};
   const FootholdSearch::Query q = standing(s, 3);
   for (const EdgeKind end : {EdgeKind::kObserved, EdgeKind::kUnknown}) {
@@ -598,7 +599,7 @@ TEST_F(FootholdTest, ShortLanding_SaysTopWhenItsEndWasSeen) {
 }
 
 // What the map does not know well is given away from the clearance.
-TEST_F(FootholdTest, EdgesKnownVaguely_FootholdIsRefusedWithThatReason) {
+TEST_F(FootholdSearchTest, EdgesKnownVaguely_FootholdIsRefusedWithThatReason) {
   const Stairs s{.tread_m = 0.275};
   const auto with_sigma = [&](double sigma_m) {
     MapSnapshot map = ideal_map(s);
@@ -612,7 +613,7 @@ TEST_F(FootholdTest, EdgesKnownVaguely_FootholdIsRefusedWithThatReason) {
 }
 
 // A foot in the middle would be refused for the nosing alone, with room to spare behind.
-TEST_F(FootholdTest, NosingKnownWorseThanTheRiser_FootStandsFartherFromIt) {
+TEST_F(FootholdSearchTest, NosingKnownWorseThanTheRiser_FootStandsFartherFromIt) {
   const Stairs s{.tread_m = 0.275};
   MapSnapshot map = ideal_map(s);
   const auto tread = std::find_if(map.polygons.begin(), map.polygons.end(), [&](const MapPolygon& p) {
@@ -632,7 +633,7 @@ TEST_F(FootholdTest, NosingKnownWorseThanTheRiser_FootStandsFartherFromIt) {
   }
 }
 
-TEST_F(FootholdTest, EmptyOrUnconfirmedMap_NamesTheReason) {
+TEST_F(FootholdSearchTest, EmptyOrUnconfirmedMap_NamesTheReason) {
   const Stairs s{};
   EXPECT_EQ(search(MapSnapshot{}, standing(s, 0)).obstruction, StopReason::kNothingSeen);
   MapSnapshot fresh = ideal_map(s);
@@ -641,7 +642,7 @@ TEST_F(FootholdTest, EmptyOrUnconfirmedMap_NamesTheReason) {
   EXPECT_EQ(search(ideal_map({.steps = 0}), standing(s, 0)).obstruction, StopReason::kNoStaircase);
 }
 
-TEST_F(FootholdTest, Slicing_DoesNotChangeTheResult) {
+TEST_F(FootholdSearchTest, Slicing_DoesNotChangeTheResult) {
   const Stairs s{.yaw_rad = 0.13};
   const MapSnapshot map = ideal_map(s);
   const FootholdSet whole = search(map, standing(s, 1, 0, 0.03, 0.05));
@@ -654,7 +655,7 @@ TEST_F(FootholdTest, Slicing_DoesNotChangeTheResult) {
   }
 }
 
-TEST_F(FootholdTest, Counters_EveryOneRises) {
+TEST_F(FootholdSearchTest, Counters_EveryOneRises) {
   const Stairs s{};
   FootholdSearch::Query q = standing(s, 0);
   search(ideal_map(s), q);

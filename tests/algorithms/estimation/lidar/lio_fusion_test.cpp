@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "algorithms/estimation/lidar/lio_fusion.hpp"
+
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "algorithms/estimation/lidar/lio_fusion.hpp"
 #include "algorithms/estimation/state_history.hpp"
 #include "algorithms/geometry/so3.hpp"
 #include "tests/support/nominal_robot.hpp"
@@ -15,45 +16,39 @@ namespace {
 using test::kLioPeriod_ns;
 using test::kTick_ns;
 using test::kTick_s;
-
-// --- Eqs (5)-(10), each by itself -----------------------------------------------------------------------------------
-
 const Transform kPose{rotation_z(0.7) * rotation_y(-0.2) * rotation_x(0.1), Vec3{1.0, -2.0, 0.8}};
 const Transform kOther{rotation_z(1.3) * rotation_y(0.1) * rotation_x(-0.3), Vec3{1.4, -1.5, 0.9}};
 
-TEST(FusionEquations, Eq5_LidarPoseThroughTheMount_IsTheBase) {
+TEST(LioFusionEquations, Eq5_LidarPoseThroughTheMount_IsTheBase) {
   const Transform base = base_from_lidar(kPose * base_T_lidar(), base_T_lidar());
   EXPECT_LT((base.p_m - kPose.p_m).norm(), 1e-14);
   EXPECT_LT((base.R - kPose.R).norm(), 1e-14);
 }
 
-TEST(FusionEquations, Eq6_Position_IsTheWeightedMean) {
+TEST(LioFusionEquations, Eq6_Position_IsTheWeightedMean) {
   const double gain = 0.3;
   EXPECT_LT((fuse_pose(kPose, kOther, gain).p_m - (0.7 * kPose.p_m + 0.3 * kOther.p_m)).norm(), 1e-15);
 }
 
-TEST(FusionEquations, Eq7And8_Rotation_TurnsTheGainsShareAboutOneAxis) {
+TEST(LioFusionEquations, Eq7And8_Rotation_TurnsTheGainsShareAboutOneAxis) {
   const Vec3 full = so3_log(kPose.R.transpose() * kOther.R);
   EXPECT_LT((kPose.R * so3_exp(full) - kOther.R).norm(), 1e-14);
   const Mat3 fused = fuse_pose(kPose, kOther, 0.25).R;
   EXPECT_LT((so3_log(kPose.R.transpose() * fused) - 0.25 * full).norm(), 1e-14);
 }
 
-TEST(FusionEquations, Eq9_Gain_IsDtOverTauPlusDt) {
+TEST(LioFusionEquations, Eq9_Gain_IsDtOverTauPlusDt) {
   EXPECT_DOUBLE_EQ(complementary_gain(0.1, 4.0), 0.1 / 4.1);
   EXPECT_DOUBLE_EQ(complementary_gain(0.0, 4.0), 0.0);
   EXPECT_DOUBLE_EQ(complementary_gain(0.1, 0.0), 1.0);
 }
 
-TEST(FusionEquations, Eq10_GainOfZeroAndOne_AreTheTwoPoses) {
+TEST(LioFusionEquations, Eq10_GainOfZeroAndOne_AreTheTwoPoses) {
   EXPECT_LT((fuse_pose(kPose, kOther, 0.0).R - kPose.R).norm(), 1e-15);
   EXPECT_LT((fuse_pose(kPose, kOther, 1.0).R - kOther.R).norm(), 1e-14);
   EXPECT_EQ(fuse_pose(kPose, kOther, 1.0).p_m, kOther.p_m);
 }
-
-// --- The recursion, on odometry made by hand ------------------------------------------------------------------------
-
-class FusionTest : public ::testing::Test {
+class LioFusionTest : public ::testing::Test {
  protected:
   void SetUp() override { fusion_.reset(params_, mount_); }
 
@@ -83,7 +78,7 @@ class FusionTest : public ::testing::Test {
   std::int64_t now_ns_ = 0;
 };
 
-TEST_F(FusionTest, FirstPoses_NoisyLio_AreAveragedIntoTheAlignment) {
+TEST_F(LioFusionTest, FirstPoses_NoisyLio_AreAveragedIntoTheAlignment) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal(0.0, 0.01);
   for (int i = 0; i < 300; ++i) {
@@ -95,7 +90,7 @@ TEST_F(FusionTest, FirstPoses_NoisyLio_AreAveragedIntoTheAlignment) {
   }
 }
 
-TEST_F(FusionTest, Offset_OdometryStepsAway_DecaysWithTau) {
+TEST_F(LioFusionTest, Offset_OdometryStepsAway_DecaysWithTau) {
   align();
   const Transform drift{rotation_z(0.02), Vec3{0.02, -0.01, 0.01}};
   const Transform drifted = drift * kPose;
@@ -111,7 +106,7 @@ TEST_F(FusionTest, Offset_OdometryStepsAway_DecaysWithTau) {
 }
 
 // The odometry walks and turns on, far from its origin; what it does not do itself, the world's offset does.
-TEST_F(FusionTest, Slew_YawCorrectedFiftyMetresFromTheOrigin_BaseMovesByNoMoreThanTheBoundPerTick) {
+TEST_F(LioFusionTest, Slew_YawCorrectedFiftyMetresFromTheOrigin_BaseMovesByNoMoreThanTheBoundPerTick) {
   Transform odom_T_base{rotation_z(0.4), Vec3{40, 30, 0.8}};
   for (int i = 0; i < 60; ++i) ASSERT_EQ(feed(odom_T_base, odom_T_base), LioVerdict::kAccepted);
   const Transform true_T_odom{rotation_z(0.02), Vec3{0.02, 0.03, 0.01}};  // at the base a displacement of 1 m ...
@@ -144,7 +139,7 @@ TEST_F(FusionTest, Slew_YawCorrectedFiftyMetresFromTheOrigin_BaseMovesByNoMoreTh
             10.0 * params_.slew_mps * kTick_s);  // a limit on the transform's own origin would have been another
 }
 
-TEST_F(FusionTest, Slew_AfterLongSilence_NoTickMovesTheFusedPoseByMoreThanTheBound) {
+TEST_F(LioFusionTest, Slew_AfterLongSilence_NoTickMovesTheFusedPoseByMoreThanTheBound) {
   align();
   const Transform drifted = Transform{rotation_z(0.06), Vec3{0.05, 0.03, 0}} * kPose;
   now_ns_ += 20 * kNsPerS;
@@ -163,7 +158,7 @@ TEST_F(FusionTest, Slew_AfterLongSilence_NoTickMovesTheFusedPoseByMoreThanTheBou
   EXPECT_NEAR(moved_m, gain * (drifted.p_m - kPose.p_m).norm(), 1e-3);
 }
 
-TEST_F(FusionTest, Slew_TicksOfAnyLength_IsARateAndNoTickMovesByMoreThanOneMillimetre) {
+TEST_F(LioFusionTest, Slew_TicksOfAnyLength_IsARateAndNoTickMovesByMoreThanOneMillimetre) {
   align();
   const Transform drifted = Transform{Mat3::Identity(), Vec3{0.05, 0.03, 0}} * kPose;
   now_ns_ += 20 * kNsPerS;
@@ -175,7 +170,7 @@ TEST_F(FusionTest, Slew_TicksOfAnyLength_IsARateAndNoTickMovesByMoreThanOneMilli
   }
 }
 
-TEST_F(FusionTest, FirstPose_ContradictedByTheSecond_IsThrownAway) {
+TEST_F(LioFusionTest, FirstPose_ContradictedByTheSecond_IsThrownAway) {
   const Transform wrong{kPose.R, kPose.p_m + Vec3{3, 0, 0}};
   EXPECT_EQ(feed(wrong, kPose), LioVerdict::kAccepted);
   EXPECT_EQ(feed(kPose, kPose), LioVerdict::kRealigned);
@@ -184,7 +179,7 @@ TEST_F(FusionTest, FirstPose_ContradictedByTheSecond_IsThrownAway) {
 
 // As of positions in millimetres: every pose contradicts the one before. The first two cannot be told from a first pose
 // that was wrong; all others are refused, and what is known of the odometry is what is known without LIO.
-TEST_F(FusionTest, PosesThatContradictEachOtherForEver_AreJumps_AndLeaveTimeAndSigmasAlone) {
+TEST_F(LioFusionTest, PosesThatContradictEachOtherForEver_AreJumps_AndLeaveTimeAndSigmasAlone) {
   LioFusion without;
   without.reset(params_, mount_);
   Transform odom_T_base = kPose;
@@ -218,7 +213,7 @@ TEST_F(FusionTest, PosesThatContradictEachOtherForEver_AreJumps_AndLeaveTimeAndS
 }
 
 // As of a quaternion whose numbers stand in another order: alike among themselves, but no heading makes them upright.
-TEST_F(FusionTest, PosesTiltedAgainstGravity_AreNeverTaken) {
+TEST_F(LioFusionTest, PosesTiltedAgainstGravity_AreNeverTaken) {
   const Transform tilted{rotation_x(1.0) * kPose.R, kPose.p_m};
   for (int i = 0; i < 100; ++i) ASSERT_EQ(feed(tilted, kPose), LioVerdict::kJump) << i;
   EXPECT_EQ(fusion_.last_accepted_ns(), -1);
@@ -229,7 +224,7 @@ TEST_F(FusionTest, PosesTiltedAgainstGravity_AreNeverTaken) {
   EXPECT_LT((fusion_.position_sigma_m() - sigma_m).norm(), 1e-3);
 }
 
-TEST_F(FusionTest, FirstPoseReplaced_TwentyPosesThatAgree_AreTheNewWorld) {
+TEST_F(LioFusionTest, FirstPoseReplaced_TwentyPosesThatAgree_AreTheNewWorld) {
   ASSERT_EQ(feed(kPose, kPose), LioVerdict::kAccepted);
   ASSERT_EQ(feed({kPose.R, kPose.p_m + Vec3{3, 0, 0}}, kPose), LioVerdict::kRealigned);
   for (std::uint32_t i = 1; i < params_.realign_count; ++i) ASSERT_EQ(feed(kPose, kPose), LioVerdict::kJump);
@@ -238,7 +233,7 @@ TEST_F(FusionTest, FirstPoseReplaced_TwentyPosesThatAgree_AreTheNewWorld) {
   EXPECT_TRUE(fusion_.aligned());
 }
 
-TEST_F(FusionTest, LastingJump_LioRelocalises_RealignsAndTheWorldStays) {
+TEST_F(LioFusionTest, LastingJump_LioRelocalises_RealignsAndTheWorldStays) {
   align();
   const Transform drifted = Transform{Mat3::Identity(), Vec3{0.01, 0, 0}} * kPose;
   for (int i = 0; i < 200; ++i) ASSERT_EQ(feed(kPose, drifted), LioVerdict::kAccepted);
@@ -252,7 +247,7 @@ TEST_F(FusionTest, LastingJump_LioRelocalises_RealignsAndTheWorldStays) {
   EXPECT_LT(((fusion_.world_T_odom() * drifted).p_m - fused.p_m).norm(), 1e-3);
 }
 
-TEST_F(FusionTest, Sigma_WithoutLio_GrowsWithTheWayAndItsHeadingAndWithLioShrinks) {
+TEST_F(LioFusionTest, Sigma_WithoutLio_GrowsWithTheWayAndItsHeadingAndWithLioShrinks) {
   align();
   tick(kPose, 2000);
   const Vec3 start_m = fusion_.position_sigma_m();
@@ -275,7 +270,7 @@ TEST_F(FusionTest, Sigma_WithoutLio_GrowsWithTheWayAndItsHeadingAndWithLioShrink
 
 // A world is tied to LIO's by noisy poses: the mean of so many stays wrong as they were, and a turn of it shows far
 // off.
-TEST_F(FusionTest, Sigma_FarFromWhereTheWorldWasTied_IsLarger) {
+TEST_F(LioFusionTest, Sigma_FarFromWhereTheWorldWasTied_IsLarger) {
   align();
   tick(kPose, 10);
   for (int i = 0; i < 400; ++i) ASSERT_EQ(feed(kPose, kPose), LioVerdict::kAccepted);
@@ -289,57 +284,7 @@ TEST_F(FusionTest, Sigma_FarFromWhereTheWorldWasTied_IsLarger) {
   EXPECT_NEAR(far_m.z(), std::hypot(near_m.z(), 10 * turn_rad), 1e-4);
 }
 
-TEST(LioUncertainty, BlendsWithoutDrift_LetThroughWhatALowPassOfWhiteNoiseDoes) {
-  LioUncertainty uncertainty;
-  uncertainty.reset({});
-  const double gain = 0.1;
-  for (int i = 0; i < 500; ++i) uncertainty.blend(gain, 0.01, 0.002);
-  EXPECT_NEAR(uncertainty.offset_variance().x(), 1e-4 * gain / (2.0 - gain), 1e-12);
-  EXPECT_NEAR(uncertainty.offset_variance()[3], 4e-6 * gain / (2.0 - gain), 1e-14);
-}
-
-TEST(LioUncertainty, DriftUnderBlends_LagsByTheTimeConstant) {
-  LioUncertainty uncertainty;
-  const LioUncertainty::Params params;
-  uncertainty.reset(params);
-  for (int i = 0; i < 2000; ++i) {
-    uncertainty.move({0, 0, 0.02});  // up: no heading bends that
-    uncertainty.blend(0.1, 0.0, 0.0);
-  }
-  EXPECT_NEAR(std::sqrt(uncertainty.offset_variance().z()), params.drift_per_m * 0.02 * 0.9 / 0.1, 1e-9);
-}
-
-TEST(LioUncertainty, Tie_AtThatMomentChangesNothing) {
-  LioUncertainty uncertainty;
-  uncertainty.reset({});
-  for (int i = 0; i < 100; ++i) uncertainty.move({0.02, 0.01, 0.005});
-  const Vec3 there_m{2.0, 1.0, 0.5}, before_m = uncertainty.position_sigma_m(there_m);
-  const double yaw_rad = uncertainty.yaw_sigma_rad();
-  uncertainty.tie(there_m, 0.01, 0.003);
-  EXPECT_LT((uncertainty.position_sigma_m(there_m) - before_m).norm(), 1e-12);
-  EXPECT_NEAR(uncertainty.yaw_sigma_rad(), yaw_rad, 1e-12);
-  for (int i = 0; i < 500; ++i) uncertainty.blend(0.1, 0.0, 0.0);  // what is forgotten no longer cancels it
-  EXPECT_NEAR(uncertainty.position_sigma_m(there_m).x(), std::hypot(before_m.x(), 0.01), 1e-9);
-}
-
-// What the odometry's filter takes back, because a foot stands firmly again, is not counted twice when it grows anew.
-TEST(LioUncertainty, OdometrysVariance_GrowsAndShrinks_IsFollowed) {
-  using Quantities = LioUncertainty::Quantities;
-  LioUncertainty uncertainty;
-  uncertainty.reset({});
-  uncertainty.begin(Quantities::Constant(1e-6));
-  for (int i = 0; i < 10; ++i) {
-    uncertainty.follow(Quantities::Constant(5e-6));
-    EXPECT_NEAR(uncertainty.offset_variance()[2], 4e-6, 1e-15);
-    uncertainty.follow(Quantities::Constant(2e-6));
-    EXPECT_NEAR(uncertainty.offset_variance()[2], 1e-6, 1e-15);
-  }
-  uncertainty.blend(0.5, 0.0, 0.0);  // LIO knows better: what shrinks then is gone already
-  uncertainty.follow(Quantities::Constant(1e-6));
-  EXPECT_EQ(uncertainty.offset_variance()[2], 0.0);
-}
-
-class NoisyFusionTest : public FusionTest {
+class NoisyLioFusionTest : public LioFusionTest {
  protected:
   // Poses of a robot at rest, white noise of kLioSigma_m on every axis and kLioSigma_rad on yaw and tilt.
   void feed_noisy(int poses, bool stated, double scale) {
@@ -363,7 +308,7 @@ class NoisyFusionTest : public FusionTest {
   std::normal_distribution<double> normal_;
 };
 
-TEST_F(NoisyFusionTest, Innovations_HonestSigmas_AreOneInTheMean) {
+TEST_F(NoisyLioFusionTest, Innovations_HonestSigmas_AreOneInTheMean) {
   feed_noisy(2000, true, 1.0);
   const LioInnovations& seen = fusion_.innovations();
   EXPECT_EQ(seen.position.stamp_ns, now_ns_);
@@ -374,7 +319,7 @@ TEST_F(NoisyFusionTest, Innovations_HonestSigmas_AreOneInTheMean) {
   EXPECT_NEAR(seen.yaw.last / math::square(seen.last[3]), 81e3, 3e3);
 }
 
-TEST_F(NoisyFusionTest, Lio_ThatStatesNoSigma_IsAsNoisyAsItIsMeasuredToBe) {
+TEST_F(NoisyLioFusionTest, Lio_ThatStatesNoSigma_IsAsNoisyAsItIsMeasuredToBe) {
   for (const double scale : {0.3, 1.0, 1.5}) {
     feed_noisy(600, false, scale);
     EXPECT_NEAR(fusion_.innovations().position.mean, 1.0, 0.2) << scale;
@@ -383,16 +328,12 @@ TEST_F(NoisyFusionTest, Lio_ThatStatesNoSigma_IsAsNoisyAsItIsMeasuredToBe) {
 }
 
 // Gravity holds the odometry's tilt, LIO's own is noise of every single pose.
-TEST_F(NoisyFusionTest, TiltOfLio_NeverTiltsTheFusedPose) {
+TEST_F(NoisyLioFusionTest, TiltOfLio_NeverTiltsTheFusedPose) {
   feed_noisy(600, true, 1.5);
   const Mat3 off = fusion_.world_T_odom().R;
   EXPECT_GT(off(2, 2), 1.0 - 1e-15);
   EXPECT_GT(std::abs(off(1, 0)), 1e-6);  // yaw is LIO's to tell
 }
-
-// --- LIO as it arrives, 10 Hz and 100 ms late, on a walk of 60 s at 0.23 m/s whose odometry is 2 % short
-// --------------
-
 // Root mean square of the fused position's error. Not at_stamp: against the odometry of the pose's arrival.
 double fused_rmse_m(bool at_stamp) {
   LioFusion::Params params;
@@ -436,11 +377,10 @@ double fused_rmse_m(bool at_stamp) {
   return std::sqrt(sum_m2 / static_cast<double>(ticks));
 }
 
-TEST(FusionOfLateLio, OdometryTwoPercentShort_FusedAtItsStamp_IsWithinSixMillimetres) {
+TEST(LioFusionOfLatePoses, OdometryTwoPercentShort_FusedAtItsStamp_IsWithinSixMillimetres) {
   const double rmse_m = fused_rmse_m(true);
   EXPECT_LT(rmse_m, 0.006);              // 3.5 mm
   EXPECT_GT(fused_rmse_m(false), 0.02);  // on arrival: 25.5 mm, nearly all of it lag
 }
-
 }  // namespace
 }  // namespace polygmap
