@@ -11,7 +11,7 @@
 namespace polygmap {
 
 #if defined(EIGEN_VECTORIZE) || EIGEN_MAX_STATIC_ALIGN_BYTES != 0
-#error "Eigen sums and aligns in another way here than in the module: compile with -DEIGEN_DONT_VECTORIZE (architecture.md, 'One result everywhere')"
+#error "Eigen sums and aligns in another way here than in the module: compile with -DEIGEN_DONT_VECTORIZE"
 #endif
 
 struct Ports {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One climb gives one result, bit for bit, in every output of the module: x86 with AVX2, x86 without (tests/consumer) and
-// AArch64 (orin) have the same recorded here. A robot on the fakes of the ports follows the commands, so that one bit of
-// difference spreads.
+// One climb gives one result, bit for bit, in every output of the module: x86 with AVX2, x86 without (tests/consumer)
+// and AArch64 (orin) have the same recorded here. A robot on the fakes of the ports follows the commands, so that one
+// bit of difference spreads.
 #include <gtest/gtest.h>
 
 #include <memory>

@@ -43,7 +43,8 @@ struct QuarterTurns {
   if (rest == 0) return {0.0, quarter};  // no double is that near to a multiple
   const auto top = static_cast<std::uint64_t>(rest >> 64U);
   const int zeros = top != 0 ? std::countl_zero(top) : 64 + std::countl_zero(static_cast<std::uint64_t>(rest));
-  const auto leading = static_cast<std::int64_t>(static_cast<std::uint64_t>((rest << static_cast<unsigned>(zeros)) >> 65U));
+  const auto leading =
+      static_cast<std::int64_t>(static_cast<std::uint64_t>((rest << static_cast<unsigned>(zeros)) >> 65U));
   // leading * 2^(-61 - zeros) quarters of a turn
   const double scale = std::bit_cast<double>(static_cast<std::uint64_t>(1023 - 61 - zeros) << 52U);
   const double rest_rad = static_cast<double>(leading) * scale * 1.57079632679489661923;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The transcendental functions of the module: they use nothing but IEEE 754's exact operations in a fixed order, so that
-// every target gives the same bits (of a NaN no more than that it is one). tests/algorithms/core/transcendental_test.cpp
-// states how accurate they are. Coefficients are fdlibm's (Sun Microsystems, 1993).
+// The transcendental functions of the module: they use nothing but IEEE 754's exact operations in a fixed order, so
+// that every target gives the same bits (of a NaN no more than that it is one).
+// tests/algorithms/core/transcendental_test.cpp states how accurate they are. Coefficients are fdlibm's (Sun
+// Microsystems, 1993).
 #pragma once
 
 #include <array>

@@ -56,10 +56,45 @@ double error_ulp(double got, long double wanted) {
 const std::vector<double>& hard_arguments() {
   static const std::vector<double> all = [] {
     std::vector<double> out;
-    for (const double x : {0.0, kLeast, 3 * kLeast, 0x1p-1022, 0x1.fffffffffffffp-1023, 1e-300, 0x1p-600, 1e-17, 1e-9,
-                           0.4375, 0.5, 0.6875, 0.975, 1.0, 1.5, kPi / 4, kPi / 2, kPi, 2 * kPi, 1e4, 99999.9, 1e5, 1e6,
-                           708.3, 709.78271289338397, 709.782712893384, 744.44007192138122, 745.13321910194122, 745.2,
-                           0x1p15, 0x1p52, 0x1p53, 1e22, 0x1.6ac5b262ca1ffp+849, 0x1p900, 0x1p1000, kMost, kInf, kNan}) {
+    for (const double x : {0.0,
+                           kLeast,
+                           3 * kLeast,
+                           0x1p-1022,
+                           0x1.fffffffffffffp-1023,
+                           1e-300,
+                           0x1p-600,
+                           1e-17,
+                           1e-9,
+                           0.4375,
+                           0.5,
+                           0.6875,
+                           0.975,
+                           1.0,
+                           1.5,
+                           kPi / 4,
+                           kPi / 2,
+                           kPi,
+                           2 * kPi,
+                           1e4,
+                           99999.9,
+                           1e5,
+                           1e6,
+                           708.3,
+                           709.78271289338397,
+                           709.782712893384,
+                           744.44007192138122,
+                           745.13321910194122,
+                           745.2,
+                           0x1p15,
+                           0x1p52,
+                           0x1p53,
+                           1e22,
+                           0x1.6ac5b262ca1ffp+849,
+                           0x1p900,
+                           0x1p1000,
+                           kMost,
+                           kInf,
+                           kNan}) {
       for (const double v : {x, std::nextafter(x, kInf), std::nextafter(x, 0.0)}) out.push_back(v), out.push_back(-v);
     }
     for (int i = 1; i < 64; ++i) out.push_back(i * (kPi / 2)), out.push_back(i * 997.0 * (kPi / 2));
@@ -125,7 +160,8 @@ TEST(AsinAndAcos, AnyArgument_AreWithinTwoAndAHalfUlp) {
 TEST(Atan2, AnyArguments_IsWithinOneAndAHalfUlp) {
   double worst = 0.0;
   const auto take = [&](double y, double x) {
-    worst = std::max(worst, error_ulp(math::atan2(y, x), std::atan2(static_cast<long double>(y), static_cast<long double>(x))));
+    worst = std::max(
+        worst, error_ulp(math::atan2(y, x), std::atan2(static_cast<long double>(y), static_cast<long double>(x))));
   };
   Arguments arguments;
   for (const double y : hard_arguments()) {
