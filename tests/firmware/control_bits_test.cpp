@@ -198,11 +198,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 0U);
-  EXPECT_EQ(hashes.gait.value(), 0U);
-  EXPECT_EQ(hashes.commands.value(), 0U);
-  EXPECT_EQ(hashes.surfaces.value(), 0U);
-  EXPECT_EQ(hashes.map.value(), 0U);
+  EXPECT_EQ(hashes.estimates.value(), 8505264477469557825U);
+  EXPECT_EQ(hashes.gait.value(), 12023883479755004066U);
+  EXPECT_EQ(hashes.commands.value(), 734820597794581347U);
+  EXPECT_EQ(hashes.surfaces.value(), 10736300000676080020U);
+  EXPECT_EQ(hashes.map.value(), 14477340419879985307U);
 }
 
 }  // namespace

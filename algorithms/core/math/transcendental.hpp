@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 
 #include "algorithms/core/math/quarter_turns.hpp"
@@ -26,32 +27,81 @@ namespace internal {
 inline constexpr double kRound = 0x1.8p52;  // the last bits of a sum with it are the nearest whole number
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// quarter: modulo 4; r_rad: what is left, within pi/4.
-[[nodiscard]] inline SinCos sin_cos_of_rest(double r_rad, std::uint64_t quarter) noexcept {
-  const double z = r_rad * r_rad, half = 0.5 * z, w = 1.0 - half;
+// Four or two numbers in vector registers, as wide as the processor has them: every operation is that of each number.
+template <std::size_t kWidth>
+struct Lanes;
+template <>
+struct Lanes<4> {
+  typedef double Reals __attribute__((vector_size(32)));
+  typedef std::uint64_t Bits __attribute__((vector_size(32)));
+};
+template <>
+struct Lanes<2> {
+  typedef double Reals __attribute__((vector_size(16)));
+  typedef std::uint64_t Bits __attribute__((vector_size(16)));
+};
 
-  double s = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10;
+// r_rad: what is left of an angle of less than kLarge_rad; shifted: its lowest bits count the quarter turns.
+inline constexpr double kLarge_rad = 1e5;
+template <typename Real>
+[[gnu::always_inline]] inline void take_quarter_turns(const Real& x_rad, Real& shifted, Real& r_rad) noexcept {
+  constexpr double kPart1 = 1.57079632673412561417e+00, kPart2 = 6.07710050630396597660e-11,
+                   kPart3 = 2.02226624879595063154e-21;
+  shifted = x_rad * 6.36619772367581382433e-01 + kRound;
+  const Real quarters = shifted - kRound;
+  r_rad = x_rad - quarters * kPart1 - quarters * kPart2 - quarters * kPart3;
+}
+
+// Sine and cosine of what is within pi/4.
+template <typename Real>
+[[gnu::always_inline]] inline void sin_cos_of_rest(const Real& r_rad, Real& sin, Real& cos) noexcept {
+  const Real z = r_rad * r_rad, half = 0.5 * z, w = 1.0 - half;
+  Real s = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10;
   s = 2.75573137070700676789e-06 + z * s;
   s = -1.98412698298579493134e-04 + z * s;
   s = 8.33333333332248946124e-03 + z * s;
   s = -1.66666666666666324348e-01 + z * s;
-  s = r_rad + r_rad * z * s;
-  double c = 2.08757232129817482790e-09 - z * 1.13596475577881948265e-11;
+  sin = r_rad + r_rad * z * s;
+  Real c = 2.08757232129817482790e-09 - z * 1.13596475577881948265e-11;
   c = -2.75573143513906633035e-07 + z * c;
   c = 2.48015872894767294178e-05 + z * c;
   c = -1.38888888888741095749e-03 + z * c;
   c = 4.16666666666666019037e-02 + z * c;
-  c = w + ((1.0 - w - half) + z * z * c);
+  cos = w + ((1.0 - w - half) + z * z * c);
+}
 
+[[nodiscard]] inline SinCos turned(double s, double c, std::uint64_t quarter) noexcept {
   const bool odd = (quarter & 1U) != 0;
   const double sin = odd ? c : s, cos = odd ? s : c;
   return {(quarter & 2U) != 0 ? -sin : sin, ((quarter + 1U) & 2U) != 0 ? -cos : cos};
 }
 
+// Of kWidth angles of less than kLarge_rad.
+template <std::size_t kWidth>
+inline void sin_cos_of_lanes(const double* x_rad, double* sin, double* cos) noexcept {
+  using Reals = typename Lanes<kWidth>::Reals;
+  using Bits = typename Lanes<kWidth>::Bits;
+  Reals x, shifted, rest, s, c;
+  std::memcpy(&x, x_rad, sizeof(x));
+  take_quarter_turns(x, shifted, rest);
+  sin_cos_of_rest(rest, s, c);
+  Bits quarter, s_bits, c_bits;
+  std::memcpy(&quarter, &shifted, sizeof(quarter));
+  std::memcpy(&s_bits, &s, sizeof(s));
+  std::memcpy(&c_bits, &c, sizeof(c));
+  const Bits swapped = (s_bits ^ c_bits) & (0U - (quarter & 1U));
+  s_bits ^= swapped ^ (quarter & 2U) << 62U;
+  c_bits ^= swapped ^ ((quarter + 1U) & 2U) << 62U;
+  std::memcpy(sin, &s_bits, sizeof(s_bits));
+  std::memcpy(cos, &c_bits, sizeof(c_bits));
+}
+
 [[nodiscard, gnu::cold, gnu::noinline]] inline SinCos sin_cos_of_large(double x_rad) noexcept {
   if (!(std::abs(x_rad) <= std::numeric_limits<double>::max())) return {kNan, kNan};
   const QuarterTurns turns = quarter_turns_of_large(x_rad);
-  return sin_cos_of_rest(turns.rest_rad, turns.quarter);
+  double s = 0.0, c = 0.0;
+  sin_cos_of_rest(turns.rest_rad, s, c);
+  return turned(s, c, turns.quarter);
 }
 
 // Of finite y and x, the larger of which is far from overflow and underflow. atan(t) = atan(c) + atan((t-c)/(1+ct)) for
@@ -115,12 +165,43 @@ inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // Sine and cosine at once. Below 1e5 rad by reduction in three parts of pi/2. Of a zero with a sign the sine is +0.
 [[nodiscard]] inline SinCos sin_cos(double x_rad) noexcept {
-  if (!(std::abs(x_rad) < 1e5)) return internal::sin_cos_of_large(x_rad);
-  constexpr double kPart1 = 1.57079632673412561417e+00, kPart2 = 6.07710050630396597660e-11,
-                   kPart3 = 2.02226624879595063154e-21;
-  const double shifted = x_rad * 6.36619772367581382433e-01 + internal::kRound, quarters = shifted - internal::kRound;
-  const double r_rad = x_rad - quarters * kPart1 - quarters * kPart2 - quarters * kPart3;
-  return internal::sin_cos_of_rest(r_rad, std::bit_cast<std::uint64_t>(shifted));
+  if (!(std::abs(x_rad) < internal::kLarge_rad)) return internal::sin_cos_of_large(x_rad);
+  double shifted = 0.0, rest_rad = 0.0, s = 0.0, c = 0.0;
+  internal::take_quarter_turns(x_rad, shifted, rest_rad);
+  internal::sin_cos_of_rest(rest_rad, s, c);
+  return internal::turned(s, c, std::bit_cast<std::uint64_t>(shifted));
+}
+
+template <std::size_t kCount>
+struct SinCosOf {
+  std::array<double, kCount> sin;
+  std::array<double, kCount> cos;
+};
+namespace internal {
+template <std::size_t kCount>
+[[gnu::cold, gnu::noinline]] inline void sin_cos_one_by_one(const double* x_rad, SinCosOf<kCount>& out) noexcept {
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const auto [s, c] = sin_cos(x_rad[i]);
+    out.sin[i] = s;
+    out.cos[i] = c;
+  }
+}
+}  // namespace internal
+// Of several angles, an even number: the same bits for fewer instructions.
+template <std::size_t kCount>
+[[nodiscard]] inline SinCosOf<kCount> sin_cos(const std::array<double, kCount>& x_rad) noexcept {
+  static_assert(kCount % 2 == 0);
+  SinCosOf<kCount> out;
+  bool small = true;
+  for (const double x : x_rad) small = small && std::abs(x) < internal::kLarge_rad;
+  if (!small) {
+    internal::sin_cos_one_by_one(x_rad.data(), out);
+    return out;
+  }
+  std::size_t i = 0;
+  for (; i + 4 <= kCount; i += 4) internal::sin_cos_of_lanes<4>(&x_rad[i], &out.sin[i], &out.cos[i]);
+  for (; i < kCount; i += 2) internal::sin_cos_of_lanes<2>(&x_rad[i], &out.sin[i], &out.cos[i]);
+  return out;
 }
 [[nodiscard]] inline double sin(double x_rad) noexcept { return sin_cos(x_rad).sin; }
 [[nodiscard]] inline double cos(double x_rad) noexcept { return sin_cos(x_rad).cos; }
