@@ -198,11 +198,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 8505264477469557825U);
-  EXPECT_EQ(hashes.gait.value(), 12023883479755004066U);
-  EXPECT_EQ(hashes.commands.value(), 734820597794581347U);
-  EXPECT_EQ(hashes.surfaces.value(), 10736300000676080020U);
-  EXPECT_EQ(hashes.map.value(), 14477340419879985307U);
+  EXPECT_EQ(hashes.estimates.value(), 15356745916766467853U);
+  EXPECT_EQ(hashes.gait.value(), 15698759557443570742U);
+  EXPECT_EQ(hashes.commands.value(), 10359067674599635270U);
+  EXPECT_EQ(hashes.surfaces.value(), 12594188397104333009U);
+  EXPECT_EQ(hashes.map.value(), 12629239578603678512U);
 }
 
 }  // namespace
