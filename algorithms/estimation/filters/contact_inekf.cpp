@@ -42,8 +42,9 @@ void ContactInEkf::initialise(const Start& start, const std::array<LegMeasuremen
   P_.diagonal().segment<3>(kAccelBias).setConstant(math::square(start.accel_bias_sigma_mps2));
   // Right-invariant errors of velocity and position hold the attitude's: e_v = dv + v x e.
   for (const auto& [index, value] : {std::pair{+kVelocity, odom_v_base_mps_}, std::pair{+kPosition, odom_p_base_m_}}) {
-    P_.middleRows<3>(index) += skew(value) * P_.middleRows<3>(kAttitude);
-    P_.middleCols<3>(index) += P_.middleCols<3>(kAttitude) * skew(value).transpose();
+    const Mat3 lever = skew(value);
+    P_.middleRows<3>(index) += lever * P_.middleRows<3>(kAttitude);
+    P_.middleCols<3>(index) += P_.middleCols<3>(kAttitude) * lever.transpose();
   }
   for (std::size_t foot = 0; foot < kFootCount; ++foot) anchor(foot, legs[foot]);
 }
