@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -14,12 +15,13 @@ template <std::size_t Capacity>
 class FixedText {
  public:
   constexpr FixedText() noexcept = default;
-  constexpr FixedText(std::string_view text) noexcept {  // NOLINT(google-explicit-constructor): as a literal is
+  template <typename Text>
+  requires std::convertible_to<const Text&, std::string_view>
+  constexpr FixedText(const Text& source) noexcept {  // NOLINT(google-explicit-constructor): as a literal is
+    const std::string_view text = source;
     too_long_ = text.size() > Capacity;
     for (std::size_t i = 0; i < text.size() && i < Capacity; ++i) chars_[i] = text[i];
   }
-  constexpr FixedText(const char* text) noexcept  // NOLINT(google-explicit-constructor)
-      : FixedText(std::string_view(text)) {}
   [[nodiscard]] constexpr const char* c_str() const noexcept { return chars_.data(); }
   [[nodiscard]] constexpr std::string_view view() const noexcept { return chars_.data(); }
   [[nodiscard]] constexpr bool empty() const noexcept { return chars_[0] == '\0'; }

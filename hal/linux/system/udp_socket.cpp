@@ -79,29 +79,29 @@ std::span<const Datagram> UdpSocket::receive(bool& more) noexcept {
   }
   more = count == static_cast<int>(kBatch);
   if (count <= 0) return {};
-  if (const ClockReading now = read_clocks(*calls_); now.good) {
-    clocks_ = now;
-  } else {
+  const ClockReading now = read_clocks(*calls_);
+  if (!now.good) {  // samples of unknown age are none
     count_up(counters_.failed_calls);
+    return {};
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < std::min(static_cast<std::size_t>(count), kBatch); ++i) {
     const msghdr& header = messages_[i].msg_hdr;
     count_up(counters_.datagrams);
-    const std::int64_t arrival_ns = arrival_of(header);
+    const std::int64_t arrival_ns = arrival_of(header, now);
     const bool named = header.msg_namelen >= sizeof(sockaddr_in) && slots_[i].sender.sin_family == AF_INET;
     if (sender_ != 0 && (!named || slots_[i].sender.sin_addr.s_addr != sender_)) {
       count_up(counters_.foreign_sender);
       continue;
     }
     const std::size_t size = std::min<std::size_t>(messages_[i].msg_len, kMostBytes);
-    datagrams_[kept++] = {codec::Bytes(slots_[i].bytes).first(size), (header.msg_flags & MSG_TRUNC) != 0, arrival_ns};
+    datagrams_[kept++] = {codec::Bytes(slots_[i].bytes).first(size), arrival_ns};
   }
   return std::span<const Datagram>(datagrams_).first(kept);
 }
 
-std::int64_t UdpSocket::arrival_of(const msghdr& header) noexcept {
-  std::int64_t arrival_ns = clocks_.monotonic_ns;
+std::int64_t UdpSocket::arrival_of(const msghdr& header, const ClockReading& now) noexcept {
+  std::int64_t arrival_ns = now.monotonic_ns;
   // The macros want a header that may be written.
   msghdr walk = header;
   for (cmsghdr* c = CMSG_FIRSTHDR(&walk); c != nullptr; c = CMSG_NXTHDR(&walk, c)) {
@@ -109,7 +109,7 @@ std::int64_t UdpSocket::arrival_of(const msghdr& header) noexcept {
     if (c->cmsg_type == SCM_TIMESTAMPNS && c->cmsg_len >= CMSG_LEN(sizeof(timespec))) {
       timespec stamp{};
       std::memcpy(&stamp, CMSG_DATA(c), sizeof(stamp));
-      arrival_ns = clocks_.to_monotonic_ns(stamp.tv_sec * kNsPerS + stamp.tv_nsec);
+      arrival_ns = now.to_monotonic_ns(stamp.tv_sec * kNsPerS + stamp.tv_nsec);
     } else if (c->cmsg_type == SO_RXQ_OVFL && c->cmsg_len >= CMSG_LEN(sizeof(std::uint32_t))) {
       std::uint32_t dropped = 0;
       std::memcpy(&dropped, CMSG_DATA(c), sizeof(dropped));

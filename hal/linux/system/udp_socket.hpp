@@ -31,8 +31,7 @@ struct UdpCounters {  // saturate
 };
 
 struct Datagram {
-  codec::Bytes bytes;           // of one that was too long, its beginning
-  bool too_long = false;        // over kMostBytes
+  codec::Bytes bytes;           // of one over UdpSocket::kMostBytes, its beginning
   std::int64_t arrival_ns = 0;  // monotonic
 };
 
@@ -65,12 +64,11 @@ class UdpSocket {
   // The batch's datagrams; more: the kernel may have others.
   [[nodiscard]] std::span<const Datagram> receive(bool& more) noexcept;
   void prepare() noexcept;
-  [[nodiscard]] std::int64_t arrival_of(const msghdr& header) noexcept;
+  [[nodiscard]] std::int64_t arrival_of(const msghdr& header, const ClockReading& now) noexcept;
 
   const SystemCalls* calls_ = nullptr;
   Descriptor socket_;
-  in_addr_t sender_ = 0;  // network order, 0: anyone
-  ClockReading clocks_{};
+  in_addr_t sender_ = 0;       // network order, 0: anyone
   std::uint32_t dropped_ = 0;  // as the kernel counts
   UdpCounters counters_;
   std::array<Slot, kBatch> slots_{};
