@@ -40,10 +40,10 @@ using LaneProgresses = std::array<LaneProgress, kLaneCount>;
 class LaneView {
  public:
   // False when the other lane has not finished the frame before: what it publishes there is then seen a frame later.
-  // The first frame has none before it.
+  // The first frame has none before it; frames that this lane skipped are told as slips.
   [[nodiscard]] bool begin(std::int64_t frame_ns, std::int64_t other_finished_ns) noexcept {
-    const bool in_time = first_ || other_finished_ns >= frame_ns - kCycle_ns;
-    first_ = false;
+    const bool in_time = other_finished_ns >= std::min(frame_ns - kCycle_ns, frame_ns_);
+    frame_ns_ = frame_ns;
     other_finished_ns_ = other_finished_ns;
     last_ns_ = std::min(frame_ns - kCycle_ns, other_finished_ns);
     return in_time;
@@ -56,7 +56,7 @@ class LaneView {
  private:
   std::int64_t last_ns_ = kNoFrame_ns;
   std::int64_t other_finished_ns_ = kNoFrame_ns;
-  bool first_ = true;
+  std::int64_t frame_ns_ = kNoFrame_ns;
 };
 
 // A lane's faults and limits. Its thread counts in `own` and publishes; control reads what was published.

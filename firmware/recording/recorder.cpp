@@ -149,8 +149,9 @@ void Recorder::put_events(std::size_t lane) noexcept {
 
 void Recorder::begin_row(std::size_t row, std::int64_t cycle_ns, const WorkBudget& budget) noexcept {
   const std::size_t lane = kTasks[row].row.lane;
-  put_events(lane);
   LaneLog& log = logs_[lane];
+  begin_frame(log, cycle_ns);
+  put_events(lane);
   log.length_at = put_record(log.out, RecordKind::kRow);
   log.out.put(static_cast<std::uint8_t>(row));
   log.out.put(cycle_ns);
@@ -165,6 +166,7 @@ void Recorder::end_row(std::size_t row, Progress progress, const WorkBudget& bud
   const std::size_t lane = kTasks[row].row.lane;
   LaneLog& log = logs_[lane];
   const LaneView& view = lane == kControlLane ? pipeline_->control().view() : pipeline_->perception().view();
+  log.frames[log.frame_count - 1].saw_ns = view.last_ns();
   log.out.put_at(log.count_at - sizeof(std::int64_t), view.other_finished_ns());
   log.out.put_at(log.count_at, log.calls);
   log.out.put(progress);
@@ -189,15 +191,47 @@ void Recorder::cycle_done(std::size_t lane, const CycleReport& report) noexcept 
   if (lane == kControlLane) ++cycles_;
 }
 
+void Recorder::begin_frame(LaneLog& log, std::int64_t cycle_ns) noexcept {
+  if (log.frame_count > 0 && log.frames[log.frame_count - 1].cycle_ns == cycle_ns) return;
+  if (log.frame_count == kFramesPerFlush) {
+    no_room_[static_cast<std::size_t>(&log - logs_.data())] = true;
+    log.frames[kFramesPerFlush - 1].cycle_ns = cycle_ns;
+    return;
+  }
+  log.frames[log.frame_count] = {log.frame_count == 0 ? 0 : log.out.size(), cycle_ns, kNoFrame_ns};
+  ++log.frame_count;
+}
+
+void Recorder::write_frame(const LaneLog& log, std::size_t frame) {
+  const std::size_t begin = log.frames[frame].begin;
+  const std::size_t end = frame + 1 < log.frame_count ? log.frames[frame + 1].begin : log.out.size();
+  write(file_, log.out.bytes().data() + begin, end - begin, kFileName);
+}
+
 void Recorder::flush() {
+  std::array<std::size_t, kLaneCount> next{};
+  const auto frame_of = [&](std::size_t lane) -> const Frame* {
+    return next[lane] < logs_[lane].frame_count ? &logs_[lane].frames[next[lane]] : nullptr;
+  };
+  for (std::size_t lane = 0; frame_of(kControlLane) != nullptr || frame_of(kPerceptionLane) != nullptr;) {
+    const Frame *frame = frame_of(lane), *other = frame_of(1 - lane);
+    // What the other lane has left it did not see, or it is that one's turn; both cannot wait for each other.
+    if (frame != nullptr && (other == nullptr || other->cycle_ns > frame->saw_ns)) {
+      write_frame(logs_[lane], next[lane]++);
+    } else {
+      lane = 1 - lane;
+    }
+  }
   for (LaneLog& log : logs_) {
-    no_room_ = no_room_ || log.out.full();
-    write(file_, log.out.bytes().data(), log.out.size(), kFileName);
+    no_room_[0] = no_room_[0] || log.out.full();
+    if (log.frame_count == 0) write(file_, log.out.bytes().data(), log.out.size(), kFileName);
     log.out.clear();
+    log.frame_count = 0;
   }
   write(picture_file_, pixels_.data(), pictures_waiting_ * picture_px_ * sizeof(std::uint16_t), kPictureFileName);
   pictures_waiting_ = 0;
-  if (no_room_ && failure_.empty()) failure_ = "A tick had more to record than there is memory for.";
+  if ((no_room_[0] || no_room_[1]) && failure_.empty())
+    failure_ = "A tick had more to record than there is memory for.";
 }
 
 std::string Recorder::finish() {
@@ -276,8 +310,10 @@ bool Recorder::try_acquire(DepthFrameView& frame) noexcept {
   } else {
     log.out.put(Pixels::kStored);
     log.out.put(hash_of_pixels(frame.depth, picture_px_));
-    no_room_ = no_room_ || pictures_waiting_ == kPicturesPerFlush;
-    if (pictures_waiting_ == kPicturesPerFlush) return true;
+    if (pictures_waiting_ == kPicturesPerFlush) {
+      no_room_[kPerceptionLane] = true;
+      return true;
+    }
     std::memcpy(pixels_.data() + pictures_waiting_ * picture_px_, frame.depth, picture_px_ * sizeof(std::uint16_t));
     ++pictures_waiting_;
     ++pictures_;

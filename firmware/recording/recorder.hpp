@@ -50,18 +50,29 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
  private:
   static constexpr std::size_t kLaneMemory_bytes = 1024U * 1024U;  // three cycles, all their polygons
   static constexpr std::size_t kPicturesPerFlush = 4;
+  // What a lane wrote in one frame. It goes into the file after all of the other lane that it saw: a replay lives the
+  // frames one after the other.
+  struct Frame {
+    std::size_t begin = 0;  // in the lane's memory
+    std::int64_t cycle_ns = 0;
+    std::int64_t saw_ns = kNoFrame_ns;  // up to this frame of the other lane
+  };
+  static constexpr std::size_t kFramesPerFlush = 16;
   struct LaneLog {
     std::vector<std::byte> memory = std::vector<std::byte>(kLaneMemory_bytes);
     ByteWriter out{memory};
     std::size_t length_at = 0, count_at = 0;  // to be filled in when the row is over
     std::uint16_t calls = 0;
+    std::array<Frame, kFramesPerFlush> frames;
+    std::size_t frame_count = 0;
     std::array<std::uint32_t, kEventTable<ExecutiveEvent>.size()> told{};  // events written so far
     HealthCounts health{};                                                 // as written last
   };
 
   void put_call(LaneLog& log, CallKind kind, bool gave) noexcept;
   void put_events(std::size_t lane) noexcept;
-  void put_outputs(LaneLog& log, std::size_t row, Progress progress) noexcept;
+  void begin_frame(LaneLog& log, std::int64_t cycle_ns) noexcept;
+  void write_frame(const LaneLog& log, std::size_t frame);
   void write(std::FILE* file, const void* bytes, std::size_t count, const char* name);
 
   Ports robot_;
@@ -76,7 +87,7 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
   std::FILE* file_ = nullptr;
   std::FILE* picture_file_ = nullptr;
   std::string failure_;
-  bool no_room_ = false;
+  std::array<bool, kLaneCount> no_room_{};
 };
 
 // The module's rows on their way to an executive.

@@ -36,6 +36,14 @@ TEST(LaneView, Begin_OtherLaneHasNotFinishedTheFrameBefore_IsBehindAndSeenAFrame
   EXPECT_EQ(view.last_ns(), frame_ns(2));
 }
 
+TEST(LaneView, Begin_BothLanesSkippedFrames_NobodyIsBehind) {
+  LaneView view;
+  (void)view.begin(frame_ns(0), kNoFrame_ns);
+  EXPECT_TRUE(view.begin(frame_ns(9), frame_ns(0)));
+  EXPECT_EQ(view.last_ns(), frame_ns(0));
+  EXPECT_FALSE(view.begin(frame_ns(10), frame_ns(0)));
+}
+
 TEST(LaneView, ValueOfAFrame_ReaderInTheSameFrame_IsSeenInTheNext) {
   LaneView view;
   Exchange<int, kSeldomSlots> exchange;
@@ -59,7 +67,9 @@ TEST(LaneView, ReaderCatchesUp_ValueInEveryFrame_NoneIsLost) {
       for (; reader <= writer; ++reader) {
         (void)view.begin(frame_ns(reader), frame_ns(writer - 1));
         (void)exchange.try_take(view.last_ns());
-        if (reader > 0) ASSERT_EQ(exchange.front_frame_ns(), frame_ns(reader - 1));
+        if (reader > 0) {
+          ASSERT_EQ(exchange.front_frame_ns(), frame_ns(reader - 1));
+        }
       }
     }
     exchange.publish(frame_ns(writer));

@@ -255,7 +255,9 @@ bool same_bits(const JointCommand& a, const JointCommand& b) {
 
 TEST(ClimbInTwoLanes, ThreadsOfAnySpeedWithinAFrame_EveryCommandIsTheOneLanesToTheBit) {
   const ClimbTrace one = climb_in_one_lane();
-  if (!test::kSlowMachine) EXPECT_GE(one.treads, 1U);
+  if (!test::kSlowMachine) {
+    EXPECT_GE(one.treads, 1U);
+  }
   for (unsigned seed = 1; seed <= 2; ++seed) {
     const ClimbTrace two = climb_in_two_lanes(seed);
     ASSERT_EQ(two.commands.size(), one.commands.size());
