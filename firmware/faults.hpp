@@ -32,7 +32,7 @@ namespace polygmap {
   X(17, kStateStale, "state_stale", "IMU or joints were silent for so long that the gait stopped.")                \
   X(18, kGaitStopped, "gait_stopped", "The gait stopped in double support, not on top.")                           \
   X(19, kLaneBehind, "lane_behind",                                                                                \
-    "A lane had not finished a frame when the other one began the next: it was seen a frame later.")
+    "A lane had not finished a cycle when the other one began the next: it is seen a cycle later.")
 
 // A bound was met; the module goes on with what it has. Numbers 101-199.
 #define POLYGMAP_LIMITS(X)                                                                                          \

@@ -30,8 +30,8 @@ class Exchange {
 
  public:
   Exchange() noexcept {
-    for (std::atomic<std::int64_t>& slot : states_) slot.store(free(kNoFrame_ns), std::memory_order_relaxed);
-    states_[front_].store(free(kNoFrame_ns) | kHeld, std::memory_order_relaxed);
+    for (std::atomic<std::int64_t>& slot : states_) slot.store(nobodys(kNoFrame_ns), std::memory_order_relaxed);
+    states_[front_].store(nobodys(kNoFrame_ns) | kHeld, std::memory_order_relaxed);
   }
   Exchange(const Exchange&) = delete;  // two threads hold references into it
   Exchange& operator=(const Exchange&) = delete;
@@ -45,7 +45,7 @@ class Exchange {
   void publish(std::int64_t frame_ns) noexcept {
     assert(frame_ns > published_ns_ && back_ != kNone);
     published_ns_ = frame_ns;
-    states_[back_].store(free(frame_ns), std::memory_order_release);
+    states_[back_].store(nobodys(frame_ns), std::memory_order_release);
     back_ = kNone;
   }
   void publish(std::int64_t frame_ns, const T& value) noexcept {
@@ -65,7 +65,7 @@ class Exchange {
                                                    std::memory_order_relaxed)) {
         continue;
       }
-      states_[front_].store(free(front_frame_ns_), std::memory_order_release);
+      states_[front_].store(nobodys(front_frame_ns_), std::memory_order_release);
       front_ = newest;
       front_frame_ns_ = frame_of(state);
       return true;
@@ -84,7 +84,7 @@ class Exchange {
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::size_t kCacheLine_bytes = 64;
 
-  static constexpr std::int64_t free(std::int64_t frame_ns) noexcept { return frame_ns * 4; }
+  static constexpr std::int64_t nobodys(std::int64_t frame_ns) noexcept { return frame_ns * 4; }
   static constexpr std::int64_t frame_of(std::int64_t state) noexcept { return (state & ~kFlags) / 4; }
 
   // A slot that nobody has, its value in (front, last_frame_ns]; kNone when there is none.
