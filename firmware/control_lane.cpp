@@ -54,6 +54,7 @@ ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometr
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {
   if (first_ns_ < 0) first_ns_ = now_ns;
+  look_across(now_ns);
   const bool imu_came = read_imu(imu_port_, now_ns, estimator_);
   if (!imu_came && now_ns - estimator_.newest_imu_ns() >= kMissing_ns) health_.raise(Fault::kImuMissing, now_ns);
   JointFeedback joints;
@@ -63,6 +64,22 @@ Progress ControlLane::sense(std::int64_t now_ns) noexcept {
     health_.raise(Fault::kJointFeedbackMissing, now_ns);
   }
   return Progress::kDone;
+}
+
+// Everything that crosses is taken when the frame begins: the writer may be ahead by then, but not by more than it has
+// slots for.
+void ControlLane::look_across(std::int64_t now_ns) noexcept {
+  const std::int64_t finished_ns = link_.progress[kPerceptionLane].finished_ns.load(std::memory_order_acquire);
+  if (!view_.begin(now_ns, finished_ns)) health_.raise(Fault::kLaneBehind, now_ns);
+  pose_asked_ = link_.pose_request.try_take(view_.last_ns());
+  (void)link_.footholds.try_take(view_.last_ns());  // the newest, or the last one again
+  std::uint32_t lost = link_.pose_request.lost() + link_.footholds.lost();
+  for (LaneHealth& lane : healths_) {
+    if (&lane.own == &health_) continue;
+    (void)lane.published.try_take(view_.last_ns());
+    lost += lane.published.lost();
+  }
+  health_.follow(Limit::kHandOverLost, now_ns, lost);
 }
 
 Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
@@ -76,8 +93,7 @@ Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
 Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   command_ready_ = false;
   if (!estimator_.leg_sensing().any()) return Progress::kIdle;  // where the legs are is not known yet
-  if (link_.footholds.try_take()) footholds_ = link_.footholds.front();
-  gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.leg_sensing().joints(), command_);
+  gait_.tick(now_ns, estimator_.state(), footholds(), estimator_.leg_sensing().joints(), command_);
   estimator_.leg_sensing().to_encoders(command_);
   command_ready_ = true;
   hand_over_touch_down();
@@ -90,7 +106,7 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   const bool stands = step.touch_down_stamp_ns != 0 || step.sequence == 0;
   context.stance = stands ? step.foot : other(step.foot);
   context.climbing = status.treads_climbed > 0 || status.step.onto_tread;
-  link_.search_context.publish();
+  link_.search_context.publish(now_ns);
   return Progress::kDone;
 }
 
@@ -111,7 +127,6 @@ Progress ControlLane::health(std::int64_t now_ns) noexcept {
   all_faults_ = health_;
   for (LaneHealth& lane : healths_) {
     if (&lane.own == &health_) continue;
-    (void)lane.published.try_take();  // the newest, or the last one again
     all_faults_.merge(lane.published.front());
   }
   return Progress::kDone;
@@ -149,13 +164,13 @@ void ControlLane::report_gait(std::int64_t now_ns) noexcept {
 }
 
 void ControlLane::answer_pose_request(std::int64_t now_ns) noexcept {
-  if (!link_.pose_request.try_take()) return;
+  if (!pose_asked_) return;
   const PoseRequest& request = link_.pose_request.front();
   PoseAnswer& answer = link_.pose_answer.back();
   answer.number = request.number;
   answer.found = estimator_.try_state_at(request.stamp_ns, answer.state);
   if (!answer.found && estimator_.state().initialised) health_.raise(Limit::kStateRingMissed, now_ns);
-  link_.pose_answer.publish();
+  link_.pose_answer.publish(now_ns);
 }
 
 // A tread's height enters the estimator once, as it was frozen at the latch: what the map has learnt from this pose

@@ -30,8 +30,12 @@ class ControlLane {
   [[nodiscard]] const Health& all_faults() const noexcept { return all_faults_; }  // of all lanes, as of this cycle
   [[nodiscard]] const JointCommand& last_command() const noexcept { return command_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_; }  // of this lane
+  // What perception has found, as far as this frame sees it.
+  [[nodiscard]] const FootholdSet& footholds() const noexcept { return link_.footholds.front(); }
+  [[nodiscard]] const LaneView& view() const noexcept { return view_; }
 
  private:
+  void look_across(std::int64_t now_ns) noexcept;
   void answer_pose_request(std::int64_t now_ns) noexcept;
   void report_lidar(std::int64_t now_ns) noexcept;
   void report_rejections(std::int64_t now_ns) noexcept;
@@ -49,7 +53,8 @@ class ControlLane {
   Estimator estimator_;
   Gait gait_;
   Health all_faults_;
-  FootholdSet footholds_;
+  LaneView view_;
+  bool pose_asked_ = false;  // a request came with this frame
   JointCommand command_;
   bool command_ready_ = false;
   bool lio_missing_ = false;

@@ -30,24 +30,27 @@ namespace polygmap {
   X(15, kPoseMissing, "pose_missing", "Control did not say in time where a frame was exposed; it was given back.") \
   X(16, kMapStale, "map_stale", "The newest fused frame was too old to step on.")                                  \
   X(17, kStateStale, "state_stale", "IMU or joints were silent for so long that the gait stopped.")                \
-  X(18, kGaitStopped, "gait_stopped", "The gait stopped in double support, not on top.")
+  X(18, kGaitStopped, "gait_stopped", "The gait stopped in double support, not on top.")                           \
+  X(19, kLaneBehind, "lane_behind",                                                                                \
+    "A lane had not finished a cycle when the other one began the next: it is seen a cycle later.")
 
 // A bound was met; the module goes on with what it has. Numbers 101-199.
-#define POLYGMAP_LIMITS(X)                                                                                         \
-  X(101, kRowShed, "row_shed", "A slot was given up for lack of time.")                                            \
-  X(102, kRowDeferred, "row_deferred", "A slot paid back an overdraft of work units.")                             \
-  X(103, kCycleCaughtUp, "cycle_caught_up", "A cycle was run late.")                                               \
-  X(104, kPlanesFull, "planes_full", "A plane or surface of a frame found no room.")                               \
-  X(105, kMapFull, "map_full", "A polygon found no room in the map.")                                              \
-  X(106, kStateRingMissed, "state_ring_missed", "The past states do not cover a frame's stamp.")                   \
-  X(107, kDepthUnplaced, "depth_unplaced", "A frame was given back: no past state covers its stamp.")              \
-  X(108, kReachLimited, "reach_limited", "A leg could not reach the pose asked for.")                              \
-  X(109, kContactEarly, "contact_early", "A foot touched before its planned time.")                                \
-  X(110, kContactLate, "contact_late", "A foot touched after its planned time.")                                   \
-  X(111, kSegmentsFull, "segments_full", "A scanline segment, a span or a pair of planes found no room.")          \
-  X(112, kHeightRejected, "height_rejected", "A mapped tread's height disagreed with the sole that landed on it.") \
-  X(113, kFootPutBack, "foot_put_back", "A foot in the air went back to where it had stood.")                      \
-  X(114, kFrameLost, "frame_lost", "A frame never reached the map: it was unusable, or the last one still waited.")
+#define POLYGMAP_LIMITS(X)                                                                                          \
+  X(101, kRowShed, "row_shed", "A slot was given up for lack of time.")                                             \
+  X(102, kRowDeferred, "row_deferred", "A slot paid back an overdraft of work units.")                              \
+  X(103, kCycleCaughtUp, "cycle_caught_up", "A cycle was run late.")                                                \
+  X(104, kPlanesFull, "planes_full", "A plane or surface of a frame found no room.")                                \
+  X(105, kMapFull, "map_full", "A polygon found no room in the map.")                                               \
+  X(106, kStateRingMissed, "state_ring_missed", "The past states do not cover a frame's stamp.")                    \
+  X(107, kDepthUnplaced, "depth_unplaced", "A frame was given back: no past state covers its stamp.")               \
+  X(108, kReachLimited, "reach_limited", "A leg could not reach the pose asked for.")                               \
+  X(109, kContactEarly, "contact_early", "A foot touched before its planned time.")                                 \
+  X(110, kContactLate, "contact_late", "A foot touched after its planned time.")                                    \
+  X(111, kSegmentsFull, "segments_full", "A scanline segment, a span or a pair of planes found no room.")           \
+  X(112, kHeightRejected, "height_rejected", "A mapped tread's height disagreed with the sole that landed on it.")  \
+  X(113, kFootPutBack, "foot_put_back", "A foot in the air went back to where it had stood.")                       \
+  X(114, kFrameLost, "frame_lost", "A frame never reached the map: it was unusable, or the last one still waited.") \
+  X(115, kHandOverLost, "hand_over_lost", "A lane was so late that what it should have seen was overwritten.")
 
 #define POLYGMAP_ENUMERATOR(number, code, name, text) code = number,
 #define POLYGMAP_FAULT_LINE(number, code, name, text) EventInfo<Fault>{Fault::code, name, text},

@@ -28,10 +28,13 @@ class PerceptionLane {
   [[nodiscard]] const CameraExtrinsicsEstimator& mount() const noexcept { return mount_; }
   [[nodiscard]] const SurfaceExtractor& extractor() const noexcept { return extractor_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_.own; }  // of this lane
+  [[nodiscard]] const FootholdSet& footholds_found() const noexcept { return search_.result(); }
+  [[nodiscard]] const LaneView& view() const noexcept { return view_; }
 
  private:
   enum class FrameStage : std::uint8_t { kWaiting, kPoseAsked, kExtracting };
 
+  void look_across(std::int64_t now_ns) noexcept;
   void begin_extraction(std::int64_t now_ns) noexcept;
   void begin_map(std::int64_t now_ns) noexcept;
   void learn_mount() noexcept;
@@ -45,6 +48,7 @@ class PerceptionLane {
   CameraIntrinsics intrinsics_;
 
   // The next frame is extracted while the last one is still being searched.
+  LaneView view_;
   FrameStage stage_ = FrameStage::kWaiting;
   bool mapping_ = false;
   bool search_due_ = false;

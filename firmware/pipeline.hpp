@@ -7,6 +7,7 @@
 #include "firmware/control_lane.hpp"
 #include "firmware/perception_lane.hpp"
 #include "firmware/telemetry.hpp"
+#include "scheduler/cyclic_executive.hpp"
 
 namespace polygmap {
 
@@ -33,6 +34,13 @@ class Pipeline {
   Pipeline& operator=(const Pipeline&) = delete;
 
   Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept;
+
+  // Told by the executive when a cycle is over: from the next one on the other lane sees what was published in it.
+  void cycle_done(std::size_t lane, const CycleReport& report) noexcept;
+  // The same of one of the module's lanes; a replay says by it how far the other one was.
+  void lane_finished(std::size_t lane, std::int64_t cycle_ns) noexcept {
+    link_.progress[lane].finished_ns.store(cycle_ns, std::memory_order_release);
+  }
 
   [[nodiscard]] ControlLane& control() noexcept { return control_; }
   [[nodiscard]] const ControlLane& control() const noexcept { return control_; }

@@ -161,7 +161,7 @@ TEST_F(PipelineTest, FrameOutOfOrder_IsRejectedAndGivenBack) {
   camera_.feed(clock_.now_ns() - 40 * kNsPerMs, blank);
   stand(40);
   camera_.feed(clock_.now_ns() - 200 * kNsPerMs, blank);
-  stand(4);
+  stand(5);
   EXPECT_EQ(count(Fault::kDepthRejected), 1U);
   EXPECT_FALSE(camera_.holding());
 }
@@ -232,7 +232,7 @@ TEST_F(PipelineTest, CameraNeverSpeaks_IsMissingAFifthOfASecondAfterTheStart) {
 TEST_F(PipelineTest, FrameBeforeTheStart_IsGivenBackAndCounted) {
   stand(100);
   camera_.feed(clock_.now_ns(), std::vector<std::uint16_t>(camera_.pixels(), 0));
-  stand(4);
+  stand(5);
   EXPECT_EQ(count(Limit::kDepthUnplaced), 1U);
   EXPECT_EQ(count(Limit::kStateRingMissed), 0U);
   EXPECT_FALSE(camera_.holding());

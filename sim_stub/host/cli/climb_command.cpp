@@ -18,6 +18,7 @@
 #include "sim_stub/host/cli/obstacle_options.hpp"
 #include "sim_stub/host/cli/params_command.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
+#include "sim_stub/host/cli/replay_command.hpp"
 #include "sim_stub/host/output_file.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
 
@@ -94,6 +95,11 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_flag(
       "--save-inputs", a.options.save_inputs,
       "Also write what the sensors said, for perceive and estimate: OUT/inputs/depth_NN.png, log.csv, lio.csv");
+  climb
+      .add_option("--record", a.options.record_dir,
+                  "Also write all that goes into the module and comes out of it, to the bit, for replay: some 100 MB a "
+                  "stair step")
+      ->type_name("DIR");
 
   climb.add_option("--camera", a.camera, "The robot's camera, 640x480 at most; the module is told what the file says")
       ->type_name("CAMERA.toml");
@@ -321,18 +327,19 @@ std::string complaint(ClimbArguments& a) {
 }
 
 // Makes the directory and tries to write into it before a minute of climbing is spent.
-std::string directory_complaint(const std::string& directory) {
+std::string directory_complaint(const std::string& directory, const std::string& option = "--out") {
   namespace fs = std::filesystem;
   std::error_code error;
   fs::create_directories(directory, error);
-  if (!fs::is_directory(directory, error)) return "Cannot create the directory \"" + directory + "\" given by --out.";
+  if (!fs::is_directory(directory, error))
+    return "Cannot create the directory \"" + directory + "\" given by " + option + ".";
   const fs::path probe = fs::path(directory) / ".polygmap_probe";
   std::ofstream file(probe);
   file << "x";
   file.close();
   const bool written = static_cast<bool>(file);
   fs::remove(probe, error);
-  return written ? "" : "Cannot write into the directory \"" + directory + "\" given by --out.";
+  return written ? "" : "Cannot write into the directory \"" + directory + "\" given by " + option + ".";
 }
 
 std::string output_complaint(const std::string& directory, bool with_inputs) {
@@ -387,7 +394,8 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
   app.require_subcommand(0, 1);
   app.footer(
-      "Exit codes: 0 pass or done, 1 the climb failed, 2 a bad argument, file or output, 130 or 143 interrupted.");
+      "Exit codes: 0 pass or done, 1 the climb failed or the replay differs, 2 a bad argument, file or output, 130 or "
+      "143 interrupted.");
   CLI::App* climb = app.add_subcommand(
       "climb", "Climb a simulated staircase; writes summary.json and climb.svg, exit code 0 only on pass");
   ClimbArguments a;
@@ -398,9 +406,11 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   CLI::App* perceive = declare_perceive(app, perceive_arguments);
   EstimateArguments estimate_arguments;
   CLI::App* estimate = declare_estimate(app, estimate_arguments);
+  ReplayArguments replay_arguments;
+  CLI::App* replay = declare_replay(app, replay_arguments);
   ParamsArguments params_arguments;
   CLI::App* params = declare_params(app, params_arguments);
-  for (CLI::App* command : {climb, perceive, estimate, params_arguments.list, params_arguments.diff}) {
+  for (CLI::App* command : {climb, perceive, estimate, replay, params_arguments.list, params_arguments.diff}) {
     for (CLI::Option* option : command->get_options()) option->check(not_empty);
   }
 
@@ -413,7 +423,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
-    constexpr std::array<std::string_view, 4> kCommands{"climb", "perceive", "estimate", "params"};
+    constexpr std::array<std::string_view, 5> kCommands{"climb", "perceive", "estimate", "replay", "params"};
     const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
     err << "polygmap: " << complaint_of(error, app, arguments) << "; see polygmap " << (named ? arguments[0] + " " : "")
         << "--help.\n";
@@ -421,6 +431,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   }
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err, interrupt);
   if (estimate->parsed()) return run_estimate(estimate_arguments, out, err, interrupt);
+  if (replay->parsed()) return run_replay(replay_arguments, out, err);
   if (params->parsed()) return run_params(params_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
     err << "polygmap: A subcommand is required; see polygmap --help.\n";
@@ -428,6 +439,9 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   }
   std::string sentence = complaint(a);
   if (sentence.empty()) sentence = output_complaint(a.options.out_dir, a.options.save_inputs);
+  if (sentence.empty() && !a.options.record_dir.empty()) {
+    sentence = directory_complaint(a.options.record_dir, "--record");
+  }
   if (!sentence.empty()) {
     err << "polygmap: " << sentence << "\n";
     return kExitUsage;

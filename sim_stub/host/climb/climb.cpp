@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "firmware/config/param_table.hpp"
+#include "firmware/recording/recorder.hpp"
 #include "firmware/schedule.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "sim_stub/host/climb/climb_report.hpp"
@@ -34,6 +35,7 @@ class TimedPipeline {
     }
     return progress;
   }
+  void cycle_done(std::size_t lane, const CycleReport& report) noexcept { pipeline_.cycle_done(lane, report); }
   [[nodiscard]] const DurationStatistics& wall(std::size_t row) const noexcept { return wall_[row]; }
 
  private:
@@ -65,12 +67,14 @@ class WatchedLidar final : public hal::LidarOdometry {
   std::int64_t told_ns_ = 0;
 };
 
-using Executive = OneLaneExecutive<TimedPipeline>;
+using Tasks = recording::RecordedTasks<TimedPipeline>;
+using Executive = OneLaneExecutive<Tasks>;
 
 // Memory that is there before the module is: the heap is watched from its first instruction on.
 struct Module {
   std::optional<Pipeline> pipeline;
-  std::optional<TimedPipeline> tasks;
+  std::optional<TimedPipeline> timed;
+  std::optional<Tasks> tasks;
   std::optional<Executive> executive;
   PerceptionTelemetry watched;
 };
@@ -192,18 +196,26 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   WatchedLidar lidar(robot);
   std::optional<ClimbRecorder> recorder;
   if (options.save_inputs) recorder.emplace(robot, robot, robot, lidar);
+  const Ports watched_ports =
+      recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{robot, robot, robot, lidar};
+  std::optional<recording::Recorder> recording;
+  if (!options.record_dir.empty()) {
+    recording.emplace(watched_ports);
+    recording->begin(options.record_dir, params);
+  }
   const auto module = std::make_unique<Module>();
   {
     const heap::ModuleCall call("Pipeline::Pipeline");
-    module->pipeline.emplace(
-        recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{robot, robot, robot, lidar}, params);
+    module->pipeline.emplace(recording ? recording->ports() : watched_ports, params);
     module->pipeline->watch(module->watched);
-    module->tasks.emplace(*module->pipeline);
+    if (recording) recording->watch(*module->pipeline);
+    module->timed.emplace(*module->pipeline);
+    module->tasks.emplace(*module->timed, recording ? &*recording : nullptr);
     module->executive.emplace(*module->tasks, robot, module->pipeline->lane_health(0));
     module->executive->start(robot.now_ns() + kCycle_ns);
   }
   Pipeline& pipeline = *module->pipeline;
-  TimedPipeline& tasks = *module->tasks;
+  TimedPipeline& tasks = *module->timed;
   Executive& executive = *module->executive;
   ClimbReport report(robot.stairs(), robot.errors().base_T_camera, robot.depth_camera().intrinsics());
 
@@ -215,6 +227,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
       const heap::ModuleCall call("CyclicExecutive::tick");
       executive.tick(robot.now_ns());
     }
+    if (recording) recording->flush();
     const Telemetry telemetry = pipeline.telemetry(robot.now_ns(), module->watched);
     report.observe(robot.truth(), telemetry);
     if (recorder) recorder->observe(robot.truth(), telemetry.state);
@@ -242,6 +255,9 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   figures.schedule = schedule_of(executive, tasks);
   figures.wall_seconds = std::chrono::duration<double>(WallClock::now() - wall_begin).count();
   const ClimbSummary summary = report.finish(figures);
+  if (recording) {
+    if (const std::string failure = recording->finish(); !failure.empty()) throw ClimbNotWritten(failure, summary);
+  }
   if (!options.out_dir.empty()) {
     try {
       write_climb_files(options.out_dir, report, summary);
