@@ -62,14 +62,16 @@ Progress ControlLane::sense(std::int64_t now_ns) noexcept {
 }
 
 void ControlLane::read_joints(std::int64_t now_ns) noexcept {
+  const bool was_asked = command_.stamp_ns != 0;  // a drive answers a command
   JointFeedback joints;
   if (joint_port_.try_read(joints)) {
-    const bool all_heard = std::ranges::find(joints.silent_cycles, JointFeedback::kNeverHeard) == joints.silent_cycles.end();
+    const bool all_heard =
+        std::ranges::find(joints.silent_cycles, JointFeedback::kNeverHeard) == joints.silent_cycles.end();
     if (all_heard) {
       note_silent_drives(joints, now_ns);
       estimator_.add_joints(joints, now_ns);
     }
-  } else if (now_ns - estimator_.leg_sensing().joints().stamp_ns >= kMissing_ns) {
+  } else if (was_asked && now_ns - estimator_.leg_sensing().joints().stamp_ns >= kMissing_ns) {
     health_.raise(Fault::kJointFeedbackMissing, now_ns);
   }
 }

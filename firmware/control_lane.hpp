@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sense, estimate, gait, command: in every cycle.
 //
-// It starts arming: an MIT drive answers only a command, and where the legs are is not known before each has answered, so
-// commands without gains and torques ask them. From the first accepted feedback of all joints on the gait commands.
+// It starts arming: an MIT drive answers only a command, and where the legs are is not known before each has answered,
+// so commands without gains and torques ask them. From the first accepted feedback of all joints on the gait commands.
 #pragma once
 
 #include "algorithms/core/work.hpp"

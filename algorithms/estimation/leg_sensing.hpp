@@ -11,8 +11,8 @@ namespace polygmap {
 
 class LegSensing {
  public:
-  // A joint whose drive is silent goes on at its last speed for so long, then stays where that took it and its leg is no
-  // measurement any more.
+  // A joint whose drive is silent goes on at its last speed for so long, then stays where that took it and its leg is
+  // no measurement any more.
   static constexpr std::uint16_t kCarried_cycles = 5;
   struct Params {
     EncoderOffsets::Params encoders;
@@ -73,8 +73,8 @@ class LegSensing {
   Counters counters_;
   EncoderOffsets encoders_;
   ForceInference forces_;
-  JointFeedback joints_;  // last accepted
-  double dt_s_ = 0.0;     // between it and the one before
+  JointFeedback joints_;                                // last accepted
+  double dt_s_ = 0.0;                                   // between it and the one before
   std::array<std::int64_t, kJointCount> replied_ns_{};  // last reply of each joint that was accepted
   bool any_ = false;
 };

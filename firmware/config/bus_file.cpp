@@ -28,7 +28,7 @@ constexpr Range kUnit{1e-4, 100.0, "N"};
 constexpr Range kBitrate{10'000.0, 1'000'000.0, "bit/s"};
 constexpr std::size_t kMaxBusName = 15;  // what Linux takes for an interface
 
-std::string quoted(std::string_view text) { return "\"" + std::string(text) + "\""; }
+std::string in_quotes(std::string_view text) { return std::string("\"").append(text).append("\""); }
 
 class BusReader {
  public:
@@ -40,7 +40,7 @@ class BusReader {
     const toml::parse_result parsed = toml::parse_file(file_.path);
     if (!parsed) {
       const auto line = parsed.error().source().begin.line;
-      if (line == 0) throw FileError("Cannot read the bus file " + quoted(file_.path) + ".");
+      if (line == 0) throw FileError("Cannot read the bus file " + in_quotes(file_.path) + ".");
       fail(line, std::string(parsed.error().description()));
     }
     const toml::table& root = parsed.table();
@@ -56,7 +56,7 @@ class BusReader {
   }
 
  private:
-  [[nodiscard]] std::string name() const { return "Bus file " + quoted(file_.path); }
+  [[nodiscard]] std::string name() const { return "Bus file " + in_quotes(file_.path); }
   [[noreturn]] void fail(toml::source_index line, const std::string& what) const {
     throw FileError(name() + ", line " + std::to_string(line) + ": " + what + ".");
   }
@@ -68,7 +68,7 @@ class BusReader {
       std::string all;
       for (const std::string_view key : keys) all.append(all.empty() ? "" : ", ").append(key);
       fail(entry.first.source().begin.line,
-           quoted(entry.first.str()) + " is no key of " + of + "; there are " + all);
+           in_quotes(entry.first.str()) + " is no key of " + of + "; there are " + all);
     }
   }
 
@@ -113,13 +113,14 @@ class BusReader {
     const auto at = table.get("bus")->source().begin.line;
     const auto good = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-'; };
     if (bus.empty() || bus.size() > kMaxBusName || !std::ranges::all_of(bus, good)) {
-      fail(at, label + "bus must name an interface such as \"can0\", not " + quoted(bus));
+      fail(at, label + "bus must name an interface such as \"can0\", not " + in_quotes(bus));
     }
     const auto known = std::ranges::find(file_.buses, bus);
     const auto index = static_cast<std::size_t>(known - file_.buses.begin());
     if (known == file_.buses.end()) {
       if (file_.buses.size() == hal::kMaxBuses) {
-        fail(at, label + quoted(bus) + " is one bus more than the " + std::to_string(hal::kMaxBuses) + " there may be");
+        fail(at,
+             label + in_quotes(bus) + " is one bus more than the " + std::to_string(hal::kMaxBuses) + " there may be");
       }
       file_.buses.push_back(bus);
     }
@@ -154,7 +155,7 @@ class BusReader {
       const std::string rule = text(table, label, "reply", line);
       if (rule != "id" && rule != "status_nibble") {
         fail(table.get("reply")->source().begin.line,
-             label + "reply must be \"id\" or \"status_nibble\", not " + quoted(rule));
+             label + "reply must be \"id\" or \"status_nibble\", not " + in_quotes(rule));
       }
       drive.reply = rule == "id" ? hal::MitReplyRule::kId : hal::MitReplyRule::kStatusNibble;
     }
@@ -181,7 +182,8 @@ class BusReader {
                        std::to_string(drive.reply_id == other.id ? drive.reply_id : drive.id) + " is the " +
                        (drive.reply_id == other.id ? "id" : "reply_id") + " of " + others + ", too");
       }
-      if (drive.reply_id == other.reply_id && hal::reply_name(drive.id, drive.reply) == hal::reply_name(other.id, other.reply)) {
+      if (drive.reply_id == other.reply_id &&
+          hal::reply_name(drive.id, drive.reply) == hal::reply_name(other.id, other.reply)) {
         fail(line, own + "its replies cannot be told from " + others);
       }
       if (drive.reply_id == other.reply_id && drive.reply != other.reply) {
@@ -227,7 +229,7 @@ class BusReader {
 BusFile read_bus(const std::string& path) { return BusReader(path).read(); }
 
 void limit_by_drives(const BusFile& bus, const JointReference::Params& joints, RobotModel& robot) {
-  const std::string name = "Bus file " + quoted(bus.path) + ": ";
+  const std::string name = "Bus file " + in_quotes(bus.path) + ": ";
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const hal::MitRanges& drive = bus.table.drives[n].ranges;
     JointLimits& limits = robot.drives.limits[n];

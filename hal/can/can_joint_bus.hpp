@@ -13,8 +13,8 @@
 
 namespace polygmap::hal {
 
-// Replies answer the last command: they get its stamp, and no clock is read. A drive that has never answered is sent the
-// frame that enters motor mode and the command in turn; from its first answer on it is sent commands only.
+// Replies answer the last command: they get its stamp, and no clock is read. A drive that has never answered is sent
+// the frame that enters motor mode and the command in turn; from its first answer on it is sent commands only.
 class CanJointBus final : public JointBus {
  public:
   // channels: one for each bus of the table, in its order; they outlive this. Buses without one are silent.
@@ -26,7 +26,8 @@ class CanJointBus final : public JointBus {
   [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override;
   [[nodiscard]] JointBusStatus status() const noexcept override;
 
-  // Instead of a command to every drive: which were taken. kExit lets go of the joints; kZero moves their zero for good.
+  // Instead of a command to every drive: which were taken. kExit lets go of the joints; kZero moves their zero for
+  // good.
   [[nodiscard]] JointSet send_to_all(MitSpecial special) noexcept;
   // Drives that have answered since the start.
   [[nodiscard]] JointSet heard() const noexcept { return heard_; }

@@ -10,10 +10,11 @@
 namespace polygmap::hal {
 
 // With the gap of three bits behind it. 11-bit identifiers.
-inline constexpr std::size_t kCanFrameBits = 47;        // besides data and stuffing
+inline constexpr std::size_t kCanFrameBits = 47;          // besides data and stuffing
 inline constexpr std::size_t kCanStuffedHeaderBits = 34;  // of those, what is stuffed
 
-// The longest that a frame of so many bytes can be: after the first five of equal bits, every fourth bit brings one more.
+// The longest that a frame of so many bytes can be: after the first five of equal bits, every fourth bit brings one
+// more.
 [[nodiscard]] constexpr std::size_t longest_frame_bits(std::size_t data_bytes) noexcept {
   const std::size_t stuffed = kCanStuffedHeaderBits + 8 * data_bytes;
   return kCanFrameBits + 8 * data_bytes + (stuffed - 1) / 4;

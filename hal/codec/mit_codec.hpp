@@ -55,7 +55,8 @@ struct MitField {
   std::size_t first_bit;  // from the most significant bit of byte 0
   std::size_t bits;
 };
-inline constexpr MitField kCommandP{0, 16}, kCommandV{16, 12}, kCommandKp{28, 12}, kCommandKd{40, 12}, kCommandT{52, 12};
+inline constexpr MitField kCommandP{0, 16}, kCommandV{16, 12}, kCommandKp{28, 12}, kCommandKd{40, 12},
+    kCommandT{52, 12};
 inline constexpr MitField kReplyP{8, 16}, kReplyV{24, 12}, kReplyT{36, 12};
 
 [[nodiscard]] constexpr std::uint32_t steps_of(MitField field) noexcept { return (1U << field.bits) - 1U; }
@@ -143,7 +144,8 @@ constexpr void put(MitBytes& bytes, MitField field, std::uint32_t value) noexcep
   return reply_name(bytes[0], rule);
 }
 
-// False, and reply untouched, unless there are 6 or 8 bytes of that drive. Every such frame has values within the range.
+// False, and reply untouched, unless there are 6 or 8 bytes of that drive. Every such frame has values within the
+// range.
 [[nodiscard]] constexpr bool try_decode_reply(std::span<const std::uint8_t> bytes, std::uint32_t drive_id,
                                               const MitRanges& ranges, MitReplyRule rule, MitReply& reply) noexcept {
   using namespace detail;

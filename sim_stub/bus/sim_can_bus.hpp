@@ -31,7 +31,8 @@ class SimCanBus final : public hal::CanChannel {
 
   // Of a node: takes part in the arbitration from ready_ns on.
   void send(const hal::CanFrame& frame, std::int64_t ready_ns) { nodes_.push_back({frame, ready_ns}); }
-  // The bus's time goes on from from_ns, where it stands, to to_ns. A frame that is not through by then goes on next time.
+  // The bus's time goes on from from_ns, where it stands, to to_ns. A frame that is not through by then goes on next
+  // time.
   void run(std::int64_t from_ns, std::int64_t to_ns, const Received& received, const Logged& logged);
 
   // Injected: the controller leaves the bus, what waited is lost; or comes back.

@@ -55,8 +55,8 @@ struct JointFeedback {
   JointVector q_rad = JointVector::Zero();
   JointVector dq_radps = JointVector::Zero();
   JointVector tau_nm = JointVector::Zero();  // not a number where a drive tells none
-  // How many cycles before stamp_ns the joint's own reply lies: 0 where it is as new as the stamp. A silent drive's joint
-  // keeps its last values and counts up; kNeverHeard: it has no values yet.
+  // How many cycles before stamp_ns the joint's own reply lies: 0 where it is as new as the stamp. A silent drive's
+  // joint keeps its last values and counts up; kNeverHeard: it has no values yet.
   std::array<std::uint16_t, kJointCount> silent_cycles{};
   [[nodiscard]] constexpr std::int64_t silent_ns(std::size_t joint) const noexcept {
     return silent_cycles[joint] * 2 * kNsPerMs;

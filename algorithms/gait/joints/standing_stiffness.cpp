@@ -48,8 +48,7 @@ StandingStiffness standing_stiffness(const RobotModel& robot, const JointReferen
   std::array<double, 3> topples_nmprad{};
   Vec3 kp_nmprad;
   for (std::size_t i = 0; i < kPitch.size(); ++i) {
-    topples_nmprad[i] =
-        toppling_nmprad(robot.masses, base_p_m, frames[0].joint[kPitch[i]].p_m.z(), kPitch[i]);
+    topples_nmprad[i] = toppling_nmprad(robot.masses, base_p_m, frames[0].joint[kPitch[i]].p_m.z(), kPitch[i]);
     kp_nmprad[static_cast<Eigen::Index>(i)] = weaker_kp(robot, params, kPitch[i]);
   }
   Mat3 G, scaled;
@@ -69,8 +68,8 @@ StandingStiffness standing_stiffness(const RobotModel& robot, const JointReferen
   for (std::size_t link = 0; link < kAnkleRoll; ++link) {
     moment_kgm += robot.masses.leg[link].mass_kg * (base_p_m.leg[0][link].z() - ankle_z_m);
   }
-  stiffness.from_the_front = kGravity_mps2 * moment_kgm /
-                             (weaker_kp(robot, params, kHipRoll) + weaker_kp(robot, params, kAnkleRoll));
+  stiffness.from_the_front =
+      kGravity_mps2 * moment_kgm / (weaker_kp(robot, params, kHipRoll) + weaker_kp(robot, params, kAnkleRoll));
   return stiffness;
 }
 

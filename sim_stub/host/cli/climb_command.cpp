@@ -13,6 +13,7 @@
 #include <ostream>
 
 #include "firmware/config/param_file.hpp"
+#include "sim_stub/host/cli/can_command.hpp"
 #include "sim_stub/host/cli/command_words.hpp"
 #include "sim_stub/host/cli/estimate_command.hpp"
 #include "sim_stub/host/cli/obstacle_options.hpp"
@@ -114,8 +115,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
 
   climb.add_option("--bus", a.bus, "The joints are behind CAN buses with the drives that this file describes")
       ->type_name("BUS.toml");
-  climb
-      .add_option("--can-log", a.options.can_log, "Also write every frame on the buses there, as candump -L has them")
+  climb.add_option("--can-log", a.options.can_log, "Also write every frame on the buses there, as candump -L has them")
       ->type_name("FILE");
 
   climb.add_option("--params", a.options.params_file, "Parameters of the module; other options go before what it says")
@@ -319,7 +319,8 @@ std::string complaint(ClimbArguments& a) {
   try {
     take_params(a);
     std::string sentence = stairs_complaint(a.options.stairs);
-    for (const auto part : {plant_complaint, pushes_complaint, errors_complaint, camera_complaint, bus_complaint, picture_complaint}) {
+    for (const auto part :
+         {plant_complaint, pushes_complaint, errors_complaint, camera_complaint, bus_complaint, picture_complaint}) {
       if (sentence.empty()) sentence = part(a);
     }
     if (!sentence.empty()) return sentence;
@@ -413,7 +414,10 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   CLI::App* estimate = declare_estimate(app, estimate_arguments);
   ParamsArguments params_arguments;
   CLI::App* params = declare_params(app, params_arguments);
-  for (CLI::App* command : {climb, perceive, estimate, params_arguments.list, params_arguments.diff}) {
+  CanArguments can_arguments;
+  CLI::App* can = declare_can(app, can_arguments);
+  for (CLI::App* command : {climb, perceive, estimate, params_arguments.list, params_arguments.diff,
+                            can_arguments.encode, can_arguments.decode, can_arguments.dbc}) {
     for (CLI::Option* option : command->get_options()) option->check(not_empty);
   }
 
@@ -426,7 +430,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
-    constexpr std::array<std::string_view, 4> kCommands{"climb", "perceive", "estimate", "params"};
+    constexpr std::array<std::string_view, 5> kCommands{"climb", "perceive", "estimate", "params", "can"};
     const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
     err << "polygmap: " << complaint_of(error, app, arguments) << "; see polygmap " << (named ? arguments[0] + " " : "")
         << "--help.\n";
@@ -434,6 +438,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   }
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);
   if (estimate->parsed()) return run_estimate(estimate_arguments, out, err);
+  if (can->parsed()) return run_can(can_arguments, out, err);
   if (params->parsed()) return run_params(params_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
     err << "polygmap: A subcommand is required; see polygmap --help.\n";
