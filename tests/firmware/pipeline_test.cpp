@@ -107,6 +107,59 @@ TEST_F(PipelineTest, BusRefusesTheCommand_IsCounted) {
   EXPECT_EQ(count(Fault::kJointCommandRefused), 1U);
 }
 
+// An MIT drive answers only a command.
+TEST_F(PipelineTest, BeforeAllDrivesAnswered_CommandsHaveNoGainsAndNothingElseBegins) {
+  const auto expect_arming = [&] {
+    EXPECT_EQ(control().module_state(), ModuleState::kArming);
+    ASSERT_FALSE(joints_.commands().empty());
+    const JointCommand& command = joints_.commands().newest();
+    EXPECT_EQ(command.stamp_ns, clock_.now_ns());
+    for (const JointSetpoint& joint : command.joints) {
+      EXPECT_EQ(joint.kp_nmprad, 0.0);
+      EXPECT_EQ(joint.kd_nmsprad, 0.0);
+      EXPECT_EQ(joint.tau_ff_nm, 0.0);
+    }
+  };
+  const ImuSample imu = imu_at(clock_.now_ns() + kCycle_ns);
+  clock_.advance_ns(kCycle_ns);
+  tick_with(&imu, nullptr);
+  expect_arming();
+  EXPECT_EQ(count(Fault::kJointFeedbackMissing), 0U) << "nobody was asked yet";
+  for (int i = 0; i < 20; ++i) {
+    clock_.advance_ns(kCycle_ns);
+    JointFeedback joints = joints_at(clock_.now_ns());
+    joints.silent_cycles[11] = JointFeedback::kNeverHeard;
+    joints.q_rad[11] = 0.0;
+    tick_with(&imu, &joints);
+    expect_arming();
+  }
+  EXPECT_EQ(count(Fault::kJointFeedbackRejected), 0U);
+  EXPECT_EQ(count(Fault::kDriveSilent), 0U);
+  stand(1);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+  EXPECT_GT(joints_.commands().newest().joints[11].kp_nmprad, 0.0) << "the robot's own gains";
+}
+
+TEST_F(PipelineTest, BusTellsOfItsFaults_EachIsCountedUnderItsName) {
+  stand(10);
+  joints_.told.bus_offs = 1;
+  joints_.told.unknown_ids = 2;
+  joints_.told.bad_frames = 3;
+  joints_.told.lost = 4;
+  joints_.told.failed_calls = 5;
+  joints_.told.clamped = 6;
+  joints_.told.feet_silent = true;
+  stand(2);
+  EXPECT_EQ(count(Fault::kBusOff), 1U);
+  EXPECT_EQ(count(Fault::kBusUnknownId), 2U);
+  EXPECT_EQ(count(Fault::kBusBadFrame), 3U);
+  EXPECT_EQ(count(Fault::kBusFrameLost), 4U);
+  EXPECT_EQ(count(Fault::kBusCallFailed), 5U);
+  EXPECT_EQ(count(Limit::kDriveClamped), 6U);
+  EXPECT_EQ(count(Fault::kFeetSilent), 1U);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+}
+
 TEST_F(PipelineTest, LidarFromTheFuture_IsRejected) {
   stand(kInitialised_ticks);
   LioSample sample;

@@ -49,6 +49,7 @@ class FakeRobot {
   bool joints_speak = true;
   bool camera_speaks = true;
   int picture_ticks = kSlowMachine ? 48 : 16;            // from one picture to the next
+  std::size_t silent_joint = kJointCount;  // whose drive follows its commands and does not answer; kJointCount: none
   JointVector encoder_offset_rad = JointVector::Zero();  // reading minus true angle
 
  private:
@@ -68,6 +69,10 @@ class FakeRobot {
   std::array<Transform, 3> true_T_base_before_;  // newest first
   Transform true_T_base_;
   std::int64_t tick_ = 0;
+  // What a drive said last before it fell silent.
+  JointVector q_rad_before_ = JointVector::Zero(), dq_radps_before_ = JointVector::Zero();
+  std::array<double, 2> last_heard_{};
+  std::uint16_t silent_cycles_ = 0;
 };
 
 }  // namespace polygmap::test

@@ -13,6 +13,7 @@
 #include <ostream>
 
 #include "firmware/config/param_file.hpp"
+#include "sim_stub/host/cli/can_command.hpp"
 #include "sim_stub/host/cli/command_words.hpp"
 #include "sim_stub/host/cli/estimate_command.hpp"
 #include "sim_stub/host/cli/obstacle_options.hpp"
@@ -41,6 +42,7 @@ struct ClimbArguments {
   std::string contacts = "sensed";
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
+  std::string bus;
   bool no_self_filter = false;
   bool no_mount_estimate = false;
   std::string camera;
@@ -116,6 +118,11 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       .add_option("--scale-error", a.options.scale_error,
                   "How far the depths' scale may be off, unknown to the module: share of the depth")
       ->capture_default_str();
+
+  climb.add_option("--bus", a.bus, "The joints are behind CAN buses with the drives that this file describes")
+      ->type_name("BUS.toml");
+  climb.add_option("--can-log", a.options.can_log, "Also write every frame on the buses there, as candump -L has them")
+      ->type_name("FILE");
 
   climb.add_option("--params", a.options.params_file, "Parameters of the module; other options go before what it says")
       ->type_name("PARAMS.toml");
@@ -283,6 +290,22 @@ std::string camera_complaint(ClimbArguments& a) {
   return {};
 }
 
+// Throws config::FileError.
+std::string bus_complaint(ClimbArguments& a) {
+  if (a.bus.empty()) return a.options.can_log.empty() ? "" : "--can-log needs --bus: without one there are no frames.";
+  a.options.bus = config::read_bus(a.bus);
+  RobotModel robot = a.options.params.robot;
+  config::limit_by_drives(*a.options.bus, a.options.params.gait.joints, robot);
+  if (!a.options.bus->table.feet.present && a.options.plant != PlantKind::kKinematic) {
+    return "Bus file \"" + a.bus +
+           "\": it has no [feet], and contacts inferred from joint torques need --plant kinematic: under physics a leg "
+           "that swings feigns a touch-down.";
+  }
+  if (a.options.can_log.empty()) return {};
+  std::ofstream probe(a.options.can_log);
+  return probe ? "" : "Cannot write the file \"" + a.options.can_log + "\" given by --can-log.";
+}
+
 std::string picture_complaint(ClimbArguments& a) {
   const StairParams& stairs = a.options.stairs;
   if (a.missing_step) {
@@ -312,7 +335,7 @@ std::string complaint(ClimbArguments& a) {
     take_params(a);
     std::string sentence = stairs_complaint(a.options.stairs);
     for (const auto part : {balusters_complaint, plant_complaint, pushes_complaint, errors_complaint, camera_complaint,
-                            picture_complaint}) {
+                            bus_complaint, picture_complaint}) {
       if (sentence.empty()) sentence = part(a);
     }
     if (!sentence.empty()) return sentence;
@@ -410,7 +433,10 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   CLI::App* replay = declare_replay(app, replay_arguments);
   ParamsArguments params_arguments;
   CLI::App* params = declare_params(app, params_arguments);
-  for (CLI::App* command : {climb, perceive, estimate, replay, params_arguments.list, params_arguments.diff}) {
+  CanArguments can_arguments;
+  CLI::App* can = declare_can(app, can_arguments);
+  for (CLI::App* command : {climb, perceive, estimate, replay, params_arguments.list, params_arguments.diff,
+                            can_arguments.encode, can_arguments.decode, can_arguments.dbc}) {
     for (CLI::Option* option : command->get_options()) option->check(not_empty);
   }
 
@@ -423,7 +449,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
-    constexpr std::array<std::string_view, 5> kCommands{"climb", "perceive", "estimate", "replay", "params"};
+    constexpr std::array<std::string_view, 6> kCommands{"climb", "perceive", "estimate", "replay", "params", "can"};
     const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
     err << "polygmap: " << complaint_of(error, app, arguments) << "; see polygmap " << (named ? arguments[0] + " " : "")
         << "--help.\n";
@@ -432,6 +458,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err, interrupt);
   if (estimate->parsed()) return run_estimate(estimate_arguments, out, err, interrupt);
   if (replay->parsed()) return run_replay(replay_arguments, out, err);
+  if (can->parsed()) return run_can(can_arguments, out, err);
   if (params->parsed()) return run_params(params_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
     err << "polygmap: A subcommand is required; see polygmap --help.\n";
