@@ -19,8 +19,12 @@ CLI::App* declare_replay(CLI::App& app, ReplayArguments& a) {
 
 int run_replay(const ReplayArguments& a, std::ostream& out, std::ostream& err) {
   const recording::ReplayResult result = recording::replay(a.directory);
-  const bool unreadable = result.verdict == recording::ReplayVerdict::kUnreadable;
-  (unreadable ? err << "polygmap: " : out) << text_of(result) << std::flush;
+  if (result.verdict == recording::ReplayVerdict::kUnreadable) {
+    if (!result.difference.empty()) out << "first difference: " << result.difference << "\n" << std::flush;
+    err << "polygmap: " << result.complaint << "\n";
+  } else {
+    out << text_of(result) << std::flush;
+  }
   return static_cast<int>(result.verdict);
 }
 

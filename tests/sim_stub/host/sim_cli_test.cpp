@@ -315,5 +315,21 @@ TEST(ClimbCommand, Help_ExplainsExitCodesAndOptions) {
   }
 }
 
+TEST(Cli, Record_IsMadeAndHandedOn) {
+  const Call c = call({"climb", "--record", temporary("record/inner")});
+  ASSERT_TRUE(c.options);
+  EXPECT_EQ(c.options->record_dir, temporary("record/inner"));
+  EXPECT_TRUE(std::filesystem::is_directory(c.options->record_dir));
+  expect_refused({"climb", "--record", "/dev/null/none"}, "given by --record");
+}
+
+TEST(Cli, ReplayOfNoRecording_IsOneSentenceWithFileAndByte) {
+  std::ostringstream out, err;
+  EXPECT_EQ(polygmap_main({"replay", "/there/is/none"}, {}, out, err, false), kExitUsage);
+  EXPECT_EQ(err.str().find("polygmap: \"/there/is/none/recording.bin\", byte 0: cannot be read: "), 0U) << err.str();
+  EXPECT_EQ(std::count(err.str().begin(), err.str().end(), '\n'), 1);
+  EXPECT_TRUE(out.str().empty());
+}
+
 }  // namespace
 }  // namespace polygmap::sim
