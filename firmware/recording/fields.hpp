@@ -14,7 +14,9 @@
 #include "algorithms/core/messages/state.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/estimation/quality/estimate_quality.hpp"
+#include "algorithms/robot/robot_model.hpp"
 #include "firmware/recording/bytes.hpp"
+#include "hal/ports/joint_bus.hpp"
 #include "scheduler/event_counters.hpp"
 
 namespace polygmap::recording {
@@ -39,12 +41,38 @@ void each_field(auto& f, Of<ImuSample> auto& m) {
   walk(f, "gyro_radps", m.gyro_radps);
   walk(f, "accel_mps2", m.accel_mps2);
 }
+void each_field(auto& f, Of<JointSet> auto& m) {
+  std::uint16_t bits = m.bits();
+  f.leaf("bits", -1, bits);
+  if constexpr (!std::is_const_v<std::remove_reference_t<decltype(m)>>) m = JointSet::of_bits(bits);
+}
 void each_field(auto& f, Of<JointFeedback> auto& m) {
   walk(f, "stamp_ns", m.stamp_ns);
   walk(f, "q_rad", m.q_rad);
   walk(f, "dq_radps", m.dq_radps);
   walk(f, "tau_nm", m.tau_nm);
+  walk(f, "silent_cycles", m.silent_cycles);
   walk(f, "foot_force_n", m.foot_force_n);
+}
+void each_field(auto& f, Of<hal::JointBusStatus> auto& m) {
+  walk(f, "drive_errors", m.drive_errors);
+  walk(f, "drive_code", m.drive_code);
+  walk(f, "bus_off", m.bus_off);
+  walk(f, "senses_feet", m.senses_feet);
+  walk(f, "feet_silent", m.feet_silent);
+  walk(f, "bus_offs", m.bus_offs);
+  walk(f, "refused", m.refused);
+  walk(f, "unknown_ids", m.unknown_ids);
+  walk(f, "bad_frames", m.bad_frames);
+  walk(f, "drive_error_replies", m.drive_error_replies);
+  walk(f, "clamped", m.clamped);
+  walk(f, "not_finite", m.not_finite);
+  walk(f, "lost", m.lost);
+  walk(f, "failed_calls", m.failed_calls);
+}
+void each_field(auto& f, Of<GainLimits> auto& m) {
+  walk(f, "kp_nmprad", m.kp_nmprad);
+  walk(f, "kd_nmsprad", m.kd_nmsprad);
 }
 void each_field(auto& f, Of<JointSetpoint> auto& m) {
   walk(f, "q_rad", m.q_rad);

@@ -6,7 +6,7 @@
 //   entries,
 //     parameters: name, kind (u8), count (u32), values (bool, i32, u32, i64, f64, choice u8)
 //     rows of the schedule: task, lane (u8), slots (u16), budget_us (i32), unit_cost_ns (i32), shed_order (u8)
-//     and the camera's intrinsics. A name is a u16 length and the characters.
+//     the camera's intrinsics, and the gains that each drive can take at most. A name is a u16 length and the characters.
 //   record: kind (u8), length of the rest (u32), then by kind
 //     row        a call of a schedule's row: row (u8), cycle_ns (i64), units (i32), frame of the other lane that had
 //     been
@@ -51,10 +51,11 @@ enum class CallKind : std::uint8_t {
   kWriteJoints = 4,
   kAcquire = 5,
   kRelease = 6,
+  kJointStatus = 7,
 };
 [[nodiscard]] constexpr std::string_view name_of(CallKind kind) noexcept {
   constexpr std::string_view kNames[] = {"no call",          "imu.try_read",       "joints.try_read", "lio.try_read",
-                                         "joints.try_write", "camera.try_acquire", "camera.release"};
+                                         "joints.try_write", "camera.try_acquire", "camera.release",  "joints.status"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 enum class ValueKind : std::uint8_t { kBool, kI32, kU32, kI64, kF64, kChoice };

@@ -45,6 +45,8 @@ void walk_outputs(auto& f, const Pipeline& module, std::size_t row, Progress pro
   } else if (task == "gait") {
     walk(f, "status", control.gait_status());
     walk(f, "command", control.last_command());
+    const ModuleState module_state = control.module_state();
+    walk(f, "module_state", module_state);
   } else if (task == "health") {
     f.health(counts_of(control.all_faults()));
   } else if (task == "intake") {

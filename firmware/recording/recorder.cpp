@@ -57,6 +57,7 @@ void put_header(ByteWriter& out, const Params& params, const CameraIntrinsics& c
   }
   FieldWriter writer(out, nullptr);
   walk(writer, "camera", camera);
+  walk(writer, "gain_limits", params.robot.drives.gain_limits);
 }
 
 // Kind and length, which put_length() fills in.
@@ -251,7 +252,7 @@ std::string Recorder::finish() {
   return failure_;
 }
 
-void Recorder::put_call(LaneLog& log, CallKind kind, bool gave) noexcept {
+void Recorder::put_call(LaneLog& log, CallKind kind, bool gave) const noexcept {
   ++log.calls;
   log.out.put(kind);
   log.out.put(gave);
@@ -284,13 +285,23 @@ bool Recorder::try_read(LioSample& sample) noexcept {
   return gave;
 }
 
-bool Recorder::try_write(const JointCommand& command) noexcept {
+JointSet Recorder::try_write(const JointCommand& command) noexcept {
   LaneLog& log = logs_[kControlLane];
-  const bool taken = robot_.joints.try_write(command);
-  put_call(log, CallKind::kWriteJoints, taken);
+  const JointSet taken = robot_.joints.try_write(command);
+  put_call(log, CallKind::kWriteJoints, taken.is_all());
   FieldWriter writer(log.out, nullptr);
+  walk(writer, "taken", taken);
   walk(writer, "command", command);
   return taken;
+}
+
+hal::JointBusStatus Recorder::status() const noexcept {
+  const hal::JointBusStatus status = robot_.joints.status();
+  LaneLog& log = logs_[kControlLane];
+  put_call(log, CallKind::kJointStatus, true);
+  FieldWriter writer(log.out, nullptr);
+  walk(writer, "status", status);
+  return status;
 }
 
 bool Recorder::try_acquire(DepthFrameView& frame) noexcept {

@@ -44,7 +44,8 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
   void release() noexcept override;
   [[nodiscard]] bool try_read(ImuSample& sample) noexcept override;
   [[nodiscard]] bool try_read(JointFeedback& feedback) noexcept override;
-  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override;
+  [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override;
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override;
   [[nodiscard]] bool try_read(LioSample& sample) noexcept override;
 
  private:
@@ -69,7 +70,7 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
     HealthCounts health{};                                                 // as written last
   };
 
-  void put_call(LaneLog& log, CallKind kind, bool gave) noexcept;
+  void put_call(LaneLog& log, CallKind kind, bool gave) const noexcept;
   void put_events(std::size_t lane) noexcept;
   void begin_frame(LaneLog& log, std::int64_t cycle_ns) noexcept;
   void write_frame(const LaneLog& log, std::size_t frame);
@@ -77,7 +78,7 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
 
   Ports robot_;
   Pipeline* pipeline_ = nullptr;
-  std::array<LaneLog, kLaneCount> logs_;
+  mutable std::array<LaneLog, kLaneCount> logs_;  // a const port call is recorded, too
   std::vector<std::uint16_t> pixels_;  // of kPicturesPerFlush pictures
   std::size_t picture_px_ = 0;
   std::size_t pictures_waiting_ = 0;

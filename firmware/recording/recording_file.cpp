@@ -177,7 +177,7 @@ bool RecordingFile::open(const std::string& directory) {
     *file = std::fopen((directory + "/" + name).c_str(), "rb");
     if (*file == nullptr) return complain_at(name, 0, std::string("cannot be read: ") + std::strerror(errno));
   }
-  return read_header() && read_params() && read_schedule() && read_camera() && open_pictures();
+  return read_header() && read_params() && read_schedule() && read_camera() && read_gain_limits() && open_pictures();
 }
 
 bool RecordingFile::read_header() {
@@ -262,6 +262,19 @@ bool RecordingFile::read_camera() {
   }
   for (const double x : {camera_.fx_px, camera_.fy_px, camera_.cx_px, camera_.cy_px, camera_.depth_unit_m}) {
     if (!std::isfinite(x)) return complain("the camera's intrinsics are no numbers");
+  }
+  return true;
+}
+
+bool RecordingFile::read_gain_limits() {
+  auto& limits = params_.robot.drives.gain_limits;
+  FieldSize size;
+  walk(size, "gain_limits", limits);
+  if (!load(size.bytes, "the drives' gains")) return false;
+  FieldReader reader(in_);
+  walk(reader, "gain_limits", limits);
+  for (const GainLimits& most : limits) {
+    if (!(most.kp_nmprad >= 0.0 && most.kd_nmsprad >= 0.0)) return complain("a drive's gains are below 0 or no numbers");
   }
   return true;
 }
@@ -395,6 +408,8 @@ bool RecordingFile::parse_call(PortCall& call) {
       if (call.gave) walk(reader, "lio", call.lio);
       break;
     case CallKind::kWriteJoints:
+      walk(reader, "taken", call.taken);
+      if (call.gave != call.taken.is_all()) return false;
       walk(reader, "command", call.command);
       break;
     case CallKind::kAcquire: {
@@ -413,6 +428,9 @@ bool RecordingFile::parse_call(PortCall& call) {
       ++pictures_;
       break;
     }
+    case CallKind::kJointStatus:
+      walk(reader, "status", call.status);
+      break;
     case CallKind::kRelease:
       break;
     default:

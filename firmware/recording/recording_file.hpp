@@ -28,6 +28,8 @@ struct PortCall {
   JointFeedback joints;
   LioSample lio;
   JointCommand command;
+  JointSet taken;
+  hal::JointBusStatus status;
   DepthFrameView frame;  // without its pixels
   Picture picture;
 };
@@ -85,6 +87,7 @@ class RecordingFile {
   [[nodiscard]] bool read_params();
   [[nodiscard]] bool read_schedule();
   [[nodiscard]] bool read_camera();
+  [[nodiscard]] bool read_gain_limits();
   [[nodiscard]] bool open_pictures();
   [[nodiscard]] bool parse_row(RowCall& row);
   [[nodiscard]] bool parse_call(PortCall& call);

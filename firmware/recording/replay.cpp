@@ -52,11 +52,15 @@ class ReplayedPorts final : public hal::DepthCamera, public hal::Imu, public hal
     feedback = call->joints;
     return true;
   }
-  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override {
+  [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override {
     const PortCall* call = next(CallKind::kWriteJoints);
-    if (call == nullptr) return true;
+    if (call == nullptr) return JointSet::all();
     if (difference_.empty()) difference_ = difference_of(call->command, command);
-    return call->gave;
+    return call->taken;
+  }
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override {
+    const PortCall* call = next(CallKind::kJointStatus);
+    return call == nullptr ? hal::JointBusStatus{} : call->status;
   }
   [[nodiscard]] bool try_read(LioSample& sample) noexcept override {
     const PortCall* call = next(CallKind::kReadLidar);
@@ -67,12 +71,12 @@ class ReplayedPorts final : public hal::DepthCamera, public hal::Imu, public hal
 
  private:
   // The next recorded call when it is of this kind; else the module does something else than it did.
-  [[nodiscard]] const PortCall* next(CallKind kind) noexcept {
+  [[nodiscard]] const PortCall* next(CallKind kind) const noexcept {
     if (next_ < row_->calls.size() && row_->calls[next_].kind == kind) return &row_->calls[next_++];
     differ(std::string(name_of(kind)), next_ < row_->calls.size() ? row_->calls[next_].kind : CallKind{});
     return nullptr;
   }
-  void differ(const std::string& computed, CallKind recorded) {
+  void differ(const std::string& computed, CallKind recorded) const {
     if (!difference_.empty()) return;
     difference_ = "call " + std::to_string(next_) + " of a port: recorded " + std::string(name_of(recorded)) +
                   ", computed " + computed;
@@ -91,9 +95,9 @@ class ReplayedPorts final : public hal::DepthCamera, public hal::Imu, public hal
   RecordingFile& file_;
   std::vector<std::uint16_t> pixels_;
   const RowCall* row_ = nullptr;
-  std::size_t next_ = 0;
+  mutable std::size_t next_ = 0;  // a const port call is one, too
   bool unreadable_ = false;
-  std::string difference_;
+  mutable std::string difference_;
 };
 
 class Replay {
