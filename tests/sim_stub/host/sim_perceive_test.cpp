@@ -158,7 +158,7 @@ TEST_F(PerceiveCommand, Picture_EveryNosingIsRedFromEndToEnd) {
     if (plane["nosing"].is_null()) continue;
     const auto end = [&](int i) {
       const auto& p = plane["nosing"][static_cast<std::size_t>(i)];
-      return Vec3{p[0], p[1], p[2]};
+      return Vec3{p[0].get<double>(), p[1].get<double>(), p[2].get<double>()};
     };
     for (int i = 0; i <= 100; ++i) {
       const Vec3 p = end(0) + (end(1) - end(0)) * (i / 100.0);
