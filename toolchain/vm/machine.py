@@ -28,11 +28,12 @@ def fetch():
 
 
 def command(archive, disk, memory_mb, cpus):
-    """Virtual time is exact: one nanosecond an instruction, and none while the host does something else."""
+    """Virtual time is exact: one nanosecond an instruction, and none while the host does something else. A file system
+    of type tmpfs would hold no more than half of the memory."""
     return ["qemu-system-aarch64", "-machine", "virt,gic-version=3", "-cpu", "cortex-a76", "-m", str(memory_mb),
             "-smp", str(cpus), "-nographic", "-nodefaults", "-serial", "stdio", "-no-reboot",
             "-kernel", str(initrd.BUILD / "kernel/vmlinuz"), "-initrd", str(archive),
-            "-append", "console=ttyAMA0 quiet panic=-1 nokaslr norandmaps rdinit=/init",
+            "-append", "console=ttyAMA0 quiet panic=-1 nokaslr norandmaps rootfstype=ramfs rdinit=/init",
             "-drive", f"file={disk},format=raw,if=none,id=out", "-device", "virtio-blk-device,drive=out",
             "-icount", "shift=0,sleep=off", "-rtc", "clock=vm,base=2026-01-01", "-seed", "1"]
 
