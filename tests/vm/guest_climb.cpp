@@ -246,6 +246,7 @@ void print_figures(const Climb& climb) {
     print_measured("kernel" + suffix, meter.kernel());
     std::printf("MEASURED stack.lane%zu max=%zu\n", lane, climb.lanes[lane]->thread.used_stack_bytes());
   }
+  for (const StageMemory& part : static_memory()) std::printf("MEASURED memory.%s max=%zu\n", part.stage, part.bytes);
 }
 
 const char* name_of(GaitPhase phase) {

@@ -18,15 +18,6 @@ DISK_BYTES = 1 << 28  # for what comes back; sparse
 SKIP = 77
 
 
-def fetch():
-    """The kernel and the tools are below build/vm; ends the program with a sentence where they cannot be had."""
-    done = subprocess.run([HERE / "fetch_kernel"])
-    if done.returncode == SKIP:
-        print("vm: skipped: no RT kernel to boot")
-    if done.returncode:
-        sys.exit(done.returncode)
-
-
 def command(archive, disk, memory_mb, cpus):
     """Virtual time is exact: one nanosecond an instruction, and none while the host does something else. A file system
     of type tmpfs would hold no more than half of the memory."""
@@ -71,9 +62,10 @@ def lines_of(process, limit_s):
         yield rest.decode(errors="replace")
 
 
-def run(work, main, files, *, cpus=1, camera=False, limit_s=120, echo=True):
-    """Boots, runs the shell script `main` with `files` ({name in /job: path}) beside it. Returns the console's lines and
-    leaves them in work/serial.log, and in work/out what the job left in /out."""
+def run(work, main, files, *, cpus=1, camera=False, limit_s=120, hold_back=None):
+    """Boots, runs the shell script `main` with `files` ({name in /job: path}) beside it. Prints the console as it
+    comes, but for lines that begin with hold_back. Returns it and leaves it in work/serial.log, and in work/out what the job
+    left in /out."""
     work.mkdir(parents=True, exist_ok=True)
     archive_path, disk = work / "initrd.cpio", work / "disk.img"
     archive = initrd.Archive(archive_path)
@@ -93,7 +85,7 @@ def run(work, main, files, *, cpus=1, camera=False, limit_s=120, echo=True):
             for line in lines_of(process, limit_s):
                 console.append(line)
                 print(line, file=log, flush=True)
-                if echo:
+                if hold_back is None or not line.startswith(hold_back):
                     print(line, flush=True)
         except TimeoutError:
             console.append(f"vm: stopped at the limit of {limit_s} s of this host's time")
