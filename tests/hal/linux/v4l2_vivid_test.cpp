@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 #include <linux/v4l2-dv-timings.h>
 #include <sys/ioctl.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <random>
 #include <string>
@@ -187,6 +189,23 @@ TEST_F(V4l2Vivid, TryAcquire_PictureOfTheOutputLooped_IsTheSamePixelForPixel) {
   vivid.camera.close();
   const int output = ::open(output_path.c_str(), O_RDWR | O_NONBLOCK);
   ASSERT_GE(output, 0);
+  std::array<void*, 4> memory{};
+  std::uint32_t next = 0;
+  // Hands the picture to the output, unless all its buffers still wait to be shown.
+  const auto show = [&](const std::vector<std::uint16_t>& pixels) {
+    v4l2_buffer buffer{};
+    buffer.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    buffer.memory = V4L2_MEMORY_MMAP;
+    if (next < memory.size()) {
+      buffer.index = next++;
+    } else if (::ioctl(output, VIDIOC_DQBUF, &buffer) != 0) {
+      return;
+    }
+    std::copy(pixels.begin(), pixels.end(), static_cast<std::uint16_t*>(memory[buffer.index]));
+    buffer.bytesused = static_cast<std::uint32_t>(2 * pixels.size());
+    buffer.field = V4L2_FIELD_NONE;
+    EXPECT_EQ(::ioctl(output, VIDIOC_QBUF, &buffer), 0);
+  };
   v4l2_dv_timings timings = V4L2_DV_BT_CEA_640X480P59_94;
   if (::ioctl(vivid.controls, VIDIOC_S_DV_TIMINGS, &timings) != 0) {
     ::close(output);
@@ -199,17 +218,34 @@ TEST_F(V4l2Vivid, TryAcquire_PictureOfTheOutputLooped_IsTheSamePixelForPixel) {
   format.fmt.pix.height = 480;
   format.fmt.pix.pixelformat = V4L2_PIX_FMT_Y16;
   EXPECT_EQ(::ioctl(output, VIDIOC_S_FMT, &format), 0);
+  v4l2_requestbuffers request{};
+  request.count = static_cast<std::uint32_t>(memory.size());
+  request.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+  request.memory = V4L2_MEMORY_MMAP;
+  EXPECT_EQ(::ioctl(output, VIDIOC_REQBUFS, &request), 0);
+  for (std::uint32_t i = 0; i < memory.size(); ++i) {
+    v4l2_buffer buffer{};
+    buffer.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    buffer.memory = V4L2_MEMORY_MMAP;
+    buffer.index = i;
+    EXPECT_EQ(::ioctl(output, VIDIOC_QUERYBUF, &buffer), 0);
+    memory[i] = ::mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, output, buffer.m.offset);
+    ASSERT_NE(memory[i], MAP_FAILED);
+  }
+  std::vector<std::uint16_t> picture(640 * 480);
+  for (std::size_t i = 0; i < memory.size(); ++i) show(picture);
+  int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+  EXPECT_EQ(::ioctl(output, VIDIOC_STREAMON, &type), 0);
   vivid.set_control("OSD Text Mode", 2);
   vivid.set_control("Loop Video", 1);
   const hal::DeviceError error = vivid.camera.open(vivid.config());
   EXPECT_FALSE(error.failed()) << error.sentence();
-  std::vector<std::uint16_t> picture(640 * 480);
   std::mt19937 random(11);
   for (int i = 0; i < 3; ++i) {
     for (std::uint16_t& pixel : picture) pixel = static_cast<std::uint16_t>(random());
     bool same = false;
     vivid.poll_until([&] {
-      static_cast<void>(::write(output, picture.data(), 2 * picture.size()));  // refused while its queue is full
+      show(picture);
       DepthFrameView frame;
       if (vivid.camera.try_acquire(frame)) {
         same = std::equal(picture.begin(), picture.end(), frame.depth);
@@ -221,6 +257,7 @@ TEST_F(V4l2Vivid, TryAcquire_PictureOfTheOutputLooped_IsTheSamePixelForPixel) {
   }
   vivid.set_control("Loop Video", 0);
   vivid.set_control("OSD Text Mode", 0);
+  for (void* mapped : memory) ::munmap(mapped, 2 * picture.size());
   ::close(output);
 }
 
