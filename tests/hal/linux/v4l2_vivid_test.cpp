@@ -3,7 +3,6 @@
 // number in them and faults on demand. Skips where there is none.
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <linux/v4l2-dv-timings.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -206,7 +205,18 @@ TEST_F(V4l2Vivid, TryAcquire_PictureOfTheOutputLooped_IsTheSamePixelForPixel) {
     buffer.field = V4L2_FIELD_NONE;
     EXPECT_EQ(::ioctl(output, VIDIOC_QBUF, &buffer), 0);
   };
-  v4l2_dv_timings timings = V4L2_DV_BT_CEA_640X480P59_94;
+  v4l2_dv_timings timings{};  // 640x480 at 59.94 Hz of CEA-861
+  timings.type = V4L2_DV_BT_656_1120;
+  timings.bt.width = 640;
+  timings.bt.height = 480;
+  timings.bt.pixelclock = 25'175'000;
+  timings.bt.hfrontporch = 16;
+  timings.bt.hsync = 96;
+  timings.bt.hbackporch = 48;
+  timings.bt.vfrontporch = 10;
+  timings.bt.vsync = 2;
+  timings.bt.vbackporch = 33;
+  timings.bt.standards = V4L2_DV_BT_STD_DMT | V4L2_DV_BT_STD_CEA861;
   if (::ioctl(vivid.controls, VIDIOC_S_DV_TIMINGS, &timings) != 0) {
     ::close(output);
     GTEST_SKIP() << "its input is no HDMI input";
