@@ -144,6 +144,13 @@ DeviceError V4l2Camera::set_rate(int fd) noexcept {
   if (call(fd, VIDIOC_S_PARM, &rate) != 0) {
     return system_error(config_.device.c_str(), "cannot set the pictures per second", errno);
   }
+  // A device takes what is nearest, or does not care. 30 may be 29.97.
+  const v4l2_fract& taken = rate.parm.capture.timeperframe;
+  const double taken_per_s = taken.numerator > 0 ? static_cast<double>(taken.denominator) / taken.numerator : 0.0;
+  if (!(taken_per_s > 0.99 * config_.frames_per_s && taken_per_s < 1.01 * config_.frames_per_s)) {
+    return device_error(DeviceErrorKind::kUnsuitable, config_.device.c_str(),
+                        "gives %.2f pictures a second instead of %u", taken_per_s, config_.frames_per_s);
+  }
   return {};
 }
 

@@ -22,7 +22,7 @@ class V4l2Camera final : public DepthCamera {
     CameraIntrinsics intrinsics{};  // width, height and what no V4L2 call tells
     PixelFormat format = PixelFormat::kZ16;
     std::uint32_t buffers = 5;              // 4 to BufferBook::kMostBuffers; three are never with the kernel at a time
-    std::uint32_t frames_per_s = 0;         // asked for; 0: the device's own
+    std::uint32_t frames_per_s = 0;         // that the device must give; 0: its own
     std::int64_t latency_ns = 0;            // from the end of the exposure to the device's stamp
     std::int64_t exposure_ns = 0;           // the stamp given is the middle of it
     std::int64_t timeout_ns = 500'000'000;  // without a picture: the stream is opened anew

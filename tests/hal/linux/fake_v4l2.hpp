@@ -31,6 +31,7 @@ class FakeV4l2 {
   std::uint32_t widest_px = 640;
   std::uint32_t row_padding_bytes = 0;
   std::uint32_t most_buffers = 32;
+  std::uint32_t most_frames_per_s = 90;
   std::uint32_t stamp_flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
   // Of the next pictures.
   std::uint32_t buffer_flags = 0;
@@ -106,7 +107,8 @@ class FakeV4l2 {
       p.sizeimage = p.bytesperline * p.height;
       for (auto& pixels : memory_) pixels.assign(p.width * p.height, 0);
     } else if (request == VIDIOC_S_PARM) {
-      frames_per_s = static_cast<v4l2_streamparm*>(argument)->parm.capture.timeperframe.denominator;
+      v4l2_fract& rate = static_cast<v4l2_streamparm*>(argument)->parm.capture.timeperframe;
+      rate.denominator = frames_per_s = std::min(rate.denominator, most_frames_per_s);
     } else if (request == VIDIOC_REQBUFS) {
       auto& r = *static_cast<v4l2_requestbuffers*>(argument);
       buffers_asked = static_cast<int>(r.count);

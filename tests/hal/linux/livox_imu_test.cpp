@@ -34,7 +34,7 @@ struct Fixture {
                       .accel_mps2 = {0.0F, 0.0F, codec::kStandardGravity_mps2}};
 
   explicit Fixture(hal::TimeBase base = hal::TimeBase::kMonotonic) {
-    open({.udp = {.port = port_number}, .time = {.base = base}});
+    open({.udp = {.port = port_number}, .time = {.base = base, .most_age_ns = test::half_of_uptime_ns()}});
   }
   void open(const hal::LivoxImu::Config& config) {
     const hal::DeviceError error = imu.open(config);
@@ -69,7 +69,9 @@ namespace {
 TEST(LivoxImu, TryRead_MountTurned_SampleIsInTheBaseFrame) {
   Fixture f;
   f.imu.close();
-  f.open({.udp = {.port = f.port_number}, .time = {.base = hal::TimeBase::kMonotonic}, .base_R_imu = rotation_x(kPi)});
+  f.open({.udp = {.port = f.port_number},
+          .time = {.base = hal::TimeBase::kMonotonic, .most_age_ns = test::half_of_uptime_ns()},
+          .base_R_imu = rotation_x(kPi)});
   f.feed();
   ImuSample s;
   ASSERT_TRUE(f.imu.try_read(s));
@@ -112,10 +114,23 @@ TEST(LivoxImu, TryRead_BadDatagrams_EachCountedByItsName) {
   EXPECT_EQ(c.out_of_order, 1U);
 }
 
+TEST(LivoxImu, TryRead_StampOff_CountedByItsName) {
+  Fixture f;
+  f.next.stamp_ns = 1;
+  f.sender.send(bytes_of(f.next));
+  f.next.stamp_ns = test::monotonic_now_ns() + 60'000'000'000;
+  f.sender.send(bytes_of(f.next));
+  EXPECT_EQ(f.read_all(), 0);
+  EXPECT_EQ(f.imu.counters().time.late, 1U);
+  EXPECT_EQ(f.imu.counters().time.early, 1U);
+}
+
 TEST(LivoxImu, TryRead_CrcOff_BelievesAnyCrc) {
   Fixture f;
   f.imu.close();
-  f.open({.udp = {.port = f.port_number}, .check_crc = false, .time = {.base = hal::TimeBase::kMonotonic}});
+  f.open({.udp = {.port = f.port_number},
+          .check_crc = false,
+          .time = {.base = hal::TimeBase::kMonotonic, .most_age_ns = test::half_of_uptime_ns()}});
   f.next.stamp_ns += 1;
   PacketBytes bytes = bytes_of(f.next);
   bytes[24] ^= 0xFF;

@@ -49,10 +49,11 @@ INSTANTIATE_TYPED_TEST_SUITE_P(MadeUp, CanChannelContract, FakeSocketCanHarness)
 // Another node of the same bus is another socket.
 struct KernelCanHarness {
   hal::SocketCan can, other;
-  hal::DeviceError error = can.open({.interface = virtual_can()});
+  static constexpr bool kFd = true;  // a virtual interface's MTU is 72 unless it was set
+  hal::DeviceError error = can.open({.interface = virtual_can(), .fd = true});
   std::string why;
   KernelCanHarness() {
-    if (!error.failed()) error = other.open({.interface = virtual_can()});
+    if (!error.failed()) error = other.open({.interface = virtual_can(), .fd = true});
     if (error.failed()) why = std::string("no virtual CAN interface here: ") + error.sentence();
   }
   const char* absent() { return error.failed() ? why.c_str() : nullptr; }

@@ -253,6 +253,10 @@ TEST(V4l2Camera, Open_ThatCannotBe_SaysWhy) {
   device.row_padding_bytes = 64;
   EXPECT_EQ(sentence(good), "/dev/video7: pads a row of 64 pixels to 192 bytes");
   device.row_padding_bytes = 0;
+  config = good;
+  config.frames_per_s = 30;
+  device.most_frames_per_s = 6;
+  EXPECT_EQ(sentence(config), "/dev/video7: gives 6.00 pictures a second instead of 30");
   device.most_buffers = 3;
   EXPECT_EQ(sentence(good), "/dev/video7: gives 3 buffers of the 4 that are needed");
   device.most_buffers = 32;
