@@ -77,8 +77,8 @@ TEST(BusFile, GoodFile_HasWhatItSays) {
   all[4].more = "reply = \"status_nibble\"\n";
   all[4].reply_id = "0x25";
   const BusFile bus =
-      read_bus(write("bitrate = 500_000\n" + text_of(all, "[feet]\nbus = \"can9\"\nid = 0x70\nunit_n = 0.1\n")));
-  EXPECT_EQ(bus.table.bitrate_bps, 500000U);
+      read_bus(write("bitrate = 800_000\n" + text_of(all, "[feet]\nbus = \"can9\"\nid = 0x70\nunit_n = 0.1\n")));
+  EXPECT_EQ(bus.table.bitrate_bps, 800000U);
   EXPECT_EQ(bus.buses.back(), "can9");
   EXPECT_EQ(bus.table.feet.bus, 4);
   EXPECT_EQ(bus.table.feet.id, 0x70);

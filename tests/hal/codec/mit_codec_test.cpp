@@ -138,7 +138,7 @@ TEST(MitCodec, RandomReplies_AreWithinTheRangesOrRefused) {
     for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
     const std::size_t length = random() % 65;
     const auto rule = i % 2 == 0 ? MitReplyRule::kId : MitReplyRule::kStatusNibble;
-    const std::uint32_t id = 1 + random() % (rule == MitReplyRule::kId ? 255 : 15);
+    const auto id = static_cast<std::uint32_t>(1 + random() % (rule == MitReplyRule::kId ? 255 : 15));
     if (i % 3 == 0) bytes[0] = static_cast<std::uint8_t>(id);
     MitReply reply{7.0, 7.0, 7.0};
     const bool taken = try_decode_reply({bytes.data(), length}, id, kRanges, rule, reply);
@@ -161,7 +161,7 @@ TEST(MitCodec, RandomReplyValues_ComeBackWithinHalfAStep) {
     const auto rule = i % 2 == 0 ? MitReplyRule::kId : MitReplyRule::kStatusNibble;
     MitReply sent{value.q_rad, value.dq_radps, value.tau_ff_nm};
     sent.status = rule == MitReplyRule::kId ? static_cast<std::uint8_t>(i % 5) : static_cast<std::uint8_t>(i % 16);
-    const std::uint32_t id = 1 + i % 15;
+    const auto id = static_cast<std::uint32_t>(1 + i % 15);
     const MitBytes bytes = reply_frame(sent, id, kRanges, rule);
     MitReply got;
     ASSERT_TRUE(try_decode_reply(bytes, id, kRanges, rule, got));
