@@ -94,7 +94,7 @@ void compare_with_a_model(unsigned seed, int most_ahead, int least_gap) {
   std::deque<std::int64_t> published;  // frames; the value is the frame
   std::int64_t writer = 1, reader = 1, front = kNoFrame_ns, published_last = -1000;
   bool filling = false;
-  for (int i = 0; i < 300'000; ++i) {
+  for (int i = 0; i < (test::kSlowMachine ? 50'000 : 300'000); ++i) {
     const unsigned what = random() % 4;
     if (what == 0 && writer - reader < most_ahead) {  // the writer's frame ends
       if (filling) {
