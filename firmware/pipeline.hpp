@@ -10,9 +10,9 @@
 
 namespace polygmap {
 
-static_assert(EIGEN_MAX_ALIGN_BYTES == POLYGMAP_EIGEN_ALIGN_BYTES,
-              "Eigen aligns its types in another way here than in the module: compile both with the same -mavx2 or "
-              "-march, or set POLYGMAP_AVX2");
+#if defined(EIGEN_VECTORIZE) || EIGEN_MAX_STATIC_ALIGN_BYTES != 0
+#error "Eigen sums and aligns in another way here than in the module: compile with -DEIGEN_DONT_VECTORIZE"
+#endif
 
 struct Ports {
   hal::DepthCamera& camera;

@@ -8,14 +8,12 @@
 #include "algorithms/robot/leg_kinematics.hpp"
 #include "scheduler/schedule_table.hpp"
 #include "tests/support/nominal_robot.hpp"
-#include "tests/support/slow_machine.hpp"
 
 namespace polygmap::test {
 namespace {
 
 constexpr double kTick_s = 1e-6 * kCycle_us;
 constexpr double kLeg_n = 30.0;
-constexpr int kPicture_ticks = kSlowMachine ? 48 : 16;
 
 }  // namespace
 
@@ -133,7 +131,7 @@ void FakeRobot::sense() {
     }
     joints.feed(feedback);
   }
-  if (camera_speaks && tick_ % kPicture_ticks == 0) {
+  if (camera_speaks && tick_ % picture_ticks == 0) {
     scene_.world_T_camera = true_T_base_ * base_T_camera();
     camera.feed(now_ns, render_for_robot(scene_));
   }

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "algorithms/core/math/math.hpp"
-#include "algorithms/core/math/sin_cos.hpp"
 
 namespace polygmap {
 
