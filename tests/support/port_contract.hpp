@@ -9,6 +9,7 @@
 //   };
 //   INSTANTIATE_TYPED_TEST_SUITE_P(Mine, ImuContract, MyImuHarness);   // in namespace polygmap::contract
 //
+// A harness of a device that this machine may lack says so by const char* absent(): why it is, or null; its tests skip.
 // The harnesses of the ports differ only in what is listed above each suite. Each test makes a new harness. A program
 // that includes this and leaves out a port fails, unless it says GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(suite).
 #pragma once
@@ -268,6 +269,11 @@ class DepthCameraContract : public ::testing::Test {
  protected:
   static std::vector<std::uint16_t> pixels_of(const DepthFrameView& frame) {
     return {frame.depth, frame.depth + std::ptrdiff_t{frame.width_px} * frame.height_px};
+  }
+  void SetUp() override {
+    if constexpr (requires { harness.absent(); }) {
+      if (const char* why = harness.absent()) GTEST_SKIP() << why;
+    }
   }
   Harness harness;
 };
