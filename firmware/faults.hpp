@@ -30,7 +30,15 @@ namespace polygmap {
   X(15, kPoseMissing, "pose_missing", "Control did not say in time where a frame was exposed; it was given back.") \
   X(16, kMapStale, "map_stale", "The newest fused frame was too old to step on.")                                  \
   X(17, kStateStale, "state_stale", "IMU or joints were silent for so long that the gait stopped.")                \
-  X(18, kGaitStopped, "gait_stopped", "The gait stopped in double support, not on top.")
+  X(18, kGaitStopped, "gait_stopped", "The gait stopped in double support, not on top.")                           \
+  X(30, kDriveSilent, "drive_silent", "A drive was silent for more than five cycles; telemetry says which joint's.") \
+  X(31, kDriveError, "drive_error", "A drive told of an error, or left its motor mode.")                           \
+  X(32, kBusOff, "bus_off", "A CAN controller left its bus.")                                                      \
+  X(33, kBusUnknownId, "bus_unknown_id", "A CAN frame came that no drive of the bus file sends.")                  \
+  X(34, kBusBadFrame, "bus_bad_frame", "A CAN frame had a wrong length or kind, or another drive's name in it.")   \
+  X(35, kBusFrameLost, "bus_frame_lost", "CAN frames were lost between controller and module.")                    \
+  X(36, kBusCallFailed, "bus_call_failed", "A CAN driver's call failed, and not for a full queue.")                \
+  X(37, kFeetSilent, "feet_silent", "The feet's sensors were silent for more than five cycles.")
 
 // A bound was met; the module goes on with what it has. Numbers 101-199.
 #define POLYGMAP_LIMITS(X)                                                                                         \
@@ -47,7 +55,8 @@ namespace polygmap {
   X(111, kRunsFull, "runs_full", "A run, interval or pair of planes of a frame found no room.")                    \
   X(112, kHeightRejected, "height_rejected", "A mapped tread's height disagreed with the sole that landed on it.") \
   X(113, kFootPutBack, "foot_put_back", "A foot in the air went back to where it had stood.")                      \
-  X(114, kFrameLost, "frame_lost", "A frame never reached the map: it was unusable, or the last one still waited.")
+  X(114, kFrameLost, "frame_lost", "A frame never reached the map: it was unusable, or the last one still waited.") \
+  X(130, kDriveClamped, "drive_clamped", "A command's value was beyond its drive's range and became the nearest end.")
 
 #define POLYGMAP_ENUMERATOR(number, code, name, text) code = number,
 #define POLYGMAP_FAULT_LINE(number, code, name, text) EventInfo<Fault>{Fault::code, name, text},

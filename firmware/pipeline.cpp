@@ -67,7 +67,9 @@ Telemetry Pipeline::telemetry(std::int64_t now_ns, PerceptionTelemetry& percepti
           control_.estimator().quality(),
           perception.surfaces.front(),
           perception.map.front(),
-          control_.gait_status()};
+          control_.gait_status(),
+          control_.module_state(),
+          control_.drives()};
 }
 
 std::span<const StageMemory> static_memory() noexcept { return kMemory; }

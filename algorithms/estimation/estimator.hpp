@@ -103,6 +103,8 @@ class Estimator {
     std::int64_t initialised_ns = 0;
   };
   void take_legs(const std::array<bool, kFootCount>& planned_stance) noexcept;
+  // Of the legs that are measured. One that is again is put where kinematics has it, as if it had just landed.
+  [[nodiscard]] std::array<FootContact, kFootCount> measured_contacts(bool new_legs) noexcept;
   void calibrate() noexcept;
   void begin(const ContactInEkf::Start& start) noexcept;
   void publish(std::int64_t now_ns) noexcept;
@@ -126,6 +128,7 @@ class Estimator {
   bool has_state_ = false;
   ProprioceptiveOdometry::Ground ground_;
   std::array<bool, kFootCount> stood_{};
+  std::array<bool, kFootCount> was_measured_{true, true};
   Origin origin_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One frame of a CAN bus, as a driver hands it over.
+// One frame on a CAN bus, as a driver or the simulation has it.
 #pragma once
 
 #include <array>

@@ -27,7 +27,8 @@ class Robot final : public polygmap::hal::Clock,
   void release() noexcept override {}
   bool try_read(polygmap::ImuSample&) noexcept override { return false; }
   bool try_read(polygmap::JointFeedback&) noexcept override { return false; }
-  bool try_write(const polygmap::JointCommand&) noexcept override { return true; }
+  polygmap::JointSet try_write(const polygmap::JointCommand&) noexcept override { return polygmap::JointSet::all(); }
+  polygmap::hal::JointBusStatus status() const noexcept override { return {}; }
   bool try_read(polygmap::LioSample&) noexcept override { return false; }
 
   std::int64_t now = polygmap::kNsPerS;

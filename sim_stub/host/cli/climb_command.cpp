@@ -40,6 +40,7 @@ struct ClimbArguments {
   std::string contacts = "sensed";
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
+  std::string bus;
   bool no_self_filter = false;
   bool no_mount_estimate = false;
   std::string camera;
@@ -110,6 +111,12 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       .add_option("--scale-error", a.options.scale_error,
                   "How far the depths' scale may be off, unknown to the module: share of the depth")
       ->capture_default_str();
+
+  climb.add_option("--bus", a.bus, "The joints are behind CAN buses with the drives that this file describes")
+      ->type_name("BUS.toml");
+  climb
+      .add_option("--can-log", a.options.can_log, "Also write every frame on the buses there, as candump -L has them")
+      ->type_name("FILE");
 
   climb.add_option("--params", a.options.params_file, "Parameters of the module; other options go before what it says")
       ->type_name("PARAMS.toml");
@@ -268,6 +275,22 @@ std::string camera_complaint(ClimbArguments& a) {
   return {};
 }
 
+// Throws config::FileError.
+std::string bus_complaint(ClimbArguments& a) {
+  if (a.bus.empty()) return a.options.can_log.empty() ? "" : "--can-log needs --bus: without one there are no frames.";
+  a.options.bus = config::read_bus(a.bus);
+  RobotModel robot = a.options.params.robot;
+  config::limit_by_drives(*a.options.bus, a.options.params.gait.joints, robot);
+  if (!a.options.bus->table.feet.present && a.options.plant != PlantKind::kKinematic) {
+    return "Bus file \"" + a.bus +
+           "\": it has no [feet], and contacts inferred from joint torques need --plant kinematic: under physics a leg "
+           "that swings feigns a touch-down.";
+  }
+  if (a.options.can_log.empty()) return {};
+  std::ofstream probe(a.options.can_log);
+  return probe ? "" : "Cannot write the file \"" + a.options.can_log + "\" given by --can-log.";
+}
+
 std::string picture_complaint(ClimbArguments& a) {
   const StairParams& stairs = a.options.stairs;
   if (a.missing_step) {
@@ -296,7 +319,7 @@ std::string complaint(ClimbArguments& a) {
   try {
     take_params(a);
     std::string sentence = stairs_complaint(a.options.stairs);
-    for (const auto part : {plant_complaint, pushes_complaint, errors_complaint, camera_complaint, picture_complaint}) {
+    for (const auto part : {plant_complaint, pushes_complaint, errors_complaint, camera_complaint, bus_complaint, picture_complaint}) {
       if (sentence.empty()) sentence = part(a);
     }
     if (!sentence.empty()) return sentence;

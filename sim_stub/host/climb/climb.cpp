@@ -9,6 +9,7 @@
 
 #include "firmware/config/param_table.hpp"
 #include "firmware/schedule.hpp"
+#include "sim_stub/bus/bus_robot.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "sim_stub/host/climb/climb_report.hpp"
 #include "sim_stub/host/record/climb_recorder.hpp"
@@ -77,6 +78,10 @@ struct Module {
 
 static_assert(VirtualClock::kTick_ns == kCycle_ns);
 
+bool infers_contacts(const ClimbOptions& options) {
+  return options.infer_contacts || (options.bus && !options.bus->table.feet.present);
+}
+
 SimOptions sim_options(const ClimbOptions& options) {
   SimOptions sim;
   sim.seed = options.seed;
@@ -96,7 +101,7 @@ SimOptions sim_options(const ClimbOptions& options) {
     sim.intrinsics = options.camera->intrinsics;
     sim.depth_sigma = options.camera->noise;
   }
-  sim.force_sensors = !options.infer_contacts;
+  sim.force_sensors = !infers_contacts(options);
   if (options.blank_depth) sim.camera.blank = {{0, INT64_MAX}};
   return sim;
 }
@@ -157,6 +162,27 @@ CameraFigures camera_figures(const SimRobot& robot, const CameraExtrinsicsEstima
   return f;
 }
 
+std::vector<std::string> names_of(JointSet joints) {
+  std::vector<std::string> names;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (joints.contains(n)) names.emplace_back(kJointNames[n]);
+  }
+  return names;
+}
+
+BusFigures bus_figures(const config::BusFile& file, BusRobot& robot, const Telemetry& telemetry) {
+  BusFigures f;
+  f.module_state = name_of(telemetry.module_state);
+  f.silent_joints = names_of(telemetry.drives.ever_silent);
+  f.error_joints = names_of(telemetry.drives.bus.drive_errors);
+  for (std::size_t i = 0; i < file.buses.size(); ++i) {
+    f.loads.emplace_back(file.buses[i], hal::bus_load(file.table, i));
+    f.sent += robot.bus(i).status().sent;
+    f.received += robot.bus(i).status().received;
+  }
+  return f;
+}
+
 // Of all lanes, by name; only what was raised.
 std::vector<std::pair<std::string, std::uint32_t>> raised(const Health& health) {
   std::vector<std::pair<std::string, std::uint32_t>> out;
@@ -182,21 +208,31 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   Params params = options.params;
   params.gait.planner.pattern = options.gait;
   params.self_filter = options.self_filter;
-  params.estimator.legs.infer_forces = options.infer_contacts;
+  params.estimator.legs.infer_forces = infers_contacts(options);
   params.estimate_mount = options.estimate_mount;
   if (options.camera) {
     params.surfaces.noise = options.camera->noise;
     params.surfaces.limits.min_depth_m = options.camera->min_depth_m;
     params.surfaces.limits.max_depth_m = options.camera->max_depth_m;
   }
+  std::optional<CandumpLog> can_log;
+  std::unique_ptr<BusRobot> bus;
+  if (options.bus) {
+    config::limit_by_drives(*options.bus, params.gait.joints, params.robot);
+    config::BusFile file = *options.bus;
+    if (options.infer_contacts) file.table.feet = {};
+    if (!options.can_log.empty()) can_log.emplace(options.can_log);
+    bus = std::make_unique<BusRobot>(robot, file, can_log ? &*can_log : nullptr);
+  }
+  hal::JointBus& joints = bus ? static_cast<hal::JointBus&>(bus->joints()) : robot;
   WatchedLidar lidar(robot);
   std::optional<ClimbRecorder> recorder;
-  if (options.save_inputs) recorder.emplace(robot, robot, robot, lidar);
+  if (options.save_inputs) recorder.emplace(robot, robot, joints, lidar);
   const auto module = std::make_unique<Module>();
   {
     const heap::ModuleCall call("Pipeline::Pipeline");
     module->pipeline.emplace(
-        recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{robot, robot, robot, lidar}, params);
+        recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{robot, robot, joints, lidar}, params);
     module->pipeline->watch(module->watched);
     module->tasks.emplace(*module->pipeline);
     module->executive.emplace(*module->tasks, robot, module->pipeline->lane_health(0));
@@ -210,7 +246,11 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   std::int64_t end_ns = -1;
   std::int64_t next_progress_ns = 0;
   while (seconds(robot.now_ns()) < options.time_limit_s) {
-    robot.advance();
+    if (bus) {
+      bus->advance();
+    } else {
+      robot.advance();
+    }
     {
       const heap::ModuleCall call("CyclicExecutive::tick");
       executive.tick(robot.now_ns());
@@ -233,6 +273,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   figures.options = options;
   figures.interrupted_by = options.interrupt != nullptr ? options.interrupt->load() : 0;
   figures.params_hash = config::hash_of(params);
+  if (bus) figures.bus = bus_figures(*options.bus, *bus, pipeline.telemetry(robot.now_ns(), module->watched));
   figures.camera = camera_figures(robot, pipeline.perception().mount());
   figures.heap_calls = heap::report().calls;
   figures.faults = raised(module->pipeline->health());
@@ -246,6 +287,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     try {
       write_climb_files(options.out_dir, report, summary);
       if (recorder) recorder->write(options.out_dir + "/inputs");
+      if (can_log) can_log->close();
     } catch (const std::runtime_error& error) {
       throw ClimbNotWritten(error.what(), summary);
     }

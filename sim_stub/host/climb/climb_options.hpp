@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "algorithms/gait/footsteps/climb_planner.hpp"
+#include "firmware/config/bus_file.hpp"
 #include "firmware/config/camera_file.hpp"
 #include "firmware/params.hpp"
 #include "sim_stub/camera/noise_kind.hpp"
@@ -50,6 +51,9 @@ struct ClimbOptions {
   Params params;
   std::string params_file;  // that they were read from
   bool estimate_mount = true;
+  // The joints are behind these buses, else wired directly. What the drives can do binds the module's robot.
+  std::optional<config::BusFile> bus;
+  std::string can_log;          // every frame on the buses, as candump -L writes it; empty: none
   bool infer_contacts = false;  // from joint torques: the feet have no force sensors
 };
 
