@@ -30,11 +30,12 @@ def guest_name(bus):
 
 
 def script(log, bus_file):
-    """The lines of the script. Of each drive the n-th command is tick n's, and its reply the next frame that names it."""
+    """The lines of the script. Of each drive the n-th command is tick n's, and its n-th reply the answer to it; the feet's
+    frame belongs to the tick of the last command before it, and one before all commands answers none."""
     drives, feet = drives_of(bus_file)
     commands = {key: [] for key in drives}
     replies = {key: [] for key in drives}
-    feet_frames = []
+    feet_frames = {}
     with open(log) as file:
         for number, line in enumerate(file, 1):
             match = FRAME.match(line)
@@ -44,7 +45,7 @@ def script(log, bus_file):
             if (bus, frame_id) in drives:
                 commands[bus, frame_id].append(data)
             elif feet == (bus, frame_id):
-                feet_frames.append(data)
+                feet_frames[max(map(len, commands.values())) - 1] = data
             else:
                 key = next((k for k, (reply_id, name, mask) in drives.items()
                             if k[0] == bus and reply_id == frame_id and data and int(data[:2], 16) & mask == name), None)
@@ -58,5 +59,5 @@ def script(log, bus_file):
         for (bus, frame_id), (reply_id, *_) in drives.items():
             yield f"{tick} expect {guest_name(bus)} {frame_id:03X}#{commands[bus, frame_id][tick]}"
             yield f"{tick} answer {guest_name(bus)} {reply_id:03X}#{replies[bus, frame_id][tick]}"
-        if tick < len(feet_frames):
+        if tick in feet_frames:
             yield f"{tick} say {guest_name(feet[0])} {feet[1]:03X}#{feet_frames[tick]}"
