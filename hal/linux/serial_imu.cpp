@@ -108,9 +108,9 @@ DeviceError SerialImu::set_line(int fd) noexcept {
 }
 
 bool SerialImu::try_read(ImuSample& sample) noexcept {
-  for (int i = 0; i < kMostReads && waiting_.empty() && owner_.is_open(); ++i) {
-    if (!read_some()) break;
-  }
+  // All that has arrived, so that the newest push out the oldest here: the kernel, once full, drops the newest.
+  bool more = waiting_.empty();
+  for (int i = 0; i < kMostReads && more && owner_.is_open(); ++i) more = read_some();
   return waiting_.try_pop(sample);
 }
 

@@ -21,6 +21,7 @@ struct PosixClockHarness {
     }
   }
 };
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(JointBusContract);  // of no driver: hal/can makes one of CAN channels
 INSTANTIATE_TYPED_TEST_SUITE_P(Posix, ClockContract, PosixClockHarness);
 
 }  // namespace contract

@@ -14,6 +14,7 @@
 #include <type_traits>
 
 #include "hal/linux/system/system_calls.hpp"
+#include "sim_stub/heap_trap.hpp"
 
 namespace polygmap::test {
 
@@ -49,7 +50,8 @@ class ScriptedCalls {
   }
   // The same of call number nth (from 0) of any kind.
   void fail_any(std::size_t nth, int error_number) { any_ = {error_number, nth, nth + 1}; }
-  std::function<void(mmsghdr*, int)> after_recvmmsg;  // may change what arrived
+  std::function<void(mmsghdr*, int)> after_recvmmsg;              // may change what arrived
+  std::function<void(unsigned long request, void*)> after_ioctl;  // of one that succeeded
   std::size_t most_read_bytes = std::numeric_limits<std::size_t>::max();
 
   [[nodiscard]] const hal::SystemCalls& table() const;
@@ -82,6 +84,7 @@ class ScriptedCalls {
   }
   template <Call kCall, auto kMember, typename R, typename... A>
   static R forward(A... a) noexcept {
+    const heap::HostCall host;  // a device made up by a test may use the heap
     ScriptedCalls& self = *active();
     // A close that fails has closed; an unmap has not failed before.
     const bool failing = self.fails(kCall);
@@ -120,7 +123,14 @@ inline const hal::SystemCalls& ScriptedCalls::table() const {
   static constexpr S kTable{
       .open = forwarder<Call::kOpen, &S::open>(&S::open),
       .close = forwarder<Call::kClose, &S::close>(&S::close),
-      .ioctl = forwarder<Call::kIoctl, &S::ioctl>(&S::ioctl),
+      .ioctl =
+          [](int fd, unsigned long request, void* argument) noexcept {
+            const int answer = forward<Call::kIoctl, &S::ioctl, int>(fd, request, argument);
+            const int error_number = errno;
+            const heap::HostCall host;
+            if (answer == 0 && active()->after_ioctl) active()->after_ioctl(request, argument);
+            return errno = error_number, answer;
+          },
       .read =
           [](int fd, void* buffer, std::size_t size) noexcept {
             return forward<Call::kRead, &S::read, ssize_t>(fd, buffer, std::min(size, active()->most_read_bytes));
@@ -133,6 +143,7 @@ inline const hal::SystemCalls& ScriptedCalls::table() const {
       .recvmmsg =
           [](int fd, mmsghdr* messages, unsigned count, int flags) noexcept {
             const int n = forward<Call::kRecvmmsg, &S::recvmmsg, int>(fd, messages, count, flags);
+            const heap::HostCall host;
             if (n > 0 && active()->after_recvmmsg) active()->after_recvmmsg(messages, n);
             return n;
           },
