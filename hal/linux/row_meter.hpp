@@ -29,7 +29,8 @@ struct InstructionStatistics {
 // count has the executive's own few instructions of that row in it. On the lane's thread only.
 // A job is what a row does from its first busy call to its kDone. Rows that hand a picture on in table order (surfaces,
 // map, footholds) are a chain: a picture's count is that of its jobs in all of them.
-template <typename Tasks, std::size_t Rows>
+// Counter: read() and read_cost(), as InstructionCounter has them.
+template <typename Tasks, std::size_t Rows, typename Counter = InstructionCounter>
 class RowMeter {
  public:
   // Bit r of a mask: row r.
@@ -37,13 +38,13 @@ class RowMeter {
       : tasks_(tasks), control_rows_(control_rows), chain_rows_(chain_rows) {}
 
   // The counter of this thread, started; before that rows are run and not counted.
-  void count_with(const InstructionCounter& counter) noexcept { counter_ = &counter; }
+  void count_with(const Counter& counter) noexcept { counter_ = &counter; }
 
   // Before the tick, so that the cycle's count has the way to its first row in it.
   void begin_cycle() noexcept {
     if (counter_ == nullptr) return;
     begin_ = last_ = counter_->read();
-    reads_ = 1;
+    reads_ = 0;
     control_ = 0;
     row_ = Rows;
   }
@@ -117,9 +118,10 @@ class RowMeter {
 
   Tasks& tasks_;
   std::uint32_t control_rows_, chain_rows_;
-  const InstructionCounter* counter_ = nullptr;
+  const Counter* counter_ = nullptr;
   InstructionCount begin_, last_;
-  std::uint64_t reads_ = 0, control_ = 0;
+  std::uint64_t reads_ = 0;  // since begin_; each costs from one to the next
+  std::uint64_t control_ = 0;
   std::size_t row_ = Rows;  // the one that ran last; Rows: none
   Progress progress_ = Progress::kIdle;
   std::array<InstructionStatistics, Rows> rows_{}, jobs_{};
