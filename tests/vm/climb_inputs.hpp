@@ -59,6 +59,7 @@ void visit_fields(Visit& visit, TickInputs& t) {
     visit_vector(visit, t.joints.dq_radps);
     visit_vector(visit, t.joints.tau_nm);
     visit_vector(visit, t.joints.foot_force_n);
+    visit_vector(visit, t.joints.silent_cycles);
   }
   visit(t.has_lio);
   if (t.has_lio != 0) {

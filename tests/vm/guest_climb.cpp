@@ -23,9 +23,12 @@
 #include <string>
 #include <string_view>
 
+#include "firmware/config/bus_file.hpp"
 #include "firmware/schedule.hpp"
+#include "hal/can/can_joint_bus.hpp"
 #include "hal/linux/instruction_counter.hpp"
 #include "hal/linux/row_meter.hpp"
+#include "hal/linux/socket_can.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "tests/vm/lane_thread.hpp"
 #include "tests/vm/replayed_robot.hpp"
@@ -41,6 +44,7 @@ struct Injection {
 };
 struct Options {
   std::string folder;
+  std::string bus;  // a bus file: the joints are behind the guest's CAN buses
   std::size_t lanes = 1;
   bool real_time = true;
   unsigned steps = 0;  // 0: not judged
@@ -121,6 +125,27 @@ constexpr std::uint32_t resumable_rows() noexcept {
   return mask;
 }
 
+// The drives' buses: can0 of the file is vcan0 here.
+class Wires {
+ public:
+  explicit Wires(const config::BusFile& file) {
+    for (std::size_t bus = 0; bus < file.buses.size(); ++bus) {
+      hal::SocketCan::Config config;
+      config.interface = "v" + file.buses[bus];
+      const hal::DeviceError error = sockets_[bus].open(config);
+      if (error.failed()) std::fprintf(stderr, "guest_climb: %s\n", error.sentence());
+      channels_.push_back(&sockets_[bus]);
+    }
+    joints_.emplace(file.table, channels_);
+  }
+  [[nodiscard]] hal::CanJointBus& joints() noexcept { return *joints_; }
+
+ private:
+  std::array<hal::SocketCan, hal::kMaxBuses> sockets_;
+  std::vector<hal::CanChannel*> channels_;
+  std::optional<hal::CanJointBus> joints_;
+};
+
 // What one lane's thread sees.
 struct LaneFigures {
   Meter meter;
@@ -138,13 +163,21 @@ struct Climb {
   ReplayedSensors sensors;
   ReplayedCamera camera;
   std::array<ReplayClock, kLaneCount> clocks{};
+  std::unique_ptr<Wires> wires;
   std::unique_ptr<Pipeline> pipeline;
   std::unique_ptr<InjectedPipeline> tasks;
   std::array<std::unique_ptr<LaneFigures>, kLaneCount> lanes;
 
   Climb(const Options& asked, const Recording& recorded)
       : options(asked), recording(recorded), sensors(recorded), camera(recorded) {
-    pipeline = std::make_unique<Pipeline>(Ports{camera, sensors, sensors, sensors}, Params{});
+    Params params;
+    if (!asked.bus.empty()) {
+      const config::BusFile file = config::read_bus(asked.bus);
+      config::limit_by_drives(file, params.gait.joints, params.robot);
+      wires = std::make_unique<Wires>(file);
+      sensors.connect(wires->joints());
+    }
+    pipeline = std::make_unique<Pipeline>(Ports{camera, sensors, sensors, sensors}, params);
     tasks = std::make_unique<InjectedPipeline>(*pipeline, asked.injection, first_ns());
     for (auto& lane : lanes) lane = std::make_unique<LaneFigures>(*tasks);
   }
@@ -368,6 +401,8 @@ Options parse(int argc, char** argv) {
       options.lanes = value == "2" ? 2 : 1;
     } else if (key == "--clock" && (value == "real" || value == "virtual")) {
       options.real_time = value == "real";
+    } else if (key == "--bus") {
+      options.bus = value;
     } else if (key == "--steps") {
       options.steps = static_cast<unsigned>(std::strtoul(argv[i + 1], nullptr, 10));
     } else if (key == "--inject") {

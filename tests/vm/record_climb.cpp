@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// record_climb FOLDER [SEED [STEPS [ds|ss]]]: climbs in the simulation, kinematic plant, and leaves in FOLDER what the
-// sensors said and what the module commanded (inputs.bin) and every picture that the module took (pictures.bin).
+// record_climb FOLDER [SEED [STEPS [ds|ss [BUS_FILE]]]]: climbs in the simulation, kinematic plant, and leaves in
+// FOLDER what the sensors said and what the module commanded (inputs.bin), every picture that the module took
+// (pictures.bin) and, with a bus file, every frame on the drives' buses (can.log).
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -8,7 +9,10 @@
 #include <optional>
 #include <string>
 
+#include "firmware/config/bus_file.hpp"
 #include "firmware/schedule.hpp"
+#include "sim_stub/bus/bus_robot.hpp"
+#include "sim_stub/bus/candump_log.hpp"
 #include "sim_stub/sim_robot.hpp"
 #include "tests/vm/climb_inputs.hpp"
 
@@ -18,8 +22,8 @@ namespace {
 // Stands between the simulated robot and the module.
 class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::JointBus, public hal::LidarOdometry {
  public:
-  Recorder(sim::SimRobot& robot, const std::string& folder)
-      : robot_(robot), pictures_(folder + "/pictures.bin", std::ios::binary) {
+  Recorder(sim::SimRobot& robot, hal::JointBus& joints, const std::string& folder)
+      : robot_(robot), joints_(joints), pictures_(folder + "/pictures.bin", std::ios::binary) {
     CameraIntrinsics intrinsics = robot.intrinsics();
     writer_(kInputsMagic);
     visit_fields(writer_, intrinsics);
@@ -44,16 +48,17 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
     return true;
   }
   [[nodiscard]] bool try_read(JointFeedback& feedback) noexcept override {
-    if (!static_cast<hal::JointBus&>(robot_).try_read(feedback)) return false;
+    if (!joints_.try_read(feedback)) return false;
     tick_.has_joints = 1;
     tick_.joints = feedback;
     return true;
   }
-  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override {
+  [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override {
     tick_.has_command = 1;
     tick_.command = command;
-    return static_cast<hal::JointBus&>(robot_).try_write(command);
+    return joints_.try_write(command);
   }
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override { return joints_.status(); }
   [[nodiscard]] bool try_read(LioSample& sample) noexcept override {
     if (tick_.has_lio != 0 || !static_cast<hal::LidarOdometry&>(robot_).try_read(sample)) return false;
     tick_.has_lio = 1;
@@ -74,12 +79,13 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
 
  private:
   sim::SimRobot& robot_;
+  hal::JointBus& joints_;
   std::ofstream pictures_;
   Writer writer_;
   TickInputs tick_;
 };
 
-int record(const std::string& folder, std::uint64_t seed, int steps, bool single_step) {
+int record(const std::string& folder, std::uint64_t seed, int steps, bool single_step, const std::string& bus_path) {
   constexpr std::int64_t kLongest_ticks = 100'000;
   sim::SimOptions options;
   options.seed = seed;
@@ -87,18 +93,26 @@ int record(const std::string& folder, std::uint64_t seed, int steps, bool single
   sim::SimRobot robot(options);
   Params params;
   if (single_step) params.gait.planner.pattern = GaitPattern::kSingleStep;
-  Recorder recorder(robot, folder);
+  std::optional<sim::CandumpLog> log;
+  std::unique_ptr<sim::BusRobot> bus;
+  if (!bus_path.empty()) {
+    const config::BusFile file = config::read_bus(bus_path);
+    config::limit_by_drives(file, params.gait.joints, params.robot);
+    bus = std::make_unique<sim::BusRobot>(robot, file, &log.emplace(folder + "/can.log"));
+  }
+  Recorder recorder(robot, bus ? static_cast<hal::JointBus&>(bus->joints()) : robot, folder);
   const auto pipeline = std::make_unique<Pipeline>(Ports{recorder, recorder, recorder, recorder}, params);
   OneLaneExecutive<> executive(*pipeline, robot, pipeline->lane_health(0));
   executive.start(robot.now_ns() + kCycle_ns);
   const GaitStatus& gait = pipeline->control().gait_status();
   std::int64_t ticks = 0;
   while (ticks < kLongest_ticks && gait.phase != GaitPhase::kFinished && gait.phase != GaitPhase::kStopped) {
-    robot.advance();
+    bus ? bus->advance() : robot.advance();
     executive.tick(robot.now_ns());
     recorder.end_tick();
     ++ticks;
   }
+  if (log) log->close();
   std::printf("recorded %lld ticks, %u steps climbed\n", static_cast<long long>(ticks), gait.treads_climbed);
   return recorder.write(folder) && gait.phase == GaitPhase::kFinished ? 0 : 1;
 }
@@ -107,8 +121,8 @@ int record(const std::string& folder, std::uint64_t seed, int steps, bool single
 }  // namespace polygmap::vm
 
 int main(int argc, char** argv) {
-  if (argc < 2) return std::puts("record_climb FOLDER [SEED [STEPS [ds|ss]]]"), 2;
+  if (argc < 2) return std::puts("record_climb FOLDER [SEED [STEPS [ds|ss [BUS_FILE]]]]"), 2;
   const std::string gait = argc > 4 ? argv[4] : "ds";
   return polygmap::vm::record(argv[1], argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1,
-                              argc > 3 ? std::atoi(argv[3]) : 4, gait == "ss");
+                              argc > 3 ? std::atoi(argv[3]) : 4, gait == "ss", argc > 5 ? argv[5] : "");
 }

@@ -47,6 +47,8 @@ struct Recording {
 class ReplayedSensors final : public hal::Imu, public hal::JointBus, public hal::LidarOdometry {
  public:
   explicit ReplayedSensors(const Recording& recording) noexcept : ticks_(recording.ticks) {}
+  // The joints are behind these wires instead; what is commanded is compared all the same.
+  void connect(hal::JointBus& wires) noexcept { wires_ = &wires; }
 
   // What has arrived until now_ns can be read from now on.
   void advance(std::int64_t now_ns) noexcept {
@@ -63,6 +65,7 @@ class ReplayedSensors final : public hal::Imu, public hal::JointBus, public hal:
     return false;
   }
   [[nodiscard]] bool try_read(JointFeedback& feedback) noexcept override {
+    if (wires_ != nullptr) return wires_->try_read(feedback);
     if (next_ == joint_tick_ || silent_) return false;
     joint_tick_ = next_;
     if (ticks_[next_ - 1].has_joints == 0) return false;
@@ -78,7 +81,7 @@ class ReplayedSensors final : public hal::Imu, public hal::JointBus, public hal:
     return false;
   }
   // A frame is a joint's command; it differs when a bit of it does, and when it was made in another tick.
-  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override {
+  [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override {
     frames_ += kJointCount;
     while (compared_ < ticks_.size() && ticks_[compared_].command.stamp_ns < command.stamp_ns) ++compared_;
     const bool known = compared_ < ticks_.size() && ticks_[compared_].has_command != 0 &&
@@ -90,7 +93,10 @@ class ReplayedSensors final : public hal::Imu, public hal::JointBus, public hal:
       if (known)
         far_rad_ = std::max(far_rad_, std::abs(command.joints[j].q_rad - ticks_[compared_].command.joints[j].q_rad));
     }
-    return true;
+    return wires_ != nullptr ? wires_->try_write(command) : JointSet::all();
+  }
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override {
+    return wires_ != nullptr ? wires_->status() : hal::JointBusStatus{};
   }
 
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
@@ -110,6 +116,7 @@ class ReplayedSensors final : public hal::Imu, public hal::JointBus, public hal:
   std::size_t next_ = 0;  // ticks before it have come
   std::size_t imu_tick_ = 0, imu_ = 0, joint_tick_ = 0, lio_tick_ = 0, compared_ = 0;
   bool silent_ = false;
+  hal::JointBus* wires_ = nullptr;
   std::uint64_t frames_ = 0, differ_ = 0;
   std::int64_t first_difference_ns_ = -1;
   double far_rad_ = 0.0;
