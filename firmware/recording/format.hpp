@@ -6,7 +6,8 @@
 //   entries,
 //     parameters: name, kind (u8), count (u32), values (bool, i32, u32, i64, f64, choice u8)
 //     rows of the schedule: task, lane (u8), slots (u16), budget_us (i32), unit_cost_ns (i32), shed_order (u8)
-//     the camera's intrinsics, and the gains that each drive can take at most. A name is a u16 length and the characters.
+//     the camera's intrinsics, and the gains that each drive can take at most. A name is a u16 length and the
+//     characters.
 //   record: kind (u8), length of the rest (u32), then by kind
 //     row        a call of a schedule's row: row (u8), cycle_ns (i64), units (i32), frame of the other lane that had
 //     been

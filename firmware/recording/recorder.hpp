@@ -79,7 +79,7 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
   Ports robot_;
   Pipeline* pipeline_ = nullptr;
   mutable std::array<LaneLog, kLaneCount> logs_;  // a const port call is recorded, too
-  std::vector<std::uint16_t> pixels_;  // of kPicturesPerFlush pictures
+  std::vector<std::uint16_t> pixels_;             // of kPicturesPerFlush pictures
   std::size_t picture_px_ = 0;
   std::size_t pictures_waiting_ = 0;
   std::uint32_t pictures_ = 0;

@@ -274,7 +274,8 @@ bool RecordingFile::read_gain_limits() {
   FieldReader reader(in_);
   walk(reader, "gain_limits", limits);
   for (const GainLimits& most : limits) {
-    if (!(most.kp_nmprad >= 0.0 && most.kd_nmsprad >= 0.0)) return complain("a drive's gains are below 0 or no numbers");
+    if (!(most.kp_nmprad >= 0.0 && most.kd_nmsprad >= 0.0))
+      return complain("a drive's gains are below 0 or no numbers");
   }
   return true;
 }

@@ -48,7 +48,7 @@ class FakeRobot {
   bool imu_speaks = true;
   bool joints_speak = true;
   bool camera_speaks = true;
-  int picture_ticks = kSlowMachine ? 48 : 16;            // from one picture to the next
+  int picture_ticks = kSlowMachine ? 48 : 16;  // from one picture to the next
   std::size_t silent_joint = kJointCount;  // whose drive follows its commands and does not answer; kJointCount: none
   JointVector encoder_offset_rad = JointVector::Zero();  // reading minus true angle
 
