@@ -84,7 +84,8 @@ class Walk {
   static void of(T& object, const std::string& name) {
     Walk walk(name);
     T::visit(object, walk);
-    EXPECT_EQ(walk.names_.size(), field_count<T>() + kInherited<T> - kFromDrives<T>) << name << " has other fields than its list";
+    EXPECT_EQ(walk.names_.size(), field_count<T>() + kInherited<T> - kFromDrives<T>)
+        << name << " has other fields than its list";
   }
 
  private:

@@ -150,10 +150,10 @@ TEST_F(PerceiveCommand, Picture_EveryNosingIsRedFromEndToEnd) {
   test::add_noise(picture, {}, 3);
   write_depth("stairs.png", picture.raw(), 640, 480);
   const Vec3 down = -scene_.camera_up();
-  ASSERT_EQ(call({"perceive", "--gravity", std::to_string(down.x()), std::to_string(down.y()), std::to_string(down.z()),
-                  at("stairs.png"), "--camera", at("camera.toml"), "--json", at("out.json"), "--picture",
-                  at("pic.png")}),
-            kExitPass);
+  ASSERT_EQ(
+      call({"perceive", "--gravity", std::to_string(down.x()), std::to_string(down.y()), std::to_string(down.z()),
+            at("stairs.png"), "--camera", at("camera.toml"), "--json", at("out.json"), "--picture", at("pic.png")}),
+      kExitPass);
   std::vector<unsigned char> rgb;
   unsigned width = 0, height = 0;
   ASSERT_EQ(lodepng::decode(rgb, width, height, at("pic.png"), LCT_RGB, 8), 0U);
