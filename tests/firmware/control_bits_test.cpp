@@ -199,11 +199,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 15356745916766467853U);
-  EXPECT_EQ(hashes.gait.value(), 15698759557443570742U);
-  EXPECT_EQ(hashes.commands.value(), 10359067674599635270U);
-  EXPECT_EQ(hashes.surfaces.value(), 12594188397104333009U);
-  EXPECT_EQ(hashes.map.value(), 12629239578603678512U);
+  EXPECT_EQ(hashes.estimates.value(), 15429244129980333228U);
+  EXPECT_EQ(hashes.gait.value(), 14232963561099995806U);
+  EXPECT_EQ(hashes.commands.value(), 8765782980090594165U);
+  EXPECT_EQ(hashes.surfaces.value(), 16086980474125418950U);
+  EXPECT_EQ(hashes.map.value(), 4944774193879360795U);
 }
 
 }  // namespace

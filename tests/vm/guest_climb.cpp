@@ -94,6 +94,7 @@ class InjectedPipeline {
     if (cycle_ns == at_ns_) inject(row);
     return pipeline_.run_row(row, cycle_ns, budget);
   }
+  void cycle_done(std::size_t lane, const CycleReport& report) noexcept { pipeline_.cycle_done(lane, report); }
 
  private:
   void inject(std::size_t row) noexcept {
