@@ -74,9 +74,7 @@ class BufferBook {
     bool any = false;
     Entry entry{};
   };
-  [[nodiscard]] constexpr Held& held_by(Holder holder) noexcept {
-    return held_[static_cast<std::size_t>(holder)];
-  }
+  [[nodiscard]] constexpr Held& held_by(Holder holder) noexcept { return held_[static_cast<std::size_t>(holder)]; }
 
   std::size_t most_waiting_ = 1;
   RingBuffer<Entry, kMostBuffers> waiting_;
