@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// guest_climb FOLDER [--lanes 1|2] [--clock real|virtual] [--steps N] [--inject WHAT@S]...: runs the module in the
-// guest on a recorded climb (record_climb), 500 times a second under SCHED_FIFO, counts what it takes, compares what it
-// commands, and prints it all, the line RESULT last.
+// guest_climb FOLDER [--lanes 1|2] [--clock real|virtual] [--gait ds|ss] [--steps N] [--inject WHAT@S]...: runs the
+// module in the guest on a recorded climb (record_climb), 500 times a second under SCHED_FIFO, counts what it takes,
+// compares what it commands, and prints it all, the line RESULT last.
 // --clock virtual: tick after tick without waiting, time stands still within one; nothing is late then and no slot is
 // given up, so that every row's work is counted whatever it takes.
 // WHAT: allocate (a heap call inside the module), overrun=ROW (that row takes 3 ms), gap=MS (IMU and joints are
@@ -47,6 +47,7 @@ struct Options {
   std::string bus;  // a bus file: the joints are behind the guest's CAN buses
   std::size_t lanes = 1;
   bool real_time = true;
+  GaitPattern gait = GaitPattern::kDoubleStep;
   unsigned steps = 0;  // 0: not judged
   Injection injection;
 };
@@ -172,6 +173,7 @@ struct Climb {
   Climb(const Options& asked, const Recording& recorded)
       : options(asked), recording(recorded), sensors(recorded), camera(recorded) {
     Params params;
+    params.gait.planner.pattern = asked.gait;
     if (!asked.bus.empty()) {
       const config::BusFile file = config::read_bus(asked.bus);
       config::limit_by_drives(file, params.gait.joints, params.robot);
@@ -394,7 +396,7 @@ Injection parse_injection(const std::string& text) {
 Options parse(int argc, char** argv) {
   Options options;
   if (argc < 2 || argc % 2 != 0)
-    refuse("usage: FOLDER [--lanes 1|2] [--clock real|virtual] [--steps N] [--inject WHAT@S]");
+    refuse("usage: FOLDER [--lanes 1|2] [--clock real|virtual] [--gait ds|ss] [--steps N] [--inject WHAT@S]");
   options.folder = argv[1];
   for (int i = 2; i + 1 < argc; i += 2) {
     const std::string_view key = argv[i], value = argv[i + 1];
@@ -404,6 +406,8 @@ Options parse(int argc, char** argv) {
       options.real_time = value == "real";
     } else if (key == "--bus") {
       options.bus = value;
+    } else if (key == "--gait" && (value == "ds" || value == "ss")) {
+      options.gait = value == "ss" ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
     } else if (key == "--steps") {
       options.steps = static_cast<unsigned>(std::strtoul(argv[i + 1], nullptr, 10));
     } else if (key == "--inject") {
