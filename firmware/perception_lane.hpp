@@ -4,6 +4,7 @@
 
 #include "algorithms/core/work.hpp"
 #include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
+#include "algorithms/perception/extrinsics/toe_detector.hpp"
 #include "firmware/lane_link.hpp"
 #include "firmware/params.hpp"
 #include "hal/ports/depth_camera.hpp"
@@ -30,11 +31,14 @@ class PerceptionLane {
   [[nodiscard]] const Health& faults() const noexcept { return health_.own; }  // of this lane
 
  private:
-  enum class FrameStage : std::uint8_t { kWaiting, kPoseAsked, kExtracting };
+  enum class FrameStage : std::uint8_t { kWaiting, kPoseAsked, kExtracting, kLearning };
 
   void begin_extraction(std::int64_t now_ns) noexcept;
   void begin_map(std::int64_t now_ns) noexcept;
-  void learn_mount() noexcept;
+  void begin_learning() noexcept;
+  void begin_toe() noexcept;
+  [[nodiscard]] bool learn_some(WorkBudget& budget) noexcept;  // of the mount; true when the picture says no more
+  void finish_picture(std::int64_t now_ns) noexcept;
   void begin_search() noexcept;
 
   hal::DepthCamera& camera_port_;
@@ -56,6 +60,11 @@ class PerceptionLane {
   std::uint32_t request_ = 0;                 // number of the last pose request
   SurfaceExtractor extractor_;
   CameraExtrinsicsEstimator mount_;
+  struct {  // what the picture says of the mount
+    CameraExtrinsicsEstimator::Stance stance;
+    ToeDetector toe;
+    std::size_t foot = 0;  // whose toe it is
+  } learning_;
   PolygonMap map_;
   FootholdSearch search_;
 };

@@ -51,6 +51,7 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
   const Wide zero = all(0.0F), end = all(static_cast<float>(Axis::kBins)), none = end;
   const float *ws = image.by_column.row(column), *ys = rays.y.data();
   const auto add_stretch = [&](std::int32_t first, std::int32_t last) {
+    work_.add(20 + 175 * (std::max(last - first + kAtOnce, 0) / kAtOnce));
     for (std::int32_t from = first; from <= last; from += kAtOnce) {
       const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce), until = std::min(last + 1 - start, kAtOnce);
       std::array<std::int32_t, kAtOnce> level_bins, upright_bins;
@@ -75,6 +76,8 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
     add_stretch(first, until);
     add_stretch(std::max(until + 1, last - kRemainderReach_px + 1), last);
   };
+  work_.add(90);
+  work_.add(spans.size(), 14);
   std::int32_t next = 0;
   for (const ColumnSpan& span : spans) {
     if (released_[span.plane]) continue;
@@ -94,6 +97,7 @@ void ResidualPlaneSearch::find(Axis& axis) noexcept {
   constexpr std::int32_t kPeak = 1;  // bins to each side that belong to a peak, see peak_at
   const std::int32_t around_bins = params_.around_bins, first = around_bins, end = Axis::kBins - around_bins;
   for (int guard = 0; guard < 4; ++guard) {
+    work_.add(Axis::kBins, 4);
     // The largest peak, the first of those.
     using Wide = cv::v_int32;
     const auto load = [&axis](std::int32_t b) { return cv::vx_load(axis.rows.data() + b); };
@@ -128,6 +132,7 @@ void ResidualPlaneSearch::find(Axis& axis) noexcept {
 }
 
 void ResidualPlaneSearch::finish() noexcept {
+  work_.add(known_.size(), 160);
   // What lies near a known plane is that plane, seen past a leg or through a hole.
   for (const InversePlane& known : known_) {
     for (Axis* axis : {&level_, &upright_}) {

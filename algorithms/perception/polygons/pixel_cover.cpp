@@ -36,6 +36,7 @@ template <typename Visit>
 void PixelCover::for_each_pixel(const Outline2& polygon, const Visit& visit) const noexcept {
   const std::size_t n = polygon.size();
   for (std::int32_t g = kColumnStride / 2; g < picture_.column_rays.columns; g += kColumnStride) {
+    work_.add(45 + 13 * static_cast<std::int32_t>(n));
     const double x = middle_px(g);
     double top = 1e9, bottom = -1e9;  // where two edges of the convex polygon cross the column
     for (std::size_t i = 0; i < n; ++i) {
@@ -49,6 +50,7 @@ void PixelCover::for_each_pixel(const Outline2& polygon, const Visit& visit) con
     const double first = std::max(2.0 * top + 0.5, 0.0) / kRowStride;
     if (!(first * kRowStride <= last)) continue;
     for (auto r = kRowStride * static_cast<std::int32_t>(std::ceil(first)); r <= last; r += kRowStride) {
+      work_.add(58);
       const Owner owner = owner_of(g, r);
       if (owner != Owner::kNobody) visit(g, r, owner == Owner::kOwn);
     }
@@ -78,22 +80,24 @@ std::int32_t PixelCover::worth_beyond(const Outline2& polygon, const Vec3& line)
   return worth;
 }
 
-bool PixelCover::try_best_cut(const Outline2& polygon, Vec3& line) const noexcept {
+void PixelCover::begin_cut(const Outline2& polygon, Cut& cut) const noexcept {
+  cut = Cut{};
+  work_.add(1500);
   // What a pixel is worth: its own are to be kept, the others to be cut off.
   std::array<std::int32_t, kGridColumns> by_column{};
   std::array<std::int32_t, kGridRows + 1> by_row{};
-  std::array<std::int32_t, Regions::kMaxRegions + 1> votes{};
   const std::int32_t foreign_worth = -params_.foreign_cost;
-  std::int32_t total = 0;
+  std::int32_t& total = cut.total;
   for_each_pixel(polygon, [&](std::int32_t g, std::int32_t r, bool own) {
     const std::int32_t worth = own ? 1 : foreign_worth;
     by_column[static_cast<std::size_t>(g / kColumnStride)] += worth;
     by_row[static_cast<std::size_t>(r / kRowStride)] += worth;
     total += worth;
-    if (!own) ++votes[regions_.labels.at(g, r)];
+    if (!own) ++cut.votes[regions_.labels.at(g, r)];
   });
-  votes[kNoRegion] = 0;
-  std::int32_t best = total;
+  cut.votes[kNoRegion] = 0;
+  std::int32_t& best = cut.best = total;
+  Vec3& line = cut.line;
   // Columns from .. on the right, or up to the one before on the left; the same for rows.
   const auto scan = [&](const auto& sums, const auto& line_before) {
     std::int32_t before = 0;
@@ -111,16 +115,19 @@ bool PixelCover::try_best_cut(const Outline2& polygon, Vec3& line) const noexcep
   scan(by_row, [&](std::int32_t i) {
     return Vec3{0.0, 1.0, -(half_row(kRowStride * i) - 0.25 * kRowStride - rays.cy_px) / rays.fy_px};
   });
-  for (std::int32_t k = 0; k < params_.neighbours; ++k) {
-    const auto most = std::max_element(votes.begin(), votes.end());
-    if (*most == 0) break;
-    *most = 0;
-    const Vec3 meeting = regions_[id_].plane.m - regions_[static_cast<std::size_t>(most - votes.begin())].plane.m;
-    const std::int32_t positive = worth_beyond(polygon, meeting);
-    if (positive > best) best = positive, line = meeting;
-    if (total - positive > best) best = total - positive, line = -meeting;
-  }
-  return best > total;
+}
+
+bool PixelCover::try_neighbour(const Outline2& polygon, Cut& cut) const noexcept {
+  work_.add(cut.votes.size(), 4);
+  const auto most = std::max_element(cut.votes.begin(), cut.votes.end());
+  if (*most == 0 || cut.tried == params_.neighbours) return false;
+  ++cut.tried;
+  *most = 0;
+  const Vec3 meeting = regions_[id_].plane.m - regions_[static_cast<std::size_t>(most - cut.votes.begin())].plane.m;
+  const std::int32_t positive = worth_beyond(polygon, meeting);
+  if (positive > cut.best) cut.best = positive, cut.line = meeting;
+  if (cut.total - positive > cut.best) cut.best = cut.total - positive, cut.line = -meeting;
+  return true;
 }
 
 }  // namespace polygmap

@@ -88,6 +88,7 @@ void ScanlineSegmentation::add_rows(std::int32_t first, std::int32_t last) noexc
   if (count == 0) return;
   for (std::int32_t row = first; row <= last; ++row) {
     static_assert(64 % kGroup == 0);
+    work_.add(count, 195);
     std::array<std::uint64_t, (kColumns + 63) / 64> events{};
     for (std::size_t i = 0; i < count; ++i) {
       const std::int32_t column = singly[i];
@@ -95,6 +96,7 @@ void ScanlineSegmentation::add_rows(std::int32_t first, std::int32_t last) noexc
     }
     for (std::size_t i = 0; i < events.size(); ++i) {
       for (std::uint64_t left = events[i]; left != 0; left &= left - 1) {
+        work_.add(240);
         handle(static_cast<std::int32_t>(64 * i) + std::countr_zero(left), row);
       }
     }
@@ -169,6 +171,10 @@ std::uint32_t ScanlineSegmentation::try_blocks(const Wides& c, std::int32_t colu
   static_assert(kBlockColumns == 2 * Wide::nlanes && (kOneGroup || kGroup == Wide::nlanes));
   Block a(c, open_, column), b(c, open_, column + Wide::nlanes);
   const bool any_a = a.may_go_on(), any_b = b.may_go_on();
+  constexpr std::int32_t kTriedInstructions = 545, kLeftInstructions = 90;
+  const auto price = [](bool tried) { return tried ? kTriedInstructions : kLeftInstructions; };
+  work_.add(price(kOneGroup ? any_a && any_b : any_a));
+  if (!kOneGroup && column + kGroup < column_count_) work_.add(price(any_b));
   if (kOneGroup ? !any_a || !any_b : !any_a && !any_b) return 0;
   const Wide to_centre = all(cy_ - static_cast<float>(row));
   a.begin(open_, to_centre), b.begin(open_, to_centre);
@@ -336,6 +342,7 @@ void ScanlineSegmentation::close(std::int32_t column, std::int32_t bottom, std::
 }
 
 void ScanlineSegmentation::finish() noexcept {
+  work_.add(column_count_, 60);
   for (std::int32_t g = 0; g < column_count_; ++g) {
     close(g, last_accepted(g, height_px_ - 1), height_px_ - 1);
   }
