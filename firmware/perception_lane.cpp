@@ -11,8 +11,8 @@ constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers w
 
 // In instructions, by what they copy and go through.
 constexpr std::int32_t kLearnMount = 2500, kLearnPerSurface = 60;
-constexpr std::int32_t kBeginMap = 2000, kMapPerSurface = 60;
-constexpr std::int32_t kBeginSearch = 1500, kSearchPerPolygon = 60;
+constexpr std::int32_t kBeginMap = 16'000, kMapPerSurface = 60;
+constexpr std::int32_t kBeginSearch = 16'000, kSearchPerPolygon = 20;
 
 }  // namespace
 
@@ -135,7 +135,7 @@ void PerceptionLane::begin_toe() noexcept {
   RawRange range;
   range.set(params_.surfaces.limits, intrinsics_.depth_unit_m);
   learning_.toe.begin(params_.mount.toe, frame_, intrinsics_, range, params_.robot.sole,
-             mount_.base_T_camera().inverse() * learning_.stance.base_T_sole[learning_.foot]);
+                      mount_.base_T_camera().inverse() * learning_.stance.base_T_sole[learning_.foot]);
 }
 
 bool PerceptionLane::learn_some(WorkBudget& budget) noexcept {

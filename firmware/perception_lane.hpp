@@ -28,6 +28,8 @@ class PerceptionLane {
   [[nodiscard]] const MapSnapshot& map_snapshot() const noexcept { return map_.snapshot(); }
   [[nodiscard]] const CameraExtrinsicsEstimator& mount() const noexcept { return mount_; }
   [[nodiscard]] const SurfaceExtractor& extractor() const noexcept { return extractor_; }
+  [[nodiscard]] const PolygonMap& polygon_map() const noexcept { return map_; }
+  [[nodiscard]] const FootholdSearch& foothold_search() const noexcept { return search_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_.own; }  // of this lane
 
  private:

@@ -38,7 +38,8 @@ struct ScheduleRow {
   std::int32_t unit_cost_ns = 0;  // of one work unit, as measured; 0: the row is not resumable
   std::uint8_t shed_order = 0;    // 1 is shed first, then 2, ...; 0 is never shed (control, gait, health)
   bool takes_leftover = false;    // spends also what the lane's resumable row before it left of this cycle
-  std::int32_t instructions = 0;  // of the processor per slot, at most, as measured; a resumable row's follow from units
+  std::int32_t instructions =
+      0;  // of the processor per slot, at most, as measured; a resumable row's follow from units
 
   [[nodiscard]] constexpr bool resumable() const noexcept { return unit_cost_ns > 0; }
   [[nodiscard]] constexpr bool runs_in(std::size_t slot) const noexcept { return ((slots >> slot) & 1U) != 0; }

@@ -13,9 +13,9 @@ enum class [[nodiscard]] Progress : std::uint8_t{
     kDone,  // a result is ready
 };
 
-// A unit of work: as much as so many instructions of the robot's processor (AArch64, -O3) do. Every piece of work is paid
-// by what it did, counted in rows, columns, corners, pairs, at a price that toolchain/checks/pieces measures: the same on
-// every machine, and no piece takes more than 1.5 times what it pays for.
+// A unit of work: as much as so many instructions of the robot's processor (AArch64, -O3) do. Every piece of work is
+// paid by what it did, counted in rows, columns, corners, pairs, at a price that toolchain/checks/pieces measures: the
+// same on every machine, and no piece takes more than 1.5 times what it pays for.
 inline constexpr std::int32_t kInstructionsPerUnit = 100;
 
 [[nodiscard]] constexpr std::int32_t units_of(std::int32_t instructions) noexcept {

@@ -33,10 +33,10 @@ class FootholdRaster {
   void add_row(std::int32_t row, std::span<const LevelSurface> surfaces, std::uint8_t layer) noexcept {
     const LevelSurface& surface = surfaces[layer];
     const double y_m = at(0, row).y();
-    work_.add(16);
+    work_.add(22);
     if (y_m < surface.box.min_m.y() || y_m > surface.box.max_m.y()) return;  // eq. (16)
-    work_.add(90);
-    work_.add(surface.hull.size(), 17);
+    work_.add(150);
+    work_.add(surface.hull.size(), 22);
     Interval x;
     if (!row_interval(surface.hull, y_m, x)) return;  // eq. (17)
     const double limit = static_cast<double>(kSide);
@@ -45,7 +45,7 @@ class FootholdRaster {
     const auto end = static_cast<std::int32_t>(last) + 1;
     for (auto begin = static_cast<std::int32_t>(first); begin < end;) {
       const Stretch here = stretch(row, begin, end);
-      work_.add(40 + (here.end - begin) / 2);
+      work_.add(60 + (here.end - begin) / 2);
       add_stretch(row, here, surfaces, layer);
       begin = here.end;
     }

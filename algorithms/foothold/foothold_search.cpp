@@ -61,7 +61,7 @@ Progress FootholdSearch::step(WorkBudget& budget) noexcept {
     stage_ = next;
   };
   while (!budget.exhausted()) {
-    work_.add(40);
+    work_.add(110);
     switch (stage_) {
       case Stage::kPrepare:
         if (index_ < map_.polygons.size()) {
@@ -191,7 +191,7 @@ void FootholdSearch::link(std::size_t i) noexcept {
 }
 
 void FootholdSearch::raster_row(std::int32_t row) noexcept {
-  work_.add(90);
+  work_.add(140);
   raster_.clear_row(row);
   const std::span<const LevelSurface> levels(levels_.begin(), levels_.size());
   for (std::size_t i = 0; i < levels_.size(); ++i) raster_.add_row(row, levels, static_cast<std::uint8_t>(i));
@@ -241,12 +241,12 @@ void FootholdSearch::find_next(std::int32_t row) noexcept {
   const FootholdRaster::Columns corridor =
       FootholdRaster::columns_within(first.x(), step.x(), {-range_m, range_m}) &
       FootholdRaster::columns_within(first.y(), step.y(), {-half_width_m, half_width_m});
-  work_.add(150);
+  work_.add(200);
   // Distances grow to both sides of the nearest column: of what the corridor has of a surface that is high enough all
   // along, no cell but one of the nearest ones counts. columns_within() has three too many at either end.
   constexpr std::int32_t kNearest = 4;
-  const auto nearest = static_cast<std::int32_t>(
-      math::clamp(-first.dot(step) / step.squaredNorm(), 0.0, FootholdRaster::kSide - 1.0));
+  const auto nearest =
+      static_cast<std::int32_t>(math::clamp(-first.dot(step) / step.squaredNorm(), 0.0, FootholdRaster::kSide - 1.0));
   const double least_z_m = z_foot_ + params_.delta_foot_m;
   for (std::int32_t begin = corridor.begin; begin < corridor.end;) {
     const FootholdRaster::Stretch stretch = raster_.stretch(row, begin, corridor.end);
@@ -277,8 +277,8 @@ void FootholdSearch::find_next(std::int32_t row) noexcept {
 // May a foot be put at a cell, eqs (20), (23), (25)? It survives when a foot may fit somewhere in it: half its diagonal
 // is forgiven here and not in the refinement.
 bool FootholdSearch::fits(const Vec2& p_m, const LevelSurface& surface) noexcept {
-  work_.add(70);
-  work_.add(surface.edges.size() + surface.toe.size() + surface.obstacles.size(), 9);
+  work_.add(85);
+  work_.add(surface.edges.size() + surface.toe.size() + surface.obstacles.size(), 12);
   return in_range(base_(p_m), params_.g_range_m) && below_limit(surface.plane.height_m(p_m), z_foot_, params_.g_z_m) &&
          surface.spare_m(p_m) >= -params_.g_res_m * std::numbers::sqrt2 / 2.0;
 }
@@ -287,7 +287,7 @@ bool FootholdSearch::fits(const Vec2& p_m, const LevelSurface& surface) noexcept
 template <typename Visit>
 void FootholdSearch::for_each_nearer(std::int32_t row, const Vec2& from_m, double distance2_m2,
                                      const Visit& visit) noexcept {
-  work_.add(60);
+  work_.add(110);
   FootholdRaster::Columns near;
   if (distance2_m2 < kFarAway_m2) {
     const double reach_m = math::sqrt(std::max(distance2_m2 - distance2_to_row_m2(from_m, row), 0.0));
@@ -321,7 +321,7 @@ double FootholdSearch::nearest_fit(std::int32_t row, const FootholdRaster::Stret
     const bool at_left = to_left <= to_right;
     const double distance2 = at_left ? to_left : to_right;
     if (distance2 >= distance2_m2) return kFarAway_m2;
-    work_.add(45);
+    work_.add(60);
     const Vec2 p = raster_.at(at_left ? left : right, row);
     if (surface.plane.height_m(p) > least_z_m && fits(p, surface)) {
       cell_m = p;
@@ -343,8 +343,8 @@ void FootholdSearch::erode_row(std::int32_t row) noexcept {
   for_each_nearer(row, base_.origin_m(), found_.p_star_distance2_m2, [&](const FootholdRaster::Stretch& stretch) {
     if (stretch.layer != found_.next) return;
     // Eq. (26), on the tread that comes next.
-    const double distance2 = nearest_fit(row, stretch, base_.origin_m(), least_z_m, found_.p_star_distance2_m2,
-                                         found_.p_star_cell_m);
+    const double distance2 =
+        nearest_fit(row, stretch, base_.origin_m(), least_z_m, found_.p_star_distance2_m2, found_.p_star_cell_m);
     found_.p_star_distance2_m2 = std::min(found_.p_star_distance2_m2, distance2);
   });
 }
@@ -586,8 +586,7 @@ void FootholdSearch::look_ahead_row(std::int32_t row) noexcept {
   for_each_nearer(row, p_star_m, found_.p_star_star_distance2_m2, [&](const FootholdRaster::Stretch& stretch) {
     if (stretch.layer == FootholdRaster::kNoLayer) return;
     Vec2 cell_m;
-    const double distance2 =
-        nearest_fit(row, stretch, p_star_m, least_z_m, found_.p_star_star_distance2_m2, cell_m);
+    const double distance2 = nearest_fit(row, stretch, p_star_m, least_z_m, found_.p_star_star_distance2_m2, cell_m);
     if (distance2 >= found_.p_star_star_distance2_m2) return;
     found_.p_star_star_distance2_m2 = distance2;
     found_.next_next = stretch.layer;

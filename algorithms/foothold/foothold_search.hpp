@@ -129,13 +129,14 @@ class FootholdSearch {
   // knows how far the two have drifted apart. An invalid query is counted and leaves nothing to do.
   void begin(const MapSnapshot& map, const Query& query) noexcept;
   Progress step(WorkBudget& budget) noexcept;
+  // What the next step begins with; a benchmark charges instructions to it.
+  enum class Stage : std::uint8_t { kIdle, kPrepare, kLink, kRaster, kErode, kChoose, kLookAhead, kFinish };
+  [[nodiscard]] Stage stage() const noexcept { return stage_; }
   // Changes only in the step that returns kDone.
   [[nodiscard]] const FootholdSet& result() const noexcept { return result_; }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:
-  enum class Stage : std::uint8_t { kIdle, kPrepare, kLink, kRaster, kErode, kChoose, kLookAhead, kFinish };
-
   static constexpr std::size_t kNone = kMaxMapPolygons;
   static constexpr double kFarAway_m2 = std::numeric_limits<double>::infinity();
   // What the rows of one search have told so far.

@@ -8,7 +8,7 @@ namespace polygmap {
 namespace {
 
 // In instructions.
-constexpr std::int32_t kSolve = 2300;    // with and without a lean
+constexpr std::int32_t kSolve = 1150;     // with and without a lean
 constexpr std::int32_t kTakePlane = 110;  // a plane that comes from another stage
 constexpr std::int32_t kDrop = 60;
 
@@ -41,7 +41,7 @@ std::int32_t PlaneExtractor::take_units() noexcept {
        {&growing_.work(), &boundaries_.work(), &merging_.work(), &overhangs_.work(), &search_.work()}) {
     work_.add(*part);
   }
-  work_.add(60);
+  work_.add(150);
   return work_.take_units();
 }
 
@@ -301,7 +301,8 @@ void PlaneExtractor::solve(PlaneId plane) noexcept {
   p.moments = fitted.moments;
   p.residual2 = fitted.residual2;
   work_.add(kTakePlane);
-  if (p.moments.count < params_.min_fitted_px || p.moments.count < least_share_[p.facets > 1 ? 1 : 0] * fitted.seen_px) {
+  if (p.moments.count < params_.min_fitted_px ||
+      p.moments.count < least_share_[p.facets > 1 ? 1 : 0] * fitted.seen_px) {
     return drop(plane);
   }
   work_.add(kSolve);

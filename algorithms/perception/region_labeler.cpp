@@ -31,7 +31,7 @@ Progress RegionLabeler::step(WorkBudget& budget) noexcept {
   while (part_ != Part::kDone && !budget.exhausted()) {
     do_piece();
     work_.add(components_.work());
-    work_.add(60);
+    work_.add(150);
     budget.spend(work_.take_units());
   }
   return part_ == Part::kDone ? Progress::kDone : Progress::kBusy;
@@ -81,10 +81,10 @@ void RegionLabeler::join() noexcept {
 
 void RegionLabeler::label_column() noexcept {
   RegionId* labels = regions_.labels.column(column_);
-  work_.add(110);
+  work_.add(240);
   std::fill(labels, labels + kDepthHeight_px, kNoRegion);
   for (const ColumnSpan& span : boundaries_->columns()[static_cast<std::size_t>(column_)]) {
-    work_.add(46);
+    work_.add(88);
     const RegionId region = span.component == 0 ? kNoRegion : components_.region_of(span.component);
     if (region == kNoRegion) continue;
     std::fill(labels + span.top, labels + span.bottom + 1, region);
@@ -93,14 +93,16 @@ void RegionLabeler::label_column() noexcept {
 }
 
 void RegionLabeler::check_inliers() noexcept {
+  work_.add(350);
   if (checked_ == regions_.count) {
+    work_.add(900);  // and what comes after, begins
     part_ = Part::kDone;
     return;
   }
   Region& region = regions_[++checked_];
   if (!region.alive || region.area_px > params_.inlier_check_px) return;
   const ColumnExtents& extents = regions_.extents[checked_];
-  work_.add(150 + 12 * std::max(extents.last_column - extents.first_column, 0));
+  work_.add(500 + 12 * std::max(extents.last_column - extents.first_column, 0));
   work_.add(kInlierSamples_px, 45);
   const double ratio = inlier_ratio(*image_, *raw_, noise_, regions_, checked_, params_.inlier_sigmas);
   if (ratio < params_.min_inlier_ratio) region.alive = false;

@@ -8,7 +8,7 @@
 namespace polygmap {
 namespace {
 
-constexpr std::int32_t kColumnsPerPiece = 24;  // that are searched for a line
+constexpr std::int32_t kColumnsPerPiece = 16;  // that are searched for a line
 
 }  // namespace
 
@@ -41,7 +41,7 @@ std::int32_t SurfaceBuilder::take_units() noexcept {
   for (WorkCount* part : {&side_lines_.work(), &column_outline_.work(), &edge_lines_.work(), &polygons_.work()}) {
     work_.add(*part);
   }
-  work_.add(60);
+  work_.add(150);
   return work_.take_units();
 }
 

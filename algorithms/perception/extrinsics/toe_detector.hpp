@@ -41,12 +41,12 @@ struct ToeSighting {
   double sigma_m = 0.0;  // of the image alone
 };
 
-// Follows lines along the foot's upper face over its front edge, beyond which depth jumps; nothing is seen where too few
-// lines show one jump at one place, because the toe is hidden, out of the image or close to a riser.
+// Follows lines along the foot's upper face over its front edge, beyond which depth jumps; nothing is seen where too
+// few lines show one jump at one place, because the toe is hidden, out of the image or close to a riser.
 class ToeDetector {
  public:
-  // frame: of the size of the intrinsics; its pixels are read until done. camera_T_sole: at the exposure, by encoders and
-  // the mount as believed.
+  // frame: of the size of the intrinsics; its pixels are read until done. camera_T_sole: at the exposure, by encoders
+  // and the mount as believed.
   void begin(const ToeDetectorParams& params, const DepthFrameView& frame, const CameraIntrinsics& intrinsics,
              const RawRange& range, const SoleModel& sole, const Transform& camera_T_sole) noexcept;
   // Follows a line; true after the last.
@@ -58,9 +58,9 @@ class ToeDetector {
   // What lines are sampled at is compiled in: their arrays have these sizes.
   static constexpr int kLines = 16;         // across the foot, 6 mm apart: three pixels at 0.7 m
   static constexpr double kStep_m = 0.001;  // along a line; a pixel is 1.9 mm there
-  static constexpr int kOnFoot = 12;  // steps on the foot before its end: a shank hides what lies farther back
-  static constexpr int kBeyond = 6;   // steps past its end: what lies there a riser may hide after a centimetre
-  static constexpr int kSearch = 14;  // the toe is looked for this far to both sides of where it is believed
+  static constexpr int kOnFoot = 12;        // steps on the foot before its end: a shank hides what lies farther back
+  static constexpr int kBeyond = 6;         // steps past its end: what lies there a riser may hide after a centimetre
+  static constexpr int kSearch = 14;        // the toe is looked for this far to both sides of where it is believed
   static constexpr int kSteps = kOnFoot + 2 * kSearch + kBeyond;
   // What is measured behind the upper face, m; not a number where nothing is.
   using Line = std::array<double, kSteps>;

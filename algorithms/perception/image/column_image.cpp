@@ -16,7 +16,7 @@ static_assert(kColumns % Raw::nlanes == 0 && kColumn_px == 8);
 
 constexpr std::int32_t kMostBody = kColumn_px / 4;  // half-resolution pixels: a column of more body is not seen
 constexpr std::int32_t kLine = 64;                  // bytes of a cache
-[[maybe_unused]] constexpr int kCountShift = 20;  // below: the sum of eight depths; from here on: how many are valid
+[[maybe_unused]] constexpr int kCountShift = 20;    // below: the sum of eight depths; from here on: how many are valid
 
 // The range as vectors see it.
 struct Range {
@@ -24,9 +24,7 @@ struct Range {
   explicit Range(const RawRange& range) noexcept
       : lowest(cv::vx_setall_u16(range.min)),
         reach(cv::vx_setall_u16(static_cast<std::uint16_t>(range.max - range.min))) {}
-  [[nodiscard]] Raw valid(const Raw& x) const noexcept {
-    return simd::at_most(cv::v_sub_wrap(x, lowest), reach);
-  }
+  [[nodiscard]] Raw valid(const Raw& x) const noexcept { return simd::at_most(cv::v_sub_wrap(x, lowest), reach); }
 };
 
 // Which of a register's pixels are valid; body has a flag for each two of them.
@@ -59,8 +57,8 @@ ColumnSums sum_columns(const Range& range, const std::uint16_t* raw, const std::
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const Words both = cv::v_reinterpret_as_u32(depths[k]);
     const cv::v_int32 minus_count = cv::v_dotprod(cv::v_reinterpret_as_s16(valid[k]), cv::vx_setall_s16(1));
-    pairs[k] = (both & cv::vx_setall_u32(0xffff)) + (both >> 16) -
-               (cv::v_reinterpret_as_u32(minus_count) << kCountShift);
+    pairs[k] =
+        (both & cv::vx_setall_u32(0xffff)) + (both >> 16) - (cv::v_reinterpret_as_u32(minus_count) << kCountShift);
   }
   Words first, second, third, fourth;
   cv::v_transpose4x4(pairs[0], pairs[1], pairs[2], pairs[3], first, second, third, fourth);  // each half by itself

@@ -116,8 +116,8 @@ void SelfFilter::add_segment(Outline& outline, const HalfRays& rays, const Vec3&
   }
 }
 
-bool SelfFilter::add_some(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body,
-                          const BodyMargin& margin, std::size_t slot) noexcept {
+bool SelfFilter::add_some(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body, const BodyMargin& margin,
+                          std::size_t slot) noexcept {
   if (slot >= kShapes) return true;
   const LegShapes& leg = body[slot / 3];
   if (next_ == 0) {

@@ -97,6 +97,7 @@ void PolygonMap::order_surfaces() noexcept {
 }
 
 void PolygonMap::begin_fusing() noexcept {
+  work_.add(600);
   if (pass_.measuring) drift_.end_frame();
   pass_.measuring = false;
   map_T_camera_.p_m = view_.world_T_camera.p_m - drift_.frame_offset_m();
@@ -122,7 +123,7 @@ Progress PolygonMap::step(WorkBudget& budget) noexcept {
   if (stage_ == Stage::kIdle) return Progress::kIdle;
   while (!budget.exhausted()) {
     do_piece();
-    work_.add(50);
+    work_.add(120);
     budget.spend(work_.take_units());
     if (stage_ == Stage::kIdle) return Progress::kDone;
   }

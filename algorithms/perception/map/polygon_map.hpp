@@ -190,14 +190,15 @@ class PolygonMap {
   // The largest piece publishes all that a frame changed, of a full map.
   static constexpr std::int32_t kMaxPieceUnits = 120'000 / kInstructionsPerUnit;
   Progress step(WorkBudget& budget) noexcept;
+  // What the next step begins with; a benchmark charges instructions to it.
+  enum class Stage : std::uint8_t { kIdle, kLoad, kCompare, kFuse, kAge, kPublish };
+  [[nodiscard]] Stage stage() const noexcept { return stage_; }
   // Changes only in the step that returns kDone. The stamp moves on only with a frame in which something was seen.
   [[nodiscard]] const MapSnapshot& snapshot() const noexcept { return snapshot_; }
   void clear() noexcept;
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:
-  enum class Stage : std::uint8_t { kIdle, kLoad, kCompare, kFuse, kAge, kPublish };
-
   // Of the seen surface to a remembered one that may be the same.
   struct Nearness {
     double across_m = 0.0;  // along the remembered normal, at the seen middle
@@ -247,7 +248,7 @@ class PolygonMap {
   void update_side(TrackedSide& side, double seen_m, bool observed) noexcept;
   void rebuild(MapTrack& track) noexcept;
   [[nodiscard]] bool in_view(const MapTrack& track, const Transform& camera_T_local) const noexcept;
-  [[nodiscard]] bool hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept;
+  [[nodiscard]] bool hidden(const MapTrack& track, const Transform& camera_T_local) noexcept;
   [[nodiscard]] double faded(std::int64_t since_ns) const noexcept;
   void write(const MapTrack& track, MapPolygon& out) const noexcept;
   [[nodiscard]] Viewpoint viewpoint() const noexcept { return {map_T_camera_.p_m, view_.mount_sigma_rad}; }

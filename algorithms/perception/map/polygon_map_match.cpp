@@ -48,8 +48,8 @@ bool PolygonMap::two_posts(const MapTrack& track, const ConvexPolygon& seen_poly
 }
 
 bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& cost) noexcept {
-  work_.add(240);
-  work_.add(seen_.polygon.size() + track.polygon.size(), 24);
+  work_.add(330);
+  work_.add(seen_.polygon.size() + track.polygon.size(), 34);
   const bool upright = track.kind == SurfaceKind::kRiser;
   const ConvexPolygon seen_polygon = local_polygon(track);
   const BoundingBox seen = bounding_box(seen_polygon), known = bounding_box(track.polygon);
@@ -73,7 +73,7 @@ void PolygonMap::compare_some() noexcept {
   constexpr std::size_t kAtOnce = 16;
   for (std::size_t glances = 0; glances < kAtOnce && pass_.track < tracks_.size(); ++glances, ++pass_.track) {
     Nearness near;
-    work_.add(45);
+    work_.add(85);
     if (!is_near(tracks_[pass_.track], near)) continue;
     double cost = 0.0;
     if (!matches(tracks_[pass_.track], near, cost)) continue;

@@ -187,7 +187,7 @@ bool PolygonMap::in_view(const MapTrack& track, const Transform& camera_T_local)
 }
 
 // By the robot's own body: three of five points, the middle and four halfway to vertices around it.
-bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept {
+bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) noexcept {
   constexpr std::size_t kAround = 4;
   const Vec2 middle = centroid_m(track.polygon);
   std::size_t hidden = 0;
@@ -196,7 +196,7 @@ bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) 
     const Vec2 inner = 0.5 * (towards + middle);
     const Vec3 p = camera_T_local * Vec3{inner.x(), inner.y(), 0.0};
     const double margin_m = view_.body_margin.at(p.norm());
-    hidden += hides(view_.body[0], margin_m, p) || hides(view_.body[1], margin_m, p) ? 1U : 0U;
+    hidden += hides(view_.body[0], margin_m, p, work_) || hides(view_.body[1], margin_m, p, work_) ? 1U : 0U;
   }
   return 2 * hidden > kAround;
 }
@@ -207,7 +207,7 @@ void PolygonMap::age(MapTrack& track) noexcept {
   work_.add(track.polygon.size(), 65);
   const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
   const bool looked = in_view(track, camera_T_local);
-  if (looked) work_.add(4200);
+  if (looked) work_.add(500);
   if (looked && !hidden(track, camera_T_local)) ++track.misses;
   const bool confirmed = track.sightings >= params_.confirmed_sightings;
   if (confirmed && track.misses >= params_.misses_confirmed) {

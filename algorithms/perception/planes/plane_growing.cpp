@@ -117,18 +117,18 @@ bool PlaneGrowing::prepare_some() noexcept {
     const std::size_t segments = (*segments_)[static_cast<std::size_t>(column_)].size();
     switch (part_) {
       case Part::kCount:
-        work_.add(150 + 14 * static_cast<std::int32_t>(segments));
+        work_.add(220 + 30 * static_cast<std::int32_t>(segments));
         count_seeds(column_);
         index_rows(column_);
         break;
       case Part::kSort:
-        work_.add(10 + 12 * static_cast<std::int32_t>(segments));
+        work_.add(30 + 25 * static_cast<std::int32_t>(segments));
         sort_seeds(column_);
         break;
       case Part::kGrow:
         break;
       case Part::kClear:
-        work_.add(10 + 5 * static_cast<std::int32_t>(segments));
+        work_.add(20 + 9 * static_cast<std::int32_t>(segments));
         clear_tried(column_);
         break;
     }
@@ -144,7 +144,7 @@ bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noe
   const ScanlineSegmentation::Column& column = (*segments_)[static_cast<std::size_t>(g)];
   std::int32_t most = 0;
   for (std::size_t k = first_near(g, segment.top); k < column.size() && column[k].top <= segment.bottom; ++k) {
-    work_.add(24);
+    work_.add(34);
     const ScanlineSegment& other = column[k];
     const std::int32_t shared = std::min(segment.bottom, other.bottom) - std::max(segment.top, other.top) + 1;
     const std::int32_t covered = std::max(segment.bottom, other.bottom) - std::min(segment.top, other.top) + 1;
@@ -158,13 +158,13 @@ bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noe
 }
 
 bool PlaneGrowing::try_seed(Place place) noexcept {
-  work_.add(12);
+  work_.add(18);
   if (at(place).plane != 0) return false;
-  work_.add(70);
+  work_.add(95);
   // Three segments beside one another: most seeds have no such neighbours.
   Place left, right;
   if (!try_neighbour(place, -1, left) || !try_neighbour(place, 1, right)) return false;
-  work_.add(420);
+  work_.add(560);
   Sums sums;
   for (const Place& p : {place, left, right}) {
     sums.add(static_cast<double>(rays_->x[static_cast<std::size_t>(p.column)]), *rays_, at(p));
@@ -188,9 +188,9 @@ bool PlaneGrowing::try_seed(Place place) noexcept {
 
 void PlaneGrowing::consider(Place place) noexcept {
   ScanlineSegment& segment = at(place);
-  work_.add(14);
+  work_.add(22);
   if (segment.plane != 0) return;
-  work_.add(75);
+  work_.add(105);
   // Mean square distance of the segment's line from the plane.
   const double ray_x = static_cast<double>(rays_->x[static_cast<std::size_t>(place.column)]);
   const double pitch = static_cast<double>(rays_->y[1] - rays_->y[0]);
@@ -200,7 +200,7 @@ void PlaneGrowing::consider(Place place) noexcept {
   const double rows = segment.rows();
   const double off2 = offset * offset + tilt * tilt * (rows * rows - 1.0) * (1.0 / 12.0);
   if (!(middle.w > kLeastInverseDepth) || off2 > math::square(tolerance_w(middle.w)) * norm2_) return;
-  work_.add(100);
+  work_.add(140);
   segment.plane = static_cast<std::uint8_t>(count_ + 1);
   sums_.add(ray_x, *rays_, segment);
   queue_.places[queue_.size++] = place;
@@ -214,7 +214,7 @@ void PlaneGrowing::consider(Place place) noexcept {
 }
 
 void PlaneGrowing::visit(Place place) noexcept {
-  work_.add(70);
+  work_.add(100);
   const ScanlineSegment segment = at(place);
   for (const std::int32_t side : {-1, 1}) {
     const std::int32_t g = place.column + side;
@@ -237,7 +237,7 @@ void PlaneGrowing::close() noexcept {
                     count_ < kMaxPlanes && sums_.try_solve(m_) && m_.dot(sums_.m.mean_ray()) > kLeastInverseDepth;
   if (!kept) {
     overflow_ += count_ == kMaxPlanes ? 1U : 0U;
-    work_.add(queue_.size, 10);
+    work_.add(queue_.size, 13);
     for (std::size_t i = 0; i < queue_.size; ++i) at(queue_.places[i]).plane = i == 0 ? kTried : std::uint8_t{0};
     return;
   }

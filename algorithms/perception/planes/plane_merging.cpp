@@ -7,7 +7,7 @@
 namespace polygmap {
 namespace {
 
-constexpr std::int32_t kContradictionInstructions = 900;
+constexpr std::int32_t kContradictionInstructions = 1100;
 constexpr double kLeastDeterminant = 1e-13;  // of moments scaled to a trace of 1
 
 void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t to) noexcept {
@@ -94,7 +94,7 @@ void PlaneMerging::begin_coplanar(const Params& params, const PlaneGrowing::Para
   }
   first_ = 0;
   second_ = 1;
-  work_.add(planes.count, 60);
+  work_.add(planes.count, 75);
 }
 
 bool PlaneMerging::merge_some(PlaneSet& planes, PlaneIndex& to_plane) noexcept {
@@ -111,16 +111,16 @@ bool PlaneMerging::merge_some(PlaneSet& planes, PlaneIndex& to_plane) noexcept {
       work_.add(12);
       continue;
     }
-    work_.add(18);
+    work_.add(24);
     const double cosine = candidates_[first_].normal.dot(candidates_[second_].normal);
     const std::size_t b = candidates_[second_++].plane;
     if (cosine < least_cosine || !planes[b].alive) continue;
     const std::size_t keep = planes[a].pixels >= planes[b].pixels ? a : b, gone = keep == a ? b : a;
-    work_.add(130);
+    work_.add(170);
     if (!part_of(planes[keep], planes[gone], cosine)) continue;
     take_over(planes[keep], planes[gone]);
     redirect(to_plane, gone, keep);
-    work_.add(500);
+    work_.add(650);
   }
   return false;
 }
@@ -164,8 +164,8 @@ void PlaneMerging::touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px,
 // Spans above or beside one another in the picture.
 void PlaneMerging::add_column(const SpanBoundaries::Column& spans, const SpanBoundaries::Column* right,
                               const PlaneIndex& to_plane) noexcept {
-  work_.add(60);
-  work_.add(spans.size() + (right != nullptr ? right->size() : 0), 24);
+  work_.add(110);
+  work_.add(spans.size() + (right != nullptr ? right->size() : 0), 54);
   for (const ColumnSpan& span : spans) ++spans_of_[to_plane[span.plane]];
   for (std::size_t k = 0; k + 1 < spans.size(); ++k) {
     if (spans[k + 1].top - spans[k].bottom > kMaxGap_px) continue;

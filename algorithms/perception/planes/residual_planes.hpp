@@ -9,8 +9,8 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/core/work.hpp"
 #include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
 
 namespace polygmap {

@@ -141,7 +141,7 @@ void SpanBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::int3
   int empty = 0, off = 0;
   work_.add(50);
   for (std::int32_t r = end + step; step > 0 ? r <= limit : r >= limit; r += step) {
-    work_.add(24);
+    work_.add(27);
     if (!(image_->by_column(r, column) > 0.0F)) {
       if (++empty > params_.max_empty_rows) return;
     } else if (offset(line, column, r).within(most)) {
@@ -245,7 +245,7 @@ void SpanBoundaries::score(std::int32_t column, bool by_planes) noexcept {
   Column& intervals = columns_[static_cast<std::size_t>(column)];
   for (std::size_t k = 0; k < intervals.size(); ++k) {
     ColumnSpan& upper = intervals[k];
-    work_.add(50);
+    work_.add(75);
     if (k == 0) extend(column, upper, -1, 0);
     if (k + 1 == intervals.size()) {
       extend(column, upper, 1, rays_->height_px - 1);
@@ -321,7 +321,7 @@ void SpanBoundaries::reproject(const Joint& joint) noexcept {
 
 bool SpanBoundaries::reproject_some() noexcept {
   constexpr std::size_t kJointsAtOnce = 64;
-  constexpr std::int32_t kJointInstructions = 75;
+  constexpr std::int32_t kJointInstructions = 85;
   const std::size_t first = next_ - pair_count_, end = std::min(first + kJointsAtOnce, joint_count_);
   work_.add(30);
   work_.add(end - first, kJointInstructions);

@@ -152,7 +152,7 @@ void SpanBoundaries::consider_beside(const Gap& gap, const Column& others, std::
   const std::int32_t reach_px = params_.beside_px;
   while (next < others.size() && others[next].bottom + reach_px < gap.from) ++next;
   for (std::size_t i = next; i < others.size() && others[i].top - reach_px <= gap.until; ++i) {
-    work_.add(24);
+    work_.add(38);
     const ColumnSpan& other = others[i];
     const std::int32_t top = std::max(gap.from, other.top - reach_px);
     const std::int32_t bottom = std::min(gap.until, other.bottom + reach_px);
@@ -165,13 +165,14 @@ void SpanBoundaries::consider_beside(const Gap& gap, const Column& others, std::
 void SpanBoundaries::fill_gaps(std::int32_t column, std::int32_t beside, std::size_t first_plane,
                                std::size_t last_plane) noexcept {
   const std::int32_t min_rows = params_.min_filled_rows;
+  work_.add(60);
   Column& spans = columns_[static_cast<std::size_t>(column)];
   const bool any_beside = beside >= 0 && beside < rays_->columns;
   const Column& others = columns_[static_cast<std::size_t>(any_beside ? beside : column)];
   std::int32_t from = 0;
   std::size_t next_beside = 0;  // the first span there that reaches down to this gap
   for (std::size_t k = 0; k <= spans.size(); ++k) {
-    work_.add(26);
+    work_.add(62);
     const bool last = k == spans.size();
     const Gap gap{column, from, last ? rays_->height_px - 1 : spans[k].top - 1,
                   k > 0 ? spans[k - 1].plane : std::uint8_t{0}, last ? std::uint8_t{0} : spans[k].plane};

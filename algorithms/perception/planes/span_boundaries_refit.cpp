@@ -156,7 +156,7 @@ void SpanBoundaries::refit(std::int32_t first_column, const Strip& strip, bool r
   const StripRows rows = rows_of(strip, roughly);
   work_.add(90);
   if (rows.none()) return;
-  work_.add(750 + 78 * ((rows.bottom - rows.top) / rows.stride + 1));
+  work_.add(880 + 84 * ((rows.bottom - rows.top) / rows.stride + 1));
   StripSums sums;
   add_up(first_column, strip, rows, sums);
   Plane& plane = planes_[strip.plane];
@@ -177,7 +177,7 @@ void SpanBoundaries::sample_noise(std::int32_t column) noexcept {
   constexpr std::int32_t kStride = 4;
   for (const ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) {
     const Line line = line_of(span.plane, column);
-    work_.add(30 + 44 * std::max((span.bottom - span.top) / kStride, 0));
+    work_.add(50 + 72 * std::max((span.bottom - span.top) / kStride, 0));
     for (std::int32_t r = span.top + 1; r < span.bottom; r += kStride) {
       const float w = image_->by_column(r, column);
       if (!(w > 0.0F)) continue;

@@ -54,14 +54,14 @@ void ConnectedComponents::link(SpanBoundaries::Columns& columns, std::int32_t co
   std::size_t next = 0;  // on the left, the first span that ends no higher than this one begins
   work_.add(40);
   for (ColumnSpan& span : columns[static_cast<std::size_t>(column)]) {
-    work_.add(28);
+    work_.add(36);
     span.component = ++span_count_;
     parent_[span_count_] = span_count_;
     if (column == 0) continue;
     const SpanBoundaries::Column& lefts = columns[static_cast<std::size_t>(column - 1)];
     while (next < lefts.size() && lefts[next].bottom < span.top) ++next;
     for (std::size_t i = next; i < lefts.size() && lefts[i].top <= span.bottom; ++i) {
-      work_.add(16);
+      work_.add(20);
       const ColumnSpan& left = lefts[i];
       if ((static_cast<int>(left.plane == span.plane) & static_cast<int>(left.bottom >= span.top)) == 0) continue;
       const std::uint16_t a = root(left.component), b = root(span.component);
@@ -95,9 +95,9 @@ bool ConnectedComponents::number_some() noexcept {
 }
 
 void ConnectedComponents::measure(SpanBoundaries::Columns& columns, std::int32_t column) noexcept {
-  work_.add(30);
+  work_.add(70);
   for (ColumnSpan& span : columns[static_cast<std::size_t>(column)]) {
-    work_.add(40);
+    work_.add(50);
     span.component = parent_[span.component];
     if (span.component == 0) continue;
     Component& component = components_[span.component];
@@ -122,7 +122,7 @@ bool ConnectedComponents::apart(const Component& a, const Component& b, const In
   const Vec2 from = a.centre(), to = b.centre();
   std::int32_t elsewhere = 0;
   for (std::int32_t i = 0; i <= params_.apart_probes && elsewhere < params_.min_apart_probes; ++i) {
-    work_.add(50);
+    work_.add(66);
     const Vec2 p = from + (to - from) * (static_cast<double>(i) / params_.apart_probes);
     const auto c = static_cast<std::int32_t>(p.x() + 0.5), r = static_cast<std::int32_t>(p.y() + 0.5);
     const float w = image_->inverse_depth_at(c, r);
@@ -169,8 +169,8 @@ ConnectedComponents::Order ConnectedComponents::large_ones() noexcept {
     const double area_a_px = components_[a].area_px, area_b_px = components_[b].area_px;
     return area_a_px != area_b_px ? area_a_px > area_b_px : a < b;
   });
-  work_.add(component_count_, 14);
-  work_.add(order.size() * static_cast<std::size_t>(std::bit_width(order.size())), 24);
+  work_.add(component_count_, 19);
+  work_.add(order.size() * static_cast<std::size_t>(std::bit_width(order.size())), 32);
   return order;
 }
 
@@ -180,7 +180,7 @@ RegionId ConnectedComponents::find_region(const Component& component) noexcept {
   const auto first_new = static_cast<RegionId>(planes_->count + 1);
   for (RegionId id = source; id <= regions.count; id = id == source ? first_new : static_cast<RegionId>(id + 1)) {
     const Region& region = regions[id];
-    work_.add(9);
+    work_.add(12);
     if (region.source != source) continue;
     if (region.main_component == 0 || !apart(components_[region.main_component], component, region.plane)) return id;
   }
@@ -209,7 +209,7 @@ void ConnectedComponents::begin_join(const Params& params, const SpanBoundaries&
   next_ = 0;
   regions.count = planes.count;
   work_.add(200);
-  work_.add(planes.count, 90);
+  work_.add(planes.count, 120);
   for (PlaneId p = 1; p <= planes.count; ++p) regions[p] = region_in(planes[p], p);
   order_ = large_ones();
 }
@@ -217,7 +217,7 @@ void ConnectedComponents::begin_join(const Params& params, const SpanBoundaries&
 // The largest component of a plane keeps it. A component apart from that becomes a region of its own in the same plane.
 void ConnectedComponents::join(std::uint8_t number) noexcept {
   Component& component = components_[number];
-  work_.add(60);
+  work_.add(90);
   component.region = find_region(component);
   if (component.region == kNoRegion) return;
   Region& region = (*regions_)[component.region];
@@ -231,7 +231,7 @@ void ConnectedComponents::join(std::uint8_t number) noexcept {
 }
 
 void ConnectedComponents::give_up_small_ones() noexcept {
-  work_.add(regions_->count, 30);
+  work_.add(regions_->count, 40);
   for (RegionId id = 1; id <= regions_->count; ++id) {
     Region& region = (*regions_)[id];
     region.alive = region.alive && region.area_px >= params_.min_surface_px;

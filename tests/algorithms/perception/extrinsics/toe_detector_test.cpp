@@ -57,8 +57,7 @@ class ToeSight : public testing::Test {
     RawRange range;
     range.set({}, k.depth_unit_m);
     ToeDetector detector;
-    detector.begin(ToeDetectorParams{}, {1, 1, k.width_px, k.height_px, raw_.data()}, k, range, kSole,
-                      camera_T_sole);
+    detector.begin(ToeDetectorParams{}, {1, 1, k.width_px, k.height_px, raw_.data()}, k, range, kSole, camera_T_sole);
     while (!detector.step()) {
     }
     return detector.sighting();
