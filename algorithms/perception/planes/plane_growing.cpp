@@ -69,9 +69,9 @@ void PlaneGrowing::begin(const Params& params, const DepthNoiseModel& noise, con
   overflow_ = 0;
   growing_ = false;
   seeds_.next = 0;
-  part_ = Part::kCount;
-  column_ = 0;
-  start_.fill(0);
+  pass_.part = Part::kCount;
+  pass_.column = 0;
+  pass_.start.fill(0);
 }
 
 // A column of clutter has dozens of segments, of which a neighbour overlaps one or two. Segments that end above a row
@@ -89,19 +89,21 @@ void PlaneGrowing::index_rows(std::int32_t column) noexcept {
 // By length, longest first; equal lengths in the order of the image.
 void PlaneGrowing::count_seeds(std::int32_t column) noexcept {
   for (const ScanlineSegment& segment : (*segments_)[static_cast<std::size_t>(column)]) {
-    if (segment.rows() >= params_.min_rows) ++start_[static_cast<std::size_t>(kDepthHeight_px - segment.rows() + 1)];
+    if (segment.rows() >= params_.min_rows)
+      ++pass_.start[static_cast<std::size_t>(kDepthHeight_px - segment.rows() + 1)];
   }
 }
 void PlaneGrowing::begin_sorting() noexcept {
-  work_.add(start_.size(), 3);
-  for (std::size_t i = 1; i < start_.size(); ++i) start_[i] = static_cast<std::uint16_t>(start_[i] + start_[i - 1]);
-  seeds_.size = start_.back();
+  work_.add(pass_.start.size(), 3);
+  for (std::size_t i = 1; i < pass_.start.size(); ++i)
+    pass_.start[i] = static_cast<std::uint16_t>(pass_.start[i] + pass_.start[i - 1]);
+  seeds_.size = pass_.start.back();
 }
 void PlaneGrowing::sort_seeds(std::int32_t column) noexcept {
   const ScanlineSegmentation::Column& segments = (*segments_)[static_cast<std::size_t>(column)];
   for (std::size_t k = 0; k < segments.size(); ++k) {
     if (segments[k].rows() < params_.min_rows) continue;
-    seeds_.places[start_[static_cast<std::size_t>(kDepthHeight_px - segments[k].rows())]++] = {
+    seeds_.places[pass_.start[static_cast<std::size_t>(kDepthHeight_px - segments[k].rows())]++] = {
         static_cast<std::int16_t>(column), static_cast<std::int16_t>(k)};
   }
 }
@@ -112,28 +114,28 @@ void PlaneGrowing::clear_tried(std::int32_t column) noexcept {
 }
 
 bool PlaneGrowing::prepare_some() noexcept {
-  const std::int32_t last = std::min(column_ + kColumnsAtOnce, rays_->columns);
-  for (; column_ < last; ++column_) {
-    const std::size_t segments = (*segments_)[static_cast<std::size_t>(column_)].size();
-    switch (part_) {
+  const std::int32_t last = std::min(pass_.column + kColumnsAtOnce, rays_->columns);
+  for (; pass_.column < last; ++pass_.column) {
+    const std::size_t segments = (*segments_)[static_cast<std::size_t>(pass_.column)].size();
+    switch (pass_.part) {
       case Part::kCount:
         work_.add(220 + 30 * static_cast<std::int32_t>(segments));
-        count_seeds(column_);
-        index_rows(column_);
+        count_seeds(pass_.column);
+        index_rows(pass_.column);
         break;
       case Part::kSort:
         work_.add(30 + 25 * static_cast<std::int32_t>(segments));
-        sort_seeds(column_);
+        sort_seeds(pass_.column);
         break;
       case Part::kGrow:
         break;
       case Part::kClear:
         work_.add(20 + 9 * static_cast<std::int32_t>(segments));
-        clear_tried(column_);
+        clear_tried(pass_.column);
         break;
     }
   }
-  return column_ == rays_->columns;
+  return pass_.column == rays_->columns;
 }
 
 // The segment in the next column that shares most rows with this one, at least half of what both cover.
@@ -259,27 +261,27 @@ void PlaneGrowing::grow_some() noexcept {
     } else if (seeds_.next < seeds_.size) {
       static_cast<void>(try_seed(seeds_.places[seeds_.next++]));
     } else {
-      part_ = Part::kClear;
-      column_ = 0;
+      pass_.part = Part::kClear;
+      pass_.column = 0;
       return;
     }
   }
 }
 
 bool PlaneGrowing::step() noexcept {
-  if (part_ == Part::kGrow) {
+  if (pass_.part == Part::kGrow) {
     grow_some();
     return false;
   }
   if (!prepare_some()) return false;
-  column_ = 0;
-  switch (part_) {
+  pass_.column = 0;
+  switch (pass_.part) {
     case Part::kCount:
       begin_sorting();
-      part_ = Part::kSort;
+      pass_.part = Part::kSort;
       return false;
     case Part::kSort:
-      part_ = Part::kGrow;
+      pass_.part = Part::kGrow;
       return false;
     case Part::kGrow:
     case Part::kClear:

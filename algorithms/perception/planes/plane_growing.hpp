@@ -117,9 +117,11 @@ class PlaneGrowing {
   Queue seeds_;
 
   Queue queue_;  // of the plane that grows: all its segments, those before next visited
-  Part part_ = Part::kCount;
-  std::int32_t column_ = 0;                                 // the next one to be gone through
-  std::array<std::uint16_t, kDepthHeight_px + 2> start_{};  // of the seeds of a length, longest first
+  struct {
+    Part part = Part::kCount;
+    std::int32_t column = 0;                                 // the next one to be gone through
+    std::array<std::uint16_t, kDepthHeight_px + 2> start{};  // of the seeds of a length, longest first
+  } pass_;
   WorkCount work_;
   bool growing_ = false;
   Sums sums_;
