@@ -160,9 +160,9 @@ bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noe
 }
 
 bool PlaneGrowing::try_seed(Place place) noexcept {
-  work_.add(18);
+  work_.add(38);
   if (at(place).plane != 0) return false;
-  work_.add(95);
+  work_.add(150);
   // Three segments beside one another: most seeds have no such neighbours.
   Place left, right;
   if (!try_neighbour(place, -1, left) || !try_neighbour(place, 1, right)) return false;
