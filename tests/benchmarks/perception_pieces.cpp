@@ -41,7 +41,9 @@ test::DepthScene stairs_with_legs() {
 // Planes of so many pixels, each tilted and placed at random; level ones and risers as the camera sees them if `steps`.
 Raw tiles(const CameraIntrinsics& k, std::int32_t width_px, std::int32_t height_px, bool steps, std::uint32_t seed) {
   std::mt19937 random(seed);
-  const auto uniform = [&random](double from, double to) { return from + (to - from) * (random() / 4294967296.0); };
+  const auto uniform = [&random](double from, double to) {
+    return from + (to - from) * (static_cast<double>(random()) / 4294967296.0);
+  };
   Raw raw(static_cast<std::size_t>(k.width_px * k.height_px));
   for (std::int32_t top = 0; top < k.height_px; top += height_px) {
     for (std::int32_t left = 0; left < k.width_px; left += width_px) {
