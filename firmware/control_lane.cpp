@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/control_lane.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -54,15 +55,58 @@ ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometr
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {
   if (first_ns_ < 0) first_ns_ = now_ns;
+  look_across(now_ns);
   const bool imu_came = read_imu(imu_port_, now_ns, estimator_);
   if (!imu_came && now_ns - estimator_.newest_imu_ns() >= kMissing_ns) health_.raise(Fault::kImuMissing, now_ns);
+  read_joints(now_ns);
+  return Progress::kDone;
+}
+
+void ControlLane::read_joints(std::int64_t now_ns) noexcept {
+  const bool was_asked = command_.stamp_ns != 0;  // a drive answers a command
   JointFeedback joints;
   if (joint_port_.try_read(joints)) {
-    estimator_.add_joints(joints, now_ns);
-  } else if (now_ns - estimator_.leg_sensing().joints().stamp_ns >= kMissing_ns) {
+    const bool all_heard =
+        std::ranges::find(joints.silent_cycles, JointFeedback::kNeverHeard) == joints.silent_cycles.end();
+    if (all_heard) {
+      note_silent_drives(joints, now_ns);
+      estimator_.add_joints(joints, now_ns);
+    }
+  } else if (was_asked && now_ns - estimator_.leg_sensing().joints().stamp_ns >= kMissing_ns) {
     health_.raise(Fault::kJointFeedbackMissing, now_ns);
   }
-  return Progress::kDone;
+}
+
+void ControlLane::note_silent_drives(const JointFeedback& joints, std::int64_t now_ns) noexcept {
+  JointSet silent;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (joints.silent_cycles[n] <= LegSensing::kCarried_cycles) continue;
+    silent.insert(n);
+    if (!drives_.silent.contains(n)) health_.raise(Fault::kDriveSilent, now_ns);
+  }
+  drives_.silent = silent;
+  drives_.ever_silent = JointSet::of_bits(drives_.ever_silent.bits() | silent.bits());
+}
+
+ModuleState ControlLane::module_state() const noexcept {
+  if (!estimator_.leg_sensing().any()) return ModuleState::kArming;
+  return gait_.status().phase == GaitPhase::kStopped ? ModuleState::kSafeStop : ModuleState::kRunning;
+}
+
+// Everything that crosses is taken when the frame begins: the writer may be ahead by then, but not by more than it has
+// slots for.
+void ControlLane::look_across(std::int64_t now_ns) noexcept {
+  const std::int64_t finished_ns = link_.progress[kPerceptionLane].finished_ns.load(std::memory_order_acquire);
+  if (!view_.begin(now_ns, finished_ns)) health_.raise(Fault::kLaneBehind, now_ns);
+  pose_asked_ = link_.pose_request.try_take(view_.last_ns());
+  (void)link_.footholds.try_take(view_.last_ns());  // the newest, or the last one again
+  std::uint32_t lost = link_.pose_request.lost() + link_.footholds.lost();
+  for (LaneHealth& lane : healths_) {
+    if (&lane.own == &health_) continue;
+    (void)lane.published.try_take(view_.last_ns());
+    lost += lane.published.lost();
+  }
+  health_.follow(Limit::kHandOverLost, now_ns, lost);
 }
 
 Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
@@ -74,12 +118,14 @@ Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
 
 // Whatever is silent, the gait runs: a foot in the air has to come down.
 Progress ControlLane::gait(std::int64_t now_ns) noexcept {
-  command_ready_ = false;
-  if (!estimator_.leg_sensing().any()) return Progress::kIdle;  // where the legs are is not known yet
-  if (link_.footholds.try_take()) footholds_ = link_.footholds.front();
-  gait_.tick(now_ns, estimator_.state(), footholds_, estimator_.leg_sensing().joints(), command_);
-  estimator_.leg_sensing().to_encoders(command_);
   command_ready_ = true;
+  if (module_state() == ModuleState::kArming) {
+    command_ = {};
+    command_.stamp_ns = now_ns;
+    return Progress::kDone;
+  }
+  gait_.tick(now_ns, estimator_.state(), footholds(), estimator_.leg_sensing().joints(), command_);
+  estimator_.leg_sensing().to_encoders(command_);
   hand_over_touch_down();
 
   const GaitStatus& status = gait_.status();
@@ -90,7 +136,7 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   const bool stands = step.touch_down_stamp_ns != 0 || step.sequence == 0;
   context.stance = stands ? step.foot : other(step.foot);
   context.climbing = status.treads_climbed > 0 || status.step.onto_tread;
-  link_.search_context.publish();
+  link_.search_context.publish(now_ns);
   return Progress::kDone;
 }
 
@@ -98,7 +144,7 @@ Progress ControlLane::command(std::int64_t now_ns) noexcept {
   if (!command_ready_) return Progress::kIdle;
   if (!all_finite(command_)) {
     health_.raise(Fault::kJointCommandInvalid, now_ns);
-  } else if (!joint_port_.try_write(command_)) {
+  } else if (!joint_port_.try_write(command_).is_all()) {
     health_.raise(Fault::kJointCommandRefused, now_ns);
   }
   return Progress::kDone;
@@ -106,12 +152,12 @@ Progress ControlLane::command(std::int64_t now_ns) noexcept {
 
 Progress ControlLane::health(std::int64_t now_ns) noexcept {
   report_rejections(now_ns);
+  report_bus(now_ns);
   report_lidar(now_ns);
   report_gait(now_ns);
   all_faults_ = health_;
   for (LaneHealth& lane : healths_) {
     if (&lane.own == &health_) continue;
-    (void)lane.published.try_take();  // the newest, or the last one again
     all_faults_.merge(lane.published.front());
   }
   return Progress::kDone;
@@ -123,6 +169,23 @@ void ControlLane::report_rejections(std::int64_t now_ns) noexcept {
   health_.follow(Fault::kJointFeedbackRejected, now_ns, joint_rejections(estimator_.leg_sensing().counters()));
   health_.follow(Fault::kLioRejected, now_ns, lio_rejections(counters));
   health_.follow(Limit::kHeightRejected, now_ns, counters.height_rejected);
+}
+
+// A drive in error gives no torque that could be trusted: the step is finished, then the gait stops.
+void ControlLane::report_bus(std::int64_t now_ns) noexcept {
+  drives_.bus = joint_port_.status();
+  const hal::JointBusStatus& bus = drives_.bus;
+  health_.follow(Fault::kDriveError, now_ns, bus.drive_error_replies);
+  health_.follow(Fault::kBusOff, now_ns, bus.bus_offs);
+  health_.follow(Fault::kBusUnknownId, now_ns, bus.unknown_ids);
+  health_.follow(Fault::kBusBadFrame, now_ns, bus.bad_frames);
+  health_.follow(Fault::kBusFrameLost, now_ns, bus.lost);
+  health_.follow(Fault::kBusCallFailed, now_ns, bus.failed_calls);
+  health_.follow(Limit::kDriveClamped, now_ns, bus.clamped);
+  const bool feet_silent = bus.feet_silent && module_state() != ModuleState::kArming;
+  if (feet_silent && !feet_silent_) health_.raise(Fault::kFeetSilent, now_ns);
+  feet_silent_ = feet_silent;
+  if (!bus.drive_errors.is_empty()) gait_.request_stop();
 }
 
 void ControlLane::report_lidar(std::int64_t now_ns) noexcept {
@@ -149,13 +212,13 @@ void ControlLane::report_gait(std::int64_t now_ns) noexcept {
 }
 
 void ControlLane::answer_pose_request(std::int64_t now_ns) noexcept {
-  if (!link_.pose_request.try_take()) return;
+  if (!pose_asked_) return;
   const PoseRequest& request = link_.pose_request.front();
   PoseAnswer& answer = link_.pose_answer.back();
   answer.number = request.number;
   answer.found = estimator_.try_state_at(request.stamp_ns, answer.state);
   if (!answer.found && estimator_.state().initialised) health_.raise(Limit::kStateRingMissed, now_ns);
-  link_.pose_answer.publish();
+  link_.pose_answer.publish(now_ns);
 }
 
 // A tread's height enters the estimator once, as it was frozen at the latch: what the map has learnt from this pose

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sense, estimate, gait, command: in every cycle.
+//
+// It starts arming: an MIT drive answers only a command, and where the legs are is not known before each has answered,
+// so commands without gains and torques ask them. From the first accepted feedback of all joints on the gait commands.
 #pragma once
 
 #include "algorithms/core/work.hpp"
 #include "firmware/lane_link.hpp"
 #include "firmware/params.hpp"
+#include "firmware/telemetry.hpp"
 #include "hal/ports/imu.hpp"
 #include "hal/ports/joint_bus.hpp"
 #include "hal/ports/lidar_odometry.hpp"
@@ -29,9 +33,18 @@ class ControlLane {
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
   [[nodiscard]] const Health& all_faults() const noexcept { return all_faults_; }  // of all lanes, as of this cycle
   [[nodiscard]] const JointCommand& last_command() const noexcept { return command_; }
+  [[nodiscard]] ModuleState module_state() const noexcept;
+  [[nodiscard]] const DriveReport& drives() const noexcept { return drives_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_; }  // of this lane
+  // What perception has found, as far as this frame sees it.
+  [[nodiscard]] const FootholdSet& footholds() const noexcept { return link_.footholds.front(); }
+  [[nodiscard]] const LaneView& view() const noexcept { return view_; }
 
  private:
+  void look_across(std::int64_t now_ns) noexcept;
+  void read_joints(std::int64_t now_ns) noexcept;
+  void note_silent_drives(const JointFeedback& joints, std::int64_t now_ns) noexcept;
+  void report_bus(std::int64_t now_ns) noexcept;
   void answer_pose_request(std::int64_t now_ns) noexcept;
   void report_lidar(std::int64_t now_ns) noexcept;
   void report_rejections(std::int64_t now_ns) noexcept;
@@ -49,9 +62,12 @@ class ControlLane {
   Estimator estimator_;
   Gait gait_;
   Health all_faults_;
-  FootholdSet footholds_;
+  LaneView view_;
+  bool pose_asked_ = false;  // a request came with this frame
   JointCommand command_;
+  DriveReport drives_;
   bool command_ready_ = false;
+  bool feet_silent_ = false;
   bool lio_missing_ = false;
   bool gait_stopped_ = false;
   std::int64_t first_ns_ = -1;          // of the first cycle: the time-out of a lidar that never speaks starts there

@@ -2,7 +2,9 @@
 // The lanes, and everything that crosses between them. Each exchange has one writer and one reader.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 
 #include "algorithms/core/containers/exchange.hpp"
 #include "algorithms/core/messages/footholds.hpp"
@@ -10,17 +12,59 @@
 #include "algorithms/core/messages/state.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
 #include "firmware/faults.hpp"
+#include "scheduler/schedule_table.hpp"
 
 namespace polygmap {
 
 enum Lane : std::uint8_t { kControlLane, kPerceptionLane, kLaneCount };
 
+// What one lane publishes in frame n (a cycle's due time), the other sees from frame n + 1 on, in one lane too: which
+// of two threads is quicker changes nothing. A lane that catches up is at most two frames late, the executive skips
+// what is older (CyclicExecutive::kMaxCaughtUp); the exchanges have slots for that.
+inline constexpr std::int64_t kMaxFramesApart = 2;
+// Of a value in every frame: those of the frames in between, the newest one before them, the one held, the one filled.
+inline constexpr std::size_t kEveryFrameSlots = kMaxFramesApart + 3;
+// Of a value that takes two frames at least, as a question and its answer do.
+inline constexpr std::size_t kSecondFrameSlots = kMaxFramesApart / 2 + 3;
+// Of a value that takes more than kMaxFramesApart frames.
+inline constexpr std::size_t kSeldomSlots = 3;
+
+// How far a lane has come; written by its thread when a cycle is over.
+struct alignas(64) LaneProgress {
+  std::atomic<std::int64_t> finished_ns{kNoFrame_ns};  // the cycle's due time
+};
+using LaneProgresses = std::array<LaneProgress, kLaneCount>;
+
+// What a lane sees of the other one in the frame that it runs: settled when the frame begins, so that all its rows see
+// the same.
+class LaneView {
+ public:
+  // False when the other lane has not finished the frame before: what it publishes there is then seen a frame later.
+  // The first frame has none before it; frames that this lane skipped are told as slips.
+  [[nodiscard]] bool begin(std::int64_t frame_ns, std::int64_t other_finished_ns) noexcept {
+    const bool in_time = other_finished_ns >= std::min(frame_ns - kCycle_ns, frame_ns_);
+    frame_ns_ = frame_ns;
+    other_finished_ns_ = other_finished_ns;
+    last_ns_ = std::min(frame_ns - kCycle_ns, other_finished_ns);
+    return in_time;
+  }
+  // Values of the frames up to this one are seen.
+  [[nodiscard]] std::int64_t last_ns() const noexcept { return last_ns_; }
+  // As begin() was told: an input of the frame, for who replays it.
+  [[nodiscard]] std::int64_t other_finished_ns() const noexcept { return other_finished_ns_; }
+
+ private:
+  std::int64_t last_ns_ = kNoFrame_ns;
+  std::int64_t other_finished_ns_ = kNoFrame_ns;
+  std::int64_t frame_ns_ = kNoFrame_ns;
+};
+
 // A lane's faults and limits. Its thread counts in `own` and publishes; control reads what was published.
 struct LaneHealth {
   Health own;
-  Exchange<Health> published;
+  Exchange<Health, kEveryFrameSlots> published;
 
-  void publish() noexcept { published.publish(own); }
+  void publish(std::int64_t frame_ns) noexcept { published.publish(frame_ns, own); }
 };
 using LaneHealths = std::array<LaneHealth, kLaneCount>;
 
@@ -44,16 +88,18 @@ struct SearchContext {
 
 // The pair of control and perception.
 struct ControlPerceptionLink {
-  Exchange<PoseRequest> pose_request;      // perception -> control
-  Exchange<PoseAnswer> pose_answer;        // control -> perception
-  Exchange<SearchContext> search_context;  // control -> perception
-  Exchange<FootholdSet> footholds;         // perception -> control
+  LaneProgresses progress;
+  Exchange<PoseRequest, kSecondFrameSlots> pose_request;     // perception -> control
+  Exchange<PoseAnswer, kSecondFrameSlots> pose_answer;       // control -> perception
+  Exchange<SearchContext, kEveryFrameSlots> search_context;  // control -> perception
+  Exchange<FootholdSet, kSecondFrameSlots> footholds;        // perception -> control
 };
 
-// What perception made, copied out when it was finished, for whoever watches the module on control's thread.
+// What perception made, copied out when it was finished, for whoever watches the module on control's thread. By frames
+// like all else that crosses, so that a watcher sees the same in one lane and in two.
 struct PerceptionTelemetry {
-  Exchange<SurfaceFrame> surfaces;
-  Exchange<MapSnapshot> map;
+  Exchange<SurfaceFrame, kSeldomSlots> surfaces;
+  Exchange<MapSnapshot, kSeldomSlots> map;
 };
 
 }  // namespace polygmap

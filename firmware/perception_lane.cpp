@@ -7,7 +7,7 @@ namespace polygmap {
 namespace {
 
 constexpr std::int64_t kCameraTimeout_ns = 200 * kNsPerMs;  // six frames
-constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers within two cycles
+constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers within three cycles
 
 // In instructions, by what they copy and go through.
 constexpr std::int32_t kLearnMount = 2500, kLearnPerSurface = 60;
@@ -29,7 +29,8 @@ PerceptionLane::PerceptionLane(hal::DepthCamera& camera, ControlPerceptionLink& 
       search_(params.footholds, params.robot.sole) {}
 
 Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
-  health_.publish();
+  look_across(now_ns);
+  health_.publish(now_ns);
   if (last_frame_ns_ < 0) last_frame_ns_ = now_ns;
   if (stage_ == FrameStage::kWaiting) {
     if (!camera_port_.try_acquire(frame_)) {
@@ -47,13 +48,13 @@ Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
       return Progress::kIdle;
     }
     link_.pose_request.back() = {++request_, frame_.stamp_ns};
-    link_.pose_request.publish();
+    link_.pose_request.publish(now_ns);
     stage_ = FrameStage::kPoseAsked;
     return Progress::kBusy;
   }
   if (stage_ != FrameStage::kPoseAsked) return Progress::kIdle;
   // A late answer to a request that was given up is not this frame's.
-  if (link_.pose_answer.try_take() && link_.pose_answer.front().number == request_) {
+  if (link_.pose_answer.front().number == request_) {
     begin_extraction(now_ns);
     return Progress::kDone;
   }
@@ -62,6 +63,15 @@ Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
   stage_ = FrameStage::kWaiting;
   camera_port_.release();
   return Progress::kDone;
+}
+
+// As ControlLane::look_across().
+void PerceptionLane::look_across(std::int64_t now_ns) noexcept {
+  const std::int64_t finished_ns = link_.progress[kControlLane].finished_ns.load(std::memory_order_acquire);
+  if (!view_.begin(now_ns, finished_ns)) health_.own.raise(Fault::kLaneBehind, now_ns);
+  (void)link_.pose_answer.try_take(view_.last_ns());
+  (void)link_.search_context.try_take(view_.last_ns());  // the newest, or the last one again
+  health_.own.follow(Limit::kHandOverLost, now_ns, link_.pose_answer.lost() + link_.search_context.lost());
 }
 
 void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
@@ -76,7 +86,7 @@ void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
     view.intrinsics = intrinsics_;
     view.camera_up = (camera_T_base.R * exposure_state_.odom_T_base.R.transpose()) * Vec3::UnitZ();
     // Yaw of the mount stays as vague as the data sheet.
-    view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior_tilt_sigma_rad);
+    view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior.tilt_sigma_rad);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       if (!params_.self_filter) break;
       body_[index_of(foot)] =
@@ -108,9 +118,9 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
 
 void PerceptionLane::finish_picture(std::int64_t now_ns) noexcept {
   camera_port_.release();
-  health_.own.follow(Limit::kRunsFull, now_ns, extractor_.counters().run_overflow);
+  health_.own.follow(Limit::kSegmentsFull, now_ns, extractor_.counters().segment_overflow);
   health_.own.follow(Limit::kPlanesFull, now_ns, extractor_.counters().plane_overflow);
-  if (watcher_ != nullptr) watcher_->surfaces.publish(extractor_.result());
+  if (watcher_ != nullptr) watcher_->surfaces.publish(now_ns, extractor_.result());
   begin_map(now_ns);
   stage_ = FrameStage::kWaiting;
 }
@@ -164,7 +174,7 @@ void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   if (params_.estimate_mount) view.mount_sigma_rad = mount_.tilt_sigma_rad();  // else the data sheet is believed
   view.intrinsics = intrinsics_;
   view.body = body_;
-  view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior_tilt_sigma_rad);
+  view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior.tilt_sigma_rad);
   map_.begin(extractor_.result(), view);
   mapping_ = true;
   const PolygonMap::Counters& counters = map_.counters();
@@ -179,13 +189,12 @@ Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
     mapping_ = false;
     search_due_ = true;
     health_.own.follow(Limit::kMapFull, now_ns, map_.counters().evicted + map_.counters().refused);
-    if (watcher_ != nullptr) watcher_->map.publish(map_.snapshot());
+    if (watcher_ != nullptr) watcher_->map.publish(now_ns, map_.snapshot());
   }
   return progress;
 }
 
 void PerceptionLane::begin_search() noexcept {
-  (void)link_.search_context.try_take();  // the newest, or the last one again
   const SearchContext& context = link_.search_context.front();
   FootholdSearch::Query query;
   query.world_T_base = context.state.world_T_base();
@@ -198,7 +207,7 @@ void PerceptionLane::begin_search() noexcept {
   searching_ = true;
 }
 
-Progress PerceptionLane::footholds(std::int64_t, WorkBudget& budget) noexcept {
+Progress PerceptionLane::footholds(std::int64_t now_ns, WorkBudget& budget) noexcept {
   if (!searching_ && search_due_) {
     begin_search();
     budget.spend(
@@ -206,7 +215,7 @@ Progress PerceptionLane::footholds(std::int64_t, WorkBudget& budget) noexcept {
   }
   if (!searching_) return Progress::kIdle;
   const Progress progress = search_.step(budget);
-  if (progress == Progress::kDone) link_.footholds.publish(search_.result());
+  if (progress == Progress::kDone) link_.footholds.publish(now_ns, search_.result());
   if (progress != Progress::kBusy) searching_ = false;
   return progress;
 }

@@ -31,10 +31,13 @@ class PerceptionLane {
   [[nodiscard]] const PolygonMap& polygon_map() const noexcept { return map_; }
   [[nodiscard]] const FootholdSearch& foothold_search() const noexcept { return search_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_.own; }  // of this lane
+  [[nodiscard]] const FootholdSet& footholds_found() const noexcept { return search_.result(); }
+  [[nodiscard]] const LaneView& view() const noexcept { return view_; }
 
  private:
   enum class FrameStage : std::uint8_t { kWaiting, kPoseAsked, kExtracting, kLearning };
 
+  void look_across(std::int64_t now_ns) noexcept;
   void begin_extraction(std::int64_t now_ns) noexcept;
   void begin_map(std::int64_t now_ns) noexcept;
   void begin_learning() noexcept;
@@ -51,6 +54,7 @@ class PerceptionLane {
   CameraIntrinsics intrinsics_;
 
   // The next frame is extracted while the last one is still being searched.
+  LaneView view_;
   FrameStage stage_ = FrameStage::kWaiting;
   bool mapping_ = false;
   bool search_due_ = false;

@@ -53,21 +53,47 @@ constexpr auto kMemory = [] {
 }();
 static_assert(sum_bytes(kMemory) <= kMemoryBudget_bytes);
 
+// Rows of a lane, as bits.
+constexpr auto kLaneRows = [] {
+  std::array<std::uint32_t, kLaneCount> rows{};
+  for (std::size_t row = 0; row < kTasks.size(); ++row) rows[kTasks[row].row.lane] |= 1U << row;
+  return rows;
+}();
+// The first row of a lane looks across; and each cycle has rows by which cycle_done() knows the lane.
+static_assert([] {
+  bool good = true;
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
+    const auto first = std::ranges::find(kSchedule, lane, &ScheduleRow::lane);
+    good = good && first->slots == kEverySlot && first->shed_order == 0;
+  }
+  return good;
+}());
+
 }  // namespace
 
 Progress Pipeline::run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
   return kTasks[row].function.run(*this, cycle_ns, budget);
 }
 
+// An executive of one lane runs the rows of all: the rows say whose cycle it was.
+void Pipeline::cycle_done(std::size_t, const CycleReport& report) noexcept {
+  const std::uint32_t rows = report.ran | report.shed | report.deferred;
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
+    if ((rows & kLaneRows[lane]) != 0) lane_finished(lane, report.due_ns);
+  }
+}
+
 Telemetry Pipeline::telemetry(std::int64_t now_ns, PerceptionTelemetry& perception) const noexcept {
-  (void)perception.surfaces.try_take();  // the newest, or the last one again
-  (void)perception.map.try_take();
+  (void)perception.surfaces.try_take(control_.view().last_ns());  // the newest, or the last one again
+  (void)perception.map.try_take(control_.view().last_ns());
   return {now_ns,
           control_.state(),
           control_.estimator().quality(),
           perception.surfaces.front(),
           perception.map.front(),
-          control_.gait_status()};
+          control_.gait_status(),
+          control_.module_state(),
+          control_.drives()};
 }
 
 std::span<const StageMemory> static_memory() noexcept { return kMemory; }

@@ -7,12 +7,13 @@
 #include "firmware/control_lane.hpp"
 #include "firmware/perception_lane.hpp"
 #include "firmware/telemetry.hpp"
+#include "scheduler/cyclic_executive.hpp"
 
 namespace polygmap {
 
-static_assert(EIGEN_MAX_ALIGN_BYTES == POLYGMAP_EIGEN_ALIGN_BYTES,
-              "Eigen aligns its types in another way here than in the module: compile both with the same -mavx2 or "
-              "-march, or set POLYGMAP_AVX2");
+#if defined(EIGEN_VECTORIZE) || EIGEN_MAX_STATIC_ALIGN_BYTES != 0
+#error "Eigen sums and aligns in another way here than in the module: compile with -DEIGEN_DONT_VECTORIZE"
+#endif
 
 struct Ports {
   hal::DepthCamera& camera;
@@ -33,6 +34,13 @@ class Pipeline {
   Pipeline& operator=(const Pipeline&) = delete;
 
   Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept;
+
+  // Told by the executive when a cycle is over: from the next one on the other lane sees what was published in it.
+  void cycle_done(std::size_t lane, const CycleReport& report) noexcept;
+  // The same of one of the module's lanes; a replay says by it how far the other one was.
+  void lane_finished(std::size_t lane, std::int64_t cycle_ns) noexcept {
+    link_.progress[lane].finished_ns.store(cycle_ns, std::memory_order_release);
+  }
 
   [[nodiscard]] ControlLane& control() noexcept { return control_; }
   [[nodiscard]] const ControlLane& control() const noexcept { return control_; }

@@ -78,6 +78,7 @@ static_assert(std::ranges::all_of(kTasks,
 template <std::size_t LaneNumber>
 using LaneExecutive = CyclicExecutive<Pipeline, kSchedule, LaneNumber, Health>;
 template <typename Tasks = Pipeline>
+requires WatchesCycles<Tasks>  // it tells the pipeline, which hands over nothing otherwise
 using OneLaneExecutive = CyclicExecutive<Tasks, kOneLaneSchedule, 0, Health>;
 
 }  // namespace polygmap

@@ -2,15 +2,35 @@
 // The module seen from outside after a tick: for reports, recorders and tests. Never an input.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "algorithms/core/messages/gait_status.hpp"
 #include "algorithms/core/messages/state.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/estimation/quality/estimate_quality.hpp"
+#include "hal/ports/joint_bus.hpp"
 
 namespace polygmap {
+
+enum class ModuleState : std::uint8_t {
+  kArming,    // some drive has not answered yet: commands without gains and torques
+  kRunning,   // the gait commands the joints
+  kSafeStop,  // the gait has stopped on two feet and holds; its stop_reason says why
+};
+[[nodiscard]] constexpr std::string_view name_of(ModuleState state) noexcept {
+  constexpr std::array<std::string_view, 3> kNames{"arming", "running", "safe_stop"};
+  return kNames[static_cast<std::size_t>(state)];
+}
+
+// What the joints' bus and drives tell of themselves.
+struct DriveReport {
+  JointSet silent;       // for more than LegSensing::kCarried_cycles, as of the last feedback
+  JointSet ever_silent;  // since the start
+  hal::JointBusStatus bus;
+};
 
 // References into the module's static object, valid until its next tick or telemetry.
 struct Telemetry {
@@ -20,6 +40,8 @@ struct Telemetry {
   const SurfaceFrame& surfaces;    // newest finished frame; its sequence changes when a new one is done
   const MapSnapshot& map;          // stamp_ns changes in the tick a frame was fused
   const GaitStatus& gait;
+  ModuleState module_state;
+  const DriveReport& drives;
 };
 
 // One line of the static memory table.

@@ -145,9 +145,9 @@ bool SimRobot::try_read(JointFeedback& feedback) noexcept {
   return true;
 }
 
-bool SimRobot::try_write(const JointCommand& command) noexcept {
+JointSet SimRobot::try_write(const JointCommand& command) noexcept {
   command_ = command;
-  return true;
+  return JointSet::all();
 }
 
 bool SimRobot::try_read(LioSample& sample) noexcept {

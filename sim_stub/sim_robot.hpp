@@ -17,6 +17,7 @@
 #include "sim_stub/camera/depth_camera.hpp"
 #include "sim_stub/plant/kinematic_plant.hpp"
 #include "sim_stub/plant/mujoco_plant.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "sim_stub/sensors/robot_errors.hpp"
 #include "sim_stub/sensors/sensor_models.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
@@ -82,7 +83,9 @@ class SimRobot final : public hal::Clock,
   void release() noexcept override { camera_.release(); }
   [[nodiscard]] bool try_read(ImuSample& sample) noexcept override { return imu_queue_.try_pop(sample); }
   [[nodiscard]] bool try_read(JointFeedback& feedback) noexcept override;
-  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override;
+  // Takes every command; the drives are wired directly.
+  [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override;
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override { return {.senses_feet = force_sensors_}; }
   [[nodiscard]] bool try_read(LioSample& sample) noexcept override;
 
  private:

@@ -12,7 +12,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   standstill_.reset(params.standstill);
   contacts_.reset(params.contacts);
   leg_sensing_.reset(params.legs, robot);
-  imu_noise_.reset();
+  imu_noise_.reset(params.imu_noise);
   odometry_.reset(params, robot);
   ring_.clear();
   state_ = {};
@@ -22,6 +22,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   has_state_ = false;
   ground_ = {};
   stood_ = {};
+  was_measured_ = {true, true};
   origin_ = {};
 }
 
@@ -47,7 +48,7 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   // The last rates bridge a short silence of the IMU; beyond it the feet alone say how the base moves.
   const bool felt = imu_.any && seconds(now_ns - imu_.newest.stamp_ns) <= params_.max_step_s;
   odometry_.step({now_ns, dt_s, imu_.mean.gyro_radps, imu_.mean.accel_mps2, felt, new_legs, imu_noise_.density()},
-                 legs_.sample.legs, contacts_.feet(), ground_);
+                 legs_.sample.legs, measured_contacts(new_legs), ground_);
   publish(now_ns);
   if (seconds(now_ns - state_.oldest_input_ns) <= params_.max_step_s) ring_.push(state_);
 }
@@ -150,9 +151,22 @@ void Estimator::take_legs(const std::array<bool, kFootCount>& planned_stance) no
     if (ground_.touch_downs[i].now) ground_.touch_downs[i].odom_T_sole = then.odom_T_sole[i];
   }
   // A robot that is being put down rocks on its soles.
-  if (state_.initialised || standstill_.collecting()) {
+  const bool measured = sample.measured[0] && sample.measured[1];
+  if (measured && (state_.initialised || standstill_.collecting())) {
     leg_sensing_.learn_offsets(sample.legs, contacts_.feet(), params_.max_step_s);
   }
+}
+
+std::array<FootContact, kFootCount> Estimator::measured_contacts(bool new_legs) noexcept {
+  std::array<FootContact, kFootCount> known = contacts_.feet();
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    FootContact& contact = known[i];
+    const bool measured = legs_.sample.measured[i];
+    if (!measured) contact.stands = contact.landed = false;
+    if (new_legs && measured && !was_measured_[i]) contact.landed = contact.stands;
+    if (new_legs) was_measured_[i] = measured;
+  }
+  return known;
 }
 
 void Estimator::calibrate() noexcept {
@@ -192,7 +206,7 @@ void Estimator::begin(const ContactInEkf::Start& start) noexcept {
 
 void Estimator::publish(std::int64_t now_ns) noexcept {
   state_.stamp_ns = counters_.stamp_ns = quality_.stamp_ns = now_ns;
-  state_.oldest_input_ns = std::min(imu_.newest.stamp_ns, legs_.sample.stamp_ns);
+  state_.oldest_input_ns = std::min(imu_.newest.stamp_ns, legs_.sample.stamp_ns - legs_.sample.silent_ns);
   if (state_.initialised) {
     odometry_.describe(now_ns, state_);
     odometry_.describe(now_ns, quality_);

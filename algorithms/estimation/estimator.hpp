@@ -21,6 +21,7 @@ class Estimator {
     std::int64_t max_lead_ns = 10 * kNsPerMs;
     double max_height_error_m = 0.03;
     double floor_sigma_m = 0.003;
+    ImuNoise::Params imu_noise;
 
     static void visit(auto& p, auto& field) {
       ProprioceptiveOdometry::Params::visit(p, field);
@@ -34,6 +35,7 @@ class Estimator {
       field("max_height_error_m", p.max_height_error_m, 0.001, 1.0,
             "A tread's height this far from the sole on it is refused.");
       field("floor_sigma_m", p.floor_sigma_m, 1e-5, 1.0, "Height of the floor under the feet at the start.");
+      field("imu_noise", p.imu_noise);
     }
   };
   struct Counters {
@@ -103,6 +105,8 @@ class Estimator {
     std::int64_t initialised_ns = 0;
   };
   void take_legs(const std::array<bool, kFootCount>& planned_stance) noexcept;
+  // Of the legs that are measured. One that is again is put where kinematics has it, as if it had just landed.
+  [[nodiscard]] std::array<FootContact, kFootCount> measured_contacts(bool new_legs) noexcept;
   void calibrate() noexcept;
   void begin(const ContactInEkf::Start& start) noexcept;
   void publish(std::int64_t now_ns) noexcept;
@@ -126,6 +130,7 @@ class Estimator {
   bool has_state_ = false;
   ProprioceptiveOdometry::Ground ground_;
   std::array<bool, kFootCount> stood_{};
+  std::array<bool, kFootCount> was_measured_{true, true};
   Origin origin_;
 };
 

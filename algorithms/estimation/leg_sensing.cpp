@@ -2,8 +2,24 @@
 #include "algorithms/estimation/leg_sensing.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace polygmap {
+namespace {
+
+JointFeedback carried_on(const JointFeedback& joints) noexcept {
+  JointFeedback carried = joints;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const std::uint16_t cycles = std::min(joints.silent_cycles[n], LegSensing::kCarried_cycles);
+    if (cycles == 0) continue;
+    const auto i = static_cast<Eigen::Index>(n);
+    carried.q_rad[i] += cycles * kTick_s * joints.dq_radps[i];
+    if (joints.silent_cycles[n] > LegSensing::kCarried_cycles) carried.dq_radps[i] = 0.0;
+  }
+  return carried;
+}
+
+}  // namespace
 
 void LegSensing::reset(const Params& params, const RobotModel& robot) noexcept {
   params_ = params;
@@ -13,6 +29,7 @@ void LegSensing::reset(const Params& params, const RobotModel& robot) noexcept {
   forces_.reset(params.forces);
   joints_ = {};
   dt_s_ = 0.0;
+  replied_ns_ = {};
   any_ = false;
 }
 
@@ -42,21 +59,30 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
     ++counters_.stale;
     return false;
   }
-  // The bound grows until the next accepted sample, so a true move is taken up again by itself.
-  const double most_rad =
-      params_.joint_slack_rad + params_.max_joint_speed_radps * seconds(joints.stamp_ns - joints_.stamp_ns);
-  const JointVector q_rad = joints.q_rad - encoders_.offset_rad();
-  if (any_ && (q_rad - joints_.q_rad).cwiseAbs().maxCoeff() > most_rad) {
+  JointFeedback carried = carried_on(joints);
+  carried.q_rad -= encoders_.offset_rad();
+  if (any_ && jumps(carried)) {
     ++counters_.jump;
     return false;
   }
   dt_s_ = any_ ? seconds(joints.stamp_ns - joints_.stamp_ns) : 0.0;
-  joints_ = joints;
-  joints_.q_rad = q_rad;
+  joints_ = carried;
+  for (std::size_t n = 0; n < kJointCount; ++n) replied_ns_[n] = joints.stamp_ns - joints.silent_ns(n);
   if (params_.infer_forces) joints_.foot_force_n = forces_.update(robot_->legs, joints_, base_up);
   for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
   any_ = true;
   return true;
+}
+
+// The bound grows until the joint's next accepted reply, so a true move is taken up again by itself.
+bool LegSensing::jumps(const JointFeedback& carried) const noexcept {
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const auto i = static_cast<Eigen::Index>(n);
+    const double most_rad =
+        params_.joint_slack_rad + params_.max_joint_speed_radps * seconds(carried.stamp_ns - replied_ns_[n]);
+    if (std::abs(carried.q_rad[i] - joints_.q_rad[i]) > most_rad) return true;
+  }
+  return false;
 }
 
 LegSample LegSensing::legs() const noexcept {
@@ -64,6 +90,12 @@ LegSample LegSensing::legs() const noexcept {
   sample.stamp_ns = joints_.stamp_ns;
   for (std::size_t i = 0; i < kFootCount; ++i) {
     sample.legs[i] = measure_leg(robot_->legs, static_cast<Foot>(i), joints_.q_rad, joints_.dq_radps);
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      const std::size_t n = joint_index(static_cast<Foot>(i), j);
+      if (joints_.silent_cycles[n] <= kCarried_cycles) continue;
+      sample.measured[i] = false;
+      sample.silent_ns = std::max(sample.silent_ns, joints_.silent_ns(n));
+    }
   }
   sample.foot_force_n = joints_.foot_force_n;
   return sample;

@@ -11,6 +11,9 @@ namespace polygmap {
 
 class LegSensing {
  public:
+  // A joint whose drive is silent goes on at its last speed for so long, then stays where that took it and its leg is
+  // no measurement any more.
+  static constexpr std::uint16_t kCarried_cycles = 5;
   struct Params {
     EncoderOffsets::Params encoders;
     bool infer_forces = false;
@@ -63,14 +66,16 @@ class LegSensing {
 
  private:
   [[nodiscard]] bool is_valid(const JointFeedback& joints) const noexcept;
+  [[nodiscard]] bool jumps(const JointFeedback& carried) const noexcept;
 
   Params params_;
   const RobotModel* robot_ = nullptr;
   Counters counters_;
   EncoderOffsets encoders_;
   ForceInference forces_;
-  JointFeedback joints_;  // last accepted
-  double dt_s_ = 0.0;     // between it and the one before
+  JointFeedback joints_;                                // last accepted
+  double dt_s_ = 0.0;                                   // between it and the one before
+  std::array<std::int64_t, kJointCount> replied_ns_{};  // last reply of each joint that was accepted
   bool any_ = false;
 };
 

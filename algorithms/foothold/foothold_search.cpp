@@ -45,7 +45,7 @@ void FootholdSearch::begin(const MapSnapshot& map, const Query& query) noexcept 
   levels_.clear();
   uprights_.clear();
   found_ = {};
-  raster_.centre_on(base_.origin_m() + params_.centre_ahead_m * base_.heading(), params_.g_res_m);
+  raster_.centre_on(base_.origin_m() + params_.raster.centre_ahead_m * base_.heading(), params_.raster.g_res_m);
   index_ = 0;
   row_ = 0;
   stage_ = Stage::kPrepare;
@@ -116,7 +116,7 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
     if (confirmed) {
       (void)levels_.try_push_back(level);  // as many as the map holds
     } else if (level.height_m > z_foot_ + params_.delta_foot_m &&
-               in_range(base_(centroid_m(level.hull)), params_.g_range_m)) {
+               in_range(base_(centroid_m(level.hull)), params_.raster.g_range_m)) {
       found_.unconfirmed_ahead = true;
     }
   }
@@ -130,10 +130,10 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
 FootholdSearch::Extent FootholdSearch::extent_on(const LevelSurface& tread, const Vec2& a_m,
                                                  const Vec2& b_m) const noexcept {
   const double a = tread.lateral_m(a_m), b = tread.lateral_m(b_m), middle_m = this->middle_m(tread);
-  const double feet_m = params_.half_spacing_m + foot_.collision.half_width_m + params_.side_margin_m;
+  const double feet_m = params_.feet.half_spacing_m + foot_.collision.half_width_m + params_.feet.side_margin_m;
   if (std::min(a, b) < middle_m - feet_m && std::max(a, b) > middle_m + feet_m) return Extent::kAcross;
-  const bool near = std::max(a, b) > middle_m - feet_m - params_.evade_max_m &&
-                    std::min(a, b) < middle_m + feet_m + params_.evade_max_m;
+  const bool near = std::max(a, b) > middle_m - feet_m - params_.feet.evade_max_m &&
+                    std::min(a, b) < middle_m + feet_m + params_.feet.evade_max_m;
   return near ? Extent::kPartial : Extent::kAside;
 }
 
@@ -159,7 +159,7 @@ void FootholdSearch::link_upright(LevelSurface& tread, const Upright& u) const n
                          u.top_m < tread.height_m + p.taller_m;
   if (own_riser) return;
   const double left = tread.lateral_m(u.left_m()), right = tread.lateral_m(u.right_m());
-  const double aside_m = foot_.collision.half_width_m + params_.side_margin_m;
+  const double aside_m = foot_.collision.half_width_m + params_.feet.side_margin_m;
   const Interval met{std::min(left, right) - aside_m, std::max(left, right) + aside_m};
   add_obstacle(tread, {std::min(a, b) - foot_.collision.toe_x_m, margin_m, met}, middle_m(tread));
 }
@@ -184,7 +184,7 @@ void FootholdSearch::link(std::size_t i) noexcept {
   for (const Upright& upright : uprights_) link_upright(tread, upright);
   const Vec2& sole_p_m = sole_.origin_m();
   const double along_m = tread.along_m(sole_p_m);
-  if (tread.far_end_m && along_m > 0.0 && along_m < *tread.far_end_m &&
+  if (tread.ends.far_m && along_m > 0.0 && along_m < *tread.ends.far_m &&
       in_sole_layer(tread.plane.height_m(sole_p_m), z_foot_, params_.delta_foot_m)) {
     found_.underfoot = i;
   }
@@ -205,25 +205,25 @@ double FootholdSearch::distance2_to_row_m2(const Vec2& from_m, std::int32_t row)
 
 // How much of the floor before the standing foot was seen, eq. (28): where nothing rises, that says so.
 void FootholdSearch::look_at_top(std::int32_t row) noexcept {
-  if (std::abs(raster_.at(0, row).y() - sole_.origin_m().y()) > params_.top_to_m + params_.top_half_width_m) return;
+  if (std::abs(raster_.at(0, row).y() - sole_.origin_m().y()) > params_.top.to_m + params_.top.half_width_m) return;
   const Vec2 first = sole_(raster_.at(0, row)), step = sole_(raster_.at(1, row)) - first;
-  const double half_width_m = params_.top_half_width_m;
+  const double half_width_m = params_.top.half_width_m;
   const FootholdRaster::Columns ahead =
-      FootholdRaster::columns_within(first.x(), step.x(), {params_.top_from_m, params_.top_to_m}) &
+      FootholdRaster::columns_within(first.x(), step.x(), {params_.top.from_m, params_.top.to_m}) &
       FootholdRaster::columns_within(first.y(), step.y(), {-half_width_m, half_width_m});
   work_.add(120);
   work_.add(std::max(ahead.end - ahead.begin, 0), 46);
   for (std::int32_t column = ahead.begin; column < ahead.end; ++column) {
     const Vec2 sole_p = first + static_cast<double>(column) * step;
-    if (sole_p.x() < params_.top_from_m || sole_p.x() > params_.top_to_m ||
-        std::abs(sole_p.y()) > params_.top_half_width_m) {
+    if (sole_p.x() < params_.top.from_m || sole_p.x() > params_.top.to_m ||
+        std::abs(sole_p.y()) > params_.top.half_width_m) {
       continue;
     }
     const Vec2 p = raster_.at(column, row);
     // Where the tread underfoot was seen to end there is nothing to look at behind.
     if (found_.underfoot != kNone) {
       const LevelSurface& underfoot = levels_[found_.underfoot];
-      if (underfoot.along_m(p) > *underfoot.far_end_m) continue;
+      if (underfoot.along_m(p) > *underfoot.ends.far_m) continue;
     }
     ++found_.top_cells;
     const std::uint8_t layer = raster_.layer(column, row);
@@ -237,7 +237,7 @@ void FootholdSearch::look_at_top(std::int32_t row) noexcept {
 void FootholdSearch::find_next(std::int32_t row) noexcept {
   if (distance2_to_row_m2(base_.origin_m(), row) >= found_.next_distance2_m2) return;
   const Vec2 first = base_(raster_.at(0, row)), step = base_(raster_.at(1, row)) - first;
-  const double range_m = params_.g_range_m, half_width_m = params_.corridor_half_width_m;
+  const double range_m = params_.raster.g_range_m, half_width_m = params_.corridor_half_width_m;
   const FootholdRaster::Columns corridor =
       FootholdRaster::columns_within(first.x(), step.x(), {-range_m, range_m}) &
       FootholdRaster::columns_within(first.y(), step.y(), {-half_width_m, half_width_m});
@@ -279,8 +279,8 @@ void FootholdSearch::find_next(std::int32_t row) noexcept {
 bool FootholdSearch::fits(const Vec2& p_m, const LevelSurface& surface) noexcept {
   work_.add(85);
   work_.add(surface.edges.size() + surface.toe.size() + surface.obstacles.size(), 12);
-  return in_range(base_(p_m), params_.g_range_m) && below_limit(surface.plane.height_m(p_m), z_foot_, params_.g_z_m) &&
-         surface.spare_m(p_m) >= -params_.g_res_m * std::numbers::sqrt2 / 2.0;
+  return in_range(base_(p_m), params_.raster.g_range_m) && below_limit(surface.plane.height_m(p_m), z_foot_, params_.g_z_m) &&
+         surface.spare_m(p_m) >= -params_.raster.g_res_m * std::numbers::sqrt2 / 2.0;
 }
 
 // The stretches of a row's cells that may be nearer to a point than that; the caller still asks every cell.
@@ -354,7 +354,7 @@ void FootholdSearch::erode_row(std::int32_t row) noexcept {
 double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, double right_m) const noexcept {
   const double heel_m = -foot_.contact.heel_x_m;
   const double margin_m = tread.nosing_margin_m;
-  double spare_m = 2.0 * (params_.heel_inset_m - margin_m);  // where nothing is mapped behind
+  double spare_m = 2.0 * (params_.feet.heel_inset_m - margin_m);  // where nothing is mapped behind
   if (!tread.toe.empty()) {
     spare_m = kInfinity;
     for (const FootLimit& limit : tread.toe) {
@@ -368,11 +368,11 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
     if (o.meets(right_m, left_m)) spare_m = std::min(spare_m, o.sole_end_m - o.margin_m - heel_m - margin_m);
   }
   // A tread that ends in nothing ends all the same: the next riser may be there and not be seen.
-  if (tread.far_end_m) {
-    const double room_m = *tread.far_end_m - heel_m - foot_.collision.toe_x_m;
+  if (tread.ends.far_m) {
+    const double room_m = *tread.ends.far_m - heel_m - foot_.collision.toe_x_m;
     spare_m = std::min(spare_m, room_m - margin_m - tread.back_margin_m);
   }
-  return heel_m + math::clamp(margin_m + 0.5 * spare_m, 0.0, params_.heel_inset_max_m);
+  return heel_m + math::clamp(margin_m + 0.5 * spare_m, 0.0, params_.feet.heel_inset_max_m);
 }
 
 Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept {
@@ -399,10 +399,10 @@ Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, 
 double FootholdSearch::middle_m(const LevelSurface& tread) const noexcept {
   const double own_m = 0.5 * (tread.lateral_m(query_.world_T_sole[0].p_m.head<2>()) +
                               tread.lateral_m(query_.world_T_sole[1].p_m.head<2>()));
-  if (!tread.left_end_m || !tread.right_end_m) return own_m;
-  const double centre_m = 0.5 * (*tread.left_end_m + *tread.right_end_m);
+  if (!tread.ends.left_m || !tread.ends.right_m) return own_m;
+  const double centre_m = 0.5 * (*tread.ends.left_m + *tread.ends.right_m);
   if (!query_.climbing) return centre_m;
-  return math::clamp(centre_m, own_m - params_.veer_max_m, own_m + params_.veer_max_m);
+  return math::clamp(centre_m, own_m - params_.feet.veer_max_m, own_m + params_.feet.veer_max_m);
 }
 
 // For the middle of the feet; the one nearer to a side keeps the margin.
@@ -413,7 +413,7 @@ Interval FootholdSearch::between_sides(const LevelSurface& tread, double along_m
     // Clearance of the foot nearer to the edge is base + inward . left * middle.
     const double across = edge.inside.inward.dot(tread.left);
     const double base_m = edge.clearance_m(tread.at(along_m, 0.0)) - half_m * std::abs(across);
-    const double bound_m = (params_.side_margin_m - base_m) / across;
+    const double bound_m = (params_.feet.side_margin_m - base_m) / across;
     if (across > 0.0) {
       out.min_m = std::max(out.min_m, bound_m);
     } else {
@@ -438,7 +438,7 @@ std::optional<double> FootholdSearch::beside_obstacles(const LevelSurface& tread
   for (const TreadObstacle& o : tread.obstacles) {
     for (const double beside_m : {o.sole_lateral_m.max_m + half_m, o.sole_lateral_m.min_m - half_m}) {
       const double moved_m = std::abs(beside_m - middle_m);
-      if (moved_m > params_.evade_max_m || beside_m < sides.min_m || beside_m > sides.max_m) continue;
+      if (moved_m > params_.feet.evade_max_m || beside_m < sides.min_m || beside_m > sides.max_m) continue;
       if (best && moved_m >= std::abs(*best - middle_m)) continue;
       if (!blocked(tread, beside_m, half_m)) best = beside_m;
     }
@@ -453,9 +453,10 @@ std::optional<double> FootholdSearch::beside_obstacles(const LevelSurface& tread
 StopReason FootholdSearch::place_feet(const LevelSurface& tread, Feet& feet) const noexcept {
   const double middle_m = this->middle_m(tread);
   StopReason reason = StopReason::kTooNarrow;
-  for (std::int32_t i = 0; i < params_.spacings; ++i) {
-    const double half_m = params_.half_spacing_m - (params_.half_spacing_m - params_.half_spacing_min_m) *
-                                                       static_cast<double>(i) / (params_.spacings - 1);
+  for (std::int32_t i = 0; i < params_.feet.spacings; ++i) {
+    const double half_m =
+        params_.feet.half_spacing_m - (params_.feet.half_spacing_m - params_.feet.half_spacing_min_m) *
+                                          static_cast<double>(i) / (params_.feet.spacings - 1);
     double along_m = aim_along_m(tread, middle_m + half_m, middle_m - half_m);
     const Interval sides = between_sides(tread, along_m, half_m);
     if (sides.min_m > sides.max_m) continue;
@@ -487,19 +488,19 @@ bool FootholdSearch::carries(const Upright& riser, const LevelSurface& tread) co
 // A face that rises from the level the robot stands on higher than it may climb, before the next tread.
 bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) const noexcept {
   const Vec2 sole_p_m = base_(sole_.origin_m());
-  const double farthest_m = std::min(query_.climbing ? sole_p_m.x() + params_.step_max_m : params_.g_range_m,
+  const double farthest_m = std::min(query_.climbing ? sole_p_m.x() + params_.step_max_m : params_.raster.g_range_m,
                                      next_distance_m + params_.upright_beyond_m);
   for (const Upright& u : uprights_) {
     if (u.top_m - z_foot_ <= params_.rise_max_m || u.bottom_m > z_foot_ + 2.0 * params_.delta_foot_m) continue;
     // A post is no rise: the feet may go beside it, see link_upright().
-    if (u.outward.dot(base_.heading()) > -params_.uprights.facing_cos || u.width_m() < 2.0 * params_.top_half_width_m)
+    if (u.outward.dot(base_.heading()) > -params_.uprights.facing_cos || u.width_m() < 2.0 * params_.top.half_width_m)
       continue;
     if (found_.next != kNone && carries(u, levels_[found_.next])) continue;
     const Vec2 a = base_(u.point_m + u.reach_left_m * u.direction);
     const Vec2 b = base_(u.point_m + u.reach_right_m * u.direction);
     const double gap_m = std::max(std::min(a.y(), b.y()), -std::max(a.y(), b.y()));
     const double x_m = 0.5 * (a.x() + b.x());
-    if (gap_m > params_.top_half_width_m || x_m < 0.0 || x_m > farthest_m) continue;
+    if (gap_m > params_.top.half_width_m || x_m < 0.0 || x_m > farthest_m) continue;
     top_m = u.top_m;
     return true;
   }
@@ -511,7 +512,7 @@ std::int32_t FootholdSearch::place_feet_instructions(const LevelSurface& tread) 
   const auto edges = static_cast<std::int32_t>(tread.edges.size()), toe = static_cast<std::int32_t>(tread.toe.size());
   const auto obstacles = static_cast<std::int32_t>(tread.obstacles.size());
   const std::int32_t once = 1500 + 50 * edges + 40 * toe + 30 * obstacles;
-  return once + params_.spacings * (120 + 14 * edges + 40 * toe + 30 * obstacles * (1 + obstacles));
+  return once + params_.feet.spacings * (120 + 14 * edges + 40 * toe + 30 * obstacles * (1 + obstacles));
 }
 
 StopReason FootholdSearch::without_next() const noexcept {
@@ -519,7 +520,7 @@ StopReason FootholdSearch::without_next() const noexcept {
   if (!query_.climbing) return StopReason::kNoStaircase;
   // Nothing higher is known: is that because nothing rises there, or because nobody looked?
   const bool looked = found_.top_cells > 0 && static_cast<double>(found_.top_cells_seen) >=
-                                                  params_.top_fraction * static_cast<double>(found_.top_cells);
+                                                  params_.top.fraction * static_cast<double>(found_.top_cells);
   return looked ? StopReason::kTop : StopReason::kNothingSeen;
 }
 

@@ -22,50 +22,31 @@ namespace polygmap {
 
 class FootholdSearch {
  public:
-  struct Params {
+  // The raster of eqs 17-24.
+  struct RasterParams {
     double g_res_m = 0.01;
     double g_range_m = 1.2;
-    double g_z_m = 0.40;
-    double delta_foot_m = 0.025;
-    double rise_max_m = 0.19;
-    // Contact rectangle to the tread's front and back edge, collision toe to the riser: the least, and two sigmas of
-    // where edge and foot are. An edge errs by as much as its own sigma says, 2.3 mm rms in 620 steps on treads of
-    // 270 mm; beside that a foot lands 2.2 mm off, by its legs' errors and the camera's yaw. Two sigmas of both, 6.4
-    // mm of the 9 there are, keep a normal error on the tread in 97.7 % of the steps.
-    EdgeMargin margin{0.003, 2.0, 0.0022};
-    double tread_min_m = 0.260;
+    double centre_ahead_m = 0.4;
+
+    static void visit(auto& p, auto& field) {
+      field("g_res_m", p.g_res_m, 0.005, 0.1, "Side of a raster cell.");
+      field("g_range_m", p.g_range_m, 0.1, 5.0, "Eq. 20: the search goes as far.");
+      field("centre_ahead_m", p.centre_ahead_m, -0.8, 0.8,
+            "The raster's centre lies this far ahead of the base, so that the raster reaches g_range_m ahead.");
+    }
+  };
+  // Where the feet go on a tread.
+  struct FeetParams {
     double side_margin_m = 0.020;
     double veer_max_m = 0.02;
     double half_spacing_m = 0.100;
     double half_spacing_min_m = 0.085;
     double heel_inset_m = 0.014;
     double heel_inset_max_m = 0.030;
-    double corridor_half_width_m = 0.25;
     double evade_max_m = 0.06;
-    double step_max_m = 0.45;
-    double area_min_m2 = 0.01;
-    double top_from_m = 0.20, top_to_m = 0.45;
-    double top_half_width_m = 0.15;
-    double top_fraction = 0.5;
-    std::uint32_t confirmed_sightings = 5;
-    double centre_ahead_m = 0.4;
-    double back_min_m = 0.05, back_max_m = 0.8;
-    double upright_beyond_m = 0.1;
     std::int32_t spacings = 7;
-    LevelSurfaceParams levels;
-    UprightParams uprights;
 
     static void visit(auto& p, auto& field) {
-      field("g_res_m", p.g_res_m, 0.005, 0.1, "Side of a raster cell.");
-      field("g_range_m", p.g_range_m, 0.1, 5.0, "Eq. 20: the search goes as far.");
-      field("g_z_m", p.g_z_m, 0.01, 2.0, "Eq. 23: a foothold is no higher, two rises of 0.175 m and margin.");
-      field("delta_foot_m", p.delta_foot_m, 0.0, 0.039,
-            "Eqs 26, 28: heights as close are one level; the published 0.04 steps over a 40 mm step.");
-      field("rise_max_m", p.rise_max_m, 0.02, 0.5,
-            "A step rises no higher: above the highest rise we climb, 0.175 m; below two of the least, 0.2 m.");
-      field("margin", p.margin);
-      field("tread_min_m", p.tread_min_m, 0.1, 1.0,
-            "A tread is as deep: collision toe and contact heel, 252 mm, and 4 mm at either end.");
       field("side_margin_m", p.side_margin_m, 0.0, 0.5, "Contact rectangle to the tread's sides.");
       field("veer_max_m", p.veer_max_m, 0.0, 0.2,
             "Feet go no farther sideways per tread, towards the middle of the staircase.");
@@ -76,26 +57,65 @@ class FootholdSearch {
       field("heel_inset_m", p.heel_inset_m, 0.0, 0.2, "Heel edge behind the nosing where the back edge is not mapped.");
       field("heel_inset_max_m", p.heel_inset_max_m, 0.0, 0.5, "Heel edge behind the nosing at most, on deep treads.");
       field.ordered("heel_inset_m", "heel_inset_max_m");
+      field("evade_max_m", p.evade_max_m, 0.0, 0.3, "Feet go no farther sideways to stand beside an obstacle.");
+      field("spacings", p.spacings, 2, 14,
+            "As many distances between the feet are tried, from half_spacing_m to half_spacing_min_m.");
+    }
+  };
+  // The floor ahead which says that the stairs end here.
+  struct TopParams {
+    double from_m = 0.20, to_m = 0.45;
+    double half_width_m = 0.15;
+    double fraction = 0.5;
+
+    static void visit(auto& p, auto& field) {
+      field("from_m", p.from_m, 0.0, 2.0, "Floor seen from this far ahead of the sole says that nothing rises there.");
+      field("to_m", p.to_m, 0.0, 2.0, "Floor seen up to this far ahead of the sole says that nothing rises there.");
+      field.ordered("from_m", "to_m");
+      field("half_width_m", p.half_width_m, 0.01, 2.0, "Floor is looked for this far to either side of the sole.");
+      field("fraction", p.fraction, 0.0, 1.0, "At least this share of that floor has been seen.");
+    }
+  };
+  struct Params {
+    double g_z_m = 0.40;
+    double delta_foot_m = 0.025;
+    double rise_max_m = 0.19;
+    // Contact rectangle to the tread's front and back edge, collision toe to the riser: the least, and two sigmas of
+    // where edge and foot are. An edge errs by as much as its own sigma says, 2.3 mm rms in 620 steps on treads of
+    // 270 mm; beside that a foot lands 2.2 mm off, by its legs' errors and the camera's yaw. Two sigmas of both, 6.4
+    // mm of the 9 there are, keep a normal error on the tread in 97.7 % of the steps.
+    EdgeMargin margin{0.003, 2.0, 0.0022};
+    double tread_min_m = 0.260;
+    double corridor_half_width_m = 0.25;
+    double step_max_m = 0.45;
+    double area_min_m2 = 0.01;
+    std::uint32_t confirmed_sightings = 5;
+    double back_min_m = 0.05, back_max_m = 0.8;
+    double upright_beyond_m = 0.1;
+    LevelSurfaceParams levels;
+    UprightParams uprights;
+    RasterParams raster;
+    FeetParams feet;
+    TopParams top;
+
+    static void visit(auto& p, auto& field) {
+      field("g_z_m", p.g_z_m, 0.01, 2.0, "Eq. 23: a foothold is no higher, two rises of 0.175 m and margin.");
+      field("delta_foot_m", p.delta_foot_m, 0.0, 0.039,
+            "Eqs 26, 28: heights as close are one level; the published 0.04 steps over a 40 mm step.");
+      field("rise_max_m", p.rise_max_m, 0.02, 0.5,
+            "A step rises no higher: above the highest rise we climb, 0.175 m; below two of the least, 0.2 m.");
+      field("margin", p.margin);
+      field("tread_min_m", p.tread_min_m, 0.1, 1.0,
+            "A tread is as deep: collision toe and contact heel, 252 mm, and 4 mm at either end.");
       field("corridor_half_width_m", p.corridor_half_width_m, 0.05, 5.0,
             "What lies farther to the side is not the next tread: both feet, 0.15 m, and as much as a body sways; 0.4 "
             "m took "
             "a box beside the way for it (2026-11).");
-      field("evade_max_m", p.evade_max_m, 0.0, 0.3, "Feet go no farther sideways to stand beside an obstacle.");
       field("step_max_m", p.step_max_m, 0.05, 2.0,
             "The next tread begins no farther along the stairs from the standing sole, when climbing.");
       field("area_min_m2", p.area_min_m2, 0.0, 1.0, "A smaller surface is no tread.");
-      field("top_from_m", p.top_from_m, 0.0, 2.0,
-            "Floor seen from this far ahead of the sole says that nothing rises there.");
-      field("top_to_m", p.top_to_m, 0.0, 2.0,
-            "Floor seen up to this far ahead of the sole says that nothing rises there.");
-      field.ordered("top_from_m", "top_to_m");
-      field("top_half_width_m", p.top_half_width_m, 0.01, 2.0,
-            "Floor is looked for this far to either side of the sole.");
-      field("top_fraction", p.top_fraction, 0.0, 1.0, "At least this share of that floor has been seen.");
       field("confirmed_sightings", p.confirmed_sightings, 0, 1000,
             "A foot goes on a surface that has been seen as often.");
-      field("centre_ahead_m", p.centre_ahead_m, -0.8, 0.8,
-            "The raster's centre lies this far ahead of the base, so that the raster reaches g_range_m ahead.");
       field("back_min_m", p.back_min_m, 0.0, 0.5,
             "A riser or nosing that bounds a tread lies farther behind its nosing: what is nearer is the tread's own.");
       field("back_max_m", p.back_max_m, 0.1, 3.0,
@@ -104,10 +124,11 @@ class FootholdSearch {
       field.ordered("back_min_m", "back_max_m");
       field("upright_beyond_m", p.upright_beyond_m, 0.0, 0.5,
             "An upright surface this much farther away than the next tread's nearest point is not looked at.");
-      field("spacings", p.spacings, 2, 14,
-            "As many distances between the feet are tried, from half_spacing_m to half_spacing_min_m.");
       field("levels", p.levels);
       field("uprights", p.uprights);
+      field("raster", p.raster);
+      field("feet", p.feet);
+      field("top", p.top);
     }
   };
   struct Query {

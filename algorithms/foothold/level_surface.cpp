@@ -40,9 +40,9 @@ void note_ends(const SurfacePatch& surface, const LevelSurfaceParams& params, Le
     const Vec2 middle_m = 0.5 * (a + b);
     const double turn = std::abs(out.heading.dot(b - a)) / length_m;  // cosine against the heading
     if (turn > params.end_parallel_cos) {
-      (out.lateral_m(middle_m) > 0.0 ? out.left_end_m : out.right_end_m) = out.lateral_m(middle_m);
+      (out.lateral_m(middle_m) > 0.0 ? out.ends.left_m : out.ends.right_m) = out.lateral_m(middle_m);
     } else if (turn < params.end_across_cos && out.along_m(middle_m) > params.end_min_m) {
-      out.far_end_m = out.along_m(middle_m);
+      out.ends.far_m = out.along_m(middle_m);
     }
   }
 }

@@ -76,6 +76,12 @@ struct TreadObstacle {
   }
 };
 
+// Where they were seen: lateral places of a tread's sides, and how far behind the nosing it ends, in a riser or in
+// nothing.
+struct SeenEnds {
+  std::optional<double> left_m, right_m, far_m;
+};
+
 struct LevelSurface {
   std::uint32_t id = 0;
   std::int64_t last_seen_ns = 0;
@@ -95,8 +101,7 @@ struct LevelSurface {
   StaticVector<FootLimit, 3> toe;                      // collision box to back edge, next nosing, next riser
   double depth_m = 0.0;                                // nosing to the nearest of these, 0: none
   StaticVector<TreadObstacle, 6> obstacles;
-  // Where they were seen: lateral places of its sides, and how far behind the nosing it ends, in a riser or in nothing.
-  std::optional<double> left_end_m, right_end_m, far_end_m;
+  SeenEnds ends;
 
   [[nodiscard]] Vec2 nosing_middle_m() const noexcept { return 0.5 * (nosing_a_m + nosing_b_m).head<2>(); }
   // Sole origin at a distance behind the nosing and to the left of its middle.

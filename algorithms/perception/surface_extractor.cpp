@@ -84,7 +84,7 @@ void SurfaceExtractor::run_stage(WorkBudget& budget) noexcept {
       return;
     case Stage::kSegments:
       if (segmenter_.step(budget) != Progress::kDone) return;
-      counters_.run_overflow += segmenter_.overflow();
+      counters_.segment_overflow += segmenter_.overflow();
       if (segmenter_.blank()) {
         ++counters_.blank_frames;
         regions_.clear();
@@ -98,14 +98,14 @@ void SurfaceExtractor::run_stage(WorkBudget& budget) noexcept {
       return;
     case Stage::kPlanes:
       if (planes_.step(budget) != Progress::kDone) return;
-      counters_.run_overflow += planes_.span_overflow();
+      counters_.segment_overflow += planes_.span_overflow();
       counters_.plane_overflow += planes_.plane_overflow();
       regions_.begin(params_.regions, noise_, raw_, segmenter_.image(), planes_.planes(), planes_.boundaries());
       stage_ = Stage::kRegions;
       return;
     case Stage::kRegions:
       if (regions_.step(budget) != Progress::kDone) return;
-      counters_.run_overflow += regions_.component_overflow();
+      counters_.segment_overflow += regions_.component_overflow();
       counters_.plane_overflow += regions_.region_overflow();
       surfaces_.begin(params_.surfaces, noise_, raw_, segmenter_.image(), regions_.result(), next());
       stage_ = Stage::kSurfaces;

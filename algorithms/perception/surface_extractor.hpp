@@ -53,16 +53,16 @@ class SurfaceExtractor {
     BodyMargin body_margin{0.025, 0.0};
   };
   struct Counters {
-    std::uint32_t frames = 0;          // accepted
-    std::uint32_t bad_view = 0;        // rejected: intrinsics, up or body not finite or out of range
-    std::uint32_t bad_frame = 0;       // rejected: no data or a size other than the intrinsics'
-    std::uint32_t bad_order = 0;       // rejected: not newer than the frame before
-    std::uint32_t busy = 0;            // rejected: the frame before is not finished
-    std::uint32_t blank_frames = 0;    // nothing measured at all
-    std::uint32_t run_overflow = 0;    // segments, spans, components and pairs of planes that found no room
-    std::uint32_t plane_overflow = 0;  // planes or surfaces that found no room
-    std::uint32_t no_polygon = 0;      // surfaces whose outline encloses no area
-    std::uint32_t rejected_lines = 0;  // nosings and back lines that were looked for and not good enough
+    std::uint32_t frames = 0;            // accepted
+    std::uint32_t bad_view = 0;          // rejected: intrinsics, up or body not finite or out of range
+    std::uint32_t bad_frame = 0;         // rejected: no data or a size other than the intrinsics'
+    std::uint32_t bad_order = 0;         // rejected: not newer than the frame before
+    std::uint32_t busy = 0;              // rejected: the frame before is not finished
+    std::uint32_t blank_frames = 0;      // nothing measured at all
+    std::uint32_t segment_overflow = 0;  // segments, spans, components and pairs of planes that found no room
+    std::uint32_t plane_overflow = 0;    // planes or surfaces that found no room
+    std::uint32_t no_polygon = 0;        // surfaces whose outline encloses no area
+    std::uint32_t rejected_lines = 0;    // nosings and back lines that were looked for and not good enough
   };
 
   // Stairs take some 45,000 units, a cluttered desk 70,000. With every capacity full a frame takes at most

@@ -16,11 +16,11 @@ double sine(double cosine) noexcept { return math::sqrt(std::max(1.0 - cosine * 
 
 // The joint before, turned about one of its axes: what a product with rotation_x, _y or _z gives, without the zeros.
 template <std::size_t kJoint>
-void turn(LegFrames& frames, double angle_rad) noexcept {
+void turn(LegFrames& frames, const math::SinCosOf<kJointsPerLeg>& angles) noexcept {
   constexpr int kAxis = kJointAxis[kJoint], kU = (kAxis + 1) % 3, kV = (kAxis + 2) % 3;
   const Mat3& R = frames.joint[kJoint - 1].R;
   Mat3& turned = frames.joint[kJoint].R;
-  const auto [s, c] = math::sin_cos(angle_rad);
+  const double s = angles.sin[kJoint], c = angles.cos[kJoint];
   turned.col(kAxis) = R.col(kAxis);
   turned.col(kU) = R.col(kU) * c + R.col(kV) * s;
   turned.col(kV) = R.col(kV) * c - R.col(kU) * s;
@@ -33,12 +33,14 @@ LegFrames leg_frames(const LegGeometry& g, Foot leg, const LegVector& q) noexcep
   const auto below = [](const Transform& joint, double length_m) -> Vec3 {
     return joint.p_m - joint.R.col(2) * length_m;
   };
-  f.joint[kHipRoll] = Transform{rotation_x(q[kHipRoll]), mirrored(g.base_p_hip_m, leg)};
-  turn<kHipYaw>(f, q[kHipYaw]);
-  turn<kHipPitch>(f, q[kHipPitch]);
-  turn<kKnee>(f, q[kKnee]);
-  turn<kAnklePitch>(f, q[kAnklePitch]);
-  turn<kAnkleRoll>(f, q[kAnkleRoll]);
+  const auto angles = math::sin_cos(std::array{q[0], q[1], q[2], q[3], q[4], q[5]});
+  const double s = angles.sin[kHipRoll], c = angles.cos[kHipRoll];
+  f.joint[kHipRoll] = {(Mat3() << 1, 0, 0, 0, c, -s, 0, s, c).finished(), mirrored(g.base_p_hip_m, leg)};
+  turn<kHipYaw>(f, angles);
+  turn<kHipPitch>(f, angles);
+  turn<kKnee>(f, angles);
+  turn<kAnklePitch>(f, angles);
+  turn<kAnkleRoll>(f, angles);
   f.joint[kHipYaw].p_m = f.joint[kHipRoll].p_m;
   f.joint[kHipPitch].p_m = f.joint[kHipYaw] * mirrored(g.hip_p_hip_pitch_m, leg);
   f.joint[kKnee].p_m = below(f.joint[kHipPitch], g.thigh_m);
@@ -97,7 +99,7 @@ LegSolution solve_leg(const LegGeometry& g, Foot leg, const Transform& base_T_so
   // N = R Rx(-roll) = Rx(hip roll) Rz(yaw) Ry(sum of pitches). Its second column is that of Rx Rz, too.
   const Vec3 side = R.col(1) * cos_roll - R.col(2) * sin_roll;
   const double sin_yaw = math::clamp(-side.x(), -1.0, 1.0), cos_yaw = std::max(sine(sin_yaw), 1e-9);
-  q[kHipYaw] = math::asin(sin_yaw);
+  q[kHipYaw] = math::atan2(sin_yaw, cos_yaw);
   q[kHipRoll] = math::atan2(side.z(), side.y());
   const double pitch_sum = math::atan2(R(0, 1) * sin_roll + R(0, 2) * cos_roll, R(0, 0));
 
@@ -110,8 +112,9 @@ LegSolution solve_leg(const LegGeometry& g, Foot leg, const Transform& base_T_so
       (length * length - g.thigh_m * g.thigh_m - g.shank_m * g.shank_m) / (2.0 * g.thigh_m * g.shank_m);
   const double cos_knee = math::clamp(asked, -1.0, 1.0);
   solution.reachable = asked <= 1.0 && asked >= -1.0;
-  q[kKnee] = math::acos(cos_knee);
-  const double bent_m = g.shank_m * sine(cos_knee), straight_m = g.thigh_m + g.shank_m * cos_knee;
+  const double sin_knee = sine(cos_knee);
+  q[kKnee] = math::atan2(sin_knee, cos_knee);
+  const double bent_m = g.shank_m * sin_knee, straight_m = g.thigh_m + g.shank_m * cos_knee;
   q[kHipPitch] = math::atan2(bent_m * leg_vector.z() - straight_m * leg_vector.x(),
                              -bent_m * leg_vector.x() - straight_m * leg_vector.z());
   q[kAnklePitch] = math::wrap_angle(pitch_sum - q[kHipPitch] - q[kKnee]);

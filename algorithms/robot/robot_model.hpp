@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <string_view>
 
 #include "algorithms/core/capacities.hpp"
@@ -109,6 +110,12 @@ struct JointLimits {
   return both;
 }
 
+// The largest gains that a drive's command can say. They come with the drives (a bus file), not with the parameters.
+struct GainLimits {
+  double kp_nmprad = std::numeric_limits<double>::infinity();
+  double kd_nmsprad = std::numeric_limits<double>::infinity();
+};
+
 // What moves the joints, and how they are held.
 struct DriveModel {
   // In the order of joint_index().
@@ -118,6 +125,7 @@ struct DriveModel {
                                                                   {0.0, 2.531, 5.0, 180.0},
                                                                   {-0.873, 0.349, 4.0, 36.0},
                                                                   {-0.262, 0.262, 4.0, 36.0}}});
+  std::array<GainLimits, kJointCount> gain_limits{};
   std::array<double, kJointsPerLeg> kp_nmprad{400, 400, 400, 400, 120, 120};
   std::array<double, kJointsPerLeg> kd_nmsprad{10, 10, 10, 10, 4, 4};
   double delay_s = 0.003;
@@ -234,9 +242,5 @@ struct RobotModel {
     field("mounts", p.mounts);
   }
 };
-
-[[nodiscard]] inline CameraIntrinsics robot_camera_intrinsics() noexcept {
-  return {kDepthWidth_px, kDepthHeight_px, 366.7, 366.8, 322.7, 242.3, 0.00025};
-}
 
 }  // namespace polygmap

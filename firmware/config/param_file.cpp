@@ -62,6 +62,7 @@ class ParamFile {
       if (line == 0) throw FileError("Cannot read the parameter file \"" + path_ + "\".");
       fail(line, std::string(parsed.error().description()));
     }
+    refuse_camera(parsed.table());
     take(parsed.table(), "");
     for (const ParamOrder& order : table_.orders) check(order);
   }
@@ -73,6 +74,11 @@ class ParamFile {
   }
   [[noreturn]] void fail(const toml::node& node, const std::string& what) const {
     fail(node.source().begin.line, what);
+  }
+  // Whoever gives one for the other needs no nearest name.
+  void refuse_camera(const toml::table& from) const {
+    if (!from.contains("width") || !from.contains("height") || !from.contains("fx")) return;
+    throw FileError(name() + " looks like a camera file (it has width, height and fx), which holds no parameters.");
   }
   [[nodiscard]] const Param* find(const std::string& full) const {
     const auto at = std::ranges::find(table_.params, full, &Param::name);

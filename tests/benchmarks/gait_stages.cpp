@@ -84,7 +84,8 @@ void stage_gait_plan(StairPlan& p) {
 void stage_gait_proof(StairPlan& p) {
   for (std::size_t i = 0; i < p.goals.size(); ++i) {
     StepSearch& search = p.searches[i];
-    search.begin(nominal_robot(), p.params, p.goals[i], p.goals[1], p.params.stair_shift_ticks, p.from[i], p.soles[i]);
+    search.begin(nominal_robot(), p.params, p.goals[i], p.goals[1], p.params.durations.stair_shift_ticks, p.from[i],
+                 p.soles[i]);
     while (search.step(nominal_robot(), p.params) == StepSearch::State::kSearching) {
     }
   }

@@ -46,7 +46,7 @@ ExtractorStage plane_stage(const PlaneExtractor& planes) noexcept {
       return kGrowing;
     case Part::kSharpening:
     case Part::kMeasuring:
-      return planes.fit_part() == SpanFit::Part::kSums ? kRefit : kMeeting;
+      return planes.fit_part() == SpanFit::Part::kSums ? kRefit : kBoundaries;
     case Part::kSolvingSharpened:
     case Part::kMergingSharpened:
     case Part::kSolvingMeasured:
@@ -55,11 +55,11 @@ ExtractorStage plane_stage(const PlaneExtractor& planes) noexcept {
     case Part::kOverhangs:
       return kRefit;
     case Part::kResidual:
-      return kRemainder;
+      return kResidualPlanes;
     case Part::kDone:
       break;
   }
-  return kPieces;
+  return kComponents;
 }
 
 // As long as the extractor's next step belongs to that stage; a budget of one unit is one piece of work.
@@ -103,11 +103,11 @@ ExtractorStage extractor_stage(const SurfaceExtractor& extractor) noexcept {
     case At::kIdle:
       return kIntake;
     case At::kSegments:
-      return extractor.segmenter().part() == Segmenter::Part::kMask ? kMask : kColumnRuns;
+      return extractor.segmenter().part() == Segmenter::Part::kMask ? kMask : kColumnSegments;
     case At::kPlanes:
       return plane_stage(extractor.plane_extractor());
     case At::kRegions:
-      return kPieces;
+      return kComponents;
     case At::kSurfaces:
     case At::kFinish:
       return kPolygons;
@@ -119,12 +119,12 @@ void stage_intake(Workbench& bench) {
   static_cast<void>(bench.extractor->try_begin(bench.next_frame(), bench.scene.view));
 }
 void stage_mask(Workbench& bench) { run_through(bench, kMask); }
-void stage_columns(Workbench& bench) { run_through(bench, kColumnRuns); }
+void stage_columns(Workbench& bench) { run_through(bench, kColumnSegments); }
 void stage_growing(Workbench& bench) { run_through(bench, kGrowing); }
-void stage_meeting(Workbench& bench) { run_through(bench, kMeeting); }
+void stage_boundaries(Workbench& bench) { run_through(bench, kBoundaries); }
 void stage_refit(Workbench& bench) { run_through(bench, kRefit); }
-void stage_remainder(Workbench& bench) { run_through(bench, kRemainder); }
-void stage_pieces(Workbench& bench) { run_through(bench, kPieces); }
+void stage_residual_planes(Workbench& bench) { run_through(bench, kResidualPlanes); }
+void stage_components(Workbench& bench) { run_through(bench, kComponents); }
 void stage_polygons(Workbench& bench) { run_through(bench, kPolygons); }
 
 void stage_streaming_floor(Workbench& bench) {
@@ -133,12 +133,12 @@ void stage_streaming_floor(Workbench& bench) {
   bench.sum += sum;
 }
 void stage_reduction(Workbench& bench) { reduce(bench); }
-void stage_runs(Workbench& bench) {
+void stage_segments(Workbench& bench) {
   const CameraIntrinsics& k = bench.scene.view.intrinsics;
-  bench.runs->begin({}, {}, k, *bench.columns);
+  bench.segments->begin({}, {}, k, *bench.columns);
   for (std::int32_t r = 0; r < k.height_px; r += ScanlineSegmentation::kBlock)
-    bench.runs->add_rows(r, r + ScanlineSegmentation::kBlock - 1);
-  bench.runs->finish();
+    bench.segments->add_rows(r, r + ScanlineSegmentation::kBlock - 1);
+  bench.segments->finish();
 }
 void stage_whole_frame(Workbench& bench) { extract(bench); }
 void stage_map(Workbench& bench) { fuse(bench); }

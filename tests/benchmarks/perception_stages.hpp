@@ -28,26 +28,26 @@ struct Workbench {
   std::unique_ptr<PolygonMap> map = std::make_unique<PolygonMap>();
   std::unique_ptr<FootholdSearch> search =
       std::make_unique<FootholdSearch>(FootholdSearch::Params{}, nominal_robot().sole);
-  RawRange range;  // this and the next two: reduction and runs by themselves
+  RawRange range;  // this and the next two: reduction and segments by themselves
   std::unique_ptr<ColumnImage> columns = std::make_unique<ColumnImage>();
-  std::unique_ptr<ScanlineSegmentation> runs = std::make_unique<ScanlineSegmentation>();
+  std::unique_ptr<ScanlineSegmentation> segments = std::make_unique<ScanlineSegmentation>();
   std::uint32_t sum = 0;
 };
 
 // On a frame's way through the extractor; some run more than once in a frame.
 void stage_intake(Workbench& bench);
 void stage_mask(Workbench& bench);
-void stage_columns(Workbench& bench);  // reduction and runs, row by row
+void stage_columns(Workbench& bench);  // reduction and segments, row by row
 void stage_growing(Workbench& bench);
-void stage_meeting(Workbench& bench);    // runs to intervals, who has which rows, change-points
-void stage_refit(Workbench& bench);      // and facets that are joined
-void stage_remainder(Workbench& bench);  // planes in what is left over
-void stage_pieces(Workbench& bench);     // and their profiles
-void stage_polygons(Workbench& bench);   // outlines, nosing and back lines, polygons
+void stage_boundaries(Workbench& bench);       // segments to spans, who has which rows, change-points
+void stage_refit(Workbench& bench);            // and facets that are joined
+void stage_residual_planes(Workbench& bench);  // planes in what is left over
+void stage_components(Workbench& bench);       // and their profiles
+void stage_polygons(Workbench& bench);         // outlines, nosing and back lines, polygons
 // By themselves.
 void stage_streaming_floor(Workbench& bench);  // reads every pixel once: nothing that sees the whole frame is faster
 void stage_reduction(Workbench& bench);
-void stage_runs(Workbench& bench);
+void stage_segments(Workbench& bench);
 void stage_whole_frame(Workbench& bench);
 void stage_map(Workbench& bench);
 void stage_footholds(Workbench& bench);
@@ -59,27 +59,27 @@ struct Stage {
 enum ExtractorStage : std::size_t {
   kIntake,
   kMask,
-  kColumnRuns,
+  kColumnSegments,
   kGrowing,
-  kMeeting,
+  kBoundaries,
   kRefit,
-  kRemainder,
-  kPieces,
+  kResidualPlanes,
+  kComponents,
   kPolygons
 };
 inline constexpr std::array<Stage, 9> kExtractorStages{{{"intake", stage_intake},
                                                         {"mask", stage_mask},
                                                         {"columns", stage_columns},
                                                         {"growing", stage_growing},
-                                                        {"meeting", stage_meeting},
+                                                        {"boundaries", stage_boundaries},
                                                         {"refit", stage_refit},
-                                                        {"remainder", stage_remainder},
-                                                        {"pieces", stage_pieces},
+                                                        {"residual_planes", stage_residual_planes},
+                                                        {"components", stage_components},
                                                         {"polygons", stage_polygons}}};
 inline constexpr std::array<Stage, 6> kOtherStages{{{"whole_frame", stage_whole_frame},
                                                     {"streaming_floor", stage_streaming_floor},
                                                     {"reduction", stage_reduction},
-                                                    {"runs", stage_runs},
+                                                    {"segments", stage_segments},
                                                     {"map", stage_map},
                                                     {"footholds", stage_footholds}}};
 

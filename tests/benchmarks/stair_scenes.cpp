@@ -6,6 +6,7 @@
 #include "algorithms/robot/body_shapes.hpp"
 #include "sim_stub/camera/depth_noise.hpp"
 #include "sim_stub/camera/depth_renderer.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
 #include "tests/support/nominal_robot.hpp"

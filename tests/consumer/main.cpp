@@ -22,12 +22,15 @@ class Robot final : public polygmap::hal::Clock,
   std::int64_t now_ns() const noexcept override { return now; }
   std::uint64_t count() const noexcept override { return static_cast<std::uint64_t>(now); }
   double counts_per_us() const noexcept override { return 1000.0; }
-  polygmap::CameraIntrinsics intrinsics() const noexcept override { return polygmap::robot_camera_intrinsics(); }
+  polygmap::CameraIntrinsics intrinsics() const noexcept override {
+    return {640, 480, 390.0, 390.0, 320.0, 240.0, 0.001};
+  }
   bool try_acquire(polygmap::DepthFrameView&) noexcept override { return false; }
   void release() noexcept override {}
   bool try_read(polygmap::ImuSample&) noexcept override { return false; }
   bool try_read(polygmap::JointFeedback&) noexcept override { return false; }
-  bool try_write(const polygmap::JointCommand&) noexcept override { return true; }
+  polygmap::JointSet try_write(const polygmap::JointCommand&) noexcept override { return polygmap::JointSet::all(); }
+  polygmap::hal::JointBusStatus status() const noexcept override { return {}; }
   bool try_read(polygmap::LioSample&) noexcept override { return false; }
 
   std::int64_t now = polygmap::kNsPerS;

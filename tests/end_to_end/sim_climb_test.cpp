@@ -84,10 +84,20 @@ INSTANTIATE_TEST_SUITE_P(Seeds, Climb,
                          testing::Values(Case{1, {.rise_m = 0.13}}, Case{2, {.rise_m = 0.17}},
                                          Case{3, {.rise_m = 0.10}}, Case{4, {.rise_m = 0.15}},
                                          Case{1, {.steps = 4, .rise_m = 0.17, .nosing_m = 0.025}},
+                                         Case{6, {.steps = 4, .nosing_m = 0.040}},
                                          Case{2, {.steps = 4, .rise_m = 0.10, .width_m = 0.8}},
                                          Case{3, {.steps = 4, .rise_m = 0.15, .tread_m = 0.30, .width_m = 1.6}},
                                          Case{4, {.steps = 4, .rise_m = 0.13, .tread_m = 0.35}}),
                          name_of);
+
+// Once every climb stopped here with "a tread of 0.121 m": a post ended the tread as an endless line would.
+TEST(ClimbBalusters, PostsOnTheTreadsAlongBothEdges_Climbed) {
+  ClimbOptions options = options_of(3, 3);
+  options.stairs.balusters.spacing_m = 0.28;
+  const ClimbSummary summary = climb(options);
+  EXPECT_TRUE(summary.pass) << summary.reason;
+  EXPECT_EQ(summary.steps_climbed, 3);
+}
 
 // The one climb that every build runs, sanitizers included.
 TEST(ClimbOneStep, ThreadedRendering_Climbed) {
@@ -127,6 +137,9 @@ std::vector<Case> long_cases() {
   constexpr double kRises_m[]{0.13, 0.10, 0.17, 0.15, 0.12};
   std::vector<Case> cases;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) cases.push_back({seed, {.rise_m = kRises_m[seed % 5]}});
+  for (const double nosing_m : {0.020, 0.025, 0.030, 0.040}) {
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) cases.push_back({seed, {.steps = 4, .nosing_m = nosing_m}});
+  }
   return cases;
 }
 INSTANTIATE_TEST_SUITE_P(Long, Climb, testing::ValuesIn(long_cases()), name_of);

@@ -12,6 +12,7 @@
 #include "algorithms/perception/surface_extractor.hpp"
 #include "sim_stub/camera/depth_noise.hpp"
 #include "sim_stub/camera/depth_renderer.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/seen_stairs.hpp"
 

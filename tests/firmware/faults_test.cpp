@@ -11,10 +11,12 @@ namespace {
 
 // A line that is put in or taken out moves no other number.
 static_assert(static_cast<int>(Fault::kCycleOverrun) == 1 && static_cast<int>(Fault::kDepthMissing) == 11);
-static_assert(static_cast<int>(Fault::kGaitStopped) == 18);
+static_assert(static_cast<int>(Fault::kGaitStopped) == 18 && static_cast<int>(Fault::kLaneBehind) == 19);
 static_assert(static_cast<int>(Limit::kRowShed) == 101 && static_cast<int>(Limit::kStateRingMissed) == 106);
-static_assert(static_cast<int>(Limit::kFrameLost) == 114);
-static_assert(kFaultTable.front().code == Fault::kCycleOverrun && kLimitTable.back().code == Limit::kFrameLost);
+static_assert(static_cast<int>(Limit::kFrameLost) == 114 && static_cast<int>(Limit::kHandOverLost) == 115);
+static_assert(static_cast<int>(Fault::kDriveSilent) == 30 && static_cast<int>(Fault::kFeetSilent) == 37);
+static_assert(static_cast<int>(Limit::kFrameLost) == 114 && static_cast<int>(Limit::kDriveClamped) == 130);
+static_assert(kFaultTable.front().code == Fault::kCycleOverrun && kLimitTable.back().code == Limit::kDriveClamped);
 
 TEST(Faults, NameOf_EachCode_IsItsTables) {
   for (const auto& line : kFaultTable) EXPECT_EQ(name_of(line.code), line.name);

@@ -128,6 +128,67 @@ TEST_F(PipelineOnARobot, ImuFallsSilentInSwing_FootComesDownAndTheGaitStops) {
   EXPECT_EQ(control().state().stamp_ns, robot_->clock.now_ns());
 }
 
+// Eleven drives are heard and commanded; the twelfth's leg is no measurement.
+TEST_F(PipelineOnARobot, OneDriveFallsSilentInSwing_FootComesDownAsPlannedAndTheGaitStops) {
+  for (const bool of_the_swing_leg : {true, false}) {
+    ASSERT_NO_FATAL_FAILURE(fly());
+    const Foot leg = of_the_swing_leg ? gait().step.foot : other(gait().step.foot);
+    robot_->silent_joint = joint_index(leg, kKnee);
+    expect_landed_and_stopped(0.004);
+    EXPECT_EQ(count(Fault::kDriveSilent), 1U);
+    EXPECT_EQ(count(Fault::kJointFeedbackMissing), 0U);
+    EXPECT_EQ(count(Fault::kJointFeedbackRejected), 0U);
+    EXPECT_TRUE(control().drives().silent.contains(robot_->silent_joint));
+    EXPECT_EQ(control().module_state(), ModuleState::kSafeStop);
+    started_ = false;
+  }
+}
+
+TEST_F(PipelineOnARobot, OneDriveSilentFor50MsInSwing_ClimbGoesOn) {
+  ASSERT_NO_FATAL_FAILURE(fly());
+  robot_->silent_joint = joint_index(other(gait().step.foot), kHipPitch);
+  run(25);
+  robot_->silent_joint = kJointCount;
+  run(1);
+  EXPECT_TRUE(control().drives().silent.is_empty());
+  EXPECT_FALSE(control().drives().ever_silent.is_empty());
+  ASSERT_TRUE(run_until(GaitPhase::kSwing, gait().step.sequence + 1));
+  EXPECT_EQ(count(Fault::kDriveSilent), 1U);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+}
+
+TEST_F(PipelineOnARobot, OneDriveSilentForAFewCycles_NothingIsRaisedAndTheClimbGoesOn) {
+  ASSERT_NO_FATAL_FAILURE(fly());
+  for (int gap = 0; gap < 5; ++gap) {
+    robot_->silent_joint = joint_index(gap % 2 == 0 ? Foot::kLeft : Foot::kRight, kKnee);
+    run(1 + gap);
+    robot_->silent_joint = kJointCount;
+    run(3);
+  }
+  EXPECT_FALSE(control().faults().any_fault());
+  ASSERT_TRUE(run_until(GaitPhase::kSwing, gait().step.sequence + 1));
+}
+
+TEST_F(PipelineOnARobot, OneDriveSilentOnTwoFeet_StopsWithinATenthOfASecond) {
+  start(kToeGap_m);
+  ASSERT_TRUE(run_until(GaitPhase::kDoubleSupport, 0));
+  run(20);
+  robot_->silent_joint = joint_index(Foot::kLeft, kHipRoll);
+  run(55);
+  EXPECT_EQ(gait().phase, GaitPhase::kStopped);
+  EXPECT_EQ(gait().stop_reason, StopReason::kStateStale);
+}
+
+TEST_F(PipelineOnARobot, DriveTellsAnErrorInSwing_StepIsFinishedThenTheGaitStops) {
+  ASSERT_NO_FATAL_FAILURE(fly());
+  robot_->joints.told.drive_errors.insert(7);
+  robot_->joints.told.drive_error_replies = 1;
+  ASSERT_TRUE(run_until(GaitPhase::kStopped, gait().step.sequence));
+  EXPECT_NE(gait().step.touch_down_stamp_ns, 0);
+  EXPECT_EQ(count(Fault::kDriveError), 1U);
+  EXPECT_EQ(control().module_state(), ModuleState::kSafeStop);
+}
+
 TEST_F(PipelineOnARobot, BothFallSilentInSwing_FootComesDownAsPlannedAndTheGaitStops) {
   ASSERT_NO_FATAL_FAILURE(fly());
   robot_->imu_speaks = robot_->joints_speak = false;
@@ -227,7 +288,7 @@ TEST_F(PipelineOnARobot, MountIsUncertain_EdgesAre) {
   run(1000);
   const PerceptionLane& perception = module_->pipeline().perception();
   const double learnt_rad = perception.mount().tilt_sigma_rad();
-  EXPECT_LT(learnt_rad, 0.5 * params.mount.prior_tilt_sigma_rad);
+  EXPECT_LT(learnt_rad, 0.5 * params.mount.prior.tilt_sigma_rad);
   int edges = 0;
   for (const MapPolygon& polygon : perception.map_snapshot().polygons) {
     if (!polygon.surface.nosing.valid) continue;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "firmware/schedule.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/fake_robot.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/trapped_module.hpp"
@@ -106,6 +107,59 @@ TEST_F(PipelineTest, BusRefusesTheCommand_IsCounted) {
   EXPECT_EQ(count(Fault::kJointCommandRefused), 1U);
 }
 
+// An MIT drive answers only a command.
+TEST_F(PipelineTest, BeforeAllDrivesAnswered_CommandsHaveNoGainsAndNothingElseBegins) {
+  const auto expect_arming = [&] {
+    EXPECT_EQ(control().module_state(), ModuleState::kArming);
+    ASSERT_FALSE(joints_.commands().empty());
+    const JointCommand& command = joints_.commands().newest();
+    EXPECT_EQ(command.stamp_ns, clock_.now_ns());
+    for (const JointSetpoint& joint : command.joints) {
+      EXPECT_EQ(joint.kp_nmprad, 0.0);
+      EXPECT_EQ(joint.kd_nmsprad, 0.0);
+      EXPECT_EQ(joint.tau_ff_nm, 0.0);
+    }
+  };
+  const ImuSample imu = imu_at(clock_.now_ns() + kCycle_ns);
+  clock_.advance_ns(kCycle_ns);
+  tick_with(&imu, nullptr);
+  expect_arming();
+  EXPECT_EQ(count(Fault::kJointFeedbackMissing), 0U) << "nobody was asked yet";
+  for (int i = 0; i < 20; ++i) {
+    clock_.advance_ns(kCycle_ns);
+    JointFeedback joints = joints_at(clock_.now_ns());
+    joints.silent_cycles[11] = JointFeedback::kNeverHeard;
+    joints.q_rad[11] = 0.0;
+    tick_with(&imu, &joints);
+    expect_arming();
+  }
+  EXPECT_EQ(count(Fault::kJointFeedbackRejected), 0U);
+  EXPECT_EQ(count(Fault::kDriveSilent), 0U);
+  stand(1);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+  EXPECT_GT(joints_.commands().newest().joints[11].kp_nmprad, 0.0) << "the robot's own gains";
+}
+
+TEST_F(PipelineTest, BusTellsOfItsFaults_EachIsCountedUnderItsName) {
+  stand(10);
+  joints_.told.bus_offs = 1;
+  joints_.told.unknown_ids = 2;
+  joints_.told.bad_frames = 3;
+  joints_.told.lost = 4;
+  joints_.told.failed_calls = 5;
+  joints_.told.clamped = 6;
+  joints_.told.feet_silent = true;
+  stand(2);
+  EXPECT_EQ(count(Fault::kBusOff), 1U);
+  EXPECT_EQ(count(Fault::kBusUnknownId), 2U);
+  EXPECT_EQ(count(Fault::kBusBadFrame), 3U);
+  EXPECT_EQ(count(Fault::kBusFrameLost), 4U);
+  EXPECT_EQ(count(Fault::kBusCallFailed), 5U);
+  EXPECT_EQ(count(Limit::kDriveClamped), 6U);
+  EXPECT_EQ(count(Fault::kFeetSilent), 1U);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+}
+
 TEST_F(PipelineTest, LidarFromTheFuture_IsRejected) {
   stand(kInitialised_ticks);
   LioSample sample;
@@ -160,7 +214,7 @@ TEST_F(PipelineTest, FrameOutOfOrder_IsRejectedAndGivenBack) {
   camera_.feed(clock_.now_ns() - 40 * kNsPerMs, blank);
   stand(40);
   camera_.feed(clock_.now_ns() - 200 * kNsPerMs, blank);
-  stand(4);
+  stand(5);
   EXPECT_EQ(count(Fault::kDepthRejected), 1U);
   EXPECT_FALSE(camera_.holding());
 }
@@ -231,7 +285,7 @@ TEST_F(PipelineTest, CameraNeverSpeaks_IsMissingAFifthOfASecondAfterTheStart) {
 TEST_F(PipelineTest, FrameBeforeTheStart_IsGivenBackAndCounted) {
   stand(100);
   camera_.feed(clock_.now_ns(), std::vector<std::uint16_t>(camera_.pixels(), 0));
-  stand(4);
+  stand(5);
   EXPECT_EQ(count(Limit::kDepthUnplaced), 1U);
   EXPECT_EQ(count(Limit::kStateRingMissed), 0U);
   EXPECT_FALSE(camera_.holding());
@@ -259,8 +313,8 @@ class PipelineAmongBoxes : public PipelineTest {
   PipelineAmongBoxes() : PipelineTest(params()) {}
   static Params params() {
     Params params;
-    params.map.misses_unconfirmed = 1000;  // it shall fill, whatever is seen next
-    params.map.unconfirmed_age_s = 1000.0;
+    params.map.memory.misses_unconfirmed = 1000;  // it shall fill, whatever is seen next
+    params.map.memory.unconfirmed_age_s = 1000.0;
     return params;
   }
   void feed(int rows, int columns, double lowest_m) {
@@ -317,7 +371,7 @@ TEST_F(PipelineAmongBoxes, MoreSurfacesThanAFrameMayHave_IsCounted) {
 TEST_F(PipelineAmongBoxes, MoreRunsThanAColumnMayHave_IsCounted) {
   stand(kInitialised_ticks);
   show(2, 3, -0.1);
-  EXPECT_EQ(count(Limit::kRunsFull), 0U);
+  EXPECT_EQ(count(Limit::kSegmentsFull), 0U);
   const CameraIntrinsics camera = robot_camera_intrinsics();
   std::vector<std::uint16_t> slats(camera_.pixels());
   for (std::size_t i = 0; i < slats.size(); ++i) {
@@ -326,7 +380,7 @@ TEST_F(PipelineAmongBoxes, MoreRunsThanAColumnMayHave_IsCounted) {
   }
   camera_.feed(clock_.now_ns(), slats);
   stand(100);
-  EXPECT_GT(count(Limit::kRunsFull), 0U);
+  EXPECT_GT(count(Limit::kSegmentsFull), 0U);
 }
 
 TEST_F(PipelineAmongBoxes, MorePolygonsThanTheMapHolds_IsCounted) {

@@ -3,7 +3,7 @@
 // expect: deleted
 #include "algorithms/core/containers/exchange.hpp"
 
-int newest(const polygmap::Exchange<int>& exchange) {
+int newest(const polygmap::Exchange<int, 3>& exchange) {
 #ifdef POSITIVE_CONTROL
   const auto& same = exchange;
 #else

@@ -3,11 +3,11 @@
 // expect: nodiscard
 #include "algorithms/core/containers/exchange.hpp"
 
-int newest(polygmap::Exchange<int>& exchange) {
+int newest(polygmap::Exchange<int, 3>& exchange) {
 #ifdef POSITIVE_CONTROL
-  if (!exchange.try_take()) return -1;
+  if (!exchange.try_take(0)) return -1;
 #else
-  exchange.try_take();
+  exchange.try_take(0);
 #endif
   return exchange.front();
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The consumer reads; only the producer's back() may be written.
+// The reader reads; only the writer's back() may be written.
 // expect: (read-only|cannot assign to return value)
 #include "algorithms/core/containers/exchange.hpp"
 
-void write(polygmap::Exchange<int>& exchange) {
+void write(polygmap::Exchange<int, 3>& exchange) {
 #ifdef POSITIVE_CONTROL
   exchange.back() = 1;
 #else

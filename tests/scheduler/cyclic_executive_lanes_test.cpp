@@ -42,8 +42,8 @@ struct HandOver {
   std::array<std::int64_t, 63> payload{};
 };
 struct TwoLaneTasks {
-  Exchange<HandOver> planes;
-  Exchange<Counters> perception_health;
+  Exchange<HandOver, 4> planes;
+  Exchange<Counters, 4> perception_health;
   Counters lane_health[2];
   std::int64_t newest_ns = -1;
   std::uint64_t taken = 0;
@@ -55,12 +55,12 @@ struct TwoLaneTasks {
       HandOver& out = planes.back();
       out.stamp_ns = cycle_ns;
       out.payload.fill(cycle_ns);
-      planes.publish();
+      planes.publish(cycle_ns);
       lane_health[1].raise(ExecutiveEvent::kRowShed, cycle_ns);
       perception_health.back() = lane_health[1];
-      perception_health.publish();
+      perception_health.publish(cycle_ns);
     } else if (row == kControl) {
-      if (!planes.try_take()) return Progress::kIdle;
+      if (!planes.try_take(cycle_ns)) return Progress::kIdle;
       const HandOver& in = planes.front();
       ++taken;
       if (in.stamp_ns <= newest_ns) ++backwards;
@@ -102,7 +102,7 @@ TEST(CyclicExecutive, Tick_TwoLanesOnTwoThreads_HandOverWholeValuesInOrder) {
   EXPECT_EQ(lane0.lane_statistics().cycles, static_cast<std::uint64_t>(kCycles));
   EXPECT_EQ(lane1.lane_statistics().cycles, static_cast<std::uint64_t>(kCycles));
 
-  ASSERT_TRUE(tasks.perception_health.try_take());
+  ASSERT_TRUE(tasks.perception_health.try_take(kCycles * kCycle_ns));
   Counters all = tasks.lane_health[0];
   all.merge(tasks.perception_health.front());
   EXPECT_EQ(all.count(ExecutiveEvent::kRowShed).count, static_cast<std::uint32_t>(kCycles));

@@ -7,15 +7,14 @@
 #include "algorithms/geometry/so3.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
 #include "scheduler/schedule_table.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/nominal_robot.hpp"
-#include "tests/support/slow_machine.hpp"
 
 namespace polygmap::test {
 namespace {
 
 constexpr double kTick_s = 1e-6 * kCycle_us;
 constexpr double kLeg_n = 30.0;
-constexpr int kPicture_ticks = kSlowMachine ? 48 : 16;
 
 }  // namespace
 
@@ -131,9 +130,20 @@ void FakeRobot::sense() {
     for (std::size_t f = 0; f < kFootCount; ++f) {
       feedback.foot_force_n[f] = f == support_ ? kWeight_n - (both ? 2 * kLeg_n : 0.0) : (both ? 2 * kLeg_n : 0.0);
     }
+    if (silent_joint < kJointCount) {
+      const auto i = static_cast<Eigen::Index>(silent_joint);
+      if (silent_cycles_++ == 0) last_heard_ = {q_rad_before_[i], dq_radps_before_[i]};
+      feedback.q_rad[i] = last_heard_[0] + encoder_offset_rad[i];
+      feedback.dq_radps[i] = last_heard_[1];
+      feedback.silent_cycles[silent_joint] = silent_cycles_;
+    } else {
+      silent_cycles_ = 0;
+    }
+    q_rad_before_ = q_rad_;
+    dq_radps_before_ = dq_radps_;
     joints.feed(feedback);
   }
-  if (camera_speaks && tick_ % kPicture_ticks == 0) {
+  if (camera_speaks && tick_ % picture_ticks == 0) {
     scene_.world_T_camera = true_T_base_ * base_T_camera();
     camera.feed(now_ns, render_for_robot(scene_));
   }

@@ -15,6 +15,7 @@
 #include "tests/support/fakes/fake_imu.hpp"
 #include "tests/support/fakes/fake_joint_bus.hpp"
 #include "tests/support/fakes/fake_lidar_odometry.hpp"
+#include "tests/support/slow_machine.hpp"
 
 namespace polygmap::test {
 
@@ -31,8 +32,7 @@ class FakeRobot {
   // toe_gap_m: from the collision toes to the first riser. Four steps of 0.13 x 0.28 m.
   explicit FakeRobot(double toe_gap_m);
   [[nodiscard]] Ports ports() noexcept { return {camera, imu, joints, lidar}; }
-  // 2 ms: the legs follow the newest command, then the sensors speak. The camera sees every 16th tick (48th
-  // on a slow machine), at once.
+  // 2 ms: the legs follow the newest command, then the sensors speak. What the camera sees it has at once.
   void advance();
 
   [[nodiscard]] const Transform& true_T_base() const noexcept { return true_T_base_; }
@@ -48,6 +48,8 @@ class FakeRobot {
   bool imu_speaks = true;
   bool joints_speak = true;
   bool camera_speaks = true;
+  int picture_ticks = kSlowMachine ? 48 : 16;  // from one picture to the next
+  std::size_t silent_joint = kJointCount;  // whose drive follows its commands and does not answer; kJointCount: none
   JointVector encoder_offset_rad = JointVector::Zero();  // reading minus true angle
 
  private:
@@ -67,6 +69,10 @@ class FakeRobot {
   std::array<Transform, 3> true_T_base_before_;  // newest first
   Transform true_T_base_;
   std::int64_t tick_ = 0;
+  // What a drive said last before it fell silent.
+  JointVector q_rad_before_ = JointVector::Zero(), dq_radps_before_ = JointVector::Zero();
+  std::array<double, 2> last_heard_{};
+  std::uint16_t silent_cycles_ = 0;
 };
 
 }  // namespace polygmap::test

@@ -24,9 +24,10 @@ class TamperedJoints final : public hal::JointBus {
     if (tamper) tamper(feedback);
     return true;
   }
-  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override {
+  [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override {
     return bus_.try_write(instead ? *instead : command);
   }
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override { return bus_.status(); }
 
   std::function<void(JointFeedback&)> tamper;
   const JointCommand* instead = nullptr;  // another module's command goes to the drives

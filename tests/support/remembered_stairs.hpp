@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "algorithms/perception/map/polygon_map.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/seen_stairs.hpp"
 
 namespace polygmap::test {

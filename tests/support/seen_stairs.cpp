@@ -5,6 +5,7 @@
 
 #include "algorithms/geometry/convex.hpp"
 #include "algorithms/geometry/plane.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/nominal_robot.hpp"
 
 namespace polygmap::test {

@@ -3,7 +3,7 @@
 import collections
 import random
 
-from campaigns.engine import Page, Table, rows
+from campaigns.engine import Figure, Page, Table, headline, rows
 
 NOISES = ("white", "correlated")
 
@@ -13,19 +13,35 @@ def own_noise(seed):
     return NOISES[(seed + 1) % 2]
 
 
-def worst(summaries, *path, best=max):
-    """The worst of a figure over the climbs that have it, None where none does."""
+def worst_climb(summaries, *path, best=max):
+    """(worst of a figure over the climbs that have it, that climb's seed), (None, None) where none has it."""
     values = []
-    for s in summaries:
+    for summary in summaries:
+        s = summary
         for key in path:
             s = s.get(key) if isinstance(s, dict) else None
         if s is not None:
-            values.append(s)
-    return best(values) if values else None
+            values.append((s, seed_of(summary)))
+    return best(values, key=lambda v: v[0]) if values else (None, None)
+
+
+def worst(summaries, *path, best=max):
+    return worst_climb(summaries, *path, best=best)[0]
+
+
+def seed_of(summary):
+    words = summary["run"].split()
+    return words[words.index("--seed") + 1] if "--seed" in words else "1"
 
 
 def number(value, digits=1, unit=""):
     return "-" if value is None else f"{value:.{digits}f}{unit}"
+
+
+def seeded(summaries, *path, best=max, digits=1):
+    """The worst of a figure, in brackets the seed of its climb."""
+    value, seed = worst_climb(summaries, *path, best=best)
+    return "-" if value is None else f"{number(value, digits)} ({seed})"
 
 
 def ratio(summaries, what):
@@ -36,14 +52,14 @@ def ratio(summaries, what):
 FIGURES = {  # column: function of the summaries
     "climbed": lambda s: f"{sum(x.get('verdict') == 'pass' for x in s)} of {len(s)}",
     "s/step": lambda s: f"{number(worst(s, 'seconds_per_step', best=min), 2)}-{number(worst(s, 'seconds_per_step'), 2)}",
-    "foothold mm, median; max": lambda s: f"{number(worst(s, 'foothold_error_mm', 'median'))}; {number(worst(s, 'foothold_error_mm', 'max'))}",
-    "execution mm": lambda s: number(worst(s, "execution_error_mm", "max")),
+    "foothold mm, median; max": lambda s: f"{seeded(s, 'foothold_error_mm', 'median')}; {seeded(s, 'foothold_error_mm', 'max')}",
+    "execution mm": lambda s: seeded(s, "execution_error_mm", "max"),
     "tracking x; z mm": lambda s: f"{number(worst(s, 'tracking_error_mm', 'x_max'))}; {number(worst(s, 'tracking_error_mm', 'z_max'))}",
     "CoM mm": lambda s: number(worst(s, "com_tracking_mm_max")),
-    "sole margin mm": lambda s: number(worst(s, "sole_margin_mm_min", best=min)),
-    "clearance mm": lambda s: number(worst(s, "swing_clearance_mm_min", best=min)),
+    "sole margin mm": lambda s: seeded(s, "sole_margin_mm_min", best=min),
+    "clearance mm": lambda s: seeded(s, "swing_clearance_mm_min", best=min),
     "torque; speed": lambda s: f"{number(ratio(s, 'torque_peak_ratio'), 2)}; {number(ratio(s, 'joint_speed_peak_ratio'), 2)}",
-    "planes Hz": lambda s: number(worst(s, "plane_rate_hz", best=min)),
+    "planes Hz": lambda s: seeded(s, "plane_rate_hz", best=min),
     "map age ms": lambda s: number(worst(s, "map_age_at_latch_ms", "max"), 0),
 }
 SHORT = ("climbed", "s/step", "foothold mm, median; max", "execution mm", "sole margin mm", "clearance mm", "planes Hz")
@@ -51,7 +67,22 @@ SHORT = ("climbed", "s/step", "foothold mm, median; max", "execution mm", "sole 
 
 def figures(groups, columns=tuple(FIGURES)):
     """A table with a line for each group of climbs, worst figure of each."""
-    return rows(("climbs", *columns), [(name, *(FIGURES[c](summaries) for c in columns)) for name, summaries in groups.items()])
+    return (rows(("climbs", *columns), [(name, *(FIGURES[c](summaries) for c in columns)) for name, summaries in groups.items()]) +
+            "\n\nIn brackets the seed of the climb that a figure is of.")
+
+
+def climbed(summaries):
+    """Of README's table: all are to."""
+    passed = sum(s.get("verdict") == "pass" for s in summaries)
+    return Figure(passed, FIGURES["climbed"](summaries), "least", len(summaries), "all")
+
+
+def least(value, asked=None, asked_text=None):
+    return Figure(value, number(value), "least" if asked is not None else "", asked, asked_text)
+
+
+def most(value, asked=None, asked_text=None):
+    return Figure(value, number(value), "most" if asked is not None else "", asked, asked_text)
 
 
 def not_climbed(summaries):
@@ -113,12 +144,16 @@ def physics(engine, seeds):
                 ("paper, real, SS, 3 trials", "1.87-1.96", "22.2-33.4", "20-23"),
                 ("this, simulated, `ss`", *(FIGURES[c](ss) for c in ("s/step", "execution mm", "planes Hz")))]))
     return Page(text, {
-        "1 climbed": ("stairs of 0.13 x 0.28 m climbed under physics, both gaits and noises", FIGURES["climbed"](everything), "all"),
-        "2 pace": ("seconds a step, both feet on every tread; one foot", f"{FIGURES['s/step'](ds)}; {FIGURES['s/step'](ss)}", "2.7; 1.6"),
-        "3 foothold": ("foothold error on those stairs, worst median and worst of all", FIGURES["foothold mm, median; max"](ds + ss) + " mm", "5; 12 mm"),
-        "4 margin": ("sole to its tread's edge, swing to the stairs, least, on those stairs",
-                     f"{FIGURES['sole margin mm'](ds + ss)}; {FIGURES['clearance mm'](ds + ss)} mm", "0"),
-        "5 planes": ("plane rate, least, on those stairs", FIGURES["planes Hz"](ds + ss) + " of 30 Hz", "20-29 in the paper")})
+        "1 climbed": headline("stairs of 0.13 x 0.28 m climbed under physics, both gaits and noises", [climbed(everything)]),
+        "2 pace": headline("seconds a step, both feet on every tread; one foot", [
+            Figure(worst(g, "seconds_per_step"), FIGURES["s/step"](g), "most", asked) for g, asked in ((ds, 2.7), (ss, 1.6))]),
+        "3 foothold": headline("foothold error on those stairs, worst median and worst of all", [
+            most(worst(ds + ss, "foothold_error_mm", "median"), 5), most(worst(ds + ss, "foothold_error_mm", "max"), 12)], " mm"),
+        "4 margin": headline("sole to its tread's edge, swing to the stairs, least, on those stairs", [
+            least(worst(ds + ss, "sole_margin_mm_min", best=min), 0), least(worst(ds + ss, "swing_clearance_mm_min", best=min), 0)], " mm"),
+        "5 planes": headline("plane rate, least, on those stairs, of 30 Hz; 20 to 29 in the paper", [
+            least(worst(ds + ss, "plane_rate_hz", best=min), 20)], " Hz")},
+        {"docs/images/climb.svg": engine.picture(["--seed", 1])})
 
 
 def kinematic(engine, seeds):
@@ -142,7 +177,7 @@ def at_random(engine, seeds):
     groups = {g: [s for s in summaries if f"--gait {g}" in s["run"]] for g in ("ds", "ss")}
     return Page(f"Rises of 0.10 to 0.17 m, treads of 0.28 to 0.35 m, 4 to 10 steps, gait and noise drawn by the seed ({span(seeds)}), "
                 "under physics.\n\n" + figures(groups) + not_climbed(summaries),
-                {"1 climbed": ("climbs drawn at random", FIGURES["climbed"](summaries), "all")})
+                {"1 climbed": headline("climbs drawn at random", [climbed(summaries)])})
 
 
 def stairs(engine, seeds):
@@ -169,7 +204,8 @@ def nosing(engine, seeds):
     everything = [s for g in groups.values() for s in g]
     return Page(f"Treads that overhang their risers, the paper's failure (its Fig. 8), {span(seeds)}. A frame counts where every "
                 "surface well in view was found and none was invented.\n\n" + figures(groups, SHORT) + not_climbed(everything),
-                {"1 rate": ("plane rate (every surface well in view found, none invented), least, under nosings of 10 to 40 mm", FIGURES["planes Hz"](everything) + " of 30 Hz", "28")})
+                {"1 rate": headline("plane rate (every surface well in view found, none invented), least, under nosings of 10 to 40 mm, of 30 Hz",
+                                    [least(worst(everything, "plane_rate_hz", best=min), 28)], " Hz")})
 
 
 def odometry(engine, seeds):
@@ -194,9 +230,8 @@ def odometry(engine, seeds):
     return Page("Ten steps under physics, from the first lift-off on; worst climb of each line, NEES the mean over its climbs. Jitter: 1 to 5 Hz, "
                 "LIO as held between arrivals. NEES: squared error of the fused position over its variance, 3 is honest.\n\n" +
                 rows(("climbs", "scored", "LIO jitter mm", "fused jitter mm", "odometry drift mm", "fused drift mm", "NEES", "ticks in 95 % bounds"),
-                     lines) + not_climbed(failed), {"1 drift": ("drift after ten stairs: odometry; fused with LIO",
-                                          f"{number(worst(everything, 'odometry_drift_mm', 'base'))}; "
-                                          f"{number(worst(everything, 'odometry_drift_mm', 'fused'))} mm", "-")})
+                     lines) + not_climbed(failed), {"1 drift": headline("drift after ten stairs: odometry; fused with LIO", [
+                         most(worst(everything, "odometry_drift_mm", "base")), most(worst(everything, "odometry_drift_mm", "fused"))], " mm")})
 
 
 def pushes(engine, seeds):
@@ -219,7 +254,9 @@ def pushes(engine, seeds):
 
     text = (f"10 N s on the torso at eight moments of the second of four stairs, perception in the loop, {span(seeds)}, under physics.\n\n" +
             outcomes("pushed", groups) + not_climbed(unpushed_failed + everything))
-    return Page(text, {"1 falls": ("pushes of 10 N s on the stairs: climbed on; fell", f"{FIGURES['climbed'](everything)}; {falls(everything)}", "-; 0")})
+    return Page(text, {"1 falls": headline("pushes of 10 N s on the stairs: climbed on; fell", [
+        Figure(sum(s.get("verdict") == "pass" for s in everything), FIGURES["climbed"](everything)),
+        Figure(sum(bool(s.get("fell")) for s in everything), falls(everything), "most", 0)])})
 
 
 BODIES = {
@@ -261,7 +298,7 @@ TABLES = {
     "random": Table("Climbs drawn at random", range(200, 260), at_random, 4),
     "stairs": Table("Other stairs", range(1, 3), stairs, 2),
     "kinematic": Table("Climbs on the kinematic plant", range(1, 25), kinematic, 2),
-    "nosing": Table("Overhanging nosings", range(1, 4), nosing, 4),
+    "nosing": Table("Overhanging nosings", range(1, 9), nosing, 4),
     "odometry": Table("Odometry, lidar odometry and the fused pose (the paper's Fig. 4)", (*range(1, 13), *range(101, 109)), odometry, 2),
     "pushes": Table("Pushes on the stairs", range(1, 5), pushes, 6),
     "bodies": Table("Other bodies and grounds than believed", range(1, 4), bodies, 2),

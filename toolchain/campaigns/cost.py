@@ -3,7 +3,7 @@
 import re
 import subprocess
 
-from campaigns.engine import ROOT, Page, Table, rows
+from campaigns.engine import ROOT, Figure, Page, Table, headline, rows
 
 WANTED = {"whole_frame": 3_600_000, "footholds": 1_200_000, "gait_swing_tick": 20_000, "gait_shift_tick": 20_000}
 
@@ -27,10 +27,15 @@ def cost(engine, _):
     text = ("Instructions (callgrind, x86-64 with AVX2) of one run of each stage: perception per frame, estimation and gait per tick.\n\n" +
             rows(("stage", "instructions", "at most"), [(s, f"{n:,}", f"{WANTED[s]:,}" if s in WANTED else "") for s, n in sorted(stages.items())]) +
             "\n\nStatic memory, bytes:\n\n" + rows(("stage", "bytes"), [*memory.items(), ("all", total), ("all but the stacks", total - stacks)]))
-    return Page(text, {"1 frame": ("instructions of a frame, a foothold search, a gait tick; memory without stacks; heap calls",
-                                   f"{stages.get('whole_frame', 0) / 1e6:.2f} M; {stages.get('footholds', 0) / 1e6:.2f} M; "
-                                   f"{max(stages.get('gait_swing_tick', 0), stages.get('gait_shift_tick', 0)) / 1e3:.1f} k; "
-                                   f"{(total - stacks) / 1e6:.2f} MB; {summary['heap_calls']}", "3.6 M; 1.2 M; 20 k; 2.0 MB; 0")})
+    frame, search = stages["whole_frame"], stages["footholds"]
+    tick = max(stages["gait_swing_tick"], stages["gait_shift_tick"])
+    return Page(text, {"1 frame": headline("instructions of a frame, a foothold search, a gait tick; memory without stacks; heap calls", [
+        Figure(frame, f"{frame / 1e6:.2f} M", "most", WANTED["whole_frame"], "3.6 M"),
+        Figure(search, f"{search / 1e6:.2f} M", "most", WANTED["footholds"], "1.2 M"),
+        Figure(tick, f"{tick / 1e3:.1f} k", "most", WANTED["gait_swing_tick"], "20 k"),
+        Figure(total - stacks, f"{(total - stacks) / 1e6:.2f} MB", "most", 2_000_000, "2.0 MB"),
+        Figure(summary["heap_calls"], str(summary["heap_calls"]), "most", 0)])})
 
 
-TABLES = {"cost": Table("Instructions and memory", (0,), cost, 2)}
+TABLES = {"cost": Table("Instructions and memory", (0,), cost, 2,
+                        ("tests/benchmarks", "tests/reference", "tests/support", "tests/CMakeLists.txt", "toolchain/checks/instructions"))}

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs what a table needs, some at a time, each only once for the same code."""
+import ast
 import concurrent.futures
 import dataclasses
 import hashlib
@@ -11,25 +12,59 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-CODE = ("algorithms", "hal", "scheduler", "firmware", "sim_stub")
+CODE = ("algorithms", "hal", "scheduler", "firmware", "sim_stub", "CMakeLists.txt", "CMakePresets.json")
+HASHED = (".hpp", ".cpp", ".h", ".in", ".toml", ".py", ".json", ".txt")  # and files that are named themselves
 COMMENT = re.compile(r'//[^\n]*|/\*.*?\*/|("(?:\\.|[^"\\\n])*")', re.S)
 
 
-def code_hash(root=ROOT):
-    """Of the module and the simulation as the compiler sees them: comments and white space do not count."""
+def meant(path):
+    """A file without what changes no result: comments and white space."""
+    text = path.read_text(errors="replace")
+    if path.suffix in (".hpp", ".cpp", ".h", ".in"):
+        text = COMMENT.sub(lambda m: m[1] or " ", text)
+    elif path.suffix == ".py" or text.startswith("#!/usr/bin/env python3"):
+        return ast.dump(ast.parse(text))
+    elif path.suffix in (".txt", ".toml"):
+        text = re.sub(r"^\s*#[^\n]*", "", text, flags=re.M)
+    return " ".join(text.split())
+
+
+def code_hash(root=ROOT, inputs=()):
+    """Of the module, the simulation, how they are compiled and further inputs: files, or folders of files."""
     digest = hashlib.sha256()
-    for path in sorted(p for top in CODE for p in (root / top).rglob("*") if p.suffix in (".hpp", ".cpp", ".h", ".toml")):
-        text = path.read_text(errors="replace")
-        if path.suffix != ".toml":
-            text = COMMENT.sub(lambda m: m[1] or " ", text)
-        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + " ".join(text.split()).encode() + b"\0")
+    paths = set()
+    for top in (*CODE, *inputs):
+        place = root / top
+        paths |= {place} if place.is_file() else {p for p in place.rglob("*") if p.suffix in HASHED and p.is_file()}
+    for path in sorted(paths):
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + meant(path).encode() + b"\0")
     return digest.hexdigest()[:16]
+
+
+@dataclasses.dataclass
+class Figure:
+    """A number of README's table as it is shown, and what it is held to: at "most" or at "least" so much."""
+    value: float
+    text: str
+    at: str = ""
+    asked: object = None
+    asked_text: object = None  # where it is not the number
+
+    def row(self):
+        bound = self.asked_text or ("-" if self.asked is None else f"{self.asked:g}")
+        return {"value": self.value, "measured": self.text, "at": self.at, "asked": self.asked, "bound": bound}
+
+
+def headline(what, figures, unit=""):
+    """One line of README's table; unit: after the last of its figures."""
+    return {"what": what, "figures": [f.row() for f in figures], "unit": unit}
 
 
 @dataclasses.dataclass
 class Page:
     text: str       # Markdown, without the title
-    headline: dict  # name -> (what it is, value, bound): rows that README may show
+    headline: dict  # name -> headline(): lines of README's table
+    files: dict = dataclasses.field(default_factory=dict)  # path from the root -> text: written beside the page
 
 
 @dataclasses.dataclass
@@ -38,6 +73,11 @@ class Table:
     seeds: object
     measure: object  # (engine, seeds) -> Page, or None where its inputs are missing
     minutes: int = 1  # on two idle cores, to tell how long
+    inputs: tuple = ()  # what it depends on besides CODE and its own script
+
+    def hash(self, root=ROOT):
+        own = (f"toolchain/{self.measure.__module__.replace('.', '/')}.py", "toolchain/campaigns/engine.py")
+        return code_hash(root, (*own, *self.inputs))
 
 
 class Engine:
@@ -69,6 +109,12 @@ class Engine:
         partial.write_text(json.dumps(summary))
         partial.rename(kept)
         return summary
+
+    def picture(self, arguments):
+        """The drawing of one climb (SVG)."""
+        with tempfile.TemporaryDirectory() as out:
+            subprocess.run([self.tool, "climb", *map(str, arguments), "--out", out], check=True, capture_output=True, start_new_session=True)
+            return pathlib.Path(out, "climb.svg").read_text()
 
     def climbs(self, what, all_arguments):
         """The summaries, in the order asked for; says how far it is."""

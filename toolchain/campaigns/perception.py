@@ -108,5 +108,8 @@ def every_plane_and_no_other(tools, frames, results, name, scratch):
     return float(figures["recall"]) == 1.0 and float(figures["precision"]) == 1.0
 
 
-TABLES = {"paper-route": Table("The paper's own route beside the module's", (20260101, 1), paper_route, 3),
-          "planes": Table("Planes in single frames", (20260101, 1, 2), planes, 3)}
+TABLES = {"paper-route": Table("The paper's own route beside the module's", (20260101, 1), paper_route, 3,
+                              ("tests/reference/paper_route", "tests/benchmarks/instructions.txt",
+                               "tests/benchmarks/reference_instructions.txt")),
+          "planes": Table("Planes in single frames", (20260101, 1, 2), planes, 3,
+                         ("toolchain/checks/perceive", "toolchain/checks/score_polygons.py"))}

@@ -1,48 +1,150 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hands the newest value from one producer thread to one consumer thread without a wait on either side.
+// Hands values from one writer thread to one reader thread without a wait on either side. Every value carries the frame
+// that it was published in, so that what the reader sees depends on frames and not on which thread was quicker.
 #pragma once
 
 #include <array>
 #include <atomic>
+#include <cassert>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 namespace polygmap {
 
-// Triple buffer: the producer fills back() and publishes it, the consumer takes the newest published value. A value
-// that nobody took is overwritten. Both sides finish in a fixed number of steps (wait-free): one atomic exchange each,
-// which is a single instruction on x86 and on AArch64 from v8.1 on (Orin: v8.2).
-template <typename T>
+// Before every frame: of a value that nobody published.
+inline constexpr std::int64_t kNoFrame_ns = -(std::int64_t{1} << 60);
+
+// The reader says up to which frame it looks and gets the newest value of those. The writer may be ahead meanwhile: it
+// fills the slot with the oldest value, never the one that the reader holds. Of Slots, one is held, one is being
+// filled; so the newest value that the reader may look at is there as long as not more than Slots - 3 others were
+// published after it. A reader that comes later finds nothing and counts that in lost(); what it holds stays whole.
+// Frames are times in ns, within +-2^60 (36 years). Both sides finish in a bounded number of steps (wait-free): whoever
+// loses a slot to the other side looks at the others, at most Slots times.
+template <typename T, std::size_t Slots>
 class Exchange {
   static_assert(std::is_default_constructible_v<T>, "values live in an array");
-  static_assert(std::atomic<std::uint32_t>::is_always_lock_free, "the exchange must not hide a lock");
+  static_assert(Slots >= 3, "one is read, one is filled, one waits");
+  static_assert(std::atomic<std::int64_t>::is_always_lock_free, "the exchange must not hide a lock");
 
  public:
-  // Producer only: the buffer to fill before publish(). It holds some older value: fill all of it.
-  [[nodiscard]] T& back() noexcept { return slots_[back_]; }
-  void publish() noexcept { back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex; }
-  void publish(const T& value) noexcept {
+  Exchange() noexcept {
+    for (std::atomic<std::int64_t>& slot : states_) slot.store(nobodys(kNoFrame_ns), std::memory_order_relaxed);
+    states_[front_].store(nobodys(kNoFrame_ns) | kHeld, std::memory_order_relaxed);
+  }
+  Exchange(const Exchange&) = delete;  // two threads hold references into it
+  Exchange& operator=(const Exchange&) = delete;
+
+  // Writer only: the slot to fill before publish(). It has some older value: fill all of it.
+  [[nodiscard]] T& back() noexcept {
+    if (back_ == kNone) back_ = claim_oldest();
+    return slots_[back_];
+  }
+  // Frames strictly increase: a value per frame.
+  void publish(std::int64_t frame_ns) noexcept {
+    assert(frame_ns > published_ns_ && back_ != kNone);
+    published_ns_ = frame_ns;
+    states_[back_].store(nobodys(frame_ns), std::memory_order_release);
+    back_ = kNone;
+  }
+  void publish(std::int64_t frame_ns, const T& value) noexcept {
     back() = value;
-    publish();
+    publish(frame_ns);
   }
 
-  // Consumer only: false when nothing new was published since the last take; front() then stays as it was.
-  [[nodiscard]] bool try_take() noexcept {
-    if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0U) return false;
-    front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;
-    return true;
+  // Reader only. Takes the newest value of the frames up to last_frame_ns; false when it is the one in front already,
+  // or when it is lost; front() then stays as it was.
+  [[nodiscard]] bool try_take(std::int64_t last_frame_ns) noexcept {
+    for (std::size_t attempt = 0; attempt < Slots; ++attempt) {
+      const std::uint32_t newest = find_newest(last_frame_ns);
+      if (newest == kNone) break;
+      std::int64_t state = states_[newest].load(std::memory_order_relaxed);
+      if ((state & kFlags) != 0 || frame_of(state) > last_frame_ns) continue;  // the writer has it now
+      if (!states_[newest].compare_exchange_strong(state, state | kHeld, std::memory_order_acquire,
+                                                   std::memory_order_relaxed)) {
+        continue;
+      }
+      states_[front_].store(nobodys(front_frame_ns_), std::memory_order_release);
+      front_ = newest;
+      front_frame_ns_ = frame_of(state);
+      return true;
+    }
+    note_lost(last_frame_ns);
+    return false;
   }
   [[nodiscard]] const T& front() const noexcept { return slots_[front_]; }
+  [[nodiscard]] std::int64_t front_frame_ns() const noexcept { return front_frame_ns_; }
+  // How often the newest value was overwritten before the reader came. Saturates.
+  [[nodiscard]] std::uint32_t lost() const noexcept { return lost_; }
 
  private:
-  static constexpr std::uint32_t kFresh = 4U;
-  static constexpr std::uint32_t kIndex = 3U;
+  // A slot's state: four times the frame of its value, and who has it.
+  static constexpr std::int64_t kHeld = 1, kFilled = 2, kFlags = 3;
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::size_t kCacheLine_bytes = 64;
 
-  std::array<T, 3> slots_{};
-  alignas(kCacheLine_bytes) std::uint32_t back_ = 0;
-  alignas(kCacheLine_bytes) std::atomic<std::uint32_t> middle_{1};
-  alignas(kCacheLine_bytes) std::uint32_t front_ = 2;
+  static constexpr std::int64_t nobodys(std::int64_t frame_ns) noexcept { return frame_ns * 4; }
+  static constexpr std::int64_t frame_of(std::int64_t state) noexcept { return (state & ~kFlags) / 4; }
+
+  // A slot that nobody has, its value in (front, last_frame_ns]; kNone when there is none.
+  [[nodiscard]] std::uint32_t find_newest(std::int64_t last_frame_ns) const noexcept {
+    std::uint32_t newest = kNone;
+    std::int64_t newest_ns = front_frame_ns_;
+    for (std::uint32_t i = 0; i < Slots; ++i) {
+      const std::int64_t state = states_[i].load(std::memory_order_acquire);
+      const std::int64_t frame_ns = frame_of(state);
+      if ((state & kFlags) != 0 || frame_ns > last_frame_ns || frame_ns <= newest_ns) continue;
+      newest = i;
+      newest_ns = frame_ns;
+    }
+    return newest;
+  }
+
+  // The reader holds one slot at a time and, while the writer looks, takes ever newer ones: some slot is free.
+  [[nodiscard]] std::uint32_t claim_oldest() noexcept {
+    std::uint32_t oldest = 0;
+    for (std::size_t attempt = 0; attempt < Slots + 1; ++attempt) {
+      std::int64_t oldest_state = std::numeric_limits<std::int64_t>::max();
+      for (std::uint32_t i = 0; i < Slots; ++i) {
+        const std::int64_t state = states_[i].load(std::memory_order_acquire);
+        if ((state & kHeld) != 0 || state >= oldest_state) continue;
+        oldest = i;
+        oldest_state = state;
+      }
+      if (!states_[oldest].compare_exchange_strong(oldest_state, oldest_state | kFilled, std::memory_order_acq_rel,
+                                                   std::memory_order_relaxed)) {
+        continue;
+      }
+      overwritten_ns_.store(frame_of(oldest_state), std::memory_order_release);
+      break;
+    }
+    return oldest;
+  }
+
+  // Values are overwritten oldest first: one that was newer than front leaves none to take that is older.
+  void note_lost(std::int64_t last_frame_ns) noexcept {
+    std::int64_t gone_ns = overwritten_ns_.load(std::memory_order_acquire);
+    for (const std::atomic<std::int64_t>& slot : states_) {
+      const std::int64_t state = slot.load(std::memory_order_acquire);
+      if ((state & kFilled) != 0 && frame_of(state) > gone_ns) gone_ns = frame_of(state);
+    }
+    if (gone_ns <= front_frame_ns_ || gone_ns > last_frame_ns || gone_ns <= lost_ns_) return;
+    lost_ns_ = gone_ns;
+    if (lost_ != std::numeric_limits<std::uint32_t>::max()) ++lost_;
+  }
+
+  std::array<T, Slots> slots_{};
+  alignas(kCacheLine_bytes) std::array<std::atomic<std::int64_t>, Slots> states_;
+  std::atomic<std::int64_t> overwritten_ns_{kNoFrame_ns};
+  // The writer's.
+  alignas(kCacheLine_bytes) std::uint32_t back_ = kNone;
+  std::int64_t published_ns_ = kNoFrame_ns;
+  // The reader's.
+  alignas(kCacheLine_bytes) std::uint32_t front_ = 0;
+  std::uint32_t lost_ = 0;
+  std::int64_t front_frame_ns_ = kNoFrame_ns;
+  std::int64_t lost_ns_ = kNoFrame_ns;
 };
 
 }  // namespace polygmap

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Linear algebra types and the scalar functions of the cycle. Transcendental functions are called only through here:
-// they are the C library's, which may round the last bit differently on another target, and this is the one place to
-// change that. (Rotations have sin_cos.hpp.)
+// Linear algebra types and the scalar functions of the cycle. Transcendental functions are the module's own
+// (transcendental.hpp): the C library's round the last bits differently on another target.
 #pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>  // cross products
 #include <cmath>
 #include <numbers>
+
+#include "algorithms/core/math/transcendental.hpp"
 
 namespace polygmap {
 
@@ -21,12 +22,6 @@ inline constexpr double kGravity_mps2 = 9.81;
 
 namespace math {
 
-[[nodiscard]] inline double sin(double x_rad) noexcept { return std::sin(x_rad); }
-[[nodiscard]] inline double cos(double x_rad) noexcept { return std::cos(x_rad); }
-[[nodiscard]] inline double asin(double x) noexcept { return std::asin(x); }
-[[nodiscard]] inline double acos(double x) noexcept { return std::acos(x); }
-[[nodiscard]] inline double atan2(double y, double x) noexcept { return std::atan2(y, x); }
-[[nodiscard]] inline double exp(double x) noexcept { return std::exp(x); }
 [[nodiscard]] inline double sqrt(double x) noexcept { return std::sqrt(x); }  // exact under IEEE 754
 [[nodiscard]] inline float sqrt(float x) noexcept { return std::sqrt(x); }
 

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "algorithms/core/math/math.hpp"
-#include "algorithms/core/math/sin_cos.hpp"
 
 namespace polygmap {
 
@@ -33,7 +32,8 @@ struct Transform {
 }
 // R_z R_y R_x: yaw, then pitch, then roll of the turned axes.
 [[nodiscard]] inline Mat3 rotation_zyx(double yaw_rad, double pitch_rad, double roll_rad) noexcept {
-  const math::SinCos z = math::sin_cos(yaw_rad), y = math::sin_cos(pitch_rad), x = math::sin_cos(roll_rad);
+  const auto [sin, cos] = math::sin_cos(std::array{yaw_rad, pitch_rad, roll_rad, 0.0});
+  const math::SinCos z{sin[0], cos[0]}, y{sin[1], cos[1]}, x{sin[2], cos[2]};
   Mat3 R;
   R.col(0) << z.cos * y.cos, z.sin * y.cos, -y.sin;
   R.col(1) << z.cos * y.sin * x.sin - z.sin * x.cos, z.sin * y.sin * x.sin + z.cos * x.cos, y.cos * x.sin;

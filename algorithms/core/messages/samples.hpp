@@ -25,11 +25,42 @@ struct ImuSample {  // in the base frame; the accelerometer measures specific fo
 using JointVector = Eigen::Matrix<double, static_cast<int>(kJointCount), 1>;
 using LegVector = Eigen::Matrix<double, static_cast<int>(kJointsPerLeg), 1>;
 
+// Some of the joints, by joint_index().
+class JointSet {
+ public:
+  constexpr JointSet() = default;
+  [[nodiscard]] static constexpr JointSet all() noexcept { return of_bits((1U << kJointCount) - 1U); }
+  // Bit n is joint n; bits beyond the last joint do not count.
+  [[nodiscard]] static constexpr JointSet of_bits(std::uint32_t bits) noexcept {
+    JointSet set;
+    set.bits_ = static_cast<std::uint16_t>(bits & ((1U << kJointCount) - 1U));
+    return set;
+  }
+  constexpr void insert(std::size_t joint) noexcept { *this = of_bits(bits_ | 1U << joint); }
+  [[nodiscard]] constexpr bool contains(std::size_t joint) const noexcept { return (bits_ >> joint & 1U) != 0U; }
+  [[nodiscard]] constexpr bool is_empty() const noexcept { return bits_ == 0U; }
+  [[nodiscard]] constexpr bool is_all() const noexcept { return *this == all(); }
+  [[nodiscard]] constexpr std::uint16_t bits() const noexcept { return bits_; }
+  [[nodiscard]] constexpr bool operator==(const JointSet&) const noexcept = default;
+
+ private:
+  static_assert(kJointCount <= 16);
+  std::uint16_t bits_ = 0;
+};
+
 struct JointFeedback {
-  std::int64_t stamp_ns = 0;
+  static constexpr std::uint16_t kNeverHeard = 0xFFFF;
+
+  std::int64_t stamp_ns = 0;  // of the newest replies
   JointVector q_rad = JointVector::Zero();
   JointVector dq_radps = JointVector::Zero();
-  JointVector tau_nm = JointVector::Zero();       // not a number where a drive tells none
+  JointVector tau_nm = JointVector::Zero();  // not a number where a drive tells none
+  // How many cycles before stamp_ns the joint's own reply lies: 0 where it is as new as the stamp. A silent drive's
+  // joint keeps its last values and counts up; kNeverHeard: it has no values yet.
+  std::array<std::uint16_t, kJointCount> silent_cycles{};
+  [[nodiscard]] constexpr std::int64_t silent_ns(std::size_t joint) const noexcept {
+    return silent_cycles[joint] * 2 * kNsPerMs;
+  }
   std::array<double, kFootCount> foot_force_n{};  // vertical, 0 in the air
 };
 

@@ -16,14 +16,27 @@ struct ImuNoiseDensity {
 
 class ImuNoise {
  public:
-  void reset() noexcept {
+  struct Params {
+    NoiseLevel::Params gyro_radps{1e-3, 0.0, 1.0, 1e-6, 1.0};
+    NoiseLevel::Params accel_mps2{0.02, 0.0, 1.0, 1e-6, 10.0};
+    double uneven = 0.3;
+
+    static void visit(auto& p, auto& field) {
+      field("gyro_radps", p.gyro_radps);
+      field("accel_mps2", p.accel_mps2);
+      field("uneven", p.uneven, 0.0, 1.0,
+            "Samples whose times lie apart by more than this share otherwise than the last two are not compared.");
+    }
+  };
+  void reset(const Params& params) noexcept {
     *this = ImuNoise{};
-    gyro_radps_.level.reset({1e-3, 0.0, kMemory_s, 1e-6, 1.0});
-    accel_mps2_.level.reset({0.02, 0.0, kMemory_s, 1e-6, 10.0});
+    uneven_ = params.uneven;
+    gyro_radps_.level.reset(params.gyro_radps);
+    accel_mps2_.level.reset(params.accel_mps2);
   }
   void update(std::int64_t stamp_ns, const Vec3& gyro_radps, const Vec3& accel_mps2) noexcept {
     const double dt_s = seconds(stamp_ns - stamp_ns_);
-    const bool even = stamp_ns_ >= 0 && std::abs(dt_s - dt_s_) < kUneven * dt_s;
+    const bool even = stamp_ns_ >= 0 && std::abs(dt_s - dt_s_) < uneven_ * dt_s;
     gyro_radps_.take(gyro_radps, even, dt_s);
     accel_mps2_.take(accel_mps2, even, dt_s);
     dt_s_ = dt_s;
@@ -35,20 +48,19 @@ class ImuNoise {
   }
 
  private:
-  static constexpr double kMemory_s = 1.0;
-  static constexpr double kUneven = 0.3;
   struct Signal {
     Vec3 last = Vec3::Zero(), step = Vec3::Zero();
     NoiseLevel level;
     void take(const Vec3& value, bool even, double dt_s) noexcept {
       const Vec3 new_step = value - last;
-      constexpr double kRows = 6.0 * 3.0;
+      constexpr double kRows = 6.0 * 3.0;  // of a second difference, three axes: by its definition
       if (even) level.take((new_step - step).squaredNorm() / kRows, dt_s);
       step = new_step;
       last = value;
     }
   };
   Signal gyro_radps_, accel_mps2_;
+  double uneven_ = 0.0;
   double dt_s_ = 0.0;
   std::int64_t stamp_ns_ = -1;
 };

@@ -15,6 +15,7 @@ class NoiseLevel {
     double first_s = 0.0;
     double memory_s = 1.0;
     double min = 0.0, max = 1e9;
+    double most_ratio = 4.0;
 
     static void visit(auto& p, auto& field) {
       field("first", p.first, 0.0, 10.0, "Sigma until something is measured, in units of the signal.");
@@ -23,6 +24,8 @@ class NoiseLevel {
       field("min", p.min, 0.0, 10.0, "The measured sigma is believed down to this.");
       field("max", p.max, 0.0, 1e9, "The measured sigma is believed up to this.");
       field.ordered("min", "max");
+      field("most_ratio", p.most_ratio, 1.0, 100.0,
+            "A square that is more than this times the usual one, an impact, counts as this times.");
     }
   };
   void reset(const Params& params) noexcept {
@@ -35,13 +38,12 @@ class NoiseLevel {
   void take(double square, double dt_s) noexcept {
     time_s_ = std::min(time_s_ + dt_s, params_.memory_s);
     const double usual = math::square(sigma_);
-    const double seen = std::min(square, kMostRatio * usual);
+    const double seen = std::min(square, params_.most_ratio * usual);
     sigma_ = math::clamp(math::sqrt(usual + std::min(dt_s / time_s_, 1.0) * (seen - usual)), params_.min, params_.max);
   }
   [[nodiscard]] double sigma() const noexcept { return sigma_; }
 
  private:
-  static constexpr double kMostRatio = 4.0;
   Params params_;
   double sigma_ = 0.0;
   double time_s_ = 0.0;

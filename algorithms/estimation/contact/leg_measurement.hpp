@@ -21,6 +21,8 @@ struct LegMeasurement {
 // Both legs at one moment.
 struct LegSample {
   std::int64_t stamp_ns = 0;
+  std::array<bool, kFootCount> measured{true, true};  // false: a drive of that leg has been silent for too long,
+  std::int64_t silent_ns = 0;                         // the longest of them for this
   std::array<LegMeasurement, kFootCount> legs;
   std::array<double, kFootCount> foot_force_n{};  // 0 in the air
   // Probability of contact, where somebody else has judged it: then forces do not count.

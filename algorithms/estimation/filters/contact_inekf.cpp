@@ -42,8 +42,9 @@ void ContactInEkf::initialise(const Start& start, const std::array<LegMeasuremen
   P_.diagonal().segment<3>(kAccelBias).setConstant(math::square(start.accel_bias_sigma_mps2));
   // Right-invariant errors of velocity and position hold the attitude's: e_v = dv + v x e.
   for (const auto& [index, value] : {std::pair{+kVelocity, odom_v_base_mps_}, std::pair{+kPosition, odom_p_base_m_}}) {
-    P_.middleRows<3>(index) += skew(value) * P_.middleRows<3>(kAttitude);
-    P_.middleCols<3>(index) += P_.middleCols<3>(kAttitude) * skew(value).transpose();
+    const Mat3 lever = skew(value);
+    P_.middleRows<3>(index) += lever * P_.middleRows<3>(kAttitude);
+    P_.middleCols<3>(index) += P_.middleCols<3>(kAttitude) * lever.transpose();
   }
   for (std::size_t foot = 0; foot < kFootCount; ++foot) anchor(foot, legs[foot]);
 }
@@ -129,7 +130,7 @@ void ContactInEkf::correct_by_feet(const std::array<LegMeasurement, kFootCount>&
       whiteness_[foot] = {};
       continue;
     }
-    const double share = std::max(contacts[foot].load_share * contacts[foot].probability, 0.05);
+    const double share = std::max(contacts[foot].load_share * contacts[foot].probability, params_.least_load_share);
     const int contact = of_foot(kContact, foot), sole = of_foot(kSoleRotation, foot);
     P_.diagonal().segment<3>(contact).array() += dt_s * (math::square(walk_mprs) / share + contacts[foot].walk_m2ps);
     const Vec3 off_m = odom_R_base_ * leg.base_T_sole.p_m - (odom_p_contact_m_[foot] - odom_p_base_m_);

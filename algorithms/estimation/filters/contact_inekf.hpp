@@ -41,6 +41,7 @@ class ContactInEkf {
     double whiteness_most_ratio = 5.0;
     double outlier_sigmas = 5.0;
     double turn_lever_m = 0.5;
+    double least_load_share = 0.05;
 
     static void visit(auto& p, auto& field) {
       field("gyro_noise_radprs", p.gyro_noise_radprs, 1e-6, 0.1,
@@ -75,6 +76,9 @@ class ContactInEkf {
       field("outlier_sigmas", p.outlier_sigmas, 0.5, 100.0, "Rows farther out weigh less, in proportion (Huber).");
       field("turn_lever_m", p.turn_lever_m, 0.0, 2.0,
             "Turning counts as the speed that it gives a point so far from the base.");
+      field("least_load_share", p.least_load_share, 0.001, 1.0,
+            "A foot that carries less, by load and by how sure its contact is, walks no more than one that carries "
+            "this.");
     }
   };
   // One sigma each, of what is known at the start.

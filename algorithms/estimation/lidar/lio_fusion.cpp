@@ -52,6 +52,7 @@ void LioFusion::reset(const Params& params, const Transform& base_T_lidar) noexc
   params_ = params;
   base_T_lidar_ = base_T_lidar;
   uncertainty_.reset(params.uncertainty);
+  untied_.reset(params.uncertainty);
   position_noise_m_.reset(params.unstated_position_m);
   rotation_noise_rad_.reset(params.unstated_rotation_rad);
   position_sigma_m_ = uncertainty_.position_sigma_m(Vec3::Zero());
@@ -79,25 +80,26 @@ LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base
   const Transform lio_T_base = base_from_lidar(lidar, base_T_lidar_);
   const LioSigmas sigmas = sigmas_of(sample);
   if (count_ == 0) {
+    if (is_tilted(odom_T_base, lio_T_base)) return LioVerdict::kJump;
     world_T_lio_ = tied_level(odom_T_base, lio_T_base);
     count_ = 1;
-    last_accepted_ns_ = sample.stamp_ns;
+    last_accepted_ns_ = last_used_ns_ = sample.stamp_ns;
     last_lio_T_odom_ = world_T_lio_.inverse();
     tie(odom_T_base, sigmas, count_);
     return LioVerdict::kAccepted;
   }
 
-  const double silence_s = seconds(sample.stamp_ns - last_accepted_ns_);
+  const double silence_s = seconds(sample.stamp_ns - last_used_ns_);
   const Transform predicted = fused_world_T_odom_ * odom_T_base;
   const Transform measured = world_T_lio_ * lio_T_base;
   if (is_jump(predicted, measured, silence_s)) {
     if (!try_realign(lio_T_base, odom_T_base, sigmas)) return LioVerdict::kJump;
-    last_accepted_ns_ = sample.stamp_ns;
+    last_used_ns_ = sample.stamp_ns;
     last_lio_T_odom_ = lio_T_base * odom_T_base.inverse();
     return LioVerdict::kRealigned;
   }
   jumped_count_ = 0;
-  last_accepted_ns_ = sample.stamp_ns;
+  last_accepted_ns_ = last_used_ns_ = sample.stamp_ns;
   const bool stated = sample.position_sigma_m.maxCoeff() > 0.0 && sample.rotation_sigma_rad.maxCoeff() > 0.0;
   if (!stated) measure_noise(lio_T_base, odom_T_base, silence_s);
 
@@ -119,11 +121,13 @@ void LioFusion::rebase(const Transform& new_T_old) noexcept {
   fused_world_T_odom_ = {};
   last_lio_T_odom_ = last_lio_T_odom_ * new_T_old.inverse();
   uncertainty_.rebase(new_T_old);
+  untied_.rebase(new_T_old);
   jumped_count_ = 0;
 }
 
 void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept {
   uncertainty_.move(world_T_odom_.R * odom_step_m);
+  if (!aligned_) untied_.move(odom_step_m);  // until then world is odom
   const Transform wanted = fused_world_T_odom_ * odom_T_base;
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
@@ -138,7 +142,7 @@ void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, doub
     world_T_odom_ = next * odom_T_base.inverse();
   }
   const Vec3 held_back_m = (1.0 - move_share) * move_m;
-  position_sigma_m_ = (uncertainty_.position_sigma_m(wanted.p_m).cwiseAbs2() + held_back_m.cwiseAbs2()).cwiseSqrt();
+  position_sigma_m_ = (known().position_sigma_m(wanted.p_m).cwiseAbs2() + held_back_m.cwiseAbs2()).cwiseSqrt();
 }
 
 bool LioFusion::is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept {
@@ -155,14 +159,23 @@ bool LioFusion::try_realign(const Transform& lio_T_base, const Transform& odom_T
   const Transform before = agrees ? jumped_lio_T_odom_ * odom_T_base : lio_T_base;
   jumped_lio_T_odom_ = fuse_pose(before, lio_T_base, 1.0 / static_cast<double>(jumped_count_)) * odom_T_base.inverse();
   jumped_lio_T_odom_.R = so3_renormalised(jumped_lio_T_odom_.R);
-  const bool first_pose_contradicted = !aligned_ && count_ == 1;
+  // Which of the first two poses is wrong nobody knows: the later one is tried, once. If a third contradicts it, too,
+  // it takes as many poses that agree as after any other jump.
+  const bool first_pose_contradicted = !aligned_ && count_ == 1 && !doubted_;
+  doubted_ = doubted_ || first_pose_contradicted;
   if (jumped_count_ < params_.realign_count && !first_pose_contradicted) return false;
-  // Our world stays where it is.
-  world_T_lio_ = tied_level(fused_world_T_odom_ * odom_T_base, jumped_lio_T_odom_ * odom_T_base);
+  const Transform world_T_base = fused_world_T_odom_ * odom_T_base, mean_T_base = jumped_lio_T_odom_ * odom_T_base;
+  if (is_tilted(world_T_base, mean_T_base)) return false;
+  if (!aligned_) uncertainty_ = untied_;                 // the former tie was none
+  world_T_lio_ = tied_level(world_T_base, mean_T_base);  // our world stays where it is
   tie(odom_T_base, sigmas, jumped_count_);
   count_ = jumped_count_;
   jumped_count_ = 0;
   return true;
+}
+
+bool LioFusion::is_tilted(const Transform& world_T_base, const Transform& lio_T_base) const noexcept {
+  return is_jump(world_T_base, tied_level(world_T_base, lio_T_base) * lio_T_base, 0.0);
 }
 
 LioFusion::LioSigmas LioFusion::sigmas_of(const LioSample& sample) const noexcept {

@@ -37,7 +37,7 @@ enum class LioVerdict : std::uint8_t {
   kTooOld,      // older than max_age_s
   kNoOdometry,  // none known at its stamp: earlier than the standstill at the start, or a sensor was silent
   kJump,        // too far from the prediction
-  kRealigned,   // accepted: a lasting jump of LIO's own world was taken as its new alignment
+  kRealigned,   // moved nothing: a first pose that its successor contradicts, or a lasting jump, made LIO's world anew
   kOutOfRange,  // finite, but farther off than any LIO goes
 };
 inline constexpr std::size_t kLioVerdictCount = 11;
@@ -111,15 +111,21 @@ class LioFusion {
 
   // Variances that the odometry's own filter has of x, y, z besides what the heading does, and of yaw: at its start,
   // and before every tick.
-  void begin(const LioUncertainty::Quantities& odometry) noexcept { uncertainty_.begin(odometry); }
-  void follow(const LioUncertainty::Quantities& odometry) noexcept { uncertainty_.follow(odometry); }
+  void begin(const LioUncertainty::Quantities& odometry) noexcept {
+    uncertainty_.begin(odometry);
+    untied_.begin(odometry);
+  }
+  void follow(const LioUncertainty::Quantities& odometry) noexcept {
+    uncertainty_.follow(odometry);
+    if (!aligned_) untied_.follow(odometry);
+  }
   // Once per tick: moves the published offset towards the fused one within the slew limits, which hold at the base,
   // wherever odom's origin is; lets the sigmas grow. odom_step: by which the odometry moved the base since the last.
   void tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept;
   [[nodiscard]] const Transform& world_T_odom() const noexcept { return world_T_odom_; }
   // Of the published pose, world axes; what the slew limit still holds back counts as error.
   [[nodiscard]] const Vec3& position_sigma_m() const noexcept { return position_sigma_m_; }
-  [[nodiscard]] double yaw_sigma_rad() const noexcept { return uncertainty_.yaw_sigma_rad(); }
+  [[nodiscard]] double yaw_sigma_rad() const noexcept { return known().yaw_sigma_rad(); }
   [[nodiscard]] bool aligned() const noexcept { return aligned_; }  // until then the fused pose is the odometry's
   [[nodiscard]] const LioInnovations& innovations() const noexcept { return innovations_; }
   [[nodiscard]] std::int64_t last_accepted_ns() const noexcept { return last_accepted_ns_; }  // -1: none
@@ -131,6 +137,12 @@ class LioFusion {
   [[nodiscard]] bool is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept;
   [[nodiscard]] bool try_realign(const Transform& lio_T_base, const Transform& odom_T_base,
                                  const LioSigmas& sigmas) noexcept;
+  // A pose whose tilt is not the odometry's cannot be tied to it by any heading and place.
+  [[nodiscard]] bool is_tilted(const Transform& world_T_base, const Transform& lio_T_base) const noexcept;
+  // Of the published pose: a tie that was contradicted, and that no second pose confirmed, says nothing.
+  [[nodiscard]] const LioUncertainty& known() const noexcept {
+    return !aligned_ && doubted_ && count_ <= 1 ? untied_ : uncertainty_;
+  }
   [[nodiscard]] LioSigmas sigmas_of(const LioSample& sample) const noexcept;
   // The odometry moves by next to nothing against LIO from one pose to the next: what is left is LIO's noise, twice.
   void measure_noise(const Transform& lio_T_base, const Transform& odom_T_base, double silence_s) noexcept;
@@ -145,6 +157,7 @@ class LioFusion {
   // drift since the first. Once that is no more than eq. (9)'s gain the tie stays and odom moves as it drifts.
   Transform world_T_lio_;
   bool aligned_ = false;
+  bool doubted_ = false;          // the first pose was contradicted before a second one agreed: that happens once
   std::uint32_t count_ = 0;       // poses averaged into the alignment
   Transform fused_world_T_odom_;  // towards which the published one moves
   Transform world_T_odom_;        // published
@@ -154,7 +167,9 @@ class LioFusion {
   std::uint32_t jumped_count_ = 0;
   std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();  // of any pose that was in order
   std::int64_t last_accepted_ns_ = -1;
+  std::int64_t last_used_ns_ = -1;  // accepted or realigned: since then LIO was silent
   LioUncertainty uncertainty_;
+  LioUncertainty untied_;  // as if there were no LIO, until the worlds are aligned
   Vec3 position_sigma_m_ = Vec3::Zero();
   LioInnovations innovations_;
 };

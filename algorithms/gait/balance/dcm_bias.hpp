@@ -17,6 +17,7 @@ class DcmBias {
     double haste = 2.0;
     double surprise_m = 0.02;
     double most_m = 0.04;
+    double begin_s = 0.4;
 
     static void visit(auto& p, auto& field) {
       field("rate_radps", p.rate_radps, 0.0, 20.0, "The observer's slow pole pair.");
@@ -26,6 +27,8 @@ class DcmBias {
       field("surprise_m", p.surprise_m, 0.0, 1.0,
             "An estimate farther from the observer's is a push, which says nothing of the bias.");
       field("most_m", p.most_m, 0.0, 0.2, "The bias is believed up to this.");
+      field("begin_s", p.begin_s, 0.01, 10.0,
+            "The time since the beginning counts from this on, or haste would know no bound.");
     }
   };
   void reset() noexcept { *this = {}; }
@@ -41,8 +44,7 @@ class DcmBias {
       return;
     }
     seen_s_ += tick_s;
-    constexpr double kBegin_s = 0.4;
-    const double rate_radps = std::max(params.rate_radps, params.haste / (kBegin_s + seen_s_));
+    const double rate_radps = std::max(params.rate_radps, params.haste / (params.begin_s + seen_s_));
     // Errors follow s^2 + 2 rate s + rate^2 with these. The bias goes against the surprise: where it is too large, the
     // true component is taken for too far behind, and falls back further.
     const double bias_gain = math::square(rate_radps) / omega_radps;

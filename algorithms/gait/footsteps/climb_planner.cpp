@@ -135,15 +135,17 @@ ClimbPlanner::StandOff ClimbPlanner::stand_off(const Situation& situation,
 }
 
 bool ClimbPlanner::lined_up(const Situation& situation, const StandOff& to, std::size_t foot) const noexcept {
-  const double relaxed =
-      corrections_ > params_.strict_corrections ? 1.0 + 0.5 * (corrections_ - params_.strict_corrections) : 1.0;
+  const double relaxed = corrections_ > params_.line_up.strict_corrections
+                             ? 1.0 + 0.5 * (corrections_ - params_.line_up.strict_corrections)
+                             : 1.0;
   // With the leading step under way a little more is no reason to line up again.
-  const double tolerance = std::min(relaxed, params_.max_relaxation) + (situation.leads ? params_.under_way : 0.0);
+  const double tolerance =
+      std::min(relaxed, params_.line_up.max_relaxation) + (situation.leads ? params_.line_up.under_way : 0.0);
   const SolePose& sole = situation.soles[foot];
   const Vec3 off_m = rotation_z(to.yaw_rad).transpose() * (sole.position_m - to.soles[foot].position_m);
-  return std::abs(off_m.x()) <= tolerance * params_.line_up_m &&
-         std::abs(off_m.y()) <= tolerance * params_.line_up_lateral_m &&
-         std::abs(math::wrap_angle(sole.yaw_rad - to.yaw_rad)) <= tolerance * params_.line_up_yaw_rad &&
+  return std::abs(off_m.x()) <= tolerance * params_.line_up.along_m &&
+         std::abs(off_m.y()) <= tolerance * params_.line_up.lateral_m &&
+         std::abs(math::wrap_angle(sole.yaw_rad - to.yaw_rad)) <= tolerance * params_.line_up.yaw_rad &&
          toe_to_line_m(robot_->sole.collision, sole, to.nosing, to.yaw_rad) >= params_.min_stand_off_m;
 }
 
@@ -214,7 +216,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     return decision;
   }
   if (treads_climbed_ == 0 && floor_goal(situation, footholds, decision.goal)) {
-    decision.has_step = corrections_ < params_.max_corrections && floor_steps_ < params_.max_floor_steps;
+    decision.has_step = corrections_ < params_.line_up.max_corrections && floor_steps_ < params_.max_floor_steps;
     if (decision.has_step) return decision;
     decision = {};
     decision.obstruction = StopReason::kNotLinedUp;

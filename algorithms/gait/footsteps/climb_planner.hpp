@@ -18,16 +18,33 @@ inline constexpr std::array<std::string_view, 2> kGaitPatternNames{"ds", "ss"};
 
 class ClimbPlanner {
  public:
+  // When the feet are lined up before the stairs.
+  struct LineUpParams {
+    double along_m = 0.004;
+    double lateral_m = 0.012;
+    double yaw_rad = 0.009;
+    std::uint32_t strict_corrections = 2;
+    double max_relaxation = 2.5;
+    std::uint32_t max_corrections = 12;
+    double under_way = 0.5;
+
+    static void visit(auto& p, auto& field) {
+      field("along_m", p.along_m, 0.001, 0.1, "Either foot is lined up within this along the heading.");
+      field("lateral_m", p.lateral_m, 0.001, 0.2, "Either foot is lined up within this to the side.");
+      field("yaw_rad", p.yaw_rad, 0.001, 0.3, "Either foot is lined up within this turn.");
+      field("strict_corrections", p.strict_corrections, 0, 1000,
+            "The tolerance relaxes by half of itself per step in place after as many.");
+      field("max_relaxation", p.max_relaxation, 1.0, 10.0, "The tolerance relaxes up to this many times.");
+      field("max_corrections", p.max_corrections, 0, 1000,
+            "The feet will not be lined up when they are not after as many: 200 climbs took up to 7.");
+      field("under_way", p.under_way, 0.0, 10.0,
+            "The tolerance relaxes by this times itself while the weight is on its way for the first leading step.");
+    }
+  };
   struct Params {
     GaitPattern pattern = GaitPattern::kDoubleStep;
     double stand_off_m = 0.032;
     double min_stand_off_m = 0.022;
-    double line_up_m = 0.004;
-    double line_up_lateral_m = 0.012;
-    double line_up_yaw_rad = 0.009;
-    std::uint32_t strict_corrections = 2;
-    double max_relaxation = 2.5;
-    std::uint32_t max_corrections = 12;
     std::uint32_t max_floor_steps = 60;
     FloorStepLimits floor;
     double floor_clearance_m = 0.02;
@@ -36,11 +53,11 @@ class ClimbPlanner {
     std::int64_t max_map_age_ns = 500 * kNsPerMs;
     double correction_m = 0.05;
     double turn_round = 2.5;
-    double under_way = 0.5;
     double shorter = 0.6;
     double shortest = 0.2;
     double least_half_width_m = 0.08;
     double wider_m = 0.03;
+    LineUpParams line_up;
 
     static void visit(auto& p, auto& field) {
       field("pattern", p.pattern, kGaitPatternNames,
@@ -48,14 +65,6 @@ class ClimbPlanner {
       field("stand_off_m", p.stand_off_m, 0.0, 0.3, "Collision toe to the first nosing or riser.");
       field("min_stand_off_m", p.min_stand_off_m, 0.0, 0.3, "Nearer is not lined up, whatever the tolerance.");
       field.ordered("min_stand_off_m", "stand_off_m");
-      field("line_up_m", p.line_up_m, 0.001, 0.1, "Either foot is lined up within this along the heading.");
-      field("line_up_lateral_m", p.line_up_lateral_m, 0.001, 0.2, "Either foot is lined up within this to the side.");
-      field("line_up_yaw_rad", p.line_up_yaw_rad, 0.001, 0.3, "Either foot is lined up within this turn.");
-      field("strict_corrections", p.strict_corrections, 0, 1000,
-            "The tolerance relaxes by half of itself per step in place after as many.");
-      field("max_relaxation", p.max_relaxation, 1.0, 10.0, "The tolerance relaxes up to this many times.");
-      field("max_corrections", p.max_corrections, 0, 1000,
-            "The feet will not be lined up when they are not after as many: 200 climbs took up to 7.");
       field("max_floor_steps", p.max_floor_steps, 0, 10000,
             "The feet will not be lined up when they are not after as many floor steps of any length.");
       field("floor", p.floor);
@@ -67,14 +76,13 @@ class ClimbPlanner {
       field("correction_m", p.correction_m, 0.0, 0.5, "A shorter step on the floor only corrects.");
       field("turn_round", p.turn_round, 1.0, 100.0,
             "The other foot leads than the one that was to only for a displacement beyond this times the dead bands.");
-      field("under_way", p.under_way, 0.0, 10.0,
-            "The tolerance relaxes by this times itself while the weight is on its way for the first leading step.");
       field("shorter", p.shorter, 0.1, 0.95, "Floor steps become this times as long when the legs cannot do one.");
       field("shortest", p.shortest, 0.01, 1.0, "Floor steps that would be no longer than this share are given up.");
       field("least_half_width_m", p.least_half_width_m, 0.03, 0.08,
             "Floor steps keep the soles at least this far from their middle.");
       field("wider_m", p.wider_m, 0.0, 0.2,
             "Floor steps keep the soles no farther from their middle than the stance's half width and this.");
+      field("line_up", p.line_up);
     }
   };
 

@@ -13,7 +13,7 @@ bool JointReference::try_arm(const RobotModel& robot, const Params& params, cons
     const auto i = static_cast<Eigen::Index>(n);
     const JointLimits& limits = robot.drives.limits[n];
     inside_rad[i] = math::clamp(q_rad[i], limits.min_rad, limits.max_rad);
-    if (!(std::abs(q_rad[i] - inside_rad[i]) <= kEncoderOffset_rad)) return false;
+    if (!(std::abs(q_rad[i] - inside_rad[i]) <= params.encoder_offset_rad)) return false;
   }
   robot_ = &robot;
   params_ = params;
@@ -49,7 +49,9 @@ bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole
       commanded_rad_[i] =
           math::clamp(math::clamp(q_rad + drives.delay_s * dq_radps, sent_rad - step_rad, sent_rad + step_rad),
                       limits.min_rad, limits.max_rad);
-      command.joints[n] = {commanded_rad_[i], dq_radps, 0.0, gain * drives.kp_nmprad[j], gain * drives.kd_nmsprad[j]};
+      const GainLimits& most = drives.gain_limits[n];
+      command.joints[n] = {commanded_rad_[i], dq_radps, 0.0, std::min(gain * drives.kp_nmprad[j], most.kp_nmprad),
+                           std::min(gain * drives.kd_nmsprad[j], most.kd_nmsprad)};
     }
   }
   return limited;
@@ -57,8 +59,10 @@ bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole
 
 void JointReference::hold(JointCommand& command) const noexcept {
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    command.joints[n] = {commanded_rad_[static_cast<Eigen::Index>(n)], 0.0, 0.0, params_.hold_kp_nmprad,
-                         params_.hold_kd_nmsprad};
+    const GainLimits& most = robot_->drives.gain_limits[n];
+    command.joints[n] = {commanded_rad_[static_cast<Eigen::Index>(n)], 0.0, 0.0,
+                         std::min(params_.hold_kp_nmprad, most.kp_nmprad),
+                         std::min(params_.hold_kd_nmsprad, most.kd_nmsprad)};
   }
 }
 

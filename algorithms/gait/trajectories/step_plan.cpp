@@ -15,10 +15,10 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
   StepPlan plan;
   plan.goal = goal;
   plan.shape = on_floor ? params.floor_swing : passing ? params.passing_swing : params.stair_swing;
-  plan.shift_ticks = on_floor ? params.floor_shift_ticks : params.stair_shift_ticks;
-  const std::int32_t usual_ticks = on_floor  ? params.floor_swing_ticks
-                                   : passing ? params.passing_swing_ticks
-                                             : params.stair_swing_ticks;
+  plan.shift_ticks = on_floor ? params.durations.floor_shift_ticks : params.durations.stair_shift_ticks;
+  const std::int32_t usual_ticks = on_floor  ? params.durations.floor_swing_ticks
+                                   : passing ? params.durations.passing_swing_ticks
+                                             : params.durations.stair_swing_ticks;
   plan.swing_ticks = static_cast<std::int32_t>(tried.longer * usual_ticks);
   const double rise_share = on_floor ? 1.0 : passing ? params.passing_rise_share : params.rise_share;
   plan.rise_ticks = static_cast<std::int32_t>(rise_share * plan.swing_ticks);
@@ -50,7 +50,7 @@ void plan_torso(const LegGeometry& geometry, const StepParams& params, const Sol
 
 ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept {
   const std::int32_t stay = plan.swing_ticks + params.landing_hold_ticks;
-  const std::int32_t ramp = params.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
+  const std::int32_t ramp = params.durations.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
   ZmpKnots knots;
   (void)knots.try_push_back({stay, plan.zmp_stance_m});
   (void)knots.try_push_back({stay + std::max(ramp, 1), plan.zmp_next_m});
@@ -60,7 +60,7 @@ ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept {
 ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2& start_m) noexcept {
   ZmpKnots knots;
   const std::int32_t over = std::max(plan.shift_ticks - params.lift_hold_ticks, 2);
-  const std::int32_t ramp = params.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
+  const std::int32_t ramp = params.durations.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
   (void)knots.try_push_back({std::max(over - ramp, over / 5), start_m});
   (void)knots.try_push_back({over, plan.zmp_stance_m});
   for (const ZmpKnot& knot : zmp_of_swing(params, plan)) {

@@ -11,6 +11,22 @@
 
 namespace polygmap {
 
+// How long the parts of a step take.
+struct StepDurations {
+  std::int32_t stair_shift_ticks = 165;
+  std::int32_t stair_swing_ticks = 450;
+  std::int32_t passing_swing_ticks = 460;
+  std::int32_t floor_shift_ticks = 350;
+  std::int32_t floor_swing_ticks = 350;
+
+  static void visit(auto& p, auto& field) {
+    field("stair_shift_ticks", p.stair_shift_ticks, 66, 2000, "Double support before a step on the stairs: 0.33 s.");
+    field("stair_swing_ticks", p.stair_swing_ticks, 50, 2000, "A swing onto a tread: 0.90 s.");
+    field("passing_swing_ticks", p.passing_swing_ticks, 50, 2000, "A swing past a tread: 0.92 s.");
+    field("floor_shift_ticks", p.floor_shift_ticks, 66, 2000, "Double support before a step on the floor.");
+    field("floor_swing_ticks", p.floor_swing_ticks, 50, 2000, "A swing on the floor.");
+  }
+};
 struct StepParams {
   TorsoParams torso;
   SwingShape stair_swing;
@@ -33,11 +49,6 @@ struct StepParams {
                            .toe_down_full = 0.29,
                            .toe_up_begin = 0.30,
                            .toe_up_end = 0.70};
-  std::int32_t stair_shift_ticks = 165;
-  std::int32_t stair_swing_ticks = 450;
-  std::int32_t passing_swing_ticks = 460;
-  std::int32_t floor_shift_ticks = 350;
-  std::int32_t floor_swing_ticks = 350;
   ComPlan::Params com;
   double max_zmp_offset_m = 0.03;
   double zmp_ahead_m = 0.0;
@@ -51,17 +62,13 @@ struct StepParams {
   double joint_margin_rad = 0.03;
   double knee_min_rad = 0.08;
   double speed_share = 0.95;
+  StepDurations durations;
 
   static void visit(auto& p, auto& field) {
     field("torso", p.torso);
     field("stair_swing", p.stair_swing);
     field("floor_swing", p.floor_swing);
     field("passing_swing", p.passing_swing);
-    field("stair_shift_ticks", p.stair_shift_ticks, 66, 2000, "Double support before a step on the stairs: 0.33 s.");
-    field("stair_swing_ticks", p.stair_swing_ticks, 50, 2000, "A swing onto a tread: 0.90 s.");
-    field("passing_swing_ticks", p.passing_swing_ticks, 50, 2000, "A swing past a tread: 0.92 s.");
-    field("floor_shift_ticks", p.floor_shift_ticks, 66, 2000, "Double support before a step on the floor.");
-    field("floor_swing_ticks", p.floor_swing_ticks, 50, 2000, "A swing on the floor.");
     field("com", p.com);
     field("max_zmp_offset_m", p.max_zmp_offset_m, 0.0, 0.1, "The zero-moment point goes no farther, to set off.");
     field("zmp_ahead_m", p.zmp_ahead_m, -0.05, 0.1,
@@ -83,6 +90,7 @@ struct StepParams {
     field("joint_margin_rad", p.joint_margin_rad, 0.0, 0.3, "A plan keeps this from the joints' ranges.");
     field("knee_min_rad", p.knee_min_rad, 0.0, 0.5, "A plan keeps the knee this far from the stretched leg.");
     field("speed_share", p.speed_share, 0.1, 1.0, "A plan uses this share of the drives' speed.");
+    field("durations", p.durations);
   }
 };
 

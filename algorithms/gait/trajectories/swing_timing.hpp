@@ -23,6 +23,7 @@ class SwingTiming {
     double descend_search = 5.0;
     std::int32_t pause_ticks = 200;
     double retreat = 0.5;
+    double pace_per_tick = 0.05;
 
     static void visit(auto& p, auto& field) {
       field("falling_outward_m", p.falling_outward_m, 0.001, 0.5,
@@ -38,6 +39,8 @@ class SwingTiming {
       field("pause_ticks", p.pause_ticks, 0, 2000, "The foot waits for so long where there is no ground.");
       field("retreat", p.retreat, 0.05, 2.0,
             "A foot that found no ground goes back this many times as fast, since the torso is elsewhere.");
+      field("pace_per_tick", p.pace_per_tick, 0.001, 1.0,
+            "The foot's pace, one as planned, changes by no more from tick to tick: what the drives accelerate.");
     }
   };
   // What decides on a tick.
@@ -60,7 +63,6 @@ class SwingTiming {
       falling_outward_ = true;
       turns_back_ = tick_ < seen.turn_until_tick;
     }
-    constexpr double kHarderPerTick = 0.05;
     // The plan's own pace is proved for the drives; they are as fast as the pace is, about.
     const double most = std::max(std::abs(pace_) / std::max(seen.drive_share, 1e-3), 1.0);
     const double speed_up = std::min(params.speed_up, most);
@@ -68,7 +70,7 @@ class SwingTiming {
                          : falling_outward_ && !straight_           ? speed_up
                                                                     : 1.0;
     const double wanted = turns_back_ ? -1.0 : usual;
-    pace_ += math::clamp(wanted - pace_, -kHarderPerTick, kHarderPerTick);
+    pace_ += math::clamp(wanted - pace_, -params.pace_per_tick, params.pace_per_tick);
     tick_ += pace_;
     if (falling_outward_ && !turns_back_) {
       widened_m_ = std::min({widened_m_ + params.widen_mps * kTick_s, params.widen_m, std::max(seen.side_room_m, 0.0)});

@@ -15,11 +15,11 @@ CameraExtrinsicsEstimator::CameraExtrinsicsEstimator(const Params& params,
     : params_(params), nominal_(nominal_base_T_camera), base_T_camera_(nominal_base_T_camera) {}
 
 double CameraExtrinsicsEstimator::tilt_sigma_rad() const noexcept {
-  const double left = 1.0 / (1.0 + tilt_.information * math::square(params_.prior_tilt_sigma_rad));  // of the prior
+  const double left = 1.0 / (1.0 + tilt_.information * math::square(params_.prior.tilt_sigma_rad));  // of the prior
   const double alike_rad2 = math::square((1.0 - by_gravity_) * params_.soles_tilt_sigma_rad) +
                             math::square(by_gravity_ * params_.gravity_tilt_sigma_rad) +
                             (seen_as_well_ > 0.0 ? 1.0 / seen_as_well_ : 0.0);
-  return math::sqrt(math::square(left * params_.prior_tilt_sigma_rad) + math::square(1.0 - left) * alike_rad2);
+  return math::sqrt(math::square(left * params_.prior.tilt_sigma_rad) + math::square(1.0 - left) * alike_rad2);
 }
 
 bool CameraExtrinsicsEstimator::usable(const SurfacePatch& patch) noexcept {
@@ -90,7 +90,7 @@ bool CameraExtrinsicsEstimator::try_learn_tilt(const SurfaceFrame& frame, const 
   const double trust = math::square(seen_as_well_ > weights ? weights / seen_as_well_ : 1.0);
   const double information = trust / math::square(params_.frame_tilt_sigma_rad);
   const double tilt_variance = fuse(tilt_, Vec2{sum / weights}, math::exp(-trust * dt_s / params_.window_s),
-                                    information, params_.prior_tilt_sigma_rad);
+                                    information, params_.prior.tilt_sigma_rad);
   const double share = information / tilt_.information;
   seen_as_well_ += share * (weights - seen_as_well_);
   by_gravity_ += share * ((level.by_soles() ? 0.0 : 1.0) - by_gravity_);
@@ -129,7 +129,7 @@ void CameraExtrinsicsEstimator::learn_height(const SurfaceFrame& frame, const St
   if (soles == 0) return;
   ++counters_.heights;
   const double variance = fuse(height_, sum_m / soles, math::exp(-dt_s / params_.window_s),
-                               1.0 / math::square(params_.frame_height_sigma_m), params_.prior_height_sigma_m);
+                               1.0 / math::square(params_.frame_height_sigma_m), params_.prior.height_sigma_m);
   height_m_ = math::clamp(variance * height_.weighted, -params_.max_height_m, params_.max_height_m);
 }
 
@@ -152,7 +152,7 @@ void CameraExtrinsicsEstimator::learn_x(const Stance& stance, double dt_s) noexc
   if (!(information > 0.0)) return;
   ++counters_.toes;
   const double variance_m2 =
-      fuse(x_, x_m_ - sum_m / information, math::exp(-dt_s / params_.window_s), information, params_.prior_x_sigma_m);
+      fuse(x_, x_m_ - sum_m / information, math::exp(-dt_s / params_.window_s), information, params_.prior.x_sigma_m);
   x_m_ = math::clamp(variance_m2 * x_.weighted, -params_.max_x_m, params_.max_x_m);
 }
 

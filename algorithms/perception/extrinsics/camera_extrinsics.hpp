@@ -17,10 +17,20 @@ namespace polygmap {
 
 class CameraExtrinsicsEstimator {
  public:
+  // What the data sheet says of the mount: one sigma each.
+  struct PriorParams {
+    double tilt_sigma_rad = 0.0175;
+    double height_sigma_m = 0.005;
+    double x_sigma_m = 0.003;
+
+    static void visit(auto& p, auto& field) {
+      field("tilt_sigma_rad", p.tilt_sigma_rad, 1e-5, 0.2, "Roll and pitch of the mount, by the data sheet.");
+      field("height_sigma_m", p.height_sigma_m, 1e-5, 0.1, "Height of the mount, by the data sheet.");
+      field("x_sigma_m", p.x_sigma_m, 1e-5, 0.1,
+            "The mount's place ahead by the data sheet, and where encoders and leg lengths have a foot.");
+    }
+  };
   struct Params {
-    double prior_tilt_sigma_rad = 0.0175;
-    double prior_height_sigma_m = 0.005;
-    double prior_x_sigma_m = 0.003;
     // Of one frame. Far more than the pixels' noise: frames err alike, and one frame must not decide.
     double frame_tilt_sigma_rad = 0.03;
     double frame_height_sigma_m = 0.010;
@@ -46,13 +56,9 @@ class CameraExtrinsicsEstimator {
     double longest_step_s = 0.1;
     double frames_alike = 20.0;
     ToeDetectorParams toe;
+    PriorParams prior;
 
     static void visit(auto& p, auto& field) {
-      field("prior_tilt_sigma_rad", p.prior_tilt_sigma_rad, 1e-5, 0.2,
-            "Roll and pitch of the mount, by the data sheet.");
-      field("prior_height_sigma_m", p.prior_height_sigma_m, 1e-5, 0.1, "Height of the mount, by the data sheet.");
-      field("prior_x_sigma_m", p.prior_x_sigma_m, 1e-5, 0.1,
-            "The mount's place ahead by the data sheet, and where encoders and leg lengths have a foot.");
       field("frame_tilt_sigma_rad", p.frame_tilt_sigma_rad, 1e-4, 1.0, "Tilt that one frame sees.");
       field("frame_height_sigma_m", p.frame_height_sigma_m, 1e-4, 1.0, "Height that one frame sees.");
       field("frame_x_sigma_m", p.frame_x_sigma_m, 1e-4, 1.0, "Place ahead that one frame sees.");
@@ -81,6 +87,7 @@ class CameraExtrinsicsEstimator {
       field("frames_alike", p.frames_alike, 1.0, 1000.0,
             "As many frames in a row see a toe from a base that moves the same way, and err alike.");
       field("toe", p.toe);
+      field("prior", p.prior);
     }
   };
   // The robot at the exposure, base frame.

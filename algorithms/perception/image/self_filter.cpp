@@ -24,14 +24,15 @@ LegShapes transformed(const Transform& to_T_from, const LegShapes& shapes) noexc
 
 BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& legs, double turn_rad) noexcept {
   const double reach_m = legs.thigh_m + legs.shank_m + legs.ankle_to_sole_m;
-  // Of the hip's three joints two move the foot sideways or ahead, and the knee half as far.
+  // Of the hip's three joints two move the foot sideways or ahead, and the knee half as far: root of 2 + 1/4, by
+  // geometry.
   const double turned_m = 1.5 * uncertainty.encoder_rad * reach_m, longer_m = uncertainty.leg_length * reach_m;
   const double position_m = math::sqrt(math::square(turned_m) + math::square(longer_m));
   return {uncertainty.shape_m + uncertainty.sigmas * position_m, turn_rad};
 }
 
 void SelfFilter::clear() noexcept {
-  for (auto& intervals : intervals_) intervals.fill(Interval{});
+  for (auto& ranges : covered_) ranges.fill(ColumnRange{});
   next_ = 0;
 }
 
@@ -137,7 +138,7 @@ bool SelfFilter::add_some(const HalfRays& rays, const std::array<LegShapes, kFoo
     const auto to_pixel = [&](double column) {
       return static_cast<std::int16_t>(math::clamp(column, 0.0, rays.width_px - 1.0));
     };
-    intervals_[slot][row] = {to_pixel(std::floor(first)), to_pixel(std::ceil(last))};
+    covered_[slot][row] = {to_pixel(std::floor(first)), to_pixel(std::ceil(last))};
   }
   return true;
 }
@@ -178,13 +179,13 @@ bool SelfFilter::add_foot(const HalfRays& rays, const OrientedBox& foot, const B
 
 bool SelfFilter::try_mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept {
   bool any = false;
-  for (const auto& intervals : intervals_) {
-    const Interval interval = intervals[static_cast<std::size_t>(row)];
-    const std::int32_t last = std::min<std::int32_t>(interval.last, width_px - 1);
-    if (interval.first > last) continue;
+  for (const auto& ranges : covered_) {
+    const ColumnRange range = ranges[static_cast<std::size_t>(row)];
+    const std::int32_t last = std::min<std::int32_t>(range.last, width_px - 1);
+    if (range.first > last) continue;
     if (!any) std::fill(flags, flags + width_px, std::uint8_t{0});
     any = true;
-    std::fill(flags + interval.first, flags + last + 1, static_cast<std::uint8_t>(kPixelBody));
+    std::fill(flags + range.first, flags + last + 1, static_cast<std::uint8_t>(kPixelBody));
   }
   return any;
 }

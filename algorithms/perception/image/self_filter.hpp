@@ -32,7 +32,7 @@ struct BodyUncertainty {
 [[nodiscard]] BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& legs,
                                      double turn_rad) noexcept;
 
-// The image of convex shapes, each grown by a margin: one column interval per row and shape. A pixel whose ray meets
+// The image of convex shapes, each grown by a margin: one range of columns per row and shape. A pixel whose ray meets
 // a grown shape is body whatever depth it measured, so that flying pixels around a leg go with it.
 class SelfFilter {
  public:
@@ -48,7 +48,7 @@ class SelfFilter {
   [[nodiscard]] bool try_mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept;
 
  private:
-  struct Interval {
+  struct ColumnRange {
     std::int16_t first = 1;
     std::int16_t last = 0;  // inclusive; empty when before first
   };
@@ -70,7 +70,7 @@ class SelfFilter {
 
   Outline outline_{};
   int next_ = 0;  // sphere of a capsule, chord of a foot
-  std::array<std::array<Interval, kHalfHeight_px>, kShapes> intervals_{};
+  std::array<std::array<ColumnRange, kHalfHeight_px>, kShapes> covered_{};
 };
 
 }  // namespace polygmap

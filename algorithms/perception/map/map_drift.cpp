@@ -35,7 +35,7 @@ void MapDrift::begin_frame(std::int64_t stamp_ns, double position_sigma_m) noexc
 
 void MapDrift::add(const Vec3& direction, double innovation_m, double variance_m2) noexcept {
   const double expected_m2 = variance_m2 + math::square(sigma_m_) + direction.dot(covariance_m2_ * direction);
-  const double most_m = 3.0 * math::sqrt(expected_m2);
+  const double most_m = params_.outlier_sigmas * math::sqrt(expected_m2);
   const double weight = std::min(1.0, most_m / std::max(std::abs(innovation_m), 1e-9)) / variance_m2;
   information_ += weight * direction * direction.transpose();
   gradient_ += weight * innovation_m * direction;

@@ -11,7 +11,7 @@ namespace polygmap {
 // What all surfaces of a frame are off by in common is an error of the pose, as far as the pose's covariance allows for
 // one; what is left is news about the surfaces. Two estimates from the same residuals: the frame's own offset, jitter
 // of its pose included, against which its surfaces are fused, and the drift, a random walk, which outlasts the frame.
-// Residuals count by their information about the last drift; one beyond three sigma counts as if it were at three.
+// Residuals count by their information about the last drift; an outlier counts as if it were at outlier_sigmas.
 class MapDrift {
  public:
   struct Params {
@@ -23,6 +23,7 @@ class MapDrift {
     // From the start the jitter of the poses averages out in the map; fused against the offsets of the frames
     // themselves, it would keep that of the first few.
     double settle_s = 1.5;
+    double outlier_sigmas = 3.0;
 
     static void visit(auto& p, auto& field) {
       field("bound_sigmas", p.bound_sigmas, 0.1, 20.0,
@@ -33,6 +34,8 @@ class MapDrift {
             "Error of one frame that is gone in the next: of the depth image, of the pose at the exposure.");
       field("settle_s", p.settle_s, 0.0, 60.0,
             "Nothing drifts for so long from the start, while the jitter of the poses averages out in the map.");
+      field("outlier_sigmas", p.outlier_sigmas, 0.5, 20.0,
+            "A residual farther out counts as if it were as far (Huber).");
     }
   };
 

@@ -44,6 +44,7 @@ class PolygonMap {
     double sigmas = 4.0;
     double min_length_m = 0.05;
     std::uint32_t min_sightings = 3;
+    double across_min = 0.5;
 
     static void visit(auto& p, auto& field) {
       field("gate_min_m", p.gate_min_m, 0.0, 0.1,
@@ -59,10 +60,12 @@ class PolygonMap {
             "An edge as many sigmas from the remembered one is an outlier, between the two gates.");
       field("min_length_m", p.min_length_m, 0.0, 1.0, "A shorter edge says nothing.");
       field("min_sightings", p.min_sightings, 1, 1000, "A line is told once it has been seen as often.");
+      field("across_min", p.across_min, 0.1, 1.0,
+            "A line of which a smaller share lies across the stairs, when the surface's axes turn, is forgotten.");
     }
   };
-  struct Params {
-    double window_s = 1.5;
+  // Which remembered surface a seen one is.
+  struct MatchParams {
     double height_gate_min_m = 0.008;
     double height_gate_max_m = 0.018;
     double upright_gate_m = 0.06;
@@ -71,31 +74,9 @@ class PolygonMap {
     double overlap_fraction = 0.3;
     double lateral_gap_m = 0.5;
     double other_gap_m = 0.1;
-    double side_sigma_m = 0.005;
-    double side_gate_m = 0.025;
-    double unknown_margin_m = 0.010;
-    std::uint32_t outliers_to_reset = 8;
-    std::uint32_t confirmed_sightings = 5;
-    std::uint32_t misses_unconfirmed = 4;
-    std::uint32_t misses_confirmed = 90;
-    double unconfirmed_age_s = 2.0;
-    double systematic_sigma_m = 0.0015;
-    double view_margin_px = 30.0;
-    double view_range_m = 2.5;
-    double view_min_incidence = 0.25;
-    double reach_m = 1.5;
-    double other_area_min_m2 = 0.02;
-    double least_sigma_m = 0.0005;
-    double least_tilt_sigma_rad = 0.0005;
-    double max_range_m = 10.0;
-    double turn_slope = 0.05;
-    KindParams kinds;
-    LineParams lines;
-    SeenEndParams ends;
-    MapDrift::Params drift;
+    double height_sigmas = 3.0;
 
     static void visit(auto& p, auto& field) {
-      field("window_s", p.window_s, 0.05, 1000.0, "Information fades to 1/e in this time.");
       field("height_gate_min_m", p.height_gate_min_m, 0.0, 0.02,
             "Surfaces other than risers that are as near along their normal may be one, whatever their sigmas.");
       field("height_gate_max_m", p.height_gate_max_m, 0.0, 0.02,
@@ -114,12 +95,21 @@ class PolygonMap {
       field("lateral_gap_m", p.lateral_gap_m, 0.0, 5.0,
             "Parts of one tread or riser lie this far apart at most: the robot's own leg may split it in two.");
       field("other_gap_m", p.other_gap_m, 0.0, 5.0, "Parts of any other surface lie this far apart at most.");
-      field("side_sigma_m", p.side_sigma_m, 1e-4, 0.1, "Place of an observed end.");
-      field("side_gate_m", p.side_gate_m, 0.001, 0.5, "An observed end farther off is an outlier.");
-      field("unknown_margin_m", p.unknown_margin_m, 0.0, 0.1,
-            "Two sigmas of a vertex, so that noise does not make unknown ends grow.");
-      field("outliers_to_reset", p.outliers_to_reset, 1, 1000,
-            "After as many outliers in a row the new evidence wins.");
+      field("height_sigmas", p.height_sigmas, 0.5, 20.0,
+            "Surfaces other than risers that are as many sigmas apart along their normal are two, between the two "
+            "gates.");
+    }
+  };
+  // When a surface is sure, when it goes, and what is worth a place.
+  struct MemoryParams {
+    std::uint32_t confirmed_sightings = 5;
+    std::uint32_t misses_unconfirmed = 4;
+    std::uint32_t misses_confirmed = 90;
+    double unconfirmed_age_s = 2.0;
+    double reach_m = 1.5;
+    double other_area_min_m2 = 0.02;
+
+    static void visit(auto& p, auto& field) {
       field("confirmed_sightings", p.confirmed_sightings, 1, 1000,
             "A surface is confirmed once it has been seen as often.");
       field("misses_unconfirmed", p.misses_unconfirmed, 1, 1000,
@@ -128,16 +118,61 @@ class PolygonMap {
             "A confirmed surface goes after as many frames in plain view without a sighting.");
       field("unconfirmed_age_s", p.unconfirmed_age_s, 0.01, 1000.0,
             "An unconfirmed surface goes when it was not seen for so long, in view or not.");
-      field("systematic_sigma_m", p.systematic_sigma_m, 0.0, 0.1,
-            "Depth errors that repeat from frame to frame do not average out.");
-      field("view_margin_px", p.view_margin_px, 0.0, 200.0,
-            "What is as near to the picture's rim is not in plain view.");
-      field("view_range_m", p.view_range_m, 0.1, 20.0, "What is farther is not in plain view.");
-      field("view_min_incidence", p.view_min_incidence, 0.01, 1.0,
-            "What is seen at a smaller sine of the angle between ray and surface is not in plain view.");
       field("reach_m", p.reach_m, 0.1, 20.0, "A polygon farther off makes room first when the map is full.");
       field("other_area_min_m2", p.other_area_min_m2, 0.0, 10.0,
             "A smaller other surface, or one out of reach, is not worth a place: nothing reads it.");
+    }
+  };
+  // Where a surface that is there would be seen.
+  struct PlainViewParams {
+    double margin_px = 30.0;
+    double range_m = 2.5;
+    double min_incidence = 0.25;
+
+    static void visit(auto& p, auto& field) {
+      field("margin_px", p.margin_px, 0.0, 200.0, "What is as near to the picture's rim is not in plain view.");
+      field("range_m", p.range_m, 0.1, 20.0, "What is farther is not in plain view.");
+      field("min_incidence", p.min_incidence, 0.01, 1.0,
+            "What is seen at a smaller sine of the angle between ray and surface is not in plain view.");
+    }
+  };
+  // Ends that are no remembered lines.
+  struct SideParams {
+    double sigma_m = 0.005;
+    double gate_m = 0.025;
+    double unknown_margin_m = 0.010;
+
+    static void visit(auto& p, auto& field) {
+      field("sigma_m", p.sigma_m, 1e-4, 0.1, "Place of an observed end.");
+      field("gate_m", p.gate_m, 0.001, 0.5, "An observed end farther off is an outlier.");
+      field("unknown_margin_m", p.unknown_margin_m, 0.0, 0.1,
+            "Two sigmas of a vertex, so that noise does not make unknown ends grow.");
+    }
+  };
+  struct Params {
+    double window_s = 1.5;
+    std::uint32_t outliers_to_reset = 8;
+    double systematic_sigma_m = 0.0015;
+    double least_sigma_m = 0.0005;
+    double least_tilt_sigma_rad = 0.0005;
+    double max_range_m = 10.0;
+    double turn_slope = 0.05;
+    double rmse_gain = 0.1;
+    KindParams kinds;
+    LineParams lines;
+    SeenEndParams ends;
+    MapDrift::Params drift;
+    MatchParams match;
+    MemoryParams memory;
+    PlainViewParams plain_view;
+    SideParams sides;
+
+    static void visit(auto& p, auto& field) {
+      field("window_s", p.window_s, 0.05, 1000.0, "Information fades to 1/e in this time.");
+      field("outliers_to_reset", p.outliers_to_reset, 1, 1000,
+            "After as many outliers in a row the new evidence wins.");
+      field("systematic_sigma_m", p.systematic_sigma_m, 0.0, 0.1,
+            "Depth errors that repeat from frame to frame do not average out.");
       field("least_sigma_m", p.least_sigma_m, 1e-6, 0.1,
             "A frame that knows the place of a surface or an edge better by its own account is believed only so far.");
       field("least_tilt_sigma_rad", p.least_tilt_sigma_rad, 1e-6, 0.1,
@@ -145,10 +180,16 @@ class PolygonMap {
       field("max_range_m", p.max_range_m, 0.5, 100.0, "A surface that reaches farther from the camera is rejected.");
       field("turn_slope", p.turn_slope, 0.0, 1.0,
             "A tread's axes turn to its nosing, or its back line, where that has a larger slope in them.");
+      field("rmse_gain", p.rmse_gain, 0.0, 1.0,
+            "Share of the newest sighting in what is remembered of the fit's residual.");
       field("kinds", p.kinds);
       field("lines", p.lines);
       field("ends", p.ends);
       field("drift", p.drift);
+      field("match", p.match);
+      field("memory", p.memory);
+      field("plain_view", p.plain_view);
+      field("sides", p.sides);
     }
   };
   struct View {

@@ -56,7 +56,7 @@ void PolygonMap::turn_to(MapTrack& track, const Vec3& world_x) noexcept {
   for (TrackedLine* line : {&track.nosing, &track.back}) {
     const Vec2 a = new_R_old * Vec2{line->at_m(-0.5), -0.5}, b = new_R_old * Vec2{line->at_m(0.5), 0.5};
     const Vec2 along = b - a;
-    if (!(along.y() > 0.5)) {  // turned by over 60 degrees: it was no edge across the stairs
+    if (!(along.y() > params_.lines.across_min)) {  // it was no edge across the stairs
       *line = {};
       continue;
     }
@@ -110,8 +110,9 @@ void PolygonMap::update_sides(MapTrack& track, bool first) noexcept {
     const bool observed = end_observed(params_.ends, seen_local_, seen_.edges, u, support);
     TrackedSide& side = track.sides[k];
     if (first) {
-      const double reach_m = support - params_.unknown_margin_m;
-      side = {observed ? support : reach_m, reach_m, 1.0 / math::square(params_.side_sigma_m), newest_ns_, 0, observed};
+      const double reach_m = support - params_.sides.unknown_margin_m;
+      side = {
+          observed ? support : reach_m, reach_m, 1.0 / math::square(params_.sides.sigma_m), newest_ns_, 0, observed};
     } else {
       update_side(side, support, observed);
     }
@@ -119,16 +120,16 @@ void PolygonMap::update_sides(MapTrack& track, bool first) noexcept {
 }
 
 void PolygonMap::update_side(TrackedSide& side, double seen_m, bool observed) noexcept {
-  const double weight = 1.0 / math::square(params_.side_sigma_m);
+  const double weight = 1.0 / math::square(params_.sides.sigma_m);
   // Certainly surface up to here, in this frame and in the one before.
-  const double seen_reach_m = seen_m - params_.unknown_margin_m;
+  const double seen_reach_m = seen_m - params_.sides.unknown_margin_m;
   const double reach_m = std::min(seen_reach_m, std::exchange(side.reach_m, seen_reach_m));
   if (!observed && !side.observed) {
     side.support_m = std::max(side.support_m, reach_m);
     return;
   }
-  if (!observed && reach_m < side.support_m + params_.side_gate_m) return;  // nothing new
-  const bool agrees = observed && std::abs(seen_m - side.support_m) < params_.side_gate_m;
+  if (!observed && reach_m < side.support_m + params_.sides.gate_m) return;  // nothing new
+  const bool agrees = observed && std::abs(seen_m - side.support_m) < params_.sides.gate_m;
   if (agrees && side.observed) {
     side.information = side.information * faded(side.seen_ns) + weight;
     side.support_m += weight / side.information * (seen_m - side.support_m);
@@ -137,7 +138,7 @@ void PolygonMap::update_side(TrackedSide& side, double seen_m, bool observed) no
     return;
   }
   // The first observed end that does not cut off what was seen counts at once; contradictions must persist.
-  const bool extends = observed && !side.observed && seen_m > side.support_m - params_.side_gate_m;
+  const bool extends = observed && !side.observed && seen_m > side.support_m - params_.sides.gate_m;
   if (!extends) {
     ++counters_.side_outliers;
     if (++side.outliers < params_.outliers_to_reset) return;
@@ -151,11 +152,12 @@ void PolygonMap::rebuild(MapTrack& track) noexcept {
   const bool has_nosing = track.nosing.sightings >= params_.lines.min_sightings;
   const bool has_back = track.back.sightings >= params_.lines.min_sightings;
   const auto build = [&](bool use_nosing, bool use_back, EdgeTags& tags) {
-    // Where a line decides, the box gives way to it at both ends.
+    // Where a line decides, the box gives way to it at both ends, by any length: the line cuts it off again.
+    constexpr double kBeyond_m = 0.01;
     double x_min = -s[4].support_m, x_max = s[0].support_m;
     const double y_min = -s[6].support_m, y_max = s[2].support_m;
-    if (use_nosing) x_min = std::min(track.nosing.at_m(y_min), track.nosing.at_m(y_max)) - 0.01;
-    if (use_back) x_max = std::max(track.back.at_m(y_min), track.back.at_m(y_max)) + 0.01;
+    if (use_nosing) x_min = std::min(track.nosing.at_m(y_min), track.nosing.at_m(y_max)) - kBeyond_m;
+    if (use_back) x_max = std::max(track.back.at_m(y_min), track.back.at_m(y_max)) + kBeyond_m;
     ConvexPolygon polygon;
     if (!(x_min < x_max) || !(y_min < y_max)) return polygon;
     for (const Vec2& v : {Vec2{x_min, y_min}, {x_max, y_min}, {x_max, y_max}, {x_min, y_max}}) {

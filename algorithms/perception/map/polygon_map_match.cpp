@@ -27,17 +27,18 @@ bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
   if (track.erased || track.kind != seen_.kind || track.polygon.size() < 3) return false;
   const bool upright = track.kind == SurfaceKind::kRiser;
   const Vec3 normal = track.world_T_local.R.col(2);
-  if (normal.dot(seen_.plane.normal) < math::cos(upright ? params_.upright_turn_gate_rad : params_.tilt_gate_rad)) {
+  if (normal.dot(seen_.plane.normal) <
+      math::cos(upright ? params_.match.upright_turn_gate_rad : params_.match.tilt_gate_rad)) {
     return false;
   }
   const Vec3 offset = seen_.centroid_m - track.world_T_local.p_m;
   out.across_m = normal.dot(offset);
-  if (std::abs(out.across_m) > (upright ? params_.upright_gate_m : params_.height_gate_max_m)) return false;
+  if (std::abs(out.across_m) > (upright ? params_.match.upright_gate_m : params_.match.height_gate_max_m)) return false;
   out.variance_m2 =
       seen_.offset_variance_m2 + 1.0 / track.offset_information + offset.squaredNorm() / track.tilt_information;
-  out.gate_m = upright ? params_.upright_gate_m
-                       : math::clamp(3.0 * math::sqrt(out.variance_m2 + seen_.pose_variance_m2),
-                                     params_.height_gate_min_m, params_.height_gate_max_m);
+  out.gate_m = upright ? params_.match.upright_gate_m
+                       : math::clamp(params_.match.height_sigmas * math::sqrt(out.variance_m2 + seen_.pose_variance_m2),
+                                     params_.match.height_gate_min_m, params_.match.height_gate_max_m);
   return std::abs(out.across_m) <= out.gate_m;
 }
 
@@ -57,12 +58,12 @@ bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& co
   const Interval seen_y{seen.min_m.y(), seen.max_m.y()}, known_y{known.min_m.y(), known.max_m.y()};
   const double overlap_x_m = overlap_m(seen_x, known_x), overlap_y_m = overlap_m(seen_y, known_y);
   if (track.kind == SurfaceKind::kOther) {
-    if (std::min(overlap_x_m, overlap_y_m) < -params_.other_gap_m) return false;
+    if (std::min(overlap_x_m, overlap_y_m) < -params_.match.other_gap_m) return false;
   } else {
     const double shorter_m =
         upright ? std::min(length_m(seen_y), length_m(known_y)) : std::min(length_m(seen_x), length_m(known_x));
-    if ((upright ? overlap_y_m : overlap_x_m) < params_.overlap_fraction * shorter_m) return false;
-    if ((upright ? overlap_x_m : overlap_y_m) < -params_.lateral_gap_m) return false;
+    if ((upright ? overlap_y_m : overlap_x_m) < params_.match.overlap_fraction * shorter_m) return false;
+    if ((upright ? overlap_x_m : overlap_y_m) < -params_.match.lateral_gap_m) return false;
     if (upright && overlap_x_m < 0.0 && two_posts(track, seen_polygon, seen_x.min_m > known_x.min_m)) return false;
   }
   cost = std::abs(near.across_m) / near.gate_m + (std::min(overlap_x_m, overlap_y_m) > 0.0 ? 0.0 : 1.0);
@@ -95,7 +96,7 @@ void PolygonMap::measure_offset() noexcept {
   if (pass_.best >= tracks_.size()) return;
   const MapTrack& track = tracks_[pass_.best];
   Nearness near;
-  if (track.sightings < params_.confirmed_sightings || !is_near(track, near)) return;
+  if (track.sightings < params_.memory.confirmed_sightings || !is_near(track, near)) return;
   work_.add(900);
   if (track.kind == SurfaceKind::kTread) work_.add(seen_.polygon.size(), 90);
   const double common_m2 = math::square(params_.systematic_sigma_m);
@@ -118,10 +119,10 @@ void PolygonMap::measure_offset() noexcept {
     const TrackedSide& side = track.sides[k];
     const Vec2 u = side_direction(k);
     const double support = support_m(seen, u);
-    if (!side.observed || std::abs(support - side.support_m) > params_.side_gate_m) continue;
+    if (!side.observed || std::abs(support - side.support_m) > params_.sides.gate_m) continue;
     if (!end_observed(params_.ends, seen, seen_.edges, u, support)) continue;
     drift_.add(track.world_T_local.R * Vec3{u.x(), u.y(), 0.0}, support - side.support_m,
-               math::square(params_.side_sigma_m) + 1.0 / side.information + common_m2);
+               math::square(params_.sides.sigma_m) + 1.0 / side.information + common_m2);
   }
 }
 

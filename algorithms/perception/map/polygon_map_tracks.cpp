@@ -69,8 +69,8 @@ void PolygonMap::create() noexcept {
     ++counters_.rejected_surfaces;
     return;
   }
-  const bool worth_a_place =
-      track.kind != SurfaceKind::kOther || (area_m2(track.polygon) >= params_.other_area_min_m2 && priority(track) > 0);
+  const bool worth_a_place = track.kind != SurfaceKind::kOther ||
+                             (area_m2(track.polygon) >= params_.memory.other_area_min_m2 && priority(track) > 0);
   if (!worth_a_place) {
     ++counters_.passed_over;
     return;
@@ -85,8 +85,8 @@ int PolygonMap::priority(const MapTrack& track) const noexcept {
   const double distance_m = track.kind == SurfaceKind::kTread
                                 ? -signed_distance_m(track.polygon, eye_m)
                                 : (track.world_T_local.p_m - map_T_camera_.p_m).head<2>().norm();
-  if (track.erased || distance_m > params_.reach_m) return 0;
-  return (track.kind == SurfaceKind::kOther ? 1 : 3) + (track.sightings < params_.confirmed_sightings ? 0 : 1);
+  if (track.erased || distance_m > params_.memory.reach_m) return 0;
+  return (track.kind == SurfaceKind::kOther ? 1 : 3) + (track.sightings < params_.memory.confirmed_sightings ? 0 : 1);
 }
 
 void PolygonMap::admit(const MapTrack& track) noexcept {
@@ -120,7 +120,7 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
   track.seen_from = viewpoint();
   track.misses = 0;
   track.outliers = 0;
-  track.rmse_m += 0.1 * (seen_.rmse_m - track.rmse_m);
+  track.rmse_m += params_.rmse_gain * (seen_.rmse_m - track.rmse_m);
   track.invalid_fraction = seen_.invalid_fraction;
 
   // The plane: offset along the normal at the local origin, and tilt about it.
@@ -173,15 +173,15 @@ bool PolygonMap::in_view(const MapTrack& track, const Transform& camera_T_local)
   const Vec3 centre = camera_T_local * Vec3{middle.x(), middle.y(), 0.0};
   const double range_m = centre.norm();
   const double incidence = -camera_T_local.R.col(2).dot(centre) / std::max(range_m, 1e-6);
-  if (range_m > params_.view_range_m || incidence < params_.view_min_incidence) return false;
+  if (range_m > params_.plain_view.range_m || incidence < params_.plain_view.min_incidence) return false;
   const CameraIntrinsics& c = view_.intrinsics;
   for (const Vec2& v : track.polygon) {
     const Vec2 inner = 0.5 * (v + middle);
     const Vec3 p = camera_T_local * Vec3{inner.x(), inner.y(), 0.0};
     if (p.z() < 0.1) return false;
     const double u_px = c.cx_px + c.fx_px * p.x() / p.z(), v_px = c.cy_px + c.fy_px * p.y() / p.z();
-    if (u_px < params_.view_margin_px || u_px > c.width_px - params_.view_margin_px) return false;
-    if (v_px < params_.view_margin_px || v_px > c.height_px - params_.view_margin_px) return false;
+    if (u_px < params_.plain_view.margin_px || u_px > c.width_px - params_.plain_view.margin_px) return false;
+    if (v_px < params_.plain_view.margin_px || v_px > c.height_px - params_.plain_view.margin_px) return false;
   }
   return true;
 }
@@ -209,12 +209,12 @@ void PolygonMap::age(MapTrack& track) noexcept {
   const bool looked = in_view(track, camera_T_local);
   if (looked) work_.add(500);
   if (looked && !hidden(track, camera_T_local)) ++track.misses;
-  const bool confirmed = track.sightings >= params_.confirmed_sightings;
-  if (confirmed && track.misses >= params_.misses_confirmed) {
+  const bool confirmed = track.sightings >= params_.memory.confirmed_sightings;
+  if (confirmed && track.misses >= params_.memory.misses_confirmed) {
     track.erased = true;
     ++counters_.dropped_vanished;
-  } else if (!confirmed && (track.misses >= params_.misses_unconfirmed ||
-                            seconds(newest_ns_ - track.last_seen_ns) > params_.unconfirmed_age_s)) {
+  } else if (!confirmed && (track.misses >= params_.memory.misses_unconfirmed ||
+                            seconds(newest_ns_ - track.last_seen_ns) > params_.memory.unconfirmed_age_s)) {
     track.erased = true;
     ++counters_.dropped_unconfirmed;
   }

@@ -98,13 +98,13 @@ OverhangSplit::Step OverhangSplit::best_step(const Profile& profile) const noexc
   return best;
 }
 
-// Where the surface ends, rows of a neighbour are among its own: few, and far from it.
+// Where a surface ends its pixels are mixed with what lies behind: such heights are few rows, lie between the two
+// distances, and look like a slope.
 void OverhangSplit::drop_sparse(Profile& profile) const noexcept {
-  const auto sparse = static_cast<float>(params_.sparse);
-  float rows = 0.0F;
-  for (const Bin& bin : profile.bins) rows += bin.rows;
+  float fullest = 0.0F;
+  for (const Bin& bin : profile.bins) fullest = std::max(fullest, bin.rows);
   for (Bin& bin : profile.bins) {
-    if (bin.rows < sparse * rows) bin = Bin{};
+    if (bin.rows < static_cast<float>(params_.sparse) * fullest) bin = Bin{};
   }
 }
 

@@ -67,7 +67,7 @@ void take_over(FittedPlane& kept, FittedPlane& gone) noexcept {
 bool PlaneMerging::part_of(const FittedPlane& p, const FittedPlane& q, double cosine) noexcept {
   const bool small = q.pixels < params_.small_plane_px;
   if (!small && cosine < math::cos(params_.merge_tilt_rad)) return false;
-  // Where a large plane lies is known well: apart by more than what lets a run join a plane, the two are not one.
+  // Where a large plane lies is known well: apart by more than what lets a segment join a plane, the two are not one.
   const double noise_m = growing_.join_floor_m + growing_.join_sigmas * noise_.sigma_m(q.centre_m.z());
   const double merge_m = small ? params_.merge_m : std::min(noise_m, params_.merge_m);
   const double apart_m = std::abs(p.plane.distance_m(q.centre_m));
@@ -77,7 +77,7 @@ bool PlaneMerging::part_of(const FittedPlane& p, const FittedPlane& q, double co
   work_.add(kContradictionInstructions);
   // Once large ones are measured their pixels have the last word: two floors that the camera bends are two.
   double chi2 = 0.0;
-  return try_contradiction(params_, noise_, p, q, chi2) && !(chi2 > params_.pieces_chi2);
+  return try_contradiction(params_, noise_, p, q, chi2) && !(chi2 > params_.apart_chi2);
 }
 
 void PlaneMerging::begin_coplanar(const Params& params, const PlaneGrowing::Params& growing,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which planes of a frame are one: pieces that a leg, a hole or noise has split, and facets of one curved or rough
+// Which planes of a frame are one: planes that a leg, a hole or noise has split, and facets of one curved or rough
 // surface.
 #pragma once
 
@@ -17,26 +17,25 @@ namespace polygmap {
 class PlaneMerging {
  public:
   struct Params {
-    double merge_m = 0.015;  // of large pieces also where a run of one could join the other
+    double merge_m = 0.015;  // of large planes also where a segment of one could join the other
     double merge_tilt_rad = 0.12;
     double small_plane_px = 4000.0;
-    double pieces_chi2 = 6.5;
+    double apart_chi2 = 6.5;
     double facet_chi2 = 8.0;
     double facet_floor_m = 0.002;
     double facet_tilt_rad = 0.6;
     // Neighbours touch along this times the root of the smaller one's pixels. Of a tread or a riser that is low in the
-    // picture two pieces cannot: side by side, along this times the lower one's height.
+    // picture two planes cannot: side by side, along this times the lower one's height.
     double facet_seam = 0.7;
     double between_rad = 0.1;
 
     static void visit(auto& p, auto& field) {
-      field("merge_m", p.merge_m, 0.0, 0.1,
-            "Pieces whose planes are this close at each other's centre are one surface.");
+      field("merge_m", p.merge_m, 0.0, 0.1, "Planes that are this close at each other's centre are one surface.");
       field("merge_tilt_rad", p.merge_tilt_rad, 0.0, 1.5,
-            "Planes of pieces that are one surface are turned no farther against each other.");
+            "Planes that are one surface are turned no farther against each other.");
       field("small_plane_px", p.small_plane_px, 1.0, 100000.0, "The tilt of a smaller plane is known half as well.");
-      field("pieces_chi2", p.pieces_chi2, 0.1, 100.0,
-            "Large pieces need not touch: 6.5 holds 91 % of what noise does to three parameters.");
+      field("apart_chi2", p.apart_chi2, 0.1, 100.0,
+            "Large planes need not touch: 6.5 holds 91 % of what noise does to three parameters.");
       field("facet_chi2", p.facet_chi2, 0.1, 100.0,
             "Neighbours are one surface unless their pixels contradict one plane by this: 8 holds 95 % of what noise "
             "does.");
@@ -51,7 +50,7 @@ class PlaneMerging {
   };
   using PlaneIndex = std::array<PlaneId, PlaneSet::kMaxPlanes + 1>;  // of a plane that may have been merged
 
-  // Pieces share the plane of the largest. measured: the planes' moments say what their pixels are worth; before, large
+  // Those that are one share the plane of the largest. measured: the planes' moments say what their pixels are worth; before, large
   // planes are one only where there is no doubt. Facets too small to be planes are left to join_facets.
   // begin_coplanar, then merge_some until it is done.
   void begin_coplanar(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Level and upright planes in what the grown planes left over.
 //
-// A far tread cut off by the picture's upper end is a few rows high: its runs are too short to say how it lies. But
+// A far tread cut off by the picture's upper end is a few rows high: its segments are too short to say how it lies. But
 // gravity does, and which way the other risers face: all its pixels have one height, or one distance from the riser
 // before. Histograms of both over all rows that belong to no plane find it.
 #pragma once

@@ -58,11 +58,11 @@ void SpanBoundaries::build_spans(std::int32_t column, const ScanlineSegmentation
         continue;
       }
     }
-    ColumnSpan interval;
-    interval.top = segment.top;
-    interval.bottom = segment.bottom;
-    interval.plane = plane;
-    if (!out.try_push_back(interval)) ++overflow_;
+    ColumnSpan span;
+    span.top = segment.top;
+    span.bottom = segment.bottom;
+    span.plane = plane;
+    if (!out.try_push_back(span)) ++overflow_;
   }
 }
 
@@ -70,21 +70,21 @@ void SpanBoundaries::trim_ends(std::int32_t column) noexcept {
   for (ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) trim_ends(column, span);
 }
 
-void SpanBoundaries::trim_ends(std::int32_t column, ColumnSpan& interval) noexcept {
+void SpanBoundaries::trim_ends(std::int32_t column, ColumnSpan& span) noexcept {
   constexpr std::int32_t kMost_px = kRowsAtOnce, kGood = 2;  // rows looked at, and good ones next to each other
-  const Line line = line_of(interval.plane, column);
+  const Line line = line_of(span.plane, column);
   work_.add(60);
-  if (interval.bottom - interval.top + 1 >= kRowsAtOnce) {
+  if (span.bottom - span.top + 1 >= kRowsAtOnce) {
     work_.add(210);
     constexpr std::uint32_t kAll = (1U << kRowsAtOnce) - 1U;
-    const Rows upper = fitting(line, column, interval.top);
-    const Rows lower = fitting(line, column, interval.bottom - kRowsAtOnce + 1);
+    const Rows upper = fitting(line, column, span.top);
+    const Rows lower = fitting(line, column, span.bottom - kRowsAtOnce + 1);
     if ((upper.measured & lower.measured) == kAll) {  // the first two good ones next to each other, if there are any
       const std::uint32_t from_top = upper.fit & upper.fit >> 1, from_bottom = lower.fit & lower.fit >> 1;
-      if (from_top != 0) interval.top = static_cast<std::int16_t>(interval.top + std::countr_zero(from_top));
+      if (from_top != 0) span.top = static_cast<std::int16_t>(span.top + std::countr_zero(from_top));
       if (from_bottom != 0) {
         const auto rows = static_cast<std::int32_t>(std::bit_width(from_bottom));
-        interval.bottom = static_cast<std::int16_t>(interval.bottom - kRowsAtOnce + 1 + rows);
+        span.bottom = static_cast<std::int16_t>(span.bottom - kRowsAtOnce + 1 + rows);
       }
       return;
     }
@@ -94,7 +94,7 @@ void SpanBoundaries::trim_ends(std::int32_t column, ColumnSpan& interval) noexce
     std::int32_t at = from, good = 0;
     for (std::int32_t i = 0; i < kMost_px && good < kGood; ++i) {
       const std::int32_t r = from + i * step;
-      if (r < interval.top || r > interval.bottom) return from;
+      if (r < span.top || r > span.bottom) return from;
       if (!(image_->by_column(r, column) > 0.0F)) continue;
       if (!offset(line, column, r).within(kTruncation)) {
         good = 0;
@@ -105,8 +105,8 @@ void SpanBoundaries::trim_ends(std::int32_t column, ColumnSpan& interval) noexce
     }
     return good == kGood ? at : from;
   };
-  interval.top = static_cast<std::int16_t>(cut(interval.top, 1));
-  interval.bottom = static_cast<std::int16_t>(cut(interval.bottom, -1));
+  span.top = static_cast<std::int16_t>(cut(span.top, 1));
+  span.bottom = static_cast<std::int16_t>(cut(span.bottom, -1));
 }
 
 void SpanBoundaries::begin_scores() noexcept {
@@ -134,10 +134,10 @@ std::uint8_t SpanBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower) noe
 }
 
 // Grows one end while rows without data or two rows off the plane do not stop it.
-void SpanBoundaries::extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept {
-  const Line line = line_of(interval.plane, column);
+void SpanBoundaries::extend(std::int32_t column, ColumnSpan& span, std::int32_t step, std::int32_t limit) noexcept {
+  const Line line = line_of(span.plane, column);
   const auto most = static_cast<float>(math::square(params_.inlier_sigmas));
-  std::int16_t& end = step > 0 ? interval.bottom : interval.top;
+  std::int16_t& end = step > 0 ? span.bottom : span.top;
   int empty = 0, off = 0;
   work_.add(50);
   for (std::int32_t r = end + step; step > 0 ? r <= limit : r >= limit; r += step) {
@@ -242,16 +242,16 @@ std::int32_t SpanBoundaries::change_point(std::int32_t column, const Line& upper
 }
 
 void SpanBoundaries::score(std::int32_t column, bool by_planes) noexcept {
-  Column& intervals = columns_[static_cast<std::size_t>(column)];
-  for (std::size_t k = 0; k < intervals.size(); ++k) {
-    ColumnSpan& upper = intervals[k];
+  Column& spans = columns_[static_cast<std::size_t>(column)];
+  for (std::size_t k = 0; k < spans.size(); ++k) {
+    ColumnSpan& upper = spans[k];
     work_.add(75);
     if (k == 0) extend(column, upper, -1, 0);
-    if (k + 1 == intervals.size()) {
+    if (k + 1 == spans.size()) {
       extend(column, upper, 1, rays_->height_px - 1);
       break;
     }
-    ColumnSpan& lower = intervals[k + 1];
+    ColumnSpan& lower = spans[k + 1];
     if (upper.plane == lower.plane || lower.top - upper.bottom > params_.max_gap_px) {
       extend(column, upper, 1, lower.top - 1);
       extend(column, lower, -1, upper.bottom + 1);
@@ -310,8 +310,8 @@ bool SpanBoundaries::place_some() noexcept {
 }
 
 void SpanBoundaries::reproject(const Joint& joint) noexcept {
-  Column& intervals = columns_[static_cast<std::size_t>(joint.column)];
-  ColumnSpan &upper = intervals[joint.upper], &lower = intervals[joint.upper + 1U];
+  Column& spans = columns_[static_cast<std::size_t>(joint.column)];
+  ColumnSpan &upper = spans[joint.upper], &lower = spans[joint.upper + 1U];
   const Line a = line_of(upper.plane, joint.column), b = line_of(lower.plane, joint.column);
   const double row = std::ceil(meeting_row(a, b) + pairs_[joint.pair].shift_px) - 1.0;
   if (!std::isfinite(row)) return;

@@ -143,7 +143,7 @@ class SpanBoundaries {
   struct Joint {
     std::int16_t column = 0;
     std::uint8_t pair = 0;
-    std::uint8_t upper = 0;  // interval
+    std::uint8_t upper = 0;  // span
   };
   struct Pair {
     std::uint8_t upper = 0;
@@ -167,7 +167,7 @@ class SpanBoundaries {
     [[nodiscard]] bool within(float cost) const noexcept { return off2 < cost * variance; }
   };
   [[nodiscard]] Offset offset(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
-  void trim_ends(std::int32_t column, ColumnSpan& interval) noexcept;
+  void trim_ends(std::int32_t column, ColumnSpan& span) noexcept;
   struct Depths {  // the range of some rows' inverse depths, 1/m
     float farthest, nearest;
     [[nodiscard]] bool any() const noexcept { return nearest >= farthest; }
@@ -214,7 +214,7 @@ class SpanBoundaries {
   struct BinnedGains;
   void place(Pair& pair) const noexcept;
   void reproject(const Joint& joint) noexcept;
-  void extend(std::int32_t column, ColumnSpan& interval, std::int32_t step, std::int32_t limit) noexcept;
+  void extend(std::int32_t column, ColumnSpan& span, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
                                           std::int32_t last, float meeting_row, Pair* pair) noexcept;
   // The row, real, where the lines meet; not finite for parallel ones.

@@ -238,7 +238,7 @@ void EdgeLineFinder::add_face(std::int32_t column, std::int32_t from_row, std::i
   const double surface_a = surface_.m.x() * x + surface_.m.z(), other_a = other_.plane.m.x() * x + other_.plane.m.z();
   const double surface_d_m = surface_.d_m(), other_d_m = other_.plane.d_m();
   std::int32_t taken = 0;
-  for (std::int32_t r = std::max(from_row - params_.face_before_px, 0); r <= last_row && taken < params_.face_rows;
+  for (std::int32_t r = std::max(from_row - params_.face.before_px, 0); r <= last_row && taken < params_.face.rows;
        ++r) {
     work_.add(22);
     const auto w = static_cast<double>(image_->inverse_depth(column, r));
@@ -484,7 +484,7 @@ bool EdgeLineFinder::begins_at_face() noexcept {
   double face_m = 0.0;
   if (!surface_above_ || face_.tried || !try_face_offset(face_m)) return false;
   const double d_m = other_.plane.d_m();
-  if (!(face_m > params_.face_m && face_m < params_.face_max_m && d_m > 2.0 * face_m)) return false;
+  if (!(face_m > params_.face.min_m && face_m < params_.face.max_m && d_m > 2.0 * face_m)) return false;
   other_.plane.m *= d_m / (d_m - face_m);
   face_.tried = true;
   restart();
@@ -497,9 +497,10 @@ bool EdgeLineFinder::try_meet_other(const Fit& fit, EdgeLine& line) noexcept {
   const double middle_s = 0.5 * (fit.lo_m + fit.hi_m), middle_t = 0.25 * (t_lo + t_hi + meet_lo + meet_hi);
   const Vec3 centre = axes_.point(middle_s, middle_t);
   const double met_sigma_m = plane_sigma_m(other_.plane, other_.both_covariance, centre / centre.z());
-  const double apart_m = params_.agree_sigmas * math::sqrt(math::square(fit.sigma_m) + math::square(met_sigma_m));
-  const double limit_m = std::max(math::clamp(apart_m, params_.agree_m, params_.agree_max_m),
-                                  params_.agree_px * pixel_m(middle_s, middle_t));
+  const double apart_m =
+      params_.agree.within_sigmas * math::sqrt(math::square(fit.sigma_m) + math::square(met_sigma_m));
+  const double limit_m = std::max(math::clamp(apart_m, params_.agree.least_m, params_.agree.most_m),
+                                  params_.agree.within_px * pixel_m(middle_s, middle_t));
   if (!(std::abs(apart) < limit_m)) return !begins_at_face();
   const Shift shift = surface_above_ ? local_shift() : Shift{};
   double lo_m = 0.0, hi_m = 0.0;

@@ -42,6 +42,44 @@ class EdgeLineFinder {
       field("max_px", p.max_px, 0.1, 50.0, "A column that tells a larger shift does not count.");
     }
   };
+  // When the line where two planes meet and the change-points are one edge.
+  struct AgreeParams {
+    // Where the two planes meet is the sharper answer when no overhang lies between: it uses every pixel of both. It is
+    // taken when it lies within least_m, or within_sigmas of both, but never beyond most_m; far away, where a pixel is
+    // centimetres of the surface, within_px of it.
+    double least_m = 0.003;
+    double most_m = 0.008;
+    double within_px = 0.3;
+    double within_sigmas = 1.5;
+
+    static void visit(auto& p, auto& field) {
+      field("least_m", p.least_m, 0.0, 0.1,
+            "The line where two planes meet is taken when it is no farther from the change-points, or within their "
+            "sigmas.");
+      field("most_m", p.most_m, 0.0, 0.2,
+            "The line where two planes meet is never taken when it is farther from the change-points.");
+      field("within_px", p.within_px, 0.0, 20.0,
+            "Far away, where a pixel is centimetres of the surface, agreement is counted in pixels.");
+      field("within_sigmas", p.within_sigmas, 0.1, 10.0,
+            "Agreement within as many sigmas of both, between least_m and most_m.");
+    }
+  };
+  // An overhang's front face.
+  struct FaceParams {
+    double min_m = 0.006;
+    double max_m = 0.08;
+    std::int32_t rows = 4;  // a face 30 mm high is 7 pixels high at 0.8 m
+    std::int32_t before_px = 6;
+
+    static void visit(auto& p, auto& field) {
+      field("min_m", p.min_m, 0.0, 0.1, "An overhang's front face stands out from the riser by more.");
+      field("max_m", p.max_m, 0.0, 0.5, "An overhang's front face stands out from the riser by less.");
+      field.ordered("min_m", "max_m");
+      field("rows", p.rows, 1, 64, "As many rows of a column tell how far an overhang's face stands out.");
+      field("before_px", p.before_px, 0, 16,
+            "The rows of an overhang's face are looked for from as far before the change-point.");
+    }
+  };
   struct Params {
     std::int32_t window_px = 12;
     std::int32_t group_px = 24;
@@ -52,24 +90,15 @@ class EdgeLineFinder {
     double min_length_m = 0.06;
     double max_rms_m = 0.006;
     double min_inlier_share = 0.5;
-    // Where the two planes meet is the sharper answer when no overhang lies between: it uses every pixel of both. It is
-    // taken when it lies within agree_m, or three sigmas of the change-points and one and a half of the planes, but
-    // never beyond agree_max_m; far away, where a pixel is centimetres of the surface, within agree_px.
-    double agree_m = 0.003;
-    double agree_max_m = 0.008;
-    double agree_px = 0.3;
-    double agree_sigmas = 1.5;
-    double face_m = 0.006;
-    double face_max_m = 0.08;
     double slow_error_m = 0.0012;
     double least_local_m = 0.0004;
     double least_scale_m = 0.0008;
     double seen_variance_gain = 2.0;
     double shared = 0.3;
-    std::int32_t face_rows = 4;  // a face 30 mm high is 7 pixels high at 0.8 m
-    std::int32_t face_before_px = 6;
     GuessParams guess;
     ShiftParams shift;
+    AgreeParams agree;
+    FaceParams face;
 
     static void visit(auto& p, auto& field) {
       field("window_px", p.window_px, 4, 16, "As many rows are searched to each side of the first guess.");
@@ -83,18 +112,6 @@ class EdgeLineFinder {
       field("min_length_m", p.min_length_m, 0.0, 1.0, "A line is as long.");
       field("max_rms_m", p.max_rms_m, 1e-4, 0.1, "Change-points lie no farther off their line.");
       field("min_inlier_share", p.min_inlier_share, 0.0, 1.0, "This share of the change-points lies on their line.");
-      field("agree_m", p.agree_m, 0.0, 0.1,
-            "The line where two planes meet is taken when it is no farther from the change-points, or within their "
-            "sigmas.");
-      field("agree_max_m", p.agree_max_m, 0.0, 0.2,
-            "The line where two planes meet is never taken when it is farther from the change-points.");
-      field("agree_px", p.agree_px, 0.0, 20.0,
-            "Far away, where a pixel is centimetres of the surface, agreement is counted in pixels.");
-      field("agree_sigmas", p.agree_sigmas, 0.1, 10.0,
-            "Agreement within as many sigmas of both, between agree_m and agree_max_m.");
-      field("face_m", p.face_m, 0.0, 0.1, "An overhang's front face stands out from the riser by more.");
-      field("face_max_m", p.face_max_m, 0.0, 0.5, "An overhang's front face stands out from the riser by less.");
-      field.ordered("face_m", "face_max_m");
       field("slow_error_m", p.slow_error_m, 0.0, 0.1,
             "Error of the change-point of group_px columns that its columns share.");
       field("least_local_m", p.least_local_m, 0.0, 0.1,
@@ -107,11 +124,10 @@ class EdgeLineFinder {
           "that they are skewed towards the less noisy plane.");
       field("shared", p.shared, 0.0, 1.0,
             "The change-points, the planes' meeting and the local shift share this part of their errors.");
-      field("face_rows", p.face_rows, 1, 64, "As many rows of a column tell how far an overhang's face stands out.");
-      field("face_before_px", p.face_before_px, 0, 16,
-            "The rows of an overhang's face are looked for from as far before the change-point.");
       field("guess", p.guess);
       field("shift", p.shift);
+      field("agree", p.agree);
+      field("face", p.face);
     }
   };
   enum class Outcome : std::uint8_t { kFound, kAgain, kFewColumns, kNoLine, kNotStraight, kShort };

@@ -124,6 +124,7 @@ EdgeKind PolygonBuilder::judge_edge(const Vec2& a, const Vec2& b, const Vec2& in
   if (outward.norm() < 1e-9) return EdgeKind::kUnknown;
   outward.normalize();
   if (outward.dot(a - inside) < 0.0) outward = -outward;
+  // From half the probe's distance to twice as far, both of which go with that parameter.
   const auto reach_px = static_cast<std::int32_t>(1.5 * params_.probe_px);
   // Nearer than the probe only the body is asked for.
   const auto nearest_px = picture.any_body ? 0 : static_cast<std::int32_t>(std::ceil(0.5 * params_.probe_px));

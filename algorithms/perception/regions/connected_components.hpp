@@ -27,18 +27,19 @@ class ConnectedComponents {
 
     static void visit(auto& p, auto& field) {
       field("apart_m", p.apart_m, 0.001, 0.5, "What is seen as far from a plane is something else.");
-      field("min_component_px", p.min_component_px, 1, 100000, "A piece of a surface has as many pixels.");
+      field("min_component_px", p.min_component_px, 1, 100000, "A connected component has as many pixels.");
       field("min_surface_px", p.min_surface_px, 1, 100000,
             "A tread that meets a riser, or the reverse, has as many pixels.");
       field("min_other_px", p.min_other_px, 1, 100000,
             "Any other surface has as many pixels: curved things have facets of this size.");
       field("min_step_columns", p.min_step_columns, 1.0, 80.0,
             "A tread meets a riser, or the reverse, in as many columns of eight pixels.");
-      field(
-          "apart_probes", p.apart_probes, 1, 200,
-          "As many steps on the straight way from one piece of a plane to another tell whether they are one surface.");
+      field("apart_probes", p.apart_probes, 1, 200,
+            "As many steps on the straight way from one connected component of a plane to another tell whether they "
+            "are one surface.");
       field("min_apart_probes", p.min_apart_probes, 1, 200,
-            "Two pieces of a plane are two surfaces when something else is seen in as many places on that way.");
+            "Two connected components of a plane are two surfaces when something else is seen in as many places on "
+            "that way.");
     }
   };
 

@@ -49,9 +49,10 @@ void ScanlineSegmentation::begin(const Params& params, const DepthNoiseModel& no
   bend_rows_ = static_cast<float>(params.bend_rows);
   sigma_ = noise.scaled(math::sqrt(noise.mean_share(kColumn_px))).inverse_sigma_f();
   floor2_ = static_cast<float>(math::square(params.floor_m));
-  // jump_share w + 4 sigma
-  jump_ = {4.0F * sigma_.base, static_cast<float>(params.jump_share) + 4.0F * sigma_.per_metre,
-           4.0F * sigma_.quadratic};
+  // jump_share w + jump_sigmas sigma
+  const auto sigmas = static_cast<float>(params.jump_sigmas);
+  jump_ = {sigmas * sigma_.base, static_cast<float>(params.jump_share) + sigmas * sigma_.per_metre,
+           sigmas * sigma_.quadratic};
   max_gap_ = static_cast<float>(params.max_gap_px);
   const std::int32_t outlier_weight = params.max_gap_px / kPending + 1;
   outlier_weight_ = static_cast<float>(outlier_weight);

@@ -33,6 +33,7 @@ class ScanlineSegmentation {
     double outlier_sigmas = 3.5;
     double bend_sigmas = 1.7;
     double jump_share = 0.03;
+    double jump_sigmas = 4.0;
     double floor_m = 0.001;
     std::int32_t max_gap_px = 8;
     std::int32_t bend_rows = 7;
@@ -43,6 +44,7 @@ class ScanlineSegmentation {
             "A segment bends away where the mean residual of its last rows is larger.");
       field("jump_share", p.jump_share, 0.001, 0.5,
             "The first rows of a segment differ by less than this share of the depth per row.");
+      field("jump_sigmas", p.jump_sigmas, 0.5, 20.0, "As many sigmas of the noise are added to that share.");
       field("floor_m", p.floor_m, 0.0, 0.1, "Slow depth errors, added to the noise.");
       field("max_gap_px", p.max_gap_px, 0, 200, "A segment may miss as many rows in a row.");
       field("bend_rows", p.bend_rows, 3, 480, "A segment of more rows may bend away.");
@@ -65,9 +67,10 @@ class ScanlineSegmentation {
   [[nodiscard]] WorkCount& work() noexcept { return work_; }                   // since it was last paid
 
  private:
+  // No parameters: the step over a block of rows is compiled for these.
   static constexpr std::int32_t kPending = 3;  // outliers in a row that end a segment
   static constexpr std::int32_t kMinRows = 3;
-  static constexpr float kMemory = 0.7F;     // of the mean of residuals, per row
+  static constexpr float kMemory = 0.7F;     // of the mean of residuals, per row; kBentRows of them are left of it
   static constexpr std::int32_t kGroup = 8;  // columns that are decided on together, for every register width
   static_assert(kColumns % kGroup == 0);
   using Floats = std::array<float, kColumns>;

@@ -13,11 +13,13 @@
 #include <ostream>
 
 #include "firmware/config/param_file.hpp"
+#include "sim_stub/host/cli/can_command.hpp"
 #include "sim_stub/host/cli/command_words.hpp"
 #include "sim_stub/host/cli/estimate_command.hpp"
 #include "sim_stub/host/cli/obstacle_options.hpp"
 #include "sim_stub/host/cli/params_command.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
+#include "sim_stub/host/cli/replay_command.hpp"
 #include "sim_stub/host/output_file.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
 
@@ -40,6 +42,7 @@ struct ClimbArguments {
   std::string contacts = "sensed";
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
+  std::string bus;
   bool no_self_filter = false;
   bool no_mount_estimate = false;
   std::string camera;
@@ -94,6 +97,11 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_flag(
       "--save-inputs", a.options.save_inputs,
       "Also write what the sensors said, for perceive and estimate: OUT/inputs/depth_NN.png, log.csv, lio.csv");
+  climb
+      .add_option("--record", a.options.record_dir,
+                  "Also write all that goes into the module and comes out of it, to the bit, for replay: some 100 MB a "
+                  "stair step")
+      ->type_name("DIR");
 
   climb.add_option("--camera", a.camera, "The robot's camera, 640x480 at most; the module is told what the file says")
       ->type_name("CAMERA.toml");
@@ -110,6 +118,11 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       .add_option("--scale-error", a.options.scale_error,
                   "How far the depths' scale may be off, unknown to the module: share of the depth")
       ->capture_default_str();
+
+  climb.add_option("--bus", a.bus, "The joints are behind CAN buses with the drives that this file describes")
+      ->type_name("BUS.toml");
+  climb.add_option("--can-log", a.options.can_log, "Also write every frame on the buses there, as candump -L has them")
+      ->type_name("FILE");
 
   climb.add_option("--params", a.options.params_file, "Parameters of the module; other options go before what it says")
       ->type_name("PARAMS.toml");
@@ -211,6 +224,15 @@ std::string plant_complaint(ClimbArguments& a) {
   return {};
 }
 
+std::string balusters_complaint(ClimbArguments& a) {
+  for (const char* name : {"--baluster-side", "--baluster-inset", "--baluster-size"}) {
+    if (a.said->count(name) > 0 && a.said->count("--balusters") == 0) {
+      return std::string(name) + " is of no use without --balusters.";
+    }
+  }
+  return {};
+}
+
 std::string pushes_complaint(ClimbArguments& a) {
   if (!a.pushes.empty() && a.options.plant != PlantKind::kMujoco) {
     return "--push needs --plant mujoco: forces do not move the kinematic plant.";
@@ -268,6 +290,22 @@ std::string camera_complaint(ClimbArguments& a) {
   return {};
 }
 
+// Throws config::FileError.
+std::string bus_complaint(ClimbArguments& a) {
+  if (a.bus.empty()) return a.options.can_log.empty() ? "" : "--can-log needs --bus: without one there are no frames.";
+  a.options.bus = config::read_bus(a.bus);
+  RobotModel robot = a.options.params.robot;
+  config::limit_by_drives(*a.options.bus, a.options.params.gait.joints, robot);
+  if (!a.options.bus->table.feet.present && a.options.plant != PlantKind::kKinematic) {
+    return "Bus file \"" + a.bus +
+           "\": it has no [feet], and contacts inferred from joint torques need --plant kinematic: under physics a leg "
+           "that swings feigns a touch-down.";
+  }
+  if (a.options.can_log.empty()) return {};
+  std::ofstream probe(a.options.can_log);
+  return probe ? "" : "Cannot write the file \"" + a.options.can_log + "\" given by --can-log.";
+}
+
 std::string picture_complaint(ClimbArguments& a) {
   const StairParams& stairs = a.options.stairs;
   if (a.missing_step) {
@@ -296,7 +334,8 @@ std::string complaint(ClimbArguments& a) {
   try {
     take_params(a);
     std::string sentence = stairs_complaint(a.options.stairs);
-    for (const auto part : {plant_complaint, pushes_complaint, errors_complaint, camera_complaint, picture_complaint}) {
+    for (const auto part : {balusters_complaint, plant_complaint, pushes_complaint, errors_complaint, camera_complaint,
+                            bus_complaint, picture_complaint}) {
       if (sentence.empty()) sentence = part(a);
     }
     if (!sentence.empty()) return sentence;
@@ -311,18 +350,19 @@ std::string complaint(ClimbArguments& a) {
 }
 
 // Makes the directory and tries to write into it before a minute of climbing is spent.
-std::string directory_complaint(const std::string& directory) {
+std::string directory_complaint(const std::string& directory, const std::string& option = "--out") {
   namespace fs = std::filesystem;
   std::error_code error;
   fs::create_directories(directory, error);
-  if (!fs::is_directory(directory, error)) return "Cannot create the directory \"" + directory + "\" given by --out.";
+  if (!fs::is_directory(directory, error))
+    return "Cannot create the directory \"" + directory + "\" given by " + option + ".";
   const fs::path probe = fs::path(directory) / ".polygmap_probe";
   std::ofstream file(probe);
   file << "x";
   file.close();
   const bool written = static_cast<bool>(file);
   fs::remove(probe, error);
-  return written ? "" : "Cannot write into the directory \"" + directory + "\" given by --out.";
+  return written ? "" : "Cannot write into the directory \"" + directory + "\" given by " + option + ".";
 }
 
 std::string output_complaint(const std::string& directory, bool with_inputs) {
@@ -373,11 +413,12 @@ class ProgressLine {
 }  // namespace
 
 int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& run, std::ostream& out,
-                  std::ostream& err, bool live) {
+                  std::ostream& err, bool live, const std::atomic<int>* interrupt) {
   CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
   app.require_subcommand(0, 1);
   app.footer(
-      "Exit codes: 0 pass or done, 1 the climb failed, 2 a bad argument, file or output, 130 or 143 interrupted.");
+      "Exit codes: 0 pass or done, 1 the climb failed or the replay differs, 2 a bad argument, file or output, 130 or "
+      "143 interrupted.");
   CLI::App* climb = app.add_subcommand(
       "climb", "Climb a simulated staircase; writes summary.json and climb.svg, exit code 0 only on pass");
   ClimbArguments a;
@@ -388,9 +429,14 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   CLI::App* perceive = declare_perceive(app, perceive_arguments);
   EstimateArguments estimate_arguments;
   CLI::App* estimate = declare_estimate(app, estimate_arguments);
+  ReplayArguments replay_arguments;
+  CLI::App* replay = declare_replay(app, replay_arguments);
   ParamsArguments params_arguments;
   CLI::App* params = declare_params(app, params_arguments);
-  for (CLI::App* command : {climb, perceive, estimate, params_arguments.list, params_arguments.diff}) {
+  CanArguments can_arguments;
+  CLI::App* can = declare_can(app, can_arguments);
+  for (CLI::App* command : {climb, perceive, estimate, replay, params_arguments.list, params_arguments.diff,
+                            can_arguments.encode, can_arguments.decode, can_arguments.dbc}) {
     for (CLI::Option* option : command->get_options()) option->check(not_empty);
   }
 
@@ -403,14 +449,16 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   } catch (const CLI::Success& success) {
     return app.exit(success, out, err);
   } catch (const CLI::ParseError& error) {
-    constexpr std::array<std::string_view, 4> kCommands{"climb", "perceive", "estimate", "params"};
+    constexpr std::array<std::string_view, 6> kCommands{"climb", "perceive", "estimate", "replay", "params", "can"};
     const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
     err << "polygmap: " << complaint_of(error, app, arguments) << "; see polygmap " << (named ? arguments[0] + " " : "")
         << "--help.\n";
     return kExitUsage;
   }
-  if (perceive->parsed()) return run_perceive(perceive_arguments, out, err);
-  if (estimate->parsed()) return run_estimate(estimate_arguments, out, err);
+  if (perceive->parsed()) return run_perceive(perceive_arguments, out, err, interrupt);
+  if (estimate->parsed()) return run_estimate(estimate_arguments, out, err, interrupt);
+  if (replay->parsed()) return run_replay(replay_arguments, out, err);
+  if (can->parsed()) return run_can(can_arguments, out, err);
   if (params->parsed()) return run_params(params_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
     err << "polygmap: A subcommand is required; see polygmap --help.\n";
@@ -418,6 +466,9 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   }
   std::string sentence = complaint(a);
   if (sentence.empty()) sentence = output_complaint(a.options.out_dir, a.options.save_inputs);
+  if (sentence.empty() && !a.options.record_dir.empty()) {
+    sentence = directory_complaint(a.options.record_dir, "--record");
+  }
   if (!sentence.empty()) {
     err << "polygmap: " << sentence << "\n";
     return kExitUsage;

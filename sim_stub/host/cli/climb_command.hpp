@@ -2,6 +2,7 @@
 // `polygmap climb`: reads and checks the arguments, runs the climb, says what came of it.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <iosfwd>
 #include <string>
@@ -21,8 +22,9 @@ enum ExitCode : int {
 using ClimbRunner = std::function<ClimbSummary(const ClimbOptions&, const ClimbProgressFunction&)>;
 
 // arguments without the program's name. Errors are one sentence on err. live: out is a terminal, the progress line is
-// rewritten in place; otherwise a line now and then.
+// rewritten in place; otherwise a line now and then. interrupt: the signal that asks perceive or estimate to stop, 0
+// until then; null where none can. A climb's is the runner's.
 [[nodiscard]] int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& run, std::ostream& out,
-                                std::ostream& err, bool live);
+                                std::ostream& err, bool live, const std::atomic<int>* interrupt = nullptr);
 
 }  // namespace polygmap::sim

@@ -51,10 +51,27 @@ std::string mismatched(const std::string& message) {
   return name + (count == "1" ? " needs a value" : " needs " + count + " values");
 }
 
+// "lst is no command of params; there are list, docs and diff"; empty where the command asks for none, or has it.
+std::string no_such_command(const CLI::App& app, const std::vector<std::string>& words) {
+  if (words.size() < 2 || words[1].starts_with("-")) return {};
+  for (const CLI::App* command : app.get_subcommands({})) {
+    if (command->get_name() != words[0]) continue;
+    const std::vector<const CLI::App*> inner = command->get_subcommands({});
+    if (inner.empty() || std::ranges::any_of(inner, [&](auto* one) { return one->get_name() == words[1]; })) return {};
+    std::string all;
+    for (const CLI::App* one : inner) {
+      all += (all.empty() ? "" : (one == inner.back() ? " and " : ", ")) + one->get_name();
+    }
+    return "\"" + words[1] + "\" is no command of " + words[0] + "; there are " + all;
+  }
+  return {};
+}
+
 }  // namespace
 
 std::string complaint_of(const CLI::ParseError& error, const CLI::App& app, const std::vector<std::string>& words) {
   std::string message = error.what();
+  if (std::string sentence = no_such_command(app, words); !sentence.empty()) return sentence;
   switch (static_cast<CLI::ExitCodes>(error.get_exit_code())) {
     case CLI::ExitCodes::ExtrasError:
       return unexpected(message, app, words);

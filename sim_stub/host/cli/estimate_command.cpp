@@ -2,16 +2,19 @@
 #include "sim_stub/host/cli/estimate_command.hpp"
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <ostream>
 #include <set>
+#include <utility>
 
 #include "firmware/config/param_file.hpp"
 #include "firmware/params.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/estimate/estimate_report.hpp"
+#include "sim_stub/host/estimate/log_contradiction.hpp"
 #include "sim_stub/host/estimate/log_plausibility.hpp"
 #include "sim_stub/host/output_file.hpp"
 
@@ -86,10 +89,10 @@ ReplayOptions options_of(const EstimateArguments& a, std::vector<std::string>& w
 void print_lio(const Replay& replay, std::size_t poses, std::ostream& out) {
   const auto count = [&replay](LioVerdict verdict) { return replay.lio[static_cast<std::size_t>(verdict)]; };
   const ReplayTick& last = replay.ticks.back();
-  out << "LIO: " << count(LioVerdict::kAccepted) + count(LioVerdict::kRealigned) << " of " << poses
-      << " poses accepted; " << count(LioVerdict::kJump) << " too far from the odometry, " << count(LioVerdict::kTooOld)
-      << " too old, " << count(LioVerdict::kFuture) << " of the future, " << count(LioVerdict::kNoOdometry)
-      << " from before the start, " << replay.lio_not_arrived << " not arrived";
+  out << "LIO: " << count(LioVerdict::kAccepted) << " of " << poses << " poses accepted; " << count(LioVerdict::kJump)
+      << " too far from the odometry, " << count(LioVerdict::kRealigned) << " taken as a new world, "
+      << count(LioVerdict::kTooOld) << " too old, " << count(LioVerdict::kFuture) << " of the future, "
+      << count(LioVerdict::kNoOdometry) << " from before the start, " << replay.lio_not_arrived << " not arrived";
   if (last.lio_age_ns >= 0) out << "; the last one is " << 1e-9 * static_cast<double>(last.lio_age_ns) << " s old";
   out << "\n";
 }
@@ -99,6 +102,11 @@ void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
   std::snprintf(line, sizeof line, "%zu rows, %.3f s; start: %s; feet's noise %.2f mm\n", log.rows.size(),
                 seconds(log.rows.back().stamp_ns), name_of(replay.start), 1e3 * replay.foot_position_sigma_m);
   out << line;
+  if (const LogGaps gaps = gaps_of(log); gaps.count > 0) {
+    std::snprintf(line, sizeof line, "%zu gap%s of more than %.0f ms without rows, the longest %.3f s: bridged\n",
+                  gaps.count, gaps.count == 1 ? "" : "s", 1e3 * kGap_s, gaps.longest_s);
+    out << line;
+  }
   if (replay.rows_without_contact == log.rows.size()) {
     out << "No foot ever stands (contact of 0.5 or more): this is dead reckoning by the IMU alone.\n";
   }
@@ -155,7 +163,7 @@ CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
   return estimate;
 }
 
-int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& err) {
+int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& err, const std::atomic<int>* interrupt) {
   if (const std::string sentence = complaint(a); !sentence.empty()) {
     err << "polygmap: " << sentence << "\n";
     return kExitUsage;
@@ -164,18 +172,32 @@ int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& er
     for (const std::string& file : {a.json, a.csv}) {
       if (!file.empty()) remove_output(file);  // a former run's is none of this one
     }
+    throw_if_interrupted(interrupt);
     const EstimateLog log = read_estimate_log(a.log);
     const std::vector<LioRow> lio = a.lio.empty() ? std::vector<LioRow>{} : read_lio_log(a.lio, log.start_s);
     std::vector<std::string> warnings = doubts_about(log, a.log);
-    const ReplayOptions options = options_of(a, warnings);
-    for (const std::string& warning : warnings) err << "polygmap: warning: " << warning << "\n";
+    ReplayOptions options = options_of(a, warnings);
+    options.interrupt = interrupt;
+    std::size_t told = 0;
+    const auto tell = [&] {
+      for (; told < warnings.size(); ++told) err << "polygmap: warning: " << warnings[told] << "\n";
+    };
+    tell();
     const Replay result = replay(log, lio, options);
     if (!is_finite(result))
       throw config::FileError("\"" + a.log + "\": the estimate is not finite, so nothing is written.");
+    for (std::string& doubt :
+         std::array{doubt_about_contacts(log, result, options), doubt_about_lio(a.lio, lio.size(), result)}) {
+      if (!doubt.empty()) warnings.push_back(std::move(doubt));
+    }
+    tell();
     if (!a.json.empty()) write_estimate_json(a.json, log, lio, result, options.params_hash, warnings);
     if (!a.csv.empty()) write_estimate_csv(a.csv, log, result);
     print(log, result, out);
     if (!a.lio.empty()) print_lio(result, lio.size(), out);
+  } catch (const Interrupted& by) {
+    err << "polygmap: interrupted: nothing is written.\n";
+    return kExitSignal + by.signal;
   } catch (const std::exception& error) {
     err << "polygmap: " << error.what() << "\n";
     return kExitUsage;

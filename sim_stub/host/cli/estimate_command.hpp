@@ -2,6 +2,7 @@
 // `polygmap estimate`: a recorded log through the module's state estimation.
 #pragma once
 
+#include <atomic>
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -19,7 +20,8 @@ struct EstimateArguments {
 };
 
 [[nodiscard]] CLI::App* declare_estimate(CLI::App& app, EstimateArguments& arguments);
-// The exit code. Errors are one sentence on err.
-[[nodiscard]] int run_estimate(const EstimateArguments& arguments, std::ostream& out, std::ostream& err);
+// The exit code. Errors are one sentence on err. interrupt: the signal that asks to stop, 0 until then; null: none can.
+[[nodiscard]] int run_estimate(const EstimateArguments& arguments, std::ostream& out, std::ostream& err,
+                               const std::atomic<int>* interrupt);
 
 }  // namespace polygmap::sim

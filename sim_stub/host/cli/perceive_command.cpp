@@ -98,7 +98,7 @@ Tuning tuning_of(const PerceiveArguments& a) {
 
 // The line that says what was found; what is doubtful goes to err. Throws config::FileError.
 std::string one_picture(const PerceiveArguments& a, const config::CameraProfile& camera, const Tuning& tuning,
-                        const std::string& path, bool several, std::ostream& err) {
+                        const std::string& path, bool several, std::ostream& err, const std::atomic<int>* interrupt) {
   const DepthPng picture = read_depth(path);
   const std::string own = size_text(picture.width_px, picture.height_px);
   const std::string expected = size_text(camera.intrinsics.width_px, camera.intrinsics.height_px);
@@ -106,7 +106,8 @@ std::string one_picture(const PerceiveArguments& a, const config::CameraProfile&
     throw config::FileError("\"" + path + "\" is " + own + ", but the camera file says " + expected + ".");
   std::optional<Vec3> gravity;
   if (!a.gravity.empty()) gravity = Vec3{a.gravity[0], a.gravity[1], a.gravity[2]};
-  Perceived perceived = perceive(camera, picture, gravity, a.repeat, tuning.values);
+  Perceived perceived = perceive(camera, picture, gravity, a.repeat, tuning.values, interrupt);
+  throw_if_interrupted(interrupt);  // once the first file is written, the others follow
   if (!a.labels.empty()) write_labels(place(a.labels, path, several, kLabels), picture, perceived);
   if (!a.json.empty()) write_planes(place(a.json, path, several, kPlanes), perceived, tuning.hash);
   if (!a.picture.empty()) write_picture(place(a.picture, path, several, kPicture), camera, picture, perceived);
@@ -157,7 +158,7 @@ CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
   return perceive;
 }
 
-int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& err) {
+int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& err, const std::atomic<int>* interrupt) {
   if (const std::string sentence = complaint(a); !sentence.empty()) {
     err << "polygmap: " << sentence << "\n";
     return kExitUsage;
@@ -181,9 +182,16 @@ int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& er
     complain(error);
     return code;
   }
+  std::size_t done = 0;
   for (const std::string& path : a.depth) {
     try {
-      out << one_picture(a, camera, tuning, path, several, err) << std::flush;
+      throw_if_interrupted(interrupt);
+      out << one_picture(a, camera, tuning, path, several, err, interrupt) << std::flush;
+      ++done;
+    } catch (const Interrupted& by) {
+      err << "polygmap: interrupted after " << done << " of " << a.depth.size()
+          << " pictures: the others have no files.\n";
+      return kExitSignal + by.signal;
     } catch (const std::exception& error) {
       complain(error);
     }

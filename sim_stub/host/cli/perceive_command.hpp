@@ -2,6 +2,7 @@
 // `polygmap perceive`: planes, labels and a picture of depth pictures from files.
 #pragma once
 
+#include <atomic>
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -21,7 +22,8 @@ struct PerceiveArguments {
 };
 
 [[nodiscard]] CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& arguments);
-// The exit code. Errors are one sentence on err.
-[[nodiscard]] int run_perceive(const PerceiveArguments& arguments, std::ostream& out, std::ostream& err);
+// The exit code. Errors are one sentence on err. interrupt: the signal that asks to stop, 0 until then; null: none can.
+[[nodiscard]] int run_perceive(const PerceiveArguments& arguments, std::ostream& out, std::ostream& err,
+                               const std::atomic<int>* interrupt);
 
 }  // namespace polygmap::sim

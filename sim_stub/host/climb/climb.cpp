@@ -8,7 +8,9 @@
 #include <optional>
 
 #include "firmware/config/param_table.hpp"
+#include "firmware/recording/recorder.hpp"
 #include "firmware/schedule.hpp"
+#include "sim_stub/bus/bus_robot.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "sim_stub/host/climb/climb_report.hpp"
 #include "sim_stub/host/record/climb_recorder.hpp"
@@ -34,6 +36,7 @@ class TimedPipeline {
     }
     return progress;
   }
+  void cycle_done(std::size_t lane, const CycleReport& report) noexcept { pipeline_.cycle_done(lane, report); }
   [[nodiscard]] const DurationStatistics& wall(std::size_t row) const noexcept { return wall_[row]; }
 
  private:
@@ -65,17 +68,23 @@ class WatchedLidar final : public hal::LidarOdometry {
   std::int64_t told_ns_ = 0;
 };
 
-using Executive = OneLaneExecutive<TimedPipeline>;
+using Tasks = recording::RecordedTasks<TimedPipeline>;
+using Executive = OneLaneExecutive<Tasks>;
 
 // Memory that is there before the module is: the heap is watched from its first instruction on.
 struct Module {
   std::optional<Pipeline> pipeline;
-  std::optional<TimedPipeline> tasks;
+  std::optional<TimedPipeline> timed;
+  std::optional<Tasks> tasks;
   std::optional<Executive> executive;
   PerceptionTelemetry watched;
 };
 
 static_assert(VirtualClock::kTick_ns == kCycle_ns);
+
+bool infers_contacts(const ClimbOptions& options) {
+  return options.infer_contacts || (options.bus && !options.bus->table.feet.present);
+}
 
 SimOptions sim_options(const ClimbOptions& options) {
   SimOptions sim;
@@ -96,7 +105,7 @@ SimOptions sim_options(const ClimbOptions& options) {
     sim.intrinsics = options.camera->intrinsics;
     sim.depth_sigma = options.camera->noise;
   }
-  sim.force_sensors = !options.infer_contacts;
+  sim.force_sensors = !infers_contacts(options);
   if (options.blank_depth) sim.camera.blank = {{0, INT64_MAX}};
   return sim;
 }
@@ -157,6 +166,27 @@ CameraFigures camera_figures(const SimRobot& robot, const CameraExtrinsicsEstima
   return f;
 }
 
+std::vector<std::string> names_of(JointSet joints) {
+  std::vector<std::string> names;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (joints.contains(n)) names.emplace_back(kJointNames[n]);
+  }
+  return names;
+}
+
+BusFigures bus_figures(const config::BusFile& file, BusRobot& robot, const Telemetry& telemetry) {
+  BusFigures f;
+  f.module_state = name_of(telemetry.module_state);
+  f.silent_joints = names_of(telemetry.drives.ever_silent);
+  f.error_joints = names_of(telemetry.drives.bus.drive_errors);
+  for (std::size_t i = 0; i < file.buses.size(); ++i) {
+    f.loads.emplace_back(file.buses[i], hal::bus_load(file.table, i));
+    f.sent += robot.bus(i).status().sent;
+    f.received += robot.bus(i).status().received;
+  }
+  return f;
+}
+
 // Of all lanes, by name; only what was raised.
 std::vector<std::pair<std::string, std::uint32_t>> raised(const Health& health) {
   std::vector<std::pair<std::string, std::uint32_t>> out;
@@ -182,39 +212,62 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   Params params = options.params;
   params.gait.planner.pattern = options.gait;
   params.self_filter = options.self_filter;
-  params.estimator.legs.infer_forces = options.infer_contacts;
+  params.estimator.legs.infer_forces = infers_contacts(options);
   params.estimate_mount = options.estimate_mount;
   if (options.camera) {
     params.surfaces.noise = options.camera->noise;
     params.surfaces.limits.min_depth_m = options.camera->min_depth_m;
     params.surfaces.limits.max_depth_m = options.camera->max_depth_m;
   }
+  std::optional<CandumpLog> can_log;
+  std::unique_ptr<BusRobot> bus;
+  if (options.bus) {
+    config::limit_by_drives(*options.bus, params.gait.joints, params.robot);
+    config::BusFile file = *options.bus;
+    if (options.infer_contacts) file.table.feet = {};
+    if (!options.can_log.empty()) can_log.emplace(options.can_log);
+    bus = std::make_unique<BusRobot>(robot, file, can_log ? &*can_log : nullptr);
+  }
+  hal::JointBus& joints = bus ? static_cast<hal::JointBus&>(bus->joints()) : robot;
   WatchedLidar lidar(robot);
   std::optional<ClimbRecorder> recorder;
-  if (options.save_inputs) recorder.emplace(robot, robot, robot, lidar);
+  if (options.save_inputs) recorder.emplace(robot, robot, joints, lidar);
+  const Ports watched_ports =
+      recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{robot, robot, joints, lidar};
+  std::optional<recording::Recorder> recording;
+  if (!options.record_dir.empty()) {
+    recording.emplace(watched_ports);
+    recording->begin(options.record_dir, params);
+  }
   const auto module = std::make_unique<Module>();
   {
     const heap::ModuleCall call("Pipeline::Pipeline");
-    module->pipeline.emplace(
-        recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{robot, robot, robot, lidar}, params);
+    module->pipeline.emplace(recording ? recording->ports() : watched_ports, params);
     module->pipeline->watch(module->watched);
-    module->tasks.emplace(*module->pipeline);
+    if (recording) recording->watch(*module->pipeline);
+    module->timed.emplace(*module->pipeline);
+    module->tasks.emplace(*module->timed, recording ? &*recording : nullptr);
     module->executive.emplace(*module->tasks, robot, module->pipeline->lane_health(0));
     module->executive->start(robot.now_ns() + kCycle_ns);
   }
   Pipeline& pipeline = *module->pipeline;
-  TimedPipeline& tasks = *module->tasks;
+  TimedPipeline& tasks = *module->timed;
   Executive& executive = *module->executive;
   ClimbReport report(robot.stairs(), robot.errors().base_T_camera, robot.depth_camera().intrinsics());
 
   std::int64_t end_ns = -1;
   std::int64_t next_progress_ns = 0;
   while (seconds(robot.now_ns()) < options.time_limit_s) {
-    robot.advance();
+    if (bus) {
+      bus->advance();
+    } else {
+      robot.advance();
+    }
     {
       const heap::ModuleCall call("CyclicExecutive::tick");
       executive.tick(robot.now_ns());
     }
+    if (recording) recording->flush();
     const Telemetry telemetry = pipeline.telemetry(robot.now_ns(), module->watched);
     report.observe(robot.truth(), telemetry);
     if (recorder) recorder->observe(robot.truth(), telemetry.state);
@@ -233,6 +286,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   figures.options = options;
   figures.interrupted_by = options.interrupt != nullptr ? options.interrupt->load() : 0;
   figures.params_hash = config::hash_of(params);
+  if (bus) figures.bus = bus_figures(*options.bus, *bus, pipeline.telemetry(robot.now_ns(), module->watched));
   figures.camera = camera_figures(robot, pipeline.perception().mount());
   figures.heap_calls = heap::report().calls;
   figures.faults = raised(module->pipeline->health());
@@ -242,10 +296,14 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   figures.schedule = schedule_of(executive, tasks);
   figures.wall_seconds = std::chrono::duration<double>(WallClock::now() - wall_begin).count();
   const ClimbSummary summary = report.finish(figures);
+  if (recording) {
+    if (const std::string failure = recording->finish(); !failure.empty()) throw ClimbNotWritten(failure, summary);
+  }
   if (!options.out_dir.empty()) {
     try {
       write_climb_files(options.out_dir, report, summary);
       if (recorder) recorder->write(options.out_dir + "/inputs");
+      if (can_log) can_log->close();
     } catch (const std::runtime_error& error) {
       throw ClimbNotWritten(error.what(), summary);
     }

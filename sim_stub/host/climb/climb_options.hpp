@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "algorithms/gait/footsteps/climb_planner.hpp"
+#include "firmware/config/bus_file.hpp"
 #include "firmware/config/camera_file.hpp"
 #include "firmware/params.hpp"
 #include "sim_stub/camera/noise_kind.hpp"
@@ -29,8 +30,9 @@ struct ClimbOptions {
   std::vector<Push> pushes;
   MujocoPlant::Params mujoco;  // the body and the ground as they are; the module believes the data sheet
   GaitPattern gait = GaitPattern::kDoubleStep;
-  std::string out_dir;          // empty: no files
-  bool save_inputs = false;     // what the sensors said, in out_dir/inputs, a directory that exists
+  std::string out_dir;       // empty: no files
+  bool save_inputs = false;  // what the sensors said, in out_dir/inputs, a directory that exists
+  std::string record_dir;  // all that goes into the module and comes out of it; empty: nothing; a directory that exists
   double time_limit_s = 150.0;  // simulated
   // Becomes the number of the signal that asks for the end; the climb then ends with what there is. Null: none may.
   const std::atomic<int>* interrupt = nullptr;
@@ -50,6 +52,9 @@ struct ClimbOptions {
   Params params;
   std::string params_file;  // that they were read from
   bool estimate_mount = true;
+  // The joints are behind these buses, else wired directly. What the drives can do binds the module's robot.
+  std::optional<config::BusFile> bus;
+  std::string can_log;          // every frame on the buses, as candump -L writes it; empty: none
   bool infer_contacts = false;  // from joint torques: the feet have no force sensors
 };
 

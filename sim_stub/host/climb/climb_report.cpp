@@ -304,6 +304,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   ClimbSummary s;
   s.options = run.options;
   s.params_hash = run.params_hash;
+  s.bus = run.bus;
   s.camera = run.camera;
   s.fell = fell_;
   s.steps_total = static_cast<int>(world_.steps.size());

@@ -18,6 +18,7 @@
 #include "sim_stub/host/climb/odometry_report.hpp"
 #include "sim_stub/host/climb/surface_match.hpp"
 #include "sim_stub/nominal_robot.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
 #include "sim_stub/world/truth.hpp"
@@ -30,6 +31,7 @@ struct RunFigures {
   int interrupted_by = 0;   // the signal; 0: none
   std::string params_hash;  // of what the module was given
   CameraFigures camera;
+  std::optional<BusFigures> bus;
   std::uint64_t heap_calls = 0;
   std::vector<std::pair<std::string, std::uint32_t>> faults;  // raised faults and limits by name
   std::string heap_first_caller;                              // the function, when there was a call

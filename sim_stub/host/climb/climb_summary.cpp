@@ -147,6 +147,16 @@ Json to_json(const ClimbSummary& s) {
         {"pitch_deg", degrees(camera.mount_found_deg.y())},
         {"height_mm", mm(camera.mount_found_height_m)},
         {"ahead_mm", mm(camera.mount_found_ahead_m)}}}};
+  if (s.bus) {
+    j["bus"] = {{"file", s.options.bus ? s.options.bus->path : ""},
+                {"load_percent", Json::object()},
+                {"module_state", s.bus->module_state},
+                {"silent_joints", s.bus->silent_joints},
+                {"error_joints", s.bus->error_joints},
+                {"frames_sent", s.bus->sent},
+                {"frames_received", s.bus->received}};
+    for (const auto& [name, load] : s.bus->loads) j["bus"]["load_percent"][name] = rounded(1e2 * load, 10.0);
+  }
   j["steps_total"] = s.steps_total;
   j["steps_climbed"] = s.steps_climbed;
   j["climb_time_s"] = seconds_of(s.climb_time_s);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -70,6 +71,15 @@ struct CameraFigures {
   double mount_found_ahead_m = 0.0;     // the same, and encoders
 };
 
+// Of a climb through CAN buses.
+struct BusFigures {
+  std::vector<std::pair<std::string, double>> loads;  // by bus: share of its time that a cycle's frames may take
+  std::string module_state;                           // at the end
+  std::vector<std::string> silent_joints;             // whose drive was silent for longer than is bridged, at any time
+  std::vector<std::string> error_joints;              // whose drive tells of an error at the end
+  std::uint64_t sent = 0, received = 0;               // frames
+};
+
 // Errors of the base's position in the true world, each world laid on it once, at the start.
 struct OdometryFigures {
   double rmse_base_m = kNotMeasured, rmse_lio_m = kNotMeasured, rmse_fused_m = kNotMeasured;
@@ -90,6 +100,7 @@ struct ClimbSummary {
   ClimbOptions options;
   std::string params_hash;  // of what the module was given
   CameraFigures camera;
+  std::optional<BusFigures> bus;
   int steps_total = 0;
   int steps_climbed = 0;  // both true soles rested on it or above, inside their treads' edges
   double climb_time_s = kNotMeasured;

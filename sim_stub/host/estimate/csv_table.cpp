@@ -155,7 +155,8 @@ double CsvTable::number(std::size_t row, std::size_t column, double limit) const
 }
 
 void CsvTable::fail(std::size_t row, const std::string& sentence) const {
-  throw config::FileError("\"" + path_ + "\" line " + std::to_string(lines_[row].number) + ": " + sentence + ".");
+  throw config::FileError("\"" + path_ + "\" line " + std::to_string(lines_[row].number) + ": " + sentence +
+                          (sentence.ends_with('?') ? "" : "."));
 }
 
 }  // namespace polygmap::sim

@@ -23,7 +23,7 @@ class CsvTable {
   [[nodiscard]] std::size_t column(std::string_view name) const;
   // Throws config::FileError when the cell is no finite number within +-limit.
   [[nodiscard]] double number(std::size_t row, std::size_t column, double limit) const;
-  // Throws config::FileError: "FILE line N: sentence."
+  // Throws config::FileError: "FILE line N: sentence.", or as a question where the sentence is one.
   [[noreturn]] void fail(std::size_t row, const std::string& sentence) const;
 
  private:

@@ -235,7 +235,10 @@ bool is_finite(const Replay& replay) {
 
 Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options) {
   const auto whole = std::make_unique<LogReplay>(log, lio, options);  // the estimator is too large for a stack
-  for (const LogRow& row : log.rows) whole->step(row);
+  for (const LogRow& row : log.rows) {
+    throw_if_interrupted(options.interrupt);
+    whole->step(row);
+  }
   return whole->take();
 }
 

@@ -9,6 +9,7 @@
 
 #include "algorithms/estimation/estimator.hpp"
 #include "sim_stub/host/estimate/estimate_log.hpp"
+#include "sim_stub/host/interrupted.hpp"
 
 namespace polygmap::sim {
 
@@ -23,6 +24,7 @@ struct ReplayOptions {
   RobotModel robot = log_robot();
   // One sigma, where no standstill at the start says what they are.
   double gyro_bias_sigma_radps = 0.01, accel_bias_sigma_mps2 = 0.2;
+  const std::atomic<int>* interrupt = nullptr;  // the signal that asks to stop, 0 until then
 };
 
 enum class StartSource : std::uint8_t { kTruth, kStandstill, kFirstAcceleration };
@@ -54,6 +56,7 @@ struct Replay {
 
 // False: the log's numbers, each possible by itself, broke the filter.
 [[nodiscard]] bool is_finite(const Replay& replay);
+// Throws Interrupted.
 [[nodiscard]] Replay replay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options);
 
 }  // namespace polygmap::sim

@@ -12,12 +12,18 @@ namespace polygmap::sim {
 namespace {
 
 constexpr double kGravityWindow_s = 2.0, kTruthWindow_s = 0.1;
+// Rates that the estimator was tried at on logs (tests, docs/measured/logs.md), with some room.
+constexpr double kLeastTried_hz = 95.0, kMostTried_hz = 1050.0;
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+bool is_gap(const LogRow& from, const LogRow& to) {
+  return to.stamp_ns - from.stamp_ns > static_cast<std::int64_t>(kGap_s * 1e9);
 }
 
 // By the gyro, from one row to the next.
@@ -33,7 +39,14 @@ double gravity_kept(const EstimateLog& log, double gyro_scale) {
   std::int64_t begin_ns = 0;
   for (std::size_t i = 0; i < log.rows.size(); ++i) {
     const LogRow& row = log.rows[i];
-    if (i > 0) R = R * turn_between(log.rows[i - 1], row, gyro_scale);
+    if (i > 0 && is_gap(log.rows[i - 1], row)) {  // how it turned meanwhile nobody knows
+      R.setIdentity();
+      turned.setZero();
+      plain.setZero();
+      begin_ns = row.stamp_ns;
+    } else if (i > 0) {
+      R = R * turn_between(log.rows[i - 1], row, gyro_scale);
+    }
     turned += R * row.accel_mps2;
     plain += row.accel_mps2;
     if (seconds(row.stamp_ns - begin_ns) < kGravityWindow_s) continue;
@@ -47,24 +60,34 @@ double gravity_kept(const EstimateLog& log, double gyro_scale) {
 }
 
 void hold_against_truth(const EstimateLog& log, double gyro_scale, LogFigures& figures) {
-  double squares = 0.0, error = 0.0, time_s = 0.0;
+  Vec3 squares = Vec3::Zero(), error = Vec3::Zero();  // of each axis
+  double time_s = 0.0;
   Mat3 R = Mat3::Identity();
   std::size_t begin = 0;
   for (std::size_t i = 1; i < log.rows.size(); ++i) {
+    if (is_gap(log.rows[i - 1], log.rows[i])) {
+      R.setIdentity();
+      begin = i;
+      continue;
+    }
     R = R * turn_between(log.rows[i - 1], log.rows[i], gyro_scale);
     const double window_s = seconds(log.rows[i].stamp_ns - log.rows[begin].stamp_ns);
     if (window_s < kTruthWindow_s) continue;
     const Vec3 felt_rad = so3_log(R);
     const Vec3 true_rad = so3_log(log.rows[begin].truth.true_T_base.R.transpose() * log.rows[i].truth.true_T_base.R);
-    squares += true_rad.squaredNorm();
-    error += (felt_rad - true_rad).squaredNorm();
+    squares += true_rad.cwiseAbs2();
+    error += (felt_rad - true_rad).cwiseAbs2();
     time_s += window_s;
     R.setIdentity();
     begin = i;
   }
-  if (!(squares > 0.0)) return;
-  figures.true_turn_radps = std::sqrt(squares * kTruthWindow_s / time_s) / kTruthWindow_s;
-  figures.gyro_error_share = error / squares;
+  if (!(squares.sum() > 0.0)) return;
+  figures.true_turn_radps = std::sqrt(squares.sum() * kTruthWindow_s / time_s) / kTruthWindow_s;
+  figures.gyro_error_share = error.sum() / squares.sum();
+  for (int axis = 0; axis < 3; ++axis) {
+    figures.true_axis_turn_radps[axis] = std::sqrt(squares[axis] * kTruthWindow_s / time_s) / kTruthWindow_s;
+    figures.gyro_axis_error_share[axis] = squares[axis] > 0.0 ? error[axis] / squares[axis] : 0.0;
+  }
 }
 
 struct Doubt {
@@ -134,6 +157,28 @@ Doubt doubt_of_gyro(const EstimateLog& log, const LogFigures& figures) {
       "or flipped?"};
 }
 
+// One axis alone: flipped, its error is four times what it turned. Noise adds less where it turns fast enough.
+Doubt doubt_of_gyro_axes(const LogFigures& figures) {
+  if (figures.true_turn_radps > 0.03 && figures.gyro_error_share > 0.8) return {};  // told of the whole gyro
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(figures.true_axis_turn_radps[axis] > 0.02 && figures.gyro_axis_error_share[axis] > 2.0)) continue;
+    return {
+        text("gyro_%c_radps contradicts the truth's quaternion, which turns about that axis otherwise: it is flipped "
+             "or swapped.",
+             "xyz"[axis])};
+  }
+  return {};
+}
+
+Doubt doubt_of_rate(const LogFigures& figures) {
+  const double rate_hz = 1.0 / std::max(figures.period_s, 1e-9);
+  if (rate_hz >= kLeastTried_hz && rate_hz <= kMostTried_hz) return {};
+  return {
+      text("The rows come at %.3g Hz: the estimator was tried on logs of 100 to 1000 Hz, and nothing is known of its "
+           "errors and sigmas elsewhere.",
+           rate_hz)};
+}
+
 Doubt doubt_of_truth(const LogFigures& figures, double duration_s) {
   const double most_mps2 = 0.35 + 0.5 / std::max(duration_s, 0.1);  // a bias, and what the base gained in speed
   if (!(figures.felt_lean_mps2 > most_mps2)) return {};
@@ -145,11 +190,25 @@ Doubt doubt_of_truth(const LogFigures& figures, double duration_s) {
 
 }  // namespace
 
+LogGaps gaps_of(const EstimateLog& log) {
+  LogGaps gaps;
+  for (std::size_t i = 1; i < log.rows.size(); ++i) {
+    if (!is_gap(log.rows[i - 1], log.rows[i])) continue;
+    ++gaps.count;
+    gaps.longest_s = std::max(gaps.longest_s, seconds(log.rows[i].stamp_ns - log.rows[i - 1].stamp_ns));
+  }
+  return gaps;
+}
+
 LogFigures figures_of(const EstimateLog& log, double gyro_scale) {
   LogFigures figures;
   Vec3 true_felt_mps2 = Vec3::Zero();
-  std::vector<double> accels_mps2, legs_m;
+  std::vector<double> accels_mps2, legs_m, periods_s;
   const double share = 1.0 / static_cast<double>(log.rows.size());
+  for (std::size_t i = 1; i < log.rows.size(); ++i) {
+    periods_s.push_back(seconds(log.rows[i].stamp_ns - log.rows[i - 1].stamp_ns));
+  }
+  figures.period_s = median(std::move(periods_s));
   for (const LogRow& row : log.rows) {
     accels_mps2.push_back(row.accel_mps2.norm());
     figures.base_up_felt += share * row.accel_mps2;
@@ -173,7 +232,8 @@ std::vector<std::string> doubts_about(const EstimateLog& log, const std::string&
   const LogFigures figures = figures_of(log);
   std::vector<std::string> doubts;
   for (const Doubt& doubt : {doubt_of_acceleration(figures), doubt_of_feet(figures), doubt_of_up(figures),
-                             doubt_of_gyro(log, figures), doubt_of_truth(figures, seconds(log.rows.back().stamp_ns))}) {
+                             doubt_of_gyro(log, figures), doubt_of_gyro_axes(figures), doubt_of_rate(figures),
+                             doubt_of_truth(figures, seconds(log.rows.back().stamp_ns))}) {
     if (doubt.impossible) throw config::FileError("\"" + path + "\": " + doubt.sentence);
     if (!doubt.sentence.empty()) doubts.push_back(doubt.sentence);
   }

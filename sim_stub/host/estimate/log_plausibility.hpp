@@ -15,12 +15,22 @@ struct LogFigures {
   Vec3 base_up_felt = Vec3::Zero();     // mean acceleration: points up where a robot stays upright
   Vec3 base_up_by_feet = Vec3::Zero();  // from the feet to the base, in the mean
   double leg_m = 0.0;                   // median distance of a foot
+  double period_s = 0.0;                // median time from row to row
   double gravity_kept = 1.0;            // share of gravity that the gyro's turns leave, at worst
   // Against the truth, 0 without it.
-  double true_turn_radps = 0.0;   // RMS
-  double gyro_error_share = 0.0;  // of the turns, squared
-  double felt_lean_mps2 = 0.0;    // of the mean acceleration, out of the vertical
+  double true_turn_radps = 0.0;                                                    // RMS
+  double gyro_error_share = 0.0;                                                   // of the turns, squared
+  Vec3 true_axis_turn_radps = Vec3::Zero(), gyro_axis_error_share = Vec3::Zero();  // the same of each axis
+  double felt_lean_mps2 = 0.0;  // of the mean acceleration, out of the vertical
 };
+// Longer times between rows are bridged, and nothing is concluded from one side of them to the other.
+inline constexpr double kGap_s = 0.05;
+struct LogGaps {
+  std::size_t count = 0;
+  double longest_s = 0.0;
+};
+[[nodiscard]] LogGaps gaps_of(const EstimateLog& log);
+
 // gyro_scale: as if the gyro had said so much.
 [[nodiscard]] LogFigures figures_of(const EstimateLog& log, double gyro_scale = 1.0);
 

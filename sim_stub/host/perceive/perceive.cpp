@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -169,21 +170,27 @@ DepthPng read_depth(const std::string& path) {
 }
 
 Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture, const std::optional<Vec3>& gravity,
-                   int repeat, const polygmap_frames::Values& values) {
+                   int repeat, const polygmap_frames::Values& values, const std::atomic<int>* interrupt) {
+  const Vec3 along_the_picture{0.0, -1.0, 0.0};
   Extraction extraction(camera, picture, values);
   Perceived out;
   if (gravity) {
     out.camera_up = -gravity->normalized();
     out.up_source = UpSource::kGiven;
+    Extraction other(camera, picture, values);  // what is found from --gravity must not depend on this look
+    static_cast<void>(other.run(along_the_picture));
+    out.found_up = find_up(other.surfaces());
   } else {
-    const Vec3 along_the_picture{0.0, -1.0, 0.0};
     static_cast<void>(extraction.run(along_the_picture));
-    const std::optional<Vec3> found = find_up(extraction.surfaces());
-    out.up_source = found ? UpSource::kFound : UpSource::kAssumed;
-    out.camera_up = found.value_or(along_the_picture);
+    out.found_up = find_up(extraction.surfaces());
+    out.up_source = out.found_up ? UpSource::kFound : UpSource::kAssumed;
+    out.camera_up = out.found_up.value_or(along_the_picture);
   }
   extraction.settle_noise(out.camera_up);
-  for (int i = 0; i < std::max(repeat, 1); ++i) out.microseconds.push_back(extraction.run(out.camera_up));
+  for (int i = 0; i < std::max(repeat, 1); ++i) {
+    throw_if_interrupted(interrupt);
+    out.microseconds.push_back(extraction.run(out.camera_up));
+  }
 
   std::map<std::uint8_t, std::size_t> index_of_plane;
   std::vector<std::uint8_t> label_of_surface{0};
@@ -221,17 +228,32 @@ const char* name_of(UpSource source) {
 std::string doubt_of_gravity(const Perceived& perceived) {
   constexpr double kLevel = 0.97;  // cosine of 14 degrees
   if (perceived.up_source != UpSource::kGiven) return {};
-  double upright_m2 = 0.0, upside_down_m2 = 0.0, all_m2 = 0.0;
+  double upright_m2 = 0.0, upside_down_m2 = 0.0, all_m2 = 0.0, level_looking_m2 = 0.0;
   for (const PerceivedPlane& pieces : perceived.planes) {
     for (const Surface& s : pieces) {
       const double cosine = s.normal.dot(perceived.camera_up);
       all_m2 += s.area_m2;
       if (cosine > kLevel) upright_m2 += s.area_m2;
       if (cosine < -kLevel) upside_down_m2 += s.area_m2;
+      if (perceived.found_up && s.normal.dot(*perceived.found_up) > kLevel) level_looking_m2 += s.area_m2;
     }
   }
-  if (upright_m2 > 0.05 * upside_down_m2 || upside_down_m2 < std::max(kMinLevelArea_m2, 0.1 * all_m2)) return {};
-  return "By --gravity every level surface in view is a ceiling: does it point down, x right, y down, z forward?";
+  if (upright_m2 <= 0.05 * upside_down_m2 && upside_down_m2 >= std::max(kMinLevelArea_m2, 0.1 * all_m2)) {
+    return "By --gravity every level surface in view is a ceiling: does it point down, x right, y down, z forward?";
+  }
+  if (!perceived.found_up) return {};
+  const Vec3 &given = perceived.camera_up, &found = *perceived.found_up;
+  const double cosine = given.dot(found);
+  if (cosine > kLevel || upright_m2 >= level_looking_m2) return {};
+  const auto tidy = [](double x) { return std::round(100.0 * x) / 100.0 + 0.0; };  // no -0.00
+  char line[256];
+  std::snprintf(
+      line, sizeof line,
+      "By --gravity up is (%.2f, %.2f, %.2f), but the largest level-looking plane says (%.2f, %.2f, %.2f), %.0f "
+      "degrees apart: does it point down in the camera frame, x right, y down, z forward?",
+      tidy(given.x()), tidy(given.y()), tidy(given.z()), tidy(found.x()), tidy(found.y()), tidy(found.z()),
+      std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / kPi);
+  return line;
 }
 
 void write_labels(const std::string& path, const DepthPng& picture, const Perceived& perceived) {
@@ -312,6 +334,10 @@ void write_picture(const std::string& path, const config::CameraProfile& camera,
       for (std::size_t i = 0; i < s.polygon_m.size(); ++i) {
         draw(s.polygon_m[i], s.polygon_m[(i + 1) % s.polygon_m.size()], {255, 255, 255});
       }
+    }
+  }
+  for (const PerceivedPlane& pieces : perceived.planes) {  // above all edges: a nosing lies on those of two surfaces
+    for (const Surface& s : pieces) {
       if (s.nosing_m) draw((*s.nosing_m)[0], (*s.nosing_m)[1], {255, 40, 40});
     }
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "firmware/config/camera_file.hpp"
+#include "sim_stub/host/interrupted.hpp"
 #include "sim_stub/host/perceive/frame_extraction.hpp"
 
 namespace polygmap::sim {
@@ -39,16 +40,18 @@ struct Perceived {
   std::vector<std::uint8_t> labels;    // per pixel, 0 = none
   Vec3 camera_up = Vec3::Zero();
   UpSource up_source = UpSource::kAssumed;
+  std::optional<Vec3> found_up;      // by the largest plane that looks level, whether up was given or not
   std::vector<double> microseconds;  // one per repetition
 };
 
-// gravity: down, camera frame; without it, the largest plane that looks level says where up is.
+// gravity: down, camera frame; without it, the largest plane that looks level says where up is. Throws Interrupted.
 [[nodiscard]] Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture,
                                  const std::optional<Vec3>& gravity, int repeat,
-                                 const polygmap_frames::Values& values = {});
+                                 const polygmap_frames::Values& values = {},
+                                 const std::atomic<int>* interrupt = nullptr);
 
-// One sentence where the picture says that the direction given is upside down: what is level in it faces downwards, and
-// nothing level faces upwards. Else empty.
+// One sentence where the picture contradicts the direction given: what is level by it faces downwards, and nothing
+// level faces upwards; or the largest plane that looks level is none by it, and less is. Else empty.
 [[nodiscard]] std::string doubt_of_gravity(const Perceived& perceived);
 
 // Throw config::FileError when the file cannot be written.

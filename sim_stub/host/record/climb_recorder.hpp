@@ -26,7 +26,8 @@ class ClimbRecorder final : public hal::DepthCamera, public hal::Imu, public hal
   void release() noexcept override { camera_.release(); }
   [[nodiscard]] bool try_read(ImuSample& sample) noexcept override;
   [[nodiscard]] bool try_read(JointFeedback& feedback) noexcept override;
-  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override { return joints_.try_write(command); }
+  [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override { return joints_.try_write(command); }
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override { return joints_.status(); }
   [[nodiscard]] bool try_read(LioSample& sample) noexcept override;
 
   // After each tick: one row of the log. The contacts are the module's own.

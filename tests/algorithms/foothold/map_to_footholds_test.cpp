@@ -7,6 +7,7 @@
 
 #include "algorithms/foothold/foothold_search.hpp"
 #include "algorithms/perception/map/polygon_map.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/seen_stairs.hpp"
 

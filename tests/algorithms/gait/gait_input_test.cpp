@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readings and estimates that are none, and the reference that the drives get.
+// Readings and estimates that are none.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -73,48 +73,5 @@ TEST(GaitInput, NanInEstimatesAndFootholds_NeverReachesACommand) {
   EXPECT_TRUE(math::all_finite(climb.true_T_base().p_m));
   test::expect_sound_commands(climb);
 }
-
-class JointReferenceTest : public testing::Test {
- protected:
-  JointReferenceTest() {
-    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-      base_T_sole_[index_of(leg)] = {Mat3::Identity(), Vec3{0, side_sign(leg) * kStanceHalfWidth_m, -0.75}};
-      q_rad_.segment<6>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
-          solve_leg({}, leg, base_T_sole_[index_of(leg)]).q_rad;
-    }
-    EXPECT_TRUE(reference_.try_arm(nominal_robot(), {}, q_rad_));
-  }
-  JointReference reference_;
-  JointVector q_rad_;
-  std::array<Transform, kFootCount> base_T_sole_;
-  JointCommand command_;
-};
-
-TEST_F(JointReferenceTest, PoseReached_IsNotLimited) {
-  EXPECT_FALSE(reference_.follow(base_T_sole_, {true, true}, command_));
-  for (std::size_t n = 0; n < kJointCount; ++n) {
-    EXPECT_NEAR(command_.joints[n].q_rad, q_rad_[static_cast<Eigen::Index>(n)], 1e-9);
-  }
-}
-
-TEST_F(JointReferenceTest, PoseNotFinite_LegStaysWhereItIs) {
-  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-    for (int axis = 0; axis < 3; ++axis) {
-      auto soles = base_T_sole_;
-      soles[0].p_m[axis] = bad;
-      for (int i = 0; i < 100; ++i) EXPECT_TRUE(reference_.follow(soles, {true, true}, command_));
-      for (std::size_t n = 0; n < kJointCount; ++n) {
-        EXPECT_NEAR(command_.joints[n].q_rad, q_rad_[static_cast<Eigen::Index>(n)], 1e-9) << n;
-        EXPECT_NEAR(command_.joints[n].dq_radps, 0.0, 1e-9) << n;
-      }
-    }
-  }
-}
-
-TEST_F(JointReferenceTest, PoseOutOfReach_IsLimited) {
-  base_T_sole_[1].p_m.z() = -1.2;
-  EXPECT_TRUE(reference_.follow(base_T_sole_, {true, true}, command_));
-}
-
 }  // namespace
 }  // namespace polygmap

@@ -47,22 +47,5 @@ TEST(GaitReset, AfterAClimb_RepeatsItExactly) {
     EXPECT_EQ(first.record().steps[i].odom_T_executed.p_m, second.record().steps[i].odom_T_executed.p_m);
   }
 }
-
-TEST(TorsoTrajectory, EveryDuration_HeightHasNoLeapBetweenTwoTicks) {
-  for (std::int32_t ticks = 1; ticks <= 1000; ++ticks) {
-    const auto from = TorsoTrajectory::at_rest({Mat3::Identity(), Vec3{0, 0, 0.70}});
-    TorsoTrajectory torso;
-    torso.plan(from, 0.83, 0.0, ticks, ticks);
-    const double most_mps2 = 5.78 * 0.13 / math::square(ticks * kTick_s);  // of a quintic between two rests
-    for (std::int32_t tick = 0; tick <= ticks; ++tick) {
-      const Motion z = torso.at(tick, {})[2];
-      ASSERT_LE(std::abs(z.acceleration), most_mps2) << tick << " of " << ticks;
-      ASSERT_GE(z.position, 0.70 - 1e-12);
-      ASSERT_LE(z.position, 0.83 + 1e-12);
-    }
-    EXPECT_NEAR(torso.at(ticks, {})[2].position, 0.83, 1e-12);
-  }
-}
-
 }  // namespace
 }  // namespace polygmap

@@ -129,7 +129,7 @@ TEST(GaitStop, TrailingStepBeyondTheLegs_BlamesNoRise) {
 
 TEST(GaitStop, FloorStepBeyondTheDrives_BlamesNoRise) {
   Gait::Params params;
-  params.step.floor_swing_ticks = 20;
+  params.step.durations.floor_swing_ticks = 20;
   IdealClimb climb({}, params);
   climb.run(20.0);
   EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);

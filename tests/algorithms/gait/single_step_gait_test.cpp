@@ -82,7 +82,7 @@ TEST(SingleStepGait, BetweenPassingSteps_WeightGoesStraightOn) {
   ASSERT_EQ(steps.size(), 5U);
   for (std::size_t i = 1; i < steps.size(); ++i) {
     const double stood_s = seconds(steps[i].latch_stamp_ns - steps[i - 1].touch_down_stamp_ns);
-    EXPECT_NEAR(stood_s, StepParams{}.stair_shift_ticks * kTick_s, 0.01) << i;
+    EXPECT_NEAR(stood_s, StepParams{}.durations.stair_shift_ticks * kTick_s, 0.01) << i;
   }
 }
 
@@ -161,7 +161,7 @@ TEST(SingleStepGait, NextTreadSeenDuringTheShift_PassesAllTheSame) {
 
 TEST(SingleStepGait, PassingStepBeyondTheDrives_ClimbsWithBothFeetOnEveryTread) {
   Gait::Params params = single_step();
-  params.step.passing_swing_ticks = 250;
+  params.step.durations.passing_swing_ticks = 250;
   IdealClimb climb({}, params);
   climb.run(60.0);
   EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);

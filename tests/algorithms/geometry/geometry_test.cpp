@@ -4,7 +4,6 @@
 #include <cmath>
 #include <random>
 
-#include "algorithms/core/math/sin_cos.hpp"
 #include "algorithms/core/math/transform.hpp"
 #include "algorithms/geometry/convex.hpp"
 #include "algorithms/geometry/oriented_rectangle.hpp"
@@ -58,32 +57,6 @@ std::size_t brute_force_hull_size(const ConvexPolygon& points) {
     }
   }
   return edges;
-}
-
-TEST(SinCos, WholeRange_IsTheLibrarysToTheLastBitButOne) {
-  std::mt19937_64 random(3);
-  for (const double range_rad : {0.8, 3.2, 50.0, 9.9e4}) {
-    std::uniform_real_distribution<> angle(-range_rad, range_rad);
-    for (int i = 0; i < 20000; ++i) {
-      const double x = angle(random);
-      const math::SinCos both = math::sin_cos(x);
-      EXPECT_NEAR(both.sin, std::sin(x), 1.2e-16) << x;
-      EXPECT_NEAR(both.cos, std::cos(x), 1.2e-16) << x;
-    }
-  }
-}
-TEST(SinCos, QuarterTurns_AreExactAndSmallAnglesKeepTheirDigits) {
-  for (int i = -9; i <= 9; ++i) {
-    const math::SinCos both = math::sin_cos(i * 0.5 * kPi);
-    EXPECT_DOUBLE_EQ(both.sin, std::sin(i * 0.5 * kPi));
-    EXPECT_DOUBLE_EQ(both.cos, std::cos(i * 0.5 * kPi));
-  }
-  EXPECT_EQ(math::sin_cos(0.0).cos, 1.0);
-  EXPECT_EQ(math::sin_cos(1e-200).sin, 1e-200);
-}
-TEST(SinCos, NoNumberOrHuge_LibraryAnswers) {
-  EXPECT_TRUE(std::isnan(math::sin_cos(NAN).sin) && std::isnan(math::sin_cos(INFINITY).cos));
-  EXPECT_EQ(math::sin_cos(1e6).sin, std::sin(1e6));
 }
 
 TEST(RotationZyx, RandomAngles_IsTheProductOfThree) {

@@ -12,9 +12,9 @@ namespace polygmap {
 namespace {
 
 // A wall 1 m ahead in the upper half of the picture, nothing measured in the lower one.
-class SegmenterOfAWall : public testing::Test {
+class SegmenterTest : public testing::Test {
  protected:
-  SegmenterOfAWall() {
+  SegmenterTest() {
     raw_.intrinsics = {640, 480, 400.0, 400.0, 320.0, 240.0, 0.001};
     raw_.range.set({}, raw_.intrinsics.depth_unit_m);
     raw_.depth = depth_.data();
@@ -35,7 +35,7 @@ class SegmenterOfAWall : public testing::Test {
   std::unique_ptr<Segmenter> segmenter_ = std::make_unique<Segmenter>();
 };
 
-TEST_F(SegmenterOfAWall, EveryColumn_HasOneSegmentAsFarAsTheWallReaches) {
+TEST_F(SegmenterTest, EveryColumn_HasOneSegmentAsFarAsTheWallReaches) {
   run(*segmenter_, 1 << 20);
   EXPECT_FALSE(segmenter_->blank());
   EXPECT_NEAR(segmenter_->invalid_fraction(), 0.5, 1e-12);
@@ -49,7 +49,7 @@ TEST_F(SegmenterOfAWall, EveryColumn_HasOneSegmentAsFarAsTheWallReaches) {
   }
 }
 
-TEST_F(SegmenterOfAWall, AnySlicing_GivesTheSameSegments) {
+TEST_F(SegmenterTest, AnySlicing_GivesTheSameSegments) {
   const auto sliced = std::make_unique<Segmenter>();
   EXPECT_EQ(run(*segmenter_, 1 << 20), 1);
   EXPECT_EQ(run(*sliced, 1), 6 + 480) << "shapes of the body, then rows";
@@ -60,7 +60,7 @@ TEST_F(SegmenterOfAWall, AnySlicing_GivesTheSameSegments) {
   }
 }
 
-TEST_F(SegmenterOfAWall, NothingMeasured_IsBlankAndWhollyInvalid) {
+TEST_F(SegmenterTest, NothingMeasured_IsBlankAndWhollyInvalid) {
   depth_.assign(depth_.size(), 0);
   run(*segmenter_, 1 << 20);
   EXPECT_TRUE(segmenter_->blank());

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "algorithms/robot/leg_kinematics.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/depth_scene.hpp"
 #include "tests/support/nominal_robot.hpp"
 
@@ -298,7 +299,7 @@ TEST(SurfaceExtractor, OverhangingNosings_AreNoLeaningPlanes) {
     return count;
   };
   int without = 0;
-  for (const double nosing_m : {0.02, 0.03}) {
+  for (const double nosing_m : {0.02, 0.03, 0.04}) {
     for (const bool correlated : {false, true}) {
       SCOPED_TRACE(testing::Message() << nosing_m << " correlated " << correlated);
       EXPECT_EQ(leaning(true, nosing_m, correlated), 0);
@@ -470,7 +471,7 @@ TEST(SurfaceExtractor, NearPlatforms_ApartByMoreThanTheNoise_AreTwoPlanes) {
   EXPECT_EQ(planes_of_platforms(0.08, 0.16, 0.161), 2U);
 }
 
-// A platform on the floor, in which of every ten rows these lie 50 mm nearer. Runs pass over two such rows.
+// A platform on the floor, in which of every ten rows these lie 50 mm nearer. Segments pass over two such rows.
 bool finds_striped_platform(const std::set<int>& stripes) {
   DepthScene scene = stair_scene({.steps = 0});
   const DepthPicture floor = test::render(scene);

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "algorithms/robot/robot_model.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/reference/paper_route/back_projection.hpp"
 
 namespace polygmap {

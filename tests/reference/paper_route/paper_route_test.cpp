@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "algorithms/robot/robot_model.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/depth_scene.hpp"
 
 namespace polygmap {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "sim_stub/robot_camera.hpp"
 #include "sim_stub/sim_robot.hpp"
 #include "tests/support/nominal_robot.hpp"
 
@@ -510,7 +511,7 @@ std::uint64_t fingerprint(SimOptions options, bool threaded) {
       add(joints.foot_force_n.data(), sizeof(double) * kFootCount);
     }
     for (std::size_t j = 0; j < kJointCount; ++j) command.joints[j].q_rad = joints.q_rad[static_cast<Eigen::Index>(j)];
-    EXPECT_TRUE(robot.try_write(command));
+    EXPECT_TRUE(robot.try_write(command).is_all());
     LioSample lio;
     while (robot.try_read(lio)) add(lio.lio_T_lidar.p_m.data(), sizeof(double) * 3);
     DepthFrameView frame;

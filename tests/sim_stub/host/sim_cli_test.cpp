@@ -238,6 +238,14 @@ TEST(ClimbCommand, BadWord_IsRefused) {
   expect_refused({}, "subcommand");
 }
 
+TEST(ClimbCommand, BalustersOfNoUse_AreRefused) {
+  for (const auto& [option, value] :
+       {std::pair{"--baluster-side", "left"}, {"--baluster-inset", "0.02"}, {"--baluster-size", "0.04"}}) {
+    expect_refused({"climb", option, value}, std::string(option) + " is of no use without --balusters.");
+    EXPECT_TRUE(call({"climb", option, value, "--balusters", "0.2"}).options) << option;
+  }
+}
+
 TEST(ClimbCommand, UnwritableOut_IsRefused) {
   const std::string file = temporary("a_file");
   std::ofstream(file) << "x";
@@ -305,6 +313,22 @@ TEST(ClimbCommand, Help_ExplainsExitCodesAndOptions) {
   for (const char* part : {"--rise", "0.13", "causality", "--render-shift"}) {
     EXPECT_NE(climb.out.find(part), std::string::npos) << part << "\n" << climb.out;
   }
+}
+
+TEST(Cli, Record_IsMadeAndHandedOn) {
+  const Call c = call({"climb", "--record", temporary("record/inner")});
+  ASSERT_TRUE(c.options);
+  EXPECT_EQ(c.options->record_dir, temporary("record/inner"));
+  EXPECT_TRUE(std::filesystem::is_directory(c.options->record_dir));
+  expect_refused({"climb", "--record", "/dev/null/none"}, "given by --record");
+}
+
+TEST(Cli, ReplayOfNoRecording_IsOneSentenceWithFileAndByte) {
+  std::ostringstream out, err;
+  EXPECT_EQ(polygmap_main({"replay", "/there/is/none"}, {}, out, err, false), kExitUsage);
+  EXPECT_EQ(err.str().find("polygmap: \"/there/is/none/recording.bin\", byte 0: cannot be read: "), 0U) << err.str();
+  EXPECT_EQ(std::count(err.str().begin(), err.str().end(), '\n'), 1);
+  EXPECT_TRUE(out.str().empty());
 }
 
 }  // namespace

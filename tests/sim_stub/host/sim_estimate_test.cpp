@@ -2,9 +2,13 @@
 // `polygmap estimate`: what it makes of logs, and what it says about files that are none.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <atomic>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <random>
@@ -15,6 +19,7 @@
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/cli/params_command.hpp"
 #include "sim_stub/host/estimate/estimate_report.hpp"
+#include "sim_stub/host/estimate/log_contradiction.hpp"
 #include "sim_stub/host/estimate/log_plausibility.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
@@ -432,6 +437,93 @@ TEST_F(LogDoubts, OddNumbersThatMayBeRight_AreTold) {
   expect(said([](LogRow& row) { row.accel_mps2.x() += 2.0; }), "leans out of the vertical", false);
 }
 
+TEST_F(LogDoubts, OneAxisOfTheGyroFlipped_ContradictsTheTruth) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name = std::string("gyro_") + "xyz"[axis];
+    const std::string doubt = said([axis](LogRow& row) { row.gyro_radps[axis] *= -1.0; });
+    EXPECT_TRUE(doubt.find(name) != std::string::npos || doubt.find("gyro turns otherwise") != std::string::npos)
+        << name << ": " << doubt;
+  }
+}
+
+TEST_F(LogDoubts, NothingIsComparedAcrossAGap) {
+  EstimateLog gapped = log_;
+  for (LogRow& row : gapped.rows) {  // as if it had turned round while nothing was recorded
+    if (row.stamp_ns < 3 * kNsPerS) continue;
+    row.stamp_ns += 2 * kNsPerS;
+    row.truth.true_T_base.R = rotation_z(2.5) * row.truth.true_T_base.R;
+  }
+  EXPECT_TRUE(doubts_about(gapped, "log.csv").empty()) << doubts_about(gapped, "log.csv").front();
+  const LogGaps gaps = gaps_of(gapped);
+  EXPECT_EQ(gaps.count, 1U);
+  EXPECT_NEAR(gaps.longest_s, 2.002, 1e-9);
+  EXPECT_EQ(gaps_of(log_).count, 0U);
+}
+
+TEST_F(LogDoubts, RateThatWasNotTried_IsTold) {
+  EstimateLog slow = log_;
+  slow.rows.clear();
+  for (std::size_t i = 0; i < log_.rows.size(); i += 15) slow.rows.push_back(log_.rows[i]);  // 33 Hz
+  std::string all;
+  for (const std::string& doubt : doubts_about(slow, "log.csv")) all += doubt;
+  EXPECT_NE(all.find("at 33.3 Hz: the estimator was tried on logs of 100 to 1000 Hz"), std::string::npos) << all;
+}
+
+// What is no truth's to say: a standing foot that moves.
+class Contradictions : public LogDoubts {
+ protected:
+  template <typename Change>
+  std::string contradiction(const Change& change) const {
+    EstimateLog changed = log_;
+    changed.has_truth = false;
+    for (LogRow& row : changed.rows) change(row);
+    return doubt_about_contacts(changed, replay(changed, {}, {}), {});
+  }
+};
+
+TEST_F(Contradictions, SignalsThatAgree_GetNoSentence) {
+  EXPECT_EQ(contradiction([](LogRow&) {}), "");
+}
+
+TEST_F(Contradictions, FlippedAxesAndWrongFeet_AreNamed) {
+  const auto expect_named = [](const std::string& said, const std::string& wanted) {
+    EXPECT_NE(said.find("they contradict each other"), std::string::npos) << wanted;
+    EXPECT_NE(said.find(wanted), std::string::npos) << said;
+  };
+  expect_named(contradiction([](LogRow& row) { row.gyro_radps.y() *= -1.0; }), "gyro_y_radps negated");
+  expect_named(contradiction([](LogRow& row) { row.accel_mps2.x() *= -1.0; }), "accel_x_mps2 negated");
+  expect_named(contradiction([](LogRow& row) { row.gyro_radps *= -1.0; }), "gyro_");
+  expect_named(contradiction([](LogRow& row) { std::swap(row.base_p_foot_m[0], row.base_p_foot_m[1]); }), "exchanged");
+  expect_named(contradiction([](LogRow& row) {
+                 for (double& contact : row.contact) contact = 1.0 - contact;
+               }),
+               "contacts");
+}
+
+TEST(LioDoubt, PosesInMillimetresOrOfAnotherOrder_AreRefusedAndTold_AndMoveNoSigma) {
+  WalkSpec spec;
+  spec.steps = 3;
+  const EstimateLog log = climb_log(spec);
+  const std::vector<LioRow> good = lio_of(log, 4);
+  const Replay without = replay(log, {}, {}), with = replay(log, good, {});
+  EXPECT_EQ(doubt_about_lio("lio.csv", good.size(), with), "");
+  const auto in_millimetres = [](LioRow& row) { row.pose.p_m *= 1000.0; };
+  const auto in_another_order = [](LioRow& row) {
+    const Eigen::Quaterniond q(row.pose.R);
+    row.pose.R = Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()).toRotationMatrix();
+  };
+  for (const auto& spoil : {std::function<void(LioRow&)>(in_millimetres), {in_another_order}}) {
+    std::vector<LioRow> bad = good;
+    for (LioRow& row : bad) spoil(row);
+    const Replay result = replay(log, bad, {});
+    EXPECT_LE(result.lio[static_cast<std::size_t>(LioVerdict::kAccepted)], 1U);
+    EXPECT_LE(result.lio[static_cast<std::size_t>(LioVerdict::kRealigned)], 1U);
+    EXPECT_NE(doubt_about_lio("lio.csv", bad.size(), result).find("w, x, y, z"), std::string::npos);
+    EXPECT_EQ(score(log, result).nees_in_bounds, score(log, without).nees_in_bounds);
+    EXPECT_EQ(result.ticks.back().quality.covariance, without.ticks.back().quality.covariance);
+  }
+}
+
 TEST(EstimateLogs, RecordedOnRobots_AreInTheRightUnitsAndAxes) {
   const char* given = std::getenv("POLYGMAP_SHARED_DATA");
   const std::string folder = given != nullptr ? given : POLYGMAP_SHARED_DATA_DEFAULT;
@@ -439,7 +531,9 @@ TEST(EstimateLogs, RecordedOnRobots_AreInTheRightUnitsAndAxes) {
   for (const std::string name : {"/cassie/cassie_walk_open.csv", "/icub/walk.csv", "/icub/gazebo_0_35.csv"}) {
     if (!std::filesystem::exists(folder + name)) continue;
     ++read;
-    EXPECT_TRUE(doubts_about(read_estimate_log(folder + name), name).empty()) << name;
+    const EstimateLog log = read_estimate_log(folder + name);
+    EXPECT_TRUE(doubts_about(log, name).empty()) << name;
+    EXPECT_EQ(doubt_about_contacts(log, replay(log, {}, {}), {}), "") << name;
   }
   if (read == 0) GTEST_SKIP() << "No logs in " << folder << ": set POLYGMAP_SHARED_DATA.";
 }
@@ -532,6 +626,33 @@ TEST_F(EstimateCommand, ParamsOfAllDefaults_AreTakenWithAWarning) {
   EXPECT_EQ(err_, "");
 }
 
+TEST_F(EstimateCommand, GapsAreCountedAndTheLongestIsTold) {
+  std::string text = log_text(300);
+  for (int i = 0; i < 300; ++i) text += std::to_string(102.6 + 0.002 * i) + kRow + "\n";
+  ASSERT_EQ(call({"estimate", write("gap.csv", text)}), kExitPass) << err_;
+  EXPECT_EQ(err_, "");
+  EXPECT_NE(out_.find("1 gap of more than 50 ms without rows, the longest 2.002 s"), std::string::npos) << out_;
+}
+
+TEST_F(EstimateCommand, TenRowsASecond_AreRefusedWithTheRatesThatWereTried) {
+  std::string text = std::string(kHeader) + "\n";
+  for (int i = 0; i < 50; ++i) text += std::to_string(100.0 + 0.1 * i) + kRow + "\n";
+  expect_refused({"estimate", write("slow.csv", text)}, "tried on 100 to 1000 Hz");
+}
+
+TEST_F(EstimateCommand, Interrupted_WritesNothingAndSaysSo) {
+  write("out.json", "old");
+  const std::atomic<int> signal{SIGINT};
+  std::ostringstream out, err;
+  const std::string log = write("log.csv", log_text(500));
+  EXPECT_EQ(
+      polygmap_main({"estimate", log, "--json", at("out.json"), "--csv", at("out.csv")}, {}, out, err, false, &signal),
+      kExitSignal + SIGINT);
+  EXPECT_EQ(err.str(), "polygmap: interrupted: nothing is written.\n");
+  EXPECT_FALSE(std::filesystem::exists(at("out.json")));
+  EXPECT_FALSE(std::filesystem::exists(at("out.csv")));
+}
+
 TEST_F(EstimateCommand, LogThatIsRefused_LeavesNoFormerOutput) {
   write("out.json", "{}");
   write("out.csv", "old");
@@ -548,6 +669,7 @@ TEST_F(EstimateCommand, StampsInMilliseconds_OrFeetInMillimetres_AreNamed) {
   expect_refused({"estimate", write("ms.csv", stamps)}, "are the stamps in seconds?");
   for (std::size_t at = 0; (at = feet.find("-0.8", at)) != std::string::npos; at += 4) feet.replace(at, 4, "-800");
   expect_refused({"estimate", write("mm.csv", feet)}, "left_foot_z_m is -800, beyond what can be true (20)");
+  EXPECT_TRUE(err_.ends_with("named after?\n")) << err_;
 }
 
 TEST_F(EstimateCommand, BlankLinesAtTheEnd_AreNoRows) {

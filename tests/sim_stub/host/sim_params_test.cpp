@@ -84,6 +84,18 @@ TEST(ParamsCommand, BadFile_IsOneSentenceAndExit2) {
   }
 }
 
+TEST(ParamsCommand, WordThatIsNoCommandOfIt_IsNamedWithThoseThereAre) {
+  EXPECT_EQ(call_tool({"params", "lst"}).err,
+            "polygmap: \"lst\" is no command of params; there are list, docs and diff; see polygmap params --help.\n");
+  EXPECT_EQ(call_tool({"params", "list", "lst"}).err,
+            "polygmap: \"lst\" is a word too many; see polygmap params --help.\n");
+}
+
+TEST(ParamsCommand, CameraFileForOne_IsCalledThat) {
+  const std::string file = write("width = 640\nheight = 480\nfx = 366.7\nfy = 366.7\n");
+  EXPECT_NE(call_tool({"climb", "--params", file}).err.find("looks like a camera file"), std::string::npos);
+}
+
 TEST(ParamsCommand, Docs_NameEveryParameterWithItsRange) {
   const std::string out = call_tool({"params", "docs"}).out;
   Params params;

@@ -3,15 +3,20 @@
 #include <gtest/gtest.h>
 #include <lodepng.h>
 
+#include <atomic>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
 #include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/robot_model.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/perceive/perceive.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/depth_scene.hpp"
 
 namespace polygmap::sim {
@@ -122,6 +127,91 @@ TEST_F(PerceiveCommand, GravityUpsideDown_GetsOneSentence_AndTheRightOneNone) {
     EXPECT_EQ(json["warnings"].size(), wrong ? 1U : 0U);
     EXPECT_EQ(json["up_source"], "given");
   }
+}
+
+TEST_F(PerceiveCommand, GravityOfAnotherFrame_IsToldWithBothDirections) {
+  test::DepthPicture picture = test::render(scene_);
+  test::add_noise(picture, {}, 3);
+  write_depth("stairs.png", picture.raw(), 640, 480);
+  for (const std::string z : {"-9.81", "1"}) {
+    ASSERT_EQ(call({"perceive", "--gravity", "0", "0", z, at("stairs.png"), "--camera", at("camera.toml"), "--json",
+                    at("out.json")}),
+              kExitPass);
+    EXPECT_NE(err_.find("By --gravity up is (0.00, 0.00, "), std::string::npos) << z << err_;
+    EXPECT_NE(err_.find("largest level-looking plane says (0.0"), std::string::npos) << z << err_;
+    EXPECT_EQ(std::count(err_.begin(), err_.end(), '\n'), 1) << err_;
+    EXPECT_EQ(nlohmann::json::parse(std::ifstream(at("out.json")))["warnings"].size(), 1U);
+  }
+}
+
+// Over all edges, whose white lies on the same pixels.
+TEST_F(PerceiveCommand, Picture_EveryNosingIsRedFromEndToEnd) {
+  write_depth("stairs.png", test::render(scene_).raw(), 640, 480);
+  ASSERT_EQ(call({"perceive", at("stairs.png"), "--camera", at("camera.toml"), "--json", at("out.json"), "--picture",
+                  at("pic.png")}),
+            kExitPass);
+  std::vector<unsigned char> rgb;
+  unsigned width = 0, height = 0;
+  ASSERT_EQ(lodepng::decode(rgb, width, height, at("pic.png"), LCT_RGB, 8), 0U);
+  int seen = 0, red = 0;
+  for (const auto& plane : nlohmann::json::parse(std::ifstream(at("out.json")))["planes"]) {
+    if (plane["nosing"].is_null()) continue;
+    const auto end = [&](int i) {
+      const auto& p = plane["nosing"][static_cast<std::size_t>(i)];
+      return Vec3{p[0].get<double>(), p[1].get<double>(), p[2].get<double>()};
+    };
+    for (int i = 0; i <= 100; ++i) {
+      const Vec3 p = end(0) + (end(1) - end(0)) * (i / 100.0);
+      const auto u = std::lround(p.x() / p.z() * 366.7 + 322.7), v = std::lround(p.y() / p.z() * 366.7 + 242.3);
+      if (u < 0 || v < 0 || u >= 640 || v >= 480) continue;
+      ++seen;
+      const unsigned char* pixel = &rgb[3 * static_cast<std::size_t>(v * 640 + u)];
+      red += pixel[0] == 255 && pixel[1] == 40 && pixel[2] == 40 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(seen, 150);
+  EXPECT_GE(red, seen * 95 / 100) << "of " << seen;
+}
+
+TEST_F(PerceiveCommand, Interrupted_LeavesNoFileOfThePicturesNotDone) {
+  write_depth("a.png", std::vector<std::uint16_t>(640 * 480, 1000), 640, 480);
+  write("out.json", "old");
+  const std::atomic<int> signal{SIGTERM};
+  std::ostringstream out, err;
+  EXPECT_EQ(polygmap_main({"perceive", at("a.png"), "--camera", at("camera.toml"), "--json", at("out.json")}, {}, out,
+                          err, false, &signal),
+            kExitSignal + SIGTERM);
+  EXPECT_EQ(err.str(), "polygmap: interrupted after 0 of 1 pictures: the others have no files.\n");
+  EXPECT_FALSE(std::filesystem::exists(at("out.json")));
+}
+
+// docs/reference/planes-json.md names exactly the keys that are written.
+TEST_F(PerceiveCommand, Json_HasTheKeysOfItsReferencePage) {
+  write_depth("stairs.png", test::render(scene_).raw(), 640, 480);
+  ASSERT_EQ(call({"perceive", at("stairs.png"), "--camera", at("camera.toml"), "--json", at("out.json")}), kExitPass);
+  std::set<std::string> written, named;
+  const std::function<void(const nlohmann::json&, const std::string&)> collect = [&](const nlohmann::json& value,
+                                                                                     const std::string& path) {
+    for (const auto& [key, inner] : value.items()) {
+      const std::string name = path + key;
+      written.insert(name);
+      if (inner.is_array() && !inner.empty() && inner[0].is_object()) {
+        for (const auto& one : inner) collect(one, name + "[].");
+      }
+    }
+  };
+  collect(nlohmann::json::parse(std::ifstream(at("out.json"))), "");
+  std::ifstream page(std::string(POLYGMAP_CAMERAS) + "/../../docs/reference/planes-json.md");
+  for (std::string line; std::getline(page, line);) {
+    if (!line.starts_with("| `")) continue;
+    const std::string keys = line.substr(0, line.find('|', 1));
+    for (std::size_t from = keys.find('`'); from != std::string::npos; from = keys.find('`', from)) {
+      const std::size_t to = keys.find('`', from + 1);
+      named.insert(keys.substr(from + 1, to - from - 1));
+      from = to + 1;
+    }
+  }
+  EXPECT_EQ(named, written);
 }
 
 // A wall alone: which way is up is not in the picture.

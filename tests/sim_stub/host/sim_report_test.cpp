@@ -9,6 +9,7 @@
 
 #include "sim_stub/host/climb/climb_report.hpp"
 #include "sim_stub/host/climb/surface_match.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/scripted_climb.hpp"
 

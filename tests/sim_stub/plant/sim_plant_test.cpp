@@ -79,7 +79,7 @@ class Script {
           command.joints[joint_index(foot, j)].q_rad = leg.q_rad[static_cast<Eigen::Index>(j)];
         }
       }
-      ASSERT_TRUE(robot_.try_write(command));
+      ASSERT_TRUE(robot_.try_write(command).is_all());
       robot_.advance();
       watch();
     }
@@ -219,7 +219,7 @@ TEST(SimPlant, SmallStep_OfOneJoint_LagsByTenMillisecondsAfterTwo) {
   JointVector q = encoders(robot);
   const double start = q[kHipYaw];
   q[kHipYaw] += 0.01;
-  ASSERT_TRUE(robot.try_write(command_of(q)));
+  ASSERT_TRUE(robot.try_write(command_of(q)).is_all());
   robot.advance();  // the command is on its way
   EXPECT_EQ(encoders(robot)[kHipYaw], start);
   for (int i = 0; i < 5; ++i) robot.advance();
@@ -233,7 +233,7 @@ TEST(SimPlant, LargeStep_OfEachJoint_KeepsTheDriveSpeed) {
     ASSERT_TRUE(robot.try_read(feedback));
     JointVector q = feedback.q_rad;
     q[static_cast<Eigen::Index>(j)] += 0.15;
-    ASSERT_TRUE(robot.try_write(command_of(q)));
+    ASSERT_TRUE(robot.try_write(command_of(q)).is_all());
     double fastest = 0.0;
     for (int i = 0; i < 10; ++i) {
       robot.advance();
@@ -385,12 +385,12 @@ TEST(SimPlant, CommandOutsideLimits_Falls) {
   SimRobot robot(ideal());
   JointVector q = encoders(robot);
   q[kKnee] = -0.5e-3;  // within the tolerance
-  ASSERT_TRUE(robot.try_write(command_of(q)));
+  ASSERT_TRUE(robot.try_write(command_of(q)).is_all());
   robot.advance();
   robot.advance();
   EXPECT_FALSE(robot.truth().fell) << robot.truth().fall_reason;
   q[kKnee] = -2e-3;
-  ASSERT_TRUE(robot.try_write(command_of(q)));
+  ASSERT_TRUE(robot.try_write(command_of(q)).is_all());
   robot.advance();
   robot.advance();
   EXPECT_TRUE(robot.truth().fell);
@@ -401,7 +401,7 @@ TEST(SimPlant, CommandNotFinite_Falls) {
   SimRobot robot(ideal());
   JointVector q = encoders(robot);
   q[7] = std::numeric_limits<double>::quiet_NaN();
-  ASSERT_TRUE(robot.try_write(command_of(q)));
+  ASSERT_TRUE(robot.try_write(command_of(q)).is_all());
   robot.advance();
   robot.advance();
   EXPECT_TRUE(robot.truth().fell);

@@ -28,11 +28,14 @@ class FakeJointBus final : public hal::JointBus {
     fresh_ = false;
     return true;
   }
-  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override {
-    if (writes.next_fails()) return false;
+  [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override {
+    if (writes.next_fails()) return {};
     commands_.push_overwrite(command);
-    return true;
+    return JointSet::all();
   }
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override { return told; }
+
+  hal::JointBusStatus told;
 
  private:
   JointFeedback newest_;

@@ -104,12 +104,12 @@ TEST(Swing, TwoRisersAhead_ClearsBothNosings) {
       shape.toe_down_rad = tried.toe_down_rad;
       Swing swing;
       swing.plan(kSole, {Mat3::Identity(), {0, 0.1, 0}}, {{2 * kTread_m, 0.1, 2 * rise_m}, 0.0}, shape,
-                 params.passing_swing_ticks);
+                 params.durations.passing_swing_ticks);
       const double riser_x_m = kCollisionRectangle.toe_x_m + kGap_m;
       double middle_m = 1e9, last_m = 1e9;  // least distance of a corner from the solid behind each riser
-      for (int i = 0; i <= params.passing_swing_ticks; ++i) {
+      for (int i = 0; i <= params.durations.passing_swing_ticks; ++i) {
         const Transform sole = swing.at(i);
-        const bool lands = i > params.passing_swing.landing_begin * params.passing_swing_ticks;
+        const bool lands = i > params.passing_swing.landing_begin * params.durations.passing_swing_ticks;
         for (const double x : {kCollisionRectangle.heel_x_m, kCollisionRectangle.toe_x_m}) {
           for (const double z : {0.0, kCollisionHeight_m}) {
             const Vec3 p = sole * Vec3{x, 0, z};

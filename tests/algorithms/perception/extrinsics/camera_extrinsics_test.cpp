@@ -108,7 +108,7 @@ struct Level {
 double squares_over_variance(const Level& level) {
   constexpr int kRobots = 200;
   constexpr double kEncoder_rad = 0.002, kGravity_rad = 0.006;
-  const double prior_rad = CameraExtrinsicsEstimator::Params{}.prior_tilt_sigma_rad;
+  const double prior_rad = CameraExtrinsicsEstimator::Params{}.prior.tilt_sigma_rad;
   std::mt19937 random(1);
   std::normal_distribution<> normal;
   std::uniform_real_distribution<> data_sheet(-std::sqrt(3.0) * prior_rad, std::sqrt(3.0) * prior_rad);

@@ -11,6 +11,7 @@
 
 #include "algorithms/perception/image/self_filter.hpp"
 #include "algorithms/robot/body_shapes.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/depth_scene.hpp"
 #include "tests/support/nominal_robot.hpp"
 
@@ -27,7 +28,7 @@ struct Stand {
   std::uint32_t noise_seed = 0;  // 0: none
 };
 
-class ToeSight : public testing::Test {
+class ToeDetectorTest : public testing::Test {
  protected:
   // What the camera sees, by the true mount.
   void look(const Stand& stand, const Vec3& mount_error_m = Vec3::Zero()) {
@@ -69,7 +70,7 @@ class ToeSight : public testing::Test {
 };
 
 // All lines round to the same row of pixels: a picture knows the toe to half of one, 1 mm.
-TEST_F(ToeSight, CameraMillimetresOff_TheToeIsSeenAsFarOffTheOtherWay) {
+TEST_F(ToeDetectorTest, CameraMillimetresOff_TheToeIsSeenAsFarOffTheOtherWay) {
   for (const double off_m : {-0.006, 0.0, 0.004}) {
     double sum_m = 0.0;
     int count = 0;
@@ -86,35 +87,35 @@ TEST_F(ToeSight, CameraMillimetresOff_TheToeIsSeenAsFarOffTheOtherWay) {
   }
 }
 
-TEST_F(ToeSight, LandingWithoutARiser_IsSeenTheSame) {
+TEST_F(ToeDetectorTest, LandingWithoutARiser_IsSeenTheSame) {
   look({.riser_m = 2.0}, {0.004, 0.0, 0.0});
   ASSERT_TRUE(see().has_value());
   EXPECT_NEAR(see()->ahead_m, -0.004, 0.0015);
 }
 
-TEST_F(ToeSight, KneeBentBeforeTheToe_NothingIsSeen) {
+TEST_F(ToeDetectorTest, KneeBentBeforeTheToe_NothingIsSeen) {
   look({.base_z_m = 0.72});
   EXPECT_FALSE(see().has_value());
 }
 
-TEST_F(ToeSight, NoFootThere_NothingIsSeen) {
+TEST_F(ToeDetectorTest, NoFootThere_NothingIsSeen) {
   look({.legs = false});
   EXPECT_FALSE(see().has_value());
   look({.rise_m = 0.07, .legs = false});  // a tread as high as a foot, which ends nowhere near
   EXPECT_FALSE(see().has_value());
 }
 
-TEST_F(ToeSight, ToeAgainstTheRiser_NothingIsSeen) {
+TEST_F(ToeDetectorTest, ToeAgainstTheRiser_NothingIsSeen) {
   look({.riser_m = 0.002});
   EXPECT_FALSE(see().has_value());
 }
 
-TEST_F(ToeSight, BeyondWhatIsLookedFor_NothingIsSeen) {
+TEST_F(ToeDetectorTest, BeyondWhatIsLookedFor_NothingIsSeen) {
   look({.riser_m = 0.06}, {0.03, 0.0, 0.0});
   EXPECT_FALSE(see().has_value());
 }
 
-TEST_F(ToeSight, BlankPictureOrAPoseThatIsNone_NothingIsSeen) {
+TEST_F(ToeDetectorTest, BlankPictureOrAPoseThatIsNone_NothingIsSeen) {
   look({});
   ASSERT_TRUE(see().has_value());
   Transform behind = camera_T_sole_, nowhere = camera_T_sole_, aside = camera_T_sole_;

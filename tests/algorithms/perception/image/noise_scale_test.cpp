@@ -7,6 +7,7 @@
 
 #include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/robot_model.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/depth_scene.hpp"
 
 namespace polygmap {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/depth_scene.hpp"
 #include "tests/support/nominal_robot.hpp"
 

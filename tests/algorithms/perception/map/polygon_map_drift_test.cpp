@@ -2,6 +2,7 @@
 // What a whole frame is off by: the pose, or the world.
 #include <gtest/gtest.h>
 
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/remembered_stairs.hpp"
 
 namespace polygmap {

@@ -142,7 +142,7 @@ TEST_F(PolygonMapEdges, ImageCutSides_200NoisyFrames_DoNotCreepOutwards) {
   double true_reach = 0.0;
   for (const MapPolygon& p : map_->snapshot().polygons) {
     if (p.surface.kind == SurfaceKind::kTread && std::abs(p.surface.centroid_m.z() - 0.13) < 0.01) {
-      true_reach = extreme(p, Vec3::UnitY()) + PolygonMap::Params{}.unknown_margin_m;
+      true_reach = extreme(p, Vec3::UnitY()) + PolygonMap::Params{}.sides.unknown_margin_m;
     }
   }
   look(stairs, on_floor_, {0.005, 0.002, 0.002}, 200);

@@ -2,6 +2,7 @@
 // What the map keeps, and what it forgets.
 #include <gtest/gtest.h>
 
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/remembered_stairs.hpp"
 
 namespace polygmap {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/remembered_stairs.hpp"
 
 namespace polygmap {

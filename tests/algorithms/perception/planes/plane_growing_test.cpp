@@ -12,7 +12,7 @@ namespace {
 
 using test::ColumnScene;
 
-class PlanesFromRuns : public testing::Test {
+class PlaneGrowingTest : public testing::Test {
  protected:
   void grow(const PlaneGrowing::Params& params = {}) {
     segments_->begin({}, {}, scene_.intrinsics, *scene_.image);
@@ -65,7 +65,7 @@ class PlanesFromRuns : public testing::Test {
   InversePlane riser_ = test::plane_of({-0.15, 0.48, -0.86}, 0.7);
 };
 
-TEST_F(PlanesFromRuns, TreadAndRiser_AreTwoPlanesWithTheirNormals) {
+TEST_F(PlaneGrowingTest, TreadAndRiser_AreTwoPlanesWithTheirNormals) {
   paint_step(0.0015, 2);
   grow();
   ASSERT_EQ(growing_->count(), 2U);
@@ -78,7 +78,7 @@ TEST_F(PlanesFromRuns, TreadAndRiser_AreTwoPlanesWithTheirNormals) {
   }
 }
 
-TEST_F(PlanesFromRuns, PatchSmallerThanTheLeast_IsNoPlane) {
+TEST_F(PlaneGrowingTest, PatchSmallerThanTheLeast_IsNoPlane) {
   const auto patch = [this](std::int32_t g, std::int32_t r) {
     return g >= 60 && g < 63 && r >= 100 && r < 120 ? &tread_ : nullptr;
   };
@@ -89,7 +89,7 @@ TEST_F(PlanesFromRuns, PatchSmallerThanTheLeast_IsNoPlane) {
   EXPECT_EQ(growing_->count(), 1U);
 }
 
-TEST_F(PlanesFromRuns, MeetingPlanes_AreCutWhereTheyMeet) {
+TEST_F(PlaneGrowingTest, MeetingPlanes_AreCutWhereTheyMeet) {
   paint_step(0.002, 4);
   grow();
   bound();
@@ -104,7 +104,7 @@ TEST_F(PlanesFromRuns, MeetingPlanes_AreCutWhereTheyMeet) {
   EXPECT_GT(seen, kColumns * 9 / 10);
 }
 
-TEST_F(PlanesFromRuns, OverhangingPlane_IsCutWhereThePictureChanges) {
+TEST_F(PlaneGrowingTest, OverhangingPlane_IsCutWhereThePictureChanges) {
   // The tread reaches 12 rows farther down than where the planes meet, as a nosing does.
   constexpr double kOver_px = 12.0;
   scene_.paint([this](std::int32_t g,
@@ -122,7 +122,7 @@ TEST_F(PlanesFromRuns, OverhangingPlane_IsCutWhereThePictureChanges) {
   EXPECT_GT(seen, kColumns * 9 / 10);
 }
 
-TEST_F(PlanesFromRuns, Refit_RecoversThePlanesThroughNoise) {
+TEST_F(PlaneGrowingTest, Refit_RecoversThePlanesThroughNoise) {
   paint_step(0.002, 8);
   grow();
   bound();

@@ -10,7 +10,7 @@ namespace {
 
 using test::ColumnScene;
 
-class Remainder : public testing::Test {
+class ResidualPlaneSearchTest : public testing::Test {
  protected:
   // Looks for planes in what the spans of every column leave over.
   void search(const SpanBoundaries::Column& spans = {}) {
@@ -30,7 +30,7 @@ class Remainder : public testing::Test {
   std::unique_ptr<ResidualPlaneSearch> search_ = std::make_unique<ResidualPlaneSearch>();
 };
 
-TEST_F(Remainder, AFewLevelRows_AreFoundAtTheirHeight) {
+TEST_F(ResidualPlaneSearchTest, AFewLevelRows_AreFoundAtTheirHeight) {
   // Three noisy rows 3 m away: no run of them says how they lie.
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
     scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 100 && r < 103 ? &tread_ : nullptr; }, 0.004, seed);
@@ -42,7 +42,7 @@ TEST_F(Remainder, AFewLevelRows_AreFoundAtTheirHeight) {
   }
 }
 
-TEST_F(Remainder, RowsDeepInClutter_AreNotLookedAt) {
+TEST_F(ResidualPlaneSearchTest, RowsDeepInClutter_AreNotLookedAt) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 100 && r < 103 ? &tread_ : nullptr; });
   for (const std::int16_t end : {std::int16_t{103 + kRemainderReach_px}, std::int16_t{99 + kRemainderReach_px}}) {
     search_->begin({}, up_);
@@ -51,7 +51,7 @@ TEST_F(Remainder, RowsDeepInClutter_AreNotLookedAt) {
   }
 }
 
-TEST_F(Remainder, RowsOfAPlaneGivenUp_AreSearchedAgain) {
+TEST_F(ResidualPlaneSearchTest, RowsOfAPlaneGivenUp_AreSearchedAgain) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 10 && r < 13 ? &tread_ : nullptr; });
   for (const bool given_back : {false, true}) {
     search_->begin({}, up_);
@@ -61,7 +61,7 @@ TEST_F(Remainder, RowsOfAPlaneGivenUp_AreSearchedAgain) {
   }
 }
 
-TEST_F(Remainder, UprightRows_AreFoundParallelToTheKnownRiser) {
+TEST_F(ResidualPlaneSearchTest, UprightRows_AreFoundParallelToTheKnownRiser) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r < 4 ? &riser_ : nullptr; }, 0.003);
   search_->begin({}, up_);
   search();
@@ -73,7 +73,7 @@ TEST_F(Remainder, UprightRows_AreFoundParallelToTheKnownRiser) {
   EXPECT_NEAR(search_->found()[0].d_m(), 1.1, 0.003);
 }
 
-TEST_F(Remainder, AKnownPlane_IsNotFoundAgain) {
+TEST_F(ResidualPlaneSearchTest, AKnownPlane_IsNotFoundAgain) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r < 20 ? &tread_ : nullptr; }, 0.002);
   search_->begin({}, up_);
   search_->add_known_level(test::plane_of(up_, 0.606));
@@ -81,7 +81,7 @@ TEST_F(Remainder, AKnownPlane_IsNotFoundAgain) {
   EXPECT_EQ(search_->found().size(), 0U);
 }
 
-TEST_F(Remainder, RowsInSpans_AreNotLookedAt) {
+TEST_F(ResidualPlaneSearchTest, RowsInSpans_AreNotLookedAt) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r < 20 ? &tread_ : nullptr; }, 0.002);
   SpanBoundaries::Column spans;
   ColumnSpan span;
@@ -94,7 +94,7 @@ TEST_F(Remainder, RowsInSpans_AreNotLookedAt) {
   EXPECT_EQ(search_->found().size(), 0U);
 }
 
-TEST_F(Remainder, ASlope_HasNoPeakOfHeights) {
+TEST_F(ResidualPlaneSearchTest, ASlope_HasNoPeakOfHeights) {
   const InversePlane slope = test::plane_of(up_ + Vec3{0.0, 0.3, -0.3}, 0.7);
   scene_.paint([&](std::int32_t, std::int32_t r) { return r > 100 && r < 400 ? &slope : nullptr; }, 0.002);
   search_->begin({}, up_);

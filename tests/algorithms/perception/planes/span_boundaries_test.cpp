@@ -12,7 +12,7 @@ namespace {
 
 using test::ColumnScene;
 
-class Boundaries : public testing::Test {
+class SpanBoundariesTest : public testing::Test {
  protected:
   static constexpr std::uint8_t kTread = 1, kRiser = 2;
 
@@ -74,19 +74,19 @@ class Boundaries : public testing::Test {
   InversePlane riser_ = test::plane_of({-0.15, 0.48, -0.86}, 0.7);
 };
 
-TEST_F(Boundaries, PlanesThatMeet_EndWhereTheyMeet) {
+TEST_F(SpanBoundariesTest, PlanesThatMeet_EndWhereTheyMeet) {
   paint(0.0, 0.003, 1);
   meet();
   EXPECT_EQ(wrong(0.0), 0);
 }
 
-TEST_F(Boundaries, AnOverhang_EndsWhereThePixelsSay) {
+TEST_F(SpanBoundariesTest, AnOverhang_EndsWhereThePixelsSay) {
   paint(5.0, 0.003, 2);
   meet();
   EXPECT_EQ(wrong(5.0), 0);
 }
 
-TEST_F(Boundaries, PlanesThatChange_TakeTheirBoundaryAlong) {
+TEST_F(SpanBoundariesTest, PlanesThatChange_TakeTheirBoundaryAlong) {
   paint(0.0, 0.003, 3);
   meet();
   tread_ = test::plane_of({0.01, -0.86, -0.5}, 0.605);
@@ -98,7 +98,7 @@ TEST_F(Boundaries, PlanesThatChange_TakeTheirBoundaryAlong) {
   EXPECT_EQ(wrong(0.0), 0);
 }
 
-TEST_F(Boundaries, AColumnWithoutARun_TakesTheRowsThatTheOneBesideShows) {
+TEST_F(SpanBoundariesTest, AColumnWithoutASegment_TakesTheRowsThatTheOneBesideShows) {
   paint(0.0, 0.003, 4);
   gather(10);
   boundaries_->build_spans(11, {}, to_plane_);
@@ -111,7 +111,7 @@ TEST_F(Boundaries, AColumnWithoutARun_TakesTheRowsThatTheOneBesideShows) {
   EXPECT_NEAR(claimed[0].bottom, meeting_row(11), 4.0);
 }
 
-TEST_F(Boundaries, RowsOfSomethingElse_AreNotClaimed) {
+TEST_F(SpanBoundariesTest, RowsOfSomethingElse_AreNotClaimed) {
   paint(0.0, 0.003, 5);
   const InversePlane far = test::plane_of({0.0, 0.0, -1.0}, 3.0);
   gather(10);
@@ -125,7 +125,7 @@ TEST_F(Boundaries, RowsOfSomethingElse_AreNotClaimed) {
 }
 
 // Rows of a column that lie on the tread; all others lie far behind it.
-class ClaimedRows : public Boundaries {
+class SpanBoundariesClaimTest : public SpanBoundariesTest {
  protected:
   static constexpr std::int32_t kFirst = 101, kLast = 300;  // that the column beside shows
   void show(const std::function<bool(std::int32_t)>& on_tread) {
@@ -153,29 +153,29 @@ class ClaimedRows : public Boundaries {
   InversePlane wall_ = test::plane_of({0.0, 0.0, -1.0}, 1.0);
 };
 
-TEST_F(ClaimedRows, AllOfThem_AreOneStretch) {
+TEST_F(SpanBoundariesClaimTest, AllOfThem_AreOneStretch) {
   show([](std::int32_t) { return true; });
   expect_claimed(kFirst, kLast);
 }
 
-TEST_F(ClaimedRows, SingleRowsOffThePlane_DoNotEndAStretch) {
+TEST_F(SpanBoundariesClaimTest, SingleRowsOffThePlane_DoNotEndAStretch) {
   show([](std::int32_t r) { return r >= 110 && r <= 250 && r % 2 == 1; });
   expect_claimed(111, 249);
 }
 
-TEST_F(ClaimedRows, TwoRowsOffThePlane_EndAStretch) {
+TEST_F(SpanBoundariesClaimTest, TwoRowsOffThePlane_EndAStretch) {
   for (const std::int32_t gap : {160, 161, 162, 163, 164, 165, 166, 167}) {  // where words of 64 bits meet, too
     show([gap](std::int32_t r) { return r != gap && r != gap + 1; });
     expect_claimed(gap + 2, kLast);
   }
 }
 
-TEST_F(ClaimedRows, ASingleRow_IsNotClaimed) {
+TEST_F(SpanBoundariesClaimTest, ASingleRow_IsNotClaimed) {
   show([](std::int32_t r) { return r % 3 == 0; });
   EXPECT_TRUE(boundaries_->columns()[11].empty());
 }
 
-TEST_F(Boundaries, ARunThatReachesOverTheEdge_IsTrimmed) {
+TEST_F(SpanBoundariesTest, ASegmentThatReachesOverTheEdge_IsTrimmed) {
   paint(0.0, 0.0, 6);
   const auto row = static_cast<std::int16_t>(meeting_row(40));
   ScanlineSegmentation::Column segments;

@@ -6,7 +6,7 @@
 namespace polygmap {
 namespace {
 
-TEST(Outline, Clip_SquareByALine_LeavesThePartInside) {
+TEST(ConvexOutlineTest, Clip_SquareByALine_LeavesThePartInside) {
   Outline2 square;
   for (const Vec2& p : {Vec2{0, 0}, Vec2{2, 0}, Vec2{2, 2}, Vec2{0, 2}}) ASSERT_TRUE(square.try_push_back(p));
   clip(square, {0, 0.5}, {0, 1});

@@ -8,6 +8,7 @@
 
 #include "algorithms/perception/polygons/counter_random.hpp"
 #include "algorithms/robot/robot_model.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/support/depth_scene.hpp"
 
 namespace polygmap {
@@ -107,7 +108,7 @@ TEST_P(NosingNoise, EdgeLine_NosingAndBackLine_WithinThreePointOneMillimetres) {
 INSTANTIATE_TEST_SUITE_P(WhiteAndCorrelated, NosingNoise, ::testing::Bool());
 
 // A camera's slow errors put a plane's best fit where its pixels beside the edge are not.
-TEST(EdgeLine, RiserFittedAside_PixelsBesideTheEdgeSayWhereItIs) {
+TEST(EdgeLineFinderTest, RiserFittedAside_PixelsBesideTheEdgeSayWhereItIs) {
   Bench bench(0.0);
   for (std::uint32_t seed = 1; seed <= 3; ++seed) {
     bench.draw({.correlated = false}, seed);
@@ -121,7 +122,7 @@ TEST(EdgeLine, RiserFittedAside_PixelsBesideTheEdgeSayWhereItIs) {
   }
 }
 
-TEST(EdgeLine, NoPlaneBeyond_DepthJumpIsFound) {
+TEST(EdgeLineFinderTest, NoPlaneBeyond_DepthJumpIsFound) {
   // Without the riser in front, the floor shows below the slab's edge.
   Bench bench(0.0, 0.0);
   bench.scene.boxes.clear();
@@ -133,7 +134,7 @@ TEST(EdgeLine, NoPlaneBeyond_DepthJumpIsFound) {
   EXPECT_LT(bench.error_m(line, 0.3), 0.005);
 }
 
-TEST(EdgeLine, ColumnsHiddenByTheBody_AreLeftOut) {
+TEST(EdgeLineFinderTest, ColumnsHiddenByTheBody_AreLeftOut) {
   Bench bench(0.0);
   bench.draw({}, 5);
   // Where the body is, the picture lies: something 5 cm nearer with an edge elsewhere.
@@ -155,7 +156,7 @@ TEST(EdgeLine, ColumnsHiddenByTheBody_AreLeftOut) {
   EXPECT_FALSE(line.valid);
 }
 
-TEST(EdgeLine, NoEdgeInThePicture_GivesNone) {
+TEST(EdgeLineFinderTest, NoEdgeInThePicture_GivesNone) {
   Bench bench(0.0);
   bench.scene.boxes.clear();
   bench.scene.boxes.push_back({{-1, -3, 0}, {3, 3, 0.15}});  // one endless tread
@@ -167,7 +168,7 @@ TEST(EdgeLine, NoEdgeInThePicture_GivesNone) {
   EXPECT_FALSE(line.valid);
 }
 
-TEST(EdgeLine, ScatteredGuesses_AreRefused) {
+TEST(EdgeLineFinderTest, ScatteredGuesses_AreRefused) {
   EdgeLineFinder finder;
   finder.begin_guess();
   for (std::int32_t i = 0; i < kColumns; ++i) {

@@ -14,12 +14,12 @@ constexpr RegionId kNear = 1, kFar = 2;
 constexpr std::int32_t kTop = 100, kBottom = 299;
 
 // A board across the picture's axis, 1 m away, before a wall at 1.3 m, between two straight sides.
-class SurfaceSidesOfABoard : public testing::Test {
+class SideLinesTest : public testing::Test {
  protected:
   struct Side {  // column = at + slope * row, full-resolution pixels
     double at, slope;
   };
-  SurfaceSidesOfABoard() {
+  SideLinesTest() {
     intrinsics_ = test::ColumnScene().intrinsics;
     picture_->rays.set(intrinsics_);
     picture_->column_rays.set(intrinsics_);
@@ -81,7 +81,7 @@ class SurfaceSidesOfABoard : public testing::Test {
   static constexpr Side kLeft{150.3, -0.11}, kRight{402.7, 0.17};
 };
 
-TEST_F(SurfaceSidesOfABoard, StraightSides_AreFoundWhetherOrNotThePlaneBeyondIsKnown) {
+TEST_F(SideLinesTest, StraightSides_AreFoundWhetherOrNotThePlaneBeyondIsKnown) {
   for (const RegionId beyond : {kNoRegion, kFar}) {
     paint(kLeft, kRight, 1300, beyond);
     expect_on(find(false), kLeft);
@@ -89,7 +89,7 @@ TEST_F(SurfaceSidesOfABoard, StraightSides_AreFoundWhetherOrNotThePlaneBeyondIsK
   }
 }
 
-TEST_F(SurfaceSidesOfABoard, WallCloseBehind_EndsTheBoardOnlyWhereItIsKnown) {
+TEST_F(SideLinesTest, WallCloseBehind_EndsTheBoardOnlyWhereItIsKnown) {
   // 4 mm are 1.6 sigmas: nothing that has left the board, but another plane if there is one.
   (*regions_)[kFar].plane = test::plane_of(-Vec3::UnitZ(), 1.004);
   paint(kLeft, kRight, 1004, kFar);
@@ -98,13 +98,13 @@ TEST_F(SurfaceSidesOfABoard, WallCloseBehind_EndsTheBoardOnlyWhereItIsKnown) {
   EXPECT_FALSE(find(true).fitted);
 }
 
-TEST_F(SurfaceSidesOfABoard, LastTwoPixelsOfThePicture_AreTooFewToEndABoard) {
+TEST_F(SideLinesTest, LastTwoPixelsOfThePicture_AreTooFewToEndABoard) {
   paint({1.5, 0.0}, {638.0, 0.0}, 1300, 0);
   EXPECT_FALSE(find(false).fitted);
   EXPECT_FALSE(find(true).fitted);
 }
 
-TEST_F(SurfaceSidesOfABoard, PictureEnd_IsNoSide) {
+TEST_F(SideLinesTest, PictureEnd_IsNoSide) {
   paint({-10.0, 0.0}, {650.0, 0.0}, 1300, 0);
   const OutlineSide left = find(false), right = find(true);
   EXPECT_FALSE(left.fitted);
@@ -114,13 +114,13 @@ TEST_F(SurfaceSidesOfABoard, PictureEnd_IsNoSide) {
   EXPECT_NEAR(2.0 * right.column_px + 0.5, 639.5, 1e-9);
 }
 
-TEST_F(SurfaceSidesOfABoard, NothingMeasuredBeyond_IsNoSide) {
+TEST_F(SideLinesTest, NothingMeasuredBeyond_IsNoSide) {
   paint(kLeft, kRight, 0, 0);
   EXPECT_FALSE(find(false).fitted);
   EXPECT_FALSE(find(true).fitted);
 }
 
-TEST_F(SurfaceSidesOfABoard, OwnBodyBesideTheBoard_HidesThatSideOnly) {
+TEST_F(SideLinesTest, OwnBodyBesideTheBoard_HidesThatSideOnly) {
   paint(kLeft, kRight, 1300, kFar);
   for (std::int32_t r = 0; r < kHalfHeight_px; ++r) {
     const auto past = static_cast<std::int32_t>(0.5 * (kRight.at + kRight.slope * 2.0 * r));
@@ -131,14 +131,14 @@ TEST_F(SurfaceSidesOfABoard, OwnBodyBesideTheBoard_HidesThatSideOnly) {
   expect_on(find(false), kLeft);
 }
 
-TEST_F(SurfaceSidesOfABoard, EndThatLeansMoreThanItRises_IsAFrontAndNoSide) {
+TEST_F(SideLinesTest, EndThatLeansMoreThanItRises_IsAFrontAndNoSide) {
   paint(kLeft, {200.0, 1.4}, 1300, kFar);
   EXPECT_FALSE(find(true).fitted);
   paint(kLeft, {300.0, 0.7}, 1300, kFar);
   expect_on(find(true), {300.0, 0.7});
 }
 
-TEST_F(SurfaceSidesOfABoard, CrookedEnd_IsNotCutStraight) {
+TEST_F(SideLinesTest, CrookedEnd_IsNotCutStraight) {
   // A corner sticks out of the lower half: a line through the upper half's end would cut it off.
   paint(kLeft, {400.0, 0.0}, 1300, kFar);
   for (std::int32_t r = (kTop + kBottom) / 2 + 8; r <= kBottom; ++r) {

@@ -14,9 +14,9 @@ constexpr PlaneId kWall = 1;
 constexpr std::int16_t kTop = 200, kBottom = 259;
 
 // One plane 1 m ahead, seen in some columns of the picture; elsewhere nothing is measured.
-class ComponentsOfAPlane : public testing::Test {
+class ConnectedComponentsTest : public testing::Test {
  protected:
-  ComponentsOfAPlane() {
+  ConnectedComponentsTest() {
     const CameraIntrinsics intrinsics = test::ColumnScene().intrinsics;
     image_->rays.set(intrinsics);
     image_->column_rays.set(intrinsics);
@@ -68,7 +68,7 @@ class ComponentsOfAPlane : public testing::Test {
   std::unique_ptr<Regions> regions_ = std::make_unique<Regions>();
 };
 
-TEST_F(ComponentsOfAPlane, WithNothingMeasuredBetween_AreOneRegion) {
+TEST_F(ConnectedComponentsTest, WithNothingMeasuredBetween_AreOneRegion) {
   show(20, 29), show(34, 39);
   join();
   ASSERT_EQ(regions_->count, 1U);
@@ -82,7 +82,7 @@ TEST_F(ComponentsOfAPlane, WithNothingMeasuredBetween_AreOneRegion) {
   EXPECT_EQ(region_in(39), kWall);
 }
 
-TEST_F(ComponentsOfAPlane, WithSomethingFartherBetween_AreTwoRegionsOfThatPlane) {
+TEST_F(ConnectedComponentsTest, WithSomethingFartherBetween_AreTwoRegionsOfThatPlane) {
   show(20, 29), show(34, 39);
   see(30, 33, 1.5F);
   join();
@@ -94,7 +94,7 @@ TEST_F(ComponentsOfAPlane, WithSomethingFartherBetween_AreTwoRegionsOfThatPlane)
   EXPECT_LT((*regions_)[kWall].centre_m.x(), (*regions_)[2].centre_m.x());
 }
 
-TEST_F(ComponentsOfAPlane, FartherApartThanTheSmallerOneIsWide_CountAsTwoPlanes) {
+TEST_F(ConnectedComponentsTest, FartherApartThanTheSmallerOneIsWide_CountAsTwoPlanes) {
   show(10, 29), show(60, 65);
   see(30, 59, 1.5F);
   join();
@@ -102,7 +102,7 @@ TEST_F(ComponentsOfAPlane, FartherApartThanTheSmallerOneIsWide_CountAsTwoPlanes)
   EXPECT_EQ((*regions_)[2].coplanar, 2U);
 }
 
-TEST_F(ComponentsOfAPlane, ThatAreTooSmall_AreInNoRegion) {
+TEST_F(ConnectedComponentsTest, ThatAreTooSmall_AreInNoRegion) {
   show(20, 29);
   show(40, 41, 100, 108);  // 144 pixels
   join();
@@ -111,7 +111,7 @@ TEST_F(ComponentsOfAPlane, ThatAreTooSmall_AreInNoRegion) {
   EXPECT_EQ(region_in(40), kNoRegion);
 }
 
-TEST_F(ComponentsOfAPlane, OfAPlaneThatWasGivenUp_AreInNoRegion) {
+TEST_F(ConnectedComponentsTest, OfAPlaneThatWasGivenUp_AreInNoRegion) {
   (*planes_)[kWall].alive = false;
   show(20, 29);
   join();
@@ -119,7 +119,7 @@ TEST_F(ComponentsOfAPlane, OfAPlaneThatWasGivenUp_AreInNoRegion) {
   EXPECT_EQ(region_in(20), kNoRegion);
 }
 
-TEST_F(ComponentsOfAPlane, SpansThatShareNoRows_DoNotHangTogether) {
+TEST_F(ConnectedComponentsTest, SpansThatShareNoRows_DoNotHangTogether) {
   show(20, 29);
   show(30, 39, kBottom + 1, kBottom + 60);
   join();

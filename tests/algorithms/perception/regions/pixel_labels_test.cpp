@@ -12,9 +12,9 @@ namespace {
 constexpr std::int32_t kWidth_px = 640, kHeight_px = 480;
 
 // Two planes in a picture, and columns of eight pixels that each end them at one row.
-class PixelLabel : public testing::Test {
+class PixelLabelsTest : public testing::Test {
  protected:
-  PixelLabel() {
+  PixelLabelsTest() {
     raw_.intrinsics = {kWidth_px, kHeight_px, 400.0, 400.0, 320.0, 240.0, 0.001};
     raw_.range.set({}, raw_.intrinsics.depth_unit_m);
     raw_.depth = depth_.data();
@@ -50,7 +50,7 @@ class PixelLabel : public testing::Test {
   std::unique_ptr<PublishedSurfaces> published_ = std::make_unique<PublishedSurfaces>();
 };
 
-TEST_F(PixelLabel, PlanesThatMeetAskew_EndWhereTheyMeetInEveryColumnOfPixels) {
+TEST_F(PixelLabelsTest, PlanesThatMeetAskew_EndWhereTheyMeetInEveryColumnOfPixels) {
   // A nosing that climbs by a quarter of a row per pixel.
   set_plane(1, Vec3{0.2, -0.86, -0.5}, {0.0, 0.0, 1.2});
   set_plane(2, Vec3{0.0, 0.45, -0.89}, {0.0, 0.0, 1.2});
@@ -76,7 +76,7 @@ TEST_F(PixelLabel, PlanesThatMeetAskew_EndWhereTheyMeetInEveryColumnOfPixels) {
   EXPECT_GT(wrong_by_columns, 20);
 }
 
-TEST_F(PixelLabel, ATreadWithANosing_EndsAtItAndBesideItWhereThePlanesMeet) {
+TEST_F(PixelLabelsTest, ATreadWithANosing_EndsAtItAndBesideItWhereThePlanesMeet) {
   set_plane(1, Vec3{0.0, -0.86, -0.5}, {0.0, 0.0, 1.2});
   set_plane(2, Vec3{0.0, 0.45, -0.89}, {0.0, 0.0, 1.2});  // they meet in row 240
   (*regions_)[1].kind = SurfaceKind::kTread;
@@ -102,7 +102,7 @@ TEST_F(PixelLabel, ATreadWithANosing_EndsAtItAndBesideItWhereThePlanesMeet) {
   EXPECT_EQ(label(320, 242), 2U) << "another edge than the one that ends these rows";
 }
 
-TEST_F(PixelLabel, AColumnOfTwoThings_IsTheSurfacesUpToWhereItsPixelsLeaveIt) {
+TEST_F(PixelLabelsTest, AColumnOfTwoThings_IsTheSurfacesUpToWhereItsPixelsLeaveIt) {
   set_plane(1, Vec3{0.0, 0.0, -1.0}, {0.0, 0.0, 1.0});
   set_plane(2, Vec3{0.0, 0.0, -1.0}, {0.0, 0.0, 1.5});
   own(1, 39, 200, 260);  // up to pixel 319; of the next column three pixels more
@@ -121,7 +121,7 @@ TEST_F(PixelLabel, AColumnOfTwoThings_IsTheSurfacesUpToWhereItsPixelsLeaveIt) {
   EXPECT_EQ(label(322, 245), 0U);
 }
 
-TEST_F(PixelLabel, APixelOfTheRobotsOwnBody_IsNoSurfaces) {
+TEST_F(PixelLabelsTest, APixelOfTheRobotsOwnBody_IsNoSurfaces) {
   set_plane(1, Vec3{0.0, 0.0, -1.0}, {0.0, 0.0, 1.0});
   own(1, 39, 200, 260);
   for (std::int32_t r = 200; r <= 260; ++r) {

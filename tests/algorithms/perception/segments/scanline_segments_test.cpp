@@ -14,7 +14,7 @@ namespace {
 
 using test::ColumnScene;
 
-class RunSegmentationTest : public testing::Test {
+class ScanlineSegmentationTest : public testing::Test {
  protected:
   const ScanlineSegmentation::Columns& segment(std::int32_t rows = ScanlineSegmentation::kBlock) {
     segments_->begin({}, {}, scene_.intrinsics, *scene_.image);
@@ -28,7 +28,7 @@ class RunSegmentationTest : public testing::Test {
   InversePlane riser_ = test::plane_of({0.0, 0.6, -0.8}, 0.6);
 };
 
-TEST_F(RunSegmentationTest, OnePlane_OneExactRunPerColumn) {
+TEST_F(ScanlineSegmentationTest, OnePlane_OneExactSegmentPerColumn) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 40 && r < 470 ? &floor_ : nullptr; });
   for (std::int32_t g = 0; g < kColumns; ++g) {
     const ScanlineSegmentation::Column& segments = segment()[static_cast<std::size_t>(g)];
@@ -41,7 +41,7 @@ TEST_F(RunSegmentationTest, OnePlane_OneExactRunPerColumn) {
   }
 }
 
-TEST_F(RunSegmentationTest, CreaseJumpAndGap_EndTheRun_NoiseDoesNot) {
+TEST_F(ScanlineSegmentationTest, CreaseJumpAndGap_EndTheSegment_NoiseDoesNot) {
   // Rows 0..199 riser, 200..299 floor, 300..319 nothing, 320..479 floor again.
   scene_.paint(
       [this](std::int32_t, std::int32_t r) -> const InversePlane* {
@@ -60,7 +60,7 @@ TEST_F(RunSegmentationTest, CreaseJumpAndGap_EndTheRun_NoiseDoesNot) {
   EXPECT_GE(exact, std::size_t{kColumns} * 9 / 10);
 }
 
-TEST_F(RunSegmentationTest, SingleOutliersAndShortGaps_StayInsideTheRun) {
+TEST_F(ScanlineSegmentationTest, SingleOutliersAndShortGaps_StayInsideTheSegment) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r >= 40 ? &floor_ : nullptr; });
   for (std::int32_t g = 0; g < kColumns; ++g) {
     scene_.image->inverse_depth(g, 100) *= 1.3F;
@@ -74,7 +74,7 @@ TEST_F(RunSegmentationTest, SingleOutliersAndShortGaps_StayInsideTheRun) {
 }
 
 // So near that a column without a segment once took them for rows of the one it has not: it then began at row 0.
-TEST_F(RunSegmentationTest, DepthsOfOneMillimetre_BeginTheirOwnRun) {
+TEST_F(ScanlineSegmentationTest, DepthsOfOneMillimetre_BeginTheirOwnSegment) {
   for (std::int32_t g = 0; g < kColumns; ++g) {
     for (std::int32_t r = 50; r < 90; ++r) scene_.image->inverse_depth(g, r) = 1000.0F;
   }
@@ -86,7 +86,7 @@ TEST_F(RunSegmentationTest, DepthsOfOneMillimetre_BeginTheirOwnRun) {
 }
 
 // Whatever register a column lies in, it says the same.
-TEST_F(RunSegmentationTest, EqualColumns_GiveEqualRuns) {
+TEST_F(ScanlineSegmentationTest, EqualColumns_GiveEqualSegments) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r / 37 % 2 == 0 ? &riser_ : &floor_; }, 0.002, 5);
   for (std::int32_t r = 0; r < kDepthHeight_px; ++r) {
     for (std::int32_t g = 1; g < kColumns; ++g) scene_.image->inverse_depth(g, r) = scene_.image->inverse_depth(0, r);
@@ -104,7 +104,7 @@ TEST_F(RunSegmentationTest, EqualColumns_GiveEqualRuns) {
 }
 
 // Two planes, dropouts and noise in whole numbers: not one bit may depend on the width of the machine's registers.
-TEST_F(RunSegmentationTest, VectorsOfAnyWidth_GiveTheSameRuns) {
+TEST_F(ScanlineSegmentationTest, VectorsOfAnyWidth_GiveTheSameSegments) {
   std::uint32_t state = 1, hash = 2166136261U;
   for (std::int32_t r = 0; r < kDepthHeight_px; ++r) {
     for (std::int32_t g = 0; g < kColumns; ++g) {
@@ -130,7 +130,7 @@ TEST_F(RunSegmentationTest, VectorsOfAnyWidth_GiveTheSameRuns) {
 }
 
 // Rows that are added together are the same least squares as one after the other.
-TEST_F(RunSegmentationTest, RowsInBlocks_GiveTheRunsOfRowsOneByOne) {
+TEST_F(ScanlineSegmentationTest, RowsInBlocks_GiveTheSegmentsOfRowsOneByOne) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r / 37 % 2 == 0 ? &riser_ : &floor_; }, 0.002, 5);
   const ScanlineSegmentation::Columns one_by_one = segment(1);
   const ScanlineSegmentation::Columns& in_blocks = segment();
@@ -151,7 +151,7 @@ TEST_F(RunSegmentationTest, RowsInBlocks_GiveTheRunsOfRowsOneByOne) {
   EXPECT_GT(static_cast<double>(same_lines), 0.95 * static_cast<double>(segments));
 }
 
-TEST_F(RunSegmentationTest, MoreRunsThanFit_AreCounted) {
+TEST_F(ScanlineSegmentationTest, MoreSegmentsThanFit_AreCounted) {
   scene_.paint([this](std::int32_t, std::int32_t r) { return r / 5 % 2 == 0 ? &riser_ : &floor_; });
   static_cast<void>(segment());
   EXPECT_GT(segments_->overflow(), 0U);

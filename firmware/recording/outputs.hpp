@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each row of the schedule leaves behind, and how fields are written, read and compared.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <string>
+#include <string_view>
+
+#include "firmware/recording/fields.hpp"
+#include "firmware/schedule.hpp"
+
+namespace polygmap::recording {
+
+// Of all faults and limits, in the order of their tables.
+using HealthCounts = std::array<EventCount, kFaultTable.size() + kLimitTable.size()>;
+[[nodiscard]] inline HealthCounts counts_of(const Health& health) noexcept {
+  HealthCounts counts;
+  auto next = counts.begin();
+  for (const auto& line : kFaultTable) *next++ = health.count(line.code);
+  for (const auto& line : kLimitTable) *next++ = health.count(line.code);
+  return counts;
+}
+void walk_health(auto& f, const HealthCounts& counts) {
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    walk(f, i < kFaultTable.size() ? kFaultTable[i].name : kLimitTable[i - kFaultTable.size()].name, counts[i]);
+  }
+}
+[[nodiscard]] inline bool same_counts(const HealthCounts& a, const HealthCounts& b) noexcept {
+  return std::equal(a.begin(), a.end(), b.begin(), [](const EventCount& x, const EventCount& y) {
+    return x.count == y.count && x.first_ns == y.first_ns && x.last_ns == y.last_ns;
+  });
+}
+// Written where they changed: f.health(counts).
+
+// f sees what the row has just made.
+void walk_outputs(auto& f, const Pipeline& module, std::size_t row, Progress progress) {
+  const std::string_view task = kTasks[row].row.task;
+  const ControlLane& control = module.control();
+  const PerceptionLane& perception = module.perception();
+  if (task == "estimate") {
+    walk(f, "state", control.state());
+    walk(f, "quality", control.estimator().quality());
+  } else if (task == "gait") {
+    walk(f, "status", control.gait_status());
+    walk(f, "command", control.last_command());
+    const ModuleState module_state = control.module_state();
+    walk(f, "module_state", module_state);
+  } else if (task == "health") {
+    f.health(counts_of(control.all_faults()));
+  } else if (task == "intake") {
+    f.health(counts_of(perception.faults()));
+  } else if (progress != Progress::kDone) {
+    return;
+  } else if (task == "surfaces") {
+    const CameraExtrinsicsEstimator& mount = perception.mount();
+    walk(f, "frame", perception.surface_frame());
+    const MountFound found{mount.roll_rad(), mount.pitch_rad(), mount.x_m(), mount.height_m(), mount.tilt_sigma_rad()};
+    walk(f, "mount", found);
+  } else if (task == "map") {
+    walk(f, "map", perception.map_snapshot());
+  } else if (task == "footholds") {
+    walk(f, "footholds", perception.footholds_found());
+  }
+}
+
+class FieldWriter {
+ public:
+  FieldWriter(ByteWriter& out, HealthCounts* last_health) noexcept : out_(out), last_health_(last_health) {}
+  void leaf(std::string_view, int, Number auto value) noexcept { out_.put(value); }
+  void enter(std::string_view, int) noexcept {}
+  void leave() noexcept {}
+  std::size_t count(std::size_t n) noexcept {
+    out_.put(static_cast<std::uint32_t>(n));
+    return n;
+  }
+  void health(const HealthCounts& counts) noexcept {
+    const bool changed = !same_counts(counts, *last_health_);
+    out_.put(changed);
+    if (!changed) return;
+    walk_health(*this, counts);
+    *last_health_ = counts;
+  }
+
+ private:
+  ByteWriter& out_;
+  HealthCounts* last_health_;
+};
+
+// Samples alone: they have no vectors.
+class FieldReader {
+ public:
+  explicit FieldReader(ByteReader& in) noexcept : in_(in) {}
+  template <Number T>
+  void leaf(std::string_view, int, T& value) noexcept {
+    value = in_.get<T>();
+  }
+  void enter(std::string_view, int) noexcept {}
+  void leave() noexcept {}
+
+ private:
+  ByteReader& in_;
+};
+
+// Bits and value of both sides: "0x3ff0000000000000 (1)".
+template <Number T>
+[[nodiscard]] std::string text_of_number(T value) {
+  char text[80];
+  if constexpr (std::is_floating_point_v<T>) {
+    std::snprintf(text, sizeof text, "0x%016llx (%.17g)",
+                  static_cast<unsigned long long>(std::bit_cast<std::uint64_t>(value)), value);
+  } else if constexpr (std::is_signed_v<T>) {
+    std::snprintf(text, sizeof text, "0x%llx (%lld)",
+                  static_cast<unsigned long long>(static_cast<std::make_unsigned_t<T>>(value)),
+                  static_cast<long long>(value));
+  } else {
+    std::snprintf(text, sizeof text, "0x%llx (%llu)", static_cast<unsigned long long>(value),
+                  static_cast<unsigned long long>(value));
+  }
+  return text;
+}
+
+// Computed values against recorded bytes, bit by bit. Says where the first one differs; after two counts that differ
+// nothing more can be compared.
+class FieldComparer {
+ public:
+  FieldComparer(ByteReader& in, HealthCounts* last_health) noexcept : in_(in), last_health_(last_health) {}
+
+  template <Number T>
+  void leaf(std::string_view name, int index, const T& computed) {
+    if (stopped_) return;
+    if constexpr (std::is_same_v<T, bool> || std::is_enum_v<T>) {
+      compare(name, index, in_.get<std::uint8_t>(), static_cast<std::uint8_t>(computed));
+    } else {
+      compare(name, index, in_.get<T>(), computed);
+    }
+  }
+  void enter(std::string_view name, int index) noexcept {
+    if (depth_ < path_.size()) path_[depth_] = {name, index};
+    ++depth_;
+  }
+  void leave() noexcept { --depth_; }
+  std::size_t count(std::size_t computed) {
+    if (stopped_) return 0;
+    const auto recorded = in_.get<std::uint32_t>();
+    compare("size", -1, recorded, static_cast<std::uint32_t>(computed));
+    stopped_ = stopped_ || recorded != computed;
+    return stopped_ ? 0 : computed;
+  }
+  void health(const HealthCounts& computed) {
+    if (in_.get<bool>()) {
+      FieldReader reader(in_);
+      for (EventCount& recorded : *last_health_) walk(reader, "", recorded);
+    }
+    if (in_.failed()) return;
+    std::array<std::byte, sizeof(HealthCounts)> memory;
+    ByteWriter bytes(memory);
+    FieldWriter writer(bytes, nullptr);
+    walk_health(writer, *last_health_);
+    ByteReader recorded(bytes.bytes());
+    FieldComparer of_health(recorded, nullptr);
+    walk_health(of_health, computed);
+    if (difference_.empty()) difference_ = of_health.difference_;
+  }
+
+  template <Number T>
+  void compare(std::string_view name, int index, T recorded, T computed) {
+    if (in_.failed()) stopped_ = true;
+    if (stopped_ || std::memcmp(&recorded, &computed, sizeof(T)) == 0 || !difference_.empty()) return;
+    difference_ =
+        path(name, index) + ": recorded " + text_of_number(recorded) + ", computed " + text_of_number(computed);
+  }
+  // Empty, or the first one's field, recorded and computed value.
+  [[nodiscard]] const std::string& difference() const noexcept { return difference_; }
+  // Two counts differed: what follows in the record was not read.
+  [[nodiscard]] bool stopped() const noexcept { return stopped_; }
+
+ private:
+  struct Step {
+    std::string_view name;
+    int index = -1;
+  };
+  [[nodiscard]] std::string path(std::string_view name, int index) const {
+    std::string text;
+    const auto add = [&text](const Step& step) {
+      if (!text.empty() && !step.name.empty()) text += '.';
+      text += step.name;
+      if (step.index >= 0) text.append("[").append(std::to_string(step.index)).append("]");
+    };
+    for (std::size_t i = 0; i < std::min(depth_, path_.size()); ++i) add(path_[i]);
+    add({name, index});
+    return text;
+  }
+
+  ByteReader& in_;
+  HealthCounts* last_health_;
+  std::array<Step, 12> path_{};
+  std::size_t depth_ = 0;
+  bool stopped_ = false;
+  std::string difference_;
+};
+
+}  // namespace polygmap::recording

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "firmware/recording/replay.hpp"
+
+#include <memory>
+#include <set>
+
+#include "firmware/recording/recording_file.hpp"
+
+namespace polygmap::recording {
+namespace {
+
+// The ports of a module that lives its row once more: each call gets the answer that was recorded.
+class ReplayedPorts final : public hal::DepthCamera, public hal::Imu, public hal::JointBus, public hal::LidarOdometry {
+ public:
+  explicit ReplayedPorts(RecordingFile& file)
+      : file_(file),
+        pixels_(static_cast<std::size_t>(file.camera().width_px) * static_cast<std::size_t>(file.camera().height_px)) {}
+
+  void begin_row(const RowCall& row) {
+    row_ = &row;
+    next_ = 0;
+    difference_.clear();
+  }
+  // Empty, or the row's first call that was not the recorded one.
+  [[nodiscard]] const std::string& end_row() {
+    if (next_ < row_->calls.size()) differ("nothing more", row_->calls[next_].kind);
+    return difference_;
+  }
+  [[nodiscard]] bool unreadable() const noexcept { return unreadable_; }
+
+  [[nodiscard]] CameraIntrinsics intrinsics() const noexcept override { return file_.camera(); }
+  [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept override {
+    const PortCall* call = next(CallKind::kAcquire);
+    if (call == nullptr || !call->gave) return false;
+    if (call->picture.pixels == Pixels::kStored)
+      unreadable_ = unreadable_ || !file_.read_picture(call->picture, pixels_);
+    frame = call->frame;
+    frame.depth =
+        call->picture.pixels == Pixels::kStored ? pixels_.data() : nullptr;  // of another size: refused anyway
+    return true;
+  }
+  void release() noexcept override { (void)next(CallKind::kRelease); }
+  [[nodiscard]] bool try_read(ImuSample& sample) noexcept override {
+    const PortCall* call = next(CallKind::kReadImu);
+    if (call == nullptr || !call->gave) return false;
+    sample = call->imu;
+    return true;
+  }
+  [[nodiscard]] bool try_read(JointFeedback& feedback) noexcept override {
+    const PortCall* call = next(CallKind::kReadJoints);
+    if (call == nullptr || !call->gave) return false;
+    feedback = call->joints;
+    return true;
+  }
+  [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override {
+    const PortCall* call = next(CallKind::kWriteJoints);
+    if (call == nullptr) return JointSet::all();
+    if (difference_.empty()) difference_ = difference_of(call->command, command);
+    return call->taken;
+  }
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override {
+    const PortCall* call = next(CallKind::kJointStatus);
+    return call == nullptr ? hal::JointBusStatus{} : call->status;
+  }
+  [[nodiscard]] bool try_read(LioSample& sample) noexcept override {
+    const PortCall* call = next(CallKind::kReadLidar);
+    if (call == nullptr || !call->gave) return false;
+    sample = call->lio;
+    return true;
+  }
+
+ private:
+  // The next recorded call when it is of this kind; else the module does something else than it did.
+  [[nodiscard]] const PortCall* next(CallKind kind) const noexcept {
+    if (next_ < row_->calls.size() && row_->calls[next_].kind == kind) return &row_->calls[next_++];
+    differ(std::string(name_of(kind)), next_ < row_->calls.size() ? row_->calls[next_].kind : CallKind{});
+    return nullptr;
+  }
+  void differ(const std::string& computed, CallKind recorded) const {
+    if (!difference_.empty()) return;
+    difference_ = "call " + std::to_string(next_) + " of a port: recorded " + std::string(name_of(recorded)) +
+                  ", computed " + computed;
+  }
+  [[nodiscard]] static std::string difference_of(const JointCommand& recorded, const JointCommand& computed) {
+    std::array<std::byte, sizeof(JointCommand)> memory;
+    ByteWriter bytes(memory);
+    FieldWriter writer(bytes, nullptr);
+    walk(writer, "", recorded);
+    ByteReader in(bytes.bytes());
+    FieldComparer comparer(in, nullptr);
+    walk(comparer, "joints.try_write", computed);
+    return comparer.difference();
+  }
+
+  RecordingFile& file_;
+  std::vector<std::uint16_t> pixels_;
+  const RowCall* row_ = nullptr;
+  mutable std::size_t next_ = 0;  // a const port call is one, too
+  bool unreadable_ = false;
+  mutable std::string difference_;
+};
+
+class Replay {
+ public:
+  explicit Replay(RecordingFile& file)
+      : file_(file),
+        ports_(file),
+        module_(std::make_unique<Pipeline>(Ports{ports_, ports_, ports_, ports_}, file.params())) {}
+
+  // False when the file cannot be read on.
+  [[nodiscard]] bool run(ReplayResult& result) {
+    Record record;
+    while (file_.read(record)) {
+      switch (record.kind) {
+        case RecordKind::kRow:
+          if (!run_row(record.row, result)) return false;
+          break;
+        case RecordKind::kEvent:
+          module_->lane_health(record.event.lane).raise(record.event.event, record.event.at_ns, record.event.times);
+          break;
+        case RecordKind::kStop:
+          module_->control().request_stop();
+          break;
+        case RecordKind::kCycle:
+          result.ticks += record.cycle_lane == kControlLane ? 1U : 0U;
+          break;
+        case RecordKind::kEnd:
+          result.differ = differing_ns_.size();
+          return true;
+      }
+    }
+    result.differ = differing_ns_.size();
+    return false;
+  }
+
+ private:
+  [[nodiscard]] bool run_row(const RowCall& row, ReplayResult& result) {
+    const std::size_t lane = kTasks[row.row].row.lane;
+    if (first_ns_ < 0) first_ns_ = row.cycle_ns;
+    module_->lane_finished(1 - lane, row.other_finished_ns);
+    ports_.begin_row(row);
+    WorkBudget budget(row.units);
+    const Progress progress = module_->run_row(row.row, row.cycle_ns, budget);
+    if (ports_.unreadable()) return false;
+    std::string difference = ports_.end_row();
+
+    ByteReader outputs = row.outputs;
+    FieldComparer comparer(outputs, &last_health_[lane]);
+    comparer.compare("progress", -1, row.progress, static_cast<std::uint8_t>(progress));
+    comparer.compare("units_left", -1, row.units_left, budget.left());
+    // What a row leaves depends on how it ended: the recorded outputs are those of the recorded end.
+    const bool ended_alike = row.progress == static_cast<std::uint8_t>(progress);
+    if (ended_alike) walk_outputs(comparer, *module_, row.row, progress);
+    if (outputs.failed() || (ended_alike && !comparer.stopped() && !outputs.at_end())) {
+      return file_.complain("a row whose outputs cannot be");
+    }
+    if (difference.empty()) difference = comparer.difference();
+    if (difference.empty()) return true;
+    differing_ns_.insert(row.cycle_ns);
+    if (result.difference.empty()) {
+      result.difference = "tick " + std::to_string((row.cycle_ns - first_ns_) / kCycle_ns) + ", " +
+                          std::string(kTasks[row.row].row.task) + ", " + difference;
+    }
+    return true;
+  }
+
+  RecordingFile& file_;
+  ReplayedPorts ports_;
+  std::unique_ptr<Pipeline> module_;
+  std::array<HealthCounts, kLaneCount> last_health_{};
+  std::set<std::int64_t> differing_ns_;
+  std::int64_t first_ns_ = -1;
+};
+
+}  // namespace
+
+ReplayResult replay(const std::string& directory) {
+  ReplayResult result;
+  RecordingFile file;
+  if (!file.open(directory) || !Replay(file).run(result)) {
+    result.complaint = file.complaint();
+    return result;
+  }
+  result.verdict = result.differ == 0 ? ReplayVerdict::kSame : ReplayVerdict::kDiffers;
+  return result;
+}
+
+std::string text_of(const ReplayResult& result) {
+  std::string text;
+  if (!result.difference.empty()) text += "first difference: " + result.difference + "\n";
+  if (result.verdict == ReplayVerdict::kUnreadable) return text + result.complaint + "\n";
+  return text + "replay: " + std::to_string(result.ticks) + " ticks, " + std::to_string(result.differ) + " differ\n";
+}
+
+}  // namespace polygmap::recording

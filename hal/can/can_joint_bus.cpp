@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/can/can_joint_bus.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace polygmap::hal {
+namespace {
+
+constexpr void count(std::uint32_t& counter, std::uint32_t times = 1) noexcept {
+  const std::uint32_t room = std::numeric_limits<std::uint32_t>::max() - counter;
+  counter += std::min(times, room);
+}
+
+}  // namespace
+
+CanJointBus::CanJointBus(const DriveTable& table, std::span<CanChannel* const> channels) noexcept : table_(table) {
+  std::copy_n(channels.begin(), std::min(channels.size(), channels_.size()), channels_.begin());
+  feedback_.silent_cycles.fill(JointFeedback::kNeverHeard);
+  feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
+  status_.senses_feet = table.feet.present;
+}
+
+bool CanJointBus::try_read(JointFeedback& feedback) noexcept {
+  replied_ = {};
+  for (std::size_t bus = 0; bus < kMaxBuses; ++bus) {
+    if (channels_[bus] == nullptr) continue;
+    std::array<CanFrame, 16> frames;
+    for (std::size_t taken = 0; taken < kMaxFramesPerRead;) {
+      const std::size_t came = channels_[bus]->read(frames);
+      for (std::size_t i = 0; i < came; ++i) take(bus, frames[i]);
+      taken += came;
+      if (came < frames.size()) break;
+    }
+  }
+  count_bus_offs();
+  if (replied_.is_empty()) return false;
+  feedback_.stamp_ns = command_ns_;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (!heard_.contains(n)) continue;
+    const std::int64_t cycles = (command_ns_ - replied_ns_[n]) / kBusCycle_ns;
+    feedback_.silent_cycles[n] =
+        static_cast<std::uint16_t>(std::clamp<std::int64_t>(cycles, 0, JointFeedback::kNeverHeard - 1));
+  }
+  status_.feet_silent = table_.feet.present && (feet_ns_ < 0 || command_ns_ - feet_ns_ > kFeetHold_ns);
+  if (status_.feet_silent) feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
+  feedback = feedback_;
+  return true;
+}
+
+void CanJointBus::take(std::size_t bus, const CanFrame& frame) noexcept {
+  // What came before the first command answers nobody; of errors the channel keeps count.
+  if (frame.error || command_ns_ < 0) return;
+  const std::span<const std::uint8_t> bytes(frame.data.data(), std::min<std::size_t>(frame.length, 8));
+  bool known = false;
+  const auto is_from = [&](std::uint32_t id) { return !frame.extended && frame.id == id; };
+  if (table_.feet.present && table_.feet.bus == bus && is_from(table_.feet.id)) return take_feet(frame);
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const CanDrive& drive = table_.drives[n];
+    if (drive.bus != bus || !is_from(drive.reply_id)) continue;
+    known = true;
+    if (bytes.empty() || name_in_reply(bytes, drive.reply) != reply_name(drive.id, drive.reply)) continue;
+    return take_reply(n, frame);
+  }
+  count(known ? status_.bad_frames : status_.unknown_ids);
+}
+
+void CanJointBus::take_feet(const CanFrame& frame) noexcept {
+  const std::span<const std::uint8_t> bytes(frame.data.data(), std::min<std::size_t>(frame.length, frame.data.size()));
+  if (frame.fd || !try_decode_feet(bytes, table_.feet.unit_n, feedback_.foot_force_n)) return count(status_.bad_frames);
+  feet_ns_ = command_ns_;
+}
+
+void CanJointBus::take_reply(std::size_t joint, const CanFrame& frame) noexcept {
+  const CanDrive& drive = table_.drives[joint];
+  const std::span<const std::uint8_t> bytes(frame.data.data(), std::min<std::size_t>(frame.length, frame.data.size()));
+  MitReply reply;
+  if (frame.fd || !try_decode_reply(bytes, drive.id, drive.ranges, drive.reply, reply)) {
+    return count(status_.bad_frames);
+  }
+  if (!reply.enabled && !heard_.contains(joint)) return;  // it is sent the frame that enters motor mode again
+  const bool error = reply.error || !reply.enabled;
+  JointSet errors = JointSet::of_bits(status_.drive_errors.bits() & ~(1U << joint));
+  if (error) {
+    errors.insert(joint);
+    count(status_.drive_error_replies);
+  }
+  status_.drive_errors = errors;
+  status_.drive_code[joint] = error ? reply.status : std::uint8_t{0};
+
+  const auto i = static_cast<Eigen::Index>(joint);
+  feedback_.q_rad[i] = reply.p_rad;
+  feedback_.dq_radps[i] = reply.v_radps;
+  feedback_.tau_nm[i] = reply.t_nm;
+  replied_ns_[joint] = command_ns_;
+  heard_.insert(joint);
+  replied_.insert(joint);
+}
+
+JointSet CanJointBus::try_write(const JointCommand& command) noexcept {
+  command_ns_ = command.stamp_ns;
+  const bool enters = writes_++ % 2 == 0;
+  JointFrames frames{};
+  JointSet made;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (!try_encode_command(command.joints[n], table_.drives[n].ranges, frames[n], status_.clamped)) {
+      count(status_.not_finite);
+      continue;
+    }
+    if (enters && !heard_.contains(n)) frames[n] = special_frame(MitSpecial::kEnter);
+    made.insert(n);
+  }
+  return send(frames, made);
+}
+
+JointSet CanJointBus::send_to_all(MitSpecial special) noexcept {
+  JointFrames frames;
+  frames.fill(special_frame(special));
+  return send(frames, JointSet::all());
+}
+
+JointSet CanJointBus::send(const JointFrames& frames, JointSet joints) noexcept {
+  JointSet taken;
+  for (std::size_t bus = 0; bus < kMaxBuses; ++bus) {
+    std::array<CanFrame, kJointCount> queue;
+    std::array<std::size_t, kJointCount> joint_of{};
+    std::size_t queued = 0;
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      if (table_.drives[n].bus != bus || !joints.contains(n)) continue;
+      CanFrame& frame = queue[queued];
+      frame.id = table_.drives[n].id;
+      frame.length = static_cast<std::uint8_t>(frames[n].size());
+      std::ranges::copy(frames[n], frame.data.begin());
+      joint_of[queued++] = n;
+    }
+    if (queued == 0) continue;
+    const std::size_t sent =
+        channels_[bus] == nullptr ? 0 : std::min(channels_[bus]->write({queue.data(), queued}), queued);
+    for (std::size_t i = 0; i < sent; ++i) taken.insert(joint_of[i]);
+    count(status_.refused, static_cast<std::uint32_t>(queued - sent));
+  }
+  count_bus_offs();
+  return taken;
+}
+
+void CanJointBus::count_bus_offs() noexcept {
+  status_.bus_off = false;
+  status_.lost = status_.failed_calls = 0;
+  for (std::size_t bus = 0; bus < kMaxBuses; ++bus) {
+    if (channels_[bus] == nullptr) continue;
+    const CanChannelStatus channel = channels_[bus]->status();
+    if (channel.bus_off && !was_off_[bus]) count(status_.bus_offs);
+    was_off_[bus] = channel.bus_off;
+    status_.bus_off |= channel.bus_off;
+    count(status_.lost, channel.lost);
+    count(status_.failed_calls, channel.failed_calls);
+  }
+}
+
+JointBusStatus CanJointBus::status() const noexcept { return status_; }
+
+}  // namespace polygmap::hal

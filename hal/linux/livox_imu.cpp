@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal/linux/livox_imu.hpp"
+
+namespace polygmap::hal {
+
+DeviceError LivoxImu::open(const Config& config) noexcept {
+  check_crc_ = config.check_crc;
+  base_R_imu_ = config.base_R_imu;
+  clock_ = SampleClock(config.time);
+  started_ = false;
+  last_stamp_ns_ = INT64_MIN;
+  waiting_.clear();
+  return socket_.open(config.udp, calls_);
+}
+
+bool LivoxImu::try_read(ImuSample& sample) noexcept {
+  if (waiting_.empty()) {
+    socket_.drain([this](const Datagram& datagram) noexcept { take(datagram); });
+  }
+  return waiting_.try_pop(sample);
+}
+
+bool LivoxImu::decoded(const Datagram& datagram, codec::LivoxImuPacket& packet) noexcept {
+  switch (codec::decode(datagram.bytes, check_crc_, packet)) {
+    case codec::LivoxDecode::kGood:
+      return true;
+    case codec::LivoxDecode::kShort:
+      count_up(counters_.too_short);
+      break;
+    case codec::LivoxDecode::kLong:
+      count_up(counters_.too_long);
+      break;
+    case codec::LivoxDecode::kForeign:
+      count_up(counters_.foreign);
+      break;
+    case codec::LivoxDecode::kCorrupted:
+      count_up(counters_.corrupted);
+      break;
+    case codec::LivoxDecode::kInvalid:
+      count_up(counters_.invalid);
+      break;
+  }
+  return false;
+}
+
+void LivoxImu::take(const Datagram& datagram) noexcept {
+  codec::LivoxImuPacket packet;
+  if (!decoded(datagram, packet)) return;
+  if (started_ && packet.time != time_) {
+    count_up(counters_.clock_changed);
+    clock_.restart();
+  }
+  started_ = true;
+  time_ = packet.time;
+  ImuSample sample;
+  if (!clock_.timely(packet.stamp_ns, datagram.arrival_ns, sample.stamp_ns, counters_.time)) return;
+  if (sample.stamp_ns <= last_stamp_ns_) {
+    count_up(sample.stamp_ns == last_stamp_ns_ ? counters_.repeated : counters_.out_of_order);
+    return;
+  }
+  last_stamp_ns_ = sample.stamp_ns;
+  const auto in_base = [this](const std::array<float, 3>& x) noexcept -> Vec3 {
+    return base_R_imu_ * Vec3(double{x[0]}, double{x[1]}, double{x[2]});
+  };
+  sample.gyro_radps = in_base(packet.gyro_radps);
+  sample.accel_mps2 = in_base(packet.accel_mps2);
+  count_up(counters_.good);
+  if (waiting_.full()) count_up(counters_.overwritten);
+  waiting_.push_overwrite(sample);
+}
+
+}  // namespace polygmap::hal

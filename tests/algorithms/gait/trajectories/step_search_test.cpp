@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+// Steps as a whole, their knots and the proof that the legs can do them.
+#include "algorithms/gait/trajectories/step_search.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/nominal_robot.hpp"
+
+namespace polygmap {
+namespace {
+
+StepPlan stair_step(StepKind kind, double rise_m, double ahead_m, std::array<Transform, kFootCount>& soles,
+                    TorsoTrajectory::State& from) {
+  const SolePose left{{kind == StepKind::kTrailing ? ahead_m : 0.0, 0.1, kind == StepKind::kTrailing ? rise_m : 0.0},
+                      0};
+  const SolePose right{{0, -0.1, 0}, 0};
+  soles = {left.transform(), right.transform()};
+  StepGoal goal;
+  goal.kind = kind;
+  goal.foot = kind == StepKind::kLeading ? Foot::kLeft : Foot::kRight;
+  goal.target = {{ahead_m, side_sign(goal.foot) * 0.1, rise_m}, 0};
+  const StepParams params;
+  if (kind == StepKind::kTrailing) {
+    StepGoal lead = goal;
+    lead.kind = StepKind::kLeading;
+    lead.foot = Foot::kLeft;
+    lead.target = left;
+    const StepPlan before = plan_step(params, lead, {SolePose{{0, 0.1, 0}, 0}, right}, kStepTries[0]);
+    const auto start = TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.0, 0.79}});
+    const StepKnots knots(nominal_robot(), params, params.knot_ticks, before, start,
+                          {SolePose{{0, 0.1, 0}, 0}.transform(), right.transform()});
+    from = TorsoTrajectory::at_rest({Mat3::Identity(), knots.torso_at_landing().position_m});
+    TorsoTrajectory::set_horizontal(from, knots.com_at_landing());
+  } else {
+    from = TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.0, 0.79}});
+  }
+  return plan_step(params, goal, {left, right}, kStepTries[0]);
+}
+
+TEST(StepKnots_Eq30Eq37, WholeStep_KnotsAreEvenInTimeAndEndOnTheTarget) {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  const StepPlan plan = stair_step(StepKind::kLeading, 0.13, 0.28, soles, from);
+  const StepParams params;
+  const StepKnots knots(nominal_robot(), params, params.knot_ticks, plan, from, soles);
+  ASSERT_EQ(knots.count(), 1 + (plan.shift_ticks + plan.swing_ticks + params.knot_ticks - 1) / params.knot_ticks);
+  for (std::int32_t i = 0; i < knots.count(); ++i) EXPECT_EQ(knots[i].tick, params.knot_ticks * i);
+  const StepKnot last = knots[knots.count() - 1];
+  EXPECT_LT((last.odom_T_sole[0].p_m - plan.goal.target.position_m).norm(), 1e-9);
+  EXPECT_NEAR(last.odom_T_base.p_m.z(), knots.torso_at_landing().position_m.z(), 1e-9);
+  EXPECT_LT((knots[0].odom_T_sole[0].p_m - soles[0].p_m).norm(), 1e-12);
+}
+
+// Every rise and tread that the module climbs, from the floor and from a tread, at both ends of the stand-off.
+TEST(StepSearch, RisesAndTreadsOfTheStairs_LegsCanDoAllOfThem) {
+  StepParams params;
+  params.knot_ticks = 2;
+  for (const double rise : {0.10, 0.12, 0.13, 0.15, 0.17, 0.175}) {
+    for (const double ahead : {0.27, 0.275, 0.285, 0.29, 0.298, 0.308}) {
+      for (const StepKind kind : {StepKind::kLeading, StepKind::kTrailing}) {
+        std::array<Transform, kFootCount> soles;
+        TorsoTrajectory::State from;
+        const StepPlan plan = stair_step(kind, rise, ahead, soles, from);
+        const StepKnots knots(nominal_robot(), params, params.knot_ticks, plan, from, soles);
+        StepFeasibility proof;
+        proof.begin(nominal_robot(), knots);
+        ASSERT_TRUE(proof.advance(nominal_robot(), params, knots.count()));
+        const StepCheck& check = proof.check();
+        EXPECT_TRUE(check.feasible) << rise << " " << ahead << " kind " << static_cast<int>(kind) << ": margin "
+                                    << check.joint_margin_rad << " knee " << check.knee_rad << " speed "
+                                    << check.speed_share;
+      }
+    }
+  }
+}
+
+// The leg left behind on the lower tread: with a level sole its ankle runs out of range.
+TEST(StepFeasibility, TrailingSwingWithALevelSole_MeetsTheAnklesLimitThatAPitchedOneKeepsOff) {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  StepPlan plan = stair_step(StepKind::kTrailing, 0.17, 0.28, soles, from);
+  StepParams params;
+  params.joint_margin_rad = 0.0;
+  const auto ankle_margin_rad = [&](double toe_down_rad) {
+    plan.shape.toe_down_rad = toe_down_rad;
+    const StepKnots knots(nominal_robot(), params, params.knot_ticks, plan, from, soles);
+    StepFeasibility proof;
+    proof.begin(nominal_robot(), knots);
+    EXPECT_TRUE(proof.advance(nominal_robot(), params, knots.count()));
+    return proof.check().joint_margin_rad;
+  };
+  EXPECT_LT(ankle_margin_rad(0.0), 0.0);
+  EXPECT_GT(ankle_margin_rad(kStepTries[0].toe_down_rad), StepParams{}.joint_margin_rad);
+}
+
+StepSearch::State finish(StepSearch& search, const StepParams& params = {}, int most_calls = 1000) {
+  while (most_calls-- > 0 && search.step(nominal_robot(), params) == StepSearch::State::kSearching) {
+  }
+  return search.state();
+}
+
+// The rear foot, on the floor, passes the one that has just landed on the first tread.
+struct PassingStep {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  StepGoal goal, trailing;
+};
+PassingStep passing_step(double rise_m, double ahead_m) {
+  PassingStep step;
+  (void)stair_step(StepKind::kTrailing, rise_m, ahead_m, step.soles, step.from);
+  step.goal = {StepKind::kPassing, Foot::kRight, {{ahead_m + 0.28, -0.1, 2 * rise_m}, 0}, {}};
+  step.trailing = {StepKind::kTrailing, Foot::kLeft, {{ahead_m + 0.28, 0.1, 2 * rise_m}, 0}, {}};
+  return step;
+}
+StepSearch searched(const PassingStep& step, const StepParams& params = {}) {
+  StepSearch search;
+  search.begin(nominal_robot(), params, step.goal, step.trailing, params.durations.stair_shift_ticks, step.from,
+               step.soles);
+  finish(search, params);
+  return search;
+}
+
+TEST(StepSearch, PassingStepOfTheStairs_IsFoundWithTheTrailingStepAfterIt) {
+  for (const double rise : {0.10, 0.13, 0.15, 0.17}) {
+    for (const double ahead : {0.27, 0.285, 0.308}) {
+      const StepSearch search = searched(passing_step(rise, ahead));
+      EXPECT_EQ(search.state(), StepSearch::State::kFound) << rise << " " << ahead;
+      EXPECT_EQ(search.plan().goal.kind, StepKind::kPassing);
+      EXPECT_EQ(search.plan().swing_ticks, StepParams{}.durations.passing_swing_ticks);
+    }
+  }
+}
+
+TEST(StepSearch, PassingStepThatIsPossibleWithNoTrailingStepAfterIt_IsImpossible) {
+  PassingStep step = passing_step(0.13, 0.28);
+  step.trailing.target.position_m.z() += 0.3;
+  EXPECT_EQ(searched(step).state(), StepSearch::State::kImpossible);
+  StepParams fast;
+  fast.durations.passing_swing_ticks = 300;
+  EXPECT_EQ(searched(passing_step(0.13, 0.28), fast).state(), StepSearch::State::kImpossible);
+}
+
+// The left foot onto a tread, and the right one after it.
+StepSearch leading_search(double rise_m, double ahead_m, const StepParams& params = {}) {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  const StepPlan plan = stair_step(StepKind::kLeading, rise_m, ahead_m, soles, from);
+  StepGoal trailing = plan.goal;
+  trailing.kind = StepKind::kTrailing;
+  trailing.foot = Foot::kRight;
+  trailing.target.position_m.y() = -0.1;
+  StepSearch search;
+  search.begin(nominal_robot(), params, plan.goal, trailing, params.durations.stair_shift_ticks, from, soles);
+  return search;
+}
+
+TEST(StepSearch, RiseTooFastForTheDrives_IsDoneInALongerSwing) {
+  StepParams fast;
+  fast.durations.stair_swing_ticks = 430;
+  StepSearch search = leading_search(0.182, 0.35, fast);
+  EXPECT_EQ(finish(search, fast), StepSearch::State::kFound);
+  EXPECT_GT(search.plan().swing_ticks, fast.durations.stair_swing_ticks);
+}
+
+TEST(StepSearch, RiseBeyondTheLegs_IsImpossibleBeforeTheFirstLiftOff) {
+  constexpr int kHalfAShift = 160;  // calls, one a tick: it is known before the foot would leave
+  for (const double rise : {0.30, 0.5}) {
+    StepSearch search = leading_search(rise, 0.3);
+    EXPECT_EQ(finish(search, {}, kHalfAShift), StepSearch::State::kImpossible) << rise;
+  }
+}
+
+TEST(StepSearch, ShiftFasterThanTheDrives_IsNotProvenByASlowerOne) {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  const StepPlan plan = stair_step(StepKind::kTrailing, 0.13, 0.28, soles, from);
+  from[2].position -= 0.05;  // the torso has a way to go
+  for (const std::int32_t shift_ticks : {StepParams{}.durations.stair_shift_ticks, 15}) {
+    StepSearch search;
+    search.begin(nominal_robot(), {}, plan.goal, {}, shift_ticks, from, soles);
+    EXPECT_EQ(finish(search) == StepSearch::State::kFound, shift_ticks > 15);
+  }
+}
+
+}  // namespace
+}  // namespace polygmap

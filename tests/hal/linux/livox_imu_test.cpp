@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+// On the kernel's own loopback, and with its answers replaced.
+#include "hal/linux/livox_imu.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "sim_stub/heap_trap.hpp"
+#include "tests/hal/linux/clock_now.hpp"
+#include "tests/hal/linux/scripted_calls.hpp"
+#include "tests/hal/linux/udp_sender.hpp"
+#include "tests/support/port_contract.hpp"
+
+namespace polygmap {
+namespace {
+
+using codec::LivoxImuPacket;
+using PacketBytes = std::array<std::uint8_t, codec::kLivoxImuPacket_bytes>;
+
+[[nodiscard]] PacketBytes bytes_of(const LivoxImuPacket& packet) {
+  PacketBytes bytes{};
+  codec::encode(packet, bytes);
+  return bytes;
+}
+
+struct Fixture {
+  test::ScriptedCalls calls;
+  std::uint16_t port_number = test::free_udp_port();
+  test::UdpSender sender{port_number};
+  hal::LivoxImu imu{calls.table()};
+  LivoxImuPacket next{.stamp_ns = test::monotonic_now_ns() - 500'000'000,
+                      .gyro_radps = {0.1F, 0.2F, 0.3F},
+                      .accel_mps2 = {0.0F, 0.0F, codec::kStandardGravity_mps2}};
+
+  explicit Fixture(hal::TimeBase base = hal::TimeBase::kMonotonic) {
+    open({.udp = {.port = port_number}, .time = {.base = base, .most_age_ns = test::half_of_uptime_ns()}});
+  }
+  void open(const hal::LivoxImu::Config& config) {
+    const hal::DeviceError error = imu.open(config);
+    EXPECT_FALSE(error.failed()) << error.sentence();
+  }
+  hal::Imu& port() { return imu; }
+  std::int64_t feed(std::int64_t step_ns = 1'000'000) {
+    next.stamp_ns += step_ns;
+    ++next.udp_count;
+    sender.send(bytes_of(next));
+    return next.stamp_ns;
+  }
+  int read_all() {
+    const heap::ModuleCall trap("LivoxImu::try_read");
+    int count = 0;
+    for (ImuSample sample; imu.try_read(sample);) ++count;
+    return count;
+  }
+};
+
+}  // namespace
+
+namespace contract {
+struct LivoxImuHarness : Fixture {
+  static constexpr int kFlood = 200;
+};
+INSTANTIATE_TYPED_TEST_SUITE_P(Livox, ImuContract, LivoxImuHarness);
+}  // namespace contract
+
+namespace {
+
+TEST(LivoxImu, TryRead_MountTurned_SampleIsInTheBaseFrame) {
+  Fixture f;
+  f.imu.close();
+  f.open({.udp = {.port = f.port_number},
+          .time = {.base = hal::TimeBase::kMonotonic, .most_age_ns = test::half_of_uptime_ns()},
+          .base_R_imu = rotation_x(kPi)});
+  f.feed();
+  ImuSample s;
+  ASSERT_TRUE(f.imu.try_read(s));
+  EXPECT_LT((s.gyro_radps - Vec3(0.1, -0.2, -0.3)).norm(), 1e-7);
+  EXPECT_LT((s.accel_mps2 - Vec3(0.0, 0.0, -9.80665)).norm(), 1e-5);
+}
+
+TEST(LivoxImu, TryRead_BadDatagrams_EachCountedByItsName) {
+  Fixture f;
+  f.next.stamp_ns += 1;
+  const PacketBytes good = bytes_of(f.next);
+  std::vector<std::uint8_t> longer(good.begin(), good.end());
+  f.sender.send(std::span(good).first(35));
+  f.sender.send(std::span(good).first(59));
+  longer.push_back(0);
+  f.sender.send(longer);
+  PacketBytes other = good;
+  other[10] = 1;  // points
+  f.sender.send(other);
+  other = good;
+  other[40] ^= 1;
+  f.sender.send(other);
+  LivoxImuPacket wild = f.next;
+  wild.accel_mps2[0] = 1e30F;
+  f.sender.send(bytes_of(wild));
+  EXPECT_EQ(f.read_all(), 0);
+  const auto& c = f.imu.counters();
+  EXPECT_EQ(c.too_short, 2U);
+  EXPECT_EQ(c.too_long, 1U);
+  EXPECT_EQ(c.foreign, 1U);
+  EXPECT_EQ(c.corrupted, 1U);
+  EXPECT_EQ(c.invalid, 1U);
+  f.sender.send(good);
+  f.sender.send(good);
+  EXPECT_EQ(f.read_all(), 1);
+  EXPECT_EQ(c.repeated, 1U);
+  f.next.stamp_ns -= 1000;
+  f.sender.send(bytes_of(f.next));
+  EXPECT_EQ(f.read_all(), 0);
+  EXPECT_EQ(c.out_of_order, 1U);
+}
+
+TEST(LivoxImu, TryRead_StampOff_CountedByItsName) {
+  Fixture f;
+  f.next.stamp_ns = 1;
+  f.sender.send(bytes_of(f.next));
+  f.next.stamp_ns = test::monotonic_now_ns() + 60'000'000'000;
+  f.sender.send(bytes_of(f.next));
+  EXPECT_EQ(f.read_all(), 0);
+  EXPECT_EQ(f.imu.counters().time.late, 1U);
+  EXPECT_EQ(f.imu.counters().time.early, 1U);
+}
+
+TEST(LivoxImu, TryRead_CrcOff_BelievesAnyCrc) {
+  Fixture f;
+  f.imu.close();
+  f.open({.udp = {.port = f.port_number},
+          .check_crc = false,
+          .time = {.base = hal::TimeBase::kMonotonic, .most_age_ns = test::half_of_uptime_ns()}});
+  f.next.stamp_ns += 1;
+  PacketBytes bytes = bytes_of(f.next);
+  bytes[24] ^= 0xFF;
+  f.sender.send(bytes);
+  EXPECT_EQ(f.read_all(), 1);
+}
+
+TEST(LivoxImu, TryRead_LidarStartsAnew_StampsGoOnInMonotonicTime) {
+  Fixture f(hal::TimeBase::kEstimated);
+  f.next.stamp_ns = 40'000'000'000;  // 40 s after the lidar's start
+  ImuSample last, s;
+  for (int i = 0; i < 30; ++i) {
+    f.feed(0);
+    f.next.stamp_ns += 5'000;  // faster than it would come: the test does not wait
+    while (f.imu.try_read(s)) last = s;
+  }
+  const std::int64_t before_ns = last.stamp_ns;
+  EXPECT_NEAR(static_cast<double>(before_ns), static_cast<double>(test::monotonic_now_ns()), 50e6);
+  f.next.stamp_ns = 1'000'000'000;
+  int taken = 0;
+  for (int i = 0; i < 60; ++i) {
+    f.feed(5'000);
+    while (f.imu.try_read(s)) {
+      ++taken;
+      EXPECT_GT(s.stamp_ns, before_ns);
+    }
+  }
+  EXPECT_EQ(f.imu.counters().time.clock_jumped, 19U);
+  EXPECT_GT(taken, 0);
+}
+
+TEST(LivoxImu, TryRead_OtherTimeType_EstimatesAnewAtOnce) {
+  Fixture f(hal::TimeBase::kEstimated);
+  f.feed();
+  EXPECT_EQ(f.read_all(), 1);
+  f.next.time = codec::LivoxTime::kPtp;
+  f.next.stamp_ns = 1'700'000'000'000'000'000;
+  f.feed();
+  EXPECT_EQ(f.read_all(), 1);
+  EXPECT_EQ(f.imu.counters().clock_changed, 1U);
+  EXPECT_EQ(f.imu.counters().time.clock_jumped, 0U);
+}
+
+TEST(LivoxImu, EveryReceiveFault_OnceOpen_IsCountedAndLosesNothing) {
+  for (const int error_number : test::kErrors) {
+    Fixture f;
+    f.feed();
+    f.calls.fail(test::Call::kRecvmmsg, error_number);
+    const int first = f.read_all();
+    EXPECT_EQ(first + f.read_all(), 1) << error_number;
+    const auto& c = f.imu.udp_counters();
+    EXPECT_EQ(c.interrupted + c.failed_calls, error_number == EAGAIN ? 0U : 1U) << error_number;
+  }
+}
+
+TEST(LivoxImu, TryRead_KernelSaysMoreBytesThanThereIsRoomFor_ReadsNoneBeyond) {
+  Fixture f;
+  f.feed();
+  f.calls.after_recvmmsg = [](mmsghdr* messages, int n) {
+    for (int i = 0; i < n; ++i) messages[i].msg_len = 100'000;
+  };
+  EXPECT_EQ(f.read_all(), 0);
+  EXPECT_EQ(f.imu.counters().too_long, 1U);
+}
+
+}  // namespace
+}  // namespace polygmap
