@@ -279,7 +279,8 @@ void FootholdSearch::find_next(std::int32_t row) noexcept {
 bool FootholdSearch::fits(const Vec2& p_m, const LevelSurface& surface) noexcept {
   work_.add(85);
   work_.add(surface.edges.size() + surface.toe.size() + surface.obstacles.size(), 12);
-  return in_range(base_(p_m), params_.raster.g_range_m) && below_limit(surface.plane.height_m(p_m), z_foot_, params_.g_z_m) &&
+  return in_range(base_(p_m), params_.raster.g_range_m) &&
+         below_limit(surface.plane.height_m(p_m), z_foot_, params_.g_z_m) &&
          surface.spare_m(p_m) >= -params_.raster.g_res_m * std::numbers::sqrt2 / 2.0;
 }
 

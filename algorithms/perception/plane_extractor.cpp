@@ -122,8 +122,11 @@ void PlaneExtractor::join_facets() noexcept {
   const SpanBoundaries::Columns& columns = boundaries_.columns();
   const std::int32_t count = image_->column_rays.columns;
   if (next_ < count) {
-    const auto g = static_cast<std::size_t>(next_++);
-    merging_.add_column(columns[g], next_ < count ? &columns[g + 1] : nullptr, to_plane_);
+    constexpr std::int32_t kColumnsAtOnce = 8;
+    for (const std::int32_t end = std::min(next_ + kColumnsAtOnce, count); next_ < end;) {
+      const auto g = static_cast<std::size_t>(next_++);
+      merging_.add_column(columns[g], next_ < count ? &columns[g + 1] : nullptr, to_plane_);
+    }
     return;
   }
   if (!merging_.join_some(planes_, to_plane_)) return;
@@ -144,9 +147,13 @@ void PlaneExtractor::split_overhangs() noexcept {
 
 void PlaneExtractor::search_residual() noexcept {
   if (next_ == 0) begin_search();
-  search_.add_column(image_->column_rays, image_->columns, next_,
-                     boundaries_.columns()[static_cast<std::size_t>(next_)]);
-  if (++next_ < image_->column_rays.columns) return;
+  constexpr std::int32_t kColumnsAtOnce = 2;
+  const std::int32_t count = image_->column_rays.columns;
+  for (const std::int32_t end = std::min(next_ + kColumnsAtOnce, count); next_ < end; ++next_) {
+    search_.add_column(image_->column_rays, image_->columns, next_,
+                       boundaries_.columns()[static_cast<std::size_t>(next_)]);
+  }
+  if (next_ < count) return;
   take_found_planes();
   begin_fit(SpanFit::kMeasuring);
   part_ = Part::kMeasuring;

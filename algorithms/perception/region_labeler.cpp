@@ -37,8 +37,12 @@ Progress RegionLabeler::step(WorkBudget& budget) noexcept {
   return part_ == Part::kDone ? Progress::kDone : Progress::kBusy;
 }
 
-void RegionLabeler::each_column(Part next) noexcept {
-  if (++column_ < image_->column_rays.columns) return;
+template <typename Visit>
+void RegionLabeler::each_column(Part next, const Visit& visit) noexcept {
+  constexpr std::int32_t kColumnsAtOnce = 4;
+  const std::int32_t count = image_->column_rays.columns;
+  for (const std::int32_t end = std::min(column_ + kColumnsAtOnce, count); column_ < end; ++column_) visit();
+  if (column_ < count) return;
   column_ = 0;
   part_ = next;
 }
@@ -46,21 +50,18 @@ void RegionLabeler::each_column(Part next) noexcept {
 void RegionLabeler::do_piece() noexcept {
   switch (part_) {
     case Part::kLinks:
-      components_.link(boundaries_->columns(), column_);
-      return each_column(Part::kNumbers);
+      return each_column(Part::kNumbers, [this] { components_.link(boundaries_->columns(), column_); });
     case Part::kNumbers:
       if (components_.number_some()) part_ = Part::kComponents;
       return;
     case Part::kComponents:
-      components_.measure(boundaries_->columns(), column_);
-      each_column(Part::kJoin);
+      each_column(Part::kJoin, [this] { components_.measure(boundaries_->columns(), column_); });
       if (part_ == Part::kJoin) components_.begin_join(params_.components, *boundaries_, *image_, *planes_, regions_);
       return;
     case Part::kJoin:
       return join();
     case Part::kLabels:
-      label_column();
-      return each_column(Part::kInliers);
+      return each_column(Part::kInliers, [this] { label_column(); });
     case Part::kInliers:
       return check_inliers();
     case Part::kDone:

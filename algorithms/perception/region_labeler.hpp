@@ -53,7 +53,9 @@ class RegionLabeler {
 
  private:
   void do_piece() noexcept;
-  void each_column(Part next) noexcept;  // counts them, and goes on after the last
+  // Visits some columns; then comes the next part.
+  template <typename Visit>
+  void each_column(Part next, const Visit& visit) noexcept;  // counts them, and goes on after the last
   void join() noexcept;
   void label_column() noexcept;
   void check_inliers() noexcept;

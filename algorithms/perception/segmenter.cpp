@@ -33,8 +33,10 @@ std::int32_t Segmenter::do_piece() noexcept {
     }
     return self_filter_.work().take_units();
   }
-  reduce_row();
-  if (++row_ == image_.column_rays.height_px) {
+  constexpr std::int32_t kRowsAtOnce = 4;
+  const std::int32_t height_px = image_.column_rays.height_px, end = std::min(row_ + kRowsAtOnce, height_px);
+  for (; row_ < end; ++row_) reduce_row();
+  if (row_ == height_px) {
     segmentation_.finish();
     part_ = Part::kDone;
   }
@@ -50,10 +52,8 @@ void Segmenter::reduce_row() noexcept {
   }
   const bool body = image_.body_rows[static_cast<std::size_t>(row_ / 2)];
   WorkCount& work = segmentation_.work();
-  work.add(120);
-  work.add(image_.column_rays.columns, body ? 24 : 13);
-  if (row_ % 2 == 0) work.add(140);
-  constexpr std::int32_t kLater = 2;  // rows ahead that are fetched from memory
+  work.add(190 + image_.column_rays.columns * (body ? 24 : 13));  // every other row is looked at for the body
+  constexpr std::int32_t kLater = 2;                              // rows ahead that are fetched from memory
   const std::int32_t columns = image_.column_rays.columns, last = image_.column_rays.height_px - 1;
   const ReducedRow reduced = reduce_to_columns(raw_->range, raw_->row(row_), body ? flags : nullptr, columns,
                                                image_.columns.inverse_depth.row(row_), image_.columns.valid.row(row_),

@@ -16,13 +16,17 @@ void SpanFit::begin(const Pass& pass, const ScanlineSegmentation::Columns& segme
 }
 
 void SpanFit::step() noexcept {
+  constexpr int kColumnsAtOnce = 2;
   switch (part_) {
     case Part::kSpans:
-      return build_column();
+      for (int i = 0; i < kColumnsAtOnce && part_ == Part::kSpans; ++i) build_column();
+      return;
     case Part::kGaps:
-      return fill_column();
+      for (int i = 0; i < kColumnsAtOnce && part_ == Part::kGaps; ++i) fill_column();
+      return;
     case Part::kScores:
-      return score_column();
+      for (int i = 0; i < kColumnsAtOnce && part_ == Part::kScores; ++i) score_column();
+      return;
     case Part::kPlaces:
       if (!boundaries_->place_some()) return;
       boundaries_->begin_refit();

@@ -11,6 +11,7 @@
 #include "algorithms/foothold/foothold_search.hpp"
 #include "algorithms/perception/map/polygon_map.hpp"
 #include "algorithms/perception/surface_extractor.hpp"
+#include "sim_stub/robot_camera.hpp"
 #include "tests/benchmarks/piece_marker.hpp"
 #include "tests/support/depth_scene.hpp"
 

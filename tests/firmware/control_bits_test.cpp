@@ -64,7 +64,8 @@ class NoisyJoints final : public hal::JointBus {
     for (double& force_n : feedback.foot_force_n) force_n += noise_.within(5.0);
     return true;
   }
-  [[nodiscard]] bool try_write(const JointCommand& command) noexcept override { return exact_.try_write(command); }
+  [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override { return exact_.try_write(command); }
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override { return exact_.status(); }
 
  private:
   hal::JointBus& exact_;

@@ -33,6 +33,7 @@ BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& le
 
 void SelfFilter::clear() noexcept {
   for (auto& ranges : covered_) ranges.fill(ColumnRange{});
+  any_.fill(false);
   next_ = 0;
 }
 
@@ -138,6 +139,7 @@ bool SelfFilter::add_some(const HalfRays& rays, const std::array<LegShapes, kFoo
     const auto to_pixel = [&](double column) {
       return static_cast<std::int16_t>(math::clamp(column, 0.0, rays.width_px - 1.0));
     };
+    any_[row] = true;
     covered_[slot][row] = {to_pixel(std::floor(first)), to_pixel(std::ceil(last))};
   }
   return true;
@@ -178,6 +180,7 @@ bool SelfFilter::add_foot(const HalfRays& rays, const OrientedBox& foot, const B
 }
 
 bool SelfFilter::try_mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept {
+  if (!any_[static_cast<std::size_t>(row)]) return false;
   bool any = false;
   for (const auto& ranges : covered_) {
     const ColumnRange range = ranges[static_cast<std::size_t>(row)];

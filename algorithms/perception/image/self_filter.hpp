@@ -71,6 +71,7 @@ class SelfFilter {
   Outline outline_{};
   int next_ = 0;  // sphere of a capsule, chord of a foot
   std::array<std::array<ColumnRange, kHalfHeight_px>, kShapes> covered_{};
+  std::array<bool, kHalfHeight_px> any_{};  // rows in which one is not empty
 };
 
 }  // namespace polygmap

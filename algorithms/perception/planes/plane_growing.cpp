@@ -2,6 +2,7 @@
 #include "algorithms/perception/planes/plane_growing.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 namespace polygmap {
@@ -76,23 +77,31 @@ void PlaneGrowing::begin(const Params& params, const DepthNoiseModel& noise, con
 
 // A column of clutter has dozens of segments, of which a neighbour overlaps one or two. Segments that end above a row
 // are counted, not looked for.
-void PlaneGrowing::index_rows(std::int32_t column) noexcept {
+void PlaneGrowing::count_column(std::int32_t column) noexcept {
   static_assert(ScanlineSegmentation::kMaxSegmentsPerColumn <= std::numeric_limits<std::uint8_t>::max());
   auto& first = first_near_[static_cast<std::size_t>(column)];
   first.fill(0);
   for (const ScanlineSegment& segment : (*segments_)[static_cast<std::size_t>(column)]) {
     ++first[static_cast<std::size_t>(segment.bottom / kIndexRows + 1)];
+    if (segment.rows() >= params_.min_rows) {
+      ++pass_.start[static_cast<std::size_t>(kDepthHeight_px - segment.rows() + 1)];
+    }
   }
-  for (std::size_t i = 1; i < first.size(); ++i) first[i] = static_cast<std::uint8_t>(first[i] + first[i - 1]);
+  // Eight sums at once (the first byte is the lowest): a product with ones adds every byte to those after it, of which
+  // none carries over.
+  constexpr std::uint64_t kOnes = 0x0101'0101'0101'0101U;
+  std::uint64_t before = 0;
+  for (std::size_t i = 0; i < first.size(); i += sizeof(std::uint64_t)) {
+    const std::size_t bytes = std::min(sizeof(std::uint64_t), first.size() - i);
+    std::uint64_t sums = 0;
+    std::memcpy(&sums, &first[i], bytes);
+    sums = (sums + before) * kOnes;
+    std::memcpy(&first[i], &sums, bytes);
+    before = sums >> 56U;
+  }
 }
 
 // By length, longest first; equal lengths in the order of the image.
-void PlaneGrowing::count_seeds(std::int32_t column) noexcept {
-  for (const ScanlineSegment& segment : (*segments_)[static_cast<std::size_t>(column)]) {
-    if (segment.rows() >= params_.min_rows)
-      ++pass_.start[static_cast<std::size_t>(kDepthHeight_px - segment.rows() + 1)];
-  }
-}
 void PlaneGrowing::begin_sorting() noexcept {
   work_.add(pass_.start.size(), 3);
   for (std::size_t i = 1; i < pass_.start.size(); ++i)
@@ -119,9 +128,8 @@ bool PlaneGrowing::prepare_some() noexcept {
     const std::size_t segments = (*segments_)[static_cast<std::size_t>(pass_.column)].size();
     switch (pass_.part) {
       case Part::kCount:
-        work_.add(220 + 30 * static_cast<std::int32_t>(segments));
-        count_seeds(pass_.column);
-        index_rows(pass_.column);
+        work_.add(120 + 30 * static_cast<std::int32_t>(segments));
+        count_column(pass_.column);
         break;
       case Part::kSort:
         work_.add(30 + 25 * static_cast<std::int32_t>(segments));
@@ -190,9 +198,7 @@ bool PlaneGrowing::try_seed(Place place) noexcept {
 
 void PlaneGrowing::consider(Place place) noexcept {
   ScanlineSegment& segment = at(place);
-  work_.add(22);
-  if (segment.plane != 0) return;
-  work_.add(105);
+  if (segment.plane != 0) return work_.add(22);
   // Mean square distance of the segment's line from the plane.
   const double ray_x = static_cast<double>(rays_->x[static_cast<std::size_t>(place.column)]);
   const double pitch = static_cast<double>(rays_->y[1] - rays_->y[0]);
@@ -201,8 +207,10 @@ void PlaneGrowing::consider(Place place) noexcept {
   const double tilt = static_cast<double>(segment.slope) - m_.y() * pitch;
   const double rows = segment.rows();
   const double off2 = offset * offset + tilt * tilt * (rows * rows - 1.0) * (1.0 / 12.0);
-  if (!(middle.w > kLeastInverseDepth) || off2 > math::square(tolerance_w(middle.w)) * norm2_) return;
-  work_.add(140);
+  if (!(middle.w > kLeastInverseDepth) || off2 > math::square(tolerance_w(middle.w)) * norm2_) {
+    return work_.add(127);
+  }
+  work_.add(267);
   segment.plane = static_cast<std::uint8_t>(count_ + 1);
   sums_.add(ray_x, *rays_, segment);
   queue_.places[queue_.size++] = place;

@@ -85,9 +85,8 @@ class PlaneGrowing {
   // Columns that are gone through in one piece: before planes grow, and afterwards.
   static constexpr std::int32_t kColumnsAtOnce = 16;
   enum class Part : std::uint8_t { kCount, kSort, kGrow, kClear };
-  void count_seeds(std::int32_t column) noexcept;
+  void count_column(std::int32_t column) noexcept;
   void sort_seeds(std::int32_t column) noexcept;
-  void index_rows(std::int32_t column) noexcept;
   void clear_tried(std::int32_t column) noexcept;
   void begin_sorting() noexcept;
   // Of kColumnsAtOnce columns; true after the last.

@@ -50,8 +50,8 @@ class PlaneMerging {
   };
   using PlaneIndex = std::array<PlaneId, PlaneSet::kMaxPlanes + 1>;  // of a plane that may have been merged
 
-  // Those that are one share the plane of the largest. measured: the planes' moments say what their pixels are worth; before, large
-  // planes are one only where there is no doubt. Facets too small to be planes are left to join_facets.
+  // Those that are one share the plane of the largest. measured: the planes' moments say what their pixels are worth;
+  // before, large planes are one only where there is no doubt. Facets too small to be planes are left to join_facets.
   // begin_coplanar, then merge_some until it is done.
   void begin_coplanar(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,
                       const PlaneSet& planes, bool measured) noexcept;

@@ -50,9 +50,9 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
   const auto all = [](float value) { return cv::vx_setall_f32(value); };
   const Wide zero = all(0.0F), end = all(static_cast<float>(Axis::kBins)), none = end;
   const float *ws = image.by_column.row(column), *ys = rays.y.data();
+  std::int32_t times = 0;
   const auto add_stretch = [&](std::int32_t first, std::int32_t last) {
-    work_.add(20 + 175 * (std::max(last - first + kAtOnce, 0) / kAtOnce));
-    for (std::int32_t from = first; from <= last; from += kAtOnce) {
+    for (std::int32_t from = first; from <= last; from += kAtOnce, ++times) {
       const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce), until = std::min(last + 1 - start, kAtOnce);
       std::array<std::int32_t, kAtOnce> level_bins, upright_bins;
       for (std::int32_t i = 0; i < kAtOnce; i += Wide::nlanes) {
@@ -76,8 +76,6 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
     add_stretch(first, until);
     add_stretch(std::max(until + 1, last - kRemainderReach_px + 1), last);
   };
-  work_.add(90);
-  work_.add(spans.size(), 14);
   std::int32_t next = 0;
   for (const ColumnSpan& span : spans) {
     if (released_[span.plane]) continue;
@@ -85,6 +83,7 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
     next = span.bottom + 1;
   }
   add_rows(next, rays.height_px - 1);
+  work_.add(130 + 54 * static_cast<std::int32_t>(spans.size()) + 175 * times);
 }
 
 void ResidualPlaneSearch::forget(Axis& axis, double distance_m, double apart_m) noexcept {

@@ -35,9 +35,13 @@ PixelCover::Owner PixelCover::owner_of(std::int32_t column, std::int32_t row) co
 template <typename Visit>
 void PixelCover::for_each_pixel(const Outline2& polygon, const Visit& visit) const noexcept {
   const std::size_t n = polygon.size();
+  double left = 1e9, right = -1e9;
+  for (const Vec2& p : polygon) left = std::min(left, p.x()), right = std::max(right, p.x());
+  std::int32_t columns = 0, pixels = 0;
   for (std::int32_t g = kColumnStride / 2; g < picture_.column_rays.columns; g += kColumnStride) {
-    work_.add(45 + 13 * static_cast<std::int32_t>(n));
     const double x = middle_px(g);
+    if (x < left || x > right) continue;
+    ++columns;
     double top = 1e9, bottom = -1e9;  // where two edges of the convex polygon cross the column
     for (std::size_t i = 0; i < n; ++i) {
       const Vec2 &a = polygon[i], &b = polygon[i + 1 < n ? i + 1 : 0];
@@ -49,12 +53,16 @@ void PixelCover::for_each_pixel(const Outline2& polygon, const Visit& visit) con
     const double last = std::min(2.0 * bottom + 0.5, picture_.column_rays.height_px - 1.0);
     const double first = std::max(2.0 * top + 0.5, 0.0) / kRowStride;
     if (!(first * kRowStride <= last)) continue;
-    for (auto r = kRowStride * static_cast<std::int32_t>(std::ceil(first)); r <= last; r += kRowStride) {
-      work_.add(58);
+    const auto last_row = static_cast<std::int32_t>(last);
+    for (auto r = kRowStride * static_cast<std::int32_t>(std::ceil(first)); r <= last_row; r += kRowStride) {
+      ++pixels;
       const Owner owner = owner_of(g, r);
       if (owner != Owner::kNobody) visit(g, r, owner == Owner::kOwn);
     }
   }
+  const auto corners = static_cast<std::int32_t>(n);
+  work_.add(40 + 4 * corners + picture_.column_rays.columns / kColumnStride * 8 + columns * (45 + 13 * corners));
+  work_.add(pixels, 58);
 }
 
 PixelCover::Count PixelCover::count(const Outline2& polygon) const noexcept {

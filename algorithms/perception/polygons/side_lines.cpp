@@ -271,11 +271,11 @@ void SideLines::find_ends(RegionId id) noexcept {
   std::fill(left + from, left + profile.last_row + 1, kNoColumn);
   std::fill(right + from, right + profile.last_row + 1, kNoColumn);
   const Bytes wanted = cv::vx_setall_u8(id);
+  std::int32_t rows = 0;
   for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
-    work_.add(10);
     if (ends.empty()) continue;
-    work_.add(20 + 11 * ((ends.bottom - ends.top) / 16 + 2));
+    rows += ends.bottom - ends.top + 32;
     const RegionId* labels = regions_->labels.column(g);
     const Bytes here = cv::vx_setall_u8(static_cast<std::uint8_t>(g));
     for (std::int32_t r = ends.top / Bytes::nlanes * Bytes::nlanes; r <= ends.bottom; r += Bytes::nlanes) {
@@ -285,6 +285,7 @@ void SideLines::find_ends(RegionId id) noexcept {
       cv::v_store(right + r, cv::v_select(own, here, cv::vx_load(right + r)));
     }
   }
+  work_.add(std::max(profile.last_column - profile.first_column + 1, 0) * 30 + 11 * rows / 16);
   const std::int32_t half = params_.flat_rows / 2;
   for (std::uint8_t* ends : {left, right}) {
     std::fill_n(ends + profile.first_row - half, half, ends[profile.first_row]);
