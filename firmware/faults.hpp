@@ -31,8 +31,8 @@ namespace polygmap {
   X(16, kMapStale, "map_stale", "The newest fused frame was too old to step on.")                                    \
   X(17, kStateStale, "state_stale", "IMU or joints were silent for so long that the gait stopped.")                  \
   X(18, kGaitStopped, "gait_stopped", "The gait stopped in double support, not on top.")                             \
-  X(19, kLaneBehind, "lane_behind",                                                                                    \
-    "A lane had not finished a cycle when the other one began the next: it is seen a cycle later.")                    \
+  X(19, kLaneBehind, "lane_behind",                                                                                  \
+    "A lane had not finished a cycle when the other one began the next: it is seen a cycle later.")                  \
   X(30, kDriveSilent, "drive_silent", "A drive was silent for more than five cycles; telemetry says which joint's.") \
   X(31, kDriveError, "drive_error", "A drive told of an error, or left its motor mode.")                             \
   X(32, kBusOff, "bus_off", "A CAN controller left its bus.")                                                        \
@@ -58,7 +58,7 @@ namespace polygmap {
   X(112, kHeightRejected, "height_rejected", "A mapped tread's height disagreed with the sole that landed on it.")  \
   X(113, kFootPutBack, "foot_put_back", "A foot in the air went back to where it had stood.")                       \
   X(114, kFrameLost, "frame_lost", "A frame never reached the map: it was unusable, or the last one still waited.") \
-  X(115, kHandOverLost, "hand_over_lost", "A lane was so late that what it should have seen was overwritten.")        \
+  X(115, kHandOverLost, "hand_over_lost", "A lane was so late that what it should have seen was overwritten.")      \
   X(130, kDriveClamped, "drive_clamped", "A command's value was beyond its drive's range and became the nearest end.")
 
 #define POLYGMAP_ENUMERATOR(number, code, name, text) code = number,

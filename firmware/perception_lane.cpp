@@ -187,7 +187,7 @@ Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
   const Progress progress = map_.step(budget);
   if (progress != Progress::kBusy) {
     mapping_ = false;
-    search_due_ = true;
+    searching_.due = true;
     health_.own.follow(Limit::kMapFull, now_ns, map_.counters().evicted + map_.counters().refused);
     if (watcher_ != nullptr) watcher_->map.publish(now_ns, map_.snapshot());
   }
@@ -203,20 +203,20 @@ void PerceptionLane::begin_search() noexcept {
   query.stance = context.stance;
   query.climbing = context.climbing;
   search_.begin(map_.snapshot(), query);
-  search_due_ = false;
-  searching_ = true;
+  searching_.due = false;
+  searching_.now = true;
 }
 
 Progress PerceptionLane::footholds(std::int64_t now_ns, WorkBudget& budget) noexcept {
-  if (!searching_ && search_due_) {
+  if (!searching_.now && searching_.due) {
     begin_search();
     budget.spend(
         units_of(kBeginSearch + kSearchPerPolygon * static_cast<std::int32_t>(map_.snapshot().polygons.size())));
   }
-  if (!searching_) return Progress::kIdle;
+  if (!searching_.now) return Progress::kIdle;
   const Progress progress = search_.step(budget);
   if (progress == Progress::kDone) link_.footholds.publish(now_ns, search_.result());
-  if (progress != Progress::kBusy) searching_ = false;
+  if (progress != Progress::kBusy) searching_.now = false;
   return progress;
 }
 

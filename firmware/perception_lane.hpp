@@ -57,8 +57,9 @@ class PerceptionLane {
   LaneView view_;
   FrameStage stage_ = FrameStage::kWaiting;
   bool mapping_ = false;
-  bool search_due_ = false;
-  bool searching_ = false;
+  struct {
+    bool due = false, now = false;
+  } searching_;
   DepthFrameView frame_;
   StateEstimate exposure_state_;
   std::array<LegShapes, kFootCount> body_{};  // camera frame, at the exposure
