@@ -35,34 +35,34 @@ class BufferBook {
   }
   // The module takes the oldest that waits. False, and view untouched, when it holds one or none waits.
   [[nodiscard]] constexpr bool take(DepthFrameView& view) noexcept {
-    std::optional<Entry>& mine = held_by(Holder::kModule);
+    Held& mine = held_by(Holder::kModule);
     Entry oldest{};
-    if (mine || !waiting_.try_pop(oldest)) return false;
-    mine = oldest;
+    if (mine.any || !waiting_.try_pop(oldest)) return false;
+    mine = {true, oldest};
     view = oldest.view;
     return true;
   }
   // The second holder takes what the module holds. False, and view untouched, when it holds one or the module none.
   [[nodiscard]] constexpr bool share(DepthFrameView& view) noexcept {
-    const std::optional<Entry>& shared = held_by(Holder::kModule);
-    if (held_by(Holder::kSecond) || !shared) return false;
+    const Held& shared = held_by(Holder::kModule);
+    if (held_by(Holder::kSecond).any || !shared.any) return false;
     held_by(Holder::kSecond) = shared;
-    view = shared->view;
+    view = shared.entry.view;
     return true;
   }
   // The buffer to be handed back, when nobody else holds it.
   [[nodiscard]] constexpr std::optional<Index> give_back(Holder holder) noexcept {
-    std::optional<Entry>& mine = held_by(holder);
-    if (!mine) return std::nullopt;
-    const Index buffer = mine->buffer;
-    mine.reset();
-    for (const std::optional<Entry>& other : held_) {
-      if (other && other->buffer == buffer) return std::nullopt;
+    Held& mine = held_by(holder);
+    if (!mine.any) return std::nullopt;
+    const Index buffer = mine.entry.buffer;
+    mine = {};
+    for (const Held& other : held_) {
+      if (other.any && other.entry.buffer == buffer) return std::nullopt;
     }
     return buffer;
   }
   constexpr void forget_waiting() noexcept { waiting_.clear(); }
-  [[nodiscard]] constexpr bool any_held() const noexcept { return held_[0].has_value() || held_[1].has_value(); }
+  [[nodiscard]] constexpr bool any_held() const noexcept { return held_[0].any || held_[1].any; }
   [[nodiscard]] constexpr std::size_t waiting() const noexcept { return waiting_.size(); }
 
  private:
@@ -70,13 +70,17 @@ class BufferBook {
     Index buffer;
     DepthFrameView view;
   };
-  [[nodiscard]] constexpr std::optional<Entry>& held_by(Holder holder) noexcept {
+  struct Held {
+    bool any = false;
+    Entry entry{};
+  };
+  [[nodiscard]] constexpr Held& held_by(Holder holder) noexcept {
     return held_[static_cast<std::size_t>(holder)];
   }
 
   std::size_t most_waiting_ = 1;
   RingBuffer<Entry, kMostBuffers> waiting_;
-  std::array<std::optional<Entry>, kHolders> held_{};
+  std::array<Held, kHolders> held_{};
 };
 
 }  // namespace polygmap::hal

@@ -12,9 +12,6 @@ struct Interrupted {
 };
 
 // interrupt: what a signal handler sets to the signal's number; null where there is none.
-inline void throw_if_interrupted(const std::atomic<int>* interrupt) {
-  const int signal = interrupt != nullptr ? interrupt->load() : 0;
-  if (signal != 0) throw Interrupted{signal};
-}
+void throw_if_interrupted(const std::atomic<int>* interrupt);
 
 }  // namespace polygmap::sim

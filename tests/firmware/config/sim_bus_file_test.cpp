@@ -13,7 +13,7 @@ namespace {
 
 std::string shipped(const std::string& name) { return std::string(POLYGMAP_BUSES) + "/" + name + ".toml"; }
 
-std::string write(const std::string& text) {
+std::string write_bus_file(const std::string& text) {
   const std::string path =
       testing::TempDir() + "polygmap_bus_" + testing::UnitTest::GetInstance()->current_test_info()->name() + ".toml";
   std::ofstream(path) << text;
@@ -41,8 +41,8 @@ std::string text_of(std::span<const Drive> drives, const std::string& more = "")
 }
 
 // Refused in one sentence that names the file and says this.
-void expect_refused(const std::string& text, const std::string& what) {
-  const std::string path = write(text);
+void expect_bus_file_refused(const std::string& text, const std::string& what) {
+  const std::string path = write_bus_file(text);
   try {
     (void)read_bus(path);
     ADD_FAILURE() << "taken, not refused for " << what;
@@ -76,8 +76,8 @@ TEST(BusFile, GoodFile_HasWhatItSays) {
   auto all = drives();
   all[4].more = "reply = \"status_nibble\"\n";
   all[4].reply_id = "0x25";
-  const BusFile bus =
-      read_bus(write("bitrate = 800_000\n" + text_of(all, "[feet]\nbus = \"can9\"\nid = 0x70\nunit_n = 0.1\n")));
+  const BusFile bus = read_bus(
+      write_bus_file("bitrate = 800_000\n" + text_of(all, "[feet]\nbus = \"can9\"\nid = 0x70\nunit_n = 0.1\n")));
   EXPECT_EQ(bus.table.bitrate_bps, 800000U);
   EXPECT_EQ(bus.buses.back(), "can9");
   EXPECT_EQ(bus.table.feet.bus, 4);
@@ -89,47 +89,50 @@ TEST(BusFile, GoodFile_HasWhatItSays) {
 }
 
 TEST(BusFile, WrongKeysTypesAndRanges_AreNamedWithTheirLine) {
-  expect_refused("drive = 3\n", "line 1: there must be a [[drive]] table for each joint");
-  expect_refused("", "there must be a [[drive]] table for each joint");
-  expect_refused("bitrate = \n", "line 1: ");
-  expect_refused("bitrate = 2_000_000\n", "line 1: bitrate must be from 10000 to 1000000 bit/s, not 2000000");
-  expect_refused("bitrate = 250000.5\n", "bitrate must be a whole number");
-  expect_refused("bitrat = 250000\n", "line 1: \"bitrat\" is no key of a bus file; there are bitrate, drive, feet");
+  expect_bus_file_refused("drive = 3\n", "line 1: there must be a [[drive]] table for each joint");
+  expect_bus_file_refused("", "there must be a [[drive]] table for each joint");
+  expect_bus_file_refused("bitrate = \n", "line 1: ");
+  expect_bus_file_refused("bitrate = 2_000_000\n", "line 1: bitrate must be from 10000 to 1000000 bit/s, not 2000000");
+  expect_bus_file_refused("bitrate = 250000.5\n", "bitrate must be a whole number");
+  expect_bus_file_refused("bitrat = 250000\n",
+                          "line 1: \"bitrat\" is no key of a bus file; there are bitrate, drive, feet");
   const auto with = [](auto change) {
     auto all = drives();
     change(all);
     return text_of(all);
   };
-  expect_refused(with([](auto& d) { d[1].bus = "3"; }), "line 11: left_hip_yaw: bus must be a text in quotes");
-  expect_refused(with([](auto& d) { d[1].bus = "\"c/n\""; }),
-                 "bus must name an interface such as \"can0\", not \"c/n\"");
-  expect_refused(with([](auto& d) { d[0].id = "0"; }), "line 3: left_hip_roll: id must be from 1 to 255, not 0");
-  expect_refused(with([](auto& d) { d[0].id = "1.5"; }), "left_hip_roll: id must be a whole number, not 1.5");
-  expect_refused(with([](auto& d) { d[0].id = "true"; }), "line 3: left_hip_roll: id must be a number");
-  expect_refused(with([](auto& d) { d[0].reply_id = "2048"; }), "reply_id must be from 0 to 2047, not 2048");
-  expect_refused(with([](auto& d) { d[0].more = "x = 1\n"; }), "line 10: \"x\" is no key of a drive");
-  expect_refused(with([](auto& d) { d[2].rest = "p = 12.5\nv = 8\nt = 144\nkp = 500\n"; }),
-                 "left_hip_pitch: kd is missing");
-  expect_refused(with([](auto& d) { d[2].rest = "p = nan\nv = 8\nt = 144\nkp = 500\nkd = 5\n"; }),
-                 "left_hip_pitch: p must be from 0.1 to 1000 rad, not");
-  expect_refused(with([](auto& d) { d[2].rest = "p = 12.5\nv = 8\nt = -1\nkp = 500\nkd = 5\n"; }),
-                 "left_hip_pitch: t must be from 0.1 to 10000 Nm, not -1");
-  expect_refused(with([](auto& d) { d[2].more = "reply = \"nibble\"\n"; }),
-                 "reply must be \"id\" or \"status_nibble\", not \"nibble\"");
-  expect_refused(with([](auto& d) {
-                   d[4].more = "reply = \"status_nibble\"\n";
-                   d[4].id = "17";
-                 }),
-                 "left_ankle_pitch: id must be from 1 to 15, not 17");
-  expect_refused(text_of(drives(), "[feet]\nbus = \"can0\"\nid = 1\nunit_n = 0.1\n"),
-                 "feet: id 1 is left_hip_roll's on can0");
-  expect_refused(text_of(drives(), "[feet]\nbus = \"can0\"\nunit_n = 0.1\n"), "feet: id is missing");
-  expect_refused(text_of(drives(), "[feet]\nbus = \"can0\"\nid = 99\nunit_n = 0\n"), "feet: unit_n must be from");
+  expect_bus_file_refused(with([](auto& d) { d[1].bus = "3"; }), "line 11: left_hip_yaw: bus must be a text in quotes");
+  expect_bus_file_refused(with([](auto& d) { d[1].bus = "\"c/n\""; }),
+                          "bus must name an interface such as \"can0\", not \"c/n\"");
+  expect_bus_file_refused(with([](auto& d) { d[0].id = "0"; }),
+                          "line 3: left_hip_roll: id must be from 1 to 255, not 0");
+  expect_bus_file_refused(with([](auto& d) { d[0].id = "1.5"; }), "left_hip_roll: id must be a whole number, not 1.5");
+  expect_bus_file_refused(with([](auto& d) { d[0].id = "true"; }), "line 3: left_hip_roll: id must be a number");
+  expect_bus_file_refused(with([](auto& d) { d[0].reply_id = "2048"; }), "reply_id must be from 0 to 2047, not 2048");
+  expect_bus_file_refused(with([](auto& d) { d[0].more = "x = 1\n"; }), "line 10: \"x\" is no key of a drive");
+  expect_bus_file_refused(with([](auto& d) { d[2].rest = "p = 12.5\nv = 8\nt = 144\nkp = 500\n"; }),
+                          "left_hip_pitch: kd is missing");
+  expect_bus_file_refused(with([](auto& d) { d[2].rest = "p = nan\nv = 8\nt = 144\nkp = 500\nkd = 5\n"; }),
+                          "left_hip_pitch: p must be from 0.1 to 1000 rad, not");
+  expect_bus_file_refused(with([](auto& d) { d[2].rest = "p = 12.5\nv = 8\nt = -1\nkp = 500\nkd = 5\n"; }),
+                          "left_hip_pitch: t must be from 0.1 to 10000 Nm, not -1");
+  expect_bus_file_refused(with([](auto& d) { d[2].more = "reply = \"nibble\"\n"; }),
+                          "reply must be \"id\" or \"status_nibble\", not \"nibble\"");
+  expect_bus_file_refused(with([](auto& d) {
+                            d[4].more = "reply = \"status_nibble\"\n";
+                            d[4].id = "17";
+                          }),
+                          "left_ankle_pitch: id must be from 1 to 15, not 17");
+  expect_bus_file_refused(text_of(drives(), "[feet]\nbus = \"can0\"\nid = 1\nunit_n = 0.1\n"),
+                          "feet: id 1 is left_hip_roll's on can0");
+  expect_bus_file_refused(text_of(drives(), "[feet]\nbus = \"can0\"\nunit_n = 0.1\n"), "feet: id is missing");
+  expect_bus_file_refused(text_of(drives(), "[feet]\nbus = \"can0\"\nid = 99\nunit_n = 0\n"),
+                          "feet: unit_n must be from");
 }
 
 TEST(BusFile, WrongCountOfDrives_IsRefused) {
   const auto all = drives();
-  expect_refused(text_of({all.data(), 11}), "there are 11 [[drive]] tables, and the robot has 12 joints");
+  expect_bus_file_refused(text_of({all.data(), 11}), "there are 11 [[drive]] tables, and the robot has 12 joints");
 }
 
 TEST(BusFile, ClashingIdentifiers_AreRefused) {
@@ -138,24 +141,24 @@ TEST(BusFile, ClashingIdentifiers_AreRefused) {
     change(all);
     return text_of(all);
   };
-  expect_refused(with([](auto& d) { d[1].id = "1"; }), "left_hip_yaw: id 1 is left_hip_roll's on can0");
-  expect_refused(with([](auto& d) { d[2].reply_id = "1"; }),
-                 "left_hip_pitch: reply_id 1 is the id of left_hip_roll's on can0, too");
-  expect_refused(with([](auto& d) { d[0].reply_id = "3"; }),
-                 "left_hip_pitch: id 3 is the reply_id of left_hip_roll's on can0, too");
-  expect_refused(with([](auto& d) { d[1].more = "reply = \"status_nibble\"\n"; }),
-                 "left_hip_yaw: reply must be as left_hip_roll's on can0, whose reply_id it shares");
+  expect_bus_file_refused(with([](auto& d) { d[1].id = "1"; }), "left_hip_yaw: id 1 is left_hip_roll's on can0");
+  expect_bus_file_refused(with([](auto& d) { d[2].reply_id = "1"; }),
+                          "left_hip_pitch: reply_id 1 is the id of left_hip_roll's on can0, too");
+  expect_bus_file_refused(with([](auto& d) { d[0].reply_id = "3"; }),
+                          "left_hip_pitch: id 3 is the reply_id of left_hip_roll's on can0, too");
+  expect_bus_file_refused(with([](auto& d) { d[1].more = "reply = \"status_nibble\"\n"; }),
+                          "left_hip_yaw: reply must be as left_hip_roll's on can0, whose reply_id it shares");
   const auto same_on_another_bus = with([](auto& d) { d[3].id = "1"; });
-  EXPECT_NO_THROW((void)read_bus(write(same_on_another_bus)));
+  EXPECT_NO_THROW((void)read_bus(write_bus_file(same_on_another_bus)));
 }
 
 TEST(BusFile, LoadAbove60Percent_IsRefused) {
   auto all = drives();
   for (std::size_t n = 0; n < kJointCount; ++n) all[n].bus = n < 4 ? "\"can0\"" : all[n].bus;
-  EXPECT_NO_THROW((void)read_bus(write(text_of(all)))) << "four drives take 54 %";
+  EXPECT_NO_THROW((void)read_bus(write_bus_file(text_of(all)))) << "four drives take 54 %";
   for (std::size_t n = 0; n < kJointCount; ++n) all[n].bus = n < 5 ? "\"can0\"" : all[n].bus;
-  expect_refused(text_of(all), "the frames of a cycle can take 68 % of can0's time, more than 60 %");
-  expect_refused("bitrate = 500_000\n" + text_of(drives()), "81 % of can0's time");
+  expect_bus_file_refused(text_of(all), "the frames of a cycle can take 68 % of can0's time, more than 60 %");
+  expect_bus_file_refused("bitrate = 500_000\n" + text_of(drives()), "81 % of can0's time");
 }
 
 TEST(BusFile, MissingFileAndFolder_AreRefused) {
@@ -190,7 +193,7 @@ TEST(LimitByDrives, Ruiwo_CannotHoldTheRobot) {
 TEST(LimitByDrives, DriveThatDoesNotReachItsJoint_IsRefused) {
   auto all = drives();
   all[3].rest = "p = 2\nv = 8\nt = 144\nkp = 500\nkd = 5\n";
-  const BusFile bus = read_bus(write(text_of(all)));
+  const BusFile bus = read_bus(write_bus_file(text_of(all)));
   RobotModel robot;
   EXPECT_THROW(limit_by_drives(bus, {}, robot), FileError);
 }

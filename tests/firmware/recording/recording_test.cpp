@@ -208,14 +208,14 @@ class ShortRecording : public testing::Test {
     }
     return 0;
   }
-  // The camera's seven numbers come last.
+  // The camera's seven numbers and the drives' gains come last.
   [[nodiscard]] std::size_t header_bytes() const {
     const std::string last = "footholds";
     const auto name = std::search(bytes_.begin(), bytes_.end(), last.begin(), last.end());
     std::size_t at = 0;
     for (auto it = name; it != bytes_.end(); it = std::search(it + 1, bytes_.end(), last.begin(), last.end())) {
       const auto place = static_cast<std::size_t>(it - bytes_.begin());
-      if (bytes_[place - 2] == 9 && bytes_[place - 1] == 0) at = place + last.size() + 12 + 8 + 5 * 8;
+      if (bytes_[place - 2] == 9 && bytes_[place - 1] == 0) at = place + last.size() + 12 + (8 + 5 * 8) + kJointCount * 2 * 8;
       if (at != 0) break;
     }
     return at;

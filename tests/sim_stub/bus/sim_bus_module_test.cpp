@@ -43,7 +43,8 @@ class BusModuleTest : public testing::TestWithParam<const char*> {
       ASSERT_EQ(count(fault), 0U) << name_of(fault);
     }
     for (const auto& line : kFaultTable) {
-      if (line.number() >= static_cast<int>(Fault::kDriveSilent)) ASSERT_EQ(count(line.code), 0U) << line.name;
+      if (line.number() < static_cast<int>(Fault::kDriveSilent)) continue;
+      ASSERT_EQ(count(line.code), 0U) << line.name;
     }
   }
   void expect_safe_stop() {

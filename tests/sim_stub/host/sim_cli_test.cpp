@@ -327,7 +327,8 @@ TEST(Cli, ReplayOfNoRecording_IsOneSentenceWithFileAndByte) {
   std::ostringstream out, err;
   EXPECT_EQ(polygmap_main({"replay", "/there/is/none"}, {}, out, err, false), kExitUsage);
   EXPECT_EQ(err.str().find("polygmap: \"/there/is/none/recording.bin\", byte 0: cannot be read: "), 0U) << err.str();
-  EXPECT_EQ(std::count(err.str().begin(), err.str().end(), '\n'), 1);
+  const std::string said = err.str();
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
   EXPECT_TRUE(out.str().empty());
 }
 

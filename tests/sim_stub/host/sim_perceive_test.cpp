@@ -146,15 +146,20 @@ TEST_F(PerceiveCommand, GravityOfAnotherFrame_IsToldWithBothDirections) {
 
 // Over all edges, whose white lies on the same pixels.
 TEST_F(PerceiveCommand, Picture_EveryNosingIsRedFromEndToEnd) {
-  write_depth("stairs.png", test::render(scene_).raw(), 640, 480);
-  ASSERT_EQ(call({"perceive", at("stairs.png"), "--camera", at("camera.toml"), "--json", at("out.json"), "--picture",
-                  at("pic.png")}),
-            kExitPass);
+  test::DepthPicture picture = test::render(scene_);
+  test::add_noise(picture, {}, 3);
+  write_depth("stairs.png", picture.raw(), 640, 480);
+  const Vec3 down = -scene_.camera_up();
+  ASSERT_EQ(
+      call({"perceive", "--gravity", std::to_string(down.x()), std::to_string(down.y()), std::to_string(down.z()),
+            at("stairs.png"), "--camera", at("camera.toml"), "--json", at("out.json"), "--picture", at("pic.png")}),
+      kExitPass);
   std::vector<unsigned char> rgb;
   unsigned width = 0, height = 0;
   ASSERT_EQ(lodepng::decode(rgb, width, height, at("pic.png"), LCT_RGB, 8), 0U);
   int seen = 0, red = 0;
-  for (const auto& plane : nlohmann::json::parse(std::ifstream(at("out.json")))["planes"]) {
+  const nlohmann::json json = nlohmann::json::parse(std::ifstream(at("out.json")));
+  for (const auto& plane : json["planes"]) {
     if (plane["nosing"].is_null()) continue;
     const auto end = [&](int i) {
       const auto& p = plane["nosing"][static_cast<std::size_t>(i)];

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "algorithms/core/time.hpp"
+
 namespace polygmap {
 namespace {
 
