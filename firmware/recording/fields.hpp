@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The fields of everything that a recording has, each named once: by this list they are written, read and compared.
-// Never a struct as it lies in memory: Eigen's types are aligned in another way with AVX2 than with NEON.
+// Never a struct as it lies in memory, whose padding and byte order are the compiler's and the processor's.
 #pragma once
 
 #include <array>

@@ -26,7 +26,7 @@ class OverhangSplit {
     double farthest_m = 0.06;
     // Between the two, where the riser lies in the nosing's shadow, a height has a tenth to a fifth of the rows of a
     // full one. With a fiftieth of all rows instead, 3 of 52 climbs over nosings saw planes at less than 28 Hz, 26.5 at
-    // least, and 29.5 with this (2026-11).
+    // least; toolchain/campaign nosing has the least of its seeds with this (2026-11).
     double sparse = 0.3;
     double most_beyond = 0.1;
 
