@@ -33,6 +33,8 @@ BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& le
 
 void SelfFilter::clear() noexcept {
   for (auto& ranges : covered_) ranges.fill(ColumnRange{});
+  any_.fill(false);
+  next_ = 0;
 }
 
 void SelfFilter::extend(Outline& outline, std::int32_t row, std::int32_t width_px, double first, double last) noexcept {
@@ -61,6 +63,7 @@ SelfFilter::Rows SelfFilter::rows_of(const HalfRays& rays, const Vec3& c, double
 void SelfFilter::add_sphere(Outline& outline, const HalfRays& rays, const Vec3& c, double radius_m) noexcept {
   using Doubles = cv::v_float64;
   static_assert(kHalfHeight_px % Doubles::nlanes == 0);
+  outline.work.add(250);
   const double g = c.squaredNorm() - math::square(radius_m);
   if (!(g > 1e-6)) return;  // the camera is inside the grown shape: nothing can be said
   const double a = math::square(c.x()) - g;
@@ -70,6 +73,7 @@ void SelfFilter::add_sphere(Outline& outline, const HalfRays& rays, const Vec3& 
   const Doubles zero = all(0.0), half = all(0.5), one = all(1.0), fx = all(rays.fx_px), centre = all(rays.cx_px);
   const Doubles least = all(-kOutside_px), most = all(rays.width_px - 1 + kOutside_px);
   const Rows rows = rows_of(rays, c, a);
+  outline.work.add(std::max(rows.last - rows.first + 2, 0), 33);
   for (std::int32_t row = rows.first / Doubles::nlanes * Doubles::nlanes; row <= rows.last; row += Doubles::nlanes) {
     const auto at = static_cast<std::size_t>(row);
     const Doubles y = cv::v_cvt_f64(cv::vx_load_low(&rays.y[at]));
@@ -102,6 +106,7 @@ void SelfFilter::add_segment(Outline& outline, const HalfRays& rays, const Vec3&
   const double height = rays.height_px;
   const auto first = static_cast<std::int32_t>(math::clamp(std::floor(v0), 0.0, height - 1.0));
   const auto last = static_cast<std::int32_t>(math::clamp(std::ceil(v1), 0.0, height - 1.0));
+  outline.work.add(100 + 36 * std::max(last - first + 1, 0));
   for (std::int32_t row = first; row <= last; ++row) {
     if (row + 1.0 < v0 || row - 1.0 > v1) continue;
     // The row's whole band, not its middle: the ends of nearly level edges count.
@@ -113,39 +118,48 @@ void SelfFilter::add_segment(Outline& outline, const HalfRays& rays, const Vec3&
   }
 }
 
-void SelfFilter::add_shape(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body,
-                           const BodyMargin& margin, std::size_t slot) noexcept {
-  if (slot >= kShapes) return;
+bool SelfFilter::add_some(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body, const BodyMargin& margin,
+                          std::size_t slot) noexcept {
+  if (slot >= kShapes) return true;
   const LegShapes& leg = body[slot / 3];
-  outline_.first_px.fill(std::numeric_limits<double>::infinity());
-  outline_.last_px.fill(-std::numeric_limits<double>::infinity());
-  if (slot % 3 == 2) {
-    add_foot(rays, leg.foot, margin);
-  } else {
-    add_capsule(rays, slot % 3 == 0 ? leg.thigh : leg.shank, margin);
+  if (next_ == 0) {
+    outline_.work.add(500);
+    outline_.first_px.fill(std::numeric_limits<double>::infinity());
+    outline_.last_px.fill(-std::numeric_limits<double>::infinity());
   }
+  const bool whole = slot % 3 == 2 ? add_foot(rays, leg.foot, margin)
+                                   : add_capsule(rays, slot % 3 == 0 ? leg.thigh : leg.shank, margin);
+  if (!whole) return false;
+  next_ = 0;
+  outline_.work.add(100 + 26 * rays.height_px);
   // Outwards to whole pixels: a pixel is body when any part of it may be.
   for (std::size_t row = 0; row < static_cast<std::size_t>(rays.height_px); ++row) {
     const double first = outline_.first_px[row], last = outline_.last_px[row];
     if (!(first <= last)) continue;
-    const auto whole = [&](double column) {
+    const auto to_pixel = [&](double column) {
       return static_cast<std::int16_t>(math::clamp(column, 0.0, rays.width_px - 1.0));
     };
-    covered_[slot][row] = {whole(std::floor(first)), whole(std::ceil(last))};
+    any_[row] = true;
+    covered_[slot][row] = {to_pixel(std::floor(first)), to_pixel(std::ceil(last))};
   }
+  return true;
 }
 
-void SelfFilter::add_capsule(const HalfRays& rays, const Capsule& capsule, const BodyMargin& margin) noexcept {
-  if (!(capsule.radius_m > 0.0)) return;
-  for (int i = 0; i < kSpheresPerCapsule; ++i) {
-    const double along = static_cast<double>(i) / (kSpheresPerCapsule - 1);
+bool SelfFilter::add_capsule(const HalfRays& rays, const Capsule& capsule, const BodyMargin& margin) noexcept {
+  constexpr int kAtOnce = 3;
+  if (!(capsule.radius_m > 0.0)) return true;
+  for (const int end = std::min(next_ + kAtOnce, kSpheresPerCapsule); next_ < end; ++next_) {
+    const double along = static_cast<double>(next_) / (kSpheresPerCapsule - 1);
     const Vec3 centre_m = capsule.a_m + along * (capsule.b_m - capsule.a_m);
     add_sphere(outline_, rays, centre_m, capsule.radius_m + margin.at(centre_m.norm()));
   }
+  return next_ == kSpheresPerCapsule;
 }
 
-void SelfFilter::add_foot(const HalfRays& rays, const OrientedBox& foot, const BodyMargin& margin) noexcept {
-  if (!(foot.half_m.minCoeff() > 0.0)) return;
+bool SelfFilter::add_foot(const HalfRays& rays, const OrientedBox& foot, const BodyMargin& margin) noexcept {
+  constexpr int kAtOnce = 7, kChords = 28;
+  if (!(foot.half_m.minCoeff() > 0.0)) return true;
+  outline_.work.add(500);
   std::array<Vec3, 8> corners;
   const double farthest_m = foot.centre.p_m.norm() + foot.half_m.norm();
   const Vec3 half = foot.half_m + Vec3::Constant(margin.at(farthest_m));
@@ -154,12 +168,19 @@ void SelfFilter::add_foot(const HalfRays& rays, const OrientedBox& foot, const B
     corners[i] = foot.centre * half.cwiseProduct(sign);
   }
   // All pairs: the outline of a convex shape needs no hull when every chord is drawn.
+  int chord = 0;
+  const int first = next_, end = std::min(next_ + kAtOnce, kChords);
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    for (std::size_t j = i + 1; j < corners.size(); ++j) add_segment(outline_, rays, corners[i], corners[j]);
+    for (std::size_t j = i + 1; j < corners.size(); ++j, ++chord) {
+      if (chord >= first && chord < end) add_segment(outline_, rays, corners[i], corners[j]);
+    }
   }
+  next_ = end;
+  return next_ == kChords;
 }
 
 bool SelfFilter::try_mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept {
+  if (!any_[static_cast<std::size_t>(row)]) return false;
   bool any = false;
   for (const auto& ranges : covered_) {
     const ColumnRange range = ranges[static_cast<std::size_t>(row)];

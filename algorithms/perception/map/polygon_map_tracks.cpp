@@ -7,15 +7,10 @@
 #include "algorithms/perception/map/polygon_map.hpp"
 
 namespace polygmap {
-namespace {
-
-// Work units.
-constexpr std::int32_t kAgeUnits = 1;
-constexpr std::int32_t kHiddenUnits = 20;
-
-}  // namespace
-
 void PolygonMap::fuse_best() noexcept {
+  constexpr std::int32_t kRebuild = 6500, kPerCorner = 420;  // of a track: its eight ends, its polygon
+  work_.add(kRebuild);
+  work_.add(seen_.polygon.size(), kPerCorner);
   if (pass_.best >= tracks_.size()) {
     ++fused_in_frame_;
     create();
@@ -96,6 +91,7 @@ int PolygonMap::priority(const MapTrack& track) const noexcept {
 
 void PolygonMap::admit(const MapTrack& track) noexcept {
   if (!tracks_.try_push_back(track)) {
+    work_.add(tracks_.size(), 330);
     // The least worth keeping goes, of these the one not seen for longest.
     std::size_t victim = 0;
     int least = priority(tracks_[0]);
@@ -157,6 +153,7 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
 }
 
 void PolygonMap::merge(MapTrack& into, MapTrack& from) noexcept {
+  work_.add(300 + static_cast<std::int32_t>(kMapSides * from.polygon.size()) * 45);
   // The other one is one more sighting of where the surface reaches.
   const Transform into_T_from = into.world_T_local.inverse() * from.world_T_local;
   for (std::size_t k = 0; k < kMapSides; ++k) {
@@ -190,7 +187,7 @@ bool PolygonMap::in_view(const MapTrack& track, const Transform& camera_T_local)
 }
 
 // By the robot's own body: three of five points, the middle and four halfway to vertices around it.
-bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept {
+bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) noexcept {
   constexpr std::size_t kAround = 4;
   const Vec2 middle = centroid_m(track.polygon);
   std::size_t hidden = 0;
@@ -199,15 +196,18 @@ bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) 
     const Vec2 inner = 0.5 * (towards + middle);
     const Vec3 p = camera_T_local * Vec3{inner.x(), inner.y(), 0.0};
     const double margin_m = view_.body_margin.at(p.norm());
-    hidden += hides(view_.body[0], margin_m, p) || hides(view_.body[1], margin_m, p) ? 1U : 0U;
+    hidden += hides(view_.body[0], margin_m, p, work_) || hides(view_.body[1], margin_m, p, work_) ? 1U : 0U;
   }
   return 2 * hidden > kAround;
 }
 
-std::int32_t PolygonMap::age(MapTrack& track) noexcept {
-  if (track.erased || track.last_seen_ns == newest_ns_) return kAgeUnits;
+void PolygonMap::age(MapTrack& track) noexcept {
+  if (track.erased || track.last_seen_ns == newest_ns_) return;
+  work_.add(330);
+  work_.add(track.polygon.size(), 65);
   const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
   const bool looked = in_view(track, camera_T_local);
+  if (looked) work_.add(500);
   if (looked && !hidden(track, camera_T_local)) ++track.misses;
   const bool confirmed = track.sightings >= params_.memory.confirmed_sightings;
   if (confirmed && track.misses >= params_.memory.misses_confirmed) {
@@ -218,7 +218,6 @@ std::int32_t PolygonMap::age(MapTrack& track) noexcept {
     track.erased = true;
     ++counters_.dropped_unconfirmed;
   }
-  return looked ? kAgeUnits + kHiddenUnits : kAgeUnits;
 }
 
 double PolygonMap::faded(std::int64_t since_ns) const noexcept {

@@ -24,6 +24,8 @@ float sum_of(const Slots& slots) noexcept {
 
 void SpanBoundaries::begin_refit() noexcept {
   noise_samples_.clear();
+  next_span_.fill(0);
+  work_.add(400 + 16 * static_cast<std::int32_t>(planes_.size()));
   for (Plane& plane : planes_) {
     plane.moments = PlaneMoments{};
     plane.residual2 = 0.0;
@@ -31,37 +33,48 @@ void SpanBoundaries::begin_refit() noexcept {
   }
 }
 
-void SpanBoundaries::refit(std::int32_t first_column, bool roughly) noexcept {
-  const std::int32_t thick_px = params_.thick_px;
-  if (!roughly) sample_noise(first_column);
-  std::array<std::size_t, kRefitColumns> next{};
-  const std::int32_t count = std::min(kRefitColumns, rays_->columns - first_column);
-  // Down the columns together: the topmost span that is left, and with it those of its plane that are next elsewhere.
-  for (;;) {
-    Strip strip;
-    std::int32_t topmost = rays_->height_px;
-    for (std::int32_t k = 0; k < count; ++k) {
-      const Column& spans = columns_[static_cast<std::size_t>(first_column + k)];
-      const std::size_t i = next[static_cast<std::size_t>(k)];
-      if (i == spans.size() || spans[i].top >= topmost) continue;
-      topmost = spans[i].top;
-      strip.plane = spans[i].plane;
-    }
-    if (topmost == rays_->height_px) return;
-    for (std::int32_t k = 0; k < kRefitColumns; ++k) {
-      const auto slot = static_cast<std::size_t>(k);
-      strip.top[slot] = 1;
-      strip.bottom[slot] = 0;
-      if (k >= count) continue;
-      const Column& spans = columns_[static_cast<std::size_t>(first_column + k)];
-      if (next[slot] == spans.size() || spans[next[slot]].plane != strip.plane) continue;
-      const ColumnSpan& span = spans[next[slot]++];
-      const int margin = span.bottom - span.top >= thick_px ? 1 : 0;
-      strip.top[slot] = static_cast<std::int16_t>(span.top + margin);
-      strip.bottom[slot] = static_cast<std::int16_t>(span.bottom - margin);
-    }
-    refit(first_column, strip, roughly);
+// Down the columns together.
+bool SpanBoundaries::take_strip(std::int32_t first_column, Strip& strip) noexcept {
+  const std::int32_t thick_px = params_.thick_px, count = std::min(kRefitColumns, rays_->columns - first_column);
+  std::int32_t topmost = rays_->height_px;
+  for (std::int32_t k = 0; k < count; ++k) {
+    const Column& spans = columns_[static_cast<std::size_t>(first_column + k)];
+    const std::size_t i = next_span_[static_cast<std::size_t>(k)];
+    if (i == spans.size() || spans[i].top >= topmost) continue;
+    topmost = spans[i].top;
+    strip.plane = spans[i].plane;
   }
+  if (topmost == rays_->height_px) return false;
+  for (std::int32_t k = 0; k < kRefitColumns; ++k) {
+    const auto slot = static_cast<std::size_t>(k);
+    strip.top[slot] = 1;
+    strip.bottom[slot] = 0;
+    if (k >= count) continue;
+    const Column& spans = columns_[static_cast<std::size_t>(first_column + k)];
+    if (next_span_[slot] == spans.size() || spans[next_span_[slot]].plane != strip.plane) continue;
+    const ColumnSpan& span = spans[next_span_[slot]++];
+    const int margin = span.bottom - span.top >= thick_px ? 1 : 0;
+    strip.top[slot] = static_cast<std::int16_t>(span.top + margin);
+    strip.bottom[slot] = static_cast<std::int16_t>(span.bottom - margin);
+  }
+  return true;
+}
+
+bool SpanBoundaries::refit_some(std::int32_t first_column, bool roughly) noexcept {
+  constexpr std::int32_t kPieceInstructions = 8000;
+  const std::int32_t enough = work_.instructions() + kPieceInstructions;
+  while (work_.instructions() < enough) {
+    work_.add(190);
+    Strip strip;
+    if (take_strip(first_column, strip)) {
+      refit(first_column, strip, roughly);
+      continue;
+    }
+    if (!roughly) sample_noise(first_column);
+    next_span_.fill(0);
+    return true;
+  }
+  return false;
 }
 
 // Rows top, top + stride ... of a strip are looked at, from the plane as it is: w = plane . (x, t, 1), t the row from
@@ -141,7 +154,9 @@ void SpanBoundaries::add_up(std::int32_t first_column, const Strip& strip, const
 
 void SpanBoundaries::refit(std::int32_t first_column, const Strip& strip, bool roughly) noexcept {
   const StripRows rows = rows_of(strip, roughly);
+  work_.add(90);
   if (rows.none()) return;
+  work_.add(880 + 84 * ((rows.bottom - rows.top) / rows.stride + 1));
   StripSums sums;
   add_up(first_column, strip, rows, sums);
   Plane& plane = planes_[strip.plane];
@@ -162,6 +177,7 @@ void SpanBoundaries::sample_noise(std::int32_t column) noexcept {
   constexpr std::int32_t kStride = 4;
   for (const ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) {
     const Line line = line_of(span.plane, column);
+    work_.add(50 + 72 * std::max((span.bottom - span.top) / kStride, 0));
     for (std::int32_t r = span.top + 1; r < span.bottom; r += kStride) {
       const float w = image_->by_column(r, column);
       if (!(w > 0.0F)) continue;

@@ -62,7 +62,7 @@ TEST_F(PolygonMapMemory, Clutter_TakesNoTreadsPlace) {
   }
   ASSERT_NE(level_at(0.1), nullptr);
   EXPECT_GT(counters().evicted, 0U);
-  EXPECT_LT(most_units_, 50 * static_cast<std::int32_t>(kMaxPlanesPerFrame));
+  EXPECT_LT(most_units_, units_of(40'000) * static_cast<std::int32_t>(kMaxPlanesPerFrame));
   // A tread finds its place among them at once.
   seen.push_back(level_patch({0.3, 0, 0.2}, 0.14, 0.3));
   for (int frame = 0; frame < 5; ++frame) {
