@@ -38,6 +38,7 @@ class SelfFilter {
  public:
   static constexpr std::size_t kShapes = 3 * kFootCount;
 
+  SelfFilter() noexcept { clear(); }
   void clear() noexcept;
   // Slots 0..2 of a foot: thigh, shank, foot. Camera frame, m. Draws a part of the shape; true when it is whole.
   [[nodiscard]] bool add_some(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body,
@@ -52,16 +53,23 @@ class SelfFilter {
     std::int16_t first = 1;
     std::int16_t last = 0;  // inclusive; empty when before first
   };
-  struct Outline {  // of one shape, by row, real columns; none where first is beyond last
-    std::array<double, kHalfHeight_px> first_px, last_px;
-    WorkCount work;
-  };
   struct Rows {
     std::int32_t first, last;
   };
+  static constexpr std::int32_t kBeyond = 8;  // rows after the last, into which a register may reach
+  struct Outline {                            // of one shape, by row, real columns; none where first is beyond last
+    std::array<double, kHalfHeight_px + kBeyond> first_px, last_px;
+    Rows touched{0, kHalfHeight_px + kBeyond - 1};  // the others have none
+    WorkCount work;
+
+    void clear() noexcept;
+    void touch(std::int32_t first, std::int32_t last) noexcept;
+    // A register of rows, where seen has all bits set.
+    template <typename Wide>
+    void extend(std::int32_t row, const Wide& seen, const Wide& first, const Wide& last) noexcept;
+  };
 
   [[nodiscard]] static Rows rows_of(const HalfRays& rays, const Vec3& centre_m, double a) noexcept;
-  static void extend(Outline& outline, std::int32_t row, std::int32_t width_px, double first, double last) noexcept;
   static void add_sphere(Outline& outline, const HalfRays& rays, const Vec3& centre_m, double radius_m) noexcept;
   static void add_segment(Outline& outline, const HalfRays& rays, const Vec3& a_m, const Vec3& b_m) noexcept;
 

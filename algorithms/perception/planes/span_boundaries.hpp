@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/noise_tracker.hpp"
@@ -203,12 +204,17 @@ class SpanBoundaries {
     std::array<std::int16_t, kRefitColumns> top{}, bottom{};
     std::uint8_t plane = 0;
   };
+  struct Front {  // the columns' spans that come next: their first rows and planes, kNone where there is none left
+    static constexpr std::int16_t kNone = std::numeric_limits<std::int16_t>::max();
+    std::array<std::int16_t, kRefitColumns> top{}, plane{};
+  };
   struct StripRows;
   struct StripSums;
   [[nodiscard]] StripRows rows_of(const Strip& strip, bool roughly) const noexcept;
   void add_up(std::int32_t first_column, const Strip& strip, const StripRows& rows, StripSums& sums) const noexcept;
   // The topmost span that is left, and with it those of its plane that are next in the other columns; false: none.
-  [[nodiscard]] bool take_strip(std::int32_t first_column, Strip& strip) noexcept;
+  [[nodiscard]] bool take_strip(std::int32_t first_column, Front& front, Strip& strip) noexcept;
+  void show_next(std::int32_t first_column, std::size_t slot, Front& front) const noexcept;
   void refit(std::int32_t first_column, const Strip& strip, bool roughly) noexcept;
   struct RowGains;
   struct BinnedGains;
