@@ -169,7 +169,7 @@ void FootholdSearch::link(std::size_t i) noexcept {
   LevelSurface& tread = levels_[i];
   work_.add(60);
   if (!tread.has_nosing) return;
-  work_.add(levels_.size(), 55);
+  work_.add(levels_.size(), 95);
   work_.add(uprights_.size(), 130);
   for (std::size_t j = 0; j < levels_.size(); ++j) {
     const LevelSurface& other = levels_[j];

@@ -203,11 +203,11 @@ bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) 
 
 void PolygonMap::age(MapTrack& track) noexcept {
   if (track.erased || track.last_seen_ns == newest_ns_) return;
-  work_.add(330);
-  work_.add(track.polygon.size(), 65);
+  work_.add(400);
+  work_.add(track.polygon.size(), 75);
   const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
   const bool looked = in_view(track, camera_T_local);
-  if (looked) work_.add(500);
+  if (looked) work_.add(750);
   if (looked && !hidden(track, camera_T_local)) ++track.misses;
   const bool confirmed = track.sightings >= params_.memory.confirmed_sightings;
   if (confirmed && track.misses >= params_.memory.misses_confirmed) {

@@ -79,8 +79,9 @@ void PlaneGrowing::begin(const Params& params, const DepthNoiseModel& noise, con
 // are counted, not looked for.
 void PlaneGrowing::count_column(std::int32_t column) noexcept {
   static_assert(ScanlineSegmentation::kMaxSegmentsPerColumn <= std::numeric_limits<std::uint8_t>::max());
-  auto& first = first_near_[static_cast<std::size_t>(column)];
-  first.fill(0);
+  constexpr std::size_t kWord = sizeof(std::uint64_t);
+  auto& out = first_near_[static_cast<std::size_t>(column)];
+  std::array<std::uint8_t, (kDepthHeight_px / kIndexRows + 1 + kWord - 1) / kWord * kWord> first{};  // whole words
   for (const ScanlineSegment& segment : (*segments_)[static_cast<std::size_t>(column)]) {
     ++first[static_cast<std::size_t>(segment.bottom / kIndexRows + 1)];
     if (segment.rows() >= params_.min_rows) {
@@ -91,19 +92,19 @@ void PlaneGrowing::count_column(std::int32_t column) noexcept {
   // none carries over.
   constexpr std::uint64_t kOnes = 0x0101'0101'0101'0101U;
   std::uint64_t before = 0;
-  for (std::size_t i = 0; i < first.size(); i += sizeof(std::uint64_t)) {
-    const std::size_t bytes = std::min(sizeof(std::uint64_t), first.size() - i);
+  for (std::size_t i = 0; i < first.size(); i += kWord) {
     std::uint64_t sums = 0;
-    std::memcpy(&sums, &first[i], bytes);
+    std::memcpy(&sums, &first[i], kWord);
     sums = (sums + before) * kOnes;
-    std::memcpy(&first[i], &sums, bytes);
+    std::memcpy(&first[i], &sums, kWord);
     before = sums >> 56U;
   }
+  std::copy_n(first.begin(), out.size(), out.begin());
 }
 
 // By length, longest first; equal lengths in the order of the image.
 void PlaneGrowing::begin_sorting() noexcept {
-  work_.add(pass_.start.size(), 3);
+  work_.add(pass_.start.size(), 5);
   for (std::size_t i = 1; i < pass_.start.size(); ++i)
     pass_.start[i] = static_cast<std::uint16_t>(pass_.start[i] + pass_.start[i - 1]);
   seeds_.size = pass_.start.back();

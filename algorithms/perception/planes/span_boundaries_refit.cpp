@@ -27,7 +27,7 @@ float sum_of(const Slots& slots) noexcept {
 void SpanBoundaries::begin_refit() noexcept {
   noise_samples_.clear();
   next_span_.fill(0);
-  work_.add(400 + 16 * static_cast<std::int32_t>(planes_.size()));
+  work_.add(1200 + 22 * static_cast<std::int32_t>(planes_.size()));
   for (Plane& plane : planes_) {
     plane.moments = PlaneMoments{};
     plane.residual2 = 0.0;
@@ -185,7 +185,7 @@ void SpanBoundaries::sample_noise(std::int32_t column) noexcept {
   constexpr std::int32_t kStride = 4;
   for (const ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) {
     const Line line = line_of(span.plane, column);
-    work_.add(50 + 72 * std::max((span.bottom - span.top) / kStride, 0));
+    work_.add(50 + 80 * ((span.bottom - span.top + 2) / kStride));
     for (std::int32_t r = span.top + 1; r < span.bottom; r += kStride) {
       const float w = image_->by_column(r, column);
       if (!(w > 0.0F)) continue;

@@ -198,7 +198,7 @@ void EdgeLineFinder::search_columns(std::int32_t first_column) noexcept {
   work_.add(750);
   const Windows windows = windows_of(first_column);
   if (windows.last_row < 0) return;
-  work_.add(300 + 122 * (windows.last_row - windows.first_row + 1));
+  work_.add(300 + 138 * (windows.last_row - windows.first_row + 1));
   Found found;
   weigh_rows(windows, found);
   const auto least = static_cast<float>(params_.min_side_px);

@@ -388,10 +388,10 @@ OutlineSide SideLines::find(RegionId id, bool right) noexcept {
   work_.add(250 + 42 * ((profile.last_row - profile.first_row) / 16 + 1));
   Views views;
   choose_rows(upright_rows(profile, ends), plane.kind == SurfaceKind::kTread ? kMaxRows : kOtherRows, ends, views);
-  work_.add(views.count, 480);
+  work_.add(views.count, 560);
   for (std::size_t i = 0; i < views.count; ++i) look(id, right, views.of[i]);
   double outermost = find_row_ends(views, right);
-  work_.add(seen_.size(), 60 + 10 * 14);
+  work_.add(seen_.size(), 230);
   if (!(outermost > kNowhere)) {  // no row but flat ones
     work_.add(profile.last_row - profile.first_row + 1, 12);
     for (std::int32_t r = profile.first_row; r <= profile.last_row; ++r) {
