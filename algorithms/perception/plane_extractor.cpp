@@ -163,7 +163,7 @@ void PlaneExtractor::measure() noexcept {
   fit_.step();
   if (!fit_.done()) return;
   const double share = explained_share();
-  work_.add(planes_.count, 10);
+  work_.add(planes_.count, 16);
   least_share_ = {params_.min_explained * share, params_.min_explained_curved * share};
   next_ = 0;
   part_ = Part::kSolvingMeasured;

@@ -74,7 +74,7 @@ void PolygonMap::compare_some() noexcept {
   constexpr std::size_t kAtOnce = 16;
   for (std::size_t glances = 0; glances < kAtOnce && pass_.track < tracks_.size(); ++glances, ++pass_.track) {
     Nearness near;
-    work_.add(85);
+    work_.add(105);
     if (!is_near(tracks_[pass_.track], near)) continue;
     double cost = 0.0;
     if (!matches(tracks_[pass_.track], near, cost)) continue;

@@ -8,10 +8,12 @@
 
 namespace polygmap {
 void PolygonMap::fuse_best() noexcept {
-  constexpr std::int32_t kRebuild = 6500, kPerCorner = 420;  // of a track: its eight ends, its polygon
-  work_.add(kRebuild);
+  // Of a track: its eight ends, its polygon; of a new one no end is known before.
+  constexpr std::int32_t kRebuild = 6500, kCreate = 3200, kPerCorner = 420;
+  const bool is_new = pass_.best >= tracks_.size();
+  work_.add(is_new ? kCreate : kRebuild);
   work_.add(seen_.polygon.size(), kPerCorner);
-  if (pass_.best >= tracks_.size()) {
+  if (is_new) {
     ++fused_in_frame_;
     create();
     return;
@@ -91,11 +93,11 @@ int PolygonMap::priority(const MapTrack& track) const noexcept {
 
 void PolygonMap::admit(const MapTrack& track) noexcept {
   if (!tracks_.try_push_back(track)) {
-    work_.add(tracks_.size(), 330);
     // The least worth keeping goes, of these the one not seen for longest.
     std::size_t victim = 0;
     int least = priority(tracks_[0]);
     for (std::size_t i = 1; i < tracks_.size(); ++i) {
+      work_.add(tracks_[i].kind == SurfaceKind::kTread ? 330 : 80);  // a tread's polygon is gone round
       const int worth = priority(tracks_[i]);
       if (worth < least || (worth == least && tracks_[i].last_seen_ns < tracks_[victim].last_seen_ns)) {
         victim = i;

@@ -301,7 +301,7 @@ void SpanBoundaries::place(Pair& pair) const noexcept {
 
 bool SpanBoundaries::place_some() noexcept {
   constexpr std::size_t kPairsAtOnce = 8;
-  constexpr std::int32_t kPairInstructions = 700;
+  constexpr std::int32_t kPairInstructions = 900;
   if (next_ >= pair_count_) return reproject_some();
   const std::size_t end = std::min(next_ + kPairsAtOnce, pair_count_);
   work_.add(end - next_, kPairInstructions);
