@@ -9,7 +9,10 @@ namespace {
 constexpr std::int64_t kCameraTimeout_ns = 200 * kNsPerMs;  // six frames
 constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers within three cycles
 
-constexpr std::int32_t kLearnMountUnits = 190;  // both toes in sight: 95,000 instructions
+// In instructions, by what they copy and go through.
+constexpr std::int32_t kLearnMount = 2500, kLearnPerSurface = 60;
+constexpr std::int32_t kBeginMap = 16'000, kMapPerSurface = 60;
+constexpr std::int32_t kBeginSearch = 16'000, kSearchPerPolygon = 20;
 
 }  // namespace
 
@@ -100,41 +103,67 @@ void PerceptionLane::begin_extraction(std::int64_t now_ns) noexcept {
 }
 
 Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexcept {
-  if (stage_ != FrameStage::kExtracting) return Progress::kIdle;
-  const Progress progress = extractor_.step(budget);
-  if (progress == Progress::kDone) {
-    if (params_.estimate_mount) {
-      learn_mount();
-      budget.spend(kLearnMountUnits);
-    }
-    camera_port_.release();
-    health_.own.follow(Limit::kSegmentsFull, now_ns, extractor_.counters().segment_overflow);
-    health_.own.follow(Limit::kPlanesFull, now_ns, extractor_.counters().plane_overflow);
-    if (watcher_ != nullptr) watcher_->surfaces.publish(now_ns, extractor_.result());
-    begin_map(now_ns);
-    stage_ = FrameStage::kWaiting;
+  if (stage_ == FrameStage::kExtracting) {
+    if (extractor_.step(budget) != Progress::kDone) return Progress::kBusy;
+    stage_ = FrameStage::kLearning;
+    if (params_.estimate_mount) begin_learning();
   }
-  return progress;
+  if (stage_ != FrameStage::kLearning) return Progress::kIdle;
+  if (params_.estimate_mount && !learn_some(budget)) return Progress::kBusy;
+  const auto count = static_cast<std::int32_t>(extractor_.result().surfaces.size());
+  finish_picture(now_ns);
+  budget.spend(units_of(kBeginMap + count * kMapPerSurface));
+  return Progress::kDone;
 }
 
-void PerceptionLane::learn_mount() noexcept {
+void PerceptionLane::finish_picture(std::int64_t now_ns) noexcept {
+  camera_port_.release();
+  health_.own.follow(Limit::kSegmentsFull, now_ns, extractor_.counters().segment_overflow);
+  health_.own.follow(Limit::kPlanesFull, now_ns, extractor_.counters().plane_overflow);
+  if (watcher_ != nullptr) watcher_->surfaces.publish(now_ns, extractor_.result());
+  begin_map(now_ns);
+  stage_ = FrameStage::kWaiting;
+}
+
+void PerceptionLane::begin_learning() noexcept {
   constexpr double kStands = 0.9;
   const StateEstimate& state = exposure_state_;
   const Transform base_T_odom = state.odom_T_base.inverse();
-  CameraExtrinsicsEstimator::Stance stance;
-  stance.base_up = base_T_odom.R.col(2);
-  stance.speed_mps = math::sqrt(state.odom_v_base_mps.squaredNorm());
+  learning_.stance = {};
+  learning_.stance.base_up = base_T_odom.R.col(2);
+  learning_.stance.speed_mps = math::sqrt(state.odom_v_base_mps.squaredNorm());
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    learning_.stance.base_T_sole[foot] = base_T_odom * state.odom_T_sole[foot];
+    learning_.stance.stands[foot] = state.contact_probability[foot] > kStands;
+  }
+  learning_.foot = 0;
+  begin_toe();
+}
+
+void PerceptionLane::begin_toe() noexcept {
+  if (learning_.foot == kFootCount) return;
   RawRange range;
   range.set(params_.surfaces.limits, intrinsics_.depth_unit_m);
-  const Transform camera_T_base = mount_.base_T_camera().inverse();
-  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-    stance.base_T_sole[foot] = base_T_odom * state.odom_T_sole[foot];
-    stance.stands[foot] = state.contact_probability[foot] > kStands;
-    if (stance.stands[foot])
-      stance.toes[foot] = detect_toe(params_.mount.toe, frame_, intrinsics_, range, params_.robot.sole,
-                                     camera_T_base * stance.base_T_sole[foot]);
+  learning_.toe.begin(params_.mount.toe, frame_, intrinsics_, range, params_.robot.sole,
+                      mount_.base_T_camera().inverse() * learning_.stance.base_T_sole[learning_.foot]);
+}
+
+bool PerceptionLane::learn_some(WorkBudget& budget) noexcept {
+  while (!budget.exhausted()) {
+    if (learning_.foot == kFootCount) {
+      mount_.update(extractor_.result(), learning_.stance);
+      budget.spend(
+          units_of(kLearnMount + kLearnPerSurface * static_cast<std::int32_t>(extractor_.result().surfaces.size())));
+      return true;
+    }
+    if (!learning_.stance.stands[learning_.foot] || learning_.toe.step()) {
+      if (learning_.stance.stands[learning_.foot]) learning_.stance.toes[learning_.foot] = learning_.toe.sighting();
+      ++learning_.foot;
+      begin_toe();
+    }
+    budget.spend(learning_.toe.work().take_units());
   }
-  mount_.update(extractor_.result(), stance);
+  return false;
 }
 
 void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
@@ -158,7 +187,7 @@ Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
   const Progress progress = map_.step(budget);
   if (progress != Progress::kBusy) {
     mapping_ = false;
-    search_due_ = true;
+    searching_.due = true;
     health_.own.follow(Limit::kMapFull, now_ns, map_.counters().evicted + map_.counters().refused);
     if (watcher_ != nullptr) watcher_->map.publish(now_ns, map_.snapshot());
   }
@@ -174,16 +203,20 @@ void PerceptionLane::begin_search() noexcept {
   query.stance = context.stance;
   query.climbing = context.climbing;
   search_.begin(map_.snapshot(), query);
-  search_due_ = false;
-  searching_ = true;
+  searching_.due = false;
+  searching_.now = true;
 }
 
 Progress PerceptionLane::footholds(std::int64_t now_ns, WorkBudget& budget) noexcept {
-  if (!searching_ && search_due_) begin_search();
-  if (!searching_) return Progress::kIdle;
+  if (!searching_.now && searching_.due) {
+    begin_search();
+    budget.spend(
+        units_of(kBeginSearch + kSearchPerPolygon * static_cast<std::int32_t>(map_.snapshot().polygons.size())));
+  }
+  if (!searching_.now) return Progress::kIdle;
   const Progress progress = search_.step(budget);
   if (progress == Progress::kDone) link_.footholds.publish(now_ns, search_.result());
-  if (progress != Progress::kBusy) searching_ = false;
+  if (progress != Progress::kBusy) searching_.now = false;
   return progress;
 }
 

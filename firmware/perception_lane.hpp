@@ -4,6 +4,7 @@
 
 #include "algorithms/core/work.hpp"
 #include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
+#include "algorithms/perception/extrinsics/toe_detector.hpp"
 #include "firmware/lane_link.hpp"
 #include "firmware/params.hpp"
 #include "hal/ports/depth_camera.hpp"
@@ -27,17 +28,22 @@ class PerceptionLane {
   [[nodiscard]] const MapSnapshot& map_snapshot() const noexcept { return map_.snapshot(); }
   [[nodiscard]] const CameraExtrinsicsEstimator& mount() const noexcept { return mount_; }
   [[nodiscard]] const SurfaceExtractor& extractor() const noexcept { return extractor_; }
+  [[nodiscard]] const PolygonMap& polygon_map() const noexcept { return map_; }
+  [[nodiscard]] const FootholdSearch& foothold_search() const noexcept { return search_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_.own; }  // of this lane
   [[nodiscard]] const FootholdSet& footholds_found() const noexcept { return search_.result(); }
   [[nodiscard]] const LaneView& view() const noexcept { return view_; }
 
  private:
-  enum class FrameStage : std::uint8_t { kWaiting, kPoseAsked, kExtracting };
+  enum class FrameStage : std::uint8_t { kWaiting, kPoseAsked, kExtracting, kLearning };
 
   void look_across(std::int64_t now_ns) noexcept;
   void begin_extraction(std::int64_t now_ns) noexcept;
   void begin_map(std::int64_t now_ns) noexcept;
-  void learn_mount() noexcept;
+  void begin_learning() noexcept;
+  void begin_toe() noexcept;
+  [[nodiscard]] bool learn_some(WorkBudget& budget) noexcept;  // of the mount; true when the picture says no more
+  void finish_picture(std::int64_t now_ns) noexcept;
   void begin_search() noexcept;
 
   hal::DepthCamera& camera_port_;
@@ -51,8 +57,9 @@ class PerceptionLane {
   LaneView view_;
   FrameStage stage_ = FrameStage::kWaiting;
   bool mapping_ = false;
-  bool search_due_ = false;
-  bool searching_ = false;
+  struct {
+    bool due = false, now = false;
+  } searching_;
   DepthFrameView frame_;
   StateEstimate exposure_state_;
   std::array<LegShapes, kFootCount> body_{};  // camera frame, at the exposure
@@ -60,6 +67,11 @@ class PerceptionLane {
   std::uint32_t request_ = 0;                 // number of the last pose request
   SurfaceExtractor extractor_;
   CameraExtrinsicsEstimator mount_;
+  struct {  // what the picture says of the mount
+    CameraExtrinsicsEstimator::Stance stance;
+    ToeDetector toe;
+    std::size_t foot = 0;  // whose toe it is
+  } learning_;
   PolygonMap map_;
   FootholdSearch search_;
 };

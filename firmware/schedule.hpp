@@ -36,26 +36,22 @@ inline constexpr TaskFunction kPerceptionWork{[](Pipeline& p, std::int64_t cycle
                                               kPerceptionLane, true};
 
 // Control on lane 0, perception on lane 1; the simulation runs both in one lane, so all rows together fit one cycle.
-// Units: see the stage's step(). What they cost is stated here only, on one core of a shared AMD EPYC: 0.11-0.14 us
-// (surfaces, means over generated stairs; 0.19 us on a cluttered desk; every piece's time over its units, the lower
-// quartile of 25 times, on the desk of 81), 0.16-0.18 us (map) and 0.83-0.86 us (footholds: thread CPU time over the
-// units spent, both taken around run_row() in `polygmap climb --steps 4 --seed 1`, three times). The table allows for
-// more than twice these means, footholds for half as much again, which also covers what other programs on that machine
-// take. It does not hold for each piece: on the desk a fourth row, in which four are cut into segments, takes 1.4-2.1
-// us of its one unit, eight columns' refit up to 1.3 us a unit, and the end of the pass in which neighbours meet, where
-// all boundaries are decided, 6 us of its one. A slot hands out hundreds. Shed first: what the next frame repeats
-// anyway.
+// Instructions are AArch64's, of user code: rows that are not resumable are measured over a climb, in worst pictures,
+// and with the codec (sense, command). A resumable row's follow from its units, kInstructionsPerUnit each, which are
+// true for every piece of work (toolchain/checks/pieces). A unit is given 120 ns, at one instruction a nanosecond and a
+// fifth for the piece that overdraws; microseconds of sense and command have the kernel's share in them, 12 writes and
+// 17 reads. What perception leaves of a cycle its followers take. Shed first: what the next frame repeats anyway.
 // clang-format off
 inline constexpr std::array kTasks = std::to_array<Task>({
-    {{.task = "sense", .lane = 0, .budget_us = 40}, kControl<&ControlLane::sense>},
-    {{.task = "estimate", .lane = 0, .budget_us = 100}, kControl<&ControlLane::estimate>},
-    {{.task = "gait", .lane = 0, .budget_us = 100}, kControl<&ControlLane::gait>},
-    {{.task = "command", .lane = 0, .budget_us = 20}, kControl<&ControlLane::command>},
-    {{.task = "health", .lane = 0, .budget_us = 10}, kControl<&ControlLane::health>},
-    {{.task = "intake", .lane = 1, .budget_us = 120}, kPerception<&PerceptionLane::intake>},
-    {{.task = "surfaces", .lane = 1, .budget_us = 1100, .unit_cost_ns = 500, .shed_order = 3}, kPerceptionWork<&PerceptionLane::surfaces>},
-    {{.task = "map", .lane = 1, .budget_us = 150, .unit_cost_ns = 400, .shed_order = 2}, kPerceptionWork<&PerceptionLane::map>},
-    {{.task = "footholds", .lane = 1, .budget_us = 350, .unit_cost_ns = 1300, .shed_order = 1}, kPerceptionWork<&PerceptionLane::footholds>},
+    {{.task = "sense", .lane = 0, .budget_us = 120, .instructions = 11'000}, kControl<&ControlLane::sense>},
+    {{.task = "estimate", .lane = 0, .budget_us = 150, .instructions = 72'000}, kControl<&ControlLane::estimate>},
+    {{.task = "gait", .lane = 0, .budget_us = 120, .instructions = 65'000}, kControl<&ControlLane::gait>},
+    {{.task = "command", .lane = 0, .budget_us = 200, .instructions = 7'000}, kControl<&ControlLane::command>},
+    {{.task = "health", .lane = 0, .budget_us = 10, .instructions = 1'000}, kControl<&ControlLane::health>},
+    {{.task = "intake", .lane = 1, .budget_us = 40, .instructions = 14'000}, kPerception<&PerceptionLane::intake>},
+    {{.task = "surfaces", .lane = 1, .budget_us = 840, .unit_cost_ns = 120, .shed_order = 3}, kPerceptionWork<&PerceptionLane::surfaces>},
+    {{.task = "map", .lane = 1, .budget_us = 96, .unit_cost_ns = 120, .shed_order = 2, .takes_leftover = true}, kPerceptionWork<&PerceptionLane::map>},
+    {{.task = "footholds", .lane = 1, .budget_us = 180, .unit_cost_ns = 120, .shed_order = 1, .takes_leftover = true}, kPerceptionWork<&PerceptionLane::footholds>},
 });
 // clang-format on
 
@@ -67,6 +63,9 @@ inline constexpr ScheduleTable<kTasks.size()> kSchedule = [] {
 inline constexpr ScheduleTable<kTasks.size()> kOneLaneSchedule = in_one_lane(kSchedule);
 
 static_assert(worst_cycle_us(kOneLaneSchedule) <= kCycle_us);
+// User code of a cycle, in one lane; what the last piece of work overdraws is to fit, too.
+inline constexpr std::int64_t kCycleInstructions = 1'200'000, kOverdraftInstructions = 60'000;
+static_assert(worst_cycle_instructions(kOneLaneSchedule) + kOverdraftInstructions <= kCycleInstructions);
 static_assert(lane_count(kSchedule) == kLaneCount);
 static_assert(std::ranges::all_of(kTasks,
                                   [](const Task& task) {

@@ -63,6 +63,7 @@ concept CountsExecutiveEvents = requires(T& counters, ExecutiveEvent event, std:
 // cycle is given up; (2) after a cycle that overran or came late the rows of one more shed order are left out, and one
 // less again after kRecoveryCycles cycles in time. Rows with shed order 0 always run.
 // Overdrafts: a resumable row that spent more units than it was given is given less in its next slots until it is paid.
+// Leftovers: a row that takes_leftover may spend what the resumable row before it did not, in the same cycle.
 template <typename Tasks, const auto& Table, std::size_t Lane = 0, typename Counters = EventCounters<ExecutiveEvent>>
 class CyclicExecutive {
   static constexpr std::size_t kRows = Table.size();
@@ -152,11 +153,12 @@ class CyclicExecutive {
                .slot = static_cast<std::size_t>(next_cycle_ % kCyclesPerMajor),
                .skipped_before = skipped_before};
     const std::uint64_t begin_count = clock_.count();
+    leftover_ = 0;
     for (std::size_t row = 0; row < kRows; ++row) {
       if (Table[row].lane != Lane || !Table[row].runs_in(report_.slot)) continue;
       const std::uint64_t elapsed_ns = scale_.to_ns(clock_.count() - begin_count);
       if (must_shed(row, elapsed_ns)) {
-        pay_overdraft(row);
+        pay_overdraft(row, Table[row].units_per_slot());
         count_up(rows_[row].shed);
         report_.shed |= 1U << row;
         counters_.raise(ExecutiveEvent::kRowShed, report_.due_ns, 1);
@@ -170,8 +172,10 @@ class CyclicExecutive {
 
   void run_row(std::size_t row) noexcept {
     RowStatistics& statistics = rows_[row];
-    const std::int32_t allowance = Table[row].units_per_slot() - overdraft_[row];
-    pay_overdraft(row);
+    const std::int32_t more = Table[row].takes_leftover ? leftover_ : 0;
+    const std::int32_t units = Table[row].units_per_slot() + more, allowance = units - overdraft_[row];
+    pay_overdraft(row, units);
+    if (Table[row].resumable()) leftover_ = 0;
     if (Table[row].resumable() && allowance <= 0) {
       count_up(statistics.deferred);
       report_.deferred |= 1U << row;
@@ -191,12 +195,15 @@ class CyclicExecutive {
     }
     if (Table[row].resumable()) {
       statistics.units += static_cast<std::uint64_t>(std::max(allowance - budget.left(), 0));
+      leftover_ = std::max(budget.left(), 0);
       if (budget.left() < 0) {
         count_up(statistics.overdrawn);
         overdraft_[row] = -budget.left();
       }
     }
-    if (time_ns > static_cast<std::uint64_t>(Table[row].budget_us) * 1000U) {
+    const std::int64_t budget_ns =
+        std::int64_t{Table[row].budget_us} * 1000 + std::int64_t{more} * Table[row].unit_cost_ns;
+    if (time_ns > static_cast<std::uint64_t>(budget_ns)) {
       count_up(statistics.overruns);
       report_.overran |= 1U << row;
       counters_.raise(ExecutiveEvent::kRowOverrun, report_.due_ns, 1);
@@ -204,8 +211,8 @@ class CyclicExecutive {
   }
 
   // Work that was done ahead of its time is paid by the slots that pass, used or not.
-  void pay_overdraft(std::size_t row) noexcept {
-    overdraft_[row] = std::max(overdraft_[row] - Table[row].units_per_slot(), 0);
+  void pay_overdraft(std::size_t row, std::int32_t units) noexcept {
+    overdraft_[row] = std::max(overdraft_[row] - units, 0);
   }
 
   // What is left of the cycle must hold this row and the later rows that matter at least as much.
@@ -250,6 +257,7 @@ class CyclicExecutive {
   CounterScale scale_;
   std::int64_t start_ns_ = 0;
   std::uint64_t next_cycle_ = 0;
+  std::int32_t leftover_ = 0;  // units of this cycle
   std::uint32_t requested_shed_ = 0;
   std::uint32_t cycles_in_time_ = 0;
   std::uint8_t shed_level_ = 0;

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "algorithms/core/work.hpp"
+
 namespace polygmap {
 
 inline constexpr std::int32_t kCycle_us = 2000;
@@ -35,6 +37,9 @@ struct ScheduleRow {
   std::int32_t budget_us = 0;     // per slot, on the robot
   std::int32_t unit_cost_ns = 0;  // of one work unit, as measured; 0: the row is not resumable
   std::uint8_t shed_order = 0;    // 1 is shed first, then 2, ...; 0 is never shed (control, gait, health)
+  bool takes_leftover = false;    // spends also what the lane's resumable row before it left of this cycle
+  std::int32_t instructions =
+      0;  // of the processor per slot, at most, as measured; a resumable row's follow from units
 
   [[nodiscard]] constexpr bool resumable() const noexcept { return unit_cost_ns > 0; }
   [[nodiscard]] constexpr bool runs_in(std::size_t slot) const noexcept { return ((slots >> slot) & 1U) != 0; }
@@ -43,6 +48,11 @@ struct ScheduleRow {
     return resumable() ? static_cast<std::int32_t>(std::int64_t{budget_us} * 1000 / unit_cost_ns) : 0;
   }
 };
+
+// Of the robot's processor, that a slot of the row is meant for.
+[[nodiscard]] constexpr std::int64_t instructions_per_slot(const ScheduleRow& row) noexcept {
+  return row.resumable() ? std::int64_t{row.units_per_slot()} * kInstructionsPerUnit : row.instructions;
+}
 
 // Rows of a slot run in table order.
 template <std::size_t RowCount>
@@ -79,6 +89,22 @@ template <std::size_t RowCount>
     if (row.lane == lane && row.runs_in(slot)) load_us += row.budget_us;
   }
   return load_us;
+}
+
+// Of the fullest slot of the fullest lane: what is left over by one row is spent by another, and adds nothing.
+template <std::size_t RowCount>
+[[nodiscard]] constexpr std::int64_t worst_cycle_instructions(const ScheduleTable<RowCount>& table) noexcept {
+  std::int64_t worst = 0;
+  for (std::size_t lane = 0; lane < lane_count(table); ++lane) {
+    for (std::size_t slot = 0; slot < kCyclesPerMajor; ++slot) {
+      std::int64_t load = 0;
+      for (const ScheduleRow& row : table) {
+        if (row.lane == lane && row.runs_in(slot)) load += instructions_per_slot(row);
+      }
+      worst = std::max(worst, load);
+    }
+  }
+  return worst;
 }
 
 // The fullest slot of the fullest lane.

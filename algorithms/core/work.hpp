@@ -13,8 +13,41 @@ enum class [[nodiscard]] Progress : std::uint8_t{
     kDone,  // a result is ready
 };
 
-// Units left in this slot. A unit is a number of pixels or cells that the stage states; its cost in time is in the
-// schedule table. A step may overdraw by less than one of its own indivisible pieces (also stated by the stage).
+// A unit of work: as much as so many instructions of the robot's processor (AArch64, -O3) do. Every piece of work is
+// paid by what it did, counted in rows, columns, corners, pairs, at a price that toolchain/checks/pieces measures: the
+// same on every machine, and no piece takes more than 1.5 times what it pays for.
+inline constexpr std::int32_t kInstructionsPerUnit = 100;
+
+[[nodiscard]] constexpr std::int32_t units_of(std::int32_t instructions) noexcept {
+  return (instructions + kInstructionsPerUnit - 1) / kInstructionsPerUnit;
+}
+
+// What a piece of work did, in instructions, until it is paid.
+class WorkCount {
+ public:
+  constexpr void add(std::int32_t instructions) noexcept { instructions_ += instructions; }
+  template <typename Count>
+  constexpr void add(Count times, std::int32_t instructions) noexcept {
+    instructions_ += static_cast<std::int32_t>(times) * instructions;
+  }
+  constexpr void add(WorkCount& part) noexcept {
+    instructions_ += part.instructions_;
+    part.instructions_ = 0;
+  }
+  [[nodiscard]] constexpr std::int32_t instructions() const noexcept { return instructions_; }
+  // The units for it, at least one: work never ends for nothing. Begins the count anew.
+  [[nodiscard]] constexpr std::int32_t take_units() noexcept {
+    const std::int32_t units = units_of(instructions_);
+    instructions_ = 0;
+    return units > 0 ? units : 1;
+  }
+
+ private:
+  std::int32_t instructions_ = 0;
+};
+
+// Units left in this slot. What a unit takes in time is in the schedule table. A step may overdraw by less than one of
+// its own indivisible pieces (stated by the stage).
 class WorkBudget {
  public:
   explicit constexpr WorkBudget(std::int32_t units) noexcept : units_(units) {}

@@ -61,7 +61,7 @@ Progress FootholdSearch::step(WorkBudget& budget) noexcept {
     stage_ = next;
   };
   while (!budget.exhausted()) {
-    budget.spend(1);
+    work_.add(110);
     switch (stage_) {
       case Stage::kPrepare:
         if (index_ < map_.polygons.size()) {
@@ -94,10 +94,13 @@ Progress FootholdSearch::step(WorkBudget& budget) noexcept {
       case Stage::kFinish:
         finish();
         stage_ = Stage::kIdle;
+        budget.spend(work_.take_units());
         return Progress::kDone;
       case Stage::kIdle:
         return Progress::kIdle;
     }
+    work_.add(raster_.work());
+    budget.spend(work_.take_units());
   }
   return Progress::kBusy;
 }
@@ -106,6 +109,8 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
   const SurfacePatch& surface = polygon.surface;
   const bool confirmed = polygon.sightings >= params_.confirmed_sightings;
   if (surface.kind == SurfaceKind::kTread && surface.area_m2 >= params_.area_min_m2) {
+    work_.add(2500);
+    work_.add(surface.polygon.size(), 260);
     LevelSurface level;
     if (!prepare(polygon, yaw_of(query_.world_T_base.R), params_.levels, params_.margin, foot_, level)) return;
     if (confirmed) {
@@ -116,6 +121,8 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
     }
   }
   if (surface.kind == SurfaceKind::kRiser && confirmed) {
+    work_.add(120);
+    work_.add(surface.polygon.size(), 18);
     (void)uprights_.try_push_back(upright_of(surface));
   }
 }
@@ -160,7 +167,10 @@ void FootholdSearch::link_upright(LevelSurface& tread, const Upright& u) const n
 // What the toe must not reach: the next tread's nosing and the next riser, beside the tread's own back edge.
 void FootholdSearch::link(std::size_t i) noexcept {
   LevelSurface& tread = levels_[i];
+  work_.add(60);
   if (!tread.has_nosing) return;
+  work_.add(levels_.size(), 95);
+  work_.add(uprights_.size(), 130);
   for (std::size_t j = 0; j < levels_.size(); ++j) {
     const LevelSurface& other = levels_[j];
     const double rise_m = other.height_m - tread.height_m;
@@ -181,6 +191,7 @@ void FootholdSearch::link(std::size_t i) noexcept {
 }
 
 void FootholdSearch::raster_row(std::int32_t row) noexcept {
+  work_.add(140);
   raster_.clear_row(row);
   const std::span<const LevelSurface> levels(levels_.begin(), levels_.size());
   for (std::size_t i = 0; i < levels_.size(); ++i) raster_.add_row(row, levels, static_cast<std::uint8_t>(i));
@@ -200,6 +211,8 @@ void FootholdSearch::look_at_top(std::int32_t row) noexcept {
   const FootholdRaster::Columns ahead =
       FootholdRaster::columns_within(first.x(), step.x(), {params_.top.from_m, params_.top.to_m}) &
       FootholdRaster::columns_within(first.y(), step.y(), {-half_width_m, half_width_m});
+  work_.add(120);
+  work_.add(std::max(ahead.end - ahead.begin, 0), 46);
   for (std::int32_t column = ahead.begin; column < ahead.end; ++column) {
     const Vec2 sole_p = first + static_cast<double>(column) * step;
     if (sole_p.x() < params_.top.from_m || sole_p.x() > params_.top.to_m ||
@@ -228,25 +241,95 @@ void FootholdSearch::find_next(std::int32_t row) noexcept {
   const FootholdRaster::Columns corridor =
       FootholdRaster::columns_within(first.x(), step.x(), {-range_m, range_m}) &
       FootholdRaster::columns_within(first.y(), step.y(), {-half_width_m, half_width_m});
-  for (std::int32_t column = corridor.begin; column < corridor.end; ++column) {
-    const std::uint8_t layer = raster_.layer(column, row);
-    if (layer == FootholdRaster::kNoLayer) continue;
-    const Vec2 base_p = first + static_cast<double>(column) * step;
-    const double distance2 = base_p.squaredNorm();
-    if (distance2 >= found_.next_distance2_m2 || std::abs(base_p.y()) > params_.corridor_half_width_m) continue;
-    const double z_m = levels_[layer].plane.height_m(raster_.at(column, row));
-    if (z_m <= z_foot_ + params_.delta_foot_m || !in_range(base_p, params_.raster.g_range_m)) continue;  // eq. (20)
-    found_.next_distance2_m2 = distance2;
-    found_.next = layer;
+  work_.add(200);
+  // Distances grow to both sides of the nearest column: of what the corridor has of a surface that is high enough all
+  // along, no cell but one of the nearest ones counts. columns_within() has three too many at either end.
+  constexpr std::int32_t kNearest = 4;
+  const auto nearest =
+      static_cast<std::int32_t>(math::clamp(-first.dot(step) / step.squaredNorm(), 0.0, FootholdRaster::kSide - 1.0));
+  const double least_z_m = z_foot_ + params_.delta_foot_m;
+  for (std::int32_t begin = corridor.begin; begin < corridor.end;) {
+    const FootholdRaster::Stretch stretch = raster_.stretch(row, begin, corridor.end);
+    work_.add(50 + (stretch.end - begin) / 2);
+    begin = stretch.end;
+    if (stretch.layer == FootholdRaster::kNoLayer) continue;
+    const Plane& plane = levels_[stretch.layer].plane;
+    const FootholdRaster::Rises rises = raster_.rises(row, stretch, plane, least_z_m);
+    if (rises == FootholdRaster::Rises::kNowhere) continue;
+    std::int32_t from = stretch.begin, until = stretch.end;
+    if (rises == FootholdRaster::Rises::kEverywhere) {
+      const std::int32_t middle = std::clamp(nearest, from, until - 1);
+      from = std::max(from, middle - kNearest);
+      until = std::min(until, middle + kNearest + 1);
+    }
+    work_.add(50 + 22 * (until - from));
+    for (std::int32_t column = from; column < until; ++column) {
+      const Vec2 base_p = first + static_cast<double>(column) * step;
+      const double distance2 = base_p.squaredNorm();
+      if (distance2 >= found_.next_distance2_m2 || std::abs(base_p.y()) > half_width_m) continue;
+      if (plane.height_m(raster_.at(column, row)) <= least_z_m || !in_range(base_p, range_m)) continue;  // eq. (20)
+      found_.next_distance2_m2 = distance2;
+      found_.next = stretch.layer;
+    }
   }
 }
 
 // May a foot be put at a cell, eqs (20), (23), (25)? It survives when a foot may fit somewhere in it: half its diagonal
 // is forgiven here and not in the refinement.
-bool FootholdSearch::fits(const Vec2& p_m, const LevelSurface& surface) const noexcept {
+bool FootholdSearch::fits(const Vec2& p_m, const LevelSurface& surface) noexcept {
+  work_.add(85);
+  work_.add(surface.edges.size() + surface.toe.size() + surface.obstacles.size(), 12);
   return in_range(base_(p_m), params_.raster.g_range_m) &&
          below_limit(surface.plane.height_m(p_m), z_foot_, params_.g_z_m) &&
          surface.spare_m(p_m) >= -params_.raster.g_res_m * std::numbers::sqrt2 / 2.0;
+}
+
+// The stretches of a row's cells that may be nearer to a point than that; the caller still asks every cell.
+template <typename Visit>
+void FootholdSearch::for_each_nearer(std::int32_t row, const Vec2& from_m, double distance2_m2,
+                                     const Visit& visit) noexcept {
+  work_.add(110);
+  FootholdRaster::Columns near;
+  if (distance2_m2 < kFarAway_m2) {
+    const double reach_m = math::sqrt(std::max(distance2_m2 - distance2_to_row_m2(from_m, row), 0.0));
+    near.begin = std::max(raster_.column_of(from_m.x() - reach_m) - 1, 0);
+    near.end = std::min(raster_.column_of(from_m.x() + reach_m) + 3, FootholdRaster::kSide);
+  }
+  while (near.begin < near.end) {
+    const FootholdRaster::Stretch stretch = raster_.stretch(row, near.begin, near.end);
+    work_.add(40 + (stretch.end - near.begin) / 2);
+    near.begin = stretch.end;
+    visit(stretch);
+  }
+}
+
+// The squared distance to the nearest cell of a stretch that is high enough and where a foot fits, the first of those,
+// if it is less than that. From the nearest cell outwards: the first one that a foot fits in is it.
+double FootholdSearch::nearest_fit(std::int32_t row, const FootholdRaster::Stretch& stretch, const Vec2& from_m,
+                                   double least_z_m, double distance2_m2, Vec2& cell_m) noexcept {
+  const LevelSurface& surface = levels_[stretch.layer];
+  work_.add(120);
+  if (raster_.rises(row, stretch, surface.plane, least_z_m) == FootholdRaster::Rises::kNowhere) return kFarAway_m2;
+  const auto distance2_to = [&](std::int32_t column) {
+    return column < stretch.begin || column >= stretch.end ? kFarAway_m2
+                                                           : (raster_.at(column, row) - from_m).squaredNorm();
+  };
+  std::int32_t right = std::clamp(raster_.column_of(from_m.x()), stretch.begin, stretch.end - 1);
+  if (distance2_to(right + 1) < distance2_to(right)) ++right;
+  std::int32_t left = right - 1;
+  double to_left = distance2_to(left), to_right = distance2_to(right);
+  for (;;) {
+    const bool at_left = to_left <= to_right;
+    const double distance2 = at_left ? to_left : to_right;
+    if (distance2 >= distance2_m2) return kFarAway_m2;
+    work_.add(60);
+    const Vec2 p = raster_.at(at_left ? left : right, row);
+    if (surface.plane.height_m(p) > least_z_m && fits(p, surface)) {
+      cell_m = p;
+      return distance2;
+    }
+    (at_left ? to_left : to_right) = distance2_to(at_left ? --left : ++right);
+  }
 }
 
 // Erosion of each layer, eqs (24)-(25). A layer is a mapped surface, since the map has already put together what lies
@@ -257,17 +340,14 @@ bool FootholdSearch::fits(const Vec2& p_m, const LevelSurface& surface) const no
 void FootholdSearch::erode_row(std::int32_t row) noexcept {
   if (found_.next == kNone) return;
   if (distance2_to_row_m2(base_.origin_m(), row) >= found_.p_star_distance2_m2) return;
-  const LevelSurface& surface = levels_[found_.next];
-  for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
-    if (raster_.layer(column, row) != found_.next) continue;
-    const Vec2 p = raster_.at(column, row);
+  const double least_z_m = z_foot_ + params_.delta_foot_m;
+  for_each_nearer(row, base_.origin_m(), found_.p_star_distance2_m2, [&](const FootholdRaster::Stretch& stretch) {
+    if (stretch.layer != found_.next) return;
     // Eq. (26), on the tread that comes next.
-    const double distance2 = (p - base_.origin_m()).squaredNorm();
-    if (distance2 >= found_.p_star_distance2_m2) continue;
-    if (surface.plane.height_m(p) <= z_foot_ + params_.delta_foot_m || !fits(p, surface)) continue;
-    found_.p_star_distance2_m2 = distance2;
-    found_.p_star_cell_m = p;
-  }
+    const double distance2 =
+        nearest_fit(row, stretch, base_.origin_m(), least_z_m, found_.p_star_distance2_m2, found_.p_star_cell_m);
+    found_.p_star_distance2_m2 = std::min(found_.p_star_distance2_m2, distance2);
+  });
 }
 
 // Sole origin behind the nosing for a foot between two lateral positions: as much to spare at the heel as at the toe,
@@ -428,6 +508,14 @@ bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) c
   return false;
 }
 
+// Of as many spacings as may be tried, edges, toe limits and obstacles are gone through.
+std::int32_t FootholdSearch::place_feet_instructions(const LevelSurface& tread) const noexcept {
+  const auto edges = static_cast<std::int32_t>(tread.edges.size()), toe = static_cast<std::int32_t>(tread.toe.size());
+  const auto obstacles = static_cast<std::int32_t>(tread.obstacles.size());
+  const std::int32_t once = 1500 + 50 * edges + 40 * toe + 30 * obstacles;
+  return once + params_.feet.spacings * (120 + 14 * edges + 40 * toe + 30 * obstacles * (1 + obstacles));
+}
+
 StopReason FootholdSearch::without_next() const noexcept {
   if (found_.unconfirmed_ahead) return StopReason::kNothingSeen;
   if (!query_.climbing) return StopReason::kNoStaircase;
@@ -472,6 +560,9 @@ StopReason FootholdSearch::judge_next() noexcept {
 }
 
 void FootholdSearch::choose() noexcept {
+  work_.add(400);
+  work_.add(uprights_.size(), 90);
+  if (found_.next != kNone) work_.add(place_feet_instructions(levels_[found_.next]));
   double top_m = 0.0;
   if (map_.stamp_ns == 0 || (levels_.empty() && uprights_.empty())) {
     pending_.obstruction = StopReason::kNothingSeen;
@@ -493,22 +584,20 @@ void FootholdSearch::choose() noexcept {
 void FootholdSearch::look_ahead_row(std::int32_t row) noexcept {
   const Vec2 p_star_m = pending_.p_star.position_m.head<2>();
   if (distance2_to_row_m2(p_star_m, row) >= found_.p_star_star_distance2_m2) return;
-  for (std::int32_t column = 0; column < FootholdRaster::kSide; ++column) {
-    const std::uint8_t layer = raster_.layer(column, row);
-    if (layer == FootholdRaster::kNoLayer) continue;
-    const Vec2 p = raster_.at(column, row);
-    const double distance2 = (p - p_star_m).squaredNorm();
-    if (distance2 >= found_.p_star_star_distance2_m2) continue;
-    const LevelSurface& surface = levels_[layer];
-    if (surface.plane.height_m(p) <= pending_.p_star.position_m.z() + params_.delta_foot_m || !fits(p, surface)) {
-      continue;
-    }
+  const double least_z_m = pending_.p_star.position_m.z() + params_.delta_foot_m;
+  for_each_nearer(row, p_star_m, found_.p_star_star_distance2_m2, [&](const FootholdRaster::Stretch& stretch) {
+    if (stretch.layer == FootholdRaster::kNoLayer) return;
+    Vec2 cell_m;
+    const double distance2 = nearest_fit(row, stretch, p_star_m, least_z_m, found_.p_star_star_distance2_m2, cell_m);
+    if (distance2 >= found_.p_star_star_distance2_m2) return;
     found_.p_star_star_distance2_m2 = distance2;
-    found_.next_next = layer;
-  }
+    found_.next_next = stretch.layer;
+  });
 }
 
 void FootholdSearch::finish() noexcept {
+  work_.add(1200);
+  if (found_.next_next != kNone) work_.add(place_feet_instructions(levels_[found_.next_next]));
   if (found_.next_next != kNone) {
     pending_.has_p_star_star =
         judge_tread(levels_[found_.next_next], levels_[found_.next].height_m, pending_.p_star.position_m.head<2>(),

@@ -149,15 +149,15 @@ class FootholdSearch {
   // Copies what it needs. Query and result are in the world of the pose; the search itself is in that of the map, which
   // knows how far the two have drifted apart. An invalid query is counted and leaves nothing to do.
   void begin(const MapSnapshot& map, const Query& query) noexcept;
-  // A unit is one row of the raster or one polygon.
   Progress step(WorkBudget& budget) noexcept;
+  // What the next step begins with; a benchmark charges instructions to it.
+  enum class Stage : std::uint8_t { kIdle, kPrepare, kLink, kRaster, kErode, kChoose, kLookAhead, kFinish };
+  [[nodiscard]] Stage stage() const noexcept { return stage_; }
   // Changes only in the step that returns kDone.
   [[nodiscard]] const FootholdSet& result() const noexcept { return result_; }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:
-  enum class Stage : std::uint8_t { kIdle, kPrepare, kLink, kRaster, kErode, kChoose, kLookAhead, kFinish };
-
   static constexpr std::size_t kNone = kMaxMapPolygons;
   static constexpr double kFarAway_m2 = std::numeric_limits<double>::infinity();
   // What the rows of one search have told so far.
@@ -185,12 +185,16 @@ class FootholdSearch {
   [[nodiscard]] double distance2_to_row_m2(const Vec2& from_m, std::int32_t row) const noexcept;
   void look_at_top(std::int32_t row) noexcept;
   void find_next(std::int32_t row) noexcept;
+  template <typename Visit>
+  void for_each_nearer(std::int32_t row, const Vec2& from_m, double distance2_m2, const Visit& visit) noexcept;
+  [[nodiscard]] double nearest_fit(std::int32_t row, const FootholdRaster::Stretch& stretch, const Vec2& from_m,
+                                   double least_z_m, double distance2_m2, Vec2& cell_m) noexcept;
   void erode_row(std::int32_t row) noexcept;
   void choose() noexcept;
   void look_ahead_row(std::int32_t row) noexcept;
   void finish() noexcept;
 
-  [[nodiscard]] bool fits(const Vec2& p_m, const LevelSurface& surface) const noexcept;
+  [[nodiscard]] bool fits(const Vec2& p_m, const LevelSurface& surface) noexcept;
   [[nodiscard]] double aim_along_m(const LevelSurface& tread, double left_m, double right_m) const noexcept;
   [[nodiscard]] Foothold foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept;
   [[nodiscard]] double middle_m(const LevelSurface& tread) const noexcept;
@@ -199,6 +203,7 @@ class FootholdSearch {
   [[nodiscard]] bool blocked(const LevelSurface& tread, double middle_m, double half_m) const noexcept;
   [[nodiscard]] std::optional<double> beside_obstacles(const LevelSurface& tread, const Interval& sides,
                                                        double middle_m, double half_m) const noexcept;
+  [[nodiscard]] std::int32_t place_feet_instructions(const LevelSurface& tread) const noexcept;
   [[nodiscard]] StopReason place_feet(const LevelSurface& tread, Feet& feet) const noexcept;
   [[nodiscard]] StopReason judge_feet(const LevelSurface& tread, const Feet& feet) const noexcept;
   // Of a step onto the tread from soles at a point before it; places the feet. kNoStaircase: it is too far for a step.
@@ -226,6 +231,7 @@ class FootholdSearch {
   std::int32_t row_ = 0;
   std::size_t index_ = 0;
   Found found_;
+  WorkCount work_;
 };
 
 }  // namespace polygmap

@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <utility>
 
-#include "algorithms/perception/image/work_units.hpp"
-
 namespace polygmap {
 namespace {
 
-constexpr std::int32_t kGrowUnits = 1;  // PlaneGrowing bounds its pieces by a row's work
-// A join looks at eight seams, or at all of them once: as many columns' work.
-constexpr std::int32_t kJoinUnits = 4 * kColumnUnits;
+// In instructions.
+constexpr std::int32_t kSolve = 1150;     // with and without a lean
+constexpr std::int32_t kTakePlane = 110;  // a plane that comes from another stage
+constexpr std::int32_t kDrop = 60;
 
 }  // namespace
 
@@ -30,16 +29,34 @@ void PlaneExtractor::begin(const Params& params, const DepthNoiseModel& noise, c
 }
 
 Progress PlaneExtractor::step(WorkBudget& budget) noexcept {
-  while (part_ != Part::kDone && !budget.exhausted()) budget.spend(do_piece());
+  while (part_ != Part::kDone && !budget.exhausted()) {
+    do_piece();
+    budget.spend(take_units());
+  }
   return part_ == Part::kDone ? Progress::kDone : Progress::kBusy;
 }
 
-std::int32_t PlaneExtractor::do_piece() noexcept {
+std::int32_t PlaneExtractor::take_units() noexcept {
+  for (WorkCount* part :
+       {&growing_.work(), &boundaries_.work(), &merging_.work(), &overhangs_.work(), &search_.work()}) {
+    work_.add(*part);
+  }
+  work_.add(150);
+  return work_.take_units();
+}
+
+void PlaneExtractor::do_piece() noexcept {
   switch (part_) {
     case Part::kGrowing:
       return grow();
+    case Part::kMergingGrown:
+      return merge_grown();
     case Part::kSharpening:
       return sharpen();
+    case Part::kSolvingSharpened:
+      return solve_sharpened();
+    case Part::kMergingSharpened:
+      return merge_sharpened();
     case Part::kFacets:
       return join_facets();
     case Part::kOverhangs:
@@ -48,81 +65,114 @@ std::int32_t PlaneExtractor::do_piece() noexcept {
       return search_residual();
     case Part::kMeasuring:
       return measure();
+    case Part::kSolvingMeasured:
+      return solve_measured();
+    case Part::kPlacing:
+      if (boundaries_.reproject_some()) part_ = Part::kDone;
+      return;
     case Part::kDone:
-      break;
+      return;
   }
-  return 0;
 }
 
-std::int32_t PlaneExtractor::grow() noexcept {
-  if (!growing_.step()) return kGrowUnits;
+void PlaneExtractor::begin_fit(const SpanFit::Pass& pass) noexcept {
+  const bool any_new = part_ == Part::kResidual;
+  fit_.begin(pass, *segments_, to_plane_, any_new ? first_new_ : PlaneId{1}, any_new ? planes_.count : kNoPlane,
+             image_->column_rays.columns, boundaries_);
+}
+
+void PlaneExtractor::grow() noexcept {
+  if (!growing_.step()) return;
   take_grown_planes();
-  merge_coplanar(false);
+  merging_.begin_coplanar(params_.merging, params_.growing, noise_, planes_, false);
+  part_ = Part::kMergingGrown;
+}
+
+void PlaneExtractor::merge_grown() noexcept {
+  if (!merge_coplanar(false)) return;
   for (PlaneId i = 1; i <= planes_.count; ++i) boundaries_.set_plane(i, planes_[i].plane);
-  fit_.begin(SpanFit::kSharpening, *segments_, to_plane_, 1, kNoPlane, image_->column_rays.columns, boundaries_);
+  work_.add(planes_.count, 30);
+  begin_fit(SpanFit::kSharpening);
   part_ = Part::kSharpening;
-  return kMaxPieceUnits;
 }
 
-std::int32_t PlaneExtractor::sharpen() noexcept {
-  const std::int32_t units = fit_.step();
-  if (!fit_.done()) return units;
+void PlaneExtractor::sharpen() noexcept {
+  fit_.step();
+  if (!fit_.done()) return;
   // While planes are rough, what they do not explain says little.
-  solve(0.0, 0.0);
-  merge_coplanar(true);
-  merging_.begin_facets(params_.merging, params_.growing, noise_, planes_);
-  column_ = 0;
-  part_ = Part::kFacets;
-  return kMaxPieceUnits;
+  least_share_ = {0.0, 0.0};
+  next_ = 0;
+  part_ = Part::kSolvingSharpened;
 }
 
-std::int32_t PlaneExtractor::join_facets() noexcept {
+void PlaneExtractor::solve_sharpened() noexcept {
+  if (!solve_some()) return;
+  merging_.begin_coplanar(params_.merging, params_.growing, noise_, planes_, true);
+  part_ = Part::kMergingSharpened;
+}
+
+void PlaneExtractor::merge_sharpened() noexcept {
+  if (!merge_coplanar(true)) return;
+  merging_.begin_facets(params_.merging, params_.growing, noise_, planes_);
+  next_ = 0;
+  part_ = Part::kFacets;
+}
+
+void PlaneExtractor::join_facets() noexcept {
   const SpanBoundaries::Columns& columns = boundaries_.columns();
   const std::int32_t count = image_->column_rays.columns;
-  if (column_ < count) {
-    const auto g = static_cast<std::size_t>(column_++);
-    merging_.add_column(columns[g], column_ < count ? &columns[g + 1] : nullptr, to_plane_);
-    return kColumnUnits;
+  if (next_ < count) {
+    constexpr std::int32_t kColumnsAtOnce = 8;
+    for (const std::int32_t end = std::min(next_ + kColumnsAtOnce, count); next_ < end;) {
+      const auto g = static_cast<std::size_t>(next_++);
+      merging_.add_column(columns[g], next_ < count ? &columns[g + 1] : nullptr, to_plane_);
+    }
+    return;
   }
-  if (merging_.join_some(planes_, to_plane_)) {
-    take_joined_planes();
-    overhangs_.begin(params_.overhangs, up_, planes_);
-    first_new_ = static_cast<PlaneId>(planes_.count + 1);
-    column_ = 0;
-    part_ = overhangs_.any() ? Part::kOverhangs : Part::kResidual;
-  }
-  return kJoinUnits;
+  if (!merging_.join_some(planes_, to_plane_)) return;
+  take_joined_planes();
+  overhangs_.begin(params_.overhangs, up_, planes_);
+  first_new_ = static_cast<PlaneId>(planes_.count + 1);
+  next_ = 0;
+  part_ = overhangs_.any() ? Part::kOverhangs : Part::kResidual;
 }
 
-std::int32_t PlaneExtractor::split_overhangs() noexcept {
-  overhangs_.add_column(*image_, column_, boundaries_.columns()[static_cast<std::size_t>(column_)], to_plane_);
-  if (++column_ < image_->column_rays.columns) return kColumnUnits;
+void PlaneExtractor::split_overhangs() noexcept {
+  overhangs_.add_column(*image_, next_, boundaries_.columns()[static_cast<std::size_t>(next_)], to_plane_);
+  if (++next_ < image_->column_rays.columns) return;
   take_split_planes();
-  column_ = 0;
+  next_ = 0;
   part_ = Part::kResidual;
-  return kJoinUnits;
 }
 
-std::int32_t PlaneExtractor::search_residual() noexcept {
-  if (column_ == 0) begin_search();
-  search_.add_column(image_->column_rays, image_->columns, column_,
-                     boundaries_.columns()[static_cast<std::size_t>(column_)]);
-  if (++column_ < image_->column_rays.columns) return kColumnUnits;
+void PlaneExtractor::search_residual() noexcept {
+  if (next_ == 0) begin_search();
+  constexpr std::int32_t kColumnsAtOnce = 2;
+  const std::int32_t count = image_->column_rays.columns;
+  for (const std::int32_t end = std::min(next_ + kColumnsAtOnce, count); next_ < end; ++next_) {
+    search_.add_column(image_->column_rays, image_->columns, next_,
+                       boundaries_.columns()[static_cast<std::size_t>(next_)]);
+  }
+  if (next_ < count) return;
   take_found_planes();
-  fit_.begin(SpanFit::kMeasuring, *segments_, to_plane_, first_new_, planes_.count, image_->column_rays.columns,
-             boundaries_);
+  begin_fit(SpanFit::kMeasuring);
   part_ = Part::kMeasuring;
-  return kMaxPieceUnits;
 }
 
-std::int32_t PlaneExtractor::measure() noexcept {
-  const std::int32_t units = fit_.step();
-  if (!fit_.done()) return units;
+void PlaneExtractor::measure() noexcept {
+  fit_.step();
+  if (!fit_.done()) return;
   const double share = explained_share();
-  solve(params_.min_explained * share, params_.min_explained_curved * share);
-  boundaries_.reproject();
-  part_ = Part::kDone;
-  return kMaxPieceUnits;
+  work_.add(planes_.count, 16);
+  least_share_ = {params_.min_explained * share, params_.min_explained_curved * share};
+  next_ = 0;
+  part_ = Part::kSolvingMeasured;
+}
+
+void PlaneExtractor::solve_measured() noexcept {
+  if (!solve_some()) return;
+  boundaries_.begin_reprojecting();
+  part_ = Part::kPlacing;
 }
 
 void PlaneExtractor::take_grown_planes() noexcept {
@@ -131,6 +181,7 @@ void PlaneExtractor::take_grown_planes() noexcept {
   plane_overflow_ += growing_.overflow();
   to_plane_.fill(kNoPlane);
   planes_.count = static_cast<PlaneId>(std::min(growing_.count(), PlaneSet::kMaxPlanes));
+  work_.add(2500 + planes_.count * kTakePlane);
   for (PlaneId i = 1; i <= planes_.count; ++i) {
     const GrownPlane& grown = growing_.plane(i);
     FittedPlane& p = planes_[i];
@@ -148,25 +199,31 @@ void PlaneExtractor::take_grown_planes() noexcept {
 
 // Two halves of a tread, left and right of the legs, are each known to a centimetre: the plane of one of them would not
 // explain the other.
-void PlaneExtractor::merge_coplanar(bool measured) noexcept {
-  PlaneMerging::merge_coplanar(params_.merging, params_.growing, noise_, planes_, to_plane_, measured);
+bool PlaneExtractor::merge_coplanar(bool measured) noexcept {
+  if (!merging_.merge_some(planes_, to_plane_)) return false;
+  work_.add(planes_.count, 8);
   for (PlaneId i = 1; i <= planes_.count; ++i) {
     FittedPlane& p = planes_[i];
     if (!std::exchange(p.merged, false) || !p.alive) continue;
+    work_.add(measured ? kSolve : kTakePlane);
     // Pixels of grown segments all weigh 1, which says nothing of how well they know the plane.
     if (measured) static_cast<void>(try_solve_leaning(params_.fit, noise_, p.moments, up_, p.plane, &p.covariance));
     p.kind = kind_of(p.plane);
     p.centre_m = p.plane.point(p.moments.mean_ray());
     boundaries_.set_plane(i, p.plane);
   }
+  return true;
 }
 
 void PlaneExtractor::take_joined_planes() noexcept {
+  work_.add(planes_.count, 60);
   for (PlaneId i = 1; i <= planes_.count; ++i) {
     FittedPlane& p = planes_[i];
     if (p.alive && p.facet) drop(i);
     if (!p.alive || p.facets == 1) continue;
+    work_.add(kTakePlane);
     if (p.low_parts) {
+      work_.add(kSolve);
       static_cast<void>(try_solve_leaning(params_.fit, noise_, p.moments, up_, p.plane, &p.covariance));
     }
     p.kind = kind_of(p.plane);
@@ -175,6 +232,7 @@ void PlaneExtractor::take_joined_planes() noexcept {
 }
 
 void PlaneExtractor::begin_search() noexcept {
+  work_.add(900 + planes_.count * 45);
   search_.begin(params_.residual, up_);
   for (PlaneId i = 1; i <= planes_.count; ++i) {
     const FittedPlane& p = planes_[i];
@@ -190,7 +248,9 @@ void PlaneExtractor::take_split_planes() noexcept {
   for (PlaneId i = 1; i < first_new_; ++i) {
     FittedPlane& p = planes_[i];
     OverhangSplit::Halves halves;
+    work_.add(12);
     if (!p.alive || !overhangs_.try_split(i, halves)) continue;
+    work_.add(2 * kTakePlane);
     if (planes_.count == PlaneSet::kMaxPlanes) {  // one leaning plane is better than half a riser
       ++plane_overflow_;
       continue;
@@ -205,6 +265,7 @@ void PlaneExtractor::take_split_planes() noexcept {
 
 void PlaneExtractor::take_found_planes() noexcept {
   search_.finish();
+  work_.add(search_.found().size(), kTakePlane);
   for (const InversePlane& found : search_.found()) add_plane(found);
 }
 
@@ -231,28 +292,37 @@ double PlaneExtractor::explained_share() const noexcept {
   return explained_px / std::max(seen_px, 1.0);
 }
 
-void PlaneExtractor::solve(double least_share, double least_share_curved) noexcept {
-  for (PlaneId i = 1; i <= planes_.count; ++i) {
-    FittedPlane& p = planes_[i];
-    if (!p.alive) continue;
-    const SpanBoundaries::Plane& fitted = boundaries_.plane(i);
-    p.moments = fitted.moments;
-    p.residual2 = fitted.residual2;
-    const double least = p.facets > 1 ? least_share_curved : least_share;
-    if (p.moments.count < params_.min_fitted_px || p.moments.count < least * fitted.seen_px ||
-        !try_solve_leaning(params_.fit, noise_, p.moments, up_, p.plane, &p.covariance)) {
-      drop(i);
-      continue;
-    }
-    p.kind = kind_of(p.plane);
-    p.pixels = p.moments.count;
-    p.centre_m = p.plane.point(p.moments.mean_ray());
-    boundaries_.set_plane(i, p.plane);
-    boundaries_.set_covariance(i, p.kind != SurfaceKind::kOther ? p.covariance : Mat3{Mat3::Zero()});
+bool PlaneExtractor::solve_some() noexcept {
+  constexpr std::int32_t kPieceInstructions = 4000;
+  const std::int32_t enough = work_.instructions() + kPieceInstructions;
+  while (next_ < planes_.count && work_.instructions() < enough) {
+    work_.add(12);
+    if (planes_[static_cast<std::size_t>(++next_)].alive) solve(static_cast<PlaneId>(next_));
   }
+  return next_ == planes_.count;
+}
+
+void PlaneExtractor::solve(PlaneId plane) noexcept {
+  FittedPlane& p = planes_[plane];
+  const SpanBoundaries::Plane& fitted = boundaries_.plane(plane);
+  p.moments = fitted.moments;
+  p.residual2 = fitted.residual2;
+  work_.add(kTakePlane);
+  if (p.moments.count < params_.min_fitted_px ||
+      p.moments.count < least_share_[p.facets > 1 ? 1 : 0] * fitted.seen_px) {
+    return drop(plane);
+  }
+  work_.add(kSolve);
+  if (!try_solve_leaning(params_.fit, noise_, p.moments, up_, p.plane, &p.covariance)) return drop(plane);
+  p.kind = kind_of(p.plane);
+  p.pixels = p.moments.count;
+  p.centre_m = p.plane.point(p.moments.mean_ray());
+  boundaries_.set_plane(plane, p.plane);
+  boundaries_.set_covariance(plane, p.kind != SurfaceKind::kOther ? p.covariance : Mat3{Mat3::Zero()});
 }
 
 void PlaneExtractor::drop(PlaneId plane) noexcept {
+  work_.add(kDrop);
   planes_[plane].alive = false;
   for (PlaneId& p : to_plane_) p = p == plane ? kNoPlane : p;
 }

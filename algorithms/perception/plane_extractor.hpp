@@ -54,7 +54,20 @@ class PlaneExtractor {
     }
   };
   // What the next step begins with; a benchmark charges time to it.
-  enum class Part : std::uint8_t { kGrowing, kSharpening, kFacets, kOverhangs, kResidual, kMeasuring, kDone };
+  enum class Part : std::uint8_t {
+    kGrowing,
+    kMergingGrown,
+    kSharpening,
+    kSolvingSharpened,
+    kMergingSharpened,
+    kFacets,
+    kOverhangs,
+    kResidual,
+    kMeasuring,
+    kSolvingMeasured,
+    kPlacing,
+    kDone
+  };
 
   // All but params, noise, intrinsics and up are read until the stage is done. Each segment is given its grown plane.
   void begin(const Params& params, const DepthNoiseModel& noise, const CameraIntrinsics& intrinsics, const Vec3& up,
@@ -76,16 +89,22 @@ class PlaneExtractor {
   }
 
  private:
-  std::int32_t do_piece() noexcept;  // returns its units
-  std::int32_t grow() noexcept;
-  std::int32_t sharpen() noexcept;
-  std::int32_t join_facets() noexcept;
-  std::int32_t split_overhangs() noexcept;
-  std::int32_t search_residual() noexcept;
-  std::int32_t measure() noexcept;
+  void do_piece() noexcept;
+  std::int32_t take_units() noexcept;  // of what the piece did
+  void grow() noexcept;
+  void merge_grown() noexcept;
+  void sharpen() noexcept;
+  void solve_sharpened() noexcept;
+  void merge_sharpened() noexcept;
+  void join_facets() noexcept;
+  void split_overhangs() noexcept;
+  void search_residual() noexcept;
+  void measure() noexcept;
+  void solve_measured() noexcept;
 
+  void begin_fit(const SpanFit::Pass& pass) noexcept;
   void take_grown_planes() noexcept;
-  void merge_coplanar(bool measured) noexcept;
+  [[nodiscard]] bool merge_coplanar(bool measured) noexcept;  // some; true when all are merged
   void take_joined_planes() noexcept;
   void begin_search() noexcept;
   void take_split_planes() noexcept;
@@ -93,8 +112,11 @@ class PlaneExtractor {
   void add_plane(const InversePlane& plane) noexcept;
   // Of all planes' pixels, the share that they explain.
   [[nodiscard]] double explained_share() const noexcept;
-  // Solves for all planes, and drops those that explain less than the least shares of their pixels.
-  void solve(double least_share, double least_share_curved) noexcept;
+  // Solves for some planes, and drops those that explain less than the least shares of their pixels, those of several
+  // facets the second; true when all are solved.
+  using Shares = std::array<double, 2>;
+  [[nodiscard]] bool solve_some() noexcept;
+  void solve(PlaneId plane) noexcept;
   void drop(PlaneId plane) noexcept;
   [[nodiscard]] SurfaceKind kind_of(const InversePlane& plane) const noexcept;
 
@@ -105,7 +127,9 @@ class PlaneExtractor {
   const FrameImage* image_ = nullptr;
   ScanlineSegmentation::Columns* segments_ = nullptr;
   Part part_ = Part::kDone;
-  std::int32_t column_ = 0;  // next, of facets and of the residual
+  std::int32_t next_ = 0;  // column, of facets, overhangs and the residual; plane to be solved, less one
+  Shares least_share_{};
+  WorkCount work_;
   PlaneGrowing growing_;
   SpanBoundaries boundaries_;
   SpanFit fit_;

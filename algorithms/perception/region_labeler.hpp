@@ -34,7 +34,7 @@ class RegionLabeler {
     }
   };
   // What the next step begins with.
-  enum class Part : std::uint8_t { kComponents, kJoin, kLabels, kInliers, kDone };
+  enum class Part : std::uint8_t { kLinks, kNumbers, kComponents, kJoin, kLabels, kInliers, kDone };
 
   // All but params and noise are read until the stage is done. Each span of boundaries is given its component.
   void begin(const Params& params, const DepthNoiseModel& noise, const RawImage& raw, const FrameImage& image,
@@ -43,6 +43,7 @@ class RegionLabeler {
   void clear() noexcept;
   Progress step(WorkBudget& budget) noexcept;
 
+  [[nodiscard]] Part part() const noexcept { return part_; }
   // Writable: whoever makes surfaces of regions gives up those that become none.
   [[nodiscard]] Regions& result() noexcept { return regions_; }
   [[nodiscard]] const Regions& result() const noexcept { return regions_; }
@@ -51,10 +52,13 @@ class RegionLabeler {
   [[nodiscard]] std::uint32_t region_overflow() const noexcept { return region_overflow_; }
 
  private:
-  std::int32_t do_piece() noexcept;  // returns its units
+  void do_piece() noexcept;
+  // Visits some columns; then comes the next part.
+  template <typename Visit>
+  void each_column(Part next, const Visit& visit) noexcept;  // counts them, and goes on after the last
   void join() noexcept;
   void label_column() noexcept;
-  std::int32_t check_inliers() noexcept;
+  void check_inliers() noexcept;
 
   Params params_;
   DepthNoiseModel noise_;
@@ -65,6 +69,7 @@ class RegionLabeler {
   Part part_ = Part::kDone;
   std::int32_t column_ = 0;
   RegionId checked_ = kNoRegion;  // the last one that was
+  WorkCount work_;
   ConnectedComponents components_;
   Regions regions_;
   std::uint32_t region_overflow_ = 0;

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "algorithms/perception/image/work_units.hpp"
-
 namespace polygmap {
 
 void Segmenter::begin(const ScanlineSegmentation::Params& params, const DepthNoiseModel& noise, const RawImage& raw,
@@ -30,15 +28,19 @@ Progress Segmenter::step(WorkBudget& budget) noexcept {
 
 std::int32_t Segmenter::do_piece() noexcept {
   if (part_ == Part::kMask) {
-    self_filter_.add_shape(image_.rays, *body_, margin_, shape_);
-    if (++shape_ == SelfFilter::kShapes) part_ = Part::kRows;
-    return kMaxPieceUnits;
+    if (self_filter_.add_some(image_.rays, *body_, margin_, shape_) && ++shape_ == SelfFilter::kShapes) {
+      part_ = Part::kRows;
+    }
+    return self_filter_.work().take_units();
   }
-  reduce_row();
-  if (++row_ != image_.column_rays.height_px) return kRowUnits;
-  segmentation_.finish();
-  part_ = Part::kDone;
-  return kMaxPieceUnits;
+  constexpr std::int32_t kRowsAtOnce = 4;
+  const std::int32_t height_px = image_.column_rays.height_px, end = std::min(row_ + kRowsAtOnce, height_px);
+  for (; row_ < end; ++row_) reduce_row();
+  if (row_ == height_px) {
+    segmentation_.finish();
+    part_ = Part::kDone;
+  }
+  return segmentation_.work().take_units();
 }
 
 void Segmenter::reduce_row() noexcept {
@@ -49,7 +51,9 @@ void Segmenter::reduce_row() noexcept {
     image_.any_body = image_.any_body || marked;
   }
   const bool body = image_.body_rows[static_cast<std::size_t>(row_ / 2)];
-  constexpr std::int32_t kLater = 2;  // rows ahead that are fetched from memory
+  WorkCount& work = segmentation_.work();
+  work.add(190 + image_.column_rays.columns * (body ? 24 : 13));  // every other row is looked at for the body
+  constexpr std::int32_t kLater = 2;                              // rows ahead that are fetched from memory
   const std::int32_t columns = image_.column_rays.columns, last = image_.column_rays.height_px - 1;
   const ReducedRow reduced = reduce_to_columns(raw_->range, raw_->row(row_), body ? flags : nullptr, columns,
                                                image_.columns.inverse_depth.row(row_), image_.columns.valid.row(row_),
@@ -59,6 +63,7 @@ void Segmenter::reduce_row() noexcept {
   constexpr std::int32_t kBlock = ScanlineSegmentation::kBlock;
   if (row_ % kBlock == kBlock - 1 || row_ == last) {
     static_assert(kBlock % ColumnImage::kTransposeRows == 0);
+    work.add(kColumns, 20);
     image_.columns.transpose(row_ - row_ % kBlock, row_);
     segmentation_.add_rows(row_ - row_ % kBlock, row_);
   }

@@ -1,15 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algorithms/perception/span_fit.hpp"
 
-#include "algorithms/perception/image/work_units.hpp"
-
 namespace polygmap {
-namespace {
-
-// Every row of the spans is summed, by kRefitColumns columns.
-constexpr std::int32_t kSumsUnits = SpanBoundaries::kRefitColumns * kColumnUnits;
-
-}  // namespace
 
 void SpanFit::begin(const Pass& pass, const ScanlineSegmentation::Columns& segments, const PlaneIndex& to_plane,
                     PlaneId first_new, PlaneId last_new, std::int32_t columns, SpanBoundaries& boundaries) noexcept {
@@ -23,24 +15,27 @@ void SpanFit::begin(const Pass& pass, const ScanlineSegmentation::Columns& segme
   enter(Part::kSpans);
 }
 
-std::int32_t SpanFit::step() noexcept {
+void SpanFit::step() noexcept {
+  constexpr int kColumnsAtOnce = 2;
   switch (part_) {
     case Part::kSpans:
-      build_column();
-      return kColumnUnits;
+      for (int i = 0; i < kColumnsAtOnce && part_ == Part::kSpans; ++i) build_column();
+      return;
     case Part::kGaps:
-      fill_column();
-      return kColumnUnits;
+      for (int i = 0; i < kColumnsAtOnce && part_ == Part::kGaps; ++i) fill_column();
+      return;
     case Part::kScores:
-      score_column();
-      return kColumnUnits;
+      for (int i = 0; i < kColumnsAtOnce && part_ == Part::kScores; ++i) score_column();
+      return;
+    case Part::kPlaces:
+      if (!boundaries_->place_some()) return;
+      boundaries_->begin_refit();
+      return enter(Part::kSums);
     case Part::kSums:
-      sum_columns();
-      return kSumsUnits;
+      return sum_columns();
     case Part::kDone:
-      break;
+      return;
   }
-  return 0;
 }
 
 void SpanFit::build_column() noexcept {
@@ -65,13 +60,12 @@ void SpanFit::score_column() noexcept {
   if (column_ == 0) boundaries_->begin_scores();
   boundaries_->score(column_, pass_.by_planes);
   if (++column_ < columns_) return;
-  boundaries_->place();
-  enter(Part::kSums);
+  boundaries_->begin_placing();
+  enter(Part::kPlaces);
 }
 
 void SpanFit::sum_columns() noexcept {
-  if (column_ == 0) boundaries_->begin_refit();
-  boundaries_->refit(column_, pass_.roughly);
+  if (!boundaries_->refit_some(column_, pass_.roughly)) return;
   column_ += SpanBoundaries::kRefitColumns;
   if (column_ >= columns_) enter(Part::kDone);
 }

@@ -26,14 +26,14 @@ class SpanFit {
   static constexpr Pass kMeasuring{.trims_and_fills = true, .by_planes = false, .roughly = false};
 
   // What the next step begins with; a benchmark charges time to it.
-  enum class Part : std::uint8_t { kSpans, kGaps, kScores, kSums, kDone };
+  enum class Part : std::uint8_t { kSpans, kGaps, kScores, kPlaces, kSums, kDone };
 
   // All but the pass is read until done. to_plane: of a segment's plane, which may have been merged. Planes from
   // first_new to last_new have no segments: they may fill any gap. The results are in boundaries.
   void begin(const Pass& pass, const ScanlineSegmentation::Columns& segments, const PlaneIndex& to_plane,
              PlaneId first_new, PlaneId last_new, std::int32_t columns, SpanBoundaries& boundaries) noexcept;
-  // Does one piece of work and returns its units.
-  std::int32_t step() noexcept;
+  // Does one piece of work, which boundaries count.
+  void step() noexcept;
   [[nodiscard]] Part part() const noexcept { return part_; }
   [[nodiscard]] bool done() const noexcept { return part_ == Part::kDone; }
 

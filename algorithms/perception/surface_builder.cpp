@@ -8,17 +8,7 @@
 namespace polygmap {
 namespace {
 
-// Pieces of a surface in units, none of which is measured apart: their sum over a frame is (firmware/schedule.hpp).
-constexpr std::int32_t kGivenUpUnits = 1;      // of a region that was given up, and the end
-constexpr std::int32_t kSideUnits = 4;         // one side: pixels of at most 14 rows, and a line through them
-constexpr std::int32_t kOutlineUnits = 5;      // columns' ends, smoothed, and their hull
-constexpr std::int32_t kNoLineUnits = 5;       // what lies beyond an end, without a line to look for
-constexpr std::int32_t kBeginLineUnits = 20;   // the same, and a line through the guesses
-constexpr std::int32_t kSearchLineUnits = 12;  // kColumnsPerPiece columns' change-points
-constexpr std::int32_t kFitLineUnits = 20;     // a line through the change-points
-constexpr std::int32_t kPolygonUnits = 10;     // cut, judged edge by edge
-
-constexpr std::int32_t kColumnsPerPiece = 48;  // of which kSearchLineUnits are the work
+constexpr std::int32_t kColumnsPerPiece = 16;  // that are searched for a line
 
 }  // namespace
 
@@ -31,7 +21,7 @@ void SurfaceBuilder::begin(const Params& params, const DepthNoiseModel& noise, c
   regions_ = &regions;
   frame_ = &frame;
   id_ = 1;
-  line_begun_ = false;
+  begun_ = false;
   std::fill_n(published_.begin(), regions.count + 1, PublishedSurface{});
   counts_ = Counts{};
   side_lines_.begin(params_.sides, noise_, raw, image, regions);
@@ -40,11 +30,22 @@ void SurfaceBuilder::begin(const Params& params, const DepthNoiseModel& noise, c
 }
 
 Progress SurfaceBuilder::step(WorkBudget& budget) noexcept {
-  while (part_ != Part::kDone && !budget.exhausted()) budget.spend(do_piece());
+  while (part_ != Part::kDone && !budget.exhausted()) {
+    do_piece();
+    budget.spend(take_units());
+  }
   return part_ == Part::kDone ? Progress::kDone : Progress::kBusy;
 }
 
-std::int32_t SurfaceBuilder::do_piece() noexcept {
+std::int32_t SurfaceBuilder::take_units() noexcept {
+  for (WorkCount* part : {&side_lines_.work(), &column_outline_.work(), &edge_lines_.work(), &polygons_.work()}) {
+    work_.add(*part);
+  }
+  work_.add(150);
+  return work_.take_units();
+}
+
+void SurfaceBuilder::do_piece() noexcept {
   switch (part_) {
     case Part::kSideLeft:
       return find_left_side();
@@ -59,43 +60,41 @@ std::int32_t SurfaceBuilder::do_piece() noexcept {
     case Part::kPolygon:
       return build_polygon();
     case Part::kDone:
-      break;
+      return;
   }
-  return 0;
 }
 
-std::int32_t SurfaceBuilder::find_left_side() noexcept {
+void SurfaceBuilder::find_left_side() noexcept {
   if (id_ > regions_->count) {
     part_ = Part::kDone;
-    return kGivenUpUnits;
+    return;
   }
   if (!(*regions_)[id_].alive) {
     ++id_;
-    return kGivenUpUnits;
+    return;
   }
   side_lines_.find_ends(id_);
   sides_.left = side_lines_.find(id_, false);
   part_ = Part::kSideRight;
-  return kSideUnits;
 }
 
-std::int32_t SurfaceBuilder::find_right_side() noexcept {
+void SurfaceBuilder::find_right_side() noexcept {
   sides_.right = side_lines_.find(id_, true);
   part_ = Part::kOutline;
-  return kSideUnits;
 }
 
-std::int32_t SurfaceBuilder::build_outline() noexcept {
+void SurfaceBuilder::build_outline() noexcept {
   column_outline_.build(regions_->extents[id_], sides_, params_.corner_px, kMaxPolygonVertices - 4, outline_);
   lines_ = SurfaceLines{};
+  begun_ = false;
   part_ = (*regions_)[id_].kind == SurfaceKind::kTread ? Part::kNosing : Part::kPolygon;
-  return kOutlineUnits;
 }
 
-void SurfaceBuilder::look_beyond(Edge edge, Beyond& beyond) const noexcept {
+void SurfaceBuilder::look_beyond(Edge edge, Beyond& beyond) noexcept {
   constexpr std::int32_t kProbe_px = 8;  // labels in one word
   const std::int32_t down = edge == Edge::kNosing ? 1 : -1;
   const ColumnExtents& extents = regions_->extents[id_];
+  work_.add(300 + 40 * (extents.last_column - extents.first_column + 1));
   for (std::int32_t g = extents.first_column; g <= extents.last_column; ++g) {
     const std::int32_t end = end_of(edge, g), far = end + down * kProbe_px;
     if (end < 0) continue;
@@ -132,6 +131,7 @@ RegionId SurfaceBuilder::most_beyond(Edge edge, const Beyond& beyond, bool riser
 }
 
 bool SurfaceBuilder::begin_line(Edge edge) noexcept {
+  work_.add(2 * regions_->count * 12);
   Beyond beyond;
   look_beyond(edge, beyond);
   // Above, a riser is the back; without one, a higher tread whose nosing hides the rest of this surface.
@@ -139,6 +139,7 @@ bool SurfaceBuilder::begin_line(Edge edge) noexcept {
   const RegionId other = riser != kNoRegion ? riser : most_beyond(edge, beyond, false);
   if (other == kNoRegion) return false;
   const ColumnExtents& extents = regions_->extents[id_];
+  work_.add(12 * (extents.last_column - extents.first_column + 1));
   edge_lines_.begin_guess();
   for (std::int32_t g = extents.first_column; g <= extents.last_column; ++g) {
     if (beyond.region[static_cast<std::size_t>(g)] == other) edge_lines_.add_guess(g, end_of(edge, g));
@@ -149,6 +150,7 @@ bool SurfaceBuilder::begin_line(Edge edge) noexcept {
   }
   const Region &own = (*regions_)[id_], &far = (*regions_)[other];
   const EdgeLineFinder::Measured near_side{own.plane, own.covariance}, far_side{far.plane, far.covariance};
+  work_.add(900);
   edge_lines_.begin(params_.edge_lines, noise_, raw_->intrinsics, image_->column_rays, image_->columns, near_side,
                     &far_side, edge == Edge::kNosing);
   if (edge == Edge::kBack && riser == kNoRegion) {
@@ -158,40 +160,43 @@ bool SurfaceBuilder::begin_line(Edge edge) noexcept {
   return true;
 }
 
-std::int32_t SurfaceBuilder::find_line(Edge edge) noexcept {
+void SurfaceBuilder::find_line(Edge edge) noexcept {
   const Part next = edge == Edge::kNosing ? Part::kBack : Part::kPolygon;
-  if (!line_begun_) {
-    line_begun_ = begin_line(edge);
-    if (line_begun_) return kBeginLineUnits;
-    part_ = next;
-    return kNoLineUnits;
+  if (!begun_) {
+    begun_ = begin_line(edge);
+    if (!begun_) part_ = next;
+    return;
   }
-  if (!edge_lines_.step(kColumnsPerPiece)) return kSearchLineUnits;
+  if (!edge_lines_.step(kColumnsPerPiece)) return;
   EdgeLine line;
   const EdgeLineFinder::Outcome outcome = edge_lines_.finish(line);
-  if (outcome == EdgeLineFinder::Outcome::kAgain) return kFitLineUnits;
+  if (outcome == EdgeLineFinder::Outcome::kAgain) return;
   counts_.rejected_lines += outcome == EdgeLineFinder::Outcome::kFound ? 0U : 1U;
   (edge == Edge::kNosing ? lines_.nosing : lines_.back) = line;
-  line_begun_ = false;
+  begun_ = false;
   part_ = next;
-  return kFitLineUnits;
 }
 
-std::int32_t SurfaceBuilder::build_polygon() noexcept {
-  Region& own = (*regions_)[id_];
-  const auto first = static_cast<std::uint8_t>(frame_->surfaces.size() + 1);
-  const PolygonBuilder::Built built = polygons_.build(*image_, *regions_, id_, outline_, lines_, frame_->surfaces);
+void SurfaceBuilder::build_polygon() noexcept {
+  if (!begun_) {
+    polygons_.begin(*image_, *regions_, id_, outline_, lines_, frame_->surfaces);
+    first_patch_ = static_cast<std::uint8_t>(frame_->surfaces.size() + 1);
+    begun_ = true;
+    return;
+  }
+  if (!polygons_.step()) return;
+  const PolygonBuilder::Built& built = polygons_.built();
   frame_->dropped += static_cast<std::uint32_t>(built.without_room);
   counts_.overflow += static_cast<std::uint32_t>(built.without_room);
   if (built.pieces > 0) {
-    published_[id_] = {first, lines_.nosing};
+    published_[id_] = {first_patch_, lines_.nosing};
   } else {
-    own.alive = false;
+    (*regions_)[id_].alive = false;
     counts_.no_polygon += built.without_room == 0 ? 1U : 0U;
   }
   ++id_;
+  begun_ = false;
   part_ = Part::kSideLeft;
-  return kPolygonUnits;
 }
 
 }  // namespace polygmap

@@ -55,6 +55,7 @@ class SurfaceBuilder {
   void clear() noexcept { published_[kNoRegion] = PublishedSurface{}; }
   Progress step(WorkBudget& budget) noexcept;
 
+  [[nodiscard]] Part part() const noexcept { return part_; }
   [[nodiscard]] const PublishedSurfaces& published() const noexcept { return published_; }
   struct Counts {
     std::uint32_t overflow = 0;        // surfaces that found no room
@@ -73,16 +74,17 @@ class SurfaceBuilder {
     std::int32_t all_columns = 0;
   };
 
-  std::int32_t do_piece() noexcept;  // returns its units
-  std::int32_t find_left_side() noexcept;
-  std::int32_t find_right_side() noexcept;
-  std::int32_t build_outline() noexcept;
-  std::int32_t find_line(Edge edge) noexcept;
+  void do_piece() noexcept;
+  std::int32_t take_units() noexcept;  // of what the piece did
+  void find_left_side() noexcept;
+  void find_right_side() noexcept;
+  void build_outline() noexcept;
+  void find_line(Edge edge) noexcept;
   // Gathers where the surface ends in each column and what lies beyond; false when there is too little to look for.
   [[nodiscard]] bool begin_line(Edge edge) noexcept;
-  void look_beyond(Edge edge, Beyond& beyond) const noexcept;
+  void look_beyond(Edge edge, Beyond& beyond) noexcept;
   [[nodiscard]] RegionId most_beyond(Edge edge, const Beyond& beyond, bool riser_only) const noexcept;
-  std::int32_t build_polygon() noexcept;
+  void build_polygon() noexcept;
   // Where the surface ends in a column.
   [[nodiscard]] std::int32_t end_of(Edge edge, std::int32_t column) const noexcept {
     const ColumnExtent& extent = regions_->extents[id_].columns[static_cast<std::size_t>(column)];
@@ -97,7 +99,8 @@ class SurfaceBuilder {
   SurfaceFrame* frame_ = nullptr;
   Part part_ = Part::kDone;
   RegionId id_ = 1;
-  bool line_begun_ = false;
+  bool begun_ = false;  // the line or the polygon
+  WorkCount work_;
   SideLines side_lines_;
   OutlineSides sides_;
   ColumnOutline column_outline_;
@@ -105,6 +108,7 @@ class SurfaceBuilder {
   EdgeLineFinder edge_lines_;
   SurfaceLines lines_;
   PolygonBuilder polygons_;
+  std::uint8_t first_patch_ = 0;  // number of the one that is built
   PublishedSurfaces published_{};
   Counts counts_;
 };

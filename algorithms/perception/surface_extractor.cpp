@@ -78,7 +78,7 @@ Progress SurfaceExtractor::step(WorkBudget& budget) noexcept {
 
 // Runs the stage until it is done, and begins the next, or until the budget is spent.
 void SurfaceExtractor::run_stage(WorkBudget& budget) noexcept {
-  constexpr std::int32_t kFinishUnits = 1;
+  constexpr std::int32_t kFinishUnits = 2200 / kInstructionsPerUnit;
   switch (stage_) {
     case Stage::kIdle:
       return;

@@ -65,10 +65,10 @@ class SurfaceExtractor {
     std::uint32_t rejected_lines = 0;    // nosings and back lines that were looked for and not good enough
   };
 
-  // Stairs take 2,300-2,900 units, a cluttered desk 3,550. With every capacity full a frame takes at most
+  // Stairs take some 45,000 units, a cluttered desk 70,000. With every capacity full a frame takes at most
   // kMaxUnitsPerFrame.
   static constexpr std::int32_t kMaxPieceUnits = polygmap::kMaxPieceUnits;
-  static constexpr std::int32_t kMaxUnitsPerFrame = 12000;
+  static constexpr std::int32_t kMaxUnitsPerFrame = 400'000;
 
   SurfaceExtractor() noexcept = default;
   explicit SurfaceExtractor(const Params& params) noexcept : params_(params) {}
@@ -101,6 +101,8 @@ class SurfaceExtractor {
   [[nodiscard]] Stage stage() const noexcept { return stage_; }
   [[nodiscard]] const Segmenter& segmenter() const noexcept { return segmenter_; }
   [[nodiscard]] const PlaneExtractor& plane_extractor() const noexcept { return planes_; }
+  [[nodiscard]] const RegionLabeler& region_labeler() const noexcept { return regions_; }
+  [[nodiscard]] const SurfaceBuilder& surface_builder() const noexcept { return surfaces_; }
 
  private:
   [[nodiscard]] SurfaceFrame& next() noexcept { return frames_[1 - done_]; }

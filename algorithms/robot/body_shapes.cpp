@@ -31,14 +31,16 @@ double signed_distance_m(const OrientedBox& box, const Vec3& point_m) noexcept {
   return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
 }
 
-bool hides(const LegShapes& leg, double margin_m, const Vec3& point_m) noexcept {
+bool hides(const LegShapes& leg, double margin_m, const Vec3& point_m, WorkCount& work) noexcept {
   // Of the way along the ray: numbers of a search, which bound its time.
   constexpr int kMaxSteps = 64;
   constexpr double kStep_m = 0.02;
   const double range_m = point_m.norm();
   const Vec3 direction = point_m / std::max(range_m, 1e-6);
   double along_m = 0.0;
+  work.add(60);
   for (int i = 0; i < kMaxSteps && along_m < range_m; ++i) {
+    work.add(150);
     const Vec3 p = along_m * direction;
     double clear_m = range_m;
     for (const Capsule* capsule : {&leg.thigh, &leg.shank}) {

@@ -3,6 +3,7 @@
 // what the simulated camera renders.
 #pragma once
 
+#include "algorithms/core/work.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
 
 namespace polygmap {
@@ -40,6 +41,6 @@ struct BodyMargin {
 };
 
 // Whether a leg, grown by a margin, is between the origin and a point. Shapes of radius or size 0 are absent.
-[[nodiscard]] bool hides(const LegShapes& leg, double margin_m, const Vec3& point_m) noexcept;
+[[nodiscard]] bool hides(const LegShapes& leg, double margin_m, const Vec3& point_m, WorkCount& work) noexcept;
 
 }  // namespace polygmap

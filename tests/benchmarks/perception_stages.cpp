@@ -42,10 +42,15 @@ ExtractorStage plane_stage(const PlaneExtractor& planes) noexcept {
   using Part = PlaneExtractor::Part;
   switch (planes.part()) {
     case Part::kGrowing:
+    case Part::kMergingGrown:
       return kGrowing;
     case Part::kSharpening:
     case Part::kMeasuring:
       return planes.fit_part() == SpanFit::Part::kSums ? kRefit : kBoundaries;
+    case Part::kSolvingSharpened:
+    case Part::kMergingSharpened:
+    case Part::kSolvingMeasured:
+    case Part::kPlacing:
     case Part::kFacets:
     case Part::kOverhangs:
       return kRefit;

@@ -199,11 +199,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 15429244129980333228U);
-  EXPECT_EQ(hashes.gait.value(), 14232963561099995806U);
-  EXPECT_EQ(hashes.commands.value(), 8765782980090594165U);
-  EXPECT_EQ(hashes.surfaces.value(), 16086980474125418950U);
-  EXPECT_EQ(hashes.map.value(), 4944774193879360795U);
+  EXPECT_EQ(hashes.estimates.value(), 4611441036048579999U);
+  EXPECT_EQ(hashes.gait.value(), 525230542002334741U);
+  EXPECT_EQ(hashes.commands.value(), 11738858354516531569U);
+  EXPECT_EQ(hashes.surfaces.value(), 8247023420399509204U);
+  EXPECT_EQ(hashes.map.value(), 12690333229199395859U);
 }
 
 }  // namespace

@@ -400,5 +400,33 @@ TEST(CyclicExecutive, Tick_ShortOfTimeBeforeTheMoreImportantRow_ShedsTheOtherOne
   EXPECT_EQ(executive.last_cycle().shed, 0b100U);
 }
 
+// What the row before did not spend in this cycle, the next may; an overdraft of it is its own.
+TEST(CyclicExecutive, RunRow_Leftover_IsSpentByTheNextRowOfTheCycle) {
+  static constexpr ScheduleTable<3> kRows{{
+      {.task = "surfaces", .budget_us = 700, .unit_cost_ns = 100, .shed_order = 3},
+      {.task = "map", .budget_us = 100, .unit_cost_ns = 100, .shed_order = 2, .takes_leftover = true},
+      {.task = "footholds", .budget_us = 200, .unit_cost_ns = 100, .shed_order = 1, .takes_leftover = true},
+  }};
+  static_assert(worst_cycle_instructions(kRows) == 10'000 * kInstructionsPerUnit);
+  RecordingTasks tasks;
+  FakeClock clock;
+  Counters counters;
+  CyclicExecutive<RecordingTasks, kRows> executive(tasks, clock, counters);
+  executive.start(0);
+  std::vector<std::int32_t> spends{3000, 500, 9000, 7500, 0, 0, 0, 0, 0};
+  std::size_t next = 0;
+  tasks.work = [&](const Call&, WorkBudget& budget) {
+    budget.spend(spends[next++]);
+    return Progress::kBusy;
+  };
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(executive.tick(executive.next_due_ns()), 1U);
+  std::vector<std::int32_t> units;
+  for (const Call& call : tasks.calls) units.push_back(call.units);
+  // First 4000 are left, then 4500 of 5000, and footholds overdraw their 6500 by 2500. Then surfaces overdraw by 500,
+  // of which the next row sees nothing, and footholds pay 2500 of their 3000. What nobody spends is nobody's next
+  // cycle.
+  EXPECT_EQ(units, (std::vector<std::int32_t>{7000, 5000, 6500, 7000, 1000, 500, 6500, 7500, 9500}));
+}
+
 }  // namespace
 }  // namespace polygmap

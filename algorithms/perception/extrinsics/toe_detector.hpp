@@ -4,11 +4,14 @@
 // standing leg is so straight that its knee does not hide it. The foot's shape is its collision box.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
+#include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/core/math/transform.hpp"
 #include "algorithms/core/messages/samples.hpp"
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/depth_range.hpp"
 #include "algorithms/robot/robot_model.hpp"
 
@@ -38,11 +41,46 @@ struct ToeSighting {
   double sigma_m = 0.0;  // of the image alone
 };
 
-// frame: of the size of the intrinsics. camera_T_sole: at the exposure, by encoders and the mount as believed. Follows
-// lines along the foot's upper face over its front edge, beyond which depth jumps; nothing where too few lines show one
-// jump at one place, because the toe is hidden, out of the image or close to a riser.
-[[nodiscard]] std::optional<ToeSighting> detect_toe(const ToeDetectorParams& params, const DepthFrameView& frame,
-                                                    const CameraIntrinsics& intrinsics, const RawRange& range,
-                                                    const SoleModel& sole, const Transform& camera_T_sole) noexcept;
+// Follows lines along the foot's upper face over its front edge, beyond which depth jumps; nothing is seen where too
+// few lines show one jump at one place, because the toe is hidden, out of the image or close to a riser.
+class ToeDetector {
+ public:
+  // frame: of the size of the intrinsics; its pixels are read until done. camera_T_sole: at the exposure, by encoders
+  // and the mount as believed.
+  void begin(const ToeDetectorParams& params, const DepthFrameView& frame, const CameraIntrinsics& intrinsics,
+             const RawRange& range, const SoleModel& sole, const Transform& camera_T_sole) noexcept;
+  // Follows a line; true after the last.
+  [[nodiscard]] bool step() noexcept;
+  [[nodiscard]] std::optional<ToeSighting> sighting() noexcept;  // when it is done
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }     // since it was last paid
+
+ private:
+  // What lines are sampled at is compiled in: their arrays have these sizes.
+  static constexpr int kLines = 16;         // across the foot, 6 mm apart: three pixels at 0.7 m
+  static constexpr double kStep_m = 0.001;  // along a line; a pixel is 1.9 mm there
+  static constexpr int kOnFoot = 12;        // steps on the foot before its end: a shank hides what lies farther back
+  static constexpr int kBeyond = 6;         // steps past its end: what lies there a riser may hide after a centimetre
+  static constexpr int kSearch = 14;        // the toe is looked for this far to both sides of where it is believed
+  static constexpr int kSteps = kOnFoot + 2 * kSearch + kBeyond;
+  // What is measured behind the upper face, m; not a number where nothing is.
+  using Line = std::array<double, kSteps>;
+  struct Excess;
+
+  [[nodiscard]] static Excess excess_of(const Line& line, int first, int last) noexcept;
+  void measure(const Vec3& from_m, int step, Line& line) noexcept;
+  // Where a line leaves the foot, in steps; nothing when that is not seen.
+  [[nodiscard]] std::optional<double> end_of_line(const Line& line) noexcept;
+
+  ToeDetectorParams params_;
+  DepthFrameView frame_;
+  CameraIntrinsics intrinsics_;
+  RawRange range_;
+  Transform camera_T_sole_;
+  Vec3 first_m_ = Vec3::Zero();  // the first line's middle would begin there, in the sole's frame
+  double half_width_m_ = 0.0;
+  int next_ = kLines;
+  StaticVector<double, kLines> ends_m_;
+  WorkCount work_;
+};
 
 }  // namespace polygmap

@@ -16,7 +16,7 @@ static_assert(kColumns % Raw::nlanes == 0 && kColumn_px == 8);
 
 constexpr std::int32_t kMostBody = kColumn_px / 4;  // half-resolution pixels: a column of more body is not seen
 constexpr std::int32_t kLine = 64;                  // bytes of a cache
-constexpr int kCountShift = 20;  // below: the sum of eight depths; from here on: how many of them are valid
+[[maybe_unused]] constexpr int kCountShift = 20;    // below: the sum of eight depths; from here on: how many are valid
 
 // The range as vectors see it.
 struct Range {
@@ -24,32 +24,47 @@ struct Range {
   explicit Range(const RawRange& range) noexcept
       : lowest(cv::vx_setall_u16(range.min)),
         reach(cv::vx_setall_u16(static_cast<std::uint16_t>(range.max - range.min))) {}
-  [[nodiscard]] Raw valid(const Raw& x) const noexcept {
-    const Raw above = cv::v_sub_wrap(x, lowest);
-    return cv::v_min(above, reach) == above;
-  }
+  [[nodiscard]] Raw valid(const Raw& x) const noexcept { return simd::at_most(cv::v_sub_wrap(x, lowest), reach); }
 };
 
-// Sum and count of pairs of pixels, of which body has a flag each.
+// Which of a register's pixels are valid; body has a flag for each two of them.
 template <bool kBody>
-Words pairs(const Range& range, const std::uint16_t* raw, [[maybe_unused]] const std::uint8_t* body) noexcept {
-  const Raw x = cv::vx_load(raw);
-  Raw valid = range.valid(x);
-  if constexpr (kBody) {
-    const Words free = (cv::vx_load_expand_q(body) & cv::vx_setall_u32(kPixelBody)) == cv::vx_setzero_u32();
-    valid = valid & cv::v_reinterpret_as_u16(free);
-  }
-  const Words depths = cv::v_reinterpret_as_u32(x & valid);
-  const cv::v_int32 minus_count = cv::v_dotprod(cv::v_reinterpret_as_s16(valid), cv::vx_setall_s16(1));
-  return (depths & cv::vx_setall_u32(0xffff)) + (depths >> 16) - (cv::v_reinterpret_as_u32(minus_count) << kCountShift);
+Raw valid_pixels(const Range& range, const Raw& x, [[maybe_unused]] const std::uint8_t* body) noexcept {
+  const Raw valid = range.valid(x);
+  if constexpr (!kBody) return valid;
+  const Words free = (cv::vx_load_expand_q(body) & cv::vx_setall_u32(kPixelBody)) == cv::vx_setzero_u32();
+  return valid & cv::v_reinterpret_as_u16(free);
 }
 
-// Sums of the pairs of each column, of which a register of pixels has one or, with AVX2, two.
-Words sum_columns(const Words& a, const Words& b, const Words& c, const Words& d) noexcept {
+// Of a register of columns: the sum of each one's valid depths, and how many there are.
+struct ColumnSums {
+  Words depths, count;
+};
+template <bool kBody>
+ColumnSums sum_columns(const Range& range, const std::uint16_t* raw, const std::uint8_t* body) noexcept {
   static_assert(kColumn_px == 2 * 4);
+  std::array<Raw, 4> depths, valid;
+  for (std::size_t k = 0; k < depths.size(); ++k) {
+    const Raw x = cv::vx_load(raw + k * Raw::nlanes);
+    valid[k] = valid_pixels<kBody>(range, x, kBody ? body + k * Words::nlanes : nullptr);
+    depths[k] = x & valid[k];
+  }
+#ifdef __ARM_NEON
+  return {simd::sums_of_eight(depths), simd::count_in_eights(valid)};
+#else
+  // Sum and count of pairs of pixels in one word each. A register of pixels has one column or, with AVX2, two.
+  std::array<Words, 4> pairs;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const Words both = cv::v_reinterpret_as_u32(depths[k]);
+    const cv::v_int32 minus_count = cv::v_dotprod(cv::v_reinterpret_as_s16(valid[k]), cv::vx_setall_s16(1));
+    pairs[k] =
+        (both & cv::vx_setall_u32(0xffff)) + (both >> 16) - (cv::v_reinterpret_as_u32(minus_count) << kCountShift);
+  }
   Words first, second, third, fourth;
-  cv::v_transpose4x4(a, b, c, d, first, second, third, fourth);  // each half by itself
-  return simd::halves_in_turn((first + second) + (third + fourth));
+  cv::v_transpose4x4(pairs[0], pairs[1], pairs[2], pairs[3], first, second, third, fourth);  // each half by itself
+  const Words sum = simd::halves_in_turn((first + second) + (third + fourth));
+  return {sum & cv::vx_setall_u32((1U << kCountShift) - 1U), sum >> kCountShift};
+#endif
 }
 
 Wide to_float(const Words& x) noexcept { return cv::v_cvt_f32(cv::v_reinterpret_as_s32(x)); }
@@ -76,12 +91,9 @@ void reduce_registers(const RawRange& raw_range, const RawPixels& pixels, const 
       free = free - seen;
       seen = seen & any;
     }
-    const auto pairs_of = [&](std::int32_t k) {
-      return pairs<kBody>(range, raw + k * Raw::nlanes, kBody ? body + k * Words::nlanes : nullptr);
-    };
-    const Words sum = sum_columns(pairs_of(0), pairs_of(1), pairs_of(2), pairs_of(3)) & seen;
-    count = sum >> kCountShift;
-    const Wide depths = to_float(sum & cv::vx_setall_u32((1U << kCountShift) - 1U));
+    const ColumnSums sums = sum_columns<kBody>(range, raw, body);
+    count = sums.count & seen;
+    const Wide depths = to_float(sums.depths & seen);
     cv::v_store(inverse_depth, to_float(count) * per_metre / cv::v_max(depths, least));
     measured = measured + count;
     raw += 4 * Raw::nlanes;

@@ -14,6 +14,10 @@ constexpr int kSpheresPerCapsule = 18;
 constexpr double kNear_m = 0.02;     // edges are cut off there: what is behind the camera has no place in the image
 constexpr double kOutside_px = 1.0;  // a shape that ends farther from the image covers none of its pixels
 
+using Doubles = cv::v_float64;
+
+Doubles doubles(double x) noexcept { return cv::vx_setall_f64(x); }
+
 }  // namespace
 
 LegShapes transformed(const Transform& to_T_from, const LegShapes& shapes) noexcept {
@@ -33,13 +37,30 @@ BodyMargin body_margin(const BodyUncertainty& uncertainty, const LegGeometry& le
 
 void SelfFilter::clear() noexcept {
   for (auto& ranges : covered_) ranges.fill(ColumnRange{});
+  any_.fill(false);
+  outline_.clear();
+  next_ = 0;
 }
 
-void SelfFilter::extend(Outline& outline, std::int32_t row, std::int32_t width_px, double first, double last) noexcept {
-  if (!(last >= -kOutside_px) || !(first <= width_px - 1 + kOutside_px)) return;
-  const auto r = static_cast<std::size_t>(row);
-  outline.first_px[r] = std::min(outline.first_px[r], first);
-  outline.last_px[r] = std::max(outline.last_px[r], last);
+void SelfFilter::Outline::touch(std::int32_t first, std::int32_t last) noexcept {
+  touched.first = std::min(touched.first, first);
+  touched.last = std::max(touched.last, last);
+}
+
+void SelfFilter::Outline::clear() noexcept {
+  constexpr double kNowhere = std::numeric_limits<double>::infinity();
+  const auto count = std::max(touched.last - touched.first + 1, 0);
+  std::fill_n(first_px.begin() + touched.first, count, kNowhere);
+  std::fill_n(last_px.begin() + touched.first, count, -kNowhere);
+  touched = {kHalfHeight_px, -1};
+}
+
+template <typename Wide>
+void SelfFilter::Outline::extend(std::int32_t row, const Wide& seen, const Wide& first, const Wide& last) noexcept {
+  double *firsts = &first_px[static_cast<std::size_t>(row)], *lasts = &last_px[static_cast<std::size_t>(row)];
+  const Wide first0 = cv::vx_load(firsts), last0 = cv::vx_load(lasts);
+  cv::v_store(firsts, cv::v_select(seen, cv::v_min(first0, first), first0));
+  cv::v_store(lasts, cv::v_select(seen, cv::v_max(last0, last), last0));
 }
 
 // The rows whose plane of rays may meet the cone around a sphere: where its discriminant, over g a quadratic in the
@@ -59,18 +80,23 @@ SelfFilter::Rows SelfFilter::rows_of(const HalfRays& rays, const Vec3& c, double
 // The cone around a sphere, cut row by row: (ray . c)^2 >= |ray|^2 (|c|^2 - r^2) is quadratic in the ray's x. Several
 // rows at once: most of what the filter costs is here.
 void SelfFilter::add_sphere(Outline& outline, const HalfRays& rays, const Vec3& c, double radius_m) noexcept {
-  using Doubles = cv::v_float64;
   static_assert(kHalfHeight_px % Doubles::nlanes == 0);
+  outline.work.add(250);
   const double g = c.squaredNorm() - math::square(radius_m);
   if (!(g > 1e-6)) return;  // the camera is inside the grown shape: nothing can be said
   const double a = math::square(c.x()) - g;
   if (!(a < -1e-9)) return;  // beside the camera, at 90 degrees: out of any image
-  const auto all = [](double x) { return cv::vx_setall_f64(x); };
-  const Doubles cx = all(c.x()), cy = all(c.y()), cz = all(c.z()), wide_a = all(a), wide_g = all(g);
-  const Doubles zero = all(0.0), half = all(0.5), one = all(1.0), fx = all(rays.fx_px), centre = all(rays.cx_px);
-  const Doubles least = all(-kOutside_px), most = all(rays.width_px - 1 + kOutside_px);
+  const Doubles cx = doubles(c.x()), cy = doubles(c.y()), cz = doubles(c.z()), wide_a = doubles(a), wide_g = doubles(g);
+  const Doubles zero = doubles(0.0), half = doubles(0.5), one = doubles(1.0), fx = doubles(rays.fx_px),
+                centre = doubles(rays.cx_px);
+  const Doubles least = doubles(-kOutside_px), most = doubles(rays.width_px - 1 + kOutside_px);
   const Rows rows = rows_of(rays, c, a);
-  for (std::int32_t row = rows.first / Doubles::nlanes * Doubles::nlanes; row <= rows.last; row += Doubles::nlanes) {
+  if (rows.first > rows.last) return;
+  outline.work.add(rows.last - rows.first + 2, 33);
+  constexpr std::int32_t kAtOnce = Doubles::nlanes;
+  const std::int32_t first_row = rows.first / kAtOnce * kAtOnce, last_row = rows.last / kAtOnce * kAtOnce + kAtOnce - 1;
+  outline.touch(first_row, last_row);
+  for (std::int32_t row = first_row; row <= last_row; row += kAtOnce) {
     const auto at = static_cast<std::size_t>(row);
     const Doubles y = cv::v_cvt_f64(cv::vx_load_low(&rays.y[at]));
     const Doubles k = y * cy + cz, cx_k = cx * k;
@@ -81,10 +107,7 @@ void SelfFilter::add_sphere(Outline& outline, const HalfRays& rays, const Vec3& 
     // Met at all, before the camera and in the image.
     const Doubles seen =
         (discriminant >= zero) & (half * (x0 + x1) * cx + k > zero) & (last >= least) & (first <= most);
-    double *firsts = &outline.first_px[at], *lasts = &outline.last_px[at];
-    const Doubles first0 = cv::vx_load(firsts), last0 = cv::vx_load(lasts);
-    cv::v_store(firsts, cv::v_select(seen, cv::v_min(first0, first), first0));
-    cv::v_store(lasts, cv::v_select(seen, cv::v_max(last0, last), last0));
+    outline.extend(row, seen, first, last);
   }
 }
 
@@ -102,50 +125,72 @@ void SelfFilter::add_segment(Outline& outline, const HalfRays& rays, const Vec3&
   const double height = rays.height_px;
   const auto first = static_cast<std::int32_t>(math::clamp(std::floor(v0), 0.0, height - 1.0));
   const auto last = static_cast<std::int32_t>(math::clamp(std::ceil(v1), 0.0, height - 1.0));
-  for (std::int32_t row = first; row <= last; ++row) {
-    if (row + 1.0 < v0 || row - 1.0 > v1) continue;
+  outline.work.add(140);
+  if (first + 1.0 < v0 || last - 1.0 > v1) return;  // below or above the image
+  outline.work.add(last - first + 2, 17);
+  outline.touch(first, last);
+  const bool level = !(v1 - v0 > 1e-9);
+  const double slope = level ? 0.0 : (u1 - u0) / (v1 - v0);
+  static_assert(Doubles::nlanes <= kBeyond);
+  const Doubles wide_v0 = doubles(v0), wide_v1 = doubles(v1), wide_u0 = doubles(u0), wide_slope = doubles(slope),
+                half = doubles(0.5);
+  const Doubles least = doubles(-kOutside_px), most = doubles(rays.width_px - 1 + kOutside_px), end = doubles(last);
+  const Doubles level_end = doubles(u1), step = doubles(Doubles::nlanes);
+  static constexpr std::array<double, 4> kSteps{0.0, 1.0, 2.0, 3.0};
+  static_assert(Doubles::nlanes <= static_cast<int>(kSteps.size()));
+  Doubles y = doubles(first) + cv::vx_load(kSteps.data());
+  for (std::int32_t row = first; row <= last; row += Doubles::nlanes, y += step) {
     // The row's whole band, not its middle: the ends of nearly level edges count.
-    const double lo = math::clamp(row - 0.5, v0, v1), hi = math::clamp(row + 0.5, v0, v1);
-    const double slope = v1 - v0 > 1e-9 ? (u1 - u0) / (v1 - v0) : 0.0;
-    const double ua = v1 - v0 > 1e-9 ? u0 + slope * (lo - v0) : u0;
-    const double ub = v1 - v0 > 1e-9 ? u0 + slope * (hi - v0) : u1;
-    extend(outline, row, rays.width_px, std::min(ua, ub), std::max(ua, ub));
+    const Doubles low = cv::v_min(cv::v_max(y - half, wide_v0), wide_v1);
+    const Doubles high = cv::v_min(cv::v_max(y + half, wide_v0), wide_v1);
+    const Doubles at_low = wide_u0 + wide_slope * (low - wide_v0);
+    const Doubles at_high = level ? level_end : wide_u0 + wide_slope * (high - wide_v0);
+    const Doubles left = cv::v_min(at_low, at_high), right = cv::v_max(at_low, at_high);
+    outline.extend(row, (y <= end) & (right >= least) & (left <= most), left, right);
   }
 }
 
-void SelfFilter::add_shape(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body,
-                           const BodyMargin& margin, std::size_t slot) noexcept {
-  if (slot >= kShapes) return;
+bool SelfFilter::add_some(const HalfRays& rays, const std::array<LegShapes, kFootCount>& body, const BodyMargin& margin,
+                          std::size_t slot) noexcept {
+  if (slot >= kShapes) return true;
   const LegShapes& leg = body[slot / 3];
-  outline_.first_px.fill(std::numeric_limits<double>::infinity());
-  outline_.last_px.fill(-std::numeric_limits<double>::infinity());
-  if (slot % 3 == 2) {
-    add_foot(rays, leg.foot, margin);
-  } else {
-    add_capsule(rays, slot % 3 == 0 ? leg.thigh : leg.shank, margin);
-  }
+  outline_.work.add(100);
+  const bool whole = slot % 3 == 2 ? add_foot(rays, leg.foot, margin)
+                                   : add_capsule(rays, slot % 3 == 0 ? leg.thigh : leg.shank, margin);
+  if (!whole) return false;
+  next_ = 0;
+  const Rows rows{outline_.touched.first, std::min(outline_.touched.last, rays.height_px - 1)};
+  outline_.work.add(300);
+  outline_.work.add(std::max(rows.last - rows.first + 1, 0), 26);
   // Outwards to whole pixels: a pixel is body when any part of it may be.
-  for (std::size_t row = 0; row < static_cast<std::size_t>(rays.height_px); ++row) {
+  for (auto row = static_cast<std::size_t>(rows.first); static_cast<std::int32_t>(row) <= rows.last; ++row) {
     const double first = outline_.first_px[row], last = outline_.last_px[row];
     if (!(first <= last)) continue;
-    const auto whole = [&](double column) {
+    const auto to_pixel = [&](double column) {
       return static_cast<std::int16_t>(math::clamp(column, 0.0, rays.width_px - 1.0));
     };
-    covered_[slot][row] = {whole(std::floor(first)), whole(std::ceil(last))};
+    any_[row] = true;
+    covered_[slot][row] = {to_pixel(std::floor(first)), to_pixel(std::ceil(last))};
   }
+  outline_.clear();
+  return true;
 }
 
-void SelfFilter::add_capsule(const HalfRays& rays, const Capsule& capsule, const BodyMargin& margin) noexcept {
-  if (!(capsule.radius_m > 0.0)) return;
-  for (int i = 0; i < kSpheresPerCapsule; ++i) {
-    const double along = static_cast<double>(i) / (kSpheresPerCapsule - 1);
+bool SelfFilter::add_capsule(const HalfRays& rays, const Capsule& capsule, const BodyMargin& margin) noexcept {
+  constexpr int kAtOnce = 3;
+  if (!(capsule.radius_m > 0.0)) return true;
+  for (const int end = std::min(next_ + kAtOnce, kSpheresPerCapsule); next_ < end; ++next_) {
+    const double along = static_cast<double>(next_) / (kSpheresPerCapsule - 1);
     const Vec3 centre_m = capsule.a_m + along * (capsule.b_m - capsule.a_m);
     add_sphere(outline_, rays, centre_m, capsule.radius_m + margin.at(centre_m.norm()));
   }
+  return next_ == kSpheresPerCapsule;
 }
 
-void SelfFilter::add_foot(const HalfRays& rays, const OrientedBox& foot, const BodyMargin& margin) noexcept {
-  if (!(foot.half_m.minCoeff() > 0.0)) return;
+bool SelfFilter::add_foot(const HalfRays& rays, const OrientedBox& foot, const BodyMargin& margin) noexcept {
+  constexpr int kAtOnce = 7, kChords = 28;
+  if (!(foot.half_m.minCoeff() > 0.0)) return true;
+  outline_.work.add(500);
   std::array<Vec3, 8> corners;
   const double farthest_m = foot.centre.p_m.norm() + foot.half_m.norm();
   const Vec3 half = foot.half_m + Vec3::Constant(margin.at(farthest_m));
@@ -154,12 +199,19 @@ void SelfFilter::add_foot(const HalfRays& rays, const OrientedBox& foot, const B
     corners[i] = foot.centre * half.cwiseProduct(sign);
   }
   // All pairs: the outline of a convex shape needs no hull when every chord is drawn.
+  int chord = 0;
+  const int first = next_, end = std::min(next_ + kAtOnce, kChords);
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    for (std::size_t j = i + 1; j < corners.size(); ++j) add_segment(outline_, rays, corners[i], corners[j]);
+    for (std::size_t j = i + 1; j < corners.size(); ++j, ++chord) {
+      if (chord >= first && chord < end) add_segment(outline_, rays, corners[i], corners[j]);
+    }
   }
+  next_ = end;
+  return next_ == kChords;
 }
 
 bool SelfFilter::try_mark_row(std::int32_t row, std::int32_t width_px, std::uint8_t* flags) const noexcept {
+  if (!any_[static_cast<std::size_t>(row)]) return false;
   bool any = false;
   for (const auto& ranges : covered_) {
     const ColumnRange range = ranges[static_cast<std::size_t>(row)];

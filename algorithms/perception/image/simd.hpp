@@ -65,6 +65,28 @@ inline Four running_sums(const Four& x, Four& before) noexcept {
   return sums;
 }
 
+// All bits where a is no more than b.
+inline cv::v_uint16 at_most(const cv::v_uint16& a, const cv::v_uint16& b) noexcept {
+#ifdef __ARM_NEON
+  return a <= b;
+#else
+  return cv::v_min(a, b) == a;  // what SSE has no comparison for
+#endif
+}
+
+#ifdef __ARM_NEON
+// Of each of four registers: the sum of its eight numbers; and how many of them have all bits set, the others none.
+inline cv::v_uint32x4 sums_of_eight(const std::array<cv::v_uint16x8, 4>& x) noexcept {
+  return cv::v_uint32x4(vpaddq_u32(vpaddq_u32(vpaddlq_u16(x[0].val), vpaddlq_u16(x[1].val)),
+                                   vpaddq_u32(vpaddlq_u16(x[2].val), vpaddlq_u16(x[3].val))));
+}
+inline cv::v_uint32x4 count_in_eights(const std::array<cv::v_uint16x8, 4>& x) noexcept {
+  const auto number = [&x](std::size_t i) { return vreinterpretq_s16_u16(x[i].val); };
+  const int16x8_t fours = vpaddq_s16(vpaddq_s16(number(0), number(1)), vpaddq_s16(number(2), number(3)));
+  return cv::v_uint32x4(vreinterpretq_u32_s32(vnegq_s32(vpaddlq_s16(fours))));
+}
+#endif
+
 // A register of 256 bits: the first of its lower half, the first of its upper half, the second ... One of 128 as it is.
 inline cv::v_uint32 halves_in_turn(const cv::v_uint32& a) noexcept {
 #ifdef __AVX2__

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The unit in which the stages of a frame count their work.
+// The largest piece of work of a frame.
 #pragma once
 
 #include <cstdint>
 
+#include "algorithms/core/work.hpp"
+
 namespace polygmap {
 
-// One unit is a row of 80 columns through reduction and segmentation, or as much work (its cost:
-// firmware/schedule.hpp).
-inline constexpr std::int32_t kRowUnits = 1;
-// One of the passes over spans takes a column of 480 rows as long at most: it looks at the spans' ends alone.
-inline constexpr std::int32_t kColumnUnits = 1;
-// No piece of work is larger. What happens a few times in a frame counts as much, whatever it takes.
-inline constexpr std::int32_t kMaxPieceUnits = 40;
+// In units. Not every piece of the worst picture was seen: what is larger is paid all the same, in the slots after it.
+inline constexpr std::int32_t kMaxPieceUnits = 120'000 / kInstructionsPerUnit;
 
 }  // namespace polygmap

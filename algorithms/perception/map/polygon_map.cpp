@@ -8,12 +8,6 @@
 namespace polygmap {
 namespace {
 
-// Work units, of 300 to 500 instructions.
-constexpr std::int32_t kLoadUnits = 2;
-constexpr std::int32_t kMeasureUnits = 2;
-constexpr std::int32_t kFuseUnits = 12;
-constexpr std::int32_t kEvictUnits = 20;
-
 bool valid(const SurfacePatch& patch, double max_range_m) noexcept {
   if (patch.polygon.size() < 3 || !math::all_finite(patch.normal) || !math::all_finite(patch.centroid_m)) return false;
   if (!(std::abs(patch.normal.squaredNorm() - 1.0) < 1e-3) ||
@@ -103,6 +97,7 @@ void PolygonMap::order_surfaces() noexcept {
 }
 
 void PolygonMap::begin_fusing() noexcept {
+  work_.add(600);
   if (pass_.measuring) drift_.end_frame();
   pass_.measuring = false;
   map_T_camera_.p_m = view_.world_T_camera.p_m - drift_.frame_offset_m();
@@ -127,45 +122,51 @@ void PolygonMap::next_surface() noexcept {
 Progress PolygonMap::step(WorkBudget& budget) noexcept {
   if (stage_ == Stage::kIdle) return Progress::kIdle;
   while (!budget.exhausted()) {
-    switch (stage_) {
-      case Stage::kLoad:
-        budget.spend(kLoadUnits);
-        next_surface();
-        break;
-      case Stage::kCompare:
-        budget.spend(compare_some());
-        if (pass_.track >= tracks_.size()) stage_ = Stage::kFuse;
-        break;
-      case Stage::kFuse:
-        if (pass_.measuring) {
-          budget.spend(kMeasureUnits);
-          measure_offset();
-        } else {
-          budget.spend(kFuseUnits + (pass_.best >= tracks_.size() && tracks_.full() ? kEvictUnits : 0));
-          fuse_best();
-        }
-        ++pass_.patch;
-        stage_ = Stage::kLoad;
-        break;
-      case Stage::kAge:
-        if (pass_.track < tracks_.size()) {
-          budget.spend(age(tracks_[pass_.track++]));
-        } else {
-          stage_ = Stage::kPublish;
-        }
-        break;
-      case Stage::kPublish:
-        budget.spend(publish());
-        stage_ = Stage::kIdle;
-        return Progress::kDone;
-      case Stage::kIdle:
-        return Progress::kIdle;
-    }
+    do_piece();
+    work_.add(120);
+    budget.spend(work_.take_units());
+    if (stage_ == Stage::kIdle) return Progress::kDone;
   }
   return Progress::kBusy;
 }
 
+void PolygonMap::do_piece() noexcept {
+  switch (stage_) {
+    case Stage::kLoad:
+      next_surface();
+      break;
+    case Stage::kCompare:
+      compare_some();
+      if (pass_.track >= tracks_.size()) stage_ = Stage::kFuse;
+      break;
+    case Stage::kFuse:
+      if (pass_.measuring) {
+        measure_offset();
+      } else {
+        fuse_best();
+      }
+      ++pass_.patch;
+      stage_ = Stage::kLoad;
+      break;
+    case Stage::kAge:
+      if (pass_.track < tracks_.size()) {
+        age(tracks_[pass_.track++]);
+      } else {
+        stage_ = Stage::kPublish;
+      }
+      break;
+    case Stage::kPublish:
+      publish();
+      stage_ = Stage::kIdle;
+      break;
+    case Stage::kIdle:
+      break;
+  }
+}
+
 bool PolygonMap::load(const SurfacePatch& patch) noexcept {
+  work_.add(450);
+  work_.add(patch.polygon.size(), 60);
   if (!valid(patch, params_.max_range_m)) return false;
   seen_.kind = patch.kind;
   seen_.plane = map_T_camera_ * Plane{patch.normal.normalized(), patch.d_m};

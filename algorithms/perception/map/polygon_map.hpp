@@ -228,19 +228,18 @@ class PolygonMap {
 
   // Copies the frame. A frame that is invalid or not newer is counted and leaves nothing to do.
   void begin(const SurfaceFrame& frame, const View& view) noexcept;
-  // A unit is a glance at kGlancesPerUnit remembered surfaces, or as much work: a comparison with one that is near is
-  // two. The largest piece publishes all that a frame changed: kMaxPieceUnits. Eight surfaces take about 220 units.
-  static constexpr std::size_t kGlancesPerUnit = 8;
-  static constexpr std::int32_t kMaxPieceUnits = 1 + kMaxMapPolygons / kGlancesPerUnit + kMaxMapPolygons;
+  // The largest piece publishes all that a frame changed, of a full map.
+  static constexpr std::int32_t kMaxPieceUnits = 120'000 / kInstructionsPerUnit;
   Progress step(WorkBudget& budget) noexcept;
+  // What the next step begins with; a benchmark charges instructions to it.
+  enum class Stage : std::uint8_t { kIdle, kLoad, kCompare, kFuse, kAge, kPublish };
+  [[nodiscard]] Stage stage() const noexcept { return stage_; }
   // Changes only in the step that returns kDone. The stamp moves on only with a frame in which something was seen.
   [[nodiscard]] const MapSnapshot& snapshot() const noexcept { return snapshot_; }
   void clear() noexcept;
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:
-  enum class Stage : std::uint8_t { kIdle, kLoad, kCompare, kFuse, kAge, kPublish };
-
   // Of the seen surface to a remembered one that may be the same.
   struct Nearness {
     double across_m = 0.0;  // along the remembered normal, at the seen middle
@@ -259,6 +258,7 @@ class PolygonMap {
     double second_cost = 0.0;
   };
 
+  void do_piece() noexcept;
   void order_surfaces() noexcept;
   void begin_fusing() noexcept;
   void next_surface() noexcept;
@@ -266,8 +266,8 @@ class PolygonMap {
   [[nodiscard]] bool is_near(const MapTrack& track, Nearness& out) const noexcept;
   // The robot's leg leaves unknown ends. Where both were seen to end towards each other, they are two posts.
   [[nodiscard]] bool two_posts(const MapTrack& track, const ConvexPolygon& seen_polygon, bool behind) const noexcept;
-  [[nodiscard]] bool matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept;
-  [[nodiscard]] std::int32_t compare_some() noexcept;
+  [[nodiscard]] bool matches(const MapTrack& track, const Nearness& near, double& cost) noexcept;
+  void compare_some() noexcept;
   void measure_offset() noexcept;
   void fuse_best() noexcept;
   void create() noexcept;
@@ -276,8 +276,8 @@ class PolygonMap {
   // offset_m: of the seen plane along the remembered normal, at the track's origin; fade: of what was known.
   void fuse(MapTrack& track, double offset_m, double fade) noexcept;
   void merge(MapTrack& into, MapTrack& from) noexcept;
-  [[nodiscard]] std::int32_t age(MapTrack& track) noexcept;
-  [[nodiscard]] std::int32_t publish() noexcept;
+  void age(MapTrack& track) noexcept;
+  void publish() noexcept;
 
   [[nodiscard]] ConvexPolygon local_polygon(const MapTrack& track) const noexcept;
   [[nodiscard]] std::optional<SeenLine> local_line(const MapTrack& track, const EdgeLine& line) const noexcept;
@@ -289,7 +289,7 @@ class PolygonMap {
   void update_side(TrackedSide& side, double seen_m, bool observed) noexcept;
   void rebuild(MapTrack& track) noexcept;
   [[nodiscard]] bool in_view(const MapTrack& track, const Transform& camera_T_local) const noexcept;
-  [[nodiscard]] bool hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept;
+  [[nodiscard]] bool hidden(const MapTrack& track, const Transform& camera_T_local) noexcept;
   [[nodiscard]] double faded(std::int64_t since_ns) const noexcept;
   void write(const MapTrack& track, MapPolygon& out) const noexcept;
   [[nodiscard]] Viewpoint viewpoint() const noexcept { return {map_T_camera_.p_m, view_.mount_sigma_rad}; }
@@ -313,6 +313,7 @@ class PolygonMap {
   bool any_frame_ = false;
   Stage stage_ = Stage::kIdle;
   Pass pass_;
+  WorkCount work_;
 };
 
 }  // namespace polygmap

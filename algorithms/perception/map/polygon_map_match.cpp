@@ -8,8 +8,6 @@
 namespace polygmap {
 namespace {
 
-constexpr std::int32_t kMatchUnits = 2;
-
 // The shorter interval's part that both cover; negative: minus the gap.
 double overlap_m(const Interval& a, const Interval& b) noexcept {
   return std::min(a.max_m, b.max_m) - std::max(a.min_m, b.min_m);
@@ -50,7 +48,9 @@ bool PolygonMap::two_posts(const MapTrack& track, const ConvexPolygon& seen_poly
          end_observed(params_.ends, seen_polygon, seen_.edges, u, support_m(seen_polygon, u));
 }
 
-bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& cost) const noexcept {
+bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& cost) noexcept {
+  work_.add(330);
+  work_.add(seen_.polygon.size() + track.polygon.size(), 34);
   const bool upright = track.kind == SurfaceKind::kRiser;
   const ConvexPolygon seen_polygon = local_polygon(track);
   const BoundingBox seen = bounding_box(seen_polygon), known = bounding_box(track.polygon);
@@ -70,12 +70,12 @@ bool PolygonMap::matches(const MapTrack& track, const Nearness& near, double& co
   return true;
 }
 
-std::int32_t PolygonMap::compare_some() noexcept {
-  std::int32_t units = 1;
-  for (std::size_t glances = 0; glances < kGlancesPerUnit && pass_.track < tracks_.size(); ++glances, ++pass_.track) {
+void PolygonMap::compare_some() noexcept {
+  constexpr std::size_t kAtOnce = 16;
+  for (std::size_t glances = 0; glances < kAtOnce && pass_.track < tracks_.size(); ++glances, ++pass_.track) {
     Nearness near;
+    work_.add(105);
     if (!is_near(tracks_[pass_.track], near)) continue;
-    units += kMatchUnits;
     double cost = 0.0;
     if (!matches(tracks_[pass_.track], near, cost)) continue;
     if (cost < pass_.best_cost) {
@@ -88,15 +88,17 @@ std::int32_t PolygonMap::compare_some() noexcept {
       pass_.second_cost = cost;
     }
   }
-  return units;
 }
 
 // What the seen surface says about the frame's offset: along the remembered normal, and across the edges of a tread.
 void PolygonMap::measure_offset() noexcept {
+  work_.add(60);
   if (pass_.best >= tracks_.size()) return;
   const MapTrack& track = tracks_[pass_.best];
   Nearness near;
   if (track.sightings < params_.memory.confirmed_sightings || !is_near(track, near)) return;
+  work_.add(900);
+  if (track.kind == SurfaceKind::kTread) work_.add(seen_.polygon.size(), 90);
   const double common_m2 = math::square(params_.systematic_sigma_m);
   // A riser is matched from further off than it may lie; a plane's normal says nothing about its place beside it.
   if (std::abs(near.across_m) < params_.lines.gate_max_m) {

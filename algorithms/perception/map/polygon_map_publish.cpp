@@ -8,27 +8,29 @@
 
 namespace polygmap {
 
-std::int32_t PolygonMap::publish() noexcept {
+void PolygonMap::publish() noexcept {
   MapPolygons& out = snapshot_.polygons;
-  auto units = static_cast<std::int32_t>(1 + tracks_.size() / kGlancesPerUnit);
+  work_.add(300);
   (void)out.try_resize(tracks_.size());
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    work_.add(340);
     if (tracks_[i].dirty) {
       write(tracks_[i], out[i]);
-      ++units;
+      work_.add(220);
+      work_.add(tracks_[i].polygon.size(), 42);
     }
     tracks_[i].dirty = false;
     write_sigmas(tracks_[i], out[i].surface);
   }
   for (std::size_t i = tracks_.size(); i-- > 0;) {
     if (!tracks_[i].erased) continue;
+    work_.add(240);
     (void)tracks_.try_swap_remove(i);
     (void)out.try_swap_remove(i);
   }
   ++counters_.frames;
   snapshot_.drift_m = drift_.drift_m();
   if (fused_in_frame_ > 0) snapshot_.stamp_ns = newest_ns_;
-  return units;
 }
 
 void PolygonMap::write(const MapTrack& track, MapPolygon& out) const noexcept {

@@ -7,16 +7,13 @@
 #include "algorithms/perception/map/polygon_map.hpp"
 
 namespace polygmap {
-namespace {
-
-// Work units.
-constexpr std::int32_t kAgeUnits = 1;
-constexpr std::int32_t kHiddenUnits = 20;
-
-}  // namespace
-
 void PolygonMap::fuse_best() noexcept {
-  if (pass_.best >= tracks_.size()) {
+  // Of a track: its eight ends, its polygon; of a new one no end is known before.
+  constexpr std::int32_t kRebuild = 6500, kCreate = 3200, kPerCorner = 420;
+  const bool is_new = pass_.best >= tracks_.size();
+  work_.add(is_new ? kCreate : kRebuild);
+  work_.add(seen_.polygon.size(), kPerCorner);
+  if (is_new) {
     ++fused_in_frame_;
     create();
     return;
@@ -100,6 +97,7 @@ void PolygonMap::admit(const MapTrack& track) noexcept {
     std::size_t victim = 0;
     int least = priority(tracks_[0]);
     for (std::size_t i = 1; i < tracks_.size(); ++i) {
+      work_.add(tracks_[i].kind == SurfaceKind::kTread ? 330 : 80);  // a tread's polygon is gone round
       const int worth = priority(tracks_[i]);
       if (worth < least || (worth == least && tracks_[i].last_seen_ns < tracks_[victim].last_seen_ns)) {
         victim = i;
@@ -157,6 +155,7 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
 }
 
 void PolygonMap::merge(MapTrack& into, MapTrack& from) noexcept {
+  work_.add(300 + static_cast<std::int32_t>(kMapSides * from.polygon.size()) * 45);
   // The other one is one more sighting of where the surface reaches.
   const Transform into_T_from = into.world_T_local.inverse() * from.world_T_local;
   for (std::size_t k = 0; k < kMapSides; ++k) {
@@ -190,7 +189,7 @@ bool PolygonMap::in_view(const MapTrack& track, const Transform& camera_T_local)
 }
 
 // By the robot's own body: three of five points, the middle and four halfway to vertices around it.
-bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) const noexcept {
+bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) noexcept {
   constexpr std::size_t kAround = 4;
   const Vec2 middle = centroid_m(track.polygon);
   std::size_t hidden = 0;
@@ -199,15 +198,18 @@ bool PolygonMap::hidden(const MapTrack& track, const Transform& camera_T_local) 
     const Vec2 inner = 0.5 * (towards + middle);
     const Vec3 p = camera_T_local * Vec3{inner.x(), inner.y(), 0.0};
     const double margin_m = view_.body_margin.at(p.norm());
-    hidden += hides(view_.body[0], margin_m, p) || hides(view_.body[1], margin_m, p) ? 1U : 0U;
+    hidden += hides(view_.body[0], margin_m, p, work_) || hides(view_.body[1], margin_m, p, work_) ? 1U : 0U;
   }
   return 2 * hidden > kAround;
 }
 
-std::int32_t PolygonMap::age(MapTrack& track) noexcept {
-  if (track.erased || track.last_seen_ns == newest_ns_) return kAgeUnits;
+void PolygonMap::age(MapTrack& track) noexcept {
+  if (track.erased || track.last_seen_ns == newest_ns_) return;
+  work_.add(400);
+  work_.add(track.polygon.size(), 75);
   const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
   const bool looked = in_view(track, camera_T_local);
+  if (looked) work_.add(750);
   if (looked && !hidden(track, camera_T_local)) ++track.misses;
   const bool confirmed = track.sightings >= params_.memory.confirmed_sightings;
   if (confirmed && track.misses >= params_.memory.misses_confirmed) {
@@ -218,7 +220,6 @@ std::int32_t PolygonMap::age(MapTrack& track) noexcept {
     track.erased = true;
     ++counters_.dropped_unconfirmed;
   }
-  return looked ? kAgeUnits + kHiddenUnits : kAgeUnits;
 }
 
 double PolygonMap::faded(std::int64_t since_ns) const noexcept {

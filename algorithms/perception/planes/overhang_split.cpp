@@ -11,6 +11,7 @@ void OverhangSplit::begin(const Params& params, const Vec3& up, const PlaneSet& 
   count_ = 0;
   overflow_ = 0;
   profile_of_.fill(0);
+  work_.add(250 + planes.count * 45);
   const double least = math::sin(params.least_lean_rad), most = math::sin(params.most_lean_rad);
   for (std::size_t p = 1; p <= planes.count; ++p) {
     if (!planes[p].alive) continue;
@@ -35,11 +36,14 @@ void OverhangSplit::add_column(const FrameImage& picture, std::int32_t column, c
   constexpr std::int32_t kStride = 2;  // rows next to each other say nearly the same
   const auto farthest_m = static_cast<float>(params_.farthest_m);
   const float* inverse_depths = picture.columns.by_column.row(column);
+  work_.add(30);
+  work_.add(spans.size(), 7);
   const Vec3 middle{static_cast<double>(picture.column_rays.x[static_cast<std::size_t>(column)]), 0.0, 1.0};
   for (const ColumnSpan& span : spans) {
     const std::size_t number = profile_of_[to_plane[span.plane]];
     if (number == 0) continue;
     Profile& profile = profiles_[number - 1];
+    work_.add(50 + 27 * ((span.bottom - span.top) / kStride + 1));
     const auto back_at = static_cast<float>(profile.back.dot(middle)), back_by = static_cast<float>(profile.back.y());
     const auto up_at = static_cast<float>(up_.dot(middle)), up_by = static_cast<float>(up_.y());
     const auto middle_m = static_cast<float>(profile.middle_m), lowest_m = static_cast<float>(profile.lowest_m);
@@ -107,6 +111,7 @@ void OverhangSplit::drop_sparse(Profile& profile) const noexcept {
 bool OverhangSplit::try_split(std::size_t plane, Halves& halves) noexcept {
   if (profile_of_[plane] == 0) return false;
   Profile& profile = profiles_[profile_of_[plane] - 1U];
+  work_.add(kBins, 60);
   drop_sparse(profile);
   const Step step = best_step(profile);
   const double rows = step.lower_rows + step.upper_rows;

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/planes/plane_merging.hpp"
 #include "algorithms/perception/planes/plane_set.hpp"
@@ -60,6 +61,8 @@ class OverhangSplit {
   [[nodiscard]] bool try_split(std::size_t plane, Halves& halves) noexcept;
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }  // leaning planes without room
 
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
+
  private:
   static constexpr std::size_t kMaxLeaning = 16;
   static constexpr std::int32_t kBins = 48;
@@ -87,6 +90,7 @@ class OverhangSplit {
   Params params_;
   Vec3 up_ = Vec3::UnitZ();
   std::array<Profile, kMaxLeaning> profiles_{};
+  WorkCount work_;
   std::size_t count_ = 0;
   std::array<std::uint8_t, PlaneSet::kMaxPlanes + 1> profile_of_{};  // 1-based, 0 = does not lean
   std::uint32_t overflow_ = 0;

@@ -2,6 +2,7 @@
 #include "algorithms/perception/planes/plane_growing.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 namespace polygmap {
@@ -69,42 +70,81 @@ void PlaneGrowing::begin(const Params& params, const DepthNoiseModel& noise, con
   overflow_ = 0;
   growing_ = false;
   seeds_.next = 0;
-  sort_seeds();
-  index_rows();
+  pass_.part = Part::kCount;
+  pass_.column = 0;
+  pass_.start.fill(0);
 }
 
 // A column of clutter has dozens of segments, of which a neighbour overlaps one or two. Segments that end above a row
 // are counted, not looked for.
-void PlaneGrowing::index_rows() noexcept {
+void PlaneGrowing::count_column(std::int32_t column) noexcept {
   static_assert(ScanlineSegmentation::kMaxSegmentsPerColumn <= std::numeric_limits<std::uint8_t>::max());
-  for (std::int32_t g = 0; g < rays_->columns; ++g) {
-    auto& first = first_near_[static_cast<std::size_t>(g)];
-    first.fill(0);
-    for (const ScanlineSegment& segment : (*segments_)[static_cast<std::size_t>(g)]) {
-      ++first[static_cast<std::size_t>(segment.bottom / kIndexRows + 1)];
+  constexpr std::size_t kWord = sizeof(std::uint64_t);
+  auto& out = first_near_[static_cast<std::size_t>(column)];
+  std::array<std::uint8_t, (kDepthHeight_px / kIndexRows + 1 + kWord - 1) / kWord * kWord> first{};  // whole words
+  for (const ScanlineSegment& segment : (*segments_)[static_cast<std::size_t>(column)]) {
+    ++first[static_cast<std::size_t>(segment.bottom / kIndexRows + 1)];
+    if (segment.rows() >= params_.min_rows) {
+      ++pass_.start[static_cast<std::size_t>(kDepthHeight_px - segment.rows() + 1)];
     }
-    for (std::size_t i = 1; i < first.size(); ++i) first[i] = static_cast<std::uint8_t>(first[i] + first[i - 1]);
   }
+  // Eight sums at once (the first byte is the lowest): a product with ones adds every byte to those after it, of which
+  // none carries over.
+  constexpr std::uint64_t kOnes = 0x0101'0101'0101'0101U;
+  std::uint64_t before = 0;
+  for (std::size_t i = 0; i < first.size(); i += kWord) {
+    std::uint64_t sums = 0;
+    std::memcpy(&sums, &first[i], kWord);
+    sums = (sums + before) * kOnes;
+    std::memcpy(&first[i], &sums, kWord);
+    before = sums >> 56U;
+  }
+  std::copy_n(first.begin(), out.size(), out.begin());
 }
 
 // By length, longest first; equal lengths in the order of the image.
-void PlaneGrowing::sort_seeds() noexcept {
-  std::array<std::uint16_t, kDepthHeight_px + 2> start{};
-  for (std::int32_t g = 0; g < rays_->columns; ++g) {
-    for (const ScanlineSegment& segment : (*segments_)[static_cast<std::size_t>(g)]) {
-      if (segment.rows() >= params_.min_rows) ++start[static_cast<std::size_t>(kDepthHeight_px - segment.rows() + 1)];
+void PlaneGrowing::begin_sorting() noexcept {
+  work_.add(pass_.start.size(), 5);
+  for (std::size_t i = 1; i < pass_.start.size(); ++i)
+    pass_.start[i] = static_cast<std::uint16_t>(pass_.start[i] + pass_.start[i - 1]);
+  seeds_.size = pass_.start.back();
+}
+void PlaneGrowing::sort_seeds(std::int32_t column) noexcept {
+  const ScanlineSegmentation::Column& segments = (*segments_)[static_cast<std::size_t>(column)];
+  for (std::size_t k = 0; k < segments.size(); ++k) {
+    if (segments[k].rows() < params_.min_rows) continue;
+    seeds_.places[pass_.start[static_cast<std::size_t>(kDepthHeight_px - segments[k].rows())]++] = {
+        static_cast<std::int16_t>(column), static_cast<std::int16_t>(k)};
+  }
+}
+void PlaneGrowing::clear_tried(std::int32_t column) noexcept {
+  for (ScanlineSegment& segment : (*segments_)[static_cast<std::size_t>(column)]) {
+    segment.plane = segment.plane == kTried ? std::uint8_t{0} : segment.plane;
+  }
+}
+
+bool PlaneGrowing::prepare_some() noexcept {
+  const std::int32_t last = std::min(pass_.column + kColumnsAtOnce, rays_->columns);
+  for (; pass_.column < last; ++pass_.column) {
+    const std::size_t segments = (*segments_)[static_cast<std::size_t>(pass_.column)].size();
+    switch (pass_.part) {
+      case Part::kCount:
+        work_.add(120 + 30 * static_cast<std::int32_t>(segments));
+        count_column(pass_.column);
+        break;
+      case Part::kSort:
+        work_.add(30 + 25 * static_cast<std::int32_t>(segments));
+        sort_seeds(pass_.column);
+        break;
+      case Part::kGrow:
+        break;
+      case Part::kClear:
+        work_.add(20 + 9 * static_cast<std::int32_t>(segments));
+        clear_tried(pass_.column);
+        break;
     }
   }
-  for (std::size_t i = 1; i < start.size(); ++i) start[i] = static_cast<std::uint16_t>(start[i] + start[i - 1]);
-  seeds_.size = start.back();
-  for (std::int32_t g = 0; g < rays_->columns; ++g) {
-    const ScanlineSegmentation::Column& column = (*segments_)[static_cast<std::size_t>(g)];
-    for (std::size_t k = 0; k < column.size(); ++k) {
-      if (column[k].rows() < params_.min_rows) continue;
-      seeds_.places[start[static_cast<std::size_t>(kDepthHeight_px - column[k].rows())]++] = {
-          static_cast<std::int16_t>(g), static_cast<std::int16_t>(k)};
-    }
-  }
+  return pass_.column == rays_->columns;
 }
 
 // The segment in the next column that shares most rows with this one, at least half of what both cover.
@@ -115,6 +155,7 @@ bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noe
   const ScanlineSegmentation::Column& column = (*segments_)[static_cast<std::size_t>(g)];
   std::int32_t most = 0;
   for (std::size_t k = first_near(g, segment.top); k < column.size() && column[k].top <= segment.bottom; ++k) {
+    work_.add(34);
     const ScanlineSegment& other = column[k];
     const std::int32_t shared = std::min(segment.bottom, other.bottom) - std::max(segment.top, other.top) + 1;
     const std::int32_t covered = std::max(segment.bottom, other.bottom) - std::min(segment.top, other.top) + 1;
@@ -128,10 +169,13 @@ bool PlaneGrowing::try_neighbour(Place from, std::int32_t side, Place& best) noe
 }
 
 bool PlaneGrowing::try_seed(Place place) noexcept {
+  work_.add(38);
   if (at(place).plane != 0) return false;
+  work_.add(150);
   // Three segments beside one another: most seeds have no such neighbours.
   Place left, right;
   if (!try_neighbour(place, -1, left) || !try_neighbour(place, 1, right)) return false;
+  work_.add(560);
   Sums sums;
   for (const Place& p : {place, left, right}) {
     sums.add(static_cast<double>(rays_->x[static_cast<std::size_t>(p.column)]), *rays_, at(p));
@@ -155,7 +199,7 @@ bool PlaneGrowing::try_seed(Place place) noexcept {
 
 void PlaneGrowing::consider(Place place) noexcept {
   ScanlineSegment& segment = at(place);
-  if (segment.plane != 0) return;
+  if (segment.plane != 0) return work_.add(22);
   // Mean square distance of the segment's line from the plane.
   const double ray_x = static_cast<double>(rays_->x[static_cast<std::size_t>(place.column)]);
   const double pitch = static_cast<double>(rays_->y[1] - rays_->y[0]);
@@ -164,19 +208,24 @@ void PlaneGrowing::consider(Place place) noexcept {
   const double tilt = static_cast<double>(segment.slope) - m_.y() * pitch;
   const double rows = segment.rows();
   const double off2 = offset * offset + tilt * tilt * (rows * rows - 1.0) * (1.0 / 12.0);
-  if (!(middle.w > kLeastInverseDepth) || off2 > math::square(tolerance_w(middle.w)) * norm2_) return;
+  if (!(middle.w > kLeastInverseDepth) || off2 > math::square(tolerance_w(middle.w)) * norm2_) {
+    return work_.add(127);
+  }
+  work_.add(267);
   segment.plane = static_cast<std::uint8_t>(count_ + 1);
   sums_.add(ray_x, *rays_, segment);
   queue_.places[queue_.size++] = place;
   first_column_ = std::min<std::int32_t>(first_column_, place.column);
   last_column_ = std::max<std::int32_t>(last_column_, place.column);
   if (sums_.m.one > next_fit_px_ && sums_.try_solve(m_)) {
+    work_.add(80);
     norm2_ = m_.squaredNorm();
     next_fit_px_ = params_.refit_growth * sums_.m.one;
   }
 }
 
 void PlaneGrowing::visit(Place place) noexcept {
+  work_.add(100);
   const ScanlineSegment segment = at(place);
   for (const std::int32_t side : {-1, 1}) {
     const std::int32_t g = place.column + side;
@@ -194,10 +243,12 @@ void PlaneGrowing::visit(Place place) noexcept {
 
 void PlaneGrowing::close() noexcept {
   growing_ = false;
+  work_.add(150);
   const bool kept = sums_.m.one >= params_.min_facet_px && last_column_ - first_column_ + 1 >= params_.min_columns &&
                     count_ < kMaxPlanes && sums_.try_solve(m_) && m_.dot(sums_.m.mean_ray()) > kLeastInverseDepth;
   if (!kept) {
     overflow_ += count_ == kMaxPlanes ? 1U : 0U;
+    work_.add(queue_.size, 13);
     for (std::size_t i = 0; i < queue_.size; ++i) at(queue_.places[i]).plane = i == 0 ? kTried : std::uint8_t{0};
     return;
   }
@@ -206,9 +257,10 @@ void PlaneGrowing::close() noexcept {
   plane.moments = sums_.m;
 }
 
-bool PlaneGrowing::step() noexcept {
-  constexpr int kPiece = 8;  // which PlaneExtractor counts as one unit
-  for (int i = 0; i < kPiece; ++i) {
+void PlaneGrowing::grow_some() noexcept {
+  constexpr std::int32_t kPieceInstructions = 4000;
+  const std::int32_t enough = work_.instructions() + kPieceInstructions;
+  while (work_.instructions() < enough) {
     if (growing_) {
       if (queue_.next < queue_.size) {
         visit(queue_.places[queue_.next++]);
@@ -218,14 +270,33 @@ bool PlaneGrowing::step() noexcept {
     } else if (seeds_.next < seeds_.size) {
       static_cast<void>(try_seed(seeds_.places[seeds_.next++]));
     } else {
-      for (ScanlineSegmentation::Column& column : *segments_) {
-        for (ScanlineSegment& segment : column)
-          segment.plane = segment.plane == kTried ? std::uint8_t{0} : segment.plane;
-      }
-      return true;
+      pass_.part = Part::kClear;
+      pass_.column = 0;
+      return;
     }
   }
-  return false;
+}
+
+bool PlaneGrowing::step() noexcept {
+  if (pass_.part == Part::kGrow) {
+    grow_some();
+    return false;
+  }
+  if (!prepare_some()) return false;
+  pass_.column = 0;
+  switch (pass_.part) {
+    case Part::kCount:
+      begin_sorting();
+      pass_.part = Part::kSort;
+      return false;
+    case Part::kSort:
+      pass_.part = Part::kGrow;
+      return false;
+    case Part::kGrow:
+    case Part::kClear:
+      break;
+  }
+  return true;
 }
 
 }  // namespace polygmap

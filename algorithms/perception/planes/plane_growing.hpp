@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/planes/plane_fit.hpp"
 #include "algorithms/perception/segments/scanline_segments.hpp"
 
@@ -49,6 +50,7 @@ class PlaneGrowing {
              ScanlineSegmentation::Columns& segments) noexcept;
   // A bounded piece of work; true when all is done. Then every segment knows its plane, 1-based.
   [[nodiscard]] bool step() noexcept;
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
 
   [[nodiscard]] std::size_t count() const noexcept { return count_; }
   [[nodiscard]] const GrownPlane& plane(std::size_t i) const noexcept { return planes_[i]; }  // 1-based
@@ -80,8 +82,16 @@ class PlaneGrowing {
   [[nodiscard]] ScanlineSegment& at(Place p) noexcept {
     return (*segments_)[static_cast<std::size_t>(p.column)][static_cast<std::size_t>(p.index)];
   }
-  void sort_seeds() noexcept;
-  void index_rows() noexcept;
+  // Columns that are gone through in one piece: before planes grow, and afterwards.
+  static constexpr std::int32_t kColumnsAtOnce = 16;
+  enum class Part : std::uint8_t { kCount, kSort, kGrow, kClear };
+  void count_column(std::int32_t column) noexcept;
+  void sort_seeds(std::int32_t column) noexcept;
+  void clear_tried(std::int32_t column) noexcept;
+  void begin_sorting() noexcept;
+  // Of kColumnsAtOnce columns; true after the last.
+  [[nodiscard]] bool prepare_some() noexcept;
+  void grow_some() noexcept;
   // Of the first segment of a column that ends at this row or below, or of one a little above it.
   [[nodiscard]] std::size_t first_near(std::int32_t column, std::int32_t row) const noexcept {
     return first_near_[static_cast<std::size_t>(column)][static_cast<std::size_t>(row / kIndexRows)];
@@ -106,6 +116,12 @@ class PlaneGrowing {
   Queue seeds_;
 
   Queue queue_;  // of the plane that grows: all its segments, those before next visited
+  struct {
+    Part part = Part::kCount;
+    std::int32_t column = 0;                                 // the next one to be gone through
+    std::array<std::uint16_t, kDepthHeight_px + 2> start{};  // of the seeds of a length, longest first
+  } pass_;
+  WorkCount work_;
   bool growing_ = false;
   Sums sums_;
   Vec3 m_ = Vec3::UnitZ();

@@ -7,6 +7,7 @@
 namespace polygmap {
 namespace {
 
+constexpr std::int32_t kContradictionInstructions = 1100;
 constexpr double kLeastDeterminant = 1e-13;  // of moments scaled to a trace of 1
 
 void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t to) noexcept {
@@ -51,19 +52,6 @@ void redirect(PlaneMerging::PlaneIndex& to_plane, std::size_t from, std::size_t 
   return true;
 }
 
-struct Candidate {
-  Vec3 normal;
-  std::size_t plane;
-};
-using Candidates = StaticVector<Candidate, PlaneSet::kMaxPlanes>;
-[[nodiscard]] Candidates candidates_of(const PlaneSet& planes) noexcept {
-  Candidates candidates;
-  for (std::size_t p = 1; p <= planes.count; ++p) {
-    if (planes[p].alive && !planes[p].facet) static_cast<void>(candidates.try_push_back({planes[p].plane.normal(), p}));
-  }
-  return candidates;
-}
-
 void take_over(FittedPlane& kept, FittedPlane& gone) noexcept {
   kept.pixels += gone.pixels;
   kept.moments.add(gone.moments);
@@ -73,49 +61,74 @@ void take_over(FittedPlane& kept, FittedPlane& gone) noexcept {
   if (try_fit(kept.moments, m)) kept.plane.m = m;
 }
 
-// Whether a plane is part of one with as many pixels or more; cosine: of the angle between them.
-[[nodiscard]] bool part_of(const PlaneMerging::Params& params, const PlaneGrowing::Params& growing,
-                           const DepthNoiseModel& noise, const FittedPlane& p, const FittedPlane& q, double cosine,
-                           bool measured) noexcept {
-  const bool small = q.pixels < params.small_plane_px;
-  if (!small && cosine < math::cos(params.merge_tilt_rad)) return false;
-  // Where a large plane lies is known well: apart by more than what lets a segment join a plane, the two are not one.
-  const double noise_m = growing.join_floor_m + growing.join_sigmas * noise.sigma_m(q.centre_m.z());
-  const double merge_m = small ? params.merge_m : std::min(noise_m, params.merge_m);
-  const double apart_m = std::abs(p.plane.distance_m(q.centre_m));
-  const double both_apart_m = small ? apart_m : apart_m + std::abs(q.plane.distance_m(p.centre_m));
-  if (both_apart_m > (small || !measured ? 1.0 : 2.0) * merge_m) return false;
-  if (small || !measured) return true;
-  // Once large ones are measured their pixels have the last word: two floors that the camera bends are two.
-  double chi2 = 0.0;
-  return try_contradiction(params, noise, p, q, chi2) && !(chi2 > params.apart_chi2);
-}
-
 }  // namespace
 
-void PlaneMerging::merge_coplanar(const Params& params, const PlaneGrowing::Params& growing,
-                                  const DepthNoiseModel& noise, PlaneSet& planes, PlaneIndex& to_plane,
-                                  bool measured) noexcept {
-  const double least_cosine = math::cos(2.0 * params.merge_tilt_rad);
-  const auto candidates = candidates_of(planes);
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const std::size_t a = candidates[i].plane;
-    for (std::size_t j = i + 1; j < candidates.size() && planes[a].alive; ++j) {
-      const double cosine = candidates[i].normal.dot(candidates[j].normal);
-      const std::size_t b = candidates[j].plane;
-      if (cosine < least_cosine || !planes[b].alive) continue;
-      const std::size_t keep = planes[a].pixels >= planes[b].pixels ? a : b, gone = keep == a ? b : a;
-      if (!part_of(params, growing, noise, planes[keep], planes[gone], cosine, measured)) continue;
-      take_over(planes[keep], planes[gone]);
-      redirect(to_plane, gone, keep);
+// Whether a plane is part of one with as many pixels or more; cosine: of the angle between them.
+bool PlaneMerging::part_of(const FittedPlane& p, const FittedPlane& q, double cosine) noexcept {
+  const bool small = q.pixels < params_.small_plane_px;
+  if (!small && cosine < math::cos(params_.merge_tilt_rad)) return false;
+  // Where a large plane lies is known well: apart by more than what lets a segment join a plane, the two are not one.
+  const double noise_m = growing_.join_floor_m + growing_.join_sigmas * noise_.sigma_m(q.centre_m.z());
+  const double merge_m = small ? params_.merge_m : std::min(noise_m, params_.merge_m);
+  const double apart_m = std::abs(p.plane.distance_m(q.centre_m));
+  const double both_apart_m = small ? apart_m : apart_m + std::abs(q.plane.distance_m(p.centre_m));
+  if (both_apart_m > (small || !measured_ ? 1.0 : 2.0) * merge_m) return false;
+  if (small || !measured_) return true;
+  work_.add(kContradictionInstructions);
+  // Once large ones are measured their pixels have the last word: two floors that the camera bends are two.
+  double chi2 = 0.0;
+  return try_contradiction(params_, noise_, p, q, chi2) && !(chi2 > params_.apart_chi2);
+}
+
+void PlaneMerging::begin_coplanar(const Params& params, const PlaneGrowing::Params& growing,
+                                  const DepthNoiseModel& noise, const PlaneSet& planes, bool measured) noexcept {
+  params_ = params;
+  growing_ = growing;
+  noise_ = noise;
+  measured_ = measured;
+  candidates_.clear();
+  for (std::size_t p = 1; p <= planes.count; ++p) {
+    if (planes[p].alive && !planes[p].facet) {
+      static_cast<void>(candidates_.try_push_back({planes[p].plane.normal(), p}));
     }
   }
+  first_ = 0;
+  second_ = 1;
+  work_.add(planes.count, 75);
+}
+
+bool PlaneMerging::merge_some(PlaneSet& planes, PlaneIndex& to_plane) noexcept {
+  constexpr std::int32_t kPieceInstructions = 6000;
+  const std::int32_t enough = work_.instructions() + kPieceInstructions;
+  const double least_cosine = math::cos(2.0 * params_.merge_tilt_rad);
+  work_.add(120);
+  while (work_.instructions() < enough) {
+    if (first_ == candidates_.size()) return true;
+    const std::size_t a = candidates_[first_].plane;
+    if (second_ >= candidates_.size() || !planes[a].alive) {
+      ++first_;
+      second_ = first_ + 1;
+      work_.add(12);
+      continue;
+    }
+    work_.add(24);
+    const double cosine = candidates_[first_].normal.dot(candidates_[second_].normal);
+    const std::size_t b = candidates_[second_++].plane;
+    if (cosine < least_cosine || !planes[b].alive) continue;
+    const std::size_t keep = planes[a].pixels >= planes[b].pixels ? a : b, gone = keep == a ? b : a;
+    work_.add(170);
+    if (!part_of(planes[keep], planes[gone], cosine)) continue;
+    take_over(planes[keep], planes[gone]);
+    redirect(to_plane, gone, keep);
+    work_.add(650);
+  }
+  return false;
 }
 
 void PlaneMerging::begin_facets(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,
                                 const PlaneSet& planes) noexcept {
   params_ = params;
-  min_plane_px_ = growing.min_plane_px;
+  growing_ = growing;
   noise_ = noise;
   least_cosine_ = math::cos(params.facet_tilt_rad);
   normals_[0] = Vec3::Zero();
@@ -127,6 +140,7 @@ void PlaneMerging::begin_facets(const Params& params, const PlaneGrowing::Params
   seam_count_ = joined_ = 0;
   next_open_ = 1;
   overflow_ = 0;
+  work_.add(300 + planes.count * (60 + planes.count / 8));
 }
 
 void PlaneMerging::touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px, bool beside) noexcept {
@@ -150,6 +164,8 @@ void PlaneMerging::touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px,
 // Spans above or beside one another in the picture.
 void PlaneMerging::add_column(const SpanBoundaries::Column& spans, const SpanBoundaries::Column* right,
                               const PlaneIndex& to_plane) noexcept {
+  work_.add(110);
+  work_.add(spans.size() + (right != nullptr ? right->size() : 0), 54);
   for (const ColumnSpan& span : spans) ++spans_of_[to_plane[span.plane]];
   for (std::size_t k = 0; k + 1 < spans.size(); ++k) {
     if (spans[k + 1].top - spans[k].bottom > kMaxGap_px) continue;
@@ -164,7 +180,8 @@ void PlaneMerging::add_column(const SpanBoundaries::Column& spans, const SpanBou
   }
 }
 
-void PlaneMerging::judge(const PlaneSet& planes, Seam& seam) const noexcept {
+void PlaneMerging::judge(const PlaneSet& planes, Seam& seam) noexcept {
+  work_.add(70);
   const FittedPlane &p = planes[seam.a], &q = planes[seam.b];
   const auto height_px = [&](std::size_t i) { return planes[i].pixels / (kColumn_px * std::max(spans_of_[i], 1)); };
   const bool steps = p.kind == q.kind && p.kind != SurfaceKind::kOther;
@@ -172,6 +189,7 @@ void PlaneMerging::judge(const PlaneSet& planes, Seam& seam) const noexcept {
   if (seam.low && !(steps && seam.beside_px >= params_.facet_seam * std::min(height_px(seam.a), height_px(seam.b)))) {
     seam.verdict = Seam::Verdict::kShort;
   } else {
+    work_.add(kContradictionInstructions);
     const bool one = try_contradiction(params_, noise_, p, q, seam.chi2) && seam.chi2 < params_.facet_chi2;
     seam.verdict = one ? Seam::Verdict::kOne : Seam::Verdict::kContradicted;
   }
@@ -179,12 +197,14 @@ void PlaneMerging::judge(const PlaneSet& planes, Seam& seam) const noexcept {
 
 bool PlaneMerging::try_join(PlaneSet& planes, PlaneIndex& to_plane, Seam& best) noexcept {
   const std::size_t kept = best.a, gone = best.b;
+  work_.add(600);
+  work_.add(seam_count_, 14);
   FittedPlane &p = planes[kept], &q = planes[gone];
   p.moments.add(q.moments);
   if (!try_fit(p.moments, p.plane.m)) return false;
   p.pixels += q.pixels;
   spans_of_[kept] += spans_of_[gone];
-  p.facet = p.facet && q.facet && p.pixels < min_plane_px_;
+  p.facet = p.facet && q.facet && p.pixels < growing_.min_plane_px;
   p.residual2 += q.residual2;
   p.centre_m = p.plane.point(p.moments.mean_ray());
   p.low_parts = p.low_parts || q.low_parts || best.low;
@@ -221,6 +241,8 @@ bool PlaneMerging::try_join(PlaneSet& planes, PlaneIndex& to_plane, Seam& best) 
 
 bool PlaneMerging::join_some(PlaneSet& planes, PlaneIndex& to_plane) noexcept {
   std::size_t looked_at = 0;
+  work_.add(40);
+  work_.add(seam_count_, 10);
   for (; next_open_ <= seam_count_ && looked_at < kSeamsAtOnce; ++next_open_) {
     if (seams_[next_open_].verdict != Seam::Verdict::kOpen) continue;
     judge(planes, seams_[next_open_]);

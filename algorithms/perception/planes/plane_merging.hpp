@@ -6,6 +6,8 @@
 #include <array>
 #include <cstdint>
 
+#include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/planes/plane_growing.hpp"
 #include "algorithms/perception/planes/plane_set.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
@@ -50,8 +52,11 @@ class PlaneMerging {
 
   // Those that are one share the plane of the largest. measured: the planes' moments say what their pixels are worth;
   // before, large planes are one only where there is no doubt. Facets too small to be planes are left to join_facets.
-  static void merge_coplanar(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,
-                             PlaneSet& planes, PlaneIndex& to_plane, bool measured) noexcept;
+  // begin_coplanar, then merge_some until it is done.
+  void begin_coplanar(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,
+                      const PlaneSet& planes, bool measured) noexcept;
+  // Holds some pairs of planes against each other; true when nothing is left to merge.
+  [[nodiscard]] bool merge_some(PlaneSet& planes, PlaneIndex& to_plane) noexcept;
   // Facets get a plane of their own, fitted to all of them, and may together be large enough to be one: begin_facets,
   // the columns of spans that the planes were fitted to, from left to right, then join_some until it is done.
   void begin_facets(const Params& params, const PlaneGrowing::Params& growing, const DepthNoiseModel& noise,
@@ -61,6 +66,7 @@ class PlaneMerging {
                   const PlaneIndex& to_plane) noexcept;
   // Looks at kSeamsAtOnce seams, or joins two planes; true when nothing is left to join.
   [[nodiscard]] bool join_some(PlaneSet& planes, PlaneIndex& to_plane) noexcept;
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
   // Seams that found no room.
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
 
@@ -81,6 +87,10 @@ class PlaneMerging {
     std::int32_t beside_px = 0;  // of that, side by side
     double chi2 = 0.0;           // if kOne
   };
+  struct Candidate {
+    Vec3 normal;
+    std::size_t plane;
+  };
   using SeamIndex = std::uint16_t;  // 0 = none
   [[nodiscard]] SeamIndex& seam_of(std::size_t a, std::size_t b) noexcept {
     return seam_of_[a < b ? a : b][a < b ? b : a];
@@ -89,11 +99,17 @@ class PlaneMerging {
     return normals_[a].dot(normals_[b]) >= least_cosine_;
   }
   void touch(std::uint8_t a, std::uint8_t b, std::int32_t length_px, bool beside) noexcept;
-  void judge(const PlaneSet& planes, Seam& seam) const noexcept;
+  void judge(const PlaneSet& planes, Seam& seam) noexcept;
+  // Whether a plane is part of one with as many pixels or more; cosine: of the angle between them.
+  [[nodiscard]] bool part_of(const FittedPlane& p, const FittedPlane& q, double cosine) noexcept;
   [[nodiscard]] bool try_join(PlaneSet& planes, PlaneIndex& to_plane, Seam& best) noexcept;
 
   Params params_;
-  double min_plane_px_ = 0.0;
+  PlaneGrowing::Params growing_;
+  bool measured_ = false;
+  StaticVector<Candidate, PlaneSet::kMaxPlanes> candidates_;  // to be merged with one another
+  std::size_t first_ = 0, second_ = 1;                        // of them, the next pair
+  WorkCount work_;
   DepthNoiseModel noise_;
   double least_cosine_ = 1.0;
   std::array<std::int32_t, PlaneSet::kMaxPlanes + 1> spans_of_{};  // columns of a plane

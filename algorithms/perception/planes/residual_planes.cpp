@@ -50,8 +50,9 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
   const auto all = [](float value) { return cv::vx_setall_f32(value); };
   const Wide zero = all(0.0F), end = all(static_cast<float>(Axis::kBins)), none = end;
   const float *ws = image.by_column.row(column), *ys = rays.y.data();
+  std::int32_t times = 0;
   const auto add_stretch = [&](std::int32_t first, std::int32_t last) {
-    for (std::int32_t from = first; from <= last; from += kAtOnce) {
+    for (std::int32_t from = first; from <= last; from += kAtOnce, ++times) {
       const std::int32_t start = std::min(from, kDepthHeight_px - kAtOnce), until = std::min(last + 1 - start, kAtOnce);
       std::array<std::int32_t, kAtOnce> level_bins, upright_bins;
       for (std::int32_t i = 0; i < kAtOnce; i += Wide::nlanes) {
@@ -82,6 +83,7 @@ void ResidualPlaneSearch::add_column(const ColumnRays& rays, const ColumnImage& 
     next = span.bottom + 1;
   }
   add_rows(next, rays.height_px - 1);
+  work_.add(130 + 54 * static_cast<std::int32_t>(spans.size()) + 175 * times);
 }
 
 void ResidualPlaneSearch::forget(Axis& axis, double distance_m, double apart_m) noexcept {
@@ -94,6 +96,7 @@ void ResidualPlaneSearch::find(Axis& axis) noexcept {
   constexpr std::int32_t kPeak = 1;  // bins to each side that belong to a peak, see peak_at
   const std::int32_t around_bins = params_.around_bins, first = around_bins, end = Axis::kBins - around_bins;
   for (int guard = 0; guard < 4; ++guard) {
+    work_.add(Axis::kBins, 4);
     // The largest peak, the first of those.
     using Wide = cv::v_int32;
     const auto load = [&axis](std::int32_t b) { return cv::vx_load(axis.rows.data() + b); };
@@ -128,6 +131,7 @@ void ResidualPlaneSearch::find(Axis& axis) noexcept {
 }
 
 void ResidualPlaneSearch::finish() noexcept {
+  work_.add(known_.size(), 160);
   // What lies near a known plane is that plane, seen past a leg or through a hole.
   for (const InversePlane& known : known_) {
     for (Axis* axis : {&level_, &upright_}) {

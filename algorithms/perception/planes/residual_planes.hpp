@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
 
 namespace polygmap {
@@ -50,6 +51,8 @@ class ResidualPlaneSearch {
 
   [[nodiscard]] const StaticVector<InversePlane, kMaxFound>& found() const noexcept { return found_; }
 
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
+
  private:
   // Rows by their distance from the camera along an axis.
   struct Axis {
@@ -71,6 +74,7 @@ class ResidualPlaneSearch {
   std::array<bool, SpanBoundaries::kMaxPlanes + 1> released_{};
   StaticVector<InversePlane, SpanBoundaries::kMaxPlanes> known_;
   StaticVector<InversePlane, kMaxFound> found_;
+  WorkCount work_;
 };
 
 }  // namespace polygmap

@@ -35,12 +35,15 @@ void SpanBoundaries::build_spans(std::int32_t column, const ScanlineSegmentation
                                  const std::array<std::uint8_t, kMaxPlanes + 1>& to_plane) noexcept {
   Column& out = columns_[static_cast<std::size_t>(column)];
   out.clear();
+  work_.add(60);
   for (const ScanlineSegment& segment : segments) {
+    work_.add(32);
     const std::uint8_t plane = segment.plane <= kMaxPlanes ? to_plane[segment.plane] : std::uint8_t{0};
     if (plane == 0) continue;
     if (!out.empty() && out.back().plane == plane) {
       const Line line = line_of(plane, column);
       int other = 0, own = 0;
+      work_.add(60 + 17 * std::max(segment.top - out.back().bottom, 0));
       for (std::int32_t r = out.back().bottom + 1; r < segment.top; ++r) {
         const float w = image_->by_column(r, column);
         const float off = std::abs(w - (line.a + line.b * rays_->y[static_cast<std::size_t>(r)])) * w;
@@ -67,10 +70,12 @@ void SpanBoundaries::trim_ends(std::int32_t column) noexcept {
   for (ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) trim_ends(column, span);
 }
 
-void SpanBoundaries::trim_ends(std::int32_t column, ColumnSpan& span) const noexcept {
+void SpanBoundaries::trim_ends(std::int32_t column, ColumnSpan& span) noexcept {
   constexpr std::int32_t kMost_px = kRowsAtOnce, kGood = 2;  // rows looked at, and good ones next to each other
   const Line line = line_of(span.plane, column);
+  work_.add(60);
   if (span.bottom - span.top + 1 >= kRowsAtOnce) {
+    work_.add(210);
     constexpr std::uint32_t kAll = (1U << kRowsAtOnce) - 1U;
     const Rows upper = fitting(line, column, span.top);
     const Rows lower = fitting(line, column, span.bottom - kRowsAtOnce + 1);
@@ -84,6 +89,7 @@ void SpanBoundaries::trim_ends(std::int32_t column, ColumnSpan& span) const noex
       return;
     }
   }
+  work_.add(200);
   const auto cut = [&](std::int32_t from, std::int32_t step) {
     std::int32_t at = from, good = 0;
     for (std::int32_t i = 0; i < kMost_px && good < kGood; ++i) {
@@ -107,6 +113,7 @@ void SpanBoundaries::begin_scores() noexcept {
   joint_count_ = 0;
   pair_count_ = 0;
   for (auto& lower : pair_of_) lower.fill(kMaxPairs);
+  work_.add(pair_of_.size(), 16);
 }
 
 std::uint8_t SpanBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower) noexcept {
@@ -122,6 +129,7 @@ std::uint8_t SpanBoundaries::pair_of(std::uint8_t upper, std::uint8_t lower) noe
   pair.lower = lower;
   pair.columns = 0.0;
   for (auto& gain : pair.gain) gain.fill(0.0F);
+  work_.add(70);
   return index;
 }
 
@@ -131,7 +139,9 @@ void SpanBoundaries::extend(std::int32_t column, ColumnSpan& span, std::int32_t 
   const auto most = static_cast<float>(math::square(params_.inlier_sigmas));
   std::int16_t& end = step > 0 ? span.bottom : span.top;
   int empty = 0, off = 0;
+  work_.add(50);
   for (std::int32_t r = end + step; step > 0 ? r <= limit : r >= limit; r += step) {
+    work_.add(27);
     if (!(image_->by_column(r, column) > 0.0F)) {
       if (++empty > params_.max_empty_rows) return;
     } else if (offset(line, column, r).within(most)) {
@@ -207,8 +217,9 @@ struct SpanBoundaries::BinnedGains {
 // Rows first .. last belong to either; the last row of the upper one, first - 1 when all are the lower one's. What the
 // rows say goes into the pair, too, if there is one.
 std::int32_t SpanBoundaries::change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
-                                          std::int32_t last, float meeting_row, Pair* pair) const noexcept {
+                                          std::int32_t last, float meeting_row, Pair* pair) noexcept {
   static_assert(kRowsAtOnce % Four::nlanes == 0);
+  work_.add(190 + 150 * ((last - first) / kRowsAtOnce + 1));
   const RowGains rows(*this, column, upper, lower);
   const BinnedGains binned(pair, meeting_row, first);
   const Four four_steps = cv::v_load(simd::kSteps.data()), zero = cv::v_setzero_f32();
@@ -234,6 +245,7 @@ void SpanBoundaries::score(std::int32_t column, bool by_planes) noexcept {
   Column& spans = columns_[static_cast<std::size_t>(column)];
   for (std::size_t k = 0; k < spans.size(); ++k) {
     ColumnSpan& upper = spans[k];
+    work_.add(75);
     if (k == 0) extend(column, upper, -1, 0);
     if (k + 1 == spans.size()) {
       extend(column, upper, 1, rays_->height_px - 1);
@@ -274,34 +286,48 @@ void SpanBoundaries::score(std::int32_t column, bool by_planes) noexcept {
   }
 }
 
-void SpanBoundaries::place() noexcept {
-  for (std::size_t i = 0; i < pair_count_; ++i) {
-    ChangePoint<double> point{0.0, 0.0, 0.0};  // in half bins from the first
-    double meeting = 0.0;
-    for (std::size_t half_bin = 0; half_bin < 2 * kBins; ++half_bin) {
-      if (half_bin == kBins) meeting = point.sum;
-      point.add(static_cast<double>(pairs_[i].gain[half_bin % 2][kRowsAtOnce + half_bin / 2]),
-                static_cast<double>(half_bin + 1));
-    }
-    const double offset_px = 0.5 * point.at - 0.5 * kBins;
-    const bool meets =
-        std::abs(offset_px) < params_.meet_px || meeting - point.least < params_.meet_gain * pairs_[i].columns;
-    pairs_[i].shift_px = meets ? 0.0 : offset_px;
+void SpanBoundaries::place(Pair& pair) const noexcept {
+  ChangePoint<double> point{0.0, 0.0, 0.0};  // in half bins from the first
+  double meeting = 0.0;
+  for (std::size_t half_bin = 0; half_bin < 2 * kBins; ++half_bin) {
+    if (half_bin == kBins) meeting = point.sum;
+    point.add(static_cast<double>(pair.gain[half_bin % 2][kRowsAtOnce + half_bin / 2]),
+              static_cast<double>(half_bin + 1));
   }
-  reproject();
+  const double offset_px = 0.5 * point.at - 0.5 * kBins;
+  const bool meets = std::abs(offset_px) < params_.meet_px || meeting - point.least < params_.meet_gain * pair.columns;
+  pair.shift_px = meets ? 0.0 : offset_px;
 }
 
-void SpanBoundaries::reproject() noexcept {
-  for (std::size_t i = 0; i < joint_count_; ++i) {
-    const Joint& joint = joints_[i];
-    Column& spans = columns_[static_cast<std::size_t>(joint.column)];
-    ColumnSpan &upper = spans[joint.upper], &lower = spans[joint.upper + 1U];
-    const Line a = line_of(upper.plane, joint.column), b = line_of(lower.plane, joint.column);
-    const double row = std::ceil(meeting_row(a, b) + pairs_[joint.pair].shift_px) - 1.0;
-    if (!std::isfinite(row)) continue;
-    upper.bottom = static_cast<std::int16_t>(math::clamp(row, upper.top, lower.bottom - 1.0));
-    lower.top = static_cast<std::int16_t>(upper.bottom + 1);
-  }
+bool SpanBoundaries::place_some() noexcept {
+  constexpr std::size_t kPairsAtOnce = 8;
+  constexpr std::int32_t kPairInstructions = 900;
+  if (next_ >= pair_count_) return reproject_some();
+  const std::size_t end = std::min(next_ + kPairsAtOnce, pair_count_);
+  work_.add(end - next_, kPairInstructions);
+  while (next_ < end) place(pairs_[next_++]);
+  return next_ == pair_count_ && joint_count_ == 0;
+}
+
+void SpanBoundaries::reproject(const Joint& joint) noexcept {
+  Column& spans = columns_[static_cast<std::size_t>(joint.column)];
+  ColumnSpan &upper = spans[joint.upper], &lower = spans[joint.upper + 1U];
+  const Line a = line_of(upper.plane, joint.column), b = line_of(lower.plane, joint.column);
+  const double row = std::ceil(meeting_row(a, b) + pairs_[joint.pair].shift_px) - 1.0;
+  if (!std::isfinite(row)) return;
+  upper.bottom = static_cast<std::int16_t>(math::clamp(row, upper.top, lower.bottom - 1.0));
+  lower.top = static_cast<std::int16_t>(upper.bottom + 1);
+}
+
+bool SpanBoundaries::reproject_some() noexcept {
+  constexpr std::size_t kJointsAtOnce = 64;
+  constexpr std::int32_t kJointInstructions = 85;
+  const std::size_t first = next_ - pair_count_, end = std::min(first + kJointsAtOnce, joint_count_);
+  work_.add(30);
+  work_.add(end - first, kJointInstructions);
+  for (std::size_t i = first; i < end; ++i) reproject(joints_[i]);
+  next_ = pair_count_ + end;
+  return end == joint_count_;
 }
 
 }  // namespace polygmap

@@ -8,7 +8,9 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/noise_tracker.hpp"
 #include "algorithms/perception/planes/plane_fit.hpp"
 #include "algorithms/perception/segments/scanline_segments.hpp"
@@ -105,14 +107,16 @@ class SpanBoundaries {
   // that is believed unmeasured.
   void score(std::int32_t column, bool by_planes) noexcept;
   // Decides for each pair of planes how far its boundary lies from where the planes meet, by the scores of all columns,
-  // and ends all its spans there.
-  void place() noexcept;
-  // Ends them there again, after the planes have changed.
-  void reproject() noexcept;
+  // and ends all its spans there: some of it, after begin_placing(); true when all is done.
+  void begin_placing() noexcept { next_ = 0; }
+  [[nodiscard]] bool place_some() noexcept;
+  // Ends them there again, after the planes have changed: some, after begin_reprojecting(); true when all is done.
+  void begin_reprojecting() noexcept { next_ = pair_count_; }
+  [[nodiscard]] bool reproject_some() noexcept;
   void begin_refit() noexcept;
-  // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments. roughly: of fewer of their
-  // rows, and without looking at the noise.
-  void refit(std::int32_t first_column, bool roughly) noexcept;
+  // Adds kRefitColumns columns, the first a multiple of that, to their planes' moments: some strips of them, and true
+  // after the last. roughly: of fewer of their rows, and without looking at the noise.
+  [[nodiscard]] bool refit_some(std::int32_t first_column, bool roughly) noexcept;
 
   // The noise as the rows of the last refit's surfaces show it.
   [[nodiscard]] const NoiseSamples& noise_samples() const noexcept { return noise_samples_; }
@@ -126,9 +130,11 @@ class SpanBoundaries {
       if (pair.lower == plane) visit(pair.upper, pair.columns);
     }
   }
+  [[nodiscard]] std::size_t meetings() const noexcept { return pair_count_; }
   [[nodiscard]] Columns& columns() noexcept { return columns_; }
   [[nodiscard]] const Columns& columns() const noexcept { return columns_; }
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
 
  private:
   static constexpr std::size_t kMaxJoints = 26 * static_cast<std::size_t>(kColumns);  // ten steps have 20 a column
@@ -162,7 +168,7 @@ class SpanBoundaries {
     [[nodiscard]] bool within(float cost) const noexcept { return off2 < cost * variance; }
   };
   [[nodiscard]] Offset offset(const Line& line, std::int32_t column, std::int32_t row) const noexcept;
-  void trim_ends(std::int32_t column, ColumnSpan& span) const noexcept;
+  void trim_ends(std::int32_t column, ColumnSpan& span) noexcept;
   struct Depths {  // the range of some rows' inverse depths, 1/m
     float farthest, nearest;
     [[nodiscard]] bool any() const noexcept { return nearest >= farthest; }
@@ -179,7 +185,7 @@ class SpanBoundaries {
   [[nodiscard]] Rows fitting(const Line& line, std::int32_t column, std::int32_t first) const noexcept;
   // The candidate's longest stretch of rows that fit its plane, if that is more than most; then most is theirs.
   void weigh_candidate(std::int32_t column, const Line& line, const ColumnSpan& candidate, std::int32_t& most,
-                       ColumnSpan& filled) const noexcept;
+                       ColumnSpan& filled) noexcept;
   struct Gap {  // rows of a column between spans of two planes, 0 = none
     std::int32_t column, from, until;
     std::uint8_t above, below;
@@ -188,26 +194,35 @@ class SpanBoundaries {
   // A plane for rows top .. bottom of the gap, whose depths are known; or several planes for its ends; or those of the
   // column beside, of whose spans next is the first that reaches down to the gap.
   void consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom, const Depths& depths,
-                std::int32_t& most, ColumnSpan& filled) const noexcept;
+                std::int32_t& most, ColumnSpan& filled) noexcept;
   void consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
-                ColumnSpan& filled) const noexcept;
+                ColumnSpan& filled) noexcept;
   void consider_beside(const Gap& gap, const Column& others, std::size_t& next, std::int32_t& most,
-                       ColumnSpan& filled) const noexcept;
+                       ColumnSpan& filled) noexcept;
   // One plane's rows in columns next to each other: top .. bottom of each, none when top > bottom.
   struct Strip {
     std::array<std::int16_t, kRefitColumns> top{}, bottom{};
     std::uint8_t plane = 0;
   };
+  struct Front {  // the columns' spans that come next: their first rows and planes, kNone where there is none left
+    static constexpr std::int16_t kNone = std::numeric_limits<std::int16_t>::max();
+    std::array<std::int16_t, kRefitColumns> top{}, plane{};
+  };
   struct StripRows;
   struct StripSums;
   [[nodiscard]] StripRows rows_of(const Strip& strip, bool roughly) const noexcept;
   void add_up(std::int32_t first_column, const Strip& strip, const StripRows& rows, StripSums& sums) const noexcept;
+  // The topmost span that is left, and with it those of its plane that are next in the other columns; false: none.
+  [[nodiscard]] bool take_strip(std::int32_t first_column, Front& front, Strip& strip) noexcept;
+  void show_next(std::int32_t first_column, std::size_t slot, Front& front) const noexcept;
   void refit(std::int32_t first_column, const Strip& strip, bool roughly) noexcept;
   struct RowGains;
   struct BinnedGains;
+  void place(Pair& pair) const noexcept;
+  void reproject(const Joint& joint) noexcept;
   void extend(std::int32_t column, ColumnSpan& span, std::int32_t step, std::int32_t limit) noexcept;
   [[nodiscard]] std::int32_t change_point(std::int32_t column, const Line& upper, const Line& lower, std::int32_t first,
-                                          std::int32_t last, float meeting_row, Pair* pair) const noexcept;
+                                          std::int32_t last, float meeting_row, Pair* pair) noexcept;
   // The row, real, where the lines meet; not finite for parallel ones.
   [[nodiscard]] double meeting_row(const Line& upper, const Line& lower) const noexcept {
     return static_cast<double>(lower.a - upper.a) / static_cast<double>(upper.b - lower.b) * fy_px_ + cy_px_;
@@ -232,6 +247,9 @@ class SpanBoundaries {
   std::array<std::array<std::uint8_t, kMaxPlanes + 1>, kMaxPlanes + 1> pair_of_{};  // by upper and lower
   NoiseSamples noise_samples_;
   std::uint32_t overflow_ = 0;
+  std::array<std::uint8_t, kRefitColumns> next_span_{};  // of each column that is refitted
+  std::size_t next_ = 0;                                 // pair to be placed, then, counted on, joint to be ended there
+  WorkCount work_;
 };
 
 inline SpanBoundaries::Line SpanBoundaries::line_of(std::uint8_t plane, std::int32_t column) const noexcept {

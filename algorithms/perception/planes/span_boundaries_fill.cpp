@@ -33,12 +33,13 @@ SpanBoundaries::Rows SpanBoundaries::fitting(const Line& line, std::int32_t colu
 }
 
 void SpanBoundaries::weigh_candidate(std::int32_t column, const Line& line, const ColumnSpan& candidate,
-                                     std::int32_t& most, ColumnSpan& filled) const noexcept {
+                                     std::int32_t& most, ColumnSpan& filled) noexcept {
   // A bit for each row that fits, from the first of the candidate's on.
   constexpr std::int32_t kBits = 64;  // of a word
   std::array<std::uint64_t, kDepthHeight_px / kBits + 2> fits{};
   const std::int32_t count = candidate.bottom - candidate.top + 1;
   std::int32_t fit = 0;
+  work_.add(90 + 105 * ((count + kRowsAtOnce - 1) / kRowsAtOnce));
   for (std::int32_t at = 0; at < count; at += kRowsAtOnce) {
     // The last rows of the image are looked at with others before them.
     const std::int32_t first = std::min(candidate.top + at, kDepthHeight_px - kRowsAtOnce);
@@ -54,6 +55,7 @@ void SpanBoundaries::weigh_candidate(std::int32_t column, const Line& line, cons
   };
   // The longest stretch of rows that fit; a single row off the plane or without data does not end it.
   for (std::int32_t at = 0; count - at > most;) {
+    work_.add(45);
     const std::uint64_t bits = bits_from(at);
     if (bits == 0) {
       at += kBits;
@@ -114,10 +116,13 @@ float SpanBoundaries::own_variance(std::uint8_t plane, std::int32_t column, std:
 }
 
 void SpanBoundaries::consider(const Gap& gap, std::uint8_t plane, std::int32_t top, std::int32_t bottom,
-                              const Depths& depths, std::int32_t& most, ColumnSpan& filled) const noexcept {
+                              const Depths& depths, std::int32_t& most, ColumnSpan& filled) noexcept {
+  work_.add(16);
   if (!gap.may_be(plane) || bottom - top < most || !depths.any()) return;
+  work_.add(45);
   Line line = line_of(plane, gap.column);
   if (!reaches(line, top, bottom, depths)) return;
+  work_.add(60);
   line.own = own_variance(plane, gap.column, (top + bottom) / 2);
   ColumnSpan candidate;
   candidate.plane = plane;
@@ -127,10 +132,12 @@ void SpanBoundaries::consider(const Gap& gap, std::uint8_t plane, std::int32_t t
 }
 
 void SpanBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size_t last_plane, std::int32_t& most,
-                              ColumnSpan& filled) const noexcept {
+                              ColumnSpan& filled) noexcept {
   const bool deep = gap.until - gap.from >= 2 * kRemainderReach_px;
   const std::int32_t upper_end = deep ? gap.from + kRemainderReach_px - 1 : gap.until;
   const std::int32_t lower_start = gap.until - kRemainderReach_px + 1;
+  work_.add(150 + 3 * (upper_end - gap.from));
+  if (deep) work_.add(60 + 3 * kRemainderReach_px);
   const Depths upper = depths_of(gap.column, gap.from, upper_end);
   const Depths lower = deep ? depths_of(gap.column, lower_start, gap.until) : upper;
   for (std::size_t p = first_plane; p <= last_plane; ++p) {
@@ -141,14 +148,16 @@ void SpanBoundaries::consider(const Gap& gap, std::size_t first_plane, std::size
 }
 
 void SpanBoundaries::consider_beside(const Gap& gap, const Column& others, std::size_t& next, std::int32_t& most,
-                                     ColumnSpan& filled) const noexcept {
+                                     ColumnSpan& filled) noexcept {
   const std::int32_t reach_px = params_.beside_px;
   while (next < others.size() && others[next].bottom + reach_px < gap.from) ++next;
   for (std::size_t i = next; i < others.size() && others[i].top - reach_px <= gap.until; ++i) {
+    work_.add(38);
     const ColumnSpan& other = others[i];
     const std::int32_t top = std::max(gap.from, other.top - reach_px);
     const std::int32_t bottom = std::min(gap.until, other.bottom + reach_px);
     if (!gap.may_be(other.plane) || bottom - top < most) continue;
+    work_.add(50 + 3 * (bottom - top));
     consider(gap, other.plane, top, bottom, depths_of(gap.column, top, bottom), most, filled);
   }
 }
@@ -156,12 +165,14 @@ void SpanBoundaries::consider_beside(const Gap& gap, const Column& others, std::
 void SpanBoundaries::fill_gaps(std::int32_t column, std::int32_t beside, std::size_t first_plane,
                                std::size_t last_plane) noexcept {
   const std::int32_t min_rows = params_.min_filled_rows;
+  work_.add(60);
   Column& spans = columns_[static_cast<std::size_t>(column)];
   const bool any_beside = beside >= 0 && beside < rays_->columns;
   const Column& others = columns_[static_cast<std::size_t>(any_beside ? beside : column)];
   std::int32_t from = 0;
   std::size_t next_beside = 0;  // the first span there that reaches down to this gap
   for (std::size_t k = 0; k <= spans.size(); ++k) {
+    work_.add(62);
     const bool last = k == spans.size();
     const Gap gap{column, from, last ? rays_->height_px - 1 : spans[k].top - 1,
                   k > 0 ? spans[k - 1].plane : std::uint8_t{0}, last ? std::uint8_t{0} : spans[k].plane};
@@ -176,6 +187,7 @@ void SpanBoundaries::fill_gaps(std::int32_t column, std::int32_t beside, std::si
     if (any_beside) consider_beside(gap, others, next_beside, most, filled);
     if (first_plane <= last_plane) consider(gap, first_plane, last_plane, most, filled);
     if (most < min_rows || !spans.try_push_back(filled)) continue;
+    work_.add(30 + 8 * static_cast<std::int32_t>(spans.size() - k));
     std::rotate(spans.begin() + static_cast<std::ptrdiff_t>(k), spans.end() - 1, spans.end());
     from = filled.bottom + 1;
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The planes' moments within their boundaries, and the noise that their rows show.
 #include <algorithm>
+#include <bit>
 
 #include "algorithms/perception/image/simd.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
@@ -9,6 +10,7 @@ namespace polygmap {
 namespace {
 
 using simd::all, simd::Four, simd::Wide;
+using Eight = cv::v_int16x8;
 using Slots = std::array<float, SpanBoundaries::kRefitColumns>;
 
 // The same order of summing for every register width.
@@ -24,6 +26,8 @@ float sum_of(const Slots& slots) noexcept {
 
 void SpanBoundaries::begin_refit() noexcept {
   noise_samples_.clear();
+  next_span_.fill(0);
+  work_.add(1200 + 22 * static_cast<std::int32_t>(planes_.size()));
   for (Plane& plane : planes_) {
     plane.moments = PlaneMoments{};
     plane.residual2 = 0.0;
@@ -31,37 +35,56 @@ void SpanBoundaries::begin_refit() noexcept {
   }
 }
 
-void SpanBoundaries::refit(std::int32_t first_column, bool roughly) noexcept {
-  const std::int32_t thick_px = params_.thick_px;
-  if (!roughly) sample_noise(first_column);
-  std::array<std::size_t, kRefitColumns> next{};
-  const std::int32_t count = std::min(kRefitColumns, rays_->columns - first_column);
-  // Down the columns together: the topmost span that is left, and with it those of its plane that are next elsewhere.
-  for (;;) {
-    Strip strip;
-    std::int32_t topmost = rays_->height_px;
-    for (std::int32_t k = 0; k < count; ++k) {
-      const Column& spans = columns_[static_cast<std::size_t>(first_column + k)];
-      const std::size_t i = next[static_cast<std::size_t>(k)];
-      if (i == spans.size() || spans[i].top >= topmost) continue;
-      topmost = spans[i].top;
-      strip.plane = spans[i].plane;
-    }
-    if (topmost == rays_->height_px) return;
-    for (std::int32_t k = 0; k < kRefitColumns; ++k) {
-      const auto slot = static_cast<std::size_t>(k);
-      strip.top[slot] = 1;
-      strip.bottom[slot] = 0;
-      if (k >= count) continue;
-      const Column& spans = columns_[static_cast<std::size_t>(first_column + k)];
-      if (next[slot] == spans.size() || spans[next[slot]].plane != strip.plane) continue;
-      const ColumnSpan& span = spans[next[slot]++];
-      const int margin = span.bottom - span.top >= thick_px ? 1 : 0;
-      strip.top[slot] = static_cast<std::int16_t>(span.top + margin);
-      strip.bottom[slot] = static_cast<std::int16_t>(span.bottom - margin);
-    }
-    refit(first_column, strip, roughly);
+void SpanBoundaries::show_next(std::int32_t first_column, std::size_t slot, Front& front) const noexcept {
+  const std::size_t column = static_cast<std::size_t>(first_column) + slot;
+  const bool in_picture = static_cast<std::int32_t>(column) < rays_->columns;
+  const std::size_t i = next_span_[slot];
+  const bool any = in_picture && i < columns_[column].size();
+  front.top[slot] = any ? columns_[column][i].top : Front::kNone;
+  front.plane[slot] = any ? columns_[column][i].plane : Front::kNone;
+}
+
+// Down the columns together.
+bool SpanBoundaries::take_strip(std::int32_t first_column, Front& front, Strip& strip) noexcept {
+  static_assert(kRefitColumns == Eight::nlanes);
+  const Eight tops = cv::v_load(front.top.data());
+  const std::int16_t topmost = cv::v_reduce_min(tops);
+  if (topmost == Front::kNone) return false;
+  const auto first = static_cast<std::size_t>(std::countr_zero(simd::bits(tops == cv::v_setall_s16(topmost))));
+  const std::int16_t plane = front.plane[first];
+  strip.plane = static_cast<PlaneId>(plane);
+  cv::v_store(strip.top.data(), cv::v_setall_s16(1));
+  cv::v_store(strip.bottom.data(), cv::v_setzero_s16());
+  for (std::uint32_t left = simd::bits(cv::v_load(front.plane.data()) == cv::v_setall_s16(plane)); left != 0;
+       left &= left - 1) {
+    const auto slot = static_cast<std::size_t>(std::countr_zero(left));
+    const ColumnSpan& span = columns_[static_cast<std::size_t>(first_column) + slot][next_span_[slot]++];
+    const int margin = span.bottom - span.top >= params_.thick_px ? 1 : 0;
+    strip.top[slot] = static_cast<std::int16_t>(span.top + margin);
+    strip.bottom[slot] = static_cast<std::int16_t>(span.bottom - margin);
+    show_next(first_column, slot, front);
   }
+  return true;
+}
+
+bool SpanBoundaries::refit_some(std::int32_t first_column, bool roughly) noexcept {
+  constexpr std::int32_t kPieceInstructions = 8000;
+  const std::int32_t enough = work_.instructions() + kPieceInstructions;
+  Front front;
+  work_.add(kRefitColumns, 12);
+  for (std::size_t slot = 0; slot < kRefitColumns; ++slot) show_next(first_column, slot, front);
+  while (work_.instructions() < enough) {
+    work_.add(190);
+    Strip strip;
+    if (take_strip(first_column, front, strip)) {
+      refit(first_column, strip, roughly);
+      continue;
+    }
+    if (!roughly) sample_noise(first_column);
+    next_span_.fill(0);
+    return true;
+  }
+  return false;
 }
 
 // Rows top, top + stride ... of a strip are looked at, from the plane as it is: w = plane . (x, t, 1), t the row from
@@ -81,13 +104,11 @@ struct SpanBoundaries::StripSums {
 };
 
 SpanBoundaries::StripRows SpanBoundaries::rows_of(const Strip& strip, bool roughly) const noexcept {
-  std::int32_t top = rays_->height_px, bottom = -1, rows = 0;
-  for (std::size_t k = 0; k < kRefitColumns; ++k) {
-    if (strip.top[k] > strip.bottom[k]) continue;
-    top = std::min<std::int32_t>(top, strip.top[k]);
-    bottom = std::max<std::int32_t>(bottom, strip.bottom[k]);
-    rows = std::max(rows, strip.bottom[k] - strip.top[k] + 1);
-  }
+  const Eight tops = cv::v_load(strip.top.data()), bottoms = cv::v_load(strip.bottom.data());
+  const std::int32_t rows = cv::v_reduce_max(bottoms - tops) + 1;
+  const Eight none = tops > bottoms;
+  const std::int32_t top = cv::v_reduce_min(cv::v_select(none, cv::v_setall_s16(kDepthHeight_px), tops));
+  const std::int32_t bottom = cv::v_reduce_max(cv::v_select(none, cv::v_setall_s16(-1), bottoms));
   if (rows == 0) return {0, -1, 1, 0.0, 0.0, Vec3::Zero()};
   // A tall strip has rows to spare: neighbours say nearly the same.
   const std::int32_t stride = (roughly && rows > 12 ? 2 : 1) * (rows > 64 ? 3 : (rows > 24 ? 2 : 1));
@@ -141,7 +162,9 @@ void SpanBoundaries::add_up(std::int32_t first_column, const Strip& strip, const
 
 void SpanBoundaries::refit(std::int32_t first_column, const Strip& strip, bool roughly) noexcept {
   const StripRows rows = rows_of(strip, roughly);
+  work_.add(90);
   if (rows.none()) return;
+  work_.add(880 + 84 * ((rows.bottom - rows.top) / rows.stride + 1));
   StripSums sums;
   add_up(first_column, strip, rows, sums);
   Plane& plane = planes_[strip.plane];
@@ -162,6 +185,7 @@ void SpanBoundaries::sample_noise(std::int32_t column) noexcept {
   constexpr std::int32_t kStride = 4;
   for (const ColumnSpan& span : columns_[static_cast<std::size_t>(column)]) {
     const Line line = line_of(span.plane, column);
+    work_.add(50 + 80 * ((span.bottom - span.top + 2) / kStride));
     for (std::int32_t r = span.top + 1; r < span.bottom; r += kStride) {
       const float w = image_->by_column(r, column);
       if (!(w > 0.0F)) continue;

@@ -62,7 +62,9 @@ void ColumnOutline::build(const ColumnExtents& profile, const OutlineSides& side
   outline.clear();
   const std::int32_t first = profile.first_column, last = profile.last_column;
   const auto ends = [&profile](std::int32_t g) { return profile.columns[static_cast<std::size_t>(g)]; };
+  work_.add(60);
   if (first > last) return;
+  work_.add(350 + 138 * (last - first + 1));
   count_ = 0;
   smooth(profile, first, last, smooth_);
   // A column's ends are those at its middle; only the sides reach farther. Full-resolution row r covers half-resolution
@@ -108,7 +110,9 @@ void ColumnOutline::build(const ColumnExtents& profile, const OutlineSides& side
   push(bottom_left, base);
   thin();
   for (std::size_t i = 0; i < count_; ++i) static_cast<void>(outline.try_push_back(chain_[i]));
+  const auto corners = static_cast<std::int32_t>(outline.size());
   reduce(outline, max_vertices, 0.0);
+  work_.add((corners - static_cast<std::int32_t>(outline.size()) + 1) * corners * 24);
 }
 
 }  // namespace polygmap

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/polygons/convex_outline.hpp"
 #include "algorithms/perception/regions/column_extents.hpp"
 
@@ -32,6 +33,7 @@ class ColumnOutline {
   // near to the columns beside it ends at the corner with them.
   void build(const ColumnExtents& profile, const OutlineSides& sides, double corner_px, std::size_t max_vertices,
              Outline2& outline) noexcept;
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
 
  private:
   void push(const Vec2& p, std::size_t base) noexcept;
@@ -40,6 +42,7 @@ class ColumnOutline {
   std::array<Vec2, 2 * (kColumns + 2)> chain_{};
   std::size_t count_ = 0;  // corners in chain_
   std::array<ColumnExtent, kColumns> smooth_{};
+  WorkCount work_;
 };
 
 }  // namespace polygmap

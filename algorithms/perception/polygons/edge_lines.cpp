@@ -24,6 +24,7 @@ bool EdgeLineFinder::try_guess(const Params& params, std::uint32_t seed) noexcep
   const auto trials = static_cast<std::uint32_t>(params.guess.trials);
   const auto n = static_cast<std::uint32_t>(guesses_.size());
   if (guesses_.size() < static_cast<std::size_t>(params.min_columns)) return false;
+  work_.add(150 + 24 * static_cast<std::int32_t>(n));
   float best_a = 0.0F, best_b = 0.0F;
   std::int32_t best = 0;
   const auto fits = [tolerance_px](const Guess& guess, float a, float b) {
@@ -36,6 +37,7 @@ bool EdgeLineFinder::try_guess(const Params& params, std::uint32_t seed) noexcep
     const float b = static_cast<float>(q.row - p.row) / static_cast<float>(q.column - p.column);
     const float a = static_cast<float>(p.row) - b * static_cast<float>(p.column);
     std::int32_t inliers = 0;
+    work_.add(45 + 7 * static_cast<std::int32_t>(n));
     for (const Guess& guess : guesses_) inliers += fits(guess, a, b) ? 1 : 0;
     if (inliers > best) {
       best = inliers;
@@ -90,6 +92,7 @@ void EdgeLineFinder::begin(const Params& params, const DepthNoiseModel& noise, c
 }
 
 void EdgeLineFinder::restart() noexcept {
+  work_.add(1100);
   next_column_ = guess_.first_column / kSlots * kSlots;
   groups_.of.fill(Group{});
   groups_.count = groups_.columns = 0;
@@ -192,8 +195,10 @@ void EdgeLineFinder::weigh_rows(const Windows& windows, Found& found) noexcept {
 }
 
 void EdgeLineFinder::search_columns(std::int32_t first_column) noexcept {
+  work_.add(750);
   const Windows windows = windows_of(first_column);
   if (windows.last_row < 0) return;
+  work_.add(300 + 138 * (windows.last_row - windows.first_row + 1));
   Found found;
   weigh_rows(windows, found);
   const auto least = static_cast<float>(params_.min_side_px);
@@ -219,6 +224,7 @@ void EdgeLineFinder::take_column(const Windows& windows, std::size_t slot) noexc
   group.columns += 1.0;
   group.column_sum += middle_px(column);
   group.rounded_sum += guess_.at(middle_px(column)) - centre;
+  work_.add(70 + 18 * params_.window_px);
   const std::int32_t first = std::max(windows.first_row, centre - params_.window_px);
   const std::int32_t last = std::min(windows.last_row, centre + params_.window_px);
   for (std::int32_t r = first; r <= last; ++r) {
@@ -234,6 +240,7 @@ void EdgeLineFinder::add_face(std::int32_t column, std::int32_t from_row, std::i
   std::int32_t taken = 0;
   for (std::int32_t r = std::max(from_row - params_.face.before_px, 0); r <= last_row && taken < params_.face.rows;
        ++r) {
+    work_.add(22);
     const auto w = static_cast<double>(image_->inverse_depth(column, r));
     if (!(w > 0.0)) continue;
     const auto y = static_cast<double>(rays_->y[static_cast<std::size_t>(r)]);
@@ -350,7 +357,7 @@ void EdgeLineFinder::add_shifts(const NearRows& near, ShiftSums& sums) const noe
   }
 }
 
-EdgeLineFinder::Shift EdgeLineFinder::local_shift() const noexcept {
+EdgeLineFinder::Shift EdgeLineFinder::local_shift() noexcept {
   Shift shift;
   const Vec3 apart = surface_.m - other_.plane.m;
   if (!(std::abs(apart.y()) > 1e-6)) return shift;
@@ -365,7 +372,9 @@ EdgeLineFinder::Shift EdgeLineFinder::local_shift() const noexcept {
     const auto from = static_cast<std::int32_t>(std::ceil(std::min(row, last_row) - params_.shift.to_px));
     const auto until = static_cast<std::int32_t>(std::floor(std::max(row, last_row) + params_.shift.to_px));
     const double w0 = surface_.inverse_depth({x, y, 1.0});
+    work_.add(60);
     if (from < 0 || until >= intrinsics_.height_px || !(w0 > 0.0)) continue;
+    work_.add(330 + 62 * (until - from + 1));
     add_shifts({first, from, until, x, row, meet_slope, limit * noise_.inverse_sigma(w0) / w0}, sums);
   }
   const auto of_line = [&sums](Wide LineSums<Wide>::*sum) {
@@ -504,9 +513,13 @@ bool EdgeLineFinder::try_meet_other(const Fit& fit, EdgeLine& line) noexcept {
 
 EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
   line = {};
+  work_.add(200);
   if (groups_.columns < params_.min_columns) return Outcome::kFewColumns;
+  work_.add(groups_.count, 330);
   gather_points();
   if (points_.count < 3) return Outcome::kFewColumns;
+  work_.add(1200);
+  work_.add(points_.count, 560);
   Fit fit;
   double limit_m = 0.0;
   if (!try_robust_line(fit, limit_m)) return Outcome::kNoLine;

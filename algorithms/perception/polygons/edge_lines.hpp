@@ -7,6 +7,7 @@
 
 #include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/column_image.hpp"
 #include "algorithms/perception/image/depth_noise_model.hpp"
 #include "algorithms/perception/planes/plane_fit.hpp"
@@ -154,6 +155,7 @@ class EdgeLineFinder {
   [[nodiscard]] EdgeLine guessed_line() const noexcept { return {guess_ends_m_[0], guess_ends_m_[1], 0.01, true}; }
 
   [[nodiscard]] std::int32_t column_count() const noexcept { return groups_.columns; }
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
 
  private:
   static constexpr std::int32_t kSlots = 8;  // columns that are searched together, on every machine
@@ -267,7 +269,7 @@ class EdgeLineFinder {
   [[nodiscard]] double pixel_m(double along_m, double across_m) const noexcept;
   // Where across the surface the image's row is that many below the one of (along, across).
   [[nodiscard]] double below_m(double along_m, double across_m, double rows) const noexcept;
-  [[nodiscard]] Shift local_shift() const noexcept;
+  [[nodiscard]] Shift local_shift() noexcept;
   void add_shifts(const NearRows& near, ShiftSums& sums) const noexcept;
 
   StaticVector<Guess, kColumns> guesses_;
@@ -289,6 +291,7 @@ class EdgeLineFinder {
   Groups groups_;
   Face face_;
   Points points_;
+  WorkCount work_;
 };
 
 }  // namespace polygmap

@@ -2,8 +2,10 @@
 // Whose pixels a convex polygon in the picture covers, and the straight cut that rids it best of what is not its own.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/polygons/convex_outline.hpp"
 #include "algorithms/perception/regions/region.hpp"
@@ -24,10 +26,10 @@ class PixelCover {
             "polygon.");
     }
   };
-  // apart_m: seen this far behind the plane, a pixel shows something else.
-  PixelCover(const Params& params, const FrameImage& picture, const Regions& regions, RegionId id,
-             double apart_m) noexcept
-      : params_(params), picture_(picture), regions_(regions), id_(id), apart_m_(apart_m) {}
+  // apart_m: seen this far behind the plane, a pixel shows something else. work: counts what is done.
+  PixelCover(const Params& params, const FrameImage& picture, const Regions& regions, RegionId id, double apart_m,
+             WorkCount& work) noexcept
+      : params_(params), picture_(picture), regions_(regions), id_(id), apart_m_(apart_m), work_(work) {}
 
   struct Count {
     std::int32_t own = 0, foreign = 0;
@@ -40,8 +42,17 @@ class PixelCover {
   // A line in the picture is where line . ray = 0. How many of the surface's pixels lie on either side of it.
   [[nodiscard]] Sides own_by_side(const Outline2& polygon, const Vec3& line) const noexcept;
   // The line whose positive side keeps most of the surface's pixels and least of others': where a neighbour's plane
-  // meets this one, or a column or a row of the picture. False where every cut costs more than it rids of.
-  [[nodiscard]] bool try_best_cut(const Outline2& polygon, Vec3& line) const noexcept;
+  // meets this one, or a column or a row of the picture. Not worth it where every cut costs more than it rids of.
+  struct Cut {
+    Vec3 line = Vec3::Zero();
+    std::int32_t total = 0, best = 0;  // worth of the whole polygon, and of what the line keeps
+    std::int32_t tried = 0;            // neighbours
+    std::array<std::int32_t, Regions::kMaxRegions + 1> votes{};
+    [[nodiscard]] bool worth_it() const noexcept { return best > total; }
+  };
+  // Columns and rows; then one neighbour after the other, until there is none left to try.
+  void begin_cut(const Outline2& polygon, Cut& cut) const noexcept;
+  [[nodiscard]] bool try_neighbour(const Outline2& polygon, Cut& cut) const noexcept;
 
  private:
   enum class Owner : std::uint8_t { kNobody, kOwn, kForeign };
@@ -58,6 +69,7 @@ class PixelCover {
   const Regions& regions_;
   RegionId id_;
   double apart_m_;
+  WorkCount& work_;
 };
 
 }  // namespace polygmap

@@ -57,12 +57,6 @@ Vec2 project(const HalfRays& rays, const Vec3& p_m) noexcept {
   return {p_m.x() * w * rays.fx_px + rays.cx_px, p_m.y() * w * rays.fy_px + rays.cy_px};
 }
 
-[[nodiscard]] Outline2 seen_of(const HalfRays& rays, const PlaneAxes& axes, const Outline2& flat) noexcept {
-  Outline2 seen;
-  for (const Vec2& p : flat) static_cast<void>(seen.try_push_back(project(rays, axes.to_space(p))));
-  return seen;
-}
-
 // Share of a polygon's pixels without data, over its columns in the picture in some of its rows.
 double invalid_share(const FrameImage& picture, const SeenPolygon& polygon) noexcept {
   constexpr std::int32_t kRows = 32;  // more say the same
@@ -112,9 +106,19 @@ double invalid_share(const FrameImage& picture, const SeenPolygon& polygon) noex
 
 }  // namespace
 
+Outline2 PolygonBuilder::seen_of(const Outline2& flat) noexcept {
+  Outline2 seen;
+  work_.add(40);
+  work_.add(flat.size(), 40);
+  for (const Vec2& p : flat) static_cast<void>(seen.try_push_back(project(picture_->rays, axes_.to_space(p))));
+  return seen;
+}
+
 // What is just outside an edge decides whether the surface ends there or only the view of it.
-EdgeKind PolygonBuilder::judge_edge(const FrameImage& picture, const InversePlane& plane, const Vec2& a, const Vec2& b,
-                                    const Vec2& inside) const noexcept {
+EdgeKind PolygonBuilder::judge_edge(const Vec2& a, const Vec2& b, const Vec2& inside) noexcept {
+  const FrameImage& picture = *picture_;
+  const InversePlane& plane = own().plane;
+  work_.add(110);
   const std::int32_t probes = params_.probes;
   Vec2 outward{(b - a).y(), -(b - a).x()};
   if (outward.norm() < 1e-9) return EdgeKind::kUnknown;
@@ -131,6 +135,7 @@ EdgeKind PolygonBuilder::judge_edge(const FrameImage& picture, const InversePlan
     // The first measured pixel outside, up to twice the probe's distance; the body or the picture's end before it hides
     // the end of the surface.
     for (std::int32_t k = nearest_px; k <= reach_px; ++k) {
+      work_.add(58);
       const double out = 0.5 * params_.probe_px + k;
       const Vec2 p = on + out * outward;
       const auto c = static_cast<std::int32_t>(std::floor(p.x() + 0.5)),
@@ -150,10 +155,12 @@ EdgeKind PolygonBuilder::judge_edge(const FrameImage& picture, const InversePlan
 }
 
 // The tread that most columns of this surface show right below (or above) it in the picture.
-RegionId PolygonBuilder::tread_beside(const FrameImage& picture, const Regions& regions, RegionId id,
-                                      bool below) const noexcept {
+RegionId PolygonBuilder::tread_beside(bool below) noexcept {
+  const FrameImage& picture = *picture_;
+  const Regions& regions = *regions_;
   const std::int32_t probe_px = params_.tread_probe_px;
-  const ColumnExtents& profile = regions.extents[id];
+  const ColumnExtents& profile = regions.extents[id_];
+  work_.add(140 + 15 * std::max(profile.last_column - profile.first_column, 0) + 9 * regions.count);
   std::array<std::int32_t, Regions::kMaxRegions + 1> votes{};
   for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
@@ -195,19 +202,19 @@ PlaneSide PlaneAxes::side_of(const Vec3& line) const noexcept {
 
 // The surface ends at the line, where most of its pixels lie. What goes on beyond the line's end, as a floor does
 // beside the stairs, is a piece by itself.
-bool PolygonBuilder::try_cut_at_line(const FrameImage& picture, const EdgeLine& edge, const PlaneAxes& axes,
-                                     const PixelCover& cover, const Outline2& outline, Pieces& pieces) const noexcept {
+bool PolygonBuilder::try_cut_at_line(const EdgeLine& edge) noexcept {
   if (!edge.valid) return true;
-  const Vec2 a = axes.to_plane(edge.a_m), b = axes.to_plane(edge.b_m);
+  work_.add(250 + 90 * static_cast<std::int32_t>(pieces_.front().flat.size()));
+  const Vec2 a = axes_.to_plane(edge.a_m), b = axes_.to_plane(edge.b_m);
   Vec2 inward{-(b - a).y(), (b - a).x()};
   inward.normalize();
   const Vec3 line = edge.a_m.cross(edge.b_m);
-  const PixelCover::Sides own = cover.own_by_side(outline, line);
+  const PixelCover::Sides own = cover().own_by_side(*outline_, line);
   const bool positive = own.positive > own.negative;
-  if ((inward.dot(axes.side_of(line).inward) > 0.0) != positive) inward = -inward;
-  Piece& piece = pieces.front();
+  if ((inward.dot(axes_.side_of(line).inward) > 0.0) != positive) inward = -inward;
+  Piece& piece = pieces_.front();
   const bool goes_on = std::min(own.positive, own.negative) >= params_.min_own;
-  const bool has_room = !goes_on || try_split_off(picture, axes, cover, piece, {a, -inward}, pieces);
+  const bool has_room = !goes_on || try_split_off(piece, {a, -inward});
   // Corners just short of the line go onto it, those beyond are cut off: either way the edge is the line. Moving only
   // the two extreme ones keeps the outline convex.
   for (Vec2& p : piece.flat) {
@@ -219,69 +226,82 @@ bool PolygonBuilder::try_cut_at_line(const FrameImage& picture, const EdgeLine& 
 }
 
 // Seen nearly edge-on, half a pixel is decimetres of a riser: it ends where the treads above and below it say.
-void PolygonBuilder::cut_at_treads(const FrameImage& picture, const Regions& regions, RegionId id,
-                                   const PlaneAxes& axes, Outline2& flat) const noexcept {
+void PolygonBuilder::cut_at_treads(Outline2& flat) noexcept {
   for (const bool below : {true, false}) {
-    const RegionId tread = tread_beside(picture, regions, id, below);
+    const RegionId tread = tread_beside(below);
     if (tread == kNoRegion) continue;
-    const InversePlane& level = regions[tread].plane;
+    work_.add(120);
+    work_.add(flat.size(), 60);
+    const InversePlane& level = (*regions_)[tread].plane;
     const double side = below ? 1.0 : -1.0;
     const Vec3 up = side * level.normal();
-    const Vec2 inward{up.dot(axes.x), up.dot(axes.y)};
+    const Vec2 inward{up.dot(axes_.x), up.dot(axes_.y)};
     if (!(inward.norm() > params_.min_tread_sin)) continue;
-    clip(flat, -side * level.distance_m(axes.origin_m) * inward / inward.squaredNorm(), inward.normalized());
+    clip(flat, -side * level.distance_m(axes_.origin_m) * inward / inward.squaredNorm(), inward.normalized());
   }
 }
 
 // The side of a cut that is not kept becomes a piece. False where there is no room for one that has enough of the
 // surface.
-bool PolygonBuilder::try_split_off(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
-                                   const Piece& from, const PlaneSide& side, Pieces& pieces) const noexcept {
+bool PolygonBuilder::try_split_off(const Piece& from, const PlaneSide& side) noexcept {
   Piece piece = from;
+  work_.add(600);
+  work_.add(piece.flat.size(), 60);
   clip(piece.flat, side.point, side.inward);
   static_cast<void>(piece.cuts.try_push_back(side));
   if (piece.flat.size() < 3) return true;
-  piece.pixels = cover.count(seen_of(picture.rays, axes, piece.flat));
+  piece.pixels = cover().count(seen_of(piece.flat));
   if (piece.pixels->own < params_.min_own) return true;
-  return pieces.try_push_back(piece);
+  return pieces_.try_push_back(piece);
 }
 
 // No line says so, but a hull around a corner covers what is not its own: the best cut parts it. A piece that was split
-// off and keeps too little of the surface, or stays over what others own, is no piece. Returns how many found no room.
-std::size_t PolygonBuilder::part_pieces(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
-                                        Pieces& pieces) const noexcept {
-  std::size_t without_room = 0;
-  for (std::size_t i = 0; i < pieces.size(); ++i) {
-    Piece& piece = pieces[i];
-    while (piece.flat.size() >= 3) {
-      const Outline2 seen = seen_of(picture.rays, axes, piece.flat);
-      const PixelCover::Count pixels = piece.pixels ? *piece.pixels : cover.count(seen);
-      piece.pixels.reset();
-      if (i > 0 && pixels.own < params_.min_own) {
-        piece.flat.clear();
-        break;
-      }
-      if (pixels.foreign < params_.min_foreign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign))
-        break;
-      Vec3 line;
-      if (piece.cuts.size() == kMaxCuts || !cover.try_best_cut(seen, line)) {
-        if (i > 0) piece.flat.clear();
-        break;
-      }
-      const PlaneSide kept = axes.side_of(line);
-      if (!try_split_off(picture, axes, cover, piece, {kept.point, -kept.inward}, pieces)) ++without_room;
-      clip(piece.flat, kept.point, kept.inward);
-      static_cast<void>(piece.cuts.try_push_back(kept));
-    }
+// off and keeps too little of the surface, or stays over what others own, is no piece.
+void PolygonBuilder::count_piece() noexcept {
+  if (next_ == pieces_.size()) {
+    next_ = 0;
+    part_ = Part::kPatches;
+    return;
   }
-  return without_room;
+  Piece& piece = pieces_[next_];
+  if (piece.flat.size() < 3) return leave_piece(true);
+  seen_ = seen_of(piece.flat);
+  const PixelCover::Count pixels = piece.pixels ? *piece.pixels : cover().count(seen_);
+  piece.pixels.reset();
+  if (next_ > 0 && pixels.own < params_.min_own) return leave_piece(false);
+  if (pixels.foreign < params_.min_foreign || pixels.foreign < params_.most_foreign * (pixels.own + pixels.foreign)) {
+    return leave_piece(true);
+  }
+  if (piece.cuts.size() == kMaxCuts) return leave_piece(next_ == 0);
+  part_ = Part::kBeginCut;
 }
 
-std::optional<SurfacePatch> PolygonBuilder::patch_of(const FrameImage& picture, const Region& own,
-                                                     const SurfaceLines& lines, const PlaneAxes& axes,
-                                                     Piece& piece) const noexcept {
+void PolygonBuilder::leave_piece(bool keep) noexcept {
+  if (!keep) pieces_[next_].flat.clear();
+  ++next_;
+  part_ = Part::kPieces;
+}
+
+void PolygonBuilder::cut_piece() noexcept {
+  if (!cut_.worth_it()) return leave_piece(next_ == 0);
+  Piece& piece = pieces_[next_];
+  const PlaneSide kept = axes_.side_of(cut_.line);
+  if (!try_split_off(piece, {kept.point, -kept.inward})) ++built_.without_room;
+  work_.add(100);
+  work_.add(piece.flat.size(), 60);
+  clip(piece.flat, kept.point, kept.inward);
+  static_cast<void>(piece.cuts.try_push_back(kept));
+  part_ = Part::kPieces;
+}
+
+std::optional<SurfacePatch> PolygonBuilder::patch_of(Piece& piece) noexcept {
   Outline2& flat = piece.flat;
+  const Region& own = this->own();
+  const PlaneAxes& axes = axes_;
+  const auto corners = static_cast<std::int32_t>(flat.size());
+  work_.add(700);
   if (flat.size() >= 3) reduce(flat, kMaxPolygonVertices, 1e-6);
+  work_.add((corners - static_cast<std::int32_t>(flat.size()) + 1) * corners * 20 + corners * 60);
   const double area_m2 = flat.size() >= 3 ? 0.5 * twice_area(flat) : 0.0;
   if (!(area_m2 > 1e-4)) return std::nullopt;
   SurfacePatch patch;
@@ -297,12 +317,15 @@ std::optional<SurfacePatch> PolygonBuilder::patch_of(const FrameImage& picture, 
   const Mat3 across = Mat3::Identity() - axes.normal * axes.normal.transpose();
   patch.tilt_sigma_rad = patch.d_m * math::sqrt(std::max((across * own.covariance * across).trace(), 0.0));
   for (const Vec2& p : flat) static_cast<void>(patch.polygon.try_push_back(axes.to_space(p)));
-  judge_edges(picture, own.plane, lines, axes, piece, patch);
+  judge_edges(piece, patch);
   return patch;
 }
 
-void PolygonBuilder::judge_edges(const FrameImage& picture, const InversePlane& plane, const SurfaceLines& lines,
-                                 const PlaneAxes& axes, const Piece& piece, SurfacePatch& patch) const noexcept {
+void PolygonBuilder::judge_edges(const Piece& piece, SurfacePatch& patch) noexcept {
+  const FrameImage& picture = *picture_;
+  const SurfaceLines& lines = *lines_;
+  const PlaneAxes& axes = axes_;
+  work_.add(piece.flat.size(), 160);
   // An edge on a nosing or back line is observed if the line was seen along most of it.
   const auto seen_on = [&](const EdgeLine& line, const Vec2& a, const Vec2& b) {
     if (!line.valid) return false;
@@ -330,42 +353,82 @@ void PolygonBuilder::judge_edges(const FrameImage& picture, const InversePlane& 
     patch.edges[i] = EdgeKind::kUnknown;
     if (cut_back(a, b)) continue;
     const bool on_line = on_nosing || on_back;
-    patch.edges[i] = on_line ? EdgeKind::kObserved : judge_edge(picture, plane, seen[i], seen[next], inside);
+    patch.edges[i] = on_line ? EdgeKind::kObserved : judge_edge(seen[i], seen[next], inside);
     if (on_nosing) patch.nosing = lines.nosing;
     if (on_back) patch.back = lines.back;
   }
+  work_.add(picture.any_body ? 6000 : 4000);
   patch.invalid_fraction = invalid_share(picture, seen);
 }
 
-PolygonBuilder::Built PolygonBuilder::build(const FrameImage& picture, const Regions& regions, RegionId id,
-                                            const Outline2& outline, const SurfaceLines& lines,
-                                            SurfacePatches& patches) const noexcept {
-  const Region& own = regions[id];
-  const PlaneAxes axes = axes_of(own, lines);
+void PolygonBuilder::begin(const FrameImage& picture, const Regions& regions, RegionId id, const Outline2& outline,
+                           const SurfaceLines& lines, SurfacePatches& patches) noexcept {
+  picture_ = &picture;
+  regions_ = &regions;
+  id_ = id;
+  outline_ = &outline;
+  lines_ = &lines;
+  patches_ = &patches;
+  axes_ = axes_of(own(), lines);
+  built_ = {};
+  pieces_.clear();
+  next_ = 0;
+  part_ = Part::kDone;
+  work_.add(500);
+  work_.add(outline.size(), 60);
   // The picture's outline onto the plane: a projection keeps it convex, and turns clockwise in the picture into
   // clockwise seen from the camera, so the order is reversed.
-  Pieces pieces;
-  static_cast<void>(pieces.try_push_back({}));
-  Outline2& flat = pieces.front().flat;
+  static_cast<void>(pieces_.try_push_back({}));
+  Outline2& flat = pieces_.front().flat;
+  const InversePlane& plane = own().plane;
   for (std::size_t i = outline.size(); i-- > 0;) {
     const Vec3 ray = picture.rays.ray(outline[i].x(), outline[i].y());
-    if (own.plane.inverse_depth(ray) > 0.1) static_cast<void>(flat.try_push_back(axes.to_plane(own.plane.point(ray))));
+    if (plane.inverse_depth(ray) > 0.1) static_cast<void>(flat.try_push_back(axes_.to_plane(plane.point(ray))));
   }
-  if (flat.size() < 3 || !(twice_area(flat) > 0.0)) return {};
-  const PixelCover cover(params_.cover, picture, regions, id, params_.apart_m);
-  if (own.kind == SurfaceKind::kRiser) cut_at_treads(picture, regions, id, axes, flat);
-  Built built;
-  for (const EdgeLine* line : {&lines.nosing, &lines.back, &lines.occluder}) {
-    if (!try_cut_at_line(picture, *line, axes, cover, outline, pieces)) ++built.without_room;
+  if (flat.size() < 3 || !(twice_area(flat) > 0.0)) return;
+  if (own().kind == SurfaceKind::kRiser) cut_at_treads(flat);
+  part_ = Part::kLines;
+}
+
+bool PolygonBuilder::step() noexcept {
+  const std::array<const EdgeLine*, 3> edges{&lines_->nosing, &lines_->back, &lines_->occluder};
+  switch (part_) {
+    case Part::kLines:
+      if (!try_cut_at_line(*edges[next_])) ++built_.without_room;
+      if (++next_ < edges.size()) return false;
+      next_ = 0;
+      part_ = Part::kPieces;
+      return false;
+    case Part::kPieces:
+      count_piece();
+      return false;
+    case Part::kBeginCut:
+      cover().begin_cut(seen_, cut_);
+      part_ = Part::kTryCut;
+      return false;
+    case Part::kTryCut:
+      if (!cover().try_neighbour(seen_, cut_)) part_ = Part::kCut;
+      return false;
+    case Part::kCut:
+      cut_piece();
+      return false;
+    case Part::kPatches:
+      add_patch();
+      return part_ == Part::kDone;
+    case Part::kDone:
+      break;
   }
-  built.without_room += part_pieces(picture, axes, cover, pieces);
-  for (Piece& piece : pieces) {
-    std::optional<SurfacePatch> patch = patch_of(picture, own, lines, axes, piece);
-    if (!patch) continue;
-    if (&piece == pieces.begin()) patch->nosing = lines.nosing, patch->back = lines.back;
-    ++(patches.try_push_back(*patch) ? built.pieces : built.without_room);
+  return true;
+}
+
+void PolygonBuilder::add_patch() noexcept {
+  Piece& piece = pieces_[next_];
+  std::optional<SurfacePatch> patch = patch_of(piece);
+  if (patch) {
+    if (next_ == 0) patch->nosing = lines_->nosing, patch->back = lines_->back;
+    ++(patches_->try_push_back(*patch) ? built_.pieces : built_.without_room);
   }
-  return built;
+  if (++next_ == pieces_.size()) part_ = Part::kDone;
 }
 
 }  // namespace polygmap

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "algorithms/core/messages/surfaces.hpp"
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/polygons/column_outline.hpp"
 #include "algorithms/perception/polygons/convex_outline.hpp"
@@ -79,11 +80,16 @@ class PolygonBuilder {
     std::size_t pieces = 0, without_room = 0;
   };
   // Adds the patches of regions[id]: convex pieces of one plane, the first with the surface's lines, another one with
-  // those that bound it. None when the outline encloses no area.
-  Built build(const FrameImage& picture, const Regions& regions, RegionId id, const Outline2& outline,
-              const SurfaceLines& lines, SurfacePatches& patches) const noexcept;
+  // those that bound it. None when the outline encloses no area. All is read until done.
+  void begin(const FrameImage& picture, const Regions& regions, RegionId id, const Outline2& outline,
+             const SurfaceLines& lines, SurfacePatches& patches) noexcept;
+  // A piece of the work; true when all is done.
+  [[nodiscard]] bool step() noexcept;
+  [[nodiscard]] const Built& built() const noexcept { return built_; }
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
 
  private:
+  enum class Part : std::uint8_t { kLines, kPieces, kBeginCut, kTryCut, kCut, kPatches, kDone };
   static constexpr std::size_t kMaxPieces = 5, kMaxCuts = 4;
   struct Piece {
     Outline2 flat;                            // on the plane
@@ -92,30 +98,43 @@ class PolygonBuilder {
   };
   using Pieces = StaticVector<Piece, kMaxPieces>;
 
+  [[nodiscard]] const Region& own() const noexcept { return (*regions_)[id_]; }
+  [[nodiscard]] PixelCover cover() noexcept {
+    return {params_.cover, *picture_, *regions_, id_, params_.apart_m, work_};
+  }
   [[nodiscard]] static PlaneAxes axes_of(const Region& own, const SurfaceLines& lines) noexcept;
-  // outline: the surface in the picture.
-  [[nodiscard]] bool try_cut_at_line(const FrameImage& picture, const EdgeLine& edge, const PlaneAxes& axes,
-                                     const PixelCover& cover, const Outline2& outline, Pieces& pieces) const noexcept;
-  void cut_at_treads(const FrameImage& picture, const Regions& regions, RegionId id, const PlaneAxes& axes,
-                     Outline2& flat) const noexcept;
-  [[nodiscard]] bool try_split_off(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
-                                   const Piece& from, const PlaneSide& side, Pieces& pieces) const noexcept;
-  [[nodiscard]] std::size_t part_pieces(const FrameImage& picture, const PlaneAxes& axes, const PixelCover& cover,
-                                        Pieces& pieces) const noexcept;
+  [[nodiscard]] Outline2 seen_of(const Outline2& flat) noexcept;
+  [[nodiscard]] bool try_cut_at_line(const EdgeLine& edge) noexcept;
+  void cut_at_treads(Outline2& flat) noexcept;
+  [[nodiscard]] bool try_split_off(const Piece& from, const PlaneSide& side) noexcept;
+  // One piece's pixels, and whether it is to be cut.
+  void count_piece() noexcept;
+  void cut_piece() noexcept;
+  void leave_piece(bool keep) noexcept;
+  void add_patch() noexcept;
   // Nothing where the piece has no area.
-  [[nodiscard]] std::optional<SurfacePatch> patch_of(const FrameImage& picture, const Region& own,
-                                                     const SurfaceLines& lines, const PlaneAxes& axes,
-                                                     Piece& piece) const noexcept;
-  void judge_edges(const FrameImage& picture, const InversePlane& plane, const SurfaceLines& lines,
-                   const PlaneAxes& axes, const Piece& piece, SurfacePatch& patch) const noexcept;
+  [[nodiscard]] std::optional<SurfacePatch> patch_of(Piece& piece) noexcept;
+  void judge_edges(const Piece& piece, SurfacePatch& patch) noexcept;
   // The tread that most columns of the surface show right below (or above) it in the picture.
-  [[nodiscard]] RegionId tread_beside(const FrameImage& picture, const Regions& regions, RegionId id,
-                                      bool below) const noexcept;
+  [[nodiscard]] RegionId tread_beside(bool below) noexcept;
   // All in half-resolution pixels: the edge's ends, a point of the surface.
-  [[nodiscard]] EdgeKind judge_edge(const FrameImage& picture, const InversePlane& plane, const Vec2& a, const Vec2& b,
-                                    const Vec2& inside) const noexcept;
+  [[nodiscard]] EdgeKind judge_edge(const Vec2& a, const Vec2& b, const Vec2& inside) noexcept;
 
   Params params_;
+  const FrameImage* picture_ = nullptr;
+  const Regions* regions_ = nullptr;
+  RegionId id_ = kNoRegion;
+  const Outline2* outline_ = nullptr;  // the surface in the picture
+  const SurfaceLines* lines_ = nullptr;
+  SurfacePatches* patches_ = nullptr;
+  PlaneAxes axes_;
+  Pieces pieces_;
+  Part part_ = Part::kDone;
+  std::size_t next_ = 0;  // line, or piece
+  Outline2 seen_;         // of the piece that is being cut
+  PixelCover::Cut cut_;
+  Built built_;
+  WorkCount work_;
 };
 
 }  // namespace polygmap

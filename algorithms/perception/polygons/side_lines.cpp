@@ -267,12 +267,15 @@ void SideLines::find_ends(RegionId id) noexcept {
   static_assert(kDepthHeight_px % Bytes::nlanes == 0);
   const std::int32_t from = profile.first_row / Bytes::nlanes * Bytes::nlanes;
   std::uint8_t *left = left_.data() + kPad, *right = right_.data() + kPad;
+  work_.add(260 + (profile.last_row - from) / 8);
   std::fill(left + from, left + profile.last_row + 1, kNoColumn);
   std::fill(right + from, right + profile.last_row + 1, kNoColumn);
   const Bytes wanted = cv::vx_setall_u8(id);
+  std::int32_t rows = 0;
   for (std::int32_t g = profile.first_column; g <= profile.last_column; ++g) {
     const ColumnExtent& ends = profile.columns[static_cast<std::size_t>(g)];
     if (ends.empty()) continue;
+    rows += ends.bottom - ends.top + 32;
     const RegionId* labels = regions_->labels.column(g);
     const Bytes here = cv::vx_setall_u8(static_cast<std::uint8_t>(g));
     for (std::int32_t r = ends.top / Bytes::nlanes * Bytes::nlanes; r <= ends.bottom; r += Bytes::nlanes) {
@@ -282,6 +285,7 @@ void SideLines::find_ends(RegionId id) noexcept {
       cv::v_store(right + r, cv::v_select(own, here, cv::vx_load(right + r)));
     }
   }
+  work_.add(std::max(profile.last_column - profile.first_column + 1, 0) * 30 + 11 * rows / 16);
   const std::int32_t half = params_.flat_rows / 2;
   for (std::uint8_t* ends : {left, right}) {
     std::fill_n(ends + profile.first_row - half, half, ends[profile.first_row]);
@@ -381,11 +385,15 @@ OutlineSide SideLines::find(RegionId id, bool right) noexcept {
   const ColumnExtents& profile = regions_->extents[id];
   const std::uint8_t* ends = ends_of(right);
   // Rows are asked for, then looked at, then decided on: each step takes its time, and none waits for another row's.
+  work_.add(250 + 42 * ((profile.last_row - profile.first_row) / 16 + 1));
   Views views;
   choose_rows(upright_rows(profile, ends), plane.kind == SurfaceKind::kTread ? kMaxRows : kOtherRows, ends, views);
+  work_.add(views.count, 560);
   for (std::size_t i = 0; i < views.count; ++i) look(id, right, views.of[i]);
   double outermost = find_row_ends(views, right);
+  work_.add(seen_.size(), 230);
   if (!(outermost > kNowhere)) {  // no row but flat ones
+    work_.add(profile.last_row - profile.first_row + 1, 12);
     for (std::int32_t r = profile.first_row; r <= profile.last_row; ++r) {
       if (ends[r] != kNoColumn) outermost = std::max(outermost, outwards(right) * outer_edge(ends[r], right));
     }
@@ -396,6 +404,7 @@ OutlineSide SideLines::find(RegionId id, bool right) noexcept {
   Line line;
   double first_row = 0.0, last_row = 0.0;
   if (!try_line(plane.plane, line) || !holds(line, first_row, last_row)) return side;
+  work_.add(kManyRows, 16);
   if (count_outside(line, profile, right) > params_.max_cut * plane.area_px) return side;
   side.fitted = true;
   side.column_px = 0.5 * (line.at + 0.5 * line.slope - 0.5);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/polygons/column_outline.hpp"
 #include "algorithms/perception/regions/region.hpp"
@@ -62,6 +63,7 @@ class SideLines {
   // The line through the ends of that surface's rows on one side; not fitted, as far as the columns reach, where the
   // ends are not seen (the image's or the robot's own) or not straight.
   [[nodiscard]] OutlineSide find(RegionId id, bool right) noexcept;
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
 
  private:
   static constexpr std::int32_t kMaxRows = 14;   // of a tread
@@ -115,6 +117,7 @@ class SideLines {
   RowColumns left_{}, right_{};            // from kPad on; of the rows next to the surface's, too
   StaticVector<RowEnd, kMaxRows> seen_;    // full-resolution pixels
   StaticVector<RowEnd, kMaxRows> hidden_;  // as far as the columns reach
+  WorkCount work_;
 };
 
 }  // namespace polygmap

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/frame_image.hpp"
 #include "algorithms/perception/planes/plane_set.hpp"
 #include "algorithms/perception/planes/span_boundaries.hpp"
@@ -44,11 +45,19 @@ class ConnectedComponents {
 
   // Numbers the components that the planes' spans form, and writes each span's number into it: 0 for those without
   // room.
-  void find(SpanBoundaries::Columns& columns, std::int32_t column_count) noexcept;
-  // Begins regions with the planes; gives every component a region, and regions without enough of them up. Returns how
-  // many regions found no room.
-  std::uint32_t join(const Params& params, const SpanBoundaries& boundaries, const FrameImage& image,
-                     const PlaneSet& planes, Regions& regions) noexcept;
+  // Column by column, from left to right, then some numbers at a time until that is done, then column by column.
+  void begin_find() noexcept;
+  void link(SpanBoundaries::Columns& columns, std::int32_t column) noexcept;
+  [[nodiscard]] bool number_some() noexcept;
+  void measure(SpanBoundaries::Columns& columns, std::int32_t column) noexcept;
+  // Begins regions with the planes. All is read until joined.
+  void begin_join(const Params& params, const SpanBoundaries& boundaries, const FrameImage& image,
+                  const PlaneSet& planes, Regions& regions) noexcept;
+  // Gives some components a region, and regions without enough of them up; true when all is done.
+  [[nodiscard]] bool join_some() noexcept;
+  // Regions that found no room in the last join.
+  [[nodiscard]] std::uint32_t region_overflow() const noexcept { return region_overflow_; }
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
   // Of a component, after join: a region that is kept, or none.
   [[nodiscard]] RegionId region_of(std::uint16_t component) const noexcept { return components_[component].region; }
   // Components that found no room.
@@ -66,21 +75,26 @@ class ConnectedComponents {
   };
   using Order = StaticVector<std::uint8_t, kMaxComponents>;
 
-  std::uint16_t link(SpanBoundaries::Columns& columns, std::int32_t column_count) noexcept;
-  void number(std::uint16_t span_count) noexcept;
-  void measure(SpanBoundaries::Columns& columns, std::int32_t column_count) noexcept;
   // Those of living planes that are large enough, by area.
-  [[nodiscard]] Order large_ones(const Params& params, const PlaneSet& planes) const noexcept;
-  [[nodiscard]] static bool apart(const Params& params, const FrameImage& image, const Component& a, const Component& b,
-                                  const InversePlane& plane) noexcept;
+  [[nodiscard]] Order large_ones() noexcept;
+  [[nodiscard]] bool apart(const Component& a, const Component& b, const InversePlane& plane) noexcept;
   // Of the regions of one fitted plane, that of the nearest which the component belongs to.
-  [[nodiscard]] RegionId coplanar_region(const FrameImage& image, const Regions& regions,
-                                         const Component& component) const noexcept;
-  // A region for a component: that of its plane, one from first_new on that a component of that plane has become, or a
+  [[nodiscard]] RegionId coplanar_region(const Component& component) noexcept;
+  // A region for a component: that of its plane, one of later numbers that a component of that plane has become, or a
   // new one; none for a small component, or without room.
-  [[nodiscard]] RegionId find_region(const Params& params, const FrameImage& image, RegionId first_new,
-                                     const Component& component, Regions& regions) noexcept;
+  [[nodiscard]] RegionId find_region(const Component& component) noexcept;
+  void join(std::uint8_t number) noexcept;
+  void give_up_small_ones() noexcept;
 
+  Params params_;
+  const SpanBoundaries* boundaries_ = nullptr;
+  const FrameImage* image_ = nullptr;
+  const PlaneSet* planes_ = nullptr;
+  Regions* regions_ = nullptr;
+  Order order_;
+  std::uint16_t span_count_ = 0;
+  std::size_t next_ = 0;  // span to be numbered, less one; of order_, to be joined
+  WorkCount work_;
   std::array<Component, kMaxComponents + 1> components_{};
   std::size_t component_count_ = 0;
   // Union-find over all spans.

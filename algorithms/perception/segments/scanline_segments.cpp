@@ -9,6 +9,8 @@
 namespace polygmap {
 namespace {
 
+constexpr unsigned kTriedBit = 8;  // of try_blocks(): from here on, groups that were tried
+
 using simd::all, simd::Wide;
 
 constexpr float kNowhere =
@@ -79,14 +81,20 @@ void ScanlineSegmentation::add_rows(std::int32_t first, std::int32_t last) noexc
   // the next: a column's rows wait for one another, columns do not.
   std::array<std::int32_t, kColumns / kGroup + 1> singly;
   std::size_t count = 0;
+  std::int32_t tried = 0, handled = 0;
   for (std::int32_t column = 0; column < column_count_; column += kBlockColumns) {
     const std::uint32_t done = last - first + 1 == kBlock ? try_blocks(c, column, first) : 0U;
+    tried += std::popcount(done >> kTriedBit);
     for (std::int32_t i = 0; i < kBlockColumns / kGroup && column + i * kGroup < column_count_; ++i) {
       singly[count] = column + i * kGroup;
       count += (done >> i & 1U) != 0 ? 0U : 1U;
     }
   }
+  // Of a group of columns, whatever the register's width: the same on every machine.
+  constexpr std::int32_t kTriedInstructions = 455, kLeftInstructions = 90;
+  work_.add(column_count_ / kGroup * kLeftInstructions + tried * kTriedInstructions);
   if (count == 0) return;
+  work_.add((last - first + 1) * static_cast<std::int32_t>(count), 195);
   for (std::int32_t row = first; row <= last; ++row) {
     static_assert(64 % kGroup == 0);
     std::array<std::uint64_t, (kColumns + 63) / 64> events{};
@@ -96,10 +104,12 @@ void ScanlineSegmentation::add_rows(std::int32_t first, std::int32_t last) noexc
     }
     for (std::size_t i = 0; i < events.size(); ++i) {
       for (std::uint64_t left = events[i]; left != 0; left &= left - 1) {
+        ++handled;
         handle(static_cast<std::int32_t>(64 * i) + std::countr_zero(left), row);
       }
     }
   }
+  work_.add(handled, 240);
 }
 
 // A register of columns over a block of rows. Most blocks go on as their columns' lines say: one update for four rows.
@@ -181,7 +191,9 @@ std::uint32_t ScanlineSegmentation::try_blocks(const Wides& c, std::int32_t colu
   const bool on_a = a.goes_on(), on_b = b.goes_on(), both = on_a && on_b;
   if (kOneGroup ? both : on_a) a.store(open_);
   if (kOneGroup ? both : on_b) b.store(open_);
-  return kOneGroup ? static_cast<std::uint32_t>(both) : static_cast<std::uint32_t>(on_a) | (on_b ? 2U : 0U);
+  if (kOneGroup) return static_cast<std::uint32_t>(both) | 1U << kTriedBit;
+  return static_cast<std::uint32_t>(on_a) | (on_b ? 2U : 0U) | static_cast<std::uint32_t>(any_a) << kTriedBit |
+         (any_b ? 2U << kTriedBit : 0U);
 }
 
 // A bit for each of the group's columns in which something ends.
@@ -337,6 +349,7 @@ void ScanlineSegmentation::close(std::int32_t column, std::int32_t bottom, std::
 }
 
 void ScanlineSegmentation::finish() noexcept {
+  work_.add(column_count_, 60);
   for (std::int32_t g = 0; g < column_count_; ++g) {
     close(g, last_accepted(g, height_px_ - 1), height_px_ - 1);
   }

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "algorithms/core/containers/static_vector.hpp"
+#include "algorithms/core/work.hpp"
 #include "algorithms/perception/image/column_image.hpp"
 #include "algorithms/perception/image/depth_noise_model.hpp"
 
@@ -63,6 +64,7 @@ class ScanlineSegmentation {
   [[nodiscard]] Columns& columns() noexcept { return segments_; }
   [[nodiscard]] const Columns& columns() const noexcept { return segments_; }
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }  // segments that found no room
+  [[nodiscard]] WorkCount& work() noexcept { return work_; }                   // since it was last paid
 
  private:
   // No parameters: the step over a block of rows is compiled for these.
@@ -109,6 +111,7 @@ class ScanlineSegmentation {
   std::array<std::int16_t, kColumns> top_{};
   Columns segments_;
   std::uint32_t overflow_ = 0;
+  WorkCount work_;
 };
 
 }  // namespace polygmap

@@ -57,8 +57,11 @@ class ToeDetectorTest : public testing::Test {
     const CameraIntrinsics k = robot_camera_intrinsics();
     RawRange range;
     range.set({}, k.depth_unit_m);
-    return detect_toe(ToeDetectorParams{}, {1, 1, k.width_px, k.height_px, raw_.data()}, k, range, kSole,
-                      camera_T_sole);
+    ToeDetector detector;
+    detector.begin(ToeDetectorParams{}, {1, 1, k.width_px, k.height_px, raw_.data()}, k, range, kSole, camera_T_sole);
+    while (!detector.step()) {
+    }
+    return detector.sighting();
   }
   [[nodiscard]] std::optional<ToeSighting> see() const { return see(camera_T_sole_); }
 

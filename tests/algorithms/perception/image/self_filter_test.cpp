@@ -30,7 +30,10 @@ HalfImage<std::uint8_t> mask_of(const HalfRays& rays, const std::array<LegShapes
                                 const BodyMargin& margin) {
   SelfFilter filter;
   filter.clear();
-  for (std::size_t i = 0; i < SelfFilter::kShapes; ++i) filter.add_shape(rays, legs, margin, i);
+  for (std::size_t i = 0; i < SelfFilter::kShapes; ++i) {
+    while (!filter.add_some(rays, legs, margin, i)) {
+    }
+  }
   HalfImage<std::uint8_t> flags;
   for (std::int32_t r = 0; r < rays.height_px; ++r)
     static_cast<void>(filter.try_mark_row(r, rays.width_px, flags.row(r)));

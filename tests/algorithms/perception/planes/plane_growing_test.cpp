@@ -36,9 +36,14 @@ class PlaneGrowingTest : public testing::Test {
       boundaries_->build_spans(g, segments_->columns()[static_cast<std::size_t>(g)], to_plane);
       boundaries_->score(g, false);
     }
-    boundaries_->place();
+    boundaries_->begin_placing();
+    while (!boundaries_->place_some()) {
+    }
     boundaries_->begin_refit();
-    for (std::int32_t g = 0; g < kColumns; g += SpanBoundaries::kRefitColumns) boundaries_->refit(g, false);
+    for (std::int32_t g = 0; g < kColumns; g += SpanBoundaries::kRefitColumns) {
+      while (!boundaries_->refit_some(g, false)) {
+      }
+    }
   }
   // Row at which plane a, above, hands over to b in a column's ray.
   [[nodiscard]] double meeting_row(const InversePlane& a, const InversePlane& b, std::int32_t column) const {

@@ -61,7 +61,9 @@ class SeenPlanes {
   [[nodiscard]] int calls() const { return calls_; }  // of join_some, but for the last
   [[nodiscard]] std::uint32_t overflow() const { return merging_->overflow(); }
   int merge(bool measured) {
-    PlaneMerging::merge_coplanar({}, {}, kNoise, *planes_, to_plane_, measured);
+    merging_->begin_coplanar({}, {}, kNoise, *planes_, measured);
+    while (!merging_->merge_some(*planes_, to_plane_)) {
+    }
     return ((*planes_)[1].alive ? 1 : 0) + ((*planes_)[2].alive ? 1 : 0);
   }
   void make_risers() { (*planes_)[1].kind = (*planes_)[2].kind = SurfaceKind::kRiser; }

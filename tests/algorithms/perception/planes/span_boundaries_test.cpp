@@ -53,7 +53,9 @@ class SpanBoundariesTest : public testing::Test {
       gather(g);
       boundaries_->score(g, false);
     }
-    boundaries_->place();
+    boundaries_->begin_placing();
+    while (!boundaries_->place_some()) {
+    }
   }
   // Columns whose tread ends more than a row from where it should.
   [[nodiscard]] int wrong(double overhang_px) const {
@@ -90,7 +92,9 @@ TEST_F(SpanBoundariesTest, PlanesThatChange_TakeTheirBoundaryAlong) {
   tread_ = test::plane_of({0.01, -0.86, -0.5}, 0.605);
   EXPECT_GT(wrong(0.0), kColumns / 2);
   boundaries_->set_plane(kTread, tread_);
-  boundaries_->reproject();
+  boundaries_->begin_reprojecting();
+  while (!boundaries_->reproject_some()) {
+  }
   EXPECT_EQ(wrong(0.0), 0);
 }
 

@@ -46,8 +46,16 @@ class ConnectedComponentsTest : public testing::Test {
     }
   }
   void join() {
-    components_->find(boundaries_->columns(), image_->column_rays.columns);
-    EXPECT_EQ(components_->join({}, *boundaries_, *image_, *planes_, *regions_), 0U);
+    const std::int32_t columns = image_->column_rays.columns;
+    components_->begin_find();
+    for (std::int32_t g = 0; g < columns; ++g) components_->link(boundaries_->columns(), g);
+    while (!components_->number_some()) {
+    }
+    for (std::int32_t g = 0; g < columns; ++g) components_->measure(boundaries_->columns(), g);
+    components_->begin_join({}, *boundaries_, *image_, *planes_, *regions_);
+    while (!components_->join_some()) {
+    }
+    EXPECT_EQ(components_->region_overflow(), 0U);
   }
   [[nodiscard]] RegionId region_in(std::int32_t column, std::size_t span = 0) const {
     return components_->region_of(boundaries_->columns()[static_cast<std::size_t>(column)][span].component);
