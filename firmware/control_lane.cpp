@@ -96,7 +96,10 @@ void ControlLane::note_silent_drives(JointSet silent, std::int64_t now_ns) noexc
 
 ModuleState ControlLane::module_state() const noexcept {
   if (!estimator_.leg_sensing().any()) return ModuleState::kArming;
-  return gait_.status().phase == GaitPhase::kStopped ? ModuleState::kSafeStop : ModuleState::kRunning;
+  const GaitPhase phase = gait_.status().phase;
+  const bool stands = phase == GaitPhase::kStopped || (phase == GaitPhase::kFinished && gait_.stop_requested());
+  if (stands) return ModuleState::kSafeStop;
+  return gait_.stop_requested() ? ModuleState::kStopping : ModuleState::kRunning;
 }
 
 // Everything that crosses is taken when the frame begins: the writer may be ahead by then, but not by more than it has
@@ -150,15 +153,18 @@ Progress ControlLane::command(std::int64_t now_ns) noexcept {
   if (!command_ready_) return Progress::kIdle;
   if (!all_finite(command_)) {
     health_.raise(Fault::kJointCommandInvalid, now_ns);
-  } else if (!joint_port_.try_write(command_).is_all()) {
-    health_.raise(Fault::kJointCommandRefused, now_ns);
+    return Progress::kDone;
   }
+  const bool taken = joint_port_.try_write(command_).is_all();
+  if (!taken) health_.raise(Fault::kJointCommandRefused, now_ns);
+  overload_.count_command(params_.overload, taken);
   return Progress::kDone;
 }
 
 Progress ControlLane::health(std::int64_t now_ns) noexcept {
   report_rejections(now_ns);
   report_bus(now_ns);
+  report_overload(now_ns);
   report_lidar(now_ns);
   report_gait(now_ns);
   all_faults_ = health_;
@@ -193,7 +199,24 @@ void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   const bool feet_silent = bus.feet_silent && !may_start;
   if (feet_silent && !feet_silent_) health_.raise(Fault::kFeetSilent, now_ns);
   feet_silent_ = feet_silent;
-  if (!bus.drive_errors.is_empty()) gait_.request_stop();
+  if (!bus.drive_errors.is_empty()) gait_.request_stop(StopReason::kDriveError);
+}
+
+// What the executive counted up to this row. While the drives are still silent there is nothing to stop.
+void ControlLane::report_overload(std::int64_t now_ns) noexcept {
+  std::uint32_t lost = 0;
+  for (const Fault fault : {Fault::kCycleSlip, Fault::kCycleOverrun, Fault::kRowOverrun}) {
+    lost += health_.count(fault).count;
+  }
+  overload_.count_cycle(params_.overload, lost);
+  if (module_state() != ModuleState::kRunning) return;
+  if (overload_.time_is_short(params_.overload)) {
+    health_.raise(Fault::kTimeShort, now_ns);
+    gait_.request_stop(StopReason::kTimeShort);
+  } else if (overload_.commands_are_refused(params_.overload)) {
+    health_.raise(Fault::kCommandsRefused, now_ns);
+    gait_.request_stop(StopReason::kCommandsRefused);
+  }
 }
 
 void ControlLane::report_lidar(std::int64_t now_ns) noexcept {

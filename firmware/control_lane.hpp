@@ -8,6 +8,7 @@
 
 #include "algorithms/core/work.hpp"
 #include "firmware/lane_link.hpp"
+#include "firmware/overload_guard.hpp"
 #include "firmware/params.hpp"
 #include "firmware/telemetry.hpp"
 #include "hal/ports/imu.hpp"
@@ -27,7 +28,7 @@ class ControlLane {
   Progress command(std::int64_t now_ns) noexcept;
   Progress health(std::int64_t now_ns) noexcept;
 
-  void request_stop() noexcept { gait_.request_stop(); }
+  void request_stop() noexcept { gait_.request_stop(StopReason::kOperator); }
 
   [[nodiscard]] const StateEstimate& state() const noexcept { return estimator_.state(); }
   [[nodiscard]] const GaitStatus& gait_status() const noexcept { return gait_.status(); }
@@ -47,6 +48,7 @@ class ControlLane {
   void note_silent_drives(JointSet silent, std::int64_t now_ns) noexcept;
   void report_bus(std::int64_t now_ns) noexcept;
   void answer_pose_request(std::int64_t now_ns) noexcept;
+  void report_overload(std::int64_t now_ns) noexcept;
   void report_lidar(std::int64_t now_ns) noexcept;
   void report_rejections(std::int64_t now_ns) noexcept;
   void report_gait(std::int64_t now_ns) noexcept;
@@ -67,6 +69,7 @@ class ControlLane {
   bool pose_asked_ = false;  // a request came with this frame
   JointCommand command_;
   DriveReport drives_;
+  OverloadGuard overload_;
   bool command_ready_ = false;
   bool feet_silent_ = false;
   bool lio_missing_ = false;

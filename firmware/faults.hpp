@@ -33,6 +33,8 @@ namespace polygmap {
   X(18, kGaitStopped, "gait_stopped", "The gait stopped in double support, not on top.")                             \
   X(19, kLaneBehind, "lane_behind",                                                                                  \
     "A lane had not finished a cycle when the other one began the next: it is seen a cycle later.")                  \
+  X(20, kTimeShort, "time_short", "Control lost cycles or overran so often that the module stops.")                  \
+  X(21, kCommandsRefused, "commands_refused", "The bus refused so many commands in a row that the module stops.")    \
   X(30, kDriveSilent, "drive_silent", "A drive was silent for more than five cycles; telemetry says which joint's.") \
   X(31, kDriveError, "drive_error", "A drive told of an error, or left its motor mode.")                             \
   X(32, kBusOff, "bus_off", "A CAN controller left its bus.")                                                        \

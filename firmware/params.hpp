@@ -9,6 +9,7 @@
 #include "algorithms/perception/map/polygon_map.hpp"
 #include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/robot_model.hpp"
+#include "firmware/overload_guard.hpp"
 
 namespace polygmap {
 
@@ -23,6 +24,7 @@ struct Params {
   bool estimate_mount = true;
   bool self_filter = true;
   BodyUncertainty body;
+  OverloadGuard::Params overload;
   double tread_height_sigma_m = 0.004;
 
   // Of the parameters' table, firmware/config/param_table.hpp.
@@ -38,6 +40,7 @@ struct Params {
     field("self_filter", p.self_filter,
           "The robot's own legs are masked; false only shows what is taken for ground then.");
     field("body", p.body);
+    field("overload", p.overload);
     field("tread_height_sigma_m", p.tread_height_sigma_m, 1e-5, 0.1,
           "Height of a mapped tread under a foot that has just landed on it.");
   }

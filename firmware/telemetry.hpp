@@ -18,10 +18,11 @@ namespace polygmap {
 enum class ModuleState : std::uint8_t {
   kArming,    // some drive has not answered yet: commands without gains and torques
   kRunning,   // the gait commands the joints
+  kStopping,  // it was asked to stop, or has to: the foot in the air comes down first
   kSafeStop,  // the gait has stopped on two feet and holds; its stop_reason says why
 };
 [[nodiscard]] constexpr std::string_view name_of(ModuleState state) noexcept {
-  constexpr std::array<std::string_view, 3> kNames{"arming", "running", "safe_stop"};
+  constexpr std::array<std::string_view, 4> kNames{"arming", "running", "stopping", "safe_stop"};
   return kNames[static_cast<std::size_t>(state)];
 }
 

@@ -58,12 +58,13 @@ concept CountsExecutiveEvents = requires(T& counters, ExecutiveEvent event, std:
 };
 
 // Late ticks: cycles whose successor is already due are caught up, at most kMaxCaughtUp of them per tick; older ones
-// are skipped (slips), so the slot number stays tied to time.
-// Shedding: (1) a sheddable row whose budget, with those of the rows that matter more, does not fit what is left of the
-// cycle is given up; (2) after a cycle that overran or came late the rows of one more shed order are left out, and one
-// less again after kRecoveryCycles cycles in time. Rows with shed order 0 always run.
-// Overdrafts: a resumable row that spent more units than it was given is given less in its next slots until it is paid.
-// Leftovers: a row that takes_leftover may spend what the resumable row before it did not, in the same cycle.
+// are skipped (slips), so the slot number stays tied to time. Rows that act on the world (newest_only) run in the
+// newest cycle of a tick alone: a bus gets one command a tick, however late it comes. Shedding: (1) a sheddable row
+// whose budget, with those of the rows that matter more, does not fit what is left of the cycle is given up; (2) after
+// a cycle that overran or came late the rows of one more shed order are left out, and one less again after
+// kRecoveryCycles cycles in time. Rows with shed order 0 always run. Overdrafts: a resumable row that spent more units
+// than it was given is given less in its next slots until it is paid. Leftovers: a row that takes_leftover may spend
+// what the resumable row before it did not, in the same cycle.
 template <typename Tasks, const auto& Table, std::size_t Lane = 0, typename Counters = EventCounters<ExecutiveEvent>>
 class CyclicExecutive {
   static constexpr std::size_t kRows = Table.size();
@@ -78,6 +79,7 @@ class CyclicExecutive {
   static_assert(rows_without_budget(Table) == 0, "a schedule row has no budget");
   static_assert(rows_without_unit(Table) == 0, "a resumable row is not paid a single unit per slot");
   static_assert(rows_shed_but_not_resumable(Table) == 0, "only a resumable row may have a shed order");
+  static_assert(rows_newest_only_but_resumable(Table) == 0, "a resumable row runs in every cycle");
   static_assert(rows_out_of_lane_order(Table) == 0, "schedule rows stand in the order of their lanes, from 0");
 
  public:
@@ -117,7 +119,7 @@ class CyclicExecutive {
         count_up(lane_.caught_up);
         counters_.raise(ExecutiveEvent::kCycleCaughtUp, now_ns, 1);
       }
-      run_cycle(i == 0 ? skipped : 0);
+      run_cycle(i == 0 ? skipped : 0, i == caught_up);
     }
     return static_cast<std::size_t>(caught_up) + 1;
   }
@@ -147,7 +149,7 @@ class CyclicExecutive {
     return static_cast<std::uint32_t>(std::min<std::uint64_t>(x, UINT32_MAX));
   }
 
-  void run_cycle(std::uint64_t skipped_before) noexcept {
+  void run_cycle(std::uint64_t skipped_before, bool newest) noexcept {
     report_ = {.cycle = next_cycle_,
                .due_ns = next_due_ns(),
                .slot = static_cast<std::size_t>(next_cycle_ % kCyclesPerMajor),
@@ -156,6 +158,7 @@ class CyclicExecutive {
     leftover_ = 0;
     for (std::size_t row = 0; row < kRows; ++row) {
       if (Table[row].lane != Lane || !Table[row].runs_in(report_.slot)) continue;
+      if (Table[row].newest_only && !newest) continue;
       const std::uint64_t elapsed_ns = scale_.to_ns(clock_.count() - begin_count);
       if (must_shed(row, elapsed_ns)) {
         pay_overdraft(row, Table[row].units_per_slot());

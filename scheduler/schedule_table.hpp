@@ -37,6 +37,7 @@ struct ScheduleRow {
   std::int32_t budget_us = 0;     // per slot, on the robot
   std::int32_t unit_cost_ns = 0;  // of one work unit, as measured; 0: the row is not resumable
   std::uint8_t shed_order = 0;    // 1 is shed first, then 2, ...; 0 is never shed (control, gait, health)
+  bool newest_only = false;       // not run in a cycle that is caught up: it acts on the world, once a tick
   bool takes_leftover = false;    // spends also what the lane's resumable row before it left of this cycle
   std::int32_t instructions =
       0;  // of the processor per slot, at most, as measured; a resumable row's follow from units
@@ -161,6 +162,14 @@ template <std::size_t RowCount>
 [[nodiscard]] constexpr std::size_t rows_shed_but_not_resumable(const ScheduleTable<RowCount>& table) noexcept {
   std::size_t count = 0;
   for (const ScheduleRow& row : table) count += row.shed_order > 0 && !row.resumable() ? 1 : 0;
+  return count;
+}
+
+// Work that is handed out slot by slot is done in every slot.
+template <std::size_t RowCount>
+[[nodiscard]] constexpr std::size_t rows_newest_only_but_resumable(const ScheduleTable<RowCount>& table) noexcept {
+  std::size_t count = 0;
+  for (const ScheduleRow& row : table) count += row.newest_only && row.resumable() ? 1 : 0;
   return count;
 }
 

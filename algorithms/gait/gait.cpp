@@ -26,7 +26,8 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
   memory_.toes_calibrated = params.standing.toe_calibration.ticks <= 0;
   status_ = {};
   state_.emplace<Standing>();
-  armed_ = started_ = stop_requested_ = false;
+  armed_ = started_ = false;
+  stop_requested_ = StopReason::kNone;
 }
 
 bool Gait::try_arm(const JointFeedback& feedback) noexcept {

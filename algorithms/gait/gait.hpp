@@ -31,7 +31,10 @@ class Gait {
   [[nodiscard]] const GaitStatus& status() const noexcept { return status_; }
   [[nodiscard]] const Balance& balance() const noexcept { return balance_; }
   // Finishes the committed step, then holds in double support. From the thread of tick().
-  void request_stop() noexcept { stop_requested_ = true; }
+  void request_stop(StopReason reason) noexcept {
+    if (stop_requested_ == StopReason::kNone) stop_requested_ = reason;
+  }
+  [[nodiscard]] bool stop_requested() const noexcept { return stop_requested_ != StopReason::kNone; }
 
  private:
   [[nodiscard]] GaitShared shared() noexcept { return {*robot_, params_, plan_, planner_, memory_, status_}; }
@@ -60,7 +63,7 @@ class Gait {
   std::variant<Standing, WeightShift, SwingPhase, End> state_;
   bool armed_ = false;    // the joint angles are known
   bool started_ = false;  // so is where the body is
-  bool stop_requested_ = false;
+  StopReason stop_requested_ = StopReason::kNone;
 };
 
 }  // namespace polygmap

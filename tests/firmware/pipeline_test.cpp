@@ -108,6 +108,56 @@ TEST_F(PipelineTest, BusRefusesTheCommand_IsCounted) {
   EXPECT_EQ(count(Fault::kJointCommandRefused), 1U);
 }
 
+TEST_F(PipelineTest, BusRefusesForFiftyMilliseconds_StopsAndSaysSo) {
+  stand(kInitialised_ticks);
+  for (std::uint32_t i = 0; i < OverloadGuard::Params{}.most_refused; ++i) {
+    EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+    joints_.writes.fail_next();
+    stand(1);
+  }
+  EXPECT_EQ(count(Fault::kCommandsRefused), 1U);
+  EXPECT_EQ(control().module_state(), ModuleState::kStopping);
+  stand(2);
+  EXPECT_EQ(control().module_state(), ModuleState::kSafeStop);
+  EXPECT_EQ(control().gait_status().stop_reason, StopReason::kCommandsRefused);
+}
+
+TEST_F(PipelineTest, BusTakesOneCommandAmongRefusedOnes_GoesOn) {
+  stand(kInitialised_ticks);
+  for (int n = 0; n < 4; ++n) {
+    for (std::uint32_t i = 1; i < OverloadGuard::Params{}.most_refused; ++i) {
+      joints_.writes.fail_next();
+      stand(1);
+    }
+    stand(1);
+  }
+  EXPECT_EQ(count(Fault::kCommandsRefused), 0U);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+}
+
+TEST_F(PipelineTest, CyclesAreLostAgainAndAgain_StopsAndSaysSo) {
+  stand(kInitialised_ticks);
+  for (int i = 0; i < 5 && count(Fault::kTimeShort) == 0; ++i) {  // 22 lost in each
+    clock_.advance_ns(24 * kCycle_ns);
+    stand(5);
+  }
+  EXPECT_EQ(count(Fault::kCycleSlip), 3U * 22U);
+  stand(2);
+  EXPECT_EQ(control().module_state(), ModuleState::kSafeStop);
+  EXPECT_EQ(control().gait_status().stop_reason, StopReason::kTimeShort);
+}
+
+TEST_F(PipelineTest, CyclesAreLostNowAndThen_GoesOn) {
+  stand(kInitialised_ticks);
+  for (int i = 0; i < 3; ++i) {
+    clock_.advance_ns(24 * kCycle_ns);
+    stand(200);
+  }
+  EXPECT_EQ(count(Fault::kCycleSlip), 3U * 22U);
+  EXPECT_EQ(count(Fault::kTimeShort), 0U);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+}
+
 // An MIT drive answers only a command.
 TEST_F(PipelineTest, BeforeAllDrivesAnswered_CommandsHaveNoGainsAndNothingElseBegins) {
   const auto expect_arming = [&] {
@@ -298,7 +348,8 @@ TEST_F(PipelineTest, TickComesTwoFramesLate_NothingIsMissingAndTheGaitKeepsTime)
   module_.tick();
   EXPECT_EQ(count(Limit::kCycleCaughtUp), 2U);
   EXPECT_FALSE(control().faults().any_fault());
-  EXPECT_EQ(joints_.writes.calls(), commands + 3);
+  EXPECT_EQ(joints_.writes.calls(), commands + 1) << "the drives are told of the newest frame only";
+  EXPECT_EQ(control().last_command().stamp_ns, clock_.now_ns());
   EXPECT_EQ(control().gait_status().stamp_ns, clock_.now_ns());
   EXPECT_EQ(control().state().oldest_input_ns, clock_.now_ns());
 }

@@ -127,6 +127,33 @@ TEST_F(SingleLane, Tick_TwoCyclesLate_CatchesThemUp) {
   EXPECT_EQ(executive.row_statistics(kPlanes).shed, 3U);
 }
 
+constexpr ScheduleTable<2> kActing{
+    {{.task = "plan", .budget_us = 100}, {.task = "act", .budget_us = 100, .newest_only = true}}};
+static_assert(rows_newest_only_but_resumable(kActing) == 0);
+static_assert(rows_newest_only_but_resumable(
+                  with(1, {.task = "b", .budget_us = 10, .unit_cost_ns = 10, .newest_only = true})) == 1);
+
+TEST(NewestOnlyRow, TickLate_RunsInTheNewestCycleAlone) {
+  FakeClock clock;
+  RecordingTasks tasks;
+  Counters health;
+  CyclicExecutive<RecordingTasks, kActing> executive(tasks, clock, health);
+  executive.start(0);
+  for (const std::int64_t late_cycles : {0, 1, 2, 30}) {
+    tasks.calls.clear();
+    const std::int64_t newest_ns = executive.next_due_ns() + late_cycles * kCycle_ns;
+    executive.tick(newest_ns + 1);
+    std::size_t acted = 0;
+    for (const Call& call : tasks.calls) {
+      if (call.row != 1) continue;
+      ++acted;
+      EXPECT_EQ(call.cycle_ns, newest_ns);
+    }
+    EXPECT_EQ(acted, 1U) << late_cycles;
+    EXPECT_EQ(tasks.calls.size() - acted, static_cast<std::size_t>(std::min<std::int64_t>(late_cycles, 2) + 1));
+  }
+}
+
 TEST_F(SingleLane, Tick_SevenCyclesLate_SkipsFiveAndStaysInPhase) {
   EXPECT_EQ(executive.tick(kStart_ns + 7 * kCycle_ns + 10), 3U);
   EXPECT_EQ(executive.lane_statistics().slips, 5U);

@@ -73,10 +73,15 @@ class PhysicalClimb {
   explicit PhysicalClimb(const SimOptions& options, const Params& params = {})
       : robot_(under_physics(options)),
         pipeline_(std::make_unique<Pipeline>(Ports{camera, robot_, joints, lidar}, params)),
-        executive_(*pipeline_, robot_, pipeline_->lane_health(0)) {
+        tasks_{*pipeline_, robot_.clock(), row_share},
+        executive_(tasks_, robot_, pipeline_->lane_health(0)) {
     executive_.start(robot_.now_ns() + kCycle_ns);
   }
 
+  // The robot goes on, nobody wakes the module: what it commanded last holds.
+  void stall(int cycles) {
+    for (int i = 0; i < cycles; ++i) robot_.advance();
+  }
   // One cycle; false when the gait has ended or the robot fell.
   bool tick() {
     robot_.advance();
@@ -111,6 +116,7 @@ class PhysicalClimb {
   [[nodiscard]] const Truth& truth() const { return robot_.truth(); }
   [[nodiscard]] const StairWorld& stairs() const { return robot_.stairs(); }
   [[nodiscard]] const GaitStatus& status() const { return pipeline_->control().gait_status(); }
+  [[nodiscard]] const Health& health() const { return pipeline_->health(); }
   [[nodiscard]] const JointCommand& command() const { return pipeline_->control().last_command(); }
   [[nodiscard]] double time_s() const { return seconds(robot_.now_ns()); }
   // Of every sole that stood on a step, at any time, to its tread's edge; negative over it.
@@ -137,10 +143,28 @@ class PhysicalClimb {
   TamperedJoints joints{robot_};
   TamperedCamera camera{robot_};
   TamperedLidar lidar{robot_};
+  std::function<double(std::size_t row)> row_share;  // a row takes this share of its time; empty: none
 
  private:
+  // The module's rows, which take time.
+  struct TimedRows {
+    Pipeline& pipeline;
+    VirtualClock& clock;
+    const std::function<double(std::size_t)>& share;  // of the row's budget, or of what its units cost
+
+    Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
+      const std::int32_t units = budget.left();
+      const Progress progress = pipeline.run_row(row, cycle_ns, budget);
+      const ScheduleRow& r = kTasks[row].row;
+      const double full_ns = r.resumable() ? 1.0 * (units - budget.left()) * r.unit_cost_ns : 1e3 * r.budget_us;
+      if (share) clock.inject_count(static_cast<std::uint64_t>(share(row) * full_ns));
+      return progress;
+    }
+    void cycle_done(std::size_t lane, const CycleReport& report) noexcept { pipeline.cycle_done(lane, report); }
+  };
   std::unique_ptr<Pipeline> pipeline_;
-  OneLaneExecutive<> executive_;
+  TimedRows tasks_;
+  OneLaneExecutive<TimedRows> executive_;
   double sole_margin_min_m_ = std::numeric_limits<double>::infinity();
 };
 

@@ -47,6 +47,11 @@ enum class StopReason : std::uint8_t {
   kGroundMissing,  // no ground where the foot came down: it was put back where it had stood
   kToppling,       // one foot after the other went back to where it had stood, since the body toppled towards it
   kStateStale,     // IMU or joint feedback fell silent
+  // Asked of the gait by the module, or of the module by its operator; the foot in the air comes down first.
+  kOperator,
+  kDriveError,       // a drive told of an error, or left its motor mode
+  kTimeShort,        // control's cycles were lost or overran again and again
+  kCommandsRefused,  // the bus did not take one command after the other
 };
 
 // The edge of the next tread.

@@ -21,7 +21,7 @@ void Standing::begin_toe_calibration(const GaitInput& in, GaitShared& gait, Foot
 
 Transition Standing::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const StandingParams& params = gait.params.standing;
-  if (in.stop_requested) return Transition::stop(StopReason::kNone);
+  if (in.stop_requested != StopReason::kNone) return Transition::stop(in.stop_requested);
   if (in.lost) return Transition::stop(StopReason::kStateStale);
   if (!in.state.initialised || !in.usable) return {};
   // A body that sways sideways is best off between the feet.

@@ -47,6 +47,14 @@ std::string why_stopped(StopReason reason, double measured_m) {
       return "its body kept toppling towards the foot it lifted, and it put every one back";
     case StopReason::kStateStale:
       return "its IMU or its joints fell silent";
+    case StopReason::kOperator:
+      return "it was asked to";
+    case StopReason::kDriveError:
+      return "a drive told of an error";
+    case StopReason::kTimeShort:
+      return "its control cycles kept coming late";
+    case StopReason::kCommandsRefused:
+      return "its bus took no commands";
   }
   return "it gave no known reason";
 }

@@ -153,7 +153,7 @@ TEST(GaitLook, StopOrNoMoreSensorsMeanwhile_ComesDownAgain) {
         state.oldest_input_ns = oldest_ns;
       };
     } else {
-      climb.gait().request_stop();
+      climb.gait().request_stop(StopReason::kOperator);
     }
     double highest_m = 0.0;
     for (int i = 0; i < 900; ++i) {
@@ -161,7 +161,7 @@ TEST(GaitLook, StopOrNoMoreSensorsMeanwhile_ComesDownAgain) {
       highest_m = std::max(highest_m, height_m(climb));
     }
     EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
-    EXPECT_EQ(climb.status().stop_reason, blind ? StopReason::kStateStale : StopReason::kNone);
+    EXPECT_EQ(climb.status().stop_reason, blind ? StopReason::kStateStale : StopReason::kOperator);
     EXPECT_LT(highest_m, kTall_m) << blind;
     EXPECT_LT(height_m(climb), 0.80) << blind;
   }

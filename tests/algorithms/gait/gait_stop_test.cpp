@@ -251,7 +251,7 @@ TEST(GaitStop, BetweenTwoLevels_RisesAsFarAsTheLegsReachOnceSettled) {
   while (!climb.status().step.onto_tread || climb.status().phase == GaitPhase::kSwing) ASSERT_TRUE(climb.tick());
   for (int i = 0; i < 155; ++i) ASSERT_TRUE(climb.tick());
   ASSERT_EQ(climb.status().phase, GaitPhase::kDoubleSupport);
-  climb.gait().request_stop();
+  climb.gait().request_stop(StopReason::kOperator);
   climb.run(5.0);
   ASSERT_EQ(climb.status().phase, GaitPhase::kStopped);
   for (int i = 0; i < 1000; ++i) climb.tick();
@@ -286,10 +286,10 @@ TEST(GaitRequestStop, InEveryPhase_EndsOnBothFeet) {
     IdealClimb climb({});
     ASSERT_TRUE(climb.run_until(when.phase, when.swing));
     for (int i = 0; i < 40; ++i) climb.tick();
-    climb.gait().request_stop();
+    climb.gait().request_stop(StopReason::kOperator);
     climb.run(20.0);
     EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
-    EXPECT_EQ(climb.status().stop_reason, StopReason::kNone);
+    EXPECT_EQ(climb.status().stop_reason, StopReason::kOperator);
     EXPECT_EQ(climb.status().step.sequence, when.last_swing);
     EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);
     for (int i = 0; i < 500; ++i) climb.tick();  // it goes on holding, and settles

@@ -254,10 +254,10 @@ TEST(SingleStepGait, StopRequestedInEveryPhase_EndsOnBothFeet) {
       run_to_swing(climb, swing);
       for (int i = 0; i < after_ticks; ++i) climb.tick();
       const std::uint32_t committed = climb.status().step.sequence;
-      climb.gait().request_stop();
+      climb.gait().request_stop(StopReason::kOperator);
       climb.run(20.0);
       EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
-      EXPECT_EQ(climb.status().stop_reason, StopReason::kNone);
+      EXPECT_EQ(climb.status().stop_reason, StopReason::kOperator);
       EXPECT_EQ(climb.status().step.sequence, committed);
       for (int i = 0; i < 500; ++i) climb.tick();
       EXPECT_TRUE(climb.touches(Foot::kLeft) && climb.touches(Foot::kRight));
