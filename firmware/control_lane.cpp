@@ -197,8 +197,8 @@ void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   health_.follow(Limit::kDriveClamped, now_ns, bus.clamped);
   const bool may_start = module_state() == ModuleState::kArming && now_ns - start_.first_ns < kArmingTimeout_ns;
   const bool feet_silent = bus.feet_silent && !may_start;
-  if (feet_silent && !feet_silent_) health_.raise(Fault::kFeetSilent, now_ns);
-  feet_silent_ = feet_silent;
+  if (feet_silent && !raised_.feet_silent) health_.raise(Fault::kFeetSilent, now_ns);
+  raised_.feet_silent = feet_silent;
   if (!bus.drive_errors.is_empty()) gait_.request_stop(StopReason::kDriveError);
 }
 
@@ -223,8 +223,8 @@ void ControlLane::report_lidar(std::int64_t now_ns) noexcept {
   const StateEstimate& state = estimator_.state();
   const std::int64_t last_ns = state.lio_age_ns < 0 ? start_.first_ns : state.stamp_ns - state.lio_age_ns;
   const bool missing = now_ns - last_ns > kLioTimeout_ns;
-  if (missing && !lio_missing_) health_.raise(Fault::kLioMissing, now_ns);
-  lio_missing_ = missing;
+  if (missing && !raised_.lio_missing) health_.raise(Fault::kLioMissing, now_ns);
+  raised_.lio_missing = missing;
 }
 
 void ControlLane::report_gait(std::int64_t now_ns) noexcept {
@@ -234,12 +234,12 @@ void ControlLane::report_gait(std::int64_t now_ns) noexcept {
   health_.follow(Limit::kContactLate, now_ns, gait.late_contacts);
   health_.follow(Limit::kFootPutBack, now_ns, gait.aborted_swings);
   const bool stopped = gait.phase == GaitPhase::kStopped;
-  if (stopped && !gait_stopped_) {
+  if (stopped && !raised_.gait_stopped) {
     health_.raise(Fault::kGaitStopped, now_ns);
     if (gait.stop_reason == StopReason::kMapStale) health_.raise(Fault::kMapStale, now_ns);
     if (gait.stop_reason == StopReason::kStateStale) health_.raise(Fault::kStateStale, now_ns);
   }
-  gait_stopped_ = stopped;
+  raised_.gait_stopped = stopped;
 }
 
 void ControlLane::answer_pose_request(std::int64_t now_ns) noexcept {

@@ -71,9 +71,11 @@ class ControlLane {
   DriveReport drives_;
   OverloadGuard overload_;
   bool command_ready_ = false;
-  bool feet_silent_ = false;
-  bool lio_missing_ = false;
-  bool gait_stopped_ = false;
+  struct {
+    bool feet_silent = false;
+    bool lio_missing = false;
+    bool gait_stopped = false;
+  } raised_;  // what lasts is a fault once, when it begins
   struct Start {
     std::int64_t first_ns = -1;              // of the first cycle: time-outs of what never speaks start there
     JointSet never_heard = JointSet::all();  // drives, as of the last feedback
