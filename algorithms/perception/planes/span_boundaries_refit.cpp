@@ -41,7 +41,7 @@ void SpanBoundaries::show_next(std::int32_t first_column, std::size_t slot, Fron
   const std::size_t i = next_span_[slot];
   const bool any = in_picture && i < columns_[column].size();
   front.top[slot] = any ? columns_[column][i].top : Front::kNone;
-  front.plane[slot] = any ? columns_[column][i].plane : Front::kNone;
+  front.plane[slot] = any ? static_cast<std::int16_t>(columns_[column][i].plane) : Front::kNone;
 }
 
 // Down the columns together.
