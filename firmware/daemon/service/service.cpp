@@ -24,6 +24,8 @@ constexpr std::int64_t kLaneHangs_ns = kNsPerS;         // without a cycle
 constexpr std::int64_t kFirstDue_ns = 20 * kNsPerMs;    // from the lanes' waiting to their first cycle
 // A swing takes 0.92 s, and a foot that finds no ground goes back: later than that something is wrong.
 constexpr std::int64_t kStopLimit_ns = 3 * kNsPerS;
+// Until there is an estimate, a second, the gait holds both feet where they are and decides nothing.
+constexpr std::int64_t kUndecided_ns = 100 * kNsPerMs;
 constexpr std::size_t kOwnStack_bytes = 64U * 1024U;
 
 std::int64_t monotonic_ns() noexcept {
@@ -99,7 +101,12 @@ std::string text_of(const Outcome& o) {
 
 Service::Service(const DaemonConfig& config, ServiceParts parts, const StopSignals& signals, Notifier& notifier)
     : config_(config), parts_(std::move(parts)), signals_(signals), notifier_(notifier) {}
-Service::~Service() = default;
+Service::~Service() {
+  ends_.store(true, std::memory_order_release);
+  for (auto& lane : lanes_) {
+    if (lane) lane->thread.join();
+  }
+}
 
 Outcome Service::run() {
   Outcome outcome;
@@ -233,7 +240,8 @@ std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
   }
   if (!asked) return std::nullopt;
   if (view.state == ModuleState::kArming) return Decision{ExitCode::kAsked, "asked to stop while it armed."};
-  if (view.stands()) return Decision{ExitCode::kAsked, "asked to stop, and stands."};
+  const bool waits = view.phase == GaitPhase::kStandstill && now_ns - seen_.asked_ns >= kUndecided_ns;
+  if (view.stands() || waits) return Decision{ExitCode::kAsked, "asked to stop, and stands."};
   if (now_ns - seen_.asked_ns < kStopLimit_ns) return std::nullopt;
   return Decision{ExitCode::kStoppedItself, "asked to stop, and after three seconds it still does not stand."};
 }
@@ -274,9 +282,11 @@ void Service::tell(std::int64_t now_ns) noexcept {
 
 void Service::log_changes() noexcept {
   const ModuleView view = board_.module();
-  if (view.state == logged_.state && view.silent.bits() == logged_.silent.bits()) return;
+  if (view == logged_) return;
+  seen_.told_ns = 0;  // the service manager hears of it at once
+  const bool is_news = view.state != logged_.state || view.silent.bits() != logged_.silent.bits();
   logged_ = view;
-  seen_.told_ns = 0;  // the service manager hears it at once, too
+  if (!is_news) return;
   StatusText status;
   write_status(status, board_, config_.lanes, parts_.heap.calls());
   std::fprintf(stderr, "polygmapd: %s\n", status.text.data());

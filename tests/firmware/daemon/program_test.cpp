@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+// The shipped program: what it says, and its exit codes.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+namespace polygmap::daemon {
+namespace {
+
+struct Done {
+  int code = -1;
+  std::string said;  // on both streams
+};
+
+class ProgramTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (kProgram.empty()) GTEST_SKIP() << "this build has no program that could run here";
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  [[nodiscard]] Done run(const std::string& arguments) const {
+    const std::string command = "env -u NOTIFY_SOCKET timeout 60 " + kProgram + " " + arguments + " 2>&1";
+    Done done;
+    std::FILE* pipe = ::popen(command.c_str(), "r");
+    std::array<char, 4096> text{};
+    while (std::fgets(text.data(), text.size(), pipe) != nullptr) done.said += text.data();
+    const int status = ::pclose(pipe);
+    done.code = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + status;
+    return done;
+  }
+  std::string write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return (folder_ / name).string();
+  }
+  std::string config(const std::string& camera = "/dev/video9") {
+    return write("robot.toml", "bus = \"" POLYGMAP_SOURCE "/firmware/buses/cubemars.toml\"\n[camera]\ndevice = \"" + camera +
+                                   "\"\nfile = \"" POLYGMAP_SOURCE "/firmware/cameras/d435.toml\"\n[imu]\ndriver = \"livox\"\n");
+  }
+
+  const std::string kProgram = POLYGMAPD;
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) / ("polygmapd_" + std::to_string(::getpid()));
+};
+
+TEST_F(ProgramTest, WrongArguments_AreConfigurationErrorsWithTheUsage) {
+  for (const char* wrong : {"", "--config", "--replay", "--frobnicate", "--json --config x", "--doctor --replay x",
+                            "--check", "--check --doctor"}) {
+    const Done done = run(wrong);
+    EXPECT_EQ(done.code, 2) << wrong;
+    EXPECT_NE(done.said.find("polygmapd --config FILE"), std::string::npos) << wrong << ": " << done.said;
+  }
+}
+
+TEST_F(ProgramTest, HelpAndVersion_AreTold) {
+  EXPECT_EQ(run("--help").code, 0);
+  const Done version = run("--version");
+  EXPECT_EQ(version.code, 0);
+  EXPECT_TRUE(version.said.starts_with("polygmapd 0.")) << version.said;
+}
+
+TEST_F(ProgramTest, WrongFile_IsCodeTwoAndOneSentence) {
+  const std::string path = write("robot.toml", "bus = 3\n");
+  for (const char* also : {"", " --check"}) {
+    const Done done = run("--config " + path + also);
+    EXPECT_EQ(done.code, 2);
+    EXPECT_NE(done.said.find("robot.toml"), std::string::npos) << done.said;
+    EXPECT_EQ(std::ranges::count(done.said, '\n'), 1) << done.said;
+  }
+}
+
+TEST_F(ProgramTest, Check_OpensNothing) {
+  const Done done = run("--check --config " + config());
+  EXPECT_EQ(done.code, 0) << done.said;
+  EXPECT_NE(done.said.find("can be used"), std::string::npos) << done.said;
+}
+
+TEST_F(ProgramTest, MissingDevice_IsCodeThreeWithFileLineAndKey) {
+  if (std::filesystem::exists("/sys/class/net/can0")) GTEST_SKIP() << "this machine has a can0";
+  const Done done = run("--config " + config());
+  EXPECT_EQ(done.code, 3) << done.said;
+  EXPECT_NE(done.said.find("cubemars.toml, line "), std::string::npos) << done.said;
+  EXPECT_NE(done.said.find("can0"), std::string::npos) << done.said;
+}
+
+TEST_F(ProgramTest, ReplayOfWhatIsNone_IsCodeTwo) {
+  const Done done = run("--replay " + folder_.string());
+  EXPECT_EQ(done.code, 2) << done.said;
+  EXPECT_FALSE(done.said.empty());
+}
+
+}  // namespace
+}  // namespace polygmap::daemon
