@@ -15,6 +15,8 @@ namespace {
 // that catch up find everything read by the first of them; for a latency below one cycle none of them is misled.
 constexpr std::int64_t kMissing_ns = kCycle_ns;
 constexpr std::int64_t kLioTimeout_ns = 2 * kNsPerS;  // twenty poses
+// Drives and the feet's board take less to start, and are asked in every cycle of it.
+constexpr std::int64_t kArmingTimeout_ns = kNsPerS / 2;
 
 bool all_finite(const JointCommand& command) noexcept {
   for (const JointSetpoint& joint : command.joints) {
@@ -54,7 +56,7 @@ ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometr
 }
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {
-  if (first_ns_ < 0) first_ns_ = now_ns;
+  if (start_.first_ns < 0) start_.first_ns = now_ns;
   look_across(now_ns);
   const bool imu_came = read_imu(imu_port_, now_ns, estimator_);
   if (!imu_came && now_ns - estimator_.newest_imu_ns() >= kMissing_ns) health_.raise(Fault::kImuMissing, now_ns);
@@ -66,23 +68,27 @@ void ControlLane::read_joints(std::int64_t now_ns) noexcept {
   const bool was_asked = command_.stamp_ns != 0;  // a drive answers a command
   JointFeedback joints;
   if (joint_port_.try_read(joints)) {
-    const bool all_heard =
-        std::ranges::find(joints.silent_cycles, JointFeedback::kNeverHeard) == joints.silent_cycles.end();
-    if (all_heard) {
-      note_silent_drives(joints, now_ns);
+    JointSet silent;
+    start_.never_heard = {};
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      if (joints.silent_cycles[n] > LegSensing::kCarried_cycles) silent.insert(n);
+      if (joints.silent_cycles[n] == JointFeedback::kNeverHeard) start_.never_heard.insert(n);
+    }
+    if (start_.never_heard.is_empty()) {
+      note_silent_drives(silent, now_ns);
       estimator_.add_joints(joints, now_ns);
     }
   } else if (was_asked && now_ns - estimator_.leg_sensing().joints().stamp_ns >= kMissing_ns) {
     health_.raise(Fault::kJointFeedbackMissing, now_ns);
   }
+  if (!start_.never_heard.is_empty() && now_ns - start_.first_ns >= kArmingTimeout_ns) {
+    note_silent_drives(start_.never_heard, now_ns);
+  }
 }
 
-void ControlLane::note_silent_drives(const JointFeedback& joints, std::int64_t now_ns) noexcept {
-  JointSet silent;
+void ControlLane::note_silent_drives(JointSet silent, std::int64_t now_ns) noexcept {
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    if (joints.silent_cycles[n] <= LegSensing::kCarried_cycles) continue;
-    silent.insert(n);
-    if (!drives_.silent.contains(n)) health_.raise(Fault::kDriveSilent, now_ns);
+    if (silent.contains(n) && !drives_.silent.contains(n)) health_.raise(Fault::kDriveSilent, now_ns);
   }
   drives_.silent = silent;
   drives_.ever_silent = JointSet::of_bits(drives_.ever_silent.bits() | silent.bits());
@@ -181,8 +187,10 @@ void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   health_.follow(Fault::kBusBadFrame, now_ns, bus.bad_frames);
   health_.follow(Fault::kBusFrameLost, now_ns, bus.lost);
   health_.follow(Fault::kBusCallFailed, now_ns, bus.failed_calls);
+  health_.follow(Fault::kBusReplyStale, now_ns, bus.stale);
   health_.follow(Limit::kDriveClamped, now_ns, bus.clamped);
-  const bool feet_silent = bus.feet_silent && module_state() != ModuleState::kArming;
+  const bool may_start = module_state() == ModuleState::kArming && now_ns - start_.first_ns < kArmingTimeout_ns;
+  const bool feet_silent = bus.feet_silent && !may_start;
   if (feet_silent && !feet_silent_) health_.raise(Fault::kFeetSilent, now_ns);
   feet_silent_ = feet_silent;
   if (!bus.drive_errors.is_empty()) gait_.request_stop();
@@ -190,7 +198,7 @@ void ControlLane::report_bus(std::int64_t now_ns) noexcept {
 
 void ControlLane::report_lidar(std::int64_t now_ns) noexcept {
   const StateEstimate& state = estimator_.state();
-  const std::int64_t last_ns = state.lio_age_ns < 0 ? first_ns_ : state.stamp_ns - state.lio_age_ns;
+  const std::int64_t last_ns = state.lio_age_ns < 0 ? start_.first_ns : state.stamp_ns - state.lio_age_ns;
   const bool missing = now_ns - last_ns > kLioTimeout_ns;
   if (missing && !lio_missing_) health_.raise(Fault::kLioMissing, now_ns);
   lio_missing_ = missing;

@@ -3,6 +3,7 @@
 //
 // It starts arming: an MIT drive answers only a command, and where the legs are is not known before each has answered,
 // so commands without gains and torques ask them. From the first accepted feedback of all joints on the gait commands.
+// What has not answered half a second after the start is named, and asked on.
 #pragma once
 
 #include "algorithms/core/work.hpp"
@@ -43,7 +44,7 @@ class ControlLane {
  private:
   void look_across(std::int64_t now_ns) noexcept;
   void read_joints(std::int64_t now_ns) noexcept;
-  void note_silent_drives(const JointFeedback& joints, std::int64_t now_ns) noexcept;
+  void note_silent_drives(JointSet silent, std::int64_t now_ns) noexcept;
   void report_bus(std::int64_t now_ns) noexcept;
   void answer_pose_request(std::int64_t now_ns) noexcept;
   void report_lidar(std::int64_t now_ns) noexcept;
@@ -70,7 +71,11 @@ class ControlLane {
   bool feet_silent_ = false;
   bool lio_missing_ = false;
   bool gait_stopped_ = false;
-  std::int64_t first_ns_ = -1;          // of the first cycle: the time-out of a lidar that never speaks starts there
+  struct Start {
+    std::int64_t first_ns = -1;              // of the first cycle: time-outs of what never speaks start there
+    JointSet never_heard = JointSet::all();  // drives, as of the last feedback
+  };
+  Start start_;
   std::uint32_t step_handed_over_ = 0;  // sequence of the last touch-down told to the estimator
 };
 

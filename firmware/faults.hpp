@@ -40,7 +40,8 @@ namespace polygmap {
   X(34, kBusBadFrame, "bus_bad_frame", "A CAN frame had a wrong length or kind, or another drive's name in it.")     \
   X(35, kBusFrameLost, "bus_frame_lost", "CAN frames were lost between controller and module.")                      \
   X(36, kBusCallFailed, "bus_call_failed", "A CAN driver's call failed, and not for a full queue.")                  \
-  X(37, kFeetSilent, "feet_silent", "The feet's sensors were silent for more than five cycles.")
+  X(37, kFeetSilent, "feet_silent", "The feet's sensors were silent for more than five cycles.")                     \
+  X(38, kBusReplyStale, "bus_reply_stale", "A CAN reply had waited for more than two cycles: it was left out.")
 
 // A bound was met; the module goes on with what it has. Numbers 101-199.
 #define POLYGMAP_LIMITS(X)                                                                                          \

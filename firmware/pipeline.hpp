@@ -65,8 +65,9 @@ class Pipeline {
 
 // The module's static memory, stage by stage: sizeof(Pipeline), the executives and the stacks of all lanes.
 inline constexpr std::size_t kMemoryBudget_bytes = 16U * 1024U * 1024U;
-// Of a lane's thread: what it is to be given. toolchain/checks/stack refuses chains of calls of half of it.
-inline constexpr std::size_t kLaneStack_bytes = 64U * 1024U;
+// Of a lane's thread, at least: the smallest stack that a thread may have on AArch64. toolchain/checks/stack refuses
+// chains of calls of a quarter of it.
+inline constexpr std::size_t kLaneStack_bytes = 128U * 1024U;
 [[nodiscard]] std::span<const StageMemory> static_memory() noexcept;
 
 }  // namespace polygmap

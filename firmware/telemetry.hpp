@@ -27,7 +27,7 @@ enum class ModuleState : std::uint8_t {
 
 // What the joints' bus and drives tell of themselves.
 struct DriveReport {
-  JointSet silent;       // for more than LegSensing::kCarried_cycles, as of the last feedback
+  JointSet silent;       // for more than LegSensing::kCarried_cycles, as of the last feedback; arming: see ControlLane
   JointSet ever_silent;  // since the start
   hal::JointBusStatus bus;
 };

@@ -42,7 +42,8 @@ concept RunsRows = requires(T& tasks, std::size_t row, std::int64_t cycle_ns, Wo
   noexcept->std::same_as<Progress>;
 };
 
-// Optional: told of every cycle after its last row, on the lane's own thread.
+// Told of every cycle after its last row, on the lane's own thread. Who stands before the tasks hands it on: where it
+// stops, nothing crosses from lane to lane.
 template <typename T>
 concept WatchesCycles = requires(T& tasks, std::size_t lane, const CycleReport& report) {
   { tasks.cycle_done(lane, report) }
@@ -66,6 +67,7 @@ template <typename Tasks, const auto& Table, std::size_t Lane = 0, typename Coun
 class CyclicExecutive {
   static constexpr std::size_t kRows = Table.size();
   static_assert(RunsRows<Tasks>, "Tasks needs: Progress run_row(std::size_t, std::int64_t, WorkBudget&) noexcept");
+  static_assert(WatchesCycles<Tasks>, "Tasks needs: void cycle_done(std::size_t, const CycleReport&) noexcept");
   static_assert(CountsExecutiveEvents<Counters>, "Counters needs: raise(ExecutiveEvent, now_ns, times) noexcept");
   static_assert(kRows > 0 && kRows <= kMaxScheduleRows, "a schedule has 1 to kMaxScheduleRows rows");
   static_assert(Lane < lane_count(Table), "the schedule has no row in this lane");
@@ -234,7 +236,7 @@ class CyclicExecutive {
       cycles_in_time_ = 0;
     }
     ++next_cycle_;
-    if constexpr (WatchesCycles<Tasks>) tasks_.cycle_done(Lane, report_);
+    tasks_.cycle_done(Lane, report_);
   }
 
   void note_time_short() noexcept {

@@ -69,6 +69,7 @@ void each_field(auto& f, Of<hal::JointBusStatus> auto& m) {
   walk(f, "not_finite", m.not_finite);
   walk(f, "lost", m.lost);
   walk(f, "failed_calls", m.failed_calls);
+  walk(f, "stale", m.stale);
 }
 void each_field(auto& f, Of<GainLimits> auto& m) {
   walk(f, "kp_nmprad", m.kp_nmprad);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -63,6 +64,23 @@ void walk_outputs(auto& f, const Pipeline& module, std::size_t row, Progress pro
   } else if (task == "footholds") {
     walk(f, "footholds", perception.footholds_found());
   }
+}
+
+// One of everything that a recording has: of the header, the calls of ports and the rows' outputs. For f of names
+// alone.
+template <class... Messages>
+void walk_messages(auto& f) {
+  (walk(f, "", *std::make_unique<const Messages>()), ...);
+}
+void walk_recorded(auto& f) {
+  walk_messages<CameraIntrinsics, GainLimits, ImuSample, JointFeedback, LioSample, JointCommand, hal::JointBusStatus>(
+      f);
+  constexpr JointSet kTaken;
+  walk(f, "taken", kTaken);
+  walk_messages<StateEstimate, EstimateQuality, GaitStatus, FootholdSet, SurfaceFrame, MountFound, MapSnapshot>(f);
+  constexpr ModuleState kState{};
+  walk(f, "module_state", kState);
+  walk_health(f, HealthCounts{});
 }
 
 class FieldWriter {

@@ -28,12 +28,6 @@ struct NameHash {
   void names_only() const noexcept {}
 };
 
-template <class Message>
-void hash_fields(NameHash& f) {
-  const auto message = std::make_unique<const Message>();
-  walk(f, "", *message);
-}
-
 // How long a message without vectors is.
 struct FieldSize {
   std::size_t bytes = 0;
@@ -115,19 +109,7 @@ bool time_possible(std::int64_t t_ns) { return t_ns >= 0 && t_ns <= kLatest_ns; 
 
 std::uint64_t hash_of_fields() noexcept {
   NameHash f;
-  hash_fields<ImuSample>(f);
-  hash_fields<JointFeedback>(f);
-  hash_fields<LioSample>(f);
-  hash_fields<JointCommand>(f);
-  hash_fields<CameraIntrinsics>(f);
-  hash_fields<StateEstimate>(f);
-  hash_fields<EstimateQuality>(f);
-  hash_fields<GaitStatus>(f);
-  hash_fields<FootholdSet>(f);
-  hash_fields<SurfaceFrame>(f);
-  hash_fields<MountFound>(f);
-  hash_fields<MapSnapshot>(f);
-  walk_health(f, HealthCounts{});
+  walk_recorded(f);
   return f.hash;
 }
 

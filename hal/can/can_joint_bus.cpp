@@ -12,6 +12,10 @@ constexpr void count(std::uint32_t& counter, std::uint32_t times = 1) noexcept {
   counter += std::min(times, room);
 }
 
+constexpr JointSet without(JointSet set, std::size_t joint) noexcept {
+  return JointSet::of_bits(set.bits() & ~(1U << joint));
+}
+
 }  // namespace
 
 CanJointBus::CanJointBus(const DriveTable& table, std::span<CanChannel* const> channels) noexcept : table_(table) {
@@ -34,6 +38,7 @@ bool CanJointBus::try_read(JointFeedback& feedback) noexcept {
     }
   }
   count_bus_offs();
+  note_feet_silent();
   if (replied_.is_empty()) return false;
   feedback_.stamp_ns = command_ns_;
   for (std::size_t n = 0; n < kJointCount; ++n) {
@@ -42,10 +47,14 @@ bool CanJointBus::try_read(JointFeedback& feedback) noexcept {
     feedback_.silent_cycles[n] =
         static_cast<std::uint16_t>(std::clamp<std::int64_t>(cycles, 0, JointFeedback::kNeverHeard - 1));
   }
-  status_.feet_silent = table_.feet.present && (feet_ns_ < 0 || command_ns_ - feet_ns_ > kFeetHold_ns);
-  if (status_.feet_silent) feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
   feedback = feedback_;
   return true;
+}
+
+void CanJointBus::note_feet_silent() noexcept {
+  if (!table_.feet.present || command_ns_ < 0) return;
+  status_.feet_silent = feet_ns_ < 0 || command_ns_ - feet_ns_ > kSilent_ns;
+  if (status_.feet_silent) feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
 }
 
 void CanJointBus::take(std::size_t bus, const CanFrame& frame) noexcept {
@@ -54,13 +63,16 @@ void CanJointBus::take(std::size_t bus, const CanFrame& frame) noexcept {
   const std::span<const std::uint8_t> bytes(frame.data.data(), std::min<std::size_t>(frame.length, 8));
   bool known = false;
   const auto is_from = [&](std::uint32_t id) { return !frame.extended && frame.id == id; };
-  if (table_.feet.present && table_.feet.bus == bus && is_from(table_.feet.id)) return take_feet(frame);
+  const bool stale = frame.stamp_ns != 0 && command_ns_ - frame.stamp_ns > kStale_ns;
+  if (table_.feet.present && table_.feet.bus == bus && is_from(table_.feet.id)) {
+    return stale ? count(status_.stale) : take_feet(frame);
+  }
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const CanDrive& drive = table_.drives[n];
     if (drive.bus != bus || !is_from(drive.reply_id)) continue;
     known = true;
     if (bytes.empty() || name_in_reply(bytes, drive.reply) != reply_name(drive.id, drive.reply)) continue;
-    return take_reply(n, frame);
+    return stale ? count(status_.stale) : take_reply(n, frame);
   }
   count(known ? status_.bad_frames : status_.unknown_ids);
 }
@@ -79,8 +91,9 @@ void CanJointBus::take_reply(std::size_t joint, const CanFrame& frame) noexcept 
     return count(status_.bad_frames);
   }
   if (!reply.enabled && !heard_.contains(joint)) return;  // it is sent the frame that enters motor mode again
+  if (lapsed_.contains(joint) && !try_take_back(joint, reply)) return;
   const bool error = reply.error || !reply.enabled;
-  JointSet errors = JointSet::of_bits(status_.drive_errors.bits() & ~(1U << joint));
+  JointSet errors = without(status_.drive_errors, joint);
   if (error) {
     errors.insert(joint);
     count(status_.drive_error_replies);
@@ -97,26 +110,56 @@ void CanJointBus::take_reply(std::size_t joint, const CanFrame& frame) noexcept 
   replied_.insert(joint);
 }
 
+bool CanJointBus::try_take_back(std::size_t joint, const MitReply& reply) noexcept {
+  returned_.insert(joint);
+  if (!reply.enabled) {  // no error of a drive that is about to be entered
+    status_.drive_errors = without(status_.drive_errors, joint);
+    status_.drive_code[joint] = 0;
+    return false;
+  }
+  if (entered_.contains(joint) && !reply.error) {
+    lapsed_ = without(lapsed_, joint);
+  }
+  return true;
+}
+
+void CanJointBus::note_lapsed() noexcept {
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (heard_.contains(n) && command_ns_ - replied_ns_[n] > kSilent_ns) lapsed_.insert(n);
+  }
+}
+
+std::optional<MitSpecial> CanJointBus::special_due(std::size_t joint, std::uint32_t write) const noexcept {
+  if (write % 2 != 0) return std::nullopt;
+  if (!heard_.contains(joint)) return MitSpecial::kEnter;
+  if (!lapsed_.contains(joint)) return std::nullopt;
+  const bool in_error = status_.drive_errors.contains(joint);
+  const bool at_once = returned_.contains(joint) && !in_error;  // an error may stay, whatever is sent
+  if (!at_once && write % kEnterPeriod != 0) return std::nullopt;
+  const bool can_clear = table_.drives[joint].reply == MitReplyRule::kStatusNibble;
+  return in_error && can_clear ? MitSpecial::kClearErrors : MitSpecial::kEnter;
+}
+
 JointSet CanJointBus::try_write(const JointCommand& command) noexcept {
+  note_lapsed();
   command_ns_ = command.stamp_ns;
-  const bool enters = writes_++ % 2 == 0;
+  const std::uint32_t write = writes_++;
   JointFrames frames{};
-  JointSet made;
+  JointSet made, entered;
   for (std::size_t n = 0; n < kJointCount; ++n) {
     if (!try_encode_command(command.joints[n], table_.drives[n].ranges, frames[n], status_.clamped)) {
       count(status_.not_finite);
       continue;
     }
-    if (enters && !heard_.contains(n)) frames[n] = special_frame(MitSpecial::kEnter);
+    const std::optional<MitSpecial> special = special_due(n, write);
+    if (special) frames[n] = special_frame(*special);
+    if (special == MitSpecial::kEnter) entered.insert(n);
     made.insert(n);
   }
-  return send(frames, made);
-}
-
-JointSet CanJointBus::send_to_all(MitSpecial special) noexcept {
-  JointFrames frames;
-  frames.fill(special_frame(special));
-  return send(frames, JointSet::all());
+  returned_ = {};
+  const JointSet taken = send(frames, made);
+  entered_ = JointSet::of_bits(entered.bits() & taken.bits());
+  return taken;
 }
 
 JointSet CanJointBus::send(const JointFrames& frames, JointSet joints) noexcept {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "hal/can/drive_table.hpp"
@@ -13,8 +14,14 @@
 
 namespace polygmap::hal {
 
-// Replies answer the last command: they get its stamp, and no clock is read. A drive that has never answered is sent
-// the frame that enters motor mode and the command in turn; from its first answer on it is sent commands only.
+// Replies answer the last command: they get its stamp, and no clock is read. A reply with a stamp of its own, in the
+// clock of the commands, that lies kStale_ns before that command has waited in a queue: it is counted and left out.
+//
+// A drive that has never answered is sent the frame that enters motor mode and the command in turn; from its first
+// answer on it is sent commands. One that was silent for longer than kSilent_ns may have restarted, and is out of motor
+// mode then: it is sent that frame once in kEnterPeriod writes, and while it answers again in turn with the command
+// until an answer to that frame has come. While it tells of an error, the frame that clears errors goes first, where
+// its dialect has one, and no oftener.
 class CanJointBus final : public JointBus {
  public:
   // channels: one for each bus of the table, in its order; they outlive this. Buses without one are silent.
@@ -26,15 +33,14 @@ class CanJointBus final : public JointBus {
   [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override;
   [[nodiscard]] JointBusStatus status() const noexcept override;
 
-  // Instead of a command to every drive: which were taken. kExit lets go of the joints; kZero moves their zero for
-  // good.
-  [[nodiscard]] JointSet send_to_all(MitSpecial special) noexcept;
   // Drives that have answered since the start.
   [[nodiscard]] JointSet heard() const noexcept { return heard_; }
 
  private:
-  // The feet's forces hold for so long.
-  static constexpr std::int64_t kFeetHold_ns = 5 * kBusCycle_ns;
+  // Drives and the feet's board are silent after so long; until then the feet's forces hold.
+  static constexpr std::int64_t kSilent_ns = 5 * kBusCycle_ns;
+  static constexpr std::int64_t kStale_ns = 2 * kBusCycle_ns;
+  static constexpr std::uint32_t kEnterPeriod = 50;  // even
   // Of one bus in one call: a backlog is worked off, a babbling node is not followed.
   static constexpr std::size_t kMaxFramesPerRead = 64;
   using JointFrames = std::array<MitBytes, kJointCount>;
@@ -43,6 +49,13 @@ class CanJointBus final : public JointBus {
   void take_feet(const CanFrame& frame) noexcept;
   void take_reply(std::size_t joint, const CanFrame& frame) noexcept;
   void count_bus_offs() noexcept;
+  void note_feet_silent() noexcept;
+  // Drives that have been silent for too long when the next command is made.
+  void note_lapsed() noexcept;
+  // A lapsed drive answered: whether its reply counts, or it says that it is out of motor mode.
+  [[nodiscard]] bool try_take_back(std::size_t joint, const MitReply& reply) noexcept;
+  // In the stead of a joint's command, none when it gets the command; write: how many went before.
+  [[nodiscard]] std::optional<MitSpecial> special_due(std::size_t joint, std::uint32_t write) const noexcept;
   // joints: whose frame is to be sent.
   [[nodiscard]] JointSet send(const JointFrames& frames, JointSet joints) noexcept;
 
@@ -51,6 +64,9 @@ class CanJointBus final : public JointBus {
   JointFeedback feedback_;
   std::array<std::int64_t, kJointCount> replied_ns_{};  // stamp of the command that a joint's last reply answered
   JointSet heard_, replied_;                            // ever; since the last read
+  JointSet lapsed_;                                     // heard once, silent for too long since, not yet entered again
+  JointSet returned_;                                   // of those, the ones that have answered since the last write
+  JointSet entered_;                                    // sent the frame that enters motor mode by the last write
   std::int64_t command_ns_ = -1;                        // stamp of the last command; negative: none yet
   std::int64_t feet_ns_ = -1;                           // stamp of the command before the feet's last frame
   std::uint32_t writes_ = 0;

@@ -13,7 +13,6 @@ namespace polygmap::hal {
 
 inline constexpr std::size_t kMaxBuses = 8;
 inline constexpr std::uint32_t kMaxCanId = 0x7FF;
-inline constexpr std::int64_t kBusCycle_ns = 2 * kNsPerMs;  // a command and a reply of every drive
 // Of the time of a bus, with every frame at its longest: what is left takes repetitions and error frames.
 inline constexpr double kMaxBusLoad = 0.6;
 

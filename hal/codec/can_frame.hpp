@@ -13,7 +13,7 @@ struct CanFrame {
   bool extended = false;
   bool fd = false;
   bool error = false;         // the controller tells of an error; data as <linux/can/error.h> has it
-  std::int64_t stamp_ns = 0;  // of the driver, monotonic; 0: none. For logs: it enters no result
+  std::int64_t stamp_ns = 0;  // of the driver, monotonic; 0: none. Judges age only: it enters no result
   std::array<std::uint8_t, 64> data{};
 };
 

@@ -73,7 +73,9 @@ void LioUdp::take(const Datagram& datagram) noexcept {
   // Old packets, sent again, must not pass for a sender that started anew; packets out of sequence must not move the
   // estimate of the sender's clock.
   if (stamped_here_ && !is_timely()) return;
+  const std::uint32_t restarts = counters_.sequence.restarts;
   if (!watch_.takes(packet.sequence, counters_.sequence)) return;
+  if (counters_.sequence.restarts != restarts) clock_.restart();  // the sender's clock began anew, too
   if (!stamped_here_ && !is_timely()) return;
   if (sample.stamp_ns <= last_stamp_ns_) {
     count_up(counters_.sequence.out_of_order);

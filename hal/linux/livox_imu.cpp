@@ -43,9 +43,19 @@ bool LivoxImu::decoded(const Datagram& datagram, codec::LivoxImuPacket& packet) 
   return false;
 }
 
+// Numbers wrap around, and the lidar may begin them again at 0. What comes behind its successor is not missing twice.
+void LivoxImu::count_missing(std::uint16_t udp_count) noexcept {
+  const auto ahead = static_cast<std::uint16_t>(udp_count - udp_count_);
+  const auto behind = static_cast<std::uint16_t>(udp_count_ - udp_count);
+  if (started_ && udp_count != 0 && behind <= kFarthest) return;
+  if (started_ && ahead > 1 && ahead <= kFarthest) count_up(counters_.missing, ahead - 1U);
+  udp_count_ = udp_count;
+}
+
 void LivoxImu::take(const Datagram& datagram) noexcept {
   codec::LivoxImuPacket packet;
   if (!decoded(datagram, packet)) return;
+  count_missing(packet.udp_count);
   if (started_ && packet.time != time_) {
     count_up(counters_.clock_changed);
     clock_.restart();

@@ -21,7 +21,7 @@ class LivoxImu final : public Imu {
     SampleClock::Params time{.base = TimeBase::kEstimated};
     Mat3 base_R_imu = Mat3::Identity();  // a rotation; what the lever arm adds to the acceleration is not taken off
   };
-  struct Counters {  // saturate; of every datagram one rises, clock_changed and overwritten beside
+  struct Counters {  // saturate; of every datagram one rises, clock_changed, missing and overwritten beside
     std::uint32_t good = 0;
     std::uint32_t foreign = 0;  // another header version, or points
     std::uint32_t too_short = 0;
@@ -32,9 +32,12 @@ class LivoxImu final : public Imu {
     std::uint32_t out_of_order = 0;  // an earlier stamp
     TimeCounters time{};
     std::uint32_t clock_changed = 0;  // to another time_type: the offset is estimated anew
+    std::uint32_t missing = 0;        // numbers (udp_count) that no datagram had
     std::uint32_t overwritten = 0;    // good samples that nobody read
   };
   static constexpr std::size_t kQueue = 32;
+  static constexpr std::uint16_t kFarthest =
+      100;  // in datagrams: beyond that the lidar started anew, nothing is missing
 
   explicit LivoxImu(const SystemCalls& calls = kernel_calls()) noexcept : calls_(calls) {}
   [[nodiscard]] DeviceError open(const Config& config) noexcept;
@@ -46,6 +49,7 @@ class LivoxImu final : public Imu {
 
  private:
   void take(const Datagram& datagram) noexcept;
+  void count_missing(std::uint16_t udp_count) noexcept;
   [[nodiscard]] bool decoded(const Datagram& datagram, codec::LivoxImuPacket& packet) noexcept;
 
   const SystemCalls& calls_;
@@ -55,6 +59,7 @@ class LivoxImu final : public Imu {
   SampleClock clock_;
   bool started_ = false;
   codec::LivoxTime time_ = codec::LivoxTime::kNone;
+  std::uint16_t udp_count_ = 0;  // of the newest datagram
   std::int64_t last_stamp_ns_ = INT64_MIN;
   RingBuffer<ImuSample, kQueue> waiting_;
   Counters counters_;

@@ -61,7 +61,7 @@ class RowMeter {
   // After the last row of a cycle: the executive calls it.
   template <typename Report>
   void cycle_done(std::size_t lane, const Report& report) noexcept {
-    if constexpr (requires { tasks_.cycle_done(lane, report); }) tasks_.cycle_done(lane, report);
+    tasks_.cycle_done(lane, report);
     if (counter_ == nullptr) return;
     close_row();
     const InstructionCount spent = last_ - begin_;

@@ -87,6 +87,7 @@ DeviceError SocketCan::open_socket() noexcept {
     return system_error(name, "cannot bind the socket", errno);
   }
   dropped_ = 0;
+  was_down_ = false;
   socket_ = std::move(socket);
   return {};
 }
@@ -129,6 +130,8 @@ SocketCan::After SocketCan::failed(int error_number, int& attempts) noexcept {
     case ENETDOWN:  // the socket stays good: frames flow again when the interface is up
       count_up(counters_.interface_down);
       count_up(status_.failed_calls);
+      status_.bus_off = status_.error_passive = false;  // it comes up with a controller started anew
+      was_down_ = true;
       return After::kStop;
     case ENODEV:
     case ENXIO:
@@ -165,7 +168,9 @@ std::size_t SocketCan::read(std::span<CanFrame> frames) noexcept {
     prepare_read(room);
     const int count = calls_.recvmmsg(socket_.get(), in_.messages.data(), static_cast<unsigned>(room), MSG_DONTWAIT);
     if (count < 0) {
-      if (failed(errno, attempts) == After::kRetry) continue;
+      const int error_number = errno;
+      if (failed(error_number, attempts) == After::kRetry) continue;
+      if (error_number == EAGAIN) was_down_ = false;
       break;
     }
     if (count == 0) break;
@@ -179,6 +184,7 @@ std::size_t SocketCan::read(std::span<CanFrame> frames) noexcept {
         refused_one = true;
       }
     }
+    if (arrived < room) was_down_ = false;
     // Frames that are refused do not count for the span: a flood of them must not hold the lane.
     if (arrived < room || refused_one) break;
   }
@@ -234,6 +240,7 @@ void SocketCan::read_control(const msghdr& header, const ClockReading& now, CanF
 
 void SocketCan::note_error(const canfd_frame& frame) noexcept {
   count_up(status_.error_frames);
+  if (was_down_) return;  // the kernel tells of the interface before it gives the frames from before
   if ((frame.can_id & CAN_ERR_BUSOFF) != 0) status_.bus_off = true;
   if ((frame.can_id & CAN_ERR_RESTARTED) != 0) status_.bus_off = status_.error_passive = false;
   if ((frame.can_id & CAN_ERR_CRTL) != 0 && frame.len > 1) {

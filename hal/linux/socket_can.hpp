@@ -79,6 +79,7 @@ class SocketCan final : public CanChannel {
   DeviceOwner owner_;
   Descriptor socket_;
   std::uint32_t dropped_ = 0;  // as the kernel counts
+  bool was_down_ = false;      // the interface; frames from before may still wait to be read
   CanChannelStatus status_;
   Counters counters_;
   ReopenCounters reopens_;

@@ -24,6 +24,7 @@ struct JointBusStatus {
   std::uint32_t not_finite = 0;                        // commands that no frame was made of
   std::uint32_t lost = 0;                              // frames lost on the way from the controller
   std::uint32_t failed_calls = 0;                      // of the driver, for another reason than a full queue
+  std::uint32_t stale = 0;                             // replies that had waited too long to count as answers
 };
 
 class JointBus {

@@ -47,6 +47,15 @@ BusRobot::BusRobot(SimRobot& robot, const config::BusFile& bus, CandumpLog* log)
   (void)robot_.try_read(feedback_);
 }
 
+void BusRobot::set_fault(std::size_t joint, DriveFault fault) noexcept {
+  Drive& drive = drives_[joint];
+  if (drive.fault == DriveFault::kDead && fault != DriveFault::kDead) {
+    drive.enabled = false;
+    drive.command = {};
+  }
+  drive.fault = fault;
+}
+
 void BusRobot::advance() {
   const std::int64_t now_ns = robot_.now_ns();
   if (file_.table.feet.present && !feet_silent_) send_feet(now_ns);

@@ -19,7 +19,7 @@ namespace polygmap::sim {
 enum class DriveFault : std::uint8_t {
   kNone,
   kUnplugged,  // hears and says nothing, and holds what it was told last
-  kDead,       // says nothing and gives no torque
+  kDead,       // says nothing and gives no torque; afterwards it has restarted, and is out of motor mode
   kError,      // tells of an error and gives no torque
 };
 
@@ -35,7 +35,7 @@ class BusRobot {
 
   [[nodiscard]] hal::CanJointBus& joints() noexcept { return joints_; }
   [[nodiscard]] SimCanBus& bus(std::size_t i) noexcept { return *buses_[i]; }
-  void set_fault(std::size_t joint, DriveFault fault) noexcept { drives_[joint].fault = fault; }
+  void set_fault(std::size_t joint, DriveFault fault) noexcept;
   void set_feet_silent(bool silent) noexcept { feet_silent_ = silent; }
   // Instead of the robot's: the buses run for a tick, then the robot does.
   void advance();

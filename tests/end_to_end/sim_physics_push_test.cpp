@@ -53,9 +53,9 @@ std::vector<PushCase> every_moment(std::uint64_t seed, GaitPattern pattern) {
   return cases;
 }
 
-// A sole that lands where a push has brought it may hang over an edge, since there is no capture step. Of these 16 one
-// does, by 4.5 mm (ss, moment 5, to the left); none did by more than 0 while a foothold reached the gait a cycle
-// sooner, 2026-11-24.
+// A push may unload the standing sole for a moment, and the swing's landing then moves it: there is no capture step. Of
+// these 16 one sole ends 4.5 mm over an edge so (ss, moment 5, to the left: it slides back by 16 mm); none did by more
+// than 0 while a foothold reached the gait a cycle sooner, 2026-11-24.
 constexpr double kMostOver_m = 0.005;
 
 class Pushed : public testing::TestWithParam<PushCase> {};

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "firmware/schedule.hpp"
@@ -140,6 +141,63 @@ TEST_F(PipelineTest, BeforeAllDrivesAnswered_CommandsHaveNoGainsAndNothingElseBe
   EXPECT_GT(joints_.commands().newest().joints[11].kp_nmprad, 0.0) << "the robot's own gains";
 }
 
+class ArmingTest : public PipelineTest {
+ protected:
+  // Until half a second after the first cycle nothing is named, from then on it is, once; the module asks on.
+  template <class FeedbackAt>
+  void arm(Fault fault, std::uint32_t times, FeedbackAt feedback_at) {
+    for (int i = 0; i < 400; ++i) {
+      clock_.advance_ns(kCycle_ns);
+      const ImuSample imu = imu_at(clock_.now_ns());
+      const std::optional<JointFeedback> joints = feedback_at(clock_.now_ns());
+      tick_with(&imu, joints ? &*joints : nullptr);
+      ASSERT_EQ(count(fault), i < 250 ? 0U : times) << i;
+      ASSERT_EQ(control().module_state(), ModuleState::kArming);
+      ASSERT_EQ(joints_.commands().newest().stamp_ns, clock_.now_ns());
+      ASSERT_EQ(joints_.commands().newest().joints[3].kp_nmprad, 0.0);
+    }
+  }
+};
+
+TEST_F(ArmingTest, OneDriveNeverAnswers_IsNamedAfterHalfASecondAndTakenInWhenItDoes) {
+  ASSERT_NO_FATAL_FAILURE(arm(Fault::kDriveSilent, 1, [this](std::int64_t now_ns) {
+    JointFeedback joints = joints_at(now_ns);
+    joints.silent_cycles[11] = JointFeedback::kNeverHeard;
+    return std::optional(joints);
+  }));
+  EXPECT_EQ(control().drives().silent.bits(), 1U << 11U);
+  EXPECT_EQ(count(Fault::kJointFeedbackMissing), 0U);
+  stand(1);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+  EXPECT_TRUE(control().drives().silent.is_empty());
+  EXPECT_EQ(control().drives().ever_silent.bits(), 1U << 11U);
+  stand(100);
+  EXPECT_EQ(count(Fault::kDriveSilent), 1U);
+}
+
+TEST_F(ArmingTest, NoDriveEverAnswers_AllAreNamed) {
+  ASSERT_NO_FATAL_FAILURE(
+      arm(Fault::kDriveSilent, kJointCount, [](std::int64_t) { return std::optional<JointFeedback>(); }));
+  EXPECT_TRUE(control().drives().silent.is_all());
+  stand(1);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+  EXPECT_TRUE(control().drives().silent.is_empty());
+}
+
+TEST_F(ArmingTest, FeetNeverAnswer_AreNamedAfterHalfASecondAndTakenInWhenTheyDo) {
+  joints_.told.feet_silent = true;
+  ASSERT_NO_FATAL_FAILURE(arm(Fault::kFeetSilent, 1, [this](std::int64_t now_ns) {
+    JointFeedback joints = joints_at(now_ns);
+    joints.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
+    return std::optional(joints);
+  }));
+  EXPECT_EQ(count(Fault::kDriveSilent), 0U);
+  joints_.told.feet_silent = false;
+  stand(10);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+  EXPECT_EQ(count(Fault::kFeetSilent), 1U);
+}
+
 TEST_F(PipelineTest, BusTellsOfItsFaults_EachIsCountedUnderItsName) {
   stand(10);
   joints_.told.bus_offs = 1;
@@ -148,6 +206,7 @@ TEST_F(PipelineTest, BusTellsOfItsFaults_EachIsCountedUnderItsName) {
   joints_.told.lost = 4;
   joints_.told.failed_calls = 5;
   joints_.told.clamped = 6;
+  joints_.told.stale = 7;
   joints_.told.feet_silent = true;
   stand(2);
   EXPECT_EQ(count(Fault::kBusOff), 1U);
@@ -156,6 +215,7 @@ TEST_F(PipelineTest, BusTellsOfItsFaults_EachIsCountedUnderItsName) {
   EXPECT_EQ(count(Fault::kBusFrameLost), 4U);
   EXPECT_EQ(count(Fault::kBusCallFailed), 5U);
   EXPECT_EQ(count(Limit::kDriveClamped), 6U);
+  EXPECT_EQ(count(Fault::kBusReplyStale), 7U);
   EXPECT_EQ(count(Fault::kFeetSilent), 1U);
   EXPECT_EQ(control().module_state(), ModuleState::kRunning);
 }

@@ -10,6 +10,7 @@ struct OtherTasks {
 #else
   Progress run_row(std::size_t, std::int64_t, WorkBudget&) { return Progress::kDone; }
 #endif
+  void cycle_done(std::size_t, const CycleReport&) noexcept {}
 };
 constexpr ScheduleTable<1> kTable{{{.task = "control", .budget_us = 500}}};
 template class CyclicExecutive<OtherTasks, kTable>;

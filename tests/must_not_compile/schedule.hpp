@@ -6,5 +6,6 @@
 namespace polygmap {
 struct Tasks {
   Progress run_row(std::size_t, std::int64_t, WorkBudget&) noexcept { return Progress::kDone; }
+  void cycle_done(std::size_t, const CycleReport&) noexcept {}
 };
 }  // namespace polygmap

@@ -48,6 +48,8 @@ class JointSet {
   std::uint16_t bits_ = 0;
 };
 
+inline constexpr std::int64_t kBusCycle_ns = 2 * kNsPerMs;  // a command to every drive, and its reply
+
 struct JointFeedback {
   static constexpr std::uint16_t kNeverHeard = 0xFFFF;
 
@@ -59,7 +61,7 @@ struct JointFeedback {
   // joint keeps its last values and counts up; kNeverHeard: it has no values yet.
   std::array<std::uint16_t, kJointCount> silent_cycles{};
   [[nodiscard]] constexpr std::int64_t silent_ns(std::size_t joint) const noexcept {
-    return silent_cycles[joint] * 2 * kNsPerMs;
+    return silent_cycles[joint] * kBusCycle_ns;
   }
   std::array<double, kFootCount> foot_force_n{};  // vertical, 0 in the air
 };

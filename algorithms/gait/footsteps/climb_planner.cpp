@@ -13,6 +13,14 @@ SolePose in_odom(const Transform& world_T_odom, const Foothold& foothold) noexce
   return sole_pose(world_T_odom.inverse() * world_T_sole);
 }
 
+Foothold in_world(const Transform& world_T_odom, const SolePose& target, std::int64_t last_seen_ns) noexcept {
+  Foothold foothold;
+  foothold.position_m = world_T_odom * target.position_m;
+  foothold.yaw_rad = math::wrap_angle(target.yaw_rad + yaw_of(world_T_odom.R));
+  foothold.last_seen_ns = last_seen_ns;
+  return foothold;
+}
+
 bool usable(const std::array<Foothold, kFootCount>& feet) noexcept { return usable(feet[0]) && usable(feet[1]); }
 
 double measured(const FootholdSet& set) noexcept {
@@ -177,11 +185,24 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   const double short_m =
       params_.floor_clearance_m - toe_to_line_m(robot_->sole.collision, goal.target, to.nosing, to.yaw_rad);
   if (short_m > 0.0) goal.target.position_m -= rotation_z(to.yaw_rad) * Vec3{short_m, 0, 0};
-  const Vec3 world_p = situation.world_T_odom * goal.target.position_m;
-  goal.foothold.position_m = world_p;
-  goal.foothold.yaw_rad = math::wrap_angle(goal.target.yaw_rad + yaw_of(situation.world_T_odom.R));
-  goal.foothold.last_seen_ns = footholds.map_stamp_ns;
+  goal.foothold = in_world(situation.world_T_odom, goal.target, footholds.map_stamp_ns);
   return true;
+}
+
+StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSet& footholds) const noexcept {
+  StepGoal goal;
+  goal.kind = StepKind::kClosing;
+  goal.foot = memory_.last_swing;
+  goal.target = sole_beside(situation.soles[index_of(other(goal.foot))], goal.foot, robot_->stance.half_width_m);
+  goal.foothold = in_world(situation.world_T_odom, goal.target, footholds.map_stamp_ns);
+  goal.foothold.polygon_id = tread_id_;
+  return goal;
+}
+
+bool ClimbPlanner::close_up(const Situation& situation) noexcept {
+  const double apart_m = (situation.soles[0].position_m - situation.soles[1].position_m).norm();
+  closes_up_ = treads_climbed_ > 0 && apart_m > 2.0 * (robot_->stance.half_width_m + params_.line_up.lateral_m);
+  return closes_up_;
 }
 
 // From nearer by, an edge that is known too vaguely may be known better: no reason against the walk up.
@@ -201,6 +222,11 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
   Decision decision;
   if (split_stance_) {
     return passing_step(situation, footholds, decision) ? decision : trailing_step(situation, footholds);
+  }
+  if (closes_up_) {
+    decision.has_step = true;
+    decision.goal = closing_goal(situation, footholds);
+    return decision;
   }
   decision.measured_m = measured(footholds);
   decision.obstruction = reason_against(situation, footholds);
@@ -258,9 +284,12 @@ void ClimbPlanner::swing_aborted() noexcept { memory_ = before_latch_; }
 
 void ClimbPlanner::landed() noexcept {
   stride_share_ = 1.0;
+  closes_up_ = false;
   switch (latched_.goal.kind) {
     case StepKind::kFloor:
       ++floor_steps_;
+      break;
+    case StepKind::kClosing:
       break;
     case StepKind::kPassing:
       ++treads_climbed_;

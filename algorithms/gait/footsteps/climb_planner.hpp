@@ -114,6 +114,9 @@ class ClimbPlanner {
   bool shorten_floor_steps() noexcept;
   // The legs cannot pass the standing foot: the next step ends beside it.
   void refuse_passing() noexcept { passing_refused_ = true; }
+  // The legs cannot lead on. A foot that landed farther out, in a stance too wide for the ankle rolls of both legs,
+  // comes back beside the other one first. False when the feet are close enough already.
+  [[nodiscard]] bool close_up(const Situation& situation) noexcept;
   // The passing foot that is in the air lands beside the standing one instead.
   void passing_ends_beside(const StepGoal& goal) noexcept;
   // Its foot stands on its goal, or where it stood before: with which foot to lead as before the latch.
@@ -127,6 +130,8 @@ class ClimbPlanner {
   // Past the standing foot onto the tread beyond it; false when there is none to be sure of.
   [[nodiscard]] bool passing_step(const Situation& situation, const FootholdSet& footholds,
                                   Decision& decision) const noexcept;
+  // The foot that landed last, beside the other one on the same tread.
+  [[nodiscard]] StepGoal closing_goal(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] bool floor_goal(const Situation& situation, const FootholdSet& footholds,
                                 StepGoal& goal) const noexcept;
   [[nodiscard]] StopReason reason_against(const Situation& situation, const FootholdSet& footholds) const noexcept;
@@ -148,6 +153,7 @@ class ClimbPlanner {
   } memory_, before_latch_;
   bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this
   bool passing_refused_ = false;
+  bool closes_up_ = false;
   std::uint32_t tread_id_ = 0;  // under the foot that landed last
   std::uint32_t treads_climbed_ = 0;
   double stride_share_ = 1.0;  // of the floor step's limits

@@ -13,6 +13,10 @@ TorsoPose torso_of_foot(const SolePose& sole, Foot foot, double half_width_m, do
   return {sole.position_m - rotation_z(sole.yaw_rad) * b_f, sole.yaw_rad};
 }
 
+SolePose sole_beside(const SolePose& stance, Foot foot, double half_width_m) noexcept {
+  return foot_of_torso(torso_of_foot(stance, other(foot), half_width_m, 0.0), foot, half_width_m, 0.0);
+}
+
 TorsoPose middle_of(const SolePair& soles) noexcept {
   const double turn_rad = math::wrap_angle(soles[1].yaw_rad - soles[0].yaw_rad);
   return {0.5 * (soles[0].position_m + soles[1].position_m), math::wrap_angle(soles[0].yaw_rad + 0.5 * turn_rad)};

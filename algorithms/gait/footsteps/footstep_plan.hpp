@@ -32,6 +32,8 @@ using SolePair = std::array<SolePose, kFootCount>;
 [[nodiscard]] SolePose foot_of_torso(const TorsoPose& torso, Foot foot, double half_width_m, double height_m) noexcept;
 // Its inverse: the torso pose that the foot belongs to.
 [[nodiscard]] TorsoPose torso_of_foot(const SolePose& sole, Foot foot, double half_width_m, double height_m) noexcept;
+// The place of a foot beside a standing one: both belong to one torso pose.
+[[nodiscard]] SolePose sole_beside(const SolePose& stance, Foot foot, double half_width_m) noexcept;
 
 // Between the feet, at their mean height and heading.
 [[nodiscard]] TorsoPose middle_of(const SolePair& soles) noexcept;

@@ -12,7 +12,11 @@ enum class StepKind : std::uint8_t {
   kLeading,   // the first foot onto the next tread
   kTrailing,  // the second, beside it
   kPassing,   // or past it onto the tread beyond
+  kClosing,   // back beside it, on the same tread, from a place too far out
 };
+[[nodiscard]] constexpr bool on_level(StepKind kind) noexcept {
+  return kind == StepKind::kFloor || kind == StepKind::kClosing;
+}
 [[nodiscard]] constexpr bool onto_tread(StepKind kind) noexcept { return kind != StepKind::kFloor; }
 // It lands higher than the other foot stands, and the weight goes on to it.
 [[nodiscard]] constexpr bool leads(StepKind kind) noexcept {

@@ -28,7 +28,7 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   step = {.sequence = step.sequence + 1,
           .foot = goal_.foot,
           .onto_tread = onto_tread(goal_.kind),
-          .height_mapped = onto_tread(goal_.kind),
+          .height_mapped = onto_tread(goal_.kind) && goal_.kind != StepKind::kClosing,
           .latch_stamp_ns = in.now_ns,
           .map_stamp_ns = in.footholds.map_stamp_ns,
           .target = goal_.foothold,
@@ -106,7 +106,7 @@ Transform SwingPhase::beside_path(const BodyPlan& plan, const Transform& odom_T_
 void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   const SwingParams& params = gait.params.swing;
   const Transform& stance = gait.plan.plan_T_sole(other(goal_.foot));
-  const bool reaches_back = goal_.kind == StepKind::kFloor || goal_.kind == StepKind::kLeading;
+  const bool reaches_back = on_level(goal_.kind) || goal_.kind == StepKind::kLeading;
   const bool reaches_shortly = goal_.kind == StepKind::kPassing;  // the torso rises, and leaves its leg too short
   const double until = reaches_back      ? params.abort_share * path_.duration_ticks()
                        : reaches_shortly ? params.abort_passing_ticks
@@ -132,9 +132,7 @@ void SwingPhase::land_soon(const GaitInput& in, GaitShared& gait) noexcept {
   const Mat3 R = rotation_z(stance.yaw_rad);
   const Transform now = sole();
   const bool beside = (R.transpose() * (now.p_m - stance.position_m)).x() < -params.beside_from_m;
-  const double apart_m = 2.0 * gait.robot.stance.half_width_m;
-  const Vec3 beside_m = stance.position_m + R * Vec3{0.0, side_sign(goal_.foot) * apart_m, 0.0};
-  const SolePose target = beside ? SolePose{beside_m, stance.yaw_rad} : goal_.target;
+  const SolePose target = beside ? sole_beside(stance, goal_.foot, gait.robot.stance.half_width_m) : goal_.target;
   const Vec3 way_m = target.position_m - now.p_m;
   const auto ticks = static_cast<std::int32_t>(params.soon_ticks + params.soon_ticks_per_m * way_m.head<2>().norm());
   // Below its nosing the tread is not to be had straight, and toes point down.

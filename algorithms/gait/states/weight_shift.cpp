@@ -52,6 +52,7 @@ Transition WeightShift::legs_cannot(const GaitInput& in, GaitShared& gait) const
   }
   if (kind == StepKind::kFloor && gait.planner.shorten_floor_steps()) return Transition::stand();
   if (!std::exchange(gait.memory.retried, true)) return Transition::stand();
+  if (kind == StepKind::kLeading && in.usable && gait.planner.close_up(situation(in))) return Transition::stand();
   return Transition::stop(StopReason::kLegsCannot, kind == StepKind::kLeading ? decision_.rise_m : 0.0);
 }
 

@@ -13,6 +13,7 @@ StepKnots::StepKnots(const RobotModel& robot, const StepParams& params, std::int
                      const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept
     : foot_(step.goal.foot),
       soles_(soles),
+      joint_margin_rad_(step.joint_margin_rad),
       shift_ticks_(step.shift_ticks),
       swing_ticks_(step.swing_ticks),
       knot_ticks_(std::max(knot_ticks, 1)),
@@ -89,7 +90,7 @@ bool StepFeasibility::advance(const RobotModel& robot, const StepParams& params,
     if (!solve(robot, next_, previous_, q_rad)) check_.feasible = false;
     check_joints(robot.drives, q_rad);
     previous_ = q_rad;
-    check_.feasible = check_.feasible && check_.joint_margin_rad >= params.joint_margin_rad &&
+    check_.feasible = check_.feasible && check_.joint_margin_rad >= knots_.joint_margin_rad() &&
                       check_.knee_rad >= params.knee_min_rad && check_.speed_share <= params.speed_share;
     if (!check_.feasible) return true;
   }

@@ -25,6 +25,7 @@ class StepKnots {
   [[nodiscard]] const TorsoPose& torso_at_landing() const noexcept { return torso_at_landing_; }
   [[nodiscard]] HorizontalMotion com_at_landing() const noexcept { return com_.at(shift_ticks_ + swing_ticks_); }
   [[nodiscard]] std::int32_t count() const noexcept { return count_; }
+  [[nodiscard]] double joint_margin_rad() const noexcept { return joint_margin_rad_; }  // that the plan is to keep
   [[nodiscard]] std::int32_t knot_ticks() const noexcept { return knot_ticks_; }
   [[nodiscard]] StepKnot operator[](std::int32_t i) const noexcept;
 
@@ -35,6 +36,7 @@ class StepKnots {
   ComPlan com_;
   Swing swing_;
   TorsoPose torso_at_landing_;
+  double joint_margin_rad_ = 0.0;
   std::int32_t shift_ticks_ = 0, swing_ticks_ = 0, knot_ticks_ = 1, count_ = 0;
 };
 

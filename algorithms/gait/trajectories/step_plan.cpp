@@ -7,7 +7,7 @@ namespace polygmap {
 
 StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePair& soles,
                    const StepTry& tried) noexcept {
-  const bool on_floor = goal.kind == StepKind::kFloor, passing = goal.kind == StepKind::kPassing;
+  const bool on_floor = on_level(goal.kind), passing = goal.kind == StepKind::kPassing;
   const Foot stance = other(goal.foot);
   SolePair landed = soles;
   landed[index_of(goal.foot)] = goal.target;
@@ -23,6 +23,7 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
   const double rise_share = on_floor ? 1.0 : passing ? params.passing_rise_share : params.rise_share;
   plan.rise_ticks = static_cast<std::int32_t>(rise_share * plan.swing_ticks);
   plan.tried = tried;
+  plan.joint_margin_rad = goal.kind == StepKind::kClosing ? params.closing_margin_rad : params.joint_margin_rad;
   plan.shape.toe_down_rad = on_floor ? 0.5 * tried.toe_down_rad : tried.toe_down_rad;
   const auto zmp_in = [&](Foot foot) -> Vec2 {
     const SolePose& sole = landed[index_of(foot)];

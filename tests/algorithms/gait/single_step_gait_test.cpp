@@ -192,23 +192,42 @@ TEST(SingleStepGait, PassingFootPutBack_PassesAgain) {
   }
 }
 
-TEST(SingleStepGait, ToppledOnTheWay_LandsBesideTheFrontFootAndTakesNoHeightForNews) {
+// It lands as far out as it may: from there a shift of the weight asks more of the ankle than the plan of a step up
+// takes, by a milliradian.
+TEST(SingleStepGait, ToppledOnTheWay_LandsBesideTheFrontFootClosesUpAndClimbsOn) {
   IdealClimb climb({}, single_step());
   topple(climb, 3, 70);
   run_to_swing(climb, 3);
   EXPECT_TRUE(climb.status().step.height_mapped);
   climb.run(60.0);
   EXPECT_EQ(climb.status().aborted_swings, 0U);
-  // It lands as far out as it may: from there the next shift asks more of the ankle than a plan takes, by a
-  // milliradian.
-  EXPECT_EQ(climb.status().stop_reason, StopReason::kLegsCannot);
-  EXPECT_EQ(treads_of(climb), (std::vector<int>{1, 2, 2}));
-  EXPECT_TRUE(climb.status().stands[0] && climb.status().stands[1]);
   const LatchedStep beside = onto_treads(climb)[2];
   EXPECT_FALSE(beside.height_mapped);
   const Vec3 apart_m = beside.odom_T_target.p_m - onto_treads(climb)[1].odom_T_executed.p_m;
   EXPECT_NEAR(apart_m.x(), 0.0, 0.01);
   EXPECT_NEAR(std::abs(apart_m.y()), 2.0 * kStanceHalfWidth_m, 0.01);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kFinished) << static_cast<int>(climb.status().stop_reason);
+  EXPECT_EQ(treads_of(climb), (std::vector<int>{1, 2, 2, 2, 3, 4, 4}));
+  const LatchedStep closing = onto_treads(climb)[3];
+  EXPECT_EQ(closing.foot, beside.foot);
+  EXPECT_FALSE(closing.height_mapped);
+  EXPECT_NEAR(std::abs((closing.odom_T_executed.p_m - onto_treads(climb)[1].odom_T_executed.p_m).y()),
+              2.0 * kStanceHalfWidth_m, 0.01);
+  EXPECT_GE(climb.record().joint_margin_rad, 0.0);
+}
+
+// The stance that a step cannot be made from is not too wide: there is nothing to close.
+TEST(SingleStepGait, LegsCannotFromAStanceOfUsualWidth_StopsWithoutClosingUp) {
+  IdealClimb climb({}, single_step());
+  climb.tamper = [&](StateEstimate&, FootholdSet& set, JointFeedback&) {
+    if (treads_of(climb).empty()) return;
+    for (auto* feet : {&set.p_star_feet, &set.p_star_star_feet}) {
+      for (Foothold& hold : *feet) hold.position_m.z() += 0.3;
+    }
+  };
+  climb.run(60.0);
+  EXPECT_EQ(climb.status().stop_reason, StopReason::kLegsCannot);
+  EXPECT_EQ(treads_of(climb), (std::vector<int>{1, 1}));
 }
 
 TEST(SingleStepGait, StateLostWhileThePassingStepIsImpossible_StopsOnBothFeet) {

@@ -82,6 +82,21 @@ class CanJointBusTest : public testing::TestWithParam<MitReplyRule> {
     return bus_->try_write(command);
   }
 
+  // Writes and says, of each joint, which special frame it was sent: its last byte, 0 for a command.
+  std::array<std::uint8_t, kJointCount> written() {
+    for (FakeChannel& channel : channels_) channel.sent.clear();
+    write();
+    std::array<std::uint8_t, kJointCount> special{};
+    for (const FakeChannel& channel : channels_) {
+      for (const CanFrame& frame : channel.sent) {
+        MitBytes bytes{};
+        std::copy_n(frame.data.begin(), bytes.size(), bytes.begin());
+        if (is_special_frame(bytes)) special[frame.id - 1] = bytes[7];
+      }
+    }
+    return special;
+  }
+
   DriveTable table_;
   std::array<FakeChannel, 4> channels_;
   std::array<CanChannel*, 4> pointers_{&channels_[0], &channels_[1], &channels_[2], &channels_[3]};
@@ -354,11 +369,159 @@ TEST_P(CanJointBusTest, Status_BusGoesOffTwice_IsCountedTwice) {
   EXPECT_EQ(bus_->status().failed_calls, 5U);
 }
 
-TEST_P(CanJointBusTest, SendToAll_Exit_LetsGoOfEveryDrive) {
-  EXPECT_TRUE(bus_->send_to_all(MitSpecial::kExit).is_all());
-  for (const FakeChannel& channel : channels_) {
-    for (const CanFrame& frame : channel.sent) EXPECT_EQ(frame.data[7], 0xFD);
+TEST_P(CanJointBusTest, DriveSilentThenBack_IsEnteredAgainAndTheOthersAreNotDisturbed) {
+  write();
+  answer_all(0.5);
+  JointFeedback feedback;
+  ASSERT_TRUE(bus_->try_read(feedback));
+  int entered = 0;
+  for (int cycle = 0; cycle < 205; ++cycle) {
+    const auto special = written();
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      if (n != 4) {
+        ASSERT_EQ(special[n], 0) << "joint " << n << " answers";
+      }
+    }
+    ASSERT_TRUE(special[4] == 0 || special[4] == 0xFC);
+    if (cycle < 5) {
+      ASSERT_EQ(special[4], 0) << "not yet silent";
+    }
+    entered += special[4] != 0;
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      if (n != 4) answer(n, 0.5);
+    }
+    ASSERT_TRUE(bus_->try_read(feedback));
   }
+  EXPECT_EQ(entered, 4) << "once in 50 cycles";
+  // It is up again, and answers a command without being in motor mode: only some dialects tell so.
+  const bool tells = GetParam() == MitReplyRule::kStatusNibble;
+  while (written()[4] != 0) {
+  }
+  int writes = 0;
+  do {
+    channels_[1].incoming.push_back(reply_of(4, 0.6, tells ? 0 : 255));
+    answer(0, 0.5);
+    ASSERT_TRUE(bus_->try_read(feedback));
+    EXPECT_EQ(feedback.silent_cycles[4] == 0, !tells);
+    EXPECT_TRUE(bus_->status().drive_errors.is_empty()) << "it is about to be entered";
+    ASSERT_LT(++writes, 3) << "entered at once";
+  } while (written()[4] == 0);
+  answer(4, 0.7);
+  ASSERT_TRUE(bus_->try_read(feedback));
+  EXPECT_EQ(feedback.silent_cycles[4], 0);
+  EXPECT_NEAR(feedback.q_rad[4], 0.7, 2e-4);
+  for (int cycle = 0; cycle < 120; ++cycle) {
+    EXPECT_EQ(written()[4], 0) << "it has answered the frame that enters";
+    answer(4, 0.7);
+    ASSERT_TRUE(bus_->try_read(feedback));
+  }
+}
+
+TEST_P(CanJointBusTest, DriveAnswersOnceAndIsSilentAgain_IsNotEnteredOftener) {
+  write();
+  answer_all(0.5);
+  JointFeedback feedback;
+  ASSERT_TRUE(bus_->try_read(feedback));
+  for (int cycle = 0; cycle < 10; ++cycle) write();
+  answer(4, 0.6);
+  ASSERT_TRUE(bus_->try_read(feedback));
+  int entered = 0;
+  for (int cycle = 0; cycle < 200; ++cycle) entered += written()[4] != 0;
+  EXPECT_LE(entered, 5);
+}
+
+TEST_P(CanJointBusTest, EnterFrameRefused_IsSentAgain) {
+  write();
+  answer_all(0.5);
+  JointFeedback feedback;
+  ASSERT_TRUE(bus_->try_read(feedback));
+  for (int cycle = 0; cycle < 10; ++cycle) write();  // all silent
+  for (FakeChannel& channel : channels_) channel.room = 0;
+  for (int cycle = 0; cycle < 40; ++cycle) write();  // the last of them is the 51st write, which enters
+  for (FakeChannel& channel : channels_) channel.room = 100;
+  for (const int special : {0x00, 0xFC}) {
+    answer(4, 0.6);
+    ASSERT_TRUE(bus_->try_read(feedback));
+    EXPECT_EQ(written()[4], special) << "what answered was not entered";
+  }
+}
+
+TEST_P(CanJointBusTest, DriveComesBackWithAnError_IsClearedThenEntered) {
+  if (GetParam() != MitReplyRule::kStatusNibble) GTEST_SKIP() << "no frame of its dialect clears an error";
+  write();
+  answer_all(0.5);
+  JointFeedback feedback;
+  ASSERT_TRUE(bus_->try_read(feedback));
+  for (int cycle = 0; cycle < 20; ++cycle) write();
+  int cleared = 0;
+  for (int cycle = 0; cycle < 200; ++cycle) {
+    const std::uint8_t special = written()[4];
+    ASSERT_TRUE(special == 0 || special == 0xFB) << "not entered while the error stays";
+    cleared += special != 0;
+    channels_[1].incoming.push_back(reply_of(4, 0.5, 9));
+    ASSERT_TRUE(bus_->try_read(feedback));
+    EXPECT_TRUE(bus_->status().drive_errors.contains(4));
+  }
+  EXPECT_EQ(cleared, 4) << "once in 50 cycles";
+  while (written()[4] != 0xFB) {
+  }
+  channels_[1].incoming.push_back(reply_of(4, 0.5, 0));
+  EXPECT_FALSE(bus_->try_read(feedback)) << "cleared, and out of motor mode";
+  EXPECT_TRUE(bus_->status().drive_errors.is_empty());
+  EXPECT_EQ(bus_->status().drive_code[4], 0);
+  EXPECT_EQ(written()[4], 0);
+  channels_[1].incoming.push_back(reply_of(4, 0.5, 0));
+  EXPECT_FALSE(bus_->try_read(feedback));
+  EXPECT_EQ(written()[4], 0xFC);
+  answer(4, 0.5);
+  ASSERT_TRUE(bus_->try_read(feedback));
+  EXPECT_EQ(written()[4], 0);
+}
+
+TEST_P(CanJointBusTest, Read_ReplyThatHasWaited_IsCountedAndNotFresh) {
+  write();
+  answer_all(0.5);
+  JointFeedback feedback;
+  ASSERT_TRUE(bus_->try_read(feedback));
+  write();
+  const auto arrive = [this](std::size_t joint, std::int64_t stamp_ns) {
+    CanFrame frame = reply_of(joint, 0.9);
+    frame.stamp_ns = stamp_ns;
+    channels_[table_.drives[joint].bus].incoming.push_back(frame);
+  };
+  arrive(0, now_ns_ + 300'000);
+  arrive(1, now_ns_ - 2 * kBusCycle_ns);
+  arrive(2, now_ns_ - 2 * kBusCycle_ns - 1);
+  arrive(3, 1);
+  arrive(4, 0);                         // none: unknown, and fresh
+  arrive(5, now_ns_ + 3600 * kNsPerS);  // of another clock: as if it had none
+  CanFrame feet;
+  feet.id = 0x60;
+  feet.length = 4;
+  feet.stamp_ns = now_ns_ - 10 * kBusCycle_ns;
+  channels_[0].incoming.push_back(feet);
+  ASSERT_TRUE(bus_->try_read(feedback));
+  EXPECT_EQ(feedback.stamp_ns, now_ns_) << "the command's, whatever the frames'";
+  for (const std::size_t n : {0U, 1U, 4U, 5U}) {
+    EXPECT_EQ(feedback.silent_cycles[n], 0) << n;
+    EXPECT_NEAR(feedback.q_rad[static_cast<Eigen::Index>(n)], 0.9, 2e-4) << n;
+  }
+  for (const std::size_t n : {2U, 3U}) {
+    EXPECT_EQ(feedback.silent_cycles[n], 1) << n;
+    EXPECT_NEAR(feedback.q_rad[static_cast<Eigen::Index>(n)], 0.5, 2e-4) << n;
+  }
+  EXPECT_EQ(feedback.foot_force_n[0], 270.0) << "as it was told last";
+  EXPECT_EQ(bus_->status().stale, 3U);
+  EXPECT_EQ(bus_->status().bad_frames + bus_->status().unknown_ids, 0U);
+}
+
+TEST_P(CanJointBusTest, Read_NothingAnswersAfterTheStart_FeetAreSilentToo) {
+  JointFeedback feedback;
+  EXPECT_FALSE(bus_->try_read(feedback));
+  EXPECT_FALSE(bus_->status().feet_silent) << "nobody was asked yet";
+  write();
+  EXPECT_FALSE(bus_->try_read(feedback));
+  EXPECT_TRUE(bus_->status().feet_silent);
 }
 
 TEST(BusLoad, ThreeDrivesAt1MbitPerS_Take41Percent) {

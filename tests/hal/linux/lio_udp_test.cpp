@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sim_stub/heap_trap.hpp"
+#include "tests/hal/linux/call_sweep.hpp"
 #include "tests/hal/linux/clock_now.hpp"
 #include "tests/hal/linux/scripted_calls.hpp"
 #include "tests/hal/linux/udp_sender.hpp"
@@ -160,6 +161,29 @@ TEST(LioUdp, TryRead_SenderStartsAnew_TakenFromTheFifthPacketOn) {
   EXPECT_EQ(f.lio.counters().sequence.restarts, 1U);
 }
 
+TEST(LioUdp, TryRead_SenderStartsAnewWithItsOwnClock_SequenceAndClockRestartTogether) {
+  Fixture f;
+  f.lio.close();
+  f.open({.udp = {.port = f.port_number}, .time = {.base = hal::TimeBase::kEstimated}});
+  f.next = {.sequence = 500'000, .stamp_ns = 900'000'000'000};
+  f.next.position_sigma_m = f.next.rotation_sigma_rad = {0.01, 0.01, 0.01};
+  for (int i = 0; i < 5; ++i) f.feed();
+  EXPECT_EQ(f.read_all(), 5);
+  f.next.sequence = 0;
+  f.next.stamp_ns = 1'000'000;  // since its new start
+  int taken = 0;
+  for (int i = 0; i < 8; ++i) {
+    f.feed();
+    for (LioSample s; f.lio.try_read(s);) {
+      ++taken;
+      EXPECT_NEAR(static_cast<double>(s.stamp_ns), static_cast<double>(test::monotonic_now_ns()), 50e6);
+    }
+  }
+  EXPECT_EQ(taken, 4) << "from the fifth on, as of any sender that starts anew";
+  EXPECT_EQ(f.lio.counters().sequence.restarts, 1U);
+  EXPECT_EQ(f.lio.counters().time.clock_jumped, 0U);
+}
+
 TEST(LioUdp, TryRead_StampOff_CountedByItsName) {
   Fixture f;
   LioPacket p = f.advance();
@@ -262,13 +286,8 @@ TEST(LioUdp, TryRead_Interrupted_TriesAgainAndNotForEver) {
 }
 
 // Opens, reads three packets and closes; what can be counted of failures.
-struct Outcome {
-  bool opened = false;
-  int read = 0;
-  std::uint32_t failures = 0;
-};
-Outcome open_and_read(test::ScriptedCalls& calls) {
-  Outcome o;
+test::SweepOutcome open_and_read(test::ScriptedCalls& calls) {
+  test::SweepOutcome o;
   const std::uint16_t port = test::free_udp_port();
   test::UdpSender sender(port);
   hal::LioUdp lio(calls.table());
@@ -291,33 +310,9 @@ Outcome open_and_read(test::ScriptedCalls& calls) {
 }
 
 TEST(LioUdp, EverySystemCall_EveryFault_IsToldOrCountedAndNothingLeaks) {
-  std::size_t calls_made = 0;
-  {
-    test::ScriptedCalls calls;
-    const Outcome o = open_and_read(calls);
-    EXPECT_TRUE(o.opened);
-    EXPECT_EQ(o.read, 3);
-    EXPECT_EQ(calls.open_descriptors(), 0);
-    calls_made = calls.all_calls();
-  }
-  ASSERT_GT(calls_made, 10U);
-  for (const int error_number : test::kErrors) {
-    for (std::size_t nth = 0; nth < calls_made; ++nth) {
-      test::ScriptedCalls calls;
-      calls.fail_any(nth, error_number);
-      const Outcome o = open_and_read(calls);
-      EXPECT_EQ(calls.open_descriptors(), 0) << nth << " " << error_number;
-      ASSERT_TRUE(calls.failed_any());
-      const test::Call hit = *calls.failed_any();
-      const bool harmless = hit == test::Call::kClose || hit == test::Call::kSetsockopt ||
-                            (hit == test::Call::kRecvmmsg && error_number == EAGAIN);
-      EXPECT_TRUE(harmless || !o.opened || o.failures > 0) << nth << " " << error_number;
-      // Once open, a call that fails once loses nothing.
-      if (o.opened && hit != test::Call::kClockGettime) {
-        EXPECT_EQ(o.read, 3) << nth << " " << error_number;
-      }
-    }
-  }
+  // Once open, a call that fails once loses nothing; without the clock a packet has no time of arrival.
+  test::sweep_failing_calls(3, open_and_read, test::is_harmless_to_udp,
+                            [](test::Call hit) { return hit == test::Call::kClockGettime ? 0 : 3; });
 }
 
 }  // namespace

@@ -4,9 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
 #include <vector>
 
 #include "sim_stub/heap_trap.hpp"
+#include "tests/hal/linux/call_sweep.hpp"
 #include "tests/hal/linux/clock_now.hpp"
 #include "tests/hal/linux/scripted_calls.hpp"
 #include "tests/hal/linux/udp_sender.hpp"
@@ -174,16 +176,53 @@ TEST(LivoxImu, TryRead_OtherTimeType_EstimatesAnewAtOnce) {
   EXPECT_EQ(f.imu.counters().time.clock_jumped, 0U);
 }
 
-TEST(LivoxImu, EveryReceiveFault_OnceOpen_IsCountedAndLosesNothing) {
-  for (const int error_number : test::kErrors) {
-    Fixture f;
+TEST(LivoxImu, TryRead_NumbersLeftOut_MissingCountsThem) {
+  Fixture f;
+  const auto count_after = [&f](std::uint16_t udp_count) {
+    f.next.udp_count = static_cast<std::uint16_t>(udp_count - 1);
     f.feed();
-    f.calls.fail(test::Call::kRecvmmsg, error_number);
-    const int first = f.read_all();
-    EXPECT_EQ(first + f.read_all(), 1) << error_number;
-    const auto& c = f.imu.udp_counters();
-    EXPECT_EQ(c.interrupted + c.failed_calls, error_number == EAGAIN ? 0U : 1U) << error_number;
+    EXPECT_EQ(f.read_all(), 1);
+    return f.imu.counters().missing;
+  };
+  EXPECT_EQ(count_after(65'530), 0U) << "the first has no last one";
+  EXPECT_EQ(count_after(65'531), 0U);
+  EXPECT_EQ(count_after(65'535), 3U);
+  EXPECT_EQ(count_after(2), 5U) << "0 and 1, when numbers wrap around";
+  EXPECT_EQ(count_after(1), 5U) << "behind";
+  EXPECT_EQ(count_after(3), 5U) << "and its successor is missed by nobody";
+  EXPECT_EQ(count_after(20), 21U);
+  EXPECT_EQ(count_after(0), 21U) << "numbers begin anew";
+  EXPECT_EQ(count_after(2), 22U);
+  EXPECT_EQ(count_after(30'000), 22U) << "so far away is another start";
+  EXPECT_EQ(count_after(30'001), 22U);
+}
+
+test::SweepOutcome open_and_read(test::ScriptedCalls& calls) {
+  test::SweepOutcome o;
+  const std::uint16_t port = test::free_udp_port();
+  test::UdpSender sender(port);
+  hal::LivoxImu imu(calls.table());
+  const hal::DeviceError error = imu.open(
+      {.udp = {.port = port}, .time = {.base = hal::TimeBase::kMonotonic, .most_age_ns = test::half_of_uptime_ns()}});
+  o.opened = !error.failed();
+  if (!o.opened) {
+    EXPECT_EQ(std::string(error.sentence()).find("UDP port "), 0U);
   }
+  LivoxImuPacket packet{.stamp_ns = test::monotonic_now_ns()};
+  for (int i = 0; i < 3; ++i) {
+    ++packet.udp_count;
+    packet.stamp_ns += 1000;
+    sender.send(bytes_of(packet));
+    for (ImuSample sample; imu.try_read(sample);) ++o.read;
+  }
+  for (ImuSample sample; imu.try_read(sample);) ++o.read;
+  o.failures = imu.udp_counters().failed_calls + imu.udp_counters().interrupted;
+  return o;
+}
+
+TEST(LivoxImu, EverySystemCall_EveryFault_IsToldOrCountedAndNothingLeaks) {
+  test::sweep_failing_calls(3, open_and_read, test::is_harmless_to_udp,
+                            [](test::Call hit) { return hit == test::Call::kClockGettime ? 0 : 3; });
 }
 
 TEST(LivoxImu, TryRead_KernelSaysMoreBytesThanThereIsRoomFor_ReadsNoneBeyond) {

@@ -32,6 +32,8 @@ struct FakeTasks {
     budget.spend(units);
     return progress;
   }
+  int cycles_done = 0;
+  void cycle_done(std::size_t, int) noexcept { ++cycles_done; }
 };
 
 enum Row : std::size_t { kControl, kSurfaces, kMap, kRows };
@@ -51,6 +53,13 @@ class RowMeterTest : public testing::Test {
   FakeTasks tasks_{counter_};
   RowMeter<FakeTasks, kRows, FakeCounter> meter_{tasks_, 1U << kControl, 1U << kSurfaces | 1U << kMap};
 };
+
+TEST_F(RowMeterTest, CycleDone_CountedOrNot_IsHandedOn) {
+  end_cycle();
+  meter_.count_with(counter_);
+  end_cycle();
+  EXPECT_EQ(tasks_.cycles_done, 2);
+}
 
 TEST_F(RowMeterTest, Cycle_ThreeRows_EachIsCountedWithoutTheReads) {
   meter_.count_with(counter_);

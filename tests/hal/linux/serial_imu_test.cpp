@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "sim_stub/heap_trap.hpp"
+#include "tests/hal/linux/call_sweep.hpp"
 #include "tests/hal/linux/clock_now.hpp"
 #include "tests/hal/linux/scripted_calls.hpp"
 #include "tests/support/port_contract.hpp"
@@ -244,13 +245,8 @@ TEST(SerialImu, Open_ThatCannotBe_SaysWhy) {
   EXPECT_EQ(calls.open_descriptors(), 0);
 }
 
-struct Outcome {
-  bool opened = false;
-  int read = 0;
-  std::uint32_t failures = 0;
-};
-Outcome open_and_read(test::ScriptedCalls& calls) {
-  Outcome o;
+test::SweepOutcome open_and_read(test::ScriptedCalls& calls) {
+  test::SweepOutcome o;
   Terminal line;
   hal::SerialImu imu(calls.table());
   const hal::DeviceError error = imu.open(
@@ -272,31 +268,11 @@ Outcome open_and_read(test::ScriptedCalls& calls) {
 }
 
 TEST(SerialImu, EverySystemCall_EveryFault_IsToldOrCountedAndNothingLeaks) {
-  std::size_t calls_made = 0;
-  {
-    test::ScriptedCalls calls;
-    const Outcome o = open_and_read(calls);
-    EXPECT_TRUE(o.opened);
-    EXPECT_EQ(o.read, 3);
-    calls_made = calls.all_calls();
-    EXPECT_EQ(calls.open_descriptors(), 0);
-  }
-  for (const int error_number : test::kErrors) {
-    for (std::size_t nth = 0; nth < calls_made; ++nth) {
-      test::ScriptedCalls calls;
-      calls.fail_any(nth, error_number);
-      const Outcome o = open_and_read(calls);
-      EXPECT_EQ(calls.open_descriptors(), 0) << nth << " " << error_number;
-      ASSERT_TRUE(calls.failed_any());
-      const test::Call hit = *calls.failed_any();
-      const bool harmless = hit == test::Call::kClose || hit == test::Call::kIoctl ||
-                            (hit == test::Call::kRead && error_number == EAGAIN);
-      EXPECT_TRUE(harmless || !o.opened || o.failures > 0) << nth << " " << error_number;
-      if (o.opened) {
-        EXPECT_GE(o.read, 1) << nth << " " << error_number;  // it comes back
-      }
-    }
-  }
+  const auto is_harmless = [](test::Call hit, int error_number) {
+    return hit == test::Call::kClose || hit == test::Call::kIoctl ||
+           (hit == test::Call::kRead && error_number == EAGAIN);
+  };
+  test::sweep_failing_calls(3, open_and_read, is_harmless, [](test::Call) { return 1; });  // it comes back
 }
 
 }  // namespace

@@ -225,6 +225,37 @@ TEST(SocketCan, ReadWrite_InterfaceDownAndUp_SameSocketGoesOn) {
   EXPECT_EQ(h.can.write({&frame, 1}), 1U);
 }
 
+// A controller that left its bus, and an interface set down and up, which starts it anew.
+TEST(SocketCan, ReadWrite_InterfaceDownWhileBusOff_EachBusOffIsSeen) {
+  FakeSocketCanHarness h;
+  const auto set_down = [&h] {
+    h.bus.up = false;
+    h.bus.pending_error = ENETDOWN;
+    EXPECT_EQ(read(h.can).size(), 0U);
+    EXPECT_FALSE(h.can.status().bus_off);
+    EXPECT_FALSE(h.can.status().error_passive);
+  };
+  for (std::uint32_t i = 1; i <= 2; ++i) {
+    h.arrive(error_frame(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
+    h.arrive(error_frame(CAN_ERR_BUSOFF));
+    EXPECT_EQ(read(h.can).size(), 2U);
+    EXPECT_TRUE(h.can.status().bus_off);
+    set_down();
+    EXPECT_EQ(h.can.counters().interface_down, i);
+    EXPECT_EQ(read(h.can).size(), 0U);
+    h.bus.up = true;
+  }
+  // The kernel tells of the interface first, then it gives what had come before.
+  h.arrive(error_frame(CAN_ERR_BUSOFF));
+  set_down();
+  EXPECT_EQ(read(h.can).size(), 1U);
+  EXPECT_FALSE(h.can.status().bus_off);
+  h.bus.up = true;
+  h.arrive(error_frame(CAN_ERR_BUSOFF));
+  EXPECT_EQ(read(h.can).size(), 1U);
+  EXPECT_TRUE(h.can.status().bus_off);
+}
+
 TEST(SocketCan, ReadWrite_InterfaceGoesAndComesBack_MaintainOpensItAnew) {
   FakeSocketCanHarness h;
   h.arrive(error_frame(CAN_ERR_BUSOFF));

@@ -84,6 +84,11 @@ TEST_P(BusModuleTest, OneDriveMissingAtTheStart_StaysArmingUntilItAnswers) {
   bus_->set_fault(8, DriveFault::kUnplugged);
   run(200);
   EXPECT_EQ(control().module_state(), ModuleState::kArming);
+  EXPECT_EQ(count(Fault::kDriveSilent), 0U) << "it may take a while to start";
+  run(100);
+  EXPECT_EQ(control().module_state(), ModuleState::kArming);
+  EXPECT_EQ(count(Fault::kDriveSilent), 1U);
+  EXPECT_EQ(control().drives().silent.bits(), 1U << 8U);
   EXPECT_EQ(bus_->joints().heard().bits(), JointSet::all().bits() & ~(1U << 8U));
   bus_->set_fault(8, DriveFault::kNone);
   run(4);
@@ -101,6 +106,21 @@ TEST_P(BusModuleTest, DriveSilentFor50Ms_IsNamedAndTheModuleGoesOn) {
   EXPECT_TRUE(control().drives().silent.is_empty());
   EXPECT_EQ(control().module_state(), ModuleState::kRunning);
   EXPECT_EQ(count(Fault::kDriveSilent), 1U);
+}
+
+TEST_P(BusModuleTest, DriveRestarts_IsEnteredAgainAndCommandedOn) {
+  ASSERT_NO_FATAL_FAILURE(stand());
+  bus_->set_fault(4, DriveFault::kDead);
+  run(20);
+  EXPECT_EQ(count(Fault::kDriveSilent), 1U);
+  EXPECT_EQ(robot_->last_command()->joints[4].kp_nmprad, 0.0);
+  bus_->set_fault(4, DriveFault::kNone);
+  run(8);
+  EXPECT_TRUE(control().drives().silent.is_empty());
+  EXPECT_GT(robot_->last_command()->joints[4].kp_nmprad, 0.0);
+  EXPECT_EQ(count(Fault::kDriveError), 0U);
+  run(200);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
 }
 
 TEST_P(BusModuleTest, DriveUnplugged_StopsOnTwoFeet) {

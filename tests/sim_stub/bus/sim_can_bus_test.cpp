@@ -200,7 +200,11 @@ TEST_F(BusRobotTest, ExitFrame_LetsGo) {
     bus_->advance();
     ASSERT_TRUE(bus_->joints().try_read(feedback));
   }
-  ASSERT_TRUE(bus_->joints().send_to_all(hal::MitSpecial::kExit).is_all());
+  for (const hal::CanDrive& drive : file_.table.drives) {
+    hal::CanFrame exit = frame_of(drive.id);
+    std::ranges::copy(hal::special_frame(hal::MitSpecial::kExit), exit.data.begin());
+    ASSERT_EQ(bus_->bus(drive.bus).write(std::array{exit}), 1U);
+  }
   bus_->advance();
   EXPECT_EQ(robot_->last_command()->joints[0].kp_nmprad, 0.0);
   ASSERT_TRUE(bus_->joints().try_read(feedback));

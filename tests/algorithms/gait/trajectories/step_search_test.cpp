@@ -79,8 +79,8 @@ TEST(StepFeasibility, TrailingSwingWithALevelSole_MeetsTheAnklesLimitThatAPitche
   std::array<Transform, kFootCount> soles;
   TorsoTrajectory::State from;
   StepPlan plan = stair_step(StepKind::kTrailing, 0.17, 0.28, soles, from);
-  StepParams params;
-  params.joint_margin_rad = 0.0;
+  plan.joint_margin_rad = 0.0;
+  const StepParams params;
   const auto ankle_margin_rad = [&](double toe_down_rad) {
     plan.shape.toe_down_rad = toe_down_rad;
     const StepKnots knots(nominal_robot(), params, params.knot_ticks, plan, from, soles);
