@@ -34,6 +34,7 @@ std::string Devices::open(const DaemonConfig& config) {
 }
 
 std::string Devices::open_buses(const DaemonConfig& config) {
+  table_ = config.bus.table;
   std::vector<hal::CanChannel*> channels;
   for (std::size_t bus = 0; bus < config.bus.buses.size(); ++bus) {
     hal::SocketCan::Config can;
@@ -44,7 +45,7 @@ std::string Devices::open_buses(const DaemonConfig& config) {
     if (error.failed()) return sentence(config.places.buses[bus], error);
     channels.push_back(sockets_.back().get());
   }
-  joints_.emplace(config.bus.table, channels);
+  joints_.emplace(table_, channels);
   return {};
 }
 
@@ -61,6 +62,17 @@ Ports Devices::ports() noexcept {
   hal::Imu& imu = livox_ ? static_cast<hal::Imu&>(*livox_) : *serial_;
   hal::LidarOdometry& lio = lio_ ? static_cast<hal::LidarOdometry&>(*lio_) : no_lidar_;
   return {camera_, imu, *joints_, lio};
+}
+
+void Devices::let_go() noexcept {
+  const hal::MitBytes exit = hal::special_frame(hal::MitSpecial::kExit);
+  for (const hal::CanDrive& drive : table_.drives) {
+    hal::CanFrame frame;
+    frame.id = drive.id;
+    frame.length = static_cast<std::uint8_t>(exit.size());
+    std::ranges::copy(exit, frame.data.begin());
+    (void)sockets_[drive.bus]->write({&frame, 1});
+  }
 }
 
 void Devices::maintain() noexcept {

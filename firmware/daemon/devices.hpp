@@ -30,7 +30,7 @@ class Devices {
   // Opens anew what was lost; each call tries once. Some ten times a second, outside the lanes.
   void maintain() noexcept;
   // The drives leave motor mode: a joint that carries gives way. No lane may run.
-  void let_go() noexcept { (void)joints_->send_to_all(hal::MitSpecial::kExit); }
+  void let_go() noexcept;
 
  private:
   class NoLidar final : public hal::LidarOdometry {
@@ -41,7 +41,8 @@ class Devices {
   [[nodiscard]] std::string open_imu(const DaemonConfig& config);
 
   const hal::SystemCalls& calls_;
-  std::vector<std::unique_ptr<hal::SocketCan>> sockets_;
+  hal::DriveTable table_;
+  std::vector<std::unique_ptr<hal::SocketCan>> sockets_;  // one a bus of the table
   std::optional<hal::CanJointBus> joints_;
   hal::V4l2Camera camera_;
   std::unique_ptr<hal::LivoxImu> livox_;  // one of the two

@@ -23,7 +23,8 @@ constexpr const char* kUsage =
     "polygmapd --version\n"
     "\n"
     "Exit codes of --config: 0 asked to stop, 1 stopped by itself, 2 configuration, 3 device, 4 no real time.\n"
-    "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording. Of --doctor: 0 nothing hinders, 1 else.\n";
+    "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording. Of --doctor: 0 nothing hinders, 1 "
+    "else.\n";
 
 struct Options {
   enum class Mode { kRun, kCheck, kReplay, kDoctor, kHelp, kVersion } mode = Mode::kRun;

@@ -94,8 +94,8 @@ class DaemonFile {
     camera.format = section.choice("format", {"Z16", "Y16"}, 0) == 0 ? hal::V4l2Camera::PixelFormat::kZ16
                                                                      : hal::V4l2Camera::PixelFormat::kY16;
     camera.frames_per_s = static_cast<std::uint32_t>(section.whole("frames_per_s", {0, 1000, "1/s"}, 0));
-    camera.buffers = static_cast<std::uint32_t>(
-        section.whole("buffers", {4, hal::BufferBook::kMostBuffers, ""}, camera.buffers));
+    camera.buffers =
+        static_cast<std::uint32_t>(section.whole("buffers", {4, hal::BufferBook::kMostBuffers, ""}, camera.buffers));
     camera.latency_ns = section.milliseconds("latency_ms", 1000.0, 0);
     camera.exposure_ns = section.milliseconds("exposure_ms", 1000.0, 0);
     camera.timeout_ns = section.milliseconds("timeout_ms", 60'000.0, camera.timeout_ns);
@@ -178,8 +178,8 @@ DaemonConfig read_daemon_config(const std::string& path) {
   if (!parsed) {
     const auto line = parsed.error().source().begin.line;
     if (line == 0) throw config::FileError("Cannot read the daemon file \"" + path + "\".");
-    throw config::FileError(name + ", line " + std::to_string(line) + ": " +
-                            std::string(parsed.error().description()) + ".");
+    throw config::FileError(name + ", line " + std::to_string(line) + ": " + std::string(parsed.error().description()) +
+                            ".");
   }
   return DaemonFile(path, parsed.table()).read();
 }

@@ -60,7 +60,8 @@ class TomlSection {
     if (node == nullptr) return *otherwise;
     return checked(*node, key, range);
   }
-  [[nodiscard]] std::int64_t whole(std::string_view key, Range range, std::optional<std::int64_t> otherwise = {}) const {
+  [[nodiscard]] std::int64_t whole(std::string_view key, Range range,
+                                   std::optional<std::int64_t> otherwise = {}) const {
     const toml::node* node = find(key, otherwise.has_value());
     if (node == nullptr) return *otherwise;
     const double value = checked(*node, key, range);

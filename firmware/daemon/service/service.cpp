@@ -17,11 +17,11 @@
 namespace polygmap::daemon {
 namespace {
 
-constexpr std::int64_t kLook_ns = 10 * kNsPerMs;        // of the daemon's own thread
-constexpr std::int64_t kMaintain_ns = 100 * kNsPerMs;   // lost devices are opened anew
+constexpr std::int64_t kLook_ns = 10 * kNsPerMs;       // of the daemon's own thread
+constexpr std::int64_t kMaintain_ns = 100 * kNsPerMs;  // lost devices are opened anew
 constexpr std::int64_t kStatus_ns = kNsPerS;
-constexpr std::int64_t kLaneHangs_ns = kNsPerS;         // without a cycle
-constexpr std::int64_t kFirstDue_ns = 20 * kNsPerMs;    // from the lanes' waiting to their first cycle
+constexpr std::int64_t kLaneHangs_ns = kNsPerS;       // without a cycle
+constexpr std::int64_t kFirstDue_ns = 20 * kNsPerMs;  // from the lanes' waiting to their first cycle
 // A swing takes 0.92 s, and a foot that finds no ground goes back: later than that something is wrong.
 constexpr std::int64_t kStopLimit_ns = 3 * kNsPerS;
 // Until there is an estimate, a second, the gait holds both feet where they are and decides nothing.
@@ -89,13 +89,12 @@ class Service::Tasks {
 
 std::string text_of(const Outcome& o) {
   std::array<char, 320> text{};
-  std::snprintf(text.data(), text.size(),
-                "stopped state=%s phase=%s cycles=%" PRIu64 " overruns=%" PRIu64 " skipped=%" PRIu64
-                " caught_up=%" PRIu64 " heap_calls=%" PRIu64 " page_faults=%" PRIu64 " wake_max_us=%" PRIu64
-                " stack_bytes=%zu exit=%d",
-                std::string(polygmap::name_of(o.module.state)).c_str(), name_of(o.module.phase), o.cycles, o.overruns,
-                o.skipped, o.caught_up, o.heap_calls, o.page_faults, o.wake_max_ns / 1000, o.stack_bytes,
-                number_of(o.code));
+  std::snprintf(
+      text.data(), text.size(),
+      "stopped state=%s phase=%s cycles=%" PRIu64 " overruns=%" PRIu64 " skipped=%" PRIu64 " caught_up=%" PRIu64
+      " heap_calls=%" PRIu64 " page_faults=%" PRIu64 " wake_max_us=%" PRIu64 " stack_bytes=%zu exit=%d",
+      std::string(polygmap::name_of(o.module.state)).c_str(), name_of(o.module.phase), o.cycles, o.overruns, o.skipped,
+      o.caught_up, o.heap_calls, o.page_faults, o.wake_max_ns / 1000, o.stack_bytes, number_of(o.code));
   return text.data();
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs the module on its lanes until it is asked to stop or has stopped, and tells the service manager how it is.
 //
-// The module arms by itself (control_lane.hpp): until all drives have answered its commands have no gains. Asked to stop
-// while it arms, it lets go of the drives. Asked later, a foot in the air comes down first, and the drives keep the last
-// command: the robot stands on them.
+// The module arms by itself (control_lane.hpp): until all drives have answered its commands have no gains. Asked to
+// stop while it arms, it lets go of the drives. Asked later, a foot in the air comes down first, and the drives keep
+// the last command: the robot stands on them.
 #pragma once
 
 #include <array>
@@ -35,10 +35,10 @@ struct ServiceParts {
 
 struct Outcome {
   ExitCode code = ExitCode::kAsked;
-  std::string why;            // one sentence
-  bool lanes_hang = false;    // their threads still run: the process can only be left by _Exit
-  ModuleView module;          // at the end
-  std::uint64_t cycles = 0;   // of control
+  std::string why;           // one sentence
+  bool lanes_hang = false;   // their threads still run: the process can only be left by _Exit
+  ModuleView module;         // at the end
+  std::uint64_t cycles = 0;  // of control
   std::uint64_t overruns = 0, skipped = 0, caught_up = 0;  // of all lanes
   std::uint64_t heap_calls = 0;
   std::uint64_t page_faults = 0;  // of the lanes' threads, from their first cycle on

@@ -19,7 +19,9 @@ struct ModuleView {
   JointSet silent;                     // drives that are silent now
   std::uint16_t treads = 0;            // climbed; saturates
 
-  [[nodiscard]] bool stands() const noexcept { return state == ModuleState::kSafeStop || phase == GaitPhase::kFinished; }
+  [[nodiscard]] bool stands() const noexcept {
+    return state == ModuleState::kSafeStop || phase == GaitPhase::kFinished;
+  }
   [[nodiscard]] bool operator==(const ModuleView& other) const noexcept { return packed() == other.packed(); }
 
   [[nodiscard]] std::uint64_t packed() const noexcept {

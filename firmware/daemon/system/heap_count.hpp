@@ -9,10 +9,10 @@ namespace polygmap::daemon {
 
 // What the service uses: a test's program has an interposer of its own.
 struct HeapCount {
-  void (*start)() noexcept = [] () noexcept {};
-  void (*stop)() noexcept = [] () noexcept {};
+  void (*start)() noexcept = []() noexcept {};
+  void (*stop)() noexcept = []() noexcept {};
   // Calls between start() and stop(), the frees among them.
-  std::uint64_t (*calls)() noexcept = [] () noexcept { return std::uint64_t{0}; };
+  std::uint64_t (*calls)() noexcept = []() noexcept { return std::uint64_t{0}; };
 };
 
 // Of the interposer.

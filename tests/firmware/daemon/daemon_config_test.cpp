@@ -23,12 +23,12 @@ class DaemonConfigTest : public testing::Test {
   }
   // Lines 1 to 10 of a good file; `more` follows.
   [[nodiscard]] static std::string good(const std::string& more = "") {
-    return "bus = \"" + kBus + "\"\n" +               // 1
-           "real_time = \"preferred\"\n" +            // 2
-           "[control]\ncpu = 4\npriority = 81\n" +    // 3-5
-           "[camera]\ndevice = \"/dev/video9\"\n" +   // 6-7
-           "file = \"" + kCamera + "\"\n" +           // 8
-           "[imu]\ndriver = \"livox\"\n" + more;      // 9-10
+    return "bus = \"" + kBus + "\"\n" +              // 1
+           "real_time = \"preferred\"\n" +           // 2
+           "[control]\ncpu = 4\npriority = 81\n" +   // 3-5
+           "[camera]\ndevice = \"/dev/video9\"\n" +  // 6-7
+           "file = \"" + kCamera + "\"\n" +          // 8
+           "[imu]\ndriver = \"livox\"\n" + more;     // 9-10
   }
   [[nodiscard]] std::string complaint(const std::string& text) {
     try {
@@ -132,17 +132,23 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"fraction", "cpu = 4", "cpu = 4.5", "line 4: control.cpu must be a whole number, not 4.5"},
         Wrong{"range", "priority = 81", "priority = 100", "line 5: control.priority must be from 1 to 98, not 100"},
         Wrong{"not_a_number", "priority = 81", "priority = nan", "line 5: control.priority must be from 1 to 98"},
-        Wrong{"word", "\"preferred\"", "\"maybe\"", "line 2: real_time must be \"required\" or \"preferred\", not \"maybe\""},
+        Wrong{"word", "\"preferred\"", "\"maybe\"",
+              "line 2: real_time must be \"required\" or \"preferred\", not \"maybe\""},
         Wrong{"text", "\"preferred\"", "true", "line 2: real_time must be a text in quotes"},
         Wrong{"missing", "device = \"/dev/video9\"\n", "", "line 6: camera.device is missing"},
         Wrong{"empty_path", "/dev/video9", "", "line 7: camera.device must be a path of 1 to 63 characters"},
-        Wrong{"table", "[control]\ncpu = 4\npriority = 81", "control = 4\n\n", "line 3: control must be a table: [control]"},
+        Wrong{"table", "[control]\ncpu = 4\npriority = 81", "control = 4\n\n",
+              "line 3: control must be a table: [control]"},
         Wrong{"no_table", "[imu]\ndriver = \"livox\"\n", "", "line 1: imu is missing"},
         Wrong{"driver", "\"livox\"", "\"bosch\"", "line 10: imu.driver must be \"livox\" or \"serial\", not \"bosch\""},
-        Wrong{"other_drivers_key", "driver = \"livox\"", "driver = \"livox\"\nbaud = 9600", "line 11: imu.baud is no key of imu"},
-        Wrong{"address", "driver = \"livox\"", "driver = \"livox\"\nsender = \"lidar\"", "line 11: imu.sender must be an address such as"},
-        Wrong{"port", "driver = \"livox\"", "driver = \"livox\"\nport = 65536", "line 11: imu.port must be from 1 to 65535, not 65536"},
-        Wrong{"vector", "driver = \"livox\"", "driver = \"livox\"\nbase_rpy_rad = [1, 2]", "line 11: imu.base_rpy_rad must be three numbers in brackets"},
+        Wrong{"other_drivers_key", "driver = \"livox\"", "driver = \"livox\"\nbaud = 9600",
+              "line 11: imu.baud is no key of imu"},
+        Wrong{"address", "driver = \"livox\"", "driver = \"livox\"\nsender = \"lidar\"",
+              "line 11: imu.sender must be an address such as"},
+        Wrong{"port", "driver = \"livox\"", "driver = \"livox\"\nport = 65536",
+              "line 11: imu.port must be from 1 to 65535, not 65536"},
+        Wrong{"vector", "driver = \"livox\"", "driver = \"livox\"\nbase_rpy_rad = [1, 2]",
+              "line 11: imu.base_rpy_rad must be three numbers in brackets"},
         Wrong{"lane", "real_time = \"preferred\"", "lanes = 3", "line 2: lanes must be from 1 to 2, not 3"},
         Wrong{"syntax", "cpu = 4", "cpu = ", "line 4"},
         Wrong{"bus", "cubemars.toml", "nobodys.toml", "line 1: bus names no file"},

@@ -52,7 +52,8 @@ TEST(Notifier, ManagerThatDoesNotRead_NeverBlocks) {
 
 TEST(Notifier, NameThatIsNone_IsRefused) {
   const std::string longest(200, 'x');
-  for (const std::string& name : {std::string("run/notify"), std::string("@"), "/" + longest, "vsock:2:1234" + longest}) {
+  for (const std::string& name :
+       {std::string("run/notify"), std::string("@"), "/" + longest, "vsock:2:1234" + longest}) {
     Notifier notifier;
     EXPECT_FALSE(notifier.open(name.c_str(), nullptr, nullptr)) << name;
   }

@@ -42,8 +42,9 @@ class ProgramTest : public testing::Test {
     return (folder_ / name).string();
   }
   std::string config(const std::string& camera = "/dev/video9") {
-    return write("robot.toml", "bus = \"" POLYGMAP_SOURCE "/firmware/buses/cubemars.toml\"\n[camera]\ndevice = \"" + camera +
-                                   "\"\nfile = \"" POLYGMAP_SOURCE "/firmware/cameras/d435.toml\"\n[imu]\ndriver = \"livox\"\n");
+    return write("robot.toml",
+                 "bus = \"" POLYGMAP_SOURCE "/firmware/buses/cubemars.toml\"\n[camera]\ndevice = \"" + camera +
+                     "\"\nfile = \"" POLYGMAP_SOURCE "/firmware/cameras/d435.toml\"\n[imu]\ndriver = \"livox\"\n");
   }
 
   const std::string kProgram = POLYGMAPD;
@@ -89,6 +90,18 @@ TEST_F(ProgramTest, MissingDevice_IsCodeThreeWithFileLineAndKey) {
   EXPECT_EQ(done.code, 3) << done.said;
   EXPECT_NE(done.said.find("cubemars.toml, line "), std::string::npos) << done.said;
   EXPECT_NE(done.said.find("can0"), std::string::npos) << done.said;
+}
+
+TEST_F(ProgramTest, Doctor_SaysWhatItFinds) {
+  const Done text = run("--doctor");
+  EXPECT_TRUE(text.code == 0 || text.code == 1) << text.said;
+  for (const char* name : {"kernel: ", "governor: ", "isolation: ", "rtprio: ", "memlock: ", "clock: ", "wake-up: "}) {
+    EXPECT_NE(text.said.find(name), std::string::npos) << name << text.said;
+  }
+  const Done json = run("--doctor --json --config " + config());
+  EXPECT_EQ(json.code, 1) << "no such camera: " << json.said;
+  EXPECT_NE(json.said.find("There is no /dev/video9"), std::string::npos) << json.said;
+  EXPECT_EQ(run("--doctor --config " + write("robot.toml", "bus = 3")).code, 2);
 }
 
 TEST_F(ProgramTest, ReplayOfWhatIsNone_IsCodeTwo) {
