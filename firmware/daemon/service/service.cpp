@@ -122,11 +122,7 @@ Outcome Service::run() {
   fault_in_stack();
   pipeline_ = std::make_unique<Pipeline>(parts_.ports, config_.params);
   tasks_ = std::make_unique<Tasks>(*pipeline_, board_, parts_.joints);
-  parts_.heap.start();
-  if (outcome.why = start_lanes(); !outcome.why.empty()) {
-    parts_.heap.stop();
-    return outcome;
-  }
+  if (outcome.why = start_lanes(); !outcome.why.empty()) return outcome;
   const Decision decision = watch();
   parts_.heap.stop();
   outcome.code = decision.code;
@@ -180,6 +176,7 @@ std::string Service::start_lanes() {
     while (!lanes_[n]->waits.load(std::memory_order_acquire)) sleep_until(monotonic_ns() + kNsPerMs);
   }
   if (!wrong.empty()) ends_.store(true, std::memory_order_release);
+  if (wrong.empty()) parts_.heap.start();
   first_due_ns_.store(monotonic_ns() + kFirstDue_ns, std::memory_order_release);
   for (auto& lane : lanes_) {
     if (!wrong.empty() && lane) lane->thread.join();
