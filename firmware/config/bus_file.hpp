@@ -15,7 +15,7 @@ namespace polygmap::config {
 struct BusFile {
   std::string path;
   hal::DriveTable table;
-  std::vector<std::string> buses;  // names of the table's buses, as "can0"; table.bus_count of them
+  std::vector<std::string> buses;        // names of the table's buses, as "can0"; table.bus_count of them
   std::vector<std::uint32_t> bus_lines;  // where the file names each of them first
 };
 

@@ -31,7 +31,8 @@ DoctorInput input_of(const DaemonConfig& config) {
   input.priority = 1;
   for (std::size_t lane = 0; lane < config.lanes; ++lane) {
     const LaneThread::Placement& placement = config.placement[lane];
-    if (placement.processor >= 0) input.processors.push_back(placement.processor);
+    const bool is_known = std::ranges::find(input.processors, placement.processor) != input.processors.end();
+    if (placement.processor >= 0 && !is_known) input.processors.push_back(placement.processor);
     input.priority = std::max(input.priority, static_cast<std::uint64_t>(placement.priority));
   }
   return input;

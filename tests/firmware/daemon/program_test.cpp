@@ -9,10 +9,35 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <memory>
 #include <string>
+#include <vector>
+
+#include "firmware/recording/recorder.hpp"
+#include "tests/support/fake_robot.hpp"
 
 namespace polygmap::daemon {
 namespace {
+
+// The first ticks of a fake robot's life.
+void record(const std::string& directory, int ticks) {
+  test::FakeRobot robot(0.062);
+  robot.camera_speaks = false;
+  recording::Recorder recorder(robot.ports());
+  const auto module = std::make_unique<Pipeline>(recorder.ports(), Params{});
+  recording::RecordedTasks<Pipeline> tasks(*module, &recorder);
+  OneLaneExecutive<recording::RecordedTasks<Pipeline>> executive(tasks, robot.clock, module->lane_health(0));
+  recorder.begin(directory, Params{});
+  recorder.watch(*module);
+  executive.start(robot.clock.now_ns() + kCycle_ns);
+  for (int i = 0; i < ticks; ++i) {
+    robot.advance();
+    executive.tick(robot.clock.now_ns());
+    recorder.flush();
+  }
+  EXPECT_EQ(recorder.finish(), "");
+}
 
 struct Done {
   int code = -1;
@@ -102,6 +127,33 @@ TEST_F(ProgramTest, Doctor_SaysWhatItFinds) {
   EXPECT_EQ(json.code, 1) << "no such camera: " << json.said;
   EXPECT_NE(json.said.find("There is no /dev/video9"), std::string::npos) << json.said;
   EXPECT_EQ(run("--doctor --config " + write("robot.toml", "bus = 3")).code, 2);
+}
+
+TEST_F(ProgramTest, Replay_OfTheSameModule_IsCodeZero) {
+  record(folder_.string(), 50);
+  const Done done = run("--replay " + folder_.string());
+  EXPECT_EQ(done.code, 0) << done.said;
+  EXPECT_EQ(done.said, "replay: 50 ticks, 0 differ\n");
+}
+
+TEST_F(ProgramTest, ReplayWithAFlippedBitOfAnInput_IsCodeOneAndNamesTheFirstDifference) {
+  record(folder_.string(), 50);
+  const std::filesystem::path file = folder_ / recording::kFileName;
+  std::ifstream in(file, std::ios::binary);
+  std::vector<char> bytes((std::istreambuf_iterator<char>(in)), {});
+  in.close();
+  // Of a standing robot the IMU's vertical acceleration is gravity.
+  const double gravity_mps2 = kGravity_mps2;
+  const auto* pattern = reinterpret_cast<const char*>(&gravity_mps2);
+  const auto at = std::search(bytes.begin() + static_cast<std::ptrdiff_t>(bytes.size() / 2), bytes.end(), pattern,
+                              pattern + sizeof gravity_mps2);
+  ASSERT_NE(at, bytes.end());
+  at[3] = static_cast<char>(at[3] ^ 1);
+  std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  const Done done = run("--replay " + folder_.string());
+  EXPECT_EQ(done.code, 1) << done.said;
+  EXPECT_NE(done.said.find("tick "), std::string::npos) << done.said;
+  EXPECT_NE(done.said.find("replay: 50 ticks, "), std::string::npos) << done.said;
 }
 
 TEST_F(ProgramTest, ReplayOfWhatIsNone_IsCodeTwo) {
