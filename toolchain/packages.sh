@@ -9,3 +9,5 @@ kPackagesCheck=("${kPackagesClimb[@]}" clang-14 libclang-rt-14-dev clang-format-
 kPackagesCross=(g++-aarch64-linux-gnu libc6:arm64 libstdc++6:arm64 libgtest-dev:arm64 qemu-user)
 # What toolchain/vm boots with; the guest's own packages are downloaded and unpacked (toolchain/vm/fetch_kernel).
 kPackagesVm=(qemu-system-arm python3)
+# What toolchain/package makes and looks at the package with.
+kPackagesPackage=(systemd dpkg-dev)

@@ -123,6 +123,7 @@ class BusReader {
              label + in_quotes(bus) + " is one bus more than the " + std::to_string(hal::kMaxBuses) + " there may be");
       }
       file_.buses.push_back(bus);
+      file_.bus_lines.push_back(at);
     }
     return static_cast<std::uint8_t>(index);
   }

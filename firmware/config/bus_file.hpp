@@ -2,6 +2,7 @@
 // The drives behind a robot's CAN buses, from a TOML file (firmware/buses has some; docs/bus.md says what is in it).
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,8 @@ namespace polygmap::config {
 struct BusFile {
   std::string path;
   hal::DriveTable table;
-  std::vector<std::string> buses;  // names of the table's buses, as "can0"; table.bus_count of them
+  std::vector<std::string> buses;        // names of the table's buses, as "can0"; table.bus_count of them
+  std::vector<std::uint32_t> bus_lines;  // where the file names each of them first
 };
 
 // Throws FileError, one sentence that names file, line and key, for what is no bus file, and for buses whose load would

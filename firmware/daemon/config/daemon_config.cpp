@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "firmware/daemon/config/daemon_config.hpp"
+
+#include <arpa/inet.h>
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+
+#include "algorithms/core/capacities.hpp"
+#include "algorithms/core/math/transform.hpp"
+#include "firmware/config/camera_file.hpp"
+#include "firmware/config/param_file.hpp"
+#include "firmware/daemon/config/toml_section.hpp"
+
+namespace polygmap::daemon {
+namespace {
+
+constexpr double kMostProcessor = 1023;  // CPU_SETSIZE - 1
+constexpr Range kPort{1, 65535, ""};
+constexpr Range kAngle{-7.0, 7.0, "rad"};
+
+class DaemonFile {
+ public:
+  DaemonFile(const std::string& path, const toml::table& root) : path_(path), root_(path, "", root, 1) {}
+
+  DaemonConfig read() {
+    root_.only({"bus", "params", "lanes", "real_time", "hold_s", "control", "perception", "camera", "imu", "lio"});
+    config_.path = path_;
+    config_.lanes = static_cast<std::size_t>(root_.whole("lanes", {1, kLaneCount, ""}, kLaneCount));
+    config_.needs_real_time = root_.choice("real_time", {"required", "preferred"}, 0) == 0;
+    config_.hold_ns = std::llround(1e9 * root_.number("hold_s", {0.0, 86400.0, "s"}, 10.0));
+    take_placement("control", kControlLane);
+    take_placement("perception", kPerceptionLane);
+    if (config_.lanes == 1 && root_.has("perception")) {
+      root_.fail("perception", "places a lane that lanes = 1 does not have");
+    }
+    take_camera(*root_.section("camera", true));
+    if (root_.has("params")) config::read_params(file("params"), config_.params);
+    take_bus();
+    take_imu(*root_.section("imu", true));
+    if (const auto lio = root_.section("lio", false)) take_lio(*lio);
+    return config_;
+  }
+
+ private:
+  // A file that this one names, from this one's folder.
+  [[nodiscard]] std::string file(std::string_view key) const { return from_here(root_, key); }
+  [[nodiscard]] std::string from_here(const TomlSection& section, std::string_view key) const {
+    const std::filesystem::path named = section.text(key);
+    const std::filesystem::path found = std::filesystem::path(path_).parent_path() / named;
+    std::error_code none;
+    if (named.empty() || !std::filesystem::is_regular_file(found, none)) {
+      section.fail(key, "names no file: \"" + found.string() + "\"");
+    }
+    return found.string();
+  }
+
+  void take_placement(const char* key, Lane lane) {
+    constexpr std::array kPriorities{80, 75};
+    LaneThread::Placement& placement = config_.placement[lane];
+    placement.priority = kPriorities[lane];
+    const auto section = root_.section(key, false);
+    if (!section) return;
+    section->only({"cpu", "priority"});
+    placement.processor = static_cast<int>(section->whole("cpu", {0, kMostProcessor, ""}, -1));
+    placement.priority = static_cast<int>(section->whole("priority", {1, 98, ""}, placement.priority));
+  }
+
+  void take_bus() {
+    const std::string path = file("bus");
+    config_.bus = config::read_bus(path);
+    config::limit_by_drives(config_.bus, config_.params.gait.joints, config_.params.robot);
+    for (const std::uint32_t line : config_.bus.bus_lines) {
+      config_.places.buses.push_back(path + ", line " + std::to_string(line) + ", bus");
+    }
+  }
+
+  void take_camera(const TomlSection& section) {
+    section.only({"device", "file", "format", "frames_per_s", "buffers", "latency_ms", "exposure_ms", "timeout_ms"});
+    hal::V4l2Camera::Config& camera = config_.camera;
+    camera.device = section.text("device");
+    check_path(section, "device", camera.device.too_long() || camera.device.empty());
+    const config::CameraProfile profile = config::read_camera(from_here(section, "file"));
+    camera.intrinsics = profile.intrinsics;
+    const CameraIntrinsics& k = profile.intrinsics;
+    if (k.width_px > kDepthWidth_px || k.height_px > kDepthHeight_px || k.width_px % 8 != 0 || k.height_px % 2 != 0) {
+      section.fail("file", "has a camera of " + std::to_string(k.width_px) + " x " + std::to_string(k.height_px) +
+                               " pixels; columns are a multiple of 8 up to " + std::to_string(kDepthWidth_px) +
+                               ", rows even up to " + std::to_string(kDepthHeight_px));
+    }
+    config_.params.surfaces.noise = profile.noise;
+    config_.params.surfaces.limits = {profile.min_depth_m, profile.max_depth_m};
+    camera.format = section.choice("format", {"Z16", "Y16"}, 0) == 0 ? hal::V4l2Camera::PixelFormat::kZ16
+                                                                     : hal::V4l2Camera::PixelFormat::kY16;
+    camera.frames_per_s = static_cast<std::uint32_t>(section.whole("frames_per_s", {0, 1000, "1/s"}, 0));
+    camera.buffers =
+        static_cast<std::uint32_t>(section.whole("buffers", {4, hal::BufferBook::kMostBuffers, ""}, camera.buffers));
+    camera.latency_ns = section.milliseconds("latency_ms", 1000.0, 0);
+    camera.exposure_ns = section.milliseconds("exposure_ms", 1000.0, 0);
+    camera.timeout_ns = section.milliseconds("timeout_ms", 60'000.0, camera.timeout_ns);
+    if (camera.timeout_ns < 10 * kNsPerMs) section.fail("timeout_ms", "must be at least 10 ms");
+    config_.places.camera = section.place_of("device");
+  }
+
+  void take_imu(const TomlSection& section) {
+    const bool is_livox = section.choice("driver", {"livox", "serial"}) == 0;
+    const Vec3 rpy_rad = section.vector("base_rpy_rad", kAngle);
+    const Mat3 base_R_imu = rotation_zyx(rpy_rad.z(), rpy_rad.y(), rpy_rad.x());
+    if (is_livox) {
+      section.only({"driver", "base_rpy_rad", "port", "address", "sender", "check_crc", "clock", "least_delay_ms"});
+      hal::LivoxImu::Config imu;
+      imu.udp = udp_of(section, imu.udp.port);
+      imu.check_crc = section.flag("check_crc", imu.check_crc);
+      take_clock(section, imu.time);
+      imu.base_R_imu = base_R_imu;
+      config_.imu = imu;
+      config_.places.imu = section.place_of("port");
+    } else {
+      section.only({"driver", "base_rpy_rad", "device", "baud", "clock", "least_delay_ms"});
+      hal::SerialImu::Config imu;
+      imu.device = section.text("device");
+      check_path(section, "device", imu.device.too_long() || imu.device.empty());
+      imu.baud = static_cast<std::uint32_t>(section.whole("baud", {9600, 4'000'000, "baud"}, imu.baud));
+      take_clock(section, imu.time);
+      imu.base_R_imu = base_R_imu;
+      config_.imu = imu;
+      config_.places.imu = section.place_of("device");
+    }
+  }
+
+  void take_lio(const TomlSection& section) {
+    section.only({"port", "address", "sender", "clock", "least_delay_ms"});
+    hal::LioUdp::Config lio;
+    lio.udp = udp_of(section, std::nullopt);
+    take_clock(section, lio.time);
+    config_.lio = lio;
+    config_.places.lio = section.place_of("port");
+  }
+
+  // "monotonic": the sender stamps in this machine's clock. "own": in its own, whose offset is estimated.
+  static void take_clock(const TomlSection& section, hal::SampleClock::Params& time) {
+    const bool is_own = section.choice("clock", {"monotonic", "own"}, time.base == hal::TimeBase::kEstimated) == 1;
+    time.base = is_own ? hal::TimeBase::kEstimated : hal::TimeBase::kMonotonic;
+    time.offset.least_delay_ns = section.milliseconds("least_delay_ms", 1000.0, 0);
+  }
+  [[nodiscard]] static hal::UdpConfig udp_of(const TomlSection& section, std::optional<std::int64_t> otherwise) {
+    hal::UdpConfig udp;
+    udp.port = static_cast<std::uint16_t>(section.whole("port", kPort, otherwise));
+    udp.address = address_of(section, "address");
+    udp.sender = address_of(section, "sender");
+    return udp;
+  }
+  [[nodiscard]] static std::string address_of(const TomlSection& section, const char* key) {
+    const std::string said = section.text(key, "");
+    in_addr parsed{};
+    if (!said.empty() && ::inet_pton(AF_INET, said.c_str(), &parsed) != 1) {
+      section.fail(key, "must be an address such as \"192.168.1.50\", not \"" + said + "\"");
+    }
+    return said;
+  }
+  static void check_path(const TomlSection& section, const char* key, bool is_wrong) {
+    if (is_wrong) section.fail(key, "must be a path of 1 to 63 characters");
+  }
+
+  std::string path_;
+  TomlSection root_;
+  DaemonConfig config_;
+};
+
+}  // namespace
+
+DaemonConfig read_daemon_config(const std::string& path) {
+  const std::string name = "Daemon file \"" + path + "\"";
+  std::error_code none;
+  if (std::filesystem::is_directory(path, none)) throw config::FileError(name + ": it is a folder.");
+  const toml::parse_result parsed = toml::parse_file(path);
+  if (!parsed) {
+    const auto line = parsed.error().source().begin.line;
+    if (line == 0) throw config::FileError("Cannot read the daemon file \"" + path + "\".");
+    throw config::FileError(name + ", line " + std::to_string(line) + ": " + std::string(parsed.error().description()) +
+                            ".");
+  }
+  return DaemonFile(path, parsed.table()).read();
+}
+
+}  // namespace polygmap::daemon

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <time.h>
+
+#include <cerrno>
+
+#include "algorithms/core/time.hpp"
+#include "firmware/daemon/doctor/doctor.hpp"
+#include "firmware/daemon/system/lane_thread.hpp"
+#include "scheduler/schedule_table.hpp"
+
+namespace polygmap::daemon {
+namespace {
+
+constexpr std::uint64_t kGood_ns = 100'000;    // a twentieth of a cycle
+constexpr std::uint64_t kUsable_ns = 500'000;  // what a cycle's rows leave
+
+std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * kNsPerS + now.tv_nsec;
+}
+
+struct Measurement {
+  WakeUps wake_ups;
+  std::uint32_t cycles = 0;
+};
+void* measure(void* argument) noexcept {
+  auto& measurement = *static_cast<Measurement*>(argument);
+  std::int64_t due_ns = monotonic_ns();
+  for (std::uint32_t i = 0; i < measurement.cycles; ++i) {
+    due_ns += kCycle_ns;
+    const timespec due{due_ns / kNsPerS, due_ns % kNsPerS};
+    while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, nullptr) == EINTR) {
+    }
+    const std::int64_t late_ns = monotonic_ns() - due_ns;
+    measurement.wake_ups.add(static_cast<std::uint64_t>(late_ns > 0 ? late_ns : 0));
+    if (late_ns > kCycle_ns) due_ns = monotonic_ns();  // each wake-up by itself
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+void WakeUps::add(std::uint64_t late_ns) noexcept {
+  std::size_t bucket = 0;
+  while (bucket + 1 < kBuckets && late_ns >= 1000ULL * below_us(bucket)) ++bucket;
+  ++counts[bucket];
+  ++woken;
+  if (late_ns > max_ns) max_ns = late_ns;
+}
+
+WakeUps measure_wake_ups(int processor, int priority, std::uint32_t cycles) {
+  Measurement measurement{.wake_ups = {}, .cycles = cycles};
+  LaneThread thread;
+  bool started = thread.start({.processor = processor, .priority = priority}, &measure, &measurement) == 0;
+  measurement.wake_ups.was_real_time = started;
+  if (!started) started = thread.start({}, &measure, &measurement) == 0;
+  thread.join();
+  return measurement.wake_ups;
+}
+
+Finding finding_of(const WakeUps& wake_ups) {
+  const std::string latest = std::to_string((wake_ups.max_ns + 999) / 1000) + " us";
+  Finding finding{"wake-up",
+                  Verdict::kGood,
+                  "Of " + std::to_string(wake_ups.woken) + " wake-ups the latest came " + latest + " late" +
+                      (wake_ups.was_real_time ? "." : ", on a thread without real-time priority."),
+                  {}};
+  if (wake_ups.max_ns <= kGood_ns && wake_ups.was_real_time) return finding;
+  finding.verdict = wake_ups.max_ns <= kUsable_ns ? Verdict::kWarning : Verdict::kBad;
+  finding.to_do = wake_ups.was_real_time
+                      ? "Mend what is found above (kernel, governor, isolation) and look again; cyclictest of rt-tests "
+                        "measures for longer."
+                      : "Run it as root, or as the shipped service runs, to see what a lane would.";
+  // Without a priority it says nothing of what a lane would have.
+  if (!wake_ups.was_real_time) finding.verdict = Verdict::kWarning;
+  return finding;
+}
+
+}  // namespace polygmap::daemon

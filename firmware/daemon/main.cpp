@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// polygmapd: the module as a robot's service. Exit codes: exit_code.hpp; of --replay those of replay.hpp; of --doctor 0
+// when nothing hinders, else 1.
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "firmware/daemon/devices.hpp"
+#include "firmware/daemon/doctor/doctor.hpp"
+#include "firmware/daemon/service/service.hpp"
+#include "firmware/recording/replay.hpp"
+
+namespace polygmap::daemon {
+namespace {
+
+constexpr const char* kUsage =
+    "polygmapd --config FILE [--check]   runs the module with the devices of this file; --check only reads it\n"
+    "polygmapd --replay DIR              feeds a recording to the module and compares what comes out\n"
+    "polygmapd --doctor [--json] [--config FILE]   says what on this machine hinders it, and what to do\n"
+    "polygmapd --version\n"
+    "\n"
+    "Exit codes of --config: 0 asked to stop, 1 stopped by itself, 2 configuration, 3 device, 4 no real time.\n"
+    "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording. Of --doctor: 0 nothing hinders, 1 "
+    "else.\n";
+
+struct Options {
+  enum class Mode { kRun, kCheck, kReplay, kDoctor, kHelp, kVersion } mode = Mode::kRun;
+  std::string config, recording;
+  bool json = false;
+};
+
+// Empty, or what is wrong.
+std::string parse(int argc, char** argv, Options& options) {
+  std::vector<std::string_view> modes;
+  bool checks = false;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    const bool takes_value = word == "--config" || word == "--replay";
+    if (takes_value && (i + 1 == argc || argv[i + 1][0] == '\0')) return std::string(word) + " takes a path";
+    if (word == "--config") {
+      options.config = argv[++i];
+    } else if (word == "--replay") {
+      options.recording = argv[++i];
+      options.mode = Options::Mode::kReplay;
+      modes.push_back(word);
+    } else if (word == "--doctor" || word == "--help" || word == "-h" || word == "--version") {
+      using enum Options::Mode;
+      options.mode = word == "--doctor" ? kDoctor : word == "--version" ? kVersion : kHelp;
+      modes.push_back(word);
+    } else if (word == "--json") {
+      options.json = true;
+    } else if (word == "--check") {
+      checks = true;
+    } else {
+      return "unknown argument " + std::string(word);
+    }
+  }
+  if (modes.size() > 1) return std::string(modes[0]) + " and " + std::string(modes[1]) + " do not go together";
+  if (options.json && options.mode != Options::Mode::kDoctor) return "--json is of --doctor";
+  if (modes.empty() && options.config.empty()) return "--config FILE is missing";
+  if (checks && !modes.empty()) return "--check is of --config";
+  if (checks) options.mode = Options::Mode::kCheck;
+  return {};
+}
+
+int complain(const std::string& what, ExitCode code) {
+  std::fprintf(stderr, "polygmapd: %s\n", what.c_str());
+  return number_of(code);
+}
+
+int run_replay(const std::string& directory) {
+  const recording::ReplayResult result = recording::replay(directory);
+  const bool is_read = result.verdict != recording::ReplayVerdict::kUnreadable;
+  std::fputs(recording::text_of(result).c_str(), is_read ? stdout : stderr);
+  return static_cast<int>(result.verdict);
+}
+
+int run_service(const DaemonConfig& config) {
+  const StopSignals signals;
+  Notifier notifier;
+  if (!notifier.open()) return complain("NOTIFY_SOCKET names no socket that can be used.", ExitCode::kConfiguration);
+  Devices devices;
+  if (const std::string wrong = devices.open(config); !wrong.empty()) return complain(wrong, ExitCode::kDevice);
+  ServiceParts parts{.ports = devices.ports(),
+                     .joints = &devices.joints(),
+                     .maintain = [&devices] { devices.maintain(); },
+                     .let_go = [&devices] { devices.let_go(); },
+                     .heap = counted_heap()};
+  Service service(config, std::move(parts), signals, notifier);
+  const Outcome outcome = service.run();
+  std::fprintf(stderr, "polygmapd: %s\n", outcome.why.c_str());
+  const bool ran = outcome.code == ExitCode::kAsked || outcome.code == ExitCode::kStoppedItself;
+  if (ran) std::printf("%s\n", text_of(outcome).c_str());
+  std::fflush(stdout);
+  if (outcome.lanes_hang) std::_Exit(number_of(outcome.code));
+  return number_of(outcome.code);
+}
+
+int run_with_config(const Options& options) {
+  DaemonConfig config;
+  try {
+    config = read_daemon_config(options.config);
+  } catch (const config::FileError& error) {
+    return complain(error.what(), ExitCode::kConfiguration);
+  }
+  if (options.mode == Options::Mode::kCheck) {
+    std::printf("%s can be used.\n", options.config.c_str());
+    return 0;
+  }
+  return run_service(config);
+}
+
+int run(int argc, char** argv) {
+  Options options;
+  if (const std::string wrong = parse(argc, argv, options); !wrong.empty()) {
+    return complain(wrong + ".\n" + kUsage, ExitCode::kConfiguration);
+  }
+  switch (options.mode) {
+    case Options::Mode::kHelp:
+      std::fputs(kUsage, stdout);
+      return 0;
+    case Options::Mode::kVersion:
+      std::puts("polygmapd " POLYGMAP_VERSION);
+      return 0;
+    case Options::Mode::kReplay:
+      return run_replay(options.recording);
+    case Options::Mode::kDoctor:
+      return run_doctor(options.config, options.json);
+    case Options::Mode::kRun:
+    case Options::Mode::kCheck:
+      break;
+  }
+  return run_with_config(options);
+}
+
+}  // namespace
+}  // namespace polygmap::daemon
+
+int main(int argc, char** argv) {
+  try {
+    return polygmap::daemon::run(argc, argv);
+  } catch (const std::exception& error) {  // of the library, for want of memory, before the lanes run
+    std::fprintf(stderr, "polygmapd: %s\n", error.what());
+    return polygmap::daemon::number_of(polygmap::daemon::ExitCode::kConfiguration);
+  }
+}

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "firmware/daemon/service/service.hpp"
+
+#include <pthread.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cinttypes>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "firmware/schedule.hpp"
+
+namespace polygmap::daemon {
+namespace {
+
+constexpr std::int64_t kLook_ns = 10 * kNsPerMs;       // of the daemon's own thread
+constexpr std::int64_t kMaintain_ns = 100 * kNsPerMs;  // lost devices are opened anew
+constexpr std::int64_t kStatus_ns = kNsPerS;
+constexpr std::int64_t kLaneHangs_ns = kNsPerS;       // without a cycle
+constexpr std::int64_t kFirstDue_ns = 20 * kNsPerMs;  // from the lanes' waiting to their first cycle
+// A swing takes 0.92 s, and a foot that finds no ground goes back: later than that something is wrong.
+constexpr std::int64_t kStopLimit_ns = 3 * kNsPerS;
+// Until there is an estimate, a second, the gait holds both feet where they are and decides nothing.
+constexpr std::int64_t kUndecided_ns = 100 * kNsPerMs;
+constexpr std::size_t kOwnStack_bytes = 64U * 1024U;
+
+std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * kNsPerS + now.tv_nsec;
+}
+void sleep_until(std::int64_t due_ns) noexcept {
+  const timespec due{due_ns / kNsPerS, due_ns % kNsPerS};
+  while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, nullptr) == EINTR) {
+  }
+}
+std::uint64_t thread_page_faults() noexcept {
+  rusage usage{};
+  ::getrusage(RUSAGE_THREAD, &usage);
+  return static_cast<std::uint64_t>(usage.ru_minflt + usage.ru_majflt);
+}
+// Touches the pages that the thread's stack will need.
+[[gnu::noinline]] void fault_in_stack() noexcept {
+  std::array<unsigned char, kOwnStack_bytes> pages;
+  std::memset(pages.data(), 0, pages.size());
+  asm volatile("" : : "r"(pages.data()) : "memory");  // or the compiler leaves it all out
+}
+
+}  // namespace
+
+struct Service::LaneRun {
+  explicit LaneRun(Service& whose) noexcept : service(whose) {}
+  Service& service;
+  LaneThread thread;
+  std::atomic<bool> waits{false};  // for the first cycle's time
+  std::uint64_t page_faults = 0;   // read after join()
+};
+
+// The module's rows, the operator's request to stop before them, and what they say of themselves after.
+class Service::Tasks {
+ public:
+  Tasks(Pipeline& pipeline, StatusBoard& board, const hal::CanJointBus* joints) noexcept
+      : pipeline_(pipeline), board_(board), joints_(joints) {}
+  void ask_to_stop() noexcept { stop_asked_.store(true, std::memory_order_release); }
+
+  Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
+    if (row == kFirstRow && stop_asked_.load(std::memory_order_acquire)) pipeline_.control().request_stop();
+    return pipeline_.run_row(row, cycle_ns, budget);
+  }
+  void cycle_done(std::size_t lane, const CycleReport& report) noexcept {
+    pipeline_.cycle_done(lane, report);
+    if (lane != kControlLane) return;
+    const JointSet heard = joints_ == nullptr ? JointSet::all() : joints_->heard();
+    board_.publish(pipeline_.control(), JointSet::of_bits(JointSet::all().bits() & ~heard.bits()));
+  }
+
+ private:
+  static constexpr std::size_t kFirstRow = 0;  // of control's
+  static_assert(kSchedule[kFirstRow].lane == kControlLane);
+  Pipeline& pipeline_;
+  StatusBoard& board_;
+  const hal::CanJointBus* joints_;
+  std::atomic<bool> stop_asked_{false};
+};
+
+std::string text_of(const Outcome& o) {
+  std::array<char, 320> text{};
+  std::snprintf(
+      text.data(), text.size(),
+      "stopped state=%s phase=%s cycles=%" PRIu64 " overruns=%" PRIu64 " skipped=%" PRIu64 " caught_up=%" PRIu64
+      " heap_calls=%" PRIu64 " page_faults=%" PRIu64 " wake_max_us=%" PRIu64 " stack_bytes=%zu exit=%d",
+      std::string(polygmap::name_of(o.module.state)).c_str(), name_of(o.module.phase), o.cycles, o.overruns, o.skipped,
+      o.caught_up, o.heap_calls, o.page_faults, o.wake_max_ns / 1000, o.stack_bytes, number_of(o.code));
+  return text.data();
+}
+
+Service::Service(const DaemonConfig& config, ServiceParts parts, const StopSignals& signals, Notifier& notifier)
+    : config_(config), parts_(std::move(parts)), signals_(signals), notifier_(notifier) {}
+Service::~Service() {
+  ends_.store(true, std::memory_order_release);
+  for (auto& lane : lanes_) {
+    if (lane) lane->thread.join();
+  }
+}
+
+Outcome Service::run() {
+  Outcome outcome;
+  if (const hal::DeviceError error = clock_.open(); error.failed()) {
+    outcome.code = ExitCode::kDevice;
+    outcome.why = error.sentence();
+    return outcome;
+  }
+  outcome.code = ExitCode::kNoRealTime;
+  if (outcome.why = lock_memory(); !outcome.why.empty()) {
+    if (config_.needs_real_time) return outcome;
+    std::fprintf(stderr, "polygmapd: %s\n", outcome.why.c_str());
+  }
+  fault_in_stack();
+  pipeline_ = std::make_unique<Pipeline>(parts_.ports, config_.params);
+  tasks_ = std::make_unique<Tasks>(*pipeline_, board_, parts_.joints);
+  if (outcome.why = start_lanes(); !outcome.why.empty()) return outcome;
+  const Decision decision = watch();
+  parts_.heap.stop();
+  outcome.code = decision.code;
+  outcome.why = decision.why;
+  finish(outcome);
+  return outcome;
+}
+
+std::string Service::lock_memory() const {
+  if (::mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return {};
+  return std::string("the memory cannot be locked (") + ::strerrordesc_np(errno) +
+         "): it takes CAP_IPC_LOCK, or a limit of locked memory (ulimit -l, LimitMEMLOCK=) that holds all of it.";
+}
+
+std::string Service::start_lanes() {
+  using Entry = void* (*)(void*);
+  constexpr Entry kControl = [](void* run) -> void* {
+    auto& lane = *static_cast<LaneRun*>(run);
+    lane.service.run_lane<kSchedule, kControlLane>(lane);
+    return nullptr;
+  };
+  constexpr Entry kPerception = [](void* run) -> void* {
+    auto& lane = *static_cast<LaneRun*>(run);
+    lane.service.run_lane<kSchedule, kPerceptionLane>(lane);
+    return nullptr;
+  };
+  constexpr Entry kAll = [](void* run) -> void* {
+    auto& lane = *static_cast<LaneRun*>(run);
+    lane.service.run_lane<kOneLaneSchedule, 0>(lane);
+    return nullptr;
+  };
+  constexpr std::array kNames{"control", "perception"};
+  std::string wrong;
+  for (std::size_t n = 0; n < config_.lanes && wrong.empty(); ++n) {
+    lanes_[n] = std::make_unique<LaneRun>(*this);
+    LaneThread::Placement placement = config_.placement[n];
+    const Entry entry = config_.lanes == 1 ? kAll : (n == kControlLane ? kControl : kPerception);
+    int error = lanes_[n]->thread.start(placement, entry, lanes_[n].get());
+    if (error == EPERM && !config_.needs_real_time) {
+      placement.priority = 0;
+      std::fprintf(stderr, "polygmapd: the lane %s has no real-time priority.\n", kNames[n]);
+      error = lanes_[n]->thread.start(placement, entry, lanes_[n].get());
+    }
+    if (error == 0) continue;
+    wrong = std::string("the lane ") + kNames[n] + " cannot have priority " + std::to_string(placement.priority) +
+            " of SCHED_FIFO on processor " + std::to_string(placement.processor) + " (" + ::strerrordesc_np(error) +
+            "): it takes CAP_SYS_NICE, or a limit of real-time priority (ulimit -r, LimitRTPRIO=), and a processor "
+            "that the machine has.";
+  }
+  for (std::size_t n = 0; n < config_.lanes && wrong.empty(); ++n) {
+    while (!lanes_[n]->waits.load(std::memory_order_acquire)) sleep_until(monotonic_ns() + kNsPerMs);
+  }
+  if (!wrong.empty()) ends_.store(true, std::memory_order_release);
+  if (wrong.empty()) parts_.heap.start();
+  first_due_ns_.store(monotonic_ns() + kFirstDue_ns, std::memory_order_release);
+  for (auto& lane : lanes_) {
+    if (!wrong.empty() && lane) lane->thread.join();
+  }
+  return wrong;
+}
+
+template <const auto& Table, std::size_t Lane>
+void Service::run_lane(LaneRun& lane) noexcept {
+  CyclicExecutive<Tasks, Table, Lane, Health> executive(*tasks_, clock_, pipeline_->lane_health(Lane));
+  LaneCounts& counts = board_.lanes[Lane];
+  lane.waits.store(true, std::memory_order_release);
+  while (first_due_ns_.load(std::memory_order_acquire) == 0) sleep_until(monotonic_ns() + kNsPerMs);
+  executive.start(first_due_ns_.load(std::memory_order_acquire));
+  const std::uint64_t faults = thread_page_faults();
+  while (!ends_.load(std::memory_order_acquire)) {
+    sleep_until(executive.next_due_ns());
+    executive.tick(clock_.now_ns());
+    const LaneStatistics& statistics = executive.lane_statistics();
+    counts.cycles.store(statistics.cycles, std::memory_order_relaxed);
+    counts.overruns.store(statistics.overruns, std::memory_order_relaxed);
+    counts.skipped.store(statistics.slips, std::memory_order_relaxed);
+    counts.caught_up.store(statistics.caught_up, std::memory_order_relaxed);
+    counts.wake_max_ns.store(statistics.lateness.max_ns(), std::memory_order_relaxed);
+  }
+  lane.page_faults = thread_page_faults() - faults;
+}
+
+Service::Decision Service::watch() {
+  seen_.moved_ns = monotonic_ns();
+  for (;;) {
+    const int signal = signals_.wait(kLook_ns);
+    const std::int64_t now_ns = monotonic_ns();
+    if (signal != 0 && seen_.asked_ns < 0) {
+      seen_.asked_ns = now_ns;
+      tasks_->ask_to_stop();
+      notifier_.tell("STOPPING=1");
+      std::fprintf(stderr, "polygmapd: asked to stop by signal %d.\n", signal);
+    }
+    log_changes();
+    if (const std::optional<Decision> decision = decide(now_ns)) return *decision;
+    if (now_ns - seen_.maintained_ns >= kMaintain_ns) {
+      seen_.maintained_ns = now_ns;
+      parts_.maintain();
+    }
+    tell(now_ns);
+  }
+}
+
+std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
+  const ModuleView view = board_.module();
+  if (!lanes_move(now_ns)) return Decision{ExitCode::kStoppedItself, "a lane has not finished a cycle for a second."};
+  const bool asked = seen_.asked_ns >= 0;
+  if (!asked && view.state == ModuleState::kSafeStop && seen_.stopped_ns < 0) seen_.stopped_ns = now_ns;
+  if (seen_.stopped_ns >= 0 && (asked || now_ns - seen_.stopped_ns >= config_.hold_ns)) {
+    return Decision{ExitCode::kStoppedItself, "the gait had stopped by itself."};
+  }
+  if (!asked) return std::nullopt;
+  if (view.state == ModuleState::kArming) return Decision{ExitCode::kAsked, "asked to stop while it armed."};
+  const bool waits = view.phase == GaitPhase::kStandstill && now_ns - seen_.asked_ns >= kUndecided_ns;
+  if (view.stands() || waits) return Decision{ExitCode::kAsked, "asked to stop, and stands."};
+  if (now_ns - seen_.asked_ns < kStopLimit_ns) return std::nullopt;
+  return Decision{ExitCode::kStoppedItself, "asked to stop, and after three seconds it still does not stand."};
+}
+
+bool Service::lanes_move(std::int64_t now_ns) noexcept {
+  bool all = true;
+  for (std::size_t n = 0; n < config_.lanes; ++n) {
+    all = all && board_.lanes[n].cycles.load(std::memory_order_relaxed) != seen_.cycles[n];
+  }
+  if (all) {
+    seen_.moved_ns = now_ns;
+    for (std::size_t n = 0; n < config_.lanes; ++n) seen_.cycles[n] = board_.lanes[n].cycles.load();
+  }
+  return now_ns - seen_.moved_ns < kLaneHangs_ns;
+}
+
+// The watchdog is fed for cycles that were done since it was fed last, not for being alive.
+void Service::tell(std::int64_t now_ns) noexcept {
+  const auto cycles = [this](std::size_t n) { return board_.lanes[n].cycles.load(std::memory_order_relaxed); };
+  bool moved = true;
+  for (std::size_t n = 0; n < config_.lanes; ++n) moved = moved && cycles(n) != seen_.fed_cycles[n];
+  if (!seen_.is_ready && moved) {
+    seen_.is_ready = true;
+    notifier_.tell("READY=1");
+  }
+  if (notifier_.watchdog_ns() > 0 && moved && now_ns - seen_.fed_ns >= notifier_.watchdog_ns() / 4) {
+    seen_.fed_ns = now_ns;
+    for (std::size_t n = 0; n < config_.lanes; ++n) seen_.fed_cycles[n] = cycles(n);
+    notifier_.tell("WATCHDOG=1");
+  }
+  if (!notifier_.is_open() || now_ns - seen_.told_ns < kStatus_ns) return;
+  seen_.told_ns = now_ns;
+  StatusText status;
+  status.add("STATUS=");
+  write_status(status, board_, config_.lanes, parts_.heap.calls());
+  notifier_.tell({status.text.data(), status.length});
+}
+
+void Service::log_changes() noexcept {
+  const ModuleView view = board_.module();
+  if (view == logged_) return;
+  seen_.told_ns = 0;  // the service manager hears of it at once
+  const bool is_news = view.state != logged_.state || view.silent.bits() != logged_.silent.bits();
+  logged_ = view;
+  if (!is_news) return;
+  StatusText status;
+  write_status(status, board_, config_.lanes, parts_.heap.calls());
+  std::fprintf(stderr, "polygmapd: %s\n", status.text.data());
+}
+
+void Service::finish(Outcome& outcome) {
+  outcome.lanes_hang = !lanes_move(monotonic_ns());
+  ends_.store(true, std::memory_order_release);
+  outcome.heap_calls = parts_.heap.calls();
+  for (std::size_t n = 0; n < config_.lanes; ++n) {
+    const LaneCounts& counts = board_.lanes[n];
+    if (!outcome.lanes_hang) {
+      lanes_[n]->thread.join();
+      outcome.page_faults += lanes_[n]->page_faults;
+      outcome.stack_bytes = std::max(outcome.stack_bytes, lanes_[n]->thread.used_stack_bytes());
+    }
+    outcome.overruns += counts.overruns.load();
+    outcome.skipped += counts.skipped.load();
+    outcome.caught_up += counts.caught_up.load();
+    outcome.wake_max_ns = std::max(outcome.wake_max_ns, counts.wake_max_ns.load());
+  }
+  outcome.cycles = board_.lanes[kControlLane].cycles.load();
+  outcome.module = board_.module();
+  if (!outcome.lanes_hang && outcome.module.state == ModuleState::kArming) parts_.let_go();
+}
+
+}  // namespace polygmap::daemon

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs the module on its lanes until it is asked to stop or has stopped, and tells the service manager how it is.
+//
+// The module arms by itself (control_lane.hpp): until all drives have answered its commands have no gains. Asked to
+// stop while it arms, it lets go of the drives. Asked later, a foot in the air comes down first, and the drives keep
+// the last command: the robot stands on them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "firmware/daemon/config/daemon_config.hpp"
+#include "firmware/daemon/exit_code.hpp"
+#include "firmware/daemon/service/status_board.hpp"
+#include "firmware/daemon/service/stop_signals.hpp"
+#include "firmware/daemon/system/heap_count.hpp"
+#include "firmware/daemon/system/notifier.hpp"
+#include "firmware/pipeline.hpp"
+#include "hal/can/can_joint_bus.hpp"
+#include "hal/linux/system/posix_clock.hpp"
+
+namespace polygmap::daemon {
+
+struct ServiceParts {
+  Ports ports;
+  const hal::CanJointBus* joints = nullptr;  // whose drives are named while they are waited for; null: none
+  std::function<void()> maintain = [] {};    // some ten times a second, on the thread of run()
+  std::function<void()> let_go = [] {};      // once, after the lanes, when the drives never had gains
+  HeapCount heap{};
+};
+
+struct Outcome {
+  ExitCode code = ExitCode::kAsked;
+  std::string why;           // one sentence
+  bool lanes_hang = false;   // their threads still run: the process can only be left by _Exit
+  ModuleView module;         // at the end
+  std::uint64_t cycles = 0;  // of control
+  std::uint64_t overruns = 0, skipped = 0, caught_up = 0;  // of all lanes
+  std::uint64_t heap_calls = 0;
+  std::uint64_t page_faults = 0;  // of the lanes' threads, from their first cycle on
+  std::uint64_t wake_max_ns = 0;  // from a cycle's due time to its tick
+  std::size_t stack_bytes = 0;    // the most that a lane used
+};
+// "stopped state=... cycles=...": one line.
+[[nodiscard]] std::string text_of(const Outcome& outcome);
+
+class Service {
+ public:
+  // All of them outlive it; the module is made here and runs in run().
+  Service(const DaemonConfig& config, ServiceParts parts, const StopSignals& signals, Notifier& notifier);
+  ~Service();
+  Service(const Service&) = delete;
+  Service& operator=(const Service&) = delete;
+
+  [[nodiscard]] Outcome run();
+
+ private:
+  struct LaneRun;
+  class Tasks;
+  struct Decision {
+    ExitCode code;
+    const char* why;
+  };
+
+  // Empty, or why there is no real time.
+  [[nodiscard]] std::string lock_memory() const;
+  [[nodiscard]] std::string start_lanes();
+  template <const auto& Table, std::size_t Lane>
+  void run_lane(LaneRun& lane) noexcept;
+  // Until it is decided how this ends.
+  [[nodiscard]] Decision watch();
+  [[nodiscard]] std::optional<Decision> decide(std::int64_t now_ns);
+  [[nodiscard]] bool lanes_move(std::int64_t now_ns) noexcept;
+  void tell(std::int64_t now_ns) noexcept;
+  void log_changes() noexcept;
+  void finish(Outcome& outcome);
+
+  const DaemonConfig& config_;
+  ServiceParts parts_;
+  const StopSignals& signals_;
+  Notifier& notifier_;
+  hal::PosixClock clock_;
+  StatusBoard board_;
+  std::unique_ptr<Pipeline> pipeline_;
+  std::unique_ptr<Tasks> tasks_;
+  std::array<std::unique_ptr<LaneRun>, kLaneCount> lanes_;
+  std::atomic<std::int64_t> first_due_ns_{0};  // 0: the lanes wait for it
+  std::atomic<bool> ends_{false};
+  struct {
+    std::int64_t asked_ns = -1, stopped_ns = -1;  // negative: not yet
+    std::int64_t maintained_ns = 0, told_ns = 0, fed_ns = 0, moved_ns = 0;
+    std::array<std::uint64_t, kLaneCount> cycles{};
+    std::array<std::uint64_t, kLaneCount> fed_cycles{};
+    bool is_ready = false;
+  } seen_;
+  ModuleView logged_;
+};
+
+}  // namespace polygmap::daemon

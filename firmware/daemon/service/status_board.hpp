@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the lanes say of themselves to the daemon's own thread, which tells the service manager. Nobody waits.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "firmware/control_lane.hpp"
+
+namespace polygmap::daemon {
+
+// Of one moment.
+struct ModuleView {
+  ModuleState state = ModuleState::kArming;
+  GaitPhase phase = GaitPhase::kStandstill;
+  StopReason reason = StopReason::kNone;
+  JointSet unheard = JointSet::all();  // drives that never answered
+  JointSet silent;                     // drives that are silent now
+  std::uint16_t treads = 0;            // climbed; saturates
+
+  [[nodiscard]] bool stands() const noexcept {
+    return state == ModuleState::kSafeStop || phase == GaitPhase::kFinished;
+  }
+  [[nodiscard]] bool operator==(const ModuleView& other) const noexcept { return packed() == other.packed(); }
+
+  [[nodiscard]] std::uint64_t packed() const noexcept {
+    return std::uint64_t{static_cast<std::uint8_t>(state)} | std::uint64_t{static_cast<std::uint8_t>(phase)} << 8U |
+           std::uint64_t{static_cast<std::uint8_t>(reason)} << 16U | std::uint64_t{unheard.bits()} << 24U |
+           std::uint64_t{silent.bits()} << 36U | std::uint64_t{treads} << 48U;
+  }
+  [[nodiscard]] static ModuleView unpacked(std::uint64_t bits) noexcept {
+    constexpr std::uint64_t kJoints = (1U << kJointCount) - 1U;
+    ModuleView view;
+    view.state = static_cast<ModuleState>(bits & 0xFFU);
+    view.phase = static_cast<GaitPhase>(bits >> 8U & 0xFFU);
+    view.reason = static_cast<StopReason>(bits >> 16U & 0xFFU);
+    view.unheard = JointSet::of_bits(static_cast<std::uint16_t>(bits >> 24U & kJoints));
+    view.silent = JointSet::of_bits(static_cast<std::uint16_t>(bits >> 36U & kJoints));
+    view.treads = static_cast<std::uint16_t>(bits >> 48U);
+    return view;
+  }
+};
+static_assert(kJointCount == 12);
+
+// Each number by itself; written by its lane only.
+struct alignas(64) LaneCounts {
+  std::atomic<std::uint64_t> cycles{0};
+  std::atomic<std::uint64_t> overruns{0};   // cycles longer than 2 ms
+  std::atomic<std::uint64_t> skipped{0};    // cycles that slipped
+  std::atomic<std::uint64_t> caught_up{0};  // cycles run late
+  std::atomic<std::uint64_t> wake_max_ns{0};
+};
+
+class StatusBoard {
+ public:
+  // On control's thread, after a cycle. unheard: drives that have not answered yet.
+  void publish(const ControlLane& control, JointSet unheard) noexcept {
+    const GaitStatus& gait = control.gait_status();
+    ModuleView view;
+    view.state = control.module_state();
+    view.phase = gait.phase;
+    view.reason = gait.stop_reason;
+    view.unheard = unheard;
+    view.silent = control.drives().silent;
+    view.treads = static_cast<std::uint16_t>(gait.treads_climbed < 0xFFFFU ? gait.treads_climbed : 0xFFFFU);
+    module_.store(view.packed(), std::memory_order_release);
+    if (++published_ % kCyclesPerFaults != 0) return;
+    for (std::size_t i = 0; i < kFaultTable.size(); ++i) {
+      faults_[i].store(control.all_faults().count(kFaultTable[i].code).count, std::memory_order_relaxed);
+    }
+  }
+  // From any thread.
+  [[nodiscard]] ModuleView module() const noexcept {
+    return ModuleView::unpacked(module_.load(std::memory_order_acquire));
+  }
+  // Of kFaultTable's entry; a tenth of a second old at most.
+  [[nodiscard]] std::uint32_t fault(std::size_t i) const noexcept { return faults_[i].load(std::memory_order_relaxed); }
+  std::array<LaneCounts, kLaneCount> lanes;
+
+ private:
+  static constexpr std::uint32_t kCyclesPerFaults = 50;
+  std::atomic<std::uint64_t> module_{ModuleView{}.packed()};
+  std::array<std::atomic<std::uint32_t>, kFaultTable.size()> faults_{};
+  std::uint32_t published_ = 0;  // control's
+};
+
+// A line of text of fixed capacity; what does not fit is cut. Allocates nothing.
+struct StatusText {
+  std::array<char, 512> text{};
+  std::size_t length = 0;
+
+  [[gnu::format(printf, 2, 3)]] void add(const char* format, ...) noexcept;
+};
+// The state in words, as systemctl shows it.
+void write_status(StatusText& out, const StatusBoard& board, std::size_t lanes, std::uint64_t heap_calls) noexcept;
+[[nodiscard]] const char* name_of(GaitPhase phase) noexcept;
+[[nodiscard]] const char* name_of(StopReason reason) noexcept;
+
+}  // namespace polygmap::daemon

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+// The shipped program: what it says, and its exit codes.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "firmware/recording/recorder.hpp"
+#include "tests/support/fake_robot.hpp"
+
+namespace polygmap::daemon {
+namespace {
+
+// The first ticks of a fake robot's life.
+void record(const std::string& directory, int ticks) {
+  test::FakeRobot robot(0.062);
+  robot.camera_speaks = false;
+  recording::Recorder recorder(robot.ports());
+  const auto module = std::make_unique<Pipeline>(recorder.ports(), Params{});
+  recording::RecordedTasks<Pipeline> tasks(*module, &recorder);
+  OneLaneExecutive<recording::RecordedTasks<Pipeline>> executive(tasks, robot.clock, module->lane_health(0));
+  recorder.begin(directory, Params{});
+  recorder.watch(*module);
+  executive.start(robot.clock.now_ns() + kCycle_ns);
+  for (int i = 0; i < ticks; ++i) {
+    robot.advance();
+    executive.tick(robot.clock.now_ns());
+    recorder.flush();
+  }
+  EXPECT_EQ(recorder.finish(), "");
+}
+
+struct Done {
+  int code = -1;
+  std::string said;  // on both streams
+};
+
+class ProgramTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (kProgram.empty()) GTEST_SKIP() << "this build has no program that could run here";
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  [[nodiscard]] Done run(const std::string& arguments) const {
+    const std::string command = "env -u NOTIFY_SOCKET timeout 60 " + kProgram + " " + arguments + " 2>&1";
+    Done done;
+    std::FILE* pipe = ::popen(command.c_str(), "r");
+    std::array<char, 4096> text{};
+    while (std::fgets(text.data(), text.size(), pipe) != nullptr) done.said += text.data();
+    const int status = ::pclose(pipe);
+    done.code = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + status;
+    return done;
+  }
+  std::string write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return (folder_ / name).string();
+  }
+  std::string config(const std::string& camera = "/dev/video9") {
+    return write("robot.toml",
+                 "bus = \"" POLYGMAP_SOURCE "/firmware/buses/cubemars.toml\"\n[camera]\ndevice = \"" + camera +
+                     "\"\nfile = \"" POLYGMAP_SOURCE "/firmware/cameras/d435.toml\"\n[imu]\ndriver = \"livox\"\n");
+  }
+
+  const std::string kProgram = POLYGMAPD;
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) / ("polygmapd_" + std::to_string(::getpid()));
+};
+
+TEST_F(ProgramTest, WrongArguments_AreConfigurationErrorsWithTheUsage) {
+  for (const char* wrong : {"", "--config", "--replay", "--frobnicate", "--json --config x", "--doctor --replay x",
+                            "--check", "--check --doctor"}) {
+    const Done done = run(wrong);
+    EXPECT_EQ(done.code, 2) << wrong;
+    EXPECT_NE(done.said.find("polygmapd --config FILE"), std::string::npos) << wrong << ": " << done.said;
+  }
+}
+
+TEST_F(ProgramTest, HelpAndVersion_AreTold) {
+  EXPECT_EQ(run("--help").code, 0);
+  const Done version = run("--version");
+  EXPECT_EQ(version.code, 0);
+  EXPECT_TRUE(version.said.starts_with("polygmapd 0.")) << version.said;
+}
+
+TEST_F(ProgramTest, WrongFile_IsCodeTwoAndOneSentence) {
+  const std::string path = write("robot.toml", "bus = 3\n");
+  for (const char* also : {"", " --check"}) {
+    const Done done = run("--config " + path + also);
+    EXPECT_EQ(done.code, 2);
+    EXPECT_NE(done.said.find("robot.toml"), std::string::npos) << done.said;
+    EXPECT_EQ(std::ranges::count(done.said, '\n'), 1) << done.said;
+  }
+}
+
+TEST_F(ProgramTest, Check_OpensNothing) {
+  const Done done = run("--check --config " + config());
+  EXPECT_EQ(done.code, 0) << done.said;
+  EXPECT_NE(done.said.find("can be used"), std::string::npos) << done.said;
+}
+
+TEST_F(ProgramTest, MissingDevice_IsCodeThreeWithFileLineAndKey) {
+  if (std::filesystem::exists("/sys/class/net/can0")) GTEST_SKIP() << "this machine has a can0";
+  const Done done = run("--config " + config());
+  EXPECT_EQ(done.code, 3) << done.said;
+  EXPECT_NE(done.said.find("cubemars.toml, line "), std::string::npos) << done.said;
+  EXPECT_NE(done.said.find("can0"), std::string::npos) << done.said;
+}
+
+TEST_F(ProgramTest, Doctor_SaysWhatItFinds) {
+  const Done text = run("--doctor");
+  EXPECT_TRUE(text.code == 0 || text.code == 1) << text.said;
+  for (const char* name : {"kernel: ", "governor: ", "isolation: ", "rtprio: ", "memlock: ", "clock: ", "wake-up: "}) {
+    EXPECT_NE(text.said.find(name), std::string::npos) << name << text.said;
+  }
+  const Done json = run("--doctor --json --config " + config());
+  EXPECT_EQ(json.code, 1) << "no such camera: " << json.said;
+  EXPECT_NE(json.said.find("There is no /dev/video9"), std::string::npos) << json.said;
+  EXPECT_EQ(run("--doctor --config " + write("robot.toml", "bus = 3")).code, 2);
+}
+
+TEST_F(ProgramTest, Replay_OfTheSameModule_IsCodeZero) {
+  record(folder_.string(), 50);
+  const Done done = run("--replay " + folder_.string());
+  EXPECT_EQ(done.code, 0) << done.said;
+  EXPECT_EQ(done.said, "replay: 50 ticks, 0 differ\n");
+}
+
+TEST_F(ProgramTest, ReplayWithAFlippedBitOfAnInput_IsCodeOneAndNamesTheFirstDifference) {
+  record(folder_.string(), 50);
+  const std::filesystem::path file = folder_ / recording::kFileName;
+  std::ifstream in(file, std::ios::binary);
+  std::vector<char> bytes((std::istreambuf_iterator<char>(in)), {});
+  in.close();
+  // Of a standing robot the IMU's vertical acceleration is gravity.
+  const double gravity_mps2 = kGravity_mps2;
+  const auto* pattern = reinterpret_cast<const char*>(&gravity_mps2);
+  const auto at = std::search(bytes.begin() + static_cast<std::ptrdiff_t>(bytes.size() / 2), bytes.end(), pattern,
+                              pattern + sizeof gravity_mps2);
+  ASSERT_NE(at, bytes.end());
+  at[3] = static_cast<char>(at[3] ^ 1);
+  std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  const Done done = run("--replay " + folder_.string());
+  EXPECT_EQ(done.code, 1) << done.said;
+  EXPECT_NE(done.said.find("tick "), std::string::npos) << done.said;
+  EXPECT_NE(done.said.find("replay: 50 ticks, "), std::string::npos) << done.said;
+}
+
+TEST_F(ProgramTest, ReplayOfWhatIsNone_IsCodeTwo) {
+  const Done done = run("--replay " + folder_.string());
+  EXPECT_EQ(done.code, 2) << done.said;
+  EXPECT_FALSE(done.said.empty());
+}
+
+}  // namespace
+}  // namespace polygmap::daemon

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+// The service on this machine's clock and threads, with a fake robot behind the ports.
+#include "firmware/daemon/service/service.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "sim_stub/heap_trap.hpp"
+#include "tests/firmware/daemon/live_robot.hpp"
+#include "tests/firmware/daemon/notify_socket.hpp"
+
+namespace polygmap::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using test::LiveRobot;
+using test::NotifySocket;
+
+constexpr auto kEstimates = 1500ms;  // from the first feedback on
+
+bool has(const std::vector<std::string>& all, std::string_view part) {
+  return std::ranges::any_of(all, [part](const std::string& one) { return one.find(part) != std::string::npos; });
+}
+
+class ServiceTest : public testing::Test {
+ protected:
+  ServiceTest() {
+    config_.lanes = 1;
+    config_.needs_real_time = false;  // a test's machine may not give it
+    config_.hold_ns = 100 * kNsPerMs;
+    config_.placement[0] = {.processor = -1, .priority = 0};
+    // Without pictures the gait waits for them, and then stops.
+    config_.params.gait.standing.start_patience_ticks = 100'000;
+  }
+  ServiceParts parts() {
+    return {.ports = robot_.ports(),
+            .joints = nullptr,
+            .maintain = [this] { ++maintained_; },
+            .let_go = [this] { ++let_go_; },
+            .heap = {}};
+  }
+  // Runs the service on a thread of its own, as long as during() takes, then SIGTERM.
+  template <typename During>
+  Outcome run(During&& during, bool then_stop = true) {
+    EXPECT_TRUE(notifier_.open(manager_.name().c_str(), "400000", nullptr));
+    Service service(config_, parts(), signals_, notifier_);
+    Outcome outcome;
+    std::atomic<bool> ended{false};
+    std::thread thread([&] {
+      outcome = service.run();
+      ended = true;
+    });
+    during();
+    const auto asked = std::chrono::steady_clock::now();
+    while (!then_stop && !ended && std::chrono::steady_clock::now() < asked + 5s) std::this_thread::sleep_for(1ms);
+    if (!ended) ::pthread_kill(thread.native_handle(), SIGTERM);
+    thread.join();
+    stopped_after_ = std::chrono::steady_clock::now() - asked;
+    const auto heard = manager_.read();
+    heard_.insert(heard_.end(), heard.begin(), heard.end());
+    return outcome;
+  }
+  void listen_until(std::string_view part, std::chrono::seconds most) {
+    for (const auto end = std::chrono::steady_clock::now() + most; std::chrono::steady_clock::now() < end;) {
+      for (const std::string& one : manager_.read()) heard_.push_back(one);
+      if (has(heard_, part)) return;
+      std::this_thread::sleep_for(5ms);
+    }
+    ADD_FAILURE() << "nobody said " << part;
+  }
+
+  const StopSignals signals_;
+  DaemonConfig config_;
+  LiveRobot robot_;
+  NotifySocket manager_{"@polygmap_service_" + std::to_string(::getpid())};
+  Notifier notifier_;
+  std::vector<std::string> heard_;
+  std::chrono::steady_clock::duration stopped_after_{};
+  int maintained_ = 0, let_go_ = 0;
+};
+
+TEST_F(ServiceTest, AskedToStopWhileItArms_LetsGoOfTheDrives) {
+  robot_.drives_answer = false;
+  const Outcome outcome = run([&] { listen_until("STATUS=arming", 5s); });
+  EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
+  EXPECT_EQ(outcome.module.state, ModuleState::kArming);
+  EXPECT_EQ(let_go_, 1);
+  EXPECT_FALSE(robot_.has_gains);
+  EXPECT_LT(stopped_after_, 1s);
+}
+
+TEST_F(ServiceTest, AskedToStopWhileItRuns_StandsOnItsDrives) {
+  const Outcome outcome = run([&] {
+    listen_until("STATUS=running", 5s);
+    std::this_thread::sleep_for(kEstimates);
+  });
+  EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
+  EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
+  EXPECT_EQ(outcome.module.phase, GaitPhase::kStopped);
+  EXPECT_EQ(outcome.module.reason, StopReason::kNone);
+  EXPECT_EQ(let_go_, 0) << "a robot that stands on its drives would fall";
+  EXPECT_TRUE(robot_.has_gains);
+  EXPECT_LT(stopped_after_, 1s);
+  EXPECT_GT(outcome.cycles, 10U);
+  EXPECT_GT(outcome.stack_bytes, 1000U);
+}
+
+TEST_F(ServiceTest, AskedToStopBeforeThereIsAnEstimate_StandsOnItsDrives) {
+  const Outcome outcome = run([&] { listen_until("STATUS=running", 5s); });
+  EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
+  EXPECT_NE(outcome.module.state, ModuleState::kArming);
+  EXPECT_EQ(let_go_, 0);
+  EXPECT_LT(stopped_after_, 1s);
+}
+
+// The longest that a foot is in the air is 0.92 s; a machine of others' may be late.
+TEST_F(ServiceTest, AskedToStopInASwing_PutsTheFootDownFirst) {
+  if constexpr (test::kSlowMachine) GTEST_SKIP() << "climbs in real time";
+  robot_.sees = true;
+  const Outcome outcome = run([&] {
+    listen_until(", swing,", 20s);
+    std::this_thread::sleep_for(100ms);
+    EXPECT_FALSE(robot_.robot.stands(Foot::kLeft) && robot_.robot.stands(Foot::kRight));
+  });
+  EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
+  EXPECT_EQ(outcome.module.phase, GaitPhase::kStopped);
+  EXPECT_TRUE(robot_.robot.stands(Foot::kLeft) && robot_.robot.stands(Foot::kRight));
+  EXPECT_EQ(let_go_, 0);
+  EXPECT_LT(stopped_after_, 1500ms);
+}
+
+TEST_F(ServiceTest, ItTellsTheServiceManager) {
+  const Outcome outcome = run([&] {
+    listen_until("STATUS=running", 5s);
+    listen_until("WATCHDOG=1", 5s);
+  });
+  EXPECT_EQ(std::ranges::count(heard_, "READY=1"), 1);
+  EXPECT_TRUE(has(heard_, "STOPPING=1"));
+  EXPECT_TRUE(has(heard_, "overruns 0, skipped 0, heap calls 0") || outcome.overruns + outcome.skipped > 0);
+  EXPECT_GT(maintained_, 0);
+}
+
+TEST_F(ServiceTest, GaitThatStopsByItself_IsHeldAndEndsTheService) {
+  config_.params.gait.standing.start_patience_ticks = 50;
+  const Outcome outcome = run([&] { listen_until("STATUS=safe_stop", 5s); }, false);
+  EXPECT_EQ(outcome.code, ExitCode::kStoppedItself) << outcome.why;
+  EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
+  EXPECT_EQ(outcome.module.reason, StopReason::kNothingSeen);
+  EXPECT_TRUE(has(heard_, "nothing to step on is seen"));
+  EXPECT_GE(stopped_after_, 90ms);
+  EXPECT_EQ(let_go_, 0);
+}
+
+TEST_F(ServiceTest, AskedWhileItHoldsAfterAStopOfItsOwn_SaysThatItStoppedItself) {
+  config_.params.gait.standing.start_patience_ticks = 50;
+  config_.hold_ns = 3600 * kNsPerS;
+  const Outcome outcome = run([&] { listen_until("STATUS=safe_stop", 5s); });
+  EXPECT_EQ(outcome.code, ExitCode::kStoppedItself) << outcome.why;
+  EXPECT_LT(stopped_after_, 1s);
+}
+
+TEST_F(ServiceTest, SilentImu_EndsInASafeStop) {
+  const Outcome outcome = run(
+      [&] {
+        listen_until("STATUS=running", 5s);
+        std::this_thread::sleep_for(kEstimates);
+        robot_.imu_speaks = false;
+        listen_until("STATUS=safe_stop", 2s);
+      },
+      false);
+  EXPECT_EQ(outcome.code, ExitCode::kStoppedItself) << outcome.why;
+  EXPECT_EQ(outcome.module.reason, StopReason::kStateStale);
+  EXPECT_TRUE(has(heard_, "imu_missing"));
+}
+
+TEST_F(ServiceTest, LaneThatHangs_IsNotFedAndEndsTheService) {
+  std::atomic<bool> hangs{false};
+  robot_.in_every_read = [&hangs] {
+    while (hangs) std::this_thread::sleep_for(1ms);
+  };
+  ASSERT_TRUE(notifier_.open(manager_.name().c_str(), "400000", nullptr));
+  Service service(config_, parts(), signals_, notifier_);
+  Outcome outcome;
+  std::thread thread([&] { outcome = service.run(); });
+  listen_until("STATUS=running", 5s);
+  hangs = true;
+  std::this_thread::sleep_for(300ms);
+  (void)manager_.read();
+  thread.join();
+  EXPECT_FALSE(has(manager_.read(), "WATCHDOG=1"));
+  EXPECT_EQ(outcome.code, ExitCode::kStoppedItself);
+  EXPECT_TRUE(outcome.lanes_hang);
+  EXPECT_NE(outcome.why.find("a lane has not finished a cycle"), std::string::npos) << outcome.why;
+  hangs = false;  // the service's end waits for its threads
+}
+
+TEST_F(ServiceTest, HeapIsWatchedFromTheLanesToTheirEnd) {
+  static int started = 0, stopped = 0;
+  started = stopped = 0;
+  ServiceParts watched = parts();
+  watched.heap = {.start = []() noexcept { ++started; },
+                  .stop = []() noexcept { ++stopped; },
+                  .calls = []() noexcept { return std::uint64_t{7}; }};
+  ::pthread_kill(::pthread_self(), SIGINT);  // waits to be heard
+  Service service(config_, std::move(watched), signals_, notifier_);
+  const Outcome outcome = service.run();
+  EXPECT_EQ(started, 1);
+  EXPECT_EQ(stopped, 1);
+  EXPECT_EQ(outcome.heap_calls, 7U);
+  EXPECT_NE(text_of(outcome).find(" heap_calls=7 "), std::string::npos) << text_of(outcome);
+}
+
+TEST_F(ServiceTest, ProcessorThatTheMachineLacks_IsNoRealTime) {
+  config_.placement[0].processor = 1000;
+  Service service(config_, parts(), signals_, notifier_);
+  const Outcome outcome = service.run();
+  EXPECT_EQ(outcome.code, ExitCode::kNoRealTime);
+  EXPECT_NE(outcome.why.find("control"), std::string::npos) << outcome.why;
+  EXPECT_NE(outcome.why.find("processor 1000"), std::string::npos) << outcome.why;
+}
+
+// In a process that may neither lock memory nor have a priority.
+TEST_F(ServiceTest, WithoutTheRights_IsNoRealTime) {
+  config_.needs_real_time = true;
+  config_.placement[0].priority = 80;
+  const auto run_without_rights = [this] {
+    const rlimit none{0, 0};
+    ::setrlimit(RLIMIT_MEMLOCK, &none);
+    ::setrlimit(RLIMIT_RTPRIO, &none);
+    if (::geteuid() == 0 && ::setresuid(65534, 65534, 65534) != 0) ::_exit(99);
+    Service service(config_, parts(), signals_, notifier_);
+    const Outcome outcome = service.run();
+    std::fprintf(stderr, "%s\n", outcome.why.c_str());
+    ::_exit(number_of(outcome.code));
+  };
+  EXPECT_EXIT(run_without_rights(), testing::ExitedWithCode(4), "CAP_IPC_LOCK.*LimitMEMLOCK");
+}
+
+TEST(ModuleViewTest, PackedAndUnpacked_IsTheSame) {
+  ModuleView view;
+  view.state = ModuleState::kSafeStop;
+  view.phase = GaitPhase::kStopped;
+  view.reason = StopReason::kStateStale;
+  view.unheard = JointSet::of_bits(0x801);
+  view.silent = JointSet::of_bits(0xFFE);
+  view.treads = 0xFFFF;
+  EXPECT_EQ(ModuleView::unpacked(view.packed()), view);
+  EXPECT_EQ(ModuleView::unpacked(view.packed()).silent.bits(), 0xFFE);
+  EXPECT_FALSE(view == ModuleView{});
+}
+
+TEST(StatusTextTest, LongText_IsCutAndEnds) {
+  StatusText text;
+  for (int i = 0; i < 100; ++i) text.add("%s", "a text of some length, again and again");
+  EXPECT_EQ(text.length, text.text.size() - 1);
+  EXPECT_EQ(text.text.back(), '\0');
+}
+
+}  // namespace
+}  // namespace polygmap::daemon
