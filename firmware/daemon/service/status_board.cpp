@@ -47,7 +47,7 @@ const char* name_of(GaitPhase phase) noexcept {
 }
 
 const char* name_of(StopReason reason) noexcept {
-  constexpr std::array kNames{"asked to stop",
+  constexpr std::array kNames{"no reason",
                               "nothing to step on is seen",
                               "no staircase is seen",
                               "on top",
@@ -62,7 +62,12 @@ const char* name_of(StopReason reason) noexcept {
                               "it does not stand straight before the stairs",
                               "there was no ground under the foot",
                               "the body toppled",
-                              "IMU or joints fell silent"};
+                              "IMU or joints fell silent",
+                              "asked to stop",
+                              "a drive told of an error",
+                              "control came late again and again",
+                              "a bus took no commands"};
+  static_assert(kNames.size() == static_cast<std::size_t>(StopReason::kCommandsRefused) + 1);
   const auto i = static_cast<std::size_t>(reason);
   return i < kNames.size() ? kNames[i] : "unknown";
 }
