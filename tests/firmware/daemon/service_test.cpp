@@ -34,6 +34,8 @@ class ServiceTest : public testing::Test {
     config_.needs_real_time = false;  // a test's machine may not give it
     config_.hold_ns = 100 * kNsPerMs;
     config_.placement[0] = {.processor = -1, .priority = 0};
+    // The fake robot lives in the module's own rows.
+    config_.params.overload.most_lost_cycles = 10'000;
     // Without pictures the gait waits for them, and then stops.
     config_.params.gait.standing.start_patience_ticks = 100'000;
   }
@@ -102,7 +104,7 @@ TEST_F(ServiceTest, AskedToStopWhileItRuns_StandsOnItsDrives) {
   EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
   EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
   EXPECT_EQ(outcome.module.phase, GaitPhase::kStopped);
-  EXPECT_EQ(outcome.module.reason, StopReason::kNone);
+  EXPECT_EQ(outcome.module.reason, StopReason::kOperator);
   EXPECT_EQ(let_go_, 0) << "a robot that stands on its drives would fall";
   EXPECT_TRUE(robot_.has_gains);
   EXPECT_LT(stopped_after_, 1s);
