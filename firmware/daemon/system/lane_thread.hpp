@@ -15,7 +15,11 @@ namespace polygmap::daemon {
 class LaneThread {
  public:
   // At least PTHREAD_STACK_MIN, which is 128 KiB on AArch64.
+#ifdef POLYGMAP_SANITIZED
+  static constexpr std::size_t kStack_bytes = std::size_t{2048} * 1024;  // a sanitizer keeps its own data in it
+#else
   static constexpr std::size_t kStack_bytes = std::size_t{256} * 1024;
+#endif
   struct Placement {
     int processor = -1;  // negative: any
     int priority = 0;    // of SCHED_FIFO; 0: no real-time thread

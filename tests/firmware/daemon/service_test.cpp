@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 using test::LiveRobot;
 using test::NotifySocket;
 
-constexpr auto kEstimates = 1500ms;  // from the first feedback on
+constexpr auto kEstimates = test::kSlowMachine ? 5000ms : 1500ms;  // from the first feedback on
 
 bool has(const std::vector<std::string>& all, std::string_view part) {
   return std::ranges::any_of(all, [part](const std::string& one) { return one.find(part) != std::string::npos; });
@@ -34,8 +34,15 @@ class ServiceTest : public testing::Test {
     config_.needs_real_time = false;  // a test's machine may not give it
     config_.hold_ns = 100 * kNsPerMs;
     config_.placement[0] = {.processor = -1, .priority = 0};
+    // The fake robot lives in the module's own rows.
+    config_.params.overload.most_lost_cycles = 10'000;
     // Without pictures the gait waits for them, and then stops.
     config_.params.gait.standing.start_patience_ticks = 100'000;
+  }
+  void SetUp() override {
+#ifdef POLYGMAP_EMULATED
+    GTEST_SKIP() << "runs in real time, which toolchain/vm/daemon_test has emulated";
+#endif
   }
   ServiceParts parts() {
     return {.ports = robot_.ports(),
@@ -102,7 +109,7 @@ TEST_F(ServiceTest, AskedToStopWhileItRuns_StandsOnItsDrives) {
   EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
   EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
   EXPECT_EQ(outcome.module.phase, GaitPhase::kStopped);
-  EXPECT_EQ(outcome.module.reason, StopReason::kNone);
+  EXPECT_EQ(outcome.module.reason, StopReason::kOperator);
   EXPECT_EQ(let_go_, 0) << "a robot that stands on its drives would fall";
   EXPECT_TRUE(robot_.has_gains);
   EXPECT_LT(stopped_after_, 1s);
@@ -238,7 +245,8 @@ TEST_F(ServiceTest, WithoutTheRights_IsNoRealTime) {
     std::fprintf(stderr, "%s\n", outcome.why.c_str());
     ::_exit(number_of(outcome.code));
   };
-  EXPECT_EXIT(run_without_rights(), testing::ExitedWithCode(4), "CAP_IPC_LOCK.*LimitMEMLOCK");
+  EXPECT_EXIT(run_without_rights(), testing::ExitedWithCode(4),
+              "CAP_IPC_LOCK.*LimitMEMLOCK|CAP_SYS_NICE.*LimitRTPRIO");  // a sanitizer locks no memory
 }
 
 TEST(ModuleViewTest, PackedAndUnpacked_IsTheSame) {
