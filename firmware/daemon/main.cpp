@@ -95,7 +95,7 @@ int run_service(const DaemonConfig& config) {
   const bool ran = outcome.code == ExitCode::kAsked || outcome.code == ExitCode::kStoppedItself;
   if (ran) std::printf("%s\n", text_of(outcome).c_str());
   std::fflush(stdout);
-  if (outcome.lanes_hang) std::_Exit(number_of(outcome.code));
+  if (outcome.threads_hang) std::_Exit(number_of(outcome.code));
   return number_of(outcome.code);
 }
 

@@ -101,7 +101,7 @@ Finding isolated(const DoctorInput& in) {
             "The machine has no processor " + joined(missing) + ", on which a lane is to run.",
             "Give control.cpu and perception.cpu of the daemon's file processors of /sys/devices/system/cpu/online."};
   }
-  if (in.processors.empty() && apart.empty()) shared.emplace_back("any");
+  if (in.processors.empty()) shared.emplace_back("any");  // threads without a processor never run on an isolated one
   if (shared.empty()) return good("isolation", "The lanes' processors are kept free of other programs.");
   return {"isolation", Verdict::kWarning,
           "Processors are shared with other programs and interrupts (" + joined(shared) + ").",
@@ -179,7 +179,11 @@ Finding controller(const DoctorInput& in, const std::string& bus, std::string so
   const std::string again = "ip link set " + bus + " down && ip link set " + bus +
                             " up type can bitrate 1000000 restart-ms 100 berr-reporting on";
   const std::optional<CanLink> link = in.can_link(bus);
-  if (!link || !link->state) return {name, Verdict::kGood, so_far + ", without a controller.", {}};
+  if (!link) {
+    return {name, Verdict::kWarning, so_far + "; the kernel did not say how its controller is.",
+            "ip -details link show " + bus + " says it."};
+  }
+  if (!link->state) return {name, Verdict::kGood, so_far + ", without a controller.", {}};
   so_far += ", " + std::string(name_of(*link->state)) + ", " + std::to_string(link->bitrate_bps) + " bit/s";
   if (*link->state != CanLink::State::kActive) {
     return {name, Verdict::kBad, so_far + ".",

@@ -19,6 +19,7 @@ namespace {
 
 constexpr std::int64_t kLook_ns = 10 * kNsPerMs;       // of the daemon's own thread
 constexpr std::int64_t kMaintain_ns = 100 * kNsPerMs;  // lost devices are opened anew
+constexpr std::int64_t kMaintainerEnds_ns = 300 * kNsPerMs;
 constexpr std::int64_t kStatus_ns = kNsPerS;
 constexpr std::int64_t kLaneHangs_ns = kNsPerS;       // without a cycle
 constexpr std::int64_t kFirstDue_ns = 20 * kNsPerMs;  // from the lanes' waiting to their first cycle
@@ -105,6 +106,7 @@ Service::~Service() {
   for (auto& lane : lanes_) {
     if (lane) lane->thread.join();
   }
+  if (maintainer_.thread.joinable()) maintainer_.thread.join();
 }
 
 Outcome Service::run() {
@@ -176,7 +178,10 @@ std::string Service::start_lanes() {
     while (!lanes_[n]->waits.load(std::memory_order_acquire)) sleep_until(monotonic_ns() + kNsPerMs);
   }
   if (!wrong.empty()) ends_.store(true, std::memory_order_release);
-  if (wrong.empty()) parts_.heap.start();
+  if (wrong.empty()) {
+    maintainer_.thread = std::thread([this] { maintain(); });
+    parts_.heap.start();
+  }
   first_due_ns_.store(monotonic_ns() + kFirstDue_ns, std::memory_order_release);
   for (auto& lane : lanes_) {
     if (!wrong.empty() && lane) lane->thread.join();
@@ -218,12 +223,17 @@ Service::Decision Service::watch() {
     }
     log_changes();
     if (const std::optional<Decision> decision = decide(now_ns)) return *decision;
-    if (now_ns - seen_.maintained_ns >= kMaintain_ns) {
-      seen_.maintained_ns = now_ns;
-      parts_.maintain();
-    }
     tell(now_ns);
   }
+}
+
+// A device that is opened anew may hold its caller up for seconds.
+void Service::maintain() noexcept {
+  while (!ends_.load(std::memory_order_acquire)) {
+    sleep_until(monotonic_ns() + kMaintain_ns);
+    parts_.maintain();
+  }
+  maintainer_.has_ended.store(true, std::memory_order_release);
 }
 
 std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
@@ -260,8 +270,7 @@ void Service::tell(std::int64_t now_ns) noexcept {
   bool moved = true;
   for (std::size_t n = 0; n < config_.lanes; ++n) moved = moved && cycles(n) != seen_.fed_cycles[n];
   if (!seen_.is_ready && moved) {
-    seen_.is_ready = true;
-    notifier_.tell("READY=1");
+    seen_.is_ready = notifier_.tell("READY=1") || !notifier_.is_open();  // not taken: once more
   }
   if (notifier_.watchdog_ns() > 0 && moved && now_ns - seen_.fed_ns >= notifier_.watchdog_ns() / 4) {
     seen_.fed_ns = now_ns;
@@ -289,12 +298,12 @@ void Service::log_changes() noexcept {
 }
 
 void Service::finish(Outcome& outcome) {
-  outcome.lanes_hang = !lanes_move(monotonic_ns());
+  const bool lanes_hang = !lanes_move(monotonic_ns());
   ends_.store(true, std::memory_order_release);
   outcome.heap_calls = parts_.heap.calls();
   for (std::size_t n = 0; n < config_.lanes; ++n) {
     const LaneCounts& counts = board_.lanes[n];
-    if (!outcome.lanes_hang) {
+    if (!lanes_hang) {
       lanes_[n]->thread.join();
       outcome.page_faults += lanes_[n]->page_faults;
       outcome.stack_bytes = std::max(outcome.stack_bytes, lanes_[n]->thread.used_stack_bytes());
@@ -306,7 +315,12 @@ void Service::finish(Outcome& outcome) {
   }
   outcome.cycles = board_.lanes[kControlLane].cycles.load();
   outcome.module = board_.module();
-  if (!outcome.lanes_hang && outcome.module.state == ModuleState::kArming) parts_.let_go();
+  const std::int64_t until_ns = monotonic_ns() + kMaintainerEnds_ns;
+  while (!maintainer_.has_ended.load(std::memory_order_acquire) && monotonic_ns() < until_ns) {
+    sleep_until(monotonic_ns() + kNsPerMs);
+  }
+  outcome.threads_hang = lanes_hang || !maintainer_.has_ended.load(std::memory_order_acquire);
+  if (!lanes_hang && outcome.module.state == ModuleState::kArming) parts_.let_go();
 }
 
 }  // namespace polygmap::daemon

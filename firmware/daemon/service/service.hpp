@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "firmware/daemon/config/daemon_config.hpp"
 #include "firmware/daemon/exit_code.hpp"
@@ -28,17 +29,17 @@ namespace polygmap::daemon {
 struct ServiceParts {
   Ports ports;
   const hal::CanJointBus* joints = nullptr;  // whose drives are named while they are waited for; null: none
-  std::function<void()> maintain = [] {};    // some ten times a second, on the thread of run()
+  std::function<void()> maintain = [] {};    // some ten times a second, on a thread of its own that may block
   std::function<void()> let_go = [] {};      // once, after the lanes, when the drives never had gains
   HeapCount heap{};
 };
 
 struct Outcome {
   ExitCode code = ExitCode::kAsked;
-  std::string why;           // one sentence
-  bool lanes_hang = false;   // their threads still run: the process can only be left by _Exit
-  ModuleView module;         // at the end
-  std::uint64_t cycles = 0;  // of control
+  std::string why;            // one sentence
+  bool threads_hang = false;  // a lane's or maintain()'s still run: the process can only be left by _Exit
+  ModuleView module;          // at the end
+  std::uint64_t cycles = 0;   // of control
   std::uint64_t overruns = 0, skipped = 0, caught_up = 0;  // of all lanes
   std::uint64_t heap_calls = 0;
   std::uint64_t page_faults = 0;  // of the lanes' threads, from their first cycle on
@@ -73,6 +74,7 @@ class Service {
   void run_lane(LaneRun& lane) noexcept;
   // Until it is decided how this ends.
   [[nodiscard]] Decision watch();
+  void maintain() noexcept;
   [[nodiscard]] std::optional<Decision> decide(std::int64_t now_ns);
   [[nodiscard]] bool lanes_move(std::int64_t now_ns) noexcept;
   void tell(std::int64_t now_ns) noexcept;
@@ -91,8 +93,12 @@ class Service {
   std::atomic<std::int64_t> first_due_ns_{0};  // 0: the lanes wait for it
   std::atomic<bool> ends_{false};
   struct {
+    std::thread thread;
+    std::atomic<bool> has_ended{false};
+  } maintainer_;
+  struct {
     std::int64_t asked_ns = -1, stopped_ns = -1;  // negative: not yet
-    std::int64_t maintained_ns = 0, told_ns = 0, fed_ns = 0, moved_ns = 0;
+    std::int64_t told_ns = 0, fed_ns = 0, moved_ns = 0;
     std::array<std::uint64_t, kLaneCount> cycles{};
     std::array<std::uint64_t, kLaneCount> fed_cycles{};
     bool is_ready = false;

@@ -105,6 +105,10 @@ TEST_F(DoctorTest, SharedProcessor_IsNamed) {
   put("sys/devices/system/cpu/isolated", "4");
   expect("isolation", Verdict::kWarning, "(5)", "isolcpus=managed_irq,domain");
 }
+TEST_F(DoctorTest, LanesOnAnyProcessor_ShareTheirsWhateverIsIsolated) {
+  in_.processors.clear();
+  expect("isolation", Verdict::kWarning, "(any)", "control.cpu and perception.cpu");
+}
 TEST_F(DoctorTest, ProcessorThatTheMachineLacks_IsBad) {
   in_.processors = {4, 11};
   expect("isolation", Verdict::kBad, "no processor 11", "control.cpu");
@@ -167,6 +171,12 @@ TEST_F(DoctorTest, ControllerThatStaysOff_IsNamed) {
 TEST_F(DoctorTest, OtherBitRateThanTheBusFile_IsBad) {
   links_["can1"].bitrate_bps = 500'000;
   expect("can can1", Verdict::kBad, "500000 bit/s; the bus file says 1000000", "bitrate 1000000");
+}
+TEST_F(DoctorTest, KernelThatDoesNotAnswer_IsAWarning) {
+  in_.can_link = [this](const std::string& bus) {
+    return bus == "can0" ? std::optional<CanLink>{} : std::optional<CanLink>(links_.at(bus));
+  };
+  expect("can can0", Verdict::kWarning, "did not say how its controller is", "ip -details link show can0");
 }
 TEST_F(DoctorTest, VirtualBus_HasNoController) {
   links_["can1"].state.reset();
