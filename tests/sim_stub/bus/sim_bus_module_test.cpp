@@ -47,9 +47,9 @@ class BusModuleTest : public testing::TestWithParam<const char*> {
       ASSERT_EQ(count(line.code), 0U) << line.name;
     }
   }
-  void expect_safe_stop() {
+  void expect_safe_stop(StopReason reason = StopReason::kStateStale) {
     EXPECT_EQ(control().module_state(), ModuleState::kSafeStop);
-    EXPECT_EQ(control().gait_status().stop_reason, StopReason::kStateStale);
+    EXPECT_EQ(control().gait_status().stop_reason, reason);
     EXPECT_TRUE(robot_->truth().in_contact[0] && robot_->truth().in_contact[1]);
     EXPECT_FALSE(robot_->truth().fell);
   }
@@ -135,7 +135,7 @@ TEST_P(BusModuleTest, BusGoesOff_IsNamedAndStopsOnTwoFeet) {
   ASSERT_NO_FATAL_FAILURE(stand());
   bus_->bus(2).set_bus_off(true);
   run(60);
-  expect_safe_stop();
+  expect_safe_stop(StopReason::kCommandsRefused);
   EXPECT_EQ(count(Fault::kBusOff), 1U);
   EXPECT_EQ(count(Fault::kDriveSilent), 3U);
   EXPECT_EQ(control().drives().silent.bits(), 0b111000000);
