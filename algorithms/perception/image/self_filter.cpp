@@ -80,7 +80,6 @@ SelfFilter::Rows SelfFilter::rows_of(const HalfRays& rays, const Vec3& c, double
 // The cone around a sphere, cut row by row: (ray . c)^2 >= |ray|^2 (|c|^2 - r^2) is quadratic in the ray's x. Several
 // rows at once: most of what the filter costs is here.
 void SelfFilter::add_sphere(Outline& outline, const HalfRays& rays, const Vec3& c, double radius_m) noexcept {
-  static_assert(kHalfHeight_px % Doubles::nlanes == 0);
   outline.work.add(250);
   const double g = c.squaredNorm() - math::square(radius_m);
   if (!(g > 1e-6)) return;  // the camera is inside the grown shape: nothing can be said
@@ -93,10 +92,11 @@ void SelfFilter::add_sphere(Outline& outline, const HalfRays& rays, const Vec3& 
   const Rows rows = rows_of(rays, c, a);
   if (rows.first > rows.last) return;
   outline.work.add(rows.last - rows.first + 2, 33);
-  constexpr std::int32_t kAtOnce = Doubles::nlanes;
+  constexpr std::int32_t kAtOnce = 4;  // whatever the register's width: what is touched is paid for
+  static_assert(kAtOnce % Doubles::nlanes == 0 && kHalfHeight_px % kAtOnce == 0);
   const std::int32_t first_row = rows.first / kAtOnce * kAtOnce, last_row = rows.last / kAtOnce * kAtOnce + kAtOnce - 1;
   outline.touch(first_row, last_row);
-  for (std::int32_t row = first_row; row <= last_row; row += kAtOnce) {
+  for (std::int32_t row = first_row; row <= last_row; row += Doubles::nlanes) {
     const auto at = static_cast<std::size_t>(row);
     const Doubles y = cv::v_cvt_f64(cv::vx_load_low(&rays.y[at]));
     const Doubles k = y * cy + cz, cx_k = cx * k;
