@@ -37,10 +37,11 @@ inline constexpr TaskFunction kPerceptionWork{[](Pipeline& p, std::int64_t cycle
 
 // Control on lane 0, perception on lane 1; the simulation runs both in one lane, so all rows together fit one cycle.
 // Instructions are AArch64's, of user code: rows that are not resumable are measured over a climb, in worst pictures,
-// and with the codec (sense, command). A resumable row's follow from its units, kInstructionsPerUnit each, which are
-// true for every piece of work (toolchain/checks/pieces). A unit is given 120 ns, at one instruction a nanosecond and a
-// fifth for the piece that overdraws; microseconds of sense and command have the kernel's share in them, 12 writes and
-// 17 reads. What perception leaves of a cycle its followers take. Shed first: what the next frame repeats anyway.
+// and with the codec (sense, command). A resumable row's follow from its units, kInstructionsPerUnit each:
+// toolchain/checks/pieces counts the pieces that its program reaches, not the mount's, nor the beginnings of map and
+// search. A unit is given 120 ns, at one instruction a nanosecond and a fifth for the piece that overdraws;
+// microseconds of sense and command have the kernel's share in them, 12 writes and 17 reads. What perception leaves of
+// a cycle its followers take. Shed first: what the next frame repeats anyway.
 // clang-format off
 inline constexpr std::array kTasks = std::to_array<Task>({
     {{.task = "sense", .lane = 0, .budget_us = 120, .instructions = 11'000}, kControl<&ControlLane::sense>},
