@@ -127,7 +127,6 @@ Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
 
 // Whatever is silent, the gait runs: a foot in the air has to come down.
 Progress ControlLane::gait(std::int64_t now_ns) noexcept {
-  command_ready_ = true;
   if (module_state() == ModuleState::kArming) {
     command_ = {};
     command_.stamp_ns = now_ns;
@@ -150,7 +149,6 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
 }
 
 Progress ControlLane::command(std::int64_t now_ns) noexcept {
-  if (!command_ready_) return Progress::kIdle;
   if (!all_finite(command_)) {
     health_.raise(Fault::kJointCommandInvalid, now_ns);
     return Progress::kDone;
@@ -202,13 +200,8 @@ void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   if (!bus.drive_errors.is_empty()) gait_.request_stop(StopReason::kDriveError);
 }
 
-// What the executive counted up to this row. While the drives are still silent there is nothing to stop.
+// While the drives are still silent there is nothing to stop.
 void ControlLane::report_overload(std::int64_t now_ns) noexcept {
-  std::uint32_t lost = 0;
-  for (const Fault fault : {Fault::kCycleSlip, Fault::kCycleOverrun, Fault::kRowOverrun}) {
-    lost += health_.count(fault).count;
-  }
-  overload_.count_cycle(params_.overload, lost);
   if (module_state() != ModuleState::kRunning) return;
   if (overload_.time_is_short(params_.overload)) {
     health_.raise(Fault::kTimeShort, now_ns);

@@ -28,6 +28,8 @@ class ControlLane {
   Progress command(std::int64_t now_ns) noexcept;
   Progress health(std::int64_t now_ns) noexcept;
 
+  // Once a cycle, when it is over. late: those skipped before it, and one when itself was late.
+  void count_cycle(std::uint64_t late) noexcept { overload_.count_cycle(params_.overload, late); }
   void request_stop() noexcept { gait_.request_stop(StopReason::kOperator); }
 
   [[nodiscard]] const StateEstimate& state() const noexcept { return estimator_.state(); }
@@ -70,7 +72,6 @@ class ControlLane {
   JointCommand command_;
   DriveReport drives_;
   OverloadGuard overload_;
-  bool command_ready_ = false;
   struct {
     bool feet_silent = false;
     bool lio_missing = false;

@@ -81,6 +81,9 @@ void Pipeline::cycle_done(std::size_t, const CycleReport& report) noexcept {
   for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
     if ((rows & kLaneRows[lane]) != 0) lane_finished(lane, report.due_ns);
   }
+  if ((rows & kLaneRows[kControlLane]) == 0) return;
+  const bool late = report.caught_up || report.overrun || (report.overran & kLaneRows[kControlLane]) != 0;
+  control_.count_cycle(report.skipped_before + (late ? 1U : 0U));
 }
 
 Telemetry Pipeline::telemetry(std::int64_t now_ns, PerceptionTelemetry& perception) const noexcept {

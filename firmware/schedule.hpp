@@ -48,7 +48,7 @@ inline constexpr std::array kTasks = std::to_array<Task>({
     {{.task = "estimate", .lane = 0, .budget_us = 150, .instructions = 72'000}, kControl<&ControlLane::estimate>},
     {{.task = "gait", .lane = 0, .budget_us = 120, .instructions = 65'000}, kControl<&ControlLane::gait>},
     {{.task = "command", .lane = 0, .budget_us = 200, .newest_only = true, .instructions = 7'000}, kControl<&ControlLane::command>},
-    {{.task = "health", .lane = 0, .budget_us = 10, .instructions = 1'000}, kControl<&ControlLane::health>},
+    {{.task = "health", .lane = 0, .budget_us = 10, .instructions = 1'300}, kControl<&ControlLane::health>},
     {{.task = "intake", .lane = 1, .budget_us = 40, .instructions = 14'000}, kPerception<&PerceptionLane::intake>},
     {{.task = "surfaces", .lane = 1, .budget_us = 840, .unit_cost_ns = 120, .shed_order = 3}, kPerceptionWork<&PerceptionLane::surfaces>},
     {{.task = "map", .lane = 1, .budget_us = 96, .unit_cost_ns = 120, .shed_order = 2, .takes_leftover = true}, kPerceptionWork<&PerceptionLane::map>},

@@ -27,6 +27,7 @@ struct CycleReport {
   std::uint32_t deferred = 0;        // rows that paid back an overdraft
   std::uint32_t overran = 0;         // rows longer than their budget
   bool overrun = false;              // the cycle was longer than kCycle_us
+  bool caught_up = false;            // the following one was due before it began
   std::uint64_t skipped_before = 0;  // cycles that slipped right before this one
   std::uint64_t time_ns = 0;
 };
@@ -153,6 +154,7 @@ class CyclicExecutive {
     report_ = {.cycle = next_cycle_,
                .due_ns = next_due_ns(),
                .slot = static_cast<std::size_t>(next_cycle_ % kCyclesPerMajor),
+               .caught_up = !newest,
                .skipped_before = skipped_before};
     const std::uint64_t begin_count = clock_.count();
     leftover_ = 0;

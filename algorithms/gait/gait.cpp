@@ -2,6 +2,7 @@
 #include "algorithms/gait/gait.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace polygmap {
 namespace {
@@ -27,6 +28,7 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
   status_ = {};
   state_.emplace<Standing>();
   armed_ = started_ = false;
+  last_tick_ns_ = 0;
   stop_requested_ = StopReason::kNone;
 }
 
@@ -147,7 +149,8 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
                      dcm_error_m_,
                      age_ns <= params_.steer_age_ns && finite(state),
                      age_ns > params_.stop_age_ns,
-                     stop_requested_};
+                     stop_requested_,
+                     now_ns - std::exchange(last_tick_ns_, now_ns)};
   if (!started_) {
     hold_upright(command);
     started_ = state.initialised && in.usable;

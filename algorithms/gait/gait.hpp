@@ -61,6 +61,7 @@ class Gait {
   GaitMemory memory_;
   GaitStatus status_;
   std::variant<Standing, WeightShift, SwingPhase, End> state_;
+  std::int64_t last_tick_ns_ = 0;
   bool armed_ = false;    // the joint angles are known
   bool started_ = false;  // so is where the body is
   StopReason stop_requested_ = StopReason::kNone;

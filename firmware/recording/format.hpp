@@ -16,7 +16,8 @@
 //     event      what the executive counted: lane (u8), code (u8), when (i64), times (u32)
 //     stop       the operator asked for the end
 //     cycle      what the executive did: lane (u8), cycle (u64), due_ns (i64), slot (u8), rows run, shed, deferred and
-//                overrun (u32 masks), whether the cycle overran (bool), cycles skipped before (u64)
+//                overrun (u32 masks), whether the cycle overran and whether it was run late (bool), cycles skipped
+//                before (u64)
 //     end        cycles (u64) and pictures (u32): a file without it was cut off
 // pictures.bin: magic (8 bytes), version (u32), width, height (i32), then each picture's pixels (u16, 0.6 MB at
 // 640x480).
@@ -33,7 +34,7 @@ namespace polygmap::recording {
 
 inline constexpr std::string_view kMagic = "PGMAPREC";
 inline constexpr std::string_view kPictureMagic = "PGMAPPIX";
-inline constexpr std::uint32_t kVersion = 1;
+inline constexpr std::uint32_t kVersion = 2;
 inline constexpr const char* kFileName = "recording.bin";
 inline constexpr const char* kPictureFileName = "pictures.bin";
 inline constexpr std::size_t kPictureHeader_bytes = 20;

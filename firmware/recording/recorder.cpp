@@ -187,6 +187,7 @@ void Recorder::cycle_done(std::size_t lane, const CycleReport& report) noexcept 
   out.put(static_cast<std::uint8_t>(report.slot));
   for (const std::uint32_t rows : {report.ran, report.shed, report.deferred, report.overran}) out.put(rows);
   out.put(report.overrun);
+  out.put(report.caught_up);
   out.put(report.skipped_before);
   put_length(out, begin);
   if (lane == kControlLane) ++cycles_;

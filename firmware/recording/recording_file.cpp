@@ -313,14 +313,9 @@ bool RecordingFile::read(Record& record) {
     case RecordKind::kStop:
       good = true;
       break;
-    case RecordKind::kCycle: {
-      record.cycle_lane = in_.get<std::uint8_t>();
-      constexpr std::size_t kRest_bytes = 8 + 8 + 1 + 4 * 4 + 1 + 8;  // what the executive did is in rows and events
-      (void)in_.get_text(kRest_bytes);
-      good = record.cycle_lane < kLaneCount;
-      cycles_ += record.cycle_lane == kControlLane ? 1U : 0U;
+    case RecordKind::kCycle:
+      good = parse_cycle(record.cycle_lane, record.cycle);
       break;
-    }
     case RecordKind::kEnd:
       return parse_end();
     default:
@@ -345,6 +340,23 @@ bool RecordingFile::parse_event(ExecutiveEventCount& event) {
   event.times = in_.get<std::uint32_t>();
   return event.lane < kLaneCount && time_possible(event.at_ns) &&
          index_of_event(event.event) < kEventTable<ExecutiveEvent>.size();
+}
+
+bool RecordingFile::parse_cycle(std::uint8_t& lane, CycleReport& cycle) {
+  lane = in_.get<std::uint8_t>();
+  cycle.cycle = in_.get<std::uint64_t>();
+  cycle.due_ns = in_.get<std::int64_t>();
+  cycle.slot = in_.get<std::uint8_t>();
+  for (std::uint32_t* const mask : {&cycle.ran, &cycle.shed, &cycle.deferred, &cycle.overran}) {
+    const auto recorded = in_.get<std::uint32_t>();
+    *mask = 0;
+    for (std::size_t i = 0; i < rows_.size(); ++i) *mask |= ((recorded >> i) & 1U) << rows_[i];
+  }
+  cycle.overrun = in_.get<bool>();
+  cycle.caught_up = in_.get<bool>();
+  cycle.skipped_before = in_.get<std::uint64_t>();
+  cycles_ += lane == kControlLane ? 1U : 0U;
+  return lane < kLaneCount && time_possible(cycle.due_ns);
 }
 
 bool RecordingFile::parse_row(RowCall& row) {

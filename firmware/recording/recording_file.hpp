@@ -57,6 +57,7 @@ struct Record {
   RowCall row;
   ExecutiveEventCount event;
   std::uint8_t cycle_lane = 0;
+  CycleReport cycle;
 };
 
 class RecordingFile {
@@ -91,6 +92,7 @@ class RecordingFile {
   [[nodiscard]] bool open_pictures();
   [[nodiscard]] bool parse_row(RowCall& row);
   [[nodiscard]] bool parse_call(PortCall& call);
+  [[nodiscard]] bool parse_cycle(std::uint8_t& lane, CycleReport& cycle);
   [[nodiscard]] bool parse_event(ExecutiveEventCount& event);
   [[nodiscard]] bool parse_end();
 

@@ -122,6 +122,7 @@ class Replay {
           module_->control().request_stop();
           break;
         case RecordKind::kCycle:
+          module_->cycle_done(record.cycle_lane, record.cycle);
           result.ticks += record.cycle_lane == kControlLane ? 1U : 0U;
           break;
         case RecordKind::kEnd:

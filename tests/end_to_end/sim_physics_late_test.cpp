@@ -103,15 +103,11 @@ class StalledForFiftyMs : public testing::TestWithParam<GaitPattern> {};
 TEST_P(StalledForFiftyMs, OnTheFirstStair_DoesNotFall) {
   for (const double at_s : {0.1, 0.7, 1.0, 1.5}) EXPECT_TRUE(stands_after_one_stall(GetParam(), 1, at_s)) << at_s;
 }
-// Of 104 with each gait one falls (ds: seed 3, 1.8 s; ss: seed 2, 1.2 s), 2026-11-25: while nobody wakes the module the
-// plan stands still and the body does not.
 class LongStalledForFiftyMs : public testing::TestWithParam<GaitPattern> {};
-TEST_P(LongStalledForFiftyMs, InEveryPhase_AtMostOneFalls) {
-  int falls = 0;
+TEST_P(LongStalledForFiftyMs, InEveryPhase_DoesNotFall) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    for (int i = 0; i < 26; ++i) falls += stands_after_one_stall(GetParam(), seed, 0.1 * i) ? 0 : 1;
+    for (int i = 0; i < 26; ++i) EXPECT_TRUE(stands_after_one_stall(GetParam(), seed, 0.1 * i)) << seed << ' ' << i;
   }
-  EXPECT_LE(falls, 1);
 }
 constexpr std::array kBothGaits{GaitPattern::kDoubleStep, GaitPattern::kSingleStep};
 INSTANTIATE_TEST_SUITE_P(Gaits, StalledForFiftyMs, testing::ValuesIn(kBothGaits));
@@ -132,6 +128,18 @@ TEST(ControlOverruns, InEveryCycle_StopsOnBothFeetAndSaysSo) {
   EXPECT_EQ(climb.status().stop_reason, StopReason::kTimeShort);
   EXPECT_LT(climb.time_s() - begin_s, 1.6);
   EXPECT_TRUE(stands_for(climb, 2.0));
+}
+
+// What perception's rows take too long is control's concern only where a cycle gets too long by it.
+TEST(PerceptionOverruns, InEveryPictureInOneLane_ClimbsOn) {
+  PhysicalClimb climb(stairs_of(2, 1));
+  const std::size_t surfaces = row_named(kSchedule, "surfaces");
+  climb.row_share = [surfaces](std::size_t row) { return row == surfaces ? 1.1 : 0.5; };
+  climb.run(60.0);
+  EXPECT_GT(climb.health().count(Fault::kRowOverrun).count, 1000U);
+  EXPECT_EQ(climb.health().count(Fault::kCycleOverrun).count, 0U);
+  EXPECT_EQ(climb.health().count(Fault::kTimeShort).count, 0U);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kFinished) << static_cast<int>(climb.status().stop_reason);
 }
 
 }  // namespace

@@ -135,6 +135,19 @@ TEST_F(PipelineTest, BusTakesOneCommandAmongRefusedOnes_GoesOn) {
   EXPECT_EQ(control().module_state(), ModuleState::kRunning);
 }
 
+TEST_F(PipelineTest, EveryTickComesTwoCyclesLate_StopsAndSaysSo) {
+  stand(kInitialised_ticks);
+  for (int i = 0; i < 40 && count(Fault::kTimeShort) == 0; ++i) {
+    clock_.advance_ns(2 * kCycle_ns);
+    stand(1);
+  }
+  EXPECT_EQ(count(Fault::kCycleSlip), 0U) << "no cycle was left out";
+  EXPECT_EQ(count(Fault::kTimeShort), 1U);
+  EXPECT_EQ(count(Limit::kCycleCaughtUp), 50U);
+  stand(2);
+  EXPECT_EQ(control().gait_status().stop_reason, StopReason::kTimeShort);
+}
+
 TEST_F(PipelineTest, CyclesAreLostAgainAndAgain_StopsAndSaysSo) {
   stand(kInitialised_ticks);
   for (int i = 0; i < 5 && count(Fault::kTimeShort) == 0; ++i) {  // 22 lost in each

@@ -64,12 +64,15 @@ struct WeightShiftParams {
   double absorb_rad = 0.035;
   std::int32_t reshift_ticks = 125;
   std::int32_t max_shifts = 9;
+  std::int64_t max_gap_ns = 20 * kNsPerMs;
 
   static void visit(auto& p, auto& field) {
     field("absorb_m", p.absorb_m, 0.0, 0.1, "A target that moves no farther up to lift-off needs no new shift.");
     field("absorb_rad", p.absorb_rad, 0.0, 0.5, "A target that turns no farther up to lift-off needs no new shift.");
     field("reshift_ticks", p.reshift_ticks, 2, 2000, "Another shift over the same foot takes so long.");
     field("max_shifts", p.max_shifts, 1, 1000, "There are no more shifts for one swing.");
+    field("max_gap_ns", p.max_gap_ns, 0, 1'000'000'000,
+          "A shift in which no tick came for longer is given up: the body went on without it.");
   }
 };
 

@@ -20,10 +20,11 @@ struct GaitInput {
   const StateEstimate& state;
   const FootholdSet& footholds;  // the newest finished search
   const JointFeedback& feedback;
-  Vec2 odom_dcm_error_m;      // of the divergent component, as last measured
-  bool usable;                // the estimate is fresh, and all of it numbers
-  bool lost;                  // it is so old that the gait stops
-  StopReason stop_requested;  // kNone: it is not
+  Vec2 odom_dcm_error_m;       // of the divergent component, as last measured
+  bool usable;                 // the estimate is fresh, and all of it numbers
+  bool lost;                   // it is so old that the gait stops
+  StopReason stop_requested;   // kNone: it is not
+  std::int64_t since_last_ns;  // since the last tick: the plan stood still, and the body did not
 };
 
 struct GaitMemory {

@@ -35,7 +35,7 @@ class ServiceTest : public testing::Test {
     config_.hold_ns = 100 * kNsPerMs;
     config_.placement[0] = {.processor = -1, .priority = 0};
     // The fake robot lives in the module's own rows.
-    config_.params.overload.most_lost_cycles = 10'000;
+    config_.params.overload.most_late_cycles = 10'000;
     // Without pictures the gait waits for them, and then stops.
     config_.params.gait.standing.start_patience_ticks = 100'000;
   }
