@@ -84,8 +84,8 @@ void ScanlineSegmentation::add_rows(std::int32_t first, std::int32_t last) noexc
   std::int32_t tried = 0, handled = 0;
   for (std::int32_t column = 0; column < column_count_; column += kBlockColumns) {
     const std::uint32_t done = last - first + 1 == kBlock ? try_blocks(c, column, first) : 0U;
-    tried += std::popcount(done >> kTriedBit);
     for (std::int32_t i = 0; i < kBlockColumns / kGroup && column + i * kGroup < column_count_; ++i) {
+      tried += static_cast<std::int32_t>(done >> kTriedBit >> i & 1U);  // a register may reach beyond a narrow picture
       singly[count] = column + i * kGroup;
       count += (done >> i & 1U) != 0 ? 0U : 1U;
     }

@@ -149,5 +149,17 @@ TEST_F(SideLinesTest, CrookedEnd_IsNotCutStraight) {
   EXPECT_NEAR(2.0 * find(true).column_px + 0.5, 479.5, 1.0);
 }
 
+// To the instruction: less is seldom seen in the units.
+TEST_F(SideLinesTest, EndsOfRows_ArePaidForWhateverTheRegistersWidth) {
+  regions_->extents[kNear] = ColumnExtents{};
+  for (std::int32_t g = 20; g < 24; ++g) {
+    for (std::int32_t r = 120; r <= 200; ++r) own(g, r);
+  }
+  sides_->begin({}, {}, raw_, *picture_, *regions_);
+  sides_->find_ends(kNear);
+  // Rows from 96 on are cleared; four columns of 81 rows are looked at.
+  EXPECT_EQ(sides_->work().instructions(), 260 + (200 - 96) / 8 + 4 * 30 + 11 * 4 * (80 + 32) / 16);
+}
+
 }  // namespace
 }  // namespace polygmap

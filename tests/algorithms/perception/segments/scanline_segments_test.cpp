@@ -160,5 +160,13 @@ TEST_F(ScanlineSegmentationTest, MoreSegmentsThanFit_AreCounted) {
   }
 }
 
+// Five groups of eight columns, half of a register of sixteen beyond them: nobody pays for that half.
+TEST_F(ScanlineSegmentationTest, NarrowPicture_IsPaidForWhateverTheRegistersWidth) {
+  scene_.intrinsics.width_px = 5 * 8 * kColumn_px;
+  segment();
+  const std::int32_t blocks = kDepthHeight_px / ScanlineSegmentation::kBlock;
+  EXPECT_EQ(segments_->work().instructions(), blocks * 5 * (90 + 455) + 40 * 60);
+}
+
 }  // namespace
 }  // namespace polygmap
