@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_stub/heap_trap.hpp"
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define POLYGMAP_HEAP_IS_SANITIZED 1
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define POLYGMAP_HEAP_IS_SANITIZED 1
-#endif
+#include "firmware/daemon/system/heap_interposer.hpp"
 
 #ifdef POLYGMAP_HEAP_IS_SANITIZED
 
@@ -36,7 +29,6 @@ bool is_watching() noexcept { return false; }
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cerrno>
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
@@ -45,15 +37,6 @@ bool is_watching() noexcept { return false; }
 #include <iterator>
 #include <utility>
 #include <vector>
-
-// glibc's own entry points: no dlsym, which allocates before main.
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* block, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-void __libc_free(void* block);
-}
 
 namespace polygmap::heap {
 namespace {
@@ -189,8 +172,10 @@ __attribute__((noinline)) void note_call(const char* function, const char* modul
   first_is_complete.store(true, std::memory_order_release);
 }
 
-// Every interposed function passes here. Disarmed meanwhile: naming the caller uses the heap itself.
-inline void on_heap_call(const char* function) {
+}  // namespace
+
+// Disarmed meanwhile: naming the caller uses the heap itself.
+void on_heap_call(const char* function) noexcept {
   if (armed == nullptr) [[likely]] {
     return;
   }
@@ -199,8 +184,6 @@ inline void on_heap_call(const char* function) {
   note_call(function, module_call);
   armed = module_call;
 }
-
-}  // namespace
 
 void set_on_call(OnCall on_call) noexcept { action.store(on_call, std::memory_order_relaxed); }
 
@@ -229,62 +212,5 @@ void reset() noexcept {
 bool is_watching() noexcept { return true; }
 
 }  // namespace polygmap::heap
-
-using polygmap::heap::on_heap_call;
-
-extern "C" {
-
-__attribute__((noinline)) void* malloc(std::size_t size) noexcept {
-  on_heap_call("malloc");
-  return __libc_malloc(size);
-}
-
-__attribute__((noinline)) void* calloc(std::size_t count, std::size_t size) noexcept {
-  on_heap_call("calloc");
-  return __libc_calloc(count, size);
-}
-
-__attribute__((noinline)) void* realloc(void* block, std::size_t size) noexcept {
-  on_heap_call("realloc");
-  return __libc_realloc(block, size);
-}
-
-__attribute__((noinline)) void* reallocarray(void* block, std::size_t count, std::size_t size) noexcept {
-  on_heap_call("reallocarray");
-  std::size_t bytes = 0;
-  if (__builtin_mul_overflow(count, size, &bytes)) {
-    errno = ENOMEM;
-    return nullptr;
-  }
-  return __libc_realloc(block, bytes);
-}
-
-__attribute__((noinline)) void* memalign(std::size_t alignment, std::size_t size) noexcept {
-  on_heap_call("memalign");
-  return __libc_memalign(alignment, size);
-}
-
-__attribute__((noinline)) void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
-  on_heap_call("aligned_alloc");
-  return __libc_memalign(alignment, size);
-}
-
-__attribute__((noinline)) int posix_memalign(void** out, std::size_t alignment, std::size_t size) noexcept {
-  on_heap_call("posix_memalign");
-  if (alignment % sizeof(void*) != 0 || alignment == 0 || (alignment & (alignment - 1)) != 0) return EINVAL;
-  void* const block = __libc_memalign(alignment, size);
-  if (block == nullptr) return ENOMEM;
-  *out = block;
-  return 0;
-}
-
-// Freeing nothing touches no heap.
-__attribute__((noinline)) void free(void* block) noexcept {
-  if (block == nullptr) return;
-  on_heap_call("free");
-  __libc_free(block);
-}
-
-}  // extern "C"
 
 #endif

@@ -11,6 +11,7 @@
 
 #include "algorithms/gait/joints/standing_stiffness.hpp"
 #include "firmware/config/param_table.hpp"
+#include "firmware/config/toml_words.hpp"
 
 namespace polygmap::config {
 namespace {
@@ -41,7 +42,7 @@ class BusReader {
     if (!parsed) {
       const auto line = parsed.error().source().begin.line;
       if (line == 0) throw FileError("Cannot read the bus file " + in_quotes(file_.path) + ".");
-      fail(line, std::string(parsed.error().description()));
+      fail(line, toml_words(parsed.error().description()));
     }
     const toml::table& root = parsed.table();
     only(root, {"bitrate", "drive", "feet"}, "a bus file");

@@ -12,6 +12,8 @@
 #define TOML_EXCEPTIONS 0
 #include <toml++/toml.h>
 
+#include "firmware/config/toml_words.hpp"
+
 namespace polygmap::config {
 namespace {
 
@@ -67,7 +69,7 @@ class CameraFile {
       const toml::source_position at = parsed_.error().source().begin;  // line 0: it could not be opened
       throw FileError("Cannot read the camera file \"" + path + "\"" +
                       (at ? " line " + std::to_string(at.line) : std::string()) + ": " +
-                      std::string(parsed_.error().description()) + ".");
+                      toml_words(parsed_.error().description()) + ".");
     }
     for (const auto& entry : parsed_.table()) {
       const std::string_view name = entry.first.str();

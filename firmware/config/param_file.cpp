@@ -10,6 +10,8 @@
 #define TOML_EXCEPTIONS 0
 #include <toml++/toml.h>
 
+#include "firmware/config/toml_words.hpp"
+
 namespace polygmap::config {
 namespace {
 
@@ -60,9 +62,9 @@ class ParamFile {
     if (!parsed) {
       const auto line = parsed.error().source().begin.line;
       if (line == 0) throw FileError("Cannot read the parameter file \"" + path_ + "\".");
-      fail(line, std::string(parsed.error().description()));
+      fail(line, toml_words(parsed.error().description()));
     }
-    refuse_camera(parsed.table());
+    refuse_others(parsed.table());
     take(parsed.table(), "");
     for (const ParamOrder& order : table_.orders) check(order);
   }
@@ -76,9 +78,13 @@ class ParamFile {
     fail(node.source().begin.line, what);
   }
   // Whoever gives one for the other needs no nearest name.
-  void refuse_camera(const toml::table& from) const {
-    if (!from.contains("width") || !from.contains("height") || !from.contains("fx")) return;
-    throw FileError(name() + " looks like a camera file (it has width, height and fx), which holds no parameters.");
+  void refuse_others(const toml::table& from) const {
+    if (from.contains("width") && from.contains("height") && from.contains("fx")) {
+      throw FileError(name() + " looks like a camera file (it has width, height and fx), which holds no parameters.");
+    }
+    if (from.contains("drive")) {
+      throw FileError(name() + " looks like a bus file (it has drives), which holds no parameters.");
+    }
   }
   [[nodiscard]] const Param* find(const std::string& full) const {
     const auto at = std::ranges::find(table_.params, full, &Param::name);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <filesystem>
+#include <system_error>
 
 #include "firmware/config/param_table.hpp"
 
@@ -105,6 +107,21 @@ std::string printable(std::string name) {
 
 bool time_possible(std::int64_t t_ns) { return t_ns >= 0 && t_ns <= kLatest_ns; }
 
+// Empty when the directory is there with both files; a byte of a file that is not there helps nobody.
+std::string missing_of(const std::string& directory) {
+  std::error_code none;
+  const std::string is_none = "\"" + directory + "\" is no recording: ";
+  if (!std::filesystem::exists(directory, none)) return is_none + "there is no such directory.";
+  if (!std::filesystem::is_directory(directory, none))
+    return is_none + "it is no directory, and climb --record writes one.";
+  for (const char* name : {kFileName, kPictureFileName}) {
+    const auto status = std::filesystem::status(std::filesystem::path(directory) / name, none);
+    if (!std::filesystem::exists(status)) return is_none + "there is no file " + name + " in it.";
+    if (std::filesystem::is_directory(status)) return is_none + name + " in it is a directory.";
+  }
+  return {};
+}
+
 }  // namespace
 
 std::uint64_t hash_of_fields() noexcept {
@@ -155,9 +172,13 @@ bool RecordingFile::take_name(std::string& name) {
 
 bool RecordingFile::open(const std::string& directory) {
   directory_ = directory;
+  if (complaint_ = missing_of(directory); !complaint_.empty()) return false;
   for (auto& [file, name] : {std::pair{&file_, kFileName}, std::pair{&picture_file_, kPictureFileName}}) {
     *file = std::fopen((directory + "/" + name).c_str(), "rb");
-    if (*file == nullptr) return complain_at(name, 0, std::string("cannot be read: ") + std::strerror(errno));
+    if (*file == nullptr) {
+      complaint_ = "\"" + directory + "/" + name + "\" cannot be read: " + std::strerror(errno) + ".";
+      return false;
+    }
   }
   return read_header() && read_params() && read_schedule() && read_camera() && read_gain_limits() && open_pictures();
 }

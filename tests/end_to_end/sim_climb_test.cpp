@@ -211,7 +211,7 @@ TEST(ClimbCausality, StepMissingFromThePicture_ClimbsUpToItAndNamesTheRiseBeyond
   EXPECT_EQ(summary.ended_by, "module");
   for (const Footstep& step : summary.footsteps) EXPECT_LE(step.step_index, 1);
   const double two_rises_m = 2 * options.stairs.rise_m;
-  expect_to_name("rise of ", two_rises_m, summary.reason);
+  expect_to_name("a rise too high to climb (", two_rises_m, summary.reason);
 }
 
 // The picture of the stairs hangs above the stairs: the foot finds nothing to stand on.
@@ -242,7 +242,7 @@ TEST(ClimbLimits, RiseOfHalfAMetre_ModuleStopsAndNamesTheRise) {
   EXPECT_FALSE(summary.fell) << summary.reason;
   EXPECT_EQ(summary.ended_by, "module");
   EXPECT_GE(summary.stand_off_m, 0.020);
-  expect_to_name("rise of ", 0.5, summary.reason);
+  expect_to_name("a rise too high to climb (", 0.5, summary.reason);
 }
 
 // Shorter than the way ahead that is looked at: its end is seen, so the module knows that it is on top.
@@ -262,7 +262,7 @@ TEST(ClimbLimits, TreadOfTenCentimetres_ModuleStopsAndNamesTheTread) {
   EXPECT_FALSE(summary.fell) << summary.reason;
   EXPECT_EQ(summary.ended_by, "module");
   EXPECT_GE(summary.stand_off_m, 0.020);
-  expect_to_name("tread of ", 0.1, summary.reason);
+  expect_to_name("a tread too short for the foot (", 0.1, summary.reason);
 }
 
 }  // namespace

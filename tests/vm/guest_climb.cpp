@@ -285,22 +285,6 @@ void print_figures(const Climb& climb) {
   for (const StageMemory& part : static_memory()) std::printf("MEASURED memory.%s max=%zu\n", part.stage, part.bytes);
 }
 
-const char* name_of(GaitPhase phase) {
-  switch (phase) {
-    case GaitPhase::kStandstill:
-      return "standing";
-    case GaitPhase::kDoubleSupport:
-      return "double_support";
-    case GaitPhase::kSwing:
-      return "swing";
-    case GaitPhase::kFinished:
-      return "finished";
-    case GaitPhase::kStopped:
-      return "stopped";
-  }
-  return "unknown";
-}
-
 struct Totals {
   std::uint64_t ticks = 0, overruns = 0, user_max = 0, user_mean = 0, kernel_max = 0;
   std::int64_t wake_max_ns = 0;
@@ -340,7 +324,7 @@ bool print_result(const Climb& climb, long faults) {
       " kernel_max=%" PRIu64 " wake_max_us=%.1f pictures_lost=%" PRIu64 " state=%s support=%s\n",
       pass ? "pass" : "fail", gait.treads_climbed, t.ticks, t.overruns, faults, heap.calls, climb.sensors.frames(),
       climb.sensors.frames_differ(), t.user_max, t.user_mean, climb.lanes[0]->meter.control().max, t.kernel_max,
-      1e-3 * static_cast<double>(t.wake_max_ns), climb.camera.lost(), name_of(gait.phase),
+      1e-3 * static_cast<double>(t.wake_max_ns), climb.camera.lost(), std::string(name_of(gait.phase)).c_str(),
       gait.stands[0] && gait.stands[1] ? "both"
       : gait.stands[0]                 ? "left"
       : gait.stands[1]                 ? "right"

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <string_view>
 
 #include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/core/math/math.hpp"
@@ -53,6 +55,45 @@ enum class StopReason : std::uint8_t {
   kTimeShort,        // control's cycles were lost or overran again and again
   kCommandsRefused,  // the bus did not take one command after the other
 };
+
+// One line for each reason, in the enumeration's order: a name for machines, and for people what may follow "the module
+// stopped: ", without a full stop.
+struct StopReasonInfo {
+  std::string_view name;
+  std::string_view text;
+};
+inline constexpr std::array kStopReasonTable{
+    StopReasonInfo{"none", "it gave no reason"},
+    StopReasonInfo{"nothing_seen", "it saw no surface to step on, or too little of the next one"},
+    StopReasonInfo{"no_staircase", "it saw level ground and no higher tread"},
+    StopReasonInfo{"top", "it took the tread it stood on for the highest"},
+    StopReasonInfo{"rise_too_high", "it measured a rise too high to climb"},
+    StopReasonInfo{"tread_too_short", "it measured a tread too short for the foot"},
+    StopReasonInfo{"too_narrow", "it measured a tread too narrow for two feet"},
+    StopReasonInfo{"map_stale", "its map was stale"},
+    StopReasonInfo{"edge_uncertain", "it knew the edges of the next tread too vaguely"},
+    StopReasonInfo{"obstacle", "something stood where its feet would have gone next"},
+    StopReasonInfo{"legs_cannot", "its legs could not do the next step"},
+    StopReasonInfo{"unsteady", "what it saw kept changing"},
+    StopReasonInfo{"not_lined_up", "it did not come to stand straight before the stairs"},
+    StopReasonInfo{"ground_missing", "there was no ground where a foot came down, and it put the foot back"},
+    StopReasonInfo{"toppling", "its body kept toppling towards the foot it lifted, and it put every one back"},
+    StopReasonInfo{"state_stale", "its IMU or its joints fell silent"},
+    StopReasonInfo{"operator", "it was asked to"},
+    StopReasonInfo{"drive_error", "a drive told of an error"},
+    StopReasonInfo{"time_short", "its control cycles kept coming late"},
+    StopReasonInfo{"commands_refused", "its bus took no commands"},
+};
+static_assert(kStopReasonTable.size() == static_cast<std::size_t>(StopReason::kCommandsRefused) + 1);
+
+[[nodiscard]] constexpr std::string_view name_of(StopReason reason) noexcept {
+  const auto i = static_cast<std::size_t>(reason);
+  return i < kStopReasonTable.size() ? kStopReasonTable[i].name : "unknown";
+}
+[[nodiscard]] constexpr std::string_view text_of(StopReason reason) noexcept {
+  const auto i = static_cast<std::size_t>(reason);
+  return i < kStopReasonTable.size() ? kStopReasonTable[i].text : "it gave no known reason";
+}
 
 // The edge of the next tread.
 struct TreadView {

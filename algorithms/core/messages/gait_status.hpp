@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "algorithms/core/math/transform.hpp"
 #include "algorithms/core/messages/footholds.hpp"
@@ -18,6 +20,12 @@ enum class GaitPhase : std::uint8_t {
   kFinished,       // on top, the climb is over
   kStopped,        // both feet stand; stop_reason says why
 };
+[[nodiscard]] constexpr std::string_view name_of(GaitPhase phase) noexcept {
+  constexpr std::array<std::string_view, 5> kNames{"standing", "double_support", "swing", "finished", "stopped"};
+  static_assert(kNames.size() == static_cast<std::size_t>(GaitPhase::kStopped) + 1);
+  const auto i = static_cast<std::size_t>(phase);
+  return i < kNames.size() ? kNames[i] : "unknown";
+}
 
 // A footstep as it was frozen at lift-off ("latch") and what became of it.
 struct LatchedStep {

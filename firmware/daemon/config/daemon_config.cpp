@@ -11,6 +11,7 @@
 #include "algorithms/core/math/transform.hpp"
 #include "firmware/config/camera_file.hpp"
 #include "firmware/config/param_file.hpp"
+#include "firmware/config/toml_words.hpp"
 #include "firmware/daemon/config/toml_section.hpp"
 
 namespace polygmap::daemon {
@@ -178,8 +179,8 @@ DaemonConfig read_daemon_config(const std::string& path) {
   if (!parsed) {
     const auto line = parsed.error().source().begin.line;
     if (line == 0) throw config::FileError("Cannot read the daemon file \"" + path + "\".");
-    throw config::FileError(name + ", line " + std::to_string(line) + ": " + std::string(parsed.error().description()) +
-                            ".");
+    throw config::FileError(name + ", line " + std::to_string(line) + ": " +
+                            config::toml_words(parsed.error().description()) + ".");
   }
   return DaemonFile(path, parsed.table()).read();
 }

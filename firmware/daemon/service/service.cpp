@@ -89,13 +89,14 @@ class Service::Tasks {
 };
 
 std::string text_of(const Outcome& o) {
-  std::array<char, 320> text{};
-  std::snprintf(
-      text.data(), text.size(),
-      "stopped state=%s phase=%s cycles=%" PRIu64 " overruns=%" PRIu64 " skipped=%" PRIu64 " caught_up=%" PRIu64
-      " heap_calls=%" PRIu64 " page_faults=%" PRIu64 " wake_max_us=%" PRIu64 " stack_bytes=%zu exit=%d",
-      std::string(polygmap::name_of(o.module.state)).c_str(), name_of(o.module.phase), o.cycles, o.overruns, o.skipped,
-      o.caught_up, o.heap_calls, o.page_faults, o.wake_max_ns / 1000, o.stack_bytes, number_of(o.code));
+  std::array<char, 384> text{};
+  std::snprintf(text.data(), text.size(),
+                "stopped state=%s phase=%s reason=%s cycles=%" PRIu64 " overruns=%" PRIu64 " skipped=%" PRIu64
+                " caught_up=%" PRIu64 " heap_calls=%" PRIu64 " page_faults=%" PRIu64 " wake_max_us=%" PRIu64
+                " stack_bytes=%zu exit=%d",
+                std::string(name_of(o.module.state)).c_str(), std::string(name_of(o.module.phase)).c_str(),
+                std::string(name_of(o.module.reason)).c_str(), o.cycles, o.overruns, o.skipped, o.caught_up,
+                o.heap_calls, o.page_faults, o.wake_max_ns / 1000, o.stack_bytes, number_of(o.code));
   return text.data();
 }
 

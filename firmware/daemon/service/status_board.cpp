@@ -5,9 +5,14 @@
 #include <cinttypes>
 #include <cstdarg>
 #include <cstdio>
+#include <string_view>
 
 namespace polygmap::daemon {
 namespace {
+
+void add_text(StatusText& out, const char* before, std::string_view text) noexcept {
+  out.add("%s%.*s", before, static_cast<int>(text.size()), text.data());
+}
 
 void add_joints(StatusText& out, const char* what, JointSet joints) noexcept {
   if (joints.is_empty()) return;
@@ -15,7 +20,7 @@ void add_joints(StatusText& out, const char* what, JointSet joints) noexcept {
   const char* between = " ";
   for (std::size_t n = 0; n < kJointCount; ++n) {
     if (!joints.contains(n)) continue;
-    out.add("%s%.*s", between, static_cast<int>(kJointNames[n].size()), kJointNames[n].data());
+    add_text(out, between, kJointNames[n]);
     between = ", ";
   }
 }
@@ -30,57 +35,14 @@ void StatusText::add(const char* format, ...) noexcept {
   if (wanted > 0) length = std::min(length + static_cast<std::size_t>(wanted), text.size() - 1);
 }
 
-const char* name_of(GaitPhase phase) noexcept {
-  switch (phase) {
-    case GaitPhase::kStandstill:
-      return "standing";
-    case GaitPhase::kDoubleSupport:
-      return "double support";
-    case GaitPhase::kSwing:
-      return "swing";
-    case GaitPhase::kFinished:
-      return "finished";
-    case GaitPhase::kStopped:
-      return "stopped";
-  }
-  return "unknown";
-}
-
-const char* name_of(StopReason reason) noexcept {
-  constexpr std::array kNames{"no reason",
-                              "nothing to step on is seen",
-                              "no staircase is seen",
-                              "on top",
-                              "the next rise is too high",
-                              "the next tread is too short",
-                              "the stairs are too narrow",
-                              "the map is too old",
-                              "the next edge is not known well enough",
-                              "something stands in the way",
-                              "the legs cannot do the next step",
-                              "what is seen keeps changing",
-                              "it does not stand straight before the stairs",
-                              "there was no ground under the foot",
-                              "the body toppled",
-                              "IMU or joints fell silent",
-                              "asked to stop",
-                              "a drive told of an error",
-                              "control came late again and again",
-                              "a bus took no commands"};
-  static_assert(kNames.size() == static_cast<std::size_t>(StopReason::kCommandsRefused) + 1);
-  const auto i = static_cast<std::size_t>(reason);
-  return i < kNames.size() ? kNames[i] : "unknown";
-}
-
 void write_status(StatusText& out, const StatusBoard& board, std::size_t lanes, std::uint64_t heap_calls) noexcept {
   const ModuleView view = board.module();
-  const std::string_view state = polygmap::name_of(view.state);
-  out.add("%.*s", static_cast<int>(state.size()), state.data());
+  add_text(out, "", name_of(view.state));
   if (view.state == ModuleState::kArming) {
     add_joints(out, ", no answer yet from", view.unheard);
   } else {
-    out.add(", %s", name_of(view.phase));
-    if (view.state == ModuleState::kSafeStop) out.add(": %s", name_of(view.reason));
+    add_text(out, ", ", name_of(view.phase));
+    if (view.state == ModuleState::kSafeStop) add_text(out, ": ", text_of(view.reason));
     out.add(", %u treads", view.treads);
     add_joints(out, ", silent:", view.silent);
   }
@@ -94,8 +56,8 @@ void write_status(StatusText& out, const StatusBoard& board, std::size_t lanes, 
   const char* before = "; faults ";
   for (std::size_t i = 0; i < kFaultTable.size(); ++i) {
     if (board.fault(i) == 0) continue;
-    out.add("%s%.*s %u", before, static_cast<int>(kFaultTable[i].name.size()), kFaultTable[i].name.data(),
-            board.fault(i));
+    add_text(out, before, kFaultTable[i].name);
+    out.add(" %u", board.fault(i));
     before = ", ";
   }
 }

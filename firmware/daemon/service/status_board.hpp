@@ -94,7 +94,5 @@ struct StatusText {
 };
 // The state in words, as systemctl shows it.
 void write_status(StatusText& out, const StatusBoard& board, std::size_t lanes, std::uint64_t heap_calls) noexcept;
-[[nodiscard]] const char* name_of(GaitPhase phase) noexcept;
-[[nodiscard]] const char* name_of(StopReason reason) noexcept;
 
 }  // namespace polygmap::daemon

@@ -44,36 +44,54 @@ const char* name_of(hal::MitSpecial special) {
   return "?";
 }
 
-Json command_json(const CanDrive& drive, const hal::CanFrame& frame) {
-  if (frame.length != 8) return {{"error", "a command has 8 bytes"}};
-  hal::MitBytes bytes{};
-  std::copy_n(frame.data.begin(), bytes.size(), bytes.begin());
-  if (hal::is_special_frame(bytes)) return {{"special", name_of(static_cast<hal::MitSpecial>(bytes[7]))}};
-  JointSetpoint command;
-  (void)hal::try_decode_command(bytes, drive.ranges, command);
-  return {{"q_rad", command.q_rad},
-          {"dq_radps", command.dq_radps},
-          {"kp_nmprad", command.kp_nmprad},
-          {"kd_nmsprad", command.kd_nmsprad},
-          {"tau_nm", command.tau_ff_nm}};
+// What a reader of a frame makes of it; one of the two is empty.
+struct Values {
+  Json json;
+  std::string doubt;  // why the frame is none of the kind, in the words that follow its name
+};
+
+std::string bytes_of(const hal::CanFrame& frame) {
+  return std::to_string(frame.length) + (frame.length == 1 ? " byte" : " bytes");
 }
 
-// Null when it is another drive's.
-Json reply_json(const CanDrive& drive, const hal::CanFrame& frame) {
+Values command_values(const CanDrive& drive, const hal::CanFrame& frame) {
+  if (frame.length != 8) return {{}, "a command has 8 bytes"};
+  hal::MitBytes bytes{};
+  std::copy_n(frame.data.begin(), bytes.size(), bytes.begin());
+  if (hal::is_special_frame(bytes)) return {{{"special", name_of(static_cast<hal::MitSpecial>(bytes[7]))}}, ""};
+  JointSetpoint command;
+  (void)hal::try_decode_command(bytes, drive.ranges, command);
+  return {{{"q_rad", command.q_rad},
+           {"dq_radps", command.dq_radps},
+           {"kp_nmprad", command.kp_nmprad},
+           {"kd_nmsprad", command.kd_nmsprad},
+           {"tau_nm", command.tau_ff_nm}},
+          ""};
+}
+
+// Both empty when it is another drive's.
+Values reply_values(const CanDrive& drive, const hal::CanFrame& frame) {
   const std::span<const std::uint8_t> bytes(frame.data.data(), frame.length);
   if (bytes.empty() || hal::name_in_reply(bytes, drive.reply) != hal::reply_name(drive.id, drive.reply)) return {};
   hal::MitReply reply;
   if (!hal::try_decode_reply(bytes, drive.id, drive.ranges, drive.reply, reply)) {
-    return {{"error", "a reply has 6 or 8 bytes"}};
+    return {{}, "a reply has 6 or 8 bytes"};
   }
-  return {{"q_rad", reply.p_rad},   {"dq_radps", reply.v_radps}, {"tau_nm", reply.t_nm},
-          {"status", reply.status}, {"enabled", reply.enabled},  {"drive_error", reply.error}};
+  return {{{"q_rad", reply.p_rad},
+           {"dq_radps", reply.v_radps},
+           {"tau_nm", reply.t_nm},
+           {"status", reply.status},
+           {"enabled", reply.enabled},
+           {"drive_error", reply.error}},
+          ""};
 }
 
-Json reading(const std::string& bus, std::string_view who, const char* kind, const Json& values) {
-  Json json{{"bus", bus}, {"joint", who}, {"kind", kind}};
-  json.update(values);
-  return json;
+Values feet_values(const hal::CanFeet& feet, const hal::CanFrame& frame) {
+  std::array<double, kFootCount> force_n{};
+  if (!hal::try_decode_feet({frame.data.data(), frame.length}, feet.unit_n, force_n)) {
+    return {{}, "the feet's frame has 4 bytes"};
+  }
+  return {{{"left_n", force_n[0]}, {"right_n", force_n[1]}}, ""};
 }
 
 // Of a DBC: the number of the signal's first bit, the most significant one.
@@ -172,32 +190,39 @@ std::optional<hal::CanFrame> read_frame(const std::string& text) {
   return frame;
 }
 
-std::string frame_json(const config::BusFile& bus, const std::string& on, const hal::CanFrame& frame) {
+FrameReading frame_reading(const config::BusFile& bus, const std::string& on, const hal::CanFrame& frame) {
   const std::vector<std::size_t> buses = buses_of(bus, on);
   Json readings = Json::array();
+  FrameReading read;
+  const auto take = [&](Json head, const std::string& whose, const Values& values) {
+    if (!values.json.is_null()) {
+      head.update(values.json);
+      readings.push_back(std::move(head));
+    } else if (!values.doubt.empty()) {
+      read.doubts.push_back(frame_text(frame) + " has " + bytes_of(frame) + ", but it would be " + whose + ", and " +
+                            values.doubt + ".");
+    }
+  };
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const CanDrive& drive = bus.table.drives[n];
     if (!counts(buses, drive.bus)) continue;
     const std::string& name = bus.buses[drive.bus];
-    if (drive.reply_id == frame.id) {
-      const Json values = reply_json(drive, frame);
-      if (!values.is_null()) readings.push_back(reading(name, kJointNames[n], "reply", values));
-    }
-    if (drive.id == frame.id) readings.push_back(reading(name, kJointNames[n], "command", command_json(drive, frame)));
+    const std::string of_joint = std::string(kJointNames[n]) + " on " + name;
+    const auto head = [&](const char* kind) { return Json{{"bus", name}, {"joint", kJointNames[n]}, {"kind", kind}}; };
+    if (drive.reply_id == frame.id) take(head("reply"), "a reply of " + of_joint, reply_values(drive, frame));
+    if (drive.id == frame.id) take(head("command"), "a command to " + of_joint, command_values(drive, frame));
   }
   const hal::CanFeet& feet = bus.table.feet;
   if (feet.present && feet.id == frame.id && counts(buses, feet.bus)) {
-    std::array<double, kFootCount> force_n{};
-    const bool good = hal::try_decode_feet({frame.data.data(), frame.length}, feet.unit_n, force_n);
-    Json json{{"bus", bus.buses[feet.bus]}, {"kind", "feet"}};
-    if (good) json.update(Json{{"left_n", force_n[0]}, {"right_n", force_n[1]}});
-    if (!good) json["error"] = "the feet's frame has 4 bytes";
-    readings.push_back(json);
+    const std::string& name = bus.buses[feet.bus];
+    take(Json{{"bus", name}, {"kind", "feet"}}, "the feet's on " + name, feet_values(feet, frame));
   }
+  if (readings.empty() && !read.doubts.empty()) throw config::FileError(read.doubts.front());
   if (readings.empty()) {
     throw config::FileError("No drive of bus file \"" + bus.path + "\" sends or takes " + frame_text(frame) + ".");
   }
-  return Json{{"frame", frame_text(frame)}, {"readings", readings}}.dump(2) + "\n";
+  read.json = Json{{"frame", frame_text(frame)}, {"readings", readings}}.dump(2) + "\n";
+  return read;
 }
 
 std::string dbc_text(const config::BusFile& bus, const std::string& on) {

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "firmware/config/bus_file.hpp"
 #include "hal/codec/can_frame.hpp"
@@ -13,9 +14,13 @@ namespace polygmap::sim {
 // "001#7FFF8007FF0A3800", identifier and up to 8 bytes in hexadecimal digits; nothing when it is none.
 [[nodiscard]] std::optional<hal::CanFrame> read_frame(const std::string& text);
 
-// What the frame says by each drive, or the feet's board, that has its identifier; on: of one bus alone, empty: of all.
-// JSON, a line break at its end. Throws config::FileError, one sentence, for a frame that none of them sends or takes.
-[[nodiscard]] std::string frame_json(const config::BusFile& bus, const std::string& on, const hal::CanFrame& frame);
+// What a frame says by each drive, or the feet's board, that has its identifier.
+struct FrameReading {
+  std::string json;                 // a line break at its end
+  std::vector<std::string> doubts;  // a sentence for each of those that has the identifier but no such frame
+};
+// on: of one bus alone, empty: of all. Throws config::FileError, one sentence, for a frame that says nothing by any.
+[[nodiscard]] FrameReading frame_reading(const config::BusFile& bus, const std::string& on, const hal::CanFrame& frame);
 
 // Motorola byte order. on: as above. Throws config::FileError where one identifier means two frames.
 [[nodiscard]] std::string dbc_text(const config::BusFile& bus, const std::string& on);

@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -18,6 +17,7 @@
 #include "sim_stub/host/cli/estimate_command.hpp"
 #include "sim_stub/host/cli/obstacle_options.hpp"
 #include "sim_stub/host/cli/params_command.hpp"
+#include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
 #include "sim_stub/host/cli/replay_command.hpp"
 #include "sim_stub/host/output_file.hpp"
@@ -50,92 +50,87 @@ struct ClimbArguments {
   const CLI::App* said = nullptr;  // which options were
 };
 
-void declare(CLI::App& climb, ClimbArguments& a) {
-  StairParams& stairs = a.options.stairs;
-  climb.add_option("--steps", stairs.steps, "Number of steps; the last one is the landing")
-      ->transform(CLI::Validator(decimal, ""))
-      ->capture_default_str();
-  climb.add_option("--rise", stairs.rise_m, "Rise of a step, m")->capture_default_str();
-  climb.add_option("--tread", stairs.tread_m, "Depth of a tread, m")->capture_default_str();
-  climb.add_option("--width", stairs.width_m, "Width of the staircase, m")->capture_default_str();
-  climb.add_option("--nosing", stairs.nosing_m, "Overhang of a tread over its riser, m")->capture_default_str();
+// A length of the stairs.
+void declare_length(CLI::App& climb, const char* name, double& length_m, double least_m, const char* text) {
+  keep_within(*climb.add_option(name, length_m, text), least_m, kMaxLength_m, "m");
+  climb.get_option(name)->capture_default_str();
+}
+
+void declare_stairs(CLI::App& climb, StairParams& stairs) {
+  keep_within(*climb.add_option("--steps", stairs.steps, "Number of steps; the last one is the landing")
+                   ->transform(CLI::Validator(decimal, ""))
+                   ->capture_default_str(),
+              1, kMaxSteps);
+  declare_length(climb, "--rise", stairs.rise_m, kMinStep_m, "Rise of a step, m");
+  declare_length(climb, "--tread", stairs.tread_m, kMinStep_m, "Depth of a tread, m");
+  declare_length(climb, "--width", stairs.width_m, kMinStep_m, "Width of the staircase, m");
+  declare_length(climb, "--nosing", stairs.nosing_m, 0.0,
+                 "Overhang of a tread over its riser, m; shorter than the shortest tread");
   declare_obstacles(climb, stairs);
-  climb.add_option("--landing", stairs.landing_m, "Depth of the landing, m")->capture_default_str();
-  climb.add_option("--jitter", stairs.jitter_m, "Rise and tread of each step differ by up to this much, m")
-      ->capture_default_str();
+  declare_length(climb, "--landing", stairs.landing_m, kMinStep_m, "Depth of the landing, m");
   climb
-      .add_option("--plant", a.plant,
-                  "mujoco: under physics, it balances or falls; kinematic: follows and never tips over, quicker")
+      .add_option("--jitter", stairs.jitter_m,
+                  "Rise and tread of each step differ by up to this much, m: from 0 to half of rise and tread")
       ->capture_default_str();
-  climb.add_option("--gait", a.gait, "ds: both feet on every tread; ss: one foot on every tread, both on the last")
-      ->capture_default_str();
-  climb.add_option("--seed", a.options.seed, "Draws the start, the steps' jitter, the robot's errors and all noise")
-      ->check(whole_number)
-      ->transform(CLI::Validator(decimal, ""))
-      ->capture_default_str();
-  climb.add_option("--noise", a.noise, "Depth noise: white or correlated")->capture_default_str();
-  climb
-      .add_option("--contacts", a.contacts,
-                  "Foot forces: sensed, or, on the kinematic plant, inferred from joint torques")
-      ->capture_default_str();
-  climb
-      .add_option("--push", a.pushes,
-                  "Pushes of the torso, over 0.1 s: when, s; along x (up the stairs) or y (to the left); how much, N s")
-      ->expected(1, 16)
-      ->type_name("\"T,AXIS,NS\"");
-  climb
-      .add_option("--mass-scale", a.options.mujoco.torso_mass_scale,
-                  "The torso's true mass over the mass that the module believes")
-      ->capture_default_str();
-  climb
-      .add_option("--torso-offset-x", a.options.mujoco.torso_offset_x_m,
-                  "How far the torso's centre of mass truly is ahead of where the module believes it, m")
-      ->capture_default_str();
-  climb.add_option("--friction", a.options.mujoco.friction, "Friction of the soles on floor and stairs")
-      ->capture_default_str();
-  climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
-  climb.add_flag(
-      "--save-inputs", a.options.save_inputs,
-      "Also write what the sensors said, for perceive and estimate: OUT/inputs/depth_NN.png, log.csv, lio.csv");
-  climb
-      .add_option("--record", a.options.record_dir,
-                  "Also write all that goes into the module and comes out of it, to the bit, for replay: some 100 MB a "
-                  "stair step")
-      ->type_name("DIR");
+}
 
-  climb.add_option("--camera", a.camera, "The robot's camera, 640x480 at most; the module is told what the file says")
+// What the robot truly is, where the module believes otherwise.
+void declare_body(CLI::App& climb, MujocoPlant::Params& mujoco) {
+  keep_within(*climb
+                   .add_option("--mass-scale", mujoco.torso_mass_scale,
+                               "The torso's true mass over the mass that the module believes")
+                   ->capture_default_str(),
+              0.5, 2.0);
+  keep_within(*climb
+                   .add_option("--torso-offset-x", mujoco.torso_offset_x_m,
+                               "How far the torso's centre of mass truly is ahead of where the module believes it, m")
+                   ->capture_default_str(),
+              -0.1, 0.1, "m");
+  keep_within(*climb.add_option("--friction", mujoco.friction, "Friction of the soles on floor and stairs")
+                   ->capture_default_str(),
+              0.05, 2.0);
+}
+
+void declare_camera(CLI::App& climb, ClimbArguments& a) {
+  climb
+      .add_option("--camera", a.camera,
+                  "The robot's camera, " + std::to_string(kDepthWidth_px) + "x" + std::to_string(kDepthHeight_px) +
+                      " at most; the module is told what the file says")
       ->type_name("CAMERA.toml");
-  climb
-      .add_option("--scan-ms", a.options.scan_ms,
-                  "Time from a picture's first row to its last, ms; the nearest of 0, 4, 8 ... is simulated")
-      ->capture_default_str();
-  climb
-      .add_option("--mount-error", a.options.mount_error_deg,
-                  "How far the camera's mount may be off, unknown to the module: degrees about each axis, and 3 mm for "
-                  "each degree")
-      ->capture_default_str();
-  climb
-      .add_option("--scale-error", a.options.scale_error,
-                  "How far the depths' scale may be off, unknown to the module: share of the depth")
-      ->capture_default_str();
+  keep_within(
+      *climb
+           .add_option("--scan-ms", a.options.scan_ms,
+                       "Time from a picture's first row to its last, ms; the nearest of 0, 4, 8 ... is simulated")
+           ->capture_default_str(),
+      0.0, 32.0, "ms");
+  keep_within(*climb
+                   .add_option("--mount-error", a.options.mount_error_deg,
+                               "How far the camera's mount may be off, unknown to the module: degrees about each axis, "
+                               "and 3 mm for each degree")
+                   ->capture_default_str(),
+              0.0, 5.0, "degrees");
+  keep_within(*climb
+                   .add_option("--scale-error", a.options.scale_error,
+                               "How far the depths' scale may be off, unknown to the module: share of the depth")
+                   ->capture_default_str(),
+              0.0, 0.05);
+}
 
-  climb.add_option("--bus", a.bus, "The joints are behind CAN buses with the drives that this file describes")
-      ->type_name("BUS.toml");
-  climb.add_option("--can-log", a.options.can_log, "Also write every frame on the buses there, as candump -L has them")
-      ->type_name("FILE");
-
-  climb.add_option("--params", a.options.params_file, "Parameters of the module; other options go before what it says")
-      ->type_name("PARAMS.toml");
-
-  // What the camera shows may differ from what the robot stands on: shows that the module lives on what it sees.
+// What the camera shows may differ from what the robot stands on: shows that the module lives on what it sees.
+void declare_causality(CLI::App& climb, ClimbArguments& a) {
   const std::string causality = "causality (experiments on what the module sees)";
-  climb.add_option("--render-shift", a.render_shift_m, "Shift of the rendered staircase, m")
+  climb
+      .add_option(
+          "--render-shift", a.render_shift_m,
+          "Shift of the rendered staircase, m, each from -" + number(kMaxLength_m) + " to " + number(kMaxLength_m))
       ->expected(3)
       ->type_name("X Y Z")
       ->group(causality);
-  climb.add_option("--render-missing-step", a.missing_step, "Leave step K (1 is the lowest) out of the picture")
+  climb
+      .add_option("--render-missing-step", a.missing_step,
+                  "Leave step K out of the picture, from 1, the lowest, to --steps")
       ->transform(CLI::Validator(decimal, ""))
-      ->type_name("K")
+      ->type_name("INT")
       ->group(causality);
   climb.add_flag("--blank-depth", a.options.blank_depth, "The camera delivers no depth")->group(causality);
   climb.add_flag("--no-mount-estimate", a.no_mount_estimate, "The module believes the mount's data sheet")
@@ -143,10 +138,59 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   climb.add_flag("--no-self-filter", a.no_self_filter, "The module does not mask its own legs")->group(causality);
 }
 
-std::string number(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%g", value);
-  return buffer;
+void declare_files(CLI::App& climb, ClimbArguments& a) {
+  climb.add_option("--out", a.options.out_dir, "Directory for summary.json and climb.svg")->capture_default_str();
+  climb.add_flag(
+      "--save-inputs", a.options.save_inputs,
+      "Also write what the sensors said, for perceive and estimate: OUT/inputs/depth_NN.png, log.csv, lio.csv");
+  climb
+      .add_option("--record", a.options.record_dir,
+                  "Also write all that goes into the module and comes out of it, to the bit, for replay: some 220 MB "
+                  "and 50 MB for each step")
+      ->type_name("DIR");
+}
+
+void declare(CLI::App& climb, ClimbArguments& a) {
+  declare_stairs(climb, a.options.stairs);
+  keep_among(
+      *climb
+           .add_option("--plant", a.plant,
+                       "mujoco: under physics, it balances or falls; kinematic: follows and never tips over, quicker")
+           ->capture_default_str(),
+      {"mujoco", "kinematic"});
+  keep_among(
+      *climb
+           .add_option("--gait", a.gait, "ds: both feet on every tread; ss: one foot on every tread, both on the last")
+           ->capture_default_str(),
+      {"ds", "ss"});
+  climb.add_option("--seed", a.options.seed, "Draws the start, the steps' jitter, the robot's errors and all noise")
+      ->check(whole_number)
+      ->transform(CLI::Validator(decimal, ""))
+      ->type_name("UINT in [0, 2^64 - 1]")
+      ->capture_default_str();
+  keep_among(*climb.add_option("--noise", a.noise, "Depth noise")->capture_default_str(), {"white", "correlated"});
+  keep_among(*climb
+                  .add_option("--contacts", a.contacts,
+                              "Foot forces: sensed, or, on the kinematic plant, inferred from joint torques")
+                  ->capture_default_str(),
+             {"sensed", "inferred"});
+  climb
+      .add_option("--push", a.pushes,
+                  "Pushes of the torso, over 0.1 s: when, from " + number(kFirstPush_s) + " to " + number(kLastPush_s) +
+                      " s; along x (up the stairs) or y (to the left); how much, from -" + number(kHardestPush_ns) +
+                      " to " + number(kHardestPush_ns) + " N s")
+      ->expected(1, 16)
+      ->type_name("\"T,AXIS,NS\"");
+  declare_body(climb, a.options.mujoco);
+  declare_files(climb, a);
+  declare_camera(climb, a);
+  climb.add_option("--bus", a.bus, "The joints are behind CAN buses with the drives that this file describes")
+      ->type_name("BUS.toml");
+  climb.add_option("--can-log", a.options.can_log, "Also write every frame on the buses there, as candump -L has them")
+      ->type_name("FILE");
+  climb.add_option("--params", a.options.params_file, "Parameters of the module; other options go before what it says")
+      ->type_name("PARAMS.toml");
+  declare_causality(climb, a);
 }
 
 // As in "12.5,x,10"; nothing when it is no push.
@@ -176,23 +220,6 @@ void take_params(ClimbArguments& a) {
 
 // Parts of complaint(): empty, or one sentence. Those that take all arguments complete the options.
 std::string stairs_complaint(const StairParams& stairs) {
-  if (stairs.steps < 1 || stairs.steps > kMaxSteps) {
-    return "--steps must be from 1 to " + std::to_string(kMaxSteps) + ", not " + std::to_string(stairs.steps) + ".";
-  }
-  struct Length {
-    const char* name;
-    double value_m;
-    double min_m;
-  };
-  for (const Length& length :
-       {Length{"--rise", stairs.rise_m, kMinStep_m}, Length{"--tread", stairs.tread_m, kMinStep_m},
-        Length{"--width", stairs.width_m, kMinStep_m}, Length{"--nosing", stairs.nosing_m, 0.0},
-        Length{"--landing", stairs.landing_m, kMinStep_m}}) {
-    if (!(length.value_m >= length.min_m && length.value_m <= kMaxLength_m)) {
-      return std::string(length.name) + " must be from " + number(length.min_m) + " to " + number(kMaxLength_m) +
-             " m, not " + number(length.value_m) + ".";
-    }
-  }
   const double most_jitter_m = 0.5 * std::min(stairs.rise_m, stairs.tread_m);
   if (!(stairs.jitter_m >= 0.0 && stairs.jitter_m <= most_jitter_m)) {
     return "--jitter must be from 0 to half of rise and tread, " + number(most_jitter_m) + " m, not " +
@@ -207,15 +234,8 @@ std::string stairs_complaint(const StairParams& stairs) {
 }
 
 std::string plant_complaint(ClimbArguments& a) {
-  if (a.gait != "ds" && a.gait != "ss") return "--gait must be ds or ss, not \"" + a.gait + "\".";
   a.options.gait = a.gait == "ss" ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
-  if (a.plant != "kinematic" && a.plant != "mujoco") {
-    return "--plant must be kinematic or mujoco, not \"" + a.plant + "\".";
-  }
   a.options.plant = a.plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kKinematic;
-  if (a.contacts != "sensed" && a.contacts != "inferred") {
-    return "--contacts must be sensed or inferred, not \"" + a.contacts + "\".";
-  }
   a.options.infer_contacts = a.contacts == "inferred";
   if (a.options.infer_contacts && a.options.plant != PlantKind::kKinematic) {
     return "--contacts inferred needs --plant kinematic: under physics a leg that swings feigns a touch-down.";
@@ -245,7 +265,8 @@ std::string pushes_complaint(ClimbArguments& a) {
     const std::optional<Push> push = read_push(text);
     if (!push) {
       return "--push must be a time from " + number(kFirstPush_s) + " to " + number(kLastPush_s) +
-             " s, x or y and up to " + number(kHardestPush_ns) + " N s, as in 12.5,x,10, not \"" + text + "\".";
+             " s, x or y and from -" + number(kHardestPush_ns) + " to " + number(kHardestPush_ns) +
+             " N s, as in 12.5,x,10, not \"" + text + "\".";
     }
     a.options.pushes.push_back(*push);
   }
@@ -253,26 +274,7 @@ std::string pushes_complaint(ClimbArguments& a) {
 }
 
 std::string errors_complaint(ClimbArguments& a) {
-  if (a.noise != "white" && a.noise != "correlated") {
-    return "--noise must be white or correlated, not \"" + a.noise + "\".";
-  }
   a.options.noise = a.noise == "white" ? NoiseKind::kWhite : NoiseKind::kCorrelated;
-  struct Range {
-    const char* name;
-    double value, least, most;
-    const char* unit;
-  };
-  for (const Range& range : {Range{"--scan-ms", a.options.scan_ms, 0.0, 32.0, " ms"},
-                             Range{"--mount-error", a.options.mount_error_deg, 0.0, 5.0, " degrees"},
-                             Range{"--scale-error", a.options.scale_error, 0.0, 0.05, ""},
-                             Range{"--mass-scale", a.options.mujoco.torso_mass_scale, 0.5, 2.0, ""},
-                             Range{"--torso-offset-x", a.options.mujoco.torso_offset_x_m, -0.1, 0.1, " m"},
-                             Range{"--friction", a.options.mujoco.friction, 0.05, 2.0, ""}}) {
-    if (!(range.value >= range.least && range.value <= range.most)) {
-      return std::string(range.name) + " must be from " + number(range.least) + " to " + number(range.most) +
-             range.unit + ", not " + number(range.value) + ".";
-    }
-  }
   return {};
 }
 
@@ -302,6 +304,10 @@ std::string bus_complaint(ClimbArguments& a) {
            "that swings feigns a touch-down.";
   }
   if (a.options.can_log.empty()) return {};
+  for (const std::string& taken : {a.bus, a.camera, a.options.params_file, a.options.out_dir + "/summary.json",
+                                   a.options.out_dir + "/climb.svg"}) {
+    if (one_name(taken) == one_name(a.options.can_log)) return "\"" + taken + "\" would be overwritten by --can-log.";
+  }
   std::ofstream probe(a.options.can_log);
   return probe ? "" : "Cannot write the file \"" + a.options.can_log + "\" given by --can-log.";
 }
@@ -393,8 +399,9 @@ class ProgressLine {
     if (!live_ && p.time_s < next_s_) return;
     next_s_ = p.time_s + kQuietPeriod_s;
     char line[160];
-    std::snprintf(line, sizeof line, "%6.1f s  step %d of %d  %-16s worst row %s %.0f us (host)", p.time_s,
-                  p.treads_climbed, steps_, p.phase, p.worst_row, p.worst_row_us);
+    std::snprintf(line, sizeof line, "%6.1f s  step %d of %d  %-16.*s worst row %s %.0f us (host)", p.time_s,
+                  p.treads_climbed, steps_, static_cast<int>(p.phase.size()), p.phase.data(), p.worst_row,
+                  p.worst_row_us);
     out_ << (live_ ? "\r" : "") << line << (live_ ? "\x1b[K" : "\n") << std::flush;
     shown_ = true;
   }
@@ -447,12 +454,10 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
     }
     app.parse(std::move(last_first));
   } catch (const CLI::Success& success) {
-    return app.exit(success, out, err);
+    app.exit(success, out, err);
+    return written(out, err);
   } catch (const CLI::ParseError& error) {
-    constexpr std::array<std::string_view, 6> kCommands{"climb", "perceive", "estimate", "replay", "params", "can"};
-    const bool named = !arguments.empty() && std::ranges::find(kCommands, arguments[0]) != kCommands.end();
-    err << "polygmap: " << complaint_of(error, app, arguments) << "; see polygmap " << (named ? arguments[0] + " " : "")
-        << "--help.\n";
+    err << "polygmap: " << complaint_of(error, app, arguments) << "; see " << command_of(app) << "--help.\n";
     return kExitUsage;
   }
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err, interrupt);

@@ -5,7 +5,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
+#include <cstdio>
+#include <ostream>
 #include <system_error>
+
+#include "sim_stub/host/cli/climb_command.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -24,18 +28,26 @@ std::string unexpected(const std::string& message, const CLI::App& app, const st
   return culprit == words.end() ? message : "\"" + *culprit + "\" is a word too many";
 }
 
+// The commands that the words got as far as, from the outermost to the innermost: can, encode.
+std::vector<const CLI::App*> commands_of(const CLI::App& app) {
+  std::vector<const CLI::App*> commands;
+  for (const CLI::App* at = &app; !at->get_subcommands().empty();) commands.push_back(at = at->get_subcommands()[0]);
+  return commands;
+}
+
 // "Could not convert: --steps = abc"
 std::string unconverted(const std::string& message, const CLI::App& app) {
   const std::size_t name_at = message.find(": "), value_at = message.find(" = ");
   if (name_at == std::string::npos || value_at == std::string::npos) return message;
   const std::string name = message.substr(name_at + 2, value_at - name_at - 2);
   std::string type;
-  for (const CLI::App* command : app.get_subcommands()) {
+  for (const CLI::App* command : commands_of(app)) {
     const CLI::Option* option = command->get_option_no_throw(name);
     if (option != nullptr) type = option->get_type_name();
   }
-  const std::string number = type == "INT" ? "no whole number" : (type == "FLOAT" ? "no number" : "no value");
-  return "\"" + message.substr(value_at + 3) + "\" is " + number + " that " + name + " can take";
+  const bool whole = type.starts_with("INT") || type.starts_with("UINT");  // all others that are converted are FLOAT
+  return "\"" + message.substr(value_at + 3) + "\" is " + (whole ? "no whole number" : "no number") + " that " + name +
+         " can take";
 }
 
 // "--steps: 1 required INT missing", "--gravity: At least 3 required but received 2", "--steps: At Most 1 required ..."
@@ -49,6 +61,13 @@ std::string mismatched(const std::string& message) {
     return name + (count == "1" ? " is given more than once" : " takes no more than " + count + " values");
   }
   return name + (count == "1" ? " needs a value" : " needs " + count + " values");
+}
+
+// As it may stand in a sentence on one line: words of the command line may hold anything.
+std::string on_one_line(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return (c >= 0 && c < ' ') || c == 127; }, '?');
+  return text;
 }
 
 // "lst is no command of params; there are list, docs and diff"; empty where the command asks for none, or has it.
@@ -71,20 +90,67 @@ std::string no_such_command(const CLI::App& app, const std::vector<std::string>&
 
 std::string complaint_of(const CLI::ParseError& error, const CLI::App& app, const std::vector<std::string>& words) {
   std::string message = error.what();
-  if (std::string sentence = no_such_command(app, words); !sentence.empty()) return sentence;
+  if (std::string sentence = no_such_command(app, words); !sentence.empty()) return on_one_line(sentence);
   switch (static_cast<CLI::ExitCodes>(error.get_exit_code())) {
     case CLI::ExitCodes::ExtrasError:
-      return unexpected(message, app, words);
+      return on_one_line(unexpected(message, app, words));
     case CLI::ExitCodes::ConversionError:
-      return unconverted(message, app);
+      return on_one_line(unconverted(message, app));
     case CLI::ExitCodes::ArgumentMismatch:
-      return mismatched(message);
+      return on_one_line(mismatched(message));
     case CLI::ExitCodes::ValidationError:  // "--seed: must be a whole number"
       if (const std::size_t end = message.find(": must "); end != std::string::npos) message.erase(end, 1);
-      return message;
+      return on_one_line(message);
     default:
-      return message;
+      return on_one_line(message);
   }
+}
+
+int written(std::ostream& out, std::ostream& err) {
+  if (out << std::flush) return kExitPass;
+  err << "polygmap: Cannot write to the standard output.\n";
+  return kExitUsage;
+}
+
+std::string command_of(const CLI::App& app) {
+  std::string words = app.get_name() + " ";
+  for (const CLI::App* command : commands_of(app)) words += command->get_name() + " ";
+  return words;
+}
+
+std::string number(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%g", value);
+  return buffer;
+}
+
+// CLI11 2.1's own range lets nan pass.
+void keep_within(CLI::Option& option, double least, double most, const std::string& unit) {
+  option.type_name(option.get_type_name() + " in [" + number(least) + ", " + number(most) + "]");
+  option.check(CLI::Validator(
+      [least, most, unit](std::string& text) -> std::string {
+        double value = 0.0;
+        if (!CLI::detail::lexical_cast(text, value)) return {};  // the conversion that follows says so
+        if (value >= least && value <= most) return {};
+        return "must be from " + number(least) + " to " + number(most) + (unit.empty() ? "" : " ") + unit + ", not " +
+               text;
+      },
+      ""));
+}
+
+void keep_among(CLI::Option& option, const std::vector<std::string>& words) {
+  std::string all, either;
+  for (const std::string& word : words) {
+    all += (all.empty() ? "" : "|") + word;
+    either += (either.empty() ? "" : (word == words.back() ? " or " : ", ")) + word;
+  }
+  option.type_name(all);
+  option.check(CLI::Validator(
+      [words, either](std::string& text) -> std::string {
+        if (std::ranges::find(words, text) != words.end()) return {};
+        return "must be " + either + ", not \"" + text + "\"";
+      },
+      ""));
 }
 
 // CLI11 2.1 lets -1 and 2^64 wrap around.

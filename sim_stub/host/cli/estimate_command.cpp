@@ -12,6 +12,7 @@
 #include "firmware/config/param_file.hpp"
 #include "firmware/params.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
+#include "sim_stub/host/cli/command_words.hpp"
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/estimate/estimate_report.hpp"
 #include "sim_stub/host/estimate/log_contradiction.hpp"
@@ -33,12 +34,13 @@ std::string complaint(const EstimateArguments& a) {
   for (std::size_t i = 0; i < a.lidar_mount.size(); ++i) {
     const double limit = i < 3 ? kMaxMount_m : kMaxAngle_deg;
     if (!(std::abs(a.lidar_mount[i]) <= limit)) {
-      return "--lidar-mount takes three lengths within 10 m and three angles within 360 degrees.";
+      return "--lidar-mount must be three lengths from -" + number(kMaxMount_m) + " to " + number(kMaxMount_m) +
+             " m and three angles from -" + number(kMaxAngle_deg) + " to " + number(kMaxAngle_deg) + " degrees, not " +
+             number(a.lidar_mount[i]) + ".";
     }
   }
   if (!a.lidar_mount.empty() && a.lio.empty()) return "--lidar-mount is of no use without --lio.";
   if (a.lio_tau_s != 0.0 && a.lio.empty()) return "--lio-tau is of no use without --lio.";
-  if (!(a.lio_tau_s >= 0.0 && a.lio_tau_s <= kMaxTau_s)) return "--lio-tau must be from 0 to 1000 s.";
   return {};
 }
 
@@ -146,15 +148,17 @@ CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
       ->type_name("LIO.csv");
   estimate
       ->add_option("--lidar-mount", a.lidar_mount,
-                   "The poses are the lidar's, and this is its place in the base: m, and degrees about x, y, z "
-                   "(R = Rz Ry Rx)")
+                   "The poses are the lidar's, and this is its place in the base: m, each from -" +
+                       number(kMaxMount_m) + " to " + number(kMaxMount_m) +
+                       ", and degrees about x, y, z (R = Rz Ry Rx), each from -" + number(kMaxAngle_deg) + " to " +
+                       number(kMaxAngle_deg))
       ->expected(6)
       ->type_name("X Y Z ROLL PITCH YAW");
-  estimate
-      ->add_option(
+  keep_within(
+      *estimate->add_option(
           "--lio-tau", a.lio_tau_s,
-          "Time constant of the offset's low-pass, s; 0: 0.4 s per mm of LIO's noise as measured, 1 s at least")
-      ->type_name("TAU");
+          "Time constant of the offset's low-pass, s; 0: 0.4 s per mm of LIO's noise as measured, 1 s at least"),
+      0.0, kMaxTau_s, "s");
   estimate->add_option("--params", a.params, "Parameters of the module; of the estimator and of the robot")
       ->type_name("PARAMS.toml");
   estimate->add_option("--json", a.json, "Scores, biases, innovations, rejections")->type_name("OUT.json");
@@ -202,12 +206,7 @@ int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& er
     err << "polygmap: " << error.what() << "\n";
     return kExitUsage;
   }
-  out << std::flush;
-  if (!out) {
-    err << "polygmap: Cannot write to the standard output.\n";
-    return kExitUsage;
-  }
-  return kExitPass;
+  return written(out, err);
 }
 
 }  // namespace polygmap::sim

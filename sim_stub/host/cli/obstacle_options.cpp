@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "sim_stub/host/cli/command_words.hpp"
+
 namespace polygmap::sim {
 namespace {
 
@@ -28,26 +30,24 @@ bool read_obstacle(const std::string& text, Obstacle& out) {
 }  // namespace
 
 void declare_obstacles(CLI::App& climb, StairParams& stairs) {
-  climb
-      .add_option("--balusters", stairs.balusters.spacing_m, "Posts along both edges of the stairs, this far apart, m")
-      ->check(CLI::Range(0.05, 2.0));
-  climb
-      .add_option("--baluster-inset", stairs.balusters.inset_m,
-                  "From the edge of the stairs to a post, m; negative: the posts stand beside the stairs")
-      ->check(CLI::Range(-1.0, 1.0))
-      ->capture_default_str();
-  climb.add_option("--baluster-size", stairs.balusters.size_m, "Side of a post, m")
-      ->check(CLI::Range(0.01, 0.3))
-      ->capture_default_str();
-  climb
-      .add_option_function<std::string>(
-          "--baluster-side",
-          [&stairs](const std::string& side) {
-            stairs.balusters.left = side != "right";
-            stairs.balusters.right = side != "left";
-          },
-          "Where the posts stand: both, left or right")
-      ->check(CLI::IsMember({"both", "left", "right"}));
+  keep_within(*climb.add_option("--balusters", stairs.balusters.spacing_m,
+                                "Posts along both edges of the stairs, this far apart, m"),
+              0.05, 2.0, "m");
+  keep_within(*climb
+                   .add_option("--baluster-inset", stairs.balusters.inset_m,
+                               "From the edge of the stairs to a post, m; negative: the posts stand beside the stairs")
+                   ->capture_default_str(),
+              -1.0, 1.0, "m");
+  keep_within(*climb.add_option("--baluster-size", stairs.balusters.size_m, "Side of a post, m")->capture_default_str(),
+              0.01, 0.3, "m");
+  keep_among(*climb.add_option_function<std::string>(
+                 "--baluster-side",
+                 [&stairs](const std::string& side) {
+                   stairs.balusters.left = side != "right";
+                   stairs.balusters.right = side != "left";
+                 },
+                 "Where the posts stand"),
+             {"both", "left", "right"});
   climb
       .add_option_function<std::vector<std::string>>(
           "--obstacle",
@@ -56,10 +56,15 @@ void declare_obstacles(CLI::App& climb, StairParams& stairs) {
               if (Obstacle read; read_obstacle(box, read)) stairs.obstacles.push_back(read);
             }
           },
-          "A box, X,Y,Z,LENGTH,WIDTH,HEIGHT: middle and size, m; x up the stairs from the first riser, y left")
+          "A box, X,Y,Z,LENGTH,WIDTH,HEIGHT: middle and size, m; x up the stairs from the first riser, y left; each "
+          "from -" +
+              number(kFarthest_m) + " to " + number(kFarthest_m) + ", sizes from " + number(kSmallest_m))
+      ->type_name("X,Y,Z,L,W,H")
       ->check([](const std::string& box) -> std::string {
         Obstacle read;
-        return read_obstacle(box, read) ? "" : "must be six numbers, X,Y,Z,LENGTH,WIDTH,HEIGHT in m, not " + box;
+        if (read_obstacle(box, read)) return {};
+        return "must be six numbers, X,Y,Z,LENGTH,WIDTH,HEIGHT in m, each from -" + number(kFarthest_m) + " to " +
+               number(kFarthest_m) + " and sizes from " + number(kSmallest_m) + ", not \"" + box + "\"";
       });
 }
 

@@ -8,6 +8,7 @@
 
 #include "firmware/config/param_file.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
+#include "sim_stub/host/cli/command_words.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -139,12 +140,7 @@ int run_params(const ParamsArguments& a, std::ostream& out, std::ostream& err) {
   } else {
     out << (a.json ? params_json(params) : params_toml(params));
   }
-  out << std::flush;
-  if (!out) {
-    err << "polygmap: Cannot write to the standard output.\n";
-    return kExitUsage;
-  }
-  return kExitPass;
+  return written(out, err);
 }
 
 }  // namespace polygmap::sim

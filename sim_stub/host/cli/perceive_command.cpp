@@ -41,7 +41,6 @@ std::vector<std::string> outputs_of(const PerceiveArguments& a, const std::strin
 }
 
 std::string complaint(const PerceiveArguments& a) {
-  if (a.repeat < 1 || a.repeat > kMaxRepeat) return "--repeat must be from 1 to " + std::to_string(kMaxRepeat) + ".";
   if (a.depth.size() > 1 && !(a.labels + a.json + a.picture).empty()) {
     std::set<std::string> names;
     for (const std::string& path : a.depth) {
@@ -152,9 +151,10 @@ CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
   perceive->add_option("--json", a.json, "The planes" + folder)->type_name("OUT.json");
   perceive->add_option("--picture", a.picture, "Planes, polygons and nosings over the depth" + folder)
       ->type_name("OUT.png");
-  perceive->add_option("--repeat", a.repeat, "Extract N times, for the median and the longest time")
-      ->transform(CLI::Validator(decimal, ""))
-      ->type_name("N");
+  keep_within(*perceive->add_option("--repeat", a.repeat, "Extract so often, for the median and the longest time")
+                   ->transform(CLI::Validator(decimal, ""))
+                   ->capture_default_str(),
+              1, kMaxRepeat);
   return perceive;
 }
 
@@ -196,11 +196,8 @@ int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& er
       complain(error);
     }
   }
-  if (!out) {
-    err << "polygmap: Cannot write to the standard output.\n";
-    return kExitUsage;
-  }
-  return code;
+  const int said = written(out, err);
+  return said == kExitPass ? code : said;
 }
 
 }  // namespace polygmap::sim

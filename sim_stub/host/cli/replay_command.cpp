@@ -5,6 +5,8 @@
 #include <ostream>
 
 #include "firmware/recording/replay.hpp"
+#include "sim_stub/host/cli/climb_command.hpp"
+#include "sim_stub/host/cli/command_words.hpp"
 
 namespace polygmap::sim {
 
@@ -23,9 +25,10 @@ int run_replay(const ReplayArguments& a, std::ostream& out, std::ostream& err) {
     if (!result.difference.empty()) out << "first difference: " << result.difference << "\n" << std::flush;
     err << "polygmap: " << result.complaint << "\n";
   } else {
-    out << text_of(result) << std::flush;
+    out << text_of(result);
   }
-  return static_cast<int>(result.verdict);
+  const int said = written(out, err);
+  return said == kExitPass ? static_cast<int>(result.verdict) : said;
 }
 
 }  // namespace polygmap::sim

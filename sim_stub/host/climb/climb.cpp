@@ -110,22 +110,6 @@ SimOptions sim_options(const ClimbOptions& options) {
   return sim;
 }
 
-const char* name_of(GaitPhase phase) {
-  switch (phase) {
-    case GaitPhase::kStandstill:
-      return "standing";
-    case GaitPhase::kDoubleSupport:
-      return "double support";
-    case GaitPhase::kSwing:
-      return "swing";
-    case GaitPhase::kFinished:
-      return "on top";
-    case GaitPhase::kStopped:
-      return "stopped";
-  }
-  return "?";
-}
-
 ClimbProgress progress_of(std::int64_t now_ns, const GaitStatus& gait, const TimedPipeline& tasks) {
   ClimbProgress progress{seconds(now_ns), static_cast<int>(gait.treads_climbed), name_of(gait.phase), "", 0.0};
   double worst_share = -1.0;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "sim_stub/host/climb/climb_options.hpp"
@@ -16,7 +17,7 @@ namespace polygmap::sim {
 struct ClimbProgress {
   double time_s;
   int treads_climbed;
-  const char* phase;
+  std::string_view phase;
   const char* worst_row;
   double worst_row_us;
 };

@@ -12,51 +12,12 @@ std::string sentence(const char* format, double a = 0.0, double b = 0.0, double 
   return buffer;
 }
 
+// With the rise or tread that was measured, where one is behind the reason.
 std::string why_stopped(StopReason reason, double measured_m) {
-  switch (reason) {
-    case StopReason::kNone:
-      return "it gave no reason";
-    case StopReason::kNothingSeen:
-      return "it saw no surface to step on, or too little of the next one";
-    case StopReason::kNoStaircase:
-      return "it saw level ground and no higher tread";
-    case StopReason::kTop:
-      return "it took the tread it stood on for the highest";
-    case StopReason::kRiseTooHigh:
-      return sentence("it measured a rise of %.3f m, too high to climb", measured_m);
-    case StopReason::kTreadTooShort:
-      return sentence("it measured a tread of %.3f m, too short for the foot", measured_m);
-    case StopReason::kTooNarrow:
-      return "it measured a tread too narrow for two feet";
-    case StopReason::kMapStale:
-      return "its map was stale";
-    case StopReason::kEdgeUncertain:
-      return "it knew the edges of the next tread too vaguely";
-    case StopReason::kObstacle:
-      return "something stood where its feet would have gone next";
-    case StopReason::kLegsCannot:
-      return measured_m > 0.0 ? sentence("its legs could not do the next step, of %.3f m rise", measured_m)
-                              : "its legs could not do the next step";
-    case StopReason::kUnsteady:
-      return "what it saw kept changing";
-    case StopReason::kNotLinedUp:
-      return "it did not come to stand straight before the stairs";
-    case StopReason::kGroundMissing:
-      return "there was no ground where a foot came down, and it put the foot back";
-    case StopReason::kToppling:
-      return "its body kept toppling towards the foot it lifted, and it put every one back";
-    case StopReason::kStateStale:
-      return "its IMU or its joints fell silent";
-    case StopReason::kOperator:
-      return "it was asked to";
-    case StopReason::kDriveError:
-      return "a drive told of an error";
-    case StopReason::kTimeShort:
-      return "its control cycles kept coming late";
-    case StopReason::kCommandsRefused:
-      return "its bus took no commands";
-  }
-  return "it gave no known reason";
+  const std::string why(text_of(reason));
+  const bool of_a_length =
+      reason == StopReason::kRiseTooHigh || reason == StopReason::kTreadTooShort || reason == StopReason::kLegsCannot;
+  return of_a_length && measured_m > 0.0 ? why + sentence(" (%.3f m)", measured_m) : why;
 }
 
 std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {

@@ -60,7 +60,7 @@ std::string shown(std::string_view text) {
 
 }  // namespace
 
-CsvTable::CsvTable(std::string path) : path_(std::move(path)), text_(read_text(path_)) {
+CsvTable::CsvTable(std::string path, std::string_view landmark) : path_(std::move(path)), text_(read_text(path_)) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   std::string_view rest = text_;
   if (rest.substr(0, kByteOrderMark.size()) == kByteOrderMark) rest.remove_prefix(kByteOrderMark.size());
@@ -69,13 +69,14 @@ CsvTable::CsvTable(std::string path) : path_(std::move(path)), text_(read_text(p
     const std::string_view line = rest.substr(0, end);
     rest.remove_prefix(std::min(end + 1, rest.size()));
     if (trimmed(line).empty() && trimmed(rest).empty() && number > 1) break;  // the file's end
+    if (number == 1 && line.find(landmark) == std::string_view::npos) fail_as_no_log(line, landmark);
     const auto cells = static_cast<std::size_t>(1 + std::ranges::count(line, ','));
     if (cells > kMostColumns) {
       throw config::FileError("\"" + path_ + "\" line " + std::to_string(number) + ": has more than " +
                               std::to_string(kMostColumns) + " columns.");
     }
     if (number == 1) {
-      read_header(line);
+      read_header(line, landmark);
       continue;
     }
     if (lines_.size() == kMostRows) {
@@ -91,11 +92,19 @@ CsvTable::CsvTable(std::string path) : path_(std::move(path)), text_(read_text(p
   if (lines_.empty()) throw config::FileError("\"" + path_ + "\" has no rows of data.");
 }
 
-void CsvTable::read_header(std::string_view line) {
+// A picture, a program or a page of text: what its cells lack says nothing to whoever gave it.
+void CsvTable::fail_as_no_log(std::string_view line, std::string_view landmark) const {
+  throw config::FileError("\"" + path_ +
+                          "\" is no log: line 1 must name the columns, with commas between them, but in " +
+                          shown(trimmed(line)) + " the column \"" + std::string(landmark) + "\" is missing.");
+}
+
+void CsvTable::read_header(std::string_view line, std::string_view landmark) {
   for (std::size_t i = 0; i <= static_cast<std::size_t>(std::ranges::count(line, ',')); ++i) {
     header_.push_back(nth_cell(line, i));
   }
   refuse_other_dialects(line);
+  if (find(landmark) == header_.size()) fail_as_no_log(line, landmark);
   for (auto name = header_.begin(); name != header_.end(); ++name) {
     if (!name->empty() && std::find(name + 1, header_.end(), *name) != header_.end()) {
       throw config::FileError("\"" + path_ + "\" line 1: the column " + shown(*name) + " is named twice.");

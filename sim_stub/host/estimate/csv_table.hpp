@@ -11,10 +11,10 @@ namespace polygmap::sim {
 
 class CsvTable {
  public:
-  // Reads the whole file. Throws config::FileError: absent, a folder, unreadable, empty, not separated by commas, names
-  // in quotes, a column named twice, a row of another length, too many
-  // rows.
-  explicit CsvTable(std::string path);
+  // Reads the whole file; a file without a column called landmark is taken for something else than a table. Throws
+  // config::FileError: absent, a folder, unreadable, empty, no such table, not separated by commas, names in quotes, a
+  // column named twice, a row of another length, too many rows.
+  CsvTable(std::string path, std::string_view landmark);
 
   [[nodiscard]] std::size_t rows() const noexcept { return lines_.size(); }
   // Does any column's name begin so?
@@ -31,7 +31,8 @@ class CsvTable {
     std::size_t number;  // in the file, from 1
     std::string_view text;
   };
-  void read_header(std::string_view line);
+  void read_header(std::string_view line, std::string_view landmark);
+  [[noreturn]] void fail_as_no_log(std::string_view line, std::string_view landmark) const;
   void refuse_other_dialects(std::string_view header) const;
   [[nodiscard]] std::size_t find(std::string_view column) const noexcept;
 

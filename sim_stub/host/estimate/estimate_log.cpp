@@ -52,7 +52,7 @@ std::int64_t nanoseconds(const CsvTable& table, std::size_t row, double stamp_s,
 }  // namespace
 
 EstimateLog read_estimate_log(const std::string& path) {
-  const CsvTable table(path);
+  const CsvTable table(path, "t_s");
   const std::size_t stamp = table.column("t_s");
   const Columns3 gyro = columns3(table, "gyro_", "_radps"), accel = columns3(table, "accel_", "_mps2");
   const std::array<std::size_t, kFootCount> contact{table.column("left_contact"), table.column("right_contact")};
@@ -110,7 +110,7 @@ EstimateLog read_estimate_log(const std::string& path) {
 }
 
 std::vector<LioRow> read_lio_log(const std::string& path, double start_s) {
-  const CsvTable table(path);
+  const CsvTable table(path, "stamp_s");
   const std::size_t stamp = table.column("stamp_s"), arrival = table.column("arrival_s");
   const Columns3 p = columns3(table, "p", "_m");
   const Columns4 q = quaternion_columns(table, "");

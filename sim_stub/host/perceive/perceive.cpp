@@ -125,6 +125,36 @@ std::optional<Vec3> find_up(const std::vector<Surface>& surfaces) {
   return up;
 }
 
+constexpr std::array<unsigned char, 8> kPngSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+constexpr std::array<unsigned char, 12> kPngEnd{0, 0, 0, 0, 'I', 'E', 'N', 'D', 0xAE, 0x42, 0x60, 0x82};
+
+// It has neither its last chunk nor a whole chunk at its end.
+bool is_cut_off(const std::vector<unsigned char>& png) {
+  if (std::search(png.begin(), png.end(), kPngEnd.begin(), kPngEnd.end()) != png.end()) return false;
+  constexpr std::size_t kAround_bytes = 12;  // length and kind before a chunk, checksum after it
+  std::size_t at = kPngSignature.size(), chunks = 0;
+  for (; at + kAround_bytes <= png.size(); ++chunks) {
+    const std::size_t length = std::size_t{png[at]} << 24U | std::size_t{png[at + 1]} << 16U |
+                               std::size_t{png[at + 2]} << 8U | std::size_t{png[at + 3]};
+    at += kAround_bytes + length;
+  }
+  return at != png.size() || chunks == 0;
+}
+
+// Of a file that the PNG reader refuses, which speaks of its own stages only.
+[[noreturn]] void fail_broken(const std::string& path, const std::vector<unsigned char>& file, unsigned error) {
+  const std::string words = std::string(" (the PNG reader: ") + lodepng_error_text(error) + ").";
+  const std::size_t first = std::min(file.size(), kPngSignature.size());
+  if (!std::equal(file.begin(), file.begin() + static_cast<std::ptrdiff_t>(first), kPngSignature.begin())) {
+    fail("\"" + path + "\" is no PNG" + words);
+  }
+  if (is_cut_off(file)) {
+    fail("The picture \"" + path + "\" is cut off: its " + std::to_string(file.size()) +
+         " bytes end before the PNG does" + words);
+  }
+  fail("The picture \"" + path + "\" is damaged: bytes in it are not as they were written" + words);
+}
+
 }  // namespace
 
 std::string size_text(std::int64_t width, std::int64_t height) {
@@ -143,7 +173,7 @@ DepthPng read_depth(const std::string& path) {
   lodepng::State state;
   unsigned width = 0, height = 0;
   if (const unsigned error = lodepng_inspect(&width, &height, &state, file.data(), file.size()); error != 0) {
-    fail("\"" + path + "\" is no PNG: " + lodepng_error_text(error) + ".");
+    fail_broken(path, file, error);
   }
   if (state.info_png.color.colortype != LCT_GREY || state.info_png.color.bitdepth != 16) {
     fail("\"" + path + "\" is no depth picture: it must be a PNG of one channel of 16 bits.");
@@ -159,7 +189,7 @@ DepthPng read_depth(const std::string& path) {
   state.info_raw.bitdepth = 16;
   std::vector<unsigned char> bytes;
   if (const unsigned error = lodepng::decode(bytes, width, height, state, file); error != 0) {
-    fail("\"" + path + "\" is broken: " + lodepng_error_text(error) + ".");
+    fail_broken(path, file, error);
   }
   DepthPng picture{static_cast<std::int32_t>(width), static_cast<std::int32_t>(height), {}};
   picture.depth.resize(std::size_t{width} * height);

@@ -160,7 +160,7 @@ TEST_F(ServiceTest, GaitThatStopsByItself_IsHeldAndEndsTheService) {
   EXPECT_EQ(outcome.code, ExitCode::kStoppedItself) << outcome.why;
   EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
   EXPECT_EQ(outcome.module.reason, StopReason::kNothingSeen);
-  EXPECT_TRUE(has(heard_, "nothing to step on is seen"));
+  EXPECT_TRUE(has(heard_, "stopped: it saw no surface to step on"));
   EXPECT_GE(stopped_after_, 90ms);
   EXPECT_EQ(let_go_, 0);
 }

@@ -300,8 +300,23 @@ TEST_F(ShortRecording, PixelChanged_PictureIsNotTheRecordedOne) {
   expect_unreadable(replay(directory_.text()), "the file ends within its header");
 }
 
-TEST_F(ShortRecording, NoneAForeignOneOrAnotherVersion_OneSentenceWithFileAndByte) {
-  expect_unreadable(replay("/there/is/none"), "cannot be read: ");
+TEST(Replay, DirectoryWithoutARecording_IsNamedWithTheFileThatIsMissing) {
+  const Directory directory("none");
+  const auto expect_none = [&](const std::string& path, const std::string& why) {
+    const ReplayResult result = replay(path);
+    EXPECT_EQ(result.verdict, ReplayVerdict::kUnreadable);
+    EXPECT_EQ(result.complaint, "\"" + path + "\" is no recording: " + why);
+  };
+  expect_none("/there/is/none", "there is no such directory.");
+  expect_none("/dev/null", "it is no directory, and climb --record writes one.");
+  expect_none(directory.text(), "there is no file recording.bin in it.");
+  write_file(directory.file(), {'x'});
+  expect_none(directory.text(), "there is no file pictures.bin in it.");
+  fs::create_directory(directory.pictures());
+  expect_none(directory.text(), "pictures.bin in it is a directory.");
+}
+
+TEST_F(ShortRecording, ForeignOneOrAnotherVersion_OneSentenceWithFileAndByte) {
   expect_unreadable(replay_of({}), "byte 0: the file ends within its first bytes");
   Bytes foreign(100'000);
   std::mt19937 random(1);

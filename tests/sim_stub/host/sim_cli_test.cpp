@@ -194,6 +194,69 @@ TEST(ClimbCommand, BodyOutsideItsRangeOrOnTheKinematicPlant_IsRefused) {
   }
 }
 
+// What is enforced stands in the help, and the sentence about another value says it once more.
+TEST(Ranges, EveryOne_StandsInTheHelpAndInTheSentence) {
+  const std::string climb = call({"climb", "--help"}).out;
+  const struct {
+    const char *option, *help, *value, *sentence;
+  } kRanges[] = {
+      {"--steps", "INT in [1, 200]=10", "201", "must be from 1 to 200, not 201"},
+      {"--rise", "FLOAT in [0.01, 2]=0.13", "3", "must be from 0.01 to 2 m, not 3"},
+      {"--tread", "FLOAT in [0.01, 2]=0.28", "nan", "must be from 0.01 to 2 m, not nan"},
+      {"--width", "FLOAT in [0.01, 2]=1.2", "0", "must be from 0.01 to 2 m, not 0"},
+      {"--nosing", "FLOAT in [0, 2]=0", "-1", "must be from 0 to 2 m, not -1"},
+      {"--landing", "FLOAT in [0.01, 2]=1", "inf", "must be from 0.01 to 2 m, not inf"},
+      {"--balusters", "FLOAT in [0.05, 2]", "nan", "must be from 0.05 to 2 m, not nan"},
+      {"--baluster-inset", "FLOAT in [-1, 1]=0.02", "-2", "must be from -1 to 1 m, not -2"},
+      {"--baluster-size", "FLOAT in [0.01, 0.3]=0.04", "1", "must be from 0.01 to 0.3 m, not 1"},
+      {"--baluster-side", "both|left|right", "top", "must be both, left or right, not \"top\""},
+      {"--plant", "mujoco|kinematic=mujoco", "rubber", "must be mujoco or kinematic, not \"rubber\""},
+      {"--gait", "ds|ss=ds", "trot", "must be ds or ss, not \"trot\""},
+      {"--noise", "white|correlated=white", "pink", "must be white or correlated, not \"pink\""},
+      {"--contacts", "sensed|inferred=sensed", "none", "must be sensed or inferred, not \"none\""},
+      {"--mass-scale", "FLOAT in [0.5, 2]=1", "0.4", "must be from 0.5 to 2, not 0.4"},
+      {"--torso-offset-x", "FLOAT in [-0.1, 0.1]=0", "0.2", "must be from -0.1 to 0.1 m, not 0.2"},
+      {"--friction", "FLOAT in [0.05, 2]=0.8", "0", "must be from 0.05 to 2, not 0"},
+      {"--scan-ms", "FLOAT in [0, 32]=16", "33", "must be from 0 to 32 ms, not 33"},
+      {"--mount-error", "FLOAT in [0, 5]=1", "6", "must be from 0 to 5 degrees, not 6"},
+      {"--scale-error", "FLOAT in [0, 0.05]=0.003", "1", "must be from 0 to 0.05, not 1"},
+      {"--seed", "UINT in [0, 2^64 - 1]=1", "-1", "must be a whole number from 0 to 2^64 - 1, not -1"},
+  };
+  for (const auto& range : kRanges) {
+    EXPECT_NE(climb.find(std::string("  ") + range.option + " " + range.help), std::string::npos) << range.option;
+    expect_refused({"climb", range.option, range.value},
+                   std::string("polygmap: ") + range.option + " " + range.sentence + "; see polygmap climb --help.");
+  }
+  for (const char* part : {"from 1.024 to 1000 s;", "from -100 to 100 N s", "m, each from -2 to 2", "--steps",
+                           "from 0 to half of rise and tread", "each from -100 to 100, sizes from 0.005"}) {
+    EXPECT_NE(climb.find(part), std::string::npos) << part;
+  }
+  expect_refused({"climb", "--obstacle", "0,0,0,1,1,0.001"}, "sizes from 0.005, not \"0,0,0,1,1,0.001\"");
+  const std::string estimate = call({"estimate", "--help"}).out, perceive = call({"perceive", "--help"}).out;
+  EXPECT_NE(estimate.find("--lio-tau FLOAT in [0, 1000]"), std::string::npos) << estimate;
+  EXPECT_NE(estimate.find("each from -10 to 10, and degrees"), std::string::npos) << estimate;
+  EXPECT_NE(perceive.find("--repeat INT in [1, 100000]=1"), std::string::npos) << perceive;
+}
+
+TEST(Ranges, BothEnds_AreTaken) {
+  for (const auto& [option, least, most] : {std::tuple{"--steps", "1", "200"},
+                                            {"--mass-scale", "0.5", "2"},
+                                            {"--torso-offset-x", "-0.1", "0.1"},
+                                            {"--friction", "0.05", "2"},
+                                            {"--scan-ms", "0", "32"},
+                                            {"--mount-error", "0", "5"},
+                                            {"--scale-error", "0", "0.05"},
+                                            {"--balusters", "0.05", "2"}}) {
+    EXPECT_TRUE(call({"climb", option, least}).options) << option;
+    EXPECT_TRUE(call({"climb", option, most}).options) << option;
+  }
+}
+
+TEST(ClimbCommand, WordsWithLineBreaks_StayOnOneLine) {
+  expect_refused({"climb", "--rise", "1\n2"}, "\"1?2\" is no number that --rise can take");
+  expect_refused({"climb", "--gait", "d\ns"}, "not \"d?s\"");
+}
+
 TEST(ClimbCommand, UnclimbableStairs_Run) {
   EXPECT_TRUE(call({"climb", "--rise", "0.5", "--tread", "0.1"}).options);
   EXPECT_TRUE(call({"climb", "--rise", "2", "--tread", "2", "--width", "2", "--landing", "2"}).options);
@@ -304,6 +367,28 @@ TEST(ClimbCommand, StandardOutputFull_SaysSoAndExits2) {
   EXPECT_EQ(err.str(), "polygmap: Cannot write the verdict to the standard output.\n");
 }
 
+TEST(Cli, StandardOutputFull_SaysSoAndExits2) {
+  for (const std::string words :
+       {"--help", "climb --help", "params list", "params docs", "can dbc --bus " POLYGMAP_BUSES "/damiao.toml"}) {
+    std::ofstream out("/dev/full");
+    std::ostringstream err;
+    std::istringstream in(words);
+    EXPECT_EQ(polygmap_main({std::istream_iterator<std::string>(in), {}}, {}, out, err, false), kExitUsage) << words;
+    EXPECT_EQ(err.str(), "polygmap: Cannot write to the standard output.\n") << words;
+  }
+}
+
+TEST(ClimbCommand, CanLogOverAnotherFileOfTheClimb_IsRefusedAndTheFileIsWhole) {
+  const std::string bus = temporary("bus.toml");
+  std::filesystem::copy_file(POLYGMAP_BUSES "/damiao.toml", bus, std::filesystem::copy_options::overwrite_existing);
+  const auto bytes = std::filesystem::file_size(bus);
+  expect_refused({"climb", "--bus", bus, "--can-log", bus}, "\"" + bus + "\" would be overwritten by --can-log.");
+  EXPECT_EQ(std::filesystem::file_size(bus), bytes);
+  expect_refused({"climb", "--bus", bus, "--out", temporary("log"), "--can-log", temporary("log/./summary.json")},
+                 "would be overwritten by --can-log.");
+  EXPECT_TRUE(call({"climb", "--bus", bus, "--can-log", temporary("can.log")}).options);
+}
+
 TEST(ClimbCommand, Help_ExplainsExitCodesAndOptions) {
   const Call app = call({"--help"});
   EXPECT_EQ(app.code, 0);
@@ -323,10 +408,11 @@ TEST(Cli, Record_IsMadeAndHandedOn) {
   expect_refused({"climb", "--record", "/dev/null/none"}, "given by --record");
 }
 
-TEST(Cli, ReplayOfNoRecording_IsOneSentenceWithFileAndByte) {
+TEST(Cli, ReplayOfNoRecording_IsOneSentence) {
   std::ostringstream out, err;
   EXPECT_EQ(polygmap_main({"replay", "/there/is/none"}, {}, out, err, false), kExitUsage);
-  EXPECT_EQ(err.str().find("polygmap: \"/there/is/none/recording.bin\", byte 0: cannot be read: "), 0U) << err.str();
+  EXPECT_EQ(err.str().find("polygmap: \"/there/is/none\" is no recording: there is no such directory.\n"), 0U)
+      << err.str();
   const std::string said = err.str();
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
   EXPECT_TRUE(out.str().empty());

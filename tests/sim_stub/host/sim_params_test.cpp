@@ -88,12 +88,22 @@ TEST(ParamsCommand, WordThatIsNoCommandOfIt_IsNamedWithThoseThereAre) {
   EXPECT_EQ(call_tool({"params", "lst"}).err,
             "polygmap: \"lst\" is no command of params; there are list, docs and diff; see polygmap params --help.\n");
   EXPECT_EQ(call_tool({"params", "list", "lst"}).err,
-            "polygmap: \"lst\" is a word too many; see polygmap params --help.\n");
+            "polygmap: \"lst\" is a word too many; see polygmap params list --help.\n");
 }
 
 TEST(ParamsCommand, CameraFileForOne_IsCalledThat) {
   const std::string file = write("width = 640\nheight = 480\nfx = 366.7\nfy = 366.7\n");
   EXPECT_NE(call_tool({"climb", "--params", file}).err.find("looks like a camera file"), std::string::npos);
+}
+
+TEST(ParamsCommand, BusFileOrPictureForOne_IsCalledThat) {
+  const std::string bus = std::string(POLYGMAP_BUSES) + "/damiao.toml", picture = write("\x89PNG\r\n\x1a\n");
+  EXPECT_EQ(
+      call_tool({"params", "diff", bus}).err,
+      "polygmap: Parameter file \"" + bus + "\" looks like a bus file (it has drives), which holds no parameters.\n");
+  EXPECT_EQ(
+      call_tool({"params", "diff", picture}).err,
+      "polygmap: Parameter file \"" + picture + "\", line 1: it is no text, or not in UTF-8, and TOML is expected.\n");
 }
 
 TEST(ParamsCommand, Docs_NameEveryParameterWithItsRange) {

@@ -258,6 +258,16 @@ TEST_F(PerceiveCommand, FilesThatAreNone_AreNamedInOneSentence) {
   std::ifstream good(at("good.png"), std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(good), {}};
   write("cut.png", bytes.substr(0, bytes.size() / 2));
+  write("cut_early.png", bytes.substr(0, 20));
+  std::string flipped = bytes;
+  flipped[bytes.size() / 2] = static_cast<char>(flipped[bytes.size() / 2] ^ 0x10);
+  write("flipped.png", flipped);
+  flipped = bytes;
+  flipped[18] = static_cast<char>(flipped[18] ^ 1);  // of the width
+  write("flipped_early.png", flipped);
+  flipped = bytes;
+  flipped[bytes.size() - 6] = static_cast<char>(flipped[bytes.size() - 6] ^ 4);  // of the last chunk's name
+  write("flipped_late.png", flipped);
   write("text.png", "no picture");
   write("empty.png", "");
   write_depth("large.png", std::vector<std::uint16_t>(1025 * 32, 1000), 1025, 32);
@@ -265,8 +275,12 @@ TEST_F(PerceiveCommand, FilesThatAreNone_AreNamedInOneSentence) {
   expect_refused({"perceive", at("missing.png"), "--camera", camera}, "missing.png");
   expect_refused({"perceive", at("small.png"), "--camera", camera}, "64x48");
   expect_refused({"perceive", at("eight.png"), "--camera", camera}, "16 bits");
-  expect_refused({"perceive", at("cut.png"), "--camera", camera}, "cut.png");
-  expect_refused({"perceive", at("text.png"), "--camera", camera}, "text.png");
+  expect_refused({"perceive", at("cut.png"), "--camera", camera}, "cut.png\" is cut off: its ");
+  expect_refused({"perceive", at("cut_early.png"), "--camera", camera}, "cut_early.png\" is cut off: its 20 bytes end");
+  expect_refused({"perceive", at("flipped.png"), "--camera", camera}, "flipped.png\" is damaged: bytes in it");
+  expect_refused({"perceive", at("flipped_early.png"), "--camera", camera}, "flipped_early.png\" is damaged");
+  expect_refused({"perceive", at("flipped_late.png"), "--camera", camera}, "flipped_late.png\" is damaged");
+  expect_refused({"perceive", at("text.png"), "--camera", camera}, "text.png\" is no PNG");
   expect_refused({"perceive", at("empty.png"), "--camera", camera}, "is empty");
   expect_refused({"perceive", folder_, "--camera", camera}, "is a folder, not a picture");
   expect_refused({"perceive", at("large.png"), "--camera", camera}, "is 1025x32, more than the 1024x768 that are read");
