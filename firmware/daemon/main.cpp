@@ -84,16 +84,19 @@ int run_service(const DaemonConfig& config) {
   if (!notifier.open()) return complain("NOTIFY_SOCKET names no socket that can be used.", ExitCode::kConfiguration);
   Devices devices;
   if (const std::string wrong = devices.open(config); !wrong.empty()) return complain(wrong, ExitCode::kDevice);
+  DeviceCounts counts;
+  devices.count_in(counts);
   ServiceParts parts{.ports = devices.ports(),
                      .joints = &devices.joints(),
                      .maintain = [&devices] { devices.maintain(); },
                      .let_go = [&devices] { devices.let_go(); },
-                     .heap = counted_heap()};
+                     .heap = counted_heap(),
+                     .devices = &counts};
   Service service(config, std::move(parts), signals, notifier);
   const Outcome outcome = service.run();
   std::fprintf(stderr, "polygmapd: %s\n", outcome.why.c_str());
   const bool ran = outcome.code == ExitCode::kAsked || outcome.code == ExitCode::kStoppedItself;
-  if (ran) std::printf("%s\n", text_of(outcome).c_str());
+  if (ran) std::printf("%s%s", counts.text().c_str(), text_of(outcome).c_str());
   std::fflush(stdout);
   if (outcome.threads_hang) std::_Exit(number_of(outcome.code));
   return number_of(outcome.code);
