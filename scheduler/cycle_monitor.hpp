@@ -56,14 +56,15 @@ class DurationStatistics {
 
 // One table row. Every slot of the row ends in exactly one of: runs, idle, shed, deferred (or in a slipped cycle).
 struct RowStatistics {
-  DurationStatistics time;      // of runs that had work
-  std::uint64_t runs = 0;       // calls that returned kBusy or kDone
-  std::uint64_t idle = 0;       // calls that returned kIdle
-  std::uint64_t overruns = 0;   // calls longer than the row's budget
-  std::uint64_t shed = 0;       // slots given up for lack of time
-  std::uint64_t deferred = 0;   // slots that paid back an overdraft instead of working
-  std::uint64_t overdrawn = 0;  // calls that spent more units than they were given
-  std::uint64_t units = 0;      // work units spent
+  DurationStatistics time;           // of runs that had work
+  std::uint64_t runs = 0;            // calls that returned kBusy or kDone
+  std::uint64_t idle = 0;            // calls that returned kIdle
+  std::uint64_t overruns = 0;        // calls longer than the row's budget
+  std::uint64_t overrun_max_ns = 0;  // the longest of those calls
+  std::uint64_t shed = 0;            // slots given up for lack of time
+  std::uint64_t deferred = 0;        // slots that paid back an overdraft instead of working
+  std::uint64_t overdrawn = 0;       // calls that spent more units than they were given
+  std::uint64_t units = 0;           // work units spent
 };
 
 // One lane.

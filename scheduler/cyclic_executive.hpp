@@ -210,6 +210,7 @@ class CyclicExecutive {
         std::int64_t{Table[row].budget_us} * 1000 + std::int64_t{more} * Table[row].unit_cost_ns;
     if (time_ns > static_cast<std::uint64_t>(budget_ns)) {
       count_up(statistics.overruns);
+      statistics.overrun_max_ns = std::max(statistics.overrun_max_ns, time_ns);
       report_.overran |= 1U << row;
       counters_.raise(ExecutiveEvent::kRowOverrun, report_.due_ns, 1);
     }

@@ -35,6 +35,7 @@ std::string Devices::open(const DaemonConfig& config) {
 
 std::string Devices::open_buses(const DaemonConfig& config) {
   table_ = config.bus.table;
+  buses_ = config.bus.buses;
   std::vector<hal::CanChannel*> channels;
   for (std::size_t bus = 0; bus < config.bus.buses.size(); ++bus) {
     hal::SocketCan::Config can;

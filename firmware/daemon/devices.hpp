@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "firmware/daemon/config/daemon_config.hpp"
+#include "firmware/daemon/service/device_counts.hpp"
 #include "firmware/pipeline.hpp"
 #include "hal/can/can_joint_bus.hpp"
 #include "hal/linux/socket_can.hpp"
@@ -27,6 +28,8 @@ class Devices {
   // After open().
   [[nodiscard]] Ports ports() noexcept;
   [[nodiscard]] const hal::CanJointBus& joints() const noexcept { return *joints_; }
+  // After open(): all counters of all devices. They refer to this.
+  void count_in(DeviceCounts& counts) const;
   // Opens anew what was lost; each call tries once. Some ten times a second, outside the lanes.
   void maintain() noexcept;
   // The drives leave motor mode: a joint that carries gives way. No lane may run.
@@ -42,6 +45,7 @@ class Devices {
 
   const hal::SystemCalls& calls_;
   hal::DriveTable table_;
+  std::vector<std::string> buses_;                        // their interfaces
   std::vector<std::unique_ptr<hal::SocketCan>> sockets_;  // one a bus of the table
   std::optional<hal::CanJointBus> joints_;
   hal::V4l2Camera camera_;

@@ -19,17 +19,17 @@ namespace {
 constexpr const char* kUsage =
     "polygmapd --config FILE [--check]   runs the module with the devices of this file; --check only reads it\n"
     "polygmapd --replay DIR              feeds a recording to the module and compares what comes out\n"
-    "polygmapd --doctor [--json] [--config FILE]   says what on this machine hinders it, and what to do\n"
+    "polygmapd --doctor [--json] [--strict] [--config FILE]   says what on this machine hinders it, and what to do\n"
     "polygmapd --version\n"
     "\n"
     "Exit codes of --config: 0 asked to stop, 1 stopped by itself, 2 configuration, 3 device, 4 no real time.\n"
     "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording. Of --doctor: 0 nothing hinders, 1 "
-    "else.\n";
+    "else; with --strict a warning hinders, too.\n";
 
 struct Options {
   enum class Mode { kRun, kCheck, kReplay, kDoctor, kHelp, kVersion } mode = Mode::kRun;
   std::string config, recording;
-  bool json = false;
+  bool json = false, strict = false;
 };
 
 // Empty, or what is wrong.
@@ -52,6 +52,8 @@ std::string parse(int argc, char** argv, Options& options) {
       modes.push_back(word);
     } else if (word == "--json") {
       options.json = true;
+    } else if (word == "--strict") {
+      options.strict = true;
     } else if (word == "--check") {
       checks = true;
     } else {
@@ -60,6 +62,7 @@ std::string parse(int argc, char** argv, Options& options) {
   }
   if (modes.size() > 1) return std::string(modes[0]) + " and " + std::string(modes[1]) + " do not go together";
   if (options.json && options.mode != Options::Mode::kDoctor) return "--json is of --doctor";
+  if (options.strict && options.mode != Options::Mode::kDoctor) return "--strict is of --doctor";
   if (modes.empty() && options.config.empty()) return "--config FILE is missing";
   if (checks && !modes.empty()) return "--check is of --config";
   if (checks) options.mode = Options::Mode::kCheck;
@@ -84,16 +87,19 @@ int run_service(const DaemonConfig& config) {
   if (!notifier.open()) return complain("NOTIFY_SOCKET names no socket that can be used.", ExitCode::kConfiguration);
   Devices devices;
   if (const std::string wrong = devices.open(config); !wrong.empty()) return complain(wrong, ExitCode::kDevice);
+  DeviceCounts counts;
+  devices.count_in(counts);
   ServiceParts parts{.ports = devices.ports(),
                      .joints = &devices.joints(),
                      .maintain = [&devices] { devices.maintain(); },
                      .let_go = [&devices] { devices.let_go(); },
-                     .heap = counted_heap()};
+                     .heap = counted_heap(),
+                     .devices = &counts};
   Service service(config, std::move(parts), signals, notifier);
   const Outcome outcome = service.run();
   std::fprintf(stderr, "polygmapd: %s\n", outcome.why.c_str());
   const bool ran = outcome.code == ExitCode::kAsked || outcome.code == ExitCode::kStoppedItself;
-  if (ran) std::printf("%s\n", text_of(outcome).c_str());
+  if (ran) std::printf("%s%s", counts.text().c_str(), text_of(outcome).c_str());
   std::fflush(stdout);
   if (outcome.threads_hang) std::_Exit(number_of(outcome.code));
   return number_of(outcome.code);
@@ -106,6 +112,7 @@ int run_with_config(const Options& options) {
   } catch (const config::FileError& error) {
     return complain(error.what(), ExitCode::kConfiguration);
   }
+  for (const std::string& warning : config.warnings) std::fprintf(stderr, "polygmapd: warning: %s\n", warning.c_str());
   if (options.mode == Options::Mode::kCheck) {
     std::printf("%s can be used.\n", options.config.c_str());
     return 0;
@@ -128,7 +135,7 @@ int run(int argc, char** argv) {
     case Options::Mode::kReplay:
       return run_replay(options.recording);
     case Options::Mode::kDoctor:
-      return run_doctor(options.config, options.json);
+      return run_doctor(options.config, options.json, options.strict);
     case Options::Mode::kRun:
     case Options::Mode::kCheck:
       break;

@@ -65,7 +65,7 @@ class DaemonFile {
     if (!section) return;
     section->only({"cpu", "priority"});
     placement.processor = static_cast<int>(section->whole("cpu", {0, kMostProcessor, ""}, -1));
-    placement.priority = static_cast<int>(section->whole("priority", {1, 98, ""}, placement.priority));
+    placement.priority = static_cast<int>(section->whole("priority", {1, kMostPriority, ""}, placement.priority));
   }
 
   void take_bus() {
@@ -112,6 +112,7 @@ class DaemonFile {
       section.only({"driver", "base_rpy_rad", "port", "address", "sender", "check_crc", "clock", "least_delay_ms"});
       hal::LivoxImu::Config imu;
       imu.udp = udp_of(section, imu.udp.port);
+      warn_of_sender(section, imu.udp);
       imu.check_crc = section.flag("check_crc", imu.check_crc);
       take_clock(section, imu.time);
       imu.base_R_imu = base_R_imu;
@@ -134,6 +135,7 @@ class DaemonFile {
     section.only({"port", "address", "sender", "clock", "least_delay_ms"});
     hal::LioUdp::Config lio;
     lio.udp = udp_of(section, std::nullopt);
+    warn_of_sender(section, lio.udp);
     take_clock(section, lio.time);
     config_.lio = lio;
     config_.places.lio = section.place_of("port");
@@ -151,6 +153,12 @@ class DaemonFile {
     udp.address = address_of(section, "address");
     udp.sender = address_of(section, "sender");
     return udp;
+  }
+  // Who may say where the robot is. Of this machine it is any process, whatever is configured.
+  void warn_of_sender(const TomlSection& section, const hal::UdpConfig& udp) {
+    if (!udp.sender.empty()) return;
+    config_.warnings.push_back(section.place_of("port") + ": without a sender in that table whoever reaches UDP port " +
+                               std::to_string(udp.port) + " is believed; name the one that sends.");
   }
   [[nodiscard]] static std::string address_of(const TomlSection& section, const char* key) {
     const std::string said = section.text(key, "");

@@ -27,6 +27,9 @@ struct DevicePlaces {
   std::vector<std::string> buses;  // of the bus file, in its order
 };
 
+// Of a lane; 99 is the kernel's own threads'. The unit's LimitRTPRIO= is the same (daemon_config_test).
+inline constexpr int kMostPriority = 98;
+
 struct DaemonConfig {
   std::string path;
   config::BusFile bus;
@@ -39,6 +42,7 @@ struct DaemonConfig {
   bool needs_real_time = true;
   std::int64_t hold_ns = 10 * kNsPerS;  // after it stopped by itself the module holds the robot for so long
   DevicePlaces places;
+  std::vector<std::string> warnings;  // what is allowed and seldom meant, a sentence each
 };
 
 // Throws config::FileError, one sentence that names file, line and key, for whatever is wrong with the file or with one

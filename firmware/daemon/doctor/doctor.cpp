@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/daemon/doctor/doctor.hpp"
 
+#include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -10,13 +11,19 @@
 #include <fstream>
 #include <set>
 
+#include "algorithms/core/capacities.hpp"
+#include "firmware/daemon/system/lane_thread.hpp"
+#include "firmware/pipeline.hpp"
+#include "hal/linux/buffer_book.hpp"
+
+extern "C" const char __executable_start, _end;  // the linker's: the program's image in memory
+
 namespace polygmap::daemon {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kLeastLocked_bytes = 64U * 1024U * 1024U;  // program, module, pictures, stacks
-constexpr int kArphrdCan = 280;                                    // type of an interface
+constexpr int kArphrdCan = 280;  // type of an interface
 // A cycle's commands of all drives a bus can have, and the frames that enter motor mode.
 constexpr long kLeastQueue_frames = 10;
 
@@ -130,13 +137,14 @@ Finding priority_limit(const DoctorInput& in) {
 }
 Finding memory_limit(const DoctorInput& in) {
   const ProcessLimits& l = in.limits;
-  if (l.may_lock_any_memory || l.locked_bytes >= kLeastLocked_bytes) {
-    return good("memlock", "This user may lock the memory that the daemon takes.");
+  const std::string needed = std::to_string((in.needed_bytes + 1023) / 1024) + " KiB";
+  if (l.may_lock_any_memory || l.locked_bytes >= in.needed_bytes) {
+    return good("memlock", "This user may lock the memory that the daemon takes, " + needed + ".");
   }
   return {
       "memlock", Verdict::kBad,
-      "This user may lock " + std::to_string(l.locked_bytes / 1024) + " KiB of memory, and the daemon needs " +
-          std::to_string(kLeastLocked_bytes / 1024) + ".",
+      "This user may lock " + std::to_string(l.locked_bytes / 1024) + " KiB of memory, and the daemon needs " + needed +
+          ".",
       "Run it as the shipped service, or set LimitMEMLOCK=infinity there, or memlock in /etc/security/limits.conf."};
 }
 
@@ -230,6 +238,21 @@ std::vector<std::string> buses_of(const DoctorInput& in) {
 
 }  // namespace
 
+std::uint64_t needed_memory_bytes() {
+  pthread_attr_t attributes;
+  std::size_t thread_bytes = 0;
+  ::pthread_attr_init(&attributes);
+  ::pthread_attr_getstacksize(&attributes, &thread_bytes);
+  ::pthread_attr_destroy(&attributes);
+  constexpr std::uint64_t kLanes_bytes = kLaneCount * (LaneThread::kStack_bytes + LaneThread::kGuard_bytes);
+  constexpr std::uint64_t kPictures_bytes =
+      std::uint64_t{hal::BufferBook::kMostBuffers} * kDepthWidth_px * kDepthHeight_px * sizeof(std::uint16_t);
+  // The first thread's stack, the configuration, the drivers.
+  constexpr std::uint64_t kRest_bytes = 4U * 1024U * 1024U;
+  const auto image_bytes = static_cast<std::uint64_t>(&_end - &__executable_start);
+  return image_bytes + sizeof(Pipeline) + kLanes_bytes + kPictures_bytes + thread_bytes + kRest_bytes;
+}
+
 ProcessLimits limits_of_this_process(const std::string& proc) {
   ProcessLimits limits;
   const auto soft = [](auto resource) {
@@ -260,6 +283,9 @@ std::vector<Finding> examine(const DoctorInput& in) {
   if (buses.empty()) {
     findings.push_back({"can", Verdict::kWarning, "The machine has no CAN interface.",
                         "On a Jetson: modprobe can can_raw mttcan (docs/deploy.md)."});
+  }
+  for (const std::string& warning : in.warnings) {
+    findings.push_back({"sender", Verdict::kWarning, warning, "Write sender = \"ADDRESS\" into that table."});
   }
   return findings;
 }

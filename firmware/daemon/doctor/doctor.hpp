@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "firmware/daemon/doctor/can_link.hpp"
+#include "firmware/lane_link.hpp"
 
 namespace polygmap::daemon {
 
@@ -36,16 +37,22 @@ struct ProcessLimits {
 // Of this process; its capabilities from proc's status.
 [[nodiscard]] ProcessLimits limits_of_this_process(const std::string& proc);
 
+// All that mlockall() holds: the program, the module, stacks, pictures. One thread's stack is as ulimit -s has it.
+[[nodiscard]] std::uint64_t needed_memory_bytes();
+
 // What is looked at; a test gives folders of its own.
 struct DoctorInput {
   std::string proc = "/proc", sys = "/sys";
   ProcessLimits limits;
+  std::uint64_t needed_bytes = needed_memory_bytes();
   std::function<std::optional<CanLink>(const std::string&)> can_link = ask_can_link;
   std::vector<std::string> buses;  // interfaces; empty: those that the machine has
   std::uint32_t bitrate_bps = 0;   // that the buses are to have; 0: any
   std::string camera;              // its path; empty: any
   std::vector<int> processors;     // of the lanes
   std::uint64_t priority = 80;     // the lanes' highest
+  std::size_t lanes = kLaneCount;
+  std::vector<std::string> warnings;  // of the daemon's file
 };
 
 [[nodiscard]] std::vector<Finding> examine(const DoctorInput& input);
@@ -65,13 +72,16 @@ struct WakeUps {
 // On a thread of its own; without the right to a priority, or with a processor that the machine lacks, on an ordinary
 // one.
 [[nodiscard]] WakeUps measure_wake_ups(int processor, int priority, std::uint32_t cycles);
-[[nodiscard]] Finding finding_of(const WakeUps& wake_ups);
+// What a lane's rows leave of a cycle at their budgets: who wakes later than that gives work up, or overruns.
+[[nodiscard]] std::uint64_t slack_ns(std::size_t lanes) noexcept;
+// Good up to half of the slack, since two seconds show less than an hour; bad beyond all of it.
+[[nodiscard]] Finding finding_of(const WakeUps& wake_ups, std::uint64_t slack_ns);
 
 [[nodiscard]] std::string text_of(const std::vector<Finding>& findings, const WakeUps& wake_ups);
 [[nodiscard]] std::string json_of(const std::vector<Finding>& findings, const WakeUps& wake_ups);
 
 // Of polygmapd --doctor: prints it all. With a daemon's file, it looks at the devices and processors that it names.
-// Returns 0: nothing is bad; 1: something is; 2: the file cannot be used.
-[[nodiscard]] int run_doctor(const std::string& config_path, bool json);
+// Returns 0: nothing is bad; 1: something is, or with strict a warning; 2: the file cannot be used.
+[[nodiscard]] int run_doctor(const std::string& config_path, bool json, bool strict);
 
 }  // namespace polygmap::daemon

@@ -29,6 +29,8 @@ DoctorInput input_of(const DaemonConfig& config) {
   input.bitrate_bps = config.bus.table.bitrate_bps;
   input.camera = config.camera.device.view();
   input.priority = 1;
+  input.lanes = config.lanes;
+  input.warnings = config.warnings;
   for (std::size_t lane = 0; lane < config.lanes; ++lane) {
     const LaneThread::Placement& placement = config.placement[lane];
     const bool is_known = std::ranges::find(input.processors, placement.processor) != input.processors.end();
@@ -80,7 +82,7 @@ std::string json_of(const std::vector<Finding>& findings, const WakeUps& wake_up
   return json + "]}}\n";
 }
 
-int run_doctor(const std::string& config_path, bool json) {
+int run_doctor(const std::string& config_path, bool json, bool strict) {
   DoctorInput input;
   if (!config_path.empty()) {
     try {
@@ -94,9 +96,10 @@ int run_doctor(const std::string& config_path, bool json) {
   std::vector<Finding> findings = examine(input);
   const int processor = input.processors.empty() ? -1 : input.processors.front();
   const WakeUps wake_ups = measure_wake_ups(processor, static_cast<int>(input.priority), kCycles);
-  findings.push_back(finding_of(wake_ups));
+  findings.push_back(finding_of(wake_ups, slack_ns(input.lanes)));
   std::fputs((json ? json_of(findings, wake_ups) : text_of(findings, wake_ups)).c_str(), stdout);
-  return std::ranges::any_of(findings, [](const Finding& f) { return f.verdict == Verdict::kBad; }) ? 1 : 0;
+  const Verdict least = strict ? Verdict::kWarning : Verdict::kBad;
+  return std::ranges::any_of(findings, [least](const Finding& f) { return f.verdict >= least; }) ? 1 : 0;
 }
 
 }  // namespace polygmap::daemon

@@ -6,13 +6,10 @@
 #include "algorithms/core/time.hpp"
 #include "firmware/daemon/doctor/doctor.hpp"
 #include "firmware/daemon/system/lane_thread.hpp"
-#include "scheduler/schedule_table.hpp"
+#include "firmware/schedule.hpp"
 
 namespace polygmap::daemon {
 namespace {
-
-constexpr std::uint64_t kGood_ns = 100'000;    // a twentieth of a cycle
-constexpr std::uint64_t kUsable_ns = 500'000;  // what a cycle's rows leave
 
 std::int64_t monotonic_ns() noexcept {
   timespec now{};
@@ -59,15 +56,21 @@ WakeUps measure_wake_ups(int processor, int priority, std::uint32_t cycles) {
   return measurement.wake_ups;
 }
 
-Finding finding_of(const WakeUps& wake_ups) {
+std::uint64_t slack_ns(std::size_t lanes) noexcept {
+  const std::int64_t worst_us = lanes == 1 ? worst_cycle_us(kOneLaneSchedule) : worst_cycle_us(kSchedule);
+  return static_cast<std::uint64_t>(kCycle_ns - 1000 * worst_us);
+}
+
+Finding finding_of(const WakeUps& wake_ups, std::uint64_t slack_ns) {
   const std::string latest = std::to_string((wake_ups.max_ns + 999) / 1000) + " us";
   Finding finding{"wake-up",
                   Verdict::kGood,
-                  "Of " + std::to_string(wake_ups.woken) + " wake-ups the latest came " + latest + " late" +
+                  "Of " + std::to_string(wake_ups.woken) + " wake-ups the latest came " + latest +
+                      " late, and a lane's rows leave " + std::to_string(slack_ns / 1000) + " us of a cycle" +
                       (wake_ups.was_real_time ? "." : ", on a thread without real-time priority."),
                   {}};
-  if (wake_ups.max_ns <= kGood_ns && wake_ups.was_real_time) return finding;
-  finding.verdict = wake_ups.max_ns <= kUsable_ns ? Verdict::kWarning : Verdict::kBad;
+  if (wake_ups.max_ns <= slack_ns / 2 && wake_ups.was_real_time) return finding;
+  finding.verdict = wake_ups.max_ns <= slack_ns ? Verdict::kWarning : Verdict::kBad;
   finding.to_do = wake_ups.was_real_time
                       ? "Mend what is found above (kernel, governor, isolation) and look again; cyclictest of rt-tests "
                         "measures for longer."

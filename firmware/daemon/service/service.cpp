@@ -21,6 +21,8 @@ constexpr std::int64_t kLook_ns = 10 * kNsPerMs;       // of the daemon's own th
 constexpr std::int64_t kMaintain_ns = 100 * kNsPerMs;  // lost devices are opened anew
 constexpr std::int64_t kMaintainerEnds_ns = 300 * kNsPerMs;
 constexpr std::int64_t kStatus_ns = kNsPerS;
+constexpr std::int64_t kComplain_ns = kNsPerS;
+constexpr std::uint64_t kTicksPerCount = 50;          // of a lane: then it publishes what its drivers counted
 constexpr std::int64_t kLaneHangs_ns = kNsPerS;       // without a cycle
 constexpr std::int64_t kFirstDue_ns = 20 * kNsPerMs;  // from the lanes' waiting to their first cycle
 // A swing takes 0.92 s, and a foot that finds no ground goes back: later than that something is wrong.
@@ -90,14 +92,22 @@ class Service::Tasks {
 
 std::string text_of(const Outcome& o) {
   std::array<char, 384> text{};
+  std::string all;
+  for (std::size_t row = 0; row < kSchedule.size(); ++row) {
+    const Outcome::LateRow& late = o.rows[row];
+    if (late.overruns == 0) continue;
+    std::snprintf(text.data(), text.size(), " budget_us=%d overruns=%" PRIu64 " longest_us=%" PRIu64 "\n",
+                  kSchedule[row].budget_us, late.overruns, late.longest_ns / 1000);
+    all.append("row ").append(kSchedule[row].task).append(text.data());
+  }
   std::snprintf(text.data(), text.size(),
                 "stopped state=%s phase=%s reason=%s cycles=%" PRIu64 " overruns=%" PRIu64 " skipped=%" PRIu64
                 " caught_up=%" PRIu64 " heap_calls=%" PRIu64 " page_faults=%" PRIu64 " wake_max_us=%" PRIu64
-                " stack_bytes=%zu exit=%d",
+                " stack_bytes=%zu exit=%d\n",
                 std::string(name_of(o.module.state)).c_str(), std::string(name_of(o.module.phase)).c_str(),
                 std::string(name_of(o.module.reason)).c_str(), o.cycles, o.overruns, o.skipped, o.caught_up,
                 o.heap_calls, o.page_faults, o.wake_max_ns / 1000, o.stack_bytes, number_of(o.code));
-  return text.data();
+  return all + text.data();
 }
 
 Service::Service(const DaemonConfig& config, ServiceParts parts, const StopSignals& signals, Notifier& notifier)
@@ -197,8 +207,13 @@ void Service::run_lane(LaneRun& lane) noexcept {
   lane.waits.store(true, std::memory_order_release);
   while (first_due_ns_.load(std::memory_order_acquire) == 0) sleep_until(monotonic_ns() + kNsPerMs);
   executive.start(first_due_ns_.load(std::memory_order_acquire));
+  const auto publish_devices = [this]() noexcept {
+    for (std::size_t n = 0; parts_.devices != nullptr && n < kLaneCount; ++n) {
+      if (n == Lane || lane_count(Table) == 1) parts_.devices->publish(n);
+    }
+  };
   const std::uint64_t faults = thread_page_faults();
-  while (!ends_.load(std::memory_order_acquire)) {
+  for (std::uint64_t ticks = 1; !ends_.load(std::memory_order_acquire); ++ticks) {
     sleep_until(executive.next_due_ns());
     executive.tick(clock_.now_ns());
     const LaneStatistics& statistics = executive.lane_statistics();
@@ -207,7 +222,12 @@ void Service::run_lane(LaneRun& lane) noexcept {
     counts.skipped.store(statistics.slips, std::memory_order_relaxed);
     counts.caught_up.store(statistics.caught_up, std::memory_order_relaxed);
     counts.wake_max_ns.store(statistics.lateness.max_ns(), std::memory_order_relaxed);
+    for (std::size_t row = 0; row < Table.size(); ++row) {
+      if (Table[row].lane == Lane) board_.rows[row].store(executive.row_statistics(row));
+    }
+    if (ticks % kTicksPerCount == 0) publish_devices();
   }
+  publish_devices();
   lane.page_faults = thread_page_faults() - faults;
 }
 
@@ -223,6 +243,7 @@ Service::Decision Service::watch() {
       std::fprintf(stderr, "polygmapd: asked to stop by signal %d.\n", signal);
     }
     log_changes();
+    log_trouble(now_ns);
     if (const std::optional<Decision> decision = decide(now_ns)) return *decision;
     tell(now_ns);
   }
@@ -298,6 +319,18 @@ void Service::log_changes() noexcept {
   std::fprintf(stderr, "polygmapd: %s\n", status.text.data());
 }
 
+void Service::log_trouble(std::int64_t now_ns) noexcept {
+  if (now_ns - seen_.complained_ns < kComplain_ns) return;
+  StatusText rows, devices;
+  write_more_late_rows(rows, board_, logged_overruns_);
+  if (parts_.devices != nullptr) parts_.devices->write_trouble(devices);
+  for (const StatusText* trouble : {&rows, &devices}) {
+    if (trouble->length == 0) continue;
+    seen_.complained_ns = now_ns;
+    std::fprintf(stderr, "polygmapd: %s\n", trouble->text.data());
+  }
+}
+
 void Service::finish(Outcome& outcome) {
   const bool lanes_hang = !lanes_move(monotonic_ns());
   ends_.store(true, std::memory_order_release);
@@ -313,6 +346,9 @@ void Service::finish(Outcome& outcome) {
     outcome.skipped += counts.skipped.load();
     outcome.caught_up += counts.caught_up.load();
     outcome.wake_max_ns = std::max(outcome.wake_max_ns, counts.wake_max_ns.load());
+  }
+  for (std::size_t row = 0; row < kSchedule.size(); ++row) {
+    outcome.rows[row] = {board_.rows[row].overruns.load(), board_.rows[row].longest_ns.load()};
   }
   outcome.cycles = board_.lanes[kControlLane].cycles.load();
   outcome.module = board_.module();

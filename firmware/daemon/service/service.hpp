@@ -16,6 +16,7 @@
 
 #include "firmware/daemon/config/daemon_config.hpp"
 #include "firmware/daemon/exit_code.hpp"
+#include "firmware/daemon/service/device_counts.hpp"
 #include "firmware/daemon/service/status_board.hpp"
 #include "firmware/daemon/service/stop_signals.hpp"
 #include "firmware/daemon/system/heap_count.hpp"
@@ -32,6 +33,7 @@ struct ServiceParts {
   std::function<void()> maintain = [] {};    // some ten times a second, on a thread of its own that may block
   std::function<void()> let_go = [] {};      // once, after the lanes, when the drives never had gains
   HeapCount heap{};
+  DeviceCounts* devices = nullptr;  // null: there are no drivers whose counters could be told
 };
 
 struct Outcome {
@@ -45,8 +47,13 @@ struct Outcome {
   std::uint64_t page_faults = 0;  // of the lanes' threads, from their first cycle on
   std::uint64_t wake_max_ns = 0;  // from a cycle's due time to its tick
   std::size_t stack_bytes = 0;    // the most that a lane used
+  struct LateRow {
+    std::uint64_t overruns = 0, longest_ns = 0;
+  };
+  std::array<LateRow, kSchedule.size()> rows{};
 };
-// "stopped state=... cycles=...": one line.
+// A line for each row that overran, "row surfaces budget_us=840 overruns=3 longest_us=1203"; last one of all,
+// "stopped state=... cycles=...". Each with its end.
 [[nodiscard]] std::string text_of(const Outcome& outcome);
 
 class Service {
@@ -79,6 +86,8 @@ class Service {
   [[nodiscard]] bool lanes_move(std::int64_t now_ns) noexcept;
   void tell(std::int64_t now_ns) noexcept;
   void log_changes() noexcept;
+  // What went wrong since it was said last, at most once a second: rows over their budget, and the drivers' counters.
+  void log_trouble(std::int64_t now_ns) noexcept;
   void finish(Outcome& outcome);
 
   const DaemonConfig& config_;
@@ -98,12 +107,13 @@ class Service {
   } maintainer_;
   struct {
     std::int64_t asked_ns = -1, stopped_ns = -1;  // negative: not yet
-    std::int64_t told_ns = 0, fed_ns = 0, moved_ns = 0;
+    std::int64_t told_ns = 0, fed_ns = 0, moved_ns = 0, complained_ns = 0;
     std::array<std::uint64_t, kLaneCount> cycles{};
     std::array<std::uint64_t, kLaneCount> fed_cycles{};
     bool is_ready = false;
   } seen_;
   ModuleView logged_;
+  RowOverruns logged_overruns_{};
 };
 
 }  // namespace polygmap::daemon

@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/daemon/service/status_board.hpp"
 
-#include <algorithm>
 #include <cinttypes>
-#include <cstdarg>
-#include <cstdio>
-#include <string_view>
 
 namespace polygmap::daemon {
 namespace {
@@ -27,12 +23,28 @@ void add_joints(StatusText& out, const char* what, JointSet joints) noexcept {
 
 }  // namespace
 
-void StatusText::add(const char* format, ...) noexcept {
-  va_list arguments;
-  va_start(arguments, format);
-  const int wanted = std::vsnprintf(text.data() + length, text.size() - length, format, arguments);
-  va_end(arguments);
-  if (wanted > 0) length = std::min(length + static_cast<std::size_t>(wanted), text.size() - 1);
+void write_late_rows(StatusText& out, const StatusBoard& board) noexcept {
+  const char* before = "; rows over their budget: ";
+  for (std::size_t row = 0; row < kSchedule.size(); ++row) {
+    const std::uint64_t overruns = board.rows[row].overruns.load(std::memory_order_relaxed);
+    if (overruns == 0) continue;
+    out.add("%s%s %" PRIu64 " (up to %" PRIu64 " us)", before, kSchedule[row].task.data(), overruns,
+            board.rows[row].longest_ns.load(std::memory_order_relaxed) / 1000);
+    before = ", ";
+  }
+}
+
+void write_more_late_rows(StatusText& out, const StatusBoard& board, RowOverruns& told) noexcept {
+  const char* before = "rows over their budget: ";
+  for (std::size_t row = 0; row < kSchedule.size(); ++row) {
+    const std::uint64_t overruns = board.rows[row].overruns.load(std::memory_order_relaxed);
+    if (overruns == told[row]) continue;
+    out.add("%s%s %" PRIu64 " (+%" PRIu64 ", up to %" PRIu64 " us of %d)", before, kSchedule[row].task.data(), overruns,
+            overruns - told[row], board.rows[row].longest_ns.load(std::memory_order_relaxed) / 1000,
+            kSchedule[row].budget_us);
+    told[row] = overruns;
+    before = ", ";
+  }
 }
 
 void write_status(StatusText& out, const StatusBoard& board, std::size_t lanes, std::uint64_t heap_calls) noexcept {
@@ -53,6 +65,7 @@ void write_status(StatusText& out, const StatusBoard& board, std::size_t lanes, 
   }
   out.add("; cycles %" PRIu64 ", overruns %" PRIu64 ", skipped %" PRIu64 ", heap calls %" PRIu64,
           board.lanes[0].cycles.load(std::memory_order_relaxed), overruns, skipped, heap_calls);
+  write_late_rows(out, board);
   const char* before = "; faults ";
   for (std::size_t i = 0; i < kFaultTable.size(); ++i) {
     if (board.fault(i) == 0) continue;

@@ -7,6 +7,8 @@
 #include <cstdint>
 
 #include "firmware/control_lane.hpp"
+#include "firmware/daemon/service/status_text.hpp"
+#include "firmware/schedule.hpp"
 
 namespace polygmap::daemon {
 
@@ -52,6 +54,17 @@ struct alignas(64) LaneCounts {
   std::atomic<std::uint64_t> wake_max_ns{0};
 };
 
+// Of a row of kSchedule; written by the row's lane only.
+struct RowCounts {
+  std::atomic<std::uint64_t> overruns{0};    // calls longer than the row's budget
+  std::atomic<std::uint64_t> longest_ns{0};  // of those calls
+
+  void store(const RowStatistics& statistics) noexcept {
+    longest_ns.store(statistics.overrun_max_ns, std::memory_order_relaxed);
+    overruns.store(statistics.overruns, std::memory_order_relaxed);
+  }
+};
+
 class StatusBoard {
  public:
   // On control's thread, after a cycle. unheard: drives that have not answered yet.
@@ -77,6 +90,7 @@ class StatusBoard {
   // Of kFaultTable's entry; a tenth of a second old at most.
   [[nodiscard]] std::uint32_t fault(std::size_t i) const noexcept { return faults_[i].load(std::memory_order_relaxed); }
   std::array<LaneCounts, kLaneCount> lanes;
+  std::array<RowCounts, kSchedule.size()> rows;
 
  private:
   static constexpr std::uint32_t kCyclesPerFaults = 50;
@@ -85,14 +99,12 @@ class StatusBoard {
   std::uint32_t published_ = 0;  // control's
 };
 
-// A line of text of fixed capacity; what does not fit is cut. Allocates nothing.
-struct StatusText {
-  std::array<char, 512> text{};
-  std::size_t length = 0;
-
-  [[gnu::format(printf, 2, 3)]] void add(const char* format, ...) noexcept;
-};
 // The state in words, as systemctl shows it.
 void write_status(StatusText& out, const StatusBoard& board, std::size_t lanes, std::uint64_t heap_calls) noexcept;
+// "; rows over their budget: surfaces 3 (up to 1203 us)"; nothing when there are none.
+void write_late_rows(StatusText& out, const StatusBoard& board) noexcept;
+// "rows over their budget: surfaces 3 (+1, up to 1203 us of 840)": those that overran since it was told last.
+using RowOverruns = std::array<std::uint64_t, kSchedule.size()>;
+void write_more_late_rows(StatusText& out, const StatusBoard& board, RowOverruns& told) noexcept;
 
 }  // namespace polygmap::daemon

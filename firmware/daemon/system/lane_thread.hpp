@@ -10,16 +10,20 @@
 #include <cstddef>
 #include <cstring>
 
+#include "firmware/pipeline.hpp"
+
 namespace polygmap::daemon {
 
 class LaneThread {
  public:
-  // At least PTHREAD_STACK_MIN, which is 128 KiB on AArch64.
+  // Twice kLaneStack_bytes, the least that a thread may have on AArch64 and what the module's memory is reckoned with:
+  // that one knows the module's calls only, and here are the drivers', the C library's and the thread's own data, too.
 #ifdef POLYGMAP_SANITIZED
   static constexpr std::size_t kStack_bytes = std::size_t{2048} * 1024;  // a sanitizer keeps its own data in it
 #else
-  static constexpr std::size_t kStack_bytes = std::size_t{256} * 1024;
+  static constexpr std::size_t kStack_bytes = 2 * kLaneStack_bytes;
 #endif
+  static constexpr std::size_t kGuard_bytes = std::size_t{64} * 1024;  // a whole page of every size there is
   struct Placement {
     int processor = -1;  // negative: any
     int priority = 0;    // of SCHED_FIFO; 0: no real-time thread
@@ -79,7 +83,6 @@ class LaneThread {
   }
 
  private:
-  static constexpr std::size_t kGuard_bytes = std::size_t{64} * 1024;  // a whole page of every size there is
   static constexpr unsigned char kPaint = 0xA5;
   [[nodiscard]] unsigned char* stack() const noexcept { return static_cast<unsigned char*>(mapping_) + kGuard_bytes; }
 

@@ -105,6 +105,37 @@ TEST_F(DaemonConfigTest, DevicesKnowWhereTheyWereNamed) {
   EXPECT_TRUE(config.places.buses[0].find("cubemars.toml, line ") != std::string::npos) << config.places.buses[0];
 }
 
+TEST_F(DaemonConfigTest, WhoMaySend_IsWarnedOfWhereNobodyIsNamed) {
+  const std::string lio = "sender = \"192.168.1.50\"\n[lio]\nport = 5601\n";
+  EXPECT_TRUE(read_daemon_config(write("robot.toml", good(lio + "sender = \"127.0.0.1\"\n"))).warnings.empty());
+  const std::vector<std::string> warnings = read_daemon_config(write("robot.toml", good(lio))).warnings;
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("robot.toml, line 13, lio.port: without a sender"), std::string::npos) << warnings[0];
+}
+
+// The shipped unit grants what the file may ask for, and what the shipped file does.
+TEST_F(DaemonConfigTest, ShippedUnit_GrantsWhatTheFilesTake) {
+  const auto text_of = [](const std::string& path) {
+    std::ifstream file(std::string(POLYGMAP_SOURCE "/toolchain/package/") + path);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  const std::string unit = text_of("polygmapd.service");
+  EXPECT_NE(unit.find("\nLimitRTPRIO=" + std::to_string(kMostPriority) + "\n"), std::string::npos);
+  const auto priority = [this](int value) {
+    return complaint(replaced(good(), "priority = 81", "priority = " + std::to_string(value)));
+  };
+  EXPECT_EQ(priority(kMostPriority), "");
+  EXPECT_NE(priority(kMostPriority + 1), "");
+  const std::string shipped =
+      replaced(replaced(text_of("polygmapd.toml"), "/usr/share/polygmap/buses/cubemars.toml", kBus),
+               "/usr/share/polygmap/cameras/d435.toml", kCamera);
+  const DaemonConfig config = read_daemon_config(write("polygmapd.toml", shipped));
+  EXPECT_TRUE(config.warnings.empty()) << config.warnings[0];
+  EXPECT_NE(unit.find("\nIPAddressDeny=any\nIPAddressAllow=localhost 192.168.1.0/24\n"), std::string::npos);
+  EXPECT_TRUE(std::get<hal::LivoxImu::Config>(config.imu).udp.sender.view().starts_with("192.168.1."));
+  EXPECT_TRUE(config.lio->udp.sender.view().starts_with("127."));
+}
+
 // A change of the good file, and what the one sentence says of it.
 struct Wrong {
   const char* name;

@@ -9,6 +9,8 @@
 #include <fstream>
 #include <map>
 
+#include "firmware/pipeline.hpp"
+
 namespace polygmap::daemon {
 namespace {
 
@@ -128,8 +130,11 @@ TEST_F(DoctorTest, LowMemoryLimit_IsBad) {
   in_.limits.may_lock_any_memory = false;
   in_.limits.locked_bytes = 8192U * 1024U;
   expect("memlock", Verdict::kBad, "8192 KiB", "LimitMEMLOCK=infinity");
-  in_.limits.locked_bytes = ProcessLimits::kUnlimited;
+  in_.limits.locked_bytes = in_.needed_bytes - 1;
+  EXPECT_EQ(found("memlock").verdict, Verdict::kBad);
+  in_.limits.locked_bytes = in_.needed_bytes;
   EXPECT_EQ(found("memlock").verdict, Verdict::kGood);
+  EXPECT_GT(in_.needed_bytes, sizeof(Pipeline));
 }
 TEST_F(DoctorTest, SlowClock_IsNamed) {
   put(kClock, "hpet");
@@ -219,15 +224,21 @@ TEST(WakeUpsTest, EachIsInItsBucket) {
 TEST(WakeUpsTest, LateOnes_AreFound) {
   WakeUps wake_ups;
   wake_ups.was_real_time = true;
-  wake_ups.add(90'000);
-  EXPECT_EQ(finding_of(wake_ups).verdict, Verdict::kGood);
-  wake_ups.add(300'000);
-  EXPECT_EQ(finding_of(wake_ups).verdict, Verdict::kWarning);
-  wake_ups.add(900'000);
-  EXPECT_EQ(finding_of(wake_ups).verdict, Verdict::kBad);
+  constexpr std::uint64_t kSlack_ns = 800'000;
+  wake_ups.add(400'000);
+  EXPECT_EQ(finding_of(wake_ups, kSlack_ns).verdict, Verdict::kGood);
+  wake_ups.add(400'001);
+  EXPECT_EQ(finding_of(wake_ups, kSlack_ns).verdict, Verdict::kWarning);
+  wake_ups.add(800'001);
+  EXPECT_EQ(finding_of(wake_ups, kSlack_ns).verdict, Verdict::kBad);
   wake_ups.was_real_time = false;
-  EXPECT_EQ(finding_of(wake_ups).verdict, Verdict::kWarning);
-  EXPECT_NE(finding_of(wake_ups).to_do, "");
+  EXPECT_EQ(finding_of(wake_ups, kSlack_ns).verdict, Verdict::kWarning);
+  EXPECT_NE(finding_of(wake_ups, kSlack_ns).to_do, "");
+}
+TEST(WakeUpsTest, SlackIsOfTheSchedule_AndLessInOneLane) {
+  EXPECT_GT(slack_ns(1), 0U);
+  EXPECT_LT(slack_ns(1), slack_ns(2));
+  EXPECT_LT(slack_ns(2), 2'000'000U);
 }
 TEST(WakeUpsTest, Measured_AreAsManyAsAsked) {
   const WakeUps wake_ups = measure_wake_ups(-1, 0, 50);

@@ -49,7 +49,8 @@ class ServiceTest : public testing::Test {
             .joints = nullptr,
             .maintain = [this] { ++maintained_; },
             .let_go = [this] { ++let_go_; },
-            .heap = {}};
+            .heap = {},
+            .devices = &counts_};
   }
   // Runs the service on a thread of its own, as long as during() takes, then SIGTERM.
   template <typename During>
@@ -86,6 +87,7 @@ class ServiceTest : public testing::Test {
   LiveRobot robot_;
   NotifySocket manager_{"@polygmap_service_" + std::to_string(::getpid())};
   Notifier notifier_;
+  DeviceCounts counts_;
   std::vector<std::string> heard_;
   std::chrono::steady_clock::duration stopped_after_{};
   std::atomic<int> maintained_ = 0;
@@ -286,6 +288,64 @@ TEST(ModuleViewTest, PackedAndUnpacked_IsTheSame) {
   EXPECT_EQ(ModuleView::unpacked(view.packed()), view);
   EXPECT_EQ(ModuleView::unpacked(view.packed()).silent.bits(), 0xFFE);
   EXPECT_FALSE(view == ModuleView{});
+}
+
+TEST_F(ServiceTest, RowThatOverran_IsNamedInTheStatusAndAtTheEnd) {
+  robot_.in_every_read = [] { std::this_thread::sleep_for(300us); };  // in the row sense, of 120 us
+  const Outcome outcome = run([&] { listen_until("rows over their budget: sense ", 10s); });
+  EXPECT_GT(outcome.rows[0].overruns, 0U);
+  EXPECT_GE(outcome.rows[0].longest_ns, 300'000U);
+  EXPECT_NE(text_of(outcome).find("row sense budget_us=120 overruns="), std::string::npos) << text_of(outcome);
+}
+
+TEST_F(ServiceTest, CountersOfDevices_AreOfTheirEndWhenItEnds) {
+  std::uint32_t reads = 0;  // the lane's
+  robot_.in_every_read = [&reads] { ++reads; };
+  counts_.add("imu", kControlLane, {{"reads", CounterMeans::kWork, [&reads] { return reads; }}});
+  counts_.add("camera", kPerceptionLane, {{"one", CounterMeans::kTrouble, [] { return 1U; }}});
+  (void)run([&] { listen_until("READY=1", 5s); });
+  EXPECT_GT(reads, 0U);
+  EXPECT_EQ(counts_.text(), "device imu reads=" + std::to_string(reads) + "\ndevice camera one=1\n");
+}
+
+TEST(DeviceCountsTest, WhatMeansTrouble_IsToldOnceWithHowMuchMore) {
+  std::uint32_t lost = 2, sent = 7, late = 0;
+  DeviceCounts counts;
+  counts.add("can0", kControlLane,
+             {{"sent", CounterMeans::kWork, [&sent] { return sent; }},
+              {"lost", CounterMeans::kTrouble, [&lost] { return lost; }}});
+  counts.add("camera", kPerceptionLane, {{"late", CounterMeans::kTrouble, [&late] { return late; }}});
+  const auto told = [&counts] {
+    StatusText text;
+    counts.write_trouble(text);
+    return std::string(text.view());
+  };
+  EXPECT_EQ(told(), "");  // nothing is published
+  counts.publish(kControlLane);
+  EXPECT_EQ(told(), "can0: lost 2 (+2)");
+  EXPECT_EQ(told(), "");
+  ++sent, lost = 5, late = 1;
+  counts.publish(kControlLane);
+  EXPECT_EQ(told(), "can0: lost 5 (+3)");  // the camera is the other lane's
+  ++lost;
+  counts.publish(kControlLane);
+  counts.publish(kPerceptionLane);
+  EXPECT_EQ(told(), "can0: lost 6 (+1); camera: late 1 (+1)");
+  EXPECT_EQ(counts.text(), "device can0 sent=8 lost=6\ndevice camera late=1\n");
+}
+
+TEST(LateRowsTest, RowsAreToldOnceWithHowManyMore) {
+  StatusBoard board;
+  RowOverruns told{};
+  StatusText text, again, status;
+  board.rows[5].overruns = 3;
+  board.rows[5].longest_ns = 177'000;
+  write_more_late_rows(text, board, told);
+  write_more_late_rows(again, board, told);
+  write_late_rows(status, board);
+  EXPECT_EQ(text.view(), "rows over their budget: intake 3 (+3, up to 177 us of 40)");
+  EXPECT_EQ(again.view(), "");
+  EXPECT_EQ(status.view(), "; rows over their budget: intake 3 (up to 177 us)");
 }
 
 TEST(StatusTextTest, LongText_IsCutAndEnds) {
