@@ -265,9 +265,9 @@ void SideLines::find_ends(RegionId id) noexcept {
   const ColumnExtents& profile = regions_->extents[id];
   using Bytes = cv::v_uint8;
   static_assert(kDepthHeight_px % Bytes::nlanes == 0);
-  constexpr std::int32_t kAtOnce = 32;  // rows, whatever the register's width: what is cleared is paid for
-  static_assert(kAtOnce % Bytes::nlanes == 0);
-  const std::int32_t from = profile.first_row / kAtOnce * kAtOnce;
+  constexpr std::int32_t kCleared_rows = 32;  // at once, whatever the register's width: what is cleared is paid for
+  static_assert(kCleared_rows % Bytes::nlanes == 0);
+  const std::int32_t from = profile.first_row / kCleared_rows * kCleared_rows;
   std::uint8_t *left = left_.data() + kPad, *right = right_.data() + kPad;
   work_.add(260 + (profile.last_row - from) / 8);
   std::fill(left + from, left + profile.last_row + 1, kNoColumn);

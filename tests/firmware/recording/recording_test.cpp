@@ -394,7 +394,10 @@ TEST_F(ShortRecording, ThousandsOfMutations_EndInAVerdict) {
       EXPECT_EQ(result.difference.empty(), result.verdict == ReplayVerdict::kSame);
     }
   }
-  for (const int count : verdicts) EXPECT_GT(count, 0);
+  // Some change what nothing computes with: those may be the same.
+  for (const ReplayVerdict verdict : {ReplayVerdict::kDiffers, ReplayVerdict::kUnreadable}) {
+    EXPECT_GT(verdicts[static_cast<std::size_t>(verdict)], 0) << static_cast<int>(verdict);
+  }
 }
 
 TEST(Recorder, DirectoryThatIsNone_SaysSoAndTheModuleRunsOn) {
