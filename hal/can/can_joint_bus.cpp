@@ -29,12 +29,11 @@ bool CanJointBus::try_read(JointFeedback& feedback) noexcept {
   replied_ = {};
   for (std::size_t bus = 0; bus < kMaxBuses; ++bus) {
     if (channels_[bus] == nullptr) continue;
-    std::array<CanFrame, 16> frames;
     for (std::size_t taken = 0; taken < kMaxFramesPerRead;) {
-      const std::size_t came = channels_[bus]->read(frames);
-      for (std::size_t i = 0; i < came; ++i) take(bus, frames[i]);
+      const std::size_t came = channels_[bus]->read(read_frames_);
+      for (std::size_t i = 0; i < came; ++i) take(bus, read_frames_[i]);
       taken += came;
-      if (came < frames.size()) break;
+      if (came < read_frames_.size()) break;
     }
   }
   count_bus_offs();
@@ -165,12 +164,11 @@ JointSet CanJointBus::try_write(const JointCommand& command) noexcept {
 JointSet CanJointBus::send(const JointFrames& frames, JointSet joints) noexcept {
   JointSet taken;
   for (std::size_t bus = 0; bus < kMaxBuses; ++bus) {
-    std::array<CanFrame, kJointCount> queue;
     std::array<std::size_t, kJointCount> joint_of{};
     std::size_t queued = 0;
     for (std::size_t n = 0; n < kJointCount; ++n) {
       if (table_.drives[n].bus != bus || !joints.contains(n)) continue;
-      CanFrame& frame = queue[queued];
+      CanFrame& frame = queue_[queued];
       frame.id = table_.drives[n].id;
       frame.length = static_cast<std::uint8_t>(frames[n].size());
       std::ranges::copy(frames[n], frame.data.begin());
@@ -178,7 +176,7 @@ JointSet CanJointBus::send(const JointFrames& frames, JointSet joints) noexcept 
     }
     if (queued == 0) continue;
     const std::size_t sent =
-        channels_[bus] == nullptr ? 0 : std::min(channels_[bus]->write({queue.data(), queued}), queued);
+        channels_[bus] == nullptr ? 0 : std::min(channels_[bus]->write({queue_.data(), queued}), queued);
     for (std::size_t i = 0; i < sent; ++i) taken.insert(joint_of[i]);
     count(status_.refused, static_cast<std::uint32_t>(queued - sent));
   }

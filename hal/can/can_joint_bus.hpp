@@ -72,6 +72,9 @@ class CanJointBus final : public JointBus {
   std::uint32_t writes_ = 0;
   std::array<bool, kMaxBuses> was_off_{};
   JointBusStatus status_;
+  // Buffers of one call each; kept, since clearing them in each call is work without a use.
+  std::array<CanFrame, 16> read_frames_{};
+  std::array<CanFrame, kJointCount> queue_{};
 };
 
 }  // namespace polygmap::hal

@@ -61,19 +61,22 @@ inline constexpr MitField kReplyP{8, 16}, kReplyV{24, 12}, kReplyT{36, 12};
 
 [[nodiscard]] constexpr std::uint32_t steps_of(MitField field) noexcept { return (1U << field.bits) - 1U; }
 
-constexpr void put(MitBytes& bytes, MitField field, std::uint32_t value) noexcept {
-  for (std::size_t i = 0; i < field.bits; ++i) {
-    const std::size_t bit = field.first_bit + i;
-    const std::uint32_t set = value >> (field.bits - 1U - i) & 1U;
-    bytes[bit / 8] = static_cast<std::uint8_t>(bytes[bit / 8] | set << (7U - bit % 8));
-  }
+// A frame's bytes as one number, byte 0 on top; those that a short one lacks are zero.
+[[nodiscard]] constexpr std::uint64_t word_of(std::span<const std::uint8_t> bytes) noexcept {
+  std::uint64_t word = 0;
+  for (std::size_t i = 0; i < 8; ++i) word = word << 8U | (i < bytes.size() ? bytes[i] : 0U);
+  return word;
 }
-[[nodiscard]] constexpr std::uint32_t get(std::span<const std::uint8_t> bytes, MitField field) noexcept {
-  std::uint32_t value = 0;
-  for (std::size_t bit = field.first_bit; bit < field.first_bit + field.bits; ++bit) {
-    value = value << 1U | (bytes[bit / 8] >> (7U - bit % 8) & 1U);
-  }
-  return value;
+[[nodiscard]] constexpr MitBytes bytes_of(std::uint64_t word) noexcept {
+  MitBytes bytes{};
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(word >> (56U - 8U * i));
+  return bytes;
+}
+[[nodiscard]] constexpr std::uint64_t placed(MitField field, std::uint32_t value) noexcept {
+  return std::uint64_t{value} << (64U - field.first_bit - field.bits);
+}
+[[nodiscard]] constexpr std::uint32_t get(std::uint64_t word, MitField field) noexcept {
+  return static_cast<std::uint32_t>(word >> (64U - field.first_bit - field.bits)) & steps_of(field);
 }
 
 [[nodiscard]] constexpr bool is_finite(double x) noexcept { return x - x == 0.0; }
@@ -111,14 +114,13 @@ constexpr void put(MitBytes& bytes, MitField field, std::uint32_t value) noexcep
   for (const double x : {command.q_rad, command.dq_radps, command.tau_ff_nm, command.kp_nmprad, command.kd_nmsprad}) {
     if (!is_finite(x)) return false;
   }
-  MitBytes made{};
-  put(made, kCommandP, quantised(command.q_rad, -ranges.p_rad, ranges.p_rad, kCommandP, clamped));
-  put(made, kCommandV, quantised(command.dq_radps, -ranges.v_radps, ranges.v_radps, kCommandV, clamped));
-  put(made, kCommandKp, quantised(command.kp_nmprad, 0.0, ranges.kp_nmprad, kCommandKp, clamped));
-  put(made, kCommandKd, quantised(command.kd_nmsprad, 0.0, ranges.kd_nmsprad, kCommandKd, clamped));
-  put(made, kCommandT, quantised(command.tau_ff_nm, -ranges.t_nm, ranges.t_nm, kCommandT, clamped));
-  if (is_special_frame(made)) made[6] = 0xEF;
-  bytes = made;
+  std::uint64_t word = placed(kCommandP, quantised(command.q_rad, -ranges.p_rad, ranges.p_rad, kCommandP, clamped));
+  word |= placed(kCommandV, quantised(command.dq_radps, -ranges.v_radps, ranges.v_radps, kCommandV, clamped));
+  word |= placed(kCommandKp, quantised(command.kp_nmprad, 0.0, ranges.kp_nmprad, kCommandKp, clamped));
+  word |= placed(kCommandKd, quantised(command.kd_nmsprad, 0.0, ranges.kd_nmsprad, kCommandKd, clamped));
+  word |= placed(kCommandT, quantised(command.tau_ff_nm, -ranges.t_nm, ranges.t_nm, kCommandT, clamped));
+  bytes = bytes_of(word);
+  if (is_special_frame(bytes)) bytes[6] = 0xEF;
   return true;
 }
 
@@ -127,11 +129,12 @@ constexpr void put(MitBytes& bytes, MitField field, std::uint32_t value) noexcep
                                                 JointSetpoint& command) noexcept {
   using namespace detail;
   if (is_special_frame(bytes)) return false;
-  command.q_rad = value_of(get(bytes, kCommandP), -ranges.p_rad, ranges.p_rad, kCommandP);
-  command.dq_radps = value_of(get(bytes, kCommandV), -ranges.v_radps, ranges.v_radps, kCommandV);
-  command.kp_nmprad = value_of(get(bytes, kCommandKp), 0.0, ranges.kp_nmprad, kCommandKp);
-  command.kd_nmsprad = value_of(get(bytes, kCommandKd), 0.0, ranges.kd_nmsprad, kCommandKd);
-  command.tau_ff_nm = value_of(get(bytes, kCommandT), -ranges.t_nm, ranges.t_nm, kCommandT);
+  const std::uint64_t word = word_of(bytes);
+  command.q_rad = value_of(get(word, kCommandP), -ranges.p_rad, ranges.p_rad, kCommandP);
+  command.dq_radps = value_of(get(word, kCommandV), -ranges.v_radps, ranges.v_radps, kCommandV);
+  command.kp_nmprad = value_of(get(word, kCommandKp), 0.0, ranges.kp_nmprad, kCommandKp);
+  command.kd_nmsprad = value_of(get(word, kCommandKd), 0.0, ranges.kd_nmsprad, kCommandKd);
+  command.tau_ff_nm = value_of(get(word, kCommandT), -ranges.t_nm, ranges.t_nm, kCommandT);
   return true;
 }
 
@@ -152,9 +155,10 @@ constexpr void put(MitBytes& bytes, MitField field, std::uint32_t value) noexcep
   if (bytes.size() != 6 && bytes.size() != 8) return false;
   if (name_in_reply(bytes, rule) != reply_name(drive_id, rule)) return false;
   reply = {};
-  reply.p_rad = value_of(get(bytes, kReplyP), -ranges.p_rad, ranges.p_rad, kReplyP);
-  reply.v_radps = value_of(get(bytes, kReplyV), -ranges.v_radps, ranges.v_radps, kReplyV);
-  reply.t_nm = value_of(get(bytes, kReplyT), -ranges.t_nm, ranges.t_nm, kReplyT);
+  const std::uint64_t word = word_of(bytes);
+  reply.p_rad = value_of(get(word, kReplyP), -ranges.p_rad, ranges.p_rad, kReplyP);
+  reply.v_radps = value_of(get(word, kReplyV), -ranges.v_radps, ranges.v_radps, kReplyV);
+  reply.t_nm = value_of(get(word, kReplyT), -ranges.t_nm, ranges.t_nm, kReplyT);
   if (rule == MitReplyRule::kStatusNibble) {
     constexpr std::uint8_t kDisabled = 0, kFirstError = 8;
     reply.status = static_cast<std::uint8_t>(bytes[0] >> 4U);
@@ -173,12 +177,12 @@ constexpr void put(MitBytes& bytes, MitField field, std::uint32_t value) noexcep
   using namespace detail;
   const auto finite = [](double x) { return is_finite(x) ? x : 0.0; };
   std::uint32_t clamped = 0;
-  MitBytes bytes{};
+  std::uint64_t word = placed(kReplyP, quantised(finite(reply.p_rad), -ranges.p_rad, ranges.p_rad, kReplyP, clamped));
+  word |= placed(kReplyV, quantised(finite(reply.v_radps), -ranges.v_radps, ranges.v_radps, kReplyV, clamped));
+  word |= placed(kReplyT, quantised(finite(reply.t_nm), -ranges.t_nm, ranges.t_nm, kReplyT, clamped));
+  MitBytes bytes = bytes_of(word);
   const std::uint32_t upper = rule == MitReplyRule::kStatusNibble ? reply.status : 0U;
   bytes[0] = static_cast<std::uint8_t>(reply_name(drive_id, rule) | upper << 4U);
-  put(bytes, kReplyP, quantised(finite(reply.p_rad), -ranges.p_rad, ranges.p_rad, kReplyP, clamped));
-  put(bytes, kReplyV, quantised(finite(reply.v_radps), -ranges.v_radps, ranges.v_radps, kReplyV, clamped));
-  put(bytes, kReplyT, quantised(finite(reply.t_nm), -ranges.t_nm, ranges.t_nm, kReplyT, clamped));
   if (rule == MitReplyRule::kId) bytes[7] = reply.status;
   return bytes;
 }

@@ -25,6 +25,17 @@ namespace {
 
 }  // namespace
 
+SocketCan::SocketCan(const SystemCalls& calls) noexcept : calls_(calls) {
+  for (Batch* batch : {&in_, &out_}) {
+    for (std::size_t i = 0; i < kBatch; ++i) {
+      batch->vectors[i] = {&batch->frames[i], sizeof(canfd_frame)};
+      batch->messages[i].msg_hdr.msg_iov = &batch->vectors[i];
+      batch->messages[i].msg_hdr.msg_iovlen = 1;
+    }
+  }
+  for (std::size_t i = 0; i < kBatch; ++i) in_.messages[i].msg_hdr.msg_control = in_.control[i].data();
+}
+
 DeviceError SocketCan::open(const Config& config) noexcept {
   close();
   config_ = config;
@@ -147,15 +158,11 @@ SocketCan::After SocketCan::failed(int error_number, int& attempts) noexcept {
   }
 }
 
+// What the kernel wrote into the messages of the last call.
 void SocketCan::prepare_read(std::size_t count) noexcept {
   for (std::size_t i = 0; i < count; ++i) {
-    in_.vectors[i] = {&in_.frames[i], sizeof(canfd_frame)};
-    msghdr& header = in_.messages[i].msg_hdr;
-    header = {};
-    header.msg_iov = &in_.vectors[i];
-    header.msg_iovlen = 1;
-    header.msg_control = in_.control[i].data();
-    header.msg_controllen = in_.control[i].size();
+    in_.messages[i].msg_hdr.msg_controllen = in_.control[i].size();
+    in_.messages[i].msg_hdr.msg_flags = 0;
     in_.messages[i].msg_len = 0;
   }
 }
@@ -264,10 +271,7 @@ bool SocketCan::prepare_write(std::size_t i, const CanFrame& frame) noexcept {
   raw.len = frame.length;
   if (frame.fd && config_.bit_rate_switch) raw.flags = CANFD_BRS;
   std::copy_n(frame.data.begin(), frame.length, static_cast<std::uint8_t*>(raw.data));
-  out_.vectors[i] = {&raw, frame.fd ? CANFD_MTU : CAN_MTU};
-  out_.messages[i] = {};
-  out_.messages[i].msg_hdr.msg_iov = &out_.vectors[i];
-  out_.messages[i].msg_hdr.msg_iovlen = 1;
+  out_.vectors[i].iov_len = frame.fd ? CANFD_MTU : CAN_MTU;
   return true;
 }
 

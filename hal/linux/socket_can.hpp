@@ -39,7 +39,9 @@ class SocketCan final : public CanChannel {
     std::uint32_t interface_gone = 0;
   };
 
-  explicit SocketCan(const SystemCalls& calls = kernel_calls()) noexcept : calls_(calls) {}
+  explicit SocketCan(const SystemCalls& calls = kernel_calls()) noexcept;
+  SocketCan(const SocketCan&) = delete;  // messages point into it
+  SocketCan& operator=(const SocketCan&) = delete;
   [[nodiscard]] DeviceError open(const Config& config) noexcept;
   void close() noexcept;
   // Opens an interface anew that went away; each call tries once. Outside the lanes.

@@ -103,15 +103,14 @@ class StalledForFiftyMs : public testing::TestWithParam<GaitPattern> {};
 TEST_P(StalledForFiftyMs, OnTheFirstStair_DoesNotFall) {
   for (const double at_s : {0.1, 0.7, 1.0, 1.5}) EXPECT_TRUE(stands_after_one_stall(GetParam(), 1, at_s)) << at_s;
 }
-// Of 104 of the double step's one falls (seed 3, 1.8 s), none of the single step's, 2026-11-25: while nobody wakes the
-// module the plan stands still and the body does not.
+// While nobody wakes the module the plan stands still and the body does not.
 class LongStalledForFiftyMs : public testing::TestWithParam<GaitPattern> {};
-TEST_P(LongStalledForFiftyMs, InEveryPhase_AtMostOneFalls) {
-  int falls = 0;
+TEST_P(LongStalledForFiftyMs, InEveryPhase_DoesNotFall) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    for (int i = 0; i < 26; ++i) falls += stands_after_one_stall(GetParam(), seed, 0.1 * i) ? 0 : 1;
+    for (int i = 0; i < 26; ++i) {
+      EXPECT_TRUE(stands_after_one_stall(GetParam(), seed, 0.1 * i)) << "seed " << seed << ", " << 0.1 * i << " s";
+    }
   }
-  EXPECT_LE(falls, GetParam() == GaitPattern::kDoubleStep ? 1 : 0);
 }
 constexpr std::array kBothGaits{GaitPattern::kDoubleStep, GaitPattern::kSingleStep};
 INSTANTIATE_TEST_SUITE_P(Gaits, StalledForFiftyMs, testing::ValuesIn(kBothGaits));

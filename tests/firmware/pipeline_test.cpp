@@ -9,6 +9,7 @@
 #include <memory>
 #include <numeric>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "firmware/schedule.hpp"
@@ -554,7 +555,10 @@ TEST(PipelineMemory, Stages_SumUpWithinTheBudget) {
   EXPECT_EQ(sum, sizeof(Pipeline) + sizeof(LaneExecutive<kControlLane>) + sizeof(LaneExecutive<kPerceptionLane>) +
                      kLaneCount * kLaneStack_bytes);
   EXPECT_LE(sum, kMemoryBudget_bytes);
-  for (const StageMemory& stage : memory) EXPECT_GT(stage.bytes, 0U) << stage.stage;
+  for (const StageMemory& stage : memory) {
+    if (std::string_view(stage.stage) == "padding") continue;  // alignment may need none
+    EXPECT_GT(stage.bytes, 0U) << stage.stage;
+  }
 }
 
 }  // namespace

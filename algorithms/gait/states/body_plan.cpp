@@ -89,8 +89,8 @@ void BodyPlan::rest_over(const ComPlan::Params& params, const Vec2& plan_p_m) no
   renewed_com().plan(params, com(), knots);
 }
 
-void BodyPlan::land(Foot foot, bool felt, std::int64_t now_ns) noexcept {
-  landed_.land(foot, felt, now_ns, odom_T_plan() * plan_T_sole(foot), plan_T_sole(foot));
+void BodyPlan::land(Foot foot, bool felt, double early_m, std::int64_t now_ns) noexcept {
+  landed_.land(foot, felt, early_m, now_ns, odom_T_plan() * plan_T_sole(foot), plan_T_sole(foot));
   posture_.restart();  // the swing foot is where it was steered to, and stops
 }
 

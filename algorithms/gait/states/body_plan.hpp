@@ -44,8 +44,8 @@ class BodyPlan {
   void set_sole(Foot foot, const Transform& plan_T_sole) noexcept { plan_T_sole_[index_of(foot)] = plan_T_sole; }
   void restart_posture() noexcept { posture_.restart(); }
 
-  // The foot stands where it is planned to be, and is held there in odometry.
-  void land(Foot foot, bool felt, std::int64_t now_ns) noexcept;
+  // The foot stands where it is planned to be, early_m above its target, and is held there in odometry.
+  void land(Foot foot, bool felt, double early_m, std::int64_t now_ns) noexcept;
   void hold_landed_foot(const LandedFootParams& params, const JointFeedback& feedback, std::int64_t now_ns) noexcept;
   void release_landed_foot() noexcept;
 

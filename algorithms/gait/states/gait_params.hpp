@@ -133,6 +133,9 @@ struct LandedFootParams {
   double pressed_n = 100.0;
   std::int64_t hold_ns = 200 * kNsPerMs;
   std::int64_t felt_hold_ns = 600 * kNsPerMs;
+  double unloaded_n = 5.0;
+  std::int32_t unloaded_ticks = 10;
+  double lower_mps = 0.1;
 
   static void visit(auto& p, auto& field) {
     field("pressed_n", p.pressed_n, 0.0, 500.0, "A foot that is pressed less is held where it landed.");
@@ -140,6 +143,10 @@ struct LandedFootParams {
           "A landed foot is held no longer where its force told nothing of the ground: it may be the sensor.");
     field("felt_hold_ns", p.felt_hold_ns, 0, 5000000000,
           "A landed foot is held no longer where its force told of the ground.");
+    field("unloaded_n", p.unloaded_n, 0.0, 200.0,
+          "A foot that landed early and feels less than this hangs in the air.");
+    field("unloaded_ticks", p.unloaded_ticks, 0, 500, "After so many ticks of that it is lowered to its target.");
+    field("lower_mps", p.lower_mps, 0.0, 1.0, "The speed of that lowering.");
   }
 };
 

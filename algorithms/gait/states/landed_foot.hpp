@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The foot that landed last, held where it landed until it is pressed: it would go along with what the base is off its
-// plan, 5 mm towards the next riser.
+// plan, 5 mm towards the next riser. One that landed early and then feels nothing hung on an edge, and is lowered to
+// its target.
 #pragma once
+
+#include <algorithm>
+#include <utility>
 
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/gait/states/gait_params.hpp"
@@ -10,13 +14,14 @@ namespace polygmap {
 
 class LandedFoot {
  public:
-  // felt: its force told of the ground.
-  void land(Foot foot, bool felt, std::int64_t now_ns, const Transform& odom_T_sole,
+  // felt: its force told of the ground. early_m: so far above its target, 0 where it came in time.
+  void land(Foot foot, bool felt, double early_m, std::int64_t now_ns, const Transform& odom_T_sole,
             const Transform& plan_T_sole) noexcept {
     *this = {};
     foot_ = foot;
     felt_ = felt;
     held_ = true;
+    to_lower_m_ = early_m;
     landed_ns_ = now_ns;
     odom_T_sole_ = odom_T_sole;
     plan_T_sole_ = plan_T_sole;
@@ -25,7 +30,12 @@ class LandedFoot {
   // One tick.
   void update(const LandedFootParams& params, const JointFeedback& feedback, std::int64_t now_ns) noexcept {
     const std::int64_t most_ns = felt_ ? params.felt_hold_ns : params.hold_ns;
-    held_ = feedback.foot_force_n[index_of(foot_)] < params.pressed_n && now_ns - landed_ns_ < most_ns;
+    const double force_n = feedback.foot_force_n[index_of(foot_)];
+    held_ = force_n < params.pressed_n && now_ns - landed_ns_ < most_ns;
+    // Of a bus that falls silent the last sample is read on and on.
+    if (std::exchange(felt_stamp_ns_, feedback.stamp_ns) == feedback.stamp_ns) return;
+    unloaded_ticks_ = force_n < params.unloaded_n ? unloaded_ticks_ + 1 : 0;
+    if (unloaded_ticks_ > params.unloaded_ticks) lower(std::min(to_lower_m_, params.lower_mps * kTick_s));
   }
   // The plan goes on in another frame.
   void carry(const Transform& to_T_plan) noexcept { plan_T_sole_ = to_T_plan * plan_T_sole_; }
@@ -37,10 +47,19 @@ class LandedFoot {
   [[nodiscard]] const Transform& plan_T_sole() const noexcept { return plan_T_sole_; }
 
  private:
+  void lower(double by_m) noexcept {
+    to_lower_m_ -= by_m;
+    odom_T_sole_.p_m.z() -= by_m;
+    plan_T_sole_.p_m.z() -= by_m;
+  }
+
   Foot foot_ = Foot::kLeft;
   bool felt_ = false;
   bool held_ = false;
   std::int64_t landed_ns_ = 0;
+  std::int64_t felt_stamp_ns_ = 0;
+  std::int32_t unloaded_ticks_ = 0;
+  double to_lower_m_ = 0.0;
   Transform odom_T_sole_, plan_T_sole_;
 };
 

@@ -57,8 +57,9 @@ SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& par
   const double above_m = in.usable ? in.state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
   const bool blocked = path_.lowered_m(timing_.tick()) > params.late_m && above_m > params.blocked_m;
   // A toe that scrapes along the next riser feels a force too, for a moment: ground that comes early has to stay.
-  contact.early = path_.at(timing_.last_tick()).p_m.z() > goal_.target.position_m.z() + params.early_m;
-  const bool touches = contact.loaded && touched_ticks_ >= (contact.early ? params.scrape_ticks : 1);
+  const double above_target_m = path_.at(timing_.last_tick()).p_m.z() - goal_.target.position_m.z();
+  if (above_target_m > params.early_m) contact.early_m = above_target_m;
+  const bool touches = contact.loaded && touched_ticks_ >= (contact.early_m > 0.0 ? params.scrape_ticks : 1);
   contact.ground = (descending && unloaded_ && touches) || blocked;
   return contact;
 }
@@ -71,13 +72,13 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const double lowered_m = path_.lowered_m(timing_.tick());
   const Contact contact = feel(in, params, odom_T_sole);
   if (contact.ground) {
-    if (contact.early) ++gait.status.early_contacts;
+    if (contact.early_m > 0.0) ++gait.status.early_contacts;
     if (lowered_m > params.late_m) ++gait.status.late_contacts;
-    return touch_down(in, gait, contact.loaded);
+    return touch_down(in, gait, contact.loaded, contact.early_m);
   }
   // A force that never left or is no longer told: the plan's end is the touch-down.
   const bool told = in.now_ns - in.feedback.stamp_ns <= gait.params.steer_age_ns;
-  if (!(unloaded_ && told) && timing_.tick() > path_.duration_ticks()) return touch_down(in, gait, false);
+  if (!(unloaded_ && told) && timing_.tick() > path_.duration_ticks()) return touch_down(in, gait, false, 0.0);
   if (lowered_m > params.max_lowering_m) {  // the ground that was seen is not there
     ++gait.status.late_contacts;
     timing_.retreat(params.timing);
@@ -194,14 +195,14 @@ Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexce
   return Transition::stand();
 }
 
-Transition SwingPhase::touch_down(const GaitInput& in, GaitShared& gait, bool felt) noexcept {
+Transition SwingPhase::touch_down(const GaitInput& in, GaitShared& gait, bool felt, double early_m) noexcept {
   const std::size_t i = index_of(goal_.foot);
   BodyPlan& body = gait.plan;
   LatchedStep& step = gait.status.step;
   step.touch_down_stamp_ns = in.now_ns;
   step.odom_T_executed = in.usable ? in.state.odom_T_sole[i] : body.odom_T_plan() * body.plan_T_sole(goal_.foot);
   gait.status.stands[i] = true;
-  body.land(goal_.foot, felt, in.now_ns);
+  body.land(goal_.foot, felt, early_m, in.now_ns);
   gait.memory.aborted_swings = 0;
   gait.planner.landed();
   gait.status.treads_climbed = gait.planner.treads_climbed();

@@ -20,13 +20,13 @@ class SwingPhase {
 
  private:
   struct Contact {
-    bool loaded = false;  // felt by the sole
-    bool early = false;   // above the target
-    bool ground = false;  // the foot stands on something
+    bool loaded = false;   // felt by the sole
+    double early_m = 0.0;  // so far above the target, where that is early
+    bool ground = false;   // the foot stands on something
   };
   [[nodiscard]] Contact feel(const GaitInput& in, const SwingParams& params, const Transform& odom_T_sole) noexcept;
   [[nodiscard]] Transition abort_swing(const GaitInput& in, GaitShared& gait) noexcept;
-  [[nodiscard]] Transition touch_down(const GaitInput& in, GaitShared& gait, bool felt) noexcept;
+  [[nodiscard]] Transition touch_down(const GaitInput& in, GaitShared& gait, bool felt, double early_m) noexcept;
   [[nodiscard]] Transform beside_path(const BodyPlan& plan, const Transform& odom_T_sole) const noexcept;
   void land_soon(const GaitInput& in, GaitShared& gait) noexcept;
   void land_beside(const GaitInput& in, GaitShared& gait, const SolePose& target) noexcept;

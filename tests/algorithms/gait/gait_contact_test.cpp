@@ -115,9 +115,8 @@ TEST(GaitContact, BumpInTheAir_HoldsTheReferenceWithoutAJump) {
   IdealClimb climb({});
   climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
     const LatchedStep& step = climb.status().step;
-    if (climb.status().phase == GaitPhase::kSwing && step.sequence == 2 &&
-        state.stamp_ns - step.latch_stamp_ns > 540 * kNsPerMs) {
-      feedback.foot_force_n[index_of(step.foot)] = 100.0;  // 30 mm above the floor, in the fastest part of the landing
+    if (step.sequence == 2 && state.stamp_ns - step.latch_stamp_ns > 540 * kNsPerMs) {
+      feedback.foot_force_n[index_of(step.foot)] = 60.0;  // 30 mm above the floor, in the fastest part of the landing
     }
   };
   ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
@@ -133,6 +132,28 @@ TEST(GaitContact, BumpInTheAir_HoldsTheReferenceWithoutAJump) {
     EXPECT_LT((relative() - held).norm(), 1e-4);
   }
   EXPECT_EQ(climb.status().ik_limited_ticks, 0U);
+  test::expect_sound_commands(climb);
+}
+
+// A toe hangs on an edge above its target, and slips off it before the weight comes.
+TEST(GaitContact, HangsForAMomentInTheAir_IsLoweredToTheGround) {
+  IdealClimb climb({});
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
+    const LatchedStep& step = climb.status().step;
+    const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns - 540 * kNsPerMs;
+    if (step.sequence == 2 && since_ns > 0 && since_ns < 60 * kNsPerMs) {
+      feedback.foot_force_n[index_of(step.foot)] = 60.0;
+    }
+  };
+  ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
+  EXPECT_EQ(climb.status().early_contacts, 1U);
+  const Foot foot = climb.status().step.foot;
+  EXPECT_FALSE(climb.touches(foot));
+  const double landed_m = climb.true_T_sole(foot).p_m.z();
+  for (int n = 0; n < 250; ++n) climb.tick();
+  EXPECT_EQ(climb.status().phase, GaitPhase::kDoubleSupport);
+  EXPECT_TRUE(climb.touches(foot));
+  EXPECT_GT(landed_m - climb.true_T_sole(foot).p_m.z(), 0.01);
   test::expect_sound_commands(climb);
 }
 
