@@ -2,10 +2,8 @@
 // Every piece of work of pictures, of the map that remembers them and of the search in it, marked one by one: what
 // toolchain/checks/pieces counts. Arguments: raw pictures of 640 x 480 depths of 0.25 mm. Beside them: stairs with legs
 // in the picture, in both noises, and clutter of tilted tiles that fills runs, planes and the map.
-#include <cmath>
 #include <cstdio>
 #include <memory>
-#include <random>
 #include <vector>
 
 #include "algorithms/foothold/foothold_search.hpp"
@@ -14,6 +12,7 @@
 #include "sim_stub/robot_camera.hpp"
 #include "tests/benchmarks/piece_marker.hpp"
 #include "tests/support/depth_scene.hpp"
+#include "tests/support/tiled_depths.hpp"
 
 namespace polygmap::bench {
 namespace {
@@ -37,35 +36,6 @@ test::DepthScene stairs_with_legs() {
   scene.legs[0] = transformed(camera_T_base, base_leg_shapes(robot, Foot::kLeft, swing));
   scene.legs[1] = transformed(camera_T_base, base_leg_shapes(robot, Foot::kRight, LegVector::Zero()));
   return scene;
-}
-
-// Planes of so many pixels, each tilted and placed at random; level ones and risers as the camera sees them if `steps`.
-Raw tiles(const CameraIntrinsics& k, std::int32_t width_px, std::int32_t height_px, bool steps, std::uint32_t seed) {
-  std::mt19937 random(seed);
-  const auto uniform = [&random](double from, double to) {
-    return from + (to - from) * (static_cast<double>(random()) / 4294967296.0);
-  };
-  Raw raw(static_cast<std::size_t>(k.width_px * k.height_px));
-  for (std::int32_t top = 0; top < k.height_px; top += height_px) {
-    for (std::int32_t left = 0; left < k.width_px; left += width_px) {
-      Vec3 normal{uniform(-0.5, 0.5), uniform(-0.8, 0.8), -1.0};
-      if (steps) normal = uniform(0.0, 1.0) < 0.5 ? Vec3{0.0, -0.62, -0.78} : Vec3{0.0, 0.78, -0.62};
-      const auto ray = [&k](std::int32_t c, std::int32_t r) {
-        return Vec3{(c - k.cx_px) / k.fx_px, (r - k.cy_px) / k.fy_px, 1.0};
-      };
-      const double d = uniform(0.5, 2.0) * normal.dot(ray(left + width_px / 2, top + height_px / 2));
-      for (std::int32_t r = top; r < std::min(top + height_px, k.height_px); ++r) {
-        for (std::int32_t c = left; c < std::min(left + width_px, k.width_px); ++c) {
-          const double z_m = d / normal.dot(ray(c, r)) + uniform(-0.002, 0.002);
-          if (z_m > 0.2 && z_m < 4.0) {
-            raw[static_cast<std::size_t>(r * k.width_px + c)] =
-                static_cast<std::uint16_t>(std::lround(z_m / k.depth_unit_m));
-          }
-        }
-      }
-    }
-  }
-  return raw;
 }
 
 std::int64_t label_of(const SurfaceExtractor& extractor) {
@@ -160,10 +130,10 @@ int run(int count, char** files) {
     test::add_noise(picture, {.correlated = correlated}, 7);
     bench.see(picture.raw());
   }
-  bench.see(tiles(scene.intrinsics, 64, 48, false, 1));
-  bench.see(tiles(scene.intrinsics, 32, 32, false, 2));
-  bench.see(tiles(scene.intrinsics, 80, 40, true, 3));
-  bench.see(tiles(scene.intrinsics, 640, 20, true, 4));
+  bench.see(test::tiled_depths(scene.intrinsics, 64, 48, false, 1));
+  bench.see(test::tiled_depths(scene.intrinsics, 32, 32, false, 2));
+  bench.see(test::tiled_depths(scene.intrinsics, 80, 40, true, 3));
+  bench.see(test::tiled_depths(scene.intrinsics, 640, 20, true, 4));
   for (int i = 0; i < count; ++i) {
     Raw raw(static_cast<std::size_t>(kDepthWidth_px) * kDepthHeight_px);
     std::FILE* file = std::fopen(files[i], "rb");

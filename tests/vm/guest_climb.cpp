@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// guest_climb FOLDER [--lanes 1|2] [--clock real|virtual] [--gait ds|ss] [--steps N] [--inject WHAT@S]...: runs the
-// module in the guest on a recorded climb (record_climb), 500 times a second under SCHED_FIFO, counts what it takes,
-// compares what it commands, and prints it all, the line RESULT last.
+// guest_climb FOLDER [--lanes 1|2] [--clock real|virtual] [--gait ds|ss] [--steps N] [--babble FILE] [--inject
+// WHAT@S]...: runs the module in the guest on a recorded climb (record_climb), 500 times a second under SCHED_FIFO,
+// counts what it takes, compares what it commands, and prints it all, the line RESULT last.
 // --clock virtual: tick after tick without waiting, time stands still within one; nothing is late then and no slot is
 // given up, so that every row's work is counted whatever it takes.
+// --babble: the joints are behind buses of that file, in memory, that are as full as they can be (babbling_bus.hpp).
 // WHAT: allocate (a heap call inside the module), overrun=ROW (that row takes 3 ms), gap=MS (IMU and joints are
 // silent).
 #include <fcntl.h>
@@ -30,6 +31,7 @@
 #include "hal/linux/row_meter.hpp"
 #include "hal/linux/socket_can.hpp"
 #include "sim_stub/heap_trap.hpp"
+#include "tests/vm/babbling_bus.hpp"
 #include "tests/vm/lane_thread.hpp"
 #include "tests/vm/replayed_robot.hpp"
 
@@ -44,7 +46,8 @@ struct Injection {
 };
 struct Options {
   std::string folder;
-  std::string bus;  // a bus file: the joints are behind the guest's CAN buses
+  std::string bus;     // a bus file: the joints are behind the guest's CAN buses
+  std::string babble;  // a bus file: they are behind full buses in memory
   std::size_t lanes = 1;
   bool real_time = true;
   GaitPattern gait = GaitPattern::kDoubleStep;
@@ -166,6 +169,7 @@ struct Climb {
   ReplayedCamera camera;
   std::array<ReplayClock, kLaneCount> clocks{};
   std::unique_ptr<Wires> wires;
+  std::unique_ptr<BabblingBus> babble;
   std::unique_ptr<Pipeline> pipeline;
   std::unique_ptr<InjectedPipeline> tasks;
   std::array<std::unique_ptr<LaneFigures>, kLaneCount> lanes;
@@ -180,7 +184,13 @@ struct Climb {
       wires = std::make_unique<Wires>(file);
       sensors.connect(wires->joints());
     }
-    pipeline = std::make_unique<Pipeline>(Ports{camera, sensors, sensors, sensors}, params);
+    if (!asked.babble.empty()) {
+      const config::BusFile file = config::read_bus(asked.babble);
+      config::limit_by_drives(file, params.gait.joints, params.robot);
+      babble = std::make_unique<BabblingBus>(file, sensors);
+    }
+    hal::JointBus& joints = babble ? static_cast<hal::JointBus&>(*babble) : sensors;
+    pipeline = std::make_unique<Pipeline>(Ports{camera, sensors, joints, sensors}, params);
     tasks = std::make_unique<InjectedPipeline>(*pipeline, asked.injection, first_ns());
     for (auto& lane : lanes) lane = std::make_unique<LaneFigures>(*tasks);
   }
@@ -213,6 +223,7 @@ void run_lane(Climb& climb) {
     if (kAllRows || Lane == kControlLane) {
       climb.sensors.set_silent(since_ns >= 0 && since_ns < injection.silent_ns);
       climb.sensors.advance(now_ns);
+      if (climb.babble) climb.babble->advance();
     }
     if (kAllRows || Lane == kPerceptionLane) climb.camera.advance(now_ns);
     figures.meter.begin_cycle();
@@ -315,8 +326,8 @@ bool print_result(const Climb& climb, long faults) {
   }
   const bool pass = t.overruns == 0 && faults == 0 && heap.calls == 0 && climb.sensors.frames() > 0 &&
                     climb.sensors.frames_differ() == 0 && climb.camera.lost() == 0 &&
-                    gait.phase == GaitPhase::kFinished &&
-                    (climb.options.steps == 0 || gait.treads_climbed == climb.options.steps) &&
+                    (climb.options.steps == 0 ||
+                     (gait.phase == GaitPhase::kFinished && gait.treads_climbed == climb.options.steps)) &&
                     t.ticks == climb.recording.ticks.size();
   std::printf(
       "RESULT %s steps=%u ticks=%" PRIu64 " overruns=%" PRIu64 " page_faults=%ld heap_calls=%" PRIu64 " frames=%" PRIu64
@@ -380,7 +391,9 @@ Injection parse_injection(const std::string& text) {
 Options parse(int argc, char** argv) {
   Options options;
   if (argc < 2 || argc % 2 != 0)
-    refuse("usage: FOLDER [--lanes 1|2] [--clock real|virtual] [--gait ds|ss] [--steps N] [--inject WHAT@S]");
+    refuse(
+        "usage: FOLDER [--lanes 1|2] [--clock real|virtual] [--gait ds|ss] [--steps N] [--babble FILE] [--inject "
+        "WHAT@S]");
   options.folder = argv[1];
   for (int i = 2; i + 1 < argc; i += 2) {
     const std::string_view key = argv[i], value = argv[i + 1];
@@ -390,6 +403,8 @@ Options parse(int argc, char** argv) {
       options.real_time = value == "real";
     } else if (key == "--bus") {
       options.bus = value;
+    } else if (key == "--babble") {
+      options.babble = value;
     } else if (key == "--gait" && (value == "ds" || value == "ss")) {
       options.gait = value == "ss" ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
     } else if (key == "--steps") {
