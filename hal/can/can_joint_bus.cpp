@@ -12,6 +12,12 @@ constexpr void count(std::uint32_t& counter, std::uint32_t times = 1) noexcept {
   counter += std::min(times, room);
 }
 
+// A bus's identifier of 11 bits as one number; none is kNobody.
+constexpr std::uint32_t sender_of(std::size_t bus, std::uint32_t id) noexcept {
+  return static_cast<std::uint32_t>(bus) << 11U | (id & kMaxCanId);
+}
+constexpr std::uint32_t kNobody = ~0U;
+
 constexpr JointSet without(JointSet set, std::size_t joint) noexcept {
   return JointSet::of_bits(set.bits() & ~(1U << joint));
 }
@@ -19,6 +25,9 @@ constexpr JointSet without(JointSet set, std::size_t joint) noexcept {
 }  // namespace
 
 CanJointBus::CanJointBus(const DriveTable& table, std::span<CanChannel* const> channels) noexcept : table_(table) {
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    repliers_[n] = sender_of(table.drives[n].bus, table.drives[n].reply_id);
+  }
   std::copy_n(channels.begin(), std::min(channels.size(), channels_.size()), channels_.begin());
   feedback_.silent_cycles.fill(JointFeedback::kNeverHeard);
   feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
@@ -61,15 +70,15 @@ void CanJointBus::take(std::size_t bus, const CanFrame& frame) noexcept {
   if (frame.error || command_ns_ < 0) return;
   const std::span<const std::uint8_t> bytes(frame.data.data(), std::min<std::size_t>(frame.length, 8));
   bool known = false;
-  const auto is_from = [&](std::uint32_t id) { return !frame.extended && frame.id == id; };
+  const std::uint32_t sender = frame.extended ? kNobody : sender_of(bus, frame.id);
   const bool stale = frame.stamp_ns != 0 && command_ns_ - frame.stamp_ns > kStale_ns;
-  if (table_.feet.present && table_.feet.bus == bus && is_from(table_.feet.id)) {
+  if (table_.feet.present && sender == sender_of(table_.feet.bus, table_.feet.id)) {
     return stale ? count(status_.stale) : take_feet(frame);
   }
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    const CanDrive& drive = table_.drives[n];
-    if (drive.bus != bus || !is_from(drive.reply_id)) continue;
+    if (sender != repliers_[n]) continue;
     known = true;
+    const CanDrive& drive = table_.drives[n];
     if (bytes.empty() || name_in_reply(bytes, drive.reply) != reply_name(drive.id, drive.reply)) continue;
     return stale ? count(status_.stale) : take_reply(n, frame);
   }

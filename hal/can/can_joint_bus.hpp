@@ -60,6 +60,7 @@ class CanJointBus final : public JointBus {
   [[nodiscard]] JointSet send(const JointFrames& frames, JointSet joints) noexcept;
 
   DriveTable table_;
+  std::array<std::uint32_t, kJointCount> repliers_{};  // who answers for a joint: bus and identifier in one
   std::array<CanChannel*, kMaxBuses> channels_{};
   JointFeedback feedback_;
   std::array<std::int64_t, kJointCount> replied_ns_{};  // stamp of the command that a joint's last reply answered

@@ -12,9 +12,9 @@ struct CanFrame {
   std::uint8_t length = 0;  // bytes of data: up to 8, with fd up to 64
   bool extended = false;
   bool fd = false;
-  bool error = false;         // the controller tells of an error; data as <linux/can/error.h> has it
-  std::int64_t stamp_ns = 0;  // of the driver, monotonic; 0: none. Judges age only: it enters no result
-  std::array<std::uint8_t, 64> data{};
+  bool error = false;                   // the controller tells of an error; data as <linux/can/error.h> has it
+  std::int64_t stamp_ns = 0;            // of the driver, monotonic; 0: none. Judges age only: it enters no result
+  std::array<std::uint8_t, 64> data{};  // behind length: of no meaning
 };
 
 }  // namespace polygmap::hal

@@ -64,7 +64,11 @@ inline constexpr MitField kReplyP{8, 16}, kReplyV{24, 12}, kReplyT{36, 12};
 // A frame's bytes as one number, byte 0 on top; those that a short one lacks are zero.
 [[nodiscard]] constexpr std::uint64_t word_of(std::span<const std::uint8_t> bytes) noexcept {
   std::uint64_t word = 0;
-  for (std::size_t i = 0; i < 8; ++i) word = word << 8U | (i < bytes.size() ? bytes[i] : 0U);
+  if (bytes.size() >= 8) {
+    for (std::size_t i = 0; i < 8; ++i) word = word << 8U | bytes[i];  // one load, as compilers know
+  } else {
+    for (std::size_t i = 0; i < 8; ++i) word = word << 8U | (i < bytes.size() ? bytes[i] : 0U);
+  }
   return word;
 }
 [[nodiscard]] constexpr MitBytes bytes_of(std::uint64_t word) noexcept {

@@ -201,7 +201,7 @@ std::size_t SocketCan::read(std::span<CanFrame> frames) noexcept {
 bool SocketCan::convert(std::size_t i, const ClockReading& now, CanFrame& frame) noexcept {
   const canfd_frame& raw = in_.frames[i];
   const msghdr& header = in_.messages[i].msg_hdr;
-  frame = {};
+  frame.stamp_ns = 0;
   read_control(header, now, frame);
   const std::size_t size = in_.messages[i].msg_len;
   frame.fd = size == CANFD_MTU;
@@ -266,7 +266,7 @@ bool SocketCan::prepare_write(std::size_t i, const CanFrame& frame) noexcept {
   const bool fits = frame.fd ? config_.fd && is_fd_length(frame.length) : frame.length <= CAN_MAX_DLEN;
   if (frame.error || !fits || !is_id(frame.id, frame.extended)) return false;
   canfd_frame& raw = out_.frames[i];
-  raw = {};
+  raw.flags = raw.__res0 = raw.__res1 = 0;
   raw.can_id = frame.id | (frame.extended ? CAN_EFF_FLAG : 0U);
   raw.len = frame.length;
   if (frame.fd && config_.bit_rate_switch) raw.flags = CANFD_BRS;

@@ -85,11 +85,14 @@ void plan_shift(const StepParams& params, const HorizontalMotion& from, std::int
   for (const std::int32_t longer : kLonger_ticks) {
     const std::int32_t ticks = std::max(usual_ticks + longer, least_ticks);
     const double zmp_offset_m = try_shift(ticks);
-    if (zmp_offset_m < least_m) {
+    const bool small = zmp_offset_m <= params.max_zmp_offset_m;
+    // A great one must be over before the foot lifts: it would lift with weight on it.
+    const bool over = ticks - params.lift_hold_ticks >= params.com.zmp_offset_ticks;
+    if ((small || over) && zmp_offset_m < least_m) {
       least_m = zmp_offset_m;
       best_ticks = ticks;
     }
-    if (zmp_offset_m <= params.max_zmp_offset_m) break;
+    if (small) break;
   }
   (void)try_shift(best_ticks);
 }

@@ -114,7 +114,8 @@ TEST(GaitLatch, OtherFootLeadsAfterTheShift_WeightTakesTheTimeOfAWholeShift) {
   }
   EXPECT_EQ(climb.status().step.foot, Foot::kRight);
   const std::int64_t stood_ns = climb.record().steps.back().touch_down_stamp_ns;
-  EXPECT_GT(seconds(climb.status().step.latch_stamp_ns - stood_ns), 2 * 0.62);
+  EXPECT_GT(seconds(climb.status().step.latch_stamp_ns - stood_ns),
+            0.62 + 0.5);  // another one over the same foot takes 0.25 s
   climb.run(60.0);
   EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
   EXPECT_EQ(climb.status().ik_limited_ticks, 0U);
