@@ -87,7 +87,8 @@ constexpr void put(MitBytes& bytes, MitField field, std::uint32_t value) noexcep
   return static_cast<std::uint32_t>((x - least) / (most - least) * steps_of(field) + 0.5);
 }
 [[nodiscard]] constexpr double value_of(std::uint32_t steps, double least, double most, MitField field) noexcept {
-  return least + (most - least) * steps / steps_of(field);
+  // The upper end is the range's own: rounded, it may lie beyond.
+  return steps == steps_of(field) ? most : least + (most - least) * steps / steps_of(field);
 }
 
 }  // namespace detail
