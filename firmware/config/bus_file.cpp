@@ -3,15 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <initializer_list>
 #include <string_view>
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
 
 #include "algorithms/gait/joints/standing_stiffness.hpp"
 #include "firmware/config/param_table.hpp"
-#include "firmware/config/toml_words.hpp"
+#include "firmware/config/toml_reader.hpp"
 
 namespace polygmap::config {
 namespace {
@@ -33,18 +30,10 @@ std::string in_quotes(std::string_view text) { return std::string("\"").append(t
 
 class BusReader {
  public:
-  explicit BusReader(const std::string& path) { file_.path = path; }
+  explicit BusReader(FileName name) : name_(std::move(name)) { file_.path = name_.path; }
 
-  BusFile read() {
-    std::error_code none;
-    if (std::filesystem::is_directory(file_.path, none)) throw FileError(name() + ": it is a folder.");
-    const toml::parse_result parsed = toml::parse_file(file_.path);
-    if (!parsed) {
-      const auto line = parsed.error().source().begin.line;
-      if (line == 0) throw FileError("Cannot read the bus file " + in_quotes(file_.path) + ".");
-      fail(line, toml_words(parsed.error().description()));
-    }
-    const toml::table& root = parsed.table();
+  BusFile read(std::string_view text) {
+    const toml::table root = parse_toml(name_, text);
     only(root, {"bitrate", "drive", "feet"}, "a bus file");
     if (root.contains("bitrate")) {
       file_.table.bitrate_bps = static_cast<std::uint32_t>(whole(root, "", "bitrate", kBitrate, 1));
@@ -57,11 +46,8 @@ class BusReader {
   }
 
  private:
-  [[nodiscard]] std::string name() const { return "Bus file " + in_quotes(file_.path); }
-  [[noreturn]] void fail(toml::source_index line, const std::string& what) const {
-    throw FileError(name() + ", line " + std::to_string(line) + ": " + what + ".");
-  }
-  [[noreturn]] void fail(const std::string& what) const { throw FileError(name() + ": " + what + "."); }
+  [[noreturn]] void fail(toml::source_index line, const std::string& what) const { name_.fail(line, what); }
+  [[noreturn]] void fail(const std::string& what) const { throw FileError(name_.text() + ": " + what + "."); }
 
   void only(const toml::table& table, std::initializer_list<std::string_view> keys, const char* of) const {
     for (const auto& entry : table) {
@@ -223,15 +209,17 @@ class BusReader {
     }
   }
 
+  FileName name_;
   BusFile file_;
 };
 
 }  // namespace
 
-BusFile read_bus(const std::string& path) { return BusReader(path).read(); }
+BusFile parse_bus(const std::string& path, std::string_view text) { return BusReader({"bus", path}).read(text); }
+BusFile read_bus(const std::string& path) { return parse_bus(path, read_text({"bus", path})); }
 
 void limit_by_drives(const BusFile& bus, const JointReference::Params& joints, RobotModel& robot) {
-  const std::string name = "Bus file " + in_quotes(bus.path) + ": ";
+  const std::string name = FileName{"bus", bus.path}.text() + ": ";
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const hal::MitRanges& drive = bus.table.drives[n].ranges;
     JointLimits& limits = robot.drives.limits[n];

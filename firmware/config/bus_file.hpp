@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "algorithms/gait/joints/joint_reference.hpp"
@@ -22,6 +23,8 @@ struct BusFile {
 // Throws FileError, one sentence that names file, line and key, for what is no bus file, and for buses whose load would
 // exceed hal::kMaxBusLoad.
 [[nodiscard]] BusFile read_bus(const std::string& path);
+// path: what the text is called.
+[[nodiscard]] BusFile parse_bus(const std::string& path, std::string_view text);
 
 // The joints' limits become what the drives can do as well: speed, torque, gains. Throws FileError, one sentence, for
 // drives that do not reach their joint's angles, or with which the robot could not stand (standing_stiffness.hpp).

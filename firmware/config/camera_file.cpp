@@ -4,15 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <iomanip>
 #include <limits>
 #include <sstream>
 #include <string_view>
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
 
-#include "firmware/config/toml_words.hpp"
+#include "firmware/config/toml_reader.hpp"
 
 namespace polygmap::config {
 namespace {
@@ -62,54 +59,47 @@ std::string text(double number) {
 
 class CameraFile {
  public:
-  explicit CameraFile(const std::string& path) : path_(path), parsed_(toml::parse_file(path)) {
-    std::error_code none;
-    if (std::filesystem::is_directory(path, none)) fail("it is a folder");
-    if (!parsed_) {
-      const toml::source_position at = parsed_.error().source().begin;  // line 0: it could not be opened
-      throw FileError("Cannot read the camera file \"" + path + "\"" +
-                      (at ? " line " + std::to_string(at.line) : std::string()) + ": " +
-                      toml_words(parsed_.error().description()) + ".");
-    }
-    for (const auto& entry : parsed_.table()) {
-      const std::string_view name = entry.first.str();
-      if (std::none_of(kKeys.begin(), kKeys.end(), [name](const Key& key) { return key.name == name; })) {
-        fail("\"" + std::string(name) + "\" is no key of a camera");
+  CameraFile(FileName name, std::string_view text) : name_(std::move(name)), table_(parse_toml(name_, text)) {
+    for (const auto& entry : table_) {
+      const std::string_view key = entry.first.str();
+      if (std::none_of(kKeys.begin(), kKeys.end(), [key](const Key& known) { return known.name == key; })) {
+        name_.fail(entry.first.source().begin.line, "\"" + std::string(key) + "\" is no key of a camera");
       }
     }
   }
-  [[noreturn]] void fail(const std::string& what) const {
-    throw FileError("Camera file \"" + path_ + "\": " + what + ".");
-  }
+  [[noreturn]] void fail(const std::string& what) const { throw FileError(name_.text() + ": " + what + "."); }
   [[nodiscard]] double number(const Key& key) const {
     const std::string name(key.name);
-    const toml::node* node = parsed_.table().get(key.name);
+    const toml::node* node = table_.get(key.name);
     if (node == nullptr && std::isnan(key.otherwise)) fail(name + " is missing");
     if (node == nullptr) return key.otherwise;
-    const std::string line = "line " + std::to_string(node->source().begin.line) + ": ";
-    if (!node->is_number()) fail(line + name + " must be a number");
+    const std::size_t line = node->source().begin.line;
+    if (!node->is_number()) name_.fail(line, name + " must be a number");
     // A whole number that no double holds has no value<double>(), and is beyond every range here.
     const double value = node->is_integer() ? static_cast<double>(node->as_integer()->get()) : *node->value<double>();
     if (!(value >= key.least && value <= key.most)) {
-      fail(line + name + " must be from " + text(key.least) + " to " + text(key.most) + ", not " + text(value));
+      name_.fail(line, name + " must be from " + text(key.least) + " to " + text(key.most) + ", not " + text(value));
     }
     return value;
   }
   [[nodiscard]] std::int32_t whole(const Key& key) const {
     const double value = number(key);
-    if (value != std::floor(value)) fail(std::string(key.name) + " must be a whole number, not " + text(value));
+    if (value != std::floor(value)) {
+      name_.fail(table_.get(key.name)->source().begin.line,
+                 std::string(key.name) + " must be a whole number, not " + text(value));
+    }
     return static_cast<std::int32_t>(value);
   }
 
  private:
-  std::string path_;
-  toml::parse_result parsed_;
+  FileName name_;
+  toml::table table_;
 };
 
 }  // namespace
 
-CameraProfile read_camera(const std::string& path) {
-  const CameraFile file(path);
+CameraProfile parse_camera(const std::string& path, std::string_view said) {
+  const CameraFile file({"camera", path}, said);
   CameraProfile camera;
   camera.intrinsics = {file.whole(kWidth), file.whole(kHeight), file.number(kFx),       file.number(kFy),
                        file.number(kCx),   file.number(kCy),    file.number(kDepthUnit)};
@@ -126,5 +116,6 @@ CameraProfile read_camera(const std::string& path) {
   }
   return camera;
 }
+CameraProfile read_camera(const std::string& path) { return parse_camera(path, read_text({"camera", path})); }
 
 }  // namespace polygmap::config

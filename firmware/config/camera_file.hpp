@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "algorithms/perception/image/depth_image.hpp"
 #include "algorithms/perception/image/depth_noise_model.hpp"
@@ -21,7 +22,9 @@ struct CameraProfile {
   double max_depth_m = 6.0;
 };
 
-// Throws FileError.
+// Throws FileError, one sentence that names file, line and key.
 [[nodiscard]] CameraProfile read_camera(const std::string& path);
+// path: what the text is called.
+[[nodiscard]] CameraProfile parse_camera(const std::string& path, std::string_view text);
 
 }  // namespace polygmap::config

@@ -3,12 +3,26 @@
 #pragma once
 
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 namespace polygmap::config {
 
+// A sentence goes to a terminal and a journal, and what it quotes is a stranger's: each control character, of ASCII or
+// of Unicode's second block in UTF-8, becomes a question mark.
+[[nodiscard]] inline std::string without_controls(std::string text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const bool second_block = byte == 0xC2 && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xA0;
+    if (second_block) text.erase(i, 1);
+    if (second_block || byte < 0x20 || byte == 0x7F) text[i] = '?';
+  }
+  return text;
+}
+
 // One sentence, with the file's name in it.
 struct FileError : std::runtime_error {
-  using std::runtime_error::runtime_error;
+  explicit FileError(std::string sentence) : std::runtime_error(without_controls(std::move(sentence))) {}
 };
 
 }  // namespace polygmap::config

@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numeric>
 #include <optional>
 #include <utility>
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
 
-#include "firmware/config/toml_words.hpp"
+#include "firmware/config/toml_reader.hpp"
 
 namespace polygmap::config {
 namespace {
@@ -53,37 +50,28 @@ std::string kind_of(const toml::node& node) {
 
 class ParamFile {
  public:
-  ParamFile(const std::string& path, const ParamTable& table) : path_(path), table_(table) {}
+  ParamFile(FileName name, const ParamTable& table) : name_(std::move(name)), table_(table) {}
 
-  void read() {
-    std::error_code none;
-    if (std::filesystem::is_directory(path_, none)) throw FileError(name() + ": it is a folder.");
-    const toml::parse_result parsed = toml::parse_file(path_);
-    if (!parsed) {
-      const auto line = parsed.error().source().begin.line;
-      if (line == 0) throw FileError("Cannot read the parameter file \"" + path_ + "\".");
-      fail(line, toml_words(parsed.error().description()));
-    }
-    refuse_others(parsed.table());
-    take(parsed.table(), "");
+  void read(std::string_view text) {
+    const toml::table root = parse_toml(name_, text);
+    refuse_others(root);
+    take(root, "");
     for (const ParamOrder& order : table_.orders) check(order);
   }
 
  private:
-  [[nodiscard]] std::string name() const { return "Parameter file \"" + path_ + "\""; }
-  [[noreturn]] void fail(toml::source_index line, const std::string& what) const {
-    throw FileError(name() + ", line " + std::to_string(line) + ": " + what + ".");
-  }
+  [[noreturn]] void fail(toml::source_index line, const std::string& what) const { name_.fail(line, what); }
   [[noreturn]] void fail(const toml::node& node, const std::string& what) const {
     fail(node.source().begin.line, what);
   }
   // Whoever gives one for the other needs no nearest name.
   void refuse_others(const toml::table& from) const {
     if (from.contains("width") && from.contains("height") && from.contains("fx")) {
-      throw FileError(name() + " looks like a camera file (it has width, height and fx), which holds no parameters.");
+      throw FileError(name_.text() +
+                      " looks like a camera file (it has width, height and fx), which holds no parameters.");
     }
     if (from.contains("drive")) {
-      throw FileError(name() + " looks like a bus file (it has drives), which holds no parameters.");
+      throw FileError(name_.text() + " looks like a bus file (it has drives), which holds no parameters.");
     }
   }
   [[nodiscard]] const Param* find(const std::string& full) const {
@@ -189,13 +177,18 @@ class ParamFile {
     fail(line, order.less + ", " + text_of(*less) + ", must not be more than " + order.more + ", " + text_of(*more));
   }
 
-  const std::string& path_;
+  FileName name_;
   const ParamTable& table_;
   std::vector<std::pair<std::string, toml::source_index>> lines_;  // of what the file says
 };
 
 }  // namespace
 
-void read_params(const std::string& path, const ParamTable& table) { ParamFile(path, table).read(); }
+void parse_params(const std::string& path, std::string_view text, const ParamTable& table) {
+  ParamFile({"parameter", path}, table).read(text);
+}
+void read_params(const std::string& path, const ParamTable& table) {
+  parse_params(path, read_text({"parameter", path}), table);
+}
 
 }  // namespace polygmap::config

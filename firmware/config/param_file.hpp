@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "firmware/config/file_error.hpp"
 #include "firmware/config/param_table.hpp"
@@ -11,6 +12,8 @@ namespace polygmap::config {
 
 // Throws FileError, one sentence that names file, line and key; what the table points into may be half changed then.
 void read_params(const std::string& path, const ParamTable& table);
+// path: what the text is called.
+void parse_params(const std::string& path, std::string_view text, const ParamTable& table);
 
 template <class T>
 void read_params(const std::string& path, T& params) {

@@ -180,6 +180,17 @@ bool RecordingFile::open(const std::string& directory) {
       return false;
     }
   }
+  return read_beginning();
+}
+
+bool RecordingFile::open(const std::string& name, std::FILE* recording, std::FILE* pictures) {
+  directory_ = name;
+  file_ = recording;
+  picture_file_ = pictures;
+  return read_beginning();
+}
+
+bool RecordingFile::read_beginning() {
   return read_header() && read_params() && read_schedule() && read_camera() && read_gain_limits() && open_pictures();
 }
 

@@ -69,6 +69,8 @@ class RecordingFile {
 
   // Each false when the file is none, or not of this module: complaint() says where and why.
   [[nodiscard]] bool open(const std::string& directory);
+  // Of files that are open, and become this one's; name: what they are called in sentences, as their directory.
+  [[nodiscard]] bool open(const std::string& name, std::FILE* recording, std::FILE* pictures);
   [[nodiscard]] bool read(Record& record);
   [[nodiscard]] bool read_picture(const Picture& picture, std::span<std::uint16_t> pixels);
   // One sentence with file and byte. For whoever finds something else wrong with the record read last.
@@ -84,6 +86,7 @@ class RecordingFile {
   template <Number T>
   [[nodiscard]] bool take(T& value, const char* what);
   [[nodiscard]] bool take_name(std::string& name);
+  [[nodiscard]] bool read_beginning();
   [[nodiscard]] bool read_header();
   [[nodiscard]] bool read_params();
   [[nodiscard]] bool read_schedule();

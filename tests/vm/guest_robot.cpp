@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// guest_robot BUS_FILE [--imu PORT] [--mute DRIVE] [--unplug DRIVE@S] [--notify NAME]: a robot that stands, as a
-// process of its own on the guest's CAN buses: each drive answers its commands and follows them at once, the feet's
-// board and the IMU (a Livox Mid-360's datagrams) speak once a cycle. DRIVE is a joint's index; a mute one never
-// answers, an unplugged one not from S seconds on. It listens on the abstract socket NAME as a service manager does. It
-// ends with SIGTERM, and prints "ROBOT commands= ..." and what the daemon told. guest_robot --as-nobody PROGRAM
-// ARGUMENT...: the program without any right of root. guest_robot --black DEVICE: vivid's pictures have no depth in
-// them.
+// guest_robot BUS_FILE [--imu PORT] [--stranger PORT] [--mute DRIVE] [--unplug DRIVE@S] [--notify NAME]: a robot that
+// stands, as a process of its own on the guest's CAN buses: each drive answers its commands and follows them at once,
+// the feet's board and the IMU (a Livox Mid-360's datagrams) speak once a cycle. To --stranger, poses of a lidar
+// odometry go ten times a second, good ones, from an address that nobody configured. DRIVE is a joint's index; a mute
+// one never answers, an unplugged one not from S seconds on. It listens on the abstract socket NAME as a service
+// manager does. It ends with SIGTERM, and prints "ROBOT commands= ..." and what the daemon told. guest_robot
+// --as-nobody PROGRAM ARGUMENT...: the program without any right of root. guest_robot --black DEVICE: vivid's pictures
+// have no depth in them.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <grp.h>
@@ -26,6 +27,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,12 +35,15 @@
 #include "algorithms/robot/leg_kinematics.hpp"
 #include "algorithms/robot/robot_model.hpp"
 #include "firmware/config/bus_file.hpp"
+#include "hal/codec/lio_packet.hpp"
 #include "hal/codec/livox_packet.hpp"
 
 namespace polygmap::vm {
 namespace {
 
 constexpr double kHalfWeight_n = 270.0;
+constexpr std::uint32_t kStranger = INADDR_LOOPBACK + 1;  // 127.0.0.2, an address of this machine, too
+constexpr unsigned kCyclesPerPose = 50;
 
 [[noreturn]] void refuse(const std::string& why) {
   std::fprintf(stderr, "guest_robot: %s\n", why.c_str());
@@ -53,6 +58,7 @@ std::int64_t monotonic_ns() {
 struct Options {
   std::string bus_file;
   int imu_port = 56401;
+  int stranger_port = 0;  // 0: there is none
   std::size_t mute = kJointCount, unplugged = kJointCount;
   double unplugged_s = 0.0;
   std::string notify;
@@ -70,6 +76,7 @@ class StandingRobot {
     }
     for (const std::string& bus : bus_.buses) sockets_.push_back({open_bus(bus), POLLIN, 0});
     udp_ = socket(AF_INET, SOCK_DGRAM, 0);
+    if (options.stranger_port != 0) stranger_ = open_stranger();
     if (!options.notify.empty()) sockets_.push_back({open_notify(options.notify), POLLIN, 0});
     told_.reserve(4096);
   }
@@ -82,7 +89,8 @@ class StandingRobot {
     }
   }
   void print() const {
-    std::printf("ROBOT commands=%zu enters=%zu exits=%zu gains=%d\n", commands_, enters_, exits_, has_gains_ ? 1 : 0);
+    std::printf("ROBOT commands=%zu enters=%zu exits=%zu gains=%d poses=%u\n", commands_, enters_, exits_,
+                has_gains_ ? 1 : 0, poses_);
     for (const std::string& state : told_) std::printf("TOLD %s\n", state.c_str());
   }
 
@@ -94,6 +102,19 @@ class StandingRobot {
     address.can_ifindex = static_cast<int>(if_nametoindex(name.c_str()));
     if (bus < 0 || bind(bus, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) refuse("no bus " + name);
     return bus;
+  }
+  static int open_stranger() {
+    const int udp = socket(AF_INET, SOCK_DGRAM, 0);
+    sockaddr_in from = address_of(kStranger, 0);
+    if (udp < 0 || bind(udp, reinterpret_cast<sockaddr*>(&from), sizeof from) != 0) refuse("cannot send as a stranger");
+    return udp;
+  }
+  static sockaddr_in address_of(std::uint32_t host, int port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    address.sin_addr.s_addr = htonl(host);
+    return address;
   }
   static int open_notify(const std::string& name) {
     const int listens = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -155,11 +176,21 @@ class StandingRobot {
     packet.accel_mps2 = {0.0F, 0.0F, codec::kStandardGravity_mps2};
     std::array<std::uint8_t, codec::kLivoxImuPacket_bytes> bytes{};
     codec::encode(packet, bytes);
-    sockaddr_in to{};
-    to.sin_family = AF_INET;
-    to.sin_port = htons(static_cast<std::uint16_t>(options_.imu_port));
-    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    (void)sendto(udp_, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&to), sizeof to);
+    send_datagram(udp_, bytes, options_.imu_port);
+    if (stranger_ >= 0 && imu_count_ % kCyclesPerPose == 0) send_pose();
+  }
+  void send_pose() {
+    codec::LioPacket packet;
+    packet.sequence = poses_++;
+    packet.stamp_ns = monotonic_ns();
+    packet.position_sigma_m = packet.rotation_sigma_rad = {0.01, 0.01, 0.01};
+    std::array<std::uint8_t, codec::kLioPacket_bytes> bytes{};
+    codec::encode(packet, bytes);
+    send_datagram(stranger_, bytes, options_.stranger_port);
+  }
+  static void send_datagram(int udp, std::span<const std::uint8_t> bytes, int port) {
+    const sockaddr_in to = address_of(INADDR_LOOPBACK, port);
+    (void)sendto(udp, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
   }
   template <std::size_t Bytes>
   void send(std::size_t bus, std::uint32_t id, const std::array<std::uint8_t, Bytes>& bytes) {
@@ -173,10 +204,11 @@ class StandingRobot {
   const Options& options_;
   const config::BusFile bus_;
   std::vector<pollfd> sockets_;  // the buses', then the service manager's
-  int udp_ = -1;
+  int udp_ = -1, stranger_ = -1;
   std::int64_t begin_ns_ = 0;
   JointVector q_rad_ = JointVector::Zero();
   std::uint16_t imu_count_ = 0;
+  std::uint32_t poses_ = 0;
   std::size_t commands_ = 0, enters_ = 0, exits_ = 0;
   bool has_gains_ = false;
   std::vector<std::string> told_;
@@ -214,13 +246,15 @@ int make_black(const char* path) {
 Options parse(int argc, char** argv) {
   Options options;
   if (argc < 2 || argc % 2 != 0)
-    refuse("usage: BUS_FILE [--imu PORT] [--mute DRIVE] [--unplug DRIVE@S] [--notify NAME]");
+    refuse("usage: BUS_FILE [--imu PORT] [--stranger PORT] [--mute DRIVE] [--unplug DRIVE@S] [--notify NAME]");
   options.bus_file = argv[1];
   for (int i = 2; i + 1 < argc; i += 2) {
     const std::string_view key = argv[i];
     char* end = nullptr;
     if (key == "--imu") {
       options.imu_port = std::atoi(argv[i + 1]);
+    } else if (key == "--stranger") {
+      options.stranger_port = std::atoi(argv[i + 1]);
     } else if (key == "--mute") {
       options.mute = std::strtoul(argv[i + 1], nullptr, 10);
     } else if (key == "--unplug") {

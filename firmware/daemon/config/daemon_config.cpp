@@ -5,13 +5,12 @@
 
 #include <array>
 #include <filesystem>
-#include <fstream>
 
 #include "algorithms/core/capacities.hpp"
 #include "algorithms/core/math/transform.hpp"
 #include "firmware/config/camera_file.hpp"
 #include "firmware/config/param_file.hpp"
-#include "firmware/config/toml_words.hpp"
+#include "firmware/config/toml_reader.hpp"
 #include "firmware/daemon/config/toml_section.hpp"
 
 namespace polygmap::daemon {
@@ -179,18 +178,12 @@ class DaemonFile {
 
 }  // namespace
 
+DaemonConfig parse_daemon_config(const std::string& path, std::string_view text) {
+  const toml::table root = config::parse_toml({"daemon", path}, text);
+  return DaemonFile(path, root).read();
+}
 DaemonConfig read_daemon_config(const std::string& path) {
-  const std::string name = "Daemon file \"" + path + "\"";
-  std::error_code none;
-  if (std::filesystem::is_directory(path, none)) throw config::FileError(name + ": it is a folder.");
-  const toml::parse_result parsed = toml::parse_file(path);
-  if (!parsed) {
-    const auto line = parsed.error().source().begin.line;
-    if (line == 0) throw config::FileError("Cannot read the daemon file \"" + path + "\".");
-    throw config::FileError(name + ", line " + std::to_string(line) + ": " +
-                            config::toml_words(parsed.error().description()) + ".");
-  }
-  return DaemonFile(path, parsed.table()).read();
+  return parse_daemon_config(path, config::read_text({"daemon", path}));
 }
 
 }  // namespace polygmap::daemon

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -48,5 +49,7 @@ struct DaemonConfig {
 // Throws config::FileError, one sentence that names file, line and key, for whatever is wrong with the file or with one
 // that it names. Paths in it are relative to its folder. Opens no device.
 [[nodiscard]] DaemonConfig read_daemon_config(const std::string& path);
+// path: where the text is said to be.
+[[nodiscard]] DaemonConfig parse_daemon_config(const std::string& path, std::string_view text);
 
 }  // namespace polygmap::daemon

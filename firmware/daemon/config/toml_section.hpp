@@ -8,11 +8,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
 
-#include "firmware/config/file_error.hpp"
 #include "firmware/config/param_table.hpp"
+#include "firmware/config/toml_reader.hpp"
 
 namespace polygmap::daemon {
 
@@ -28,7 +26,7 @@ class TomlSection {
       : path_(std::move(path)), name_(std::move(name)), table_(table), line_(line) {}
 
   [[noreturn]] void fail(toml::source_index line, const std::string& what) const {
-    throw config::FileError("Daemon file \"" + path_ + "\", line " + std::to_string(line) + ": " + what + ".");
+    config::FileName{"daemon", path_}.fail(line, what);
   }
   [[noreturn]] void fail(std::string_view key, const std::string& what) const {
     fail(line_of(key), full(key) + " " + what);
