@@ -124,7 +124,8 @@ int run_service(const DaemonConfig& config, const std::string& record_directory)
                      .let_go = [&devices] { devices.let_go(); },
                      .heap = counted_heap(),
                      .devices = &counts,
-                     .recorder = recorder ? &*recorder : nullptr};
+                     .recorder = recorder ? &*recorder : nullptr,
+                     .hook = row_hook()};
   Service service(config, std::move(parts), signals, notifier);
   const Outcome outcome = service.run();
   std::fprintf(stderr, "polygmapd: %s\n", outcome.why.c_str());

@@ -148,10 +148,11 @@ class Plant {
                                                                                 : "none";
     std::printf(
         "PLANT steps=%d of=%d fell=%d support=%.*s commands=%zu enters=%zu pictures=%lld picture_off_mm=%.2f "
-        "late_max_us=%lld refused=%zu unwitnessed=%zu\n",
+        "late_max_us=%lld refused=%zu unwitnessed=%zu down_s=%.3f\n",
         steps_climbed_, options_.steps, truth.fell ? 1 : 0, static_cast<int>(support.size()), support.data(), commands_,
         enters_, static_cast<long long>(camera_.shown()), 1e3 * camera_.farthest_m(),
-        static_cast<long long>(late_max_ns_ / 1000), refused_, unwitnessed_);
+        static_cast<long long>(late_max_ns_ / 1000), refused_, unwitnessed_,
+        1e-9 * static_cast<double>(in_the_air_ns_ - gains_ns_));
     if (truth.fell) std::printf("PLANT fell: %s\n", truth.fall_reason.c_str());
     for (const Told& told : told_) std::printf("TOLD %.3f %s\n", told.since_s, told.state.c_str());
   }
@@ -277,6 +278,8 @@ class Plant {
     disturb();
     camera_.tick(tick, due_ns, PictureKey::of(robot_.truth().true_T_base, robot_.true_q_rad()));
     count_steps();
+    const sim::Truth& truth = robot_.truth();
+    if (!truth.in_contact[0] || !truth.in_contact[1]) in_the_air_ns_ = due_ns;
   }
   void sense(std::int64_t now_ns) {
     const hal::CanFeet& feet = bus_.table.feet;
@@ -383,6 +386,7 @@ class Plant {
   std::array<Drive, kJointCount> drives_;
   JointFeedback feedback_;  // as the last tick left it
   std::int64_t begin_ns_ = 0, gains_ns_ = -1, late_max_ns_ = 0;
+  std::int64_t in_the_air_ns_ = 0;  // when a foot was it last
   std::uint16_t imu_count_ = 0;
   std::uint32_t lio_count_ = 0;
   bool was_off_ = false;

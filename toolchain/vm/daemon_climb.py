@@ -10,8 +10,12 @@ import machine
 
 PACKAGE = machine.ROOT / "build/package"
 GUEST_PLANT = machine.ROOT / "build/orin/tests/vm/guest_plant"
+INJECTED = machine.ROOT / "build/orin/firmware/daemon/polygmapd_inject"
 RELEASE = machine.ROOT / "build/release"
-TARGETS = ("orin:guest_plant", "release:render_climb", "release:recorded_frames", "release:polygmap_replay")
+OF_A_ROW = re.compile(r"(allocate|overrun=\w+)@[\d.]+")
+ON_THE_BUS = re.compile(r"((unplug|busoff|garbage|duplicate)=\d+(\+\d+)?|gap=\d+)@[\d.]+")
+LOST = ("flagged", "short", "wrong_stamp", "missing", "pushed_out", "timeouts")  # of what the camera's driver counts
+TARGETS = ("orin:guest_plant", "orin:polygmapd_inject", "release:render_climb", "release:recorded_frames", "release:polygmap_replay")
 PERIOD_TICKS = 12  # of the rendered pictures
 LATENCY_MS, EXPOSURE_MS = 22, 16  # of the camera; its stamp is that of the exposure's end, less the latency
 DISK_BYTES = 1 << 31  # sparse
@@ -66,13 +70,14 @@ def render(work, args):
     return book
 
 
-def main_script(args, daemon="/usr/bin/polygmapd", prefix=""):
-    inject = args.inject or ""
+def main_script(args):
+    """In the guest. What a row does is injected by another build of the daemon, all else by the robot."""
+    of_a_row = bool(args.inject and OF_A_ROW.fullmatch(args.inject))
     words = {"gait": args.gait, "latency": LATENCY_MS, "exposure": EXPOSURE_MS, "perception_cpu": args.cpus - 1,
              "one_lane": ONE_LANE if args.lanes == 1 else ""}
     run = {"seed": args.seed, "steps": args.steps, "picture_latency": LATENCY_MS + EXPOSURE_MS // 2,
-           "inject": f"--inject {inject}" if inject and not prefix else "", "daemon": prefix + daemon,
-           "limit_tenths": 10 * (15 + 5 * args.steps)}
+           "inject": f"--inject {args.inject}" if args.inject and not of_a_row else "",
+           "daemon": "/job/polygmapd_inject" if of_a_row else "/usr/bin/polygmapd", "limit_tenths": 10 * (15 + 5 * args.steps)}
     return CONFIG.format(**words) + RUN.format(**run)
 
 
@@ -99,26 +104,35 @@ def compare(out, bus):
 
 
 def judge(out, args):
-    """The line RESULT of what a run left in out, and its figures."""
+    """What a run left in out: its figures, and whether it climbed without a flaw."""
     plant, daemon = ((out / name).read_text() if (out / name).exists() else "" for name in ("plant.txt", "daemon.txt"))
     robot, last, camera = numbers("PLANT", plant), numbers("stopped", daemon), numbers("device camera", daemon)
     frames = compare(out, args.bus)
     ticks, differ = replay(out / "recording")
-    lost = sum(int(camera.get(key, 0)) for key in ("flagged", "short", "wrong_stamp", "missing", "pushed_out", "timeouts"))
     figures = {
         "steps": int(robot.get("steps", 0)), "ticks": int(last.get("cycles", 0)),
         "overruns": sum(int(last.get(key, 1)) for key in ("overruns", "skipped", "caught_up")),
         "page_faults": int(last.get("page_faults", 1)), "heap_calls": int(last.get("heap_calls", 1)),
         "frames": frames.get("frames", 0), "frames_differ": frames.get("frames_differ", 0) + frames.get("missing", 0),
         "replayed": ticks, "ticks_differ": differ, "wake_max_us": last.get("wake_max_us"),
-        "pictures": int(camera.get("good", 0)), "pictures_lost": lost, "state": last.get("state"),
-        "phase": last.get("phase"), "support": robot.get("support"), "exit": last.get("exit")}
-    wrong = [key for key in ("overruns", "page_faults", "heap_calls", "frames_differ", "ticks_differ", "pictures_lost")
-             if figures[key]]
-    good = (not wrong and figures["steps"] == args.steps and robot.get("fell") == "0" and figures["support"] == "both"
-            and figures["frames"] > 0 and figures["pictures"] > 0 and ticks == figures["ticks"] and figures["exit"] == "0")
-    line = f"RESULT {'pass' if good else 'fail'} " + " ".join(f"{key}={value}" for key, value in figures.items())
-    return line, good
+        "pictures": int(camera.get("good", 0)), "pictures_lost": sum(int(camera.get(key, 0)) for key in LOST),
+        "state": last.get("state"), "phase": last.get("phase"), "reason": last.get("reason"),
+        "support": robot.get("support"), "fell": robot.get("fell"), "exit": last.get("exit"), "down_s": robot.get("down_s")}
+    flaws = ("overruns", "page_faults", "heap_calls", "frames_differ", "ticks_differ", "pictures_lost")
+    good = (not any(figures[key] for key in flaws) and figures["steps"] == args.steps and figures["fell"] == "0"
+            and figures["support"] == "both" and figures["frames"] > 0 and figures["pictures"] > 0
+            and ticks == figures["ticks"] and figures["exit"] == "0")
+    return figures, good
+
+
+def told(out):
+    """What the daemon told the service manager: (seconds since the drives had gains, text)."""
+    found = re.findall(r"^TOLD (-?[\d.]+) (.*)$", (out / "plant.txt").read_text(), re.M)
+    return [(float(since_s), text) for since_s, text in found]
+
+
+def line_of(figures, good):
+    return f"RESULT {'pass' if good else 'fail'} " + " ".join(f"{key}={value}" for key, value in figures.items())
 
 
 def package():
@@ -128,16 +142,24 @@ def package():
     return next(PACKAGE.glob("polygmap_*_arm64.deb"))
 
 
-def climb(args, work, deb):
+def boot(args, work, deb, book):
+    """One climb in the guest; what it leaves is in work/out."""
     work.mkdir(parents=True, exist_ok=True)
-    files = {"package.deb": deb, "guest_plant": GUEST_PLANT, "book": render(work, args), "bus.toml": args.bus}
+    files = {"package.deb": deb, "guest_plant": GUEST_PLANT, "book": book, "bus.toml": args.bus}
+    if args.inject and OF_A_ROW.fullmatch(args.inject):
+        (work / "injection").write_text(args.inject)
+        files |= {"injection": work / "injection", "polygmapd_inject": INJECTED}
     machine.run(work, main_script(args), files, cpus=args.cpus, camera=True, limit_s=args.limit, disk_bytes=DISK_BYTES,
                 more_mb=RECORDED_MB)
-    files["book"].unlink()
-    line, good = judge(work / "out", args)
+
+
+def climb(args, work, deb):
+    work.mkdir(parents=True, exist_ok=True)
+    boot(args, work, deb, render(work, args))
+    figures, good = judge(work / "out", args)
     if args.keep:
         args.keep.mkdir(parents=True, exist_ok=True)
         shutil.copy(work / "serial.log", args.keep)
         shutil.copytree(work / "out", args.keep, dirs_exist_ok=True)
-    say(line)
+    say(line_of(figures, good))
     return 0 if good else 1

@@ -73,11 +73,13 @@ class Service::Tasks {
         board_(board),
         joints_(parts.joints),
         recorder_(parts.recorder),
+        hook_(parts.hook),
         rows_(pipeline, parts.recorder) {}
   void ask_to_stop() noexcept { stop_asked_.store(true, std::memory_order_release); }
 
   Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
     if (row == kFirstRow && stop_asked_.load(std::memory_order_acquire)) request_stop();
+    if (hook_ != nullptr) hook_->before_row(row, cycle_ns);
     return rows_.run_row(row, cycle_ns, budget);
   }
   void cycle_done(std::size_t lane, const CycleReport& report) noexcept {
@@ -99,6 +101,7 @@ class Service::Tasks {
   StatusBoard& board_;
   const hal::CanJointBus* joints_;
   recording::Recorder* recorder_;
+  RowHook* hook_;
   recording::RecordedTasks<Pipeline> rows_;
   bool stop_recorded_ = false;
   std::atomic<bool> stop_asked_{false};

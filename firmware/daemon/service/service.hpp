@@ -17,6 +17,7 @@
 #include "firmware/daemon/config/daemon_config.hpp"
 #include "firmware/daemon/exit_code.hpp"
 #include "firmware/daemon/service/device_counts.hpp"
+#include "firmware/daemon/service/row_hook.hpp"
 #include "firmware/daemon/service/status_board.hpp"
 #include "firmware/daemon/service/stop_signals.hpp"
 #include "firmware/daemon/system/heap_count.hpp"
@@ -36,6 +37,7 @@ struct ServiceParts {
   HeapCount heap{};
   DeviceCounts* devices = nullptr;          // null: there are no drivers whose counters could be told
   recording::Recorder* recorder = nullptr;  // has begun, and stands before the ports; null: nothing is recorded
+  RowHook* hook = nullptr;                  // of a test's build
 };
 
 struct Outcome {

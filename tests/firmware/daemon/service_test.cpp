@@ -53,7 +53,8 @@ class ServiceTest : public testing::Test {
             .let_go = [this] { ++let_go_; },
             .heap = {},
             .devices = &counts_,
-            .recorder = nullptr};
+            .recorder = nullptr,
+            .hook = nullptr};
   }
   // The same, with a recorder before the ports.
   ServiceParts recorded_parts(recording::Recorder& recorder) {
@@ -64,7 +65,8 @@ class ServiceTest : public testing::Test {
             .let_go = std::move(all.let_go),
             .heap = {},
             .devices = &counts_,
-            .recorder = &recorder};
+            .recorder = &recorder,
+            .hook = nullptr};
   }
   // Runs the service on a thread of its own, as long as during() takes, then SIGTERM.
   template <typename During>
