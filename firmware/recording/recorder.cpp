@@ -12,6 +12,26 @@ namespace {
 
 constexpr std::size_t kHeaderMemory_bytes = 1024U * 1024U;
 
+// Where a lane's health counts what its executive raises.
+struct EventPlace {
+  bool is_fault = false;
+  std::size_t index = 0;
+};
+constexpr auto kEventPlaces = [] {
+  std::array<EventPlace, kEventTable<ExecutiveEvent>.size()> places{};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    Health probe;
+    probe.raise(kEventTable<ExecutiveEvent>[i].code, 0);
+    for (std::size_t n = 0; n < kFaultTable.size(); ++n) {
+      if (probe.counts<Fault>()[n].count > 0) places[i] = {true, n};
+    }
+    for (std::size_t n = 0; n < kLimitTable.size(); ++n) {
+      if (probe.counts<Limit>()[n].count > 0) places[i] = {false, n};
+    }
+  }
+  return places;
+}();
+
 void put_name(ByteWriter& out, std::string_view name) {
   out.put(static_cast<std::uint16_t>(name.size()));
   out.put_bytes(name.data(), name.size());
@@ -136,22 +156,14 @@ void Recorder::request_stop() noexcept {
 void Recorder::put_events(std::size_t lane) noexcept {
   LaneLog& log = logs_[lane];
   const Health& health = pipeline_->lane_health(lane);
-  std::size_t i = 0;
-  for (const auto& line : kEventTable<ExecutiveEvent>) {
-    Health probe;
-    probe.raise(line.code, 0);
-    EventCount count;
-    for (const auto& fault : kFaultTable) {
-      if (probe.count(fault.code).count > 0) count = health.count(fault.code);
-    }
-    for (const auto& limit : kLimitTable) {
-      if (probe.count(limit.code).count > 0) count = health.count(limit.code);
-    }
-    std::uint32_t& told = log.told[i++];
+  for (std::size_t i = 0; i < kEventPlaces.size(); ++i) {
+    const EventCount& count = kEventPlaces[i].is_fault ? health.counts<Fault>()[kEventPlaces[i].index]
+                                                       : health.counts<Limit>()[kEventPlaces[i].index];
+    std::uint32_t& told = log.told[i];
     if (count.count == told) continue;
     const std::size_t begin = put_record(log.out, RecordKind::kEvent);
     log.out.put(static_cast<std::uint8_t>(lane));
-    log.out.put(line.code);
+    log.out.put(kEventTable<ExecutiveEvent>[i].code);
     log.out.put(count.last_ns);
     log.out.put(count.count - told);
     put_length(log.out, begin);

@@ -82,6 +82,7 @@ class Camera {
       : output_(output), book_(book), latency_ns_(latency_ns) {}
 
   void tick(std::int64_t tick, std::int64_t now_ns, const PictureKey& key) noexcept {
+    if (tick == 1) past_.fill(key);
     past_[static_cast<std::size_t>(tick) % past_.size()] = key;
     if (first_ns_ < 0) {
       if (!output_.input_is_taken()) return;

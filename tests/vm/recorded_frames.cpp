@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // recorded_frames RECORDING BUS_FILE LOG: the commands of the daemon's recording, encoded here, against the frames that
 // the drives got (a log as candump -L writes it). Of each drive the n-th frame is the n-th command that the bus took,
-// or a frame that enters motor mode in its place. Prints "FRAMES frames= frames_differ= special= missing= cycles=".
+// or a frame that enters motor mode in its place. Prints "FRAMES frames= frames_differ= special= missing= cycles=
+// pictures= lost=".
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -46,13 +47,19 @@ int compare(const std::string& directory, const config::BusFile& file, const Fra
   recording::RecordingFile recording;
   if (!recording.open(directory)) return refuse(recording.complaint());
   std::array<std::size_t, kJointCount> next{};
-  std::size_t frames = 0, differ = 0, special = 0, missing = 0, cycles = 0;
+  std::size_t frames = 0, differ = 0, special = 0, missing = 0, cycles = 0, pictures = 0;
+  std::uint32_t last = 0, lost = 0;  // by the pictures' numbers, from the first one on
   recording::Record record;
   bool ended = false;
   while (!ended && recording.read(record)) {
     ended = record.kind == recording::RecordKind::kEnd;
     if (record.kind != recording::RecordKind::kRow) continue;
     for (const recording::PortCall& call : record.row.calls) {
+      if (call.kind == recording::CallKind::kAcquire && call.gave) {
+        lost += pictures > 0 ? call.frame.sequence - last - 1 : 0;
+        last = call.frame.sequence;
+        ++pictures;
+      }
       if (call.kind != recording::CallKind::kWriteJoints) continue;
       ++cycles;
       for (std::size_t n = 0; n < kJointCount; ++n) {
@@ -74,8 +81,8 @@ int compare(const std::string& directory, const config::BusFile& file, const Fra
     }
   }
   for (std::size_t n = 0; n < kJointCount; ++n) differ += seen[n].size() - next[n];  // that no command was
-  std::printf("FRAMES frames=%zu frames_differ=%zu special=%zu missing=%zu cycles=%zu\n", frames, differ, special,
-              missing, cycles);
+  std::printf("FRAMES frames=%zu frames_differ=%zu special=%zu missing=%zu cycles=%zu pictures=%zu lost=%u\n", frames,
+              differ, special, missing, cycles, pictures, lost);
   if (!ended) return refuse(recording.complaint());
   return frames > 0 && differ == 0 && missing == 0 ? 0 : 1;
 }

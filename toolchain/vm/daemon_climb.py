@@ -14,7 +14,7 @@ INJECTED = machine.ROOT / "build/orin/firmware/daemon/polygmapd_inject"
 RELEASE = machine.ROOT / "build/release"
 OF_A_ROW = re.compile(r"(allocate|overrun=\w+)@[\d.]+")
 ON_THE_BUS = re.compile(r"((unplug|busoff|garbage|duplicate)=\d+(\+\d+)?|gap=\d+)@[\d.]+")
-LOST = ("flagged", "short", "wrong_stamp", "missing", "pushed_out", "timeouts")  # of what the camera's driver counts
+BAD = ("flagged", "short_ones", "wrong_stamp", "missing", "timeouts")  # of what the camera's driver counts
 TARGETS = ("orin:guest_plant", "orin:polygmapd_inject", "release:render_climb", "release:recorded_frames", "release:polygmap_replay")
 PERIOD_TICKS = 12  # of the rendered pictures
 LATENCY_MS, EXPOSURE_MS = 22, 16  # of the camera; its stamp is that of the exposure's end, less the latency
@@ -115,7 +115,8 @@ def judge(out, args):
         "page_faults": int(last.get("page_faults", 1)), "heap_calls": int(last.get("heap_calls", 1)),
         "frames": frames.get("frames", 0), "frames_differ": frames.get("frames_differ", 0) + frames.get("missing", 0),
         "replayed": ticks, "ticks_differ": differ, "wake_max_us": last.get("wake_max_us"),
-        "pictures": int(camera.get("good", 0)), "pictures_lost": sum(int(camera.get(key, 0)) for key in LOST),
+        "pictures": frames.get("pictures", 0),
+        "pictures_lost": frames.get("lost", 1) + sum(int(camera.get(key, 0)) for key in BAD),
         "state": last.get("state"), "phase": last.get("phase"), "reason": last.get("reason"),
         "support": robot.get("support"), "fell": robot.get("fell"), "exit": last.get("exit"), "down_s": robot.get("down_s")}
     flaws = ("overruns", "page_faults", "heap_calls", "frames_differ", "ticks_differ", "pictures_lost")
