@@ -3,7 +3,9 @@
 // guest, which cannot render in time, shows the one that was taken from where it is.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <span>
@@ -80,7 +82,7 @@ class PictureBook {
   // not shown: a robot that stands sees another noise in every picture.
   [[nodiscard]] std::size_t nearest(const PictureKey& now, std::size_t last, double& distance2_m2) const noexcept {
     constexpr std::size_t kBack = 40, kAhead = 200;
-    constexpr double kAsNear_m2 = 2e-4 * 2e-4;
+    constexpr double kAsNear_m = 5e-4;
     const std::size_t from = last < kBack ? 0 : last - kBack, to = std::min(last + kAhead, keys_.size());
     std::size_t best = from;
     distance2_m2 = keys_[from].distance2_m2(now);
@@ -88,8 +90,9 @@ class PictureBook {
       const double d2 = keys_[n].distance2_m2(now);
       if (d2 < distance2_m2) distance2_m2 = d2, best = n;
     }
+    const double as_near_m = std::sqrt(distance2_m2) + kAsNear_m;
     for (std::size_t n = last + 1; n < to; ++n) {
-      if (keys_[n].distance2_m2(now) <= distance2_m2 + kAsNear_m2) return n;
+      if (keys_[n].distance2_m2(now) <= as_near_m * as_near_m) return n;
     }
     return best;
   }
