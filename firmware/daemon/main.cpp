@@ -91,7 +91,7 @@ int run_replay(const std::string& directory) {
   return static_cast<int>(result.verdict);
 }
 
-// With a second of pictures, and of all else what a minute of climbing takes at 2 kB a cycle.
+// A second of pictures, and of all else, 4 kB a cycle, four seconds.
 constexpr recording::Recorder::Capacity kRecorded{.queue_bytes = 8U * 1024U * 1024U, .pictures = 32};
 
 // Empty, or why nothing can be written there.
