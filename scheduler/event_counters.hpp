@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <string_view>
 #include <tuple>
 #include <type_traits>
@@ -98,6 +99,11 @@ class EventCounters {
   [[nodiscard]] constexpr EventCount count(Code code) const noexcept {
     const std::size_t i = index_of_event(code);
     return i < kEventTable<Code>.size() ? of<Code>()[i] : EventCount{};
+  }
+  // Of all codes, in the order of their table.
+  template <typename Code>
+  [[nodiscard]] constexpr std::span<const EventCount> counts() const noexcept {
+    return of<Code>();
   }
   template <typename Code>
   [[nodiscard]] constexpr bool any() const noexcept {

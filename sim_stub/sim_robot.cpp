@@ -45,8 +45,7 @@ Transform start_transform(const StartPose& start) {
 std::unique_ptr<Plant> make_plant(const SimOptions& options, const StairWorld& stairs, const RobotErrors& errors,
                                   const StartPose& start) {
   if (options.plant_kind == PlantKind::kMujoco) {
-    auto plant =
-        std::make_unique<MujocoPlant>(options.mujoco, stairs, errors, start_transform(start), standing_q_rad());
+    auto plant = make_mujoco_plant(options.mujoco, stairs, errors, start_transform(start), standing_q_rad());
     constexpr int kSettle_ticks = 1000;  // it has stood there for a while
     for (int i = 0; i < kSettle_ticks; ++i) plant->step(standing_command());
     return plant;

@@ -11,6 +11,7 @@
 #include "firmware/daemon/config/daemon_config.hpp"
 #include "firmware/daemon/service/device_counts.hpp"
 #include "firmware/pipeline.hpp"
+#include "firmware/recording/recorder.hpp"
 #include "hal/can/can_joint_bus.hpp"
 #include "hal/linux/socket_can.hpp"
 
@@ -28,6 +29,8 @@ class Devices {
   // After open().
   [[nodiscard]] Ports ports() noexcept;
   [[nodiscard]] const hal::CanJointBus& joints() const noexcept { return *joints_; }
+  // Whom a recorder asks to keep pictures.
+  [[nodiscard]] recording::PictureKeeper& picture_keeper() noexcept { return keeper_; }
   // After open(): all counters of all devices. They refer to this.
   void count_in(DeviceCounts& counts) const;
   // Opens anew what was lost; each call tries once. Some ten times a second, outside the lanes.
@@ -40,6 +43,16 @@ class Devices {
    public:
     [[nodiscard]] bool try_read(LioSample&) noexcept override { return false; }
   };
+  // The camera's second holder.
+  class Keeper final : public recording::PictureKeeper {
+   public:
+    explicit Keeper(hal::V4l2Camera& camera) noexcept : camera_(camera) {}
+    [[nodiscard]] bool try_keep(DepthFrameView& frame) noexcept override { return camera_.try_share(frame); }
+    void let_go() noexcept override { camera_.release_second(); }
+
+   private:
+    hal::V4l2Camera& camera_;
+  };
   [[nodiscard]] std::string open_buses(const DaemonConfig& config);
   [[nodiscard]] std::string open_imu(const DaemonConfig& config);
 
@@ -49,6 +62,7 @@ class Devices {
   std::vector<std::unique_ptr<hal::SocketCan>> sockets_;  // one a bus of the table
   std::optional<hal::CanJointBus> joints_;
   hal::V4l2Camera camera_;
+  Keeper keeper_{camera_};
   std::unique_ptr<hal::LivoxImu> livox_;  // one of the two
   std::unique_ptr<hal::SerialImu> serial_;
   std::unique_ptr<hal::LioUdp> lio_;

@@ -10,6 +10,7 @@ enum class ExitCode : int {
   kConfiguration = 2,
   kDevice = 3,
   kNoRealTime = 4,
+  kRecording = 5,  // as 0, but the recording that was asked for is not complete, or could not be begun
 };
 [[nodiscard]] constexpr int number_of(ExitCode code) noexcept { return static_cast<int>(code); }
 

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,31 +19,38 @@ namespace polygmap::daemon {
 namespace {
 
 constexpr const char* kUsage =
-    "polygmapd --config FILE [--check]   runs the module with the devices of this file; --check only reads it\n"
+    "polygmapd --config FILE [--record DIR]   runs the module with the devices of this file; writes all that goes in\n"
+    "                                         and comes out into DIR, for --replay\n"
+    "polygmapd --config FILE --check     only reads it\n"
     "polygmapd --replay DIR              feeds a recording to the module and compares what comes out\n"
     "polygmapd --doctor [--json] [--strict] [--config FILE]   says what on this machine hinders it, and what to do\n"
     "polygmapd --version\n"
     "\n"
-    "Exit codes of --config: 0 asked to stop, 1 stopped by itself, 2 configuration, 3 device, 4 no real time.\n"
+    "Exit codes of --config: 0 asked to stop, 1 stopped by itself, 2 configuration, 3 device, 4 no real time, 5 as 0 "
+    "with the\n"
+    "recording incomplete.\n"
     "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording. Of --doctor: 0 nothing hinders, 1 "
     "else; with --strict a warning hinders, too.\n";
 
 struct Options {
   enum class Mode { kRun, kCheck, kReplay, kDoctor, kHelp, kVersion } mode = Mode::kRun;
-  std::string config, recording;
+  std::string config, recording;  // recording: to be replayed, or written
   bool json = false, strict = false;
 };
 
 // Empty, or what is wrong.
 std::string parse(int argc, char** argv, Options& options) {
   std::vector<std::string_view> modes;
-  bool checks = false;
+  bool checks = false, records = false;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
-    const bool takes_value = word == "--config" || word == "--replay";
+    const bool takes_value = word == "--config" || word == "--replay" || word == "--record";
     if (takes_value && (i + 1 == argc || argv[i + 1][0] == '\0')) return std::string(word) + " takes a path";
     if (word == "--config") {
       options.config = argv[++i];
+    } else if (word == "--record") {
+      options.recording = argv[++i];
+      records = true;
     } else if (word == "--replay") {
       options.recording = argv[++i];
       options.mode = Options::Mode::kReplay;
@@ -64,6 +73,7 @@ std::string parse(int argc, char** argv, Options& options) {
   if (options.json && options.mode != Options::Mode::kDoctor) return "--json is of --doctor";
   if (options.strict && options.mode != Options::Mode::kDoctor) return "--strict is of --doctor";
   if (modes.empty() && options.config.empty()) return "--config FILE is missing";
+  if (records && (checks || !modes.empty())) return "--record is of --config alone";
   if (checks && !modes.empty()) return "--check is of --config";
   if (checks) options.mode = Options::Mode::kCheck;
   return {};
@@ -81,7 +91,18 @@ int run_replay(const std::string& directory) {
   return static_cast<int>(result.verdict);
 }
 
-int run_service(const DaemonConfig& config) {
+// A second of pictures, and of all else, 4 kB a cycle, four seconds.
+constexpr recording::Recorder::Capacity kRecorded{.queue_bytes = 8U * 1024U * 1024U, .pictures = 32};
+
+// Empty, or why nothing can be written there.
+std::string begin_recording(recording::Recorder& recorder, const std::string& directory, const Params& params) {
+  std::error_code error;
+  std::filesystem::create_directory(directory, error);  // what fails here the recorder says of its files
+  recorder.begin(directory, params);
+  return recorder.failed() ? recorder.finish() : std::string();
+}
+
+int run_service(const DaemonConfig& config, const std::string& record_directory) {
   const StopSignals signals;
   Notifier notifier;
   if (!notifier.open()) return complain("NOTIFY_SOCKET names no socket that can be used.", ExitCode::kConfiguration);
@@ -89,16 +110,28 @@ int run_service(const DaemonConfig& config) {
   if (const std::string wrong = devices.open(config); !wrong.empty()) return complain(wrong, ExitCode::kDevice);
   DeviceCounts counts;
   devices.count_in(counts);
-  ServiceParts parts{.ports = devices.ports(),
+  std::optional<recording::Recorder> recorder;
+  if (!record_directory.empty()) {
+    recording::Recorder::Capacity capacity = kRecorded;
+    capacity.keeper = &devices.picture_keeper();
+    recorder.emplace(devices.ports(), capacity);
+    const std::string wrong = begin_recording(*recorder, record_directory, config.params);
+    if (!wrong.empty()) return complain(wrong, ExitCode::kRecording);
+  }
+  ServiceParts parts{.ports = recorder ? recorder->ports() : devices.ports(),
                      .joints = &devices.joints(),
                      .maintain = [&devices] { devices.maintain(); },
                      .let_go = [&devices] { devices.let_go(); },
                      .heap = counted_heap(),
-                     .devices = &counts};
+                     .devices = &counts,
+                     .recorder = recorder ? &*recorder : nullptr,
+                     .hook = row_hook()};
   Service service(config, std::move(parts), signals, notifier);
   const Outcome outcome = service.run();
   std::fprintf(stderr, "polygmapd: %s\n", outcome.why.c_str());
-  const bool ran = outcome.code == ExitCode::kAsked || outcome.code == ExitCode::kStoppedItself;
+  if (!outcome.recording_failure.empty()) std::fprintf(stderr, "polygmapd: %s\n", outcome.recording_failure.c_str());
+  const bool ran = outcome.code == ExitCode::kAsked || outcome.code == ExitCode::kStoppedItself ||
+                   outcome.code == ExitCode::kRecording;
   if (ran) std::printf("%s%s", counts.text().c_str(), text_of(outcome).c_str());
   std::fflush(stdout);
   if (outcome.threads_hang) std::_Exit(number_of(outcome.code));
@@ -117,7 +150,7 @@ int run_with_config(const Options& options) {
     std::printf("%s can be used.\n", options.config.c_str());
     return 0;
   }
-  return run_service(config);
+  return run_service(config, options.recording);
 }
 
 int run(int argc, char** argv) {

@@ -18,9 +18,8 @@ namespace polygmap::recording {
 using HealthCounts = std::array<EventCount, kFaultTable.size() + kLimitTable.size()>;
 [[nodiscard]] inline HealthCounts counts_of(const Health& health) noexcept {
   HealthCounts counts;
-  auto next = counts.begin();
-  for (const auto& line : kFaultTable) *next++ = health.count(line.code);
-  for (const auto& line : kLimitTable) *next++ = health.count(line.code);
+  const auto faults_end = std::ranges::copy(health.counts<Fault>(), counts.begin()).out;
+  std::ranges::copy(health.counts<Limit>(), faults_end);
   return counts;
 }
 void walk_health(auto& f, const HealthCounts& counts) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/recording/recorder.hpp"
 
+#include <algorithm>
 #include <cerrno>
+#include <cstring>
 
 #include "firmware/config/param_table.hpp"
 
@@ -9,6 +11,26 @@ namespace polygmap::recording {
 namespace {
 
 constexpr std::size_t kHeaderMemory_bytes = 1024U * 1024U;
+
+// Where a lane's health counts what its executive raises.
+struct EventPlace {
+  bool is_fault = false;
+  std::size_t index = 0;
+};
+constexpr auto kEventPlaces = [] {
+  std::array<EventPlace, kEventTable<ExecutiveEvent>.size()> places{};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    Health probe;
+    probe.raise(kEventTable<ExecutiveEvent>[i].code, 0);
+    for (std::size_t n = 0; n < kFaultTable.size(); ++n) {
+      if (probe.counts<Fault>()[n].count > 0) places[i] = {true, n};
+    }
+    for (std::size_t n = 0; n < kLimitTable.size(); ++n) {
+      if (probe.counts<Limit>()[n].count > 0) places[i] = {false, n};
+    }
+  }
+  return places;
+}();
 
 void put_name(ByteWriter& out, std::string_view name) {
   out.put(static_cast<std::uint16_t>(name.size()));
@@ -72,15 +94,18 @@ void put_length(ByteWriter& out, std::size_t begin) noexcept {
 
 }  // namespace
 
-Recorder::Recorder(const Ports& robot) : robot_(robot) {
+Recorder::Recorder(const Ports& robot, const Capacity& capacity)
+    : robot_(robot), capacity_(capacity), logs_{LaneLog(capacity.queue_bytes), LaneLog(capacity.queue_bytes)} {
+  static_assert(kLaneCount == 2);
   const CameraIntrinsics camera = robot.camera.intrinsics();
   if (camera.width_px > 0 && camera.height_px > 0) {
     picture_px_ = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
   }
-  pixels_.resize(kPicturesPerFlush * picture_px_);
+  pixels_.resize(capacity_.pictures * picture_px_);
 }
 
 Recorder::~Recorder() {
+  if (copy_.kept) capacity_.keeper->let_go();
   for (std::FILE* file : {file_, picture_file_}) {
     if (file != nullptr) (void)std::fclose(file);
   }
@@ -90,29 +115,35 @@ void Recorder::begin(const std::string& directory, const Params& params) {
   directory_ = directory;
   const CameraIntrinsics camera = robot_.camera.intrinsics();
   file_ = std::fopen((directory + "/" + kFileName).c_str(), "wb");
-  picture_file_ = std::fopen((directory + "/" + kPictureFileName).c_str(), "wb");
-  if (file_ == nullptr || picture_file_ == nullptr) {
-    failure_ = "Cannot write \"" + directory + "/" + (file_ == nullptr ? kFileName : kPictureFileName) +
-               "\": " + std::strerror(errno) + ".";
-    return;
+  if (file_ != nullptr) picture_file_ = std::fopen((directory + "/" + kPictureFileName).c_str(), "wb");
+  if (picture_file_ == nullptr) {
+    errno_.store(errno);
+    unmade_file_ = file_ == nullptr ? kFileName : kPictureFileName;
+    return fail(Failure::kBegin);
   }
   std::vector<std::byte> memory(kHeaderMemory_bytes);
   ByteWriter header(memory);
   put_header(header, params, camera);
-  write(file_, header.bytes().data(), header.size(), kFileName);
+  write(file_, header.bytes().data(), header.size());
   header.clear();
   header.put_bytes(kPictureMagic.data(), kPictureMagic.size());
   header.put(kVersion);
   header.put(camera.width_px);
   header.put(camera.height_px);
-  write(picture_file_, header.bytes().data(), header.size(), kPictureFileName);
+  write(picture_file_, header.bytes().data(), header.size());
 }
 
-void Recorder::write(std::FILE* file, const void* bytes, std::size_t count, const char* name) {
-  if (!failure_.empty() || count == 0) return;
-  if (std::fwrite(bytes, 1, count, file) != count) {
-    failure_ = "Cannot write \"" + directory_ + "/" + name + "\": " + std::strerror(errno) + ".";
-  }
+void Recorder::fail(Failure failure) noexcept {
+  Failure none = Failure::kNone;  // the first one is told
+  (void)failure_.compare_exchange_strong(none, failure, std::memory_order_acq_rel);
+}
+
+void Recorder::write(std::FILE* file, const void* bytes, std::size_t count) noexcept {
+  const Failure before = failure_.load(std::memory_order_acquire);
+  if (before == Failure::kBegin || before == Failure::kWrite || count == 0) return;
+  if (std::fwrite(bytes, 1, count, file) == count) return;
+  errno_.store(errno);
+  fail(Failure::kWrite);
 }
 
 void Recorder::request_stop() noexcept {
@@ -125,22 +156,14 @@ void Recorder::request_stop() noexcept {
 void Recorder::put_events(std::size_t lane) noexcept {
   LaneLog& log = logs_[lane];
   const Health& health = pipeline_->lane_health(lane);
-  std::size_t i = 0;
-  for (const auto& line : kEventTable<ExecutiveEvent>) {
-    Health probe;
-    probe.raise(line.code, 0);
-    EventCount count;
-    for (const auto& fault : kFaultTable) {
-      if (probe.count(fault.code).count > 0) count = health.count(fault.code);
-    }
-    for (const auto& limit : kLimitTable) {
-      if (probe.count(limit.code).count > 0) count = health.count(limit.code);
-    }
-    std::uint32_t& told = log.told[i++];
+  for (std::size_t i = 0; i < kEventPlaces.size(); ++i) {
+    const EventCount& count = kEventPlaces[i].is_fault ? health.counts<Fault>()[kEventPlaces[i].index]
+                                                       : health.counts<Limit>()[kEventPlaces[i].index];
+    std::uint32_t& told = log.told[i];
     if (count.count == told) continue;
     const std::size_t begin = put_record(log.out, RecordKind::kEvent);
     log.out.put(static_cast<std::uint8_t>(lane));
-    log.out.put(line.code);
+    log.out.put(kEventTable<ExecutiveEvent>[i].code);
     log.out.put(count.last_ns);
     log.out.put(count.count - told);
     put_length(log.out, begin);
@@ -151,7 +174,7 @@ void Recorder::put_events(std::size_t lane) noexcept {
 void Recorder::begin_row(std::size_t row, std::int64_t cycle_ns, const WorkBudget& budget) noexcept {
   const std::size_t lane = kTasks[row].row.lane;
   LaneLog& log = logs_[lane];
-  begin_frame(log, cycle_ns);
+  log.head.cycle_ns = cycle_ns;
   put_events(lane);
   log.length_at = put_record(log.out, RecordKind::kRow);
   log.out.put(static_cast<std::uint8_t>(row));
@@ -167,7 +190,7 @@ void Recorder::end_row(std::size_t row, Progress progress, const WorkBudget& bud
   const std::size_t lane = kTasks[row].row.lane;
   LaneLog& log = logs_[lane];
   const LaneView& view = lane == kControlLane ? pipeline_->control().view() : pipeline_->perception().view();
-  log.frames[log.frame_count - 1].saw_ns = view.last_ns();
+  log.head.saw_ns = view.last_ns();
   log.out.put_at(log.count_at - sizeof(std::int64_t), view.other_finished_ns());
   log.out.put_at(log.count_at, log.calls);
   log.out.put(progress);
@@ -191,66 +214,103 @@ void Recorder::cycle_done(std::size_t lane, const CycleReport& report) noexcept 
   out.put(report.skipped_before);
   put_length(out, begin);
   if (lane == kControlLane) ++cycles_;
+  hand_over(logs_[lane]);
+  // An executive of one lane has the rows of both.
+  constexpr std::size_t kFirstOfPerception = [] {
+    std::size_t row = 0;
+    while (kTasks[row].row.lane != kPerceptionLane) ++row;
+    return row;
+  }();
+  const std::uint32_t rows = report.ran | report.shed | report.deferred;
+  if (lane == kControlLane && rows >> kFirstOfPerception != 0) hand_over(logs_[kPerceptionLane]);
 }
 
-void Recorder::begin_frame(LaneLog& log, std::int64_t cycle_ns) noexcept {
-  if (log.frame_count > 0 && log.frames[log.frame_count - 1].cycle_ns == cycle_ns) return;
-  if (log.frame_count == kFramesPerFlush) {
-    no_room_[static_cast<std::size_t>(&log - logs_.data())] = true;
-    log.frames[kFramesPerFlush - 1].cycle_ns = cycle_ns;
-    return;
+void Recorder::hand_over(LaneLog& log) noexcept {
+  if (log.out.full()) fail(Failure::kFrameTooLarge);
+  const std::span<const std::byte> head(reinterpret_cast<const std::byte*>(&log.head), sizeof log.head);
+  if (log.out.size() > 0 && !failed() && !log.queue.try_push(head, log.out.bytes())) fail(Failure::kQueueFull);
+  log.out.clear();
+  log.head = {};
+}
+
+bool Recorder::load(LaneLog& log) noexcept {
+  if (!log.next.empty()) return true;
+  const std::span<std::byte> block = log.queue.pop(log.next_memory);
+  if (block.empty()) return false;
+  std::memcpy(&log.next_head, block.data(), sizeof log.next_head);
+  log.next = block.subspan(sizeof log.next_head);
+  return true;
+}
+
+// A lane hands its frame over before the other one can see it (RecordedTasks). So what a frame saw is in the other
+// queue when it is looked into after the frame was there.
+void Recorder::write_out() {
+  for (std::size_t lane = 0, waited = 0; waited < kLaneCount;) {
+    LaneLog &log = logs_[lane], &other = logs_[1 - lane];
+    const bool sees_all =
+        load(log) && (!load(other) || other.next_head.cycle_ns > log.next_head.saw_ns) && write_frame(log);
+    waited = sees_all ? 0 : waited + 1;
+    if (!sees_all) lane = 1 - lane;
   }
-  log.frames[log.frame_count] = {log.frame_count == 0 ? 0 : log.out.size(), cycle_ns, kNoFrame_ns};
-  ++log.frame_count;
 }
 
-void Recorder::write_frame(const LaneLog& log, std::size_t frame) {
-  const std::size_t begin = log.frames[frame].begin;
-  const std::size_t end = frame + 1 < log.frame_count ? log.frames[frame + 1].begin : log.out.size();
-  write(file_, log.out.bytes().data() + begin, end - begin, kFileName);
+bool Recorder::write_frame(LaneLog& log) {
+  const std::uint32_t written = pictures_written_.load(std::memory_order_relaxed);
+  if (pictures_copied_.load(std::memory_order_acquire) - written < log.next_head.pictures) return false;
+  for (std::uint32_t i = 0; i < log.next_head.pictures; ++i) {
+    const std::uint16_t* pixels = pixels_.data() + ((written + i) % capacity_.pictures) * picture_px_;
+    const std::uint64_t hash = hash_of_pixels(pixels, picture_px_);
+    std::memcpy(log.next.data() + log.next_head.hash_at[i], &hash, sizeof hash);
+    write(picture_file_, pixels, picture_px_ * sizeof(std::uint16_t));
+    pictures_written_.store(written + i + 1, std::memory_order_release);
+  }
+  write(file_, log.next.data(), log.next.size());
+  log.next = {};
+  return true;
 }
 
 void Recorder::flush() {
-  std::array<std::size_t, kLaneCount> next{};
-  const auto frame_of = [&](std::size_t lane) -> const Frame* {
-    return next[lane] < logs_[lane].frame_count ? &logs_[lane].frames[next[lane]] : nullptr;
-  };
-  for (std::size_t lane = 0; frame_of(kControlLane) != nullptr || frame_of(kPerceptionLane) != nullptr;) {
-    const Frame *frame = frame_of(lane), *other = frame_of(1 - lane);
-    // What the other lane has left it did not see, or it is that one's turn; both cannot wait for each other.
-    if (frame != nullptr && (other == nullptr || other->cycle_ns > frame->saw_ns)) {
-      write_frame(logs_[lane], next[lane]++);
-    } else {
-      lane = 1 - lane;
-    }
-  }
-  for (LaneLog& log : logs_) {
-    no_room_[0] = no_room_[0] || log.out.full();
-    if (log.frame_count == 0) write(file_, log.out.bytes().data(), log.out.size(), kFileName);
-    log.out.clear();
-    log.frame_count = 0;
-  }
-  write(picture_file_, pixels_.data(), pictures_waiting_ * picture_px_ * sizeof(std::uint16_t), kPictureFileName);
-  pictures_waiting_ = 0;
-  if ((no_room_[0] || no_room_[1]) && failure_.empty())
-    failure_ = "A tick had more to record than there is memory for.";
+  for (LaneLog& log : logs_) hand_over(log);
+  copy_pixels(picture_px_);
+  write_out();
 }
 
 std::string Recorder::finish() {
   flush();
-  ByteWriter& out = logs_[kControlLane].out;
-  const std::size_t begin = put_record(out, RecordKind::kEnd);
-  out.put(cycles_);
-  out.put(pictures_);
-  put_length(out, begin);
-  flush();
+  if (!failed()) {
+    ByteWriter& out = logs_[kControlLane].out;
+    const std::size_t begin = put_record(out, RecordKind::kEnd);
+    out.put(cycles_);
+    out.put(pictures_);
+    put_length(out, begin);
+    flush();
+  }
   for (std::FILE** file : {&file_, &picture_file_}) {
-    if (*file != nullptr && std::fclose(*file) != 0 && failure_.empty()) {
-      failure_ = "Cannot write into \"" + directory_ + "\": " + std::strerror(errno) + ".";
+    if (*file != nullptr && std::fclose(*file) != 0) {
+      errno_.store(errno);
+      fail(Failure::kWrite);
     }
     *file = nullptr;
   }
-  return failure_;
+  return sentence();
+}
+
+std::string Recorder::sentence() const {
+  switch (failure_.load(std::memory_order_acquire)) {
+    case Failure::kNone:
+      break;
+    case Failure::kBegin:
+      return "Cannot write \"" + directory_ + "/" + unmade_file_ + "\": " + std::strerror(errno_.load()) + ".";
+    case Failure::kWrite:
+      return "Cannot write into \"" + directory_ + "\": " + std::strerror(errno_.load()) + ".";
+    case Failure::kFrameTooLarge:
+      return "The recording in \"" + directory_ + "\" ends early: a cycle had more to record than there is memory for.";
+    case Failure::kQueueFull:
+      return "The recording in \"" + directory_ + "\" ends early: its queue was full.";
+    case Failure::kPicturesFull:
+      return "The recording in \"" + directory_ + "\" ends early: its queue of pictures was full.";
+  }
+  return {};
 }
 
 void Recorder::put_call(LaneLog& log, CallKind kind, bool gave) const noexcept {
@@ -321,16 +381,39 @@ bool Recorder::try_acquire(DepthFrameView& frame) noexcept {
     log.out.put(Pixels::kOtherSize);
   } else {
     log.out.put(Pixels::kStored);
-    log.out.put(hash_of_pixels(frame.depth, picture_px_));
-    if (pictures_waiting_ == kPicturesPerFlush) {
-      no_room_[kPerceptionLane] = true;
-      return true;
-    }
-    std::memcpy(pixels_.data() + pictures_waiting_ * picture_px_, frame.depth, picture_px_ * sizeof(std::uint16_t));
-    ++pictures_waiting_;
-    ++pictures_;
+    put_picture(log, frame);
   }
   return true;
+}
+
+// The hash takes longer than a row has: it is the other thread's work, as is the file's.
+void Recorder::put_picture(LaneLog& log, const DepthFrameView& frame) noexcept {
+  copy_pixels(picture_px_);  // the rest of the one before, if a lane was so late
+  const std::size_t waiting = pictures_ - pictures_written_.load(std::memory_order_acquire);
+  if (waiting == capacity_.pictures || log.head.pictures == kPicturesPerFrame) fail(Failure::kPicturesFull);
+  log.head.hash_at[log.head.pictures % kPicturesPerFrame] = static_cast<std::uint32_t>(log.out.size());
+  log.out.put(std::uint64_t{0});
+  if (failed()) return;
+  ++log.head.pictures;
+  ++pictures_;
+  DepthFrameView kept = frame;
+  const bool is_kept = capacity_.keeper != nullptr && capacity_.keeper->try_keep(kept);
+  copy_ = {is_kept ? kept.depth : frame.depth, 0, is_kept};
+  if (!copy_.kept) copy_pixels(picture_px_);
+}
+
+void Recorder::copy_piece() noexcept { copy_pixels(kPiece_px); }
+
+void Recorder::copy_pixels(std::size_t most_px) noexcept {
+  if (copy_.from == nullptr) return;
+  const std::size_t count = std::min(most_px, picture_px_ - copy_.done_px);
+  std::uint16_t* to = pixels_.data() + ((pictures_ - 1) % capacity_.pictures) * picture_px_ + copy_.done_px;
+  std::memcpy(to, copy_.from + copy_.done_px, count * sizeof *to);
+  copy_.done_px += count;
+  if (copy_.done_px < picture_px_) return;
+  if (copy_.kept) capacity_.keeper->let_go();
+  copy_ = {};
+  pictures_copied_.store(pictures_, std::memory_order_release);
 }
 
 void Recorder::release() noexcept {

@@ -178,4 +178,10 @@ Vec3 MujocoPlant::true_p_com_m() const noexcept {
   return {p[0], p[1], p[2]};
 }
 
+std::unique_ptr<Plant> make_mujoco_plant(const MujocoPlant::Params& params, const StairWorld& world,
+                                         const RobotErrors& errors, const Transform& true_T_start,
+                                         const JointVector& q_rad) {
+  return std::make_unique<MujocoPlant>(params, world, errors, true_T_start, q_rad);
+}
+
 }  // namespace polygmap::sim

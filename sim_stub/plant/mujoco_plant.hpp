@@ -84,4 +84,9 @@ class MujocoPlant final : public Plant {
   std::string fall_reason_;
 };
 
+// As its constructor. A program without the physics library has one that refuses.
+[[nodiscard]] std::unique_ptr<Plant> make_mujoco_plant(const MujocoPlant::Params& params, const StairWorld& world,
+                                                       const RobotErrors& errors, const Transform& true_T_start,
+                                                       const JointVector& q_rad);
+
 }  // namespace polygmap::sim

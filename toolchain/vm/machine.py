@@ -62,7 +62,8 @@ def lines_of(process, limit_s):
         yield rest.decode(errors="replace")
 
 
-def run(work, main, files, *, cpus=1, camera=False, limit_s=120, hold_back=None):
+def run(work, main, files, *, cpus=1, camera=False, limit_s=120, hold_back=None, disk_bytes=DISK_BYTES,
+        more_mb=0):
     """Boots, runs the shell script `main` with `files` ({name in /job: path}) beside it. Prints the console as it
     comes, but for lines that begin with hold_back. Returns it and leaves it in work/serial.log, and in work/out what the job
     left in /out."""
@@ -76,9 +77,9 @@ def run(work, main, files, *, cpus=1, camera=False, limit_s=120, hold_back=None)
     archive.close()
     disk.unlink(missing_ok=True)
     with open(disk, "wb") as file:
-        file.truncate(DISK_BYTES)
+        file.truncate(disk_bytes)
     # The archive is in memory twice while the kernel unpacks it.
-    memory_mb = 256 + 2 * archive_path.stat().st_size // 2**20
+    memory_mb = 256 + more_mb + 2 * archive_path.stat().st_size // 2**20
     console = []
     with open(work / "serial.log", "w") as log, started(command(archive_path, disk, memory_mb, cpus)) as process:
         try:

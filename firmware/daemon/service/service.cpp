@@ -20,6 +20,8 @@ namespace {
 constexpr std::int64_t kLook_ns = 10 * kNsPerMs;       // of the daemon's own thread
 constexpr std::int64_t kMaintain_ns = 100 * kNsPerMs;  // lost devices are opened anew
 constexpr std::int64_t kMaintainerEnds_ns = 300 * kNsPerMs;
+constexpr std::int64_t kWrite_ns = 5 * kNsPerMs;      // what the lanes recorded is written
+constexpr std::int64_t kWriterEnds_ns = 2 * kNsPerS;  // with what a slow disk has before it
 constexpr std::int64_t kStatus_ns = kNsPerS;
 constexpr std::int64_t kComplain_ns = kNsPerS;
 constexpr std::uint64_t kTicksPerCount = 50;          // of a lane: then it publishes what its drivers counted
@@ -66,16 +68,22 @@ struct Service::LaneRun {
 // The module's rows, the operator's request to stop before them, and what they say of themselves after.
 class Service::Tasks {
  public:
-  Tasks(Pipeline& pipeline, StatusBoard& board, const hal::CanJointBus* joints) noexcept
-      : pipeline_(pipeline), board_(board), joints_(joints) {}
+  Tasks(Pipeline& pipeline, StatusBoard& board, const ServiceParts& parts) noexcept
+      : pipeline_(pipeline),
+        board_(board),
+        joints_(parts.joints),
+        recorder_(parts.recorder),
+        hook_(parts.hook),
+        rows_(pipeline, parts.recorder) {}
   void ask_to_stop() noexcept { stop_asked_.store(true, std::memory_order_release); }
 
   Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
-    if (row == kFirstRow && stop_asked_.load(std::memory_order_acquire)) pipeline_.control().request_stop();
-    return pipeline_.run_row(row, cycle_ns, budget);
+    if (row == kFirstRow && stop_asked_.load(std::memory_order_acquire)) request_stop();
+    if (hook_ != nullptr) hook_->before_row(row, cycle_ns);
+    return rows_.run_row(row, cycle_ns, budget);
   }
   void cycle_done(std::size_t lane, const CycleReport& report) noexcept {
-    pipeline_.cycle_done(lane, report);
+    rows_.cycle_done(lane, report);
     if (lane != kControlLane) return;
     const JointSet heard = joints_ == nullptr ? JointSet::all() : joints_->heard();
     board_.publish(pipeline_.control(), JointSet::of_bits(JointSet::all().bits() & ~heard.bits()));
@@ -84,9 +92,18 @@ class Service::Tasks {
  private:
   static constexpr std::size_t kFirstRow = 0;  // of control's
   static_assert(kSchedule[kFirstRow].lane == kControlLane);
+  void request_stop() noexcept {
+    if (recorder_ == nullptr) return pipeline_.control().request_stop();
+    if (!stop_recorded_) recorder_->request_stop();
+    stop_recorded_ = true;
+  }
   Pipeline& pipeline_;
   StatusBoard& board_;
   const hal::CanJointBus* joints_;
+  recording::Recorder* recorder_;
+  RowHook* hook_;
+  recording::RecordedTasks<Pipeline> rows_;
+  bool stop_recorded_ = false;
   std::atomic<bool> stop_asked_{false};
 };
 
@@ -117,7 +134,15 @@ Service::~Service() {
   for (auto& lane : lanes_) {
     if (lane) lane->thread.join();
   }
-  if (maintainer_.thread.joinable()) maintainer_.thread.join();
+  for (Helper* helper : {&maintainer_, &writer_}) {
+    if (helper->thread.joinable()) helper->thread.join();
+  }
+}
+bool Service::Helper::ends_before(std::int64_t until_ns) const noexcept {
+  while (thread.joinable() && !has_ended.load(std::memory_order_acquire) && monotonic_ns() < until_ns) {
+    sleep_until(monotonic_ns() + kNsPerMs);
+  }
+  return !thread.joinable() || has_ended.load(std::memory_order_acquire);
 }
 
 Outcome Service::run() {
@@ -134,7 +159,8 @@ Outcome Service::run() {
   }
   fault_in_stack();
   pipeline_ = std::make_unique<Pipeline>(parts_.ports, config_.params);
-  tasks_ = std::make_unique<Tasks>(*pipeline_, board_, parts_.joints);
+  if (parts_.recorder != nullptr) parts_.recorder->watch(*pipeline_);
+  tasks_ = std::make_unique<Tasks>(*pipeline_, board_, parts_);
   if (outcome.why = start_lanes(); !outcome.why.empty()) return outcome;
   const Decision decision = watch();
   parts_.heap.stop();
@@ -191,6 +217,7 @@ std::string Service::start_lanes() {
   if (!wrong.empty()) ends_.store(true, std::memory_order_release);
   if (wrong.empty()) {
     maintainer_.thread = std::thread([this] { maintain(); });
+    if (parts_.recorder != nullptr) writer_.thread = std::thread([this] { write_recording(); });
     parts_.heap.start();
   }
   first_due_ns_.store(monotonic_ns() + kFirstDue_ns, std::memory_order_release);
@@ -226,6 +253,8 @@ void Service::run_lane(LaneRun& lane) noexcept {
       if (Table[row].lane == Lane) board_.rows[row].store(executive.row_statistics(row));
     }
     if (ticks % kTicksPerCount == 0) publish_devices();
+    constexpr bool kHasPerception = Lane == kPerceptionLane || lane_count(Table) == 1;
+    if (kHasPerception && parts_.recorder != nullptr) parts_.recorder->copy_piece();
   }
   publish_devices();
   lane.page_faults = thread_page_faults() - faults;
@@ -256,6 +285,15 @@ void Service::maintain() noexcept {
     parts_.maintain();
   }
   maintainer_.has_ended.store(true, std::memory_order_release);
+}
+
+// A disk may hold its writer up for longer than the queues last: the recorder says so then.
+void Service::write_recording() noexcept {
+  while (!ends_.load(std::memory_order_acquire)) {
+    sleep_until(monotonic_ns() + kWrite_ns);
+    parts_.recorder->write_out();
+  }
+  writer_.has_ended.store(true, std::memory_order_release);
 }
 
 std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
@@ -320,6 +358,10 @@ void Service::log_changes() noexcept {
 }
 
 void Service::log_trouble(std::int64_t now_ns) noexcept {
+  if (parts_.recorder != nullptr && !seen_.recording_failed && parts_.recorder->failed()) {
+    seen_.recording_failed = true;
+    std::fprintf(stderr, "polygmapd: the recording has ended; the module goes on without it.\n");
+  }
   if (now_ns - seen_.complained_ns < kComplain_ns) return;
   StatusText rows, devices;
   write_more_late_rows(rows, board_, logged_overruns_);
@@ -352,12 +394,18 @@ void Service::finish(Outcome& outcome) {
   }
   outcome.cycles = board_.lanes[kControlLane].cycles.load();
   outcome.module = board_.module();
-  const std::int64_t until_ns = monotonic_ns() + kMaintainerEnds_ns;
-  while (!maintainer_.has_ended.load(std::memory_order_acquire) && monotonic_ns() < until_ns) {
-    sleep_until(monotonic_ns() + kNsPerMs);
-  }
-  outcome.threads_hang = lanes_hang || !maintainer_.has_ended.load(std::memory_order_acquire);
+  const bool maintainer_ends = maintainer_.ends_before(monotonic_ns() + kMaintainerEnds_ns);
+  outcome.threads_hang = lanes_hang || !maintainer_ends;
   if (!lanes_hang && outcome.module.state == ModuleState::kArming) parts_.let_go();
+  if (parts_.recorder != nullptr) finish_recording(outcome, lanes_hang);
+}
+
+void Service::finish_recording(Outcome& outcome, bool lanes_hang) {
+  const bool writer_ends = writer_.ends_before(monotonic_ns() + kWriterEnds_ns);
+  outcome.threads_hang = outcome.threads_hang || !writer_ends;
+  outcome.recording_failure = writer_ends && !lanes_hang ? parts_.recorder->finish()
+                                                         : "The recording ends early: a thread that it needs hangs.";
+  if (!outcome.recording_failure.empty() && outcome.code == ExitCode::kAsked) outcome.code = ExitCode::kRecording;
 }
 
 }  // namespace polygmap::daemon

@@ -17,11 +17,13 @@
 #include "firmware/daemon/config/daemon_config.hpp"
 #include "firmware/daemon/exit_code.hpp"
 #include "firmware/daemon/service/device_counts.hpp"
+#include "firmware/daemon/service/row_hook.hpp"
 #include "firmware/daemon/service/status_board.hpp"
 #include "firmware/daemon/service/stop_signals.hpp"
 #include "firmware/daemon/system/heap_count.hpp"
 #include "firmware/daemon/system/notifier.hpp"
 #include "firmware/pipeline.hpp"
+#include "firmware/recording/recorder.hpp"
 #include "hal/can/can_joint_bus.hpp"
 #include "hal/linux/system/posix_clock.hpp"
 
@@ -33,15 +35,18 @@ struct ServiceParts {
   std::function<void()> maintain = [] {};    // some ten times a second, on a thread of its own that may block
   std::function<void()> let_go = [] {};      // once, after the lanes, when the drives never had gains
   HeapCount heap{};
-  DeviceCounts* devices = nullptr;  // null: there are no drivers whose counters could be told
+  DeviceCounts* devices = nullptr;          // null: there are no drivers whose counters could be told
+  recording::Recorder* recorder = nullptr;  // has begun, and stands before the ports; null: nothing is recorded
+  RowHook* hook = nullptr;                  // of a test's build
 };
 
 struct Outcome {
   ExitCode code = ExitCode::kAsked;
-  std::string why;            // one sentence
-  bool threads_hang = false;  // a lane's or maintain()'s still run: the process can only be left by _Exit
-  ModuleView module;          // at the end
-  std::uint64_t cycles = 0;   // of control
+  std::string why;                // one sentence
+  bool threads_hang = false;      // a lane's or maintain()'s still run: the process can only be left by _Exit
+  std::string recording_failure;  // one sentence; empty when all was recorded, or nothing was to be
+  ModuleView module;              // at the end
+  std::uint64_t cycles = 0;       // of control
   std::uint64_t overruns = 0, skipped = 0, caught_up = 0;  // of all lanes
   std::uint64_t heap_calls = 0;
   std::uint64_t page_faults = 0;  // of the lanes' threads, from their first cycle on
@@ -82,6 +87,7 @@ class Service {
   // Until it is decided how this ends.
   [[nodiscard]] Decision watch();
   void maintain() noexcept;
+  void write_recording() noexcept;
   [[nodiscard]] std::optional<Decision> decide(std::int64_t now_ns);
   [[nodiscard]] bool lanes_move(std::int64_t now_ns) noexcept;
   void tell(std::int64_t now_ns) noexcept;
@@ -89,6 +95,7 @@ class Service {
   // What went wrong since it was said last, at most once a second: rows over their budget, and the drivers' counters.
   void log_trouble(std::int64_t now_ns) noexcept;
   void finish(Outcome& outcome);
+  void finish_recording(Outcome& outcome, bool lanes_hang);
 
   const DaemonConfig& config_;
   ServiceParts parts_;
@@ -101,16 +108,19 @@ class Service {
   std::array<std::unique_ptr<LaneRun>, kLaneCount> lanes_;
   std::atomic<std::int64_t> first_due_ns_{0};  // 0: the lanes wait for it
   std::atomic<bool> ends_{false};
-  struct {
+  // May block, and does not hold up the end for longer than a moment.
+  struct Helper {
     std::thread thread;
     std::atomic<bool> has_ended{false};
-  } maintainer_;
+    [[nodiscard]] bool ends_before(std::int64_t until_ns) const noexcept;
+  };
+  Helper maintainer_, writer_;
   struct {
     std::int64_t asked_ns = -1, stopped_ns = -1;  // negative: not yet
     std::int64_t told_ns = 0, fed_ns = 0, moved_ns = 0, complained_ns = 0;
     std::array<std::uint64_t, kLaneCount> cycles{};
     std::array<std::uint64_t, kLaneCount> fed_cycles{};
-    bool is_ready = false;
+    bool is_ready = false, recording_failed = false;
   } seen_;
   ModuleView logged_;
   RowOverruns logged_overruns_{};

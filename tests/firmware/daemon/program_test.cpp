@@ -79,7 +79,8 @@ class ProgramTest : public testing::Test {
 
 TEST_F(ProgramTest, WrongArguments_AreConfigurationErrorsWithTheUsage) {
   for (const char* wrong : {"", "--config", "--replay", "--frobnicate", "--json --config x", "--doctor --replay x",
-                            "--check", "--check --doctor"}) {
+                            "--check", "--check --doctor", "--record", "--config x --record", "--record x",
+                            "--config x --record y --check", "--replay x --record y"}) {
     const Done done = run(wrong);
     EXPECT_EQ(done.code, 2) << wrong;
     EXPECT_NE(done.said.find("polygmapd --config FILE"), std::string::npos) << wrong << ": " << done.said;

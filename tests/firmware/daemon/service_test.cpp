@@ -8,8 +8,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <thread>
 
+#include "firmware/recording/replay.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "tests/firmware/daemon/live_robot.hpp"
 #include "tests/firmware/daemon/notify_socket.hpp"
@@ -50,13 +52,27 @@ class ServiceTest : public testing::Test {
             .maintain = [this] { ++maintained_; },
             .let_go = [this] { ++let_go_; },
             .heap = {},
-            .devices = &counts_};
+            .devices = &counts_,
+            .recorder = nullptr,
+            .hook = nullptr};
+  }
+  // The same, with a recorder before the ports.
+  ServiceParts recorded_parts(recording::Recorder& recorder) {
+    ServiceParts all = parts();
+    return {.ports = recorder.ports(),
+            .joints = nullptr,
+            .maintain = std::move(all.maintain),
+            .let_go = std::move(all.let_go),
+            .heap = {},
+            .devices = &counts_,
+            .recorder = &recorder,
+            .hook = nullptr};
   }
   // Runs the service on a thread of its own, as long as during() takes, then SIGTERM.
   template <typename During>
-  Outcome run(During&& during, bool then_stop = true) {
+  Outcome run(During&& during, bool then_stop = true, recording::Recorder* recorder = nullptr) {
     EXPECT_TRUE(notifier_.open(manager_.name().c_str(), "400000", nullptr));
-    Service service(config_, parts(), signals_, notifier_);
+    Service service(config_, recorder != nullptr ? recorded_parts(*recorder) : parts(), signals_, notifier_);
     Outcome outcome;
     std::atomic<bool> ended{false};
     std::thread thread([&] {
@@ -275,6 +291,42 @@ TEST_F(ServiceTest, WithoutTheRights_IsNoRealTime) {
   };
   EXPECT_EXIT(run_without_rights(), testing::ExitedWithCode(4),
               "CAP_IPC_LOCK.*LimitMEMLOCK|CAP_SYS_NICE.*LimitRTPRIO");  // a sanitizer locks no memory
+}
+
+// All that went in and came out, in files that a replay takes; the request to stop is in them.
+TEST_F(ServiceTest, WithARecorder_TheReplayHasTheSameBits) {
+  const std::string directory = testing::TempDir() + "/polygmap_service_" + std::to_string(::getpid());
+  std::filesystem::create_directories(directory);
+  robot_.sees = true;
+  for (const std::size_t lanes : {1U, 2U}) {
+    if (lanes == 2) robot_.sees = false;  // the fake robot's camera is for one lane
+    config_.lanes = lanes;
+    recording::Recorder recorder(robot_.ports());
+    recorder.begin(directory, config_.params);
+    const auto during = [&] {
+      listen_until("STATUS=running", 5s);
+      std::this_thread::sleep_for(kEstimates);
+    };
+    const Outcome outcome = run(during, true, &recorder);
+    EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why << outcome.recording_failure;
+    EXPECT_EQ(outcome.module.reason, StopReason::kOperator);
+    const recording::ReplayResult replay = recording::replay(directory);
+    EXPECT_EQ(replay.verdict, recording::ReplayVerdict::kSame) << recording::text_of(replay);
+    EXPECT_EQ(replay.ticks, outcome.cycles);
+  }
+  std::filesystem::remove_all(directory);
+}
+
+TEST_F(ServiceTest, RecordingThatEndsEarly_IsSaidByTheExitCodeAndTheModuleGoesOn) {
+  const std::string directory = testing::TempDir() + "/polygmap_early_" + std::to_string(::getpid());
+  std::filesystem::create_directories(directory);
+  recording::Recorder recorder(robot_.ports(), {.queue_bytes = 256, .pictures = 1});
+  recorder.begin(directory, config_.params);
+  const Outcome outcome = run([&] { listen_until("STATUS=running", 5s); }, true, &recorder);
+  EXPECT_EQ(outcome.code, ExitCode::kRecording) << outcome.why;
+  EXPECT_NE(outcome.recording_failure.find("its queue was full"), std::string::npos) << outcome.recording_failure;
+  EXPECT_GT(outcome.cycles, 10U);
+  std::filesystem::remove_all(directory);
 }
 
 TEST(ModuleViewTest, PackedAndUnpacked_IsTheSame) {

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <barrier>
+#include <deque>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -114,6 +115,22 @@ class RecordedRun {
   OneLaneExecutive<RecordedTasks<Pipeline>> executive_{tasks_, robot.clock, module_->lane_health(0)};
 };
 
+// Keeps every picture as long as it is asked to: the fake robot draws the next one into the same memory.
+struct KeptPictures final : PictureKeeper {
+  int kept = 0, gone = 0;
+  std::vector<std::uint16_t> pixels;
+  [[nodiscard]] bool try_keep(DepthFrameView& frame) noexcept override {
+    pixels.assign(frame.depth, frame.depth + frame.width_px * frame.height_px);
+    frame.depth = pixels.data();
+    ++kept;
+    return true;
+  }
+  void let_go() noexcept override {
+    pixels.assign(pixels.size(), 0);
+    ++gone;
+  }
+};
+
 void expect_same(const Directory& directory, std::uint64_t ticks) {
   const ReplayResult result = replay(directory.text());
   EXPECT_EQ(result.verdict, ReplayVerdict::kSame) << text_of(result);
@@ -210,6 +227,111 @@ TEST(Replay, TwoLanesOneOfThemBehind_NothingDiffers) {
   EXPECT_GT(module->health().count(Fault::kLaneBehind).count, 20U);
   EXPECT_GT(module->perception().extractor().counters().frames, 0U);
   expect_same(directory, kFrames);
+}
+
+// As the daemon has it: the lanes run on while another thread writes, and pictures are copied piece by piece.
+TEST(Replay, LanesWrittenOutWhileTheyRun_NothingDiffers) {
+  const Directory directory("running");
+  test::FakeRobot robot(0.062);
+  KeptPictures keeper;
+  Recorder recorder(robot.ports(), {.queue_bytes = 4U << 20U, .pictures = 8, .keeper = &keeper});
+  const auto module = std::make_unique<Pipeline>(recorder.ports(), Params{});
+  recorder.begin(directory.text(), Params{});
+  recorder.watch(*module);
+  RecordedTasks<Pipeline> tasks(*module, &recorder);
+  CyclicExecutive<RecordedTasks<Pipeline>, kSchedule, kControlLane, Health> control(tasks, robot.clock,
+                                                                                    module->lane_health(kControlLane));
+  CyclicExecutive<RecordedTasks<Pipeline>, kSchedule, kPerceptionLane, Health> perception(
+      tasks, robot.clock, module->lane_health(kPerceptionLane));
+  control.start(robot.clock.now_ns() + kCycle_ns);
+  perception.start(robot.clock.now_ns() + kCycle_ns);
+  constexpr int kFrames = 1000;
+  std::barrier wake(2), asleep(2);
+  std::thread other([&] {
+    for (int i = 0; i < kFrames; ++i) {
+      wake.arrive_and_wait();
+      if (i % 50 < 48) perception.tick(robot.clock.now_ns());  // the 49th and 50th are run with the next
+      recorder.copy_piece();
+      asleep.arrive_and_wait();
+    }
+  });
+  std::atomic<bool> ends{false};
+  std::thread writer([&] {
+    while (!ends) recorder.write_out();
+  });
+  for (int i = 0; i < kFrames; ++i) {
+    robot.advance();
+    wake.arrive_and_wait();
+    control.tick(robot.clock.now_ns());
+    asleep.arrive_and_wait();
+  }
+  other.join();
+  ends = true;
+  writer.join();
+  EXPECT_EQ(recorder.finish(), "");
+  EXPECT_GT(module->perception().extractor().counters().frames, 0U);
+  EXPECT_GT(keeper.kept, 10);
+  EXPECT_EQ(keeper.kept, keeper.gone);
+  expect_same(directory, kFrames);
+}
+
+// Nobody writes: the first cycle or picture that finds no room ends the recording, the module runs on, and what there
+// was before is whole.
+void expect_early_end(const Recorder::Capacity& capacity, const std::string& name, const std::string& why) {
+  const Directory directory(name);
+  test::FakeRobot robot(0.062);
+  Recorder recorder(robot.ports(), capacity);
+  const auto module = std::make_unique<Pipeline>(recorder.ports(), Params{});
+  recorder.begin(directory.text(), Params{});
+  recorder.watch(*module);
+  RecordedTasks<Pipeline> tasks(*module, &recorder);
+  OneLaneExecutive<RecordedTasks<Pipeline>> executive(tasks, robot.clock, module->lane_health(0));
+  executive.start(robot.clock.now_ns() + kCycle_ns);
+  for (int i = 0; i < 100; ++i) {
+    robot.advance();
+    const heap::ModuleCall call("recorded tick");
+    executive.tick(robot.clock.now_ns());
+  }
+  EXPECT_TRUE(recorder.failed());
+  EXPECT_EQ(recorder.finish(), "The recording in \"" + directory.text() + "\" ends early: " + why);
+  EXPECT_TRUE(module->control().last_command().stamp_ns > 0);
+  const ReplayResult result = replay(directory.text());
+  EXPECT_EQ(result.verdict, ReplayVerdict::kUnreadable);
+  EXPECT_GT(result.ticks, 5U);
+  EXPECT_TRUE(result.difference.empty()) << result.difference;
+  EXPECT_NE(result.complaint.find("ends within"), std::string::npos) << result.complaint;
+}
+TEST(Recorder, QueueThatIsFull_EndsTheRecordingAndSaysSo) {
+  expect_early_end({.queue_bytes = 64U << 10U, .pictures = 8}, "full", "its queue was full.");
+}
+TEST(Recorder, PicturesThatNobodyWrites_EndTheRecordingAndSaySo) {
+  expect_early_end({.queue_bytes = 4U << 20U, .pictures = 2}, "full_pictures", "its queue of pictures was full.");
+}
+
+TEST(BlockQueue, BlocksAroundTheEnd_ComeOutAsTheyWentInAndNoneTooMany) {
+  BlockQueue queue(100);
+  std::array<std::byte, 64> memory{};
+  EXPECT_TRUE(queue.pop(memory).empty());
+  std::mt19937 random(5);
+  std::deque<std::vector<std::byte>> inside;
+  std::size_t used = 0;
+  for (int i = 0; i < 10'000; ++i) {
+    std::vector<std::byte> block(1 + random() % 40);
+    for (std::byte& byte : block) byte = static_cast<std::byte>(random());
+    const std::size_t head = random() % block.size();
+    const std::span<const std::byte> bytes(block);
+    const bool fits = used + 4 + block.size() <= 100;
+    ASSERT_EQ(queue.try_push(bytes.first(head), bytes.subspan(head)), fits);
+    if (fits) {
+      used += 4 + block.size();
+      inside.push_back(block);
+    }
+    if (random() % 2 == 0 || inside.empty()) continue;
+    const std::span<std::byte> out = queue.pop(memory);
+    ASSERT_TRUE(std::ranges::equal(out, inside.front()));
+    used -= 4 + inside.front().size();
+    inside.pop_front();
+  }
 }
 
 // A recording of few ticks, for changes.
