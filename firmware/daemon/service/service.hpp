@@ -12,7 +12,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "firmware/daemon/config/daemon_config.hpp"
 #include "firmware/daemon/exit_code.hpp"
@@ -74,9 +73,11 @@ class Service {
     const char* why;
   };
 
-  // Empty, or why there is no real time.
+  // Each: empty, or why there is no real time. What it has started by then the destructor ends.
+  [[nodiscard]] std::string start();
   [[nodiscard]] std::string lock_memory() const;
   [[nodiscard]] std::string start_lanes();
+  [[nodiscard]] std::string start_maintainer();
   template <const auto& Table, std::size_t Lane>
   void run_lane(LaneRun& lane) noexcept;
   // Until it is decided how this ends.
@@ -88,6 +89,7 @@ class Service {
   void log_changes() noexcept;
   // What went wrong since it was said last, at most once a second: rows over their budget, and the drivers' counters.
   void log_trouble(std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool all_end_within(std::int64_t most_ns) const noexcept;  // the lanes
   void finish(Outcome& outcome);
 
   const DaemonConfig& config_;
@@ -102,7 +104,7 @@ class Service {
   std::atomic<std::int64_t> first_due_ns_{0};  // 0: the lanes wait for it
   std::atomic<bool> ends_{false};
   struct {
-    std::thread thread;
+    LaneThread thread;
     std::atomic<bool> has_ended{false};
   } maintainer_;
   struct {
