@@ -17,10 +17,11 @@ void add_reopens(Counters& all, const hal::ReopenCounters& c) {
   all.push_back({"reopen_failed", kTrouble, [&c] { return c.failed.load(std::memory_order_relaxed); }});
 }
 void add_udp(Counters& all, const hal::UdpCounters& c) {
-  static_assert(kCounters<hal::UdpCounters> == 5);
+  static_assert(kCounters<hal::UdpCounters> == 6);
   all.push_back({"datagrams", kWork, [&c] { return c.datagrams; }});
   all.push_back({"foreign_sender", kTrouble, [&c] { return c.foreign_sender; }});
   all.push_back({"lost", kTrouble, [&c] { return c.lost; }});
+  all.push_back({"cut_short", kTrouble, [&c] { return c.cut_short; }});
   all.push_back({"interrupted", kWork, [&c] { return c.interrupted; }});
   all.push_back({"failed_calls", kTrouble, [&c] { return c.failed_calls; }});
 }

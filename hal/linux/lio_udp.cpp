@@ -27,14 +27,18 @@ DeviceError LioUdp::open(const Config& config) noexcept {
   stamped_here_ = config.time.base == TimeBase::kMonotonic;
   last_stamp_ns_ = INT64_MIN;
   waiting_.clear();
+  cut_short_ = false;
   return socket_.open(config.udp, calls_);
 }
 
 bool LioUdp::try_read(LioSample& sample) noexcept {
-  if (waiting_.empty()) {
-    socket_.drain([this](const Datagram& datagram) noexcept { take(datagram); });
+  // Read until it is false, as a cycle does, it reads the socket once where that has more than one may take.
+  if (waiting_.empty() && !cut_short_) {
+    cut_short_ = socket_.drain([this](const Datagram& datagram) noexcept { take(datagram); });
   }
-  return waiting_.try_pop(sample);
+  if (waiting_.try_pop(sample)) return true;
+  cut_short_ = false;
+  return false;
 }
 
 bool LioUdp::decoded(const Datagram& datagram, codec::LioPacket& packet) noexcept {

@@ -16,7 +16,9 @@ class LioUdp final : public LidarOdometry {
  public:
   struct Config {
     UdpConfig udp{};
-    SampleClock::Params time{};  // kMonotonic: the odometry runs on this machine and stamps in CLOCK_MONOTONIC
+    // kMonotonic: the odometry runs on this machine and stamps in CLOCK_MONOTONIC. What it takes to compute varies by
+    // up to a scan; later than that it leaves scans out.
+    SampleClock::Params time{.offset = {.jump_ns = 100 * kNsPerMs}};
     SequenceWatch::Params sequence{};
   };
   struct Counters {  // saturate; of every datagram one rises, missing, restarts and overwritten beside
@@ -52,6 +54,7 @@ class LioUdp final : public LidarOdometry {
   bool stamped_here_ = true;
   std::int64_t last_stamp_ns_ = INT64_MIN;
   RingBuffer<LioSample, kQueue> waiting_;
+  bool cut_short_ = false;  // the socket has more, which waits for the next cycle
   Counters counters_;
 };
 

@@ -10,14 +10,18 @@ DeviceError LivoxImu::open(const Config& config) noexcept {
   started_ = false;
   last_stamp_ns_ = INT64_MIN;
   waiting_.clear();
+  cut_short_ = false;
   return socket_.open(config.udp, calls_);
 }
 
 bool LivoxImu::try_read(ImuSample& sample) noexcept {
-  if (waiting_.empty()) {
-    socket_.drain([this](const Datagram& datagram) noexcept { take(datagram); });
+  // Read until it is false, as a cycle does, it reads the socket once where that has more than one may take.
+  if (waiting_.empty() && !cut_short_) {
+    cut_short_ = socket_.drain([this](const Datagram& datagram) noexcept { take(datagram); });
   }
-  return waiting_.try_pop(sample);
+  if (waiting_.try_pop(sample)) return true;
+  cut_short_ = false;
+  return false;
 }
 
 bool LivoxImu::decoded(const Datagram& datagram, codec::LivoxImuPacket& packet) noexcept {

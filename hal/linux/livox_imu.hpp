@@ -35,7 +35,7 @@ class LivoxImu final : public Imu {
     std::uint32_t missing = 0;        // numbers (udp_count) that no datagram had
     std::uint32_t overwritten = 0;    // good samples that nobody read
   };
-  static constexpr std::size_t kQueue = 32;
+  static constexpr std::size_t kQueue = 16;
   static constexpr std::uint16_t kFarthest =
       100;  // in datagrams: beyond that the lidar started anew, nothing is missing
 
@@ -62,6 +62,7 @@ class LivoxImu final : public Imu {
   std::uint16_t udp_count_ = 0;  // of the newest datagram
   std::int64_t last_stamp_ns_ = INT64_MIN;
   RingBuffer<ImuSample, kQueue> waiting_;
+  bool cut_short_ = false;  // the socket has more, which waits for the next cycle
   Counters counters_;
 };
 

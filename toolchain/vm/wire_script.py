@@ -13,13 +13,13 @@ class BadLog(Exception):
 
 
 def drives_of(bus_file):
-    """{(bus, command's id): (reply's id, what byte 0 of a reply says)}, and the feet's (bus, id) or None."""
+    """{(bus, command's id): (reply's id, what byte 0 of a reply says, in which bits)}, and the feet's (bus, id) or None."""
     with open(bus_file, "rb") as file:
         table = tomllib.load(file)
     drives = {}
     for drive in table["drive"]:
-        names = drive["id"] & (0x0F if drive["reply"] == "status_nibble" else 0xFF)
-        drives[drive["bus"], drive["id"]] = (drive["reply_id"], names, 0x0F if drive["reply"] == "status_nibble" else 0xFF)
+        mask = 0x0F if drive.get("reply", "id") == "status_nibble" else 0xFF  # as firmware/config/bus_file.cpp has it
+        drives[drive["bus"], drive["id"]] = (drive["reply_id"], drive["id"] & mask, mask)
     feet = table.get("feet")
     return drives, (feet["bus"], feet["id"]) if feet else None
 

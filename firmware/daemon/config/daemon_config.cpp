@@ -35,6 +35,7 @@ class DaemonFile {
     if (config_.lanes == 1 && root_.has("perception")) {
       root_.fail("perception", "places a lane that lanes = 1 does not have");
     }
+    check_placement();
     take_camera(*root_.section("camera", true));
     if (root_.has("params")) config::read_params(file("params"), config_.params);
     take_bus();
@@ -65,6 +66,18 @@ class DaemonFile {
     section->only({"cpu", "priority"});
     placement.processor = static_cast<int>(section->whole("cpu", {0, kMostProcessor, ""}, -1));
     placement.priority = static_cast<int>(section->whole("priority", {1, kMostPriority, ""}, placement.priority));
+  }
+
+  // On one processor the lane of the higher priority runs, and of two alike the one that runs already.
+  void check_placement() const {
+    const LaneThread::Placement& control = config_.placement[kControlLane];
+    const LaneThread::Placement& perception = config_.placement[kPerceptionLane];
+    const bool is_shared = control.processor >= 0 && control.processor == perception.processor;
+    if (config_.lanes == 1 || !is_shared || perception.priority < control.priority) return;
+    const auto section = root_.section("perception", true);
+    section->fail(section->has("priority") ? "priority" : "cpu",
+                  "lets perception hold control up: on processor " + std::to_string(control.processor) +
+                      ", which is control's, its priority must be below control's " + std::to_string(control.priority));
   }
 
   void take_bus() {

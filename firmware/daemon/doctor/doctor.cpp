@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/daemon/doctor/doctor.hpp"
 
-#include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -239,18 +238,14 @@ std::vector<std::string> buses_of(const DoctorInput& in) {
 }  // namespace
 
 std::uint64_t needed_memory_bytes() {
-  pthread_attr_t attributes;
-  std::size_t thread_bytes = 0;
-  ::pthread_attr_init(&attributes);
-  ::pthread_attr_getstacksize(&attributes, &thread_bytes);
-  ::pthread_attr_destroy(&attributes);
-  constexpr std::uint64_t kLanes_bytes = kLaneCount * (LaneThread::kStack_bytes + LaneThread::kGuard_bytes);
+  constexpr std::uint64_t kThreads = kLaneCount + 1;  // and the one that opens lost devices anew
+  constexpr std::uint64_t kThreads_bytes = kThreads * (LaneThread::kStack_bytes + LaneThread::kGuard_bytes);
   constexpr std::uint64_t kPictures_bytes =
       std::uint64_t{hal::BufferBook::kMostBuffers} * kDepthWidth_px * kDepthHeight_px * sizeof(std::uint16_t);
   // The first thread's stack, the configuration, the drivers.
   constexpr std::uint64_t kRest_bytes = 4U * 1024U * 1024U;
   const auto image_bytes = static_cast<std::uint64_t>(&_end - &__executable_start);
-  return image_bytes + sizeof(Pipeline) + kLanes_bytes + kPictures_bytes + thread_bytes + kRest_bytes;
+  return image_bytes + sizeof(Pipeline) + kThreads_bytes + kPictures_bytes + kRest_bytes;
 }
 
 ProcessLimits limits_of_this_process(const std::string& proc) {

@@ -9,7 +9,9 @@
 #include <string_view>
 #include <vector>
 
+#include "firmware/daemon/config/daemon_config.hpp"
 #include "firmware/daemon/doctor/can_link.hpp"
+#include "firmware/daemon/system/lane_thread.hpp"
 #include "firmware/lane_link.hpp"
 
 namespace polygmap::daemon {
@@ -37,7 +39,7 @@ struct ProcessLimits {
 // Of this process; its capabilities from proc's status.
 [[nodiscard]] ProcessLimits limits_of_this_process(const std::string& proc);
 
-// All that mlockall() holds: the program, the module, stacks, pictures. One thread's stack is as ulimit -s has it.
+// All that mlockall() holds: the program, the module, stacks, pictures.
 [[nodiscard]] std::uint64_t needed_memory_bytes();
 
 // What is looked at; a test gives folders of its own.
@@ -69,16 +71,23 @@ struct WakeUps {
 
   void add(std::uint64_t late_ns) noexcept;
 };
-// On a thread of its own; without the right to a priority, or with a processor that the machine lacks, on an ordinary
-// one.
-[[nodiscard]] WakeUps measure_wake_ups(int processor, int priority, std::uint32_t cycles);
+struct LaneWakeUps {
+  std::string lane;  // "control"; empty: of no lane, where no file says how they run
+  LaneThread::Placement placement;
+  WakeUps wake_ups;
+};
+// As a daemon's file places them.
+[[nodiscard]] std::vector<LaneWakeUps> lanes_of(const DaemonConfig& config);
+// Each on a thread of its own, all at once, as the lanes run. Without the right to a priority, or with a processor that
+// the machine lacks, on an ordinary one.
+void measure_wake_ups(std::vector<LaneWakeUps>& lanes, std::uint32_t cycles);
 // What a lane's rows leave of a cycle at their budgets: who wakes later than that gives work up, or overruns.
 [[nodiscard]] std::uint64_t slack_ns(std::size_t lanes) noexcept;
 // Good up to half of the slack, since two seconds show less than an hour; bad beyond all of it.
-[[nodiscard]] Finding finding_of(const WakeUps& wake_ups, std::uint64_t slack_ns);
+[[nodiscard]] Finding finding_of(const LaneWakeUps& lane, std::uint64_t slack_ns);
 
-[[nodiscard]] std::string text_of(const std::vector<Finding>& findings, const WakeUps& wake_ups);
-[[nodiscard]] std::string json_of(const std::vector<Finding>& findings, const WakeUps& wake_ups);
+[[nodiscard]] std::string text_of(const std::vector<Finding>& findings, const std::vector<LaneWakeUps>& lanes);
+[[nodiscard]] std::string json_of(const std::vector<Finding>& findings, const std::vector<LaneWakeUps>& lanes);
 
 // Of polygmapd --doctor: prints it all. With a daemon's file, it looks at the devices and processors that it names.
 // Returns 0: nothing is bad; 1: something is, or with strict a warning; 2: the file cannot be used.

@@ -20,6 +20,7 @@ std::int64_t monotonic_ns() noexcept {
 struct Measurement {
   WakeUps wake_ups;
   std::uint32_t cycles = 0;
+  bool was_as_asked = false;  // the thread's processor and priority
 };
 void* measure(void* argument) noexcept {
   auto& measurement = *static_cast<Measurement*>(argument);
@@ -46,14 +47,19 @@ void WakeUps::add(std::uint64_t late_ns) noexcept {
   if (late_ns > max_ns) max_ns = late_ns;
 }
 
-WakeUps measure_wake_ups(int processor, int priority, std::uint32_t cycles) {
-  Measurement measurement{.wake_ups = {}, .cycles = cycles};
-  LaneThread thread;
-  bool started = thread.start({.processor = processor, .priority = priority}, &measure, &measurement) == 0;
-  measurement.wake_ups.was_real_time = started;
-  if (!started) started = thread.start({}, &measure, &measurement) == 0;
-  thread.join();
-  return measurement.wake_ups;
+void measure_wake_ups(std::vector<LaneWakeUps>& lanes, std::uint32_t cycles) {
+  std::vector<Measurement> measurements(lanes.size(), Measurement{.wake_ups = {}, .cycles = cycles});
+  std::vector<LaneThread> threads(lanes.size());
+  for (std::size_t n = 0; n < lanes.size(); ++n) {
+    const bool is_as_asked = threads[n].start(lanes[n].placement, &measure, &measurements[n]) == 0;
+    measurements[n].was_as_asked = is_as_asked;
+    if (!is_as_asked) (void)threads[n].start({}, &measure, &measurements[n]);
+  }
+  for (std::size_t n = 0; n < lanes.size(); ++n) {
+    threads[n].join();
+    lanes[n].wake_ups = measurements[n].wake_ups;
+    lanes[n].wake_ups.was_real_time = measurements[n].was_as_asked;
+  }
 }
 
 std::uint64_t slack_ns(std::size_t lanes) noexcept {
@@ -61,13 +67,17 @@ std::uint64_t slack_ns(std::size_t lanes) noexcept {
   return static_cast<std::uint64_t>(kCycle_ns - 1000 * worst_us);
 }
 
-Finding finding_of(const WakeUps& wake_ups, std::uint64_t slack_ns) {
+Finding finding_of(const LaneWakeUps& lane, std::uint64_t slack_ns) {
+  const WakeUps& wake_ups = lane.wake_ups;
   const std::string latest = std::to_string((wake_ups.max_ns + 999) / 1000) + " us";
-  Finding finding{"wake-up",
+  const int processor = lane.placement.processor;
+  Finding finding{lane.lane.empty() ? "wake-up" : "wake-up " + lane.lane,
                   Verdict::kGood,
-                  "Of " + std::to_string(wake_ups.woken) + " wake-ups the latest came " + latest +
-                      " late, and a lane's rows leave " + std::to_string(slack_ns / 1000) + " us of a cycle" +
-                      (wake_ups.was_real_time ? "." : ", on a thread without real-time priority."),
+                  "Of " + std::to_string(wake_ups.woken) + " wake-ups on " +
+                      (processor < 0 ? "any processor" : "processor " + std::to_string(processor)) +
+                      " the latest came " + latest + " late, and a lane's rows leave " +
+                      std::to_string(slack_ns / 1000) + " us of a cycle" +
+                      (wake_ups.was_real_time ? "." : ", on an ordinary thread anywhere."),
                   {}};
   if (wake_ups.max_ns <= slack_ns / 2 && wake_ups.was_real_time) return finding;
   finding.verdict = wake_ups.max_ns <= slack_ns ? Verdict::kWarning : Verdict::kBad;

@@ -10,6 +10,7 @@
 #include <cinttypes>
 #include <cstdio>
 #include <cstring>
+#include <new>
 #include <utility>
 
 #include "firmware/schedule.hpp"
@@ -17,11 +18,11 @@
 namespace polygmap::daemon {
 namespace {
 
-constexpr std::int64_t kLook_ns = 10 * kNsPerMs;       // of the daemon's own thread
-constexpr std::int64_t kMaintain_ns = 100 * kNsPerMs;  // lost devices are opened anew
-constexpr std::int64_t kMaintainerEnds_ns = 300 * kNsPerMs;
-constexpr std::int64_t kWrite_ns = 5 * kNsPerMs;      // what the lanes recorded is written
-constexpr std::int64_t kWriterEnds_ns = 2 * kNsPerS;  // with what a slow disk has before it
+constexpr std::int64_t kLook_ns = 10 * kNsPerMs;         // of the daemon's own thread
+constexpr std::int64_t kMaintain_ns = 100 * kNsPerMs;    // lost devices are opened anew
+constexpr std::int64_t kThreadsEnd_ns = 300 * kNsPerMs;  // a cycle, or a look at the devices
+constexpr std::int64_t kWrite_ns = 5 * kNsPerMs;         // what the lanes recorded is written
+constexpr std::int64_t kWriterEnds_ns = 2 * kNsPerS;     // with what a slow disk has before it
 constexpr std::int64_t kStatus_ns = kNsPerS;
 constexpr std::int64_t kComplain_ns = kNsPerS;
 constexpr std::uint64_t kTicksPerCount = 50;          // of a lane: then it publishes what its drivers counted
@@ -32,6 +33,8 @@ constexpr std::int64_t kStopLimit_ns = 3 * kNsPerS;
 // Until there is an estimate, a second, the gait holds both feet where they are and decides nothing.
 constexpr std::int64_t kUndecided_ns = 100 * kNsPerMs;
 constexpr std::size_t kOwnStack_bytes = 64U * 1024U;
+constexpr std::string_view kTooLittleMemory =
+    "there is too little memory: it takes a limit of locked memory (ulimit -l, LimitMEMLOCK=) that holds all of it.";
 
 std::int64_t monotonic_ns() noexcept {
   timespec now{};
@@ -61,8 +64,9 @@ struct Service::LaneRun {
   explicit LaneRun(Service& whose) noexcept : service(whose) {}
   Service& service;
   LaneThread thread;
-  std::atomic<bool> waits{false};  // for the first cycle's time
-  std::uint64_t page_faults = 0;   // read after join()
+  std::atomic<bool> waits{false};      // for the first cycle's time
+  std::atomic<bool> has_ended{false};  // join() does not wait
+  std::uint64_t page_faults = 0;       // read after join()
 };
 
 // The module's rows, the operator's request to stop before them, and what they say of themselves after.
@@ -135,14 +139,14 @@ Service::~Service() {
     if (lane) lane->thread.join();
   }
   for (Helper* helper : {&maintainer_, &writer_}) {
-    if (helper->thread.joinable()) helper->thread.join();
+    if (helper->runs.load()) helper->thread.join();
   }
 }
 bool Service::Helper::ends_before(std::int64_t until_ns) const noexcept {
-  while (thread.joinable() && !has_ended.load(std::memory_order_acquire) && monotonic_ns() < until_ns) {
+  while (runs.load() && !has_ended.load(std::memory_order_acquire) && monotonic_ns() < until_ns) {
     sleep_until(monotonic_ns() + kNsPerMs);
   }
-  return !thread.joinable() || has_ended.load(std::memory_order_acquire);
+  return !runs.load() || has_ended.load(std::memory_order_acquire);
 }
 
 Outcome Service::run() {
@@ -153,21 +157,30 @@ Outcome Service::run() {
     return outcome;
   }
   outcome.code = ExitCode::kNoRealTime;
-  if (outcome.why = lock_memory(); !outcome.why.empty()) {
-    if (config_.needs_real_time) return outcome;
-    std::fprintf(stderr, "polygmapd: %s\n", outcome.why.c_str());
+  try {
+    outcome.why = start();
+  } catch (const std::bad_alloc&) {
+    outcome.why = std::string(kTooLittleMemory);
   }
-  fault_in_stack();
-  pipeline_ = std::make_unique<Pipeline>(parts_.ports, config_.params);
-  if (parts_.recorder != nullptr) parts_.recorder->watch(*pipeline_);
-  tasks_ = std::make_unique<Tasks>(*pipeline_, board_, parts_);
-  if (outcome.why = start_lanes(); !outcome.why.empty()) return outcome;
+  if (!outcome.why.empty()) return outcome;
   const Decision decision = watch();
   parts_.heap.stop();
   outcome.code = decision.code;
   outcome.why = decision.why;
   finish(outcome);
   return outcome;
+}
+
+std::string Service::start() {
+  if (const std::string wrong = lock_memory(); !wrong.empty()) {
+    if (config_.needs_real_time) return wrong;
+    std::fprintf(stderr, "polygmapd: %s\n", wrong.c_str());
+  }
+  fault_in_stack();
+  pipeline_ = std::make_unique<Pipeline>(parts_.ports, config_.params);
+  if (parts_.recorder != nullptr) parts_.recorder->watch(*pipeline_);
+  tasks_ = std::make_unique<Tasks>(*pipeline_, board_, parts_);
+  return start_lanes();
 }
 
 std::string Service::lock_memory() const {
@@ -214,11 +227,11 @@ std::string Service::start_lanes() {
   for (std::size_t n = 0; n < config_.lanes && wrong.empty(); ++n) {
     while (!lanes_[n]->waits.load(std::memory_order_acquire)) sleep_until(monotonic_ns() + kNsPerMs);
   }
-  if (!wrong.empty()) ends_.store(true, std::memory_order_release);
+  if (wrong.empty()) wrong = start_helpers();
   if (wrong.empty()) {
-    maintainer_.thread = std::thread([this] { maintain(); });
-    if (parts_.recorder != nullptr) writer_.thread = std::thread([this] { write_recording(); });
     parts_.heap.start();
+  } else {
+    ends_.store(true, std::memory_order_release);
   }
   first_due_ns_.store(monotonic_ns() + kFirstDue_ns, std::memory_order_release);
   for (auto& lane : lanes_) {
@@ -227,12 +240,38 @@ std::string Service::start_lanes() {
   return wrong;
 }
 
+std::string Service::start_helpers() {
+  constexpr auto kMaintain = [](void* service) -> void* {
+    static_cast<Service*>(service)->maintain();
+    return nullptr;
+  };
+  constexpr auto kWrite = [](void* service) -> void* {
+    static_cast<Service*>(service)->write_recording();
+    return nullptr;
+  };
+  std::string wrong = start_helper(maintainer_, kMaintain, "the devices that are lost");
+  if (wrong.empty() && parts_.recorder != nullptr) wrong = start_helper(writer_, kWrite, "the recording");
+  return wrong;
+}
+
+// As small a stack as a lane's: one of the process' default size, 8 MB, counts whole where memory is locked.
+std::string Service::start_helper(Helper& helper, void* (*function)(void*), const char* purpose) {
+  const int error = helper.thread.start({}, function, this);
+  helper.runs.store(error == 0);
+  if (error == 0) return {};
+  return std::string("there is no thread for ") + purpose + " (" + ::strerrordesc_np(error) +
+         "): it takes a limit of locked memory (ulimit -l, LimitMEMLOCK=) and one of tasks (ulimit -u, TasksMax=) that "
+         "hold it.";
+}
+
 template <const auto& Table, std::size_t Lane>
 void Service::run_lane(LaneRun& lane) noexcept {
   CyclicExecutive<Tasks, Table, Lane, Health> executive(*tasks_, clock_, pipeline_->lane_health(Lane));
   LaneCounts& counts = board_.lanes[Lane];
   lane.waits.store(true, std::memory_order_release);
-  while (first_due_ns_.load(std::memory_order_acquire) == 0) sleep_until(monotonic_ns() + kNsPerMs);
+  while (first_due_ns_.load(std::memory_order_acquire) == 0 && !ends_.load(std::memory_order_acquire)) {
+    sleep_until(monotonic_ns() + kNsPerMs);
+  }
   executive.start(first_due_ns_.load(std::memory_order_acquire));
   const auto publish_devices = [this]() noexcept {
     for (std::size_t n = 0; parts_.devices != nullptr && n < kLaneCount; ++n) {
@@ -258,6 +297,7 @@ void Service::run_lane(LaneRun& lane) noexcept {
   }
   publish_devices();
   lane.page_faults = thread_page_faults() - faults;
+  lane.has_ended.store(true, std::memory_order_release);
 }
 
 Service::Decision Service::watch() {
@@ -373,9 +413,25 @@ void Service::log_trouble(std::int64_t now_ns) noexcept {
   }
 }
 
+bool Service::all_end_within(std::int64_t most_ns) const noexcept {
+  const std::int64_t until_ns = monotonic_ns() + most_ns;
+  for (std::size_t n = 0; n < config_.lanes; ++n) {
+    while (!lanes_[n]->has_ended.load(std::memory_order_acquire)) {
+      if (monotonic_ns() >= until_ns) return false;
+      sleep_until(monotonic_ns() + kNsPerMs);
+    }
+  }
+  return true;
+}
+
 void Service::finish(Outcome& outcome) {
-  const bool lanes_hang = !lanes_move(monotonic_ns());
   ends_.store(true, std::memory_order_release);
+  const std::int64_t until_ns = monotonic_ns() + kThreadsEnd_ns;
+  const bool lanes_hang = !all_end_within(kThreadsEnd_ns);
+  if (lanes_hang && outcome.code == ExitCode::kAsked) {
+    outcome.code = ExitCode::kStoppedItself;
+    outcome.why = "asked to stop, and a lane did not end.";
+  }
   outcome.heap_calls = parts_.heap.calls();
   for (std::size_t n = 0; n < config_.lanes; ++n) {
     const LaneCounts& counts = board_.lanes[n];
@@ -394,7 +450,7 @@ void Service::finish(Outcome& outcome) {
   }
   outcome.cycles = board_.lanes[kControlLane].cycles.load();
   outcome.module = board_.module();
-  const bool maintainer_ends = maintainer_.ends_before(monotonic_ns() + kMaintainerEnds_ns);
+  const bool maintainer_ends = maintainer_.ends_before(until_ns);
   outcome.threads_hang = lanes_hang || !maintainer_ends;
   if (!lanes_hang && outcome.module.state == ModuleState::kArming) parts_.let_go();
   if (parts_.recorder != nullptr) finish_recording(outcome, lanes_hang);

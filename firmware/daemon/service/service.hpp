@@ -12,7 +12,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "firmware/daemon/config/daemon_config.hpp"
 #include "firmware/daemon/exit_code.hpp"
@@ -79,9 +78,20 @@ class Service {
     const char* why;
   };
 
-  // Empty, or why there is no real time.
+  // May block, and does not hold up the end for longer than a moment.
+  struct Helper {
+    LaneThread thread;
+    std::atomic<bool> runs{false};
+    std::atomic<bool> has_ended{false};
+    [[nodiscard]] bool ends_before(std::int64_t until_ns) const noexcept;
+  };
+
+  // Each: empty, or why there is no real time. What it has started by then the destructor ends.
+  [[nodiscard]] std::string start();
   [[nodiscard]] std::string lock_memory() const;
   [[nodiscard]] std::string start_lanes();
+  [[nodiscard]] std::string start_helpers();
+  [[nodiscard]] std::string start_helper(Helper& helper, void* (*function)(void*), const char* purpose);
   template <const auto& Table, std::size_t Lane>
   void run_lane(LaneRun& lane) noexcept;
   // Until it is decided how this ends.
@@ -94,6 +104,7 @@ class Service {
   void log_changes() noexcept;
   // What went wrong since it was said last, at most once a second: rows over their budget, and the drivers' counters.
   void log_trouble(std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool all_end_within(std::int64_t most_ns) const noexcept;  // the lanes
   void finish(Outcome& outcome);
   void finish_recording(Outcome& outcome, bool lanes_hang);
 
@@ -108,12 +119,6 @@ class Service {
   std::array<std::unique_ptr<LaneRun>, kLaneCount> lanes_;
   std::atomic<std::int64_t> first_due_ns_{0};  // 0: the lanes wait for it
   std::atomic<bool> ends_{false};
-  // May block, and does not hold up the end for longer than a moment.
-  struct Helper {
-    std::thread thread;
-    std::atomic<bool> has_ended{false};
-    [[nodiscard]] bool ends_before(std::int64_t until_ns) const noexcept;
-  };
   Helper maintainer_, writer_;
   struct {
     std::int64_t asked_ns = -1, stopped_ns = -1;  // negative: not yet

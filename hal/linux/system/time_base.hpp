@@ -40,36 +40,46 @@ enum class TimeBase : std::uint8_t {
 // The offset of a sender's clock, from stamps and times of arrival. What arrived fastest was delayed least: the offset
 // is the least difference of the last one to two windows, less the delay that even the fastest has. Two clocks that
 // drift apart by 100 ppm differ by 0.4 ms in two windows. The estimate is late by what the least delay is taken wrong.
+//
+// A packet can be late, and then its stamp goes on from the last one's; it cannot be early. So a stamp ahead of what
+// the offset allows, or one that went back, is that of a clock that was set (here or there), or a wrong one: it is
+// refused until others have confirmed it, and moves the estimate only then. One that is late is taken, by the offset
+// known; where all are late alike the clock was set, too.
 class ClockOffset {
  public:
   struct Params {
     std::int64_t window_ns = 2 * kNsPerS;
-    std::int64_t jump_ns = 500 * kNsPerMs;  // beyond that the clock was set, or the packet is late
-    std::uint32_t confirm = 20;             // so many such in a row: it was set
-    std::int64_t least_delay_ns = 0;        // of a sample, from its stamp to its arrival
+    // What a stamp may be wrong until the window has passed: a fifth of the 0.1 s after which the gait stops for want
+    // of news. Packets on a cable are delayed by some 1 ms more or less.
+    std::int64_t jump_ns = 20 * kNsPerMs;
+    // A clock was set when so many packets in a row, over so long by their arrival, agree to jump_ns. What waited
+    // somewhere and arrives at once is no such row. A sender of 100 Hz or more is back well within that 0.1 s.
+    std::uint32_t confirm = 5;
+    std::int64_t confirm_ns = 40 * kNsPerMs;
+    std::int64_t least_delay_ns = 0;  // of a sample, from its stamp to its arrival
   };
   constexpr ClockOffset() noexcept = default;
   explicit constexpr ClockOffset(const Params& params) noexcept : params_(params) {}
 
-  // The stamp in the monotonic clock; none for a packet that is late by more than jump_ns, or whose clock was set and
-  // is not yet believed. Both below 2^62.
+  // The stamp in the monotonic clock; none where the clock seems to have been set and that is not yet confirmed. Both
+  // below 2^62.
   [[nodiscard]] constexpr std::optional<std::int64_t> to_monotonic_ns(std::int64_t sender_ns,
                                                                       std::int64_t arrival_ns) noexcept {
     const std::int64_t difference_ns = arrival_ns - sender_ns;
     if (known_) {
       const std::int64_t off_ns = difference_ns - least_ns();
-      if (off_ns > params_.jump_ns || off_ns < -params_.jump_ns) {
-        if (++strange_ < params_.confirm) return std::nullopt;
+      if (off_ns <= params_.jump_ns && off_ns >= -params_.jump_ns) {
+        strange_.count = 0;
+      } else if (!confirmed(difference_ns, arrival_ns)) {
+        if (off_ns < 0 || sender_ns <= last_sender_ns_) return std::nullopt;
+      } else {
         ++restarts_;
-        known_ = false;
+        begin(strange_.least_ns, arrival_ns);
       }
+    } else {
+      begin(difference_ns, arrival_ns);
     }
-    strange_ = 0;
-    if (!known_) {
-      known_ = true;
-      current_ns_ = previous_ns_ = difference_ns;
-      window_begin_ns_ = arrival_ns;
-    }
+    last_sender_ns_ = sender_ns;
     if (arrival_ns - window_begin_ns_ >= params_.window_ns) {
       previous_ns_ = current_ns_;
       current_ns_ = difference_ns;
@@ -85,12 +95,34 @@ class ClockOffset {
  private:
   [[nodiscard]] constexpr std::int64_t least_ns() const noexcept { return std::min(current_ns_, previous_ns_); }
 
+  constexpr void begin(std::int64_t difference_ns, std::int64_t arrival_ns) noexcept {
+    known_ = true;
+    strange_.count = 0;
+    current_ns_ = previous_ns_ = difference_ns;
+    window_begin_ns_ = arrival_ns;
+  }
+  // Counts one more strange packet in a row; true when the clock has been set.
+  [[nodiscard]] constexpr bool confirmed(std::int64_t difference_ns, std::int64_t arrival_ns) noexcept {
+    const std::int64_t least_ns = std::min(strange_.least_ns, difference_ns);
+    const std::int64_t most_ns = std::max(strange_.most_ns, difference_ns);
+    if (strange_.count == 0 || most_ns - least_ns > params_.jump_ns) {
+      strange_ = {.count = 1, .least_ns = difference_ns, .most_ns = difference_ns, .begin_ns = arrival_ns};
+    } else {
+      strange_ = {strange_.count + 1, least_ns, most_ns, strange_.begin_ns};
+    }
+    return strange_.count >= params_.confirm && arrival_ns - strange_.begin_ns >= params_.confirm_ns;
+  }
+
   Params params_;
   bool known_ = false;
   std::int64_t current_ns_ = 0;
   std::int64_t previous_ns_ = 0;
   std::int64_t window_begin_ns_ = 0;
-  std::uint32_t strange_ = 0;
+  std::int64_t last_sender_ns_ = 0;
+  struct {
+    std::uint32_t count = 0;  // in a row
+    std::int64_t least_ns = 0, most_ns = 0, begin_ns = 0;
+  } strange_;
   std::uint32_t restarts_ = 0;
 };
 

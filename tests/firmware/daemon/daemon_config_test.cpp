@@ -75,6 +75,25 @@ TEST_F(DaemonConfigTest, GoodFile_HasWhatItSaysAndDefaultsElsewhere) {
   EXPECT_EQ(config.lio->time.base, hal::TimeBase::kEstimated);
 }
 
+TEST_F(DaemonConfigTest, PerceptionThatCouldHoldControlUp_IsRefused) {
+  const std::string pose = "base_rpy_rad = [0.0, 0.0, 0.0]\n";
+  const auto placed = [&](const std::string& perception) {
+    return complaint(good(pose + "[perception]\n" + perception));
+  };
+  const std::string says =
+      "lets perception hold control up: on processor 4, which is control's, its priority must be below control's 81";
+  for (const char* const priority : {"81", "82"}) {
+    const std::string said = placed(std::string("cpu = 4\npriority = ") + priority + "\n");
+    EXPECT_NE(said.find("robot.toml\", line 14: perception.priority " + says), std::string::npos) << said;
+  }
+  EXPECT_EQ(placed("cpu = 4\npriority = 80\n"), "");
+  EXPECT_EQ(placed("cpu = 5\npriority = 90\n"), "");
+  EXPECT_EQ(placed("priority = 90\n"), "");
+  const std::string low_control = replaced(good(pose + "[perception]\ncpu = 4\n"), "priority = 81", "priority = 75");
+  EXPECT_NE(complaint(low_control).find("perception.cpu lets perception hold"), std::string::npos)
+      << complaint(low_control);
+}
+
 TEST_F(DaemonConfigTest, DrivesOfTheBusFile_LimitTheGains) {
   const DaemonConfig config = read_daemon_config(write("robot.toml", good()));
   EXPECT_DOUBLE_EQ(config.params.robot.drives.gain_limits[0].kp_nmprad, 500.0);

@@ -222,47 +222,64 @@ TEST(WakeUpsTest, EachIsInItsBucket) {
   EXPECT_EQ(wake_ups.max_ns, 3'000'000'000U);
 }
 TEST(WakeUpsTest, LateOnes_AreFound) {
-  WakeUps wake_ups;
+  LaneWakeUps lane{"perception", {.processor = 5, .priority = 75}, {}};
+  WakeUps& wake_ups = lane.wake_ups;
   wake_ups.was_real_time = true;
   constexpr std::uint64_t kSlack_ns = 800'000;
   wake_ups.add(400'000);
-  EXPECT_EQ(finding_of(wake_ups, kSlack_ns).verdict, Verdict::kGood);
+  EXPECT_EQ(finding_of(lane, kSlack_ns).verdict, Verdict::kGood);
   wake_ups.add(400'001);
-  EXPECT_EQ(finding_of(wake_ups, kSlack_ns).verdict, Verdict::kWarning);
+  EXPECT_EQ(finding_of(lane, kSlack_ns).verdict, Verdict::kWarning);
   wake_ups.add(800'001);
-  EXPECT_EQ(finding_of(wake_ups, kSlack_ns).verdict, Verdict::kBad);
+  EXPECT_EQ(finding_of(lane, kSlack_ns).verdict, Verdict::kBad);
+  EXPECT_EQ(finding_of(lane, kSlack_ns).name, "wake-up perception");
+  EXPECT_NE(finding_of(lane, kSlack_ns).what.find("3 wake-ups on processor 5 "), std::string::npos);
   wake_ups.was_real_time = false;
-  EXPECT_EQ(finding_of(wake_ups, kSlack_ns).verdict, Verdict::kWarning);
-  EXPECT_NE(finding_of(wake_ups, kSlack_ns).to_do, "");
+  EXPECT_EQ(finding_of(lane, kSlack_ns).verdict, Verdict::kWarning);
+  EXPECT_NE(finding_of(lane, kSlack_ns).to_do, "");
 }
 TEST(WakeUpsTest, SlackIsOfTheSchedule_AndLessInOneLane) {
   EXPECT_GT(slack_ns(1), 0U);
   EXPECT_LT(slack_ns(1), slack_ns(2));
   EXPECT_LT(slack_ns(2), 2'000'000U);
 }
-TEST(WakeUpsTest, Measured_AreAsManyAsAsked) {
-  const WakeUps wake_ups = measure_wake_ups(-1, 0, 50);
-  EXPECT_EQ(wake_ups.woken, 50U);
-  std::uint32_t sum = 0;
-  for (const std::uint32_t count : wake_ups.counts) sum += count;
-  EXPECT_EQ(sum, 50U);
-}
-TEST(WakeUpsTest, ProcessorThatTheMachineLacks_IsMeasuredOnAnotherAndSaid) {
-  const WakeUps wake_ups = measure_wake_ups(1000, 80, 5);
-  EXPECT_EQ(wake_ups.woken, 5U);
-  EXPECT_FALSE(wake_ups.was_real_time);
+TEST(WakeUpsTest, EveryLane_IsMeasuredWhereItRuns) {
+  DaemonConfig config;
+  config.placement = {{{.processor = 0, .priority = 0}, {.processor = 1000, .priority = 75}}};
+  std::vector<LaneWakeUps> lanes = lanes_of(config);
+  ASSERT_EQ(lanes.size(), 2U);
+  measure_wake_ups(lanes, 50);
+  for (const LaneWakeUps& lane : lanes) {
+    EXPECT_EQ(lane.wake_ups.woken, 50U) << lane.lane;
+    std::uint32_t sum = 0;
+    for (const std::uint32_t count : lane.wake_ups.counts) sum += count;
+    EXPECT_EQ(sum, 50U);
+  }
+  EXPECT_EQ(lanes[0].lane, "control");
+  EXPECT_TRUE(lanes[0].wake_ups.was_real_time) << "as it is placed";
+  EXPECT_EQ(lanes[1].lane, "perception");
+  EXPECT_FALSE(lanes[1].wake_ups.was_real_time) << "no machine has processor 1000: it was measured on another";
+  config.lanes = 1;
+  EXPECT_EQ(lanes_of(config).size(), 1U);
 }
 
 TEST(DoctorReport, TextAndJson_SayTheSame) {
   const std::vector<Finding> findings{{"kernel", Verdict::kBad, "It says \"no\".", "Do \\ that."},
                                       {"clock", Verdict::kGood, "Fine.", ""}};
-  WakeUps wake_ups;
-  wake_ups.add(7'000);
-  const std::string text = text_of(findings, wake_ups);
+  std::vector<LaneWakeUps> lanes{{"control", {.processor = 4, .priority = 80}, {}},
+                                 {"perception", {.processor = 5, .priority = 75}, {}}};
+  lanes[0].wake_ups.add(7'000);
+  lanes[1].wake_ups.add(90'000);
+  const std::string text = text_of(findings, lanes);
   EXPECT_NE(text.find("bad      kernel: It says \"no\".\n         Do: Do \\ that.\n"), std::string::npos) << text;
   EXPECT_NE(text.find("good     clock: Fine.\n"), std::string::npos) << text;
   EXPECT_NE(text.find("below    10 us      1\n"), std::string::npos) << text;
-  const std::string json = json_of(findings, wake_ups);
+  EXPECT_NE(text.find("wake-ups of perception by how late they came:\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("below   160 us      1\n"), std::string::npos) << text;
+  const std::string json = json_of(findings, lanes);
+  EXPECT_NE(json.find(R"({"lane": "perception", "processor": 5, "priority": 75, "count": 1, "max_ns": 90000,)"),
+            std::string::npos)
+      << json;
   EXPECT_NE(json.find(R"({"name": "kernel", "verdict": "bad", "what": "It says \"no\".", "do": "Do \\ that."})"),
             std::string::npos)
       << json;

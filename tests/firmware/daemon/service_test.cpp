@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <thread>
 
@@ -226,6 +227,34 @@ TEST_F(ServiceTest, LaneThatHangs_IsNotFedAndEndsTheService) {
   hangs = false;  // the service's end waits for its threads
 }
 
+// It had done a cycle not a second before: nothing but waiting for its end tells.
+TEST_F(ServiceTest, LaneThatHangsAsItIsToEnd_IsNotWaitedForForEver) {
+  std::atomic<bool> hangs{false};
+  robot_.drives_answer = false;
+  robot_.in_every_read = [&hangs] {
+    while (hangs) std::this_thread::sleep_for(1ms);
+  };
+  ASSERT_TRUE(notifier_.open(manager_.name().c_str(), "400000", nullptr));
+  Service service(config_, parts(), signals_, notifier_);
+  Outcome outcome;
+  std::atomic<bool> ended{false};
+  std::thread thread([&] {
+    outcome = service.run();
+    ended = true;
+  });
+  listen_until("STATUS=arming", 5s);
+  hangs = true;
+  ::pthread_kill(thread.native_handle(), SIGTERM);
+  for (int i = 0; i < 2000 && !ended; ++i) std::this_thread::sleep_for(1ms);
+  EXPECT_TRUE(ended);
+  hangs = false;  // the service's end waits for its threads
+  thread.join();
+  EXPECT_EQ(outcome.code, ExitCode::kStoppedItself) << outcome.why;
+  EXPECT_NE(outcome.why.find("a lane did not end"), std::string::npos) << outcome.why;
+  EXPECT_TRUE(outcome.threads_hang);
+  EXPECT_EQ(let_go_, 0) << "the lane may be writing to the drives";
+}
+
 // As a camera that is opened anew, on a slow USB bus.
 TEST_F(ServiceTest, DeviceThatBlocksItsMaintenance_HoldsUpNeitherWatchdogNorStop) {
   std::atomic<bool> blocks{true};
@@ -327,6 +356,49 @@ TEST_F(ServiceTest, RecordingThatEndsEarly_IsSaidByTheExitCodeAndTheModuleGoesOn
   EXPECT_NE(outcome.recording_failure.find("its queue was full"), std::string::npos) << outcome.recording_failure;
   EXPECT_GT(outcome.cycles, 10U);
   std::filesystem::remove_all(directory);
+}
+
+// In a process that may have one more thread: the lane's. The user is no other process's.
+TEST_F(ServiceTest, NoThreadForTheDevices_IsNoRealTime) {
+  if (::geteuid() != 0) GTEST_SKIP() << "becomes a user that has no other processes";
+  const auto run_with_one_thread = [this] {
+    const rlimit two{2, 2};
+    ::setrlimit(RLIMIT_NPROC, &two);
+    const auto user = static_cast<uid_t>(70'000 + ::getpid());
+    if (::setresuid(user, user, user) != 0) ::_exit(99);
+    ::alarm(10);  // it would wait for its lane for ever
+    ExitCode code{};
+    {
+      Service service(config_, parts(), signals_, notifier_);
+      const Outcome outcome = service.run();
+      std::fprintf(stderr, "%s\n", outcome.why.c_str());
+      code = outcome.code;
+    }
+    ::_exit(number_of(code));
+  };
+  EXPECT_EXIT(run_with_one_thread(), testing::ExitedWithCode(4), "no thread for the devices.*TasksMax");
+}
+
+TEST_F(ServiceTest, TooLittleMemory_IsNoRealTime) {
+#ifdef POLYGMAP_SANITIZED
+  GTEST_SKIP() << "a sanitizer ends the process when it has no memory";
+#else
+  const auto run_without_memory = [this] {
+    const rlimit none{0, 0};
+    ::setrlimit(RLIMIT_AS, &none);  // what the heap holds free already is left
+    constexpr std::size_t kPiece_bytes = 64U * 1024U;
+    static_assert(sizeof(Pipeline) > 4 * kPiece_bytes);
+    void* last = nullptr;
+    while (void* const piece = std::malloc(kPiece_bytes)) last = piece;
+    std::free(last);  // enough for a sentence
+    ::alarm(10);
+    Service service(config_, parts(), signals_, notifier_);
+    const Outcome outcome = service.run();
+    std::fprintf(stderr, "%s\n", outcome.why.c_str());
+    ::_exit(number_of(outcome.code));
+  };
+  EXPECT_EXIT(run_without_memory(), testing::ExitedWithCode(4), "too little memory.*LimitMEMLOCK");
+#endif
 }
 
 TEST(ModuleViewTest, PackedAndUnpacked_IsTheSame) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <optional>
 #include <random>
 
 namespace polygmap::hal {
@@ -34,29 +36,98 @@ TEST(ClockOffset, ToMonotonicNs_ClockDrifts_IsFollowed) {
   }
 }
 
-TEST(ClockOffset, ToMonotonicNs_OnePacketSecondsLate_IsRefusedAndForgotten) {
-  ClockOffset offset;
-  ASSERT_TRUE(offset.to_monotonic_ns(0, 10 * kMs));
-  EXPECT_FALSE(offset.to_monotonic_ns(1 * kMs, 3 * kNsPerS));
-  EXPECT_EQ(offset.to_monotonic_ns(3 * kNsPerS, 3 * kNsPerS + 10 * kMs), 3 * kNsPerS + 10 * kMs);
-  EXPECT_EQ(offset.restarts(), 0U);
+// A sender of 200 Hz whose packets take 1 ms; its clock began 30 s after this machine's.
+struct Sender {
+  static constexpr std::int64_t kBehind_ns = 30 * kNsPerS, kInterval_ns = 5 * kMs, kDelay_ns = 1 * kMs;
+  SampleClock clock{{.base = TimeBase::kEstimated, .offset = {.least_delay_ns = kDelay_ns}}};
+  std::int64_t now_ns = 100 * kNsPerS;  // when a sample is taken
+  std::int64_t set_ns = 0;              // what its clock was set by
+  TimeCounters counters;
+
+  // Takes a sample whose packet is late by that much more, and whose time of arrival was told wrong by that. What the
+  // stamp's error is, none when it was refused.
+  std::optional<std::int64_t> send(std::int64_t late_ns = 0, std::int64_t arrival_off_ns = 0) {
+    now_ns += kInterval_ns;
+    std::int64_t stamp_ns = 0;
+    const bool taken =
+        clock.timely(now_ns - kBehind_ns + set_ns, now_ns + kDelay_ns + late_ns + arrival_off_ns, stamp_ns, counters);
+    return taken ? std::optional(stamp_ns - now_ns) : std::nullopt;
+  }
+  void send_for(std::int64_t time_ns) {
+    for (const std::int64_t end_ns = now_ns + time_ns; now_ns < end_ns;) EXPECT_EQ(send(), 0);
+  }
+};
+
+TEST(ClockOffset, ToMonotonicNs_OneStampOff_IsRefusedAndMovesNoOther) {
+  for (const std::int64_t set_ns : {21 * kMs, 100 * kMs, 400 * kMs, 30 * kNsPerS, -100 * kMs, -400 * kMs}) {
+    Sender sender;
+    sender.send_for(kNsPerS);
+    sender.set_ns = set_ns;
+    EXPECT_EQ(sender.send(), std::nullopt) << set_ns;
+    sender.set_ns = 0;
+    sender.send_for(5 * kNsPerS);
+    EXPECT_EQ(sender.counters.clock_jumped, 1U);
+    EXPECT_EQ(sender.clock.restarts(), 0U);
+  }
 }
 
-TEST(ClockOffset, ToMonotonicNs_ClockSetEitherWay_BelievedOnceConfirmed) {
-  for (const std::int64_t jump_ns : {-30 * kNsPerS, 1'700'000'000 * kNsPerS}) {
-    ClockOffset offset({.confirm = 4});
-    std::int64_t now_ns = 50 * kNsPerS;
-    ASSERT_TRUE(offset.to_monotonic_ns(40 * kNsPerS, now_ns));
-    for (int i = 1; i <= 6; ++i) {
-      now_ns += 5 * kMs;
-      const auto mapped_ns = offset.to_monotonic_ns(40 * kNsPerS + jump_ns + i * 5 * kMs, now_ns);
-      EXPECT_EQ(mapped_ns.has_value(), i >= 4) << i;
-      if (mapped_ns) {
-        EXPECT_EQ(*mapped_ns, now_ns);
-      }
+TEST(ClockOffset, ToMonotonicNs_ClockSetEitherWay_IsBelievedWithin45Milliseconds) {
+  for (const std::int64_t set_ns :
+       {25 * kMs, 400 * kMs, 1'700'000'000 * kNsPerS, -25 * kMs, -400 * kMs, -20 * kNsPerS}) {
+    Sender sender;
+    sender.send_for(kNsPerS);
+    sender.set_ns = set_ns;
+    const std::int64_t set_at_ns = sender.now_ns;
+    while (sender.now_ns < set_at_ns + 40 * kMs) {
+      // Stamps that have passed the last one from before go on by the old offset; the gait sees no age of 0.1 s.
+      const std::optional<std::int64_t> error_ns = sender.send();
+      EXPECT_TRUE(!error_ns || std::abs(*error_ns) == 25 * kMs) << set_ns << " " << *error_ns;
     }
-    EXPECT_EQ(offset.restarts(), 1U);
+    sender.send_for(5 * kNsPerS);
+    EXPECT_EQ(sender.clock.restarts(), 1U);
   }
+}
+
+TEST(ClockOffset, ToMonotonicNs_PacketsHeldUpAndDeliveredAtOnce_KeepTheirStamps) {
+  for (const std::int64_t held_ns : {25 * kMs, 50 * kMs, 400 * kMs}) {
+    Sender sender;
+    sender.send_for(kNsPerS);
+    const std::int64_t delivered_ns = sender.now_ns + held_ns;
+    while (sender.now_ns < delivered_ns) {
+      const std::int64_t taken_ns = sender.now_ns + Sender::kInterval_ns;
+      EXPECT_EQ(sender.send(delivered_ns - taken_ns), 0) << held_ns;
+    }
+    sender.send_for(5 * kNsPerS);
+    EXPECT_EQ(sender.counters.clock_jumped, 0U);
+    EXPECT_EQ(sender.clock.restarts(), 0U);
+  }
+}
+
+// Between a datagram's arrival and its reading, CLOCK_REALTIME was set: those of one cycle have a wrong arrival.
+TEST(ClockOffset, ToMonotonicNs_RealtimeSetBetweenArrivalAndReading_MovesNoOther) {
+  for (const std::int64_t off_ns : {-400 * kMs, 400 * kMs}) {
+    Sender sender;
+    sender.send_for(kNsPerS);
+    (void)sender.send(0, off_ns);
+    (void)sender.send(0, off_ns);
+    sender.send_for(5 * kNsPerS);
+    EXPECT_EQ(sender.clock.restarts(), 0U);
+  }
+}
+
+TEST(ClockOffset, ToMonotonicNs_FirstPacketHeldUp_IsCorrected) {
+  Sender sender;
+  EXPECT_EQ(sender.send(50 * kMs), 50 * kMs) << "nothing says that it is late";
+  for (int i = 0; i < 8; ++i) EXPECT_EQ(sender.send(), std::nullopt);
+  sender.send_for(5 * kNsPerS);
+}
+
+TEST(SampleClock, Judge_PacketSecondsLate_IsLateAndForgotten) {
+  Sender sender;
+  sender.send_for(kNsPerS);
+  EXPECT_EQ(sender.send(3 * kNsPerS), std::nullopt);
+  EXPECT_EQ(sender.counters.late, 1U);
+  sender.send_for(kNsPerS);
 }
 
 TEST(SampleClock, Judge_MonotonicStamps_AgeBoundsHold) {
