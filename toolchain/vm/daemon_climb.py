@@ -128,7 +128,8 @@ def judge(out, args):
 
 def told(out):
     """What the daemon told the service manager: (seconds since the drives had gains, text)."""
-    found = re.findall(r"^TOLD (-?[\d.]+) (.*)$", (out / "plant.txt").read_text(), re.M)
+    robot = (out / "plant.txt").read_text() if (out / "plant.txt").exists() else ""
+    found = re.findall(r"^TOLD (-?[\d.]+) (.*)$", robot, re.M)
     return [(float(since_s), text) for since_s, text in found]
 
 
