@@ -106,7 +106,7 @@ def compare(out, bus):
 def judge(out, args):
     """What a run left in out: its figures, and whether it climbed without a flaw."""
     plant, daemon = ((out / name).read_text() if (out / name).exists() else "" for name in ("plant.txt", "daemon.txt"))
-    robot, last, camera = numbers("PLANT", plant), numbers("stopped", daemon), numbers("device camera", daemon)
+    robot, last, camera = numbers("PLANT(?= steps=)", plant), numbers("stopped", daemon), numbers("device camera", daemon)
     frames = compare(out, args.bus)
     ticks, differ = replay(out / "recording")
     figures = {
