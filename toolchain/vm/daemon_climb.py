@@ -106,7 +106,7 @@ def compare(out, bus):
 def judge(out, args):
     """What a run left in out: its figures, and whether it climbed without a flaw."""
     plant, daemon = ((out / name).read_text() if (out / name).exists() else "" for name in ("plant.txt", "daemon.txt"))
-    robot, last, camera = numbers("PLANT", plant), numbers("stopped", daemon), numbers("device camera", daemon)
+    robot, last, camera = numbers("PLANT(?= steps=)", plant), numbers("stopped", daemon), numbers("device camera", daemon)
     frames = compare(out, args.bus)
     ticks, differ = replay(out / "recording")
     figures = {
@@ -128,7 +128,8 @@ def judge(out, args):
 
 def told(out):
     """What the daemon told the service manager: (seconds since the drives had gains, text)."""
-    found = re.findall(r"^TOLD (-?[\d.]+) (.*)$", (out / "plant.txt").read_text(), re.M)
+    robot = (out / "plant.txt").read_text() if (out / "plant.txt").exists() else ""
+    found = re.findall(r"^TOLD (-?[\d.]+) (.*)$", robot, re.M)
     return [(float(since_s), text) for since_s, text in found]
 
 
