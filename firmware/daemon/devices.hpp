@@ -27,7 +27,6 @@ class Devices {
 
   // After open().
   [[nodiscard]] Ports ports() noexcept;
-  [[nodiscard]] const hal::CanJointBus& joints() const noexcept { return *joints_; }
   // After open(): all counters of all devices. They refer to this.
   void count_in(DeviceCounts& counts) const;
   // Opens anew what was lost; each call tries once. Some ten times a second, outside the lanes.

@@ -90,7 +90,6 @@ int run_service(const DaemonConfig& config) {
   DeviceCounts counts;
   devices.count_in(counts);
   ServiceParts parts{.ports = devices.ports(),
-                     .joints = &devices.joints(),
                      .maintain = [&devices] { devices.maintain(); },
                      .let_go = [&devices] { devices.let_go(); },
                      .heap = counted_heap(),

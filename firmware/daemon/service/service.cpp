@@ -27,8 +27,6 @@ constexpr std::int64_t kLaneHangs_ns = kNsPerS;       // without a cycle
 constexpr std::int64_t kFirstDue_ns = 20 * kNsPerMs;  // from the lanes' waiting to their first cycle
 // A swing takes 0.92 s, and a foot that finds no ground goes back: later than that something is wrong.
 constexpr std::int64_t kStopLimit_ns = 3 * kNsPerS;
-// Until there is an estimate, a second, the gait holds both feet where they are and decides nothing.
-constexpr std::int64_t kUndecided_ns = 100 * kNsPerMs;
 constexpr std::size_t kOwnStack_bytes = 64U * 1024U;
 
 std::int64_t monotonic_ns() noexcept {
@@ -66,8 +64,7 @@ struct Service::LaneRun {
 // The module's rows, the operator's request to stop before them, and what they say of themselves after.
 class Service::Tasks {
  public:
-  Tasks(Pipeline& pipeline, StatusBoard& board, const hal::CanJointBus* joints) noexcept
-      : pipeline_(pipeline), board_(board), joints_(joints) {}
+  Tasks(Pipeline& pipeline, StatusBoard& board) noexcept : pipeline_(pipeline), board_(board) {}
   void ask_to_stop() noexcept { stop_asked_.store(true, std::memory_order_release); }
 
   Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
@@ -76,9 +73,7 @@ class Service::Tasks {
   }
   void cycle_done(std::size_t lane, const CycleReport& report) noexcept {
     pipeline_.cycle_done(lane, report);
-    if (lane != kControlLane) return;
-    const JointSet heard = joints_ == nullptr ? JointSet::all() : joints_->heard();
-    board_.publish(pipeline_.control(), JointSet::of_bits(JointSet::all().bits() & ~heard.bits()));
+    if (lane == kControlLane) board_.publish(pipeline_.control());
   }
 
  private:
@@ -86,7 +81,6 @@ class Service::Tasks {
   static_assert(kSchedule[kFirstRow].lane == kControlLane);
   Pipeline& pipeline_;
   StatusBoard& board_;
-  const hal::CanJointBus* joints_;
   std::atomic<bool> stop_asked_{false};
 };
 
@@ -134,7 +128,7 @@ Outcome Service::run() {
   }
   fault_in_stack();
   pipeline_ = std::make_unique<Pipeline>(parts_.ports, config_.params);
-  tasks_ = std::make_unique<Tasks>(*pipeline_, board_, parts_.joints);
+  tasks_ = std::make_unique<Tasks>(*pipeline_, board_);
   if (outcome.why = start_lanes(); !outcome.why.empty()) return outcome;
   const Decision decision = watch();
   parts_.heap.stop();
@@ -268,8 +262,7 @@ std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
   }
   if (!asked) return std::nullopt;
   if (view.state == ModuleState::kArming) return Decision{ExitCode::kAsked, "asked to stop while it armed."};
-  const bool waits = view.phase == GaitPhase::kStandstill && now_ns - seen_.asked_ns >= kUndecided_ns;
-  if (view.stands() || waits) return Decision{ExitCode::kAsked, "asked to stop, and stands."};
+  if (view.stands()) return Decision{ExitCode::kAsked, "asked to stop, and stands."};
   if (now_ns - seen_.asked_ns < kStopLimit_ns) return std::nullopt;
   return Decision{ExitCode::kStoppedItself, "asked to stop, and after three seconds it still does not stand."};
 }
