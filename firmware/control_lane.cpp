@@ -27,6 +27,14 @@ bool all_finite(const JointCommand& command) noexcept {
   return true;
 }
 
+JointSet silent_drives(const JointFeedback& joints) noexcept {
+  JointSet silent;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (joints.silent_cycles[n] > LegSensing::kCarried_cycles) silent.insert(n);
+  }
+  return silent;
+}
+
 std::uint32_t imu_rejections(const Estimator::Counters& counters) noexcept {
   return counters.imu_invalid + counters.imu_stale + counters.imu_future;
 }
@@ -67,23 +75,56 @@ Progress ControlLane::sense(std::int64_t now_ns) noexcept {
 void ControlLane::read_joints(std::int64_t now_ns) noexcept {
   const bool was_asked = command_.stamp_ns != 0;  // a drive answers a command
   JointFeedback joints;
-  if (joint_port_.try_read(joints)) {
-    JointSet silent;
-    start_.never_heard = {};
-    for (std::size_t n = 0; n < kJointCount; ++n) {
-      if (joints.silent_cycles[n] > LegSensing::kCarried_cycles) silent.insert(n);
-      if (joints.silent_cycles[n] == JointFeedback::kNeverHeard) start_.never_heard.insert(n);
-    }
-    if (start_.never_heard.is_empty()) {
-      note_silent_drives(silent, now_ns);
-      estimator_.add_joints(joints, now_ns);
-    }
-  } else if (was_asked && now_ns - estimator_.leg_sensing().joints().stamp_ns >= kMissing_ns) {
+  const bool came = joint_port_.try_read(joints);
+  if (module_state() == ModuleState::kArming) {
+    arm(came ? &joints : nullptr, now_ns);
+  } else if (came) {
+    note_silent_drives(silent_drives(joints), now_ns);
+    estimator_.add_joints(joints, now_ns);
+  }
+  if (!came && was_asked && now_ns - estimator_.leg_sensing().joints().stamp_ns >= kMissing_ns) {
     health_.raise(Fault::kJointFeedbackMissing, now_ns);
   }
-  if (!start_.never_heard.is_empty() && now_ns - start_.first_ns >= kArmingTimeout_ns) {
-    note_silent_drives(start_.never_heard, now_ns);
+}
+
+// The estimator hears of the joints no sooner: what it learnt from a robot that is being put down would be wrong.
+void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept {
+  const JointSet late = late_drives(joints, now_ns);
+  drives_.bus = joint_port_.status();
+  if (joints != nullptr) {
+    const JointSet outside = JointReference::out_of_range(params_.robot, params_.gait.joints, joints->q_rad);
+    note_out_of_range(JointSet::of_bits(outside.bits() & ~late.bits()), now_ns);
   }
+  const std::int64_t imu_ns = estimator_.newest_imu_ns();
+  start_.imu_speaks = imu_ns != 0 && now_ns - imu_ns <= params_.gait.steer_age_ns;
+  if (now_ns - start_.first_ns >= kArmingTimeout_ns) note_silent_drives(start_.silent, now_ns);
+  if (!late.is_empty() || !drives_.bus.drive_errors.is_empty() || !drives_.out_of_range.is_empty()) return;
+  if (!start_.imu_speaks || gait_.stop_requested()) return;
+  estimator_.add_joints(*joints, now_ns);
+}
+
+// Those that did not answer the last command.
+JointSet ControlLane::late_drives(const JointFeedback* joints, std::int64_t now_ns) noexcept {
+  if (joints == nullptr) {
+    const std::int64_t last_ns = std::max(start_.answered_ns, start_.first_ns);
+    if (now_ns - last_ns > LegSensing::kCarried_cycles * kBusCycle_ns) start_.silent = JointSet::all();
+    return JointSet::all();
+  }
+  start_.answered_ns = now_ns;
+  start_.silent = silent_drives(*joints);
+  JointSet late;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (joints->silent_cycles[n] > 0) late.insert(n);
+  }
+  return late;
+}
+
+void ControlLane::note_out_of_range(JointSet out_of_range, std::int64_t now_ns) noexcept {
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const bool is_news = out_of_range.contains(n) && !drives_.out_of_range.contains(n);
+    if (is_news) health_.raise(Fault::kJointOutOfRange, now_ns);
+  }
+  drives_.out_of_range = out_of_range;
 }
 
 void ControlLane::note_silent_drives(JointSet silent, std::int64_t now_ns) noexcept {
@@ -95,11 +136,21 @@ void ControlLane::note_silent_drives(JointSet silent, std::int64_t now_ns) noexc
 }
 
 ModuleState ControlLane::module_state() const noexcept {
-  if (!estimator_.leg_sensing().any()) return ModuleState::kArming;
+  if (!gait_.armed()) return ModuleState::kArming;
   const GaitPhase phase = gait_.status().phase;
   const bool stands = phase == GaitPhase::kStopped || (phase == GaitPhase::kFinished && gait_.stop_requested());
   if (stands) return ModuleState::kSafeStop;
   return gait_.stop_requested() ? ModuleState::kStopping : ModuleState::kRunning;
+}
+
+ArmingWait ControlLane::arming_waits_for() const noexcept {
+  using For = ArmingWait::For;
+  if (module_state() != ModuleState::kArming) return {};
+  if (!start_.silent.is_empty()) return {For::kAnswers, start_.silent};
+  if (!drives_.bus.drive_errors.is_empty()) return {For::kErrors, drives_.bus.drive_errors};
+  if (!drives_.out_of_range.is_empty()) return {For::kRange, drives_.out_of_range};
+  if (!start_.imu_speaks) return {For::kImu, {}};
+  return {drives_.bus.feet_silent ? For::kFeet : For::kNothing, {}};
 }
 
 // Everything that crosses is taken when the frame begins: the writer may be ahead by then, but not by more than it has
@@ -127,7 +178,7 @@ Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
 
 // Whatever is silent, the gait runs: a foot in the air has to come down.
 Progress ControlLane::gait(std::int64_t now_ns) noexcept {
-  if (module_state() == ModuleState::kArming) {
+  if (!estimator_.leg_sensing().any()) {
     command_ = {};
     command_.stamp_ns = now_ns;
     return Progress::kDone;
@@ -149,12 +200,13 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
 }
 
 Progress ControlLane::command(std::int64_t now_ns) noexcept {
-  if (!all_finite(command_)) {
+  bool taken = false;  // a drive that is sent nothing keeps its last command, whoever refused
+  if (all_finite(command_)) {
+    taken = joint_port_.try_write(command_).is_all();
+    if (!taken) health_.raise(Fault::kJointCommandRefused, now_ns);
+  } else {
     health_.raise(Fault::kJointCommandInvalid, now_ns);
-    return Progress::kDone;
   }
-  const bool taken = joint_port_.try_write(command_).is_all();
-  if (!taken) health_.raise(Fault::kJointCommandRefused, now_ns);
   overload_.count_command(params_.overload, taken);
   return Progress::kDone;
 }
@@ -181,7 +233,8 @@ void ControlLane::report_rejections(std::int64_t now_ns) noexcept {
   health_.follow(Limit::kHeightRejected, now_ns, counters.height_rejected);
 }
 
-// A drive in error gives no torque that could be trusted: the step is finished, then the gait stops.
+// A drive in error gives no torque that could be trusted: the step is finished, then the gait stops. While it arms
+// there is nothing to stop, and the bus clears errors that can be cleared.
 void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   drives_.bus = joint_port_.status();
   const hal::JointBusStatus& bus = drives_.bus;
@@ -193,11 +246,12 @@ void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   health_.follow(Fault::kBusCallFailed, now_ns, bus.failed_calls);
   health_.follow(Fault::kBusReplyStale, now_ns, bus.stale);
   health_.follow(Limit::kDriveClamped, now_ns, bus.clamped);
-  const bool may_start = module_state() == ModuleState::kArming && now_ns - start_.first_ns < kArmingTimeout_ns;
+  const bool arms = module_state() == ModuleState::kArming;
+  const bool may_start = arms && now_ns - start_.first_ns < kArmingTimeout_ns;
   const bool feet_silent = bus.feet_silent && !may_start;
   if (feet_silent && !raised_.feet_silent) health_.raise(Fault::kFeetSilent, now_ns);
   raised_.feet_silent = feet_silent;
-  if (!bus.drive_errors.is_empty()) gait_.request_stop(StopReason::kDriveError);
+  if (!arms && !bus.drive_errors.is_empty()) gait_.request_stop(StopReason::kDriveError);
 }
 
 // While the drives are still silent there is nothing to stop.

@@ -2,8 +2,9 @@
 // Sense, estimate, gait, command: in every cycle.
 //
 // It starts arming: an MIT drive answers only a command, and where the legs are is not known before each has answered,
-// so commands without gains and torques ask them. From the first accepted feedback of all joints on the gait commands.
-// What has not answered half a second after the start is named, and asked on.
+// so commands without gains and torques ask them. The gait commands from the first accepted feedback on in which every
+// drive has answered the last command, none tells of an error and all joints are within their ranges, if the IMU speaks
+// too. What is silent half a second after the start is named, and asked on. Asked to stop meanwhile, it arms no more.
 #pragma once
 
 #include "algorithms/core/work.hpp"
@@ -38,6 +39,7 @@ class ControlLane {
   [[nodiscard]] const Health& all_faults() const noexcept { return all_faults_; }  // of all lanes, as of this cycle
   [[nodiscard]] const JointCommand& last_command() const noexcept { return command_; }
   [[nodiscard]] ModuleState module_state() const noexcept;
+  [[nodiscard]] ArmingWait arming_waits_for() const noexcept;
   [[nodiscard]] const DriveReport& drives() const noexcept { return drives_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_; }  // of this lane
   // What perception has found, as far as this frame sees it.
@@ -47,6 +49,10 @@ class ControlLane {
  private:
   void look_across(std::int64_t now_ns) noexcept;
   void read_joints(std::int64_t now_ns) noexcept;
+  // While it arms, in every cycle; joints: the feedback that came, or null.
+  void arm(const JointFeedback* joints, std::int64_t now_ns) noexcept;
+  [[nodiscard]] JointSet late_drives(const JointFeedback* joints, std::int64_t now_ns) noexcept;
+  void note_out_of_range(JointSet out_of_range, std::int64_t now_ns) noexcept;
   void note_silent_drives(JointSet silent, std::int64_t now_ns) noexcept;
   void report_bus(std::int64_t now_ns) noexcept;
   void answer_pose_request(std::int64_t now_ns) noexcept;
@@ -78,8 +84,10 @@ class ControlLane {
     bool gait_stopped = false;
   } raised_;  // what lasts is a fault once, when it begins
   struct Start {
-    std::int64_t first_ns = -1;              // of the first cycle: time-outs of what never speaks start there
-    JointSet never_heard = JointSet::all();  // drives, as of the last feedback
+    std::int64_t first_ns = -1;         // of the first cycle: time-outs of what never speaks start there
+    std::int64_t answered_ns = -1;      // when a drive answered last
+    JointSet silent = JointSet::all();  // drives, never heard or silent for too long since
+    bool imu_speaks = false;
   };
   Start start_;
   std::uint32_t step_handed_over_ = 0;  // sequence of the last touch-down told to the estimator

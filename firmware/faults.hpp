@@ -34,7 +34,8 @@ namespace polygmap {
   X(19, kLaneBehind, "lane_behind",                                                                                  \
     "A lane had not finished a cycle when the other one began the next: it is seen a cycle later.")                  \
   X(20, kTimeShort, "time_short", "Control lost cycles or overran so often that the module stops.")                  \
-  X(21, kCommandsRefused, "commands_refused", "The bus refused so many commands in a row that the module stops.")    \
+  X(21, kCommandsRefused, "commands_refused",                                                                        \
+    "So many commands in a row were refused by the bus, or not finite, that the module stops.")                      \
   X(30, kDriveSilent, "drive_silent", "A drive was silent for more than five cycles; telemetry says which joint's.") \
   X(31, kDriveError, "drive_error", "A drive told of an error, or left its motor mode.")                             \
   X(32, kBusOff, "bus_off", "A CAN controller left its bus.")                                                        \
@@ -43,7 +44,9 @@ namespace polygmap {
   X(35, kBusFrameLost, "bus_frame_lost", "CAN frames were lost between controller and module.")                      \
   X(36, kBusCallFailed, "bus_call_failed", "A CAN driver's call failed, and not for a full queue.")                  \
   X(37, kFeetSilent, "feet_silent", "The feet's sensors were silent for more than five cycles.")                     \
-  X(38, kBusReplyStale, "bus_reply_stale", "A CAN reply had waited for more than two cycles: it was left out.")
+  X(38, kBusReplyStale, "bus_reply_stale", "A CAN reply had waited for more than two cycles: it was left out.")      \
+  X(39, kJointOutOfRange, "joint_out_of_range",                                                                      \
+    "While arming, a joint was farther beyond its range than its encoder may be off; telemetry says which.")
 
 // A bound was met; the module goes on with what it has. Numbers 101-199.
 #define POLYGMAP_LIMITS(X)                                                                                          \

@@ -20,7 +20,7 @@ class OverloadGuard {
             "The module stops when so many of control's cycles were late, less one for each recovery_cycles.");
       field("recovery_cycles", p.recovery_cycles, 1, 10000, "After so many cycles in time a late one is forgotten.");
       field("most_refused", p.most_refused, 1, 10000,
-            "The module stops when the bus refused so many commands, one after the other.");
+            "The module stops when so many commands were refused or not finite, one after the other.");
     }
   };
 

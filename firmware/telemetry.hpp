@@ -16,7 +16,7 @@
 namespace polygmap {
 
 enum class ModuleState : std::uint8_t {
-  kArming,    // some drive has not answered yet: commands without gains and torques
+  kArming,    // commands without gains and torques: see ArmingWait
   kRunning,   // the gait commands the joints
   kStopping,  // it was asked to stop, or has to: the foot in the air comes down first
   kSafeStop,  // the gait has stopped on two feet and holds; its stop_reason says why
@@ -26,10 +26,26 @@ enum class ModuleState : std::uint8_t {
   return kNames[static_cast<std::size_t>(state)];
 }
 
+// What the module that arms waits for: the first of these that lacks.
+struct ArmingWait {
+  enum class For : std::uint8_t {
+    kNothing,  // it has armed, or waits for the next good feedback
+    kAnswers,  // of drives
+    kErrors,   // that drives tell of, to go
+    kRange,    // joints outside it
+    kImu,
+    kFeet,
+  };
+  For what = For::kNothing;
+  JointSet joints;  // whose
+  [[nodiscard]] constexpr bool operator==(const ArmingWait&) const noexcept = default;
+};
+
 // What the joints' bus and drives tell of themselves.
 struct DriveReport {
-  JointSet silent;       // for more than LegSensing::kCarried_cycles, as of the last feedback; arming: see ControlLane
-  JointSet ever_silent;  // since the start
+  JointSet silent;        // for more than LegSensing::kCarried_cycles, as of the last feedback; arming: see ControlLane
+  JointSet ever_silent;   // since the start
+  JointSet out_of_range;  // arming: farther than an encoder may be off, as of the last feedback
   hal::JointBusStatus bus;
 };
 

@@ -38,11 +38,24 @@ bool Gait::try_arm(const JointFeedback& feedback) noexcept {
   return true;
 }
 
-// Nothing is known but the joint angles: the soles are taken for level.
-void Gait::hold_upright(JointCommand& command) noexcept {
+// Nothing is known but the joint angles: the soles are taken for level. Who stops here holds on for good: an estimate
+// that comes later starts nothing.
+void Gait::hold_upright(const GaitInput& in, JointCommand& command) noexcept {
   joints_.hold(command);
   plan_.place(joints_, {joints_.base_T_sole_reference(Foot::kLeft).R.transpose(), Vec3::Zero()});
   add_torques({}, {}, false, command);
+  if (status_.phase == GaitPhase::kStopped) return;
+  const bool asked = in.stop_requested != StopReason::kNone;
+  if (asked || in.lost) {
+    status_.phase = GaitPhase::kStopped;
+    status_.stop_reason = asked ? in.stop_requested : StopReason::kStateStale;
+    return;
+  }
+  started_ = in.state.initialised && in.usable;
+  if (!started_) return;
+  plan_.start(joints_, in.state.odom_T_base);
+  GaitShared gait = shared();
+  state_.emplace<Standing>().begin(in, gait);
 }
 
 void Gait::observe_links() noexcept {
@@ -152,12 +165,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
                      stop_requested_,
                      now_ns - std::exchange(last_tick_ns_, now_ns)};
   if (!started_) {
-    hold_upright(command);
-    started_ = state.initialised && in.usable;
-    if (!started_) return;
-    plan_.start(joints_, state.odom_T_base);
-    GaitShared gait = shared();
-    state_.emplace<Standing>().begin(in, gait);
+    hold_upright(in, command);
     return;
   }
   advance(in);

@@ -35,12 +35,14 @@ class Gait {
     if (stop_requested_ == StopReason::kNone) stop_requested_ = reason;
   }
   [[nodiscard]] bool stop_requested() const noexcept { return stop_requested_ != StopReason::kNone; }
+  // Before its first good reading it commands no gains and no torques.
+  [[nodiscard]] bool armed() const noexcept { return armed_; }
 
  private:
   [[nodiscard]] GaitShared shared() noexcept { return {*robot_, params_, plan_, planner_, memory_, status_}; }
   // Without one good reading the drives get no stiffness: there is nothing safe to ask of them.
   [[nodiscard]] bool try_arm(const JointFeedback& feedback) noexcept;
-  void hold_upright(JointCommand& command) noexcept;
+  void hold_upright(const GaitInput& in, JointCommand& command) noexcept;
   void advance(const GaitInput& in) noexcept;
   [[nodiscard]] Transition tick_state(const GaitInput& in, GaitShared& gait) noexcept;
   void enter(const GaitInput& in, GaitShared& gait, const Transition& next) noexcept;

@@ -28,7 +28,6 @@ class Devices {
 
   // After open().
   [[nodiscard]] Ports ports() noexcept;
-  [[nodiscard]] const hal::CanJointBus& joints() const noexcept { return *joints_; }
   // Whom a recorder asks to keep pictures.
   [[nodiscard]] recording::PictureKeeper& picture_keeper() noexcept { return keeper_; }
   // After open(): all counters of all devices. They refer to this.

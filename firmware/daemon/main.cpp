@@ -119,7 +119,6 @@ int run_service(const DaemonConfig& config, const std::string& record_directory)
     if (!wrong.empty()) return complain(wrong, ExitCode::kRecording);
   }
   ServiceParts parts{.ports = recorder ? recorder->ports() : devices.ports(),
-                     .joints = &devices.joints(),
                      .maintain = [&devices] { devices.maintain(); },
                      .let_go = [&devices] { devices.let_go(); },
                      .heap = counted_heap(),

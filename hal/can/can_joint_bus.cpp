@@ -137,6 +137,11 @@ void CanJointBus::note_lapsed() noexcept {
   }
 }
 
+void CanJointBus::note_error(std::size_t joint, const JointSetpoint& command) noexcept {
+  const bool asks_nothing = command.kp_nmprad == 0.0 && command.kd_nmsprad == 0.0 && command.tau_ff_nm == 0.0;
+  if (asks_nothing && status_.drive_errors.contains(joint)) lapsed_.insert(joint);
+}
+
 std::optional<MitSpecial> CanJointBus::special_due(std::size_t joint, std::uint32_t write) const noexcept {
   if (write % 2 != 0) return std::nullopt;
   if (!heard_.contains(joint)) return MitSpecial::kEnter;
@@ -159,6 +164,7 @@ JointSet CanJointBus::try_write(const JointCommand& command) noexcept {
       count(status_.not_finite);
       continue;
     }
+    note_error(n, command.joints[n]);
     const std::optional<MitSpecial> special = special_due(n, write);
     if (special) frames[n] = special_frame(*special);
     if (special == MitSpecial::kEnter) entered.insert(n);

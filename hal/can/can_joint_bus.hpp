@@ -21,7 +21,8 @@ namespace polygmap::hal {
 // answer on it is sent commands. One that was silent for longer than kSilent_ns may have restarted, and is out of motor
 // mode then: it is sent that frame once in kEnterPeriod writes, and while it answers again in turn with the command
 // until an answer to that frame has come. While it tells of an error, the frame that clears errors goes first, where
-// its dialect has one, and no oftener.
+// its dialect has one, and no oftener. So is a drive that tells of an error while its commands ask for nothing, since
+// the module arms: it may have been so since before the start. One that carries is not brought back in mid-step.
 class CanJointBus final : public JointBus {
  public:
   // channels: one for each bus of the table, in its order; they outlive this. Buses without one are silent.
@@ -52,6 +53,8 @@ class CanJointBus final : public JointBus {
   void note_feet_silent() noexcept;
   // Drives that have been silent for too long when the next command is made.
   void note_lapsed() noexcept;
+  // A drive in error that nothing is asked of is brought back as one that lapsed.
+  void note_error(std::size_t joint, const JointSetpoint& command) noexcept;
   // A lapsed drive answered: whether its reply counts, or it says that it is out of motor mode.
   [[nodiscard]] bool try_take_back(std::size_t joint, const MitReply& reply) noexcept;
   // In the stead of a joint's command, none when it gets the command; write: how many went before.
@@ -65,11 +68,11 @@ class CanJointBus final : public JointBus {
   JointFeedback feedback_;
   std::array<std::int64_t, kJointCount> replied_ns_{};  // stamp of the command that a joint's last reply answered
   JointSet heard_, replied_;                            // ever; since the last read
-  JointSet lapsed_;                                     // heard once, silent for too long since, not yet entered again
-  JointSet returned_;                                   // of those, the ones that have answered since the last write
-  JointSet entered_;                                    // sent the frame that enters motor mode by the last write
-  std::int64_t command_ns_ = -1;                        // stamp of the last command; negative: none yet
-  std::int64_t feet_ns_ = -1;                           // stamp of the command before the feet's last frame
+  JointSet lapsed_;    // heard once, silent for too long or in error since (note_error), not yet entered again
+  JointSet returned_;  // of those, the ones that have answered since the last write
+  JointSet entered_;   // sent the frame that enters motor mode by the last write
+  std::int64_t command_ns_ = -1;  // stamp of the last command; negative: none yet
+  std::int64_t feet_ns_ = -1;     // stamp of the command before the feet's last frame
   std::uint32_t writes_ = 0;
   std::array<bool, kMaxBuses> was_off_{};
   JointBusStatus status_;

@@ -26,6 +26,8 @@ std::vector<hal::CanChannel*> channels_of(const std::vector<std::unique_ptr<SimC
   return channels;
 }
 
+bool in_error(DriveFault fault) noexcept { return fault == DriveFault::kError || fault == DriveFault::kLatched; }
+
 template <std::size_t N>
 hal::CanFrame frame_of(std::uint32_t id, const std::array<std::uint8_t, N>& bytes) {
   hal::CanFrame frame;
@@ -87,7 +89,10 @@ void BusRobot::receive(std::size_t bus, const hal::CanFrame& frame, std::int64_t
     hal::MitBytes bytes{};
     std::copy_n(frame.data.begin(), bytes.size(), bytes.begin());
     JointSetpoint command;
-    if (bytes == hal::special_frame(hal::MitSpecial::kEnter)) {
+    if (drive.fault == DriveFault::kLatched) {  // it takes nothing else
+      const bool has_frame = description.reply == hal::MitReplyRule::kStatusNibble;
+      if (has_frame && bytes == hal::special_frame(hal::MitSpecial::kClearErrors)) drive = {};
+    } else if (bytes == hal::special_frame(hal::MitSpecial::kEnter)) {
       drive.enabled = true;
     } else if (bytes == hal::special_frame(hal::MitSpecial::kExit)) {
       drive.enabled = false;
@@ -109,7 +114,7 @@ void BusRobot::reply(std::size_t joint, std::int64_t done_ns) {
   reply.p_rad = feedback_.q_rad[i];
   reply.v_radps = feedback_.dq_radps[i];
   reply.t_nm = feedback_.tau_nm[i];
-  if (drive.fault == DriveFault::kError) {
+  if (in_error(drive.fault)) {
     reply.status = kErrorCode;
   } else if (description.reply == hal::MitReplyRule::kStatusNibble && drive.enabled) {
     reply.status = kEnabledNibble;
@@ -124,8 +129,9 @@ void BusRobot::command_robot(std::int64_t now_ns) {
   command.stamp_ns = now_ns;
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const Drive& drive = drives_[n];
-    if (!drive.commanded && drive.fault == DriveFault::kNone) return;
-    const bool limp = drive.fault == DriveFault::kDead || drive.fault == DriveFault::kError;
+    const bool starts = drive.fault == DriveFault::kNone || drive.fault == DriveFault::kLatched;
+    if (!drive.commanded && starts) return;
+    const bool limp = drive.fault == DriveFault::kDead || in_error(drive.fault);
     if (!limp) command.joints[n] = drive.command;
   }
   (void)robot_.try_write(command);

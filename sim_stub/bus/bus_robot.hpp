@@ -21,6 +21,7 @@ enum class DriveFault : std::uint8_t {
   kUnplugged,  // hears and says nothing, and holds what it was told last
   kDead,       // says nothing and gives no torque; afterwards it has restarted, and is out of motor mode
   kError,      // tells of an error and gives no torque
+  kLatched,    // the same, until it hears the frame that clears errors: then it is out of motor mode, without fault
 };
 
 // A command moves its drive one cycle after it was written, as without a bus, and the reply to it, with the joint as it

@@ -15,58 +15,12 @@
 #include "firmware/schedule.hpp"
 #include "sim_stub/robot_camera.hpp"
 #include "tests/support/fake_robot.hpp"
-#include "tests/support/nominal_robot.hpp"
-#include "tests/support/trapped_module.hpp"
+#include "tests/support/standing_module.hpp"
 
 namespace polygmap {
 namespace {
 
-using test::FakeRobot;
-using test::TrappedModule;
-
-// A robot that stands still on level floor whatever it is told, fed by hand.
-class PipelineTest : public testing::Test {
- protected:
-  explicit PipelineTest(const Params& params = {})
-      : camera_(robot_camera_intrinsics()), module_({camera_, imu_, joints_, lidar_}, params, clock_) {}
-
-  [[nodiscard]] ImuSample imu_at(std::int64_t stamp_ns) const {
-    return {stamp_ns, Vec3::Zero(), Vec3{0, 0, kGravity_mps2}};
-  }
-  [[nodiscard]] JointFeedback joints_at(std::int64_t stamp_ns) const {
-    JointFeedback feedback;
-    feedback.stamp_ns = stamp_ns;
-    feedback.q_rad = standing_q_rad_;
-    feedback.foot_force_n = {270.0, 270.0};
-    return feedback;
-  }
-  void tick_with(const ImuSample* imu, const JointFeedback* joints) {
-    if (imu != nullptr) imu_.feed(*imu);
-    if (joints != nullptr) joints_.feed(*joints);
-    module_.tick();
-  }
-  void stand(int ticks) {
-    for (int i = 0; i < ticks; ++i) {
-      clock_.advance_ns(kCycle_ns);
-      const ImuSample imu = imu_at(clock_.now_ns());
-      const JointFeedback joints = joints_at(clock_.now_ns());
-      tick_with(&imu, &joints);
-    }
-  }
-  [[nodiscard]] const ControlLane& control() const { return module_.pipeline().control(); }
-  [[nodiscard]] std::uint32_t count(Fault fault) const { return module_.pipeline().health().count(fault).count; }
-  [[nodiscard]] std::uint32_t count(Limit limit) const { return module_.pipeline().health().count(limit).count; }
-
-  static constexpr int kInitialised_ticks = 700;  // the standstill takes a second
-
-  const JointVector standing_q_rad_ = test::standing_joints();
-  fakes::FakeClock clock_ = test::three_days_up();
-  fakes::FakeDepthCamera camera_;
-  fakes::FakeImu imu_;
-  fakes::FakeJointBus joints_;
-  fakes::FakeLidarOdometry lidar_;
-  TrappedModule module_;
-};
+using PipelineTest = test::StandingModule;
 
 TEST_F(PipelineTest, StandingStill_InitialisesCommandsAndRaisesNothingOfControl) {
   stand(kInitialised_ticks);
@@ -170,96 +124,6 @@ TEST_F(PipelineTest, CyclesAreLostNowAndThen_GoesOn) {
   EXPECT_EQ(count(Fault::kCycleSlip), 3U * 22U);
   EXPECT_EQ(count(Fault::kTimeShort), 0U);
   EXPECT_EQ(control().module_state(), ModuleState::kRunning);
-}
-
-// An MIT drive answers only a command.
-TEST_F(PipelineTest, BeforeAllDrivesAnswered_CommandsHaveNoGainsAndNothingElseBegins) {
-  const auto expect_arming = [&] {
-    EXPECT_EQ(control().module_state(), ModuleState::kArming);
-    ASSERT_FALSE(joints_.commands().empty());
-    const JointCommand& command = joints_.commands().newest();
-    EXPECT_EQ(command.stamp_ns, clock_.now_ns());
-    for (const JointSetpoint& joint : command.joints) {
-      EXPECT_EQ(joint.kp_nmprad, 0.0);
-      EXPECT_EQ(joint.kd_nmsprad, 0.0);
-      EXPECT_EQ(joint.tau_ff_nm, 0.0);
-    }
-  };
-  const ImuSample imu = imu_at(clock_.now_ns() + kCycle_ns);
-  clock_.advance_ns(kCycle_ns);
-  tick_with(&imu, nullptr);
-  expect_arming();
-  EXPECT_EQ(count(Fault::kJointFeedbackMissing), 0U) << "nobody was asked yet";
-  for (int i = 0; i < 20; ++i) {
-    clock_.advance_ns(kCycle_ns);
-    JointFeedback joints = joints_at(clock_.now_ns());
-    joints.silent_cycles[11] = JointFeedback::kNeverHeard;
-    joints.q_rad[11] = 0.0;
-    tick_with(&imu, &joints);
-    expect_arming();
-  }
-  EXPECT_EQ(count(Fault::kJointFeedbackRejected), 0U);
-  EXPECT_EQ(count(Fault::kDriveSilent), 0U);
-  stand(1);
-  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
-  EXPECT_GT(joints_.commands().newest().joints[11].kp_nmprad, 0.0) << "the robot's own gains";
-}
-
-class ArmingTest : public PipelineTest {
- protected:
-  // Until half a second after the first cycle nothing is named, from then on it is, once; the module asks on.
-  template <class FeedbackAt>
-  void arm(Fault fault, std::uint32_t times, FeedbackAt feedback_at) {
-    for (int i = 0; i < 400; ++i) {
-      clock_.advance_ns(kCycle_ns);
-      const ImuSample imu = imu_at(clock_.now_ns());
-      const std::optional<JointFeedback> joints = feedback_at(clock_.now_ns());
-      tick_with(&imu, joints ? &*joints : nullptr);
-      ASSERT_EQ(count(fault), i < 250 ? 0U : times) << i;
-      ASSERT_EQ(control().module_state(), ModuleState::kArming);
-      ASSERT_EQ(joints_.commands().newest().stamp_ns, clock_.now_ns());
-      ASSERT_EQ(joints_.commands().newest().joints[3].kp_nmprad, 0.0);
-    }
-  }
-};
-
-TEST_F(ArmingTest, OneDriveNeverAnswers_IsNamedAfterHalfASecondAndTakenInWhenItDoes) {
-  ASSERT_NO_FATAL_FAILURE(arm(Fault::kDriveSilent, 1, [this](std::int64_t now_ns) {
-    JointFeedback joints = joints_at(now_ns);
-    joints.silent_cycles[11] = JointFeedback::kNeverHeard;
-    return std::optional(joints);
-  }));
-  EXPECT_EQ(control().drives().silent.bits(), 1U << 11U);
-  EXPECT_EQ(count(Fault::kJointFeedbackMissing), 0U);
-  stand(1);
-  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
-  EXPECT_TRUE(control().drives().silent.is_empty());
-  EXPECT_EQ(control().drives().ever_silent.bits(), 1U << 11U);
-  stand(100);
-  EXPECT_EQ(count(Fault::kDriveSilent), 1U);
-}
-
-TEST_F(ArmingTest, NoDriveEverAnswers_AllAreNamed) {
-  ASSERT_NO_FATAL_FAILURE(
-      arm(Fault::kDriveSilent, kJointCount, [](std::int64_t) { return std::optional<JointFeedback>(); }));
-  EXPECT_TRUE(control().drives().silent.is_all());
-  stand(1);
-  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
-  EXPECT_TRUE(control().drives().silent.is_empty());
-}
-
-TEST_F(ArmingTest, FeetNeverAnswer_AreNamedAfterHalfASecondAndTakenInWhenTheyDo) {
-  joints_.told.feet_silent = true;
-  ASSERT_NO_FATAL_FAILURE(arm(Fault::kFeetSilent, 1, [this](std::int64_t now_ns) {
-    JointFeedback joints = joints_at(now_ns);
-    joints.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
-    return std::optional(joints);
-  }));
-  EXPECT_EQ(count(Fault::kDriveSilent), 0U);
-  joints_.told.feet_silent = false;
-  stand(10);
-  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
-  EXPECT_EQ(count(Fault::kFeetSilent), 1U);
 }
 
 TEST_F(PipelineTest, BusTellsOfItsFaults_EachIsCountedUnderItsName) {
@@ -414,22 +278,6 @@ TEST_F(PipelineTest, FrameBeforeTheStart_IsGivenBackAndCounted) {
   EXPECT_EQ(count(Limit::kDepthUnplaced), 1U);
   EXPECT_EQ(count(Limit::kStateRingMissed), 0U);
   EXPECT_FALSE(camera_.holding());
-}
-
-class PipelineWithBadStiffness : public PipelineTest {
- protected:
-  PipelineWithBadStiffness() : PipelineTest(params()) {}
-  static Params params() {
-    Params params;
-    params.gait.joints.hold_kp_nmprad = std::numeric_limits<double>::quiet_NaN();
-    return params;
-  }
-};
-
-TEST_F(PipelineWithBadStiffness, CommandNotFinite_IsCountedAndNeverSent) {
-  stand(10);
-  EXPECT_EQ(count(Fault::kJointCommandInvalid), 10U);
-  EXPECT_EQ(joints_.writes.calls(), 0U);
 }
 
 // Boxes of different heights, a surface or two of each.

@@ -53,7 +53,7 @@ enum class StopReason : std::uint8_t {
   kOperator,
   kDriveError,       // a drive told of an error, or left its motor mode
   kTimeShort,        // control's cycles were lost or overran again and again
-  kCommandsRefused,  // the bus did not take one command after the other
+  kCommandsRefused,  // one command after the other was not taken by the bus, or not finite and never sent
 };
 
 // One line for each reason, in the enumeration's order: a name for machines, and for people what may follow "the module
@@ -82,7 +82,7 @@ inline constexpr std::array kStopReasonTable{
     StopReasonInfo{"operator", "it was asked to"},
     StopReasonInfo{"drive_error", "a drive told of an error"},
     StopReasonInfo{"time_short", "its control cycles kept coming late"},
-    StopReasonInfo{"commands_refused", "its bus took no commands"},
+    StopReasonInfo{"commands_refused", "its drives could not be sent its commands"},
 };
 static_assert(kStopReasonTable.size() == static_cast<std::size_t>(StopReason::kCommandsRefused) + 1);
 

@@ -7,14 +7,34 @@
 
 namespace polygmap {
 
-bool JointReference::try_arm(const RobotModel& robot, const Params& params, const JointVector& q_rad) noexcept {
+namespace {
+
+JointVector into_range(const RobotModel& robot, const JointVector& q_rad) noexcept {
   JointVector inside_rad;
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const auto i = static_cast<Eigen::Index>(n);
     const JointLimits& limits = robot.drives.limits[n];
     inside_rad[i] = math::clamp(q_rad[i], limits.min_rad, limits.max_rad);
-    if (!(std::abs(q_rad[i] - inside_rad[i]) <= params.encoder_offset_rad)) return false;
   }
+  return inside_rad;
+}
+
+}  // namespace
+
+JointSet JointReference::out_of_range(const RobotModel& robot, const Params& params,
+                                      const JointVector& q_rad) noexcept {
+  const JointVector inside_rad = into_range(robot, q_rad);
+  JointSet outside;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const auto i = static_cast<Eigen::Index>(n);
+    if (!(std::abs(q_rad[i] - inside_rad[i]) <= params.encoder_offset_rad)) outside.insert(n);
+  }
+  return outside;
+}
+
+bool JointReference::try_arm(const RobotModel& robot, const Params& params, const JointVector& q_rad) noexcept {
+  if (!out_of_range(robot, params, q_rad).is_empty()) return false;
+  const JointVector inside_rad = into_range(robot, q_rad);
   robot_ = &robot;
   params_ = params;
   reference_rad_ = inside_rad;

@@ -27,8 +27,11 @@ class JointReference {
     }
   };
 
-  // Starts from measured angles, moved into the joints' ranges. False, and nothing changes, when one is not finite or
-  // further outside than an encoder may be off. robot: outlives this.
+  // Joints whose angle is not finite or farther outside its range than an encoder may be off.
+  [[nodiscard]] static JointSet out_of_range(const RobotModel& robot, const Params& params,
+                                             const JointVector& q_rad) noexcept;
+  // Starts from measured angles, moved into the joints' ranges. False, and nothing changes, when one is out of range.
+  // robot: outlives this.
   [[nodiscard]] bool try_arm(const RobotModel& robot, const Params& params, const JointVector& q_rad) noexcept;
   // True when a leg could not do what was asked: out of reach, range or speed, or not a number, upon which the leg
   // stays. The command never leaves the limits.

@@ -30,8 +30,6 @@ constexpr std::int64_t kLaneHangs_ns = kNsPerS;       // without a cycle
 constexpr std::int64_t kFirstDue_ns = 20 * kNsPerMs;  // from the lanes' waiting to their first cycle
 // A swing takes 0.92 s, and a foot that finds no ground goes back: later than that something is wrong.
 constexpr std::int64_t kStopLimit_ns = 3 * kNsPerS;
-// Until there is an estimate, a second, the gait holds both feet where they are and decides nothing.
-constexpr std::int64_t kUndecided_ns = 100 * kNsPerMs;
 constexpr std::size_t kOwnStack_bytes = 64U * 1024U;
 constexpr std::string_view kTooLittleMemory =
     "there is too little memory: it takes a limit of locked memory (ulimit -l, LimitMEMLOCK=) that holds all of it.";
@@ -75,7 +73,6 @@ class Service::Tasks {
   Tasks(Pipeline& pipeline, StatusBoard& board, const ServiceParts& parts) noexcept
       : pipeline_(pipeline),
         board_(board),
-        joints_(parts.joints),
         recorder_(parts.recorder),
         hook_(parts.hook),
         rows_(pipeline, parts.recorder) {}
@@ -88,9 +85,7 @@ class Service::Tasks {
   }
   void cycle_done(std::size_t lane, const CycleReport& report) noexcept {
     rows_.cycle_done(lane, report);
-    if (lane != kControlLane) return;
-    const JointSet heard = joints_ == nullptr ? JointSet::all() : joints_->heard();
-    board_.publish(pipeline_.control(), JointSet::of_bits(JointSet::all().bits() & ~heard.bits()));
+    if (lane == kControlLane) board_.publish(pipeline_.control());
   }
 
  private:
@@ -103,7 +98,6 @@ class Service::Tasks {
   }
   Pipeline& pipeline_;
   StatusBoard& board_;
-  const hal::CanJointBus* joints_;
   recording::Recorder* recorder_;
   RowHook* hook_;
   recording::RecordedTasks<Pipeline> rows_;
@@ -346,8 +340,7 @@ std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
   }
   if (!asked) return std::nullopt;
   if (view.state == ModuleState::kArming) return Decision{ExitCode::kAsked, "asked to stop while it armed."};
-  const bool waits = view.phase == GaitPhase::kStandstill && now_ns - seen_.asked_ns >= kUndecided_ns;
-  if (view.stands() || waits) return Decision{ExitCode::kAsked, "asked to stop, and stands."};
+  if (view.stands()) return Decision{ExitCode::kAsked, "asked to stop, and stands."};
   if (now_ns - seen_.asked_ns < kStopLimit_ns) return std::nullopt;
   return Decision{ExitCode::kStoppedItself, "asked to stop, and after three seconds it still does not stand."};
 }

@@ -23,16 +23,14 @@
 #include "firmware/daemon/system/notifier.hpp"
 #include "firmware/pipeline.hpp"
 #include "firmware/recording/recorder.hpp"
-#include "hal/can/can_joint_bus.hpp"
 #include "hal/linux/system/posix_clock.hpp"
 
 namespace polygmap::daemon {
 
 struct ServiceParts {
   Ports ports;
-  const hal::CanJointBus* joints = nullptr;  // whose drives are named while they are waited for; null: none
-  std::function<void()> maintain = [] {};    // some ten times a second, on a thread of its own that may block
-  std::function<void()> let_go = [] {};      // once, after the lanes, when the drives never had gains
+  std::function<void()> maintain = [] {};  // some ten times a second, on a thread of its own that may block
+  std::function<void()> let_go = [] {};    // once, after the lanes, when the drives never had gains
   HeapCount heap{};
   DeviceCounts* devices = nullptr;          // null: there are no drivers whose counters could be told
   recording::Recorder* recorder = nullptr;  // has begun, and stands before the ports; null: nothing is recorded

@@ -21,6 +21,23 @@ void add_joints(StatusText& out, const char* what, JointSet joints) noexcept {
   }
 }
 
+void add_wait(StatusText& out, const ArmingWait& wait) noexcept {
+  switch (wait.what) {
+    case ArmingWait::For::kNothing:
+      break;
+    case ArmingWait::For::kAnswers:
+      return add_joints(out, ", no answer yet from", wait.joints);
+    case ArmingWait::For::kErrors:
+      return add_joints(out, ", in error:", wait.joints);
+    case ArmingWait::For::kRange:
+      return add_joints(out, ", out of range:", wait.joints);
+    case ArmingWait::For::kImu:
+      return out.add(", no IMU sample");
+    case ArmingWait::For::kFeet:
+      return out.add(", no forces of the feet");
+  }
+}
+
 }  // namespace
 
 void write_late_rows(StatusText& out, const StatusBoard& board) noexcept {
@@ -47,17 +64,20 @@ void write_more_late_rows(StatusText& out, const StatusBoard& board, RowOverruns
   }
 }
 
-void write_status(StatusText& out, const StatusBoard& board, std::size_t lanes, std::uint64_t heap_calls) noexcept {
-  const ModuleView view = board.module();
+void write_module(StatusText& out, const ModuleView& view) noexcept {
   add_text(out, "", name_of(view.state));
   if (view.state == ModuleState::kArming) {
-    add_joints(out, ", no answer yet from", view.unheard);
+    add_wait(out, view.waits_for);
   } else {
     add_text(out, ", ", name_of(view.phase));
     if (view.state == ModuleState::kSafeStop) add_text(out, ": ", text_of(view.reason));
     out.add(", %u treads", view.treads);
     add_joints(out, ", silent:", view.silent);
   }
+}
+
+void write_status(StatusText& out, const StatusBoard& board, std::size_t lanes, std::uint64_t heap_calls) noexcept {
+  write_module(out, board.module());
   std::uint64_t overruns = 0, skipped = 0;
   for (std::size_t lane = 0; lane < lanes; ++lane) {
     overruns += board.lanes[lane].overruns.load(std::memory_order_relaxed);

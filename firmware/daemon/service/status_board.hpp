@@ -17,9 +17,9 @@ struct ModuleView {
   ModuleState state = ModuleState::kArming;
   GaitPhase phase = GaitPhase::kStandstill;
   StopReason reason = StopReason::kNone;
-  JointSet unheard = JointSet::all();  // drives that never answered
-  JointSet silent;                     // drives that are silent now
-  std::uint16_t treads = 0;            // climbed; saturates
+  ArmingWait waits_for{ArmingWait::For::kAnswers, JointSet::all()};
+  JointSet silent;           // drives that are silent now
+  std::uint16_t treads = 0;  // climbed; saturates
 
   [[nodiscard]] bool stands() const noexcept {
     return state == ModuleState::kSafeStop || phase == GaitPhase::kFinished;
@@ -27,17 +27,20 @@ struct ModuleView {
   [[nodiscard]] bool operator==(const ModuleView& other) const noexcept { return packed() == other.packed(); }
 
   [[nodiscard]] std::uint64_t packed() const noexcept {
-    return std::uint64_t{static_cast<std::uint8_t>(state)} | std::uint64_t{static_cast<std::uint8_t>(phase)} << 8U |
-           std::uint64_t{static_cast<std::uint8_t>(reason)} << 16U | std::uint64_t{unheard.bits()} << 24U |
+    return std::uint64_t{static_cast<std::uint8_t>(state)} |
+           std::uint64_t{static_cast<std::uint8_t>(waits_for.what)} << 4U |
+           std::uint64_t{static_cast<std::uint8_t>(phase)} << 8U |
+           std::uint64_t{static_cast<std::uint8_t>(reason)} << 16U | std::uint64_t{waits_for.joints.bits()} << 24U |
            std::uint64_t{silent.bits()} << 36U | std::uint64_t{treads} << 48U;
   }
   [[nodiscard]] static ModuleView unpacked(std::uint64_t bits) noexcept {
     constexpr std::uint64_t kJoints = (1U << kJointCount) - 1U;
     ModuleView view;
-    view.state = static_cast<ModuleState>(bits & 0xFFU);
+    view.state = static_cast<ModuleState>(bits & 0xFU);
+    view.waits_for.what = static_cast<ArmingWait::For>(bits >> 4U & 0xFU);
     view.phase = static_cast<GaitPhase>(bits >> 8U & 0xFFU);
     view.reason = static_cast<StopReason>(bits >> 16U & 0xFFU);
-    view.unheard = JointSet::of_bits(static_cast<std::uint16_t>(bits >> 24U & kJoints));
+    view.waits_for.joints = JointSet::of_bits(static_cast<std::uint16_t>(bits >> 24U & kJoints));
     view.silent = JointSet::of_bits(static_cast<std::uint16_t>(bits >> 36U & kJoints));
     view.treads = static_cast<std::uint16_t>(bits >> 48U);
     return view;
@@ -67,14 +70,14 @@ struct RowCounts {
 
 class StatusBoard {
  public:
-  // On control's thread, after a cycle. unheard: drives that have not answered yet.
-  void publish(const ControlLane& control, JointSet unheard) noexcept {
+  // On control's thread, after a cycle.
+  void publish(const ControlLane& control) noexcept {
     const GaitStatus& gait = control.gait_status();
     ModuleView view;
     view.state = control.module_state();
     view.phase = gait.phase;
     view.reason = gait.stop_reason;
-    view.unheard = unheard;
+    view.waits_for = control.arming_waits_for();
     view.silent = control.drives().silent;
     view.treads = static_cast<std::uint16_t>(gait.treads_climbed < 0xFFFFU ? gait.treads_climbed : 0xFFFFU);
     module_.store(view.packed(), std::memory_order_release);
@@ -101,6 +104,8 @@ class StatusBoard {
 
 // The state in words, as systemctl shows it.
 void write_status(StatusText& out, const StatusBoard& board, std::size_t lanes, std::uint64_t heap_calls) noexcept;
+// Its part about the module.
+void write_module(StatusText& out, const ModuleView& view) noexcept;
 // "; rows over their budget: surfaces 3 (up to 1203 us)"; nothing when there are none.
 void write_late_rows(StatusText& out, const StatusBoard& board) noexcept;
 // "rows over their budget: surfaces 3 (+1, up to 1203 us of 840)": those that overran since it was told last.

@@ -2,6 +2,7 @@
 // Readings and estimates that are none.
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <limits>
 
 #include "tests/support/gait_checks.hpp"
@@ -55,6 +56,42 @@ TEST(GaitInput, EncoderALittleOutsideTheRange_HoldsAtTheLimit) {
   gait.tick(0, {}, {}, feedback, command);
   EXPECT_GT(command.joints[kKnee].kp_nmprad, 0.0);
   EXPECT_EQ(command.joints[kKnee].q_rad, 0.0);
+}
+
+// What the gait is told before the estimate's first, tick 251, and what becomes of it.
+GaitStatus before_the_estimate(IdealClimb& climb, const std::function<void(StateEstimate&)>& told) {
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback&) {
+    if (climb.tick_count() > 100) told(state);
+  };
+  while (climb.tick_count() < 240) (void)climb.tick();
+  EXPECT_TRUE(climb.gait().armed());
+  const GaitStatus before = climb.status();
+  for (int i = 0; i < 1000; ++i) (void)climb.tick();
+  EXPECT_EQ(climb.status().phase, before.phase) << "for good";
+  EXPECT_EQ(climb.status().stop_reason, before.stop_reason);
+  EXPECT_LT(climb.true_T_base().p_m.z(), kNominalBaseHeight_m + 1e-3);
+  test::expect_sound_commands(climb);
+  return before;
+}
+
+TEST(GaitInput, StopRequestedBeforeTheEstimate_StopsStandingForThatReason) {
+  IdealClimb climb({});
+  const GaitStatus status =
+      before_the_estimate(climb, [&](StateEstimate&) { climb.gait().request_stop(StopReason::kTimeShort); });
+  EXPECT_EQ(status.phase, GaitPhase::kStopped);
+  EXPECT_EQ(status.stop_reason, StopReason::kTimeShort);
+  EXPECT_TRUE(status.stands[0] && status.stands[1]);
+}
+
+TEST(GaitInput, SamplesGrowOldBeforeTheEstimate_StopsStandingAsStale) {
+  IdealClimb climb({});
+  std::int64_t oldest_ns = -1;
+  const GaitStatus status = before_the_estimate(climb, [&](StateEstimate& state) {
+    if (oldest_ns < 0) oldest_ns = state.oldest_input_ns;
+    if (climb.tick_count() < 240) state.oldest_input_ns = oldest_ns;
+  });
+  EXPECT_EQ(status.phase, GaitPhase::kStopped);
+  EXPECT_EQ(status.stop_reason, StopReason::kStateStale);
 }
 
 TEST(GaitInput, NanInEstimatesAndFootholds_NeverReachesACommand) {

@@ -49,7 +49,6 @@ class ServiceTest : public testing::Test {
   }
   ServiceParts parts() {
     return {.ports = robot_.ports(),
-            .joints = nullptr,
             .maintain = [this] { ++maintained_; },
             .let_go = [this] { ++let_go_; },
             .heap = {},
@@ -61,7 +60,6 @@ class ServiceTest : public testing::Test {
   ServiceParts recorded_parts(recording::Recorder& recorder) {
     ServiceParts all = parts();
     return {.ports = recorder.ports(),
-            .joints = nullptr,
             .maintain = std::move(all.maintain),
             .let_go = std::move(all.let_go),
             .heap = {},
@@ -121,6 +119,16 @@ TEST_F(ServiceTest, AskedToStopWhileItArms_LetsGoOfTheDrives) {
   EXPECT_LT(stopped_after_, 1s);
 }
 
+TEST_F(ServiceTest, JointBeyondItsRange_IsNamedAndTheDrivesAreLetGo) {
+  robot_.robot.encoder_offset_rad[kKnee] = -2.0;
+  const Outcome outcome = run([&] { listen_until("STATUS=arming, out of range: left_knee;", 5s); });
+  EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
+  EXPECT_EQ(outcome.module.state, ModuleState::kArming);
+  EXPECT_EQ(outcome.module.waits_for.joints.bits(), 1U << kKnee);
+  EXPECT_EQ(let_go_, 1);
+  EXPECT_FALSE(robot_.has_gains);
+}
+
 TEST_F(ServiceTest, AskedToStopWhileItRuns_StandsOnItsDrives) {
   const Outcome outcome = run([&] {
     listen_until("STATUS=running", 5s);
@@ -140,7 +148,8 @@ TEST_F(ServiceTest, AskedToStopWhileItRuns_StandsOnItsDrives) {
 TEST_F(ServiceTest, AskedToStopBeforeThereIsAnEstimate_StandsOnItsDrives) {
   const Outcome outcome = run([&] { listen_until("STATUS=running", 5s); });
   EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
-  EXPECT_NE(outcome.module.state, ModuleState::kArming);
+  EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
+  EXPECT_EQ(outcome.module.reason, StopReason::kOperator);
   EXPECT_EQ(let_go_, 0);
   EXPECT_LT(stopped_after_, 1s);
 }
@@ -204,6 +213,19 @@ TEST_F(ServiceTest, SilentImu_EndsInASafeStop) {
   EXPECT_EQ(outcome.code, ExitCode::kStoppedItself) << outcome.why;
   EXPECT_EQ(outcome.module.reason, StopReason::kStateStale);
   EXPECT_TRUE(has(heard_, "imu_missing"));
+}
+
+TEST_F(ServiceTest, SilentImuBeforeThereIsAnEstimate_EndsInASafeStopToo) {
+  const Outcome outcome = run(
+      [&] {
+        listen_until("STATUS=running", 5s);
+        robot_.imu_speaks = false;
+        listen_until("STATUS=safe_stop", 2s);
+      },
+      false);
+  EXPECT_EQ(outcome.code, ExitCode::kStoppedItself) << outcome.why;
+  EXPECT_EQ(outcome.module.reason, StopReason::kStateStale);
+  EXPECT_GE(stopped_after_, 90ms) << "held for hold_s";
 }
 
 TEST_F(ServiceTest, LaneThatHangs_IsNotFedAndEndsTheService) {
@@ -406,11 +428,12 @@ TEST(ModuleViewTest, PackedAndUnpacked_IsTheSame) {
   view.state = ModuleState::kSafeStop;
   view.phase = GaitPhase::kStopped;
   view.reason = StopReason::kStateStale;
-  view.unheard = JointSet::of_bits(0x801);
+  view.waits_for = {ArmingWait::For::kFeet, JointSet::of_bits(0x801)};
   view.silent = JointSet::of_bits(0xFFE);
   view.treads = 0xFFFF;
   EXPECT_EQ(ModuleView::unpacked(view.packed()), view);
   EXPECT_EQ(ModuleView::unpacked(view.packed()).silent.bits(), 0xFFE);
+  EXPECT_EQ(ModuleView::unpacked(view.packed()).waits_for, view.waits_for);
   EXPECT_FALSE(view == ModuleView{});
 }
 
@@ -456,6 +479,24 @@ TEST(DeviceCountsTest, WhatMeansTrouble_IsToldOnceWithHowMuchMore) {
   counts.publish(kPerceptionLane);
   EXPECT_EQ(told(), "can0: lost 6 (+1); camera: late 1 (+1)");
   EXPECT_EQ(counts.text(), "device can0 sent=8 lost=6\ndevice camera late=1\n");
+}
+
+TEST(StatusTest, Arming_SaysWhatItWaitsFor) {
+  const auto status_of = [](const ArmingWait& wait) {
+    ModuleView view;
+    view.waits_for = wait;
+    StatusText text;
+    write_module(text, view);
+    return std::string(text.view());
+  };
+  using For = ArmingWait::For;
+  const JointSet two = JointSet::of_bits(0x9);
+  EXPECT_EQ(status_of({For::kNothing, {}}), "arming");
+  EXPECT_EQ(status_of({For::kAnswers, two}), "arming, no answer yet from left_hip_roll, left_knee");
+  EXPECT_EQ(status_of({For::kErrors, two}), "arming, in error: left_hip_roll, left_knee");
+  EXPECT_EQ(status_of({For::kRange, two}), "arming, out of range: left_hip_roll, left_knee");
+  EXPECT_EQ(status_of({For::kImu, {}}), "arming, no IMU sample");
+  EXPECT_EQ(status_of({For::kFeet, {}}), "arming, no forces of the feet");
 }
 
 TEST(LateRowsTest, RowsAreToldOnceWithHowManyMore) {

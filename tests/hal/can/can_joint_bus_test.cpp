@@ -78,7 +78,7 @@ class CanJointBusTest : public testing::TestWithParam<MitReplyRule> {
   JointSet write(double q_rad = 0.1) {
     JointCommand command;
     command.stamp_ns = now_ns_ += kBusCycle_ns;
-    for (JointSetpoint& joint : command.joints) joint = {q_rad, 0.0, 1.0, 100.0, 1.0};
+    if (asks_) command.joints.fill({q_rad, 0.0, 1.0, 100.0, 1.0});
     return bus_->try_write(command);
   }
 
@@ -102,6 +102,7 @@ class CanJointBusTest : public testing::TestWithParam<MitReplyRule> {
   std::array<CanChannel*, 4> pointers_{&channels_[0], &channels_[1], &channels_[2], &channels_[3]};
   std::optional<CanJointBus> bus_;
   std::int64_t now_ns_ = kNsPerS;
+  bool asks_ = true;  // gains and torques of the drives
 };
 
 INSTANTIATE_TEST_SUITE_P(, CanJointBusTest, testing::Values(MitReplyRule::kId, MitReplyRule::kStatusNibble));
@@ -476,6 +477,57 @@ TEST_P(CanJointBusTest, DriveComesBackWithAnError_IsClearedThenEntered) {
   answer(4, 0.5);
   ASSERT_TRUE(bus_->try_read(feedback));
   EXPECT_EQ(written()[4], 0);
+}
+
+// As after a power-up in which it latched an error.
+TEST_P(CanJointBusTest, FirstAnswerTellsAnError_IsClearedThenEnteredWhileNothingIsAsked) {
+  const bool can_clear = GetParam() == MitReplyRule::kStatusNibble;
+  asks_ = false;
+  write();
+  JointFeedback feedback;
+  const auto answer_with = [&](std::uint8_t status) {
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      if (n != 4) answer(n, 0.5);
+    }
+    channels_[1].incoming.push_back(reply_of(4, 0.5, status));
+    ASSERT_TRUE(bus_->try_read(feedback));
+  };
+  int sent = 0;
+  for (int cycle = 0; cycle < 205; ++cycle) {
+    answer_with(9);
+    ASSERT_TRUE(bus_->status().drive_errors.contains(4));
+    const auto special = written();
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      ASSERT_TRUE(special[n] == 0 || (n == 4 && special[n] == (can_clear ? 0xFB : 0xFC))) << n;
+    }
+    sent += special[4] != 0;
+  }
+  EXPECT_EQ(sent, 4) << "once in 50 cycles";
+  const std::uint8_t gone = can_clear ? 0 : 255;  // out of motor mode, where it can tell
+  for (int cycle = 0; cycle < 2; ++cycle) {
+    answer_with(gone);
+    EXPECT_TRUE(bus_->status().drive_errors.is_empty());
+    EXPECT_EQ(feedback.silent_cycles[4] == 0, !can_clear);
+    if (written()[4] == 0xFC) break;
+    ASSERT_EQ(cycle, 0) << "entered at once";
+  }
+  for (int cycle = 0; cycle < 120; ++cycle) {
+    answer_with(255);
+    EXPECT_EQ(feedback.silent_cycles[4], 0);
+    EXPECT_EQ(written()[4], 0) << "it has answered the frame that enters";
+  }
+}
+
+TEST_P(CanJointBusTest, DriveInErrorThatCarries_IsSentItsCommandsOnly) {
+  write();
+  answer_all(0.5);
+  JointFeedback feedback;
+  ASSERT_TRUE(bus_->try_read(feedback));
+  for (int cycle = 0; cycle < 200; ++cycle) {
+    ASSERT_EQ(written()[4], 0);
+    channels_[1].incoming.push_back(reply_of(4, 0.5, 9));
+    ASSERT_TRUE(bus_->try_read(feedback));
+  }
 }
 
 TEST_P(CanJointBusTest, Read_ReplyThatHasWaited_IsCountedAndNotFresh) {

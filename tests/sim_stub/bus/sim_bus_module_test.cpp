@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <string_view>
 
 #include "firmware/pipeline.hpp"
 #include "firmware/schedule.hpp"
@@ -93,6 +94,52 @@ TEST_P(BusModuleTest, OneDriveMissingAtTheStart_StaysArmingUntilItAnswers) {
   bus_->set_fault(8, DriveFault::kNone);
   run(4);
   EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+}
+
+TEST_P(BusModuleTest, DriveAnsweredOnceAndIsMuteSince_StaysArmingUntilItAnswersAgain) {
+  bus_->set_fault(3, DriveFault::kUnplugged);
+  run(100);
+  bus_->set_fault(8, DriveFault::kUnplugged);
+  run(200);
+  bus_->set_fault(3, DriveFault::kNone);
+  run(100);
+  EXPECT_TRUE(bus_->joints().heard().is_all());
+  EXPECT_EQ(control().module_state(), ModuleState::kArming);
+  EXPECT_EQ(control().last_command().joints[0].kp_nmprad, 0.0);
+  EXPECT_EQ(control().drives().silent.bits(), 1U << 8U);
+  EXPECT_EQ(count(Fault::kDriveSilent), 2U);
+  bus_->set_fault(8, DriveFault::kNone);
+  run(4);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+}
+
+// Only Damiao has a frame for it; others keep the module arming until their error is gone.
+TEST_P(BusModuleTest, DriveWithALatchedErrorAtPowerUp_IsClearedWhereItCanBeAndArmsAfterwards) {
+  const bool can_clear = GetParam() == std::string_view("damiao");
+  bus_->set_fault(8, DriveFault::kLatched);
+  run(10);
+  EXPECT_EQ(control().module_state(), ModuleState::kArming);
+  EXPECT_EQ(control().arming_waits_for(), (ArmingWait{ArmingWait::For::kErrors, JointSet::of_bits(1U << 8U)}));
+  EXPECT_GE(count(Fault::kDriveError), 1U);
+  EXPECT_EQ(control().last_command().joints[0].kp_nmprad, 0.0);
+  run(110);
+  EXPECT_EQ(control().module_state(), can_clear ? ModuleState::kRunning : ModuleState::kArming);
+  bus_->set_fault(8, DriveFault::kNone);
+  run(900);
+  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+  EXPECT_TRUE(control().state().initialised);
+  EXPECT_GT(robot_->last_command()->joints[8].kp_nmprad, 0.0);
+  EXPECT_FALSE(robot_->truth().fell);
+}
+
+TEST_P(BusModuleTest, DriveTellsAnErrorBeforeTheEstimate_Stops) {
+  run(100);
+  ASSERT_EQ(control().module_state(), ModuleState::kRunning);
+  ASSERT_FALSE(control().state().initialised);
+  bus_->set_fault(1, DriveFault::kError);
+  run(4);
+  EXPECT_EQ(control().module_state(), ModuleState::kSafeStop);
+  EXPECT_EQ(control().gait_status().stop_reason, StopReason::kDriveError);
 }
 
 TEST_P(BusModuleTest, DriveSilentFor50Ms_IsNamedAndTheModuleGoesOn) {

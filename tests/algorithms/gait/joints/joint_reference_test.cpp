@@ -24,6 +24,17 @@ class JointReferenceTest : public testing::Test {
   JointCommand command_;
 };
 
+TEST_F(JointReferenceTest, AnglesFartherOutsideThanAnEncoderMayBeOff_AreNamedAndNotArmed) {
+  EXPECT_TRUE(JointReference::out_of_range(nominal_robot(), {}, q_rad_).is_empty());
+  q_rad_[kKnee] = -0.019;
+  EXPECT_TRUE(JointReference::out_of_range(nominal_robot(), {}, q_rad_).is_empty());
+  q_rad_[kKnee] = -0.021;
+  q_rad_[11] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(JointReference::out_of_range(nominal_robot(), {}, q_rad_).bits(), 1U << kKnee | 1U << 11U);
+  JointReference other;
+  EXPECT_FALSE(other.try_arm(nominal_robot(), {}, q_rad_));
+}
+
 TEST_F(JointReferenceTest, PoseReached_IsNotLimited) {
   EXPECT_FALSE(reference_.follow(base_T_sole_, {true, true}, command_));
   for (std::size_t n = 0; n < kJointCount; ++n) {
