@@ -373,7 +373,11 @@ TEST_F(ServiceTest, RecordingThatEndsEarly_IsSaidByTheExitCodeAndTheModuleGoesOn
   std::filesystem::create_directories(directory);
   recording::Recorder recorder(robot_.ports(), {.queue_bytes = 256, .pictures = 1});
   recorder.begin(directory, config_.params);
-  const Outcome outcome = run([&] { listen_until("STATUS=running", 5s); }, true, &recorder);
+  const auto during = [&] {
+    listen_until("STATUS=running", 5s);
+    std::this_thread::sleep_for(200ms);
+  };
+  const Outcome outcome = run(during, true, &recorder);
   EXPECT_EQ(outcome.code, ExitCode::kRecording) << outcome.why;
   EXPECT_NE(outcome.recording_failure.find("its queue was full"), std::string::npos) << outcome.recording_failure;
   EXPECT_GT(outcome.cycles, 10U);
