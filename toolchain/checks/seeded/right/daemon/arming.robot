@@ -1,5 +1,5 @@
 ROBOT ready
-ROBOT commands=5532 enters=252 exits=12 gains=0 poses=0
+ROBOT commands=5578 enters=254 exits=12 gains=0 poses=0
 TOLD STATUS=arming, no answer yet from left_hip_roll, left_hip_yaw, left_hip_pitch, left_knee, left_ankle_pitch, left_ankle_roll, right_hip_roll, right_hip_yaw, right_hip_pitch, right_knee, right_ankle_pitch, right_ankle_roll; cycles 0, overruns 0, skipped 0, heap calls 0
 TOLD READY=1
 TOLD WATCHDOG=1
