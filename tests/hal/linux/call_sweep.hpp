@@ -38,7 +38,11 @@ void sweep_failing_calls(int sent, Use&& use, Harmless&& harmless, LeastRead&& l
       calls.fail_any(nth, error_number);
       const SweepOutcome o = use(calls);
       EXPECT_EQ(calls.open_descriptors(), 0) << nth << " " << error_number;
-      ASSERT_TRUE(calls.failed_any());
+      if (!calls.failed_any()) {  // packets that come together take a read less
+        EXPECT_LE(calls.all_calls(), nth);
+        EXPECT_GE(nth + 3, calls_made);
+        continue;
+      }
       const Call hit = *calls.failed_any();
       EXPECT_TRUE(harmless(hit, error_number) || !o.opened || o.failures > 0) << nth << " " << error_number;
       if (o.opened) {
