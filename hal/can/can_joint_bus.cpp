@@ -12,11 +12,11 @@ constexpr void count(std::uint32_t& counter, std::uint32_t times = 1) noexcept {
   counter += std::min(times, room);
 }
 
-// A bus's identifier of 11 bits as one number; none is kNobody.
-constexpr std::uint32_t sender_of(std::size_t bus, std::uint32_t id) noexcept {
-  return static_cast<std::uint32_t>(bus) << 11U | (id & kMaxCanId);
-}
 constexpr std::uint32_t kNobody = ~0U;
+// A bus's identifier of 11 bits as one number; of more bits it is nobody's.
+constexpr std::uint32_t sender_of(std::size_t bus, std::uint32_t id) noexcept {
+  return id > kMaxCanId ? kNobody : static_cast<std::uint32_t>(bus) << 11U | id;
+}
 
 constexpr JointSet without(JointSet set, std::size_t joint) noexcept {
   return JointSet::of_bits(set.bits() & ~(1U << joint));

@@ -250,6 +250,9 @@ TEST_P(CanJointBusTest, Read_ForeignFrames_AreCountedAndChangeNothing) {
   CanFrame fd = reply_of(1, 1.0);
   fd.fd = true;
   channels_[0].incoming.push_back(fd);
+  CanFrame wide = reply_of(1, 1.0);  // no identifier of 11 bits, and in its lower ones a drive's
+  wide.id |= kMaxCanId + 1;
+  channels_[0].incoming.push_back(wide);
   CanFrame error;
   error.error = true;
   error.id = table_.drives[0].reply_id;
@@ -262,7 +265,7 @@ TEST_P(CanJointBusTest, Read_ForeignFrames_AreCountedAndChangeNothing) {
   const JointBusStatus status = bus_->status();
   // Where all drives share an identifier, the frame of another bus's drive has a known identifier and a wrong name.
   const bool shared = GetParam() == MitReplyRule::kId;
-  EXPECT_EQ(status.unknown_ids, shared ? 2U : 3U);
+  EXPECT_EQ(status.unknown_ids, shared ? 3U : 4U);
   EXPECT_EQ(status.bad_frames, shared ? 5U : 4U);
 }
 
