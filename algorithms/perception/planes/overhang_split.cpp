@@ -4,6 +4,11 @@
 #include <algorithm>
 
 namespace polygmap {
+namespace {
+
+constexpr double kLeastMiddle_m = 0.05;  // a plane nearer than that is seen from its end
+
+}  // namespace
 
 void OverhangSplit::begin(const Params& params, const Vec3& up, const PlaneSet& planes) noexcept {
   params_ = params;
@@ -28,6 +33,7 @@ void OverhangSplit::begin(const Params& params, const Vec3& up, const PlaneSet& 
     profile.back = (up * up.dot(normal) - normal).normalized();
     profile.middle_m = profile.back.dot(planes[p].centre_m);
     profile.lowest_m = up.dot(planes[p].centre_m) - 0.5 * kBins * kBin_m;
+    profile.drop = profile.middle_m > kLeastMiddle_m ? -up.dot(planes[p].centre_m) / profile.middle_m : 0.0;
   }
 }
 
@@ -108,12 +114,37 @@ void OverhangSplit::drop_sparse(Profile& profile) const noexcept {
   }
 }
 
+// Where the nearer of two upright surfaces ends, the line of sight passes heights of the farther one that nobody sees.
+// What shows such a height is a mixture of both surfaces: it lies on that line, and speaks neither for a step nor for a
+// slope. As many heights as the step hides, those with the fewest rows about it, are left out of both.
+void OverhangSplit::drop_hidden(const Step& step, Profile& profile) noexcept {
+  const double hidden = (step.lower_m - step.upper_m) * profile.drop / kBin_m;
+  if (!(hidden > 0.0)) return;
+  const auto count = static_cast<std::int32_t>(std::min(hidden + 1.0, kBins - 1.0));  // that begin or end in a bin
+  const auto rows_at = [&profile](std::int32_t k) { return profile.bins[static_cast<std::size_t>(k)].rows; };
+  const std::int32_t from = std::max(step.first_upper - count, 0), until = std::min(step.first_upper, kBins - count);
+  float rows = 0.0F;
+  for (std::int32_t k = from; k < from + count; ++k) rows += rows_at(k);
+  float fewest = rows;
+  std::int32_t first = from;
+  for (std::int32_t k = from + 1; k <= until; ++k) {
+    rows += rows_at(k + count - 1) - rows_at(k - 1);
+    if (rows >= fewest) continue;
+    fewest = rows;
+    first = k;
+  }
+  std::fill_n(profile.bins.begin() + first, count, Bin{});
+}
+
 bool OverhangSplit::try_split(std::size_t plane, Halves& halves) noexcept {
   if (profile_of_[plane] == 0) return false;
   Profile& profile = profiles_[profile_of_[plane] - 1U];
-  work_.add(kBins, 60);
+  work_.add(kBins, 110);
   drop_sparse(profile);
-  const Step step = best_step(profile);
+  Step step = best_step(profile);
+  if (step.first_upper == 0) return false;
+  drop_hidden(step, profile);
+  step = best_step(profile);
   const double rows = step.lower_rows + step.upper_rows;
   if (step.first_upper == 0 || profile.beyond > params_.most_beyond * rows) return false;
   if (std::abs(step.upper_m - step.lower_m) < params_.least_step_m) return false;

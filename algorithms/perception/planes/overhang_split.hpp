@@ -74,6 +74,7 @@ class OverhangSplit {
     Vec3 back = Vec3::UnitZ();  // level, away from the camera
     double middle_m = 0.0;      // distance of the plane's centre along it
     double lowest_m = 0.0;      // of the first bin, along up
+    double drop = 0.0;          // of the line of sight to the plane's centre, per length along back
     double beyond = 0.0;        // rows above or below all bins
     std::array<Bin, kBins> bins{};
   };
@@ -84,6 +85,7 @@ class OverhangSplit {
     double left_m2 = 1e9;  // unexplained, summed over rows
   };
   void drop_sparse(Profile& profile) const noexcept;
+  static void drop_hidden(const Step& step, Profile& profile) noexcept;
   [[nodiscard]] static double left_by_slope_m2(const Profile& profile) noexcept;
   [[nodiscard]] Step best_step(const Profile& profile) const noexcept;
 
