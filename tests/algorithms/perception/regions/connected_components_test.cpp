@@ -102,6 +102,36 @@ TEST_F(ConnectedComponentsTest, FartherApartThanTheSmallerOneIsWide_CountAsTwoPl
   EXPECT_EQ((*regions_)[2].coplanar, 2U);
 }
 
+// The floor beside a flight of stairs, in the corners of the picture that the treads leave: 1200 and 1120 pixels.
+TEST_F(ConnectedComponentsTest, SmallPiecesOfOnePlaneAtThePicturesEdge_AreRegionsTogether_AndNoneAlone) {
+  (*planes_)[kWall].kind = SurfaceKind::kTread;
+  show(77, 79, 20, 69), show(78, 79, 300, 369);
+  for (std::int32_t g = 70; g < kColumns; ++g) {
+    for (std::int32_t r = 70; r < 300; ++r) image_->columns.inverse_depth(g, r) = 1.0F / 0.7F;
+  }
+  join();
+  ASSERT_EQ(regions_->count, 2U);
+  EXPECT_TRUE((*regions_)[kWall].alive);
+  EXPECT_TRUE((*regions_)[2].alive);
+  EXPECT_EQ((*regions_)[2].coplanar, kWall);
+  EXPECT_EQ(region_in(77), kWall);
+  EXPECT_EQ(region_in(79, 1), 2U);
+  for (std::int32_t g = 0; g < kColumns; ++g) boundaries_->columns()[static_cast<std::size_t>(g)].clear();
+  show(77, 79, 20, 69);
+  join();
+  EXPECT_FALSE((*regions_)[kWall].alive);
+  EXPECT_EQ(region_in(77), kNoRegion);
+}
+
+// Nothing says that two pieces far from each other within the picture are one thing.
+TEST_F(ConnectedComponentsTest, SmallPiecesThatCountAsTwoPlanes_AreInNoRegion) {
+  show(20, 22, 200, 249), show(60, 61, 200, 269);
+  see(23, 59, 1.5F);
+  join();
+  EXPECT_EQ(region_in(20), kNoRegion);
+  EXPECT_EQ(region_in(60), kNoRegion);
+}
+
 TEST_F(ConnectedComponentsTest, ThatAreTooSmall_AreInNoRegion) {
   show(20, 29);
   show(40, 41, 100, 108);  // 144 pixels
