@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 
 #include "firmware/params.hpp"
 
@@ -167,7 +168,7 @@ void Collector::ordered(std::string_view less, std::string_view more) {
 }
 
 ParamTable Collector::take() && {
-  own_.params.insert(own_.params.end(), nested_.begin(), nested_.end());
+  std::ranges::move(nested_, std::back_inserter(own_.params));
   return std::move(own_);
 }
 
@@ -178,8 +179,8 @@ void Collector::add(std::string_view name, ParamValue value, double least, doubl
 }
 
 void Collector::append(ParamTable inner) {
-  nested_.insert(nested_.end(), inner.params.begin(), inner.params.end());
-  own_.orders.insert(own_.orders.end(), inner.orders.begin(), inner.orders.end());
+  std::ranges::move(inner.params, std::back_inserter(nested_));
+  std::ranges::move(inner.orders, std::back_inserter(own_.orders));
 }
 
 }  // namespace detail

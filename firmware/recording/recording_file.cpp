@@ -216,7 +216,11 @@ bool RecordingFile::read_params() {
   for (std::uint32_t i = 0; i < count; ++i) {
     std::string name;
     if (!take_name(name)) return false;
-    const auto param = std::ranges::find(table.params, name, &config::Param::name);
+    // A recording of this build has them in the table's order.
+    auto param = table.params.begin() + std::min<std::ptrdiff_t>(i, std::ssize(table.params));
+    if (param == table.params.end() || param->name != name) {
+      param = std::ranges::find(table.params, name, &config::Param::name);
+    }
     if (param == table.params.end()) return complain("this module has no parameter \"" + printable(name) + "\"");
     const auto at = static_cast<std::size_t>(param - table.params.begin());
     if (given[at]) return complain("parameter \"" + name + "\" is there twice");
