@@ -45,9 +45,7 @@ void expect_a_good_climb(const ClimbSummary& summary, int steps) {
   EXPECT_GT(summary.swing_clearance_min_m, 0.0);
   EXPECT_GE(summary.seconds_per_step, 2.35);  // four steps from a standstill: 2.398
   EXPECT_LE(summary.seconds_per_step, 3.7);
-  // Of 30 Hz: in a few frames a surface is missed or one is none. The least of fifty seeds is 28.7 (2026-11, seed 27,
-  // rise 0.17): beside the stairs the floor shows in three corners of the picture, 3100 pixels in all and at most 1300
-  // in one, and is found in some frames and not in others.
+  // Of 30 Hz: in a few frames a surface is missed or one is none.
   EXPECT_GE(summary.plane_rate_hz, 28.5);
   EXPECT_LE(summary.exposure_to_map_ms.max, 64.0);
   EXPECT_LE(summary.map_age_at_latch_ms.max, 100.0);
