@@ -120,8 +120,8 @@ INSTANTIATE_TEST_SUITE_P(Long, LongStalledForFiftyMs, testing::ValuesIn(kBothGai
 TEST(ControlOverruns, InEveryCycle_StopsOnBothFeetAndSaysSo) {
   PhysicalClimb climb(stairs_of(2, 1));
   ASSERT_TRUE(run_to_swing_onto(climb, 2));
-  const std::size_t gait = row_named(kSchedule, "gait");
-  climb.row_share = [gait](std::size_t row) { return row == gait ? 1.5 : 0.3; };
+  constexpr std::size_t gait = row_named(kSchedule, "gait");
+  climb.row_share = [](std::size_t row) { return row == gait ? 1.5 : 0.3; };
   const double begin_s = climb.time_s();
   while (climb.health().count(Fault::kTimeShort).count == 0 && climb.tick()) {
   }
@@ -136,8 +136,8 @@ TEST(ControlOverruns, InEveryCycle_StopsOnBothFeetAndSaysSo) {
 // What perception's rows take too long is control's concern only where a cycle gets too long by it.
 TEST(PerceptionOverruns, InEveryPictureInOneLane_ClimbsOn) {
   PhysicalClimb climb(stairs_of(2, 1));
-  const std::size_t surfaces = row_named(kSchedule, "surfaces");
-  climb.row_share = [surfaces](std::size_t row) { return row == surfaces ? 1.1 : 0.5; };
+  constexpr std::size_t surfaces = row_named(kSchedule, "surfaces");
+  climb.row_share = [](std::size_t row) { return row == surfaces ? 1.1 : 0.5; };
   climb.run(60.0);
   EXPECT_GT(climb.health().count(Fault::kRowOverrun).count, 1000U);
   EXPECT_EQ(climb.health().count(Fault::kCycleOverrun).count, 0U);
