@@ -199,11 +199,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 4611441036048579999U);
-  EXPECT_EQ(hashes.gait.value(), 525230542002334741U);
-  EXPECT_EQ(hashes.commands.value(), 11738858354516531569U);
-  EXPECT_EQ(hashes.surfaces.value(), 8247023420399509204U);
-  EXPECT_EQ(hashes.map.value(), 12690333229199395859U);
+  EXPECT_EQ(hashes.estimates.value(), 13501040207022085415U);
+  EXPECT_EQ(hashes.gait.value(), 16200294594912441230U);
+  EXPECT_EQ(hashes.commands.value(), 8607098865666268020U);
+  EXPECT_EQ(hashes.surfaces.value(), 9833336271603982806U);
+  EXPECT_EQ(hashes.map.value(), 3154100391977307547U);
 }
 
 }  // namespace

@@ -41,6 +41,7 @@ class ServiceTest : public testing::Test {
     config_.params.overload.most_late_cycles = 10'000;
     // Without pictures the gait waits for them, and then stops.
     config_.params.gait.standing.start_patience_ticks = 100'000;
+    config_.params.gait.planner.max_map_age_ns = 10'000'000'000;
   }
   void SetUp() override {
 #ifdef POLYGMAP_EMULATED
