@@ -14,6 +14,10 @@ namespace {
 // A sensor that delivers every cycle is missing when nothing came and its newest sample is at least this old. Cycles
 // that catch up find everything read by the first of them; for a latency below one cycle none of them is misled.
 constexpr std::int64_t kMissing_ns = kCycle_ns;
+// The same of one that delivers less often: what was due within a cycle is read by the next.
+constexpr std::int64_t missing_after_ns(std::int64_t interval_ns) noexcept {
+  return interval_ns <= kCycle_ns ? kMissing_ns : interval_ns + kCycle_ns;
+}
 constexpr std::int64_t kLioTimeout_ns = 2 * kNsPerS;  // twenty poses
 // Drives and the feet's board take less to start, and are asked in every cycle of it.
 constexpr std::int64_t kArmingTimeout_ns = kNsPerS / 2;
@@ -67,7 +71,8 @@ Progress ControlLane::sense(std::int64_t now_ns) noexcept {
   if (start_.first_ns < 0) start_.first_ns = now_ns;
   look_across(now_ns);
   const bool imu_came = read_imu(imu_port_, now_ns, estimator_);
-  if (!imu_came && now_ns - estimator_.newest_imu_ns() >= kMissing_ns) health_.raise(Fault::kImuMissing, now_ns);
+  const std::int64_t imu_age_ns = now_ns - std::max(estimator_.newest_imu_ns(), start_.first_ns);
+  if (!imu_came && imu_age_ns >= missing_after_ns(params_.imu_interval_ns)) health_.raise(Fault::kImuMissing, now_ns);
   read_joints(now_ns);
   return Progress::kDone;
 }

@@ -14,7 +14,7 @@ namespace polygmap {
   X(2, kRowOverrun, "row_overrun", "A row took longer than its budget.")                                             \
   X(3, kCycleSlip, "cycle_slip", "A tick came so late that cycles were skipped.")                                    \
   X(4, kClockRate, "clock_rate", "The clock's counter has a rate outside CounterScale's range.")                     \
-  X(5, kImuMissing, "imu_missing", "No IMU sample came in a cycle, and none was read ahead.")                        \
+  X(5, kImuMissing, "imu_missing", "An IMU sample was due and did not come.")                                        \
   X(6, kImuRejected, "imu_rejected", "An IMU sample was not finite, out of range or order, or of the future.")       \
   X(7, kJointFeedbackMissing, "joint_feedback_missing", "No joint feedback came in a cycle.")                        \
   X(8, kJointFeedbackRejected, "joint_feedback_rejected",                                                            \

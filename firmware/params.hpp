@@ -10,6 +10,7 @@
 #include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/robot_model.hpp"
 #include "firmware/overload_guard.hpp"
+#include "scheduler/schedule_table.hpp"
 
 namespace polygmap {
 
@@ -26,6 +27,7 @@ struct Params {
   BodyUncertainty body;
   OverloadGuard::Params overload;
   double tread_height_sigma_m = 0.004;
+  std::int64_t imu_interval_ns = kCycle_ns;
 
   // Of the parameters' table, firmware/config/param_table.hpp.
   static void visit(auto& p, auto& field) {
@@ -43,6 +45,8 @@ struct Params {
     field("overload", p.overload);
     field("tread_height_sigma_m", p.tread_height_sigma_m, 1e-5, 0.1,
           "Height of a mapped tread under a foot that has just landed on it.");
+    field("imu_interval_ns", p.imu_interval_ns, 500'000, 20'000'000,
+          "From one sample of the IMU to the next; when one is missing is judged by it.");
   }
 };
 

@@ -76,6 +76,7 @@ SimRobot::SimRobot(const SimOptions& options)
                .strength = options.errors.depth_noise},
               options.intrinsics, errors_.base_T_camera, stairs_, options.seed),
       imu_(error_params_, errors_, options.seed, plant_->true_T_base()),
+      imu_interval_(options.imu_interval_ns, VirtualClock::kTick_ns),
       joints_(error_params_, options.seed),
       torques_(error_params_, options.seed),
       force_sensors_(options.force_sensors),
@@ -105,7 +106,10 @@ Vec3 SimRobot::push_force_n() const {
 void SimRobot::sense() {
   update_truth();
   const std::int64_t now_ns = clock_.now_ns();
-  imu_queue_.push_overwrite(imu_.sample(plant_->true_T_base(), now_ns, kPlantTick_s));
+  ImuSample felt;
+  if (imu_interval_.push(imu_.sample(plant_->true_T_base(), now_ns, kPlantTick_s), felt)) {
+    imu_queue_.push_overwrite(felt);
+  }
   feedback_ = joints_.sample(plant_->drive_q_rad(), plant_->drive_dq_radps(), now_ns);
   feedback_.tau_nm = torques_.sample(plant_->drive_tau_nm(), plant_->drive_dq_radps());
   feedback_.foot_force_n = forces_.sample({plant_->foot_force_n(0), plant_->foot_force_n(1)});

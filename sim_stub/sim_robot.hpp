@@ -18,6 +18,7 @@
 #include "sim_stub/plant/kinematic_plant.hpp"
 #include "sim_stub/plant/mujoco_plant.hpp"
 #include "sim_stub/robot_camera.hpp"
+#include "sim_stub/sensors/imu_interval.hpp"
 #include "sim_stub/sensors/robot_errors.hpp"
 #include "sim_stub/sensors/sensor_models.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
@@ -44,8 +45,9 @@ struct SimOptions {
   ErrorParams errors;
   std::optional<StartPose> start;  // drawn from the seed when absent
   DepthCameraOptions camera;
-  bool force_sensors = true;       // false: no foot force is measured, NaN
-  std::vector<Window> lio_silent;  // poses stamped then never arrive
+  std::int64_t imu_interval_ns = VirtualClock::kTick_ns;  // from one sample to the next, no less than a tick
+  bool force_sensors = true;                              // false: no foot force is measured, NaN
+  std::vector<Window> lio_silent;                         // poses stamped then never arrive
   PlantKind plant_kind = PlantKind::kKinematic;
   KinematicPlant::Params plant;
   MujocoPlant::Params mujoco;
@@ -106,6 +108,7 @@ class SimRobot final : public hal::Clock,
   std::unique_ptr<Plant> plant_;
   SimDepthCamera camera_;
   ImuModel imu_;
+  ImuInterval imu_interval_;
   JointModel joints_;
   FootForceModel forces_;
   TorqueModel torques_;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <ostream>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "sim_stub/host/climb/climb.hpp"
@@ -29,8 +30,7 @@ std::string name_of(const testing::TestParamInfo<Case>& info) {
          mm(stairs.rise_m) + "_tread" + mm(stairs.tread_m) + "_jitter" + mm(stairs.jitter_m);
 }
 
-ClimbSummary climb(const Case& c, GaitPattern gait) {
-  ClimbOptions options;
+ClimbSummary climb(const Case& c, GaitPattern gait, ClimbOptions options = {}) {
   options.gait = gait;
   options.seed = c.seed;
   options.stairs = c.stairs;
@@ -82,6 +82,32 @@ TEST_P(SingleStepClimb, UnderPhysics_ClimbedWithinTheFigures) {
   EXPECT_LE(summary.tracking_error_x_max_m, 0.030);
   EXPECT_GE(summary.sole_margin_min_m, 0.0);
 }
+
+// The IMU of a Livox Mid-360: 200 Hz, of which no sample falls on every second cycle.
+class SlowImuClimb : public testing::TestWithParam<std::tuple<PlantKind, GaitPattern, std::uint64_t>> {};
+
+TEST_P(SlowImuClimb, ImuOf200Hz_ClimbedWithoutOneMissed) {
+  const auto& [plant, gait, seed] = GetParam();
+  ClimbOptions options;
+  options.plant = plant;
+  options.params.imu_interval_ns = 5 * kNsPerMs;
+  const ClimbSummary summary = climb({seed, {.steps = 4}}, gait, options);
+  EXPECT_FALSE(summary.fell) << summary.reason;
+  EXPECT_EQ(summary.steps_climbed, 4) << summary.reason;
+  EXPECT_EQ(summary.ended_by, "module");
+  EXPECT_LE(summary.foothold_error_m.max, 0.0124);
+  EXPECT_GE(summary.sole_margin_min_m, 0.0);
+  EXPECT_TRUE(std::ranges::none_of(summary.faults, [](const auto& fault) { return fault.first == "imu_missing"; }));
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, SlowImuClimb,
+                         testing::Values(std::tuple{PlantKind::kMujoco, GaitPattern::kDoubleStep, 3U},
+                                         std::tuple{PlantKind::kKinematic, GaitPattern::kDoubleStep, 3U},
+                                         std::tuple{PlantKind::kMujoco, GaitPattern::kSingleStep, 2U}));
+INSTANTIATE_TEST_SUITE_P(Long, SlowImuClimb,
+                         testing::Combine(testing::Values(PlantKind::kMujoco, PlantKind::kKinematic),
+                                          testing::Values(GaitPattern::kDoubleStep, GaitPattern::kSingleStep),
+                                          testing::Range(std::uint64_t{1}, std::uint64_t{11})));
 
 INSTANTIATE_TEST_SUITE_P(Seeds, PhysicsClimb,
                          testing::Values(Case{3, {.steps = 4}},

@@ -6,9 +6,11 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "firmware/pipeline.hpp"
+#include "sim_stub/sensors/imu_interval.hpp"
 #include "tests/support/depth_scene.hpp"
 #include "tests/support/fakes/fake_clock.hpp"
 #include "tests/support/fakes/fake_depth_camera.hpp"
@@ -46,6 +48,7 @@ class FakeRobot {
   fakes::FakeJointBus joints;
   fakes::FakeLidarOdometry lidar;
   bool imu_speaks = true;
+  std::int64_t imu_interval_ns = kCycle_ns;  // from one sample to the next, no less; before the first advance()
   bool joints_speak = true;
   bool camera_speaks = true;
   int picture_ticks = kSlowMachine ? 48 : 16;  // from one picture to the next
@@ -69,6 +72,7 @@ class FakeRobot {
   std::array<Transform, 3> true_T_base_before_;  // newest first
   Transform true_T_base_;
   std::int64_t tick_ = 0;
+  std::optional<sim::ImuInterval> imu_interval_;
   // What a drive said last before it fell silent.
   JointVector q_rad_before_ = JointVector::Zero(), dq_radps_before_ = JointVector::Zero();
   std::array<double, 2> last_heard_{};

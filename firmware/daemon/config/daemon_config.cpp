@@ -19,6 +19,9 @@ namespace {
 constexpr double kMostProcessor = 1023;  // CPU_SETSIZE - 1
 constexpr Range kPort{1, 65535, ""};
 constexpr Range kAngle{-7.0, 7.0, "rad"};
+constexpr Range kImuRate{50, 2000, "Hz"};
+constexpr double kLivoxRate_hz = 200.0;  // of a Mid-360
+constexpr double kSerialRate_hz = 500.0;
 
 class DaemonFile {
  public:
@@ -120,8 +123,11 @@ class DaemonFile {
     const bool is_livox = section.choice("driver", {"livox", "serial"}) == 0;
     const Vec3 rpy_rad = section.vector("base_rpy_rad", kAngle);
     const Mat3 base_R_imu = rotation_zyx(rpy_rad.z(), rpy_rad.y(), rpy_rad.x());
+    const double rate_hz = section.number("rate_hz", kImuRate, is_livox ? kLivoxRate_hz : kSerialRate_hz);
+    config_.params.imu_interval_ns = std::llround(1e9 / rate_hz);
     if (is_livox) {
-      section.only({"driver", "base_rpy_rad", "port", "address", "sender", "check_crc", "clock", "least_delay_ms"});
+      section.only(
+          {"driver", "base_rpy_rad", "rate_hz", "port", "address", "sender", "check_crc", "clock", "least_delay_ms"});
       hal::LivoxImu::Config imu;
       imu.udp = udp_of(section, imu.udp.port);
       warn_of_sender(section, imu.udp);
@@ -131,7 +137,7 @@ class DaemonFile {
       config_.imu = imu;
       config_.places.imu = section.place_of("port");
     } else {
-      section.only({"driver", "base_rpy_rad", "device", "baud", "clock", "least_delay_ms"});
+      section.only({"driver", "base_rpy_rad", "rate_hz", "device", "baud", "clock", "least_delay_ms"});
       hal::SerialImu::Config imu;
       imu.device = section.text("device");
       check_path(section, "device", imu.device.too_long() || imu.device.empty());

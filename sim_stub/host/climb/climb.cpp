@@ -105,6 +105,7 @@ SimOptions sim_options(const ClimbOptions& options) {
     sim.intrinsics = options.camera->intrinsics;
     sim.depth_sigma = options.camera->noise;
   }
+  sim.imu_interval_ns = std::max(options.params.imu_interval_ns, VirtualClock::kTick_ns);
   sim.force_sensors = !infers_contacts(options);
   if (options.blank_depth) sim.camera.blank = {{0, INT64_MAX}};
   return sim;

@@ -48,7 +48,7 @@ struct ClimbOptions {
   double scan_ms = 16.0;                        // one exposure, top to bottom; SimDepthCamera rounds it
   double mount_error_deg = 1.0;                 // roll, pitch, yaw; and 3 mm per degree in each direction
   double scale_error = 0.003;
-  // The module's parameters; what else is said here of the module goes before.
+  // The module's parameters; what else is said here of the module goes before. The IMU is as they say.
   Params params;
   std::string params_file;  // that they were read from
   bool estimate_mount = true;

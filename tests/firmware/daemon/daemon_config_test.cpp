@@ -67,6 +67,7 @@ TEST_F(DaemonConfigTest, GoodFile_HasWhatItSaysAndDefaultsElsewhere) {
   const auto& imu = std::get<hal::LivoxImu::Config>(config.imu);
   EXPECT_EQ(imu.udp.port, 56401);
   EXPECT_EQ(imu.udp.sender.view(), "192.168.1.50");
+  EXPECT_EQ(config.params.imu_interval_ns, 5 * kNsPerMs) << "200 Hz";
   EXPECT_EQ(imu.time.base, hal::TimeBase::kEstimated);
   EXPECT_EQ(imu.time.offset.least_delay_ns, 1'500'000);
   EXPECT_NEAR((imu.base_R_imu * Vec3::UnitX() - Vec3::UnitY()).norm(), 0.0, 1e-12);
@@ -101,7 +102,9 @@ TEST_F(DaemonConfigTest, DrivesOfTheBusFile_LimitTheGains) {
 
 TEST_F(DaemonConfigTest, SerialImu_TakesItsOwnKeys) {
   const std::string text = replaced(good("device = \"/dev/ttyTHS1\"\nbaud = 460800\n"), "\"livox\"", "\"serial\"");
+  EXPECT_EQ(read_daemon_config(write("robot.toml", text + "rate_hz = 100\n")).params.imu_interval_ns, 10 * kNsPerMs);
   const DaemonConfig config = read_daemon_config(write("robot.toml", text));
+  EXPECT_EQ(config.params.imu_interval_ns, kCycle_ns);
   const auto& imu = std::get<hal::SerialImu::Config>(config.imu);
   EXPECT_EQ(imu.device.view(), "/dev/ttyTHS1");
   EXPECT_EQ(imu.baud, 460'800U);
@@ -197,6 +200,8 @@ INSTANTIATE_TEST_SUITE_P(
               "line 11: imu.sender must be an address such as"},
         Wrong{"port", "driver = \"livox\"", "driver = \"livox\"\nport = 65536",
               "line 11: imu.port must be from 1 to 65535, not 65536"},
+        Wrong{"rate", "driver = \"livox\"", "driver = \"livox\"\nrate_hz = 20",
+              "line 11: imu.rate_hz must be from 50 to 2000 Hz, not 20"},
         Wrong{"vector", "driver = \"livox\"", "driver = \"livox\"\nbase_rpy_rad = [1, 2]",
               "line 11: imu.base_rpy_rad must be three numbers in brackets"},
         Wrong{"lane", "real_time = \"preferred\"", "lanes = 3", "line 2: lanes must be from 1 to 2, not 3"},
