@@ -134,6 +134,26 @@ TEST_F(PipelineOnARobot, ImuSlowerThanACycle_IsMissingOnlyWhenASampleIsDue) {
   EXPECT_LE(count(Fault::kImuMissing), 8U);
 }
 
+// Nothing comes in every other cycle.
+TEST_F(PipelineOnARobot, ImuSlowerThanTheModuleIsTold_IsMissingAllTheTime) {
+  start(kToeGap_m);
+  robot_->imu_interval_ns = 4 * kNsPerMs;
+  run(100);
+  EXPECT_GE(count(Fault::kImuMissing), 48U);
+  EXPECT_LE(count(Fault::kImuMissing), 50U);
+}
+
+TEST_F(PipelineOnARobot, ImuSilentFromTheStart_IsMissingFromWhenItWasDue) {
+  Params params;
+  params.imu_interval_ns = 5 * kNsPerMs;
+  start(kToeGap_m, params);
+  robot_->imu_speaks = false;
+  run(4);
+  EXPECT_EQ(count(Fault::kImuMissing), 0U);
+  run(1);
+  EXPECT_EQ(count(Fault::kImuMissing), 1U);
+}
+
 TEST_F(PipelineOnARobot, ImuFallsSilentInSwing_FootComesDownAndTheGaitStops) {
   ASSERT_NO_FATAL_FAILURE(fly());
   robot_->imu_speaks = false;
