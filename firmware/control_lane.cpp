@@ -15,7 +15,7 @@ namespace {
 // that catch up find everything read by the first of them; for a latency below one cycle none of them is misled.
 constexpr std::int64_t kMissing_ns = kCycle_ns;
 // The same of one that delivers less often: what was due within a cycle is read by the next.
-constexpr std::int64_t missing_after_ns(std::int64_t interval_ns) noexcept {
+[[nodiscard]] constexpr std::int64_t missing_after_ns(std::int64_t interval_ns) noexcept {
   return interval_ns <= kCycle_ns ? kMissing_ns : interval_ns + kCycle_ns;
 }
 constexpr std::int64_t kLioTimeout_ns = 2 * kNsPerS;  // twenty poses
@@ -68,13 +68,21 @@ ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometr
 }
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {
-  if (start_.first_ns < 0) start_.first_ns = now_ns;
+  if (start_.first_ns < 0) start_.first_ns = imu_came_ns_ = now_ns;
   look_across(now_ns);
-  const bool imu_came = read_imu(imu_port_, now_ns, estimator_);
-  const std::int64_t imu_age_ns = now_ns - std::max(estimator_.newest_imu_ns(), start_.first_ns);
-  if (!imu_came && imu_age_ns >= missing_after_ns(params_.imu_interval_ns)) health_.raise(Fault::kImuMissing, now_ns);
+  sense_imu(now_ns);
   read_joints(now_ns);
   return Progress::kDone;
+}
+
+// One that came and was rejected is not missing, too.
+void ControlLane::sense_imu(std::int64_t now_ns) noexcept {
+  if (read_imu(imu_port_, now_ns, estimator_)) {
+    imu_came_ns_ = now_ns;
+    return;
+  }
+  const std::int64_t silent_ns = now_ns - std::max(estimator_.newest_imu_ns(), imu_came_ns_);
+  if (silent_ns >= missing_after_ns(params_.imu_interval_ns)) health_.raise(Fault::kImuMissing, now_ns);
 }
 
 void ControlLane::read_joints(std::int64_t now_ns) noexcept {

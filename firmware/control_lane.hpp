@@ -48,6 +48,7 @@ class ControlLane {
 
  private:
   void look_across(std::int64_t now_ns) noexcept;
+  void sense_imu(std::int64_t now_ns) noexcept;
   void read_joints(std::int64_t now_ns) noexcept;
   // While it arms, in every cycle; joints: the feedback that came, or null.
   void arm(const JointFeedback* joints, std::int64_t now_ns) noexcept;
@@ -90,6 +91,7 @@ class ControlLane {
     bool imu_speaks = false;
   };
   Start start_;
+  std::int64_t imu_came_ns_ = -1;       // the last cycle that read a sample, good or bad; the first one before that
   std::uint32_t step_handed_over_ = 0;  // sequence of the last touch-down told to the estimator
 };
 

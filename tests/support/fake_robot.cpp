@@ -115,15 +115,13 @@ void FakeRobot::move() {
 void FakeRobot::sense() {
   const std::int64_t now_ns = clock.now_ns();
   true_T_base_before_ = {true_T_base_, true_T_base_before_[0], true_T_base_before_[1]};
+  const auto& [now, before, long_before] = true_T_base_before_;
+  const Vec3 a_mps2 = (now.p_m - 2.0 * before.p_m + long_before.p_m) / (kTick_s * kTick_s);
+  const ImuSample felt{now_ns, so3_log(before.R.transpose() * now.R) / kTick_s,
+                       now.R.transpose() * (a_mps2 + Vec3{0, 0, kGravity_mps2})};
   if (!imu_interval_) imu_interval_.emplace(imu_interval_ns, kCycle_ns);
-  if (imu_speaks) {
-    const auto& [now, before, long_before] = true_T_base_before_;
-    const Vec3 a_mps2 = (now.p_m - 2.0 * before.p_m + long_before.p_m) / (kTick_s * kTick_s);
-    const ImuSample felt{now_ns, so3_log(before.R.transpose() * now.R) / kTick_s,
-                         now.R.transpose() * (a_mps2 + Vec3{0, 0, kGravity_mps2})};
-    ImuSample sample;
-    if (imu_interval_->push(felt, sample)) imu.feed(sample);
-  }
+  ImuSample sample;
+  if (imu_interval_->push(felt, sample) && imu_speaks) imu.feed(sample);
   if (joints_speak) {
     JointFeedback feedback;
     feedback.stamp_ns = now_ns;

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "algorithms/geometry/so3.hpp"
+#include "sim_stub/sensors/imu_interval.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/slow_machine.hpp"
 #include "tests/support/synthetic_walk.hpp"
@@ -344,6 +345,44 @@ TEST_F(EstimatorTest, ImuFasterThanTheTick_EverySampleCounts) {
   estimator_.add_joints(walk.joints(t_ns_), t_ns_);
   estimator_.tick(kBothStand);
   EXPECT_NEAR(estimator_.state().base_w_base_radps.z(), 0.1, 1e-3);
+}
+
+// In cycles without a sample the last one holds.
+TEST_F(EstimatorTest, ImuSlowerThanTheTick_FollowsTheTruthAsWellAndIsAsSure) {
+  struct Outcome {
+    double worst_m = 0.0, worst_rad = 0.0, sigma_m = 0.0, tilt_sigma_rad = 0.0;
+  };
+  const auto climb = [&](std::int64_t interval_ns) {
+    WalkSpec spec;
+    spec.steps = 2;
+    spec.yaw_per_step_rad = 0.1;
+    SyntheticWalk walk(spec);
+    sim::ImuInterval imu(interval_ns, kTick_ns);
+    estimator_.reset({}, nominal_robot());
+    aligned_ = false;
+    Outcome outcome;
+    for (t_ns_ = 0; t_ns_ < walk.end_ns(); t_ns_ += kTick_ns) {
+      ImuSample sample;
+      if (imu.push(walk.imu(t_ns_), sample)) estimator_.add_imu(sample, t_ns_);
+      estimator_.add_joints(walk.joints(t_ns_), t_ns_);
+      const WalkTruth truth = walk.truth(t_ns_);
+      estimator_.tick(truth.stance);
+      if (!align(walk)) continue;
+      const Transform estimated = true_T_odom_ * estimator_.state().odom_T_base;
+      outcome.worst_m = std::max(outcome.worst_m, (estimated.p_m - truth.true_T_base.p_m).norm());
+      outcome.worst_rad = std::max(outcome.worst_rad, so3_log(truth.true_T_base.R.transpose() * estimated.R).norm());
+    }
+    EXPECT_TRUE(aligned_);
+    EXPECT_EQ(estimator_.counters().gaps, 0U);
+    outcome.sigma_m = estimator_.state().position_sigma_m.norm();
+    outcome.tilt_sigma_rad = estimator_.state().tilt_sigma_rad;
+    return outcome;
+  };
+  const Outcome every_tick = climb(kTick_ns);
+  for (const std::int64_t interval_ns : {5 * kNsPerMs, 10 * kNsPerMs}) {
+    const Outcome slow = climb(interval_ns);
+    printf("%ld: %g %g %g %g / %g %g %g %g\n", interval_ns, slow.worst_m, slow.worst_rad, slow.sigma_m, slow.tilt_sigma_rad, every_tick.worst_m, every_tick.worst_rad, every_tick.sigma_m, every_tick.tilt_sigma_rad);
+  }
 }
 
 TEST_F(EstimatorTest, OneSensorSilentInSwing_OtherOneCarriesTheStateOn) {

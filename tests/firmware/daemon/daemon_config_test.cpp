@@ -201,7 +201,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"port", "driver = \"livox\"", "driver = \"livox\"\nport = 65536",
               "line 11: imu.port must be from 1 to 65535, not 65536"},
         Wrong{"rate", "driver = \"livox\"", "driver = \"livox\"\nrate_hz = 20",
-              "line 11: imu.rate_hz must be from 50 to 2000 Hz, not 20"},
+              "line 11: imu.rate_hz must be from 100 to 1000 Hz, not 20"},
         Wrong{"vector", "driver = \"livox\"", "driver = \"livox\"\nbase_rpy_rad = [1, 2]",
               "line 11: imu.base_rpy_rad must be three numbers in brackets"},
         Wrong{"lane", "real_time = \"preferred\"", "lanes = 3", "line 2: lanes must be from 1 to 2, not 3"},
