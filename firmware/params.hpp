@@ -45,7 +45,8 @@ struct Params {
     field("overload", p.overload);
     field("tread_height_sigma_m", p.tread_height_sigma_m, 1e-5, 0.1,
           "Height of a mapped tread under a foot that has just landed on it.");
-    // A cycle reads four samples, and nothing is steered by one of 20 ms ago (gait.steer_age_ns): half of that for either.
+    // A cycle reads four samples, and nothing is steered by one of 20 ms ago (gait.steer_age_ns): half of that for
+    // either.
     field("imu_interval_ns", p.imu_interval_ns, 1'000'000, 10'000'000,
           "From one sample of the IMU to the next; when one is missing is judged by it.");
   }

@@ -31,7 +31,7 @@ class PipelineOnARobot : public testing::Test {
       robot_->advance();
       module_->tick();
       if (!started_) {
-        started_ = !sent.empty();
+        started_ = !sent.empty() && sent.newest().joints[0].kp_nmprad > 0.0;  // armed: from here on angles count
         continue;
       }
       // Whatever is silent, the drives hear of the gait every tick, and nothing jumps.

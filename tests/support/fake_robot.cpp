@@ -84,8 +84,9 @@ void FakeRobot::move() {
   dq_radps_ = (q_rad_ - before_rad) / kTick_s;
   if (!joints.commands().empty()) {
     for (std::size_t n = 0; n < kJointCount; ++n) {
-      followed_rad_[static_cast<Eigen::Index>(n)] =
-          joints.commands().newest().joints[n].q_rad - encoder_offset_rad[static_cast<Eigen::Index>(n)];
+      const JointSetpoint& asked = joints.commands().newest().joints[n];
+      const auto joint = static_cast<Eigen::Index>(n);
+      if (asked.kp_nmprad > 0.0) followed_rad_[joint] = asked.q_rad - encoder_offset_rad[joint];  // armed
     }
   }
   std::array<Transform, kFootCount> base_T_foot;

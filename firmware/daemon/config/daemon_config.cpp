@@ -20,7 +20,7 @@ constexpr double kMostProcessor = 1023;  // CPU_SETSIZE - 1
 constexpr Range kPort{1, 65535, ""};
 constexpr Range kAngle{-7.0, 7.0, "rad"};
 constexpr Range kImuRate{100, 1000, "Hz"};  // what imu_interval_ns may be
-constexpr double kLivoxRate_hz = 200.0;  // of a Mid-360
+constexpr double kLivoxRate_hz = 200.0;     // of a Mid-360
 constexpr double kSerialRate_hz = 500.0;
 
 class DaemonFile {

@@ -381,7 +381,9 @@ TEST_F(EstimatorTest, ImuSlowerThanTheTick_FollowsTheTruthAsWellAndIsAsSure) {
   const Outcome every_tick = climb(kTick_ns);
   for (const std::int64_t interval_ns : {5 * kNsPerMs, 10 * kNsPerMs}) {
     const Outcome slow = climb(interval_ns);
-    printf("%ld: %g %g %g %g / %g %g %g %g\n", interval_ns, slow.worst_m, slow.worst_rad, slow.sigma_m, slow.tilt_sigma_rad, every_tick.worst_m, every_tick.worst_rad, every_tick.sigma_m, every_tick.tilt_sigma_rad);
+    printf("%ld: %g %g %g %g / %g %g %g %g\n", interval_ns, slow.worst_m, slow.worst_rad, slow.sigma_m,
+           slow.tilt_sigma_rad, every_tick.worst_m, every_tick.worst_rad, every_tick.sigma_m,
+           every_tick.tilt_sigma_rad);
   }
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr PlaneId kLeaning = 1;
 constexpr std::int32_t kFirstColumn = 20, kLastColumn = 59;
-constexpr std::int16_t kTop = 231, kBottom = 250;  // some eight rows of each surface
+constexpr std::int16_t kTop = 231, kBottom = 250;    // some eight rows of each surface
 constexpr double kDown_rad = 1.05, kMiddle_m = 0.8;  // the camera looks down by as much; depth along its axis
 
 // One grown plane that leans, in a picture whose rows show something upright at some distance along the level.
@@ -57,7 +57,8 @@ class OverhangSplitTest : public testing::Test {
     return split_->try_split(kLeaning, halves);
   }
 
-  const Vec3 up_{0.0, -std::cos(kDown_rad), -std::sin(kDown_rad)}, ahead_{0.0, -std::sin(kDown_rad), std::cos(kDown_rad)};
+  const Vec3 up_{0.0, -std::cos(kDown_rad), -std::sin(kDown_rad)},
+      ahead_{0.0, -std::sin(kDown_rad), std::cos(kDown_rad)};
   const test::ColumnScene scene_;
   std::unique_ptr<FrameImage> picture_ = std::make_unique<FrameImage>();
   std::unique_ptr<PlaneSet> planes_ = std::make_unique<PlaneSet>();
