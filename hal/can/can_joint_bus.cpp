@@ -12,12 +12,6 @@ constexpr void count(std::uint32_t& counter, std::uint32_t times = 1) noexcept {
   counter += std::min(times, room);
 }
 
-constexpr std::uint32_t kNobody = ~0U;
-// A bus's identifier of 11 bits as one number; of more bits it is nobody's.
-constexpr std::uint32_t sender_of(std::size_t bus, std::uint32_t id) noexcept {
-  return id > kMaxCanId ? kNobody : static_cast<std::uint32_t>(bus) << 11U | id;
-}
-
 constexpr JointSet without(JointSet set, std::size_t joint) noexcept {
   return JointSet::of_bits(set.bits() & ~(1U << joint));
 }
@@ -25,10 +19,12 @@ constexpr JointSet without(JointSet set, std::size_t joint) noexcept {
 }  // namespace
 
 CanJointBus::CanJointBus(const DriveTable& table, std::span<CanChannel* const> channels) noexcept : table_(table) {
-  for (std::size_t n = 0; n < kJointCount; ++n) {
-    repliers_[n] = sender_of(table.drives[n].bus, table.drives[n].reply_id);
+  for (std::size_t bus = 0; bus < buses_.size(); ++bus) {
+    if (bus < channels.size()) buses_[bus].channel = channels[bus];
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      if (table.drives[n].bus == bus) (void)buses_[bus].joints.try_push_back(static_cast<std::uint8_t>(n));
+    }
   }
-  std::copy_n(channels.begin(), std::min(channels.size(), channels_.size()), channels_.begin());
   feedback_.silent_cycles.fill(JointFeedback::kNeverHeard);
   feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
   status_.senses_feet = table.feet.present;
@@ -37,9 +33,9 @@ CanJointBus::CanJointBus(const DriveTable& table, std::span<CanChannel* const> c
 bool CanJointBus::try_read(JointFeedback& feedback) noexcept {
   replied_ = {};
   for (std::size_t bus = 0; bus < kMaxBuses; ++bus) {
-    if (channels_[bus] == nullptr) continue;
+    if (buses_[bus].channel == nullptr) continue;
     for (std::size_t taken = 0; taken < kMaxFramesPerRead;) {
-      const std::size_t came = channels_[bus]->read(read_frames_);
+      const std::size_t came = buses_[bus].channel->read(read_frames_);
       for (std::size_t i = 0; i < came; ++i) take(bus, read_frames_[i]);
       taken += came;
       if (came < read_frames_.size()) break;
@@ -69,16 +65,16 @@ void CanJointBus::take(std::size_t bus, const CanFrame& frame) noexcept {
   // What came before the first command answers nobody; of errors the channel keeps count.
   if (frame.error || command_ns_ < 0) return;
   const std::span<const std::uint8_t> bytes(frame.data.data(), std::min<std::size_t>(frame.length, 8));
+  if (frame.extended || frame.id > kMaxCanId) return count(status_.unknown_ids);
   bool known = false;
-  const std::uint32_t sender = frame.extended ? kNobody : sender_of(bus, frame.id);
   const bool stale = frame.stamp_ns != 0 && command_ns_ - frame.stamp_ns > kStale_ns;
-  if (table_.feet.present && sender == sender_of(table_.feet.bus, table_.feet.id)) {
+  if (table_.feet.present && bus == table_.feet.bus && frame.id == table_.feet.id) {
     return stale ? count(status_.stale) : take_feet(frame);
   }
-  for (std::size_t n = 0; n < kJointCount; ++n) {
-    if (sender != repliers_[n]) continue;
-    known = true;
+  for (const std::size_t n : buses_[bus].joints) {
     const CanDrive& drive = table_.drives[n];
+    if (frame.id != drive.reply_id) continue;
+    known = true;
     if (bytes.empty() || name_in_reply(bytes, drive.reply) != reply_name(drive.id, drive.reply)) continue;
     return stale ? count(status_.stale) : take_reply(n, frame);
   }
@@ -178,22 +174,21 @@ JointSet CanJointBus::try_write(const JointCommand& command) noexcept {
 
 JointSet CanJointBus::send(const JointFrames& frames, JointSet joints) noexcept {
   JointSet taken;
-  for (std::size_t bus = 0; bus < kMaxBuses; ++bus) {
-    std::array<std::size_t, kJointCount> joint_of{};
-    std::size_t queued = 0;
-    for (std::size_t n = 0; n < kJointCount; ++n) {
-      if (table_.drives[n].bus != bus || !joints.contains(n)) continue;
-      CanFrame& frame = queue_[queued];
+  for (const Bus& bus : buses_) {
+    StaticVector<std::uint8_t, kJointCount> queued;
+    for (const std::uint8_t n : bus.joints) {
+      if (!joints.contains(n)) continue;
+      CanFrame& frame = queue_[queued.size()];
       frame.id = table_.drives[n].id;
       frame.length = static_cast<std::uint8_t>(frames[n].size());
       std::ranges::copy(frames[n], frame.data.begin());
-      joint_of[queued++] = n;
+      (void)queued.try_push_back(n);
     }
-    if (queued == 0) continue;
+    if (queued.empty()) continue;
     const std::size_t sent =
-        channels_[bus] == nullptr ? 0 : std::min(channels_[bus]->write({queue_.data(), queued}), queued);
-    for (std::size_t i = 0; i < sent; ++i) taken.insert(joint_of[i]);
-    count(status_.refused, static_cast<std::uint32_t>(queued - sent));
+        bus.channel == nullptr ? 0 : std::min(bus.channel->write({queue_.data(), queued.size()}), queued.size());
+    for (std::size_t i = 0; i < sent; ++i) taken.insert(queued[i]);
+    count(status_.refused, static_cast<std::uint32_t>(queued.size() - sent));
   }
   count_bus_offs();
   return taken;
@@ -202,11 +197,11 @@ JointSet CanJointBus::send(const JointFrames& frames, JointSet joints) noexcept 
 void CanJointBus::count_bus_offs() noexcept {
   status_.bus_off = false;
   status_.lost = status_.failed_calls = 0;
-  for (std::size_t bus = 0; bus < kMaxBuses; ++bus) {
-    if (channels_[bus] == nullptr) continue;
-    const CanChannelStatus channel = channels_[bus]->status();
-    if (channel.bus_off && !was_off_[bus]) count(status_.bus_offs);
-    was_off_[bus] = channel.bus_off;
+  for (Bus& bus : buses_) {
+    if (bus.channel == nullptr) continue;
+    const CanChannelStatus channel = bus.channel->status();
+    if (channel.bus_off && !bus.was_off) count(status_.bus_offs);
+    bus.was_off = channel.bus_off;
     status_.bus_off |= channel.bus_off;
     count(status_.lost, channel.lost);
     count(status_.failed_calls, channel.failed_calls);

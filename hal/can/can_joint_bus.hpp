@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "algorithms/core/containers/static_vector.hpp"
 #include "hal/can/drive_table.hpp"
 #include "hal/ports/can_channel.hpp"
 #include "hal/ports/joint_bus.hpp"
@@ -45,6 +46,11 @@ class CanJointBus final : public JointBus {
   // Of one bus in one call: a backlog is worked off, a babbling node is not followed.
   static constexpr std::size_t kMaxFramesPerRead = 64;
   using JointFrames = std::array<MitBytes, kJointCount>;
+  struct Bus {
+    CanChannel* channel = nullptr;
+    StaticVector<std::uint8_t, kJointCount> joints;  // whose drives are on it
+    bool was_off = false;
+  };
 
   void take(std::size_t bus, const CanFrame& frame) noexcept;
   void take_feet(const CanFrame& frame) noexcept;
@@ -63,8 +69,7 @@ class CanJointBus final : public JointBus {
   [[nodiscard]] JointSet send(const JointFrames& frames, JointSet joints) noexcept;
 
   DriveTable table_;
-  std::array<std::uint32_t, kJointCount> repliers_{};  // who answers for a joint: bus and identifier in one
-  std::array<CanChannel*, kMaxBuses> channels_{};
+  std::array<Bus, kMaxBuses> buses_{};
   JointFeedback feedback_;
   std::array<std::int64_t, kJointCount> replied_ns_{};  // stamp of the command that a joint's last reply answered
   JointSet heard_, replied_;                            // ever; since the last read
@@ -74,7 +79,6 @@ class CanJointBus final : public JointBus {
   std::int64_t command_ns_ = -1;  // stamp of the last command; negative: none yet
   std::int64_t feet_ns_ = -1;     // stamp of the command before the feet's last frame
   std::uint32_t writes_ = 0;
-  std::array<bool, kMaxBuses> was_off_{};
   JointBusStatus status_;
   // Buffers of one call each; kept, since clearing them in each call is work without a use.
   std::array<CanFrame, 16> read_frames_{};

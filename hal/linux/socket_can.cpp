@@ -34,6 +34,7 @@ SocketCan::SocketCan(const SystemCalls& calls) noexcept : calls_(calls) {
     }
   }
   for (std::size_t i = 0; i < kBatch; ++i) in_.messages[i].msg_hdr.msg_control = in_.control[i].data();
+  prepare_read(kBatch);
 }
 
 DeviceError SocketCan::open(const Config& config) noexcept {
@@ -158,7 +159,7 @@ SocketCan::After SocketCan::failed(int error_number, int& attempts) noexcept {
   }
 }
 
-// What the kernel wrote into the messages of the last call.
+// What the kernel wrote into the messages that arrived; it writes into no other.
 void SocketCan::prepare_read(std::size_t count) noexcept {
   for (std::size_t i = 0; i < count; ++i) {
     in_.messages[i].msg_hdr.msg_controllen = in_.control[i].size();
@@ -172,7 +173,6 @@ std::size_t SocketCan::read(std::span<CanFrame> frames) noexcept {
   int attempts = 0;
   while (taken < frames.size() && owner_.is_open()) {
     const std::size_t room = std::min(kBatch, frames.size() - taken);
-    prepare_read(room);
     const int count = calls_.recvmmsg(socket_.get(), in_.messages.data(), static_cast<unsigned>(room), MSG_DONTWAIT);
     if (count < 0) {
       const int error_number = errno;
@@ -191,6 +191,7 @@ std::size_t SocketCan::read(std::span<CanFrame> frames) noexcept {
         refused_one = true;
       }
     }
+    prepare_read(arrived);
     if (arrived < room) was_down_ = false;
     // Frames that are refused do not count for the span: a flood of them must not hold the lane.
     if (arrived < room || refused_one) break;

@@ -248,6 +248,9 @@ int run_threads(Climb& climb, long& faults) {
   const long processors = sysconf(_SC_NPROCESSORS_ONLN);
   constexpr int kControlPriority = 80, kPerceptionPriority = 75;
   for (ReplayClock& clock : climb.clocks) clock.set(climb.first_ns());
+  // The kernel waits for a grace period, up to ten milliseconds, before the first counter counts: not in a lane's.
+  hal::InstructionCounter first;
+  if (const int error = first.start(); error != 0) return error;
   if (climb.options.real_time) {
     climb.clocks[0].run_from(climb.first_ns() - 10 * kNsPerMs);
     climb.clocks[1] = climb.clocks[0];
