@@ -2,6 +2,7 @@
 #include "algorithms/gait/states/body_plan.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "algorithms/core/time.hpp"
 #include "algorithms/gait/states/state.hpp"
@@ -14,6 +15,7 @@ void BodyPlan::reset() noexcept {
   correction_ = {};
   base_com_bias_m_.setZero();
   landed_ = {};
+  held_ = false;
 }
 
 void BodyPlan::place(const JointReference& joints, const Transform& plan_T_base) noexcept {
@@ -35,6 +37,14 @@ void BodyPlan::advance() noexcept {
   torso_state_ = torso_.at(torso_tick_, com_.at(com_tick_));
   plan_T_base_ = TorsoTrajectory::pose(torso_state_);
   plan_T_base_.p_m.head<2>() -= (plan_T_base_.R * reference_p_com_m_).head<2>();
+  if (std::exchange(held_, false)) posture_.restart();
+}
+
+// The base stays, so that the standing legs do; the centre of mass moves with the leg in the air.
+void BodyPlan::hold() noexcept {
+  if (!std::exchange(held_, true)) posture_.restart();
+  for (Motion& axis : torso_state_) axis = {.position = axis.position};
+  torso_state_ = TorsoTrajectory::placed(torso_state_, plan_T_base_, (plan_T_base_ * reference_p_com_m_).head<2>());
 }
 
 void BodyPlan::correct(const StateEstimate& state, double correction_time_s) noexcept {

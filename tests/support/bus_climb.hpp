@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole module climbs with its joints behind CAN buses, until a drive or a bus is taken away. What is mute neither
+// hears nor speaks and holds its last command: angle, speed, gains and torque, as an MIT drive does until a timeout of
+// its own.
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "firmware/pipeline.hpp"
+#include "firmware/schedule.hpp"
+#include "sim_stub/bus/bus_robot.hpp"
+
+namespace polygmap::sim {
+
+// What falls silent: one drive, or one bus with all of its drives.
+struct Mute {
+  bool is_bus = false;
+  std::size_t number = 0;
+};
+
+class BusClimb {
+ public:
+  struct Options {
+    PlantKind plant = PlantKind::kMujoco;
+    GaitPattern pattern = GaitPattern::kDoubleStep;
+    std::string bus_file;
+    std::uint64_t seed = 1;
+    int steps = 2;
+  };
+  explicit BusClimb(const Options& options)
+      : file_(config::read_bus(options.bus_file)), robot_(sim_options(options)), bus_(robot_, file_, nullptr) {
+    Params params;
+    params.gait.planner.pattern = options.pattern;
+    config::limit_by_drives(file_, params.gait.joints, params.robot);
+    pipeline_ = std::make_unique<Pipeline>(Ports{robot_, robot_, bus_.joints(), robot_}, params);
+    executive_ = std::make_unique<OneLaneExecutive<>>(*pipeline_, robot_, pipeline_->lane_health(0));
+    executive_->start(robot_.now_ns() + kCycle_ns);
+  }
+
+  void tick() {
+    bus_.advance();
+    executive_->tick(robot_.now_ns());
+  }
+  void run_until(double time_s) {
+    while (this->time_s() < time_s && !has_ended()) tick();
+  }
+  void run_on(double for_s) {
+    const double end_s = time_s() + for_s;
+    while (time_s() < end_s && !truth().fell) tick();
+  }
+  void set_mute(const Mute& mute, bool on) {
+    if (mute.is_bus) {
+      bus_.bus(mute.number).set_bus_off(on);
+      if (mute.number == file_.table.feet.bus) bus_.set_feet_silent(on);
+    } else {
+      bus_.set_fault(mute.number, on ? DriveFault::kUnplugged : DriveFault::kNone);
+    }
+  }
+
+  [[nodiscard]] double time_s() const { return seconds(robot_.now_ns()); }
+  [[nodiscard]] const Truth& truth() const { return robot_.truth(); }
+  [[nodiscard]] const ControlLane& control() const { return pipeline_->control(); }
+  [[nodiscard]] const GaitStatus& status() const { return control().gait_status(); }
+  [[nodiscard]] bool has_ended() const {
+    return truth().fell || status().phase == GaitPhase::kFinished || status().phase == GaitPhase::kStopped;
+  }
+  [[nodiscard]] bool stands_on_both() const {
+    return !truth().fell && truth().in_contact[0] && truth().in_contact[1];
+  }
+
+ private:
+  static SimOptions sim_options(const Options& options) {
+    SimOptions sim;
+    sim.seed = options.seed;
+    sim.stairs.steps = options.steps;
+    sim.plant_kind = options.plant;
+    sim.camera.threaded = false;
+    return sim;
+  }
+
+  config::BusFile file_;
+  SimRobot robot_;
+  BusRobot bus_;
+  std::unique_ptr<Pipeline> pipeline_;
+  std::unique_ptr<OneLaneExecutive<>> executive_;
+};
+
+// A swing of a climb without faults, by the module's own clock.
+struct SwingTimes {
+  Foot foot = Foot::kLeft;
+  bool onto_tread = false;
+  double lift_off_s = 0.0;
+  double touch_down_s = 0.0;
+};
+[[nodiscard]] inline std::vector<SwingTimes> swings_of(BusClimb& climb, double limit_s = 60.0) {
+  std::vector<SwingTimes> swings;
+  std::uint32_t sequence = 0;
+  bool in_the_air = false;
+  while (climb.time_s() < limit_s && !climb.has_ended()) {
+    climb.tick();
+    const LatchedStep& step = climb.status().step;
+    if (step.sequence != sequence) {
+      sequence = step.sequence;
+      swings.push_back({step.foot, step.onto_tread, climb.time_s(), 0.0});
+      in_the_air = true;
+    }
+    if (!in_the_air || climb.status().phase == GaitPhase::kSwing) continue;
+    in_the_air = false;
+    swings.back().touch_down_s = climb.time_s();
+  }
+  return swings;
+}
+
+// What became of it.
+struct MuteOutcome {
+  bool stopped = false;      // the module is in safe_stop
+  bool fell = false;         // the robot did
+  bool both = false;         // both feet stand
+  double stop_s = 0.0;       // from the fault to safe_stop
+  double tilt_rad = 0.0;     // of the base, in the end
+  int reason = 0;            // of the stop
+  [[nodiscard]] bool stands() const { return stopped && both && !fell; }
+};
+// It stays mute; a robot that is to stand does so for rest_s.
+[[nodiscard]] inline MuteOutcome outcome_of(BusClimb& climb, const Mute& mute, double limit_s = 3.0,
+                                            double rest_s = 2.0) {
+  const double begin_s = climb.time_s();
+  climb.set_mute(mute, true);
+  MuteOutcome outcome;
+  while (climb.time_s() < begin_s + limit_s && !climb.truth().fell) {
+    climb.tick();
+    if (climb.control().module_state() != ModuleState::kSafeStop) continue;
+    outcome.stopped = true;
+    outcome.stop_s = climb.time_s() - begin_s;
+    break;
+  }
+  climb.run_on(rest_s);
+  outcome.fell = climb.truth().fell;
+  outcome.both = climb.stands_on_both();
+  outcome.reason = static_cast<int>(climb.status().stop_reason);
+  outcome.tilt_rad = std::acos(std::min(climb.truth().true_T_base.R(2, 2), 1.0));
+  return outcome;
+}
+
+}  // namespace polygmap::sim
