@@ -86,6 +86,7 @@ struct SwingParams {
   double max_lowering_m = 0.055;
   double abort_share = 0.38;
   double abort_passing_ticks = 45.0;
+  double abort_mute_share = 0.25;
   double abort_landing_m = 0.01;
   std::uint32_t max_aborted = 4;
   double soon_ticks = 100.0;
@@ -108,6 +109,8 @@ struct SwingParams {
     field("abort_share", p.abort_share, 0.0, 1.0,
           "In this share of a swing a foot that falls outward goes back to where it stood.");
     field("abort_passing_ticks", p.abort_passing_ticks, 0.0, 2000.0, "That of a passing swing, in ticks.");
+    field("abort_mute_share", p.abort_mute_share, 0.0, 1.0,
+          "In this share of a swing a foot goes back to where it stood when a drive is silent for good.");
     field("abort_landing_m", p.abort_landing_m, 0.0, 0.1,
           "A foot that goes back feels the ground within this of where it stood.");
     field("max_aborted", p.max_aborted, 0, 1000, "As many swings in a row are aborted, then the gait stops.");
