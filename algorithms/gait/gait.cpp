@@ -136,7 +136,7 @@ void Gait::follow_state(const GaitInput& in, GaitShared& gait) noexcept {
 void Gait::advance(const GaitInput& in) noexcept {
   GaitShared gait = shared();
   if (in.mute) {
-    plan_.hold();
+    plan_.hold(params_.held_body, in.lost && status_.stands[0] && status_.stands[1]);
   } else {
     plan_.advance();
   }
@@ -179,7 +179,9 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   observe_links();
   const Transform base_T_plan = plan_.plan_T_base().inverse();
   const std::array<Transform, kFootCount>& plan_T_sole = plan_.plan_T_sole();
-  if (joints_.follow({base_T_plan * plan_T_sole[0], base_T_plan * plan_T_sole[1]}, status_.stands, command)) {
+  std::array<Transform, kFootCount> base_T_sole{base_T_plan * plan_T_sole[0], base_T_plan * plan_T_sole[1]};
+  if (in.mute) joints_.fit_mute_knees(feedback, status_.stands, base_T_sole);
+  if (joints_.follow(base_T_sole, status_.stands, command)) {
     ++status_.ik_limited_ticks;
   }
   plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m(), params_.bias_time_s);

@@ -153,6 +153,21 @@ struct LandedFootParams {
   }
 };
 
+// While a drive is mute the body stays where it was.
+struct HeldBodyParams {
+  double lean_m = 0.05;
+  double lean_mps = 0.1;
+  double lower_m = 0.2;
+  double lower_mps = 0.2;
+
+  static void visit(auto& p, auto& field) {
+    field("lean_m", p.lean_m, 0.0, 0.2, "On both feet the body leans so far towards between them, so that both carry.");
+    field("lean_mps", p.lean_mps, 0.001, 1.0, "The speed of that lean.");
+    field("lower_m", p.lower_m, 0.0, 0.4, "The body comes down no farther for a foot that its mute leg keeps in the air.");
+    field("lower_mps", p.lower_mps, 0.001, 1.0, "The speed of that way down.");
+  }
+};
+
 struct GaitParams {
   StepParams step;
   ClimbPlanner::Params planner;
@@ -163,6 +178,7 @@ struct GaitParams {
   SwingParams swing;
   CrouchParams crouch;
   LandedFootParams landed_foot;
+  HeldBodyParams held_body;
   double steady_m = 0.015;
   double correction_time_s = 0.03;
   double bias_time_s = 0.1;
@@ -179,6 +195,7 @@ struct GaitParams {
     field("swing", p.swing);
     field("crouch", p.crouch);
     field("landed_foot", p.landed_foot);
+    field("held_body", p.held_body);
     field("steady_m", p.steady_m, 0.001, 0.5, "No foot lifts when the divergent component's error is larger.");
     field("correction_time_s", p.correction_time_s, 0.002, 2.0,
           "Time constant of the low-pass of the base's difference to the plan.");

@@ -81,6 +81,9 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const bool told = in.now_ns - in.feedback.stamp_ns <= gait.params.steer_age_ns &&
                     std::isfinite(in.feedback.foot_force_n[index_of(goal_.foot)]);
   if (!(unloaded_ && told) && timing_.tick() > path_.duration_ticks()) return touch_down(in, gait, false, 0.0);
+  if (lowered_m > params.max_lowering_m && in.mute) {  // the leg keeps the foot up: down with the body
+    return gait.plan.try_lower(gait.params.held_body) ? Transition{} : touch_down(in, gait, false, 0.0);
+  }
   if (lowered_m > params.max_lowering_m) {  // the ground that was seen is not there
     ++gait.status.late_contacts;
     timing_.retreat(params.timing);
