@@ -4,9 +4,13 @@
 // its own.
 #pragma once
 
-#include <cmath>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
 #include <memory>
-#include <optional>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -115,14 +119,52 @@ struct SwingTimes {
   return swings;
 }
 
+// A moment of a climb: of the two feet before a swing, or of the swing.
+struct MuteMoment {
+  double at_s = 0.0;
+  std::size_t swing = 0;  // which one
+  Foot foot = Foot::kLeft;
+  bool in_the_air = false;
+  double share = 0.0;  // of the time on both feet before it, or in the air
+};
+[[nodiscard]] inline std::vector<MuteMoment> moments_of(const std::vector<SwingTimes>& swings, std::size_t first,
+                                                        std::size_t last) {
+  constexpr double kStand_s = 1.0;  // before the first swing
+  std::vector<MuteMoment> moments;
+  for (std::size_t n = first; n <= last && n < swings.size(); ++n) {
+    const SwingTimes& s = swings[n];
+    const double both_s = s.lift_off_s - (n == 0 ? s.lift_off_s - kStand_s : swings[n - 1].touch_down_s);
+    const double air_s = s.touch_down_s - s.lift_off_s;
+    for (const double share : {0.1, 0.5, 0.95}) {
+      moments.push_back({s.lift_off_s - (1.0 - share) * both_s, n, s.foot, false, share});
+    }
+    for (const double share : {0.05, 0.25, 0.5, 0.75, 0.95}) {
+      moments.push_back({s.lift_off_s + share * air_s, n, s.foot, true, share});
+    }
+  }
+  return moments;
+}
+// Each drive of the leg that stands, then of the one that swings; then the buses of hip and of knee and ankle of either,
+// where a bus has half a leg, as in the shipped files.
+inline constexpr std::size_t kMutes = kJointCount + 4;
+[[nodiscard]] inline std::array<Mute, kMutes> mutes_of(Foot swing) {
+  std::array<Mute, kMutes> mutes;
+  std::size_t n = 0;
+  for (const Foot leg : {other(swing), swing}) {
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) mutes[n++] = {false, joint_index(leg, j)};
+  }
+  for (const Foot leg : {other(swing), swing}) {
+    for (std::size_t half = 0; half < 2; ++half) mutes[n++] = {true, 2 * index_of(leg) + half};
+  }
+  return mutes;
+}
+
 // What became of it.
 struct MuteOutcome {
-  bool stopped = false;      // the module is in safe_stop
-  bool fell = false;         // the robot did
-  bool both = false;         // both feet stand
-  double stop_s = 0.0;       // from the fault to safe_stop
-  double tilt_rad = 0.0;     // of the base, in the end
-  int reason = 0;            // of the stop
+  bool stopped = false;  // the module is in safe_stop
+  bool fell = false;     // the robot did
+  bool both = false;     // both feet stand
+  double stop_s = 0.0;   // from the fault to safe_stop
   [[nodiscard]] bool stands() const { return stopped && both && !fell; }
 };
 // It stays mute; a robot that is to stand does so for rest_s.
@@ -131,18 +173,30 @@ struct MuteOutcome {
   const double begin_s = climb.time_s();
   climb.set_mute(mute, true);
   MuteOutcome outcome;
-  while (climb.time_s() < begin_s + limit_s && !climb.truth().fell) {
+  while (climb.time_s() < begin_s + limit_s && !climb.truth().fell && !outcome.stopped) {
     climb.tick();
-    if (climb.control().module_state() != ModuleState::kSafeStop) continue;
-    outcome.stopped = true;
-    outcome.stop_s = climb.time_s() - begin_s;
-    break;
+    outcome.stopped = climb.control().module_state() == ModuleState::kSafeStop;
   }
+  if (outcome.stopped) outcome.stop_s = climb.time_s() - begin_s;
   climb.run_on(rest_s);
   outcome.fell = climb.truth().fell;
   outcome.both = climb.stands_on_both();
-  outcome.reason = static_cast<int>(climb.status().stop_reason);
-  outcome.tilt_rad = std::acos(std::min(climb.truth().true_T_base.R(2, 2), 1.0));
+  return outcome;
+}
+// The same in a copy of the process: the climb itself stays where it is.
+[[nodiscard]] inline MuteOutcome outcome_in_a_copy(BusClimb& climb, const Mute& mute) {
+  void* memory = mmap(nullptr, sizeof(MuteOutcome), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) return {};
+  auto* shared = new (memory) MuteOutcome;
+  const pid_t pid = fork();
+  if (pid == 0) {
+    *shared = outcome_of(climb, mute);
+    _exit(0);
+  }
+  int status = 0;
+  const bool good = pid > 0 && waitpid(pid, &status, 0) == pid && status == 0;
+  const MuteOutcome outcome = good ? *shared : MuteOutcome{};
+  munmap(memory, sizeof(MuteOutcome));
   return outcome;
 }
 

@@ -52,7 +52,7 @@ double IdealClimb::noise() {  // about normal, sigma 1
 
 void IdealClimb::sense() {
   const std::int64_t now_ns = setup_.clock_ns + record_.ticks * 2 * kNsPerMs;
-  state_.stamp_ns = state_.oldest_input_ns = state_.heard_ns = now_ns;
+  state_.stamp_ns = state_.oldest_input_ns = now_ns;
   state_.initialised = record_.ticks > 250;
   const Mat3 tilt = rotation_y(setup_.estimate_tilt_rad) * rotation_x(setup_.estimate_tilt_rad);
   state_.odom_T_base = odom_T_true_ * true_T_base_;
