@@ -120,8 +120,10 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                        : reaches_shortly ? params.abort_passing_ticks
                                          : 0.0;
   const bool went_back = timing_.goes_back();
+  // A plan that has just been stopped is no body that falls.
+  const Vec2 error_m = in.mute && !in.lost ? Vec2::Zero() : in.odom_dcm_error_m;
   timing_.advance(params.timing,
-                  {.falling_outward_m = side_sign(goal_.foot) * in.odom_dcm_error_m.dot(stance.R.col(1).head<2>()),
+                  {.falling_outward_m = side_sign(goal_.foot) * error_m.dot(stance.R.col(1).head<2>()),
                    .turn_until_tick = until,
                    .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
