@@ -58,8 +58,8 @@ class LegSensing {
                      const std::array<FootContact, kFootCount>& contacts, double longest_s) noexcept;
   void forget_offsets() noexcept { encoders_.learn_anew(); }
 
-  // The last accepted feedback, its angles without offset_rad(), its forces inferred where they are not sensed and not a
-  // number where their sensors are silent; any() is false before the first.
+  // The last accepted feedback, its angles without offset_rad(), its forces inferred where they are not sensed and not
+  // a number where their sensors are silent; any() is false before the first.
   [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
   [[nodiscard]] bool any() const noexcept { return any_; }
   [[nodiscard]] const JointVector& offset_rad() const noexcept { return encoders_.offset_rad(); }

@@ -136,7 +136,7 @@ void Gait::follow_state(const GaitInput& in, GaitShared& gait) noexcept {
 void Gait::advance(const GaitInput& in) noexcept {
   GaitShared gait = shared();
   if (in.mute) {
-    plan_.hold(params_.held_body, in.lost && status_.stands[0] && status_.stands[1]);
+    plan_.hold(params_.held_body, status_.stands[0] && status_.stands[1]);
   } else {
     plan_.advance();
   }

@@ -31,8 +31,8 @@ TEST(MuteDrive, OnBothFeet_StopsAtOnceAndStands) {
     if (moment.in_the_air || moment.share > 0.6) continue;
     climb.run_until(moment.at_s);
     const auto mutes = mutes_of(moment.foot);
-    for (const std::size_t n : {std::size_t{kKnee}, std::size_t{kAnklePitch}, kJointsPerLeg + kHipPitch, kJointCount,
-                                kJointCount + 1}) {
+    for (const std::size_t n :
+         {std::size_t{kKnee}, std::size_t{kAnklePitch}, kJointsPerLeg + kHipPitch, kJointCount, kJointCount + 1}) {
       const MuteOutcome outcome = outcome_in_a_copy(climb, mutes[n]);
       EXPECT_TRUE(outcome.stands()) << text_of(moment, n);
       EXPECT_LT(outcome.stop_s, kStopsOnTwoFeet_s) << text_of(moment, n);

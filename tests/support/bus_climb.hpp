@@ -72,9 +72,7 @@ class BusClimb {
   [[nodiscard]] bool has_ended() const {
     return truth().fell || status().phase == GaitPhase::kFinished || status().phase == GaitPhase::kStopped;
   }
-  [[nodiscard]] bool stands_on_both() const {
-    return !truth().fell && truth().in_contact[0] && truth().in_contact[1];
-  }
+  [[nodiscard]] bool stands_on_both() const { return !truth().fell && truth().in_contact[0] && truth().in_contact[1]; }
 
  private:
   static SimOptions sim_options(const Options& options) {
@@ -144,8 +142,8 @@ struct MuteMoment {
   }
   return moments;
 }
-// Each drive of the leg that stands, then of the one that swings; then the buses of hip and of knee and ankle of either,
-// where a bus has half a leg, as in the shipped files.
+// Each drive of the leg that stands, then of the one that swings; then the buses of hip and of knee and ankle of
+// either, where a bus has half a leg, as in the shipped files.
 inline constexpr std::size_t kMutes = kJointCount + 4;
 [[nodiscard]] inline std::array<Mute, kMutes> mutes_of(Foot swing) {
   std::array<Mute, kMutes> mutes;

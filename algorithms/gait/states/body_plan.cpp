@@ -44,7 +44,8 @@ void BodyPlan::advance() noexcept {
 void BodyPlan::hold(const HeldBodyParams& params, bool on_both_feet) noexcept {
   if (!std::exchange(held_, true)) {
     posture_.restart();
-    leant_m_ = lowered_m_ = 0.0;
+    leant_m_ = on_both_feet ? params.lean_m : 0.0;
+    lowered_m_ = 0.0;
   }
   for (Motion& axis : torso_state_) axis = {.position = axis.position};
   const Vec2 way_m = 0.5 * (plan_T_sole_[0].p_m + plan_T_sole_[1].p_m).head<2>() - com().position_m;

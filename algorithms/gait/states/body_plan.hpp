@@ -23,7 +23,8 @@ class BodyPlan {
 
   // One tick: the plan's next pose, then, where the estimate is known, how far it is off.
   void advance() noexcept;
-  // Instead: it stays where it is, at rest; but on both feet it leans a little to between them, so that both carry.
+  // Instead: it stays where it is, at rest. When a foot that was in the air stands, it leans a little to between them,
+  // so that both carry.
   void hold(const HeldBodyParams& params, bool on_both_feet) noexcept;
   // Held, it comes down. False: no farther.
   [[nodiscard]] bool try_lower(const HeldBodyParams& params) noexcept;

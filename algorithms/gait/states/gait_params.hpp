@@ -161,9 +161,11 @@ struct HeldBodyParams {
   double lower_mps = 0.2;
 
   static void visit(auto& p, auto& field) {
-    field("lean_m", p.lean_m, 0.0, 0.2, "On both feet the body leans so far towards between them, so that both carry.");
+    field("lean_m", p.lean_m, 0.0, 0.2,
+          "The body leans so far to between the feet when the one in the air has landed: both are to carry.");
     field("lean_mps", p.lean_mps, 0.001, 1.0, "The speed of that lean.");
-    field("lower_m", p.lower_m, 0.0, 0.4, "The body comes down no farther for a foot that its mute leg keeps in the air.");
+    field("lower_m", p.lower_m, 0.0, 0.4,
+          "The body comes down no farther for a foot that its mute leg keeps in the air.");
     field("lower_mps", p.lower_mps, 0.001, 1.0, "The speed of that way down.");
   }
 };

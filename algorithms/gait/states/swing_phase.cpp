@@ -114,7 +114,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   const Transform& stance = gait.plan.plan_T_sole(other(goal_.foot));
   const bool reaches_back = on_level(goal_.kind) || goal_.kind == StepKind::kLeading;
   const bool reaches_shortly = goal_.kind == StepKind::kPassing;  // the torso rises, and leaves its leg too short
-  const bool crippled = in.mute && in.lost;  // and the torso stays
+  const bool crippled = in.mute && in.lost;                       // and the torso stays
   const double until = crippled          ? params.abort_mute_share * path_.duration_ticks()
                        : reaches_back    ? params.abort_share * path_.duration_ticks()
                        : reaches_shortly ? params.abort_passing_ticks
