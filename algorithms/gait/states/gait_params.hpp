@@ -87,6 +87,7 @@ struct SwingParams {
   double abort_share = 0.38;
   double abort_passing_ticks = 45.0;
   double abort_mute_share = 0.25;
+  std::int32_t unjudged_ticks = 50;
   double abort_landing_m = 0.01;
   std::uint32_t max_aborted = 4;
   double soon_ticks = 100.0;
@@ -111,6 +112,9 @@ struct SwingParams {
     field("abort_passing_ticks", p.abort_passing_ticks, 0.0, 2000.0, "That of a passing swing, in ticks.");
     field("abort_mute_share", p.abort_mute_share, 0.0, 1.0,
           "In this share of a swing a foot goes back to where it stood when a drive is silent for good.");
+    field(
+        "unjudged_ticks", p.unjudged_ticks, 0, 500,
+        "After a drive was silent for a moment no error tells for so long of a fall: the plan stood still meanwhile.");
     field("abort_landing_m", p.abort_landing_m, 0.0, 0.1,
           "A foot that goes back feels the ground within this of where it stood.");
     field("max_aborted", p.max_aborted, 0, 1000, "As many swings in a row are aborted, then the gait stops.");

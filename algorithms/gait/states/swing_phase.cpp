@@ -120,8 +120,9 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                        : reaches_shortly ? params.abort_passing_ticks
                                          : 0.0;
   const bool went_back = timing_.goes_back();
-  // A plan that has just been stopped is no body that falls.
-  const Vec2 error_m = in.mute && !in.lost ? Vec2::Zero() : in.odom_dcm_error_m;
+  // A plan that has just been stopped, or has just gone on, is no body that falls.
+  unjudged_ticks_ = in.mute ? params.unjudged_ticks : std::max(unjudged_ticks_ - 1, 0);
+  const Vec2 error_m = unjudged_ticks_ > 0 && !in.lost ? Vec2::Zero() : in.odom_dcm_error_m;
   timing_.advance(params.timing,
                   {.falling_outward_m = side_sign(goal_.foot) * error_m.dot(stance.R.col(1).head<2>()),
                    .turn_until_tick = until,

@@ -99,7 +99,7 @@ TEST(GaitMute, ForSixtyMilliseconds_ClimbsOn) {
       climb.run(60.0);
       EXPECT_EQ(climb.status().phase, GaitPhase::kFinished) << name_of(phase) << after_ticks;
       EXPECT_EQ(climb.status().treads_climbed, 4U);
-      EXPECT_EQ(climb.status().aborted_swings, 0U);
+      EXPECT_EQ(climb.status().aborted_swings, 0U) << name_of(phase) << after_ticks;
     }
   }
 }
