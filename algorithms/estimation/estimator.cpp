@@ -207,6 +207,7 @@ void Estimator::begin(const ContactInEkf::Start& start) noexcept {
 void Estimator::publish(std::int64_t now_ns) noexcept {
   state_.stamp_ns = counters_.stamp_ns = quality_.stamp_ns = now_ns;
   state_.oldest_input_ns = std::min(imu_.newest.stamp_ns, legs_.sample.stamp_ns - legs_.sample.silent_ns);
+  state_.heard_ns = std::min(imu_.newest.stamp_ns, legs_.sample.stamp_ns);
   if (state_.initialised) {
     odometry_.describe(now_ns, state_);
     odometry_.describe(now_ns, quality_);

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
+#include <limits>
+#include <optional>
 
 namespace polygmap {
 namespace {
@@ -19,6 +22,16 @@ JointFeedback carried_on(const JointFeedback& joints) noexcept {
   return carried;
 }
 
+// The lowest silent one of those that turn about the same axis: it carries most and gives way most.
+std::optional<std::size_t> lowest_silent(const JointFeedback& joints, Foot leg,
+                                         std::initializer_list<LegJoint> upwards) noexcept {
+  for (const LegJoint joint : upwards) {
+    const std::size_t n = joint_index(leg, joint);
+    if (joints.silent_cycles[n] > LegSensing::kCarried_cycles) return n;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 void LegSensing::reset(const Params& params, const RobotModel& robot) noexcept {
@@ -28,6 +41,8 @@ void LegSensing::reset(const Params& params, const RobotModel& robot) noexcept {
   encoders_.reset(params.encoders);
   forces_.reset(params.forces);
   joints_ = {};
+  felt_force_n_ = {};
+  felt_ns_ = 0;
   dt_s_ = 0.0;
   replied_ns_ = {};
   any_ = false;
@@ -38,7 +53,8 @@ bool LegSensing::is_valid(const JointFeedback& joints) const noexcept {
               joints.q_rad.cwiseAbs().maxCoeff() <= params_.max_joint_rad &&
               joints.dq_radps.cwiseAbs().maxCoeff() <= params_.max_joint_speed_radps;
   for (const double force_n : joints.foot_force_n) {
-    good = good && (params_.infer_forces || std::abs(force_n) <= params_.max_force_n);
+    const bool untold = any_ && std::isnan(force_n);
+    good = good && (params_.infer_forces || untold || std::abs(force_n) <= params_.max_force_n);
   }
   if (params_.infer_forces) {
     good = good && math::all_finite(joints.tau_nm) && joints.tau_nm.cwiseAbs().maxCoeff() <= params_.max_torque_nm;
@@ -61,6 +77,7 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
   }
   JointFeedback carried = carried_on(joints);
   carried.q_rad -= encoders_.offset_rad();
+  level_soles(base_up, carried);
   if (any_ && jumps(carried)) {
     ++counters_.jump;
     return false;
@@ -69,9 +86,30 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
   joints_ = carried;
   for (std::size_t n = 0; n < kJointCount; ++n) replied_ns_[n] = joints.stamp_ns - joints.silent_ns(n);
   if (params_.infer_forces) joints_.foot_force_n = forces_.update(robot_->legs, joints_, base_up);
-  for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
+  for (std::size_t n = 0; n < kJointCount; ++n) {  // the last torque is not this one's
+    if (is_mute(n)) joints_.tau_nm[static_cast<Eigen::Index>(n)] = std::numeric_limits<double>::quiet_NaN();
+  }
+  if (!std::isnan(joints_.foot_force_n[0] + joints_.foot_force_n[1])) {
+    for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
+    felt_force_n_ = joints_.foot_force_n;
+    felt_ns_ = joints_.stamp_ns;
+  }
   any_ = true;
   return true;
+}
+
+// A drive that holds gives way under its load all the same: by how much, the sole tells that stands level.
+void LegSensing::level_soles(const Vec3& base_up, JointFeedback& joints) const noexcept {
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    if (!(felt_force_n_[index_of(leg)] > params_.level_n)) continue;
+    const auto pitch = lowest_silent(joints, leg, {kAnklePitch, kKnee, kHipPitch});
+    const auto roll = lowest_silent(joints, leg, {kAnkleRoll, kHipRoll});
+    if (!pitch && !roll) continue;
+    const Mat3 base_R_sole = base_T_sole(robot_->legs, leg, leg_joints(joints.q_rad, leg)).R;
+    const Vec3 off_rad = base_R_sole.transpose() * base_R_sole.col(2).cross(base_up);
+    if (pitch) joints.q_rad[static_cast<Eigen::Index>(*pitch)] += off_rad.y();
+    if (roll) joints.q_rad[static_cast<Eigen::Index>(*roll)] += off_rad.x();
+  }
 }
 
 // The bound grows until the joint's next accepted reply, so a true move is taken up again by itself.
@@ -92,12 +130,13 @@ LegSample LegSensing::legs() const noexcept {
     sample.legs[i] = measure_leg(robot_->legs, static_cast<Foot>(i), joints_.q_rad, joints_.dq_radps);
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       const std::size_t n = joint_index(static_cast<Foot>(i), j);
-      if (joints_.silent_cycles[n] <= kCarried_cycles) continue;
+      if (!is_mute(n)) continue;
       sample.measured[i] = false;
       sample.silent_ns = std::max(sample.silent_ns, joints_.silent_ns(n));
     }
   }
-  sample.foot_force_n = joints_.foot_force_n;
+  sample.silent_ns = std::max(sample.silent_ns, joints_.stamp_ns - felt_ns_);
+  sample.foot_force_n = felt_force_n_;
   return sample;
 }
 

@@ -23,6 +23,7 @@ class LegSensing {
     double max_joint_speed_radps = 15.0;
     double joint_slack_rad = 0.01;
     double max_force_n = 5000.0;
+    double level_n = 60.0;
 
     static void visit(auto& p, auto& field) {
       field("encoders", p.encoders);
@@ -35,6 +36,8 @@ class LegSensing {
       field("joint_slack_rad", p.joint_slack_rad, 0.0, 1.0,
             "An encoder may jump by this besides what the joint's speed allows.");
       field("max_force_n", p.max_force_n, 100.0, 1e6, "A foot that presses harder makes the sample invalid.");
+      field("level_n", p.level_n, 1.0, 5000.0,
+            "The sole of a foot that presses harder is level: that tells the angle of a silent drive of its leg.");
     }
   };
   struct Counters {
@@ -55,8 +58,8 @@ class LegSensing {
                      const std::array<FootContact, kFootCount>& contacts, double longest_s) noexcept;
   void forget_offsets() noexcept { encoders_.learn_anew(); }
 
-  // The last accepted feedback, its angles without offset_rad(), its forces inferred where they are not sensed; any()
-  // is false before the first.
+  // The last accepted feedback, its angles without offset_rad(), its forces inferred where they are not sensed and not
+  // a number where their sensors are silent; any() is false before the first.
   [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
   [[nodiscard]] bool any() const noexcept { return any_; }
   [[nodiscard]] const JointVector& offset_rad() const noexcept { return encoders_.offset_rad(); }
@@ -66,6 +69,10 @@ class LegSensing {
 
  private:
   [[nodiscard]] bool is_valid(const JointFeedback& joints) const noexcept;
+  [[nodiscard]] bool is_mute(std::size_t joint) const noexcept {
+    return joints_.silent_cycles[joint] > kCarried_cycles;
+  }
+  void level_soles(const Vec3& base_up, JointFeedback& joints) const noexcept;
   [[nodiscard]] bool jumps(const JointFeedback& carried) const noexcept;
 
   Params params_;
@@ -74,6 +81,8 @@ class LegSensing {
   EncoderOffsets encoders_;
   ForceInference forces_;
   JointFeedback joints_;                                // last accepted
+  std::array<double, kFootCount> felt_force_n_{};       // as last told,
+  std::int64_t felt_ns_ = 0;                            // then
   double dt_s_ = 0.0;                                   // between it and the one before
   std::array<std::int64_t, kJointCount> replied_ns_{};  // last reply of each joint that was accepted
   bool any_ = false;

@@ -135,8 +135,12 @@ void Gait::follow_state(const GaitInput& in, GaitShared& gait) noexcept {
 
 void Gait::advance(const GaitInput& in) noexcept {
   GaitShared gait = shared();
-  plan_.advance();
-  if (in.usable) {
+  if (in.mute) {
+    plan_.hold(params_.held_body, status_.stands[0] && status_.stands[1]);
+  } else {
+    plan_.advance();
+  }
+  if (in.usable || in.mute) {
     plan_.correct(in.state, params_.correction_time_s);
   } else {
     plan_.correction_missed();
@@ -144,7 +148,7 @@ void Gait::advance(const GaitInput& in) noexcept {
   enter(in, gait, tick_state(in, gait));
   plan_.hold_landed_foot(params_.landed_foot, in.feedback, in.now_ns);
   follow_state(in, gait);
-  plan_.count_tick();
+  if (!in.mute) plan_.count_tick();
 }
 
 void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
@@ -155,12 +159,15 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   armed_ = armed_ || try_arm(feedback);
   if (!armed_) return;
   const std::int64_t age_ns = now_ns - state.oldest_input_ns;
+  const bool usable = age_ns <= params_.steer_age_ns && finite(state);
+  const bool mute = !usable && now_ns - state.heard_ns <= params_.steer_age_ns && finite(state);
   const GaitInput in{now_ns,
                      state,
                      footholds,
                      feedback,
                      dcm_error_m_,
-                     age_ns <= params_.steer_age_ns && finite(state),
+                     usable,
+                     mute,
                      age_ns > params_.stop_age_ns,
                      stop_requested_,
                      now_ns - std::exchange(last_tick_ns_, now_ns)};
@@ -172,11 +179,13 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   observe_links();
   const Transform base_T_plan = plan_.plan_T_base().inverse();
   const std::array<Transform, kFootCount>& plan_T_sole = plan_.plan_T_sole();
-  if (joints_.follow({base_T_plan * plan_T_sole[0], base_T_plan * plan_T_sole[1]}, status_.stands, command)) {
+  std::array<Transform, kFootCount> base_T_sole{base_T_plan * plan_T_sole[0], base_T_plan * plan_T_sole[1]};
+  if (in.mute) joints_.fit_mute_knees(feedback, status_.stands, base_T_sole);
+  if (joints_.follow(base_T_sole, status_.stands, command)) {
     ++status_.ik_limited_ticks;
   }
   plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m(), params_.bias_time_s);
-  add_torques(state, feedback, in.usable, command);
+  add_torques(state, feedback, in.usable || in.mute, command);
   status_.odom_p_com_desired_m = balance_.odom_p_com_planned_m();
   const Transform odom_T_plan = plan_.odom_T_plan();
   for (std::size_t i = 0; i < kFootCount; ++i) status_.odom_T_sole_desired[i] = odom_T_plan * plan_T_sole[i];

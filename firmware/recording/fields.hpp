@@ -105,6 +105,7 @@ void each_field(auto& f, Of<CameraIntrinsics> auto& m) {
 void each_field(auto& f, Of<StateEstimate> auto& m) {
   walk(f, "stamp_ns", m.stamp_ns);
   walk(f, "oldest_input_ns", m.oldest_input_ns);
+  walk(f, "heard_ns", m.heard_ns);
   walk(f, "odom_T_base", m.odom_T_base);
   walk(f, "world_T_odom", m.world_T_odom);
   walk(f, "odom_v_base_mps", m.odom_v_base_mps);

@@ -77,6 +77,22 @@ bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole
   return limited;
 }
 
+void JointReference::fit_mute_knees(const JointFeedback& feedback, const std::array<bool, kFootCount>& stands,
+                                    std::array<Transform, kFootCount>& base_T_sole) const noexcept {
+  const LegGeometry& legs = robot_->legs;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const std::size_t knee = joint_index(leg, kKnee);
+    if (stands[index_of(leg)] || feedback.silent_cycles[knee] == 0) continue;
+    const double bent_cos = math::cos(feedback.q_rad[static_cast<Eigen::Index>(knee)]);
+    const double length_m = math::sqrt(math::square(legs.thigh_m) + math::square(legs.shank_m) +
+                                       2.0 * legs.thigh_m * legs.shank_m * bent_cos);
+    Transform& sole = base_T_sole[index_of(leg)];
+    const Vec3 hip_m = base_p_leg(legs, leg, leg_joints(reference_rad_, leg)).hip_pitch_m;
+    const Vec3 way_m = sole * Vec3{0, 0, legs.ankle_to_sole_m} - hip_m;
+    sole.p_m += (length_m / std::max(way_m.norm(), 0.1) - 1.0) * way_m;
+  }
+}
+
 void JointReference::hold(JointCommand& command) const noexcept {
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const GainLimits& most = robot_->drives.gain_limits[n];

@@ -2,6 +2,7 @@
 #include "algorithms/gait/states/body_plan.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "algorithms/core/time.hpp"
 #include "algorithms/gait/states/state.hpp"
@@ -14,6 +15,7 @@ void BodyPlan::reset() noexcept {
   correction_ = {};
   base_com_bias_m_.setZero();
   landed_ = {};
+  held_ = false;
 }
 
 void BodyPlan::place(const JointReference& joints, const Transform& plan_T_base) noexcept {
@@ -35,6 +37,31 @@ void BodyPlan::advance() noexcept {
   torso_state_ = torso_.at(torso_tick_, com_.at(com_tick_));
   plan_T_base_ = TorsoTrajectory::pose(torso_state_);
   plan_T_base_.p_m.head<2>() -= (plan_T_base_.R * reference_p_com_m_).head<2>();
+  if (std::exchange(held_, false)) posture_.restart();
+}
+
+// The base stays, so that the standing legs do; the centre of mass moves with the leg in the air.
+void BodyPlan::hold(const HeldBodyParams& params, bool on_both_feet) noexcept {
+  if (!std::exchange(held_, true)) {
+    posture_.restart();
+    leant_m_ = on_both_feet ? params.lean_m : 0.0;
+    lowered_m_ = 0.0;
+  }
+  for (Motion& axis : torso_state_) axis = {.position = axis.position};
+  const Vec2 way_m = 0.5 * (plan_T_sole_[0].p_m + plan_T_sole_[1].p_m).head<2>() - com().position_m;
+  const double step_m = std::min(params.lean_mps * kTick_s, params.lean_m - leant_m_);
+  if (on_both_feet && step_m > 0.0 && way_m.norm() > step_m) {
+    plan_T_base_.p_m.head<2>() += step_m * way_m.normalized();
+    leant_m_ += step_m;
+  }
+  torso_state_ = TorsoTrajectory::placed(torso_state_, plan_T_base_, (plan_T_base_ * reference_p_com_m_).head<2>());
+}
+
+bool BodyPlan::try_lower(const HeldBodyParams& params) noexcept {
+  if (lowered_m_ >= params.lower_m) return false;
+  plan_T_base_.p_m.z() -= params.lower_mps * kTick_s;
+  lowered_m_ += params.lower_mps * kTick_s;
+  return true;
 }
 
 void BodyPlan::correct(const StateEstimate& state, double correction_time_s) noexcept {

@@ -23,6 +23,11 @@ class BodyPlan {
 
   // One tick: the plan's next pose, then, where the estimate is known, how far it is off.
   void advance() noexcept;
+  // Instead: it stays where it is, at rest. When a foot that was in the air stands, it leans a little to between them,
+  // so that both carry.
+  void hold(const HeldBodyParams& params, bool on_both_feet) noexcept;
+  // Held, it comes down. False: no farther.
+  [[nodiscard]] bool try_lower(const HeldBodyParams& params) noexcept;
   void correct(const StateEstimate& state, double correction_time_s) noexcept;
   void correction_missed() noexcept { correction_.missed(); }
   // Once the tick's joint references are known: where they have the centre of mass, without what the masses have too
@@ -76,6 +81,8 @@ class BodyPlan {
   Vec3 reference_p_com_m_ = Vec3::Zero();  // centre of mass of the posture last asked for, base frame, without the next
   Vec3 base_com_bias_m_ = Vec3::Zero();    // what the masses have too much of it
   LandedFoot landed_;
+  bool held_ = false;
+  double leant_m_ = 0.0, lowered_m_ = 0.0;  // since then
 };
 
 }  // namespace polygmap

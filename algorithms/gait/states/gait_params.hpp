@@ -86,6 +86,8 @@ struct SwingParams {
   double max_lowering_m = 0.055;
   double abort_share = 0.38;
   double abort_passing_ticks = 45.0;
+  double abort_mute_share = 0.25;
+  std::int32_t unjudged_ticks = 50;
   double abort_landing_m = 0.01;
   std::uint32_t max_aborted = 4;
   double soon_ticks = 100.0;
@@ -108,6 +110,11 @@ struct SwingParams {
     field("abort_share", p.abort_share, 0.0, 1.0,
           "In this share of a swing a foot that falls outward goes back to where it stood.");
     field("abort_passing_ticks", p.abort_passing_ticks, 0.0, 2000.0, "That of a passing swing, in ticks.");
+    field("abort_mute_share", p.abort_mute_share, 0.0, 1.0,
+          "In this share of a swing a foot goes back to where it stood when a drive is silent for good.");
+    field(
+        "unjudged_ticks", p.unjudged_ticks, 0, 500,
+        "After a drive was silent for a moment no error tells for so long of a fall: the plan stood still meanwhile.");
     field("abort_landing_m", p.abort_landing_m, 0.0, 0.1,
           "A foot that goes back feels the ground within this of where it stood.");
     field("max_aborted", p.max_aborted, 0, 1000, "As many swings in a row are aborted, then the gait stops.");
@@ -150,6 +157,23 @@ struct LandedFootParams {
   }
 };
 
+// While a drive is mute the body stays where it was.
+struct HeldBodyParams {
+  double lean_m = 0.05;
+  double lean_mps = 0.1;
+  double lower_m = 0.2;
+  double lower_mps = 0.2;
+
+  static void visit(auto& p, auto& field) {
+    field("lean_m", p.lean_m, 0.0, 0.2,
+          "The body leans so far to between the feet when the one in the air has landed: both are to carry.");
+    field("lean_mps", p.lean_mps, 0.001, 1.0, "The speed of that lean.");
+    field("lower_m", p.lower_m, 0.0, 0.4,
+          "The body comes down no farther for a foot that its mute leg keeps in the air.");
+    field("lower_mps", p.lower_mps, 0.001, 1.0, "The speed of that way down.");
+  }
+};
+
 struct GaitParams {
   StepParams step;
   ClimbPlanner::Params planner;
@@ -160,6 +184,7 @@ struct GaitParams {
   SwingParams swing;
   CrouchParams crouch;
   LandedFootParams landed_foot;
+  HeldBodyParams held_body;
   double steady_m = 0.015;
   double correction_time_s = 0.03;
   double bias_time_s = 0.1;
@@ -176,6 +201,7 @@ struct GaitParams {
     field("swing", p.swing);
     field("crouch", p.crouch);
     field("landed_foot", p.landed_foot);
+    field("held_body", p.held_body);
     field("steady_m", p.steady_m, 0.001, 0.5, "No foot lifts when the divergent component's error is larger.");
     field("correction_time_s", p.correction_time_s, 0.002, 2.0,
           "Time constant of the low-pass of the base's difference to the plan.");

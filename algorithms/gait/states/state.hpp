@@ -22,6 +22,7 @@ struct GaitInput {
   const JointFeedback& feedback;
   Vec2 odom_dcm_error_m;       // of the divergent component, as last measured
   bool usable;                 // the estimate is fresh, and all of it numbers
+  bool mute;                   // it would be, but for drives that are silent while others speak
   bool lost;                   // it is so old that the gait stops
   StopReason stop_requested;   // kNone: it is not
   std::int64_t since_last_ns;  // since the last tick: the plan stood still, and the body did not

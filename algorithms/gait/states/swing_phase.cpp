@@ -2,6 +2,7 @@
 #include "algorithms/gait/states/swing_phase.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace polygmap {
@@ -77,8 +78,12 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
     return touch_down(in, gait, contact.loaded, contact.early_m);
   }
   // A force that never left or is no longer told: the plan's end is the touch-down.
-  const bool told = in.now_ns - in.feedback.stamp_ns <= gait.params.steer_age_ns;
+  const bool told = in.now_ns - in.feedback.stamp_ns <= gait.params.steer_age_ns &&
+                    std::isfinite(in.feedback.foot_force_n[index_of(goal_.foot)]);
   if (!(unloaded_ && told) && timing_.tick() > path_.duration_ticks()) return touch_down(in, gait, false, 0.0);
+  if (lowered_m > params.max_lowering_m && in.mute) {  // the leg keeps the foot up: down with the body
+    return gait.plan.try_lower(gait.params.held_body) ? Transition{} : touch_down(in, gait, false, 0.0);
+  }
   if (lowered_m > params.max_lowering_m) {  // the ground that was seen is not there
     ++gait.status.late_contacts;
     timing_.retreat(params.timing);
@@ -109,15 +114,21 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   const Transform& stance = gait.plan.plan_T_sole(other(goal_.foot));
   const bool reaches_back = on_level(goal_.kind) || goal_.kind == StepKind::kLeading;
   const bool reaches_shortly = goal_.kind == StepKind::kPassing;  // the torso rises, and leaves its leg too short
-  const double until = reaches_back      ? params.abort_share * path_.duration_ticks()
+  const bool crippled = in.mute && in.lost;                       // and the torso stays
+  const double until = crippled          ? params.abort_mute_share * path_.duration_ticks()
+                       : reaches_back    ? params.abort_share * path_.duration_ticks()
                        : reaches_shortly ? params.abort_passing_ticks
                                          : 0.0;
   const bool went_back = timing_.goes_back();
+  // A plan that has just been stopped, or has just gone on, is no body that falls.
+  unjudged_ticks_ = in.mute ? params.unjudged_ticks : std::max(unjudged_ticks_ - 1, 0);
+  const Vec2 error_m = unjudged_ticks_ > 0 && !in.lost ? Vec2::Zero() : in.odom_dcm_error_m;
   timing_.advance(params.timing,
-                  {.falling_outward_m = side_sign(goal_.foot) * in.odom_dcm_error_m.dot(stance.R.col(1).head<2>()),
+                  {.falling_outward_m = side_sign(goal_.foot) * error_m.dot(stance.R.col(1).head<2>()),
                    .turn_until_tick = until,
                    .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
-                   .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m},
+                   .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
+                   .crippled = crippled},
                   path_.duration_ticks());
   // The torso is on its way up: the foot is to reach where it stood all the same.
   if (timing_.goes_back() && !went_back) lower_torso(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));

@@ -40,6 +40,7 @@ class SwingPhase {
   Vec2 zmp_stance_m_ = Vec2::Zero();  // plan frame
   std::int32_t touched_ticks_ = 0;    // for which the foot has been felt to touch,
   std::int64_t felt_stamp_ns_ = 0;    // as told by then
+  std::int32_t unjudged_ticks_ = 0;   // for which no error tells of a fall
   bool unloaded_ = false;             // the foot was felt to leave the ground
 };
 

@@ -425,6 +425,51 @@ TEST_F(EstimatorTest, OneSensorSilentInSwing_OtherOneCarriesTheStateOn) {
   }
 }
 
+TEST_F(EstimatorTest, MuteAnkleOfAStandingFoot_IsWhereTheSoleIsLevelAndTheOthersAreHeard) {
+  WalkSpec spec;
+  spec.noise_scale = 0.0;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 1500 * kNsPerMs);
+  ASSERT_TRUE(estimator_.state().initialised);
+  const std::int64_t since_ns = t_ns_ - kTick_ns;
+  const JointFeedback heard = walk.joints(since_ns);
+  for (const LegJoint joint : {kAnklePitch, kAnkleRoll}) {
+    const std::size_t n = joint_index(Foot::kRight, joint);
+    const auto i = static_cast<Eigen::Index>(n);
+    for (int tick_count = 0; tick_count < 50; ++tick_count, t_ns_ += kTick_ns) {
+      JointFeedback joints = walk.joints(t_ns_);
+      joints.q_rad[i] = heard.q_rad[i] + 0.05;  // it gave way since it was heard
+      joints.dq_radps[i] = 0.0;
+      joints.silent_cycles[n] = static_cast<std::uint16_t>((t_ns_ - since_ns) / kTick_ns);
+      if (tick_count < 6) joints.q_rad[i] = heard.q_rad[i];
+      tick(walk.imu(t_ns_), joints, kBothStand);
+    }
+    EXPECT_NEAR(estimator_.state().q_rad[i], walk.joints(t_ns_ - kTick_ns).q_rad[i], 0.01) << joint;
+    EXPECT_EQ(estimator_.state().heard_ns, t_ns_ - kTick_ns);
+    EXPECT_LE(estimator_.state().oldest_input_ns, since_ns);
+    EXPECT_TRUE(std::isnan(estimator_.leg_sensing().joints().tau_nm[i])) << "its last torque is no news";
+  }
+}
+
+TEST_F(EstimatorTest, FeetFallSilent_JointsAreTakenOnAndTheAgeIsTheirs) {
+  WalkSpec spec;
+  spec.noise_scale = 0.0;
+  SyntheticWalk walk(spec);
+  run(walk, spec, 1500 * kNsPerMs);
+  ASSERT_TRUE(estimator_.state().initialised);
+  const std::int64_t since_ns = t_ns_ - kTick_ns;
+  for (int tick_count = 0; tick_count < 50; ++tick_count, t_ns_ += kTick_ns) {
+    JointFeedback joints = walk.joints(t_ns_);
+    joints.foot_force_n = {kNaN, kNaN};
+    tick(walk.imu(t_ns_), joints, kBothStand);
+  }
+  EXPECT_EQ(estimator_.leg_sensing().counters().invalid, 0U);
+  EXPECT_EQ(estimator_.state().heard_ns, t_ns_ - kTick_ns);
+  EXPECT_EQ(estimator_.state().oldest_input_ns, since_ns);
+  EXPECT_GT(estimator_.state().contact_probability[0], 0.9) << "as told last";
+  EXPECT_TRUE(std::isnan(estimator_.leg_sensing().joints().foot_force_n[0]));
+}
+
 TEST_F(EstimatorTest, StateAt_BetweenTicks_IsInterpolatedAndOutsideRefused) {
   WalkSpec spec;
   SyntheticWalk walk(spec);
