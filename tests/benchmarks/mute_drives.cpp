@@ -35,7 +35,9 @@ int run(const BusClimb::Options& options, std::size_t first, std::size_t last) {
                 moment.in_the_air ? "air " : "both", moment.share);
     for (const Mute& mute : mutes_of(moment.foot)) {
       std::fflush(stdout);
-      const MuteOutcome o = outcome_in_a_copy(climb, mute);
+      const std::optional<MuteOutcome> copy = outcome_in_a_copy(climb, mute);
+      if (!copy) return std::fprintf(stderr, "mute_drives: error: a copy of the climb crashed\n"), 1;
+      const MuteOutcome& o = *copy;
       std::printf("%5s%.2f", o.fell ? "FELL" : !o.stopped ? "runs" : o.both ? "ok" : "foot", o.stop_s);
       ++all;
       good += o.stands() ? 1 : 0;
@@ -50,7 +52,10 @@ int run(const BusClimb::Options& options, std::size_t first, std::size_t last) {
 }  // namespace polygmap::sim
 
 int main(int argc, char** argv) {
-  if (argc != 5 && argc != 7) {
+  const auto is_one_of = [](std::string_view word, std::string_view a, std::string_view b) {
+    return word == a || word == b;
+  };
+  if ((argc != 5 && argc != 7) || !is_one_of(argv[2], "ds", "ss") || !is_one_of(argv[3], "mujoco", "kinematic")) {
     return std::puts("mute_drives BUS_FILE ds|ss mujoco|kinematic SEED [FIRST LAST]"), 2;
   }
   using namespace polygmap;

@@ -11,6 +11,7 @@
 #include <array>
 #include <memory>
 #include <new>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -181,10 +182,10 @@ struct MuteOutcome {
   outcome.both = climb.stands_on_both();
   return outcome;
 }
-// The same in a copy of the process: the climb itself stays where it is.
-[[nodiscard]] inline MuteOutcome outcome_in_a_copy(BusClimb& climb, const Mute& mute) {
+// The same in a copy of the process: the climb itself stays where it is. Empty: the copy crashed.
+[[nodiscard]] inline std::optional<MuteOutcome> outcome_in_a_copy(BusClimb& climb, const Mute& mute) {
   void* memory = mmap(nullptr, sizeof(MuteOutcome), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED) return {};
+  if (memory == MAP_FAILED) return std::nullopt;
   auto* shared = new (memory) MuteOutcome;
   const pid_t pid = fork();
   if (pid == 0) {
@@ -193,7 +194,7 @@ struct MuteOutcome {
   }
   int status = 0;
   const bool good = pid > 0 && waitpid(pid, &status, 0) == pid && status == 0;
-  const MuteOutcome outcome = good ? *shared : MuteOutcome{};
+  const std::optional<MuteOutcome> outcome = good ? std::optional(*shared) : std::nullopt;
   munmap(memory, sizeof(MuteOutcome));
   return outcome;
 }

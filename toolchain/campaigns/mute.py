@@ -27,7 +27,11 @@ def mute(engine, seeds):
         if done.returncode:
             raise SystemExit(f"campaign: mute_drives {gait} {seed}: {done.stderr[-400:]}")
         print(f"mute: {gait}, seed {seed}: {done.stdout.splitlines()[-1]}", flush=True)
-        return [(m[1], float(m[2]), CELL.findall(m[3])) for m in LINE.finditer(done.stdout)]
+        moments = [(m[1], float(m[2]), CELL.findall(m[3])) for m in LINE.finditer(done.stdout)]
+        counted = sum(c[0] == "ok" for m in moments for c in m[2]), sum(len(m[2]) for m in moments)
+        if f"on both feet: {counted[0]} of {counted[1]}" != done.stdout.splitlines()[-1]:
+            raise SystemExit(f"campaign: mute_drives {gait} {seed}: {counted} read of: {done.stdout.splitlines()[-1]}")
+        return moments
 
     text = (f"`{PROGRAM} {BUS} ds|ss mujoco SEED` climbs two steps under physics, perception in the loop, and takes away for good each drive "
             f"and each bus at eight moments of each swing, seeds {seeds[0]}-{seeds[-1]}. Such a drive neither hears nor speaks and holds its last "
@@ -46,7 +50,7 @@ def mute(engine, seeds):
                           *(stands(c) for c in GROUPS.values()), stands(range(16))))
         good = [float(s) for *_, cells in moments for outcome, s in cells if outcome == "ok"]
         text += (f"\n## Gait `{gait}`\n\n" + rows(("moment", *GROUPS, "all"), lines) +
-                 f"\n\nIn sum {len(good)} of {sum(len(m[2]) for m in moments)}. Where it stands, `safe_stop` came within {max(good):.2f} s.\n")
+                 f"\n\nIn sum {len(good)} of {sum(len(m[2]) for m in moments)}. Where it stands, `safe_stop` came within {max(good, default=0.0):.2f} s.\n")
     return Page(text, {})
 
 
