@@ -115,6 +115,7 @@ class ClimbReport {
   bool landing_pending_ = false;
   double com_tracking_max_m_ = kNotMeasured, zmp_margin_min_m_ = kNotMeasured;
   std::array<double, kJointsPerLeg> torque_peak_ratio_{}, joint_speed_peak_ratio_{};
+  int torque_limited_ticks_ = 0;
   double tracking_x_max_m_ = kNotMeasured, tracking_z_max_m_ = kNotMeasured;
 
   std::array<std::optional<Flight>, kFootCount> flights_;

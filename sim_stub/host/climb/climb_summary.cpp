@@ -174,6 +174,7 @@ Json to_json(const ClimbSummary& s) {
   j["com_tracking_mm_max"] = mm(s.com_tracking_max_m);
   j["zmp_margin_mm_min"] = mm(s.zmp_margin_min_m);
   j["torque_peak_ratio"] = per_joint(s.torque_peak_ratio);
+  j["torque_limited_ms"] = s.torque_limited_ms;
   j["joint_speed_peak_ratio"] = per_joint(s.joint_speed_peak_ratio);
   const OdometryFigures& o = s.odometry;
   j["odometry_rmse_mm"] = {{"base", mm(o.rmse_base_m)}, {"lio", mm(o.rmse_lio_m)}, {"fused", mm(o.rmse_fused_m)}};
