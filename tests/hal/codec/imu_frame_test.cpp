@@ -109,7 +109,7 @@ void fuzz_stream(int runs, unsigned seed) {
   EXPECT_LT(bytes_pushed - whole - finder.counters().garbage_bytes, kImuFrame_bytes) << "every byte is accounted for";
 }
 TEST(ImuFrameFinder, Push_AnyBytes_GivesGoodValuesAndAccountsForEach) { fuzz_stream(100'000, 1); }
-TEST(LongFuzzImuFrameFinder, Push_AnyBytes_GivesGoodValuesAndAccountsForEach) { fuzz_stream(1'000'000, 2); }
+TEST(LongFuzzImuFrameFinder, Push_AnyBytes_GivesGoodValuesAndAccountsForEach) { fuzz_stream(4'000'000, 2); }
 
 }  // namespace
 }  // namespace imu_frame_test

@@ -110,8 +110,8 @@ TEST(LioPacket, Decode_AnyBytes_GivesGoodValuesOrARefusal) {
   fuzz_decode(100'000, 2);
 }
 TEST(LongFuzzLioPacket, Decode_AnyBytes_GivesGoodValuesOrARefusal) {
-  fuzz_decode(1'000'000, 3);
-  fuzz_decode(1'000'000, 4);
+  fuzz_decode(2'000'000, 3);
+  fuzz_decode(2'000'000, 4);
 }
 
 }  // namespace
