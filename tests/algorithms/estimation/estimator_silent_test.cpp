@@ -144,5 +144,23 @@ TEST_F(EstimatorSilentTest, FeetAtLiftOff_SwingingFootIsNeitherOnTheGroundNorLev
   EXPECT_LT(off_m(), 0.01);
 }
 
+TEST_F(EstimatorSilentTest, ADriveOfEachLeg_IsHeardForASecondAndAgainAsSoonAsOneSpeaks) {
+  run_until(1.5);
+  ASSERT_TRUE(estimator_.state().initialised);
+  const JointFeedback last = walk_->joints(t_ns_ - kTick_ns);
+  const auto silence = [&](JointFeedback& joints) {
+    silence_joint(joints, last, joint_index(Foot::kLeft, kAnkleRoll));
+    silence_joint(joints, last, joint_index(Foot::kRight, kAnkleRoll));
+  };
+  const auto heard_ago_s = [&] { return seconds(t_ns_ - kTick_ns - estimator_.state().heard_ns); };
+  // Still the robot stands on both feet; shorter than a second it is not told from a swing beside a mute leg.
+  run_until(2.0, silence);
+  EXPECT_EQ(heard_ago_s(), 0.0);
+  run_until(2.6, silence);
+  EXPECT_NEAR(heard_ago_s(), 1.1, 0.02);
+  run_until(2.7, [&](JointFeedback& joints) { silence_joint(joints, last, joint_index(Foot::kLeft, kAnkleRoll)); });
+  EXPECT_EQ(heard_ago_s(), 0.0);
+}
+
 }  // namespace
 }  // namespace polygmap
