@@ -23,6 +23,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   ground_ = {};
   stood_ = {};
   was_measured_ = {true, true};
+  stood_ns_ = 0;
   origin_ = {};
 }
 
@@ -47,8 +48,10 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   if (dt_s > params_.max_step_s) ++counters_.gaps;
   // The last rates bridge a short silence of the IMU; beyond it the feet alone say how the base moves.
   const bool felt = imu_.any && seconds(now_ns - imu_.newest.stamp_ns) <= params_.max_step_s;
+  const std::array<FootContact, kFootCount> contacts = measured_contacts(new_legs);
+  if (contacts[0].stands || contacts[1].stands) stood_ns_ = now_ns;
   odometry_.step({now_ns, dt_s, imu_.mean.gyro_radps, imu_.mean.accel_mps2, felt, new_legs, imu_noise_.density()},
-                 legs_.sample.legs, measured_contacts(new_legs), ground_);
+                 legs_.sample.legs, contacts, ground_);
   publish(now_ns);
   if (seconds(now_ns - state_.oldest_input_ns) <= params_.max_step_s) ring_.push(state_);
 }
@@ -117,7 +120,7 @@ void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
 void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noexcept {
   // Until there is an attitude the base counts as upright.
   const Vec3 base_up = state_.odom_T_base.R.row(2).transpose();
-  if (leg_sensing_.try_take(joints, now_ns + params_.max_lead_ns, base_up)) add_legs(leg_sensing_.legs());
+  if (leg_sensing_.try_take(joints, now_ns + params_.max_lead_ns, base_up, stood_)) add_legs(leg_sensing_.legs());
 }
 
 void Estimator::add_legs(const LegSample& legs) noexcept { legs_ = {true, true, legs}; }
@@ -200,7 +203,7 @@ void Estimator::calibrate() noexcept {
 void Estimator::begin(const ContactInEkf::Start& start) noexcept {
   odometry_.initialise(start, legs_.sample.legs, params_.max_step_s);
   odometry_.fusion().rebase(origin_.odom_T_base);
-  origin_.initialised_ns = newest_input_ns();
+  origin_.initialised_ns = stood_ns_ = newest_input_ns();
   state_.initialised = has_state_ = true;
 }
 
@@ -209,6 +212,7 @@ void Estimator::publish(std::int64_t now_ns) noexcept {
   state_.oldest_input_ns = std::min(imu_.newest.stamp_ns, legs_.sample.stamp_ns - legs_.sample.silent_ns);
   state_.heard_ns = std::min(imu_.newest.stamp_ns, legs_.sample.stamp_ns);
   if (state_.initialised) {
+    if (now_ns - stood_ns_ > kAlone_ns) state_.heard_ns = std::min(state_.heard_ns, stood_ns_);
     odometry_.describe(now_ns, state_);
     odometry_.describe(now_ns, quality_);
   } else {

@@ -13,6 +13,9 @@ namespace polygmap {
 
 class Estimator {
  public:
+  // The IMU alone carries the base on for so long, as a swing beside a mute leg takes: a tilt that is off by 5 mrad
+  // makes 50 mm/s of it. From then on StateEstimate::heard_ns says when a measured leg stood last.
+  static constexpr std::int64_t kAlone_ns = kNsPerS;
   struct Params : ProprioceptiveOdometry::Params {
     StandstillCalibration::Params standstill;
     ContactEstimator::Params contacts;
@@ -131,6 +134,7 @@ class Estimator {
   ProprioceptiveOdometry::Ground ground_;
   std::array<bool, kFootCount> stood_{};
   std::array<bool, kFootCount> was_measured_{true, true};
+  std::int64_t stood_ns_ = 0;  // when a measured leg did last
   Origin origin_;
 };
 

@@ -41,7 +41,6 @@ void LegSensing::reset(const Params& params, const RobotModel& robot) noexcept {
   encoders_.reset(params.encoders);
   forces_.reset(params.forces);
   joints_ = {};
-  felt_force_n_ = {};
   felt_ns_ = 0;
   dt_s_ = 0.0;
   replied_ns_ = {};
@@ -62,7 +61,8 @@ bool LegSensing::is_valid(const JointFeedback& joints) const noexcept {
   return good;
 }
 
-bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, const Vec3& base_up) noexcept {
+bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, const Vec3& base_up,
+                          const std::array<bool, kFootCount>& stands) noexcept {
   if (!is_valid(joints)) {
     ++counters_.invalid;
     return false;
@@ -77,7 +77,7 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
   }
   JointFeedback carried = carried_on(joints);
   carried.q_rad -= encoders_.offset_rad();
-  level_soles(base_up, carried);
+  level_soles(base_up, stands, carried);
   if (any_ && jumps(carried)) {
     ++counters_.jump;
     return false;
@@ -89,19 +89,19 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
   for (std::size_t n = 0; n < kJointCount; ++n) {  // the last torque is not this one's
     if (is_mute(n)) joints_.tau_nm[static_cast<Eigen::Index>(n)] = std::numeric_limits<double>::quiet_NaN();
   }
-  if (!std::isnan(joints_.foot_force_n[0] + joints_.foot_force_n[1])) {
-    for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);
-    felt_force_n_ = joints_.foot_force_n;
-    felt_ns_ = joints_.stamp_ns;
-  }
+  for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);  // not a number stays so
+  if (!std::isnan(joints_.foot_force_n[0] + joints_.foot_force_n[1])) felt_ns_ = joints_.stamp_ns;
   any_ = true;
   return true;
 }
 
 // A drive that holds gives way under its load all the same: by how much, the sole tells that stands level.
-void LegSensing::level_soles(const Vec3& base_up, JointFeedback& joints) const noexcept {
+void LegSensing::level_soles(const Vec3& base_up, const std::array<bool, kFootCount>& stands,
+                             JointFeedback& joints) const noexcept {
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    if (!(felt_force_n_[index_of(leg)] > params_.level_n)) continue;
+    const double force_n = joints_.foot_force_n[index_of(leg)];  // as it was before
+    const bool pressed = std::isnan(force_n) ? stands[index_of(leg)] : force_n > params_.level_n;
+    if (!pressed) continue;
     const auto pitch = lowest_silent(joints, leg, {kAnklePitch, kKnee, kHipPitch});
     const auto roll = lowest_silent(joints, leg, {kAnkleRoll, kHipRoll});
     if (!pitch && !roll) continue;
@@ -136,7 +136,7 @@ LegSample LegSensing::legs() const noexcept {
     }
   }
   sample.silent_ns = std::max(sample.silent_ns, joints_.stamp_ns - felt_ns_);
-  sample.foot_force_n = felt_force_n_;
+  sample.foot_force_n = joints_.foot_force_n;
   return sample;
 }
 

@@ -50,7 +50,9 @@ class LegSensing {
   // robot: outlives this object.
   void reset(const Params& params, const RobotModel& robot) noexcept;
   // False, and the sample counted, when it is bad, stale or stamped after latest_ns. base_up: as well as it is known.
-  [[nodiscard]] bool try_take(const JointFeedback& joints, std::int64_t latest_ns, const Vec3& base_up) noexcept;
+  // stands: which feet do as far as is known, for those whose force is not told.
+  [[nodiscard]] bool try_take(const JointFeedback& joints, std::int64_t latest_ns, const Vec3& base_up,
+                              const std::array<bool, kFootCount>& stands) noexcept;
   // Of the last accepted feedback.
   [[nodiscard]] LegSample legs() const noexcept;
   // The encoders' offsets learn from the last accepted feedback. longest_s: it stands for no more time than this.
@@ -72,7 +74,8 @@ class LegSensing {
   [[nodiscard]] bool is_mute(std::size_t joint) const noexcept {
     return joints_.silent_cycles[joint] > kCarried_cycles;
   }
-  void level_soles(const Vec3& base_up, JointFeedback& joints) const noexcept;
+  void level_soles(const Vec3& base_up, const std::array<bool, kFootCount>& stands,
+                   JointFeedback& joints) const noexcept;
   [[nodiscard]] bool jumps(const JointFeedback& carried) const noexcept;
 
   Params params_;
@@ -81,8 +84,7 @@ class LegSensing {
   EncoderOffsets encoders_;
   ForceInference forces_;
   JointFeedback joints_;                                // last accepted
-  std::array<double, kFootCount> felt_force_n_{};       // as last told,
-  std::int64_t felt_ns_ = 0;                            // then
+  std::int64_t felt_ns_ = 0;                            // when both feet's forces were told last
   double dt_s_ = 0.0;                                   // between it and the one before
   std::array<std::int64_t, kJointCount> replied_ns_{};  // last reply of each joint that was accepted
   bool any_ = false;

@@ -3,6 +3,7 @@
 // cannot be survived is in docs/vm.md.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <tuple>
 
 #include "tests/support/bus_climb.hpp"
@@ -71,6 +72,30 @@ TEST(MuteDrive, KneeInTheMiddleOfASwing_BodyComesDownAndItStands) {
   const MuteOutcome outcome = outcome_of(climb, {false, joint_index(swing.foot, kKnee)});
   EXPECT_TRUE(outcome.stands());
   EXPECT_LT(outcome.stop_s, 2.0);
+}
+
+// Nothing measures the base then: it does not drift off by what the IMU alone makes of it.
+TEST(MuteDrive, OneOfEachLeg_StandsOnForHalfAMinute) {
+  const BusClimb::Options options = climb_of(GaitPattern::kDoubleStep);
+  const std::vector<SwingTimes> swings = swings_of(options);
+  BusClimb climb(options);
+  climb.run_until(swings.at(kOnto).lift_off_s - 0.4);
+  climb.set_mute({false, joint_index(Foot::kLeft, kHipYaw)}, true);
+  const MuteOutcome outcome = outcome_of(climb, {false, joint_index(Foot::kRight, kHipYaw)}, 3.0, 30.0);
+  EXPECT_TRUE(outcome.stands()) << climb.truth().fall_reason;
+}
+
+// In the shipped file that bus has the hip of the standing leg and the feet's board.
+TEST(MuteDrive, FirstBusWhileTheRightFootIsInTheAir_StandsOnForHalfAMinute) {
+  const BusClimb::Options options = climb_of(GaitPattern::kDoubleStep);
+  BusClimb climb(options);
+  const std::vector<SwingTimes> swings = swings_of(options);
+  const auto swing = std::ranges::find_if(swings.begin() + kOnto, swings.end(),
+                                          [](const SwingTimes& s) { return s.foot == Foot::kRight; });
+  ASSERT_NE(swing, swings.end());
+  climb.run_until(0.5 * (swing->lift_off_s + swing->touch_down_s));
+  const MuteOutcome outcome = outcome_of(climb, {true, 0}, 3.0, 30.0);
+  EXPECT_TRUE(outcome.stands()) << climb.truth().fall_reason;
 }
 
 TEST(MuteDrive, ForSixtyMilliseconds_ClimbsOn) {

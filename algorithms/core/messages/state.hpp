@@ -14,10 +14,12 @@ namespace polygmap {
 // The state of one tick. odom: smooth, drifts slowly, never jumps. world: odom corrected by LIO (eqs 5-10).
 struct StateEstimate {
   std::int64_t stamp_ns = 0;
-  // Of the newest IMU and the newest joint sample, the older one's stamp; a drive that is silent for more than a few
-  // cycles makes the joint sample as old as its last reply.
+  // Of the newest IMU and the newest joint sample, the older one's stamp; a drive or a feet's board that is silent for
+  // more than a few cycles makes the joint sample as old as its last reply.
   std::int64_t oldest_input_ns = 0;
-  std::int64_t heard_ns = 0;  // the same without the silent drives: their joints count as held where they were
+  // The same without what is silent: such joints count as held where they were, such feet stand as planned. But once no
+  // leg that is measured has stood for a second, when one stood last: by the IMU alone the velocity drifts.
+  std::int64_t heard_ns = 0;
   Transform odom_T_base;
   Transform world_T_odom;  // the low-passed LIO offset: changes slowly
   Vec3 odom_v_base_mps = Vec3::Zero();

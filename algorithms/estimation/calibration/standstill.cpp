@@ -24,10 +24,12 @@ void StandstillCalibration::begin(const ImuSample& imu, const JointFeedback& joi
 }
 
 bool StandstillCalibration::try_finish(const ImuSample& imu, const JointFeedback& joints, const Legs& legs) noexcept {
+  // What is not told, not a number, presses nothing.
+  const auto loaded = [this](double force_n) { return force_n >= params_.min_foot_force_n; };
   const bool moves =
       imu.gyro_radps.cwiseAbs().maxCoeff() > params_.max_rate_radps ||
       std::abs(imu.accel_mps2.norm() - kGravity_mps2) > params_.max_accel_error_mps2 ||
-      std::min(joints.foot_force_n[0], joints.foot_force_n[1]) < params_.min_foot_force_n ||
+      !std::ranges::all_of(joints.foot_force_n, loaded) ||
       (samples_ > 0.0 && (joints.q_rad - first_q_rad_).cwiseAbs().maxCoeff() > params_.max_joint_move_rad);
   if (moves) {
     if (samples_ > 0.0) ++restarts_;

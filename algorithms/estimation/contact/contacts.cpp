@@ -2,6 +2,7 @@
 #include "algorithms/estimation/contact/contacts.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace polygmap {
 
@@ -22,10 +23,14 @@ void ContactEstimator::update(const std::array<double, kFootCount>& force_n,
     }
     was_planned_[i] = planned_stance[i];
     if (force_n[i] <= params_.force_air_n) unloaded_[i] = true;
-    const bool may_stand =
-        planned_stance[i] || unloaded_[i] || seconds(stamp_ns - swing_since_ns_[i]) > params_.stuck_swing_s;
-    const double evidence =
-        math::clamp((force_n[i] - params_.force_air_n) / (params_.force_standing_n - params_.force_air_n), 0.0, 1.0);
+    const bool stuck = seconds(stamp_ns - swing_since_ns_[i]) > params_.stuck_swing_s;
+    bool may_stand = planned_stance[i];
+    double evidence = 1.0;
+    if (!std::isnan(force_n[i])) {
+      may_stand = may_stand || unloaded_[i] || stuck;
+      evidence =
+          math::clamp((force_n[i] - params_.force_air_n) / (params_.force_standing_n - params_.force_air_n), 0.0, 1.0);
+    }
     FootContact& foot = feet_[i];
     const double before = foot.probability;
     foot.probability = may_stand ? std::min(evidence, before + rise) : 0.0;

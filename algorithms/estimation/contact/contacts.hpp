@@ -48,7 +48,7 @@ class ContactEstimator {
   };
   void reset(const Params& params) noexcept;
   // planned_stance releases a foot at once at lift-off (forces lag); once unloaded, force alone brings it back, so an
-  // early touch-down counts.
+  // early touch-down counts. A foot whose force is not told, not a number, stands as planned.
   void update(const std::array<double, kFootCount>& force_n, const std::array<bool, kFootCount>& planned_stance,
               std::int64_t stamp_ns) noexcept;
   // The same for contacts as a log states them, a probability or 0 and 1. A drop of some milliseconds is bridged: a

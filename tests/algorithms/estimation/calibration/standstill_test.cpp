@@ -75,5 +75,26 @@ TEST(Standstill, RobotSways_IsNoBiasAndNoTilt) {
   EXPECT_LT((state.odom_v_base_mps - v_mps).norm(), 1e-3);
 }
 
+TEST(Standstill, FootForceIsNotTold_IsNoFootThatStands) {
+  static Estimator estimator;  // its ring is too large for a stack
+  for (const std::array<bool, kFootCount> silent : {std::array{true, true}, {true, false}, {false, true}}) {
+    estimator.reset({}, nominal_robot());
+    SwayingRobot robot;
+    ImuSample imu;
+    JointFeedback joints;
+    while (robot.time_s < 3.0) {
+      robot.sense(imu, joints);
+      for (std::size_t i = 0; i < kFootCount; ++i) {
+        if (silent[i] && robot.time_s > 0.5) joints.foot_force_n[i] = test::kNaN;
+      }
+      estimator.add_imu(imu, imu.stamp_ns);
+      estimator.add_joints(joints, imu.stamp_ns);
+      estimator.tick({true, true});
+    }
+    EXPECT_FALSE(estimator.state().initialised) << silent[0] << silent[1];
+    EXPECT_EQ(estimator.counters().standstill_restarts, 1U);
+  }
+}
+
 }  // namespace
 }  // namespace polygmap

@@ -8,6 +8,7 @@
 namespace polygmap {
 namespace {
 
+using test::kNaN;
 using test::kTick_ns;
 
 constexpr std::array<bool, kFootCount> kBothStand{true, true};
@@ -52,6 +53,27 @@ TEST(Contacts, PlannedSwing_FootNeverUnloads_StandsAgainAfterTheTimeout) {
   EXPECT_DOUBLE_EQ(contacts.feet()[1].probability, 0.0);  // 0.14 s
   for (int i = 0; i < 30; ++i) contacts.update({270.0, 270.0}, {true, false}, t += kTick_ns);
   EXPECT_DOUBLE_EQ(contacts.feet()[1].probability, 1.0);
+}
+
+TEST(Contacts, ForcesFallSilent_FeetLandAndLiftAsPlanned) {
+  ContactEstimator contacts;
+  contacts.reset({});
+  std::int64_t t = 0;
+  const auto update = [&](const std::array<double, kFootCount>& force_n, const std::array<bool, kFootCount>& stance,
+                          int ticks) {
+    for (int i = 0; i < ticks; ++i) contacts.update(force_n, stance, t += kTick_ns);
+  };
+  update({540.0, 0.0}, {true, false}, 50);
+  update({kNaN, kNaN}, {true, false}, 100);
+  EXPECT_TRUE(contacts.feet()[0].stands);
+  EXPECT_EQ(contacts.feet()[1].probability, 0.0);
+  update({kNaN, kNaN}, kBothStand, 10);
+  EXPECT_TRUE(contacts.feet()[1].stands) << "its last force was 0";
+  update({270.0, 270.0}, kBothStand, 10);
+  update({kNaN, kNaN}, {true, false}, 200);
+  EXPECT_EQ(contacts.feet()[1].probability, 0.0) << "its last force is no foot that sticks";
+  EXPECT_EQ(contacts.feet()[0].probability, 1.0);
+  EXPECT_EQ(contacts.feet()[0].load_share, 0.5);
 }
 
 }  // namespace
