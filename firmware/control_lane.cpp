@@ -34,7 +34,7 @@ bool all_finite(const JointCommand& command) noexcept {
 JointSet silent_drives(const JointFeedback& joints) noexcept {
   JointSet silent;
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    if (joints.silent_cycles[n] > LegSensing::kCarried_cycles) silent.insert(n);
+    if (joints.is_mute(n)) silent.insert(n);
   }
   return silent;
 }
@@ -120,7 +120,7 @@ void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept
 JointSet ControlLane::late_drives(const JointFeedback* joints, std::int64_t now_ns) noexcept {
   if (joints == nullptr) {
     const std::int64_t last_ns = std::max(start_.answered_ns, start_.first_ns);
-    if (now_ns - last_ns > LegSensing::kCarried_cycles * kBusCycle_ns) start_.silent = JointSet::all();
+    if (now_ns - last_ns > JointFeedback::kCarried_cycles * kBusCycle_ns) start_.silent = JointSet::all();
     return JointSet::all();
   }
   start_.answered_ns = now_ns;

@@ -43,7 +43,7 @@ struct ArmingWait {
 
 // What the joints' bus and drives tell of themselves.
 struct DriveReport {
-  JointSet silent;        // for more than LegSensing::kCarried_cycles, as of the last feedback; arming: see ControlLane
+  JointSet silent;  // for more than JointFeedback::kCarried_cycles, as of the last feedback; arming: see ControlLane
   JointSet ever_silent;   // since the start
   JointSet out_of_range;  // arming: farther than an encoder may be off, as of the last feedback
   hal::JointBusStatus bus;

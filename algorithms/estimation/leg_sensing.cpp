@@ -13,11 +13,11 @@ namespace {
 JointFeedback carried_on(const JointFeedback& joints) noexcept {
   JointFeedback carried = joints;
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    const std::uint16_t cycles = std::min(joints.silent_cycles[n], LegSensing::kCarried_cycles);
+    const std::uint16_t cycles = std::min(joints.silent_cycles[n], JointFeedback::kCarried_cycles);
     if (cycles == 0) continue;
     const auto i = static_cast<Eigen::Index>(n);
     carried.q_rad[i] += cycles * kTick_s * joints.dq_radps[i];
-    if (joints.silent_cycles[n] > LegSensing::kCarried_cycles) carried.dq_radps[i] = 0.0;
+    if (joints.is_mute(n)) carried.dq_radps[i] = 0.0;
   }
   return carried;
 }
@@ -27,7 +27,7 @@ std::optional<std::size_t> lowest_silent(const JointFeedback& joints, Foot leg,
                                          std::initializer_list<LegJoint> upwards) noexcept {
   for (const LegJoint joint : upwards) {
     const std::size_t n = joint_index(leg, joint);
-    if (joints.silent_cycles[n] > LegSensing::kCarried_cycles) return n;
+    if (joints.is_mute(n)) return n;
   }
   return std::nullopt;
 }

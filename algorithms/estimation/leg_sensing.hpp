@@ -11,9 +11,6 @@ namespace polygmap {
 
 class LegSensing {
  public:
-  // A joint whose drive is silent goes on at its last speed for so long, then stays where that took it and its leg is
-  // no measurement any more.
-  static constexpr std::uint16_t kCarried_cycles = 5;
   struct Params {
     EncoderOffsets::Params encoders;
     bool infer_forces = false;
@@ -71,9 +68,7 @@ class LegSensing {
 
  private:
   [[nodiscard]] bool is_valid(const JointFeedback& joints) const noexcept;
-  [[nodiscard]] bool is_mute(std::size_t joint) const noexcept {
-    return joints_.silent_cycles[joint] > kCarried_cycles;
-  }
+  [[nodiscard]] bool is_mute(std::size_t joint) const noexcept { return joints_.is_mute(joint); }
   void level_soles(const Vec3& base_up, const std::array<bool, kFootCount>& stands,
                    JointFeedback& joints) const noexcept;
   [[nodiscard]] bool jumps(const JointFeedback& carried) const noexcept;

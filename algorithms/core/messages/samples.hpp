@@ -63,6 +63,12 @@ struct JointFeedback {
   [[nodiscard]] constexpr std::int64_t silent_ns(std::size_t joint) const noexcept {
     return silent_cycles[joint] * kBusCycle_ns;
   }
+  // A joint whose drive is silent goes on at its last speed for so long, then stays where that took it: the drive is
+  // mute, and its leg is no measurement any more.
+  static constexpr std::uint16_t kCarried_cycles = 5;
+  [[nodiscard]] constexpr bool is_mute(std::size_t joint) const noexcept {
+    return silent_cycles[joint] > kCarried_cycles;
+  }
   std::array<double, kFootCount> foot_force_n{};  // vertical, 0 in the air
 };
 

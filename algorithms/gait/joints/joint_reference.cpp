@@ -39,6 +39,7 @@ bool JointReference::try_arm(const RobotModel& robot, const Params& params, cons
   params_ = params;
   reference_rad_ = inside_rad;
   commanded_rad_ = inside_rad;
+  knee_was_mute_ = {};
   return true;
 }
 
@@ -78,11 +79,13 @@ bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole
 }
 
 void JointReference::fit_mute_knees(const JointFeedback& feedback, const std::array<bool, kFootCount>& stands,
-                                    std::array<Transform, kFootCount>& base_T_sole) const noexcept {
+                                    bool for_good, std::array<Transform, kFootCount>& base_T_sole) noexcept {
   const LegGeometry& legs = robot_->legs;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const std::size_t knee = joint_index(leg, kKnee);
-    if (stands[index_of(leg)] || feedback.silent_cycles[knee] == 0) continue;
+    bool& was_mute = knee_was_mute_[index_of(leg)];
+    was_mute = feedback.is_mute(knee) || (was_mute && for_good);
+    if (stands[index_of(leg)] || !was_mute) continue;
     const double bent_cos = math::cos(feedback.q_rad[static_cast<Eigen::Index>(knee)]);
     const double length_m = math::sqrt(math::square(legs.thigh_m) + math::square(legs.shank_m) +
                                        2.0 * legs.thigh_m * legs.shank_m * bent_cos);

@@ -37,9 +37,10 @@ class JointReference {
   // stays. The command never leaves the limits.
   bool follow(const std::array<Transform, kFootCount>& base_T_sole, const std::array<bool, kFootCount>& stands,
               JointCommand& command) noexcept;
-  // Of a leg in the air whose knee is mute: the sole on its line from the hip, as far away as the knee keeps it.
-  void fit_mute_knees(const JointFeedback& feedback, const std::array<bool, kFootCount>& stands,
-                      std::array<Transform, kFootCount>& base_T_sole) const noexcept;
+  // Of a leg in the air whose knee is mute, or (for_good) was: the sole on its line from the hip, as far away as the
+  // knee keeps it.
+  void fit_mute_knees(const JointFeedback& feedback, const std::array<bool, kFootCount>& stands, bool for_good,
+                      std::array<Transform, kFootCount>& base_T_sole) noexcept;
   // Repeats the last joint angles, at rest.
   void hold(JointCommand& command) const noexcept;
   [[nodiscard]] const JointVector& reference_rad() const noexcept { return reference_rad_; }
@@ -51,6 +52,7 @@ class JointReference {
   Params params_;
   JointVector reference_rad_ = JointVector::Zero();
   JointVector commanded_rad_ = JointVector::Zero();  // with the lead for the drives' delay
+  std::array<bool, kFootCount> knee_was_mute_{};
 };
 
 }  // namespace polygmap

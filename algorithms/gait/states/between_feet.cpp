@@ -26,6 +26,7 @@ void BetweenFeet::settle(const GaitInput& in, GaitShared& gait, double height_m)
 }
 
 void BetweenFeet::follow(const GaitInput& in, GaitShared& gait) noexcept {
+  if (in.held) return;
   const std::int32_t settle_ticks = gait.params.standing.settle_ticks;
   if (tick_ == settle_ticks) rise(gait);
   crouch_.update(in, gait, settle_ticks - tick_);

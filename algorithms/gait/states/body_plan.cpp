@@ -41,7 +41,7 @@ void BodyPlan::advance() noexcept {
 }
 
 // The base stays, so that the standing legs do; the centre of mass moves with the leg in the air.
-void BodyPlan::hold(const HeldBodyParams& params, bool on_both_feet) noexcept {
+void BodyPlan::hold(const HeldBodyParams& params, bool on_both_feet, bool may_lean) noexcept {
   if (!std::exchange(held_, true)) {
     posture_.restart();
     leant_m_ = on_both_feet ? params.lean_m : 0.0;
@@ -50,7 +50,7 @@ void BodyPlan::hold(const HeldBodyParams& params, bool on_both_feet) noexcept {
   for (Motion& axis : torso_state_) axis = {.position = axis.position};
   const Vec2 way_m = 0.5 * (plan_T_sole_[0].p_m + plan_T_sole_[1].p_m).head<2>() - com().position_m;
   const double step_m = std::min(params.lean_mps * kTick_s, params.lean_m - leant_m_);
-  if (on_both_feet && step_m > 0.0 && way_m.norm() > step_m) {
+  if (on_both_feet && may_lean && step_m > 0.0 && way_m.norm() > step_m) {
     plan_T_base_.p_m.head<2>() += step_m * way_m.normalized();
     leant_m_ += step_m;
   }

@@ -25,7 +25,9 @@ class BodyPlan {
   void advance() noexcept;
   // Instead: it stays where it is, at rest. When a foot that was in the air stands, it leans a little to between them,
   // so that both carry.
-  void hold(const HeldBodyParams& params, bool on_both_feet) noexcept;
+  void hold(const HeldBodyParams& params, bool on_both_feet, bool may_lean) noexcept;
+  // To a foot that does not carry nobody leans.
+  void keep_upright() noexcept { leant_m_ = kUpright_m; }
   // Held, it comes down. False: no farther.
   [[nodiscard]] bool try_lower(const HeldBodyParams& params) noexcept;
   void correct(const StateEstimate& state, double correction_time_s) noexcept;
@@ -81,6 +83,7 @@ class BodyPlan {
   Vec3 reference_p_com_m_ = Vec3::Zero();  // centre of mass of the posture last asked for, base frame, without the next
   Vec3 base_com_bias_m_ = Vec3::Zero();    // what the masses have too much of it
   LandedFoot landed_;
+  static constexpr double kUpright_m = 1.0;  // more than it may lean
   bool held_ = false;
   double leant_m_ = 0.0, lowered_m_ = 0.0;  // since then
 };

@@ -55,7 +55,8 @@ SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& par
   }
   const bool descending = 2.0 * timing_.tick() > path_.duration_ticks();
   // What does not go down any more stands on something, whatever its force sensor says.
-  const double above_m = in.usable ? in.state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
+  const bool judged = in.usable && !in.crippled;  // a mute leg stays above its path, too
+  const double above_m = judged ? in.state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
   const bool blocked = path_.lowered_m(timing_.tick()) > params.late_m && above_m > params.blocked_m;
   // A toe that scrapes along the next riser feels a force too, for a moment: ground that comes early has to stay.
   const double above_target_m = path_.at(timing_.last_tick()).p_m.z() - goal_.target.position_m.z();
@@ -81,8 +82,9 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const bool told = in.now_ns - in.feedback.stamp_ns <= gait.params.steer_age_ns &&
                     std::isfinite(in.feedback.foot_force_n[index_of(goal_.foot)]);
   if (!(unloaded_ && told) && timing_.tick() > path_.duration_ticks()) return touch_down(in, gait, false, 0.0);
-  if (lowered_m > params.max_lowering_m && in.mute) {  // the leg keeps the foot up: down with the body
-    return gait.plan.try_lower(gait.params.held_body) ? Transition{} : touch_down(in, gait, false, 0.0);
+  if (lowered_m > params.max_lowering_m && leg_was_mute_) {  // the leg keeps the foot up: down with the body
+    lowers_body_ = gait.plan.try_lower(gait.params.held_body);
+    return lowers_body_ ? Transition{} : touch_down(in, gait, false, 0.0);
   }
   if (lowered_m > params.max_lowering_m) {  // the ground that was seen is not there
     ++gait.status.late_contacts;
@@ -110,12 +112,15 @@ Transform SwingPhase::beside_path(const BodyPlan& plan, const Transform& odom_T_
 }
 
 void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
+  for (std::size_t j = 0; j < kJointsPerLeg && in.crippled; ++j) {
+    leg_was_mute_ = leg_was_mute_ || in.feedback.is_mute(joint_index(goal_.foot, j));
+  }
+  if (lowers_body_) return;  // the foot is as low on its path as it gets
   const SwingParams& params = gait.params.swing;
   const Transform& stance = gait.plan.plan_T_sole(other(goal_.foot));
   const bool reaches_back = on_level(goal_.kind) || goal_.kind == StepKind::kLeading;
   const bool reaches_shortly = goal_.kind == StepKind::kPassing;  // the torso rises, and leaves its leg too short
-  const bool crippled = in.mute && in.lost;                       // and the torso stays
-  const double until = crippled          ? params.abort_mute_share * path_.duration_ticks()
+  const double until = in.crippled       ? params.abort_mute_share * path_.duration_ticks()
                        : reaches_back    ? params.abort_share * path_.duration_ticks()
                        : reaches_shortly ? params.abort_passing_ticks
                                          : 0.0;
@@ -128,7 +133,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .turn_until_tick = until,
                    .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
-                   .crippled = crippled},
+                   .crippled = in.crippled},
                   path_.duration_ticks());
   // The torso is on its way up: the foot is to reach where it stood all the same.
   if (timing_.goes_back() && !went_back) lower_torso(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
@@ -195,6 +200,7 @@ Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexce
     return {};
   }
   gait.status.stands[i] = true;
+  if (!loaded && std::isfinite(in.feedback.foot_force_n[i])) gait.plan.keep_upright();
   ++gait.status.aborted_swings;
   gait.planner.swing_aborted();
   gait.plan.restart_posture();
@@ -214,6 +220,7 @@ Transition SwingPhase::touch_down(const GaitInput& in, GaitShared& gait, bool fe
   step.odom_T_executed = in.usable ? in.state.odom_T_sole[i] : body.odom_T_plan() * body.plan_T_sole(goal_.foot);
   gait.status.stands[i] = true;
   body.land(goal_.foot, felt, early_m, in.now_ns);
+  if (!felt && std::isfinite(in.feedback.foot_force_n[i])) body.keep_upright();
   gait.memory.aborted_swings = 0;
   gait.planner.landed();
   gait.status.treads_climbed = gait.planner.treads_climbed();

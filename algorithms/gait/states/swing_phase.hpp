@@ -41,6 +41,8 @@ class SwingPhase {
   std::int32_t touched_ticks_ = 0;    // for which the foot has been felt to touch,
   std::int64_t felt_stamp_ns_ = 0;    // as told by then
   std::int32_t unjudged_ticks_ = 0;   // for which no error tells of a fall
+  bool leg_was_mute_ = false;         // a drive of it, for good
+  bool lowers_body_ = false;          // since the leg does not lower its foot
   bool unloaded_ = false;             // the foot was felt to leave the ground
 };
 

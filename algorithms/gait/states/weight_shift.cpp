@@ -58,6 +58,7 @@ Transition WeightShift::legs_cannot(const GaitInput& in, GaitShared& gait) const
 }
 
 void WeightShift::follow(const GaitInput& in, GaitShared& gait) noexcept {
+  if (in.held) return;
   crouch_.update(in, gait, shift_ticks_ - tick_);
   tick_ = next_tick(tick_);
 }

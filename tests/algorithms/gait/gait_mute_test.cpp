@@ -3,6 +3,8 @@
 // the air comes down.
 #include <gtest/gtest.h>
 
+#include <string>
+
 #include "tests/support/gait_checks.hpp"
 #include "tests/support/nominal_robot.hpp"
 
@@ -102,6 +104,48 @@ TEST(GaitMute, ForSixtyMilliseconds_ClimbsOn) {
       EXPECT_EQ(climb.status().aborted_swings, 0U) << name_of(phase) << after_ticks;
     }
   }
+}
+
+// Silent for 0.3 s, then not: by then it has to stop, and nothing jumps when the drive answers.
+TEST(GaitMute, AnswersAgainTooLate_StopsWhereItIsWithoutAJump) {
+  constexpr double kMost_rad = 0.004;  // of a joint in a tick, when it stands: 2 rad/s
+  for (const auto phase : {GaitPhase::kDoubleSupport, GaitPhase::kSwing}) {
+    for (const int after_ticks : {20, 100, 300}) {
+      SCOPED_TRACE(std::string(name_of(phase)) + " " + std::to_string(after_ticks));
+      IdealClimb climb({});
+      ASSERT_TRUE(climb.run_until(phase, 4));
+      tick(climb, after_ticks);
+      mute(climb, 300 * kNsPerMs);
+      for (int ticks = 0; ticks < 1500; ++ticks) {
+        const JointCommand before = climb.command();
+        const bool stood = climb.status().phase == GaitPhase::kStopped;
+        tick(climb, 1);
+        for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+          if (stood) {
+            ASSERT_LT(moved_rad(climb.command(), before, leg), kMost_rad) << ticks;
+          }
+        }
+      }
+      EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+      EXPECT_EQ(climb.status().stop_reason, StopReason::kStateStale);
+      EXPECT_TRUE(climb.touches(Foot::kLeft) && climb.touches(Foot::kRight));
+    }
+  }
+}
+
+// Everything silent for 0.2 s of a swing: the foot comes down as planned, and that was its last.
+TEST(GaitMute, AllSilentForTooLongInASwing_StopsWhenTheFootHasLanded) {
+  IdealClimb climb({});
+  ASSERT_TRUE(climb.run_until(GaitPhase::kSwing, 4));
+  tick(climb, 100);
+  climb.tamper = [since_ns = std::int64_t{-1}](StateEstimate& state, FootholdSet&, JointFeedback&) mutable {
+    if (since_ns < 0) since_ns = state.oldest_input_ns;
+    if (state.oldest_input_ns - since_ns < 200 * kNsPerMs) state.oldest_input_ns = state.heard_ns = since_ns;
+  };
+  tick(climb, 800);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+  EXPECT_EQ(climb.status().stop_reason, StopReason::kStateStale);
+  EXPECT_EQ(climb.status().step.sequence, 4U);
 }
 
 }  // namespace
