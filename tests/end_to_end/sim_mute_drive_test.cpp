@@ -70,6 +70,17 @@ TEST(MuteDrive, KneeInTheMiddleOfASwing_BodyComesDownAndItStands) {
   EXPECT_LT(outcome.stop_s, 2.0);
 }
 
+// No leg without a mute drive measures the base then, and by the IMU alone it would drift off.
+TEST(MuteDrive, OneOfEachLeg_StandsOnForHalfAMinute) {
+  const BusClimb::Options options = climb_of(GaitPattern::kDoubleStep);
+  const std::vector<SwingTimes> swings = swings_of(options);
+  BusClimb climb(options);
+  climb.run_until(swings.at(kOnto).lift_off_s - 0.4);
+  climb.set_mute({false, joint_index(Foot::kLeft, kHipYaw)}, true);
+  const MuteOutcome outcome = outcome_of(climb, {false, joint_index(Foot::kRight, kHipYaw)}, 3.0, 30.0);
+  EXPECT_TRUE(outcome.stands()) << climb.truth().fall_reason;
+}
+
 // In the shipped file that bus has the hip of the standing leg and the feet's board.
 TEST(MuteDrive, FirstBusWhileTheRightFootIsInTheAir_StandsOnForHalfAMinute) {
   const BusClimb::Options options = climb_of(GaitPattern::kDoubleStep);
