@@ -23,6 +23,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   ground_ = {};
   stood_ = {};
   was_measured_ = {true, true};
+  alone_ = false;
   stood_ns_ = 0;
   origin_ = {};
 }
@@ -48,8 +49,7 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   if (dt_s > params_.max_step_s) ++counters_.gaps;
   // The last rates bridge a short silence of the IMU; beyond it the feet alone say how the base moves.
   const bool felt = imu_.any && seconds(now_ns - imu_.newest.stamp_ns) <= params_.max_step_s;
-  const std::array<FootContact, kFootCount> contacts = measured_contacts(new_legs);
-  if (contacts[0].stands || contacts[1].stands) stood_ns_ = now_ns;
+  const std::array<FootContact, kFootCount> contacts = measured_contacts(now_ns, new_legs);
   odometry_.step({now_ns, dt_s, imu_.mean.gyro_radps, imu_.mean.accel_mps2, felt, new_legs, imu_noise_.density()},
                  legs_.sample.legs, contacts, ground_);
   publish(now_ns);
@@ -160,12 +160,16 @@ void Estimator::take_legs(const std::array<bool, kFootCount>& planned_stance) no
   }
 }
 
-std::array<FootContact, kFootCount> Estimator::measured_contacts(bool new_legs) noexcept {
+std::array<FootContact, kFootCount> Estimator::measured_contacts(std::int64_t now_ns, bool new_legs) noexcept {
+  alone_ = alone_ || now_ns - stood_ns_ > kAlone_ns;
   std::array<FootContact, kFootCount> known = contacts_.feet();
+  const std::array<bool, kFootCount>& heard = legs_.sample.measured;
+  for (std::size_t i = 0; i < kFootCount; ++i) alone_ = alone_ && !(heard[i] && known[i].stands);
   for (std::size_t i = 0; i < kFootCount; ++i) {
     FootContact& contact = known[i];
-    const bool measured = legs_.sample.measured[i];
+    const bool measured = heard[i] || alone_;
     if (!measured) contact.stands = contact.landed = false;
+    if (contact.stands) stood_ns_ = now_ns;
     if (new_legs && measured && !was_measured_[i]) contact.landed = contact.stands;
     if (new_legs) was_measured_[i] = measured;
   }

@@ -14,7 +14,8 @@ namespace polygmap {
 class Estimator {
  public:
   // The IMU alone carries the base on for so long, as a swing beside a mute leg takes: a tilt that is off by 5 mrad
-  // makes 50 mm/s of it. From then on StateEstimate::heard_ns says when a measured leg stood last.
+  // makes 50 mm/s of it. From then on a mute leg that stands counts all the same: its joints hold, or are where the
+  // sole is level.
   static constexpr std::int64_t kAlone_ns = kNsPerS;
   struct Params : ProprioceptiveOdometry::Params {
     StandstillCalibration::Params standstill;
@@ -108,8 +109,8 @@ class Estimator {
     std::int64_t initialised_ns = 0;
   };
   void take_legs(const std::array<bool, kFootCount>& planned_stance) noexcept;
-  // Of the legs that are measured. One that is again is put where kinematics has it, as if it had just landed.
-  [[nodiscard]] std::array<FootContact, kFootCount> measured_contacts(bool new_legs) noexcept;
+  // Of the legs that count as measurements. One that is again is put where kinematics has it, as if it had just landed.
+  [[nodiscard]] std::array<FootContact, kFootCount> measured_contacts(std::int64_t now_ns, bool new_legs) noexcept;
   void calibrate() noexcept;
   void begin(const ContactInEkf::Start& start) noexcept;
   void publish(std::int64_t now_ns) noexcept;
@@ -134,7 +135,8 @@ class Estimator {
   ProprioceptiveOdometry::Ground ground_;
   std::array<bool, kFootCount> stood_{};
   std::array<bool, kFootCount> was_measured_{true, true};
-  std::int64_t stood_ns_ = 0;  // when a measured leg did last
+  bool alone_ = false;         // no leg without a mute drive has stood for kAlone_ns, nor since
+  std::int64_t stood_ns_ = 0;  // when a leg that counts as a measurement did last
   Origin origin_;
 };
 

@@ -131,7 +131,7 @@ LegSample LegSensing::legs() const noexcept {
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       const std::size_t n = joint_index(static_cast<Foot>(i), j);
       if (!is_mute(n)) continue;
-      sample.measured[i] = false;
+      sample.measured[i] = sample.legs[i].sole_known = false;
       sample.silent_ns = std::max(sample.silent_ns, joints_.silent_ns(n));
     }
   }

@@ -74,7 +74,7 @@ TEST(MuteDrive, KneeInTheMiddleOfASwing_BodyComesDownAndItStands) {
   EXPECT_LT(outcome.stop_s, 2.0);
 }
 
-// Nothing measures the base then: it does not drift off by what the IMU alone makes of it.
+// No leg without a mute drive measures the base then, and by the IMU alone it would drift off.
 TEST(MuteDrive, OneOfEachLeg_StandsOnForHalfAMinute) {
   const BusClimb::Options options = climb_of(GaitPattern::kDoubleStep);
   const std::vector<SwingTimes> swings = swings_of(options);

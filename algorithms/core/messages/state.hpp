@@ -17,8 +17,8 @@ struct StateEstimate {
   // Of the newest IMU and the newest joint sample, the older one's stamp; a drive or a feet's board that is silent for
   // more than a few cycles makes the joint sample as old as its last reply.
   std::int64_t oldest_input_ns = 0;
-  // The same without what is silent: such joints count as held where they were, such feet stand as planned. But once no
-  // leg that is measured has stood for a second, when one stood last: by the IMU alone the velocity drifts.
+  // The same without what is silent: such joints count as held where they were, such feet stand as planned. But where
+  // no leg has stood for a second, when one did last: by the IMU alone the velocity drifts.
   std::int64_t heard_ns = 0;
   Transform odom_T_base;
   Transform world_T_odom;  // the low-passed LIO offset: changes slowly

@@ -379,11 +379,17 @@ TEST_F(EstimatorTest, ImuSlowerThanTheTick_FollowsTheTruthAsWellAndIsAsSure) {
     return outcome;
   };
   const Outcome every_tick = climb(kTick_ns);
-  for (const std::int64_t interval_ns : {5 * kNsPerMs, 10 * kNsPerMs}) {
-    const Outcome slow = climb(interval_ns);
-    printf("%ld: %g %g %g %g / %g %g %g %g\n", interval_ns, slow.worst_m, slow.worst_rad, slow.sigma_m,
-           slow.tilt_sigma_rad, every_tick.worst_m, every_tick.worst_rad, every_tick.sigma_m,
-           every_tick.tilt_sigma_rad);
+  struct Times {
+    std::int64_t interval_ns;
+    double worst_m, worst_rad, sigma_m;
+  };
+  for (const Times& most : {Times{5 * kNsPerMs, 1.3, 2.0, 1.4}, Times{10 * kNsPerMs, 1.8, 4.5, 2.0}}) {
+    const Outcome slow = climb(most.interval_ns);
+    EXPECT_LT(slow.worst_m, most.worst_m * every_tick.worst_m) << most.interval_ns;
+    EXPECT_LT(slow.worst_rad, most.worst_rad * every_tick.worst_rad) << most.interval_ns;
+    EXPECT_LT(slow.sigma_m, most.sigma_m * every_tick.sigma_m) << most.interval_ns;
+    EXPECT_GT(slow.sigma_m, every_tick.sigma_m) << most.interval_ns;
+    EXPECT_NEAR(slow.tilt_sigma_rad, every_tick.tilt_sigma_rad, 0.05 * every_tick.tilt_sigma_rad) << most.interval_ns;
   }
 }
 
@@ -423,51 +429,6 @@ TEST_F(EstimatorTest, OneSensorSilentInSwing_OtherOneCarriesTheStateOn) {
     EXPECT_TRUE(estimator_.try_state_at(t_ns_ - kTick_ns, then));
     EXPECT_FALSE(estimator_.try_state_at(until_ns - 30 * kNsPerMs, then)) << "in the gap";
   }
-}
-
-TEST_F(EstimatorTest, MuteAnkleOfAStandingFoot_IsWhereTheSoleIsLevelAndTheOthersAreHeard) {
-  WalkSpec spec;
-  spec.noise_scale = 0.0;
-  SyntheticWalk walk(spec);
-  run(walk, spec, 1500 * kNsPerMs);
-  ASSERT_TRUE(estimator_.state().initialised);
-  const std::int64_t since_ns = t_ns_ - kTick_ns;
-  const JointFeedback heard = walk.joints(since_ns);
-  for (const LegJoint joint : {kAnklePitch, kAnkleRoll}) {
-    const std::size_t n = joint_index(Foot::kRight, joint);
-    const auto i = static_cast<Eigen::Index>(n);
-    for (int tick_count = 0; tick_count < 50; ++tick_count, t_ns_ += kTick_ns) {
-      JointFeedback joints = walk.joints(t_ns_);
-      joints.q_rad[i] = heard.q_rad[i] + 0.05;  // it gave way since it was heard
-      joints.dq_radps[i] = 0.0;
-      joints.silent_cycles[n] = static_cast<std::uint16_t>((t_ns_ - since_ns) / kTick_ns);
-      if (tick_count < 6) joints.q_rad[i] = heard.q_rad[i];
-      tick(walk.imu(t_ns_), joints, kBothStand);
-    }
-    EXPECT_NEAR(estimator_.state().q_rad[i], walk.joints(t_ns_ - kTick_ns).q_rad[i], 0.01) << joint;
-    EXPECT_EQ(estimator_.state().heard_ns, t_ns_ - kTick_ns);
-    EXPECT_LE(estimator_.state().oldest_input_ns, since_ns);
-    EXPECT_TRUE(std::isnan(estimator_.leg_sensing().joints().tau_nm[i])) << "its last torque is no news";
-  }
-}
-
-TEST_F(EstimatorTest, FeetFallSilent_JointsAreTakenOnAndTheAgeIsTheirs) {
-  WalkSpec spec;
-  spec.noise_scale = 0.0;
-  SyntheticWalk walk(spec);
-  run(walk, spec, 1500 * kNsPerMs);
-  ASSERT_TRUE(estimator_.state().initialised);
-  const std::int64_t since_ns = t_ns_ - kTick_ns;
-  for (int tick_count = 0; tick_count < 50; ++tick_count, t_ns_ += kTick_ns) {
-    JointFeedback joints = walk.joints(t_ns_);
-    joints.foot_force_n = {kNaN, kNaN};
-    tick(walk.imu(t_ns_), joints, kBothStand);
-  }
-  EXPECT_EQ(estimator_.leg_sensing().counters().invalid, 0U);
-  EXPECT_EQ(estimator_.state().heard_ns, t_ns_ - kTick_ns);
-  EXPECT_EQ(estimator_.state().oldest_input_ns, since_ns);
-  EXPECT_GT(estimator_.state().contact_probability[0], 0.9) << "as told last";
-  EXPECT_TRUE(std::isnan(estimator_.leg_sensing().joints().foot_force_n[0]));
 }
 
 TEST_F(EstimatorTest, StateAt_BetweenTicks_IsInterpolatedAndOutsideRefused) {
