@@ -98,23 +98,39 @@ TEST(MuteDrive, FirstBusWhileTheRightFootIsInTheAir_StandsOnForHalfAMinute) {
   EXPECT_TRUE(outcome.stands()) << climb.truth().fall_reason;
 }
 
+// An ankle is mute for 60 ms from then on.
+void expect_climbs_on(const BusClimb::Options& options, double at_s, Foot leg) {
+  BusClimb climb(options);
+  climb.run_until(at_s);
+  const Mute mute{false, joint_index(leg, kAnklePitch)};
+  climb.set_mute(mute, true);
+  climb.run_on(0.06);
+  climb.set_mute(mute, false);
+  climb.run_until(60.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kFinished) << at_s;
+  EXPECT_EQ(climb.status().treads_climbed, 2U);
+  EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
+}
+
 TEST(MuteDrive, ForSixtyMilliseconds_ClimbsOn) {
   const BusClimb::Options options = climb_of(GaitPattern::kDoubleStep);
   const std::vector<SwingTimes> swings = swings_of(options);
   const SwingTimes& swing = swings.at(kOnto);
   const double air_s = swing.touch_down_s - swing.lift_off_s;
   for (const double at_s : {swing.lift_off_s - 0.4, swing.lift_off_s + 0.4 * air_s}) {
-    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-      BusClimb climb(options);
-      climb.run_until(at_s);
-      const Mute mute{false, joint_index(leg, kAnklePitch)};
-      climb.set_mute(mute, true);
-      climb.run_on(0.06);
-      climb.set_mute(mute, false);
-      climb.run_until(60.0);
-      EXPECT_EQ(climb.status().phase, GaitPhase::kFinished) << at_s;
-      EXPECT_EQ(climb.status().treads_climbed, 2U);
-      EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
+    for (const Foot leg : {Foot::kLeft, Foot::kRight}) expect_climbs_on(options, at_s, leg);
+  }
+}
+
+TEST(LongMuteDriveGap, ForSixtyMillisecondsInEachPhaseOfASwing_ClimbsOn) {
+  const BusClimb::Options options = climb_of(GaitPattern::kDoubleStep);
+  const std::vector<SwingTimes> swings = swings_of(options);
+  for (std::size_t n = kOnto; n < kOnto + 3; ++n) {
+    const double air_s = swings.at(n).touch_down_s - swings.at(n).lift_off_s;
+    for (const double share : {0.05, 0.2, 0.4, 0.6, 0.8}) {
+      for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+        expect_climbs_on(options, swings.at(n).lift_off_s + share * air_s, leg);
+      }
     }
   }
 }
