@@ -69,6 +69,7 @@ sim::SimOptions sim_options(const PlantOptions& options) {
   sim::SimOptions sim;
   sim.seed = options.seed;
   sim.stairs.steps = options.steps;
+  sim.imu_interval_ns = 5 * kNsPerMs;  // a Mid-360's, as the package has it
   sim.camera.silent = {{INT64_MIN, INT64_MAX}};  // nothing is rendered here
   sim.camera.threaded = false;
   return sim;
