@@ -121,7 +121,7 @@ def falls(summaries):
 
 
 def span(seeds):
-    return f"seeds {min(seeds)}-{max(seeds)}"
+    return f"seeds {min(seeds)}-{max(seeds)}" if len(seeds) > 1 else f"seed {min(seeds)}"
 
 
 def physics(engine, seeds):
