@@ -168,6 +168,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
                      state,
                      footholds,
                      feedback,
+                     joints_,
                      dcm_error_m_,
                      usable,
                      mute,

@@ -199,7 +199,7 @@ Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexce
     gait.plan.set_sole(goal_.foot, beside_path(gait.plan, odom_T_sole));
     return {};
   }
-  gait.status.stands[i] = true;
+  stop_foot(in, gait);
   if (!loaded && std::isfinite(in.feedback.foot_force_n[i])) gait.plan.keep_upright();
   ++gait.status.aborted_swings;
   gait.planner.swing_aborted();
@@ -217,8 +217,8 @@ Transition SwingPhase::touch_down(const GaitInput& in, GaitShared& gait, bool fe
   BodyPlan& body = gait.plan;
   LatchedStep& step = gait.status.step;
   step.touch_down_stamp_ns = in.now_ns;
+  stop_foot(in, gait);
   step.odom_T_executed = in.usable ? in.state.odom_T_sole[i] : body.odom_T_plan() * body.plan_T_sole(goal_.foot);
-  gait.status.stands[i] = true;
   body.land(goal_.foot, felt, early_m, in.now_ns);
   if (!felt && std::isfinite(in.feedback.foot_force_n[i])) body.keep_upright();
   gait.memory.aborted_swings = 0;
@@ -227,6 +227,13 @@ Transition SwingPhase::touch_down(const GaitInput& in, GaitShared& gait, bool fe
   gait.status.phase = GaitPhase::kDoubleSupport;
   body.carry_to_odometry();
   return Transition::stand();
+}
+
+// A mute knee has it elsewhere than the plan; it stays where it is commanded.
+void SwingPhase::stop_foot(const GaitInput& in, GaitShared& gait) const noexcept {
+  gait.status.stands[index_of(goal_.foot)] = true;
+  if (!in.crippled) return;
+  gait.plan.set_sole(goal_.foot, gait.plan.plan_T_base() * in.joints.base_T_sole_reference(goal_.foot));
 }
 
 // As low as the sole asks for, plan frame, and the standing one allows.
