@@ -69,7 +69,9 @@ SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& par
 Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const SwingParams& params = gait.params.swing;
   if (timing_.goes_back()) return abort_swing(in, gait);
-  if (in.usable && timing_.speeds_up() && goal_.kind == StepKind::kPassing) land_soon(in, gait);
+  // An impaired leg has drives that may not follow another path.
+  const bool lands_soon = in.usable && !in.leg_impaired && timing_.speeds_up();
+  if (lands_soon && goal_.kind == StepKind::kPassing) land_soon(in, gait);
   const Transform odom_T_sole = sole();
   const double lowered_m = path_.lowered_m(timing_.tick());
   const Contact contact = feel(in, params, odom_T_sole);

@@ -3,6 +3,7 @@
 // the air comes down.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <optional>
 #include <string>
 
@@ -327,6 +328,35 @@ TEST(GaitMute, KneeAnswersInTheAirTooLate_StaysAsCommanded) {
   tick(climb, 40);
   ASSERT_EQ(climb.status().phase, GaitPhase::kSwing);
   EXPECT_NEAR(climb.command().joints[knee].q_rad, held_rad, 1e-3);
+}
+
+// Both a way beside the standing foot and a straight one ask of the drives what no plan has proved for those that were
+// silent.
+TEST(GaitMute, SeemsToToppleAfterALongSilence_PassingFootKeepsToItsTarget) {
+  Gait::Params params;
+  params.planner.pattern = GaitPattern::kSingleStep;
+  IdealClimb climb({}, params);
+  const auto passes = [&climb] {
+    const auto& done = climb.record().steps;
+    const bool second = std::count_if(done.begin(), done.end(), [](const auto& step) { return step.onto_tread; }) == 2;
+    return second && climb.status().phase == GaitPhase::kSwing;
+  };
+  while (!passes() && climb.tick()) {
+  }
+  ASSERT_TRUE(passes());
+  const LatchedStep latched = climb.status().step;
+  tick(climb, 70);
+  mute(climb, 120 * kNsPerMs);
+  climb.tamper = [silent = climb.tamper, n = 0, side = side_sign(latched.foot)](StateEstimate& state, FootholdSet& set,
+                                                                                JointFeedback& feedback) mutable {
+    silent(state, set, feedback);
+    if (++n > 80 && n < 120) state.odom_v_base_mps.y() += side * 0.15;
+  };
+  tick(climb, 1500);
+  expect_stopped_as_stale(climb);
+  EXPECT_EQ(climb.status().step.sequence, latched.sequence);
+  EXPECT_EQ(climb.status().aborted_swings, 0U);
+  EXPECT_EQ((climb.status().step.odom_T_target.p_m - latched.odom_T_target.p_m).norm(), 0.0);
 }
 
 }  // namespace
