@@ -27,7 +27,7 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
   memory_.toes_calibrated = params.standing.toe_calibration.ticks <= 0;
   status_ = {};
   state_.emplace<Standing>();
-  armed_ = started_ = crippled_ = lost_in_swing_ = false;
+  armed_ = started_ = leg_impaired_ = lost_in_swing_ = false;
   last_tick_ns_ = 0;
   stop_requested_ = StopReason::kNone;
 }
@@ -136,7 +136,7 @@ void Gait::follow_state(const GaitInput& in, GaitShared& gait) noexcept {
 void Gait::advance(const GaitInput& in) noexcept {
   GaitShared gait = shared();
   if (in.held) {
-    plan_.hold(params_.held_body, status_.stands[0] && status_.stands[1], in.crippled);
+    plan_.hold(params_.held_body, status_.stands[0] && status_.stands[1], in.leg_impaired);
   } else {
     plan_.advance();
   }
@@ -162,18 +162,19 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   const bool usable = age_ns <= params_.steer_age_ns && finite(state);
   const bool mute = !usable && now_ns - state.heard_ns <= params_.steer_age_ns && finite(state);
   const bool lost = age_ns > params_.stop_age_ns;
-  crippled_ = crippled_ || (started_ && lost && mute);
+  leg_impaired_ = leg_impaired_ || (started_ && lost && mute);
   lost_in_swing_ = lost_in_swing_ || (lost && status_.phase == GaitPhase::kSwing);
   const GaitInput in{now_ns,
                      state,
                      footholds,
                      feedback,
+                     joints_,
                      dcm_error_m_,
                      usable,
                      mute,
-                     crippled_,
-                     mute || crippled_,
-                     lost || crippled_ || lost_in_swing_,
+                     leg_impaired_,
+                     mute || leg_impaired_,
+                     lost || leg_impaired_ || lost_in_swing_,
                      stop_requested_,
                      now_ns - std::exchange(last_tick_ns_, now_ns)};
   if (!started_) {
@@ -185,7 +186,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   const Transform base_T_plan = plan_.plan_T_base().inverse();
   const std::array<Transform, kFootCount>& plan_T_sole = plan_.plan_T_sole();
   std::array<Transform, kFootCount> base_T_sole{base_T_plan * plan_T_sole[0], base_T_plan * plan_T_sole[1]};
-  if (in.held) joints_.fit_mute_knees(feedback, status_.stands, in.crippled, base_T_sole);
+  if (in.held) joints_.fit_mute_knees(feedback, status_.stands, in.leg_impaired, base_T_sole);
   if (joints_.follow(base_T_sole, status_.stands, command)) {
     ++status_.ik_limited_ticks;
   }

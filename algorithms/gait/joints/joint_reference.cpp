@@ -79,14 +79,16 @@ bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole
 }
 
 void JointReference::fit_mute_knees(const JointFeedback& feedback, const std::array<bool, kFootCount>& stands,
-                                    bool for_good, std::array<Transform, kFootCount>& base_T_sole) noexcept {
+                                    bool leg_impaired, std::array<Transform, kFootCount>& base_T_sole) noexcept {
   const LegGeometry& legs = robot_->legs;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const std::size_t knee = joint_index(leg, kKnee);
     bool& was_mute = knee_was_mute_[index_of(leg)];
-    was_mute = feedback.is_mute(knee) || (was_mute && for_good);
+    was_mute = feedback.is_mute(knee) || (was_mute && leg_impaired);
     if (stands[index_of(leg)] || !was_mute) continue;
-    const double bent_cos = math::cos(feedback.q_rad[static_cast<Eigen::Index>(knee)]);
+    // One that speaks again stays as commanded: where it is measured it gives way to its load.
+    const JointVector& q_rad = feedback.is_mute(knee) ? feedback.q_rad : reference_rad_;
+    const double bent_cos = math::cos(q_rad[static_cast<Eigen::Index>(knee)]);
     const double length_m = math::sqrt(math::square(legs.thigh_m) + math::square(legs.shank_m) +
                                        2.0 * legs.thigh_m * legs.shank_m * bent_cos);
     Transform& sole = base_T_sole[index_of(leg)];

@@ -37,9 +37,9 @@ class JointReference {
   // stays. The command never leaves the limits.
   bool follow(const std::array<Transform, kFootCount>& base_T_sole, const std::array<bool, kFootCount>& stands,
               JointCommand& command) noexcept;
-  // Of a leg in the air whose knee is mute, or (for_good) was: the sole on its line from the hip, as far away as the
-  // knee keeps it.
-  void fit_mute_knees(const JointFeedback& feedback, const std::array<bool, kFootCount>& stands, bool for_good,
+  // Of a leg in the air whose knee is mute, or (leg_impaired) was: the sole on its line from the hip, as far away as
+  // the knee keeps it.
+  void fit_mute_knees(const JointFeedback& feedback, const std::array<bool, kFootCount>& stands, bool leg_impaired,
                       std::array<Transform, kFootCount>& base_T_sole) noexcept;
   // Repeats the last joint angles, at rest.
   void hold(JointCommand& command) const noexcept;

@@ -16,6 +16,7 @@ void BodyPlan::reset() noexcept {
   base_com_bias_m_.setZero();
   landed_ = {};
   held_ = false;
+  com_shift_m_.setZero();
 }
 
 void BodyPlan::place(const JointReference& joints, const Transform& plan_T_base) noexcept {
@@ -34,10 +35,15 @@ void BodyPlan::start(const JointReference& joints, const Transform& plan_T_base)
 // The horizontal part of the torso's trajectory is the centre of mass's: the base follows from the legs' places, one
 // tick old.
 void BodyPlan::advance() noexcept {
-  torso_state_ = torso_.at(torso_tick_, com_.at(com_tick_));
+  HorizontalMotion com = com_.at(com_tick_);
+  if (std::exchange(held_, false)) {
+    posture_.restart();
+    com_shift_m_ = (plan_T_base_ * reference_p_com_m_).head<2>() - com_.at(com_tick_ - 1).position_m;
+  }
+  com.position_m += com_shift_m_;
+  torso_state_ = torso_.at(torso_tick_, com);
   plan_T_base_ = TorsoTrajectory::pose(torso_state_);
   plan_T_base_.p_m.head<2>() -= (plan_T_base_.R * reference_p_com_m_).head<2>();
-  if (std::exchange(held_, false)) posture_.restart();
 }
 
 // The base stays, so that the standing legs do; the centre of mass moves with the leg in the air.
@@ -107,6 +113,7 @@ void BodyPlan::move_torso(double height_m, double yaw_rad, std::int32_t ticks, s
 
 ComPlan& BodyPlan::renewed_com() noexcept {
   com_tick_ = 0;
+  com_shift_m_.setZero();
   return com_;
 }
 

@@ -75,7 +75,8 @@ class BodyPlan {
   TorsoTrajectory::State torso_state_{};
   std::int32_t torso_tick_ = 0;  // of the torso's plan, saturates
   ComPlan com_;
-  std::int32_t com_tick_ = 0;  // of the plan of the centre of mass, likewise
+  std::int32_t com_tick_ = 0;        // of the plan of the centre of mass, likewise
+  Vec2 com_shift_m_ = Vec2::Zero();  // of that plan: the leg in the air moved while the base was held
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
   BaseCorrection correction_;

@@ -20,14 +20,15 @@ struct GaitInput {
   const StateEstimate& state;
   const FootholdSet& footholds;  // the newest finished search
   const JointFeedback& feedback;
-  Vec2 odom_dcm_error_m;       // of the divergent component, as last measured
-  bool usable;                 // the estimate is fresh, and all of it numbers
-  bool mute;                   // it would be, but for drives or feet that are silent while others speak
-  bool crippled;               // that lasted for so long that the gait stops; for good
-  bool held;                   // either: the body stays where it is, and the states' clocks stand still
-  bool lost;                   // the estimate is, or in this swing was, so old that the gait stops; or crippled
-  StopReason stop_requested;   // kNone: it is not
-  std::int64_t since_last_ns;  // since the last tick: the plan stood still, and the body did not
+  const JointReference& joints;  // as last commanded
+  Vec2 odom_dcm_error_m;         // of the divergent component, as last measured
+  bool usable;                   // the estimate is fresh, and all of it numbers
+  bool mute;                     // it would be, but for drives or feet that are silent while others speak
+  bool leg_impaired;             // that lasted for so long that the gait stops; for good
+  bool held;                     // either: the body stays where it is, and the states' clocks stand still
+  bool lost;                     // the estimate is, or in this swing was, so old that the gait stops; or leg_impaired
+  StopReason stop_requested;     // kNone: it is not
+  std::int64_t since_last_ns;    // since the last tick: the plan stood still, and the body did not
 };
 
 struct GaitMemory {

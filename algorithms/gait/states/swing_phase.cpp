@@ -55,7 +55,7 @@ SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& par
   }
   const bool descending = 2.0 * timing_.tick() > path_.duration_ticks();
   // What does not go down any more stands on something, whatever its force sensor says.
-  const bool judged = in.usable && !in.crippled;  // a mute leg stays above its path, too
+  const bool judged = in.usable && !in.leg_impaired;  // a mute leg stays above its path, too
   const double above_m = judged ? in.state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
   const bool blocked = path_.lowered_m(timing_.tick()) > params.late_m && above_m > params.blocked_m;
   // A toe that scrapes along the next riser feels a force too, for a moment: ground that comes early has to stay.
@@ -69,7 +69,9 @@ SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& par
 Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const SwingParams& params = gait.params.swing;
   if (timing_.goes_back()) return abort_swing(in, gait);
-  if (in.usable && timing_.speeds_up() && goal_.kind == StepKind::kPassing) land_soon(in, gait);
+  // An impaired leg has drives that may not follow another path.
+  const bool lands_soon = in.usable && !in.leg_impaired && timing_.speeds_up();
+  if (lands_soon && goal_.kind == StepKind::kPassing) land_soon(in, gait);
   const Transform odom_T_sole = sole();
   const double lowered_m = path_.lowered_m(timing_.tick());
   const Contact contact = feel(in, params, odom_T_sole);
@@ -112,7 +114,7 @@ Transform SwingPhase::beside_path(const BodyPlan& plan, const Transform& odom_T_
 }
 
 void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
-  for (std::size_t j = 0; j < kJointsPerLeg && in.crippled; ++j) {
+  for (std::size_t j = 0; j < kJointsPerLeg && in.leg_impaired; ++j) {
     leg_was_mute_ = leg_was_mute_ || in.feedback.is_mute(joint_index(goal_.foot, j));
   }
   if (lowers_body_) return;  // the foot is as low on its path as it gets
@@ -120,7 +122,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   const Transform& stance = gait.plan.plan_T_sole(other(goal_.foot));
   const bool reaches_back = on_level(goal_.kind) || goal_.kind == StepKind::kLeading;
   const bool reaches_shortly = goal_.kind == StepKind::kPassing;  // the torso rises, and leaves its leg too short
-  const double until = in.crippled       ? params.abort_mute_share * path_.duration_ticks()
+  const double until = in.leg_impaired   ? params.abort_mute_share * path_.duration_ticks()
                        : reaches_back    ? params.abort_share * path_.duration_ticks()
                        : reaches_shortly ? params.abort_passing_ticks
                                          : 0.0;
@@ -133,7 +135,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .turn_until_tick = until,
                    .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
-                   .crippled = in.crippled},
+                   .leg_impaired = in.leg_impaired},
                   path_.duration_ticks());
   // The torso is on its way up: the foot is to reach where it stood all the same.
   if (timing_.goes_back() && !went_back) lower_torso(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
@@ -199,7 +201,7 @@ Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexce
     gait.plan.set_sole(goal_.foot, beside_path(gait.plan, odom_T_sole));
     return {};
   }
-  gait.status.stands[i] = true;
+  stop_foot(in, gait);
   if (!loaded && std::isfinite(in.feedback.foot_force_n[i])) gait.plan.keep_upright();
   ++gait.status.aborted_swings;
   gait.planner.swing_aborted();
@@ -217,8 +219,8 @@ Transition SwingPhase::touch_down(const GaitInput& in, GaitShared& gait, bool fe
   BodyPlan& body = gait.plan;
   LatchedStep& step = gait.status.step;
   step.touch_down_stamp_ns = in.now_ns;
+  stop_foot(in, gait);
   step.odom_T_executed = in.usable ? in.state.odom_T_sole[i] : body.odom_T_plan() * body.plan_T_sole(goal_.foot);
-  gait.status.stands[i] = true;
   body.land(goal_.foot, felt, early_m, in.now_ns);
   if (!felt && std::isfinite(in.feedback.foot_force_n[i])) body.keep_upright();
   gait.memory.aborted_swings = 0;
@@ -227,6 +229,13 @@ Transition SwingPhase::touch_down(const GaitInput& in, GaitShared& gait, bool fe
   gait.status.phase = GaitPhase::kDoubleSupport;
   body.carry_to_odometry();
   return Transition::stand();
+}
+
+// A mute knee has it elsewhere than the plan; it stays where it is commanded.
+void SwingPhase::stop_foot(const GaitInput& in, GaitShared& gait) const noexcept {
+  gait.status.stands[index_of(goal_.foot)] = true;
+  if (!in.leg_impaired) return;
+  gait.plan.set_sole(goal_.foot, gait.plan.plan_T_base() * in.joints.base_T_sole_reference(goal_.foot));
 }
 
 // As low as the sole asks for, plan frame, and the standing one allows.

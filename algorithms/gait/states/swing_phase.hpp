@@ -27,6 +27,7 @@ class SwingPhase {
   [[nodiscard]] Contact feel(const GaitInput& in, const SwingParams& params, const Transform& odom_T_sole) noexcept;
   [[nodiscard]] Transition abort_swing(const GaitInput& in, GaitShared& gait) noexcept;
   [[nodiscard]] Transition touch_down(const GaitInput& in, GaitShared& gait, bool felt, double early_m) noexcept;
+  void stop_foot(const GaitInput& in, GaitShared& gait) const noexcept;
   [[nodiscard]] Transform beside_path(const BodyPlan& plan, const Transform& odom_T_sole) const noexcept;
   void land_soon(const GaitInput& in, GaitShared& gait) noexcept;
   void land_beside(const GaitInput& in, GaitShared& gait, const SolePose& target) noexcept;

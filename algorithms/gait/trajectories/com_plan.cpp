@@ -52,29 +52,36 @@ ComPlan::Knots ComPlan::with_offset_knots(const Params& params, const Vec2& star
 
 // The divergent component xi = x + v/w must meet every segment so that the last one rests: backwards. The offset's part
 // of xi(0) per metre of offset goes along.
-Vec2 ComPlan::add_offset(const Params& params, const HorizontalMotion& from, double offset_ticks,
-                         Knots& all) const noexcept {
-  const double w = omega_radps_;
+ComPlan::Knots ComPlan::offset_knots(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots,
+                                     Vec2& offset_m) noexcept {
+  const double w = params.omega_radps, offset_ticks = std::min(params.zmp_offset_ticks, knots.back().tick);
+  Knots all = with_offset_knots(params, zmp_under(params, from), knots, offset_ticks);
+  std::array<double, kSegments> share{};
+  for (std::size_t i = 0; i < all.size(); ++i) share[i] = offset_share(params, all[i].tick / offset_ticks);
   Vec2 xi_m = all.back().zmp_m;
   double offset_xi = 0.0;
-  const auto share_at = [&](std::size_t i) { return offset_share(params, all[i].tick / offset_ticks); };
   for (std::size_t i = all.size() - 1; i-- > 0;) {
     const double T = (all[i + 1].tick - all[i].tick) * kTick_s, decay = math::exp(-w * T);
     const Vec2 slope = (all[i + 1].zmp_m - all[i].zmp_m) / T;
     xi_m = all[i].zmp_m + slope / w + decay * (xi_m - all[i + 1].zmp_m - slope / w);
-    const double rate = (share_at(i + 1) - share_at(i)) / T;
-    offset_xi = share_at(i) + rate / w + decay * (offset_xi - share_at(i + 1) - rate / w);
+    const double rate = (share[i + 1] - share[i]) / T;
+    offset_xi = share[i] + rate / w + decay * (offset_xi - share[i + 1] - rate / w);
   }
-  const Vec2 offset_m = (from.position_m + from.velocity_mps / w - xi_m) / std::max(offset_xi, 0.05);
-  for (std::size_t i = 0; i < all.size(); ++i) all[i].zmp_m += share_at(i) * offset_m;
-  return offset_m;
+  offset_m = (from.position_m + from.velocity_mps / w - xi_m) / std::max(offset_xi, 0.05);
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].zmp_m += share[i] * offset_m;
+  return all;
+}
+
+double ComPlan::zmp_offset_m(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept {
+  Vec2 offset_m;
+  (void)offset_knots(params, from, knots, offset_m);
+  return offset_m.norm();
 }
 
 void ComPlan::plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept {
   const double w = omega_radps_ = params.omega_radps;
-  const double offset_ticks = std::min(params.zmp_offset_ticks, knots.back().tick);
-  Knots all = with_offset_knots(params, zmp_under(params, from), knots, offset_ticks);
-  zmp_offset_m_ = add_offset(params, from, offset_ticks, all).norm();
+  Vec2 offset_m;
+  const Knots all = offset_knots(params, from, knots, offset_m);
   count_ = all.size();
 
   // Backwards again for the growing part, forwards for the dying one.

@@ -43,9 +43,11 @@ class ComPlan {
   // point starts under `from`'s acceleration. What the pendulum would need of speed at the start and does not have is
   // made up by an offset: the zero-moment point leaves its straight way for zmp_offset_ticks.
   void plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept;
+  // How far it would leave its way with such a plan, for half of what the plan takes.
+  [[nodiscard]] static double zmp_offset_m(const Params& params, const HorizontalMotion& from,
+                                           const ZmpKnots& knots) noexcept;
   [[nodiscard]] HorizontalMotion at(std::int32_t tick) const noexcept;
   [[nodiscard]] Vec2 zmp_m(std::int32_t tick) const noexcept;
-  [[nodiscard]] double zmp_offset_m() const noexcept { return zmp_offset_m_; }  // how far it leaves it at the start
 
  private:
   // x(t) = p + s t + a e^(w (t - T)) + b e^(-w t), T the duration: neither exponential overflows.
@@ -61,15 +63,14 @@ class ComPlan {
   using Knots = StaticVector<ZmpKnot, kSegments>;
   [[nodiscard]] static Knots with_offset_knots(const Params& params, const Vec2& start_m, const ZmpKnots& knots,
                                                double offset_ticks) noexcept;
-  // Moves the knots by the offset, which it returns.
-  [[nodiscard]] Vec2 add_offset(const Params& params, const HorizontalMotion& from, double offset_ticks,
-                                Knots& all) const noexcept;
+  // The knots of both together, moved by the offset, which it writes.
+  [[nodiscard]] static Knots offset_knots(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots,
+                                          Vec2& offset_m) noexcept;
   [[nodiscard]] const Segment& segment(std::int32_t tick) const noexcept;
 
   std::array<Segment, kSegments> segments_;
   std::size_t count_ = 0;
   double omega_radps_ = 1.0;
-  double zmp_offset_m_ = 0.0;
 };
 
 }  // namespace polygmap

@@ -75,16 +75,15 @@ void plan_shift(const StepParams& params, const HorizontalMotion& from, std::int
   constexpr std::array<std::int32_t, 10> kLonger_ticks{0, -35, -70, 50, 100, 150, 200, 300, 400, 500};
   const Vec2 start_m = ComPlan::zmp_under(params.com, from);
   const std::int32_t usual_ticks = plan.shift_ticks;
-  const auto try_shift = [&](std::int32_t ticks) {
+  const auto knots_of = [&](std::int32_t ticks) {
     plan.shift_ticks = ticks;
-    com.plan(params.com, from, zmp_of_shift(params, plan, start_m));
-    return com.zmp_offset_m();
+    return zmp_of_shift(params, plan, start_m);
   };
   std::int32_t best_ticks = usual_ticks;
   double least_m = 1e9;
   for (const std::int32_t longer : kLonger_ticks) {
     const std::int32_t ticks = std::max(usual_ticks + longer, least_ticks);
-    const double zmp_offset_m = try_shift(ticks);
+    const double zmp_offset_m = ComPlan::zmp_offset_m(params.com, from, knots_of(ticks));
     const bool small = zmp_offset_m <= params.max_zmp_offset_m;
     // A great one must be over before the foot lifts: it would lift with weight on it.
     const bool over = ticks - params.lift_hold_ticks >= params.com.zmp_offset_ticks;
@@ -94,7 +93,7 @@ void plan_shift(const StepParams& params, const HorizontalMotion& from, std::int
     }
     if (small) break;
   }
-  (void)try_shift(best_ticks);
+  com.plan(params.com, from, knots_of(best_ticks));
 }
 
 }  // namespace polygmap
