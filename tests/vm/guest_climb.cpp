@@ -76,7 +76,7 @@ class ReplayClock final : public hal::Clock {
 
   // Returns how late the thread woke, ns; 0 when there was nothing to wait for.
   [[nodiscard]] std::int64_t wait_until(std::int64_t due_ns) const noexcept {
-    if (now_ns() >= due_ns) return 0;
+    if (const std::int64_t late_ns = now_ns() - due_ns; late_ns >= 0) return late_ns;
     const std::int64_t at_ns = due_ns + offset_ns_;
     const timespec at{at_ns / kNsPerS, at_ns % kNsPerS};
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr) != 0) {

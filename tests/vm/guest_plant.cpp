@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// guest_plant BUS_FILE BOOK ...: the simulated robot on its stairs, in closed loop and real time, as a process of its
-// own in the guest. Its drives and the feet's board are on the CAN buses, its IMU is a Livox Mid-360's datagrams, poses
-// of a lidar odometry come as datagrams, and its camera is vivid, shown the picture of BOOK that was taken from where
-// the robot was (picture_book.hpp). It listens on the abstract socket of --notify as a service manager does. It says
-// "PLANT ready" when all is there and "PLANT climbed" when both feet rest on the last tread; it ends with SIGTERM, and
-// prints "PLANT steps= ..." and what the daemon told.
+// guest_plant BUS_FILE REQUESTS PICTURES ...: the simulated robot on its stairs, in closed loop and real time, as a
+// process of its own in the guest. Its drives and the feet's board are on the CAN buses, its IMU is a Livox Mid-360's
+// datagrams, poses of a lidar odometry come as datagrams, and its camera is vivid, shown what the host renders from
+// where the robot is (picture_request.hpp); REQUESTS and PICTURES are named pipes of the host. It listens on the
+// abstract socket of --notify as a service manager does. It says "PLANT ready" when all is there and "PLANT climbed"
+// when both feet rest on the last tread; it ends with SIGTERM, and prints "PLANT steps= ..." and what the daemon told.
 #include <arpa/inet.h>
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
@@ -14,7 +14,6 @@
 #include <signal.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/un.h>
 
 #include <Eigen/Geometry>
@@ -26,8 +25,9 @@
 #include "hal/codec/lio_packet.hpp"
 #include "hal/codec/livox_packet.hpp"
 #include "sim_stub/sim_robot.hpp"
-#include "tests/vm/picture_book.hpp"
+#include "tests/vm/picture_request.hpp"
 #include "tests/vm/plant_options.hpp"
+#include "tests/vm/semihosting.hpp"
 #include "tests/vm/vivid_output.hpp"
 
 namespace polygmap::sim {
@@ -54,71 +54,61 @@ std::int64_t monotonic_ns() {
   return now.tv_sec * kNsPerS + now.tv_nsec;
 }
 
-std::span<const char> map_file(const std::string& path) {
-  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  struct stat status {};
-  if (file < 0 || fstat(file, &status) != 0 || status.st_size == 0) refuse(path + " cannot be read or is empty");
-  const auto bytes = static_cast<std::size_t>(status.st_size);
-  void* memory = mmap(nullptr, bytes, PROT_READ, MAP_SHARED | MAP_POPULATE, file, 0);
-  close(file);
-  if (memory == MAP_FAILED) refuse(path + " cannot be mapped");
-  return {static_cast<const char*>(memory), bytes};
-}
-
-sim::SimOptions sim_options(const PlantOptions& options) {
-  sim::SimOptions sim;
-  sim.seed = options.seed;
-  sim.stairs.steps = options.steps;
-  sim.camera.silent = {{INT64_MIN, INT64_MAX}};  // nothing is rendered here
-  sim.camera.threaded = false;
-  return sim;
-}
-
-// Shows, some milliseconds before the camera takes its next picture, what was to be seen when that one's exposure was
-// half over.
+// Shows, some milliseconds before the camera takes its next picture, what was to be seen when that one was exposed.
 class Camera {
  public:
-  Camera(VividOutput& output, const PictureBook& book, std::int64_t latency_ns) noexcept
-      : output_(output), book_(book), latency_ns_(latency_ns) {}
+  Camera(VividOutput& output, const PlantOptions& options)
+      : output_(output),
+        latency_ns_(options.latency_ns),
+        requests_(options.requests, HostFile::Mode::kWrite),
+        pictures_(options.pictures, HostFile::Mode::kRead) {
+    if (!requests_.is_open() || !pictures_.is_open()) refuse("the host's renderer cannot be reached");
+  }
 
-  void tick(std::int64_t tick, std::int64_t now_ns, const PictureKey& key) noexcept {
-    if (tick == 1) past_.fill(key);
-    past_[static_cast<std::size_t>(tick) % past_.size()] = key;
+  void tick(std::int64_t tick, std::int64_t now_ns, const sim::SimRobot& robot) {
+    if (tick == 1) past_.fill(PictureMoment::of(robot));
+    at(tick) = PictureMoment::of(robot);
     if (first_ns_ < 0) {
       if (!output_.input_is_taken()) return;
       first_ns_ = now_ns;
     }
     const std::int64_t due_ns = first_ns_ + taken_ * kNsPerS / 30;
     if (now_ns < due_ns - kAhead_ns) return;
-    ++taken_;
     const std::int64_t ago_ticks = (now_ns - (due_ns - latency_ns_) + kTick_ns / 2) / kTick_ns;
-    const std::int64_t exposed = std::max<std::int64_t>(0, tick - std::max<std::int64_t>(0, ago_ticks));
-    double distance2_m2 = 0.0;
-    shown_ = book_.nearest(past_[static_cast<std::size_t>(exposed) % past_.size()], shown_, distance2_m2);
-    farthest2_m2_ = std::max(farthest2_m2_, distance2_m2);
-    output_.show(book_.pixels(shown_));
+    const std::int64_t middle = tick - std::max(ago_ticks, kHalfScan_ticks);
+    const PictureRequest request{static_cast<std::uint64_t>(taken_),
+                                 1e-9 * static_cast<double>(std::max<std::int64_t>(middle, 0) * kTick_ns),
+                                 at(middle - kHalfScan_ticks), at(middle + kHalfScan_ticks)};
+    ++taken_;
+    if (!requests_.write(&request, sizeof request) || !pictures_.read(pixels_.data(), pixels_.size())) {
+      refuse("the host's renderer has ended");
+    }
+    output_.show(pixels_.data());
   }
   [[nodiscard]] std::int64_t shown() const noexcept { return taken_; }
-  [[nodiscard]] double farthest_m() const noexcept { return std::sqrt(farthest2_m2_); }
 
  private:
   static constexpr std::int64_t kAhead_ns = 8 * kNsPerMs;
+  static constexpr std::int64_t kHalfScan_ticks = 4;  // as the simulated camera scans
+  [[nodiscard]] PictureMoment& at(std::int64_t tick) noexcept {
+    return past_[static_cast<std::size_t>(tick + 64) % past_.size()];
+  }
+
   VividOutput& output_;
-  const PictureBook& book_;
   const std::int64_t latency_ns_;
-  std::array<PictureKey, 64> past_{};
+  const HostFile requests_, pictures_;
+  std::array<PictureMoment, 64> past_{};
+  std::vector<char> pixels_ = std::vector<char>(VividOutput::kPicture_bytes);
   std::int64_t first_ns_ = -1, taken_ = 0;
-  std::size_t shown_ = 0;
-  double farthest2_m2_ = 0.0;
 };
 
 class Plant {
  public:
-  Plant(const PlantOptions& options, VividOutput& output, const PictureBook& book)
+  Plant(const PlantOptions& options, VividOutput& output)
       : options_(options),
         bus_(config::read_bus(options.bus_file)),
-        robot_(sim_options(options)),
-        camera_(output, book, options.latency_ns),
+        robot_(sim_options(options.seed, options.steps)),
+        camera_(output, options),
         udp_(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
     for (const std::string& bus : bus_.buses) sockets_.push_back({open_bus(bus), POLLIN, 0});
     if (!options.notify.empty()) sockets_.push_back({open_notify(options.notify), POLLIN, 0});
@@ -148,12 +138,11 @@ class Plant {
                                      : truth.in_contact[1]                      ? "right"
                                                                                 : "none";
     std::printf(
-        "PLANT steps=%d of=%d fell=%d support=%.*s commands=%zu enters=%zu pictures=%lld picture_off_mm=%.2f "
+        "PLANT steps=%d of=%d fell=%d support=%.*s commands=%zu enters=%zu pictures=%lld "
         "late_max_us=%lld refused=%zu unwitnessed=%zu down_s=%.3f\n",
         steps_climbed_, options_.steps, truth.fell ? 1 : 0, static_cast<int>(support.size()), support.data(), commands_,
-        enters_, static_cast<long long>(camera_.shown()), 1e3 * camera_.farthest_m(),
-        static_cast<long long>(late_max_ns_ / 1000), refused_, unwitnessed_,
-        1e-9 * static_cast<double>(in_the_air_ns_ - gains_ns_));
+        enters_, static_cast<long long>(camera_.shown()), static_cast<long long>(late_max_ns_ / 1000), refused_,
+        unwitnessed_, 1e-9 * static_cast<double>(in_the_air_ns_ - gains_ns_));
     if (truth.fell) std::printf("PLANT fell: %s\n", truth.fall_reason.c_str());
     for (const Told& told : told_) std::printf("TOLD %.3f %s\n", told.since_s, told.state.c_str());
   }
@@ -277,7 +266,7 @@ class Plant {
     (void)robot_.try_read(feedback_);
     sense(due_ns);
     disturb();
-    camera_.tick(tick, due_ns, PictureKey::of(robot_.truth().true_T_base, robot_.true_q_rad()));
+    camera_.tick(tick, due_ns, robot_);
     count_steps();
     const sim::Truth& truth = robot_.truth();
     if (!truth.in_contact[0] || !truth.in_contact[1]) in_the_air_ns_ = due_ns;
@@ -400,19 +389,15 @@ class Plant {
 };
 
 int run(const PlantOptions& options) {
-  PictureBook book;
-  if (!book.open(map_file(options.book)) || 2 * book.picture_px() != VividOutput::kPicture_bytes) {
-    refuse(options.book + " is no book of render_climb");
-  }
   VividOutput output;
   if (const std::string wrong = output.open("/dev/video0", "/dev/video1"); !wrong.empty()) refuse("vivid: " + wrong);
-  Plant plant(options, output, book);
+  Plant plant(options, output);
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) refuse("cannot lock its memory");
   // Below both lanes: it answers when they have done their cycle.
   const sched_param scheduling{.sched_priority = 60};
   if (sched_setscheduler(0, SCHED_FIFO, &scheduling) != 0) refuse("cannot have a real-time priority");
   for (const int number : {SIGTERM, SIGINT}) signal(number, [](int) { ended = 1; });
-  std::printf("PLANT ready: %zu pictures\n", book.count());
+  std::printf("PLANT ready\n");
   std::fflush(stdout);
   plant.run();
   plant.print();

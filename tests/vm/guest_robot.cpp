@@ -170,14 +170,18 @@ class StandingRobot {
   void sense() {
     const hal::CanFeet& feet = bus_.table.feet;
     if (feet.present) send(feet.bus, feet.id, hal::feet_frame({kHalfWeight_n, kHalfWeight_n}, feet.unit_n));
+    ++cycles_;
+    if (stranger_ >= 0 && cycles_ % kCyclesPerPose == 0) send_pose();
+    // A clock of its own, and a Mid-360's rate, as the package has it.
+    if (monotonic_ns() - begin_ns_ < imu_due_ns_) return;
     codec::LivoxImuPacket packet;
     packet.udp_count = ++imu_count_;
-    packet.stamp_ns = monotonic_ns() - begin_ns_ + kNsPerS;  // a clock of its own
+    packet.stamp_ns = imu_due_ns_ + kNsPerS;
+    imu_due_ns_ += 5 * kNsPerMs;
     packet.accel_mps2 = {0.0F, 0.0F, codec::kStandardGravity_mps2};
     std::array<std::uint8_t, codec::kLivoxImuPacket_bytes> bytes{};
     codec::encode(packet, bytes);
     send_datagram(udp_, bytes, options_.imu_port);
-    if (stranger_ >= 0 && imu_count_ % kCyclesPerPose == 0) send_pose();
   }
   void send_pose() {
     codec::LioPacket packet;
@@ -208,6 +212,8 @@ class StandingRobot {
   std::int64_t begin_ns_ = 0;
   JointVector q_rad_ = JointVector::Zero();
   std::uint16_t imu_count_ = 0;
+  std::int64_t imu_due_ns_ = 0;
+  unsigned cycles_ = 0;
   std::uint32_t poses_ = 0;
   std::size_t commands_ = 0, enters_ = 0, exits_ = 0;
   bool has_gains_ = false;

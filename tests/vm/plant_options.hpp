@@ -30,7 +30,7 @@ struct PlantInjection {
 };
 
 struct PlantOptions {
-  std::string bus_file, book, witness, notify;
+  std::string bus_file, requests, pictures, witness, notify;
   std::uint64_t seed = 1;
   int steps = 4;
   int imu_port = 56401, lio_port = 5601;
@@ -71,14 +71,16 @@ inline PlantInjection parse_injection(const std::string& text) {
 
 inline PlantOptions parse_options(int argc, char** argv) {
   PlantOptions options;
-  if (argc < 3 || argc % 2 != 1) {
+  if (argc < 4 || argc % 2 != 0) {
     refuse(
-        "usage: BUS_FILE BOOK [--seed N] [--steps N] [--latency MS] [--witness FILE] [--notify NAME] [--inject "
+        "usage: BUS_FILE REQUESTS PICTURES [--seed N] [--steps N] [--latency MS] [--witness FILE] [--notify NAME] "
+        "[--inject "
         "WHAT@S]");
   }
   options.bus_file = argv[1];
-  options.book = argv[2];
-  for (int i = 3; i + 1 < argc; i += 2) {
+  options.requests = argv[2];
+  options.pictures = argv[3];
+  for (int i = 4; i + 1 < argc; i += 2) {
     const std::string_view key = argv[i];
     const char* value = argv[i + 1];
     if (key == "--seed") {

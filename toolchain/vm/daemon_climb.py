@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The packaged daemon climbs in the emulated machine, in closed loop with a simulated robot (tests/vm/guest_plant.cpp):
-toolchain/vm/run --daemon. The pictures are rendered on the host beforehand; what the daemon recorded is replayed there
-afterwards, and what it says it commanded is compared with what the drives got."""
+toolchain/vm/run --daemon. The pictures are rendered on the host, while the guest's time stands still; what the daemon
+recorded is replayed there afterwards, and what it says it commanded is compared with what the drives got."""
+import contextlib
+import os
 import re
 import shutil
 import subprocess
@@ -15,8 +17,7 @@ RELEASE = machine.ROOT / "build/release"
 OF_A_ROW = re.compile(r"(allocate|overrun=\w+)@[\d.]+")
 ON_THE_BUS = re.compile(r"((unplug|busoff|garbage|duplicate)=\d+(\+\d+)?|gap=\d+)@[\d.]+")
 BAD = ("flagged", "short_ones", "wrong_stamp", "missing", "timeouts")  # of what the camera's driver counts
-TARGETS = ("orin:guest_plant", "orin:polygmapd_inject", "release:render_climb", "release:recorded_frames", "release:polygmap_replay")
-PERIOD_TICKS = 12  # of the rendered pictures
+TARGETS = ("orin:guest_plant", "orin:polygmapd_inject", "release:render_pictures", "release:recorded_frames", "release:polygmap_replay")
 LATENCY_MS, EXPOSURE_MS = 22, 16  # of the camera; its stamp is that of the exposure's end, less the latency
 DISK_BYTES = 1 << 31  # sparse
 RECORDED_MB = 1500  # the guest's memory for what is recorded, 20 a second
@@ -38,7 +39,7 @@ ONE_LANE = "sed -i -e 's/^lanes = 2/lanes = 1/' -e '/^\\[perception\\]/,/^$/d' v
 
 # Until the robot is on top, or the daemon has ended; then SIGTERM, as systemd would.
 RUN = r"""
-/job/guest_plant /etc/polygmap/vm_bus.toml /job/book --seed {seed} --steps {steps} --latency {picture_latency} \
+/job/guest_plant /etc/polygmap/vm_bus.toml {requests} {pictures} --seed {seed} --steps {steps} --latency {picture_latency} \
   --witness /out/frames.log --notify polygmap {inject} >/out/plant.txt 2>&1 & plant=$!
 while ! grep -qs ready /out/plant.txt; do [ -d /proc/$plant ] || break; sleep 0.05; done
 export NOTIFY_SOCKET=@polygmap WATCHDOG_USEC=400000
@@ -59,23 +60,28 @@ def say(text):
     print(text, flush=True)
 
 
-def render(work, args):
-    """Pictures of the same climb on the host."""
-    book = work / "book"
-    words = [RELEASE / "tests/vm/render_climb", book, args.seed, args.steps, args.gait, args.bus, PERIOD_TICKS]
-    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=args.limit)
-    if done.returncode:
-        raise SystemExit(f"vm: error: the host's climb failed: {done.stdout}{done.stderr}")
-    say("vm: " + done.stdout.strip())
-    return book
+@contextlib.contextmanager
+def renderer(work, args):
+    """The host's process that renders the guest's pictures, and the named pipes by which it is asked and answers."""
+    pipes = work / "requests", work / "pictures"
+    for pipe in pipes:
+        os.mkfifo(pipe)
+    process = subprocess.Popen([RELEASE / "tests/vm/render_pictures", str(args.seed), str(args.steps), *pipes])
+    try:
+        yield pipes
+    finally:
+        process.kill()
+        process.wait()
+        for pipe in pipes:
+            pipe.unlink()
 
 
-def main_script(args):
+def main_script(args, pipes):
     """In the guest. What a row does is injected by another build of the daemon, all else by the robot."""
     of_a_row = bool(args.inject and OF_A_ROW.fullmatch(args.inject))
     words = {"gait": args.gait, "latency": LATENCY_MS, "exposure": EXPOSURE_MS, "perception_cpu": args.cpus - 1,
              "one_lane": ONE_LANE if args.lanes == 1 else ""}
-    run = {"seed": args.seed, "steps": args.steps, "picture_latency": LATENCY_MS + EXPOSURE_MS // 2,
+    run = {"requests": pipes[0].resolve(), "pictures": pipes[1].resolve(), "seed": args.seed, "steps": args.steps, "picture_latency": LATENCY_MS + EXPOSURE_MS // 2,
            "inject": f"--inject {args.inject}" if args.inject and not of_a_row else "",
            "daemon": "/job/polygmapd_inject" if of_a_row else "/usr/bin/polygmapd", "limit_tenths": 10 * (15 + 5 * args.steps)}
     return CONFIG.format(**words) + RUN.format(**run)
@@ -144,20 +150,20 @@ def package():
     return next(PACKAGE.glob("polygmap_*_arm64.deb"))
 
 
-def boot(args, work, deb, book):
+def boot(args, work, deb):
     """One climb in the guest; what it leaves is in work/out."""
     work.mkdir(parents=True, exist_ok=True)
-    files = {"package.deb": deb, "guest_plant": GUEST_PLANT, "book": book, "bus.toml": args.bus}
+    files = {"package.deb": deb, "guest_plant": GUEST_PLANT, "bus.toml": args.bus}
     if args.inject and OF_A_ROW.fullmatch(args.inject):
         (work / "injection").write_text(args.inject)
         files |= {"injection": work / "injection", "polygmapd_inject": INJECTED}
-    machine.run(work, main_script(args), files, cpus=args.cpus, camera=True, limit_s=args.limit, disk_bytes=DISK_BYTES,
-                more_mb=RECORDED_MB)
+    with renderer(work, args) as pipes:
+        machine.run(work, main_script(args, pipes), files, cpus=args.cpus, camera=True, limit_s=args.limit, disk_bytes=DISK_BYTES,
+                    more_mb=RECORDED_MB, semihosting=True)
 
 
 def climb(args, work, deb):
-    work.mkdir(parents=True, exist_ok=True)
-    boot(args, work, deb, render(work, args))
+    boot(args, work, deb)
     figures, good = judge(work / "out", args)
     if args.keep:
         args.keep.mkdir(parents=True, exist_ok=True)

@@ -18,7 +18,7 @@ DISK_BYTES = 1 << 28  # for what comes back; sparse
 SKIP = 77
 
 
-def command(archive, disk, memory_mb, cpus):
+def command(archive, disk, memory_mb, cpus, semihosting):
     """Virtual time is exact: one nanosecond an instruction, and none while the host does something else. A file system
     of type tmpfs would hold no more than half of the memory."""
     return ["qemu-system-aarch64", "-machine", "virt,gic-version=3", "-cpu", "cortex-a76", "-m", str(memory_mb),
@@ -26,7 +26,8 @@ def command(archive, disk, memory_mb, cpus):
             "-kernel", str(initrd.BUILD / "kernel/vmlinuz"), "-initrd", str(archive),
             "-append", "console=ttyAMA0 quiet panic=-1 nokaslr norandmaps rootfstype=ramfs rdinit=/init",
             "-drive", f"file={disk},format=raw,if=none,id=out", "-device", "virtio-blk-device,drive=out",
-            "-icount", "shift=0,sleep=off", "-rtc", "clock=vm,base=2026-01-01", "-seed", "1"]
+            "-icount", "shift=0,sleep=off", "-rtc", "clock=vm,base=2026-01-01", "-seed", "1",
+            *(["-semihosting-config", "enable=on,userspace=on,target=native"] if semihosting else [])]
 
 
 @contextlib.contextmanager
@@ -63,10 +64,10 @@ def lines_of(process, limit_s):
 
 
 def run(work, main, files, *, cpus=1, camera=False, limit_s=120, hold_back=None, disk_bytes=DISK_BYTES,
-        more_mb=0):
+        more_mb=0, semihosting=False):
     """Boots, runs the shell script `main` with `files` ({name in /job: path}) beside it. Prints the console as it
     comes, but for lines that begin with hold_back. Returns it and leaves it in work/serial.log, and in work/out what the job
-    left in /out."""
+    left in /out. semihosting: programs of the guest may open the host's files (tests/vm/semihosting.hpp)."""
     work.mkdir(parents=True, exist_ok=True)
     archive_path, disk = work / "initrd.cpio", work / "disk.img"
     archive = initrd.Archive(archive_path)
@@ -81,7 +82,7 @@ def run(work, main, files, *, cpus=1, camera=False, limit_s=120, hold_back=None,
     # The archive is in memory twice while the kernel unpacks it.
     memory_mb = 256 + more_mb + 2 * archive_path.stat().st_size // 2**20
     console = []
-    with open(work / "serial.log", "w") as log, started(command(archive_path, disk, memory_mb, cpus)) as process:
+    with open(work / "serial.log", "w") as log, started(command(archive_path, disk, memory_mb, cpus, semihosting)) as process:
         try:
             for line in lines_of(process, limit_s):
                 console.append(line)
