@@ -51,7 +51,7 @@ static_assert(sizeof(PictureRequest) == 50 * sizeof(double), "it has no padding"
   sim::SimOptions options;
   options.seed = seed;
   options.stairs.steps = steps;
-  options.imu_interval_ns = 5 * kNsPerMs;  // a Mid-360's, as the package has it
+  options.imu_interval_ns = 5 * kNsPerMs;            // a Mid-360's, as the package has it
   options.camera.silent = {{INT64_MIN, INT64_MAX}};  // its own camera sees nothing
   options.camera.threaded = false;
   return options;
