@@ -30,7 +30,8 @@ class Gait {
             const JointFeedback& feedback, JointCommand& command) noexcept;
   [[nodiscard]] const GaitStatus& status() const noexcept { return status_; }
   [[nodiscard]] const Balance& balance() const noexcept { return balance_; }
-  // Finishes the committed step, then holds in double support. From the thread of tick().
+  // Finishes the committed step, or puts its foot back where the operator asks so early (SwingParams), then holds in
+  // double support. From the thread of tick().
   void request_stop(StopReason reason) noexcept {
     if (stop_requested_ == StopReason::kNone) stop_requested_ = reason;
   }

@@ -109,7 +109,8 @@ struct SwingParams {
           "A foot that finds no ground so far below its target goes back.");
     field("abort_share", p.abort_share, 0.0, 1.0,
           "In this share of a swing a foot that falls outward goes back to where it stood.");
-    field("abort_passing_ticks", p.abort_passing_ticks, 0.0, 2000.0, "That of a passing swing, in ticks.");
+    field("abort_passing_ticks", p.abort_passing_ticks, 0.0, 2000.0,
+          "That of a passing swing, in ticks, and of every swing when the operator asks to stop.");
     field("abort_mute_share", p.abort_mute_share, 0.0, 1.0,
           "In this share of a swing a foot goes back to where it stood when a drive is silent for good.");
     field(

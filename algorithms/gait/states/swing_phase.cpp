@@ -126,6 +126,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                        : reaches_back    ? params.abort_share * path_.duration_ticks()
                        : reaches_shortly ? params.abort_passing_ticks
                                          : 0.0;
+  const double stop_until = in.stop_requested == StopReason::kOperator ? params.abort_passing_ticks : 0.0;
   const bool went_back = timing_.goes_back();
   // A plan that has just been stopped, or has just gone on, is no body that falls.
   unjudged_ticks_ = in.mute ? params.unjudged_ticks : std::max(unjudged_ticks_ - 1, 0);
@@ -135,7 +136,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .turn_until_tick = until,
                    .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
-                   .leg_impaired = in.leg_impaired},
+                   .wanted_back = timing_.tick() < (in.leg_impaired ? until : stop_until)},
                   path_.duration_ticks());
   // The torso is on its way up: the foot is to reach where it stood all the same.
   if (timing_.goes_back() && !went_back) lower_torso(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
@@ -196,7 +197,8 @@ Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexce
   const Transform odom_T_sole = sole();
   const double above_m = odom_T_sole.p_m.z() - path_.start_height_m();
   const bool loaded = in.feedback.foot_force_n[i] > params.touch_force_n, all_the_way = timing_.tick() < 0.0;
-  const bool lands = loaded && (all_the_way || above_m < params.abort_landing_m);
+  if (!loaded) unloaded_ = true;
+  const bool lands = loaded && (all_the_way || (unloaded_ && above_m < params.abort_landing_m));
   if (!lands && !(all_the_way && above_m < -params.abort_landing_m)) {
     gait.plan.set_sole(goal_.foot, beside_path(gait.plan, odom_T_sole));
     return {};

@@ -49,7 +49,7 @@ class SwingTiming {
     double turn_until_tick = 0.0;    // of the path: earlier a foot may still go back to where it stood
     double drive_share = 0.0;        // of the leg's fastest drive in the last tick, over its limit
     double side_room_m = 1e9;        // beside the target, away from the standing foot
-    bool leg_impaired = false;       // back where that is still possible
+    bool wanted_back = false;        // to where it stood, however the body stands
   };
 
   void begin() noexcept { *this = {}; }
@@ -64,7 +64,7 @@ class SwingTiming {
       falling_outward_ = true;
       turns_back_ = tick_ < seen.turn_until_tick;
     }
-    if (seen.leg_impaired && !straight_ && tick_ < seen.turn_until_tick) turns_back_ = true;
+    if (seen.wanted_back && !straight_) turns_back_ = true;
     // The plan's own pace is proved for the drives; they are as fast as the pace is, about.
     const double most = std::max(std::abs(pace_) / std::max(seen.drive_share, 1e-3), 1.0);
     const double speed_up = std::min(params.speed_up, most);

@@ -2,6 +2,9 @@
 // How a climb ends: by itself, for a reason, when asked to.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <string>
+
 #include "tests/support/gait_checks.hpp"
 #include "tests/support/nominal_robot.hpp"
 
@@ -296,6 +299,46 @@ TEST(GaitRequestStop, InEveryPhase_EndsOnBothFeet) {
     EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
     EXPECT_TRUE(climb.touches(Foot::kLeft) && climb.touches(Foot::kRight));
     test::expect_sound_commands(climb);
+  }
+}
+
+// Of swings as long as the longest that are tried.
+TEST(GaitRequestStop, AtEveryMomentOfASwing_BothFeetStandWithinASecond) {
+  constexpr int kWithin_ticks = 500, kApart_ticks = 3;
+  constexpr double kLongest = 1.15;
+  for (const StepTries& tries : {kStepTries, kPassingTries}) {
+    for (const StepTry& tried : tries) ASSERT_LE(tried.longer, kLongest);
+  }
+  for (const GaitPattern pattern : {GaitPattern::kDoubleStep, GaitPattern::kSingleStep}) {
+    Gait::Params params;
+    params.planner.pattern = pattern;
+    StepDurations& durations = params.step.durations;
+    for (std::int32_t* ticks :
+         {&durations.stair_swing_ticks, &durations.passing_swing_ticks, &durations.floor_swing_ticks}) {
+      *ticks = static_cast<std::int32_t>(kLongest * *ticks);
+    }
+    IdealClimb climb({}, params);
+    int longest_ticks = 0, swing_ticks = 0;
+    while (climb.tick()) {
+      swing_ticks = climb.status().phase == GaitPhase::kSwing ? swing_ticks + 1 : 0;
+      longest_ticks = std::max(longest_ticks, swing_ticks);
+      if (swing_ticks % kApart_ticks != 1) continue;
+      SCOPED_TRACE("tick " + std::to_string(swing_ticks) + " of swing " + std::to_string(climb.status().step.sequence));
+      IdealClimb stopped = climb;
+      stopped.gait().request_stop(StopReason::kOperator);
+      int ticks = 0;
+      do {
+        stopped.tick();
+      } while (++ticks < 2 * kWithin_ticks && !(stopped.status().stands[0] && stopped.status().stands[1]));
+      EXPECT_LE(ticks, kWithin_ticks);
+      stopped.run(5.0);
+      EXPECT_EQ(stopped.status().phase, GaitPhase::kStopped);
+      EXPECT_EQ(stopped.status().stop_reason, StopReason::kOperator);
+      for (int i = 0; i < 500; ++i) stopped.tick();  // it settles
+      EXPECT_TRUE(stopped.touches(Foot::kLeft) && stopped.touches(Foot::kRight));
+      test::expect_sound_commands(stopped);
+    }
+    EXPECT_GT(longest_ticks, kWithin_ticks);
   }
 }
 

@@ -155,8 +155,7 @@ TEST_F(ServiceTest, AskedToStopBeforeThereIsAnEstimate_StandsOnItsDrives) {
   EXPECT_LT(stopped_after_, 1s);
 }
 
-// A foot is 1.06 s in the air where the search made its swing longer, 0.92 s on these stairs; a machine of others' may
-// be late.
+// It takes 1.0 s at most, on these stairs 0.9 s; a machine of others' may be late.
 TEST_F(ServiceTest, AskedToStopInASwing_PutsTheFootDownFirst) {
   if constexpr (test::kSlowMachine) GTEST_SKIP() << "climbs in real time";
   robot_.sees = true;
