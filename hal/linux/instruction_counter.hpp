@@ -48,7 +48,6 @@ class InstructionCounter {
     }
     return 0;
   }
-  [[nodiscard]] bool counts_kernel() const noexcept { return kernel_ >= 0; }
 
   // Since start(). Zero before, and where the kernel gives no answer.
   [[nodiscard]] InstructionCount read() const noexcept {

@@ -74,7 +74,7 @@ class ReplayClock final : public hal::Clock {
   [[nodiscard]] std::uint64_t count() const noexcept override { return static_cast<std::uint64_t>(now_ns()); }
   [[nodiscard]] double counts_per_us() const noexcept override { return 1000.0; }
 
-  // Returns how late the thread woke, ns; 0 when there was nothing to wait for.
+  // Returns how late the thread woke, ns.
   [[nodiscard]] std::int64_t wait_until(std::int64_t due_ns) const noexcept {
     if (const std::int64_t late_ns = now_ns() - due_ns; late_ns >= 0) return late_ns;
     const std::int64_t at_ns = due_ns + offset_ns_;

@@ -78,6 +78,10 @@ class Drives {
   Drives(const WireScript& script, const Injection& injection)
       : script_(script), injection_(injection), next_(script.drives.size(), 0), udp_(socket(AF_INET, SOCK_DGRAM, 0)) {
     for (const std::string& bus : script.buses) sockets_.push_back({open_bus(bus), POLLIN, 0});
+    const bool of_a_bus = injection.what == Wrong::kBusOff || injection.what == Wrong::kGarbage;
+    const std::size_t count = of_a_bus ? script.buses.size() : script.drives.size();
+    if (injection.what != Wrong::kGap && static_cast<std::size_t>(injection.number) >= count)
+      refuse("--inject names none");
   }
 
   void run() {

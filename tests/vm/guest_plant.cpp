@@ -111,6 +111,9 @@ class Plant {
         camera_(output, options),
         udp_(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
     for (const std::string& bus : bus_.buses) sockets_.push_back({open_bus(bus), POLLIN, 0});
+    const What what = options.injection.what;
+    const std::size_t count = what == What::kBusOff || what == What::kGarbage ? bus_.buses.size() : kJointCount;
+    if (options.injection.number >= count) refuse("--inject names none of " + std::to_string(count));
     if (!options.notify.empty()) sockets_.push_back({open_notify(options.notify), POLLIN, 0});
     witnessed_.reserve(kMostWitnessed);
     told_.reserve(4096);

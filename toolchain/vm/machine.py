@@ -31,13 +31,13 @@ def command(archive, disk, memory_mb, cpus, semihosting):
 
 
 @contextlib.contextmanager
-def started(words):
+def started(words, folder):
     """The emulator's process, ended when the block is left, whatever the reason."""
     def stop(number, frame):
         sys.exit(128 + number)
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         signal.signal(number, stop)
-    process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=folder)
     try:
         yield process
     finally:
@@ -45,14 +45,19 @@ def started(words):
         process.wait()
 
 
-def lines_of(process, limit_s):
-    """Lines of the console until the emulator ends; a TimeoutError when that takes longer than limit_s."""
+def lines_of(process, limit_s, companion=None):
+    """Lines of the console until the emulator ends; a TimeoutError when that takes longer than limit_s, a ChildProcessError when
+    its companion, without which it may wait for ever, ends before it."""
     deadline, rest = time.monotonic() + limit_s, b""
     with selectors.DefaultSelector() as selector:
         selector.register(process.stdout, selectors.EVENT_READ)
         while True:
-            if not selector.select(max(0.0, deadline - time.monotonic())):
-                raise TimeoutError
+            if not selector.select(min(1.0, max(0.0, deadline - time.monotonic()))):
+                if time.monotonic() >= deadline:
+                    raise TimeoutError
+                if companion is not None and companion.poll() is not None:
+                    raise ChildProcessError
+                continue
             data = os.read(process.stdout.fileno(), 1 << 16)
             if not data:
                 break
@@ -64,10 +69,11 @@ def lines_of(process, limit_s):
 
 
 def run(work, main, files, *, cpus=1, camera=False, limit_s=120, hold_back=None, disk_bytes=DISK_BYTES,
-        more_mb=0, semihosting=False):
+        more_mb=0, companion=None):
     """Boots, runs the shell script `main` with `files` ({name in /job: path}) beside it. Prints the console as it
     comes, but for lines that begin with hold_back. Returns it and leaves it in work/serial.log, and in work/out what the job
-    left in /out. semihosting: programs of the guest may open the host's files (tests/vm/semihosting.hpp)."""
+    left in /out. companion: a process of the host that the guest's programs talk to, by files in work that they may open
+    (tests/vm/semihosting.hpp)."""
     work.mkdir(parents=True, exist_ok=True)
     archive_path, disk = work / "initrd.cpio", work / "disk.img"
     archive = initrd.Archive(archive_path)
@@ -81,18 +87,22 @@ def run(work, main, files, *, cpus=1, camera=False, limit_s=120, hold_back=None,
         file.truncate(disk_bytes)
     # The archive is in memory twice while the kernel unpacks it.
     memory_mb = 256 + more_mb + 2 * archive_path.stat().st_size // 2**20
-    console = []
-    with open(work / "serial.log", "w") as log, started(command(archive_path, disk, memory_mb, cpus, semihosting)) as process:
+    console, stopped = [], None
+    with open(work / "serial.log", "w") as log, started(command(archive_path, disk, memory_mb, cpus, companion is not None), work) as process:
         try:
-            for line in lines_of(process, limit_s):
+            for line in lines_of(process, limit_s, companion):
                 console.append(line)
                 print(line, file=log, flush=True)
                 if hold_back is None or not line.startswith(hold_back):
                     print(line, flush=True)
         except TimeoutError:
-            console.append(f"vm: stopped at the limit of {limit_s} s of this host's time")
-            print(console[-1], file=log)
-            print(console[-1], flush=True)
+            stopped = f"vm: stopped at the limit of {limit_s} s of this host's time"
+        except ChildProcessError:
+            stopped = f"vm: stopped: {companion.args[0]} ended with {companion.returncode} while the guest ran"
+        if stopped:
+            console.append(stopped)
+            print(stopped, file=log)
+            print(stopped, flush=True)
     take_out(disk, work / "out")
     archive_path.unlink()
     disk.unlink()

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "hal/can/can_joint_bus.hpp"
+#include "tests/support/for_a_minute.hpp"
 
 namespace polygmap::hal {
 namespace can_fuzz_test {
@@ -212,7 +213,9 @@ void fuzz_bus(int runs, unsigned seed) {
   EXPECT_GT(fuzzer.counted(), static_cast<std::uint64_t>(runs));
 }
 TEST(CanJointBus, AnyFrames_GiveReadingsWithinRangesOrAreCounted) { fuzz_bus(20'000, 1); }
-TEST(LongFuzzCanJointBus, AnyFrames_GiveReadingsWithinRangesOrAreCounted) { fuzz_bus(1'000'000, 2); }
+TEST(LongFuzzCanJointBus, AnyFrames_GiveReadingsWithinRangesOrAreCounted) {
+  test::for_a_minute(2, [](unsigned seed) { fuzz_bus(1'000'000, seed); });
+}
 
 // The codec alone, in memory of exactly the frame's size.
 void fuzz_codec(int runs, unsigned seed) {
@@ -245,7 +248,9 @@ void fuzz_codec(int runs, unsigned seed) {
   EXPECT_GT(feet_decoded, static_cast<std::uint64_t>(runs) / 10);
 }
 TEST(MitCodec, AnyBytes_GiveValuesWithinRangesOrARefusal) { fuzz_codec(50'000, 3); }
-TEST(LongFuzzMitCodec, AnyBytes_GiveValuesWithinRangesOrARefusal) { fuzz_codec(30'000'000, 4); }
+TEST(LongFuzzMitCodec, AnyBytes_GiveValuesWithinRangesOrARefusal) {
+  test::for_a_minute(4, [](unsigned seed) { fuzz_codec(1'000'000, seed); });
+}
 
 }  // namespace
 }  // namespace can_fuzz_test
