@@ -17,7 +17,7 @@ RELEASE = machine.ROOT / "build/release"
 OF_A_ROW = re.compile(r"(allocate|overrun=\w+)@[\d.]+")
 BAD = ("flagged", "short_ones", "wrong_stamp", "missing", "timeouts")  # of what the camera's driver counts
 TARGETS = ("orin:guest_plant", "orin:polygmapd_inject", "release:render_pictures", "release:recorded_frames", "release:polygmap_replay")
-SPECIAL_FRAMES = 2 * 12  # each drive is told once to clear its errors, and once to enter motor mode
+DRIVES = 12
 PIPES = ("requests", "pictures")  # of the renderer, in the emulator's own folder
 LATENCY_MS, EXPOSURE_MS = 22, 16  # of the camera; its stamp is that of the exposure's end, less the latency
 DISK_BYTES = 1 << 31  # sparse
@@ -129,7 +129,7 @@ def judge(out, args):
     flaws = ("overruns", "page_faults", "heap_calls", "frames_differ", "ticks_differ", "pictures_lost")
     good = (not any(figures[key] for key in flaws) and figures["steps"] == args.steps and figures["fell"] == "0"
             and figures["support"] == "both" and figures["frames"] > 0 and figures["pictures"] > 0
-            and figures["special"] == SPECIAL_FRAMES
+            and figures["special"] <= DRIVES * (2 if args.inject else 1)  # enters motor mode; once more after a silence
             and ticks == figures["ticks"] and figures["exit"] == "0")
     return figures, good
 
