@@ -43,7 +43,7 @@ class ComPlan {
   // point starts under `from`'s acceleration. What the pendulum would need of speed at the start and does not have is
   // made up by an offset: the zero-moment point leaves its straight way for zmp_offset_ticks.
   void plan(const Params& params, const HorizontalMotion& from, const ZmpKnots& knots) noexcept;
-  // How far it would leave its way with such a plan, for half of what the plan takes.
+  // How far it would leave its way with such a plan, without making the plan.
   [[nodiscard]] static double zmp_offset_m(const Params& params, const HorizontalMotion& from,
                                            const ZmpKnots& knots) noexcept;
   [[nodiscard]] HorizontalMotion at(std::int32_t tick) const noexcept;
