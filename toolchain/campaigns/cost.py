@@ -3,7 +3,7 @@
 import re
 import subprocess
 
-from campaigns.engine import ROOT, Figure, Page, Table, headline, rows
+from campaigns.engine import ROOT, Figure, Page, Table, build, headline, rows
 
 WANTED = {"whole_frame": 3_600_000, "footholds": 1_200_000, "gait_swing_tick": 20_000, "gait_shift_tick": 20_000}
 
@@ -11,10 +11,7 @@ WANTED = {"whole_frame": 3_600_000, "footholds": 1_200_000, "gait_swing_tick": 2
 def cost(engine, _):
     records = {"instructions.txt": ("perception_instructions", "estimation_instructions", "gait_instructions"),
                "reference_instructions.txt": ("reference_instructions",)}
-    built = subprocess.run(["cmake", "--build", ROOT / "build/release", "--target", *(p for programs in records.values() for p in programs)],
-                           capture_output=True, text=True)
-    if built.returncode:
-        raise SystemExit(f"campaign: the benchmarks were not built: {built.stdout[-400:]}")
+    build(*(p for programs in records.values() for p in programs))
     counted = "".join(subprocess.run([ROOT / "toolchain/checks/instructions", "--recorded", ROOT / "tests/benchmarks" / record,
                                       *(ROOT / "build/release/tests/benchmarks" / p for p in programs)],
                                      capture_output=True, text=True).stdout for record, programs in records.items())

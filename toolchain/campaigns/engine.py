@@ -83,6 +83,14 @@ class Table:
         return code_hash(root, (*own, *self.inputs))
 
 
+def build(*targets):
+    """Programs of the preset release, while nobody else builds in its folder."""
+    words = ["bash", "-c", 'source toolchain/lib.sh && build release "$@"', "campaign", *targets]
+    done = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        raise SystemExit(f"campaign: {', '.join(targets)}: not built: {done.stdout[-400:]}")
+
+
 class Engine:
     def __init__(self, tool, jobs):
         self.tool, self.jobs = pathlib.Path(tool), jobs
