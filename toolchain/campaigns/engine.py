@@ -58,9 +58,9 @@ class Figure:
         return {"value": self.value, "measured": self.text, "at": self.at, "asked": self.asked, "bound": bound}
 
 
-def headline(what, figures, unit=""):
-    """One line of README's table; unit: after the last of its figures."""
-    return {"what": what, "figures": [f.row() for f in figures], "unit": unit}
+def headline(what, figure, unit="", shown=True):
+    """One line of README's table. One that is not shown is held to its bound all the same."""
+    return {"what": what, "figures": [figure.row()], "unit": unit, "shown": shown}
 
 
 @dataclasses.dataclass
