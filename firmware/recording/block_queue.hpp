@@ -40,8 +40,10 @@ class BlockQueue {
     popped_.store(begin + kLength_bytes + length, std::memory_order_release);
     return block;
   }
-  [[nodiscard]] bool empty() const noexcept {
-    return pushed_.load(std::memory_order_acquire) == popped_.load(std::memory_order_acquire);
+  // On either thread.
+  [[nodiscard]] std::size_t used_bytes() const noexcept {
+    const std::size_t popped = popped_.load(std::memory_order_acquire);
+    return pushed_.load(std::memory_order_acquire) - popped;
   }
 
  private:

@@ -190,7 +190,6 @@ void Recorder::end_row(std::size_t row, Progress progress, const WorkBudget& bud
   const std::size_t lane = kTasks[row].row.lane;
   LaneLog& log = logs_[lane];
   const LaneView& view = lane == kControlLane ? pipeline_->control().view() : pipeline_->perception().view();
-  log.head.saw_ns = view.last_ns();
   log.out.put_at(log.count_at - sizeof(std::int64_t), view.other_finished_ns());
   log.out.put_at(log.count_at, log.calls);
   log.out.put(progress);
@@ -242,16 +241,26 @@ bool Recorder::load(LaneLog& log) noexcept {
   return true;
 }
 
-// A lane hands its frame over before the other one can see it (RecordedTasks). So what a frame saw is in the other
-// queue when it is looked into after the frame was there.
-void Recorder::write_out() {
-  for (std::size_t lane = 0, waited = 0; waited < kLaneCount;) {
-    LaneLog &log = logs_[lane], &other = logs_[1 - lane];
-    const bool sees_all =
-        load(log) && (!load(other) || other.next_head.cycle_ns > log.next_head.saw_ns) && write_frame(log);
-    waited = sees_all ? 0 : waited + 1;
-    if (!sees_all) lane = 1 - lane;
+// The frame with the smaller cycle first: then it comes after all that it saw, since a frame sees only earlier ones,
+// and before values are overwritten that it could still take.
+void Recorder::write_frames(bool lanes_run) {
+  for (bool wrote = true; wrote;) {
+    const auto next_ns = [this](LaneLog& log) { return load(log) ? log.next_head.cycle_ns : kNever_ns; };
+    const std::int64_t control_ns = next_ns(logs_[kControlLane]), perception_ns = next_ns(logs_[kPerceptionLane]);
+    LaneLog &first = logs_[control_ns <= perception_ns ? kControlLane : kPerceptionLane],
+            &other = logs_[&first == &logs_[kControlLane] ? kPerceptionLane : kControlLane];
+    wrote = load(first) && (!lanes_run || may_go_ahead(first, other)) && write_frame(first);
   }
+}
+
+// A lane hands its frame over before the other one can see it (RecordedTasks), and this lane's frame was there before
+// the other queue was looked into: so the other lane's frames that it saw are written. One that the other lane is still
+// in must find, in a replay, what it found here: this lane may not be further ahead of it than the exchanges have slots
+// for. Where a lane hangs, a recording without its frame is better than none.
+bool Recorder::may_go_ahead(LaneLog& log, LaneLog& other) noexcept {
+  if (load(other)) return log.next_head.cycle_ns <= other.next_head.cycle_ns;
+  const bool hangs = log.queue.used_bytes() > capacity_.queue_bytes / 2;
+  return hangs || log.next_head.cycle_ns <= other.written_ns + kMaxFramesApart * kCycle_ns;
 }
 
 bool Recorder::write_frame(LaneLog& log) {
@@ -265,6 +274,7 @@ bool Recorder::write_frame(LaneLog& log) {
     pictures_written_.store(written + i + 1, std::memory_order_release);
   }
   write(file_, log.next.data(), log.next.size());
+  log.written_ns = std::max(log.written_ns, log.next_head.cycle_ns);
   log.next = {};
   return true;
 }
@@ -272,7 +282,7 @@ bool Recorder::write_frame(LaneLog& log) {
 void Recorder::flush() {
   for (LaneLog& log : logs_) hand_over(log);
   copy_pixels(picture_px_);
-  write_out();
+  write_frames(false);
 }
 
 std::string Recorder::finish() {

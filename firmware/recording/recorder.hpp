@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -59,7 +60,7 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
   void copy_piece() noexcept;
 
   // On one thread, whether the lanes run or not: writes what was handed over.
-  void write_out();
+  void write_out() { write_frames(true); }
   // No lane runs: hands over what belongs to no finished cycle, too, and writes it.
   void flush();
   // No lane runs: writes the rest and closes the files. What begin() or a write could not do, or what was lost, is said
@@ -79,16 +80,15 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
 
  private:
   static constexpr std::size_t kFrameMemory_bytes = 1024U * 1024U;  // of a lane in one frame, with all its polygons
+  static constexpr std::int64_t kNever_ns = std::numeric_limits<std::int64_t>::max();
   static constexpr std::size_t kPicturesPerFrame = 4;
   static constexpr std::size_t kPiece_px = 32U * 1024U;  // a tenth of a picture
   enum class Failure : std::uint8_t { kNone, kBegin, kFrameTooLarge, kQueueFull, kPicturesFull, kWrite };
 
-  // What a lane wrote in one frame. It goes into the file after all of the other lane that it saw: a replay lives the
-  // frames one after the other.
+  // What a lane wrote in one frame. A replay lives the frames one after the other, in the file's order.
   struct FrameHead {
     std::int64_t cycle_ns = kNoFrame_ns;
-    std::int64_t saw_ns = kNoFrame_ns;  // up to this frame of the other lane
-    std::uint32_t pictures = 0;         // acquired in it; their hashes are filled in when they are written
+    std::uint32_t pictures = 0;  // acquired in it; their hashes are filled in when they are written
     std::array<std::uint32_t, kPicturesPerFrame> hash_at{};
   };
   struct LaneLog {
@@ -105,6 +105,7 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
     std::vector<std::byte> next_memory = std::vector<std::byte>(sizeof(FrameHead) + kFrameMemory_bytes);
     std::span<std::byte> next;
     FrameHead next_head;
+    std::int64_t written_ns = kNoFrame_ns;  // the newest frame that it has
   };
 
   void put_call(LaneLog& log, CallKind kind, bool gave) const noexcept;
@@ -115,6 +116,8 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
   void fail(Failure failure) noexcept;
   // False: there is no frame that could be written now.
   [[nodiscard]] bool load(LaneLog& log) noexcept;
+  void write_frames(bool lanes_run);
+  [[nodiscard]] bool may_go_ahead(LaneLog& log, LaneLog& other) noexcept;
   [[nodiscard]] bool write_frame(LaneLog& log);
   void write(std::FILE* file, const void* bytes, std::size_t count) noexcept;
   [[nodiscard]] std::string sentence() const;

@@ -7,6 +7,7 @@
 #include <deque>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <random>
 #include <string>
@@ -273,6 +274,62 @@ TEST(Replay, LanesWrittenOutWhileTheyRun_NothingDiffers) {
   EXPECT_GT(keeper.kept, 10);
   EXPECT_EQ(keeper.kept, keeper.gone);
   expect_same(directory, kFrames);
+}
+
+// A camera that holds its caller up: meanwhile the other lane runs on.
+class HeldCamera final : public hal::DepthCamera {
+ public:
+  explicit HeldCamera(hal::DepthCamera& camera) : camera_(camera) {}
+  [[nodiscard]] CameraIntrinsics intrinsics() const noexcept override { return camera_.intrinsics(); }
+  [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept override {
+    meanwhile();
+    return camera_.try_acquire(frame);
+  }
+  void release() noexcept override { camera_.release(); }
+
+  std::function<void()> meanwhile = [] {};
+
+ private:
+  hal::DepthCamera& camera_;
+};
+
+// What perception saw when its frame began is overwritten by the time that the frame is handed over.
+TEST(Replay, LaneHeldUpWithinAFrame_NothingDiffers) {
+  constexpr int kFrames = 300, kHeldFrames = 8;
+  const Directory directory("held");
+  test::FakeRobot robot(0.062);
+  HeldCamera camera(robot.camera);
+  Recorder recorder({camera, robot.imu, robot.joints, robot.lidar});
+  const auto module = std::make_unique<Pipeline>(recorder.ports(), Params{});
+  recorder.begin(directory.text(), Params{});
+  recorder.watch(*module);
+  RecordedTasks<Pipeline> tasks(*module, &recorder);
+  CyclicExecutive<RecordedTasks<Pipeline>, kSchedule, kControlLane, Health> control(tasks, robot.clock,
+                                                                                    module->lane_health(kControlLane));
+  CyclicExecutive<RecordedTasks<Pipeline>, kSchedule, kPerceptionLane, Health> perception(
+      tasks, robot.clock, module->lane_health(kPerceptionLane));
+  control.start(robot.clock.now_ns() + kCycle_ns);
+  perception.start(robot.clock.now_ns() + kCycle_ns);
+  int frames = 0, held = 0;
+  const auto live = [&] {
+    robot.advance();
+    control.tick(robot.clock.now_ns());
+    recorder.write_out();
+    ++frames;
+  };
+  camera.meanwhile = [&] {
+    if (frames % 50 != 0) return;
+    ++held;
+    for (int i = 0; i < kHeldFrames; ++i) live();
+  };
+  while (frames < kFrames) {
+    live();
+    perception.tick(robot.clock.now_ns());
+    recorder.write_out();
+  }
+  EXPECT_EQ(recorder.finish(), "");
+  EXPECT_GT(held, 3);
+  expect_same(directory, static_cast<std::uint64_t>(frames));
 }
 
 // Nobody writes: the first cycle or picture that finds no room ends the recording, the module runs on, and what there
