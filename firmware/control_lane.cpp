@@ -171,12 +171,12 @@ ArmingWait ControlLane::arming_waits_for() const noexcept {
 void ControlLane::look_across(std::int64_t now_ns) noexcept {
   const std::int64_t finished_ns = link_.progress[kPerceptionLane].finished_ns.load(std::memory_order_acquire);
   if (!view_.begin(now_ns, finished_ns)) health_.raise(Fault::kLaneBehind, now_ns);
-  pose_asked_ = link_.pose_request.try_take(view_.last_ns());
-  (void)link_.footholds.try_take(view_.last_ns());  // the newest, or the last one again
+  pose_asked_ = view_.take(link_.pose_request);
+  (void)view_.take(link_.footholds);  // the newest, or the last one again
   std::uint32_t lost = link_.pose_request.lost() + link_.footholds.lost();
   for (LaneHealth& lane : healths_) {
     if (&lane.own == &health_) continue;
-    (void)lane.published.try_take(view_.last_ns());
+    (void)view_.take(lane.published);
     lost += lane.published.lost();
   }
   health_.follow(Limit::kHandOverLost, now_ns, lost);

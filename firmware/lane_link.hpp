@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <span>
 
 #include "algorithms/core/containers/exchange.hpp"
+#include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/core/messages/footholds.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
 #include "algorithms/core/messages/state.hpp"
@@ -35,6 +37,13 @@ struct alignas(64) LaneProgress {
 };
 using LaneProgresses = std::array<LaneProgress, kLaneCount>;
 
+// The frame of a value that a lane holds, and whether it came too late for a newer one.
+struct TakenFrame {
+  std::int64_t frame_ns = kNoFrame_ns;
+  bool missed = false;
+};
+inline constexpr std::size_t kMaxTaken = 3;  // exchanges that a lane reads
+
 // What a lane sees of the other one in the frame that it runs: settled when the frame begins, so that all its rows see
 // the same.
 class LaneView {
@@ -46,17 +55,26 @@ class LaneView {
     frame_ns_ = frame_ns;
     other_finished_ns_ = other_finished_ns;
     last_ns_ = std::min(frame_ns - kCycle_ns, other_finished_ns);
+    taken_.clear();
     return in_time;
+  }
+  // Takes what the other lane published; in every frame all exchanges that the lane reads, in the same order.
+  bool take(auto& exchange) noexcept {
+    const bool took = exchange.try_take(last_ns_);
+    (void)taken_.try_push_back({exchange.front_frame_ns(), exchange.missed()});
+    return took;
   }
   // Values of the frames up to this one are seen.
   [[nodiscard]] std::int64_t last_ns() const noexcept { return last_ns_; }
-  // As begin() was told: an input of the frame, for who replays it.
+  // Inputs of the frame, for who replays it: as begin() was told, and what take() found in each exchange.
   [[nodiscard]] std::int64_t other_finished_ns() const noexcept { return other_finished_ns_; }
+  [[nodiscard]] std::span<const TakenFrame> taken() const noexcept { return {taken_.begin(), taken_.end()}; }
 
  private:
   std::int64_t last_ns_ = kNoFrame_ns;
   std::int64_t other_finished_ns_ = kNoFrame_ns;
   std::int64_t frame_ns_ = kNoFrame_ns;
+  StaticVector<TakenFrame, kMaxTaken> taken_;
 };
 
 // A lane's faults and limits. Its thread counts in `own` and publishes; control reads what was published.

@@ -69,8 +69,8 @@ Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
 void PerceptionLane::look_across(std::int64_t now_ns) noexcept {
   const std::int64_t finished_ns = link_.progress[kControlLane].finished_ns.load(std::memory_order_acquire);
   if (!view_.begin(now_ns, finished_ns)) health_.own.raise(Fault::kLaneBehind, now_ns);
-  (void)link_.pose_answer.try_take(view_.last_ns());
-  (void)link_.search_context.try_take(view_.last_ns());  // the newest, or the last one again
+  (void)view_.take(link_.pose_answer);
+  (void)view_.take(link_.search_context);  // the newest, or the last one again
   health_.own.follow(Limit::kHandOverLost, now_ns, link_.pose_answer.lost() + link_.search_context.lost());
 }
 

@@ -41,6 +41,11 @@ class Pipeline {
   void lane_finished(std::size_t lane, std::int64_t cycle_ns) noexcept {
     link_.progress[lane].finished_ns.store(cycle_ns, std::memory_order_release);
   }
+  // What crosses between the lanes, for a replay.
+  [[nodiscard]] ControlPerceptionLink& link() noexcept { return link_; }
+  [[nodiscard]] Exchange<Health, kEveryFrameSlots>& published_health(std::size_t lane) noexcept {
+    return health_[lane].published;
+  }
 
   [[nodiscard]] ControlLane& control() noexcept { return control_; }
   [[nodiscard]] const ControlLane& control() const noexcept { return control_; }

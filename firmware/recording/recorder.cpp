@@ -180,7 +180,6 @@ void Recorder::begin_row(std::size_t row, std::int64_t cycle_ns, const WorkBudge
   log.out.put(static_cast<std::uint8_t>(row));
   log.out.put(cycle_ns);
   log.out.put(budget.left());
-  log.out.put(kNoFrame_ns);
   log.count_at = log.out.size();
   log.out.put(std::uint16_t{0});
   log.calls = 0;
@@ -191,8 +190,13 @@ void Recorder::end_row(std::size_t row, Progress progress, const WorkBudget& bud
   LaneLog& log = logs_[lane];
   const LaneView& view = lane == kControlLane ? pipeline_->control().view() : pipeline_->perception().view();
   log.head.saw_ns = view.last_ns();
-  log.out.put_at(log.count_at - sizeof(std::int64_t), view.other_finished_ns());
   log.out.put_at(log.count_at, log.calls);
+  log.out.put(view.other_finished_ns());
+  log.out.put(static_cast<std::uint8_t>(view.taken().size()));
+  for (const TakenFrame& taken : view.taken()) {
+    log.out.put(taken.frame_ns);
+    log.out.put(taken.missed);
+  }
   log.out.put(progress);
   log.out.put(budget.left());
   FieldWriter writer(log.out, &log.health);

@@ -395,13 +395,26 @@ bool RecordingFile::parse_cycle(std::uint8_t& lane, CycleReport& cycle) {
   return lane < kLaneCount && time_possible(cycle.due_ns);
 }
 
+bool RecordingFile::parse_view(RowCall& row) {
+  const auto can_be = [](std::int64_t frame_ns) { return frame_ns == kNoFrame_ns || time_possible(frame_ns); };
+  row.other_finished_ns = in_.get<std::int64_t>();
+  const auto taken = in_.get<std::uint8_t>();
+  if (!can_be(row.other_finished_ns) || taken > kMaxTaken) return false;
+  row.taken.clear();
+  for (std::size_t i = 0; i < taken; ++i) {
+    const auto frame_ns = in_.get<std::int64_t>();
+    (void)row.taken.try_push_back({frame_ns, in_.get<bool>()});
+    if (!can_be(frame_ns)) return false;
+  }
+  return true;
+}
+
 bool RecordingFile::parse_row(RowCall& row) {
   const auto index = in_.get<std::uint8_t>();
   if (index >= rows_.size()) return complain("a row that the schedule does not have");
   row.row = rows_[index];
   row.cycle_ns = in_.get<std::int64_t>();
   row.units = in_.get<std::int32_t>();
-  row.other_finished_ns = in_.get<std::int64_t>();
   const auto calls = in_.get<std::uint16_t>();
   const std::size_t lane = kTasks[row.row].row.lane;
   const bool in_order =
@@ -409,14 +422,12 @@ bool RecordingFile::parse_row(RowCall& row) {
   if (!time_possible(row.cycle_ns) || !in_order) return complain("a row out of its order");
   last_cycle_ns_[lane] = row.cycle_ns;
   last_row_[lane] = row.row;
-  if (row.other_finished_ns != kNoFrame_ns && !time_possible(row.other_finished_ns)) {
-    return complain("a frame of the other lane at a time that cannot be");
-  }
   if (calls > kMaxCallsPerRow) return complain(std::to_string(calls) + " calls of ports in a row");
   row.calls.resize(calls);
   for (PortCall& call : row.calls) {
     if (!parse_call(call)) return complaint_.empty() ? complain("a call of a port that cannot be") : false;
   }
+  if (!parse_view(row)) return complain("frames of the other lane that cannot be");
   row.progress = in_.get<std::uint8_t>();
   row.units_left = in_.get<std::int32_t>();
   if (in_.failed()) return complain("a row that is too short");

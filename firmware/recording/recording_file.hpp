@@ -39,6 +39,7 @@ struct RowCall {
   std::int64_t cycle_ns = 0;
   std::int32_t units = 0;
   std::int64_t other_finished_ns = 0;
+  StaticVector<TakenFrame, kMaxTaken> taken;
   std::vector<PortCall> calls;
   std::uint8_t progress = 0;
   std::int32_t units_left = 0;
@@ -94,6 +95,7 @@ class RecordingFile {
   [[nodiscard]] bool read_gain_limits();
   [[nodiscard]] bool open_pictures();
   [[nodiscard]] bool parse_row(RowCall& row);
+  [[nodiscard]] bool parse_view(RowCall& row);
   [[nodiscard]] bool parse_call(PortCall& call);
   [[nodiscard]] bool parse_cycle(std::uint8_t& lane, CycleReport& cycle);
   [[nodiscard]] bool parse_event(ExecutiveEventCount& event);

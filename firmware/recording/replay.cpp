@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/recording/replay.hpp"
 
+#include <map>
 #include <memory>
 #include <set>
+#include <tuple>
 
 #include "firmware/recording/recording_file.hpp"
 
@@ -100,6 +102,63 @@ class ReplayedPorts final : public hal::DepthCamera, public hal::Imu, public hal
   mutable std::string difference_;
 };
 
+// The values of an exchange, as long as its reader may be found to have taken them.
+template <typename Exchange>
+class Values {
+ public:
+  explicit Values(Exchange& exchange) : exchange_(exchange) {}
+
+  void keep_newest() {
+    const std::int64_t frame_ns = exchange_.published_ns();
+    if (const auto* value = exchange_.find(frame_ns); value != nullptr) kept_.try_emplace(frame_ns, *value);
+  }
+  // False: nobody published what the reader took.
+  [[nodiscard]] bool replay(const TakenFrame& taken) {
+    if (taken.frame_ns == exchange_.front_frame_ns()) {
+      exchange_.replay_take(taken.frame_ns, nullptr, taken.missed);
+      return true;
+    }
+    kept_.erase(kept_.begin(), kept_.lower_bound(taken.frame_ns));
+    if (kept_.empty() || kept_.begin()->first != taken.frame_ns) return false;
+    exchange_.replay_take(taken.frame_ns, &kept_.begin()->second, taken.missed);
+    return true;
+  }
+
+ private:
+  using Value = std::remove_cvref_t<decltype(std::declval<Exchange&>().front())>;
+  Exchange& exchange_;
+  std::map<std::int64_t, Value> kept_;
+};
+
+// What each lane takes from the other one, in the order of its look_across().
+class Crossings {
+ public:
+  explicit Crossings(Pipeline& module)
+      : of_control_(Values(module.link().pose_request), Values(module.link().footholds),
+                    Values(module.published_health(kPerceptionLane))),
+        of_perception_(Values(module.link().pose_answer), Values(module.link().search_context)) {}
+
+  void keep_newest(std::size_t writer) {
+    const auto keep = [](auto&... values) { (values.keep_newest(), ...); };
+    writer == kControlLane ? std::apply(keep, of_perception_) : std::apply(keep, of_control_);
+  }
+  [[nodiscard]] bool replay(std::size_t reader, std::span<const TakenFrame> taken) {
+    const auto replay = [taken](auto&... values) {
+      std::size_t i = 0;
+      return taken.size() == sizeof...(values) && (values.replay(taken[i++]) && ...);
+    };
+    return reader == kControlLane ? std::apply(replay, of_control_) : std::apply(replay, of_perception_);
+  }
+
+ private:
+  std::tuple<Values<decltype(ControlPerceptionLink::pose_request)>, Values<decltype(ControlPerceptionLink::footholds)>,
+             Values<decltype(LaneHealth::published)>>
+      of_control_;
+  std::tuple<Values<decltype(ControlPerceptionLink::pose_answer)>,
+             Values<decltype(ControlPerceptionLink::search_context)>>
+      of_perception_;
+};
+
 class Replay {
  public:
   explicit Replay(RecordingFile& file)
@@ -139,9 +198,14 @@ class Replay {
     const std::size_t lane = kTasks[row.row].row.lane;
     if (first_ns_ < 0) first_ns_ = row.cycle_ns;
     module_->lane_finished(1 - lane, row.other_finished_ns);
+    const bool looks_across = row.row == 0 || kTasks[row.row - 1].row.lane != lane;
+    if (looks_across && !crossings_.replay(lane, row.taken)) {
+      return file_.complain("a frame that saw what the other lane had not published");
+    }
     ports_.begin_row(row);
     WorkBudget budget(row.units);
     const Progress progress = module_->run_row(row.row, row.cycle_ns, budget);
+    crossings_.keep_newest(lane);
     if (ports_.unreadable()) return false;
     std::string difference = ports_.end_row();
 
@@ -168,6 +232,7 @@ class Replay {
   RecordingFile& file_;
   ReplayedPorts ports_;
   std::unique_ptr<Pipeline> module_;
+  Crossings crossings_{*module_};
   std::array<HealthCounts, kLaneCount> last_health_{};
   std::set<std::int64_t> differing_ns_;
   std::int64_t first_ns_ = -1;

@@ -19,7 +19,8 @@ inline constexpr std::int64_t kNoFrame_ns = -(std::int64_t{1} << 60);
 // The reader says up to which frame it looks and gets the newest value of those. The writer may be ahead meanwhile: it
 // fills the slot with the oldest value, never the one that the reader holds. Of Slots, one is held, one is being
 // filled; so the newest value that the reader may look at is there as long as not more than Slots - 3 others were
-// published after it. A reader that comes later finds nothing and counts that in lost(); what it holds stays whole.
+// published after it. A reader that comes later finds nothing and counts that in lost(); what it holds stays whole. So
+// it does when only newer values than it may look at went: whether there was one for it is not known.
 // Frames are times in ns, within +-2^60 (36 years). Both sides finish in a bounded number of steps (wait-free): whoever
 // loses a slot to the other side looks at the others, at most Slots times.
 template <typename T, std::size_t Slots>
@@ -56,6 +57,7 @@ class Exchange {
   // Reader only. Takes the newest value of the frames up to last_frame_ns; false when it is the one in front already,
   // or when it is lost; front() then stays as it was.
   [[nodiscard]] bool try_take(std::int64_t last_frame_ns) noexcept {
+    if (replayed_.due) return take_replayed();
     for (std::size_t attempt = 0; attempt < Slots; ++attempt) {
       const std::uint32_t newest = find_newest(last_frame_ns);
       if (newest == kNone) break;
@@ -68,15 +70,33 @@ class Exchange {
       states_[front_].store(nobodys(front_frame_ns_), std::memory_order_release);
       front_ = newest;
       front_frame_ns_ = frame_of(state);
+      missed_ = false;
       return true;
     }
-    note_lost(last_frame_ns);
+    missed_ = newest_overwritten_ns() > front_frame_ns_;
+    if (missed_) count_lost();
     return false;
   }
+  // Reader only: the last try_take() came too late.
+  [[nodiscard]] bool missed() const noexcept { return missed_; }
   [[nodiscard]] const T& front() const noexcept { return slots_[front_]; }
   [[nodiscard]] std::int64_t front_frame_ns() const noexcept { return front_frame_ns_; }
-  // How often the newest value was overwritten before the reader came. Saturates.
+  // How often the reader came too late. Saturates.
   [[nodiscard]] std::uint32_t lost() const noexcept { return lost_; }
+
+  // Which value a reader found is an input of its frame. Who replays it, on one thread, keeps the values that were
+  // published and says what the next try_take() does, wherever the writer is then: it takes the value of the frame, or
+  // keeps what it holds where that is null. The value stays until then.
+  [[nodiscard]] std::int64_t published_ns() const noexcept { return published_ns_; }
+  [[nodiscard]] const T* find(std::int64_t frame_ns) const noexcept {
+    for (std::size_t i = 0; i < Slots; ++i) {
+      if (states_[i].load(std::memory_order_relaxed) == nobodys(frame_ns)) return &slots_[i];
+    }
+    return nullptr;
+  }
+  void replay_take(std::int64_t frame_ns, const T* value, bool missed) noexcept {
+    replayed_ = {true, missed, frame_ns, value};
+  }
 
  private:
   // A slot's state: four times the frame of its value, and who has it.
@@ -86,6 +106,16 @@ class Exchange {
 
   static constexpr std::int64_t nobodys(std::int64_t frame_ns) noexcept { return frame_ns * 4; }
   static constexpr std::int64_t frame_of(std::int64_t state) noexcept { return (state & ~kFlags) / 4; }
+
+  [[nodiscard]] bool take_replayed() noexcept {
+    replayed_.due = false;
+    missed_ = replayed_.missed;
+    if (missed_) count_lost();
+    if (replayed_.value == nullptr) return false;
+    slots_[front_] = *replayed_.value;
+    front_frame_ns_ = replayed_.frame_ns;
+    return true;
+  }
 
   // A slot that nobody has, its value in (front, last_frame_ns]; kNone when there is none.
   [[nodiscard]] std::uint32_t find_newest(std::int64_t last_frame_ns) const noexcept {
@@ -123,14 +153,15 @@ class Exchange {
   }
 
   // Values are overwritten oldest first: one that was newer than front leaves none to take that is older.
-  void note_lost(std::int64_t last_frame_ns) noexcept {
+  [[nodiscard]] std::int64_t newest_overwritten_ns() const noexcept {
     std::int64_t gone_ns = overwritten_ns_.load(std::memory_order_acquire);
     for (const std::atomic<std::int64_t>& slot : states_) {
       const std::int64_t state = slot.load(std::memory_order_acquire);
       if ((state & kFilled) != 0 && frame_of(state) > gone_ns) gone_ns = frame_of(state);
     }
-    if (gone_ns <= front_frame_ns_ || gone_ns > last_frame_ns || gone_ns <= lost_ns_) return;
-    lost_ns_ = gone_ns;
+    return gone_ns;
+  }
+  void count_lost() noexcept {
     if (lost_ != std::numeric_limits<std::uint32_t>::max()) ++lost_;
   }
 
@@ -144,7 +175,12 @@ class Exchange {
   alignas(kCacheLine_bytes) std::uint32_t front_ = 0;
   std::uint32_t lost_ = 0;
   std::int64_t front_frame_ns_ = kNoFrame_ns;
-  std::int64_t lost_ns_ = kNoFrame_ns;
+  bool missed_ = false;
+  struct {
+    bool due = false, missed = false;
+    std::int64_t frame_ns = kNoFrame_ns;
+    const T* value = nullptr;
+  } replayed_;
 };
 
 }  // namespace polygmap

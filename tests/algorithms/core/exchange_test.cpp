@@ -67,7 +67,7 @@ TEST(Exchange, TryTake_WriterIsAheadByAllItsSlotsAllow_StillGivesTheNewestOfTheF
   EXPECT_EQ(exchange.lost(), 0U);
 }
 
-TEST(Exchange, TryTake_WriterIsFurtherAhead_KeepsWhatItHoldsAndCountsItOnce) {
+TEST(Exchange, TryTake_WriterIsFurtherAhead_KeepsWhatItHoldsAndCountsEachTake) {
   FourSlots exchange;
   exchange.publish(1, 1);
   ASSERT_TRUE(exchange.try_take(1));
@@ -75,7 +75,7 @@ TEST(Exchange, TryTake_WriterIsFurtherAhead_KeepsWhatItHoldsAndCountsItOnce) {
   EXPECT_FALSE(exchange.try_take(2));
   EXPECT_FALSE(exchange.try_take(2));
   EXPECT_EQ(exchange.front(), 1);
-  EXPECT_EQ(exchange.lost(), 1U);
+  EXPECT_EQ(exchange.lost(), 2U);
   EXPECT_TRUE(exchange.try_take(5)) << "it goes on";
   EXPECT_EQ(exchange.front(), 5);
   exchange.publish(6, 6);
@@ -83,7 +83,20 @@ TEST(Exchange, TryTake_WriterIsFurtherAhead_KeepsWhatItHoldsAndCountsItOnce) {
   exchange.publish(8, 8);
   exchange.back() = 9;
   EXPECT_FALSE(exchange.try_take(6)) << "overwritten right now";
-  EXPECT_EQ(exchange.lost(), 2U);
+  EXPECT_EQ(exchange.lost(), 3U);
+}
+
+// Only newer ones than it may look at were overwritten: there may have been one for it.
+TEST(Exchange, TryTake_WriterIsFarAhead_IsMissedThoughTheReaderSeesNoTrace) {
+  FourSlots exchange;
+  exchange.publish(1, 1);
+  ASSERT_TRUE(exchange.try_take(1));
+  for (std::int64_t frame = 2; frame <= 9; ++frame) exchange.publish(frame, frame);
+  EXPECT_FALSE(exchange.try_take(2));
+  EXPECT_TRUE(exchange.missed());
+  EXPECT_EQ(exchange.lost(), 1U);
+  EXPECT_TRUE(exchange.try_take(9));
+  EXPECT_FALSE(exchange.missed());
 }
 
 // One thread, any interleaving of take, begin to fill and publish, against a model that remembers everything.

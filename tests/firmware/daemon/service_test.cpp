@@ -359,8 +359,13 @@ TEST_F(ServiceTest, WithARecorder_TheReplayHasTheSameBits) {
       std::this_thread::sleep_for(kEstimates);
     };
     const Outcome outcome = run(during, true, &recorder);
-    EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why << outcome.recording_failure;
-    EXPECT_EQ(outcome.module.reason, StopReason::kOperator);
+    // A machine that starves the lanes stops the robot: such a run is replayed, too.
+    const bool starved = test::kSlowMachine && outcome.module.reason == StopReason::kStateStale;
+    if (!starved) {
+      EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
+      EXPECT_EQ(outcome.module.reason, StopReason::kOperator);
+    }
+    EXPECT_EQ(outcome.recording_failure, "");
     const recording::ReplayResult replay = recording::replay(directory);
     EXPECT_EQ(replay.verdict, recording::ReplayVerdict::kSame) << recording::text_of(replay);
     EXPECT_EQ(replay.ticks, outcome.cycles);

@@ -7,6 +7,7 @@
 #include <deque>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <random>
 #include <string>
@@ -275,6 +276,91 @@ TEST(Replay, LanesWrittenOutWhileTheyRun_NothingDiffers) {
   expect_same(directory, kFrames);
 }
 
+std::size_t row_of(std::string_view task) {
+  const auto place = std::ranges::find_if(kTasks, [task](const Task& t) { return t.row.task == task; });
+  return static_cast<std::size_t>(place - kTasks.begin());
+}
+
+// Rows on their way to a lane that is held up before some of them, while the other lane runs on.
+struct HeldTasks {
+  RecordedTasks<Pipeline>& tasks;
+  std::size_t held_row;
+  std::function<void()> meanwhile = [] {};
+
+  Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
+    if (row == held_row) meanwhile();
+    return tasks.run_row(row, cycle_ns, budget);
+  }
+  void cycle_done(std::size_t lane, const CycleReport& report) noexcept { tasks.cycle_done(lane, report); }
+};
+
+// One lane is held up before `row` for longer than the exchanges have slots for, again and again.
+void expect_same_though_held_before(std::size_t row, const std::string& name) {
+  constexpr int kFrames = 300, kHeldFrames = 8;
+  const Directory directory(name);
+  test::FakeRobot robot(0.062);
+  Recorder recorder(robot.ports());
+  const auto module = std::make_unique<Pipeline>(recorder.ports(), Params{});
+  recorder.begin(directory.text(), Params{});
+  recorder.watch(*module);
+  RecordedTasks<Pipeline> recorded(*module, &recorder);
+  HeldTasks tasks{recorded, row};
+  CyclicExecutive<HeldTasks, kSchedule, kControlLane, Health> control(tasks, robot.clock,
+                                                                      module->lane_health(kControlLane));
+  CyclicExecutive<HeldTasks, kSchedule, kPerceptionLane, Health> perception(tasks, robot.clock,
+                                                                            module->lane_health(kPerceptionLane));
+  const bool control_is_held = kTasks[row].row.lane == kControlLane;
+  control.start(robot.clock.now_ns() + kCycle_ns);
+  perception.start(robot.clock.now_ns() + kCycle_ns);
+  const auto run_other = [&] {
+    if (control_is_held) {
+      perception.tick(robot.clock.now_ns());
+    } else {
+      control.tick(robot.clock.now_ns());
+    }
+    recorder.write_out();
+  };
+  int frames = 0, held = 0;
+  tasks.meanwhile = [&] {
+    if (frames % 50 != 0) return;
+    ++held;
+    for (int i = 0; i < kHeldFrames; ++i, ++frames) {
+      robot.advance();
+      run_other();
+    }
+  };
+  for (; frames < kFrames; ++frames) {
+    robot.advance();
+    const std::int64_t now_ns = robot.clock.now_ns();
+    run_other();
+    if (control_is_held) {
+      control.tick(now_ns);
+    } else {
+      perception.tick(now_ns);
+    }
+    recorder.write_out();
+  }
+  EXPECT_EQ(recorder.finish(), "");
+  EXPECT_GT(held, 3);
+  const ReplayResult result = replay(directory.text());
+  EXPECT_EQ(result.verdict, ReplayVerdict::kSame) << text_of(result);
+  EXPECT_GT(result.ticks, static_cast<std::uint64_t>(kFrames - held * (kHeldFrames + 1)));
+  const bool looks_across = row == row_of("sense") || row == row_of("intake");
+  EXPECT_EQ(module->health().count(Limit::kHandOverLost).count > 0, looks_across) << name;
+}
+
+// What the lane saw when its frame began is overwritten by the time that the frame is handed over.
+TEST(Replay, LaneHeldUpWithinAFrame_NothingDiffers) {
+  expect_same_though_held_before(row_of("surfaces"), "held_surfaces");
+  expect_same_though_held_before(row_of("gait"), "held_gait");
+}
+
+// What the lane should have seen is overwritten before it looks.
+TEST(Replay, LaneHeldUpBeforeItLooks_TheLossIsRepeated) {
+  expect_same_though_held_before(row_of("sense"), "held_sense");
+  expect_same_though_held_before(row_of("intake"), "held_intake");
+}
+
 // Nobody writes: the first cycle or picture that finds no room ends the recording, the module runs on, and what there
 // was before is whole.
 void expect_early_end(const Recorder::Capacity& capacity, const std::string& name, const std::string& why) {
@@ -446,7 +532,7 @@ TEST_F(ShortRecording, ForeignOneOrAnotherVersion_OneSentenceWithFileAndByte) {
   expect_unreadable(replay_of(foreign), "byte 0: this is no recording");
   Bytes changed = bytes_;
   changed[8] = 9;
-  expect_unreadable(replay_of(changed), "byte 8: version 9, where this program reads 2");
+  expect_unreadable(replay_of(changed), "byte 8: version 9, where this program reads 3");
   changed = bytes_;
   changed[12] ^= 1;
   expect_unreadable(replay_of(changed), "byte 12: it has the fields of another build");
