@@ -32,9 +32,10 @@ JointCommand standing_command() {
   return command;
 }
 
-LegShapes leg_shapes(const LegGeometry& true_lengths, Foot leg, const JointVector& q_rad) {
+LegShapes leg_shapes(const RobotErrors& errors, Foot leg, const JointVector& q_rad) {
   RobotModel robot = nominal_robot();
-  robot.legs = true_lengths;
+  robot.legs = errors.legs[index_of(leg)];
+  robot.sole = errors.sole;
   return base_leg_shapes(robot, leg, leg_joints(q_rad, leg));
 }
 
@@ -78,6 +79,7 @@ SimRobot::SimRobot(const SimOptions& options)
       imu_(error_params_, errors_, options.seed, plant_->true_T_base()),
       imu_interval_(options.imu_interval_ns, VirtualClock::kTick_ns),
       joints_(error_params_, options.seed),
+      forces_(error_params_, options.seed),
       torques_(error_params_, options.seed),
       force_sensors_(options.force_sensors),
       lio_(error_params_, errors_, options.seed),
@@ -110,9 +112,10 @@ void SimRobot::sense() {
   if (imu_interval_.push(imu_.sample(plant_->true_T_base(), now_ns, kPlantTick_s), felt)) {
     imu_queue_.push_overwrite(felt);
   }
-  feedback_ = joints_.sample(plant_->drive_q_rad(), plant_->drive_dq_radps(), now_ns);
+  feedback_ = joints_.sample(plant_->drive_q_rad(), plant_->drive_dq_radps(), now_ns, kPlantTick_s);
   feedback_.tau_nm = torques_.sample(plant_->drive_tau_nm(), plant_->drive_dq_radps());
-  feedback_.foot_force_n = forces_.sample({plant_->foot_force_n(0), plant_->foot_force_n(1)});
+  feedback_.foot_force_n = forces_.sample({plant_->foot_force_n(0), plant_->foot_force_n(1)},
+                                          {truth_.true_T_sole[0].p_m.z(), truth_.true_T_sole[1].p_m.z()}, kPlantTick_s);
   if (!force_sensors_) feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
   feedback_fresh_ = true;
   if (clock_.tick() % kLioPeriod_ticks == 0 && !any_contains(lio_silent_, now_ns)) {
@@ -125,7 +128,7 @@ void SimRobot::update_truth() {
   truth_.stamp_ns = clock_.now_ns();
   truth_.true_T_base = plant_->true_T_base();
   const JointVector q = plant_->true_q_rad();
-  truth_.base_legs = {leg_shapes(errors_.legs[0], Foot::kLeft, q), leg_shapes(errors_.legs[1], Foot::kRight, q)};
+  truth_.base_legs = {leg_shapes(errors_, Foot::kLeft, q), leg_shapes(errors_, Foot::kRight, q)};
   for (std::size_t f = 0; f < kFootCount; ++f) {
     truth_.true_T_sole[f] = plant_->true_T_sole(f);
     truth_.in_contact[f] = plant_->in_contact(f);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What climb and check share. Sourced from the repository's root.
+# What the scripts share that install and build. Sourced from the repository's root.
 
 say() { printf '%s: %s\n' "${0##*/}" "$*"; }
 die() {
@@ -62,4 +62,43 @@ configure() {
   # shellcheck disable=SC2086 # none or one
   cmake --preset "$1" -DCMAKE_CXX_COMPILER_LAUNCHER= $kProcessorOptions || return 1  # ccache loses the call graphs
   printf '%s\n' "$key" >"$stamp"
+}
+
+# alone_in FOLDER COMMAND...: while no other such command runs on that folder, since two builds at once break it. What the
+# command starts holds the lock, too, so that a compiler that outlives a killed script still keeps others out.
+alone_in() {
+  local folder=$1
+  shift
+  mkdir -p "${folder%/*}"
+  (
+    flock -n 9 || {
+      # check keeps its own output as 3, since a gate's goes to a log.
+      { say "waiting for another build in $folder" >&3; } 2>/dev/null || say "waiting for another build in $folder" >&2
+      flock 9
+    }
+    "$@"
+  ) 9>"$folder.lock"
+}
+
+# build PRESET [TARGET...]
+build() { alone_in "build/$1" configure_and_build "$@"; }
+configure_and_build() { configure "$1" && cmake --build "build/$1" ${2+--target "${@:2}"}; }
+
+# build_quietly PRESET TARGET...: into a log; says so when it takes longer than a moment, and dies of a failure.
+build_quietly() {
+  local log=$PWD/build/logs/$1.log
+  mkdir -p build/logs
+  alone_in "build/$1" log_build "$log" "$@" && return
+  grep -a -E -A 12 'error|FAILED|Error' "$log" | head -n 40 >&2
+  die "${*:2} of the preset $1 does not build; the whole log is $log"
+}
+log_build() {
+  local log=$1 ticker code=0
+  shift
+  # The sleep has no output of its own, or a pipe that waits for the script's would wait for it.
+  (sleep 3 >/dev/null 2>&1 9>&- && say "building ${*:2}, which may take some minutes (log: $log)") >&2 9>&- &
+  ticker=$!
+  configure_and_build "$@" >"$log" 2>&1 || code=$?
+  kill "$ticker" 2>/dev/null
+  return "$code"
 }

@@ -120,7 +120,10 @@ void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
 void Estimator::add_joints(const JointFeedback& joints, std::int64_t now_ns) noexcept {
   // Until there is an attitude the base counts as upright.
   const Vec3 base_up = state_.odom_T_base.R.row(2).transpose();
-  if (leg_sensing_.try_take(joints, now_ns + params_.max_lead_ns, base_up, stood_)) add_legs(leg_sensing_.legs());
+  const ImuSample base = imu_.any ? imu_.mean : ImuSample{.accel_mps2 = kGravity_mps2 * base_up};
+  if (leg_sensing_.try_take(joints, now_ns + params_.max_lead_ns, base, base_up, stood_)) {
+    add_legs(leg_sensing_.legs());
+  }
 }
 
 void Estimator::add_legs(const LegSample& legs) noexcept { legs_ = {true, true, legs}; }

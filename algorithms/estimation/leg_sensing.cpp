@@ -61,8 +61,8 @@ bool LegSensing::is_valid(const JointFeedback& joints) const noexcept {
   return good;
 }
 
-bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, const Vec3& base_up,
-                          const std::array<bool, kFootCount>& stands) noexcept {
+bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, const ImuSample& base,
+                          const Vec3& base_up, const std::array<bool, kFootCount>& stands) noexcept {
   if (!is_valid(joints)) {
     ++counters_.invalid;
     return false;
@@ -85,7 +85,10 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
   dt_s_ = any_ ? seconds(joints.stamp_ns - joints_.stamp_ns) : 0.0;
   joints_ = carried;
   for (std::size_t n = 0; n < kJointCount; ++n) replied_ns_[n] = joints.stamp_ns - joints.silent_ns(n);
-  if (params_.infer_forces) joints_.foot_force_n = forces_.update(robot_->legs, joints_, base_up);
+  if (params_.infer_forces) {
+    joints_.foot_force_n = forces_.update(*robot_, joints_, base, base_up);
+    for (double& force_n : joints_.foot_force_n) force_n = force_n > params_.light_n ? force_n : 0.0;
+  }
   for (std::size_t n = 0; n < kJointCount; ++n) {  // the last torque is not this one's
     if (is_mute(n)) joints_.tau_nm[static_cast<Eigen::Index>(n)] = std::numeric_limits<double>::quiet_NaN();
   }

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "algorithms/estimation/calibration/encoder_offsets.hpp"
-#include "algorithms/estimation/contact/force_inference.hpp"
+#include "algorithms/estimation/contact/ground_force_observer.hpp"
 #include "algorithms/estimation/contact/leg_measurement.hpp"
 
 namespace polygmap {
@@ -14,7 +14,8 @@ class LegSensing {
   struct Params {
     EncoderOffsets::Params encoders;
     bool infer_forces = false;
-    ForceInference::Params forces;
+    GroundForceObserver::Params forces;
+    double light_n = 20.0;
     double max_torque_nm = 1000.0;
     double max_joint_rad = 4.0;
     double max_joint_speed_radps = 15.0;
@@ -26,6 +27,8 @@ class LegSensing {
       field("encoders", p.encoders);
       field("infer_forces", p.infer_forces, "Foot forces come from joint torques, since no sensor measures them.");
       field("forces", p.forces);
+      field("light_n", p.light_n, 0.0, 200.0,
+            "What is left of friction and masses may feign so much: an inferred force that is less is none.");
       field("max_torque_nm", p.max_torque_nm, 1.0, 100000.0, "A joint sample of a higher torque is invalid.");
       field("max_joint_rad", p.max_joint_rad, 1.0, 100.0, "A joint sample of a larger angle is invalid.");
       field("max_joint_speed_radps", p.max_joint_speed_radps, 0.1, 1000.0,
@@ -46,10 +49,11 @@ class LegSensing {
 
   // robot: outlives this object.
   void reset(const Params& params, const RobotModel& robot) noexcept;
-  // False, and the sample counted, when it is bad, stale or stamped after latest_ns. base_up: as well as it is known.
-  // stands: which feet do as far as is known, for those whose force is not told.
-  [[nodiscard]] bool try_take(const JointFeedback& joints, std::int64_t latest_ns, const Vec3& base_up,
-                              const std::array<bool, kFootCount>& stands) noexcept;
+  // False, and the sample counted, when it is bad, stale or stamped after latest_ns. base: what the IMU feels, base
+  // axes, and base_up there, as well as they are known. stands: which feet do as far as is known, for those whose force
+  // is not told.
+  [[nodiscard]] bool try_take(const JointFeedback& joints, std::int64_t latest_ns, const ImuSample& base,
+                              const Vec3& base_up, const std::array<bool, kFootCount>& stands) noexcept;
   // Of the last accepted feedback.
   [[nodiscard]] LegSample legs() const noexcept;
   // The encoders' offsets learn from the last accepted feedback. longest_s: it stands for no more time than this.
@@ -77,7 +81,7 @@ class LegSensing {
   const RobotModel* robot_ = nullptr;
   Counters counters_;
   EncoderOffsets encoders_;
-  ForceInference forces_;
+  GroundForceObserver forces_;
   JointFeedback joints_;                                // last accepted
   std::int64_t felt_ns_ = 0;                            // when both feet's forces were told last
   double dt_s_ = 0.0;                                   // between it and the one before

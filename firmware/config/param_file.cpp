@@ -91,22 +91,24 @@ class ParamFile {
         if (!node.is_table()) fail(node, full + " is a table of parameters, not " + kind_of(node));
         take(*node.as_table(), full + ".");
       } else {
-        fail(key.source().begin.line, full +
-                                          (node.is_table() ? " is no table of parameters; the nearest is "
-                                                           : " is no parameter; the nearest is ") +
-                                          nearest(full, node.is_table()));
+        const std::string near = nearest(full, node.is_table());
+        fail(key.source().begin.line,
+             full + (node.is_table() ? " is no table of parameters; " : " is no parameter; ") +
+                 (near.empty() ? "`polygmap params list` names all" : "the nearest is " + near));
       }
     }
   }
 
-  // The parameter, or the table, whose name it may be; that of another table counts when its last word is alike.
+  // The parameter, or the table, whose name it may be; that of another table counts when its last word is alike. Empty
+  // when none is near: a third of the last word's letters, or two, may be wrong.
   [[nodiscard]] std::string nearest(const std::string& full, bool tables) const {
     std::string best;
-    std::size_t least = 0;
+    const std::string_view last = last_word(full);
+    std::size_t least = std::max<std::size_t>(2, last.size() / 3) + 1;
     for (const Param& param : table_.params) {
       const std::string name = tables ? param.name.substr(0, param.name.rfind('.')) : param.name;
-      const std::size_t off = std::min(distance(full, name), 2 + 2 * distance(last_word(full), last_word(name)));
-      if (best.empty() || off < least) {
+      const std::size_t off = std::min(distance(full, name), 2 + 2 * distance(last, last_word(name)));
+      if (off < least) {
         best = name;
         least = off;
       }

@@ -90,6 +90,58 @@ inline void refuse_no_text(const FileName& name, std::string_view text) {
   }
 }
 
+// toml++ says "Error while parsing SCOPE: REASON". Of both these parts, what it means; the first that fits holds.
+struct TomlComplaint {
+  std::string_view scope, reason, words;
+};
+inline constexpr TomlComplaint kTomlComplaints[] = {
+    {"", "nested value depth", "values are nested too deep"},
+    {"", "expected '='", "expected '=' after the key"},
+    {"", "expected value, saw", "expected a value after '='"},
+    {"key-value pair", "end-of-file", "the file ends where '=' and a value were expected"},
+    {"key-value pair", "whitespace", "expected nothing more after the value"},
+    {"table header", "whitespace", "expected nothing more after the table's name"},
+    {"table header", "blank", "a table has no name"},
+    {"table header", "", "a table's name has no closing ']'"},
+    {"key", "", "expected a key"},
+    {"root table", "", "expected a key, or a table's name in brackets"},
+    {"array", "saw comma", "an array has a comma too many"},
+    {"array", "end-of-file", "an array has no closing ']'"},
+    {"array", "", "expected ',' or ']' in an array"},
+    {"inline table", "comma)", "a table in braces has a comma too many"},
+    {"inline table", "", "expected a key, ',' or '}' on the same line, in a table in braces"},
+    {"boolean", "", "expected true or false"},
+    {"string", "escape sequence", "a text has a backslash that means nothing; two of them are one"},
+    {"unicode scalar sequence", "", "a text has a backslash that means nothing; two of them are one"},
+    {"string", "", "a text has no closing quote"},
+    {"literal string", "", "a text has no closing quote"},
+    {"", "not representable", "a number is too large"},
+    {"", "interpreted", "a number is too large"},
+    {"", "leading zeroes", "a number must not begin with 0"},
+    {"date", "", "this is no date"},
+    {"time", "", "this is no time of day"},
+    {"value", "", "expected a value: a number, true, false or a text in quotes"},
+    {"", "digit", "expected a number such as 5, 0.5 or 1e-3"},
+    {"floating-point", "", "expected a number such as 5, 0.5 or 1e-3"}};
+
+[[nodiscard]] inline std::string plain_words(std::string_view description) {
+  constexpr std::string_view kBegin = "Error while parsing ";
+  const std::size_t colon = description.find(": ");
+  if (!description.starts_with(kBegin) || colon == std::string_view::npos) return "this is no TOML";
+  const std::string_view scope = description.substr(kBegin.size(), colon - kBegin.size());
+  const std::string_view reason = description.substr(colon + 2);
+  if (reason.starts_with("cannot redefine")) {
+    const std::size_t first = reason.find('\''), last = reason.rfind('\'');
+    if (first == last) return "a key is both a value and a table";
+    return std::string(reason.substr(first, last + 1 - first)) + " is given twice";
+  }
+  for (const TomlComplaint& complaint : kTomlComplaints) {
+    const bool fits = complaint.scope.empty() || scope == complaint.scope;
+    if (fits && reason.find(complaint.reason) != std::string_view::npos) return std::string(complaint.words);
+  }
+  return "this is no TOML";
+}
+
 }  // namespace detail
 
 [[nodiscard]] inline toml::table parse_toml(const FileName& name, std::string_view text) {
@@ -98,7 +150,7 @@ inline void refuse_no_text(const FileName& name, std::string_view text) {
   if (!parsed) {
     // Of some errors toml++ tells no place.
     const std::size_t line = parsed.error().source().begin.line;
-    name.fail(line == 0 ? detail::line_of(text, text.size()) : line, std::string(parsed.error().description()));
+    name.fail(line == 0 ? detail::line_of(text, text.size()) : line, detail::plain_words(parsed.error().description()));
   }
   return std::move(parsed).table();
 }

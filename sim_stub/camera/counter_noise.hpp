@@ -34,6 +34,9 @@ enum class Stream : std::uint64_t {
   kTables,
   kCameraMount,
   kTorques,
+  kFootForces,
+  kLioWalk,
+  kReality,
 };
 
 // Finaliser of SplitMix64 (Steele, Lea, Flood 2014): a bijection that passes the usual statistical batteries.

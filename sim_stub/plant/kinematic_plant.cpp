@@ -80,7 +80,7 @@ double KinematicPlant::foot_force_n(std::size_t foot) const noexcept {
 // The feet's forces through the Jacobians. Where in its sole each presses is what the body's place and acceleration
 // leave over beyond the shares, within the sole.
 void KinematicPlant::load_drives() {
-  const SoleRectangle& sole = nominal_robot().sole.contact;
+  const SoleRectangle& sole = errors_.sole.contact;
   const Vec3 between_m = load_share(0) * feet_[0].true_T_sole.p_m + load_share(1) * feet_[1].true_T_sole.p_m;
   const Vec3 rest_m = pressed_m() - between_m;
   for (std::size_t f = 0; f < kFootCount; ++f) {
@@ -299,7 +299,7 @@ void KinematicPlant::move_swing_feet() {
     if (foot.anchored) continue;
     const Transform previous = foot.true_T_sole;
     foot.true_T_sole = true_T_base_ * foot.base_T_sole;
-    const std::array<Vec3, kContactsPerFoot> contacts = nominal_robot().sole.contacts_m();
+    const std::array<Vec3, kContactsPerFoot> contacts = errors_.sole.contacts_m();
     for (std::size_t c = 0; c < kContactsPerFoot; ++c) {
       const Vec3 corner = foot.true_T_sole * contacts[c];
       const double fallen_m = (previous * contacts[c]).z() - corner.z();
@@ -326,14 +326,14 @@ void KinematicPlant::check_falls() {
   double highest_m = -1e9;
   for (std::size_t f = 0; f < kFootCount; ++f) {
     const FootState& foot = feet_[f];
-    const double depth_m = -clearance_m(collision_box(nominal_robot().sole, foot.true_T_sole), solids_);
+    const double depth_m = -clearance_m(collision_box(errors_.sole, foot.true_T_sole), solids_);
     if (depth_m > params_.collision_depth_m) {
       fall("The %s foot collided with the staircase, %.1f mm deep.", name_of(f), mm(depth_m));
       return;
     }
     if (!foot.anchored) continue;
     highest_m = std::max(highest_m, foot.true_T_sole.p_m.z());
-    const Vec3 centre = foot.true_T_sole * Vec3{nominal_robot().sole.contact.centre_x_m(), 0, 0};
+    const Vec3 centre = foot.true_T_sole * Vec3{errors_.sole.contact.centre_x_m(), 0, 0};
     int below = kFloorStep;
     static_cast<void>(world_.height_m(centre.x(), centre.y(), &below));
     if (below != foot.step && load_share(f) > params_.lift_share) {

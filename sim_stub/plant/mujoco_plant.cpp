@@ -18,8 +18,8 @@
 namespace polygmap::sim {
 namespace {
 
-constexpr int kPhysicsSteps = 2;       // per tick
-constexpr int kFreeQ = 7, kFreeV = 6;  // coordinates and rates of the base before those of the joints
+constexpr int kPhysicsSteps = 2;  // per tick
+constexpr double kPhysicsStep_s = 0.001;
 
 mjModel* compile(const std::string& xml) {
   const auto files = std::make_unique<mjVFS>();
@@ -52,6 +52,11 @@ MujocoPlant::MujocoPlant(const Params& params, const StairWorld& world, const Ro
   data_.reset(mj_makeData(model_.get()));
   feet_[0].body = mj_name2id(model_.get(), mjOBJ_BODY, "left_6");
   feet_[1].body = mj_name2id(model_.get(), mjOBJ_BODY, "right_6");
+  for (std::size_t j = 0; j < kJointCount; ++j) {
+    const int joint = mj_name2id(model_.get(), mjOBJ_JOINT, ("drive_" + std::to_string(j)).c_str());
+    q_at_[j] = model_->jnt_qposadr[joint];
+    v_at_[j] = model_->jnt_dofadr[joint];
+  }
 
   // Upright, the lower sole on the floor.
   const JointVector true_q = q_rad - errors.encoder_offset_rad;
@@ -64,27 +69,32 @@ MujocoPlant::MujocoPlant(const Params& params, const StairWorld& world, const Ro
   for (int a = 0; a < 3; ++a) data_->qpos[a] = p_m[a];
   data_->qpos[3] = std::cos(0.5 * yaw);
   data_->qpos[6] = std::sin(0.5 * yaw);
-  for (std::size_t j = 0; j < kJointCount; ++j) data_->qpos[kFreeQ + j] = true_q[static_cast<Eigen::Index>(j)];
+  for (std::size_t j = 0; j < kJointCount; ++j) data_->qpos[q_at_[j]] = true_q[static_cast<Eigen::Index>(j)];
   mj_forward(model_.get(), data_.get());
   read_state();
 }
 
 MujocoPlant::~MujocoPlant() = default;
 
-void MujocoPlant::step(const JointCommand& command) {
+void MujocoPlant::step(const JointCommand& newest) {
+  commands_.push_overwrite(newest);
+  const auto late = static_cast<std::size_t>(std::lround(params_.command_delay_s / kPlantTick_s));
+  const JointCommand& command = commands_[commands_.size() - 1 - std::min(late, commands_.size() - 1)];
+  const double follows = params_.torque_lag_s > 0.0 ? -std::expm1(-kPhysicsStep_s / params_.torque_lag_s) : 1.0;
   for (int k = 0; k < kPhysicsSteps; ++k) {
     for (std::size_t j = 0; j < kJointCount; ++j) {
       const auto i = static_cast<Eigen::Index>(j);
       const JointSetpoint& set = command.joints[j];
       const double limit_nm = nominal_robot().drives.limits[j].torque_nm;
-      const double q = data_->qpos[kFreeQ + j] + errors_.encoder_offset_rad[i];
+      const double q = data_->qpos[q_at_[j]] + errors_.encoder_offset_rad[i];
       const double asked_nm =
-          set.tau_ff_nm + set.kp_nmprad * (set.q_rad - q) + set.kd_nmsprad * (set.dq_radps - data_->qvel[kFreeV + j]);
+          set.tau_ff_nm + set.kp_nmprad * (set.q_rad - q) + set.kd_nmsprad * (set.dq_radps - data_->qvel[v_at_[j]]);
       if (!std::isfinite(asked_nm) && fall_reason_.empty()) {
         fall_reason_ = "The command of joint " + std::to_string(j) + " is not finite.";
       }
-      tau_[i] = math::clamp(asked_nm, -limit_nm, limit_nm);
-      data_->qfrc_applied[kFreeV + j] = tau_[i];
+      const double given_nm = math::clamp(asked_nm, -limit_nm, limit_nm);
+      tau_[i] = follows == 1.0 ? given_nm : tau_[i] + follows * (given_nm - tau_[i]);
+      data_->qfrc_applied[v_at_[j]] = params_.torque_scale * tau_[i];
     }
     mj_step(model_.get(), data_.get());
   }
@@ -108,8 +118,10 @@ void MujocoPlant::read_state() {
   }
   for (std::size_t j = 0; j < kJointCount; ++j) {
     const auto i = static_cast<Eigen::Index>(j);
-    q_[i] = data_->qpos[kFreeQ + j] + errors_.encoder_offset_rad[i];
-    dq_[i] = data_->qvel[kFreeV + j];
+    q_[i] = data_->qpos[q_at_[j]] + errors_.encoder_offset_rad[i];
+    dq_[i] = data_->qvel[v_at_[j]];
+    link_q_[i] = q_[i] - errors_.encoder_offset_rad[i];
+    if (params_.backlash_rad > 0.0) link_q_[i] += data_->qpos[q_at_[j] + 1];
   }
 }
 
@@ -167,7 +179,7 @@ double MujocoPlant::zmp_margin_m() const noexcept {
   if (in_contact(0) == in_contact(1)) return Plant::zmp_margin_m();
   const FootState& foot = feet_[in_contact(0) ? 0 : 1];
   const Vec3 local_m = foot.true_T_sole.inverse() * Vec3(foot.pressure_nm / foot.force_n);
-  const SoleRectangle& sole = nominal_robot().sole.contact;
+  const SoleRectangle& sole = errors_.sole.contact;
   return std::min({local_m.x() - sole.heel_x_m, sole.toe_x_m - local_m.x(), sole.half_width_m - std::abs(local_m.y())});
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "algorithms/core/containers/ring_buffer.hpp"
 #include "sim_stub/plant/plant.hpp"
 #include "sim_stub/sensors/robot_errors.hpp"
 #include "sim_stub/world/stair_world.hpp"
@@ -20,12 +21,33 @@ class MujocoPlant final : public Plant {
  public:
   struct Params {
     double friction = 0.8;
+    double ground_s = 0.008;         // time constant of a contact: the longer, the softer
     double armature_kgm2 = 0.05;     // of every drive, seen at the joint
+    double joint_friction_nm = 0.0;  // Coulomb, that the leg feels
+    double joint_damping_nmsprad = 0.0;
+    double backlash_rad = 0.0;       // play between drive and link, from end to end
+    double torque_scale = 1.0;       // what a drive gives of what it is asked
+    double torque_lag_s = 0.0;       // time constant
+    double command_delay_s = 0.0;    // beyond the bus
     double torso_mass_scale = 1.0;   // against the mass that the module believes
     double torso_offset_x_m = 0.0;   // of its centre, likewise
     double contact_force_n = 10.0;   // a sole pressed less than this hangs in the air
     double max_tilt_rad = 0.8;       // of the base; beyond it the robot falls,
     double min_base_height_m = 0.3;  // or below this above its higher sole
+
+    static void visit(auto& p, auto& field) {
+      field("friction", p.friction, 0.05, 2.0, "Of the soles on the ground.");
+      field("ground_s", p.ground_s, 0.002, 0.1, "Time constant of a contact: the longer, the softer.");
+      field("armature_kgm2", p.armature_kgm2, 0.001, 1.0, "Of every drive, seen at the joint.");
+      field("joint_friction_nm", p.joint_friction_nm, 0.0, 30.0, "Coulomb friction of a joint, which the leg feels.");
+      field("joint_damping_nmsprad", p.joint_damping_nmsprad, 0.0, 20.0, "Viscous friction of a joint.");
+      field("backlash_rad", p.backlash_rad, 0.0, 0.05, "Play between drive and link, from end to end.");
+      field("torque_scale", p.torque_scale, 0.3, 2.0, "What a drive gives of what it is asked.");
+      field("torque_lag_s", p.torque_lag_s, 0.0, 0.05, "Time constant of a drive's torque.");
+      field("command_delay_s", p.command_delay_s, 0.0, 0.05, "Of a command beyond the bus, in whole ticks of 2 ms.");
+      field("torso_mass_scale", p.torso_mass_scale, 0.3, 3.0, "True mass of the torso over the believed one.");
+      field("torso_offset_x_m", p.torso_offset_x_m, -0.2, 0.2, "By which the torso's centre lies ahead.");
+    }
   };
 
   // Stands with the middle of the soles below true_T_start (x, y and yaw are used) and the drives at q_rad.
@@ -50,7 +72,7 @@ class MujocoPlant final : public Plant {
   [[nodiscard]] const JointVector& drive_q_rad() const noexcept override { return q_; }
   [[nodiscard]] const JointVector& drive_dq_radps() const noexcept override { return dq_; }
   [[nodiscard]] const JointVector& drive_tau_nm() const noexcept override { return tau_; }
-  [[nodiscard]] JointVector true_q_rad() const noexcept override { return q_ - errors_.encoder_offset_rad; }
+  [[nodiscard]] JointVector true_q_rad() const noexcept override { return link_q_; }
   [[nodiscard]] const std::string& fall_reason() const noexcept override { return fall_reason_; }
 
   [[nodiscard]] double total_mass_kg() const noexcept;
@@ -80,7 +102,10 @@ class MujocoPlant final : public Plant {
   std::unique_ptr<mjData_, Delete> data_;
   std::array<FootState, kFootCount> feet_;
   Transform true_T_base_;
+  std::array<int, kJointCount> q_at_{}, v_at_{};  // of the drives, among the physics' coordinates and rates
   JointVector q_ = JointVector::Zero(), dq_ = JointVector::Zero(), tau_ = JointVector::Zero();
+  JointVector link_q_ = JointVector::Zero();  // with the play
+  RingBuffer<JointCommand, 32> commands_;     // newest last
   std::string fall_reason_;
 };
 

@@ -20,6 +20,10 @@ RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
     errors.legs[f].thigh_m *= 1.0 + common * lengths.normal(0) + own * lengths.normal(2 + 2 * f);
     errors.legs[f].shank_m *= 1.0 + common * lengths.normal(1) + own * lengths.normal(3 + 2 * f);
   }
+  for (SoleRectangle* sole : {&errors.sole.contact, &errors.sole.collision}) {
+    sole->toe_x_m += params.toe_m;
+    sole->heel_x_m -= params.heel_m;
+  }
   for (std::size_t j = 0; j < kJointCount; ++j) {
     errors.encoder_offset_rad[static_cast<Eigen::Index>(j)] = params.encoder_offset_rad * offsets.normal(j);
   }

@@ -28,15 +28,62 @@ struct ErrorParams {
   double torque_noise_nm = 0.5;           // of a measured joint torque, white
   double friction_nm = 1.0;  // Coulomb, of a moving joint: what the drive measures and the leg does not feel
   double depth_noise = 1.0;  // scales sigma, warp, edge mixing and dropouts: 0 or 1
+  // What a data sheet does not say at all; 0 unless told (sim_stub/reality.hpp).
+  double encoder_step_rad = 0.0;
+  bool rates_by_difference = false;  // of encoder readings, tick by tick, in place of a rate that is measured
+  double foot_force_noise_n = 0.0;
+  std::array<double, kFootCount> foot_force_offset_n{};
+  double foot_force_mass_kg = 0.0;    // of the foot below the sensor, whose acceleration it feels
+  Vec3 lio_drift_mps = Vec3::Zero();  // true axes
+  double lio_drift_radps = 0.0;       // of its yaw
+  double lio_walk_mprs = 0.0;         // random walk, per axis
+  Vec3 lio_jump_m = Vec3::Zero();     // at lio_jump_s, true axes
+  double lio_jump_s = 20.0;
+  double lio_sigma_scale = 1.0;      // true noise over the stated one
+  double toe_m = 0.0, heel_m = 0.0;  // by which the foot is longer in front and behind
 
-  [[nodiscard]] static constexpr ErrorParams none() noexcept {
+  [[nodiscard]] static ErrorParams none() noexcept {
     return {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  }
+
+  static void visit(auto& p, auto& field) {
+    field("leg_length", p.leg_length, 0.0, 0.1, "Spread of thigh and shank, relative.");
+    field("encoder_offset_rad", p.encoder_offset_rad, 0.0, 0.1, "Spread of the encoders' offsets.");
+    field("encoder_noise_rad", p.encoder_noise_rad, 0.0, 0.01, "White noise of an encoder.");
+    field("encoder_step_rad", p.encoder_step_rad, 0.0, 0.01, "Step of an encoder's readings; 0: none.");
+    field("joint_rate_noise_radps", p.joint_rate_noise_radps, 0.0, 1.0, "White noise of a measured joint speed.");
+    field("rates_by_difference", p.rates_by_difference, "A joint's speed is the difference of two readings.");
+    field("imu_mount_rad", p.imu_mount_rad, 0.0, 0.2, "Spread of the IMU's mount, per axis.");
+    field("gyro_bias_radps", p.gyro_bias_radps, 0.0, 0.1, "Spread of the gyroscope's bias, per axis.");
+    field("gyro_noise_radps", p.gyro_noise_radps, 0.0, 0.1, "White noise of the gyroscope.");
+    field("accel_bias_mps2", p.accel_bias_mps2, 0.0, 1.0, "Spread of the accelerometer's bias, per axis.");
+    field("accel_noise_mps2", p.accel_noise_mps2, 0.0, 5.0, "White noise of the accelerometer.");
+    field("torque_noise_nm", p.torque_noise_nm, 0.0, 20.0, "White noise of a measured torque.");
+    field("friction_nm", p.friction_nm, 0.0, 20.0, "Coulomb friction that a drive measures and the leg does not feel.");
+    field("foot_force_noise_n", p.foot_force_noise_n, 0.0, 200.0, "White noise of a foot force.");
+    field("foot_force_offset_n", p.foot_force_offset_n, -300.0, 300.0, "Zero error of the left and right foot force.");
+    field("foot_force_mass_kg", p.foot_force_mass_kg, 0.0, 5.0, "Of the foot below its sensor, which feels it move.");
+    field("lio_position_m", p.lio_position_m, 0.0, 0.2, "White noise of the LIO position.");
+    field("lio_rotation_rad", p.lio_rotation_rad, 0.0, 0.2, "White noise of the LIO rotation.");
+    field("lio_sigma_scale", p.lio_sigma_scale, 0.1, 10.0, "True LIO noise over the stated one.");
+    field("lio_drift_mps", p.lio_drift_mps, -0.2, 0.2, "Steady drift of the LIO position; x up the stairs, z up.");
+    field("lio_drift_radps", p.lio_drift_radps, -0.2, 0.2, "Steady drift of the LIO yaw.");
+    field("lio_walk_mprs", p.lio_walk_mprs, 0.0, 0.1, "Random walk of the LIO position, per axis.");
+    field("lio_jump_m", p.lio_jump_m, -2.0, 2.0, "Jump of the LIO position, for good.");
+    field("lio_jump_s", p.lio_jump_s, 0.0, 1000.0, "When it jumps.");
+    field("depth_scale", p.depth_scale, 0.0, 0.1, "Half range of the camera's scale error.");
+    field("camera_mount_rad", p.camera_mount_rad, 0.0, 0.1, "Half range of the camera's mount, per axis.");
+    field("camera_mount_m", p.camera_mount_m, 0.0, 0.05, "Half range of the camera's place, per axis.");
+    field("depth_noise", p.depth_noise, 0.0, 3.0, "Depth noise over the believed one.");
+    field("toe_m", p.toe_m, -0.05, 0.05, "By which the foot is longer in front.");
+    field("heel_m", p.heel_m, -0.05, 0.05, "By which the foot is longer behind.");
   }
 };
 
 // What a seed makes of one robot, constant over its run.
 struct RobotErrors {
   std::array<LegGeometry, kFootCount> legs{nominal_robot().legs, nominal_robot().legs};  // true lengths
+  SoleModel sole = nominal_robot().sole;
   JointVector encoder_offset_rad = JointVector::Zero();  // encoder reading minus true angle
   Mat3 base_R_imu = Mat3::Identity();
   Vec3 gyro_bias_radps = Vec3::Zero();

@@ -38,17 +38,42 @@ ImuSample ImuModel::sample(const Transform& true_T_base, std::int64_t stamp_ns, 
 }
 
 JointFeedback JointModel::sample(const JointVector& drive_q_rad, const JointVector& drive_dq_radps,
-                                 std::int64_t stamp_ns) {
+                                 std::int64_t stamp_ns, double tick_s) {
   JointFeedback feedback;
   feedback.stamp_ns = stamp_ns;
   for (std::size_t j = 0; j < kJointCount; ++j) {
     const auto i = static_cast<Eigen::Index>(j);
     const std::uint64_t n = index_ * kJointCount + j;
     feedback.q_rad[i] = drive_q_rad[i] + params_.encoder_noise_rad * angle_noise_.normal(n);
+    if (const double step_rad = params_.encoder_step_rad; step_rad > 0.0) {
+      feedback.q_rad[i] = step_rad * std::round(feedback.q_rad[i] / step_rad);
+    }
     feedback.dq_radps[i] = drive_dq_radps[i] + params_.joint_rate_noise_radps * rate_noise_.normal(n);
   }
+  if (params_.rates_by_difference) {
+    feedback.dq_radps = index_ > 0 ? JointVector((feedback.q_rad - last_q_rad_) / tick_s) : JointVector::Zero();
+  }
+  last_q_rad_ = feedback.q_rad;
   ++index_;
   return feedback;
+}
+
+std::array<double, kFootCount> FootForceModel::sample(const std::array<double, kFootCount>& contact_n,
+                                                      const std::array<double, kFootCount>& true_sole_z_m,
+                                                      double tick_s) {
+  true_sole_z_m_.push_overwrite(true_sole_z_m);
+  std::array<double, kFootCount> felt_n = contact_n;
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    if (true_sole_z_m_.size() == 3) {
+      const double up_mps2 =
+          (true_sole_z_m_[2][f] - 2.0 * true_sole_z_m_[1][f] + true_sole_z_m_[0][f]) / (tick_s * tick_s);
+      felt_n[f] -= params_.foot_force_mass_kg * up_mps2;
+    }
+    felt_n[f] += params_.foot_force_offset_n[f] + params_.foot_force_noise_n * noise_.normal(index_ * kFootCount + f);
+  }
+  ++index_;
+  history_.push_overwrite(felt_n);
+  return history_.oldest();
 }
 
 JointVector TorqueModel::sample(const JointVector& drive_tau_nm, const JointVector& dq_radps) {
@@ -62,13 +87,31 @@ JointVector TorqueModel::sample(const JointVector& drive_tau_nm, const JointVect
   return tau_nm;
 }
 
+Transform LioModel::drifted(const Transform& true_T_base, std::int64_t stamp_ns) {
+  if (last_ns_ < 0) start_m_ = true_T_base.p_m;
+  const double since_s = last_ns_ < 0 ? 0.0 : seconds(stamp_ns - last_ns_);
+  last_ns_ = stamp_ns;
+  run_s_ += since_s;
+  if (params_.lio_walk_mprs > 0.0) walk_m_ += params_.lio_walk_mprs * std::sqrt(since_s) * walk_noise_.normal3(index_);
+  Transform pose = true_T_base;
+  if (params_.lio_drift_radps != 0.0) {
+    const Mat3 turn = rotation_z(params_.lio_drift_radps * run_s_);
+    pose = {turn * pose.R, start_m_ + turn * (pose.p_m - start_m_)};
+  }
+  pose.p_m += walk_m_ + run_s_ * params_.lio_drift_mps;
+  if (seconds(stamp_ns) >= params_.lio_jump_s) pose.p_m += params_.lio_jump_m;
+  return pose;
+}
+
 LioSample LioModel::sample(const Transform& true_T_base, std::int64_t stamp_ns) {
-  const Vec3 turn_rad = params_.lio_rotation_rad * rotation_noise_.normal3(index_);
+  const double scale = params_.lio_sigma_scale;
+  const Vec3 turn_rad = scale * params_.lio_rotation_rad * rotation_noise_.normal3(index_);
   const Transform noise{rotation_z(turn_rad.z()) * rotation_y(turn_rad.y()) * rotation_x(turn_rad.x()), Vec3::Zero()};
   LioSample sample;
   sample.stamp_ns = stamp_ns;
-  sample.lio_T_lidar = errors_.lio_T_true * true_T_base * nominal_robot().mounts.base_T_lidar * noise;
-  sample.lio_T_lidar.p_m += params_.lio_position_m * position_noise_.normal3(index_);
+  sample.lio_T_lidar =
+      errors_.lio_T_true * drifted(true_T_base, stamp_ns) * nominal_robot().mounts.base_T_lidar * noise;
+  sample.lio_T_lidar.p_m += scale * params_.lio_position_m * position_noise_.normal3(index_);
   constexpr double kLeastSigma = 1e-3;  // no odometry claims to be perfect
   sample.position_sigma_m.setConstant(std::max(params_.lio_position_m, kLeastSigma));
   sample.rotation_sigma_rad.setConstant(std::max(params_.lio_rotation_rad, kLeastSigma));

@@ -33,25 +33,30 @@ class JointModel {
       : params_(params), angle_noise_(seed, Stream::kEncoders), rate_noise_(seed, Stream::kJointRates) {}
   // q and dq as the drives have them (offset included); forces as delayed by foot_force().
   [[nodiscard]] JointFeedback sample(const JointVector& drive_q_rad, const JointVector& drive_dq_radps,
-                                     std::int64_t stamp_ns);
+                                     std::int64_t stamp_ns, double tick_s);
 
  private:
   ErrorParams params_;
   CounterNoise angle_noise_, rate_noise_;
   std::uint64_t index_ = 0;
+  JointVector last_q_rad_ = JointVector::Zero();  // as read
 };
 
-// Vertical forces as the plant's contact sensors report them 6 ms later.
+// Vertical forces as the feet's sensors report them 6 ms later. The foot below its sensor is felt when it moves.
 class FootForceModel {
  public:
-  [[nodiscard]] std::array<double, kFootCount> sample(const std::array<double, kFootCount>& force_n) {
-    history_.push_overwrite(force_n);
-    return history_.oldest();
-  }
+  FootForceModel(const ErrorParams& params, std::uint64_t seed) : params_(params), noise_(seed, Stream::kFootForces) {}
+  [[nodiscard]] std::array<double, kFootCount> sample(const std::array<double, kFootCount>& contact_n,
+                                                      const std::array<double, kFootCount>& true_sole_z_m,
+                                                      double tick_s);
 
  private:
   static constexpr std::size_t kDelay_ticks = 3;
+  ErrorParams params_;
+  CounterNoise noise_;
+  std::uint64_t index_ = 0;
   RingBuffer<std::array<double, kFootCount>, kDelay_ticks + 1> history_;
+  RingBuffer<std::array<double, kFootCount>, 3> true_sole_z_m_;
 };
 
 // What the drives say of their torques: friction and noise on top.
@@ -72,14 +77,21 @@ class LioModel {
       : params_(params),
         errors_(errors),
         position_noise_(seed, Stream::kLioPosition),
-        rotation_noise_(seed, Stream::kLioRotation) {}
+        rotation_noise_(seed, Stream::kLioRotation),
+        walk_noise_(seed, Stream::kLioWalk) {}
   [[nodiscard]] LioSample sample(const Transform& true_T_base, std::int64_t stamp_ns);
 
  private:
+  // What the odometry makes of the truth by drift and jumps alone.
+  [[nodiscard]] Transform drifted(const Transform& true_T_base, std::int64_t stamp_ns);
+
   ErrorParams params_;
   const RobotErrors& errors_;
-  CounterNoise position_noise_, rotation_noise_;
+  CounterNoise position_noise_, rotation_noise_, walk_noise_;
   std::uint64_t index_ = 0;
+  std::int64_t last_ns_ = -1;  // negative: there was no sample
+  double run_s_ = 0.0;         // since the first
+  Vec3 start_m_ = Vec3::Zero(), walk_m_ = Vec3::Zero();
 };
 
 }  // namespace polygmap::sim

@@ -127,9 +127,9 @@ double tread_margin_m(const Vec3& point_m, const StairWorld& world, int step) no
   return std::min({point_m.x() - s.nosing_x_m, s.back_x_m - point_m.x(), world.half_width_m - std::abs(point_m.y())});
 }
 
-double sole_margin_m(const Transform& true_T_sole, const StairWorld& world, int step) noexcept {
+double sole_margin_m(const Transform& true_T_sole, const StairWorld& world, int step, const SoleModel& sole) noexcept {
   double least = kInf;
-  for (const Vec3& corner : nominal_robot().sole.contacts_m())
+  for (const Vec3& corner : sole.contacts_m())
     least = std::min(least, tread_margin_m(true_T_sole * corner, world, step));
   return least;
 }

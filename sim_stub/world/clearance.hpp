@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "algorithms/robot/body_shapes.hpp"
+#include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/world/stair_world.hpp"
 
 namespace polygmap::sim {
@@ -36,7 +37,8 @@ struct SolidBox {
 
 // Least signed distance of the contact rectangle's corners, seen from above, to the edges of the tread of one step
 // (nosing, next riser, sides; the landing's far end); negative = overhang. For kFloorStep the edge is the staircase.
-[[nodiscard]] double sole_margin_m(const Transform& true_T_sole, const StairWorld& world, int step) noexcept;
+[[nodiscard]] double sole_margin_m(const Transform& true_T_sole, const StairWorld& world, int step,
+                                   const SoleModel& sole = nominal_robot().sole) noexcept;
 // The same for one point.
 [[nodiscard]] double tread_margin_m(const Vec3& point_m, const StairWorld& world, int step) noexcept;
 

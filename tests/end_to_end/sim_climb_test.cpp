@@ -164,7 +164,8 @@ void expect_to_name(const std::string& what, double true_m, const std::string& r
 // x axis is the true world's.
 void expect_footholds_to_move_by(double dx_m, double dy_m, double dz_m) {
   ClimbOptions options = options_of(5, 1);
-  options.mount_error_deg = 0.0;  // 30 mm too near, the robot has no millimetre to spare before the first step
+  // 30 mm too near, the robot has no millimetre to spare before the first step.
+  options.reality.sensors.camera_mount_rad = options.reality.sensors.camera_mount_m = 0.0;
   const ClimbSummary straight = climb(options);
   options.render_dx_m = dx_m;
   options.render_dy_m = dy_m;

@@ -6,7 +6,7 @@
 // given up, so that every row's work is counted whatever it takes.
 // --babble: the joints are behind buses of that file, in memory, that are as full as they can be (babbling_bus.hpp).
 // WHAT: allocate (a heap call inside the module), overrun=ROW (that row takes 3 ms), gap=MS (IMU and joints are
-// silent).
+// silent). A fault whose time never came fails the run.
 #include <fcntl.h>
 #include <sched.h>
 #include <sys/mman.h>
@@ -39,8 +39,8 @@ namespace polygmap::vm {
 namespace {
 
 struct Injection {
+  std::size_t row = kTasks.size();  // allocates, or else overruns, when it runs next; none: no row does
   bool allocates = false;
-  std::size_t overrunning_row = kTasks.size();
   std::int64_t silent_ns = 0;
   std::int64_t at_ns = 0;  // since the first tick
 };
@@ -95,18 +95,20 @@ class InjectedPipeline {
       : pipeline_(pipeline), injection_(injection), at_ns_(first_ns + injection.at_ns) {}
 
   Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
-    if (cycle_ns == at_ns_) inject(row);
+    if (row == injection_.row && cycle_ns >= at_ns_ && !done_) inject();
     return pipeline_.run_row(row, cycle_ns, budget);
   }
   void cycle_done(std::size_t lane, const CycleReport& report) noexcept { pipeline_.cycle_done(lane, report); }
+  [[nodiscard]] bool done() const noexcept { return done_; }
 
  private:
-  void inject(std::size_t row) noexcept {
-    if (injection_.allocates && row == 0) {
+  void inject() noexcept {
+    done_ = true;
+    if (injection_.allocates) {
       void* volatile block = std::malloc(1);  // volatile: or the compiler leaves both calls out
       std::free(block);
+      return;
     }
-    if (row != injection_.overrunning_row) return;
     constexpr std::int64_t kTooLong_ns = 3 * kNsPerMs;
     const std::int64_t begin_ns = monotonic_ns();
     while (monotonic_ns() - begin_ns < kTooLong_ns) {
@@ -115,6 +117,7 @@ class InjectedPipeline {
   Pipeline& pipeline_;
   const Injection injection_;
   const std::int64_t at_ns_;
+  bool done_ = false;  // only the row's own lane looks at it while the lanes run
 };
 
 using Meter = hal::RowMeter<InjectedPipeline, kTasks.size()>;
@@ -317,6 +320,18 @@ Totals totals_of(const Climb& climb) {
   return t;
 }
 
+// Says so where a fault was asked for and its time never came.
+bool missed_fault(const Climb& climb) {
+  const Injection& injection = climb.options.injection;
+  const std::int64_t lasted_ns = climb.last_ns() - climb.first_ns();
+  const bool missed =
+      injection.silent_ns > 0 ? lasted_ns < injection.at_ns : injection.row < kTasks.size() && !climb.tasks->done();
+  if (missed) {
+    std::printf("the fault was never injected: the climb had ended at %.2f s\n", 1e-9 * static_cast<double>(lasted_ns));
+  }
+  return missed;
+}
+
 // Returns whether all that can be judged here passed.
 bool print_result(const Climb& climb, long faults) {
   const Totals t = totals_of(climb);
@@ -327,7 +342,8 @@ bool print_result(const Climb& climb, long faults) {
     std::printf("DIFFER first at %.3f s, at most %.3g rad\n",
                 1e-9 * static_cast<double>(climb.sensors.first_difference_ns()), climb.sensors.farthest_rad());
   }
-  const bool pass = t.overruns == 0 && faults == 0 && heap.calls == 0 && climb.sensors.frames() > 0 &&
+  const bool missed = missed_fault(climb);
+  const bool pass = !missed && t.overruns == 0 && faults == 0 && heap.calls == 0 && climb.sensors.frames() > 0 &&
                     climb.sensors.frames_differ() == 0 && climb.camera.lost() == 0 &&
                     (climb.options.steps == 0 ||
                      (gait.phase == GaitPhase::kFinished && gait.treads_climbed == climb.options.steps)) &&
@@ -379,9 +395,10 @@ Injection parse_injection(const std::string& text) {
   injection.at_ns = static_cast<std::int64_t>(seconds * 500.0 + 0.5) * kCycle_ns;
   if (what == "allocate") {
     injection.allocates = true;
+    injection.row = 0;
   } else if (what.starts_with("overrun=")) {
-    injection.overrunning_row = row_named(kSchedule, std::string_view(what).substr(8));
-    if (injection.overrunning_row == kTasks.size()) refuse("no row of the schedule is called " + what.substr(8));
+    injection.row = row_named(kSchedule, std::string_view(what).substr(8));
+    if (injection.row == kTasks.size()) refuse("no row of the schedule is called " + what.substr(8));
   } else if (what.starts_with("gap=")) {
     injection.silent_ns = std::strtol(what.c_str() + 4, &end, 10) * kNsPerMs;
     if (*end != '\0' || injection.silent_ns <= 0) refuse("gap= takes milliseconds: " + what);

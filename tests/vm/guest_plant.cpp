@@ -146,6 +146,10 @@ class Plant {
         steps_climbed_, options_.steps, truth.fell ? 1 : 0, static_cast<int>(support.size()), support.data(), commands_,
         enters_, static_cast<long long>(camera_.shown()), static_cast<long long>(late_max_ns_ / 1000), refused_,
         unwitnessed_, 1e-9 * static_cast<double>(in_the_air_ns_ - gains_ns_));
+    if (options_.injection.what != What::kNothing && !fault_has_begun_) {
+      std::printf("the fault was never injected: the climb had ended at %.2f s\n",
+                  gains_ns_ < 0 ? 0.0 : 1e-9 * static_cast<double>(monotonic_ns() - gains_ns_));
+    }
     if (truth.fell) std::printf("PLANT fell: %s\n", truth.fall_reason.c_str());
     for (const Told& told : told_) std::printf("TOLD %.3f %s\n", told.since_s, told.state.c_str());
   }
@@ -204,10 +208,13 @@ class Plant {
       }
     }
   }
-  [[nodiscard]] bool injected(What what) const {
-    return gains_ns_ >= 0 && options_.injection.is_on(what, monotonic_ns() - gains_ns_);
+  [[nodiscard]] bool injected(What what) {
+    if (gains_ns_ < 0) return false;
+    const std::int64_t since_ns = monotonic_ns() - gains_ns_;
+    fault_has_begun_ |= options_.injection.has_begun(what, since_ns);
+    return options_.injection.is_on(what, since_ns);
   }
-  [[nodiscard]] bool injected(What what, std::size_t number) const {
+  [[nodiscard]] bool injected(What what, std::size_t number) {
     return options_.injection.number == number && injected(what);
   }
 
@@ -382,7 +389,7 @@ class Plant {
   std::int64_t in_the_air_ns_ = 0;  // when a foot was it last
   std::uint16_t imu_count_ = 0;
   std::uint32_t lio_count_ = 0;
-  bool was_off_ = false;
+  bool was_off_ = false, fault_has_begun_ = false;
   std::uint64_t seed_ = 1;
   std::array<bool, 64> climbed_{};
   int steps_climbed_ = 0, rested_ticks_ = 0, resting_step_ = -1;

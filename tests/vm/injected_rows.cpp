@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The row hook of polygmapd_inject, the daemon with a seeded violation: what /job/injection says, "allocate@S" or
-// "overrun=ROW@S", S seconds after the first cycle.
+// "overrun=ROW@S", S seconds after the first cycle. It says at the end if that never came.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -21,6 +22,14 @@ std::int64_t monotonic_ns() noexcept {
 
 class Violation final : public RowHook {
  public:
+  Violation() = default;
+  Violation(const Violation&) = delete;
+  Violation& operator=(const Violation&) = delete;
+  ~Violation() {
+    if (row_ >= kTasks.size() || done_) return;
+    std::printf("the fault was never injected: the climb had ended at %.2f s\n",
+                1e-9 * static_cast<double>(last_ns_ - std::max<std::int64_t>(first_ns_, 0)));
+  }
   // False: it is none.
   [[nodiscard]] bool parse(const std::string& text) {
     const std::size_t at = text.find('@');
@@ -34,6 +43,7 @@ class Violation final : public RowHook {
   void before_row(std::size_t row, std::int64_t cycle_ns) noexcept override {
     if (row != row_ || done_) return;
     if (first_ns_ < 0) first_ns_ = cycle_ns;
+    last_ns_ = cycle_ns;
     if (cycle_ns - first_ns_ < at_ns_) return;
     done_ = true;
     if (allocates_) {
@@ -49,8 +59,8 @@ class Violation final : public RowHook {
 
  private:
   bool allocates_ = false, done_ = false;
-  std::size_t row_ = 0;
-  std::int64_t at_ns_ = 0, first_ns_ = -1;
+  std::size_t row_ = kTasks.size();
+  std::int64_t at_ns_ = 0, first_ns_ = -1, last_ns_ = 0;
 };
 
 }  // namespace

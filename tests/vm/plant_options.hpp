@@ -24,8 +24,11 @@ struct PlantInjection {
   std::size_t number = 0;  // drive or bus
   std::int64_t at_ns = 0, lasts_ns = INT64_MAX / 4;
 
+  [[nodiscard]] bool has_begun(What asked, std::int64_t since_ns) const noexcept {
+    return what == asked && since_ns >= at_ns;
+  }
   [[nodiscard]] bool is_on(What asked, std::int64_t since_ns) const noexcept {
-    return what == asked && since_ns >= at_ns && since_ns - at_ns < lasts_ns;
+    return has_begun(asked, since_ns) && since_ns - at_ns < lasts_ns;
   }
 };
 

@@ -5,7 +5,7 @@ import re
 import subprocess
 
 from campaigns.climbs import span
-from campaigns.engine import ROOT, Page, Table, rows
+from campaigns.engine import ROOT, Page, Table, build, rows
 
 PROGRAM, BUS = "build/release/tests/benchmarks/mute_drives", "firmware/buses/cubemars.toml"
 # The program's columns: of the leg that stands, then of the one that swings: roll, yaw and pitch of the hip, knee, pitch and
@@ -18,9 +18,7 @@ CELL = re.compile(r"(ok|foot|FELL|runs)([\d.]+)")
 
 
 def mute(engine, seeds):
-    built = subprocess.run(["cmake", "--build", ROOT / "build/release", "--target", "mute_drives"], capture_output=True, text=True)
-    if built.returncode:
-        raise SystemExit(f"campaign: mute_drives was not built: {built.stdout[-400:]}")
+    build("mute_drives")
 
     def run(which):
         gait, seed = which

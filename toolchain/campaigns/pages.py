@@ -39,10 +39,12 @@ def write_page(name, table, page, date, code):
 
 
 def headline():
-    """README's table: every headline figure that was measured, with its command; older ones say so."""
+    """README's table: every headline figure that was measured and is shown, with its command; older ones say so."""
     lines = ["| figure | measured | asked | repeat with |", "|---|---|---|---|"]
     for name, entry in figures_of().items():
         for line in entry["figures"].values():
+            if not line.get("shown", True):
+                continue
             old = "" if entry["code"] == hash_of(name) else " (of older code)"
             measured, asked = ("; ".join(f[key] for f in line["figures"]) for key in ("measured", "bound"))
             asked = "-" if set(asked) <= set("-; ") else asked + line["unit"]

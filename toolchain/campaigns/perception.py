@@ -7,7 +7,7 @@ import re
 import subprocess
 import tempfile
 
-from campaigns.engine import ROOT, Page, Table, rows
+from campaigns.engine import ROOT, Page, Table, build, rows
 
 SHOWN = ("precision", "recall_treads", "recall_risers", "over_segmentation", "under_segmentation", "tread_angle_p95", "tread_offset_p95",
          "nosing_line_p95", "beyond_nosing_line_max", "columns_2px_beyond_max")
@@ -52,9 +52,7 @@ def paper_route(engine, seeds):
     tools = pathlib.Path(os.environ.get("POLYGMAP_SHARED_DATA", ROOT.parent / "shared/data")).parent / "tools"
     if not (tools / "stair_frames.py").exists():
         return None
-    built = subprocess.run(["cmake", "--build", ROOT / "build/release", "--target", "paper_route_frames"], capture_output=True, text=True)
-    if built.returncode:
-        raise SystemExit(f"campaign: paper_route_frames was not built: {built.stdout[-400:]}")
+    build("paper_route_frames")
     program = ROOT / "build/release/tests/paper_route_frames"
     routes = {"module": None, "paper's route, published parameters": "published", "paper's route, tuned here": "own"}
     lines = []

@@ -15,6 +15,7 @@ GUEST_PLANT = machine.ROOT / "build/orin/tests/vm/guest_plant"
 INJECTED = machine.ROOT / "build/orin/firmware/daemon/polygmapd_inject"
 RELEASE = machine.ROOT / "build/release"
 OF_A_ROW = re.compile(r"(allocate|overrun=\w+)@[\d.]+")
+MISSED = "the fault was never injected"  # what the guest's programs say of one whose time never came
 BAD = ("flagged", "short_ones", "wrong_stamp", "missing", "timeouts")  # of what the camera's driver counts
 TARGETS = ("orin:guest_plant", "orin:polygmapd_inject", "release:render_pictures", "release:recorded_frames", "release:polygmap_replay")
 DRIVES = 12
@@ -94,6 +95,10 @@ def numbers(pattern, text):
     return dict(re.findall(r"(\w+)=([\w.-]+)", lines[-1])) if lines else {}
 
 
+def missed_fault(said):
+    return bool(re.search(f"^{MISSED}", said, re.M))
+
+
 def replay(recording):
     done = subprocess.run([RELEASE / "polygmap_replay", recording], capture_output=True, text=True)
     found = re.search(r"^replay: (\d+) ticks, (\d+) differ$", done.stdout, re.M)
@@ -114,6 +119,7 @@ def judge(out, args):
     """What a run left in out: its figures, and whether it climbed without a flaw."""
     plant, daemon = ((out / name).read_text() if (out / name).exists() else "" for name in ("plant.txt", "daemon.txt"))
     robot, last, camera = numbers("PLANT(?= steps=)", plant), numbers("stopped", daemon), numbers("device camera", daemon)
+    missed = missed_fault(plant + daemon)
     frames = compare(out, args.bus)
     ticks, differ = replay(out / "recording")
     figures = {
@@ -125,9 +131,10 @@ def judge(out, args):
         "special": frames.get("special", 0), "pictures": frames.get("pictures", 0),
         "pictures_lost": frames.get("lost", 1) + sum(int(camera.get(key, 0)) for key in BAD),
         "state": last.get("state"), "phase": last.get("phase"), "reason": last.get("reason"),
-        "support": robot.get("support"), "fell": robot.get("fell"), "exit": last.get("exit"), "down_s": robot.get("down_s")}
+        "support": robot.get("support"), "fell": robot.get("fell"), "exit": last.get("exit"), "down_s": robot.get("down_s"),
+        "fault": "none" if not args.inject else "missed" if missed else "injected"}
     flaws = ("overruns", "page_faults", "heap_calls", "frames_differ", "ticks_differ", "pictures_lost")
-    good = (not any(figures[key] for key in flaws) and figures["steps"] == args.steps and figures["fell"] == "0"
+    good = (not missed and not any(figures[key] for key in flaws) and figures["steps"] == args.steps and figures["fell"] == "0"
             and figures["support"] == "both" and figures["frames"] > 0 and figures["pictures"] > 0
             and figures["special"] <= DRIVES * (2 if args.inject else 1)  # enters motor mode; once more after a silence
             and ticks == figures["ticks"] and figures["exit"] == "0")

@@ -50,6 +50,11 @@ struct Values {
   std::string doubt;  // why the frame is none of the kind, in the words that follow its name
 };
 
+// Three hexadecimal digits.
+std::string id_text(const hal::CanFrame& frame) {
+  const std::string text = frame_text(frame);
+  return text.substr(0, text.find('#'));
+}
 std::string bytes_of(const hal::CanFrame& frame) {
   return std::to_string(frame.length) + (frame.length == 1 ? " byte" : " bytes");
 }
@@ -69,7 +74,7 @@ Values command_values(const CanDrive& drive, const hal::CanFrame& frame) {
           ""};
 }
 
-// Both empty when it is another drive's.
+// Both empty when it names another drive.
 Values reply_values(const CanDrive& drive, const hal::CanFrame& frame) {
   const std::span<const std::uint8_t> bytes(frame.data.data(), frame.length);
   if (bytes.empty() || hal::name_in_reply(bytes, drive.reply) != hal::reply_name(drive.id, drive.reply)) return {};
@@ -84,6 +89,22 @@ Values reply_values(const CanDrive& drive, const hal::CanFrame& frame) {
            {"enabled", reply.enabled},
            {"drive_error", reply.error}},
           ""};
+}
+
+// Why a frame under the identifier of these joints' replies is none of theirs, whatever drive it names.
+std::string complaint_of_reply(const config::BusFile& bus, const std::vector<std::size_t>& joints,
+                               const hal::CanFrame& frame) {
+  const CanDrive& drive = bus.table.drives[joints.front()];
+  const std::string text = frame_text(frame), id = id_text(frame);
+  const bool one = joints.size() == 1;
+  const std::string who = one ? std::string(kJointNames[joints.front()]) + " on " + bus.buses[drive.bus] + " replies"
+                              : std::to_string(joints.size()) + " drives reply";
+  if (frame.length != 6 && frame.length != 8) {
+    return text + " has " + bytes_of(frame) + ", but under " + id + " " + who + ", and a reply has 6 or 8 bytes.";
+  }
+  const auto named = hal::name_in_reply({frame.data.data(), frame.length}, drive.reply);
+  return text + " names drive " + std::to_string(named) + " in its first byte, but under " + id + " " + who +
+         (one ? ", as drive " + std::to_string(hal::reply_name(drive.id, drive.reply)) : ", none as that") + ".";
 }
 
 Values feet_values(const hal::CanFeet& feet, const hal::CanFrame& frame) {
@@ -194,6 +215,7 @@ FrameReading frame_reading(const config::BusFile& bus, const std::string& on, co
   const std::vector<std::size_t> buses = buses_of(bus, on);
   Json readings = Json::array();
   FrameReading read;
+  std::vector<std::size_t> repliers;  // under the frame's identifier
   const auto take = [&](Json head, const std::string& whose, const Values& values) {
     if (!values.json.is_null()) {
       head.update(values.json);
@@ -209,7 +231,10 @@ FrameReading frame_reading(const config::BusFile& bus, const std::string& on, co
     const std::string& name = bus.buses[drive.bus];
     const std::string of_joint = std::string(kJointNames[n]) + " on " + name;
     const auto head = [&](const char* kind) { return Json{{"bus", name}, {"joint", kJointNames[n]}, {"kind", kind}}; };
-    if (drive.reply_id == frame.id) take(head("reply"), "a reply of " + of_joint, reply_values(drive, frame));
+    if (drive.reply_id == frame.id) {
+      repliers.push_back(n);
+      take(head("reply"), "a reply of " + of_joint, reply_values(drive, frame));
+    }
     if (drive.id == frame.id) take(head("command"), "a command to " + of_joint, command_values(drive, frame));
   }
   const hal::CanFeet& feet = bus.table.feet;
@@ -218,8 +243,10 @@ FrameReading frame_reading(const config::BusFile& bus, const std::string& on, co
     take(Json{{"bus", name}, {"kind", "feet"}}, "the feet's on " + name, feet_values(feet, frame));
   }
   if (readings.empty() && !read.doubts.empty()) throw config::FileError(read.doubts.front());
+  if (readings.empty() && !repliers.empty()) throw config::FileError(complaint_of_reply(bus, repliers, frame));
   if (readings.empty()) {
-    throw config::FileError("No drive of bus file \"" + bus.path + "\" sends or takes " + frame_text(frame) + ".");
+    throw config::FileError("Nothing on " + (on.empty() ? "the buses" : on) + " of bus file \"" + bus.path +
+                            "\" sends or takes frames under " + id_text(frame) + ".");
   }
   read.json = Json{{"frame", frame_text(frame)}, {"readings", readings}}.dump(2) + "\n";
   return read;

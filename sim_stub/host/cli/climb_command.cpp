@@ -47,6 +47,9 @@ struct ClimbArguments {
   bool no_mount_estimate = false;
   std::string camera;
   std::vector<std::string> pushes;
+  std::vector<std::string> set;
+  Reality usual;  // of the options that are items of it
+  double mount_error_deg = 1.0;
   const CLI::App* said = nullptr;  // which options were
 };
 
@@ -75,7 +78,19 @@ void declare_stairs(CLI::App& climb, StairParams& stairs) {
 }
 
 // What the robot truly is, where the module believes otherwise.
-void declare_body(CLI::App& climb, MujocoPlant::Params& mujoco) {
+void declare_reality(CLI::App& climb, ClimbArguments& a) {
+  MujocoPlant::Params& mujoco = a.usual.plant;
+  keep_within(
+      *climb
+           .add_option("--reality", a.options.reality_scale,
+                       "How far the robot and its sensors are from the data sheet: 0 as it says, 1 as real ones "
+                       "are, 2 twice as bad; drawn by the seed, see docs/reference/reality.md")
+           ->capture_default_str(),
+      0.0, 2.0);
+  climb
+      .add_option("--set", a.set, "One number of --reality by its name, as in plant.friction=0.4; goes before all else")
+      ->expected(1, 64)
+      ->type_name("NAME=VALUE");
   keep_within(*climb
                    .add_option("--mass-scale", mujoco.torso_mass_scale,
                                "The torso's true mass over the mass that the module believes")
@@ -104,13 +119,13 @@ void declare_camera(CLI::App& climb, ClimbArguments& a) {
            ->capture_default_str(),
       0.0, 32.0, "ms");
   keep_within(*climb
-                   .add_option("--mount-error", a.options.mount_error_deg,
+                   .add_option("--mount-error", a.mount_error_deg,
                                "How far the camera's mount may be off, unknown to the module: degrees about each axis, "
                                "and 3 mm for each degree")
                    ->capture_default_str(),
               0.0, 5.0, "degrees");
   keep_within(*climb
-                   .add_option("--scale-error", a.options.scale_error,
+                   .add_option("--scale-error", a.usual.sensors.depth_scale,
                                "How far the depths' scale may be off, unknown to the module: share of the depth")
                    ->capture_default_str(),
               0.0, 0.05);
@@ -171,7 +186,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   keep_among(*climb.add_option("--noise", a.noise, "Depth noise")->capture_default_str(), {"white", "correlated"});
   keep_among(*climb
                   .add_option("--contacts", a.contacts,
-                              "Foot forces: sensed, or, on the kinematic plant, inferred from joint torques")
+                              "Foot forces: sensed, or inferred from joint torques")
                   ->capture_default_str(),
              {"sensed", "inferred"});
   climb
@@ -181,7 +196,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
                       " to " + number(kHardestPush_ns) + " N s")
       ->expected(1, 16)
       ->type_name("\"T,AXIS,NS\"");
-  declare_body(climb, a.options.mujoco);
+  declare_reality(climb, a);
   declare_files(climb, a);
   declare_camera(climb, a);
   climb.add_option("--bus", a.bus, "The joints are behind CAN buses with the drives that this file describes")
@@ -237,10 +252,6 @@ std::string plant_complaint(ClimbArguments& a) {
   a.options.gait = a.gait == "ss" ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
   a.options.plant = a.plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kKinematic;
   a.options.infer_contacts = a.contacts == "inferred";
-  if (a.options.infer_contacts && a.options.plant != PlantKind::kKinematic) {
-    return "--contacts inferred needs --plant kinematic: under physics a leg that swings feigns a touch-down.";
-  }
-
   return {};
 }
 
@@ -273,6 +284,28 @@ std::string pushes_complaint(ClimbArguments& a) {
   return {};
 }
 
+std::string reality_complaint(ClimbArguments& a) {
+  Reality& reality = a.options.reality;
+  reality = draw_reality(a.options.reality_scale, a.options.seed);
+  const auto said = [&a](const char* name) { return a.said->count(name) > 0; };
+  if (said("--mass-scale")) reality.plant.torso_mass_scale = a.usual.plant.torso_mass_scale;
+  if (said("--torso-offset-x")) reality.plant.torso_offset_x_m = a.usual.plant.torso_offset_x_m;
+  if (said("--friction")) reality.plant.friction = a.usual.plant.friction;
+  if (said("--scale-error")) reality.sensors.depth_scale = a.usual.sensors.depth_scale;
+  if (said("--mount-error")) {
+    reality.sensors.camera_mount_rad = a.mount_error_deg * kPi / 180.0;
+    reality.sensors.camera_mount_m = 0.003 * a.mount_error_deg;
+  }
+  for (const std::string& assignment : a.set) {
+    if (assignment.starts_with("plant.") && a.options.plant != PlantKind::kMujoco) {
+      return "--set " + assignment + " needs --plant mujoco: the kinematic plant has neither masses nor friction.";
+    }
+    const std::string sentence = set_item(reality, assignment);
+    if (!sentence.empty()) return sentence;
+  }
+  return {};
+}
+
 std::string errors_complaint(ClimbArguments& a) {
   a.options.noise = a.noise == "white" ? NoiseKind::kWhite : NoiseKind::kCorrelated;
   return {};
@@ -298,11 +331,6 @@ std::string bus_complaint(ClimbArguments& a) {
   a.options.bus = config::read_bus(a.bus);
   RobotModel robot = a.options.params.robot;
   config::limit_by_drives(*a.options.bus, a.options.params.gait.joints, robot);
-  if (!a.options.bus->table.feet.present && a.options.plant != PlantKind::kKinematic) {
-    return "Bus file \"" + a.bus +
-           "\": it has no [feet], and contacts inferred from joint torques need --plant kinematic: under physics a leg "
-           "that swings feigns a touch-down.";
-  }
   if (a.options.can_log.empty()) return {};
   for (const std::string& taken : {a.bus, a.camera, a.options.params_file, a.options.out_dir + "/summary.json",
                                    a.options.out_dir + "/climb.svg"}) {
@@ -340,8 +368,8 @@ std::string complaint(ClimbArguments& a) {
   try {
     take_params(a);
     std::string sentence = stairs_complaint(a.options.stairs);
-    for (const auto part : {balusters_complaint, plant_complaint, pushes_complaint, errors_complaint, camera_complaint,
-                            bus_complaint, picture_complaint}) {
+    for (const auto part : {balusters_complaint, plant_complaint, pushes_complaint, errors_complaint, reality_complaint,
+                            camera_complaint, bus_complaint, picture_complaint}) {
       if (sentence.empty()) sentence = part(a);
     }
     if (!sentence.empty()) return sentence;

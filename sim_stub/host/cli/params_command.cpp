@@ -9,6 +9,7 @@
 #include "firmware/config/param_file.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/cli/command_words.hpp"
+#include "sim_stub/reality.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -112,6 +113,28 @@ std::string params_difference(const Params& params) {
   return out;
 }
 
+std::string reality_markdown() {
+  Reality defaults;
+  std::string out =
+      "# Reality\n\nWritten by `toolchain/checks/docs --write`, not by hand.\n\nWhere the simulated robot "
+      "may differ from the data sheet that the module keeps. `polygmap climb --reality R` draws them by the "
+      "seed, `--set NAME=VALUE` gives one of them; `summary.json` says what they were. Of several numbers "
+      "each is drawn alone.\n\n| name | without | range | at `--reality 1` | what it is |\n|---|---|---|---|---|\n";
+  for (const Param& param : config::param_table(defaults).params) {
+    std::string drawn = "the same";
+    for (const RealityItem& item : reality_items()) {
+      if (item.name != param.name) continue;
+      const std::string size = config::text_of(item.at_one);
+      drawn = item.draw == Draw::kLevel  ? (item.at_one < 0.0 ? "" : "+") + size
+              : item.draw == Draw::kEven ? "evenly within +-" + size
+                                         : "normally, sigma " + size;
+    }
+    out += "| `" + param.name + "` | " + config::text_of(param) + " | " + range(param) + " | " + drawn + " | " +
+           std::string(param.text) + " |\n";
+  }
+  return out;
+}
+
 CLI::App* declare_params(CLI::App& app, ParamsArguments& a) {
   CLI::App* params = app.add_subcommand("params", "The module's parameters: list them, document them, compare a file");
   params->require_subcommand(1);
@@ -119,6 +142,7 @@ CLI::App* declare_params(CLI::App& app, ParamsArguments& a) {
   a.list->add_flag("--json", a.json, "As JSON instead, with defaults");
   a.list->add_option("--params", a.file, "As this file has them")->type_name("FILE.toml");
   a.docs = params->add_subcommand("docs", "Their reference as Markdown");
+  a.reality = params->add_subcommand("reality", "What climb --reality draws and --set gives, as Markdown");
   a.diff = params->add_subcommand("diff", "What a file makes different from the defaults");
   a.diff->add_option("FILE.toml", a.file, "Parameters to change")->required()->type_name("");
   return params;
@@ -134,6 +158,8 @@ int run_params(const ParamsArguments& a, std::ostream& out, std::ostream& err) {
   }
   if (a.docs->parsed()) {
     out << params_markdown();
+  } else if (a.reality->parsed()) {
+    out << reality_markdown();
   } else if (a.diff->parsed()) {
     const std::string different = params_difference(params);
     out << (different.empty() ? "No parameter differs from its default.\n" : different);

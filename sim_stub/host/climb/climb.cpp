@@ -93,14 +93,12 @@ SimOptions sim_options(const ClimbOptions& options) {
   sim.noise = options.noise;
   sim.plant_kind = options.plant;
   sim.pushes = options.pushes;
-  sim.mujoco = options.mujoco;
+  sim.errors = options.reality.sensors;
+  sim.mujoco = options.reality.plant;
   sim.camera.stairs_shift_m = {options.render_dx_m, options.render_dy_m, options.render_dz_m};
   sim.camera.missing_step = options.render_missing_step;
   sim.camera.threaded = options.threaded_render;
   sim.camera.scan_s = 1e-3 * options.scan_ms;
-  sim.errors.camera_mount_rad = options.mount_error_deg * kPi / 180.0;
-  sim.errors.camera_mount_m = 0.003 * options.mount_error_deg;
-  sim.errors.depth_scale = options.scale_error;
   if (options.camera) {
     sim.intrinsics = options.camera->intrinsics;
     sim.depth_sigma = options.camera->noise;
@@ -238,7 +236,8 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   Pipeline& pipeline = *module->pipeline;
   TimedPipeline& tasks = *module->timed;
   Executive& executive = *module->executive;
-  ClimbReport report(robot.stairs(), robot.errors().base_T_camera, robot.depth_camera().intrinsics());
+  ClimbReport report(robot.stairs(), robot.errors().base_T_camera, robot.depth_camera().intrinsics(),
+                     robot.errors().sole);
 
   std::int64_t end_ns = -1;
   std::int64_t next_progress_ns = 0;

@@ -13,7 +13,7 @@
 #include "firmware/config/camera_file.hpp"
 #include "firmware/params.hpp"
 #include "sim_stub/camera/noise_kind.hpp"
-#include "sim_stub/plant/mujoco_plant.hpp"
+#include "sim_stub/reality.hpp"
 #include "sim_stub/world/stair_world.hpp"
 
 namespace polygmap::sim {
@@ -28,7 +28,8 @@ struct ClimbOptions {
   NoiseKind noise = NoiseKind::kWhite;
   PlantKind plant = PlantKind::kMujoco;
   std::vector<Push> pushes;
-  MujocoPlant::Params mujoco;  // the body and the ground as they are; the module believes the data sheet
+  double reality_scale = 0.0;  // that reality was drawn at
+  Reality reality;             // the robot and the ground as they are; the module believes the data sheet
   GaitPattern gait = GaitPattern::kDoubleStep;
   std::string out_dir;       // empty: no files
   bool save_inputs = false;  // what the sensors said, in out_dir/inputs, a directory that exists
@@ -42,12 +43,9 @@ struct ClimbOptions {
   int render_missing_step = -1;  // 0-based, -1: none
   bool blank_depth = false;
   bool self_filter = true;
-  // The camera, and what the module is not told of it. Of a seed's errors, half ranges.
   std::optional<config::CameraProfile> camera;  // the robot's own when absent; the module is told its noise and range
   std::string camera_file;                      // that it was read from
   double scan_ms = 16.0;                        // one exposure, top to bottom; SimDepthCamera rounds it
-  double mount_error_deg = 1.0;                 // roll, pitch, yaw; and 3 mm per degree in each direction
-  double scale_error = 0.003;
   // The module's parameters; what else is said here of the module goes before. The IMU is as they say.
   Params params;
   std::string params_file;  // that they were read from

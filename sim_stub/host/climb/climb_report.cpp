@@ -39,10 +39,12 @@ double nosing_distance_m(const Step& step, const Transform& true_T_sole) {
 
 }  // namespace
 
-ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera, const CameraIntrinsics& intrinsics)
+ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera, const CameraIntrinsics& intrinsics,
+                         const SoleModel& true_sole)
     : world_(std::move(world)),
       solids_(stair_solids(world_)),
       true_base_T_camera_(true_base_T_camera),
+      true_sole_(true_sole),
       visibility_(world_, intrinsics),
       climbed_(world_.steps.size(), false) {}
 
@@ -212,7 +214,7 @@ void ClimbReport::observe_balance(const Truth& truth, const Telemetry& telemetry
 double ClimbReport::flight_clearance_m(const Flight& flight, int to_step, double at_most_m) const {
   const std::array excluded{flight.from_step, to_step};
   for (const Transform& true_T_sole : flight.true_T_sole) {
-    at_most_m = clearance_m(collision_box(nominal_robot().sole, true_T_sole), solids_, excluded, at_most_m);
+    at_most_m = clearance_m(collision_box(true_sole_, true_T_sole), solids_, excluded, at_most_m);
   }
   return at_most_m;
 }
@@ -235,10 +237,9 @@ void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
       flights_[foot].reset();
     }
     last_step_[foot] = step;
-    clearance_min_m_ =
-        clearance_m(collision_box(nominal_robot().sole, true_T_sole), solids_, std::array{step}, clearance_min_m_);
+    clearance_min_m_ = clearance_m(collision_box(true_sole_, true_T_sole), solids_, std::array{step}, clearance_min_m_);
     if (step < 0) continue;
-    const double margin_m = sole_margin_m(true_T_sole, world_, step);
+    const double margin_m = sole_margin_m(true_T_sole, world_, step, true_sole_);
     keep_min(sole_margin_min_m_, margin_m);
     const int footstep = standing_footstep_[foot];
     if (footstep >= 0) keep_min(footsteps_[static_cast<std::size_t>(footstep)].sole_margin_m, margin_m);
@@ -251,7 +252,7 @@ void ClimbReport::observe_stance(const Truth& truth) {
   if (world_.steps.empty() || first_lift_off_ns_ >= 0) return;
   double toe_x_m = -std::numeric_limits<double>::infinity();
   for (const Transform& true_T_sole : truth.true_T_sole) {
-    const OrientedBox box = collision_box(nominal_robot().sole, true_T_sole);
+    const OrientedBox box = collision_box(true_sole_, true_T_sole);
     toe_x_m = std::max(toe_x_m, box.centre.p_m.x() + box.centre.R.row(0).cwiseAbs().dot(box.half_m));
   }
   stand_off_m_ = world_.steps.front().nosing_x_m - toe_x_m;
@@ -261,7 +262,7 @@ void ClimbReport::observe_steps_climbed(const Truth& truth) {
   const int step = std::min(truth.step_index[0], truth.step_index[1]);
   bool rests = step >= 0 && truth.in_contact[0] && truth.in_contact[1];
   for (std::size_t foot = 0; rests && foot < kFootCount; ++foot) {
-    rests = sole_margin_m(truth.true_T_sole[foot], world_, truth.step_index[foot]) >= 0.0;
+    rests = sole_margin_m(truth.true_T_sole[foot], world_, truth.step_index[foot], true_sole_) >= 0.0;
   }
   if (!rests) {
     resting_step_ = -1;

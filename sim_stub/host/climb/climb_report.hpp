@@ -43,7 +43,8 @@ struct RunFigures {
 class ClimbReport {
  public:
   explicit ClimbReport(StairWorld world, const Transform& true_base_T_camera = nominal_robot().mounts.base_T_camera,
-                       const CameraIntrinsics& intrinsics = robot_camera_intrinsics());
+                       const CameraIntrinsics& intrinsics = robot_camera_intrinsics(),
+                       const SoleModel& true_sole = nominal_robot().sole);
 
   // Once per tick, after the module's tick, with the truth of the same instant.
   void observe(const Truth& truth, const Telemetry& telemetry);
@@ -86,6 +87,7 @@ class ClimbReport {
   StairWorld world_;
   std::vector<SolidBox> solids_;
   Transform true_base_T_camera_;
+  SoleModel true_sole_;
   SurfaceVisibility visibility_;
   std::deque<PastLegs> past_legs_;
 

@@ -75,16 +75,16 @@ Json arguments_json(const ClimbOptions& o) {
                {"noise", o.noise == NoiseKind::kWhite ? "white" : "correlated"},
                {"camera", o.camera ? Json(o.camera_file) : Json(nullptr)},
                {"scan_ms", o.scan_ms},
-               {"mount_error_deg", o.mount_error_deg},
-               {"scale_error", o.scale_error},
+               {"mount_error_deg", rounded(o.reality.sensors.camera_mount_rad * 180.0 / kPi, 1e6)},
+               {"scale_error", o.reality.sensors.depth_scale},
                {"params", o.params_file.empty() ? Json(nullptr) : Json(o.params_file)},
                {"estimate_mount", o.estimate_mount},
                {"self_filter", o.self_filter},
                {"contacts", o.infer_contacts ? "inferred" : "sensed"},
                {"pushes", pushes_json(o.pushes)},
-               {"mass_scale", o.mujoco.torso_mass_scale},
-               {"torso_offset_x_m", o.mujoco.torso_offset_x_m},
-               {"friction", o.mujoco.friction},
+               {"mass_scale", o.reality.plant.torso_mass_scale},
+               {"torso_offset_x_m", o.reality.plant.torso_offset_x_m},
+               {"friction", o.reality.plant.friction},
                {"render_shift_m", {o.render_dx_m, o.render_dy_m, o.render_dz_m}},
                {"render_missing_step", o.render_missing_step < 0 ? Json(nullptr) : Json(o.render_missing_step + 1)},
                {"blank_depth", o.blank_depth}};
@@ -131,6 +131,8 @@ Json to_json(const ClimbSummary& s) {
   j["seed"] = s.options.seed;
   j["arguments"] = arguments_json(s.options);
   j["params_hash"] = s.params_hash;
+  j["reality"] = {{"scale", s.options.reality_scale}};
+  for (const NamedValue& item : values_of(s.options.reality)) j["reality"][item.name] = Json::parse(item.text);
   const CameraFigures& camera = s.camera;
   const auto degrees = [](double x) { return rounded(x, 1e3); };
   j["camera"] = {

@@ -76,6 +76,13 @@ TEST(ParamFile, UnknownKey_NamesTheNearest) {
   expect_refused("tau_spm = 1.0\n", "the nearest is estimator.fusion.tau_spm.");
 }
 
+TEST(ParamFile, UnknownKeyLikeNone_NamesNone) {
+  const std::string list = "`polygmap params list` names all.";
+  expect_refused("speed = 2.0\n", "line 1: speed is no parameter; " + list);
+  expect_refused("[estimator.fusion]\ncolour = 2.0\n", "line 2: estimator.fusion.colour is no parameter; " + list);
+  expect_refused("[robot_arm]\n", "line 1: robot_arm is no table of parameters; " + list);
+}
+
 TEST(ParamFile, WrongType_IsRefused) {
   expect_refused("estimator.fusion.tau_s = \"2\"\n", "line 1: estimator.fusion.tau_s must be a number, not a text.");
   expect_refused("estimator.fusion.tau_s = [2.0]\n", "must be a number, not an array.");

@@ -95,7 +95,8 @@ TEST(Can, BadWords_AreRefusedInOneSentence) {
   for (const char* frame : {"1", "#11", "800#11", "001#1", "001#112233445566778899", "0011#11", "00G#11", "001#1G"}) {
     refused({"can", "decode", "--bus", bus, frame}, "A frame is an identifier");
   }
-  refused({"can", "decode", "--bus", bus, "123#11"}, "sends or takes 123#11");
+  refused({"can", "decode", "--bus", bus, "123#11"}, "\" sends or takes frames under 123.\n");
+  refused({"can", "decode", "--bus", bus, "--on", "can0", "004#11"}, "Nothing on can0 of bus file \"");
   refused({"can", "dbc", "--bus", bus, "--on", "can7"}, "has no bus \"can7\"");
 }
 
@@ -129,6 +130,29 @@ TEST(Can, FrameOfAnotherLength_IsASentenceAndNoJson) {
     EXPECT_EQ(said.code, kExitUsage) << frame;
     EXPECT_EQ(said.out, "") << frame;
     EXPECT_EQ(said.err, sentence);
+  }
+}
+
+// Of each shipped file what is true of it: 014 is the identifier of a reply, or of nothing; 000 of all replies, or of
+// nothing.
+TEST(Can, FrameOfNoDrive_SaysWhatTheIdentifierIs) {
+  const auto refused = [](const std::string& bus, const std::string& frame, const std::string& what) {
+    const Said said = say({"can", "decode", "--bus", shipped(bus), frame});
+    EXPECT_EQ(said.code, kExitUsage) << frame;
+    EXPECT_EQ(said.out, "") << frame;
+    EXPECT_NE(said.err.find(what), std::string::npos) << said.err;
+  };
+  refused("damiao", "014#00",
+          "014#00 has 1 byte, but under 014 left_knee on can1 replies, and a reply has 6 or 8 bytes.");
+  refused("damiao", "014#", "014# has 0 bytes, but under 014 left_knee on can1 replies");
+  refused("damiao", "014#057FFF7FF7FF",
+          "014#057FFF7FF7FF names drive 5 in its first byte, but under 014 left_knee on can1 replies, as drive 4.");
+  refused("damiao", "000#00", "sends or takes frames under 000.");
+  for (const char* bus : {"cubemars", "ruiwo"}) {
+    refused(bus, "014#00", "sends or takes frames under 014.");
+    refused(bus, "000#00", "000#00 has 1 byte, but under 000 12 drives reply, and a reply has 6 or 8 bytes.");
+    refused(bus, "000#147FFF7FF7FF",
+            "000#147FFF7FF7FF names drive 20 in its first byte, but under 000 12 drives reply, none as that.");
   }
 }
 

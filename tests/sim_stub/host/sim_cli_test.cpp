@@ -64,8 +64,7 @@ void expect_refused(const std::vector<std::string>& arguments, const std::string
 TEST(ClimbCommand, Contacts_SensedUnlessInferred) {
   EXPECT_FALSE(call({"climb"}).options->infer_contacts);
   EXPECT_TRUE(call({"climb", "--contacts", "inferred", "--plant", "kinematic"}).options->infer_contacts);
-  expect_refused({"climb", "--contacts", "inferred"}, "--contacts inferred needs --plant kinematic");
-  expect_refused({"climb", "--plant", "mujoco", "--contacts", "inferred"}, "--plant kinematic");
+  EXPECT_TRUE(call({"climb", "--contacts", "inferred"}).options->infer_contacts);
   expect_refused({"climb", "--contacts", "guessed"}, "--contacts");
 }
 
@@ -73,15 +72,16 @@ TEST(ClimbCommand, CameraErrors_OnByDefault_EachCanBeTurnedOff) {
   const Call usual = call({"climb"});
   ASSERT_TRUE(usual.options) << usual.err;
   EXPECT_EQ(usual.options->scan_ms, 16.0);
-  EXPECT_EQ(usual.options->mount_error_deg, 1.0);
-  EXPECT_EQ(usual.options->scale_error, 0.003);
+  EXPECT_EQ(usual.options->reality.sensors.camera_mount_rad, kPi / 180.0);
+  EXPECT_EQ(usual.options->reality.sensors.depth_scale, 0.003);
   EXPECT_TRUE(usual.options->estimate_mount);
   const Call none =
       call({"climb", "--scan-ms", "0", "--mount-error", "0", "--scale-error", "0", "--no-mount-estimate"});
   ASSERT_TRUE(none.options) << none.err;
   EXPECT_EQ(none.options->scan_ms, 0.0);
-  EXPECT_EQ(none.options->mount_error_deg, 0.0);
-  EXPECT_EQ(none.options->scale_error, 0.0);
+  EXPECT_EQ(none.options->reality.sensors.camera_mount_rad, 0.0);
+  EXPECT_EQ(none.options->reality.sensors.camera_mount_m, 0.0);
+  EXPECT_EQ(none.options->reality.sensors.depth_scale, 0.0);
   EXPECT_FALSE(none.options->estimate_mount);
   expect_refused({"climb", "--scan-ms", "40"}, "--scan-ms");
   expect_refused({"climb", "--mount-error", "-1"}, "--mount-error");
@@ -147,9 +147,9 @@ TEST(ClimbCommand, EveryOption_ReachesTheRun) {
   EXPECT_EQ(c.options->pushes[1].at_s, 7.5);
   EXPECT_EQ(c.options->pushes[1].axis, 1);
   EXPECT_EQ(c.options->pushes[1].impulse_ns, -8.0);
-  EXPECT_EQ(c.options->mujoco.torso_mass_scale, 1.2);
-  EXPECT_EQ(c.options->mujoco.torso_offset_x_m, -0.015);
-  EXPECT_EQ(c.options->mujoco.friction, 0.4);
+  EXPECT_EQ(c.options->reality.plant.torso_mass_scale, 1.2);
+  EXPECT_EQ(c.options->reality.plant.torso_offset_x_m, -0.015);
+  EXPECT_EQ(c.options->reality.plant.friction, 0.4);
   EXPECT_EQ(c.options->seed, 42U);
   EXPECT_EQ(c.options->noise, NoiseKind::kCorrelated);
   EXPECT_EQ(c.options->out_dir, temporary("every/deep"));

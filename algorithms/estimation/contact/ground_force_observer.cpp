@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/estimation/contact/ground_force_observer.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
+#include "algorithms/robot/leg_kinematics.hpp"
+
+namespace polygmap {
+namespace {
+
+// Velocities of a leg's links relative to the base's origin, base axes; the base turns, too.
+std::array<Vec3, kJointsPerLeg> link_velocities_mps(const LegFrames& frames, const std::array<Vec3, kJointsPerLeg>& p_m,
+                                                    const LegVector& dq_radps, const Vec3& base_w_radps) noexcept {
+  std::array<Vec3, kJointsPerLeg> v_mps;
+  Vec3 w_radps = base_w_radps, at_origin_mps = Vec3::Zero();
+  for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+    const Vec3 turn_radps = dq_radps[static_cast<Eigen::Index>(j)] * frames.joint[j].R.col(kJointAxis[j]);
+    w_radps += turn_radps;
+    at_origin_mps -= turn_radps.cross(frames.joint[j].p_m);
+    v_mps[j] = at_origin_mps + w_radps.cross(p_m[j]);
+  }
+  return v_mps;
+}
+
+}  // namespace
+
+void GroundForceObserver::reset(const Params& params) noexcept {
+  *this = GroundForceObserver{};
+  params_ = params;
+}
+
+std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& robot, const JointFeedback& joints,
+                                                           const ImuSample& base, const Vec3& base_up) noexcept {
+  const bool first = stamp_ns_ < 0;
+  const double dt_s = first ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
+  const double share = first ? 1.0 : dt_s / (params_.smoothing_s + dt_s), rate_ps = 1.0 / params_.smoothing_s;
+  stamp_ns_ = joints.stamp_ns;
+  felt_mps2_ += share * (base.accel_mps2 - felt_mps2_);
+  const BodyFrames frames = body_frames(robot.legs, joints.q_rad);
+  const PerLink p_m = base_p_links_m(robot.masses, frames);
+  std::array<double, kFootCount> upwards_n{};
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    const auto foot = static_cast<Foot>(f);
+    const LegVector dq_radps = leg_joints(joints.dq_radps, foot);
+    const auto v_mps = link_velocities_mps(frames[f], p_m.leg[f], dq_radps, base.gyro_radps);
+    Leg& leg = legs_[f];
+    if (first) leg.link_mps = v_mps;
+    std::array<Vec3, kJointsPerLeg> specific_mps2;
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      leg.link_mps[j] += share * (v_mps[j] - leg.link_mps[j]);
+      specific_mps2[j] = -felt_mps2_ - rate_ps * (v_mps[j] - leg.link_mps[j]) - base.gyro_radps.cross(v_mps[j]);
+    }
+    leg.drive_nm += share * (leg_joints(joints.tau_nm, foot) - leg.drive_nm);
+    leg.dq_radps += share * (dq_radps - leg.dq_radps);
+    LegVector left_nm = leg.drive_nm - leg_torques_nm(robot.masses, foot, frames[f], specific_mps2, {});
+    for (Eigen::Index j = 0; j < left_nm.size(); ++j) {
+      left_nm[j] -= robot.drives.armature_kgm2 * rate_ps * (dq_radps[j] - leg.dq_radps[j]) +
+                    params_.friction_nm * math::clamp(leg.dq_radps[j] / params_.creep_radps, -1.0, 1.0);
+    }
+    const LegJacobian J = leg_jacobian(robot.legs, foot, leg_joints(joints.q_rad, foot));
+    Eigen::Matrix<double, 6, 6> A = J * J.transpose();
+    A.diagonal().array() += math::square(params_.damping_m);
+    const Eigen::Matrix<double, 6, 1> wrench = -A.ldlt().solve(J * left_nm);
+    upwards_n[f] = wrench.head<3>().dot(base_up);
+  }
+  return upwards_n;
+}
+
+}  // namespace polygmap

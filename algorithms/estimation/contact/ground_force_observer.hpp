@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vertical foot forces from joint torques, for a robot without force sensors.
+//
+// A momentum observer of each leg, hung on a base whose motion the IMU feels: what the drives give, less what it takes
+// to carry and accelerate the links and the rotors and to overcome friction, is what the ground gives. Torques and
+// momenta pass the same low-pass, so that nothing is differentiated. Source: De Luca and Mattone, "Sensorless robot
+// collision detection and hybrid force/motion control", ICRA 2005; links as points, lever arms as they are now.
+#pragma once
+
+#include "algorithms/core/messages/samples.hpp"
+#include "algorithms/robot/leg_dynamics.hpp"
+
+namespace polygmap {
+
+class GroundForceObserver {
+ public:
+  struct Params {
+    double smoothing_s = 0.008;
+    double friction_nm = 1.0;
+    double creep_radps = 0.05;
+    double damping_m = 0.02;
+
+    static void visit(auto& p, auto& field) {
+      field("smoothing_s", p.smoothing_s, 0.0005, 0.1, "Time constant of the observed forces.");
+      field("friction_nm", p.friction_nm, 0.0, 50.0, "Coulomb friction of a joint, which a drive's torque holds.");
+      field("creep_radps", p.creep_radps, 0.001, 1.0, "The friction of a joint that turns more slowly is less.");
+      field("damping_m", p.damping_m, 0.001, 0.2,
+            "Damping of the inverse against a stretched knee: 0.02 takes 1 to 2 % of the force.");
+    }
+  };
+  void reset(const Params& params) noexcept;
+  // base: what the IMU feels, base axes; base_up: the vertical there. Forces in N, upwards on the foot; what
+  // friction and masses leave over has either sign.
+  [[nodiscard]] std::array<double, kFootCount> update(const RobotModel& robot, const JointFeedback& joints,
+                                                      const ImuSample& base, const Vec3& base_up) noexcept;
+
+ private:
+  // Low-passed, of one leg.
+  struct Leg {
+    LegVector drive_nm = LegVector::Zero();
+    LegVector dq_radps = LegVector::Zero();
+    std::array<Vec3, kJointsPerLeg> link_mps{};  // relative to the base's origin, base axes
+  };
+
+  Params params_;
+  std::array<Leg, kFootCount> legs_;
+  Vec3 felt_mps2_ = Vec3::Zero();
+  std::int64_t stamp_ns_ = -1;
+};
+
+}  // namespace polygmap
