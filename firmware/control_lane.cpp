@@ -112,6 +112,7 @@ void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept
   start_.imu_speaks = imu_ns != 0 && now_ns - imu_ns <= params_.gait.steer_age_ns;
   if (now_ns - start_.first_ns >= kArmingTimeout_ns) note_silent_drives(start_.silent, now_ns);
   if (!late.is_empty() || !drives_.bus.drive_errors.is_empty() || !drives_.out_of_range.is_empty()) return;
+  if (drives_.bus.feet_silent) return;
   if (!start_.imu_speaks || gait_.stop_requested()) return;
   estimator_.add_joints(*joints, now_ns);
 }

@@ -52,13 +52,10 @@ bool LegSensing::is_valid(const JointFeedback& joints) const noexcept {
               joints.q_rad.cwiseAbs().maxCoeff() <= params_.max_joint_rad &&
               joints.dq_radps.cwiseAbs().maxCoeff() <= params_.max_joint_speed_radps;
   for (const double force_n : joints.foot_force_n) {
-    const bool untold = any_ && std::isnan(force_n);
-    good = good && (params_.infer_forces || untold || std::abs(force_n) <= params_.max_force_n);
+    good = good && (std::isnan(force_n) || std::abs(force_n) <= params_.max_force_n);
   }
-  if (params_.infer_forces) {
-    good = good && math::all_finite(joints.tau_nm) && joints.tau_nm.cwiseAbs().maxCoeff() <= params_.max_torque_nm;
-  }
-  return good;
+  const bool torques_told = math::all_finite(joints.tau_nm);
+  return good && !(torques_told && joints.tau_nm.cwiseAbs().maxCoeff() > params_.max_torque_nm);
 }
 
 bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, const ImuSample& base,
@@ -85,14 +82,10 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
   dt_s_ = any_ ? seconds(joints.stamp_ns - joints_.stamp_ns) : 0.0;
   joints_ = carried;
   for (std::size_t n = 0; n < kJointCount; ++n) replied_ns_[n] = joints.stamp_ns - joints.silent_ns(n);
-  if (params_.infer_forces) {
-    joints_.foot_force_n = forces_.update(*robot_, joints_, base, base_up);
-    for (double& force_n : joints_.foot_force_n) force_n = force_n > params_.light_n ? force_n : 0.0;
-  }
+  joints_.foot_force_n = forces_.update(*robot_, joints_, base, base_up, stands);
   for (std::size_t n = 0; n < kJointCount; ++n) {  // the last torque is not this one's
     if (is_mute(n)) joints_.tau_nm[static_cast<Eigen::Index>(n)] = std::numeric_limits<double>::quiet_NaN();
   }
-  for (double& force_n : joints_.foot_force_n) force_n = std::max(force_n, 0.0);  // not a number stays so
   if (!std::isnan(joints_.foot_force_n[0] + joints_.foot_force_n[1])) felt_ns_ = joints_.stamp_ns;
   any_ = true;
   return true;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // From joint feedback to legs in the base frame: what is no joint's angle is left out, encoder offsets are taken off,
-// and forces that no sensor measures are inferred.
+// and what presses on the feet is told from torques and force sensors.
 #pragma once
 
 #include "algorithms/estimation/calibration/encoder_offsets.hpp"
-#include "algorithms/estimation/contact/ground_force_observer.hpp"
+#include "algorithms/estimation/contact/foot_forces.hpp"
 #include "algorithms/estimation/contact/leg_measurement.hpp"
 
 namespace polygmap {
@@ -13,9 +13,7 @@ class LegSensing {
  public:
   struct Params {
     EncoderOffsets::Params encoders;
-    bool infer_forces = false;
-    GroundForceObserver::Params forces;
-    double light_n = 20.0;
+    FootForces::Params forces;
     double max_torque_nm = 1000.0;
     double max_joint_rad = 4.0;
     double max_joint_speed_radps = 15.0;
@@ -25,10 +23,7 @@ class LegSensing {
 
     static void visit(auto& p, auto& field) {
       field("encoders", p.encoders);
-      field("infer_forces", p.infer_forces, "Foot forces come from joint torques, since no sensor measures them.");
       field("forces", p.forces);
-      field("light_n", p.light_n, 0.0, 200.0,
-            "What is left of friction and masses may feign so much: an inferred force that is less is none.");
       field("max_torque_nm", p.max_torque_nm, 1.0, 100000.0, "A joint sample of a higher torque is invalid.");
       field("max_joint_rad", p.max_joint_rad, 1.0, 100.0, "A joint sample of a larger angle is invalid.");
       field("max_joint_speed_radps", p.max_joint_speed_radps, 0.1, 1000.0,
@@ -61,8 +56,8 @@ class LegSensing {
                      const std::array<FootContact, kFootCount>& contacts, double longest_s) noexcept;
   void forget_offsets() noexcept { encoders_.learn_anew(); }
 
-  // The last accepted feedback, its angles without offset_rad(), its forces inferred where they are not sensed and not
-  // a number where their sensors are silent; any() is false before the first.
+  // The last accepted feedback, its angles without offset_rad(), its forces those of FootForces; any() is false before
+  // the first.
   [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
   [[nodiscard]] bool any() const noexcept { return any_; }
   [[nodiscard]] const JointVector& offset_rad() const noexcept { return encoders_.offset_rad(); }
@@ -81,7 +76,7 @@ class LegSensing {
   const RobotModel* robot_ = nullptr;
   Counters counters_;
   EncoderOffsets encoders_;
-  GroundForceObserver forces_;
+  FootForces forces_;
   JointFeedback joints_;                                // last accepted
   std::int64_t felt_ns_ = 0;                            // when both feet's forces were told last
   double dt_s_ = 0.0;                                   // between it and the one before

@@ -15,6 +15,8 @@ namespace {
 constexpr int kDriveSubsteps = 4;
 constexpr double kGapMemory_s = 1.0;  // how slowly the usual gap of a loaded foot is learnt
 
+const MassModel kMasses;
+
 const char* name_of(std::size_t foot) { return foot == 0 ? "left" : "right"; }
 double mm(double metres) { return 1e3 * metres; }
 
@@ -77,26 +79,36 @@ double KinematicPlant::foot_force_n(std::size_t foot) const noexcept {
   return feet_[foot].anchored ? std::max(kTouch_n, load_share(foot) * kRobotWeight_n) : 0.0;
 }
 
-// The feet's forces through the Jacobians. Where in its sole each presses is what the body's place and acceleration
-// leave over beyond the shares, within the sole.
+// What the feet's forces, the links and the rotors ask of the drives. Where in its sole a foot presses is what the
+// body's place and acceleration leave over beyond the shares, within the sole.
 void KinematicPlant::load_drives() {
+  constexpr double kMost_mps2 = 50.0;  // a sole that meets the ground stops within a tick
   const SoleRectangle& sole = errors_.sole.contact;
   const Vec3 between_m = load_share(0) * feet_[0].true_T_sole.p_m + load_share(1) * feet_[1].true_T_sole.p_m;
   const Vec3 rest_m = pressed_m() - between_m;
   for (std::size_t f = 0; f < kFootCount; ++f) {
     const auto leg = static_cast<Foot>(f);
-    const LegVector q = leg_joints(true_q_rad(), leg);
+    const LegFrames frames = leg_frames(errors_.legs[f], leg, leg_joints(true_q_rad(), leg));
     const Vec3 base_f = true_T_base_.R.transpose() * Vec3{0, 0, foot_force_n(f)};
     const Vec3 local_m = feet_[f].true_T_sole.R.transpose() * rest_m;
-    const Vec3 base_r = base_T_sole(errors_.legs[f], leg, q).R *
+    const Vec3 base_r = frames.sole.R *
                         Vec3{math::clamp(local_m.x(), sole.heel_x_m, sole.toe_x_m),
                              math::clamp(local_m.y(), -sole.half_width_m, sole.half_width_m), 0.0};
-    Eigen::Matrix<double, 6, 1> wrench;
-    wrench.head<3>() = base_f;
-    wrench.tail<3>() = base_r.cross(base_f);
+    std::array<Vec3, kJointsPerLeg> specific_mps2;
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      LinkState& link = feet_[f].links[j];
+      const Vec3& c_m = kMasses.leg[j].centre_m;
+      const Vec3 p_m = true_T_base_ * (frames.joint[j] * Vec3{c_m.x(), side_sign(leg) * c_m.y(), c_m.z()});
+      const Vec3 v_mps = link.seen ? Vec3((p_m - link.p_m) / kPlantTick_s) : Vec3(Vec3::Zero());
+      const Vec3 a_mps2 = ((v_mps - link.v_mps) / kPlantTick_s).cwiseMax(-kMost_mps2).cwiseMin(kMost_mps2);
+      specific_mps2[j] = true_T_base_.R.transpose() * Vec3(Vec3{0, 0, -kGravity_mps2} - a_mps2);
+      link = {p_m, v_mps, true};
+    }
     tau_.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) =
-        -leg_jacobian(errors_.legs[f], leg, q).transpose() * wrench;
+        leg_torques_nm(kMasses, leg, frames, specific_mps2, {base_f, base_r.cross(base_f)});
   }
+  tau_ += nominal_robot().drives.armature_kgm2 / kPlantTick_s * (dq_ - dq_before_radps_);
+  dq_before_radps_ = dq_;
 }
 
 void KinematicPlant::step(const JointCommand& command) {
@@ -177,7 +189,7 @@ Vec3 KinematicPlant::true_p_mass_m() const {
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     frames[index_of(leg)] = leg_frames(errors_.legs[index_of(leg)], leg, leg_joints(true_q_rad(), leg));
   }
-  return true_T_base_ * centre_of_mass_m({}, base_p_links_m({}, frames));
+  return true_T_base_ * centre_of_mass_m(kMasses, base_p_links_m(kMasses, frames));
 }
 
 // Where the weight, moving as the base does, presses on the ground.

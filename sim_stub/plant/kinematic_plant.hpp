@@ -63,6 +63,10 @@ class KinematicPlant final : public Plant {
     Vec3 p_m = Vec3::Zero(), p_rate = Vec3::Zero();
     Vec3 turn_rad = Vec3::Zero(), turn_rate = Vec3::Zero();
   };
+  struct LinkState {  // of a link's centre, in the last tick
+    Vec3 p_m = Vec3::Zero(), v_mps = Vec3::Zero();
+    bool seen = false;
+  };
   struct FootState {
     Transform base_T_sole;
     Transform true_T_sole;                                   // the anchor while anchored
@@ -73,6 +77,7 @@ class KinematicPlant final : public Plant {
     int step = kFloorStep;
     double gap_m = 0.0;    // KinematicPlant::gap_m() as usual while standing
     double raise_m = 0.0;  // above that
+    std::array<LinkState, kJointsPerLeg> links;
   };
   [[nodiscard]] bool accept_command(const JointVector& command_rad, const JointVector& rate_radps);
   void move_joints(const JointVector& command_rad, const JointVector& rate_radps);
@@ -98,7 +103,8 @@ class KinematicPlant final : public Plant {
   JointVector q_, dq_ = JointVector::Zero();
   JointVector led_q_;                        // as the commands have led the joints:
   JointVector given_ = JointVector::Zero();  // and this further, by which the ankles have given way
-  JointVector tau_ = JointVector::Zero();    // of massless legs that stand, quasi-static
+  JointVector tau_ = JointVector::Zero();    // what the motion asks for, were it one
+  JointVector dq_before_radps_ = JointVector::Zero();
   Transform true_T_base_;
   Slack slack_;
   double share_ = 0.5, share_rate_ = 0.0;  // of the left foot

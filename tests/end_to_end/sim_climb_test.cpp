@@ -123,10 +123,10 @@ TEST(ClimbOneStep, SavedInputs_AreRead_AndTheEstimatorFollowsItsTruth) {
   EXPECT_EQ(picture.height_px, 480);
 }
 
-TEST(ClimbContacts, InferredFromTorques_ClimbedWithinTheFigures) {
+TEST(ClimbContacts, SensedToo_ClimbedWithinTheFigures) {
   for (const std::uint64_t seed : {1U, 2U}) {
     ClimbOptions options = options_of(seed, 4);
-    options.infer_contacts = true;
+    options.foot_sensors = true;
     expect_a_good_climb(climb(options), 4);
   }
 }

@@ -28,45 +28,49 @@ void FootForces::learn_zero(Sensor& sensor, double off_n, double least_sigma_n, 
   sensor.zero_variance_n2 = std::max((1.0 - gain) * sensor.zero_variance_n2, least_n2);
 }
 
-const std::array<FootForces::Pressed, kFootCount>& FootForces::update(
-    const RobotModel& robot, const JointFeedback& joints, const ImuSample& base, const Vec3& base_up,
-    const std::array<bool, kFootCount>& in_air) noexcept {
+FootForces::Weighed FootForces::sense(Sensor& sensor, double read_n, const Weighed& observed, bool hangs,
+                                      double dt_s) noexcept {
+  if (!std::isfinite(read_n)) return {};
+  if (++sensor.samples > 2) {  // a force that rises steadily is no noise
+    const double bend_n = read_n - 2.0 * sensor.last_n + sensor.before_n;
+    sensor.noise_n.take(math::square(bend_n) / 6.0, dt_s);
+  }
+  sensor.before_n = sensor.last_n;
+  sensor.last_n = read_n;
+  sensor.zero_variance_n2 += math::square(params_.zero_walk_nprs) * dt_s;
+  if (hangs) {
+    learn_zero(sensor, read_n, params_.zero_in_air_sigma_n, dt_s);
+  } else if (observed.weight_pn2 > 0.0) {
+    learn_zero(sensor, read_n - observed.force_n, params_.zero_by_torque_sigma_n, dt_s);
+  }
+  return {read_n - sensor.zero_n, 1.0 / (math::square(sensor.noise_n.sigma()) + sensor.zero_variance_n2)};
+}
+
+std::array<double, kFootCount> FootForces::update(const RobotModel& robot, const JointFeedback& joints,
+                                                  const ImuSample& base, const Vec3& base_up,
+                                                  const std::array<bool, kFootCount>& stands) noexcept {
   const double dt_s = stamp_ns_ < 0 ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
   stamp_ns_ = joints.stamp_ns;
   const bool torques_told = math::all_finite(joints.tau_nm) && joints.tau_nm.cwiseAbs().maxCoeff() > 0.0;
   std::array<double, kFootCount> observed_n{};
   if (torques_told) observed_n = observer_.update(robot, joints, base, base_up);
+  std::array<double, kFootCount> up_n{};
   for (std::size_t f = 0; f < kFootCount; ++f) {
-    Sensor& sensor = sensors_[f];
-    Pressed& foot = feet_[f];
-    const double read_n = joints.foot_force_n[f];
-    const double observed_weight = torques_told ? 1.0 / math::square(params_.observer_sigma_n) : 0.0;
-    double sensor_weight = 0.0;
-    if (std::isfinite(read_n)) {
-      if (++sensor.samples > 2) {  // a force that rises steadily is no noise
-        const double bend_n = read_n - 2.0 * sensor.last_n + sensor.before_n;
-        sensor.noise_n.take(math::square(bend_n) / 6.0, dt_s);
-      }
-      sensor.before_n = sensor.last_n;
-      sensor.last_n = read_n;
-      sensor.zero_variance_n2 += math::square(params_.zero_walk_nprs) * dt_s;
-      if (in_air[f]) {
-        learn_zero(sensor, read_n, params_.zero_in_air_sigma_n, dt_s);
-      } else if (torques_told) {
-        learn_zero(sensor, read_n - observed_n[f], params_.zero_by_torque_sigma_n, dt_s);
-      }
-      sensor_weight = 1.0 / (math::square(sensor.noise_n.sigma()) + sensor.zero_variance_n2);
-    }
-    const double weight = observed_weight + sensor_weight;
-    if (!(weight > 0.0)) {
-      foot = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()};
+    bool told = torques_told;
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) told = told && !joints.is_mute(joint_index(static_cast<Foot>(f), j));
+    const Weighed observed{observed_n[f], told ? 1.0 / math::square(params_.observer_sigma_n) : 0.0};
+    const bool hangs = told && !stands[f] && observed_n[f] < params_.light_n;
+    const Weighed sensed = sense(sensors_[f], joints.foot_force_n[f], observed, hangs, dt_s);
+    const double weight_pn2 = observed.weight_pn2 + sensed.weight_pn2;
+    if (!(weight_pn2 > 0.0)) {
+      up_n[f] = std::numeric_limits<double>::quiet_NaN();
       continue;
     }
-    const double sensed_n = sensor_weight > 0.0 ? read_n - sensor.zero_n : 0.0;
-    foot.up_n = std::max((observed_weight * observed_n[f] + sensor_weight * sensed_n) / weight, 0.0);
-    foot.sigma_n = 1.0 / math::sqrt(weight);
+    const double mean_n = (observed.weight_pn2 * observed.force_n + sensed.weight_pn2 * sensed.force_n) / weight_pn2;
+    const double light_n = std::min(params_.light_n, params_.light_sigmas / math::sqrt(weight_pn2));
+    up_n[f] = mean_n > light_n ? mean_n : 0.0;
   }
-  return feet_;
+  return up_n;
 }
 
 }  // namespace polygmap

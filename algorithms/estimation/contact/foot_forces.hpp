@@ -21,6 +21,8 @@ class FootForces {
     double zero_in_air_sigma_n = 3.0;
     double zero_s = 0.2;
     double zero_walk_nprs = 1.0;
+    double light_n = 20.0;
+    double light_sigmas = 2.0;
 
     static void visit(auto& p, auto& field) {
       field("observer", p.observer);
@@ -33,18 +35,17 @@ class FootForces {
             "The zero is known no better than this from a swing: the foot feels its own motion.");
       field("zero_s", p.zero_s, 0.002, 60.0, "The zero is averaged over so much time at least.");
       field("zero_walk_nprs", p.zero_walk_nprs, 0.0, 50.0, "Random walk of the zero.");
+      field("light_n", p.light_n, 0.0, 200.0, "A force below this and below `light_sigmas` is none.");
+      field("light_sigmas", p.light_sigmas, 0.0, 10.0, "So many of its sigmas a force may be feigned.");
     }
   };
-  struct Pressed {
-    double up_n = 0.0;     // never negative; not a number when nothing tells it
-    double sigma_n = 0.0;  // of up_n
-  };
   void reset(const Params& params) noexcept;
-  // joints: torques not a number are not told, as are foot forces. base: what the IMU feels, base axes; base_up: the
-  // vertical there. in_air: feet that hang for certain.
-  [[nodiscard]] const std::array<Pressed, kFootCount>& update(const RobotModel& robot, const JointFeedback& joints,
-                                                            const ImuSample& base, const Vec3& base_up,
-                                                            const std::array<bool, kFootCount>& in_air) noexcept;
+  // joints: a force that is not a number is not told, as are all torques when one is none or all are 0, and those of a
+  // leg with a mute drive. base: what the IMU feels, base axes; base_up: the vertical there. stands: which feet do as
+  // far as is known. Upwards on each foot, never negative; not a number where nothing tells it.
+  [[nodiscard]] std::array<double, kFootCount> update(const RobotModel& robot, const JointFeedback& joints,
+                                                      const ImuSample& base, const Vec3& base_up,
+                                                      const std::array<bool, kFootCount>& stands) noexcept;
 
  private:
   struct Sensor {
@@ -53,12 +54,16 @@ class FootForces {
     double last_n = 0.0, before_n = 0.0;
     int samples = 0;
   };
+  struct Weighed {
+    double force_n = 0.0, weight_pn2 = 0.0;  // 1 / variance; 0: not told
+  };
+  // observed: what torques tell. hangs: the foot does for certain.
+  [[nodiscard]] Weighed sense(Sensor& sensor, double read_n, const Weighed& observed, bool hangs, double dt_s) noexcept;
   void learn_zero(Sensor& sensor, double off_n, double least_sigma_n, double dt_s) noexcept;
 
   Params params_;
   GroundForceObserver observer_;
   std::array<Sensor, kFootCount> sensors_;
-  std::array<Pressed, kFootCount> feet_{};
   std::int64_t stamp_ns_ = -1;
 };
 

@@ -39,7 +39,7 @@ struct ClimbArguments {
   std::string noise = "white";
   std::string plant = name_of(ClimbOptions{}.plant);
   std::string gait = "ds";
-  std::string contacts = "sensed";
+  std::string contacts = "inferred";
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
   std::string bus;
@@ -186,9 +186,9 @@ void declare(CLI::App& climb, ClimbArguments& a) {
   keep_among(*climb.add_option("--noise", a.noise, "Depth noise")->capture_default_str(), {"white", "correlated"});
   keep_among(*climb
                   .add_option("--contacts", a.contacts,
-                              "Foot forces: sensed, or inferred from joint torques")
+                              "Foot forces: inferred from joint torques, or sensed, too")
                   ->capture_default_str(),
-             {"sensed", "inferred"});
+             {"inferred", "sensed"});
   climb
       .add_option("--push", a.pushes,
                   "Pushes of the torso, over 0.1 s: when, from " + number(kFirstPush_s) + " to " + number(kLastPush_s) +
@@ -228,7 +228,6 @@ void take_params(ClimbArguments& a) {
   Params& params = a.options.params;
   config::read_params(a.options.params_file, params);
   if (a.said->count("--gait") == 0) a.gait = name_of(params.gait.planner.pattern);
-  if (a.said->count("--contacts") == 0 && params.estimator.legs.infer_forces) a.contacts = "inferred";
   a.no_self_filter |= !params.self_filter;
   a.no_mount_estimate |= !params.estimate_mount;
 }
@@ -251,7 +250,7 @@ std::string stairs_complaint(const StairParams& stairs) {
 std::string plant_complaint(ClimbArguments& a) {
   a.options.gait = a.gait == "ss" ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
   a.options.plant = a.plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kKinematic;
-  a.options.infer_contacts = a.contacts == "inferred";
+  a.options.foot_sensors = a.contacts == "sensed";
   return {};
 }
 
@@ -329,6 +328,11 @@ std::string camera_complaint(ClimbArguments& a) {
 std::string bus_complaint(ClimbArguments& a) {
   if (a.bus.empty()) return a.options.can_log.empty() ? "" : "--can-log needs --bus: without one there are no frames.";
   a.options.bus = config::read_bus(a.bus);
+  const bool has_feet = a.options.bus->table.feet.present;
+  if (a.said->count("--contacts") == 0) a.options.foot_sensors = has_feet;
+  if (a.options.foot_sensors && !has_feet) {
+    return "--contacts sensed needs [feet] in \"" + a.bus + "\": its buses carry no foot forces.";
+  }
   RobotModel robot = a.options.params.robot;
   config::limit_by_drives(*a.options.bus, a.options.params.gait.joints, robot);
   if (a.options.can_log.empty()) return {};

@@ -82,10 +82,6 @@ struct Module {
 
 static_assert(VirtualClock::kTick_ns == kCycle_ns);
 
-bool infers_contacts(const ClimbOptions& options) {
-  return options.infer_contacts || (options.bus && !options.bus->table.feet.present);
-}
-
 SimOptions sim_options(const ClimbOptions& options) {
   SimOptions sim;
   sim.seed = options.seed;
@@ -104,7 +100,7 @@ SimOptions sim_options(const ClimbOptions& options) {
     sim.depth_sigma = options.camera->noise;
   }
   sim.imu_interval_ns = std::max(options.params.imu_interval_ns, VirtualClock::kTick_ns);
-  sim.force_sensors = !infers_contacts(options);
+  sim.force_sensors = options.foot_sensors;
   if (options.blank_depth) sim.camera.blank = {{0, INT64_MAX}};
   return sim;
 }
@@ -195,7 +191,6 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   Params params = options.params;
   params.gait.planner.pattern = options.gait;
   params.self_filter = options.self_filter;
-  params.estimator.legs.infer_forces = infers_contacts(options);
   params.estimate_mount = options.estimate_mount;
   if (options.camera) {
     params.surfaces.noise = options.camera->noise;
@@ -207,7 +202,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   if (options.bus) {
     config::limit_by_drives(*options.bus, params.gait.joints, params.robot);
     config::BusFile file = *options.bus;
-    if (options.infer_contacts) file.table.feet = {};
+    if (!options.foot_sensors) file.table.feet = {};
     if (!options.can_log.empty()) can_log.emplace(options.can_log);
     bus = std::make_unique<BusRobot>(robot, file, can_log ? &*can_log : nullptr);
   }

@@ -53,7 +53,7 @@ struct ClimbOptions {
   // The joints are behind these buses, else wired directly. What the drives can do binds the module's robot.
   std::optional<config::BusFile> bus;
   std::string can_log;          // every frame on the buses, as candump -L writes it; empty: none
-  bool infer_contacts = false;  // from joint torques: the feet have no force sensors
+  bool foot_sensors = false;  // else contacts are told by joint torques alone
 };
 
 }  // namespace polygmap::sim

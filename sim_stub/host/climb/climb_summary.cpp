@@ -80,7 +80,7 @@ Json arguments_json(const ClimbOptions& o) {
                {"params", o.params_file.empty() ? Json(nullptr) : Json(o.params_file)},
                {"estimate_mount", o.estimate_mount},
                {"self_filter", o.self_filter},
-               {"contacts", o.infer_contacts ? "inferred" : "sensed"},
+               {"contacts", o.foot_sensors ? "sensed" : "inferred"},
                {"pushes", pushes_json(o.pushes)},
                {"mass_scale", o.reality.plant.torso_mass_scale},
                {"torso_offset_x_m", o.reality.plant.torso_offset_x_m},

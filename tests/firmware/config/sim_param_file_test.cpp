@@ -71,7 +71,7 @@ TEST(ParamFile, Empty_ChangesNothing) { EXPECT_EQ(hash_of(read("# nothing\n")), 
 TEST(ParamFile, UnknownKey_NamesTheNearest) {
   expect_refused("[estimator]\n[estimator.fusion]\ntau = 2.0\n",
                  "line 3: estimator.fusion.tau is no parameter; the nearest is estimator.fusion.tau_s.");
-  expect_refused("[estmator]\ninfer_forces = true\n",
+  expect_refused("[estmator]\nimu_of_moments = true\n",
                  "line 1: estmator is no table of parameters; the nearest is estimator.");
   expect_refused("tau_spm = 1.0\n", "the nearest is estimator.fusion.tau_spm.");
 }
@@ -87,8 +87,8 @@ TEST(ParamFile, WrongType_IsRefused) {
   expect_refused("estimator.fusion.tau_s = \"2\"\n", "line 1: estimator.fusion.tau_s must be a number, not a text.");
   expect_refused("estimator.fusion.tau_s = [2.0]\n", "must be a number, not an array.");
   expect_refused("estimator.fusion.tau_s = 1979-05-27\n", "must be a number, not a date or time.");
-  expect_refused("estimator.legs.infer_forces = 1\n",
-                 "estimator.legs.infer_forces must be true or false, not a whole number.");
+  expect_refused("estimator.imu_of_moments = 1\n",
+                 "estimator.imu_of_moments must be true or false, not a whole number.");
   expect_refused("estimator.fusion.realign_count = 2.5\n", "must be a whole number, not 2.5.");
   expect_refused("estimator.fusion = 3\n", "estimator.fusion is a table of parameters, not a whole number.");
   expect_refused("robot.mounts.base_T_camera.p_m = [0.1, 0.2]\n",

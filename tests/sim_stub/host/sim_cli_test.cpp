@@ -61,10 +61,10 @@ void expect_refused(const std::vector<std::string>& arguments, const std::string
   EXPECT_EQ(c.out, "");
 }
 
-TEST(ClimbCommand, Contacts_SensedUnlessInferred) {
-  EXPECT_FALSE(call({"climb"}).options->infer_contacts);
-  EXPECT_TRUE(call({"climb", "--contacts", "inferred", "--plant", "kinematic"}).options->infer_contacts);
-  EXPECT_TRUE(call({"climb", "--contacts", "inferred"}).options->infer_contacts);
+TEST(ClimbCommand, Contacts_InferredUnlessSensed) {
+  EXPECT_FALSE(call({"climb"}).options->foot_sensors);
+  EXPECT_FALSE(call({"climb", "--contacts", "inferred"}).options->foot_sensors);
+  EXPECT_TRUE(call({"climb", "--contacts", "sensed"}).options->foot_sensors);
   expect_refused({"climb", "--contacts", "guessed"}, "--contacts");
 }
 
@@ -213,7 +213,7 @@ TEST(Ranges, EveryOne_StandsInTheHelpAndInTheSentence) {
       {"--plant", "mujoco|kinematic=mujoco", "rubber", "must be mujoco or kinematic, not \"rubber\""},
       {"--gait", "ds|ss=ds", "trot", "must be ds or ss, not \"trot\""},
       {"--noise", "white|correlated=white", "pink", "must be white or correlated, not \"pink\""},
-      {"--contacts", "sensed|inferred=sensed", "none", "must be sensed or inferred, not \"none\""},
+      {"--contacts", "inferred|sensed=inferred", "none", "must be inferred or sensed, not \"none\""},
       {"--mass-scale", "FLOAT in [0.5, 2]=1", "0.4", "must be from 0.5 to 2, not 0.4"},
       {"--torso-offset-x", "FLOAT in [-0.1, 0.1]=0", "0.2", "must be from -0.1 to 0.1 m, not 0.2"},
       {"--friction", "FLOAT in [0.05, 2]=0.8", "0", "must be from 0.05 to 2, not 0"},

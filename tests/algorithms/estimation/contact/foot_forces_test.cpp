@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/estimation/contact/foot_forces.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/support/nominal_robot.hpp"
+#include "tests/support/ticks.hpp"
+
+namespace polygmap {
+namespace {
+
+using test::kNaN;
+
+// A robot at rest whose feet press by some force, the torques exact.
+class FootForcesTest : public testing::Test {
+ protected:
+  FootForcesTest() { forces_.reset({}); }
+  std::array<double, kFootCount> tick(const std::array<double, kFootCount>& pressed_n,
+                                      const std::array<double, kFootCount>& read_n) {
+    JointFeedback joints;
+    joints.stamp_ns = stamp_ns_ += 2'000'000;
+    joints.foot_force_n = read_n;
+    joints.silent_cycles[kKnee] = silent_cycles_;
+    const Vec3 up = Vec3::UnitZ();
+    ImuSample base;
+    base.accel_mps2 = kGravity_mps2 * up;
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      LegVector q;
+      q << 0.0, 0.0, -0.4, 0.8, -0.4, 0.0;
+      const auto at = static_cast<Eigen::Index>(joint_index(foot, 0));
+      joints.q_rad.segment<6>(at) = q;
+      std::array<Vec3, kJointsPerLeg> specific_mps2;
+      specific_mps2.fill(-kGravity_mps2 * up);
+      if (!tells_torques_) continue;
+      joints.tau_nm.segment<6>(at) = leg_torques_nm(robot_.masses, foot, leg_frames(robot_.legs, foot, q), specific_mps2,
+                                                    {pressed_n[index_of(foot)] * up, Vec3::Zero()});
+    }
+    return forces_.update(robot_, joints, base, up, {pressed_n[0] > 0.0, pressed_n[1] > 0.0});
+  }
+  std::array<double, kFootCount> ticks(int count, const std::array<double, kFootCount>& pressed_n,
+                                       const std::array<double, kFootCount>& offset_n) {
+    std::array<double, kFootCount> up_n{};
+    for (int i = 0; i < count; ++i) up_n = tick(pressed_n, {pressed_n[0] + offset_n[0], pressed_n[1] + offset_n[1]});
+    return up_n;
+  }
+
+  RobotModel robot_ = nominal_robot();
+  FootForces forces_;
+  std::int64_t stamp_ns_ = 0;
+  bool tells_torques_ = true;
+  std::uint16_t silent_cycles_ = 0;
+};
+
+TEST_F(FootForcesTest, NoSensor_TorquesTellTheForce) {
+  const auto up_n = ticks(100, {400.0, 140.0}, {kNaN, kNaN});
+  EXPECT_NEAR(up_n[0], 400.0, 10.0);
+  EXPECT_NEAR(up_n[1], 140.0, 5.0);
+}
+
+TEST_F(FootForcesTest, NoTorques_SensorIsBelieved) {
+  tells_torques_ = false;
+  const auto up_n = ticks(1000, {400.0, 140.0}, {0.0, 0.0});
+  EXPECT_NEAR(up_n[0], 400.0, 1e-9);
+  EXPECT_NEAR(up_n[1], 140.0, 1e-9);
+}
+
+TEST_F(FootForcesTest, NeitherIsTold_IsNoNumber) {
+  tells_torques_ = false;
+  EXPECT_TRUE(std::isnan(ticks(1, {400.0, 140.0}, {kNaN, kNaN})[0]));
+}
+
+TEST_F(FootForcesTest, MuteDrive_OnlyTheOtherLegIsToldByTorques) {
+  silent_cycles_ = JointFeedback::kCarried_cycles + 1;
+  const auto up_n = ticks(100, {270.0, 270.0}, {kNaN, kNaN});
+  EXPECT_TRUE(std::isnan(up_n[0]));
+  EXPECT_NEAR(up_n[1], 270.0, 10.0);
+}
+
+TEST_F(FootForcesTest, SensorWithAnOffset_ItsZeroIsLearntFromTorquesWhileItCarries) {
+  const auto first_n = ticks(1, {270.0, 270.0}, {60.0, -60.0});
+  EXPECT_NEAR(first_n[0], 270.0, 15.0) << "torques are known better from the first";
+  const auto up_n = ticks(1000, {270.0, 270.0}, {60.0, -60.0});
+  EXPECT_NEAR(up_n[0], 270.0, 8.0);
+  EXPECT_NEAR(up_n[1], 270.0, 8.0);
+}
+
+TEST_F(FootForcesTest, SensorWithAnOffset_AFootInTheAirPressesNothing) {
+  (void)ticks(1000, {270.0, 270.0}, {60.0, -60.0});
+  (void)ticks(200, {0.0, 540.0}, {60.0, -60.0});
+  EXPECT_EQ(tick({0.0, 540.0}, {60.0, 480.0})[0], 0.0);
+  // From the air the zero is known to some newtons: a touch is seen that torques alone would not tell.
+  EXPECT_NEAR(tick({15.0, 525.0}, {75.0, 465.0})[0], 15.0, 4.0);
+}
+
+TEST_F(FootForcesTest, NoisySensor_TheForceIsBetterThanTorquesOrSensorAlone) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise_n(0.0, 20.0);
+  double off_n2 = 0.0;
+  constexpr int kTicks = 2000;
+  for (int i = 0; i < kTicks; ++i) {
+    const double sensed_n = 270.0 + noise_n(random);
+    const double up_n = tick({270.0, 270.0}, {sensed_n, 270.0})[0];
+    if (i > kTicks / 2) off_n2 += math::square(up_n - 270.0) / (0.5 * kTicks);
+  }
+  EXPECT_LT(std::sqrt(off_n2), 8.0);
+}
+
+TEST_F(FootForcesTest, AFewNewtons_AreNoForceWhereOnlyTorquesTellThem) {
+  EXPECT_EQ(ticks(100, {15.0, 525.0}, {kNaN, kNaN})[0], 0.0);
+  EXPECT_NEAR(ticks(100, {40.0, 500.0}, {kNaN, kNaN})[0], 40.0, 3.0);
+}
+
+}  // namespace
+}  // namespace polygmap
