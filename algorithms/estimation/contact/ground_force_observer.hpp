@@ -25,7 +25,7 @@ class GroundForceObserver {
       field("friction_nm", p.friction_nm, 0.0, 50.0, "Coulomb friction of a joint, which a drive's torque holds.");
       field("creep_radps", p.creep_radps, 0.001, 1.0, "The friction of a joint that turns more slowly is less.");
       field("damping_m", p.damping_m, 0.001, 0.2,
-            "Damping of the inverse against a stretched knee: 0.02 takes 1 to 2 % of the force.");
+            "Damping of the inverse against a stretched knee: 0.02 takes 1 to 4 % of the force.");
     }
   };
   void reset(const Params& params) noexcept;
