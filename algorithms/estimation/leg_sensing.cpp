@@ -81,8 +81,9 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
   }
   dt_s_ = any_ ? seconds(joints.stamp_ns - joints_.stamp_ns) : 0.0;
   joints_ = carried;
+  frames_ = body_frames(robot_->legs, joints_.q_rad);
   for (std::size_t n = 0; n < kJointCount; ++n) replied_ns_[n] = joints.stamp_ns - joints.silent_ns(n);
-  joints_.foot_force_n = forces_.update(*robot_, joints_, base, base_up, stands);
+  joints_.foot_force_n = forces_.update(*robot_, frames_, joints_, base, base_up, stands);
   for (std::size_t n = 0; n < kJointCount; ++n) {  // the last torque is not this one's
     if (is_mute(n)) joints_.tau_nm[static_cast<Eigen::Index>(n)] = std::numeric_limits<double>::quiet_NaN();
   }
@@ -123,7 +124,7 @@ LegSample LegSensing::legs() const noexcept {
   LegSample sample;
   sample.stamp_ns = joints_.stamp_ns;
   for (std::size_t i = 0; i < kFootCount; ++i) {
-    sample.legs[i] = measure_leg(robot_->legs, static_cast<Foot>(i), joints_.q_rad, joints_.dq_radps);
+    sample.legs[i] = measure_leg(frames_[i], leg_joints(joints_.dq_radps, static_cast<Foot>(i)));
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       const std::size_t n = joint_index(static_cast<Foot>(i), j);
       if (!is_mute(n)) continue;

@@ -78,6 +78,7 @@ class LegSensing {
   EncoderOffsets encoders_;
   FootForces forces_;
   JointFeedback joints_;                                // last accepted
+  BodyFrames frames_;                                   // of it
   std::int64_t felt_ns_ = 0;                            // when both feet's forces were told last
   double dt_s_ = 0.0;                                   // between it and the one before
   std::array<std::int64_t, kJointCount> replied_ns_{};  // last reply of each joint that was accepted

@@ -4,8 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "algorithms/robot/leg_frames.hpp"
-
 namespace polygmap {
 namespace {
 
@@ -68,8 +66,7 @@ LegPoints base_p_leg(const LegGeometry& geometry, Foot leg, const LegVector& q_r
   return {f.joint[kHipPitch].p_m, f.joint[kKnee].p_m, f.joint[kAnklePitch].p_m};
 }
 
-LegJacobian leg_jacobian(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept {
-  const LegFrames f = leg_frames(geometry, leg, q_rad);
+LegJacobian leg_jacobian(const LegFrames& f) noexcept {
   LegJacobian jacobian;
   for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
     const auto column = static_cast<Eigen::Index>(j);

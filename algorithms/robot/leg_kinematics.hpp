@@ -2,7 +2,7 @@
 // Leg kinematics both ways, closed form.
 #pragma once
 
-#include "algorithms/robot/robot_model.hpp"
+#include "algorithms/robot/leg_frames.hpp"
 
 namespace polygmap {
 
@@ -20,7 +20,7 @@ struct LegPoints {
 [[nodiscard]] LegPoints base_p_leg(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept;
 
 // Rows 0-2: velocity of the sole frame's origin, rows 3-5: angular velocity, both in the base frame, per joint rate.
-[[nodiscard]] LegJacobian leg_jacobian(const LegGeometry& geometry, Foot leg, const LegVector& q_rad) noexcept;
+[[nodiscard]] LegJacobian leg_jacobian(const LegFrames& frames) noexcept;
 
 struct LegSolution {
   LegVector q_rad = LegVector::Zero();

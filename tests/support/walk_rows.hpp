@@ -5,6 +5,7 @@
 #include <random>
 
 #include "algorithms/estimation/filters/base_filter.hpp"
+#include "tests/support/measured_legs.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/synthetic_walk.hpp"
 
@@ -26,10 +27,7 @@ class WalkRows {
     const WalkTruth truth = walk_.truth(t_ns_);
     const JointFeedback joints = walk_.joints(t_ns_);
     contacts_.update(joints.foot_force_n, truth.stance, t_ns_);
-    const LegGeometry geometry;
-    const std::array<LegMeasurement, kFootCount> legs{
-        measure_leg(geometry, Foot::kLeft, joints.q_rad, joints.dq_radps),
-        measure_leg(geometry, Foot::kRight, joints.q_rad, joints.dq_radps)};
+    const auto legs = measured_legs(LegGeometry{}, joints.q_rad, joints.dq_radps);
     const auto make = [&](const std::array<FootContact, kFootCount>& feet) {
       return axes.make_rows(truth.true_T_base.R, Vec3::Zero(), legs, feet, touch_downs(truth), heights_, kTick_s);
     };

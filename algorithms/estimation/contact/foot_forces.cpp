@@ -46,14 +46,14 @@ FootForces::Weighed FootForces::sense(Sensor& sensor, double read_n, const Weigh
   return {read_n - sensor.zero_n, 1.0 / (math::square(sensor.noise_n.sigma()) + sensor.zero_variance_n2)};
 }
 
-std::array<double, kFootCount> FootForces::update(const RobotModel& robot, const JointFeedback& joints,
-                                                  const ImuSample& base, const Vec3& base_up,
+std::array<double, kFootCount> FootForces::update(const RobotModel& robot, const BodyFrames& frames,
+                                                  const JointFeedback& joints, const ImuSample& base, const Vec3& base_up,
                                                   const std::array<bool, kFootCount>& stands) noexcept {
   const double dt_s = stamp_ns_ < 0 ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
   stamp_ns_ = joints.stamp_ns;
   const bool torques_told = math::all_finite(joints.tau_nm) && joints.tau_nm.cwiseAbs().maxCoeff() > 0.0;
   std::array<double, kFootCount> observed_n{};
-  if (torques_told) observed_n = observer_.update(robot, joints, base, base_up);
+  if (torques_told) observed_n = observer_.update(robot, frames, joints, base, base_up);
   std::array<double, kFootCount> up_n{};
   for (std::size_t f = 0; f < kFootCount; ++f) {
     bool told = torques_told;

@@ -30,14 +30,13 @@ void GroundForceObserver::reset(const Params& params) noexcept {
   params_ = params;
 }
 
-std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& robot, const JointFeedback& joints,
-                                                           const ImuSample& base, const Vec3& base_up) noexcept {
+std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& robot, const BodyFrames& frames,
+                                                           const JointFeedback& joints, const ImuSample& base, const Vec3& base_up) noexcept {
   const bool first = stamp_ns_ < 0;
   const double dt_s = first ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
   const double share = first ? 1.0 : dt_s / (params_.smoothing_s + dt_s), rate_ps = 1.0 / params_.smoothing_s;
   stamp_ns_ = joints.stamp_ns;
   felt_mps2_ += share * (base.accel_mps2 - felt_mps2_);
-  const BodyFrames frames = body_frames(robot.legs, joints.q_rad);
   const PerLink p_m = base_p_links_m(robot.masses, frames);
   std::array<double, kFootCount> upwards_n{};
   for (std::size_t f = 0; f < kFootCount; ++f) {
@@ -58,10 +57,10 @@ std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& rob
       left_nm[j] -= robot.drives.armature_kgm2 * rate_ps * (dq_radps[j] - leg.dq_radps[j]) +
                     params_.friction_nm * math::clamp(leg.dq_radps[j] / params_.creep_radps, -1.0, 1.0);
     }
-    const LegJacobian J = leg_jacobian(robot.legs, foot, leg_joints(joints.q_rad, foot));
+    const LegJacobian J = leg_jacobian(frames[f]);
     Eigen::Matrix<double, 6, 6> A = J * J.transpose();
     A.diagonal().array() += math::square(params_.damping_m);
-    const Eigen::Matrix<double, 6, 1> wrench = -A.ldlt().solve(J * left_nm);
+    const Eigen::Matrix<double, 6, 1> wrench = -A.llt().solve(J * left_nm);
     upwards_n[f] = wrench.head<3>().dot(base_up);
   }
   return upwards_n;

@@ -3,11 +3,9 @@
 
 namespace polygmap {
 
-LegMeasurement measure_leg(const LegGeometry& geometry, Foot leg, const JointVector& q_rad,
-                           const JointVector& dq_radps) noexcept {
-  const LegVector q = leg_joints(q_rad, leg);
-  const Eigen::Matrix<double, 6, 1> rates = leg_jacobian(geometry, leg, q) * leg_joints(dq_radps, leg);
-  return {base_T_sole(geometry, leg, q), rates.head<3>(), rates.tail<3>()};
+LegMeasurement measure_leg(const LegFrames& frames, const LegVector& dq_radps) noexcept {
+  const Eigen::Matrix<double, 6, 1> rates = leg_jacobian(frames) * dq_radps;
+  return {frames.sole, rates.head<3>(), rates.tail<3>()};
 }
 
 }  // namespace polygmap

@@ -29,7 +29,6 @@ struct LegSample {
   std::optional<std::array<double, kFootCount>> stated_contact;
 };
 
-[[nodiscard]] LegMeasurement measure_leg(const LegGeometry& geometry, Foot leg, const JointVector& q_rad,
-                                         const JointVector& dq_radps) noexcept;
+[[nodiscard]] LegMeasurement measure_leg(const LegFrames& frames, const LegVector& dq_radps) noexcept;
 
 }  // namespace polygmap

@@ -33,7 +33,7 @@ TEST(LegDynamics, Torques_DoTheWorkOfWeightsAndGround) {
     std::array<Vec3, kJointsPerLeg> specific;
     specific.fill(gravity);
     const LegVector torque = leg_torques_nm(masses, leg, body_frames({}, q)[index_of(leg)], specific, ground);
-    const LegJacobian jacobian = leg_jacobian({}, leg, leg_joints(q, leg));
+    const LegJacobian jacobian = leg_jacobian(body_frames({}, q)[index_of(leg)]);
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       const double step = 1e-6;
       JointVector moved = q;

@@ -58,7 +58,7 @@ TEST(LegKinematicsAgainstKdl, RandomJointsOfBothLegs_SoleAndJacobianAgree) {
         for (int c = 0; c < 3; ++c) ASSERT_NEAR(sole.R(r, c), frame.M(r, c), 1e-12);
       }
       // Number by number: the library's Eigen may align its matrices otherwise than this build's.
-      const LegJacobian ours = leg_jacobian(geometry, leg, q_rad);
+      const LegJacobian ours = leg_jacobian(leg_frames(geometry, leg, q_rad));
       for (unsigned r = 0; r < 6; ++r) {
         for (unsigned c = 0; c < kJointsPerLeg; ++c) ASSERT_NEAR(ours(r, c), jacobian(r, c), 1e-12);
       }

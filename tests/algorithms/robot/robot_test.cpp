@@ -51,7 +51,7 @@ TEST(LegKinematics, Jacobian_AgainstCentralDifferences_Agrees) {
   for (int i = 0; i < 200; ++i) {
     const Foot leg = i % 2 == 0 ? Foot::kLeft : Foot::kRight;
     const LegVector q = random_joints(random, leg);
-    const LegJacobian jacobian = leg_jacobian(geometry, leg, q);
+    const LegJacobian jacobian = leg_jacobian(leg_frames(geometry, leg, q));
     for (int j = 0; j < static_cast<int>(kJointsPerLeg); ++j) {
       LegVector hi = q, lo = q;
       hi[j] += kStep;

@@ -7,6 +7,7 @@
 
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/geometry/so3.hpp"
+#include "tests/support/measured_legs.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/ticks.hpp"
 
@@ -38,8 +39,7 @@ struct StandingRobot {
     return legs[0].base_T_sole.p_m - legs[1].base_T_sole.p_m;
   }
   [[nodiscard]] static Legs measured(const JointVector& q_rad) {
-    return {measure_leg({}, Foot::kLeft, q_rad, JointVector::Zero()),
-            measure_leg({}, Foot::kRight, q_rad, JointVector::Zero())};
+    return test::measured_legs({}, q_rad, JointVector::Zero());
   }
   void stand(EncoderOffsets& encoders, double time_s, const Contacts& contacts, double noise_rad = 0.0) {
     std::mt19937 random(1);

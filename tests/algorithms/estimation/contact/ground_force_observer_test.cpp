@@ -92,7 +92,7 @@ double worst_error_n(const std::array<double, kFootCount>& up_n, const GroundFor
   double worst_n = 0.0;
   for (int i = 0; i < 1000; ++i) {
     const Sample s = sample(robot, i * kDt_s, up_n, friction_nm);
-    const auto force_n = observer.update(robot, s.joints, s.base, s.base_up);
+    const auto force_n = observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up);
     if (i < 125) continue;
     for (std::size_t f = 0; f < kFootCount; ++f) worst_n = std::max(worst_n, std::abs(force_n[f] - up_n[f]));
   }
@@ -112,7 +112,7 @@ TEST(GroundForceObserver, LegsThatSwingOnABaseThatSways_PressOnNothing) {
     double most_n = 0.0;
     for (int i = 0; i < 1000; ++i) {
       const Sample s = sample(RobotModel{}, i * kDt_s, {0.0, 0.0}, 0.0);
-      most_n = std::max(most_n, std::abs(observer.update(robot, s.joints, s.base, s.base_up)[0]));
+      most_n = std::max(most_n, std::abs(observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up)[0]));
     }
     return most_n;
   }();
@@ -146,7 +146,7 @@ TEST(GroundForceObserver, StandingStill_FirstSampleTellsTheForce) {
     s.joints.tau_nm.segment<6>(static_cast<Eigen::Index>(joint_index(foot, 0))) =
         leg_torques_nm(robot.masses, foot, leg_frames(robot.legs, foot, q), gravity_mps2, ground);
   }
-  const auto force_n = observer.update(robot, s.joints, s.base, s.base_up);
+  const auto force_n = observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up);
   EXPECT_NEAR(force_n[0], 270.0, 6.0);
   EXPECT_NEAR(force_n[1], 0.0, 3.0);
 }

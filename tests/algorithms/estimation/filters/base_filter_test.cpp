@@ -6,6 +6,7 @@
 
 #include "algorithms/estimation/contact/leg_measurement.hpp"
 #include "algorithms/geometry/so3.hpp"
+#include "tests/support/measured_legs.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/synthetic_walk.hpp"
 #include "tests/support/ticks.hpp"
@@ -23,8 +24,7 @@ ContactRows rows_of(const BaseFilter& filter, const WalkTruth& truth, const Join
                     const std::array<KnownHeight, kFootCount>& heights) {
   const LegGeometry geometry;
   return filter.make_rows(truth.true_T_base.R, Vec3::Zero(),
-                          {measure_leg(geometry, Foot::kLeft, joints.q_rad, joints.dq_radps),
-                           measure_leg(geometry, Foot::kRight, joints.q_rad, joints.dq_radps)},
+                          test::measured_legs(geometry, joints.q_rad, joints.dq_radps),
                           contacts, {}, heights, kTick_s);
 }
 
@@ -74,8 +74,7 @@ TEST(BaseFilter, Closure_LegsDisagreeAndTheWeightGoesOver_PoseGoesFromOneToTheOt
   const JointFeedback joints = walk.joints(0);
   filter.initialise(truth.true_T_base.p_m, Vec3::Zero(), rows_of(filter, truth, joints, {}, {}));
   const LegGeometry geometry;
-  std::array<LegMeasurement, kFootCount> legs{measure_leg(geometry, Foot::kLeft, joints.q_rad, joints.dq_radps),
-                                              measure_leg(geometry, Foot::kRight, joints.q_rad, joints.dq_radps)};
+  auto legs = test::measured_legs(geometry, joints.q_rad, joints.dq_radps);
   const auto run = [&](double left_share, int ticks) {
     double largest = 0.0;
     for (int i = 0; i < ticks; ++i) {

@@ -135,7 +135,7 @@ struct MisweighedRobot {
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const std::size_t f = index_of(foot);
       const LegVector own_nm = leg_torques_nm({}, foot, frames[f], weight_mps2, {});
-      const LegJacobian J = leg_jacobian({}, foot, leg_joints(q, foot));
+      const LegJacobian J = leg_jacobian(frames[f]);
       const Eigen::Matrix<double, 6, 1> wrench =
           -J.transpose().partialPivLu().solve(leg_joints(torque_nm, foot) - own_nm);
       force_n[f] = wrench.z();
