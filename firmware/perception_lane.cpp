@@ -168,7 +168,7 @@ bool PerceptionLane::learn_some(WorkBudget& budget) noexcept {
 
 void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   PolygonMap::View view;
-  view.world_T_camera = exposure_state_.world_T_base() * mount_.base_T_camera();
+  view.odom_T_camera = exposure_state_.odom_T_base * mount_.base_T_camera();
   view.position_sigma_m = exposure_state_.position_sigma_m.maxCoeff();
   view.tilt_sigma_rad = exposure_state_.tilt_sigma_rad;
   if (params_.estimate_mount) view.mount_sigma_rad = mount_.tilt_sigma_rad();  // else the data sheet is believed
@@ -197,9 +197,9 @@ Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
 void PerceptionLane::begin_search() noexcept {
   const SearchContext& context = link_.search_context.front();
   FootholdSearch::Query query;
-  query.world_T_base = context.state.world_T_base();
+  query.odom_T_base = context.state.odom_T_base;
   for (const Foot foot : {Foot::kLeft, Foot::kRight})
-    query.world_T_sole[index_of(foot)] = context.state.world_T_sole(foot);
+    query.odom_T_sole[index_of(foot)] = context.state.odom_T_sole[index_of(foot)];
   query.stance = context.stance;
   query.climbing = context.climbing;
   search_.begin(map_.snapshot(), query);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The foothold cells around the robot, eqs (16)-(21): world-aligned, fixed size, filled row by row. A cell names its
-// surface and nothing else; height, range and room for a foot follow from the surface where they are asked for.
+// The foothold cells around the robot, eqs (16)-(21): aligned with odometry, fixed size, filled row by row. A cell
+// names its surface and nothing else; height, range and room for a foot follow from the surface where they are asked
+// for.
 #pragma once
 
 #include <algorithm>
@@ -20,11 +21,11 @@ class FootholdRaster {
   static constexpr std::int32_t kSide = static_cast<std::int32_t>(kFootholdRasterSide_cells);
   static constexpr std::uint8_t kNoLayer = 255;
 
-  // Cells lie on world multiples of g_res, so that they do not jitter with the pose.
-  void centre_on(const Vec2& world_m, double g_res_m) noexcept {
+  // Cells lie on multiples of g_res, so that they do not jitter with the pose.
+  void centre_on(const Vec2& p_m, double g_res_m) noexcept {
     g_res_m_ = g_res_m;
-    first_x_ = std::lround(world_m.x() / g_res_m) - kSide / 2;
-    first_y_ = std::lround(world_m.y() / g_res_m) - kSide / 2;
+    first_x_ = std::lround(p_m.x() / g_res_m) - kSide / 2;
+    first_y_ = std::lround(p_m.y() / g_res_m) - kSide / 2;
   }
   void clear_row(std::int32_t row) noexcept { std::fill_n(cells_.row(row), kSide, kNoLayer); }
 

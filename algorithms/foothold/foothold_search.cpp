@@ -10,11 +10,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool valid(const FootholdSearch::Query& q) noexcept {
   const auto finite = [](const Transform& t) { return math::all_finite(t.R) && math::all_finite(t.p_m); };
-  return finite(q.world_T_base) && finite(q.world_T_sole[0]) && finite(q.world_T_sole[1]) &&
-         q.world_T_base.p_m.cwiseAbs().maxCoeff() < 1e6;
+  return finite(q.odom_T_base) && finite(q.odom_T_sole[0]) && finite(q.odom_T_sole[1]) &&
+         q.odom_T_base.p_m.cwiseAbs().maxCoeff() < 1e6;
 }
 
-// From the map's world to that of the pose.
+// From the map's frame to odometry.
 FootholdSet moved(FootholdSet set, const Vec3& by_m) noexcept {
   for (Vec3* p : {&set.p_star.position_m, &set.tread.nosing_a_m, &set.tread.nosing_b_m}) {
     *p += by_m;
@@ -35,11 +35,11 @@ void FootholdSearch::begin(const MapSnapshot& map, const Query& query) noexcept 
   }
   map_ = map;
   query_ = query;
-  query_.world_T_base.p_m -= map.drift_m;
-  for (Transform& sole : query_.world_T_sole) sole.p_m -= map.drift_m;
-  base_ = PlanFrame(query_.world_T_base);
-  sole_ = PlanFrame(query_.world_T_sole[index_of(query.stance)]);
-  z_foot_ = z_foot_m(foot_, query_.world_T_sole[index_of(query.stance)]);
+  query_.odom_T_base.p_m -= map.drift_m;
+  for (Transform& sole : query_.odom_T_sole) sole.p_m -= map.drift_m;
+  base_ = PlanFrame(query_.odom_T_base);
+  sole_ = PlanFrame(query_.odom_T_sole[index_of(query.stance)]);
+  z_foot_ = z_foot_m(foot_, query_.odom_T_sole[index_of(query.stance)]);
   pending_ = {};
   pending_.map_stamp_ns = map.stamp_ns;
   levels_.clear();
@@ -112,7 +112,7 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
     work_.add(2500);
     work_.add(surface.polygon.size(), 260);
     LevelSurface level;
-    if (!prepare(polygon, yaw_of(query_.world_T_base.R), params_.levels, params_.margin, foot_, level)) return;
+    if (!prepare(polygon, yaw_of(query_.odom_T_base.R), params_.levels, params_.margin, foot_, level)) return;
     if (confirmed) {
       (void)levels_.try_push_back(level);  // as many as the map holds
     } else if (level.height_m > z_foot_ + params_.delta_foot_m &&
@@ -398,8 +398,8 @@ Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, 
 // Where the middle between the feet should be: in the middle of the tread when both its sides are known, without
 // veering on the way up; otherwise where the robot is.
 double FootholdSearch::middle_m(const LevelSurface& tread) const noexcept {
-  const double own_m = 0.5 * (tread.lateral_m(query_.world_T_sole[0].p_m.head<2>()) +
-                              tread.lateral_m(query_.world_T_sole[1].p_m.head<2>()));
+  const double own_m = 0.5 * (tread.lateral_m(query_.odom_T_sole[0].p_m.head<2>()) +
+                              tread.lateral_m(query_.odom_T_sole[1].p_m.head<2>()));
   if (!tread.ends.left_m || !tread.ends.right_m) return own_m;
   const double centre_m = 0.5 * (*tread.ends.left_m + *tread.ends.right_m);
   if (!query_.climbing) return centre_m;

@@ -132,8 +132,8 @@ class FootholdSearch {
     }
   };
   struct Query {
-    Transform world_T_base;
-    std::array<Transform, kFootCount> world_T_sole;
+    Transform odom_T_base;
+    std::array<Transform, kFootCount> odom_T_sole;
     Foot stance = Foot::kLeft;  // the foot that stays
     bool climbing = false;      // a tread has been climbed already
   };
@@ -146,7 +146,7 @@ class FootholdSearch {
   // foot: outlives the search.
   FootholdSearch(const Params& params, const SoleModel& foot) noexcept : params_(params), foot_(foot) {}
 
-  // Copies what it needs. Query and result are in the world of the pose; the search itself is in that of the map, which
+  // Copies what it needs. Query and result are in odometry; the search itself is in the map's frame, which
   // knows how far the two have drifted apart. An invalid query is counted and leaves nothing to do.
   void begin(const MapSnapshot& map, const Query& query) noexcept;
   Progress step(WorkBudget& budget) noexcept;
@@ -176,7 +176,7 @@ class FootholdSearch {
 
   void prepare_one(const MapPolygon& polygon) noexcept;
   void link(std::size_t i) noexcept;
-  // What the feet meet of the segment from a to b, world plan: across both of them it ends the tread.
+  // What the feet meet of the segment from a to b, plan view: across both of them it ends the tread.
   enum class Extent : std::uint8_t { kAside, kPartial, kAcross };
   [[nodiscard]] Extent extent_on(const LevelSurface& tread, const Vec2& a_m, const Vec2& b_m) const noexcept;
   void link_upright(LevelSurface& tread, const Upright& upright) const noexcept;

@@ -53,7 +53,7 @@ struct LevelSurfaceParams {
 };
 
 // A foot on the surface has its yaw, so each edge takes the same part of every foot: what is left of the edge's
-// distance to the sole's origin is distance - reach. Plan view, world frame.
+// distance to the sole's origin is distance - reach. Plan view, in the map.
 struct FootLimit {
   HalfPlane inside;
   double reach_m = 0.0;   // from the sole's origin towards the edge

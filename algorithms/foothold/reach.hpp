@@ -18,9 +18,9 @@ namespace polygmap {
 
 // Lowest of toe and heel, eq. (22), but of the foot that stays only: with the lower of both, the tread under the upper
 // foot would be found again in split stance.
-[[nodiscard]] inline double z_foot_m(const SoleModel& model, const Transform& world_T_sole) noexcept {
+[[nodiscard]] inline double z_foot_m(const SoleModel& model, const Transform& odom_T_sole) noexcept {
   double lowest = std::numeric_limits<double>::infinity();
-  for (const Vec3& contact : model.contacts_m()) lowest = std::min(lowest, (world_T_sole * contact).z());
+  for (const Vec3& contact : model.contacts_m()) lowest = std::min(lowest, (odom_T_sole * contact).z());
   return lowest;
 }
 

@@ -12,10 +12,10 @@ namespace polygmap {
 class PlanFrame {
  public:
   PlanFrame() noexcept = default;
-  explicit PlanFrame(const Transform& world_T_pose) noexcept
-      : origin_m_(world_T_pose.p_m.head<2>()), heading_(unit_at(yaw_of(world_T_pose.R))) {}
-  [[nodiscard]] Vec2 operator()(const Vec2& world_p_m) const noexcept {
-    const Vec2 d = world_p_m - origin_m_;
+  explicit PlanFrame(const Transform& odom_T_pose) noexcept
+      : origin_m_(odom_T_pose.p_m.head<2>()), heading_(unit_at(yaw_of(odom_T_pose.R))) {}
+  [[nodiscard]] Vec2 operator()(const Vec2& odom_p_m) const noexcept {
+    const Vec2 d = odom_p_m - origin_m_;
     return {heading_.dot(d), cross(heading_, d)};
   }
   [[nodiscard]] const Vec2& origin_m() const noexcept { return origin_m_; }

@@ -95,16 +95,16 @@ class Bench {
     if (!extractor_->try_begin({stamp_ns_, 1, k.width_px, k.height_px, raw.data()}, view)) return;
     run_marked([&](WorkBudget& b) { return extractor_->step(b); }, [&] { return label_of(*extractor_); });
     PolygonMap::View seen;
-    seen.world_T_camera = scene_.world_T_camera;
+    seen.odom_T_camera = scene_.world_T_camera;
     seen.intrinsics = k;
     seen.body = scene_.legs;
     map_->begin(extractor_->result(), seen);
     run_marked([&](WorkBudget& b) { return map_->step(b); },
                [&] { return kMap + static_cast<std::int64_t>(map_->stage()); });
     FootholdSearch::Query query;
-    query.world_T_base.p_m = {0.0, 0.0, 0.75};
-    query.world_T_sole[0].p_m = {0.0, 0.1, 0.0};
-    query.world_T_sole[1].p_m = {0.0, -0.1, 0.0};
+    query.odom_T_base.p_m = {0.0, 0.0, 0.75};
+    query.odom_T_sole[0].p_m = {0.0, 0.1, 0.0};
+    query.odom_T_sole[1].p_m = {0.0, -0.1, 0.0};
     search_->begin(map_->snapshot(), query);
     run_marked([&](WorkBudget& b) { return search_->step(b); },
                [&] { return kFootholds + static_cast<std::int64_t>(search_->stage()); });

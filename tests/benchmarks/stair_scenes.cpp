@@ -46,12 +46,12 @@ StairScene scene_at(const Place& place) {
     ground = {step.nosing_x_m + kHeelRoom_m, 0.0, step.height_m};
   }
   const double base_height_m = kNominalBaseHeight_m - kCrouch_m;
-  const Transform world_T_base{rotation_z(place.yaw_rad), ground + Vec3{0.0, 0.0, base_height_m}};
-  const Transform world_T_camera = world_T_base * base_T_camera();
+  const Transform odom_T_base{rotation_z(place.yaw_rad), ground + Vec3{0.0, 0.0, base_height_m}};
+  const Transform odom_T_camera = odom_T_base * base_T_camera();
   const bool lifted = place.lift_m > 0.0;
 
   StairScene scene;
-  sim::DepthScene picture{world_T_camera, solids, {}, base_T_camera(), true};
+  sim::DepthScene picture{odom_T_camera, solids, {}, base_T_camera(), true};
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     Vec3 sole_m{0.0, side_sign(foot) * kStanceHalfWidth_m, -base_height_m};
     if (lifted && foot == Foot::kLeft) sole_m += Vec3{kLiftedForward_m, 0.0, place.lift_m};
@@ -59,12 +59,12 @@ StairScene scene_at(const Place& place) {
     const LegShapes shapes = base_leg_shapes({}, foot, solve_leg({}, foot, base_T_foot).q_rad);
     picture.base_legs[index_of(foot)] = shapes;
     scene.view.body[index_of(foot)] = transformed(base_T_camera().inverse(), shapes);
-    scene.query.world_T_sole[index_of(foot)] = world_T_base * base_T_foot;
+    scene.query.odom_T_sole[index_of(foot)] = odom_T_base * base_T_foot;
   }
   scene.view.intrinsics = robot_camera_intrinsics();
-  scene.view.camera_up = world_T_camera.R.transpose() * Vec3::UnitZ();
-  scene.map_view = {world_T_camera, 0.002, 0.002, robot_camera_intrinsics()};
-  scene.query.world_T_base = world_T_base;
+  scene.view.camera_up = odom_T_camera.R.transpose() * Vec3::UnitZ();
+  scene.map_view = {odom_T_camera, 0.002, 0.002, robot_camera_intrinsics()};
+  scene.query.odom_T_base = odom_T_base;
   scene.query.stance = lifted ? Foot::kRight : Foot::kLeft;
   scene.query.climbing = place.step > 0;
 

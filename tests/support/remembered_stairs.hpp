@@ -38,9 +38,9 @@ inline double tread_error_m(const MapPolygon& tread, const Stairs& stairs, int s
 // A robot that looks and a map that remembers.
 class PolygonMapTest : public ::testing::Test {
  protected:
-  void fuse(const SurfaceFrame& frame, const Transform& world_T_camera, double position_sigma_m = 0.0,
+  void fuse(const SurfaceFrame& frame, const Transform& odom_T_camera, double position_sigma_m = 0.0,
             double mount_sigma_rad = 0.0) {
-    PolygonMap::View view{world_T_camera, position_sigma_m, 0.0, robot_camera_intrinsics()};
+    PolygonMap::View view{odom_T_camera, position_sigma_m, 0.0, robot_camera_intrinsics()};
     view.mount_sigma_rad = mount_sigma_rad;
     map_->begin(frame, view);
     WorkBudget budget(1 << 20);
@@ -48,16 +48,16 @@ class PolygonMapTest : public ::testing::Test {
     most_units_ = std::max(most_units_, (1 << 20) - budget.left());
   }
   // pose_error_m: of where the robot believes to be.
-  void look(const Stairs& stairs, const Transform& world_T_base, const Noise& noise, const Vec3& pose_error_m,
+  void look(const Stairs& stairs, const Transform& odom_T_base, const Noise& noise, const Vec3& pose_error_m,
             double position_sigma_m) {
     stamp_ns_ += kFrame_ns;
-    Transform camera = camera_of(world_T_base);
+    Transform camera = camera_of(odom_T_base);
     const SurfaceFrame frame = seen_from(stairs, camera, stamp_ns_, noise, random_);
     camera.p_m += pose_error_m;
     fuse(frame, camera, position_sigma_m);
   }
-  void look(const Stairs& stairs, const Transform& world_T_base, const Noise& noise, int frames = 1) {
-    for (int i = 0; i < frames; ++i) look(stairs, world_T_base, noise, Vec3::Zero(), 0.0);
+  void look(const Stairs& stairs, const Transform& odom_T_base, const Noise& noise, int frames = 1) {
+    for (int i = 0; i < frames; ++i) look(stairs, odom_T_base, noise, Vec3::Zero(), 0.0);
   }
   Vec3 gauss(double sigma) {
     std::normal_distribution<> normal(0.0, sigma);
@@ -103,11 +103,11 @@ inline Transform looking_down(const Vec3& from_m) {
   return {R, from_m};
 }
 
-inline SurfaceFrame in_camera(const std::vector<SurfacePatch>& world, const Transform& world_T_camera,
+inline SurfaceFrame in_camera(const std::vector<SurfacePatch>& world, const Transform& odom_T_camera,
                               std::int64_t stamp_ns) {
   SurfaceFrame frame;
   frame.stamp_ns = stamp_ns;
-  const Transform inverse = world_T_camera.inverse();
+  const Transform inverse = odom_T_camera.inverse();
   for (SurfacePatch patch : world) {
     const Plane plane = inverse * Plane{patch.normal, patch.d_m};
     patch.normal = plane.normal;

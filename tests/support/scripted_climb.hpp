@@ -80,8 +80,8 @@ class ScriptedClimb {
     Transform planned = true_T_target;
     planned.p_m.x() += errors.along_m;
     planned.p_m.y() += errors.across_m;
-    latched.target.position_m = world_T_true() * planned.p_m;
-    latched.target.yaw_rad = yaw_of(world_T_true().R * planned.R);
+    latched.target.position_m = odom_T_true * planned.p_m;
+    latched.target.yaw_rad = yaw_of(odom_T_true.R * planned.R);
     latched.target.polygon_id = static_cast<std::uint32_t>(step + 1);
     latched.target.last_seen_ns = latched.latch_stamp_ns - errors.last_seen_before_latch_ns;
     if (step >= 0) {

@@ -25,9 +25,9 @@ double gauss(std::mt19937& random, double sigma) {
   return sigma > 0.0 ? std::normal_distribution<>(0.0, sigma)(random) : 0.0;
 }
 
-void add(const Face& face, const Transform& world_T_camera, const Noise& noise, std::mt19937& random,
+void add(const Face& face, const Transform& odom_T_camera, const Noise& noise, std::mt19937& random,
          SurfaceFrame& frame) {
-  const Transform face_T_camera = face.world_T_face.inverse() * world_T_camera;
+  const Transform face_T_camera = face.world_T_face.inverse() * odom_T_camera;
   const Vec3 eye = face_T_camera.p_m;
   if (eye.z() < 0.05) return;
   ConvexPolygon polygon;
@@ -92,7 +92,7 @@ void add(const Face& face, const Transform& world_T_camera, const Noise& noise, 
 
 }  // namespace
 
-Transform camera_of(const Transform& world_T_base) { return world_T_base * base_T_camera(); }
+Transform camera_of(const Transform& odom_T_base) { return odom_T_base * base_T_camera(); }
 
 Transform base_above(const Vec3& sole_m, double yaw_rad) {
   return {rotation_z(yaw_rad), sole_m + Vec3{0, 0, kNominalBaseHeight_m}};
@@ -104,7 +104,7 @@ std::array<Transform, kFootCount> soles_at(const Vec3& middle_m, double yaw_rad)
           middle * Transform{Mat3::Identity(), Vec3{0, -kStanceHalfWidth_m, 0}}};
 }
 
-SurfaceFrame seen_from(const Stairs& stairs, const Transform& world_T_camera, std::int64_t stamp_ns, const Noise& noise,
+SurfaceFrame seen_from(const Stairs& stairs, const Transform& odom_T_camera, std::int64_t stamp_ns, const Noise& noise,
                        std::mt19937& random) {
   SurfaceFrame frame;
   frame.stamp_ns = stamp_ns;
@@ -114,7 +114,7 @@ SurfaceFrame seen_from(const Stairs& stairs, const Transform& world_T_camera, st
     return std::find(stairs.missing.begin(), stairs.missing.end(), step) != stairs.missing.end();
   };
   add({SurfaceKind::kTread, base, -3.0, is_missing(1) ? stairs.tread_m : 0.0, -3.0, 3.0, false, stairs.steps > 0},
-      world_T_camera, noise, random, frame);
+      odom_T_camera, noise, random, frame);
   Mat3 upright;  // x to the right looking up the stairs, y up, z towards the viewer
   upright << 0, 0, -1, -1, 0, 0, 0, 1, 0;
   for (int step = 1; step <= stairs.steps; ++step) {
@@ -124,10 +124,10 @@ SurfaceFrame seen_from(const Stairs& stairs, const Transform& world_T_camera, st
     const double back = is_missing(step + 1) ? stairs.back_x_m(step + 1) : stairs.back_x_m(step);
     add({SurfaceKind::kRiser, base * Transform{upright, Vec3{(step - 1) * stairs.tread_m, 0, 0}}, -half, half, foot,
          top, false, false},
-        world_T_camera, noise, random, frame);
+        odom_T_camera, noise, random, frame);
     add({SurfaceKind::kTread, base * Transform{Mat3::Identity(), Vec3{0, 0, top}}, stairs.nosing_x_m(step), back, -half,
          half, true, step < stairs.steps},
-        world_T_camera, noise, random, frame);
+        odom_T_camera, noise, random, frame);
   }
   return frame;
 }

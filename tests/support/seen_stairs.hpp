@@ -34,14 +34,14 @@ struct Noise {
 };
 
 // The camera of a robot whose base is at that pose.
-[[nodiscard]] Transform camera_of(const Transform& world_T_base);
+[[nodiscard]] Transform camera_of(const Transform& odom_T_base);
 // Base pose of a robot standing upright with the middle between its soles at sole_m.
 [[nodiscard]] Transform base_above(const Vec3& sole_m, double yaw_rad);
 // Sole poses of that robot.
 [[nodiscard]] std::array<Transform, kFootCount> soles_at(const Vec3& middle_m, double yaw_rad);
 
 // Treads, risers and floor in view, in the camera frame; sigmas as the noise says, at least 1 mm.
-[[nodiscard]] SurfaceFrame seen_from(const Stairs& stairs, const Transform& world_T_camera, std::int64_t stamp_ns,
+[[nodiscard]] SurfaceFrame seen_from(const Stairs& stairs, const Transform& odom_T_camera, std::int64_t stamp_ns,
                                      const Noise& noise, std::mt19937& random);
 
 }  // namespace polygmap::test

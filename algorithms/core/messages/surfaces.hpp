@@ -29,7 +29,7 @@ struct EdgeLine {
 
 using PolygonVertices = StaticVector<Vec3, kMaxPolygonVertices>;
 
-// One planar surface; in the camera frame when it comes from a frame, in the world frame in the map.
+// One planar surface; in the camera frame when it comes from a frame, in odometry in the map.
 struct SurfacePatch {
   SurfaceKind kind = SurfaceKind::kOther;
   Vec3 normal = Vec3::UnitZ();  // unit, towards the viewer (map: out of the surface)
@@ -59,7 +59,7 @@ struct SurfaceFrame {
   std::uint32_t dropped = 0;      // surfaces that found no room
 };
 
-// One remembered surface, world frame.
+// One remembered surface, in odometry.
 struct MapPolygon {
   SurfacePatch surface;
   std::uint32_t id = 0;           // never reused
@@ -70,7 +70,7 @@ using MapPolygons = StaticVector<MapPolygon, kMaxMapPolygons>;
 
 struct MapSnapshot {
   std::int64_t stamp_ns = 0;    // exposure of the newest fused frame
-  Vec3 drift_m = Vec3::Zero();  // what lies at p in the map lies at p + drift in the world of the pose
+  Vec3 drift_m = Vec3::Zero();  // what lies at p in the map lies at p + drift in the pose's odometry
   MapPolygons polygons;
 };
 

@@ -40,11 +40,13 @@ class FootForces {
     }
   };
   void reset(const Params& params) noexcept;
-  // frames: of the joints. joints: a force that is not a number is not told, as are all torques when one is none or all are 0, and those of a
-  // leg with a mute drive. base: what the IMU feels, base axes; base_up: the vertical there. stands: which feet do as
-  // far as is known. Upwards on each foot, never negative; not a number where nothing tells it.
+  // frames: of the joints. joints: a force that is not a number is not told, as are all torques when one is none or all
+  // are 0, and those of a leg with a mute drive. base: what the IMU feels, base axes; base_up: the vertical there.
+  // stands: which feet do as far as is known. Upwards on each foot, never negative; not a number where nothing tells
+  // it.
   [[nodiscard]] std::array<double, kFootCount> update(const RobotModel& robot, const BodyFrames& frames,
-                                                      const JointFeedback& joints, const ImuSample& base, const Vec3& base_up,
+                                                      const JointFeedback& joints, const ImuSample& base,
+                                                      const Vec3& base_up,
                                                       const std::array<bool, kFootCount>& stands) noexcept;
 
  private:

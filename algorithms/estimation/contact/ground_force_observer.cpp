@@ -31,7 +31,8 @@ void GroundForceObserver::reset(const Params& params) noexcept {
 }
 
 std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& robot, const BodyFrames& frames,
-                                                           const JointFeedback& joints, const ImuSample& base, const Vec3& base_up) noexcept {
+                                                           const JointFeedback& joints, const ImuSample& base,
+                                                           const Vec3& base_up) noexcept {
   const bool first = stamp_ns_ < 0;
   const double dt_s = first ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
   const double share = first ? 1.0 : dt_s / (params_.smoothing_s + dt_s), rate_ps = 1.0 / params_.smoothing_s;

@@ -29,10 +29,11 @@ class GroundForceObserver {
     }
   };
   void reset(const Params& params) noexcept;
-  // frames: of the joints. base: what the IMU feels, base axes; base_up: the vertical there. Forces in N, upwards on the foot; what
-  // friction and masses leave over has either sign.
+  // frames: of the joints. base: what the IMU feels, base axes; base_up: the vertical there. Forces in N, upwards on
+  // the foot; what friction and masses leave over has either sign.
   [[nodiscard]] std::array<double, kFootCount> update(const RobotModel& robot, const BodyFrames& frames,
-                                                      const JointFeedback& joints, const ImuSample& base, const Vec3& base_up) noexcept;
+                                                      const JointFeedback& joints, const ImuSample& base,
+                                                      const Vec3& base_up) noexcept;
 
  private:
   // Low-passed, of one leg.

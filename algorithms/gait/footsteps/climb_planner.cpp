@@ -8,15 +8,12 @@ namespace {
 
 bool usable(const Foothold& f) noexcept { return math::all_finite(f.position_m) && std::isfinite(f.yaw_rad); }
 
-SolePose in_odom(const Transform& world_T_odom, const Foothold& foothold) noexcept {
-  const Transform world_T_sole{rotation_z(foothold.yaw_rad), foothold.position_m};
-  return sole_pose(world_T_odom.inverse() * world_T_sole);
-}
+SolePose sole_on(const Foothold& foothold) noexcept { return {foothold.position_m, foothold.yaw_rad}; }
 
-Foothold in_world(const Transform& world_T_odom, const SolePose& target, std::int64_t last_seen_ns) noexcept {
+Foothold foothold_at(const SolePose& target, std::int64_t last_seen_ns) noexcept {
   Foothold foothold;
-  foothold.position_m = world_T_odom * target.position_m;
-  foothold.yaw_rad = math::wrap_angle(target.yaw_rad + yaw_of(world_T_odom.R));
+  foothold.position_m = target.position_m;
+  foothold.yaw_rad = target.yaw_rad;
   foothold.last_seen_ns = last_seen_ns;
   return foothold;
 }
@@ -66,8 +63,7 @@ void ClimbPlanner::reset(const Params& params, const RobotModel& robot) noexcept
   robot_ = &robot;
 }
 
-ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
-                                                   const FootholdSet& footholds) const noexcept {
+ClimbPlanner::Decision ClimbPlanner::trailing_step(const FootholdSet& footholds) const noexcept {
   Decision decision;
   decision.has_step = true;
   StepGoal& goal = decision.goal;
@@ -78,7 +74,7 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
   const bool same_tread =
       footholds.has_p_star && seen.polygon_id == memory_.trailing_foothold.polygon_id && usable(seen);
   goal.foothold = same_tread ? seen : memory_.trailing_foothold;
-  goal.target = in_odom(situation.world_T_odom, goal.foothold);
+  goal.target = sole_on(goal.foothold);
   return decision;
 }
 
@@ -94,7 +90,7 @@ bool ClimbPlanner::passing_step(const Situation& situation, const FootholdSet& f
   const Foot foot = other(memory_.leading);
   const double standing_m = situation.soles[index_of(memory_.leading)].position_m.z();
   const auto rise_m = [&](const std::array<Foothold, kFootCount>& feet) {
-    return in_odom(situation.world_T_odom, feet[index_of(foot)]).position_m.z() - standing_m;
+    return sole_on(feet[index_of(foot)]).position_m.z() - standing_m;
   };
   const auto* feet = &footholds.p_star_feet;
   if ((*feet)[0].polygon_id == tread_id_ || rise_m(*feet) < params_.min_rise_m) {
@@ -105,7 +101,7 @@ bool ClimbPlanner::passing_step(const Situation& situation, const FootholdSet& f
   decision.rise_m = rise_m(*feet);
   const auto goal = [&](StepKind kind, Foot f) -> StepGoal {
     const Foothold& foothold = (*feet)[index_of(f)];
-    return {kind, f, in_odom(situation.world_T_odom, foothold), foothold};
+    return {kind, f, sole_on(foothold), foothold};
   };
   decision.goal = goal(StepKind::kPassing, foot);
   decision.trailing = goal(StepKind::kTrailing, memory_.leading);
@@ -127,11 +123,9 @@ Foot ClimbPlanner::leading_foot(const Situation& situation, const SolePair& targ
 
 ClimbPlanner::StandOff ClimbPlanner::stand_off(const Situation& situation,
                                                const FootholdSet& footholds) const noexcept {
-  const Transform odom_T_world = situation.world_T_odom.inverse();
   const TreadView& tread = footholds.tread;
-  const SolePair on_tread{in_odom(situation.world_T_odom, footholds.p_star_feet[0]),
-                          in_odom(situation.world_T_odom, footholds.p_star_feet[1])};
-  StandOff to{{odom_T_world * tread.nosing_a_m, odom_T_world * tread.nosing_b_m}, middle_of(on_tread).yaw_rad, {}};
+  const SolePair on_tread{sole_on(footholds.p_star_feet[0]), sole_on(footholds.p_star_feet[1])};
+  StandOff to{{tread.nosing_a_m, tread.nosing_b_m}, middle_of(on_tread).yaw_rad, {}};
   const double floor_m = middle_of(situation.soles).position_m.z();
   for (std::size_t i = 0; i < kFootCount; ++i) {
     const double back_m =
@@ -185,7 +179,7 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   const double short_m =
       params_.floor_clearance_m - toe_to_line_m(robot_->sole.collision, goal.target, to.nosing, to.yaw_rad);
   if (short_m > 0.0) goal.target.position_m -= rotation_z(to.yaw_rad) * Vec3{short_m, 0, 0};
-  goal.foothold = in_world(situation.world_T_odom, goal.target, footholds.map_stamp_ns);
+  goal.foothold = foothold_at(goal.target, footholds.map_stamp_ns);
   return true;
 }
 
@@ -194,7 +188,7 @@ StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSe
   goal.kind = StepKind::kClosing;
   goal.foot = memory_.last_swing;
   goal.target = sole_beside(situation.soles[index_of(other(goal.foot))], goal.foot, robot_->stance.half_width_m);
-  goal.foothold = in_world(situation.world_T_odom, goal.target, footholds.map_stamp_ns);
+  goal.foothold = foothold_at(goal.target, footholds.map_stamp_ns);
   goal.foothold.polygon_id = tread_id_;
   return goal;
 }
@@ -221,7 +215,7 @@ StopReason ClimbPlanner::reason_against(const Situation& situation, const Footho
 ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const FootholdSet& footholds) const noexcept {
   Decision decision;
   if (split_stance_) {
-    return passing_step(situation, footholds, decision) ? decision : trailing_step(situation, footholds);
+    return passing_step(situation, footholds, decision) ? decision : trailing_step(footholds);
   }
   if (closes_up_) {
     decision.has_step = true;
@@ -234,7 +228,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
   const bool walks_up = footholds.obstruction != StopReason::kNone;
   decision.obstruction = footholds.obstruction;
   const auto& feet = footholds.p_star_feet;
-  const SolePair targets{in_odom(situation.world_T_odom, feet[0]), in_odom(situation.world_T_odom, feet[1])};
+  const SolePair targets{sole_on(feet[0]), sole_on(feet[1])};
   decision.rise_m = middle_of(targets).position_m.z() - middle_of(situation.soles).position_m.z();
   const bool underfoot = treads_climbed_ > 0 && feet[0].polygon_id == tread_id_;
   if (decision.rise_m < params_.min_rise_m || underfoot) {  // a search from before the last step

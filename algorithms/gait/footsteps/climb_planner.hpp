@@ -89,7 +89,6 @@ class ClimbPlanner {
   // What the planner looks at; poses in odom.
   struct Situation {
     std::int64_t stamp_ns = 0;
-    Transform world_T_odom;
     SolePair soles;
     // The weight is on its way over the other foot for a leading step of this one, or it looks at its toes for it: no
     // reason to turn round but a large one.
@@ -126,7 +125,7 @@ class ClimbPlanner {
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
 
  private:
-  [[nodiscard]] Decision trailing_step(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  [[nodiscard]] Decision trailing_step(const FootholdSet& footholds) const noexcept;
   // Past the standing foot onto the tread beyond it; false when there is none to be sure of.
   [[nodiscard]] bool passing_step(const Situation& situation, const FootholdSet& footholds,
                                   Decision& decision) const noexcept;
@@ -146,7 +145,7 @@ class ClimbPlanner {
   Decision latched_;
   // What a latch changes, and what it was before.
   struct Memory {
-    Foothold trailing_foothold;  // from the leading latch, world
+    Foothold trailing_foothold;  // from the leading latch
     Foot last_swing = Foot::kRight;
     Foot leading = Foot::kLeft;
     bool has_leading = false;

@@ -27,7 +27,7 @@ struct StepGoal {
   StepKind kind = StepKind::kFloor;
   Foot foot = Foot::kLeft;
   SolePose target;    // odom
-  Foothold foothold;  // the same, world
+  Foothold foothold;  // the same, as it was found
 };
 
 }  // namespace polygmap

@@ -52,11 +52,7 @@ struct GaitShared {
 // leads: the weight is on its way for a leading step of that foot.
 [[nodiscard]] inline ClimbPlanner::Situation situation(const GaitInput& in, bool leads = false,
                                                        Foot leading = Foot::kLeft) noexcept {
-  return {in.now_ns,
-          in.state.world_T_odom,
-          {sole_pose(in.state.odom_T_sole[0]), sole_pose(in.state.odom_T_sole[1])},
-          leads,
-          leading};
+  return {in.now_ns, {sole_pose(in.state.odom_T_sole[0]), sole_pose(in.state.odom_T_sole[1])}, leads, leading};
 }
 
 // Before the first leading step the toes are looked at, once.

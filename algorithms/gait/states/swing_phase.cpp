@@ -71,7 +71,7 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   if (timing_.goes_back()) return abort_swing(in, gait);
   // An impaired leg has drives that may not follow another path.
   const bool lands_soon = in.usable && !in.leg_impaired && timing_.speeds_up();
-  if (lands_soon && goal_.kind == StepKind::kPassing) land_soon(in, gait);
+  if (lands_soon && goal_.kind == StepKind::kPassing) land_soon(gait);
   const Transform odom_T_sole = sole();
   const double lowered_m = path_.lowered_m(timing_.tick());
   const Contact contact = feel(in, params, odom_T_sole);
@@ -144,7 +144,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
 
 // Of a passing foot, the rest of the way straight to the target, or beside the standing foot while it is still behind
 // it.
-void SwingPhase::land_soon(const GaitInput& in, GaitShared& gait) noexcept {
+void SwingPhase::land_soon(GaitShared& gait) noexcept {
   const SwingParams& params = gait.params.swing;
   const StepParams& step = gait.params.step;
   BodyPlan& body = gait.plan;
@@ -160,7 +160,7 @@ void SwingPhase::land_soon(const GaitInput& in, GaitShared& gait) noexcept {
   const bool from_below = target.position_m.z() - std::min(toe_m, now.p_m.z()) > params.soon_below_m;
   if (from_below || timing_.tick() + ticks >= path_.duration_ticks()) return;
   body.carry_to_odometry();
-  if (beside) land_beside(in, gait, target);
+  if (beside) land_beside(gait, target);
   const SolePair soles = body.soles();
   StepPlan plan = plan_step(step, goal_, soles, tried_);
   plan.swing_ticks = ticks;
@@ -174,12 +174,11 @@ void SwingPhase::land_soon(const GaitInput& in, GaitShared& gait) noexcept {
 }
 
 // The step's new goal: the standing foot's tread.
-void SwingPhase::land_beside(const GaitInput& in, GaitShared& gait, const SolePose& target) noexcept {
+void SwingPhase::land_beside(GaitShared& gait, const SolePose& target) noexcept {
   goal_.kind = StepKind::kTrailing;
   goal_.target = target;
-  const Transform world_T_sole = in.state.world_T_odom * target.transform();
-  goal_.foothold = {.position_m = world_T_sole.p_m,
-                    .yaw_rad = yaw_of(world_T_sole.R),
+  goal_.foothold = {.position_m = target.position_m,
+                    .yaw_rad = target.yaw_rad,
                     .polygon_id = gait.planner.tread_id(),
                     .last_seen_ns = goal_.foothold.last_seen_ns,
                     .side_room_m = goal_.foothold.side_room_m};  // as much as above: both are of one staircase

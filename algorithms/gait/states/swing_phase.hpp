@@ -29,8 +29,8 @@ class SwingPhase {
   [[nodiscard]] Transition touch_down(const GaitInput& in, GaitShared& gait, bool felt, double early_m) noexcept;
   void stop_foot(const GaitInput& in, GaitShared& gait) const noexcept;
   [[nodiscard]] Transform beside_path(const BodyPlan& plan, const Transform& odom_T_sole) const noexcept;
-  void land_soon(const GaitInput& in, GaitShared& gait) noexcept;
-  void land_beside(const GaitInput& in, GaitShared& gait, const SolePose& target) noexcept;
+  void land_soon(GaitShared& gait) noexcept;
+  void land_beside(GaitShared& gait, const SolePose& target) noexcept;
   void lower_torso(GaitShared& gait, const SolePose& sole) const noexcept;
   void wait_over_stance(GaitShared& gait, const SolePose& sole) const noexcept;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// By how much the world of the pose has moved against that of the map.
+// By how much the pose's odometry has moved against that of the map.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ class MapDrift {
     double bound_sigmas = 3.0;
     double walk_m_per_sqrt_s = 0.0015;
     // What is common to a frame and gone in the next: of the depth image, of the pose at the exposure. With it and the
-    // walk, half of a step in the pose's world is in the drift after 13 frames.
+    // walk, half of a step in the pose's odometry is in the drift after 13 frames.
     double frame_sigma_m = 0.005;
     // From the start the jitter of the poses averages out in the map; fused against the offsets of the frames
     // themselves, it would keep that of the first few.
@@ -42,17 +42,17 @@ class MapDrift {
   MapDrift() noexcept : MapDrift(Params{}) {}
   explicit MapDrift(const Params& params) noexcept : params_(params) {}
 
-  // The map begins anew, in the world of the pose.
+  // The map begins anew, in the pose's odometry.
   void clear() noexcept { *this = MapDrift(params_); }
   void begin_frame(std::int64_t stamp_ns, double position_sigma_m) noexcept;
-  // innovation_m: by how much the surface lies further along the world direction, a unit vector, than the map and the
+  // innovation_m: by how much the surface lies further along the direction, a unit vector, than the map and the
   // last drift say.
   void add(const Vec3& direction, double innovation_m, double variance_m2) noexcept;
   void end_frame() noexcept;
 
   // False: the pose claims to be exact, and its word stands.
   [[nodiscard]] bool possible() const noexcept { return sigma_m_ > 0.0; }
-  // What lies at p in the map lies at p + drift in the world of the pose.
+  // What lies at p in the map lies at p + drift in the pose's odometry.
   [[nodiscard]] const Vec3& drift_m() const noexcept { return drift_m_; }
   // The same for this frame alone, once the map has settled.
   [[nodiscard]] const Vec3& frame_offset_m() const noexcept { return frame_offset_m_; }

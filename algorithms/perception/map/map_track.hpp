@@ -20,8 +20,8 @@ inline constexpr std::uint8_t kBackTag = 9;
 [[nodiscard]] inline Vec2 side_direction(std::size_t side) noexcept {
   return unit_at(static_cast<double>(side) * (kPi / 4.0));
 }
-[[nodiscard]] inline Vec2 local_xy(const Transform& world_T_local, const Vec3& world_m) noexcept {
-  return (world_T_local.R.transpose() * (world_m - world_T_local.p_m)).head<2>();
+[[nodiscard]] inline Vec2 local_xy(const Transform& map_T_local, const Vec3& map_m) noexcept {
+  return (map_T_local.R.transpose() * (map_m - map_T_local.p_m)).head<2>();
 }
 // A right-handed frame with z along the unit normal and x as near to the given direction as that allows.
 [[nodiscard]] Mat3 frame_from(const Vec3& normal, const Vec3& x_hint) noexcept;
@@ -43,7 +43,7 @@ struct SeenEndParams {
 
 // Where the camera was at the last sighting, and how well its mount was known then.
 struct Viewpoint {
-  Vec3 world_p_camera_m = Vec3::Zero();
+  Vec3 map_p_camera_m = Vec3::Zero();
   double mount_sigma_rad = 0.0;
 };
 // A seen line, local coordinates.
@@ -70,7 +70,7 @@ struct TrackedSide {
   std::uint32_t outliers = 0;
   bool observed = false;
 };
-// A surface of the frame, world coordinates.
+// A surface of the frame, in the map.
 struct SeenSurface {
   SurfaceKind kind = SurfaceKind::kOther;
   Plane plane;
@@ -93,7 +93,7 @@ struct MapTrack {
   std::uint32_t outliers = 0;  // consecutive sightings of its plane elsewhere
   std::int64_t last_seen_ns = 0;
   Viewpoint seen_from;
-  Transform world_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up
+  Transform map_T_local;  // z out of the surface; level: x up the stairs, y left; upright: y up
   double offset_information = 0.0;
   double tilt_information = 0.0;
   double rmse_m = 0.0;

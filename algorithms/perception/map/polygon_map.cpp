@@ -30,8 +30,8 @@ bool valid(const SurfacePatch& patch, double max_range_m) noexcept {
 }
 
 bool valid(const PolygonMap::View& view) noexcept {
-  const Mat3& R = view.world_T_camera.R;
-  return math::all_finite(R) && math::all_finite(view.world_T_camera.p_m) &&
+  const Mat3& R = view.odom_T_camera.R;
+  return math::all_finite(R) && math::all_finite(view.odom_T_camera.p_m) &&
          (R * R.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-6 && view.position_sigma_m >= 0.0 &&
          std::isfinite(view.position_sigma_m) && view.tilt_sigma_rad >= 0.0 && std::isfinite(view.tilt_sigma_rad) &&
          view.mount_sigma_rad >= 0.0 && std::isfinite(view.mount_sigma_rad) && view.intrinsics.fx_px > 0.0 &&
@@ -76,7 +76,7 @@ void PolygonMap::begin(const SurfaceFrame& frame, const View& view) noexcept {
   fused_in_frame_ = 0;
   order_surfaces();
   drift_.begin_frame(frame.stamp_ns, view.position_sigma_m);
-  map_T_camera_ = view.world_T_camera;
+  map_T_camera_ = view.odom_T_camera;
   map_T_camera_.p_m -= drift_.drift_m();
   pass_.measuring = drift_.possible();
   pass_.patch = 0;
@@ -100,7 +100,7 @@ void PolygonMap::begin_fusing() noexcept {
   work_.add(600);
   if (pass_.measuring) drift_.end_frame();
   pass_.measuring = false;
-  map_T_camera_.p_m = view_.world_T_camera.p_m - drift_.frame_offset_m();
+  map_T_camera_.p_m = view_.odom_T_camera.p_m - drift_.frame_offset_m();
   pass_.patch = 0;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The polygon map: what perception saw in single frames, fused in the world frame and remembered.
+// The polygon map: what perception saw in single frames, fused in odometry and remembered: what moves
+// the world against it, LIO, moves no foothold.
 #pragma once
 
 #include <array>
@@ -21,7 +22,7 @@ namespace polygmap {
 // window_s. Only an observed end can pull an end inwards; where the picture ends, the surface is taken to reach at
 // least about as far as it was seen. An offset that a frame's confirmed treads and risers share is taken for an error
 // of its pose (MapDrift), as far as that pose's covariance allows, and moves nothing: surfaces out of view stay in
-// place against those in view. The map's world is that of the pose at the start.
+// place against those in view. The map's frame is that of the odometry at the start.
 class PolygonMap {
  public:
   // What a surface of a kind cannot be: its normal in the map says so.
@@ -193,7 +194,7 @@ class PolygonMap {
     }
   };
   struct View {
-    Transform world_T_camera;       // at the exposure
+    Transform odom_T_camera;        // at the exposure
     double position_sigma_m = 0.0;  // of that pose
     double tilt_sigma_rad = 0.0;    // of the base
     CameraIntrinsics intrinsics;
@@ -283,7 +284,7 @@ class PolygonMap {
   [[nodiscard]] std::optional<SeenLine> local_line(const MapTrack& track, const EdgeLine& line) const noexcept;
   [[nodiscard]] std::optional<Vec3> heading_from_lines() const noexcept;
   [[nodiscard]] bool agrees(const TrackedLine& line, const SeenLine& seen) const noexcept;
-  void turn_to(MapTrack& track, const Vec3& world_x) noexcept;
+  void turn_to(MapTrack& track, const Vec3& map_x) noexcept;
   void update_line(TrackedLine& line, const SeenLine& seen) noexcept;
   void update_sides(MapTrack& track, bool first) noexcept;
   void update_side(TrackedSide& side, double seen_m, bool observed) noexcept;

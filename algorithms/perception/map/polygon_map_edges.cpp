@@ -29,7 +29,7 @@ std::optional<Vec3> PolygonMap::heading_from_lines() const noexcept {
 
 std::optional<SeenLine> PolygonMap::local_line(const MapTrack& track, const EdgeLine& line) const noexcept {
   if (!line.valid || track.kind != SurfaceKind::kTread) return std::nullopt;
-  const SeenLine seen{local_xy(track.world_T_local, line.a_m), local_xy(track.world_T_local, line.b_m),
+  const SeenLine seen{local_xy(track.map_T_local, line.a_m), local_xy(track.map_T_local, line.b_m),
                       math::square(std::max(line.sigma_m, params_.least_sigma_m))};
   const Vec2 along = seen.b_m - seen.a_m;
   // More than 45 degrees off is no edge across the stairs.
@@ -38,9 +38,9 @@ std::optional<SeenLine> PolygonMap::local_line(const MapTrack& track, const Edge
   return seen;
 }
 
-void PolygonMap::turn_to(MapTrack& track, const Vec3& world_x) noexcept {
-  Transform& frame = track.world_T_local;
-  const Transform turned_frame{frame_from(frame.R.col(2), world_x), frame.p_m};
+void PolygonMap::turn_to(MapTrack& track, const Vec3& map_x) noexcept {
+  Transform& frame = track.map_T_local;
+  const Transform turned_frame{frame_from(frame.R.col(2), map_x), frame.p_m};
   const Mat2 new_R_old = (turned_frame.R.transpose() * frame.R).topLeftCorner<2, 2>();
   const double turn_rad = math::atan2(new_R_old(0, 1), new_R_old(0, 0));  // of the new x axis in the old frame
   frame = turned_frame;

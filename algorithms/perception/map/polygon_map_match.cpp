@@ -18,7 +18,7 @@ double length_m(const Interval& a) noexcept { return a.max_m - a.min_m; }
 
 ConvexPolygon PolygonMap::local_polygon(const MapTrack& track) const noexcept {
   ConvexPolygon out;
-  for (const Vec3& v : seen_.polygon) (void)out.try_push_back(local_xy(track.world_T_local, v));
+  for (const Vec3& v : seen_.polygon) (void)out.try_push_back(local_xy(track.map_T_local, v));
   return out;
 }
 
@@ -26,12 +26,12 @@ ConvexPolygon PolygonMap::local_polygon(const MapTrack& track) const noexcept {
 bool PolygonMap::is_near(const MapTrack& track, Nearness& out) const noexcept {
   if (track.erased || track.kind != seen_.kind || track.polygon.size() < 3) return false;
   const bool upright = track.kind == SurfaceKind::kRiser;
-  const Vec3 normal = track.world_T_local.R.col(2);
+  const Vec3 normal = track.map_T_local.R.col(2);
   if (normal.dot(seen_.plane.normal) <
       math::cos(upright ? params_.match.upright_turn_gate_rad : params_.match.tilt_gate_rad)) {
     return false;
   }
-  const Vec3 offset = seen_.centroid_m - track.world_T_local.p_m;
+  const Vec3 offset = seen_.centroid_m - track.map_T_local.p_m;
   out.across_m = normal.dot(offset);
   if (std::abs(out.across_m) > (upright ? params_.match.upright_gate_m : params_.match.height_gate_max_m)) return false;
   out.variance_m2 =
@@ -102,14 +102,14 @@ void PolygonMap::measure_offset() noexcept {
   const double common_m2 = math::square(params_.systematic_sigma_m);
   // A riser is matched from further off than it may lie; a plane's normal says nothing about its place beside it.
   if (std::abs(near.across_m) < params_.lines.gate_max_m) {
-    drift_.add(track.world_T_local.R.col(2), near.across_m, near.variance_m2 + common_m2);
+    drift_.add(track.map_T_local.R.col(2), near.across_m, near.variance_m2 + common_m2);
   }
   for (const auto& [edge, line] : {std::pair{&seen_.nosing, &track.nosing}, std::pair{&seen_.back, &track.back}}) {
     const std::optional<SeenLine> seen = local_line(track, *edge);
     if (!seen || line->sightings < params_.lines.min_sightings || !agrees(*line, *seen)) continue;
     const Vec2 middle_m = 0.5 * (seen->a_m + seen->b_m);
     const double norm = math::sqrt(1.0 + math::square(line->state[1]));
-    drift_.add(track.world_T_local.R * Vec3{1.0 / norm, -line->state[1] / norm, 0.0},
+    drift_.add(track.map_T_local.R * Vec3{1.0 / norm, -line->state[1] / norm, 0.0},
                (middle_m.x() - line->at_m(middle_m.y())) / norm,
                seen->variance_m2 + std::min(line->variance_m2(middle_m.y()), 1.0) + common_m2);
   }
@@ -121,7 +121,7 @@ void PolygonMap::measure_offset() noexcept {
     const double support = support_m(seen, u);
     if (!side.observed || std::abs(support - side.support_m) > params_.sides.gate_m) continue;
     if (!end_observed(params_.ends, seen, seen_.edges, u, support)) continue;
-    drift_.add(track.world_T_local.R * Vec3{u.x(), u.y(), 0.0}, support - side.support_m,
+    drift_.add(track.map_T_local.R * Vec3{u.x(), u.y(), 0.0}, support - side.support_m,
                math::square(params_.sides.sigma_m) + 1.0 / side.information + common_m2);
   }
 }

@@ -28,7 +28,7 @@ void PolygonMap::fuse_best() noexcept {
     }
   }
   // A riser is matched from further off than it may have moved.
-  const Transform& frame = keep->world_T_local;
+  const Transform& frame = keep->map_T_local;
   const double offset_m = -seen_.plane.distance_m(frame.p_m) / frame.R.col(2).dot(seen_.plane.normal);
   const bool outlier = std::abs(offset_m) > params_.lines.gate_max_m;
   if (outlier) {
@@ -57,7 +57,7 @@ void PolygonMap::create() noexcept {
   if (track.kind == SurfaceKind::kTread) {
     if (const std::optional<Vec3> heading = heading_from_lines()) x_hint = *heading;
   }
-  track.world_T_local = {frame_from(normal, x_hint), seen_.centroid_m};
+  track.map_T_local = {frame_from(normal, x_hint), seen_.centroid_m};
   track.offset_information = 1.0 / seen_.offset_variance_m2;
   track.tilt_information = 1.0 / seen_.tilt_variance_rad2;
   track.rmse_m = seen_.rmse_m;
@@ -82,11 +82,11 @@ void PolygonMap::create() noexcept {
 
 // What is worth keeping when the map is full.
 int PolygonMap::priority(const MapTrack& track) const noexcept {
-  const Vec2 eye_m = local_xy(track.world_T_local, map_T_camera_.p_m);
+  const Vec2 eye_m = local_xy(track.map_T_local, map_T_camera_.p_m);
   // A long floor's middle may be far from where the robot stands on it.
   const double distance_m = track.kind == SurfaceKind::kTread
                                 ? -signed_distance_m(track.polygon, eye_m)
-                                : (track.world_T_local.p_m - map_T_camera_.p_m).head<2>().norm();
+                                : (track.map_T_local.p_m - map_T_camera_.p_m).head<2>().norm();
   if (track.erased || distance_m > params_.memory.reach_m) return 0;
   return (track.kind == SurfaceKind::kOther ? 1 : 3) + (track.sightings < params_.memory.confirmed_sightings ? 0 : 1);
 }
@@ -126,7 +126,7 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
   track.invalid_fraction = seen_.invalid_fraction;
 
   // The plane: offset along the normal at the local origin, and tilt about it.
-  Transform& frame = track.world_T_local;
+  Transform& frame = track.map_T_local;
   Vec3 normal = frame.R.col(2);
   const double cosine = normal.dot(seen_.plane.normal);
   const double lever2_m2 = (seen_.centroid_m - frame.p_m).squaredNorm();
@@ -157,7 +157,7 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
 void PolygonMap::merge(MapTrack& into, MapTrack& from) noexcept {
   work_.add(300 + static_cast<std::int32_t>(kMapSides * from.polygon.size()) * 45);
   // The other one is one more sighting of where the surface reaches.
-  const Transform into_T_from = into.world_T_local.inverse() * from.world_T_local;
+  const Transform into_T_from = into.map_T_local.inverse() * from.map_T_local;
   for (std::size_t k = 0; k < kMapSides; ++k) {
     const Vec2 u = side_direction(k);
     for (const Vec2& v : from.polygon) {
@@ -207,7 +207,7 @@ void PolygonMap::age(MapTrack& track) noexcept {
   if (track.erased || track.last_seen_ns == newest_ns_) return;
   work_.add(400);
   work_.add(track.polygon.size(), 75);
-  const Transform camera_T_local = map_T_camera_.inverse() * track.world_T_local;
+  const Transform camera_T_local = map_T_camera_.inverse() * track.map_T_local;
   const bool looked = in_view(track, camera_T_local);
   if (looked) work_.add(750);
   if (looked && !hidden(track, camera_T_local)) ++track.misses;

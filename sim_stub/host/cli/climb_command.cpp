@@ -184,9 +184,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->type_name("UINT in [0, 2^64 - 1]")
       ->capture_default_str();
   keep_among(*climb.add_option("--noise", a.noise, "Depth noise")->capture_default_str(), {"white", "correlated"});
-  keep_among(*climb
-                  .add_option("--contacts", a.contacts,
-                              "Foot forces: inferred from joint torques, or sensed, too")
+  keep_among(*climb.add_option("--contacts", a.contacts, "Foot forces: inferred from joint torques, or sensed, too")
                   ->capture_default_str(),
              {"inferred", "sensed"});
   climb

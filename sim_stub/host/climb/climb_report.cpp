@@ -105,7 +105,7 @@ void ClimbReport::observe_map(const Telemetry& telemetry) {
   for (auto& [id, seen] : polygons_) seen.remembered = false;
   for (const MapPolygon& polygon : map.polygons) {
     auto& seen = polygons_[polygon.id] = {polygon.surface, true};
-    for (Vec3& vertex_m : seen.surface.polygon) vertex_m += map.drift_m;  // from the map's world to the estimator's
+    for (Vec3& vertex_m : seen.surface.polygon) vertex_m = odometry_.true_T_odom() * Vec3(vertex_m + map.drift_m);
   }
 }
 
@@ -151,7 +151,7 @@ void ClimbReport::take_target(const Telemetry& telemetry) {
   target_ = step.target;
   target_mapped_ = step.height_mapped;
   footsteps_.back().true_T_planned =
-      odometry_.true_T_world() * Transform{rotation_z(step.target.yaw_rad), step.target.position_m};
+      odometry_.true_T_odom() * Transform{rotation_z(step.target.yaw_rad), step.target.position_m};
   const Transform& odom_T_stance = telemetry.state.odom_T_sole[index_of(other(step.foot))];
   latched_across_m_ = level_frame_p(odom_T_stance, step.odom_T_target.p_m).y();
 }
@@ -381,7 +381,7 @@ ClimbDrawing ClimbReport::drawing() const {
   ClimbDrawing d;
   for (const auto& [id, seen] : polygons_) {
     ClimbDrawing::Polygon polygon{seen.surface.kind, {}, seen.remembered};
-    for (const Vec3& vertex_m : seen.surface.polygon) polygon.vertices_m.push_back(odometry_.true_T_world() * vertex_m);
+    for (const Vec3& vertex_m : seen.surface.polygon) polygon.vertices_m.push_back(vertex_m);
     d.polygons.push_back(std::move(polygon));
   }
   d.base_trail_m = base_trail_m_;

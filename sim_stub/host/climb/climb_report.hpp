@@ -108,7 +108,7 @@ class ClimbReport {
     SurfacePatch surface;
     bool remembered;
   };
-  std::map<std::uint32_t, Seen> polygons_;  // newest form of every polygon, by id
+  std::map<std::uint32_t, Seen> polygons_;  // newest form of every polygon, by id; true world
 
   std::vector<Footstep> footsteps_;
   Foothold target_;              // of the newest footstep

@@ -34,7 +34,7 @@ struct Footstep {
   bool onto_tread = false;
   bool landed = false;                      // touch-down reported, and the sole truly stands
   int step_index = -1;                      // true step under the landed sole, 0-based; -1: floor
-  Transform true_T_planned;                 // latched target, module's world aligned at tick 0
+  Transform true_T_planned;                 // latched target, by where the base was then
   Transform true_T_landed;                  // true sole at touch-down
   double execution_error_m = kNotMeasured;  // 3D, odometry frame: latched target to estimated sole at touch-down
   // Signed, latched minus true: the sole's distance behind the nosing and its lateral place seen from the stance sole.

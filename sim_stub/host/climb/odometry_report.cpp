@@ -87,6 +87,7 @@ void OdometryReport::observe(const Truth& truth, const StateEstimate& state, Gai
     aligned_ = true;
     aligned_stamp_ns_ = truth.stamp_ns;
   }
+  true_T_odom_now_ = aligned_worlds(truth.true_T_base, state.odom_T_base);
   const Vec3& true_p_m = truth.true_T_base.p_m;
   const Vec3 base_error_m = true_T_odom_ * state.odom_T_base.p_m - true_p_m;
   const Vec3 fused_error_m = true_T_world_ * state.world_T_base().p_m - true_p_m;

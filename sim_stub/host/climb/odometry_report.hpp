@@ -29,7 +29,8 @@ class OdometryReport {
 
   [[nodiscard]] bool aligned() const { return aligned_; }
   [[nodiscard]] std::int64_t aligned_stamp_ns() const { return aligned_stamp_ns_; }
-  [[nodiscard]] const Transform& true_T_world() const { return true_T_world_; }
+  // By where the base is in this tick, so that what lies in odometry is judged without its drift until then.
+  [[nodiscard]] const Transform& true_T_odom() const { return true_T_odom_now_; }
   // None for a moment before the first or after the last tick, or longer than 2 s ago.
   [[nodiscard]] std::optional<Transform> true_T_base_at(std::int64_t stamp_ns) const;
   [[nodiscard]] OdometryFigures figures() const;
@@ -49,7 +50,7 @@ class OdometryReport {
   std::deque<TruePose> past_;
   bool aligned_ = false, climbing_ = false;
   std::int64_t aligned_stamp_ns_ = 0;
-  Transform true_T_odom_, true_T_world_;
+  Transform true_T_odom_, true_T_world_, true_T_odom_now_;
   std::optional<Transform> true_T_lio_;
   std::optional<Vec3> held_lio_m_;  // the last pose that arrived, true world
   SquaredError base_, lio_, fused_;

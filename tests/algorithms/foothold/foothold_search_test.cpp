@@ -77,8 +77,8 @@ FootholdSearch::Query standing(const Stairs& s, int on, double before_m = 0.3, d
   const double x = on == 0 ? -before_m : s.nosing_x_m(on) + 0.0872;
   const Vec3 middle = s.world_T_stairs() * Vec3{x, lateral_m, on * s.rise_m};
   FootholdSearch::Query q;
-  q.world_T_base = test::base_above(middle, s.yaw_rad + yaw_rad);
-  q.world_T_sole = test::soles_at(middle, s.yaw_rad + yaw_rad);
+  q.odom_T_base = test::base_above(middle, s.yaw_rad + yaw_rad);
+  q.odom_T_sole = test::soles_at(middle, s.yaw_rad + yaw_rad);
   q.climbing = on > 0;
   return q;
 }
@@ -250,8 +250,8 @@ TEST_F(FootholdSearchTest, Eq26_PStarStarOfBothFeet_LieSideBySideOnTheTreadAfter
   MapSnapshot map = ideal_map(s);
   map.drift_m = {0.02, -0.01, 0.03};
   FootholdSearch::Query q = standing(s, 0);
-  q.world_T_base.p_m += map.drift_m;
-  for (Transform& sole : q.world_T_sole) sole.p_m += map.drift_m;
+  q.odom_T_base.p_m += map.drift_m;
+  for (Transform& sole : q.odom_T_sole) sole.p_m += map.drift_m;
   const FootholdSet& r = search(map, q);
   ASSERT_TRUE(r.has_p_star_star);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -310,7 +310,7 @@ TEST_F(FootholdSearchTest, SecondTreadTooShort_IsNoPStarStar) {
 TEST_F(FootholdSearchTest, Eq26_SplitStance_SearchesFromTheFootThatStays) {
   const Stairs s{};
   FootholdSearch::Query q = standing(s, 1);
-  q.world_T_sole[index_of(Foot::kRight)].p_m = Vec3{s.nosing_x_m(2) + 0.0872, -0.1, 2 * s.rise_m};
+  q.odom_T_sole[index_of(Foot::kRight)].p_m = Vec3{s.nosing_x_m(2) + 0.0872, -0.1, 2 * s.rise_m};
   q.stance = Foot::kRight;
   EXPECT_NEAR(search(ideal_map(s), q).p_star.position_m.z(), 3 * s.rise_m, 1e-9);
   q.stance = Foot::kLeft;
@@ -663,7 +663,7 @@ TEST_F(FootholdSearchTest, Counters_EveryOneRises) {
   search_->begin(ideal_map(s), q);
   search_->begin(ideal_map(s), q);
   EXPECT_EQ(search_->counters().abandoned, 1U);
-  q.world_T_base.p_m.x() = std::nan("");
+  q.odom_T_base.p_m.x() = std::nan("");
   search_->begin(ideal_map(s), q);
   EXPECT_EQ(search_->counters().rejected_queries, 1U);
   WorkBudget budget(10);

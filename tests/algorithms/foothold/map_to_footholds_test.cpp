@@ -63,8 +63,8 @@ ClimbErrors climb(const Stairs& stairs, const Noise& noise, const PoseError& pos
       EXPECT_EQ(map->step(budget), Progress::kDone);
     }
     FootholdSearch::Query query;
-    query.world_T_base = test::base_above(to + drift, stairs.yaw_rad);
-    query.world_T_sole = test::soles_at(to + drift, stairs.yaw_rad);
+    query.odom_T_base = test::base_above(to + drift, stairs.yaw_rad);
+    query.odom_T_sole = test::soles_at(to + drift, stairs.yaw_rad);
     query.climbing = k > 0;
     search->begin(map->snapshot(), query);
     WorkBudget budget(1 << 20);

@@ -196,7 +196,8 @@ TEST_P(BusModuleTest, FeetSilent_AreNamedAndTheJointTorquesGoOnTellingContacts) 
   EXPECT_EQ(count(Fault::kFeetSilent), 1U);
   EXPECT_EQ(control().module_state(), ModuleState::kRunning);
   EXPECT_FALSE(robot_->truth().fell);
-  for (const double force_n : control().estimator().leg_sensing().joints().foot_force_n) EXPECT_NEAR(force_n, 270.0, 40.0);
+  for (const double force_n : control().estimator().leg_sensing().joints().foot_force_n)
+    EXPECT_NEAR(force_n, 270.0, 40.0);
 }
 
 TEST_P(BusModuleTest, DriveTellsAnError_StopsOnTwoFeet) {

@@ -126,7 +126,7 @@ TEST(ClimbReport, PassingFoot_MustClearTheTreadItPasses) {
       climb.gait.step.sequence += 1;
       climb.gait.step.foot = Foot::kLeft;
       climb.gait.step.touch_down_stamp_ns = 0;
-      climb.gait.step.target.position_m = climb.world_T_true() * climb.on_step(2, Foot::kLeft).p_m;
+      climb.gait.step.target.position_m = climb.odom_T_true * climb.on_step(2, Foot::kLeft).p_m;
       climb.truth.in_contact[0] = false;
       climb.truth.true_T_sole[0].p_m = Vec3(0.28 - 0.179 + 0.004, 0.1, 0.20);  // 4 mm into step 2 on the way to step 3
       climb.tick();
@@ -275,7 +275,7 @@ TEST(ClimbReport, TargetChangedInTheAir_LandingIsScoredAgainstTheNewOne) {
   step.touch_down_stamp_ns = 0;
   Transform target = climb.on_step(1, Foot::kRight, 0.11);
   const auto aim = [&] {
-    step.target.position_m = climb.world_T_true() * target.p_m;
+    step.target.position_m = climb.odom_T_true * target.p_m;
     step.odom_T_target = climb.odom_T_true * target;
   };
   aim();
@@ -521,7 +521,8 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
   for (const auto& [key, value] : j.items()) keys += key + " ";
   EXPECT_EQ(
       keys,
-      "verdict reason fell ended_by ended_at_s plant gait seed arguments params_hash reality camera steps_total steps_climbed "
+      "verdict reason fell ended_by ended_at_s plant gait seed arguments params_hash reality camera steps_total "
+      "steps_climbed "
       "climb_time_s seconds_per_step plane_rate_hz "
       "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min stand_off_mm "
       "closure_error_mm tracking_error_mm com_tracking_mm_max zmp_margin_mm_min torque_peak_ratio torque_limited_ms "
@@ -567,7 +568,7 @@ TEST(ClimbSvg, Drawing_HasEveryPartInTheTrueWorld) {
   polygon.id = 4;
   polygon.surface.kind = SurfaceKind::kTread;
   for (const Vec3& p : {Vec3(0, -0.4, 0.13), Vec3(0.28, -0.4, 0.13), Vec3(0.28, 0.4, 0.13)}) {
-    ASSERT_TRUE(polygon.surface.polygon.try_push_back(climb.world_T_true() * p));
+    ASSERT_TRUE(polygon.surface.polygon.try_push_back(climb.odom_T_true * p));
   }
   ASSERT_TRUE(climb.map.polygons.try_push_back(polygon));
   climb.map.stamp_ns = 1;

@@ -112,7 +112,8 @@ TEST(GroundForceObserver, LegsThatSwingOnABaseThatSways_PressOnNothing) {
     double most_n = 0.0;
     for (int i = 0; i < 1000; ++i) {
       const Sample s = sample(RobotModel{}, i * kDt_s, {0.0, 0.0}, 0.0);
-      most_n = std::max(most_n, std::abs(observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up)[0]));
+      most_n = std::max(most_n, std::abs(observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints,
+                                                         s.base, s.base_up)[0]));
     }
     return most_n;
   }();

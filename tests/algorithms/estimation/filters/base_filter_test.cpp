@@ -24,8 +24,7 @@ ContactRows rows_of(const BaseFilter& filter, const WalkTruth& truth, const Join
                     const std::array<KnownHeight, kFootCount>& heights) {
   const LegGeometry geometry;
   return filter.make_rows(truth.true_T_base.R, Vec3::Zero(),
-                          test::measured_legs(geometry, joints.q_rad, joints.dq_radps),
-                          contacts, {}, heights, kTick_s);
+                          test::measured_legs(geometry, joints.q_rad, joints.dq_radps), contacts, {}, heights, kTick_s);
 }
 
 TEST(BaseFilter, Eq2Prediction_ConstantAcceleration_IsTheParabola) {

@@ -160,10 +160,10 @@ TEST_F(PolygonMapTest, InvalidInput_IsRejectedAndCounted) {
   };
   SurfaceFrame frame = in_camera({level_patch({0, 0, 0}, 0.2, 0.2)}, camera, 100);
   PolygonMap::View bad = view;
-  bad.world_T_camera.p_m.x() = std::nan("");
+  bad.odom_T_camera.p_m.x() = std::nan("");
   EXPECT_EQ(begin_with(bad, frame), Progress::kIdle);
   bad = view;
-  bad.world_T_camera.R *= 1.1;
+  bad.odom_T_camera.R *= 1.1;
   EXPECT_EQ(begin_with(bad, frame), Progress::kIdle);
   bad = view;
   bad.intrinsics.fx_px = 0.0;
