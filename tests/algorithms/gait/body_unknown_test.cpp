@@ -37,7 +37,7 @@ class BodyInView : public testing::Test {
       WorkBudget budget(1'000'000);
       ASSERT_EQ(extractor_->step(budget), Progress::kDone);
       PolygonMap::View seen;
-      seen.world_T_camera = scene_.world_T_camera;
+      seen.odom_T_camera = scene_.world_T_camera;
       seen.position_sigma_m = 0.002;
       seen.tilt_sigma_rad = 0.002;
       seen.intrinsics = scene_.intrinsics;
