@@ -40,7 +40,10 @@ void ProprioceptiveOdometry::initialise(const ContactInEkf::Start& start, const 
   fusion_.begin(fusion_variances(covariance_));
   soles_known_ = legs[0].sole_known && legs[1].sole_known;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) odom_p_foot_m_[foot] = odom_p_foot_m(legs[foot]);
-  since_legs_s_ = 0.0;
+  motion_.reset(params_.motion);
+  since_legs_s_ = unrested_s_ = 0.0;
+  feet_lost_ = false;
+  innovations_ = {};
   // Feet not yet standing: the contacts begin where kinematics has them.
   base_.initialise(start.odom_p_base_m, start.odom_v_base_mps,
                    base_.make_rows(start.odom_R_base, Vec3::Zero(), legs, {}, {}, {}, dt_s));

@@ -91,9 +91,8 @@ void KinematicPlant::load_drives() {
     const LegFrames frames = leg_frames(errors_.legs[f], leg, leg_joints(true_q_rad(), leg));
     const Vec3 base_f = true_T_base_.R.transpose() * Vec3{0, 0, foot_force_n(f)};
     const Vec3 local_m = feet_[f].true_T_sole.R.transpose() * rest_m;
-    const Vec3 base_r = frames.sole.R *
-                        Vec3{math::clamp(local_m.x(), sole.heel_x_m, sole.toe_x_m),
-                             math::clamp(local_m.y(), -sole.half_width_m, sole.half_width_m), 0.0};
+    const Vec3 base_r = frames.sole.R * Vec3{math::clamp(local_m.x(), sole.heel_x_m, sole.toe_x_m),
+                                             math::clamp(local_m.y(), -sole.half_width_m, sole.half_width_m), 0.0};
     std::array<Vec3, kJointsPerLeg> specific_mps2;
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       LinkState& link = feet_[f].links[j];

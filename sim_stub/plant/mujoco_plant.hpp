@@ -25,10 +25,10 @@ class MujocoPlant final : public Plant {
     double armature_kgm2 = 0.05;     // of every drive, seen at the joint
     double joint_friction_nm = 0.0;  // Coulomb, that the leg feels
     double joint_damping_nmsprad = 0.0;
-    double backlash_rad = 0.0;       // play between drive and link, from end to end
-    double torque_scale = 1.0;       // what a drive gives of what it is asked
-    double torque_lag_s = 0.0;       // time constant
-    double command_delay_s = 0.0;    // beyond the bus
+    double backlash_rad = 0.0;     // play between drive and link, from end to end
+    double torque_scale = 1.0;     // what a drive gives of what it is asked
+    double torque_lag_s = 0.0;     // time constant
+    double command_delay_s = 0.0;  // beyond the bus
     // Of either leg's drives, what a command's encoding ends at; 0: nowhere.
     std::array<double, kJointsPerLeg> kp_most_nmprad{}, kd_most_nmsprad{};
     double torso_mass_scale = 1.0;   // against the mass that the module believes

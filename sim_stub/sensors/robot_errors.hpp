@@ -42,9 +42,7 @@ struct ErrorParams {
   double lio_sigma_scale = 1.0;      // true noise over the stated one
   double toe_m = 0.0, heel_m = 0.0;  // by which the foot is longer in front and behind
 
-  [[nodiscard]] static ErrorParams none() noexcept {
-    return {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
-  }
+  [[nodiscard]] static ErrorParams none() noexcept { return {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}; }
 
   static void visit(auto& p, auto& field) {
     field("leg_length", p.leg_length, 0.0, 0.1, "Spread of thigh and shank, relative.");

@@ -190,8 +190,7 @@ double ankle_after(const MujocoPlant::Params& params, double torque_nm, int tick
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const double lifted_m = foot == Foot::kLeft ? 0.1 : 0.0;
     const Vec3 p_m{0, side_sign(foot) * kStanceHalfWidth_m, lifted_m - kNominalBaseHeight_m};
-    q.segment<6>(static_cast<Eigen::Index>(joint_index(foot, 0))) =
-        solve_leg({}, foot, {Mat3::Identity(), p_m}).q_rad;
+    q.segment<6>(static_cast<Eigen::Index>(joint_index(foot, 0))) = solve_leg({}, foot, {Mat3::Identity(), p_m}).q_rad;
   }
   MujocoPlant plant(params, world, errors, Transform{Mat3::Identity(), Vec3{-1, 0, 0}}, q);
   JointCommand command;

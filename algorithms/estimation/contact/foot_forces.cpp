@@ -57,7 +57,8 @@ std::array<double, kFootCount> FootForces::update(const RobotModel& robot, const
   std::array<double, kFootCount> up_n{};
   for (std::size_t f = 0; f < kFootCount; ++f) {
     bool told = torques_told;
-    for (std::size_t j = 0; j < kJointsPerLeg; ++j) told = told && !joints.is_mute(joint_index(static_cast<Foot>(f), j));
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j)
+      told = told && !joints.is_mute(joint_index(static_cast<Foot>(f), j));
     const Weighed observed{observed_n[f], told ? 1.0 / math::square(params_.observer_sigma_n) : 0.0};
     const bool hangs = told && !stands[f] && observed_n[f] < params_.light_n;
     const Weighed sensed = sense(sensors_[f], joints.foot_force_n[f], observed, hangs, dt_s);

@@ -184,9 +184,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->type_name("UINT in [0, 2^64 - 1]")
       ->capture_default_str();
   keep_among(*climb.add_option("--noise", a.noise, "Depth noise")->capture_default_str(), {"white", "correlated"});
-  keep_among(*climb
-                  .add_option("--contacts", a.contacts,
-                              "Foot forces: inferred from joint torques, or sensed, too")
+  keep_among(*climb.add_option("--contacts", a.contacts, "Foot forces: inferred from joint torques, or sensed, too")
                   ->capture_default_str(),
              {"inferred", "sensed"});
   climb
@@ -334,7 +332,7 @@ std::string bus_complaint(ClimbArguments& a) {
     return "--contacts sensed needs [feet] in \"" + a.bus + "\": its buses carry no foot forces.";
   }
   RobotModel robot = a.options.params.robot;
-  config::limit_by_drives(*a.options.bus, a.options.params.gait.joints, robot);
+  config::limit_by_drives(*a.options.bus, robot);
   if (a.options.can_log.empty()) return {};
   for (const std::string& taken : {a.bus, a.camera, a.options.params_file, a.options.out_dir + "/summary.json",
                                    a.options.out_dir + "/climb.svg"}) {

@@ -52,7 +52,7 @@ struct ClimbOptions {
   bool estimate_mount = true;
   // The joints are behind these buses, else wired directly. What the drives can do binds the module's robot.
   std::optional<config::BusFile> bus;
-  std::string can_log;          // every frame on the buses, as candump -L writes it; empty: none
+  std::string can_log;        // every frame on the buses, as candump -L writes it; empty: none
   bool foot_sensors = false;  // else contacts are told by joint torques alone
 };
 

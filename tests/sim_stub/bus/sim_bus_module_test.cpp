@@ -23,7 +23,7 @@ class BusModuleTest : public testing::TestWithParam<const char*> {
     const config::BusFile file = config::read_bus(std::string(POLYGMAP_BUSES) + "/" + GetParam() + ".toml");
     Params params;
     params.gait.standing.start_patience_ticks = 100000;  // it waits for stairs
-    config::limit_by_drives(file, params.gait.joints, params.robot);
+    config::limit_by_drives(file, params.robot);
     bus_ = std::make_unique<BusRobot>(*robot_, file, nullptr);
     pipeline_ = std::make_unique<Pipeline>(Ports{*robot_, *robot_, bus_->joints(), *robot_}, params);
     executive_ = std::make_unique<OneLaneExecutive<>>(*pipeline_, *robot_, pipeline_->lane_health(0));
@@ -196,7 +196,8 @@ TEST_P(BusModuleTest, FeetSilent_AreNamedAndTheJointTorquesGoOnTellingContacts) 
   EXPECT_EQ(count(Fault::kFeetSilent), 1U);
   EXPECT_EQ(control().module_state(), ModuleState::kRunning);
   EXPECT_FALSE(robot_->truth().fell);
-  for (const double force_n : control().estimator().leg_sensing().joints().foot_force_n) EXPECT_NEAR(force_n, 270.0, 40.0);
+  for (const double force_n : control().estimator().leg_sensing().joints().foot_force_n)
+    EXPECT_NEAR(force_n, 270.0, 40.0);
 }
 
 TEST_P(BusModuleTest, DriveTellsAnError_StopsOnTwoFeet) {

@@ -35,8 +35,8 @@ class FootForcesTest : public testing::Test {
       std::array<Vec3, kJointsPerLeg> specific_mps2;
       specific_mps2.fill(-kGravity_mps2 * up);
       if (!tells_torques_) continue;
-      joints.tau_nm.segment<6>(at) = leg_torques_nm(robot_.masses, foot, leg_frames(robot_.legs, foot, q), specific_mps2,
-                                                    {pressed_n[index_of(foot)] * up, Vec3::Zero()});
+      joints.tau_nm.segment<6>(at) = leg_torques_nm(robot_.masses, foot, leg_frames(robot_.legs, foot, q),
+                                                    specific_mps2, {pressed_n[index_of(foot)] * up, Vec3::Zero()});
     }
     return forces_.update(robot_, joints, base, up, {pressed_n[0] > 0.0, pressed_n[1] > 0.0});
   }
