@@ -220,7 +220,7 @@ bool Estimator::try_begin() noexcept {
   start.tilt_sigma_rad = params_.first_tilt_sigma_rad;
   start.velocity_sigma_mps = params_.first_velocity_sigma_mps;
   start.gyro_bias_sigma_radps = params_.first_gyro_bias_sigma_radps;
-  odometry_.initialise(start, legs, params_.max_step_s);
+  odometry_.initialise(start, true, legs, params_.max_step_s);
   stood_ns_ = newest_input_ns();
   begun_ = true;
   balances_ = stood_[0] && stood_[1];
@@ -228,7 +228,7 @@ bool Estimator::try_begin() noexcept {
 }
 
 void Estimator::begin(const ContactInEkf::Start& start) noexcept {
-  odometry_.initialise(start, legs_.sample.legs, params_.max_step_s);
+  odometry_.initialise(start, false, legs_.sample.legs, params_.max_step_s);
   odometry_.fusion().rebase(origin_.odom_T_base);
   origin_.initialised_ns = stood_ns_ = newest_input_ns();
   state_.initialised = has_state_ = begun_ = true;
