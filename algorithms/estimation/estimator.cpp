@@ -19,7 +19,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   quality_ = {};
   imu_ = {};
   legs_ = {};
-  has_state_ = begun_ = balances_ = false;
+  known_ = {};
   ground_ = {};
   stood_ = {};
   was_measured_ = {true, true};
@@ -34,13 +34,13 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   const bool new_legs = std::exchange(legs_.fresh, false);
   if (!state_.initialised && (!imu_.any || !legs_.any)) return;
   const std::int64_t now_ns = newest_input_ns();
-  if (has_state_ && now_ns <= state_.stamp_ns) return;
-  has_state_ = true;
+  if (known_.ticked && now_ns <= state_.stamp_ns) return;
+  known_.ticked = true;
 
   for (TouchDown& touch_down : ground_.touch_downs) touch_down.now = false;
   if (new_legs) take_legs(planned_stance);
   const bool begun = !state_.initialised && new_imu && new_legs && try_begin();
-  if (begun || !(state_.initialised || balances_)) {
+  if (begun || !(state_.initialised || known_.runs)) {
     publish(now_ns);
     return;
   }
@@ -189,20 +189,20 @@ bool Estimator::try_begin() noexcept {
     leg_sensing_.forget_offsets();
   }
   const bool collecting = standstill_.collecting();
-  balances_ = balances_ && (stood_[0] || stood_[1]);
-  if (!still && balances_ && !collecting) return false;
+  known_.runs = known_.runs && (stood_[0] || stood_[1]);
+  if (!still && known_.runs && !collecting) return false;
 
   // Origin: the floor under the base as it stood first, the soles at z = 0 in the mean.
   Transform& odom_T_base = origin_.odom_T_base;
   odom_T_base = {collecting ? standstill_.odom_R_base() : level_attitude(imu_.mean.accel_mps2), Vec3::Zero()};
-  if (balances_) {
+  if (known_.runs) {
     odom_T_base.R = rotation_z(yaw_of(state_.odom_T_base.R)) * odom_T_base.R;
     odom_T_base.p_m.head<2>() = state_.odom_T_base.p_m.head<2>();
   }
   for (const LegMeasurement& leg : legs) {
     odom_T_base.p_m.z() -= (odom_T_base.R * leg.base_T_sole.p_m).z() / kFootCount;
   }
-  if (!still && balances_) return false;
+  if (!still && known_.runs) return false;
 
   ground_.heights.fill({0.0, params_.floor_sigma_m});
   ContactInEkf::Start start;
@@ -222,8 +222,8 @@ bool Estimator::try_begin() noexcept {
   start.gyro_bias_sigma_radps = params_.first_gyro_bias_sigma_radps;
   odometry_.initialise(start, true, legs, params_.max_step_s);
   stood_ns_ = newest_input_ns();
-  begun_ = true;
-  balances_ = stood_[0] && stood_[1];
+  known_.begun = true;
+  known_.runs = stood_[0] && stood_[1];
   return true;
 }
 
@@ -231,14 +231,14 @@ void Estimator::begin(const ContactInEkf::Start& start) noexcept {
   odometry_.initialise(start, false, legs_.sample.legs, params_.max_step_s);
   odometry_.fusion().rebase(origin_.odom_T_base);
   origin_.initialised_ns = stood_ns_ = newest_input_ns();
-  state_.initialised = has_state_ = begun_ = true;
+  state_.initialised = known_.ticked = known_.begun = true;
 }
 
 void Estimator::publish(std::int64_t now_ns) noexcept {
   state_.stamp_ns = counters_.stamp_ns = quality_.stamp_ns = now_ns;
   state_.oldest_input_ns = std::min(imu_.newest.stamp_ns, legs_.sample.stamp_ns - legs_.sample.silent_ns);
   state_.heard_ns = std::min(imu_.newest.stamp_ns, legs_.sample.stamp_ns);
-  if (begun_) {
+  if (known_.begun) {
     if (now_ns - stood_ns_ > kAlone_ns) state_.heard_ns = std::min(state_.heard_ns, stood_ns_);
     odometry_.describe(now_ns, state_);
     odometry_.describe(now_ns, quality_);

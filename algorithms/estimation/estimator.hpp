@@ -141,9 +141,11 @@ class Estimator {
   EstimateQuality quality_;
   Imu imu_;
   Legs legs_;
-  bool has_state_ = false;
-  bool begun_ = false;     // the filters have a state,
-  bool balances_ = false;  // and carry it on, though the standstill is not over
+  struct {
+    bool ticked = false;
+    bool begun = false;  // the filters have a state,
+    bool runs = false;   // and carry it on, though the standstill is not over
+  } known_;
   ProprioceptiveOdometry::Ground ground_;
   std::array<bool, kFootCount> stood_{};
   std::array<bool, kFootCount> was_measured_{true, true};

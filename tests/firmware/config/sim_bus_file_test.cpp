@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bus files: what they may say, the one sentence about what they may not, and whose drives can hold the robot.
+// Bus files: what they may say, and the one sentence about what they may not.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <fstream>
 
-#include "algorithms/gait/joints/standing_stiffness.hpp"
 #include "firmware/config/bus_file.hpp"
 
 namespace polygmap::config {
