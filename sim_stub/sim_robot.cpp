@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_stub/sim_robot.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -22,14 +23,22 @@ JointVector standing_q_rad() {
   return q;
 }
 
-// Before the module speaks, stiff drives keep the robot standing.
-JointCommand standing_command() {
-  JointCommand command;
-  const JointVector q = standing_q_rad();
-  for (std::size_t j = 0; j < kJointCount; ++j) {
-    command.joints[j] = {q[static_cast<Eigen::Index>(j)], 0.0, 0.0, 2000.0, 40.0};
+// As stiff as its drives can be, up to what holds a robot that nobody balances.
+StandController stand_controller(const MujocoPlant::Params& params) {
+  constexpr double kKp_nmprad = 2000.0, kKd_nmsprad = 40.0;
+  const auto within = [](double gain, double most) { return most > 0.0 ? std::min(gain, most) : gain; };
+  StandController::Gains gains;
+  for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+    gains.kp_nmprad[j] = within(kKp_nmprad, params.kp_most_nmprad[j]);
+    gains.kd_nmsprad[j] = within(gains.kp_nmprad[j] * kKd_nmsprad / kKp_nmprad, params.kd_most_nmsprad[j]);
   }
-  return command;
+  return {standing_q_rad(), gains};
+}
+
+bool asks_something(const JointCommand& command) {
+  return std::ranges::any_of(command.joints, [](const JointSetpoint& joint) {
+    return joint.kp_nmprad != 0.0 || joint.kd_nmsprad != 0.0 || joint.tau_ff_nm != 0.0;
+  });
 }
 
 LegShapes leg_shapes(const RobotErrors& errors, Foot leg, const JointVector& q_rad) {
@@ -44,11 +53,11 @@ Transform start_transform(const StartPose& start) {
 }
 
 std::unique_ptr<Plant> make_plant(const SimOptions& options, const StairWorld& stairs, const RobotErrors& errors,
-                                  const StartPose& start) {
+                                  const StartPose& start, StandController& holder) {
   if (options.plant_kind == PlantKind::kMujoco) {
     auto plant = make_mujoco_plant(options.mujoco, stairs, errors, start_transform(start), standing_q_rad());
     constexpr int kSettle_ticks = 1000;  // it has stood there for a while
-    for (int i = 0; i < kSettle_ticks; ++i) plant->step(standing_command());
+    for (int i = 0; i < kSettle_ticks; ++i) plant->step(holder.command(*plant));
     return plant;
   }
   return std::make_unique<KinematicPlant>(options.plant, stairs, errors, start_transform(start), standing_q_rad());
@@ -69,7 +78,8 @@ SimRobot::SimRobot(const SimOptions& options)
       errors_(draw_errors(options.errors, options.seed)),
       lio_silent_(options.lio_silent),
       pushes_(options.pushes),
-      plant_(make_plant(options, stairs_, errors_, start_)),
+      holder_(stand_controller(options.mujoco)),
+      plant_(make_plant(options, stairs_, errors_, start_, holder_)),
       camera_(options.camera,
               {.kind = options.noise,
                .sigma = options.depth_sigma,
@@ -82,16 +92,15 @@ SimRobot::SimRobot(const SimOptions& options)
       forces_(error_params_, options.seed),
       torques_(error_params_, options.seed),
       force_sensors_(options.force_sensors),
-      lio_(error_params_, errors_, options.seed),
-      active_(standing_command()) {
+      lio_(error_params_, errors_, options.seed) {
   sense();
 }
 
 void SimRobot::advance() {
   clock_.advance();
   if (!pushes_.empty()) plant_->push(push_force_n());
-  plant_->step(active_);
-  if (command_) active_ = *command_;
+  plant_->step(active_ ? *active_ : holder_.command(*plant_));
+  if (command_ && (active_ || asks_something(*command_))) active_ = command_;
   sense();
 }
 

@@ -22,6 +22,7 @@
 #include "sim_stub/sensors/robot_errors.hpp"
 #include "sim_stub/sensors/sensor_models.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
+#include "sim_stub/stand_controller.hpp"
 #include "sim_stub/world/stair_world.hpp"
 #include "sim_stub/world/truth.hpp"
 
@@ -105,6 +106,7 @@ class SimRobot final : public hal::Clock,
   std::vector<Window> lio_silent_;
   std::vector<Push> pushes_;
   VirtualClock clock_;
+  StandController holder_;  // until the module's first command that asks something of a drive
   std::unique_ptr<Plant> plant_;
   SimDepthCamera camera_;
   ImuModel imu_;
@@ -119,7 +121,7 @@ class SimRobot final : public hal::Clock,
   JointFeedback feedback_;
   bool feedback_fresh_ = false;
   std::optional<JointCommand> command_;  // by the module, in this tick or before
-  JointCommand active_;                  // what the drives follow
+  std::optional<JointCommand> active_;   // what the drives follow; none: the holder's
   Truth truth_;
 };
 

@@ -19,7 +19,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   quality_ = {};
   imu_ = {};
   legs_ = {};
-  has_state_ = false;
+  known_ = {};
   ground_ = {};
   stood_ = {};
   was_measured_ = {true, true};
@@ -34,13 +34,13 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   const bool new_legs = std::exchange(legs_.fresh, false);
   if (!state_.initialised && (!imu_.any || !legs_.any)) return;
   const std::int64_t now_ns = newest_input_ns();
-  if (has_state_ && now_ns <= state_.stamp_ns) return;
-  has_state_ = true;
+  if (known_.ticked && now_ns <= state_.stamp_ns) return;
+  known_.ticked = true;
 
   for (TouchDown& touch_down : ground_.touch_downs) touch_down.now = false;
   if (new_legs) take_legs(planned_stance);
-  if (!state_.initialised) {
-    if (new_imu && new_legs) calibrate();
+  const bool begun = !state_.initialised && new_imu && new_legs && try_begin();
+  if (begun || !(state_.initialised || known_.runs)) {
     publish(now_ns);
     return;
   }
@@ -53,7 +53,8 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   odometry_.step({now_ns, dt_s, imu_.mean.gyro_radps, imu_.mean.accel_mps2, felt, new_legs, imu_noise_.density()},
                  legs_.sample.legs, contacts, ground_);
   publish(now_ns);
-  if (seconds(now_ns - state_.oldest_input_ns) <= params_.max_step_s) ring_.push(state_);
+  const bool fresh = seconds(now_ns - state_.oldest_input_ns) <= params_.max_step_s;
+  if (state_.initialised && fresh) ring_.push(state_);
 }
 
 void Estimator::add_lio(const LioSample& sample, std::int64_t now_ns) noexcept {
@@ -179,7 +180,7 @@ std::array<FootContact, kFootCount> Estimator::measured_contacts(std::int64_t no
   return known;
 }
 
-void Estimator::calibrate() noexcept {
+bool Estimator::try_begin() noexcept {
   const ProprioceptiveOdometry::Legs& legs = legs_.sample.legs;
   const bool still = standstill_.try_finish(imu_.mean, leg_sensing_.joints(), legs);
   if (counters_.standstill_restarts != standstill_.restarts()) {
@@ -187,38 +188,57 @@ void Estimator::calibrate() noexcept {
     odometry_.fusion().reset(params_.fusion, robot_->mounts.base_T_lidar);  // what it averaged was another place
     leg_sensing_.forget_offsets();
   }
-  if (!standstill_.collecting()) return;
+  const bool collecting = standstill_.collecting();
+  known_.runs = known_.runs && (stood_[0] || stood_[1]);
+  if (!still && known_.runs && !collecting) return false;
 
-  // Origin: the floor under the base, the soles at z = 0 in the mean, yaw 0.
+  // Origin: the floor under the base as it stood first, the soles at z = 0 in the mean.
   Transform& odom_T_base = origin_.odom_T_base;
-  odom_T_base = {standstill_.odom_R_base(), Vec3::Zero()};
+  odom_T_base = {collecting ? standstill_.odom_R_base() : level_attitude(imu_.mean.accel_mps2), Vec3::Zero()};
+  if (known_.runs) {
+    odom_T_base.R = rotation_z(yaw_of(state_.odom_T_base.R)) * odom_T_base.R;
+    odom_T_base.p_m.head<2>() = state_.odom_T_base.p_m.head<2>();
+  }
   for (const LegMeasurement& leg : legs) {
     odom_T_base.p_m.z() -= (odom_T_base.R * leg.base_T_sole.p_m).z() / kFootCount;
   }
-  if (!still) return;
+  if (!still && known_.runs) return false;
 
+  ground_.heights.fill({0.0, params_.floor_sigma_m});
   ContactInEkf::Start start;
   start.odom_R_base = odom_T_base.R;
   start.odom_p_base_m = odom_T_base.p_m;
-  start.odom_v_base_mps = standstill_.odom_v_base_mps();
-  start.gyro_bias_radps = standstill_.gyro_bias_radps();
-  start.gravity_mps2 = standstill_.gravity_mps2();
-  ground_.heights.fill({0.0, params_.floor_sigma_m});
-  begin(start);
+  if (still) {
+    start.odom_v_base_mps = rotation_z(yaw_of(odom_T_base.R)) * standstill_.odom_v_base_mps();
+    start.gyro_bias_radps = standstill_.gyro_bias_radps();
+    start.gravity_mps2 = standstill_.gravity_mps2();
+    begin(start);
+    return true;
+  }
+  // To balance by, until it has stood still for long enough.
+  start.odom_v_base_mps = odom_T_base.R * base_v_base_mps(legs);
+  start.tilt_sigma_rad = params_.first_tilt_sigma_rad;
+  start.velocity_sigma_mps = params_.first_velocity_sigma_mps;
+  start.gyro_bias_sigma_radps = params_.first_gyro_bias_sigma_radps;
+  odometry_.initialise(start, true, legs, params_.max_step_s);
+  stood_ns_ = newest_input_ns();
+  known_.begun = true;
+  known_.runs = stood_[0] && stood_[1];
+  return true;
 }
 
 void Estimator::begin(const ContactInEkf::Start& start) noexcept {
-  odometry_.initialise(start, legs_.sample.legs, params_.max_step_s);
+  odometry_.initialise(start, false, legs_.sample.legs, params_.max_step_s);
   odometry_.fusion().rebase(origin_.odom_T_base);
   origin_.initialised_ns = stood_ns_ = newest_input_ns();
-  state_.initialised = has_state_ = true;
+  state_.initialised = known_.ticked = known_.begun = true;
 }
 
 void Estimator::publish(std::int64_t now_ns) noexcept {
   state_.stamp_ns = counters_.stamp_ns = quality_.stamp_ns = now_ns;
   state_.oldest_input_ns = std::min(imu_.newest.stamp_ns, legs_.sample.stamp_ns - legs_.sample.silent_ns);
   state_.heard_ns = std::min(imu_.newest.stamp_ns, legs_.sample.stamp_ns);
-  if (state_.initialised) {
+  if (known_.begun) {
     if (now_ns - stood_ns_ > kAlone_ns) state_.heard_ns = std::min(state_.heard_ns, stood_ns_);
     odometry_.describe(now_ns, state_);
     odometry_.describe(now_ns, quality_);

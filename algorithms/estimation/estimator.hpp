@@ -25,6 +25,9 @@ class Estimator {
     std::int64_t max_lead_ns = 10 * kNsPerMs;
     double max_height_error_m = 0.03;
     double floor_sigma_m = 0.003;
+    double first_tilt_sigma_rad = 0.015;
+    double first_velocity_sigma_mps = 0.02;
+    double first_gyro_bias_sigma_radps = 0.005;
     ImuNoise::Params imu_noise;
 
     static void visit(auto& p, auto& field) {
@@ -39,6 +42,11 @@ class Estimator {
       field("max_height_error_m", p.max_height_error_m, 0.001, 1.0,
             "A tread's height this far from the sole on it is refused.");
       field("floor_sigma_m", p.floor_sigma_m, 1e-5, 1.0, "Height of the floor under the feet at the start.");
+      field("first_tilt_sigma_rad", p.first_tilt_sigma_rad, 1e-4, 0.2,
+            "Tilt as the first accelerations tell it: they have a bias, and the robot sways.");
+      field("first_velocity_sigma_mps", p.first_velocity_sigma_mps, 1e-3, 1.0, "Velocity as the first legs tell it.");
+      field("first_gyro_bias_sigma_radps", p.first_gyro_bias_sigma_radps, 1e-5, 0.1,
+            "Bias of the gyro, of which nothing is known before the standstill.");
       field("imu_noise", p.imu_noise);
     }
   };
@@ -111,7 +119,9 @@ class Estimator {
   void take_legs(const std::array<bool, kFootCount>& planned_stance) noexcept;
   // Of the legs that count as measurements. One that is again is put where kinematics has it, as if it had just landed.
   [[nodiscard]] std::array<FootContact, kFootCount> measured_contacts(std::int64_t now_ns, bool new_legs) noexcept;
-  void calibrate() noexcept;
+  // Before the standstill is over: true when the filters begin at these samples, either from what it found or from a
+  // first guess to balance by.
+  [[nodiscard]] bool try_begin() noexcept;
   void begin(const ContactInEkf::Start& start) noexcept;
   void publish(std::int64_t now_ns) noexcept;
   [[nodiscard]] std::int64_t newest_input_ns() const noexcept {
@@ -131,7 +141,11 @@ class Estimator {
   EstimateQuality quality_;
   Imu imu_;
   Legs legs_;
-  bool has_state_ = false;
+  struct {
+    bool ticked = false;
+    bool begun = false;  // the filters have a state,
+    bool runs = false;   // and carry it on, though the standstill is not over
+  } known_;
   ProprioceptiveOdometry::Ground ground_;
   std::array<bool, kFootCount> stood_{};
   std::array<bool, kFootCount> was_measured_{true, true};

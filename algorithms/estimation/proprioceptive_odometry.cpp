@@ -34,13 +34,17 @@ void ProprioceptiveOdometry::reset(const Params& params, const RobotModel& robot
   innovations_ = {};
 }
 
-void ProprioceptiveOdometry::initialise(const ContactInEkf::Start& start, const Legs& legs, double dt_s) noexcept {
+void ProprioceptiveOdometry::initialise(const ContactInEkf::Start& start, bool guess, const Legs& legs,
+                                        double dt_s) noexcept {
   attitude_.initialise(start, legs);
   covariance_ = attitude_.covariance();
   fusion_.begin(fusion_variances(covariance_));
-  soles_known_ = legs[0].sole_known && legs[1].sole_known;
+  base_filtered_ = !guess && legs[0].sole_known && legs[1].sole_known;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) odom_p_foot_m_[foot] = odom_p_foot_m(legs[foot]);
-  since_legs_s_ = 0.0;
+  motion_.reset(params_.motion);
+  since_legs_s_ = unrested_s_ = 0.0;
+  feet_lost_ = false;
+  innovations_ = {};
   // Feet not yet standing: the contacts begin where kinematics has them.
   base_.initialise(start.odom_p_base_m, start.odom_v_base_mps,
                    base_.make_rows(start.odom_R_base, Vec3::Zero(), legs, {}, {}, {}, dt_s));
@@ -61,7 +65,7 @@ void ProprioceptiveOdometry::bridge(double gap_s) noexcept {
     const Vec3 felt_mps2 = attitude_.odom_R_base().transpose() * (odom_a_mps2 + Vec3{0, 0, attitude_.gravity_mps2()});
     attitude_.predict(attitude_.gyro_bias_radps(), attitude_.accel_bias_mps2() + felt_mps2, part_s,
                       ContactInEkf::Motion::kUnfelt);
-    if (soles_known_) base_.predict(-slowing_ps * base_.odom_v_base_mps(), part_s, {});
+    if (base_filtered_) base_.predict(-slowing_ps * base_.odom_v_base_mps(), part_s, {});
   }
   feet_lost_ = true;
 }
@@ -88,7 +92,7 @@ void ProprioceptiveOdometry::step(const Step& whole, const Legs& legs, const Con
   const bool feet_lost = feet_lost_;
   if (step.new_legs) take_legs(legs);
   base_w_base_radps_ = gyro_radps - attitude_.gyro_bias_radps();
-  if (soles_known_) {
+  if (base_filtered_) {
     const Mat3& odom_R_base = attitude_.odom_R_base();
     Contacts known = contacts_;
     if (feet_lost) {  // where they stand is anyone's guess
@@ -140,7 +144,7 @@ void ProprioceptiveOdometry::count_innovations(const Step& step) noexcept {
   };
   take(MeasurementGroup::kFootPosition, attitude_.position_rows());
   take(MeasurementGroup::kSoleAttitude, attitude_.sole_rows());
-  if (!soles_known_) return;
+  if (!base_filtered_) return;
   take(MeasurementGroup::kFootVelocity, base_.velocity_rows());
   take(MeasurementGroup::kTreadHeight, base_.height_rows());
 }
@@ -148,7 +152,7 @@ void ProprioceptiveOdometry::count_innovations(const Step& step) noexcept {
 // Of the velocity that is published; the attitude filter's own is the least that any can have.
 Vec3 ProprioceptiveOdometry::velocity_sigma_mps() const noexcept {
   Vec3 sigma_mps = covariance_.diagonal().segment<3>(kVelocity).cwiseSqrt();
-  for (int i = 0; i < 3 && soles_known_; ++i) {
+  for (int i = 0; i < 3 && base_filtered_; ++i) {
     sigma_mps[i] = std::max(sigma_mps[i], base_.axis(static_cast<std::size_t>(i)).velocity_sigma_mps());
   }
   return sigma_mps;
@@ -156,7 +160,7 @@ Vec3 ProprioceptiveOdometry::velocity_sigma_mps() const noexcept {
 
 void ProprioceptiveOdometry::describe(std::int64_t now_ns, StateEstimate& state) const noexcept {
   state.odom_T_base = {attitude_.odom_R_base(), odom_p_base_m()};
-  state.odom_v_base_mps = soles_known_ ? base_.odom_v_base_mps() : attitude_.odom_v_base_mps();
+  state.odom_v_base_mps = base_filtered_ ? base_.odom_v_base_mps() : attitude_.odom_v_base_mps();
   state.base_w_base_radps = base_w_base_radps_;
   state.world_T_odom = fusion_.world_T_odom();
   state.position_sigma_m = fusion_.position_sigma_m();

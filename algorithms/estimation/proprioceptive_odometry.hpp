@@ -3,10 +3,11 @@
 // joints or a replay from a log, runs this.
 //
 // Position and velocity are those of eqs (1)-(4) where soles are known: eight contact points, tread heights, legs that
-// disagree. Where feet are points there is none of that, and the attitude filter's own are published: they gain from
-// what tilt and biases turn out to have been, which filters that take the attitude as given cannot. On the walks of
-// estimation_quality_test the attitude filter's velocity errs by 1.8 to 2.0 mm/s (RMS) and that of eqs (1)-(4) by 2.9
-// to 3.3 mm/s, but under physics, where soles roll and land hard, balance on it strays three times as far from its plan
+// disagree. Where feet are points there is none of that, and after a start that is a guess no use for it: there the
+// attitude filter's own are published: they gain from what tilt and biases turn out to have been, which filters that
+// take the attitude as given cannot. On the walks of estimation_quality_test the attitude filter's velocity errs by 1.8
+// to 2.0 mm/s (RMS) and that of eqs (1)-(4) by 2.9 to 3.3 mm/s, but under physics, where soles roll and land hard,
+// balance on it strays three times as far from its plan
 // (`polygmap climb --plant mujoco`, seeds 1, 7, 10: 33, 47, 35 mm instead of 10, 15, 9).
 #pragma once
 
@@ -77,7 +78,8 @@ class ProprioceptiveOdometry {
   void reset(const Params& params, const RobotModel& robot) noexcept;
   // Finite and in range.
   [[nodiscard]] bool is_valid_imu(const Vec3& gyro_radps, const Vec3& accel_mps2) const noexcept;
-  void initialise(const ContactInEkf::Start& start, const Legs& legs, double dt_s) noexcept;
+  // guess: the start is one, of which the filters are to find out by how much it is off.
+  void initialise(const ContactInEkf::Start& start, bool guess, const Legs& legs, double dt_s) noexcept;
   // A step longer than max_step_s is a gap: the base coasts through it, its sigmas grow, and the feet are new contacts.
   void step(const Step& step, const Legs& legs, const Contacts& contacts, const Ground& ground) noexcept;
   // Fills in pose, twist, sigmas and LIO's share, as of now_ns.
@@ -100,7 +102,7 @@ class ProprioceptiveOdometry {
   void count_innovations(const Step& step) noexcept;
   [[nodiscard]] Vec3 velocity_sigma_mps() const noexcept;
   [[nodiscard]] Vec3 odom_p_base_m() const noexcept {
-    return soles_known_ ? base_.odom_p_base_m() : attitude_.odom_p_base_m();
+    return base_filtered_ ? base_.odom_p_base_m() : attitude_.odom_p_base_m();
   }
 
   Params params_;
@@ -113,7 +115,7 @@ class ProprioceptiveOdometry {
   double since_legs_s_ = 0.0;
   double unrested_s_ = 0.0;
   bool feet_lost_ = false;  // by a gap, until the next legs
-  bool soles_known_ = true;
+  bool base_filtered_ = true;
   Vec3 base_w_base_radps_ = Vec3::Zero();
   Eigen::Matrix<double, 9, 9> covariance_ = Eigen::Matrix<double, 9, 9>::Zero();  // of the attitude filter
   std::array<InnovationStatistics, kMeasurementGroupCount> innovations_{};        // LIO's: the fusion has them

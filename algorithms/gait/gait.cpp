@@ -27,7 +27,7 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
   memory_.toes_calibrated = params.standing.toe_calibration.ticks <= 0;
   status_ = {};
   state_.emplace<Standing>();
-  armed_ = started_ = leg_impaired_ = lost_in_swing_ = false;
+  armed_ = placed_ = started_ = leg_impaired_ = lost_in_swing_ = false;
   last_tick_ns_ = 0;
   stop_requested_ = StopReason::kNone;
 }
@@ -38,12 +38,16 @@ bool Gait::try_arm(const JointFeedback& feedback) noexcept {
   return true;
 }
 
-// Nothing is known but the joint angles: the soles are taken for level. Who stops here holds on for good: an estimate
-// that comes later starts nothing.
+// It balances as it was met: joints, and the centre of mass over the soles. Until the estimate is calibrated nothing
+// else begins. Who stops here holds on for good: an estimate that comes later starts nothing.
 void Gait::hold_upright(const GaitInput& in, JointCommand& command) noexcept {
   joints_.hold(command);
-  plan_.place(joints_, {joints_.base_T_sole_reference(Foot::kLeft).R.transpose(), Vec3::Zero()});
-  add_torques({}, {}, false, command);
+  if (!placed_)
+    plan_.place(joints_, in.usable ? in.state.odom_T_base : joints_.base_T_sole_reference(Foot::kLeft).inverse());
+  placed_ = placed_ || in.usable;
+  plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m(), params_.bias_time_s);
+  plan_.place(joints_, plan_.plan_T_base());
+  add_torques(in.state, in.feedback, in.usable || in.mute, command);
   if (status_.phase == GaitPhase::kStopped) return;
   const bool asked = in.stop_requested != StopReason::kNone;
   if (asked || in.lost) {
@@ -159,8 +163,9 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   armed_ = armed_ || try_arm(feedback);
   if (!armed_) return;
   const std::int64_t age_ns = now_ns - state.oldest_input_ns;
-  const bool usable = age_ns <= params_.steer_age_ns && finite(state);
-  const bool mute = !usable && now_ns - state.heard_ns <= params_.steer_age_ns && finite(state);
+  const bool known = state.oldest_input_ns > 0 && finite(state);
+  const bool usable = known && age_ns <= params_.steer_age_ns;
+  const bool mute = known && !usable && now_ns - state.heard_ns <= params_.steer_age_ns;
   const bool lost = age_ns > params_.stop_age_ns;
   leg_impaired_ = leg_impaired_ || (started_ && lost && mute);
   lost_in_swing_ = lost_in_swing_ || (lost && status_.phase == GaitPhase::kSwing);

@@ -66,7 +66,8 @@ class Gait {
   std::variant<Standing, WeightShift, SwingPhase, End> state_;
   std::int64_t last_tick_ns_ = 0;
   bool armed_ = false;          // the joint angles are known
-  bool started_ = false;        // so is where the body is
+  bool placed_ = false;         // so is how the body leans
+  bool started_ = false;        // and where it is
   bool leg_impaired_ = false;   // a drive or a foot was silent so long that the gait stops, whatever it says later
   bool lost_in_swing_ = false;  // so was the estimate; the foot in the air came down all the same
   StopReason stop_requested_ = StopReason::kNone;

@@ -6,6 +6,7 @@
 // sole: below the ankle joint on the ground plane of the foot, x towards the toe. Flat on level ground its z is up.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <string_view>
@@ -110,7 +111,7 @@ struct JointLimits {
   return both;
 }
 
-// The largest gains that a drive's command can say. They come with the drives (a bus file), not with the parameters.
+// The largest gains that a drive's command can say, beside the parameters': they come with the drives (a bus file).
 struct GainLimits {
   double kp_nmprad = std::numeric_limits<double>::infinity();
   double kd_nmsprad = std::numeric_limits<double>::infinity();
@@ -128,17 +129,31 @@ struct DriveModel {
   std::array<GainLimits, kJointCount> gain_limits{};
   std::array<double, kJointsPerLeg> kp_nmprad{400, 400, 400, 400, 120, 120};
   std::array<double, kJointsPerLeg> kd_nmsprad{10, 10, 10, 10, 4, 4};
+  std::array<double, kJointsPerLeg> kp_most_nmprad{10000, 10000, 10000, 10000, 10000, 10000};
+  std::array<double, kJointsPerLeg> kd_most_nmsprad{1000, 1000, 1000, 1000, 1000, 1000};
   double delay_s = 0.003;
   double armature_kgm2 = 0.05;
 
   [[nodiscard]] const JointLimits& limits_of(Foot leg, std::size_t joint) const noexcept {
     return limits[joint_index(leg, joint)];
   }
+  // Times as stiff as standing, and no stiffer than the drive may be.
+  [[nodiscard]] constexpr double kp_of(std::size_t n, double times = 1.0) const noexcept {
+    const std::size_t j = n % kJointsPerLeg;
+    return std::min({times * kp_nmprad[j], kp_most_nmprad[j], gain_limits[n].kp_nmprad});
+  }
+  [[nodiscard]] constexpr double kd_of(std::size_t n, double times = 1.0) const noexcept {
+    const std::size_t j = n % kJointsPerLeg;
+    return std::min({times * kd_nmsprad[j], kd_most_nmsprad[j], gain_limits[n].kd_nmsprad});
+  }
 
   static void visit(auto& p, auto& field) {
     field("limits", p.limits, kJointNames);
     field("kp_nmprad", p.kp_nmprad, 0.0, 10000.0, "Stiffness of either leg's drives, standing.");
     field("kd_nmsprad", p.kd_nmsprad, 0.0, 1000.0, "Damping of either leg's drives, standing.");
+    field("kp_most_nmprad", p.kp_most_nmprad, 0.0, 10000.0,
+          "No command asks either leg's drives for more stiffness, in a swing least of all.");
+    field("kd_most_nmsprad", p.kd_most_nmsprad, 0.0, 1000.0, "No command asks either leg's drives for more damping.");
     field("delay_s", p.delay_s, 0.0, 0.05,
           "Delay of the drives by the data sheet: 2 ms on the bus, half a tick of hold.");
     field("armature_kgm2", p.armature_kgm2, 0.0, 5.0, "Inertia of a drive, seen at its joint.");

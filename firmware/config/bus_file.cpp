@@ -6,7 +6,6 @@
 #include <initializer_list>
 #include <string_view>
 
-#include "algorithms/gait/joints/standing_stiffness.hpp"
 #include "firmware/config/param_table.hpp"
 #include "firmware/config/toml_reader.hpp"
 
@@ -218,7 +217,7 @@ class BusReader {
 BusFile parse_bus(const std::string& path, std::string_view text) { return BusReader({"bus", path}).read(text); }
 BusFile read_bus(const std::string& path) { return parse_bus(path, read_text({"bus", path})); }
 
-void limit_by_drives(const BusFile& bus, const JointReference::Params& joints, RobotModel& robot) {
+void limit_by_drives(const BusFile& bus, RobotModel& robot) {
   const std::string name = FileName{"bus", bus.path}.text() + ": ";
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const hal::MitRanges& drive = bus.table.drives[n].ranges;
@@ -232,15 +231,6 @@ void limit_by_drives(const BusFile& bus, const JointReference::Params& joints, R
     limits.torque_nm = std::min(limits.torque_nm, drive.t_nm);
     robot.drives.gain_limits[n] = {drive.kp_nmprad, drive.kd_nmsprad};
   }
-  const StandingStiffness stiffness = standing_stiffness(robot, joints);
-  if (can_stand(stiffness)) return;
-  const auto percent = [](double share) { return std::to_string(std::lround(100.0 * share)) + " %"; };
-  const bool side = stiffness.from_the_side > stiffness.from_the_front;
-  throw FileError(name + "with these gains the robot cannot stand: seen from the " + (side ? "side" : "front") +
-                  ", gravity topples it with " + percent(side ? stiffness.from_the_side : stiffness.from_the_front) +
-                  " of the stiffness that holds it, and " + percent(kMaxTopplingShare) +
-                  " is the most; pitch drives with a kp of " + text_of(std::ceil(stiffness.least_kp_nmprad)) +
-                  " Nm/rad would do.");
 }
 
 }  // namespace polygmap::config

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "algorithms/gait/joints/joint_reference.hpp"
+#include "algorithms/robot/robot_model.hpp"
 #include "firmware/config/file_error.hpp"
 #include "hal/can/drive_table.hpp"
 
@@ -27,7 +27,7 @@ struct BusFile {
 [[nodiscard]] BusFile parse_bus(const std::string& path, std::string_view text);
 
 // The joints' limits become what the drives can do as well: speed, torque, gains. Throws FileError, one sentence, for
-// drives that do not reach their joint's angles, or with which the robot could not stand (standing_stiffness.hpp).
-void limit_by_drives(const BusFile& bus, const JointReference::Params& joints, RobotModel& robot);
+// drives that do not reach their joint's angles.
+void limit_by_drives(const BusFile& bus, RobotModel& robot);
 
 }  // namespace polygmap::config

@@ -41,6 +41,18 @@ Transform pose(const mjData& data, int body) {
           Vec3{p[0], p[1], p[2]}};
 }
 
+// A drive's frame has no more bits: what is beyond its range arrives as the range's end.
+JointCommand within_limits(const MujocoPlant::Params& params, const JointCommand& command) {
+  const auto within = [](double gain, double most) { return most > 0.0 && gain > most ? most : gain; };
+  JointCommand taken = command;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    JointSetpoint& joint = taken.joints[n];
+    joint.kp_nmprad = within(joint.kp_nmprad, params.kp_most_nmprad[n % kJointsPerLeg]);
+    joint.kd_nmsprad = within(joint.kd_nmsprad, params.kd_most_nmsprad[n % kJointsPerLeg]);
+  }
+  return taken;
+}
+
 }  // namespace
 
 void MujocoPlant::Delete::operator()(mjModel* model) const noexcept { mj_deleteModel(model); }
@@ -77,7 +89,7 @@ MujocoPlant::MujocoPlant(const Params& params, const StairWorld& world, const Ro
 MujocoPlant::~MujocoPlant() = default;
 
 void MujocoPlant::step(const JointCommand& newest) {
-  commands_.push_overwrite(newest);
+  commands_.push_overwrite(within_limits(params_, newest));
   const auto late = static_cast<std::size_t>(std::lround(params_.command_delay_s / kPlantTick_s));
   const JointCommand& command = commands_[commands_.size() - 1 - std::min(late, commands_.size() - 1)];
   const double follows = params_.torque_lag_s > 0.0 ? -std::expm1(-kPhysicsStep_s / params_.torque_lag_s) : 1.0;

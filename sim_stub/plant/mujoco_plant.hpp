@@ -25,10 +25,12 @@ class MujocoPlant final : public Plant {
     double armature_kgm2 = 0.05;     // of every drive, seen at the joint
     double joint_friction_nm = 0.0;  // Coulomb, that the leg feels
     double joint_damping_nmsprad = 0.0;
-    double backlash_rad = 0.0;       // play between drive and link, from end to end
-    double torque_scale = 1.0;       // what a drive gives of what it is asked
-    double torque_lag_s = 0.0;       // time constant
-    double command_delay_s = 0.0;    // beyond the bus
+    double backlash_rad = 0.0;     // play between drive and link, from end to end
+    double torque_scale = 1.0;     // what a drive gives of what it is asked
+    double torque_lag_s = 0.0;     // time constant
+    double command_delay_s = 0.0;  // beyond the bus
+    // Of either leg's drives, what a command's encoding ends at; 0: nowhere.
+    std::array<double, kJointsPerLeg> kp_most_nmprad{}, kd_most_nmsprad{};
     double torso_mass_scale = 1.0;   // against the mass that the module believes
     double torso_offset_x_m = 0.0;   // of its centre, likewise
     double contact_force_n = 10.0;   // a sole pressed less than this hangs in the air
@@ -45,6 +47,10 @@ class MujocoPlant final : public Plant {
       field("torque_scale", p.torque_scale, 0.3, 2.0, "What a drive gives of what it is asked.");
       field("torque_lag_s", p.torque_lag_s, 0.0, 0.05, "Time constant of a drive's torque.");
       field("command_delay_s", p.command_delay_s, 0.0, 0.05, "Of a command beyond the bus, in whole ticks of 2 ms.");
+      field("kp_most_nmprad", p.kp_most_nmprad, 0.0, 10000.0,
+            "A drive takes no more stiffness, from hip roll to ankle roll; 0: as much as it is told.");
+      field("kd_most_nmsprad", p.kd_most_nmsprad, 0.0, 1000.0,
+            "A drive takes no more damping, from hip roll to ankle roll; 0: as much as it is told.");
       field("torso_mass_scale", p.torso_mass_scale, 0.3, 3.0, "True mass of the torso over the believed one.");
       field("torso_offset_x_m", p.torso_offset_x_m, -0.2, 0.2, "By which the torso's centre lies ahead.");
     }

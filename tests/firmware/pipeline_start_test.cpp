@@ -294,7 +294,7 @@ class PipelineWithBadStiffness : public StandingModule {
   PipelineWithBadStiffness() : StandingModule(params()) {}
   static Params params() {
     Params params;
-    params.gait.joints.hold_kp_nmprad = std::numeric_limits<double>::quiet_NaN();
+    params.robot.drives.kp_nmprad[0] = std::numeric_limits<double>::quiet_NaN();
     return params;
   }
 };

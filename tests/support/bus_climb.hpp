@@ -40,7 +40,7 @@ class BusClimb {
       : file_(config::read_bus(options.bus_file)), robot_(sim_options(options)), bus_(robot_, file_, nullptr) {
     Params params;
     params.gait.planner.pattern = options.pattern;
-    config::limit_by_drives(file_, params.gait.joints, params.robot);
+    config::limit_by_drives(file_, params.robot);
     pipeline_ = std::make_unique<Pipeline>(Ports{robot_, robot_, bus_.joints(), robot_}, params);
     executive_ = std::make_unique<OneLaneExecutive<>>(*pipeline_, robot_, pipeline_->lane_health(0));
     executive_->start(robot_.now_ns() + kCycle_ns);

@@ -183,13 +183,13 @@ struct Climb {
     params.gait.planner.pattern = asked.gait;
     if (!asked.bus.empty()) {
       const config::BusFile file = config::read_bus(asked.bus);
-      config::limit_by_drives(file, params.gait.joints, params.robot);
+      config::limit_by_drives(file, params.robot);
       wires = std::make_unique<Wires>(file);
       sensors.connect(wires->joints());
     }
     if (!asked.babble.empty()) {
       const config::BusFile file = config::read_bus(asked.babble);
-      config::limit_by_drives(file, params.gait.joints, params.robot);
+      config::limit_by_drives(file, params.robot);
       babble = std::make_unique<BabblingBus>(file, sensors);
     }
     hal::JointBus& joints = babble ? static_cast<hal::JointBus&>(*babble) : sensors;

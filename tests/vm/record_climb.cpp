@@ -100,7 +100,7 @@ int record(const std::string& folder, std::uint64_t seed, int steps, bool single
   std::unique_ptr<sim::BusRobot> bus;
   if (!bus_path.empty()) {
     const config::BusFile file = config::read_bus(bus_path);
-    config::limit_by_drives(file, params.gait.joints, params.robot);
+    config::limit_by_drives(file, params.robot);
     bus = std::make_unique<sim::BusRobot>(robot, file, &log.emplace(folder + "/can.log"));
   }
   Recorder recorder({robot, robot, bus ? static_cast<hal::JointBus&>(bus->joints()) : robot, robot}, folder);
@@ -140,7 +140,7 @@ int record_adverse(const std::string& folder, std::uint64_t seed, const std::str
   sim::SimRobot robot(options);
   const config::BusFile file = config::read_bus(bus_path);
   Params params;
-  config::limit_by_drives(file, params.gait.joints, params.robot);
+  config::limit_by_drives(file, params.robot);
   AdverseSensors sensors(robot, std::move(real));
   Recorder recorder({sensors, robot, robot, sensors}, folder);
   BabblingBus bus(file, recorder);

@@ -19,6 +19,7 @@ void StandstillCalibration::begin(const ImuSample& imu, const JointFeedback& joi
   turn_ = velocity_ = {};
   time_s_ = 0.0;
   first_q_rad_ = joints.q_rad;
+  first_mps2_ = imu.accel_mps2;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) first_base_R_sole_[foot] = legs[foot].base_T_sole.R;
   start_ns_ = imu.stamp_ns;
 }
@@ -42,12 +43,9 @@ bool StandstillCalibration::try_finish(const ImuSample& imu, const JointFeedback
   time_s_ = time_s;
 
   // The soles rest: the base turns against them, and moves.
-  Vec3 turned_rad = Vec3::Zero(), base_v_mps = Vec3::Zero();
+  Vec3 turned_rad = Vec3::Zero();
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-    const LegMeasurement& leg = legs[foot];
-    constexpr double kShare = 1.0 / kFootCount;
-    turned_rad += kShare * so3_log(first_base_R_sole_[foot] * leg.base_T_sole.R.transpose());
-    base_v_mps += kShare * (leg.base_w_sole_radps.cross(leg.base_T_sole.p_m) - leg.base_v_sole_mps);
+    turned_rad += so3_log(first_base_R_sole_[foot] * legs[foot].base_T_sole.R.transpose()) / kFootCount;
   }
   first_base_R_base_ = so3_exp(turned_rad);
   felt_rad_ += dt_s * imu.gyro_radps;
@@ -56,17 +54,20 @@ bool StandstillCalibration::try_finish(const ImuSample& imu, const JointFeedback
   times_.sum_s += time_s;
   times_.sum_s2 += math::square(time_s);
   turn_.add(time_s, felt_rad_ - turned_rad);
-  velocity_.add(time_s, felt_mps_ - first_base_R_base_ * base_v_mps);
+  velocity_.add(time_s, felt_mps_ - first_base_R_base_ * base_v_base_mps(legs));
   return time_s >= params_.duration_s && times_.spread() > 0.0;
 }
 
 Vec3 StandstillCalibration::first_base_g_mps2() const noexcept {
   if (time_s_ >= params_.min_line_s) return velocity_.slope(times_);
-  return time_s_ > 0.0 ? Vec3(felt_mps_ / time_s_) : Vec3(kGravity_mps2 * Vec3::UnitZ());
+  return time_s_ > 0.0 ? Vec3(felt_mps_ / time_s_) : first_mps2_;
 }
 
 Mat3 StandstillCalibration::odom_R_base() const noexcept {
-  const Vec3 up = first_base_R_base_.transpose() * first_base_g_mps2();
+  return level_attitude(first_base_R_base_.transpose() * first_base_g_mps2());
+}
+
+Mat3 level_attitude(const Vec3& up) noexcept {
   const double roll_rad = math::atan2(up.y(), up.z());
   const double pitch_rad = math::atan2(-up.x(), math::sqrt(math::square(up.y()) + math::square(up.z())));
   return rotation_y(pitch_rad) * rotation_x(roll_rad);

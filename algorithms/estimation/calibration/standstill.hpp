@@ -8,6 +8,9 @@
 
 namespace polygmap {
 
+// Roll and pitch of a base that has what is up there, in its own axes; yaw 0.
+[[nodiscard]] Mat3 level_attitude(const Vec3& up) noexcept;
+
 class StandstillCalibration {
  public:
   struct Params {
@@ -70,6 +73,7 @@ class StandstillCalibration {
   // In axes of the base as it was at the first sample, from there on.
   Vec3 felt_rad_ = Vec3::Zero(), felt_mps_ = Vec3::Zero();  // integrals of what the IMU feels
   Mat3 first_base_R_base_ = Mat3::Identity();               // by the legs
+  Vec3 first_mps2_{0.0, 0.0, kGravity_mps2};                // felt at that sample
   Times times_;
   Line turn_, velocity_;  // these integrals less the motion that the legs tell
   JointVector first_q_rad_ = JointVector::Zero();

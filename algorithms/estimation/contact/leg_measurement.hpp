@@ -31,4 +31,7 @@ struct LegSample {
 
 [[nodiscard]] LegMeasurement measure_leg(const LegFrames& frames, const LegVector& dq_radps) noexcept;
 
+// Of the base, its own axes, as each leg has it whose sole rests; both legs' mean.
+[[nodiscard]] Vec3 base_v_base_mps(const std::array<LegMeasurement, kFootCount>& legs) noexcept;
+
 }  // namespace polygmap

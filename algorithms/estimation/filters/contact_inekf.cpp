@@ -27,6 +27,10 @@ void ContactInEkf::reset(const Params& params) noexcept {
 }
 
 void ContactInEkf::initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs) noexcept {
+  whiteness_ = {};
+  contact_walk_mprs_ = params_.contact_walk_mprs;
+  pace_ = 1.0;
+  walk_time_s_ = 0.0;
   odom_R_base_ = start.odom_R_base;
   odom_p_base_m_ = start.odom_p_base_m;
   odom_v_base_mps_ = start.odom_v_base_mps;

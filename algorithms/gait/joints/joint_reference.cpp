@@ -70,9 +70,7 @@ bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole
       commanded_rad_[i] =
           math::clamp(math::clamp(q_rad + drives.delay_s * dq_radps, sent_rad - step_rad, sent_rad + step_rad),
                       limits.min_rad, limits.max_rad);
-      const GainLimits& most = drives.gain_limits[n];
-      command.joints[n] = {commanded_rad_[i], dq_radps, 0.0, std::min(gain * drives.kp_nmprad[j], most.kp_nmprad),
-                           std::min(gain * drives.kd_nmsprad[j], most.kd_nmsprad)};
+      command.joints[n] = {commanded_rad_[i], dq_radps, 0.0, drives.kp_of(n, gain), drives.kd_of(n, gain)};
     }
   }
   return limited;
@@ -100,10 +98,8 @@ void JointReference::fit_mute_knees(const JointFeedback& feedback, const std::ar
 
 void JointReference::hold(JointCommand& command) const noexcept {
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    const GainLimits& most = robot_->drives.gain_limits[n];
-    command.joints[n] = {commanded_rad_[static_cast<Eigen::Index>(n)], 0.0, 0.0,
-                         std::min(params_.hold_kp_nmprad, most.kp_nmprad),
-                         std::min(params_.hold_kd_nmsprad, most.kd_nmsprad)};
+    const DriveModel& drives = robot_->drives;
+    command.joints[n] = {commanded_rad_[static_cast<Eigen::Index>(n)], 0.0, 0.0, drives.kp_of(n), drives.kd_of(n)};
   }
 }
 

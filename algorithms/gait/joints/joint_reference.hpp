@@ -12,16 +12,11 @@ class JointReference {
  public:
   struct Params {
     double swing_gain = 2.0;
-    double hold_kp_nmprad = 2000;
-    double hold_kd_nmsprad = 40;
     double encoder_offset_rad = 0.02;
 
     static void visit(auto& p, auto& field) {
       field("swing_gain", p.swing_gain, 0.1, 10.0,
             "The drives' gains are this many times as large in the leg that swings.");
-      field("hold_kp_nmprad", p.hold_kp_nmprad, 0.0, 10000.0,
-            "Stiffness before there is an estimate to balance by: more than the robot is top-heavy.");
-      field("hold_kd_nmsprad", p.hold_kd_nmsprad, 0.0, 1000.0, "Damping before there is an estimate to balance by.");
       field("encoder_offset_rad", p.encoder_offset_rad, 0.0, 0.2,
             "A joint measured farther outside its range at the start is refused: an encoder is off by less.");
     }

@@ -86,7 +86,7 @@ class DaemonFile {
   void take_bus() {
     const std::string path = file("bus");
     config_.bus = config::read_bus(path);
-    config::limit_by_drives(config_.bus, config_.params.gait.joints, config_.params.robot);
+    config::limit_by_drives(config_.bus, config_.params.robot);
     for (const std::uint32_t line : config_.bus.bus_lines) {
       config_.places.buses.push_back(path + ", line " + std::to_string(line) + ", bus");
     }

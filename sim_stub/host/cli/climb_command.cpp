@@ -332,7 +332,7 @@ std::string bus_complaint(ClimbArguments& a) {
     return "--contacts sensed needs [feet] in \"" + a.bus + "\": its buses carry no foot forces.";
   }
   RobotModel robot = a.options.params.robot;
-  config::limit_by_drives(*a.options.bus, a.options.params.gait.joints, robot);
+  config::limit_by_drives(*a.options.bus, robot);
   if (a.options.can_log.empty()) return {};
   for (const std::string& taken : {a.bus, a.camera, a.options.params_file, a.options.out_dir + "/summary.json",
                                    a.options.out_dir + "/climb.svg"}) {

@@ -200,7 +200,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   std::optional<CandumpLog> can_log;
   std::unique_ptr<BusRobot> bus;
   if (options.bus) {
-    config::limit_by_drives(*options.bus, params.gait.joints, params.robot);
+    config::limit_by_drives(*options.bus, params.robot);
     config::BusFile file = *options.bus;
     if (!options.foot_sensors) file.table.feet = {};
     if (!options.can_log.empty()) can_log.emplace(options.can_log);

@@ -75,8 +75,9 @@ TEST_F(EstimatorTest, Standstill_BiasedSensors_FindsBiasTiltAndFloor) {
   EXPECT_LT(so3_log(state.odom_T_base.R).head<2>().norm(),
             0.02);  // accelerometer bias and mount: 0.4 deg each, 1 sigma
   EXPECT_NEAR(0.5 * (state.odom_T_sole[0].p_m.z() + state.odom_T_sole[1].p_m.z()), 0.0, 5e-4);
-  EXPECT_NEAR(state.odom_T_base.p_m.x(), 0.0, 5e-4);
-  EXPECT_NEAR(state.odom_T_base.p_m.y(), 0.0, 5e-4);
+  // By what the first sample had the tilt wrong: the soles have not moved since.
+  EXPECT_NEAR(state.odom_T_base.p_m.x(), 0.0, 5e-3);
+  EXPECT_NEAR(state.odom_T_base.p_m.y(), 0.0, 5e-3);
   EXPECT_NEAR(state.odom_T_base.p_m.z(), 0.77, 0.01);
   EXPECT_EQ(state.lio_age_ns, -1);
 }

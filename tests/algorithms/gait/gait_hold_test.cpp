@@ -53,7 +53,7 @@ double crouched_m(const std::function<bool(int)>& is_off) {
 
 TEST(GaitCrouch, BodyOffItsPlan_CrouchesByAsMuch_NotForOneTick) {
   EXPECT_LT(crouched_m([](int tick) { return tick == 400; }), 0.001);
-  EXPECT_LT(crouched_m([](int tick) { return tick % 8 < 4; }), 0.001);  // four ticks at a time are none either
+  EXPECT_LT(crouched_m([](int tick) { return tick % 8 >= 4; }), 0.001);  // four ticks at a time are none either
   const double lasting_m = crouched_m([](int tick) { return tick > 400; });
   EXPECT_GT(lasting_m, 0.025);
   EXPECT_LT(lasting_m, Gait::Params{}.crouch.max_m + 0.001);

@@ -129,7 +129,7 @@ void fuzz_bus(int runs, unsigned seed) {
       expect_bus(bus);
       if (seed % 2 != 0) return;
       RobotModel robot;
-      config::limit_by_drives(bus, {}, robot);
+      config::limit_by_drives(bus, robot);
     });
   }
   expect_some(taken, runs);

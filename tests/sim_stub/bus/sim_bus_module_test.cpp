@@ -23,7 +23,7 @@ class BusModuleTest : public testing::TestWithParam<const char*> {
     const config::BusFile file = config::read_bus(std::string(POLYGMAP_BUSES) + "/" + GetParam() + ".toml");
     Params params;
     params.gait.standing.start_patience_ticks = 100000;  // it waits for stairs
-    config::limit_by_drives(file, params.gait.joints, params.robot);
+    config::limit_by_drives(file, params.robot);
     bus_ = std::make_unique<BusRobot>(*robot_, file, nullptr);
     pipeline_ = std::make_unique<Pipeline>(Ports{*robot_, *robot_, bus_->joints(), *robot_}, params);
     executive_ = std::make_unique<OneLaneExecutive<>>(*pipeline_, *robot_, pipeline_->lane_health(0));

@@ -75,6 +75,35 @@ TEST(Standstill, RobotSways_IsNoBiasAndNoTilt) {
   EXPECT_LT((state.odom_v_base_mps - v_mps).norm(), 1e-3);
 }
 
+// It can be balanced from its first samples on, long before the calibration is over.
+TEST(BeforeTheStandstill, RobotSways_TiltAndVelocityAreKnownAtOnce) {
+  static Estimator estimator;  // its ring is too large for a stack
+  estimator.reset({}, nominal_robot());
+  SwayingRobot robot;
+  ImuSample imu;
+  JointFeedback joints;
+  double worst_rad = 0.0, worst_mps = 0.0, late_rad = 0.0, late_mps = 0.0;
+  while (robot.time_s < 0.9) {
+    robot.sense(imu, joints);
+    estimator.add_imu(imu, imu.stamp_ns);
+    estimator.add_joints(joints, imu.stamp_ns);
+    estimator.tick({true, true});
+    const StateEstimate& state = estimator.state();
+    ASSERT_FALSE(state.initialised);
+    ASSERT_EQ(state.oldest_input_ns, imu.stamp_ns);
+    const auto p_m = [](double t_s) { return SwayingRobot::true_T_base(t_s).p_m; };
+    const Vec3 v_mps = (p_m(robot.time_s) - p_m(robot.time_s - kTick_s)) / kTick_s;
+    const double off_rad = so3_log(state.odom_T_base.R.transpose() * SwayingRobot::true_T_base(robot.time_s).R).norm();
+    const double off_mps = (state.odom_v_base_mps - v_mps).norm();
+    worst_rad = std::max(worst_rad, off_rad), worst_mps = std::max(worst_mps, off_mps);
+    if (robot.time_s > 0.5) late_rad = std::max(late_rad, off_rad), late_mps = std::max(late_mps, off_mps);
+  }
+  EXPECT_LT(worst_rad, 0.03) << "what it sways with is taken for tilt";
+  EXPECT_LT(worst_mps, 0.005);
+  EXPECT_LT(late_rad, 0.001);
+  EXPECT_LT(late_mps, 0.001);
+}
+
 TEST(Standstill, FootForceIsNotTold_IsNoFootThatStands) {
   static Estimator estimator;  // its ring is too large for a stack
   for (const std::array<bool, kFootCount> silent : {std::array{true, true}, {true, false}, {false, true}}) {

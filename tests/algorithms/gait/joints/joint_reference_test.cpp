@@ -61,5 +61,24 @@ TEST_F(JointReferenceTest, PoseOutOfReach_IsLimited) {
   EXPECT_TRUE(reference_.follow(base_T_sole_, {true, true}, command_));
 }
 
+TEST_F(JointReferenceTest, GainsBeyondTheRobotsLimits_AreNeverCommanded) {
+  RobotModel robot = nominal_robot();
+  robot.drives.kp_most_nmprad = {220, 100, 224, 224, 58, 58};
+  robot.drives.kd_most_nmsprad = {5, 5, 5, 5, 2, 2};
+  robot.drives.gain_limits[kKnee].kp_nmprad = 150.0;  // this one's frame says no more
+  JointReference reference;
+  ASSERT_TRUE(reference.try_arm(robot, {}, q_rad_));
+  const auto expect_within = [&] {
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      EXPECT_EQ(command_.joints[n].kp_nmprad, n == kKnee ? 150.0 : robot.drives.kp_most_nmprad[n % kJointsPerLeg]);
+      EXPECT_EQ(command_.joints[n].kd_nmsprad, robot.drives.kd_most_nmsprad[n % kJointsPerLeg]);
+    }
+  };
+  reference.hold(command_);
+  expect_within();
+  (void)reference.follow(base_T_sole_, {true, false}, command_);
+  expect_within();
+}
+
 }  // namespace
 }  // namespace polygmap

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// The module meets a robot that somebody else's controller holds, at that robot's gains: it balances from its first
+// command, and no command asks for more than the drives are to give.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "tests/support/physical_climb.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+using LegGains = std::array<double, kJointsPerLeg>;
+struct Case {
+  const char* name;
+  LegGains kp_most_nmprad;
+  bool single_step;
+  std::uint64_t seed;
+};
+void PrintTo(const Case& c, std::ostream* out) { *out << c.name << ", seed " << c.seed; }
+std::string case_name(const testing::TestParamInfo<Case>& info) {
+  return info.param.name + ("_seed" + std::to_string(info.param.seed)) + (info.param.single_step ? "_ss" : "_ds");
+}
+constexpr LegGains kKuavo_nmprad{220, 100, 224, 224, 58, 58}, kSoft_nmprad{250, 250, 250, 250, 250, 250};
+
+// The most that was commanded over the limit, of all joints.
+double highest_share(const JointCommand& command, const LegGains& most_nmprad) {
+  double share = 0.0;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    share = std::max(share, command.joints[n].kp_nmprad / most_nmprad[n % kJointsPerLeg]);
+  }
+  return share;
+}
+
+class TakeOver : public testing::TestWithParam<Case> {};
+
+TEST_P(TakeOver, DrivesWithLimits_BalancesAndClimbsWithinThem) {
+  const auto& [name, most_nmprad, single_step, seed] = GetParam();
+  SimOptions options = stairs_of(2, seed);
+  options.mujoco.kp_most_nmprad = most_nmprad;
+  Params params;
+  params.robot.drives.kp_most_nmprad = most_nmprad;
+  params.gait.planner.pattern = single_step ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
+  PhysicalClimb climb(options, params);
+  double share = 0.0;
+  bool goes_on = true;
+  while (goes_on && climb.time_s() < 40.0) {
+    goes_on = climb.tick();
+    share = std::max(share, highest_share(climb.command(), most_nmprad));
+  }
+  EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
+  EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+  EXPECT_EQ(climb.status().treads_climbed, 2U);
+  EXPECT_GE(climb.sole_margin_min_m(), 0.0);
+  EXPECT_GT(share, 0.99) << "the limits are tried";
+  EXPECT_LE(share, 1.0);
+}
+INSTANTIATE_TEST_SUITE_P(Gains, TakeOver,
+                         testing::Values(Case{"kuavo", kKuavo_nmprad, false, 1}, Case{"kuavo", kKuavo_nmprad, true, 2},
+                                         Case{"soft", kSoft_nmprad, false, 2}, Case{"soft", kSoft_nmprad, true, 1}),
+                         case_name);
+
+// From the very first tick: whoever holds it lets go at once.
+TEST(TakeOverStart, FirstSecond_StaysWhereItWasMet) {
+  SimOptions options = stairs_of(2, 3);
+  options.mujoco.kp_most_nmprad = kKuavo_nmprad;
+  Params params;
+  params.robot.drives.kp_most_nmprad = kKuavo_nmprad;
+  PhysicalClimb climb(options, params);
+  const Vec3 com_m = climb.truth().true_p_com_m;
+  double moved_m = 0.0;
+  while (climb.time_s() < 1.0 && climb.tick()) {
+    moved_m = std::max(moved_m, (climb.truth().true_p_com_m - com_m).head<2>().norm());
+  }
+  EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
+  EXPECT_LT(moved_m, 0.02);
+  EXPECT_GT(climb.command().joints[kAnklePitch].kp_nmprad, 0.0);
+}
+
+}  // namespace
+}  // namespace polygmap::sim
