@@ -198,11 +198,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 658283832878141700U);
-  EXPECT_EQ(hashes.gait.value(), 13713704394412745885U);
-  EXPECT_EQ(hashes.commands.value(), 14226194956882086713U);
-  EXPECT_EQ(hashes.surfaces.value(), 2114992796798185165U);
-  EXPECT_EQ(hashes.map.value(), 9925603103940891519U);
+  EXPECT_EQ(hashes.estimates.value(), 2309312200891986628U);
+  EXPECT_EQ(hashes.gait.value(), 6011424594978596109U);
+  EXPECT_EQ(hashes.commands.value(), 1071317256027022085U);
+  EXPECT_EQ(hashes.surfaces.value(), 10216721067913147700U);
+  EXPECT_EQ(hashes.map.value(), 13886859744410203120U);
 }
 
 }  // namespace
