@@ -198,11 +198,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 1244334336233382426U);
-  EXPECT_EQ(hashes.gait.value(), 9310770345360016013U);
-  EXPECT_EQ(hashes.commands.value(), 6493137158557656717U);
-  EXPECT_EQ(hashes.surfaces.value(), 2777002014579322720U);
-  EXPECT_EQ(hashes.map.value(), 10561684964092396203U);
+  EXPECT_EQ(hashes.estimates.value(), 10581302569461746599U);
+  EXPECT_EQ(hashes.gait.value(), 1115304639203392915U);
+  EXPECT_EQ(hashes.commands.value(), 12635088157661037386U);
+  EXPECT_EQ(hashes.surfaces.value(), 4406688474873754351U);
+  EXPECT_EQ(hashes.map.value(), 11311803823706704389U);
 }
 
 }  // namespace
