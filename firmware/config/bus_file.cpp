@@ -6,6 +6,8 @@
 #include <initializer_list>
 #include <string_view>
 
+#include "algorithms/robot/leg_dynamics.hpp"
+#include "algorithms/robot/leg_kinematics.hpp"
 #include "firmware/config/param_table.hpp"
 #include "firmware/config/toml_reader.hpp"
 
@@ -214,6 +216,20 @@ class BusReader {
 
 }  // namespace
 
+namespace {
+
+// The whole robot at rest on one leg, in its nominal stance, the sole below the middle of the base.
+LegVector torques_on_one_leg_nm(const RobotModel& robot, Foot leg) {
+  const Transform base_T_sole{Mat3::Identity(), Vec3{0.0, 0.0, -robot.stance.base_height_m}};
+  const LegFrames frames = leg_frames(robot.legs, leg, solve_leg(robot.legs, leg, base_T_sole).q_rad);
+  std::array<Vec3, kJointsPerLeg> specific_mps2;
+  specific_mps2.fill(Vec3{0.0, 0.0, -kGravity_mps2});
+  const Vec3 weight_n{0.0, 0.0, robot.masses.total_kg() * kGravity_mps2};
+  return leg_torques_nm(robot.masses, leg, frames, specific_mps2, {weight_n, Vec3::Zero()});
+}
+
+}  // namespace
+
 BusFile parse_bus(const std::string& path, std::string_view text) { return BusReader({"bus", path}).read(text); }
 BusFile read_bus(const std::string& path) { return parse_bus(path, read_text({"bus", path})); }
 
@@ -230,6 +246,18 @@ void limit_by_drives(const BusFile& bus, RobotModel& robot) {
     limits.speed_radps = std::min(limits.speed_radps, drive.v_radps);
     limits.torque_nm = std::min(limits.torque_nm, drive.t_nm);
     robot.drives.gain_limits[n] = {drive.kp_nmprad, drive.kd_nmsprad};
+  }
+  constexpr std::array<const char*, kJointsPerLeg> kNames{"hip roll", "hip yaw",     "hip pitch",
+                                                          "knee",     "ankle pitch", "ankle roll"};
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const LegVector needed_nm = torques_on_one_leg_nm(robot, leg);
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      const double given_nm = robot.drives.limits_of(leg, j).torque_nm;
+      const double asked_nm = std::abs(needed_nm[static_cast<Eigen::Index>(j)]);
+      if (asked_nm <= given_nm) continue;
+      throw FileError(name + "with these drives the robot cannot stand on one leg: its " + kNames[j] + " needs " +
+                      text_of(std::ceil(asked_nm)) + " Nm, and the drive gives " + text_of(given_nm) + " Nm.");
+    }
   }
 }
 

@@ -27,7 +27,7 @@ struct BusFile {
 [[nodiscard]] BusFile parse_bus(const std::string& path, std::string_view text);
 
 // The joints' limits become what the drives can do as well: speed, torque, gains. Throws FileError, one sentence, for
-// drives that do not reach their joint's angles.
+// drives that do not reach their joint's angles, or that give less torque than standing on one leg takes.
 void limit_by_drives(const BusFile& bus, RobotModel& robot);
 
 }  // namespace polygmap::config

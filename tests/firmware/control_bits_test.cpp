@@ -198,11 +198,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 10581302569461746599U);
-  EXPECT_EQ(hashes.gait.value(), 1115304639203392915U);
-  EXPECT_EQ(hashes.commands.value(), 12635088157661037386U);
-  EXPECT_EQ(hashes.surfaces.value(), 4406688474873754351U);
-  EXPECT_EQ(hashes.map.value(), 11311803823706704389U);
+  EXPECT_EQ(hashes.estimates.value(), 2309312200891986628U);
+  EXPECT_EQ(hashes.gait.value(), 6011424594978596109U);
+  EXPECT_EQ(hashes.commands.value(), 1071317256027022085U);
+  EXPECT_EQ(hashes.surfaces.value(), 10216721067913147700U);
+  EXPECT_EQ(hashes.map.value(), 13886859744410203120U);
 }
 
 }  // namespace

@@ -77,8 +77,6 @@ void IdealClimb::sense() {
 
 FootholdSet IdealClimb::search() const {
   const Staircase& stairs = setup_.stairs;
-  const Transform true_T_world = (state_.world_T_odom * odom_T_true_).inverse();
-  const Transform world_T_true = true_T_world.inverse();
   FootholdSet set;
   set.map_stamp_ns = state_.stamp_ns - 40 * kNsPerMs;
   double stance_m = -1e9, lateral_m = 0.0;
@@ -113,10 +111,10 @@ FootholdSet IdealClimb::search() const {
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       Foothold& hold = feet[index_of(foot)];
       hold.position_m =
-          world_T_true * Vec3{stairs.riser_x_m(step) + setup_.map_shift_x_m + inset_m - kContactRectangle.heel_x_m,
+          odom_T_true_ * Vec3{stairs.riser_x_m(step) + setup_.map_shift_x_m + inset_m - kContactRectangle.heel_x_m,
                               middle_m + side_sign(foot) * kStanceHalfWidth_m,
                               stairs.top_m(step) + setup_.map_shift_z_m};
-      hold.yaw_rad = yaw_of(world_T_true.R);
+      hold.yaw_rad = yaw_of(odom_T_true_.R);
       hold.polygon_id = static_cast<std::uint32_t>(step) + 10;
       hold.last_seen_ns = set.map_stamp_ns;
     }
@@ -126,8 +124,8 @@ FootholdSet IdealClimb::search() const {
   set.p_star = set.p_star_feet[0];
   set.has_p_star_star = next + 1 < stairs.steps;
   if (set.has_p_star_star) place(next + 1, set.p_star_star_feet);
-  set.tread.nosing_a_m = world_T_true * Vec3{x_m, stairs.half_width_m, z_m};
-  set.tread.nosing_b_m = world_T_true * Vec3{x_m, -stairs.half_width_m, z_m};
+  set.tread.nosing_a_m = odom_T_true_ * Vec3{x_m, stairs.half_width_m, z_m};
+  set.tread.nosing_b_m = odom_T_true_ * Vec3{x_m, -stairs.half_width_m, z_m};
   set.measured_rise_m = z_m - stance_m;
   return set;
 }

@@ -177,6 +177,19 @@ TEST(LimitByDrives, Damiao_LimitsGainsSpeedAndTorque) {
   }
 }
 
+TEST(LimitByDrives, DrivesTooWeakForOneLeg_AreRefusedWithWhatTheyLack) {
+  RobotModel robot;
+  try {
+    limit_by_drives(read_bus(shipped("ruiwo")), robot);
+    ADD_FAILURE() << "taken";
+  } catch (const FileError& error) {
+    const std::string sentence = error.what();
+    EXPECT_NE(sentence.find("cannot stand on one leg: its knee needs 86 Nm, and the drive gives 50 Nm."),
+              std::string::npos)
+        << sentence;
+  }
+}
+
 TEST(LimitByDrives, DriveThatDoesNotReachItsJoint_IsRefused) {
   auto all = drives();
   all[3].rest = "p = 2\nv = 8\nt = 144\nkp = 500\nkd = 5\n";

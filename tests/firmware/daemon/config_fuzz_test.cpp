@@ -30,7 +30,7 @@ std::string text_of(const std::string& path) {
 // Of these no line is to blame.
 constexpr std::array<std::string_view, 9> kOfTheWholeFile{
     " is missing.",        " [[drive]] tables, and", " looks like a ", " must be less than max_depth_m", " reach ",
-    " frames of a cycle ", " with these gains ",     "'s p, ",         " is no key of a camera"};
+    " frames of a cycle ", " with these drives ",    "'s p, ",         " is no key of a camera"};
 
 void expect_sentence(const std::string& sentence, const std::string& path, std::string_view text) {
   ASSERT_TRUE(sentence.ends_with('.') && !sentence.ends_with("..")) << sentence;

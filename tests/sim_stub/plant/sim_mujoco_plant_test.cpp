@@ -197,6 +197,7 @@ TEST(MujocoPlant, CommandOverTheBus_TakesHold2msLater) {
   options.camera.silent = {{0, std::numeric_limits<std::int64_t>::max()}};
   SimRobot robot(options);
   JointCommand command;  // no stiffness: only the torque asked for
+  command.joints[kKnee].tau_ff_nm = 1.0;
   ASSERT_TRUE(robot.try_write(command).is_all());
   for (int i = 0; i < 3; ++i) robot.advance();
   command.joints[kKnee].tau_ff_nm = 7.0;
@@ -204,7 +205,7 @@ TEST(MujocoPlant, CommandOverTheBus_TakesHold2msLater) {
   JointFeedback feedback;
   robot.advance();  // 2 ms on the bus
   ASSERT_TRUE(robot.try_read(feedback));
-  EXPECT_EQ(feedback.tau_nm[kKnee], 0.0);
+  EXPECT_EQ(feedback.tau_nm[kKnee], 1.0);
   robot.advance();
   ASSERT_TRUE(robot.try_read(feedback));
   EXPECT_EQ(feedback.tau_nm[kKnee], 7.0);

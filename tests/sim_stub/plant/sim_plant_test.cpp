@@ -77,6 +77,7 @@ class Script {
             << "the script asks too much: " << leg.q_rad.transpose();
         for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
           command.joints[joint_index(foot, j)].q_rad = leg.q_rad[static_cast<Eigen::Index>(j)];
+          command.joints[joint_index(foot, j)].kp_nmprad = 1.0;
         }
       }
       ASSERT_TRUE(robot_.try_write(command).is_all());
@@ -91,7 +92,10 @@ class Script {
 
 JointCommand command_of(const JointVector& q_rad) {
   JointCommand command;
-  for (std::size_t j = 0; j < kJointCount; ++j) command.joints[j].q_rad = q_rad[static_cast<Eigen::Index>(j)];
+  for (std::size_t j = 0; j < kJointCount; ++j) {
+    command.joints[j].q_rad = q_rad[static_cast<Eigen::Index>(j)];
+    command.joints[j].kp_nmprad = 1.0;  // the first one with a gain takes over
+  }
   return command;
 }
 JointVector encoders(SimRobot& robot) {
