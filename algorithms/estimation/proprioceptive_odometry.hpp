@@ -3,8 +3,8 @@
 // joints or a replay from a log, runs this.
 //
 // Position and velocity are those of eqs (1)-(4) where soles are known: eight contact points, tread heights, legs that
-// disagree. Where feet are points there is none of that, and after a start that is a guess no use for it: there the
-// attitude filter's own are published: they gain from what tilt and biases turn out to have been, which filters that
+// disagree. Where feet are points there is none of that, and after a start that is a guess it does not help: there the
+// attitude filter's own are published. They gain from what tilt and biases turn out to have been, which filters that
 // take the attitude as given cannot. On the walks of estimation_quality_test the attitude filter's velocity errs by 1.8
 // to 2.0 mm/s (RMS) and that of eqs (1)-(4) by 2.9 to 3.3 mm/s, but under physics, where soles roll and land hard,
 // balance on it strays three times as far from its plan

@@ -214,10 +214,6 @@ class BusReader {
   BusFile file_;
 };
 
-}  // namespace
-
-namespace {
-
 // The whole robot at rest on one leg, in its nominal stance, the sole below the middle of the base.
 LegVector torques_on_one_leg_nm(const RobotModel& robot, Foot leg) {
   const Transform base_T_sole{Mat3::Identity(), Vec3{0.0, 0.0, -robot.stance.base_height_m}};
@@ -247,17 +243,14 @@ void limit_by_drives(const BusFile& bus, RobotModel& robot) {
     limits.torque_nm = std::min(limits.torque_nm, drive.t_nm);
     robot.drives.gain_limits[n] = {drive.kp_nmprad, drive.kd_nmsprad};
   }
-  constexpr std::array<const char*, kJointsPerLeg> kNames{"hip roll", "hip yaw",     "hip pitch",
-                                                          "knee",     "ankle pitch", "ankle roll"};
-  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    const LegVector needed_nm = torques_on_one_leg_nm(robot, leg);
-    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-      const double given_nm = robot.drives.limits_of(leg, j).torque_nm;
-      const double asked_nm = std::abs(needed_nm[static_cast<Eigen::Index>(j)]);
-      if (asked_nm <= given_nm) continue;
-      throw FileError(name + "with these drives the robot cannot stand on one leg: its " + kNames[j] + " needs " +
-                      text_of(std::ceil(asked_nm)) + " Nm, and the drive gives " + text_of(given_nm) + " Nm.");
-    }
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const auto leg = static_cast<Foot>(n / kJointsPerLeg);
+    const double given_nm = robot.drives.limits[n].torque_nm;
+    const double asked_nm = std::abs(torques_on_one_leg_nm(robot, leg)[static_cast<Eigen::Index>(n % kJointsPerLeg)]);
+    if (asked_nm <= given_nm) continue;
+    throw FileError(name + "with these drives the robot cannot stand on one leg: " + std::string(kJointNames[n]) +
+                    " needs " + text_of(std::ceil(asked_nm)) + " Nm, and its drive gives " + text_of(given_nm) +
+                    " Nm.");
   }
 }
 

@@ -84,11 +84,13 @@ double KinematicPlant::foot_force_n(std::size_t foot) const noexcept {
 void KinematicPlant::load_drives() {
   constexpr double kMost_mps2 = 50.0;  // a sole that meets the ground stops within a tick
   const SoleRectangle& sole = errors_.sole.contact;
+  const BodyFrames body = true_frames();
+  const PerLink base_p_m = base_p_links_m(kMasses, body);
   const Vec3 between_m = load_share(0) * feet_[0].true_T_sole.p_m + load_share(1) * feet_[1].true_T_sole.p_m;
   const Vec3 rest_m = pressed_m() - between_m;
   for (std::size_t f = 0; f < kFootCount; ++f) {
     const auto leg = static_cast<Foot>(f);
-    const LegFrames frames = leg_frames(errors_.legs[f], leg, leg_joints(true_q_rad(), leg));
+    const LegFrames& frames = body[f];
     const Vec3 base_f = true_T_base_.R.transpose() * Vec3{0, 0, foot_force_n(f)};
     const Vec3 local_m = feet_[f].true_T_sole.R.transpose() * rest_m;
     const Vec3 base_r = frames.sole.R * Vec3{math::clamp(local_m.x(), sole.heel_x_m, sole.toe_x_m),
@@ -96,8 +98,7 @@ void KinematicPlant::load_drives() {
     std::array<Vec3, kJointsPerLeg> specific_mps2;
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       LinkState& link = feet_[f].links[j];
-      const Vec3& c_m = kMasses.leg[j].centre_m;
-      const Vec3 p_m = true_T_base_ * (frames.joint[j] * Vec3{c_m.x(), side_sign(leg) * c_m.y(), c_m.z()});
+      const Vec3 p_m = true_T_base_ * base_p_m.leg[f][j];
       const Vec3 v_mps = link.seen ? Vec3((p_m - link.p_m) / kPlantTick_s) : Vec3(Vec3::Zero());
       const Vec3 a_mps2 = ((v_mps - link.v_mps) / kPlantTick_s).cwiseMax(-kMost_mps2).cwiseMin(kMost_mps2);
       specific_mps2[j] = true_T_base_.R.transpose() * Vec3(Vec3{0, 0, -kGravity_mps2} - a_mps2);
@@ -183,12 +184,16 @@ void KinematicPlant::update_leg_kinematics() {
   }
 }
 
-Vec3 KinematicPlant::true_p_mass_m() const {
+BodyFrames KinematicPlant::true_frames() const {
   BodyFrames frames;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     frames[index_of(leg)] = leg_frames(errors_.legs[index_of(leg)], leg, leg_joints(true_q_rad(), leg));
   }
-  return true_T_base_ * centre_of_mass_m(kMasses, base_p_links_m(kMasses, frames));
+  return frames;
+}
+
+Vec3 KinematicPlant::true_p_mass_m() const {
+  return true_T_base_ * centre_of_mass_m(kMasses, base_p_links_m(kMasses, true_frames()));
 }
 
 // Where the weight, moving as the base does, presses on the ground.

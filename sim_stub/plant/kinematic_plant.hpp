@@ -88,6 +88,7 @@ class KinematicPlant final : public Plant {
   void give_way(double share);
   void move_swing_feet();
   void load_drives();
+  [[nodiscard]] BodyFrames true_frames() const;  // of the legs as they are long
   [[nodiscard]] Vec3 true_p_mass_m() const;
   [[nodiscard]] Vec3 pressed_m() const;
   void check_falls();
@@ -103,7 +104,7 @@ class KinematicPlant final : public Plant {
   JointVector q_, dq_ = JointVector::Zero();
   JointVector led_q_;                        // as the commands have led the joints:
   JointVector given_ = JointVector::Zero();  // and this further, by which the ankles have given way
-  JointVector tau_ = JointVector::Zero();    // what the motion asks for, were it one
+  JointVector tau_ = JointVector::Zero();    // as the motion asks for
   JointVector dq_before_radps_ = JointVector::Zero();
   Transform true_T_base_;
   Slack slack_;

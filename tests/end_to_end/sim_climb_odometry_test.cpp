@@ -44,6 +44,27 @@ TEST(ClimbOdometry, Fig4_TenSteps_FusedHasNeitherLiosJitterNorTheOdometrysDrift)
   }
 }
 
+// Map and footholds lie in odometry. Were they in the world that LIO corrects, soles would stand 20 mm over edges.
+TEST(ClimbOdometry, LioThatDriftsOrJumps_MovesNoFoothold) {
+  for (const int kind : {0, 1, 2, 3}) {
+    ClimbOptions options;
+    options.seed = 8;
+    options.stairs.steps = 4;
+    options.noise = NoiseKind::kCorrelated;
+    ErrorParams& sensors = options.reality.sensors;
+    if (kind == 0) sensors.lio_drift_mps = {0.02, 0.0, 0.0};
+    if (kind == 1) sensors.lio_drift_mps = {0.0, 0.0, 0.02};
+    if (kind == 2) sensors.lio_drift_radps = 0.02;
+    if (kind == 3) {
+      sensors.lio_jump_m = {0.06, 0.06, 0.06};
+      sensors.lio_jump_s = 14.0;
+    }
+    const ClimbSummary summary = run_climb(options, {});
+    EXPECT_TRUE(summary.pass) << kind << ": " << summary.reason;
+    EXPECT_LE(summary.foothold_error_m.max, 0.010) << kind;
+  }
+}
+
 // A climb's error lasts (how its world was tied to LIO's), so that its ticks are nearly one case: twenty climbs are
 // twenty. The covariance was set on the kinematic plant. Under physics it is too sure, by 1.2 to 1.5 in sigma
 // (toolchain/campaign odometry, 2026-11-23: 4.1 and 6.2 where 3 is honest): these bounds say that it is not worse.

@@ -131,6 +131,18 @@ TEST(ClimbContacts, SensedToo_ClimbedWithinTheFigures) {
   }
 }
 
+TEST(ClimbContacts, SensorsThatAreNoisyOrOff_ClimbedUnderPhysics) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    ClimbOptions options = options_of(seed, 4);
+    options.plant = PlantKind::kMujoco;
+    options.foot_sensors = true;
+    options.reality.sensors.foot_force_noise_n = seed == 1 ? 20.0 : 0.0;
+    options.reality.sensors.foot_force_offset_n = {seed == 1 ? 0.0 : 60.0, seed == 1 ? 0.0 : -60.0};
+    const ClimbSummary summary = climb(options);
+    EXPECT_TRUE(summary.pass) << "seed " << seed << ": " << summary.reason;
+  }
+}
+
 std::vector<Case> long_cases() {
   constexpr double kRises_m[]{0.13, 0.10, 0.17, 0.15, 0.12};
   std::vector<Case> cases;

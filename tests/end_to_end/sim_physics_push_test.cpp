@@ -54,8 +54,8 @@ std::vector<PushCase> every_moment(std::uint64_t seed, GaitPattern pattern) {
 }
 
 // A push may unload the standing sole for a moment, and the swing's landing then moves it: there is no capture step. Of
-// these 16 one sole ends 12.9 mm over an edge so (ss, moment 5, to the left), 2026-11-26; it was 4.5 mm while the foot
-// forces were exact, 0 while a foothold reached the gait a cycle sooner.
+// these 16 one sole ends 12.9 mm over an edge so (ss, moment 5, to the left; 4.5 mm until 2026-11-26), and 35 mm where
+// the feet have no force sensors.
 constexpr double kMostOver_m = 0.015;
 
 class Pushed : public testing::TestWithParam<PushCase> {};

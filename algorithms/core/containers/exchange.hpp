@@ -19,8 +19,8 @@ inline constexpr std::int64_t kNoFrame_ns = -(std::int64_t{1} << 60);
 // The reader says up to which frame it looks and gets the newest value of those. The writer may be ahead meanwhile: it
 // fills the slot with the oldest value, never the one that the reader holds. Of Slots, one is held, one is being
 // filled; so the newest value that the reader may look at is there as long as not more than Slots - 3 others were
-// published after it. A reader that comes later finds nothing and counts that in lost(); what it holds stays whole. So
-// it does when only newer values than it may look at went: whether there was one for it is not known.
+// published after it. A reader that comes later finds nothing and counts that in lost(); what it holds stays whole.
+// One that sees only values gone that are newer than it may look at counts that, too: there may have been one for it.
 // Frames are times in ns, within +-2^60 (36 years). Both sides finish in a bounded number of steps (wait-free): whoever
 // loses a slot to the other side looks at the others, at most Slots times.
 template <typename T, std::size_t Slots>

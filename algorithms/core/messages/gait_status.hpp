@@ -36,7 +36,7 @@ struct LatchedStep {
   bool height_mapped = false;
   std::int64_t latch_stamp_ns = 0;
   std::int64_t map_stamp_ns = 0;         // exposure of the newest fused frame at the latch
-  Foothold target;                       // as it was found
+  Foothold target;                       // in odometry, as it was found
   Transform odom_T_target;               // the same sole pose in the odometry frame that the swing is steered in
   std::int64_t touch_down_stamp_ns = 0;  // 0 while in the air, and for ever when the swing was aborted
   Transform odom_T_executed;             // estimated sole pose at touch-down

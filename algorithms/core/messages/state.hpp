@@ -35,7 +35,6 @@ struct StateEstimate {
   bool initialised = false;      // false while the robot must stand still for bias and alignment
 
   [[nodiscard]] Transform world_T_base() const noexcept { return world_T_odom * odom_T_base; }
-  [[nodiscard]] Transform world_T_sole(Foot foot) const noexcept { return world_T_odom * odom_T_sole[index_of(foot)]; }
 };
 
 }  // namespace polygmap

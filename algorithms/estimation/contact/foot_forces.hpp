@@ -27,7 +27,8 @@ class FootForces {
     static void visit(auto& p, auto& field) {
       field("observer", p.observer);
       field("sensor_noise", p.sensor_noise);
-      field("observer_sigma_n", p.observer_sigma_n, 0.5, 200.0, "Error of a force that torques tell.");
+      field("observer_sigma_n", p.observer_sigma_n, 0.5, 200.0,
+            "Error of a force that torques tell; judged by the simulated drives.");
       field("zero_sigma_n", p.zero_sigma_n, 0.0, 500.0, "Error of a force sensor's zero at the start.");
       field("zero_by_torque_sigma_n", p.zero_by_torque_sigma_n, 0.5, 500.0,
             "The zero is known no better than this from torques.");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vertical foot forces from joint torques, for a robot without force sensors.
+// Vertical foot forces from joint torques. The friction is that of the simulated drives.
 //
 // A momentum observer of each leg, hung on a base whose motion the IMU feels: what the drives give, less what it takes
 // to carry and accelerate the links and the rotors and to overcome friction, is what the ground gives. Torques and

@@ -184,7 +184,7 @@ TEST(LimitByDrives, DrivesTooWeakForOneLeg_AreRefusedWithWhatTheyLack) {
     ADD_FAILURE() << "taken";
   } catch (const FileError& error) {
     const std::string sentence = error.what();
-    EXPECT_NE(sentence.find("cannot stand on one leg: its knee needs 86 Nm, and the drive gives 50 Nm."),
+    EXPECT_NE(sentence.find("cannot stand on one leg: left_knee needs 86 Nm, and its drive gives 50 Nm."),
               std::string::npos)
         << sentence;
   }
