@@ -187,7 +187,13 @@ StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSe
   StepGoal goal;
   goal.kind = StepKind::kClosing;
   goal.foot = memory_.last_swing;
-  goal.target = sole_beside(situation.soles[index_of(other(goal.foot))], goal.foot, robot_->stance.half_width_m);
+  // As far along the tread as its foothold: the standing foot may have slid and turned, and beside it is over the edge.
+  goal.target = latched_.goal.target;
+  const SolePose& stance = situation.soles[index_of(other(goal.foot))];
+  const Vec3 across = rotation_z(goal.target.yaw_rad).col(1);
+  const double apart_m = side_sign(goal.foot) * across.dot(goal.target.position_m - stance.position_m);
+  goal.target.position_m += side_sign(goal.foot) * (2.0 * robot_->stance.half_width_m - apart_m) * across;
+  goal.target.position_m.z() = stance.position_m.z();
   goal.foothold = foothold_at(goal.target, footholds.map_stamp_ns);
   goal.foothold.polygon_id = tread_id_;
   return goal;

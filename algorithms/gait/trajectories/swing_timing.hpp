@@ -65,11 +65,11 @@ class SwingTiming {
       turns_back_ = tick_ < seen.turn_until_tick;
     }
     if (seen.wanted_back && !straight_) turns_back_ = true;
-    // The plan's own pace is proved for the drives; they are as fast as the pace is, about.
-    const double most = std::max(std::abs(pace_) / std::max(seen.drive_share, 1e-3), 1.0);
-    const double speed_up = std::min(params.speed_up, most);
+    // The drives are as fast as the pace is, about. The plan's own pace is proved for them, a straight path's is not.
+    const double most = std::abs(pace_) / std::max(seen.drive_share, 1e-3);
     const double usual = tick_ > duration_ticks + params.late_ticks ? params.descend_search
-                         : falling_outward_ && !straight_           ? speed_up
+                         : straight_                                ? std::min(1.0, most)
+                         : falling_outward_                         ? math::clamp(most, 1.0, params.speed_up)
                                                                     : 1.0;
     const double wanted = turns_back_ ? -1.0 : usual;
     pace_ += math::clamp(wanted - pace_, -params.pace_per_tick, params.pace_per_tick);

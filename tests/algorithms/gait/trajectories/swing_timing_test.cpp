@@ -70,6 +70,15 @@ TEST(SwingTiming, Hurrying_TakesNoMoreThanTheDrivesHave) {
   }
 }
 
+TEST(SwingTiming, StraightPath_NoFasterThanTheDrivesAre) {
+  for (const double at_pace_one : {0.7, 1.0, 1.6, 3.0}) {
+    SwingTiming pace;
+    pace.begin_straight();
+    for (int i = 0; i < 50; ++i) pace.advance(kParams, {.drive_share = at_pace_one * pace.pace()}, kSwing_ticks);
+    EXPECT_NEAR(pace.pace(), std::min(1.0, 1.0 / at_pace_one), 1e-9) << at_pace_one;
+  }
+}
+
 TEST(SwingTiming, TopplesEarly_TurnsBackWhereItMay) {
   for (const bool may : {true, false}) {
     SwingTiming pace;
