@@ -75,7 +75,7 @@ KinematicPlant::KinematicPlant(const Params& params, const StairWorld& world, co
 }
 
 double KinematicPlant::foot_force_n(std::size_t foot) const noexcept {
-  constexpr double kTouch_n = 30.0;  // least force of a sole that touches
+  constexpr double kTouch_n = 60.0;  // of a sole that touches: drives that gave way by 3 mm would press as hard
   return feet_[foot].anchored ? std::max(kTouch_n, load_share(foot) * kRobotWeight_n) : 0.0;
 }
 

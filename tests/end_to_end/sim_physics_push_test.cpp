@@ -65,22 +65,17 @@ TEST_P(Pushed, AnyWayAtAnyMomentOfAStair_DoesNotFall) {
 INSTANTIATE_TEST_SUITE_P(DoubleStep, Pushed, testing::ValuesIn(every_moment(1, GaitPattern::kDoubleStep)), name_of);
 INSTANTIATE_TEST_SUITE_P(SingleStep, Pushed, testing::ValuesIn(every_moment(1, GaitPattern::kSingleStep)), name_of);
 
-// Over four seeds every way at every moment. Of 64 such pushes one felled the robot (ss, seed 3, to the right): there is
-// no capture step. toolchain/campaign pushes counts more of them.
+// Over four seeds every way at every moment; toolchain/campaign pushes counts more of them.
 class LongPushed : public testing::TestWithParam<GaitPattern> {};
-TEST_P(LongPushed, FourSeedsEveryWayAtEveryMoment_AtMostOneFallsAndNoneOnBothFeet) {
-  int falls = 0;
+TEST_P(LongPushed, FourSeedsEveryWayAtEveryMoment_NoneFalls) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     for (const PushCase& c : every_moment(seed, GetParam())) {
       Outcome out;
       climb_pushed(c, out);
-      if (!out.fall.empty())
-        std::printf("seed %d, moment %d: %s\n", static_cast<int>(c.seed), c.moment, out.fall.c_str());
-      falls += out.fall.empty() ? 0 : 1;
+      EXPECT_EQ(out.fall, "") << "seed " << c.seed << ", moment " << c.moment;
       EXPECT_GE(out.sole_margin_m, -kMostOver_m) << "seed " << c.seed << ", moment " << c.moment;
     }
   }
-  EXPECT_LE(falls, GetParam() == GaitPattern::kSingleStep ? 1 : 0);
 }
 INSTANTIATE_TEST_SUITE_P(Long, LongPushed, testing::Values(GaitPattern::kDoubleStep, GaitPattern::kSingleStep));
 

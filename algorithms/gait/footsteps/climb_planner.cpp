@@ -188,7 +188,7 @@ StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSe
   goal.kind = StepKind::kClosing;
   goal.foot = memory_.last_swing;
   // As far along the tread as its foothold: the standing foot may have slid and turned, and beside it is over the edge.
-  goal.target = latched_.goal.target;
+  goal.target = landed_;
   const SolePose& stance = situation.soles[index_of(other(goal.foot))];
   const Vec3 across = rotation_z(goal.target.yaw_rad).col(1);
   const double apart_m = side_sign(goal.foot) * across.dot(goal.target.position_m - stance.position_m);
@@ -285,6 +285,7 @@ void ClimbPlanner::swing_aborted() noexcept { memory_ = before_latch_; }
 void ClimbPlanner::landed() noexcept {
   stride_share_ = 1.0;
   closes_up_ = false;
+  landed_ = latched_.goal.target;
   switch (latched_.goal.kind) {
     case StepKind::kFloor:
       ++floor_steps_;

@@ -153,6 +153,7 @@ class ClimbPlanner {
   bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this
   bool passing_refused_ = false;
   bool closes_up_ = false;
+  SolePose landed_;             // where the foot that landed last was to
   std::uint32_t tread_id_ = 0;  // under the foot that landed last
   std::uint32_t treads_climbed_ = 0;
   double stride_share_ = 1.0;  // of the floor step's limits

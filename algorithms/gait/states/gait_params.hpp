@@ -5,6 +5,7 @@
 #include "algorithms/gait/balance/balance.hpp"
 #include "algorithms/gait/footsteps/climb_planner.hpp"
 #include "algorithms/gait/joints/joint_reference.hpp"
+#include "algorithms/gait/states/touch_evidence.hpp"
 #include "algorithms/gait/trajectories/step_plan.hpp"
 #include "algorithms/gait/trajectories/swing_timing.hpp"
 
@@ -78,9 +79,8 @@ struct WeightShiftParams {
 
 struct SwingParams {
   SwingTiming::Params timing;
-  double touch_force_n = 15.0;
+  TouchEvidence::Params touch;
   double early_m = 0.005;
-  std::int32_t scrape_ticks = 5;
   double late_m = 0.005;
   double blocked_m = 0.008;
   double max_lowering_m = 0.055;
@@ -100,9 +100,8 @@ struct SwingParams {
 
   static void visit(auto& p, auto& field) {
     field("timing", p.timing);
-    field("touch_force_n", p.touch_force_n, 1.0, 200.0, "A sole that feels this force touches something.");
+    field("touch", p.touch);
     field("early_m", p.early_m, 0.0, 0.1, "Contact this far above the target counts as early.");
-    field("scrape_ticks", p.scrape_ticks, 0, 200, "Early contact that lasts so long is ground and no scraping toe.");
     field("late_m", p.late_m, 0.0, 0.1, "Contact this far below the target counts as late.");
     field("blocked_m", p.blocked_m, 0.001, 0.1, "A foot this far above where it is asked to be does not go down.");
     field("max_lowering_m", p.max_lowering_m, 0.0, 0.15,

@@ -43,26 +43,25 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   body.release_landed_foot();
 }
 
+void SwingPhase::feel_force(const JointFeedback& feedback, const SwingParams& params) noexcept {
+  if (std::exchange(felt_stamp_ns_, feedback.stamp_ns) == feedback.stamp_ns) return;
+  touch_.take(params.touch, feedback.foot_force_n[index_of(goal_.foot)]);
+  if (touch_.hangs()) unloaded_ = true;
+}
+
 SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& params,
                                      const Transform& odom_T_sole) noexcept {
-  const std::size_t i = index_of(goal_.foot);
-  Contact contact;
-  contact.loaded = in.feedback.foot_force_n[i] > params.touch_force_n;
-  if (!contact.loaded) unloaded_ = true;
-  // Each sample once: of a bus that falls silent the last one is read on and on.
-  if (std::exchange(felt_stamp_ns_, in.feedback.stamp_ns) != in.feedback.stamp_ns) {
-    touched_ticks_ = contact.loaded ? touched_ticks_ + 1 : 0;
-  }
+  feel_force(in.feedback, params);
   const bool descending = 2.0 * timing_.tick() > path_.duration_ticks();
   // What does not go down any more stands on something, whatever its force sensor says.
   const bool judged = in.usable && !in.leg_impaired;  // a mute leg stays above its path, too
-  const double above_m = judged ? in.state.odom_T_sole[i].p_m.z() - odom_T_sole.p_m.z() : 0.0;
+  const double above_m = judged ? in.state.odom_T_sole[index_of(goal_.foot)].p_m.z() - odom_T_sole.p_m.z() : 0.0;
   const bool blocked = path_.lowered_m(timing_.tick()) > params.late_m && above_m > params.blocked_m;
-  // A toe that scrapes along the next riser feels a force too, for a moment: ground that comes early has to stay.
+  Contact contact;
   const double above_target_m = path_.at(timing_.last_tick()).p_m.z() - goal_.target.position_m.z();
   if (above_target_m > params.early_m) contact.early_m = above_target_m;
-  const bool touches = contact.loaded && touched_ticks_ >= (contact.early_m > 0.0 ? params.scrape_ticks : 1);
-  contact.ground = (descending && unloaded_ && touches) || blocked;
+  contact.felt = touch_.touches(params.touch, contact.early_m > 0.0);
+  contact.ground = (descending && unloaded_ && contact.felt) || blocked;
   return contact;
 }
 
@@ -78,7 +77,7 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   if (contact.ground) {
     if (contact.early_m > 0.0) ++gait.status.early_contacts;
     if (lowered_m > params.late_m) ++gait.status.late_contacts;
-    return touch_down(in, gait, contact.loaded, contact.early_m);
+    return touch_down(in, gait, contact.felt, contact.early_m);
   }
   // A force that never left or is no longer told: the plan's end is the touch-down.
   const bool told = in.now_ns - in.feedback.stamp_ns <= gait.params.steer_age_ns &&
@@ -192,18 +191,17 @@ void SwingPhase::land_beside(GaitShared& gait, const SolePose& target) noexcept 
 // The only way that is known to be free is the one it came: the swing backwards.
 Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexcept {
   const SwingParams& params = gait.params.swing;
-  const std::size_t i = index_of(goal_.foot);
+  feel_force(in.feedback, params);
   const Transform odom_T_sole = sole();
   const double above_m = odom_T_sole.p_m.z() - path_.start_height_m();
-  const bool loaded = in.feedback.foot_force_n[i] > params.touch_force_n, all_the_way = timing_.tick() < 0.0;
-  if (!loaded) unloaded_ = true;
-  const bool lands = loaded && (all_the_way || (unloaded_ && above_m < params.abort_landing_m));
+  const bool felt = touch_.touches(params.touch, false), all_the_way = timing_.tick() < 0.0;
+  const bool lands = felt && (all_the_way || (unloaded_ && above_m < params.abort_landing_m));
   if (!lands && !(all_the_way && above_m < -params.abort_landing_m)) {
     gait.plan.set_sole(goal_.foot, beside_path(gait.plan, odom_T_sole));
     return {};
   }
   stop_foot(in, gait);
-  if (!loaded && std::isfinite(in.feedback.foot_force_n[i])) gait.plan.keep_upright();
+  if (!felt && std::isfinite(in.feedback.foot_force_n[index_of(goal_.foot)])) gait.plan.keep_upright();
   ++gait.status.aborted_swings;
   gait.planner.swing_aborted();
   gait.plan.restart_posture();

@@ -20,10 +20,12 @@ class SwingPhase {
 
  private:
   struct Contact {
-    bool loaded = false;   // felt by the sole
+    bool felt = false;     // by the sole
     double early_m = 0.0;  // so far above the target, where that is early
     bool ground = false;   // the foot stands on something
   };
+  // Each sample once: of a bus that falls silent the last one is read on and on.
+  void feel_force(const JointFeedback& feedback, const SwingParams& params) noexcept;
   [[nodiscard]] Contact feel(const GaitInput& in, const SwingParams& params, const Transform& odom_T_sole) noexcept;
   [[nodiscard]] Transition abort_swing(const GaitInput& in, GaitShared& gait) noexcept;
   [[nodiscard]] Transition touch_down(const GaitInput& in, GaitShared& gait, bool felt, double early_m) noexcept;
@@ -39,12 +41,12 @@ class SwingPhase {
   Swing path_;  // odometry
   SwingTiming timing_;
   Vec2 zmp_stance_m_ = Vec2::Zero();  // plan frame
-  std::int32_t touched_ticks_ = 0;    // for which the foot has been felt to touch,
-  std::int64_t felt_stamp_ns_ = 0;    // as told by then
-  std::int32_t unjudged_ticks_ = 0;   // for which no error tells of a fall
-  bool leg_was_mute_ = false;         // a drive of it, for good
-  bool lowers_body_ = false;          // since the leg does not lower its foot
-  bool unloaded_ = false;             // the foot was felt to leave the ground
+  TouchEvidence touch_;
+  std::int64_t felt_stamp_ns_ = 0;   // of the last sample in it
+  std::int32_t unjudged_ticks_ = 0;  // for which no error tells of a fall
+  bool leg_was_mute_ = false;        // a drive of it, for good
+  bool lowers_body_ = false;         // since the leg does not lower its foot
+  bool unloaded_ = false;            // the foot was felt to leave the ground
 };
 
 }  // namespace polygmap

@@ -23,6 +23,12 @@ TEST(ClimbPlanner, ClosesUpBesideAFootThatTurned_LandsAsFarAlongTheTreadAsItsFoo
                      SolePose{odom_R_stairs * Vec3{0.985, -0.105, 0.129}, kYaw_rad + 0.055}};
   planner.latched(situation, landed);
   planner.landed();
+  ClimbPlanner::Decision aborted;  // a swing that went back is none that landed
+  aborted.goal.kind = StepKind::kLeading;
+  aborted.goal.foot = Foot::kRight;
+  aborted.goal.target = {odom_R_stairs * Vec3{1.3, -0.1, 0.26}, kYaw_rad};
+  planner.latched(situation, aborted);
+  planner.swing_aborted();
   ASSERT_TRUE(planner.close_up(situation));
 
   const ClimbPlanner::Decision closing = planner.decide(situation, {});

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether a swinging foot touches, from a force that friction and masses may feign: the log odds of touching against
+// hanging, summed over the samples (Page's cumulative sum; Page, "Continuous inspection schemes", Biometrika 1954). A
+// hard touch-down counts at once, a soft one after a while, and a toe that scrapes along a riser for a moment does not.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "algorithms/core/math/math.hpp"
+
+namespace polygmap {
+
+class TouchEvidence {
+ public:
+  struct Params {
+    double even_n = 40.0;
+    double odds_pn = 0.2;
+    double most_odds = 2.0;
+    double expected_odds = 2.0;
+    double early_odds = 10.0;
+
+    static void visit(auto& p, auto& field) {
+      field("even_n", p.even_n, 1.0, 200.0,
+            "A foot that is felt to press so hard touches as likely as it hangs. In the air torques feigned up to 50 N "
+            "of the simulation's worst robots.");
+      field("odds_pn", p.odds_pn, 0.001, 10.0, "Log odds of touching, for each newton above that and sample.");
+      field("most_odds", p.most_odds, 0.1, 100.0, "One sample's log odds count no more, either way.");
+      field("expected_odds", p.expected_odds, 0.1, 100.0, "Log odds that make a touch where the ground is expected.");
+      field("early_odds", p.early_odds, 0.1, 1000.0, "And where it is not expected yet: a toe may scrape there.");
+      field.ordered("expected_odds", "early_odds");
+    }
+  };
+  // One sample; a force that is not a number tells nothing and is taken for none.
+  void take(const Params& params, double force_n) noexcept {
+    const double sample = std::isfinite(force_n) ? params.odds_pn * (force_n - params.even_n) : -params.most_odds;
+    odds_ = math::clamp(odds_ + math::clamp(sample, -params.most_odds, params.most_odds), 0.0, params.early_odds);
+  }
+  [[nodiscard]] bool touches(const Params& params, bool early) const noexcept {
+    return odds_ >= (early ? params.early_odds : params.expected_odds);
+  }
+  [[nodiscard]] bool hangs() const noexcept { return !(odds_ > 0.0); }
+
+ private:
+  double odds_ = 0.0;
+};
+
+}  // namespace polygmap
