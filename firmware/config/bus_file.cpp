@@ -243,10 +243,11 @@ void limit_by_drives(const BusFile& bus, RobotModel& robot) {
     limits.torque_nm = std::min(limits.torque_nm, drive.t_nm);
     robot.drives.gain_limits[n] = {drive.kp_nmprad, drive.kd_nmsprad};
   }
+  JointVector needed_nm;
+  needed_nm << torques_on_one_leg_nm(robot, Foot::kLeft), torques_on_one_leg_nm(robot, Foot::kRight);
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    const auto leg = static_cast<Foot>(n / kJointsPerLeg);
     const double given_nm = robot.drives.limits[n].torque_nm;
-    const double asked_nm = std::abs(torques_on_one_leg_nm(robot, leg)[static_cast<Eigen::Index>(n % kJointsPerLeg)]);
+    const double asked_nm = std::abs(needed_nm[static_cast<Eigen::Index>(n)]);
     if (asked_nm <= given_nm) continue;
     throw FileError(name + "with these drives the robot cannot stand on one leg: " + std::string(kJointNames[n]) +
                     " needs " + text_of(std::ceil(asked_nm)) + " Nm, and its drive gives " + text_of(given_nm) +

@@ -187,13 +187,8 @@ StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSe
   StepGoal goal;
   goal.kind = StepKind::kClosing;
   goal.foot = memory_.last_swing;
-  // As far along the tread as its foothold: the standing foot may have slid and turned, and beside it is over the edge.
-  goal.target = landed_;
-  const SolePose& stance = situation.soles[index_of(other(goal.foot))];
-  const Vec3 across = rotation_z(goal.target.yaw_rad).col(1);
-  const double apart_m = side_sign(goal.foot) * across.dot(goal.target.position_m - stance.position_m);
-  goal.target.position_m += side_sign(goal.foot) * (2.0 * robot_->stance.half_width_m - apart_m) * across;
-  goal.target.position_m.z() = stance.position_m.z();
+  goal.target = sole_beside_on_tread(situation.soles[index_of(other(goal.foot))], goal.foot, landed_,
+                                     robot_->stance.half_width_m);
   goal.foothold = foothold_at(goal.target, footholds.map_stamp_ns);
   goal.foothold.polygon_id = tread_id_;
   return goal;
@@ -273,6 +268,13 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
 bool ClimbPlanner::shorten_floor_steps() noexcept {
   stride_share_ *= params_.shorter;
   return stride_share_ > params_.shortest;
+}
+
+SolePose ClimbPlanner::beside_passed(const SolePose& stance, Foot foot) const noexcept {
+  const Foothold& foothold = before_latch_.trailing_foothold;  // of this foot, on the tread of the standing one
+  const bool known = foothold.polygon_id == tread_id_ && usable(foothold);
+  return known ? sole_beside_on_tread(stance, foot, sole_on(foothold), robot_->stance.half_width_m)
+               : sole_beside(stance, foot, robot_->stance.half_width_m);
 }
 
 void ClimbPlanner::passing_ends_beside(const StepGoal& goal) noexcept {

@@ -116,6 +116,8 @@ class ClimbPlanner {
   // The legs cannot lead on. A foot that landed farther out, in a stance too wide for the ankle rolls of both legs,
   // comes back beside the other one first. False when the feet are close enough already.
   [[nodiscard]] bool close_up(const Situation& situation) noexcept;
+  // Where the passing foot that is in the air would land beside the standing one, odom.
+  [[nodiscard]] SolePose beside_passed(const SolePose& stance, Foot foot) const noexcept;
   // The passing foot that is in the air lands beside the standing one instead.
   void passing_ends_beside(const StepGoal& goal) noexcept;
   // Its foot stands on its goal, or where it stood before: with which foot to lead as before the latch.

@@ -17,6 +17,15 @@ SolePose sole_beside(const SolePose& stance, Foot foot, double half_width_m) noe
   return foot_of_torso(torso_of_foot(stance, other(foot), half_width_m, 0.0), foot, half_width_m, 0.0);
 }
 
+SolePose sole_beside_on_tread(const SolePose& stance, Foot foot, const SolePose& foothold,
+                              double half_width_m) noexcept {
+  const Vec3 across = side_sign(foot) * rotation_z(foothold.yaw_rad).col(1);
+  SolePose beside = foothold;
+  beside.position_m += (2.0 * half_width_m - across.dot(foothold.position_m - stance.position_m)) * across;
+  beside.position_m.z() = stance.position_m.z();
+  return beside;
+}
+
 TorsoPose middle_of(const SolePair& soles) noexcept {
   const double turn_rad = math::wrap_angle(soles[1].yaw_rad - soles[0].yaw_rad);
   return {0.5 * (soles[0].position_m + soles[1].position_m), math::wrap_angle(soles[0].yaw_rad + 0.5 * turn_rad)};

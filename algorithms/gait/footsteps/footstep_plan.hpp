@@ -34,6 +34,10 @@ using SolePair = std::array<SolePose, kFootCount>;
 [[nodiscard]] TorsoPose torso_of_foot(const SolePose& sole, Foot foot, double half_width_m, double height_m) noexcept;
 // The place of a foot beside a standing one: both belong to one torso pose.
 [[nodiscard]] SolePose sole_beside(const SolePose& stance, Foot foot, double half_width_m) noexcept;
+// The same on a tread: as far along it, and as straight, as the foot's foothold. A standing foot that slid and turned
+// by 3 degrees has its side 11 mm over the edge.
+[[nodiscard]] SolePose sole_beside_on_tread(const SolePose& stance, Foot foot, const SolePose& foothold,
+                                            double half_width_m) noexcept;
 
 // Between the feet, at their mean height and heading.
 [[nodiscard]] TorsoPose middle_of(const SolePair& soles) noexcept;

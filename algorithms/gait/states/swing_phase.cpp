@@ -151,9 +151,9 @@ void SwingPhase::land_soon(GaitShared& gait) noexcept {
   const Mat3 R = rotation_z(stance.yaw_rad);
   const Transform now = sole();
   const bool beside = (R.transpose() * (now.p_m - stance.position_m)).x() < -params.beside_from_m;
-  const SolePose target = beside ? sole_beside(stance, goal_.foot, gait.robot.stance.half_width_m) : goal_.target;
+  const SolePose target = beside ? gait.planner.beside_passed(stance, goal_.foot) : goal_.target;
   const Vec3 way_m = target.position_m - now.p_m;
-  const auto ticks = static_cast<std::int32_t>(params.soon_ticks + params.soon_ticks_per_m * way_m.head<2>().norm());
+  const auto ticks = static_cast<std::int32_t>(params.soon_ticks + params.soon_ticks_per_m * way_m.norm());
   // Below its nosing the tread is not to be had straight, and toes point down.
   const double toe_m = (now * Vec3{gait.robot.sole.collision.toe_x_m, 0.0, 0.0}).z();
   const bool from_below = target.position_m.z() - std::min(toe_m, now.p_m.z()) > params.soon_below_m;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // How fast a swing runs along its path, and how far beside it: as planned, unless the body topples towards the free
 // foot (one sole cannot hold that; the free foot has to be there in time, or back), the ground is late (the weight is
-// on its way) or is not there (back to where the foot stood).
+// on its way) or is not there (back to where the foot stood), or its path is a straight one and asks the drives for
+// more than they have.
 #pragma once
 
 #include <algorithm>
@@ -78,7 +79,7 @@ class SwingTiming {
       widened_m_ = std::min({widened_m_ + params.widen_mps * kTick_s, params.widen_m, std::max(seen.side_room_m, 0.0)});
     }
   }
-  // From here on another path, which is short enough not to be hurried.
+  // From here on another path, which no plan proved for the drives: it is not hurried.
   void begin_straight() noexcept {
     tick_ = 0.0;
     pace_ = 1.0;

@@ -43,5 +43,33 @@ TEST(ClimbPlanner, ClosesUpBesideAFootThatTurned_LandsAsFarAlongTheTreadAsItsFoo
   EXPECT_NEAR(stairs_p_m.z(), 0.129, 1e-12);
 }
 
+TEST(ClimbPlanner, PassingFootLandsBesideAFootThatTurned_AsFarAlongTheTreadAsItsFoothold) {
+  const RobotModel robot;
+  ClimbPlanner planner;
+  planner.reset({}, robot);
+  ClimbPlanner::Decision leading;  // of the right foot onto tread 7, where the left one would have this foothold
+  leading.goal.kind = StepKind::kLeading;
+  leading.goal.foot = Foot::kRight;
+  leading.goal.foothold.polygon_id = 7;
+  leading.trailing.foothold.position_m = {1.0, 0.1, 0.13};
+  leading.trailing.foothold.polygon_id = 7;
+  planner.latched({}, leading);
+  planner.landed();
+  ClimbPlanner::Decision passing;
+  passing.goal.kind = StepKind::kPassing;
+  passing.goal.foot = Foot::kLeft;
+  passing.goal.foothold.polygon_id = 8;
+  passing.trailing.foothold.position_m = {1.3, -0.1, 0.26};
+  passing.trailing.foothold.polygon_id = 8;
+  planner.latched({}, passing);
+
+  const SolePose stance{{0.99, -0.105, 0.129}, 0.055};
+  const SolePose beside = planner.beside_passed(stance, Foot::kLeft);
+  EXPECT_NEAR(beside.position_m.x(), 1.0, 1e-12);
+  EXPECT_NEAR(beside.position_m.y(), stance.position_m.y() + 2.0 * robot.stance.half_width_m, 1e-12);
+  EXPECT_NEAR(beside.position_m.z(), 0.129, 1e-12);
+  EXPECT_EQ(beside.yaw_rad, 0.0);
+}
+
 }  // namespace
 }  // namespace polygmap

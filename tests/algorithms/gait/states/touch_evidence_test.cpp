@@ -32,7 +32,7 @@ TEST(TouchEvidence, SofterTouchDown_TakesLonger) {
   EXPECT_LT(samples_until_touch(42.0, true), 50);
 }
 
-TEST(TouchEvidence, ForceThatFrictionFeigns_NeverTouches) { EXPECT_EQ(samples_until_touch(38.0, false), 1000); }
+TEST(TouchEvidence, ForceBelowEven_NeverTouches) { EXPECT_EQ(samples_until_touch(38.0, false), 1000); }
 
 TEST(TouchEvidence, ScrapesForAMoment_TouchesNotAndIsForgotten) {
   TouchEvidence touch;
@@ -40,6 +40,15 @@ TEST(TouchEvidence, ScrapesForAMoment_TouchesNotAndIsForgotten) {
   EXPECT_FALSE(touch.touches(kParams, true));
   for (int i = 0; i < 4; ++i) touch.take(kParams, 0.0);
   EXPECT_TRUE(touch.hangs());
+}
+
+TEST(TouchEvidence, ScrapedAboveTheTargetAndIsFree_TouchesNotWhereTheGroundIsExpected) {
+  TouchEvidence touch;
+  for (int i = 0; i < 4; ++i) touch.take(kParams, 150.0);
+  touch.take(kParams, 0.0);
+  EXPECT_FALSE(touch.touches(kParams, false));
+  touch.take(kParams, 150.0);
+  EXPECT_TRUE(touch.touches(kParams, false));
 }
 
 TEST(TouchEvidence, PressedForLong_HangsAsSoonAfterLiftOff) {
