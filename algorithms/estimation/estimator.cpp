@@ -249,6 +249,7 @@ void Estimator::publish(std::int64_t now_ns) noexcept {
   for (std::size_t i = 0; i < kFootCount; ++i) {
     state_.odom_T_sole[i] = state_.odom_T_base * legs_.sample.legs[i].base_T_sole;
     state_.contact_probability[i] = contacts_.feet()[i].probability;
+    state_.foot_force_sigma_n[i] = legs_.sample.foot_force_sigma_n[i];
   }
 }
 

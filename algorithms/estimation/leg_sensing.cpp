@@ -83,7 +83,8 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
   joints_ = carried;
   frames_ = body_frames(robot_->legs, joints_.q_rad);
   for (std::size_t n = 0; n < kJointCount; ++n) replied_ns_[n] = joints.stamp_ns - joints.silent_ns(n);
-  joints_.foot_force_n = forces_.update(*robot_, frames_, joints_, base, base_up, stands);
+  forces_.update(*robot_, frames_, joints_, base, base_up, stands);
+  joints_.foot_force_n = forces_.up_n();
   for (std::size_t n = 0; n < kJointCount; ++n) {  // the last torque is not this one's
     if (is_mute(n)) joints_.tau_nm[static_cast<Eigen::Index>(n)] = std::numeric_limits<double>::quiet_NaN();
   }
@@ -134,6 +135,7 @@ LegSample LegSensing::legs() const noexcept {
   }
   sample.silent_ns = std::max(sample.silent_ns, joints_.stamp_ns - felt_ns_);
   sample.foot_force_n = joints_.foot_force_n;
+  sample.foot_force_sigma_n = forces_.sigma_n();
   return sample;
 }
 

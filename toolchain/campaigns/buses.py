@@ -39,9 +39,8 @@ def buses(engine, seeds):
             rows(("buses", "climbed", "s/step", "sole margin mm", "foothold error, mean change mm", "of single climbs mm"), lines) +
             ("\n\nRefused before anything moves:\n\n" + "\n".join(f"- {r}" for r in refused) if refused else "") + not_climbed(everything))
     worst = None if None in changes or not changes else max(changes)
-    # 0.5 mm is asked; it was 0.61 on 2026-11-26, and 0.33 the day before, with exact force sensors. Not isolated.
     return Page(text, {"1 climbed": headline("climbs with the joints behind CAN buses", climbed(behind)),
-                       "2 foothold": headline("what these buses add to the foothold error, mean of 20 climbs", most(worst, 0.65, "0.5, not met"), " mm", False)})
+                       "2 foothold": headline("what these buses add to the foothold error, mean of 20 climbs", most(worst, 0.5), " mm", False)})
 
 
 TABLES = {"buses": Table("Joints on CAN buses", range(1, 21), buses, 5)}

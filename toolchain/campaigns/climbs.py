@@ -258,10 +258,9 @@ def pushes(engine, seeds):
 
     text = (f"10 N s on the torso at eight moments of the second of four stairs, perception in the loop, {span(seeds)}, under physics.\n\n" +
             outcomes("pushed", groups) + not_climbed(unpushed_failed + everything))
-    # None is asked; three fell on 2026-11-26, none the day before, with exact force sensors. The cause is not isolated.
     return Page(text, {"1 falls": headline(
         "falls by a push of 10 N s on the stairs",
-        Figure(sum(bool(s.get("fell")) for s in everything), falls(everything), "most", 3, "0, not met"))})
+        Figure(sum(bool(s.get("fell")) for s in everything), falls(everything), "most", 0))})
 
 
 BODIES = {

@@ -18,10 +18,10 @@ class NoiseLevel {
     double most_ratio = 4.0;
 
     static void visit(auto& p, auto& field) {
-      field("first", p.first, 0.0, 10.0, "Sigma until something is measured, in units of the signal.");
+      field("first", p.first, 0.0, 100.0, "Sigma until something is measured, in units of the signal.");
       field("first_s", p.first_s, 0.0, 1000.0, "The first sigma counts like so much time of measurement.");
       field("memory_s", p.memory_s, 0.01, 1000.0, "What was measured longer ago is forgotten.");
-      field("min", p.min, 0.0, 10.0, "The measured sigma is believed down to this.");
+      field("min", p.min, 0.0, 100.0, "The measured sigma is believed down to this.");
       field("max", p.max, 0.0, 1e9, "The measured sigma is believed up to this.");
       field.ordered("min", "max");
       field("most_ratio", p.most_ratio, 1.0, 100.0,

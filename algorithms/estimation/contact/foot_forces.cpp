@@ -11,6 +11,7 @@ void FootForces::reset(const Params& params) noexcept {
   *this = FootForces{};
   params_ = params;
   observer_.reset(params.observer);
+  for (NoiseLevel& noise_n : observer_noise_n_) noise_n.reset(params.observer_noise);
   for (Sensor& sensor : sensors_) {
     sensor.noise_n.reset(params.sensor_noise);
     sensor.zero_variance_n2 = math::square(params.zero_sigma_n);
@@ -46,33 +47,37 @@ FootForces::Weighed FootForces::sense(Sensor& sensor, double read_n, const Weigh
   return {read_n - sensor.zero_n, 1.0 / (math::square(sensor.noise_n.sigma()) + sensor.zero_variance_n2)};
 }
 
-std::array<double, kFootCount> FootForces::update(const RobotModel& robot, const BodyFrames& frames,
-                                                  const JointFeedback& joints, const ImuSample& base,
-                                                  const Vec3& base_up,
-                                                  const std::array<bool, kFootCount>& stands) noexcept {
+void FootForces::update(const RobotModel& robot, const BodyFrames& frames, const JointFeedback& joints,
+                        const ImuSample& base, const Vec3& base_up,
+                        const std::array<bool, kFootCount>& stands) noexcept {
   const double dt_s = stamp_ns_ < 0 ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
   stamp_ns_ = joints.stamp_ns;
   const bool torques_told = math::all_finite(joints.tau_nm) && joints.tau_nm.cwiseAbs().maxCoeff() > 0.0;
-  std::array<double, kFootCount> observed_n{};
-  if (torques_told) observed_n = observer_.update(robot, frames, joints, base, base_up);
-  std::array<double, kFootCount> up_n{};
+  std::array<bool, kFootCount> told{}, hangs{};
   for (std::size_t f = 0; f < kFootCount; ++f) {
-    bool told = torques_told;
-    for (std::size_t j = 0; j < kJointsPerLeg; ++j)
-      told = told && !joints.is_mute(joint_index(static_cast<Foot>(f), j));
-    const Weighed observed{observed_n[f], told ? 1.0 / math::square(params_.observer_sigma_n) : 0.0};
-    const bool hangs = told && !stands[f] && observed_n[f] < params_.light_n;
-    const Weighed sensed = sense(sensors_[f], joints.foot_force_n[f], observed, hangs, dt_s);
+    told[f] = torques_told;
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      told[f] = told[f] && !joints.is_mute(joint_index(static_cast<Foot>(f), j));
+    }
+    hangs[f] = told[f] && !stands[f];
+  }
+  std::array<double, kFootCount> observed_n{};
+  if (torques_told) observed_n = observer_.update(robot, frames, joints, base, base_up, hangs);
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    NoiseLevel& noise_n = observer_noise_n_[f];
+    if (hangs[f]) noise_n.take(math::square(observed_n[f]), dt_s);
+    const Weighed observed{observed_n[f], told[f] ? 1.0 / math::square(noise_n.sigma()) : 0.0};
+    const Weighed sensed =
+        sense(sensors_[f], joints.foot_force_n[f], observed, hangs[f] && observed_n[f] < params_.light_n, dt_s);
     const double weight_pn2 = observed.weight_pn2 + sensed.weight_pn2;
     if (!(weight_pn2 > 0.0)) {
-      up_n[f] = std::numeric_limits<double>::quiet_NaN();
+      up_n_[f] = sigma_n_[f] = std::numeric_limits<double>::quiet_NaN();
       continue;
     }
     const double mean_n = (observed.weight_pn2 * observed.force_n + sensed.weight_pn2 * sensed.force_n) / weight_pn2;
-    const double light_n = std::min(params_.light_n, params_.light_sigmas / math::sqrt(weight_pn2));
-    up_n[f] = mean_n > light_n ? mean_n : 0.0;
+    sigma_n_[f] = 1.0 / math::sqrt(weight_pn2);
+    up_n_[f] = mean_n > std::min(params_.light_n, params_.light_sigmas * sigma_n_[f]) ? mean_n : 0.0;
   }
-  return up_n;
 }
 
 }  // namespace polygmap

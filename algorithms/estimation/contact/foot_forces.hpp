@@ -15,7 +15,7 @@ class FootForces {
   struct Params {
     GroundForceObserver::Params observer;
     NoiseLevel::Params sensor_noise{10.0, 0.1, 2.0, 1.0, 100.0};
-    double observer_sigma_n = 10.0;
+    NoiseLevel::Params observer_noise{20.0, 0.2, 2.0, 6.0, 40.0};
     double zero_sigma_n = 60.0;
     double zero_by_torque_sigma_n = 15.0;
     double zero_in_air_sigma_n = 3.0;
@@ -27,8 +27,7 @@ class FootForces {
     static void visit(auto& p, auto& field) {
       field("observer", p.observer);
       field("sensor_noise", p.sensor_noise);
-      field("observer_sigma_n", p.observer_sigma_n, 0.5, 200.0,
-            "Error of a force that torques tell; judged by the simulated drives.");
+      field("observer_noise", p.observer_noise);
       field("zero_sigma_n", p.zero_sigma_n, 0.0, 500.0, "Error of a force sensor's zero at the start.");
       field("zero_by_torque_sigma_n", p.zero_by_torque_sigma_n, 0.5, 500.0,
             "The zero is known no better than this from torques.");
@@ -43,12 +42,13 @@ class FootForces {
   void reset(const Params& params) noexcept;
   // frames: of the joints. joints: a force that is not a number is not told, as are all torques when one is none or all
   // are 0, and those of a leg with a mute drive. base: what the IMU feels, base axes; base_up: the vertical there.
-  // stands: which feet do as far as is known. Upwards on each foot, never negative; not a number where nothing tells
-  // it.
-  [[nodiscard]] std::array<double, kFootCount> update(const RobotModel& robot, const BodyFrames& frames,
-                                                      const JointFeedback& joints, const ImuSample& base,
-                                                      const Vec3& base_up,
-                                                      const std::array<bool, kFootCount>& stands) noexcept;
+  // stands: which feet do as far as is known.
+  void update(const RobotModel& robot, const BodyFrames& frames, const JointFeedback& joints, const ImuSample& base,
+              const Vec3& base_up, const std::array<bool, kFootCount>& stands) noexcept;
+  // Upwards on each foot, never negative; not a number where nothing tells it.
+  [[nodiscard]] const std::array<double, kFootCount>& up_n() const noexcept { return up_n_; }
+  // Error of that, one sigma, by what is felt of feet that hang.
+  [[nodiscard]] const std::array<double, kFootCount>& sigma_n() const noexcept { return sigma_n_; }
 
  private:
   struct Sensor {
@@ -66,7 +66,9 @@ class FootForces {
 
   Params params_;
   GroundForceObserver observer_;
+  std::array<NoiseLevel, kFootCount> observer_noise_n_;
   std::array<Sensor, kFootCount> sensors_;
+  std::array<double, kFootCount> up_n_{}, sigma_n_{};
   std::int64_t stamp_ns_ = -1;
 };
 

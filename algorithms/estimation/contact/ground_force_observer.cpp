@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "algorithms/robot/leg_kinematics.hpp"
 
@@ -28,14 +29,17 @@ std::array<Vec3, kJointsPerLeg> link_velocities_mps(const LegFrames& frames, con
 void GroundForceObserver::reset(const Params& params) noexcept {
   *this = GroundForceObserver{};
   params_ = params;
+  for (Leg& leg : legs_) leg.friction_nm.setConstant(params.friction_nm);
 }
 
 std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& robot, const BodyFrames& frames,
                                                            const JointFeedback& joints, const ImuSample& base,
-                                                           const Vec3& base_up) noexcept {
+                                                           const Vec3& base_up,
+                                                           const std::array<bool, kFootCount>& hangs) noexcept {
   const bool first = stamp_ns_ < 0;
   const double dt_s = first ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
   const double share = first ? 1.0 : dt_s / (params_.smoothing_s + dt_s), rate_ps = 1.0 / params_.smoothing_s;
+  const double learning = std::min(dt_s / params_.friction_s, 1.0);
   stamp_ns_ = joints.stamp_ns;
   felt_mps2_ += share * (base.accel_mps2 - felt_mps2_);
   const PerLink p_m = base_p_links_m(robot.masses, frames);
@@ -55,8 +59,13 @@ std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& rob
     leg.dq_radps += share * (dq_radps - leg.dq_radps);
     LegVector left_nm = leg.drive_nm - leg_torques_nm(robot.masses, foot, frames[f], specific_mps2, {});
     for (Eigen::Index j = 0; j < left_nm.size(); ++j) {
+      const double way = math::clamp(leg.dq_radps[j] / params_.creep_radps, -1.0, 1.0);
+      double& friction_nm = leg.friction_nm[j];
       left_nm[j] -= robot.drives.armature_kgm2 * rate_ps * (dq_radps[j] - leg.dq_radps[j]) +
-                    params_.friction_nm * math::clamp(leg.dq_radps[j] / params_.creep_radps, -1.0, 1.0);
+                    (hangs[f] ? friction_nm : params_.friction_nm) * way;
+      if (!hangs[f]) continue;  // on the ground a joint that hardly turns may be held either way
+      // Nothing else is left in the air but what masses are off, which goes both ways of a swing alike.
+      friction_nm = math::clamp(friction_nm + learning * way * left_nm[j], 0.0, params_.most_friction_nm);
     }
     const LegJacobian J = leg_jacobian(frames[f]);
     Eigen::Matrix<double, 6, 6> A = J * J.transpose();

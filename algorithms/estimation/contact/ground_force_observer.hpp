@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vertical foot forces from joint torques. The friction is that of the simulated drives.
+// Vertical foot forces from joint torques. Each joint's friction is learnt while its leg hangs.
 //
 // A momentum observer of each leg, hung on a base whose motion the IMU feels: what the drives give, less what it takes
 // to carry and accelerate the links and the rotors and to overcome friction, is what the ground gives. Torques and
@@ -17,29 +17,40 @@ class GroundForceObserver {
   struct Params {
     double smoothing_s = 0.008;
     double friction_nm = 1.0;
+    double most_friction_nm = 5.0;
+    double friction_s = 0.5;
     double creep_radps = 0.05;
     double damping_m = 0.02;
 
     static void visit(auto& p, auto& field) {
       field("smoothing_s", p.smoothing_s, 0.0005, 0.1, "Time constant of the observed forces.");
-      field("friction_nm", p.friction_nm, 0.0, 50.0, "Coulomb friction of a joint, which a drive's torque holds.");
+      field("friction_nm", p.friction_nm, 0.0, 50.0,
+            "Coulomb friction of a joint, which a drive's torque holds, until it is learnt.");
+      field("most_friction_nm", p.most_friction_nm, 0.0, 50.0, "A joint's friction is learnt up to this.");
+      field.ordered("friction_nm", "most_friction_nm");
+      field("friction_s", p.friction_s, 0.01, 60.0,
+            "Time of a leg's motion in the air that its friction is learnt in.");
       field("creep_radps", p.creep_radps, 0.001, 1.0, "The friction of a joint that turns more slowly is less.");
       field("damping_m", p.damping_m, 0.001, 0.2,
             "Damping of the inverse against a stretched knee: 0.02 takes 1 to 4 % of the force.");
     }
   };
   void reset(const Params& params) noexcept;
-  // frames: of the joints. base: what the IMU feels, base axes; base_up: the vertical there. Forces in N, upwards on
-  // the foot; what friction and masses leave over has either sign.
+  // frames: of the joints. hangs: a leg does for certain, and its friction is learnt. base: what the IMU feels, base
+  // axes; base_up: the vertical there. Forces in N, upwards on the foot; what friction and masses leave over has either
+  // sign.
   [[nodiscard]] std::array<double, kFootCount> update(const RobotModel& robot, const BodyFrames& frames,
                                                       const JointFeedback& joints, const ImuSample& base,
-                                                      const Vec3& base_up) noexcept;
+                                                      const Vec3& base_up,
+                                                      const std::array<bool, kFootCount>& hangs) noexcept;
+  [[nodiscard]] const LegVector& friction_nm(Foot leg) const noexcept { return legs_[index_of(leg)].friction_nm; }
 
  private:
   // Low-passed, of one leg.
   struct Leg {
     LegVector drive_nm = LegVector::Zero();
     LegVector dq_radps = LegVector::Zero();
+    LegVector friction_nm = LegVector::Zero();   // Coulomb's, not low-passed
     std::array<Vec3, kJointsPerLeg> link_mps{};  // relative to the base's origin, base axes
   };
 

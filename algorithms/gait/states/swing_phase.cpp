@@ -43,15 +43,16 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   body.release_landed_foot();
 }
 
-void SwingPhase::feel_force(const JointFeedback& feedback, const SwingParams& params) noexcept {
-  if (std::exchange(felt_stamp_ns_, feedback.stamp_ns) == feedback.stamp_ns) return;
-  touch_.take(params.touch, feedback.foot_force_n[index_of(goal_.foot)]);
+void SwingPhase::feel_force(const GaitInput& in, const SwingParams& params) noexcept {
+  if (std::exchange(felt_stamp_ns_, in.feedback.stamp_ns) == in.feedback.stamp_ns) return;
+  const std::size_t foot = index_of(goal_.foot);
+  touch_.take(params.touch, in.feedback.foot_force_n[foot], in.state.foot_force_sigma_n[foot]);
   if (touch_.hangs()) unloaded_ = true;
 }
 
 SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& params,
                                      const Transform& odom_T_sole) noexcept {
-  feel_force(in.feedback, params);
+  feel_force(in, params);
   const bool descending = 2.0 * timing_.tick() > path_.duration_ticks();
   // What does not go down any more stands on something, whatever its force sensor says.
   const bool judged = in.usable && !in.leg_impaired;  // a mute leg stays above its path, too
@@ -132,6 +133,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   const Vec2 error_m = unjudged_ticks_ > 0 && !in.lost ? Vec2::Zero() : in.odom_dcm_error_m;
   timing_.advance(params.timing,
                   {.falling_outward_m = side_sign(goal_.foot) * error_m.dot(stance.R.col(1).head<2>()),
+                   .falling_ahead_m = error_m.dot(stance.R.col(0).head<2>()),
                    .turn_until_tick = until,
                    .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
@@ -191,7 +193,7 @@ void SwingPhase::land_beside(GaitShared& gait, const SolePose& target) noexcept 
 // The only way that is known to be free is the one it came: the swing backwards.
 Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexcept {
   const SwingParams& params = gait.params.swing;
-  feel_force(in.feedback, params);
+  feel_force(in, params);
   const Transform odom_T_sole = sole();
   const double above_m = odom_T_sole.p_m.z() - path_.start_height_m();
   const bool felt = touch_.touches(params.touch, false), all_the_way = timing_.tick() < 0.0;

@@ -25,7 +25,7 @@ class SwingPhase {
     bool ground = false;   // the foot stands on something
   };
   // Each sample once: of a bus that falls silent the last one is read on and on.
-  void feel_force(const JointFeedback& feedback, const SwingParams& params) noexcept;
+  void feel_force(const GaitInput& in, const SwingParams& params) noexcept;
   [[nodiscard]] Contact feel(const GaitInput& in, const SwingParams& params, const Transform& odom_T_sole) noexcept;
   [[nodiscard]] Transition abort_swing(const GaitInput& in, GaitShared& gait) noexcept;
   [[nodiscard]] Transition touch_down(const GaitInput& in, GaitShared& gait, bool felt, double early_m) noexcept;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // How fast a swing runs along its path, and how far beside it: as planned, unless the body topples towards the free
-// foot (one sole cannot hold that; the free foot has to be there in time, or back), the ground is late (the weight is
-// on its way) or is not there (back to where the foot stood), or its path is a straight one and asks the drives for
-// more than they have.
+// foot (one sole cannot hold that; the free foot has to be there in time, or back) or ahead, the ground is late (the
+// weight is on its way) or is not there (back to where the foot stood), or its path is a straight one and asks the
+// drives for more than they have.
 #pragma once
 
 #include <algorithm>
@@ -16,6 +16,7 @@ class SwingTiming {
  public:
   struct Params {
     double falling_outward_m = 0.02;
+    double falling_ahead_m = 0.05;
     double speed_up = 1.6;
     // or back, earlier in the swing than Seen says;
     double widen_m = 0.06;
@@ -29,8 +30,10 @@ class SwingTiming {
     static void visit(auto& p, auto& field) {
       field("falling_outward_m", p.falling_outward_m, 0.001, 0.5,
             "The body falls outward when the divergent component's error towards the free foot is larger.");
+      field("falling_ahead_m", p.falling_ahead_m, 0.001, 0.5,
+            "The body falls ahead when that error forwards is larger: its foot hurries on.");
       field("speed_up", p.speed_up, 1.0, 5.0,
-            "The foot of a body that falls outward goes this many times as fast where its drives can.");
+            "The foot of a body that falls goes this many times as fast where its drives can.");
       field("widen_m", p.widen_m, 0.0, 0.3, "The foot of a body that falls outward lands this much farther out.");
       field("widen_mps", p.widen_mps, 0.0, 2.0, "The foot goes farther out at this speed.");
       field("late_ticks", p.late_ticks, 0, 500,
@@ -47,6 +50,7 @@ class SwingTiming {
   // What decides on a tick.
   struct Seen {
     double falling_outward_m = 0.0;  // of the divergent component's error, towards the free foot
+    double falling_ahead_m = 0.0;    // forwards
     double turn_until_tick = 0.0;    // of the path: earlier a foot may still go back to where it stood
     double drive_share = 0.0;        // of the leg's fastest drive in the last tick, over its limit
     double side_room_m = 1e9;        // beside the target, away from the standing foot
@@ -65,12 +69,13 @@ class SwingTiming {
       falling_outward_ = true;
       turns_back_ = tick_ < seen.turn_until_tick;
     }
+    falling_ahead_ = falling_ahead_ || seen.falling_ahead_m > params.falling_ahead_m;
     if (seen.wanted_back && !straight_) turns_back_ = true;
     // The drives are as fast as the pace is, about. The plan's own pace is proved for them, a straight path's is not.
     const double most = std::abs(pace_) / std::max(seen.drive_share, 1e-3);
     const double usual = tick_ > duration_ticks + params.late_ticks ? params.descend_search
                          : straight_                                ? std::min(1.0, most)
-                         : falling_outward_                         ? math::clamp(most, 1.0, params.speed_up)
+                         : falling_outward_ || falling_ahead_       ? math::clamp(most, 1.0, params.speed_up)
                                                                     : 1.0;
     const double wanted = turns_back_ ? -1.0 : usual;
     pace_ += math::clamp(wanted - pace_, -params.pace_per_tick, params.pace_per_tick);
@@ -105,6 +110,7 @@ class SwingTiming {
   double widened_m_ = 0.0;
   std::int32_t pause_ticks_ = 0;
   bool falling_outward_ = false;
+  bool falling_ahead_ = false;
   bool turns_back_ = false;
   bool straight_ = false;
   bool no_ground_ = false;

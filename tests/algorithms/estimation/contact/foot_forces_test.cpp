@@ -38,8 +38,9 @@ class FootForcesTest : public testing::Test {
       joints.tau_nm.segment<6>(at) = leg_torques_nm(robot_.masses, foot, leg_frames(robot_.legs, foot, q),
                                                     specific_mps2, {pressed_n[index_of(foot)] * up, Vec3::Zero()});
     }
-    return forces_.update(robot_, body_frames(robot_.legs, joints.q_rad), joints, base, up,
-                          {pressed_n[0] > 0.0, pressed_n[1] > 0.0});
+    forces_.update(robot_, body_frames(robot_.legs, joints.q_rad), joints, base, up,
+                   {pressed_n[0] > 0.0, pressed_n[1] > 0.0});
+    return forces_.up_n();
   }
   std::array<double, kFootCount> ticks(int count, const std::array<double, kFootCount>& pressed_n,
                                        const std::array<double, kFootCount>& offset_n) {
@@ -112,6 +113,20 @@ TEST_F(FootForcesTest, NoisySensor_TheForceIsLessNoisy) {
 TEST_F(FootForcesTest, AFewNewtons_AreNoForceWhereOnlyTorquesTellThem) {
   EXPECT_EQ(ticks(100, {15.0, 525.0}, {kNaN, kNaN})[0], 0.0);
   EXPECT_NEAR(ticks(100, {40.0, 500.0}, {kNaN, kNaN})[0], 40.0, 3.0);
+}
+
+TEST_F(FootForcesTest, FootInTheAir_TellsHowWellTorquesDo) {
+  (void)tick({270.0, 270.0}, {kNaN, kNaN});
+  const double first_n = forces_.sigma_n()[0];
+  (void)ticks(500, {0.0, 540.0}, {kNaN, kNaN});
+  EXPECT_LT(forces_.sigma_n()[0], 0.5 * first_n) << "these torques are exact";
+  EXPECT_EQ(forces_.sigma_n()[1], first_n) << "of a foot that stands nothing is learnt";
+  const double torques_n = forces_.sigma_n()[0];
+  (void)ticks(500, {0.0, 540.0}, {0.0, 0.0});
+  EXPECT_LT(forces_.sigma_n()[0], 0.7 * torques_n) << "a sensor knows better";
+  tells_torques_ = false;
+  (void)tick({0.0, 540.0}, {kNaN, kNaN});
+  EXPECT_TRUE(std::isnan(forces_.sigma_n()[0]));
 }
 
 }  // namespace

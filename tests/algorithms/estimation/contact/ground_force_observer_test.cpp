@@ -83,17 +83,18 @@ Sample sample(const RobotModel& robot, double t_s, const std::array<double, kFoo
   return s;
 }
 
-// Greatest error of both feet after the first quarter of a second.
+// Greatest error of both feet after so many ticks. hangs: the observer is told so.
 double worst_error_n(const std::array<double, kFootCount>& up_n, const GroundForceObserver::Params& params,
-                     double friction_nm) {
+                     double friction_nm, bool hangs = false, int from = 125) {
   const RobotModel robot;
   GroundForceObserver observer;
   observer.reset(params);
   double worst_n = 0.0;
   for (int i = 0; i < 1000; ++i) {
     const Sample s = sample(robot, i * kDt_s, up_n, friction_nm);
-    const auto force_n = observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up);
-    if (i < 125) continue;
+    const auto force_n =
+        observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up, {hangs, hangs});
+    if (i < from) continue;
     for (std::size_t f = 0; f < kFootCount; ++f) worst_n = std::max(worst_n, std::abs(force_n[f] - up_n[f]));
   }
   return worst_n;
@@ -113,7 +114,7 @@ TEST(GroundForceObserver, LegsThatSwingOnABaseThatSways_PressOnNothing) {
     for (int i = 0; i < 1000; ++i) {
       const Sample s = sample(RobotModel{}, i * kDt_s, {0.0, 0.0}, 0.0);
       most_n = std::max(most_n, std::abs(observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints,
-                                                         s.base, s.base_up)[0]));
+                                                         s.base, s.base_up, {})[0]));
     }
     return most_n;
   }();
@@ -132,6 +133,12 @@ TEST(GroundForceObserver, FrictionOfAsMuchAsToldAndTwiceThat_FeignsLittle) {
   EXPECT_LT(worst_error_n({0.0, 0.0}, params, 2.0), 28.0);
 }
 
+TEST(GroundForceObserver, LegsHang_FrictionIsLearnt) {
+  GroundForceObserver::Params params;
+  const double unlearnt_n = worst_error_n({0.0, 0.0}, params, 3.0, false, 750);
+  EXPECT_LT(worst_error_n({0.0, 0.0}, params, 3.0, true, 750), 0.5 * unlearnt_n);
+}
+
 TEST(GroundForceObserver, StandingStill_FirstSampleTellsTheForce) {
   const RobotModel robot;
   GroundForceObserver observer;
@@ -147,7 +154,7 @@ TEST(GroundForceObserver, StandingStill_FirstSampleTellsTheForce) {
     s.joints.tau_nm.segment<6>(static_cast<Eigen::Index>(joint_index(foot, 0))) =
         leg_torques_nm(robot.masses, foot, leg_frames(robot.legs, foot, q), gravity_mps2, ground);
   }
-  const auto force_n = observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up);
+  const auto force_n = observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up, {});
   EXPECT_NEAR(force_n[0], 270.0, 6.0);
   EXPECT_NEAR(force_n[1], 0.0, 3.0);
 }

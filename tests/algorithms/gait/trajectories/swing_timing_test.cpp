@@ -47,6 +47,20 @@ TEST(SwingTiming, TopplesTowardsTheFreeFoot_HurriesAndLandsWider) {
   EXPECT_EQ(pace.widened_m(), kParams.widen_m);
 }
 
+TEST(SwingTiming, FallsAhead_HurriesOnItsPath) {
+  SwingTiming pace;
+  advance(pace, 100, {.turn_until_tick = kTurn_tick});
+  advance(pace, 1, {.falling_ahead_m = kParams.falling_ahead_m + 0.001, .turn_until_tick = kTurn_tick});
+  EXPECT_FALSE(pace.goes_back()) << "where it stood is behind";
+  EXPECT_LT(ticks_to_the_end(pace, {}), 1.1 * (kSwing_ticks - 100) / kParams.speed_up);
+  advance(pace, 100, {});
+  EXPECT_EQ(pace.widened_m(), 0.0);
+  EXPECT_FALSE(pace.speeds_up()) << "the path stays: straight it would meet the nosing";
+  SwingTiming behind;
+  advance(behind, kSwing_ticks, {.falling_ahead_m = -1.0});
+  EXPECT_EQ(behind.tick(), kSwing_ticks);
+}
+
 TEST(SwingTiming, Toppling_LandsNoWiderThanTheTread) {
   for (const double room_m : {0.02, 0.0, -0.01}) {
     SwingTiming pace;
