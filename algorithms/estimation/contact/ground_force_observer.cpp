@@ -59,7 +59,8 @@ std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& rob
     leg.dq_radps += share * (dq_radps - leg.dq_radps);
     LegVector left_nm = leg.drive_nm - leg_torques_nm(robot.masses, foot, frames[f], specific_mps2, {});
     for (Eigen::Index j = 0; j < left_nm.size(); ++j) {
-      const double way = math::clamp(leg.dq_radps[j] / params_.creep_radps, -1.0, 1.0);
+      double& way = leg.way[j];
+      way += share * (math::clamp(dq_radps[j] / params_.creep_radps, -1.0, 1.0) - way);
       double& friction_nm = leg.friction_nm[j];
       left_nm[j] -= robot.drives.armature_kgm2 * rate_ps * (dq_radps[j] - leg.dq_radps[j]) +
                     (hangs[f] ? friction_nm : params_.friction_nm) * way;

@@ -50,6 +50,7 @@ class GroundForceObserver {
   struct Leg {
     LegVector drive_nm = LegVector::Zero();
     LegVector dq_radps = LegVector::Zero();
+    LegVector way = LegVector::Zero();           // in which a joint turns, -1 to 1
     LegVector friction_nm = LegVector::Zero();   // Coulomb's, not low-passed
     std::array<Vec3, kJointsPerLeg> link_mps{};  // relative to the base's origin, base axes
   };
