@@ -39,7 +39,7 @@ std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& rob
   const bool first = stamp_ns_ < 0;
   const double dt_s = first ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
   const double share = first ? 1.0 : dt_s / (params_.smoothing_s + dt_s), rate_ps = 1.0 / params_.smoothing_s;
-  const double learning = std::min(dt_s / params_.friction_s, 1.0);
+  const double learning = std::min(dt_s, params_.smoothing_s) / params_.friction_s;  // after a gap, too
   stamp_ns_ = joints.stamp_ns;
   felt_mps2_ += share * (base.accel_mps2 - felt_mps2_);
   const PerLink p_m = base_p_links_m(robot.masses, frames);
