@@ -137,6 +137,18 @@ TEST(GroundForceObserver, LegsHang_FrictionIsLearnt) {
   GroundForceObserver::Params params;
   const double unlearnt_n = worst_error_n({0.0, 0.0}, params, 3.0, false, 750);
   EXPECT_LT(worst_error_n({0.0, 0.0}, params, 3.0, true, 750), 0.5 * unlearnt_n);
+
+  const RobotModel robot;
+  GroundForceObserver observer;
+  observer.reset(params);
+  for (int i = 0; i < 1000; ++i) {  // the left leg hangs, the right one is not known to
+    const Sample s = sample(robot, i * kDt_s, {0.0, 0.0}, 3.0);
+    (void)observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up, {true, false});
+  }
+  for (Eigen::Index j = 0; j < observer.friction_nm(Foot::kLeft).size(); ++j) {
+    EXPECT_NEAR(observer.friction_nm(Foot::kLeft)[j], 3.0, 0.5) << j;
+    EXPECT_EQ(observer.friction_nm(Foot::kRight)[j], params.friction_nm) << j;
+  }
 }
 
 TEST(GroundForceObserver, StandingStill_FirstSampleTellsTheForce) {
