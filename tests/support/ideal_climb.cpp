@@ -12,6 +12,7 @@ namespace polygmap::test {
 namespace {
 
 constexpr int kFrame_ticks = 16;
+constexpr double kForceSigma_n = 6.0;
 
 double lowest_corner_m(const Transform& sole) {
   double z = 1e9;
@@ -73,6 +74,7 @@ void IdealClimb::sense() {
     force_history_[0][f] = !feet_[f].anchored ? 0.0 : (f == support_ ? kWeight_n : kPressed_n);
   }
   feedback_.foot_force_n = force_history_.back();
+  state_.foot_force_sigma_n.fill(kForceSigma_n);
 }
 
 FootholdSet IdealClimb::search() const {

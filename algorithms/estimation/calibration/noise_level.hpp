@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One sigma of a white noise, measured as it goes from differences in which the signal itself cancels.
+// One sigma of an error, measured as it goes from what has no signal in it: differences in which it cancels, or samples
+// that should be none.
 #pragma once
 
 #include <algorithm>

@@ -21,6 +21,7 @@ class FootForces {
     double zero_in_air_sigma_n = 3.0;
     double zero_s = 0.2;
     double zero_walk_nprs = 1.0;
+    double lifted_s = 0.08;
     double light_n = 20.0;
     double light_sigmas = 2.0;
 
@@ -35,6 +36,8 @@ class FootForces {
             "The zero is known no better than this from a swing: the foot feels its own motion.");
       field("zero_s", p.zero_s, 0.002, 60.0, "The zero is averaged over so much time at least.");
       field("zero_walk_nprs", p.zero_walk_nprs, 0.0, 50.0, "Random walk of the zero.");
+      field("lifted_s", p.lifted_s, 0.0, 1.0,
+            "From a foot in the air nothing is learnt earlier: at lift-off it still carries.");
       field("light_n", p.light_n, 0.0, 200.0, "A force below this and below `light_sigmas` is none.");
       field("light_sigmas", p.light_sigmas, 0.0, 10.0, "So many of its sigmas a force may be feigned.");
     }
@@ -57,17 +60,23 @@ class FootForces {
     double last_n = 0.0, before_n = 0.0;
     int samples = 0;
   };
+  struct InAir {
+    bool stood = false;  // before: until then nobody knows whether it hangs
+    double since_s = 0.0;
+  };
   struct Weighed {
     double force_n = 0.0, weight_pn2 = 0.0;  // 1 / variance; 0: not told
   };
   // observed: what torques tell. hangs: the foot does for certain.
   [[nodiscard]] Weighed sense(Sensor& sensor, double read_n, const Weighed& observed, bool hangs, double dt_s) noexcept;
+  [[nodiscard]] bool hangs(std::size_t foot, bool stands, double dt_s) noexcept;
   void learn_zero(Sensor& sensor, double off_n, double least_sigma_n, double dt_s) noexcept;
 
   Params params_;
   GroundForceObserver observer_;
   std::array<NoiseLevel, kFootCount> observer_noise_n_;
   std::array<Sensor, kFootCount> sensors_;
+  std::array<InAir, kFootCount> in_air_;
   std::array<double, kFootCount> up_n_{}, sigma_n_{};
   std::int64_t stamp_ns_ = -1;
 };

@@ -39,7 +39,7 @@ std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& rob
   const bool first = stamp_ns_ < 0;
   const double dt_s = first ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
   const double share = first ? 1.0 : dt_s / (params_.smoothing_s + dt_s), rate_ps = 1.0 / params_.smoothing_s;
-  const double learning = std::min(dt_s / params_.friction_s, 1.0);
+  const double learning = std::min(dt_s, params_.smoothing_s) / params_.friction_s;  // after a gap, too
   stamp_ns_ = joints.stamp_ns;
   felt_mps2_ += share * (base.accel_mps2 - felt_mps2_);
   const PerLink p_m = base_p_links_m(robot.masses, frames);
@@ -62,8 +62,7 @@ std::array<double, kFootCount> GroundForceObserver::update(const RobotModel& rob
       double& way = leg.way[j];
       way += share * (math::clamp(dq_radps[j] / params_.creep_radps, -1.0, 1.0) - way);
       double& friction_nm = leg.friction_nm[j];
-      left_nm[j] -= robot.drives.armature_kgm2 * rate_ps * (dq_radps[j] - leg.dq_radps[j]) +
-                    (hangs[f] ? friction_nm : params_.friction_nm) * way;
+      left_nm[j] -= robot.drives.armature_kgm2 * rate_ps * (dq_radps[j] - leg.dq_radps[j]) + friction_nm * way;
       if (!hangs[f]) continue;  // on the ground a joint that hardly turns may be held either way
       // Nothing else is left in the air but what masses are off, which goes both ways of a swing alike.
       friction_nm = math::clamp(friction_nm + learning * way * left_nm[j], 0.0, params_.most_friction_nm);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algorithms/gait/states/standing.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace polygmap {
@@ -24,9 +26,11 @@ Transition Standing::tick(const GaitInput& in, GaitShared& gait) noexcept {
   if (in.stop_requested != StopReason::kNone) return Transition::stop(in.stop_requested);
   if (in.lost) return Transition::stop(StopReason::kStateStale);
   if (!in.state.initialised || !in.usable) return {};
-  // A body that sways sideways is best off between the feet.
-  const Vec2 left = gait.plan.plan_T_base().R.col(1).head<2>();
-  const bool sways = !(std::abs(left.dot(in.odom_dcm_error_m)) <= gait.params.steady_m);
+  // A body that sways sideways or back is best off between the feet: no step to come would catch it.
+  const Mat3& R = gait.plan.plan_T_base().R;
+  const double ahead_m = R.col(0).head<2>().dot(in.odom_dcm_error_m);
+  const double left_m = R.col(1).head<2>().dot(in.odom_dcm_error_m);
+  const bool sways = !(std::max(-ahead_m, std::abs(left_m)) <= gait.params.steady_m);
   if ((gait.memory.retried || sways) && rest_.tick() < params.settle_ticks) return {};
   // What it learns meanwhile may be that it does not stand straight yet: all of the time first, and once.
   if (toe_calibration_.active && rest_.tick() < params.toe_calibration.ticks) return {};

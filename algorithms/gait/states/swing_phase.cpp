@@ -70,7 +70,7 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const SwingParams& params = gait.params.swing;
   if (timing_.goes_back()) return abort_swing(in, gait);
   // An impaired leg has drives that may not follow another path.
-  const bool lands_soon = in.usable && !in.leg_impaired && timing_.speeds_up();
+  const bool lands_soon = in.usable && !in.leg_impaired && timing_.falls_outward();
   if (lands_soon && goal_.kind == StepKind::kPassing) land_soon(gait);
   const Transform odom_T_sole = sole();
   const double lowered_m = path_.lowered_m(timing_.tick());
@@ -133,7 +133,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   const Vec2 error_m = unjudged_ticks_ > 0 && !in.lost ? Vec2::Zero() : in.odom_dcm_error_m;
   timing_.advance(params.timing,
                   {.falling_outward_m = side_sign(goal_.foot) * error_m.dot(stance.R.col(1).head<2>()),
-                   .falling_ahead_m = error_m.dot(stance.R.col(0).head<2>()),
+                   .falling_ahead_m = in.leg_impaired ? 0.0 : error_m.dot(stance.R.col(0).head<2>()),
                    .turn_until_tick = until,
                    .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,

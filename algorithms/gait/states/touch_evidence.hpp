@@ -36,9 +36,12 @@ class TouchEvidence {
       field.ordered("expected_odds", "early_odds");
     }
   };
-  // One sample and its sigma; a force that is not a number is none, as of a foot that hangs.
+  // One sample and its sigma, which may be 0 or no number: not known. A force that is not a number is none, as of a
+  // foot that hangs.
   void take(const Params& params, double force_n, double sigma_n) noexcept {
-    const double even_n = math::clamp(params.even_sigmas * sigma_n, params.least_even_n, params.most_even_n);
+    const double even_n = sigma_n > 0.0
+                              ? math::clamp(params.even_sigmas * sigma_n, params.least_even_n, params.most_even_n)
+                              : params.most_even_n;
     const double sample = std::isfinite(force_n) ? params.odds_pn * (force_n - even_n) : -params.most_odds;
     odds_ = math::clamp(odds_ + math::clamp(sample, -params.most_odds, params.most_odds), 0.0, params.early_odds);
     presses_ = sample > 0.0;

@@ -16,11 +16,9 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
   plan.goal = goal;
   plan.shape = on_floor ? params.floor_swing : passing ? params.passing_swing : params.stair_swing;
   plan.shift_ticks = on_floor ? params.durations.floor_shift_ticks : params.durations.stair_shift_ticks;
-  const StepDurations& durations = params.durations;
-  const std::int32_t usual_ticks = on_floor                           ? durations.floor_swing_ticks
-                                   : passing                          ? durations.passing_swing_ticks
-                                   : goal.kind == StepKind::kTrailing ? durations.trailing_swing_ticks
-                                                                      : durations.stair_swing_ticks;
+  const std::int32_t usual_ticks = on_floor  ? params.durations.floor_swing_ticks
+                                   : passing ? params.durations.passing_swing_ticks
+                                             : params.durations.stair_swing_ticks;
   plan.swing_ticks = static_cast<std::int32_t>(tried.longer * usual_ticks);
   const double rise_share = on_floor ? 1.0 : passing ? params.passing_rise_share : params.rise_share;
   plan.rise_ticks = static_cast<std::int32_t>(rise_share * plan.swing_ticks);

@@ -15,7 +15,6 @@ namespace polygmap {
 struct StepDurations {
   std::int32_t stair_shift_ticks = 165;
   std::int32_t stair_swing_ticks = 450;
-  std::int32_t trailing_swing_ticks = 462;
   std::int32_t passing_swing_ticks = 460;
   std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
@@ -23,8 +22,6 @@ struct StepDurations {
   static void visit(auto& p, auto& field) {
     field("stair_shift_ticks", p.stair_shift_ticks, 66, 2000, "Double support before a step on the stairs: 0.33 s.");
     field("stair_swing_ticks", p.stair_swing_ticks, 50, 2000, "A swing onto a tread: 0.90 s.");
-    field("trailing_swing_ticks", p.trailing_swing_ticks, 50, 2000,
-          "A swing beside the other foot, which folds the knee most: 0.92 s.");
     field("passing_swing_ticks", p.passing_swing_ticks, 50, 2000, "A swing past a tread: 0.92 s.");
     field("floor_shift_ticks", p.floor_shift_ticks, 66, 2000, "Double support before a step on the floor.");
     field("floor_swing_ticks", p.floor_swing_ticks, 50, 2000, "A swing on the floor.");

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // How fast a swing runs along its path, and how far beside it: as planned, unless the body topples towards the free
 // foot (one sole cannot hold that; the free foot has to be there in time, or back) or ahead, the ground is late (the
-// weight is on its way) or is not there (back to where the foot stood), or its path is a straight one and asks the
-// drives for more than they have.
+// weight is on its way) or is not there (back to where the foot stood). The straight path of a body that topples is as
+// fast as its drives are.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace polygmap {
 class SwingTiming {
  public:
   struct Params {
-    double falling_outward_m = 0.02;
+    double falling_outward_m = 0.025;
     double falling_ahead_m = 0.05;
     double speed_up = 1.6;
     // or back, earlier in the swing than Seen says;
@@ -65,17 +65,19 @@ class SwingTiming {
       tick_ += pace_;
       return;
     }
-    if (!falling_outward_ && seen.falling_outward_m > params.falling_outward_m) {
+    const bool falls_outward = seen.falling_outward_m > params.falling_outward_m;
+    if (!falling_outward_ && falls_outward) {
       falling_outward_ = true;
       turns_back_ = tick_ < seen.turn_until_tick;
     }
     falling_ahead_ = falling_ahead_ || seen.falling_ahead_m > params.falling_ahead_m;
     if (seen.wanted_back && !straight_) turns_back_ = true;
-    // The drives are as fast as the pace is, about. The plan's own pace is proved for them, a straight path's is not.
-    const double most = std::abs(pace_) / std::max(seen.drive_share, 1e-3);
+    // The drives are as fast as the pace is, about. The plan's own pace is proved for them, a straight path's is not:
+    // it is hurried for as long as the body falls on.
+    const double most = std::min(std::abs(pace_) / std::max(seen.drive_share, 1e-3), params.speed_up);
     const double usual = tick_ > duration_ticks + params.late_ticks ? params.descend_search
-                         : straight_                                ? std::min(1.0, most)
-                         : falling_outward_ || falling_ahead_       ? math::clamp(most, 1.0, params.speed_up)
+                         : straight_                                ? (falls_outward ? most : std::min(most, 1.0))
+                         : falling_outward_ || falling_ahead_       ? std::max(most, 1.0)
                                                                     : 1.0;
     const double wanted = turns_back_ ? -1.0 : usual;
     pace_ += math::clamp(wanted - pace_, -params.pace_per_tick, params.pace_per_tick);
@@ -84,7 +86,7 @@ class SwingTiming {
       widened_m_ = std::min({widened_m_ + params.widen_mps * kTick_s, params.widen_m, std::max(seen.side_room_m, 0.0)});
     }
   }
-  // From here on another path, which no plan proved for the drives: it is not hurried.
+  // From here on another path, which no plan proved for the drives, of a body that falls outward.
   void begin_straight() noexcept {
     tick_ = 0.0;
     pace_ = 1.0;
@@ -100,7 +102,7 @@ class SwingTiming {
   [[nodiscard]] double last_tick() const noexcept { return tick_ - pace_; }  // before that
   [[nodiscard]] double pace() const noexcept { return pace_; }               // ticks of the path in the last tick
   [[nodiscard]] bool goes_back() const noexcept { return turns_back_ || no_ground_; }
-  [[nodiscard]] bool speeds_up() const noexcept { return falling_outward_ && !turns_back_ && !straight_; }
+  [[nodiscard]] bool falls_outward() const noexcept { return falling_outward_ && !turns_back_ && !straight_; }
   [[nodiscard]] bool no_ground() const noexcept { return no_ground_; }
   [[nodiscard]] double widened_m() const noexcept { return widened_m_; }  // away from the standing foot
 

@@ -66,11 +66,12 @@ int first_shift(const Vec2& off_m, int until_tick) {
   return hold.ticks;
 }
 
-TEST(GaitHold, BodySwaysSideways_RestsBetweenTheFeetFirst_NoLongerThanThatTakes) {
+TEST(GaitHold, BodySwaysSidewaysOrBack_RestsBetweenTheFeetFirst_NoLongerThanThatTakes) {
   const int settle_ticks = Gait::Params{}.standing.settle_ticks;
   EXPECT_LT(first_shift({0.0, 0.03}, 0), 25);
   EXPECT_LT(first_shift({0.0, 0.012}, 500), 25);  // steady enough
-  EXPECT_LT(first_shift({0.03, 0.0}, 500), 25);   // ahead the soles are long
+  EXPECT_LT(first_shift({0.03, 0.0}, 500), 25);   // the next step goes there
+  EXPECT_NEAR(first_shift({-0.03, 0.0}, 120), 120, 5);
   EXPECT_NEAR(first_shift({0.0, 0.03}, 120), 120, 5);
   EXPECT_NEAR(first_shift({0.0, -0.03}, 120), 120, 5);
   EXPECT_NEAR(first_shift({0.0, 0.03}, 500), settle_ticks, 5);

@@ -315,8 +315,8 @@ TEST(GaitRequestStop, AtEveryMomentOfASwing_BothFeetStandWithinASecond) {
     Gait::Params params;
     params.planner.pattern = pattern;
     StepDurations& durations = params.step.durations;
-    for (std::int32_t* ticks : {&durations.stair_swing_ticks, &durations.trailing_swing_ticks,
-                                &durations.passing_swing_ticks, &durations.floor_swing_ticks}) {
+    for (std::int32_t* ticks :
+         {&durations.stair_swing_ticks, &durations.passing_swing_ticks, &durations.floor_swing_ticks}) {
       *ticks = static_cast<std::int32_t>(kLongest * *ticks);
     }
     IdealClimb climb({}, params);

@@ -39,7 +39,7 @@ class FootForcesTest : public testing::Test {
                                                     specific_mps2, {pressed_n[index_of(foot)] * up, Vec3::Zero()});
     }
     forces_.update(robot_, body_frames(robot_.legs, joints.q_rad), joints, base, up,
-                   {pressed_n[0] > 0.0, pressed_n[1] > 0.0});
+                   {says_stands_ && pressed_n[0] > 0.0, says_stands_ && pressed_n[1] > 0.0});
     return forces_.up_n();
   }
   std::array<double, kFootCount> ticks(int count, const std::array<double, kFootCount>& pressed_n,
@@ -52,7 +52,7 @@ class FootForcesTest : public testing::Test {
   RobotModel robot_ = nominal_robot();
   FootForces forces_;
   std::int64_t stamp_ns_ = 0;
-  bool tells_torques_ = true;
+  bool tells_torques_ = true, says_stands_ = true;
   std::uint16_t silent_cycles_ = 0;
 };
 
@@ -114,6 +114,20 @@ TEST_F(FootForcesTest, NoisySensor_TheForceIsLessNoisy) {
 TEST_F(FootForcesTest, AFewNewtons_AreNoForceWhereOnlyTorquesTellThem) {
   EXPECT_EQ(ticks(100, {15.0, 525.0}, {kNaN, kNaN})[0], 0.0);
   EXPECT_NEAR(ticks(100, {40.0, 500.0}, {kNaN, kNaN})[0], 40.0, 3.0);
+}
+
+// Nobody said yet that it stands, or the plan says early that it does not.
+TEST_F(FootForcesTest, LoadedFootThatIsSaidToHang_TeachesNothing) {
+  says_stands_ = false;
+  (void)tick({270.0, 270.0}, {kNaN, kNaN});
+  const double first_n = forces_.sigma_n()[0];
+  (void)ticks(500, {270.0, 270.0}, {kNaN, kNaN});
+  EXPECT_EQ(forces_.sigma_n()[0], first_n) << "it never stood";
+  says_stands_ = true;
+  (void)ticks(10, {270.0, 270.0}, {kNaN, kNaN});
+  says_stands_ = false;
+  (void)ticks(35, {270.0, 270.0}, {kNaN, kNaN});
+  EXPECT_EQ(forces_.sigma_n()[0], first_n) << "it lifts";
 }
 
 TEST_F(FootForcesTest, FootInTheAir_TellsHowWellTorquesDo) {

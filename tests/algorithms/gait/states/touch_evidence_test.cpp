@@ -40,6 +40,10 @@ TEST(TouchEvidence, ForceThatIsKnownBetter_IsFeltSooner) {
   EXPECT_EQ(samples_until_touch(25.0, false, 2.0), 1) << "a good sensor";
   EXPECT_EQ(samples_until_touch(25.0, false, 10.0), 1000) << "as much may be feigned";
   EXPECT_EQ(samples_until_touch(60.0, false, 100.0), 1) << "a foot that carries its leg is felt by the worst";
+  for (const double unknown : {0.0, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_EQ(samples_until_touch(25.0, false, unknown), 1000);
+    EXPECT_EQ(samples_until_touch(60.0, false, unknown), 1);
+  }
 }
 
 TEST(TouchEvidence, ScrapesForAMoment_TouchesNotAndIsForgotten) {

@@ -55,7 +55,7 @@ TEST(SwingTiming, FallsAhead_HurriesOnItsPath) {
   EXPECT_LT(ticks_to_the_end(pace, {}), 1.1 * (kSwing_ticks - 100) / kParams.speed_up);
   advance(pace, 100, {});
   EXPECT_EQ(pace.widened_m(), 0.0);
-  EXPECT_FALSE(pace.speeds_up()) << "the path stays: straight it would meet the nosing";
+  EXPECT_FALSE(pace.falls_outward()) << "the path stays: straight it would meet the nosing";
   SwingTiming behind;
   advance(behind, kSwing_ticks, {.falling_ahead_m = -1.0});
   EXPECT_EQ(behind.tick(), kSwing_ticks);
@@ -84,12 +84,17 @@ TEST(SwingTiming, Hurrying_TakesNoMoreThanTheDrivesHave) {
   }
 }
 
-TEST(SwingTiming, StraightPath_NoFasterThanTheDrivesAre) {
-  for (const double at_pace_one : {0.7, 1.0, 1.6, 3.0}) {
-    SwingTiming pace;
-    pace.begin_straight();
-    for (int i = 0; i < 50; ++i) pace.advance(kParams, {.drive_share = at_pace_one * pace.pace()}, kSwing_ticks);
-    EXPECT_NEAR(pace.pace(), std::min(1.0, 1.0 / at_pace_one), 1e-9) << at_pace_one;
+TEST(SwingTiming, StraightPath_AsFastAsTheDrivesAre) {
+  for (const double at_pace_one : {0.4, 0.7, 1.0, 1.6, 3.0}) {
+    for (const double outward_m : {0.0, kToppling_m}) {
+      SwingTiming pace;
+      pace.begin_straight();
+      for (int i = 0; i < 50; ++i) {
+        pace.advance(kParams, {.falling_outward_m = outward_m, .drive_share = at_pace_one * pace.pace()}, kSwing_ticks);
+      }
+      const double most = outward_m > 0.0 ? kParams.speed_up : 1.0;  // as planned once it falls no more
+      EXPECT_NEAR(pace.pace(), std::min(most, 1.0 / at_pace_one), 1e-9) << at_pace_one;
+    }
   }
 }
 
