@@ -199,11 +199,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 9098855955104343857U);
-  EXPECT_EQ(hashes.gait.value(), 6444460569728547102U);
-  EXPECT_EQ(hashes.commands.value(), 14068743653760402642U);
-  EXPECT_EQ(hashes.surfaces.value(), 17874688664635338447U);
-  EXPECT_EQ(hashes.map.value(), 10690358044605733955U);
+  EXPECT_EQ(hashes.estimates.value(), 7929241141556362587U);
+  EXPECT_EQ(hashes.gait.value(), 6011424594978596109U);
+  EXPECT_EQ(hashes.commands.value(), 1071317256027022085U);
+  EXPECT_EQ(hashes.surfaces.value(), 10216721067913147700U);
+  EXPECT_EQ(hashes.map.value(), 13886859744410203120U);
 }
 
 }  // namespace
