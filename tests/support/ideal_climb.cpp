@@ -34,7 +34,7 @@ IdealClimb::IdealClimb(const ClimbSetup& setup, const Gait::Params& params, cons
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     feet_[index_of(leg)].true_T_sole = true_T_base_ * base_T_sole({}, leg, leg_joints(q_, leg));
   }
-  odom_T_true_ = {rotation_z(-setup.yaw_rad), Vec3{0.3, -0.2, 0.01}};
+  odom_T_true_ = {rotation_z(setup.odom_yaw_rad - setup.yaw_rad), Vec3{0.3, -0.2, 0.01}};
   // Its forces know no pendulum: drives that tell no torque.
   feedback_.tau_nm.setConstant(std::numeric_limits<double>::quiet_NaN());
   gait_.reset(params, robot);

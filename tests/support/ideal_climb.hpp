@@ -30,6 +30,7 @@ struct ClimbSetup {
   double distance_m = 0.5;  // base to the first riser
   double lateral_m = 0.0;
   double yaw_rad = 0.0;
+  double odom_yaw_rad = 0.0;                             // of the robot at the start, in odometry
   double estimate_tilt_rad = 0.0;                        // constant pitch and roll error of the estimated attitude
   double estimate_noise_m = 0.0;                         // white, of the estimated base
   double world_drift_mps = 0.0;                          // the LIO offset wanders that fast

@@ -27,7 +27,7 @@ struct StateEstimate {
   JointVector q_rad = JointVector::Zero();        // as measured
   std::array<Transform, kFootCount> odom_T_sole;  // leg kinematics on odom_T_base; sole frame: robot_model.hpp
   std::array<double, kFootCount> contact_probability{};
-  std::array<double, kFootCount> foot_force_sigma_n{};  // of the joint feedback's; 0: not known
+  std::array<double, kFootCount> foot_force_sigma_n{};  // of the joint feedback's; 0 or no number: not known
   Vec3 position_sigma_m = Vec3::Zero();                 // of world_p_base
   Vec3 velocity_sigma_mps = Vec3::Zero();
   double yaw_sigma_rad = 0.0;

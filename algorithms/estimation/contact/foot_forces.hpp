@@ -61,7 +61,7 @@ class FootForces {
     int samples = 0;
   };
   struct InAir {
-    bool stood = false;  // before: until then nobody knows whether it hangs
+    bool stood = false;  // since reset; before that nobody knows whether it hangs
     double since_s = 0.0;
   };
   struct Weighed {

@@ -25,7 +25,7 @@ struct LegSample {
   std::int64_t silent_ns = 0;                         // the longest of them for this
   std::array<LegMeasurement, kFootCount> legs;
   std::array<double, kFootCount> foot_force_n{};        // 0 in the air, not a number where none is told
-  std::array<double, kFootCount> foot_force_sigma_n{};  // 0: not known
+  std::array<double, kFootCount> foot_force_sigma_n{};  // 0 or no number: not known
   // Probability of contact, where somebody else has judged it: then forces do not count.
   std::optional<std::array<double, kFootCount>> stated_contact;
 };

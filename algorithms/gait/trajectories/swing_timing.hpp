@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // How fast a swing runs along its path, and how far beside it: as planned, unless the body topples towards the free
 // foot (one sole cannot hold that; the free foot has to be there in time, or back) or ahead, the ground is late (the
-// weight is on its way) or is not there (back to where the foot stood). The straight path of a body that topples is as
-// fast as its drives are.
+// weight is on its way) or is not there (back to where the foot stood). A straight path, on which a foot lands sooner,
+// is hurried while the body falls outward, up to `speed_up`, and slowed to what its drives have.
 #pragma once
 
 #include <algorithm>
@@ -86,7 +86,7 @@ class SwingTiming {
       widened_m_ = std::min({widened_m_ + params.widen_mps * kTick_s, params.widen_m, std::max(seen.side_room_m, 0.0)});
     }
   }
-  // From here on another path, which no plan proved for the drives, of a body that falls outward.
+  // From here on another path, which no plan proved for the drives.
   void begin_straight() noexcept {
     tick_ = 0.0;
     pace_ = 1.0;

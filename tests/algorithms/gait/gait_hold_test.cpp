@@ -59,9 +59,14 @@ TEST(GaitCrouch, BodyOffItsPlan_CrouchesByAsMuch_NotForOneTick) {
   EXPECT_LT(lasting_m, Gait::Params{}.crouch.max_m + 0.001);
 }
 
-// Ticks from the beginning of the hold to the first shift.
+// Ticks from the beginning of the hold to the first shift. off_m: ahead of the body and to its left.
 int first_shift(const Vec2& off_m, int until_tick) {
-  Hold hold{.off_m = off_m, .is_off = [until_tick](int tick) { return tick < until_tick; }};
+  constexpr double kYaw_rad = 0.5;
+  ClimbSetup turned;
+  turned.odom_yaw_rad = kYaw_rad;
+  Hold hold{.off_m = rotation_z(kYaw_rad).topLeftCorner<2, 2>() * off_m,
+            .is_off = [until_tick](int tick) { return tick < until_tick; },
+            .climb = IdealClimb{turned}};
   while (hold.climb.status().phase == GaitPhase::kStandstill && hold.ticks < 1000) hold.tick();
   return hold.ticks;
 }
@@ -71,7 +76,9 @@ TEST(GaitHold, BodySwaysSidewaysOrBack_RestsBetweenTheFeetFirst_NoLongerThanThat
   EXPECT_LT(first_shift({0.0, 0.03}, 0), 25);
   EXPECT_LT(first_shift({0.0, 0.012}, 500), 25);  // steady enough
   EXPECT_LT(first_shift({0.03, 0.0}, 500), 25);   // the next step goes there
+  EXPECT_LT(first_shift({-0.012, 0.0}, 500), 25);
   EXPECT_NEAR(first_shift({-0.03, 0.0}, 120), 120, 5);
+  EXPECT_NEAR(first_shift({-0.03, 0.0}, 500), settle_ticks, 5);
   EXPECT_NEAR(first_shift({0.0, 0.03}, 120), 120, 5);
   EXPECT_NEAR(first_shift({0.0, -0.03}, 120), 120, 5);
   EXPECT_NEAR(first_shift({0.0, 0.03}, 500), settle_ticks, 5);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "algorithms/robot/leg_kinematics.hpp"
@@ -149,6 +150,26 @@ TEST(GroundForceObserver, LegsHang_FrictionIsLearnt) {
     EXPECT_NEAR(observer.friction_nm(Foot::kLeft)[j], 3.0, 0.5) << j;
     EXPECT_EQ(observer.friction_nm(Foot::kRight)[j], params.friction_nm) << j;
   }
+}
+
+// Of the left foot, which the ground presses with 270 N: the worst error in two seconds after the leg has hung or not.
+double error_on_the_ground_n(bool hung_before) {
+  const RobotModel robot;
+  GroundForceObserver observer;
+  observer.reset({});
+  double worst_n = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    const bool hangs = i < 1000;
+    const Sample s = sample(robot, i * kDt_s, {hangs ? 0.0 : 270.0, 0.0}, 3.0);
+    const auto force_n = observer.update(robot, body_frames(robot.legs, s.joints.q_rad), s.joints, s.base, s.base_up,
+                                         {hangs && hung_before, false});
+    if (i > 1050) worst_n = std::max(worst_n, std::abs(force_n[0] - 270.0));
+  }
+  return worst_n;
+}
+
+TEST(GroundForceObserver, FootOnTheGround_FrictionLearntInTheAirCounts) {
+  EXPECT_LT(error_on_the_ground_n(true), 0.6 * error_on_the_ground_n(false));
 }
 
 TEST(GroundForceObserver, StandingStill_FirstSampleTellsTheForce) {

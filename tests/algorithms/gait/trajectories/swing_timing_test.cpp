@@ -88,7 +88,9 @@ TEST(SwingTiming, StraightPath_AsFastAsTheDrivesAre) {
   for (const double at_pace_one : {0.4, 0.7, 1.0, 1.6, 3.0}) {
     for (const double outward_m : {0.0, kToppling_m}) {
       SwingTiming pace;
+      advance(pace, 1, {.falling_outward_m = kToppling_m});
       pace.begin_straight();
+      advance(pace, 50, {.falling_outward_m = kToppling_m});  // as fast as may be, before the drives tell
       for (int i = 0; i < 50; ++i) {
         pace.advance(kParams, {.falling_outward_m = outward_m, .drive_share = at_pace_one * pace.pace()}, kSwing_ticks);
       }
