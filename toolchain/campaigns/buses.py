@@ -41,7 +41,7 @@ def buses(engine, seeds):
     # 0.5 mm is asked. The mean of 20 climbs is known to 0.15 mm: 2026-11-26 it was 0.33, 0.61, 0.49 and 0.55 mm.
     worst = None if None in changes or not changes else max(changes)
     return Page(text, {"1 climbed": headline("climbs with the joints behind CAN buses", climbed(behind)),
-                       "2 foothold": headline("what these buses add to the foothold error, mean of 20 climbs", most(worst, 0.65, "0.5, not met"), " mm", False)})
+                       "2 foothold": headline("what these buses add to the foothold error, mean of 20 climbs", most(worst, 0.65, "0.5 (not met)"), " mm")})
 
 
 TABLES = {"buses": Table("Joints on CAN buses", range(1, 21), buses, 5)}
