@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a image shows the toe of a standing foot, against where the encoders have it. Where a camera sits along the
+// Where an image shows the toe of a standing foot, against where the encoders have it. Where a camera sits along the
 // ground cannot be told from level surfaces, and a foothold is off by as much; the robot's own toe tells, whenever a
 // standing leg is so straight that its knee does not hide it. The foot's shape is its collision box.
 #pragma once
