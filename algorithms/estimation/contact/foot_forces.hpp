@@ -21,7 +21,7 @@ class FootForces {
     double zero_in_air_sigma_n = 3.0;
     double zero_s = 0.2;
     double zero_walk_nprs = 1.0;
-    double lifted_s = 0.08;
+    double lifted_s = 0.16;
     double light_n = 20.0;
     double light_sigmas = 2.0;
 
@@ -37,7 +37,7 @@ class FootForces {
       field("zero_s", p.zero_s, 0.002, 60.0, "The zero is averaged over so much time at least.");
       field("zero_walk_nprs", p.zero_walk_nprs, 0.0, 50.0, "Random walk of the zero.");
       field("lifted_s", p.lifted_s, 0.0, 1.0,
-            "From a foot in the air nothing is learnt earlier: at lift-off it still carries.");
+            "From a foot in the air nothing is learnt earlier: at lift-off it still carries, and may be stuck.");
       field("light_n", p.light_n, 0.0, 200.0, "A force below this and below `light_sigmas` is none.");
       field("light_sigmas", p.light_sigmas, 0.0, 10.0, "So many of its sigmas a force may be feigned.");
     }
@@ -69,6 +69,7 @@ class FootForces {
   };
   // observed: what torques tell. hangs: the foot does for certain.
   [[nodiscard]] Weighed sense(Sensor& sensor, double read_n, const Weighed& observed, bool hangs, double dt_s) noexcept;
+  // For certain.
   [[nodiscard]] bool hangs(std::size_t foot, bool stands, double dt_s) noexcept;
   void learn_zero(Sensor& sensor, double off_n, double least_sigma_n, double dt_s) noexcept;
 

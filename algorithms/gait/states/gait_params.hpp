@@ -119,7 +119,8 @@ struct SwingParams {
           "A foot that goes back feels the ground within this of where it stood.");
     field("max_aborted", p.max_aborted, 0, 1000, "As many swings in a row are aborted, then the gait stops.");
     field("soon_ticks", p.soon_ticks, 1.0, 2000.0,
-          "A passing foot that falls outward goes straight to its target in this time at least.");
+          "The foot of a body that falls outward is to go straight to its target in this time; it hurries while it "
+          "falls.");
     field("soon_ticks_per_m", p.soon_ticks_per_m, 0.0, 10000.0,
           "It takes so much longer for each metre of that way, for the drives.");
     field("soon_below_m", p.soon_below_m, 0.0, 0.5,
@@ -143,6 +144,7 @@ struct LandedFootParams {
   double unloaded_n = 5.0;
   std::int32_t unloaded_ticks = 10;
   double lower_mps = 0.1;
+  double lower_mps2 = 2.0;
 
   static void visit(auto& p, auto& field) {
     field("pressed_n", p.pressed_n, 0.0, 500.0, "A foot that is pressed less is held where it landed.");
@@ -154,6 +156,8 @@ struct LandedFootParams {
           "A foot that landed early and feels less than this hangs in the air.");
     field("unloaded_ticks", p.unloaded_ticks, 0, 500, "After so many ticks of that it is lowered to its target.");
     field("lower_mps", p.lower_mps, 0.0, 1.0, "The speed of that lowering.");
+    field("lower_mps2", p.lower_mps2, 0.1, 100.0,
+          "It begins and ends so gently: the torques feed the leg's acceleration forward.");
   }
 };
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "algorithms/core/math/math.hpp"
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/gait/states/gait_params.hpp"
 
@@ -35,7 +36,7 @@ class LandedFoot {
     // Of a bus that falls silent the last sample is read on and on.
     if (std::exchange(felt_stamp_ns_, feedback.stamp_ns) == feedback.stamp_ns) return;
     unloaded_ticks_ = force_n < params.unloaded_n ? unloaded_ticks_ + 1 : 0;
-    if (unloaded_ticks_ > params.unloaded_ticks) lower(std::min(to_lower_m_, params.lower_mps * kTick_s));
+    lower(params, unloaded_ticks_ > params.unloaded_ticks);
   }
   // The plan goes on in another frame.
   void carry(const Transform& to_T_plan) noexcept { plan_T_sole_ = to_T_plan * plan_T_sole_; }
@@ -47,7 +48,12 @@ class LandedFoot {
   [[nodiscard]] const Transform& plan_T_sole() const noexcept { return plan_T_sole_; }
 
  private:
-  void lower(double by_m) noexcept {
+  void lower(const LandedFootParams& params, bool hangs) noexcept {
+    const double may_stop_mps = math::sqrt(params.lower_mps2 * to_lower_m_);  // with half of it: in whole ticks
+    const double wanted_mps = hangs ? std::min(params.lower_mps, may_stop_mps) : 0.0;
+    const double change_mps = params.lower_mps2 * kTick_s;
+    speed_mps_ = math::clamp(wanted_mps, std::max(speed_mps_ - change_mps, 0.0), speed_mps_ + change_mps);
+    const double by_m = std::min(to_lower_m_, speed_mps_ * kTick_s);
     to_lower_m_ -= by_m;
     odom_T_sole_.p_m.z() -= by_m;
     plan_T_sole_.p_m.z() -= by_m;
@@ -60,6 +66,7 @@ class LandedFoot {
   std::int64_t felt_stamp_ns_ = 0;
   std::int32_t unloaded_ticks_ = 0;
   double to_lower_m_ = 0.0;
+  double speed_mps_ = 0.0;  // downwards
   Transform odom_T_sole_, plan_T_sole_;
 };
 

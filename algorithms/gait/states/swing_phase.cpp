@@ -70,7 +70,7 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const SwingParams& params = gait.params.swing;
   if (timing_.goes_back()) return abort_swing(in, gait);
   // An impaired leg has drives that may not follow another path.
-  const bool lands_soon = in.usable && !in.leg_impaired && timing_.falls_outward();
+  const bool lands_soon = in.usable && !in.leg_impaired && timing_.may_land_sooner();
   if (lands_soon && goal_.kind == StepKind::kPassing) land_soon(gait);
   const Transform odom_T_sole = sole();
   const double lowered_m = path_.lowered_m(timing_.tick());
@@ -133,11 +133,12 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
   const Vec2 error_m = unjudged_ticks_ > 0 && !in.lost ? Vec2::Zero() : in.odom_dcm_error_m;
   timing_.advance(params.timing,
                   {.falling_outward_m = side_sign(goal_.foot) * error_m.dot(stance.R.col(1).head<2>()),
-                   .falling_ahead_m = in.leg_impaired ? 0.0 : error_m.dot(stance.R.col(0).head<2>()),
+                   .falling_ahead_m = error_m.dot(stance.R.col(0).head<2>()),
                    .turn_until_tick = until,
                    .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
-                   .wanted_back = timing_.tick() < (in.leg_impaired ? until : stop_until)},
+                   .wanted_back = timing_.tick() < (in.leg_impaired ? until : stop_until),
+                   .may_hurry = !in.leg_impaired},
                   path_.duration_ticks());
   // The torso is on its way up: the foot is to reach where it stood all the same.
   if (timing_.goes_back() && !went_back) lower_torso(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));

@@ -55,6 +55,7 @@ class SwingTiming {
     double drive_share = 0.0;        // of the leg's fastest drive in the last tick, over its limit
     double side_room_m = 1e9;        // beside the target, away from the standing foot
     bool wanted_back = false;        // to where it stood, however the body stands
+    bool may_hurry = true;           // its drives are all there
   };
 
   void begin() noexcept { *this = {}; }
@@ -65,8 +66,9 @@ class SwingTiming {
       tick_ += pace_;
       return;
     }
-    const bool falls_outward = seen.falling_outward_m > params.falling_outward_m;
-    if (!falling_outward_ && falls_outward) {
+    // Falling is over at half of what it began with: noise is to change no pace back and forth.
+    falls_now_ = seen.falling_outward_m > (falls_now_ ? 0.5 : 1.0) * params.falling_outward_m;
+    if (!falling_outward_ && falls_now_) {
       falling_outward_ = true;
       turns_back_ = tick_ < seen.turn_until_tick;
     }
@@ -74,9 +76,10 @@ class SwingTiming {
     if (seen.wanted_back && !straight_) turns_back_ = true;
     // The drives are as fast as the pace is, about. The plan's own pace is proved for them, a straight path's is not:
     // it is hurried for as long as the body falls on.
-    const double most = std::min(std::abs(pace_) / std::max(seen.drive_share, 1e-3), params.speed_up);
+    const double most =
+        std::min(std::abs(pace_) / std::max(seen.drive_share, 1e-3), seen.may_hurry ? params.speed_up : 1.0);
     const double usual = tick_ > duration_ticks + params.late_ticks ? params.descend_search
-                         : straight_                                ? (falls_outward ? most : std::min(most, 1.0))
+                         : straight_                                ? (falls_now_ ? most : std::min(most, 1.0))
                          : falling_outward_ || falling_ahead_       ? std::max(most, 1.0)
                                                                     : 1.0;
     const double wanted = turns_back_ ? -1.0 : usual;
@@ -102,7 +105,8 @@ class SwingTiming {
   [[nodiscard]] double last_tick() const noexcept { return tick_ - pace_; }  // before that
   [[nodiscard]] double pace() const noexcept { return pace_; }               // ticks of the path in the last tick
   [[nodiscard]] bool goes_back() const noexcept { return turns_back_ || no_ground_; }
-  [[nodiscard]] bool falls_outward() const noexcept { return falling_outward_ && !turns_back_ && !straight_; }
+  // Of a body that fell outward, on the path it began with.
+  [[nodiscard]] bool may_land_sooner() const noexcept { return falling_outward_ && !turns_back_ && !straight_; }
   [[nodiscard]] bool no_ground() const noexcept { return no_ground_; }
   [[nodiscard]] double widened_m() const noexcept { return widened_m_; }  // away from the standing foot
 
@@ -111,7 +115,8 @@ class SwingTiming {
   double pace_ = 1.0;
   double widened_m_ = 0.0;
   std::int32_t pause_ticks_ = 0;
-  bool falling_outward_ = false;
+  bool falling_outward_ = false;  // once in this swing
+  bool falls_now_ = false;        // outward
   bool falling_ahead_ = false;
   bool turns_back_ = false;
   bool straight_ = false;

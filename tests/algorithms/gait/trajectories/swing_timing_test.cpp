@@ -55,7 +55,7 @@ TEST(SwingTiming, FallsAhead_HurriesOnItsPath) {
   EXPECT_LT(ticks_to_the_end(pace, {}), 1.1 * (kSwing_ticks - 100) / kParams.speed_up);
   advance(pace, 100, {});
   EXPECT_EQ(pace.widened_m(), 0.0);
-  EXPECT_FALSE(pace.falls_outward()) << "the path stays: straight it would meet the nosing";
+  EXPECT_FALSE(pace.may_land_sooner()) << "the path stays: straight it would meet the nosing";
   SwingTiming behind;
   advance(behind, kSwing_ticks, {.falling_ahead_m = -1.0});
   EXPECT_EQ(behind.tick(), kSwing_ticks);
