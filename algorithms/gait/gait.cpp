@@ -75,14 +75,17 @@ void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback
   const TorsoTrajectory::State& torso = plan_.torso();
   const Vec3 plan_v_base_mps{torso[0].speed, torso[1].speed, torso[2].speed};
   const bool seen = usable && math::all_finite(feedback.dq_radps);
-  const JointVector torque_nm =
+  JointVector torque_nm =
       seen ? balance_.torques_nm(params_.balance, *robot_, reference,
                                  {state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad},
                                  feedback, kTick_s)
            : balance_.torques_nm(params_.balance, *robot_, reference,
                                  {plan_.plan_T_base(), plan_v_base_mps, Vec3::Zero(), joints_.reference_rad()}, {},
                                  kTick_s);
-  if (seen) dcm_error_m_ = balance_.dcm_error_m();
+  if (seen) {
+    dcm_error_m_ = balance_.dcm_error_m();
+    joints_.add_damping(status_.stands, feedback, command, torque_nm);
+  }
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const double limit_nm = robot_->drives.limits[n].torque_nm;
     const double wanted_nm = torque_nm[static_cast<Eigen::Index>(n)];

@@ -146,6 +146,14 @@ struct DriveModel {
     const std::size_t j = n % kJointsPerLeg;
     return std::min({times * kd_nmsprad[j], kd_most_nmsprad[j], gain_limits[n].kd_nmsprad});
   }
+  // Damping that is wanted beside the drive's own, which its command has no room for: it is to come as a torque, from
+  // speeds that are some cycles old by then. No more than the drive's own: two dampers, of which the late one is no
+  // larger, take energy out of every motion, whatever moves and however late it is.
+  [[nodiscard]] constexpr double kd_beside(std::size_t n, double times = 1.0) const noexcept {
+    const std::size_t j = n % kJointsPerLeg;
+    const double own_nmsprad = kd_of(n, times);
+    return std::min(std::min(times * kd_nmsprad[j], kd_most_nmsprad[j]) - own_nmsprad, own_nmsprad);
+  }
 
   static void visit(auto& p, auto& field) {
     field("limits", p.limits, kJointNames);

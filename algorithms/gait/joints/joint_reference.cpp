@@ -51,7 +51,7 @@ bool JointReference::follow(const std::array<Transform, kFootCount>& base_T_sole
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const LegSolution solution = solve_leg(robot_->legs, leg, base_T_sole[index_of(leg)]);
     const bool solved = math::all_finite(solution.q_rad);
-    const double gain = stands[index_of(leg)] ? 1.0 : params_.swing_gain;
+    const double gain = gain_of(leg, stands);
     limited = limited || !solution.reachable || !solved;
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       const std::size_t n = joint_index(leg, j);
@@ -93,6 +93,20 @@ void JointReference::fit_mute_knees(const JointFeedback& feedback, const std::ar
     const Vec3 hip_m = base_p_leg(legs, leg, leg_joints(reference_rad_, leg)).hip_pitch_m;
     const Vec3 way_m = sole * Vec3{0, 0, legs.ankle_to_sole_m} - hip_m;
     sole.p_m += (length_m / std::max(way_m.norm(), 0.1) - 1.0) * way_m;
+  }
+}
+
+void JointReference::add_damping(const std::array<bool, kFootCount>& stands, const JointFeedback& feedback,
+                                 const JointCommand& command, JointVector& torque_nm) const noexcept {
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    const double gain = gain_of(leg, stands);
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+      const std::size_t n = joint_index(leg, j);
+      const double kd_nmsprad = robot_->drives.kd_beside(n, gain);
+      if (!(kd_nmsprad > 0.0) || feedback.is_mute(n)) continue;
+      const auto i = static_cast<Eigen::Index>(n);
+      torque_nm[i] += kd_nmsprad * (command.joints[n].dq_radps - feedback.dq_radps[i]);
+    }
   }
 }
 

@@ -36,6 +36,11 @@ class JointReference {
   // the knee keeps it.
   void fit_mute_knees(const JointFeedback& feedback, const std::array<bool, kFootCount>& stands, bool leg_impaired,
                       std::array<Transform, kFootCount>& base_T_sole) noexcept;
+  // The damping that the drives' commands have no room for, as torques: without it a swinging leg's joints are some
+  // milliradians beside their path when the foot lands. stands: as follow() was given it. A silent drive's speed is
+  // not known, and a drive with room for all of its damping gets no such torque.
+  void add_damping(const std::array<bool, kFootCount>& stands, const JointFeedback& feedback,
+                   const JointCommand& command, JointVector& torque_nm) const noexcept;
   // Repeats the last joint angles, at rest.
   void hold(JointCommand& command) const noexcept;
   [[nodiscard]] const JointVector& reference_rad() const noexcept { return reference_rad_; }
@@ -43,6 +48,11 @@ class JointReference {
   [[nodiscard]] Transform base_T_sole_reference(Foot leg) const noexcept;
 
  private:
+  // Times as stiff and damped as standing.
+  [[nodiscard]] double gain_of(Foot leg, const std::array<bool, kFootCount>& stands) const noexcept {
+    return stands[index_of(leg)] ? 1.0 : params_.swing_gain;
+  }
+
   const RobotModel* robot_ = nullptr;
   Params params_;
   JointVector reference_rad_ = JointVector::Zero();

@@ -39,6 +39,34 @@ TEST(GaitRobot, SlowKnees_TheProofRefusesTheFirstStepOntoTheStairs) {
   EXPECT_EQ(climb.status().treads_climbed, 0U);
 }
 
+TEST(GaitRobot, DrivesWithoutRoomForTheirDamping_TorquesMakeUpForIt) {
+  RobotModel robot;
+  for (GainLimits& limits : robot.drives.gain_limits) limits.kd_nmsprad = 5.0;
+  IdealClimb limited({}, {}, robot), nominal({});
+  JointVector dq_radps;
+  const auto knees_jerk = [&](StateEstimate&, FootholdSet&, JointFeedback& feedback) {
+    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+      feedback.dq_radps[static_cast<Eigen::Index>(joint_index(leg, kKnee))] += 0.1;
+    }
+    dq_radps = feedback.dq_radps;
+  };
+  limited.tamper = nominal.tamper = knees_jerk;
+  ASSERT_TRUE(limited.run_until(GaitPhase::kSwing, 1));
+  ASSERT_TRUE(nominal.run_until(GaitPhase::kSwing, 1));
+  for (int i = 0; i < 50; ++i) {
+    (void)nominal.tick();
+    (void)limited.tick();  // the same motion: this robot goes wherever it is told
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      const JointSetpoint& joint = limited.command().joints[n];
+      const double times = limited.status().stands[n / kJointsPerLeg] ? 1.0 : JointReference::Params{}.swing_gain;
+      const double added_nm =
+          robot.drives.kd_beside(n, times) * (joint.dq_radps - dq_radps[static_cast<Eigen::Index>(n)]);
+      EXPECT_NEAR(joint.tau_ff_nm - nominal.command().joints[n].tau_ff_nm, added_nm, 1e-9) << n;
+      EXPECT_TRUE(n % kJointsPerLeg != kKnee || std::abs(added_nm) > 0.0) << n;
+    }
+  }
+}
+
 // The margins of one and the same step, as the proof sees them.
 StepCheck check_of(const RobotModel& robot) {
   const StepParams params;

@@ -80,5 +80,60 @@ TEST_F(JointReferenceTest, GainsBeyondTheRobotsLimits_AreNeverCommanded) {
   expect_within();
 }
 
+// What the module adds to the torques of standing left and swinging right leg, whose joints all turn 0.1 rad/s too
+// fast.
+class JointDampingTest : public JointReferenceTest {
+ protected:
+  JointDampingTest() { feedback_.dq_radps.setConstant(0.1); }
+  JointVector added_nm(const RobotModel& robot) {
+    JointReference reference;
+    EXPECT_TRUE(reference.try_arm(robot, {.swing_gain = 2.0}, q_rad_));
+    (void)reference.follow(base_T_sole_, stands_, command_);  // where they are: at rest
+    JointVector torque_nm = JointVector::Constant(7.0);
+    reference.add_damping(stands_, feedback_, command_, torque_nm);
+    return torque_nm - JointVector::Constant(7.0);
+  }
+  static RobotModel within(double kd_nmsprad) {
+    RobotModel robot = nominal_robot();
+    robot.drives.kd_nmsprad = {10, 10, 10, 10, 4, 4};
+    for (GainLimits& limits : robot.drives.gain_limits) limits.kd_nmsprad = kd_nmsprad;
+    return robot;
+  }
+  static constexpr std::size_t kRight = kJointsPerLeg;
+  std::array<bool, kFootCount> stands_{true, false};
+  JointFeedback feedback_;
+};
+
+TEST_F(JointDampingTest, DrivesWithRoomForAllOfIt_GetNoTorque) {
+  EXPECT_TRUE(added_nm(nominal_robot()).isZero(0.0));
+  EXPECT_TRUE(added_nm(within(20.0)).isZero(0.0));
+}
+
+TEST_F(JointDampingTest, DriveWithoutRoom_GetsTheRestAsTorque) {
+  const JointVector nm = added_nm(within(5.0));
+  EXPECT_NEAR(nm[kKnee], -0.1 * (10.0 - 5.0), 1e-9);
+  EXPECT_EQ(nm[kAnklePitch], 0.0);
+  EXPECT_NEAR(nm[kRight + kAnklePitch], -0.1 * (8.0 - 5.0), 1e-9);
+}
+
+TEST_F(JointDampingTest, DriveThatHasLessThanHalf_GetsNoMoreThanItsOwn) {
+  EXPECT_NEAR(added_nm(within(5.0))[kRight + kKnee], -0.1 * 5.0, 1e-9);  // of 20 in the swing
+  EXPECT_NEAR(added_nm(within(3.0))[kKnee], -0.1 * 3.0, 1e-9);
+  EXPECT_TRUE(added_nm(within(0.0)).isZero(0.0));
+}
+
+TEST_F(JointDampingTest, LessDampingAskedForByTheParameters_AddsNone) {
+  RobotModel robot = within(5.0);
+  robot.drives.kd_most_nmsprad = {5, 5, 5, 5, 2, 2};
+  EXPECT_TRUE(added_nm(robot).isZero(0.0));
+}
+
+TEST_F(JointDampingTest, SilentDrive_GetsNone) {
+  feedback_.silent_cycles[kKnee] = JointFeedback::kCarried_cycles + 1;
+  const JointVector nm = added_nm(within(5.0));
+  EXPECT_EQ(nm[kKnee], 0.0);
+  EXPECT_LT(nm[kHipPitch], 0.0);
+}
+
 }  // namespace
 }  // namespace polygmap
