@@ -81,6 +81,8 @@ struct SwingParams {
   SwingTiming::Params timing;
   TouchEvidence::Params touch;
   double early_m = 0.005;
+  double certain_n = 120.0;
+  std::int32_t early_ticks = 10;
   double late_m = 0.005;
   double blocked_m = 0.008;
   double max_lowering_m = 0.055;
@@ -102,6 +104,9 @@ struct SwingParams {
     field("timing", p.timing);
     field("touch", p.touch);
     field("early_m", p.early_m, 0.0, 0.1, "Contact this far above the target counts as early.");
+    field("certain_n", p.certain_n, 0.0, 500.0, "No acceleration of the leg feigns a contact that presses more.");
+    field("early_ticks", p.early_ticks, 0, 500,
+          "The foot stops for an early contact that presses less, and lands when it still feels that after so long.");
     field("late_m", p.late_m, 0.0, 0.1, "Contact this far below the target counts as late.");
     field("blocked_m", p.blocked_m, 0.001, 0.1, "A foot this far above where it is asked to be does not go down.");
     field("max_lowering_m", p.max_lowering_m, 0.0, 0.15,

@@ -46,7 +46,9 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
 void SwingPhase::feel_force(const GaitInput& in, const SwingParams& params) noexcept {
   if (std::exchange(felt_stamp_ns_, in.feedback.stamp_ns) == in.feedback.stamp_ns) return;
   const std::size_t foot = index_of(goal_.foot);
-  touch_.take(params.touch, in.feedback.foot_force_n[foot], in.state.foot_force_sigma_n[foot]);
+  // What masses and friction feign grows with the leg's accelerations: with its pace squared.
+  const double feigned = math::square(std::max(timing_.pace(), 1.0));
+  touch_.take(params.touch, in.feedback.foot_force_n[foot], feigned * in.state.foot_force_sigma_n[foot]);
   if (touch_.hangs()) unloaded_ = true;
 }
 
@@ -62,7 +64,11 @@ SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& par
   const double above_target_m = path_.at(timing_.last_tick()).p_m.z() - goal_.target.position_m.z();
   if (above_target_m > params.early_m) contact.early_m = above_target_m;
   contact.felt = touch_.touches(params.touch, contact.early_m > 0.0);
-  contact.ground = (descending && unloaded_ && contact.felt) || blocked;
+  const bool touches = descending && unloaded_ && contact.felt;
+  // Above the target it may be the leg's own acceleration that is felt: is it there while the foot stands still, too?
+  const bool doubtful = contact.early_m > 0.0 && in.feedback.foot_force_n[index_of(goal_.foot)] < params.certain_n;
+  stopped_ticks_ = touches && doubtful ? stopped_ticks_ + 1 : 0;
+  contact.ground = (touches && (!doubtful || stopped_ticks_ > params.early_ticks)) || blocked;
   return contact;
 }
 
@@ -138,8 +144,10 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .drive_share = gait.plan.drive_share(gait.robot.drives, goal_.foot),
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
                    .wanted_back = timing_.tick() < (in.leg_impaired ? until : stop_until),
-                   .may_hurry = !in.leg_impaired},
+                   .may_hurry = !in.leg_impaired,
+                   .touches_early = stopped_ticks_ > 0},
                   path_.duration_ticks());
+  if (stopped_ticks_ == 1) gait.plan.restart_posture();
   // The torso is on its way up: the foot is to reach where it stood all the same.
   if (timing_.goes_back() && !went_back) lower_torso(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
 }

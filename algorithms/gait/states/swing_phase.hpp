@@ -44,6 +44,7 @@ class SwingPhase {
   TouchEvidence touch_;
   std::int64_t felt_stamp_ns_ = 0;   // of the last sample in it
   std::int32_t unjudged_ticks_ = 0;  // for which no error tells of a fall
+  std::int32_t stopped_ticks_ = 0;   // since it is felt to touch above its target
   bool leg_was_mute_ = false;        // a drive of it, for good
   bool lowers_body_ = false;         // since the leg does not lower its foot
   bool unloaded_ = false;            // the foot was felt to leave the ground

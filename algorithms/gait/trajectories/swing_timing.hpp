@@ -56,6 +56,7 @@ class SwingTiming {
     double side_room_m = 1e9;        // beside the target, away from the standing foot
     bool wanted_back = false;        // to where it stood, however the body stands
     bool may_hurry = true;           // its drives are all there
+    bool touches_early = false;      // above its target, as it seems: the foot stops
   };
 
   void begin() noexcept { *this = {}; }
@@ -76,14 +77,14 @@ class SwingTiming {
     if (seen.wanted_back && !straight_) turns_back_ = true;
     // The drives are as fast as the pace is, about. The plan's own pace is proved for them, a straight path's is not:
     // it is hurried for as long as the body falls on.
-    const double most =
-        std::min(std::abs(pace_) / std::max(seen.drive_share, 1e-3), seen.may_hurry ? params.speed_up : 1.0);
+    const double most = std::min(std::max(std::abs(pace_), params.pace_per_tick) / std::max(seen.drive_share, 1e-3),
+                                 seen.may_hurry ? params.speed_up : 1.0);
     const double usual = tick_ > duration_ticks + params.late_ticks ? params.descend_search
                          : straight_                                ? (falls_now_ ? most : std::min(most, 1.0))
                          : falling_outward_ || falling_ahead_       ? std::max(most, 1.0)
                                                                     : 1.0;
     const double wanted = turns_back_ ? -1.0 : usual;
-    pace_ += math::clamp(wanted - pace_, -params.pace_per_tick, params.pace_per_tick);
+    pace_ = seen.touches_early ? 0.0 : pace_ + math::clamp(wanted - pace_, -params.pace_per_tick, params.pace_per_tick);
     tick_ += pace_;
     if (falling_outward_ && !turns_back_) {
       widened_m_ = std::min({widened_m_ + params.widen_mps * kTick_s, params.widen_m, std::max(seen.side_room_m, 0.0)});

@@ -72,6 +72,25 @@ TEST(GaitContact, ForceForAMomentInTheAir_GoesOnToTheGround) {
   EXPECT_LT(climb.record().execution_z_m, 0.003);
 }
 
+// A leg's acceleration feigns a force of some tens of newtons, and is gone once the foot stands still. What presses
+// much harder is no acceleration.
+TEST(GaitContact, ForceAboveTheTargetWhileTheFootMoves_LandsOnlyWhereNoAccelerationFeignsIt) {
+  for (const double force_n : {60.0, 200.0}) {
+    IdealClimb climb({});
+    climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
+      const LatchedStep& step = climb.status().step;
+      const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns - 540 * kNsPerMs;
+      if (climb.status().phase != GaitPhase::kSwing || step.sequence != 2 || since_ns < 0) return;
+      if (since_ns < 24 * kNsPerMs) feedback.foot_force_n[index_of(step.foot)] = force_n;
+    };
+    ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
+    const bool lands_early = force_n > GaitParams{}.swing.certain_n;
+    EXPECT_EQ(climb.status().early_contacts, lands_early ? 1U : 0U);
+    EXPECT_EQ(climb.touches(climb.status().step.foot), !lands_early);
+    test::expect_sound_commands(climb);
+  }
+}
+
 // The last sample before the bus falls silent is of a toe that scrapes: it is one, however often it is read.
 TEST(GaitContact, BusSilentAfterAScrape_IsNoGround) {
   IdealClimb climb({});

@@ -114,6 +114,22 @@ TEST(SwingTiming, TopplesEarly_TurnsBackWhereItMay) {
   }
 }
 
+TEST(SwingTiming, TouchesAboveItsTarget_StopsAtOnceAndGoesOnGently) {
+  for (const bool straight : {false, true}) {
+    SwingTiming pace;
+    advance(pace, 300, {});
+    if (straight) pace.begin_straight();
+    const double at_tick = pace.tick();
+    advance(pace, 10, {.touches_early = true});
+    EXPECT_EQ(pace.tick(), at_tick);
+    EXPECT_EQ(pace.last_tick(), at_tick);
+    advance(pace, 1, {});
+    EXPECT_NEAR(pace.pace(), kParams.pace_per_tick, 1e-12);
+    for (int i = 0; i < 100; ++i) pace.advance(kParams, {.drive_share = 0.3 * pace.pace()}, kSwing_ticks);
+    EXPECT_NEAR(pace.pace(), 1.0, 1e-9) << (straight ? "straight" : "as planned");
+  }
+}
+
 TEST(SwingTiming, GroundLate_GoesDownFaster) {
   SwingTiming pace;
   advance(pace, kSwing_ticks + kParams.late_ticks, {});
