@@ -38,10 +38,9 @@ def buses(engine, seeds):
             "directly.\n\n" +
             rows(("buses", "climbed", "s/step", "sole margin mm", "foothold error, mean change mm", "of single climbs mm"), lines) +
             ("\n\nRefused before anything moves:\n\n" + "\n".join(f"- {r}" for r in refused) if refused else "") + not_climbed(everything))
-    # 0.5 mm is asked. The mean of 20 climbs is known to 0.15 mm: 2026-11-26 it was 0.33, 0.61, 0.49 and 0.55 mm.
     worst = None if None in changes or not changes else max(changes)
     return Page(text, {"1 climbed": headline("climbs with the joints behind CAN buses", climbed(behind)),
-                       "2 foothold": headline("what these buses add to the foothold error, mean of 20 climbs", most(worst, 0.65, "0.5 (not met)"), " mm")})
+                       "2 foothold": headline("what these buses add to the foothold error, mean of 20 climbs", most(worst, 0.5), " mm")})
 
 
 TABLES = {"buses": Table("Joints on CAN buses", range(1, 21), buses, 5)}
