@@ -81,7 +81,6 @@ struct SwingParams {
   SwingTiming::Params timing;
   TouchEvidence::Params touch;
   double early_m = 0.005;
-  double certain_n = 120.0;
   std::int32_t early_ticks = 10;
   double late_m = 0.005;
   double blocked_m = 0.008;
@@ -104,7 +103,6 @@ struct SwingParams {
     field("timing", p.timing);
     field("touch", p.touch);
     field("early_m", p.early_m, 0.0, 0.1, "Contact this far above the target counts as early.");
-    field("certain_n", p.certain_n, 0.0, 500.0, "No acceleration of the leg feigns a contact that presses more.");
     field("early_ticks", p.early_ticks, 0, 500,
           "The foot stops for an early contact that presses less, and lands when it still feels that after so long.");
     field("late_m", p.late_m, 0.0, 0.1, "Contact this far below the target counts as late.");

@@ -66,7 +66,8 @@ SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& par
   contact.felt = touch_.touches(params.touch, contact.early_m > 0.0);
   const bool touches = descending && unloaded_ && contact.felt;
   // Above the target it may be the leg's own acceleration that is felt: is it there while the foot stands still, too?
-  const bool doubtful = contact.early_m > 0.0 && in.feedback.foot_force_n[index_of(goal_.foot)] < params.certain_n;
+  const bool doubtful =
+      contact.early_m > 0.0 && in.feedback.foot_force_n[index_of(goal_.foot)] < params.touch.certain_n;
   stopped_ticks_ = touches && doubtful ? stopped_ticks_ + 1 : 0;
   contact.ground = (touches && (!doubtful || stopped_ticks_ > params.early_ticks)) || blocked;
   return contact;

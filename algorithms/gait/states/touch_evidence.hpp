@@ -22,6 +22,7 @@ class TouchEvidence {
     double most_odds = 2.0;
     double expected_odds = 2.0;
     double early_odds = 10.0;
+    double certain_n = 120.0;
 
     static void visit(auto& p, auto& field) {
       field("even_sigmas", p.even_sigmas, 0.1, 10.0,
@@ -34,6 +35,7 @@ class TouchEvidence {
       field("expected_odds", p.expected_odds, 0.1, 100.0, "Log odds that make a touch where the ground is expected.");
       field("early_odds", p.early_odds, 0.1, 1000.0, "And where it is not expected yet: a toe may scrape there.");
       field.ordered("expected_odds", "early_odds");
+      field("certain_n", p.certain_n, 0.0, 500.0, "No acceleration of the leg feigns a contact that presses more.");
     }
   };
   // One sample and its sigma, which may be 0 or no number: not known. A force that is not a number is none, as of a

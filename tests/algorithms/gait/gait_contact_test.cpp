@@ -84,7 +84,7 @@ TEST(GaitContact, ForceAboveTheTargetWhileTheFootMoves_LandsOnlyWhereNoAccelerat
       if (since_ns < 24 * kNsPerMs) feedback.foot_force_n[index_of(step.foot)] = force_n;
     };
     ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
-    const bool lands_early = force_n > GaitParams{}.swing.certain_n;
+    const bool lands_early = force_n > GaitParams{}.swing.touch.certain_n;
     EXPECT_EQ(climb.status().early_contacts, lands_early ? 1U : 0U);
     EXPECT_EQ(climb.touches(climb.status().step.foot), !lands_early);
     test::expect_sound_commands(climb);
