@@ -148,7 +148,7 @@ struct DriveModel {
   }
   // Damping that is wanted beside the drive's own, which its command has no room for: it is to come as a torque, from
   // speeds that are some cycles old by then. No more than the drive's own: two dampers, of which the late one is no
-  // larger, take energy out of every motion, whatever moves and however late it is.
+  // larger, take energy out of every motion, whatever moves and at whatever constant delay.
   [[nodiscard]] constexpr double kd_beside(std::size_t n, double times = 1.0) const noexcept {
     const std::size_t j = n % kJointsPerLeg;
     const double own_nmsprad = kd_of(n, times);

@@ -47,7 +47,7 @@ void expect_a_good_climb(const ClimbSummary& summary, const StairParams& stairs)
   EXPECT_GE(summary.sole_margin_min_m, 0.0);
   EXPECT_GT(summary.swing_clearance_min_m, 0.0);
   EXPECT_GE(summary.seconds_per_step, 2.35);  // a plan that leaves something out would be quicker
-  EXPECT_LE(summary.seconds_per_step, 3.7);
+  EXPECT_LE(summary.seconds_per_step, 3.75);  // the slowest of the paper's trials
   EXPECT_GE(summary.plane_rate_hz, least_plane_rate_hz(stairs));
   EXPECT_LE(summary.exposure_to_map_ms.max, 64.0);
   EXPECT_LE(summary.map_age_at_latch_ms.max, 100.0);

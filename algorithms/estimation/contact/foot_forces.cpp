@@ -38,7 +38,6 @@ FootForces::Weighed FootForces::sense(Sensor& sensor, double read_n, const Weigh
   }
   sensor.before_n = sensor.last_n;
   sensor.last_n = read_n;
-  sensor.zero_variance_n2 += math::square(params_.zero_walk_nprs) * dt_s;
   if (hangs) {
     learn_zero(sensor, read_n, params_.zero_in_air_sigma_n, dt_s);
   } else if (observed.weight_pn2 > 0.0) {
@@ -57,26 +56,27 @@ bool FootForces::hangs(std::size_t foot, bool stands, double dt_s) noexcept {
 void FootForces::update(const RobotModel& robot, const BodyFrames& frames, const JointFeedback& joints,
                         const ImuSample& base, const Vec3& base_up,
                         const std::array<bool, kFootCount>& stands) noexcept {
-  constexpr double kMost_s = 0.02;  // after a gap nobody knows what was in it
-  const double dt_s = stamp_ns_ < 0 ? 0.0 : std::min(seconds(joints.stamp_ns - stamp_ns_), kMost_s);
+  const double since_s = stamp_ns_ < 0 ? 0.0 : seconds(joints.stamp_ns - stamp_ns_);
+  for (Sensor& sensor : sensors_) sensor.zero_variance_n2 += math::square(params_.zero_walk_nprs) * since_s;
+  const double dt_s = std::min(since_s, params_.most_gap_s);  // nobody knows what was in a gap
   stamp_ns_ = joints.stamp_ns;
   const bool torques_told = math::all_finite(joints.tau_nm) && joints.tau_nm.cwiseAbs().maxCoeff() > 0.0;
-  std::array<bool, kFootCount> told{}, hang{};
+  std::array<bool, kFootCount> told{}, lifted{};
   for (std::size_t f = 0; f < kFootCount; ++f) {
     told[f] = torques_told;
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       told[f] = told[f] && !joints.is_mute(joint_index(static_cast<Foot>(f), j));
     }
-    hang[f] = hangs(f, stands[f], dt_s) && told[f];
+    lifted[f] = hangs(f, stands[f], dt_s) && told[f];
   }
   std::array<double, kFootCount> observed_n{};
-  if (torques_told) observed_n = observer_.update(robot, frames, joints, base, base_up, hang);
+  if (torques_told) observed_n = observer_.update(robot, frames, joints, base, base_up, lifted);
   for (std::size_t f = 0; f < kFootCount; ++f) {
     NoiseLevel& noise_n = observer_noise_n_[f];
-    if (hang[f]) noise_n.take(math::square(observed_n[f]), dt_s);
+    if (lifted[f]) noise_n.take(math::square(observed_n[f]), dt_s);
     const Weighed observed{observed_n[f], told[f] ? 1.0 / math::square(noise_n.sigma()) : 0.0};
     const Weighed sensed =
-        sense(sensors_[f], joints.foot_force_n[f], observed, hang[f] && observed_n[f] < params_.light_n, dt_s);
+        sense(sensors_[f], joints.foot_force_n[f], observed, lifted[f] && observed_n[f] < params_.light_n, dt_s);
     const double weight_pn2 = observed.weight_pn2 + sensed.weight_pn2;
     if (!(weight_pn2 > 0.0)) {
       up_n_[f] = sigma_n_[f] = std::numeric_limits<double>::quiet_NaN();

@@ -22,6 +22,7 @@ class FootForces {
     double zero_s = 0.2;
     double zero_walk_nprs = 1.0;
     double lifted_s = 0.16;
+    double most_gap_s = 0.02;
     double light_n = 20.0;
     double light_sigmas = 2.0;
 
@@ -37,7 +38,11 @@ class FootForces {
       field("zero_s", p.zero_s, 0.002, 60.0, "The zero is averaged over so much time at least.");
       field("zero_walk_nprs", p.zero_walk_nprs, 0.0, 50.0, "Random walk of the zero.");
       field("lifted_s", p.lifted_s, 0.0, 1.0,
-            "From a foot in the air nothing is learnt earlier: at lift-off it still carries, and may be stuck.");
+            "From a foot in the air nothing is learnt earlier: at lift-off it still carries, and one that is stuck is "
+            "found "
+            "to stand after `stuck_swing_s`.");
+      field("most_gap_s", p.most_gap_s, 0.001, 1.0,
+            "A sample after a longer gap counts no more than after such a one.");
       field("light_n", p.light_n, 0.0, 200.0, "A force below this and below `light_sigmas` is none.");
       field("light_sigmas", p.light_sigmas, 0.0, 10.0, "So many of its sigmas a force may be feigned.");
     }
@@ -69,7 +74,7 @@ class FootForces {
   };
   // observed: what torques tell. hangs: the foot does for certain.
   [[nodiscard]] Weighed sense(Sensor& sensor, double read_n, const Weighed& observed, bool hangs, double dt_s) noexcept;
-  // For certain.
+  // Whether the foot does for certain.
   [[nodiscard]] bool hangs(std::size_t foot, bool stands, double dt_s) noexcept;
   void learn_zero(Sensor& sensor, double off_n, double least_sigma_n, double dt_s) noexcept;
 

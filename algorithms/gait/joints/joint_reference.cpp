@@ -98,12 +98,13 @@ void JointReference::fit_mute_knees(const JointFeedback& feedback, const std::ar
 
 void JointReference::add_damping(const std::array<bool, kFootCount>& stands, const JointFeedback& feedback,
                                  const JointCommand& command, JointVector& torque_nm) const noexcept {
+  if (command.stamp_ns - feedback.stamp_ns > params_.damping_age_ns) return;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     const double gain = gain_of(leg, stands);
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
       const std::size_t n = joint_index(leg, j);
       const double kd_nmsprad = robot_->drives.kd_beside(n, gain);
-      if (!(kd_nmsprad > 0.0) || feedback.is_mute(n)) continue;
+      if (!(kd_nmsprad > 0.0) || feedback.silent_cycles[n] > 0) continue;
       const auto i = static_cast<Eigen::Index>(n);
       torque_nm[i] += kd_nmsprad * (command.joints[n].dq_radps - feedback.dq_radps[i]);
     }

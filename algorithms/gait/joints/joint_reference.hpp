@@ -13,12 +13,15 @@ class JointReference {
   struct Params {
     double swing_gain = 2.0;
     double encoder_offset_rad = 0.02;
+    std::int64_t damping_age_ns = 6 * kNsPerMs;
 
     static void visit(auto& p, auto& field) {
       field("swing_gain", p.swing_gain, 0.1, 10.0,
             "The drives' gains are this many times as large in the leg that swings.");
       field("encoder_offset_rad", p.encoder_offset_rad, 0.0, 0.2,
             "A joint measured farther outside its range at the start is refused: an encoder is off by less.");
+      field("damping_age_ns", p.damping_age_ns, 0, 100'000'000,
+            "Older speeds damp no joint: held for longer than some cycles they push where nothing moves any more.");
     }
   };
 
@@ -37,8 +40,9 @@ class JointReference {
   void fit_mute_knees(const JointFeedback& feedback, const std::array<bool, kFootCount>& stands, bool leg_impaired,
                       std::array<Transform, kFootCount>& base_T_sole) noexcept;
   // The damping that the drives' commands have no room for, as torques: without it a swinging leg's joints are some
-  // milliradians beside their path when the foot lands. stands: as follow() was given it. A silent drive's speed is
-  // not known, and a drive with room for all of its damping gets no such torque.
+  // milliradians beside their path when the foot lands. stands: as follow() was given it. Speeds older than
+  // `damping_age_ns`, or of a drive that missed a cycle, damp nothing, and a drive with room for all of its damping
+  // gets no such torque.
   void add_damping(const std::array<bool, kFootCount>& stands, const JointFeedback& feedback,
                    const JointCommand& command, JointVector& torque_nm) const noexcept;
   // Repeats the last joint angles, at rest.

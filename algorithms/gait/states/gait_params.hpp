@@ -5,6 +5,7 @@
 #include "algorithms/gait/balance/balance.hpp"
 #include "algorithms/gait/footsteps/climb_planner.hpp"
 #include "algorithms/gait/joints/joint_reference.hpp"
+#include "algorithms/gait/states/early_touch.hpp"
 #include "algorithms/gait/states/touch_evidence.hpp"
 #include "algorithms/gait/trajectories/step_plan.hpp"
 #include "algorithms/gait/trajectories/swing_timing.hpp"
@@ -80,8 +81,7 @@ struct WeightShiftParams {
 struct SwingParams {
   SwingTiming::Params timing;
   TouchEvidence::Params touch;
-  double early_m = 0.005;
-  std::int32_t early_ticks = 10;
+  EarlyTouch::Params early;
   double late_m = 0.005;
   double blocked_m = 0.008;
   double max_lowering_m = 0.055;
@@ -102,9 +102,7 @@ struct SwingParams {
   static void visit(auto& p, auto& field) {
     field("timing", p.timing);
     field("touch", p.touch);
-    field("early_m", p.early_m, 0.0, 0.1, "Contact this far above the target counts as early.");
-    field("early_ticks", p.early_ticks, 0, 500,
-          "The foot stops for an early contact that presses less, and lands when it still feels that after so long.");
+    field("early", p.early);
     field("late_m", p.late_m, 0.0, 0.1, "Contact this far below the target counts as late.");
     field("blocked_m", p.blocked_m, 0.001, 0.1, "A foot this far above where it is asked to be does not go down.");
     field("max_lowering_m", p.max_lowering_m, 0.0, 0.15,
@@ -157,10 +155,12 @@ struct LandedFootParams {
           "A landed foot is held no longer where its force told of the ground.");
     field("unloaded_n", p.unloaded_n, 0.0, 200.0,
           "A foot that landed early and feels less than this hangs in the air.");
-    field("unloaded_ticks", p.unloaded_ticks, 0, 500, "After so many ticks of that it is lowered to its target.");
+    field("unloaded_ticks", p.unloaded_ticks, 0, 500,
+          "After so many ticks of that it is lowered to its target; pressed for longer it is held no more.");
     field("lower_mps", p.lower_mps, 0.0, 1.0, "The speed of that lowering.");
     field("lower_mps2", p.lower_mps2, 0.1, 100.0,
-          "It begins and ends so gently: the torques feed the leg's acceleration forward.");
+          "It begins and ends so gently, since the torques feed the leg's acceleration forward: from `lower_mps` it "
+          "goes on for 2.5 mm.");
   }
 };
 

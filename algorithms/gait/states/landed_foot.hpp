@@ -32,11 +32,16 @@ class LandedFoot {
   void update(const LandedFootParams& params, const JointFeedback& feedback, std::int64_t now_ns) noexcept {
     const std::int64_t most_ns = felt_ ? params.felt_hold_ns : params.hold_ns;
     const double force_n = feedback.foot_force_n[index_of(foot_)];
-    held_ = force_n < params.pressed_n && now_ns - landed_ns_ < most_ns;
     // Of a bus that falls silent the last sample is read on and on.
-    if (std::exchange(felt_stamp_ns_, feedback.stamp_ns) == feedback.stamp_ns) return;
-    unloaded_ticks_ = force_n < params.unloaded_n ? unloaded_ticks_ + 1 : 0;
-    lower(params, unloaded_ticks_ > params.unloaded_ticks);
+    const bool sampled = std::exchange(felt_stamp_ns_, feedback.stamp_ns) != feedback.stamp_ns;
+    if (sampled) {
+      unloaded_ticks_ = force_n < params.unloaded_n ? unloaded_ticks_ + 1 : 0;
+      pressed_ticks_ = force_n < params.pressed_n ? 0 : pressed_ticks_ + 1;
+    }
+    // What landed early may have knocked against a riser, for a moment.
+    const std::int32_t enough_ticks = to_lower_m_ > 0.0 ? params.unloaded_ticks : 0;
+    held_ = pressed_ticks_ <= enough_ticks && now_ns - landed_ns_ < most_ns;
+    lower(params, sampled && unloaded_ticks_ > params.unloaded_ticks);
   }
   // The plan goes on in another frame.
   void carry(const Transform& to_T_plan) noexcept { plan_T_sole_ = to_T_plan * plan_T_sole_; }
@@ -65,6 +70,7 @@ class LandedFoot {
   std::int64_t landed_ns_ = 0;
   std::int64_t felt_stamp_ns_ = 0;
   std::int32_t unloaded_ticks_ = 0;
+  std::int32_t pressed_ticks_ = 0;
   double to_lower_m_ = 0.0;
   double speed_mps_ = 0.0;  // downwards
   Transform odom_T_sole_, plan_T_sole_;

@@ -43,33 +43,38 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   body.release_landed_foot();
 }
 
-void SwingPhase::feel_force(const GaitInput& in, const SwingParams& params) noexcept {
-  if (std::exchange(felt_stamp_ns_, in.feedback.stamp_ns) == in.feedback.stamp_ns) return;
+bool SwingPhase::feel_force(const GaitInput& in, const SwingParams& params) noexcept {
+  if (std::exchange(felt_stamp_ns_, in.feedback.stamp_ns) == in.feedback.stamp_ns) return false;
   const std::size_t foot = index_of(goal_.foot);
-  // What masses and friction feign grows with the leg's accelerations: with its pace squared.
-  const double feigned = math::square(std::max(timing_.pace(), 1.0));
-  touch_.take(params.touch, in.feedback.foot_force_n[foot], feigned * in.state.foot_force_sigma_n[foot]);
+  touch_.take(params.touch, in.feedback.foot_force_n[foot], feigned_share() * in.state.foot_force_sigma_n[foot]);
   if (touch_.hangs()) unloaded_ = true;
+  return true;
+}
+
+double SwingPhase::feigned_share() const noexcept {
+  const bool searches = timing_.tick() > path_.duration_ticks();  // at one speed
+  return searches ? 1.0 : math::square(std::max(timing_.pace(), 1.0));
 }
 
 SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& params,
                                      const Transform& odom_T_sole) noexcept {
-  feel_force(in, params);
-  const bool descending = 2.0 * timing_.tick() > path_.duration_ticks();
+  const bool sampled = feel_force(in, params);
+  Contact contact;
+  const double above_target_m = path_.at(timing_.last_tick()).p_m.z() - goal_.target.position_m.z();
+  if (above_target_m > params.early.from_m) contact.early_m = above_target_m;
+  const bool may_land = unloaded_ && 2.0 * timing_.tick() > path_.duration_ticks();
+  if (!may_land || contact.early_m == 0.0) {
+    early_touch_.release();
+  } else if (sampled) {
+    early_touch_.take(params.early, params.touch, touch_,
+                      in.feedback.foot_force_n[index_of(goal_.foot)] / feigned_share());
+  }
+  contact.felt = contact.early_m > 0.0 ? early_touch_.lands() : touch_.touches(params.touch, false);
   // What does not go down any more stands on something, whatever its force sensor says.
   const bool judged = in.usable && !in.leg_impaired;  // a mute leg stays above its path, too
   const double above_m = judged ? in.state.odom_T_sole[index_of(goal_.foot)].p_m.z() - odom_T_sole.p_m.z() : 0.0;
   const bool blocked = path_.lowered_m(timing_.tick()) > params.late_m && above_m > params.blocked_m;
-  Contact contact;
-  const double above_target_m = path_.at(timing_.last_tick()).p_m.z() - goal_.target.position_m.z();
-  if (above_target_m > params.early_m) contact.early_m = above_target_m;
-  contact.felt = touch_.touches(params.touch, contact.early_m > 0.0);
-  const bool touches = descending && unloaded_ && contact.felt;
-  // Above the target it may be the leg's own acceleration that is felt: is it there while the foot stands still, too?
-  const bool doubtful =
-      contact.early_m > 0.0 && in.feedback.foot_force_n[index_of(goal_.foot)] < params.touch.certain_n;
-  stopped_ticks_ = touches && doubtful ? stopped_ticks_ + 1 : 0;
-  contact.ground = (touches && (!doubtful || stopped_ticks_ > params.early_ticks)) || blocked;
+  contact.ground = (may_land && contact.felt) || blocked;
   return contact;
 }
 
@@ -81,7 +86,9 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   if (lands_soon && goal_.kind == StepKind::kPassing) land_soon(gait);
   const Transform odom_T_sole = sole();
   const double lowered_m = path_.lowered_m(timing_.tick());
+  const bool was_stopped = early_touch_.stops();
   const Contact contact = feel(in, params, odom_T_sole);
+  if (early_touch_.stops() && !was_stopped) gait.plan.restart_posture();
   if (contact.ground) {
     if (contact.early_m > 0.0) ++gait.status.early_contacts;
     if (lowered_m > params.late_m) ++gait.status.late_contacts;
@@ -146,9 +153,8 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
                    .wanted_back = timing_.tick() < (in.leg_impaired ? until : stop_until),
                    .may_hurry = !in.leg_impaired,
-                   .touches_early = stopped_ticks_ > 0},
+                   .stopped = early_touch_.stops() && in.now_ns - in.feedback.stamp_ns <= gait.params.steer_age_ns},
                   path_.duration_ticks());
-  if (stopped_ticks_ == 1) gait.plan.restart_posture();
   // The torso is on its way up: the foot is to reach where it stood all the same.
   if (timing_.goes_back() && !went_back) lower_torso(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
 }
@@ -203,7 +209,7 @@ void SwingPhase::land_beside(GaitShared& gait, const SolePose& target) noexcept 
 // The only way that is known to be free is the one it came: the swing backwards.
 Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexcept {
   const SwingParams& params = gait.params.swing;
-  feel_force(in, params);
+  (void)feel_force(in, params);
   const Transform odom_T_sole = sole();
   const double above_m = odom_T_sole.p_m.z() - path_.start_height_m();
   const bool felt = touch_.touches(params.touch, false), all_the_way = timing_.tick() < 0.0;

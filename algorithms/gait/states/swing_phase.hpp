@@ -24,8 +24,11 @@ class SwingPhase {
     double early_m = 0.0;  // so far above the target, where that is early
     bool ground = false;   // the foot stands on something
   };
+  // What masses and friction feign of a force grows with the leg's accelerations: with the pace squared of a foot that
+  // hurries.
+  [[nodiscard]] double feigned_share() const noexcept;
   // Each sample once: of a bus that falls silent the last one is read on and on.
-  void feel_force(const GaitInput& in, const SwingParams& params) noexcept;
+  [[nodiscard]] bool feel_force(const GaitInput& in, const SwingParams& params) noexcept;
   [[nodiscard]] Contact feel(const GaitInput& in, const SwingParams& params, const Transform& odom_T_sole) noexcept;
   [[nodiscard]] Transition abort_swing(const GaitInput& in, GaitShared& gait) noexcept;
   [[nodiscard]] Transition touch_down(const GaitInput& in, GaitShared& gait, bool felt, double early_m) noexcept;
@@ -42,9 +45,9 @@ class SwingPhase {
   SwingTiming timing_;
   Vec2 zmp_stance_m_ = Vec2::Zero();  // plan frame
   TouchEvidence touch_;
+  EarlyTouch early_touch_;
   std::int64_t felt_stamp_ns_ = 0;   // of the last sample in it
   std::int32_t unjudged_ticks_ = 0;  // for which no error tells of a fall
-  std::int32_t stopped_ticks_ = 0;   // since it is felt to touch above its target
   bool leg_was_mute_ = false;        // a drive of it, for good
   bool lowers_body_ = false;         // since the leg does not lower its foot
   bool unloaded_ = false;            // the foot was felt to leave the ground

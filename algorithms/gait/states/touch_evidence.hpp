@@ -22,7 +22,6 @@ class TouchEvidence {
     double most_odds = 2.0;
     double expected_odds = 2.0;
     double early_odds = 10.0;
-    double certain_n = 120.0;
 
     static void visit(auto& p, auto& field) {
       field("even_sigmas", p.even_sigmas, 0.1, 10.0,
@@ -35,7 +34,6 @@ class TouchEvidence {
       field("expected_odds", p.expected_odds, 0.1, 100.0, "Log odds that make a touch where the ground is expected.");
       field("early_odds", p.early_odds, 0.1, 1000.0, "And where it is not expected yet: a toe may scrape there.");
       field.ordered("expected_odds", "early_odds");
-      field("certain_n", p.certain_n, 0.0, 500.0, "No acceleration of the leg feigns a contact that presses more.");
     }
   };
   // One sample and its sigma, which may be 0 or no number: not known. A force that is not a number is none, as of a
@@ -52,6 +50,8 @@ class TouchEvidence {
   [[nodiscard]] bool touches(const Params& params, bool early) const noexcept {
     return presses_ && odds_ >= (early ? params.early_odds : params.expected_odds);
   }
+  // Whatever the last sample was.
+  [[nodiscard]] bool likely(const Params& params) const noexcept { return odds_ >= params.expected_odds; }
   [[nodiscard]] bool hangs() const noexcept { return !(odds_ > 0.0); }
 
  private:

@@ -2,7 +2,8 @@
 // How fast a swing runs along its path, and how far beside it: as planned, unless the body topples towards the free
 // foot (one sole cannot hold that; the free foot has to be there in time, or back) or ahead, the ground is late (the
 // weight is on its way) or is not there (back to where the foot stood). A straight path, on which a foot lands sooner,
-// is hurried while the body falls outward, up to `speed_up`, and slowed to what its drives have.
+// is hurried while the body falls outward, up to `speed_up`, and slowed to what its drives have. A foot that may have
+// touched above its target stops.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +19,6 @@ class SwingTiming {
     double falling_outward_m = 0.025;
     double falling_ahead_m = 0.05;
     double speed_up = 1.6;
-    // or back, earlier in the swing than Seen says;
     double widen_m = 0.06;
     double widen_mps = 0.25;
     std::int32_t late_ticks = 10;
@@ -56,7 +56,7 @@ class SwingTiming {
     double side_room_m = 1e9;        // beside the target, away from the standing foot
     bool wanted_back = false;        // to where it stood, however the body stands
     bool may_hurry = true;           // its drives are all there
-    bool touches_early = false;      // above its target, as it seems: the foot stops
+    bool stopped = false;            // while it is judged whether the foot touches above its target
   };
 
   void begin() noexcept { *this = {}; }
@@ -68,25 +68,26 @@ class SwingTiming {
       return;
     }
     // Falling is over at half of what it began with: noise is to change no pace back and forth.
-    falls_now_ = seen.falling_outward_m > (falls_now_ ? 0.5 : 1.0) * params.falling_outward_m;
-    if (!falling_outward_ && falls_now_) {
-      falling_outward_ = true;
+    falls_outward_ = seen.falling_outward_m > (falls_outward_ ? 0.5 : 1.0) * params.falling_outward_m;
+    if (!fell_outward_ && falls_outward_) {
+      fell_outward_ = true;
       turns_back_ = tick_ < seen.turn_until_tick;
     }
-    falling_ahead_ = falling_ahead_ || seen.falling_ahead_m > params.falling_ahead_m;
+    fell_ahead_ = fell_ahead_ || seen.falling_ahead_m > params.falling_ahead_m;
     if (seen.wanted_back && !straight_) turns_back_ = true;
     // The drives are as fast as the pace is, about. The plan's own pace is proved for them, a straight path's is not:
     // it is hurried for as long as the body falls on.
     const double most = std::min(std::max(std::abs(pace_), params.pace_per_tick) / std::max(seen.drive_share, 1e-3),
                                  seen.may_hurry ? params.speed_up : 1.0);
     const double usual = tick_ > duration_ticks + params.late_ticks ? params.descend_search
-                         : straight_                                ? (falls_now_ ? most : std::min(most, 1.0))
-                         : falling_outward_ || falling_ahead_       ? std::max(most, 1.0)
+                         : straight_                                ? (falls_outward_ ? most : std::min(most, 1.0))
+                         : fell_outward_ || fell_ahead_             ? std::max(most, 1.0)
                                                                     : 1.0;
     const double wanted = turns_back_ ? -1.0 : usual;
-    pace_ = seen.touches_early ? 0.0 : pace_ + math::clamp(wanted - pace_, -params.pace_per_tick, params.pace_per_tick);
+    const bool stopped = seen.stopped && !turns_back_;
+    pace_ = stopped ? 0.0 : pace_ + math::clamp(wanted - pace_, -params.pace_per_tick, params.pace_per_tick);
     tick_ += pace_;
-    if (falling_outward_ && !turns_back_) {
+    if (fell_outward_ && !turns_back_) {
       widened_m_ = std::min({widened_m_ + params.widen_mps * kTick_s, params.widen_m, std::max(seen.side_room_m, 0.0)});
     }
   }
@@ -107,7 +108,7 @@ class SwingTiming {
   [[nodiscard]] double pace() const noexcept { return pace_; }               // ticks of the path in the last tick
   [[nodiscard]] bool goes_back() const noexcept { return turns_back_ || no_ground_; }
   // Of a body that fell outward, on the path it began with.
-  [[nodiscard]] bool may_land_sooner() const noexcept { return falling_outward_ && !turns_back_ && !straight_; }
+  [[nodiscard]] bool may_land_sooner() const noexcept { return fell_outward_ && !turns_back_ && !straight_; }
   [[nodiscard]] bool no_ground() const noexcept { return no_ground_; }
   [[nodiscard]] double widened_m() const noexcept { return widened_m_; }  // away from the standing foot
 
@@ -116,9 +117,9 @@ class SwingTiming {
   double pace_ = 1.0;
   double widened_m_ = 0.0;
   std::int32_t pause_ticks_ = 0;
-  bool falling_outward_ = false;  // once in this swing
-  bool falls_now_ = false;        // outward
-  bool falling_ahead_ = false;
+  bool fell_outward_ = false;  // once in this swing
+  bool falls_outward_ = false;
+  bool fell_ahead_ = false;
   bool turns_back_ = false;
   bool straight_ = false;
   bool no_ground_ = false;

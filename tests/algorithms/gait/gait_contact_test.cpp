@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "tests/support/gait_checks.hpp"
 
@@ -73,20 +74,30 @@ TEST(GaitContact, ForceForAMomentInTheAir_GoesOnToTheGround) {
 }
 
 // A leg's acceleration feigns a force of some tens of newtons, and is gone once the foot stands still. What presses
-// much harder is no acceleration.
-TEST(GaitContact, ForceAboveTheTargetWhileTheFootMoves_LandsOnlyWhereNoAccelerationFeignsIt) {
-  for (const double force_n : {60.0, 200.0}) {
+// much harder is no acceleration, and what is felt at rest neither.
+TEST(GaitContact, ForceAboveTheTarget_LandsWhereNoAccelerationFeignsIt) {
+  struct Case {
+    double force_n;
+    int lasts_ms;
+    bool lands_early;
+  };
+  for (const Case& c : {Case{60.0, 24, false}, Case{60.0, 500, true}, Case{200.0, 24, true}}) {
     IdealClimb climb({});
+    std::vector<double> heights_m;  // asked for while it is felt
     climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
       const LatchedStep& step = climb.status().step;
       const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns - 540 * kNsPerMs;
       if (climb.status().phase != GaitPhase::kSwing || step.sequence != 2 || since_ns < 0) return;
-      if (since_ns < 24 * kNsPerMs) feedback.foot_force_n[index_of(step.foot)] = force_n;
+      if (since_ns >= c.lasts_ms * kNsPerMs) return;
+      heights_m.push_back(climb.status().odom_T_sole_desired[index_of(step.foot)].p_m.z());
+      feedback.foot_force_n[index_of(step.foot)] = c.force_n;
     };
     ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
-    const bool lands_early = force_n > GaitParams{}.swing.touch.certain_n;
-    EXPECT_EQ(climb.status().early_contacts, lands_early ? 1U : 0U);
-    EXPECT_EQ(climb.touches(climb.status().step.foot), !lands_early);
+    EXPECT_EQ(climb.status().early_contacts, c.lands_early ? 1U : 0U) << c.force_n << " N, " << c.lasts_ms << " ms";
+    EXPECT_EQ(climb.touches(climb.status().step.foot), !c.lands_early);
+    // Five samples tell of it, and are some 3 mm of the way; then it stands still.
+    for (std::size_t n = 7; n < heights_m.size(); ++n) EXPECT_NEAR(heights_m[n], heights_m[6], 2e-4) << n;
+    EXPECT_GT(heights_m.size(), 3U);
     test::expect_sound_commands(climb);
   }
 }

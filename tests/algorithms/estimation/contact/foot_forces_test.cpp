@@ -130,6 +130,16 @@ TEST_F(FootForcesTest, LoadedFootThatIsSaidToHang_TeachesNothing) {
   EXPECT_EQ(forces_.sigma_n()[0], first_n) << "it lifts";
 }
 
+// It counts as 20 ms of a foot that is said to hang.
+TEST_F(FootForcesTest, GapAfterLiftOff_TeachesNothing) {
+  (void)ticks(10, {270.0, 270.0}, {kNaN, kNaN});
+  const double first_n = forces_.sigma_n()[0];
+  says_stands_ = false;
+  stamp_ns_ += 1'000'000'000;
+  (void)ticks(60, {270.0, 270.0}, {kNaN, kNaN});
+  EXPECT_EQ(forces_.sigma_n()[0], first_n);
+}
+
 TEST_F(FootForcesTest, FootInTheAir_TellsHowWellTorquesDo) {
   (void)tick({270.0, 270.0}, {kNaN, kNaN});
   const double first_n = forces_.sigma_n()[0];

@@ -128,11 +128,19 @@ TEST_F(JointDampingTest, LessDampingAskedForByTheParameters_AddsNone) {
   EXPECT_TRUE(added_nm(robot).isZero(0.0));
 }
 
-TEST_F(JointDampingTest, SilentDrive_GetsNone) {
-  feedback_.silent_cycles[kKnee] = JointFeedback::kCarried_cycles + 1;
+TEST_F(JointDampingTest, DriveThatMissedACycle_GetsNone) {
+  feedback_.silent_cycles[kKnee] = 1;
   const JointVector nm = added_nm(within(5.0));
   EXPECT_EQ(nm[kKnee], 0.0);
   EXPECT_LT(nm[kHipPitch], 0.0);
+}
+
+// A whole bus that is silent leaves the last sample there, of a foot that just touched down, say.
+TEST_F(JointDampingTest, SpeedsOfLongAgo_DampNothing) {
+  command_.stamp_ns = JointReference::Params{}.damping_age_ns;
+  EXPECT_LT(added_nm(within(5.0))[kKnee], 0.0);
+  command_.stamp_ns += 2 * kNsPerMs;
+  EXPECT_TRUE(added_nm(within(5.0)).isZero(0.0));
 }
 
 }  // namespace

@@ -14,15 +14,16 @@ constexpr double kEarly_m = 0.012;
 
 struct Ticks {
   LandedFoot foot;
-  std::int64_t now_ns = 0;
+  std::int64_t now_ns = 0, sample_ns = 0;
   double before_mps = 0.0, most_mps2 = 0.0, most_mps = 0.0;
 
   explicit Ticks(double early_m) { foot.land(Foot::kLeft, true, early_m, now_ns, {}, {}); }
-  void run(int ticks, double force_n) {
+  void run(int ticks, double force_n, bool silent = false) {
     for (int i = 0; i < ticks; ++i) {
       now_ns += 2 * kNsPerMs;
       JointFeedback feedback;
-      feedback.stamp_ns = now_ns;
+      if (!silent) sample_ns = now_ns;
+      feedback.stamp_ns = sample_ns;
       feedback.foot_force_n = {force_n, 500.0};
       const double before_m = foot.odom_T_sole().p_m.z();
       foot.update(kLanded, feedback, now_ns);
@@ -55,6 +56,32 @@ TEST(LandedFoot, FeelsTheGroundOnItsWay_StopsGently) {
   EXPECT_GT(felt_m, 0.005);
   EXPECT_NEAR(ticks.lowered_m() - felt_m, 0.5 * math::square(kLanded.lower_mps) / kLanded.lower_mps2, 0.0005);
   EXPECT_LE(ticks.most_mps2, 1.01 * kLanded.lower_mps2);
+}
+
+TEST(LandedFoot, BusSilentOnItsWay_StopsGently) {
+  Ticks ticks(0.1);
+  ticks.run(60, 0.0);
+  ticks.run(50, 0.0, true);
+  EXPECT_EQ(ticks.before_mps, 0.0);
+  ticks.run(50, 0.0);
+  EXPECT_LE(ticks.most_mps2, 1.01 * kLanded.lower_mps2);
+}
+
+// Against a riser, say: it hangs in the air afterwards.
+TEST(LandedFoot, KnockedHardAboveItsTarget_IsLoweredAllTheSame) {
+  Ticks ticks(kEarly_m);
+  ticks.run(kLanded.unloaded_ticks, kLanded.pressed_n + 30.0);
+  EXPECT_TRUE(ticks.foot.held());
+  ticks.run(200, 0.0);
+  EXPECT_NEAR(ticks.lowered_m(), kEarly_m, 1e-9);
+}
+
+TEST(LandedFoot, Pressed_IsHeldNoMore) {
+  for (const double early_m : {0.0, kEarly_m}) {
+    Ticks ticks(early_m);
+    ticks.run(early_m > 0.0 ? kLanded.unloaded_ticks + 1 : 1, kLanded.pressed_n);
+    EXPECT_FALSE(ticks.foot.held());
+  }
 }
 
 TEST(LandedFoot, CameInTime_IsNotLowered) {

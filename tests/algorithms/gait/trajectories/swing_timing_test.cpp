@@ -114,13 +114,13 @@ TEST(SwingTiming, TopplesEarly_TurnsBackWhereItMay) {
   }
 }
 
-TEST(SwingTiming, TouchesAboveItsTarget_StopsAtOnceAndGoesOnGently) {
+TEST(SwingTiming, MayTouchAboveItsTarget_StopsAtOnceAndGoesOnGently) {
   for (const bool straight : {false, true}) {
     SwingTiming pace;
     advance(pace, 300, {});
     if (straight) pace.begin_straight();
     const double at_tick = pace.tick();
-    advance(pace, 10, {.touches_early = true});
+    advance(pace, 10, {.stopped = true});
     EXPECT_EQ(pace.tick(), at_tick);
     EXPECT_EQ(pace.last_tick(), at_tick);
     advance(pace, 1, {});
@@ -128,6 +128,13 @@ TEST(SwingTiming, TouchesAboveItsTarget_StopsAtOnceAndGoesOnGently) {
     for (int i = 0; i < 100; ++i) pace.advance(kParams, {.drive_share = 0.3 * pace.pace()}, kSwing_ticks);
     EXPECT_NEAR(pace.pace(), 1.0, 1e-9) << (straight ? "straight" : "as planned");
   }
+}
+
+TEST(SwingTiming, GoesBack_IsNotStopped) {
+  SwingTiming pace;
+  advance(pace, 100, {});
+  advance(pace, 200, {.wanted_back = true, .stopped = true});
+  EXPECT_LT(pace.tick(), 0.0);
 }
 
 TEST(SwingTiming, GroundLate_GoesDownFaster) {
