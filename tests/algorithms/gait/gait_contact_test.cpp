@@ -74,7 +74,7 @@ TEST(GaitContact, ForceForAMomentInTheAir_GoesOnToTheGround) {
 }
 
 // A leg's acceleration feigns a force of some tens of newtons, and is gone once the foot stands still. What presses
-// much harder is no acceleration, and what is felt at rest neither.
+// much harder is no acceleration, nor is what is felt for some time at rest.
 TEST(GaitContact, ForceAboveTheTarget_LandsWhereNoAccelerationFeignsIt) {
   struct Case {
     double force_n;

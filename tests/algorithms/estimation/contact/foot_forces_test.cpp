@@ -140,6 +140,15 @@ TEST_F(FootForcesTest, GapAfterLiftOff_TeachesNothing) {
   EXPECT_EQ(forces_.sigma_n()[0], first_n);
 }
 
+TEST_F(FootForcesTest, LongGap_ASensorsZeroWalksOn) {
+  (void)ticks(500, {270.0, 270.0}, {0.0, 0.0});
+  const double before_n = forces_.sigma_n()[0];
+  tells_torques_ = false;
+  stamp_ns_ += 100'000'000'000;
+  (void)tick({270.0, 270.0}, {270.0, 270.0});
+  EXPECT_GT(forces_.sigma_n()[0], before_n + 3.0) << "by ten newtons in 100 s";
+}
+
 TEST_F(FootForcesTest, FootInTheAir_TellsHowWellTorquesDo) {
   (void)tick({270.0, 270.0}, {kNaN, kNaN});
   const double first_n = forces_.sigma_n()[0];
