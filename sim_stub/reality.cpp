@@ -75,7 +75,9 @@ std::string set_item(Reality& reality, const std::string& assignment) {
   }
   Reality changed = reality;
   try {
-    config::parse_params(assignment, assignment, config::param_table(changed));
+    config::ParamTable table = config::param_table(changed);
+    table.listed_by = "polygmap params reality";
+    config::parse_params({"", "--set " + assignment}, assignment, table);
   } catch (const config::FileError& error) {
     return error.what();
   }

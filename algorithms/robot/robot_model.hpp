@@ -143,16 +143,14 @@ struct DriveModel {
     return std::min({times * kp_nmprad[j], kp_most_nmprad[j], gain_limits[n].kp_nmprad});
   }
   [[nodiscard]] constexpr double kd_of(std::size_t n, double times = 1.0) const noexcept {
-    const std::size_t j = n % kJointsPerLeg;
-    return std::min({times * kd_nmsprad[j], kd_most_nmsprad[j], gain_limits[n].kd_nmsprad});
+    return std::min(wanted_kd(n, times), gain_limits[n].kd_nmsprad);
   }
   // Damping that is wanted beside the drive's own, which its command has no room for: it is to come as a torque, from
   // speeds that are some cycles old by then. No more than the drive's own: two dampers, of which the late one is no
   // larger, take energy out of every motion, whatever moves and at whatever constant delay.
   [[nodiscard]] constexpr double kd_beside(std::size_t n, double times = 1.0) const noexcept {
-    const std::size_t j = n % kJointsPerLeg;
     const double own_nmsprad = kd_of(n, times);
-    return std::min(std::min(times * kd_nmsprad[j], kd_most_nmsprad[j]) - own_nmsprad, own_nmsprad);
+    return std::min(wanted_kd(n, times) - own_nmsprad, own_nmsprad);
   }
 
   static void visit(auto& p, auto& field) {
@@ -165,6 +163,11 @@ struct DriveModel {
     field("delay_s", p.delay_s, 0.0, 0.05,
           "Delay of the drives by the data sheet: 2 ms on the bus, half a tick of hold.");
     field("armature_kgm2", p.armature_kgm2, 0.0, 5.0, "Inertia of a drive, seen at its joint.");
+  }
+
+ private:
+  [[nodiscard]] constexpr double wanted_kd(std::size_t n, double times) const noexcept {
+    return std::min(times * kd_nmsprad[n % kJointsPerLeg], kd_most_nmsprad[n % kJointsPerLeg]);
   }
 };
 

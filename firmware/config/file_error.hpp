@@ -2,6 +2,7 @@
 // What a user is told about a file that cannot be used.
 #pragma once
 
+#include <cstddef>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -24,5 +25,19 @@ namespace polygmap::config {
 struct FileError : std::runtime_error {
   explicit FileError(std::string sentence) : std::runtime_error(without_controls(std::move(sentence))) {}
 };
+
+// What a file is called in sentences about it: "bus", "/etc/polygmap/legs.toml". Without a kind it is no file but an
+// option of the command line, path all of it.
+struct FileName {
+  std::string kind;
+  std::string path;
+
+  // As: Bus file "legs.toml"
+  [[nodiscard]] std::string text() const;
+  [[noreturn]] void fail(std::size_t line, const std::string& what) const;
+};
+
+// Of a file that the last call could not open or read; what: "the bus file". Throws FileError with errno's reason.
+[[noreturn]] void fail_to_read(const std::string& what, const std::string& path);
 
 }  // namespace polygmap::config

@@ -94,7 +94,7 @@ class ParamFile {
         const std::string near = nearest(full, node.is_table());
         fail(key.source().begin.line,
              full + (node.is_table() ? " is no table of parameters; " : " is no parameter; ") +
-                 (near.empty() ? "`polygmap params list` names all" : "the nearest is " + near));
+                 (near.empty() ? "`" + table_.listed_by + "` names all" : "the nearest is " + near));
       }
     }
   }
@@ -186,11 +186,12 @@ class ParamFile {
 
 }  // namespace
 
-void parse_params(const std::string& path, std::string_view text, const ParamTable& table) {
-  ParamFile({"parameter", path}, table).read(text);
+void parse_params(const FileName& name, std::string_view text, const ParamTable& table) {
+  ParamFile(name, table).read(text);
 }
 void read_params(const std::string& path, const ParamTable& table) {
-  parse_params(path, read_text({"parameter", path}), table);
+  const FileName name{"parameter", path};
+  parse_params(name, read_text(name), table);
 }
 
 }  // namespace polygmap::config

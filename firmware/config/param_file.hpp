@@ -12,8 +12,7 @@ namespace polygmap::config {
 
 // Throws FileError, one sentence that names file, line and key; what the table points into may be half changed then.
 void read_params(const std::string& path, const ParamTable& table);
-// path: what the text is called.
-void parse_params(const std::string& path, std::string_view text, const ParamTable& table);
+void parse_params(const FileName& name, std::string_view text, const ParamTable& table);
 
 template <class T>
 void read_params(const std::string& path, T& params) {

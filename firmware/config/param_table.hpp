@@ -52,6 +52,7 @@ struct ParamOrder {
 struct ParamTable {
   std::vector<Param> params;
   std::vector<ParamOrder> orders;
+  std::string listed_by = "polygmap params list";  // the command that names them all
 };
 
 // "m/s" of walk_speed_mps; empty for a plain number.

@@ -30,28 +30,12 @@
 
 namespace polygmap::config {
 
-// What a file is called in sentences about it: "bus", "/etc/polygmap/legs.toml".
-struct FileName {
-  std::string kind;
-  std::string path;
-
-  // As: Bus file "legs.toml"
-  [[nodiscard]] std::string text() const {
-    std::string text = kind + " file \"" + path + "\"";
-    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
-    return text;
-  }
-  [[noreturn]] void fail(std::size_t line, const std::string& what) const {
-    throw FileError(text() + ", line " + std::to_string(line) + ": " + what + ".");
-  }
-};
-
 [[nodiscard]] inline std::string read_text(const FileName& name) {
   std::error_code none;
   if (std::filesystem::is_directory(name.path, none)) throw FileError(name.text() + ": it is a folder.");
   std::ifstream file(name.path, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw FileError("Cannot read the " + name.kind + " file \"" + name.path + "\".");
+  if (!file) fail_to_read("the " + name.kind + " file", name.path);
   return text;
 }
 

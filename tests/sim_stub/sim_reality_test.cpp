@@ -69,6 +69,7 @@ TEST(Reality, WrongAssignment_OneSentenceThatNamesIt) {
     EXPECT_EQ(sentence.back(), '.') << sentence;
   }
   EXPECT_NE(complaint_of("plant.frictoin=0.3").find("plant.friction"), std::string::npos);
+  EXPECT_EQ(complaint_of("foo=1"), "--set foo=1: foo is no parameter; `polygmap params reality` names all.");
 }
 
 // Stands under physics for a while, and what its ports say of it.

@@ -39,8 +39,7 @@ class FootForces {
       field("zero_walk_nprs", p.zero_walk_nprs, 0.0, 50.0, "Random walk of the zero.");
       field("lifted_s", p.lifted_s, 0.0, 1.0,
             "From a foot in the air nothing is learnt earlier: at lift-off it still carries, and one that is stuck is "
-            "found "
-            "to stand after `stuck_swing_s`.");
+            "found to stand after `stuck_swing_s`.");
       field("most_gap_s", p.most_gap_s, 0.001, 1.0,
             "A sample after a longer gap counts no more than after such a one.");
       field("light_n", p.light_n, 0.0, 200.0, "A force below this and below `light_sigmas` is none.");

@@ -25,21 +25,27 @@ class EarlyTouch {
     }
   };
 
-  void release() noexcept { *this = {}; }
-  // The sample that touch took last, by as much smaller as the foot's hurry makes it larger.
+  void release() noexcept {
+    samples_ = 0;
+    lands_ = false;
+  }
+  // The sample that touch took last.
   void take(const Params& params, const TouchEvidence::Params& evidence, const TouchEvidence& touch,
             double force_n) noexcept {
     if (samples_ > 0 ? !touch.likely(evidence) : !touch.touches(evidence, true)) return release();
     ++samples_;
-    const bool presses = touch.touches(evidence, false);
-    lands_ = presses && (force_n >= params.certain_n || samples_ > params.samples);
+    lands_ = touch.touches(evidence, false) && (force_n >= params.certain_n || samples_ > params.samples);
+    if (!lands_ && stopped_ <= 3 * params.samples) ++stopped_;
+    may_stop_ = stopped_ <= 3 * params.samples;
   }
   [[nodiscard]] bool lands() const noexcept { return lands_; }
   // The foot is to stand still meanwhile.
-  [[nodiscard]] bool stops() const noexcept { return samples_ > 0 && !lands_; }
+  [[nodiscard]] bool stops() const noexcept { return samples_ > 0 && !lands_ && may_stop_; }
 
  private:
   std::int32_t samples_ = 0;  // since the first that told of it
+  std::int32_t stopped_ = 0;  // samples of this swing that stopped the foot: a scrape at every start is to end
+  bool may_stop_ = true;
   bool lands_ = false;
 };
 

@@ -143,7 +143,7 @@ struct LandedFootParams {
   std::int64_t hold_ns = 200 * kNsPerMs;
   std::int64_t felt_hold_ns = 600 * kNsPerMs;
   double unloaded_n = 5.0;
-  std::int32_t unloaded_ticks = 10;
+  std::int32_t unloaded_samples = 10;
   double lower_mps = 0.1;
   double lower_mps2 = 2.0;
 
@@ -155,8 +155,9 @@ struct LandedFootParams {
           "A landed foot is held no longer where its force told of the ground.");
     field("unloaded_n", p.unloaded_n, 0.0, 200.0,
           "A foot that landed early and feels less than this hangs in the air.");
-    field("unloaded_ticks", p.unloaded_ticks, 0, 500,
-          "After so many ticks of that it is lowered to its target; pressed for longer it is held no more.");
+    field("unloaded_samples", p.unloaded_samples, 0, 500,
+          "After so many samples of that it is lowered to its target. A foot that landed early is held until it was "
+          "pressed in as many.");
     field("lower_mps", p.lower_mps, 0.0, 1.0, "The speed of that lowering.");
     field("lower_mps2", p.lower_mps2, 0.1, 100.0,
           "It begins and ends so gently, since the torques feed the leg's acceleration forward: from `lower_mps` it "

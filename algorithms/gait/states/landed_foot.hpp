@@ -35,13 +35,14 @@ class LandedFoot {
     // Of a bus that falls silent the last sample is read on and on.
     const bool sampled = std::exchange(felt_stamp_ns_, feedback.stamp_ns) != feedback.stamp_ns;
     if (sampled) {
-      unloaded_ticks_ = force_n < params.unloaded_n ? unloaded_ticks_ + 1 : 0;
-      pressed_ticks_ = force_n < params.pressed_n ? 0 : pressed_ticks_ + 1;
+      unloaded_samples_ = force_n < params.unloaded_n ? unloaded_samples_ + 1 : 0;
+      pressed_samples_ = force_n < params.pressed_n ? 0 : pressed_samples_ + 1;
     }
     // What landed early may have knocked against a riser, for a moment.
-    const std::int32_t enough_ticks = to_lower_m_ > 0.0 ? params.unloaded_ticks : 0;
-    held_ = pressed_ticks_ <= enough_ticks && now_ns - landed_ns_ < most_ns;
-    lower(params, sampled && unloaded_ticks_ > params.unloaded_ticks);
+    const std::int32_t enough_samples = to_lower_m_ > 0.0 ? params.unloaded_samples : 0;
+    held_ = pressed_samples_ <= enough_samples && now_ns - landed_ns_ < most_ns;
+    silent_ticks_ = sampled ? 0 : silent_ticks_ + 1;
+    lower(params, unloaded_samples_ > params.unloaded_samples && silent_ticks_ < kSilent_ticks);
   }
   // The plan goes on in another frame.
   void carry(const Transform& to_T_plan) noexcept { plan_T_sole_ = to_T_plan * plan_T_sole_; }
@@ -64,13 +65,16 @@ class LandedFoot {
     plan_T_sole_.p_m.z() -= by_m;
   }
 
+  static constexpr std::int32_t kSilent_ticks = 3;  // one cycle without a sample is none of a silent bus
+
   Foot foot_ = Foot::kLeft;
   bool felt_ = false;
   bool held_ = false;
   std::int64_t landed_ns_ = 0;
   std::int64_t felt_stamp_ns_ = 0;
-  std::int32_t unloaded_ticks_ = 0;
-  std::int32_t pressed_ticks_ = 0;
+  std::int32_t unloaded_samples_ = 0;
+  std::int32_t pressed_samples_ = 0;
+  std::int32_t silent_ticks_ = 0;
   double to_lower_m_ = 0.0;
   double speed_mps_ = 0.0;  // downwards
   Transform odom_T_sole_, plan_T_sole_;

@@ -46,19 +46,22 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
 bool SwingPhase::feel_force(const GaitInput& in, const SwingParams& params) noexcept {
   if (std::exchange(felt_stamp_ns_, in.feedback.stamp_ns) == in.feedback.stamp_ns) return false;
   const std::size_t foot = index_of(goal_.foot);
-  touch_.take(params.touch, in.feedback.foot_force_n[foot], feigned_share() * in.state.foot_force_sigma_n[foot]);
+  // What masses and friction feign grows with the leg's accelerations: with the pace squared of a foot that hurries.
+  // Down in search of the ground it gathers speed gently.
+  const bool searches = timing_.tick() > path_.duration_ticks();
+  const double hurry = searches ? 1.0 : std::max(timing_.pace(), 1.0);
+  touch_.take(params.touch, in.feedback.foot_force_n[foot], math::square(hurry) * in.state.foot_force_sigma_n[foot]);
   if (touch_.hangs()) unloaded_ = true;
   return true;
 }
 
-double SwingPhase::feigned_share() const noexcept {
-  const bool searches = timing_.tick() > path_.duration_ticks();  // at one speed
-  return searches ? 1.0 : math::square(std::max(timing_.pace(), 1.0));
-}
-
-SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& params,
+SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& params, std::int64_t steer_age_ns,
                                      const Transform& odom_T_sole) noexcept {
   const bool sampled = feel_force(in, params);
+  if (in.now_ns - in.feedback.stamp_ns > steer_age_ns) {  // what was felt then tells nothing of now
+    touch_ = {};
+    early_touch_.release();
+  }
   Contact contact;
   const double above_target_m = path_.at(timing_.last_tick()).p_m.z() - goal_.target.position_m.z();
   if (above_target_m > params.early.from_m) contact.early_m = above_target_m;
@@ -66,8 +69,7 @@ SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& par
   if (!may_land || contact.early_m == 0.0) {
     early_touch_.release();
   } else if (sampled) {
-    early_touch_.take(params.early, params.touch, touch_,
-                      in.feedback.foot_force_n[index_of(goal_.foot)] / feigned_share());
+    early_touch_.take(params.early, params.touch, touch_, in.feedback.foot_force_n[index_of(goal_.foot)]);
   }
   contact.felt = contact.early_m > 0.0 ? early_touch_.lands() : touch_.touches(params.touch, false);
   // What does not go down any more stands on something, whatever its force sensor says.
@@ -87,7 +89,7 @@ Transition SwingPhase::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const Transform odom_T_sole = sole();
   const double lowered_m = path_.lowered_m(timing_.tick());
   const bool was_stopped = early_touch_.stops();
-  const Contact contact = feel(in, params, odom_T_sole);
+  const Contact contact = feel(in, params, gait.params.steer_age_ns, odom_T_sole);
   if (early_touch_.stops() && !was_stopped) gait.plan.restart_posture();
   if (contact.ground) {
     if (contact.early_m > 0.0) ++gait.status.early_contacts;
@@ -153,7 +155,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .side_room_m = goal_.foothold.side_room_m[index_of(goal_.foot)] - params.side_margin_m,
                    .wanted_back = timing_.tick() < (in.leg_impaired ? until : stop_until),
                    .may_hurry = !in.leg_impaired,
-                   .stopped = early_touch_.stops() && in.now_ns - in.feedback.stamp_ns <= gait.params.steer_age_ns},
+                   .stopped = early_touch_.stops()},
                   path_.duration_ticks());
   // The torso is on its way up: the foot is to reach where it stood all the same.
   if (timing_.goes_back() && !went_back) lower_torso(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));

@@ -24,12 +24,11 @@ class SwingPhase {
     double early_m = 0.0;  // so far above the target, where that is early
     bool ground = false;   // the foot stands on something
   };
-  // What masses and friction feign of a force grows with the leg's accelerations: with the pace squared of a foot that
-  // hurries.
-  [[nodiscard]] double feigned_share() const noexcept;
   // Each sample once: of a bus that falls silent the last one is read on and on.
   [[nodiscard]] bool feel_force(const GaitInput& in, const SwingParams& params) noexcept;
-  [[nodiscard]] Contact feel(const GaitInput& in, const SwingParams& params, const Transform& odom_T_sole) noexcept;
+  // steer_age_ns: older samples tell nothing.
+  [[nodiscard]] Contact feel(const GaitInput& in, const SwingParams& params, std::int64_t steer_age_ns,
+                             const Transform& odom_T_sole) noexcept;
   [[nodiscard]] Transition abort_swing(const GaitInput& in, GaitShared& gait) noexcept;
   [[nodiscard]] Transition touch_down(const GaitInput& in, GaitShared& gait, bool felt, double early_m) noexcept;
   void stop_foot(const GaitInput& in, GaitShared& gait) const noexcept;

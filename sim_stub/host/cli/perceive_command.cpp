@@ -113,7 +113,7 @@ std::string one_picture(const PerceiveArguments& a, const config::CameraProfile&
   std::vector<double>& times = perceived.microseconds;
   std::sort(times.begin(), times.end());
   const Vec3& up = perceived.camera_up;
-  if (const std::string doubt = doubt_of_gravity(perceived); !doubt.empty()) {
+  if (const std::string doubt = doubt_of(perceived); !doubt.empty()) {
     err << "polygmap: warning: \"" << path << "\": " << doubt << "\n";
   }
   const std::string source = name_of(perceived.up_source) +

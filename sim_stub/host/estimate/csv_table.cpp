@@ -45,7 +45,7 @@ std::string read_text(const std::string& path) {
                               " MiB, more than a log that is read.");
     }
   }
-  if (!file.is_open() || file.bad()) throw config::FileError("Cannot read \"" + path + "\".");
+  if (!file.is_open() || file.bad()) config::fail_to_read("the log", path);
   if (text.empty()) throw config::FileError("\"" + path + "\" is empty.");
   return text;
 }

@@ -168,7 +168,7 @@ DepthPng read_depth(const std::string& path) {
     fail("\"" + path + "\" has " + std::to_string(bytes) + " bytes, more than any depth picture that is read.");
   }
   std::vector<unsigned char> file;
-  if (lodepng::load_file(file, path) != 0) fail("Cannot read the picture \"" + path + "\".");
+  if (lodepng::load_file(file, path) != 0) config::fail_to_read("the picture", path);
   if (file.empty()) fail("The picture \"" + path + "\" is empty.");
   lodepng::State state;
   unsigned width = 0, height = 0;
@@ -204,6 +204,11 @@ Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture,
   const Vec3 along_the_picture{0.0, -1.0, 0.0};
   Extraction extraction(camera, picture, values);
   Perceived out;
+  const auto in_range = std::ranges::count_if(picture.depth, [&](std::uint16_t raw) {
+    const double z_m = raw * camera.intrinsics.depth_unit_m;
+    return z_m >= camera.min_depth_m && z_m <= camera.max_depth_m;
+  });
+  out.in_range_share = static_cast<double>(in_range) / static_cast<double>(picture.depth.size());
   if (gravity) {
     out.camera_up = -gravity->normalized();
     out.up_source = UpSource::kGiven;
@@ -255,8 +260,13 @@ const char* name_of(UpSource source) {
   return "?";
 }
 
-std::string doubt_of_gravity(const Perceived& perceived) {
+std::string doubt_of(const Perceived& perceived) {
   constexpr double kLevel = 0.97;  // cosine of 14 degrees
+  constexpr double kLeastInRange_share = 0.001;
+  if (perceived.in_range_share < kLeastInRange_share) {
+    return "Less than one pixel in a thousand has a depth in the camera's range: are min_depth_m, max_depth_m and "
+           "depth_unit_m in its file those of this picture?";
+  }
   if (perceived.up_source != UpSource::kGiven) return {};
   double upright_m2 = 0.0, upside_down_m2 = 0.0, all_m2 = 0.0, level_looking_m2 = 0.0;
   for (const PerceivedPlane& pieces : perceived.planes) {
@@ -322,7 +332,7 @@ void write_planes(const std::string& path, const Perceived& perceived, const std
     planes.push_back(j);
   }
   Json warnings = Json::array();
-  if (const std::string doubt = doubt_of_gravity(perceived); !doubt.empty()) warnings.push_back(doubt);
+  if (const std::string doubt = doubt_of(perceived); !doubt.empty()) warnings.push_back(doubt);
   const Json json{{"planes", planes},
                   {"up", point(perceived.camera_up)},
                   {"up_source", name_of(perceived.up_source)},

@@ -41,6 +41,7 @@ struct Perceived {
   Vec3 camera_up = Vec3::Zero();
   UpSource up_source = UpSource::kAssumed;
   std::optional<Vec3> found_up;      // by the largest plane that looks level, whether up was given or not
+  double in_range_share = 0.0;       // of the pixels: with a depth that the camera's file has in its range
   std::vector<double> microseconds;  // one per repetition
 };
 
@@ -50,9 +51,10 @@ struct Perceived {
                                  const polygmap_frames::Values& values = {},
                                  const std::atomic<int>* interrupt = nullptr);
 
-// One sentence where the picture contradicts the direction given: what is level by it faces downwards, and nothing
-// level faces upwards; or the largest plane that looks level is none by it, and less is. Else empty.
-[[nodiscard]] std::string doubt_of_gravity(const Perceived& perceived);
+// One sentence where hardly a pixel is in the camera's range; or where the picture contradicts the direction given:
+// what is level by it faces downwards, and nothing level faces upwards; or the largest plane that looks level is none
+// by it, and less is. Else empty.
+[[nodiscard]] std::string doubt_of(const Perceived& perceived);
 
 // Throw config::FileError when the file cannot be written.
 void write_labels(const std::string& path, const DepthPng& picture, const Perceived& perceived);

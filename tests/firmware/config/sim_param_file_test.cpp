@@ -130,7 +130,7 @@ TEST(ParamFile, NoFile_IsSaid) {
     read_params("/nowhere/params.toml", params);
     ADD_FAILURE();
   } catch (const FileError& error) {
-    EXPECT_STREQ(error.what(), "Cannot read the parameter file \"/nowhere/params.toml\".");
+    EXPECT_STREQ(error.what(), "Cannot read the parameter file \"/nowhere/params.toml\": No such file or directory.");
   }
   EXPECT_THROW(read_params(testing::TempDir(), params), FileError);
 }

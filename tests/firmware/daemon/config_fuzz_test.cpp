@@ -170,7 +170,7 @@ void fuzz_params(int runs, unsigned seed) {
   int looked_at = 0;
   const int taken = fuzz_file(kParams, path, runs, seed, [&](const std::string& text) {
     params = otherwise;
-    config::parse_params(path, text, table);
+    config::parse_params({"parameter", path}, text, table);
     if (++looked_at % 20 == 0) expect_params(table);
   });
   expect_some(taken, runs);

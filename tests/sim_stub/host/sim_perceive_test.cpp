@@ -393,6 +393,19 @@ TEST(CameraProfiles, OfTheProject_AreReadAndSayWhatTheyKnow) {
   EXPECT_EQ(own.max_depth_m, built_in.limits.max_depth_m);
 }
 
+TEST_F(PerceiveCommand, HardlyADepthInRange_IsTold) {
+  // None; 0.1 m and 7 m, where 0.2 to 6 m are looked at.
+  for (const std::uint16_t raw : std::initializer_list<std::uint16_t>{0, 100, 7000, 65535}) {
+    write_depth("far.png", std::vector<std::uint16_t>(640 * 480, raw), 640, 480);
+    EXPECT_EQ(call({"perceive", at("far.png"), "--camera", at("camera.toml"), "--json", at("out.json")}), kExitPass);
+    EXPECT_NE(err_.find("depth_unit_m in its file those of this picture?"), std::string::npos) << raw << err_;
+    EXPECT_EQ(nlohmann::json::parse(std::ifstream(at("out.json")))["warnings"].size(), 1U);
+  }
+  write_depth("near.png", std::vector<std::uint16_t>(640 * 480, 1000), 640, 480);
+  EXPECT_EQ(call({"perceive", at("near.png"), "--camera", at("camera.toml")}), kExitPass);
+  EXPECT_EQ(err_, "");
+}
+
 // What a camera file may say and what the extractor takes are the same.
 TEST_F(PerceiveCommand, CamerasAtTheBoundsOfWhatIsAllowed_AreTaken) {
   const std::vector<std::uint16_t> depth(32 * 32, 1000);

@@ -55,6 +55,13 @@ TEST_F(EarlyTouchTest, ForceAroundTheEvenOne_EndsSoon) {
   EXPECT_LE(stopped, kEarly.samples + 2);
 }
 
+// A scrape that is there only while the foot moves.
+TEST_F(EarlyTouchTest, GoneAtEveryStop_StopsNoMoreAfterSome) {
+  for (int i = 0; i < 200; ++i) take(early.stops() ? 0.0 : 60.0);
+  EXPECT_FALSE(early.stops());
+  EXPECT_LE(stopped, 3 * kEarly.samples);
+}
+
 TEST_F(EarlyTouchTest, NoNumber_IsNoTouch) {
   for (int i = 0; i < 8; ++i) take(60.0);
   for (int i = 0; i < 8; ++i) take(std::numeric_limits<double>::quiet_NaN());
