@@ -18,7 +18,9 @@ void FileName::fail(std::size_t line, const std::string& what) const {
 }
 
 void fail_to_read(const std::string& what, const std::string& path) {
-  throw FileError("Cannot read " + what + " \"" + path + "\": " + std::generic_category().message(errno) + ".");
+  const int why = errno;
+  throw FileError("Cannot read " + what + " \"" + path + "\"" +
+                  (why == 0 ? "" : ": " + std::generic_category().message(why)) + ".");
 }
 
 }  // namespace polygmap::config

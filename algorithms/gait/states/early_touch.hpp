@@ -27,25 +27,31 @@ class EarlyTouch {
 
   void release() noexcept {
     samples_ = 0;
-    lands_ = false;
+    stops_ = lands_ = false;
   }
   // The sample that touch took last.
   void take(const Params& params, const TouchEvidence::Params& evidence, const TouchEvidence& touch,
             double force_n) noexcept {
     if (samples_ > 0 ? !touch.likely(evidence) : !touch.touches(evidence, true)) return release();
     ++samples_;
-    lands_ = touch.touches(evidence, false) && (force_n >= params.certain_n || samples_ > params.samples);
-    if (!lands_ && stopped_ <= 3 * params.samples) ++stopped_;
-    may_stop_ = stopped_ <= 3 * params.samples;
+    const bool may_stop = stopped_ < kMostStops * params.samples;
+    const bool still_felt = may_stop && samples_ > params.samples;
+    lands_ = touch.touches(evidence, false) && (force_n >= params.certain_n || still_felt);
+    stops_ = may_stop && !lands_;
+    if (stops_) ++stopped_;
   }
   [[nodiscard]] bool lands() const noexcept { return lands_; }
   // The foot is to stand still meanwhile.
-  [[nodiscard]] bool stops() const noexcept { return samples_ > 0 && !lands_ && may_stop_; }
+  [[nodiscard]] bool stops() const noexcept { return stops_; }
 
  private:
+  // A scrape that begins again whenever the foot goes on stops it no more after so many whole stops of a swing: then
+  // only what presses by certain_n is the ground.
+  static constexpr std::int32_t kMostStops = 3;
+
   std::int32_t samples_ = 0;  // since the first that told of it
-  std::int32_t stopped_ = 0;  // samples of this swing that stopped the foot: a scrape at every start is to end
-  bool may_stop_ = true;
+  std::int32_t stopped_ = 0;  // samples of this swing that stopped the foot
+  bool stops_ = false;
   bool lands_ = false;
 };
 

@@ -156,8 +156,8 @@ struct LandedFootParams {
     field("unloaded_n", p.unloaded_n, 0.0, 200.0,
           "A foot that landed early and feels less than this hangs in the air.");
     field("unloaded_samples", p.unloaded_samples, 0, 500,
-          "After so many samples of that it is lowered to its target. A foot that landed early is held until it was "
-          "pressed in as many.");
+          "After more samples of that in a row it is lowered to its target. A foot that landed early is held until it "
+          "was pressed in more.");
     field("lower_mps", p.lower_mps, 0.0, 1.0, "The speed of that lowering.");
     field("lower_mps2", p.lower_mps2, 0.1, 100.0,
           "It begins and ends so gently, since the torques feed the leg's acceleration forward: from `lower_mps` it "

@@ -65,7 +65,7 @@ class LandedFoot {
     plan_T_sole_.p_m.z() -= by_m;
   }
 
-  static constexpr std::int32_t kSilent_ticks = 3;  // one cycle without a sample is none of a silent bus
+  static constexpr std::int32_t kSilent_ticks = 3;  // a bus that misses one sample or two is not silent
 
   Foot foot_ = Foot::kLeft;
   bool felt_ = false;

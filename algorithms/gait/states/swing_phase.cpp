@@ -43,7 +43,11 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   body.release_landed_foot();
 }
 
-bool SwingPhase::feel_force(const GaitInput& in, const SwingParams& params) noexcept {
+bool SwingPhase::feel_force(const GaitInput& in, const SwingParams& params, std::int64_t steer_age_ns) noexcept {
+  if (in.now_ns - in.feedback.stamp_ns > steer_age_ns) {  // what was felt then tells nothing of now
+    touch_ = {};
+    early_touch_.release();
+  }
   if (std::exchange(felt_stamp_ns_, in.feedback.stamp_ns) == in.feedback.stamp_ns) return false;
   const std::size_t foot = index_of(goal_.foot);
   // What masses and friction feign grows with the leg's accelerations: with the pace squared of a foot that hurries.
@@ -57,11 +61,7 @@ bool SwingPhase::feel_force(const GaitInput& in, const SwingParams& params) noex
 
 SwingPhase::Contact SwingPhase::feel(const GaitInput& in, const SwingParams& params, std::int64_t steer_age_ns,
                                      const Transform& odom_T_sole) noexcept {
-  const bool sampled = feel_force(in, params);
-  if (in.now_ns - in.feedback.stamp_ns > steer_age_ns) {  // what was felt then tells nothing of now
-    touch_ = {};
-    early_touch_.release();
-  }
+  const bool sampled = feel_force(in, params, steer_age_ns);
   Contact contact;
   const double above_target_m = path_.at(timing_.last_tick()).p_m.z() - goal_.target.position_m.z();
   if (above_target_m > params.early.from_m) contact.early_m = above_target_m;
@@ -211,7 +211,7 @@ void SwingPhase::land_beside(GaitShared& gait, const SolePose& target) noexcept 
 // The only way that is known to be free is the one it came: the swing backwards.
 Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexcept {
   const SwingParams& params = gait.params.swing;
-  (void)feel_force(in, params);
+  (void)feel_force(in, params, gait.params.steer_age_ns);
   const Transform odom_T_sole = sole();
   const double above_m = odom_T_sole.p_m.z() - path_.start_height_m();
   const bool felt = touch_.touches(params.touch, false), all_the_way = timing_.tick() < 0.0;

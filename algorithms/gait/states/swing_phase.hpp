@@ -24,9 +24,9 @@ class SwingPhase {
     double early_m = 0.0;  // so far above the target, where that is early
     bool ground = false;   // the foot stands on something
   };
-  // Each sample once: of a bus that falls silent the last one is read on and on.
-  [[nodiscard]] bool feel_force(const GaitInput& in, const SwingParams& params) noexcept;
-  // steer_age_ns: older samples tell nothing.
+  // Each sample once: of a bus that falls silent the last one is read on and on, and older than steer_age_ns it tells
+  // nothing.
+  [[nodiscard]] bool feel_force(const GaitInput& in, const SwingParams& params, std::int64_t steer_age_ns) noexcept;
   [[nodiscard]] Contact feel(const GaitInput& in, const SwingParams& params, std::int64_t steer_age_ns,
                              const Transform& odom_T_sole) noexcept;
   [[nodiscard]] Transition abort_swing(const GaitInput& in, GaitShared& gait) noexcept;

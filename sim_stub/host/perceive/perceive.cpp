@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "algorithms/perception/image/depth_range.hpp"
 #include "sim_stub/host/output_file.hpp"
 
 namespace polygmap::sim {
@@ -204,10 +205,9 @@ Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture,
   const Vec3 along_the_picture{0.0, -1.0, 0.0};
   Extraction extraction(camera, picture, values);
   Perceived out;
-  const auto in_range = std::ranges::count_if(picture.depth, [&](std::uint16_t raw) {
-    const double z_m = raw * camera.intrinsics.depth_unit_m;
-    return z_m >= camera.min_depth_m && z_m <= camera.max_depth_m;
-  });
+  RawRange range;
+  range.set({camera.min_depth_m, camera.max_depth_m}, camera.intrinsics.depth_unit_m);
+  const auto in_range = std::ranges::count_if(picture.depth, [&](std::uint16_t raw) { return range.valid(raw); });
   out.in_range_share = static_cast<double>(in_range) / static_cast<double>(picture.depth.size());
   if (gravity) {
     out.camera_up = -gravity->normalized();

@@ -123,24 +123,22 @@ TEST(GaitContact, BusSilentAfterAScrape_IsNoGround) {
 
 // A contact above the target stops the foot, and then the bus is silent: what it said then lands no foot.
 TEST(GaitContact, BusSilentWhileTheFootIsStopped_LandsWhereTheGroundIs) {
-  for (const int silent_ms : {16, 60}) {
-    IdealClimb climb({});
-    JointFeedback last;
-    climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
-      const LatchedStep& step = climb.status().step;
-      const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns - 540 * kNsPerMs;
-      if (climb.status().phase != GaitPhase::kSwing || step.sequence != 2 || since_ns < 0) return;
-      if (since_ns < 12 * kNsPerMs) {
-        feedback.foot_force_n[index_of(step.foot)] = 60.0;
-        last = feedback;
-      } else if (since_ns < (12 + silent_ms) * kNsPerMs) {
-        feedback = last;
-      }
-    };
-    ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
-    EXPECT_EQ(climb.status().early_contacts, 0U) << silent_ms << " ms";
-    EXPECT_LT(climb.record().execution_z_m, 0.003);
-  }
+  IdealClimb climb({});
+  JointFeedback last;
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
+    const LatchedStep& step = climb.status().step;
+    const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns - 540 * kNsPerMs;
+    if (climb.status().phase != GaitPhase::kSwing || step.sequence != 2 || since_ns < 0) return;
+    if (since_ns < 12 * kNsPerMs) {
+      feedback.foot_force_n[index_of(step.foot)] = 60.0;
+      last = feedback;
+    } else if (since_ns < 72 * kNsPerMs) {
+      feedback = last;
+    }
+  };
+  ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
+  EXPECT_EQ(climb.status().early_contacts, 0U);
+  EXPECT_LT(climb.record().execution_z_m, 0.003);
 }
 
 // The base comes 10 mm off its plan: a foot that is hardly pressed must not go along.

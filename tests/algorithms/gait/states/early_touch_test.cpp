@@ -55,11 +55,16 @@ TEST_F(EarlyTouchTest, ForceAroundTheEvenOne_EndsSoon) {
   EXPECT_LE(stopped, kEarly.samples + 2);
 }
 
-// A scrape that is there only while the foot moves.
-TEST_F(EarlyTouchTest, GoneAtEveryStop_StopsNoMoreAfterSome) {
-  for (int i = 0; i < 200; ++i) take(early.stops() ? 0.0 : 60.0);
+// A scrape that is there only while the foot moves lands it nowhere, and ends stopping it.
+TEST_F(EarlyTouchTest, GoneAtEveryStop_StopsNoMoreAfterSome_AndLandsOnlyWhereItPresses) {
+  for (int i = 0; i < 200; ++i) {
+    take(early.stops() ? 0.0 : 60.0);
+    ASSERT_FALSE(early.lands()) << "sample " << i;
+  }
   EXPECT_FALSE(early.stops());
-  EXPECT_LE(stopped, 3 * kEarly.samples);
+  EXPECT_EQ(stopped, 3 * kEarly.samples);
+  take(kEarly.certain_n);
+  EXPECT_TRUE(early.lands());
 }
 
 TEST_F(EarlyTouchTest, NoNumber_IsNoTouch) {
