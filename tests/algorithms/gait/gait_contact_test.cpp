@@ -121,20 +121,18 @@ TEST(GaitContact, BusSilentAfterAScrape_IsNoGround) {
   EXPECT_LT(climb.record().execution_z_m, 0.003);
 }
 
-// A contact above the target stops the foot, and then the bus is silent: what it said then lands no foot.
-TEST(GaitContact, BusSilentWhileTheFootIsStopped_LandsWhereTheGroundIs) {
+// A scrape stops the foot, the bus is silent for 60 ms, and the foot scrapes again: what it felt before counts no more.
+TEST(GaitContact, BusSilentBetweenTwoScrapes_LandsWhereTheGroundIs) {
   IdealClimb climb({});
   JointFeedback last;
   climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
     const LatchedStep& step = climb.status().step;
     const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns - 540 * kNsPerMs;
     if (climb.status().phase != GaitPhase::kSwing || step.sequence != 2 || since_ns < 0) return;
-    if (since_ns < 12 * kNsPerMs) {
-      feedback.foot_force_n[index_of(step.foot)] = 60.0;
-      last = feedback;
-    } else if (since_ns < 72 * kNsPerMs) {
-      feedback = last;
-    }
+    const std::int64_t since_ms = since_ns / kNsPerMs;
+    if (since_ms < 20 || (since_ms >= 80 && since_ms < 92)) feedback.foot_force_n[index_of(step.foot)] = 60.0;
+    if (since_ms < 20) last = feedback;
+    if (since_ms >= 20 && since_ms < 80) feedback = last;
   };
   ASSERT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
   EXPECT_EQ(climb.status().early_contacts, 0U);
