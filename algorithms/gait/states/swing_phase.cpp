@@ -142,7 +142,10 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                        : reaches_back    ? params.abort_share * path_.duration_ticks()
                        : reaches_shortly ? params.abort_passing_ticks
                                          : 0.0;
-  const double stop_until = in.stop_requested == StopReason::kOperator ? params.abort_passing_ticks : 0.0;
+  // Back down to a lower tread the body topples, which is on its way up: on it goes where that takes no longer.
+  const double stop_until = in.stop_requested != StopReason::kOperator ? 0.0
+                            : reaches_back                             ? params.abort_passing_ticks
+                                                                       : path_.duration_ticks() - params.stop_ticks;
   const bool went_back = timing_.goes_back();
   // A plan that has just been stopped, or has just gone on, is no body that falls.
   unjudged_ticks_ = in.mute ? params.unjudged_ticks : std::max(unjudged_ticks_ - 1, 0);

@@ -28,7 +28,8 @@ class DaemonFile {
   DaemonFile(const std::string& path, const toml::table& root) : path_(path), root_(path, "", root, 1) {}
 
   DaemonConfig read() {
-    root_.only({"bus", "params", "lanes", "real_time", "hold_s", "control", "perception", "camera", "imu", "lio"});
+    root_.only(
+        {"bus", "params", "lanes", "real_time", "hold_s", "control", "perception", "camera", "imu", "lio", "operator"});
     config_.path = path_;
     config_.lanes = static_cast<std::size_t>(root_.whole("lanes", {1, kLaneCount, ""}, kLaneCount));
     config_.needs_real_time = root_.choice("real_time", {"required", "preferred"}, 0) == 0;
@@ -41,6 +42,10 @@ class DaemonFile {
     check_placement();
     take_camera(*root_.section("camera", true));
     if (root_.has("params")) config::read_params(file("params"), config_.params);
+    if (root_.has("operator")) {
+      config_.operator_socket = root_.text("operator");
+      config_.params.supervisor.autostart = false;
+    }
     take_bus();
     take_imu(*root_.section("imu", true));
     if (const auto lio = root_.section("lio", false)) take_lio(*lio);
