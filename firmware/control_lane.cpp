@@ -64,7 +64,9 @@ ControlLane::ControlLane(const ControlPorts& ports, ControlPerceptionLink& link,
 }
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {
-  if (start_.first_ns < 0) start_.first_ns = imu_came_ns_ = now_ns;
+  if (start_.first_ns < 0) imu_came_ns_ = now_ns;
+  // Before it is to arm nobody is waited for.
+  if (start_.first_ns < 0 || !supervisor_.may_arm()) start_.first_ns = now_ns;
   look_across(now_ns);
   read_operator(now_ns);
   sense_imu(now_ns);
@@ -75,22 +77,31 @@ Progress ControlLane::sense(std::int64_t now_ns) noexcept {
 void ControlLane::read_operator(std::int64_t now_ns) noexcept {
   OperatorCommand command{};
   if (ports_.operator_input == nullptr || !ports_.operator_input->try_read(command)) return;
-  if (!try_obey(command, now_ns)) health_.raise(Limit::kOperatorRefused, now_ns);
+  const bool obeyed = try_obey(command, now_ns);
+  if (!obeyed) health_.raise(Limit::kOperatorRefused, now_ns);
+  ports_.operator_input->answer(obeyed);
 }
 
 bool ControlLane::try_obey(OperatorCommand command, std::int64_t now_ns) noexcept {
   const ModuleState state = module_state();
-  if (command == OperatorCommand::kReset) {  // is what stopped it over?
-    const StateEstimate& estimate = estimator_.state();
-    const bool speak = drives_.silent.is_empty() && drives_.bus.drive_errors.is_empty() &&
-                       now_ns - estimate.oldest_input_ns <= params_.gait.steer_age_ns;
-    if (!speak || !supervisor_.try_obey(command, state)) return false;
+  if (!Supervisor::answers(state, command)) return false;
+  if (command == OperatorCommand::kReset) {
+    if (!is_sound(now_ns) || !gait_.try_restart(estimator_.state().q_rad)) return false;
     overload_ = {};
-    return gait_.try_restart(estimate.q_rad);
   }
-  if (!supervisor_.try_obey(command, state)) return false;
+  supervisor_.obey(command, state);
   if (command == OperatorCommand::kStop && state != ModuleState::kArming) gait_.request_stop(StopReason::kOperator);
   return true;
+}
+
+// What may have stopped it is over, and both feet carry: one that a mute knee kept up counts as standing only until the
+// drive speaks again.
+bool ControlLane::is_sound(std::int64_t now_ns) const noexcept {
+  constexpr double kStands = 0.5;  // probability
+  const StateEstimate& state = estimator_.state();
+  return drives_.silent.is_empty() && drives_.bus.drive_errors.is_empty() && overload_.takes_commands() &&
+         now_ns - state.oldest_input_ns <= params_.gait.steer_age_ns && state.contact_probability[0] > kStands &&
+         state.contact_probability[1] > kStands;
 }
 
 // One that came and was rejected is not missing, too.
@@ -219,8 +230,9 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   }
   gait_.allow_steps(supervisor_.may_step());
   gait_.tick(now_ns, estimator_.state(), footholds(), estimator_.leg_sensing().joints(), command_);
-  if (estimator_.state().initialised) {
-    supervisor_.watch_lean(params_.supervisor, estimator_.state().odom_T_base.R);
+  const StateEstimate& state = estimator_.state();
+  if (state.initialised && now_ns - estimator_.newest_imu_ns() <= params_.gait.steer_age_ns) {
+    supervisor_.watch_lean(params_.supervisor, state.odom_T_base.R);
   }
   if (supervisor_.has_fallen()) damp_joints(now_ns);
   estimator_.leg_sensing().to_encoders(command_);

@@ -59,6 +59,7 @@ class ControlLane {
   void look_across(std::int64_t now_ns) noexcept;
   void read_operator(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool try_obey(OperatorCommand command, std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool is_sound(std::int64_t now_ns) const noexcept;
   void sense_imu(std::int64_t now_ns) noexcept;
   void read_joints(std::int64_t now_ns) noexcept;
   // While it arms, in every cycle; joints: the feedback that came, or null.

@@ -42,7 +42,7 @@ inline constexpr std::array kModuleStateTable{
     ModuleStateInfo{"stopping", "It was asked to stop, or has to: a foot in the air comes down first."},
     ModuleStateInfo{"safe_stop", "The gait has stopped on two feet and holds; the stop's reason says why."},
     ModuleStateInfo{"on_top", "The gait has ended the climb, and holds."},
-    ModuleStateInfo{"fallen", "The joints are damped, and nothing else is asked of them, until the module is started anew."},
+    ModuleStateInfo{"fallen", "The joints are damped, and nothing else is asked of them; only a new start leads on."},
 };
 static_assert(kModuleStateTable.size() == static_cast<std::size_t>(ModuleState::kFallen) + 1);
 [[nodiscard]] constexpr std::string_view name_of(ModuleState state) noexcept {
@@ -104,19 +104,19 @@ class Supervisor {
     *this = {};
     armed_ = started_ = params.autostart;
   }
-  // False: not in this state, and nothing changes. What of the gait is asked to stop, or to begin anew, the caller
-  // does.
-  [[nodiscard]] bool try_obey(OperatorCommand command, ModuleState state) noexcept {
+  [[nodiscard]] static bool answers(ModuleState state, OperatorCommand command) noexcept {
     const auto is_this = [=](const OperatorTransition& t) { return t.from == state && t.command == command; };
-    if (std::ranges::none_of(kOperatorTransitions, is_this)) return false;
+    return std::ranges::any_of(kOperatorTransitions, is_this);
+  }
+  // In a state that answers the command. What of the gait is asked to stop, or to begin anew, the caller does.
+  void obey(OperatorCommand command, ModuleState state) noexcept {
     if (command == OperatorCommand::kArm) armed_ = true;
     if (command == OperatorCommand::kStop && state == ModuleState::kArming) armed_ = false;
     if (command == OperatorCommand::kStart) started_ = true;
     if (command == OperatorCommand::kReset) started_ = false;
     paused_ = command == OperatorCommand::kPause;
-    return true;
   }
-  // Every tick, with an estimate that is fresh.
+  // Every tick in which the estimate hears of the IMU.
   void watch_lean(const Params& params, const Mat3& odom_R_base) noexcept {
     leaning_ticks_ = odom_R_base(2, 2) < std::cos(params.fallen_rad) ? leaning_ticks_ + 1 : 0;
     fallen_ = fallen_ || leaning_ticks_ >= params.fallen_ticks;

@@ -46,6 +46,7 @@ bool Gait::try_restart(const JointVector& q_rad) noexcept {
   stop_requested_ = StopReason::kNone;
   leg_impaired_ = lost_in_swing_ = false;
   memory_ = {.toes_calibrated = memory_.toes_calibrated};
+  planner_.restart();
   status_.phase = GaitPhase::kStandstill;
   status_.stop_reason = StopReason::kNone;
   status_.stop_measured_m = 0.0;

@@ -31,6 +31,7 @@ constexpr const char* kUsage =
     "Exit codes of --config: 0 asked to stop, 1 stopped by itself, 2 configuration, 3 device, 4 no real time, 5 as 0 "
     "with the\n"
     "recording incomplete.\n"
+    "Exit codes of --ask: 0 it does so, 1 its state has no answer, 2 configuration, 3 nobody listens.\n"
     "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording. Of --doctor: 0 nothing hinders, 1 "
     "else; with --strict a warning hinders, too.\n";
 
@@ -50,7 +51,8 @@ std::string parse(int argc, char** argv, Options& options) {
     const bool takes_path = word == "--config" || word == "--replay" || word == "--record";
     const bool lacks_value = i + 1 == argc || argv[i + 1][0] == '\0';
     if (takes_path && lacks_value) return std::string(word) + " takes a path";
-    if (word == "--ask" && lacks_value) return "--ask takes a word";
+    const bool may_ask = !lacks_value && (operator_command_of(argv[i + 1]) || argv[i + 1] == std::string_view("state"));
+    if (word == "--ask" && !may_ask) return "--ask takes arm, start, pause, resume, stop, reset or state";
     if (word == "--config") {
       options.config = argv[++i];
     } else if (word == "--record") {
@@ -162,7 +164,7 @@ int run_ask(const DaemonConfig& config, const std::string& word) {
   std::string text;
   if (!try_ask(config.operator_socket, word, text)) return complain(text + ".", ExitCode::kDevice);
   std::puts(text.c_str());
-  return 0;
+  return text.starts_with(kRefusedAnswer) ? number_of(ExitCode::kStoppedItself) : 0;
 }
 
 int run_with_config(const Options& options) {

@@ -81,6 +81,9 @@ class Recorder final : public hal::DepthCamera,
   [[nodiscard]] hal::JointBusStatus status() const noexcept override;
   [[nodiscard]] bool try_read(LioSample& sample) noexcept override;
   [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override;
+  void answer(bool obeyed) noexcept override {
+    if (robot_.operator_input != nullptr) robot_.operator_input->answer(obeyed);
+  }
 
  private:
   static constexpr std::size_t kFrameMemory_bytes = 1024U * 1024U;  // of a lane in one frame, with all its polygons

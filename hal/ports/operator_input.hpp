@@ -9,6 +9,8 @@ class OperatorInput {
  public:
   // The oldest command that was given and not yet read; false, and command untouched, when there is none. Never blocks.
   [[nodiscard]] virtual bool try_read(OperatorCommand& command) noexcept = 0;
+  // Of the command that was read last: the module does as it was asked, or its state has no answer to it.
+  virtual void answer(bool obeyed) noexcept { (void)obeyed; }
 
  protected:
   ~OperatorInput() = default;

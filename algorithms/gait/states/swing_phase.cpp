@@ -29,7 +29,8 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   step = {.sequence = step.sequence + 1,
           .foot = goal_.foot,
           .onto_tread = onto_tread(goal_.kind),
-          .height_mapped = onto_tread(goal_.kind) && goal_.kind != StepKind::kClosing,
+          .height_mapped =
+              onto_tread(goal_.kind) && goal_.kind != StepKind::kClosing && goal_.foothold.last_seen_ns > 0,
           .latch_stamp_ns = in.now_ns,
           .map_stamp_ns = in.footholds.map_stamp_ns,
           .target = goal_.foothold,

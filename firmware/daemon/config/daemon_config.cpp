@@ -16,6 +16,7 @@
 namespace polygmap::daemon {
 namespace {
 
+constexpr std::size_t kMostSocketPath_bytes = 107;  // sockaddr_un holds so many and a null
 constexpr double kMostProcessor = 1023;  // CPU_SETSIZE - 1
 constexpr Range kPort{1, 65535, ""};
 constexpr Range kAngle{-7.0, 7.0, "rad"};
@@ -43,8 +44,12 @@ class DaemonFile {
     take_camera(*root_.section("camera", true));
     if (root_.has("params")) config::read_params(file("params"), config_.params);
     if (root_.has("operator")) {
-      config_.operator_socket = root_.text("operator");
+      config_.operator_socket = (std::filesystem::path(path_).parent_path() / root_.text("operator")).string();
+      const std::size_t bytes = config_.operator_socket.size();
+      check_path(root_, "operator", root_.text("operator").empty() || bytes > kMostSocketPath_bytes);
       config_.params.supervisor.autostart = false;
+    } else if (!config_.params.supervisor.autostart) {
+      root_.fail("params", "switches supervisor.autostart off, and there is no key operator: it would never arm");
     }
     take_bus();
     take_imu(*root_.section("imu", true));

@@ -3,18 +3,22 @@
 
 #include <poll.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
+#include <utility>
 
 namespace polygmap::daemon {
 namespace {
 
 constexpr std::size_t kMostWord_bytes = 32;
-constexpr const char* kWhatMayBeAsked = "ask for arm, start, pause, resume, stop, reset or state\n";
+constexpr std::int64_t kDrop_ns = 500'000'000;
+constexpr std::string_view kWhatMayBeAsked = "refused: ask for arm, start, pause, resume, stop, reset or state";
 
 // False: the path is longer than an address holds, or empty.
 [[nodiscard]] bool address_of(const std::string& path, sockaddr_un& address) {
@@ -41,8 +45,13 @@ std::string OperatorSocket::open(const std::string& path) {
   sockaddr_un address{};
   if (!address_of(path, address)) return "the socket's path \"" + path + "\" is too long";
   struct stat found {};
-  if (::lstat(path.c_str(), &found) == 0 && S_ISSOCK(found.st_mode)) ::unlink(path.c_str());  // of a former run
   const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (::lstat(path.c_str(), &found) == 0 && S_ISSOCK(found.st_mode)) {
+    const int other = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    const bool lives = ::connect(other, generic(address), sizeof address) == 0;
+    ::close(other);
+    if (!lives) ::unlink(path.c_str());  // of a former run
+  }
   if (fd < 0 || ::bind(fd, generic(address), sizeof address) != 0) {
     const std::string why = reason();
     if (fd >= 0) ::close(fd);
@@ -53,17 +62,41 @@ std::string OperatorSocket::open(const std::string& path) {
   return {};
 }
 
-void OperatorSocket::answer(const char* text) noexcept {
+void OperatorSocket::tell(const std::string_view& text) noexcept {
   if (asker_bytes_ <= sizeof(sa_family_t)) return;  // without a name nobody can be answered
-  (void)::sendto(fd_, text, std::strlen(text), MSG_DONTWAIT, generic(asker_), asker_bytes_);
+  (void)::sendto(fd_, text.data(), text.size(), MSG_DONTWAIT, generic(asker_), asker_bytes_);
 }
 
-void OperatorSocket::serve(ModuleState state) noexcept {
-  if (asked_.load(std::memory_order_acquire) != 0) return;  // control's next cycle takes it
-  if (owes_state_) {
-    answer(name_of(state).data());  // a literal: it ends with a null
-    owes_state_ = false;
+void OperatorSocket::drop_waiting() noexcept {
+  char byte = 0;
+  while (::recv(fd_, &byte, 1, MSG_DONTWAIT) >= 0) {
   }
+}
+
+void OperatorSocket::serve(ModuleState state, std::int64_t now_ns) noexcept {
+  if (is_answered(state, now_ns)) listen(state, now_ns);
+}
+
+// False: control is at it.
+bool OperatorSocket::is_answered(ModuleState state, std::int64_t now_ns) noexcept {
+  std::uint8_t stage = stage_.load(std::memory_order_acquire);
+  if (stage == kNone) return true;
+  if (stage == kAsked && now_ns - asked_ns_ > kDrop_ns && stage_.compare_exchange_strong(stage, kNone)) {
+    tell("refused: control did not take it");
+    return true;
+  }
+  if (stage != kObeyed && stage != kRefused) return false;
+  if (!std::exchange(was_answered_, true)) return false;  // its cycle has yet to end
+  std::array<char, 64> text{};
+  const std::string_view name = name_of(state);
+  std::snprintf(text.data(), text.size(), "%s%.*s", stage == kRefused ? kRefusedAnswer.data() : "",
+                static_cast<int>(name.size()), name.data());
+  tell(text.data());
+  stage_.store(kNone, std::memory_order_release);
+  return true;
+}
+
+void OperatorSocket::listen(ModuleState state, std::int64_t now_ns) noexcept {
   std::array<char, kMostWord_bytes> bytes{};
   asker_bytes_ = sizeof asker_;
   const auto got = ::recvfrom(fd_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_TRUNC,
@@ -72,15 +105,22 @@ void OperatorSocket::serve(ModuleState state) noexcept {
   std::string_view word(bytes.data(), std::min(static_cast<std::size_t>(got), bytes.size()));
   while (!word.empty() && (word.back() == '\n' || word.back() == '\0')) word.remove_suffix(1);
   const auto command = operator_command_of(word);
-  owes_state_ = command.has_value() || word == "state";
-  if (!owes_state_) return answer(kWhatMayBeAsked);
-  if (command) asked_.store(static_cast<std::uint8_t>(1 + static_cast<int>(*command)), std::memory_order_release);
+  if (!command) return tell(word == "state" ? name_of(state) : kWhatMayBeAsked);
+  command_.store(*command, std::memory_order_relaxed);
+  asked_ns_ = now_ns;
+  was_answered_ = false;
+  stage_.store(kAsked, std::memory_order_release);
 }
 
 bool OperatorSocket::try_read(OperatorCommand& command) noexcept {
-  if (asked_.load(std::memory_order_relaxed) == 0) return false;
-  command = static_cast<OperatorCommand>(asked_.exchange(0, std::memory_order_acq_rel) - 1);
+  std::uint8_t asked = kAsked;
+  if (!stage_.compare_exchange_strong(asked, kTaken, std::memory_order_acq_rel)) return false;
+  command = command_.load(std::memory_order_relaxed);
   return true;
+}
+
+void OperatorSocket::answer(bool obeyed) noexcept {
+  stage_.store(obeyed ? kObeyed : kRefused, std::memory_order_release);
 }
 
 bool try_ask(const std::string& path, const std::string& word, std::string& text) {
@@ -88,7 +128,8 @@ bool try_ask(const std::string& path, const std::string& word, std::string& text
   own.sun_family = AF_UNIX;
   const int fd = address_of(path, address) ? ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0) : -1;
   // Bound to no path it gets a name of the kernel's, to be answered at.
-  const bool sent = fd >= 0 && ::bind(fd, generic(own), sizeof(sa_family_t)) == 0 &&
+  const timeval most{1, 0};
+  const bool sent = fd >= 0 && ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &most, sizeof most) == 0 && ::bind(fd, generic(own), sizeof(sa_family_t)) == 0 &&
                     ::sendto(fd, word.data(), word.size(), 0, generic(address), sizeof address) >= 0;
   text = sent ? std::string("no answer within a second") : "nobody listens at \"" + path + "\": " + reason();
   pollfd answer{fd, POLLIN, 0};

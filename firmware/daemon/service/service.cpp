@@ -296,6 +296,7 @@ void Service::run_lane(LaneRun& lane) noexcept {
 
 Service::Decision Service::watch() {
   seen_.moved_ns = monotonic_ns();
+  if (parts_.operator_socket != nullptr) parts_.operator_socket->drop_waiting();
   for (;;) {
     const int signal = signals_.wait(kLook_ns);
     const std::int64_t now_ns = monotonic_ns();
@@ -305,7 +306,8 @@ Service::Decision Service::watch() {
       notifier_.tell("STOPPING=1");
       std::fprintf(stderr, "polygmapd: asked to stop by signal %d.\n", signal);
     }
-    if (parts_.operator_socket != nullptr) parts_.operator_socket->serve(board_.module().state);
+    const bool listens = parts_.operator_socket != nullptr && seen_.asked_ns < 0;
+    if (listens) parts_.operator_socket->serve(board_.module().state, now_ns);
     log_changes();
     log_trouble(now_ns);
     if (const std::optional<Decision> decision = decide(now_ns)) return *decision;
@@ -346,6 +348,8 @@ std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
   if (fallen) return Decision{ExitCode::kStoppedItself, "the robot has fallen."};
   if (view.state == ModuleState::kOff) return Decision{ExitCode::kAsked, "asked to stop before it armed."};
   if (view.state == ModuleState::kArming) return Decision{ExitCode::kAsked, "asked to stop while it armed."};
+  const bool by_itself = view.state == ModuleState::kSafeStop && view.reason != StopReason::kOperator;
+  if (by_itself) return Decision{ExitCode::kStoppedItself, "the gait had stopped by itself."};
   if (view.stands()) return Decision{ExitCode::kAsked, "asked to stop, and stands."};
   if (now_ns - seen_.asked_ns < kStopLimit_ns) return std::nullopt;
   return Decision{ExitCode::kStoppedItself, "asked to stop, and after three seconds it still does not stand."};

@@ -139,7 +139,7 @@ std::string states_markdown() {
   std::string out =
       "# States\n\nWritten by `toolchain/checks/docs --write`, not by hand.\n\nWhat the module does, and what its "
       "operator may ask of it. A command that a state has no line for changes nothing and is counted as "
-      "`operator_refused`. Without an operator, or with `supervisor.autostart`, it arms and starts by itself. Which "
+      "`operator_refused`. Without an operator it arms and starts by itself (`supervisor.autostart`). Which "
       "failure leads to which state, and within what time, is in [the architecture](../architecture.md).\n\n"
       "| state | what it does |\n|---|---|\n";
   for (const ModuleStateInfo& state : kModuleStateTable) {

@@ -81,7 +81,7 @@ TEST_F(ProgramTest, WrongArguments_AreConfigurationErrorsWithTheUsage) {
   for (const char* wrong :
        {"", "--config", "--replay", "--frobnicate", "--json --config x", "--doctor --replay x", "--check",
         "--check --doctor", "--record", "--config x --record", "--record x", "--config x --record y --check",
-        "--replay x --record y", "--ask", "--ask arm", "--ask arm --check --config x"}) {
+        "--replay x --record y", "--ask", "--ask arm", "--ask stopp --config x", "--ask arm --check --config x"}) {
     const Done done = run(wrong);
     EXPECT_EQ(done.code, 2) << wrong;
     EXPECT_NE(done.said.find("polygmapd --config FILE"), std::string::npos) << wrong << ": " << done.said;

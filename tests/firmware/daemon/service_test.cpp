@@ -176,27 +176,28 @@ TEST_F(ServiceTest, OperatorAsks_ArmsStartsStopsAndResetsThenAndNotBefore) {
   const Outcome outcome = run([&] {
     listen_until("STATUS=off;", 5s);
     EXPECT_EQ(ask("state"), "off");
-    EXPECT_EQ(ask("start"), "off") << "it was not armed";
+    EXPECT_EQ(ask("start"), "refused: off");
     EXPECT_FALSE(robot_.has_gains);
     (void)ask("arm");
     listen_until("STATUS=standing", 5s);
     std::this_thread::sleep_for(kEstimates);
     EXPECT_EQ(ask("start"), "walking_up");
-    EXPECT_EQ(ask("dance"), "ask for arm, start, pause, resume, stop, reset or state");
-    EXPECT_EQ(ask(std::string(100, 'a')), "ask for arm, start, pause, resume, stop, reset or state");
+    EXPECT_EQ(ask("dance"), "refused: ask for arm, start, pause, resume, stop, reset or state");
+    EXPECT_EQ(ask(std::string(100, 'a')), "refused: ask for arm, start, pause, resume, stop, reset or state");
     EXPECT_EQ(ask("pause\n"), "holding");
     (void)ask("stop");
     listen_until("STATUS=safe_stop", 5s);
     std::this_thread::sleep_for(std::chrono::nanoseconds(3 * config_.hold_ns));
     EXPECT_EQ(ask("state"), "safe_stop") << "it waits for a reset";
     EXPECT_EQ(ask("reset"), "standing");
+    EXPECT_EQ(ask("arm"), "refused: standing");
   });
   EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
   EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
 }
 
 TEST(OperatorSocketTest, NoSocketCanBeMade_IsTold) {
-  OperatorSocket none, file;
+  OperatorSocket none, file, first, second;
   EXPECT_NE(none.open("/nowhere/operator").find("cannot be made"), std::string::npos);
   EXPECT_NE(none.open(std::string(200, 'x')).find("too long"), std::string::npos);
   const std::string path = testing::TempDir() + "polygmap_no_socket_" + std::to_string(::getpid());
@@ -204,8 +205,10 @@ TEST(OperatorSocketTest, NoSocketCanBeMade_IsTold) {
   EXPECT_NE(file.open(path).find("cannot be made"), std::string::npos);
   EXPECT_TRUE(std::filesystem::is_regular_file(path)) << "what is no socket stays there";
   std::filesystem::remove(path);
+  ASSERT_EQ(first.open(path), "");
+  EXPECT_NE(second.open(path).find("cannot be made"), std::string::npos) << "another daemon lives there";
   std::string text;
-  EXPECT_FALSE(try_ask(path, "state", text));
+  EXPECT_FALSE(try_ask(path + "_", "state", text));
   EXPECT_NE(text.find("nobody listens at"), std::string::npos) << text;
 }
 
