@@ -37,8 +37,8 @@ class Gait {
   }
   // No foot is lifted from now on; true again: it goes on. From the thread of tick().
   void allow_steps(bool may_step) noexcept { may_step_ = may_step; }
-  // After its end, finished or stopped, with both feet on the ground: it stands, and looks for a step. Where it stands and
-  // how many treads it has climbed stays. False, and nothing happens: a joint is not where it was commanded to be.
+  // After its end, finished or stopped, with both feet on the ground: it stands, and looks for a step. Where it stands
+  // and how many treads it has climbed stays. False, and nothing happens: a joint is not where it was commanded to be.
   [[nodiscard]] bool try_restart(const JointVector& q_rad) noexcept;
   [[nodiscard]] bool stop_requested() const noexcept { return stop_requested_ != StopReason::kNone; }
   // Before its first good reading it commands no gains and no torques.

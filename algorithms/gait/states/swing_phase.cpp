@@ -26,17 +26,17 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   gait.planner.latched(situation(in), decision);
 
   LatchedStep& step = gait.status.step;
-  step = {.sequence = step.sequence + 1,
-          .foot = goal_.foot,
-          .onto_tread = onto_tread(goal_.kind),
-          .height_mapped =
-              onto_tread(goal_.kind) && goal_.kind != StepKind::kClosing && goal_.foothold.last_seen_ns > 0,
-          .latch_stamp_ns = in.now_ns,
-          .map_stamp_ns = in.footholds.map_stamp_ns,
-          .target = goal_.foothold,
-          .odom_T_target = goal_.target.transform(),
-          .touch_down_stamp_ns = 0,
-          .odom_T_executed = {}};
+  step = {
+      .sequence = step.sequence + 1,
+      .foot = goal_.foot,
+      .onto_tread = onto_tread(goal_.kind),
+      .height_mapped = onto_tread(goal_.kind) && goal_.kind != StepKind::kClosing && goal_.foothold.last_seen_ns > 0,
+      .latch_stamp_ns = in.now_ns,
+      .map_stamp_ns = in.footholds.map_stamp_ns,
+      .target = goal_.foothold,
+      .odom_T_target = goal_.target.transform(),
+      .touch_down_stamp_ns = 0,
+      .odom_T_executed = {}};
   gait.status.phase = GaitPhase::kSwing;
   gait.status.stands[index_of(goal_.foot)] = false;
   gait.memory.shifts = gait.memory.idle_ticks = 0;

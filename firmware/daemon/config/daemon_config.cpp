@@ -17,7 +17,7 @@ namespace polygmap::daemon {
 namespace {
 
 constexpr std::size_t kMostSocketPath_bytes = 107;  // sockaddr_un holds so many and a null
-constexpr double kMostProcessor = 1023;  // CPU_SETSIZE - 1
+constexpr double kMostProcessor = 1023;             // CPU_SETSIZE - 1
 constexpr Range kPort{1, 65535, ""};
 constexpr Range kAngle{-7.0, 7.0, "rad"};
 constexpr Range kImuRate{100, 1000, "Hz"};  // what imu_interval_ns may be

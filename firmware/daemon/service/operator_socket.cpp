@@ -129,7 +129,8 @@ bool try_ask(const std::string& path, const std::string& word, std::string& text
   const int fd = address_of(path, address) ? ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0) : -1;
   // Bound to no path it gets a name of the kernel's, to be answered at.
   const timeval most{1, 0};
-  const bool sent = fd >= 0 && ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &most, sizeof most) == 0 && ::bind(fd, generic(own), sizeof(sa_family_t)) == 0 &&
+  const bool sent = fd >= 0 && ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &most, sizeof most) == 0 &&
+                    ::bind(fd, generic(own), sizeof(sa_family_t)) == 0 &&
                     ::sendto(fd, word.data(), word.size(), 0, generic(address), sizeof address) >= 0;
   text = sent ? std::string("no answer within a second") : "nobody listens at \"" + path + "\": " + reason();
   pollfd answer{fd, POLLIN, 0};

@@ -14,7 +14,8 @@ class App;
 namespace polygmap::sim {
 
 struct ParamsArguments {
-  CLI::App *list = nullptr, *reality = nullptr, *states = nullptr, *docs = nullptr, *diff = nullptr;  // of which one is asked for
+  CLI::App *list = nullptr, *reality = nullptr, *states = nullptr, *docs = nullptr,
+           *diff = nullptr;  // of which one is asked for
   std::string file;
   bool json = false;
 };
