@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "firmware/sensor_reading.hpp"
 #include "scheduler/schedule_table.hpp"
@@ -52,32 +53,60 @@ std::uint32_t lio_rejections(const Estimator::Counters& counters) noexcept {
 
 }  // namespace
 
-ControlLane::ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometry& lio, ControlPerceptionLink& link,
-                         LaneHealths& health, const Params& params) noexcept
-    : imu_port_(imu),
-      joint_port_(joints),
-      lio_port_(lio),
-      link_(link),
-      healths_(health),
-      health_(health[kControlLane].own),
-      params_(params) {
+ControlLane::ControlLane(const ControlPorts& ports, ControlPerceptionLink& link, LaneHealths& health,
+                         const Params& params) noexcept
+    : ports_(ports), link_(link), healths_(health), health_(health[kControlLane].own), params_(params) {
   estimator_.reset(params.estimator, params.robot);
   Gait::Params gait = params.gait;
   if (!params.estimate_mount) gait.standing.toe_calibration.ticks = 0;
   gait_.reset(gait, params.robot);
+  supervisor_.reset(params.supervisor);
 }
 
 Progress ControlLane::sense(std::int64_t now_ns) noexcept {
-  if (start_.first_ns < 0) start_.first_ns = imu_came_ns_ = now_ns;
+  if (start_.first_ns < 0) imu_came_ns_ = now_ns;
+  // Before it is to arm nobody is waited for.
+  if (start_.first_ns < 0 || !supervisor_.may_arm()) start_.first_ns = now_ns;
   look_across(now_ns);
+  read_operator(now_ns);
   sense_imu(now_ns);
   read_joints(now_ns);
   return Progress::kDone;
 }
 
+void ControlLane::read_operator(std::int64_t now_ns) noexcept {
+  OperatorCommand command{};
+  if (ports_.operator_input == nullptr || !ports_.operator_input->try_read(command)) return;
+  const bool obeyed = try_obey(command, now_ns);
+  if (!obeyed) health_.raise(Limit::kOperatorRefused, now_ns);
+  ports_.operator_input->answer(obeyed);
+}
+
+bool ControlLane::try_obey(OperatorCommand command, std::int64_t now_ns) noexcept {
+  const ModuleState state = module_state();
+  if (!Supervisor::answers(state, command)) return false;
+  if (command == OperatorCommand::kReset) {
+    if (!is_sound(now_ns) || !gait_.try_restart(estimator_.state().q_rad)) return false;
+    overload_ = {};
+  }
+  supervisor_.obey(command, state);
+  if (command == OperatorCommand::kStop && state != ModuleState::kArming) gait_.request_stop(StopReason::kOperator);
+  return true;
+}
+
+// What may have stopped it is over, and both feet carry: one that a mute knee kept up counts as standing only until the
+// drive speaks again.
+bool ControlLane::is_sound(std::int64_t now_ns) const noexcept {
+  constexpr double kStands = 0.5;  // probability
+  const StateEstimate& state = estimator_.state();
+  return drives_.silent.is_empty() && drives_.bus.drive_errors.is_empty() && overload_.takes_commands() &&
+         now_ns - state.oldest_input_ns <= params_.gait.steer_age_ns && state.contact_probability[0] > kStands &&
+         state.contact_probability[1] > kStands;
+}
+
 // One that came and was rejected is not missing, too.
 void ControlLane::sense_imu(std::int64_t now_ns) noexcept {
-  if (read_imu(imu_port_, now_ns, estimator_)) {
+  if (read_imu(ports_.imu, now_ns, estimator_)) {
     imu_came_ns_ = now_ns;
     return;
   }
@@ -88,8 +117,8 @@ void ControlLane::sense_imu(std::int64_t now_ns) noexcept {
 void ControlLane::read_joints(std::int64_t now_ns) noexcept {
   const bool was_asked = command_.stamp_ns != 0;  // a drive answers a command
   JointFeedback joints;
-  const bool came = joint_port_.try_read(joints);
-  if (module_state() == ModuleState::kArming) {
+  const bool came = ports_.joints.try_read(joints);
+  if (!gait_.armed()) {
     arm(came ? &joints : nullptr, now_ns);
   } else if (came) {
     note_silent_drives(silent_drives(joints), now_ns);
@@ -103,7 +132,7 @@ void ControlLane::read_joints(std::int64_t now_ns) noexcept {
 // The estimator hears of the joints no sooner: what it learnt from a robot that is being put down would be wrong.
 void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept {
   const JointSet late = late_drives(joints, now_ns);
-  drives_.bus = joint_port_.status();
+  drives_.bus = ports_.joints.status();
   if (joints != nullptr) {
     const JointSet outside = JointReference::out_of_range(params_.robot, params_.gait.joints, joints->q_rad);
     note_out_of_range(JointSet::of_bits(outside.bits() & ~late.bits()), now_ns);
@@ -113,7 +142,7 @@ void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept
   if (now_ns - start_.first_ns >= kArmingTimeout_ns) note_silent_drives(start_.silent, now_ns);
   if (!late.is_empty() || !drives_.bus.drive_errors.is_empty() || !drives_.out_of_range.is_empty()) return;
   if (drives_.bus.feet_silent) return;
-  if (!start_.imu_speaks || gait_.stop_requested()) return;
+  if (!start_.imu_speaks || gait_.stop_requested() || !supervisor_.may_arm()) return;
   estimator_.add_joints(*joints, now_ns);
 }
 
@@ -150,11 +179,9 @@ void ControlLane::note_silent_drives(JointSet silent, std::int64_t now_ns) noexc
 }
 
 ModuleState ControlLane::module_state() const noexcept {
-  if (!gait_.armed()) return ModuleState::kArming;
-  const GaitPhase phase = gait_.status().phase;
-  const bool stands = phase == GaitPhase::kStopped || (phase == GaitPhase::kFinished && gait_.stop_requested());
-  if (stands) return ModuleState::kSafeStop;
-  return gait_.stop_requested() ? ModuleState::kStopping : ModuleState::kRunning;
+  const GaitStatus& status = gait_.status();
+  const bool on_stairs = status.treads_climbed > 0 || status.step.onto_tread;
+  return supervisor_.state({gait_.armed(), status.phase, gait_.stop_requested(), on_stairs});
 }
 
 ArmingWait ControlLane::arming_waits_for() const noexcept {
@@ -185,7 +212,11 @@ void ControlLane::look_across(std::int64_t now_ns) noexcept {
 
 Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
   estimator_.tick(gait_.status().stands);
-  read_lio(lio_port_, now_ns, estimator_);
+  if (gait_.armed()) {
+    read_lio(ports_.lio, now_ns, estimator_);
+  } else {
+    drop_lio(ports_.lio);
+  }
   answer_pose_request(now_ns);
   return Progress::kDone;
 }
@@ -197,7 +228,13 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
     command_.stamp_ns = now_ns;
     return Progress::kDone;
   }
+  gait_.allow_steps(supervisor_.may_step());
   gait_.tick(now_ns, estimator_.state(), footholds(), estimator_.leg_sensing().joints(), command_);
+  const StateEstimate& state = estimator_.state();
+  if (state.initialised && now_ns - estimator_.newest_imu_ns() <= params_.gait.steer_age_ns) {
+    supervisor_.watch_lean(params_.supervisor, state.odom_T_base.R);
+  }
+  if (supervisor_.has_fallen()) damp_joints(now_ns);
   estimator_.leg_sensing().to_encoders(command_);
   hand_over_touch_down();
 
@@ -213,10 +250,18 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   return Progress::kDone;
 }
 
+void ControlLane::damp_joints(std::int64_t now_ns) noexcept {
+  if (!std::exchange(raised_.fallen, true)) health_.raise(Fault::kFallen, now_ns);
+  const JointVector& q_rad = estimator_.leg_sensing().joints().q_rad;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    command_.joints[n] = {q_rad[static_cast<Eigen::Index>(n)], 0.0, 0.0, 0.0, params_.robot.drives.kd_of(n)};
+  }
+}
+
 Progress ControlLane::command(std::int64_t now_ns) noexcept {
   bool taken = false;  // a drive that is sent nothing keeps its last command, whoever refused
   if (all_finite(command_)) {
-    taken = joint_port_.try_write(command_).is_all();
+    taken = ports_.joints.try_write(command_).is_all();
     if (!taken) health_.raise(Fault::kJointCommandRefused, now_ns);
   } else {
     health_.raise(Fault::kJointCommandInvalid, now_ns);
@@ -250,7 +295,7 @@ void ControlLane::report_rejections(std::int64_t now_ns) noexcept {
 // A drive in error gives no torque that could be trusted: the step is finished, then the gait stops. While it arms
 // there is nothing to stop, and the bus clears errors that can be cleared.
 void ControlLane::report_bus(std::int64_t now_ns) noexcept {
-  drives_.bus = joint_port_.status();
+  drives_.bus = ports_.joints.status();
   const hal::JointBusStatus& bus = drives_.bus;
   health_.follow(Fault::kDriveError, now_ns, bus.drive_error_replies);
   health_.follow(Fault::kBusOff, now_ns, bus.bus_offs);
@@ -260,7 +305,7 @@ void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   health_.follow(Fault::kBusCallFailed, now_ns, bus.failed_calls);
   health_.follow(Fault::kBusReplyStale, now_ns, bus.stale);
   health_.follow(Limit::kDriveClamped, now_ns, bus.clamped);
-  const bool arms = module_state() == ModuleState::kArming;
+  const bool arms = !gait_.armed();
   const bool may_start = arms && now_ns - start_.first_ns < kArmingTimeout_ns;
   const bool feet_silent = bus.feet_silent && !may_start;
   if (feet_silent && !raised_.feet_silent) health_.raise(Fault::kFeetSilent, now_ns);
@@ -270,7 +315,7 @@ void ControlLane::report_bus(std::int64_t now_ns) noexcept {
 
 // While the drives are still silent there is nothing to stop.
 void ControlLane::report_overload(std::int64_t now_ns) noexcept {
-  if (module_state() != ModuleState::kRunning) return;
+  if (!is_running(module_state())) return;
   if (overload_.time_is_short(params_.overload)) {
     health_.raise(Fault::kTimeShort, now_ns);
     gait_.request_stop(StopReason::kTimeShort);

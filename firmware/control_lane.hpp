@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sense, estimate, gait, command: in every cycle.
 //
-// It starts arming: an MIT drive answers only a command, and where the legs are is not known before each has answered,
-// so commands without gains and torques ask them. The gait commands from the first accepted feedback on in which every
-// drive has answered the last command, none tells of an error and all joints are within their ranges, if the IMU speaks
-// too. What is silent half a second after the start is named, and asked on. Asked to stop meanwhile, it arms no more.
+// It starts arming, or off until its operator asks for that (Supervisor). An MIT drive answers only a command, and
+// where the legs are is not known before each has answered, so commands without gains and torques ask them. The gait
+// commands from the first accepted feedback on in which every drive has answered the last command, none tells of an
+// error and all joints are within their ranges, if the IMU speaks too. What is silent half a second after the start is
+// named, and asked on. Asked to stop meanwhile, it arms no more.
 #pragma once
 
 #include "algorithms/core/work.hpp"
@@ -15,13 +16,21 @@
 #include "hal/ports/imu.hpp"
 #include "hal/ports/joint_bus.hpp"
 #include "hal/ports/lidar_odometry.hpp"
+#include "hal/ports/operator_input.hpp"
 
 namespace polygmap {
 
+struct ControlPorts {
+  hal::Imu& imu;
+  hal::JointBus& joints;
+  hal::LidarOdometry& lio;
+  hal::OperatorInput* operator_input;  // null: there is none
+};
+
 class ControlLane {
  public:
-  ControlLane(hal::Imu& imu, hal::JointBus& joints, hal::LidarOdometry& lio, ControlPerceptionLink& link,
-              LaneHealths& health, const Params& params) noexcept;
+  ControlLane(const ControlPorts& ports, ControlPerceptionLink& link, LaneHealths& health,
+              const Params& params) noexcept;
 
   Progress sense(std::int64_t now_ns) noexcept;
   Progress estimate(std::int64_t now_ns) noexcept;
@@ -48,6 +57,9 @@ class ControlLane {
 
  private:
   void look_across(std::int64_t now_ns) noexcept;
+  void read_operator(std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool try_obey(OperatorCommand command, std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool is_sound(std::int64_t now_ns) const noexcept;
   void sense_imu(std::int64_t now_ns) noexcept;
   void read_joints(std::int64_t now_ns) noexcept;
   // While it arms, in every cycle; joints: the feedback that came, or null.
@@ -61,11 +73,11 @@ class ControlLane {
   void report_lidar(std::int64_t now_ns) noexcept;
   void report_rejections(std::int64_t now_ns) noexcept;
   void report_gait(std::int64_t now_ns) noexcept;
+  // Of a robot that falls: no stiffness, no torque, and the drives' own damping.
+  void damp_joints(std::int64_t now_ns) noexcept;
   void hand_over_touch_down() noexcept;
 
-  hal::Imu& imu_port_;
-  hal::JointBus& joint_port_;
-  hal::LidarOdometry& lio_port_;
+  ControlPorts ports_;
   ControlPerceptionLink& link_;
   LaneHealths& healths_;
   Health& health_;  // this lane's
@@ -73,6 +85,7 @@ class ControlLane {
 
   Estimator estimator_;
   Gait gait_;
+  Supervisor supervisor_;
   Health all_faults_;
   LaneView view_;
   bool pose_asked_ = false;  // a request came with this frame
@@ -83,6 +96,7 @@ class ControlLane {
     bool feet_silent = false;
     bool lio_missing = false;
     bool gait_stopped = false;
+    bool fallen = false;
   } raised_;  // what lasts is a fault once, when it begins
   struct Start {
     std::int64_t first_ns = -1;         // of the first cycle: time-outs of what never speaks start there

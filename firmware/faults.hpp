@@ -36,6 +36,7 @@ namespace polygmap {
   X(20, kTimeShort, "time_short", "Control lost cycles or overran so often that the module stops.")                  \
   X(21, kCommandsRefused, "commands_refused",                                                                        \
     "So many commands in a row were refused by the bus, or not finite, that the module stops.")                      \
+  X(22, kFallen, "fallen", "The torso leans so far that the robot falls: its joints are damped.")                    \
   X(30, kDriveSilent, "drive_silent", "A drive was silent for more than five cycles; telemetry says which joint's.") \
   X(31, kDriveError, "drive_error", "A drive told of an error, or left its motor mode.")                             \
   X(32, kBusOff, "bus_off", "A CAN controller left its bus.")                                                        \
@@ -65,6 +66,7 @@ namespace polygmap {
   X(113, kFootPutBack, "foot_put_back", "A foot in the air went back to where it had stood.")                       \
   X(114, kFrameLost, "frame_lost", "A frame never reached the map: it was unusable, or the last one still waited.") \
   X(115, kHandOverLost, "hand_over_lost", "A lane was so late that what it should have seen was overwritten.")      \
+  X(116, kOperatorRefused, "operator_refused", "The operator asked for what this state has no answer to.")          \
   X(130, kDriveClamped, "drive_clamped", "A command's value was beyond its drive's range and became the nearest end.")
 
 #define POLYGMAP_ENUMERATOR(number, code, name, text) code = number,

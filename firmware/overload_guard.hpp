@@ -36,6 +36,7 @@ class OverloadGuard {
   void count_command(const Params& params, bool taken) noexcept {
     refused_ = taken ? 0 : std::min(refused_ + 1, params.most_refused);
   }
+  [[nodiscard]] bool takes_commands() const noexcept { return refused_ == 0; }  // the last one was taken
   [[nodiscard]] bool time_is_short(const Params& params) const noexcept { return short_of_ >= params.most_late_cycles; }
   [[nodiscard]] bool commands_are_refused(const Params& params) const noexcept {
     return refused_ >= params.most_refused;

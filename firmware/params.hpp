@@ -10,6 +10,7 @@
 #include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/robot_model.hpp"
 #include "firmware/overload_guard.hpp"
+#include "firmware/supervisor.hpp"
 #include "scheduler/schedule_table.hpp"
 
 namespace polygmap {
@@ -26,6 +27,7 @@ struct Params {
   bool self_filter = true;
   BodyUncertainty body;
   OverloadGuard::Params overload;
+  Supervisor::Params supervisor;
   double tread_height_sigma_m = 0.004;
   std::int64_t imu_interval_ns = kCycle_ns;
 
@@ -43,6 +45,7 @@ struct Params {
           "The robot's own legs are masked; false only shows what is taken for ground then.");
     field("body", p.body);
     field("overload", p.overload);
+    field("supervisor", p.supervisor);
     field("tread_height_sigma_m", p.tread_height_sigma_m, 1e-5, 0.1,
           "Height of a mapped tread under a foot that has just landed on it.");
     // A cycle reads four samples, and nothing is steered by one of 20 ms ago (gait.steer_age_ns): half of that for

@@ -20,6 +20,7 @@ struct Ports {
   hal::Imu& imu;
   hal::JointBus& joints;
   hal::LidarOdometry& lio;
+  hal::OperatorInput* operator_input = nullptr;  // null: nobody asks anything of the module but to stop
 };
 
 // Runs the tasks of the schedule's rows (schedule.hpp) for the executives. Rows of different lanes may run on different
@@ -28,7 +29,7 @@ class Pipeline {
  public:
   Pipeline(const Ports& ports, const Params& params) noexcept
       : params_(params),
-        control_(ports.imu, ports.joints, ports.lio, link_, health_, params_),
+        control_({ports.imu, ports.joints, ports.lio, ports.operator_input}, link_, health_, params_),
         perception_(ports.camera, link_, health_[kPerceptionLane], params_) {}
   Pipeline(const Pipeline&) = delete;  // the lanes refer to the link inside
   Pipeline& operator=(const Pipeline&) = delete;

@@ -28,4 +28,11 @@ inline void read_lio(hal::LidarOdometry& port, std::int64_t now_ns, Estimator& e
   for (int i = 0; i < kMaxReadsPerCycle && port.try_read(sample); ++i) estimator.add_lio(sample, now_ns);
 }
 
+// While nothing is estimated: a pose of before the start is no news later.
+inline void drop_lio(hal::LidarOdometry& port) noexcept {
+  LioSample sample;
+  for (int i = 0; i < kMaxReadsPerCycle && port.try_read(sample); ++i) {
+  }
+}
+
 }  // namespace polygmap

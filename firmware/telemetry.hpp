@@ -11,20 +11,10 @@
 #include "algorithms/core/messages/state.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/estimation/quality/estimate_quality.hpp"
+#include "firmware/supervisor.hpp"
 #include "hal/ports/joint_bus.hpp"
 
 namespace polygmap {
-
-enum class ModuleState : std::uint8_t {
-  kArming,    // commands without gains and torques: see ArmingWait
-  kRunning,   // the gait commands the joints
-  kStopping,  // it was asked to stop, or has to: the foot in the air comes down first
-  kSafeStop,  // the gait has stopped on two feet and holds; its stop_reason says why
-};
-[[nodiscard]] constexpr std::string_view name_of(ModuleState state) noexcept {
-  constexpr std::array<std::string_view, 4> kNames{"arming", "running", "stopping", "safe_stop"};
-  return kNames[static_cast<std::size_t>(state)];
-}
 
 // What the module that arms waits for: the first of these that lacks.
 struct ArmingWait {

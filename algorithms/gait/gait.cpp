@@ -27,7 +27,8 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
   memory_.toes_calibrated = params.standing.toe_calibration.ticks <= 0;
   status_ = {};
   state_.emplace<Standing>();
-  armed_ = placed_ = started_ = leg_impaired_ = lost_in_swing_ = false;
+  armed_ = placed_ = started_ = leg_impaired_ = lost_in_swing_ = restarts_ = false;
+  may_step_ = true;
   last_tick_ns_ = 0;
   stop_requested_ = StopReason::kNone;
 }
@@ -35,6 +36,21 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
 bool Gait::try_arm(const JointFeedback& feedback) noexcept {
   if (!joints_.try_arm(*robot_, params_.joints, feedback.q_rad)) return false;
   plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m(), params_.bias_time_s);
+  return true;
+}
+
+bool Gait::try_restart(const JointVector& q_rad) noexcept {
+  constexpr double kMostOff_rad = 0.3;  // legs that carry the robot give way by a third of it
+  const JointVector off_rad = (q_rad - joints_.reference_rad()).cwiseAbs();
+  if (!math::all_finite(off_rad) || off_rad.maxCoeff() > kMostOff_rad) return false;
+  stop_requested_ = StopReason::kNone;
+  leg_impaired_ = lost_in_swing_ = false;
+  memory_ = {.toes_calibrated = memory_.toes_calibrated};
+  planner_.restart();
+  status_.phase = GaitPhase::kStandstill;
+  status_.stop_reason = StopReason::kNone;
+  status_.stop_measured_m = 0.0;
+  restarts_ = started_;
   return true;
 }
 
@@ -152,6 +168,7 @@ void Gait::advance(const GaitInput& in) noexcept {
   } else {
     plan_.correction_missed();
   }
+  if (std::exchange(restarts_, false)) state_.emplace<Standing>().begin(in, gait);
   enter(in, gait, tick_state(in, gait));
   plan_.hold_landed_foot(params_.landed_foot, in.feedback, in.now_ns);
   follow_state(in, gait);
@@ -184,6 +201,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
                      mute || leg_impaired_,
                      lost || leg_impaired_ || lost_in_swing_,
                      stop_requested_,
+                     may_step_,
                      now_ns - std::exchange(last_tick_ns_, now_ns)};
   if (!started_) {
     hold_upright(in, command);

@@ -35,6 +35,11 @@ class Gait {
   void request_stop(StopReason reason) noexcept {
     if (stop_requested_ == StopReason::kNone) stop_requested_ = reason;
   }
+  // No foot is lifted from now on; true again: it goes on. From the thread of tick().
+  void allow_steps(bool may_step) noexcept { may_step_ = may_step; }
+  // After its end, finished or stopped, with both feet on the ground: it stands, and looks for a step. Where it stands
+  // and how many treads it has climbed stays. False, and nothing happens: a joint is not where it was commanded to be.
+  [[nodiscard]] bool try_restart(const JointVector& q_rad) noexcept;
   [[nodiscard]] bool stop_requested() const noexcept { return stop_requested_ != StopReason::kNone; }
   // Before its first good reading it commands no gains and no torques.
   [[nodiscard]] bool armed() const noexcept { return armed_; }
@@ -70,6 +75,8 @@ class Gait {
   bool started_ = false;        // and where it is
   bool leg_impaired_ = false;   // a drive or a foot was silent so long that the gait stops, whatever it says later
   bool lost_in_swing_ = false;  // so was the estimate; the foot in the air came down all the same
+  bool restarts_ = false;       // with the next tick
+  bool may_step_ = true;
   StopReason stop_requested_ = StopReason::kNone;
 };
 

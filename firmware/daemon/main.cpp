@@ -22,6 +22,8 @@ constexpr const char* kUsage =
     "polygmapd --config FILE [--record DIR]   runs the module with the devices of this file; writes all that goes in\n"
     "                                         and comes out into DIR, for --replay\n"
     "polygmapd --config FILE --check     only reads it\n"
+    "polygmapd --ask WHAT --config FILE  asks the one that runs with this file to arm, start, pause, resume, stop or\n"
+    "                                    reset, or for its state; says the state that came of it\n"
     "polygmapd --replay DIR              feeds a recording to the module and compares what comes out\n"
     "polygmapd --doctor [--json] [--strict] [--config FILE]   says what on this machine hinders it, and what to do\n"
     "polygmapd --version\n"
@@ -29,11 +31,13 @@ constexpr const char* kUsage =
     "Exit codes of --config: 0 asked to stop, 1 stopped by itself, 2 configuration, 3 device, 4 no real time, 5 as 0 "
     "with the\n"
     "recording incomplete.\n"
+    "Exit codes of --ask: 0 it does so, 1 its state has no answer, 2 configuration, 3 nobody listens.\n"
     "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording. Of --doctor: 0 nothing hinders, 1 "
     "else; with --strict a warning hinders, too.\n";
 
 struct Options {
-  enum class Mode { kRun, kCheck, kReplay, kDoctor, kHelp, kVersion } mode = Mode::kRun;
+  enum class Mode { kRun, kCheck, kAsk, kReplay, kDoctor, kHelp, kVersion } mode = Mode::kRun;
+  std::string ask;
   std::string config, recording;  // recording: to be replayed, or written
   bool json = false, strict = false;
 };
@@ -44,8 +48,11 @@ std::string parse(int argc, char** argv, Options& options) {
   bool checks = false, records = false;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
-    const bool takes_value = word == "--config" || word == "--replay" || word == "--record";
-    if (takes_value && (i + 1 == argc || argv[i + 1][0] == '\0')) return std::string(word) + " takes a path";
+    const bool takes_path = word == "--config" || word == "--replay" || word == "--record";
+    const bool lacks_value = i + 1 == argc || argv[i + 1][0] == '\0';
+    if (takes_path && lacks_value) return std::string(word) + " takes a path";
+    const bool may_ask = !lacks_value && (operator_command_of(argv[i + 1]) || argv[i + 1] == std::string_view("state"));
+    if (word == "--ask" && !may_ask) return "--ask takes arm, start, pause, resume, stop, reset or state";
     if (word == "--config") {
       options.config = argv[++i];
     } else if (word == "--record") {
@@ -58,6 +65,10 @@ std::string parse(int argc, char** argv, Options& options) {
     } else if (word == "--doctor" || word == "--help" || word == "-h" || word == "--version") {
       using enum Options::Mode;
       options.mode = word == "--doctor" ? kDoctor : word == "--version" ? kVersion : kHelp;
+      modes.push_back(word);
+    } else if (word == "--ask") {
+      options.ask = argv[++i];
+      options.mode = Options::Mode::kAsk;
       modes.push_back(word);
     } else if (word == "--json") {
       options.json = true;
@@ -72,7 +83,8 @@ std::string parse(int argc, char** argv, Options& options) {
   if (modes.size() > 1) return std::string(modes[0]) + " and " + std::string(modes[1]) + " do not go together";
   if (options.json && options.mode != Options::Mode::kDoctor) return "--json is of --doctor";
   if (options.strict && options.mode != Options::Mode::kDoctor) return "--strict is of --doctor";
-  if (modes.empty() && options.config.empty()) return "--config FILE is missing";
+  const bool needs_config = modes.empty() || options.mode == Options::Mode::kAsk;
+  if (needs_config && options.config.empty()) return "--config FILE is missing";
   if (records && (checks || !modes.empty())) return "--record is of --config alone";
   if (checks && !modes.empty()) return "--check is of --config";
   if (checks) options.mode = Options::Mode::kCheck;
@@ -110,18 +122,26 @@ int run_service(const DaemonConfig& config, const std::string& record_directory)
   if (const std::string wrong = devices.open(config); !wrong.empty()) return complain(wrong, ExitCode::kDevice);
   DeviceCounts counts;
   devices.count_in(counts);
+  OperatorSocket operator_socket;
+  Ports ports = devices.ports();
+  if (!config.operator_socket.empty()) {
+    const std::string wrong = operator_socket.open(config.operator_socket);
+    if (!wrong.empty()) return complain(config.path + ", operator: " + wrong + ".", ExitCode::kDevice);
+    ports.operator_input = &operator_socket;
+  }
   std::optional<recording::Recorder> recorder;
   if (!record_directory.empty()) {
     recording::Recorder::Capacity capacity = kRecorded;
     capacity.keeper = &devices.picture_keeper();
-    recorder.emplace(devices.ports(), capacity);
+    recorder.emplace(ports, capacity);
     const std::string wrong = begin_recording(*recorder, record_directory, config.params);
     if (!wrong.empty()) return complain(wrong, ExitCode::kRecording);
   }
-  ServiceParts parts{.ports = recorder ? recorder->ports() : devices.ports(),
+  ServiceParts parts{.ports = recorder ? recorder->ports() : ports,
                      .maintain = [&devices] { devices.maintain(); },
                      .let_go = [&devices] { devices.let_go(); },
                      .heap = counted_heap(),
+                     .operator_socket = config.operator_socket.empty() ? nullptr : &operator_socket,
                      .devices = &counts,
                      .recorder = recorder ? &*recorder : nullptr,
                      .hook = row_hook()};
@@ -137,6 +157,16 @@ int run_service(const DaemonConfig& config, const std::string& record_directory)
   return number_of(outcome.code);
 }
 
+int run_ask(const DaemonConfig& config, const std::string& word) {
+  if (config.operator_socket.empty()) {
+    return complain(config.path + " has no key operator: there is nobody to ask.", ExitCode::kConfiguration);
+  }
+  std::string text;
+  if (!try_ask(config.operator_socket, word, text)) return complain(text + ".", ExitCode::kDevice);
+  std::puts(text.c_str());
+  return text.starts_with(kRefusedAnswer) ? number_of(ExitCode::kStoppedItself) : 0;
+}
+
 int run_with_config(const Options& options) {
   DaemonConfig config;
   try {
@@ -145,6 +175,7 @@ int run_with_config(const Options& options) {
     return complain(error.what(), ExitCode::kConfiguration);
   }
   for (const std::string& warning : config.warnings) std::fprintf(stderr, "polygmapd: warning: %s\n", warning.c_str());
+  if (options.mode == Options::Mode::kAsk) return run_ask(config, options.ask);
   if (options.mode == Options::Mode::kCheck) {
     std::printf("%s can be used.\n", options.config.c_str());
     return 0;
@@ -169,6 +200,7 @@ int run(int argc, char** argv) {
     case Options::Mode::kDoctor:
       return run_doctor(options.config, options.json, options.strict);
     case Options::Mode::kRun:
+    case Options::Mode::kAsk:
     case Options::Mode::kCheck:
       break;
   }

@@ -34,7 +34,7 @@ namespace polygmap::recording {
 
 inline constexpr std::string_view kMagic = "PGMAPREC";
 inline constexpr std::string_view kPictureMagic = "PGMAPPIX";
-inline constexpr std::uint32_t kVersion = 3;
+inline constexpr std::uint32_t kVersion = 4;
 inline constexpr const char* kFileName = "recording.bin";
 inline constexpr const char* kPictureFileName = "pictures.bin";
 inline constexpr std::size_t kPictureHeader_bytes = 20;
@@ -54,10 +54,12 @@ enum class CallKind : std::uint8_t {
   kAcquire = 5,
   kRelease = 6,
   kJointStatus = 7,
+  kReadOperator = 8,
 };
 [[nodiscard]] constexpr std::string_view name_of(CallKind kind) noexcept {
-  constexpr std::string_view kNames[] = {"no call",          "imu.try_read",       "joints.try_read", "lio.try_read",
-                                         "joints.try_write", "camera.try_acquire", "camera.release",  "joints.status"};
+  constexpr std::string_view kNames[] = {"no call",        "imu.try_read",     "joints.try_read",
+                                         "lio.try_read",   "joints.try_write", "camera.try_acquire",
+                                         "camera.release", "joints.status",    "operator.try_read"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 enum class ValueKind : std::uint8_t { kBool, kI32, kU32, kI64, kF64, kChoice };

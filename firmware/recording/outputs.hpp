@@ -77,6 +77,8 @@ void walk_recorded(auto& f) {
   constexpr JointSet kTaken;
   walk(f, "taken", kTaken);
   walk_messages<StateEstimate, EstimateQuality, GaitStatus, FootholdSet, SurfaceFrame, MountFound, MapSnapshot>(f);
+  constexpr OperatorCommand kCommand{};
+  walk(f, "command", kCommand);
   constexpr ModuleState kState{};
   walk(f, "module_state", kState);
   walk_health(f, HealthCounts{});

@@ -350,6 +350,15 @@ bool Recorder::try_read(LioSample& sample) noexcept {
   return gave;
 }
 
+bool Recorder::try_read(OperatorCommand& command) noexcept {
+  LaneLog& log = logs_[kControlLane];
+  const bool gave = robot_.operator_input != nullptr && robot_.operator_input->try_read(command);
+  put_call(log, CallKind::kReadOperator, gave);
+  FieldWriter writer(log.out, nullptr);
+  if (gave) walk(writer, "command", command);
+  return gave;
+}
+
 JointSet Recorder::try_write(const JointCommand& command) noexcept {
   LaneLog& log = logs_[kControlLane];
   const JointSet taken = robot_.joints.try_write(command);

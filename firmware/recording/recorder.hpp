@@ -32,7 +32,11 @@ class PictureKeeper {
 // calls it allocates nothing and talks to no file: each lane writes into memory of its own and hands it over when its
 // cycle is over, through a queue of a fixed size. write_out() empties the queues into the files, on whatever thread,
 // while the lanes run or between their ticks. What finds no room in a queue ends the recording there, and says so.
-class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::JointBus, public hal::LidarOdometry {
+class Recorder final : public hal::DepthCamera,
+                       public hal::Imu,
+                       public hal::JointBus,
+                       public hal::LidarOdometry,
+                       public hal::OperatorInput {
  public:
   struct Capacity {
     std::size_t queue_bytes = 4U * 1024U * 1024U;  // of each lane
@@ -45,7 +49,7 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
   Recorder& operator=(const Recorder&) = delete;
   ~Recorder();
 
-  [[nodiscard]] Ports ports() noexcept { return {*this, *this, *this, *this}; }
+  [[nodiscard]] Ports ports() noexcept { return {*this, *this, *this, *this, this}; }
   // Makes both files in a directory that exists. params: the module's, from its start on.
   void begin(const std::string& directory, const Params& params);
   // The module that ports() were given to, before its first cycle.
@@ -76,6 +80,10 @@ class Recorder final : public hal::DepthCamera, public hal::Imu, public hal::Joi
   [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override;
   [[nodiscard]] hal::JointBusStatus status() const noexcept override;
   [[nodiscard]] bool try_read(LioSample& sample) noexcept override;
+  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override;
+  void answer(bool obeyed) noexcept override {
+    if (robot_.operator_input != nullptr) robot_.operator_input->answer(obeyed);
+  }
 
  private:
   static constexpr std::size_t kFrameMemory_bytes = 1024U * 1024U;  // of a lane in one frame, with all its polygons

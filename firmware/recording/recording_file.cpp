@@ -449,6 +449,9 @@ bool RecordingFile::parse_call(PortCall& call) {
     case CallKind::kReadLidar:
       if (call.gave) walk(reader, "lio", call.lio);
       break;
+    case CallKind::kReadOperator:
+      if (call.gave) walk(reader, "command", call.asked);
+      break;
     case CallKind::kWriteJoints:
       walk(reader, "taken", call.taken);
       if (call.gave != call.taken.is_all()) return false;

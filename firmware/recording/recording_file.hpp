@@ -27,6 +27,7 @@ struct PortCall {
   ImuSample imu;
   JointFeedback joints;
   LioSample lio;
+  OperatorCommand asked{};
   JointCommand command;
   JointSet taken;
   hal::JointBusStatus status;

@@ -12,7 +12,11 @@ namespace polygmap::recording {
 namespace {
 
 // The ports of a module that lives its row once more: each call gets the answer that was recorded.
-class ReplayedPorts final : public hal::DepthCamera, public hal::Imu, public hal::JointBus, public hal::LidarOdometry {
+class ReplayedPorts final : public hal::DepthCamera,
+                            public hal::Imu,
+                            public hal::JointBus,
+                            public hal::LidarOdometry,
+                            public hal::OperatorInput {
  public:
   explicit ReplayedPorts(RecordingFile& file)
       : file_(file),
@@ -68,6 +72,12 @@ class ReplayedPorts final : public hal::DepthCamera, public hal::Imu, public hal
     const PortCall* call = next(CallKind::kReadLidar);
     if (call == nullptr || !call->gave) return false;
     sample = call->lio;
+    return true;
+  }
+  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override {
+    const PortCall* call = next(CallKind::kReadOperator);
+    if (call == nullptr || !call->gave) return false;
+    command = call->asked;
     return true;
   }
 
@@ -164,7 +174,7 @@ class Replay {
   explicit Replay(RecordingFile& file)
       : file_(file),
         ports_(file),
-        module_(std::make_unique<Pipeline>(Ports{ports_, ports_, ports_, ports_}, file.params())) {}
+        module_(std::make_unique<Pipeline>(Ports{ports_, ports_, ports_, ports_, &ports_}, file.params())) {}
 
   // False when the file cannot be read on.
   [[nodiscard]] bool run(ReplayResult& result) {

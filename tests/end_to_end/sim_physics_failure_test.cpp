@@ -153,5 +153,21 @@ TEST(PhysicalFailure, TreadsTenMillimetresNearerThanSeen_ToesMissTheRisers) {
   expect_climbed(climb);
 }
 
+// By a push that no step catches.
+TEST(PhysicalFailure, LeansTooFar_JointsAreDampedAndTheModuleSaysSo) {
+  PhysicalClimb climb(stairs_of(2, 3));
+  climb.run(5.0);
+  ASSERT_EQ(climb.health().count(Fault::kFallen).count, 0U);
+  climb.push({.at_s = 0.0, .axis = 1, .impulse_ns = 100.0});
+  for (int i = 0; i < 1000 && climb.health().count(Fault::kFallen).count == 0; ++i) (void)climb.tick();
+  EXPECT_EQ(climb.health().count(Fault::kFallen).count, 1U);
+  (void)climb.tick();
+  for (const JointSetpoint& joint : climb.command().joints) {
+    EXPECT_EQ(joint.kp_nmprad, 0.0);
+    EXPECT_EQ(joint.tau_ff_nm, 0.0);
+    EXPECT_GT(joint.kd_nmsprad, 0.0);
+  }
+}
+
 }  // namespace
 }  // namespace polygmap::sim

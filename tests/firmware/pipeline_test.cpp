@@ -66,7 +66,7 @@ TEST_F(PipelineTest, BusRefusesTheCommand_IsCounted) {
 TEST_F(PipelineTest, BusRefusesForFiftyMilliseconds_StopsAndSaysSo) {
   stand(kInitialised_ticks);
   for (std::uint32_t i = 0; i < OverloadGuard::Params{}.most_refused; ++i) {
-    EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+    EXPECT_TRUE(is_running(control().module_state()));
     joints_.writes.fail_next();
     stand(1);
   }
@@ -87,7 +87,7 @@ TEST_F(PipelineTest, BusTakesOneCommandAmongRefusedOnes_GoesOn) {
     stand(1);
   }
   EXPECT_EQ(count(Fault::kCommandsRefused), 0U);
-  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+  EXPECT_TRUE(is_running(control().module_state()));
 }
 
 TEST_F(PipelineTest, EveryTickComesTwoCyclesLate_StopsAndSaysSo) {
@@ -123,7 +123,7 @@ TEST_F(PipelineTest, CyclesAreLostNowAndThen_GoesOn) {
   }
   EXPECT_EQ(count(Fault::kCycleSlip), 3U * 22U);
   EXPECT_EQ(count(Fault::kTimeShort), 0U);
-  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+  EXPECT_TRUE(is_running(control().module_state()));
 }
 
 TEST_F(PipelineTest, BusTellsOfItsFaults_EachIsCountedUnderItsName) {
@@ -145,7 +145,7 @@ TEST_F(PipelineTest, BusTellsOfItsFaults_EachIsCountedUnderItsName) {
   EXPECT_EQ(count(Limit::kDriveClamped), 6U);
   EXPECT_EQ(count(Fault::kBusReplyStale), 7U);
   EXPECT_EQ(count(Fault::kFeetSilent), 1U);
-  EXPECT_EQ(control().module_state(), ModuleState::kRunning);
+  EXPECT_TRUE(is_running(control().module_state()));
 }
 
 TEST_F(PipelineTest, LidarFromTheFuture_IsRejected) {

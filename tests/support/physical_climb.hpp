@@ -13,6 +13,7 @@
 #include "firmware/schedule.hpp"
 #include "sim_stub/sim_robot.hpp"
 #include "sim_stub/world/clearance.hpp"
+#include "tests/support/fakes/fake_operator_input.hpp"
 
 namespace polygmap::sim {
 
@@ -25,16 +26,36 @@ class TamperedJoints final : public hal::JointBus {
     return true;
   }
   [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override {
-    return bus_.try_write(instead ? *instead : command);
+    return refuses ? JointSet{} : bus_.try_write(instead ? *instead : command);
   }
-  [[nodiscard]] hal::JointBusStatus status() const noexcept override { return bus_.status(); }
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override {
+    hal::JointBusStatus status = bus_.status();
+    if (!in_error.is_empty()) {
+      status.drive_errors = in_error;
+      ++status.drive_error_replies;
+    }
+    return status;
+  }
 
   std::function<void(JointFeedback&)> tamper;
   const JointCommand* instead = nullptr;  // another module's command goes to the drives
   bool silent = false;
+  bool refuses = false;  // every command
+  JointSet in_error;     // drives that tell of one
 
  private:
   hal::JointBus& bus_;
+};
+
+class TamperedImu final : public hal::Imu {
+ public:
+  explicit TamperedImu(hal::Imu& imu) noexcept : imu_(imu) {}
+  [[nodiscard]] bool try_read(ImuSample& sample) noexcept override { return !silent && imu_.try_read(sample); }
+
+  bool silent = false;
+
+ private:
+  hal::Imu& imu_;
 };
 
 class TamperedCamera final : public hal::DepthCamera {
@@ -72,7 +93,7 @@ class PhysicalClimb {
  public:
   explicit PhysicalClimb(const SimOptions& options, const Params& params = {})
       : robot_(under_physics(options)),
-        pipeline_(std::make_unique<Pipeline>(Ports{camera, robot_, joints, lidar}, params)),
+        pipeline_(std::make_unique<Pipeline>(Ports{camera, imu, joints, lidar, &operator_input}, params)),
         tasks_{*pipeline_, robot_.clock(), row_share},
         executive_(tasks_, robot_, pipeline_->lane_health(0)) {
     executive_.start(robot_.now_ns() + kCycle_ns);
@@ -118,6 +139,7 @@ class PhysicalClimb {
   [[nodiscard]] const GaitStatus& status() const { return pipeline_->control().gait_status(); }
   [[nodiscard]] const Health& health() const { return pipeline_->health(); }
   [[nodiscard]] const JointCommand& command() const { return pipeline_->control().last_command(); }
+  [[nodiscard]] ModuleState state() const { return pipeline_->control().module_state(); }
   [[nodiscard]] double time_s() const { return seconds(robot_.now_ns()); }
   // Of every sole that stood on a step, at any time, to its tread's edge; negative over it.
   [[nodiscard]] double sole_margin_min_m() const { return sole_margin_min_m_; }
@@ -143,6 +165,8 @@ class PhysicalClimb {
   TamperedJoints joints{robot_};
   TamperedCamera camera{robot_};
   TamperedLidar lidar{robot_};
+  TamperedImu imu{robot_};
+  fakes::FakeOperatorInput operator_input;
   std::function<double(std::size_t row)> row_share;  // a row takes this share of its time; empty: none
 
  private:

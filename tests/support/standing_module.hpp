@@ -14,8 +14,8 @@ namespace polygmap::test {
 // A robot that stands still on level floor whatever it is told, fed by hand.
 class StandingModule : public testing::Test {
  protected:
-  explicit StandingModule(const Params& params = {})
-      : camera_(robot_camera_intrinsics()), module_({camera_, imu_, joints_, lidar_}, params, clock_) {}
+  explicit StandingModule(const Params& params = {}, hal::OperatorInput* operator_input = nullptr)
+      : camera_(robot_camera_intrinsics()), module_({camera_, imu_, joints_, lidar_, operator_input}, params, clock_) {}
 
   [[nodiscard]] ImuSample imu_at(std::int64_t stamp_ns) const {
     return {stamp_ns, Vec3::Zero(), Vec3{0, 0, kGravity_mps2}};

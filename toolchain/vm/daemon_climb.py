@@ -32,7 +32,7 @@ printf '[gait.planner]\npattern = "{gait}"\n' >vm_params.toml
 sed -e 's#/dev/polygmap/depth#/dev/video0#' -e 's/Z16/Y16/' -e 's/^frames_per_s/# &/' -e 's#cameras/d435#cameras/kuavo#' \
     -e 's/^latency_ms.*/latency_ms = {latency}/' -e 's/^exposure_ms.*/exposure_ms = {exposure}/' \
     -e 's#^bus = .*#bus = "vm_bus.toml"#' -e 's#^\# params = .*#params = "vm_params.toml"#' \
-    -e 's/^sender = .*/sender = "127.0.0.1"/' -e 's/^least_delay_ms.*/least_delay_ms = 0.0/' -e 's/^hold_s.*/hold_s = 1.0/' \
+    -e 's/^sender = .*/sender = "127.0.0.1"/' -e 's/^least_delay_ms.*/least_delay_ms = 0.0/' -e 's/^hold_s.*/hold_s = 1.0/' -e '/^operator = /d' \
     -e 's/^cpu = 4/cpu = 0/' -e 's/^cpu = 5/cpu = {perception_cpu}/' polygmapd.toml >vm.toml
 {one_lane}
 cd /

@@ -63,7 +63,14 @@ void ClimbPlanner::reset(const Params& params, const RobotModel& robot) noexcept
   robot_ = &robot;
 }
 
-ClimbPlanner::Decision ClimbPlanner::trailing_step(const FootholdSet& footholds) const noexcept {
+void ClimbPlanner::restart() noexcept {
+  stride_share_ = 1.0;
+  floor_steps_ = corrections_ = 0;
+  passing_refused_ = closes_up_ = false;
+}
+
+ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
+                                                   const FootholdSet& footholds) const noexcept {
   Decision decision;
   decision.has_step = true;
   StepGoal& goal = decision.goal;
@@ -75,6 +82,11 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const FootholdSet& footholds)
       footholds.has_p_star && seen.polygon_id == memory_.trailing_foothold.polygon_id && usable(seen);
   goal.foothold = same_tread ? seen : memory_.trailing_foothold;
   goal.target = sole_on(goal.foothold);
+  if (situation.stamp_ns - goal.foothold.last_seen_ns <= params_.remembered_ns) return decision;
+  // Odometry has wandered since, but not from the foot that stands there.
+  goal.target = sole_beside(situation.soles[index_of(memory_.leading)], goal.foot, robot_->stance.half_width_m);
+  goal.foothold = foothold_at(goal.target, 0);
+  goal.foothold.polygon_id = tread_id_;
   return decision;
 }
 
@@ -216,7 +228,7 @@ StopReason ClimbPlanner::reason_against(const Situation& situation, const Footho
 ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const FootholdSet& footholds) const noexcept {
   Decision decision;
   if (split_stance_) {
-    return passing_step(situation, footholds, decision) ? decision : trailing_step(footholds);
+    return passing_step(situation, footholds, decision) ? decision : trailing_step(situation, footholds);
   }
   if (closes_up_) {
     decision.has_step = true;

@@ -51,6 +51,7 @@ class ClimbPlanner {
     SwingRule rule;
     double min_rise_m = 0.02;
     std::int64_t max_map_age_ns = 500 * kNsPerMs;
+    std::int64_t remembered_ns = 5 * kNsPerS;
     double correction_m = 0.05;
     double turn_round = 2.5;
     double shorter = 0.6;
@@ -73,6 +74,9 @@ class ClimbPlanner {
       field("rule", p.rule);
       field("min_rise_m", p.min_rise_m, 0.001, 0.039, "Delta_foot: a tread that is not higher is already underfoot.");
       field("max_map_age_ns", p.max_map_age_ns, 1000000, 10000000000, "An older map is no reason to step.");
+      field("remembered_ns", p.remembered_ns, 1000000, 100000000000,
+            "After a longer pause between two treads the rear foot goes beside the other one, wherever its foothold "
+            "was.");
       field("correction_m", p.correction_m, 0.0, 0.5, "A shorter step on the floor only corrects.");
       field("turn_round", p.turn_round, 1.0, 100.0,
             "The other foot leads than the one that was to only for a displacement beyond this times the dead bands.");
@@ -107,6 +111,9 @@ class ClimbPlanner {
   // robot: outlives the planner.
   void reset(const Params& params, const RobotModel& robot) noexcept;
   [[nodiscard]] Decision decide(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  // After an end: what it has tried to line up with the stairs, and what it has given up, is forgotten; where it stands
+  // is not.
+  void restart() noexcept;
   // A swing was latched: its goal is what the next decisions build on.
   void latched(const Situation& situation, const Decision& decision) noexcept;
   // The legs cannot do the step: the next ones on the floor are shorter. False when they are short already.
@@ -127,7 +134,7 @@ class ClimbPlanner {
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
 
  private:
-  [[nodiscard]] Decision trailing_step(const FootholdSet& footholds) const noexcept;
+  [[nodiscard]] Decision trailing_step(const Situation& situation, const FootholdSet& footholds) const noexcept;
   // Past the standing foot onto the tread beyond it; false when there is none to be sure of.
   [[nodiscard]] bool passing_step(const Situation& situation, const FootholdSet& footholds,
                                   Decision& decision) const noexcept;

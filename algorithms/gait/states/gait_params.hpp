@@ -87,6 +87,7 @@ struct SwingParams {
   double max_lowering_m = 0.055;
   double abort_share = 0.38;
   double abort_passing_ticks = 45.0;
+  double stop_ticks = 490.0;
   double abort_mute_share = 0.25;
   std::int32_t unjudged_ticks = 50;
   double abort_landing_m = 0.01;
@@ -110,7 +111,9 @@ struct SwingParams {
     field("abort_share", p.abort_share, 0.0, 1.0,
           "In this share of a swing a foot that falls outward goes back to where it stood.");
     field("abort_passing_ticks", p.abort_passing_ticks, 0.0, 2000.0,
-          "That of a passing swing, in ticks, and of every swing when the operator asks to stop.");
+          "That of a passing swing, in ticks, and of a floor's or a leading one when the operator asks to stop.");
+    field("stop_ticks", p.stop_ticks, 0.0, 5000.0,
+          "When he asks in another swing, the foot goes back if on to its target it would take longer.");
     field("abort_mute_share", p.abort_mute_share, 0.0, 1.0,
           "In this share of a swing a foot goes back to where it stood when a drive is silent for good.");
     field(

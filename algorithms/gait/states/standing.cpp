@@ -26,6 +26,10 @@ Transition Standing::tick(const GaitInput& in, GaitShared& gait) noexcept {
   if (in.stop_requested != StopReason::kNone) return Transition::stop(in.stop_requested);
   if (in.lost) return Transition::stop(StopReason::kStateStale);
   if (!in.state.initialised || !in.usable) return {};
+  if (!in.may_step) {
+    gait.memory.shifts = gait.memory.idle_ticks = wait_ticks_ = 0;  // it waits for nothing that it sees
+    return {};
+  }
   // A body that sways sideways or back is best off between the feet: no step to come would catch it.
   const Mat3& R = gait.plan.plan_T_base().R;
   const double ahead_m = R.col(0).head<2>().dot(in.odom_dcm_error_m);

@@ -28,6 +28,7 @@ struct GaitInput {
   bool held;                     // either: the body stays where it is, and the states' clocks stand still
   bool lost;                     // the estimate is, or in this swing was, so old that the gait stops; or leg_impaired
   StopReason stop_requested;     // kNone: it is not
+  bool may_step;                 // false: a foot in the air comes down, no other is lifted
   std::int64_t since_last_ns;    // since the last tick: the plan stood still, and the body did not
 };
 

@@ -26,16 +26,17 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   gait.planner.latched(situation(in), decision);
 
   LatchedStep& step = gait.status.step;
-  step = {.sequence = step.sequence + 1,
-          .foot = goal_.foot,
-          .onto_tread = onto_tread(goal_.kind),
-          .height_mapped = onto_tread(goal_.kind) && goal_.kind != StepKind::kClosing,
-          .latch_stamp_ns = in.now_ns,
-          .map_stamp_ns = in.footholds.map_stamp_ns,
-          .target = goal_.foothold,
-          .odom_T_target = goal_.target.transform(),
-          .touch_down_stamp_ns = 0,
-          .odom_T_executed = {}};
+  step = {
+      .sequence = step.sequence + 1,
+      .foot = goal_.foot,
+      .onto_tread = onto_tread(goal_.kind),
+      .height_mapped = onto_tread(goal_.kind) && goal_.kind != StepKind::kClosing && goal_.foothold.last_seen_ns > 0,
+      .latch_stamp_ns = in.now_ns,
+      .map_stamp_ns = in.footholds.map_stamp_ns,
+      .target = goal_.foothold,
+      .odom_T_target = goal_.target.transform(),
+      .touch_down_stamp_ns = 0,
+      .odom_T_executed = {}};
   gait.status.phase = GaitPhase::kSwing;
   gait.status.stands[index_of(goal_.foot)] = false;
   gait.memory.shifts = gait.memory.idle_ticks = 0;
@@ -142,7 +143,10 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                        : reaches_back    ? params.abort_share * path_.duration_ticks()
                        : reaches_shortly ? params.abort_passing_ticks
                                          : 0.0;
-  const double stop_until = in.stop_requested == StopReason::kOperator ? params.abort_passing_ticks : 0.0;
+  // Back down to a lower tread the body topples, which is on its way up: on it goes where that takes no longer.
+  const double stop_until = in.stop_requested != StopReason::kOperator ? 0.0
+                            : reaches_back                             ? params.abort_passing_ticks
+                                                                       : path_.duration_ticks() - params.stop_ticks;
   const bool went_back = timing_.goes_back();
   // A plan that has just been stopped, or has just gone on, is no body that falls.
   unjudged_ticks_ = in.mute ? params.unjudged_ticks : std::max(unjudged_ticks_ - 1, 0);

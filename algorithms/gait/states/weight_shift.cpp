@@ -27,8 +27,8 @@ void WeightShift::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanne
 
 Transition WeightShift::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const WeightShiftParams& params = gait.params.weight_shift;
-  if (in.stop_requested != StopReason::kNone || in.lost || in.since_last_ns > params.max_gap_ns)
-    return Transition::stand();
+  const bool ends = in.stop_requested != StopReason::kNone || in.lost || !in.may_step;
+  if (ends || in.since_last_ns > params.max_gap_ns) return Transition::stand();
   if (search_.step(gait.robot, gait.params.step) == StepSearch::State::kImpossible) return legs_cannot(in, gait);
   if (tick_ < shift_ticks_ || search_.state() != StepSearch::State::kFound || !in.usable) return {};
   if (!(in.odom_dcm_error_m.norm() <= gait.params.steady_m)) return wait(params);

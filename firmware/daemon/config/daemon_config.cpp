@@ -16,7 +16,8 @@
 namespace polygmap::daemon {
 namespace {
 
-constexpr double kMostProcessor = 1023;  // CPU_SETSIZE - 1
+constexpr std::size_t kMostSocketPath_bytes = 107;  // sockaddr_un holds so many and a null
+constexpr double kMostProcessor = 1023;             // CPU_SETSIZE - 1
 constexpr Range kPort{1, 65535, ""};
 constexpr Range kAngle{-7.0, 7.0, "rad"};
 constexpr Range kImuRate{100, 1000, "Hz"};  // what imu_interval_ns may be
@@ -28,7 +29,8 @@ class DaemonFile {
   DaemonFile(const std::string& path, const toml::table& root) : path_(path), root_(path, "", root, 1) {}
 
   DaemonConfig read() {
-    root_.only({"bus", "params", "lanes", "real_time", "hold_s", "control", "perception", "camera", "imu", "lio"});
+    root_.only(
+        {"bus", "params", "lanes", "real_time", "hold_s", "control", "perception", "camera", "imu", "lio", "operator"});
     config_.path = path_;
     config_.lanes = static_cast<std::size_t>(root_.whole("lanes", {1, kLaneCount, ""}, kLaneCount));
     config_.needs_real_time = root_.choice("real_time", {"required", "preferred"}, 0) == 0;
@@ -41,6 +43,14 @@ class DaemonFile {
     check_placement();
     take_camera(*root_.section("camera", true));
     if (root_.has("params")) config::read_params(file("params"), config_.params);
+    if (root_.has("operator")) {
+      config_.operator_socket = (std::filesystem::path(path_).parent_path() / root_.text("operator")).string();
+      const std::size_t bytes = config_.operator_socket.size();
+      check_path(root_, "operator", root_.text("operator").empty() || bytes > kMostSocketPath_bytes);
+      config_.params.supervisor.autostart = false;
+    } else if (!config_.params.supervisor.autostart) {
+      root_.fail("params", "switches supervisor.autostart off, and there is no key operator: it would never arm");
+    }
     take_bus();
     take_imu(*root_.section("imu", true));
     if (const auto lio = root_.section("lio", false)) take_lio(*lio);

@@ -296,6 +296,7 @@ void Service::run_lane(LaneRun& lane) noexcept {
 
 Service::Decision Service::watch() {
   seen_.moved_ns = monotonic_ns();
+  if (parts_.operator_socket != nullptr) parts_.operator_socket->drop_waiting();
   for (;;) {
     const int signal = signals_.wait(kLook_ns);
     const std::int64_t now_ns = monotonic_ns();
@@ -305,6 +306,8 @@ Service::Decision Service::watch() {
       notifier_.tell("STOPPING=1");
       std::fprintf(stderr, "polygmapd: asked to stop by signal %d.\n", signal);
     }
+    const bool listens = parts_.operator_socket != nullptr && seen_.asked_ns < 0;
+    if (listens) parts_.operator_socket->serve(board_.module().state, now_ns);
     log_changes();
     log_trouble(now_ns);
     if (const std::optional<Decision> decision = decide(now_ns)) return *decision;
@@ -334,12 +337,19 @@ std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
   const ModuleView view = board_.module();
   if (!lanes_move(now_ns)) return Decision{ExitCode::kStoppedItself, "a lane has not finished a cycle for a second."};
   const bool asked = seen_.asked_ns >= 0;
-  if (!asked && view.state == ModuleState::kSafeStop && seen_.stopped_ns < 0) seen_.stopped_ns = now_ns;
+  const bool fallen = view.state == ModuleState::kFallen;
+  const bool may_reset = parts_.operator_socket != nullptr && !fallen;
+  const bool over = !may_reset && (fallen || view.state == ModuleState::kSafeStop);
+  if (!asked && over && seen_.stopped_ns < 0) seen_.stopped_ns = now_ns;
   if (seen_.stopped_ns >= 0 && (asked || now_ns - seen_.stopped_ns >= config_.hold_ns)) {
-    return Decision{ExitCode::kStoppedItself, "the gait had stopped by itself."};
+    return Decision{ExitCode::kStoppedItself, fallen ? "the robot has fallen." : "the gait had stopped by itself."};
   }
   if (!asked) return std::nullopt;
+  if (fallen) return Decision{ExitCode::kStoppedItself, "the robot has fallen."};
+  if (view.state == ModuleState::kOff) return Decision{ExitCode::kAsked, "asked to stop before it armed."};
   if (view.state == ModuleState::kArming) return Decision{ExitCode::kAsked, "asked to stop while it armed."};
+  const bool by_itself = view.state == ModuleState::kSafeStop && view.reason != StopReason::kOperator;
+  if (by_itself) return Decision{ExitCode::kStoppedItself, "the gait had stopped by itself."};
   if (view.stands()) return Decision{ExitCode::kAsked, "asked to stop, and stands."};
   if (now_ns - seen_.asked_ns < kStopLimit_ns) return std::nullopt;
   return Decision{ExitCode::kStoppedItself, "asked to stop, and after three seconds it still does not stand."};
@@ -445,7 +455,7 @@ void Service::finish(Outcome& outcome) {
   outcome.module = board_.module();
   const bool maintainer_ends = maintainer_.ends_before(until_ns);
   outcome.threads_hang = lanes_hang || !maintainer_ends;
-  if (!lanes_hang && outcome.module.state == ModuleState::kArming) parts_.let_go();
+  if (!lanes_hang && outcome.module.state <= ModuleState::kArming) parts_.let_go();
   if (parts_.recorder != nullptr) finish_recording(outcome, lanes_hang);
 }
 

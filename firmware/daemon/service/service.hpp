@@ -16,6 +16,7 @@
 #include "firmware/daemon/config/daemon_config.hpp"
 #include "firmware/daemon/exit_code.hpp"
 #include "firmware/daemon/service/device_counts.hpp"
+#include "firmware/daemon/service/operator_socket.hpp"
 #include "firmware/daemon/service/row_hook.hpp"
 #include "firmware/daemon/service/status_board.hpp"
 #include "firmware/daemon/service/stop_signals.hpp"
@@ -32,9 +33,10 @@ struct ServiceParts {
   std::function<void()> maintain = [] {};  // some ten times a second, on a thread of its own that may block
   std::function<void()> let_go = [] {};    // once, after the lanes, when the drives never had gains
   HeapCount heap{};
-  DeviceCounts* devices = nullptr;          // null: there are no drivers whose counters could be told
-  recording::Recorder* recorder = nullptr;  // has begun, and stands before the ports; null: nothing is recorded
-  RowHook* hook = nullptr;                  // of a test's build
+  OperatorSocket* operator_socket = nullptr;  // the port of it, or of who records it; null: none
+  DeviceCounts* devices = nullptr;            // null: there are no drivers whose counters could be told
+  recording::Recorder* recorder = nullptr;    // has begun, and stands before the ports; null: nothing is recorded
+  RowHook* hook = nullptr;                    // of a test's build
 };
 
 struct Outcome {

@@ -68,7 +68,7 @@ void write_module(StatusText& out, const ModuleView& view) noexcept {
   add_text(out, "", name_of(view.state));
   if (view.state == ModuleState::kArming) {
     add_wait(out, view.waits_for);
-  } else {
+  } else if (view.state != ModuleState::kOff) {
     add_text(out, ", ", name_of(view.phase));
     if (view.state == ModuleState::kSafeStop) add_text(out, ": ", text_of(view.reason));
     out.add(", %u treads", view.treads);

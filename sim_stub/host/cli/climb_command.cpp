@@ -20,6 +20,7 @@
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
 #include "sim_stub/host/cli/replay_command.hpp"
+#include "sim_stub/host/operator/keyboard.hpp"
 #include "sim_stub/host/output_file.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
 
@@ -48,6 +49,8 @@ struct ClimbArguments {
   std::string camera;
   std::vector<std::string> pushes;
   std::vector<std::string> set;
+  bool keyboard = false;
+  std::vector<std::string> ask;
   Reality usual;  // of the options that are items of it
   double mount_error_deg = 1.0;
   const CLI::App* said = nullptr;  // which options were
@@ -104,6 +107,20 @@ void declare_reality(CLI::App& climb, ClimbArguments& a) {
   keep_within(*climb.add_option("--friction", mujoco.friction, "Friction of the soles on floor and stairs")
                    ->capture_default_str(),
               0.05, 2.0);
+}
+
+void declare_operator(CLI::App& climb, ClimbArguments& a) {
+  CLI::Option* keys =
+      climb.add_flag("--operator", a.keyboard,
+                     "Nothing starts by itself: keys arm, start, pause and stop it, in the wall clock's time");
+  climb
+      .add_option(
+          "--ask", a.ask,
+          "The same by a script: arm, start, pause, resume, stop or reset, and at which simulated second, as in "
+          "pause@12.5")
+      ->expected(1, 64)
+      ->excludes(keys)
+      ->type_name("WHAT@S");
 }
 
 void declare_camera(CLI::App& climb, ClimbArguments& a) {
@@ -194,6 +211,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
                       " to " + number(kHardestPush_ns) + " N s")
       ->expected(1, 16)
       ->type_name("\"T,AXIS,NS\"");
+  declare_operator(climb, a);
   declare_reality(climb, a);
   declare_files(climb, a);
   declare_camera(climb, a);
@@ -277,6 +295,19 @@ std::string pushes_complaint(ClimbArguments& a) {
              " N s, as in 12.5,x,10, not \"" + text + "\".";
     }
     a.options.pushes.push_back(*push);
+  }
+  return {};
+}
+
+std::string operator_complaint(ClimbArguments& a) {
+  for (const std::string& text : a.ask) {
+    TimedCommand command;
+    const std::string sentence = read_command(text, command);
+    if (!sentence.empty()) return sentence;
+    if (!a.options.asked.empty() && command.at_s < a.options.asked.back().at_s) {
+      return "--ask must be in the order of time: \"" + text + "\" comes after a later one.";
+    }
+    a.options.asked.push_back(command);
   }
   return {};
 }
@@ -370,8 +401,8 @@ std::string complaint(ClimbArguments& a) {
   try {
     take_params(a);
     std::string sentence = stairs_complaint(a.options.stairs);
-    for (const auto part : {balusters_complaint, plant_complaint, pushes_complaint, errors_complaint, reality_complaint,
-                            camera_complaint, bus_complaint, picture_complaint}) {
+    for (const auto part : {balusters_complaint, plant_complaint, pushes_complaint, operator_complaint,
+                            errors_complaint, reality_complaint, camera_complaint, bus_complaint, picture_complaint}) {
       if (sentence.empty()) sentence = part(a);
     }
     if (!sentence.empty()) return sentence;
@@ -509,7 +540,11 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
     return kExitUsage;
   }
 
-  ProgressLine progress(out, a.options.stairs.steps, live);
+  std::optional<ScriptedOperator> script;
+  std::optional<Keyboard> keyboard;
+  if (!a.options.asked.empty()) a.options.climb_operator = &script.emplace(a.options.asked);
+  if (a.keyboard) a.options.climb_operator = &keyboard.emplace(err);
+  ProgressLine progress(out, a.options.stairs.steps, live && !a.keyboard);
   ClimbSummary summary;
   std::string not_written;
   try {

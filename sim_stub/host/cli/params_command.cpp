@@ -135,6 +135,24 @@ std::string reality_markdown() {
   return out;
 }
 
+std::string states_markdown() {
+  std::string out =
+      "# States\n\nWritten by `toolchain/checks/docs --write`, not by hand.\n\nWhat the module does, and what its "
+      "operator may ask of it. A command that a state has no line for changes nothing and is counted as "
+      "`operator_refused`. Without an operator it arms and starts by itself (`supervisor.autostart`). Which "
+      "failure leads to which state, and within what time, is in [the architecture](../architecture.md).\n\n"
+      "| state | what it does |\n|---|---|\n";
+  for (const ModuleStateInfo& state : kModuleStateTable) {
+    out += "| `" + std::string(state.name) + "` | " + std::string(state.text) + " |\n";
+  }
+  out += "\n| in | asked to | it becomes |\n|---|---|---|\n";
+  for (const OperatorTransition& t : kOperatorTransitions) {
+    out += "| `" + std::string(name_of(t.from)) + "` | " + std::string(name_of(t.command)) + " | `" +
+           std::string(name_of(t.to)) + "`" + std::string(t.note) + " |\n";
+  }
+  return out;
+}
+
 CLI::App* declare_params(CLI::App& app, ParamsArguments& a) {
   CLI::App* params = app.add_subcommand("params", "The module's parameters: list them, document them, compare a file");
   params->require_subcommand(1);
@@ -143,6 +161,7 @@ CLI::App* declare_params(CLI::App& app, ParamsArguments& a) {
   a.list->add_option("--params", a.file, "As this file has them")->type_name("FILE.toml");
   a.docs = params->add_subcommand("docs", "Their reference as Markdown");
   a.reality = params->add_subcommand("reality", "What climb --reality draws and --set gives, as Markdown");
+  a.states = params->add_subcommand("states", "The module's states and what its operator may ask, as Markdown");
   a.diff = params->add_subcommand("diff", "What a file makes different from the defaults");
   a.diff->add_option("FILE.toml", a.file, "Parameters to change")->required()->type_name("");
   return params;
@@ -160,6 +179,8 @@ int run_params(const ParamsArguments& a, std::ostream& out, std::ostream& err) {
     out << params_markdown();
   } else if (a.reality->parsed()) {
     out << reality_markdown();
+  } else if (a.states->parsed()) {
+    out << states_markdown();
   } else if (a.diff->parsed()) {
     const std::string different = params_difference(params);
     out << (different.empty() ? "No parameter differs from its default.\n" : different);

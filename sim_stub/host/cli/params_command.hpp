@@ -14,7 +14,8 @@ class App;
 namespace polygmap::sim {
 
 struct ParamsArguments {
-  CLI::App *list = nullptr, *reality = nullptr, *docs = nullptr, *diff = nullptr;  // of which one is asked for
+  CLI::App *list = nullptr, *reality = nullptr, *states = nullptr, *docs = nullptr,
+           *diff = nullptr;  // of which one is asked for
   std::string file;
   bool json = false;
 };
@@ -28,6 +29,8 @@ CLI::App* declare_params(CLI::App& app, ParamsArguments& a);
 [[nodiscard]] std::string params_markdown();
 // docs/reference/reality.md
 [[nodiscard]] std::string reality_markdown();
+// docs/reference/states.md
+[[nodiscard]] std::string states_markdown();
 // A line for each value that is not the default; empty when there is none.
 [[nodiscard]] std::string params_difference(const Params& params);
 

@@ -190,6 +190,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   SimRobot robot(sim_options(options));
   Params params = options.params;
   params.gait.planner.pattern = options.gait;
+  params.supervisor.autostart = params.supervisor.autostart && options.climb_operator == nullptr;
   params.self_filter = options.self_filter;
   params.estimate_mount = options.estimate_mount;
   if (options.camera) {
@@ -210,8 +211,9 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   WatchedLidar lidar(robot);
   std::optional<ClimbRecorder> recorder;
   if (options.save_inputs) recorder.emplace(robot, robot, joints, lidar);
-  const Ports watched_ports =
+  Ports watched_ports =
       recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{robot, robot, joints, lidar};
+  watched_ports.operator_input = options.climb_operator;
   std::optional<recording::Recorder> recording;
   if (!options.record_dir.empty()) {
     recording.emplace(watched_ports);
@@ -234,6 +236,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   ClimbReport report(robot.stairs(), robot.errors().base_T_camera, robot.depth_camera().intrinsics(),
                      robot.errors().sole);
 
+  std::vector<StateChange> states;
   std::int64_t end_ns = -1;
   std::int64_t next_progress_ns = 0;
   while (seconds(robot.now_ns()) < options.time_limit_s) {
@@ -241,6 +244,9 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
       bus->advance();
     } else {
       robot.advance();
+    }
+    if (options.climb_operator != nullptr) {
+      options.climb_operator->look(robot.now_ns(), pipeline.control().module_state());
     }
     {
       const heap::ModuleCall call("CyclicExecutive::tick");
@@ -255,9 +261,14 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
       progress(progress_of(robot.now_ns(), telemetry.gait, tasks));
       next_progress_ns += kNsPerS;
     }
-    const bool over = telemetry.gait.phase == GaitPhase::kFinished || telemetry.gait.phase == GaitPhase::kStopped;
+    const ModuleState state = telemetry.module_state;
+    if (states.empty() || states.back().state != state) states.push_back({seconds(robot.now_ns()), state});
+    const bool goes_on = options.climb_operator != nullptr && options.climb_operator->has_more();
+    const bool over = (state == ModuleState::kOnTop || state == ModuleState::kSafeStop) && !goes_on;
+    if (!over) end_ns = -1;
     if (over && end_ns < 0) end_ns = robot.now_ns() + kRestAfterEnd_ns;
     if (robot.truth().fell || (over && robot.now_ns() >= end_ns)) break;
+    if (options.climb_operator != nullptr && options.climb_operator->ends_climb()) break;
     if (options.interrupt != nullptr && *options.interrupt != 0) break;
   }
 
@@ -265,6 +276,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   figures.options = options;
   figures.interrupted_by = options.interrupt != nullptr ? options.interrupt->load() : 0;
   figures.params_hash = config::hash_of(params);
+  figures.states = std::move(states);
   if (bus) figures.bus = bus_figures(*options.bus, *bus, pipeline.telemetry(robot.now_ns(), module->watched));
   figures.camera = camera_figures(robot, pipeline.perception().mount());
   figures.heap_calls = heap::report().calls;

@@ -13,6 +13,7 @@
 #include "firmware/config/camera_file.hpp"
 #include "firmware/params.hpp"
 #include "sim_stub/camera/noise_kind.hpp"
+#include "sim_stub/host/operator/climb_operator.hpp"
 #include "sim_stub/reality.hpp"
 #include "sim_stub/world/stair_world.hpp"
 
@@ -28,8 +29,10 @@ struct ClimbOptions {
   NoiseKind noise = NoiseKind::kWhite;
   PlantKind plant = PlantKind::kMujoco;
   std::vector<Push> pushes;
-  double reality_scale = 0.0;  // that reality was drawn at
-  Reality reality;             // the robot and the ground as they are; the module believes the data sheet
+  std::vector<TimedCommand> asked;          // of an operator with a script; for the record
+  ClimbOperator* climb_operator = nullptr;  // null: the module starts by itself. Outlives the climb
+  double reality_scale = 0.0;               // that reality was drawn at
+  Reality reality;                          // the robot and the ground as they are; the module believes the data sheet
   GaitPattern gait = GaitPattern::kDoubleStep;
   std::string out_dir;       // empty: no files
   bool save_inputs = false;  // what the sensors said, in out_dir/inputs, a directory that exists

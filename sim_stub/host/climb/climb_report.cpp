@@ -366,6 +366,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
 
   s.heap_calls = run.heap_calls;
   s.faults = run.faults;
+  s.states = run.states;
   for (const StageMemory& stage : run.static_memory) s.static_memory.push_back({stage.stage, stage.bytes});
   s.schedule = run.schedule;
   s.footsteps = footsteps_;

@@ -30,6 +30,7 @@ struct RunFigures {
   ClimbOptions options;
   int interrupted_by = 0;   // the signal; 0: none
   std::string params_hash;  // of what the module was given
+  std::vector<StateChange> states;
   CameraFigures camera;
   std::optional<BusFigures> bus;
   std::uint64_t heap_calls = 0;

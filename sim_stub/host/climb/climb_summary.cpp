@@ -62,6 +62,12 @@ Json pushes_json(const std::vector<Push>& pushes) {
   return list;
 }
 
+Json asked_json(const std::vector<TimedCommand>& asked) {
+  Json list = Json::array();
+  for (const TimedCommand& one : asked) list.push_back({{"at_s", one.at_s}, {"command", name_of(one.command)}});
+  return list;
+}
+
 // What the command line said beside gait and seed, defaults included: enough to run it again.
 Json arguments_json(const ClimbOptions& o) {
   const StairParams& stairs = o.stairs;
@@ -82,6 +88,7 @@ Json arguments_json(const ClimbOptions& o) {
                {"self_filter", o.self_filter},
                {"contacts", o.foot_sensors ? "sensed" : "inferred"},
                {"pushes", pushes_json(o.pushes)},
+               {"asked", asked_json(o.asked)},
                {"mass_scale", o.reality.plant.torso_mass_scale},
                {"torso_offset_x_m", o.reality.plant.torso_offset_x_m},
                {"friction", o.reality.plant.friction},
@@ -158,6 +165,10 @@ Json to_json(const ClimbSummary& s) {
                 {"frames_sent", s.bus->sent},
                 {"frames_received", s.bus->received}};
     for (const auto& [name, load] : s.bus->loads) j["bus"]["load_percent"][name] = rounded(1e2 * load, 10.0);
+  }
+  j["states"] = Json::array();
+  for (const StateChange& change : s.states) {
+    j["states"].push_back({{"at_s", seconds_of(change.at_s)}, {"state", name_of(change.state)}});
   }
   j["steps_total"] = s.steps_total;
   j["steps_climbed"] = s.steps_climbed;

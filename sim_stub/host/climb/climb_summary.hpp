@@ -71,6 +71,11 @@ struct CameraFigures {
   double mount_found_ahead_m = 0.0;     // the same, and encoders
 };
 
+struct StateChange {
+  double at_s = 0.0;  // simulation's clock
+  ModuleState state{};
+};
+
 // Of a climb through CAN buses.
 struct BusFigures {
   std::vector<std::pair<std::string, double>> loads;  // by bus: share of its time that a cycle's frames may take
@@ -98,7 +103,8 @@ struct ClimbSummary {
   int interrupted_by = 0;            // the signal; 0: none
   double ended_at_s = kNotMeasured;  // simulation's clock
   ClimbOptions options;
-  std::string params_hash;  // of what the module was given
+  std::string params_hash;          // of what the module was given
+  std::vector<StateChange> states;  // the module's, the first one included
   CameraFigures camera;
   std::optional<BusFigures> bus;
   int steps_total = 0;

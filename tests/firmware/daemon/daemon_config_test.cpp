@@ -153,6 +153,10 @@ TEST_F(DaemonConfigTest, ShippedUnit_GrantsWhatTheFilesTake) {
                "/usr/share/polygmap/cameras/d435.toml", kCamera);
   const DaemonConfig config = read_daemon_config(write("polygmapd.toml", shipped));
   EXPECT_TRUE(config.warnings.empty()) << config.warnings[0];
+  EXPECT_EQ(config.operator_socket, "/run/polygmap/operator");
+  EXPECT_FALSE(config.params.supervisor.autostart) << "no robot walks off by itself";
+  EXPECT_NE(unit.find("\nRuntimeDirectory=polygmap\n"), std::string::npos);
+  EXPECT_TRUE(read_daemon_config(write("robot.toml", good())).params.supervisor.autostart);
   EXPECT_NE(unit.find("\nIPAddressDeny=any\nIPAddressAllow=localhost 192.168.1.0/24\n"), std::string::npos);
   EXPECT_TRUE(std::get<hal::LivoxImu::Config>(config.imu).udp.sender.view().starts_with("192.168.1."));
   EXPECT_TRUE(config.lio->udp.sender.view().starts_with("127."));

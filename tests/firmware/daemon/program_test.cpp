@@ -78,9 +78,10 @@ class ProgramTest : public testing::Test {
 };
 
 TEST_F(ProgramTest, WrongArguments_AreConfigurationErrorsWithTheUsage) {
-  for (const char* wrong : {"", "--config", "--replay", "--frobnicate", "--json --config x", "--doctor --replay x",
-                            "--check", "--check --doctor", "--record", "--config x --record", "--record x",
-                            "--config x --record y --check", "--replay x --record y"}) {
+  for (const char* wrong :
+       {"", "--config", "--replay", "--frobnicate", "--json --config x", "--doctor --replay x", "--check",
+        "--check --doctor", "--record", "--config x --record", "--record x", "--config x --record y --check",
+        "--replay x --record y", "--ask", "--ask arm", "--ask stopp --config x", "--ask arm --check --config x"}) {
     const Done done = run(wrong);
     EXPECT_EQ(done.code, 2) << wrong;
     EXPECT_NE(done.said.find("polygmapd --config FILE"), std::string::npos) << wrong << ": " << done.said;
@@ -108,6 +109,19 @@ TEST_F(ProgramTest, Check_OpensNothing) {
   const Done done = run("--check --config " + config());
   EXPECT_EQ(done.code, 0) << done.said;
   EXPECT_NE(done.said.find("can be used"), std::string::npos) << done.said;
+}
+
+TEST_F(ProgramTest, Ask_SaysWhereNobodyListens) {
+  const Done none = run("--ask state --config " + config());
+  EXPECT_EQ(none.code, 2) << none.said;
+  EXPECT_NE(none.said.find("has no key operator"), std::string::npos) << none.said;
+  const std::string text = "operator = \"" + (folder_ / "socket").string() + "\"\n";
+  const std::string path = config();
+  std::ifstream robot(path);
+  const std::string all = text + std::string{std::istreambuf_iterator<char>(robot), {}};
+  const Done silent = run("--ask state --config " + write("operated.toml", all));
+  EXPECT_EQ(silent.code, 3) << silent.said;
+  EXPECT_NE(silent.said.find("nobody listens at"), std::string::npos) << silent.said;
 }
 
 TEST_F(ProgramTest, MissingDevice_IsCodeThreeWithFileLineAndKey) {

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "firmware/recording/replay.hpp"
@@ -49,10 +50,13 @@ class ServiceTest : public testing::Test {
 #endif
   }
   ServiceParts parts() {
-    return {.ports = robot_.ports(),
+    Ports ports = robot_.ports();
+    if (operator_socket_ != nullptr) ports.operator_input = operator_socket_;
+    return {.ports = ports,
             .maintain = [this] { ++maintained_; },
             .let_go = [this] { ++let_go_; },
             .heap = {},
+            .operator_socket = operator_socket_,
             .devices = &counts_,
             .recorder = nullptr,
             .hook = nullptr};
@@ -64,6 +68,7 @@ class ServiceTest : public testing::Test {
             .maintain = std::move(all.maintain),
             .let_go = std::move(all.let_go),
             .heap = {},
+            .operator_socket = operator_socket_,
             .devices = &counts_,
             .recorder = &recorder,
             .hook = nullptr};
@@ -104,6 +109,7 @@ class ServiceTest : public testing::Test {
   NotifySocket manager_{"@polygmap_service_" + std::to_string(::getpid())};
   Notifier notifier_;
   DeviceCounts counts_;
+  OperatorSocket* operator_socket_ = nullptr;
   std::vector<std::string> heard_;
   std::chrono::steady_clock::duration stopped_after_{};
   std::atomic<int> maintained_ = 0;
@@ -132,7 +138,7 @@ TEST_F(ServiceTest, JointBeyondItsRange_IsNamedAndTheDrivesAreLetGo) {
 
 TEST_F(ServiceTest, AskedToStopWhileItRuns_StandsOnItsDrives) {
   const Outcome outcome = run([&] {
-    listen_until("STATUS=running", 5s);
+    listen_until("STATUS=walking_up", 5s);
     std::this_thread::sleep_for(kEstimates);
   });
   EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
@@ -147,12 +153,63 @@ TEST_F(ServiceTest, AskedToStopWhileItRuns_StandsOnItsDrives) {
 }
 
 TEST_F(ServiceTest, AskedToStopBeforeThereIsAnEstimate_StandsOnItsDrives) {
-  const Outcome outcome = run([&] { listen_until("STATUS=running", 5s); });
+  const Outcome outcome = run([&] { listen_until("STATUS=walking_up", 5s); });
   EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
   EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
   EXPECT_EQ(outcome.module.reason, StopReason::kOperator);
   EXPECT_EQ(let_go_, 0);
   EXPECT_LT(stopped_after_, 1s);
+}
+
+// As polygmapd --ask does it, through the socket.
+TEST_F(ServiceTest, OperatorAsks_ArmsStartsStopsAndResetsThenAndNotBefore) {
+  const std::string path = testing::TempDir() + "polygmap_operator_" + std::to_string(::getpid());
+  OperatorSocket socket;
+  ASSERT_EQ(socket.open(path), "");
+  operator_socket_ = &socket;
+  config_.params.supervisor.autostart = false;
+  const auto ask = [&](const std::string& word) {
+    std::string text;
+    EXPECT_TRUE(try_ask(path, word, text)) << text;
+    return text;
+  };
+  const Outcome outcome = run([&] {
+    listen_until("STATUS=off;", 5s);
+    EXPECT_EQ(ask("state"), "off");
+    EXPECT_EQ(ask("start"), "refused: off");
+    EXPECT_FALSE(robot_.has_gains);
+    (void)ask("arm");
+    listen_until("STATUS=standing", 5s);
+    std::this_thread::sleep_for(kEstimates);
+    EXPECT_EQ(ask("start"), "walking_up");
+    EXPECT_EQ(ask("dance"), "refused: ask for arm, start, pause, resume, stop, reset or state");
+    EXPECT_EQ(ask(std::string(100, 'a')), "refused: ask for arm, start, pause, resume, stop, reset or state");
+    EXPECT_EQ(ask("pause\n"), "holding");
+    (void)ask("stop");
+    listen_until("STATUS=safe_stop", 5s);
+    std::this_thread::sleep_for(std::chrono::nanoseconds(3 * config_.hold_ns));
+    EXPECT_EQ(ask("state"), "safe_stop") << "it waits for a reset";
+    EXPECT_EQ(ask("reset"), "standing");
+    EXPECT_EQ(ask("arm"), "refused: standing");
+  });
+  EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
+  EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
+}
+
+TEST(OperatorSocketTest, NoSocketCanBeMade_IsTold) {
+  OperatorSocket none, file, first, second;
+  EXPECT_NE(none.open("/nowhere/operator").find("cannot be made"), std::string::npos);
+  EXPECT_NE(none.open(std::string(200, 'x')).find("too long"), std::string::npos);
+  const std::string path = testing::TempDir() + "polygmap_no_socket_" + std::to_string(::getpid());
+  std::ofstream(path) << "mine";
+  EXPECT_NE(file.open(path).find("cannot be made"), std::string::npos);
+  EXPECT_TRUE(std::filesystem::is_regular_file(path)) << "what is no socket stays there";
+  std::filesystem::remove(path);
+  ASSERT_EQ(first.open(path), "");
+  EXPECT_NE(second.open(path).find("cannot be made"), std::string::npos) << "another daemon lives there";
+  std::string text;
+  EXPECT_FALSE(try_ask(path + "_", "state", text));
+  EXPECT_NE(text.find("nobody listens at"), std::string::npos) << text;
 }
 
 // It takes 1.0 s at most, on these stairs 0.9 s; a machine of others' may be late.
@@ -173,7 +230,7 @@ TEST_F(ServiceTest, AskedToStopInASwing_PutsTheFootDownFirst) {
 
 TEST_F(ServiceTest, ItTellsTheServiceManager) {
   const Outcome outcome = run([&] {
-    listen_until("STATUS=running", 5s);
+    listen_until("STATUS=walking_up", 5s);
     listen_until("WATCHDOG=1", 5s);
   });
   EXPECT_EQ(std::ranges::count(heard_, "READY=1"), 1);
@@ -204,7 +261,7 @@ TEST_F(ServiceTest, AskedWhileItHoldsAfterAStopOfItsOwn_SaysThatItStoppedItself)
 TEST_F(ServiceTest, SilentImu_EndsInASafeStop) {
   const Outcome outcome = run(
       [&] {
-        listen_until("STATUS=running", 5s);
+        listen_until("STATUS=walking_up", 5s);
         std::this_thread::sleep_for(kEstimates);
         robot_.imu_speaks = false;
         listen_until("STATUS=safe_stop", 2s);
@@ -218,7 +275,7 @@ TEST_F(ServiceTest, SilentImu_EndsInASafeStop) {
 TEST_F(ServiceTest, SilentImuBeforeThereIsAnEstimate_EndsInASafeStopToo) {
   const Outcome outcome = run(
       [&] {
-        listen_until("STATUS=running", 5s);
+        listen_until("STATUS=walking_up", 5s);
         robot_.imu_speaks = false;
         listen_until("STATUS=safe_stop", 2s);
       },
@@ -237,7 +294,7 @@ TEST_F(ServiceTest, LaneThatHangs_IsNotFedAndEndsTheService) {
   Service service(config_, parts(), signals_, notifier_);
   Outcome outcome;
   std::thread thread([&] { outcome = service.run(); });
-  listen_until("STATUS=running", 5s);
+  listen_until("STATUS=walking_up", 5s);
   hangs = true;
   std::this_thread::sleep_for(300ms);
   (void)manager_.read();
@@ -355,7 +412,7 @@ TEST_F(ServiceTest, WithARecorder_TheReplayHasTheSameBits) {
     recording::Recorder recorder(robot_.ports());
     recorder.begin(directory, config_.params);
     const auto during = [&] {
-      listen_until("STATUS=running", 5s);
+      listen_until("STATUS=walking_up", 5s);
       std::this_thread::sleep_for(kEstimates);
     };
     const Outcome outcome = run(during, true, &recorder);
@@ -379,7 +436,7 @@ TEST_F(ServiceTest, RecordingThatEndsEarly_IsSaidByTheExitCodeAndTheModuleGoesOn
   recording::Recorder recorder(robot_.ports(), {.queue_bytes = 256, .pictures = 1});
   recorder.begin(directory, config_.params);
   const auto during = [&] {
-    listen_until("STATUS=running", 5s);
+    listen_until("STATUS=walking_up", 5s);
     std::this_thread::sleep_for(200ms);
   };
   const Outcome outcome = run(during, true, &recorder);

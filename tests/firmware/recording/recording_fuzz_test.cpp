@@ -113,7 +113,7 @@ void expect_row(const RowCall& row) {
   ASSERT_TRUE(row.cycle_ns >= 0 && row.cycle_ns <= kLatest_ns);
   ASSERT_LE(row.calls.size(), kMaxCallsPerRow);
   for (const PortCall& call : row.calls) {
-    ASSERT_TRUE(call.kind >= CallKind::kReadImu && call.kind <= CallKind::kJointStatus);
+    ASSERT_TRUE(call.kind >= CallKind::kReadImu && call.kind <= CallKind::kReadOperator);
     ASSERT_TRUE(call.kind != CallKind::kAcquire || !call.gave || call.picture.pixels <= Pixels::kOtherSize);
   }
 }

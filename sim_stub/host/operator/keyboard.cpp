@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/operator/keyboard.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <ostream>
+#include <thread>
+
+#include "sim_stub/heap_trap.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+struct Key {
+  char key;
+  OperatorCommand command;
+};
+constexpr std::array kKeys{Key{'a', OperatorCommand::kArm},   Key{'s', OperatorCommand::kStart},
+                           Key{'p', OperatorCommand::kPause}, Key{'g', OperatorCommand::kResume},
+                           Key{'x', OperatorCommand::kStop},  Key{'n', OperatorCommand::kReset}};
+constexpr const char* kHelp = "a arm, s start, p pause, g go on, x stop, n new start (reset), q quit\n";
+
+}  // namespace
+
+Keyboard::Keyboard(std::ostream& out) : out_(out) {
+  out_ << kHelp << std::flush;
+  termios usual{};
+  if (::isatty(STDIN_FILENO) == 0 || ::tcgetattr(STDIN_FILENO, &usual) != 0) return;
+  termios single_keys = usual;
+  single_keys.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
+  if (::tcsetattr(STDIN_FILENO, TCSANOW, &single_keys) == 0) usual_ = usual;
+}
+
+Keyboard::~Keyboard() {
+  if (usual_) (void)::tcsetattr(STDIN_FILENO, TCSANOW, &*usual_);
+}
+
+void Keyboard::read_keys() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  while (!closed_ && ::poll(&input, 1, 0) > 0) {
+    char key = 0;
+    const auto got = ::read(STDIN_FILENO, &key, 1);
+    closed_ = got <= 0;
+    if (closed_ || key == '\n' || key == ' ') continue;
+    const auto known = std::ranges::find(kKeys, key, &Key::key);
+    quits_ = quits_ || key == 'q';
+    if (known != kKeys.end()) {
+      asked_.push_back(known->command);
+    } else if (key != 'q') {
+      out_ << kHelp << std::flush;
+    }
+  }
+}
+
+void Keyboard::look(std::int64_t now_ns, ModuleState state) {
+  if (begun_ns_ < 0) {
+    begun_ns_ = now_ns;
+    begun_ = std::chrono::steady_clock::now();
+  }
+  if (state != state_) {
+    std::array<char, 64> line{};
+    std::snprintf(line.data(), line.size(), "%8.2f s  ", 1e-9 * static_cast<double>(now_ns));
+    out_ << line.data() << name_of(state) << "\n" << std::flush;
+  }
+  state_ = state;
+  read_keys();
+  std::this_thread::sleep_until(begun_ + std::chrono::nanoseconds(now_ns - begun_ns_));
+}
+
+bool Keyboard::try_read(OperatorCommand& command) noexcept {
+  const heap::HostCall host;  // of the module's cycle
+  if (asked_.empty()) return false;
+  command = asked_.front();
+  asked_.pop_front();
+  return true;
+}
+
+}  // namespace polygmap::sim

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// The module with an operator: nothing begins before it is asked for, and what was stopped begins anew when it may.
+#include <gtest/gtest.h>
+
+#include "tests/support/fakes/fake_operator_input.hpp"
+#include "tests/support/standing_module.hpp"
+
+namespace polygmap {
+namespace {
+
+class OperatedModule : public test::StandingModule {
+ protected:
+  static Params params() {
+    Params params;
+    params.supervisor.autostart = false;
+    return params;
+  }
+  OperatedModule() : StandingModule(params(), &operator_) {}
+  void ask(OperatorCommand command, int ticks) {
+    operator_.ask(command);
+    stand(ticks);
+  }
+  [[nodiscard]] ModuleState state() const { return control().module_state(); }
+  [[nodiscard]] double knee_kp_nmprad() const { return joints_.commands().newest().joints[3].kp_nmprad; }
+
+  fakes::FakeOperatorInput operator_;
+};
+
+TEST_F(OperatedModule, NotAskedToArm_StaysOffWithoutGains) {
+  stand(500);
+  EXPECT_EQ(state(), ModuleState::kOff);
+  EXPECT_EQ(knee_kp_nmprad(), 0.0);
+  EXPECT_EQ(joints_.writes.calls(), 500U) << "its drives are asked where they are";
+  ask(OperatorCommand::kArm, 2);
+  EXPECT_EQ(state(), ModuleState::kStanding);
+  EXPECT_GT(knee_kp_nmprad(), 0.0);
+}
+
+TEST_F(OperatedModule, NotStarted_StandsForEver_AndWaitsForStairsOnlyFromThen) {
+  ask(OperatorCommand::kArm, kInitialised_ticks);
+  ASSERT_TRUE(control().state().initialised);
+  stand(4000);
+  EXPECT_EQ(state(), ModuleState::kStanding) << "without stairs in view a started module stops after three seconds";
+  ask(OperatorCommand::kStart, 1400);
+  EXPECT_EQ(state(), ModuleState::kWalkingUp);
+  stand(200);
+  EXPECT_EQ(state(), ModuleState::kSafeStop);
+  EXPECT_EQ(control().gait_status().stop_reason, StopReason::kNothingSeen);
+}
+
+TEST_F(OperatedModule, Paused_WaitsForNothing) {
+  ask(OperatorCommand::kArm, kInitialised_ticks);
+  ask(OperatorCommand::kStart, 1000);
+  ask(OperatorCommand::kPause, 3000);
+  EXPECT_EQ(state(), ModuleState::kHolding);
+  ask(OperatorCommand::kResume, 1400);
+  EXPECT_EQ(state(), ModuleState::kWalkingUp);
+  stand(200);
+  EXPECT_EQ(state(), ModuleState::kSafeStop);
+}
+
+TEST_F(OperatedModule, Stopped_StandsAgainAfterAResetAndStartsAnew) {
+  ask(OperatorCommand::kArm, kInitialised_ticks);
+  ask(OperatorCommand::kStart, 100);
+  ask(OperatorCommand::kStop, 2);
+  EXPECT_EQ(state(), ModuleState::kSafeStop);
+  EXPECT_EQ(control().gait_status().stop_reason, StopReason::kOperator);
+  ask(OperatorCommand::kStart, 2);
+  EXPECT_EQ(state(), ModuleState::kSafeStop);
+  EXPECT_EQ(count(Limit::kOperatorRefused), 1U);
+  for (int round = 0; round < 3; ++round) {
+    ask(OperatorCommand::kReset, 2);
+    EXPECT_EQ(state(), ModuleState::kStanding);
+    EXPECT_EQ(control().gait_status().stop_reason, StopReason::kNone);
+    ask(OperatorCommand::kStart, 2);
+    EXPECT_EQ(state(), ModuleState::kWalkingUp);
+    stand(1600);
+    EXPECT_EQ(state(), ModuleState::kSafeStop) << "there are no stairs";
+  }
+  EXPECT_EQ(count(Limit::kOperatorRefused), 1U);
+  EXPECT_EQ(count(Fault::kGaitStopped), 4U);
+}
+
+TEST_F(OperatedModule, ResetWhileItsCauseLasts_IsRefused) {
+  ask(OperatorCommand::kArm, kInitialised_ticks);
+  joints_.told.drive_errors.insert(4);
+  stand(3);
+  ASSERT_EQ(state(), ModuleState::kSafeStop);
+  ASSERT_EQ(control().gait_status().stop_reason, StopReason::kDriveError);
+  ask(OperatorCommand::kReset, 2);
+  EXPECT_EQ(state(), ModuleState::kSafeStop);
+  EXPECT_EQ(count(Limit::kOperatorRefused), 1U);
+  joints_.told.drive_errors = {};
+  stand(1);
+  ask(OperatorCommand::kReset, 2);
+  EXPECT_EQ(state(), ModuleState::kStanding);
+}
+
+TEST_F(OperatedModule, StopWhileArmingWaits_IsOff) {
+  joints_.told.feet_silent = true;
+  ask(OperatorCommand::kArm, 20);
+  EXPECT_EQ(state(), ModuleState::kArming);
+  ask(OperatorCommand::kStop, 1);
+  EXPECT_EQ(state(), ModuleState::kOff);
+  joints_.told.feet_silent = false;
+  stand(20);
+  EXPECT_EQ(state(), ModuleState::kOff);
+  EXPECT_EQ(knee_kp_nmprad(), 0.0);
+}
+
+}  // namespace
+}  // namespace polygmap
