@@ -532,7 +532,7 @@ TEST_F(ShortRecording, ForeignOneOrAnotherVersion_OneSentenceWithFileAndByte) {
   expect_unreadable(replay_of(foreign), "byte 0: this is no recording");
   Bytes changed = bytes_;
   changed[8] = 9;
-  expect_unreadable(replay_of(changed), "byte 8: version 9, where this program reads 3");
+  expect_unreadable(replay_of(changed), "byte 8: version 9, where this program reads " + std::to_string(kVersion));
   changed = bytes_;
   changed[12] ^= 1;
   expect_unreadable(replay_of(changed), "byte 12: it has the fields of another build");
