@@ -169,7 +169,7 @@ bool PerceptionLane::learn_some(WorkBudget& budget) noexcept {
 void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   PolygonMap::View view;
   view.odom_T_camera = exposure_state_.odom_T_base * mount_.base_T_camera();
-  view.position_sigma_m = exposure_state_.position_sigma_m.maxCoeff();
+  view.position_sigma_m = exposure_state_.odom_sigma_m;
   view.tilt_sigma_rad = exposure_state_.tilt_sigma_rad;
   if (params_.estimate_mount) view.mount_sigma_rad = mount_.tilt_sigma_rad();  // else the data sheet is believed
   view.intrinsics = intrinsics_;

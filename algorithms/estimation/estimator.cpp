@@ -211,6 +211,7 @@ bool Estimator::try_begin() noexcept {
   if (still) {
     start.odom_v_base_mps = rotation_z(yaw_of(odom_T_base.R)) * standstill_.odom_v_base_mps();
     start.gyro_bias_radps = standstill_.gyro_bias_radps();
+    start.gyro_bias_sigma_radps = standstill_.gyro_bias_sigma_radps();
     start.gravity_mps2 = standstill_.gravity_mps2();
     begin(start);
     return true;

@@ -164,6 +164,7 @@ void ProprioceptiveOdometry::describe(std::int64_t now_ns, StateEstimate& state)
   state.base_w_base_radps = base_w_base_radps_;
   state.world_T_odom = fusion_.world_T_odom();
   state.position_sigma_m = fusion_.position_sigma_m();
+  state.odom_sigma_m = math::sqrt(covariance_.diagonal().head<3>().maxCoeff());
   state.velocity_sigma_mps = velocity_sigma_mps();
   state.yaw_sigma_rad = fusion_.yaw_sigma_rad();
   state.tilt_sigma_rad = attitude_.tilt_sigma_rad();

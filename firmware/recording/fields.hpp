@@ -115,6 +115,7 @@ void each_field(auto& f, Of<StateEstimate> auto& m) {
   walk(f, "contact_probability", m.contact_probability);
   walk(f, "foot_force_sigma_n", m.foot_force_sigma_n);
   walk(f, "position_sigma_m", m.position_sigma_m);
+  walk(f, "odom_sigma_m", m.odom_sigma_m);
   walk(f, "velocity_sigma_mps", m.velocity_sigma_mps);
   walk(f, "yaw_sigma_rad", m.yaw_sigma_rad);
   walk(f, "tilt_sigma_rad", m.tilt_sigma_rad);

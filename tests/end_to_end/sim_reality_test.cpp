@@ -34,13 +34,21 @@ class ClimbReality : public testing::TestWithParam<GaitPattern> {};
 TEST_P(ClimbReality, AsRealRobotsAre_ClimbedWithinTheFigures) { expect_climbed_as_real_robots(GetParam(), 31); }
 INSTANTIATE_TEST_SUITE_P(Gaits, ClimbReality, testing::ValuesIn(kBothGaits));
 
+// While it stood at the start it leant within its joints' play: the gyro's bias was found wrong by 7 mrad/s, and
+// believed to be known to 0.2 it turned the base by 35 mrad and felled the robot.
+TEST(ClimbPlay, TwiceAsBadAndLeaningInItsPlay_IsClimbed) {
+  const ClimbSummary summary = climb(2.0, GaitPattern::kDoubleStep, 55);
+  EXPECT_EQ(summary.steps_climbed, 10) << summary.reason;
+  EXPECT_LE(summary.foothold_error_m.max, 0.020);
+}
+
 class LongClimbReality : public testing::TestWithParam<GaitPattern> {};
 TEST_P(LongClimbReality, AsRealRobotsAre_EverySeed_ClimbedWithinTheFigures) {
   for (std::uint64_t seed = 32; seed <= 40; ++seed) expect_climbed_as_real_robots(GetParam(), seed);
 }
 // It may stop, touch a riser or stand a little over an edge.
 TEST_P(LongClimbReality, TwiceAsBad_NoneFalls) {
-  for (std::uint64_t seed = 31; seed <= 40; ++seed) {
+  for (std::uint64_t seed = 31; seed <= 60; ++seed) {
     const ClimbSummary summary = climb(2.0, GetParam(), seed);
     EXPECT_FALSE(summary.fell) << "seed " << seed << ": " << summary.reason;
   }

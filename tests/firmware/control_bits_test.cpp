@@ -114,7 +114,7 @@ void add(BitHash& hash, const StateEstimate& s) {
   for (const Transform& sole : s.odom_T_sole) hash.add(sole);
   for (const double probability : s.contact_probability) hash.add(probability);
   for (const double sigma_n : s.foot_force_sigma_n) hash.add(sigma_n);
-  hash.add_all(s.position_sigma_m), hash.add_all(s.velocity_sigma_mps);
+  hash.add_all(s.position_sigma_m), hash.add(s.odom_sigma_m), hash.add_all(s.velocity_sigma_mps);
   hash.add(s.yaw_sigma_rad), hash.add(s.tilt_sigma_rad);
   hash.add(static_cast<std::uint64_t>(s.lio_age_ns)), hash.add(std::uint64_t{s.initialised});
 }

@@ -29,6 +29,7 @@ struct StateEstimate {
   std::array<double, kFootCount> contact_probability{};
   std::array<double, kFootCount> foot_force_sigma_n{};  // of the joint feedback's; 0 or no number: not known
   Vec3 position_sigma_m = Vec3::Zero();                 // of world_p_base
+  double odom_sigma_m = 0.0;  // of odom_p_base along the axis that is known worst; grows with the way
   Vec3 velocity_sigma_mps = Vec3::Zero();
   double yaw_sigma_rad = 0.0;
   double tilt_sigma_rad = 0.0;   // of odom's roll and pitch against those of the start

@@ -20,6 +20,7 @@ class StandstillCalibration {
     double max_joint_move_rad = 0.01;
     double min_foot_force_n = 50.0;
     double min_line_s = 0.3;
+    double gyro_bias_sigma_radps = 0.002;
 
     static void visit(auto& p, auto& field) {
       field("duration_s", p.duration_s, 0.05, 30.0, "The robot stands still for so long at the start.");
@@ -30,6 +31,9 @@ class StandstillCalibration {
       field("min_foot_force_n", p.min_foot_force_n, 0.0, 500.0, "A standing foot presses at least as hard.");
       field("min_line_s", p.min_line_s, 0.01, 10.0,
             "Gravity is the mean of what was felt for less, and the slope of its integral from then on.");
+      field("gyro_bias_sigma_radps", p.gyro_bias_sigma_radps, 1e-5, 0.1,
+            "What the gyro's bias is off by once found: joints play by some millirad, and their encoders do not see "
+            "the base sway by that.");
     }
   };
   using Legs = std::array<LegMeasurement, kFootCount>;
@@ -45,6 +49,7 @@ class StandstillCalibration {
   [[nodiscard]] double gravity_mps2() const noexcept { return first_base_g_mps2().norm(); }
   // Once finished.
   [[nodiscard]] Vec3 gyro_bias_radps() const noexcept { return turn_.slope(times_); }
+  [[nodiscard]] double gyro_bias_sigma_radps() const noexcept { return params_.gyro_bias_sigma_radps; }
   [[nodiscard]] Vec3 odom_v_base_mps() const noexcept;
 
  private:

@@ -93,7 +93,7 @@ class ContactInEkf {
     double yaw_sigma_rad = 1e-4;
     double position_sigma_m = 1e-4;
     double velocity_sigma_mps = 1e-3;
-    double gyro_bias_sigma_radps = 2e-4;  // after one second of standstill
+    double gyro_bias_sigma_radps = 2e-4;
     double accel_bias_sigma_mps2 = 0.003;
   };
   void reset(const Params& params) noexcept;

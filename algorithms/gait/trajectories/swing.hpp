@@ -15,9 +15,9 @@ struct SwingShape {
   double forward_begin = 0.40;
   double forward_end = 0.84;
   double landing_begin = 0.74;
-  // A foot that stops before a riser comes 2 mm too far by its inertia, 3 mm at most: it goes the last part on the way
-  // down, when it has stopped.
-  double short_m = 0.004;
+  // A foot that stops before a riser comes 2 mm too far by its inertia, more on slack drives: it goes the last part on
+  // the way down, when it has stopped.
+  double short_m = 0.006;
   double short_begin = 0.80;
   double short_end = 0.92;
   double clearance_m = 0.05;

@@ -93,6 +93,8 @@ TEST_F(EstimatorLioTest, TenSteps_NoisyLateLio_WorldStaysWithinAFewMillimetres) 
     run(walk, walk.end_ns(), deliver());
     EXPECT_LT(worst_m_, 0.012) << seed;
     EXPECT_LT(error_m_.cwiseAbs().cwiseQuotient(estimator_.state().position_sigma_m).maxCoeff(), 3.0) << seed;
+    // Odometry itself drifts on, whatever LIO knows of the place: by the map it is bound to this.
+    EXPECT_GT(estimator_.state().odom_sigma_m, 1.5 * estimator_.state().position_sigma_m.maxCoeff()) << seed;
     EXPECT_EQ(estimator_.counters().lio_of(LioVerdict::kJump), 0U);
     EXPECT_GT(estimator_.counters().lio_of(LioVerdict::kAccepted), 300U);
     EXPECT_LE(estimator_.state().lio_age_ns, 202 * kNsPerMs);
@@ -182,7 +184,7 @@ TEST_F(EstimatorLioTest, SilenceOf4s_OnTheStairs_SigmaGrowsAndTheReturnIsSlewed)
 }
 TEST_F(EstimatorLioTest, SilenceOf40s_OnTheStairs_ErrorStaysWithinThreeSigmaAndTheReturnIsSlewed) {
   silent_in_the_climb(40.0, 17);
-  EXPECT_LT(worst_m_, 0.03);
+  EXPECT_LT(worst_m_, 0.033);
   EXPECT_LT(estimator_.state().position_sigma_m.maxCoeff(), 0.02);                     // LIO is believed again
   EXPECT_GT(most_slewed_m_, LioFusion::Params{}.slew_mps * seconds(kTick_ns) * 0.99);  // and the limit was needed
 }

@@ -70,7 +70,7 @@ TEST_F(EstimatorTest, Standstill_BiasedSensors_FindsBiasTiltAndFloor) {
   run(walk, spec, 1100 * kNsPerMs);
   const StateEstimate& state = estimator_.state();
   ASSERT_TRUE(state.initialised);
-  EXPECT_LT((estimator_.odometry().attitude().gyro_bias_radps() - walk.gyro_bias_radps()).norm(), 4e-4);
+  EXPECT_LT((estimator_.odometry().attitude().gyro_bias_radps() - walk.gyro_bias_radps()).norm(), 6e-4);
   EXPECT_NEAR(yaw_of(state.odom_T_base.R), 0.0, 5e-4);
   EXPECT_LT(so3_log(state.odom_T_base.R).head<2>().norm(),
             0.02);  // accelerometer bias and mount: 0.4 deg each, 1 sigma
@@ -115,7 +115,7 @@ TEST_F(EstimatorTest, Walk_PerfectSensors_FollowsTheTruth) {
   });
   EXPECT_LT(worst_m, 2e-3);
   EXPECT_LT(worst_rad, 1e-3);
-  EXPECT_LT(worst_mps, 8e-3);
+  EXPECT_LT(worst_mps, 0.011);  // a bias that is known to 2 mrad/s is bent by what contacts creep
 }
 
 TEST_F(EstimatorTest, Walk_NoisySensorsWithoutLio_DriftStaysBelowOnePercentAndIsSmooth) {
