@@ -32,10 +32,10 @@ Vec3 level_frame_p(const Transform& any_T_sole, const Vec3& any_p_m) {
   return rotation_z(yaw_of(any_T_sole.R)).transpose() * (any_p_m - any_T_sole.p_m);
 }
 
-// Along the sole's axis from the tread's edge to the sole's origin.
+// Along the sole's axis from the nosing to the sole's origin.
 double nosing_distance_m(const Step& step, const Transform& true_T_sole) {
   const Transform step_T_sole = step.true_T_step.inverse() * true_T_sole;
-  return (step_T_sole.p_m.x() - step.edge_x_m()) / std::cos(yaw_of(step_T_sole.R));
+  return (step_T_sole.p_m.x() - step.nosing_x_m) / std::cos(yaw_of(step_T_sole.R));
 }
 
 }  // namespace
