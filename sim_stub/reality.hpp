@@ -9,18 +9,24 @@
 #include <string_view>
 #include <vector>
 
+#include "sim_stub/camera/camera_errors.hpp"
 #include "sim_stub/plant/mujoco_plant.hpp"
 #include "sim_stub/sensors/robot_errors.hpp"
+#include "sim_stub/world/stair_world.hpp"
 
 namespace polygmap::sim {
 
 struct Reality {
   ErrorParams sensors;
   MujocoPlant::Params plant;
+  CameraErrors camera;
+  StairErrors stairs;
 
   static void visit(auto& p, auto& field) {
     field("sensors", p.sensors);
     field("plant", p.plant);
+    field("camera", p.camera);
+    field("stairs", p.stairs);
   }
 };
 

@@ -72,7 +72,7 @@ StartPose draw_start(std::uint64_t seed) {
 }
 
 SimRobot::SimRobot(const SimOptions& options)
-    : stairs_(make_stairs(options.stairs, options.seed)),
+    : stairs_(make_stairs(options.stairs, options.seed, options.stair_errors)),
       start_(options.start.value_or(draw_start(options.seed))),
       error_params_(options.errors),
       errors_(draw_errors(options.errors, options.seed)),

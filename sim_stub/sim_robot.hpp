@@ -40,6 +40,7 @@ struct StartPose {
 struct SimOptions {
   std::uint64_t seed = 1;
   StairParams stairs;
+  StairErrors stair_errors;
   NoiseKind noise = NoiseKind::kWhite;
   CameraIntrinsics intrinsics = robot_camera_intrinsics();
   DepthNoiseModel depth_sigma;

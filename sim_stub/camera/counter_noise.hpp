@@ -37,6 +37,11 @@ enum class Stream : std::uint64_t {
   kFootForces,
   kLioWalk,
   kReality,
+  kStairErrors,
+  kCameraFrames,
+  kFatEdges,
+  kTreadHoles,
+  kSunPatch,
 };
 
 // Finaliser of SplitMix64 (Steele, Lea, Flood 2014): a bijection that passes the usual statistical batteries.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace polygmap::sim {
 namespace {
@@ -11,11 +12,26 @@ std::vector<SolidBox> rendered_solids(const StairWorld& world, const DepthCamera
   std::vector<SolidBox> solids;
   for (SolidBox solid : stair_solids(world)) {
     if (solid.step == options.missing_step) continue;
-    solid.min_m += options.stairs_shift_m;
-    solid.max_m += options.stairs_shift_m;
+    solid.true_T_solid.p_m += options.stairs_shift_m;
     solids.push_back(solid);
   }
   return solids;
+}
+
+constexpr std::int64_t ticks_of(double duration_s) {
+  return std::llround(duration_s / seconds(VirtualClock::kTick_ns));
+}
+
+// Of a frame that comes after its successor, and two ticks of jitter to spare.
+constexpr std::int64_t kOvertaken_ticks = 19;
+
+// One arrived, one held, one to spare, and those that are on their way.
+std::size_t slot_count(const CameraErrors& errors) {
+  constexpr std::int64_t kFrame_ticks = 16;
+  const std::int64_t latest_ticks = SimDepthCamera::kLatency_ticks + ticks_of(errors.latency_s) +
+                                    ticks_of(errors.jitter_s) +
+                                    (errors.reorder_share > 0.0 ? ticks_of(errors.jitter_s) + kOvertaken_ticks : 0);
+  return 3 + static_cast<std::size_t>(latest_ticks / kFrame_ticks + 1);
 }
 
 }  // namespace
@@ -28,7 +44,11 @@ SimDepthCamera::SimDepthCamera(const DepthCameraOptions& options, const CameraNo
       base_T_camera_(base_T_camera),
       solids_(rendered_solids(world, options)),
       renderer_(intrinsics),
-      noise_(noise, intrinsics, seed) {
+      noise_(noise, intrinsics, seed),
+      holes_(options.errors, world, seed),
+      frame_draws_(seed, Stream::kCameraFrames),
+      edge_draws_(seed, Stream::kFatEdges),
+      slots_(slot_count(options.errors)) {
   const CameraIntrinsics& k = renderer_.intrinsics();
   for (Slot& slot : slots_)
     slot.depth.resize(static_cast<std::size_t>(k.width_px) * static_cast<std::size_t>(k.height_px));
@@ -40,8 +60,8 @@ SimDepthCamera::~SimDepthCamera() {
 
 void SimDepthCamera::tick(std::int64_t tick, const Transform& true_T_base,
                           const std::array<LegShapes, kFootCount>& base_legs) {
-  Slot* due = oldest(SlotState::kExposed);
-  if (due != nullptr && tick >= due->arrival_tick) {
+  for (Slot* due = oldest(SlotState::kExposed); due != nullptr && tick >= due->arrival_tick;
+       due = oldest(SlotState::kExposed)) {
     if (rendering_.valid()) rendering_.get();
     due->state = SlotState::kArrived;
   }
@@ -50,14 +70,25 @@ void SimDepthCamera::tick(std::int64_t tick, const Transform& true_T_base,
   if (tick >= exposure_tick(next_frame_) + half_scan_ticks_) expose();
 }
 
+std::int64_t SimDepthCamera::arrival_tick(std::int64_t frame) const {
+  const CameraErrors& errors = options_.errors;
+  const auto index = static_cast<std::uint64_t>(frame);
+  std::int64_t late_ticks = ticks_of(errors.latency_s + frame_draws_.uniform(3 * index, 0.0, errors.jitter_s));
+  if (frame_draws_.uniform(3 * index + 1) < errors.reorder_share) {
+    late_ticks += ticks_of(errors.jitter_s) + kOvertaken_ticks;
+  }
+  return exposure_tick(frame) + kLatency_ticks + late_ticks;
+}
+
 void SimDepthCamera::expose() {
   const std::int64_t frame = next_frame_++, tick = exposure_tick(frame);
   const std::int64_t stamp_ns = VirtualClock::stamp_ns(tick);
   if (any_contains(options_.silent, stamp_ns)) return;
+  if (frame_draws_.uniform(3 * static_cast<std::uint64_t>(frame) + 2) < options_.errors.drop_share) return;
   Slot& slot = free_slot();
   slot.state = SlotState::kExposed;
   slot.stamp_ns = stamp_ns;
-  slot.arrival_tick = tick + kLatency_ticks;
+  slot.arrival_tick = arrival_tick(frame);
   slot.sequence = static_cast<std::uint32_t>(frame);
   std::uint16_t* depth = slot.depth.data();
   if (any_contains(options_.blank, stamp_ns)) {
@@ -67,8 +98,11 @@ void SimDepthCamera::expose() {
   const double time_s = seconds(stamp_ns - VirtualClock::kStart_ns);
   const auto render = [this, first = past_.front(), last = past_.back(), frame, time_s, depth] {
     renderer_.render(first, last);
+    renderer_.fatten_edges(options_.errors.edge_fattening_px, edge_draws_);
     noise_.apply(renderer_, static_cast<std::uint64_t>(frame), time_s, depth);
+    holes_.apply(renderer_, first, last, static_cast<std::uint64_t>(frame), depth);
   };
+  if (rendering_.valid()) rendering_.get();  // pictures share the renderer
   if (options_.threaded) {
     rendering_ = std::async(std::launch::async, render);
   } else {
@@ -86,9 +120,12 @@ SimDepthCamera::Slot& SimDepthCamera::free_slot() {
 }
 
 SimDepthCamera::Slot* SimDepthCamera::oldest(SlotState state) noexcept {
+  const auto before = [](const Slot& a, const Slot& b) {
+    return std::tie(a.arrival_tick, a.stamp_ns) < std::tie(b.arrival_tick, b.stamp_ns);
+  };
   Slot* found = nullptr;
   for (Slot& slot : slots_) {
-    if (slot.state == state && (found == nullptr || slot.stamp_ns < found->stamp_ns)) found = &slot;
+    if (slot.state == state && (found == nullptr || before(slot, *found))) found = &slot;
   }
   return found;
 }

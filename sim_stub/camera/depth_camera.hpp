@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simulated depth camera as a device: exposes at 30 Hz, delivers 30 ms later, renders meanwhile on a second core.
+// The simulated depth camera as a device: exposes at 30 Hz, delivers 30 ms later or as its errors say, renders
+// meanwhile on a second core.
 #pragma once
 
 #include <array>
@@ -9,6 +10,8 @@
 #include <vector>
 
 #include "algorithms/core/messages/samples.hpp"
+#include "sim_stub/camera/camera_errors.hpp"
+#include "sim_stub/camera/depth_holes.hpp"
 #include "sim_stub/camera/depth_noise.hpp"
 #include "sim_stub/camera/depth_renderer.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
@@ -38,6 +41,7 @@ struct DepthCameraOptions {
   std::vector<Window> blank;   // frames exposed then have no valid pixel
   std::vector<Window> silent;  // frames exposed then never arrive
   bool threaded = true;        // the pictures are the same either way
+  CameraErrors errors{};
 };
 
 class SimDepthCamera {
@@ -73,11 +77,10 @@ class SimDepthCamera {
     std::uint32_t sequence = 0;
     std::vector<std::uint16_t> depth;
   };
-  // One exposed, one arrived, one held, one to spare.
-  static constexpr std::size_t kSlots = 4;
-
   void expose();
+  [[nodiscard]] std::int64_t arrival_tick(std::int64_t frame) const;
   [[nodiscard]] Slot& free_slot();
+  // The first in the order of arrival.
   [[nodiscard]] Slot* oldest(SlotState state) noexcept;
 
   DepthCameraOptions options_;
@@ -87,7 +90,9 @@ class SimDepthCamera {
   std::deque<DepthScene> past_;  // as long as an exposure
   DepthRenderer renderer_;
   CameraNoise noise_;
-  std::array<Slot, kSlots> slots_;
+  DepthHoles holes_;
+  CounterNoise frame_draws_, edge_draws_;
+  std::vector<Slot> slots_;
   std::future<void> rendering_;
   std::int64_t next_frame_ = 0;
   std::uint32_t overwritten_ = 0;

@@ -120,6 +120,9 @@ void DepthRenderer::render(const DepthScene& first, const DepthScene& last) {
   std::fill(inverse_depth_.begin(), inverse_depth_.end(), 0.0F);
   std::fill(plane_distance_.begin(), plane_distance_.end(), 0.0F);
   const Transform first_T_true = first.true_T_camera.inverse(), last_T_true = last.true_T_camera.inverse();
+  const auto moved = [](const Transform& camera_T, const Capsule& c) {
+    return Capsule{camera_T * c.a_m, camera_T * c.b_m, c.radius_m};
+  };
 
   const double x = first.true_T_camera.p_m.x(), y = first.true_T_camera.p_m.y(), r = kFloorReach_m;
   const auto floor = [&](const Transform& camera_T_true) {
@@ -129,19 +132,44 @@ void DepthRenderer::render(const DepthScene& first, const DepthScene& last) {
   };
   draw_face(floor(first_T_true), floor(last_T_true));
   for (const SolidBox& solid : first.solids) {
-    const Transform true_T_box{Mat3::Identity(), 0.5 * (solid.min_m + solid.max_m)};
-    draw_box(first_T_true * true_T_box, last_T_true * true_T_box, 0.5 * (solid.max_m - solid.min_m));
+    if (solid.round_m > 0.0) {
+      draw_capsule(moved(first_T_true, bar_of(solid)), moved(last_T_true, bar_of(solid)));
+      continue;
+    }
+    const OrientedBox box = solid.box();
+    draw_box(first_T_true * box.centre, last_T_true * box.centre, box.half_m);
   }
   if (!first.legs_visible) return;
   const Transform first_T_base = first.base_T_camera.inverse(), last_T_base = last.base_T_camera.inverse();
-  const auto moved = [](const Transform& camera_T_base, const Capsule& c) {
-    return Capsule{camera_T_base * c.a_m, camera_T_base * c.b_m, c.radius_m};
-  };
   for (std::size_t i = 0; i < kFootCount; ++i) {
     const LegShapes &a = first.base_legs[i], &b = last.base_legs[i];
     draw_capsule(moved(first_T_base, a.thigh), moved(last_T_base, b.thigh));
     draw_capsule(moved(first_T_base, a.shank), moved(last_T_base, b.shank));
     draw_box(first_T_base * a.foot.centre, last_T_base * b.foot.centre, a.foot.half_m);
+  }
+}
+
+void DepthRenderer::fatten_edges(double px, const CounterNoise& noise) {
+  constexpr float kJump_m = 0.03F;
+  const int width = intrinsics_.width_px, height = intrinsics_.height_px;
+  for (double left_px = px; left_px > 0.0; left_px -= 1.0) {
+    const std::vector<float> inverse = inverse_depth_, distance = plane_distance_;
+    for (int v = 0; v < height; ++v) {
+      for (int u = 0; u < width; ++u) {
+        const std::size_t here = offset(v) + static_cast<std::size_t>(u);
+        std::size_t nearest = here;
+        const auto look = [&](int column, int row) {
+          if (column < 0 || column >= width || row < 0 || row >= height) return;
+          const std::size_t there = offset(row) + static_cast<std::size_t>(column);
+          if (inverse[there] > inverse[nearest]) nearest = there;
+        };
+        look(u - 1, v), look(u + 1, v), look(u, v - 1), look(u, v + 1);
+        if (inverse[nearest] - inverse[here] <= kJump_m * inverse[nearest] * inverse[here]) continue;
+        if (left_px < 1.0 && noise.uniform(here) >= left_px) continue;
+        inverse_depth_[here] = inverse[nearest];
+        plane_distance_[here] = distance[nearest];
+      }
+    }
   }
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "algorithms/robot/body_shapes.hpp"
+#include "sim_stub/camera/counter_noise.hpp"
 #include "sim_stub/world/clearance.hpp"
 
 namespace polygmap::sim {
@@ -31,6 +32,9 @@ class DepthRenderer {
   void render(const DepthScene& scene) { render(scene, scene); }
   // The scene moves evenly from first (the upper edge of the picture) to last (the lower one); the solids stay.
   void render(const DepthScene& first, const DepthScene& last);
+  // What is near grows by so many pixels over what is at least 30 mm behind it, as in the window of a matcher or in a
+  // wide beam; of the last pixel a share grows, always the same ones.
+  void fatten_edges(double px, const CounterNoise& noise);
 
   [[nodiscard]] const CameraIntrinsics& intrinsics() const noexcept { return intrinsics_; }
   // One row of 1 / depth, 1/m; 0 where nothing is hit.
@@ -39,6 +43,8 @@ class DepthRenderer {
   // depth their product is the cosine of the incidence angle.
   [[nodiscard]] const float* plane_distance(int row) const noexcept { return plane_distance_.data() + offset(row); }
   [[nodiscard]] const float* inverse_length(int row) const noexcept { return inverse_length_.data() + offset(row); }
+  // How much of the exposure has passed when a row is taken.
+  [[nodiscard]] double moment_of(int row) const { return (row + 0.5) / intrinsics_.height_px; }
 
  private:
   // Camera frame, at one moment.
@@ -55,8 +61,6 @@ class DepthRenderer {
   void draw_face(const Face& first, const Face& last);
   void draw_capsule(const Capsule& first, const Capsule& last);
   [[nodiscard]] Rows rows_of(const Face& first, const Face& last) const;
-  // How much of the exposure has passed when a row is taken.
-  [[nodiscard]] double moment_of(int row) const { return (row + 0.5) / intrinsics_.height_px; }
   [[nodiscard]] std::size_t offset(int row) const noexcept {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(intrinsics_.width_px);
   }

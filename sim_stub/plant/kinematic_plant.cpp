@@ -39,9 +39,12 @@ void critically_damped(T& x, T& rate, const T& target, double w, double dt) {
   rate = (rate - w * slope * dt) * decay;
 }
 
-// Flat on a surface of height z: x, y and yaw stay.
-Transform flattened(const Transform& pose, double z_m) {
-  return {rotation_z(yaw_of(pose.R)), Vec3{pose.p_m.x(), pose.p_m.y(), z_m}};
+// Flat on the floor or a tread: x, y and heading stay.
+Transform flattened(const Transform& pose, const Step* tread = nullptr) {
+  const double x_m = pose.p_m.x(), y_m = pose.p_m.y(), yaw_rad = yaw_of(pose.R);
+  if (tread == nullptr) return {rotation_z(yaw_rad), Vec3{x_m, y_m, 0.0}};
+  const Mat3& R = tread->true_T_step.R;
+  return {R * rotation_z(yaw_rad - yaw_of(R)), Vec3{x_m, y_m, tread->top_m(x_m, y_m)}};
 }
 
 double smooth_step(double x) {
@@ -56,7 +59,7 @@ KinematicPlant::KinematicPlant(const Params& params, const StairWorld& world, co
     : params_(params), world_(world), errors_(errors), solids_(stair_solids(world)), q_(q_rad), led_q_(q_rad) {
   update_leg_kinematics();
   for (FootState& foot : feet_) {
-    foot.true_T_sole = flattened(true_T_start * foot.base_T_sole, 0.0);
+    foot.true_T_sole = flattened(true_T_start * foot.base_T_sole);
     foot.true_T_base = foot.true_T_sole * foot.base_T_sole.inverse();
   }
   true_T_base_ = blend();
@@ -328,7 +331,8 @@ void KinematicPlant::move_swing_feet() {
       if (depth_m < 0.0 || fallen_m <= 0.0 || !from_above) continue;
       foot.anchored = true;
       foot.step = step;
-      foot.true_T_sole = flattened(foot.true_T_sole, surface_m);
+      foot.true_T_sole =
+          flattened(foot.true_T_sole, step < 0 ? nullptr : &world_.steps[static_cast<std::size_t>(step)]);
       foot.true_T_base = foot.true_T_sole * foot.base_T_sole.inverse();
       foot.gap_m = gap_m(f);
       foot.raise_m = 0.0;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_stub/plant/mujoco_model.hpp"
 
+#include <Eigen/Geometry>
+#include <array>
 #include <cstdarg>
 #include <cstdio>
 
@@ -72,6 +74,25 @@ void add_link(Xml& xml, Foot leg, std::size_t joint, const RobotErrors& errors, 
   }
 }
 
+void add_solid(Xml& xml, const SolidBox& solid, std::size_t number) {
+  if (solid.round_m > 0.0) {
+    const Capsule bar = bar_of(solid);
+    xml.add(
+        "<geom class='ground' name='solid_%zu' type='capsule' fromto='%.9g %.9g %.9g %.9g %.9g %.9g' size='%.9g' "
+        "user='%d'/>",
+        number, bar.a_m.x(), bar.a_m.y(), bar.a_m.z(), bar.b_m.x(), bar.b_m.y(), bar.b_m.z(), bar.radius_m, solid.step);
+    return;
+  }
+  const OrientedBox box = solid.box();
+  const Vec3 centre = box.centre.p_m, half = box.half_m;
+  const Eigen::Quaterniond turn(box.centre.R);
+  xml.add(
+      "<geom class='ground' name='solid_%zu' type='box' pos='%.9g %.9g %.9g' quat='%.9g %.9g %.9g %.9g' size='%.9g "
+      "%.9g %.9g' user='%d'/>",
+      number, centre.x(), centre.y(), centre.z(), turn.w(), turn.x(), turn.y(), turn.z(), half.x(), half.y(), half.z(),
+      solid.step);
+}
+
 }  // namespace
 
 std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& world, const RobotErrors& errors) {
@@ -86,11 +107,7 @@ std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& wo
   xml.add("<default class='ground'><geom contype='1' conaffinity='2'/></default></default>");
   xml.add("<worldbody><geom class='ground' name='floor' type='plane' size='0 0 1'/>");
   std::size_t number = 0;
-  for (const SolidBox& box : stair_solids(world)) {
-    const Vec3 centre = 0.5 * (box.min_m + box.max_m), half = 0.5 * (box.max_m - box.min_m);
-    xml.add("<geom class='ground' name='solid_%zu' type='box' pos='%.9g %.9g %.9g' size='%.9g %.9g %.9g' user='%d'/>",
-            number++, centre.x(), centre.y(), centre.z(), half.x(), half.y(), half.z(), box.step);
-  }
+  for (const SolidBox& solid : stair_solids(world)) add_solid(xml, solid, number++);
   const LinkMass torso = nominal_robot().masses.torso;
   xml.add("<body name='base'><freejoint/>");
   xml.add("<geom class='mass' type='box' pos='%.9g %.9g %.9g' size='0.1 0.17 0.28' mass='%.9g'/>",

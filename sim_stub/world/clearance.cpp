@@ -14,10 +14,6 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kFoundation_m = 1.0;  // how far the solids reach below the floor
 
-OrientedBox oriented(const SolidBox& solid) noexcept {
-  return {{Mat3::Identity(), 0.5 * (solid.min_m + solid.max_m)}, 0.5 * (solid.max_m - solid.min_m)};
-}
-
 std::array<Vec3, 8> corners(const OrientedBox& box) noexcept {
   std::array<Vec3, 8> out;
   for (unsigned i = 0; i < 8; ++i) {
@@ -35,9 +31,12 @@ double segment_distance_m(const Vec3& a0, const Vec3& a1, const Vec3& b0, const 
   const Vec3 u = a1 - a0, v = b1 - b0, w = a0 - b0;
   const double uu = u.squaredNorm(), uv = u.dot(v), vv = v.squaredNorm(), uw = u.dot(w), vw = v.dot(w);
   const double det = uu * vv - uv * uv;
-  double s = det > 1e-12 * uu * vv ? math::clamp((uv * vw - vv * uw) / det, 0.0, 1.0) : 0.0;
-  const double t = math::clamp((uv * s + vw) / vv, 0.0, 1.0);
-  s = math::clamp((uv * t - uw) / uu, 0.0, 1.0);
+  const auto share = [](double part, double whole) {  // of an edge without length: none
+    return whole > 0.0 ? math::clamp(part / whole, 0.0, 1.0) : 0.0;
+  };
+  double s = det > 1e-12 * uu * vv ? share(uv * vw - vv * uw, det) : 0.0;
+  const double t = share(uv * s + vw, vv);
+  s = share(uv * t - uw, uu);
   return (w + s * u - t * v).norm();
 }
 
@@ -81,11 +80,21 @@ std::vector<SolidBox> stair_solids(const StairWorld& world) {
   const double w = world.half_width_m;
   for (std::size_t k = 0; k < world.steps.size(); ++k) {
     const Step& s = world.steps[k];
-    const int step = static_cast<int>(k);
-    solids.push_back({Vec3{s.riser_x_m, -w, -kFoundation_m}, Vec3{s.back_x_m, w, s.height_m}, step});
-    if (s.nosing_x_m < s.riser_x_m) {
-      solids.push_back({Vec3{s.nosing_x_m, -w, s.height_m - kTreadSlab_m}, Vec3{s.back_x_m, w, s.height_m}, step});
+    const double back_x_m = s.back_x_m + s.beneath_m, slab_z_m = s.height_m - kTreadSlab_m;
+    const auto add = [&](double from_x_m, double from_z_m, double to_z_m) {
+      solids.push_back({Vec3{from_x_m, -w, from_z_m}, Vec3{back_x_m, w, to_z_m}, static_cast<int>(k), s.true_T_step});
+    };
+    const bool overhangs = s.nosing_x_m < s.riser_x_m;
+    if (s.worn_m > 0.0) {
+      const Vec3 bar_m{s.edge_x_m(), 0.0, s.height_m - s.worn_m}, along_m{0.0, w - s.worn_m, 0.0};
+      add(s.riser_x_m, -kFoundation_m, bar_m.z());
+      if (overhangs) add(s.nosing_x_m, slab_z_m, bar_m.z());
+      add(bar_m.x(), slab_z_m, s.height_m);
+      solids.push_back({bar_m - along_m, bar_m + along_m, static_cast<int>(k), s.true_T_step, s.worn_m});
+      continue;
     }
+    add(s.riser_x_m, -kFoundation_m, s.height_m);
+    if (overhangs) add(s.nosing_x_m, slab_z_m, s.height_m);
   }
   for (const Obstacle& o : world.obstacles) {
     solids.push_back({o.centre_m - 0.5 * o.size_m, o.centre_m + 0.5 * o.size_m, kObstacleStep});
@@ -93,10 +102,14 @@ std::vector<SolidBox> stair_solids(const StairWorld& world) {
   return solids;
 }
 
+Capsule bar_of(const SolidBox& solid) noexcept {
+  return {solid.true_T_solid * solid.min_m, solid.true_T_solid * solid.max_m, solid.round_m};
+}
+
 double signed_distance_m(const OrientedBox& box, const SolidBox& solid) noexcept {
-  const OrientedBox other = oriented(solid);
+  const OrientedBox other = solid.box();
   const double gap = axis_gap_m(box, other);
-  return gap <= 0.0 ? gap : gap_m(box, other);
+  return (gap <= 0.0 ? gap : gap_m(box, other)) - solid.round_m;
 }
 
 double clearance_m(const OrientedBox& box, std::span<const SolidBox> solids, std::span<const int> excluded,
@@ -108,8 +121,9 @@ double clearance_m(const OrientedBox& box, std::span<const SolidBox> solids, std
   double least = is_excluded(kFloorStep) ? at_most_m : std::min(at_most_m, box.centre.p_m.z() - reach.z());
   for (const SolidBox& solid : solids) {
     if (is_excluded(solid.step)) continue;
-    const Vec3 centre = 0.5 * (solid.min_m + solid.max_m), half = 0.5 * (solid.max_m - solid.min_m);
-    const Vec3 apart = ((box.centre.p_m - centre).cwiseAbs() - half - reach).cwiseMax(0.0);
+    const OrientedBox other = solid.box();
+    const Vec3 other_reach = other.centre.R.cwiseAbs() * other.half_m + Vec3::Constant(solid.round_m);
+    const Vec3 apart = ((box.centre.p_m - other.centre.p_m).cwiseAbs() - other_reach - reach).cwiseMax(0.0);
     if (apart.norm() >= std::max(least, 1e-9)) continue;  // the boxes' bounds are a lower bound of their distance
     least = std::min(least, signed_distance_m(box, solid));
   }
@@ -117,14 +131,21 @@ double clearance_m(const OrientedBox& box, std::span<const SolidBox> solids, std
 }
 
 double tread_margin_m(const Vec3& point_m, const StairWorld& world, int step) noexcept {
+  const auto along = [&point_m](const Step& s) { return Vec3(s.true_T_step.inverse() * point_m); };
   if (step < 0) {
     if (world.steps.empty()) return kInf;
-    const double outside_x =
-        std::max(world.steps.front().riser_x_m - point_m.x(), point_m.x() - world.steps.back().back_x_m);
+    const Step &first = world.steps.front(), &last = world.steps.back();
+    const double outside_x = std::max(first.riser_x_m - along(first).x(), along(last).x() - last.back_x_m);
     return std::max(outside_x, std::abs(point_m.y()) - world.half_width_m);
   }
-  const Step& s = world.steps[static_cast<std::size_t>(step)];
-  return std::min({point_m.x() - s.nosing_x_m, s.back_x_m - point_m.x(), world.half_width_m - std::abs(point_m.y())});
+  const auto k = static_cast<std::size_t>(step);
+  const Step& s = world.steps[k];
+  const Vec3 p_m = along(s);
+  double behind_m = s.back_x_m - p_m.x();
+  if (k + 1 < world.steps.size() && world.steps[k + 1].turned()) {  // the next riser is not parallel to this tread
+    behind_m = world.steps[k + 1].riser_x_m - along(world.steps[k + 1]).x();
+  }
+  return std::min({p_m.x() - s.edge_x_m(), behind_m, world.half_width_m - std::abs(p_m.y())});
 }
 
 double sole_margin_m(const Transform& true_T_sole, const StairWorld& world, int step, const SoleModel& sole) noexcept {

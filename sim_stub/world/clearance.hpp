@@ -15,15 +15,26 @@ namespace polygmap::sim {
 inline constexpr int kFloorStep = -1;     // the floor among step indices
 inline constexpr int kObstacleStep = -2;  // what is no step: posts, boxes
 
-// An axis-aligned solid of the staircase, true world frame.
+// A box along its own axes, with all that is nearer to it than round_m.
 struct SolidBox {
   Vec3 min_m;
   Vec3 max_m;
   int step;
+  Transform true_T_solid{};
+  double round_m = 0.0;
+
+  [[nodiscard]] Vec3 half_m() const noexcept { return 0.5 * (max_m - min_m); }
+  // About its middle, without what is round.
+  [[nodiscard]] OrientedBox box() const noexcept {
+    return {{true_T_solid.R, true_T_solid * Vec3(0.5 * (min_m + max_m))}, half_m()};
+  }
 };
-// Every step as a solid standing on the ground; with a nosing, its slab as a second solid; then the obstacles. The
-// steps reach below the floor, so that nothing is ever pushed out downwards.
+// Every step as a solid standing on the ground; with a nosing, its slab as a second solid; a worn one is a round bar
+// between boxes; then the obstacles. The steps reach below the floor, so that nothing is ever pushed out downwards.
+// Camera, physics and report have no other description of the staircase.
 [[nodiscard]] std::vector<SolidBox> stair_solids(const StairWorld& world);
+// A round bar as a capsule, its ends within the solid's sides.
+[[nodiscard]] Capsule bar_of(const SolidBox& solid) noexcept;
 
 // Signed distance between a box and a solid, m: exact gap when apart, minus the penetration depth (the shortest way
 // apart) otherwise.

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "algorithms/core/math/math.hpp"
+#include "algorithms/core/math/transform.hpp"
 
 namespace polygmap::sim {
 
@@ -38,15 +38,44 @@ struct StairParams {
   std::vector<Obstacle> obstacles{};
 };
 
+// How stairs that were built, and walked on for years, differ from their drawing.
+struct StairErrors {
+  double tread_slope_rad = 0.0;
+  double tread_fall_rad = 0.0;
+  double tread_cant_rad = 0.0;
+  double tread_yaw_rad = 0.0;
+  double rise_error_m = 0.0;
+  double worn_nosing_m = 0.0;
+
+  static void visit(auto& p, auto& field) {
+    field("tread_slope_rad", p.tread_slope_rad, 0.0, 0.1, "Half range of each tread's slope along the stairs.");
+    field("tread_fall_rad", p.tread_fall_rad, -0.1, 0.1, "By which every tread falls towards its nosing.");
+    field("tread_cant_rad", p.tread_cant_rad, 0.0, 0.1, "Half range of each tread's slope across the stairs.");
+    field("tread_yaw_rad", p.tread_yaw_rad, 0.0, 0.2, "Half range of each tread's turn about the vertical.");
+    field("rise_error_m", p.rise_error_m, 0.0, 0.05, "Half range of each rise's error, beside --jitter.");
+    field("worn_nosing_m", p.worn_nosing_m, 0.0, 0.02, "Radius to which every nosing is worn.");
+  }
+};
+
 // A tread with a nosing is a slab of this thickness that overhangs its riser.
 inline constexpr double kTreadSlab_m = 0.03;
 
-// Step k (1-based in speech, index k - 1): a level tread from its nosing to the next riser.
+// Step k (1-based in speech, index k - 1): a tread from its nosing to the next riser. Its numbers are along its own
+// axes: those of the true world, turned about the middle of its nosing.
 struct Step {
   double riser_x_m = 0.0;   // plane of the riser beneath the tread
   double nosing_x_m = 0.0;  // front edge of the tread: riser_x_m - nosing
   double back_x_m = 0.0;    // the next riser's plane; the landing's far end for step N
   double height_m = 0.0;
+  double worn_m = 0.0;      // radius of the nosing
+  double beneath_m = 0.0;   // how far it reaches beneath the next step, which is turned otherwise
+  Transform true_T_step{};  // a level, square step has the true world's axes
+
+  // Where the tread is flat from.
+  [[nodiscard]] double edge_x_m() const noexcept { return nosing_x_m + worn_m; }
+  [[nodiscard]] bool turned() const noexcept { return true_T_step.R != Mat3::Identity(); }
+  // Of the tread's plane, at a place in the true world.
+  [[nodiscard]] double top_m(double x_m, double y_m) const noexcept;
 };
 
 struct StairWorld {
@@ -59,7 +88,7 @@ struct StairWorld {
   [[nodiscard]] double height_m(double x_m, double y_m, int* step = nullptr) const noexcept;
 };
 
-// The staircase of one seed: jitter drawn from the seed, nothing else.
-[[nodiscard]] StairWorld make_stairs(const StairParams& params, std::uint64_t seed);
+// The staircase of one seed: what differs from step to step is drawn from the seed, nothing else.
+[[nodiscard]] StairWorld make_stairs(const StairParams& params, std::uint64_t seed, const StairErrors& errors = {});
 
 }  // namespace polygmap::sim

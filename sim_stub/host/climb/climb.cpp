@@ -91,6 +91,8 @@ SimOptions sim_options(const ClimbOptions& options) {
   sim.pushes = options.pushes;
   sim.errors = options.reality.sensors;
   sim.mujoco = options.reality.plant;
+  sim.stair_errors = options.reality.stairs;
+  sim.camera.errors = options.reality.camera;
   sim.camera.stairs_shift_m = {options.render_dx_m, options.render_dy_m, options.render_dz_m};
   sim.camera.missing_step = options.render_missing_step;
   sim.camera.threaded = options.threaded_render;

@@ -34,7 +34,8 @@ Vec3 level_frame_p(const Transform& any_T_sole, const Vec3& any_p_m) {
 
 // Along the sole's axis from the nosing to the sole's origin.
 double nosing_distance_m(const Step& step, const Transform& true_T_sole) {
-  return (true_T_sole.p_m.x() - step.nosing_x_m) / std::cos(yaw_of(true_T_sole.R));
+  const Transform step_T_sole = step.true_T_step.inverse() * true_T_sole;
+  return (step_T_sole.p_m.x() - step.nosing_x_m) / std::cos(yaw_of(step_T_sole.R));
 }
 
 }  // namespace
@@ -252,7 +253,7 @@ void ClimbReport::observe_stance(const Truth& truth) {
   if (world_.steps.empty() || first_lift_off_ns_ >= 0) return;
   double toe_x_m = -std::numeric_limits<double>::infinity();
   for (const Transform& true_T_sole : truth.true_T_sole) {
-    const OrientedBox box = collision_box(true_sole_, true_T_sole);
+    const OrientedBox box = collision_box(true_sole_, world_.steps.front().true_T_step.inverse() * true_T_sole);
     toe_x_m = std::max(toe_x_m, box.centre.p_m.x() + box.centre.R.row(0).cwiseAbs().dot(box.half_m));
   }
   stand_off_m_ = world_.steps.front().nosing_x_m - toe_x_m;

@@ -195,7 +195,8 @@ void add_stairs_from_the_side(std::string& out, const View& view, const StairWor
       profile_m.emplace_back(s.nosing_x_m, 0, s.height_m - slab_m);
     }
     profile_m.emplace_back(s.nosing_x_m, 0, s.height_m);
-    below_m = s.height_m;
+    below_m = s.top_m(s.back_x_m, 0.0);
+    if (s.turned()) profile_m.emplace_back(s.back_x_m, 0, below_m);
   }
   if (!world.steps.empty()) {
     profile_m.emplace_back(world.steps.back().back_x_m, 0, below_m);
@@ -213,8 +214,11 @@ void add_stairs_from_above(std::string& out, const View& view, const StairWorld&
   std::string style;
   add(style, "fill=\"%s\" stroke=\"%s\" stroke-width=\"1.2\"", kStairFill, kStairLine);
   for (const Step& s : world.steps) {
-    const std::array<Vec3, 4> tread_m{
-        {{s.nosing_x_m, -w, 0}, {s.back_x_m, -w, 0}, {s.back_x_m, w, 0}, {s.nosing_x_m, w, 0}}};
+    std::array<Vec3, 4> tread_m{{{s.nosing_x_m, -w, s.height_m},
+                                 {s.back_x_m, -w, s.height_m},
+                                 {s.back_x_m, w, s.height_m},
+                                 {s.nosing_x_m, w, s.height_m}}};
+    for (Vec3& corner_m : tread_m) corner_m = s.true_T_step * corner_m;
     add_polygon(out, view, tread_m, style.c_str());
   }
   for (const Obstacle& o : world.obstacles) {

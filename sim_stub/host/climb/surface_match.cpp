@@ -24,11 +24,13 @@ std::vector<TrueSurface> stair_surfaces(const StairWorld& world) {
   double below_m = 0.0;
   const int left = 1 + 2 * static_cast<int>(world.steps.size());
   int id = kFloorSurface;
-  for (const Step& s : world.steps) {
-    all.push_back({++id, 2, 1.0, {s.nosing_x_m, -w, s.height_m}, {s.back_x_m, w, s.height_m}});
-    all.push_back({++id, 0, -1.0, {s.nosing_x_m, -w, below_m}, {s.riser_x_m, w, s.height_m}});
-    all.push_back({left, 1, 1.0, {s.riser_x_m, w, 0.0}, {s.back_x_m, w, s.height_m}});
-    all.push_back({left + 1, 1, -1.0, {s.riser_x_m, -w, 0.0}, {s.back_x_m, -w, s.height_m}});
+  for (int k = 0; k < static_cast<int>(world.steps.size()); ++k) {
+    const Step& s = world.steps[static_cast<std::size_t>(k)];
+    const double back_m = s.back_x_m + s.beneath_m;
+    all.push_back({++id, 2, 1.0, {s.nosing_x_m, -w, s.height_m}, {back_m, w, s.height_m}, k});
+    all.push_back({++id, 0, -1.0, {s.nosing_x_m, -w, below_m}, {s.riser_x_m, w, s.height_m}, k});
+    all.push_back({left, 1, 1.0, {s.riser_x_m, w, 0.0}, {back_m, w, s.height_m}, k});
+    all.push_back({left + 1, 1, -1.0, {s.riser_x_m, -w, 0.0}, {back_m, -w, s.height_m}, k});
     below_m = s.height_m;
   }
   for (const Obstacle& o : world.obstacles) {
@@ -91,7 +93,14 @@ int matching_surface(const StairWorld& world, const SurfacePatch& patch, const T
   for (const Vec3& vertex_m : patch.polygon) polygon_m.push_back(true_T_camera * vertex_m);
   if (is_on_floor(world, normal, polygon_m, limits)) return kFloorSurface;
   for (const TrueSurface& surface : stair_surfaces(world)) {
-    if (is_on(surface, normal, centroid_m, polygon_m, limits)) return surface.id;
+    if (surface.step < 0) {
+      if (is_on(surface, normal, centroid_m, polygon_m, limits)) return surface.id;
+      continue;
+    }
+    const Transform step_T_true = world.steps[static_cast<std::size_t>(surface.step)].true_T_step.inverse();
+    std::vector<Vec3> along_m;
+    for (const Vec3& vertex_m : polygon_m) along_m.push_back(step_T_true * vertex_m);
+    if (is_on(surface, step_T_true.R * normal, step_T_true * centroid_m, along_m, limits)) return surface.id;
   }
   return kNoSurface;
 }
@@ -103,7 +112,9 @@ SurfaceVisibility::SurfaceVisibility(const StairWorld& world, const CameraIntrin
         coarse.fx_px /= kCoarse_px, coarse.fy_px /= kCoarse_px;
         coarse.cx_px = (coarse.cx_px + 0.5) / kCoarse_px - 0.5, coarse.cy_px = (coarse.cy_px + 0.5) / kCoarse_px - 0.5;
         return coarse;
-      }()) {}
+      }()) {
+  for (const Step& step : world.steps) step_T_true_.push_back(step.true_T_step.inverse());
+}
 
 const std::vector<int>& SurfaceVisibility::in_view(const Transform& true_T_camera, const Transform& base_T_camera,
                                                    const std::array<LegShapes, kFootCount>& base_legs,
@@ -137,20 +148,26 @@ void SurfaceVisibility::see(const Vec3& point_m, int px) {
   // The floor first: under a nosing it reaches to the riser.
   int id = std::abs(point_m.z()) <= kOnSurface_m ? kFloorSurface : kNoSurface;
   bool farther = false;
+  Vec3 along_m = point_m;  // the axes of along_step
+  int along_step = kFloorStep;
   for (std::size_t i = 0; i < surfaces_.size() && id == kNoSurface; ++i) {
     const TrueSurface& s = surfaces_[i];
-    if (((point_m - s.low_m).array() < -kOnSurface_m).any() || ((s.high_m - point_m).array() < -kOnSurface_m).any()) {
+    if (s.step != along_step) {
+      along_step = s.step;
+      along_m = s.step < 0 ? point_m : step_T_true_[static_cast<std::size_t>(s.step)] * point_m;
+    }
+    if (((along_m - s.low_m).array() < -kOnSurface_m).any() || ((s.high_m - along_m).array() < -kOnSurface_m).any()) {
       continue;
     }
     id = s.id;
-    farther = 2.0 * point_m[s.axis] > s.low_m[s.axis] + s.high_m[s.axis];
+    farther = 2.0 * along_m[s.axis] > s.low_m[s.axis] + s.high_m[s.axis];
     if (id < 0) return;  // an obstacle's
   }
   if (id < 0) return;
   Seen& seen = seen_[static_cast<std::size_t>(id)][farther ? 1 : 0];
   seen.px += px;
-  seen.low_m = seen.low_m.cwiseMin(point_m);
-  seen.high_m = seen.high_m.cwiseMax(point_m);
+  seen.low_m = seen.low_m.cwiseMin(along_m);
+  seen.high_m = seen.high_m.cwiseMax(along_m);
 }
 
 bool SurfaceVisibility::Seen::well(const InViewLimits& limits) const {

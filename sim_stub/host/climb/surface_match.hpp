@@ -21,14 +21,15 @@ struct SurfaceMatchLimits {
   double overhang_m = 0.05;   // of the centroid beyond the true surface's edges
 };
 
-// An axis-aligned rectangle in the true world: flat along `axis`, facing `sign` along it. Its place on the axis may be
-// a range: a riser under a nosing shows two planes. Rectangles of one id are one surface.
+// A rectangle along a step's axes: flat along `axis`, facing `sign` along it. Its place on the axis may be a range: a
+// riser under a nosing shows two planes. Rectangles of one id are one surface.
 struct TrueSurface {
   int id;
   int axis;
   double sign;
   Vec3 low_m;
   Vec3 high_m;
+  int step = kFloorStep;  // whose axes; of none: the true world's
 };
 
 inline constexpr int kNoSurface = -1;
@@ -67,6 +68,7 @@ class SurfaceVisibility {
   using SeenSurface = std::array<Seen, 2>;
   void see(const Vec3& point_m, int px);
 
+  std::vector<Transform> step_T_true_;
   std::vector<SolidBox> solids_;
   std::vector<TrueSurface> surfaces_;
   std::vector<SeenSurface> seen_;  // by id

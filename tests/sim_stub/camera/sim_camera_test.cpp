@@ -47,8 +47,9 @@ double marched_depth_m(const DepthScene& scene, int u, int v) {
     const Vec3 p = scene.true_T_camera.p_m + along_m * direction;
     double distance_m = p.z();
     for (const SolidBox& s : scene.solids) {
-      const Vec3 out = (s.min_m - p).cwiseMax(p - s.max_m);
-      distance_m = std::min(distance_m, out.cwiseMax(0.0).norm() + std::min(out.maxCoeff(), 0.0));
+      const Vec3 along = s.true_T_solid.inverse() * p;
+      const Vec3 out = (s.min_m - along).cwiseMax(along - s.max_m);
+      distance_m = std::min(distance_m, out.cwiseMax(0.0).norm() + std::min(out.maxCoeff(), 0.0) - s.round_m);
     }
     if (scene.legs_visible) {
       const Vec3 base_p = base_T_true * p;
@@ -69,8 +70,8 @@ double depth_m(const DepthRenderer& renderer, int u, int v) {
   return inverse > 1.0F / 6.0F ? 1.0 / static_cast<double>(inverse) : 0.0;
 }
 
-TEST(DepthRenderer, SeveralPoses_AgreeWithARayMarcher) {
-  const StairWorld world = make_stairs({.steps = 5, .nosing_m = 0.02}, 2);
+void compare_with_a_ray_marcher(const StairErrors& errors) {
+  const StairWorld world = make_stairs({.steps = 5, .nosing_m = 0.02}, 2, errors);
   const std::vector<SolidBox> solids = stair_solids(world);
   struct Pose {
     Vec3 p_m;
@@ -95,6 +96,13 @@ TEST(DepthRenderer, SeveralPoses_AgreeWithARayMarcher) {
     }
     EXPECT_LE(differ, compared / 1000) << pose.p_m.transpose();  // silhouettes that graze a pixel centre
   }
+}
+
+TEST(DepthRenderer, SeveralPoses_AgreeWithARayMarcher) { compare_with_a_ray_marcher({}); }
+
+TEST(DepthRenderer, TreadsThatSlopeAndTurnAndAreWorn_AgreeWithARayMarcher) {
+  compare_with_a_ray_marcher(
+      {.tread_slope_rad = 0.05, .tread_cant_rad = 0.05, .tread_yaw_rad = 0.1, .worn_nosing_m = 0.012});
 }
 
 TEST(DepthRenderer, MovingWhileItScans_EveryRowIsAsSeenFromItsOwnMoment) {

@@ -116,12 +116,13 @@ std::vector<Vec3> sampled(const OrientedBox& box, double spacing_m) {
 }
 
 double point_distance_m(const Vec3& p, const SolidBox& solid) {
-  const Vec3 outside = (solid.min_m - p).cwiseMax(p - solid.max_m);
-  return outside.cwiseMax(0.0).norm() + std::min(outside.maxCoeff(), 0.0);
+  const Vec3 along = solid.true_T_solid.inverse() * p;
+  const Vec3 outside = (solid.min_m - along).cwiseMax(along - solid.max_m);
+  return outside.cwiseMax(0.0).norm() + std::min(outside.maxCoeff(), 0.0) - solid.round_m;
 }
 
-TEST(Clearance, RandomFeetNearStairs_AgreesWithSampledPoints) {
-  const StairWorld world = make_stairs({.steps = 4, .nosing_m = 0.02}, 3);
+void compare_with_sampled_points(const StairErrors& errors) {
+  const StairWorld world = make_stairs({.steps = 4, .nosing_m = 0.02}, 3, errors);
   const std::vector<SolidBox> solids = stair_solids(world);
   const CounterNoise noise(11, Stream::kStart);
   constexpr double kSpacing_m = 0.01;
@@ -149,7 +150,9 @@ TEST(Clearance, RandomFeetNearStairs_AgreesWithSampledPoints) {
       const Vec3 reach = box.centre.R.cwiseAbs() * box.half_m;
       double deepest = std::max(0.0, reach.z() - box.centre.p_m.z());
       for (const SolidBox& s : solids) {
-        const Vec3 out = (s.max_m - box.centre.p_m + reach).cwiseMin(box.centre.p_m - s.min_m + reach);
+        const Vec3 other = s.box().centre.p_m;
+        const Vec3 other_reach = s.box().centre.R.cwiseAbs() * s.half_m() + Vec3::Constant(s.round_m);
+        const Vec3 out = reach + other_reach - (box.centre.p_m - other).cwiseAbs();
         deepest = std::max(deepest, out.minCoeff());
       }
       EXPECT_GT(clearance, -deepest - 1e-9) << i;
@@ -157,6 +160,13 @@ TEST(Clearance, RandomFeetNearStairs_AgreesWithSampledPoints) {
   }
   EXPECT_GT(apart, 100);
   EXPECT_GT(inside, 50);
+}
+
+TEST(Clearance, RandomFeetNearStairs_AgreesWithSampledPoints) { compare_with_sampled_points({}); }
+
+TEST(Clearance, RandomFeetNearTurnedAndWornStairs_AgreesWithSampledPoints) {
+  compare_with_sampled_points(
+      {.tread_slope_rad = 0.05, .tread_cant_rad = 0.05, .tread_yaw_rad = 0.1, .worn_nosing_m = 0.015});
 }
 
 TEST(Clearance, KnownPlaces_HaveTheirGapAndDepth) {

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pixels without depth for what they show: dark and shiny treads, strips along the nosings, sunlight.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "sim_stub/camera/camera_errors.hpp"
+#include "sim_stub/camera/counter_noise.hpp"
+#include "sim_stub/camera/depth_renderer.hpp"
+#include "sim_stub/world/stair_world.hpp"
+
+namespace polygmap::sim {
+
+class DepthHoles {
+ public:
+  DepthHoles(const CameraErrors& errors, const StairWorld& world, std::uint64_t seed);
+
+  // Takes the depth from such pixels of a picture that was rendered from first to last.
+  void apply(const DepthRenderer& picture, const DepthScene& first, const DepthScene& last, std::uint64_t frame,
+             std::uint16_t* depth) const;
+
+ private:
+  struct Tread {
+    Transform step_T_true;
+    Step step;
+    bool holed;         // dark and shiny
+    double turned_z_m;  // a pixel of it is no farther from its height
+  };
+  [[nodiscard]] bool is_sunlit(const Vec3& point_m) const;
+  // True for a point on the tread that gives no depth.
+  [[nodiscard]] bool is_lost(const Tread& tread, const Vec3& step_p_m, std::uint64_t frame, int u, int v) const;
+
+  CameraErrors errors_;
+  double half_width_m_;
+  CounterNoise noise_;
+  std::vector<Tread> treads_;
+  Vec3 sun_place_m_ = Vec3::Zero(), sun_ray_ = Vec3::UnitZ();
+};
+
+}  // namespace polygmap::sim
