@@ -373,7 +373,8 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
     const double room_m = *tread.ends.far_m - heel_m - foot_.collision.toe_x_m;
     spare_m = std::min(spare_m, room_m - margin_m - tread.back_margin_m);
   }
-  return heel_m + math::clamp(margin_m + 0.5 * spare_m, 0.0, params_.feet.heel_inset_max_m);
+  const double round_m = params_.feet.nosing_round_m;
+  return heel_m + math::clamp(margin_m + 0.5 * (round_m + spare_m), 0.0, params_.feet.heel_inset_max_m);
 }
 
 Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept {

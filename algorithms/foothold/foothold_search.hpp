@@ -43,6 +43,7 @@ class FootholdSearch {
     double half_spacing_min_m = 0.085;
     double heel_inset_m = 0.014;
     double heel_inset_max_m = 0.030;
+    double nosing_round_m = 0.004;
     double evade_max_m = 0.06;
     std::int32_t spacings = 7;
 
@@ -57,6 +58,8 @@ class FootholdSearch {
       field("heel_inset_m", p.heel_inset_m, 0.0, 0.2, "Heel edge behind the nosing where the back edge is not mapped.");
       field("heel_inset_max_m", p.heel_inset_max_m, 0.0, 0.5, "Heel edge behind the nosing at most, on deep treads.");
       field.ordered("heel_inset_m", "heel_inset_max_m");
+      field("nosing_round_m", p.nosing_round_m, 0.0, 0.05,
+            "A nosing is rounded, by wear or as it was built: the tread carries a heel from so far behind it on.");
       field("evade_max_m", p.evade_max_m, 0.0, 0.3, "Feet go no farther sideways to stand beside an obstacle.");
       field("spacings", p.spacings, 2, 14,
             "As many distances between the feet are tried, from half_spacing_m to half_spacing_min_m.");

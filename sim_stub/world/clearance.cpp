@@ -145,7 +145,7 @@ double tread_margin_m(const Vec3& point_m, const StairWorld& world, int step) no
   if (k + 1 < world.steps.size() && world.steps[k + 1].turned()) {  // the next riser is not parallel to this tread
     behind_m = world.steps[k + 1].riser_x_m - along(world.steps[k + 1]).x();
   }
-  return std::min({p_m.x() - s.edge_x_m(), behind_m, world.half_width_m - std::abs(p_m.y())});
+  return std::min({p_m.x() - s.carries_from_x_m(), behind_m, world.half_width_m - std::abs(p_m.y())});
 }
 
 double sole_margin_m(const Transform& true_T_sole, const StairWorld& world, int step, const SoleModel& sole) noexcept {

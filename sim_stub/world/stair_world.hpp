@@ -3,6 +3,8 @@
 // first riser stands at x = 0, the staircase is centred on y = 0.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -73,6 +75,11 @@ struct Step {
 
   // Where the tread is flat from.
   [[nodiscard]] double edge_x_m() const noexcept { return nosing_x_m + worn_m; }
+  // Where it carries a sole from, which gives by as much: a worn nosing has fallen by a millimetre there.
+  [[nodiscard]] double carries_from_x_m() const noexcept {
+    const double fallen_m = std::min(0.001, worn_m);
+    return edge_x_m() - std::sqrt(worn_m * worn_m - (worn_m - fallen_m) * (worn_m - fallen_m));
+  }
   [[nodiscard]] bool turned() const noexcept { return true_T_step.R != Mat3::Identity(); }
   // Of the tread's plane, at a place in the true world.
   [[nodiscard]] double top_m(double x_m, double y_m) const noexcept;
