@@ -456,6 +456,44 @@ TEST(ClimbReport, PlaneRate_CountsFramesWhoseEverySurfaceIsTrueAndThatMissNone) 
   EXPECT_NEAR(s.plane_rate_hz, 2.0 / 0.160, 1e-9);
 }
 
+// Every step turned alike about the middle of its nosing.
+StairWorld turned_stairs(double yaw_rad) {
+  StairWorld world = plain_stairs(3);
+  for (Step& step : world.steps) {
+    const Vec3 nosing_m{step.nosing_x_m, 0.0, step.height_m};
+    step.true_T_step = {rotation_z(yaw_rad), nosing_m - rotation_z(yaw_rad) * nosing_m};
+  }
+  return world;
+}
+
+TEST(ClimbReport, TurnedTread_FootholdErrorIsAlongTheTreadsOwnAxes) {
+  constexpr double kYaw_rad = 0.1, kBehind_m = 0.09;
+  const StairWorld world = turned_stairs(kYaw_rad);
+  ScriptedClimb climb(world);
+  climb.wait(200 * kNsPerMs);
+  // As the tread is turned, its target at the middle of the nosing.
+  const Transform target =
+      world.steps[0].true_T_step * Transform{Mat3::Identity(), {world.steps[0].nosing_x_m + kBehind_m, 0.0, 0.13}};
+  climb.swing(Foot::kLeft, target, 0);
+  const double told_m = target.p_m.x() - world.steps[0].nosing_x_m;  // what the script says of a square tread
+  EXPECT_NEAR(climb.finish().footsteps[0].along_error_m, told_m - kBehind_m, kUm);
+  EXPECT_GT(std::abs(told_m - kBehind_m), 10 * kUm);
+}
+
+TEST(SurfaceMatch, TurnedTread_MatchesAsItIsTurned) {
+  const double yaw_rad = 0.25;  // more than the angle that matches
+  const StairWorld world = turned_stairs(yaw_rad);
+  const Transform camera{rotation_y(0.3), Vec3(-0.4, 0, 0.8)}, &turn = world.steps[1].true_T_step;
+  const auto matched = [&](const Transform& as) {
+    return matching_surface(
+        world,
+        patch_of(camera, as * Vec3(0.28, 0, 0.20), as.R * -Vec3::UnitX(), as.R * Vec3(0, 0.2, 0), Vec3(0, 0, 0.05)),
+        camera);
+  };
+  EXPECT_EQ(matched(turn), 4);
+  EXPECT_EQ(matched({}), kNoSurface);
+}
+
 TEST(SurfaceVisibility, LegBeforeATread_TakesItOutOfView) {
   const StairWorld world = plain_stairs(3);
   const Transform base{Mat3::Identity(), Vec3(-0.3, 0, 0.79)};
