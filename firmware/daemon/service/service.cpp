@@ -392,7 +392,8 @@ void Service::log_changes() noexcept {
   const ModuleView view = board_.module();
   if (view == logged_) return;
   seen_.told_ns = 0;  // the service manager hears of it at once
-  const bool is_news = view.state != logged_.state || view.silent.bits() != logged_.silent.bits();
+  const bool disagrees = view.waits_for.leans() && view.waits_for.what != logged_.waits_for.what;
+  const bool is_news = view.state != logged_.state || view.silent.bits() != logged_.silent.bits() || disagrees;
   logged_ = view;
   if (!is_news) return;
   StatusText status;
