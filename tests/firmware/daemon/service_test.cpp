@@ -170,6 +170,18 @@ TEST_F(ServiceTest, AskedToStopBeforeThereIsAnEstimate_StandsOnItsDrives) {
   EXPECT_LT(stopped_after_, 1s);
 }
 
+// The estimate begins with a lean, as of a robot that falls: without the check at arming a wrong mount makes one.
+TEST_F(ServiceTest, RobotThatFalls_IsSaidHeldAndEndsTheService) {
+  config_.params.stance.most_gravity_rad = 3.2;
+  config_.params.robot.mounts.base_R_imu = rotation_y(0.6);
+  const Outcome outcome = run([&] { listen_until("STATUS=fallen", 10s); }, false);
+  EXPECT_EQ(outcome.code, ExitCode::kStoppedItself) << outcome.why;
+  EXPECT_EQ(outcome.why, "the robot has fallen.");
+  EXPECT_EQ(outcome.module.state, ModuleState::kFallen);
+  EXPECT_EQ(let_go_, 0) << "its joints are damped";
+  EXPECT_GE(stopped_after_, 90ms) << "held for hold_s";
+}
+
 // As polygmapd --ask does it, through the socket.
 TEST_F(ServiceTest, OperatorAsks_ArmsStartsStopsAndResetsThenAndNotBefore) {
   const std::string path = testing::TempDir() + "polygmap_operator_" + std::to_string(::getpid());
