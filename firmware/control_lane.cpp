@@ -108,6 +108,7 @@ bool ControlLane::is_sound(std::int64_t now_ns) const noexcept {
 void ControlLane::sense_imu(std::int64_t now_ns) noexcept {
   if (read_imu(ports_.imu, now_ns, estimator_)) {
     imu_came_ns_ = now_ns;
+    if (!gait_.armed()) start_.stance.add_accel(estimator_.base_accel_mps2());
     return;
   }
   const std::int64_t silent_ns = now_ns - std::max(estimator_.newest_imu_ns(), imu_came_ns_);
@@ -143,7 +144,27 @@ void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept
   if (!late.is_empty() || !drives_.bus.drive_errors.is_empty() || !drives_.out_of_range.is_empty()) return;
   if (drives_.bus.feet_silent) return;
   if (!start_.imu_speaks || gait_.stop_requested() || !supervisor_.may_arm()) return;
-  estimator_.add_joints(*joints, now_ns);
+  if (check_stance(joints->q_rad, now_ns)) estimator_.add_joints(*joints, now_ns);
+}
+
+// A robot that balances by another gravity than the true one falls with its first step, or before.
+bool ControlLane::check_stance(const JointVector& q_rad, std::int64_t now_ns) noexcept {
+  using For = ArmingWait::For;
+  const auto [soles_rad, gravity_rad] = start_.stance.leans(params_.robot.legs, q_rad);
+  const auto wait_for = [](For what, double lean_rad) {
+    return ArmingWait{what, {}, static_cast<std::uint16_t>(lean_rad * 180.0 / kPi + 0.5)};
+  };
+  start_.disagreement = {};
+  if (!(gravity_rad <= params_.stance.most_gravity_rad)) start_.disagreement = wait_for(For::kGravity, gravity_rad);
+  if (!(soles_rad <= params_.stance.most_soles_rad)) start_.disagreement = wait_for(For::kSoles, soles_rad);
+  const bool agrees = start_.disagreement.what == For::kNothing;
+  const bool is_named = !agrees && now_ns - start_.first_ns >= kArmingTimeout_ns;
+  if (is_named && !start_.disagreement_named) {
+    const bool soles_do = start_.disagreement.what == For::kSoles;
+    health_.raise(soles_do ? Fault::kSolesDisagree : Fault::kGravityDisagrees, now_ns);
+  }
+  start_.disagreement_named = is_named;
+  return agrees;
 }
 
 // Those that did not answer the last command.
@@ -191,7 +212,7 @@ ArmingWait ControlLane::arming_waits_for() const noexcept {
   if (!drives_.bus.drive_errors.is_empty()) return {For::kErrors, drives_.bus.drive_errors};
   if (!drives_.out_of_range.is_empty()) return {For::kRange, drives_.out_of_range};
   if (!start_.imu_speaks) return {For::kImu, {}};
-  return {drives_.bus.feet_silent ? For::kFeet : For::kNothing, {}};
+  return drives_.bus.feet_silent ? ArmingWait{For::kFeet, {}} : start_.disagreement;
 }
 
 // Everything that crosses is taken when the frame begins: the writer may be ahead by then, but not by more than it has

@@ -4,8 +4,9 @@
 // It starts arming, or off until its operator asks for that (Supervisor). An MIT drive answers only a command, and
 // where the legs are is not known before each has answered, so commands without gains and torques ask them. The gait
 // commands from the first accepted feedback on in which every drive has answered the last command, none tells of an
-// error and all joints are within their ranges, if the IMU speaks too. What is silent half a second after the start is
-// named, and asked on. Asked to stop meanwhile, it arms no more.
+// error and all joints are within their ranges, if the IMU speaks too and agrees with both legs about where up is
+// (StanceCheck). What is silent or disagrees half a second after the start is named, and asked on. Asked to stop
+// meanwhile, it arms no more.
 #pragma once
 
 #include "algorithms/core/work.hpp"
@@ -64,6 +65,8 @@ class ControlLane {
   void read_joints(std::int64_t now_ns) noexcept;
   // While it arms, in every cycle; joints: the feedback that came, or null.
   void arm(const JointFeedback* joints, std::int64_t now_ns) noexcept;
+  // False: IMU and legs disagree, and start_ says so.
+  [[nodiscard]] bool check_stance(const JointVector& q_rad, std::int64_t now_ns) noexcept;
   [[nodiscard]] JointSet late_drives(const JointFeedback* joints, std::int64_t now_ns) noexcept;
   void note_out_of_range(JointSet out_of_range, std::int64_t now_ns) noexcept;
   void note_silent_drives(JointSet silent, std::int64_t now_ns) noexcept;
@@ -103,6 +106,9 @@ class ControlLane {
     std::int64_t answered_ns = -1;      // when a drive answered last
     JointSet silent = JointSet::all();  // drives, never heard or silent for too long since
     bool imu_speaks = false;
+    StanceCheck stance;
+    ArmingWait disagreement;  // of IMU and legs
+    bool disagreement_named = false;
   };
   Start start_;
   std::int64_t imu_came_ns_ = -1;       // the last cycle that read a sample, good or bad; the first one before that

@@ -2,6 +2,7 @@
 // The robot and every stage's parameters, in one place.
 #pragma once
 
+#include "algorithms/estimation/calibration/stance_check.hpp"
 #include "algorithms/estimation/estimator.hpp"
 #include "algorithms/foothold/foothold_search.hpp"
 #include "algorithms/gait/gait.hpp"
@@ -28,6 +29,7 @@ struct Params {
   BodyUncertainty body;
   OverloadGuard::Params overload;
   Supervisor::Params supervisor;
+  StanceCheck::Params stance;
   double tread_height_sigma_m = 0.004;
   std::int64_t imu_interval_ns = kCycle_ns;
 
@@ -46,6 +48,7 @@ struct Params {
     field("body", p.body);
     field("overload", p.overload);
     field("supervisor", p.supervisor);
+    field("stance", p.stance);
     field("tread_height_sigma_m", p.tread_height_sigma_m, 1e-5, 0.1,
           "Height of a mapped tread under a foot that has just landed on it.");
     // A cycle reads four samples, and nothing is steered by one of 20 ms ago (gait.steer_age_ns): half of that for

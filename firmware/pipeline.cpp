@@ -96,6 +96,7 @@ Telemetry Pipeline::telemetry(std::int64_t now_ns, PerceptionTelemetry& percepti
           perception.map.front(),
           control_.gait_status(),
           control_.module_state(),
+          control_.arming_waits_for(),
           control_.drives()};
 }
 

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
 
 #include "algorithms/core/math/math.hpp"
+#include "algorithms/core/math/transcendental.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
 #include "algorithms/core/messages/operator_command.hpp"
 
@@ -34,7 +34,7 @@ struct ModuleStateInfo {
 };
 inline constexpr std::array kModuleStateTable{
     ModuleStateInfo{"off", "Its commands have no gains and no torques; it waits to be armed."},
-    ModuleStateInfo{"arming", "The same commands, until every drive and sensor has answered."},
+    ModuleStateInfo{"arming", "The same commands, until every drive and sensor has answered and IMU and legs agree."},
     ModuleStateInfo{"standing", "The gait commands the joints and balances; it waits to be started."},
     ModuleStateInfo{"walking_up", "It looks for stairs, and steps on the floor."},
     ModuleStateInfo{"climbing", "It has begun to step onto treads."},
@@ -74,6 +74,59 @@ inline constexpr auto kOperatorTransitions = std::to_array<OperatorTransition>({
     {ModuleState::kSafeStop, OperatorCommand::kReset, ModuleState::kStanding, ", once what stopped it is over"},
     {ModuleState::kOnTop, OperatorCommand::kReset, ModuleState::kStanding},
     {ModuleState::kOnTop, OperatorCommand::kStop, ModuleState::kSafeStop},
+});
+
+// What happens without an operator.
+enum class StateEvent : std::uint8_t {
+  kArms,
+  kStepsOntoTread,
+  kStepsOnFloor,
+  kHasToStop,
+  kGaitStops,
+  kGaitEnds,
+  kFalls
+};
+[[nodiscard]] constexpr std::string_view text_of(StateEvent event) noexcept {
+  constexpr std::array<std::string_view, 7> kTexts{"all drives and sensors have answered, and agree",
+                                                   "a foot is lifted for a tread",
+                                                   "that foot was put back, and one is lifted for the floor",
+                                                   "it has to stop: time is short, commands are refused, a drive errs",
+                                                   "the gait has stopped, on both feet",
+                                                   "the gait has ended the climb",
+                                                   "the torso leans too far for too long"};
+  static_assert(kTexts.size() == static_cast<std::size_t>(StateEvent::kFalls) + 1);
+  return kTexts[static_cast<std::size_t>(event)];
+}
+// What an event leads to. What no line has changes nothing.
+struct AutomaticTransition {
+  ModuleState from;
+  StateEvent event;
+  ModuleState to;
+  std::string_view note = "";  // may follow the state's name
+};
+inline constexpr auto kAutomaticTransitions = std::to_array<AutomaticTransition>({
+    {ModuleState::kArming, StateEvent::kArms, ModuleState::kStanding, ", or walking_up by itself with autostart"},
+    {ModuleState::kStanding, StateEvent::kHasToStop, ModuleState::kStopping},
+    {ModuleState::kStanding, StateEvent::kGaitStops, ModuleState::kSafeStop},
+    {ModuleState::kStanding, StateEvent::kFalls, ModuleState::kFallen},
+    {ModuleState::kWalkingUp, StateEvent::kStepsOntoTread, ModuleState::kClimbing},
+    {ModuleState::kWalkingUp, StateEvent::kHasToStop, ModuleState::kStopping},
+    {ModuleState::kWalkingUp, StateEvent::kGaitStops, ModuleState::kSafeStop},
+    {ModuleState::kWalkingUp, StateEvent::kFalls, ModuleState::kFallen},
+    {ModuleState::kClimbing, StateEvent::kStepsOnFloor, ModuleState::kWalkingUp},
+    {ModuleState::kClimbing, StateEvent::kHasToStop, ModuleState::kStopping},
+    {ModuleState::kClimbing, StateEvent::kGaitStops, ModuleState::kSafeStop},
+    {ModuleState::kClimbing, StateEvent::kGaitEnds, ModuleState::kOnTop},
+    {ModuleState::kClimbing, StateEvent::kFalls, ModuleState::kFallen},
+    {ModuleState::kHolding, StateEvent::kHasToStop, ModuleState::kStopping},
+    {ModuleState::kHolding, StateEvent::kGaitStops, ModuleState::kSafeStop},
+    {ModuleState::kHolding, StateEvent::kFalls, ModuleState::kFallen},
+    {ModuleState::kStopping, StateEvent::kGaitStops, ModuleState::kSafeStop},
+    {ModuleState::kStopping, StateEvent::kGaitEnds, ModuleState::kSafeStop},
+    {ModuleState::kStopping, StateEvent::kFalls, ModuleState::kFallen},
+    {ModuleState::kSafeStop, StateEvent::kFalls, ModuleState::kFallen},
+    {ModuleState::kOnTop, StateEvent::kHasToStop, ModuleState::kSafeStop},
+    {ModuleState::kOnTop, StateEvent::kFalls, ModuleState::kFallen},
 });
 
 class Supervisor {
@@ -118,7 +171,7 @@ class Supervisor {
   }
   // Every tick in which the estimate hears of the IMU.
   void watch_lean(const Params& params, const Mat3& odom_R_base) noexcept {
-    leaning_ticks_ = odom_R_base(2, 2) < std::cos(params.fallen_rad) ? leaning_ticks_ + 1 : 0;
+    leaning_ticks_ = odom_R_base(2, 2) < math::cos(params.fallen_rad) ? leaning_ticks_ + 1 : 0;
     fallen_ = fallen_ || leaning_ticks_ >= params.fallen_ticks;
   }
   [[nodiscard]] bool may_arm() const noexcept { return armed_; }

@@ -25,11 +25,31 @@ struct ArmingWait {
     kRange,    // joints outside it
     kImu,
     kFeet,
+    kSoles,    // to be parallel by the encoders
+    kGravity,  // to be where the soles have it
   };
   For what = For::kNothing;
-  JointSet joints;  // whose
+  JointSet joints;             // whose
+  std::uint16_t lean_deg = 0;  // of the last two
+  [[nodiscard]] constexpr bool leans() const noexcept { return what >= For::kSoles; }
   [[nodiscard]] constexpr bool operator==(const ArmingWait&) const noexcept = default;
 };
+// Joints or degrees go before or after it.
+[[nodiscard]] constexpr std::string_view text_of(ArmingWait::For what) noexcept {
+  constexpr std::array<std::string_view, 8> kTexts{
+      "",
+      "no answer yet from",
+      "in error:",
+      "out of range:",
+      "no IMU sample",
+      "no forces of the feet",
+      "deg between the soles' normals by the encoders: suspect an encoder's zero or sign, or a foot that does not "
+      "stand",
+      "deg between gravity as the IMU feels it and the soles' normal: suspect the IMU's mount (imu.base_rpy_rad, "
+      "robot.mounts.base_R_imu), then both legs' encoders, then the floor"};
+  static_assert(kTexts.size() == static_cast<std::size_t>(ArmingWait::For::kGravity) + 1);
+  return kTexts[static_cast<std::size_t>(what)];
+}
 
 // What the joints' bus and drives tell of themselves.
 struct DriveReport {
@@ -48,6 +68,7 @@ struct Telemetry {
   const MapSnapshot& map;          // stamp_ns changes in the tick a frame was fused
   const GaitStatus& gait;
   ModuleState module_state;
+  ArmingWait arming_waits_for;
   const DriveReport& drives;
 };
 

@@ -89,6 +89,8 @@ class Estimator {
   [[nodiscard]] const StateEstimate& state() const noexcept { return state_; }
   [[nodiscard]] const LegSensing& leg_sensing() const noexcept { return leg_sensing_; }
   [[nodiscard]] std::int64_t newest_imu_ns() const noexcept { return imu_.newest.stamp_ns; }  // accepted; 0: none yet
+  // The mean of the samples that came with the newest one's cycle, in base axes.
+  [[nodiscard]] const Vec3& base_accel_mps2() const noexcept { return imu_.mean.accel_mps2; }
   // The state at a stamp of the last half second. False, and out untouched, outside, before initialisation, and where a
   // sensor was silent for longer than max_step_s.
   [[nodiscard]] bool try_state_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {

@@ -37,8 +37,8 @@ struct FileName {
   [[noreturn]] void fail(std::size_t line, const std::string& what) const;
 };
 
-// Of a file that the last call could not open or read; what: "the bus file". Throws FileError with errno's reason,
-// where there is one.
+// Of a file that could not be opened or read; what: "the bus file". Throws FileError with errno's reason, where there
+// is one: who reads sets errno to 0 before, since a read that ends short leaves an earlier call's.
 [[noreturn]] void fail_to_read(const std::string& what, const std::string& path);
 
 }  // namespace polygmap::config

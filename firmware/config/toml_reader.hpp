@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cerrno>
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
@@ -32,6 +33,7 @@ namespace polygmap::config {
 [[nodiscard]] inline std::string read_text(const FileName& name) {
   std::error_code none;
   if (std::filesystem::is_directory(name.path, none)) throw FileError(name.text() + ": it is a folder.");
+  errno = 0;
   std::ifstream file(name.path, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) fail_to_read("the " + name.kind + " file", name.path);

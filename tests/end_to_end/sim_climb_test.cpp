@@ -247,6 +247,18 @@ TEST(ClimbCausality, SelfFilterOff_LegsAreTakenForSurfaces) {
   EXPECT_GT(unfiltered.surfaces_unmatched, filtered.surfaces_unmatched + 10);
 }
 
+TEST(ClimbArming, ImuMountIsNotAsConfigured_EndsAtOnceAndNamesIt) {
+  ClimbOptions options = options_of(1, 1);
+  options.params.robot.mounts.base_R_imu = rotation_y(13.0 * kPi / 180.0);
+  const ClimbSummary summary = climb(options);
+  EXPECT_EQ(summary.ended_by, "module");
+  EXPECT_LT(summary.ended_at_s, 4.0);
+  EXPECT_TRUE(summary.reason.starts_with("The module did not arm: 13 deg between gravity")) << summary.reason;
+  ASSERT_EQ(summary.states.size(), 1U);
+  EXPECT_EQ(summary.states[0].state, ModuleState::kArming);
+  EXPECT_TRUE(summary.footsteps.empty());
+}
+
 TEST(ClimbLimits, RiseOfHalfAMetre_ModuleStopsAndNamesTheRise) {
   ClimbOptions options = options_of(1, 3);
   options.stairs.rise_m = 0.5;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <string>
 
+#include "sim_stub/reality.hpp"
 #include "tests/support/physical_climb.hpp"
 
 namespace polygmap::sim {
@@ -78,6 +79,46 @@ TEST(TakeOverStart, FirstSecond_StaysWhereItWasMet) {
   }
   EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
   EXPECT_LT(moved_m, 0.02);
+}
+
+// Turned by 13 deg to any side, on its side and upside down: without the check the robot falls within seconds.
+TEST(TakeOverStart, ImuMountIsNotAsConfigured_CommandsNothingAndTheRobotStands) {
+  for (const Mat3& turn : {rotation_x(0.227), rotation_x(-0.227), rotation_y(0.227), rotation_y(-0.227),
+                           rotation_x(0.5 * kPi), rotation_x(kPi)}) {
+    Params params;
+    params.robot.mounts.base_R_imu = turn;
+    PhysicalClimb climb(stairs_of(1, 3), params);
+    while (climb.time_s() < 2.0) {
+      (void)climb.tick();
+      ASSERT_EQ(climb.state(), ModuleState::kArming);
+      ASSERT_EQ(climb.command().joints[kKnee].kp_nmprad, 0.0);
+      ASSERT_EQ(climb.command().joints[kKnee].tau_ff_nm, 0.0);
+    }
+    EXPECT_FALSE(climb.truth().fell);
+    EXPECT_EQ(climb.health().count(Fault::kGravityDisagrees).count, 1U);
+  }
+}
+
+// The robot of each seed stands on its own controller, with errors twice as large as a real one's.
+TEST(TakeOverStart, EveryRobotOfTwiceTheErrors_IsWithinTheTolerance) {
+  constexpr StanceCheck::Params kMost;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    SimOptions options = stairs_of(1, seed);
+    options.plant_kind = PlantKind::kKinematic;
+    options.errors = draw_reality(2.0, seed).sensors;
+    SimRobot robot(options);
+    StanceCheck check;
+    JointFeedback joints;
+    for (int i = 0; i < 50; ++i) {
+      robot.advance();
+      ImuSample imu;
+      if (robot.try_read(imu)) check.add_accel(imu.accel_mps2);
+      ASSERT_TRUE(robot.try_read(joints));
+    }
+    const auto [soles_rad, gravity_rad] = check.leans(RobotModel{}.legs, joints.q_rad);
+    EXPECT_LT(soles_rad, kMost.most_soles_rad) << seed;
+    EXPECT_LT(gravity_rad, kMost.most_gravity_rad) << seed;
+  }
 }
 
 }  // namespace

@@ -96,6 +96,37 @@ TEST_F(OperatedModule, ResetWhileItsCauseLasts_IsRefused) {
   EXPECT_EQ(state(), ModuleState::kStanding);
 }
 
+// The drive of a knee falls silent, and the robot stands on.
+TEST_F(OperatedModule, MuteKneeAnswersAgain_StandsAfterAResetAndNotBefore) {
+  ask(OperatorCommand::kArm, kInitialised_ticks);
+  ask(OperatorCommand::kStart, 100);
+  std::uint16_t silent = 0;
+  const auto stand_mute = [&](int ticks) {
+    for (int i = 0; i < ticks; ++i) {
+      clock_.advance_ns(kCycle_ns);
+      const ImuSample imu = imu_at(clock_.now_ns());
+      JointFeedback joints = joints_at(clock_.now_ns());
+      joints.silent_cycles[kKnee] = ++silent;
+      tick_with(&imu, &joints);
+    }
+  };
+  stand_mute(1000);
+  ASSERT_EQ(state(), ModuleState::kSafeStop);
+  EXPECT_EQ(control().gait_status().stop_reason, StopReason::kStateStale);
+  operator_.ask(OperatorCommand::kReset);
+  stand_mute(2);
+  EXPECT_EQ(state(), ModuleState::kSafeStop) << "the knee is mute";
+  EXPECT_EQ(count(Limit::kOperatorRefused), 1U);
+  stand(100);
+  EXPECT_EQ(state(), ModuleState::kSafeStop) << "nobody asked";
+  ask(OperatorCommand::kReset, 2);
+  EXPECT_EQ(state(), ModuleState::kStanding);
+  ask(OperatorCommand::kStart, 1000);
+  EXPECT_EQ(state(), ModuleState::kWalkingUp) << "its leg is whole again";
+  EXPECT_EQ(count(Limit::kOperatorRefused), 1U);
+  EXPECT_EQ(count(Fault::kDriveSilent), 1U);
+}
+
 TEST_F(OperatedModule, StopWhileArmingWaits_IsOff) {
   joints_.told.feet_silent = true;
   ask(OperatorCommand::kArm, 20);

@@ -3,6 +3,8 @@
 // have them ends in a safe stop with its name.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -159,6 +161,7 @@ TEST_F(ArmingTest, JointBeyondItsRange_IsNamedAndHoldsTheGainsBackUntilItIsInsid
       clock_.advance_ns(kCycle_ns);
       const ImuSample imu = imu_at(clock_.now_ns());
       JointFeedback joints = joints_at(clock_.now_ns());
+      joints.q_rad.setZero();  // straight legs: the soles are parallel
       joints.q_rad[kKnee] = knee_rad;
       tick_with(&imu, &joints);
     }
@@ -192,6 +195,53 @@ TEST_F(ArmingTest, ImuSilent_HoldsTheGainsBackUntilItSpeaks) {
   EXPECT_EQ(joints_.commands().newest().joints[3].kp_nmprad, 0.0);
   EXPECT_GT(count(Fault::kImuMissing), 200U);
   stand(1);
+  EXPECT_TRUE(is_running(control().module_state()));
+}
+
+// Turned by 13 deg, on its side and upside down.
+TEST_F(ArmingTest, ImuIsTurned_IsNamedAndHoldsTheGainsBackUntilItIsNot) {
+  std::uint32_t named = 0;
+  for (const double turn_rad : {13.0 * kPi / 180.0, 0.5 * kPi, kPi}) {
+    const auto lean_deg = static_cast<std::uint16_t>(std::lround(turn_rad * 180.0 / kPi));
+    for (int i = 0; i < 600; ++i) {
+      clock_.advance_ns(kCycle_ns);
+      ImuSample imu = imu_at(clock_.now_ns());
+      imu.accel_mps2 = rotation_y(turn_rad) * imu.accel_mps2;
+      const JointFeedback joints = joints_at(clock_.now_ns());
+      tick_with(&imu, &joints);
+      ASSERT_EQ(control().module_state(), ModuleState::kArming);
+      ASSERT_EQ(joints_.commands().newest().joints[3].kp_nmprad, 0.0);
+    }
+    EXPECT_EQ(control().arming_waits_for(), (ArmingWait{ArmingWait::For::kGravity, {}, lean_deg}));
+    named = std::max(named, count(Fault::kGravityDisagrees));
+    EXPECT_EQ(named, 1U) << "it disagrees all the while";
+  }
+  EXPECT_EQ(count(Fault::kSolesDisagree), 0U);
+  stand(600);
+  EXPECT_TRUE(is_running(control().module_state()));
+  EXPECT_EQ(control().arming_waits_for(), ArmingWait{});
+  EXPECT_EQ(count(Fault::kGravityDisagrees), 1U);
+}
+
+TEST_F(ArmingTest, EncoderOfOneLegIsWrong_IsNamedAndHoldsTheGainsBackUntilItIsNot) {
+  const auto stand_with_ankle = [this](double off_rad, int ticks) {
+    for (int i = 0; i < ticks; ++i) {
+      clock_.advance_ns(kCycle_ns);
+      const ImuSample imu = imu_at(clock_.now_ns());
+      JointFeedback joints = joints_at(clock_.now_ns());
+      joints.q_rad[kAnklePitch] += off_rad;
+      tick_with(&imu, &joints);
+    }
+  };
+  stand_with_ankle(0.2, 240);
+  EXPECT_EQ(count(Fault::kSolesDisagree), 0U) << "it is named after half a second";
+  stand_with_ankle(0.2, 60);
+  EXPECT_EQ(count(Fault::kSolesDisagree), 1U);
+  EXPECT_EQ(count(Fault::kGravityDisagrees), 0U);
+  EXPECT_EQ(control().module_state(), ModuleState::kArming);
+  EXPECT_EQ(joints_.commands().newest().joints[kKnee].kp_nmprad, 0.0);
+  EXPECT_EQ(control().arming_waits_for(), (ArmingWait{ArmingWait::For::kSoles, {}, 11}));
+  stand_with_ankle(0.05, 1);
   EXPECT_TRUE(is_running(control().module_state()));
 }
 

@@ -78,6 +78,108 @@ TEST(Supervisor, WithoutAutostart_EachStateWaitsForItsCommand) {
   EXPECT_EQ(supervisor.state(kOnTheStairs), ModuleState::kClimbing);
 }
 
+// A supervisor in a state, and the gait that it sees there.
+struct Case {
+  Supervisor supervisor;
+  Supervisor::GaitView gait = kUnarmed;
+
+  [[nodiscard]] ModuleState state() const { return supervisor.state(gait); }
+  // As ControlLane does.
+  void ask(Command command) {
+    const ModuleState before = state();
+    if (command == Command::kStop && before != ModuleState::kArming) gait.stop_requested = true;
+    if (command == Command::kReset) gait.phase = GaitPhase::kStandstill, gait.stop_requested = false;
+    supervisor.obey(command, before);
+  }
+  void happen(StateEvent event) {
+    switch (event) {
+      case StateEvent::kArms:
+        gait.armed = true;
+        break;
+      case StateEvent::kStepsOntoTread:
+      case StateEvent::kStepsOnFloor:
+        gait.on_stairs = event == StateEvent::kStepsOntoTread;
+        break;
+      case StateEvent::kHasToStop:
+        gait.stop_requested = true;
+        break;
+      case StateEvent::kGaitStops:
+        gait.phase = GaitPhase::kStopped;
+        break;
+      case StateEvent::kGaitEnds:
+        gait.phase = GaitPhase::kFinished;
+        break;
+      case StateEvent::kFalls:
+        for (int i = 0; i < 100; ++i) supervisor.watch_lean({}, rotation_zyx(0.0, 1.0, 0.0));
+        break;
+    }
+  }
+};
+Case case_in(ModuleState state) {
+  Case c{supervisor_of(false)};
+  if (state == ModuleState::kOff) return c;
+  c.ask(Command::kArm);
+  if (state == ModuleState::kArming) return c;
+  c.happen(StateEvent::kArms);
+  if (state == ModuleState::kStanding) return c;
+  c.ask(Command::kStart);
+  if (state == ModuleState::kClimbing || state == ModuleState::kOnTop) c.happen(StateEvent::kStepsOntoTread);
+  if (state == ModuleState::kHolding) c.ask(Command::kPause);
+  if (state == ModuleState::kStopping) c.ask(Command::kStop);
+  if (state == ModuleState::kSafeStop) c.happen(StateEvent::kGaitStops);
+  if (state == ModuleState::kOnTop) c.happen(StateEvent::kGaitEnds);
+  if (state == ModuleState::kFallen) c.happen(StateEvent::kFalls);
+  return c;
+}
+
+TEST(Supervisor, EveryTransitionOfTheOperators_LeadsWhereTheTableSays) {
+  for (const OperatorTransition& t : kOperatorTransitions) {
+    Case c = case_in(t.from);
+    ASSERT_EQ(c.state(), t.from);
+    c.ask(t.command);
+    EXPECT_EQ(c.state(), t.to) << name_of(t.from) << " " << name_of(t.command);
+  }
+}
+
+TEST(Supervisor, EveryEventInEveryState_LeadsWhereTheTableSaysAndElseNowhere) {
+  using State = ModuleState;
+  using Event = StateEvent;
+  // A gait that may not step ends no climb, nor does one that has not begun it; one that has ended has no event but
+  // those of the table; before it has its commands, neither gait nor lean is looked at.
+  const auto cannot_be = [](State state, Event event) {
+    const bool is_unarmed = state == State::kOff || state == State::kArming;
+    const bool is_over = state == State::kSafeStop || state == State::kOnTop;
+    if (event == Event::kGaitEnds) {
+      return is_unarmed || is_over || state == State::kStanding || state == State::kWalkingUp ||
+             state == State::kHolding;
+    }
+    if (is_unarmed) return event == Event::kFalls || (event == Event::kArms && state == State::kOff);
+    return event == Event::kGaitStops && is_over;
+  };
+  for (std::size_t from = 0; from < kModuleStateTable.size(); ++from) {
+    for (std::size_t what = 0; what <= static_cast<std::size_t>(Event::kFalls); ++what) {
+      const auto state = static_cast<State>(from);
+      const auto event = static_cast<Event>(what);
+      if (cannot_be(state, event)) continue;
+      State expected = state;
+      for (const AutomaticTransition& t : kAutomaticTransitions) {
+        if (t.from == state && t.event == event) expected = t.to;
+      }
+      Case c = case_in(state);
+      ASSERT_EQ(c.state(), state) << name_of(state);
+      c.happen(event);
+      EXPECT_EQ(c.state(), expected) << name_of(state) << ": " << text_of(event);
+    }
+  }
+}
+
+TEST(Supervisor, Autostart_WalksUpOnceItHasArmed) {
+  Case c{supervisor_of(true)};
+  ASSERT_EQ(c.state(), ModuleState::kArming);
+  c.happen(StateEvent::kArms);
+  EXPECT_EQ(c.state(), ModuleState::kWalkingUp);
+}
+
 TEST(Supervisor, StopWhileItArms_IsOffAgain) {
   Supervisor supervisor = supervisor_of(true);
   EXPECT_EQ(supervisor.state(kUnarmed), ModuleState::kArming);

@@ -209,9 +209,10 @@ Finding bus(const DoctorInput& in, const std::string& bus) {
   const std::string name = "can " + bus;
   std::error_code none;
   if (!fs::exists(folder, none) || number_of(folder / "type", 0) != kArphrdCan) {
-    return {name, Verdict::kBad, "There is no CAN interface " + bus + ".",
-            "On a Jetson: modprobe can can_raw mttcan, with the pins set to CAN (docs/deploy.md); elsewhere load the "
-            "adapter's driver. ip -details link show type can lists what there is."};
+    return {
+        name, Verdict::kBad, "There is no CAN interface " + bus + ".",
+        "On a Jetson: modprobe -a can can_raw mttcan, with the pins set to CAN (docs/deploy.md); elsewhere load the "
+        "adapter's driver. ip -details link show type can lists what there is."};
   }
   if ((number_of(folder / "flags", 0) & 1) == 0) {
     return {name, Verdict::kBad, bus + " is down.",
@@ -277,7 +278,7 @@ std::vector<Finding> examine(const DoctorInput& in) {
   for (const std::string& name : buses) findings.push_back(bus(in, name));
   if (buses.empty()) {
     findings.push_back({"can", Verdict::kWarning, "The machine has no CAN interface.",
-                        "On a Jetson: modprobe can can_raw mttcan (docs/deploy.md)."});
+                        "On a Jetson: modprobe -a can can_raw mttcan (docs/deploy.md)."});
   }
   for (const std::string& warning : in.warnings) {
     findings.push_back({"sender", Verdict::kWarning, warning, "Write sender = \"ADDRESS\" into that table."});

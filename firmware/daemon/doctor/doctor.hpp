@@ -68,6 +68,7 @@ struct WakeUps {
   std::uint32_t woken = 0;
   std::uint64_t max_ns = 0;
   bool was_real_time = false;
+  bool lacks_processor = false;  // the machine does: no right would help
 
   void add(std::uint64_t late_ns) noexcept;
 };

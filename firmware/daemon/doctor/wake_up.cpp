@@ -20,7 +20,7 @@ std::int64_t monotonic_ns() noexcept {
 struct Measurement {
   WakeUps wake_ups;
   std::uint32_t cycles = 0;
-  bool was_as_asked = false;  // the thread's processor and priority
+  int refused = 0;  // why the thread has not the processor and priority that it was to have, an errno
 };
 void* measure(void* argument) noexcept {
   auto& measurement = *static_cast<Measurement*>(argument);
@@ -51,14 +51,14 @@ void measure_wake_ups(std::vector<LaneWakeUps>& lanes, std::uint32_t cycles) {
   std::vector<Measurement> measurements(lanes.size(), Measurement{.wake_ups = {}, .cycles = cycles});
   std::vector<LaneThread> threads(lanes.size());
   for (std::size_t n = 0; n < lanes.size(); ++n) {
-    const bool is_as_asked = threads[n].start(lanes[n].placement, &measure, &measurements[n]) == 0;
-    measurements[n].was_as_asked = is_as_asked;
-    if (!is_as_asked) (void)threads[n].start({}, &measure, &measurements[n]);
+    measurements[n].refused = threads[n].start(lanes[n].placement, &measure, &measurements[n]);
+    if (measurements[n].refused != 0) (void)threads[n].start({}, &measure, &measurements[n]);
   }
   for (std::size_t n = 0; n < lanes.size(); ++n) {
     threads[n].join();
     lanes[n].wake_ups = measurements[n].wake_ups;
-    lanes[n].wake_ups.was_real_time = measurements[n].was_as_asked;
+    lanes[n].wake_ups.was_real_time = measurements[n].refused == 0;
+    lanes[n].wake_ups.lacks_processor = measurements[n].refused == EINVAL;
   }
 }
 
@@ -84,6 +84,8 @@ Finding finding_of(const LaneWakeUps& lane, std::uint64_t slack_ns) {
   finding.to_do = wake_ups.was_real_time
                       ? "Mend what is found above (kernel, governor, isolation) and look again; cyclictest of rt-tests "
                         "measures for longer."
+                  : wake_ups.lacks_processor
+                      ? "Give the lane a processor of /sys/devices/system/cpu/online, to see what it would."
                       : "Run it as root, or as the shipped service runs, to see what a lane would.";
   // Without a priority it says nothing of what a lane would have.
   if (!wake_ups.was_real_time) finding.verdict = Verdict::kWarning;

@@ -28,7 +28,7 @@ constexpr std::int64_t kComplain_ns = kNsPerS;
 constexpr std::uint64_t kTicksPerCount = 50;          // of a lane: then it publishes what its drivers counted
 constexpr std::int64_t kLaneHangs_ns = kNsPerS;       // without a cycle
 constexpr std::int64_t kFirstDue_ns = 20 * kNsPerMs;  // from the lanes' waiting to their first cycle
-// A swing takes 0.92 s, and a foot that finds no ground goes back: later than that something is wrong.
+// The longest swing takes 1.06 s, and a foot that finds no ground goes back: later than that something is wrong.
 constexpr std::int64_t kStopLimit_ns = 3 * kNsPerS;
 constexpr std::size_t kOwnStack_bytes = 64U * 1024U;
 constexpr std::string_view kTooLittleMemory =
@@ -392,7 +392,8 @@ void Service::log_changes() noexcept {
   const ModuleView view = board_.module();
   if (view == logged_) return;
   seen_.told_ns = 0;  // the service manager hears of it at once
-  const bool is_news = view.state != logged_.state || view.silent.bits() != logged_.silent.bits();
+  const bool disagrees = view.waits_for.leans() && view.waits_for.what != logged_.waits_for.what;
+  const bool is_news = view.state != logged_.state || view.silent.bits() != logged_.silent.bits() || disagrees;
   logged_ = view;
   if (!is_news) return;
   StatusText status;

@@ -22,20 +22,11 @@ void add_joints(StatusText& out, const char* what, JointSet joints) noexcept {
 }
 
 void add_wait(StatusText& out, const ArmingWait& wait) noexcept {
-  switch (wait.what) {
-    case ArmingWait::For::kNothing:
-      break;
-    case ArmingWait::For::kAnswers:
-      return add_joints(out, ", no answer yet from", wait.joints);
-    case ArmingWait::For::kErrors:
-      return add_joints(out, ", in error:", wait.joints);
-    case ArmingWait::For::kRange:
-      return add_joints(out, ", out of range:", wait.joints);
-    case ArmingWait::For::kImu:
-      return out.add(", no IMU sample");
-    case ArmingWait::For::kFeet:
-      return out.add(", no forces of the feet");
-  }
+  if (wait.what == ArmingWait::For::kNothing) return;
+  add_text(out, ", ", "");
+  if (wait.leans()) out.add("%u ", wait.lean_deg);
+  add_text(out, "", text_of(wait.what));
+  add_joints(out, "", wait.joints);
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ struct ModuleView {
     return std::uint64_t{static_cast<std::uint8_t>(state)} |
            std::uint64_t{static_cast<std::uint8_t>(waits_for.what)} << 4U |
            std::uint64_t{static_cast<std::uint8_t>(phase)} << 8U |
-           std::uint64_t{static_cast<std::uint8_t>(reason)} << 16U | std::uint64_t{waits_for.joints.bits()} << 24U |
+           std::uint64_t{static_cast<std::uint8_t>(reason)} << 16U | std::uint64_t{wait_detail()} << 24U |
            std::uint64_t{silent.bits()} << 36U | std::uint64_t{treads} << 48U;
   }
   [[nodiscard]] static ModuleView unpacked(std::uint64_t bits) noexcept {
@@ -40,10 +40,18 @@ struct ModuleView {
     view.waits_for.what = static_cast<ArmingWait::For>(bits >> 4U & 0xFU);
     view.phase = static_cast<GaitPhase>(bits >> 8U & 0xFFU);
     view.reason = static_cast<StopReason>(bits >> 16U & 0xFFU);
-    view.waits_for.joints = JointSet::of_bits(static_cast<std::uint16_t>(bits >> 24U & kJoints));
+    const auto detail = static_cast<std::uint16_t>(bits >> 24U & kJoints);
+    const bool leans = view.waits_for.leans();
+    view.waits_for.joints = leans ? JointSet{} : JointSet::of_bits(detail);
+    view.waits_for.lean_deg = leans ? detail : std::uint16_t{0};
     view.silent = JointSet::of_bits(static_cast<std::uint16_t>(bits >> 36U & kJoints));
     view.treads = static_cast<std::uint16_t>(bits >> 48U);
     return view;
+  }
+
+ private:
+  [[nodiscard]] std::uint16_t wait_detail() const noexcept {
+    return waits_for.leans() ? waits_for.lean_deg : waits_for.joints.bits();
   }
 };
 static_assert(kJointCount == 12);

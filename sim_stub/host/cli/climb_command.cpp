@@ -419,10 +419,11 @@ std::string complaint(ClimbArguments& a) {
 // Makes the directory and tries to write into it before a minute of climbing is spent.
 std::string directory_complaint(const std::string& directory, const std::string& option = "--out") {
   namespace fs = std::filesystem;
-  std::error_code error;
-  fs::create_directories(directory, error);
-  if (!fs::is_directory(directory, error))
-    return "Cannot create the directory \"" + directory + "\" given by " + option + ".";
+  std::error_code why, error;
+  fs::create_directories(directory, why);
+  if (!fs::is_directory(directory, error)) {
+    return "Cannot create the directory \"" + directory + "\" given by " + option + ": " + why.message() + ".";
+  }
   const fs::path probe = fs::path(directory) / ".polygmap_probe";
   std::ofstream file(probe);
   file << "x";
@@ -484,6 +485,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
                   std::ostream& err, bool live, const std::atomic<int>* interrupt) {
   CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
   app.require_subcommand(0, 1);
+  app.set_version_flag("--version", "polygmap " POLYGMAP_VERSION, "Print the version and exit");
   app.footer(
       "Exit codes: 0 pass or done, 1 the climb failed or the replay differs, 2 a bad argument, file or output, 130 or "
       "143 interrupted.");

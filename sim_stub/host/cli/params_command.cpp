@@ -150,6 +150,13 @@ std::string states_markdown() {
     out += "| `" + std::string(name_of(t.from)) + "` | " + std::string(name_of(t.command)) + " | `" +
            std::string(name_of(t.to)) + "`" + std::string(t.note) + " |\n";
   }
+  out +=
+      "\nWhat nobody asks for; what a state has no line for changes nothing in it.\n\n"
+      "| in | when | it becomes |\n|---|---|---|\n";
+  for (const AutomaticTransition& t : kAutomaticTransitions) {
+    out += "| `" + std::string(name_of(t.from)) + "` | " + std::string(text_of(t.event)) + " | `" +
+           std::string(name_of(t.to)) + "`" + std::string(t.note) + " |\n";
+  }
   return out;
 }
 

@@ -266,7 +266,8 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     const ModuleState state = telemetry.module_state;
     if (states.empty() || states.back().state != state) states.push_back({seconds(robot.now_ns()), state});
     const bool goes_on = options.climb_operator != nullptr && options.climb_operator->has_more();
-    const bool over = (state == ModuleState::kOnTop || state == ModuleState::kSafeStop) && !goes_on;
+    const bool ended = state == ModuleState::kOnTop || state == ModuleState::kSafeStop;
+    const bool over = (ended || telemetry.arming_waits_for.leans()) && !goes_on;
     if (!over) end_ns = -1;
     if (over && end_ns < 0) end_ns = robot.now_ns() + kRestAfterEnd_ns;
     if (robot.truth().fell || (over && robot.now_ns() >= end_ns)) break;

@@ -57,6 +57,7 @@ void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
     fell_ = true;
     ending_.fall_reason = truth.fall_reason;
   }
+  ending_.arming_waits_for = telemetry.arming_waits_for;
   odometry_.observe(truth, telemetry.state, telemetry.gait.phase);
   if (odometry_.aligned()) {
     observe_surfaces(telemetry.surfaces);
@@ -314,7 +315,8 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.fell = fell_;
   s.steps_total = static_cast<int>(world_.steps.size());
   s.steps_climbed = steps_climbed_;
-  const bool module_ended = ending_.phase == GaitPhase::kFinished || ending_.phase == GaitPhase::kStopped;
+  const bool module_ended =
+      ending_.phase == GaitPhase::kFinished || ending_.phase == GaitPhase::kStopped || ending_.arming_waits_for.leans();
   s.ended_at_s = seconds(last_stamp_ns_);
   s.interrupted_by = fell_ || module_ended ? 0 : run.interrupted_by;
   s.ended_by = fell_ ? "fall" : module_ended ? "module" : s.interrupted_by != 0 ? "interrupted" : "time limit";

@@ -40,6 +40,10 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
   if (!all_climbed && ending.phase == GaitPhase::kStopped) {
     return "The module stopped after " + climbed + ": " + why + ".";
   }
+  if (ending.arming_waits_for.leans()) {
+    return sentence("The module did not arm: %.0f ", ending.arming_waits_for.lean_deg) +
+           std::string(text_of(ending.arming_waits_for.what)) + ".";
+  }
   // A step counts where both soles rest inside its edges, so a sole over one may be why the count is short.
   if (!all_climbed && ending.phase == GaitPhase::kFinished) {
     if (over) return over_the_edge + "; " + climbed + " count.";

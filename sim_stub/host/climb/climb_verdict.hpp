@@ -5,6 +5,7 @@
 #include <string>
 
 #include "algorithms/core/messages/samples.hpp"
+#include "firmware/telemetry.hpp"
 #include "sim_stub/host/climb/climb_summary.hpp"
 
 namespace polygmap::sim {
@@ -13,6 +14,7 @@ namespace polygmap::sim {
 struct ClimbEnding {
   GaitPhase phase = GaitPhase::kStandstill;
   StopReason stop_reason = StopReason::kNone;
+  ArmingWait arming_waits_for;
   double stop_measured_m = 0.0;
   std::string fall_reason;        // a sentence; empty when it did not fall
   std::string heap_first_caller;  // the function, when the module called the heap

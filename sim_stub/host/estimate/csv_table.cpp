@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -36,6 +37,7 @@ std::string read_text(const std::string& path) {
   std::error_code none;
   if (!std::filesystem::exists(path, none)) throw config::FileError("There is no file \"" + path + "\".");
   if (std::filesystem::is_directory(path, none)) throw config::FileError("\"" + path + "\" is a folder, not a file.");
+  errno = 0;
   std::ifstream file(path, std::ios::binary);
   std::string text;
   for (std::array<char, 1 << 16> block{}; file.read(block.data(), block.size()) || file.gcount() > 0;) {

@@ -4,6 +4,7 @@
 #include <lodepng.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -169,6 +170,7 @@ DepthPng read_depth(const std::string& path) {
     fail("\"" + path + "\" has " + std::to_string(bytes) + " bytes, more than any depth picture that is read.");
   }
   std::vector<unsigned char> file;
+  errno = 0;
   if (lodepng::load_file(file, path) != 0) config::fail_to_read("the picture", path);
   if (file.empty()) fail("The picture \"" + path + "\" is empty.");
   lodepng::State state;

@@ -236,7 +236,9 @@ TEST(WakeUpsTest, LateOnes_AreFound) {
   EXPECT_NE(finding_of(lane, kSlack_ns).what.find("3 wake-ups on processor 5 "), std::string::npos);
   wake_ups.was_real_time = false;
   EXPECT_EQ(finding_of(lane, kSlack_ns).verdict, Verdict::kWarning);
-  EXPECT_NE(finding_of(lane, kSlack_ns).to_do, "");
+  EXPECT_TRUE(finding_of(lane, kSlack_ns).to_do.starts_with("Run it as root"));
+  wake_ups.lacks_processor = true;
+  EXPECT_TRUE(finding_of(lane, kSlack_ns).to_do.starts_with("Give the lane a processor"));
 }
 TEST(WakeUpsTest, SlackIsOfTheSchedule_AndLessInOneLane) {
   EXPECT_GT(slack_ns(1), 0U);
@@ -259,6 +261,7 @@ TEST(WakeUpsTest, EveryLane_IsMeasuredWhereItRuns) {
   EXPECT_TRUE(lanes[0].wake_ups.was_real_time) << "as it is placed";
   EXPECT_EQ(lanes[1].lane, "perception");
   EXPECT_FALSE(lanes[1].wake_ups.was_real_time) << "no machine has processor 1000: it was measured on another";
+  EXPECT_TRUE(lanes[1].wake_ups.lacks_processor);
   config.lanes = 1;
   EXPECT_EQ(lanes_of(config).size(), 1U);
 }

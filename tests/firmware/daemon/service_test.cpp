@@ -136,6 +136,15 @@ TEST_F(ServiceTest, JointBeyondItsRange_IsNamedAndTheDrivesAreLetGo) {
   EXPECT_FALSE(robot_.has_gains);
 }
 
+TEST_F(ServiceTest, ImuMountIsNotAsConfigured_IsSaidAndTheDrivesAreLetGo) {
+  config_.params.robot.mounts.base_R_imu = rotation_y(13.0 * kPi / 180.0);
+  const Outcome outcome = run([&] { listen_until("STATUS=arming, 13 deg between gravity as the IMU feels it", 5s); });
+  EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
+  EXPECT_EQ(outcome.module.state, ModuleState::kArming);
+  EXPECT_EQ(let_go_, 1);
+  EXPECT_FALSE(robot_.has_gains);
+}
+
 TEST_F(ServiceTest, AskedToStopWhileItRuns_StandsOnItsDrives) {
   const Outcome outcome = run([&] {
     listen_until("STATUS=walking_up", 5s);
@@ -159,6 +168,18 @@ TEST_F(ServiceTest, AskedToStopBeforeThereIsAnEstimate_StandsOnItsDrives) {
   EXPECT_EQ(outcome.module.reason, StopReason::kOperator);
   EXPECT_EQ(let_go_, 0);
   EXPECT_LT(stopped_after_, 1s);
+}
+
+// The estimate begins with a lean, as of a robot that falls: without the check at arming a wrong mount makes one.
+TEST_F(ServiceTest, RobotThatFalls_IsSaidHeldAndEndsTheService) {
+  config_.params.stance.most_gravity_rad = 3.2;
+  config_.params.robot.mounts.base_R_imu = rotation_y(0.6);
+  const Outcome outcome = run([&] { listen_until("STATUS=fallen", 10s); }, false);
+  EXPECT_EQ(outcome.code, ExitCode::kStoppedItself) << outcome.why;
+  EXPECT_EQ(outcome.why, "the robot has fallen.");
+  EXPECT_EQ(outcome.module.state, ModuleState::kFallen);
+  EXPECT_EQ(let_go_, 0) << "its joints are damped";
+  EXPECT_GE(stopped_after_, 90ms) << "held for hold_s";
 }
 
 // As polygmapd --ask does it, through the socket.
@@ -505,6 +526,8 @@ TEST(ModuleViewTest, PackedAndUnpacked_IsTheSame) {
   EXPECT_EQ(ModuleView::unpacked(view.packed()), view);
   EXPECT_EQ(ModuleView::unpacked(view.packed()).silent.bits(), 0xFFE);
   EXPECT_EQ(ModuleView::unpacked(view.packed()).waits_for, view.waits_for);
+  view.waits_for = {ArmingWait::For::kGravity, {}, 180};
+  EXPECT_EQ(ModuleView::unpacked(view.packed()).waits_for, view.waits_for);
   EXPECT_FALSE(view == ModuleView{});
 }
 
@@ -568,6 +591,12 @@ TEST(StatusTest, Arming_SaysWhatItWaitsFor) {
   EXPECT_EQ(status_of({For::kRange, two}), "arming, out of range: left_hip_roll, left_knee");
   EXPECT_EQ(status_of({For::kImu, {}}), "arming, no IMU sample");
   EXPECT_EQ(status_of({For::kFeet, {}}), "arming, no forces of the feet");
+  EXPECT_EQ(status_of({For::kSoles, {}, 12}),
+            "arming, 12 deg between the soles' normals by the encoders: suspect an encoder's zero or sign, or a foot "
+            "that does not stand");
+  EXPECT_EQ(status_of({For::kGravity, {}, 13}),
+            "arming, 13 deg between gravity as the IMU feels it and the soles' normal: suspect the IMU's mount "
+            "(imu.base_rpy_rad, robot.mounts.base_R_imu), then both legs' encoders, then the floor");
 }
 
 TEST(LateRowsTest, RowsAreToldOnceWithHowManyMore) {

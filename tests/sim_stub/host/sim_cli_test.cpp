@@ -61,6 +61,12 @@ void expect_refused(const std::vector<std::string>& arguments, const std::string
   EXPECT_EQ(c.out, "");
 }
 
+TEST(PolygmapCommand, Version_IsTheProjects) {
+  const Call version = call({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_EQ(version.out, "polygmap " POLYGMAP_VERSION "\n");
+}
+
 TEST(ClimbCommand, Contacts_InferredUnlessSensed) {
   EXPECT_FALSE(call({"climb"}).options->foot_sensors);
   EXPECT_FALSE(call({"climb", "--contacts", "inferred"}).options->foot_sensors);
@@ -312,7 +318,7 @@ TEST(ClimbCommand, BalustersOfNoUse_AreRefused) {
 TEST(ClimbCommand, UnwritableOut_IsRefused) {
   const std::string file = temporary("a_file");
   std::ofstream(file) << "x";
-  expect_refused({"climb", "--out", file}, file);
+  expect_refused({"climb", "--out", file}, file + "\" given by --out: Not a directory.");
   expect_refused({"climb", "--out", file + "/inside"}, file);
   expect_refused({"climb", "--out", "/proc/polygmap"}, "/proc/polygmap");
   expect_refused({"climb", "--out", "/proc"}, "/proc");

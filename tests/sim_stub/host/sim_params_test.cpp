@@ -85,9 +85,10 @@ TEST(ParamsCommand, BadFile_IsOneSentenceAndExit2) {
 }
 
 TEST(ParamsCommand, WordThatIsNoCommandOfIt_IsNamedWithThoseThereAre) {
-  EXPECT_EQ(call_tool({"params", "lst"}).err,
-            "polygmap: \"lst\" is no command of params; there are list, docs, reality and diff; see polygmap params "
-            "--help.\n");
+  EXPECT_EQ(
+      call_tool({"params", "lst"}).err,
+      "polygmap: \"lst\" is no command of params; there are list, docs, reality, states and diff; see polygmap params "
+      "--help.\n");
   EXPECT_EQ(call_tool({"params", "list", "lst"}).err,
             "polygmap: \"lst\" is a word too many; see polygmap params list --help.\n");
 }

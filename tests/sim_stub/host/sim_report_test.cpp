@@ -572,7 +572,7 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
       j["arguments"].dump(),
       R"({"steps":10,"rise_m":0.17,"tread_m":0.28,"width_m":1.2,"nosing_m":0.0,"landing_m":1.0,"jitter_m":0.005,)"
       R"("noise":"correlated","camera":null,"scan_ms":16.0,"mount_error_deg":1.0,"scale_error":0.003,"params":null,)"
-      R"("estimate_mount":true,"self_filter":true,"contacts":"inferred","pushes":[],"mass_scale":1.0,"torso_offset_x_m":0.0,"friction":0.8,"render_shift_m":[0.0,0.0,0.0],"render_missing_step":2,)"
+      R"("estimate_mount":true,"self_filter":true,"contacts":"inferred","pushes":[],"asked":[],"mass_scale":1.0,"torso_offset_x_m":0.0,"friction":0.8,"render_shift_m":[0.0,0.0,0.0],"render_missing_step":2,)"
       R"("blank_depth":false})");
   EXPECT_EQ(j["execution_error_mm"].dump(), R"({"median":1.23,"max":1.23})");
   EXPECT_EQ(j["odometry_rmse_mm"].dump(), R"({"base":0.0,"lio":null,"fused":0.0})");

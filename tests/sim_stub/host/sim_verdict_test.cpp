@@ -46,6 +46,17 @@ TEST(ClimbVerdict, ModuleStopped_NamesWhatItMeasured) {
   EXPECT_TRUE(std::isnan(s.swing_clearance_min_m));  // nothing swung
 }
 
+TEST(ClimbVerdict, ImuAndLegsDisagree_SaysWhatToSuspect) {
+  ScriptedClimb climb(plain_stairs(2));
+  climb.arming_waits_for = {ArmingWait::For::kGravity, {}, 13};
+  climb.wait(100 * kNsPerMs);
+  const ClimbSummary s = climb.finish();
+  EXPECT_EQ(s.ended_by, "module");
+  EXPECT_EQ(s.reason,
+            "The module did not arm: 13 deg between gravity as the IMU feels it and the soles' normal: suspect the "
+            "IMU's mount (imu.base_rpy_rad, robot.mounts.base_R_imu), then both legs' encoders, then the floor.");
+}
+
 TEST(ClimbVerdict, RunCutShort_SaysSo) {
   ScriptedClimb climb(plain_stairs(2));
   climb.wait(100 * kNsPerMs);
