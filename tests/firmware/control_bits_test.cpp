@@ -199,11 +199,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 7929241141556362587U);
-  EXPECT_EQ(hashes.gait.value(), 6011424594978596109U);
-  EXPECT_EQ(hashes.commands.value(), 1071317256027022085U);
-  EXPECT_EQ(hashes.surfaces.value(), 10216721067913147700U);
-  EXPECT_EQ(hashes.map.value(), 13886859744410203120U);
+  EXPECT_EQ(hashes.estimates.value(), 2103088198764066550U);
+  EXPECT_EQ(hashes.gait.value(), 10717310726543801529U);
+  EXPECT_EQ(hashes.commands.value(), 369878697279598700U);
+  EXPECT_EQ(hashes.surfaces.value(), 11544134129317924097U);
+  EXPECT_EQ(hashes.map.value(), 2383447586187953763U);
 }
 
 }  // namespace
