@@ -350,8 +350,8 @@ void FootholdSearch::erode_row(std::int32_t row) noexcept {
   });
 }
 
-// Sole origin behind the nosing for a foot between two lateral positions: as much to spare at the heel as at the toe,
-// but not deep into a long tread.
+// Sole origin behind the nosing for a foot between two lateral positions: as much to spare at the heel, behind the
+// nosing's round, as at the toe, but not deep into a long tread.
 double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, double right_m) const noexcept {
   const double heel_m = -foot_.contact.heel_x_m;
   const double margin_m = tread.nosing_margin_m;
@@ -373,8 +373,8 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
     const double room_m = *tread.ends.far_m - heel_m - foot_.collision.toe_x_m;
     spare_m = std::min(spare_m, room_m - margin_m - tread.back_margin_m);
   }
-  const double round_m = params_.feet.nosing_round_m;
-  return heel_m + math::clamp(margin_m + 0.5 * (round_m + spare_m), 0.0, params_.feet.heel_inset_max_m);
+  const double round_m = std::min(params_.feet.nosing_round_m, std::max(0.5 * spare_m, 0.0));
+  return heel_m + math::clamp(margin_m + 0.5 * (spare_m + round_m), 0.0, params_.feet.heel_inset_max_m);
 }
 
 Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept {

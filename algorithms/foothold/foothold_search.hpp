@@ -43,7 +43,7 @@ class FootholdSearch {
     double half_spacing_min_m = 0.085;
     double heel_inset_m = 0.014;
     double heel_inset_max_m = 0.030;
-    double nosing_round_m = 0.004;
+    double nosing_round_m = 0.0015;
     double evade_max_m = 0.06;
     std::int32_t spacings = 7;
 

@@ -199,11 +199,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 2103088198764066550U);
-  EXPECT_EQ(hashes.gait.value(), 10717310726543801529U);
-  EXPECT_EQ(hashes.commands.value(), 369878697279598700U);
-  EXPECT_EQ(hashes.surfaces.value(), 11544134129317924097U);
-  EXPECT_EQ(hashes.map.value(), 2383447586187953763U);
+  EXPECT_EQ(hashes.estimates.value(), 8892397807449347857U);
+  EXPECT_EQ(hashes.gait.value(), 408179278714138939U);
+  EXPECT_EQ(hashes.commands.value(), 3526817496724754235U);
+  EXPECT_EQ(hashes.surfaces.value(), 15450768377625595271U);
+  EXPECT_EQ(hashes.map.value(), 17383963159424324668U);
 }
 
 }  // namespace

@@ -71,6 +71,8 @@ MapSnapshot ideal_map(const Stairs& s) {
   return map;
 }
 
+const double kRound_m = FootholdSearch::Params{}.feet.nosing_round_m;  // of each nosing carries no heel
+
 // Both feet on tread `on` (0: the floor, that far before the first riser), robot heading off by yaw.
 FootholdSearch::Query standing(const Stairs& s, int on, double before_m = 0.3, double lateral_m = 0.0,
                                double yaw_rad = 0.0) {
@@ -112,7 +114,7 @@ class FootholdSearchTest : public ::testing::Test {
       EXPECT_GT(heel, 0.005);
       EXPECT_GT(toe, 0.005);
       if (k < s.steps && s.tread_m < 0.3) {
-        EXPECT_NEAR(heel, toe, 1e-6) << "centred";
+        EXPECT_NEAR(heel - kRound_m, toe, 1e-6) << "centred";
       }
       EXPECT_NEAR(f.nosing_distance_m, p.x() - nosing, 1e-9);
       EXPECT_LE(std::abs(p.y()) + kContactRectangle.half_width_m + 0.02, 0.5 * s.width_m + 1e-9);
@@ -484,10 +486,10 @@ TEST_F(FootholdSearchTest, TreadEndsInNothing_ToeStaysOnItAsBeforeARiser) {
   ASSERT_EQ(r.obstruction, StopReason::kNone);
   const double heel_m = r.p_star_feet[0].position_m.x() + kContactRectangle.heel_x_m;
   const double toe_m = s.tread_m - (r.p_star_feet[0].position_m.x() + kCollisionRectangle.toe_x_m);
-  EXPECT_NEAR(heel_m, toe_m, 1e-9);
+  EXPECT_NEAR(heel_m - kRound_m, toe_m, 1e-9);
 }
 
-TEST_F(FootholdSearchTest, BackEdgeNotMapped_HeelGoes14mmBehindTheNosing) {
+TEST_F(FootholdSearchTest, BackEdgeNotMapped_HeelGoes14mmAndHalfItsRoundBehindTheNosing) {
   const Stairs s{};
   MapSnapshot map = ideal_map(s), only;
   only.stamp_ns = kNow_ns;
@@ -497,7 +499,7 @@ TEST_F(FootholdSearchTest, BackEdgeNotMapped_HeelGoes14mmBehindTheNosing) {
   ASSERT_TRUE(only.polygons.try_push_back(map.polygons[0]) && only.polygons.try_push_back(tread));
   const FootholdSet& r = search(only, standing(s, 0));
   ASSERT_EQ(r.obstruction, StopReason::kNone);
-  EXPECT_NEAR(r.p_star_feet[0].position_m.x() + kContactRectangle.heel_x_m, 0.014, 1e-9);
+  EXPECT_NEAR(r.p_star_feet[0].position_m.x() + kContactRectangle.heel_x_m, 0.014 + 0.5 * kRound_m, 1e-9);
   EXPECT_EQ(r.measured_tread_m, 0.0);
   EXPECT_TRUE(std::isinf(r.p_star_feet[0].toe_clearance_m));
   EXPECT_FALSE(r.has_p_star_star);
@@ -628,7 +630,7 @@ TEST_F(FootholdSearchTest, NosingKnownWorseThanTheRiser_FootStandsFartherFromIt)
     const double more_m = 2.0 * (std::hypot(nosing_m, 0.0022) - std::hypot(back_m, 0.0022));
     for (const Foothold& foot : r.p_star_feet) {
       const double heel_m = foot.nosing_distance_m + kContactRectangle.heel_x_m;
-      EXPECT_NEAR(heel_m - foot.toe_clearance_m, more_m, 1e-9);
+      EXPECT_NEAR(heel_m - kRound_m - foot.toe_clearance_m, more_m, 1e-9);
     }
   }
 }

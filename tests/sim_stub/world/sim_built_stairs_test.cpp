@@ -118,11 +118,12 @@ TEST(BuiltStairs, TreadTurnedAway_LeavesLessMarginAtOneCornerOfTheSole) {
   EXPECT_NEAR(sole_margin_m(before, world, 1), 0.02 * std::cos(yaw_rad) - (0.1 + inner_m) * std::sin(yaw_rad), 1e-9);
 }
 
-TEST(BuiltStairs, WornNosing_CarriesFromWhereItIsFlatAndIsClearedByItsRound) {
+TEST(BuiltStairs, WornNosing_CarriesFromWhereItHasFallenByAMillimetreAndIsClearedByItsRound) {
   constexpr double kWorn_m = 0.012;
   const StairWorld world = make_stairs(kDrawing, 2, {.worn_nosing_m = kWorn_m});
   const double heel_m = -kContactRectangle.heel_x_m;
-  EXPECT_NEAR(sole_margin_m(on_tread(world.steps[2], heel_m + 0.02, 0.1), world, 2), 0.02 - kWorn_m, 1e-9);
+  EXPECT_NEAR(sole_margin_m(on_tread(world.steps[2], heel_m + 0.02, 0.1), world, 2),
+              0.02 - kWorn_m + std::sqrt(math::square(kWorn_m) - math::square(kWorn_m - 0.001)), 1e-9);
   // A corner at 45 degrees before the edge: the round is nearer to it than the edge was far.
   const std::vector<SolidBox> solids = stair_solids(world);
   constexpr double kHalf_m = 0.01, kGap_m = 0.004;
