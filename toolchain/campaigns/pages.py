@@ -4,10 +4,10 @@ import hashlib
 import json
 import re
 
-from campaigns import buses, climbs, cost, estimation, mute, perception
+from campaigns import buses, climbs, cost, estimation, mute, perception, reality
 from campaigns.engine import ROOT, code_hash, commit
 
-TABLES = {**climbs.TABLES, **buses.TABLES, **mute.TABLES, **perception.TABLES, **estimation.TABLES, **cost.TABLES}
+TABLES = {**climbs.TABLES, **buses.TABLES, **mute.TABLES, **reality.TABLES, **perception.TABLES, **estimation.TABLES, **cost.TABLES}
 MEASURED = ROOT / "docs/measured"
 FIGURES = MEASURED / "headline.json"
 STALE = "**Stale: the code has changed since this was measured.**"
