@@ -108,7 +108,6 @@ bool ControlLane::is_sound(std::int64_t now_ns) const noexcept {
 void ControlLane::sense_imu(std::int64_t now_ns) noexcept {
   if (read_imu(ports_.imu, now_ns, estimator_)) {
     imu_came_ns_ = now_ns;
-    if (!gait_.armed()) start_.stance.add_accel(estimator_.base_accel_mps2());
     return;
   }
   const std::int64_t silent_ns = now_ns - std::max(estimator_.newest_imu_ns(), imu_came_ns_);
@@ -139,7 +138,8 @@ void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept
     note_out_of_range(JointSet::of_bits(outside.bits() & ~late.bits()), now_ns);
   }
   const std::int64_t imu_ns = estimator_.newest_imu_ns();
-  start_.imu_speaks = imu_ns != 0 && now_ns - imu_ns <= params_.gait.steer_age_ns;
+  const bool hears_imu = imu_ns != 0 && now_ns - imu_ns <= params_.gait.steer_age_ns;
+  start_.imu_speaks = hears_imu && estimator_.resting_accel().is_settled();
   if (now_ns - start_.first_ns >= kArmingTimeout_ns) note_silent_drives(start_.silent, now_ns);
   if (!late.is_empty() || !drives_.bus.drive_errors.is_empty() || !drives_.out_of_range.is_empty()) return;
   if (drives_.bus.feet_silent) return;
@@ -150,13 +150,17 @@ void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept
 // A robot that balances by another gravity than the true one falls with its first step, or before.
 bool ControlLane::check_stance(const JointVector& q_rad, std::int64_t now_ns) noexcept {
   using For = ArmingWait::For;
-  const auto [soles_rad, gravity_rad] = start_.stance.leans(params_.robot.legs, q_rad);
+  const auto [soles_rad, gravity_rad] = StanceCheck::leans(params_.robot.legs, q_rad, estimator_.resting_accel().mean_mps2());
   const auto wait_for = [](For what, double lean_rad) {
     return ArmingWait{what, {}, static_cast<std::uint16_t>(lean_rad * 180.0 / kPi + 0.5)};
   };
   start_.disagreement = {};
   if (!(gravity_rad <= params_.stance.most_gravity_rad)) start_.disagreement = wait_for(For::kGravity, gravity_rad);
   if (!(soles_rad <= params_.stance.most_soles_rad)) start_.disagreement = wait_for(For::kSoles, soles_rad);
+  const double felt_mps2 = estimator_.resting_accel().mean_mps2().norm();
+  if (!(std::abs(felt_mps2 - kGravity_mps2) <= params_.stance.most_strength_mps2)) {
+    start_.disagreement = wait_for(For::kStrength, 0.0);
+  }
   const bool agrees = start_.disagreement.what == For::kNothing;
   const bool is_named = !agrees && now_ns - start_.first_ns >= kArmingTimeout_ns;
   if (is_named && !start_.disagreement_named) {
@@ -246,13 +250,13 @@ Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
 Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   if (!estimator_.leg_sensing().any()) {
     command_ = {};
-    command_.stamp_ns = now_ns;
+    if (!listens(now_ns)) command_.stamp_ns = now_ns;
     return Progress::kDone;
   }
   gait_.allow_steps(supervisor_.may_step());
   gait_.tick(now_ns, estimator_.state(), footholds(), estimator_.leg_sensing().joints(), command_);
   const StateEstimate& state = estimator_.state();
-  if (state.initialised && now_ns - estimator_.newest_imu_ns() <= params_.gait.steer_age_ns) {
+  if (gait_.armed() && now_ns - estimator_.newest_imu_ns() <= params_.gait.steer_age_ns) {
     supervisor_.watch_lean(params_.supervisor, state.odom_T_base.R);
   }
   if (supervisor_.has_fallen()) damp_joints(now_ns);
@@ -279,7 +283,15 @@ void ControlLane::damp_joints(std::int64_t now_ns) noexcept {
   }
 }
 
+// A drive that is asked for feedback with a command without gains lets go of what another controller had it hold. So
+// nobody is asked until the IMU was listened to; one that is silent is not waited for.
+bool ControlLane::listens(std::int64_t now_ns) const noexcept {
+  return !gait_.armed() && supervisor_.may_arm() && !estimator_.resting_accel().is_settled() &&
+         now_ns - start_.first_ns < kArmingTimeout_ns;
+}
+
 Progress ControlLane::command(std::int64_t now_ns) noexcept {
+  if (command_.stamp_ns == 0) return Progress::kDone;
   bool taken = false;  // a drive that is sent nothing keeps its last command, whoever refused
   if (all_finite(command_)) {
     taken = ports_.joints.try_write(command_).is_all();

@@ -76,6 +76,7 @@ class ControlLane {
   void report_lidar(std::int64_t now_ns) noexcept;
   void report_rejections(std::int64_t now_ns) noexcept;
   void report_gait(std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool listens(std::int64_t now_ns) const noexcept;
   // Of a robot that falls: no stiffness, no torque, and the drives' own damping.
   void damp_joints(std::int64_t now_ns) noexcept;
   void hand_over_touch_down() noexcept;
@@ -106,7 +107,6 @@ class ControlLane {
     std::int64_t answered_ns = -1;      // when a drive answered last
     JointSet silent = JointSet::all();  // drives, never heard or silent for too long since
     bool imu_speaks = false;
-    StanceCheck stance;
     ArmingWait disagreement;  // of IMU and legs
     bool disagreement_named = false;
   };

@@ -40,7 +40,7 @@ namespace polygmap {
   X(23, kSolesDisagree, "soles_disagree",                                                                            \
     "While arming, the soles were not parallel by the encoders: a zero or a sign is wrong, or a foot hangs.")        \
   X(24, kGravityDisagrees, "gravity_disagrees",                                                                      \
-    "While arming, the IMU felt gravity elsewhere than the soles have it: its mount is not as configured.")          \
+    "While arming, the IMU felt gravity elsewhere than the soles have it, or not as strong: its mount or its unit.") \
   X(30, kDriveSilent, "drive_silent", "A drive was silent for more than five cycles; telemetry says which joint's.") \
   X(31, kDriveError, "drive_error", "A drive told of an error, or left its motor mode.")                             \
   X(32, kBusOff, "bus_off", "A CAN controller left its bus.")                                                        \

@@ -25,6 +25,7 @@ struct ArmingWait {
     kRange,    // joints outside it
     kImu,
     kFeet,
+    kStrength,  // of gravity, as the IMU feels it
     kSoles,    // to be parallel by the encoders
     kGravity,  // to be where the soles have it
   };
@@ -36,13 +37,14 @@ struct ArmingWait {
 };
 // Joints or degrees go before or after it.
 [[nodiscard]] constexpr std::string_view text_of(ArmingWait::For what) noexcept {
-  constexpr std::array<std::string_view, 8> kTexts{
+  constexpr std::array<std::string_view, 9> kTexts{
       "",
       "no answer yet from",
       "in error:",
       "out of range:",
-      "no IMU sample",
+      "too few IMU samples",
       "no forces of the feet",
+      "gravity that the IMU feels is not 9.81 m/s^2: suspect its unit, or an axis that is dead",
       "deg between the soles' normals by the encoders: suspect an encoder's zero or sign, or a foot that does not "
       "stand",
       "deg between gravity as the IMU feels it and the soles' normal: suspect the IMU's mount (imu.base_rpy_rad, "

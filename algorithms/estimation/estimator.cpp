@@ -13,6 +13,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   contacts_.reset(params.contacts);
   leg_sensing_.reset(params.legs, robot);
   imu_noise_.reset(params.imu_noise);
+  resting_accel_.reset(params.rest_ns);
   odometry_.reset(params, robot);
   ring_.clear();
   state_ = {};
@@ -104,6 +105,7 @@ void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
   imu_noise_.update(imu.stamp_ns, imu.gyro_radps, imu.accel_mps2);
   const ImuSample before = imu_.newest;
   imu_.newest = {imu.stamp_ns, robot_->mounts.base_R_imu * imu.gyro_radps, robot_->mounts.base_R_imu * imu.accel_mps2};
+  if (!known_.has_run) resting_accel_.add(imu_.newest.stamp_ns, imu_.newest.accel_mps2);
   ImuSample since = imu_.newest;
   if (params_.imu_of_moments && imu_.any) {
     since.gyro_radps = 0.5 * (before.gyro_radps + since.gyro_radps);
@@ -194,7 +196,12 @@ bool Estimator::try_begin() noexcept {
 
   // Origin: the floor under the base as it stood first, the soles at z = 0 in the mean.
   Transform& odom_T_base = origin_.odom_T_base;
-  odom_T_base = {collecting ? standstill_.odom_R_base() : level_attitude(imu_.mean.accel_mps2), Vec3::Zero()};
+  odom_T_base.p_m.setZero();
+  if (!known_.has_run) {
+    odom_T_base.R = level_attitude(resting_accel_.mean_mps2());
+  } else {
+    odom_T_base.R = collecting ? standstill_.odom_R_base() : level_attitude(imu_.mean.accel_mps2);
+  }
   if (known_.runs) {
     odom_T_base.R = rotation_z(yaw_of(state_.odom_T_base.R)) * odom_T_base.R;
     odom_T_base.p_m.head<2>() = state_.odom_T_base.p_m.head<2>();
@@ -217,14 +224,16 @@ bool Estimator::try_begin() noexcept {
     return true;
   }
   // To balance by, until it has stood still for long enough.
-  start.odom_v_base_mps = odom_T_base.R * base_v_base_mps(legs);
-  start.tilt_sigma_rad = params_.first_tilt_sigma_rad;
+  const bool rested = !known_.has_run && resting_accel_.is_settled();
+  if (!rested) start.odom_v_base_mps = odom_T_base.R * base_v_base_mps(legs);
+  start.tilt_sigma_rad = rested ? params_.rested_tilt_sigma_rad : params_.first_tilt_sigma_rad;
   start.velocity_sigma_mps = params_.first_velocity_sigma_mps;
   start.gyro_bias_sigma_radps = params_.first_gyro_bias_sigma_radps;
   odometry_.initialise(start, true, legs, params_.max_step_s);
   stood_ns_ = newest_input_ns();
   known_.begun = true;
   known_.runs = stood_[0] && stood_[1];
+  known_.has_run = known_.has_run || known_.runs;
   return true;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "algorithms/estimation/calibration/resting_accel.hpp"
 #include "algorithms/estimation/calibration/standstill.hpp"
 #include "algorithms/estimation/leg_sensing.hpp"
 #include "algorithms/estimation/proprioceptive_odometry.hpp"
@@ -26,6 +27,8 @@ class Estimator {
     double max_height_error_m = 0.03;
     double floor_sigma_m = 0.003;
     double first_tilt_sigma_rad = 0.015;
+    std::int64_t rest_ns = 100 * kNsPerMs;
+    double rested_tilt_sigma_rad = 0.006;
     double first_velocity_sigma_mps = 0.02;
     double first_gyro_bias_sigma_radps = 0.005;
     ImuNoise::Params imu_noise;
@@ -43,7 +46,10 @@ class Estimator {
             "A tread's height this far from the sole on it is refused.");
       field("floor_sigma_m", p.floor_sigma_m, 1e-5, 1.0, "Height of the floor under the feet at the start.");
       field("first_tilt_sigma_rad", p.first_tilt_sigma_rad, 1e-4, 0.2,
-            "Tilt as the first accelerations tell it: they have a bias, and the robot sways.");
+            "Tilt as a single acceleration tells it.");
+      field("rest_ns", p.rest_ns, 0, kNsPerS, "The IMU is listened to for so long before anything is commanded.");
+      field("rested_tilt_sigma_rad", p.rested_tilt_sigma_rad, 1e-4, 0.2,
+            "Tilt as the mean over `rest_ns` tells it: the accelerometer has a bias.");
       field("first_velocity_sigma_mps", p.first_velocity_sigma_mps, 1e-3, 1.0, "Velocity as the first legs tell it.");
       field("first_gyro_bias_sigma_radps", p.first_gyro_bias_sigma_radps, 1e-5, 0.1,
             "Bias of the gyro, of which nothing is known before the standstill.");
@@ -89,8 +95,8 @@ class Estimator {
   [[nodiscard]] const StateEstimate& state() const noexcept { return state_; }
   [[nodiscard]] const LegSensing& leg_sensing() const noexcept { return leg_sensing_; }
   [[nodiscard]] std::int64_t newest_imu_ns() const noexcept { return imu_.newest.stamp_ns; }  // accepted; 0: none yet
-  // The mean of the samples that came with the newest one's cycle, in base axes.
-  [[nodiscard]] const Vec3& base_accel_mps2() const noexcept { return imu_.mean.accel_mps2; }
+  // Until the filters begin; it is what they begin with.
+  [[nodiscard]] const RestingAccel& resting_accel() const noexcept { return resting_accel_; }
   // The state at a stamp of the last half second. False, and out untouched, outside, before initialisation, and where a
   // sensor was silent for longer than max_step_s.
   [[nodiscard]] bool try_state_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {
@@ -134,6 +140,7 @@ class Estimator {
   const RobotModel* robot_ = nullptr;
   Counters counters_;
   LegSensing leg_sensing_;
+  RestingAccel resting_accel_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;
   ImuNoise imu_noise_;
@@ -146,7 +153,8 @@ class Estimator {
   struct {
     bool ticked = false;
     bool begun = false;  // the filters have a state,
-    bool runs = false;   // and carry it on, though the standstill is not over
+    bool runs = false;   // and carry it on, though the standstill is not over,
+    bool has_run = false;  // or did so before
   } known_;
   ProprioceptiveOdometry::Ground ground_;
   std::array<bool, kFootCount> stood_{};

@@ -13,6 +13,12 @@ bool finite(const StateEstimate& s) noexcept {
          math::all_finite(s.odom_v_base_mps) && math::all_finite(s.base_w_base_radps);
 }
 
+// By how much the soles are turned against each other from where they were then.
+double soles_turned_rad(const StateEstimate& state, const Mat3& left_R_right_then) noexcept {
+  const Mat3 R = state.odom_T_sole[0].R.transpose() * state.odom_T_sole[1].R * left_R_right_then.transpose();
+  return 0.5 * Vec3{R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1)}.norm();
+}
+
 }  // namespace
 
 void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
@@ -36,6 +42,8 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
 bool Gait::try_arm(const JointFeedback& feedback) noexcept {
   if (!joints_.try_arm(*robot_, params_.joints, feedback.q_rad)) return false;
   plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m(), params_.bias_time_s);
+  memory_.left_R_right_met = joints_.base_T_sole_reference(Foot::kLeft).R.transpose() *
+                             joints_.base_T_sole_reference(Foot::kRight).R;
   return true;
 }
 
@@ -45,13 +53,20 @@ bool Gait::try_restart(const JointVector& q_rad) noexcept {
   if (!math::all_finite(off_rad) || off_rad.maxCoeff() > kMostOff_rad) return false;
   stop_requested_ = StopReason::kNone;
   leg_impaired_ = lost_in_swing_ = false;
-  memory_ = {.toes_calibrated = memory_.toes_calibrated};
+  memory_ = {.toes_calibrated = memory_.toes_calibrated, .left_R_right_met = memory_.left_R_right_met, .soft_ground = memory_.soft_ground};
   planner_.restart();
   status_.phase = GaitPhase::kStandstill;
   status_.stop_reason = StopReason::kNone;
   status_.stop_measured_m = 0.0;
   restarts_ = started_;
   return true;
+}
+
+// Flat soles on firm ground turn against each other by what encoders, play and a compliant sole miss.
+void Gait::judge_ground(const StateEstimate& state) noexcept {
+  if (status_.step.sequence != 0 || memory_.soft_ground) return;
+  memory_.soft_ground = soles_turned_rad(state, memory_.left_R_right_met) > params_.soft_ground_rad;
+  if (memory_.soft_ground) request_stop(StopReason::kGroundSoft);
 }
 
 // It balances as it was met: joints, and the centre of mass over the soles. Until the estimate is calibrated nothing
@@ -86,7 +101,8 @@ void Gait::observe_links() noexcept {
 
 void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback, bool usable,
                        JointCommand& command) noexcept {
-  const Balance::Reference reference{plan_.com(), link_acceleration_, plan_.plan_T_sole(), status_.stands};
+  const Balance::Reference reference{plan_.com(), link_acceleration_, plan_.plan_T_sole(), status_.stands,
+                                     memory_.soft_ground};
   // Blind, it feeds forward to where the plan has itself, and as fast: at rest it would brake.
   const TorsoTrajectory::State& torso = plan_.torso();
   const Vec3 plan_v_base_mps{torso[0].speed, torso[1].speed, torso[2].speed};
@@ -187,6 +203,7 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   const bool usable = known && age_ns <= params_.steer_age_ns;
   const bool mute = known && !usable && now_ns - state.heard_ns <= params_.steer_age_ns;
   const bool lost = age_ns > params_.stop_age_ns;
+  if (usable) judge_ground(state);
   leg_impaired_ = leg_impaired_ || (started_ && lost && mute);
   lost_in_swing_ = lost_in_swing_ || (lost && status_.phase == GaitPhase::kSwing);
   const GaitInput in{now_ns,

@@ -48,6 +48,7 @@ class Gait {
   [[nodiscard]] GaitShared shared() noexcept { return {*robot_, params_, plan_, planner_, memory_, status_}; }
   // Without one good reading the drives get no stiffness: there is nothing safe to ask of them.
   [[nodiscard]] bool try_arm(const JointFeedback& feedback) noexcept;
+  void judge_ground(const StateEstimate& state) noexcept;
   void hold_upright(const GaitInput& in, JointCommand& command) noexcept;
   void advance(const GaitInput& in) noexcept;
   [[nodiscard]] Transition tick_state(const GaitInput& in, GaitShared& gait) noexcept;

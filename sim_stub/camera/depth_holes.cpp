@@ -28,7 +28,8 @@ bool DepthHoles::is_sunlit(const Vec3& point_m) const {
 }
 
 bool DepthHoles::is_lost(const Tread& tread, const Vec3& step_p_m, std::uint64_t frame, int u, int v) const {
-  if (step_p_m.x() < tread.step.edge_x_m() + errors_.nosing_strip_m) return errors_.nosing_strip_m > 0.0;
+  const bool on_strip = step_p_m.x() < tread.step.edge_x_m() + errors_.nosing_strip_m;
+  if (on_strip && errors_.nosing_strip_m > 0.0) return true;
   if (!tread.holed) return false;
   const auto drawn = [this](std::uint64_t a, std::uint64_t b, std::uint64_t c) {
     return noise_.uniform(mix64(mix64(mix64(a + 1) ^ b) ^ c));

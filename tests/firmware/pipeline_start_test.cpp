@@ -223,6 +223,24 @@ TEST_F(ArmingTest, ImuIsTurned_IsNamedAndHoldsTheGainsBackUntilItIsNot) {
   EXPECT_EQ(count(Fault::kGravityDisagrees), 1U);
 }
 
+// In units of g, with an axis that is dead, and all of them.
+TEST_F(ArmingTest, ImuFeelsAnotherGravity_IsNamedAndHoldsTheGainsBack) {
+  for (const double share : {1.0 / kGravity_mps2, 0.0, 0.9, 1.1}) {
+    for (int i = 0; i < 300; ++i) {
+      clock_.advance_ns(kCycle_ns);
+      ImuSample imu = imu_at(clock_.now_ns());
+      imu.accel_mps2 *= share;
+      const JointFeedback joints = joints_at(clock_.now_ns());
+      tick_with(&imu, &joints);
+      ASSERT_EQ(control().module_state(), ModuleState::kArming) << share;
+    }
+    EXPECT_EQ(control().arming_waits_for(), (ArmingWait{ArmingWait::For::kStrength, {}})) << share;
+    EXPECT_EQ(count(Fault::kGravityDisagrees), 1U);
+  }
+  stand(1);
+  EXPECT_TRUE(is_running(control().module_state()));
+}
+
 TEST_F(ArmingTest, EncoderOfOneLegIsWrong_IsNamedAndHoldsTheGainsBackUntilItIsNot) {
   const auto stand_with_ankle = [this](double off_rad, int ticks) {
     for (int i = 0; i < ticks; ++i) {

@@ -15,7 +15,12 @@ namespace polygmap::test {
 class StandingModule : public testing::Test {
  protected:
   explicit StandingModule(const Params& params = {}, hal::OperatorInput* operator_input = nullptr)
-      : camera_(robot_camera_intrinsics()), module_({camera_, imu_, joints_, lidar_, operator_input}, params, clock_) {}
+      : camera_(robot_camera_intrinsics()), module_({camera_, imu_, joints_, lidar_, operator_input}, arming_at_once(params), clock_) {}
+  // What it is to do next is not the tenth of a second that it listens for.
+  [[nodiscard]] static Params arming_at_once(Params params) {
+    params.estimator.rest_ns = 0;
+    return params;
+  }
 
   [[nodiscard]] ImuSample imu_at(std::int64_t stamp_ns) const {
     return {stamp_ns, Vec3::Zero(), Vec3{0, 0, kGravity_mps2}};

@@ -48,6 +48,7 @@ enum class StopReason : std::uint8_t {
   kNotLinedUp,     // so many steps on the floor, and it does not stand straight before the stairs
   kGroundMissing,  // no ground where the foot came down: it was put back where it had stood
   kToppling,       // one foot after the other went back to where it had stood, since the body toppled towards it
+  kGroundSoft,     // its soles turned against each other where it stood
   kStateStale,     // IMU or joint feedback fell silent
   // Asked of the gait by the module, or of the module by its operator; the foot in the air comes down first.
   kOperator,
@@ -78,6 +79,7 @@ inline constexpr std::array kStopReasonTable{
     StopReasonInfo{"not_lined_up", "it did not come to stand straight before the stairs"},
     StopReasonInfo{"ground_missing", "there was no ground where a foot came down, and it put the foot back"},
     StopReasonInfo{"toppling", "its body kept toppling towards the foot it lifted, and it put every one back"},
+    StopReasonInfo{"ground_soft", "the ground gave way under its soles where it stood"},
     StopReasonInfo{"state_stale", "its IMU or its joints fell silent"},
     StopReasonInfo{"operator", "it was asked to"},
     StopReasonInfo{"drive_error", "a drive told of an error"},

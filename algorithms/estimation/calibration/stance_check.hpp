@@ -3,8 +3,6 @@
 // their normal points where the IMU feels up. An IMU that is turned about the vertical is not noticed.
 #pragma once
 
-#include <algorithm>
-
 #include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
@@ -17,6 +15,7 @@ class StanceCheck {
   struct Params {
     double most_soles_rad = 0.06;
     double most_gravity_rad = 0.07;
+    double most_strength_mps2 = 0.5;
 
     static void visit(auto& p, auto& field) {
       // 4.5 sigma where all errors are twice as large, 44 mrad, and a floor that is 1 deg steeper under one foot.
@@ -26,6 +25,8 @@ class StanceCheck {
       // deg.
       field("most_gravity_rad", p.most_gravity_rad, 0.01, 3.2,
             "Arming: gravity is no farther from the soles' mean normal, or the IMU's mount is not as configured.");
+      field("most_strength_mps2", p.most_strength_mps2, 0.01, 10.0,
+            "Arming: the IMU feels gravity as strong as it is to within this, ten times what a bias may be.");
     }
   };
   // Angles, 0 to pi.
@@ -34,18 +35,9 @@ class StanceCheck {
     double gravity_rad = 0.0;  // between what the IMU feels and the mean of those
   };
 
-  // In base axes, once for each cycle with a sample: the mean of a tenth of a second counts, and of the first sample
-  // until there are more.
-  void add_accel(const Vec3& base_accel_mps2) noexcept {
-    constexpr double kMean_samples = 50.0;
-    samples_ = std::min(samples_ + 1.0, kMean_samples);
-    base_accel_mps2_ += (base_accel_mps2 - base_accel_mps2_) / samples_;
-  }
-  [[nodiscard]] Leans leans(const LegGeometry& legs, const JointVector& q_rad) const noexcept;
-
- private:
-  double samples_ = 0.0;
-  Vec3 base_accel_mps2_ = Vec3::Zero();
+  // base_accel_mps2: the mean of some time at rest.
+  [[nodiscard]] static Leans leans(const LegGeometry& legs, const JointVector& q_rad,
+                                   const Vec3& base_accel_mps2) noexcept;
 };
 
 }  // namespace polygmap

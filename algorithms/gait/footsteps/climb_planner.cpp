@@ -83,10 +83,11 @@ ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
   goal.foothold = same_tread ? seen : memory_.trailing_foothold;
   goal.target = sole_on(goal.foothold);
   if (situation.stamp_ns - goal.foothold.last_seen_ns <= params_.remembered_ns) return decision;
-  // Odometry has wandered since, but not from the foot that stands there.
-  goal.target = sole_beside(situation.soles[index_of(memory_.leading)], goal.foot, robot_->stance.half_width_m);
-  goal.foothold = foothold_at(goal.target, 0);
-  goal.foothold.polygon_id = tread_id_;
+  // Odometry has wandered since, but not from the foot that stands there: as far from it as the two footholds were.
+  goal.foothold = memory_.trailing_foothold;
+  goal.foothold.last_seen_ns = 0;
+  goal.foothold.position_m = situation.soles[index_of(memory_.leading)].position_m + memory_.odom_trailing_m;
+  goal.target = sole_on(goal.foothold);
   return decision;
 }
 
@@ -274,6 +275,7 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
     memory_.leading = decision.goal.foot;
     memory_.has_leading = true;
     memory_.trailing_foothold = decision.trailing.foothold;
+    memory_.odom_trailing_m = decision.trailing.foothold.position_m - decision.goal.target.position_m;
   }
 }
 

@@ -75,8 +75,8 @@ class ClimbPlanner {
       field("min_rise_m", p.min_rise_m, 0.001, 0.039, "Delta_foot: a tread that is not higher is already underfoot.");
       field("max_map_age_ns", p.max_map_age_ns, 1000000, 10000000000, "An older map is no reason to step.");
       field("remembered_ns", p.remembered_ns, 1000000, 100000000000,
-            "After a longer pause between two treads the rear foot goes beside the other one, wherever its foothold "
-            "was.");
+            "After a longer pause between two treads the rear foot goes as far beside the other one as its foothold "
+            "was beside that one's, wherever odometry has both.");
       field("correction_m", p.correction_m, 0.0, 0.5, "A shorter step on the floor only corrects.");
       field("turn_round", p.turn_round, 1.0, 100.0,
             "The other foot leads than the one that was to only for a displacement beyond this times the dead bands.");
@@ -155,6 +155,7 @@ class ClimbPlanner {
   // What a latch changes, and what it was before.
   struct Memory {
     Foothold trailing_foothold;  // from the leading latch
+    Vec3 odom_trailing_m = Vec3::Zero();  // from the leading foot's target to it
     Foot last_swing = Foot::kRight;
     Foot leading = Foot::kLeft;
     bool has_leading = false;

@@ -197,6 +197,7 @@ struct GaitParams {
   LandedFootParams landed_foot;
   HeldBodyParams held_body;
   double steady_m = 0.015;
+  double soft_ground_rad = 0.025;
   double correction_time_s = 0.03;
   double bias_time_s = 0.1;
   std::int64_t steer_age_ns = 20 * kNsPerMs;
@@ -214,6 +215,8 @@ struct GaitParams {
     field("landed_foot", p.landed_foot);
     field("held_body", p.held_body);
     field("steady_m", p.steady_m, 0.001, 0.5, "No foot lifts when the divergent component's error is larger.");
+    field("soft_ground_rad", p.soft_ground_rad, 0.001, 1.0,
+          "No step is begun where the soles turned against each other by more since they were met.");
     field("correction_time_s", p.correction_time_s, 0.002, 2.0,
           "Time constant of the low-pass of the base's difference to the plan.");
     field("bias_time_s", p.bias_time_s, 0.002, 10.0,

@@ -41,7 +41,7 @@ struct SwingShape {
     field("landing_begin", p.landing_begin, 0.05, 0.99, "The way down begins.");
     field("short_m", p.short_m, 0.0, 0.05,
           "The last part of the way ahead, which the foot goes on the way down: it comes 2 mm too far by its inertia, "
-          "3 at most.");
+          "up to 4 on slack drives.");
     field("short_begin", p.short_begin, 0.0, 0.95, "That last part begins.");
     field("short_end", p.short_end, 0.05, 1.0, "That last part ends.");
     field.ordered("short_begin", "short_end");

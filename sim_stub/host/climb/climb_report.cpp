@@ -58,6 +58,9 @@ void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
     ending_.fall_reason = truth.fall_reason;
   }
   ending_.arming_waits_for = telemetry.arming_waits_for;
+  ending_.phase = telemetry.gait.phase;
+  ending_.stop_reason = telemetry.gait.stop_reason;
+  ending_.stop_measured_m = telemetry.gait.stop_measured_m;
   odometry_.observe(truth, telemetry.state, telemetry.gait.phase);
   if (odometry_.aligned()) {
     observe_surfaces(telemetry.surfaces);
@@ -114,9 +117,6 @@ void ClimbReport::observe_map(const Telemetry& telemetry) {
 void ClimbReport::observe_footsteps(const Truth& truth, const Telemetry& telemetry) {
   const GaitStatus& gait = telemetry.gait;
   const LatchedStep& step = gait.step;
-  ending_.phase = gait.phase;
-  ending_.stop_reason = gait.stop_reason;
-  ending_.stop_measured_m = gait.stop_measured_m;
   if (step.sequence == 0) return;
 
   if (footsteps_.empty() || footsteps_.back().sequence != step.sequence) {

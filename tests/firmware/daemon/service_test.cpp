@@ -589,7 +589,7 @@ TEST(StatusTest, Arming_SaysWhatItWaitsFor) {
   EXPECT_EQ(status_of({For::kAnswers, two}), "arming, no answer yet from left_hip_roll, left_knee");
   EXPECT_EQ(status_of({For::kErrors, two}), "arming, in error: left_hip_roll, left_knee");
   EXPECT_EQ(status_of({For::kRange, two}), "arming, out of range: left_hip_roll, left_knee");
-  EXPECT_EQ(status_of({For::kImu, {}}), "arming, no IMU sample");
+  EXPECT_EQ(status_of({For::kImu, {}}), "arming, too few IMU samples");
   EXPECT_EQ(status_of({For::kFeet, {}}), "arming, no forces of the feet");
   EXPECT_EQ(status_of({For::kSoles, {}, 12}),
             "arming, 12 deg between the soles' normals by the encoders: suspect an encoder's zero or sign, or a foot "
