@@ -62,9 +62,9 @@ bool Gait::try_restart(const JointVector& q_rad) noexcept {
   return true;
 }
 
-// Flat soles on firm ground turn against each other by what encoders, play and a compliant sole miss.
+// Flat soles on firm ground turn against each other by what encoders, play and a compliant sole miss. Judged while
+// nothing else moves: until the standstill is over.
 void Gait::judge_ground(const StateEstimate& state) noexcept {
-  if (status_.step.sequence != 0 || memory_.soft_ground) return;
   memory_.soft_ground = soles_turned_rad(state, memory_.left_R_right_met) > params_.soft_ground_rad;
   if (memory_.soft_ground) request_stop(StopReason::kGroundSoft);
 }
@@ -80,6 +80,7 @@ void Gait::hold_upright(const GaitInput& in, JointCommand& command) noexcept {
   plan_.place(joints_, plan_.plan_T_base());
   add_torques(in.state, in.feedback, in.usable || in.mute, command);
   if (status_.phase == GaitPhase::kStopped) return;
+  if (in.usable) judge_ground(in.state);
   const bool asked = in.stop_requested != StopReason::kNone;
   if (asked || in.lost) {
     status_.phase = GaitPhase::kStopped;
@@ -203,7 +204,6 @@ void Gait::tick(std::int64_t now_ns, const StateEstimate& state, const FootholdS
   const bool usable = known && age_ns <= params_.steer_age_ns;
   const bool mute = known && !usable && now_ns - state.heard_ns <= params_.steer_age_ns;
   const bool lost = age_ns > params_.stop_age_ns;
-  if (usable) judge_ground(state);
   leg_impaired_ = leg_impaired_ || (started_ && lost && mute);
   lost_in_swing_ = lost_in_swing_ || (lost && status_.phase == GaitPhase::kSwing);
   const GaitInput in{now_ns,

@@ -23,6 +23,7 @@ class BusModuleTest : public testing::TestWithParam<const char*> {
     const config::BusFile file = config::read_bus(std::string(POLYGMAP_BUSES) + "/" + GetParam() + ".toml");
     Params params;
     params.gait.standing.start_patience_ticks = 100000;  // it waits for stairs
+    params.estimator.rest_ns = 0;                        // nor does it listen before it asks the drives
     config::limit_by_drives(file, params.robot);
     bus_ = std::make_unique<BusRobot>(*robot_, file, nullptr);
     pipeline_ = std::make_unique<Pipeline>(Ports{*robot_, *robot_, bus_->joints(), *robot_}, params);
