@@ -150,7 +150,8 @@ void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept
 // A robot that balances by another gravity than the true one falls with its first step, or before.
 bool ControlLane::check_stance(const JointVector& q_rad, std::int64_t now_ns) noexcept {
   using For = ArmingWait::For;
-  const auto [soles_rad, gravity_rad] = StanceCheck::leans(params_.robot.legs, q_rad, estimator_.resting_accel().mean_mps2());
+  const auto [soles_rad, gravity_rad] =
+      StanceCheck::leans(params_.robot.legs, q_rad, estimator_.resting_accel().mean_mps2());
   const auto wait_for = [](For what, double lean_rad) {
     return ArmingWait{what, {}, static_cast<std::uint16_t>(lean_rad * 180.0 / kPi + 0.5)};
   };

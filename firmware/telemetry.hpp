@@ -26,8 +26,8 @@ struct ArmingWait {
     kImu,
     kFeet,
     kStrength,  // of gravity, as the IMU feels it
-    kSoles,    // to be parallel by the encoders
-    kGravity,  // to be where the soles have it
+    kSoles,     // to be parallel by the encoders
+    kGravity,   // to be where the soles have it
   };
   For what = For::kNothing;
   JointSet joints;             // whose

@@ -45,8 +45,7 @@ class Estimator {
       field("max_height_error_m", p.max_height_error_m, 0.001, 1.0,
             "A tread's height this far from the sole on it is refused.");
       field("floor_sigma_m", p.floor_sigma_m, 1e-5, 1.0, "Height of the floor under the feet at the start.");
-      field("first_tilt_sigma_rad", p.first_tilt_sigma_rad, 1e-4, 0.2,
-            "Tilt as a single acceleration tells it.");
+      field("first_tilt_sigma_rad", p.first_tilt_sigma_rad, 1e-4, 0.2, "Tilt as a single acceleration tells it.");
       field("rest_ns", p.rest_ns, 0, kNsPerS, "The IMU is listened to for so long before anything is commanded.");
       field("rested_tilt_sigma_rad", p.rested_tilt_sigma_rad, 1e-4, 0.2,
             "Tilt as the mean over `rest_ns` tells it: the accelerometer has a bias.");
@@ -152,8 +151,8 @@ class Estimator {
   Legs legs_;
   struct {
     bool ticked = false;
-    bool begun = false;  // the filters have a state,
-    bool runs = false;   // and carry it on, though the standstill is not over,
+    bool begun = false;    // the filters have a state,
+    bool runs = false;     // and carry it on, though the standstill is not over,
     bool has_run = false;  // or did so before
   } known_;
   ProprioceptiveOdometry::Ground ground_;

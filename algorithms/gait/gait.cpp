@@ -42,8 +42,8 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
 bool Gait::try_arm(const JointFeedback& feedback) noexcept {
   if (!joints_.try_arm(*robot_, params_.joints, feedback.q_rad)) return false;
   plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m(), params_.bias_time_s);
-  memory_.left_R_right_met = joints_.base_T_sole_reference(Foot::kLeft).R.transpose() *
-                             joints_.base_T_sole_reference(Foot::kRight).R;
+  memory_.left_R_right_met =
+      joints_.base_T_sole_reference(Foot::kLeft).R.transpose() * joints_.base_T_sole_reference(Foot::kRight).R;
   return true;
 }
 
@@ -53,7 +53,9 @@ bool Gait::try_restart(const JointVector& q_rad) noexcept {
   if (!math::all_finite(off_rad) || off_rad.maxCoeff() > kMostOff_rad) return false;
   stop_requested_ = StopReason::kNone;
   leg_impaired_ = lost_in_swing_ = false;
-  memory_ = {.toes_calibrated = memory_.toes_calibrated, .left_R_right_met = memory_.left_R_right_met, .soft_ground = memory_.soft_ground};
+  memory_ = {.toes_calibrated = memory_.toes_calibrated,
+             .left_R_right_met = memory_.left_R_right_met,
+             .soft_ground = memory_.soft_ground};
   planner_.restart();
   status_.phase = GaitPhase::kStandstill;
   status_.stop_reason = StopReason::kNone;

@@ -27,7 +27,7 @@ RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
   for (std::size_t j = 0; j < kJointCount; ++j) {
     errors.encoder_offset_rad[static_cast<Eigen::Index>(j)] = params.encoder_offset_rad * offsets.normal(j);
   }
-  const Vec3 imu_rad = params.imu_mount_rad * CounterNoise(seed, Stream::kImuMount).normal3(0);
+  const Vec3 imu_rad = params.imu_turned_rad + params.imu_mount_rad * CounterNoise(seed, Stream::kImuMount).normal3(0);
   errors.base_R_imu = rotation_zyx(imu_rad.z(), imu_rad.y(), imu_rad.x());
   errors.gyro_bias_radps = params.gyro_bias_radps * CounterNoise(seed, Stream::kGyroBias).normal3(0);
   errors.accel_bias_mps2 = params.accel_bias_mps2 * CounterNoise(seed, Stream::kAccelBias).normal3(0);

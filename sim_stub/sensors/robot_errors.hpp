@@ -29,6 +29,7 @@ struct ErrorParams {
   double friction_nm = 1.0;  // Coulomb, of a moving joint: what the drive measures and the leg does not feel
   double depth_noise = 1.0;  // scales sigma, warp, edge mixing and dropouts: 0 or 1
   // What a data sheet does not say at all; 0 unless told (sim_stub/reality.hpp).
+  Vec3 imu_turned_rad = Vec3::Zero();  // roll, pitch and yaw of the IMU's mount besides its spread
   double encoder_step_rad = 0.0;
   bool rates_by_difference = false;  // of encoder readings, tick by tick, in place of a rate that is measured
   double foot_force_noise_n = 0.0;
@@ -52,6 +53,7 @@ struct ErrorParams {
     field("joint_rate_noise_radps", p.joint_rate_noise_radps, 0.0, 1.0, "White noise of a measured joint speed.");
     field("rates_by_difference", p.rates_by_difference, "A joint's speed is the difference of two readings.");
     field("imu_mount_rad", p.imu_mount_rad, 0.0, 0.2, "Spread of the IMU's mount, per axis.");
+    field("imu_turned_rad", p.imu_turned_rad, -0.3, 0.3, "Roll, pitch and yaw of the IMU's mount besides that.");
     field("gyro_bias_radps", p.gyro_bias_radps, 0.0, 0.1, "Spread of the gyroscope's bias, per axis.");
     field("gyro_noise_radps", p.gyro_noise_radps, 0.0, 0.1, "White noise of the gyroscope.");
     field("accel_bias_mps2", p.accel_bias_mps2, 0.0, 1.0, "Spread of the accelerometer's bias, per axis.");

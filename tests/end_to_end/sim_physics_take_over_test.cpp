@@ -106,7 +106,8 @@ TEST(TakeOverStart, EveryRobotOfTwiceTheErrors_IsWithinTheTolerance) {
     SimOptions options = stairs_of(1, seed);
     options.plant_kind = PlantKind::kKinematic;
     options.errors = draw_reality(2.0, seed).sensors;
-    for (double* spread : {&options.errors.imu_mount_rad, &options.errors.accel_bias_mps2, &options.errors.encoder_offset_rad}) {
+    for (double* spread :
+         {&options.errors.imu_mount_rad, &options.errors.accel_bias_mps2, &options.errors.encoder_offset_rad}) {
       *spread *= 2.0;
     }
     SimRobot robot(options);

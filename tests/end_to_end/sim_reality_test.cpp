@@ -58,8 +58,7 @@ TEST(ClimbWeakDrives, TorqueIsAFifthLess_TheWeightFeltMakesUpForIt) {
 }
 // The speeds of the first ticks are off by metres per second: what is met at rest is at rest.
 TEST(ClimbCoarseEncoders, SpeedsByDifference_TheFirstTicksPushNobodyAside) {
-  const ClimbSummary summary =
-      climb_with({"sensors.encoder_step_rad=0.00175", "sensors.rates_by_difference=true"}, 3);
+  const ClimbSummary summary = climb_with({"sensors.encoder_step_rad=0.00175", "sensors.rates_by_difference=true"}, 3);
   EXPECT_TRUE(summary.pass) << summary.reason;
 }
 TEST(ClimbSoftGround, SolesTurnWhereItStands_IsRefusedAndItStands) {

@@ -15,7 +15,8 @@ namespace polygmap::test {
 class StandingModule : public testing::Test {
  protected:
   explicit StandingModule(const Params& params = {}, hal::OperatorInput* operator_input = nullptr)
-      : camera_(robot_camera_intrinsics()), module_({camera_, imu_, joints_, lidar_, operator_input}, arming_at_once(params), clock_) {}
+      : camera_(robot_camera_intrinsics()),
+        module_({camera_, imu_, joints_, lidar_, operator_input}, arming_at_once(params), clock_) {}
   // What it is to do next is not the tenth of a second that it listens for.
   [[nodiscard]] static Params arming_at_once(Params params) {
     params.estimator.rest_ns = 0;

@@ -7,7 +7,7 @@ from campaigns.climbs import grouped, not_climbed, outcomes, own_noise, seeded, 
 from campaigns.engine import ROOT, Figure, Page, Table, headline, rows
 
 GAITS = ("ds", "ss")
-ALONE = range(1, 4)  # seeds of each item alone
+ALONE = range(1, 6)  # seeds of each item alone
 TWICE = 10           # seeds of --reality 2
 
 
@@ -31,7 +31,7 @@ ITEMS = {
     "edges 3 pixels fatter": of("camera.edge_fattening_px=3"),
     "lidar odometry drifts by 20 mm/s": of("sensors.lio_drift_mps=[0.02, 0, 0]"),
     "lidar odometry turns by 20 mrad/s": of("sensors.lio_drift_radps=0.02"),
-    "lidar odometry jumps by 300 mm": of("sensors.lio_jump_m=[0.3, 0.3, 0.1]"),
+    "lidar odometry jumps by 300 mm": of("sensors.lio_jump_m=[0.3, 0.3, 0.1]", "sensors.lio_jump_s=12"),
     "treads turned by up to 2 degrees": of("stairs.tread_yaw_rad=0.035"),
     "treads sloped by up to 2 degrees": of("stairs.tread_slope_rad=0.035"),
     "rises off by up to 10 mm": of("stairs.rise_error_m=0.01"),
@@ -40,7 +40,8 @@ ITEMS = {
     "encoder steps of 0.1 degrees, speeds by difference": of("sensors.encoder_step_rad=0.00175", "sensors.rates_by_difference=true"),
     "torque 20 % low": of("plant.torque_scale=0.8"),
     "ground of 40 ms": of("plant.ground_s=0.04"),
-    "IMU mounted 2 degrees off": of("sensors.imu_mount_rad=0.02"),
+    "IMU pitched by 2 degrees": of("sensors.imu_turned_rad=[0, 0.035, 0]"),
+    "IMU rolled by 2 degrees": of("sensors.imu_turned_rad=[0.035, 0, 0]"),
     "commands 8 ms late": of("plant.command_delay_s=0.008"),
     "torque lags by 10 ms": of("plant.torque_lag_s=0.01"),
     "armature four times as large": of("plant.armature_kgm2=0.2"),

@@ -154,7 +154,7 @@ class ClimbPlanner {
   Decision latched_;
   // What a latch changes, and what it was before.
   struct Memory {
-    Foothold trailing_foothold;  // from the leading latch
+    Foothold trailing_foothold;           // from the leading latch
     Vec3 odom_trailing_m = Vec3::Zero();  // from the leading foot's target to it
     Foot last_swing = Foot::kRight;
     Foot leading = Foot::kLeft;

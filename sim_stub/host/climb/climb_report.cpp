@@ -15,7 +15,7 @@ namespace polygmap::sim {
 namespace {
 
 constexpr std::int64_t kPast_ns = kNsPerS;        // covers the latest frame
-constexpr std::int64_t kRest_ns = 50 * kNsPerMs;  // both soles stand this long: they rest
+constexpr std::int64_t kRest_ns = 50 * kNsPerMs;  // a sole that stands this long rests
 constexpr std::uint64_t kTrailEvery_ticks = 10;   // 20 ms
 
 double ms(std::int64_t duration_ns) { return static_cast<double>(duration_ns) * 1e-6; }
@@ -237,10 +237,11 @@ void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
       if (step >= 0 && first_lift_off_ns_ < 0) first_lift_off_ns_ = flights_[foot]->lift_off_ns;
       clearance_min_m_ = flight_clearance_m(*flights_[foot], step, clearance_min_m_);
       flights_[foot].reset();
+      landed_ns_[foot] = truth.stamp_ns;
     }
     last_step_[foot] = step;
     clearance_min_m_ = clearance_m(collision_box(true_sole_, true_T_sole), solids_, std::array{step}, clearance_min_m_);
-    if (step < 0) continue;
+    if (step < 0 || truth.stamp_ns - landed_ns_[foot] < kRest_ns) continue;
     const double margin_m = sole_margin_m(true_T_sole, world_, step, true_sole_);
     keep_min(sole_margin_min_m_, margin_m);
     const int footstep = standing_footstep_[foot];

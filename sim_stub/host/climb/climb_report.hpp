@@ -124,6 +124,7 @@ class ClimbReport {
   std::array<std::optional<Flight>, kFootCount> flights_;
   bool flight_onto_tread_ = false;
   std::array<int, kFootCount> last_step_{-1, -1};
+  std::array<std::int64_t, kFootCount> landed_ns_{};
   std::array<int, kFootCount> standing_footstep_{-1, -1};  // index into footsteps_ of what each sole stands on
   bool swung_ = false;
   double sole_margin_min_m_ = kNotMeasured;
