@@ -13,12 +13,12 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   contacts_.reset(params.contacts);
   leg_sensing_.reset(params.legs, robot);
   imu_noise_.reset(params.imu_noise);
-  resting_accel_.reset(params.rest_ns);
   odometry_.reset(params, robot);
   ring_.clear();
   state_ = {};
   quality_ = {};
   imu_ = {};
+  imu_.resting.reset(params.rest_ns);
   legs_ = {};
   known_ = {};
   ground_ = {};
@@ -105,7 +105,7 @@ void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
   imu_noise_.update(imu.stamp_ns, imu.gyro_radps, imu.accel_mps2);
   const ImuSample before = imu_.newest;
   imu_.newest = {imu.stamp_ns, robot_->mounts.base_R_imu * imu.gyro_radps, robot_->mounts.base_R_imu * imu.accel_mps2};
-  if (!known_.has_run) resting_accel_.add(imu_.newest.stamp_ns, imu_.newest.accel_mps2);
+  if (!known_.has_run) imu_.resting.add(imu_.newest.stamp_ns, imu_.newest.accel_mps2);
   ImuSample since = imu_.newest;
   if (params_.imu_of_moments && imu_.any) {
     since.gyro_radps = 0.5 * (before.gyro_radps + since.gyro_radps);
@@ -197,8 +197,8 @@ bool Estimator::try_begin() noexcept {
   // Origin: the floor under the base as it stood first, the soles at z = 0 in the mean.
   Transform& odom_T_base = origin_.odom_T_base;
   odom_T_base.p_m.setZero();
-  if (!known_.has_run) {
-    odom_T_base.R = level_attitude(resting_accel_.mean_mps2());
+  if (!still && !known_.has_run) {
+    odom_T_base.R = level_attitude(imu_.resting.mean_mps2());
   } else {
     odom_T_base.R = collecting ? standstill_.odom_R_base() : level_attitude(imu_.mean.accel_mps2);
   }
@@ -224,7 +224,7 @@ bool Estimator::try_begin() noexcept {
     return true;
   }
   // To balance by, until it has stood still for long enough.
-  const bool rested = !known_.has_run && resting_accel_.is_settled();
+  const bool rested = !known_.has_run && imu_.resting.is_settled();
   if (!rested) start.odom_v_base_mps = odom_T_base.R * base_v_base_mps(legs);
   start.tilt_sigma_rad = rested ? params_.rested_tilt_sigma_rad : params_.first_tilt_sigma_rad;
   start.velocity_sigma_mps = params_.first_velocity_sigma_mps;

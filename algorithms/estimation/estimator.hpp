@@ -95,7 +95,7 @@ class Estimator {
   [[nodiscard]] const LegSensing& leg_sensing() const noexcept { return leg_sensing_; }
   [[nodiscard]] std::int64_t newest_imu_ns() const noexcept { return imu_.newest.stamp_ns; }  // accepted; 0: none yet
   // Until the filters begin; it is what they begin with.
-  [[nodiscard]] const RestingAccel& resting_accel() const noexcept { return resting_accel_; }
+  [[nodiscard]] const RestingAccel& resting_accel() const noexcept { return imu_.resting; }
   // The state at a stamp of the last half second. False, and out untouched, outside, before initialisation, and where a
   // sensor was silent for longer than max_step_s.
   [[nodiscard]] bool try_state_at(std::int64_t stamp_ns, StateEstimate& out) const noexcept {
@@ -113,6 +113,7 @@ class Estimator {
     ImuSample newest;             // accepted
     ImuSample mean;               // of the tick's; stamped as the newest
     std::uint32_t new_count = 0;  // accepted since the last tick
+    RestingAccel resting;         // until the filters begin
   };
   struct Legs {
     bool any = false;
@@ -139,7 +140,6 @@ class Estimator {
   const RobotModel* robot_ = nullptr;
   Counters counters_;
   LegSensing leg_sensing_;
-  RestingAccel resting_accel_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;
   ImuNoise imu_noise_;
