@@ -276,7 +276,7 @@ class EdgeLineFinder {
   // reach out of the window.
   enum class GapFound : std::uint8_t { kNone, kInside, kOutside };
   [[nodiscard]] GapFound find_gap(const Group& group, std::int32_t at, Gap& gap) noexcept;
-  // Most columns were refused: where rows without data at the guess are why, the window is moved onto their middle.
+  // Most columns were refused: where rows without data at the guess are why, the window is moved onto them and widened.
   [[nodiscard]] bool begins_at_gap() noexcept;
   // Between the first and the last row of the gap that a column has at its guess; false without one.
   [[nodiscard]] bool try_gap_of_column(std::int32_t column, Gap& gap) const noexcept;

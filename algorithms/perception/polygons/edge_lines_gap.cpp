@@ -7,7 +7,7 @@
 namespace polygmap {
 namespace {
 
-// A gap of more rows leaves fewer than min_side_px of its default to either side in the widest window.
+// A gap of more rows leaves too few to either side in the widest window.
 constexpr std::int32_t kMostGap_px = 24;
 // The guess ends a label, which goes on to where the planes meet or stops where the depths do: either is next to the gap.
 constexpr std::int32_t kBesideGuess_px = 4;
@@ -67,19 +67,22 @@ bool EdgeLineFinder::try_gap_of_column(std::int32_t column, Gap& gap) const noex
 bool EdgeLineFinder::begins_at_gap() noexcept {
   if (gap_tried_ || !surface_above_) return false;
   gap_tried_ = true;
-  std::array<double, kMaxGroups> middles{};
+  std::array<double, kMaxGroups> shifts{};
   std::size_t count = 0;
+  // As few rows of the surface as tell it, and all others for the gap and what is beyond it: an overhang's face, and the
+  // riser under that.
+  const double window_px = kMaxWindow_px - (params_.min_side_px + 2);
   const std::int32_t columns = guess_.last_column - guess_.first_column + 1;
   const std::int32_t stride = (columns + kMaxGroups - 1) / kMaxGroups;
   for (std::int32_t g = guess_.first_column; g <= guess_.last_column; g += stride) {
     work_.add(220);
     Gap gap;
-    if (try_gap_of_column(g, gap)) middles[count++] = 0.5 * (gap.from + gap.to) - guess_.at(middle_px(g));
+    if (try_gap_of_column(g, gap)) shifts[count++] = gap.from + window_px - guess_.at(middle_px(g));
   }
   if (2 * static_cast<std::int32_t>(count) * stride < columns || count < 3) return false;
-  const auto middle = middles.begin() + static_cast<std::ptrdiff_t>(count / 2);
-  std::nth_element(middles.begin(), middle, middles.begin() + static_cast<std::ptrdiff_t>(count));
-  guess_.row += *middle;
+  const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(shifts.begin(), middle, shifts.begin() + static_cast<std::ptrdiff_t>(count));
+  guess_.row += *middle;  // the surface is above
   params_.window_px = kMaxWindow_px;
   restart();
   return true;
