@@ -228,7 +228,7 @@ void EdgeLineFinder::take_column(const Windows& windows, std::size_t slot, float
   group.columns += 1.0;
   group.column_sum += middle_px(column);
   group.rounded_sum += guess_.at(middle_px(column)) - centre;
-  group.missing_rows += 2 * (params_.max_gap_px / 2) + 1 - static_cast<double>(near_rows);
+  group.seen_rows += near_rows;
   work_.add(70 + 18 * params_.window_px);
   const std::int32_t first = std::max(windows.first_row, centre - params_.window_px);
   const std::int32_t last = std::min(windows.last_row, centre + params_.window_px);
@@ -268,7 +268,7 @@ bool EdgeLineFinder::try_group_point(const Group& group, Vec2& point_m, double& 
   const auto at = static_cast<std::int32_t>(point.at);
   if (at <= kMaxWindow_px - params_.window_px || at + 2 > kMaxWindow_px + params_.window_px) return false;
   half_gap_m = 0.0;
-  if (group.missing_rows >= group.columns) {
+  if (group.seen_rows <= static_cast<float>(group.columns * (2 * (params_.max_gap_px / 2)))) {
     Gap gap;
     const GapFound found = find_gap(group, at, gap);
     if (found == GapFound::kOutside) return false;
@@ -425,13 +425,13 @@ void EdgeLineFinder::gather_points() noexcept {
     const Group& group = groups_.of[static_cast<std::size_t>(i)];
     double& half_gap_m = points_.half_gap_m[points_.count];
     if (group.columns < 1.0 || !try_group_point(group, points_.at_m[points_.count], half_gap_m)) continue;
-    points_.trust[points_.count] = 1.0;
-    if (half_gap_m != 0.0) {
-      // Anywhere in the gap with the same right, beside the error of every change-point.
-      const double own_m2 = math::square(params_.slow_error_m);
-      points_.trust[points_.count] = own_m2 / (own_m2 + math::square(half_gap_m) / 3.0);
-    }
-    points_.weight[points_.count++] = group.columns;
+    double& weight = points_.weight[points_.count];
+    weight = points_.columns[points_.count] = group.columns;
+    ++points_.count;
+    if (half_gap_m == 0.0) continue;
+    // It is anywhere in the gap with the same right, beside the error that every change-point has.
+    const double own_m2 = math::square(params_.slow_error_m);
+    weight *= own_m2 / (own_m2 + math::square(half_gap_m) / 3.0);
   }
 }
 
@@ -448,8 +448,7 @@ bool EdgeLineFinder::try_robust_line(Fit& fit, double& limit_m) noexcept {
     LineSums<double> sums{};
     for (std::size_t i = 0; i < p.count; ++i) {
       const double r = (p.at_m[i].y() - fit.at(p.at_m[i].x())) / limit_m;
-      if (std::abs(r) >= 1.0) continue;
-      sums.add(p.weight[i] * p.trust[i] * math::square(1.0 - r * r), p.at_m[i].x(), p.at_m[i].y());
+      if (std::abs(r) < 1.0) sums.add(p.weight[i] * math::square(1.0 - r * r), p.at_m[i].x(), p.at_m[i].y());
     }
     if (!try_solve(sums, fit.a, fit.b)) return false;
   }
@@ -457,18 +456,18 @@ bool EdgeLineFinder::try_robust_line(Fit& fit, double& limit_m) noexcept {
 }
 
 EdgeLineFinder::Outcome EdgeLineFinder::measure(Fit& fit, double limit_m) const noexcept {
-  double squares = 0.0, columns = 0.0, groups = 0.0, trust = 0.0, half_gap_m = 0.0;
+  double squares = 0.0, columns = 0.0, groups = 0.0, weight = 0.0, half_gap_m = 0.0;
   fit.lo_m = 1e9;
   fit.hi_m = -1e9;
   for (std::size_t i = 0; i < points_.count; ++i) {
     const Vec2& at_m = points_.at_m[i];
     const double r = at_m.y() - fit.at(at_m.x());
     if (std::abs(r) >= limit_m) continue;
-    squares += points_.weight[i] * r * r;
-    columns += points_.weight[i];
+    squares += points_.columns[i] * r * r;
+    columns += points_.columns[i];
     groups += 1.0;
-    trust += points_.trust[i];
-    half_gap_m += points_.trust[i] * points_.half_gap_m[i];
+    weight += points_.weight[i];
+    half_gap_m += points_.weight[i] * points_.half_gap_m[i];
     fit.lo_m = std::min(fit.lo_m, at_m.x());
     fit.hi_m = std::max(fit.hi_m, at_m.x());
   }
@@ -481,7 +480,7 @@ EdgeLineFinder::Outcome EdgeLineFinder::measure(Fit& fit, double limit_m) const 
   fit.hi_m += half_group_m;
   if (fit.hi_m - fit.lo_m < params_.min_length_m) return Outcome::kShort;
   fit.sigma_m = 2.0 * math::sqrt((rms * rms + math::square(params_.slow_error_m)) / groups);
-  fit.half_gap_m = half_gap_m / trust;
+  fit.half_gap_m = half_gap_m / weight;
   return Outcome::kFound;
 }
 

@@ -199,7 +199,7 @@ class EdgeLineFinder {
     double columns = 0.0;
     double column_sum = 0.0;   // of their middles, pixels
     double rounded_sum = 0.0;  // of the guess less the row that it was rounded to
-    double missing_rows = 0.0;  // near the guess, without data, of all its columns
+    float seen_rows = 0.0F;    // near the guess, with data, of all its columns
   };
   struct Groups {
     std::array<Group, kMaxGroups> of{};
@@ -221,9 +221,9 @@ class EdgeLineFinder {
   // The groups' change-points, in the axes.
   struct Points {
     std::array<Vec2, kMaxGroups> at_m{};
-    std::array<double, kMaxGroups> weight{};
+    std::array<double, kMaxGroups> columns{};     // of the group
+    std::array<double, kMaxGroups> weight{};      // less than these where a gap leaves open where the point is
     std::array<double, kMaxGroups> half_gap_m{};  // from there across to the first row beyond; negative against across
-    std::array<double, kMaxGroups> trust{};       // of the weight: a change-point next to none counts as a whole
     std::array<double, kMaxGroups> scratch{};
     std::size_t count = 0;
     [[nodiscard]] double median_of_scratch() noexcept;

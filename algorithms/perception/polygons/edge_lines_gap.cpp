@@ -67,6 +67,7 @@ bool EdgeLineFinder::try_gap_of_column(std::int32_t column, Gap& gap) const noex
 bool EdgeLineFinder::begins_at_gap() noexcept {
   if (gap_tried_ || !surface_above_) return false;
   gap_tried_ = true;
+  work_.add(600);
   std::array<double, kMaxGroups> shifts{};
   std::size_t count = 0;
   // As few rows of the surface as tell it, and all others for the gap and what is beyond it: an overhang's face, and the
@@ -75,7 +76,7 @@ bool EdgeLineFinder::begins_at_gap() noexcept {
   const std::int32_t columns = guess_.last_column - guess_.first_column + 1;
   const std::int32_t stride = (columns + kMaxGroups - 1) / kMaxGroups;
   for (std::int32_t g = guess_.first_column; g <= guess_.last_column; g += stride) {
-    work_.add(220);
+    work_.add(300);
     Gap gap;
     if (try_gap_of_column(g, gap)) shifts[count++] = gap.from + window_px - guess_.at(middle_px(g));
   }
