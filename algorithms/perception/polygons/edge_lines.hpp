@@ -2,8 +2,8 @@
 // Where a surface ends, to a fraction of a pixel: change-points in the columns of the image, one line through all.
 //
 // Where rows without depth lie between the two surfaces (a dark or shiny strip along a nosing), a change-point is
-// anywhere among them: its middle is taken, and its reach to both sides is kept with it. The plane beyond says more when
-// its first rows lie where it meets the surface's plane; then that is the edge, and the rows were the surface's.
+// anywhere among them: its middle is taken, and its reach to both sides is kept with it. The plane beyond says more
+// when its first rows lie where it meets the surface's plane; then that is the edge, and the rows were the surface's.
 #pragma once
 
 #include <array>
@@ -232,7 +232,7 @@ class EdgeLineFinder {
   struct Fit {
     double a = 0.0, b = 0.0;
     double lo_m = 0.0, hi_m = 0.0;
-    double sigma_m = 0.0;  // at the line's ends: twice the one in the middle
+    double sigma_m = 0.0;     // at the line's ends: twice the one in the middle
     double half_gap_m = 0.0;  // mean of the points'
     [[nodiscard]] double at(double along_m) const noexcept { return a + b * along_m; }
   };

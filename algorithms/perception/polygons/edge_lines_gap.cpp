@@ -9,7 +9,8 @@ namespace {
 
 // A gap of more rows leaves too few to either side in the widest window.
 constexpr std::int32_t kMostGap_px = 24;
-// The guess ends a label, which goes on to where the planes meet or stops where the depths do: either is next to the gap.
+// The guess ends a label, which goes on to where the planes meet or stops where the depths do: either is next to the
+// gap.
 constexpr std::int32_t kBesideGuess_px = 4;
 
 }  // namespace
@@ -24,8 +25,8 @@ EdgeLineFinder::GapFound EdgeLineFinder::find_gap(const Group& group, std::int32
     const std::int32_t r = surface_above_ ? centre + i - kMaxWindow_px : centre - i + kMaxWindow_px;
     return gain(i) == 0.0 && r >= 0 && r < intrinsics_.height_px && !(image_->inverse_depth(column, r) > 0.0F);
   };
-  // Where the planes meet, rows hardly tell one from the other, and the least sum may be a few rows aside of the gap. It
-  // is one with it when no more lies between than a single pixel can say.
+  // Where the planes meet, rows hardly tell one from the other, and the least sum may be a few rows aside of the gap.
+  // It is one with it when no more lies between than a single pixel can say.
   const double most = math::square(params_.truncate_sigmas);
   std::int32_t begin = last + 1, end = first - 1;
   double sum = 0.0;
@@ -70,8 +71,8 @@ bool EdgeLineFinder::begins_at_gap() noexcept {
   work_.add(600);
   std::array<double, kMaxGroups> shifts{};
   std::size_t count = 0;
-  // As few rows of the surface as tell it, and all others for the gap and what is beyond it: an overhang's face, and the
-  // riser under that.
+  // As few rows of the surface as tell it, and all others for the gap and what is beyond it: an overhang's face, and
+  // the riser under that.
   const double window_px = kMaxWindow_px - (params_.min_side_px + 2);
   const std::int32_t columns = guess_.last_column - guess_.first_column + 1;
   const std::int32_t stride = (columns + kMaxGroups - 1) / kMaxGroups;
