@@ -77,6 +77,7 @@ void EdgeLineFinder::begin(const Params& params, const DepthNoiseModel& noise, c
   }
   surface_above_ = surface_above;
   face_.tried = false;
+  gap_tried_ = false;
   restart();
   for (std::size_t i = 0; i < guess_ends_m_.size(); ++i) {
     const double x_px = middle_px(i == 0 ? guess_.first_column : guess_.last_column);
@@ -95,7 +96,7 @@ void EdgeLineFinder::restart() noexcept {
   work_.add(1100);
   next_column_ = guess_.first_column / kSlots * kSlots;
   groups_.of.fill(Group{});
-  groups_.count = groups_.columns = 0;
+  groups_.count = groups_.columns = groups_.refused = 0;
   face_.counts.fill(0);
 }
 
@@ -203,16 +204,19 @@ void EdgeLineFinder::search_columns(std::int32_t first_column) noexcept {
   weigh_rows(windows, found);
   const auto least = static_cast<float>(params_.min_side_px);
   for (std::size_t k = 0; k < kSlots; ++k) {
-    if (windows.reach[k] < 0.0F || found.row[k] < 0.0F || found.near_rows[k] < 0.5F) continue;
+    if (windows.reach[k] < 0.0F) continue;
+    ++groups_.refused;
+    if (found.row[k] < 0.0F || (found.near_rows[k] < 0.5F && !gap_tried_)) continue;
     if (found.surface_side[k] < least || found.other_side[k] < least) continue;
+    --groups_.refused;
     if (other_.known && surface_above_ && !face_.tried) {
       add_face(first_column + static_cast<std::int32_t>(k), static_cast<std::int32_t>(found.row[k]), windows.last_row);
     }
-    take_column(windows, k);
+    take_column(windows, k, found.near_rows[k]);
   }
 }
 
-void EdgeLineFinder::take_column(const Windows& windows, std::size_t slot) noexcept {
+void EdgeLineFinder::take_column(const Windows& windows, std::size_t slot, float near_rows) noexcept {
   const std::int32_t column = windows.first_column + static_cast<std::int32_t>(slot);
   const auto centre = static_cast<std::int32_t>(windows.centre[slot]);
   const std::int32_t columns = guess_.last_column - guess_.first_column + 1;
@@ -224,6 +228,7 @@ void EdgeLineFinder::take_column(const Windows& windows, std::size_t slot) noexc
   group.columns += 1.0;
   group.column_sum += middle_px(column);
   group.rounded_sum += guess_.at(middle_px(column)) - centre;
+  group.seen_rows += near_rows;
   work_.add(70 + 18 * params_.window_px);
   const std::int32_t first = std::max(windows.first_row, centre - params_.window_px);
   const std::int32_t last = std::min(windows.last_row, centre + params_.window_px);
@@ -254,7 +259,7 @@ void EdgeLineFinder::add_face(std::int32_t column, std::int32_t from_row, std::i
   }
 }
 
-bool EdgeLineFinder::try_group_point(const Group& group, Vec2& point_m) const noexcept {
+bool EdgeLineFinder::try_group_point(const Group& group, Vec2& point_m, double& half_gap_m) noexcept {
   ChangePoint<double> point{0.0, 0.0, -1.0};
   for (std::int32_t i = 0; i < kOffsets; ++i) {
     point.add(static_cast<double>(group.gain[static_cast<std::size_t>(i)]), i);
@@ -262,11 +267,27 @@ bool EdgeLineFinder::try_group_point(const Group& group, Vec2& point_m) const no
   // At the window's ends nothing was compared.
   const auto at = static_cast<std::int32_t>(point.at);
   if (at <= kMaxWindow_px - params_.window_px || at + 2 > kMaxWindow_px + params_.window_px) return false;
+  half_gap_m = 0.0;
+  if (group.seen_rows <= static_cast<float>(group.columns * (2 * (params_.max_gap_px / 2)))) {
+    Gap gap;
+    const GapFound found = find_gap(group, at, gap);
+    if (found == GapFound::kOutside) return false;
+    if (found == GapFound::kInside) {
+      Vec2 near_m, far_m;
+      if (!try_on_surface(group, gap.from, near_m) || !try_on_surface(group, gap.to, far_m)) return false;
+      point_m = 0.5 * (near_m + far_m);
+      half_gap_m = 0.5 * (far_m - near_m).y();
+      return true;
+    }
+  }
   // The running sum's least value lies where the gain crosses zero: between the rows on both sides of the minimum.
   const auto g0 = static_cast<double>(group.gain[static_cast<std::size_t>(at)]);
   const auto g1 = static_cast<double>(group.gain[static_cast<std::size_t>(at + 1)]);
   const double fraction = g1 - g0 > 1e-9 ? math::clamp(-g0 / (g1 - g0), 0.0, 1.0) : 0.5;
-  const double outwards = at + fraction - kMaxWindow_px;
+  return try_on_surface(group, at + fraction - kMaxWindow_px, point_m);
+}
+
+bool EdgeLineFinder::try_on_surface(const Group& group, double outwards, Vec2& point_m) const noexcept {
   const double column = group.column_sum / group.columns;
   const double centre = guess_.at(column) - group.rounded_sum / group.columns;
   const Vec3 ray = ray_at(column, surface_above_ ? centre + outwards : centre - outwards);
@@ -402,8 +423,15 @@ void EdgeLineFinder::gather_points() noexcept {
   points_.count = 0;
   for (std::int32_t i = 0; i < groups_.count; ++i) {
     const Group& group = groups_.of[static_cast<std::size_t>(i)];
-    if (group.columns < 1.0 || !try_group_point(group, points_.at_m[points_.count])) continue;
-    points_.weight[points_.count++] = group.columns;
+    double& half_gap_m = points_.half_gap_m[points_.count];
+    if (group.columns < 1.0 || !try_group_point(group, points_.at_m[points_.count], half_gap_m)) continue;
+    double& weight = points_.weight[points_.count];
+    weight = points_.columns[points_.count] = group.columns;
+    ++points_.count;
+    if (half_gap_m == 0.0) continue;
+    // It is anywhere in the gap with the same right, beside the error that every change-point has.
+    const double own_m2 = math::square(params_.slow_error_m);
+    weight *= own_m2 / (own_m2 + math::square(half_gap_m) / 3.0);
   }
 }
 
@@ -428,16 +456,18 @@ bool EdgeLineFinder::try_robust_line(Fit& fit, double& limit_m) noexcept {
 }
 
 EdgeLineFinder::Outcome EdgeLineFinder::measure(Fit& fit, double limit_m) const noexcept {
-  double squares = 0.0, columns = 0.0, groups = 0.0;
+  double squares = 0.0, columns = 0.0, groups = 0.0, weight = 0.0, half_gap_m = 0.0;
   fit.lo_m = 1e9;
   fit.hi_m = -1e9;
   for (std::size_t i = 0; i < points_.count; ++i) {
     const Vec2& at_m = points_.at_m[i];
     const double r = at_m.y() - fit.at(at_m.x());
     if (std::abs(r) >= limit_m) continue;
-    squares += points_.weight[i] * r * r;
-    columns += points_.weight[i];
+    squares += points_.columns[i] * r * r;
+    columns += points_.columns[i];
     groups += 1.0;
+    weight += points_.weight[i];
+    half_gap_m += points_.weight[i] * points_.half_gap_m[i];
     fit.lo_m = std::min(fit.lo_m, at_m.x());
     fit.hi_m = std::max(fit.hi_m, at_m.x());
   }
@@ -450,6 +480,7 @@ EdgeLineFinder::Outcome EdgeLineFinder::measure(Fit& fit, double limit_m) const 
   fit.hi_m += half_group_m;
   if (fit.hi_m - fit.lo_m < params_.min_length_m) return Outcome::kShort;
   fit.sigma_m = 2.0 * math::sqrt((rms * rms + math::square(params_.slow_error_m)) / groups);
+  fit.half_gap_m = half_gap_m / weight;
   return Outcome::kFound;
 }
 
@@ -491,9 +522,9 @@ bool EdgeLineFinder::begins_at_face() noexcept {
   return true;
 }
 
-bool EdgeLineFinder::try_meet_other(const Fit& fit, EdgeLine& line) noexcept {
-  const double meet_lo = meet_m(fit.lo_m), meet_hi = meet_m(fit.hi_m), t_lo = fit.at(fit.lo_m), t_hi = fit.at(fit.hi_m);
-  const double apart = 0.5 * (meet_lo + meet_hi - t_lo - t_hi);
+bool EdgeLineFinder::try_meet_other(Fit& fit, EdgeLine& line) noexcept {
+  const double meet_lo = meet_m(fit.lo_m), meet_hi = meet_m(fit.hi_m);
+  const double t_lo = fit.at(fit.lo_m), t_hi = fit.at(fit.hi_m), apart = 0.5 * (meet_lo + meet_hi - t_lo - t_hi);
   const double middle_s = 0.5 * (fit.lo_m + fit.hi_m), middle_t = 0.25 * (t_lo + t_hi + meet_lo + meet_hi);
   const Vec3 centre = axes_.point(middle_s, middle_t);
   const double met_sigma_m = plane_sigma_m(other_.plane, other_.both_covariance, centre / centre.z());
@@ -501,7 +532,10 @@ bool EdgeLineFinder::try_meet_other(const Fit& fit, EdgeLine& line) noexcept {
       params_.agree.within_sigmas * math::sqrt(math::square(fit.sigma_m) + math::square(met_sigma_m));
   const double limit_m = std::max(math::clamp(apart_m, params_.agree.least_m, params_.agree.most_m),
                                   params_.agree.within_px * pixel_m(middle_s, middle_t));
-  if (!(std::abs(apart) < limit_m)) return !begins_at_face();
+  const bool agrees = fit.half_gap_m == 0.0 ? std::abs(apart) < limit_m : settle_gap(fit, apart, limit_m);
+  if (!agrees && begins_at_face()) return false;
+  line = seen_line(fit);
+  if (!agrees) return true;
   const Shift shift = surface_above_ ? local_shift() : Shift{};
   double lo_m = 0.0, hi_m = 0.0;
   const double sigma_lo_m = join(fit, shift, fit.lo_m, meet_lo, lo_m);
@@ -511,26 +545,29 @@ bool EdgeLineFinder::try_meet_other(const Fit& fit, EdgeLine& line) noexcept {
   return true;
 }
 
+EdgeLine EdgeLineFinder::seen_line(const Fit& fit) const noexcept {
+  return {axes_.point(fit.lo_m, fit.at(fit.lo_m)), axes_.point(fit.hi_m, fit.at(fit.hi_m)), fit.sigma_m, true};
+}
+
 EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
   line = {};
   work_.add(200);
+  if (groups_.refused > groups_.columns && begins_at_gap()) return Outcome::kAgain;
   if (groups_.columns < params_.min_columns) return Outcome::kFewColumns;
   work_.add(groups_.count, 330);
   gather_points();
   if (points_.count < 3) return Outcome::kFewColumns;
   work_.add(1200);
-  work_.add(points_.count, 560);
+  work_.add(points_.count, 570);
   Fit fit;
   double limit_m = 0.0;
   if (!try_robust_line(fit, limit_m)) return Outcome::kNoLine;
   const Outcome outcome = measure(fit, limit_m);
   if (outcome != Outcome::kFound) return outcome;
-  const EdgeLine seen{axes_.point(fit.lo_m, fit.at(fit.lo_m)), axes_.point(fit.hi_m, fit.at(fit.hi_m)), fit.sigma_m,
-                      true};
-  line = seen;
-  if (!other_.known || try_meet_other(fit, line)) return Outcome::kFound;
-  line = {};
-  return Outcome::kAgain;
+  if (other_.known) return try_meet_other(fit, line) ? Outcome::kFound : Outcome::kAgain;
+  widen_by_gap(fit, -1.0);
+  line = seen_line(fit);
+  return Outcome::kFound;
 }
 
 }  // namespace polygmap

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a surface ends, to a fraction of a pixel: change-points in the columns of the image, one line through all.
+//
+// Where rows without depth lie between the two surfaces (a dark or shiny strip along a nosing), a change-point is
+// anywhere among them: its middle is taken, and its reach to both sides is kept with it. The plane beyond says more
+// when its first rows lie where it meets the surface's plane; then that is the edge, and the rows were the surface's.
 #pragma once
 
 #include <array>
@@ -195,11 +199,17 @@ class EdgeLineFinder {
     double columns = 0.0;
     double column_sum = 0.0;   // of their middles, pixels
     double rounded_sum = 0.0;  // of the guess less the row that it was rounded to
+    float seen_rows = 0.0F;    // near the guess, with data, of all its columns
   };
   struct Groups {
     std::array<Group, kMaxGroups> of{};
     std::int32_t count = 0;
     std::int32_t columns = 0;  // in all of them
+    std::int32_t refused = 0;  // columns that are in none of them
+  };
+  // Rows without data on which an edge lies: from between two rows to between two rows, counted outwards in a group.
+  struct Gap {
+    double from = 0.0, to = 0.0;
   };
   // By how much the first pixels past the change-point stand out from the other plane.
   struct Face {
@@ -211,7 +221,9 @@ class EdgeLineFinder {
   // The groups' change-points, in the axes.
   struct Points {
     std::array<Vec2, kMaxGroups> at_m{};
-    std::array<double, kMaxGroups> weight{};
+    std::array<double, kMaxGroups> columns{};     // of the group
+    std::array<double, kMaxGroups> weight{};      // less than these where a gap leaves open where the point is
+    std::array<double, kMaxGroups> half_gap_m{};  // from there across to the first row beyond; negative against across
     std::array<double, kMaxGroups> scratch{};
     std::size_t count = 0;
     [[nodiscard]] double median_of_scratch() noexcept;
@@ -220,7 +232,8 @@ class EdgeLineFinder {
   struct Fit {
     double a = 0.0, b = 0.0;
     double lo_m = 0.0, hi_m = 0.0;
-    double sigma_m = 0.0;  // at the line's ends: twice the one in the middle
+    double sigma_m = 0.0;     // at the line's ends: twice the one in the middle
+    double half_gap_m = 0.0;  // mean of the points'
     [[nodiscard]] double at(double along_m) const noexcept { return a + b * along_m; }
   };
   // By how many rows the planes meet below where they meet as a whole, as the few rows on both sides say: what a slow
@@ -250,18 +263,34 @@ class EdgeLineFinder {
   void search_columns(std::int32_t first_column) noexcept;
   [[nodiscard]] Windows windows_of(std::int32_t first_column) const noexcept;
   void weigh_rows(const Windows& windows, Found& found) noexcept;
-  void take_column(const Windows& windows, std::size_t slot) noexcept;
+  void take_column(const Windows& windows, std::size_t slot, float near_rows) noexcept;
   void add_face(std::int32_t column, std::int32_t from_row, std::int32_t last_row) noexcept;
   // False when too few pixels stand out.
   [[nodiscard]] bool try_face_offset(double& offset_m) const noexcept;
   // A line through the change-points that holds for most columns.
   void gather_points() noexcept;
-  [[nodiscard]] bool try_group_point(const Group& group, Vec2& point_m) const noexcept;
+  // The middle of where the group's columns may change, and how far that reaches across.
+  [[nodiscard]] bool try_group_point(const Group& group, Vec2& point_m, double& half_gap_m) noexcept;
+  [[nodiscard]] bool try_on_surface(const Group& group, double outwards, Vec2& point_m) const noexcept;
+  // The rows without data next to the change-point, the last one before which is at. False when there are none, or they
+  // reach out of the window.
+  enum class GapFound : std::uint8_t { kNone, kInside, kOutside };
+  [[nodiscard]] GapFound find_gap(const Group& group, std::int32_t at, Gap& gap) noexcept;
+  // Most columns were refused: where rows without data at the guess are why, the window is moved onto them and widened.
+  [[nodiscard]] bool begins_at_gap() noexcept;
+  // Between the first and the last row of the gap that a column has at its guess; false without one.
+  [[nodiscard]] bool try_gap_of_column(std::int32_t column, Gap& gap) const noexcept;
+  // Takes the gap's far end for the edge where the planes meet there; else what remains of it, and how uncertain it is.
+  // apart_m: from the fit to where the planes meet.
+  [[nodiscard]] EdgeLine seen_line(const Fit& fit) const noexcept;
+  // The edge is anywhere from there to the gap's end; from: -1 where the gap begins, 1 where it ends.
+  void widen_by_gap(Fit& fit, double from) const noexcept;
+  [[nodiscard]] bool settle_gap(Fit& fit, double apart_m, double limit_m) const noexcept;
   [[nodiscard]] bool try_robust_line(Fit& fit, double& limit_m) noexcept;
   [[nodiscard]] Outcome measure(Fit& fit, double limit_m) const noexcept;
   // Where the planes meet, if that agrees with the fit, goes into the line's ends; false when the search is to begin
   // again, against an overhang's face.
-  [[nodiscard]] bool try_meet_other(const Fit& fit, EdgeLine& line) noexcept;
+  [[nodiscard]] bool try_meet_other(Fit& fit, EdgeLine& line) noexcept;
   [[nodiscard]] bool begins_at_face() noexcept;
   // All that is known of the edge at one place along it, by information: where across it lies, and its sigma.
   double join(const Fit& fit, const Shift& shift, double along_m, double meet_m, double& across_m) const noexcept;
@@ -290,6 +319,7 @@ class EdgeLineFinder {
   std::array<Slots, kDepthHeight_px> gains_{};  // of the columns searched together, by row
   Groups groups_;
   Face face_;
+  bool gap_tried_ = false;
   Points points_;
   WorkCount work_;
 };
