@@ -113,6 +113,7 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
     work_.add(surface.polygon.size(), 260);
     LevelSurface level;
     if (!prepare(polygon, yaw_of(query_.odom_T_base.R), params_.levels, params_.margin, foot_, level)) return;
+    if (is_top_of_thing(map_.occupied, params_.things, level, work_)) return;
     if (confirmed) {
       (void)levels_.try_push_back(level);  // as many as the map holds
     } else if (level.height_m > z_foot_ + params_.delta_foot_m &&
@@ -182,6 +183,10 @@ void FootholdSearch::link(std::size_t i) noexcept {
                   {params_.back_min_m, params_.back_max_m});
   }
   for (const Upright& upright : uprights_) link_upright(tread, upright);
+  if (!map_.occupied.empty()) {
+    const double feet_m = params_.feet.half_spacing_m + params_.feet.evade_max_m;
+    add_things(map_.occupied, params_.things, foot_, middle_m(tread), feet_m, tread, work_);
+  }
   const Vec2& sole_p_m = sole_.origin_m();
   const double along_m = tread.along_m(sole_p_m);
   if (tread.ends.far_m && along_m > 0.0 && along_m < *tread.ends.far_m &&

@@ -100,7 +100,7 @@ struct LevelSurface {
   StaticVector<FootLimit, kMaxPolygonVertices> edges;  // contact rectangle
   StaticVector<FootLimit, 3> toe;                      // collision box to back edge, next nosing, next riser
   double depth_m = 0.0;                                // nosing to the nearest of these, 0: none
-  StaticVector<TreadObstacle, 6> obstacles;
+  StaticVector<TreadObstacle, 8> obstacles;
   SeenEnds ends;
 
   [[nodiscard]] Vec2 nosing_middle_m() const noexcept { return 0.5 * (nosing_a_m + nosing_b_m).head<2>(); }

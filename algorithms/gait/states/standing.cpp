@@ -61,7 +61,8 @@ Transition Standing::wait(const GaitShared& gait, const ClimbPlanner::Decision& 
   wait_ticks_ = reason == waiting_for_ ? wait_ticks_ + 1 : 1;
   waiting_for_ = reason;
   ++gait.memory.idle_ticks;
-  const std::int32_t patience = gait.status.step.sequence == 0 ? params.start_patience_ticks : params.patience_ticks;
+  std::int32_t patience = gait.status.step.sequence == 0 ? params.start_patience_ticks : params.patience_ticks;
+  if (reason == StopReason::kObstacle) patience = std::max(patience, params.obstacle_patience_ticks);
   if (wait_ticks_ >= patience) {
     return reason == StopReason::kTop ? Transition::finish() : Transition::stop(reason, decision.measured_m);
   }
