@@ -10,7 +10,7 @@ namespace polygmap {
 
 struct ThingParams {
   double margin_m = 0.010;
-  double side_margin_m = 0.015;
+  double side_margin_m = 0.010;
   double level_m = 0.03;
   double before_nosing_m = 0.02;
   double behind_m = 0.40;
