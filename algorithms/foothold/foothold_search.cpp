@@ -371,7 +371,7 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
     }
   }
   for (const TreadObstacle& o : tread.obstacles) {
-    if (o.meets(right_m, left_m)) spare_m = std::min(spare_m, o.sole_end_m - o.margin_m - heel_m - margin_m);
+    if (o.meets_feet(right_m, left_m)) spare_m = std::min(spare_m, o.sole_end_m - o.margin_m - heel_m - margin_m);
   }
   // A tread that ends in nothing ends all the same: the next riser may be there and not be seen.
   if (tread.ends.far_m) {
@@ -434,7 +434,7 @@ Interval FootholdSearch::between_sides(const LevelSurface& tread, double along_m
 bool FootholdSearch::blocked(const LevelSurface& tread, double middle_m, double half_m) const noexcept {
   const double least_m = params_.tread_min_m - foot_.collision.toe_x_m;
   return std::any_of(tread.obstacles.begin(), tread.obstacles.end(), [&](const TreadObstacle& o) {
-    return o.sole_end_m < least_m && o.meets(middle_m - half_m, middle_m + half_m);
+    return o.sole_end_m < least_m && o.meets_feet(middle_m - half_m, middle_m + half_m);
   });
 }
 
@@ -443,7 +443,9 @@ std::optional<double> FootholdSearch::beside_obstacles(const LevelSurface& tread
                                                        double middle_m, double half_m) const noexcept {
   std::optional<double> best;
   for (const TreadObstacle& o : tread.obstacles) {
-    for (const double beside_m : {o.sole_lateral_m.max_m + half_m, o.sole_lateral_m.min_m - half_m}) {
+    const auto [right_m, left_m] = o.sole_lateral_m;
+    // To the left and to the right of it, or over it.
+    for (const double beside_m : {left_m + half_m, right_m - half_m, left_m - half_m, right_m + half_m}) {
       const double moved_m = std::abs(beside_m - middle_m);
       if (moved_m > params_.feet.evade_max_m || beside_m < sides.min_m || beside_m > sides.max_m) continue;
       if (best && moved_m >= std::abs(*best - middle_m)) continue;
@@ -519,7 +521,7 @@ std::int32_t FootholdSearch::place_feet_instructions(const LevelSurface& tread) 
   const auto edges = static_cast<std::int32_t>(tread.edges.size()), toe = static_cast<std::int32_t>(tread.toe.size());
   const auto obstacles = static_cast<std::int32_t>(tread.obstacles.size());
   const std::int32_t once = 1500 + 50 * edges + 40 * toe + 30 * obstacles;
-  return once + params_.feet.spacings * (120 + 14 * edges + 40 * toe + 30 * obstacles * (1 + obstacles));
+  return once + params_.feet.spacings * (120 + 14 * edges + 40 * toe + 60 * obstacles * (1 + obstacles));
 }
 
 StopReason FootholdSearch::without_next() const noexcept {

@@ -32,9 +32,10 @@ void add_things(const OccupiedCells& cells, const ThingParams& params, const Sol
       return met.min_m < o.sole_lateral_m.max_m && met.max_m > o.sole_lateral_m.min_m;
     });
     if (same == things.end()) {
-      if (things.try_push_back({end_m, params.margin_m, met})) continue;
+      if (things.try_push_back({end_m, params.margin_m, met, cell.height_m <= params.low_m})) continue;
       same = things.begin();
     }
+    same->low = same->low && cell.height_m <= params.low_m;
     same->sole_end_m = std::min(same->sole_end_m, end_m);
     same->sole_lateral_m.min_m = std::min(same->sole_lateral_m.min_m, met.min_m);
     same->sole_lateral_m.max_m = std::max(same->sole_lateral_m.max_m, met.max_m);

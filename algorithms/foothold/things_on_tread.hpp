@@ -14,6 +14,7 @@ struct ThingParams {
   double level_m = 0.03;
   double before_nosing_m = 0.02;
   double behind_m = 0.40;
+  double low_m = 0.06;
   double top_area_m2 = 0.08;
 
   static void visit(auto& p, auto& field) {
@@ -23,6 +24,7 @@ struct ThingParams {
     field("before_nosing_m", p.before_nosing_m, 0.0, 0.1,
           "A cell no farther before the nosing is on the tread: it may hang over.");
     field("behind_m", p.behind_m, 0.1, 3.0, "A cell farther behind the nosing is in no foot's way.");
+    field("low_m", p.low_m, 0.0, 0.3, "What is no higher may lie between the feet.");
     field("top_area_m2", p.top_area_m2, 0.0, 1.0,
           "A level surface of no larger area above occupied cells is the top of a thing and no tread.");
   }
