@@ -35,7 +35,7 @@ void ThingMap::add(const ThingSighting& sighting) noexcept {
 void ThingMap::mark(const Vec3& ground_p_m, double height_m) noexcept {
   work_.add(60);
   ThingCell* cell = cell_for(static_cast<std::int32_t>(std::floor(ground_p_m.x() / kOccupiedCell_m)),
-                        static_cast<std::int32_t>(std::floor(ground_p_m.y() / kOccupiedCell_m)));
+                             static_cast<std::int32_t>(std::floor(ground_p_m.y() / kOccupiedCell_m)));
   if (cell == nullptr) return;
   if (!cell->seen) {
     cell->seen = true;

@@ -65,7 +65,7 @@ class ThingMap {
 
  private:
   static constexpr std::int32_t kSide = 128;  // of the square of cells, which repeats
-  using Index = std::uint8_t;  // 1 + that of a cell, 0: none
+  using Index = std::uint8_t;                 // 1 + that of a cell, 0: none
   static_assert(kMaxOccupiedCells < 255);
 
   [[nodiscard]] Index& index_of(std::int32_t x, std::int32_t y) noexcept {

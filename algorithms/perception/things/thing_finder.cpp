@@ -11,7 +11,7 @@
 namespace polygmap {
 namespace {
 
-constexpr double kNearest_m = 0.05;    // nearer to the camera's plane nothing is projected
+constexpr double kNearest_m = 0.05;       // nearer to the camera's plane nothing is projected
 constexpr double kBeforeNosing_m = 0.01;  // as far before its nosing something still lies on the tread
 
 }  // namespace
@@ -26,6 +26,7 @@ void ThingFinder::begin(const Params& params, const DepthNoiseModel& noise, cons
   frame_ = &frame;
   patch_ = 0;
   begun_ = false;
+  ++turn_;
   find_surfaces();
 }
 
@@ -53,11 +54,12 @@ Progress ThingFinder::step(WorkBudget& budget) noexcept {
     }
     if (!begun_) {
       begun_ = begin_tread(frame_->surfaces[patch_]);
-      column_ = tread_.first_column;
+      const auto odd = static_cast<std::int32_t>(turn_ & 1U);  // every other column, in turn
+      column_ = tread_.first_column + ((tread_.first_column & 1) != odd ? 1 : 0);
       if (!begun_) ++patch_;
     } else {
       const std::int32_t end = std::min(column_ + kColumnsAtOnce, tread_.last_column + 1);
-      for (; column_ < end; ++column_) look_along(column_);
+      for (; column_ < end; column_ += 2) look_along(column_);
       if (column_ > tread_.last_column) {
         begun_ = false;
         ++patch_;
@@ -106,8 +108,7 @@ bool ThingFinder::begin_tread(const SurfacePatch& patch) noexcept {
 
   // A depth's error raises a row by its share along the normal.
   const double slant = -patch.normal.dot(patch.centroid_m) / std::max(patch.centroid_m.z(), kNearest_m);
-  const double sigma_m =
-      slant * noise_.sigma_m(patch.centroid_m.z()) * math::sqrt(noise_.mean_share(kColumn_px));
+  const double sigma_m = slant * noise_.sigma_m(patch.centroid_m.z()) * math::sqrt(noise_.mean_share(kColumn_px));
   const double height_m = std::max(params_.least_height_m, params_.sigmas * sigma_m);
   if (!(height_m < 0.5 * patch.d_m)) return false;
   tread_.bound = -patch.normal / (patch.d_m - height_m);
@@ -179,9 +180,9 @@ void ThingFinder::look_along(std::int32_t column) noexcept {
   const auto at_row = [&](const Vec3& m, std::int32_t row) {
     return static_cast<float>(m.x() * x + m.y() * rays.y[static_cast<std::size_t>(row)] + m.z());
   };
-  // Every other four rows, in turn from column to column and from frame to frame.
+  // Every other four rows, in turn from one of the columns to the next and from one of their frames to the next.
   constexpr std::int32_t kStride = 2 * kRows;
-  const auto turn = static_cast<std::int32_t>((static_cast<std::uint32_t>(column) + frame_->sequence) & 1U);
+  const auto turn = static_cast<std::int32_t>(((static_cast<std::uint32_t>(column) + turn_) >> 1) & 1U);
   std::int32_t row = rows.first / kStride * kStride + turn * kRows;
   if (row + kRows <= rows.first) row += kStride;
   const auto four_from = [](float first, float step) {

@@ -49,7 +49,7 @@ class ThingFinder {
   Progress step(WorkBudget& budget) noexcept;
 
  private:
-  static constexpr std::int32_t kRows = 4;  // next to each other, every other four of them
+  static constexpr std::int32_t kRows = 4;  // next to each other, of every other column
   struct Rows {
     std::int16_t first = kDepthHeight_px, last = -1;
   };
@@ -57,7 +57,7 @@ class ThingFinder {
   // w > m . r.
   struct Tread {
     InversePlane plane;
-    double d_m = 0.0;          // of the camera above it
+    double d_m = 0.0;           // of the camera above it
     Vec3 bound = Vec3::Zero();  // the plane that things rise above
     Vec3 back = Vec3::Zero();   // the upright plane that things lie before; zero where none is known
     Vec3 along = Vec3::Zero();  // unit, into the tread
@@ -90,6 +90,7 @@ class ThingFinder {
   std::size_t patch_ = 0;
   bool begun_ = false;  // the tread
   std::int32_t column_ = 0;
+  std::uint32_t turn_ = 0;  // goes round with the pictures: which columns and rows are looked at
   WorkCount work_;
 };
 

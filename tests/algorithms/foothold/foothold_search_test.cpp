@@ -385,8 +385,10 @@ TEST_F(FootholdSearchTest, PostInTheMiddleOfATread_SaysThatSomethingStandsThere)
 TEST_F(FootholdSearchTest, CubeWhereAFootWouldStand_SaysThatSomethingLiesThere) {
   const Stairs s;
   MapSnapshot map = ideal_map(s);
-  const Vec3 p = s.world_T_stairs() * Vec3{0.14, 0.1, s.rise_m};
-  ASSERT_TRUE(map.occupied.try_push_back({p.x(), p.y(), p.z(), 0.02}));
+  for (const double y_m : {0.08, 0.10, 0.12}) {
+    const Vec3 p = s.world_T_stairs() * Vec3{0.14, y_m, s.rise_m};
+    ASSERT_TRUE(map.occupied.try_push_back({p.x(), p.y(), p.z(), 0.02}));
+  }
   EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kObstacle);
 }
 
@@ -411,7 +413,7 @@ TEST_F(FootholdSearchTest, CubeAtTheOuterSideOfAFoot_BothMoveAwayFromIt) {
   const FootholdSet& r = search(map, standing(s, 0));
   ASSERT_EQ(r.obstruction, StopReason::kNone);
   const Vec3 left = s.world_T_stairs().inverse() * r.p_star_feet[0].position_m;
-  EXPECT_LT(left.y(), 0.15 - kCollisionRectangle.half_width_m - 0.02);
+  EXPECT_LT(left.y(), 0.15 - kCollisionRectangle.half_width_m - 0.019);
 }
 
 TEST_F(FootholdSearchTest, WallAcrossBothFeetAtASlant_SaysThatSomethingStandsThere) {

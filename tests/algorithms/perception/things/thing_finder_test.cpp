@@ -50,9 +50,8 @@ class ThingFinderTest : public ::testing::TestWithParam<bool> {
       SurfaceExtractor::View view;
       view.intrinsics = scene.intrinsics;
       view.camera_up = scene.camera_up();
-      ASSERT_TRUE(stage->try_begin({i, static_cast<std::uint32_t>(i), scene.intrinsics.width_px,
-                                    scene.intrinsics.height_px, raw.data()},
-                                   view));
+      ASSERT_TRUE(stage->try_begin(
+          {i, static_cast<std::uint32_t>(i), scene.intrinsics.width_px, scene.intrinsics.height_px, raw.data()}, view));
       WorkBudget budget(1'000'000);
       ASSERT_EQ(stage->step(budget), Progress::kDone);
       std::vector<ThingSighting> seen;
@@ -89,7 +88,7 @@ TEST_P(ThingFinderTest, Cubes_OfEachHeightAndPlace_AreSeenWhereTheyLie) {
           EXPECT_LT(thing.far_m.x(), kFirst_m + at.x() + 0.04);
         }
       });
-      EXPECT_GE(frames, kFrames - 1) << height_m << " at " << at.transpose();
+      EXPECT_GE(frames, kFrames - 2) << height_m << " at " << at.transpose();
     }
   }
 }
@@ -103,13 +102,13 @@ TEST_P(ThingFinderTest, BookAcrossTheTread_IsSeenInEveryColumnThatShowsIt) {
       left_m = std::max(left_m, thing.near_m.y());
       right_m = std::min(right_m, thing.near_m.y());
     }
-    EXPECT_NEAR(left_m, 0.1, 0.025);
-    EXPECT_NEAR(right_m, -0.1, 0.025);
+    EXPECT_NEAR(left_m, 0.1, 0.04);
+    EXPECT_NEAR(right_m, -0.1, 0.04);
   });
 }
 
 INSTANTIATE_TEST_SUITE_P(Noise, ThingFinderTest, ::testing::Bool(),
-                         [](const auto& info) { return info.param ? "correlated" : "white"; });
+                         [](const auto& noise) { return noise.param ? "correlated" : "white"; });
 
 }  // namespace
 }  // namespace polygmap
