@@ -175,6 +175,7 @@ void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   view.intrinsics = intrinsics_;
   view.body = body_;
   view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior.tilt_sigma_rad);
+  view.columns = &extractor_.segmenter().image().columns;  // no next picture before the map is done, see intake()
   map_.begin(extractor_.result(), view);
   mapping_ = true;
   const PolygonMap::Counters& counters = map_.counters();

@@ -25,6 +25,8 @@ inline constexpr std::int32_t kDepthHeight_px = POLYGMAP_DEPTH_HEIGHT_PX;
 inline constexpr std::size_t kMaxPlanesPerFrame = 64;
 inline constexpr std::size_t kMaxPolygonVertices = 24;
 inline constexpr std::size_t kMaxMapPolygons = 64;
+inline constexpr std::size_t kMaxThingSightings = 64;  // of a frame: columns that show things on its treads
+inline constexpr std::size_t kMaxOccupiedCells = 128;  // of 20 mm: as many as a book has that both feet do not pass
 
 inline constexpr std::size_t kStateRingCapacity = 256;  // 0.51 s at 500 Hz: covers LIO and camera delays with margin
 

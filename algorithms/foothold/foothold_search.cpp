@@ -113,6 +113,7 @@ void FootholdSearch::prepare_one(const MapPolygon& polygon) noexcept {
     work_.add(surface.polygon.size(), 260);
     LevelSurface level;
     if (!prepare(polygon, yaw_of(query_.odom_T_base.R), params_.levels, params_.margin, foot_, level)) return;
+    if (is_top_of_thing(map_.occupied, params_.things, level, work_)) return;
     if (confirmed) {
       (void)levels_.try_push_back(level);  // as many as the map holds
     } else if (level.height_m > z_foot_ + params_.delta_foot_m &&
@@ -182,6 +183,10 @@ void FootholdSearch::link(std::size_t i) noexcept {
                   {params_.back_min_m, params_.back_max_m});
   }
   for (const Upright& upright : uprights_) link_upright(tread, upright);
+  if (!map_.occupied.empty()) {
+    const double feet_m = params_.feet.half_spacing_m + params_.feet.evade_max_m;
+    add_things(map_.occupied, params_.things, foot_, middle_m(tread), feet_m, tread, work_);
+  }
   const Vec2& sole_p_m = sole_.origin_m();
   const double along_m = tread.along_m(sole_p_m);
   if (tread.ends.far_m && along_m > 0.0 && along_m < *tread.ends.far_m &&
@@ -366,7 +371,7 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
     }
   }
   for (const TreadObstacle& o : tread.obstacles) {
-    if (o.meets(right_m, left_m)) spare_m = std::min(spare_m, o.sole_end_m - o.margin_m - heel_m - margin_m);
+    if (o.meets_feet(right_m, left_m)) spare_m = std::min(spare_m, o.sole_end_m - o.margin_m - heel_m - margin_m);
   }
   // A tread that ends in nothing ends all the same: the next riser may be there and not be seen.
   if (tread.ends.far_m) {
@@ -429,7 +434,7 @@ Interval FootholdSearch::between_sides(const LevelSurface& tread, double along_m
 bool FootholdSearch::blocked(const LevelSurface& tread, double middle_m, double half_m) const noexcept {
   const double least_m = params_.tread_min_m - foot_.collision.toe_x_m;
   return std::any_of(tread.obstacles.begin(), tread.obstacles.end(), [&](const TreadObstacle& o) {
-    return o.sole_end_m < least_m && o.meets(middle_m - half_m, middle_m + half_m);
+    return o.sole_end_m < least_m && o.meets_feet(middle_m - half_m, middle_m + half_m);
   });
 }
 
@@ -438,7 +443,9 @@ std::optional<double> FootholdSearch::beside_obstacles(const LevelSurface& tread
                                                        double middle_m, double half_m) const noexcept {
   std::optional<double> best;
   for (const TreadObstacle& o : tread.obstacles) {
-    for (const double beside_m : {o.sole_lateral_m.max_m + half_m, o.sole_lateral_m.min_m - half_m}) {
+    const auto [right_m, left_m] = o.sole_lateral_m;
+    // To the left and to the right of it, or over it.
+    for (const double beside_m : {left_m + half_m, right_m - half_m, left_m - half_m, right_m + half_m}) {
       const double moved_m = std::abs(beside_m - middle_m);
       if (moved_m > params_.feet.evade_max_m || beside_m < sides.min_m || beside_m > sides.max_m) continue;
       if (best && moved_m >= std::abs(*best - middle_m)) continue;
@@ -514,7 +521,7 @@ std::int32_t FootholdSearch::place_feet_instructions(const LevelSurface& tread) 
   const auto edges = static_cast<std::int32_t>(tread.edges.size()), toe = static_cast<std::int32_t>(tread.toe.size());
   const auto obstacles = static_cast<std::int32_t>(tread.obstacles.size());
   const std::int32_t once = 1500 + 50 * edges + 40 * toe + 30 * obstacles;
-  return once + params_.feet.spacings * (120 + 14 * edges + 40 * toe + 30 * obstacles * (1 + obstacles));
+  return once + params_.feet.spacings * (120 + 14 * edges + 40 * toe + 60 * obstacles * (1 + obstacles));
 }
 
 StopReason FootholdSearch::without_next() const noexcept {

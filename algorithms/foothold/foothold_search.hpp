@@ -15,6 +15,7 @@
 #include "algorithms/foothold/foothold_raster.hpp"
 #include "algorithms/foothold/level_surface.hpp"
 #include "algorithms/foothold/reach.hpp"
+#include "algorithms/foothold/things_on_tread.hpp"
 #include "algorithms/foothold/upright.hpp"
 #include "algorithms/geometry/plan_frame.hpp"
 
@@ -97,6 +98,7 @@ class FootholdSearch {
     double upright_beyond_m = 0.1;
     LevelSurfaceParams levels;
     UprightParams uprights;
+    ThingParams things;
     RasterParams raster;
     FeetParams feet;
     TopParams top;
@@ -129,6 +131,7 @@ class FootholdSearch {
             "An upright surface this much farther away than the next tread's nearest point is not looked at.");
       field("levels", p.levels);
       field("uprights", p.uprights);
+      field("things", p.things);
       field("raster", p.raster);
       field("feet", p.feet);
       field("top", p.top);

@@ -71,8 +71,13 @@ struct TreadObstacle {
   double sole_end_m = 0.0;  // behind the nosing, of a sole whose toe touches it
   double margin_m = 0.0;    // to be kept before it
   Interval sole_lateral_m;  // left of the nosing's middle, of soles that meet it or the margin beside it
+  bool low = false;         // it may lie between the feet, below the legs
   [[nodiscard]] bool meets(double right_m, double left_m) const noexcept {
     return sole_lateral_m.min_m < left_m && sole_lateral_m.max_m > right_m;
+  }
+  // Of the soles of two feet.
+  [[nodiscard]] bool meets_feet(double right_m, double left_m) const noexcept {
+    return low ? meets(right_m, right_m) || meets(left_m, left_m) : meets(right_m, left_m);
   }
 };
 
@@ -100,7 +105,7 @@ struct LevelSurface {
   StaticVector<FootLimit, kMaxPolygonVertices> edges;  // contact rectangle
   StaticVector<FootLimit, 3> toe;                      // collision box to back edge, next nosing, next riser
   double depth_m = 0.0;                                // nosing to the nearest of these, 0: none
-  StaticVector<TreadObstacle, 6> obstacles;
+  StaticVector<TreadObstacle, 8> obstacles;
   SeenEnds ends;
 
   [[nodiscard]] Vec2 nosing_middle_m() const noexcept { return 0.5 * (nosing_a_m + nosing_b_m).head<2>(); }

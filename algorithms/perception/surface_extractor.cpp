@@ -62,6 +62,7 @@ void SurfaceExtractor::begin_frame(const DepthFrameView& frame) noexcept {
   next().stamp_ns = frame.stamp_ns;
   next().sequence = frame.sequence;
   next().surfaces.clear();
+  next().things.clear();
   next().dropped = 0;
   units_spent_ = 0;
   segmenter_.begin(params_.segments, noise_, raw_, view_.body, view_.body_margin);
@@ -115,6 +116,12 @@ void SurfaceExtractor::run_stage(WorkBudget& budget) noexcept {
       counters_.plane_overflow += surfaces_.counts().overflow;
       counters_.no_polygon += surfaces_.counts().no_polygon;
       counters_.rejected_lines += surfaces_.counts().rejected_lines;
+      things_.begin(params_.things, noise_, view_.intrinsics, segmenter_.image(), regions_.result(), next());
+      stage_ = Stage::kThings;
+      return;
+    case Stage::kThings:
+      if (things_.step(budget) != Progress::kDone) return;
+      counters_.things += static_cast<std::uint32_t>(next().things.size());
       stage_ = Stage::kFinish;
       return;
     case Stage::kFinish:

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // From one raw depth frame to the planar surfaces in it: polygons, nosings, back lines. Static memory, resumable.
 //
-// A frame goes through four stages, each a class with begin(inputs), step(budget) and its results:
+// A frame goes through five stages, each a class with begin(inputs), step(budget) and its results:
 //   Segmenter       raw depths        -> columns of eight pixels, straight segments in them
 //   PlaneExtractor  segments          -> planes, and the spans of the columns that show them
 //   RegionLabeler   planes and spans  -> regions of the picture, a label for every row of every column
 //   SurfaceBuilder  regions           -> surfaces
+//   ThingFinder     surfaces, regions -> what lies on treads
 #pragma once
 
 #include <array>
@@ -21,6 +22,7 @@
 #include "algorithms/perception/region_labeler.hpp"
 #include "algorithms/perception/segmenter.hpp"
 #include "algorithms/perception/surface_builder.hpp"
+#include "algorithms/perception/things/thing_finder.hpp"
 
 namespace polygmap {
 
@@ -34,6 +36,7 @@ class SurfaceExtractor {
     PlaneExtractor::Params planes;
     RegionLabeler::Params regions;
     SurfaceBuilder::Params surfaces;
+    ThingFinder::Params things;
 
     static void visit(auto& p, auto& field) {
       field("noise", p.noise);
@@ -43,6 +46,7 @@ class SurfaceExtractor {
       field("planes", p.planes);
       field("regions", p.regions);
       field("surfaces", p.surfaces);
+      field("things", p.things);
     }
   };
   // What the module knows about this frame, in the camera frame at the exposure.
@@ -63,6 +67,7 @@ class SurfaceExtractor {
     std::uint32_t plane_overflow = 0;    // planes or surfaces that found no room
     std::uint32_t no_polygon = 0;        // surfaces whose outline encloses no area
     std::uint32_t rejected_lines = 0;    // nosings and back lines that were looked for and not good enough
+    std::uint32_t things = 0;            // columns that showed something on a tread
   };
 
   // Stairs take some 45,000 units, a cluttered desk 70,000. With every capacity full a frame takes at most
@@ -97,7 +102,7 @@ class SurfaceExtractor {
   }
 
   // What the next step begins with; a benchmark charges time to it.
-  enum class Stage : std::uint8_t { kIdle, kSegments, kPlanes, kRegions, kSurfaces, kFinish };
+  enum class Stage : std::uint8_t { kIdle, kSegments, kPlanes, kRegions, kSurfaces, kThings, kFinish };
   [[nodiscard]] Stage stage() const noexcept { return stage_; }
   [[nodiscard]] const Segmenter& segmenter() const noexcept { return segmenter_; }
   [[nodiscard]] const PlaneExtractor& plane_extractor() const noexcept { return planes_; }
@@ -128,6 +133,7 @@ class SurfaceExtractor {
   PlaneExtractor planes_;
   RegionLabeler regions_;
   SurfaceBuilder surfaces_;
+  ThingFinder things_;
 };
 
 }  // namespace polygmap

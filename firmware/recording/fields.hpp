@@ -159,10 +159,16 @@ void each_field(auto& f, Of<SurfacePatch> auto& m) {
   walk(f, "nosing", m.nosing);
   walk(f, "back", m.back);
 }
+void each_field(auto& f, Of<ThingSighting> auto& m) {
+  walk(f, "near_m", m.near_m);
+  walk(f, "far_m", m.far_m);
+  walk(f, "height_m", m.height_m);
+}
 void each_field(auto& f, Of<SurfaceFrame> auto& m) {
   walk(f, "stamp_ns", m.stamp_ns);
   walk(f, "sequence", m.sequence);
   walk(f, "surfaces", m.surfaces);
+  walk(f, "things", m.things);
   walk(f, "invalid_fraction", m.invalid_fraction);
   walk(f, "dropped", m.dropped);
 }
@@ -172,10 +178,17 @@ void each_field(auto& f, Of<MapPolygon> auto& m) {
   walk(f, "sightings", m.sightings);
   walk(f, "last_seen_ns", m.last_seen_ns);
 }
+void each_field(auto& f, Of<OccupiedCell> auto& m) {
+  walk(f, "x_m", m.x_m);
+  walk(f, "y_m", m.y_m);
+  walk(f, "ground_m", m.ground_m);
+  walk(f, "height_m", m.height_m);
+}
 void each_field(auto& f, Of<MapSnapshot> auto& m) {
   walk(f, "stamp_ns", m.stamp_ns);
   walk(f, "drift_m", m.drift_m);
   walk(f, "polygons", m.polygons);
+  walk(f, "occupied", m.occupied);
 }
 
 void each_field(auto& f, Of<Foothold> auto& m) {

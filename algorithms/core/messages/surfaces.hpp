@@ -50,11 +50,21 @@ struct SurfacePatch {
 
 using SurfacePatches = StaticVector<SurfacePatch, kMaxPlanesPerFrame>;
 
+// What one of the picture's columns shows of something that lies on a tread: below it, on the tread's plane, from its
+// nearest to its farthest row. Camera frame.
+struct ThingSighting {
+  Vec3 near_m = Vec3::Zero();
+  Vec3 far_m = Vec3::Zero();
+  double height_m = 0.0;  // above the tread, at most
+};
+using ThingSightings = StaticVector<ThingSighting, kMaxThingSightings>;
+
 // Everything seen in one frame.
 struct SurfaceFrame {
   std::int64_t stamp_ns = 0;  // exposure
   std::uint32_t sequence = 0;
   SurfacePatches surfaces;        // camera frame
+  ThingSightings things;          // on its treads
   double invalid_fraction = 0.0;  // of the picture outside the robot's own body
   std::uint32_t dropped = 0;      // surfaces that found no room
 };
@@ -68,10 +78,20 @@ struct MapPolygon {
 };
 using MapPolygons = StaticVector<MapPolygon, kMaxMapPolygons>;
 
+// A square of ground that something lies on, kOccupiedCell_m wide and along the map's axes; the map's frame.
+struct OccupiedCell {
+  double x_m = 0.0, y_m = 0.0;  // its middle
+  double ground_m = 0.0;        // height of the tread there
+  double height_m = 0.0;        // of the thing above it
+};
+using OccupiedCells = StaticVector<OccupiedCell, kMaxOccupiedCells>;
+inline constexpr double kOccupiedCell_m = 0.02;
+
 struct MapSnapshot {
   std::int64_t stamp_ns = 0;    // exposure of the newest fused frame
   Vec3 drift_m = Vec3::Zero();  // what lies at p in the map lies at p + drift in the pose's odometry
   MapPolygons polygons;
+  OccupiedCells occupied;
 };
 
 }  // namespace polygmap

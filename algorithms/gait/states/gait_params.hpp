@@ -46,6 +46,7 @@ struct StandingParams {
   std::int32_t settle_ticks = 300;
   std::int32_t start_patience_ticks = 1500;
   std::int32_t patience_ticks = 500;
+  std::int32_t obstacle_patience_ticks = 5000;
   std::int32_t unsteady_patience = 3;
   ToeCalibrationParams toe_calibration;
 
@@ -55,6 +56,8 @@ struct StandingParams {
           "Before the first step the gait stops when one obstruction lasts so long without a break.");
     field("patience_ticks", p.patience_ticks, 0, 100000,
           "After the first step, or at the top, the gait stops when one obstruction lasts so long: 1 s.");
+    field("obstacle_patience_ticks", p.obstacle_patience_ticks, 0, 100000,
+          "The gait waits so long for what stands in its way to go, 10 s.");
     field("unsteady_patience", p.unsteady_patience, 1, 100,
           "Obstructions that change are waited for this many times as long.");
     field("toe_calibration", p.toe_calibration);

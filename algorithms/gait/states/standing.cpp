@@ -27,7 +27,8 @@ Transition Standing::tick(const GaitInput& in, GaitShared& gait) noexcept {
   if (in.lost) return Transition::stop(StopReason::kStateStale);
   if (!in.state.initialised || !in.usable) return {};
   if (!in.may_step) {
-    gait.memory.shifts = gait.memory.idle_ticks = wait_ticks_ = 0;  // it waits for nothing that it sees
+    gait.memory.shifts = gait.memory.idle_ticks = gait.memory.obstacle_ticks = wait_ticks_ =
+        0;  // it waits for nothing that it sees
     return {};
   }
   // A body that sways sideways or back is best off between the feet: no step to come would catch it.
@@ -61,12 +62,17 @@ Transition Standing::wait(const GaitShared& gait, const ClimbPlanner::Decision& 
   wait_ticks_ = reason == waiting_for_ ? wait_ticks_ + 1 : 1;
   waiting_for_ = reason;
   ++gait.memory.idle_ticks;
-  const std::int32_t patience = gait.status.step.sequence == 0 ? params.start_patience_ticks : params.patience_ticks;
+  if (reason == StopReason::kObstacle) ++gait.memory.obstacle_ticks;
+  std::int32_t patience = gait.status.step.sequence == 0 ? params.start_patience_ticks : params.patience_ticks;
+  if (reason == StopReason::kObstacle) patience = std::max(patience, params.obstacle_patience_ticks);
   if (wait_ticks_ >= patience) {
     return reason == StopReason::kTop ? Transition::finish() : Transition::stop(reason, decision.measured_m);
   }
-  const bool unsteady = gait.memory.idle_ticks >= params.unsteady_patience * patience;
-  return unsteady ? Transition::stop(StopReason::kUnsteady) : Transition{};
+  // At the margin of what it may stand beside, a thing is in the way in some pictures and not in others.
+  const bool obstacle = 2 * gait.memory.obstacle_ticks > gait.memory.idle_ticks;
+  const std::int32_t most = params.unsteady_patience * patience;
+  if (gait.memory.idle_ticks < (obstacle ? std::max(most, params.obstacle_patience_ticks) : most)) return {};
+  return Transition::stop(obstacle ? StopReason::kObstacle : StopReason::kUnsteady);
 }
 
 }  // namespace polygmap

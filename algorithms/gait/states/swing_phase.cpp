@@ -39,7 +39,7 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
       .odom_T_executed = {}};
   gait.status.phase = GaitPhase::kSwing;
   gait.status.stands[index_of(goal_.foot)] = false;
-  gait.memory.shifts = gait.memory.idle_ticks = 0;
+  gait.memory.shifts = gait.memory.idle_ticks = gait.memory.obstacle_ticks = 0;
   gait.memory.retried = false;
   body.release_landed_foot();
 }

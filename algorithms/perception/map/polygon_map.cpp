@@ -53,6 +53,8 @@ void PolygonMap::clear() noexcept {
   snapshot_.stamp_ns = 0;
   snapshot_.drift_m.setZero();
   drift_.clear();
+  things_.clear();
+  snapshot_.occupied.clear();
   any_frame_ = false;
   newest_ns_ = 0;
   stage_ = Stage::kIdle;
@@ -124,6 +126,7 @@ Progress PolygonMap::step(WorkBudget& budget) noexcept {
   while (!budget.exhausted()) {
     do_piece();
     work_.add(120);
+    work_.add(things_.work());
     budget.spend(work_.take_units());
     if (stage_ == Stage::kIdle) return Progress::kDone;
   }
@@ -152,8 +155,23 @@ void PolygonMap::do_piece() noexcept {
       if (pass_.track < tracks_.size()) {
         age(tracks_[pass_.track++]);
       } else {
-        stage_ = Stage::kPublish;
+        begin_things();
       }
+      break;
+    case Stage::kThings:
+      if (thing_ < frame_.things.size()) {
+        things_.add(frame_.things[thing_++]);
+      } else {
+        thing_ = 0;
+        stage_ = Stage::kThingsAgain;
+      }
+      break;
+    case Stage::kThingsAgain:
+      for (constexpr std::size_t kAtOnce = 16; thing_ < things_.count();) {
+        things_.look_again(thing_++);
+        if (thing_ % kAtOnce == 0) break;
+      }
+      if (thing_ >= things_.count()) stage_ = Stage::kPublish;
       break;
     case Stage::kPublish:
       publish();
@@ -162,6 +180,12 @@ void PolygonMap::do_piece() noexcept {
     case Stage::kIdle:
       break;
   }
+}
+
+void PolygonMap::begin_things() noexcept {
+  things_.begin({map_T_camera_, view_.intrinsics, view_.columns});
+  thing_ = 0;
+  stage_ = Stage::kThings;
 }
 
 bool PolygonMap::load(const SurfacePatch& patch) noexcept {

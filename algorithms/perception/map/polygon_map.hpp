@@ -13,6 +13,7 @@
 #include "algorithms/core/work.hpp"
 #include "algorithms/perception/map/map_drift.hpp"
 #include "algorithms/perception/map/map_track.hpp"
+#include "algorithms/perception/map/thing_map.hpp"
 #include "algorithms/robot/body_shapes.hpp"
 
 namespace polygmap {
@@ -167,6 +168,7 @@ class PolygonMap {
     MemoryParams memory;
     PlainViewParams plain_view;
     SideParams sides;
+    ThingMap::Params things;
 
     static void visit(auto& p, auto& field) {
       field("window_s", p.window_s, 0.05, 1000.0, "Information fades to 1/e in this time.");
@@ -191,6 +193,7 @@ class PolygonMap {
       field("memory", p.memory);
       field("plain_view", p.plain_view);
       field("sides", p.sides);
+      field("things", p.things);
     }
   };
   struct View {
@@ -201,6 +204,7 @@ class PolygonMap {
     std::array<LegShapes, kFootCount> body{};  // camera frame; what it hides is not seen to be empty
     BodyMargin body_margin{0.02, 0.0};
     double mount_sigma_rad = 0.0;  // of the camera's roll and pitch on the base: between what is seen and the feet
+    const ColumnImage* columns = nullptr;  // the picture, until the frame is done; none: no thing is seen to be gone
   };
   struct Counters {
     std::uint32_t frames = 0;
@@ -225,7 +229,7 @@ class PolygonMap {
   };
 
   PolygonMap() noexcept : PolygonMap(Params{}) {}
-  explicit PolygonMap(const Params& params) noexcept : params_(params), drift_(params.drift) {}
+  explicit PolygonMap(const Params& params) noexcept : params_(params), drift_(params.drift), things_(params.things) {}
 
   // Copies the frame. A frame that is invalid or not newer is counted and leaves nothing to do.
   void begin(const SurfaceFrame& frame, const View& view) noexcept;
@@ -233,7 +237,7 @@ class PolygonMap {
   static constexpr std::int32_t kMaxPieceUnits = 120'000 / kInstructionsPerUnit;
   Progress step(WorkBudget& budget) noexcept;
   // What the next step begins with; a benchmark charges instructions to it.
-  enum class Stage : std::uint8_t { kIdle, kLoad, kCompare, kFuse, kAge, kPublish };
+  enum class Stage : std::uint8_t { kIdle, kLoad, kCompare, kFuse, kAge, kThings, kThingsAgain, kPublish };
   [[nodiscard]] Stage stage() const noexcept { return stage_; }
   // Changes only in the step that returns kDone. The stamp moves on only with a frame in which something was seen.
   [[nodiscard]] const MapSnapshot& snapshot() const noexcept { return snapshot_; }
@@ -260,6 +264,7 @@ class PolygonMap {
   };
 
   void do_piece() noexcept;
+  void begin_things() noexcept;
   void order_surfaces() noexcept;
   void begin_fusing() noexcept;
   void next_surface() noexcept;
@@ -301,6 +306,7 @@ class PolygonMap {
   MapSnapshot snapshot_;
   StaticVector<MapTrack, kMaxMapPolygons> tracks_;  // index i is snapshot polygon i once published
   MapDrift drift_;
+  ThingMap things_;
   SurfaceFrame frame_;
   StaticVector<std::uint8_t, kMaxPlanesPerFrame> order_;  // of the frame's surfaces: treads and risers first
   std::size_t alignment_count_ = 0;                       // how many of these say where the frame lies
@@ -314,6 +320,7 @@ class PolygonMap {
   bool any_frame_ = false;
   Stage stage_ = Stage::kIdle;
   Pass pass_;
+  std::size_t thing_ = 0;  // the frame's sighting, or the map's cell
   WorkCount work_;
 };
 

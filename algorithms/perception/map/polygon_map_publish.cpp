@@ -29,6 +29,7 @@ void PolygonMap::publish() noexcept {
     (void)out.try_swap_remove(i);
   }
   ++counters_.frames;
+  things_.finish(snapshot_.occupied);
   snapshot_.drift_m = drift_.drift_m();
   if (fused_in_frame_ > 0) snapshot_.stamp_ns = newest_ns_;
 }

@@ -107,6 +107,7 @@ void ClimbReport::observe_map(const Telemetry& telemetry) {
   if (map.stamp_ns == map_stamp_ns_) return;
   map_stamp_ns_ = map.stamp_ns;
   exposure_to_map_ms_.push_back(ms(telemetry.now_ns - map.stamp_ns));
+  occupied_cells_most_ = std::max<std::uint64_t>(occupied_cells_most_, map.occupied.size());
   for (auto& [id, seen] : polygons_) seen.remembered = false;
   for (const MapPolygon& polygon : map.polygons) {
     auto& seen = polygons_[polygon.id] = {polygon.surface, true};
@@ -354,6 +355,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.foothold_error_across_m = spread_of(across);
   s.map_age_at_latch_ms = spread_of(map_age);
   s.target_last_seen_ms = spread_of(last_seen);
+  s.occupied_cells_most = occupied_cells_most_;
   s.exposure_to_map_ms = spread_of(exposure_to_map_ms_);
   s.sole_margin_min_m = sole_margin_min_m_;
   s.swing_clearance_min_m = clearance_min_m();

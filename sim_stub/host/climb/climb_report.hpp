@@ -105,6 +105,7 @@ class ClimbReport {
   std::uint64_t in_view_ = 0, missed_ = 0;  // true surfaces
   std::int64_t map_stamp_ns_ = 0;
   std::vector<double> exposure_to_map_ms_;
+  std::uint64_t occupied_cells_most_ = 0;
   struct Seen {
     SurfacePatch surface;
     bool remembered;

@@ -194,6 +194,7 @@ Json to_json(const ClimbSummary& s) {
   j["odometry_drift_mm"] = {{"base", mm(o.drift_base_m)}, {"fused", mm(o.drift_fused_m)}};
   j["odometry_jitter_mm"] = {{"lio", mm(o.jitter_lio_m)}, {"fused", mm(o.jitter_fused_m)}};
   j["odometry_nees"] = {{"mean", rounded(o.nees_mean, 100.0)}, {"in_bounds", rounded(o.nees_in_bounds, 1e3)}};
+  j["occupied_cells_most"] = s.occupied_cells_most;
   j["exposure_to_map_ms"] = spread_ms(s.exposure_to_map_ms);
   j["map_age_at_latch_ms"] = spread_ms(s.map_age_at_latch_ms);
   j["target_last_seen_ms"] = spread_ms(s.target_last_seen_ms);

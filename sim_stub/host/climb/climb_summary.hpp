@@ -139,6 +139,7 @@ struct ClimbSummary {
   double torque_limited_ms = 0.0;  // for so long a drive gave all it has
   OdometryFigures odometry;
   Spread exposure_to_map_ms;
+  std::uint64_t occupied_cells_most = 0;  // of the map at any time
   Spread map_age_at_latch_ms;
   Spread target_last_seen_ms;
   std::uint64_t heap_calls = 0;

@@ -382,6 +382,40 @@ TEST_F(FootholdSearchTest, PostInTheMiddleOfATread_SaysThatSomethingStandsThere)
   EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kObstacle);
 }
 
+TEST_F(FootholdSearchTest, CubeWhereAFootWouldStand_SaysThatSomethingLiesThere) {
+  const Stairs s;
+  MapSnapshot map = ideal_map(s);
+  for (const double y_m : {0.08, 0.10, 0.12}) {
+    const Vec3 p = s.world_T_stairs() * Vec3{0.14, y_m, s.rise_m};
+    ASSERT_TRUE(map.occupied.try_push_back({p.x(), p.y(), p.z(), 0.02}));
+  }
+  EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kObstacle);
+}
+
+TEST_F(FootholdSearchTest, CubeBetweenTheFeet_TheyStandAsWithoutIt) {
+  const Stairs s;
+  MapSnapshot map = ideal_map(s);
+  const FootholdSet without = search(map, standing(s, 0));
+  const Vec3 p = s.world_T_stairs() * Vec3{0.14, 0.0, s.rise_m};
+  ASSERT_TRUE(map.occupied.try_push_back({p.x(), p.y(), p.z(), 0.02}));
+  const FootholdSet& with = search(map, standing(s, 0));
+  ASSERT_EQ(with.obstruction, StopReason::kNone);
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    EXPECT_LT((with.p_star_feet[foot].position_m - without.p_star_feet[foot].position_m).norm(), 1e-9);
+  }
+}
+
+TEST_F(FootholdSearchTest, CubeAtTheOuterSideOfAFoot_BothMoveAwayFromIt) {
+  const Stairs s;
+  MapSnapshot map = ideal_map(s);
+  const Vec3 p = s.world_T_stairs() * Vec3{0.14, 0.15, s.rise_m};
+  ASSERT_TRUE(map.occupied.try_push_back({p.x(), p.y(), p.z(), 0.02}));
+  const FootholdSet& r = search(map, standing(s, 0));
+  ASSERT_EQ(r.obstruction, StopReason::kNone);
+  const Vec3 left = s.world_T_stairs().inverse() * r.p_star_feet[0].position_m;
+  EXPECT_LT(left.y(), 0.15 - kCollisionRectangle.half_width_m - 0.019);
+}
+
 TEST_F(FootholdSearchTest, WallAcrossBothFeetAtASlant_SaysThatSomethingStandsThere) {
   const Stairs s;
   for (const double slant_rad : {0.7, -0.7, 1.0}) {
