@@ -144,15 +144,16 @@ bool ThingFinder::begin_tread(const SurfacePatch& patch) noexcept {
 
 // What parts a tread's pieces may lie on it: a column between them is looked at from the one's rows to the other's.
 void ThingFinder::fill_columns() noexcept {
-  work_.add(tread_.last_column - tread_.first_column + 1, 6);
+  work_.add(std::max(tread_.last_column - tread_.first_column + 1, 0), 8);
+  std::int32_t seen = -1;  // the last column with rows
   for (std::int32_t g = tread_.first_column; g <= tread_.last_column; ++g) {
-    if (rows_[static_cast<std::size_t>(g)].last >= 0) continue;
-    std::int32_t next = g;
-    while (rows_[static_cast<std::size_t>(next)].last < 0) ++next;  // the last column has rows
-    const Rows before = rows_[static_cast<std::size_t>(g - 1)], after = rows_[static_cast<std::size_t>(next)];
-    for (; g < next; ++g) {
-      rows_[static_cast<std::size_t>(g)] = {std::min(before.first, after.first), std::max(before.last, after.last)};
+    const Rows rows = rows_[static_cast<std::size_t>(g)];
+    if (rows.last < rows.first) continue;
+    for (std::int32_t between = seen + 1; seen >= 0 && between < g; ++between) {
+      const Rows& before = rows_[static_cast<std::size_t>(seen)];
+      rows_[static_cast<std::size_t>(between)] = {std::min(before.first, rows.first), std::max(before.last, rows.last)};
     }
+    seen = g;
   }
 }
 
