@@ -84,6 +84,8 @@ bool ThingFinder::find_back(const SurfacePatch& patch, EdgeLine& back) const noe
   if (patch.back.valid) add(patch.back);
   for (const SurfacePatch& other : frame_->surfaces) {
     if (!other.nosing.valid || &other == &patch) continue;
+    const double width_m2 = (other.nosing.b_m - other.nosing.a_m).squaredNorm();
+    if (width_m2 < math::square(params_.surface_width_m)) continue;  // the top of a thing
     const double above_m = tread_.plane.distance_m(0.5 * (other.nosing.a_m + other.nosing.b_m));
     if (above_m > params_.least_height_m && above_m < kNextNosing_m) add(other.nosing);
   }
@@ -95,6 +97,9 @@ bool ThingFinder::begin_tread(const SurfacePatch& patch) noexcept {
   tread_.first_column = 0;
   tread_.last_column = -1;
   if (patch.kind != SurfaceKind::kTread || !patch.nosing.valid || !(patch.d_m > kNearest_m)) return false;
+  for (std::size_t i = 0; i < patch_; ++i) {  // its pieces are looked over together
+    if (frame_->surfaces[i].plane == patch.plane && frame_->surfaces[i].nosing.valid) return false;
+  }
   const Vec3 nosing_m = 0.5 * (patch.nosing.a_m + patch.nosing.b_m);
   if (nosing_m.squaredNorm() > math::square(params_.range_m) || nosing_m.z() < kNearest_m) return false;
   work_.add(600);
@@ -128,34 +133,52 @@ bool ThingFinder::begin_tread(const SurfacePatch& patch) noexcept {
       above_px = std::max(0.0, intrinsics_.fy_px * (foot_m.y() / foot_m.z() - top_m.y() / top_m.z()));
     }
   }
-  find_rows(patch, above_px);
+  rows_.fill(Rows{});
+  tread_.first_column = image_->column_rays.columns;
+  for (const SurfacePatch& piece : frame_->surfaces) {
+    if (piece.plane == patch.plane) add_rows(piece, above_px);
+  }
+  fill_columns();
   return tread_.last_column >= tread_.first_column;
 }
 
-// Of every column, the rows in which the polygon lies, and as many above as a thing at its back would show in.
-void ThingFinder::find_rows(const SurfacePatch& patch, double above_px) noexcept {
-  rows_.fill(Rows{});
+// What parts a tread's pieces may lie on it: a column between them is looked at from the one's rows to the other's.
+void ThingFinder::fill_columns() noexcept {
+  work_.add(std::max(tread_.last_column - tread_.first_column + 1, 0), 8);
+  std::int32_t seen = -1;  // the last column with rows
+  for (std::int32_t g = tread_.first_column; g <= tread_.last_column; ++g) {
+    const Rows rows = rows_[static_cast<std::size_t>(g)];
+    if (rows.last < rows.first) continue;
+    for (std::int32_t between = seen + 1; seen >= 0 && between < g; ++between) {
+      const Rows& before = rows_[static_cast<std::size_t>(seen)];
+      rows_[static_cast<std::size_t>(between)] = {std::min(before.first, rows.first), std::max(before.last, rows.last)};
+    }
+    seen = g;
+  }
+}
+
+// Adds to every column the rows in which the polygon lies, and as many above as a thing at its back would show in.
+void ThingFinder::add_rows(const SurfacePatch& piece, double above_px) noexcept {
   const std::int32_t columns = image_->column_rays.columns, height_px = image_->column_rays.height_px;
-  const std::size_t n = patch.polygon.size();
+  const std::size_t n = piece.polygon.size();
   const auto column_of = [&](const Vec3& p) {
     return (p.x() / p.z() * intrinsics_.fx_px + intrinsics_.cx_px - 0.5 * (kColumn_px - 1)) / kColumn_px;
   };
   const auto row_of = [&](const Vec3& p) { return p.y() / p.z() * intrinsics_.fy_px + intrinsics_.cy_px; };
   work_.add(250);
   work_.add(n, 60);
-  for (const Vec3& v : patch.polygon) {
+  for (const Vec3& v : piece.polygon) {
     if (v.z() < kNearest_m) return;
   }
-  std::int32_t first_column = columns, last_column = -1;
   for (std::size_t i = 0; i < n; ++i) {
-    const Vec3 &a = patch.polygon[i], &b = patch.polygon[i + 1 < n ? i + 1 : 0];
+    const Vec3 &a = piece.polygon[i], &b = piece.polygon[i + 1 < n ? i + 1 : 0];
     const double from = column_of(a), to = column_of(b), from_px = row_of(a), to_px = row_of(b);
     const double slope = std::abs(to - from) > 1e-9 ? (to_px - from_px) / (to - from) : 0.0;
     const auto first = static_cast<std::int32_t>(std::ceil(math::clamp(std::min(from, to), 0.0, columns + 0.0)));
     const auto last = static_cast<std::int32_t>(std::floor(math::clamp(std::max(from, to), -1.0, columns - 1.0)));
     if (last < first) continue;
-    first_column = std::min(first_column, first);
-    last_column = std::max(last_column, last);
+    tread_.first_column = std::min(tread_.first_column, first);
+    tread_.last_column = std::max(tread_.last_column, last);
     work_.add(last - first + 1, 14);
     for (std::int32_t g = first; g <= last; ++g) {
       const double row = math::clamp(from_px + slope * (g - from), -1.0, height_px + 0.0);
@@ -164,8 +187,6 @@ void ThingFinder::find_rows(const SurfacePatch& patch, double above_px) noexcept
       rows.last = std::max(rows.last, static_cast<std::int16_t>(std::min(row, height_px - 1.0)));
     }
   }
-  tread_.first_column = first_column;
-  tread_.last_column = last_column;
 }
 
 void ThingFinder::look_along(std::int32_t column) noexcept {

@@ -74,7 +74,8 @@ class ThingFinder {
   void find_surfaces() noexcept;
   [[nodiscard]] bool begin_tread(const SurfacePatch& patch) noexcept;
   [[nodiscard]] bool find_back(const SurfacePatch& patch, EdgeLine& back) const noexcept;
-  void find_rows(const SurfacePatch& patch, double above_px) noexcept;
+  void add_rows(const SurfacePatch& piece, double above_px) noexcept;
+  void fill_columns() noexcept;
   void look_along(std::int32_t column) noexcept;
   void take(std::int32_t column, std::int32_t row, Seen& seen) noexcept;
 

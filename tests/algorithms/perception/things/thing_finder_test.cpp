@@ -84,8 +84,8 @@ TEST_P(ThingFinderTest, Cubes_OfEachHeightAndPlace_AreSeenWhereTheyLie) {
         for (const ThingSighting& thing : things) {
           EXPECT_NEAR(thing.near_m.y(), at.y(), 0.035);
           EXPECT_NEAR(thing.near_m.z(), kRise_m, 0.006);
-          EXPECT_GT(thing.near_m.x(), kFirst_m + at.x() - 0.04);
-          EXPECT_LT(thing.far_m.x(), kFirst_m + at.x() + 0.04);
+          EXPECT_GT(thing.near_m.x(), kFirst_m + at.x() - 0.06);
+          EXPECT_LT(thing.far_m.x(), kFirst_m + at.x() + 0.06);
         }
       });
       EXPECT_GE(frames, kFrames - 2) << height_m << " at " << at.transpose();
