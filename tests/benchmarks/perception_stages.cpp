@@ -109,6 +109,7 @@ ExtractorStage extractor_stage(const SurfaceExtractor& extractor) noexcept {
     case At::kRegions:
       return kComponents;
     case At::kSurfaces:
+    case At::kThings:
     case At::kFinish:
       return kPolygons;
   }

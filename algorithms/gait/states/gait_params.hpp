@@ -200,7 +200,7 @@ struct GaitParams {
   LandedFootParams landed_foot;
   HeldBodyParams held_body;
   double steady_m = 0.015;
-  double soft_ground_rad = 0.025;
+  double soft_ground_rad = 0.031;
   double correction_time_s = 0.03;
   double bias_time_s = 0.1;
   std::int64_t steer_age_ns = 20 * kNsPerMs;
