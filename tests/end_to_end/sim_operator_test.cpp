@@ -94,7 +94,7 @@ INSTANTIATE_TEST_SUITE_P(
                                 "s  standing\n    3.00 s  pause refused: standing\n", "standing"},
                     AskedInVain{"holding", {{1.0, Command::kArm}, {3.0, Command::kStart}, {4.0, Command::kPause}},
                                 "s  walking_up\n    4.00 s  holding\n", "holding"}),
-    [](const auto& info) { return info.param.name; });
+    [](const auto& asked) { return asked.param.name; });
 
 TEST(UnaskedRobot, AutostartIsOffAndThereIsNoOperator_EndsAsOff) {
   ClimbOptions options;
