@@ -90,10 +90,14 @@ TEST_P(OperatorWithNothingMoreToAsk, ModuleWaits_EndsAndSaysWhatWasRefused) {
 INSTANTIATE_TEST_SUITE_P(
     States, OperatorWithNothingMoreToAsk,
     testing::Values(AskedInVain{"off", {{2.0, Command::kStart}}, "    2.00 s  start refused: off\n", "off"},
-                    AskedInVain{"standing", {{1.0, Command::kArm}, {3.0, Command::kPause}},
-                                "s  standing\n    3.00 s  pause refused: standing\n", "standing"},
-                    AskedInVain{"holding", {{1.0, Command::kArm}, {3.0, Command::kStart}, {4.0, Command::kPause}},
-                                "s  walking_up\n    4.00 s  holding\n", "holding"}),
+                    AskedInVain{"standing",
+                                {{1.0, Command::kArm}, {3.0, Command::kPause}},
+                                "s  standing\n    3.00 s  pause refused: standing\n",
+                                "standing"},
+                    AskedInVain{"holding",
+                                {{1.0, Command::kArm}, {3.0, Command::kStart}, {4.0, Command::kPause}},
+                                "s  walking_up\n    4.00 s  holding\n",
+                                "holding"}),
     [](const auto& asked) { return asked.param.name; });
 
 TEST(UnaskedRobot, AutostartIsOffAndThereIsNoOperator_EndsAsOff) {

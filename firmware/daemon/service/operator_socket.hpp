@@ -49,7 +49,7 @@ class OperatorSocket final : public hal::OperatorInput {
   int fd_ = -1;
   std::atomic<std::uint8_t> stage_{kNone};
   std::atomic<OperatorCommand> command_{};  // written before kAsked is
-  OperatorAnswer answer_;               // written before kAnswered is
+  OperatorAnswer answer_;                   // written before kAnswered is
   std::int64_t sent_ns_ = 0;
   bool was_answered_ = false;  // at the last look: by this one its cycle has published the state
   sockaddr_un asker_{};

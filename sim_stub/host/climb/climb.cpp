@@ -275,7 +275,8 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     const bool ended = state == ModuleState::kOnTop || state == ModuleState::kSafeStop;
     const bool waits = waits_for_operator(state);
     // Out of a fall no command leads.
-    const bool over = state == ModuleState::kFallen || ((ended || waits || telemetry.arming_waits_for.leans()) && !goes_on);
+    const bool over =
+        state == ModuleState::kFallen || ((ended || waits || telemetry.arming_waits_for.leans()) && !goes_on);
     if (!over) end_ns = -1;
     if (over && end_ns < 0) end_ns = robot.now_ns() + kRestAfterEnd_ns;
     if (robot.truth().fell) break;

@@ -321,7 +321,11 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   const bool operator_ended = run.operator_end != OperatorEnd::kNone;
   s.ended_at_s = seconds(last_stamp_ns_);
   s.interrupted_by = fell_ || module_ended ? 0 : run.interrupted_by;
-  s.ended_by = fell_ ? "fall" : module_ended ? "module" : s.interrupted_by != 0 ? "interrupted" : operator_ended ? "operator" : "time limit";
+  s.ended_by = fell_                   ? "fall"
+               : module_ended          ? "module"
+               : s.interrupted_by != 0 ? "interrupted"
+               : operator_ended        ? "operator"
+                                       : "time limit";
   if (on_top_ns_ >= 0 && first_lift_off_ns_ >= 0) {
     s.climb_time_s = seconds(on_top_ns_ - first_lift_off_ns_);
     s.seconds_per_step = s.climb_time_s / s.steps_total;

@@ -128,7 +128,8 @@ TEST_F(ProgramTest, Ask_SaysWhereNobodyListens) {
 TEST_F(ProgramTest, AskWithAFileThatIsBeingEdited_ReadsTheKeyOperatorAlone) {
   for (const char* rest : {"bus = \"nowhere.toml\"\n", "params = \"nowhere.toml\"\n", "lanes = \"x\"\n[imu]\n",
                            "hold_s = \n", "[camera\n", "[imu]\noperator = 3\n", "\"unfinished"}) {
-    const std::string path = write("edited.toml", "# a robot\n \toperator =\t\"socket\"  # here\r\n" + std::string(rest));
+    const std::string path =
+        write("edited.toml", "# a robot\n \toperator =\t\"socket\"  # here\r\n" + std::string(rest));
     const Done done = run("--ask stop --config " + path);
     EXPECT_EQ(done.code, 3) << rest << done.said;
     EXPECT_NE(done.said.find("nobody listens at \"" + (folder_ / "socket").string()), std::string::npos) << done.said;
