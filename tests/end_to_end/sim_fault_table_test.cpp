@@ -76,17 +76,24 @@ bool falls(bool single_step, std::string_view fault, std::string_view moment) {
 
 class FaultTable : public testing::TestWithParam<FaultCase> {};
 
-bool within_limits(const DriveModel& drives, const JointCommand& command) {
+// Empty, or the first joint that is asked for more than its drive takes, and of what.
+std::string beyond_limits(const DriveModel& drives, const JointCommand& command) {
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const JointSetpoint& joint = command.joints[n];
     const JointLimits& limits = drives.limits[n];
+    const double kp_most_nmprad = drives.kp_most_nmprad[n % kJointsPerLeg];
+    const double kd_most_nmsprad = drives.kd_most_nmsprad[n % kJointsPerLeg];
+    const auto says = [n](const char* what, double value) {
+      return std::string(kJointNames[n]) + " " + what + " " + std::to_string(value);
+    };
     const bool placed = joint.q_rad >= limits.min_rad - 1e-9 && joint.q_rad <= limits.max_rad + 1e-9;
-    const bool moves = std::abs(joint.tau_ff_nm) <= limits.torque_nm && std::abs(joint.dq_radps) <= limits.speed_radps;
-    const bool stiff = joint.kp_nmprad >= 0.0 && joint.kp_nmprad <= drives.kp_most_nmprad[n % kJointsPerLeg];
-    const bool damped = joint.kd_nmsprad >= 0.0 && joint.kd_nmsprad <= drives.kd_most_nmsprad[n % kJointsPerLeg];
-    if (!placed || !moves || !stiff || !damped) return false;
+    if (!placed) return says("q_rad", joint.q_rad);
+    if (!(std::abs(joint.dq_radps) <= limits.speed_radps)) return says("dq_radps", joint.dq_radps);
+    if (!(std::abs(joint.tau_ff_nm) <= limits.torque_nm)) return says("tau_ff_nm", joint.tau_ff_nm);
+    if (!(joint.kp_nmprad >= 0.0 && joint.kp_nmprad <= kp_most_nmprad)) return says("kp_nmprad", joint.kp_nmprad);
+    if (!(joint.kd_nmsprad >= 0.0 && joint.kd_nmsprad <= kd_most_nmsprad)) return says("kd_nmsprad", joint.kd_nmsprad);
   }
-  return true;
+  return {};
 }
 
 TEST_P(FaultTable, EndsInItsStateWithinItsTime_OnBothFeet) {
@@ -110,10 +117,10 @@ TEST_P(FaultTable, EndsInItsStateWithinItsTime_OnBothFeet) {
   const auto is_over = [&] {
     return climb.state() == fault.ends_as && climb.status().stands[0] && climb.status().stands[1];
   };
-  bool sound = true;
+  std::string beyond;
   do {
     (void)climb.tick();
-    sound = sound && within_limits(params.robot.drives, climb.command());
+    if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.command());
   } while (!is_over() && !climb.truth().fell && climb.time_s() - begun_s < 10.0);
   const bool may_fall = falls(single_step, fault.name, moment.name);
   if (!climb.truth().fell) {
@@ -121,7 +128,8 @@ TEST_P(FaultTable, EndsInItsStateWithinItsTime_OnBothFeet) {
     EXPECT_LE(climb.time_s() - begun_s, fault.within_s);
   }
   climb.run_on(2.0);
-  EXPECT_TRUE(sound && within_limits(params.robot.drives, climb.command()));
+  if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.command());
+  EXPECT_EQ(beyond, "");
   EXPECT_EQ(climb.truth().fell, may_fall) << climb.truth().fall_reason;
   if (may_fall) return;
   EXPECT_TRUE(climb.truth().in_contact[0] && climb.truth().in_contact[1]);
