@@ -125,14 +125,16 @@ TEST_P(FaultTable, EndsInItsStateWithinItsTime_OnBothFeet) {
     if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.command());
   } while (!is_over() && !climb.truth().fell && climb.time_s() - begun_s < 10.0);
   const bool may_fall = falls(single_step, fault.name, moment.name, gains.name[0] != '\0');
-  if (!climb.truth().fell) {
+  // One that leans so far sinks on its damped joints, and the plant may call that a fall seconds later.
+  const auto fell = [&] { return climb.truth().fell || climb.state() == ModuleState::kFallen; };
+  if (!fell()) {
     EXPECT_EQ(name_of(climb.state()), name_of(fault.ends_as));
     EXPECT_LE(climb.time_s() - begun_s, fault.within_s);
   }
   climb.run_on(2.0);
   if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.command());
   EXPECT_EQ(beyond, "");
-  EXPECT_EQ(climb.truth().fell, may_fall) << climb.truth().fall_reason;
+  EXPECT_EQ(fell(), may_fall) << climb.truth().fall_reason;
   if (may_fall) return;
   EXPECT_TRUE(climb.truth().in_contact[0] && climb.truth().in_contact[1]);
   EXPECT_EQ(name_of(climb.state()), name_of(fault.ends_as));
