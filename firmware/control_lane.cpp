@@ -77,31 +77,36 @@ Progress ControlLane::sense(std::int64_t now_ns) noexcept {
 void ControlLane::read_operator(std::int64_t now_ns) noexcept {
   OperatorCommand command{};
   if (ports_.operator_input == nullptr || !ports_.operator_input->try_read(command)) return;
-  const bool obeyed = try_obey(command, now_ns);
-  if (!obeyed) health_.raise(Limit::kOperatorRefused, now_ns);
-  ports_.operator_input->answer(obeyed);
+  const OperatorAnswer answer = obey(command, now_ns);
+  if (!answer.is_obeyed()) health_.raise(Limit::kOperatorRefused, now_ns);
+  ports_.operator_input->answer(answer);
 }
 
-bool ControlLane::try_obey(OperatorCommand command, std::int64_t now_ns) noexcept {
+OperatorAnswer ControlLane::obey(OperatorCommand command, std::int64_t now_ns) noexcept {
   const ModuleState state = module_state();
-  if (!Supervisor::answers(state, command)) return false;
+  if (!Supervisor::answers(state, command)) return {Refusal::kState, {}};
   if (command == OperatorCommand::kReset) {
-    if (!is_sound(now_ns) || !gait_.try_restart(estimator_.state().q_rad)) return false;
+    if (const OperatorAnswer answer = answer_to_reset(now_ns); !answer.is_obeyed()) return answer;
+    const JointVector& q_rad = estimator_.state().q_rad;
+    if (!gait_.try_restart(q_rad)) return {Refusal::kJointsAway, gait_.joints_away(q_rad)};
     overload_ = {};
   }
   supervisor_.obey(command, state);
   if (command == OperatorCommand::kStop && state != ModuleState::kArming) gait_.request_stop(StopReason::kOperator);
-  return true;
+  return {};
 }
 
 // What may have stopped it is over, and both feet carry: one that a mute knee kept up counts as standing only until the
 // drive speaks again.
-bool ControlLane::is_sound(std::int64_t now_ns) const noexcept {
+OperatorAnswer ControlLane::answer_to_reset(std::int64_t now_ns) const noexcept {
   constexpr double kStands = 0.5;  // probability
   const StateEstimate& state = estimator_.state();
-  return drives_.silent.is_empty() && drives_.bus.drive_errors.is_empty() && overload_.takes_commands() &&
-         now_ns - state.oldest_input_ns <= params_.gait.steer_age_ns && state.contact_probability[0] > kStands &&
-         state.contact_probability[1] > kStands;
+  if (!drives_.silent.is_empty()) return {Refusal::kDrivesSilent, drives_.silent};
+  if (!drives_.bus.drive_errors.is_empty()) return {Refusal::kDrivesInError, drives_.bus.drive_errors};
+  if (!overload_.takes_commands()) return {Refusal::kCommandRefused, {}};
+  if (!(now_ns - state.oldest_input_ns <= params_.gait.steer_age_ns)) return {Refusal::kEstimateStale, {}};
+  const bool carry = state.contact_probability[0] > kStands && state.contact_probability[1] > kStands;
+  return {carry ? Refusal::kNone : Refusal::kFootLifted, {}};
 }
 
 // One that came and was rejected is not missing, too.

@@ -59,8 +59,8 @@ class ControlLane {
  private:
   void look_across(std::int64_t now_ns) noexcept;
   void read_operator(std::int64_t now_ns) noexcept;
-  [[nodiscard]] bool try_obey(OperatorCommand command, std::int64_t now_ns) noexcept;
-  [[nodiscard]] bool is_sound(std::int64_t now_ns) const noexcept;
+  [[nodiscard]] OperatorAnswer obey(OperatorCommand command, std::int64_t now_ns) noexcept;
+  [[nodiscard]] OperatorAnswer answer_to_reset(std::int64_t now_ns) const noexcept;
   void sense_imu(std::int64_t now_ns) noexcept;
   void read_joints(std::int64_t now_ns) noexcept;
   // While it arms, in every cycle; joints: the feedback that came, or null.

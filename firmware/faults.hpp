@@ -70,7 +70,8 @@ namespace polygmap {
   X(113, kFootPutBack, "foot_put_back", "A foot in the air went back to where it had stood.")                       \
   X(114, kFrameLost, "frame_lost", "A frame never reached the map: it was unusable, or the last one still waited.") \
   X(115, kHandOverLost, "hand_over_lost", "A lane was so late that what it should have seen was overwritten.")      \
-  X(116, kOperatorRefused, "operator_refused", "The operator asked for what this state has no answer to.")          \
+  X(116, kOperatorRefused, "operator_refused",                                                                      \
+    "The operator asked for what the module did not do; the answer says why.")                                      \
   X(130, kDriveClamped, "drive_clamped", "A command's value was beyond its drive's range and became the nearest end.")
 
 #define POLYGMAP_ENUMERATOR(number, code, name, text) code = number,

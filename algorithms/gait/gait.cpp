@@ -47,10 +47,18 @@ bool Gait::try_arm(const JointFeedback& feedback) noexcept {
   return true;
 }
 
-bool Gait::try_restart(const JointVector& q_rad) noexcept {
+JointSet Gait::joints_away(const JointVector& q_rad) const noexcept {
   constexpr double kMostOff_rad = 0.3;  // legs that carry the robot give way by a third of it
-  const JointVector off_rad = (q_rad - joints_.reference_rad()).cwiseAbs();
-  if (!math::all_finite(off_rad) || off_rad.maxCoeff() > kMostOff_rad) return false;
+  JointSet away;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    const auto i = static_cast<Eigen::Index>(n);
+    if (!(std::abs(q_rad[i] - joints_.reference_rad()[i]) <= kMostOff_rad)) away.insert(n);
+  }
+  return away;
+}
+
+bool Gait::try_restart(const JointVector& q_rad) noexcept {
+  if (!joints_away(q_rad).is_empty()) return false;
   stop_requested_ = StopReason::kNone;
   leg_impaired_ = lost_in_swing_ = false;
   memory_ = {.toes_calibrated = memory_.toes_calibrated,

@@ -34,12 +34,16 @@ class Gait {
   // double support. From the thread of tick().
   void request_stop(StopReason reason) noexcept {
     if (stop_requested_ == StopReason::kNone) stop_requested_ = reason;
+    // After the climb's end no state is left that would take the reason over.
+    if (status_.phase == GaitPhase::kFinished) status_.stop_reason = stop_requested_;
   }
   // No foot is lifted from now on; true again: it goes on. From the thread of tick().
   void allow_steps(bool may_step) noexcept { may_step_ = may_step; }
   // After its end, finished or stopped, with both feet on the ground: it stands, and looks for a step. Where it stands
-  // and how many treads it has climbed stays. False, and nothing happens: a joint is not where it was commanded to be.
+  // and how many treads it has climbed stays. False, and nothing happens: there are joints_away().
   [[nodiscard]] bool try_restart(const JointVector& q_rad) noexcept;
+  // Those that are not where they were commanded to be, or not finite.
+  [[nodiscard]] JointSet joints_away(const JointVector& q_rad) const noexcept;
   [[nodiscard]] bool stop_requested() const noexcept { return stop_requested_ != StopReason::kNone; }
   // Before its first good reading it commands no gains and no torques.
   [[nodiscard]] bool armed() const noexcept { return armed_; }

@@ -31,7 +31,7 @@ constexpr const char* kUsage =
     "Exit codes of --config: 0 asked to stop, 1 stopped by itself, 2 configuration, 3 device, 4 no real time, 5 as 0 "
     "with the\n"
     "recording incomplete.\n"
-    "Exit codes of --ask: 0 it does so, 1 its state has no answer, 2 configuration, 3 nobody listens.\n"
+    "Exit codes of --ask: 0 it does so, 1 it refuses and says why, 2 configuration, 3 nobody listens.\n"
     "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording. Of --doctor: 0 nothing hinders, 1 "
     "else; with --strict a warning hinders, too.\n";
 
@@ -157,12 +157,17 @@ int run_service(const DaemonConfig& config, const std::string& record_directory)
   return number_of(outcome.code);
 }
 
-int run_ask(const DaemonConfig& config, const std::string& word) {
-  if (config.operator_socket.empty()) {
-    return complain(config.path + " has no key operator: there is nobody to ask.", ExitCode::kConfiguration);
+int run_ask(const Options& options) {
+  std::string socket, text;
+  try {
+    socket = read_operator_socket(options.config);
+  } catch (const config::FileError& error) {
+    return complain(error.what(), ExitCode::kConfiguration);
   }
-  std::string text;
-  if (!try_ask(config.operator_socket, word, text)) return complain(text + ".", ExitCode::kDevice);
+  if (socket.empty()) {
+    return complain(options.config + " has no key operator: there is nobody to ask.", ExitCode::kConfiguration);
+  }
+  if (!try_ask(socket, options.ask, text)) return complain(text + ".", ExitCode::kDevice);
   std::puts(text.c_str());
   return text.starts_with(kRefusedAnswer) ? number_of(ExitCode::kStoppedItself) : 0;
 }
@@ -175,7 +180,6 @@ int run_with_config(const Options& options) {
     return complain(error.what(), ExitCode::kConfiguration);
   }
   for (const std::string& warning : config.warnings) std::fprintf(stderr, "polygmapd: warning: %s\n", warning.c_str());
-  if (options.mode == Options::Mode::kAsk) return run_ask(config, options.ask);
   if (options.mode == Options::Mode::kCheck) {
     std::printf("%s can be used.\n", options.config.c_str());
     return 0;
@@ -199,8 +203,9 @@ int run(int argc, char** argv) {
       return run_replay(options.recording);
     case Options::Mode::kDoctor:
       return run_doctor(options.config, options.json, options.strict);
-    case Options::Mode::kRun:
     case Options::Mode::kAsk:
+      return run_ask(options);
+    case Options::Mode::kRun:
     case Options::Mode::kCheck:
       break;
   }

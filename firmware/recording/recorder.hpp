@@ -81,8 +81,8 @@ class Recorder final : public hal::DepthCamera,
   [[nodiscard]] hal::JointBusStatus status() const noexcept override;
   [[nodiscard]] bool try_read(LioSample& sample) noexcept override;
   [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override;
-  void answer(bool obeyed) noexcept override {
-    if (robot_.operator_input != nullptr) robot_.operator_input->answer(obeyed);
+  void answer(const OperatorAnswer& answer) noexcept override {
+    if (robot_.operator_input != nullptr) robot_.operator_input->answer(answer);
   }
 
  private:

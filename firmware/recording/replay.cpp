@@ -80,6 +80,7 @@ class ReplayedPorts final : public hal::DepthCamera,
     command = call->asked;
     return true;
   }
+  void answer(const OperatorAnswer&) noexcept override {}  // who asked is gone
 
  private:
   // The next recorded call when it is of this kind; else the module does something else than it did.

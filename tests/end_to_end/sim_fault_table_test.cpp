@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every fault in every phase of the gait, under physics and with perception in the loop: in which state it ends, and
-// within what time; both feet on the ground, the robot upright, and no command beyond a drive's limit. Where the robot
-// falls is written down, too.
+// within what time; both feet on the ground, the robot upright, and no command beyond a drive's limits; and
+// some of them on drives that take less stiffness. Where the robot falls is written down, too.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -44,48 +44,70 @@ constexpr std::array kFaults{
 struct Moment {
   const char* name;
   std::uint32_t nth;  // swing onto a tread
-  double after_s;     // its lift-off; less than 0: that long before, while the weight shifts
+  double after_s;     // its lift-off
 };
 constexpr std::array kMoments{Moment{"standing", 0, 0.0},      Moment{"shift", 1, 1.0},
                               Moment{"swing1_early", 1, 0.05}, Moment{"swing1_high", 1, 0.4},
                               Moment{"swing1_late", 1, 0.8},   Moment{"swing2_early", 2, 0.05},
                               Moment{"swing2_high", 2, 0.4},   Moment{"swing2_late", 2, 0.8}};
 
-using FaultCase = std::tuple<bool, FaultRow, Moment>;
+// The most that the drives take of either leg's stiffness and damping.
+struct MostGains {
+  const char* name;
+  std::array<double, kJointsPerLeg> kp_nmprad, kd_nmsprad;
+};
+constexpr MostGains kUsualGains{"", DriveModel{}.kp_most_nmprad, DriveModel{}.kd_most_nmsprad};
+// As toolchain/campaigns/gains/kuavo.toml has it, and no more damping than standing.
+constexpr MostGains kKuavoGains{"_kuavo_gains", {220, 100, 224, 224, 58, 58}, DriveModel{}.kd_nmsprad};
+
+using FaultCase = std::tuple<bool, FaultRow, Moment, MostGains>;
 std::string fault_name(const testing::TestParamInfo<FaultCase>& info) {
-  const auto& [single_step, fault, moment] = info.param;
-  return std::string(single_step ? "ss_" : "ds_") + fault.name + "_" + moment.name;
+  const auto& [single_step, fault, moment, gains] = info.param;
+  return std::string(single_step ? "ss_" : "ds_") + fault.name + "_" + moment.name + gains.name;
 }
 
 // Known to fall, as of 2026-11-27. Drives that are sent nothing hold the torques of their last command, whatever the
 // body does. And on the way up to the other foot's tread, its knee straightening, the body needs its balance.
-bool falls(bool single_step, std::string_view fault, std::string_view moment) {
+bool falls(bool single_step, std::string_view fault, std::string_view moment, bool soft) {
   if (fault == "commands_refused") return true;
+  if (soft && fault == "joints_silent" && moment == "swing1_high") return true;
   const bool blind = fault == "joints_silent" || fault == "imu_silent";
   return blind && (moment == "swing2_early" || (moment == "swing2_high" && !single_step));
 }
 
 class FaultTable : public testing::TestWithParam<FaultCase> {};
 
-bool within_limits(const JointCommand& command) {
-  const RobotModel robot;
+// Empty, or the first joint that is asked for more than its drive takes, and of what.
+std::string beyond_limits(const DriveModel& drives, const JointCommand& command) {
+  constexpr double kRounding = 1e-9;
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const JointSetpoint& joint = command.joints[n];
-    const JointLimits& limits = robot.drives.limits[n];
-    const bool placed = joint.q_rad >= limits.min_rad - 1e-9 && joint.q_rad <= limits.max_rad + 1e-9;
-    if (!placed || !(std::abs(joint.tau_ff_nm) <= limits.torque_nm) ||
-        !(std::abs(joint.dq_radps) <= limits.speed_radps)) {
-      return false;
-    }
+    const JointLimits& limits = drives.limits[n];
+    const double kp_most_nmprad = drives.kp_most_nmprad[n % kJointsPerLeg];
+    const double kd_most_nmsprad = drives.kd_most_nmsprad[n % kJointsPerLeg];
+    const auto says = [n](const char* what, double value) {
+      return std::string(kJointNames[n]) + " " + what + " " + std::to_string(value);
+    };
+    const bool placed = joint.q_rad >= limits.min_rad - kRounding && joint.q_rad <= limits.max_rad + kRounding;
+    if (!placed) return says("q_rad", joint.q_rad);
+    if (!(std::abs(joint.dq_radps) <= limits.speed_radps + kRounding)) return says("dq_radps", joint.dq_radps);
+    if (!(std::abs(joint.tau_ff_nm) <= limits.torque_nm)) return says("tau_ff_nm", joint.tau_ff_nm);
+    if (!(joint.kp_nmprad >= 0.0 && joint.kp_nmprad <= kp_most_nmprad)) return says("kp_nmprad", joint.kp_nmprad);
+    if (!(joint.kd_nmsprad >= 0.0 && joint.kd_nmsprad <= kd_most_nmsprad)) return says("kd_nmsprad", joint.kd_nmsprad);
   }
-  return true;
+  return {};
 }
 
 TEST_P(FaultTable, EndsInItsStateWithinItsTime_OnBothFeet) {
-  const auto& [single_step, fault, moment] = GetParam();
+  const auto& [single_step, fault, moment, gains] = GetParam();
   Params params;
   params.gait.planner.pattern = single_step ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
-  PhysicalClimb climb(stairs_of(single_step ? 4 : 2, 2), params);
+  params.robot.drives.kp_most_nmprad = gains.kp_nmprad;
+  params.robot.drives.kd_most_nmsprad = gains.kd_nmsprad;
+  SimOptions options = stairs_of(single_step ? 4 : 2, 2);
+  options.mujoco.kp_most_nmprad = gains.kp_nmprad;
+  options.mujoco.kd_most_nmsprad = gains.kd_nmsprad;
+  PhysicalClimb climb(options, params);
   if (moment.nth == 0) {
     climb.run(2.5);
   } else {
@@ -97,25 +119,34 @@ TEST_P(FaultTable, EndsInItsStateWithinItsTime_OnBothFeet) {
   const auto is_over = [&] {
     return climb.state() == fault.ends_as && climb.status().stands[0] && climb.status().stands[1];
   };
-  bool sound = true;
+  std::string beyond;
   do {
     (void)climb.tick();
-    sound = sound && within_limits(climb.command());
+    if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.command());
   } while (!is_over() && !climb.truth().fell && climb.time_s() - begun_s < 10.0);
-  const bool may_fall = falls(single_step, fault.name, moment.name);
-  if (!climb.truth().fell) {
+  const bool may_fall = falls(single_step, fault.name, moment.name, gains.name[0] != '\0');
+  // One that leans so far sinks on its damped joints, and the plant may call that a fall seconds later.
+  const auto fell = [&] { return climb.truth().fell || climb.state() == ModuleState::kFallen; };
+  if (!fell()) {
     EXPECT_EQ(name_of(climb.state()), name_of(fault.ends_as));
     EXPECT_LE(climb.time_s() - begun_s, fault.within_s);
   }
   climb.run_on(2.0);
-  EXPECT_TRUE(sound && within_limits(climb.command()));
-  EXPECT_EQ(climb.truth().fell, may_fall) << climb.truth().fall_reason;
+  if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.command());
+  EXPECT_EQ(beyond, "");
+  EXPECT_EQ(fell(), may_fall) << climb.truth().fall_reason;
   if (may_fall) return;
   EXPECT_TRUE(climb.truth().in_contact[0] && climb.truth().in_contact[1]);
   EXPECT_EQ(name_of(climb.state()), name_of(fault.ends_as));
 }
 INSTANTIATE_TEST_SUITE_P(Long, FaultTable,
-                         testing::Combine(testing::Bool(), testing::ValuesIn(kFaults), testing::ValuesIn(kMoments)),
+                         testing::Combine(testing::Bool(), testing::ValuesIn(kFaults), testing::ValuesIn(kMoments),
+                                          testing::Values(kUsualGains)),
+                         fault_name);
+INSTANTIATE_TEST_SUITE_P(LongSoft, FaultTable,
+                         testing::Combine(testing::Bool(), testing::ValuesIn(kFaults),
+                                          testing::Values(kMoments[0], kMoments[3], kMoments[5]),
+                                          testing::Values(kKuavoGains)),
                          fault_name);
 
 }  // namespace

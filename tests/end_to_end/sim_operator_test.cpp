@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "firmware/recording/replay.hpp"
@@ -21,11 +23,14 @@ std::string states_of(const ClimbSummary& summary) {
 }
 
 // asked: in the order of time.
-ClimbSummary climb_with(ClimbOptions options, const std::vector<TimedCommand>& asked) {
-  ScriptedOperator script(asked);
+ClimbSummary climb_with(ClimbOptions options, const std::vector<TimedCommand>& asked, std::string* said = nullptr) {
+  std::ostringstream out;
+  ScriptedOperator script(asked, out);
   options.climb_operator = &script;
   options.asked = asked;
-  return run_climb(options, {});
+  const ClimbSummary summary = run_climb(options, {});
+  if (said != nullptr) *said = out.str();
+  return summary;
 }
 
 class OperatedClimb : public testing::TestWithParam<GaitPattern> {};
@@ -53,11 +58,56 @@ INSTANTIATE_TEST_SUITE_P(Gaits, OperatedClimb, testing::Values(GaitPattern::kDou
 TEST(OperatedRobot, NothingAsked_StandsOnItsOwnControllerAndTheModuleIsOff) {
   ClimbOptions options;
   options.time_limit_s = 6.0;
-  const ClimbSummary summary = climb_with(options, {});
+  const ClimbSummary summary = climb_with(options, {{7.0, Command::kArm}});
   EXPECT_EQ(states_of(summary), "off");
   EXPECT_FALSE(summary.fell);
   EXPECT_TRUE(summary.footsteps.empty());
   for (const auto& [name, count] : summary.faults) EXPECT_NE(name, "lio_rejected") << "nothing is estimated yet";
+}
+
+struct AskedInVain {
+  const char* name;
+  std::vector<TimedCommand> asked;
+  std::string_view said, state;
+};
+class OperatorWithNothingMoreToAsk : public testing::TestWithParam<AskedInVain> {};
+
+// Two seconds after the last command, and not when the time is out.
+TEST_P(OperatorWithNothingMoreToAsk, ModuleWaits_EndsAndSaysWhatWasRefused) {
+  ClimbOptions options;
+  options.plant = PlantKind::kKinematic;
+  options.time_limit_s = 12.0;
+  std::string said;
+  const ClimbSummary summary = climb_with(options, GetParam().asked, &said);
+  EXPECT_FALSE(summary.pass);
+  EXPECT_EQ(summary.ended_by, "operator");
+  EXPECT_EQ(summary.reason, "No command was to come after 0 of " + std::to_string(summary.steps_total) +
+                                " steps, and the module waited for one; its state was " +
+                                std::string(GetParam().state) + ".");
+  EXPECT_LT(summary.ended_at_s, GetParam().asked.back().at_s + 3.1);
+  EXPECT_NE(said.find(GetParam().said), std::string::npos) << said;
+}
+INSTANTIATE_TEST_SUITE_P(
+    States, OperatorWithNothingMoreToAsk,
+    testing::Values(AskedInVain{"off", {{2.0, Command::kStart}}, "    2.00 s  start refused: off\n", "off"},
+                    AskedInVain{"standing",
+                                {{1.0, Command::kArm}, {3.0, Command::kPause}},
+                                "s  standing\n    3.00 s  pause refused: standing\n",
+                                "standing"},
+                    AskedInVain{"holding",
+                                {{1.0, Command::kArm}, {3.0, Command::kStart}, {4.0, Command::kPause}},
+                                "s  walking_up\n    4.00 s  holding\n",
+                                "holding"}),
+    [](const auto& asked) { return asked.param.name; });
+
+TEST(UnaskedRobot, AutostartIsOffAndThereIsNoOperator_EndsAsOff) {
+  ClimbOptions options;
+  options.plant = PlantKind::kKinematic;
+  options.time_limit_s = 12.0;
+  options.params.supervisor.autostart = false;
+  const ClimbSummary summary = run_climb(options, {});
+  EXPECT_EQ(summary.ended_by, "operator");
+  EXPECT_LT(summary.ended_at_s, 3.1);
 }
 
 TEST(OperatedRobot, Recorded_NothingDiffersInTheReplay) {

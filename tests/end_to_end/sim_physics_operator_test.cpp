@@ -60,6 +60,13 @@ TEST_P(OperatedPhysics, PausedForLongBetweenTwoTreads_ClimbsOn) {
   expect_climbs_on();
 }
 
+TEST_P(OperatedPhysics, StoppedOnTop_IsASafeStopThatTheOperatorAskedFor) {
+  expect_climbs_on();
+  ask(Command::kStop, 0.01);
+  EXPECT_EQ(climb_.state(), ModuleState::kSafeStop);
+  EXPECT_EQ(climb_.status().stop_reason, StopReason::kOperator);
+}
+
 // The knee that carries, while the other foot is in the air.
 TEST_P(OperatedPhysics, KneeIsMuteAndAnswersAgain_ClimbsOnAfterAReset) {
   ASSERT_TRUE(run_to_swing_onto(climb_, parting_swing()));

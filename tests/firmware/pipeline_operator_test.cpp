@@ -21,6 +21,15 @@ class OperatedModule : public test::StandingModule {
     stand(ticks);
   }
   [[nodiscard]] ModuleState state() const { return control().module_state(); }
+  // Of the last command asked; kNone where it was obeyed.
+  [[nodiscard]] Refusal refusal(JointSet* joints = nullptr) {
+    OperatorAnswer answer;
+    bool any = false;
+    while (operator_.try_take_answer(answer)) any = true;
+    EXPECT_TRUE(any) << "nobody answered";
+    if (joints != nullptr) *joints = answer.joints;
+    return answer.refusal;
+  }
   [[nodiscard]] double knee_kp_nmprad() const { return joints_.commands().newest().joints[3].kp_nmprad; }
 
   fakes::FakeOperatorInput operator_;
@@ -90,9 +99,66 @@ TEST_F(OperatedModule, ResetWhileItsCauseLasts_IsRefused) {
   ask(OperatorCommand::kReset, 2);
   EXPECT_EQ(state(), ModuleState::kSafeStop);
   EXPECT_EQ(count(Limit::kOperatorRefused), 1U);
+  JointSet joints;
+  EXPECT_EQ(refusal(&joints), Refusal::kDrivesInError);
+  EXPECT_EQ(joints.bits(), 1U << 4U);
   joints_.told.drive_errors = {};
   stand(1);
   ask(OperatorCommand::kReset, 2);
+  EXPECT_EQ(state(), ModuleState::kStanding);
+  EXPECT_EQ(refusal(), Refusal::kNone);
+}
+
+// Of the others the answer's text names the reason; the drives' are above and below.
+TEST_F(OperatedModule, ResetOfASafeStop_IsRefusedForWhatLasts) {
+  ask(OperatorCommand::kArm, kInitialised_ticks);
+  ask(OperatorCommand::kStart, 100);
+  EXPECT_EQ(refusal(), Refusal::kNone);
+  ask(OperatorCommand::kReset, 1);
+  EXPECT_EQ(refusal(), Refusal::kState);
+  ask(OperatorCommand::kStop, 2);
+  ASSERT_EQ(state(), ModuleState::kSafeStop);
+  EXPECT_EQ(refusal(), Refusal::kNone);
+
+  joints_.writes.fail_next();
+  stand(1);
+  ask(OperatorCommand::kReset, 1);
+  EXPECT_EQ(refusal(), Refusal::kCommandRefused);
+
+  // Slower than what would be taken for a jump.
+  for (int i = 0; i < 400; ++i) {
+    standing_q_rad_[9] += 0.001;
+    stand(1);
+  }
+  ask(OperatorCommand::kReset, 1);
+  JointSet joints;
+  EXPECT_EQ(refusal(&joints), Refusal::kJointsAway);
+  EXPECT_EQ(joints.bits(), 1U << 9U);
+  for (int i = 0; i < 400; ++i) {
+    standing_q_rad_[9] -= 0.001;
+    stand(1);
+  }
+
+  foot_force_n_[1] = 0.0;
+  stand(100);
+  ask(OperatorCommand::kReset, 1);
+  EXPECT_EQ(refusal(), Refusal::kFootLifted);
+  foot_force_n_[1] = 270.0;
+  stand(100);
+
+  for (int i = 0; i < 50; ++i) {
+    if (i == 49) operator_.ask(OperatorCommand::kReset);
+    clock_.advance_ns(kCycle_ns);
+    const JointFeedback feedback = joints_at(clock_.now_ns());
+    tick_with(nullptr, &feedback);
+  }
+  EXPECT_EQ(refusal(), Refusal::kEstimateStale);
+  EXPECT_EQ(state(), ModuleState::kSafeStop);
+  EXPECT_EQ(count(Limit::kOperatorRefused), 5U);
+
+  stand(100);
+  ask(OperatorCommand::kReset, 2);
+  EXPECT_EQ(refusal(), Refusal::kNone);
   EXPECT_EQ(state(), ModuleState::kStanding);
 }
 
@@ -116,6 +182,9 @@ TEST_F(OperatedModule, MuteKneeAnswersAgain_StandsAfterAResetAndNotBefore) {
   operator_.ask(OperatorCommand::kReset);
   stand_mute(2);
   EXPECT_EQ(state(), ModuleState::kSafeStop) << "the knee is mute";
+  JointSet joints;
+  EXPECT_EQ(refusal(&joints), Refusal::kDrivesSilent);
+  EXPECT_EQ(joints.bits(), 1U << kKnee);
   EXPECT_EQ(count(Limit::kOperatorRefused), 1U);
   stand(100);
   EXPECT_EQ(state(), ModuleState::kSafeStop) << "nobody asked";

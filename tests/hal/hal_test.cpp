@@ -4,11 +4,13 @@
 
 #include <limits>
 
+#include "firmware/operator_answer_text.hpp"
 #include "tests/support/fakes/fake_clock.hpp"
 #include "tests/support/fakes/fake_depth_camera.hpp"
 #include "tests/support/fakes/fake_imu.hpp"
 #include "tests/support/fakes/fake_joint_bus.hpp"
 #include "tests/support/fakes/fake_lidar_odometry.hpp"
+#include "tests/support/fakes/fake_operator_input.hpp"
 #include "tests/support/port_contract.hpp"
 
 namespace polygmap::contract {
@@ -90,6 +92,18 @@ struct FakeDepthCameraHarness {
   }
 };
 INSTANTIATE_TYPED_TEST_SUITE_P(Fake, DepthCameraContract, FakeDepthCameraHarness);
+
+struct FakeOperatorInputHarness {
+  FakeOperatorInput input;
+  hal::OperatorInput& port() { return input; }
+  void ask(OperatorCommand command) { input.ask(command); }
+  std::string told() {
+    OperatorAnswer answer;
+    EXPECT_TRUE(input.try_take_answer(answer));
+    return std::string(text_of(answer, ModuleState::kSafeStop).view());
+  }
+};
+INSTANTIATE_TYPED_TEST_SUITE_P(Fake, OperatorInputContract, FakeOperatorInputHarness);
 
 TEST(CallScript, Fail_FromTheThirdCallOn_FailsJustThose) {
   CallScript script;

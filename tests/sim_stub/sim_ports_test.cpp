@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simulated robot keeps the ports' contracts, all five of them.
+// The simulated robot and its scripted operator keep the ports' contracts, all six of them.
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <sstream>
 
+#include "sim_stub/host/operator/climb_operator.hpp"
 #include "sim_stub/sim_robot.hpp"
 #include "tests/support/port_contract.hpp"
 
@@ -82,6 +84,24 @@ struct SimDepthCameraHarness {
   }
 };
 INSTANTIATE_TYPED_TEST_SUITE_P(Sim, DepthCameraContract, SimDepthCameraHarness);
+
+struct ScriptedOperatorHarness {
+  std::ostringstream out;
+  std::vector<sim::TimedCommand> script;
+  std::optional<sim::ScriptedOperator> scripted;
+  // Of what was asked until the first look; asking begins anew.
+  hal::OperatorInput& port() {
+    if (!scripted) scripted.emplace(std::exchange(script, {}), out);
+    scripted->look(kNsPerS, ModuleState::kSafeStop);
+    return *scripted;
+  }
+  void ask(OperatorCommand command) {
+    script.push_back({0.5, command});
+    scripted.reset();
+  }
+  std::string told() const { return out.str(); }
+};
+INSTANTIATE_TYPED_TEST_SUITE_P(Scripted, OperatorInputContract, ScriptedOperatorHarness);
 
 }  // namespace
 }  // namespace polygmap::contract

@@ -17,16 +17,21 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <concepts>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "algorithms/core/math/math.hpp"
+#include "algorithms/robot/robot_model.hpp"
 #include "hal/ports/clock.hpp"
 #include "hal/ports/depth_camera.hpp"
 #include "hal/ports/imu.hpp"
 #include "hal/ports/joint_bus.hpp"
 #include "hal/ports/lidar_odometry.hpp"
+#include "hal/ports/operator_input.hpp"
 #include "scheduler/cycle_monitor.hpp"
 
 namespace polygmap::contract {
@@ -36,7 +41,7 @@ template <typename Port>
 inline constexpr bool kIsPort =
     std::is_abstract_v<Port> && !std::is_destructible_v<Port> && !std::has_virtual_destructor_v<Port>;
 static_assert(kIsPort<hal::Clock> && kIsPort<hal::DepthCamera> && kIsPort<hal::Imu> && kIsPort<hal::JointBus> &&
-              kIsPort<hal::LidarOdometry>);
+              kIsPort<hal::LidarOdometry> && kIsPort<hal::OperatorInput>);
 
 // hal::Clock& port(); void pass(std::int64_t duration_ns): returns when at least that much time has passed.
 template <typename Harness>
@@ -364,5 +369,60 @@ REGISTER_TYPED_TEST_SUITE_P(DepthCameraContract, Intrinsics_AnyTime_ArePlausible
                             TryAcquire_FrameArrived_HasTheIntrinsicsSizeAndPixels,
                             TryAcquire_OneHeld_IsFalseUntilReleased,
                             TryAcquire_HeldWhileManyArrive_KeepsItsPixelsAndThenGivesTheNewestLast);
+
+// hal::OperatorInput& port(): whatever is on its way has arrived; void ask(OperatorCommand);
+// std::string told(): what whoever asked last has been told since.
+template <typename Harness>
+class OperatorInputContract : public ::testing::Test {
+ protected:
+  // Nothing where there is no command.
+  [[nodiscard]] std::optional<OperatorCommand> read() {
+    auto command = OperatorCommand::kPause;
+    if (this->harness.port().try_read(command)) return command;
+    EXPECT_EQ(command, OperatorCommand::kPause) << "a refused read must leave the command alone";
+    return std::nullopt;
+  }
+  Harness harness;
+};
+TYPED_TEST_SUITE_P(OperatorInputContract);
+
+TYPED_TEST_P(OperatorInputContract, TryRead_NothingAsked_IsFalseAndLeavesTheCommand) {
+  EXPECT_EQ(this->read(), std::nullopt);
+}
+TYPED_TEST_P(OperatorInputContract, TryRead_CommandsOneByOne_GivesEachOnce) {
+  for (const auto command : {OperatorCommand::kArm, OperatorCommand::kStart, OperatorCommand::kReset}) {
+    this->harness.ask(command);
+    EXPECT_EQ(this->read(), command);
+    this->harness.port().answer({});
+    EXPECT_EQ(this->read(), std::nullopt);
+  }
+}
+TYPED_TEST_P(OperatorInputContract, TryRead_SeveralAsked_GivesTheOldestFirst) {
+  constexpr std::array kAsked{OperatorCommand::kArm, OperatorCommand::kStop, OperatorCommand::kArm};
+  for (const auto command : kAsked) this->harness.ask(command);
+  for (const auto command : kAsked) {
+    EXPECT_EQ(this->read(), command);
+    this->harness.port().answer({});
+  }
+  EXPECT_EQ(this->read(), std::nullopt);
+}
+TYPED_TEST_P(OperatorInputContract, Answer_Refused_IsToldWithItsReason) {
+  this->harness.ask(OperatorCommand::kReset);
+  ASSERT_EQ(this->read(), OperatorCommand::kReset);
+  this->harness.port().answer({Refusal::kDrivesSilent, JointSet::of_bits(1U << kKnee)});
+  const std::string told = this->harness.told();
+  EXPECT_NE(told.find("refused: "), std::string::npos) << told;
+  EXPECT_NE(told.find(", no answer yet from left_knee"), std::string::npos) << told;
+}
+TYPED_TEST_P(OperatorInputContract, Answer_Obeyed_IsToldAsNoRefusal) {
+  this->harness.ask(OperatorCommand::kArm);
+  ASSERT_EQ(this->read(), OperatorCommand::kArm);
+  this->harness.port().answer({});
+  const std::string told = this->harness.told();
+  EXPECT_EQ(told.find("refused"), std::string::npos) << told;
+}
+REGISTER_TYPED_TEST_SUITE_P(OperatorInputContract, TryRead_NothingAsked_IsFalseAndLeavesTheCommand,
+                            TryRead_CommandsOneByOne_GivesEachOnce, TryRead_SeveralAsked_GivesTheOldestFirst,
+                            Answer_Refused_IsToldWithItsReason, Answer_Obeyed_IsToldAsNoRefusal);
 
 }  // namespace polygmap::contract

@@ -57,8 +57,7 @@ class ScriptedClimb {
     if (gait.phase == GaitPhase::kSwing) {
       gait.odom_T_sole_desired[index_of(gait.step.foot)].p_m += odom_T_true.R * tracking_m_;
     }
-    report.observe(truth,
-                   {now_ns, state, quality, surfaces, map, gait, ModuleState::kWalkingUp, arming_waits_for, drives});
+    report.observe(truth, {now_ns, state, quality, surfaces, map, gait, module_state, arming_waits_for, drives});
   }
   void wait(std::int64_t duration_ns) {
     for (std::int64_t t = 0; t < duration_ns; t += kTick_ns) tick();
@@ -144,6 +143,7 @@ class ScriptedClimb {
   SurfaceFrame surfaces;
   MapSnapshot map;
   GaitStatus gait;
+  ModuleState module_state = ModuleState::kWalkingUp;
   DriveReport drives;
   ArmingWait arming_waits_for;
   ClimbReport report;

@@ -30,7 +30,7 @@ class StandingModule : public testing::Test {
     JointFeedback feedback;
     feedback.stamp_ns = stamp_ns;
     feedback.q_rad = standing_q_rad_;
-    feedback.foot_force_n = {270.0, 270.0};
+    feedback.foot_force_n = foot_force_n_;
     return feedback;
   }
   void tick_with(const ImuSample* imu, const JointFeedback* joints) {
@@ -52,7 +52,8 @@ class StandingModule : public testing::Test {
 
   static constexpr int kInitialised_ticks = 700;  // the standstill takes a second
 
-  const JointVector standing_q_rad_ = standing_joints();
+  JointVector standing_q_rad_ = standing_joints();
+  std::array<double, kFootCount> foot_force_n_{270.0, 270.0};
   fakes::FakeClock clock_ = three_days_up();
   fakes::FakeDepthCamera camera_;
   fakes::FakeImu imu_;

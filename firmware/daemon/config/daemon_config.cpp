@@ -3,6 +3,7 @@
 
 #include <arpa/inet.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 
@@ -24,6 +25,34 @@ constexpr Range kImuRate{100, 1000, "Hz"};  // what imu_interval_ns may be
 constexpr double kLivoxRate_hz = 200.0;     // of a Mid-360
 constexpr double kSerialRate_hz = 500.0;
 
+void check_path(const TomlSection& section, const char* key, bool is_wrong) {
+  if (is_wrong) section.fail(key, "must be a path of 1 to 63 characters");
+}
+
+std::string operator_socket_of(const std::string& path, const TomlSection& root) {
+  std::string socket = (std::filesystem::path(path).parent_path() / root.text("operator")).string();
+  check_path(root, "operator", root.text("operator").empty() || socket.size() > kMostSocketPath_bytes);
+  return socket;
+}
+
+// The line that gives the file's own key operator; lines before it are left empty, so that it keeps its number. Empty:
+// there is none that stands by itself.
+std::string operator_line_of(std::string_view text) {
+  constexpr std::string_view kKey = "operator", kBlank = " \t\r";
+  const auto trimmed = [=](std::string_view words) {
+    words.remove_prefix(std::min(words.find_first_not_of(kBlank), words.size()));
+    return words.substr(0, words.find_last_not_of(kBlank) + 1);
+  };
+  for (std::string before; !text.empty(); before += '\n') {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = trimmed(text.substr(0, end));
+    if (line.starts_with('[')) return {};  // a table begins, and what follows is its
+    if (line.starts_with(kKey) && trimmed(line.substr(kKey.size())).starts_with('=')) return before.append(line);
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return {};
+}
+
 class DaemonFile {
  public:
   DaemonFile(const std::string& path, const toml::table& root) : path_(path), root_(path, "", root, 1) {}
@@ -44,9 +73,7 @@ class DaemonFile {
     take_camera(*root_.section("camera", true));
     if (root_.has("params")) config::read_params(file("params"), config_.params);
     if (root_.has("operator")) {
-      config_.operator_socket = (std::filesystem::path(path_).parent_path() / root_.text("operator")).string();
-      const std::size_t bytes = config_.operator_socket.size();
-      check_path(root_, "operator", root_.text("operator").empty() || bytes > kMostSocketPath_bytes);
+      config_.operator_socket = operator_socket_of(path_, root_);
       config_.params.supervisor.autostart = false;
     } else if (!config_.params.supervisor.autostart) {
       root_.fail("params", "switches supervisor.autostart off, and there is no key operator: it would never arm");
@@ -196,9 +223,6 @@ class DaemonFile {
     }
     return said;
   }
-  static void check_path(const TomlSection& section, const char* key, bool is_wrong) {
-    if (is_wrong) section.fail(key, "must be a path of 1 to 63 characters");
-  }
 
   std::string path_;
   TomlSection root_;
@@ -213,6 +237,13 @@ DaemonConfig parse_daemon_config(const std::string& path, std::string_view text)
 }
 DaemonConfig read_daemon_config(const std::string& path) {
   return parse_daemon_config(path, config::read_text({"daemon", path}));
+}
+std::string read_operator_socket(const std::string& path) {
+  const std::string text = config::read_text({"daemon", path});
+  const std::string line = operator_line_of(text);
+  const toml::table root = config::parse_toml({"daemon", path}, line.empty() ? text : line);
+  const TomlSection section(path, "", root, 1);
+  return section.has("operator") ? operator_socket_of(path, section) : std::string();
 }
 
 }  // namespace polygmap::daemon

@@ -52,5 +52,8 @@ struct DaemonConfig {
 [[nodiscard]] DaemonConfig read_daemon_config(const std::string& path);
 // path: where the text is said to be.
 [[nodiscard]] DaemonConfig parse_daemon_config(const std::string& path, std::string_view text);
+// The key operator alone, as operator_socket; whatever else the file holds may be wrong, since who asks a robot to stop
+// must not be held up by it. Throws config::FileError when there is no file, or when that key's line is wrong.
+[[nodiscard]] std::string read_operator_socket(const std::string& path);
 
 }  // namespace polygmap::daemon

@@ -9,16 +9,23 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstdio>
+#include <charconv>
 #include <cstring>
+#include <ctime>
+#include <optional>
 #include <utility>
+
+#include "algorithms/core/messages/samples.hpp"
+#include "firmware/daemon/system/error_text.hpp"
 
 namespace polygmap::daemon {
 namespace {
 
-constexpr std::size_t kMostWord_bytes = 32;
+constexpr std::size_t kMostAsked_bytes = 64;
 constexpr std::int64_t kDrop_ns = 500'000'000;
 constexpr std::string_view kWhatMayBeAsked = "refused: ask for arm, start, pause, resume, stop, reset or state";
+constexpr std::string_view kNoTime = "refused: its time is missing, CLOCK_MONOTONIC in ns, as polygmapd --ask sends it";
+constexpr std::string_view kTooOld = "refused: it was not heard within half a second";
 
 // False: the path is longer than an address holds, or empty.
 [[nodiscard]] bool address_of(const std::string& path, sockaddr_un& address) {
@@ -31,7 +38,21 @@ constexpr std::string_view kWhatMayBeAsked = "refused: ask for arm, start, pause
 [[nodiscard]] const sockaddr* generic(const sockaddr_un& address) {
   return reinterpret_cast<const sockaddr*>(&address);
 }
-[[nodiscard]] std::string reason() { return ::strerrordesc_np(errno); }
+[[nodiscard]] std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * kNsPerS + now.tv_nsec;
+}
+[[nodiscard]] std::string_view without_end(std::string_view text) noexcept {
+  while (!text.empty() && (text.back() == '\n' || text.back() == '\0')) text.remove_suffix(1);
+  return text;
+}
+[[nodiscard]] std::optional<std::int64_t> number_in(std::string_view text) noexcept {
+  std::int64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
 
 }  // namespace
 
@@ -48,12 +69,12 @@ std::string OperatorSocket::open(const std::string& path) {
   const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (::lstat(path.c_str(), &found) == 0 && S_ISSOCK(found.st_mode)) {
     const int other = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    const bool lives = ::connect(other, generic(address), sizeof address) == 0;
-    ::close(other);
-    if (!lives) ::unlink(path.c_str());  // of a former run
+    const bool is_left = ::connect(other, generic(address), sizeof address) != 0 && errno == ECONNREFUSED;
+    if (other >= 0) ::close(other);
+    if (is_left) ::unlink(path.c_str());  // by a former run; of any other failure somebody may live there
   }
   if (fd < 0 || ::bind(fd, generic(address), sizeof address) != 0) {
-    const std::string why = reason();
+    const std::string why = error_text(errno);
     if (fd >= 0) ::close(fd);
     return "the socket \"" + path + "\" cannot be made: " + why;
   }
@@ -81,33 +102,34 @@ void OperatorSocket::serve(ModuleState state, std::int64_t now_ns) noexcept {
 bool OperatorSocket::is_answered(ModuleState state, std::int64_t now_ns) noexcept {
   std::uint8_t stage = stage_.load(std::memory_order_acquire);
   if (stage == kNone) return true;
-  if (stage == kAsked && now_ns - asked_ns_ > kDrop_ns && stage_.compare_exchange_strong(stage, kNone)) {
+  if (stage == kAsked && now_ns - sent_ns_ > kDrop_ns && stage_.compare_exchange_strong(stage, kNone)) {
     tell("refused: control did not take it");
     return true;
   }
-  if (stage != kObeyed && stage != kRefused) return false;
+  if (stage != kAnswered) return false;
   if (!std::exchange(was_answered_, true)) return false;  // its cycle has yet to end
-  std::array<char, 64> text{};
-  const std::string_view name = name_of(state);
-  std::snprintf(text.data(), text.size(), "%s%.*s", stage == kRefused ? kRefusedAnswer.data() : "",
-                static_cast<int>(name.size()), name.data());
-  tell(text.data());
+  tell(text_of(answer_, state).view());
   stage_.store(kNone, std::memory_order_release);
   return true;
 }
 
 void OperatorSocket::listen(ModuleState state, std::int64_t now_ns) noexcept {
-  std::array<char, kMostWord_bytes> bytes{};
+  std::array<char, kMostAsked_bytes> bytes{};
   asker_bytes_ = sizeof asker_;
   const auto got = ::recvfrom(fd_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_TRUNC,
                               reinterpret_cast<sockaddr*>(&asker_), &asker_bytes_);
   if (got < 0) return;
-  std::string_view word(bytes.data(), std::min(static_cast<std::size_t>(got), bytes.size()));
-  while (!word.empty() && (word.back() == '\n' || word.back() == '\0')) word.remove_suffix(1);
+  const std::string_view asked(bytes.data(), std::min(static_cast<std::size_t>(got), bytes.size()));
+  const std::size_t space = std::min(asked.find(' '), asked.size());
+  const std::string_view word = without_end(asked.substr(0, space));
+  const auto sent_ns = number_in(without_end(asked.substr(std::min(space + 1, asked.size()))));
   const auto command = operator_command_of(word);
   if (!command) return tell(word == "state" ? name_of(state) : kWhatMayBeAsked);
+  if (!sent_ns) return tell(kNoTime);
+  // Of the future, too: it is of another clock.
+  if (*sent_ns < now_ns - kDrop_ns || *sent_ns > now_ns + kDrop_ns) return tell(kTooOld);
   command_.store(*command, std::memory_order_relaxed);
-  asked_ns_ = now_ns;
+  sent_ns_ = *sent_ns;
   was_answered_ = false;
   stage_.store(kAsked, std::memory_order_release);
 }
@@ -119,8 +141,9 @@ bool OperatorSocket::try_read(OperatorCommand& command) noexcept {
   return true;
 }
 
-void OperatorSocket::answer(bool obeyed) noexcept {
-  stage_.store(obeyed ? kObeyed : kRefused, std::memory_order_release);
+void OperatorSocket::answer(const OperatorAnswer& answer) noexcept {
+  answer_ = answer;
+  stage_.store(kAnswered, std::memory_order_release);
 }
 
 bool try_ask(const std::string& path, const std::string& word, std::string& text) {
@@ -129,12 +152,13 @@ bool try_ask(const std::string& path, const std::string& word, std::string& text
   const int fd = address_of(path, address) ? ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0) : -1;
   // Bound to no path it gets a name of the kernel's, to be answered at.
   const timeval most{1, 0};
+  const std::string stamped = word + " " + std::to_string(monotonic_ns());
   const bool sent = fd >= 0 && ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &most, sizeof most) == 0 &&
                     ::bind(fd, generic(own), sizeof(sa_family_t)) == 0 &&
-                    ::sendto(fd, word.data(), word.size(), 0, generic(address), sizeof address) >= 0;
-  text = sent ? std::string("no answer within a second") : "nobody listens at \"" + path + "\": " + reason();
+                    ::sendto(fd, stamped.data(), stamped.size(), 0, generic(address), sizeof address) >= 0;
+  text = sent ? std::string("no answer within a second") : "nobody listens at \"" + path + "\": " + error_text(errno);
   pollfd answer{fd, POLLIN, 0};
-  std::array<char, 256> bytes{};
+  std::array<char, sizeof(AnswerText::text)> bytes{};
   const auto got = sent && ::poll(&answer, 1, 1000) > 0 ? ::recv(fd, bytes.data(), bytes.size(), 0) : -1;
   if (fd >= 0) ::close(fd);
   if (got < 0) return false;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The operator's commands, a word a datagram on a Unix socket, as `polygmapd --ask` sends them. The daemon's own thread
-// listens, and hands one command at a time to control's lane, which calls nothing of the system for it.
+// The operator's commands on a Unix socket, a datagram each, as `polygmapd --ask` sends them: the word and the
+// CLOCK_MONOTONIC time of its sending, "start 81234567890123" in ns. The daemon's own thread listens, and hands one
+// command at a time to control's lane, which calls nothing of the system for it.
 #pragma once
 
 #include <sys/socket.h>
@@ -11,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-#include "firmware/supervisor.hpp"
+#include "firmware/operator_answer_text.hpp"
 #include "hal/ports/operator_input.hpp"
 
 namespace polygmap::daemon {
@@ -27,18 +28,18 @@ class OperatorSocket final : public hal::OperatorInput {
   // stays there.
   [[nodiscard]] std::string open(const std::string& path);
   // Some hundred times a second, on the daemon's own thread, while the lanes run. Whoever asked hears what came of it:
-  // the state, or that it has no answer; who sends anything else hears what may be asked. A command that control has
-  // not taken within half a second is dropped, and its sender told so.
+  // the state, or why not; who sends anything else hears what may be asked. A command that control has not taken within
+  // half a second of its sending is dropped, and its sender told so: by then he may have gone, or changed his mind.
   void serve(ModuleState state, std::int64_t now_ns) noexcept;
   // What was sent before the lanes ran is not theirs.
   void drop_waiting() noexcept;
 
   [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override;
-  void answer(bool obeyed) noexcept override;
+  void answer(const OperatorAnswer& answer) noexcept override;
 
  private:
-  // Of a command: from the daemon's thread to control's lane and back. Above them the command's number.
-  enum Stage : std::uint8_t { kNone, kAsked, kTaken, kObeyed, kRefused };
+  // Of a command: from the daemon's thread to control's lane and back.
+  enum Stage : std::uint8_t { kNone, kAsked, kTaken, kAnswered };
 
   [[nodiscard]] bool is_answered(ModuleState state, std::int64_t now_ns) noexcept;
   void listen(ModuleState state, std::int64_t now_ns) noexcept;
@@ -48,16 +49,15 @@ class OperatorSocket final : public hal::OperatorInput {
   int fd_ = -1;
   std::atomic<std::uint8_t> stage_{kNone};
   std::atomic<OperatorCommand> command_{};  // written before kAsked is
-  std::int64_t asked_ns_ = 0;
+  OperatorAnswer answer_;                   // written before kAnswered is
+  std::int64_t sent_ns_ = 0;
   bool was_answered_ = false;  // at the last look: by this one its cycle has published the state
   sockaddr_un asker_{};
   socklen_t asker_bytes_ = 0;
 };
 
-inline constexpr std::string_view kRefusedAnswer = "refused: ";  // begins the answer to a command that does nothing
-
-// As a client: sends the word and waits for a second for the answer. False: text says why, without its full stop. What
-// nobody has answered by then nobody will do later.
+// As a client: sends the word, and when that was, and waits for a second for the answer. False: text says why, without
+// its full stop. What nobody has answered by then nobody will do later.
 [[nodiscard]] bool try_ask(const std::string& path, const std::string& word, std::string& text);
 
 }  // namespace polygmap::daemon

@@ -13,6 +13,7 @@
 #include <new>
 #include <utility>
 
+#include "firmware/daemon/system/error_text.hpp"
 #include "firmware/schedule.hpp"
 
 namespace polygmap::daemon {
@@ -179,7 +180,7 @@ std::string Service::start() {
 
 std::string Service::lock_memory() const {
   if (::mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return {};
-  return std::string("the memory cannot be locked (") + ::strerrordesc_np(errno) +
+  return std::string("the memory cannot be locked (") + error_text(errno) +
          "): it takes CAP_IPC_LOCK, or a limit of locked memory (ulimit -l, LimitMEMLOCK=) that holds all of it.";
 }
 
@@ -214,7 +215,7 @@ std::string Service::start_lanes() {
     }
     if (error == 0) continue;
     wrong = std::string("the lane ") + kNames[n] + " cannot have priority " + std::to_string(placement.priority) +
-            " of SCHED_FIFO on processor " + std::to_string(placement.processor) + " (" + ::strerrordesc_np(error) +
+            " of SCHED_FIFO on processor " + std::to_string(placement.processor) + " (" + error_text(error) +
             "): it takes CAP_SYS_NICE, or a limit of real-time priority (ulimit -r, LimitRTPRIO=), and a processor "
             "that the machine has.";
   }
@@ -253,7 +254,7 @@ std::string Service::start_helper(Helper& helper, void* (*function)(void*), cons
   const int error = helper.thread.start({}, function, this);
   helper.runs.store(error == 0);
   if (error == 0) return {};
-  return std::string("there is no thread for ") + purpose + " (" + ::strerrordesc_np(error) +
+  return std::string("there is no thread for ") + purpose + " (" + error_text(error) +
          "): it takes a limit of locked memory (ulimit -l, LimitMEMLOCK=) and one of tasks (ulimit -u, TasksMax=) that "
          "hold it.";
 }
@@ -345,14 +346,19 @@ std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
     return Decision{ExitCode::kStoppedItself, fallen ? "the robot has fallen." : "the gait had stopped by itself."};
   }
   if (!asked) return std::nullopt;
-  if (fallen) return Decision{ExitCode::kStoppedItself, "the robot has fallen."};
+  if (const std::optional<Decision> decision = decision_when_asked(view)) return decision;
+  if (now_ns - seen_.asked_ns < kStopLimit_ns) return std::nullopt;
+  return Decision{ExitCode::kStoppedItself, "asked to stop, and after three seconds it still does not stand."};
+}
+
+std::optional<Service::Decision> Service::decision_when_asked(const ModuleView& view) noexcept {
+  if (view.state == ModuleState::kFallen) return Decision{ExitCode::kStoppedItself, "the robot has fallen."};
   if (view.state == ModuleState::kOff) return Decision{ExitCode::kAsked, "asked to stop before it armed."};
   if (view.state == ModuleState::kArming) return Decision{ExitCode::kAsked, "asked to stop while it armed."};
   const bool by_itself = view.state == ModuleState::kSafeStop && view.reason != StopReason::kOperator;
   if (by_itself) return Decision{ExitCode::kStoppedItself, "the gait had stopped by itself."};
   if (view.stands()) return Decision{ExitCode::kAsked, "asked to stop, and stands."};
-  if (now_ns - seen_.asked_ns < kStopLimit_ns) return std::nullopt;
-  return Decision{ExitCode::kStoppedItself, "asked to stop, and after three seconds it still does not stand."};
+  return std::nullopt;
 }
 
 bool Service::lanes_move(std::int64_t now_ns) noexcept {

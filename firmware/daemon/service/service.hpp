@@ -70,13 +70,16 @@ class Service {
 
   [[nodiscard]] Outcome run();
 
- private:
-  struct LaneRun;
-  class Tasks;
   struct Decision {
     ExitCode code;
     const char* why;
   };
+  // Of who was asked to stop; empty: a foot has yet to come down.
+  [[nodiscard]] static std::optional<Decision> decision_when_asked(const ModuleView& view) noexcept;
+
+ private:
+  struct LaneRun;
+  class Tasks;
 
   // May block, and does not hold up the end for longer than a moment.
   struct Helper {

@@ -309,6 +309,10 @@ std::string operator_complaint(ClimbArguments& a) {
     }
     a.options.asked.push_back(command);
   }
+  if (!a.options.params.supervisor.autostart && !a.keyboard && a.options.asked.empty()) {
+    return "Parameter file \"" + a.options.params_file +
+           "\" switches supervisor.autostart off, and there is no --operator and no --ask: it would never arm.";
+  }
   return {};
 }
 
@@ -544,9 +548,9 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
 
   std::optional<ScriptedOperator> script;
   std::optional<Keyboard> keyboard;
-  if (!a.options.asked.empty()) a.options.climb_operator = &script.emplace(a.options.asked);
+  if (!a.options.asked.empty()) a.options.climb_operator = &script.emplace(a.options.asked, err);
   if (a.keyboard) a.options.climb_operator = &keyboard.emplace(err);
-  ProgressLine progress(out, a.options.stairs.steps, live && !a.keyboard);
+  ProgressLine progress(out, a.options.stairs.steps, live && a.options.climb_operator == nullptr);
   ClimbSummary summary;
   std::string not_written;
   try {

@@ -147,6 +147,11 @@ CameraFigures camera_figures(const SimRobot& robot, const CameraExtrinsicsEstima
   return f;
 }
 
+// Nothing but a command leads on.
+bool waits_for_operator(ModuleState state) {
+  return state == ModuleState::kOff || state == ModuleState::kStanding || state == ModuleState::kHolding;
+}
+
 std::vector<std::string> names_of(JointSet joints) {
   std::vector<std::string> names;
   for (std::size_t n = 0; n < kJointCount; ++n) {
@@ -240,6 +245,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
 
   std::vector<StateChange> states;
   std::int64_t end_ns = -1;
+  OperatorEnd operator_end = OperatorEnd::kNone;
   std::int64_t next_progress_ns = 0;
   while (seconds(robot.now_ns()) < options.time_limit_s) {
     if (bus) {
@@ -267,16 +273,27 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     if (states.empty() || states.back().state != state) states.push_back({seconds(robot.now_ns()), state});
     const bool goes_on = options.climb_operator != nullptr && options.climb_operator->has_more();
     const bool ended = state == ModuleState::kOnTop || state == ModuleState::kSafeStop;
-    const bool over = (ended || telemetry.arming_waits_for.leans()) && !goes_on;
+    const bool waits = waits_for_operator(state);
+    // Out of a fall no command leads.
+    const bool over =
+        state == ModuleState::kFallen || ((ended || waits || telemetry.arming_waits_for.leans()) && !goes_on);
     if (!over) end_ns = -1;
     if (over && end_ns < 0) end_ns = robot.now_ns() + kRestAfterEnd_ns;
-    if (robot.truth().fell || (over && robot.now_ns() >= end_ns)) break;
-    if (options.climb_operator != nullptr && options.climb_operator->ends_climb()) break;
+    if (robot.truth().fell) break;
+    if (options.climb_operator != nullptr && options.climb_operator->has_left()) {
+      operator_end = OperatorEnd::kLeft;
+      break;
+    }
+    if (over && robot.now_ns() >= end_ns) {
+      if (waits) operator_end = OperatorEnd::kAsksNoMore;
+      break;
+    }
     if (options.interrupt != nullptr && *options.interrupt != 0) break;
   }
 
   RunFigures figures;
   figures.options = options;
+  figures.operator_end = operator_end;
   figures.interrupted_by = options.interrupt != nullptr ? options.interrupt->load() : 0;
   figures.params_hash = config::hash_of(params);
   figures.states = std::move(states);

@@ -58,6 +58,7 @@ void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
     ending_.fall_reason = truth.fall_reason;
   }
   ending_.arming_waits_for = telemetry.arming_waits_for;
+  ending_.module_state = telemetry.module_state;
   ending_.phase = telemetry.gait.phase;
   ending_.stop_reason = telemetry.gait.stop_reason;
   ending_.stop_measured_m = telemetry.gait.stop_measured_m;
@@ -317,11 +318,16 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.fell = fell_;
   s.steps_total = static_cast<int>(world_.steps.size());
   s.steps_climbed = steps_climbed_;
-  const bool module_ended =
-      ending_.phase == GaitPhase::kFinished || ending_.phase == GaitPhase::kStopped || ending_.arming_waits_for.leans();
+  const bool module_ended = ending_.phase == GaitPhase::kFinished || ending_.phase == GaitPhase::kStopped ||
+                            ending_.module_state == ModuleState::kFallen || ending_.arming_waits_for.leans();
+  const bool operator_ended = run.operator_end != OperatorEnd::kNone;
   s.ended_at_s = seconds(last_stamp_ns_);
   s.interrupted_by = fell_ || module_ended ? 0 : run.interrupted_by;
-  s.ended_by = fell_ ? "fall" : module_ended ? "module" : s.interrupted_by != 0 ? "interrupted" : "time limit";
+  s.ended_by = fell_                   ? "fall"
+               : module_ended          ? "module"
+               : s.interrupted_by != 0 ? "interrupted"
+               : operator_ended        ? "operator"
+                                       : "time limit";
   if (on_top_ns_ >= 0 && first_lift_off_ns_ >= 0) {
     s.climb_time_s = seconds(on_top_ns_ - first_lift_off_ns_);
     s.seconds_per_step = s.climb_time_s / s.steps_total;
@@ -380,6 +386,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
 
   ClimbEnding ending = ending_;
   ending.heap_first_caller = run.heap_first_caller;
+  ending.operator_end = run.operator_end;
   judge(s, ending);
   return s;
 }

@@ -29,6 +29,7 @@ namespace polygmap::sim {
 struct RunFigures {
   ClimbOptions options;
   int interrupted_by = 0;   // the signal; 0: none
+  OperatorEnd operator_end = OperatorEnd::kNone;
   std::string params_hash;  // of what the module was given
   std::vector<StateChange> states;
   CameraFigures camera;

@@ -99,7 +99,7 @@ struct ClimbSummary {
   bool pass = false;
   std::string reason;  // one sentence
   bool fell = false;
-  std::string ended_by;              // "module": by itself; "fall"; "time limit"; "interrupted"
+  std::string ended_by;              // "module": by itself; "fall"; "time limit"; "interrupted"; "operator"
   int interrupted_by = 0;            // the signal; 0: none
   double ended_at_s = kNotMeasured;  // simulation's clock
   ClimbOptions options;

@@ -20,6 +20,18 @@ std::string why_stopped(StopReason reason, double measured_m) {
   return of_a_length && measured_m > 0.0 ? why + sentence(" (%.3f m)", measured_m) : why;
 }
 
+// The gait has not ended, and the plant has not fallen.
+std::string why_ended_early(const std::string& climbed, const ClimbEnding& ending) {
+  const std::string state(name_of(ending.module_state));
+  if (ending.operator_end == OperatorEnd::kLeft) {
+    return "The operator left after " + climbed + "; the module's state was " + state + ".";
+  }
+  if (ending.operator_end == OperatorEnd::kAsksNoMore) {
+    return "No command was to come after " + climbed + ", and the module waited for one; its state was " + state + ".";
+  }
+  return "Time ran out after " + climbed + ".";
+}
+
 std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
   const std::string climbed = sentence("%.0f of %.0f steps", s.steps_climbed, s.steps_total);
   const std::string over_the_edge =
@@ -32,11 +44,15 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
         "Climbed " + climbed +
         sentence(" in %.1f s (%.2f s per step), least sole margin %.1f mm, least swing clearance %.1f mm",
                  s.climb_time_s, s.seconds_per_step, s.sole_margin_min_m * 1e3, s.swing_clearance_min_m * 1e3);
+    if (ending.module_state == ModuleState::kFallen) return reason + "; the module took the robot for fallen there.";
     if (ending.phase == GaitPhase::kStopped) return reason + "; the module stopped there: " + why + ".";
     return reason + (ending.phase == GaitPhase::kFinished ? "." : "; the run ended before the module did.");
   }
   if (s.interrupted_by != 0) return "The run was interrupted after " + climbed + ".";
   if (s.fell) return "Fell after " + climbed + ": " + ending.fall_reason;
+  if (!all_climbed && ending.module_state == ModuleState::kFallen) {
+    return "The module took the robot for fallen after " + climbed + ", and damped its joints.";
+  }
   if (!all_climbed && ending.phase == GaitPhase::kStopped) {
     return "The module stopped after " + climbed + ": " + why + ".";
   }
@@ -49,7 +65,7 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
     if (over) return over_the_edge + "; " + climbed + " count.";
     return "The module ended the climb after " + climbed + ": " + why_stopped(StopReason::kTop, 0.0) + ".";
   }
-  if (!all_climbed) return "Time ran out after " + climbed + ".";
+  if (!all_climbed) return why_ended_early(climbed, ending);
   if (s.heap_calls != 0) {
     return "The module called the heap, " + std::to_string(s.heap_calls) + " times in all, first from " +
            (ending.heap_first_caller.empty() ? "an unknown function" : ending.heap_first_caller) + ".";

@@ -2,6 +2,7 @@
 // Whether a climb passed and why: a sentence, and one for every push that it did not live to see.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "algorithms/core/messages/samples.hpp"
@@ -10,8 +11,17 @@
 
 namespace polygmap::sim {
 
+// What its operator has to do with the run's end.
+enum class OperatorEnd : std::uint8_t {
+  kNone,
+  kAsksNoMore,  // and the module waits for a command
+  kLeft,        // quit, or the input ended
+};
+
 // How the run ended, in the module's words and in the plant's.
 struct ClimbEnding {
+  ModuleState module_state{};
+  OperatorEnd operator_end = OperatorEnd::kNone;
   GaitPhase phase = GaitPhase::kStandstill;
   StopReason stop_reason = StopReason::kNone;
   ArmingWait arming_waits_for;

@@ -1,11 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_stub/host/operator/climb_operator.hpp"
 
+#include <array>
 #include <charconv>
+#include <cstdio>
+#include <ostream>
 
 #include "firmware/config/file_error.hpp"
+#include "firmware/operator_answer_text.hpp"
+#include "sim_stub/heap_trap.hpp"
 
 namespace polygmap::sim {
+
+void ClimbOperator::say(const std::string& words) {
+  std::array<char, 32> time{};
+  std::snprintf(time.data(), time.size(), "%8.2f s  ", 1e-9 * static_cast<double>(now_ns_));
+  out_ << time.data() << words << "\n" << std::flush;
+}
+
+void ClimbOperator::look(std::int64_t now_ns, ModuleState state) {
+  now_ns_ = now_ns;
+  if (state != state_) say(std::string(name_of(state)));
+  state_ = state;
+  listen();
+}
+
+bool ClimbOperator::try_read(OperatorCommand& command) noexcept {
+  const heap::HostCall host;  // of the module's cycle
+  const std::optional<OperatorCommand> asked = next();
+  if (!asked) return false;
+  command = asked_ = *asked;
+  return true;
+}
+
+void ClimbOperator::answer(const OperatorAnswer& answer) noexcept {
+  const heap::HostCall host;
+  if (answer.is_obeyed() || !state_) return;  // the state that comes of it is said by look()
+  say(std::string(name_of(asked_)) + " " + std::string(text_of(answer, *state_).view()));
+}
 
 std::string read_command(const std::string& text, TimedCommand& command) {
   constexpr double kLatest_s = 10000.0;

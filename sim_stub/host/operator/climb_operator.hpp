@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <iosfwd>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,16 +15,34 @@
 
 namespace polygmap::sim {
 
+// Its states as they change, and what it refuses, are said on a stream.
 class ClimbOperator : public hal::OperatorInput {
  public:
   // Before each cycle of the module, with the state it is in.
-  virtual void look(std::int64_t now_ns, ModuleState state) = 0;
-  // It may still ask for something: a gait that has ended is not the end of the climb.
+  void look(std::int64_t now_ns, ModuleState state);
+  // It may still ask for something: a module that waits, or a gait that has ended, is not the end of the climb.
   [[nodiscard]] virtual bool has_more() const = 0;
-  [[nodiscard]] virtual bool ends_climb() const { return false; }
+  // It wants no more of this climb.
+  [[nodiscard]] virtual bool has_left() const { return false; }
+  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept final;
+  void answer(const OperatorAnswer& answer) noexcept final;
 
  protected:
+  explicit ClimbOperator(std::ostream& out) : out_(out) {}
   ~ClimbOperator() = default;
+
+  [[nodiscard]] std::ostream& out() { return out_; }
+  [[nodiscard]] std::int64_t now_ns() const { return now_ns_; }
+  virtual void listen() = 0;  // once a cycle, before the module's
+  [[nodiscard]] virtual std::optional<OperatorCommand> next() = 0;
+
+ private:
+  void say(const std::string& words);
+
+  std::ostream& out_;
+  std::int64_t now_ns_ = 0;
+  std::optional<ModuleState> state_;
+  OperatorCommand asked_{};  // last
 };
 
 struct TimedCommand {
@@ -34,20 +54,20 @@ struct TimedCommand {
 class ScriptedOperator final : public ClimbOperator {
  public:
   // In the order of their times.
-  explicit ScriptedOperator(std::vector<TimedCommand> script) : script_(std::move(script)) {}
+  ScriptedOperator(std::vector<TimedCommand> script, std::ostream& out)
+      : ClimbOperator(out), script_(std::move(script)) {}
 
-  void look(std::int64_t now_ns, ModuleState) override { now_ns_ = now_ns; }
   [[nodiscard]] bool has_more() const override { return next_ < script_.size(); }
-  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override {
-    if (next_ >= script_.size() || 1e-9 * static_cast<double>(now_ns_) < script_[next_].at_s) return false;
-    command = script_[next_++].command;
-    return true;
-  }
 
  private:
+  void listen() override {}
+  [[nodiscard]] std::optional<OperatorCommand> next() override {
+    if (next_ >= script_.size() || 1e-9 * static_cast<double>(now_ns()) < script_[next_].at_s) return std::nullopt;
+    return script_[next_++].command;
+  }
+
   std::vector<TimedCommand> script_;
   std::size_t next_ = 0;
-  std::int64_t now_ns_ = 0;
 };
 
 // As in "start@4.5"; a sentence where it is none.

@@ -6,11 +6,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <ostream>
 #include <thread>
-
-#include "sim_stub/heap_trap.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -26,8 +23,8 @@ constexpr const char* kHelp = "a arm, s start, p pause, g go on, x stop, n new s
 
 }  // namespace
 
-Keyboard::Keyboard(std::ostream& out) : out_(out) {
-  out_ << kHelp << std::flush;
+Keyboard::Keyboard(std::ostream& out) : ClimbOperator(out) {
+  out << kHelp << std::flush;
   termios usual{};
   if (::isatty(STDIN_FILENO) == 0 || ::tcgetattr(STDIN_FILENO, &usual) != 0) return;
   termios single_keys = usual;
@@ -51,32 +48,25 @@ void Keyboard::read_keys() {
     if (known != kKeys.end()) {
       asked_.push_back(known->command);
     } else if (key != 'q') {
-      out_ << kHelp << std::flush;
+      out() << kHelp << std::flush;
     }
   }
 }
 
-void Keyboard::look(std::int64_t now_ns, ModuleState state) {
+void Keyboard::listen() {
   if (begun_ns_ < 0) {
-    begun_ns_ = now_ns;
+    begun_ns_ = now_ns();
     begun_ = std::chrono::steady_clock::now();
   }
-  if (state != state_) {
-    std::array<char, 64> line{};
-    std::snprintf(line.data(), line.size(), "%8.2f s  ", 1e-9 * static_cast<double>(now_ns));
-    out_ << line.data() << name_of(state) << "\n" << std::flush;
-  }
-  state_ = state;
   read_keys();
-  std::this_thread::sleep_until(begun_ + std::chrono::nanoseconds(now_ns - begun_ns_));
+  std::this_thread::sleep_until(begun_ + std::chrono::nanoseconds(now_ns() - begun_ns_));
 }
 
-bool Keyboard::try_read(OperatorCommand& command) noexcept {
-  const heap::HostCall host;  // of the module's cycle
-  if (asked_.empty()) return false;
-  command = asked_.front();
+std::optional<OperatorCommand> Keyboard::next() {
+  if (asked_.empty()) return std::nullopt;
+  const OperatorCommand command = asked_.front();
   asked_.pop_front();
-  return true;
+  return command;
 }
 
 }  // namespace polygmap::sim

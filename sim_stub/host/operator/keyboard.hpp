@@ -12,8 +12,8 @@
 
 namespace polygmap::sim {
 
-// Keys on the standard input, each a command, and the climb no faster than the wall's clock. What it hears and the
-// module's states are said on a stream.
+// Keys on the standard input, each a command, and the climb no faster than the wall's clock. Whoever quits, or whose
+// input ends, has left.
 class Keyboard final : public ClimbOperator {
  public:
   explicit Keyboard(std::ostream& out);
@@ -21,19 +21,17 @@ class Keyboard final : public ClimbOperator {
   Keyboard& operator=(const Keyboard&) = delete;
   ~Keyboard();
 
-  void look(std::int64_t now_ns, ModuleState state) override;
-  [[nodiscard]] bool has_more() const override { return !closed_ || !asked_.empty(); }
-  [[nodiscard]] bool ends_climb() const override { return quits_; }
-  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override;
+  [[nodiscard]] bool has_more() const override { return !has_left(); }
+  [[nodiscard]] bool has_left() const override { return quits_ || (closed_ && asked_.empty()); }
 
  private:
+  void listen() override;
+  [[nodiscard]] std::optional<OperatorCommand> next() override;
   void read_keys();
 
-  std::ostream& out_;
   std::optional<termios> usual_;  // of a terminal, to be put back
   std::deque<OperatorCommand> asked_;
   bool closed_ = false, quits_ = false;
-  std::optional<ModuleState> state_;
   std::int64_t begun_ns_ = -1;
   std::chrono::steady_clock::time_point begun_;
 };

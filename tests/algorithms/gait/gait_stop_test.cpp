@@ -35,6 +35,22 @@ TEST(GaitStop, ReasonsOfTheSearch_StopBeforeTheStairsWithTheMeasure) {
   EXPECT_DOUBLE_EQ(b.status().stop_measured_m, 0.1);
 }
 
+// Whoever reads the status afterwards takes a stop without a reason for the gait's own.
+TEST(GaitStop, AskedToStopAfterTheClimbsEnd_SaysWhoAsked) {
+  IdealClimb climb({});
+  climb.run(60.0);
+  ASSERT_EQ(climb.status().phase, GaitPhase::kFinished);
+  EXPECT_EQ(climb.status().stop_reason, StopReason::kNone);
+  climb.gait().request_stop(StopReason::kOperator);
+  EXPECT_EQ(climb.status().stop_reason, StopReason::kOperator);
+  climb.gait().request_stop(StopReason::kTimeShort);
+  (void)climb.tick();
+  EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+  EXPECT_EQ(climb.status().stop_reason, StopReason::kOperator) << "the first to ask";
+  ASSERT_TRUE(climb.gait().try_restart(climb.q_rad()));
+  EXPECT_EQ(climb.status().stop_reason, StopReason::kNone);
+}
+
 TEST(GaitStop, EveryObstructionAfterTheFirstTread_StandsOnBothFeet) {
   for (const StopReason obstruction :
        {StopReason::kNothingSeen, StopReason::kNoStaircase, StopReason::kTop, StopReason::kRiseTooHigh,

@@ -124,6 +124,28 @@ TEST_F(ProgramTest, Ask_SaysWhereNobodyListens) {
   EXPECT_NE(silent.said.find("nobody listens at"), std::string::npos) << silent.said;
 }
 
+// Somebody edits the file while the robot climbs: it must be possible to stop it all the same.
+TEST_F(ProgramTest, AskWithAFileThatIsBeingEdited_ReadsTheKeyOperatorAlone) {
+  for (const char* rest : {"bus = \"nowhere.toml\"\n", "params = \"nowhere.toml\"\n", "lanes = \"x\"\n[imu]\n",
+                           "hold_s = \n", "[camera\n", "[imu]\noperator = 3\n", "\"unfinished"}) {
+    const std::string path =
+        write("edited.toml", "# a robot\n \toperator =\t\"socket\"  # here\r\n" + std::string(rest));
+    const Done done = run("--ask stop --config " + path);
+    EXPECT_EQ(done.code, 3) << rest << done.said;
+    EXPECT_NE(done.said.find("nobody listens at \"" + (folder_ / "socket").string()), std::string::npos) << done.said;
+  }
+  for (const char* wrong : {"operator = 3\n", "operator = \"\"\n", "operator = \"socket\n", "operator =\n"}) {
+    const Done done = run("--ask stop --config " + write("edited.toml", "\n" + std::string(wrong)));
+    EXPECT_EQ(done.code, 2) << wrong << done.said;
+    EXPECT_NE(done.said.find("line 2"), std::string::npos) << done.said;
+  }
+  for (const char* none : {"", "operators = \"x\"\n", "[imu]\noperator = \"socket\"\n"}) {
+    const Done done = run("--ask stop --config " + write("edited.toml", none));
+    EXPECT_EQ(done.code, 2) << none << done.said;
+    EXPECT_NE(done.said.find("has no key operator"), std::string::npos) << done.said;
+  }
+}
+
 TEST_F(ProgramTest, MissingDevice_IsCodeThreeWithFileLineAndKey) {
   if (std::filesystem::exists("/sys/class/net/can0")) GTEST_SKIP() << "this machine has a can0";
   const Done done = run("--config " + config());

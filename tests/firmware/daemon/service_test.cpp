@@ -217,20 +217,19 @@ TEST_F(ServiceTest, OperatorAsks_ArmsStartsStopsAndResetsThenAndNotBefore) {
   EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
 }
 
-TEST(OperatorSocketTest, NoSocketCanBeMade_IsTold) {
-  OperatorSocket none, file, first, second;
-  EXPECT_NE(none.open("/nowhere/operator").find("cannot be made"), std::string::npos);
-  EXPECT_NE(none.open(std::string(200, 'x')).find("too long"), std::string::npos);
-  const std::string path = testing::TempDir() + "polygmap_no_socket_" + std::to_string(::getpid());
-  std::ofstream(path) << "mine";
-  EXPECT_NE(file.open(path).find("cannot be made"), std::string::npos);
-  EXPECT_TRUE(std::filesystem::is_regular_file(path)) << "what is no socket stays there";
-  std::filesystem::remove(path);
-  ASSERT_EQ(first.open(path), "");
-  EXPECT_NE(second.open(path).find("cannot be made"), std::string::npos) << "another daemon lives there";
-  std::string text;
-  EXPECT_FALSE(try_ask(path + "_", "state", text));
-  EXPECT_NE(text.find("nobody listens at"), std::string::npos) << text;
+// A climb to the top takes too long here: what the module then says, and what comes of it.
+TEST(ServiceDecisionTest, AskedToStopOnTop_IsWhatWasAskedFor) {
+  const auto code_of = [](ModuleState state, StopReason reason) {
+    ModuleView view;
+    view.state = state;
+    view.phase = GaitPhase::kFinished;
+    view.reason = reason;
+    const auto decision = Service::decision_when_asked(view);
+    return decision ? number_of(decision->code) : -1;
+  };
+  EXPECT_EQ(code_of(ModuleState::kOnTop, StopReason::kNone), 0) << "SIGTERM on top";
+  EXPECT_EQ(code_of(ModuleState::kSafeStop, StopReason::kOperator), 0) << "stop on top, then SIGTERM";
+  EXPECT_EQ(code_of(ModuleState::kSafeStop, StopReason::kTimeShort), 1) << "it had to stop on top, then SIGTERM";
 }
 
 // It takes 1.0 s at most, on these stairs 0.9 s; a machine of others' may be late.

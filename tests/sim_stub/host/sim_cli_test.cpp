@@ -74,6 +74,14 @@ TEST(ClimbCommand, Contacts_InferredUnlessSensed) {
   expect_refused({"climb", "--contacts", "guessed"}, "--contacts");
 }
 
+TEST(ClimbCommand, AutostartOff_TakesAnOperator) {
+  const std::string path = temporary("autostart.toml");
+  std::ofstream(path) << "[supervisor]\nautostart = false\n";
+  expect_refused({"climb", "--params", path}, "supervisor.autostart");
+  EXPECT_EQ(call({"climb", "--params", path, "--ask", "arm@1"}).code, 0);
+  std::filesystem::remove(path);
+}
+
 TEST(ClimbCommand, CameraErrors_OnByDefault_EachCanBeTurnedOff) {
   const Call usual = call({"climb"});
   ASSERT_TRUE(usual.options) << usual.err;

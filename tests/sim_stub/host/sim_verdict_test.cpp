@@ -63,6 +63,31 @@ TEST(ClimbVerdict, RunCutShort_SaysSo) {
   EXPECT_EQ(climb.finish().reason, "Time ran out after 0 of 2 steps.");
 }
 
+TEST(ClimbVerdict, ModuleTakesTheRobotForFallen_SaysSo) {
+  ScriptedClimb climb(plain_stairs(2));
+  climb.module_state = ModuleState::kFallen;
+  climb.wait(100 * kNsPerMs);
+  const ClimbSummary s = climb.finish();
+  EXPECT_EQ(s.ended_by, "module");
+  EXPECT_EQ(s.reason, "The module took the robot for fallen after 0 of 2 steps, and damped its joints.");
+}
+
+TEST(ClimbVerdict, OperatorAsksNoMoreOrLeft_NamesTheState) {
+  for (const auto end : {OperatorEnd::kAsksNoMore, OperatorEnd::kLeft}) {
+    ScriptedClimb climb(plain_stairs(2));
+    climb.module_state = ModuleState::kHolding;
+    climb.wait(100 * kNsPerMs);
+    RunFigures run;
+    run.operator_end = end;
+    const ClimbSummary s = climb.report.finish(run);
+    EXPECT_EQ(s.ended_by, "operator");
+    EXPECT_EQ(s.reason, end == OperatorEnd::kLeft
+                            ? "The operator left after 0 of 2 steps; the module's state was holding."
+                            : "No command was to come after 0 of 2 steps, and the module waited for one; its state was "
+                              "holding.");
+  }
+}
+
 TEST(ClimbVerdict, StoppedOnTop_PassesAndSaysWhy) {
   ScriptedClimb climb(plain_stairs(1));
   climb.climb_all();
