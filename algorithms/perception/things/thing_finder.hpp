@@ -18,8 +18,8 @@ namespace polygmap {
 class ThingFinder {
  public:
   struct Params {
-    double least_height_m = 0.010;
-    double sigmas = 4.5;
+    double least_height_m = 0.012;
+    double sigmas = 6.0;  // 4.5 took warped treads of robots twice as bad for things (2026-11)
     double most_height_m = 0.40;
     double before_back_m = 0.012;
     double seen_height_m = 0.06;
