@@ -199,11 +199,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 8892397807449347857U);
-  EXPECT_EQ(hashes.gait.value(), 408179278714138939U);
-  EXPECT_EQ(hashes.commands.value(), 3526817496724754235U);
-  EXPECT_EQ(hashes.surfaces.value(), 15450768377625595271U);
-  EXPECT_EQ(hashes.map.value(), 17383963159424324668U);
+  EXPECT_EQ(hashes.estimates.value(), 18334935431787563409U);
+  EXPECT_EQ(hashes.gait.value(), 4957036221274194019U);
+  EXPECT_EQ(hashes.commands.value(), 8781539385001486090U);
+  EXPECT_EQ(hashes.surfaces.value(), 6018346593508900000U);
+  EXPECT_EQ(hashes.map.value(), 6955445935282093827U);
 }
 
 }  // namespace

@@ -252,7 +252,7 @@ class PolygonMap {
     double variance_m2 = 0.0;  // of across, but for the pose's
   };
 
-  // Where a pass over the frame's surfaces stands, and what of the map the present one may be.
+  // Where a pass over the frame's surfaces or things stands, and what of the map the present one may be.
   struct Pass {
     bool measuring = false;  // the first pass, in which nothing changes yet
     std::size_t patch = 0;   // in order_
@@ -261,6 +261,7 @@ class PolygonMap {
     std::size_t second = kMaxMapPolygons;
     double best_cost = 0.0;
     double second_cost = 0.0;
+    std::size_t thing = 0;  // the frame's sighting, or the map's cell
   };
 
   void do_piece() noexcept;
@@ -320,7 +321,6 @@ class PolygonMap {
   bool any_frame_ = false;
   Stage stage_ = Stage::kIdle;
   Pass pass_;
-  std::size_t thing_ = 0;  // the frame's sighting, or the map's cell
   WorkCount work_;
 };
 

@@ -28,7 +28,7 @@ namespace polygmap::sim {
 // What the run knows beside truth and telemetry.
 struct RunFigures {
   ClimbOptions options;
-  int interrupted_by = 0;   // the signal; 0: none
+  int interrupted_by = 0;  // the signal; 0: none
   OperatorEnd operator_end = OperatorEnd::kNone;
   std::string params_hash;  // of what the module was given
   std::vector<StateChange> states;
