@@ -159,19 +159,19 @@ void PolygonMap::do_piece() noexcept {
       }
       break;
     case Stage::kThings:
-      if (thing_ < frame_.things.size()) {
-        things_.add(frame_.things[thing_++]);
+      if (pass_.thing < frame_.things.size()) {
+        things_.add(frame_.things[pass_.thing++]);
       } else {
-        thing_ = 0;
+        pass_.thing = 0;
         stage_ = Stage::kThingsAgain;
       }
       break;
     case Stage::kThingsAgain:
-      for (constexpr std::size_t kAtOnce = 16; thing_ < things_.count();) {
-        things_.look_again(thing_++);
-        if (thing_ % kAtOnce == 0) break;
+      for (constexpr std::size_t kAtOnce = 16; pass_.thing < things_.count();) {
+        things_.look_again(pass_.thing++);
+        if (pass_.thing % kAtOnce == 0) break;
       }
-      if (thing_ >= things_.count()) stage_ = Stage::kPublish;
+      if (pass_.thing >= things_.count()) stage_ = Stage::kPublish;
       break;
     case Stage::kPublish:
       publish();
@@ -184,7 +184,7 @@ void PolygonMap::do_piece() noexcept {
 
 void PolygonMap::begin_things() noexcept {
   things_.begin({map_T_camera_, view_.intrinsics, view_.columns});
-  thing_ = 0;
+  pass_.thing = 0;
   stage_ = Stage::kThings;
 }
 

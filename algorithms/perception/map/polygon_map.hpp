@@ -261,6 +261,7 @@ class PolygonMap {
     std::size_t second = kMaxMapPolygons;
     double best_cost = 0.0;
     double second_cost = 0.0;
+    std::size_t thing = 0;  // after the surfaces: the frame's sighting, or the map's cell
   };
 
   void do_piece() noexcept;
@@ -320,7 +321,6 @@ class PolygonMap {
   bool any_frame_ = false;
   Stage stage_ = Stage::kIdle;
   Pass pass_;
-  std::size_t thing_ = 0;  // the frame's sighting, or the map's cell
   WorkCount work_;
 };
 
