@@ -174,7 +174,8 @@ TEST_F(ProgramTest, Replay_OfTheSameModule_IsCodeZero) {
 }
 
 TEST_F(ProgramTest, ReplayWithAFlippedBitOfAnInput_IsCodeOneAndNamesTheFirstDifference) {
-  record(folder_.string(), 50);
+  constexpr int kTicks = 120;  // it listens for the first fifty
+  record(folder_.string(), kTicks);
   const std::filesystem::path file = folder_ / recording::kFileName;
   std::ifstream in(file, std::ios::binary);
   std::vector<char> bytes((std::istreambuf_iterator<char>(in)), {});
@@ -190,7 +191,7 @@ TEST_F(ProgramTest, ReplayWithAFlippedBitOfAnInput_IsCodeOneAndNamesTheFirstDiff
   const Done done = run("--replay " + folder_.string());
   EXPECT_EQ(done.code, 1) << done.said;
   EXPECT_NE(done.said.find("tick "), std::string::npos) << done.said;
-  EXPECT_NE(done.said.find("replay: 50 ticks, "), std::string::npos) << done.said;
+  EXPECT_NE(done.said.find("replay: " + std::to_string(kTicks) + " ticks, "), std::string::npos) << done.said;
 }
 
 TEST_F(ProgramTest, ReplayOfWhatIsNone_IsCodeTwo) {
