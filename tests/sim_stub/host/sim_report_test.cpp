@@ -563,7 +563,8 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
       "steps_total steps_climbed climb_time_s seconds_per_step plane_rate_hz "
       "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min stand_off_mm "
       "closure_error_mm tracking_error_mm com_tracking_mm_max zmp_margin_mm_min torque_peak_ratio torque_limited_ms "
-      "joint_speed_peak_ratio odometry_rmse_mm odometry_drift_mm odometry_jitter_mm odometry_nees exposure_to_map_ms "
+      "joint_speed_peak_ratio odometry_rmse_mm odometry_drift_mm odometry_jitter_mm odometry_nees "
+      "occupied_cells_most exposure_to_map_ms "
       "map_age_at_latch_ms target_last_seen_ms heap_calls faults "
       "static_memory_bytes static_memory schedule surfaces footsteps wall ");
   EXPECT_EQ(j["verdict"], "pass");
