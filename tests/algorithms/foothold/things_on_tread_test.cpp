@@ -13,7 +13,7 @@ constexpr double kHeight_m = 0.13, kDepth_m = 0.28;
 class ThingsOnTreadTest : public ::testing::Test {
  protected:
   const SoleModel sole_{};
-  const ThingParams params_;
+  const ThingParams params_{};
   LevelSurface tread_;
   OccupiedCells cells_;
   WorkCount work_;
