@@ -55,6 +55,7 @@ std::int64_t label_of(const SurfaceExtractor& extractor) {
     case Stage::kSurfaces:
       return in(Stage::kSurfaces, extractor.surface_builder().part());
     case Stage::kIdle:
+    case Stage::kThings:
     case Stage::kFinish:
       break;
   }

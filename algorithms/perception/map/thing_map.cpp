@@ -18,12 +18,13 @@ void ThingMap::begin(const View& view) noexcept {
   work_.add(150);
   work_.add(cells_.size(), 4);
   for (ThingCell& cell : cells_) cell.seen = false;
+  may_make_room_ = true;
 }
 
 // The cells below the sighting, from its near to its far end.
 void ThingMap::add(const ThingSighting& sighting) noexcept {
-  constexpr double kStep_m = 0.5 * kOccupiedCell_m;
-  constexpr std::int32_t kMostSteps = 40;
+  constexpr double kStep_m = kOccupiedCell_m;
+  constexpr std::int32_t kMostSteps = 16;  // what is longer is wider than a foot, too
   const Vec3 near_m = view_.map_T_camera * sighting.near_m, far_m = view_.map_T_camera * sighting.far_m;
   const Vec3 way_m = far_m - near_m;
   const auto steps = static_cast<std::int32_t>(std::min(std::ceil(way_m.norm() / kStep_m), kMostSteps + 0.0));
@@ -57,8 +58,10 @@ ThingCell* ThingMap::cell_for(std::int32_t x, std::int32_t y) noexcept {
       index = static_cast<Index>(cells_.size());
       return &cells_[cells_.size() - 1];
     }
-    // What was not seen in this frame and is farthest from the camera makes room.
-    work_.add(cells_.size(), 12);
+    // What was not seen in this frame and is farthest from the camera makes room, once in a frame: a search of all cells
+    // for each of a frame's cells would cost more than a picture.
+    if (!std::exchange(may_make_room_, false)) return nullptr;
+    work_.add(cells_.size(), 25);
     ThingCell* victim = nullptr;
     double farthest_m2 = 0.0;
     for (ThingCell& c : cells_) {

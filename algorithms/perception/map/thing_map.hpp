@@ -81,6 +81,7 @@ class ThingMap {
   Transform camera_T_map_;
   StaticVector<ThingCell, kMaxOccupiedCells> cells_;
   std::array<Index, static_cast<std::size_t>(kSide) * kSide> index_{};
+  bool may_make_room_ = true;  // in this frame
   WorkCount work_;
 };
 
