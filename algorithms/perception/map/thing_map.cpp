@@ -58,8 +58,8 @@ ThingCell* ThingMap::cell_for(std::int32_t x, std::int32_t y) noexcept {
       index = static_cast<Index>(cells_.size());
       return &cells_[cells_.size() - 1];
     }
-    // What was not seen in this frame and is farthest from the camera makes room, once in a frame: a search of all cells
-    // for each of a frame's cells would cost more than a picture.
+    // What was not seen in this frame and is farthest from the camera makes room, once in a frame: a search of all
+    // cells for each of a frame's cells would cost more than a picture.
     if (!std::exchange(may_make_room_, false)) return nullptr;
     work_.add(cells_.size(), 25);
     ThingCell* victim = nullptr;
