@@ -268,7 +268,8 @@ bool EdgeLineFinder::try_group_point(const Group& group, Vec2& point_m, double& 
   const auto at = static_cast<std::int32_t>(point.at);
   if (at <= kMaxWindow_px - params_.window_px || at + 2 > kMaxWindow_px + params_.window_px) return false;
   half_gap_m = 0.0;
-  if (group.seen_rows <= static_cast<float>(group.columns * (2 * (params_.max_gap_px / 2)))) {
+  const std::int32_t near_rows = 2 * (params_.max_gap_px / 2);
+  if (group.seen_rows <= static_cast<float>(group.columns * near_rows)) {
     Gap gap;
     const GapFound found = find_gap(group, at, gap);
     if (found == GapFound::kOutside) return false;

@@ -26,8 +26,8 @@ void ThingFinder::begin(const Params& params, const DepthNoiseModel& noise, cons
   frame_ = &frame;
   patch_ = 0;
   begun_ = false;
+  knows_surfaces_ = false;
   ++turn_;
-  find_surfaces();
 }
 
 // Of the picture's regions, those that are too wide for a thing.
@@ -52,7 +52,11 @@ Progress ThingFinder::step(WorkBudget& budget) noexcept {
       budget.spend(work_.take_units());
       return Progress::kDone;
     }
-    if (!begun_) {
+    if (!knows_surfaces_) {
+      find_surfaces();
+      knows_surfaces_ = true;
+    } else if (!begun_) {
+      work_.add(340);
       begun_ = begin_tread(frame_->surfaces[patch_]);
       const auto odd = static_cast<std::int32_t>(turn_ & 1U);  // every other column, in turn
       column_ = tread_.first_column + ((tread_.first_column & 1) != odd ? 1 : 0);

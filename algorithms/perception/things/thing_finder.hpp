@@ -90,6 +90,7 @@ class ThingFinder {
   Tread tread_;
   std::size_t patch_ = 0;
   bool begun_ = false;  // the tread
+  bool knows_surfaces_ = false;
   std::int32_t column_ = 0;
   std::uint32_t turn_ = 0;  // goes round with the pictures: which columns and rows are looked at
   WorkCount work_;
