@@ -35,7 +35,7 @@ void ThingFinder::find_surfaces() noexcept {
   work_.add(200);
   is_surface_[kNoRegion] = false;
   for (std::size_t id = 1; id <= regions_->count; ++id) {
-    work_.add(14);
+    work_.add(26);
     const Region& region = (*regions_)[id];
     const ColumnExtents& extents = regions_->extents[id];
     const double width_m =
@@ -197,7 +197,7 @@ void ThingFinder::look_along(std::int32_t column) noexcept {
   using simd::Four;
   const auto g = static_cast<std::size_t>(column);
   const Rows rows = rows_[g];
-  work_.add(60);
+  work_.add(130);
   if (rows.last < rows.first) return;
   const ColumnRays& rays = image_->column_rays;
   const float* inverse_depth = image_->columns.by_column.row(column);
@@ -227,6 +227,7 @@ void ThingFinder::look_along(std::int32_t column) noexcept {
     back = back + back_step;
     if (!cv::v_check_any(before)) continue;
     const std::uint32_t hits = simd::bits(before);
+    work_.add(40);
     for (std::int32_t k = 0; k < kRows; ++k) {
       if ((hits >> k & 1U) != 0 && row + k >= rows.first && row + k <= rows.last) take(column, row + k, seen);
     }
@@ -237,7 +238,7 @@ void ThingFinder::look_along(std::int32_t column) noexcept {
 }
 
 void ThingFinder::take(std::int32_t column, std::int32_t row, Seen& seen) noexcept {
-  work_.add(60);
+  work_.add(80);
   const RegionId label = regions_->labels.at(column, row);
   if (is_surface_[label] && (*regions_)[label].coplanar != tread_.own) return;
   const Vec3 ray{image_->column_rays.x[static_cast<std::size_t>(column)],
