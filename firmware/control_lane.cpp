@@ -144,11 +144,11 @@ void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept
   }
   const std::int64_t imu_ns = estimator_.newest_imu_ns();
   const bool hears_imu = imu_ns != 0 && now_ns - imu_ns <= params_.gait.steer_age_ns;
-  start_.imu_speaks = hears_imu && estimator_.resting_accel().is_settled();
+  start_.imu_settled = hears_imu && estimator_.resting_accel().is_settled();
   if (now_ns - start_.first_ns >= kArmingTimeout_ns) note_silent_drives(start_.silent, now_ns);
   if (!late.is_empty() || !drives_.bus.drive_errors.is_empty() || !drives_.out_of_range.is_empty()) return;
   if (drives_.bus.feet_silent) return;
-  if (!start_.imu_speaks || gait_.stop_requested() || !supervisor_.may_arm()) return;
+  if (!start_.imu_settled || gait_.stop_requested() || !supervisor_.may_arm()) return;
   if (check_stance(joints->q_rad, now_ns)) estimator_.add_joints(*joints, now_ns);
 }
 
@@ -221,7 +221,7 @@ ArmingWait ControlLane::arming_waits_for() const noexcept {
   if (!start_.silent.is_empty()) return {For::kAnswers, start_.silent};
   if (!drives_.bus.drive_errors.is_empty()) return {For::kErrors, drives_.bus.drive_errors};
   if (!drives_.out_of_range.is_empty()) return {For::kRange, drives_.out_of_range};
-  if (!start_.imu_speaks) return {For::kImu, {}};
+  if (!start_.imu_settled) return {For::kImu, {}};
   return drives_.bus.feet_silent ? ArmingWait{For::kFeet, {}} : start_.disagreement;
 }
 

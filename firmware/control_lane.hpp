@@ -106,8 +106,8 @@ class ControlLane {
     std::int64_t first_ns = -1;         // of the first cycle: time-outs of what never speaks start there
     std::int64_t answered_ns = -1;      // when a drive answered last
     JointSet silent = JointSet::all();  // drives, never heard or silent for too long since
-    bool imu_speaks = false;
-    ArmingWait disagreement;  // of IMU and legs
+    bool imu_settled = false;           // heard now, and for long enough
+    ArmingWait disagreement;            // of IMU and legs
     bool disagreement_named = false;
   };
   Start start_;

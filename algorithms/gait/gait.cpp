@@ -80,7 +80,7 @@ void Gait::judge_ground(const StateEstimate& state) noexcept {
 }
 
 // It balances as it was met: joints, and the centre of mass over the soles. Until the estimate is calibrated nothing
-// else begins. Who stops here holds on for good: an estimate that comes later starts nothing.
+// else begins. Who stops here holds on until it is reset: an estimate that comes later starts nothing.
 void Gait::hold_upright(const GaitInput& in, JointCommand& command) noexcept {
   joints_.hold(command);
   if (!placed_)

@@ -154,9 +154,9 @@ TEST(PhysicalFailure, TreadsTenMillimetresNearerThanSeen_ToesMissTheRisers) {
 }
 
 // By a push that no step catches.
-TEST(PhysicalFailure, LeansTooFar_JointsAreDampedAndTheModuleSaysSo) {
+void expect_damped_when_pushed_after(double time_s) {
   PhysicalClimb climb(stairs_of(2, 3));
-  climb.run(5.0);
+  climb.run(time_s);
   ASSERT_EQ(climb.health().count(Fault::kFallen).count, 0U);
   climb.push({.at_s = 0.0, .axis = 1, .impulse_ns = 100.0});
   for (int i = 0; i < 1000 && climb.health().count(Fault::kFallen).count == 0; ++i) (void)climb.tick();
@@ -167,6 +167,10 @@ TEST(PhysicalFailure, LeansTooFar_JointsAreDampedAndTheModuleSaysSo) {
     EXPECT_EQ(joint.tau_ff_nm, 0.0);
     EXPECT_GT(joint.kd_nmsprad, 0.0);
   }
+}
+TEST(PhysicalFailure, LeansTooFar_JointsAreDampedAndTheModuleSaysSo) { expect_damped_when_pushed_after(5.0); }
+TEST(PhysicalFailure, LeansTooFarBeforeTheStandstillIsOver_JointsAreDampedAndTheModuleSaysSo) {
+  expect_damped_when_pushed_after(0.3);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ class RestingAccel {
       reset(time_ns_);
       first_ns_ = stamp_ns;
     }
-    ++samples_;
+    samples_ = std::min(samples_ + 1, 1'000'000);  // it may listen for weeks
     newest_ns_ = stamp_ns;
     const double evenly = 1.0 / samples_;
     const double share = samples_ == 1 ? 1.0 : static_cast<double>(step_ns) / static_cast<double>(time_ns_);

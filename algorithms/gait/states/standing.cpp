@@ -27,8 +27,8 @@ Transition Standing::tick(const GaitInput& in, GaitShared& gait) noexcept {
   if (in.lost) return Transition::stop(StopReason::kStateStale);
   if (!in.state.initialised || !in.usable) return {};
   if (!in.may_step) {
-    gait.memory.shifts = gait.memory.idle_ticks = gait.memory.obstacle_ticks = wait_ticks_ =
-        0;  // it waits for nothing that it sees
+    // It waits for nothing that it sees.
+    gait.memory.shifts = gait.memory.idle_ticks = gait.memory.obstacle_ticks = wait_ticks_ = 0;
     return {};
   }
   // A body that sways sideways or back is best off between the feet: no step to come would catch it.

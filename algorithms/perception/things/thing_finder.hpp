@@ -19,7 +19,7 @@ class ThingFinder {
  public:
   struct Params {
     double least_height_m = 0.012;
-    double sigmas = 6.0;  // 4.5 took warped treads of robots twice as bad for things (2026-11)
+    double sigmas = 6.0;  // at 4.5 the warp of a picture's depths, twice as bad, makes things of a tread
     double most_height_m = 0.40;
     double before_back_m = 0.012;
     double seen_height_m = 0.06;

@@ -43,6 +43,32 @@ TEST(ClimbPlanner, ClosesUpBesideAFootThatTurned_LandsAsFarAlongTheTreadAsItsFoo
   EXPECT_NEAR(stairs_p_m.z(), 0.129, 1e-12);
 }
 
+// The feet stand closer than usual, between posts, and odometry wandered while it waited.
+TEST(ClimbPlanner, TrailingStepAfterALongPause_KeepsTheSpacingOfTheFootholds) {
+  const RobotModel robot;
+  ClimbPlanner planner;
+  const ClimbPlanner::Params params;
+  planner.reset(params, robot);
+  ClimbPlanner::Decision leading;
+  leading.goal = {StepKind::kLeading, Foot::kRight, {{1.0, -0.07, 0.13}, 0.0}, {}};
+  leading.goal.foothold.polygon_id = 7;
+  leading.trailing.foothold.position_m = {1.01, 0.08, 0.13};
+  leading.trailing.foothold.polygon_id = 7;
+  leading.trailing.foothold.last_seen_ns = 5;
+  leading.trailing.foothold.side_room_m = {0.02, 0.03};
+  planner.latched({}, leading);
+  planner.landed();
+  ClimbPlanner::Situation situation;
+  situation.stamp_ns = params.remembered_ns + 6;
+  situation.soles = {SolePose{{0.7, 0.1, 0.0}, 0.0}, SolePose{{1.05, -0.10, 0.131}, 0.0}};
+
+  const StepGoal goal = planner.decide(situation, {}).goal;
+  EXPECT_EQ(goal.kind, StepKind::kTrailing);
+  EXPECT_NEAR((goal.target.position_m - Vec3{1.06, 0.05, 0.131}).norm(), 0.0, 1e-12);
+  EXPECT_EQ(goal.foothold.side_room_m, leading.trailing.foothold.side_room_m);
+  EXPECT_EQ(goal.foothold.last_seen_ns, 0) << "nothing steers it";
+}
+
 TEST(ClimbPlanner, PassingFootLandsBesideAFootThatTurned_AsFarAlongTheTreadAsItsFoothold) {
   const RobotModel robot;
   ClimbPlanner planner;
