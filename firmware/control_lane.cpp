@@ -266,7 +266,7 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
     supervisor_.watch_lean(params_.supervisor, state.odom_T_base.R);
   }
   if (supervisor_.has_fallen()) damp_joints(now_ns);
-  estimator_.leg_sensing().to_encoders(command_);
+  estimator_.leg_sensing().to_drives(command_);
   hand_over_touch_down();
 
   const GaitStatus& status = gait_.status();

@@ -30,13 +30,10 @@ struct Reality {
   }
 };
 
-// How a number leaves its default as reality grows: by so much for every robot, evenly within +- so much, or normally
-// with that spread.
-enum class Draw : std::uint8_t { kLevel, kEven, kNormal };
+// A number leaves its default, at scale 1, by what is drawn evenly from least to most: each of several alone.
 struct RealityItem {
   std::string_view name;  // as in param_table(Reality)
-  Draw draw;
-  double at_one;  // at scale 1; each number of several is drawn alone
+  double least, most;
 };
 [[nodiscard]] std::span<const RealityItem> reality_items() noexcept;
 

@@ -127,7 +127,7 @@ void SimRobot::sense() {
                                           {truth_.true_T_sole[0].p_m.z(), truth_.true_T_sole[1].p_m.z()}, kPlantTick_s);
   if (!force_sensors_) feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
   feedback_fresh_ = true;
-  if (clock_.tick() % kLioPeriod_ticks == 0 && !any_contains(lio_silent_, now_ns)) {
+  if (clock_.tick() % kLioPeriod_ticks == 0 && !any_contains(lio_silent_, now_ns) && !lio_.is_out(now_ns)) {
     lio_queue_.push_overwrite(lio_.sample(plant_->true_T_base(), now_ns));
   }
   camera_.tick(clock_.tick(), truth_.true_T_base, truth_.base_legs);

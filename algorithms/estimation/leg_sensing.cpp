@@ -74,6 +74,7 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
   }
   JointFeedback carried = carried_on(joints);
   carried.q_rad -= encoders_.offset_rad();
+  carried.tau_nm /= forces_.torque_scale();
   level_soles(base_up, stands, carried);
   if (any_ && jumps(carried)) {
     ++counters_.jump;
@@ -144,11 +145,13 @@ void LegSensing::learn_offsets(const std::array<LegMeasurement, kFootCount>& leg
   if (any_) encoders_.update(legs, contacts, joints_.tau_nm, std::min(dt_s_, longest_s));
 }
 
-void LegSensing::to_encoders(JointCommand& command) const noexcept {
+void LegSensing::to_drives(JointCommand& command) const noexcept {
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const JointLimits& limits = robot_->drives.limits[n];
-    double& q_rad = command.joints[n].q_rad;
-    q_rad = math::clamp(q_rad + encoders_.offset_rad()[static_cast<Eigen::Index>(n)], limits.min_rad, limits.max_rad);
+    JointSetpoint& joint = command.joints[n];
+    joint.q_rad =
+        math::clamp(joint.q_rad + encoders_.offset_rad()[static_cast<Eigen::Index>(n)], limits.min_rad, limits.max_rad);
+    joint.tau_ff_nm = math::clamp(joint.tau_ff_nm * forces_.torque_scale(), -limits.torque_nm, limits.torque_nm);
   }
 }
 

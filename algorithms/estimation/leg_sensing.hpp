@@ -56,13 +56,14 @@ class LegSensing {
                      const std::array<FootContact, kFootCount>& contacts, double longest_s) noexcept;
   void forget_offsets() noexcept { encoders_.learn_anew(); }
 
-  // The last accepted feedback, its angles without offset_rad(), its forces those of FootForces; any() is false before
-  // the first.
+  // The last accepted feedback, its angles without offset_rad(), its torques as the legs need them (over
+  // torque_scale()), its forces those of FootForces; any() is false before the first.
   [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
   [[nodiscard]] bool any() const noexcept { return any_; }
   [[nodiscard]] const JointVector& offset_rad() const noexcept { return encoders_.offset_rad(); }
-  // A command in angles of joints(), to what the drives' encoders will read.
-  void to_encoders(JointCommand& command) const noexcept;
+  [[nodiscard]] double torque_scale() const noexcept { return forces_.torque_scale(); }
+  // A command in angles and torques of joints(), to what the drives' encoders will read and their motors take.
+  void to_drives(JointCommand& command) const noexcept;
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:

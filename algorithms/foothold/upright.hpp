@@ -19,6 +19,7 @@ struct UprightParams {
   double below_m = 0.05;
   double overhang_max_m = 0.06;
   double overhang_tolerance_m = 0.02;
+  double hidden_max_m = 0.10;
 
   static void visit(auto& p, auto& field) {
     field("facing_cos", p.facing_cos, 0.0, 1.0,
@@ -35,6 +36,8 @@ struct UprightParams {
     field("overhang_max_m", p.overhang_max_m, 0.0, 0.3, "A riser lies no farther behind the nosing of its tread.");
     field("overhang_tolerance_m", p.overhang_tolerance_m, 0.0, 0.1,
           "A riser's place against its nosing is taken with this tolerance, both ways.");
+    field("hidden_max_m", p.hidden_max_m, 0.0, 0.3,
+          "A tread whose nosing was not found is seen from no farther behind its riser on: a strip has no depth.");
   }
 };
 

@@ -2,6 +2,8 @@
 // What a real depth camera does beside noise: frames that come late or never, edges that grow, pixels without depth.
 #pragma once
 
+#include <array>
+
 namespace polygmap::sim {
 
 struct CameraErrors {
@@ -9,6 +11,9 @@ struct CameraErrors {
   double latency_s = 0.0;
   double jitter_s = 0.0;
   double reorder_share = 0.0;
+  double scan_s = 0.0;
+  double focal_share = 0.0;
+  std::array<double, 2> centre_px{};
   double edge_fattening_px = 0.0;
   double dark_share = 0.0;
   double shiny_share = 0.0;
@@ -21,6 +26,10 @@ struct CameraErrors {
     field("latency_s", p.latency_s, -0.01, 0.3, "By which every frame comes later than after 30 ms.");
     field("jitter_s", p.jitter_s, 0.0, 0.2, "By up to which a frame comes later still, evenly.");
     field("reorder_share", p.reorder_share, 0.0, 0.95, "Share of the frames that come after their successor.");
+    field("scan_s", p.scan_s, -0.01, 0.03, "By which a frame takes longer than --scan-ms.");
+    field("focal_share", p.focal_share, -0.05, 0.05,
+          "By which the focal length is larger than the camera file has it.");
+    field("centre_px", p.centre_px, -20.0, 20.0, "By which the optical centre lies farther right and down.");
     field("edge_fattening_px", p.edge_fattening_px, 0.0, 10.0, "By which what is near covers what is behind it.");
     field("dark_share", p.dark_share, 0.0, 1.0, "Share of a dark tread's pixels without depth, others in every frame.");
     field("shiny_share", p.shiny_share, 0.0, 1.0, "Share of a shiny tread that never has depth.");

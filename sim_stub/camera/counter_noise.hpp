@@ -42,6 +42,7 @@ enum class Stream : std::uint64_t {
   kFatEdges,
   kTreadHoles,
   kSunPatch,
+  kLidarMount,
 };
 
 // Finaliser of SplitMix64 (Steele, Lea, Flood 2014): a bijection that passes the usual statistical batteries.

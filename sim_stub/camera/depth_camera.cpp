@@ -22,6 +22,14 @@ constexpr std::int64_t ticks_of(double duration_s) {
   return std::llround(duration_s / seconds(VirtualClock::kTick_ns));
 }
 
+CameraIntrinsics true_intrinsics(CameraIntrinsics k, const CameraErrors& errors) {
+  k.fx_px *= 1.0 + errors.focal_share;
+  k.fy_px *= 1.0 + errors.focal_share;
+  k.cx_px += errors.centre_px[0];
+  k.cy_px += errors.centre_px[1];
+  return k;
+}
+
 // Of a frame that comes after its successor, and two ticks of jitter to spare.
 constexpr std::int64_t kOvertaken_ticks = 19;
 
@@ -40,18 +48,20 @@ SimDepthCamera::SimDepthCamera(const DepthCameraOptions& options, const CameraNo
                                const CameraIntrinsics& intrinsics, const Transform& base_T_camera,
                                const StairWorld& world, std::uint64_t seed)
     : options_(options),
-      half_scan_ticks_(std::llround(0.5 * options.scan_s / seconds(VirtualClock::kTick_ns))),
+      stated_(intrinsics),
+      half_scan_ticks_(
+          std::llround(0.5 * std::max(options.scan_s + options.errors.scan_s, 0.0) / seconds(VirtualClock::kTick_ns))),
       base_T_camera_(base_T_camera),
       solids_(rendered_solids(world, options)),
-      renderer_(intrinsics),
+      renderer_(true_intrinsics(intrinsics, options.errors)),
       noise_(noise, intrinsics, seed),
       holes_(options.errors, world, seed),
       frame_draws_(seed, Stream::kCameraFrames),
       edge_draws_(seed, Stream::kFatEdges),
       slots_(slot_count(options.errors)) {
-  const CameraIntrinsics& k = renderer_.intrinsics();
-  for (Slot& slot : slots_)
-    slot.depth.resize(static_cast<std::size_t>(k.width_px) * static_cast<std::size_t>(k.height_px));
+  for (Slot& slot : slots_) {
+    slot.depth.resize(static_cast<std::size_t>(stated_.width_px) * static_cast<std::size_t>(stated_.height_px));
+  }
 }
 
 SimDepthCamera::~SimDepthCamera() {

@@ -62,7 +62,7 @@ class SimDepthCamera {
   // Once per tick, in order: starts a picture when its exposure has ended, and delivers the one that arrives.
   void tick(std::int64_t tick, const Transform& true_T_base, const std::array<LegShapes, kFootCount>& base_legs);
 
-  [[nodiscard]] const CameraIntrinsics& intrinsics() const noexcept { return renderer_.intrinsics(); }
+  [[nodiscard]] const CameraIntrinsics& intrinsics() const noexcept { return stated_; }  // by the data sheet
   [[nodiscard]] double scan_s() const noexcept { return seconds(2 * half_scan_ticks_ * VirtualClock::kTick_ns); }
   [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept;
   void release() noexcept;
@@ -84,6 +84,7 @@ class SimDepthCamera {
   [[nodiscard]] Slot* oldest(SlotState state) noexcept;
 
   DepthCameraOptions options_;
+  CameraIntrinsics stated_;
   std::int64_t half_scan_ticks_;
   Transform base_T_camera_;
   std::vector<SolidBox> solids_;

@@ -39,7 +39,7 @@ constexpr std::array<std::array<double, 3>, kJointsPerLeg> kLinkHalf_m{{{0.04, 0
                                                                         {0.02, 0.02, 0.02},
                                                                         {0.12, 0.04, 0.015}}};
 
-void add_link(Xml& xml, Foot leg, std::size_t joint, const RobotErrors& errors, double backlash_rad) {
+void add_link(Xml& xml, Foot leg, std::size_t joint, const RobotErrors& errors, const MujocoPlant::Params& params) {
   const LegGeometry& g = errors.legs[index_of(leg)];
   constexpr std::array<const char*, kJointsPerLeg> kAxis{"1 0 0", "0 0 1", "0 1 0", "0 1 0", "0 1 0", "1 0 0"};
   const char* side = leg == Foot::kLeft ? "left" : "right";
@@ -53,22 +53,22 @@ void add_link(Xml& xml, Foot leg, std::size_t joint, const RobotErrors& errors, 
   xml.add("<body name='%s_%zu' pos='%.9g %.9g %.9g'>", side, joint + 1, p.x(), sign * p.y(), p.z());
   xml.add("<joint name='drive_%zu' axis='%s' range='%.9g %.9g'/>", joint_index(leg, joint), kAxis[joint],
           limits.min_rad, limits.max_rad);
-  if (backlash_rad > 0.0) {
+  if (params.backlash_rad > 0.0) {
     xml.add(
         "<joint name='play_%zu' axis='%s' range='%.9g %.9g' armature='1e-4' damping='0.01' "
         "frictionloss='0' solreflimit='0.002 1' solimplimit='0.99 0.999 0.0001'/>",
-        joint_index(leg, joint), kAxis[joint], -0.5 * backlash_rad, 0.5 * backlash_rad);
+        joint_index(leg, joint), kAxis[joint], -0.5 * params.backlash_rad, 0.5 * params.backlash_rad);
   }
   xml.add("<geom class='mass' type='box' pos='%.9g %.9g %.9g' size='%g %g %g' mass='%.9g'/>", link.centre_m.x(),
-          sign * link.centre_m.y(), link.centre_m.z(), half[0], half[1], half[2], link.mass_kg);
+          sign * link.centre_m.y(), link.centre_m.z(), half[0], half[1], half[2], params.leg_mass_scale * link.mass_kg);
   if (joint == kHipPitch || joint == kKnee) {
     const bool thigh = joint == kHipPitch;
-    xml.add("<geom class='skin' type='capsule' fromto='0 0 0 0 0 %.9g' size='%g'/>", thigh ? -g.thigh_m : -g.shank_m,
-            thigh ? nominal_robot().radii.thigh_m : nominal_robot().radii.shank_m);
+    xml.add("<geom class='%s' type='capsule' fromto='0 0 0 0 0 %.9g' size='%g'/>", side,
+            thigh ? -g.thigh_m : -g.shank_m, thigh ? nominal_robot().radii.thigh_m : nominal_robot().radii.shank_m);
   }
   if (joint == kAnkleRoll) {
     const SoleRectangle& sole = errors.sole.collision;
-    xml.add("<geom class='skin' name='%s_sole' type='box' pos='%.9g 0 %.9g' size='%.9g %.9g %.9g'/>", side,
+    xml.add("<geom class='%s' name='%s_sole' type='box' pos='%.9g 0 %.9g' size='%.9g %.9g %.9g'/>", side, side,
             sole.centre_x_m(), 0.5 * kSoleThickness_m - g.ankle_to_sole_m, 0.5 * sole.length_m(), sole.half_width_m,
             0.5 * kSoleThickness_m);
   }
@@ -103,7 +103,10 @@ std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& wo
           params.joint_friction_nm, params.joint_damping_nmsprad);
   xml.add("<geom friction='%.9g 0.005 0.0001' condim='4' solref='%.9g 1'/>", params.friction, params.ground_s);
   xml.add("<default class='mass'><geom contype='0' conaffinity='0'/></default>");
-  xml.add("<default class='skin'><geom contype='2' conaffinity='1' mass='0'/></default>");
+  // Torso and both legs touch the ground, and one leg the other.
+  xml.add("<default class='torso'><geom contype='2' conaffinity='1' mass='0'/></default>");
+  xml.add("<default class='left'><geom contype='6' conaffinity='1' mass='0'/></default>");
+  xml.add("<default class='right'><geom contype='2' conaffinity='5' mass='0'/></default>");
   xml.add("<default class='ground'><geom contype='1' conaffinity='2'/></default></default>");
   xml.add("<worldbody><geom class='ground' name='floor' type='plane' size='0 0 1'/>");
   std::size_t number = 0;
@@ -113,8 +116,10 @@ std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& wo
   xml.add("<geom class='mass' type='box' pos='%.9g %.9g %.9g' size='0.1 0.17 0.28' mass='%.9g'/>",
           torso.centre_m.x() + params.torso_offset_x_m, torso.centre_m.y(), torso.centre_m.z(),
           params.torso_mass_scale * torso.mass_kg);
+  xml.add("<geom class='torso' type='box' pos='%.9g %.9g %.9g' size='0.1 0.17 0.28'/>", torso.centre_m.x(),
+          torso.centre_m.y(), torso.centre_m.z());
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    for (std::size_t j = 0; j < kJointsPerLeg; ++j) add_link(xml, leg, j, errors, params.backlash_rad);
+    for (std::size_t j = 0; j < kJointsPerLeg; ++j) add_link(xml, leg, j, errors, params);
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) xml.add("</body>");
   }
   xml.add("</body></worldbody></mujoco>");

@@ -145,6 +145,7 @@ void MujocoPlant::read_contacts() {
   }
   for (int c = 0; c < data_->ncon; ++c) {
     const mjContact& contact = data_->contact[c];
+    if (model_->geom_bodyid[contact.geom1] != 0 && model_->geom_bodyid[contact.geom2] != 0) continue;  // leg on leg
     for (std::size_t f = 0; f < kFootCount; ++f) {
       const bool first = model_->geom_bodyid[contact.geom1] == feet_[f].body;
       if (!first && model_->geom_bodyid[contact.geom2] != feet_[f].body) continue;

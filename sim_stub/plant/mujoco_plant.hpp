@@ -33,6 +33,7 @@ class MujocoPlant final : public Plant {
     std::array<double, kJointsPerLeg> kp_most_nmprad{}, kd_most_nmsprad{};
     double torso_mass_scale = 1.0;   // against the mass that the module believes
     double torso_offset_x_m = 0.0;   // of its centre, likewise
+    double leg_mass_scale = 1.0;     // of every link of the legs, likewise
     double contact_force_n = 10.0;   // a sole pressed less than this hangs in the air
     double max_tilt_rad = 0.8;       // of the base; beyond it the robot falls,
     double min_base_height_m = 0.3;  // or below this above its higher sole
@@ -53,6 +54,7 @@ class MujocoPlant final : public Plant {
             "A drive takes no more damping, from hip roll to ankle roll; 0: as much as it is told.");
       field("torso_mass_scale", p.torso_mass_scale, 0.3, 3.0, "True mass of the torso over the believed one.");
       field("torso_offset_x_m", p.torso_offset_x_m, -0.2, 0.2, "By which the torso's centre lies ahead.");
+      field("leg_mass_scale", p.leg_mass_scale, 0.3, 3.0, "True masses of the legs' links over the believed ones.");
     }
   };
 

@@ -8,6 +8,16 @@
 #include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
+namespace {
+
+// Off its data sheet by up to so much, about each of the base's axes and along it.
+Transform mounted(const Transform& nominal, const CounterNoise& draws, double most_rad, double most_m) {
+  const auto within = [&draws](std::uint64_t index, double half) { return draws.uniform(index, -half, half); };
+  return {rotation_zyx(within(2, most_rad), within(1, most_rad), within(0, most_rad)) * nominal.R,
+          nominal.p_m + Vec3{within(3, most_m), within(4, most_m), within(5, most_m)}};
+}
+
+}  // namespace
 
 RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
   RobotErrors errors;
@@ -23,6 +33,7 @@ RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
   for (SoleRectangle* sole : {&errors.sole.contact, &errors.sole.collision}) {
     sole->toe_x_m += params.toe_m;
     sole->heel_x_m -= params.heel_m;
+    sole->half_width_m += 0.5 * params.sole_width_m;
   }
   for (std::size_t j = 0; j < kJointCount; ++j) {
     errors.encoder_offset_rad[static_cast<Eigen::Index>(j)] = params.encoder_offset_rad * offsets.normal(j);
@@ -33,12 +44,10 @@ RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
   errors.accel_bias_mps2 = params.accel_bias_mps2 * CounterNoise(seed, Stream::kAccelBias).normal3(0);
   errors.depth_scale =
       1.0 + CounterNoise(seed, Stream::kDepthScale).uniform(0, -params.depth_scale, params.depth_scale);
-  const CounterNoise mount(seed, Stream::kCameraMount);
-  const auto within = [&mount](std::uint64_t index, double half) { return mount.uniform(index, -half, half); };
-  const double turn_rad = params.camera_mount_rad, shift_m = params.camera_mount_m;
-  const Transform nominal = nominal_robot().mounts.base_T_camera;
-  errors.base_T_camera = {rotation_zyx(within(2, turn_rad), within(1, turn_rad), within(0, turn_rad)) * nominal.R,
-                          nominal.p_m + Vec3{within(3, shift_m), within(4, shift_m), within(5, shift_m)}};
+  errors.base_T_camera = mounted(nominal_robot().mounts.base_T_camera, {seed, Stream::kCameraMount},
+                                 params.camera_mount_rad, params.camera_mount_m);
+  errors.base_T_lidar = mounted(nominal_robot().mounts.base_T_lidar, {seed, Stream::kLidarMount}, params.lio_mount_rad,
+                                params.lio_mount_m);
   errors.lio_T_true = {rotation_z(lio.uniform(0, -kPi, kPi)),
                        Vec3{lio.uniform(1, -5, 5), lio.uniform(2, -5, 5), lio.uniform(3, -1, 1)}};
   return errors;

@@ -34,14 +34,18 @@ struct ErrorParams {
   bool rates_by_difference = false;  // of encoder readings, tick by tick, in place of a rate that is measured
   double foot_force_noise_n = 0.0;
   std::array<double, kFootCount> foot_force_offset_n{};
-  double foot_force_mass_kg = 0.0;    // of the foot below the sensor, whose acceleration it feels
-  Vec3 lio_drift_mps = Vec3::Zero();  // true axes
-  double lio_drift_radps = 0.0;       // of its yaw
-  double lio_walk_mprs = 0.0;         // random walk, per axis
-  Vec3 lio_jump_m = Vec3::Zero();     // at lio_jump_s, true axes
+  double foot_force_mass_kg = 0.0;                // of the foot below the sensor, whose acceleration it feels
+  Vec3 lio_drift_mps = Vec3::Zero();              // true axes
+  double lio_drift_radps = 0.0;                   // of its yaw
+  double lio_walk_mprs = 0.0;                     // random walk, per axis
+  double lio_mount_rad = 0.0, lio_mount_m = 0.0;  // half range, uniform, per axis
+  Vec3 lio_jump_m = Vec3::Zero();                 // at lio_jump_s, true axes
   double lio_jump_s = 20.0;
+  double lio_outage_s = 0.0;  // from lio_outage_from_s on it says nothing for so long
+  double lio_outage_from_s = 20.0;
   double lio_sigma_scale = 1.0;      // true noise over the stated one
   double toe_m = 0.0, heel_m = 0.0;  // by which the foot is longer in front and behind
+  double sole_width_m = 0.0;         // by which it is wider, both sides together
 
   [[nodiscard]] static ErrorParams none() noexcept { return {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}; }
 
@@ -69,14 +73,19 @@ struct ErrorParams {
     field("lio_drift_mps", p.lio_drift_mps, -0.2, 0.2, "Steady drift of the LIO position; x up the stairs, z up.");
     field("lio_drift_radps", p.lio_drift_radps, -0.2, 0.2, "Steady drift of the LIO yaw.");
     field("lio_walk_mprs", p.lio_walk_mprs, 0.0, 0.1, "Random walk of the LIO position, per axis.");
+    field("lio_mount_rad", p.lio_mount_rad, 0.0, 0.1, "Half range of the lidar's mount, per axis.");
+    field("lio_mount_m", p.lio_mount_m, 0.0, 0.1, "Half range of the lidar's place, per axis.");
     field("lio_jump_m", p.lio_jump_m, -2.0, 2.0, "Jump of the LIO position, for good.");
     field("lio_jump_s", p.lio_jump_s, 0.0, 1000.0, "When it jumps.");
+    field("lio_outage_s", p.lio_outage_s, 0.0, 1000.0, "For how long the LIO says nothing.");
+    field("lio_outage_from_s", p.lio_outage_from_s, 0.0, 1000.0, "When that begins.");
     field("depth_scale", p.depth_scale, 0.0, 0.1, "Half range of the camera's scale error.");
     field("camera_mount_rad", p.camera_mount_rad, 0.0, 0.1, "Half range of the camera's mount, per axis.");
     field("camera_mount_m", p.camera_mount_m, 0.0, 0.05, "Half range of the camera's place, per axis.");
     field("depth_noise", p.depth_noise, 0.0, 3.0, "Depth noise over the believed one.");
     field("toe_m", p.toe_m, -0.05, 0.05, "By which the foot is longer in front.");
     field("heel_m", p.heel_m, -0.05, 0.05, "By which the foot is longer behind.");
+    field("sole_width_m", p.sole_width_m, -0.03, 0.03, "By which the foot is wider, both sides together.");
   }
 };
 
@@ -90,6 +99,7 @@ struct RobotErrors {
   Vec3 accel_bias_mps2 = Vec3::Zero();
   double depth_scale = 1.0;
   Transform base_T_camera = nominal_robot().mounts.base_T_camera;  // true mount
+  Transform base_T_lidar = nominal_robot().mounts.base_T_lidar;    // true mount
   Transform lio_T_true;  // LIO's own world: level, with its own origin and yaw
 };
 

@@ -109,8 +109,7 @@ LioSample LioModel::sample(const Transform& true_T_base, std::int64_t stamp_ns) 
   const Transform noise{rotation_z(turn_rad.z()) * rotation_y(turn_rad.y()) * rotation_x(turn_rad.x()), Vec3::Zero()};
   LioSample sample;
   sample.stamp_ns = stamp_ns;
-  sample.lio_T_lidar =
-      errors_.lio_T_true * drifted(true_T_base, stamp_ns) * nominal_robot().mounts.base_T_lidar * noise;
+  sample.lio_T_lidar = errors_.lio_T_true * drifted(true_T_base, stamp_ns) * errors_.base_T_lidar * noise;
   sample.lio_T_lidar.p_m += scale * params_.lio_position_m * position_noise_.normal3(index_);
   constexpr double kLeastSigma = 1e-3;  // no odometry claims to be perfect
   sample.position_sigma_m.setConstant(std::max(params_.lio_position_m, kLeastSigma));

@@ -80,6 +80,11 @@ class LioModel {
         rotation_noise_(seed, Stream::kLioRotation),
         walk_noise_(seed, Stream::kLioWalk) {}
   [[nodiscard]] LioSample sample(const Transform& true_T_base, std::int64_t stamp_ns);
+  // Whether it says nothing then.
+  [[nodiscard]] bool is_out(std::int64_t stamp_ns) const noexcept {
+    const double since_s = seconds(stamp_ns) - params_.lio_outage_from_s;
+    return since_s >= 0.0 && since_s < params_.lio_outage_s;
+  }
 
  private:
   // What the odometry makes of the truth by drift and jumps alone.

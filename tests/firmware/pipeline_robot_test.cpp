@@ -105,7 +105,7 @@ TEST_F(PipelineOnARobot, AnotherRobotInParams_EstimatorAndBalanceFollow) {
   Params params;
   params.robot.legs.shank_m += kLonger_m;
   params.robot.masses.torso.mass_kg += kHeavier_kg;
-  params.gait.balance.weight.most = 0.0;  // or its drives feel that it is no heavier
+  params.estimator.legs.forces.torque_scale.most = 0.0;  // or its drives feel that it is no heavier
   stand(params);
   EXPECT_NEAR(control().state().odom_T_base.p_m.z() - height_m, kLonger_m, 0.5 * kLonger_m);
   EXPECT_GT(std::abs(control().last_command().joints[kKnee].tau_ff_nm), 1.2 * std::abs(knee_nm));

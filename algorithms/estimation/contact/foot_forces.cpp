@@ -71,6 +71,11 @@ void FootForces::update(const RobotModel& robot, const BodyFrames& frames, const
   }
   std::array<double, kFootCount> observed_n{};
   if (torques_told) observed_n = observer_.update(robot, frames, joints, base, base_up, lifted);
+  if (std::min(observed_n[0], observed_n[1]) > params_.torque_scale.pressed_n && told[0] && told[1] && stands[0] &&
+      stands[1]) {
+    const double weight_n = robot.masses.total_kg() * base_up.dot(base.accel_mps2);
+    torque_scale_.update(params_.torque_scale, observed_n[0] + observed_n[1], weight_n, dt_s);
+  }
   for (std::size_t f = 0; f < kFootCount; ++f) {
     NoiseLevel& noise_n = observer_noise_n_[f];
     if (lifted[f]) noise_n.take(math::square(observed_n[f]), dt_s);

@@ -7,6 +7,7 @@
 
 #include "algorithms/estimation/calibration/noise_level.hpp"
 #include "algorithms/estimation/contact/ground_force_observer.hpp"
+#include "algorithms/estimation/contact/torque_scale.hpp"
 
 namespace polygmap {
 
@@ -14,6 +15,7 @@ class FootForces {
  public:
   struct Params {
     GroundForceObserver::Params observer;
+    TorqueScale::Params torque_scale;
     NoiseLevel::Params sensor_noise{10.0, 0.1, 2.0, 1.0, 100.0};
     NoiseLevel::Params observer_noise{20.0, 0.2, 2.0, 6.0, 40.0};
     double zero_sigma_n = 60.0;
@@ -28,6 +30,7 @@ class FootForces {
 
     static void visit(auto& p, auto& field) {
       field("observer", p.observer);
+      field("torque_scale", p.torque_scale);
       field("sensor_noise", p.sensor_noise);
       field("observer_noise", p.observer_noise);
       field("zero_sigma_n", p.zero_sigma_n, 0.0, 500.0, "Error of a force sensor's zero at the start.");
@@ -48,14 +51,16 @@ class FootForces {
   };
   void reset(const Params& params) noexcept;
   // frames: of the joints. joints: a force that is not a number is not told, as are all torques when one is none or all
-  // are 0, and those of a leg with a mute drive. base: what the IMU feels, base axes; base_up: the vertical there.
-  // stands: which feet do as far as is known.
+  // are 0, and those of a leg with a mute drive; torques were divided by torque_scale(). base: what the IMU feels, base
+  // axes; base_up: the vertical there. stands: which feet do as far as is known.
   void update(const RobotModel& robot, const BodyFrames& frames, const JointFeedback& joints, const ImuSample& base,
               const Vec3& base_up, const std::array<bool, kFootCount>& stands) noexcept;
   // Upwards on each foot, never negative; not a number where nothing tells it.
   [[nodiscard]] const std::array<double, kFootCount>& up_n() const noexcept { return up_n_; }
   // Error of that, one sigma, by what is felt of feet that hang.
   [[nodiscard]] const std::array<double, kFootCount>& sigma_n() const noexcept { return sigma_n_; }
+  // Torques of the drives over those that the legs need.
+  [[nodiscard]] double torque_scale() const noexcept { return torque_scale_.scale(); }
 
  private:
   struct Sensor {
@@ -79,6 +84,7 @@ class FootForces {
 
   Params params_;
   GroundForceObserver observer_;
+  TorqueScale torque_scale_;
   std::array<NoiseLevel, kFootCount> observer_noise_n_;
   std::array<Sensor, kFootCount> sensors_;
   std::array<InAir, kFootCount> in_air_;

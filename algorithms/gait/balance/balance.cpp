@@ -28,7 +28,6 @@ std::array<double, kFootCount> held_by(double pressed_n, const std::array<bool, 
 void Balance::reset() noexcept {
   stabiliser_.reset();
   bias_.reset();
-  weight_ = {};
   bias_tick_ = 0;
   share_ = {0.5, 0.5};
   odom_p_com_planned_m_.setZero();
@@ -117,10 +116,6 @@ JointVector Balance::torques_nm(const Params& params, const RobotModel& robot, c
   const PerLink& links_mps2 = reference.links.plan_mps2;
   Pendulum pendulum = pendulum_of(robot.masses, frames, body, feedback.dq_radps, links_mps2, ground_m);
   observe_bias(params, robot, body, feedback, support, pendulum, tick_s);
-  const std::array<double, kFootCount>& felt_n = feedback.foot_force_n;
-  if (reference.stands[0] && reference.stands[1] && std::min(felt_n[0], felt_n[1]) > params.pressed_n) {
-    weight_.update(params.weight, felt_n[0] + felt_n[1], pendulum.vertical_n, tick_s);
-  }
   Vec3& odom_p_com_m = pendulum.odom_p_com_m;
   odom_p_com_m.head<2>() -= bias_.odom_bias_m();
 
@@ -143,10 +138,8 @@ JointVector Balance::torques_nm(const Params& params, const RobotModel& robot, c
   slope_ = (odom_p_com_m.head<2>() + beside_m - pressure.zmp_m.head<2>()) / pendulum.height_m;
   const double up_n = pendulum.vertical_n;
   const Vec3 force_n{up_n * slope_.x(), up_n * slope_.y(), up_n};
-  const JointVector torque_nm =
-      leg_torques(robot.masses, frames, links_mps2, body.odom_T_base.R, support, pressure, force_n) +
-      robot.drives.armature_kgm2 * reference.links.joint_radps2;
-  return weight_.share() * torque_nm;
+  return leg_torques(robot.masses, frames, links_mps2, body.odom_T_base.R, support, pressure, force_n) +
+         robot.drives.armature_kgm2 * reference.links.joint_radps2;
 }
 
 }  // namespace polygmap

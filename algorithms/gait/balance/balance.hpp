@@ -5,7 +5,6 @@
 
 #include "algorithms/gait/balance/dcm_bias.hpp"
 #include "algorithms/gait/balance/dcm_stabiliser.hpp"
-#include "algorithms/gait/balance/felt_weight.hpp"
 #include "algorithms/gait/balance/link_motion.hpp"
 #include "algorithms/gait/balance/wrench_distribution.hpp"
 #include "algorithms/gait/balance/zmp_measurement.hpp"
@@ -19,7 +18,6 @@ class Balance {
     DcmBias::Params bias;
     PressureLimits pressure;
     ZmpMeasurementParams zmp;
-    FeltWeight::Params weight;
     double pressed_n = 60.0;
     std::int32_t bias_ticks = 4;
     double soft_ground_gain = 2.0;
@@ -29,7 +27,6 @@ class Balance {
       field("bias", p.bias);
       field("pressure", p.pressure);
       field("zmp", p.zmp);
-      field("weight", p.weight);
       field("pressed_n", p.pressed_n, 1.0, 500.0,
             "A standing foot that is pressed less says the less of where the plan lies: it hangs and moves.");
       field("bias_ticks", p.bias_ticks, 1, 20, "The bias is observed once in as many ticks, since it is slow.");
@@ -89,7 +86,6 @@ class Balance {
 
   DcmStabiliser stabiliser_;
   DcmBias bias_;
-  FeltWeight weight_;
   int bias_tick_ = 0;
   std::array<double, kFootCount> share_{0.5, 0.5};
   Vec2 odom_p_com_planned_m_ = Vec2::Zero();

@@ -124,10 +124,13 @@ std::string reality_markdown() {
     std::string drawn = "the same";
     for (const RealityItem& item : reality_items()) {
       if (item.name != param.name) continue;
-      const std::string size = config::text_of(item.at_one);
-      drawn = item.draw == Draw::kLevel  ? (item.at_one < 0.0 ? "" : "+") + size
-              : item.draw == Draw::kEven ? "evenly within +-" + size
-                                         : "normally, sigma " + size;
+      const auto signed_text = [](double number) { return (number < 0.0 ? "" : "+") + config::text_of(number); };
+      if (item.least == item.most)
+        drawn = signed_text(item.most);
+      else if (item.least == -item.most)
+        drawn = "evenly within +-" + config::text_of(item.most);
+      else
+        drawn = "evenly from " + signed_text(item.least) + " to " + signed_text(item.most);
     }
     out += "| `" + param.name + "` | " + config::text_of(param) + " | " + range(param) + " | " + drawn + " | " +
            std::string(param.text) + " |\n";

@@ -539,6 +539,49 @@ TEST_F(FootholdSearchTest, BackEdgeNotMapped_HeelGoes14mmAndHalfItsRoundBehindTh
   EXPECT_FALSE(r.has_p_star_star);
 }
 
+// A landing, or a tread whose next riser nobody saw: it may end where what was seen of it does.
+TEST_F(FootholdSearchTest, DeepSurfaceWithoutABackEdge_HeelGoesAsFarInAsOnADeepTread) {
+  const Stairs s{};
+  for (const double seen_to_m : {0.29, 0.30, 0.6}) {
+    MapSnapshot map;
+    map.stamp_ns = kNow_ns;
+    ASSERT_TRUE(map.polygons.try_push_back(ideal_map(s).polygons[0]));
+    ASSERT_TRUE(map.polygons.try_push_back(level(2, {}, 0.13, 0.0, seen_to_m, 0.6, true, false)));
+    const FootholdSet& r = search(map, standing(s, 0));
+    ASSERT_EQ(r.obstruction, StopReason::kNone);
+    const double room_m = seen_to_m - kCollisionRectangle.toe_x_m + kContactRectangle.heel_x_m;
+    EXPECT_NEAR(r.p_star_feet[0].position_m.x() + kContactRectangle.heel_x_m,
+                std::min(0.5 * (room_m + kRound_m), FootholdSearch::Params{}.feet.heel_inset_max_m), 1e-9);
+  }
+}
+
+// Of 3 degrees: it is higher ahead than the soles by more than what makes a level.
+TEST_F(FootholdSearchTest, GroundUnderfootThatRises_IsNotTheNextTread) {
+  MapSnapshot map;
+  map.stamp_ns = kNow_ns;
+  const Stairs s{};
+  MapPolygon landing = level(1, {}, 0.0, -0.5, 1.5, 0.6, true, false);
+  const double slope = 0.052;
+  for (Vec3& v : landing.surface.polygon) v.z() = slope * (v.x() + 0.3);
+  landing.surface.normal = Vec3{-slope, 0.0, 1.0}.normalized();
+  landing.surface.d_m = -landing.surface.normal.dot(Vec3{-0.3, 0.0, 0.0});
+  ASSERT_TRUE(map.polygons.try_push_back(landing));
+  FootholdSearch::Query query = standing(s, 0);
+  query.climbing = true;
+  EXPECT_EQ(search(map, query).obstruction, StopReason::kTop);
+}
+
+// A strip without depth hides the nosing, and the riser below it measures 60 mm too tall.
+TEST_F(FootholdSearchTest, TallRiserBeneathATreadWithoutANosing_IsNotTooHigh) {
+  const Stairs s{};
+  MapSnapshot map;
+  map.stamp_ns = kNow_ns;
+  ASSERT_TRUE(map.polygons.try_push_back(ideal_map(s).polygons[0]));
+  ASSERT_TRUE(map.polygons.try_push_back(level(2, {}, 0.13, 0.06, 0.28, 0.6, false, false)));
+  ASSERT_TRUE(map.polygons.try_push_back(riser(3, {}, 0.0, 0.0, 0.195, 0.6)));
+  EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kNothingSeen);
+}
+
 TEST_F(FootholdSearchTest, TreadSeenOnlyInFront_NoFootholdReachesOverWhatWasSeen) {
   const Stairs s{};
   MapSnapshot map;

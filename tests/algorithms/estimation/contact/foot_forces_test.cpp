@@ -38,6 +38,7 @@ class FootForcesTest : public testing::Test {
       joints.tau_nm.segment<6>(at) = leg_torques_nm(robot_.masses, foot, leg_frames(robot_.legs, foot, q),
                                                     specific_mps2, {pressed_n[index_of(foot)] * up, Vec3::Zero()});
     }
+    joints.tau_nm *= told_share_ / forces_.torque_scale();
     forces_.update(robot_, body_frames(robot_.legs, joints.q_rad), joints, base, up,
                    {says_stands_ && pressed_n[0] > 0.0, says_stands_ && pressed_n[1] > 0.0});
     return forces_.up_n();
@@ -53,6 +54,7 @@ class FootForcesTest : public testing::Test {
   FootForces forces_;
   std::int64_t stamp_ns_ = 0;
   bool tells_torques_ = true, says_stands_ = true;
+  double told_share_ = 1.0;  // of the torques that the legs need
   std::uint16_t silent_cycles_ = 0;
 };
 
@@ -114,6 +116,19 @@ TEST_F(FootForcesTest, NoisySensor_TheForceIsLessNoisy) {
 TEST_F(FootForcesTest, AFewNewtons_AreNoForceWhereOnlyTorquesTellThem) {
   EXPECT_EQ(ticks(100, {15.0, 525.0}, {kNaN, kNaN})[0], 0.0);
   EXPECT_NEAR(ticks(100, {40.0, 500.0}, {kNaN, kNaN})[0], 40.0, 3.0);
+}
+
+// Motors of a fifth less than they say: the weight is known, so that neither forces nor sensors' zeros go with them.
+TEST_F(FootForcesTest, DrivesTellAFourthMore_ForcesAreThoseOfTheWeight) {
+  told_share_ = 1.25;
+  const double half_n = 0.5 * robot_.masses.total_kg() * kGravity_mps2;
+  const auto by_torques_n = ticks(1000, {half_n, half_n}, {kNaN, kNaN});
+  EXPECT_NEAR(forces_.torque_scale(), 1.25, 0.03);
+  EXPECT_NEAR(by_torques_n[0], half_n, 0.03 * half_n);
+  forces_.reset({});
+  (void)ticks(1000, {half_n, half_n}, {40.0, -40.0});
+  EXPECT_NEAR(forces_.torque_scale(), 1.25, 0.03);
+  EXPECT_NEAR(tick({0.0, 2.0 * half_n}, {40.0, 2.0 * half_n - 40.0})[0], 0.0, 25.0) << "that zero is not the weight's";
 }
 
 // Nobody said yet that it stands, or the plan says early that it does not.

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/estimation/leg_sensing.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/nominal_robot.hpp"
+#include "tests/support/ticks.hpp"
+
+namespace polygmap {
+namespace {
+
+constexpr double kTold = 1.2;  // by the drives, over what the legs need
+
+// Stands upright on both feet for `ticks`, without sensors of their forces.
+void stand(LegSensing& sensing, const RobotModel& robot, int ticks) {
+  const Vec3 up = Vec3::UnitZ();
+  JointFeedback joints;
+  joints.foot_force_n.fill(test::kNaN);
+  const double half_n = 0.5 * robot.masses.total_kg() * kGravity_mps2;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    LegVector q_rad;
+    q_rad << 0.0, 0.0, -0.4, 0.8, -0.4, 0.0;
+    const auto at = static_cast<Eigen::Index>(joint_index(leg, 0));
+    joints.q_rad.segment<6>(at) = q_rad;
+    std::array<Vec3, kJointsPerLeg> specific_mps2;
+    specific_mps2.fill(-kGravity_mps2 * up);
+    joints.tau_nm.segment<6>(at) = kTold * leg_torques_nm(robot.masses, leg, leg_frames(robot.legs, leg, q_rad),
+                                                          specific_mps2, {half_n * up, Vec3::Zero()});
+  }
+  ImuSample base;
+  base.accel_mps2 = kGravity_mps2 * up;
+  for (int i = 0; i < ticks; ++i) {
+    joints.stamp_ns += kTick_ns;
+    ASSERT_TRUE(sensing.try_take(joints, joints.stamp_ns, base, up, {true, true}));
+  }
+}
+
+TEST(LegSensing, DrivesOfTooLittleTorque_AreReadAndAskedInTheLegsTorques) {
+  const RobotModel robot = nominal_robot();
+  LegSensing sensing;
+  sensing.reset({}, robot);
+  stand(sensing, robot, 1000);
+  EXPECT_NEAR(sensing.torque_scale(), kTold, 0.03);
+
+  JointCommand command;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    command.joints[n].tau_ff_nm = sensing.joints().tau_nm[static_cast<Eigen::Index>(n)];
+  }
+  command.joints[kKnee].tau_ff_nm = robot.drives.limits[kKnee].torque_nm;
+  const double asked_nm = command.joints[kAnklePitch].tau_ff_nm;
+  sensing.to_drives(command);
+  EXPECT_DOUBLE_EQ(command.joints[kAnklePitch].tau_ff_nm, sensing.torque_scale() * asked_nm);
+  EXPECT_DOUBLE_EQ(command.joints[kKnee].tau_ff_nm, robot.drives.limits[kKnee].torque_nm) << "never more than it has";
+}
+
+}  // namespace
+}  // namespace polygmap
