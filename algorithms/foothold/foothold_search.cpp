@@ -395,6 +395,7 @@ Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, 
   Foothold out;
   out.position_m = {p.x(), p.y(), tread.plane.height_m(p)};
   out.yaw_rad = tread.yaw_rad;
+  out.up = tread.plane.normal;
   out.clearance_m = tread.contact_clearance_m(p);
   out.toe_clearance_m = tread.toe_clearance_m(p);
   out.polygon_id = tread.id;

@@ -194,6 +194,7 @@ void each_field(auto& f, Of<MapSnapshot> auto& m) {
 void each_field(auto& f, Of<Foothold> auto& m) {
   walk(f, "position_m", m.position_m);
   walk(f, "yaw_rad", m.yaw_rad);
+  walk(f, "up", m.up);
   walk(f, "clearance_m", m.clearance_m);
   walk(f, "toe_clearance_m", m.toe_clearance_m);
   walk(f, "polygon_id", m.polygon_id);

@@ -19,6 +19,7 @@ namespace polygmap {
 struct Foothold {
   Vec3 position_m = Vec3::Zero();  // of the sole frame's origin (below the ankle, see robot_model.hpp)
   double yaw_rad = 0.0;            // of the sole, perpendicular to the nosing
+  Vec3 up = Vec3::UnitZ();         // the tread's normal
   double clearance_m = 0.0;        // signed: least distance from the contact rectangle to the polygon's edges
   double toe_clearance_m = 0.0;    // signed: collision box to the next riser; +inf when none is mapped
   std::uint32_t polygon_id = 0;

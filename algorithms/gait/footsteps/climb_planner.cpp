@@ -6,14 +6,20 @@
 namespace polygmap {
 namespace {
 
-bool usable(const Foothold& f) noexcept { return math::all_finite(f.position_m) && std::isfinite(f.yaw_rad); }
+// A sole is laid on a slope of 10 degrees at most.
+constexpr double kLeastUp = 0.985;
 
-SolePose sole_on(const Foothold& foothold) noexcept { return {foothold.position_m, foothold.yaw_rad}; }
+bool usable(const Foothold& f) noexcept {
+  return math::all_finite(f.position_m) && std::isfinite(f.yaw_rad) && f.up.z() > kLeastUp;
+}
+
+SolePose sole_on(const Foothold& foothold) noexcept { return {foothold.position_m, foothold.yaw_rad, foothold.up}; }
 
 Foothold foothold_at(const SolePose& target, std::int64_t last_seen_ns) noexcept {
   Foothold foothold;
   foothold.position_m = target.position_m;
   foothold.yaw_rad = target.yaw_rad;
+  foothold.up = target.up;
   foothold.last_seen_ns = last_seen_ns;
   return foothold;
 }

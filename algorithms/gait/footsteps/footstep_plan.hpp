@@ -17,15 +17,25 @@ struct TorsoPose {
   double yaw_rad = 0.0;
 };
 
-// A flat sole. position: of the sole frame's origin.
+// A sole that lies on a surface. position: of the sole frame's origin.
 struct SolePose {
   Vec3 position_m = Vec3::Zero();
   double yaw_rad = 0.0;
-  [[nodiscard]] Transform transform() const noexcept { return {rotation_z(yaw_rad), position_m}; }
+  Vec3 up = Vec3::UnitZ();  // the surface's normal
+  [[nodiscard]] Transform transform() const noexcept { return {upright(up, yaw_rad), position_m}; }
+
+ private:
+  // Its z axis along up, its x axis above the heading.
+  [[nodiscard]] static Mat3 upright(const Vec3& up, double yaw_rad) noexcept {
+    const Vec3 left = up.cross(rotation_z(yaw_rad).col(0)).normalized();
+    Mat3 R;
+    R << left.cross(up), left, up;
+    return R;
+  }
 };
 using SolePair = std::array<SolePose, kFootCount>;
 
-// Flattens a pose: estimates are tilted by a fraction of a degree, plans are not.
+// Flattens a pose: where a sole stands is planned from, not how its ground slopes.
 [[nodiscard]] inline SolePose sole_pose(const Transform& sole) noexcept { return {sole.p_m, yaw_of(sole.R)}; }
 
 // Eq. (31): the foot below a torso pose; half_width_m is the paper's y_b, z of the torso pose is height_m above it.

@@ -202,6 +202,7 @@ void SwingPhase::land_beside(GaitShared& gait, const SolePose& target) noexcept 
   goal_.target = target;
   goal_.foothold = {.position_m = target.position_m,
                     .yaw_rad = target.yaw_rad,
+                    .up = target.up,
                     .polygon_id = gait.planner.tread_id(),
                     .last_seen_ns = goal_.foothold.last_seen_ns,
                     .side_room_m = goal_.foothold.side_room_m};  // as much as above: both are of one staircase

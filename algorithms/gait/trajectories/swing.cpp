@@ -14,9 +14,9 @@ void Swing::plan(const SoleModel& sole, const Transform& start, const SolePose& 
   foot_height_m_ = sole.collision_height_m;
   start_m_ = start.p_m;
   start_yaw_rad_ = yaw_of(start.R);
-  start_pitch_rad_ = math::asin(math::clamp(-start.R(2, 0), -1.0, 1.0));
-  start_roll_rad_ = math::atan2(start.R(2, 1), start.R(2, 2));
+  start_tilt_ = Tilt::of(start.R);
   target_ = target;
+  target_tilt_ = Tilt::of(target.transform().R);
   turn_rad_ = math::wrap_angle(target.yaw_rad - start_yaw_rad_);
   shape_ = shape;
   duration_ticks_ = std::max(duration_ticks, 1);
@@ -30,8 +30,7 @@ void Swing::plan(const SoleModel& sole, const Transform& start, const SolePose& 
 void Swing::redirect(double tick, double pace, const SolePose& target, std::int32_t duration_ticks) noexcept {
   const Transform now = at(tick), before = at(tick - pace);
   const Vec3 v_mps = (now.p_m - before.p_m) / kTick_s;
-  const double pitch_rad = math::asin(math::clamp(-now.R(2, 0), -1.0, 1.0));
-  const double before_rad = math::asin(math::clamp(-before.R(2, 0), -1.0, 1.0));
+  const Tilt tilt = Tilt::of(now.R), tilt_before = Tilt::of(before.R), tilt_after = Tilt::of(target.transform().R);
   const double whole_s = std::max(duration_ticks * kTick_s - approach_s_, 2.0 * kTick_s);
   // Over the nosing of the target's tread, and high enough to stop the rise.
   const double apex_m =
@@ -43,7 +42,10 @@ void Swing::redirect(double tick, double pace, const SolePose& target, std::int3
                         whole_s - other_.up_s);
   other_.x = Quintic({now.p_m.x(), v_mps.x(), 0.0}, {target.position_m.x()}, whole_s);
   other_.y = Quintic({now.p_m.y(), v_mps.y(), 0.0}, {target.position_m.y()}, whole_s);
-  other_.pitch = Quintic({pitch_rad, (pitch_rad - before_rad) / kTick_s, 0.0}, {0.0}, whole_s);
+  other_.pitch = Quintic({tilt.pitch_rad, (tilt.pitch_rad - tilt_before.pitch_rad) / kTick_s, 0.0},
+                         {tilt_after.pitch_rad}, whole_s);
+  other_.roll =
+      Quintic({tilt.roll_rad, (tilt.roll_rad - tilt_before.roll_rad) / kTick_s, 0.0}, {tilt_after.roll_rad}, whole_s);
   other_.yaw_rad = yaw_of(now.R);
   target_ = target;
   duration_ticks_ = std::max(duration_ticks, 1);
@@ -63,7 +65,7 @@ Transform Swing::redirected_at(double tick) const noexcept {
     sole.p_m.z() = t_s < other_.up_s ? other_.up.at(t_s).position : other_.down.at(t_s - other_.up_s).position;
   }
   const double yaw_rad = other_.yaw_rad + turned * math::wrap_angle(target_.yaw_rad - other_.yaw_rad);
-  sole.R = rotation_zyx(yaw_rad, other_.pitch.at(t_s).position, 0.0);
+  sole.R = rotation_zyx(yaw_rad, other_.pitch.at(t_s).position, other_.roll.at(t_s).position);
   return sole;
 }
 
@@ -105,8 +107,10 @@ Transform Swing::at(double tick) const noexcept {
   const Vec3 heading{turn.cos, turn.sin, 0.0};
   sole.p_m = start_m_ + (target_.position_m - start_m_) * forward - (retreat_m + short_m + lean_m) * heading;
   sole.p_m.z() = height_m(tick) + lift_m;
-  const double level = 1.0 - smooth_window(u, 0.0, s.forward_end);  // the start's small tilt fades
-  sole.R = rotation_zyx(yaw_rad, toe_down_rad + start_pitch_rad_ * level, start_roll_rad_ * level);
+  // The start's small tilt fades, and the target's comes as the toe does.
+  const double left = 1.0 - smooth_window(u, 0.0, s.forward_end), came = smooth_window(u, s.toe_up_begin, s.toe_up_end);
+  sole.R = rotation_zyx(yaw_rad, toe_down_rad + start_tilt_.pitch_rad * left + target_tilt_.pitch_rad * came,
+                        start_tilt_.roll_rad * left + target_tilt_.roll_rad * came);
   return sole;
 }
 

@@ -68,10 +68,10 @@ struct SwingShape {
 
 class Swing {
  public:
-  // start may be tilted a little; target is flat. duration_ticks: until the target height is reached.
+  // start and target may be tilted a little. duration_ticks: until the target height is reached.
   void plan(const SoleModel& sole, const Transform& start, const SolePose& target, const SwingShape& shape,
             std::int32_t duration_ticks) noexcept;
-  // Leaves the path at that tick, reached at that pace (ticks of the path in a tick), for another one to a flat target:
+  // Leaves the path at that tick, reached at that pace (ticks of the path in a tick), for another one to that target:
   // ticks count from 0 again.
   void redirect(double tick, double pace, const SolePose& target, std::int32_t duration_ticks) noexcept;
   // Pose of the sole. After duration_ticks, and before 0 on the way back, the foot goes on downwards at approach_mps:
@@ -87,16 +87,24 @@ class Swing {
   // Eq. (32) made continuous: height of the lowest point of the foot.
   [[nodiscard]] double height_m(double tick) const noexcept;
 
-  // Another way: along, across, pitch; up and down again.
+  struct Tilt {
+    double pitch_rad = 0.0, roll_rad = 0.0;
+    [[nodiscard]] static Tilt of(const Mat3& R) noexcept {
+      return {math::asin(math::clamp(-R(2, 0), -1.0, 1.0)), math::atan2(R(2, 1), R(2, 2))};
+    }
+  };
+  // Another way: along, across, pitch, roll; up and down again.
   struct Redirected {
-    Quintic x, y, pitch, up, down;
+    Quintic x, y, pitch, roll, up, down;
     double yaw_rad = 0.0, up_s = 0.0;
   };
   [[nodiscard]] Transform redirected_at(double tick) const noexcept;
 
   Vec3 start_m_ = Vec3::Zero();
-  double start_yaw_rad_ = 0.0, start_pitch_rad_ = 0.0, start_roll_rad_ = 0.0;
+  double start_yaw_rad_ = 0.0;
+  Tilt start_tilt_;
   SolePose target_;
+  Tilt target_tilt_;
   double turn_rad_ = 0.0;
   double apex_m_ = 0.0;
   SwingShape shape_;
