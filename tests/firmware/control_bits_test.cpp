@@ -199,11 +199,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 18334935431787563409U);
-  EXPECT_EQ(hashes.gait.value(), 4957036221274194019U);
-  EXPECT_EQ(hashes.commands.value(), 8781539385001486090U);
-  EXPECT_EQ(hashes.surfaces.value(), 6018346593508900000U);
-  EXPECT_EQ(hashes.map.value(), 6955445935282093827U);
+  EXPECT_EQ(hashes.estimates.value(), 6667858769561389474U);
+  EXPECT_EQ(hashes.gait.value(), 17525522911526964829U);
+  EXPECT_EQ(hashes.commands.value(), 137298381970484661U);
+  EXPECT_EQ(hashes.surfaces.value(), 14226978360009351294U);
+  EXPECT_EQ(hashes.map.value(), 4748262824326141400U);
 }
 
 }  // namespace

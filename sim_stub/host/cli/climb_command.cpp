@@ -83,11 +83,13 @@ void declare_stairs(CLI::App& climb, StairParams& stairs) {
 // What the robot truly is, where the module believes otherwise.
 void declare_reality(CLI::App& climb, ClimbArguments& a) {
   MujocoPlant::Params& mujoco = a.usual.plant;
+  a.options.reality_scale = 1.0;
   keep_within(
       *climb
            .add_option("--reality", a.options.reality_scale,
                        "How far the robot and its sensors are from the data sheet: 0 as it says, 1 as real ones "
-                       "are, 2 twice as bad; drawn by the seed, see docs/reference/reality.md")
+                       "are, 2 twice as bad; drawn by the seed, see docs/reference/reality.md. Without it, with --plant "
+                       "kinematic, 0")
            ->capture_default_str(),
       0.0, 2.0);
   climb
@@ -318,8 +320,9 @@ std::string operator_complaint(ClimbArguments& a) {
 
 std::string reality_complaint(ClimbArguments& a) {
   Reality& reality = a.options.reality;
-  reality = draw_reality(a.options.reality_scale, a.options.seed);
   const auto said = [&a](const char* name) { return a.said->count(name) > 0; };
+  if (!said("--reality") && a.options.plant != PlantKind::kMujoco) a.options.reality_scale = 0.0;
+  reality = draw_reality(a.options.reality_scale, a.options.seed);
   if (said("--mass-scale")) reality.plant.torso_mass_scale = a.usual.plant.torso_mass_scale;
   if (said("--torso-offset-x")) reality.plant.torso_offset_x_m = a.usual.plant.torso_offset_x_m;
   if (said("--friction")) reality.plant.friction = a.usual.plant.friction;
