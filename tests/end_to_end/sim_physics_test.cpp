@@ -35,6 +35,21 @@ TEST(PhysicalClimb, TwoSteps_ClimbsAndStands) {
   EXPECT_TRUE(stands_for(climb, 1.0)) << climb.com_error_m();
 }
 
+// What it was taken for is known only where it balances: from there on nothing may jolt it.
+TEST(PhysicalClimb, ImuPitchedOrRolledByTwoDegrees_ClimbsAndTellsOfIt) {
+  for (const Vec3& turned_rad : {Vec3{0.0, 0.035, 0.0}, Vec3{0.0, -0.035, 0.0}, Vec3{-0.035, 0.0, 0.0}}) {
+    SimOptions options = stairs_of(2, 5);
+    options.errors.imu_turned_rad = turned_rad;
+    PhysicalClimb climb(options);
+    climb.run(60.0);
+    EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
+    EXPECT_EQ(climb.status().phase, GaitPhase::kFinished);
+    EXPECT_EQ(climb.status().treads_climbed, 2U);
+    EXPECT_GE(climb.sole_margin_min_m(), 0.0);
+    EXPECT_EQ(climb.health().count(Limit::kImuTurned).count, 1U);
+  }
+}
+
 TEST(PhysicalRepetition, SameSeedTwice_RepeatsBitForBit) {
   PhysicalClimb one(stairs_of(2, 2)), two(stairs_of(2, 2));
   one.run(6.0);

@@ -4,8 +4,6 @@
 #include <algorithm>
 
 #include "algorithms/geometry/so3.hpp"
-#include <cstdio>
-#include <cstdlib>
 
 namespace polygmap {
 namespace {
@@ -84,11 +82,6 @@ Mat3 ImuMount::base_R_felt(const RobotModel& robot) const noexcept {
   if (!try_turns(robot, turns)) return Mat3::Identity();
   const Vec2 all_rad = turn_rad(params_, turns);
   const double share = std::min(1.0, params_.most_rad / std::max(all_rad.norm(), 1e-9));
-  if (std::getenv("DBG")) {
-    fprintf(stderr, "MOUNT soles %.1f %.1f statics %.1f %.1f turn %.1f %.1f mrad, samples %.0f\n", turns.soles_rad.x()*1e3, turns.soles_rad.y()*1e3, turns.statics_rad.x()*1e3, turns.statics_rad.y()*1e3, all_rad.x()*1e3, all_rad.y()*1e3, samples_);
-    if (std::getenv("DBGOFF")) return Mat3::Identity();
-    if (std::getenv("DBGQUIT")) std::exit(0);
-  }
   return so3_exp(Vec3{share * all_rad.x(), share * all_rad.y(), 0.0});
 }
 
