@@ -12,8 +12,6 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   robot_ = &robot;
   counters_ = {};
   standstill_.reset(params.standstill);
-  imu_mount_.reset(params.imu_mount);
-  base_R_imu_ = robot.mounts.base_R_imu;
   contacts_.reset(params.contacts);
   leg_sensing_.reset(params.legs, robot);
   imu_noise_.reset(params.imu_noise);
@@ -23,6 +21,8 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   quality_ = {};
   imu_ = {};
   imu_.resting.reset(params.rest_ns);
+  imu_.mount.reset(params.imu_mount);
+  imu_.base_R_imu = robot.mounts.base_R_imu;
   legs_ = {};
   known_ = {};
   ground_ = {};
@@ -109,7 +109,7 @@ void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
   }
   imu_noise_.update(imu.stamp_ns, imu.gyro_radps, imu.accel_mps2);
   const ImuSample before = imu_.newest;
-  imu_.newest = {imu.stamp_ns, base_R_imu_ * imu.gyro_radps, base_R_imu_ * imu.accel_mps2};
+  imu_.newest = {imu.stamp_ns, imu_.base_R_imu * imu.gyro_radps, imu_.base_R_imu * imu.accel_mps2};
   if (!known_.has_run) imu_.resting.add(imu_.newest.stamp_ns, imu_.newest.accel_mps2);
   ImuSample since = imu_.newest;
   if (params_.imu_of_moments && imu_.any) {
@@ -197,9 +197,9 @@ bool Estimator::try_begin() noexcept {
   }
   const bool collecting = standstill_.collecting();
   if (collecting) {
-    imu_mount_.add(imu_.mean.accel_mps2, leg_sensing_.joints());
+    imu_.mount.add(imu_.mean.accel_mps2, leg_sensing_.joints());
   } else {
-    imu_mount_.forget();
+    imu_.mount.forget();
   }
   known_.runs = known_.runs && (stood_[0] || stood_[1]);
   if (!still && known_.runs && !collecting) return false;
@@ -212,8 +212,8 @@ bool Estimator::try_begin() noexcept {
   } else {
     odom_T_base.R = collecting ? standstill_.odom_R_base() : level_attitude(imu_.mean.accel_mps2);
   }
-  const Mat3 base_R_felt = still ? imu_mount_.base_R_felt(*robot_) : Mat3::Identity();
-  if (still) turn_imu(base_R_felt, odom_T_base.R);
+  const Mat3 base_R_felt = still ? imu_.mount.base_R_felt(*robot_) : Mat3::Identity();
+  if (!base_R_felt.isIdentity(0.0)) turn_imu(base_R_felt, odom_T_base.R);
   if (known_.runs) {
     odom_T_base.R = rotation_z(yaw_of(state_.odom_T_base.R)) * odom_T_base.R;
     odom_T_base.p_m.head<2>() = state_.odom_T_base.p_m.head<2>();
@@ -249,12 +249,12 @@ bool Estimator::try_begin() noexcept {
   return true;
 }
 
-// The standstill's attitude as that mount has it; samples from here on are turned as they come.
+// The standstill's attitude, and all samples from this tick's on, as the IMU is found to be mounted.
 void Estimator::turn_imu(const Mat3& base_R_felt, Mat3& odom_R_base) noexcept {
   const Mat3 odom_R_felt = odom_R_base;
   odom_R_base = level_attitude(base_R_felt * odom_R_felt.row(2).transpose());
   state_.odom_turned_rad = so3_log(odom_R_base * odom_R_felt.transpose());
-  base_R_imu_ = base_R_felt * base_R_imu_;
+  imu_.base_R_imu = base_R_felt * imu_.base_R_imu;
   for (ImuSample* imu : {&imu_.newest, &imu_.mean}) {
     imu->gyro_radps = base_R_felt * imu->gyro_radps;
     imu->accel_mps2 = base_R_felt * imu->accel_mps2;

@@ -113,10 +113,12 @@ class Estimator {
  private:
   struct Imu {
     bool any = false;
-    ImuSample newest;             // accepted
-    ImuSample mean;               // of the tick's; stamped as the newest
-    std::uint32_t new_count = 0;  // accepted since the last tick
-    RestingAccel resting;         // until the filters begin
+    ImuSample newest;                    // accepted
+    ImuSample mean;                      // of the tick's; stamped as the newest
+    std::uint32_t new_count = 0;         // accepted since the last tick
+    RestingAccel resting;                // until the filters begin
+    ImuMount mount;                      // until the standstill is over
+    Mat3 base_R_imu = Mat3::Identity();  // as configured, then as that has found it
   };
   struct Legs {
     bool any = false;
@@ -145,8 +147,6 @@ class Estimator {
   Counters counters_;
   LegSensing leg_sensing_;
   StandstillCalibration standstill_;
-  ImuMount imu_mount_;
-  Mat3 base_R_imu_ = Mat3::Identity();  // as configured, then as the standstill has found it
   ContactEstimator contacts_;
   ImuNoise imu_noise_;
   ProprioceptiveOdometry odometry_;

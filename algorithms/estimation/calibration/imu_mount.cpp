@@ -63,10 +63,10 @@ Vec2 ImuMount::turn_rad(const Params& params, const Turns& turns) noexcept {
       for (const Guess& c : guesses(params.statics)) {
         const double ms = m.variance_rad2 * s.variance_rad2, mc = m.variance_rad2 * c.variance_rad2;
         const double all = ms + mc + s.variance_rad2 * c.variance_rad2;
-        const double far = (s.variance_rad2 * turns.statics_rad.squaredNorm() +
-                            c.variance_rad2 * turns.soles_rad.squaredNorm() +
-                            m.variance_rad2 * (turns.statics_rad - turns.soles_rad).squaredNorm()) /
-                           all;
+        const double far =
+            (s.variance_rad2 * turns.statics_rad.squaredNorm() + c.variance_rad2 * turns.soles_rad.squaredNorm() +
+             m.variance_rad2 * (turns.statics_rad - turns.soles_rad).squaredNorm()) /
+            all;
         const double weight = m.chance * s.chance * c.chance * math::exp(-0.5 * far) / all;  // two axes
         sum += weight;
         if (&m != &imu.front()) mean_rad += weight / all * (mc * turns.soles_rad + ms * turns.statics_rad);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether the IMU is mounted as its data sheet says. Of a robot that stands still three things tell where up is: the
 // gravity that the IMU feels, the soles, and where the ground presses under the centre of mass. Where two agree and the
-// third does not, the third is off: the IMU's mount, the floor, which slopes, or the masses, with a load nobody told of.
-// Each is mostly about right and sometimes not at all, so each has two Gaussians; the turn of the IMU is its mean over
-// what these make of the three together. An IMU that is within its data sheet is left alone.
+// third does not, the third is off: the IMU's mount, the floor, which slopes, or the masses, with a load nobody told
+// of. Each is mostly about right and sometimes not at all, so each has two Gaussians; the turn of the IMU is its mean
+// over what these make of the three together. An IMU that is within its data sheet is left alone.
 #pragma once
 
 #include "algorithms/estimation/calibration/standing_vertical.hpp"
@@ -56,14 +56,16 @@ class ImuMount {
   void forget() noexcept;
   // A tick at rest. base_accel_mps2: felt, as the mount is configured. joints: LegSensing's.
   void add(const Vec3& base_accel_mps2, const JointFeedback& joints) noexcept;
-  // By their means. False, and nothing changes, where statics are not told.
-  [[nodiscard]] bool try_turns(const RobotModel& robot, Turns& turns) const noexcept;
-  // Of the IMU, that its samples are to be turned by: the mean of what is likely, 0 for an IMU as in its data sheet.
+  // By which the IMU's samples are to be turned, base axes: the mean of what is likely, about 0 for an IMU as in its
+  // data sheet. Error: half of the turn where floor and masses are off alike.
   [[nodiscard]] static Vec2 turn_rad(const Params& params, const Turns& turns) noexcept;
-  // The same by the means of what was added; identity where statics are not told.
+  // The same by the means of what was added, no more than most_rad; identity where statics are not told.
   [[nodiscard]] Mat3 base_R_felt(const RobotModel& robot) const noexcept;
 
  private:
+  // By the means of what was added. False, and nothing changes, where statics are not told.
+  [[nodiscard]] bool try_turns(const RobotModel& robot, Turns& turns) const noexcept;
+
   Params params_;
   double samples_ = 0.0;
   Vec3 accel_mps2_ = Vec3::Zero();  // sums

@@ -21,15 +21,15 @@ struct StandingVerticalParams {
   }
 };
 
-// In base axes, of unit length. Errors: half of what the floor slopes by under either sole, and of what their three
-// pitch and two roll encoders are off by.
+// In base axes, of unit length. Errs by the mean of what the floor slopes by under either sole, and by that of what
+// each leg's three pitch and two roll encoders are off by.
 [[nodiscard]] Vec3 up_by_soles(const LegGeometry& legs, const JointVector& q_rad) noexcept;
 
-// Likewise. felt: forces and torques as the legs need them (LegSensing::joints()). All that is above the ankles hangs on
-// what these feel: its centre is straight above the point where ankle forces and torques have it carried. Error: what
-// the masses have their centre off by, and ankles their torques, over its height, 10 mm over 0.8 m. False, and nothing
-// changes, when forces or torques are not told (not a number, or ankles at exactly 0) or the feet do not both carry, or
-// together not about the robot's weight.
+// Likewise. felt: forces and torques as the legs need them (LegSensing::joints()). All that is above the ankles hangs
+// on what these feel: its centre is straight above the point where ankle forces and torques have it carried. Error:
+// what the masses have their centre off by, and ankles their torques, over its height, 10 mm over 0.8 m. False, and
+// nothing changes, when forces or torques are not told (not a number, or ankles at exactly 0) or the feet do not both
+// carry, or together not about the robot's weight.
 [[nodiscard]] bool try_up_by_statics(const StandingVerticalParams& params, const RobotModel& robot,
                                      const JointFeedback& felt, Vec3& base_up) noexcept;
 

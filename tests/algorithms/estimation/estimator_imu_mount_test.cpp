@@ -18,9 +18,9 @@ class EstimatorImuMountTest : public ::testing::Test {
   // The robot stands upright; its IMU is turned in the base, and feels it turn by that, true axes.
   void tick(const Mat3& base_R_imu, const Vec3& base_w_radps = Vec3::Zero()) {
     t_ns_ += kTick_ns;
-    estimator_.add_imu({t_ns_, base_R_imu.transpose() * base_w_radps,
-                        kGravity_mps2 * (base_R_imu.transpose() * Vec3::UnitZ())},
-                       t_ns_);
+    estimator_.add_imu(
+        {t_ns_, base_R_imu.transpose() * base_w_radps, kGravity_mps2 * (base_R_imu.transpose() * Vec3::UnitZ())},
+        t_ns_);
     joints_.stamp_ns = t_ns_;
     estimator_.add_joints(joints_, t_ns_);
     estimator_.tick({true, true});
