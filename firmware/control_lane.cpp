@@ -243,6 +243,9 @@ void ControlLane::look_across(std::int64_t now_ns) noexcept {
 
 Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
   estimator_.tick(gait_.status().stands);
+  if (estimator_.state().odom_turned_rad.norm() > params_.estimator.imu_mount.told_rad) {
+    health_.raise(Limit::kImuTurned, now_ns);
+  }
   if (gait_.armed()) {
     read_lio(ports_.lio, now_ns, estimator_);
   } else {

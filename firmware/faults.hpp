@@ -72,6 +72,8 @@ namespace polygmap {
   X(115, kHandOverLost, "hand_over_lost", "A lane was so late that what it should have seen was overwritten.")      \
   X(116, kOperatorRefused, "operator_refused",                                                                      \
     "The operator asked for what the module did not do; the answer says why.")                                      \
+  X(117, kImuTurned, "imu_turned",                                                                                  \
+    "Soles and weight say that the IMU is not mounted as configured: its samples are turned.")                      \
   X(130, kDriveClamped, "drive_clamped", "A command's value was beyond its drive's range and became the nearest end.")
 
 #define POLYGMAP_ENUMERATOR(number, code, name, text) code = number,

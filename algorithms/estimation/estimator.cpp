@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "algorithms/geometry/so3.hpp"
+
 namespace polygmap {
 
 void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
@@ -19,6 +21,8 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   quality_ = {};
   imu_ = {};
   imu_.resting.reset(params.rest_ns);
+  imu_.mount.reset(params.imu_mount);
+  imu_.base_R_imu = robot.mounts.base_R_imu;
   legs_ = {};
   known_ = {};
   ground_ = {};
@@ -31,6 +35,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
 
 void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcept {
   ++counters_.ticks;
+  state_.odom_turned_rad.setZero();
   const bool new_imu = std::exchange(imu_.new_count, 0U) > 0;
   const bool new_legs = std::exchange(legs_.fresh, false);
   if (!state_.initialised && (!imu_.any || !legs_.any)) return;
@@ -104,7 +109,7 @@ void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
   }
   imu_noise_.update(imu.stamp_ns, imu.gyro_radps, imu.accel_mps2);
   const ImuSample before = imu_.newest;
-  imu_.newest = {imu.stamp_ns, robot_->mounts.base_R_imu * imu.gyro_radps, robot_->mounts.base_R_imu * imu.accel_mps2};
+  imu_.newest = {imu.stamp_ns, imu_.base_R_imu * imu.gyro_radps, imu_.base_R_imu * imu.accel_mps2};
   if (!known_.has_run) imu_.resting.add(imu_.newest.stamp_ns, imu_.newest.accel_mps2);
   ImuSample since = imu_.newest;
   if (params_.imu_of_moments && imu_.any) {
@@ -191,6 +196,11 @@ bool Estimator::try_begin() noexcept {
     leg_sensing_.forget_offsets();
   }
   const bool collecting = standstill_.collecting();
+  if (collecting) {
+    imu_.mount.add(imu_.mean.accel_mps2, leg_sensing_.joints());
+  } else {
+    imu_.mount.forget();
+  }
   known_.runs = known_.runs && (stood_[0] || stood_[1]);
   if (!still && known_.runs && !collecting) return false;
 
@@ -202,6 +212,8 @@ bool Estimator::try_begin() noexcept {
   } else {
     odom_T_base.R = collecting ? standstill_.odom_R_base() : level_attitude(imu_.mean.accel_mps2);
   }
+  const Mat3 base_R_felt = still ? imu_.mount.base_R_felt(*robot_) : Mat3::Identity();
+  if (!base_R_felt.isIdentity(0.0)) turn_imu(base_R_felt, odom_T_base.R);
   if (known_.runs) {
     odom_T_base.R = rotation_z(yaw_of(state_.odom_T_base.R)) * odom_T_base.R;
     odom_T_base.p_m.head<2>() = state_.odom_T_base.p_m.head<2>();
@@ -217,7 +229,7 @@ bool Estimator::try_begin() noexcept {
   start.odom_p_base_m = odom_T_base.p_m;
   if (still) {
     start.odom_v_base_mps = rotation_z(yaw_of(odom_T_base.R)) * standstill_.odom_v_base_mps();
-    start.gyro_bias_radps = standstill_.gyro_bias_radps();
+    start.gyro_bias_radps = base_R_felt * standstill_.gyro_bias_radps();
     start.gyro_bias_sigma_radps = standstill_.gyro_bias_sigma_radps();
     start.gravity_mps2 = standstill_.gravity_mps2();
     begin(start);
@@ -235,6 +247,18 @@ bool Estimator::try_begin() noexcept {
   known_.runs = stood_[0] && stood_[1];
   known_.has_run = known_.has_run || known_.runs;
   return true;
+}
+
+// The standstill's attitude, and all samples from this tick's on, as the IMU is found to be mounted.
+void Estimator::turn_imu(const Mat3& base_R_felt, Mat3& odom_R_base) noexcept {
+  const Mat3 odom_R_felt = odom_R_base;
+  odom_R_base = level_attitude(base_R_felt * odom_R_felt.row(2).transpose());
+  state_.odom_turned_rad = so3_log(odom_R_base * odom_R_felt.transpose());
+  imu_.base_R_imu = base_R_felt * imu_.base_R_imu;
+  for (ImuSample* imu : {&imu_.newest, &imu_.mean}) {
+    imu->gyro_radps = base_R_felt * imu->gyro_radps;
+    imu->accel_mps2 = base_R_felt * imu->accel_mps2;
+  }
 }
 
 void Estimator::begin(const ContactInEkf::Start& start) noexcept {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "algorithms/estimation/calibration/imu_mount.hpp"
 #include "algorithms/estimation/calibration/resting_accel.hpp"
 #include "algorithms/estimation/calibration/standstill.hpp"
 #include "algorithms/estimation/leg_sensing.hpp"
@@ -20,6 +21,7 @@ class Estimator {
   static constexpr std::int64_t kAlone_ns = kNsPerS;
   struct Params : ProprioceptiveOdometry::Params {
     StandstillCalibration::Params standstill;
+    ImuMount::Params imu_mount;
     ContactEstimator::Params contacts;
     LegSensing::Params legs;
     bool imu_of_moments = false;
@@ -36,6 +38,7 @@ class Estimator {
     static void visit(auto& p, auto& field) {
       ProprioceptiveOdometry::Params::visit(p, field);
       field("standstill", p.standstill);
+      field("imu_mount", p.imu_mount);
       field("contacts", p.contacts);
       field("legs", p.legs);
       field("imu_of_moments", p.imu_of_moments,
@@ -110,10 +113,12 @@ class Estimator {
  private:
   struct Imu {
     bool any = false;
-    ImuSample newest;             // accepted
-    ImuSample mean;               // of the tick's; stamped as the newest
-    std::uint32_t new_count = 0;  // accepted since the last tick
-    RestingAccel resting;         // until the filters begin
+    ImuSample newest;                    // accepted
+    ImuSample mean;                      // of the tick's; stamped as the newest
+    std::uint32_t new_count = 0;         // accepted since the last tick
+    RestingAccel resting;                // until the filters begin
+    ImuMount mount;                      // until the standstill is over
+    Mat3 base_R_imu = Mat3::Identity();  // as configured, then as that has found it
   };
   struct Legs {
     bool any = false;
@@ -130,6 +135,7 @@ class Estimator {
   // Before the standstill is over: true when the filters begin at these samples, either from what it found or from a
   // first guess to balance by.
   [[nodiscard]] bool try_begin() noexcept;
+  void turn_imu(const Mat3& base_R_felt, Mat3& odom_R_base) noexcept;
   void begin(const ContactInEkf::Start& start) noexcept;
   void publish(std::int64_t now_ns) noexcept;
   [[nodiscard]] std::int64_t newest_input_ns() const noexcept {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "algorithms/geometry/so3.hpp"
+
 namespace polygmap {
 namespace {
 
@@ -79,6 +81,15 @@ void Gait::judge_ground(const StateEstimate& state) noexcept {
   if (memory_.soft_ground) request_stop(StopReason::kGroundSoft);
 }
 
+// What stands in odometry by the attitude before is put where the corrected one has it: the robot has not moved.
+void Gait::take_turn(const StateEstimate& state) noexcept {
+  const Balance::Body body{state.odom_T_base, state.odom_v_base_mps, state.base_w_base_radps, state.q_rad};
+  const Vec2 odom_shift_m = balance_.turn(*robot_, body, state.odom_turned_rad);
+  const Transform& plan_T_base = plan_.plan_T_base();
+  plan_.place(joints_, {so3_exp(state.odom_turned_rad) * plan_T_base.R, plan_T_base.p_m});
+  plan_.shift_bias(odom_shift_m);
+}
+
 // It balances as it was met: joints, and the centre of mass over the soles. Until the estimate is calibrated nothing
 // else begins. Who stops here holds on until it is reset: an estimate that comes later starts nothing.
 void Gait::hold_upright(const GaitInput& in, JointCommand& command) noexcept {
@@ -86,6 +97,7 @@ void Gait::hold_upright(const GaitInput& in, JointCommand& command) noexcept {
   if (!placed_)
     plan_.place(joints_, in.usable ? in.state.odom_T_base : joints_.base_T_sole_reference(Foot::kLeft).inverse());
   placed_ = placed_ || in.usable;
+  if (!in.state.odom_turned_rad.isZero(0.0)) take_turn(in.state);
   plan_.observe_reference(*robot_, joints_.reference_rad(), balance_.odom_com_bias_m(), params_.bias_time_s);
   plan_.place(joints_, plan_.plan_T_base());
   add_torques(in.state, in.feedback, in.usable || in.mute, command);

@@ -53,6 +53,7 @@ class Gait {
   // Without one good reading the drives get no stiffness: there is nothing safe to ask of them.
   [[nodiscard]] bool try_arm(const JointFeedback& feedback) noexcept;
   void judge_ground(const StateEstimate& state) noexcept;
+  void take_turn(const StateEstimate& state) noexcept;
   void hold_upright(const GaitInput& in, JointCommand& command) noexcept;
   void advance(const GaitInput& in) noexcept;
   [[nodiscard]] Transition tick_state(const GaitInput& in, GaitShared& gait) noexcept;

@@ -29,6 +29,9 @@ struct StateEstimate {
   std::array<double, kFootCount> contact_probability{};
   std::array<double, kFootCount> foot_force_sigma_n{};  // of the joint feedback's; 0 or no number: not known
   Vec3 position_sigma_m = Vec3::Zero();                 // of world_p_base
+  // By which the IMU turned out to be mounted otherwise than it was taken to be: odom_T_base.R is turned by so much
+  // against that of the tick before, odometry axes, without any motion. 0 in all other ticks.
+  Vec3 odom_turned_rad = Vec3::Zero();
   double odom_sigma_m = 0.0;  // of odom_p_base along the axis that is known worst; grows with the way
   Vec3 velocity_sigma_mps = Vec3::Zero();
   double yaw_sigma_rad = 0.0;

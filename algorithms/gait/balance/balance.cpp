@@ -23,6 +23,11 @@ std::array<double, kFootCount> held_by(double pressed_n, const std::array<bool, 
   return {holds[0] / sum, holds[1] / sum};
 }
 
+Mat2 heading_of(const Mat3& odom_R_base) noexcept {
+  const Vec2 ahead = odom_R_base.col(0).head<2>().normalized();
+  return (Mat2() << ahead.x(), -ahead.y(), ahead.y(), ahead.x()).finished();
+}
+
 }  // namespace
 
 void Balance::reset() noexcept {
@@ -33,6 +38,16 @@ void Balance::reset() noexcept {
   odom_p_com_planned_m_.setZero();
   com_error_m_.setZero();
   slope_.setZero();
+}
+
+Vec2 Balance::turn(const RobotModel& robot, const Body& body, const Vec3& odom_turned_rad) noexcept {
+  const BodyFrames frames = body_frames(robot.legs, body.q_rad);
+  // The centre of mass above the soles, which rest: it is seen elsewhere now.
+  const Vec3 base_up_m = centre_of_mass_m(robot.masses, base_p_links_m(robot.masses, frames)) -
+                         0.5 * (frames[0].sole.p_m + frames[1].sole.p_m);
+  const Vec2 odom_shift_m = odom_turned_rad.cross(body.odom_T_base.R * base_up_m).head<2>();
+  bias_.shift(odom_shift_m, heading_of(body.odom_T_base.R));
+  return odom_shift_m;
 }
 
 Balance::Pendulum Balance::pendulum_of(const MassModel& masses, const BodyFrames& frames, const Body& body,
@@ -72,9 +87,7 @@ void Balance::observe_bias(const Params& params, const RobotModel& robot, const 
                            double tick_s) noexcept {
   if (++bias_tick_ < params.bias_ticks) return;
   bias_tick_ = 0;
-  const Vec2 ahead = body.odom_T_base.R.col(0).head<2>().normalized();
-  Mat2 odom_R_heading;
-  odom_R_heading << ahead.x(), -ahead.y(), ahead.y(), ahead.x();
+  const Mat2 odom_R_heading = heading_of(body.odom_T_base.R);
   Vec2 zmp_felt_m;
   if (!try_measure_zmp(params.zmp, robot, feedback, support.odom_T_sole, slope_, zmp_felt_m)) {
     bias_.missed(odom_R_heading);

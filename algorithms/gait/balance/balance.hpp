@@ -49,6 +49,9 @@ class Balance {
   };
 
   void reset() noexcept;
+  // Once, before the tick: the body's attitude was corrected by odom_turned_rad since the last one, and what is wrong
+  // of the centre of mass has changed with it. Returns by how much, odometry.
+  Vec2 turn(const RobotModel& robot, const Body& body, const Vec3& odom_turned_rad) noexcept;
   // One tick. feedback: rates, torques and forces on the feet, as measured. The plan frame is laid on the estimate by
   // the standing soles: an error of the base is what is fed back.
   [[nodiscard]] JointVector torques_nm(const Params& params, const RobotModel& robot, const Reference& reference,

@@ -58,6 +58,11 @@ class DcmBias {
     odom_bias_m_ = odom_R_heading * bias_m_;
     known_ = false;
   }
+  // What is estimated has jumped by so much and the true one has not, odometry: what estimates it was corrected.
+  void shift(const Vec2& odom_shift_m, const Mat2& odom_R_heading) noexcept {
+    bias_m_ += odom_R_heading.transpose() * odom_shift_m;
+    missed(odom_R_heading);
+  }
   // Estimated minus true, odometry.
   [[nodiscard]] const Vec2& odom_bias_m() const noexcept { return odom_bias_m_; }
 

@@ -75,6 +75,10 @@ void BodyPlan::correct(const StateEstimate& state, double correction_time_s) noe
                      plan_T_base_, correction_time_s);
 }
 
+void BodyPlan::shift_bias(const Vec2& odom_shift_m) noexcept {
+  base_com_bias_m_ += plan_T_base_.R.transpose() * Vec3{odom_shift_m.x(), odom_shift_m.y(), 0.0};
+}
+
 void BodyPlan::observe_reference(const RobotModel& robot, const JointVector& reference_rad, const Vec2& odom_com_bias_m,
                                  double bias_time_s) noexcept {
   // Evened out: neither the observer's steps nor those of the plan, when it is carried, may accelerate the links.

@@ -32,6 +32,8 @@ class BodyPlan {
   [[nodiscard]] bool try_lower(const HeldBodyParams& params) noexcept;
   void correct(const StateEstimate& state, double correction_time_s) noexcept;
   void correction_missed() noexcept { correction_.missed(); }
+  // The attitude was corrected: what the masses have too much of the centre of mass has changed by so much, at once.
+  void shift_bias(const Vec2& odom_shift_m) noexcept;
   // Once the tick's joint references are known: where they have the centre of mass, without what the masses have too
   // much of it.
   void observe_reference(const RobotModel& robot, const JointVector& reference_rad, const Vec2& odom_com_bias_m,

@@ -9,6 +9,8 @@
 namespace polygmap {
 namespace {
 
+using test::kTick_ns;
+
 constexpr double kTold = 1.2;  // by the drives, over what the legs need
 
 // Stands upright on both feet for `ticks`, without sensors of their forces.

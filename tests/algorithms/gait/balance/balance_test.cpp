@@ -32,5 +32,24 @@ TEST(Balance, FootThatHangs_DoesNotMoveThePlan) {
   EXPECT_GT(moved_m(100.0), 0.02);
   EXPECT_EQ(moved_m(std::nan("")), moved_m(100.0));  // without forces both count
 }
+
+TEST(Balance, AttitudeIsCorrected_CentreOfMassIsOffByAsMuchAsItIsSeenElsewhereAboveTheSoles) {
+  const JointVector q_rad = bent_q_rad();
+  const BodyFrames frames = body_frames({}, q_rad);
+  const Vec3 base_p_com_m = centre_of_mass_m({}, base_p_links_m({}, frames));
+  const Vec3 base_p_soles_m = 0.5 * (frames[0].sole.p_m + frames[1].sole.p_m);
+  for (const Vec3& turned_rad : {Vec3{0.0, 0.035, 0.0}, Vec3{-0.02, 0.01, 0.0}}) {
+    const Mat3 before_R = rotation_z(0.8) * rotation_y(0.05);
+    Balance::Body body;
+    body.odom_T_base.R = rotation_zyx(0.0, turned_rad.y(), turned_rad.x()) * before_R;
+    body.q_rad = q_rad;
+    Balance balance;
+    const Vec2 shift_m = balance.turn(nominal_robot(), body, turned_rad);
+    const Vec2 seen_m = ((body.odom_T_base.R - before_R) * (base_p_com_m - base_p_soles_m)).head<2>();
+    EXPECT_GT(seen_m.norm(), 0.01);
+    EXPECT_LT((shift_m - seen_m).norm(), 0.8e-3);
+    EXPECT_LT((balance.odom_com_bias_m() - seen_m).norm(), 0.8e-3);
+  }
+}
 }  // namespace
 }  // namespace polygmap

@@ -63,6 +63,22 @@ TEST(DcmBias, RobotThatTurns_BiasTurnsWithIt) {
   EXPECT_LT((pendulum.observer.odom_bias_m() - Vec2{0.0, 0.01}).norm(), 0.5e-3);
 }
 
+// The attitude of a robot that was balanced by a wrong one is corrected: the body stays where it was.
+TEST(DcmBias, EstimateIsCorrectedAndTheBiasToldOfIt_NothingMoves) {
+  BiasedPendulum pendulum{{0.026, -0.004}, 0.7};
+  pendulum.run(10.0);
+  BiasedPendulum untold = pendulum;
+  const Vec2 shift_m{-0.026, 0.004};
+  pendulum.observer.shift(shift_m, rotation_z(pendulum.heading_rad).topLeftCorner<2, 2>());
+  pendulum.bias_m += shift_m;
+  EXPECT_LT(pendulum.observer.odom_bias_m().norm(), 0.5e-3);
+  pendulum.run(0.3);
+  EXPECT_LT(pendulum.x_m.norm(), 1e-3);
+  untold.bias_m += shift_m;
+  untold.run(0.3);
+  EXPECT_GT(untold.x_m.norm(), 0.01);
+}
+
 TEST(DcmBias, Push_IsNoBias) {
   BiasedPendulum pendulum{{0.005, 0.005}, 0.0};
   pendulum.push_mps = {0.0, 10.0 / MassModel{}.total_kg()};
