@@ -80,7 +80,7 @@ inline constexpr std::array kStopReasonTable{
     StopReasonInfo{"not_lined_up", "it did not come to stand straight before the stairs"},
     StopReasonInfo{"ground_missing", "there was no ground where a foot came down, and it put the foot back"},
     StopReasonInfo{"toppling", "its body kept toppling towards the foot it lifted, and it put every one back"},
-    StopReasonInfo{"ground_soft", "the ground gave way under its soles where it stood"},
+    StopReasonInfo{"ground_soft", "its soles turned against each other where it stood, on soft ground or by play in its joints"},
     StopReasonInfo{"state_stale", "its IMU or its joints fell silent"},
     StopReasonInfo{"operator", "it was asked to"},
     StopReasonInfo{"drive_error", "a drive told of an error"},
