@@ -86,10 +86,11 @@ void declare_reality(CLI::App& climb, ClimbArguments& a) {
   a.options.reality_scale = 1.0;
   keep_within(
       *climb
-           .add_option("--reality", a.options.reality_scale,
-                       "How far the robot and its sensors are from the data sheet: 0 as it says, 1 as real ones "
-                       "are, 2 twice as bad; drawn by the seed, see docs/reference/reality.md. Without it, with --plant "
-                       "kinematic, 0")
+           .add_option(
+               "--reality", a.options.reality_scale,
+               "How far the robot and its sensors are from the data sheet: 0 as it says, 1 as real ones "
+               "are, 2 twice as bad; drawn by the seed, see docs/reference/reality.md. Without it, with --plant "
+               "kinematic, 0")
            ->capture_default_str(),
       0.0, 2.0);
   climb
