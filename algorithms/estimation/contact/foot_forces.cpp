@@ -40,7 +40,7 @@ FootForces::Weighed FootForces::sense(Sensor& sensor, double read_n, const Weigh
   sensor.last_n = read_n;
   if (hangs) {
     learn_zero(sensor, read_n, params_.zero_in_air_sigma_n, dt_s);
-  } else if (observed.weight_pn2 > 0.0) {
+  } else if (observed.weight_pn2 > 0.0 && torque_scale_.is_settled(params_.torque_scale)) {
     learn_zero(sensor, read_n - observed.force_n, params_.zero_by_torque_sigma_n, dt_s);
   }
   return {read_n - sensor.zero_n, 1.0 / (math::square(sensor.noise_n.sigma()) + sensor.zero_variance_n2)};

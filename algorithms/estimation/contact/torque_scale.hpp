@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "algorithms/core/math/math.hpp"
 
@@ -15,12 +16,16 @@ class TorqueScale {
   struct Params {
     double time_s = 2.0;
     double begin_s = 0.1;
+    double unsure = 0.05;
     double most = 0.3;
     double pressed_n = 60.0;
 
     static void visit(auto& p, auto& field) {
       field("time_s", p.time_s, 0.05, 60.0, "The felt weight is averaged over so long.");
       field("begin_s", p.begin_s, 0.01, 10.0, "In the beginning over the time since then, and this.");
+      field("unsure", p.unsure, 0.001, 0.3,
+            "The felt weight is wrong itself by this share, 3 to 5 % too low by the observed force's damping: what "
+            "differs by less changes nothing, what differs by twice as much counts in full.");
       field("most", p.most, 0.0, 0.5, "It differs from what the masses make by no more than this share.");
       field("pressed_n", p.pressed_n, 1.0, 500.0, "The weight is felt while both feet are pressed by more than this.");
     }
@@ -32,11 +37,17 @@ class TorqueScale {
     if (!(share > 0.5 && share < 2.0)) return;  // it is pushed, falls or hangs
     seen_s_ = std::min(seen_s_ + dt_s, params.time_s);
     const double gain = dt_s / std::min(params.begin_s + seen_s_, params.time_s);
-    scale_ = math::clamp(scale_ + gain * (share - scale_), 1.0 - params.most, 1.0 + params.most);
+    felt_share_ += gain * (share - felt_share_);
+    const double off = felt_share_ - 1.0;
+    const double counts = math::clamp(std::abs(off) / params.unsure - 1.0, 0.0, 1.0);
+    scale_ = 1.0 + math::clamp(counts * off, -params.most, params.most);
   }
   [[nodiscard]] double scale() const noexcept { return scale_; }
+  // It has followed the felt weight for a while.
+  [[nodiscard]] bool is_settled(const Params& params) const noexcept { return seen_s_ >= 4.0 * params.begin_s; }
 
  private:
+  double felt_share_ = 1.0;
   double scale_ = 1.0;
   double seen_s_ = 0.0;
 };

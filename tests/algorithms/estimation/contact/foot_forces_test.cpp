@@ -110,7 +110,7 @@ TEST_F(FootForcesTest, NoisySensor_TheForceIsLessNoisy) {
     const double up_n = tick({270.0, 270.0}, {sensed_n, 270.0})[0];
     if (i > kTicks / 2) off_n2 += math::square(up_n - 270.0) / (0.5 * kTicks);
   }
-  EXPECT_LT(std::sqrt(off_n2), 0.6 * 20.0);
+  EXPECT_LT(std::sqrt(off_n2), 0.85 * 20.0) << "5 % of 270 N of it by the observed force's damping";
 }
 
 TEST_F(FootForcesTest, AFewNewtons_AreNoForceWhereOnlyTorquesTellThem) {

@@ -36,6 +36,14 @@ TEST(TorqueScale, HeavierThanIsBelieved_StopsAtTheBound) {
   EXPECT_DOUBLE_EQ(torques.scale(), 1.0 + kParams.most);
 }
 
+TEST(TorqueScale, WeightWithinItsOwnError_ChangesNothing) {
+  TorqueScale torques;
+  for (const double times : {1.0 - 0.9 * kParams.unsure, 1.0 + 0.9 * kParams.unsure}) {
+    feel(torques, times, 2000);
+    EXPECT_DOUBLE_EQ(torques.scale(), 1.0) << times;
+  }
+}
+
 TEST(TorqueScale, ForcesThatAreNoWeight_ChangeNothing) {
   TorqueScale torques;
   for (const double felt_n : {0.0, 100.0, 5000.0, -540.0, std::numeric_limits<double>::quiet_NaN(),
