@@ -76,7 +76,6 @@ SimRobot::SimRobot(const SimOptions& options)
       start_(options.start.value_or(draw_start(options.seed))),
       error_params_(options.errors),
       errors_(draw_errors(options.errors, options.seed)),
-      lio_silent_(options.lio_silent),
       pushes_(options.pushes),
       holder_(stand_controller(options.mujoco)),
       plant_(make_plant(options, stairs_, errors_, start_, holder_)),
@@ -127,7 +126,7 @@ void SimRobot::sense() {
                                           {truth_.true_T_sole[0].p_m.z(), truth_.true_T_sole[1].p_m.z()}, kPlantTick_s);
   if (!force_sensors_) feedback_.foot_force_n.fill(std::numeric_limits<double>::quiet_NaN());
   feedback_fresh_ = true;
-  if (clock_.tick() % kLioPeriod_ticks == 0 && !any_contains(lio_silent_, now_ns) && !lio_.is_out(now_ns)) {
+  if (clock_.tick() % kLioPeriod_ticks == 0 && !lio_.is_out(now_ns)) {
     lio_queue_.push_overwrite(lio_.sample(plant_->true_T_base(), now_ns));
   }
   camera_.tick(clock_.tick(), truth_.true_T_base, truth_.base_legs);

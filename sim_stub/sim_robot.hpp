@@ -49,7 +49,6 @@ struct SimOptions {
   DepthCameraOptions camera;
   std::int64_t imu_interval_ns = VirtualClock::kTick_ns;  // from one sample to the next, no less than a tick
   bool force_sensors = true;                              // false: no foot force is measured, NaN
-  std::vector<Window> lio_silent;                         // poses stamped then never arrive
   PlantKind plant_kind = PlantKind::kKinematic;
   KinematicPlant::Params plant;
   MujocoPlant::Params mujoco;
@@ -104,7 +103,6 @@ class SimRobot final : public hal::Clock,
   StartPose start_;
   ErrorParams error_params_;
   RobotErrors errors_;
-  std::vector<Window> lio_silent_;
   std::vector<Push> pushes_;
   VirtualClock clock_;
   StandController holder_;  // until the module's first command that asks something of a drive

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/nominal_robot.hpp"
+#include "tests/support/standing_torques.hpp"
 #include "tests/support/ticks.hpp"
 
 namespace polygmap {
@@ -14,21 +15,11 @@ using test::kTick_ns;
 constexpr double kTold = 1.2;  // by the drives, over what the legs need
 
 // Stands upright on both feet for `ticks`, without sensors of their forces.
-void stand(LegSensing& sensing, const RobotModel& robot, int ticks) {
+void stand(LegSensing& sensing, int ticks) {
   const Vec3 up = Vec3::UnitZ();
-  JointFeedback joints;
+  JointFeedback joints = test::standing_on_both(up, 0.5);
   joints.foot_force_n.fill(test::kNaN);
-  const double half_n = 0.5 * robot.masses.total_kg() * kGravity_mps2;
-  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    LegVector q_rad;
-    q_rad << 0.0, 0.0, -0.4, 0.8, -0.4, 0.0;
-    const auto at = static_cast<Eigen::Index>(joint_index(leg, 0));
-    joints.q_rad.segment<6>(at) = q_rad;
-    std::array<Vec3, kJointsPerLeg> specific_mps2;
-    specific_mps2.fill(-kGravity_mps2 * up);
-    joints.tau_nm.segment<6>(at) = kTold * leg_torques_nm(robot.masses, leg, leg_frames(robot.legs, leg, q_rad),
-                                                          specific_mps2, {half_n * up, Vec3::Zero()});
-  }
+  joints.tau_nm *= kTold;
   ImuSample base;
   base.accel_mps2 = kGravity_mps2 * up;
   for (int i = 0; i < ticks; ++i) {
@@ -41,7 +32,7 @@ TEST(LegSensing, DrivesOfTooLittleTorque_AreReadAndAskedInTheLegsTorques) {
   const RobotModel robot = nominal_robot();
   LegSensing sensing;
   sensing.reset({}, robot);
-  stand(sensing, robot, 1000);
+  stand(sensing, 1000);
   EXPECT_NEAR(sensing.torque_scale(), kTold, 0.05 * kTold) << "of which the damping of the observed force takes most";
 
   JointCommand command;

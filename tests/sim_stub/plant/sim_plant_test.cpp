@@ -473,7 +473,8 @@ TEST(SimLio, Poses_ArriveLateInTheirOwnWorldWithTheirNoise) {
   SimOptions options = ideal();
   options.errors = {};
   options.seed = 9;
-  options.lio_silent = {{VirtualClock::kStart_ns + 2 * kNsPerS, VirtualClock::kStart_ns + 3 * kNsPerS}};
+  options.errors.lio_outage_from_s = seconds(VirtualClock::kStart_ns) + 2.0;
+  options.errors.lio_outage_s = 1.0;
   SimRobot robot(options);
   int count = 0;
   std::int64_t last_ns = VirtualClock::kStart_ns - 100 * kNsPerMs, longest_ns = 0;
