@@ -38,7 +38,7 @@ class SpanBoundaries {
     double meet_px = 2.0;
     double meet_gain = 1.0;
     std::int32_t window_px = 6;
-    std::int32_t max_gap_px = 24;
+    std::int32_t max_gap_px = 40;
     std::int32_t min_gap_rows = 3;
     std::int32_t max_empty_rows = 3;
     std::int32_t beside_px = 4;

@@ -261,7 +261,7 @@ void EdgeLineFinder::add_face(std::int32_t column, std::int32_t from_row, std::i
 
 bool EdgeLineFinder::try_group_point(const Group& group, Vec2& point_m, double& half_gap_m) noexcept {
   ChangePoint<double> point{0.0, 0.0, -1.0};
-  for (std::int32_t i = 0; i < kOffsets; ++i) {
+  for (std::int32_t i = kMaxWindow_px - params_.window_px; i <= kMaxWindow_px + params_.window_px; ++i) {
     point.add(static_cast<double>(group.gain[static_cast<std::size_t>(i)]), i);
   }
   // At the window's ends nothing was compared.
@@ -269,7 +269,7 @@ bool EdgeLineFinder::try_group_point(const Group& group, Vec2& point_m, double& 
   if (at <= kMaxWindow_px - params_.window_px || at + 2 > kMaxWindow_px + params_.window_px) return false;
   half_gap_m = 0.0;
   const std::int32_t near_rows = 2 * (params_.max_gap_px / 2);
-  if (group.seen_rows <= static_cast<float>(group.columns * near_rows)) {
+  if (gap_tried_ || group.seen_rows <= static_cast<float>(group.columns * near_rows)) {
     Gap gap;
     const GapFound found = find_gap(group, at, gap);
     if (found == GapFound::kOutside) return false;

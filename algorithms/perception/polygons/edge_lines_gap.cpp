@@ -8,7 +8,7 @@ namespace polygmap {
 namespace {
 
 // A gap of more rows leaves too few to either side in the widest window.
-constexpr std::int32_t kMostGap_px = 24;
+constexpr std::int32_t kMostGap_px = 40;
 // The guess ends a label, which goes on to where the planes meet or stops where the depths do: either is next to the
 // gap.
 constexpr std::int32_t kBesideGuess_px = 4;
