@@ -65,11 +65,22 @@ void CameraExtrinsicsEstimator::update(const SurfaceFrame& frame, const Stance& 
   last_ns_ = frame.stamp_ns;
   learn_x(stance, dt_s);
   const Level level = level_of(stance);
-  if (try_learn_tilt(frame, level, dt_s)) learn_height(frame, stance, level, dt_s);
+  if (try_learn_tilt(frame, stance, level, dt_s)) learn_height(frame, stance, level, dt_s);
   place(level.up);
 }
 
-bool CameraExtrinsicsEstimator::try_learn_tilt(const SurfaceFrame& frame, const Level& level, double dt_s) noexcept {
+Vec3 CameraExtrinsicsEstimator::camera_p_sole(const Stance& stance, std::size_t foot) const noexcept {
+  return base_T_camera_.R.transpose() * (stance.base_T_sole[foot].p_m - nominal_.p_m);
+}
+
+bool CameraExtrinsicsEstimator::stands_on(const SurfacePatch& patch, const Vec3& camera_p_sole,
+                                          double& above_m) const noexcept {
+  above_m = patch.normal.dot(camera_p_sole) + patch.d_m;
+  return std::abs(above_m - height_m_) <= params_.height_gate_m;
+}
+
+bool CameraExtrinsicsEstimator::try_learn_tilt(const SurfaceFrame& frame, const Stance& stance, const Level& level,
+                                               double dt_s) noexcept {
   Vec2 sum = Vec2::Zero();
   double weights = 0.0;
   for (const SurfacePatch& patch : frame.surfaces) {
@@ -78,7 +89,13 @@ bool CameraExtrinsicsEstimator::try_learn_tilt(const SurfaceFrame& frame, const 
       ++counters_.rejected_surfaces;
       continue;
     }
-    const double weight = 1.0 / (math::square(patch.tilt_sigma_rad) + math::square(params_.systematic_tilt_rad));
+    bool stood_on = false;
+    double above_m = 0.0;
+    for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+      stood_on = stood_on || (level.flat[foot] && stands_on(patch, camera_p_sole(stance, foot), above_m));
+    }
+    const double own_rad = stood_on ? params_.systematic_tilt_rad : params_.treads_tilt_rad;
+    const double weight = 1.0 / (math::square(patch.tilt_sigma_rad) + math::square(own_rad));
     sum += weight * (nominal_.R * patch.normal).cross(level.up).head<2>();
     weights += weight;
   }
@@ -106,8 +123,8 @@ bool CameraExtrinsicsEstimator::try_height(const SurfaceFrame& frame, const Vec3
   double largest_m2 = 0.0;
   for (const SurfacePatch& patch : frame.surfaces) {
     if (!says_level(patch) || !usable(patch) || !near_level(patch, up) || !(patch.area_m2 > largest_m2)) continue;
-    const double above_m = patch.normal.dot(camera_p_sole) + patch.d_m;
-    if (std::abs(above_m - height_m_) > params_.height_gate_m) continue;
+    double above_m = 0.0;
+    if (!stands_on(patch, camera_p_sole, above_m)) continue;
     largest_m2 = patch.area_m2;
     height_m = above_m;
   }
@@ -120,9 +137,8 @@ void CameraExtrinsicsEstimator::learn_height(const SurfaceFrame& frame, const St
   int soles = 0;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     if (!level.flat[foot]) continue;
-    const Vec3 camera_p_sole = base_T_camera_.R.transpose() * (stance.base_T_sole[foot].p_m - nominal_.p_m);
     double height_m = 0.0;
-    if (!try_height(frame, camera_p_sole, level.up, height_m)) continue;
+    if (!try_height(frame, camera_p_sole(stance, foot), level.up, height_m)) continue;
     sum_m += height_m;
     ++soles;
   }

@@ -52,6 +52,9 @@ class CameraExtrinsicsEstimator {
     // Of a surface, added to its sigma. Those below 2 mrad err by 1.0 to 1.5, vaguer ones by what they say, and the
     // same in every frame: with 3 mrad three treads ahead, 8 mrad off, outvoted the floor (seed 64).
     double systematic_tilt_rad = 0.001;
+    // Of a surface that no sole stands on, against the one that they do: the treads of a flight slope as they like. As
+    // much as the robot climbs.
+    double treads_tilt_rad = 0.02;
     double max_sole_tilt_rad = 3.0 * kPi / 180.0;  // from gravity: more, and the foot does not stand flat
     double longest_step_s = 0.1;
     double frames_alike = 20.0;
@@ -81,6 +84,8 @@ class CameraExtrinsicsEstimator {
       field("max_tilt_sigma_rad", p.max_tilt_sigma_rad, 1e-4, 1.0,
             "Vaguer surfaces say only what gravity told the fit before.");
       field("systematic_tilt_rad", p.systematic_tilt_rad, 0.0, 0.1, "A surface's tilt errs by this besides its sigma.");
+      field("treads_tilt_rad", p.treads_tilt_rad, 0.0, 0.2,
+            "A surface that no sole stands on slopes by this against the one that they stand on.");
       field("max_sole_tilt_rad", p.max_sole_tilt_rad, 0.001, 0.5,
             "A foot tilted farther from gravity does not stand flat.");
       field("longest_step_s", p.longest_step_s, 0.001, 10.0, "What was learnt fades by no more from frame to frame.");
@@ -151,8 +156,12 @@ class CameraExtrinsicsEstimator {
   [[nodiscard]] bool says_level(const SurfacePatch& patch) const noexcept;
   [[nodiscard]] bool near_level(const SurfacePatch& patch, const Vec3& up) const noexcept;
   // False when no surface says anything.
-  [[nodiscard]] bool try_learn_tilt(const SurfaceFrame& frame, const Level& level, double dt_s) noexcept;
+  [[nodiscard]] bool try_learn_tilt(const SurfaceFrame& frame, const Stance& stance, const Level& level,
+                                    double dt_s) noexcept;
   void learn_height(const SurfaceFrame& frame, const Stance& stance, const Level& level, double dt_s) noexcept;
+  [[nodiscard]] Vec3 camera_p_sole(const Stance& stance, std::size_t foot) const noexcept;
+  // By how much a sole seems to lie above the surface, and whether that can be what it stands on.
+  [[nodiscard]] bool stands_on(const SurfacePatch& patch, const Vec3& camera_p_sole, double& above_m) const noexcept;
   // How far a sole lies above the largest surface that can be what it stands on; false when there is none.
   [[nodiscard]] bool try_height(const SurfaceFrame& frame, const Vec3& camera_p_sole, const Vec3& up,
                                 double& height_m) const noexcept;
