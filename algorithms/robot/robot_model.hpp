@@ -129,6 +129,9 @@ struct DriveModel {
   std::array<GainLimits, kJointCount> gain_limits{};
   std::array<double, kJointsPerLeg> kp_nmprad{400, 400, 400, 400, 120, 120};
   std::array<double, kJointsPerLeg> kd_nmsprad{10, 10, 10, 10, 4, 4};
+  // A robot that nobody balances topples about its ankles with 430 Nm/rad, more than kp_nmprad resists. Common drives
+  // can be told no more than this.
+  std::array<double, kJointsPerLeg> kp_blind_nmprad{500, 500, 500, 500, 500, 500};
   std::array<double, kJointsPerLeg> kp_most_nmprad{10000, 10000, 10000, 10000, 10000, 10000};
   std::array<double, kJointsPerLeg> kd_most_nmsprad{1000, 1000, 1000, 1000, 1000, 1000};
   double delay_s = 0.003;
@@ -139,8 +142,10 @@ struct DriveModel {
   }
   // Times as stiff as standing, and no stiffer than the drive may be.
   [[nodiscard]] constexpr double kp_of(std::size_t n, double times = 1.0) const noexcept {
-    const std::size_t j = n % kJointsPerLeg;
-    return std::min({times * kp_nmprad[j], kp_most_nmprad[j], gain_limits[n].kp_nmprad});
+    return within_kp(n, times * kp_nmprad[n % kJointsPerLeg]);
+  }
+  [[nodiscard]] constexpr double kp_blind_of(std::size_t n) const noexcept {
+    return std::max(within_kp(n, kp_blind_nmprad[n % kJointsPerLeg]), kp_of(n));
   }
   [[nodiscard]] constexpr double kd_of(std::size_t n, double times = 1.0) const noexcept {
     return std::min(wanted_kd(n, times), gain_limits[n].kd_nmsprad);
@@ -157,6 +162,8 @@ struct DriveModel {
     field("limits", p.limits, kJointNames);
     field("kp_nmprad", p.kp_nmprad, 0.0, 10000.0, "Stiffness of either leg's drives, standing.");
     field("kd_nmsprad", p.kd_nmsprad, 0.0, 1000.0, "Damping of either leg's drives, standing.");
+    field("kp_blind_nmprad", p.kp_blind_nmprad, 0.0, 10000.0,
+          "Stiffness of a standing leg's drives while IMU or joints are silent and nobody balances.");
     field("kp_most_nmprad", p.kp_most_nmprad, 0.0, 10000.0,
           "No command asks either leg's drives for more stiffness, in a swing least of all.");
     field("kd_most_nmsprad", p.kd_most_nmsprad, 0.0, 1000.0, "No command asks either leg's drives for more damping.");
@@ -166,6 +173,9 @@ struct DriveModel {
   }
 
  private:
+  [[nodiscard]] constexpr double within_kp(std::size_t n, double wanted_nmprad) const noexcept {
+    return std::min({wanted_nmprad, kp_most_nmprad[n % kJointsPerLeg], gain_limits[n].kp_nmprad});
+  }
   [[nodiscard]] constexpr double wanted_kd(std::size_t n, double times) const noexcept {
     return std::min(times * kd_nmsprad[n % kJointsPerLeg], kd_most_nmsprad[n % kJointsPerLeg]);
   }

@@ -66,15 +66,14 @@ std::string fault_name(const testing::TestParamInfo<FaultCase>& info) {
   return std::string(single_step ? "ss_" : "ds_") + fault.name + "_" + moment.name + gains.name;
 }
 
-// Known to fall, as of 2026-11-27. Drives that are sent nothing hold the torques of their last command, whatever the
-// body does. And on the way up to the other foot's tread, its knee straightening, the body needs its balance, as it
-// does just after a foot left. All are climbs of one seed: which of the blind ones fall changes with the code.
-bool falls(bool single_step, std::string_view fault, std::string_view moment, bool soft) {
-  if (fault == "commands_refused") return true;
-  if (soft && fault == "joints_silent" && moment == "swing1_high") return true;
-  if (single_step && fault == "joints_silent" && moment == "swing2_high") return true;
-  const bool blind = fault == "joints_silent" || fault == "imu_silent";
-  return blind && (moment == "swing2_early" || (moment == "swing1_early" && !single_step));
+bool is_blind(std::string_view fault) { return fault == "joints_silent" || fault == "imu_silent"; }
+
+// Known to fall, as of 2026-11-27. Drives that are sent nothing go on with the law of their last command, stiffness,
+// damping and torque, and that stiffness does not hold up a body that nobody balances. Nor does any that a KUAVO's
+// drives take, when it is blind. All are climbs of one seed: 2; of seeds 2 to 4, 5 of 96 blind ones fall.
+bool falls(std::string_view fault, std::string_view moment, bool soft) {
+  if (fault == "commands_refused" || (soft && is_blind(fault))) return true;
+  return fault == "imu_silent" && moment == "swing2_early";
 }
 
 class FaultTable : public testing::TestWithParam<FaultCase> {};
@@ -126,14 +125,14 @@ TEST_P(FaultTable, EndsInItsStateWithinItsTime_OnBothFeet) {
     (void)climb.tick();
     if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.command());
   } while (!is_over() && !climb.truth().fell && climb.time_s() - begun_s < 10.0);
-  const bool may_fall = falls(single_step, fault.name, moment.name, gains.name[0] != '\0');
+  const bool may_fall = falls(fault.name, moment.name, gains.name[0] != '\0');
   // One that leans so far sinks on its damped joints, and the plant may call that a fall seconds later.
   const auto fell = [&] { return climb.truth().fell || climb.state() == ModuleState::kFallen; };
   if (!fell()) {
     EXPECT_EQ(name_of(climb.state()), name_of(fault.ends_as));
     EXPECT_LE(climb.time_s() - begun_s, fault.within_s);
   }
-  climb.run_on(2.0);
+  climb.run_on(is_blind(fault.name) ? 6.0 : 2.0);  // what nobody balances topples slowly at first
   if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.command());
   EXPECT_EQ(beyond, "");
   EXPECT_EQ(fell(), may_fall) << climb.truth().fall_reason;

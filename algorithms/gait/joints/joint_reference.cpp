@@ -111,6 +111,12 @@ void JointReference::add_damping(const std::array<bool, kFootCount>& stands, con
   }
 }
 
+void JointReference::stiffen_blind(const std::array<bool, kFootCount>& stands, JointCommand& command) const noexcept {
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (stands[n / kJointsPerLeg]) command.joints[n].kp_nmprad = robot_->drives.kp_blind_of(n);
+  }
+}
+
 void JointReference::hold(JointCommand& command) const noexcept {
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const DriveModel& drives = robot_->drives;

@@ -45,6 +45,8 @@ class JointReference {
   // gets no such torque.
   void add_damping(const std::array<bool, kFootCount>& stands, const JointFeedback& feedback,
                    const JointCommand& command, JointVector& torque_nm) const noexcept;
+  // Of a command that nobody balances: standing legs as stiff as hold the robot up. stands: as follow() was given it.
+  void stiffen_blind(const std::array<bool, kFootCount>& stands, JointCommand& command) const noexcept;
   // Repeats the last joint angles, at rest.
   void hold(JointCommand& command) const noexcept;
   [[nodiscard]] const JointVector& reference_rad() const noexcept { return reference_rad_; }

@@ -78,6 +78,19 @@ TEST_F(JointReferenceTest, GainsBeyondTheRobotsLimits_AreNeverCommanded) {
   expect_within();
   (void)reference.follow(base_T_sole_, {true, false}, command_);
   expect_within();
+  reference.stiffen_blind({true, true}, command_);
+  expect_within();
+}
+
+TEST_F(JointReferenceTest, NobodyBalances_StandingLegsAloneAreStiffer) {
+  (void)reference_.follow(base_T_sole_, {true, false}, command_);
+  const JointCommand balanced = command_;
+  reference_.stiffen_blind({true, false}, command_);
+  for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
+    EXPECT_EQ(command_.joints[j].kp_nmprad, nominal_robot().drives.kp_blind_nmprad[j]);
+    EXPECT_GT(command_.joints[j].kp_nmprad, balanced.joints[j].kp_nmprad);
+    EXPECT_EQ(command_.joints[kJointsPerLeg + j].kp_nmprad, balanced.joints[kJointsPerLeg + j].kp_nmprad);
+  }
 }
 
 // What the module adds to the torques of standing left and swinging right leg, whose joints all turn 0.1 rad/s too
