@@ -102,10 +102,10 @@ struct StepTry {
   double toe_down_rad = 0.0;  // half of it on the floor
   double longer = 1.0;        // the swing
 };
-inline constexpr std::size_t kStepTryCount = 7;
+inline constexpr std::size_t kStepTryCount = 8;
 using StepTries = std::array<StepTry, kStepTryCount>;
-inline constexpr StepTries kStepTries{{{0.3}, {0.2}, {0.4}, {0.1}, {0.5}, {0.3, 1.15}, {0.2, 1.15}}};
-inline constexpr StepTries kPassingTries{{{0.4}, {0.5}, {0.3}, {0.6}, {0.2}, {0.4, 1.15}, {0.5, 1.15}}};
+inline constexpr StepTries kStepTries{{{0.3}, {0.2}, {0.4}, {0.1}, {0.5}, {0.3, 1.15}, {0.2, 1.15}, {0.4, 1.15}}};
+inline constexpr StepTries kPassingTries{{{0.4}, {0.5}, {0.3}, {0.6}, {0.2}, {0.4, 1.15}, {0.5, 1.15}, {0.3, 1.15}}};
 
 struct StepPlan {
   StepGoal goal;

@@ -89,7 +89,7 @@ bool CameraExtrinsicsEstimator::try_learn_tilt(const SurfaceFrame& frame, const 
       ++counters_.rejected_surfaces;
       continue;
     }
-    bool stood_on = false;
+    bool stood_on = !level.by_soles();  // where none stands flat, all surfaces are alike
     double above_m = 0.0;
     for (std::size_t foot = 0; foot < kFootCount; ++foot) {
       stood_on = stood_on || (level.flat[foot] && stands_on(patch, camera_p_sole(stance, foot), above_m));
