@@ -200,11 +200,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 11689214675528431458U);
-  EXPECT_EQ(hashes.gait.value(), 17525522911526964829U);
-  EXPECT_EQ(hashes.commands.value(), 137298381970484661U);
-  EXPECT_EQ(hashes.surfaces.value(), 14226978360009351294U);
-  EXPECT_EQ(hashes.map.value(), 4748262824326141400U);
+  EXPECT_EQ(hashes.estimates.value(), 16597667750185879478U);
+  EXPECT_EQ(hashes.gait.value(), 9006052142305674664U);
+  EXPECT_EQ(hashes.commands.value(), 14669972244582513227U);
+  EXPECT_EQ(hashes.surfaces.value(), 13626793572632778257U);
+  EXPECT_EQ(hashes.map.value(), 1587180584710157660U);
 }
 
 }  // namespace

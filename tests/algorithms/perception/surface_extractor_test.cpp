@@ -138,6 +138,43 @@ TEST_P(StairNoise, Stairs_RisesYawsAndNosings_TreadsNosingsAndBackLinesAreExact)
   EXPECT_EQ(nosings, 8);
   EXPECT_GE(backs, 5);
 }
+// A strip of 70 mm along the first nosing has no depth; how many rows that is in the middle of the picture.
+int blank_first_nosing(const DepthScene& scene, const StairSpec& stairs, DepthPicture& picture) {
+  const CameraIntrinsics& k = scene.intrinsics;
+  const Vec3& eye_m = scene.world_T_camera.p_m;
+  int rows = 0;
+  for (int r = 0; r < k.height_px; ++r) {
+    for (int c = 0; c < k.width_px; ++c) {
+      const Vec3 ray = scene.world_T_camera.R * Vec3{(c - k.cx_px) / k.fx_px, (r - k.cy_px) / k.fy_px, 1.0};
+      const double behind_m = eye_m.x() + ray.x() * (stairs.rise_m - eye_m.z()) / ray.z() - stairs.first_riser_x_m;
+      if (behind_m < 0.0 || behind_m > 0.07) continue;
+      picture
+          .depth_m[static_cast<std::size_t>(r) * static_cast<std::size_t>(k.width_px) + static_cast<std::size_t>(c)] =
+          0.0;
+      rows += c == k.width_px / 2 ? 1 : 0;
+    }
+  }
+  return rows;
+}
+
+TEST_P(StairNoise, WideStripWithoutDepth_TreadKeepsItsNosing) {
+  StairSpec stairs;
+  stairs.rise_m = 0.165;
+  const DepthScene scene = stair_scene(stairs);
+  DepthPicture picture = test::render(scene);
+  test::add_noise(picture, {.correlated = GetParam()}, 5);
+  const int rows = blank_first_nosing(scene, stairs, picture);
+  EXPECT_GT(rows, 28);
+  EXPECT_LT(rows, 40);
+  Extraction extraction;
+  const SurfaceFrame* frame = extraction.run_raw(scene, picture.raw());
+  ASSERT_NE(frame, nullptr);
+  const SurfacePatch* tread = tread_at(*frame, scene, stairs.rise_m);
+  ASSERT_NE(tread, nullptr);
+  ASSERT_TRUE(tread->nosing.valid);
+  EXPECT_LT(line_error_m(scene, tread->nosing, stairs.first_riser_x_m), 0.004);
+}
+
 INSTANTIATE_TEST_SUITE_P(WhiteAndCorrelated, StairNoise, ::testing::Bool());
 
 TEST(SurfaceExtractor, Dropouts_OneToThirtyPercent_LoseNoTread) {

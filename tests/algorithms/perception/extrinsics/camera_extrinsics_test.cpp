@@ -190,6 +190,24 @@ TEST(CameraExtrinsicsEstimator, FloorThenNarrowTreadsForTwentySeconds_FloorIsNot
   EXPECT_GT(std::abs(treads_only.pitch_rad()), 0.007);  // where they are all there is, they count
 }
 
+// Treads of a flight slope each by itself, and a large one or a landing is seen well. The floor that the soles stand on
+// is as level as they are.
+TEST(CameraExtrinsicsEstimator, SlopingTreadsAhead_WellSeen_DoNotTiltTheCamera) {
+  CameraExtrinsicsEstimator mount = estimator();
+  Robot robot(0.0, 1.0 * kDegree, Vec3::Zero());
+  for (int i = 0; i < 90; ++i) {
+    robot.see(0.0);
+    robot.see(0.15, 1.5 * kDegree);
+    robot.deliver(mount);
+  }
+  EXPECT_NEAR(mount.pitch_rad(), 1.0 * kDegree, 0.1 * kDegree);
+  for (int i = 0; i < 300; ++i) {
+    robot.see(0.15, 1.5 * kDegree);
+    robot.deliver(mount);
+  }
+  EXPECT_NEAR(mount.pitch_rad(), 1.0 * kDegree, 0.1 * kDegree);
+}
+
 TEST(CameraExtrinsicsEstimator, OneBadFrame_MovesItByLittle) {
   CameraExtrinsicsEstimator mount = estimator();
   Robot robot(0.0, 0.0, Vec3::Zero());
