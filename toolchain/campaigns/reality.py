@@ -8,7 +8,7 @@ from campaigns.engine import ROOT, Figure, Page, Table, headline, rows
 
 GAITS = ("ds", "ss")
 ALONE = range(1, 4)  # seeds of each item alone
-TWICE = 30          # seeds of --reality 2
+TWICE = 50          # seeds of --reality 2
 
 
 def with_gains(name, most):
