@@ -140,9 +140,8 @@ void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback
   if (seen) {
     dcm_error_m_ = balance_.dcm_error_m();
     joints_.add_damping(status_.stands, feedback, command, torque_nm);
-  } else {
-    joints_.stiffen_blind(status_.stands, command);
   }
+  joints_.stiffen_blind(!seen, status_.stands, command);
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const double limit_nm = robot_->drives.limits[n].torque_nm;
     const double wanted_nm = torque_nm[static_cast<Eigen::Index>(n)];

@@ -129,8 +129,8 @@ struct DriveModel {
   std::array<GainLimits, kJointCount> gain_limits{};
   std::array<double, kJointsPerLeg> kp_nmprad{400, 400, 400, 400, 120, 120};
   std::array<double, kJointsPerLeg> kd_nmsprad{10, 10, 10, 10, 4, 4};
-  // A robot that nobody balances topples about its ankles with 430 Nm/rad, more than kp_nmprad resists. Common drives
-  // can be told no more than this.
+  // A robot that nobody balances topples about its ankles with 430 Nm/rad, more than kp_nmprad resists. CubeMars' and
+  // Damiao's drives can be told no more than this, others less.
   std::array<double, kJointsPerLeg> kp_blind_nmprad{500, 500, 500, 500, 500, 500};
   std::array<double, kJointsPerLeg> kp_most_nmprad{10000, 10000, 10000, 10000, 10000, 10000};
   std::array<double, kJointsPerLeg> kd_most_nmsprad{1000, 1000, 1000, 1000, 1000, 1000};
@@ -163,7 +163,8 @@ struct DriveModel {
     field("kp_nmprad", p.kp_nmprad, 0.0, 10000.0, "Stiffness of either leg's drives, standing.");
     field("kd_nmsprad", p.kd_nmsprad, 0.0, 1000.0, "Damping of either leg's drives, standing.");
     field("kp_blind_nmprad", p.kp_blind_nmprad, 0.0, 10000.0,
-          "Stiffness of a standing leg's drives while IMU or joints are silent and nobody balances.");
+          "Stiffness of a standing leg's drives while IMU or joints are silent and nobody balances; no less than "
+          "standing.");
     field("kp_most_nmprad", p.kp_most_nmprad, 0.0, 10000.0,
           "No command asks either leg's drives for more stiffness, in a swing least of all.");
     field("kd_most_nmsprad", p.kd_most_nmsprad, 0.0, 1000.0, "No command asks either leg's drives for more damping.");

@@ -44,7 +44,9 @@ class TorqueScale {
   }
   [[nodiscard]] double scale() const noexcept { return scale_; }
   // It has followed the felt weight for a while.
-  [[nodiscard]] bool is_settled(const Params& params) const noexcept { return seen_s_ >= 4.0 * params.begin_s; }
+  [[nodiscard]] bool is_settled(const Params& params) const noexcept {
+    return seen_s_ >= std::min(4.0 * params.begin_s, params.time_s);
+  }
 
  private:
   double felt_share_ = 1.0;

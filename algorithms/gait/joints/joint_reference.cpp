@@ -111,9 +111,13 @@ void JointReference::add_damping(const std::array<bool, kFootCount>& stands, con
   }
 }
 
-void JointReference::stiffen_blind(const std::array<bool, kFootCount>& stands, JointCommand& command) const noexcept {
+void JointReference::stiffen_blind(bool blind, const std::array<bool, kFootCount>& stands,
+                                   JointCommand& command) noexcept {
+  blind_share_ = math::clamp(blind_share_ + (blind ? 1.0 : -1.0) * kTick_s / params_.blind_ramp_s, 0.0, 1.0);
+  if (blind_share_ == 0.0) return;
   for (std::size_t n = 0; n < kJointCount; ++n) {
-    if (stands[n / kJointsPerLeg]) command.joints[n].kp_nmprad = robot_->drives.kp_blind_of(n);
+    double& kp_nmprad = command.joints[n].kp_nmprad;
+    if (stands[n / kJointsPerLeg]) kp_nmprad += blind_share_ * (robot_->drives.kp_blind_of(n) - kp_nmprad);
   }
 }
 

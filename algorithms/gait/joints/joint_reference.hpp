@@ -13,6 +13,7 @@ class JointReference {
   struct Params {
     double swing_gain = 2.0;
     double encoder_offset_rad = 0.02;
+    double blind_ramp_s = 0.1;
     std::int64_t damping_age_ns = 6 * kNsPerMs;
 
     static void visit(auto& p, auto& field) {
@@ -20,6 +21,8 @@ class JointReference {
             "The drives' gains are this many times as large in the leg that swings.");
       field("encoder_offset_rad", p.encoder_offset_rad, 0.0, 0.2,
             "A joint measured farther outside its range at the start is refused: an encoder is off by less.");
+      field("blind_ramp_s", p.blind_ramp_s, 0.002, 2.0,
+            "In this time a standing leg becomes as stiff as it is while nobody balances, and back.");
       field("damping_age_ns", p.damping_age_ns, 0, 100'000'000,
             "Older speeds damp no joint: held for longer than some cycles they push where nothing moves any more.");
     }
@@ -45,8 +48,10 @@ class JointReference {
   // gets no such torque.
   void add_damping(const std::array<bool, kFootCount>& stands, const JointFeedback& feedback,
                    const JointCommand& command, JointVector& torque_nm) const noexcept;
-  // Of a command that nobody balances: standing legs as stiff as hold the robot up. stands: as follow() was given it.
-  void stiffen_blind(const std::array<bool, kFootCount>& stands, JointCommand& command) const noexcept;
+  // Stiffens the standing legs of commands that nobody balances, as far as their drives allow, and lets go of it
+  // afterwards: over `blind_ramp_s`, since joints are not where they are commanded. Once in a tick. stands: as follow()
+  // was given it.
+  void stiffen_blind(bool blind, const std::array<bool, kFootCount>& stands, JointCommand& command) noexcept;
   // Repeats the last joint angles, at rest.
   void hold(JointCommand& command) const noexcept;
   [[nodiscard]] const JointVector& reference_rad() const noexcept { return reference_rad_; }
@@ -64,6 +69,7 @@ class JointReference {
   JointVector reference_rad_ = JointVector::Zero();
   JointVector commanded_rad_ = JointVector::Zero();  // with the lead for the drives' delay
   std::array<bool, kFootCount> knee_was_mute_{};
+  double blind_share_ = 0.0;  // of the way to kp_blind_nmprad
 };
 
 }  // namespace polygmap

@@ -35,11 +35,11 @@ bool CameraExtrinsicsEstimator::near_level(const SurfacePatch& patch, const Vec3
   return (base_T_camera_.R * patch.normal).dot(up) > math::cos(params_.tilt_gate_rad);
 }
 
-// Level is what the standing soles lie on: treads are parallel to it, and a foot is put down by the same kinematics.
+// Level is what the standing soles lie on: a foot is put down by the same kinematics.
 // Gravity as the estimator has it errs by more than twice as much, and alike in everything but the camera.
 CameraExtrinsicsEstimator::Level CameraExtrinsicsEstimator::level_of(const Stance& stance) const noexcept {
-  Level level{stance.base_up, {}};
-  std::array<Vec3, kFootCount> up;
+  Level level{stance.base_up, {}, {}};
+  std::array<Vec3, kFootCount>& up = level.sole_up;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     up[foot] = stance.base_T_sole[foot].R.col(2);
     level.flat[foot] = stance.stands[foot] && up[foot].dot(stance.base_up) > math::cos(params_.max_sole_tilt_rad);
@@ -79,24 +79,33 @@ bool CameraExtrinsicsEstimator::stands_on(const SurfacePatch& patch, const Vec3&
   return std::abs(above_m - height_m_) <= params_.height_gate_m;
 }
 
+CameraExtrinsicsEstimator::Parallel CameraExtrinsicsEstimator::parallel_of(
+    const SurfacePatch& patch, const Level& level, const std::array<Vec3, kFootCount>& camera_p_soles) const noexcept {
+  if (!level.by_soles()) return {level.up, params_.gravity_tilt_sigma_rad};
+  std::array<bool, kFootCount> on{};
+  double above_m = 0.0;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    on[foot] = level.flat[foot] && stands_on(patch, camera_p_soles[foot], above_m);
+  }
+  if (on[0] && on[1]) return {level.up, params_.systematic_tilt_rad};
+  // One sole lies by the play of its own leg's joints, and on a tread that is seen in part.
+  return {on[0] ? level.sole_up[0] : on[1] ? level.sole_up[1] : level.up, params_.treads_tilt_rad};
+}
+
 bool CameraExtrinsicsEstimator::try_learn_tilt(const SurfaceFrame& frame, const Stance& stance, const Level& level,
                                                double dt_s) noexcept {
+  const std::array<Vec3, kFootCount> camera_p_soles{camera_p_sole(stance, 0), camera_p_sole(stance, 1)};
   Vec2 sum = Vec2::Zero();
   double weights = 0.0;
   for (const SurfacePatch& patch : frame.surfaces) {
     if (!says_level(patch)) continue;
-    if (!usable(patch) || !near_level(patch, level.up)) {
+    const Parallel parallel = usable(patch) ? parallel_of(patch, level, camera_p_soles) : Parallel{};
+    if (!usable(patch) || !near_level(patch, parallel.up)) {
       ++counters_.rejected_surfaces;
       continue;
     }
-    bool stood_on = !level.by_soles();  // where none stands flat, all surfaces are alike
-    double above_m = 0.0;
-    for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-      stood_on = stood_on || (level.flat[foot] && stands_on(patch, camera_p_sole(stance, foot), above_m));
-    }
-    const double own_rad = stood_on ? params_.systematic_tilt_rad : params_.treads_tilt_rad;
-    const double weight = 1.0 / (math::square(patch.tilt_sigma_rad) + math::square(own_rad));
-    sum += weight * (nominal_.R * patch.normal).cross(level.up).head<2>();
+    const double weight = 1.0 / (math::square(patch.tilt_sigma_rad) + math::square(parallel.sigma_rad));
+    sum += weight * (nominal_.R * patch.normal).cross(parallel.up).head<2>();
     weights += weight;
   }
   if (!(weights > 0.0)) return false;

@@ -52,10 +52,10 @@ class CameraExtrinsicsEstimator {
     // Of a surface, added to its sigma. Those below 2 mrad err by 1.0 to 1.5, vaguer ones by what they say, and the
     // same in every frame: with 3 mrad three treads ahead, 8 mrad off, outvoted the floor (seed 64).
     double systematic_tilt_rad = 0.001;
-    // Of a surface that no sole stands on, against the one that they do: the treads of a flight slope as they like. As
-    // much as the robot climbs.
+    // Of a surface that no sole stands on, against the one that they do: every tread of a flight slopes by itself, and
+    // those that vary evenly by 2 degrees have this sigma.
     double treads_tilt_rad = 0.02;
-    double max_sole_tilt_rad = 3.0 * kPi / 180.0;  // from gravity: more, and the foot does not stand flat
+    double max_sole_tilt_rad = 5.0 * kPi / 180.0;  // from gravity: more, and the foot does not stand flat
     double longest_step_s = 0.1;
     double frames_alike = 20.0;
     ToeDetectorParams toe;
@@ -83,8 +83,9 @@ class CameraExtrinsicsEstimator {
             "A surface farther from the soles' height is another one: at most half of the least step, 40 mm.");
       field("max_tilt_sigma_rad", p.max_tilt_sigma_rad, 1e-4, 1.0,
             "Vaguer surfaces say only what gravity told the fit before.");
-      field("systematic_tilt_rad", p.systematic_tilt_rad, 0.0, 0.1, "A surface's tilt errs by this besides its sigma.");
-      field("treads_tilt_rad", p.treads_tilt_rad, 0.0, 0.2,
+      field("systematic_tilt_rad", p.systematic_tilt_rad, 1e-5, 0.1,
+            "A surface's tilt errs by this besides its sigma.");
+      field("treads_tilt_rad", p.treads_tilt_rad, 1e-5, 0.2,
             "A surface that no sole stands on slopes by this against the one that they stand on.");
       field("max_sole_tilt_rad", p.max_sole_tilt_rad, 0.001, 0.5,
             "A foot tilted farther from gravity does not stand flat.");
@@ -147,7 +148,8 @@ class CameraExtrinsicsEstimator {
   }
   // Level as that frame had it, by standing soles or, flat being none, by gravity.
   struct Level {
-    Vec3 up;
+    Vec3 up;                               // of them all
+    std::array<Vec3, kFootCount> sole_up;  // of the flat ones
     std::array<bool, kFootCount> flat{};
     [[nodiscard]] bool by_soles() const noexcept { return flat[0] || flat[1]; }
   };
@@ -160,6 +162,13 @@ class CameraExtrinsicsEstimator {
                                     double dt_s) noexcept;
   void learn_height(const SurfaceFrame& frame, const Stance& stance, const Level& level, double dt_s) noexcept;
   [[nodiscard]] Vec3 camera_p_sole(const Stance& stance, std::size_t foot) const noexcept;
+  // What a surface is parallel to, and how far it may slope against that: the soles that stand on it, if any do.
+  struct Parallel {
+    Vec3 up;
+    double sigma_rad;
+  };
+  [[nodiscard]] Parallel parallel_of(const SurfacePatch& patch, const Level& level,
+                                     const std::array<Vec3, kFootCount>& camera_p_soles) const noexcept;
   // By how much a sole seems to lie above the surface, and whether that can be what it stands on.
   [[nodiscard]] bool stands_on(const SurfacePatch& patch, const Vec3& camera_p_sole, double& above_m) const noexcept;
   // How far a sole lies above the largest surface that can be what it stands on; false when there is none.

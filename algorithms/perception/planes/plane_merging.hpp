@@ -71,7 +71,7 @@ class PlaneMerging {
   [[nodiscard]] std::uint32_t overflow() const noexcept { return overflow_; }
 
  private:
-  static constexpr std::int32_t kMaxGap_px = 24;  // rows between two surfaces that still touch
+  static constexpr std::int32_t kMaxGap_px = 24;  // rows between facets of one bent surface
   static constexpr std::size_t kMaxFacets = 32;   // joined per frame
   static constexpr std::size_t kMaxSeams = 512;
   static constexpr std::size_t kSeamsAtOnce = 8;

@@ -241,6 +241,15 @@ std::int32_t SpanBoundaries::change_point(std::int32_t column, const Line& upper
   return static_cast<std::int32_t>(cv::v_reduce_min(cv::v_select(least, point.at, cv::v_setall_f32(kDepthHeight_px))));
 }
 
+bool SpanBoundaries::touch(std::int32_t column, std::int32_t bottom, std::int32_t top) noexcept {
+  if (top - bottom <= params_.max_gap_px) return true;
+  if (top - bottom > params_.max_strip_px) return false;
+  work_.add(20 + 4 * (top - bottom));
+  std::int32_t seen = 0;
+  for (std::int32_t r = bottom + 1; r < top; ++r) seen += image_->by_column(r, column) > 0.0F ? 1 : 0;
+  return seen < params_.max_gap_px;
+}
+
 void SpanBoundaries::score(std::int32_t column, bool by_planes) noexcept {
   Column& spans = columns_[static_cast<std::size_t>(column)];
   for (std::size_t k = 0; k < spans.size(); ++k) {
@@ -252,7 +261,7 @@ void SpanBoundaries::score(std::int32_t column, bool by_planes) noexcept {
       break;
     }
     ColumnSpan& lower = spans[k + 1];
-    if (upper.plane == lower.plane || lower.top - upper.bottom > params_.max_gap_px) {
+    if (upper.plane == lower.plane || !touch(column, upper.bottom, lower.top)) {
       extend(column, upper, 1, lower.top - 1);
       extend(column, lower, -1, upper.bottom + 1);
       continue;

@@ -38,7 +38,8 @@ class SpanBoundaries {
     double meet_px = 2.0;
     double meet_gain = 1.0;
     std::int32_t window_px = 6;
-    std::int32_t max_gap_px = 40;
+    std::int32_t max_gap_px = 24;
+    std::int32_t max_strip_px = 40;
     std::int32_t min_gap_rows = 3;
     std::int32_t max_empty_rows = 3;
     std::int32_t beside_px = 4;
@@ -56,7 +57,10 @@ class SpanBoundaries {
             "Planes meet where their line costs no more than this of the columns' mean, too.");
       field("window_px", p.window_px, 1, 64, "As many rows are searched beyond where the segments ended.");
       field("max_gap_px", p.max_gap_px, 1, 480,
-            "Surfaces with as many rows between them are still next to each other.");
+            "Surfaces with as many rows of something else between them are still next to each other.");
+      field("max_strip_px", p.max_strip_px, 1, 480,
+            "As many rows may lie between them if no more of these have depth: a strip along a nosing has none.");
+      field.ordered("max_gap_px", "max_strip_px");
       field("min_gap_rows", p.min_gap_rows, 1, 100,
             "As many rows of something else part two segments of one plane, if they are half as many as its own.");
       field("max_empty_rows", p.max_empty_rows, 0, 100, "A surface is extended over no more rows without data.");
@@ -103,6 +107,8 @@ class SpanBoundaries {
   // planes first .. last. Such rows are too few for a segment of their own.
   void fill_gaps(std::int32_t column, std::int32_t beside, std::size_t first, std::size_t last) noexcept;
   void begin_scores() noexcept;
+  // Whether surfaces that end at the row bottom and begin at the row top are next to each other.
+  [[nodiscard]] bool touch(std::int32_t column, std::int32_t bottom, std::int32_t top) noexcept;
   // Scores where the column's surfaces change, and ends its spans there. by_planes: where planes meet near a change,
   // that is believed unmeasured.
   void score(std::int32_t column, bool by_planes) noexcept;

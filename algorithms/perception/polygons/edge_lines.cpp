@@ -555,7 +555,7 @@ EdgeLineFinder::Outcome EdgeLineFinder::finish(EdgeLine& line) noexcept {
   work_.add(200);
   if (groups_.refused > groups_.columns && begins_at_gap()) return Outcome::kAgain;
   if (groups_.columns < params_.min_columns) return Outcome::kFewColumns;
-  work_.add(groups_.count, 330);
+  work_.add(groups_.count, 160 + 7 * (2 * params_.window_px + 1));
   gather_points();
   if (points_.count < 3) return Outcome::kFewColumns;
   work_.add(1200);

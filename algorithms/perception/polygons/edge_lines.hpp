@@ -162,8 +162,8 @@ class EdgeLineFinder {
   [[nodiscard]] WorkCount& work() noexcept { return work_; }  // since it was last paid
 
  private:
-  static constexpr std::int32_t kSlots = 8;  // columns that are searched together, on every machine
-  static constexpr std::int32_t kMaxWindow_px = 24;  // of the widest, onto a gap
+  static constexpr std::int32_t kSlots = 8;          // columns that are searched together, on every machine
+  static constexpr std::int32_t kMaxWindow_px = 24;  // the one that is moved onto a gap
   static constexpr std::int32_t kOffsets = 2 * kMaxWindow_px + 1;
   static constexpr std::int32_t kMaxGroups = 24;
   using Slots = std::array<float, kSlots>;

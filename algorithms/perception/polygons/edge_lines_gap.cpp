@@ -7,8 +7,6 @@
 namespace polygmap {
 namespace {
 
-// A gap of more rows leaves too few to either side in the widest window.
-constexpr std::int32_t kMostGap_px = 40;
 // The guess ends a label, which goes on to where the planes meet or stops where the depths do: either is next to the
 // gap.
 constexpr std::int32_t kBesideGuess_px = 4;
@@ -48,8 +46,10 @@ EdgeLineFinder::GapFound EdgeLineFinder::find_gap(const Group& group, std::int32
 }
 
 bool EdgeLineFinder::try_gap_of_column(std::int32_t column, Gap& gap) const noexcept {
+  // A gap of more rows leaves too few to either side in the widest window.
+  const std::int32_t most_px = kOffsets - 2 * (params_.min_side_px + 2) + 1;
   const auto guess = static_cast<std::int32_t>(std::floor(guess_.at(middle_px(column)) + 0.5));
-  if (guess < kMostGap_px + kBesideGuess_px || guess + kMostGap_px + kBesideGuess_px >= intrinsics_.height_px) {
+  if (guess < most_px + kBesideGuess_px || guess + most_px + kBesideGuess_px >= intrinsics_.height_px) {
     return false;
   }
   const auto empty = [&](std::int32_t r) { return !(image_->inverse_depth(column, r) > 0.0F); };
@@ -59,10 +59,10 @@ bool EdgeLineFinder::try_gap_of_column(std::int32_t column, Gap& gap) const noex
   }
   if (!empty(first)) return false;
   std::int32_t last = first;
-  while (last - first < kMostGap_px && empty(first - 1)) --first;
-  while (last - first < kMostGap_px && empty(last + 1)) ++last;
+  while (last - first < most_px && empty(first - 1)) --first;
+  while (last - first < most_px && empty(last + 1)) ++last;
   gap = {first - 0.5, last + 0.5};
-  return last - first < kMostGap_px;
+  return last - first < most_px;
 }
 
 bool EdgeLineFinder::begins_at_gap() noexcept {
@@ -77,7 +77,7 @@ bool EdgeLineFinder::begins_at_gap() noexcept {
   const std::int32_t columns = guess_.last_column - guess_.first_column + 1;
   const std::int32_t stride = (columns + kMaxGroups - 1) / kMaxGroups;
   for (std::int32_t g = guess_.first_column; g <= guess_.last_column; g += stride) {
-    work_.add(300);
+    work_.add(450);
     Gap gap;
     if (try_gap_of_column(g, gap)) shifts[count++] = gap.from + window_px - guess_.at(middle_px(g));
   }

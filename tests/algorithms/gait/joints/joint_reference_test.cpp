@@ -78,19 +78,32 @@ TEST_F(JointReferenceTest, GainsBeyondTheRobotsLimits_AreNeverCommanded) {
   expect_within();
   (void)reference.follow(base_T_sole_, {true, false}, command_);
   expect_within();
-  reference.stiffen_blind({true, true}, command_);
+  for (int i = 0; i < 100; ++i) reference.stiffen_blind(true, {true, true}, command_);
   expect_within();
 }
 
-TEST_F(JointReferenceTest, NobodyBalances_StandingLegsAloneAreStiffer) {
+TEST_F(JointReferenceTest, NobodyBalances_StandingLegsAloneBecomeStiffer_AndBackInAsManyTicks) {
   (void)reference_.follow(base_T_sole_, {true, false}, command_);
   const JointCommand balanced = command_;
-  reference_.stiffen_blind({true, false}, command_);
+  const auto ticks = static_cast<int>(JointReference::Params{}.blind_ramp_s / kTick_s + 0.5);
+  double last_nmprad = balanced.joints[kAnklePitch].kp_nmprad;
+  for (int i = 0; i < ticks; ++i) {
+    command_ = balanced;
+    reference_.stiffen_blind(true, {true, false}, command_);
+    EXPECT_GT(command_.joints[kAnklePitch].kp_nmprad, last_nmprad);
+    EXPECT_LT(command_.joints[kAnklePitch].kp_nmprad, last_nmprad + 10.0);
+    last_nmprad = command_.joints[kAnklePitch].kp_nmprad;
+  }
   for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-    EXPECT_EQ(command_.joints[j].kp_nmprad, nominal_robot().drives.kp_blind_nmprad[j]);
+    EXPECT_NEAR(command_.joints[j].kp_nmprad, nominal_robot().drives.kp_blind_nmprad[j], 1e-6);
     EXPECT_GT(command_.joints[j].kp_nmprad, balanced.joints[j].kp_nmprad);
     EXPECT_EQ(command_.joints[kJointsPerLeg + j].kp_nmprad, balanced.joints[kJointsPerLeg + j].kp_nmprad);
   }
+  for (int i = 0; i < ticks; ++i) {
+    command_ = balanced;
+    reference_.stiffen_blind(false, {true, false}, command_);
+  }
+  EXPECT_EQ(command_.joints[kAnklePitch].kp_nmprad, balanced.joints[kAnklePitch].kp_nmprad);
 }
 
 // What the module adds to the torques of standing left and swinging right leg, whose joints all turn 0.1 rad/s too
