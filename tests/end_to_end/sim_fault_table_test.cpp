@@ -70,8 +70,7 @@ bool is_blind(std::string_view fault) { return fault == "joints_silent" || fault
 
 // Known to fall, as of 2026-11-27. Drives that are sent nothing go on with the law of their last command, stiffness,
 // damping and torque, and that stiffness does not hold up a body that nobody balances. Nor does any that a KUAVO's
-// drives take, when it is blind. All are climbs of one seed: which of
-// the blind ones fall changes with the code.
+// drives take, when it is blind. All are climbs of one seed: which of the blind ones fall changes with the code.
 bool falls(std::string_view fault, std::string_view moment, bool soft) {
   if (fault == "commands_refused" || (soft && is_blind(fault))) return true;
   return fault == "imu_silent" && moment == "swing2_early";
