@@ -12,6 +12,7 @@ namespace polygmap {
 StepKnots::StepKnots(const RobotModel& robot, const StepParams& params, std::int32_t knot_ticks, const StepPlan& step,
                      const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept
     : foot_(step.goal.foot),
+      mass_kg_(robot.masses.total_kg()),
       soles_(soles),
       joint_margin_rad_(step.joint_margin_rad),
       shift_ticks_(step.shift_ticks),
@@ -37,7 +38,11 @@ StepKnot StepKnots::operator[](std::int32_t i) const noexcept {
   if (swing_tick < 0) {
     knot.odom_T_base = TorsoTrajectory::pose(shift_.at(knot.tick, com_.at(knot.tick)));
   } else {
-    knot.odom_T_base = TorsoTrajectory::pose(lean_.at(swing_tick, com_.at(knot.tick)));
+    const TorsoTrajectory::State torso = lean_.at(swing_tick, com_.at(knot.tick));
+    knot.odom_T_base = TorsoTrajectory::pose(torso);
+    knot.odom_force_n =
+        mass_kg_ * Vec3{torso[0].acceleration, torso[1].acceleration, kGravity_mps2 + torso[2].acceleration};
+    knot.odom_zmp_m = com_.zmp_m(knot.tick);
     knot.odom_T_sole[index_of(foot_)] = swing_.at(swing_tick);
   }
   return knot;
@@ -45,18 +50,19 @@ StepKnot StepKnots::operator[](std::int32_t i) const noexcept {
 
 void StepFeasibility::begin(const RobotModel& robot, const StepKnots& knots) noexcept {
   knots_ = knots;
-  check_ = {true, 1e9, 1e9, 0.0};
+  check_ = {true, 1e9, 1e9, 0.0, 0.0};
   next_ = 0;
-  constexpr int kPasses = 3;  // of base and legs that follow each other
   previous_.setZero();
-  for (int i = 0; i < kPasses; ++i) (void)solve(robot, 0, previous_, previous_);
+  frames_ = body_frames(robot.legs, previous_);
+  constexpr int kPasses = 3;  // of base and legs that follow each other
+  for (int i = 0; i < kPasses; ++i) {
+    StepKnot knot = knots_[0];
+    (void)solve(robot, knot, previous_);
+  }
 }
 
-bool StepFeasibility::solve(const RobotModel& robot, std::int32_t i, const JointVector& before_rad,
-                            JointVector& q_rad) const noexcept {
-  StepKnot knot = knots_[i];
-  const Vec3 base_p_com =
-      centre_of_mass_m(robot.masses, base_p_links_m(robot.masses, body_frames(robot.legs, before_rad)));
+bool StepFeasibility::solve(const RobotModel& robot, StepKnot& knot, JointVector& q_rad) noexcept {
+  const Vec3 base_p_com = centre_of_mass_m(robot.masses, base_p_links_m(robot.masses, frames_));
   knot.odom_T_base.p_m.head<2>() -= (knot.odom_T_base.R * base_p_com).head<2>();
   const Transform base_T_odom = knot.odom_T_base.inverse();
   bool reachable = true;
@@ -65,6 +71,7 @@ bool StepFeasibility::solve(const RobotModel& robot, std::int32_t i, const Joint
     reachable = reachable && s.reachable;
     q_rad.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
   }
+  frames_ = body_frames(robot.legs, q_rad);
   return reachable;
 }
 
@@ -83,15 +90,35 @@ void StepFeasibility::check_joints(const DriveModel& drives, const JointVector& 
   }
 }
 
+// Hip and knee: what an ankle gives follows the zero-moment point, which ComPlan bounds.
+void StepFeasibility::check_torques(const RobotModel& robot, const StepKnot& knot) noexcept {
+  if (!knots_.swings_at(knot.tick)) return;
+  const Foot stance = knots_.stance();
+  const Mat3 base_R_odom = knot.odom_T_base.R.transpose();
+  Vec3 odom_arm_m = Vec3::Zero();
+  odom_arm_m.head<2>() = knot.odom_zmp_m - knot.odom_T_sole[index_of(stance)].p_m.head<2>();
+  const SoleWrench ground{base_R_odom * knot.odom_force_n, base_R_odom * odom_arm_m.cross(knot.odom_force_n)};
+  std::array<Vec3, kJointsPerLeg> specific_mps2;
+  specific_mps2.fill(base_R_odom * (-knot.odom_force_n / robot.masses.total_kg()));
+  const LegVector torque_nm = leg_torques_nm(robot.masses, stance, frames_[index_of(stance)], specific_mps2, ground);
+  for (std::size_t j = 0; j <= kKnee; ++j) {
+    const double limit_nm = robot.drives.limits[joint_index(stance, j)].torque_nm;
+    check_.torque_share = std::max(check_.torque_share, std::abs(torque_nm[static_cast<Eigen::Index>(j)]) / limit_nm);
+  }
+}
+
 bool StepFeasibility::advance(const RobotModel& robot, const StepParams& params, std::int32_t count) noexcept {
   const std::int32_t end = std::min(next_ + count, knots_.count());
   for (; next_ < end; ++next_) {
+    StepKnot knot = knots_[next_];
     JointVector q_rad;
-    if (!solve(robot, next_, previous_, q_rad)) check_.feasible = false;
+    if (!solve(robot, knot, q_rad)) check_.feasible = false;
     check_joints(robot.drives, q_rad);
+    check_torques(robot, knot);
     previous_ = q_rad;
     check_.feasible = check_.feasible && check_.joint_margin_rad >= knots_.joint_margin_rad() &&
-                      check_.knee_rad >= params.knee_min_rad && check_.speed_share <= params.speed_share;
+                      check_.knee_rad >= params.knee_min_rad && check_.speed_share <= params.speed_share &&
+                      check_.torque_share <= params.torque_share;
     if (!check_.feasible) return true;
   }
   return next_ == knots_.count();

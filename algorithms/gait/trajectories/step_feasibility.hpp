@@ -3,6 +3,7 @@
 #pragma once
 
 #include "algorithms/gait/trajectories/step_plan.hpp"
+#include "algorithms/robot/leg_frames.hpp"
 
 namespace polygmap {
 
@@ -12,6 +13,8 @@ namespace polygmap {
 struct StepKnot {
   std::array<Transform, kFootCount> odom_T_sole;
   Transform odom_T_base;
+  Vec3 odom_force_n = Vec3::Zero();  // of the ground on the stance foot while the other swings
+  Vec2 odom_zmp_m = Vec2::Zero();    // where it acts
   std::int32_t tick = 0;
 };
 
@@ -27,10 +30,13 @@ class StepKnots {
   [[nodiscard]] std::int32_t count() const noexcept { return count_; }
   [[nodiscard]] double joint_margin_rad() const noexcept { return joint_margin_rad_; }  // that the plan is to keep
   [[nodiscard]] std::int32_t knot_ticks() const noexcept { return knot_ticks_; }
+  [[nodiscard]] Foot stance() const noexcept { return other(foot_); }
+  [[nodiscard]] bool swings_at(std::int32_t tick) const noexcept { return tick >= shift_ticks_; }
   [[nodiscard]] StepKnot operator[](std::int32_t i) const noexcept;
 
  private:
   Foot foot_ = Foot::kLeft;
+  double mass_kg_ = 0.0;
   std::array<Transform, kFootCount> soles_;
   TorsoTrajectory shift_, lean_;
   ComPlan com_;
@@ -45,6 +51,7 @@ struct StepCheck {
   double joint_margin_rad = 0.0;  // least, over all knots and joints
   double knee_rad = 0.0;          // least
   double speed_share = 0.0;       // greatest, of the drive's limit
+  double torque_share = 0.0;      // greatest, of hip and knee that carry the body alone, of the drive's limit
 };
 
 // Follows the knots with the leg kinematics, as many per call as the tick can spare. Every call is given the same robot
@@ -58,14 +65,17 @@ class StepFeasibility {
   [[nodiscard]] const StepKnots& knots() const noexcept { return knots_; }
 
  private:
-  // Both legs at a knot; false when one is out of reach. The plan says where the centre of mass is: the base follows
-  // from the legs' places in `before`.
-  bool solve(const RobotModel& robot, std::int32_t i, const JointVector& before_rad, JointVector& q_rad) const noexcept;
+  // Both legs at a knot; false when one is out of reach. The plan says where the centre of mass is: the base, which is
+  // moved there, follows from where the legs were before.
+  bool solve(const RobotModel& robot, StepKnot& knot, JointVector& q_rad) noexcept;
   void check_joints(const DriveModel& drives, const JointVector& q_rad) noexcept;
+  // With frames_ those of the knot.
+  void check_torques(const RobotModel& robot, const StepKnot& knot) noexcept;
 
   StepKnots knots_;
   StepCheck check_;
   JointVector previous_ = JointVector::Zero();
+  BodyFrames frames_;  // of previous_
   std::int32_t next_ = 0;
 };
 

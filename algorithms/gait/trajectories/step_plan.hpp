@@ -63,6 +63,7 @@ struct StepParams {
   double closing_margin_rad = 0.01;
   double knee_min_rad = 0.08;
   double speed_share = 0.95;
+  double torque_share = 1.0;
   StepDurations durations;
 
   static void visit(auto& p, auto& field) {
@@ -93,19 +94,24 @@ struct StepParams {
           "The plan of a step that brings back a foot from too far out keeps this: its ankle has no more.");
     field("knee_min_rad", p.knee_min_rad, 0.0, 0.5, "A plan keeps the knee this far from the stretched leg.");
     field("speed_share", p.speed_share, 0.1, 1.0, "A plan uses this share of the drives' speed.");
+    field("torque_share", p.torque_share, 0.1, 2.0,
+          "A plan uses this share of the drives' torque: a knee that has no more lags and then throws the body up.");
     field("durations", p.durations);
   }
 };
 
-// What is tried to make a step possible, in this order: the ankles ask for toes that point down, the drives for time.
+// What is tried to make a step possible, in this order: the ankles ask for toes that point down, the drives for time,
+// and a knee that is to lift the body with a deep bend for a slower rise.
 struct StepTry {
   double toe_down_rad = 0.0;  // half of it on the floor
   double longer = 1.0;        // the swing
+  double rise_longer = 1.0;   // the torso's rise, of the swing
 };
 inline constexpr std::size_t kStepTryCount = 8;
 using StepTries = std::array<StepTry, kStepTryCount>;
 inline constexpr StepTries kStepTries{{{0.3}, {0.2}, {0.4}, {0.1}, {0.5}, {0.3, 1.15}, {0.2, 1.15}, {0.4, 1.15}}};
-inline constexpr StepTries kPassingTries{{{0.4}, {0.5}, {0.3}, {0.6}, {0.2}, {0.4, 1.15}, {0.5, 1.15}, {0.3, 1.15}}};
+inline constexpr StepTries kPassingTries{
+    {{0.4}, {0.5}, {0.3}, {0.6}, {0.2}, {0.4, 1.15}, {0.5, 1.15}, {0.5, 1.15, 1.1}}};
 
 struct StepPlan {
   StepGoal goal;

@@ -68,7 +68,7 @@ TEST(StepSearch, RisesAndTreadsOfTheStairs_LegsCanDoAllOfThem) {
         const StepCheck& check = proof.check();
         EXPECT_TRUE(check.feasible) << rise << " " << ahead << " kind " << static_cast<int>(kind) << ": margin "
                                     << check.joint_margin_rad << " knee " << check.knee_rad << " speed "
-                                    << check.speed_share;
+                                    << check.speed_share << " torque " << check.torque_share;
       }
     }
   }
@@ -91,6 +91,28 @@ TEST(StepFeasibility, TrailingSwingWithALevelSole_MeetsTheAnklesLimitThatAPitche
   };
   EXPECT_LT(ankle_margin_rad(0.0), 0.0);
   EXPECT_GT(ankle_margin_rad(kStepTries[0].toe_down_rad), StepParams{}.joint_margin_rad);
+}
+
+// Twice the weight with the same lever arms.
+TEST(StepFeasibility, LinksTwiceAsHeavy_TakeTwiceTheTorque) {
+  std::array<Transform, kFootCount> soles;
+  TorsoTrajectory::State from;
+  const StepPlan plan = stair_step(StepKind::kTrailing, 0.13, 0.28, soles, from);
+  StepParams params;
+  params.torque_share = 10.0;
+  const auto torque_share = [&](const RobotModel& robot) {
+    const StepKnots knots(robot, params, params.knot_ticks, plan, from, soles);
+    StepFeasibility proof;
+    proof.begin(robot, knots);
+    EXPECT_TRUE(proof.advance(robot, params, knots.count()));
+    return proof.check().torque_share;
+  };
+  RobotModel heavy = nominal_robot();
+  heavy.masses.torso.mass_kg *= 2.0;
+  for (auto& link : heavy.masses.leg) link.mass_kg *= 2.0;
+  const double usual = torque_share(nominal_robot());
+  EXPECT_GT(usual, 0.5);
+  EXPECT_NEAR(torque_share(heavy), 2.0 * usual, 1e-9);
 }
 
 StepSearch::State finish(StepSearch& search, const StepParams& params = {}, int most_calls = 1000) {
@@ -129,6 +151,17 @@ TEST(StepSearch, PassingStepOfTheStairs_IsFoundWithTheTrailingStepAfterIt) {
       EXPECT_EQ(search.plan().swing_ticks, StepParams{}.durations.passing_swing_ticks);
     }
   }
+}
+
+TEST(StepSearch, PassingStepThatTheKneeCannotLiftInTime_IsDoneWithASlowerRise) {
+  const PassingStep step = passing_step(0.17, 0.285);
+  StepParams weak;
+  weak.torque_share = 0.85;
+  const StepSearch search = searched(step, weak);
+  ASSERT_EQ(search.state(), StepSearch::State::kFound);
+  EXPECT_GT(search.plan().rise_ticks, searched(step).plan().rise_ticks);
+  weak.torque_share = 0.6;  // not even at rest
+  EXPECT_EQ(searched(step, weak).state(), StepSearch::State::kImpossible);
 }
 
 TEST(StepSearch, PassingStepThatIsPossibleWithNoTrailingStepAfterIt_IsImpossible) {
