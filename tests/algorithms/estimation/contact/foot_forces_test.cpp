@@ -132,6 +132,15 @@ TEST_F(FootForcesTest, DrivesTellAFourthMore_ForcesAreThoseOfTheWeight) {
 }
 
 // Nobody said yet that it stands, or the plan says early that it does not.
+// The scale is not known yet when the robot first stands: torques that are a fourth too high would leave the zero of an
+// exact sensor 67 N off.
+TEST_F(FootForcesTest, DrivesTellAFourthMore_AnExactSensorKeepsItsZero) {
+  told_share_ = 1.25;
+  (void)ticks(1000, {270.0, 270.0}, {0.0, 0.0});
+  tells_torques_ = false;
+  EXPECT_NEAR(ticks(1, {270.0, 270.0}, {0.0, 0.0})[0], 270.0, 20.0);
+}
+
 TEST_F(FootForcesTest, LoadedFootThatIsSaidToHang_TeachesNothing) {
   says_stands_ = false;
   (void)tick({270.0, 270.0}, {kNaN, kNaN});
