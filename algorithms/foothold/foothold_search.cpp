@@ -470,7 +470,9 @@ std::optional<double> FootholdSearch::beside_obstacles(const LevelSurface& tread
 // centred (seeds 1 and 4, both noises).
 StopReason FootholdSearch::place_feet(const LevelSurface& tread, Feet& feet) const noexcept {
   const double middle_m = this->middle_m(tread);
-  StopReason reason = StopReason::kTooNarrow;
+  // A side that was not seen, as under a patch of sunlight, says nothing of how wide the tread is.
+  const bool sides_seen = tread.ends.left_m && tread.ends.right_m;
+  StopReason reason = sides_seen ? StopReason::kTooNarrow : StopReason::kNothingSeen;
   for (std::int32_t i = 0; i < params_.feet.spacings; ++i) {
     const double half_m =
         params_.feet.half_spacing_m - (params_.feet.half_spacing_m - params_.feet.half_spacing_min_m) *

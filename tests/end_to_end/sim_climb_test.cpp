@@ -224,7 +224,7 @@ TEST(ClimbCausality, StepMissingFromThePicture_ClimbsUpToItAndNamesTheRiseBeyond
   EXPECT_EQ(summary.ended_by, "module");
   for (const Footstep& step : summary.footsteps) EXPECT_LE(step.step_index, 1);
   const double two_rises_m = 2 * options.stairs.rise_m;
-  expect_to_name("a rise too high to climb (", two_rises_m, summary.reason);
+  expect_to_name("too high to step on (", two_rises_m, summary.reason);
 }
 
 // The picture of the stairs hangs above the stairs: the foot finds nothing to stand on.
@@ -267,7 +267,7 @@ TEST(ClimbLimits, RiseOfHalfAMetre_ModuleStopsAndNamesTheRise) {
   EXPECT_FALSE(summary.fell) << summary.reason;
   EXPECT_EQ(summary.ended_by, "module");
   EXPECT_GE(summary.stand_off_m, 0.020);
-  expect_to_name("a rise too high to climb (", 0.5, summary.reason);
+  expect_to_name("too high to step on (", 0.5, summary.reason);
 }
 
 // Shorter than the way ahead that is looked at: its end is seen, so the module knows that it is on top.

@@ -38,9 +38,9 @@ enum class StopReason : std::uint8_t {
   kNothingSeen,    // no frame, no surface in it, or too little of the next tread
   kNoStaircase,    // level ground, no higher tread in the map
   kTop,            // standing on the highest tread of a staircase just climbed
-  kRiseTooHigh,    // the next tread is out of reach: measured_rise_m
+  kRiseTooHigh,    // the next surface is out of reach, or the tread before it was not seen: measured_rise_m
   kTreadTooShort,  // the foot does not fit: measured_tread_m
-  kTooNarrow,      // both feet do not fit side by side
+  kTooNarrow,      // both feet do not fit side by side between the sides that were seen
   kMapStale,       // the newest fused frame is too old
   kEdgeUncertain,  // the foot fits the next tread, but not with its edges known so vaguely
   kObstacle,       // something stands on the next tread or before it, and both feet do not fit beside it
@@ -69,7 +69,7 @@ inline constexpr std::array kStopReasonTable{
     StopReasonInfo{"nothing_seen", "it saw no surface to step on, or too little of the next one"},
     StopReasonInfo{"no_staircase", "it saw level ground and no higher tread"},
     StopReasonInfo{"top", "it took the tread it stood on for the highest"},
-    StopReasonInfo{"rise_too_high", "it measured a rise too high to climb"},
+    StopReasonInfo{"rise_too_high", "the next surface that it saw was too high to step on"},
     StopReasonInfo{"tread_too_short", "it measured a tread too short for the foot"},
     StopReasonInfo{"too_narrow", "it measured a tread too narrow for two feet"},
     StopReasonInfo{"map_stale", "its map was stale"},

@@ -498,7 +498,7 @@ TEST_F(FootholdSearchTest, SidesSeen_FeetGoToTheMiddleAtOnceFromTheFloorAndSlowl
               1e-9);
 }
 
-TEST_F(FootholdSearchTest, NarrowTread_FeetCloseUpThenItSaysTooNarrow) {
+TEST_F(FootholdSearchTest, NarrowTread_FeetCloseUpThenItSaysTooNarrowIfItsSidesWereSeen) {
   Stairs s{.width_m = 0.32};
   const FootholdSet& r = search(s, 1);
   ASSERT_EQ(r.obstruction, StopReason::kNone);
@@ -508,6 +508,9 @@ TEST_F(FootholdSearchTest, NarrowTread_FeetCloseUpThenItSaysTooNarrow) {
   s.width_m = 0.30;
   EXPECT_EQ(search(s, 1).obstruction, StopReason::kTooNarrow);
   EXPECT_FALSE(search_->result().has_p_star);
+  MapSnapshot map = ideal_map(s);
+  for (MapPolygon& p : map.polygons) p.surface.edges.fill(EdgeKind::kUnknown);  // a patch of sunlight on either side
+  EXPECT_EQ(search(map, standing(s, 1)).obstruction, StopReason::kNothingSeen);
 }
 
 TEST_F(FootholdSearchTest, TreadEndsInNothing_ToeStaysOnItAsBeforeARiser) {
