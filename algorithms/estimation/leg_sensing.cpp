@@ -40,6 +40,7 @@ void LegSensing::reset(const Params& params, const RobotModel& robot) noexcept {
   counters_ = {};
   encoders_.reset(params.encoders);
   forces_.reset(params.forces);
+  speeds_.reset(params.speeds);
   joints_ = {};
   felt_ns_ = 0;
   dt_s_ = 0.0;
@@ -72,7 +73,10 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
     ++counters_.stale;
     return false;
   }
-  JointFeedback carried = carried_on(joints);
+  const double since_s = any_ ? seconds(joints.stamp_ns - joints_.stamp_ns) : 0.0;
+  JointFeedback smooth = joints;
+  smooth.dq_radps = speeds_.smoothed(joints.dq_radps, since_s);
+  JointFeedback carried = carried_on(smooth);
   carried.q_rad -= encoders_.offset_rad();
   carried.tau_nm /= forces_.torque_scale();
   level_soles(base_up, stands, carried);
@@ -80,7 +84,7 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
     ++counters_.jump;
     return false;
   }
-  dt_s_ = any_ ? seconds(joints.stamp_ns - joints_.stamp_ns) : 0.0;
+  dt_s_ = since_s;
   joints_ = carried;
   frames_ = body_frames(robot_->legs, joints_.q_rad);
   for (std::size_t n = 0; n < kJointCount; ++n) replied_ns_[n] = joints.stamp_ns - joints.silent_ns(n);

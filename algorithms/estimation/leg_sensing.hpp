@@ -6,6 +6,7 @@
 #include "algorithms/estimation/calibration/encoder_offsets.hpp"
 #include "algorithms/estimation/contact/foot_forces.hpp"
 #include "algorithms/estimation/contact/leg_measurement.hpp"
+#include "algorithms/estimation/joint_speeds.hpp"
 
 namespace polygmap {
 
@@ -14,6 +15,7 @@ class LegSensing {
   struct Params {
     EncoderOffsets::Params encoders;
     FootForces::Params forces;
+    JointSpeeds::Params speeds;
     double max_torque_nm = 1000.0;
     double max_joint_rad = 4.0;
     double max_joint_speed_radps = 15.0;
@@ -24,6 +26,7 @@ class LegSensing {
     static void visit(auto& p, auto& field) {
       field("encoders", p.encoders);
       field("forces", p.forces);
+      field("speeds", p.speeds);
       field("max_torque_nm", p.max_torque_nm, 1.0, 100000.0, "A joint sample of a higher torque is invalid.");
       field("max_joint_rad", p.max_joint_rad, 1.0, 100.0, "A joint sample of a larger angle is invalid.");
       field("max_joint_speed_radps", p.max_joint_speed_radps, 0.1, 1000.0,
@@ -56,8 +59,8 @@ class LegSensing {
                      const std::array<FootContact, kFootCount>& contacts, double longest_s) noexcept;
   void forget_offsets() noexcept { encoders_.learn_anew(); }
 
-  // The last accepted feedback, its angles without offset_rad(), its torques as the legs need them (over
-  // torque_scale()), its forces those of FootForces; any() is false before the first.
+  // The last accepted feedback, its angles without offset_rad(), its speeds smooth, its torques as the legs need them
+  // (over torque_scale()), its forces those of FootForces; any() is false before the first.
   [[nodiscard]] const JointFeedback& joints() const noexcept { return joints_; }
   [[nodiscard]] bool any() const noexcept { return any_; }
   [[nodiscard]] const JointVector& offset_rad() const noexcept { return encoders_.offset_rad(); }
@@ -78,6 +81,7 @@ class LegSensing {
   Counters counters_;
   EncoderOffsets encoders_;
   FootForces forces_;
+  JointSpeeds speeds_;
   JointFeedback joints_;                                // last accepted
   BodyFrames frames_;                                   // of it
   std::int64_t felt_ns_ = 0;                            // when both feet's forces were told last

@@ -4,7 +4,7 @@
 // Printed, eq. (6) has no memory: with dt = 2 ms and tau = 4 s LIO would weigh 0.05 % and drift would stay. Read
 // recursively it low-passes the offset between the two; done at the stamp of the LIO pose. Done at its arrival, 100 ms
 // later, the world of a climb with perfect sensors was 5.8 mm off at worst instead of 0.3 mm (the test of a late LIO in
-// estimation_fusion_test.cpp).
+// lio_fusion_test.cpp).
 #pragma once
 
 #include <cstdint>

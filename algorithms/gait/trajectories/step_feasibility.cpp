@@ -12,7 +12,6 @@ namespace polygmap {
 StepKnots::StepKnots(const RobotModel& robot, const StepParams& params, std::int32_t knot_ticks, const StepPlan& step,
                      const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept
     : foot_(step.goal.foot),
-      mass_kg_(robot.masses.total_kg()),
       soles_(soles),
       joint_margin_rad_(step.joint_margin_rad),
       shift_ticks_(step.shift_ticks),
@@ -40,8 +39,7 @@ StepKnot StepKnots::operator[](std::int32_t i) const noexcept {
   } else {
     const TorsoTrajectory::State torso = lean_.at(swing_tick, com_.at(knot.tick));
     knot.odom_T_base = TorsoTrajectory::pose(torso);
-    knot.odom_force_n =
-        mass_kg_ * Vec3{torso[0].acceleration, torso[1].acceleration, kGravity_mps2 + torso[2].acceleration};
+    knot.odom_felt_mps2 = {torso[0].acceleration, torso[1].acceleration, kGravity_mps2 + torso[2].acceleration};
     knot.odom_zmp_m = com_.zmp_m(knot.tick);
     knot.odom_T_sole[index_of(foot_)] = swing_.at(swing_tick);
   }
@@ -90,16 +88,17 @@ void StepFeasibility::check_joints(const DriveModel& drives, const JointVector& 
   }
 }
 
-// Hip and knee: what an ankle gives follows the zero-moment point, which ComPlan bounds.
+// Hip and knee: what an ankle gives follows the zero-moment point, whose way off the plan StepParams bounds.
 void StepFeasibility::check_torques(const RobotModel& robot, const StepKnot& knot) noexcept {
   if (!knots_.swings_at(knot.tick)) return;
   const Foot stance = knots_.stance();
   const Mat3 base_R_odom = knot.odom_T_base.R.transpose();
   Vec3 odom_arm_m = Vec3::Zero();
   odom_arm_m.head<2>() = knot.odom_zmp_m - knot.odom_T_sole[index_of(stance)].p_m.head<2>();
-  const SoleWrench ground{base_R_odom * knot.odom_force_n, base_R_odom * odom_arm_m.cross(knot.odom_force_n)};
+  const Vec3 odom_force_n = robot.masses.total_kg() * knot.odom_felt_mps2;
+  const SoleWrench ground{base_R_odom * odom_force_n, base_R_odom * odom_arm_m.cross(odom_force_n)};
   std::array<Vec3, kJointsPerLeg> specific_mps2;
-  specific_mps2.fill(base_R_odom * (-knot.odom_force_n / robot.masses.total_kg()));
+  specific_mps2.fill(base_R_odom * -knot.odom_felt_mps2);
   const LegVector torque_nm = leg_torques_nm(robot.masses, stance, frames_[index_of(stance)], specific_mps2, ground);
   for (std::size_t j = 0; j <= kKnee; ++j) {
     const double limit_nm = robot.drives.limits[joint_index(stance, j)].torque_nm;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Can the legs do a step? Its knots (eqs 30, 37), followed with the leg kinematics.
+// Can the legs do a step? Its knots (eqs 30, 37), followed with kinematics and statics of the legs.
 #pragma once
 
 #include "algorithms/gait/trajectories/step_plan.hpp"
@@ -13,8 +13,8 @@ namespace polygmap {
 struct StepKnot {
   std::array<Transform, kFootCount> odom_T_sole;
   Transform odom_T_base;
-  Vec3 odom_force_n = Vec3::Zero();  // of the ground on the stance foot while the other swings
-  Vec2 odom_zmp_m = Vec2::Zero();    // where it acts
+  Vec3 odom_felt_mps2 = Vec3::Zero();  // while a foot swings: the body's acceleration against free fall
+  Vec2 odom_zmp_m = Vec2::Zero();      // then: where the ground carries the stance foot
   std::int32_t tick = 0;
 };
 
@@ -36,7 +36,6 @@ class StepKnots {
 
  private:
   Foot foot_ = Foot::kLeft;
-  double mass_kg_ = 0.0;
   std::array<Transform, kFootCount> soles_;
   TorsoTrajectory shift_, lean_;
   ComPlan com_;
@@ -54,22 +53,24 @@ struct StepCheck {
   double torque_share = 0.0;      // greatest, of hip and knee that carry the body alone, of the drive's limit
 };
 
-// Follows the knots with the leg kinematics, as many per call as the tick can spare. Every call is given the same robot
-// and parameters.
+// Follows the knots with kinematics and statics of the legs, as many per call as the tick can spare. Every call is
+// given the same robot and parameters.
 class StepFeasibility {
  public:
   void begin(const RobotModel& robot, const StepKnots& knots) noexcept;
-  // Up to `count` knots; true when all are done or one cannot be. A knot costs two leg solutions and a centre of mass.
+  // Up to `count` knots; true when all are done or one cannot be. A knot costs two leg solutions, the frames
+  // of both legs, a centre of mass and the torques of one leg.
   bool advance(const RobotModel& robot, const StepParams& params, std::int32_t count) noexcept;
   [[nodiscard]] const StepCheck& check() const noexcept { return check_; }
   [[nodiscard]] const StepKnots& knots() const noexcept { return knots_; }
 
  private:
-  // Both legs at a knot; false when one is out of reach. The plan says where the centre of mass is: the base, which is
-  // moved there, follows from where the legs were before.
+  // Both legs at a knot; false when one is out of reach. The base is placed so that the centre of mass of the last
+  // posture is where the plan has it; knot.odom_T_base is changed.
   bool solve(const RobotModel& robot, StepKnot& knot, JointVector& q_rad) noexcept;
   void check_joints(const DriveModel& drives, const JointVector& q_rad) noexcept;
-  // With frames_ those of the knot.
+  // Of the stance leg while the other one swings, as if all links had the centre of mass's acceleration and the
+  // swinging leg hung on the torso. Two legs that stand are not asked: they share. frames_ are the knot's.
   void check_torques(const RobotModel& robot, const StepKnot& knot) noexcept;
 
   StepKnots knots_;

@@ -21,7 +21,7 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
                                              : params.durations.stair_swing_ticks;
   plan.swing_ticks = static_cast<std::int32_t>(tried.longer * usual_ticks);
   const double rise_share = on_floor ? 1.0 : passing ? params.passing_rise_share : params.rise_share;
-  plan.rise_ticks = static_cast<std::int32_t>(tried.rise_longer * rise_share * plan.swing_ticks);
+  plan.rise_ticks = static_cast<std::int32_t>(std::min(tried.rise_longer * rise_share, 1.0) * plan.swing_ticks);
   plan.tried = tried;
   plan.joint_margin_rad = goal.kind == StepKind::kClosing ? params.closing_margin_rad : params.joint_margin_rad;
   plan.shape.toe_down_rad = on_floor ? 0.5 * tried.toe_down_rad : tried.toe_down_rad;

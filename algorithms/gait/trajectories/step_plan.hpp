@@ -94,8 +94,9 @@ struct StepParams {
           "The plan of a step that brings back a foot from too far out keeps this: its ankle has no more.");
     field("knee_min_rad", p.knee_min_rad, 0.0, 0.5, "A plan keeps the knee this far from the stretched leg.");
     field("speed_share", p.speed_share, 0.1, 1.0, "A plan uses this share of the drives' speed.");
-    field("torque_share", p.torque_share, 0.1, 2.0,
-          "A plan uses this share of the drives' torque: a knee that has no more lags and then throws the body up.");
+    field("torque_share", p.torque_share, 0.1, 1.0,
+          "A plan uses at most this share of the drives' torque: a knee that has no more lags and then throws the body "
+          "up.");
     field("durations", p.durations);
   }
 };
@@ -105,7 +106,7 @@ struct StepParams {
 struct StepTry {
   double toe_down_rad = 0.0;  // half of it on the floor
   double longer = 1.0;        // the swing
-  double rise_longer = 1.0;   // the torso's rise, of the swing
+  double rise_longer = 1.0;   // factor on the torso's rise, which takes a share of the swing
 };
 inline constexpr std::size_t kStepTryCount = 8;
 using StepTries = std::array<StepTry, kStepTryCount>;
