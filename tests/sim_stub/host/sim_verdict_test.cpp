@@ -41,7 +41,8 @@ TEST(ClimbVerdict, ModuleStopped_NamesWhatItMeasured) {
   climb.tick();
   const ClimbSummary s = climb.finish();
   EXPECT_FALSE(s.pass);
-  EXPECT_EQ(s.reason, "The module stopped after 0 of 2 steps: the next surface that it saw was too high to step on (0.498 m).");
+  EXPECT_EQ(s.reason,
+            "The module stopped after 0 of 2 steps: the next surface that it saw was too high to step on (0.498 m).");
   EXPECT_TRUE(std::isnan(s.climb_time_s));
   EXPECT_TRUE(std::isnan(s.swing_clearance_min_m));  // nothing swung
 }
