@@ -52,14 +52,12 @@ void StepFeasibility::begin(const RobotModel& robot, const StepKnots& knots) noe
   next_ = 0;
   previous_.setZero();
   frames_ = body_frames(robot.legs, previous_);
-  constexpr int kPasses = 3;  // of base and legs that follow each other
-  for (int i = 0; i < kPasses; ++i) {
-    StepKnot knot = knots_[0];
-    (void)solve(robot, knot, previous_);
-  }
+  StepKnot knot = knots_[0];  // base and legs follow each other: this knot is solved again
+  (void)solve(robot, knot, previous_);
+  frames_ = body_frames(robot.legs, previous_);
 }
 
-bool StepFeasibility::solve(const RobotModel& robot, StepKnot& knot, JointVector& q_rad) noexcept {
+bool StepFeasibility::solve(const RobotModel& robot, StepKnot& knot, JointVector& q_rad) const noexcept {
   const Vec3 base_p_com = centre_of_mass_m(robot.masses, base_p_links_m(robot.masses, frames_));
   knot.odom_T_base.p_m.head<2>() -= (knot.odom_T_base.R * base_p_com).head<2>();
   const Transform base_T_odom = knot.odom_T_base.inverse();
@@ -69,7 +67,6 @@ bool StepFeasibility::solve(const RobotModel& robot, StepKnot& knot, JointVector
     reachable = reachable && s.reachable;
     q_rad.segment<static_cast<int>(kJointsPerLeg)>(static_cast<Eigen::Index>(joint_index(leg, 0))) = s.q_rad;
   }
-  frames_ = body_frames(robot.legs, q_rad);
   return reachable;
 }
 
@@ -88,22 +85,19 @@ void StepFeasibility::check_joints(const DriveModel& drives, const JointVector& 
   }
 }
 
-// Hip and knee: what an ankle gives follows the zero-moment point, whose way off the plan StepParams bounds.
-void StepFeasibility::check_torques(const RobotModel& robot, const StepKnot& knot) noexcept {
+// The hips' drives have plenty, and what an ankle gives follows the zero-moment point.
+void StepFeasibility::check_knee_torque(const RobotModel& robot, const StepKnot& knot) noexcept {
   if (!knots_.swings_at(knot.tick)) return;
   const Foot stance = knots_.stance();
   const Mat3 base_R_odom = knot.odom_T_base.R.transpose();
+  const Vec3 felt_mps2 = base_R_odom * knot.odom_felt_mps2;
   Vec3 odom_arm_m = Vec3::Zero();
   odom_arm_m.head<2>() = knot.odom_zmp_m - knot.odom_T_sole[index_of(stance)].p_m.head<2>();
-  const Vec3 odom_force_n = robot.masses.total_kg() * knot.odom_felt_mps2;
-  const SoleWrench ground{base_R_odom * odom_force_n, base_R_odom * odom_arm_m.cross(odom_force_n)};
-  std::array<Vec3, kJointsPerLeg> specific_mps2;
-  specific_mps2.fill(base_R_odom * -knot.odom_felt_mps2);
-  const LegVector torque_nm = leg_torques_nm(robot.masses, stance, frames_[index_of(stance)], specific_mps2, ground);
-  for (std::size_t j = 0; j <= kKnee; ++j) {
-    const double limit_nm = robot.drives.limits[joint_index(stance, j)].torque_nm;
-    check_.torque_share = std::max(check_.torque_share, std::abs(torque_nm[static_cast<Eigen::Index>(j)]) / limit_nm);
-  }
+  const Vec3 force_n = robot.masses.total_kg() * felt_mps2;
+  const double torque_nm = knee_torque_nm(robot.masses, stance, frames_[index_of(stance)], -felt_mps2,
+                                          {force_n, (base_R_odom * odom_arm_m).cross(force_n)});
+  const double limit_nm = robot.drives.limits[joint_index(stance, kKnee)].torque_nm;
+  check_.torque_share = std::max(check_.torque_share, std::abs(torque_nm) / limit_nm);
 }
 
 bool StepFeasibility::advance(const RobotModel& robot, const StepParams& params, std::int32_t count) noexcept {
@@ -112,8 +106,9 @@ bool StepFeasibility::advance(const RobotModel& robot, const StepParams& params,
     StepKnot knot = knots_[next_];
     JointVector q_rad;
     if (!solve(robot, knot, q_rad)) check_.feasible = false;
+    frames_ = body_frames(robot.legs, q_rad);
     check_joints(robot.drives, q_rad);
-    check_torques(robot, knot);
+    check_knee_torque(robot, knot);
     previous_ = q_rad;
     check_.feasible = check_.feasible && check_.joint_margin_rad >= knots_.joint_margin_rad() &&
                       check_.knee_rad >= params.knee_min_rad && check_.speed_share <= params.speed_share &&

@@ -50,7 +50,7 @@ struct StepCheck {
   double joint_margin_rad = 0.0;  // least, over all knots and joints
   double knee_rad = 0.0;          // least
   double speed_share = 0.0;       // greatest, of the drive's limit
-  double torque_share = 0.0;      // greatest, of hip and knee that carry the body alone, of the drive's limit
+  double torque_share = 0.0;      // greatest, of the knee that carries the body alone, of the drive's limit
 };
 
 // Follows the knots with kinematics and statics of the legs, as many per call as the tick can spare. Every call is
@@ -59,7 +59,7 @@ class StepFeasibility {
  public:
   void begin(const RobotModel& robot, const StepKnots& knots) noexcept;
   // Up to `count` knots; true when all are done or one cannot be. A knot costs two leg solutions, the frames
-  // of both legs, a centre of mass and the torques of one leg.
+  // of both legs, a centre of mass and the torque of one knee.
   bool advance(const RobotModel& robot, const StepParams& params, std::int32_t count) noexcept;
   [[nodiscard]] const StepCheck& check() const noexcept { return check_; }
   [[nodiscard]] const StepKnots& knots() const noexcept { return knots_; }
@@ -67,16 +67,16 @@ class StepFeasibility {
  private:
   // Both legs at a knot; false when one is out of reach. The base is placed so that the centre of mass of the last
   // posture is where the plan has it; knot.odom_T_base is changed.
-  bool solve(const RobotModel& robot, StepKnot& knot, JointVector& q_rad) noexcept;
+  bool solve(const RobotModel& robot, StepKnot& knot, JointVector& q_rad) const noexcept;
   void check_joints(const DriveModel& drives, const JointVector& q_rad) noexcept;
   // Of the stance leg while the other one swings, as if all links had the centre of mass's acceleration and the
   // swinging leg hung on the torso. Two legs that stand are not asked: they share. frames_ are the knot's.
-  void check_torques(const RobotModel& robot, const StepKnot& knot) noexcept;
+  void check_knee_torque(const RobotModel& robot, const StepKnot& knot) noexcept;
 
   StepKnots knots_;
   StepCheck check_;
   JointVector previous_ = JointVector::Zero();
-  BodyFrames frames_;  // of previous_
+  BodyFrames frames_;  // of the last posture
   std::int32_t next_ = 0;
 };
 
