@@ -10,13 +10,15 @@
 namespace polygmap {
 namespace {
 
-JointFeedback carried_on(const JointFeedback& joints) noexcept {
+// With speeds that its own were smoothed to.
+JointFeedback carried_on(const JointFeedback& joints, const JointVector& dq_radps) noexcept {
   JointFeedback carried = joints;
+  carried.dq_radps = dq_radps;
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const std::uint16_t cycles = std::min(joints.silent_cycles[n], JointFeedback::kCarried_cycles);
     if (cycles == 0) continue;
     const auto i = static_cast<Eigen::Index>(n);
-    carried.q_rad[i] += cycles * kTick_s * joints.dq_radps[i];
+    carried.q_rad[i] += cycles * kTick_s * dq_radps[i];
     if (joints.is_mute(n)) carried.dq_radps[i] = 0.0;
   }
   return carried;
@@ -74,9 +76,7 @@ bool LegSensing::try_take(const JointFeedback& joints, std::int64_t latest_ns, c
     return false;
   }
   const double since_s = any_ ? seconds(joints.stamp_ns - joints_.stamp_ns) : 0.0;
-  JointFeedback smooth = joints;
-  smooth.dq_radps = speeds_.smoothed(joints.dq_radps, since_s);
-  JointFeedback carried = carried_on(smooth);
+  JointFeedback carried = carried_on(joints, speeds_.smoothed(joints.dq_radps, since_s));
   carried.q_rad -= encoders_.offset_rad();
   carried.tau_nm /= forces_.torque_scale();
   level_soles(base_up, stands, carried);

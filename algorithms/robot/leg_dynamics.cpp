@@ -65,18 +65,4 @@ LegVector leg_torques_nm(const MassModel& masses, Foot leg, const LegFrames& f,
   return torque_nm;
 }
 
-double knee_torque_nm(const MassModel& masses, Foot leg, const LegFrames& f, const Vec3& specific_mps2,
-                      const SoleWrench& ground) noexcept {
-  double mass_kg = 0.0;
-  Vec3 mass_m = Vec3::Zero();  // of what hangs on the knee
-  for (std::size_t j = kKnee; j < kJointsPerLeg; ++j) {
-    mass_kg += masses.leg[j].mass_kg;
-    mass_m += masses.leg[j].mass_kg * base_p_link(f, masses, leg, j);
-  }
-  const Transform& knee = f.joint[kKnee];
-  const Vec3 moment_nm = ground.moment_nm + (f.sole.p_m - knee.p_m).cross(ground.force_n) +
-                         (mass_m - mass_kg * knee.p_m).cross(specific_mps2);
-  return -knee.R.col(kJointAxis[kKnee]).dot(moment_nm);
-}
-
 }  // namespace polygmap

@@ -33,8 +33,5 @@ struct PerLink {
 [[nodiscard]] LegVector leg_torques_nm(const MassModel& masses, Foot leg, const LegFrames& frames,
                                        const std::array<Vec3, kJointsPerLeg>& specific_mps2,
                                        const SoleWrench& ground) noexcept;
-// The knee's alone, of a leg whose links all feel the same.
-[[nodiscard]] double knee_torque_nm(const MassModel& masses, Foot leg, const LegFrames& frames,
-                                    const Vec3& specific_mps2, const SoleWrench& ground) noexcept;
 
 }  // namespace polygmap

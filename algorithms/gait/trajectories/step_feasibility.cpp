@@ -94,8 +94,10 @@ void StepFeasibility::check_knee_torque(const RobotModel& robot, const StepKnot&
   Vec3 odom_arm_m = Vec3::Zero();
   odom_arm_m.head<2>() = knot.odom_zmp_m - knot.odom_T_sole[index_of(stance)].p_m.head<2>();
   const Vec3 force_n = robot.masses.total_kg() * felt_mps2;
-  const double torque_nm = knee_torque_nm(robot.masses, stance, frames_[index_of(stance)], -felt_mps2,
-                                          {force_n, (base_R_odom * odom_arm_m).cross(force_n)});
+  std::array<Vec3, kJointsPerLeg> specific_mps2;
+  specific_mps2.fill(-felt_mps2);
+  const double torque_nm = leg_torques_nm(robot.masses, stance, frames_[index_of(stance)], specific_mps2,
+                                          {force_n, (base_R_odom * odom_arm_m).cross(force_n)})[kKnee];
   const double limit_nm = robot.drives.limits[joint_index(stance, kKnee)].torque_nm;
   check_.torque_share = std::max(check_.torque_share, std::abs(torque_nm) / limit_nm);
 }

@@ -95,8 +95,8 @@ struct StepParams {
     field("knee_min_rad", p.knee_min_rad, 0.0, 0.5, "A plan keeps the knee this far from the stretched leg.");
     field("speed_share", p.speed_share, 0.1, 1.0, "A plan uses this share of the drives' speed.");
     field("torque_share", p.torque_share, 0.1, 1.0,
-          "A plan uses at most this share of the drives' torque: a knee that has no more lags and then throws the body "
-          "up.");
+          "A plan asks the knee that stands alone for at most this share of its drive's torque: one that has no more "
+          "lags and then throws the body up.");
     field("durations", p.durations);
   }
 };

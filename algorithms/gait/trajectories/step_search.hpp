@@ -11,7 +11,7 @@ namespace polygmap {
 class StepSearch {
  public:
   enum class State : std::uint8_t { kSearching, kFound, kImpossible };
-  static constexpr std::int32_t kKnotsPerCall = 2;  // beside them a tick has to fit its budget
+  static constexpr std::int32_t kKnotsPerCall = 2;  // as many as a tick of the gait has room for
   static constexpr std::int32_t kLookAhead = 2;     // as far apart are the knots of a step that is proved again later
 
   // trailing: the goal of the step after one that leads; ignored otherwise. shift_ticks: of the shift before the goal's

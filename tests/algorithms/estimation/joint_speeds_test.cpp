@@ -35,7 +35,7 @@ TEST(JointSpeeds, SmoothSpeeds_PassToTheBit) {
   }
 }
 
-TEST(JointSpeeds, CoarseEncoderDifferenced_FollowsTheJointWithAFewTenthsOfARadianPerSecond) {
+TEST(JointSpeeds, CoarseEncoderDifferenced_FollowsTheJointWithLessThanHalfTheNoise) {
   constexpr double kRate_radps = 3.0, kSwing_rad = 0.3;
   const auto q_rad = [](double t_s) { return kSwing_rad * std::sin(kRate_radps * t_s); };
   JointSpeeds speeds;

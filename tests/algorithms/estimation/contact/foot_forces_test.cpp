@@ -131,7 +131,6 @@ TEST_F(FootForcesTest, DrivesTellAFourthMore_ForcesAreThoseOfTheWeight) {
   EXPECT_LT(ticks(50, {0.0, 2.0 * half_n}, {40.0, -40.0})[0], 25.0) << "that zero is not the weight's";
 }
 
-// Nobody said yet that it stands, or the plan says early that it does not.
 // The scale is not known yet when the robot first stands: torques that are a fourth too high would leave the zero of an
 // exact sensor 67 N off.
 TEST_F(FootForcesTest, DrivesTellAFourthMore_AnExactSensorKeepsItsZero) {
@@ -141,6 +140,7 @@ TEST_F(FootForcesTest, DrivesTellAFourthMore_AnExactSensorKeepsItsZero) {
   EXPECT_NEAR(ticks(1, {270.0, 270.0}, {0.0, 0.0})[0], 270.0, 20.0);
 }
 
+// Nobody said yet that it stands, or the plan says early that it does not.
 TEST_F(FootForcesTest, LoadedFootThatIsSaidToHang_TeachesNothing) {
   says_stands_ = false;
   (void)tick({270.0, 270.0}, {kNaN, kNaN});
