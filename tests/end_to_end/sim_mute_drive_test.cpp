@@ -122,6 +122,26 @@ TEST(MuteDrive, ForSixtyMilliseconds_ClimbsOn) {
   }
 }
 
+// As when a cycle's frames are lost on all buses, again and again.
+TEST(LongMuteDriveGap, AllDrivesForFiftyMilliseconds_ClimbsOn) {
+  const BusClimb::Options options = climb_of(GaitPattern::kDoubleStep);
+  const std::vector<SwingTimes> swings = swings_of(options);
+  for (std::size_t n = kOnto; n < kOnto + 3; ++n) {
+    const double air_s = swings.at(n).touch_down_s - swings.at(n).lift_off_s;
+    for (const double share : {-0.3, 0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95}) {
+      BusClimb climb(options);
+      climb.run_until(swings.at(n).lift_off_s + share * air_s);
+      for (std::size_t j = 0; j < kJointCount; ++j) climb.set_mute({false, j}, true);
+      climb.run_on(0.05);
+      for (std::size_t j = 0; j < kJointCount; ++j) climb.set_mute({false, j}, false);
+      climb.run_until(60.0);
+      EXPECT_EQ(climb.status().phase, GaitPhase::kFinished) << n << ", " << share;
+      EXPECT_EQ(climb.status().treads_climbed, 2U);
+      EXPECT_FALSE(climb.truth().fell) << climb.truth().fall_reason;
+    }
+  }
+}
+
 TEST(LongMuteDriveGap, ForSixtyMillisecondsInEachPhaseOfASwing_ClimbsOn) {
   const BusClimb::Options options = climb_of(GaitPattern::kDoubleStep);
   const std::vector<SwingTimes> swings = swings_of(options);

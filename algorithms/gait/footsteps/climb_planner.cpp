@@ -202,10 +202,27 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   return true;
 }
 
-StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSet& footholds) const noexcept {
+std::optional<Foot> ClimbPlanner::slid_foot(const Situation& situation) const noexcept {
+  if (treads_climbed_ == 0 || !odom_stood_ || set_back_ >= params_.max_set_back) return std::nullopt;
+  std::array<Vec2, kFootCount> moved_m;
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    moved_m[i] = (situation.soles[i].position_m - (*odom_stood_)[i].position_m).head<2>();
+  }
+  if (!((moved_m[0] - moved_m[1]).norm() > params_.slid_m)) return std::nullopt;
+  return moved_m[0].norm() > moved_m[1].norm() ? Foot::kLeft : Foot::kRight;
+}
+
+bool ClimbPlanner::leave_slid_foot(const Situation& situation) noexcept {
+  if (closes_up_ || !slid_foot(situation)) return false;
+  set_back_ = params_.max_set_back;
+  return true;
+}
+
+StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSet& footholds,
+                                    Foot foot) const noexcept {
   StepGoal goal;
   goal.kind = StepKind::kClosing;
-  goal.foot = memory_.last_swing;
+  goal.foot = foot;
   goal.target = sole_beside_on_tread(situation.soles[index_of(other(goal.foot))], goal.foot, landed_,
                                      robot_->stance.half_width_m);
   goal.foothold = foothold_at(goal.target, footholds.map_stamp_ns);
@@ -237,9 +254,10 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
   if (split_stance_) {
     return passing_step(situation, footholds, decision) ? decision : trailing_step(situation, footholds);
   }
-  if (closes_up_) {
+  const std::optional<Foot> closing = closes_up_ ? memory_.last_swing : slid_foot(situation);
+  if (closing) {
     decision.has_step = true;
-    decision.goal = closing_goal(situation, footholds);
+    decision.goal = closing_goal(situation, footholds, *closing);
     return decision;
   }
   decision.measured_m = measured(footholds);
@@ -304,7 +322,8 @@ void ClimbPlanner::passing_ends_beside(const StepGoal& goal) noexcept {
 
 void ClimbPlanner::swing_aborted() noexcept { memory_ = before_latch_; }
 
-void ClimbPlanner::landed() noexcept {
+void ClimbPlanner::landed(const std::optional<SolePair>& soles) noexcept {
+  odom_stood_ = soles;
   stride_share_ = 1.0;
   closes_up_ = false;
   landed_ = latched_.goal.target;
@@ -313,12 +332,14 @@ void ClimbPlanner::landed() noexcept {
       ++floor_steps_;
       break;
     case StepKind::kClosing:
+      ++set_back_;
       break;
     case StepKind::kPassing:
       ++treads_climbed_;
       break;
     case StepKind::kLeading:
       split_stance_ = true;
+      set_back_ = 0;
       break;
     case StepKind::kTrailing:
       split_stance_ = passing_refused_ = false;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string_view>
 
 #include "algorithms/core/messages/footholds.hpp"
@@ -58,6 +59,8 @@ class ClimbPlanner {
     double shortest = 0.2;
     double least_half_width_m = 0.08;
     double wider_m = 0.03;
+    double slid_m = 0.012;
+    std::uint32_t max_set_back = 2;
     LineUpParams line_up;
 
     static void visit(auto& p, auto& field) {
@@ -86,6 +89,11 @@ class ClimbPlanner {
             "Floor steps keep the soles at least this far from their middle.");
       field("wider_m", p.wider_m, 0.0, 0.2,
             "Floor steps keep the soles no farther from their middle than the stance's half width and this.");
+      field("slid_m", p.slid_m, 0.002, 0.2,
+            "Two feet on a tread that are farther from where they stood to each other when they landed have slid: the "
+            "one "
+            "that moved is set back beside the other one.");
+      field("max_set_back", p.max_set_back, 0, 100, "Feet that slid are set back so often on a tread.");
       field("line_up", p.line_up);
     }
   };
@@ -127,8 +135,11 @@ class ClimbPlanner {
   [[nodiscard]] SolePose beside_passed(const SolePose& stance, Foot foot) const noexcept;
   // The passing foot that is in the air lands beside the standing one instead.
   void passing_ends_beside(const StepGoal& goal) noexcept;
-  // Its foot stands on its goal, or where it stood before: with which foot to lead as before the latch.
-  void landed() noexcept;
+  // The legs cannot set the foot back that slid: on without. False when none is to be.
+  [[nodiscard]] bool leave_slid_foot(const Situation& situation) noexcept;
+  // Its foot stands on its goal, or where it stood before: with which foot to lead as before the latch. soles: as
+  // estimated, none while the estimate tells nothing.
+  void landed(const std::optional<SolePair>& soles) noexcept;
   void swing_aborted() noexcept;
   [[nodiscard]] std::uint32_t tread_id() const noexcept { return tread_id_; }  // under the foot that landed last
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
@@ -138,8 +149,11 @@ class ClimbPlanner {
   // Past the standing foot onto the tread beyond it; false when there is none to be sure of.
   [[nodiscard]] bool passing_step(const Situation& situation, const FootholdSet& footholds,
                                   Decision& decision) const noexcept;
-  // The foot that landed last, beside the other one on the same tread.
-  [[nodiscard]] StepGoal closing_goal(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  // The foot beside the other one on the same tread.
+  [[nodiscard]] StepGoal closing_goal(const Situation& situation, const FootholdSet& footholds,
+                                      Foot foot) const noexcept;
+  // Of two that stand on one tread, by their places to each other: encoders tell, whatever odometry does.
+  [[nodiscard]] std::optional<Foot> slid_foot(const Situation& situation) const noexcept;
   [[nodiscard]] bool floor_goal(const Situation& situation, const FootholdSet& footholds,
                                 StepGoal& goal) const noexcept;
   [[nodiscard]] StopReason reason_against(const Situation& situation, const FootholdSet& footholds) const noexcept;
@@ -163,8 +177,10 @@ class ClimbPlanner {
   bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this
   bool passing_refused_ = false;
   bool closes_up_ = false;
-  SolePose landed_;             // where the foot that landed last was to
-  std::uint32_t tread_id_ = 0;  // under the foot that landed last
+  SolePose landed_;                     // where the foot that landed last was to
+  std::optional<SolePair> odom_stood_;  // both soles when it landed
+  std::uint32_t set_back_ = 0;          // feet that slid, on this tread
+  std::uint32_t tread_id_ = 0;          // under the foot that landed last
   std::uint32_t treads_climbed_ = 0;
   double stride_share_ = 1.0;  // of the floor step's limits
   std::uint32_t floor_steps_ = 0;

@@ -143,6 +143,14 @@ void BodyPlan::hold_landed_foot(const LandedFootParams& params, const JointFeedb
   }
 }
 
+void BodyPlan::hold_lifted_foot(const LandedFootParams& params, const JointFeedback& feedback,
+                                std::int64_t now_ns) noexcept {
+  if (landed_.held()) return;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    if (feedback.foot_force_n[index_of(leg)] < params.lifted_n) return land(leg, true, 0.0, now_ns);
+  }
+}
+
 void BodyPlan::release_landed_foot() noexcept {
   if (landed_.held()) posture_.restart();
   landed_.release();

@@ -36,7 +36,7 @@ Transition Standing::tick(const GaitInput& in, GaitShared& gait) noexcept {
   const double ahead_m = R.col(0).head<2>().dot(in.odom_dcm_error_m);
   const double left_m = R.col(1).head<2>().dot(in.odom_dcm_error_m);
   const bool sways = !(std::max(-ahead_m, std::abs(left_m)) <= gait.params.steady_m);
-  if ((gait.memory.retried || sways) && rest_.tick() < params.settle_ticks) return {};
+  if ((gait.memory.rests_first || sways) && rest_.tick() < params.settle_ticks) return {};
   // What it learns meanwhile may be that it does not stand straight yet: all of the time first, and once.
   if (toe_calibration_.active && rest_.tick() < params.toe_calibration.ticks) return {};
   const ClimbPlanner::Decision decision =

@@ -33,10 +33,11 @@ struct GaitInput {
 };
 
 struct GaitMemory {
-  std::int32_t shifts = 0;          // since the last swing
-  std::int32_t idle_ticks = 0;      // without a step to do since the last swing
-  std::int32_t obstacle_ticks = 0;  // of them, with an obstacle in the way
-  bool retried = false;  // the legs could not do a step from the motion the plan was in: once more, from rest
+  std::int32_t shifts = 0;                   // since the last swing
+  std::int32_t idle_ticks = 0;               // without a step to do since the last swing
+  std::int32_t obstacle_ticks = 0;           // of them, with an obstacle in the way
+  bool rests_first = false;                  // the next step begins from rest between the feet
+  std::int32_t refusals = 0;                 // of steps that the legs could not do, since the last swing
   std::uint32_t aborted_swings = 0;          // since the last foot that landed
   bool toes_calibrated = false;              // stood tall for it, or need not
   Mat3 left_R_right_met = Mat3::Identity();  // of the soles, when the gait was armed

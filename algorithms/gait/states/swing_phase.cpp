@@ -39,8 +39,8 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
       .odom_T_executed = {}};
   gait.status.phase = GaitPhase::kSwing;
   gait.status.stands[index_of(goal_.foot)] = false;
-  gait.memory.shifts = gait.memory.idle_ticks = gait.memory.obstacle_ticks = 0;
-  gait.memory.retried = false;
+  gait.memory.shifts = gait.memory.idle_ticks = gait.memory.obstacle_ticks = gait.memory.refusals = 0;
+  gait.memory.rests_first = false;
   body.release_landed_foot();
 }
 
@@ -162,7 +162,8 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .stopped = early_touch_.stops()},
                   path_.duration_ticks());
   // The torso is on its way up: the foot is to reach where it stood all the same.
-  if (timing_.goes_back() && !went_back) lower_torso(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
+  // The body was on its way ahead to the target, too.
+  if (timing_.goes_back() && !went_back) wait_over_stance(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
 }
 
 // Of a passing foot, the rest of the way straight to the target, or beside the standing foot while it is still behind
@@ -232,7 +233,7 @@ Transition SwingPhase::abort_swing(const GaitInput& in, GaitShared& gait) noexce
   gait.plan.restart_posture();
   gait.plan.carry_to_odometry();
   gait.status.phase = GaitPhase::kDoubleSupport;
-  gait.memory.retried = true;
+  gait.memory.rests_first = true;
   if (timing_.no_ground()) return Transition::stop(StopReason::kGroundMissing);
   if (++gait.memory.aborted_swings >= params.max_aborted) return Transition::stop(StopReason::kToppling);
   return Transition::stand();
@@ -248,7 +249,7 @@ Transition SwingPhase::touch_down(const GaitInput& in, GaitShared& gait, bool fe
   body.land(goal_.foot, felt, early_m, in.now_ns);
   if (!felt && std::isfinite(in.feedback.foot_force_n[i])) body.keep_upright();
   gait.memory.aborted_swings = 0;
-  gait.planner.landed();
+  gait.planner.landed(in.usable ? std::optional(situation(in).soles) : std::nullopt);
   gait.status.treads_climbed = gait.planner.treads_climbed();
   gait.status.phase = GaitPhase::kDoubleSupport;
   body.carry_to_odometry();

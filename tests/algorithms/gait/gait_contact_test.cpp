@@ -159,6 +159,34 @@ TEST(GaitContact, LandedFootHardlyPressed_StaysWhereItLanded) {
   }
 }
 
+// A foot went back, and the body sways over it: the other one, lifted with the base 20 mm off its plan, must not go
+// along.
+TEST(GaitContact, FootLiftedAfterTheOtherOneWentBack_StaysWhereItStood) {
+  IdealClimb climb({});
+  bool off = false;
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
+    const LatchedStep& step = climb.status().step;
+    const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns;
+    if (climb.status().phase == GaitPhase::kSwing && step.onto_tread && since_ns > 20 * kNsPerMs &&
+        since_ns < 80 * kNsPerMs) {
+      state.odom_v_base_mps.y() += side_sign(step.foot) * 0.15;
+    }
+    if (off) state.odom_T_base.p_m.x() += 0.02;
+    if (off) feedback.foot_force_n[index_of(other(step.foot))] = 0.0;
+  };
+  while (climb.tick() && climb.status().aborted_swings == 0) {
+  }
+  ASSERT_EQ(climb.status().aborted_swings, 1U);
+  const std::size_t lifted = index_of(other(climb.status().step.foot));
+  const Vec3 stood_m = climb.status().odom_T_sole_desired[lifted].p_m;
+  off = true;
+  for (int n = 0; n < 200; ++n) {
+    climb.tick();
+    ASSERT_EQ(climb.status().phase, GaitPhase::kDoubleSupport);
+    EXPECT_LT((climb.status().odom_T_sole_desired[lifted].p_m - stood_m).norm(), 2e-3) << n;
+  }
+}
+
 TEST(GaitContact, BumpInTheAir_HoldsTheReferenceWithoutAJump) {
   IdealClimb climb({});
   climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {

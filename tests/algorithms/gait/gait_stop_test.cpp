@@ -129,6 +129,24 @@ TEST(GaitStop, LeadingStepBeyondTheLegs_StopsBeforeTheStairsWithTheRise) {
   EXPECT_FALSE(climb.status().step.onto_tread);
 }
 
+// As from a body that a push still moves: from rest the same step is one for the legs.
+TEST(GaitStop, LegsCannotTwice_TriesOnceMoreAndClimbs) {
+  const auto refused_until = [](IdealClimb& climb, std::int64_t until_ns) {
+    climb.tamper = [&climb, until_ns](StateEstimate& state, FootholdSet& set, JointFeedback&) {
+      if (climb.status().treads_climbed != 1 || state.stamp_ns >= until_ns) return;
+      for (Foothold& hold : set.p_star_feet) hold.position_m.z() += 0.2;
+    };
+    climb.run(60.0);
+  };
+  Gait::Params twice;
+  twice.weight_shift.max_refusals = 2;
+  IdealClimb stopped({}, twice), climbed({});
+  refused_until(stopped, 60 * kNsPerS);
+  ASSERT_EQ(stopped.status().stop_reason, StopReason::kLegsCannot);
+  refused_until(climbed, stopped.record().end_ns);
+  EXPECT_EQ(climbed.status().phase, GaitPhase::kFinished);
+}
+
 TEST(GaitStop, TrailingStepBeyondTheLegs_BlamesNoRise) {
   IdealClimb climb({});
   climb.tamper = [&](StateEstimate&, FootholdSet& set, JointFeedback&) {

@@ -22,7 +22,7 @@ TEST(ClimbPlanner, ClosesUpBesideAFootThatTurned_LandsAsFarAlongTheTreadAsItsFoo
   situation.soles = {SolePose{odom_R_stairs * Vec3{0.96, 0.17, 0.131}, kYaw_rad},
                      SolePose{odom_R_stairs * Vec3{0.985, -0.105, 0.129}, kYaw_rad + 0.055}};
   planner.latched(situation, landed);
-  planner.landed();
+  planner.landed(std::nullopt);
   ClimbPlanner::Decision aborted;  // a swing that went back is none that landed
   aborted.goal.kind = StepKind::kLeading;
   aborted.goal.foot = Foot::kRight;
@@ -57,7 +57,7 @@ TEST(ClimbPlanner, TrailingStepAfterALongPause_KeepsTheSpacingOfTheFootholds) {
   leading.trailing.foothold.last_seen_ns = 5;
   leading.trailing.foothold.side_room_m = {0.02, 0.03};
   planner.latched({}, leading);
-  planner.landed();
+  planner.landed(std::nullopt);
   ClimbPlanner::Situation situation;
   situation.stamp_ns = params.remembered_ns + 6;
   situation.soles = {SolePose{{0.7, 0.1, 0.0}, 0.0}, SolePose{{1.05, -0.10, 0.131}, 0.0}};
@@ -80,7 +80,7 @@ TEST(ClimbPlanner, PassingFootLandsBesideAFootThatTurned_AsFarAlongTheTreadAsIts
   leading.trailing.foothold.position_m = {1.0, 0.1, 0.13};
   leading.trailing.foothold.polygon_id = 7;
   planner.latched({}, leading);
-  planner.landed();
+  planner.landed(std::nullopt);
   ClimbPlanner::Decision passing;
   passing.goal.kind = StepKind::kPassing;
   passing.goal.foot = Foot::kLeft;
@@ -95,6 +95,63 @@ TEST(ClimbPlanner, PassingFootLandsBesideAFootThatTurned_AsFarAlongTheTreadAsIts
   EXPECT_NEAR(beside.position_m.y(), stance.position_m.y() + 2.0 * robot.stance.half_width_m, 1e-12);
   EXPECT_NEAR(beside.position_m.z(), 0.129, 1e-12);
   EXPECT_EQ(beside.yaw_rad, 0.0);
+}
+
+// Both feet on tread 7, the left one landed last.
+struct OnATread {
+  RobotModel robot;
+  ClimbPlanner::Params params;
+  ClimbPlanner planner;
+  ClimbPlanner::Situation situation;
+
+  OnATread() {
+    planner.reset(params, robot);
+    situation.soles = {SolePose{{1.0, 0.1, 0.13}, 0.0}, SolePose{{1.0, -0.1, 0.13}, 0.0}};
+    ClimbPlanner::Decision trailing;
+    trailing.goal = {StepKind::kTrailing, Foot::kLeft, situation.soles[0], {}};
+    trailing.goal.foothold.polygon_id = 7;
+    planner.latched(situation, trailing);
+    planner.landed(situation.soles);
+  }
+  void land_on(const StepGoal& goal) {
+    planner.latched(situation, {.has_step = true, .goal = goal});
+    situation.soles[index_of(goal.foot)] = goal.target;
+    planner.landed(situation.soles);
+  }
+};
+
+TEST(ClimbPlanner, FootSlidOnATread_IsSetBackBesideTheOtherOne_AsOftenAsItMayBe) {
+  OnATread on;
+  for (std::uint32_t n = 0; n < on.params.max_set_back; ++n) {
+    on.situation.soles[1].position_m += Vec3{-0.011, -0.006, 0.0};
+    const ClimbPlanner::Decision decision = on.planner.decide(on.situation, {});
+    ASSERT_TRUE(decision.has_step);
+    EXPECT_EQ(decision.goal.kind, StepKind::kClosing);
+    EXPECT_EQ(decision.goal.foot, Foot::kRight);
+    EXPECT_EQ(decision.goal.foothold.polygon_id, 7U);
+    EXPECT_NEAR(decision.goal.target.position_m.x(), 1.0, 1e-12);
+    EXPECT_NEAR(decision.goal.target.position_m.y(), 0.1 - 2.0 * on.robot.stance.half_width_m, 1e-12);
+    on.land_on(decision.goal);
+  }
+  on.situation.soles[1].position_m.x() -= 0.02;
+  EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
+}
+
+TEST(ClimbPlanner, OdometryCarriesBothFeet_NoneSlid) {
+  OnATread on;
+  for (SolePose& sole : on.situation.soles) sole.position_m.x() += 0.05;
+  EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
+  on.situation.soles[1].position_m.x() += on.params.slid_m - 1e-4;
+  EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
+}
+
+TEST(ClimbPlanner, LegsCannotSetTheSlidFootBack_GoesOnWithout) {
+  OnATread on;
+  EXPECT_FALSE(on.planner.leave_slid_foot(on.situation)) << "none slid";
+  on.situation.soles[0].position_m.x() -= 0.02;
+  ASSERT_TRUE(on.planner.decide(on.situation, {}).has_step);
+  EXPECT_TRUE(on.planner.leave_slid_foot(on.situation));
+  EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
 }
 
 }  // namespace
