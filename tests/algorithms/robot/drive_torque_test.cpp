@@ -20,7 +20,7 @@ TEST(TorqueAvailable, UpToTheCorner_IsAllTorque) {
 TEST(TorqueAvailable, BeyondTheCorner_FallsLinearlyToNone) {
   EXPECT_DOUBLE_EQ(torque_available_nm(kDrive, 5.0), 75.0);
   EXPECT_DOUBLE_EQ(torque_available_nm(kDrive, -6.0), 50.0);
-  EXPECT_DOUBLE_EQ(torque_available_nm(kDrive, 7.6), 10.0);
+  EXPECT_NEAR(torque_available_nm(kDrive, 7.6), 10.0, 1e-12);
   EXPECT_EQ(torque_available_nm(kDrive, 8.0), 0.0);
   EXPECT_EQ(torque_available_nm(kDrive, -20.0), 0.0);
 }
