@@ -4,6 +4,7 @@
 namespace polygmap {
 
 void limit_torque(const JointLimits& limits, double q_rad, double dq_radps, JointSetpoint& joint) noexcept {
+  if (std::abs(dq_radps) <= limits.corner_radps) return;
   const TorqueRange range = torque_range_nm(limits, dq_radps);
   const double asked_nm = torque_asked_nm(joint, q_rad, dq_radps);
   const double given_nm = math::clamp(asked_nm, range.least_nm, range.most_nm);

@@ -31,9 +31,9 @@ struct TorqueRange {
   return joint.tau_ff_nm + joint.kp_nmprad * (joint.q_rad - q_rad) + joint.kd_nmsprad * (joint.dq_radps - dq_radps);
 }
 
-// The setpoint's feed-forward torque is changed so that it asks for no more than the drive has, and where that is not
-// enough its gains are lowered. A setpoint that asks for less stays as it is. Its feed-forward torque is no more than
-// torque_nm.
+// Beyond the corner the setpoint's feed-forward torque is changed so that all of it asks for no more than the drive
+// has, and where that is not enough its gains are lowered. A slower joint's setpoint stays as it is: what stiffness
+// asks for beyond torque_nm the drive cuts. The feed-forward torque is no more than torque_nm.
 void limit_torque(const JointLimits& limits, double q_rad, double dq_radps, JointSetpoint& joint) noexcept;
 
 }  // namespace polygmap

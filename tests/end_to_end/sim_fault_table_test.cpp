@@ -109,9 +109,11 @@ std::string beyond_limits(const DriveModel& drives, const LegSensing& sensing, c
     if (!(joint.kp_nmprad >= 0.0 && joint.kp_nmprad <= kp_most_nmprad)) return says("kp_nmprad", joint.kp_nmprad);
     if (!(joint.kd_nmsprad >= 0.0 && joint.kd_nmsprad <= kd_most_nmsprad)) return says("kd_nmsprad", joint.kd_nmsprad);
     const double asked_nm = asked_of_heard_drive_nm(drives, sensing, command, n);
-    const auto range = torque_range_nm(limits, sensing.joints().dq_radps[static_cast<Eigen::Index>(n)]);
-    if (asked_nm < range.least_nm - kRounding || asked_nm > range.most_nm + kRounding)
-      return says("torque_nm", asked_nm);
+    const double dq_radps = sensing.joints().dq_radps[static_cast<Eigen::Index>(n)];
+    if (std::abs(dq_radps) <= limits.corner_radps) continue;  // the drive cuts its own stiffness
+    const TorqueRange range = torque_range_nm(limits, dq_radps);
+    const bool there = asked_nm >= range.least_nm - kRounding && asked_nm <= range.most_nm + kRounding;
+    if (!there) return says("torque_nm", asked_nm);
   }
   return {};
 }

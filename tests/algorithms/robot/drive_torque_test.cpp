@@ -66,20 +66,28 @@ TEST(LimitTorque, BeyondTheNoLoadSpeed_DrivesNothingAndBrakes) {
 }
 
 TEST(LimitTorque, GainsBeyondTwiceTheTorque_AreLowered) {
-  JointSetpoint joint{1.0, 0.0, 0.0, 400.0, 10.0};
-  limit_torque(kDrive, 0.0, 0.0, joint);  // 400 Nm of stiffness: 100 less 100 of feed-forward leaves 200 of them
+  JointSetpoint joint{1.0, 6.0, 0.0, 300.0, 10.0};
+  limit_torque(kDrive, 0.0, 6.0, joint);  // 300 Nm of stiffness: 50 there and 100 of feed-forward leave 150 of them
   EXPECT_EQ(joint.tau_ff_nm, -100.0);
-  EXPECT_DOUBLE_EQ(joint.kp_nmprad, 200.0);
+  EXPECT_DOUBLE_EQ(joint.kp_nmprad, 150.0);
   EXPECT_DOUBLE_EQ(joint.kd_nmsprad, 5.0);
 }
 
-TEST(LimitTorque, AnySetpoint_AsksForNoMoreThanThereIs) {
+TEST(LimitTorque, SlowJoint_IsLeftToItsDrive) {
+  JointSetpoint joint{1.0, 0.0, 50.0, 400.0, 10.0};
+  limit_torque(kDrive, 0.0, 4.0, joint);
+  EXPECT_EQ(joint.tau_ff_nm, 50.0);
+  EXPECT_EQ(joint.kp_nmprad, 400.0);
+}
+
+TEST(LimitTorque, AnySetpointBeyondTheCorner_AsksForNoMoreThanThereIs) {
   std::mt19937 random(1);
   const auto within = [&](double most) { return std::uniform_real_distribution<>(-most, most)(random); };
   for (int i = 0; i < 100000; ++i) {
     const JointSetpoint before{within(3.0), within(6.0), within(100.0), std::abs(within(800.0)),
                                std::abs(within(20.0))};
     const double q_rad = within(3.0), dq_radps = within(10.0);
+    if (std::abs(dq_radps) <= kDrive.corner_radps) continue;
     JointSetpoint joint = before;
     limit_torque(kDrive, q_rad, dq_radps, joint);
     constexpr double kRounding = 1e-9;
