@@ -146,6 +146,7 @@ void SimRobot::update_truth() {
   truth_.true_p_com_m = plant_->true_p_com_m();
   truth_.zmp_margin_m = plant_->zmp_margin_m();
   truth_.drive_tau_nm = plant_->drive_tau_nm();
+  truth_.torque_limited = plant_->torque_limited();
   truth_.drive_dq_radps = plant_->drive_dq_radps();
   truth_.closure_error_m = plant_->closure_error_m();
   truth_.fell = plant_->fell();

@@ -7,6 +7,8 @@
 #include <limits>
 #include <optional>
 
+#include "algorithms/robot/drive_torque.hpp"
+
 namespace polygmap {
 namespace {
 
@@ -150,12 +152,23 @@ void LegSensing::learn_offsets(const std::array<LegMeasurement, kFootCount>& leg
 }
 
 void LegSensing::to_drives(JointCommand& command) const noexcept {
+  constexpr std::int64_t kTelling_ns = 6 * kNsPerMs;  // older angles tell no torque: the setpoint's own stand in
+  const std::int64_t age_ns = command.stamp_ns - joints_.stamp_ns;
+  const bool told = any_ && age_ns <= kTelling_ns;
+  const double until_taken_s = seconds(age_ns) + robot_->drives.delay_s;
   for (std::size_t n = 0; n < kJointCount; ++n) {
+    const auto i = static_cast<Eigen::Index>(n);
+    const double offset_rad = encoders_.offset_rad()[i];
     const JointLimits& limits = robot_->drives.limits[n];
     JointSetpoint& joint = command.joints[n];
-    joint.q_rad =
-        math::clamp(joint.q_rad + encoders_.offset_rad()[static_cast<Eigen::Index>(n)], limits.min_rad, limits.max_rad);
+    joint.q_rad = math::clamp(joint.q_rad + offset_rad, limits.min_rad, limits.max_rad);
     joint.tau_ff_nm = math::clamp(joint.tau_ff_nm * forces_.torque_scale(), -limits.torque_nm, limits.torque_nm);
+    if (told && !is_mute(n)) {
+      const double dq_radps = joints_.dq_radps[i];
+      limit_torque(limits, joints_.q_rad[i] + offset_rad + until_taken_s * dq_radps, dq_radps, joint);
+    } else {
+      limit_torque(limits, joint.q_rad, joint.dq_radps, joint);
+    }
   }
 }
 

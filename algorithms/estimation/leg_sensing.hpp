@@ -65,7 +65,9 @@ class LegSensing {
   [[nodiscard]] bool any() const noexcept { return any_; }
   [[nodiscard]] const JointVector& offset_rad() const noexcept { return encoders_.offset_rad(); }
   [[nodiscard]] double torque_scale() const noexcept { return forces_.torque_scale(); }
-  // A command in angles and torques of joints(), to what the drives' encoders will read and their motors take.
+  // A command in angles and torques of joints(), to what the drives' encoders will read and their motors take. No drive
+  // beyond its corner is asked for more torque, stiffness and damping included, than it has at its joint's speed: as
+  // told by joints(), carried on to when the command is taken.
   void to_drives(JointCommand& command) const noexcept;
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 

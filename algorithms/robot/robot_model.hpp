@@ -85,8 +85,12 @@ struct MassModel {
 struct JointLimits {
   double min_rad;
   double max_rad;
-  double speed_radps;
+  double speed_radps;  // no command asks for more
   double torque_nm;
+  // The torque-speed line of a motor at its supply's voltage: all its torque up to the corner, from there linearly
+  // less, and none at the speed that it reaches without a load. Braking has no such line.
+  double corner_radps;
+  double no_load_radps;
 
   static void visit(auto& p, auto& field) {
     field("min_rad", p.min_rad, -3.2, 3.2, "Least angle.");
@@ -94,6 +98,11 @@ struct JointLimits {
     field.ordered("min_rad", "max_rad");
     field("speed_radps", p.speed_radps, 0.1, 100.0, "Speed of the drive, not of the motor.");
     field("torque_nm", p.torque_nm, 1.0, 2000.0, "Torque of the drive, not of the motor.");
+    field("corner_radps", p.corner_radps, 0.1, 100.0, "Up to this speed the drive gives all its torque.");
+    field("no_load_radps", p.no_load_radps, 0.1, 100.0,
+          "At this speed it gives none, between the two linearly less; braking it gives all.");
+    field.ordered("corner_radps", "no_load_radps");
+    field.ordered("speed_radps", "no_load_radps");
   }
 };
 
@@ -104,9 +113,10 @@ struct JointLimits {
   for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
     const JointLimits& limits = left[j];
     const bool mirrored = j == kHipRoll || j == kHipYaw || j == kAnkleRoll;
-    both[j] = limits;
-    both[kJointsPerLeg + j] =
-        mirrored ? JointLimits{-limits.max_rad, -limits.min_rad, limits.speed_radps, limits.torque_nm} : limits;
+    both[j] = both[kJointsPerLeg + j] = limits;
+    if (!mirrored) continue;
+    both[kJointsPerLeg + j].min_rad = -limits.max_rad;
+    both[kJointsPerLeg + j].max_rad = -limits.min_rad;
   }
   return both;
 }
@@ -119,13 +129,14 @@ struct GainLimits {
 
 // What moves the joints, and how they are held.
 struct DriveModel {
-  // In the order of joint_index().
-  std::array<JointLimits, kJointCount> limits = mirrored_limits({{{-0.314, 0.663, 4.0, 180.0},
-                                                                  {-0.873, 0.785, 4.0, 100.0},
-                                                                  {-2.007, 1.571, 8.0, 100.0},
-                                                                  {0.0, 2.531, 5.0, 180.0},
-                                                                  {-0.873, 0.349, 4.0, 36.0},
-                                                                  {-0.262, 0.262, 4.0, 36.0}}});
+  // In the order of joint_index(). A KUAVO's public description has the ranges and torques, its drive configuration the
+  // speeds. Its drives' lines are not published and are assumed: all torque up to 0.8 of the speed, none at 1.5 of it.
+  std::array<JointLimits, kJointCount> limits = mirrored_limits({{{-0.314, 0.663, 4.0, 180.0, 3.2, 6.0},
+                                                                  {-0.873, 0.785, 4.0, 100.0, 3.2, 6.0},
+                                                                  {-2.007, 1.571, 8.0, 100.0, 6.4, 12.0},
+                                                                  {0.0, 2.531, 5.0, 180.0, 4.0, 7.5},
+                                                                  {-0.873, 0.349, 4.0, 36.0, 3.2, 6.0},
+                                                                  {-0.262, 0.262, 4.0, 36.0, 3.2, 6.0}}});
   std::array<GainLimits, kJointCount> gain_limits{};
   std::array<double, kJointsPerLeg> kp_nmprad{400, 400, 400, 400, 120, 120};
   std::array<double, kJointsPerLeg> kd_nmsprad{10, 10, 10, 10, 4, 4};

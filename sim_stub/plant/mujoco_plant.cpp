@@ -88,24 +88,38 @@ MujocoPlant::MujocoPlant(const Params& params, const StairWorld& world, const Ro
 
 MujocoPlant::~MujocoPlant() = default;
 
+// A motor's voltage has to make up for its speed and for its winding's resistance to the current: another supply shifts
+// the line and leaves it as steep. Braking, speed helps. Written without the module's own function.
+double MujocoPlant::saturated_nm(std::size_t joint, double asked_nm, double dq_radps) const noexcept {
+  const JointLimits& sheet = nominal_robot().drives.limits[joint];
+  const double per_speed_nms = sheet.torque_nm / std::max(sheet.no_load_radps - sheet.corner_radps, 1e-3);
+  const double no_load_radps = params_.no_load_scale * sheet.no_load_radps;
+  const double along_radps = asked_nm < 0.0 ? -dq_radps : dq_radps;
+  const double most_nm = math::clamp(per_speed_nms * (no_load_radps - along_radps), 0.0, sheet.torque_nm);
+  return math::clamp(asked_nm, -most_nm, most_nm);
+}
+
 void MujocoPlant::step(const JointCommand& newest) {
   commands_.push_overwrite(within_limits(params_, newest));
   const auto late = static_cast<std::size_t>(std::lround(params_.command_delay_s / kPlantTick_s));
   const JointCommand& command = commands_[commands_.size() - 1 - std::min(late, commands_.size() - 1)];
   const double follows = params_.torque_lag_s > 0.0 ? -std::expm1(-kPhysicsStep_s / params_.torque_lag_s) : 1.0;
   for (int k = 0; k < kPhysicsSteps; ++k) {
+    torque_limited_ = false;
     for (std::size_t j = 0; j < kJointCount; ++j) {
       const auto i = static_cast<Eigen::Index>(j);
       const JointSetpoint& set = command.joints[j];
-      const double limit_nm = nominal_robot().drives.limits[j].torque_nm;
       const double q = data_->qpos[q_at_[j]] + errors_.encoder_offset_rad[i];
-      const double asked_nm =
-          set.tau_ff_nm + set.kp_nmprad * (set.q_rad - q) + set.kd_nmsprad * (set.dq_radps - data_->qvel[v_at_[j]]);
+      const double dq = data_->qvel[v_at_[j]];
+      const double asked_nm = set.tau_ff_nm + set.kp_nmprad * (set.q_rad - q) + set.kd_nmsprad * (set.dq_radps - dq);
       if (!std::isfinite(asked_nm) && fall_reason_.empty()) {
         fall_reason_ = "The command of joint " + std::to_string(j) + " is not finite.";
       }
-      const double given_nm = math::clamp(asked_nm, -limit_nm, limit_nm);
-      tau_[i] = follows == 1.0 ? given_nm : tau_[i] + follows * (given_nm - tau_[i]);
+      const double given_nm = saturated_nm(j, asked_nm, dq);
+      tau_[i] = follows == 1.0 ? given_nm : saturated_nm(j, tau_[i] + follows * (given_nm - tau_[i]), dq);
+      // A drive that lags comes near its limit, never to it.
+      constexpr double kAtLimit = 0.999;
+      torque_limited_ = torque_limited_ || (given_nm != asked_nm && std::abs(tau_[i]) >= kAtLimit * std::abs(given_nm));
       data_->qfrc_applied[v_at_[j]] = params_.torque_scale * tau_[i];
     }
     mj_step(model_.get(), data_.get());

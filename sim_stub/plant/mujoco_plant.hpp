@@ -27,6 +27,7 @@ class MujocoPlant final : public Plant {
     double joint_damping_nmsprad = 0.0;
     double backlash_rad = 0.0;     // play between drive and link, from end to end
     double torque_scale = 1.0;     // what a drive gives of what it is asked
+    double no_load_scale = 1.0;    // speed without a load over the data sheet's, as its supply's voltage is
     double torque_lag_s = 0.0;     // time constant
     double command_delay_s = 0.0;  // beyond the bus
     // Of either leg's drives, what a command's encoding ends at; 0: nowhere.
@@ -46,6 +47,8 @@ class MujocoPlant final : public Plant {
       field("joint_damping_nmsprad", p.joint_damping_nmsprad, 0.0, 20.0, "Viscous friction of a joint.");
       field("backlash_rad", p.backlash_rad, 0.0, 0.05, "Play between drive and link, from end to end.");
       field("torque_scale", p.torque_scale, 0.3, 2.0, "What a drive gives of what it is asked.");
+      field("no_load_scale", p.no_load_scale, 0.3, 3.0,
+            "Speed of the drives without a load over the data sheet's; the torque that is left falls as steeply.");
       field("torque_lag_s", p.torque_lag_s, 0.0, 0.05, "Time constant of a drive's torque.");
       field("command_delay_s", p.command_delay_s, 0.0, 0.05, "Of a command beyond the bus, in whole ticks of 2 ms.");
       field("kp_most_nmprad", p.kp_most_nmprad, 0.0, 10000.0,
@@ -80,6 +83,7 @@ class MujocoPlant final : public Plant {
   [[nodiscard]] const JointVector& drive_q_rad() const noexcept override { return q_; }
   [[nodiscard]] const JointVector& drive_dq_radps() const noexcept override { return dq_; }
   [[nodiscard]] const JointVector& drive_tau_nm() const noexcept override { return tau_; }
+  [[nodiscard]] bool torque_limited() const noexcept override { return torque_limited_; }
   [[nodiscard]] JointVector true_q_rad() const noexcept override { return link_q_; }
   [[nodiscard]] const std::string& fall_reason() const noexcept override { return fall_reason_; }
 
@@ -100,6 +104,7 @@ class MujocoPlant final : public Plant {
     int step = -1;
     int body = -1;
   };
+  [[nodiscard]] double saturated_nm(std::size_t joint, double asked_nm, double dq_radps) const noexcept;
   void read_state();
   void read_contacts();
   void check_falls();
@@ -114,6 +119,7 @@ class MujocoPlant final : public Plant {
   JointVector q_ = JointVector::Zero(), dq_ = JointVector::Zero(), tau_ = JointVector::Zero();
   JointVector link_q_ = JointVector::Zero();  // with the play
   RingBuffer<JointCommand, 32> commands_;     // newest last
+  bool torque_limited_ = false;
   std::string fall_reason_;
 };
 

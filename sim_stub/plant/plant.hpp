@@ -45,6 +45,8 @@ class Plant {
   [[nodiscard]] virtual const JointVector& drive_q_rad() const noexcept = 0;
   [[nodiscard]] virtual const JointVector& drive_dq_radps() const noexcept = 0;
   [[nodiscard]] virtual const JointVector& drive_tau_nm() const noexcept = 0;
+  // A drive gives all that it has at its speed, and is asked for more.
+  [[nodiscard]] virtual bool torque_limited() const noexcept { return false; }
   [[nodiscard]] virtual JointVector true_q_rad() const noexcept = 0;
   // Under physics only: NaN without, and no push moves it. The margin: centre of pressure to the edge of the contact
   // rectangle of a sole that stands alone, NaN on two.

@@ -25,6 +25,7 @@ struct Truth {
   Vec3 true_p_com_m = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());  // under physics only
   double zmp_margin_m = std::numeric_limits<double>::quiet_NaN();                // see plant.hpp
   JointVector drive_tau_nm = JointVector::Zero(), drive_dq_radps = JointVector::Zero();
+  bool torque_limited = false;
   double closure_error_m = 0.0;  // distance by which the two standing legs disagree about the base
   bool fell = false;
   std::string fall_reason;  // one sentence with the number behind it

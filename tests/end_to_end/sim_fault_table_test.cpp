@@ -10,6 +10,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "algorithms/robot/drive_torque.hpp"
 #include "tests/support/physical_climb.hpp"
 
 namespace polygmap::sim {
@@ -78,8 +79,20 @@ bool falls(std::string_view fault, std::string_view moment, bool soft) {
 
 class FaultTable : public testing::TestWithParam<FaultCase> {};
 
+// Its stiffness and damping included, where the joint is when the command is taken; 0 where that is not known.
+double asked_of_heard_drive_nm(const DriveModel& drives, const LegSensing& sensing, const JointCommand& command,
+                               std::size_t n) {
+  const JointFeedback& joints = sensing.joints();
+  const auto i = static_cast<Eigen::Index>(n);
+  const std::int64_t age_ns = command.stamp_ns - joints.stamp_ns;
+  if (!sensing.any() || age_ns > 6'000'000 || joints.is_mute(n)) return 0.0;
+  const double later_s = seconds(age_ns) + drives.delay_s;
+  return torque_asked_nm(command.joints[n], joints.q_rad[i] + sensing.offset_rad()[i] + later_s * joints.dq_radps[i],
+                         joints.dq_radps[i]);
+}
+
 // Empty, or the first joint that is asked for more than its drive takes, and of what.
-std::string beyond_limits(const DriveModel& drives, const JointCommand& command) {
+std::string beyond_limits(const DriveModel& drives, const LegSensing& sensing, const JointCommand& command) {
   constexpr double kRounding = 1e-9;
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const JointSetpoint& joint = command.joints[n];
@@ -95,6 +108,12 @@ std::string beyond_limits(const DriveModel& drives, const JointCommand& command)
     if (!(std::abs(joint.tau_ff_nm) <= limits.torque_nm)) return says("tau_ff_nm", joint.tau_ff_nm);
     if (!(joint.kp_nmprad >= 0.0 && joint.kp_nmprad <= kp_most_nmprad)) return says("kp_nmprad", joint.kp_nmprad);
     if (!(joint.kd_nmsprad >= 0.0 && joint.kd_nmsprad <= kd_most_nmsprad)) return says("kd_nmsprad", joint.kd_nmsprad);
+    const double asked_nm = asked_of_heard_drive_nm(drives, sensing, command, n);
+    const double dq_radps = sensing.joints().dq_radps[static_cast<Eigen::Index>(n)];
+    if (std::abs(dq_radps) <= limits.corner_radps) continue;  // the drive cuts its own stiffness
+    const TorqueRange range = torque_range_nm(limits, dq_radps);
+    const bool there = asked_nm >= range.least_nm - kRounding && asked_nm <= range.most_nm + kRounding;
+    if (!there) return says("torque_nm", asked_nm);
   }
   return {};
 }
@@ -123,7 +142,7 @@ TEST_P(FaultTable, EndsInItsStateWithinItsTime_OnBothFeet) {
   std::string beyond;
   do {
     (void)climb.tick();
-    if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.command());
+    if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.leg_sensing(), climb.command());
   } while (!is_over() && !climb.truth().fell && climb.time_s() - begun_s < 10.0);
   const bool may_fall = falls(fault.name, moment.name, gains.name[0] != '\0');
   // One that leans so far sinks on its damped joints, and the plant may call that a fall seconds later.
@@ -133,7 +152,7 @@ TEST_P(FaultTable, EndsInItsStateWithinItsTime_OnBothFeet) {
     EXPECT_LE(climb.time_s() - begun_s, fault.within_s);
   }
   climb.run_on(is_blind(fault.name) ? 6.0 : 2.0);  // what nobody balances topples slowly at first
-  if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.command());
+  if (beyond.empty()) beyond = beyond_limits(params.robot.drives, climb.leg_sensing(), climb.command());
   EXPECT_EQ(beyond, "");
   EXPECT_EQ(fell(), may_fall) << climb.truth().fall_reason;
   if (may_fall) return;

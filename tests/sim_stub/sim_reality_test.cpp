@@ -204,6 +204,19 @@ double ankle_after(const MujocoPlant::Params& params, double torque_nm, int tick
   return plant.true_q_rad()[kAnkleRoll] - q[kAnkleRoll];
 }
 
+// All its torque all the time, with nothing to move but its foot.
+TEST(RealityDrive, NoLoadScale_ScalesTheSpeedThatADriveReachesAlone) {
+  const double all_nm = joint_limits(Foot::kLeft, kAnkleRoll).torque_nm;
+  const auto speed_radps = [&](double scale) {
+    MujocoPlant::Params params;
+    params.no_load_scale = scale;
+    return (ankle_after(params, all_nm, 16) - ankle_after(params, all_nm, 15)) / kPlantTick_s;
+  };
+  const double no_load_radps = joint_limits(Foot::kLeft, kAnkleRoll).no_load_radps;
+  EXPECT_NEAR(speed_radps(1.0), no_load_radps, 0.05 * no_load_radps);
+  EXPECT_NEAR(speed_radps(0.8), 0.8 * no_load_radps, 0.05 * no_load_radps);
+}
+
 TEST(RealityDrive, CommandDelay_IsTicksInWhichNothingHappens) {
   MujocoPlant::Params params;
   const auto torque_after = [&](int ticks) {

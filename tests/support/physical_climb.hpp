@@ -139,6 +139,7 @@ class PhysicalClimb {
   [[nodiscard]] const GaitStatus& status() const { return pipeline_->control().gait_status(); }
   [[nodiscard]] const Health& health() const { return pipeline_->health(); }
   [[nodiscard]] const JointCommand& command() const { return pipeline_->control().last_command(); }
+  [[nodiscard]] const LegSensing& leg_sensing() const { return pipeline_->control().estimator().leg_sensing(); }
   [[nodiscard]] ModuleState state() const { return pipeline_->control().module_state(); }
   [[nodiscard]] double time_s() const { return seconds(robot_.now_ns()); }
   // Of every sole that stood on a step, at any time, to its tread's edge; negative over it.

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "algorithms/core/time.hpp"
+#include "algorithms/robot/drive_torque.hpp"
 #include "algorithms/robot/leg_dynamics.hpp"
 #include "algorithms/robot/leg_kinematics.hpp"
 
@@ -86,8 +87,10 @@ void StepFeasibility::check_joints(const DriveModel& drives, const JointVector& 
 }
 
 // The hips' drives have plenty, and what an ankle gives follows the zero-moment point.
-void StepFeasibility::check_knee_torque(const RobotModel& robot, const StepKnot& knot) noexcept {
+void StepFeasibility::check_knee_torque(const RobotModel& robot, const StepKnot& knot,
+                                        const JointVector& q_rad) noexcept {
   if (!knots_.swings_at(knot.tick)) return;
+  constexpr double kLeast_nm = 1e-3;  // in place of none
   const Foot stance = knots_.stance();
   const Mat3 base_R_odom = knot.odom_T_base.R.transpose();
   const Vec3 felt_mps2 = base_R_odom * knot.odom_felt_mps2;
@@ -98,7 +101,11 @@ void StepFeasibility::check_knee_torque(const RobotModel& robot, const StepKnot&
   specific_mps2.fill(-felt_mps2);
   const double torque_nm = leg_torques_nm(robot.masses, stance, frames_[index_of(stance)], specific_mps2,
                                           {force_n, (base_R_odom * odom_arm_m).cross(force_n)})[kKnee];
-  const double limit_nm = robot.drives.limits[joint_index(stance, kKnee)].torque_nm;
+  const std::size_t knee = joint_index(stance, kKnee);
+  const auto i = static_cast<Eigen::Index>(knee);
+  const double speed_radps = next_ > 0 ? (q_rad[i] - previous_[i]) / (knots_.knot_ticks() * kTick_s) : 0.0;
+  const TorqueRange range = torque_range_nm(robot.drives.limits[knee], speed_radps);
+  const double limit_nm = std::max(torque_nm < 0.0 ? -range.least_nm : range.most_nm, kLeast_nm);
   check_.torque_share = std::max(check_.torque_share, std::abs(torque_nm) / limit_nm);
 }
 
@@ -110,7 +117,7 @@ bool StepFeasibility::advance(const RobotModel& robot, const StepParams& params,
     if (!solve(robot, knot, q_rad)) check_.feasible = false;
     frames_ = body_frames(robot.legs, q_rad);
     check_joints(robot.drives, q_rad);
-    check_knee_torque(robot, knot);
+    check_knee_torque(robot, knot, q_rad);
     previous_ = q_rad;
     check_.feasible = check_.feasible && check_.joint_margin_rad >= knots_.joint_margin_rad() &&
                       check_.knee_rad >= params.knee_min_rad && check_.speed_share <= params.speed_share &&

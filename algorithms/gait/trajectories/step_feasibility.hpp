@@ -50,7 +50,7 @@ struct StepCheck {
   double joint_margin_rad = 0.0;  // least, over all knots and joints
   double knee_rad = 0.0;          // least
   double speed_share = 0.0;       // greatest, of the drive's limit
-  double torque_share = 0.0;      // greatest, of the knee that carries the body alone, of the drive's limit
+  double torque_share = 0.0;      // greatest, of the knee that carries the body alone, of what its drive has
 };
 
 // Follows the knots with kinematics and statics of the legs, as many per call as the tick can spare. Every call is
@@ -70,8 +70,9 @@ class StepFeasibility {
   bool solve(const RobotModel& robot, StepKnot& knot, JointVector& q_rad) const noexcept;
   void check_joints(const DriveModel& drives, const JointVector& q_rad) noexcept;
   // Of the stance leg while the other one swings, as if all links had the centre of mass's acceleration and the
-  // swinging leg hung on the torso. Two legs that stand are not asked: they share. frames_ are the knot's.
-  void check_knee_torque(const RobotModel& robot, const StepKnot& knot) noexcept;
+  // swinging leg hung on the torso. Two legs that stand are not asked: they share. frames_ are the knot's, and what the
+  // drive has is told by the knee's speed since the knot before.
+  void check_knee_torque(const RobotModel& robot, const StepKnot& knot, const JointVector& q_rad) noexcept;
 
   StepKnots knots_;
   StepCheck check_;

@@ -197,17 +197,14 @@ void ClimbReport::observe_tracking(const Truth& truth, const GaitStatus& gait) {
 void ClimbReport::observe_balance(const Truth& truth, const Telemetry& telemetry) {
   const GaitStatus& gait = telemetry.gait;
   keep_min(zmp_margin_min_m_, truth.zmp_margin_m);
-  constexpr double kAtLimit = 0.999;  // a drive that lags comes near its limit, never to it
-  bool torque_limited = false;
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const std::size_t j = n % kJointsPerLeg;
     const auto i = static_cast<Eigen::Index>(n);
     const JointLimits& limits = nominal_robot().drives.limits[n];
     keep_max(torque_peak_ratio_[j], std::abs(truth.drive_tau_nm[i]) / limits.torque_nm);
     keep_max(joint_speed_peak_ratio_[j], std::abs(truth.drive_dq_radps[i]) / limits.speed_radps);
-    torque_limited = torque_limited || std::abs(truth.drive_tau_nm[i]) >= kAtLimit * limits.torque_nm;
   }
-  torque_limited_ticks_ += torque_limited ? 1 : 0;
+  torque_limited_ticks_ += truth.torque_limited ? 1 : 0;
   if (gait.step.sequence == 0) return;  // it may not have begun to balance
   const std::size_t stance = gait.stands[0] ? 0 : 1;
   const Vec2& com_m = gait.odom_p_com_desired_m;

@@ -136,7 +136,7 @@ struct ClimbSummary {
   double zmp_margin_min_m = kNotMeasured;
   // Greatest of both legs, over the drives' limits.
   std::array<double, kJointsPerLeg> torque_peak_ratio{}, joint_speed_peak_ratio{};
-  double torque_limited_ms = 0.0;  // for so long a drive gave all it has
+  double torque_limited_ms = 0.0;  // for so long a drive gave all it has at its speed
   OdometryFigures odometry;
   Spread exposure_to_map_ms;
   std::uint64_t occupied_cells_most = 0;  // of the map at any time

@@ -39,6 +39,21 @@ TEST(GaitRobot, SlowKnees_TheProofRefusesTheFirstStepOntoTheStairs) {
   EXPECT_EQ(climb.status().treads_climbed, 0U);
 }
 
+// As strong as ever at rest, but while the knee lifts the body it turns.
+TEST(GaitRobot, KneesWhoseTorqueFallsEarly_TheProofRefusesTheFirstStepOntoTheStairs) {
+  RobotModel robot;
+  for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+    JointLimits& knee = robot.drives.limits[joint_index(leg, kKnee)];
+    knee.corner_radps = 0.1;
+    knee.no_load_radps = 2.0;
+  }
+  IdealClimb climb({}, {}, robot);
+  climb.run(40.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+  EXPECT_EQ(climb.status().stop_reason, StopReason::kLegsCannot);
+  EXPECT_EQ(climb.status().treads_climbed, 0U);
+}
+
 TEST(GaitRobot, DrivesWithoutRoomForTheirDamping_TorquesMakeUpForIt) {
   RobotModel robot;
   for (GainLimits& limits : robot.drives.gain_limits) limits.kd_nmsprad = 5.0;

@@ -132,8 +132,9 @@ TEST(StepFeasibility, SlowStepOfATorsoOnly_KneeHoldsTheWeightOverItsArm) {
   EXPECT_NEAR(proof.check().torque_share, by_hand, 0.03 * by_hand);
 }
 
-StepSearch::State finish(StepSearch& search, const StepParams& params = {}, int most_calls = 1000) {
-  while (most_calls-- > 0 && search.step(nominal_robot(), params) == StepSearch::State::kSearching) {
+StepSearch::State finish(StepSearch& search, const StepParams& params = {}, int most_calls = 1000,
+                         const RobotModel& robot = nominal_robot()) {
+  while (most_calls-- > 0 && search.step(robot, params) == StepSearch::State::kSearching) {
   }
   return search.state();
 }
@@ -151,11 +152,10 @@ PassingStep passing_step(double rise_m, double ahead_m) {
   step.trailing = {StepKind::kTrailing, Foot::kLeft, {{ahead_m + 0.28, 0.1, 2 * rise_m}, 0}, {}};
   return step;
 }
-StepSearch searched(const PassingStep& step, const StepParams& params = {}) {
+StepSearch searched(const PassingStep& step, const StepParams& params = {}, const RobotModel& robot = nominal_robot()) {
   StepSearch search;
-  search.begin(nominal_robot(), params, step.goal, step.trailing, params.durations.stair_shift_ticks, step.from,
-               step.soles);
-  finish(search, params);
+  search.begin(robot, params, step.goal, step.trailing, params.durations.stair_shift_ticks, step.from, step.soles);
+  finish(search, params, 1000, robot);
   return search;
 }
 
@@ -186,6 +186,24 @@ TEST(StepSearch, PassingStepThatTheKneeCannotLiftInTime_IsDoneMoreSlowlyOrNotAtA
   StepParams too_weak;
   too_weak.torque_share = 0.6;
   EXPECT_EQ(searched(step, too_weak).state(), StepSearch::State::kImpossible);
+}
+
+// All else alike: a drive that has all its torque at rest only.
+TEST(StepSearch, PassingStepForWhichTheTurningKneeLacksTorque_IsDoneMoreSlowlyOrNotAtAll) {
+  const auto searched_with = [](double no_load_radps) {
+    RobotModel robot = nominal_robot();
+    for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
+      JointLimits& knee = robot.drives.limits[joint_index(leg, kKnee)];
+      knee.corner_radps = 0.1;
+      knee.no_load_radps = no_load_radps;
+    }
+    return searched(passing_step(0.17, 0.285), {}, robot);
+  };
+  EXPECT_EQ(searched_with(12.0).state(), StepSearch::State::kFound);
+  EXPECT_EQ(searched_with(12.0).plan().tried.longer, 1.0);
+  EXPECT_EQ(searched_with(7.5).state(), StepSearch::State::kFound);
+  EXPECT_GT(searched_with(7.5).plan().tried.longer, 1.0);
+  EXPECT_EQ(searched_with(5.0).state(), StepSearch::State::kImpossible);
 }
 
 TEST(StepSearch, PassingStepThatIsPossibleWithNoTrailingStepAfterIt_IsImpossible) {
