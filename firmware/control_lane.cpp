@@ -103,6 +103,7 @@ OperatorAnswer ControlLane::answer_to_reset(std::int64_t now_ns) const noexcept 
   const StateEstimate& state = estimator_.state();
   if (!drives_.silent.is_empty()) return {Refusal::kDrivesSilent, drives_.silent};
   if (!drives_.bus.drive_errors.is_empty()) return {Refusal::kDrivesInError, drives_.bus.drive_errors};
+  if (!drives_.hot.is_empty()) return {Refusal::kDrivesHot, drives_.hot};
   if (!overload_.takes_commands()) return {Refusal::kCommandRefused, {}};
   if (!(now_ns - state.oldest_input_ns <= params_.gait.steer_age_ns)) return {Refusal::kEstimateStale, {}};
   const bool carry = state.contact_probability[0] > kStands && state.contact_probability[1] > kStands;
@@ -138,6 +139,7 @@ void ControlLane::read_joints(std::int64_t now_ns) noexcept {
 void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept {
   const JointSet late = late_drives(joints, now_ns);
   drives_.bus = ports_.joints.status();
+  note_hot_drives(now_ns);
   if (joints != nullptr) {
     const JointSet outside = JointReference::out_of_range(params_.robot, params_.gait.joints, joints->q_rad);
     note_out_of_range(JointSet::of_bits(outside.bits() & ~late.bits()), now_ns);
@@ -147,7 +149,7 @@ void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept
   start_.imu_settled = hears_imu && estimator_.resting_accel().is_settled();
   if (now_ns - start_.first_ns >= kArmingTimeout_ns) note_silent_drives(start_.silent, now_ns);
   if (!late.is_empty() || !drives_.bus.drive_errors.is_empty() || !drives_.out_of_range.is_empty()) return;
-  if (drives_.bus.feet_silent) return;
+  if (!drives_.hot.is_empty() || drives_.bus.feet_silent) return;
   if (!start_.imu_settled || gait_.stop_requested() || !supervisor_.may_arm()) return;
   if (check_stance(joints->q_rad, now_ns)) estimator_.add_joints(*joints, now_ns);
 }
@@ -209,6 +211,16 @@ void ControlLane::note_silent_drives(JointSet silent, std::int64_t now_ns) noexc
   drives_.ever_silent = JointSet::of_bits(drives_.ever_silent.bits() | silent.bits());
 }
 
+void ControlLane::note_hot_drives(std::int64_t now_ns) noexcept {
+  const JointSet hot = Supervisor::hot(params_.supervisor, drives_.bus.drive_degc, drives_.hot);
+  if (hot == drives_.hot) return;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (hot.contains(n) && !drives_.hot.contains(n)) health_.raise(Fault::kDriveHot, now_ns);
+  }
+  drives_.hot = hot;
+  drives_.ever_hot = JointSet::of_bits(drives_.ever_hot.bits() | hot.bits());
+}
+
 ModuleState ControlLane::module_state() const noexcept {
   const GaitStatus& status = gait_.status();
   const bool on_stairs = status.treads_climbed > 0 || status.step.onto_tread;
@@ -220,6 +232,7 @@ ArmingWait ControlLane::arming_waits_for() const noexcept {
   if (module_state() != ModuleState::kArming) return {};
   if (!start_.silent.is_empty()) return {For::kAnswers, start_.silent};
   if (!drives_.bus.drive_errors.is_empty()) return {For::kErrors, drives_.bus.drive_errors};
+  if (!drives_.hot.is_empty()) return {For::kCooler, drives_.hot};
   if (!drives_.out_of_range.is_empty()) return {For::kRange, drives_.out_of_range};
   if (!start_.imu_settled) return {For::kImu, {}};
   return drives_.bus.feet_silent ? ArmingWait{For::kFeet, {}} : start_.disagreement;
@@ -334,10 +347,11 @@ void ControlLane::report_rejections(std::int64_t now_ns) noexcept {
   health_.follow(Limit::kHeightRejected, now_ns, counters.height_rejected);
 }
 
-// A drive in error gives no torque that could be trusted: the step is finished, then the gait stops. While it arms
-// there is nothing to stop, and the bus clears errors that can be cleared.
+// A drive in error gives no torque that could be trusted, and one that is too hot will soon be in error: the step is
+// finished, then the gait stops. While it arms there is nothing to stop, and the bus clears errors that can be cleared.
 void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   drives_.bus = ports_.joints.status();
+  note_hot_drives(now_ns);
   const hal::JointBusStatus& bus = drives_.bus;
   health_.follow(Fault::kDriveError, now_ns, bus.drive_error_replies);
   health_.follow(Fault::kBusOff, now_ns, bus.bus_offs);
@@ -353,6 +367,7 @@ void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   if (feet_silent && !raised_.feet_silent) health_.raise(Fault::kFeetSilent, now_ns);
   raised_.feet_silent = feet_silent;
   if (!arms && !bus.drive_errors.is_empty()) gait_.request_stop(StopReason::kDriveError);
+  if (!arms && !drives_.hot.is_empty()) gait_.request_stop(StopReason::kDriveHot);
 }
 
 // While the drives are still silent there is nothing to stop.

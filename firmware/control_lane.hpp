@@ -70,6 +70,7 @@ class ControlLane {
   [[nodiscard]] JointSet late_drives(const JointFeedback* joints, std::int64_t now_ns) noexcept;
   void note_out_of_range(JointSet out_of_range, std::int64_t now_ns) noexcept;
   void note_silent_drives(JointSet silent, std::int64_t now_ns) noexcept;
+  void note_hot_drives(std::int64_t now_ns) noexcept;
   void report_bus(std::int64_t now_ns) noexcept;
   void answer_pose_request(std::int64_t now_ns) noexcept;
   void report_overload(std::int64_t now_ns) noexcept;

@@ -12,6 +12,7 @@
 #include "algorithms/core/math/transcendental.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
 #include "algorithms/core/messages/operator_command.hpp"
+#include "algorithms/core/messages/samples.hpp"
 
 namespace polygmap {
 
@@ -87,13 +88,14 @@ enum class StateEvent : std::uint8_t {
   kFalls
 };
 [[nodiscard]] constexpr std::string_view text_of(StateEvent event) noexcept {
-  constexpr std::array<std::string_view, 7> kTexts{"all drives and sensors have answered, and agree",
-                                                   "a foot is lifted for a tread",
-                                                   "that foot was put back, and one is lifted for the floor",
-                                                   "it has to stop: time is short, commands are refused, a drive errs",
-                                                   "the gait has stopped, on both feet",
-                                                   "the gait has ended the climb",
-                                                   "the torso leans too far for too long"};
+  constexpr std::array<std::string_view, 7> kTexts{
+      "all drives and sensors have answered, and agree",
+      "a foot is lifted for a tread",
+      "that foot was put back, and one is lifted for the floor",
+      "it has to stop: time is short, commands are refused, a drive errs or is too hot",
+      "the gait has stopped, on both feet",
+      "the gait has ended the climb",
+      "the torso leans too far for too long"};
   static_assert(kTexts.size() == static_cast<std::size_t>(StateEvent::kFalls) + 1);
   return kTexts[static_cast<std::size_t>(event)];
 }
@@ -135,6 +137,8 @@ class Supervisor {
     bool autostart = true;
     double fallen_rad = 0.45;
     std::int32_t fallen_ticks = 10;
+    std::int32_t hot_degc = 90;
+    std::int32_t cool_degc = 75;
 
     static void visit(auto& p, auto& field) {
       field("autostart", p.autostart, "It arms and starts by itself; false: when its operator asks.");
@@ -143,6 +147,10 @@ class Supervisor {
       field("fallen_rad", p.fallen_rad, 0.2, 1.5,
             "A torso that leans farther falls: the joints are damped from then on.");
       field("fallen_ticks", p.fallen_ticks, 1, 500, "So many ticks in a row.");
+      field("hot_degc", p.hot_degc, 30, 256,
+            "A drive that tells of such a temperature or more is too hot: it stops. Let it be less than what the drive "
+            "itself switches off at; 256, which no drive can tell: never.");
+      field("cool_degc", p.cool_degc, 20, 255, "It is too hot until it tells of such a temperature or less.");
     }
   };
   // What the state follows from, beside what was asked.
@@ -173,6 +181,16 @@ class Supervisor {
   void watch_lean(const Params& params, const Mat3& odom_R_base) noexcept {
     leaning_ticks_ = odom_R_base(2, 2) < math::cos(params.fallen_rad) ? leaning_ticks_ + 1 : 0;
     fallen_ = fallen_ || leaning_ticks_ >= params.fallen_ticks;
+  }
+  // Of those that were too hot before. What a drive does not tell any more it still is.
+  [[nodiscard]] static JointSet hot(const Params& params, const std::array<std::int16_t, kJointCount>& degc,
+                                    JointSet before) noexcept {
+    JointSet hot;
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      const bool was = before.contains(n);
+      if (was ? degc[n] > params.cool_degc || degc[n] == kNotTold_degc : degc[n] >= params.hot_degc) hot.insert(n);
+    }
+    return hot;
   }
   [[nodiscard]] bool may_arm() const noexcept { return armed_; }
   [[nodiscard]] bool may_step() const noexcept { return started_ && !paused_; }

@@ -2,6 +2,7 @@
 // The module with an operator: nothing begins before it is asked for, and what was stopped begins anew when it may.
 #include <gtest/gtest.h>
 
+#include "firmware/operator_answer_text.hpp"
 #include "tests/support/fakes/fake_operator_input.hpp"
 #include "tests/support/standing_module.hpp"
 
@@ -107,6 +108,29 @@ TEST_F(OperatedModule, ResetWhileItsCauseLasts_IsRefused) {
   ask(OperatorCommand::kReset, 2);
   EXPECT_EQ(state(), ModuleState::kStanding);
   EXPECT_EQ(refusal(), Refusal::kNone);
+}
+
+TEST_F(OperatedModule, DriveIsTooHot_StopsAndIsResetOnceItHasCooled) {
+  ask(OperatorCommand::kArm, kInitialised_ticks);
+  joints_.told.drive_degc[3] = 120;
+  stand(3);
+  ASSERT_EQ(state(), ModuleState::kSafeStop);
+  ASSERT_EQ(control().gait_status().stop_reason, StopReason::kDriveHot);
+  EXPECT_GT(knee_kp_nmprad(), 0.0) << "it holds on";
+  joints_.told.drive_degc[3] = 80;
+  ask(OperatorCommand::kReset, 2);
+  EXPECT_EQ(state(), ModuleState::kSafeStop);
+  OperatorAnswer answer;
+  while (operator_.try_take_answer(answer)) {
+  }
+  EXPECT_EQ(text_of(answer, state()).view(), "refused: safe_stop, too hot: left_knee");
+  joints_.told.drive_degc[3] = 75;
+  stand(1);
+  ask(OperatorCommand::kReset, 2);
+  EXPECT_EQ(state(), ModuleState::kStanding);
+  EXPECT_EQ(count(Fault::kDriveHot), 1U);
+  EXPECT_TRUE(control().drives().hot.is_empty());
+  EXPECT_EQ(control().drives().ever_hot.bits(), 1U << 3U);
 }
 
 // Of the others the answer's text names the reason; the drives' are above and below.

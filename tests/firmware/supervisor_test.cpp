@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "algorithms/core/math/transform.hpp"
+#include "hal/ports/joint_bus.hpp"
 
 namespace polygmap {
 namespace {
@@ -203,6 +204,24 @@ TEST(Supervisor, LeansTooFarForTooLong_HasFallenForGood) {
   EXPECT_TRUE(supervisor.has_fallen());
   lean(0.0, 1000);
   EXPECT_EQ(supervisor.state(kOnTheStairs), ModuleState::kFallen);
+}
+
+TEST(Supervisor, DriveTellsItsTemperature_IsTooHotFromOneToTheOther) {
+  const Supervisor::Params params;
+  std::array<std::int16_t, kJointCount> degc = hal::all_not_told_degc();
+  JointSet hot;
+  const auto tells = [&](int told) {
+    degc[3] = static_cast<std::int16_t>(told);
+    return (hot = Supervisor::hot(params, degc, hot)).bits();
+  };
+  constexpr std::uint32_t kNone = 0, kKnee = 1U << 3U;
+  EXPECT_EQ(tells(kNotTold_degc), kNone);
+  EXPECT_EQ(tells(params.hot_degc - 1), kNone);
+  EXPECT_EQ(tells(params.hot_degc), kKnee);
+  EXPECT_EQ(tells(params.cool_degc + 1), kKnee);
+  EXPECT_EQ(tells(kNotTold_degc), kKnee) << "it says nothing of having cooled";
+  EXPECT_EQ(tells(params.cool_degc), kNone);
+  EXPECT_EQ(tells(params.hot_degc - 1), kNone);
 }
 
 TEST(OperatorCommand, NamesAreRead_AndNothingElse) {

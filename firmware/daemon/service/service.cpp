@@ -399,7 +399,8 @@ void Service::log_changes() noexcept {
   if (view == logged_) return;
   seen_.told_ns = 0;  // the service manager hears of it at once
   const bool disagrees = view.waits_for.leans() && view.waits_for.what != logged_.waits_for.what;
-  const bool is_news = view.state != logged_.state || view.silent.bits() != logged_.silent.bits() || disagrees;
+  const bool is_news =
+      view.state != logged_.state || !(view.silent == logged_.silent) || !(view.hot == logged_.hot) || disagrees;
   logged_ = view;
   if (!is_news) return;
   StatusText status;

@@ -165,6 +165,7 @@ BusFigures bus_figures(const config::BusFile& file, BusRobot& robot, const Telem
   f.module_state = name_of(telemetry.module_state);
   f.silent_joints = names_of(telemetry.drives.ever_silent);
   f.error_joints = names_of(telemetry.drives.bus.drive_errors);
+  f.hot_joints = names_of(telemetry.drives.ever_hot);
   for (std::size_t i = 0; i < file.buses.size(); ++i) {
     f.loads.emplace_back(file.buses[i], hal::bus_load(file.table, i));
     f.sent += robot.bus(i).status().sent;

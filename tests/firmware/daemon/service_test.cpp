@@ -521,9 +521,12 @@ TEST(ModuleViewTest, PackedAndUnpacked_IsTheSame) {
   view.reason = StopReason::kStateStale;
   view.waits_for = {ArmingWait::For::kFeet, JointSet::of_bits(0x801)};
   view.silent = JointSet::of_bits(0xFFE);
-  view.treads = 0xFFFF;
+  view.hot = JointSet::of_bits(0x7FF);
+  view.treads = 0xFF;
   EXPECT_EQ(ModuleView::unpacked(view.packed()), view);
   EXPECT_EQ(ModuleView::unpacked(view.packed()).silent.bits(), 0xFFE);
+  EXPECT_EQ(ModuleView::unpacked(view.packed()).hot.bits(), 0x7FF);
+  EXPECT_EQ(ModuleView::unpacked(view.packed()).treads, 0xFF);
   EXPECT_EQ(ModuleView::unpacked(view.packed()).waits_for, view.waits_for);
   view.waits_for = {ArmingWait::For::kGravity, {}, 180};
   EXPECT_EQ(ModuleView::unpacked(view.packed()).waits_for, view.waits_for);
@@ -587,6 +590,7 @@ TEST(StatusTest, Arming_SaysWhatItWaitsFor) {
   EXPECT_EQ(status_of({For::kNothing, {}}), "arming");
   EXPECT_EQ(status_of({For::kAnswers, two}), "arming, no answer yet from left_hip_roll, left_knee");
   EXPECT_EQ(status_of({For::kErrors, two}), "arming, in error: left_hip_roll, left_knee");
+  EXPECT_EQ(status_of({For::kCooler, two}), "arming, too hot: left_hip_roll, left_knee");
   EXPECT_EQ(status_of({For::kRange, two}), "arming, out of range: left_hip_roll, left_knee");
   EXPECT_EQ(status_of({For::kImu, {}}), "arming, too few IMU samples");
   EXPECT_EQ(status_of({For::kFeet, {}}), "arming, no forces of the feet");
