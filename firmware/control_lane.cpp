@@ -91,19 +91,30 @@ OperatorAnswer ControlLane::obey(OperatorCommand command, std::int64_t now_ns) n
     if (!gait_.try_restart(q_rad)) return {Refusal::kJointsAway, gait_.joints_away(q_rad)};
     overload_ = {};
   }
+  if (command == OperatorCommand::kHandOver) {
+    if (const OperatorAnswer answer = answer_if_it_stands(now_ns); !answer.is_obeyed()) return answer;
+    hand_over_.begin();
+  }
   supervisor_.obey(command, state);
-  if (command == OperatorCommand::kStop && state != ModuleState::kArming) gait_.request_stop(StopReason::kOperator);
+  const bool ends = command == OperatorCommand::kStop && state != ModuleState::kArming;
+  const bool stands_on = command == OperatorCommand::kHandOver && state == ModuleState::kStanding;
+  if (ends || stands_on) gait_.request_stop(StopReason::kOperator);
   return {};
 }
 
 // What may have stopped it is over, and both feet carry: one that a mute knee kept up counts as standing only until the
 // drive speaks again.
 OperatorAnswer ControlLane::answer_to_reset(std::int64_t now_ns) const noexcept {
-  constexpr double kStands = 0.5;  // probability
-  const StateEstimate& state = estimator_.state();
   if (!drives_.silent.is_empty()) return {Refusal::kDrivesSilent, drives_.silent};
   if (!drives_.bus.drive_errors.is_empty()) return {Refusal::kDrivesInError, drives_.bus.drive_errors};
   if (!drives_.hot.is_empty()) return {Refusal::kDrivesHot, drives_.hot};
+  return answer_if_it_stands(now_ns);
+}
+
+OperatorAnswer ControlLane::answer_if_it_stands(std::int64_t now_ns) const noexcept {
+  constexpr double kStands = 0.5;  // probability
+  const StateEstimate& state = estimator_.state();
+  if (!drives_.silent.is_empty()) return {Refusal::kDrivesSilent, drives_.silent};
   if (!overload_.takes_commands()) return {Refusal::kCommandRefused, {}};
   if (!(now_ns - state.oldest_input_ns <= params_.gait.steer_age_ns)) return {Refusal::kEstimateStale, {}};
   const bool carry = state.contact_probability[0] > kStands && state.contact_probability[1] > kStands;
@@ -124,6 +135,7 @@ void ControlLane::read_joints(std::int64_t now_ns) noexcept {
   const bool was_asked = command_.stamp_ns != 0;  // a drive answers a command
   JointFeedback joints;
   const bool came = ports_.joints.try_read(joints);
+  if (supervisor_.has_let_go()) return;  // they answer another's commands
   if (!gait_.armed()) {
     arm(came ? &joints : nullptr, now_ns);
   } else if (came) {
@@ -270,6 +282,10 @@ Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
 
 // Whatever is silent, the gait runs: a foot in the air has to come down.
 Progress ControlLane::gait(std::int64_t now_ns) noexcept {
+  if (supervisor_.has_let_go()) {
+    command_ = {};
+    return Progress::kDone;
+  }
   if (!estimator_.leg_sensing().any()) {
     command_ = {};
     if (!listens(now_ns)) command_.stamp_ns = now_ns;
@@ -282,6 +298,7 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
     supervisor_.watch_lean(params_.supervisor, state.odom_T_base.R);
   }
   if (supervisor_.has_fallen()) damp_joints(now_ns);
+  if (supervisor_.hands_over()) hand_over_robot(now_ns);
   estimator_.leg_sensing().to_drives(command_);
   hand_over_touch_down();
 
@@ -295,6 +312,14 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   context.climbing = status.treads_climbed > 0 || status.step.onto_tread;
   link_.search_context.publish(now_ns);
   return Progress::kDone;
+}
+
+void ControlLane::hand_over_robot(std::int64_t now_ns) noexcept {
+  const StateEstimate& state = estimator_.state();
+  const bool knows = now_ns - state.oldest_input_ns <= params_.gait.steer_age_ns;
+  const bool ended = gait_.status().phase == GaitPhase::kStopped || gait_.status().phase == GaitPhase::kFinished;
+  const bool at_rest = knows && ended && HandOver::is_at_rest(params_.hand_over, state);
+  hand_over_.tick(params_.hand_over, params_.robot.drives, at_rest, estimator_.leg_sensing().joints(), command_);
 }
 
 void ControlLane::damp_joints(std::int64_t now_ns) noexcept {
@@ -322,6 +347,8 @@ Progress ControlLane::command(std::int64_t now_ns) noexcept {
     health_.raise(Fault::kJointCommandInvalid, now_ns);
   }
   overload_.count_command(params_.overload, taken);
+  // Not before every drive has the hold.
+  if (taken && supervisor_.hands_over() && hand_over_.is_over(params_.hand_over)) supervisor_.let_go();
   return Progress::kDone;
 }
 

@@ -129,7 +129,13 @@ void BusRobot::reply(std::size_t joint, std::int64_t done_ns) {
       done_ns + kReply_ns);
 }
 
+void BusRobot::hold_again() {
+  held_again_ = true;
+  robot_.hold_again();
+}
+
 void BusRobot::command_robot(std::int64_t now_ns) {
+  if (held_again_) return;
   JointCommand command;
   command.stamp_ns = now_ns;
   for (std::size_t n = 0; n < kJointCount; ++n) {

@@ -40,6 +40,8 @@ class BusRobot {
   // What it tells of itself from now on, motor and transistors alike.
   void set_temperature(std::size_t joint, std::int16_t degc) noexcept { drives_[joint].degc = degc; }
   void set_feet_silent(bool silent) noexcept { feet_silent_ = silent; }
+  // As SimRobot's; the drives' commands count no more.
+  void hold_again();
   // Instead of the robot's: the buses run for a tick, then the robot does.
   void advance();
 
@@ -64,6 +66,7 @@ class BusRobot {
   hal::CanJointBus joints_;
   std::array<Drive, kJointCount> drives_;
   bool feet_silent_ = false;
+  bool held_again_ = false;
   JointFeedback feedback_;  // as the tick begins
 };
 

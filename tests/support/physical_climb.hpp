@@ -129,6 +129,7 @@ class PhysicalClimb {
     const double end_s = time_s() + for_s;
     while (time_s() < end_s && !truth().fell) (void)tick();
   }
+  void hold_again() { robot_.hold_again(); }
   void push(const Push& push) {
     Vec3 force_n = Vec3::Zero();
     force_n[push.axis] = push.impulse_ns / Push::kDuration_s;

@@ -337,6 +337,7 @@ void Service::write_recording() noexcept {
 std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
   const ModuleView view = board_.module();
   if (!lanes_move(now_ns)) return Decision{ExitCode::kStoppedItself, "a lane has not finished a cycle for a second."};
+  if (view.state == ModuleState::kReleased) return Decision{ExitCode::kAsked, "another controller has the robot."};
   const bool asked = seen_.asked_ns >= 0;
   const bool fallen = view.state == ModuleState::kFallen;
   const bool may_reset = parts_.operator_socket != nullptr && !fallen;
