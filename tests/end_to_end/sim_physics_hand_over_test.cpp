@@ -76,12 +76,14 @@ TEST_P(HandsOver, OnTop_StandsOnTheOtherController) {
   expect_stands_on_the_other(0.01);
 }
 
-// Between two treads, and who is to take over is half a second late.
+// One foot a step above the other, and who is to take over is half a second late.
 TEST_P(HandsOver, StoppedOnTheStairs_StandsOnTheOtherController) {
   ASSERT_TRUE(run_to_swing_onto(climb_, GetParam().single_step ? 2 : 1));
+  climb_.run_on(0.3);  // it will not go back to where it stood
   climb_.operator_input.ask(OperatorCommand::kStop);
   climb_.run_on(2.0);
   ASSERT_EQ(climb_.state(), ModuleState::kSafeStop);
+  ASSERT_NE(climb_.truth().step_index[0], climb_.truth().step_index[1]);
   ASSERT_NO_FATAL_FAILURE(release());
   expect_stands_on_the_other(0.5);
 }
