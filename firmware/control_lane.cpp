@@ -91,18 +91,30 @@ OperatorAnswer ControlLane::obey(OperatorCommand command, std::int64_t now_ns) n
     if (!gait_.try_restart(q_rad)) return {Refusal::kJointsAway, gait_.joints_away(q_rad)};
     overload_ = {};
   }
+  if (command == OperatorCommand::kHandOver) {
+    if (const OperatorAnswer answer = answer_if_it_stands(now_ns); !answer.is_obeyed()) return answer;
+    hand_over_.begin();
+  }
   supervisor_.obey(command, state);
-  if (command == OperatorCommand::kStop && state != ModuleState::kArming) gait_.request_stop(StopReason::kOperator);
+  const bool ends = command == OperatorCommand::kStop && state != ModuleState::kArming;
+  const bool stands_on = command == OperatorCommand::kHandOver && state == ModuleState::kStanding;
+  if (ends || stands_on) gait_.request_stop(StopReason::kOperator);
   return {};
 }
 
 // What may have stopped it is over, and both feet carry: one that a mute knee kept up counts as standing only until the
 // drive speaks again.
 OperatorAnswer ControlLane::answer_to_reset(std::int64_t now_ns) const noexcept {
+  if (!drives_.silent.is_empty()) return {Refusal::kDrivesSilent, drives_.silent};
+  if (!drives_.bus.drive_errors.is_empty()) return {Refusal::kDrivesInError, drives_.bus.drive_errors};
+  if (!drives_.hot.is_empty()) return {Refusal::kDrivesHot, drives_.hot};
+  return answer_if_it_stands(now_ns);
+}
+
+OperatorAnswer ControlLane::answer_if_it_stands(std::int64_t now_ns) const noexcept {
   constexpr double kStands = 0.5;  // probability
   const StateEstimate& state = estimator_.state();
   if (!drives_.silent.is_empty()) return {Refusal::kDrivesSilent, drives_.silent};
-  if (!drives_.bus.drive_errors.is_empty()) return {Refusal::kDrivesInError, drives_.bus.drive_errors};
   if (!overload_.takes_commands()) return {Refusal::kCommandRefused, {}};
   if (!(now_ns - state.oldest_input_ns <= params_.gait.steer_age_ns)) return {Refusal::kEstimateStale, {}};
   const bool carry = state.contact_probability[0] > kStands && state.contact_probability[1] > kStands;
@@ -123,6 +135,7 @@ void ControlLane::read_joints(std::int64_t now_ns) noexcept {
   const bool was_asked = command_.stamp_ns != 0;  // a drive answers a command
   JointFeedback joints;
   const bool came = ports_.joints.try_read(joints);
+  if (supervisor_.has_let_go()) return;  // they answer another's commands
   if (!gait_.armed()) {
     arm(came ? &joints : nullptr, now_ns);
   } else if (came) {
@@ -138,6 +151,7 @@ void ControlLane::read_joints(std::int64_t now_ns) noexcept {
 void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept {
   const JointSet late = late_drives(joints, now_ns);
   drives_.bus = ports_.joints.status();
+  note_hot_drives(now_ns);
   if (joints != nullptr) {
     const JointSet outside = JointReference::out_of_range(params_.robot, params_.gait.joints, joints->q_rad);
     note_out_of_range(JointSet::of_bits(outside.bits() & ~late.bits()), now_ns);
@@ -147,7 +161,7 @@ void ControlLane::arm(const JointFeedback* joints, std::int64_t now_ns) noexcept
   start_.imu_settled = hears_imu && estimator_.resting_accel().is_settled();
   if (now_ns - start_.first_ns >= kArmingTimeout_ns) note_silent_drives(start_.silent, now_ns);
   if (!late.is_empty() || !drives_.bus.drive_errors.is_empty() || !drives_.out_of_range.is_empty()) return;
-  if (drives_.bus.feet_silent) return;
+  if (!drives_.hot.is_empty() || drives_.bus.feet_silent) return;
   if (!start_.imu_settled || gait_.stop_requested() || !supervisor_.may_arm()) return;
   if (check_stance(joints->q_rad, now_ns)) estimator_.add_joints(*joints, now_ns);
 }
@@ -209,6 +223,16 @@ void ControlLane::note_silent_drives(JointSet silent, std::int64_t now_ns) noexc
   drives_.ever_silent = JointSet::of_bits(drives_.ever_silent.bits() | silent.bits());
 }
 
+void ControlLane::note_hot_drives(std::int64_t now_ns) noexcept {
+  const JointSet hot = Supervisor::hot(params_.supervisor, drives_.bus.drive_degc, drives_.hot);
+  if (hot == drives_.hot) return;
+  for (std::size_t n = 0; n < kJointCount; ++n) {
+    if (hot.contains(n) && !drives_.hot.contains(n)) health_.raise(Fault::kDriveHot, now_ns);
+  }
+  drives_.hot = hot;
+  drives_.ever_hot = JointSet::of_bits(drives_.ever_hot.bits() | hot.bits());
+}
+
 ModuleState ControlLane::module_state() const noexcept {
   const GaitStatus& status = gait_.status();
   const bool on_stairs = status.treads_climbed > 0 || status.step.onto_tread;
@@ -220,6 +244,7 @@ ArmingWait ControlLane::arming_waits_for() const noexcept {
   if (module_state() != ModuleState::kArming) return {};
   if (!start_.silent.is_empty()) return {For::kAnswers, start_.silent};
   if (!drives_.bus.drive_errors.is_empty()) return {For::kErrors, drives_.bus.drive_errors};
+  if (!drives_.hot.is_empty()) return {For::kCooler, drives_.hot};
   if (!drives_.out_of_range.is_empty()) return {For::kRange, drives_.out_of_range};
   if (!start_.imu_settled) return {For::kImu, {}};
   return drives_.bus.feet_silent ? ArmingWait{For::kFeet, {}} : start_.disagreement;
@@ -257,6 +282,10 @@ Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
 
 // Whatever is silent, the gait runs: a foot in the air has to come down.
 Progress ControlLane::gait(std::int64_t now_ns) noexcept {
+  if (supervisor_.has_let_go()) {
+    command_ = {};
+    return Progress::kDone;
+  }
   if (!estimator_.leg_sensing().any()) {
     command_ = {};
     if (!listens(now_ns)) command_.stamp_ns = now_ns;
@@ -269,6 +298,7 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
     supervisor_.watch_lean(params_.supervisor, state.odom_T_base.R);
   }
   if (supervisor_.has_fallen()) damp_joints(now_ns);
+  if (supervisor_.hands_over()) hand_over_robot(now_ns);
   estimator_.leg_sensing().to_drives(command_);
   hand_over_touch_down();
 
@@ -282,6 +312,14 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   context.climbing = status.treads_climbed > 0 || status.step.onto_tread;
   link_.search_context.publish(now_ns);
   return Progress::kDone;
+}
+
+void ControlLane::hand_over_robot(std::int64_t now_ns) noexcept {
+  const StateEstimate& state = estimator_.state();
+  const bool knows = now_ns - state.oldest_input_ns <= params_.gait.steer_age_ns;
+  const bool ended = gait_.status().phase == GaitPhase::kStopped || gait_.status().phase == GaitPhase::kFinished;
+  const bool at_rest = knows && ended && HandOver::is_at_rest(params_.hand_over, state);
+  hand_over_.tick(params_.hand_over, params_.robot.drives, at_rest, estimator_.leg_sensing().joints(), command_);
 }
 
 void ControlLane::damp_joints(std::int64_t now_ns) noexcept {
@@ -309,6 +347,8 @@ Progress ControlLane::command(std::int64_t now_ns) noexcept {
     health_.raise(Fault::kJointCommandInvalid, now_ns);
   }
   overload_.count_command(params_.overload, taken);
+  // Not before every drive has the hold.
+  if (taken && supervisor_.hands_over() && hand_over_.is_over(params_.hand_over)) supervisor_.let_go();
   return Progress::kDone;
 }
 
@@ -334,10 +374,11 @@ void ControlLane::report_rejections(std::int64_t now_ns) noexcept {
   health_.follow(Limit::kHeightRejected, now_ns, counters.height_rejected);
 }
 
-// A drive in error gives no torque that could be trusted: the step is finished, then the gait stops. While it arms
-// there is nothing to stop, and the bus clears errors that can be cleared.
+// A drive in error gives no torque that could be trusted, and one that is too hot will soon be in error: the step is
+// finished, then the gait stops. While it arms there is nothing to stop, and the bus clears errors that can be cleared.
 void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   drives_.bus = ports_.joints.status();
+  note_hot_drives(now_ns);
   const hal::JointBusStatus& bus = drives_.bus;
   health_.follow(Fault::kDriveError, now_ns, bus.drive_error_replies);
   health_.follow(Fault::kBusOff, now_ns, bus.bus_offs);
@@ -353,6 +394,7 @@ void ControlLane::report_bus(std::int64_t now_ns) noexcept {
   if (feet_silent && !raised_.feet_silent) health_.raise(Fault::kFeetSilent, now_ns);
   raised_.feet_silent = feet_silent;
   if (!arms && !bus.drive_errors.is_empty()) gait_.request_stop(StopReason::kDriveError);
+  if (!arms && !drives_.hot.is_empty()) gait_.request_stop(StopReason::kDriveHot);
 }
 
 // While the drives are still silent there is nothing to stop.

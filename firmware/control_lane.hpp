@@ -61,6 +61,8 @@ class ControlLane {
   void read_operator(std::int64_t now_ns) noexcept;
   [[nodiscard]] OperatorAnswer obey(OperatorCommand command, std::int64_t now_ns) noexcept;
   [[nodiscard]] OperatorAnswer answer_to_reset(std::int64_t now_ns) const noexcept;
+  // Whether it balances: all drives speak and take commands, the estimate is fresh, and both feet carry.
+  [[nodiscard]] OperatorAnswer answer_if_it_stands(std::int64_t now_ns) const noexcept;
   void sense_imu(std::int64_t now_ns) noexcept;
   void read_joints(std::int64_t now_ns) noexcept;
   // While it arms, in every cycle; joints: the feedback that came, or null.
@@ -70,6 +72,7 @@ class ControlLane {
   [[nodiscard]] JointSet late_drives(const JointFeedback* joints, std::int64_t now_ns) noexcept;
   void note_out_of_range(JointSet out_of_range, std::int64_t now_ns) noexcept;
   void note_silent_drives(JointSet silent, std::int64_t now_ns) noexcept;
+  void note_hot_drives(std::int64_t now_ns) noexcept;
   void report_bus(std::int64_t now_ns) noexcept;
   void answer_pose_request(std::int64_t now_ns) noexcept;
   void report_overload(std::int64_t now_ns) noexcept;
@@ -79,6 +82,7 @@ class ControlLane {
   [[nodiscard]] bool listens(std::int64_t now_ns) const noexcept;
   // Of a robot that falls: no stiffness, no torque, and the drives' own damping.
   void damp_joints(std::int64_t now_ns) noexcept;
+  void hand_over_robot(std::int64_t now_ns) noexcept;
   void hand_over_touch_down() noexcept;
 
   ControlPorts ports_;
@@ -90,6 +94,7 @@ class ControlLane {
   Estimator estimator_;
   Gait gait_;
   Supervisor supervisor_;
+  HandOver hand_over_;
   Health all_faults_;
   LaneView view_;
   bool pose_asked_ = false;  // a request came with this frame

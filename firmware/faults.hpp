@@ -51,7 +51,8 @@ namespace polygmap {
   X(37, kFeetSilent, "feet_silent", "The feet's sensors were silent for more than five cycles.")                     \
   X(38, kBusReplyStale, "bus_reply_stale", "A CAN reply had waited for more than two cycles: it was left out.")      \
   X(39, kJointOutOfRange, "joint_out_of_range",                                                                      \
-    "While arming, a joint was farther beyond its range than its encoder may be off; telemetry says which.")
+    "While arming, a joint was farther beyond its range than its encoder may be off; telemetry says which.")         \
+  X(40, kDriveHot, "drive_hot", "A drive told that it is hotter than it may be; telemetry says which joint's.")
 
 // A bound was met; the module goes on with what it has. Numbers 101-199.
 #define POLYGMAP_LIMITS(X)                                                                                          \

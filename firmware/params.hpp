@@ -10,6 +10,7 @@
 #include "algorithms/perception/map/polygon_map.hpp"
 #include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/robot_model.hpp"
+#include "firmware/hand_over.hpp"
 #include "firmware/overload_guard.hpp"
 #include "firmware/supervisor.hpp"
 #include "scheduler/schedule_table.hpp"
@@ -29,6 +30,7 @@ struct Params {
   BodyUncertainty body;
   OverloadGuard::Params overload;
   Supervisor::Params supervisor;
+  HandOver::Params hand_over;
   StanceCheck::Params stance;
   double tread_height_sigma_m = 0.004;
   std::int64_t imu_interval_ns = kCycle_ns;
@@ -48,6 +50,7 @@ struct Params {
     field("body", p.body);
     field("overload", p.overload);
     field("supervisor", p.supervisor);
+    field("hand_over", p.hand_over);
     field("stance", p.stance);
     field("tread_height_sigma_m", p.tread_height_sigma_m, 1e-5, 0.1,
           "Height of a mapped tread under a foot that has just landed on it.");

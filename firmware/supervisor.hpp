@@ -12,6 +12,7 @@
 #include "algorithms/core/math/transcendental.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
 #include "algorithms/core/messages/operator_command.hpp"
+#include "algorithms/core/messages/samples.hpp"
 
 namespace polygmap {
 
@@ -26,6 +27,8 @@ enum class ModuleState : std::uint8_t {
   kSafeStop,
   kOnTop,
   kFallen,
+  kHandingOver,
+  kReleased,
 };
 // One line for each state, in the enumeration's order: its name, and what the module does in it.
 struct ModuleStateInfo {
@@ -43,8 +46,12 @@ inline constexpr std::array kModuleStateTable{
     ModuleStateInfo{"safe_stop", "The gait has stopped on two feet and holds; the stop's reason says why."},
     ModuleStateInfo{"on_top", "The gait has ended the climb, and holds."},
     ModuleStateInfo{"fallen", "The joints are damped, and nothing else is asked of them; only a new start leads on."},
+    ModuleStateInfo{"handing_over",
+                    "It balances until the robot is at rest; then the drives get a law that holds it there."},
+    ModuleStateInfo{"released",
+                    "Nothing is sent any more: another controller has the robot; only a new start leads on."},
 };
-static_assert(kModuleStateTable.size() == static_cast<std::size_t>(ModuleState::kFallen) + 1);
+static_assert(kModuleStateTable.size() == static_cast<std::size_t>(ModuleState::kReleased) + 1);
 [[nodiscard]] constexpr std::string_view name_of(ModuleState state) noexcept {
   return kModuleStateTable[static_cast<std::size_t>(state)].name;
 }
@@ -74,6 +81,10 @@ inline constexpr auto kOperatorTransitions = std::to_array<OperatorTransition>({
     {ModuleState::kSafeStop, OperatorCommand::kReset, ModuleState::kStanding, ", once what stopped it is over"},
     {ModuleState::kOnTop, OperatorCommand::kReset, ModuleState::kStanding},
     {ModuleState::kOnTop, OperatorCommand::kStop, ModuleState::kSafeStop},
+    {ModuleState::kStanding, OperatorCommand::kHandOver, ModuleState::kHandingOver},
+    {ModuleState::kSafeStop, OperatorCommand::kHandOver, ModuleState::kHandingOver, ", if it balances"},
+    {ModuleState::kOnTop, OperatorCommand::kHandOver, ModuleState::kHandingOver},
+    {ModuleState::kHandingOver, OperatorCommand::kStop, ModuleState::kSafeStop},
 });
 
 // What happens without an operator.
@@ -84,17 +95,20 @@ enum class StateEvent : std::uint8_t {
   kHasToStop,
   kGaitStops,
   kGaitEnds,
-  kFalls
+  kFalls,
+  kLetsGo
 };
 [[nodiscard]] constexpr std::string_view text_of(StateEvent event) noexcept {
-  constexpr std::array<std::string_view, 7> kTexts{"all drives and sensors have answered, and agree",
-                                                   "a foot is lifted for a tread",
-                                                   "that foot was put back, and one is lifted for the floor",
-                                                   "it has to stop: time is short, commands are refused, a drive errs",
-                                                   "the gait has stopped, on both feet",
-                                                   "the gait has ended the climb",
-                                                   "the torso leans too far for too long"};
-  static_assert(kTexts.size() == static_cast<std::size_t>(StateEvent::kFalls) + 1);
+  constexpr std::array<std::string_view, 8> kTexts{
+      "all drives and sensors have answered, and agree",
+      "a foot is lifted for a tread",
+      "that foot was put back, and one is lifted for the floor",
+      "it has to stop: time is short, commands are refused, a drive errs or is too hot",
+      "the gait has stopped, on both feet",
+      "the gait has ended the climb",
+      "the torso leans too far for too long",
+      "it was at rest, and the drives hold it"};
+  static_assert(kTexts.size() == static_cast<std::size_t>(StateEvent::kLetsGo) + 1);
   return kTexts[static_cast<std::size_t>(event)];
 }
 // What an event leads to. What no line has changes nothing.
@@ -127,6 +141,8 @@ inline constexpr auto kAutomaticTransitions = std::to_array<AutomaticTransition>
     {ModuleState::kSafeStop, StateEvent::kFalls, ModuleState::kFallen},
     {ModuleState::kOnTop, StateEvent::kHasToStop, ModuleState::kSafeStop},
     {ModuleState::kOnTop, StateEvent::kFalls, ModuleState::kFallen},
+    {ModuleState::kHandingOver, StateEvent::kFalls, ModuleState::kFallen},
+    {ModuleState::kHandingOver, StateEvent::kLetsGo, ModuleState::kReleased},
 });
 
 class Supervisor {
@@ -135,6 +151,8 @@ class Supervisor {
     bool autostart = true;
     double fallen_rad = 0.45;
     std::int32_t fallen_ticks = 10;
+    std::int32_t hot_degc = 90;
+    std::int32_t cool_degc = 75;
 
     static void visit(auto& p, auto& field) {
       field("autostart", p.autostart, "It arms and starts by itself; false: when its operator asks.");
@@ -143,6 +161,10 @@ class Supervisor {
       field("fallen_rad", p.fallen_rad, 0.2, 1.5,
             "A torso that leans farther falls: the joints are damped from then on.");
       field("fallen_ticks", p.fallen_ticks, 1, 500, "So many ticks in a row.");
+      field("hot_degc", p.hot_degc, 30, 256,
+            "A drive that tells of such a temperature or more is too hot: it stops. Let it be less than what the drive "
+            "itself switches off at; 256, which no drive can tell: never.");
+      field("cool_degc", p.cool_degc, 20, 255, "It is too hot until it tells of such a temperature or less.");
     }
   };
   // What the state follows from, beside what was asked.
@@ -167,6 +189,7 @@ class Supervisor {
     if (command == OperatorCommand::kStop && state == ModuleState::kArming) armed_ = false;
     if (command == OperatorCommand::kStart) started_ = true;
     if (command == OperatorCommand::kReset) started_ = false;
+    hands_over_ = command == OperatorCommand::kHandOver;
     paused_ = command == OperatorCommand::kPause;
   }
   // Every tick in which the estimate hears of the IMU.
@@ -174,13 +197,30 @@ class Supervisor {
     leaning_ticks_ = odom_R_base(2, 2) < math::cos(params.fallen_rad) ? leaning_ticks_ + 1 : 0;
     fallen_ = fallen_ || leaning_ticks_ >= params.fallen_ticks;
   }
+  // before: those that were. What a drive does not tell any more it still is; it cools below hot_degc at least.
+  [[nodiscard]] static JointSet hot(const Params& params, const std::array<std::int16_t, kJointCount>& degc,
+                                    JointSet before) noexcept {
+    const std::int32_t cool_degc = std::min(params.cool_degc, params.hot_degc - 1);
+    JointSet hot;
+    for (std::size_t n = 0; n < kJointCount; ++n) {
+      const bool was = before.contains(n);
+      if (was ? degc[n] > cool_degc || degc[n] == kNotTold_degc : degc[n] >= params.hot_degc) hot.insert(n);
+    }
+    return hot;
+  }
   [[nodiscard]] bool may_arm() const noexcept { return armed_; }
   [[nodiscard]] bool may_step() const noexcept { return started_ && !paused_; }
   [[nodiscard]] bool has_fallen() const noexcept { return fallen_; }
+  // Until it has let go, or fallen.
+  [[nodiscard]] bool hands_over() const noexcept { return hands_over_ && !released_ && !fallen_; }
+  void let_go() noexcept { released_ = true; }
+  [[nodiscard]] bool has_let_go() const noexcept { return released_; }
 
   [[nodiscard]] ModuleState state(const GaitView& gait) const noexcept {
+    if (released_) return ModuleState::kReleased;
     if (fallen_) return ModuleState::kFallen;
     if (!gait.armed) return armed_ ? ModuleState::kArming : ModuleState::kOff;
+    if (hands_over_) return ModuleState::kHandingOver;
     const bool over = gait.phase == GaitPhase::kFinished;
     if (gait.phase == GaitPhase::kStopped || (over && gait.stop_requested)) return ModuleState::kSafeStop;
     if (over) return ModuleState::kOnTop;
@@ -195,6 +235,8 @@ class Supervisor {
   bool started_ = false;  // so is this
   bool paused_ = false;
   bool fallen_ = false;
+  bool hands_over_ = false;
+  bool released_ = false;  // for good
   std::int32_t leaning_ticks_ = 0;
 };
 

@@ -22,6 +22,7 @@ struct ArmingWait {
     kNothing,  // it has armed, or waits for the next good feedback
     kAnswers,  // of drives
     kErrors,   // that drives tell of, to go
+    kCooler,   // drives, that are too hot
     kRange,    // joints outside it
     kImu,
     kFeet,
@@ -37,10 +38,11 @@ struct ArmingWait {
 };
 // Joints or degrees go before or after it.
 [[nodiscard]] constexpr std::string_view text_of(ArmingWait::For what) noexcept {
-  constexpr std::array<std::string_view, 9> kTexts{
+  constexpr std::array<std::string_view, 10> kTexts{
       "",
       "no answer yet from",
       "in error:",
+      "too hot:",
       "out of range:",
       "too few IMU samples",
       "no forces of the feet",
@@ -58,6 +60,8 @@ struct DriveReport {
   JointSet silent;  // for more than JointFeedback::kCarried_cycles, as of the last feedback; arming: see ControlLane
   JointSet ever_silent;   // since the start
   JointSet out_of_range;  // arming: farther than an encoder may be off, as of the last feedback
+  JointSet hot;           // too hot, until they have cooled (Supervisor)
+  JointSet ever_hot;      // since the start
   hal::JointBusStatus bus;
 };
 

@@ -103,6 +103,12 @@ void SimRobot::advance() {
   sense();
 }
 
+void SimRobot::hold_again() {
+  holder_.meet(feedback_.q_rad);
+  active_.reset();
+  command_.reset();
+}
+
 Vec3 SimRobot::push_force_n() const {
   Vec3 force_n = Vec3::Zero();
   for (const Push& push : pushes_) {

@@ -74,6 +74,8 @@ class SimRobot final : public hal::Clock,
   [[nodiscard]] const SimDepthCamera& depth_camera() const noexcept { return camera_; }
   [[nodiscard]] JointVector true_q_rad() const noexcept { return plant_->true_q_rad(); }
   [[nodiscard]] Plant& plant() noexcept { return *plant_; }  // for tests that push it
+  // Who held the robot before the module's first command takes it over as it stands; the module has to be silent.
+  void hold_again();
   // The last command as the module wrote it.
   [[nodiscard]] const std::optional<JointCommand>& last_command() const noexcept { return command_; }
   [[nodiscard]] VirtualClock& clock() noexcept { return clock_; }  // for tests that inject work
@@ -105,7 +107,7 @@ class SimRobot final : public hal::Clock,
   RobotErrors errors_;
   std::vector<Push> pushes_;
   VirtualClock clock_;
-  StandController holder_;  // until the module's first command that asks something of a drive
+  StandController holder_;  // until the module's first command that asks something of a drive, and from hold_again() on
   std::unique_ptr<Plant> plant_;
   SimDepthCamera camera_;
   ImuModel imu_;

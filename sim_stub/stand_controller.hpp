@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whoever holds the robot before the module speaks: drives at their own gains around a posture, and a balance of its
-// own that knows the true state. The module takes over from it.
+// Whoever holds the robot before the module speaks, and after it has let go: drives at their own gains around a
+// posture, and a balance of its own that knows the true state. The module takes over from it, and hands over to it.
 #pragma once
 
 #include <optional>
@@ -16,6 +16,11 @@ class StandController {
   };
   StandController(const JointVector& q_rad, const Gains& gains) : q_rad_(q_rad), gains_(gains) {}
 
+  // It holds that posture from now on, and the centre of mass where it finds it.
+  void meet(const JointVector& q_rad) {
+    q_rad_ = q_rad;
+    centre_.reset();
+  }
   // One tick. The centre of mass stays where it was at the first.
   [[nodiscard]] JointCommand command(const Plant& plant);
 

@@ -54,6 +54,7 @@ constexpr std::array kSuffixes{Suffix{"_m", "m"},
                                Suffix{"_nmprad", "N m/rad"},
                                Suffix{"_nmsprad", "N m s/rad"},
                                Suffix{"_kg", "kg"},
+                               Suffix{"_degc", "degrees C"},
                                Suffix{"_kgm2", "kg m^2"},
                                Suffix{"_sigma", "sigma"},
                                Suffix{"_sigmas", "sigma"}};

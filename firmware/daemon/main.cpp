@@ -22,8 +22,8 @@ constexpr const char* kUsage =
     "polygmapd --config FILE [--record DIR]   runs the module with the devices of this file; writes all that goes in\n"
     "                                         and comes out into DIR, for --replay\n"
     "polygmapd --config FILE --check     only reads it\n"
-    "polygmapd --ask WHAT --config FILE  asks the one that runs with this file to arm, start, pause, resume, stop or\n"
-    "                                    reset, or for its state; says the state that came of it\n"
+    "polygmapd --ask WHAT --config FILE  asks the one that runs with this file to arm, start, pause, resume, stop,\n"
+    "                                    reset or hand_over, or for its state; says the state that came of it\n"
     "polygmapd --replay DIR              feeds a recording to the module and compares what comes out\n"
     "polygmapd --doctor [--json] [--strict] [--config FILE]   says what on this machine hinders it, and what to do\n"
     "polygmapd --version\n"
@@ -52,7 +52,7 @@ std::string parse(int argc, char** argv, Options& options) {
     const bool lacks_value = i + 1 == argc || argv[i + 1][0] == '\0';
     if (takes_path && lacks_value) return std::string(word) + " takes a path";
     const bool may_ask = !lacks_value && (operator_command_of(argv[i + 1]) || argv[i + 1] == std::string_view("state"));
-    if (word == "--ask" && !may_ask) return "--ask takes arm, start, pause, resume, stop, reset or state";
+    if (word == "--ask" && !may_ask) return "--ask takes arm, start, pause, resume, stop, reset, hand_over or state";
     if (word == "--config") {
       options.config = argv[++i];
     } else if (word == "--record") {

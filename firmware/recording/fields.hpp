@@ -57,6 +57,7 @@ void each_field(auto& f, Of<JointFeedback> auto& m) {
 void each_field(auto& f, Of<hal::JointBusStatus> auto& m) {
   walk(f, "drive_errors", m.drive_errors);
   walk(f, "drive_code", m.drive_code);
+  walk(f, "drive_degc", m.drive_degc);
   walk(f, "bus_off", m.bus_off);
   walk(f, "senses_feet", m.senses_feet);
   walk(f, "feet_silent", m.feet_silent);

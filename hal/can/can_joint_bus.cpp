@@ -104,6 +104,7 @@ void CanJointBus::take_reply(std::size_t joint, const CanFrame& frame) noexcept 
   }
   status_.drive_errors = errors;
   status_.drive_code[joint] = error ? reply.status : std::uint8_t{0};
+  status_.drive_degc[joint] = reply.hottest_degc();
 
   const auto i = static_cast<Eigen::Index>(joint);
   feedback_.q_rad[i] = reply.p_rad;

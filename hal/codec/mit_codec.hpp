@@ -2,10 +2,11 @@
 // The frames of the MIT family of drives (CubeMars AK, Damiao, Ruiwo and others): 8 bytes, fields packed big-endian.
 //
 // Command: position 16 bits | velocity 12 | kp 12 | kd 12 | torque 12. Reply: byte 0 names the drive, position 16 |
-// velocity 12 | torque 12, then, in a reply of 8 bytes, two bytes that differ from maker to maker. A field of n bits
-// spans its range in 2^n - 1 steps and is rounded to the nearest.
+// velocity 12 | torque 12, then, in a reply of 8 bytes, two bytes that differ from maker to maker: temperatures, and an
+// error code. A field of n bits spans its range in 2^n - 1 steps and is rounded to the nearest.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -28,8 +29,11 @@ struct MitRanges {
 
 // What byte 0 of a reply says.
 enum class MitReplyRule : std::uint8_t {
-  kId,            // the drive's id; byte 7 of a long reply is its error code
-  kStatusNibble,  // status in the upper half, the id's lower half in the lower one (Damiao)
+  // The drive's id. Byte 6 of a long reply is the motor's temperature, with its sign, byte 7 the error code (CubeMars).
+  kId,
+  // Status in the upper half, the id's lower half in the lower one. Byte 6 of a long reply is the transistors'
+  // temperature, byte 7 the motor's, without a sign (Damiao).
+  kStatusNibble,
 };
 
 // Frames that are no command: seven bytes 0xFF, then this.
@@ -47,6 +51,9 @@ struct MitReply {
   std::uint8_t status = 0;  // by kStatusNibble the upper half of byte 0; by kId byte 7, 0 in a short reply
   bool enabled = true;      // false: the drive says that it is not in motor mode
   bool error = false;
+  std::int16_t motor_degc = kNotTold_degc;  // whole degrees; short replies tell none
+  std::int16_t mos_degc = kNotTold_degc;    // of its transistors; by kId never told
+  [[nodiscard]] constexpr std::int16_t hottest_degc() const noexcept { return std::max(motor_degc, mos_degc); }
 };
 
 namespace detail {
@@ -169,14 +176,20 @@ inline constexpr MitField kReplyP{8, 16}, kReplyV{24, 12}, kReplyT{36, 12};
     reply.status = static_cast<std::uint8_t>(bytes[0] >> 4U);
     reply.enabled = reply.status != kDisabled;
     reply.error = reply.status >= kFirstError;
+    if (bytes.size() == 8) {
+      reply.mos_degc = bytes[6];
+      reply.motor_degc = bytes[7];
+    }
   } else if (bytes.size() == 8) {
+    reply.motor_degc = static_cast<std::int8_t>(bytes[6]);
     reply.status = bytes[7];
     reply.error = reply.status != 0;
   }
   return true;
 }
 
-// As a drive sends it, 8 bytes; for the simulation. Not finite: zero.
+// As a drive sends it, 8 bytes; for the simulation. Not finite, or not told: zero. A temperature that the byte has no
+// room for becomes its nearest end.
 [[nodiscard]] constexpr MitBytes reply_frame(const MitReply& reply, std::uint32_t drive_id, const MitRanges& ranges,
                                              MitReplyRule rule) noexcept {
   using namespace detail;
@@ -188,7 +201,16 @@ inline constexpr MitField kReplyP{8, 16}, kReplyV{24, 12}, kReplyT{36, 12};
   MitBytes bytes = bytes_of(word);
   const std::uint32_t upper = rule == MitReplyRule::kStatusNibble ? reply.status : 0U;
   bytes[0] = static_cast<std::uint8_t>(reply_name(drive_id, rule) | upper << 4U);
-  if (rule == MitReplyRule::kId) bytes[7] = reply.status;
+  const auto degc = [](std::int16_t told, int least, int most) {
+    return static_cast<std::uint8_t>(told == kNotTold_degc ? 0 : std::clamp<int>(told, least, most));
+  };
+  if (rule == MitReplyRule::kId) {
+    bytes[6] = degc(reply.motor_degc, -128, 127);
+    bytes[7] = reply.status;
+  } else {
+    bytes[6] = degc(reply.mos_degc, 0, 255);
+    bytes[7] = degc(reply.motor_degc, 0, 255);
+  }
   return bytes;
 }
 

@@ -91,7 +91,11 @@ void BusRobot::receive(std::size_t bus, const hal::CanFrame& frame, std::int64_t
     JointSetpoint command;
     if (drive.fault == DriveFault::kLatched) {  // it takes nothing else
       const bool has_frame = description.reply == hal::MitReplyRule::kStatusNibble;
-      if (has_frame && bytes == hal::special_frame(hal::MitSpecial::kClearErrors)) drive = {};
+      if (has_frame && bytes == hal::special_frame(hal::MitSpecial::kClearErrors)) {
+        drive.fault = DriveFault::kNone;
+        drive.enabled = drive.commanded = false;
+        drive.command = {};
+      }
     } else if (bytes == hal::special_frame(hal::MitSpecial::kEnter)) {
       drive.enabled = true;
     } else if (bytes == hal::special_frame(hal::MitSpecial::kExit)) {
@@ -114,6 +118,7 @@ void BusRobot::reply(std::size_t joint, std::int64_t done_ns) {
   reply.p_rad = feedback_.q_rad[i];
   reply.v_radps = feedback_.dq_radps[i];
   reply.t_nm = feedback_.tau_nm[i];
+  reply.motor_degc = reply.mos_degc = drive.degc;
   if (in_error(drive.fault)) {
     reply.status = kErrorCode;
   } else if (description.reply == hal::MitReplyRule::kStatusNibble && drive.enabled) {
@@ -124,7 +129,13 @@ void BusRobot::reply(std::size_t joint, std::int64_t done_ns) {
       done_ns + kReply_ns);
 }
 
+void BusRobot::hold_again() {
+  held_again_ = true;
+  robot_.hold_again();
+}
+
 void BusRobot::command_robot(std::int64_t now_ns) {
+  if (held_again_) return;
   JointCommand command;
   command.stamp_ns = now_ns;
   for (std::size_t n = 0; n < kJointCount; ++n) {

@@ -37,7 +37,11 @@ class BusRobot {
   [[nodiscard]] hal::CanJointBus& joints() noexcept { return joints_; }
   [[nodiscard]] SimCanBus& bus(std::size_t i) noexcept { return *buses_[i]; }
   void set_fault(std::size_t joint, DriveFault fault) noexcept;
+  // What it tells of itself from now on, motor and transistors alike.
+  void set_temperature(std::size_t joint, std::int16_t degc) noexcept { drives_[joint].degc = degc; }
   void set_feet_silent(bool silent) noexcept { feet_silent_ = silent; }
+  // As SimRobot's; the drives' commands count no more.
+  void hold_again();
   // Instead of the robot's: the buses run for a tick, then the robot does.
   void advance();
 
@@ -46,6 +50,7 @@ class BusRobot {
     DriveFault fault = DriveFault::kNone;
     bool enabled = false;
     bool commanded = false;
+    std::int16_t degc = 40;
     JointSetpoint command;
   };
   void send_feet(std::int64_t now_ns);
@@ -61,6 +66,7 @@ class BusRobot {
   hal::CanJointBus joints_;
   std::array<Drive, kJointCount> drives_;
   bool feet_silent_ = false;
+  bool held_again_ = false;
   JointFeedback feedback_;  // as the tick begins
 };
 

@@ -30,6 +30,7 @@ constexpr std::array kFaults{
     FaultRow{"commands_refused", [](PhysicalClimb& c) { c.joints.refuses = true; }, ModuleState::kSafeStop,
              0.05 + kStep_s},
     FaultRow{"drive_error", [](PhysicalClimb& c) { c.joints.in_error.insert(4); }, ModuleState::kSafeStop, kStep_s},
+    FaultRow{"drive_hot", [](PhysicalClimb& c) { c.joints.hottest_degc = 90; }, ModuleState::kSafeStop, kStep_s},
     // Twice the time that a cycle has, in every cycle.
     FaultRow{"time_short", [](PhysicalClimb& c) { c.row_share = [](std::size_t) { return 3.0; }; },
              ModuleState::kSafeStop, 0.3 + kStep_s},

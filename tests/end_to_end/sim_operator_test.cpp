@@ -110,6 +110,20 @@ TEST(UnaskedRobot, AutostartIsOffAndThereIsNoOperator_EndsAsOff) {
   EXPECT_LT(summary.ended_at_s, 3.1);
 }
 
+TEST(OperatedRobot, HandedOverOnTop_StandsOnItsOwnControllerAgain) {
+  ClimbOptions options;
+  options.stairs.steps = 1;
+  options.bus = config::read_bus(std::string(POLYGMAP_BUSES) + "/damiao.toml");
+  options.time_limit_s = 40.0;
+  const ClimbSummary summary =
+      climb_with(options, {{1.0, Command::kArm}, {3.0, Command::kStart}, {30.0, Command::kHandOver}});
+  EXPECT_TRUE(summary.pass) << summary.reason;
+  EXPECT_TRUE(summary.reason.ends_with("; it handed the robot over there.")) << summary.reason;
+  EXPECT_TRUE(states_of(summary).ends_with("on_top handing_over released")) << states_of(summary);
+  EXPECT_NEAR(summary.ended_at_s, 35.6, 0.3);
+  for (const auto& [name, count] : summary.faults) EXPECT_NE(name, "drive_silent");
+}
+
 TEST(OperatedRobot, Recorded_NothingDiffersInTheReplay) {
   const auto directory = std::filesystem::path(testing::TempDir()) / "polygmap_operated_climb";
   std::error_code error;
@@ -119,9 +133,14 @@ TEST(OperatedRobot, Recorded_NothingDiffersInTheReplay) {
   options.plant = PlantKind::kKinematic;
   options.record_dir = directory.string();
   options.time_limit_s = 9.0;
-  const ClimbSummary summary = climb_with(
-      options, {{1.2, Command::kArm}, {1.3, Command::kReset}, {3.0, Command::kStart}, {6.0, Command::kPause}});
-  EXPECT_EQ(states_of(summary), "off standing walking_up holding");
+  const ClimbSummary summary = climb_with(options, {{1.2, Command::kArm},
+                                                    {1.3, Command::kReset},
+                                                    {3.0, Command::kStart},
+                                                    {5.0, Command::kPause},
+                                                    {6.0, Command::kStop},
+                                                    {6.5, Command::kHandOver}});
+  EXPECT_TRUE(states_of(summary).starts_with("off standing walking_up holding ")) << states_of(summary);
+  EXPECT_TRUE(states_of(summary).ends_with("safe_stop handing_over released")) << states_of(summary);
   const recording::ReplayResult result = recording::replay(options.record_dir);
   EXPECT_EQ(result.verdict, recording::ReplayVerdict::kSame) << recording::text_of(result);
   std::filesystem::remove_all(directory, error);

@@ -155,6 +155,19 @@ TEST_F(ArmingTest, DriveTellsAnError_HoldsTheGainsBackUntilItIsGone) {
   EXPECT_EQ(control().arming_waits_for(), ArmingWait{});
 }
 
+TEST_F(ArmingTest, DriveIsTooHot_HoldsTheGainsBackUntilItHasCooled) {
+  joints_.told.drive_degc[4] = 95;
+  stand(50);
+  EXPECT_EQ(control().module_state(), ModuleState::kArming);
+  EXPECT_EQ(joints_.commands().newest().joints[3].kp_nmprad, 0.0);
+  EXPECT_EQ(control().arming_waits_for(), (ArmingWait{ArmingWait::For::kCooler, JointSet::of_bits(1U << 4U)}));
+  EXPECT_EQ(count(Fault::kDriveHot), 1U);
+  joints_.told.drive_degc[4] = 60;
+  stand(kInitialised_ticks);
+  EXPECT_TRUE(is_running(control().module_state()));
+  EXPECT_EQ(control().arming_waits_for(), ArmingWait{});
+}
+
 TEST_F(ArmingTest, JointBeyondItsRange_IsNamedAndHoldsTheGainsBackUntilItIsInside) {
   const auto stand_with_knee = [this](double knee_rad, int ticks) {
     for (int i = 0; i < ticks; ++i) {

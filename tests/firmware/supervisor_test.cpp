@@ -8,13 +8,14 @@
 #include <vector>
 
 #include "algorithms/core/math/transform.hpp"
+#include "hal/ports/joint_bus.hpp"
 
 namespace polygmap {
 namespace {
 
 using Command = OperatorCommand;
-constexpr std::array kCommands{Command::kArm,    Command::kStart, Command::kPause,
-                               Command::kResume, Command::kStop,  Command::kReset};
+constexpr std::array kCommands{Command::kArm,  Command::kStart, Command::kPause,   Command::kResume,
+                               Command::kStop, Command::kReset, Command::kHandOver};
 
 Supervisor supervisor_of(bool autostart) {
   Supervisor::Params params;
@@ -31,11 +32,12 @@ constexpr Supervisor::GaitView kStopped{true, GaitPhase::kStopped, true, true};
 TEST(Supervisor, EveryCommandInEveryState_IsObeyedWhereItMeansSomething) {
   // In the order of kCommands.
   const std::vector<std::pair<ModuleState, std::string>> obeyed{
-      {ModuleState::kOff, "yes no no no no no"},       {ModuleState::kArming, "no no no no yes no"},
-      {ModuleState::kStanding, "no yes no no yes no"}, {ModuleState::kWalkingUp, "no no yes no yes no"},
-      {ModuleState::kClimbing, "no no yes no yes no"}, {ModuleState::kHolding, "no no no yes yes no"},
-      {ModuleState::kStopping, "no no no no no no"},   {ModuleState::kSafeStop, "no no no no no yes"},
-      {ModuleState::kOnTop, "no no no no yes yes"},    {ModuleState::kFallen, "no no no no no no"}};
+      {ModuleState::kOff, "yes no no no no no no"},         {ModuleState::kArming, "no no no no yes no no"},
+      {ModuleState::kStanding, "no yes no no yes no yes"},  {ModuleState::kWalkingUp, "no no yes no yes no no"},
+      {ModuleState::kClimbing, "no no yes no yes no no"},   {ModuleState::kHolding, "no no no yes yes no no"},
+      {ModuleState::kStopping, "no no no no no no no"},     {ModuleState::kSafeStop, "no no no no no yes yes"},
+      {ModuleState::kOnTop, "no no no no yes yes yes"},     {ModuleState::kFallen, "no no no no no no no"},
+      {ModuleState::kHandingOver, "no no no no yes no no"}, {ModuleState::kReleased, "no no no no no no no"}};
   ASSERT_EQ(obeyed.size(), kModuleStateTable.size());
   for (const auto& [state, expected] : obeyed) {
     std::string answers;
@@ -87,7 +89,10 @@ struct Case {
   // As ControlLane does.
   void ask(Command command) {
     const ModuleState before = state();
-    if (command == Command::kStop && before != ModuleState::kArming) gait.stop_requested = true;
+    const bool ends = command == Command::kStop && before != ModuleState::kArming;
+    const bool stands_on = command == Command::kHandOver && before == ModuleState::kStanding;
+    if (ends || stands_on) gait.stop_requested = true;
+    if (stands_on) gait.phase = GaitPhase::kStopped;  // at once: no foot is in the air
     if (command == Command::kReset) gait.phase = GaitPhase::kStandstill, gait.stop_requested = false;
     supervisor.obey(command, before);
   }
@@ -112,6 +117,9 @@ struct Case {
       case StateEvent::kFalls:
         for (int i = 0; i < 100; ++i) supervisor.watch_lean({}, rotation_zyx(0.0, 1.0, 0.0));
         break;
+      case StateEvent::kLetsGo:
+        if (supervisor.hands_over()) supervisor.let_go();
+        break;
     }
   }
 };
@@ -129,6 +137,11 @@ Case case_in(ModuleState state) {
   if (state == ModuleState::kSafeStop) c.happen(StateEvent::kGaitStops);
   if (state == ModuleState::kOnTop) c.happen(StateEvent::kGaitEnds);
   if (state == ModuleState::kFallen) c.happen(StateEvent::kFalls);
+  if (state == ModuleState::kHandingOver || state == ModuleState::kReleased) {
+    c.happen(StateEvent::kGaitStops);
+    c.ask(Command::kHandOver);
+  }
+  if (state == ModuleState::kReleased) c.happen(StateEvent::kLetsGo);
   return c;
 }
 
@@ -148,7 +161,8 @@ TEST(Supervisor, EveryEventInEveryState_LeadsWhereTheTableSaysAndElseNowhere) {
   // those of the table; before it has its commands, neither gait nor lean is looked at.
   const auto cannot_be = [](State state, Event event) {
     const bool is_unarmed = state == State::kOff || state == State::kArming;
-    const bool is_over = state == State::kSafeStop || state == State::kOnTop;
+    const bool lets_go = state == State::kHandingOver || state == State::kReleased;
+    const bool is_over = state == State::kSafeStop || state == State::kOnTop || lets_go;
     if (event == Event::kGaitEnds) {
       return is_unarmed || is_over || state == State::kStanding || state == State::kWalkingUp ||
              state == State::kHolding;
@@ -157,7 +171,7 @@ TEST(Supervisor, EveryEventInEveryState_LeadsWhereTheTableSaysAndElseNowhere) {
     return event == Event::kGaitStops && is_over;
   };
   for (std::size_t from = 0; from < kModuleStateTable.size(); ++from) {
-    for (std::size_t what = 0; what <= static_cast<std::size_t>(Event::kFalls); ++what) {
+    for (std::size_t what = 0; what <= static_cast<std::size_t>(Event::kLetsGo); ++what) {
       const auto state = static_cast<State>(from);
       const auto event = static_cast<Event>(what);
       if (cannot_be(state, event)) continue;
@@ -203,6 +217,24 @@ TEST(Supervisor, LeansTooFarForTooLong_HasFallenForGood) {
   EXPECT_TRUE(supervisor.has_fallen());
   lean(0.0, 1000);
   EXPECT_EQ(supervisor.state(kOnTheStairs), ModuleState::kFallen);
+}
+
+TEST(Supervisor, DriveTellsItsTemperature_IsTooHotFromOneToTheOther) {
+  const Supervisor::Params params;
+  std::array<std::int16_t, kJointCount> degc = hal::all_not_told_degc();
+  JointSet hot;
+  const auto tells = [&](int told) {
+    degc[3] = static_cast<std::int16_t>(told);
+    return (hot = Supervisor::hot(params, degc, hot)).bits();
+  };
+  constexpr std::uint32_t kNone = 0, kKnee = 1U << 3U;
+  EXPECT_EQ(tells(kNotTold_degc), kNone);
+  EXPECT_EQ(tells(params.hot_degc - 1), kNone);
+  EXPECT_EQ(tells(params.hot_degc), kKnee);
+  EXPECT_EQ(tells(params.cool_degc + 1), kKnee);
+  EXPECT_EQ(tells(kNotTold_degc), kKnee) << "it says nothing of having cooled";
+  EXPECT_EQ(tells(params.cool_degc), kNone);
+  EXPECT_EQ(tells(params.hot_degc - 1), kNone);
 }
 
 TEST(OperatorCommand, NamesAreRead_AndNothingElse) {

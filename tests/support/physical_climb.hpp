@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "firmware/pipeline.hpp"
@@ -34,14 +35,16 @@ class TamperedJoints final : public hal::JointBus {
       status.drive_errors = in_error;
       ++status.drive_error_replies;
     }
+    if (hottest_degc) status.drive_degc[4] = *hottest_degc;
     return status;
   }
 
   std::function<void(JointFeedback&)> tamper;
   const JointCommand* instead = nullptr;  // another module's command goes to the drives
   bool silent = false;
-  bool refuses = false;  // every command
-  JointSet in_error;     // drives that tell of one
+  bool refuses = false;                      // every command
+  JointSet in_error;                         // drives that tell of one
+  std::optional<std::int16_t> hottest_degc;  // a drive tells of
 
  private:
   hal::JointBus& bus_;
@@ -126,6 +129,7 @@ class PhysicalClimb {
     const double end_s = time_s() + for_s;
     while (time_s() < end_s && !truth().fell) (void)tick();
   }
+  void hold_again() { robot_.hold_again(); }
   void push(const Push& push) {
     Vec3 force_n = Vec3::Zero();
     force_n[push.axis] = push.impulse_ns / Push::kDuration_s;

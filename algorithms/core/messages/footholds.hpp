@@ -56,6 +56,7 @@ enum class StopReason : std::uint8_t {
   kDriveError,       // a drive told of an error, or left its motor mode
   kTimeShort,        // control's cycles were lost or overran again and again
   kCommandsRefused,  // one command after the other was not taken by the bus, or not finite and never sent
+  kDriveHot,         // a drive told that it is hotter than it may be
 };
 
 // One line for each reason, in the enumeration's order: a name for machines, and for people what may follow "the module
@@ -87,8 +88,9 @@ inline constexpr std::array kStopReasonTable{
     StopReasonInfo{"drive_error", "a drive told of an error"},
     StopReasonInfo{"time_short", "its control cycles kept coming late"},
     StopReasonInfo{"commands_refused", "its drives could not be sent its commands"},
+    StopReasonInfo{"drive_hot", "a drive was too hot"},
 };
-static_assert(kStopReasonTable.size() == static_cast<std::size_t>(StopReason::kCommandsRefused) + 1);
+static_assert(kStopReasonTable.size() == static_cast<std::size_t>(StopReason::kDriveHot) + 1);
 
 [[nodiscard]] constexpr std::string_view name_of(StopReason reason) noexcept {
   const auto i = static_cast<std::size_t>(reason);

@@ -15,8 +15,9 @@ namespace polygmap {
 enum class Refusal : std::uint8_t {
   kNone,            // it does
   kState,           // the state has no answer to the command
-  kDrivesSilent,    // the answer names their joints, as those of the next
+  kDrivesSilent,    // the answer names their joints, as those of the next two
   kDrivesInError,   //
+  kDrivesHot,       //
   kCommandRefused,  // by the bus, or it was not finite
   kEstimateStale,   //
   kFootLifted,      // by the estimate one foot does not carry, or both
@@ -24,10 +25,11 @@ enum class Refusal : std::uint8_t {
 };
 // Joints go behind it.
 [[nodiscard]] constexpr std::string_view text_of(Refusal refusal) noexcept {
-  constexpr std::array<std::string_view, 8> kTexts{"",
+  constexpr std::array<std::string_view, 9> kTexts{"",
                                                    "",
                                                    "no answer yet from",
                                                    "in error:",
+                                                   "too hot:",
                                                    "the last command did not reach the drives",
                                                    "the estimate is too old",
                                                    "not both feet carry",

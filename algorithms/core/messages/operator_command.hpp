@@ -11,16 +11,17 @@
 namespace polygmap {
 
 enum class OperatorCommand : std::uint8_t {
-  kArm,     // take the robot over, and stand
-  kStart,   // walk up and climb
-  kPause,   // the foot in the air comes down, then stand
-  kResume,  // go on
-  kStop,    // the foot in the air comes down, then end
-  kReset,   // after an end whose cause is over: stand, and be ready to start
+  kArm,       // take the robot over, and stand
+  kStart,     // walk up and climb
+  kPause,     // the foot in the air comes down, then stand
+  kResume,    // go on
+  kStop,      // the foot in the air comes down, then end
+  kReset,     // after an end whose cause is over: stand, and be ready to start
+  kHandOver,  // let go of a robot that stands, for another controller
 };
-inline constexpr std::array<std::string_view, 6> kOperatorCommandNames{"arm",    "start", "pause",
-                                                                       "resume", "stop",  "reset"};
-static_assert(kOperatorCommandNames.size() == static_cast<std::size_t>(OperatorCommand::kReset) + 1);
+inline constexpr std::array<std::string_view, 7> kOperatorCommandNames{"arm",  "start", "pause",    "resume",
+                                                                       "stop", "reset", "hand_over"};
+static_assert(kOperatorCommandNames.size() == static_cast<std::size_t>(OperatorCommand::kHandOver) + 1);
 
 [[nodiscard]] constexpr std::string_view name_of(OperatorCommand command) noexcept {
   const auto i = static_cast<std::size_t>(command);

@@ -48,6 +48,9 @@ class JointSet {
   std::uint16_t bits_ = 0;
 };
 
+// In the stead of a temperature that nobody told.
+inline constexpr std::int16_t kNotTold_degc = -32768;
+
 inline constexpr std::int64_t kBusCycle_ns = 2 * kNsPerMs;  // a command to every drive, and its reply
 
 struct JointFeedback {

@@ -23,7 +23,8 @@ namespace {
 
 constexpr std::size_t kMostAsked_bytes = 64;
 constexpr std::int64_t kDrop_ns = 500'000'000;
-constexpr std::string_view kWhatMayBeAsked = "refused: ask for arm, start, pause, resume, stop, reset or state";
+constexpr std::string_view kWhatMayBeAsked =
+    "refused: ask for arm, start, pause, resume, stop, reset, hand_over or state";
 constexpr std::string_view kNoTime = "refused: its time is missing, CLOCK_MONOTONIC in ns, as polygmapd --ask sends it";
 constexpr std::string_view kTooOld = "refused: it was not heard within half a second";
 

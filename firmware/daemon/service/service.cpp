@@ -337,6 +337,7 @@ void Service::write_recording() noexcept {
 std::optional<Service::Decision> Service::decide(std::int64_t now_ns) {
   const ModuleView view = board_.module();
   if (!lanes_move(now_ns)) return Decision{ExitCode::kStoppedItself, "a lane has not finished a cycle for a second."};
+  if (view.state == ModuleState::kReleased) return Decision{ExitCode::kAsked, "another controller has the robot."};
   const bool asked = seen_.asked_ns >= 0;
   const bool fallen = view.state == ModuleState::kFallen;
   const bool may_reset = parts_.operator_socket != nullptr && !fallen;
@@ -399,7 +400,8 @@ void Service::log_changes() noexcept {
   if (view == logged_) return;
   seen_.told_ns = 0;  // the service manager hears of it at once
   const bool disagrees = view.waits_for.leans() && view.waits_for.what != logged_.waits_for.what;
-  const bool is_news = view.state != logged_.state || view.silent.bits() != logged_.silent.bits() || disagrees;
+  const bool is_news =
+      view.state != logged_.state || !(view.silent == logged_.silent) || !(view.hot == logged_.hot) || disagrees;
   logged_ = view;
   if (!is_news) return;
   StatusText status;

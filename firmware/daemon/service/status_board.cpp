@@ -64,6 +64,7 @@ void write_module(StatusText& out, const ModuleView& view) noexcept {
     if (view.state == ModuleState::kSafeStop) add_text(out, ": ", text_of(view.reason));
     out.add(", %u treads", view.treads);
     add_joints(out, ", silent:", view.silent);
+    add_joints(out, ", too hot:", view.hot);
   }
 }
 

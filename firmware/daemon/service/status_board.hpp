@@ -18,11 +18,12 @@ struct ModuleView {
   GaitPhase phase = GaitPhase::kStandstill;
   StopReason reason = StopReason::kNone;
   ArmingWait waits_for{ArmingWait::For::kAnswers, JointSet::all()};
-  JointSet silent;           // drives that are silent now
-  std::uint16_t treads = 0;  // climbed; saturates
+  JointSet silent;          // drives that are silent now
+  JointSet hot;             // and those that are too hot
+  std::uint8_t treads = 0;  // climbed; saturates
 
   [[nodiscard]] bool stands() const noexcept {
-    return state == ModuleState::kSafeStop || phase == GaitPhase::kFinished;
+    return state == ModuleState::kSafeStop || state == ModuleState::kHandingOver || phase == GaitPhase::kFinished;
   }
   [[nodiscard]] bool operator==(const ModuleView& other) const noexcept { return packed() == other.packed(); }
 
@@ -30,22 +31,23 @@ struct ModuleView {
     return std::uint64_t{static_cast<std::uint8_t>(state)} |
            std::uint64_t{static_cast<std::uint8_t>(waits_for.what)} << 4U |
            std::uint64_t{static_cast<std::uint8_t>(phase)} << 8U |
-           std::uint64_t{static_cast<std::uint8_t>(reason)} << 16U | std::uint64_t{wait_detail()} << 24U |
-           std::uint64_t{silent.bits()} << 36U | std::uint64_t{treads} << 48U;
+           std::uint64_t{static_cast<std::uint8_t>(reason)} << 12U | std::uint64_t{wait_detail()} << 20U |
+           std::uint64_t{silent.bits()} << 32U | std::uint64_t{hot.bits()} << 44U | std::uint64_t{treads} << 56U;
   }
   [[nodiscard]] static ModuleView unpacked(std::uint64_t bits) noexcept {
     constexpr std::uint64_t kJoints = (1U << kJointCount) - 1U;
     ModuleView view;
     view.state = static_cast<ModuleState>(bits & 0xFU);
     view.waits_for.what = static_cast<ArmingWait::For>(bits >> 4U & 0xFU);
-    view.phase = static_cast<GaitPhase>(bits >> 8U & 0xFFU);
-    view.reason = static_cast<StopReason>(bits >> 16U & 0xFFU);
-    const auto detail = static_cast<std::uint16_t>(bits >> 24U & kJoints);
+    view.phase = static_cast<GaitPhase>(bits >> 8U & 0xFU);
+    view.reason = static_cast<StopReason>(bits >> 12U & 0xFFU);
+    const auto detail = static_cast<std::uint16_t>(bits >> 20U & kJoints);
     const bool leans = view.waits_for.leans();
     view.waits_for.joints = leans ? JointSet{} : JointSet::of_bits(detail);
     view.waits_for.lean_deg = leans ? detail : std::uint16_t{0};
-    view.silent = JointSet::of_bits(static_cast<std::uint16_t>(bits >> 36U & kJoints));
-    view.treads = static_cast<std::uint16_t>(bits >> 48U);
+    view.silent = JointSet::of_bits(static_cast<std::uint16_t>(bits >> 32U & kJoints));
+    view.hot = JointSet::of_bits(static_cast<std::uint16_t>(bits >> 44U & kJoints));
+    view.treads = static_cast<std::uint8_t>(bits >> 56U);
     return view;
   }
 
@@ -87,7 +89,8 @@ class StatusBoard {
     view.reason = gait.stop_reason;
     view.waits_for = control.arming_waits_for();
     view.silent = control.drives().silent;
-    view.treads = static_cast<std::uint16_t>(gait.treads_climbed < 0xFFFFU ? gait.treads_climbed : 0xFFFFU);
+    view.hot = control.drives().hot;
+    view.treads = static_cast<std::uint8_t>(gait.treads_climbed < 0xFFU ? gait.treads_climbed : 0xFFU);
     module_.store(view.packed(), std::memory_order_release);
     if (++published_ % kCyclesPerFaults != 0) return;
     for (std::size_t i = 0; i < kFaultTable.size(); ++i) {

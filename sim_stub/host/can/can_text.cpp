@@ -82,13 +82,11 @@ Values reply_values(const CanDrive& drive, const hal::CanFrame& frame) {
   if (!hal::try_decode_reply(bytes, drive.id, drive.ranges, drive.reply, reply)) {
     return {{}, "a reply has 6 or 8 bytes"};
   }
-  return {{{"q_rad", reply.p_rad},
-           {"dq_radps", reply.v_radps},
-           {"tau_nm", reply.t_nm},
-           {"status", reply.status},
-           {"enabled", reply.enabled},
-           {"drive_error", reply.error}},
-          ""};
+  Json json{{"q_rad", reply.p_rad},   {"dq_radps", reply.v_radps}, {"tau_nm", reply.t_nm},
+            {"status", reply.status}, {"enabled", reply.enabled},  {"drive_error", reply.error}};
+  if (reply.mos_degc != kNotTold_degc) json["mos_degc"] = reply.mos_degc;
+  if (reply.motor_degc != kNotTold_degc) json["motor_degc"] = reply.motor_degc;
+  return {std::move(json), ""};
 }
 
 // Why a frame under the identifier of these joints' replies is none of theirs, whatever drive it names.
@@ -129,13 +127,15 @@ struct Signal {
   std::size_t first_bit, bits;
   double factor, offset;
   const char* unit;
+  bool has_sign = false;
 };
 
 std::string signal_line(const Signal& s) {
-  const double most = s.offset + s.factor * static_cast<double>((1U << s.bits) - 1U);
-  return " SG_ " + s.name + " : " + std::to_string(start_bit(s.first_bit)) + "|" + std::to_string(s.bits) + "@0+ (" +
-         number(s.factor) + "," + number(s.offset) + ") [" + number(s.offset) + "|" + number(most) + "] \"" + s.unit +
-         "\" Vector__XXX\n";
+  const double steps = static_cast<double>(1U << s.bits), lowest = s.has_sign ? -0.5 * steps : 0.0;
+  const double least = s.offset + s.factor * lowest, most = s.offset + s.factor * (lowest + steps - 1.0);
+  return " SG_ " + s.name + " : " + std::to_string(start_bit(s.first_bit)) + "|" + std::to_string(s.bits) +
+         (s.has_sign ? "@0- (" : "@0+ (") + number(s.factor) + "," + number(s.offset) + ") [" + number(least) + "|" +
+         number(most) + "] \"" + s.unit + "\" Vector__XXX\n";
 }
 
 Signal spanning(const std::string& name, hal::detail::MitField field, double least, double most, const char* unit) {
@@ -181,7 +181,13 @@ std::string reply_message(const config::BusFile& bus, std::uint32_t id, const st
       text += signal_line(placed);
     }
   }
-  if (!nibble) text += signal_line({"error", 56, 8, 1.0, 0.0, ""});
+  if (nibble) {
+    text += signal_line({"mos_temperature", 48, 8, 1.0, 0.0, "degC"});
+    text += signal_line({"motor_temperature", 56, 8, 1.0, 0.0, "degC"});
+  } else {
+    text += signal_line({"motor_temperature", 48, 8, 1.0, 0.0, "degC", true});
+    text += signal_line({"error", 56, 8, 1.0, 0.0, ""});
+  }
   return text;
 }
 

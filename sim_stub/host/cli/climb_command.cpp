@@ -117,10 +117,10 @@ void declare_operator(CLI::App& climb, ClimbArguments& a) {
       climb.add_flag("--operator", a.keyboard,
                      "Nothing starts by itself: keys arm, start, pause and stop it, in the wall clock's time");
   climb
-      .add_option(
-          "--ask", a.ask,
-          "The same by a script: arm, start, pause, resume, stop or reset, and at which simulated second, as in "
-          "pause@12.5")
+      .add_option("--ask", a.ask,
+                  "The same by a script: arm, start, pause, resume, stop, reset or hand_over, and at which simulated "
+                  "second, as in "
+                  "pause@12.5")
       ->expected(1, 64)
       ->excludes(keys)
       ->type_name("WHAT@S");

@@ -165,6 +165,7 @@ BusFigures bus_figures(const config::BusFile& file, BusRobot& robot, const Telem
   f.module_state = name_of(telemetry.module_state);
   f.silent_joints = names_of(telemetry.drives.ever_silent);
   f.error_joints = names_of(telemetry.drives.bus.drive_errors);
+  f.hot_joints = names_of(telemetry.drives.ever_hot);
   for (std::size_t i = 0; i < file.buses.size(); ++i) {
     f.loads.emplace_back(file.buses[i], hal::bus_load(file.table, i));
     f.sent += robot.bus(i).status().sent;
@@ -189,7 +190,9 @@ std::vector<std::pair<std::string, std::uint32_t>> raised(const Health& health) 
 }  // namespace
 
 ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction& progress) {
-  constexpr std::int64_t kRestAfterEnd_ns = 2 * kNsPerS;  // a robot that topples takes its time
+  constexpr std::int64_t kRestAfterEnd_ns = 2 * kNsPerS;      // a robot that topples takes its time
+  constexpr std::int64_t kRestAfterRelease_ns = 5 * kNsPerS;  // on the other controller
+  constexpr std::int64_t kUnheard_ns = 10 * kNsPerMs;         // who hears no command for so long takes the robot over
   const auto wall_begin = WallClock::now();
   heap::set_on_call(heap::OnCall::kCount);
   heap::reset();
@@ -244,7 +247,8 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
                      robot.errors().sole);
 
   std::vector<StateChange> states;
-  std::int64_t end_ns = -1;
+  std::int64_t end_ns = -1, released_ns = -1;
+  bool held_again = false;
   OperatorEnd operator_end = OperatorEnd::kNone;
   std::int64_t next_progress_ns = 0;
   while (seconds(robot.now_ns()) < options.time_limit_s) {
@@ -274,11 +278,21 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     const bool goes_on = options.climb_operator != nullptr && options.climb_operator->has_more();
     const bool ended = state == ModuleState::kOnTop || state == ModuleState::kSafeStop;
     const bool waits = waits_for_operator(state);
+    const bool released = state == ModuleState::kReleased;
+    if (released && released_ns < 0) released_ns = robot.now_ns();
+    if (released && !held_again && robot.now_ns() - released_ns >= kUnheard_ns) {
+      held_again = true;
+      if (bus) {
+        bus->hold_again();
+      } else {
+        robot.hold_again();
+      }
+    }
     // Out of a fall no command leads.
-    const bool over =
-        state == ModuleState::kFallen || ((ended || waits || telemetry.arming_waits_for.leans()) && !goes_on);
+    const bool over = state == ModuleState::kFallen || released ||
+                      ((ended || waits || telemetry.arming_waits_for.leans()) && !goes_on);
     if (!over) end_ns = -1;
-    if (over && end_ns < 0) end_ns = robot.now_ns() + kRestAfterEnd_ns;
+    if (over && end_ns < 0) end_ns = robot.now_ns() + (released ? kRestAfterRelease_ns : kRestAfterEnd_ns);
     if (robot.truth().fell) break;
     if (options.climb_operator != nullptr && options.climb_operator->has_left()) {
       operator_end = OperatorEnd::kLeft;

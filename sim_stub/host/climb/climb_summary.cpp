@@ -162,6 +162,7 @@ Json to_json(const ClimbSummary& s) {
                 {"module_state", s.bus->module_state},
                 {"silent_joints", s.bus->silent_joints},
                 {"error_joints", s.bus->error_joints},
+                {"hot_joints", s.bus->hot_joints},
                 {"frames_sent", s.bus->sent},
                 {"frames_received", s.bus->received}};
     for (const auto& [name, load] : s.bus->loads) j["bus"]["load_percent"][name] = rounded(1e2 * load, 10.0);

@@ -82,6 +82,7 @@ struct BusFigures {
   std::string module_state;                           // at the end
   std::vector<std::string> silent_joints;             // whose drive was silent for longer than is bridged, at any time
   std::vector<std::string> error_joints;              // whose drive tells of an error at the end
+  std::vector<std::string> hot_joints;                // whose drive was too hot, at any time
   std::uint64_t sent = 0, received = 0;               // frames
 };
 

@@ -45,6 +45,7 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
         sentence(" in %.1f s (%.2f s per step), least sole margin %.1f mm, least swing clearance %.1f mm",
                  s.climb_time_s, s.seconds_per_step, s.sole_margin_min_m * 1e3, s.swing_clearance_min_m * 1e3);
     if (ending.module_state == ModuleState::kFallen) return reason + "; the module took the robot for fallen there.";
+    if (ending.module_state == ModuleState::kReleased) return reason + "; it handed the robot over there.";
     if (ending.phase == GaitPhase::kStopped) return reason + "; the module stopped there: " + why + ".";
     return reason + (ending.phase == GaitPhase::kFinished ? "." : "; the run ended before the module did.");
   }
@@ -52,6 +53,9 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
   if (s.fell) return "Fell after " + climbed + ": " + ending.fall_reason;
   if (!all_climbed && ending.module_state == ModuleState::kFallen) {
     return "The module took the robot for fallen after " + climbed + ", and damped its joints.";
+  }
+  if (!all_climbed && ending.module_state == ModuleState::kReleased) {
+    return "The module handed the robot over after " + climbed + ".";
   }
   if (!all_climbed && ending.phase == GaitPhase::kStopped) {
     return "The module stopped after " + climbed + ": " + why + ".";

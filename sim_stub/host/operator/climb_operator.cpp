@@ -51,7 +51,7 @@ std::string read_command(const std::string& text, TimedCommand& command) {
   }
   if (!known || !(at_s >= 0.0 && at_s <= kLatest_s)) {
     return config::without_controls(
-        "--ask must be arm, start, pause, resume, stop or reset, and when, from 0 to 10000 s, "
+        "--ask must be arm, start, pause, resume, stop, reset or hand_over, and when, from 0 to 10000 s, "
         "as in pause@12.5, not \"" +
         text + "\".");
   }

@@ -16,10 +16,11 @@ struct Key {
   char key;
   OperatorCommand command;
 };
-constexpr std::array kKeys{Key{'a', OperatorCommand::kArm},   Key{'s', OperatorCommand::kStart},
-                           Key{'p', OperatorCommand::kPause}, Key{'g', OperatorCommand::kResume},
-                           Key{'x', OperatorCommand::kStop},  Key{'n', OperatorCommand::kReset}};
-constexpr const char* kHelp = "a arm, s start, p pause, g go on, x stop, n new start (reset), q quit\n";
+constexpr std::array kKeys{Key{'a', OperatorCommand::kArm},     Key{'s', OperatorCommand::kStart},
+                           Key{'p', OperatorCommand::kPause},   Key{'g', OperatorCommand::kResume},
+                           Key{'x', OperatorCommand::kStop},    Key{'n', OperatorCommand::kReset},
+                           Key{'h', OperatorCommand::kHandOver}};
+constexpr const char* kHelp = "a arm, s start, p pause, g go on, x stop, n new start (reset), h hand over, q quit\n";
 
 }  // namespace
 

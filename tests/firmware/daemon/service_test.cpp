@@ -203,8 +203,9 @@ TEST_F(ServiceTest, OperatorAsks_ArmsStartsStopsAndResetsThenAndNotBefore) {
     listen_until("STATUS=standing", 5s);
     std::this_thread::sleep_for(kEstimates);
     EXPECT_EQ(ask("start"), "walking_up");
-    EXPECT_EQ(ask("dance"), "refused: ask for arm, start, pause, resume, stop, reset or state");
-    EXPECT_EQ(ask(std::string(100, 'a')), "refused: ask for arm, start, pause, resume, stop, reset or state");
+    EXPECT_EQ(ask("dance"), "refused: ask for arm, start, pause, resume, stop, reset, hand_over or state");
+    EXPECT_EQ(ask(std::string(100, 'a')),
+              "refused: ask for arm, start, pause, resume, stop, reset, hand_over or state");
     EXPECT_EQ(ask("pause\n"), "holding");
     (void)ask("stop");
     listen_until("STATUS=safe_stop", 5s);
@@ -215,6 +216,30 @@ TEST_F(ServiceTest, OperatorAsks_ArmsStartsStopsAndResetsThenAndNotBefore) {
   });
   EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
   EXPECT_EQ(outcome.module.state, ModuleState::kSafeStop);
+}
+
+TEST_F(ServiceTest, RobotIsHandedOver_EndsAsAskedAndItsDrivesHoldIt) {
+  const std::string path = testing::TempDir() + "polygmap_hand_over_" + std::to_string(::getpid());
+  OperatorSocket socket;
+  ASSERT_EQ(socket.open(path), "");
+  operator_socket_ = &socket;
+  config_.params.supervisor.autostart = false;
+  config_.params.hand_over.rest_ticks = 100;
+  std::string heard;
+  const Outcome outcome = run(
+      [&] {
+        listen_until("STATUS=off;", 5s);
+        EXPECT_TRUE(try_ask(path, "arm", heard));
+        listen_until("STATUS=standing", 5s);
+        std::this_thread::sleep_for(kEstimates);
+        EXPECT_TRUE(try_ask(path, "hand_over", heard));
+      },
+      false);
+  EXPECT_EQ(heard, "handing_over");
+  EXPECT_EQ(outcome.code, ExitCode::kAsked) << outcome.why;
+  EXPECT_EQ(outcome.module.state, ModuleState::kReleased);
+  EXPECT_EQ(let_go_, 0) << "a robot that stands on its drives would fall";
+  EXPECT_TRUE(robot_.has_gains);
 }
 
 // A climb to the top takes too long here: what the module then says, and what comes of it.
@@ -521,9 +546,12 @@ TEST(ModuleViewTest, PackedAndUnpacked_IsTheSame) {
   view.reason = StopReason::kStateStale;
   view.waits_for = {ArmingWait::For::kFeet, JointSet::of_bits(0x801)};
   view.silent = JointSet::of_bits(0xFFE);
-  view.treads = 0xFFFF;
+  view.hot = JointSet::of_bits(0x7FF);
+  view.treads = 0xFF;
   EXPECT_EQ(ModuleView::unpacked(view.packed()), view);
   EXPECT_EQ(ModuleView::unpacked(view.packed()).silent.bits(), 0xFFE);
+  EXPECT_EQ(ModuleView::unpacked(view.packed()).hot.bits(), 0x7FF);
+  EXPECT_EQ(ModuleView::unpacked(view.packed()).treads, 0xFF);
   EXPECT_EQ(ModuleView::unpacked(view.packed()).waits_for, view.waits_for);
   view.waits_for = {ArmingWait::For::kGravity, {}, 180};
   EXPECT_EQ(ModuleView::unpacked(view.packed()).waits_for, view.waits_for);
@@ -587,6 +615,7 @@ TEST(StatusTest, Arming_SaysWhatItWaitsFor) {
   EXPECT_EQ(status_of({For::kNothing, {}}), "arming");
   EXPECT_EQ(status_of({For::kAnswers, two}), "arming, no answer yet from left_hip_roll, left_knee");
   EXPECT_EQ(status_of({For::kErrors, two}), "arming, in error: left_hip_roll, left_knee");
+  EXPECT_EQ(status_of({For::kCooler, two}), "arming, too hot: left_hip_roll, left_knee");
   EXPECT_EQ(status_of({For::kRange, two}), "arming, out of range: left_hip_roll, left_knee");
   EXPECT_EQ(status_of({For::kImu, {}}), "arming, too few IMU samples");
   EXPECT_EQ(status_of({For::kFeet, {}}), "arming, no forces of the feet");

@@ -323,6 +323,26 @@ TEST_P(CanJointBusTest, Read_DriveTellsAnError_SaysWhichAndItsCode) {
   EXPECT_TRUE(bus_->status().drive_errors.is_empty());
 }
 
+TEST_P(CanJointBusTest, Read_DriveTellsItsTemperature_SaysTheHottestUntilItTellsNone) {
+  EXPECT_EQ(bus_->status().drive_degc[5], kNotTold_degc);
+  write();
+  CanFrame frame = reply_of(5, 0.5);
+  const bool nibble = GetParam() == MitReplyRule::kStatusNibble;
+  frame.data[6] = 71;              // the motor; Damiao: the transistors
+  if (nibble) frame.data[7] = 64;  // the motor
+  channels_[1].incoming.push_back(frame);
+  JointFeedback feedback;
+  ASSERT_TRUE(bus_->try_read(feedback));
+  EXPECT_EQ(bus_->status().drive_degc[5], 71);
+  EXPECT_EQ(bus_->status().drive_degc[4], kNotTold_degc);
+  EXPECT_TRUE(bus_->status().drive_errors.is_empty());
+  write();
+  frame.length = 6;
+  channels_[1].incoming.push_back(frame);
+  ASSERT_TRUE(bus_->try_read(feedback));
+  EXPECT_EQ(bus_->status().drive_degc[5], kNotTold_degc);
+}
+
 TEST_P(CanJointBusTest, Read_DriveLeftMotorMode_IsAnError) {
   if (GetParam() != MitReplyRule::kStatusNibble) GTEST_SKIP() << "its replies do not say";
   write();

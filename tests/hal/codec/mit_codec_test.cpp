@@ -187,6 +187,40 @@ TEST(MitCodec, StatusNibble_IsReadByItsOwnRuleAlone) {
   EXPECT_FALSE(try_decode_reply(bytes, 1, kRanges, MitReplyRule::kId, reply));
 }
 
+TEST(MitCodec, Temperatures_AreTheMakersBytes) {
+  std::array<std::uint8_t, 8> bytes{5, 0x80, 0, 0x80, 0x08, 0, 0xEC, 0x7D};
+  MitReply reply;
+  ASSERT_TRUE(try_decode_reply(bytes, 5, kRanges, MitReplyRule::kId, reply));
+  EXPECT_EQ(reply.motor_degc, -20) << "it has a sign";
+  EXPECT_EQ(reply.mos_degc, kNotTold_degc);
+  EXPECT_EQ(reply.hottest_degc(), -20);
+  EXPECT_EQ(reply.status, 0x7D);
+  bytes[0] = 0x15;
+  ASSERT_TRUE(try_decode_reply(bytes, 5, kRanges, MitReplyRule::kStatusNibble, reply));
+  EXPECT_EQ(reply.mos_degc, 236) << "it has none";
+  EXPECT_EQ(reply.motor_degc, 125);
+  EXPECT_EQ(reply.hottest_degc(), 236);
+  for (const auto rule : {MitReplyRule::kId, MitReplyRule::kStatusNibble}) {
+    ASSERT_TRUE(try_decode_reply({bytes.data(), 6}, rule == MitReplyRule::kId ? 0x15 : 5, kRanges, rule, reply));
+    EXPECT_EQ(reply.hottest_degc(), kNotTold_degc) << "a short reply tells none";
+  }
+}
+
+TEST(MitCodec, EveryTemperature_ComesBackOrIsTheNearestEnd) {
+  for (std::int16_t degc = -300; degc <= 300; ++degc) {
+    for (const auto rule : {MitReplyRule::kId, MitReplyRule::kStatusNibble}) {
+      const bool is_id = rule == MitReplyRule::kId;
+      MitReply sent;
+      sent.motor_degc = degc;
+      sent.mos_degc = 30;
+      MitReply got;
+      ASSERT_TRUE(try_decode_reply(reply_frame(sent, 3, kRanges, rule), 3, kRanges, rule, got));
+      EXPECT_EQ(got.motor_degc, std::clamp<int>(degc, is_id ? -128 : 0, is_id ? 127 : 255));
+      EXPECT_EQ(got.mos_degc, is_id ? kNotTold_degc : 30);
+    }
+  }
+}
+
 TEST(FeetFrame, RandomForces_ComeBackWithinHalfAUnit) {
   std::mt19937_64 random(5);
   for (int i = 0; i < 20000; ++i) {

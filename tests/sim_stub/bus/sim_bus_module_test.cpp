@@ -211,6 +211,19 @@ TEST_P(BusModuleTest, DriveTellsAnError_StopsOnTwoFeet) {
   EXPECT_EQ(control().module_state(), ModuleState::kSafeStop);
 }
 
+TEST_P(BusModuleTest, DriveIsTooHot_StopsOnTwoFeetAndIsNamed) {
+  ASSERT_NO_FATAL_FAILURE(stand());
+  EXPECT_EQ(control().drives().bus.drive_degc[7], 40);
+  bus_->set_temperature(7, 89);
+  run(20);
+  EXPECT_TRUE(is_running(control().module_state()));
+  bus_->set_temperature(7, 90);
+  run(20);
+  EXPECT_EQ(count(Fault::kDriveHot), 1U);
+  EXPECT_EQ(control().drives().hot.bits(), 1U << 7U);
+  expect_safe_stop(StopReason::kDriveHot);
+}
+
 TEST_P(BusModuleTest, QueueFullForATick_IsNamedAndTheModuleGoesOn) {
   ASSERT_NO_FATAL_FAILURE(stand());
   bus_->bus(0).set_transmit_queue(1);

@@ -73,6 +73,9 @@ TEST(Can, Decode_KnowsRepliesSpecialFramesAndFeet) {
   EXPECT_EQ(reply["tau_nm"], 200.0);
   EXPECT_EQ(reply["status"], 9);
   EXPECT_EQ(reply["drive_error"], true);
+  EXPECT_EQ(reply["mos_degc"], 0x21);
+  EXPECT_EQ(reply["motor_degc"], 0x22);
+  EXPECT_FALSE(read("015#95FFFF000FFF").contains("motor_degc")) << "a short reply tells none";
   EXPECT_EQ(read("060#00641000")["left_n"], 5.0);
 }
 
@@ -236,6 +239,8 @@ TEST_P(DbcTest, Canmatrix_ReadsEveryFrameAsTheCodecDoes) {
                                                  {"kd", "kd_nmsprad"},
                                                  {"torque", "tau_nm"},
                                                  {"status", "status"},
+                                                 {"mos_temperature", "mos_degc"},
+                                                 {"motor_temperature", "motor_degc"},
                                                  {"left_force", "left_n"},
                                                  {"right_force", "right_n"}}) {
       if (!theirs.contains(theirs_name)) continue;
@@ -244,7 +249,7 @@ TEST_P(DbcTest, Canmatrix_ReadsEveryFrameAsTheCodecDoes) {
       ++compared;
     }
   }
-  EXPECT_GE(compared, 60U * (5 + 3 + 2));
+  EXPECT_GE(compared, 60U * (5 + 3 + 1 + 2));
 }
 
 TEST(Dbc, IdentifierOfTwoBuses_NeedsOneNamed) {

@@ -114,7 +114,9 @@ struct OnATread {
     planner.landed(situation.soles);
   }
   void land_on(const StepGoal& goal) {
-    planner.latched(situation, {.has_step = true, .goal = goal});
+    ClimbPlanner::Decision closing;
+    closing.goal = goal;
+    planner.latched(situation, closing);
     situation.soles[index_of(goal.foot)] = goal.target;
     planner.landed(situation.soles);
   }
