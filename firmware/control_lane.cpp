@@ -347,8 +347,10 @@ Progress ControlLane::command(std::int64_t now_ns) noexcept {
     health_.raise(Fault::kJointCommandInvalid, now_ns);
   }
   overload_.count_command(params_.overload, taken);
-  // Not before every drive has the hold.
-  if (taken && supervisor_.hands_over() && hand_over_.is_over(params_.hand_over)) supervisor_.let_go();
+  if (!supervisor_.hands_over()) return Progress::kDone;
+  // A hold that not all drives have holds nobody: it balances again.
+  if (!taken || !drives_.silent.is_empty()) hand_over_.begin();
+  if (hand_over_.is_over(params_.hand_over)) supervisor_.let_go();
   return Progress::kDone;
 }
 

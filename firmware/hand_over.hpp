@@ -39,13 +39,14 @@ class HandOver {
     return state.odom_v_base_mps.squaredNorm() <= params.rest_mps * params.rest_mps &&
            state.base_w_base_radps.squaredNorm() <= params.rest_radps * params.rest_radps;
   }
-  // command: of the balance, for this tick; the hold, when it is time for that. joints: in its angles and torques.
+  // command: of the balance, for this tick; the hold, when it is time for that and as long as the robot rests in it.
+  // joints: in its angles and torques.
   void tick(const Params& params, const DriveModel& drives, bool at_rest, const JointFeedback& joints,
             JointCommand& command) noexcept {
+    if (!at_rest) return begin();
     if (rested_ticks_ < params.rest_ticks) {
-      rested_ticks_ = at_rest ? rested_ticks_ + 1 : 0;
-      if (at_rest) add(joints, command);
-      return;
+      ++rested_ticks_;
+      return add(joints, command);
     }
     ++held_ticks_;
     for (std::size_t n = 0; n < kJointCount; ++n) {

@@ -210,7 +210,7 @@ void Gait::advance(const GaitInput& in) noexcept {
   }
   if (std::exchange(restarts_, false)) state_.emplace<Standing>().begin(in, gait);
   enter(in, gait, tick_state(in, gait));
-  const bool went_back = status_.phase == GaitPhase::kDoubleSupport && memory_.aborted_swings > 0 && !in.held;
+  const bool went_back = status_.phase == GaitPhase::kDoubleSupport && memory_.aborted_swings > 0 && in.usable;
   if (went_back) plan_.hold_lifted_foot(params_.landed_foot, in.feedback, in.now_ns);
   plan_.hold_landed_foot(params_.landed_foot, in.feedback, in.now_ns);
   follow_state(in, gait);

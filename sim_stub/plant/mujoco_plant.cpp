@@ -104,8 +104,8 @@ void MujocoPlant::step(const JointCommand& newest) {
   const auto late = static_cast<std::size_t>(std::lround(params_.command_delay_s / kPlantTick_s));
   const JointCommand& command = commands_[commands_.size() - 1 - std::min(late, commands_.size() - 1)];
   const double follows = params_.torque_lag_s > 0.0 ? -std::expm1(-kPhysicsStep_s / params_.torque_lag_s) : 1.0;
+  torque_limited_ = false;
   for (int k = 0; k < kPhysicsSteps; ++k) {
-    torque_limited_ = false;
     for (std::size_t j = 0; j < kJointCount; ++j) {
       const auto i = static_cast<Eigen::Index>(j);
       const JointSetpoint& set = command.joints[j];

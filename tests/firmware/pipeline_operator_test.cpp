@@ -284,17 +284,19 @@ TEST_F(OperatedModule, RobotSwaysWhileItHandsOver_IsBalancedUntilItRests) {
   EXPECT_EQ(state(), ModuleState::kSafeStop);
 }
 
-TEST_F(OperatedModule, HoldIsRefusedByTheBus_IsSentUntilItIsTaken) {
+TEST_F(OperatedModule, HoldIsRefusedByTheBus_BalancesAgainAndLetsGoLater) {
   const HandOver::Params params;
   ask(OperatorCommand::kArm, kInitialised_ticks);
+  const double balance_nmprad = knee_kp_nmprad();
   ask(OperatorCommand::kHandOver, params.rest_ticks + 10);
   ASSERT_EQ(state(), ModuleState::kHandingOver);
-  for (int i = 0; i < params.hold_ticks + 20; ++i) {
-    joints_.writes.fail_next();
-    stand(1);
-  }
+  ASSERT_GT(knee_kp_nmprad(), balance_nmprad) << "the hold";
+  joints_.writes.fail_next();
+  stand(2);
+  EXPECT_EQ(knee_kp_nmprad(), balance_nmprad);
+  stand(params.rest_ticks);
   EXPECT_EQ(state(), ModuleState::kHandingOver);
-  stand(1);
+  stand(params.hold_ticks);
   EXPECT_EQ(state(), ModuleState::kReleased);
 }
 

@@ -73,6 +73,9 @@ void ClimbPlanner::restart() noexcept {
   stride_share_ = 1.0;
   floor_steps_ = corrections_ = 0;
   passing_refused_ = closes_up_ = false;
+  odom_stood_.reset();
+  slid_.reset();
+  set_back_ = 0;
 }
 
 ClimbPlanner::Decision ClimbPlanner::trailing_step(const Situation& situation,
@@ -202,18 +205,20 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   return true;
 }
 
-std::optional<Foot> ClimbPlanner::slid_foot(const Situation& situation) const noexcept {
-  if (treads_climbed_ == 0 || !odom_stood_ || set_back_ >= params_.max_set_back) return std::nullopt;
-  std::array<Vec2, kFootCount> moved_m;
-  for (std::size_t i = 0; i < kFootCount; ++i) {
-    moved_m[i] = (situation.soles[i].position_m - (*odom_stood_)[i].position_m).head<2>();
-  }
-  if (!((moved_m[0] - moved_m[1]).norm() > params_.slid_m)) return std::nullopt;
-  return moved_m[0].norm() > moved_m[1].norm() ? Foot::kLeft : Foot::kRight;
+void ClimbPlanner::watch_feet(const SolePair& soles) noexcept {
+  if (slid_ || treads_climbed_ == 0 || split_stance_ || !odom_stood_ || set_back_ >= params_.max_set_back) return;
+  const auto right_p_left_m = [](const SolePair& pair) -> Vec2 {
+    const Vec3 apart_m = pair[0].position_m - pair[1].position_m;
+    return (rotation_z(pair[1].yaw_rad).transpose() * apart_m).head<2>();
+  };
+  if (!((right_p_left_m(soles) - right_p_left_m(*odom_stood_)).norm() > params_.slid_m)) return;
+  const auto moved_m = [&](std::size_t i) { return (soles[i].position_m - (*odom_stood_)[i].position_m).norm(); };
+  slid_ = moved_m(0) > moved_m(1) ? Foot::kLeft : Foot::kRight;
 }
 
-bool ClimbPlanner::leave_slid_foot(const Situation& situation) noexcept {
-  if (closes_up_ || !slid_foot(situation)) return false;
+bool ClimbPlanner::leave_slid_foot() noexcept {
+  if (closes_up_ || !slid_) return false;
+  slid_.reset();
   set_back_ = params_.max_set_back;
   return true;
 }
@@ -254,7 +259,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
   if (split_stance_) {
     return passing_step(situation, footholds, decision) ? decision : trailing_step(situation, footholds);
   }
-  const std::optional<Foot> closing = closes_up_ ? memory_.last_swing : slid_foot(situation);
+  const std::optional<Foot> closing = closes_up_ ? memory_.last_swing : slid_;
   if (closing) {
     decision.has_step = true;
     decision.goal = closing_goal(situation, footholds, *closing);
@@ -324,6 +329,7 @@ void ClimbPlanner::swing_aborted() noexcept { memory_ = before_latch_; }
 
 void ClimbPlanner::landed(const std::optional<SolePair>& soles) noexcept {
   odom_stood_ = soles;
+  slid_.reset();
   stride_share_ = 1.0;
   closes_up_ = false;
   landed_ = latched_.goal.target;

@@ -89,10 +89,9 @@ class ClimbPlanner {
             "Floor steps keep the soles at least this far from their middle.");
       field("wider_m", p.wider_m, 0.0, 0.2,
             "Floor steps keep the soles no farther from their middle than the stance's half width and this.");
-      field("slid_m", p.slid_m, 0.002, 0.2,
-            "Two feet on a tread that are farther from where they stood to each other when they landed have slid: the "
-            "one "
-            "that moved is set back beside the other one.");
+      field(
+          "slid_m", p.slid_m, 0.002, 0.2,
+          "A foot that is farther from where it landed, seen from the other one on its tread, is set back beside it.");
       field("max_set_back", p.max_set_back, 0, 100, "Feet that slid are set back so often on a tread.");
       field("line_up", p.line_up);
     }
@@ -135,8 +134,11 @@ class ClimbPlanner {
   [[nodiscard]] SolePose beside_passed(const SolePose& stance, Foot foot) const noexcept;
   // The passing foot that is in the air lands beside the standing one instead.
   void passing_ends_beside(const StepGoal& goal) noexcept;
+  // Both feet stand: on a tread, has one slid since they landed? Their places to each other tell, by the encoders,
+  // wherever odometry has both; which of them moved, odometry tells. It is to be set back.
+  void watch_feet(const SolePair& soles) noexcept;
   // The legs cannot set the foot back that slid: on without. False when none is to be.
-  [[nodiscard]] bool leave_slid_foot(const Situation& situation) noexcept;
+  [[nodiscard]] bool leave_slid_foot() noexcept;
   // Its foot stands on its goal, or where it stood before: with which foot to lead as before the latch. soles: as
   // estimated, none while the estimate tells nothing.
   void landed(const std::optional<SolePair>& soles) noexcept;
@@ -152,8 +154,6 @@ class ClimbPlanner {
   // The foot beside the other one on the same tread.
   [[nodiscard]] StepGoal closing_goal(const Situation& situation, const FootholdSet& footholds,
                                       Foot foot) const noexcept;
-  // Of two that stand on one tread, by their places to each other: encoders tell, whatever odometry does.
-  [[nodiscard]] std::optional<Foot> slid_foot(const Situation& situation) const noexcept;
   [[nodiscard]] bool floor_goal(const Situation& situation, const FootholdSet& footholds,
                                 StepGoal& goal) const noexcept;
   [[nodiscard]] StopReason reason_against(const Situation& situation, const FootholdSet& footholds) const noexcept;
@@ -179,6 +179,7 @@ class ClimbPlanner {
   bool closes_up_ = false;
   SolePose landed_;                     // where the foot that landed last was to
   std::optional<SolePair> odom_stood_;  // both soles when it landed
+  std::optional<Foot> slid_;            // since then, and is to be set back
   std::uint32_t set_back_ = 0;          // feet that slid, on this tread
   std::uint32_t tread_id_ = 0;          // under the foot that landed last
   std::uint32_t treads_climbed_ = 0;

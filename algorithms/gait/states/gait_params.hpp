@@ -77,10 +77,8 @@ struct WeightShiftParams {
     field("absorb_rad", p.absorb_rad, 0.0, 0.5, "A target that turns no farther up to lift-off needs no new shift.");
     field("reshift_ticks", p.reshift_ticks, 2, 2000, "Another shift over the same foot takes so long.");
     field("max_shifts", p.max_shifts, 1, 1000, "There are no more shifts for one swing.");
-    field(
-        "max_refusals", p.max_refusals, 1, 100,
-        "A step that the legs cannot do is given up after so many tries, all but the first from rest: a body that was "
-        "pushed comes to rest late.");
+    field("max_refusals", p.max_refusals, 1, 100,
+          "A step that the legs cannot do is given up after so many tries, all but the first from rest.");
     field("max_gap_ns", p.max_gap_ns, 0, 1'000'000'000,
           "A shift in which no tick came for longer is given up: the body went on without it.");
   }
@@ -162,9 +160,7 @@ struct LandedFootParams {
   static void visit(auto& p, auto& field) {
     field("pressed_n", p.pressed_n, 0.0, 500.0, "A foot that is pressed less is held where it landed.");
     field("lifted_n", p.lifted_n, 0.0, 500.0,
-          "After a foot went back to where it stood, one of the two that is pressed less is held likewise: the body "
-          "sways "
-          "over the other one.");
+          "After a foot went back, one of the two that is pressed less is held, too: the body lifted it.");
     field("hold_ns", p.hold_ns, 0, 5000000000,
           "A landed foot is held no longer where its force told nothing of the ground: it may be the sensor.");
     field("felt_hold_ns", p.felt_hold_ns, 0, 5000000000,

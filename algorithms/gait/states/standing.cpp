@@ -39,6 +39,7 @@ Transition Standing::tick(const GaitInput& in, GaitShared& gait) noexcept {
   if ((gait.memory.rests_first || sways) && rest_.tick() < params.settle_ticks) return {};
   // What it learns meanwhile may be that it does not stand straight yet: all of the time first, and once.
   if (toe_calibration_.active && rest_.tick() < params.toe_calibration.ticks) return {};
+  gait.planner.watch_feet(situation(in).soles);
   const ClimbPlanner::Decision decision =
       gait.planner.decide(situation(in, toe_calibration_.active, toe_calibration_.leading), in.footholds);
   const bool was_tall = std::exchange(toe_calibration_.active, false);

@@ -161,8 +161,7 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .may_hurry = !in.leg_impaired,
                    .stopped = early_touch_.stops()},
                   path_.duration_ticks());
-  // The torso is on its way up: the foot is to reach where it stood all the same.
-  // The body was on its way ahead to the target, too.
+  // The body was on its way up and ahead, to a target where no foot will stand.
   if (timing_.goes_back() && !went_back) wait_over_stance(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
 }
 
@@ -273,8 +272,8 @@ void SwingPhase::lower_torso(GaitShared& gait, const SolePose& sole) const noexc
   gait.plan.move_torso(height_m, low.yaw_rad, ticks, ticks);
 }
 
-// No ground: the weight rests over the stance foot, as far towards the free foot as the sole carries. The ankle roll of
-// a folded leg has little range.
+// The foot goes back: the weight rests over the stance foot, as far towards the free foot as the sole carries. The
+// ankle roll of a folded leg has little range.
 void SwingPhase::wait_over_stance(GaitShared& gait, const SolePose& sole) const noexcept {
   lower_torso(gait, sole);
   const Vec3 inward_m =

@@ -49,11 +49,13 @@ Transition WeightShift::legs_cannot(const GaitInput& in, GaitShared& gait) const
     gait.planner.refuse_passing();
     return Transition::shift(gait.planner.decide(situation(in), in.footholds), false);
   }
-  if (kind == StepKind::kClosing && in.usable && gait.planner.leave_slid_foot(situation(in)))
-    return Transition::stand();
   if (kind == StepKind::kFloor && gait.planner.shorten_floor_steps()) return Transition::stand();
   gait.memory.rests_first = true;
   if (++gait.memory.refusals < gait.params.weight_shift.max_refusals) return Transition::stand();
+  if (kind == StepKind::kClosing && gait.planner.leave_slid_foot()) {
+    gait.memory.refusals = 0;
+    return Transition::stand();
+  }
   if (kind == StepKind::kLeading && in.usable && gait.planner.close_up(situation(in))) return Transition::stand();
   return Transition::stop(StopReason::kLegsCannot, kind == StepKind::kLeading ? decision_.rise_m : 0.0);
 }

@@ -23,7 +23,7 @@ struct ModuleView {
   std::uint8_t treads = 0;  // climbed; saturates
 
   [[nodiscard]] bool stands() const noexcept {
-    return state == ModuleState::kSafeStop || state == ModuleState::kHandingOver || phase == GaitPhase::kFinished;
+    return state != ModuleState::kHandingOver && (state == ModuleState::kSafeStop || phase == GaitPhase::kFinished);
   }
   [[nodiscard]] bool operator==(const ModuleView& other) const noexcept { return packed() == other.packed(); }
 

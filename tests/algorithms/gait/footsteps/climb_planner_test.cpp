@@ -126,6 +126,7 @@ TEST(ClimbPlanner, FootSlidOnATread_IsSetBackBesideTheOtherOne_AsOftenAsItMayBe)
   OnATread on;
   for (std::uint32_t n = 0; n < on.params.max_set_back; ++n) {
     on.situation.soles[1].position_m += Vec3{-0.011, -0.006, 0.0};
+    on.planner.watch_feet(on.situation.soles);
     const ClimbPlanner::Decision decision = on.planner.decide(on.situation, {});
     ASSERT_TRUE(decision.has_step);
     EXPECT_EQ(decision.goal.kind, StepKind::kClosing);
@@ -136,23 +137,37 @@ TEST(ClimbPlanner, FootSlidOnATread_IsSetBackBesideTheOtherOne_AsOftenAsItMayBe)
     on.land_on(decision.goal);
   }
   on.situation.soles[1].position_m.x() -= 0.02;
+  on.planner.watch_feet(on.situation.soles);
   EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
 }
 
-TEST(ClimbPlanner, OdometryCarriesBothFeet_NoneSlid) {
+TEST(ClimbPlanner, OdometryCarriesAndTurnsBothFeet_NoneSlid) {
   OnATread on;
-  for (SolePose& sole : on.situation.soles) sole.position_m.x() += 0.05;
+  const Mat3 turned = rotation_z(0.1);
+  for (SolePose& sole : on.situation.soles) sole = {turned * sole.position_m + Vec3{0.05, 0, 0}, sole.yaw_rad + 0.1};
+  on.planner.watch_feet(on.situation.soles);
   EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
   on.situation.soles[1].position_m.x() += on.params.slid_m - 1e-4;
+  on.planner.watch_feet(on.situation.soles);
   EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
+}
+
+TEST(ClimbPlanner, FootThatSlidComesNearer_IsSetBackAllTheSame) {
+  OnATread on;
+  on.situation.soles[1].position_m.x() += on.params.slid_m + 1e-4;
+  on.planner.watch_feet(on.situation.soles);
+  on.situation.soles[1].position_m.x() -= 2e-4;
+  on.planner.watch_feet(on.situation.soles);
+  EXPECT_EQ(on.planner.decide(on.situation, {}).goal.foot, Foot::kRight);
 }
 
 TEST(ClimbPlanner, LegsCannotSetTheSlidFootBack_GoesOnWithout) {
   OnATread on;
-  EXPECT_FALSE(on.planner.leave_slid_foot(on.situation)) << "none slid";
+  EXPECT_FALSE(on.planner.leave_slid_foot()) << "none slid";
   on.situation.soles[0].position_m.x() -= 0.02;
+  on.planner.watch_feet(on.situation.soles);
   ASSERT_TRUE(on.planner.decide(on.situation, {}).has_step);
-  EXPECT_TRUE(on.planner.leave_slid_foot(on.situation));
+  EXPECT_TRUE(on.planner.leave_slid_foot());
   EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
 }
 
