@@ -3,8 +3,9 @@
 import math
 import os
 import random
+import statistics
 
-from campaigns.climbs import grouped, not_climbed, outcomes, own_noise, seeded, span
+from campaigns.climbs import grouped, most, not_climbed, outcomes, own_noise, seeded, span, worst
 from campaigns.engine import ROOT, Figure, Page, Table, headline, rows
 
 GAITS = ("ds", "ss")
@@ -93,7 +94,7 @@ def reality(engine, seeds):
             f"\n\n## Each alone\n\nFour steps of 0.13 x 0.28 m, {span(ALONE)}, everything else as the data sheet says.\n\n" +
             outcomes("what differs", alone) + "\n\n" + figures(alone) +
             not_climbed([s for g in (*drawn_all.values(), *alone.values()) for s in g]))
-    first, second = ([s for g in groups.values() for s in g] for groups in (once, twice))
+    first, second, each = ([s for g in groups.values() for s in g] for groups in (once, twice, alone))
 
     def counted(what, summaries, passed, at="", asked=None):
         count = sum(bool(passed(s)) for s in summaries)
@@ -102,14 +103,23 @@ def reality(engine, seeds):
     def climbed(summary):
         return summary.get("verdict") == "pass"
 
+    def unsafe(summary):
+        return summary.get("fell") or (summary.get("sole_margin_mm_min") or 0) < 0 or (summary.get("swing_clearance_mm_min") or 0) < 0
+
+    medians = [m for s in first if (m := (s.get("foothold_error_mm") or {}).get("median")) is not None]
+
     return Page(text, {
         "1 climbed": counted("climbs with everything drawn as on a real robot, `--reality 1`", first, climbed, "least",
                              math.ceil(0.98 * len(first))),
-        "2 falls": counted("falls among them", first, lambda s: s.get("fell"), "most", 0),
+        "2 falls": counted("falls, soles over an edge and feet in the stairs among them", first, unsafe, "most", 0),
+        "2 foothold": headline("foothold error of them, median of the climbs' medians",
+                               most(statistics.median(medians) if medians else None, 4), " mm"),
+        "2 foothold worst": headline("foothold error of them, worst; 10 mm is asked", most(worst(first, "foothold_error_mm", "max")), " mm"),
         "3 climbed": counted("climbs with everything twice as bad, `--reality 2`", second, climbed, "least",
                              math.ceil(0.85 * len(second))),
-        "4 falls": counted("falls among those", second, lambda s: s.get("fell"), "most", 0)})
+        "4 falls": counted("falls among those", second, lambda s: s.get("fell"), "most", 0),
+        "5 alone": counted("falls, soles over an edge and feet in the stairs with each of these alone", each, unsafe, "most", 0)})
 
 
-TABLES = {"reality": Table("Robots, stairs and pictures that are not as the data sheet says", range(101, 151), reality, 25,
+TABLES = {"reality": Table("Robots, stairs and pictures that are not as the data sheet says", range(101, 201), reality, 50,
                            ("toolchain/campaigns/climbs.py", "toolchain/campaigns/gains"))}
