@@ -2,17 +2,71 @@
 #include "sim_stub/camera/depth_holes.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace polygmap::sim {
+namespace {
+
+constexpr int kBlob_px = 6;
+constexpr double kBlob_m = 0.03;
+constexpr double kOn_m = 0.002;  // so far off a tread's plane a pixel is still of the tread
+
+// A point, or what is linear in it, along a row of pixels.
+struct AlongRow {
+  Vec3 at, at_zero, per_px;
+  [[nodiscard]] Vec3 operator()(int u, double depth_m) const { return at + depth_m * (at_zero + u * per_px); }
+  [[nodiscard]] double z(int u, double depth_m) const { return at.z() + depth_m * (at_zero.z() + u * per_px.z()); }
+};
+
+double drawn(const CounterNoise& noise, std::uint64_t a, std::uint64_t b, std::uint64_t c) {
+  return noise.uniform(mix64(mix64(mix64(a + 1) ^ b) ^ c));
+}
+
+}  // namespace
+
+// What was drawn last is asked for again by the pixel beside.
+class DepthHoles::Draws {
+ public:
+  Draws(const CameraErrors& errors, const CounterNoise& noise, std::uint64_t frame)
+      : errors_(errors), noise_(noise), frame_(frame) {}
+
+  [[nodiscard]] bool is_dark(int u, int v) {
+    if (const std::array<int, 2> blob{u / kBlob_px, v / kBlob_px}; blob != blob_) {
+      blob_ = blob;
+      dark_ = drawn(noise_, frame_, static_cast<std::uint64_t>(blob[0]), static_cast<std::uint64_t>(blob[1])) <
+              errors_.dark_share;
+    }
+    return dark_;
+  }
+  [[nodiscard]] bool is_shiny(const Vec2& step_p_m) {
+    if (errors_.shiny_share <= 0.0) return false;
+    constexpr double kInside = 0.499999;
+    if (const Vec2 off = step_p_m / kBlob_m - cell_; !(off.cwiseAbs().maxCoeff() < kInside)) {
+      cell_ = {std::round(step_p_m.x() / kBlob_m), std::round(step_p_m.y() / kBlob_m)};
+      const auto index = [](double along) {
+        return static_cast<std::uint64_t>(static_cast<std::int64_t>(along) + 1000);
+      };
+      constexpr std::uint64_t kAlways = 1ULL << 40U;  // no frame has that number
+      shiny_ = drawn(noise_, kAlways, index(cell_.x()), index(cell_.y())) < errors_.shiny_share;
+    }
+    return shiny_;
+  }
+
+ private:
+  const CameraErrors& errors_;
+  const CounterNoise& noise_;
+  std::uint64_t frame_;
+  std::array<int, 2> blob_{-1, -1};
+  Vec2 cell_ = Vec2::Constant(1e9);
+  bool dark_ = false, shiny_ = false;
+};
 
 DepthHoles::DepthHoles(const CameraErrors& errors, const StairWorld& world, std::uint64_t seed)
     : errors_(errors), half_width_m_(world.half_width_m), noise_(seed, Stream::kTreadHoles) {
-  constexpr double kLevel_m = 0.003, kTurned_m = 0.3;
   for (std::size_t k = 0; k < world.steps.size(); ++k) {
     const Step& step = world.steps[k];
-    treads_.push_back({step.true_T_step.inverse(), step, noise_.uniform(k) < errors.hole_treads,
-                       step.turned() ? kTurned_m : step.worn_m + kLevel_m});
+    treads_.push_back({step.true_T_step.inverse(), step, noise_.uniform(k) < errors.hole_treads});
   }
   if (treads_.empty()) return;
   // On one of the treads that the robot sees from the floor.
@@ -23,26 +77,16 @@ DepthHoles::DepthHoles(const CameraErrors& errors, const StairWorld& world, std:
   sun_ray_ = Vec3{sun.uniform(3, -0.6, 0.6), sun.uniform(4, -0.6, 0.6), 1.0}.normalized();
 }
 
-bool DepthHoles::is_sunlit(const Vec3& point_m) const {
-  return (point_m - sun_place_m_).cross(sun_ray_).norm() < errors_.sun_patch_m;
-}
-
-bool DepthHoles::is_lost(const Tread& tread, const Vec3& step_p_m, std::uint64_t frame, int u, int v) const {
+bool DepthHoles::is_lost(const Tread& tread, const Vec3& step_p_m, int u, int v, Draws& draws) const {
   const bool on_strip = step_p_m.x() < tread.step.edge_x_m() + errors_.nosing_strip_m;
   if (on_strip && errors_.nosing_strip_m > 0.0) return true;
-  if (!tread.holed) return false;
-  const auto drawn = [this](std::uint64_t a, std::uint64_t b, std::uint64_t c) {
-    return noise_.uniform(mix64(mix64(mix64(a + 1) ^ b) ^ c));
-  };
-  constexpr int kBlob_px = 6;
-  constexpr double kBlob_m = 0.03;
-  if (drawn(frame, static_cast<std::uint64_t>(u / kBlob_px), static_cast<std::uint64_t>(v / kBlob_px)) <
-      errors_.dark_share) {
-    return true;
-  }
-  const auto cell = [](double along_m) { return static_cast<std::uint64_t>(std::llround(along_m / kBlob_m) + 1000); };
-  constexpr std::uint64_t kAlways = 1ULL << 40U;  // no frame has that number
-  return drawn(kAlways, cell(step_p_m.x()), cell(step_p_m.y())) < errors_.shiny_share;
+  return tread.holed && (draws.is_dark(u, v) || draws.is_shiny(step_p_m.head<2>()));
+}
+
+bool DepthHoles::is_on(const Step& step, const Vec3& step_p_m) const {
+  const double round_m = step_p_m.x() < step.edge_x_m() ? step.worn_m : 0.0;
+  return step_p_m.z() - step.height_m >= -kOn_m - round_m && step_p_m.x() >= step.nosing_x_m - kOn_m &&
+         step_p_m.x() <= step.back_x_m + step.beneath_m && std::abs(step_p_m.y()) <= half_width_m_;
 }
 
 void DepthHoles::apply(const DepthRenderer& picture, const DepthScene& first, const DepthScene& last,
@@ -50,31 +94,35 @@ void DepthHoles::apply(const DepthRenderer& picture, const DepthScene& first, co
   if (std::max({errors_.dark_share, errors_.shiny_share, errors_.nosing_strip_m, errors_.sun_patch_m}) <= 0.0) return;
   const CameraIntrinsics& k = picture.intrinsics();
   const Transform &from = first.true_T_camera, &to = last.true_T_camera;
+  Draws draws(errors_, noise_, frame);
+  std::vector<AlongRow> step_p(treads_.size());
+  const bool sun = errors_.sun_patch_m > 0.0;
   for (int v = 0; v < k.height_px; ++v) {
     const double s = picture.moment_of(v);
     const Mat3 R = from.R + s * (to.R - from.R);
-    const Vec3 p_m = from.p_m + s * (to.p_m - from.p_m);
-    const Vec3 at_zero = R * Vec3{-k.cx_px / k.fx_px, (v - k.cy_px) / k.fy_px, 1.0}, per_px = R.col(0) / k.fx_px;
+    const AlongRow true_p{from.p_m + s * (to.p_m - from.p_m),
+                          R * Vec3{-k.cx_px / k.fx_px, (v - k.cy_px) / k.fy_px, 1.0}, R.col(0) / k.fx_px};
+    const AlongRow off_ray{(true_p.at - sun_place_m_).cross(sun_ray_), true_p.at_zero.cross(sun_ray_),
+                           true_p.per_px.cross(sun_ray_)};
+    for (std::size_t i = 0; i < treads_.size(); ++i) {
+      const Transform& step_T_true = treads_[i].step_T_true;
+      step_p[i] = {step_T_true * true_p.at, step_T_true.R * true_p.at_zero, step_T_true.R * true_p.per_px};
+    }
     const float* inverse_depth = picture.inverse_depth(v);
     for (int u = 0; u < k.width_px; ++u, ++depth) {
       if (*depth == 0 || inverse_depth[u] <= 0.0F) continue;
-      const Vec3 point_m = p_m + (at_zero + u * per_px) / static_cast<double>(inverse_depth[u]);
-      if (is_sunlit(point_m)) {
+      const double depth_m = 1.0 / static_cast<double>(inverse_depth[u]);
+      if (sun && off_ray(u, depth_m).squaredNorm() < math::square(errors_.sun_patch_m)) {
         *depth = 0;
         continue;
       }
-      for (const Tread& tread : treads_) {
-        if (std::abs(point_m.z() - tread.step.height_m) > tread.turned_z_m) continue;
-        constexpr double kOn_m = 0.002;
-        const Vec3 step_p_m = tread.step_T_true * point_m;
-        const double above_m = step_p_m.z() - tread.step.height_m;
-        const double round_m = step_p_m.x() < tread.step.edge_x_m() ? tread.step.worn_m : 0.0;
-        if (above_m > kOn_m || above_m < -kOn_m - round_m) continue;
-        if (step_p_m.x() < tread.step.nosing_x_m - kOn_m || step_p_m.x() > tread.step.back_x_m + tread.step.beneath_m) {
-          continue;
-        }
-        if (std::abs(step_p_m.y()) > half_width_m_) continue;
-        if (is_lost(tread, step_p_m, frame, u, v)) *depth = 0;
+      for (std::size_t i = 0; i < treads_.size(); ++i) {
+        const Tread& tread = treads_[i];
+        const double above_m = step_p[i].z(u, depth_m) - tread.step.height_m;
+        if (above_m > kOn_m || above_m < -kOn_m - tread.step.worn_m) continue;
+        const Vec3 step_p_m = step_p[i](u, depth_m);
+        if (!is_on(tread.step, step_p_m)) continue;
+        if (is_lost(tread, step_p_m, u, v, draws)) *depth = 0;
         break;
       }
     }

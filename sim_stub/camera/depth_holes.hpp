@@ -24,12 +24,13 @@ class DepthHoles {
   struct Tread {
     Transform step_T_true;
     Step step;
-    bool holed;         // dark and shiny
-    double turned_z_m;  // a pixel of it is no farther from its height
+    bool holed;  // dark and shiny
   };
-  [[nodiscard]] bool is_sunlit(const Vec3& point_m) const;
-  // True for a point on the tread that gives no depth.
-  [[nodiscard]] bool is_lost(const Tread& tread, const Vec3& step_p_m, std::uint64_t frame, int u, int v) const;
+  class Draws;
+  // True for a point of the step's frame, no higher than the tread, that is of the tread or of its worn nosing.
+  [[nodiscard]] bool is_on(const Step& step, const Vec3& step_p_m) const;
+  // True for a point on the tread that gives no depth, seen by the pixel (u, v).
+  [[nodiscard]] bool is_lost(const Tread& tread, const Vec3& step_p_m, int u, int v, Draws& draws) const;
 
   CameraErrors errors_;
   double half_width_m_;

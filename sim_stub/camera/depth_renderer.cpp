@@ -151,23 +151,26 @@ void DepthRenderer::render(const DepthScene& first, const DepthScene& last) {
 
 void DepthRenderer::fatten_edges(double px, const CounterNoise& noise) {
   constexpr float kJump_m = 0.03F;
-  const int width = intrinsics_.width_px, height = intrinsics_.height_px;
+  const auto width = static_cast<std::size_t>(intrinsics_.width_px);
+  const int height = intrinsics_.height_px;
+  std::vector<float> nearest(width);  // 1 / depth of the nearest one beside each pixel of a row
   for (double left_px = px; left_px > 0.0; left_px -= 1.0) {
     const std::vector<float> inverse = inverse_depth_, distance = plane_distance_;
     for (int v = 0; v < height; ++v) {
-      for (int u = 0; u < width; ++u) {
-        const std::size_t here = offset(v) + static_cast<std::size_t>(u);
-        std::size_t nearest = here;
-        const auto look = [&](int column, int row) {
-          if (column < 0 || column >= width || row < 0 || row >= height) return;
-          const std::size_t there = offset(row) + static_cast<std::size_t>(column);
-          if (inverse[there] > inverse[nearest]) nearest = there;
-        };
-        look(u - 1, v), look(u + 1, v), look(u, v - 1), look(u, v + 1);
-        if (inverse[nearest] - inverse[here] <= kJump_m * inverse[nearest] * inverse[here]) continue;
+      const std::size_t begin = offset(v), above = offset(std::max(v - 1, 0)),
+                        below = offset(std::min(v + 1, height - 1));
+      const float* row = inverse.data() + begin;
+      for (std::size_t u = 0; u < width; ++u) nearest[u] = std::max(inverse[above + u], inverse[below + u]);
+      for (std::size_t u = 1; u < width; ++u) nearest[u] = std::max(nearest[u], row[u - 1]);
+      for (std::size_t u = 1; u < width; ++u) nearest[u - 1] = std::max(nearest[u - 1], row[u]);
+      for (std::size_t u = 0; u < width; ++u) {
+        if (nearest[u] - row[u] <= kJump_m * nearest[u] * row[u]) continue;
+        const std::size_t here = begin + u;
         if (left_px < 1.0 && noise.uniform(here) >= left_px) continue;
-        inverse_depth_[here] = inverse[nearest];
-        plane_distance_[here] = distance[nearest];
+        const std::array<std::size_t, 4> beside{here - (u > 0), here + (u + 1 < width), above + u, below + u};
+        const auto* from = std::ranges::find_if(beside, [&](std::size_t i) { return inverse[i] == nearest[u]; });
+        inverse_depth_[here] = nearest[u];
+        plane_distance_[here] = distance[*from];
       }
     }
   }
