@@ -12,6 +12,7 @@
 
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/core/messages/state.hpp"
+#include "algorithms/robot/drive_torque.hpp"
 #include "algorithms/robot/robot_model.hpp"
 
 namespace polygmap {
@@ -62,9 +63,7 @@ class HandOver {
     const double share = 1.0 / rested_ticks_;
     for (std::size_t n = 0; n < kJointCount; ++n) {
       const auto i = static_cast<Eigen::Index>(n);
-      const JointSetpoint& asked = command.joints[n];
-      const double torque_nm = asked.tau_ff_nm + asked.kp_nmprad * (asked.q_rad - joints.q_rad[i]) +
-                               asked.kd_nmsprad * (asked.dq_radps - joints.dq_radps[i]);
+      const double torque_nm = torque_asked_nm(command.joints[n], joints.q_rad[i], joints.dq_radps[i]);
       mean_q_rad_[i] += share * (joints.q_rad[i] - mean_q_rad_[i]);
       mean_torque_nm_[i] += share * (torque_nm - mean_torque_nm_[i]);
     }

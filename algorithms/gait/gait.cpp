@@ -210,8 +210,11 @@ void Gait::advance(const GaitInput& in) noexcept {
   }
   if (std::exchange(restarts_, false)) state_.emplace<Standing>().begin(in, gait);
   enter(in, gait, tick_state(in, gait));
-  const bool went_back = status_.phase == GaitPhase::kDoubleSupport && memory_.aborted_swings > 0 && in.usable;
-  if (went_back) plan_.hold_lifted_foot(params_.landed_foot, in.feedback, in.now_ns);
+  // Thrown, the body lifts a foot that was to stand. A foot that it leaves as planned needs no hold.
+  const bool thrown = memory_.aborted_swings > 0 || in.odom_dcm_error_m.norm() > params_.steady_m;
+  if (thrown && status_.phase == GaitPhase::kDoubleSupport && in.usable && !in.held) {
+    plan_.hold_lifted_foot(params_.landed_foot, in.state, in.feedback, in.now_ns);
+  }
   plan_.hold_landed_foot(params_.landed_foot, in.feedback, in.now_ns);
   follow_state(in, gait);
   if (!in.held) plan_.count_tick();

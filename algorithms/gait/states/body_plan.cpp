@@ -143,11 +143,15 @@ void BodyPlan::hold_landed_foot(const LandedFootParams& params, const JointFeedb
   }
 }
 
-void BodyPlan::hold_lifted_foot(const LandedFootParams& params, const JointFeedback& feedback,
-                                std::int64_t now_ns) noexcept {
+void BodyPlan::hold_lifted_foot(const LandedFootParams& params, const StateEstimate& state,
+                                const JointFeedback& feedback, std::int64_t now_ns) noexcept {
   if (landed_.held()) return;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    if (feedback.foot_force_n[index_of(leg)] < params.lifted_n) return land(leg, true, 0.0, now_ns);
+    if (!(feedback.foot_force_n[index_of(leg)] < params.lifted_n)) continue;
+    Transform odom_T_sole = odom_T_plan() * plan_T_sole(leg);
+    odom_T_sole.p_m.head<2>() = state.odom_T_sole[index_of(leg)].p_m.head<2>();
+    set_sole(leg, plan_T_odom() * odom_T_sole);
+    return land(leg, true, 0.0, now_ns);
   }
 }
 

@@ -21,6 +21,10 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   com.plan(params.com, body.com(), zmp_of_swing(params, plan));
   plan_torso(gait.robot.legs, params, soles, com, 0, plan);
   path_.plan(gait.robot.sole, body.plan_T_sole(goal_.foot), goal_.target, plan.shape, plan.swing_ticks);
+  if (in.usable) {
+    odom_stood_off_m_ = in.state.odom_T_sole[index_of(goal_.foot)].p_m - body.plan_T_sole(goal_.foot).p_m;
+    odom_stood_off_m_.z() = 0.0;
+  }
   body.move_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
   zmp_stance_m_ = plan.zmp_stance_m;
   gait.planner.latched(situation(in), decision);
@@ -42,6 +46,15 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   gait.memory.shifts = gait.memory.idle_ticks = gait.memory.obstacle_ticks = gait.memory.refusals = 0;
   gait.memory.rests_first = false;
   body.release_landed_foot();
+}
+
+// Legs give way under load, and a foot stands millimetres from where it is planned: back it goes to where it stood.
+Transform SwingPhase::sole() const noexcept {
+  Transform odom_T_sole = path_.at(timing_.tick());
+  if (timing_.goes_back() && turn_tick_ > 0.0) {
+    odom_T_sole.p_m += (1.0 - std::max(timing_.tick(), 0.0) / turn_tick_) * odom_stood_off_m_;
+  }
+  return odom_T_sole;
 }
 
 bool SwingPhase::feel_force(const GaitInput& in, const SwingParams& params, std::int64_t steer_age_ns) noexcept {
@@ -161,8 +174,10 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .may_hurry = !in.leg_impaired,
                    .stopped = early_touch_.stops()},
                   path_.duration_ticks());
+  if (!timing_.goes_back() || went_back) return;
+  turn_tick_ = timing_.tick();
   // The body was on its way up and ahead, to a target where no foot will stand.
-  if (timing_.goes_back() && !went_back) wait_over_stance(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
+  wait_over_stance(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
 }
 
 // Of a passing foot, the rest of the way straight to the target, or beside the standing foot while it is still behind

@@ -23,7 +23,8 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
   const double rise_share = on_floor ? 1.0 : passing ? params.passing_rise_share : params.rise_share;
   plan.rise_ticks = static_cast<std::int32_t>(std::min(tried.rise_longer * rise_share, 1.0) * plan.swing_ticks);
   plan.tried = tried;
-  plan.joint_margin_rad = goal.kind == StepKind::kClosing ? params.closing_margin_rad : params.joint_margin_rad;
+  const bool needed = goal.kind == StepKind::kClosing || goal.kind == StepKind::kTrailing;
+  plan.joint_margin_rad = needed ? params.needed_margin_rad : params.joint_margin_rad;
   plan.shape.toe_down_rad = on_floor ? 0.5 * tried.toe_down_rad : tried.toe_down_rad;
   const auto zmp_in = [&](Foot foot) -> Vec2 {
     const SolePose& sole = landed[index_of(foot)];

@@ -60,7 +60,7 @@ struct StepParams {
   double passing_rise_share = 0.6;
   std::int32_t knot_ticks = 15;
   double joint_margin_rad = 0.03;
-  double closing_margin_rad = 0.01;
+  double needed_margin_rad = 0.01;
   double knee_min_rad = 0.08;
   double speed_share = 0.95;
   double torque_share = 1.0;
@@ -90,8 +90,9 @@ struct StepParams {
     field("knot_ticks", p.knot_ticks, 1, 200,
           "Eq. 37: time between two knots; a drive is up to 2 % faster between them than its knots say.");
     field("joint_margin_rad", p.joint_margin_rad, 0.0, 0.3, "A plan keeps this from the joints' ranges.");
-    field("closing_margin_rad", p.closing_margin_rad, 0.0, 0.3,
-          "The plan of a step that brings back a foot from too far out keeps this: its ankle has no more.");
+    field("needed_margin_rad", p.needed_margin_rad, 0.0, 0.3,
+          "The plan of a step without which there is no way on keeps this: the rear foot's after the leading one, and "
+          "that of a foot too far out.");
     field("knee_min_rad", p.knee_min_rad, 0.0, 0.5, "A plan keeps the knee this far from the stretched leg.");
     field("speed_share", p.speed_share, 0.1, 1.0, "A plan uses this share of the drives' speed.");
     field("torque_share", p.torque_share, 0.1, 1.0,

@@ -32,7 +32,11 @@ void StepSearch::try_candidate(const RobotModel& robot, const StepParams& params
   }
   const StepTries& tries = goal.kind == StepKind::kPassing ? kPassingTries : kStepTries;
   candidate_ = plan_step(params, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, tries[try_]);
-  if (!leading_found_) candidate_.shift_ticks = shift_ticks_;
+  if (leading_found_) {
+    candidate_.joint_margin_rad = params.joint_margin_rad;  // the foot lands some mm off
+  } else {
+    candidate_.shift_ticks = shift_ticks_;
+  }
   const std::int32_t knot_ticks = leading_found_ ? kLookAhead * params.knot_ticks : params.knot_ticks;
   proof_.begin(robot, StepKnots(robot, params, knot_ticks, candidate_, from, soles));
 }
