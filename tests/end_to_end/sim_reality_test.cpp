@@ -51,6 +51,20 @@ TEST(ClimbPlay, RobotTwiceAsBadThatLeansInItsPlay_IsClimbed) {
   EXPECT_LE(summary.foothold_error_m.max, 0.020);
 }
 
+// Its legs give way by 10 mm under load. A foot that turned back in the air, or that the body lifted, once stood that
+// far from where it had stood: over its tread's edge, or in the stairs.
+TEST(ClimbPushed, AsRealRobotsAre_FeetStayWhereTheyStood) {
+  for (const double at_s : {15.115, 16.052}) {
+    ClimbOptions options = options_of(1.0, GaitPattern::kDoubleStep, 5);
+    options.stairs.steps = 4;
+    options.pushes = {{.at_s = at_s, .axis = 1, .impulse_ns = -10.0}};
+    const ClimbSummary summary = run_climb(options, {});
+    EXPECT_FALSE(summary.fell) << at_s;
+    EXPECT_GE(summary.sole_margin_min_m, 0.0) << at_s;
+    EXPECT_GT(summary.swing_clearance_min_m, 0.0) << at_s;
+  }
+}
+
 // One thing as a real robot may have it, all else as the data sheet says.
 ClimbSummary climb_with(std::initializer_list<const char*> items, std::uint64_t seed) {
   ClimbOptions options;

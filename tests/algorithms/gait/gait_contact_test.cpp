@@ -187,6 +187,31 @@ TEST(GaitContact, FootLiftedAfterTheOtherOneWentBack_StaysWhereItStood) {
   }
 }
 
+// Legs that give way under load: the soles stand 8 mm ahead of their plan.
+TEST(GaitContact, FootThatGoesBack_StandsWhereItStoodAndNotWhereItWasPlanned) {
+  constexpr double kOff_m = 0.008;
+  IdealClimb climb({});
+  climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback&) {
+    for (Transform& odom_T_sole : state.odom_T_sole) odom_T_sole.p_m.x() += kOff_m;
+    const LatchedStep& step = climb.status().step;
+    const std::int64_t since_ns = state.stamp_ns - step.latch_stamp_ns;
+    if (climb.status().phase == GaitPhase::kSwing && step.onto_tread && since_ns > 20 * kNsPerMs &&
+        since_ns < 80 * kNsPerMs) {
+      state.odom_v_base_mps.y() += side_sign(step.foot) * 0.15;
+    }
+  };
+  while (climb.tick() && !in_swing_onto_tread(climb, 1)) {
+  }
+  const std::size_t foot = index_of(climb.status().step.foot);
+  const Vec3 planned_m = climb.status().odom_T_sole_desired[foot].p_m;
+  while (climb.tick() && climb.status().aborted_swings == 0) {
+  }
+  ASSERT_EQ(climb.status().aborted_swings, 1U);
+  const Vec3 back_m = climb.status().odom_T_sole_desired[foot].p_m;
+  EXPECT_NEAR(back_m.x() - planned_m.x(), kOff_m, 1e-3);
+  EXPECT_NEAR(back_m.y(), planned_m.y(), 1e-3);
+}
+
 TEST(GaitContact, BumpInTheAir_HoldsTheReferenceWithoutAJump) {
   IdealClimb climb({});
   climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {

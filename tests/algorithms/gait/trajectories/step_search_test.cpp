@@ -215,6 +215,35 @@ TEST(StepSearch, PassingStepThatIsPossibleWithNoTrailingStepAfterIt_IsImpossible
   EXPECT_EQ(searched(passing_step(0.13, 0.28), fast).state(), StepSearch::State::kImpossible);
 }
 
+// The left foot, on a tread, landed so far out that the ankle left behind hardly reaches: no step would have led there,
+// but the way on from there is none the less the rear foot's.
+TEST(StepSearch, TrailingStepFromAWideStance_IsDoneWhereNoLeadingStepWouldHaveLed) {
+  const StepParams params;
+  const auto search_from = [&](double wider_m, StepKind kind) {
+    std::array<Transform, kFootCount> soles;
+    TorsoTrajectory::State from;
+    StepPlan plan = stair_step(kind, 0.13, 0.28, soles, from);
+    StepGoal trailing = plan.goal;
+    if (kind == StepKind::kTrailing) {
+      soles[0].p_m.y() += wider_m;
+    } else {
+      plan.goal.target.position_m.y() += wider_m;
+      trailing = {StepKind::kTrailing, Foot::kRight, {{0.28, -0.1, 0.13}, 0}, {}};
+    }
+    StepSearch search;
+    search.begin(nominal_robot(), params, plan.goal, trailing, params.durations.stair_shift_ticks, from, soles);
+    return finish(search, params);
+  };
+  int rescued = 0;
+  for (double wider_m = 0.0; wider_m < 0.1; wider_m += 0.0025) {
+    const bool leads = search_from(wider_m, StepKind::kLeading) == StepSearch::State::kFound;
+    const bool trails = search_from(wider_m, StepKind::kTrailing) == StepSearch::State::kFound;
+    EXPECT_TRUE(trails || !leads) << wider_m;
+    rescued += trails && !leads;
+  }
+  EXPECT_GE(rescued, 2);
+}
+
 // The left foot onto a tread, and the right one after it.
 StepSearch leading_search(double rise_m, double ahead_m, const StepParams& params = {}) {
   std::array<Transform, kFootCount> soles;
