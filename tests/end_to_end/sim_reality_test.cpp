@@ -51,8 +51,8 @@ TEST(ClimbPlay, RobotTwiceAsBadThatLeansInItsPlay_IsClimbed) {
   EXPECT_LE(summary.foothold_error_m.max, 0.020);
 }
 
-// Its legs give way by 10 mm under load. A foot that turned back in the air, or that the body lifted, once stood that
-// far from where it had stood: over its tread's edge, or in the stairs.
+// Its legs give way by some millimetres under load. A foot that turned back in the air, or that the body lifted, once
+// stood that far from where it had stood: 3 mm over its tread's edge, 2 mm into the stairs.
 TEST(ClimbPushed, AsRealRobotsAre_FeetStayWhereTheyStood) {
   for (const double at_s : {15.115, 16.052}) {
     ClimbOptions options = options_of(1.0, GaitPattern::kDoubleStep, 5);

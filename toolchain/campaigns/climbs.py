@@ -111,6 +111,13 @@ def outcomes(what, groups):
                 [(name, *line(s)) for name, s in groups.items()])
 
 
+def touches(summary):
+    """A sole stood over its tread's edge, or a foot touched the stairs, or nobody knows."""
+    margin, clearance = summary.get("sole_margin_mm_min"), summary.get("swing_clearance_mm_min")
+    unknown = summary.get("steps_climbed", 1) > 0 and (margin is None or clearance is None)
+    return unknown or (margin is not None and margin < 0) or (clearance is not None and clearance <= 0)
+
+
 def grouped(engine, what, named):
     """named: {group: [arguments]} -> {group: summaries}, one run of the engine."""
     flat = [(group, a) for group, all_arguments in named.items() for a in all_arguments]
@@ -259,11 +266,11 @@ def pushes(engine, seeds):
     text = ("10 N s on the torso at eight moments of the second of four stairs, perception in the loop, robot, sensors and stairs drawn as on "
             f"a real robot (`--reality 1`), {span(seeds)}, under physics.\n\n" +
             outcomes("pushed", groups) + not_climbed(unpushed_failed + everything))
-    over = sum((s.get("sole_margin_mm_min") or 0) < 0 for s in everything)
+    over = sum(map(touches, everything))
     return Page(text, {
         "1 falls": headline("falls by a push of 10 N s on the stairs, `--reality 1`",
                             Figure(sum(bool(s.get("fell")) for s in everything), falls(everything), "most", 0)),
-        "2 over": headline("soles over an edge by such a push", Figure(over, f"{over} of {len(everything)}", "most", 0))})
+        "2 over": headline("soles over an edge and feet in the stairs by such a push", Figure(over, f"{over} of {len(everything)}", "most", 0))})
 
 
 BODIES = {

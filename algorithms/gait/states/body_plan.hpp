@@ -55,8 +55,8 @@ class BodyPlan {
 
   // The foot stands where it is planned to be, early_m above its target, and is held there in odometry.
   void land(Foot foot, bool felt, double early_m, std::int64_t now_ns) noexcept;
-  // Of two that stand, one that the body has lifted, where it stood: without load its leg gives way no longer, and the
-  // foot would go to where it is planned, and along with what the base is off its plan.
+  // Of two that stand, one that the body has lifted, where it is when it loses its load: without load its leg gives way
+  // no longer, and the foot would go to where it is planned, and along with what the base is off its plan.
   void hold_lifted_foot(const LandedFootParams& params, const StateEstimate& state, const JointFeedback& feedback,
                         std::int64_t now_ns) noexcept;
   void hold_landed_foot(const LandedFootParams& params, const JointFeedback& feedback, std::int64_t now_ns) noexcept;

@@ -160,7 +160,8 @@ struct LandedFootParams {
   static void visit(auto& p, auto& field) {
     field("pressed_n", p.pressed_n, 0.0, 500.0, "A foot that is pressed less is held where it landed.");
     field("lifted_n", p.lifted_n, 0.0, 500.0,
-          "After a foot went back, one of the two that is pressed less is held, too: the body lifted it.");
+          "After a foot went back, and while the body is thrown, one of the two that is pressed less is held: the body "
+          "lifted it.");
     field("hold_ns", p.hold_ns, 0, 5000000000,
           "A landed foot is held no longer where its force told nothing of the ground: it may be the sensor.");
     field("felt_hold_ns", p.felt_hold_ns, 0, 5000000000,

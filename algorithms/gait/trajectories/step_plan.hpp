@@ -92,7 +92,7 @@ struct StepParams {
     field("joint_margin_rad", p.joint_margin_rad, 0.0, 0.3, "A plan keeps this from the joints' ranges.");
     field("needed_margin_rad", p.needed_margin_rad, 0.0, 0.3,
           "The plan of a step without which there is no way on keeps this: the rear foot's after the leading one, and "
-          "that of a foot too far out.");
+          "one that sets a foot beside the other.");
     field("knee_min_rad", p.knee_min_rad, 0.0, 0.5, "A plan keeps the knee this far from the stretched leg.");
     field("speed_share", p.speed_share, 0.1, 1.0, "A plan uses this share of the drives' speed.");
     field("torque_share", p.torque_share, 0.1, 1.0,

@@ -33,7 +33,7 @@ void StepSearch::try_candidate(const RobotModel& robot, const StepParams& params
   const StepTries& tries = goal.kind == StepKind::kPassing ? kPassingTries : kStepTries;
   candidate_ = plan_step(params, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, tries[try_]);
   if (leading_found_) {
-    candidate_.joint_margin_rad = params.joint_margin_rad;  // the foot lands some mm off
+    candidate_.joint_margin_rad = params.joint_margin_rad;  // the needed one is for a foot that lands some mm off
   } else {
     candidate_.shift_ticks = shift_ticks_;
   }
