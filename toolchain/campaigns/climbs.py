@@ -266,11 +266,11 @@ def pushes(engine, seeds):
     text = ("10 N s on the torso at eight moments of the second of four stairs, perception in the loop, robot, sensors and stairs drawn as on "
             f"a real robot (`--reality 1`), {span(seeds)}, under physics.\n\n" +
             outcomes("pushed", groups) + not_climbed(unpushed_failed + everything))
-    over = sum(map(touches, everything))
+    touching = sum(map(touches, everything))
     return Page(text, {
         "1 falls": headline("falls by a push of 10 N s on the stairs, `--reality 1`",
                             Figure(sum(bool(s.get("fell")) for s in everything), falls(everything), "most", 0)),
-        "2 over": headline("soles over an edge and feet in the stairs by such a push", Figure(over, f"{over} of {len(everything)}", "most", 0))})
+        "2 over": headline("soles over an edge and feet in the stairs by such a push", Figure(touching, f"{touching} of {len(everything)}", "most", 0))})
 
 
 BODIES = {
