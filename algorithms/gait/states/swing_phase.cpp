@@ -22,8 +22,8 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   plan_torso(gait.robot.legs, params, soles, com, 0, plan);
   path_.plan(gait.robot.sole, body.plan_T_sole(goal_.foot), goal_.target, plan.shape, plan.swing_ticks);
   if (in.usable) {
-    odom_stood_off_m_ = in.state.odom_T_sole[index_of(goal_.foot)].p_m - body.plan_T_sole(goal_.foot).p_m;
-    odom_stood_off_m_.z() = 0.0;
+    odom_off_path_m_ = in.state.odom_T_sole[index_of(goal_.foot)].p_m - body.plan_T_sole(goal_.foot).p_m;
+    odom_off_path_m_.z() = 0.0;
   }
   body.move_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
   zmp_stance_m_ = plan.zmp_stance_m;
@@ -48,11 +48,12 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   body.release_landed_foot();
 }
 
-// Legs give way under load, and a foot stands millimetres from where it is planned: back it goes to where it stood.
+// Legs give way under load, and a foot stands millimetres from where it is planned: back it goes to where it
+// stood, if the estimate told that.
 Transform SwingPhase::sole() const noexcept {
   Transform odom_T_sole = path_.at(timing_.tick());
   if (timing_.goes_back() && turn_tick_ > 0.0) {
-    odom_T_sole.p_m += (1.0 - std::max(timing_.tick(), 0.0) / turn_tick_) * odom_stood_off_m_;
+    odom_T_sole.p_m += (1.0 - std::max(timing_.tick(), 0.0) / turn_tick_) * odom_off_path_m_;
   }
   return odom_T_sole;
 }
@@ -174,8 +175,9 @@ void SwingPhase::follow(const GaitInput& in, GaitShared& gait) noexcept {
                    .may_hurry = !in.leg_impaired,
                    .stopped = early_touch_.stops()},
                   path_.duration_ticks());
-  if (!timing_.goes_back() || went_back) return;
-  turn_tick_ = timing_.tick();
+  if (!timing_.goes_back()) return;
+  turn_tick_ = std::max(turn_tick_, timing_.tick());  // the pace takes some ticks to turn, too
+  if (went_back) return;
   // The body was on its way up and ahead, to a target where no foot will stand.
   wait_over_stance(gait, sole_pose(gait.plan.plan_T_odom() * path_.at(0)));
 }
@@ -207,6 +209,7 @@ void SwingPhase::land_soon(GaitShared& gait) noexcept {
   plan_torso(gait.robot.legs, step, soles, com, 0, plan);
   body.move_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, ticks, ticks);
   path_.redirect(timing_.tick(), timing_.pace(), target, ticks);
+  odom_off_path_m_.setZero();  // the path begins elsewhere now
   timing_.begin_straight();
   zmp_stance_m_ = plan.zmp_stance_m;
 }

@@ -42,9 +42,9 @@ class SwingPhase {
   StepTry tried_;
   Swing path_;  // odometry
   SwingTiming timing_;
-  Vec2 zmp_stance_m_ = Vec2::Zero();      // plan frame
-  Vec3 odom_stood_off_m_ = Vec3::Zero();  // horizontally, from where the path begins to where the foot stood
-  double turn_tick_ = 0.0;                // of the path, where the foot turned back
+  Vec2 zmp_stance_m_ = Vec2::Zero();     // plan frame
+  Vec3 odom_off_path_m_ = Vec3::Zero();  // horizontally, from where the path begins to where the foot stood
+  double turn_tick_ = 0.0;               // of the path, where the foot turned back
   TouchEvidence touch_;
   EarlyTouch early_touch_;
   std::int64_t felt_stamp_ns_ = 0;   // of the last sample in it
