@@ -203,6 +203,7 @@ void PerceptionLane::begin_search() noexcept {
     query.odom_T_sole[index_of(foot)] = context.state.odom_T_sole[index_of(foot)];
   query.stance = context.stance;
   query.climbing = context.climbing;
+  query.feet_ahead_m = mount_.feet_ahead_m();
   search_.begin(map_.snapshot(), query);
   searching_.due = false;
   searching_.now = true;

@@ -84,7 +84,21 @@ constexpr auto kItems = std::to_array<RealityItem>({
     always("stairs.tread_yaw_rad", 0.0262),
     always("stairs.rise_error_m", 0.005),
     always("stairs.worn_nosing_m", 0.004),
-    around("plant.no_load_scale", 0.1),  // last: what the others draw stays as it was
+    around("plant.no_load_scale", 0.1),
+    {"plant.holder_kp_nmprad", -1800.0, -1000.0},
+    around("plant.torso_offset_y_m", 0.005),
+    around("plant.torso_offset_z_m", 0.02),
+    around("plant.inertia_scale", 0.1),
+    around("sensors.gyro_scale", 0.003),
+    around("sensors.accel_scale", 0.003),
+    around("sensors.imu_delay_s", 0.003),
+    around("sensors.foot_force_scale", 0.05),
+    around("sensors.foot_force_delay_s", 0.004),
+    around("sensors.lio_delay_s", 0.03),
+    around("sensors.lio_stamp_s", 0.005),
+    around("camera.stamp_s", 0.005),
+    {"sensors.toe_round_m", 0.0, 0.03},
+    {"sensors.sole_edge_m", 0.0, 0.004},
 });
 
 std::span<double> numbers_of(config::Param& param) {

@@ -23,14 +23,14 @@ JointVector standing_q_rad() {
   return q;
 }
 
-// As stiff as its drives can be, up to what holds a robot that nobody balances.
+// As stiff as its drives can be, up to what the robot is held with.
 StandController stand_controller(const MujocoPlant::Params& params) {
-  constexpr double kKp_nmprad = 2000.0, kKd_nmsprad = 40.0;
+  constexpr double kKdPerKp_s = 0.02;
   const auto within = [](double gain, double most) { return most > 0.0 ? std::min(gain, most) : gain; };
   StandController::Gains gains;
   for (std::size_t j = 0; j < kJointsPerLeg; ++j) {
-    gains.kp_nmprad[j] = within(kKp_nmprad, params.kp_most_nmprad[j]);
-    gains.kd_nmsprad[j] = within(gains.kp_nmprad[j] * kKd_nmsprad / kKp_nmprad, params.kd_most_nmsprad[j]);
+    gains.kp_nmprad[j] = within(params.holder_kp_nmprad, params.kp_most_nmprad[j]);
+    gains.kd_nmsprad[j] = within(kKdPerKp_s * gains.kp_nmprad[j], params.kd_most_nmsprad[j]);
   }
   return {standing_q_rad(), gains};
 }
@@ -172,8 +172,9 @@ JointSet SimRobot::try_write(const JointCommand& command) noexcept {
 }
 
 bool SimRobot::try_read(LioSample& sample) noexcept {
-  const std::int64_t latest_ns = clock_.now_ns() - kLioLatency_ticks * VirtualClock::kTick_ns;
-  if (lio_queue_.empty() || lio_queue_.oldest().stamp_ns > latest_ns) return false;
+  const double taken_s = error_params_.lio_delay_s - error_params_.lio_stamp_s;  // before its stamp it may not come
+  if (lio_queue_.empty() || clock_.now_ns() - lio_queue_.oldest().stamp_ns < std::llround(taken_s * kNsPerS))
+    return false;
   return lio_queue_.try_pop(sample);
 }
 

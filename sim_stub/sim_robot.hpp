@@ -95,7 +95,6 @@ class SimRobot final : public hal::Clock,
 
  private:
   static constexpr std::int64_t kLioPeriod_ticks = 50;
-  static constexpr std::int64_t kLioLatency_ticks = 50;
 
   [[nodiscard]] Vec3 push_force_n() const;
   void sense();

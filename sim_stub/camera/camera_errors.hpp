@@ -9,6 +9,7 @@ namespace polygmap::sim {
 struct CameraErrors {
   double drop_share = 0.0;
   double latency_s = 0.0;
+  double stamp_s = 0.0;
   double jitter_s = 0.0;
   double reorder_share = 0.0;
   double scan_s = 0.0;
@@ -24,6 +25,7 @@ struct CameraErrors {
   static void visit(auto& p, auto& field) {
     field("drop_share", p.drop_share, 0.0, 0.95, "Share of the frames that never come.");
     field("latency_s", p.latency_s, -0.01, 0.3, "By which every frame comes later than after 30 ms.");
+    field("stamp_s", p.stamp_s, -0.05, 0.05, "By which a frame's stamp is later than the middle of its exposure.");
     field("jitter_s", p.jitter_s, 0.0, 0.2, "By up to which a frame comes later still, evenly.");
     field("reorder_share", p.reorder_share, 0.0, 0.95, "Share of the frames that come after their successor.");
     field("scan_s", p.scan_s, -0.01, 0.03, "By which a frame takes longer than --scan-ms.");

@@ -97,7 +97,7 @@ void SimDepthCamera::expose() {
   if (frame_draws_.uniform(3 * static_cast<std::uint64_t>(frame) + 2) < options_.errors.drop_share) return;
   Slot& slot = free_slot();
   slot.state = SlotState::kExposed;
-  slot.stamp_ns = stamp_ns;
+  slot.stamp_ns = stamp_ns + std::llround(options_.errors.stamp_s * kNsPerS);
   slot.arrival_tick = arrival_tick(frame);
   slot.sequence = static_cast<std::uint32_t>(frame);
   std::uint16_t* depth = slot.depth.data();

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <cstdarg>
 #include <cstdio>
 
@@ -39,6 +40,30 @@ constexpr std::array<std::array<double, 3>, kJointsPerLeg> kLinkHalf_m{{{0.04, 0
                                                                         {0.02, 0.02, 0.02},
                                                                         {0.12, 0.04, 0.015}}};
 
+// A box; where the toe is round, boxes and upright cylinders in its corners, and where its ends are worn, both a little
+// higher there.
+void add_sole(Xml& xml, const char* side, const RobotErrors& errors, double ankle_to_sole_m) {
+  const SoleRectangle& sole = errors.sole.collision;
+  constexpr double kWorn_m = 0.004;
+  const double round_m = errors.toe_round_m, worn_m = errors.sole_edge_m;
+  const auto box = [&](double from_x_m, double to_x_m, double half_width_m, double above_m) {
+    xml.add("<geom class='%s' type='box' pos='%.9g 0 %.9g' size='%.9g %.9g %.9g'/>", side, 0.5 * (from_x_m + to_x_m),
+            0.5 * (kSoleThickness_m + above_m) - ankle_to_sole_m, 0.5 * (to_x_m - from_x_m), half_width_m,
+            0.5 * (kSoleThickness_m - above_m));
+  };
+  const auto outline = [&](double from_x_m, double to_x_m, double above_m) {
+    box(from_x_m, to_x_m - round_m, sole.half_width_m, above_m);
+    if (round_m == 0.0) return;
+    box(to_x_m - round_m, to_x_m, sole.half_width_m - round_m, above_m);
+    for (const double y_m : {sole.half_width_m - round_m, round_m - sole.half_width_m}) {
+      xml.add("<geom class='%s' type='cylinder' pos='%.9g %.9g %.9g' size='%.9g %.9g'/>", side, to_x_m - round_m, y_m,
+              0.5 * (kSoleThickness_m + above_m) - ankle_to_sole_m, round_m, 0.5 * (kSoleThickness_m - above_m));
+    }
+  };
+  outline(sole.heel_x_m + worn_m, sole.toe_x_m - worn_m, 0.0);
+  if (worn_m > 0.0) outline(sole.heel_x_m, sole.toe_x_m, kWorn_m);
+}
+
 void add_link(Xml& xml, Foot leg, std::size_t joint, const RobotErrors& errors, const MujocoPlant::Params& params) {
   const LegGeometry& g = errors.legs[index_of(leg)];
   constexpr std::array<const char*, kJointsPerLeg> kAxis{"1 0 0", "0 0 1", "0 1 0", "0 1 0", "0 1 0", "1 0 0"};
@@ -59,19 +84,16 @@ void add_link(Xml& xml, Foot leg, std::size_t joint, const RobotErrors& errors, 
         "frictionloss='0' solreflimit='0.002 1' solimplimit='0.99 0.999 0.0001'/>",
         joint_index(leg, joint), kAxis[joint], -0.5 * params.backlash_rad, 0.5 * params.backlash_rad);
   }
+  const double wide = std::sqrt(params.inertia_scale);
   xml.add("<geom class='mass' type='box' pos='%.9g %.9g %.9g' size='%g %g %g' mass='%.9g'/>", link.centre_m.x(),
-          sign * link.centre_m.y(), link.centre_m.z(), half[0], half[1], half[2], params.leg_mass_scale * link.mass_kg);
+          sign * link.centre_m.y(), link.centre_m.z(), wide * half[0], wide * half[1], wide * half[2],
+          params.leg_mass_scale * link.mass_kg);
   if (joint == kHipPitch || joint == kKnee) {
     const bool thigh = joint == kHipPitch;
     xml.add("<geom class='%s' type='capsule' fromto='0 0 0 0 0 %.9g' size='%g'/>", side,
             thigh ? -g.thigh_m : -g.shank_m, thigh ? nominal_robot().radii.thigh_m : nominal_robot().radii.shank_m);
   }
-  if (joint == kAnkleRoll) {
-    const SoleRectangle& sole = errors.sole.collision;
-    xml.add("<geom class='%s' name='%s_sole' type='box' pos='%.9g 0 %.9g' size='%.9g %.9g %.9g'/>", side, side,
-            sole.centre_x_m(), 0.5 * kSoleThickness_m - g.ankle_to_sole_m, 0.5 * sole.length_m(), sole.half_width_m,
-            0.5 * kSoleThickness_m);
-  }
+  if (joint == kAnkleRoll) add_sole(xml, side, errors, g.ankle_to_sole_m);
 }
 
 void add_solid(Xml& xml, const SolidBox& solid, std::size_t number) {
@@ -113,8 +135,10 @@ std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& wo
   for (const SolidBox& solid : stair_solids(world)) add_solid(xml, solid, number++);
   const LinkMass torso = nominal_robot().masses.torso;
   xml.add("<body name='base'><freejoint/>");
-  xml.add("<geom class='mass' type='box' pos='%.9g %.9g %.9g' size='0.1 0.17 0.28' mass='%.9g'/>",
-          torso.centre_m.x() + params.torso_offset_x_m, torso.centre_m.y(), torso.centre_m.z(),
+  const double wide = std::sqrt(params.inertia_scale);
+  xml.add("<geom class='mass' type='box' pos='%.9g %.9g %.9g' size='%.9g %.9g %.9g' mass='%.9g'/>",
+          torso.centre_m.x() + params.torso_offset_x_m, torso.centre_m.y() + params.torso_offset_y_m,
+          torso.centre_m.z() + params.torso_offset_z_m, wide * 0.1, wide * 0.17, wide * 0.28,
           params.torso_mass_scale * torso.mass_kg);
   xml.add("<geom class='torso' type='box' pos='%.9g %.9g %.9g' size='0.1 0.17 0.28'/>", torso.centre_m.x(),
           torso.centre_m.y(), torso.centre_m.z());

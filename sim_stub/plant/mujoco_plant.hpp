@@ -32,9 +32,11 @@ class MujocoPlant final : public Plant {
     double command_delay_s = 0.0;  // beyond the bus
     // Of either leg's drives, what a command's encoding ends at; 0: nowhere.
     std::array<double, kJointsPerLeg> kp_most_nmprad{}, kd_most_nmsprad{};
-    double torso_mass_scale = 1.0;   // against the mass that the module believes
-    double torso_offset_x_m = 0.0;   // of its centre, likewise
+    double torso_mass_scale = 1.0;  // against the mass that the module believes
+    double torso_offset_x_m = 0.0, torso_offset_y_m = 0.0, torso_offset_z_m = 0.0;  // of its centre, likewise
     double leg_mass_scale = 1.0;     // of every link of the legs, likewise
+    double inertia_scale = 1.0;      // of every link about its centre, likewise
+    double holder_kp_nmprad = 2000;  // of the drives of whoever holds the robot before the module and after it
     double contact_force_n = 10.0;   // a sole pressed less than this hangs in the air
     double max_tilt_rad = 0.8;       // of the base; beyond it the robot falls,
     double min_base_height_m = 0.3;  // or below this above its higher sole
@@ -57,6 +59,11 @@ class MujocoPlant final : public Plant {
             "A drive takes no more damping, from hip roll to ankle roll; 0: as much as it is told.");
       field("torso_mass_scale", p.torso_mass_scale, 0.3, 3.0, "True mass of the torso over the believed one.");
       field("torso_offset_x_m", p.torso_offset_x_m, -0.2, 0.2, "By which the torso's centre lies ahead.");
+      field("torso_offset_y_m", p.torso_offset_y_m, -0.2, 0.2, "By which the torso's centre lies to the left.");
+      field("torso_offset_z_m", p.torso_offset_z_m, -0.2, 0.2, "By which the torso's centre lies higher.");
+      field("inertia_scale", p.inertia_scale, 0.3, 3.0, "True inertias of the links about their centres.");
+      field("holder_kp_nmprad", p.holder_kp_nmprad, 150.0, 10000.0,
+            "Stiffness with which the robot is held before the module speaks and after it is silent.");
       field("leg_mass_scale", p.leg_mass_scale, 0.3, 3.0, "True masses of the legs' links over the believed ones.");
     }
   };

@@ -35,6 +35,8 @@ RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
     sole->heel_x_m -= params.heel_m;
     sole->half_width_m += 0.5 * params.sole_width_m;
   }
+  errors.toe_round_m = params.toe_round_m;
+  errors.sole_edge_m = params.sole_edge_m;
   for (std::size_t j = 0; j < kJointCount; ++j) {
     errors.encoder_offset_rad[static_cast<Eigen::Index>(j)] = params.encoder_offset_rad * offsets.normal(j);
   }

@@ -46,6 +46,13 @@ struct ErrorParams {
   double lio_sigma_scale = 1.0;      // true noise over the stated one
   double toe_m = 0.0, heel_m = 0.0;  // by which the foot is longer in front and behind
   double sole_width_m = 0.0;         // by which it is wider, both sides together
+  double toe_round_m = 0.0;          // radius of the toe's two corners, seen from above
+  double sole_edge_m = 0.0;          // of the sole's length, in front and behind, worn off its underside
+  double gyro_scale = 1.0, accel_scale = 1.0, foot_force_scale = 1.0;  // read over true
+  double imu_delay_s = 0.0;                                            // by which a sample is older than its stamp
+  double foot_force_delay_s = 0.006;
+  double lio_delay_s = 0.1;
+  double lio_stamp_s = 0.0;  // by which the stamp is later than the pose
 
   [[nodiscard]] static ErrorParams none() noexcept { return {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}; }
 
@@ -86,6 +93,17 @@ struct ErrorParams {
     field("toe_m", p.toe_m, -0.05, 0.05, "By which the foot is longer in front.");
     field("heel_m", p.heel_m, -0.05, 0.05, "By which the foot is longer behind.");
     field("sole_width_m", p.sole_width_m, -0.03, 0.03, "By which the foot is wider, both sides together.");
+    field("toe_round_m", p.toe_round_m, 0.0, 0.045, "Radius of the toe's two corners, seen from above.");
+    field("sole_edge_m", p.sole_edge_m, 0.0, 0.02,
+          "Of the sole's length, in front and behind, worn off its underside.");
+    field("gyro_scale", p.gyro_scale, 0.9, 1.1, "What the gyroscope reads over the true rate.");
+    field("accel_scale", p.accel_scale, 0.9, 1.1, "What the accelerometer reads over the true specific force.");
+    field("imu_delay_s", p.imu_delay_s, 0.0, 0.05,
+          "By which a sample is older than its stamp, in whole ticks of 2 ms.");
+    field("foot_force_scale", p.foot_force_scale, 0.5, 1.5, "What a foot force reads over the true one.");
+    field("foot_force_delay_s", p.foot_force_delay_s, 0.0, 0.05, "Of a foot force, in whole ticks of 2 ms.");
+    field("lio_delay_s", p.lio_delay_s, 0.0, 0.4, "From a scan to its pose's arrival.");
+    field("lio_stamp_s", p.lio_stamp_s, -0.05, 0.05, "By which a pose's stamp is later than its scan.");
   }
 };
 
@@ -93,6 +111,7 @@ struct ErrorParams {
 struct RobotErrors {
   std::array<LegGeometry, kFootCount> legs{nominal_robot().legs, nominal_robot().legs};  // true lengths
   SoleModel sole = nominal_robot().sole;
+  double toe_round_m = 0.0, sole_edge_m = 0.0;           // as ErrorParams has them
   JointVector encoder_offset_rad = JointVector::Zero();  // encoder reading minus true angle
   Mat3 base_R_imu = Mat3::Identity();
   Vec3 gyro_bias_radps = Vec3::Zero();

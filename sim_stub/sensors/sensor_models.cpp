@@ -8,6 +8,16 @@
 #include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
+namespace {
+
+// The sample of so long ago, in whole ticks; the oldest where there is none so old.
+template <class T, std::size_t N>
+const T& late(const RingBuffer<T, N>& history, double delay_s, double tick_s) {
+  const auto ticks = static_cast<std::size_t>(std::lround(delay_s / tick_s));
+  return history[history.size() - 1 - std::min(ticks, history.size() - 1)];
+}
+
+}  // namespace
 
 ImuModel::ImuModel(const ErrorParams& params, const RobotErrors& errors, std::uint64_t seed,
                    const Transform& true_T_base)
@@ -28,12 +38,14 @@ ImuSample ImuModel::sample(const Transform& true_T_base, std::int64_t stamp_ns, 
 
   const Mat3 imu_R_base = errors_.base_R_imu.transpose();
   ImuSample sample;
-  sample.stamp_ns = stamp_ns;
-  sample.gyro_radps =
-      imu_R_base * base_w + errors_.gyro_bias_radps + params_.gyro_noise_radps * gyro_noise_.normal3(index_);
-  sample.accel_mps2 =
-      imu_R_base * base_f + errors_.accel_bias_mps2 + params_.accel_noise_mps2 * accel_noise_.normal3(index_);
+  sample.gyro_radps = params_.gyro_scale * (imu_R_base * base_w) + errors_.gyro_bias_radps +
+                      params_.gyro_noise_radps * gyro_noise_.normal3(index_);
+  sample.accel_mps2 = params_.accel_scale * (imu_R_base * base_f) + errors_.accel_bias_mps2 +
+                      params_.accel_noise_mps2 * accel_noise_.normal3(index_);
   ++index_;
+  history_.push_overwrite(sample);
+  sample = late(history_, params_.imu_delay_s, tick_s);
+  sample.stamp_ns = stamp_ns;
   return sample;
 }
 
@@ -69,11 +81,12 @@ std::array<double, kFootCount> FootForceModel::sample(const std::array<double, k
           (true_sole_z_m_[2][f] - 2.0 * true_sole_z_m_[1][f] + true_sole_z_m_[0][f]) / (tick_s * tick_s);
       felt_n[f] -= params_.foot_force_mass_kg * up_mps2;
     }
+    felt_n[f] *= params_.foot_force_scale;
     felt_n[f] += params_.foot_force_offset_n[f] + params_.foot_force_noise_n * noise_.normal(index_ * kFootCount + f);
   }
   ++index_;
   history_.push_overwrite(felt_n);
-  return history_.oldest();
+  return late(history_, params_.foot_force_delay_s, tick_s);
 }
 
 JointVector TorqueModel::sample(const JointVector& drive_tau_nm, const JointVector& dq_radps) {
@@ -108,7 +121,7 @@ LioSample LioModel::sample(const Transform& true_T_base, std::int64_t stamp_ns) 
   const Vec3 turn_rad = scale * params_.lio_rotation_rad * rotation_noise_.normal3(index_);
   const Transform noise{rotation_z(turn_rad.z()) * rotation_y(turn_rad.y()) * rotation_x(turn_rad.x()), Vec3::Zero()};
   LioSample sample;
-  sample.stamp_ns = stamp_ns;
+  sample.stamp_ns = stamp_ns + std::llround(params_.lio_stamp_s * kNsPerS);
   sample.lio_T_lidar = errors_.lio_T_true * drifted(true_T_base, stamp_ns) * errors_.base_T_lidar * noise;
   sample.lio_T_lidar.p_m += scale * params_.lio_position_m * position_noise_.normal3(index_);
   constexpr double kLeastSigma = 1e-3;  // no odometry claims to be perfect

@@ -23,6 +23,7 @@ class ImuModel {
   const RobotErrors& errors_;
   CounterNoise gyro_noise_, accel_noise_;
   std::uint64_t index_ = 0;
+  RingBuffer<ImuSample, 32> history_;
   Transform previous_;
   Vec3 previous_velocity_mps_ = Vec3::Zero();
 };
@@ -42,7 +43,7 @@ class JointModel {
   JointVector last_q_rad_ = JointVector::Zero();  // as read
 };
 
-// Vertical forces as the feet's sensors report them 6 ms later. The foot below its sensor is felt when it moves.
+// Vertical forces as the feet's sensors report them, late. The foot below its sensor is felt when it moves.
 class FootForceModel {
  public:
   FootForceModel(const ErrorParams& params, std::uint64_t seed) : params_(params), noise_(seed, Stream::kFootForces) {}
@@ -51,11 +52,10 @@ class FootForceModel {
                                                       double tick_s);
 
  private:
-  static constexpr std::size_t kDelay_ticks = 3;
   ErrorParams params_;
   CounterNoise noise_;
   std::uint64_t index_ = 0;
-  RingBuffer<std::array<double, kFootCount>, kDelay_ticks + 1> history_;
+  RingBuffer<std::array<double, kFootCount>, 32> history_;
   RingBuffer<std::array<double, kFootCount>, 3> true_sole_z_m_;
 };
 

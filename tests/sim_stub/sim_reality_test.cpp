@@ -141,6 +141,34 @@ TEST(RealityFootForce, FootThatIsLiftedQuickly_IsFeltByItsMass) {
   EXPECT_EQ(felt_n[1], 0.0);
 }
 
+TEST(RealityFootForce, ScaleAndDelay_AreOnTheContactForce) {
+  ErrorParams params = ErrorParams::none();
+  params.foot_force_scale = 1.1;
+  params.foot_force_delay_s = 0.010;
+  FootForceModel forces(params, 1);
+  for (int i = 0; i < 20; ++i) (void)forces.sample({0.0, 0.0}, {0.0, 0.0}, kPlantTick_s);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(forces.sample({100.0, 0.0}, {0.0, 0.0}, kPlantTick_s)[0], 0.0);
+  EXPECT_NEAR(forces.sample({100.0, 0.0}, {0.0, 0.0}, kPlantTick_s)[0], 110.0, 1e-9);
+}
+
+TEST(RealityImu, ScalesAndDelay_AreOnRateAndForce) {
+  ErrorParams params = ErrorParams::none();
+  params.gyro_scale = 1.01;
+  params.accel_scale = 0.98;
+  params.imu_delay_s = 0.006;
+  const RobotErrors errors = draw_errors(params, 1);
+  ImuModel imu(params, errors, 1, Transform{});
+  std::vector<ImuSample> samples;
+  for (int i = 1; i <= 40; ++i) {  // it turns from the twentieth tick on
+    samples.push_back(imu.sample({rotation_z(0.001 * std::max(0, i - 20)), Vec3::Zero()}, i, kPlantTick_s));
+    EXPECT_EQ(samples.back().stamp_ns, i);
+  }
+  EXPECT_NEAR(samples.back().gyro_radps.z(), 1.01 * 0.5, 1e-9);
+  EXPECT_NEAR(samples.back().accel_mps2.z(), 0.98 * kGravity_mps2, 1e-9);
+  const auto first = std::ranges::find_if(samples, [](const ImuSample& s) { return s.gyro_radps.z() > 0.1; });
+  EXPECT_EQ(first - samples.begin(), 20 + 3);
+}
+
 TEST(RealityEncoders, Steps_RoundTheAngleAndSpeedIsTheDifferenceOfTwo) {
   Reality reality = plain();
   reality.sensors.encoder_step_rad = 0.00175;
@@ -181,6 +209,22 @@ TEST(RealityLio, DriftAndJump_MoveThePoseAwayFromTheTruth) {
   EXPECT_NEAR(off_m.x(), 0.01 * run_s, 0.003);
   EXPECT_NEAR(off_m.y(), 0.3, 0.003);
   EXPECT_NEAR(turned_rad, 0.02 * run_s, 0.003);
+}
+
+TEST(RealityLio, DelayAndStamp_AreWhenAPoseComesAndWhatItSaysOfItsScan) {
+  Reality reality = plain();
+  reality.sensors.lio_delay_s = 0.130;
+  reality.sensors.lio_stamp_s = 0.010;
+  StandingRobot standing(reality);
+  int poses = 0;
+  for (int i = 0; i < 300; ++i) {
+    (void)standing.next();
+    LioSample sample;
+    if (!standing.robot.try_read(sample)) continue;
+    ++poses;
+    EXPECT_NEAR(seconds(standing.robot.now_ns() - sample.stamp_ns), 0.120, 1e-6);
+  }
+  EXPECT_GT(poses, 3);
 }
 
 // The ankle of a lifted foot gets a torque of its own: what differs is what the joint has in it.
@@ -279,6 +323,31 @@ TEST(RealityGround, LongerTimeConstant_SoleSinksDeeper) {
   };
   EXPECT_LT(sunk_m(0.008), 5e-4);
   EXPECT_GT(sunk_m(0.040), 3e-3);
+}
+
+// A stiff robot that is pushed harder and harder that way tips over the edge of its soles.
+double tipping_force_n(const Vec3& direction, double round_m, double edge_m) {
+  Reality reality = plain();
+  reality.sensors.toe_round_m = round_m;
+  reality.sensors.sole_edge_m = edge_m;
+  StandingRobot standing(reality);
+  for (int i = 0; i < 300; ++i) (void)standing.next();
+  EXPECT_NEAR(standing.robot.truth().true_T_sole[0].p_m.z(), 0.0, 1e-3);
+  double force_n = 20.0;
+  constexpr double kTilted = 0.03;  // of the sole, ahead
+  for (; standing.robot.truth().true_T_sole[0].R(2, 0) > -kTilted && force_n < 400.0; force_n += 0.04) {
+    standing.robot.plant().push(force_n * direction.normalized());
+    (void)standing.next();
+  }
+  return force_n;
+}
+
+TEST(RealityFoot, WornEndsAndRoundToe_TipOverEarlierWhereTheyAreMissing) {
+  const Vec3 ahead{1, 0, 0}, aslant{1, 1, 0};
+  const double ahead_n = tipping_force_n(ahead, 0.0, 0.0), aslant_n = tipping_force_n(aslant, 0.0, 0.0);
+  EXPECT_LT(tipping_force_n(ahead, 0.0, 0.015) / ahead_n, 0.98);
+  EXPECT_NEAR(tipping_force_n(ahead, 0.04, 0.0) / ahead_n, 1.0, 0.02);
+  EXPECT_LT(tipping_force_n(aslant, 0.04, 0.0) / aslant_n, 0.98);
 }
 
 TEST(RealityFoot, LongerToe_IsInTheJudgementOfItsMargin) {

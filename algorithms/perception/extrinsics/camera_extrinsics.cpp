@@ -66,6 +66,7 @@ void CameraExtrinsicsEstimator::update(const SurfaceFrame& frame, const Stance& 
   learn_x(stance, dt_s);
   const Level level = level_of(stance);
   if (try_learn_tilt(frame, stance, level, dt_s)) learn_height(frame, stance, level, dt_s);
+  place_x();
   place(level.up);
 }
 
@@ -164,21 +165,39 @@ void CameraExtrinsicsEstimator::place(const Vec3& base_level) noexcept {
 }
 
 void CameraExtrinsicsEstimator::learn_x(const Stance& stance, double dt_s) noexcept {
-  double sum_m = 0.0, information = 0.0;
+  bool seen = false;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     const std::optional<ToeSighting>& toe = stance.toes[foot];
     if (!stance.stands[foot] || !toe || !std::isfinite(toe->ahead_m) || !std::isfinite(toe->sigma_m)) continue;
     // The toe is in the last rows of a image: a base that moves alike in many frames shows it off alike in all.
     const double variance_m2 = math::square(params_.frame_x_sigma_m) + math::square(toe->sigma_m) +
                                params_.frames_alike * math::square(params_.half_scan_s * stance.speed_mps);
-    sum_m += toe->ahead_m / variance_m2;
-    information += 1.0 / variance_m2;
+    above_toes_m_ = (nominal_.p_m - stance.base_T_sole[foot].p_m).dot(stance.base_up);
+    const double untilted_x_m = x_m_ - toe->ahead_m - above_toes_m_ * tilt_rad_.y();
+    FadingMean<double>& mean = x_[foot];
+    const double fade = math::exp(-dt_s / params_.window_s);
+    mean.information = fade * mean.information + 1.0 / variance_m2;
+    mean.weighted = fade * mean.weighted + untilted_x_m / variance_m2;
+    seen = true;
   }
-  if (!(information > 0.0)) return;
-  ++counters_.toes;
-  const double variance_m2 =
-      fuse(x_, x_m_ - sum_m / information, math::exp(-dt_s / params_.window_s), information, params_.prior.x_sigma_m);
-  x_m_ = math::clamp(variance_m2 * x_.weighted, -params_.max_x_m, params_.max_x_m);
+  if (seen) ++counters_.toes;
+}
+
+// The toes tell a sum: where the mount is and both legs have the feet, as long as the feet are as the data sheet says,
+// and half of what the legs are apart, which is the other way in the other foot.
+void CameraExtrinsicsEstimator::place_x() noexcept {
+  const double mount_m2 = math::square(params_.prior.x_sigma_m) + math::square(above_toes_m_ * tilt_sigma_rad());
+  const double common_m2 = mount_m2 + math::square(params_.prior.toe_sigma_m);
+  const double apart_m2 = math::square(0.5 * params_.prior.legs_apart_sigma_m);
+  const double off_m = above_toes_m_ * tilt_rad_.y();  // by the tilt as it is believed now
+  const double own = (common_m2 + apart_m2) / (4.0 * common_m2 * apart_m2);
+  const double other = (apart_m2 - common_m2) / (4.0 * common_m2 * apart_m2);
+  const Mat2 information{{own + x_[0].information, other}, {other, own + x_[1].information}};
+  const Vec2 told{x_[0].weighted + x_[0].information * off_m, x_[1].weighted + x_[1].information * off_m};
+  const Vec2 by_toe_m = information.inverse() * told;
+  x_m_ = math::clamp(mount_m2 / common_m2 * 0.5 * by_toe_m.sum(), -params_.max_x_m, params_.max_x_m);
+  const double half_m = math::clamp(0.5 * (by_toe_m[1] - by_toe_m[0]), -params_.max_x_m, params_.max_x_m);
+  feet_ahead_m_ = {half_m, -half_m};
 }
 
 }  // namespace polygmap

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the camera really sits on the base: roll, pitch and height, found slowly from the ground that the robot stands
 // on, and how far ahead, from the toes that it sees. A mount is known to a degree at best, and a degree is 13 mm at the
-// camera's height. Yaw and the place sideways stay as the data sheet says.
+// camera's height. What one leg is off ahead of the other is found by their toes, too. Yaw and the place sideways stay
+// as the data sheet says.
 #pragma once
 
 #include <array>
@@ -22,12 +23,17 @@ class CameraExtrinsicsEstimator {
     double tilt_sigma_rad = 0.0175;
     double height_sigma_m = 0.005;
     double x_sigma_m = 0.003;
+    double toe_sigma_m = 0.002;
+    double legs_apart_sigma_m = 0.0025;
 
     static void visit(auto& p, auto& field) {
       field("tilt_sigma_rad", p.tilt_sigma_rad, 1e-5, 0.2, "Roll and pitch of the mount, by the data sheet.");
       field("height_sigma_m", p.height_sigma_m, 1e-5, 0.1, "Height of the mount, by the data sheet.");
       field("x_sigma_m", p.x_sigma_m, 1e-5, 0.1,
-            "The mount's place ahead by the data sheet, and where encoders and leg lengths have a foot.");
+            "The mount's place ahead by the data sheet, and where encoders and leg lengths have both feet.");
+      field("toe_sigma_m", p.toe_sigma_m, 1e-5, 0.1, "Length of both feet ahead of the ankle, by the data sheet.");
+      field("legs_apart_sigma_m", p.legs_apart_sigma_m, 1e-5, 0.1,
+            "Where encoders and leg lengths have one foot ahead of the other.");
     }
   };
   struct Params {
@@ -126,6 +132,8 @@ class CameraExtrinsicsEstimator {
   [[nodiscard]] double height_m() const noexcept { return height_m_; }
   // Along the ground. What legs and encoders are off goes into it: a foot put down by them meets what the camera saw.
   [[nodiscard]] double x_m() const noexcept { return x_m_; }
+  // By how much each foot truly stands ahead of where the encoders have it, beside what both do: as much the other way.
+  [[nodiscard]] const std::array<double, kFootCount>& feet_ahead_m() const noexcept { return feet_ahead_m_; }
   // One sigma of roll and pitch: what of the data sheet's error is left, and what frames err by alike: the surfaces
   // that were seen, and what told which way is up.
   [[nodiscard]] double tilt_sigma_rad() const noexcept;
@@ -136,7 +144,7 @@ class CameraExtrinsicsEstimator {
   template <typename T>
   struct FadingMean {
     double information = 0.0;
-    T weighted;
+    T weighted{};
   };
   // Puts one value of a frame into a mean; its variance, the prior's information included.
   template <typename T>
@@ -175,6 +183,7 @@ class CameraExtrinsicsEstimator {
   [[nodiscard]] bool try_height(const SurfaceFrame& frame, const Vec3& camera_p_sole, const Vec3& up,
                                 double& height_m) const noexcept;
   void learn_x(const Stance& stance, double dt_s) noexcept;
+  void place_x() noexcept;
   void place(const Vec3& base_level) noexcept;
 
   Params params_;
@@ -185,7 +194,10 @@ class CameraExtrinsicsEstimator {
   double x_m_ = 0.0;
   FadingMean<Vec2> tilt_{0.0, Vec2::Zero()};
   FadingMean<double> height_{0.0, 0.0};
-  FadingMean<double> x_{0.0, 0.0};
+  // By each foot's toe, the place ahead that a camera without any tilt of its own would have.
+  std::array<FadingMean<double>, kFootCount> x_{};
+  double above_toes_m_ = 0.0;  // of the camera, by the last sighting
+  std::array<double, kFootCount> feet_ahead_m_{};
   double seen_as_well_ = 0.0;  // 1/rad^2, of level by its surfaces: mean of the frames that the tilt is made of
   double by_gravity_ = 0.0;    // share of that information whose level was gravity's
   std::int64_t last_ns_ = 0;

@@ -405,6 +405,24 @@ TEST_F(FootholdSearchTest, CubeBetweenTheFeet_TheyStandAsWithoutIt) {
   }
 }
 
+TEST_F(FootholdSearchTest, FootThatStandsAheadOfWhereItIsTold_IsToldFartherBackOnBothTreads) {
+  Stairs s;
+  s.yaw_rad = 0.3;
+  const MapSnapshot map = ideal_map(s);
+  FootholdSearch::Query query = standing(s, 0);
+  const FootholdSet without = search(map, query);
+  query.feet_ahead_m = {0.003, -0.003};
+  const FootholdSet& with = search(map, query);
+  ASSERT_TRUE(with.has_p_star_star);
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    const Vec3 back_m = -query.feet_ahead_m[foot] * rotation_z(s.yaw_rad).col(0);
+    EXPECT_LT((with.p_star_feet[foot].position_m - without.p_star_feet[foot].position_m - back_m).norm(), 1e-9);
+    EXPECT_LT((with.p_star_star_feet[foot].position_m - without.p_star_star_feet[foot].position_m - back_m).norm(),
+              1e-9);
+    EXPECT_EQ(with.p_star_feet[foot].nosing_distance_m, without.p_star_feet[foot].nosing_distance_m);
+  }
+}
+
 TEST_F(FootholdSearchTest, CubeAtTheOuterSideOfAFoot_BothMoveAwayFromIt) {
   const Stairs s;
   MapSnapshot map = ideal_map(s);

@@ -39,11 +39,14 @@ class Robot {
     patch.area_m2 = 0.3;
     ASSERT_TRUE(frame_.surfaces.try_push_back(patch));
   }
-  // A standing foot's toe, where it is; the picture shows the mount's error as the toe's.
-  void detect_toe(const CameraExtrinsicsEstimator& mount, std::size_t foot, double noise_m = 0.0) {
+  // A standing foot's toe, as far ahead of where encoders and data sheet have it; the picture shows the mount's error
+  // as the toe's, and what the mount is tilted by at the height of the feet.
+  void detect_toe(const CameraExtrinsicsEstimator& mount, std::size_t foot, double noise_m = 0.0,
+                  double ahead_m = 0.0) {
     std::normal_distribution<> noise(0.0, noise_m);
-    const double off_m = true_mount_.p_m.x() - mount.base_T_camera().p_m.x();
-    stance_.toes[foot] = ToeSighting{-off_m + (noise_m > 0.0 ? noise(random_) : 0.0), 0.0006};
+    const Vec3 camera_p_toe = true_mount_.inverse() * stance_.base_T_sole[foot].p_m;
+    const double seen_m = (mount.base_T_camera() * camera_p_toe - stance_.base_T_sole[foot].p_m).x();
+    stance_.toes[foot] = ToeSighting{ahead_m + seen_m + (noise_m > 0.0 ? noise(random_) : 0.0), 0.0006};
   }
   SurfacePatch& last() { return frame_.surfaces.back(); }
   CameraExtrinsicsEstimator::Stance& stance() { return stance_; }
@@ -62,6 +65,12 @@ class Robot {
 };
 
 CameraExtrinsicsEstimator estimator() { return {CameraExtrinsicsEstimator::Params{}, base_T_camera()}; }
+// That has no doubt of its feet's length.
+CameraExtrinsicsEstimator sure_of_its_feet() {
+  CameraExtrinsicsEstimator::Params params;
+  params.prior.toe_sigma_m = 1e-5;
+  return {params, base_T_camera()};
+}
 
 TEST(CameraExtrinsicsEstimator, TiltedAndRaisedMount_FoundWithinATenthOfADegreeAndAMillimetre) {
   for (const double sign : {1.0, -1.0}) {
@@ -290,7 +299,7 @@ TEST(CameraExtrinsicsEstimator, GravityOffByHalfADegree_SolesSayWhatIsLevel) {
 
 TEST(CameraExtrinsicsEstimator, CameraAheadOfItsPlace_FoundByTheToes) {
   for (const double off_m : {-0.004, 0.004}) {
-    CameraExtrinsicsEstimator mount = estimator();
+    CameraExtrinsicsEstimator mount = sure_of_its_feet();
     Robot robot(0.0, 0.0, {off_m, 0.0, 0.0});
     for (int i = 0; i < 30; ++i) {
       robot.see(0.0);
@@ -301,7 +310,7 @@ TEST(CameraExtrinsicsEstimator, CameraAheadOfItsPlace_FoundByTheToes) {
     EXPECT_NEAR(mount.base_T_camera().p_m.x() - base_T_camera().p_m.x(), mount.x_m(), 1e-9);
     EXPECT_EQ(mount.counters().toes, 30U);
     // Frames in which no surface is seen tell of the toes all the same.
-    CameraExtrinsicsEstimator blind = estimator();
+    CameraExtrinsicsEstimator blind = sure_of_its_feet();
     for (int i = 0; i < 30; ++i) {
       robot.detect_toe(blind, 1, 0.001);
       robot.deliver(blind);
@@ -311,19 +320,75 @@ TEST(CameraExtrinsicsEstimator, CameraAheadOfItsPlace_FoundByTheToes) {
 }
 
 TEST(CameraExtrinsicsEstimator, ToeSeenFarOffOrWhileTheBaseMoves_MovesTheCameraNoFartherThanTheBoundsOrLittle) {
-  CameraExtrinsicsEstimator far = estimator(), moving = estimator();
+  CameraExtrinsicsEstimator far = sure_of_its_feet(), moving = sure_of_its_feet();
   Robot robot(0.0, 0.0, {0.05, 0.0, 0.0}), other(0.0, 0.0, {0.004, 0.0, 0.0});
   for (int i = 0; i < 300; ++i) {
     robot.detect_toe(far, 0);
     robot.deliver(far);
   }
   EXPECT_NEAR(far.x_m(), 0.010, 1e-9);
+  for (int i = 0; i < 60; ++i) {  // before its tilt is known a toe decides alone
+    other.see(0.0);
+    other.deliver(moving);
+  }
   other.stance().speed_mps = 0.3;
   for (int i = 0; i < 10; ++i) {
     other.detect_toe(moving, 0);
     other.deliver(moving);
   }
   EXPECT_LT(std::abs(moving.x_m()), 0.002);
+}
+
+// What both toes say may be the camera or the feet: the camera gets its share by what is known of either.
+TEST(CameraExtrinsicsEstimator, ToesOfUnknownLength_CameraGetsItsShare) {
+  CameraExtrinsicsEstimator mount = estimator();
+  Robot robot(0.0, 0.0, {0.004, 0.0, 0.0});
+  for (int i = 0; i < 300; ++i) {
+    robot.see(0.0);
+    for (std::size_t foot = 0; foot < kFootCount; ++foot) robot.detect_toe(mount, foot);
+    robot.deliver(mount);
+  }
+  const CameraExtrinsicsEstimator::PriorParams prior;
+  const double mount_m2 = math::square(prior.x_sigma_m) + math::square(0.95 * mount.tilt_sigma_rad());
+  const double share = mount_m2 / (mount_m2 + math::square(prior.toe_sigma_m));
+  EXPECT_GT(share, 0.5);
+  EXPECT_LT(share, 0.9);
+  EXPECT_NEAR(mount.x_m(), share * 0.004, 3e-4);
+}
+
+TEST(CameraExtrinsicsEstimator, ToesApart_TellWhichFootStandsAheadAndLeaveTheCamera) {
+  CameraExtrinsicsEstimator mount = estimator(), one_foot = estimator();
+  Robot robot(0.0, 0.0, Vec3::Zero());
+  for (int i = 0; i < 300; ++i) {
+    robot.detect_toe(mount, 0, 0.0, 0.003);
+    robot.detect_toe(mount, 1, 0.0, -0.003);
+    robot.deliver(mount);
+    robot.detect_toe(one_foot, 1, 0.0, -0.003);
+    robot.deliver(one_foot);
+  }
+  EXPECT_NEAR(mount.feet_ahead_m()[0], 0.003, 2e-4);
+  EXPECT_NEAR(mount.feet_ahead_m()[1], -0.003, 2e-4);
+  EXPECT_NEAR(mount.x_m(), 0.0, 2e-4);
+  // Of one foot alone nobody knows whether it is ahead of the other.
+  EXPECT_LT(std::abs(one_foot.feet_ahead_m()[1]), 0.0005);
+}
+
+// A toe that was seen long ago stays where it was seen when the tilt is learnt anew.
+TEST(CameraExtrinsicsEstimator, TiltLearntAfterTheToes_TheirPlaceIsKept) {
+  CameraExtrinsicsEstimator mount = sure_of_its_feet();
+  const double pitch_rad = 0.4 * kDegree;
+  Robot robot(0.0, pitch_rad, {0.002, 0.0, 0.0});
+  for (int i = 0; i < 60; ++i) {  // before any surface tells of the tilt
+    for (std::size_t foot = 0; foot < kFootCount; ++foot) robot.detect_toe(mount, foot);
+    robot.deliver(mount);
+  }
+  EXPECT_EQ(mount.pitch_rad(), 0.0);
+  for (int i = 0; i < 300; ++i) {
+    robot.see(0.0);
+    robot.deliver(mount);
+  }
+  EXPECT_NEAR(mount.pitch_rad(), pitch_rad, 0.1 * pitch_rad);
+  EXPECT_NEAR(mount.x_m(), 0.002, 0.0012);
 }
 
 TEST(CameraExtrinsicsEstimator, ToeOfAFootInTheAirOrNoNumber_TellsNothing) {
