@@ -327,7 +327,7 @@ TEST(CameraExtrinsicsEstimator, ToeSeenFarOffOrWhileTheBaseMoves_MovesTheCameraN
     robot.deliver(far);
   }
   EXPECT_NEAR(far.x_m(), 0.010, 1e-9);
-  for (int i = 0; i < 60; ++i) {  // before its tilt is known a toe decides alone
+  for (int i = 0; i < 150; ++i) {  // before its tilt is known a toe decides alone
     other.see(0.0);
     other.deliver(moving);
   }
@@ -336,7 +336,7 @@ TEST(CameraExtrinsicsEstimator, ToeSeenFarOffOrWhileTheBaseMoves_MovesTheCameraN
     other.detect_toe(moving, 0);
     other.deliver(moving);
   }
-  EXPECT_LT(std::abs(moving.x_m()), 0.002);
+  EXPECT_LT(std::abs(moving.x_m()), 0.0025);  // the mount is 5 mm vague at the height of the feet
 }
 
 // What both toes say may be the camera or the feet: the camera gets its share by what is known of either.
