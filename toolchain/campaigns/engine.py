@@ -58,9 +58,10 @@ class Figure:
         return {"value": self.value, "measured": self.text, "at": self.at, "asked": self.asked, "bound": bound}
 
 
-def headline(what, figure, unit="", shown=True):
-    """One line of README's table. One that is not shown is held to its bound all the same."""
-    return {"what": what, "figures": [figure.row()], "unit": unit, "shown": shown}
+def headline(what, figures, unit="", shown=True):
+    """One line of README's table, of one figure or a list. One that is not shown is held to its bound all the same."""
+    figures = figures if isinstance(figures, list) else [figures]
+    return {"what": what, "figures": [figure.row() for figure in figures], "unit": unit, "shown": shown}
 
 
 @dataclasses.dataclass
