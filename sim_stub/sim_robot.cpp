@@ -172,7 +172,7 @@ JointSet SimRobot::try_write(const JointCommand& command) noexcept {
 }
 
 bool SimRobot::try_read(LioSample& sample) noexcept {
-  const double taken_s = error_params_.lio_delay_s - error_params_.lio_stamp_s;  // before its stamp it may not come
+  const double taken_s = error_params_.lio_delay_s - error_params_.lio_stamp_s;  // by its stamp
   if (lio_queue_.empty() || clock_.now_ns() - lio_queue_.oldest().stamp_ns < std::llround(taken_s * kNsPerS))
     return false;
   return lio_queue_.try_pop(sample);

@@ -2,6 +2,7 @@
 #include "sim_stub/plant/mujoco_model.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdarg>
@@ -45,7 +46,8 @@ constexpr std::array<std::array<double, 3>, kJointsPerLeg> kLinkHalf_m{{{0.04, 0
 void add_sole(Xml& xml, const char* side, const RobotErrors& errors, double ankle_to_sole_m) {
   const SoleRectangle& sole = errors.sole.collision;
   constexpr double kWorn_m = 0.004;
-  const double round_m = errors.toe_round_m, worn_m = errors.sole_edge_m;
+  constexpr double kLeast_m = 1e-3;  // of a box's half width
+  const double round_m = std::min(errors.toe_round_m, sole.half_width_m - kLeast_m), worn_m = errors.sole_edge_m;
   const auto box = [&](double from_x_m, double to_x_m, double half_width_m, double above_m) {
     xml.add("<geom class='%s' type='box' pos='%.9g 0 %.9g' size='%.9g %.9g %.9g'/>", side, 0.5 * (from_x_m + to_x_m),
             0.5 * (kSoleThickness_m + above_m) - ankle_to_sole_m, 0.5 * (to_x_m - from_x_m), half_width_m,

@@ -350,6 +350,16 @@ TEST(RealityFoot, WornEndsAndRoundToe_TipOverEarlierWhereTheyAreMissing) {
   EXPECT_LT(tipping_force_n(aslant, 0.04, 0.0) / aslant_n, 0.98);
 }
 
+// Narrower than its toe is round, at the ends of both ranges.
+TEST(RealityFoot, RoundestToeOfTheNarrowestSole_IsABodyThatStands) {
+  Reality reality = plain();
+  EXPECT_EQ(set_item(reality, "sensors.toe_round_m=0.045"), "");
+  EXPECT_EQ(set_item(reality, "sensors.sole_width_m=-0.03"), "");
+  StandingRobot standing(reality);
+  for (int i = 0; i < 300; ++i) (void)standing.next();
+  EXPECT_FALSE(standing.robot.truth().fell);
+}
+
 TEST(RealityFoot, LongerToe_IsInTheJudgementOfItsMargin) {
   const RobotErrors longer = [] {
     ErrorParams params = ErrorParams::none();

@@ -113,7 +113,9 @@ struct FootholdSet {
   Foothold p_star;                // eq. 26: on the nearest tread higher than the stance
   bool has_p_star = false;
   bool has_p_star_star = false;
-  std::array<Foothold, kFootCount> p_star_feet;       // p* spread to left and right sole, both on the same tread
+  // p* spread to left and right sole, both on the same tread. Their position_m is where a foot is told to go, which is
+  // back from where it will stand by FootholdSearch::Query::feet_ahead_m; all else is of where it will stand.
+  std::array<Foothold, kFootCount> p_star_feet;
   std::array<Foothold, kFootCount> p_star_star_feet;  // p** likewise, on the tread after p*'s
   TreadView tread;                                    // of p*
   StopReason obstruction = StopReason::kNothingSeen;

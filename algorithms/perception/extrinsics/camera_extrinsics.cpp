@@ -2,6 +2,7 @@
 #include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace polygmap {
 namespace {
@@ -165,20 +166,25 @@ void CameraExtrinsicsEstimator::place(const Vec3& base_level) noexcept {
 }
 
 void CameraExtrinsicsEstimator::learn_x(const Stance& stance, double dt_s) noexcept {
+  const double fade = math::exp(-dt_s / params_.window_s);
   bool seen = false;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     const std::optional<ToeSighting>& toe = stance.toes[foot];
     if (!stance.stands[foot] || !toe || !std::isfinite(toe->ahead_m) || !std::isfinite(toe->sigma_m)) continue;
+    // What the other toe told fades as well: else all that has changed since would seem to be between the legs.
+    if (!std::exchange(seen, true)) {
+      for (ToeMean& mean : toes_) {
+        mean = {fade * mean.information, fade * mean.weighted_m, fade * mean.weighted_above_m};
+      }
+    }
     // The toe is in the last rows of a image: a base that moves alike in many frames shows it off alike in all.
     const double variance_m2 = math::square(params_.frame_x_sigma_m) + math::square(toe->sigma_m) +
                                params_.frames_alike * math::square(params_.half_scan_s * stance.speed_mps);
-    above_toes_m_ = (nominal_.p_m - stance.base_T_sole[foot].p_m).dot(stance.base_up);
-    const double untilted_x_m = x_m_ - toe->ahead_m - above_toes_m_ * tilt_rad_.y();
-    FadingMean<double>& mean = x_[foot];
-    const double fade = math::exp(-dt_s / params_.window_s);
-    mean.information = fade * mean.information + 1.0 / variance_m2;
-    mean.weighted = fade * mean.weighted + untilted_x_m / variance_m2;
-    seen = true;
+    above_toes_m_ = (nominal_.p_m - stance.base_T_sole[foot] * toe->sole_p_edge_m).dot(stance.base_up);
+    ToeMean& mean = toes_[foot];
+    mean.information += 1.0 / variance_m2;
+    mean.weighted_m += (x_m_ - toe->ahead_m - above_toes_m_ * tilt_rad_.y()) / variance_m2;
+    mean.weighted_above_m += above_toes_m_ / variance_m2;
   }
   if (seen) ++counters_.toes;
 }
@@ -189,14 +195,14 @@ void CameraExtrinsicsEstimator::place_x() noexcept {
   const double mount_m2 = math::square(params_.prior.x_sigma_m) + math::square(above_toes_m_ * tilt_sigma_rad());
   const double common_m2 = mount_m2 + math::square(params_.prior.toe_sigma_m);
   const double apart_m2 = math::square(0.5 * params_.prior.legs_apart_sigma_m);
-  const double off_m = above_toes_m_ * tilt_rad_.y();  // by the tilt as it is believed now
   const double own = (common_m2 + apart_m2) / (4.0 * common_m2 * apart_m2);
   const double other = (apart_m2 - common_m2) / (4.0 * common_m2 * apart_m2);
-  const Mat2 information{{own + x_[0].information, other}, {other, own + x_[1].information}};
-  const Vec2 told{x_[0].weighted + x_[0].information * off_m, x_[1].weighted + x_[1].information * off_m};
-  const Vec2 by_toe_m = information.inverse() * told;
+  const auto told = [this](const ToeMean& mean) { return mean.weighted_m + mean.weighted_above_m * tilt_rad_.y(); };
+  const Mat2 information{{own + toes_[0].information, other}, {other, own + toes_[1].information}};
+  const Vec2 by_toe_m = information.inverse() * Vec2{told(toes_[0]), told(toes_[1])};
   x_m_ = math::clamp(mount_m2 / common_m2 * 0.5 * by_toe_m.sum(), -params_.max_x_m, params_.max_x_m);
-  const double half_m = math::clamp(0.5 * (by_toe_m[1] - by_toe_m[0]), -params_.max_x_m, params_.max_x_m);
+  const double most_m = 3.0 * math::sqrt(apart_m2);
+  const double half_m = math::clamp(0.5 * (by_toe_m[1] - by_toe_m[0]), -most_m, most_m);
   feet_ahead_m_ = {half_m, -half_m};
 }
 

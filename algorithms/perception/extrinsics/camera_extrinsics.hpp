@@ -24,7 +24,7 @@ class CameraExtrinsicsEstimator {
     double height_sigma_m = 0.005;
     double x_sigma_m = 0.003;
     double toe_sigma_m = 0.002;
-    double legs_apart_sigma_m = 0.0025;
+    double legs_apart_sigma_m = 0.0025;  // 2 mrad of each encoder at hips and knees, 0.8 and 0.4 m above the sole
 
     static void visit(auto& p, auto& field) {
       field("tilt_sigma_rad", p.tilt_sigma_rad, 1e-5, 0.2, "Roll and pitch of the mount, by the data sheet.");
@@ -130,7 +130,8 @@ class CameraExtrinsicsEstimator {
   [[nodiscard]] double roll_rad() const noexcept { return tilt_rad_.x(); }
   [[nodiscard]] double pitch_rad() const noexcept { return tilt_rad_.y(); }
   [[nodiscard]] double height_m() const noexcept { return height_m_; }
-  // Along the ground. What legs and encoders are off goes into it: a foot put down by them meets what the camera saw.
+  // Along the ground. What both legs and their encoders are off goes into it, since a foot put down by them is to meet
+  // what the camera saw; of what a foot is longer than its data sheet as little as the prior lets.
   [[nodiscard]] double x_m() const noexcept { return x_m_; }
   // By how much each foot truly stands ahead of where the encoders have it, beside what both do: as much the other way.
   [[nodiscard]] const std::array<double, kFootCount>& feet_ahead_m() const noexcept { return feet_ahead_m_; }
@@ -144,7 +145,7 @@ class CameraExtrinsicsEstimator {
   template <typename T>
   struct FadingMean {
     double information = 0.0;
-    T weighted{};
+    T weighted;
   };
   // Puts one value of a frame into a mean; its variance, the prior's information included.
   template <typename T>
@@ -194,9 +195,13 @@ class CameraExtrinsicsEstimator {
   double x_m_ = 0.0;
   FadingMean<Vec2> tilt_{0.0, Vec2::Zero()};
   FadingMean<double> height_{0.0, 0.0};
-  // By each foot's toe, the place ahead that a camera without any tilt of its own would have.
-  std::array<FadingMean<double>, kFootCount> x_{};
-  double above_toes_m_ = 0.0;  // of the camera, by the last sighting
+  // By each foot's toe, the place ahead that a camera without any tilt of its own would have, and the height above the
+  // toe, by which a tilt changes that place.
+  struct ToeMean {
+    double information = 0.0, weighted_m = 0.0, weighted_above_m = 0.0;
+  };
+  std::array<ToeMean, kFootCount> toes_{};
+  double above_toes_m_ = 0.0;  // at the last sighting
   std::array<double, kFootCount> feet_ahead_m_{};
   double seen_as_well_ = 0.0;  // 1/rad^2, of level by its surfaces: mean of the frames that the tilt is made of
   double by_gravity_ = 0.0;    // share of that information whose level was gravity's

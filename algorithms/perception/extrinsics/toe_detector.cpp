@@ -115,7 +115,8 @@ std::optional<ToeSighting> ToeDetector::sighting() noexcept {
   if (inliers < least_lines || 3 * inliers < 2 * static_cast<int>(ends_m_.size())) return std::nullopt;
   const double mean_m = sum / inliers;
   const double variance_m2 = std::max(0.0, squares / inliers - mean_m * mean_m);
-  return ToeSighting{mean_m, std::max(params_.least_sigma_m, math::sqrt(variance_m2 / inliers))};
+  return ToeSighting{mean_m, std::max(params_.least_sigma_m, math::sqrt(variance_m2 / inliers)),
+                     first_m_ + kStep_m * (kOnFoot + kSearch) * Vec3::UnitX()};
 }
 
 }  // namespace polygmap

@@ -39,6 +39,7 @@ struct ToeDetectorParams {
 struct ToeSighting {
   double ahead_m = 0.0;  // by how much the toe is seen ahead of where the encoders have it, along the sole's x axis
   double sigma_m = 0.0;  // of the image alone
+  Vec3 sole_p_edge_m = Vec3::Zero();  // middle of the upper edge that was seen, where the data sheet has it
 };
 
 // Follows lines along the foot's upper face over its front edge, beyond which depth jumps; nothing is seen where too
