@@ -142,7 +142,7 @@ class FootholdSearch {
     std::array<Transform, kFootCount> odom_T_sole;
     Foot stance = Foot::kLeft;  // the foot that stays
     bool climbing = false;      // a tread has been climbed already
-    // By how much each foot stands ahead of where it is told to: a foothold of its is told as much farther back.
+    // By how much each foot stands ahead of where it is told to: its footholds are told as much farther back.
     std::array<double, kFootCount> feet_ahead_m{};
   };
   struct Counters {

@@ -294,6 +294,14 @@ TEST(RealityDrive, TorqueLag_FollowsWithItsTimeConstant) {
   EXPECT_NEAR(standing.next().tau_nm[kHipYaw] - before_nm, 1.0 - std::exp(-1.1), 0.06);
 }
 
+TEST(RealityBody, LargerInertia_TheSameTorqueTurnsTheFootLess) {
+  MujocoPlant::Params params;
+  params.armature_kgm2 = 0.001;
+  const double usual_rad = ankle_after(params, 0.2, 20);
+  params.inertia_scale = 3.0;
+  EXPECT_LT(std::abs(ankle_after(params, 0.2, 20)), 0.9 * std::abs(usual_rad));
+}
+
 TEST(RealityDrive, FrictionOfAJoint_HoldsASmallTorque) {
   MujocoPlant::Params params;
   EXPECT_GT(std::abs(ankle_after(params, 0.5, 20)), 1e-4);

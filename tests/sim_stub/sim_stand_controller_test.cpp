@@ -26,6 +26,20 @@ TEST(StandController, GainsOfARealRobot_KeepItStandingStill) {
   EXPECT_LT((robot.truth().true_p_com_m - com_m).norm(), 0.005);
 }
 
+TEST(StandController, SofterHolder_GivesWayFartherAndHolds) {
+  const auto moved_m = [](double holder_kp_nmprad) {
+    SimOptions options = standing({});
+    options.mujoco.holder_kp_nmprad = holder_kp_nmprad;
+    SimRobot robot(options);
+    const Vec3 com_m = robot.truth().true_p_com_m;
+    robot.plant().push({15.0, 0.0, 0.0});
+    for (int i = 0; i < 300; ++i) robot.advance();
+    EXPECT_FALSE(robot.truth().fell);
+    return (robot.truth().true_p_com_m - com_m).norm();
+  };
+  EXPECT_GT(moved_m(150.0), 1.2 * moved_m(2000.0));
+}
+
 TEST(StandController, CommandThatAsksNothing_DoesNotTakeOver) {
   SimRobot robot(standing(kKuavo_nmprad));
   for (int i = 0; i < 1000; ++i) {

