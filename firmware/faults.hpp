@@ -75,6 +75,8 @@ namespace polygmap {
     "The operator asked for what the module did not do; the answer says why.")                                      \
   X(117, kImuTurned, "imu_turned",                                                                                  \
     "Soles and weight say that the IMU is not mounted as configured: its samples are turned.")                      \
+  X(118, kPictureBad, "picture_bad",                                                                                \
+    "The last pictures had no depth on much of the way ahead, or were noisier than the camera is to be.")           \
   X(130, kDriveClamped, "drive_clamped", "A command's value was beyond its drive's range and became the nearest end.")
 
 #define POLYGMAP_ENUMERATOR(number, code, name, text) code = number,

@@ -7,6 +7,7 @@
 #include "algorithms/foothold/foothold_search.hpp"
 #include "algorithms/gait/gait.hpp"
 #include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
+#include "algorithms/perception/image/picture_monitor.hpp"
 #include "algorithms/perception/map/polygon_map.hpp"
 #include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/robot_model.hpp"
@@ -21,6 +22,7 @@ struct Params {
   RobotModel robot;
   Estimator::Params estimator;
   SurfaceExtractor::Params surfaces;
+  PictureMonitor::Params pictures;
   CameraExtrinsicsEstimator::Params mount;
   PolygonMap::Params map;
   FootholdSearch::Params footholds;
@@ -40,6 +42,7 @@ struct Params {
     field("robot", p.robot);
     field("estimator", p.estimator);
     field("surfaces", p.surfaces);
+    field("pictures", p.pictures);
     field("mount", p.mount);
     field("map", p.map);
     field("footholds", p.footholds);

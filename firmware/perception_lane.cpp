@@ -11,6 +11,7 @@ constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers w
 
 // In instructions, by what they copy and go through.
 constexpr std::int32_t kLearnMount = 2500, kLearnPerSurface = 60;
+constexpr std::int32_t kJudgePicture = PictureMonitor::kInstructions;
 constexpr std::int32_t kBeginMap = 16'000, kMapPerSurface = 60;
 constexpr std::int32_t kBeginSearch = 16'000, kSearchPerPolygon = 20;
 
@@ -24,6 +25,7 @@ PerceptionLane::PerceptionLane(hal::DepthCamera& camera, ControlPerceptionLink& 
       params_(params),
       intrinsics_(camera.intrinsics()),
       extractor_(params.surfaces),
+      pictures_(params.pictures),
       mount_(params.mount, params.robot.mounts.base_T_camera),
       map_(params.map),
       search_(params.footholds, params.robot.sole) {}
@@ -112,17 +114,34 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
   if (params_.estimate_mount && !learn_some(budget)) return Progress::kBusy;
   const auto count = static_cast<std::int32_t>(extractor_.result().surfaces.size());
   finish_picture(now_ns);
-  budget.spend(units_of(kBeginMap + count * kMapPerSurface));
+  budget.spend(units_of(kJudgePicture + kBeginMap + count * kMapPerSurface));
   return Progress::kDone;
 }
 
 void PerceptionLane::finish_picture(std::int64_t now_ns) noexcept {
+  judge_picture(now_ns);
   camera_port_.release();
   health_.own.follow(Limit::kSegmentsFull, now_ns, extractor_.counters().segment_overflow);
   health_.own.follow(Limit::kPlanesFull, now_ns, extractor_.counters().plane_overflow);
   if (watcher_ != nullptr) watcher_->surfaces.publish(now_ns, extractor_.result());
   begin_map(now_ns);
   stage_ = FrameStage::kWaiting;
+}
+
+void PerceptionLane::judge_picture(std::int64_t now_ns) noexcept {
+  const StateEstimate& state = exposure_state_;
+  const Transform odom_T_way{rotation_z(yaw_of(state.odom_T_base.R)),
+                             0.5 * (state.odom_T_sole[0].p_m + state.odom_T_sole[1].p_m)};
+  const Transform odom_T_camera = state.odom_T_base * mount_.base_T_camera();
+  pictures_.take(frame_, intrinsics_, depth_range(), odom_T_camera.inverse() * odom_T_way,
+                 extractor_.noise().sigma_m(1.0) / params_.surfaces.noise.sigma_m(1.0));
+  if (pictures_.is_bad()) health_.own.raise(Limit::kPictureBad, now_ns);
+}
+
+RawRange PerceptionLane::depth_range() const noexcept {
+  RawRange range;
+  range.set(params_.surfaces.limits, intrinsics_.depth_unit_m);
+  return range;
 }
 
 void PerceptionLane::begin_learning() noexcept {
@@ -142,9 +161,7 @@ void PerceptionLane::begin_learning() noexcept {
 
 void PerceptionLane::begin_toe() noexcept {
   if (learning_.foot == kFootCount) return;
-  RawRange range;
-  range.set(params_.surfaces.limits, intrinsics_.depth_unit_m);
-  learning_.toe.begin(params_.mount.toe, frame_, intrinsics_, range, params_.robot.sole,
+  learning_.toe.begin(params_.mount.toe, frame_, intrinsics_, depth_range(), params_.robot.sole,
                       mount_.base_T_camera().inverse() * learning_.stance.base_T_sole[learning_.foot]);
 }
 
@@ -217,7 +234,12 @@ Progress PerceptionLane::footholds(std::int64_t now_ns, WorkBudget& budget) noex
   }
   if (!searching_.now) return Progress::kIdle;
   const Progress progress = search_.step(budget);
-  if (progress == Progress::kDone) link_.footholds.publish(now_ns, search_.result());
+  if (progress == Progress::kDone) {
+    FootholdSet& told = link_.footholds.back();
+    told = search_.result();
+    told.obstruction = pictures_.explain(told.obstruction, link_.search_context.front().climbing);
+    link_.footholds.publish(now_ns);
+  }
   if (progress != Progress::kBusy) searching_.now = false;
   return progress;
 }

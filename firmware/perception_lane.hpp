@@ -5,6 +5,7 @@
 #include "algorithms/core/work.hpp"
 #include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
 #include "algorithms/perception/extrinsics/toe_detector.hpp"
+#include "algorithms/perception/image/picture_monitor.hpp"
 #include "firmware/lane_link.hpp"
 #include "firmware/params.hpp"
 #include "hal/ports/depth_camera.hpp"
@@ -28,6 +29,7 @@ class PerceptionLane {
   [[nodiscard]] const MapSnapshot& map_snapshot() const noexcept { return map_.snapshot(); }
   [[nodiscard]] const CameraExtrinsicsEstimator& mount() const noexcept { return mount_; }
   [[nodiscard]] const SurfaceExtractor& extractor() const noexcept { return extractor_; }
+  [[nodiscard]] const PictureMonitor& pictures() const noexcept { return pictures_; }
   [[nodiscard]] const PolygonMap& polygon_map() const noexcept { return map_; }
   [[nodiscard]] const FootholdSearch& foothold_search() const noexcept { return search_; }
   [[nodiscard]] const Health& faults() const noexcept { return health_.own; }  // of this lane
@@ -40,6 +42,8 @@ class PerceptionLane {
   void look_across(std::int64_t now_ns) noexcept;
   void begin_extraction(std::int64_t now_ns) noexcept;
   void begin_map(std::int64_t now_ns) noexcept;
+  void judge_picture(std::int64_t now_ns) noexcept;
+  [[nodiscard]] RawRange depth_range() const noexcept;
   void begin_learning() noexcept;
   void begin_toe() noexcept;
   [[nodiscard]] bool learn_some(WorkBudget& budget) noexcept;  // of the mount; true when the picture says no more
@@ -66,6 +70,7 @@ class PerceptionLane {
   std::int64_t last_frame_ns_ = -1;           // taken; from the start until there is one
   std::uint32_t request_ = 0;                 // number of the last pose request
   SurfaceExtractor extractor_;
+  PictureMonitor pictures_;
   CameraExtrinsicsEstimator mount_;
   struct {  // what the picture says of the mount
     CameraExtrinsicsEstimator::Stance stance;

@@ -89,7 +89,7 @@ struct ErrorParams {
     field("depth_scale", p.depth_scale, 0.0, 0.1, "Half range of the camera's scale error.");
     field("camera_mount_rad", p.camera_mount_rad, 0.0, 0.1, "Half range of the camera's mount, per axis.");
     field("camera_mount_m", p.camera_mount_m, 0.0, 0.05, "Half range of the camera's place, per axis.");
-    field("depth_noise", p.depth_noise, 0.0, 3.0, "Depth noise over the believed one.");
+    field("depth_noise", p.depth_noise, 0.0, 20.0, "Depth noise over the believed one.");
     field("toe_m", p.toe_m, -0.05, 0.05, "By which the foot is longer in front.");
     field("heel_m", p.heel_m, -0.05, 0.05, "By which the foot is longer behind.");
     field("sole_width_m", p.sole_width_m, -0.03, 0.03, "By which the foot is wider, both sides together.");

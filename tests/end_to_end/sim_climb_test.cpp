@@ -211,7 +211,23 @@ TEST(ClimbCausality, BlankDepth_NoStepOntoAnythingAndTheReasonIsNamed) {
   EXPECT_FALSE(summary.fell);
   EXPECT_EQ(steps_onto_treads(summary), 0);
   EXPECT_EQ(summary.ended_by, "module");
-  EXPECT_NE(summary.reason.find("saw no surface"), std::string::npos) << summary.reason;
+  EXPECT_NE(summary.reason.find("measured no depth"), std::string::npos) << summary.reason;
+}
+
+TEST(ClimbCausality, SunOnTheLowerTreads_NoStepOntoAnythingAndTheReasonIsThePicture) {
+  ClimbOptions options = options_of(1, 3);
+  options.reality.camera.sun_patch_m = 1.0;
+  const ClimbSummary summary = climb(options);
+  EXPECT_EQ(steps_onto_treads(summary), 0);
+  EXPECT_NE(summary.reason.find("measured no depth"), std::string::npos) << summary.reason;
+}
+
+TEST(ClimbCausality, NoiseBeyondTheCameras_NoStepOntoAnythingAndTheReasonIsTheNoise) {
+  ClimbOptions options = options_of(4, 3);
+  options.reality.sensors.depth_noise = 10.0;
+  const ClimbSummary summary = climb(options);
+  EXPECT_EQ(steps_onto_treads(summary), 0);
+  EXPECT_NE(summary.reason.find("too noisy"), std::string::npos) << summary.reason;
 }
 
 TEST(ClimbCausality, StepMissingFromThePicture_ClimbsUpToItAndNamesTheRiseBeyond) {

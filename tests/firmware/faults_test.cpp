@@ -17,6 +17,7 @@ static_assert(static_cast<int>(Limit::kFrameLost) == 114 && static_cast<int>(Lim
 static_assert(static_cast<int>(Fault::kDriveSilent) == 30 && static_cast<int>(Fault::kFeetSilent) == 37);
 static_assert(static_cast<int>(Fault::kJointOutOfRange) == 39);
 static_assert(static_cast<int>(Fault::kDriveHot) == 40);
+static_assert(static_cast<int>(Limit::kPictureBad) == 118);
 static_assert(static_cast<int>(Limit::kFrameLost) == 114 && static_cast<int>(Limit::kDriveClamped) == 130);
 static_assert(kFaultTable.front().code == Fault::kCycleOverrun && kLimitTable.back().code == Limit::kDriveClamped);
 

@@ -44,6 +44,9 @@ enum class StopReason : std::uint8_t {
   kMapStale,       // the newest fused frame is too old
   kEdgeUncertain,  // the foot fits the next tread, but not with its edges known so vaguely
   kObstacle,       // something stands on the next tread or before it, and both feet do not fit beside it
+  // Where the search found no way, and the pictures may be why (PictureMonitor).
+  kDepthMissing,   // too little of the way ahead has depth
+  kDepthNoisy,     // the depths are noisier than what the parameters allow for
   kLegsCannot,     // the legs cannot do the next step: of this rise when it is a leading one, 0 otherwise
   kUnsteady,       // what the search offers keeps changing
   kNotLinedUp,     // so many steps on the floor, and it does not stand straight before the stairs
@@ -76,6 +79,8 @@ inline constexpr std::array kStopReasonTable{
     StopReasonInfo{"map_stale", "its map was stale"},
     StopReasonInfo{"edge_uncertain", "it knew the edges of the next tread too vaguely"},
     StopReasonInfo{"obstacle", "something stood where its feet would have gone next"},
+    StopReasonInfo{"depth_missing", "its camera measured no depth on too much of the way ahead"},
+    StopReasonInfo{"depth_noisy", "its camera's depth was too noisy to find the next tread"},
     StopReasonInfo{"legs_cannot", "its legs could not do the next step"},
     StopReasonInfo{"unsteady", "what it saw kept changing"},
     StopReasonInfo{"not_lined_up", "it did not come to stand straight before the stairs"},

@@ -243,7 +243,9 @@ bool ClimbPlanner::close_up(const Situation& situation) noexcept {
 
 // From nearer by, an edge that is known too vaguely may be known better: no reason against the walk up.
 StopReason ClimbPlanner::reason_against(const Situation& situation, const FootholdSet& footholds) const noexcept {
-  if (footholds.map_stamp_ns <= 0) return StopReason::kNothingSeen;
+  if (footholds.map_stamp_ns <= 0) {
+    return footholds.obstruction == StopReason::kNone ? StopReason::kNothingSeen : footholds.obstruction;
+  }
   if (situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) return StopReason::kMapStale;
   const bool walks_up = footholds.obstruction == StopReason::kEdgeUncertain && treads_climbed_ == 0;
   if (footholds.obstruction != StopReason::kNone && !walks_up) return footholds.obstruction;

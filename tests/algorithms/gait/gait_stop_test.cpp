@@ -54,7 +54,8 @@ TEST(GaitStop, AskedToStopAfterTheClimbsEnd_SaysWhoAsked) {
 TEST(GaitStop, EveryObstructionAfterTheFirstTread_StandsOnBothFeet) {
   for (const StopReason obstruction :
        {StopReason::kNothingSeen, StopReason::kNoStaircase, StopReason::kTop, StopReason::kRiseTooHigh,
-        StopReason::kTreadTooShort, StopReason::kTooNarrow, StopReason::kMapStale, StopReason::kEdgeUncertain}) {
+        StopReason::kTreadTooShort, StopReason::kTooNarrow, StopReason::kMapStale, StopReason::kEdgeUncertain,
+        StopReason::kDepthMissing, StopReason::kDepthNoisy}) {
     IdealClimb climb({});
     climb.tamper = [&](StateEstimate&, FootholdSet& set, JointFeedback&) {
       if (climb.status().treads_climbed == 0) return;

@@ -89,7 +89,8 @@ TEST(SingleStepGait, BetweenPassingSteps_WeightGoesStraightOn) {
 TEST(SingleStepGait, NextTreadObstructedOnTheWay_EndsBesideTheFrontFoot) {
   for (const StopReason obstruction :
        {StopReason::kNothingSeen, StopReason::kTop, StopReason::kRiseTooHigh, StopReason::kTreadTooShort,
-        StopReason::kTooNarrow, StopReason::kMapStale, StopReason::kEdgeUncertain}) {
+        StopReason::kTooNarrow, StopReason::kMapStale, StopReason::kEdgeUncertain, StopReason::kDepthMissing,
+        StopReason::kDepthNoisy}) {
     IdealClimb climb({}, single_step());
     climb.tamper = [&](StateEstimate&, FootholdSet& set, JointFeedback&) {
       if (treads_of(climb).size() < 2) return;
