@@ -211,7 +211,7 @@ void Gait::advance(const GaitInput& in) noexcept {
   if (std::exchange(restarts_, false)) state_.emplace<Standing>().begin(in, gait);
   enter(in, gait, tick_state(in, gait));
   // Thrown, the body lifts a foot that was to stand. A foot that it leaves as planned needs no hold.
-  const bool thrown = memory_.aborted_swings > 0 || in.odom_dcm_error_m.norm() > params_.steady_m;
+  const bool thrown = memory_.aborted_swings > 0 || in.odom_dcm_error_m.norm() > params_.landed_foot.thrown_m;
   if (thrown && status_.phase == GaitPhase::kDoubleSupport && in.usable && !in.held) {
     plan_.hold_lifted_foot(params_.landed_foot, in.state, in.feedback, in.now_ns);
   }
