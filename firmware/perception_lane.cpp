@@ -44,7 +44,7 @@ Progress PerceptionLane::intake(std::int64_t now_ns) noexcept {
     }
     last_frame_ns_ = now_ns;
     // The map was shed since the last picture: another one would be looked at for nothing, in time that is short.
-    if (mapping_) {
+    if (pending_.mapping) {
       camera_port_.release();
       health_.own.raise(Limit::kFrameLost, now_ns);
       return Progress::kIdle;
@@ -194,18 +194,18 @@ void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior.tilt_sigma_rad);
   view.columns = &extractor_.segmenter().image().columns;  // no next picture before the map is done, see intake()
   map_.begin(extractor_.result(), view);
-  mapping_ = true;
+  pending_.mapping = true;
   const PolygonMap::Counters& counters = map_.counters();
   const std::uint32_t lost = counters.abandoned_frames + counters.stale_frames + counters.rejected_frames;
   health_.own.follow(Limit::kFrameLost, now_ns, lost);
 }
 
 Progress PerceptionLane::map(std::int64_t now_ns, WorkBudget& budget) noexcept {
-  if (!mapping_) return Progress::kIdle;
+  if (!pending_.mapping) return Progress::kIdle;
   const Progress progress = map_.step(budget);
   if (progress != Progress::kBusy) {
-    mapping_ = false;
-    searching_.due = true;
+    pending_.mapping = false;
+    pending_.search_due = true;
     health_.own.follow(Limit::kMapFull, now_ns, map_.counters().evicted + map_.counters().refused);
     if (watcher_ != nullptr) watcher_->map.publish(now_ns, map_.snapshot());
   }
@@ -222,17 +222,17 @@ void PerceptionLane::begin_search() noexcept {
   query.climbing = context.climbing;
   query.feet_ahead_m = mount_.feet_ahead_m();
   search_.begin(map_.snapshot(), query);
-  searching_.due = false;
-  searching_.now = true;
+  pending_.search_due = false;
+  pending_.searching = true;
 }
 
 Progress PerceptionLane::footholds(std::int64_t now_ns, WorkBudget& budget) noexcept {
-  if (!searching_.now && searching_.due) {
+  if (!pending_.searching && pending_.search_due) {
     begin_search();
     budget.spend(
         units_of(kBeginSearch + kSearchPerPolygon * static_cast<std::int32_t>(map_.snapshot().polygons.size())));
   }
-  if (!searching_.now) return Progress::kIdle;
+  if (!pending_.searching) return Progress::kIdle;
   const Progress progress = search_.step(budget);
   if (progress == Progress::kDone) {
     FootholdSet& told = link_.footholds.back();
@@ -240,7 +240,7 @@ Progress PerceptionLane::footholds(std::int64_t now_ns, WorkBudget& budget) noex
     told.obstruction = pictures_.explain(told.obstruction, link_.search_context.front().climbing);
     link_.footholds.publish(now_ns);
   }
-  if (progress != Progress::kBusy) searching_.now = false;
+  if (progress != Progress::kBusy) pending_.searching = false;
   return progress;
 }
 

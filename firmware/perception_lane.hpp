@@ -60,10 +60,9 @@ class PerceptionLane {
   // The next frame is extracted while the last one is still being searched.
   LaneView view_;
   FrameStage stage_ = FrameStage::kWaiting;
-  bool mapping_ = false;
   struct {
-    bool due = false, now = false;
-  } searching_;
+    bool mapping = false, search_due = false, searching = false;
+  } pending_;
   DepthFrameView frame_;
   StateEstimate exposure_state_;
   std::array<LegShapes, kFootCount> body_{};  // camera frame, at the exposure
