@@ -151,6 +151,7 @@ struct LandedFootParams {
   double pressed_n = 100.0;
   double lifted_n = 40.0;
   double thrown_m = 0.03;
+  double caught_m = 0.01;
   std::int64_t hold_ns = 200 * kNsPerMs;
   std::int64_t felt_hold_ns = 600 * kNsPerMs;
   double unloaded_n = 5.0;
@@ -163,10 +164,9 @@ struct LandedFootParams {
     field("lifted_n", p.lifted_n, 0.0, 500.0,
           "After a foot went back, and while the body is thrown, one of the two that is pressed less is held: the body "
           "lifted it.");
-    field(
-        "thrown_m", p.thrown_m, 0.001, 0.5,
-        "The body is thrown while the divergent component's error is larger. Feet that are held are planned elsewhere "
-        "to each other than they stand, as far as the body is off its plan.");
+    field("thrown_m", p.thrown_m, 0.001, 0.5, "The divergent component's error is larger once the body is thrown.");
+    field("caught_m", p.caught_m, 0.001, 0.5, "It is smaller once the body is thrown no more.");
+    field.ordered("caught_m", "thrown_m");
     field("hold_ns", p.hold_ns, 0, 5000000000,
           "A landed foot is held no longer where its force told nothing of the ground: it may be the sensor.");
     field("felt_hold_ns", p.felt_hold_ns, 0, 5000000000,
