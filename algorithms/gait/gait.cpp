@@ -35,7 +35,7 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
   memory_.toes_calibrated = params.standing.toe_calibration.ticks <= 0;
   status_ = {};
   state_.emplace<Standing>();
-  armed_ = placed_ = started_ = thrown_ = leg_impaired_ = lost_in_swing_ = restarts_ = false;
+  armed_ = placed_ = started_ = leg_impaired_ = lost_in_swing_ = restarts_ = false;
   may_step_ = true;
   last_tick_ns_ = 0;
   stop_requested_ = StopReason::kNone;
@@ -62,7 +62,7 @@ JointSet Gait::joints_away(const JointVector& q_rad) const noexcept {
 bool Gait::try_restart(const JointVector& q_rad) noexcept {
   if (!joints_away(q_rad).is_empty()) return false;
   stop_requested_ = StopReason::kNone;
-  thrown_ = leg_impaired_ = lost_in_swing_ = false;
+  leg_impaired_ = lost_in_swing_ = false;
   memory_ = {.toes_calibrated = memory_.toes_calibrated,
              .left_R_right_met = memory_.left_R_right_met,
              .soft_ground = memory_.soft_ground};
@@ -212,8 +212,9 @@ void Gait::advance(const GaitInput& in) noexcept {
   enter(in, gait, tick_state(in, gait));
   // Thrown, the body lifts a foot that was to stand. A foot that it leaves as planned needs no hold.
   const LandedFootParams& landed = params_.landed_foot;
-  thrown_ = in.odom_dcm_error_m.norm() > (thrown_ ? landed.caught_m : landed.thrown_m);
-  if ((thrown_ || memory_.aborted_swings > 0) && status_.phase == GaitPhase::kDoubleSupport && in.usable && !in.held) {
+  memory_.thrown = in.odom_dcm_error_m.norm() > (memory_.thrown ? landed.caught_m : landed.thrown_m);
+  if ((memory_.thrown || memory_.aborted_swings > 0) && status_.phase == GaitPhase::kDoubleSupport && in.usable &&
+      !in.held) {
     plan_.hold_lifted_foot(params_.landed_foot, in.state, in.feedback, in.now_ns);
   }
   plan_.hold_landed_foot(params_.landed_foot, in.feedback, in.now_ns);

@@ -79,7 +79,6 @@ class Gait {
   bool armed_ = false;          // the joint angles are known
   bool placed_ = false;         // so is how the body leans
   bool started_ = false;        // and where it is
-  bool thrown_ = false;         // the body, by the error of its divergent component
   bool leg_impaired_ = false;   // a drive or a foot was silent so long that the gait stops, whatever it says later
   bool lost_in_swing_ = false;  // so was the estimate; the foot in the air came down all the same
   bool restarts_ = false;       // with the next tick

@@ -39,6 +39,7 @@ struct GaitMemory {
   bool rests_first = false;                  // the next step begins from rest between the feet
   std::int32_t refusals = 0;                 // of steps that the legs could not do, since the last swing
   std::uint32_t aborted_swings = 0;          // since the last foot that landed
+  bool thrown = false;                       // the body, by the error of its divergent component
   bool toes_calibrated = false;              // stood tall for it, or need not
   Mat3 left_R_right_met = Mat3::Identity();  // of the soles, when the gait was armed
   bool soft_ground = false;                  // it gave way under them before the standstill was over
