@@ -15,6 +15,7 @@ class PictureMonitor {
   struct Params {
     double from_m = 0.25, to_m = 1.15;
     double half_width_m = 0.25;
+    // Chosen in the simulation (2026-11-28), and tried on no camera.
     double most_missing = 0.3;
     double most_noise = 3.0;
     double gain = 0.1;
