@@ -217,6 +217,9 @@ void Gait::advance(const GaitInput& in) noexcept {
       !in.held) {
     plan_.hold_lifted_foot(params_.landed_foot, in.state, in.feedback, in.now_ns);
   }
+  if (status_.phase == GaitPhase::kDoubleSupport && in.usable && !in.held) {
+    plan_.settle_feet_apart(params_.feet_apart, in.state, in.feedback);
+  }
   plan_.hold_landed_foot(params_.landed_foot, in.feedback, in.now_ns);
   follow_state(in, gait);
   if (!in.held) plan_.count_tick();

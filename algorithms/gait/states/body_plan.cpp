@@ -160,4 +160,19 @@ void BodyPlan::release_landed_foot() noexcept {
   landed_.release();
 }
 
+void BodyPlan::settle_feet_apart(const FeetApartParams& params, const StateEstimate& state,
+                                 const JointFeedback& feedback) noexcept {
+  const std::array<double, kFootCount>& force_n = feedback.foot_force_n;
+  if (landed_.held() || !(force_n[0] > params.pressed_n && force_n[1] > params.pressed_n)) return;
+  const Mat3 plan_R_odom = odom_T_plan().R.transpose();
+  const Vec3 seen_m = plan_R_odom * (state.odom_T_sole[0].p_m - state.odom_T_sole[1].p_m);
+  const Vec2 off_m = (seen_m - (plan_T_sole_[0].p_m - plan_T_sole_[1].p_m)).head<2>();
+  const double beyond_m = off_m.norm() - params.least_m;
+  if (!(beyond_m > 0.0)) return;
+  const double by_m = std::min(params.most_mps, beyond_m / params.time_s) * kTick_s;
+  const Vec2 half_m = 0.5 * by_m * off_m.normalized();
+  plan_T_sole_[0].p_m.head<2>() += half_m;
+  plan_T_sole_[1].p_m.head<2>() -= half_m;
+}
+
 }  // namespace polygmap

@@ -61,6 +61,10 @@ class BodyPlan {
                         std::int64_t now_ns) noexcept;
   void hold_landed_foot(const LandedFootParams& params, const JointFeedback& feedback, std::int64_t now_ns) noexcept;
   void release_landed_foot() noexcept;
+  // Two feet that both carry are planned to stand to each other as the estimate has them; their middle stays where it
+  // is planned. What both are off alike is no error of theirs: a body that leans has its feet elsewhere.
+  void settle_feet_apart(const FeetApartParams& params, const StateEstimate& state,
+                         const JointFeedback& feedback) noexcept;
 
   [[nodiscard]] const Transform& plan_T_base() const noexcept { return plan_T_base_; }
   [[nodiscard]] const std::array<Transform, kFootCount>& plan_T_sole() const noexcept { return plan_T_sole_; }

@@ -15,6 +15,10 @@ StepKnots::StepKnots(const RobotModel& robot, const StepParams& params, std::int
     : foot_(step.goal.foot),
       soles_(soles),
       joint_margin_rad_(step.joint_margin_rad),
+      start_z_m_(soles[index_of(step.goal.foot)].p_m.z()),
+      goal_z_m_(step.goal.target.position_m.z()),
+      half_width_m_(robot.sole.collision.half_width_m),
+      most_air_roll_rad_(step.shape.air_roll_rad),
       shift_ticks_(step.shift_ticks),
       swing_ticks_(step.swing_ticks),
       knot_ticks_(std::max(knot_ticks, 1)),
@@ -28,6 +32,13 @@ StepKnots::StepKnots(const RobotModel& robot, const StepParams& params, std::int
   lean_.plan(shift_.at(plan.shift_ticks, com), plan.touch_down.position_m.z(), plan.touch_down.yaw_rad,
              plan.swing_ticks, plan.rise_ticks);
   swing_.plan(robot.sole, soles[index_of(foot_)], plan.goal.target, plan.shape, plan.swing_ticks);
+}
+
+double StepKnots::air_roll_rad(const StepKnot& knot) const noexcept {
+  if (!swings_at(knot.tick)) return 0.0;
+  const bool leaves = 2 * (knot.tick - shift_ticks_) < swing_ticks_;
+  const double above_m = knot.odom_T_sole[index_of(foot_)].p_m.z() - (leaves ? start_z_m_ : goal_z_m_);
+  return math::clamp(0.5 * above_m / half_width_m_, 0.0, most_air_roll_rad_);
 }
 
 StepKnot StepKnots::operator[](std::int32_t i) const noexcept {
@@ -71,14 +82,17 @@ bool StepFeasibility::solve(const RobotModel& robot, StepKnot& knot, JointVector
   return reachable;
 }
 
-void StepFeasibility::check_joints(const DriveModel& drives, const JointVector& q_rad) noexcept {
+void StepFeasibility::check_joints(const DriveModel& drives, const StepKnot& knot, const JointVector& q_rad) noexcept {
+  const std::size_t in_air = joint_index(knots_.swing(), kAnkleRoll);
+  const double air_roll_rad = knots_.air_roll_rad(knot);
   for (std::size_t n = 0; n < kJointCount; ++n) {
     const JointLimits& limits = drives.limits[n];
     const auto i = static_cast<Eigen::Index>(n);
     // The knee's lower end is the stretched leg, which has a margin of its own.
     double& low = n % kJointsPerLeg == kKnee ? check_.knee_rad : check_.joint_margin_rad;
-    low = std::min(low, q_rad[i] - limits.min_rad);
-    check_.joint_margin_rad = std::min(check_.joint_margin_rad, limits.max_rad - q_rad[i]);
+    const double spare_rad = n == in_air ? air_roll_rad : 0.0;
+    low = std::min(low, q_rad[i] - limits.min_rad + spare_rad);
+    check_.joint_margin_rad = std::min(check_.joint_margin_rad, limits.max_rad - q_rad[i] + spare_rad);
     if (next_ > 0) {
       const double speed_radps = std::abs(q_rad[i] - previous_[i]) / (knots_.knot_ticks() * kTick_s);
       check_.speed_share = std::max(check_.speed_share, speed_radps / limits.speed_radps);
@@ -116,7 +130,7 @@ bool StepFeasibility::advance(const RobotModel& robot, const StepParams& params,
     JointVector q_rad;
     if (!solve(robot, knot, q_rad)) check_.feasible = false;
     frames_ = body_frames(robot.legs, q_rad);
-    check_joints(robot.drives, q_rad);
+    check_joints(robot.drives, knot, q_rad);
     check_knee_torque(robot, knot, q_rad);
     previous_ = q_rad;
     check_.feasible = check_.feasible && check_.joint_margin_rad >= knots_.joint_margin_rad() &&

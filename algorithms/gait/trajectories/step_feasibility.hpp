@@ -31,8 +31,12 @@ class StepKnots {
   [[nodiscard]] double joint_margin_rad() const noexcept { return joint_margin_rad_; }  // that the plan is to keep
   [[nodiscard]] std::int32_t knot_ticks() const noexcept { return knot_ticks_; }
   [[nodiscard]] Foot stance() const noexcept { return other(foot_); }
+  [[nodiscard]] Foot swing() const noexcept { return foot_; }
   [[nodiscard]] bool swings_at(std::int32_t tick) const noexcept { return tick >= shift_ticks_; }
   [[nodiscard]] StepKnot operator[](std::int32_t i) const noexcept;
+  // By how much the sole in the air may roll where its ankle's range ends: its lower side then comes down by half of
+  // what the sole is above the ground.
+  [[nodiscard]] double air_roll_rad(const StepKnot& knot) const noexcept;
 
  private:
   Foot foot_ = Foot::kLeft;
@@ -42,6 +46,8 @@ class StepKnots {
   Swing swing_;
   TorsoPose torso_at_landing_;
   double joint_margin_rad_ = 0.0;
+  double start_z_m_ = 0.0, goal_z_m_ = 0.0;
+  double half_width_m_ = 0.0, most_air_roll_rad_ = 0.0;
   std::int32_t shift_ticks_ = 0, swing_ticks_ = 0, knot_ticks_ = 1, count_ = 0;
 };
 
@@ -68,7 +74,7 @@ class StepFeasibility {
   // Both legs at a knot; false when one is out of reach. The base is placed so that the centre of mass of the last
   // posture is where the plan has it; knot.odom_T_base is changed.
   bool solve(const RobotModel& robot, StepKnot& knot, JointVector& q_rad) const noexcept;
-  void check_joints(const DriveModel& drives, const JointVector& q_rad) noexcept;
+  void check_joints(const DriveModel& drives, const StepKnot& knot, const JointVector& q_rad) noexcept;
   // Of the stance leg while the other one swings, as if all links had the centre of mass's acceleration and the
   // swinging leg hung on the torso. Two legs that stand are not asked: they share. frames_ are the knot's, and what the
   // drive has is told by the knee's speed since the knot before.

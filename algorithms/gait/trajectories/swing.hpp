@@ -28,6 +28,7 @@ struct SwingShape {
   double toe_down_full = 0.38;
   double toe_up_begin = 0.44;
   double toe_up_end = 0.80;
+  double air_roll_rad = 0.1;
   double approach_m = 0.008;
   double approach_mps = 0.08;
   double redirect_up = 0.4;
@@ -57,6 +58,8 @@ struct SwingShape {
     field("toe_up_begin", p.toe_up_begin, 0.0, 0.95, "The toe begins to come up.");
     field("toe_up_end", p.toe_up_end, 0.05, 1.0, "The toe is level.");
     field.ordered("toe_up_begin", "toe_up_end");
+    field("air_roll_rad", p.air_roll_rad, 0.0, 0.5,
+          "The sole may roll by this where its ankle's range ends: its leg leans far out after a step aside.");
     field("approach_m", p.approach_m, 0.0, 0.1, "The last part down goes at approach_mps until something is felt.");
     field("approach_mps", p.approach_mps, 0.005, 1.0, "Speed of the last part down.");
     field("redirect_up", p.redirect_up, 0.05, 0.95,

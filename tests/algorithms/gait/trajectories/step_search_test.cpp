@@ -218,7 +218,8 @@ TEST(StepSearch, PassingStepThatIsPossibleWithNoTrailingStepAfterIt_IsImpossible
 // The left foot, on a tread, landed so far out that the ankle left behind hardly reaches: no step would have led there,
 // but the way on from there is none the less the rear foot's.
 TEST(StepSearch, TrailingStepFromAWideStance_IsDoneWhereNoLeadingStepWouldHaveLed) {
-  const StepParams params;
+  StepParams params;
+  params.stair_swing.air_roll_rad = 0.0;  // the ankle in the air, which either step has alike, is not the question
   const auto search_from = [&](double wider_m, StepKind kind) {
     std::array<Transform, kFootCount> soles;
     TorsoTrajectory::State from;
@@ -242,6 +243,33 @@ TEST(StepSearch, TrailingStepFromAWideStance_IsDoneWhereNoLeadingStepWouldHaveLe
     rescued += trails && !leads;
   }
   EXPECT_GE(rescued, 2);
+}
+
+// A leg that leans far out while its foot is in the air: there the sole may roll where the ankle's range ends.
+TEST(StepSearch, FootBroughtBackFromAWideStance_IsPossibleWhereTheSoleMayRollInTheAir) {
+  const auto closes = [](double wider_m, double air_roll_rad) {
+    StepParams params;
+    params.floor_swing.air_roll_rad = air_roll_rad;
+    const std::array<Transform, kFootCount> soles{SolePose{{0, 0.1 + wider_m, 0}, 0}.transform(),
+                                                  SolePose{{0, -0.1, 0}, 0}.transform()};
+    StepGoal goal;
+    goal.kind = StepKind::kClosing;
+    goal.foot = Foot::kLeft;
+    goal.target = {{0, 0.1, 0}, 0};
+    const auto from = TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.5 * wider_m, 0.76}});
+    StepSearch search;
+    search.begin(nominal_robot(), params, goal, {}, params.durations.floor_shift_ticks, from, soles);
+    return finish(search, params) == StepSearch::State::kFound;
+  };
+  EXPECT_TRUE(closes(0.0, 0.0));
+  int gained = 0;
+  for (double wider_m = 0.0; wider_m < 0.1; wider_m += 0.0025) {
+    const bool level = closes(wider_m, 0.0), rolled = closes(wider_m, 0.1);
+    EXPECT_TRUE(rolled || !level) << wider_m;
+    gained += rolled && !level;
+  }
+  EXPECT_GE(gained, 2);
+  EXPECT_FALSE(closes(0.2, 0.1)) << "on the ground, before it lifts, the sole lies flat";
 }
 
 // The left foot onto a tread, and the right one after it.
