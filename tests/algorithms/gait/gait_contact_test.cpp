@@ -187,22 +187,32 @@ TEST(GaitContact, FootLiftedAfterTheOtherOneWentBack_StaysWhereItStood) {
   }
 }
 
-// On two feet the base is 20 mm off its plan and moves on, and one foot loses its load: how far that one is asked to
-// go.
-double lifted_foot_moves_m(double speed_mps) {
-  IdealClimb climb({});
-  bool off = false;
+// On two feet the base is 20 mm off its plan and moves on, at first with both feet pressed, and then one loses its
+// load: how far that one is asked to go.
+struct Throw {
+  double pressed_mps = 0.0;
+  double lifted_mps = 0.0;
+};
+double lifted_foot_moves_m(const Throw& thrown, const Gait::Params& params = {}) {
+  IdealClimb climb({}, params);
+  enum class Off : std::uint8_t { kNot, kThrown, kPressed, kLifted } off = Off::kNot;
   climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
-    if (!off) return;
+    if (off == Off::kNot) return;
     state.odom_T_base.p_m.x() += 0.02;
-    state.odom_v_base_mps.x() += speed_mps;
-    feedback.foot_force_n[index_of(other(climb.status().step.foot))] = 0.0;
+    state.odom_v_base_mps.x() += off == Off::kThrown ? thrown.pressed_mps : thrown.lifted_mps;
+    if (off == Off::kLifted) feedback.foot_force_n[index_of(other(climb.status().step.foot))] = 0.0;
   };
   EXPECT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
   for (int n = 0; n < 150; ++n) climb.tick();  // the one that landed is pressed, and held no longer
   const std::size_t lifted = index_of(other(climb.status().step.foot));
   const Vec3 stood_m = climb.status().odom_T_sole_desired[lifted].p_m;
-  off = true;
+  if (thrown.pressed_mps > 0.0) {
+    off = Off::kThrown;
+    for (int n = 0; n < 10; ++n) climb.tick();
+    off = Off::kPressed;
+    for (int n = 0; n < 5; ++n) climb.tick();
+  }
+  off = Off::kLifted;
   double moved_m = 0.0;
   for (int n = 0; n < 100; ++n) {
     climb.tick();
@@ -211,9 +221,18 @@ double lifted_foot_moves_m(double speed_mps) {
   }
   return moved_m;
 }
-TEST(GaitContact, FootLiftedWhileTheBodyIsThrown_StaysWhereItStood) { EXPECT_LT(lifted_foot_moves_m(0.15), 2e-3); }
+TEST(GaitContact, FootLiftedWhileTheBodyIsThrown_StaysWhereItStood) {
+  EXPECT_LT(lifted_foot_moves_m({0.0, 0.15}), 2e-3);
+}
+// A throw is over when the body is back, not as soon as it comes back.
+TEST(GaitContact, FootLiftedWhileAThrownBodyComesBack_StaysWhereItStood) {
+  EXPECT_LT(lifted_foot_moves_m({0.15, 0.07}), 2e-3);
+  Gait::Params at_once;
+  at_once.landed_foot.caught_m = at_once.landed_foot.thrown_m;
+  EXPECT_GT(lifted_foot_moves_m({0.15, 0.07}, at_once), 1e-2);
+}
 // Held feet are planned elsewhere to each other than they stand: no reason for that where nothing is thrown.
-TEST(GaitContact, FootLiftedWhileTheBodyIsALittleOff_GoesAlong) { EXPECT_GT(lifted_foot_moves_m(0.0), 1e-2); }
+TEST(GaitContact, FootLiftedWhileTheBodyIsALittleOff_GoesAlong) { EXPECT_GT(lifted_foot_moves_m({}), 1e-2); }
 
 // Of a foot that turns back soon after it left: where it ends, and the least on the way, ahead of where its path
 // begins.
