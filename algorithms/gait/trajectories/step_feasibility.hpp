@@ -35,7 +35,7 @@ class StepKnots {
   [[nodiscard]] bool swings_at(std::int32_t tick) const noexcept { return tick >= shift_ticks_; }
   [[nodiscard]] StepKnot operator[](std::int32_t i) const noexcept;
   // By how much the sole in the air may roll where its ankle's range ends: its lower side then comes down by half of
-  // what the sole is above the ground.
+  // what the sole is above the ground. The swing is planned level; the sole rolls because its ankle stops at the range.
   [[nodiscard]] double air_roll_rad(const StepKnot& knot) const noexcept;
 
  private:

@@ -19,7 +19,7 @@ class SwingTiming {
     double falling_outward_m = 0.025;
     double falling_ahead_m = 0.05;
     double speed_up = 1.6;
-    // Chosen on 91 climbs of the simulation, pushed sideways (2026-11-28), and tried on nothing else.
+    // Chosen on 91 pushed climbs of the simulation (2026-11-28), and tried on no robot.
     double widen_m = 0.08;
     double widen_mps = 0.25;
     std::int32_t late_ticks = 10;

@@ -187,11 +187,11 @@ TEST(GaitContact, FootLiftedAfterTheOtherOneWentBack_StaysWhereItStood) {
   }
 }
 
-// On two feet the base is 20 mm off its plan and moves on, at first with both feet pressed, and then one loses its
-// load: how far that one is asked to go.
+// On two feet the base is 20 mm off its plan. It moves on at first_mps, if that is not 0, while both feet are pressed,
+// then at then_mps, and one foot loses its load: how far that one is asked to go.
 struct Throw {
-  double pressed_mps = 0.0;
-  double lifted_mps = 0.0;
+  double first_mps = 0.0;
+  double then_mps = 0.0;
 };
 double lifted_foot_moves_m(const Throw& thrown, const Gait::Params& params = {}) {
   IdealClimb climb({}, params);
@@ -199,14 +199,14 @@ double lifted_foot_moves_m(const Throw& thrown, const Gait::Params& params = {})
   climb.tamper = [&](StateEstimate& state, FootholdSet&, JointFeedback& feedback) {
     if (off == Off::kNot) return;
     state.odom_T_base.p_m.x() += 0.02;
-    state.odom_v_base_mps.x() += off == Off::kThrown ? thrown.pressed_mps : thrown.lifted_mps;
+    state.odom_v_base_mps.x() += off == Off::kThrown ? thrown.first_mps : thrown.then_mps;
     if (off == Off::kLifted) feedback.foot_force_n[index_of(other(climb.status().step.foot))] = 0.0;
   };
   EXPECT_TRUE(climb.run_until(GaitPhase::kDoubleSupport, 2));
   for (int n = 0; n < 150; ++n) climb.tick();  // the one that landed is pressed, and held no longer
   const std::size_t lifted = index_of(other(climb.status().step.foot));
   const Vec3 stood_m = climb.status().odom_T_sole_desired[lifted].p_m;
-  if (thrown.pressed_mps > 0.0) {
+  if (thrown.first_mps > 0.0) {
     off = Off::kThrown;
     for (int n = 0; n < 10; ++n) climb.tick();
     off = Off::kPressed;
