@@ -99,8 +99,9 @@ def told(arguments):
 
 
 class Engine:
-    def __init__(self, tool, jobs):
-        self.tool, self.jobs = pathlib.Path(tool), jobs
+    def __init__(self, tool, jobs, peer=None):
+        """peer: where invariant-ekf's sources are, if anywhere."""
+        self.tool, self.jobs, self.peer = pathlib.Path(tool), jobs, peer
         if not self.tool.exists():
             sys.exit(f"campaign: there is no tool {self.tool}")
         self.code = hashlib.sha256(self.tool.read_bytes()).hexdigest()[:16]

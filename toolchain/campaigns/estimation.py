@@ -1,38 +1,163 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of state estimation on logs."""
+"""The table of state estimation on logs: the module's, invariant-ekf's beside it, and logs that are not as they should be."""
+import hashlib
 import json
 import os
 import pathlib
+import re
+import shutil
 import subprocess
 import tempfile
 
-from campaigns.engine import ROOT, Page, Table, rows
+from campaigns import log_variants
+from campaigns.engine import ROOT, Page, Table, code_hash, rows
 
 LOGS = {"cassie/cassie_walk_open.csv": "Cassie, simulated walk, 5 s", "icub/walk.csv": "iCub, real walk, Vicon, 12 s",
         "icub/gazebo_0_35.csv": "iCub3 in Gazebo, 35 s"}
+FIGURES = {"position RMSE mm": ("position_rmse_mm", 1), "velocity RMSE mm/s": ("velocity_rmse_mmps", 1), "tilt deg": ("tilt_rmse_deg", 2),
+           "yaw deg": ("yaw_rmse_deg", 2), "drift % of the way": ("drift_percent", 2),
+           "rows within the 95 % bounds %": ("nees_in_bounds_percent", 0), "mean NEES, 6 is honest": ("nees_mean", 1)}
+
+PEER = "https://github.com/RossHartley/invariant-ekf"
+PEER_HEADER, PEER_SOURCES = "include/InEKF.h", ("src/*.cpp", "include/*.h")
+REPLAY = "toolchain/campaigns/peers/inekf_replay.cpp"
+REPLAY_NEEDS = ("sim_stub/host/estimate/csv_table.cpp", "sim_stub/host/estimate/estimate_log.cpp",  # compiled with it
+                "sim_stub/host/estimate/estimate_report.cpp", "sim_stub/host/estimate/estimate_score.cpp",
+                "sim_stub/host/output_file.cpp", "firmware/config/file_error.cpp")
+# The authors' for Cassie (example_code/RIEKF_InitFcn.m of their Contact-Aided-Invariant-EKF); 0.5 degrees of an encoder are 8 mm
+# at the end of a leg of 0.9 m.
+CASSIE_NOISE = ("gyro=0.002", "accel=0.04", "gyro_bias=0.001", "accel_bias=0.001", "contact=0.05", "foot=0.008")
+# What is run for each row, in callgrind's names.
+OURS_RUNS, PEER_RUNS = r"polygmap::Estimator::(?:add_\w+|tick)", r"inekf::InEKF::(?:Propagate|setContacts|CorrectKinematics)"
 
 
-def logs(engine, _):
-    place = pathlib.Path(os.environ.get("POLYGMAP_SHARED_DATA", ROOT.parent / "shared/data"))
-    if not any((place / name).exists() for name in LOGS):
+def lack_of_peer(path):
+    """A sentence, or nothing where invariant-ekf's sources are at path."""
+    return "" if (path / PEER_HEADER).is_file() else f"{path} has no sources of invariant-ekf ({PEER_HEADER}): clone {PEER}"
+
+
+def compiled_peer(path):
+    """The program, compiled once for the same sources."""
+    sources = sorted(p for pattern in PEER_SOURCES for p in path.glob(pattern))
+    key = hashlib.sha256(code_hash(ROOT, (REPLAY,)).encode() + b"".join(p.read_bytes() for p in sources)).hexdigest()[:16]
+    program = ROOT / f"build/campaign/inekf_replay-{key}"
+    if not program.exists():
+        partial = program.with_suffix(".part")
+        print("estimation: compiling the peer, which may take some minutes", flush=True)
+        done = subprocess.run(["g++", "-std=c++20", "-O2", "-DNDEBUG", "-I", ROOT, "-isystem", path / "include", "-isystem",
+                               "/usr/include/eigen3", "-o", partial, *(ROOT / s for s in (REPLAY, *REPLAY_NEEDS)),
+                               *(p for p in sources if p.suffix == ".cpp")], capture_output=True, text=True)
+        if done.returncode:
+            raise SystemExit(f"campaign: {REPLAY}: not built with {path}: {done.stderr[-800:]}")
+        partial.rename(program)
+    return program
+
+
+def commit_of(path):
+    done = subprocess.run(["git", "-C", path, "rev-parse", "--short=10", "HEAD"], capture_output=True, text=True)
+    return f"commit {done.stdout.strip()}" if (path / ".git").exists() and not done.returncode else "of unknown commit"
+
+
+def logs_found():
+    """What it is -> its path."""
+    shared = pathlib.Path(os.environ.get("POLYGMAP_SHARED_DATA", ROOT.parent / "shared/data"))
+    found = {what: shared / name for name, what in LOGS.items()}
+    if "POLYGMAP_LOGS" in os.environ:
+        found |= {path.stem: path for path in sorted(pathlib.Path(os.environ["POLYGMAP_LOGS"]).glob("*.csv"))}
+    return {what: path for what, path in found.items() if path.exists()}
+
+
+def scores(command, log):
+    """What the program scored the log with, or the sentence with which it did not."""
+    with tempfile.TemporaryDirectory() as out:
+        done = subprocess.run([*command, log, "--json", f"{out}/scores.json"], capture_output=True, text=True)
+        if done.returncode:
+            return done.stderr.strip().removeprefix("polygmap: ")
+        found = json.loads(pathlib.Path(out, "scores.json").read_text())
+    return found if "position_rmse_mm" in found else "It has no truth to be scored against."
+
+
+def instructions(command, log, runs):
+    """Of all that matches runs, in thousands a row."""
+    with tempfile.TemporaryDirectory() as out:
+        subprocess.run(["valgrind", "--tool=callgrind", "--quiet", f"--callgrind-out-file={out}/counted", *command, log], check=True,
+                       capture_output=True)
+        listed = subprocess.run(["callgrind_annotate", "--inclusive=yes", "--threshold=100", "--auto=no", f"{out}/counted"],
+                                capture_output=True, text=True, check=True).stdout
+    total = sum(int(n.replace(",", "")) for n in re.findall(rf"^\s*([\d,]+) .*:{runs}\(", listed, re.M))
+    return f"{total / 1e3 / (len(log.read_text().splitlines()) - 1):.0f} k"
+
+
+def side_by_side(filters, logs):
+    """(a line for each log and filter, a sentence for each that was not scored)."""
+    lines, unscored = [], []
+    for what, path in logs.items():
+        for name, command in filters.items():
+            s = scores(command, path)
+            if isinstance(s, str):
+                unscored.append(f"{what}, {name}: {s}")
+                break  # the others would say the same
+            lines.append((what, name, *(f"{s[key]:.{digits}f}" for key, digits in FIGURES.values())))
+    return lines, unscored
+
+
+def disturbed(command, logs):
+    """(a line for each log with the position's error on each of its variants, a sentence for each that was not scored)."""
+    lines, unscored = [], []
+    for what, path in logs.items():
+        log = log_variants.read(path)
+        cells = []
+        for name, variant in log_variants.VARIANTS.items():
+            with tempfile.TemporaryDirectory() as place:
+                try:
+                    log_variants.write(f"{place}/log.csv", variant(log))
+                    s = scores(command, f"{place}/log.csv")
+                except ValueError as reason:
+                    s = str(reason)
+            if isinstance(s, str):
+                unscored.append(f"{what}, {name}: {s.replace(f'{place}/', '')}")
+            cells.append("-" if isinstance(s, str) else f"{s['position_rmse_mm']:.1f}")
+        lines.append((what, *cells))
+    return lines, unscored
+
+
+def counted(ours, peer, logs):
+    """A sentence, of the shortest log, where there is a valgrind."""
+    if not logs or not shutil.which("valgrind"):
+        return ""
+    what, path = min(logs.items(), key=lambda log: log[1].stat().st_size)
+    others = f", invariant-ekf {instructions([peer], path, PEER_RUNS)}" if peer else ""
+    return f"\n\nInstructions a row (callgrind; {what}): ours {instructions(ours, path, OURS_RUNS)}{others}."
+
+
+def list_of(sentences):
+    return "\n\nNot scored:\n\n" + "\n".join(f"- {s}" for s in sentences) if sentences else ""
+
+
+def estimation(engine, _):
+    logs = logs_found()
+    if not logs:
         return None
-    lines = []
-    for name, what in LOGS.items():
-        if not (place / name).exists():
-            lines.append((what, "-", "-", "-", "-", "is not there"))
-            continue
-        with tempfile.TemporaryDirectory() as out:
-            done = subprocess.run([engine.tool, "estimate", place / name, "--json", f"{out}/scores.json"], capture_output=True, text=True)
-            if done.returncode:
-                lines.append((what, "-", "-", "-", "-", done.stderr.strip()))
-                continue
-            s = json.loads(pathlib.Path(out, "scores.json").read_text())
-        s = s.get("score", s)
-        lines.append((what, f"{s['position_rmse_mm']:.1f}", f"{s['velocity_rmse_mmps']:.1f}", f"{s['drift_percent']:.2f}",
-                      f"{s['nees_in_bounds_percent']:.0f}", ""))
-    return Page("`polygmap estimate LOG.csv`, scored against the log's truth. The logs are third-party data (../shared/data).\n\n" +
-                rows(("log", "position RMSE mm", "velocity RMSE mm/s", "drift % of the way", "rows within the 95 % bounds %", ""), lines),
-                {})
+    ours = [engine.tool, "estimate"]
+    peer = compiled_peer(engine.peer) if engine.peer else None
+    filters = {"ours": ours}
+    if peer:
+        filters |= {"invariant-ekf, its example's noise": [peer], "invariant-ekf, its authors' noise for Cassie": [peer, *CASSIE_NOISE]}
+        beside = (f"[invariant-ekf]({PEER}) ({commit_of(engine.peer)}) has the same rows, first pose and scores; its feet are points, a "
+                  "contact of 0.5 stands, and its biases begin at 0, where ours begin as a standstill at the start tells. Its example's noise is "
+                  "untouched: gyro 0.01, accelerometer 0.1, contacts 0.01, feet 3 mm. Its authors' for Cassie: 0.002, 0.04, 0.05; feet 8 mm, the encoders' 0.5 degrees at the end of a leg.")
+    else:
+        beside = f"`toolchain/campaign estimation --peer PATH` adds invariant-ekf's rows, where PATH is a clone of {PEER}."
+    lines, unscored = side_by_side(filters, logs)
+    scored = {what: path for what, path in logs.items() if (what, "ours") in {line[:2] for line in lines}}
+    worse, unscored_variants = disturbed(ours, scored)
+    return Page(
+        "`polygmap estimate LOG.csv`, scored against the log's truth. The logs are third-party data (../shared/data, and what lies in the folder "
+        f"`$POLYGMAP_LOGS`). {beside}\n\n" + rows(("log", "filter", *FIGURES), lines) + list_of(unscored) + counted(ours, peer, scored) +
+        "\n\n## Logs that are not as they should be\n\nPosition RMSE, mm, of ours on the same logs made otherwise (`toolchain/campaigns/log_variants.py`). "
+        "What slips or pivots is the foot that stands nearest to the log's middle.\n\n" +
+        rows(("log", *log_variants.VARIANTS), worse) + list_of(unscored_variants), {})
 
 
-TABLES = {"logs": Table("State estimation on logs", (0,), logs, 1)}
+TABLES = {"estimation": Table("State estimation on logs", (0,), estimation, 2,
+                              ("toolchain/campaigns/log_variants.py", REPLAY))}
