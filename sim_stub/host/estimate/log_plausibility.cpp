@@ -12,7 +12,7 @@ namespace polygmap::sim {
 namespace {
 
 constexpr double kGravityWindow_s = 2.0, kTruthWindow_s = 0.1;
-// Rates that the estimator was tried at on logs (tests, docs/measured/logs.md), with some room.
+// Rates that the estimator was tried at on logs (tests, docs/measured/estimation.md), with some room.
 constexpr double kLeastTried_hz = 95.0, kMostTried_hz = 1050.0;
 
 double median(std::vector<double> values) {
