@@ -24,8 +24,8 @@ REPLAY = "toolchain/campaigns/peers/inekf_replay.cpp"
 REPLAY_NEEDS = ("sim_stub/host/estimate/csv_table.cpp", "sim_stub/host/estimate/estimate_log.cpp",  # compiled with it
                 "sim_stub/host/estimate/estimate_report.cpp", "sim_stub/host/estimate/estimate_score.cpp",
                 "sim_stub/host/output_file.cpp", "firmware/config/file_error.cpp")
-# The authors' for Cassie (example_code/RIEKF_InitFcn.m of their Contact-Aided-Invariant-EKF). They compute the feet's noise from the
-# encoders'; 8 mm is our choice.
+# The authors' for Cassie (matlab_example/example_code/RIEKF_InitFcn.m of their Contact-Aided-Invariant-EKF). They compute the feet's
+# noise from the encoders'; 8 mm is our choice.
 CASSIE_NOISE = ("gyro=0.002", "accel=0.04", "gyro_bias=0.001", "accel_bias=0.001", "contact=0.05", "foot=0.008")
 # What is run for each row, in callgrind's names.
 OURS_RUNS, PEER_RUNS = r"polygmap::Estimator::(?:add_\w+|tick)", r"inekf::InEKF::(?:Propagate|setContacts|CorrectKinematics)"
