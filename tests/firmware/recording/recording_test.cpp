@@ -225,7 +225,8 @@ TEST(Replay, TwoLanesOneOfThemBehind_NothingDiffers) {
   }
   other.join();
   EXPECT_EQ(recorder.finish(), "");
-  EXPECT_GT(module->health().count(Fault::kLaneBehind).count, 20U);
+  // Once per gap control finds perception two cycles behind; whether also in the cycle after depends on the threads.
+  EXPECT_GE(module->health().count(Fault::kLaneBehind).count, 20U);
   EXPECT_GT(module->perception().extractor().counters().frames, 0U);
   expect_same(directory, kFrames);
 }
