@@ -14,8 +14,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   standstill_.reset(params.standstill);
   contacts_.reset(params.contacts);
   leg_sensing_.reset(params.legs, robot);
-  imu_noise_.reset(params.imu_noise);
-  odometry_.reset(params, robot);
+  odometry_.reset(params, robot.mounts.base_T_lidar);
   ring_.clear();
   state_ = {};
   quality_ = {};
@@ -25,7 +24,7 @@ void Estimator::reset(const Params& params, const RobotModel& robot) noexcept {
   imu_.base_R_imu = robot.mounts.base_R_imu;
   legs_ = {};
   known_ = {};
-  ground_ = {};
+  heights_ = {};
   stood_ = {};
   was_measured_ = {true, true};
   alone_ = false;
@@ -43,7 +42,6 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   if (known_.ticked && now_ns <= state_.stamp_ns) return;
   known_.ticked = true;
 
-  for (TouchDown& touch_down : ground_.touch_downs) touch_down.now = false;
   if (new_legs) take_legs(planned_stance);
   const bool begun = !state_.initialised && new_imu && new_legs && try_begin();
   if (begun || !(state_.initialised || known_.runs)) {
@@ -56,8 +54,8 @@ void Estimator::tick(const std::array<bool, kFootCount>& planned_stance) noexcep
   // The last rates bridge a short silence of the IMU; beyond it the feet alone say how the base moves.
   const bool felt = imu_.any && seconds(now_ns - imu_.newest.stamp_ns) <= params_.max_step_s;
   const std::array<FootContact, kFootCount> contacts = measured_contacts(now_ns, new_legs);
-  odometry_.step({now_ns, dt_s, imu_.mean.gyro_radps, imu_.mean.accel_mps2, felt, new_legs, imu_noise_.density()},
-                 legs_.sample.legs, contacts, ground_);
+  odometry_.step({now_ns, dt_s, imu_.mean.gyro_radps, imu_.mean.accel_mps2, felt, new_legs}, legs_.sample.legs,
+                 contacts, heights_);
   publish(now_ns);
   const bool fresh = seconds(now_ns - state_.oldest_input_ns) <= params_.max_step_s;
   if (state_.initialised && fresh) ring_.push(state_);
@@ -76,13 +74,13 @@ void Estimator::add_lio(const LioSample& sample, std::int64_t now_ns) noexcept {
         known = ring_.try_at(sample.stamp_ns, then);
       }
     }
-    verdict = known ? odometry_.fusion().fuse(sample, then.odom_T_base) : LioVerdict::kNoOdometry;
+    verdict = known ? odometry_.add_lio(sample, then.odom_T_base, newest_input_ns()) : LioVerdict::kNoOdometry;
   }
   ++counters_.lio[static_cast<std::size_t>(verdict)];
 }
 
 void Estimator::set_tread_height(Foot foot, double odom_z_m, double sigma_m) noexcept {
-  KnownHeight& height = ground_.heights[index_of(foot)];
+  KnownHeight& height = heights_[index_of(foot)];
   height = {};
   if (!state_.initialised || !std::isfinite(odom_z_m) || !(sigma_m > 0.0 && sigma_m < 1.0)) {
     ++counters_.height_invalid;
@@ -107,7 +105,6 @@ void Estimator::add_imu(const ImuSample& imu, std::int64_t now_ns) noexcept {
     ++counters_.imu_stale;
     return;
   }
-  imu_noise_.update(imu.stamp_ns, imu.gyro_radps, imu.accel_mps2);
   const ImuSample before = imu_.newest;
   imu_.newest = {imu.stamp_ns, imu_.base_R_imu * imu.gyro_radps, imu_.base_R_imu * imu.accel_mps2};
   if (!known_.has_run) imu_.resting.add(imu_.newest.stamp_ns, imu_.newest.accel_mps2);
@@ -154,15 +151,9 @@ void Estimator::take_legs(const std::array<bool, kFootCount>& planned_stance) no
     contacts_.update(sample.foot_force_n, planned_stance, sample.stamp_ns);
   }
   for (std::size_t i = 0; i < kFootCount; ++i) {
-    LegMeasurement& leg = sample.legs[i];
-    if (leg.position_sigma_m <= 0.0) leg.position_sigma_m = odometry_.motion().position_sigma_m();
     const FootContact& contact = contacts_.feet()[i];
-    if (stood_[i] && !contact.stands) ground_.heights[i] = {};  // lifted: its tread's height is history
+    if (stood_[i] && !contact.stands) heights_[i] = {};  // lifted: its tread's height is history
     stood_[i] = contact.stands;
-    // The contact's place is that of the touch: by now the leg may have pushed on by some millimetres.
-    StateEstimate then;
-    ground_.touch_downs[i].now = contact.landed && ring_.try_at(contact.touch_ns, then);
-    if (ground_.touch_downs[i].now) ground_.touch_downs[i].odom_T_sole = then.odom_T_sole[i];
   }
   // A robot that is being put down rocks on its soles.
   const bool measured = sample.measured[0] && sample.measured[1];
@@ -223,7 +214,7 @@ bool Estimator::try_begin() noexcept {
   }
   if (!still && known_.runs) return false;
 
-  ground_.heights.fill({0.0, params_.floor_sigma_m});
+  heights_.fill({0.0, params_.floor_sigma_m});
   ContactInEkf::Start start;
   start.odom_R_base = odom_T_base.R;
   start.odom_p_base_m = odom_T_base.p_m;
@@ -241,7 +232,7 @@ bool Estimator::try_begin() noexcept {
   start.tilt_sigma_rad = rested ? params_.rested_tilt_sigma_rad : params_.first_tilt_sigma_rad;
   start.velocity_sigma_mps = params_.first_velocity_sigma_mps;
   start.gyro_bias_sigma_radps = params_.first_gyro_bias_sigma_radps;
-  odometry_.initialise(start, true, legs, params_.max_step_s);
+  odometry_.initialise(start, legs, imu_.mean.gyro_radps, imu_.mean.accel_mps2);
   stood_ns_ = newest_input_ns();
   known_.begun = true;
   known_.runs = stood_[0] && stood_[1];
@@ -262,7 +253,7 @@ void Estimator::turn_imu(const Mat3& base_R_felt, Mat3& odom_R_base) noexcept {
 }
 
 void Estimator::begin(const ContactInEkf::Start& start) noexcept {
-  odometry_.initialise(start, false, legs_.sample.legs, params_.max_step_s);
+  odometry_.initialise(start, legs_.sample.legs, imu_.mean.gyro_radps, imu_.mean.accel_mps2);
   odometry_.fusion().rebase(origin_.odom_T_base);
   origin_.initialised_ns = stood_ns_ = newest_input_ns();
   state_.initialised = known_.ticked = known_.begun = true;

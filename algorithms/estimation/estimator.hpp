@@ -33,7 +33,6 @@ class Estimator {
     double rested_tilt_sigma_rad = 0.006;
     double first_velocity_sigma_mps = 0.02;
     double first_gyro_bias_sigma_radps = 0.005;
-    ImuNoise::Params imu_noise;
 
     static void visit(auto& p, auto& field) {
       ProprioceptiveOdometry::Params::visit(p, field);
@@ -55,7 +54,6 @@ class Estimator {
       field("first_velocity_sigma_mps", p.first_velocity_sigma_mps, 1e-3, 1.0, "Velocity as the first legs tell it.");
       field("first_gyro_bias_sigma_radps", p.first_gyro_bias_sigma_radps, 1e-5, 0.1,
             "Bias of the gyro, of which nothing is known before the standstill.");
-      field("imu_noise", p.imu_noise);
     }
   };
   struct Counters {
@@ -148,7 +146,6 @@ class Estimator {
   LegSensing leg_sensing_;
   StandstillCalibration standstill_;
   ContactEstimator contacts_;
-  ImuNoise imu_noise_;
   ProprioceptiveOdometry odometry_;
   StateHistory ring_;
   StateEstimate state_;
@@ -161,7 +158,7 @@ class Estimator {
     bool runs = false;     // and carry it on, though the standstill is not over,
     bool has_run = false;  // or did so before
   } known_;
-  ProprioceptiveOdometry::Ground ground_;
+  ProprioceptiveOdometry::Heights heights_;
   std::array<bool, kFootCount> stood_{};
   std::array<bool, kFootCount> was_measured_{true, true};
   bool alone_ = false;         // no leg without a mute drive has stood for kAlone_ns, nor since

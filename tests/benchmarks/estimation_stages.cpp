@@ -2,16 +2,14 @@
 #include "tests/benchmarks/estimation_stages.hpp"
 
 #include "tests/support/nominal_robot.hpp"
-#include "tests/support/walk_rows.hpp"
+#include "tests/support/synthetic_walk.hpp"
 
 namespace polygmap::bench {
 namespace {
 
 using test::SyntheticWalk;
-using test::WalkRows;
 using test::WalkSpec;
 
-constexpr double kTick_s = WalkRows::kTick_s;
 constexpr std::int64_t kLioDelay_ns = 100 * kNsPerMs;
 constexpr std::int64_t kWarm_ns = 6 * kNsPerS;  // standing: calibrated and aligned, the ring is full
 constexpr std::int64_t kEnd_ns = kWarm_ns + 1500 * kNsPerMs;
@@ -39,7 +37,6 @@ EstimationWalk::EstimationWalk() {
   spec.stand_s = seconds(kWarm_ns);
   spec.steps = 1;
   SyntheticWalk walk(spec);
-  WalkRows rows(spec);
   start.estimator.reset({}, nominal_robot());
   start.fusion.reset({}, base_T_lidar());
   for (std::int64_t t_ns = kLioDelay_ns; t_ns < kEnd_ns; t_ns += SyntheticWalk::kTick_ns) {
@@ -50,20 +47,13 @@ EstimationWalk::EstimationWalk() {
     tick.stance = walk.truth(t_ns).stance;
     tick.lio = walk.lio(t_ns - kLioDelay_ns);
     tick.odom_T_base = walk.truth(t_ns).true_T_base;
-    rows.next();
-    tick.rows = rows.rows;
-    for (ContactRow& row : tick.rows) row.height_m2 = 1e-4;  // all 56 rows
-    tick.accel_mps2 = rows.accel_mps2;
     if (t_ns >= kWarm_ns) {
       ticks.push_back(tick);
     } else {
-      rows.axes.predict(tick.accel_mps2, kTick_s, rows.rows);
-      rows.axes.correct(rows.rows);
       run_all(start, tick);
       align(start, tick);
     }
   }
-  start.axes = rows.axes;
 }
 
 std::string_view complaint(const EstimationBench& end, const EstimationWalk& walk) {
@@ -77,11 +67,6 @@ std::string_view complaint(const EstimationBench& end, const EstimationWalk& wal
   if (!end.estimator.state().initialised) return "the estimator is not initialised";
   if (walk.ticks.front().stance[0] == walk.ticks[walk.ticks.size() / 2].stance[0]) return "no foot swings";
   return {};
-}
-
-void stage_base_filter(EstimationBench& bench, const EstimationTick& tick) {
-  bench.axes.predict(tick.accel_mps2, kTick_s, tick.rows);
-  bench.axes.correct(tick.rows);
 }
 
 void stage_lio_alignment(EstimationBench& bench, const EstimationTick& tick) { align(bench, tick); }

@@ -19,8 +19,6 @@ struct EstimationTick {
   std::array<bool, kFootCount> stance{};
   LioSample lio;  // 100 ms old
   Transform odom_T_base;
-  ContactRows rows;
-  Vec3 accel_mps2 = Vec3::Zero();
 };
 
 // The estimator and its parts by themselves, as they are when the ticks begin: on both feet, before a step up.
@@ -28,7 +26,6 @@ struct EstimationBench {
   Estimator estimator;
   LioFusion fusion;
   StateHistory ring;
-  BaseFilter axes;
 };
 struct EstimationWalk {
   EstimationWalk();
@@ -39,7 +36,6 @@ struct EstimationWalk {
 // What makes the stages, run through all ticks, useless as a benchmark; empty when nothing does.
 [[nodiscard]] std::string_view complaint(const EstimationBench& end, const EstimationWalk& walk);
 
-void stage_base_filter(EstimationBench& bench, const EstimationTick& tick);  // predict and 56 rows: three axis filters
 void stage_lio_alignment(EstimationBench& bench,
                          const EstimationTick& tick);  // store a state, gate, find the stamp, fuse
 void stage_fused_tick(EstimationBench& bench,
@@ -49,7 +45,7 @@ struct EstimationStage {
   std::string_view name;
   void (*run)(EstimationBench&, const EstimationTick&);
 };
-inline constexpr std::array<EstimationStage, 3> kEstimationStages{
-    {{"base_filter", stage_base_filter}, {"lio_alignment", stage_lio_alignment}, {"fused_tick", stage_fused_tick}}};
+inline constexpr std::array<EstimationStage, 2> kEstimationStages{
+    {{"lio_alignment", stage_lio_alignment}, {"fused_tick", stage_fused_tick}}};
 
 }  // namespace polygmap::bench

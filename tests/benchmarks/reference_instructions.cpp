@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "tests/benchmarks/build_name.hpp"
-#include "tests/benchmarks/estimation_stages.hpp"
 #include "tests/benchmarks/stair_scenes.hpp"
 #include "tests/reference/base_filter/full_filters.hpp"
 #include "tests/reference/paper_route/paper_route.hpp"
@@ -18,26 +17,36 @@ namespace polygmap::bench {
 
 // None is inlined: callgrind counts what is spent inside a function.
 
-// The full forms of the base filter, on the rows that the three axis filters have.
-struct FullForms {
+// The paper's filter of eqs (1)-(4), in four forms on the same rows.
+struct PaperForms {
+  BaseFilter axes;               // three filters of ten states
   reference::DenseFilter dense;  // as printed, fixed size
   reference::SequentialFilter sequential;
   reference::DynamicFilter dynamic;  // matrices on the heap
 };
+struct PaperTick {
+  ContactRows rows;
+  Vec3 accel_mps2 = Vec3::Zero();
+};
+constexpr double kTick_s = test::WalkRows::kTick_s;
 
-void run_full(auto& form, const BaseFilter& axes, const EstimationTick& tick) {
-  const reference::FullStep step = reference::full_step(axes.base_process(test::WalkRows::kTick_s), tick.rows);
-  form.predict(tick.accel_mps2, test::WalkRows::kTick_s, step);
+void run_full(auto& form, const BaseFilter& axes, const PaperTick& tick) {
+  const reference::FullStep step = reference::full_step(axes.base_process(kTick_s), tick.rows);
+  form.predict(tick.accel_mps2, kTick_s, step);
   form.correct(step);
 }
-[[gnu::noinline]] void stage_base_dense(FullForms& forms, const BaseFilter& axes, const EstimationTick& tick) {
-  run_full(forms.dense, axes, tick);
+[[gnu::noinline]] void stage_base_axes(PaperForms& forms, const PaperTick& tick) {
+  forms.axes.predict(tick.accel_mps2, kTick_s, tick.rows);
+  forms.axes.correct(tick.rows);
 }
-[[gnu::noinline]] void stage_base_sequential(FullForms& forms, const BaseFilter& axes, const EstimationTick& tick) {
-  run_full(forms.sequential, axes, tick);
+[[gnu::noinline]] void stage_base_dense(PaperForms& forms, const PaperTick& tick) {
+  run_full(forms.dense, forms.axes, tick);
 }
-[[gnu::noinline]] void stage_base_dynamic(FullForms& forms, const BaseFilter& axes, const EstimationTick& tick) {
-  run_full(forms.dynamic, axes, tick);
+[[gnu::noinline]] void stage_base_sequential(PaperForms& forms, const PaperTick& tick) {
+  run_full(forms.sequential, forms.axes, tick);
+}
+[[gnu::noinline]] void stage_base_dynamic(PaperForms& forms, const PaperTick& tick) {
+  run_full(forms.dynamic, forms.axes, tick);
 }
 [[gnu::noinline]] void stage_paper_route(PaperRoute& route, const StairScene& scene) {
   route.run(scene.depth.data(), scene.view.intrinsics, scene.view.camera_up);
@@ -48,23 +57,31 @@ void run_full(auto& form, const BaseFilter& axes, const EstimationTick& tick) {
 int main() {
   using namespace polygmap;
   using namespace polygmap::bench;
-  const auto walk = std::make_unique<EstimationWalk>();
-  const auto bench = std::make_unique<EstimationBench>(walk->start);
-  const auto forms = std::make_unique<FullForms>();
-  forms->dense.initialise(bench->axes);
-  forms->sequential.initialise(bench->axes);
-  forms->dynamic.initialise(bench->axes);
-  for (const EstimationTick& tick : walk->ticks) {
-    bench->axes.predict(tick.accel_mps2, test::WalkRows::kTick_s, tick.rows);
-    bench->axes.correct(tick.rows);
-    stage_base_dense(*forms, bench->axes, tick);
-    stage_base_sequential(*forms, bench->axes, tick);
-    stage_base_dynamic(*forms, bench->axes, tick);
+  test::WalkSpec spec;
+  spec.stand_s = 1.0;
+  spec.steps = 1;
+  test::WalkRows walk(spec);
+  const auto forms = std::make_unique<PaperForms>();
+  std::size_t ticks = 0;
+  for (int i = 0; i < 1250; ++i) {
+    walk.next();
+    PaperTick tick{walk.rows, walk.accel_mps2};
+    for (ContactRow& row : tick.rows) row.height_m2 = 1e-4;  // all 56 rows
+    if (i == 0) {
+      forms->axes = walk.axes;
+      forms->dense.initialise(forms->axes);
+      forms->sequential.initialise(forms->axes);
+      forms->dynamic.initialise(forms->axes);
+    }
+    stage_base_axes(*forms, tick);
+    stage_base_dense(*forms, tick);
+    stage_base_sequential(*forms, tick);
+    stage_base_dynamic(*forms, tick);
+    ++ticks;
   }
   const auto off_m = [&](const auto& form) {
-    return (form.state().template head<3>() - bench->axes.odom_p_base_m()).norm();
+    return (form.state().template head<3>() - forms->axes.odom_p_base_m()).norm();
   };
-  // Not the same filter to the last digit: the full forms began without the axis filters' correlations.
   if (!(std::max({off_m(forms->dense), off_m(forms->sequential), off_m(forms->dynamic)}) < 1e-3)) {
     std::fprintf(stderr, "reference_instructions: the forms of the base filter disagree\n");
     return 1;
@@ -72,6 +89,6 @@ int main() {
   const auto route = std::make_unique<PaperRoute>(PaperRoute::Params{});
   const std::vector<StairScene> scenes = stair_scenes();
   for (const StairScene& scene : scenes) stage_paper_route(*route, scene);
-  std::printf("build %s\nruns %zu\nruns_of paper_route %zu\n", build_name().c_str(), walk->ticks.size(), scenes.size());
+  std::printf("build %s\nruns %zu\nruns_of paper_route %zu\n", build_name().c_str(), ticks, scenes.size());
   return 0;
 }

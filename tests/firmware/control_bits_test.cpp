@@ -200,11 +200,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 17907877105563883536U);
-  EXPECT_EQ(hashes.gait.value(), 12398769965906842451U);
-  EXPECT_EQ(hashes.commands.value(), 6993622026269475183U);
-  EXPECT_EQ(hashes.surfaces.value(), 13499091706062168430U);
-  EXPECT_EQ(hashes.map.value(), 17350734165557211268U);
+  EXPECT_EQ(hashes.estimates.value(), 14888023180727174748U);
+  EXPECT_EQ(hashes.gait.value(), 1347559623879054244U);
+  EXPECT_EQ(hashes.commands.value(), 1095796989230085519U);
+  EXPECT_EQ(hashes.surfaces.value(), 14814304540621091332U);
+  EXPECT_EQ(hashes.map.value(), 17645724117699418240U);
 }
 
 }  // namespace

@@ -149,17 +149,17 @@ TEST_F(OperatedModule, ResetOfASafeStop_IsRefusedForWhatLasts) {
   ask(OperatorCommand::kReset, 1);
   EXPECT_EQ(refusal(), Refusal::kCommandRefused);
 
-  // Slower than what would be taken for a jump.
-  for (int i = 0; i < 400; ++i) {
-    standing_q_rad_[9] += 0.001;
+  // Slower than what would be taken for a jump, faster than what two feet creep apart.
+  for (int i = 0; i < 250; ++i) {
+    standing_q_rad_[9] += 0.0016;
     stand(1);
   }
   ask(OperatorCommand::kReset, 1);
   JointSet joints;
   EXPECT_EQ(refusal(&joints), Refusal::kJointsAway);
   EXPECT_EQ(joints.bits(), 1U << 9U);
-  for (int i = 0; i < 400; ++i) {
-    standing_q_rad_[9] -= 0.001;
+  for (int i = 0; i < 250; ++i) {
+    standing_q_rad_[9] -= 0.0016;
     stand(1);
   }
 

@@ -312,16 +312,16 @@ TEST_F(PipelineOnARobot, TreadElsewhereThanTheSoleOnIt_IsCounted) {
 
 TEST_F(PipelineOnARobot, PoseOfAFrameIsUncertain_MapKnows) {
   Params params;
-  params.estimator.attitude.gyro_noise_radprs = 0.1;
-  params.estimator.attitude.foot_sigma_rad = 0.1;
-  params.estimator.attitude.accel_noise_mpsrs = 3.0;  // gravity tells less
+  params.estimator.filter.gyro_noise_radprs = 0.1;
+  params.estimator.filter.sole_sigma_rad = 0.1;
+  params.estimator.filter.accel_noise_mpsrs = 3.0;  // gravity tells less
   start(kToeGap_m, params);
   run(1000);
   const double tilt_sigma_rad = control().state().tilt_sigma_rad;
   EXPECT_GT(tilt_sigma_rad, 0.02);
   ASSERT_FALSE(module_->pipeline().perception().map_snapshot().polygons.empty());
   for (const MapPolygon& polygon : module_->pipeline().perception().map_snapshot().polygons) {
-    EXPECT_GT(polygon.surface.tilt_sigma_rad, 0.9 * tilt_sigma_rad);
+    EXPECT_GT(polygon.surface.tilt_sigma_rad, 0.8 * tilt_sigma_rad);  // it has grown since the frame
   }
 }
 

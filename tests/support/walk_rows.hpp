@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "algorithms/estimation/filters/base_filter.hpp"
+#include "tests/reference/base_filter/base_filter.hpp"
 #include "tests/support/measured_legs.hpp"
 #include "tests/support/nominal_robot.hpp"
 #include "tests/support/synthetic_walk.hpp"

@@ -14,7 +14,6 @@ void ContactEstimator::reset(const Params& params) noexcept {
 void ContactEstimator::update(const std::array<double, kFootCount>& force_n,
                               const std::array<bool, kFootCount>& planned_stance, std::int64_t stamp_ns) noexcept {
   const double rise = stamp_ns_ < 0 ? 0.0 : seconds(stamp_ns - stamp_ns_) / params_.settle_s;
-  const auto delay_ns = static_cast<std::int64_t>(params_.force_delay_s * 1e9);
   const double total_n = force_n[0] + force_n[1];
   for (std::size_t i = 0; i < kFootCount; ++i) {
     if (!planned_stance[i] && was_planned_[i]) {
@@ -34,10 +33,8 @@ void ContactEstimator::update(const std::array<double, kFootCount>& force_n,
     FootContact& foot = feet_[i];
     const double before = foot.probability;
     foot.probability = may_stand ? std::min(evidence, before + rise) : 0.0;
-    if (before <= 0.0 && foot.probability > 0.0) touched_ns_[i] = stamp_ns - delay_ns;
     foot.landed = !foot.stands && foot.probability >= 1.0;
     foot.stands = foot.landed || (foot.stands && foot.probability > 0.0);
-    if (foot.landed) foot.touch_ns = touched_ns_[i];
     foot.load_share = total_n > params_.force_air_n ? force_n[i] / total_n : 0.5;
   }
   stamp_ns_ = stamp_ns;
@@ -52,7 +49,6 @@ void ContactEstimator::update_stated(const std::array<double, kFootCount>& proba
     foot.probability = std::max(probability[i], kept * foot.probability);
     foot.landed = !foot.stands && foot.probability >= params_.stated_standing;
     foot.stands = foot.landed || (foot.stands && foot.probability >= params_.stated_air);
-    if (foot.landed) foot.touch_ns = stamp_ns;
   }
   const double total = feet_[0].probability + feet_[1].probability;
   for (FootContact& foot : feet_) foot.load_share = total > 0.0 ? foot.probability / total : 0.5;

@@ -8,12 +8,11 @@
 namespace polygmap {
 
 struct FootContact {
-  double probability = 0.0;   // that the foot rests on the ground
-  double load_share = 0.5;    // of the force on both feet
-  bool stands = false;        // from certainty until nothing is left of it
-  bool landed = false;        // began to stand in this tick
-  double walk_m2ps = 0.0;     // random walk that its motion over the ground stands for (FootMotion)
-  std::int64_t touch_ns = 0;  // when it met the ground, the force sensor's delay taken off
+  double probability = 0.0;  // that the foot rests on the ground
+  double load_share = 0.5;   // of the force on both feet
+  bool stands = false;       // from certainty until nothing is left of it
+  bool landed = false;       // began to stand in this tick
+  double walk_m2ps = 0.0;    // random walk that its motion over the ground stands for (FootMotion)
 };
 
 class ContactEstimator {
@@ -21,7 +20,6 @@ class ContactEstimator {
   struct Params {
     double force_air_n = 10.0;
     double force_standing_n = 25.0;
-    double force_delay_s = 0.006;
     double settle_s = 0.006;
     double stated_standing = 0.5;
     double stated_air = 0.4;
@@ -33,8 +31,6 @@ class ContactEstimator {
       field("force_standing_n", p.force_standing_n, 1.0, 500.0,
             "A foot that presses as hard stands; one that touches weighs at least its own leg.");
       field.ordered("force_air_n", "force_standing_n");
-      field("force_delay_s", p.force_delay_s, 0.0, 0.05,
-            "The force sensor's delay, taken off the time of a touch-down.");
       field("settle_s", p.settle_s, 0.001, 0.1,
             "A contact's probability rises from 0 to 1 in this time at the earliest, which blanks the impact.");
       field("stated_standing", p.stated_standing, 0.05, 1.0, "A foot whose stated probability is as high stands.");
@@ -62,7 +58,6 @@ class ContactEstimator {
   std::array<bool, kFootCount> was_planned_{true, true};
   std::array<bool, kFootCount> unloaded_{};
   std::array<std::int64_t, kFootCount> swing_since_ns_{};
-  std::array<std::int64_t, kFootCount> touched_ns_{};
   std::int64_t stamp_ns_ = -1;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algorithms/estimation/contact/foot_motion.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 
 namespace polygmap {
@@ -8,28 +9,47 @@ namespace polygmap {
 void FootMotion::reset(const Params& params) noexcept {
   *this = FootMotion{};
   params_ = params;
-  noise_m_.reset(params.noise);
+  usual_m2ps2_ = math::square(params.usual_mps);
 }
 
-void FootMotion::update(std::size_t foot, const Vec3& odom_step_m, double speed_sigma_mps, bool stands,
-                        double dt_s) noexcept {
-  Track& track = feet_[foot];
-  // The change between two steps holds no speed, and no acceleration but the IMU's error: noise alone, six times over.
-  constexpr double kRows = 6.0 * 3.0;
-  if (track.has_step && stands) noise_m_.take((odom_step_m - track.last_step_m).squaredNorm() / kRows, dt_s);
-  track.last_step_m = odom_step_m;
-  track.has_step = true;
+void FootMotion::update(const std::array<Step, kFootCount>& steps, double dt_s) noexcept {
+  // A base that is thought to turn otherwise than it does feigns a speed of the foot, and tells it by the sole's turn.
+  std::array<Vec3, kFootCount> odom_v_mps, unturned_mps;
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    Track& track = feet_[foot];
+    const Step& step = steps[foot];
+    track.walk_m2ps = 0.0;
+    if (!step.rests) {
+      track = {};
+      continue;
+    }
+    const double share = dt_s / (std::min(params_.window_s, track.age_s) + dt_s);
+    track.odom_v_mps += share * (step.odom_m / dt_s - track.odom_v_mps);
+    track.odom_w_radps += share * (step.odom_rad / dt_s - track.odom_w_radps);
+    track.age_s += dt_s;
+    odom_v_mps[foot] = unturned_mps[foot] = track.odom_v_mps;
+    if (step.sole_known) unturned_mps[foot] -= track.odom_w_radps.cross(step.odom_from_base_m);
+    track.speed_mps = std::min(odom_v_mps[foot].norm(), unturned_mps[foot].norm());
+  }
+  if (steps[0].rests && steps[1].rests) {
+    const double apart_mps =
+        std::min((odom_v_mps[0] - odom_v_mps[1]).norm(), (unturned_mps[0] - unturned_mps[1]).norm());
+    let_go(feet_[feet_[0].speed_mps > feet_[1].speed_mps ? 0 : 1], apart_mps, params_.slip_mps, dt_s);
+    return;
+  }
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    if (!steps[foot].rests) continue;
+    const double slip_mps = std::max(params_.alone_slip_mps, params_.usual_times * math::sqrt(usual_m2ps2_));
+    const double seen_m2ps2 = math::square(std::min(feet_[foot].speed_mps, params_.usual_share * slip_mps));
+    usual_m2ps2_ += dt_s / (params_.usual_s + dt_s) * (seen_m2ps2 - usual_m2ps2_);
+    let_go(feet_[foot], feet_[foot].speed_mps, slip_mps, dt_s);
+  }
+}
 
-  const double position_sigma_m = noise_m_.sigma();
-  const double window_s =
-      math::clamp(position_sigma_m / params_.speed_sigma_mps, params_.min_window_s, params_.max_window_s);
-  const double share = dt_s / (window_s + dt_s);
-  track.odom_v_mps += share * (odom_step_m / dt_s - track.odom_v_mps);
-  // Low-passed differences of white noise: sigma over the window.
-  const double variance_m2ps2 = math::square(position_sigma_m / (window_s + dt_s)) + math::square(speed_sigma_mps) +
-                                math::square(params_.rest_sigma_mps);
-  const double beyond_m2ps2 = track.odom_v_mps.squaredNorm() - math::square(params_.rest_sigmas) * variance_m2ps2;
-  track.walk_m2ps = params_.gain * std::max(beyond_m2ps2, 0.0) * window_s;
+void FootMotion::let_go(Track& track, double speed_mps, double slip_mps, double dt_s) noexcept {
+  if (!(speed_mps > slip_mps) || track.let_go_s > params_.most_s || 1.5 * dt_s > params_.window_s) return;
+  track.let_go_s += dt_s;
+  track.walk_m2ps = params_.gain * (math::square(speed_mps) - 0.5 * math::square(slip_mps)) * params_.window_s;
 }
 
 }  // namespace polygmap

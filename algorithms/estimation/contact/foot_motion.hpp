@@ -1,70 +1,75 @@
 // SPDX-License-Identifier: Apache-2.0
-// Does a foot that is said to stand really rest? Its speed over the ground, as the IMU's prediction of the base and the
-// leg's position have it, against what their noise explains.
+// Does a foot that is said to stand slip? Its speed over the ground, as the base is predicted and its leg measured.
 //
-// A foot that touches a little early, lifts a little before its flag falls, or slips, moves. A gate on the innovation
-// would see that only after the velocity was dragged along, and throw away good rows at every touch-down; here a foot
-// that moves is let go by as much as it moves, a continuous function, and one that has come to rest is held again.
+// Of two feet that stand, each is the other's witness: none is let go unless they move against each other, whatever the
+// IMU says of the base. One that stands alone has the IMU as its only witness, so only what is far beyond what the feet
+// of this robot usually seem to move by is a slip. A foot that slips is let go by as much as it moves, a continuous
+// function, and for a limited time: a contact that never rests is the estimate's error.
 #pragma once
 
 #include <array>
 
+#include "algorithms/core/math/math.hpp"
 #include "algorithms/core/messages/samples.hpp"
-#include "algorithms/estimation/calibration/noise_level.hpp"
 
 namespace polygmap {
 
 class FootMotion {
  public:
   struct Params {
-    double speed_sigma_mps = 0.04;
-    double min_window_s = 0.010;
-    double max_window_s = 0.060;
-    NoiseLevel::Params noise{1e-3, 0.0, 2.0, 3e-4, 0.02};
-    double rest_sigma_mps = 0.05;
-    double rest_sigmas = 3.0;
-    double gain = 4.0;
+    double window_s = 0.02;
+    double slip_mps = 0.2;
+    double alone_slip_mps = 0.15;
+    double usual_mps = 0.08;
+    double usual_s = 1.0;
+    double usual_times = 2.5;
+    double usual_share = 0.6;
+    double gain = 20.0;
+    double most_s = 0.4;
 
     static void visit(auto& p, auto& field) {
-      field("speed_sigma_mps", p.speed_sigma_mps, 0.001, 1.0,
-            "The measured speed of a foot is averaged until it is as good as this.");
-      field("min_window_s", p.min_window_s, 0.002, 0.1, "The speed is averaged over no less.");
-      field("max_window_s", p.max_window_s, 0.002, 0.5, "The speed is averaged over no more.");
-      field.ordered("min_window_s", "max_window_s");
-      field("noise", p.noise);
-      field("rest_sigma_mps", p.rest_sigma_mps, 0.001, 1.0,
-            "A foot that rests moves like this all the same: it rolls and creeps.");
-      field("rest_sigmas", p.rest_sigmas, 0.0, 10.0, "A speed below this many of its sigmas is rest.");
+      field("window_s", p.window_s, 0.002, 0.5, "The measured speed of a foot is averaged over this.");
+      field("slip_mps", p.slip_mps, 0.01, 10.0, "Two feet that stand and move apart faster: one of them slips.");
+      field("alone_slip_mps", p.alone_slip_mps, 0.01, 10.0, "A foot that stands alone slips at no lower speed.");
+      field("usual_mps", p.usual_mps, 0.0, 10.0, "Speed by which a foot that stands alone seems to move at the start.");
+      field("usual_s", p.usual_s, 0.01, 1000.0, "That speed is averaged over this.");
+      field("usual_times", p.usual_times, 1.0, 100.0,
+            "A foot that stands alone slips beyond so many times that speed.");
+      field("usual_share", p.usual_share, 0.1, 1.0, "What counts for that average, at most, of a slip's speed.");
       field("gain", p.gain, 0.0, 100.0,
-            "The random walk that a speed stands for is this times its square times the window.");
+            "The random walk that a slip stands for is this times its speed squared times the window.");
+      field("most_s", p.most_s, 0.0, 100.0, "A contact is let go for no longer than this.");
     }
   };
   void reset(const Params& params) noexcept;
 
-  // odom_step_m: by how much the foot moved over the ground in this step of dt_s, the base as predicted by the IMU from
-  // the last corrected state. speed_sigma_mps: of the base's velocity, one sigma. A foot in the air says nothing of
-  // noise.
-  void update(std::size_t foot, const Vec3& odom_step_m, double speed_sigma_mps, bool stands, double dt_s) noexcept;
+  // By how much a foot moved and turned over the ground in one step, the base as predicted from the last corrected
+  // state.
+  struct Step {
+    bool rests = false;  // from the step's beginning on: it is not in the air and has not just landed
+    bool sole_known = false;
+    Vec3 odom_m = Vec3::Zero(), odom_rad = Vec3::Zero();
+    Vec3 odom_from_base_m = Vec3::Zero();
+  };
+  void update(const std::array<Step, kFootCount>& steps, double dt_s) noexcept;
 
-  // The foot is known to rest from now on, whatever it did before.
-  void rest(std::size_t foot) noexcept { feet_[foot] = {}; }
-
-  // Random walk of the contact that its motion stands for, m^2/s, 0 at rest.
+  // By which a standing foot seems to move over the ground, whether it is let go or not.
+  [[nodiscard]] double speed_mps(std::size_t foot) const noexcept { return feet_[foot].speed_mps; }
+  // Random walk of the contact that its slip stands for, m^2/s, 0 at rest.
   [[nodiscard]] double walk_m2ps(std::size_t foot) const noexcept { return feet_[foot].walk_m2ps; }
-  // White noise of one foot position, per axis, measured from its jitter.
-  [[nodiscard]] double position_sigma_m() const noexcept { return noise_m_.sigma(); }
 
  private:
   struct Track {
-    Vec3 odom_v_mps = Vec3::Zero();
-    Vec3 last_step_m = Vec3::Zero();
+    Vec3 odom_v_mps = Vec3::Zero(), odom_w_radps = Vec3::Zero();
+    double age_s = 0.0, let_go_s = 0.0;
+    double speed_mps = 0.0;
     double walk_m2ps = 0.0;
-    bool has_step = false;
   };
+  void let_go(Track& track, double speed_mps, double slip_mps, double dt_s) noexcept;
 
   Params params_;
   std::array<Track, kFootCount> feet_{};
-  NoiseLevel noise_m_;
+  double usual_m2ps2_ = 0.0;
 };
 
 }  // namespace polygmap

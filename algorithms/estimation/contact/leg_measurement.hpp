@@ -14,8 +14,7 @@ struct LegMeasurement {
   Transform base_T_sole;
   Vec3 base_v_sole_mps = Vec3::Zero();
   Vec3 base_w_sole_radps = Vec3::Zero();
-  bool sole_known = true;          // its rotation and motion; without them the foot is one point
-  double position_sigma_m = 3e-4;  // white noise of the position, per axis; 0: as measured (FootMotion)
+  bool sole_known = true;  // its rotation and motion; without them the foot is one point
 };
 
 // Both legs at one moment.

@@ -1,84 +1,86 @@
 // SPDX-License-Identifier: Apache-2.0
-// Attitude of the base in odom and the biases of gyro and accelerometer, from the IMU and the standing feet.
+// Attitude, velocity and position of the base, the biases of gyro and accelerometer, the places and rotations of the
+// soles, where lidar odometry's world lies, and by how much the IMU is late: from the IMU, the standing feet, known
+// heights of the ground and lidar odometry.
 //
-// An error-state filter on SO(3) whose errors are right-invariant (in odom axes: R = exp(e) R_est, v = exp(e) v_est +
-// e_v, ...): its propagation and rows do not depend on the estimate, so an estimate gained wrongly does not feign
-// information, yaw's and position's least of all. Velocity, position and contacts are in it because tilt and biases
-// show themselves as motion that the legs deny; eqs (1)-(4) do the rest with the attitude they are given. It also
-// holds the covariance between attitude and motion, which the axis filters of eqs (1)-(4) cannot.
+// An error-state filter whose errors are right-invariant (in odom axes: R = exp(e) R_est, v = exp(e) v_est + e_v, ...):
+// its propagation and rows do not depend on the estimate, so an estimate gained wrongly does not feign information,
+// yaw's and position's least of all. What eqs (1)-(4) say, an IMU that predicts, feet that rest and treads of known
+// height, with one covariance instead of one per axis. All noises are densities: the rate of samples does not matter.
 // Source: Hartley, Ghaffari, Eustice, Grizzle, "Contact-aided invariant extended Kalman filtering for robot state
-// estimation", IJRR 2020, sections 4-6; the sole's rotation as two more states: own derivation.
+// estimation", IJRR 2020, sections 4-6; soles, heights, lidar's world and the delay: own derivation.
 #pragma once
 
 #include <algorithm>
 
-#include "algorithms/estimation/calibration/imu_noise.hpp"
 #include "algorithms/estimation/contact/contacts.hpp"
-#include "algorithms/estimation/contact/leg_measurement.hpp"
+#include "algorithms/estimation/contact/leg_history.hpp"
+#include "algorithms/estimation/filters/row_batch.hpp"
+#include "algorithms/estimation/filters/stance_walk.hpp"
 #include "algorithms/estimation/quality/innovation.hpp"
 
 namespace polygmap {
 
+struct KnownHeight {
+  double odom_z_m = 0.0;
+  double sigma_m = -1.0;  // negative: unknown
+};
+
+// One sigma each, of one pose of lidar odometry's; world_tilt_rad: its world is level but for that.
+struct LidarSigmas {
+  double position_m = 0.0, yaw_rad = 0.0, world_tilt_rad = 0.0;
+};
+
 class ContactInEkf {
  public:
   struct Params {
-    double gyro_noise_radprs = 1e-4;
-    double accel_noise_mpsrs = 3e-3;
+    double gyro_noise_radprs = 1e-3;
+    double accel_noise_mpsrs = 0.015;
+    double accel_noise_rs = 0.006;
     double lost_accel_noise_mpsrs = 2.0;
     double lost_gyro_noise_radprs = 0.1;
-    double dynamic_accel_share = 0.02;
-    double gyro_bias_walk_radpsrs = 5e-6;
-    double accel_bias_walk_mps2rs = 1e-4;
-    double foot_sigma_rad = 1e-3;
-    double foot_walk_radprs = 1e-3;
-    double contact_walk_mprs = 2e-3;
-    double min_contact_walk_mprs = 3e-4;
-    double full_walk_speed_mps = 0.1;
-    double max_contact_walk_mprs = 2e-2;
-    double whiteness_window_s = 0.2;
-    double whiteness_gain_ps = 1.0;
-    double whiteness_start_gain = 1.0;
-    double whiteness_most_ratio = 5.0;
+    double gyro_bias_walk_radpsrs = 1e-4;
+    double accel_bias_walk_mps2rs = 1e-3;
+    double foot_sigma_m = 1.2e-3;
+    double sole_sigma_rad = 1.5e-3;
+    double foot_correlation_s = 0.01;
+    StanceWalk::Params stance;
+    double height_correlation_s = 4.0;
     double outlier_sigmas = 5.0;
     double turn_lever_m = 0.5;
-    double least_load_share = 0.05;
+    double motion_s = 0.1;
+    double imu_delay_sigma_s = 0.0015;
+    double imu_delay_memory_s = 4.0;
+    double imu_delay_start_sigma_s = 0.0015;
 
     static void visit(auto& p, auto& field) {
       field("gyro_noise_radprs", p.gyro_noise_radprs, 1e-6, 0.1,
-            "Noise of the gyro at least: 2e-3 rad/s at 500 Hz is 0.9e-4.");
-      field("accel_noise_mpsrs", p.accel_noise_mpsrs, 1e-5, 1.0,
-            "Noise of the accelerometer at least: 0.05 m/s^2 at 500 Hz is 2.2e-3.");
+            "Noise of the gyro and of whatever it is bolted to, as far as the filter is concerned.");
+      field("accel_noise_mpsrs", p.accel_noise_mpsrs, 1e-5, 1.0, "The same of the accelerometer, of a base at rest.");
+      field("accel_noise_rs", p.accel_noise_rs, 0.0, 1.0,
+            "Scale, mount, timing and vibration add so much for each m/s^2 that the base accelerates.");
       field("lost_accel_noise_mpsrs", p.lost_accel_noise_mpsrs, 0.01, 20.0,
             "The acceleration of a base that nobody feels.");
       field("lost_gyro_noise_radprs", p.lost_gyro_noise_radprs, 0.001, 1.0,
             "The turning of a walking base that nobody feels: 0.03 rad in 0.1 s.");
-      field("dynamic_accel_share", p.dynamic_accel_share, 0.0, 0.5,
-            "Sampling, scale and mount falsify this share of what differs from gravity.");
       field("gyro_bias_walk_radpsrs", p.gyro_bias_walk_radpsrs, 0.0, 0.01, "Random walk of the gyro's bias.");
       field("accel_bias_walk_mps2rs", p.accel_bias_walk_mps2rs, 0.0, 0.1, "Random walk of the accelerometer's bias.");
-      field("foot_sigma_rad", p.foot_sigma_rad, 1e-5, 0.1, "Encoder noise of one attitude of a sole.");
-      field("foot_walk_radprs", p.foot_walk_radprs, 1e-6, 1.0,
-            "A loaded foot's creep and the kinematic error turn its attitude like this as the legs move.");
-      field("contact_walk_mprs", p.contact_walk_mprs, 1e-5, 1.0,
-            "A loaded foot's place walks like this at the start; then the walk is measured.");
-      field("min_contact_walk_mprs", p.min_contact_walk_mprs, 1e-6, 0.1, "The measured walk is at least this.");
-      field("full_walk_speed_mps", p.full_walk_speed_mps, 0.001, 2.0,
-            "A contact walks less when the base moves more slowly, turning included.");
-      field("max_contact_walk_mprs", p.max_contact_walk_mprs, 1e-5, 10.0, "The measured walk is at most this.");
-      field.ordered("min_contact_walk_mprs", "max_contact_walk_mprs");
-      field("whiteness_window_s", p.whiteness_window_s, 0.002, 10.0,
-            "The walk is right when innovations averaged over this time are white.");
-      field("whiteness_gain_ps", p.whiteness_gain_ps, 0.0, 20.0, "Gain of the walk's logarithm in the long run.");
-      field("whiteness_start_gain", p.whiteness_start_gain, 0.0, 10.0,
-            "Gain of the walk's logarithm at the start, over the time measured.");
-      field("whiteness_most_ratio", p.whiteness_most_ratio, 1.01, 1000.0,
-            "Innovations count as no more than this times what white ones are.");
+      field("foot_sigma_m", p.foot_sigma_m, 1e-6, 0.1, "Error of a foot's place by its leg.");
+      field("sole_sigma_rad", p.sole_sigma_rad, 1e-6, 0.1, "Error of a sole's attitude by its leg.");
+      field("foot_correlation_s", p.foot_correlation_s, 1e-4, 1.0,
+            "Both err alike for so long, however many samples there are in it.");
+      field("stance", p.stance);
+      field("height_correlation_s", p.height_correlation_s, 0.002, 100.0,
+            "A tread's height errs alike in every step of this time.");
       field("outlier_sigmas", p.outlier_sigmas, 0.5, 100.0, "Rows farther out weigh less, in proportion (Huber).");
       field("turn_lever_m", p.turn_lever_m, 0.0, 2.0,
             "Turning counts as the speed that it gives a point so far from the base.");
-      field("least_load_share", p.least_load_share, 0.001, 1.0,
-            "A foot that carries less, by load and by how sure its contact is, walks no more than one that carries "
-            "this.");
+      field("motion_s", p.motion_s, 1e-3, 10.0, "Turning and acceleration of the base are averaged over this.");
+      field("imu_delay_sigma_s", p.imu_delay_sigma_s, 0.0, 0.05, "The IMU is later than the legs, by so much usually.");
+      field("imu_delay_memory_s", p.imu_delay_memory_s, 0.1, 1e4,
+            "What is known of its delay is forgotten in this time.");
+      field("imu_delay_start_sigma_s", p.imu_delay_start_sigma_s, 0.0, 0.05,
+            "The start may be that of another time than the first IMU sample's.");
     }
   };
   // One sigma each, of what is known at the start.
@@ -97,25 +99,52 @@ class ContactInEkf {
     double accel_bias_sigma_mps2 = 0.003;
   };
   void reset(const Params& params) noexcept;
-  void initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs) noexcept;
+  // gyro_radps, accel_mps2: of the IMU then.
+  void initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs,
+                  const Vec3& gyro_radps = Vec3::Zero(), const Vec3& accel_mps2 = Vec3{0, 0, kGravity_mps2}) noexcept;
 
   enum class Motion : std::uint8_t {
     kFelt,
     kVelocityLost,  // felt, but no foot has rested for so long that the velocity is not known
     kUnfelt         // the IMU is silent: rates are guesses
   };
-  // noise: as measured of this IMU.
-  void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion,
-               const ImuNoiseDensity& noise = {}) noexcept;
-  // A foot that does not stand is anchored anew.
-  void correct_by_feet(const std::array<LegMeasurement, kFootCount>& legs,
+  void predict(const Vec3& gyro_radps, const Vec3& accel_mps2, double dt_s, Motion motion) noexcept;
+  // A foot that does not stand is anchored anew. legs: as they were legs_delay_s ago, nearly when the IMU felt what it
+  // tells now; what is left of the IMU's delay is estimated.
+  void correct_by_feet(const LegHistory::Moment& legs, double legs_delay_s,
                        const std::array<FootContact, kFootCount>& contacts, double dt_s) noexcept;
+
+  // Eq. (4): the ground's height under feet that stand, where it is known.
+  void correct_by_heights(const std::array<KnownHeight, kFootCount>& heights,
+                          const std::array<FootContact, kFootCount>& contacts, double dt_s) noexcept;
+
+  // Where lidar odometry's world lies is a clone of the base's place and heading at the moment of a tie (stochastic
+  // cloning): later poses of that world are relative to it. It is level: the tilt of its poses is that of its mount,
+  // too. age_s: of the pose by which it is tied; odom_T_base is the state's of that time.
+  void tie_lidar(const Transform& odom_T_base, const Transform& odom_T_lidar, double age_s,
+                 const LidarSigmas& sigmas) noexcept;
+  // That world drifts.
+  void drift_lidar(double position_m2, double rotation_rad2) noexcept;
+  // A pose of it: three rows of position and one of yaw. age_s: of the pose, odom_T_base is the state's of that time.
+  struct LidarRows {
+    Eigen::Vector4d innovation = Eigen::Vector4d::Zero();  // x, y, z in m, yaw in rad
+    double ratio = 0.0;                                    // its square over its variance, per row
+  };
+  [[nodiscard]] LidarRows lidar_rows(const Transform& odom_T_base, const Transform& lidar_T_base, double age_s,
+                                     const LidarSigmas& sigmas) const noexcept;
+  // rows: as lidar_rows has just told them.
+  void correct_by_lidar(const Transform& odom_T_base, const LidarRows& rows, double age_s,
+                        const LidarSigmas& sigmas) noexcept;
 
   [[nodiscard]] const Mat3& odom_R_base() const noexcept { return odom_R_base_; }
   [[nodiscard]] const Vec3& odom_v_base_mps() const noexcept { return odom_v_base_mps_; }
   [[nodiscard]] const Vec3& odom_p_base_m() const noexcept { return odom_p_base_m_; }
   [[nodiscard]] const Vec3& gyro_bias_radps() const noexcept { return gyro_bias_radps_; }
   [[nodiscard]] const Vec3& accel_bias_mps2() const noexcept { return accel_bias_mps2_; }
+  // The state is that of so long ago: the IMU is late by it, against the legs.
+  [[nodiscard]] double imu_delay_s() const noexcept { return imu_delay_s_; }
+  // Of late.
+  [[nodiscard]] const Vec3& odom_a_base_mps2() const noexcept { return odom_a_base_mps2_; }
   [[nodiscard]] double gravity_mps2() const noexcept { return gravity_mps2_; }
   // Of roll and pitch, one sigma, the larger one; and of yaw.
   [[nodiscard]] double tilt_sigma_rad() const noexcept {
@@ -126,35 +155,54 @@ class ContactInEkf {
   [[nodiscard]] Eigen::Matrix<double, 9, 9> covariance() const noexcept;
   [[nodiscard]] double velocity_sigma_mps() const noexcept;  // of the axis that is known worst
   // Of the last correction.
-  [[nodiscard]] const NormalisedRows& position_rows() const noexcept { return position_rows_; }
-  [[nodiscard]] const NormalisedRows& sole_rows() const noexcept { return sole_rows_; }
-  // Random walk of a resting contact, m/sqrt(s), as measured.
-  [[nodiscard]] double contact_walk_mprs() const noexcept { return contact_walk_mprs_; }
+  [[nodiscard]] const NormalisedRows& position_rows() const noexcept { return rows_.position; }
+  [[nodiscard]] const NormalisedRows& sole_rows() const noexcept { return rows_.sole; }
+  [[nodiscard]] const NormalisedRows& height_rows() const noexcept { return rows_.height; }
+  // Mean square per axis of the standing feet's innovations, each averaged over some milliseconds; negative: none.
+  [[nodiscard]] double mean_innovation_m2() const noexcept { return mean_innovation_m2_; }
   [[nodiscard]] std::uint32_t outliers() const noexcept { return outliers_; }
 
  private:
-  static constexpr int kStates = 27;
+  static constexpr int kStates = 34;
   enum Index : int {
     kAttitude = 0,
     kVelocity = 3,
     kPosition = 6,
-    kGyroBias = 9,
-    kAccelBias = 12,
-    kContact = 15,
-    kSoleRotation = 21
+    kContact = 9,
+    kMoving = 15,  // what prediction changes ends here
+    kGyroBias = 15,
+    kAccelBias = 18,
+    kSoleRotation = 21,
+    kLidarRotation = 27,
+    kLidarPosition = 30,
+    kImuDelay = 33
   };
   using Covariance = Eigen::Matrix<double, kStates, kStates>;
   using Vector = Eigen::Matrix<double, kStates, 1>;
 
-  void predict_covariance(double gyro_noise_radprs, double accel_noise_mpsrs, double dt_s) noexcept;
+  void predict_covariance(double gyro_rad2ps, double accel_m2ps3, double dt_s) noexcept;
   void anchor(std::size_t foot, const LegMeasurement& leg) noexcept;
-  // Three rows: state at `plus` minus state at `minus` is innovation, each of this variance.
-  void correct(int plus, int minus, const Vec3& innovation, double variance, NormalisedRows& rows) noexcept;
+  using FeetBatch = RowBatch<kStates, 6 * kFootCount>;
+  // State at `plus` minus state at `minus`, three rows, and their share in the IMU's delay.
+  struct Difference {
+    int plus, minus;
+    Vec3 per_delay;
+  };
+  // variance: of each of the three. Returns what is left of the innovation after the rows before them.
+  Vec3 take(const Difference& difference, const Vec3& innovation, double variance, FeetBatch& batch,
+            NormalisedRows& rows) noexcept;
+  void average_innovation(std::size_t foot, const Vec3& innovation_m, double dt_s) noexcept;
   void apply(const Vector& error) noexcept;
-  // A foot rolls and creeps as long as its leg moves, by more or less from robot to robot. Too small a walk shows as
-  // innovations that keep their sign.
-  void measure_walk(std::size_t foot, const Vec3& innovation_m, double variance_m2, double dt_s) noexcept;
-
+  static constexpr int kYawRow = 3;
+  struct LidarRow {
+    int index = 0;
+    std::array<int, 2> turns{};
+    std::array<double, 2> lever_m{};
+    double age_s = 0.0;
+    [[nodiscard]] double operator()(const Vector& x) const noexcept;
+    [[nodiscard]] Vector times(const Covariance& P) const noexcept;
+  };
+  [[nodiscard]] static LidarRow lidar_row(int index, const Vec3& odom_p_base_m, double age_s) noexcept;
   Params params_;
   Mat3 odom_R_base_ = Mat3::Identity();
   Vec3 odom_v_base_mps_ = Vec3::Zero();
@@ -162,18 +210,19 @@ class ContactInEkf {
   Vec3 gyro_bias_radps_ = Vec3::Zero();
   Vec3 accel_bias_mps2_ = Vec3::Zero();
   std::array<Vec3, kFootCount> odom_p_contact_m_{Vec3::Zero(), Vec3::Zero()};
-  struct Whiteness {
-    Vec3 mean_m = Vec3::Zero();
-    double age_s = 0.0;
-  };
-  std::array<Whiteness, kFootCount> whiteness_{};
-  double contact_walk_mprs_ = 0.0;
-  double pace_ = 1.0;         // share of that walk at the base's speed
-  double walk_time_s_ = 0.0;  // measured for so long
+  StanceWalk stance_;
+  std::array<Vec3, kFootCount> innovation_m_{Vec3::Zero(), Vec3::Zero()};  // averaged
+  double mean_innovation_m2_ = -1.0;
+  double turn_rad2ps2_ = 0.0, accel_m2ps4_ = 0.0;  // of the base, mean squares of late
   std::array<Mat3, kFootCount> odom_R_foot_{Mat3::Identity(), Mat3::Identity()};
+  Transform odom_T_lidar_;  // its world's
+  double imu_delay_s_ = 0.0;
+  Vec3 odom_a_base_mps2_ = Vec3::Zero();
   Covariance P_ = Covariance::Zero();
   double gravity_mps2_ = kGravity_mps2;
-  NormalisedRows position_rows_, sole_rows_;
+  struct {
+    NormalisedRows position, sole, height;
+  } rows_;  // of the last correction
   std::uint32_t outliers_ = 0;
 };
 

@@ -23,17 +23,14 @@ Transform turned_by_yaw(const Transform& predicted, const Transform& measured) n
   return {rotation_z(yaw_rad) * predicted.R, measured.p_m};
 }
 
-// Where LIO's world lies in ours, from one body's pose in both. Both know which way is up, LIO by an IMU of its own:
-// the tie is a heading and a place. A tie that took over what the odometry's tilt was off by, 10 to 20 mrad where a
-// robot sways at the start, would tilt the world that LIO is there to keep level (40 mm on ten stairs, 2026-11).
+double share_within(double length, double limit) noexcept { return length > limit ? limit / length : 1.0; }
+
+}  // namespace
+
 Transform tied_level(const Transform& world_T_body, const Transform& lio_T_body) noexcept {
   const Mat3 R = rotation_z(so3_log(world_T_body.R * lio_T_body.R.transpose()).z());
   return {R, world_T_body.p_m - R * lio_T_body.p_m};
 }
-
-double share_within(double length, double limit) noexcept { return length > limit ? limit / length : 1.0; }
-
-}  // namespace
 
 Transform base_from_lidar(const Transform& lio_T_lidar, const Transform& base_T_lidar) noexcept {
   return lio_T_lidar * base_T_lidar.inverse();

@@ -20,6 +20,10 @@
 namespace polygmap {
 
 // Eq. (5): the base in LIO's world, through the lidar's mount.
+// Where LIO's world lies in ours, from one body's pose in both. Both know which way is up, LIO by an IMU of its own:
+// the tie is a heading and a place. A tie that took over what the odometry's tilt was off by, 10 to 20 mrad where a
+// robot sways at the start, would tilt the world that LIO is there to keep level (40 mm on ten stairs, 2026-11).
+[[nodiscard]] Transform tied_level(const Transform& world_T_body, const Transform& lio_T_body) noexcept;
 [[nodiscard]] Transform base_from_lidar(const Transform& lio_T_lidar, const Transform& base_T_lidar) noexcept;
 // Eq. (9): 1 - alpha.
 [[nodiscard]] double complementary_gain(double dt_s, double tau_s) noexcept;
@@ -51,6 +55,7 @@ struct LioInnovations {
 class LioFusion {
  public:
   struct Params {
+    bool as_rows = true;
     double max_age_s = 0.4;
     double tau_s = 4.0;
     double tau_spm = 0.0;
@@ -73,6 +78,8 @@ class LioFusion {
     LioUncertainty::Params uncertainty;
 
     static void visit(auto& p, auto& field) {
+      field("as_rows", p.as_rows,
+            "Besides the offset, by eqs (5)-(10), poses correct the odometry's velocity, tilt and biases.");
       field("max_age_s", p.max_age_s, 0.0, 0.5, "A pose is no older on arrival; the history of states holds 0.5 s.");
       field("tau_s", p.tau_s, 0.0, 1000.0,
             "Time constant of the offset's low-pass at least: of a LIO of 10 mm at 10 Hz, 2.2 mm come through 4 s.");
@@ -126,14 +133,16 @@ class LioFusion {
   // Of the published pose, world axes; what the slew limit still holds back counts as error.
   [[nodiscard]] const Vec3& position_sigma_m() const noexcept { return position_sigma_m_; }
   [[nodiscard]] double yaw_sigma_rad() const noexcept { return known().yaw_sigma_rad(); }
+  struct LioSigmas {
+    double position_m, rotation_rad;  // of the base
+  };
+  [[nodiscard]] LioSigmas sigmas_of(const LioSample& sample) const noexcept;
+  [[nodiscard]] const Transform& base_T_lidar() const noexcept { return base_T_lidar_; }
   [[nodiscard]] bool aligned() const noexcept { return aligned_; }  // until then the fused pose is the odometry's
   [[nodiscard]] const LioInnovations& innovations() const noexcept { return innovations_; }
   [[nodiscard]] std::int64_t last_accepted_ns() const noexcept { return last_accepted_ns_; }  // -1: none
 
  private:
-  struct LioSigmas {
-    double position_m, rotation_rad;  // of the base
-  };
   [[nodiscard]] bool is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept;
   [[nodiscard]] bool try_realign(const Transform& lio_T_base, const Transform& odom_T_base,
                                  const LioSigmas& sigmas) noexcept;
@@ -143,7 +152,6 @@ class LioFusion {
   [[nodiscard]] const LioUncertainty& known() const noexcept {
     return !aligned_ && doubted_ && count_ <= 1 ? untied_ : uncertainty_;
   }
-  [[nodiscard]] LioSigmas sigmas_of(const LioSample& sample) const noexcept;
   // The odometry moves by next to nothing against LIO from one pose to the next: what is left is LIO's noise, twice.
   void measure_noise(const Transform& lio_T_base, const Transform& odom_T_base, double silence_s) noexcept;
   void observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,

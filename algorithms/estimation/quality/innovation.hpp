@@ -10,14 +10,13 @@
 namespace polygmap {
 
 enum class MeasurementGroup : std::uint8_t {
-  kFootPosition,  // of a standing foot, in the attitude filter: 3 rows a foot
+  kFootPosition,  // of a standing foot, eq. (3): 3 rows a foot
   kSoleAttitude,  // the same of its rotation, where kinematics knows it
-  kFootVelocity,  // base velocity by all contacts, eq. (3): 1 row an axis
   kTreadHeight,   // of a contact on a tread of known height, eq. (4)
   kLioPosition,   // of a LIO pose against the fused one at its stamp, once aligned: 3 rows
   kLioYaw
 };
-inline constexpr std::size_t kMeasurementGroupCount = 6;
+inline constexpr std::size_t kMeasurementGroupCount = 5;
 
 // Rows of one update.
 struct NormalisedRows {

@@ -101,8 +101,8 @@ void print_lio(const Replay& replay, std::size_t poses, std::ostream& out) {
 
 void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
   char line[224];
-  std::snprintf(line, sizeof line, "%zu rows, %.3f s; start: %s; feet's noise %.2f mm\n", log.rows.size(),
-                seconds(log.rows.back().stamp_ns), name_of(replay.start), 1e3 * replay.foot_position_sigma_m);
+  std::snprintf(line, sizeof line, "%zu rows, %.3f s; start: %s; feet as %s\n", log.rows.size(),
+                seconds(log.rows.back().stamp_ns), name_of(replay.start), log.has_soles ? "soles" : "points");
   out << line;
   if (const LogGaps gaps = gaps_of(log); gaps.count > 0) {
     std::snprintf(line, sizeof line, "%zu gap%s of more than %.0f ms without rows, the longest %.3f s: bridged\n",
@@ -137,8 +137,10 @@ CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
   estimate
       ->add_option("LOG.csv", a.log,
                    "t_s, gyro_{x,y,z}_radps, accel_{x,y,z}_mps2, {left,right}_contact (0 to 1), "
-                   "{left,right}_foot_{x,y,z}_m (base frame); optional truth: truth_p{x,y,z}_m, truth_v{x,y,z}_mps, "
-                   "truth_q{w,x,y,z}; the first row of it is the initial state, the rest is scored only")
+                   "{left,right}_foot_{x,y,z}_m (base frame); optional soles, without which feet are points: "
+                   "{left,right}_foot_q{w,x,y,z}, {left,right}_foot_w{x,y,z}_radps; optional truth: "
+                   "truth_p{x,y,z}_m, truth_v{x,y,z}_mps, truth_q{w,x,y,z}; the first row of it is the initial state, "
+                   "the rest is scored only")
       ->required()
       ->type_name("");
   estimate

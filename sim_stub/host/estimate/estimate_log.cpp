@@ -67,6 +67,15 @@ EstimateLog read_estimate_log(const std::string& path) {
     truth_v = columns3(table, "truth_v", "_mps");
     truth_q = quaternion_columns(table, "truth_");
   }
+  log.has_soles = table.has_any("left_foot_q") || table.has_any("right_foot_q") || table.has_any("left_foot_w") ||
+                  table.has_any("right_foot_w");  // then all fourteen columns
+  std::array<Columns4, kFootCount> foot_q{};
+  std::array<Columns3, kFootCount> foot_w{};
+  for (std::size_t f = 0; f < kFootCount && log.has_soles; ++f) {
+    const std::string name = f == 0 ? "left_foot_" : "right_foot_";
+    foot_q[f] = quaternion_columns(table, name);
+    foot_w[f] = columns3(table, name + "w", "_radps");
+  }
   log.rows.resize(table.rows());
   for (std::size_t i = 0; i < table.rows(); ++i) {
     LogRow& row = log.rows[i];
@@ -88,6 +97,9 @@ EstimateLog read_estimate_log(const std::string& path) {
       row.contact[f] = table.number(i, contact[f], 1.0);
       if (row.contact[f] < 0.0) table.fail(i, "a contact is below 0");
       row.base_p_foot_m[f] = vector(table, i, foot[f], kMaxLeg_m);
+      if (!log.has_soles) continue;
+      row.base_R_foot[f] = rotation(table, i, foot_q[f]);
+      row.base_w_foot_radps[f] = vector(table, i, foot_w[f], kMaxRate_radps);
     }
     if (!log.has_truth) continue;
     row.truth.true_T_base = {rotation(table, i, truth_q), vector(table, i, truth_p, kMaxPlace_m)};

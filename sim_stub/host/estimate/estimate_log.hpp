@@ -22,12 +22,16 @@ struct LogRow {
   Vec3 gyro_radps = Vec3::Zero(), accel_mps2 = Vec3::Zero();
   std::array<double, kFootCount> contact{};  // probability, or 0 and 1
   std::array<Vec3, kFootCount> base_p_foot_m{Vec3::Zero(), Vec3::Zero()};
+  // Of the soles, where the log has them: their rates are against the base, in its axes.
+  std::array<Mat3, kFootCount> base_R_foot{Mat3::Identity(), Mat3::Identity()};
+  std::array<Vec3, kFootCount> base_w_foot_radps{Vec3::Zero(), Vec3::Zero()};
   LogTruth truth;  // where the log has it
 };
 
 struct EstimateLog {
   double start_s = 0.0;  // stamp of the first row, as recorded
   bool has_truth = false;
+  bool has_soles = false;  // their orientation and rates; without them feet are points
   std::vector<LogRow> rows;
 };
 

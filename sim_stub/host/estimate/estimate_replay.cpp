@@ -11,6 +11,8 @@
 namespace polygmap::sim {
 namespace {
 
+constexpr double kSlip_mps = 0.15;  // a standing foot that seems faster moves
+
 // Standing still at the start, for so long at least and at most. What is noise is smoothed away, and the last of it is
 // left out: it was motion before it could be seen.
 constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0, kSmoothing_s = 0.05, kUnseenMotion_s = 0.15;
@@ -82,16 +84,17 @@ Opening opening(const EstimateLog& log) {
   return o;
 }
 
-// The feet of a row, as points whose contact the log states.
-LegSample legs_of(const LogRow& row) {
+// The feet of a row, whose contact the log states; where it has no soles they are points.
+LegSample legs_of(const LogRow& row, bool has_soles) {
   LegSample sample;
   sample.stamp_ns = row.stamp_ns;
   sample.stated_contact = row.contact;
   for (std::size_t f = 0; f < kFootCount; ++f) {
     LegMeasurement& leg = sample.legs[f];
     leg.base_T_sole.p_m = row.base_p_foot_m[f];
-    leg.sole_known = false;
-    leg.position_sigma_m = 0.0;
+    leg.sole_known = has_soles;
+    leg.base_T_sole.R = row.base_R_foot[f];
+    leg.base_w_sole_radps = row.base_w_foot_radps[f];
   }
   return sample;
 }
@@ -135,7 +138,7 @@ KnownStart start_of(const EstimateLog& log, const ReplayOptions& options) {
 class LogReplay {
  public:
   LogReplay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options)
-      : imu_(log.rows), lio_(lio), robot_(options.robot), start_(start_of(log, options)) {
+      : has_soles_(log.has_soles), imu_(log.rows), lio_(lio), robot_(options.robot), start_(start_of(log, options)) {
     estimator_.reset(options.estimator, robot_);
     result_.start = start_.source;
   }
@@ -145,7 +148,7 @@ class LogReplay {
     imu_.advance(now_ns);
     lio_.advance(now_ns);
     (void)read_imu(imu_, now_ns, estimator_);
-    estimator_.add_legs(legs_of(row));
+    estimator_.add_legs(legs_of(row, has_soles_));
     if (estimator_.state().initialised) {
       estimator_.tick({true, true});
     } else {
@@ -158,10 +161,8 @@ class LogReplay {
   [[nodiscard]] Replay take() {
     const ProprioceptiveOdometry& odometry = estimator_.odometry();
     const Estimator::Counters& counters = estimator_.counters();
-    result_.gyro_bias_radps = odometry.attitude().gyro_bias_radps();
-    result_.accel_bias_mps2 = odometry.attitude().accel_bias_mps2();
-    result_.foot_position_sigma_m = odometry.motion().position_sigma_m();
-    result_.contact_walk_mprs = odometry.attitude().contact_walk_mprs();
+    result_.gyro_bias_radps = odometry.filter().gyro_bias_radps();
+    result_.accel_bias_mps2 = odometry.filter().accel_bias_mps2();
     result_.imu_invalid = counters.imu_invalid;
     result_.gaps = counters.gaps;
     result_.lio = counters.lio;
@@ -191,10 +192,11 @@ class LogReplay {
     const auto& feet = estimator_.contacts();
     if (!feet[0].stands && !feet[1].stands) ++result_.rows_without_contact;
     for (std::size_t f = 0; f < kFootCount; ++f) {
-      if (feet[f].stands && estimator_.odometry().motion().walk_m2ps(f) > 0.0) ++result_.slipping_rows;
+      if (feet[f].stands && estimator_.odometry().motion().speed_mps(f) > kSlip_mps) ++result_.slipping_rows;
     }
   }
 
+  bool has_soles_;
   LogImu imu_;
   LogLidarOdometry lio_;
   RobotModel robot_;
@@ -209,9 +211,7 @@ class LogReplay {
 Estimator::Params log_params() {
   Estimator::Params params;
   params.imu_of_moments = true;
-  // How much contacts creep is soon found out, where nothing is known of the feet.
-  params.attitude.contact_walk_mprs = 1e-2;
-  params.attitude.whiteness_start_gain = params.attitude.whiteness_gain_ps = 2.0;
+  params.filter.imu_delay_start_sigma_s = 0.01;  // the truth of the first row is that of another time than its IMU's
   params.fusion.uncertainty.initial_sigma_m = 1e-4;  // the start is the truth's, or defined there
   params.fusion.uncertainty.initial_sigma_rad = 1e-4;
   // As the module's 4 s are to its lidar's 10 mm: what comes through grows with LIO's noise, drift does not.

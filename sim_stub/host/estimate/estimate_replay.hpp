@@ -23,7 +23,7 @@ struct ReplayOptions {
   Estimator::Params estimator = log_params();
   RobotModel robot = log_robot();
   // One sigma, where no standstill at the start says what they are.
-  double gyro_bias_sigma_radps = 0.01, accel_bias_sigma_mps2 = 0.2;
+  double gyro_bias_sigma_radps = 0.003, accel_bias_sigma_mps2 = 0.03;
   const std::atomic<int>* interrupt = nullptr;  // the signal that asks to stop, 0 until then
 };
 
@@ -44,7 +44,6 @@ struct Replay {
   std::vector<ReplayTick> ticks;  // one per row
   StartSource start = StartSource::kTruth;
   Vec3 gyro_bias_radps = Vec3::Zero(), accel_bias_mps2 = Vec3::Zero();  // at the end
-  double foot_position_sigma_m = 0.0, contact_walk_mprs = 0.0;          // measured
   std::uint32_t imu_invalid = 0;  // rows beyond what the module takes for true: left out
   std::uint32_t gaps = 0;         // rows that came after more than 50 ms
   std::uint32_t slipping_rows = 0;

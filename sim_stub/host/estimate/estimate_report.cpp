@@ -91,8 +91,6 @@ void write_estimate_json(const std::string& path, const EstimateLog& log, const 
   const ReplayTick& last = replay.ticks.back();
   json["gyro_bias_radps"] = vector(replay.gyro_bias_radps);
   json["accel_bias_mps2"] = vector(replay.accel_bias_mps2);
-  json["foot_position_noise_mm"] = 1e3 * replay.foot_position_sigma_m;
-  json["contact_walk_mm_per_sqrt_s"] = 1e3 * replay.contact_walk_mprs;
   json["innovations"] = innovations(last.quality);
   json["innovation_outliers"] = last.quality.outliers;
   json["moving_contact_rows"] = replay.slipping_rows;

@@ -29,7 +29,10 @@ constexpr std::array<Change, 9> kChanges{{
     {"accel_y_mps2 negated", [](LogRow& row) { row.accel_mps2.y() *= -1.0; }},
     {"accel_x_mps2 and accel_y_mps2 exchanged", [](LogRow& row) { std::swap(row.accel_mps2.x(), row.accel_mps2.y()); }},
     {"the left and the right foot (or their contacts) exchanged",
-     [](LogRow& row) { std::swap(row.base_p_foot_m[0], row.base_p_foot_m[1]); }},
+     [](LogRow& row) {
+       std::swap(row.base_p_foot_m[0], row.base_p_foot_m[1]);
+       std::swap(row.base_R_foot[0], row.base_R_foot[1]);
+     }},
     {"0 and 1 exchanged in both contacts",
      [](LogRow& row) {
        for (double& contact : row.contact) contact = 1.0 - contact;

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "algorithms/core/time.hpp"
-#include "algorithms/robot/leg_kinematics.hpp"
+#include "algorithms/estimation/contact/leg_measurement.hpp"
 #include "firmware/config/file_error.hpp"
 #include "sim_stub/host/output_file.hpp"
 #include "sim_stub/nominal_robot.hpp"
@@ -27,10 +27,13 @@ void add_number(std::string& text, double value) {
 void add_numbers(std::string& text, const Vec3& values) {
   for (const double value : values) add_number(text, value);
 }
-void add_pose(std::string& text, const Transform& pose) {
-  const Eigen::Quaterniond q(pose.R);
-  add_numbers(text, pose.p_m);
+void add_rotation(std::string& text, const Mat3& R) {
+  const Eigen::Quaterniond q(R);
   for (const double value : {q.w(), q.x(), q.y(), q.z()}) add_number(text, value);
+}
+void add_pose(std::string& text, const Transform& pose) {
+  add_numbers(text, pose.p_m);
+  add_rotation(text, pose.R);
 }
 
 }  // namespace
@@ -89,8 +92,11 @@ void ClimbRecorder::observe(const Truth& truth, const StateEstimate& state) {
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     // Before the module has an opinion it waits for a robot that stands.
     row.contact[index_of(foot)] = state.initialised ? state.contact_probability[index_of(foot)] : 1.0;
-    row.base_p_foot_m[index_of(foot)] =
-        base_T_sole(nominal_robot().legs, foot, leg_joints(last_joints_.q_rad, foot)).p_m;
+    const LegMeasurement leg = measure_leg(leg_frames(nominal_robot().legs, foot, leg_joints(last_joints_.q_rad, foot)),
+                                           leg_joints(last_joints_.dq_radps, foot));
+    row.base_p_foot_m[index_of(foot)] = leg.base_T_sole.p_m;
+    row.base_R_foot[index_of(foot)] = leg.base_T_sole.R;
+    row.base_w_foot_radps[index_of(foot)] = leg.base_w_sole_radps;
   }
   row.truth.true_T_base = truth.true_T_base;
   rows_.push_back(row);
@@ -105,7 +111,10 @@ void ClimbRecorder::write(const std::string& folder) const {
   std::string log =
       "t_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2,left_contact,right_contact,"
       "left_foot_x_m,left_foot_y_m,left_foot_z_m,right_foot_x_m,right_foot_y_m,right_foot_z_m,"
-      "truth_px_m,truth_py_m,truth_pz_m,truth_qw,truth_qx,truth_qy,truth_qz,truth_vx_mps,truth_vy_mps,truth_vz_mps\n";
+      "truth_px_m,truth_py_m,truth_pz_m,truth_qw,truth_qx,truth_qy,truth_qz,truth_vx_mps,truth_vy_mps,truth_vz_mps,"
+      "left_foot_qw,left_foot_qx,left_foot_qy,left_foot_qz,left_foot_wx_radps,left_foot_wy_radps,left_foot_wz_radps,"
+      "right_foot_qw,right_foot_qx,right_foot_qy,right_foot_qz,right_foot_wx_radps,right_foot_wy_radps,"
+      "right_foot_wz_radps\n";
   for (const LogRow& row : rows_) {
     add_number(log, seconds(row.stamp_ns));
     add_numbers(log, row.gyro_radps);
@@ -114,6 +123,10 @@ void ClimbRecorder::write(const std::string& folder) const {
     for (const Vec3& foot_m : row.base_p_foot_m) add_numbers(log, foot_m);
     add_pose(log, row.truth.true_T_base);
     add_numbers(log, row.truth.true_v_base_mps);
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      add_rotation(log, row.base_R_foot[f]);
+      add_numbers(log, row.base_w_foot_radps[f]);
+    }
     log += '\n';
   }
   write_output(folder + "/log.csv", log);

@@ -70,7 +70,7 @@ TEST_F(EstimatorTest, Standstill_BiasedSensors_FindsBiasTiltAndFloor) {
   run(walk, spec, 1100 * kNsPerMs);
   const StateEstimate& state = estimator_.state();
   ASSERT_TRUE(state.initialised);
-  EXPECT_LT((estimator_.odometry().attitude().gyro_bias_radps() - walk.gyro_bias_radps()).norm(), 6e-4);
+  EXPECT_LT((estimator_.odometry().filter().gyro_bias_radps() - walk.gyro_bias_radps()).norm(), 6e-4);
   EXPECT_NEAR(yaw_of(state.odom_T_base.R), 0.0, 5e-4);
   EXPECT_LT(so3_log(state.odom_T_base.R).head<2>().norm(),
             0.02);  // accelerometer bias and mount: 0.4 deg each, 1 sigma
@@ -247,7 +247,6 @@ TEST_F(EstimatorTest, StartGiven_PointFeetWithStatedContact_CarryTheStateOn) {
     sample.stated_contact = {1.0, 0.0};
     for (LegMeasurement& leg : sample.legs) {
       leg.sole_known = false;
-      leg.position_sigma_m = 0.0;
       leg.base_T_sole.p_m = base_p_left_m - Vec3{gone_m, 0.0, 0.0};
     }
     return sample;
@@ -382,14 +381,13 @@ TEST_F(EstimatorTest, ImuSlowerThanTheTick_FollowsTheTruthAsWellAndIsAsSure) {
   const Outcome every_tick = climb(kTick_ns);
   struct Times {
     std::int64_t interval_ns;
-    double worst_m, worst_rad, sigma_m;
+    double worst_m, worst_rad;
   };
-  for (const Times& most : {Times{5 * kNsPerMs, 1.3, 2.0, 1.4}, Times{10 * kNsPerMs, 1.8, 4.5, 2.0}}) {
+  for (const Times& most : {Times{5 * kNsPerMs, 1.3, 2.5}, Times{10 * kNsPerMs, 1.8, 5.0}}) {
     const Outcome slow = climb(most.interval_ns);
     EXPECT_LT(slow.worst_m, most.worst_m * every_tick.worst_m) << most.interval_ns;
     EXPECT_LT(slow.worst_rad, most.worst_rad * every_tick.worst_rad) << most.interval_ns;
-    EXPECT_LT(slow.sigma_m, most.sigma_m * every_tick.sigma_m) << most.interval_ns;
-    EXPECT_GT(slow.sigma_m, every_tick.sigma_m) << most.interval_ns;
+    EXPECT_NEAR(slow.sigma_m, every_tick.sigma_m, 0.05 * every_tick.sigma_m) << most.interval_ns;
     EXPECT_NEAR(slow.tilt_sigma_rad, every_tick.tilt_sigma_rad, 0.05 * every_tick.tilt_sigma_rad) << most.interval_ns;
   }
 }

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <bitset>
 
-#include "algorithms/estimation/filters/base_filter.hpp"
+#include "tests/reference/base_filter/base_filter.hpp"
 
 namespace polygmap::reference {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/estimation/filters/base_filter.hpp"
+#include "tests/reference/base_filter/base_filter.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Eqs (1)-(4).
-#include "algorithms/estimation/filters/base_filter.hpp"
+#include "tests/reference/base_filter/base_filter.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The paper's Kalman filter, eqs (1)-(4): 30 states (base position and velocity, eight contact points, all in odom) and
-// 56 rows (contact positions and velocities relative to the base, contact heights).
+// The paper's Kalman filter, eqs (1)-(4), which the module's one filter is measured against: 30 states (base position
+// and velocity, eight contact points, all in odom) and 56 rows (contact positions and velocities relative to the base,
+// contact heights).
 #pragma once
 
-#include "algorithms/estimation/contact/contacts.hpp"
-#include "algorithms/estimation/contact/leg_measurement.hpp"
-#include "algorithms/estimation/filters/axis_filter.hpp"
+#include "algorithms/estimation/filters/contact_inekf.hpp"
 #include "algorithms/estimation/quality/innovation.hpp"
+#include "tests/reference/base_filter/axis_filter.hpp"
 
 namespace polygmap {
 
@@ -27,11 +27,6 @@ struct ContactRow {
   double height_m2 = -1.0;  // negative: height unknown
 };
 using ContactRows = std::array<ContactRow, kContactCount>;  // left foot first
-
-struct KnownHeight {
-  double odom_z_m = 0.0;
-  double sigma_m = -1.0;  // negative: unknown
-};
 
 class BaseFilter {
  public:
