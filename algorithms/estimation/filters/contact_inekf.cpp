@@ -2,6 +2,7 @@
 #include "algorithms/estimation/filters/contact_inekf.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "algorithms/geometry/so3.hpp"
@@ -20,7 +21,7 @@ int of_foot(int first, std::size_t foot) noexcept { return first + 3 * static_ca
 }  // namespace
 
 void ContactInEkf::reset(const Params& params) noexcept {
-  *this = ContactInEkf{};
+  std::construct_at(this);  // a copy would not fit the stack
   params_ = params;
 }
 
