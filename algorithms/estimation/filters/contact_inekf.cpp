@@ -2,7 +2,6 @@
 #include "algorithms/estimation/filters/contact_inekf.hpp"
 
 #include <algorithm>
-#include <memory>
 #include <utility>
 
 #include "algorithms/geometry/so3.hpp"
@@ -21,8 +20,24 @@ int of_foot(int first, std::size_t foot) noexcept { return first + 3 * static_ca
 }  // namespace
 
 void ContactInEkf::reset(const Params& params) noexcept {
-  std::construct_at(this);  // a copy would not fit the stack
+  // One by one: a whole one to copy from would not fit the stack.
   params_ = params;
+  odom_R_base_.setIdentity();
+  for (Vec3* const zero :
+       {&odom_v_base_mps_, &odom_p_base_m_, &gyro_bias_radps_, &accel_bias_mps2_, &odom_a_base_mps2_}) {
+    zero->setZero();
+  }
+  odom_p_contact_m_.fill(Vec3::Zero());
+  innovation_m_.fill(Vec3::Zero());
+  odom_R_foot_.fill(Mat3::Identity());
+  odom_T_lidar_ = {};
+  stance_ = {};
+  P_.setZero();
+  mean_innovation_m2_ = -1.0;
+  turn_rad2ps2_ = accel_m2ps4_ = imu_delay_s_ = 0.0;
+  gravity_mps2_ = kGravity_mps2;
+  rows_ = {};
+  outliers_ = 0;
 }
 
 void ContactInEkf::initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs,
