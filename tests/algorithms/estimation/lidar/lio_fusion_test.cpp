@@ -48,13 +48,6 @@ TEST(LioFusionEquations, Eq10_GainOfZeroAndOne_AreTheTwoPoses) {
   EXPECT_LT((fuse_pose(kPose, kOther, 1.0).R - kOther.R).norm(), 1e-14);
   EXPECT_EQ(fuse_pose(kPose, kOther, 1.0).p_m, kOther.p_m);
 }
-// The complementary filter, alone.
-LioFusion::Params complementary() {
-  LioFusion::Params params;
-  params.as_rows = false;
-  return params;
-}
-
 class LioFusionTest : public ::testing::Test {
  protected:
   void SetUp() override { fusion_.reset(params_, mount_); }
@@ -78,7 +71,7 @@ class LioFusionTest : public ::testing::Test {
   }
 
   static constexpr double kLioSigma_m = 0.01, kLioSigma_rad = 0.0035;
-  LioFusion::Params params_ = complementary();
+  LioFusion::Params params_;
   LioFusion fusion_;
   Transform mount_ = base_T_lidar();
   Transform lio_T_true_{rotation_z(2.0), Vec3{12, -7, 1}};
@@ -343,7 +336,7 @@ TEST_F(NoisyLioFusionTest, TiltOfLio_NeverTiltsTheFusedPose) {
 }
 // Root mean square of the fused position's error. Not at_stamp: against the odometry of the pose's arrival.
 double fused_rmse_m(bool at_stamp) {
-  LioFusion::Params params = complementary();
+  LioFusion::Params params;
   params.tau_s = 0.5;
   LioFusion fusion;
   fusion.reset(params, base_T_lidar());
