@@ -3,8 +3,8 @@
 // over it, and gives way when it is unloaded. As densities, so that the rate of samples does not matter.
 //
 // The constants were chosen on the three logs of docs/measured/estimation.md, the rocking of a sole that rests on
-// simulated climbs over soft ground: with a fifteenth of it the robot of seed 32, twice as bad as real ones, lost its tilt
-// and fell.
+// simulated climbs over soft ground: with a fifteenth of it the robot of seed 32, twice as bad as real ones, lost its
+// tilt and fell.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lidar odometry as relative poses: where its world lies is a clone of the base's place and heading when the
-// two were tied, and every later pose corrects the filter against that, as of its own stamp. So velocity, tilt and biases gain from it.
+// two were tied, and every later pose corrects the filter against that, as of its own stamp. So velocity, tilt and
+// biases gain from it.
 //
 // What lidar odometry moves the filter by at once, in place and heading, odom does not follow: odometry goes on without
 // a step, and so do the footholds that live in it. Where odom lies in the world is eqs (5)-(10)'s to say (LioFusion).
