@@ -74,7 +74,13 @@ void Estimator::add_lio(const LioSample& sample, std::int64_t now_ns) noexcept {
         known = ring_.try_at(sample.stamp_ns, then);
       }
     }
-    verdict = known ? odometry_.add_lio(sample, then.odom_T_base, newest_input_ns()) : LioVerdict::kNoOdometry;
+    if (!known) {
+      verdict = LioVerdict::kNoOdometry;
+    } else if (state_.initialised) {
+      verdict = odometry_.add_lio(sample, then.odom_T_base, newest_input_ns());
+    } else {  // the filter that balances until then does not stand in odom yet
+      verdict = odometry_.fusion().fuse(sample, then.odom_T_base);
+    }
   }
   ++counters_.lio[static_cast<std::size_t>(verdict)];
 }

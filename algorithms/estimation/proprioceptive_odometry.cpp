@@ -101,7 +101,7 @@ void ProprioceptiveOdometry::step(const Step& whole, const Legs& legs, const Con
   base_w_base_radps_ = gyro_radps - filter_.gyro_bias_radps();
   count_innovations(step);
   covariance_ = filter_.covariance();
-  scale_.update(step.new_legs ? filter_.mean_innovation_m2() : -1.0, accel_mps2 - last_accel_mps2_, step.dt_s);
+  scale_.update(step.new_legs ? filter_.mean_innovation_ratio() : -1.0, accel_mps2 - last_accel_mps2_, step.dt_s);
   last_accel_mps2_ = accel_mps2;
   published_ = scale_.published(covariance_);
   const double filter_m2 = covariance_.diagonal().head<3>().maxCoeff();
@@ -155,7 +155,7 @@ void ProprioceptiveOdometry::take_legs(std::int64_t stamp_ns, const Legs& legs, 
 LioVerdict ProprioceptiveOdometry::add_lio(const LioSample& sample, const Transform& odom_T_base,
                                            std::int64_t now_ns) noexcept {
   const LioVerdict verdict = fusion_.fuse(sample, odom_T_base);
-  if (!params_.fusion.as_rows) return verdict;
+  if (!params_.lidar_tie.as_rows) return verdict;
   if (verdict == LioVerdict::kRealigned) tie_.untie();
   if (verdict == LioVerdict::kAccepted || verdict == LioVerdict::kRealigned)
     correct_by_lio(sample, odom_T_base, now_ns);

@@ -33,8 +33,9 @@ void ContactInEkf::reset(const Params& params) noexcept {
   odom_T_lidar_ = {};
   stance_ = {};
   P_.setZero();
-  mean_innovation_m2_ = -1.0;
-  turn_rad2ps2_ = accel_m2ps4_ = imu_delay_s_ = 0.0;
+  mean_innovation_ratio_ = -1.0;
+  motion_ = {};
+  imu_delay_s_ = 0.0;
   gravity_mps2_ = kGravity_mps2;
   rows_ = {};
   outliers_ = 0;
@@ -43,7 +44,7 @@ void ContactInEkf::reset(const Params& params) noexcept {
 void ContactInEkf::initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs,
                               const Vec3& gyro_radps, const Vec3& accel_mps2) noexcept {
   stance_.reset(params_.stance);
-  turn_rad2ps2_ = accel_m2ps4_ = 0.0;
+  motion_ = {0.0, 0.0, accel_mps2};
   odom_R_base_ = start.odom_R_base;
   odom_p_base_m_ = start.odom_p_base_m;
   odom_v_base_mps_ = start.odom_v_base_mps;
@@ -99,8 +100,8 @@ void ContactInEkf::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, doubl
   const Vec3 force_mps2 = odom_R_base_ * so3_exp(0.5 * turn_rad) * (accel_mps2 - accel_bias_mps2_);
   const Vec3 odom_a_mps2 = force_mps2 - Vec3{0, 0, gravity_mps2_};
   const double share = dt_s / (params_.motion_s + dt_s);
-  turn_rad2ps2_ += share * ((turn_rad / dt_s).squaredNorm() - turn_rad2ps2_);
-  accel_m2ps4_ += share * (odom_a_mps2.squaredNorm() - accel_m2ps4_);
+  motion_.turn_rad2ps2 += share * ((turn_rad / dt_s).squaredNorm() - motion_.turn_rad2ps2);
+  motion_.accel_m2ps4 += share * (odom_a_mps2.squaredNorm() - motion_.accel_m2ps4);
   odom_a_base_mps2_ += dt_s / (0.5 * params_.motion_s + dt_s) * (odom_a_mps2 - odom_a_base_mps2_);
   const double kept = math::exp(-dt_s / params_.imu_delay_memory_s);
   imu_delay_s_ *= kept;
@@ -109,8 +110,11 @@ void ContactInEkf::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, doubl
   P_(kImuDelay, kImuDelay) += math::square(params_.imu_delay_sigma_s) * (1.0 - kept * kept);
   const double gyro_rad2ps = math::square(params_.gyro_noise_radprs) +
                              (motion == Motion::kUnfelt ? math::square(params_.lost_gyro_noise_radprs) : 0.0);
+  const double accel_step_m2ps4 = (accel_mps2 - motion_.felt_mps2).squaredNorm() / 3.0;
+  motion_.felt_mps2 = accel_mps2;
   const double accel_m2ps3 = math::square(params_.accel_noise_mpsrs) +
-                             math::square(params_.accel_noise_rs) * accel_m2ps4_ +
+                             math::square(params_.accel_noise_rs) * motion_.accel_m2ps4 +
+                             math::square(params_.accel_step_share) * accel_step_m2ps4 * dt_s +
                              (motion == Motion::kFelt ? 0.0 : math::square(params_.lost_accel_noise_mpsrs));
   predict_covariance(gyro_rad2ps, accel_m2ps3, dt_s);
   odom_p_base_m_ += dt_s * (odom_v_base_mps_ + 0.5 * dt_s * odom_a_mps2);
@@ -157,7 +161,7 @@ void ContactInEkf::correct_by_feet(const LegHistory::Moment& legs, double legs_d
     if (!stands[foot]) anchor(foot, legs.legs[foot]);
   }
   stance_.update(stands, dt_s);
-  const double speed_m2ps2 = odom_v_base_mps_.squaredNorm() + math::square(params_.turn_lever_m) * turn_rad2ps2_;
+  const double speed_m2ps2 = odom_v_base_mps_.squaredNorm() + math::square(params_.turn_lever_m) * motion_.turn_rad2ps2;
   // As many samples as there are in the time for which they err alike count as one.
   const double alike = std::max(2.0 * params_.foot_correlation_s / dt_s, 1.0);
   const double position_m2 = alike * math::square(params_.foot_sigma_m);
@@ -169,7 +173,7 @@ void ContactInEkf::correct_by_feet(const LegHistory::Moment& legs, double legs_d
         dt_s * (stance_.contact_m2ps(foot, sole_known, speed_m2ps2) + Vec3::Constant(contacts[foot].walk_m2ps));
     if (sole_known) P_.diagonal().segment<3>(of_foot(kSoleRotation, foot)) += dt_s * stance_.sole_rad2ps(speed_m2ps2);
   }
-  mean_innovation_m2_ = -1.0;
+  mean_innovation_ratio_ = -1.0;
   FeetBatch batch;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     if (!stands[foot]) continue;
@@ -190,29 +194,32 @@ void ContactInEkf::correct_by_feet(const LegHistory::Moment& legs, double legs_d
   apply(batch.error());
 }
 
-void ContactInEkf::average_innovation(std::size_t foot, const Vec3& innovation_m, double dt_s) noexcept {
+void ContactInEkf::average_innovation(std::size_t foot, const Innovation& innovation_m, double dt_s) noexcept {
   constexpr double kWindow_s = 0.02;
   const double share = dt_s / (std::min(kWindow_s, stance_.age_s(foot) - dt_s) + dt_s);
-  innovation_m_[foot] += share * (innovation_m - innovation_m_[foot]);
-  const double square_m2 = innovation_m_[foot].squaredNorm() / 3.0;
-  mean_innovation_m2_ = mean_innovation_m2_ < 0.0 ? square_m2 : 0.5 * (mean_innovation_m2_ + square_m2);
+  innovation_m_[foot] += share * (innovation_m.value - innovation_m_[foot]);
+  const double expected_m2 = innovation_m.variance + math::square(params_.foot_sigma_m);
+  const double ratio = innovation_m_[foot].squaredNorm() / (3.0 * expected_m2);
+  mean_innovation_ratio_ = mean_innovation_ratio_ < 0.0 ? ratio : 0.5 * (mean_innovation_ratio_ + ratio);
 }
 
-Vec3 ContactInEkf::take(const Difference& difference, const Vec3& innovation, double variance, FeetBatch& batch,
-                        NormalisedRows& rows) noexcept {
+ContactInEkf::Innovation ContactInEkf::take(const Difference& difference, const Vec3& innovation, double variance,
+                                            FeetBatch& batch, NormalisedRows& rows) noexcept {
   const auto row = [&](int i) {
     return [plus = difference.plus + i, minus = difference.minus + i,
             delay = difference.per_delay[i]](const Vector& x) { return x[plus] - x[minus] + delay * x[kImuDelay]; };
   };
   std::array<Vector, 3> columns;
-  Vec3 left;  // of the innovation, after the rows before
+  Innovation left{Vec3::Zero(), 0.0};
   double ratio = 0.0;
   for (int i = 0; i < 3; ++i) {
     Vector& PHt = columns[static_cast<std::size_t>(i)];
     PHt = P_.col(difference.plus + i) - P_.col(difference.minus + i) + difference.per_delay[i] * P_.col(kImuDelay);
     batch.condition(PHt, row(i));
-    left[i] = innovation[i] - row(i)(batch.error());
-    ratio += math::square(left[i]) / (3.0 * std::max(row(i)(PHt) + variance, 1e-18));
+    const double of_state = std::max(row(i)(PHt), 0.0);
+    left.value[i] = innovation[i] - row(i)(batch.error());
+    left.variance += of_state / 3.0;
+    ratio += math::square(left.value[i]) / (3.0 * std::max(of_state + variance, 1e-18));
   }
   rows.take(3.0 * ratio, 3);
   const double sigmas = math::sqrt(ratio) / params_.outlier_sigmas;

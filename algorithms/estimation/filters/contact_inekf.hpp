@@ -37,6 +37,7 @@ class ContactInEkf {
     double gyro_noise_radprs = 1e-3;
     double accel_noise_mpsrs = 0.015;
     double accel_noise_rs = 0.006;
+    double accel_step_share = 0.25;
     double lost_accel_noise_mpsrs = 2.0;
     double lost_gyro_noise_radprs = 0.1;
     double gyro_bias_walk_radpsrs = 1e-4;
@@ -59,6 +60,8 @@ class ContactInEkf {
       field("accel_noise_mpsrs", p.accel_noise_mpsrs, 1e-5, 1.0, "The same of the accelerometer, of a base at rest.");
       field("accel_noise_rs", p.accel_noise_rs, 0.0, 1.0,
             "Scale, mount, timing and vibration add so much for each m/s^2 that the base accelerates.");
+      field("accel_step_share", p.accel_step_share, 0.0, 10.0,
+            "Between two samples the acceleration is off by this share of its change.");
       field("lost_accel_noise_mpsrs", p.lost_accel_noise_mpsrs, 0.01, 20.0,
             "The acceleration of a base that nobody feels.");
       field("lost_gyro_noise_radprs", p.lost_gyro_noise_radprs, 0.001, 1.0,
@@ -158,8 +161,9 @@ class ContactInEkf {
   [[nodiscard]] const NormalisedRows& position_rows() const noexcept { return rows_.position; }
   [[nodiscard]] const NormalisedRows& sole_rows() const noexcept { return rows_.sole; }
   [[nodiscard]] const NormalisedRows& height_rows() const noexcept { return rows_.height; }
-  // Mean square per axis of the standing feet's innovations, each averaged over some milliseconds; negative: none.
-  [[nodiscard]] double mean_innovation_m2() const noexcept { return mean_innovation_m2_; }
+  // Square of the standing feet's innovations, each averaged over some milliseconds, over the variance that the filter
+  // expects of them; per axis; negative: none.
+  [[nodiscard]] double mean_innovation_ratio() const noexcept { return mean_innovation_ratio_; }
   [[nodiscard]] std::uint32_t outliers() const noexcept { return outliers_; }
 
  private:
@@ -188,10 +192,15 @@ class ContactInEkf {
     int plus, minus;
     Vec3 per_delay;
   };
-  // variance: of each of the three. Returns what is left of the innovation after the rows before them.
-  Vec3 take(const Difference& difference, const Vec3& innovation, double variance, FeetBatch& batch,
-            NormalisedRows& rows) noexcept;
-  void average_innovation(std::size_t foot, const Vec3& innovation_m, double dt_s) noexcept;
+  // What is left of an innovation after the rows before it, and the variance that the state gives it, per axis.
+  struct Innovation {
+    Vec3 value;
+    double variance;
+  };
+  // variance: of each of the three measurements.
+  Innovation take(const Difference& difference, const Vec3& innovation, double variance, FeetBatch& batch,
+                  NormalisedRows& rows) noexcept;
+  void average_innovation(std::size_t foot, const Innovation& innovation_m, double dt_s) noexcept;
   void apply(const Vector& error) noexcept;
   static constexpr int kYawRow = 3;
   struct LidarRow {
@@ -212,8 +221,11 @@ class ContactInEkf {
   std::array<Vec3, kFootCount> odom_p_contact_m_{Vec3::Zero(), Vec3::Zero()};
   StanceWalk stance_;
   std::array<Vec3, kFootCount> innovation_m_{Vec3::Zero(), Vec3::Zero()};  // averaged
-  double mean_innovation_m2_ = -1.0;
-  double turn_rad2ps2_ = 0.0, accel_m2ps4_ = 0.0;  // of the base, mean squares of late
+  double mean_innovation_ratio_ = -1.0;
+  struct {
+    double turn_rad2ps2 = 0.0, accel_m2ps4 = 0.0;  // of the base, mean squares of late
+    Vec3 felt_mps2 = Vec3::Zero();                 // by the last sample
+  } motion_;
   std::array<Mat3, kFootCount> odom_R_foot_{Mat3::Identity(), Mat3::Identity()};
   Transform odom_T_lidar_;  // its world's
   double imu_delay_s_ = 0.0;

@@ -4,6 +4,8 @@
 // that of the measurements one by one. Its loops are plain: the compiler makes vectors of them.
 #pragma once
 
+#include <algorithm>
+
 #include "algorithms/core/math/math.hpp"
 
 namespace polygmap {
@@ -40,22 +42,52 @@ class RowBatch {
     if constexpr (MaxRows >= 6) {
       for (; k + 6 <= rows_; k += 6) subtract<6>(k, P);
     }
-    for (; k + 2 <= rows_; k += 2) subtract<2>(k, P);
-    if (k < rows_) subtract<1>(k, P);
+    if constexpr (MaxRows >= 4) {
+      for (; k + 4 <= rows_; k += 4) subtract<4>(k, P);
+    }
+    for (; k < rows_; ++k) subtract<1>(k, P);
+    mirror(P);
   }
 
  private:
-  template <int Count>
+  // P is symmetric: it is changed from its diagonal on downwards, in bands of columns, and copied above in the end.
+  static constexpr int kBand = 8;
+
+  template <int Count, int First = 0>
   void subtract(int first, Covariance& P) const noexcept {
+    constexpr int kEnd = std::min(First + kBand, States);
     std::array<const double*, Count> taken;
     for (int k = 0; k < Count; ++k) taken[static_cast<std::size_t>(k)] = column(first + k).data();
-    for (int j = 0; j < States; ++j) {
-      double* const out = P.data() + j * States;
-      for (int i = 0; i < States; ++i) {
-        double sum = 0.0;
-        for (const double* const t : taken) sum += t[i] * t[j];
-        out[i] -= sum;  // symmetric to the last bit
+    int j = First;
+    for (; j + 1 < kEnd; j += 2) subtract_from_two<Count, First>(taken, j, P.col(j).data(), P.col(j + 1).data());
+    for (int i = First; i < States && j < kEnd; ++i) {  // an odd one
+      double sum = 0.0;
+      for (const double* const t : taken) sum += t[i] * t[j];
+      P(i, j) -= sum;
+    }
+    if constexpr (kEnd < States) subtract<Count, kEnd>(first, P);
+  }
+  // Two columns at once: what is taken is read once for both. Apart from each other, which the compiler is told.
+  template <int Count, int First>
+  static void subtract_from_two(const std::array<const double*, Count>& taken, int j, double* __restrict left,
+                                double* __restrict right) noexcept {
+    for (int i = First; i < States; ++i) {
+      double left_sum = 0.0, right_sum = 0.0;
+      for (const double* const t : taken) {
+        left_sum += t[i] * t[j];
+        right_sum += t[i] * t[j + 1];
       }
+      left[i] -= left_sum;
+      right[i] -= right_sum;
+    }
+  }
+  template <int First = 0>
+  static void mirror(Covariance& P) noexcept {
+    constexpr int kEnd = std::min(First + kBand, States), kBelow = States - kEnd;
+    if constexpr (kBelow > 0) {
+      P.template block<kEnd - First, kBelow>(First, kEnd) =
+          P.template block<kBelow, kEnd - First>(kEnd, First).transpose();
+      mirror<kEnd>(P);
     }
   }
   [[nodiscard]] const Vector& column(int k) const noexcept { return columns_[static_cast<std::size_t>(k)]; }

@@ -20,6 +20,8 @@ class StanceWalk {
     double contact_mprs = 6e-3;
     double contact_rs = 4e-3;
     double full_mps = 0.1;
+    double bedding_s = 2.0;
+    double bedded_share = 0.5;
     double least_mprs = 3e-4;
     double point_mprs = 0.015;
     double point_rs = 0.018;
@@ -38,6 +40,9 @@ class StanceWalk {
       field("contact_rs", p.contact_rs, 0.0, 1.0, "And so much more for each m/s of the base's.");
       field("full_mps", p.full_mps, 0.001, 2.0,
             "A foot creeps less where the base moves more slowly, turning included.");
+      field("bedding_s", p.bedding_s, 0.01, 1e6,
+            "And less once it has stood for this time, in inverse proportion: it has bedded in.");
+      field("bedded_share", p.bedded_share, 0.0, 1.0, "To this share at least.");
       field("least_mprs", p.least_mprs, 1e-6, 0.1, "But it creeps like this at least.");
       field("point_mprs", p.point_mprs, 1e-6, 1.0,
             "A foot that is known as a point rolls: its place creeps like this.");
@@ -71,9 +76,10 @@ class StanceWalk {
   [[nodiscard]] Vec3 contact_m2ps(std::size_t foot, bool sole_known, double speed_m2ps2) const noexcept {
     const double at_rest_mprs = sole_known ? params_.contact_mprs : params_.point_mprs;
     const double moving_rs = sole_known ? params_.contact_rs : params_.point_rs;
-    const double pace = std::min(math::sqrt(speed_m2ps2) / params_.full_mps, 1.0);
+    const double bedded = std::max(params_.bedding_s / std::max(age_s_[foot], params_.bedding_s), params_.bedded_share);
+    const double pace = bedded * std::min(math::sqrt(speed_m2ps2) / params_.full_mps, 1.0);
     const double creep_mprs = std::max(pace * at_rest_mprs, params_.least_mprs);
-    double walk_m2ps = math::square(creep_mprs) + math::square(moving_rs) * speed_m2ps2 +
+    double walk_m2ps = math::square(creep_mprs) + math::square(bedded * moving_rs) * speed_m2ps2 +
                        math::square(params_.landing_mprs) * math::exp(-age_s_[foot] / params_.landing_s);
     const std::size_t witness = 1 - foot;
     const bool unloads = stands_[witness] && age_s_[witness] < std::min(params_.unloading_s, age_s_[foot]);

@@ -14,6 +14,7 @@ namespace polygmap {
 class LidarTie {
  public:
   struct Params {
+    bool as_rows = true;
     double tilt_sigma_rad = 0.003;
     double walk_mprs = 0.03;
     double walk_radprs = 3e-4;
@@ -21,6 +22,8 @@ class LidarTie {
     std::int32_t most_denied = 10;
 
     static void visit(auto& p, auto& field) {
+      field("as_rows", p.as_rows,
+            "Besides the offset, by eqs (5)-(10), poses correct the odometry's velocity, tilt and biases.");
       field("tilt_sigma_rad", p.tilt_sigma_rad, 0.0, 0.2, "Lidar odometry's world is level but for this.");
       field("walk_mprs", p.walk_mprs, 0.0, 1.0,
             "Its world drifts like this: one of 2 to 20 mm/s is not to move the footholds.");

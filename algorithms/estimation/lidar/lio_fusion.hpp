@@ -55,7 +55,6 @@ struct LioInnovations {
 class LioFusion {
  public:
   struct Params {
-    bool as_rows = true;
     double max_age_s = 0.4;
     double tau_s = 4.0;
     double tau_spm = 0.0;
@@ -78,8 +77,6 @@ class LioFusion {
     LioUncertainty::Params uncertainty;
 
     static void visit(auto& p, auto& field) {
-      field("as_rows", p.as_rows,
-            "Besides the offset, by eqs (5)-(10), poses correct the odometry's velocity, tilt and biases.");
       field("max_age_s", p.max_age_s, 0.0, 0.5, "A pose is no older on arrival; the history of states holds 0.5 s.");
       field("tau_s", p.tau_s, 0.0, 1000.0,
             "Time constant of the offset's low-pass at least: of a LIO of 10 mm at 10 Hz, 2.2 mm come through 4 s.");

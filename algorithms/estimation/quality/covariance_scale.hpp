@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// By how much the published covariance of position and velocity is larger or smaller than the filter's: as the standing
-// feet's innovations, averaged over some milliseconds, are to what they usually are. Published only: no gain depends on
-// it, so that nothing which the filter measures of itself feeds back.
+// By how much the published covariance of position and velocity is larger or smaller than the filter's: as the squares
+// of the standing feet's innovations, averaged over some milliseconds, are to what the filter expects of them.
+// Published only: no gain depends on it, so that nothing which the filter measures of itself feeds back.
 //
 // The constants are fitted to the three logs in docs/measured/estimation.md and looked at on simulated climbs.
 #pragma once
@@ -15,29 +15,23 @@ namespace polygmap {
 class CovarianceScale {
  public:
   struct Params {
-    double usual_m = 8.5e-4;
-    double rise_s = 0.04;
-    double fall_s = 0.06;
-    double slow_s = 1.0;
-    double slow_share = 0.3;
-    double least = 0.3;
-    double position_share = 0.4;
-    double coupling_s = 0.05;
-    double jerk_times = 2.5;
-    double jerk_floor_mpsrs = 0.012;
+    double usual_ratio = 0.22;
+    double fall_s = 0.1;
+    double least = 0.003;
+    double position_share = 0.65;
+    double coupling_s = 0.03;
+    double jerk_times = 3.6;
+    double jerk_floor_mpsrs = 0.0035;
     double least_position_m = 2e-5;
-    double least_velocity_mps = 2e-4;
+    double least_velocity_mps = 5e-4;
 
     static void visit(auto& p, auto& field) {
-      field("usual_m", p.usual_m, 1e-5, 0.1,
-            "Innovation of a standing foot with which the filter's covariance is right.");
-      field("rise_s", p.rise_s, 1e-3, 10.0, "Larger innovations count after this time.");
-      field("fall_s", p.fall_s, 1e-3, 10.0, "Smaller ones count after this.");
-      field("slow_s", p.slow_s, 1e-3, 100.0, "Their average over this time counts, too.");
-      field("slow_share", p.slow_share, 0.0, 10.0, "It counts by this share.");
-      field("least", p.least, 0.0, 1.0,
-            "The filter's variances are no more than this share too large: legs that are longer than thought move no "
-            "foot.");
+      field(
+          "usual_ratio", p.usual_ratio, 1e-5, 10.0,
+          "Square of a standing foot's averaged innovation over the variance that the filter expects of it, with which "
+          "the filter's covariance is right.");
+      field("fall_s", p.fall_s, 1e-3, 10.0, "Larger innovations count at once, and smaller ones after this time.");
+      field("least", p.least, 0.0, 1.0, "The filter's variances are no more than this share too large.");
       field("position_share", p.position_share, 0.0, 10.0,
             "Position's variance grows by this share of what the filter's does.");
       field("coupling_s", p.coupling_s, 0.0, 1.0, "Velocity's errors move the position for this time.");
@@ -53,19 +47,15 @@ class CovarianceScale {
   void reset(const Params& params) noexcept {
     *this = CovarianceScale{};
     params_ = params;
-    fast_m2_ = slow_m2_ = math::square(0.3 * params.usual_m);
+    ratio_ = 0.09 * params.usual_ratio;
   }
-  // innovation_m2: mean square per axis of the standing feet's averaged innovations; negative: no foot stands.
+  // innovation_ratio: of the standing feet, as ContactInEkf has it; negative: no foot stands.
   // accel_step_mps2: change of the accelerometer since the last sample.
-  void update(double innovation_m2, const Vec3& accel_step_mps2, double dt_s) noexcept {
-    if (innovation_m2 >= 0.0) {
-      const double time_s = innovation_m2 > fast_m2_ ? params_.rise_s : params_.fall_s;
-      fast_m2_ += dt_s / (time_s + dt_s) * (innovation_m2 - fast_m2_);
-      slow_m2_ += dt_s / (params_.slow_s + dt_s) * (innovation_m2 - slow_m2_);
-    }
-    const double step_m2ps2 = accel_step_mps2.squaredNorm() * dt_s * dt_s / 3.0;
-    const double time_s = step_m2ps2 > jerk_m2ps2_ ? params_.rise_s : params_.fall_s;
-    jerk_m2ps2_ += dt_s / (time_s + dt_s) * (step_m2ps2 - jerk_m2ps2_);
+  void update(double innovation_ratio, const Vec3& accel_step_mps2, double dt_s) noexcept {
+    const double kept = params_.fall_s / (params_.fall_s + dt_s);
+    const auto follow = [&](double& value, double now) { value = std::max(now, now + kept * (value - now)); };
+    if (innovation_ratio >= 0.0) follow(ratio_, innovation_ratio);
+    follow(jerk_m2ps2_, accel_step_mps2.squaredNorm() * dt_s * dt_s / 3.0);
     dt_s_ = dt_s;
   }
   // Of what the filter's variance of the position grows by, what counts.
@@ -98,12 +88,10 @@ class CovarianceScale {
   }
 
  private:
-  [[nodiscard]] double velocity_scale() const noexcept {
-    return std::max((fast_m2_ + params_.slow_share * slow_m2_) / math::square(params_.usual_m), params_.least);
-  }
+  [[nodiscard]] double velocity_scale() const noexcept { return std::max(ratio_ / params_.usual_ratio, params_.least); }
 
   Params params_;
-  double fast_m2_ = 0.0, slow_m2_ = 0.0, jerk_m2ps2_ = 0.0;
+  double ratio_ = 0.0, jerk_m2ps2_ = 0.0;
   double filter_m2_ = 0.0, position_m2_ = 0.0;
   double dt_s_ = 0.0;
 };

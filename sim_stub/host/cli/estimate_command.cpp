@@ -106,7 +106,7 @@ void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
   out << line;
   if (const LogGaps gaps = gaps_of(log); gaps.count > 0) {
     std::snprintf(line, sizeof line, "%zu gap%s of more than %.0f ms without rows, the longest %.3f s: bridged\n",
-                  gaps.count, gaps.count == 1 ? "" : "s", 1e3 * kGap_s, gaps.longest_s);
+                  gaps.count, gaps.count == 1 ? "" : "s", 1e3 * log.gap_s(), gaps.longest_s);
     out << line;
   }
   if (replay.rows_without_contact == log.rows.size()) {

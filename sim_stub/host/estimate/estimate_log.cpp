@@ -16,7 +16,7 @@ constexpr double kMaxStamp_s = 1e11, kMaxSpan_s = 1e8;
 constexpr double kMaxRate_radps = 200.0, kMaxAccel_mps2 = 2000.0, kMaxLeg_m = 20.0;
 constexpr double kMaxPlace_m = 1e6, kMaxSpeed_mps = 1e3;
 constexpr double kMaxGap_s = 5.0;        // nobody knows where a robot went in longer ones
-constexpr double kMaxPeriod_s = 0.05;    // of rows, in the median: each longer one is a gap to the module
+constexpr double kMaxPeriod_s = 0.06;    // of rows, in the median: feet land and leave in less
 constexpr double kNormTolerance = 0.01;  // of a quaternion
 
 using Columns3 = std::array<std::size_t, 3>;
@@ -112,9 +112,10 @@ EstimateLog read_estimate_log(const std::string& path) {
   }
   const auto middle = periods_ns.begin() + static_cast<std::ptrdiff_t>(periods_ns.size() / 2);
   std::nth_element(periods_ns.begin(), middle, periods_ns.end());
-  if (const double period_s = seconds(*middle); period_s > kMaxPeriod_s) {
+  log.period_s = seconds(*middle);
+  if (log.period_s > kMaxPeriod_s) {
     std::ostringstream sentence;
-    sentence << "the rows up to this one come every " << period_s << " s, but legged odometry needs one per "
+    sentence << "the rows up to this one come every " << log.period_s << " s, but legged odometry needs one per "
              << kMaxPeriod_s << " s at least, and was tried on 100 to 1000 Hz (are the stamps in seconds?)";
     table.fail(table.rows() - 1, sentence.str());
   }

@@ -3,6 +3,7 @@
 // of a lidar odometry.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -29,10 +30,13 @@ struct LogRow {
 };
 
 struct EstimateLog {
-  double start_s = 0.0;  // stamp of the first row, as recorded
+  double start_s = 0.0;    // stamp of the first row, as recorded
+  double period_s = 0.01;  // of its rows, in the median
   bool has_truth = false;
   bool has_soles = false;  // their orientation and rates; without them feet are points
   std::vector<LogRow> rows;
+  // Longer times between rows are bridged, and nothing is concluded from one side of them to the other.
+  [[nodiscard]] double gap_s() const { return std::max(0.05, 2.5 * period_s); }
 };
 
 struct LioRow {

@@ -17,7 +17,7 @@ constexpr double kSlip_mps = 0.15;  // a standing foot that seems faster moves
 // left out: it was motion before it could be seen.
 constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0, kSmoothing_s = 0.05, kUnseenMotion_s = 0.15;
 constexpr double kStillRate_radps = 0.1, kStillAccel_mps2 = 1.0, kStillMove_m = 0.004;
-constexpr double kUnseenTurn_rad = 2e-4, kUnseenSpeed_mps = 5e-3;  // in that time
+constexpr double kUnseenTurn_rad = 2e-3, kUnseenSpeed_mps = 5e-3;  // in that time
 
 Mat3 level_R_base(const Vec3& up) {
   const double roll_rad = std::atan2(up.y(), up.z());
@@ -121,7 +121,7 @@ KnownStart start_of(const EstimateLog& log, const ReplayOptions& options) {
     start.odom_v_base_mps = first.truth.true_v_base_mps;
     if (stood) {
       start.accel_bias_mps2 = o.accel_mps2 - start.odom_R_base.transpose() * Vec3{0, 0, kGravity_mps2};
-      start.accel_bias_sigma_mps2 = kUnseenSpeed_mps / o.still_s;
+      start.accel_bias_sigma_mps2 = std::hypot(kUnseenSpeed_mps / o.still_s, kUnseenTurn_rad * kGravity_mps2);
     }
     return known;
   }
@@ -139,7 +139,9 @@ class LogReplay {
  public:
   LogReplay(const EstimateLog& log, const std::vector<LioRow>& lio, const ReplayOptions& options)
       : has_soles_(log.has_soles), imu_(log.rows), lio_(lio), robot_(options.robot), start_(start_of(log, options)) {
-    estimator_.reset(options.estimator, robot_);
+    Estimator::Params params = options.estimator;
+    params.max_step_s = std::max(params.max_step_s, log.gap_s());
+    estimator_.reset(params, robot_);
     result_.start = start_.source;
   }
 

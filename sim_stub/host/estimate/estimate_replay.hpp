@@ -45,7 +45,7 @@ struct Replay {
   StartSource start = StartSource::kTruth;
   Vec3 gyro_bias_radps = Vec3::Zero(), accel_bias_mps2 = Vec3::Zero();  // at the end
   std::uint32_t imu_invalid = 0;  // rows beyond what the module takes for true: left out
-  std::uint32_t gaps = 0;         // rows that came after more than 50 ms
+  std::uint32_t gaps = 0;         // rows that came after more than the log's gap_s()
   std::uint32_t slipping_rows = 0;
   std::uint32_t rows_without_contact = 0;
   std::array<std::uint32_t, kLioVerdictCount> lio{};

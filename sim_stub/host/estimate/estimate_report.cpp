@@ -52,6 +52,7 @@ Json scores(const EstimateLog& log, const Replay& replay) {
           {"horizontal_drift_percent", horizontal_drift_percent(s)},
           {"distance_m", s.distance_m},
           {"final_error_mm", 1e3 * s.final_error_m},
+          {"planted_foot_mm", s.planted_foot_m < 0.0 ? Json(nullptr) : Json(1e3 * s.planted_foot_m)},
           {"nees_in_bounds_percent", 100.0 * s.nees_in_bounds},
           {"nees_mean", s.nees_mean},
           {"nees_states", "position and velocity, 6"}};

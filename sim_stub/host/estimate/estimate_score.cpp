@@ -2,6 +2,7 @@
 #include "sim_stub/host/estimate/estimate_score.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "algorithms/geometry/so3.hpp"
@@ -12,16 +13,47 @@ namespace {
 // Distances are gone along steps of this length at least: noise of the truth's digits walks nowhere.
 constexpr double kStep_m = 0.005;
 
+// Where both feet stand: how far the estimate lets them go.
+class PlantedFeet {
+ public:
+  void take(const LogRow& row, const Transform& world_T_base, double& farthest_m) {
+    if (!(row.contact[0] >= 0.5 && row.contact[1] >= 0.5)) {
+      stand_ = false;
+      return;
+    }
+    std::array<Vec3, kFootCount> world_p_foot_m;
+    for (std::size_t f = 0; f < kFootCount; ++f) world_p_foot_m[f] = world_T_base * row.base_p_foot_m[f];
+    if (!stand_) {
+      *this = {};
+      stand_ = true;
+      since_ns_ = row.stamp_ns;
+      planted_m_ = world_p_foot_m;
+    }
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      farthest_m_ = std::max(farthest_m_, (world_p_foot_m[f] - planted_m_[f]).norm());
+    }
+    if (seconds(row.stamp_ns - since_ns_) >= kPlanted_s) farthest_m = std::max(farthest_m, farthest_m_);
+  }
+
+ private:
+  bool stand_ = false;
+  std::int64_t since_ns_ = 0;
+  std::array<Vec3, kFootCount> planted_m_{Vec3::Zero(), Vec3::Zero()};
+  double farthest_m_ = 0.0;
+};
+
 }  // namespace
 
 Score score(const EstimateLog& log, const Replay& replay) {
   Score s;
   const auto rows = static_cast<double>(log.rows.size());
   Vec3 mark_m = log.rows.front().truth.true_T_base.p_m;
+  PlantedFeet planted;
   for (std::size_t i = 0; i < log.rows.size(); ++i) {
     const LogTruth& truth = log.rows[i].truth;
     const ReplayTick& tick = replay.ticks[i];
     Eigen::Matrix<double, kNeesStates, 1> error;
+    planted.take(log.rows[i], tick.world_T_base, s.planted_foot_m);
     error << tick.world_T_base.p_m - truth.true_T_base.p_m, tick.world_v_base_mps - truth.true_v_base_mps;
     const Vec3 turn_rad = so3_log(tick.world_T_base.R * truth.true_T_base.R.transpose());  // world axes
     s.position_rmse_m += error.head<3>().squaredNorm() / rows;

@@ -10,6 +10,8 @@ namespace polygmap::sim {
 inline constexpr int kNeesStates = 6;
 inline constexpr double kNeesLow = 1.2373, kNeesHigh = 14.4494;  // chi-squared of 6, 2.5 % and 97.5 %
 
+inline constexpr double kPlanted_s = 1.0;
+
 struct Score {
   double position_rmse_m = 0.0, velocity_rmse_mps = 0.0, attitude_rmse_rad = 0.0;
   double odometry_rmse_m = 0.0;  // without LIO's offset
@@ -19,6 +21,9 @@ struct Score {
   double horizontal_distance_m = 0.0, final_horizontal_error_m = 0.0;
   double nees_in_bounds = 0.0;  // share of the rows
   double nees_mean = 0.0;
+  // The farthest that a foot went from where it was planted, as the legs and the estimate say, while both stood by the
+  // log for kPlanted_s at least; negative: they never did.
+  double planted_foot_m = -1.0;
 };
 
 [[nodiscard]] Score score(const EstimateLog& log, const Replay& replay);

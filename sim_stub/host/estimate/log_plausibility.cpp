@@ -22,8 +22,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-bool is_gap(const LogRow& from, const LogRow& to) {
-  return to.stamp_ns - from.stamp_ns > static_cast<std::int64_t>(kGap_s * 1e9);
+bool is_gap(const EstimateLog& log, const LogRow& from, const LogRow& to) {
+  return seconds(to.stamp_ns - from.stamp_ns) > log.gap_s();
 }
 
 // By the gyro, from one row to the next.
@@ -39,7 +39,7 @@ double gravity_kept(const EstimateLog& log, double gyro_scale) {
   std::int64_t begin_ns = 0;
   for (std::size_t i = 0; i < log.rows.size(); ++i) {
     const LogRow& row = log.rows[i];
-    if (i > 0 && is_gap(log.rows[i - 1], row)) {  // how it turned meanwhile nobody knows
+    if (i > 0 && is_gap(log, log.rows[i - 1], row)) {  // how it turned meanwhile nobody knows
       R.setIdentity();
       turned.setZero();
       plain.setZero();
@@ -65,7 +65,7 @@ void hold_against_truth(const EstimateLog& log, double gyro_scale, LogFigures& f
   Mat3 R = Mat3::Identity();
   std::size_t begin = 0;
   for (std::size_t i = 1; i < log.rows.size(); ++i) {
-    if (is_gap(log.rows[i - 1], log.rows[i])) {
+    if (is_gap(log, log.rows[i - 1], log.rows[i])) {
       R.setIdentity();
       begin = i;
       continue;
@@ -193,7 +193,7 @@ Doubt doubt_of_truth(const LogFigures& figures, double duration_s) {
 LogGaps gaps_of(const EstimateLog& log) {
   LogGaps gaps;
   for (std::size_t i = 1; i < log.rows.size(); ++i) {
-    if (!is_gap(log.rows[i - 1], log.rows[i])) continue;
+    if (!is_gap(log, log.rows[i - 1], log.rows[i])) continue;
     ++gaps.count;
     gaps.longest_s = std::max(gaps.longest_s, seconds(log.rows[i].stamp_ns - log.rows[i - 1].stamp_ns));
   }

@@ -23,8 +23,6 @@ struct LogFigures {
   Vec3 true_axis_turn_radps = Vec3::Zero(), gyro_axis_error_share = Vec3::Zero();  // the same of each axis
   double felt_lean_mps2 = 0.0;  // of the mean acceleration, out of the vertical
 };
-// Longer times between rows are bridged, and nothing is concluded from one side of them to the other.
-inline constexpr double kGap_s = 0.05;
 struct LogGaps {
   std::size_t count = 0;
   double longest_s = 0.0;

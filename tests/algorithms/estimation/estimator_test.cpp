@@ -348,7 +348,7 @@ TEST_F(EstimatorTest, ImuFasterThanTheTick_EverySampleCounts) {
 }
 
 // In cycles without a sample the last one holds.
-TEST_F(EstimatorTest, ImuSlowerThanTheTick_FollowsTheTruthAsWellAndIsAsSure) {
+TEST_F(EstimatorTest, ImuSlowerThanTheTick_FollowsTheTruthNearlyAsWellAndItsSigmasTell) {
   struct Outcome {
     double worst_m = 0.0, worst_rad = 0.0, sigma_m = 0.0, tilt_sigma_rad = 0.0;
   };
@@ -387,7 +387,8 @@ TEST_F(EstimatorTest, ImuSlowerThanTheTick_FollowsTheTruthAsWellAndIsAsSure) {
     const Outcome slow = climb(most.interval_ns);
     EXPECT_LT(slow.worst_m, most.worst_m * every_tick.worst_m) << most.interval_ns;
     EXPECT_LT(slow.worst_rad, most.worst_rad * every_tick.worst_rad) << most.interval_ns;
-    EXPECT_NEAR(slow.sigma_m, every_tick.sigma_m, 0.05 * every_tick.sigma_m) << most.interval_ns;
+    EXPECT_GT(slow.sigma_m, 0.95 * every_tick.sigma_m) << most.interval_ns;  // its feet agree less well
+    EXPECT_LT(slow.sigma_m, most.worst_m * every_tick.sigma_m) << most.interval_ns;
     EXPECT_NEAR(slow.tilt_sigma_rad, every_tick.tilt_sigma_rad, 0.05 * every_tick.tilt_sigma_rad) << most.interval_ns;
   }
 }

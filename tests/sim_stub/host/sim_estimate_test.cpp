@@ -368,6 +368,30 @@ TEST(EstimateReplay, LidarMount_PosesOfTheLidar_AreThoseOfTheBase) {
 // --- Cassie: a robot of another make, its truth from its own simulator
 // ------------------------------------------------
 
+// A log of rows at 100 Hz whose feet stand, but for one row of the right one's; the estimate goes off by 10 mm/s.
+Score score_of_creep(int rows, int lifted_row) {
+  EstimateLog log;
+  Replay replay;
+  for (int i = 0; i < rows; ++i) {
+    LogRow row;
+    row.stamp_ns = i * 10 * kNsPerMs;
+    row.contact = {1.0, i == lifted_row ? 0.0 : 1.0};
+    row.base_p_foot_m = {Vec3{0.0, 0.1, -0.8}, Vec3{0.0, -0.1, -0.8}};
+    log.rows.push_back(row);
+    ReplayTick tick;
+    tick.world_T_base.p_m.x() = 1e-4 * i;
+    tick.quality.covariance.setIdentity();
+    replay.ticks.push_back(tick);
+  }
+  return score(log, replay);
+}
+
+TEST(EstimateScore, PlantedFeet_TheFarthestThatTheyGoCountsOfStancesOfASecondAtLeast) {
+  EXPECT_NEAR(score_of_creep(151, -1).planted_foot_m, 0.015, 1e-9);
+  EXPECT_NEAR(score_of_creep(151, 120).planted_foot_m, 0.0119, 1e-9);  // anew from there, and not for long enough
+  EXPECT_LT(score_of_creep(151, 60).planted_foot_m, 0.0);
+}
+
 TEST(EstimateReplay, CassieWalk_OwnAttitude_StaysWithinNineMillimetres) {
   const char* folder = std::getenv("POLYGMAP_SHARED_DATA");
   const std::string path =
@@ -590,6 +614,7 @@ TEST_F(EstimateCommand, StandingLog_WritesScoresAndOneRowPerRow) {
     EXPECT_LT(json.at(key).get<double>(), 0.1) << key;
   }
   EXPECT_TRUE(json.contains("nees_in_bounds_percent"));
+  EXPECT_LT(json["planted_foot_mm"].get<double>(), 0.1);
   EXPECT_EQ(json["lio"]["accepted"], 1);
   EXPECT_EQ(json["innovations"]["foot_position"]["updates"], 499);
   EXPECT_EQ(json["innovations"]["lio_position"]["updates"], 0);

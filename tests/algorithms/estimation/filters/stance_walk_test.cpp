@@ -17,6 +17,7 @@ StanceWalk::Params round_numbers() {
   params.contact_mprs = 6e-3;
   params.contact_rs = 4e-3;
   params.full_mps = 0.1;
+  params.bedding_s = 100.0;
   params.least_mprs = 3e-4;
   params.point_mprs = 0.015;
   params.point_rs = 0.02;
@@ -63,6 +64,24 @@ TEST_F(StanceWalkOfOldStance, MovingBase_CreepsByThePaceAndNoFasterThanInFull) {
   EXPECT_NEAR(x_m2ps(0, 0.1), 36e-6 + 16e-8, 1e-13);
   EXPECT_NEAR(x_m2ps(0, 0.2), 36e-6 + 64e-8, 1e-13);
   EXPECT_EQ(x_m2ps(0, 0.2), x_m2ps(1, 0.2));
+}
+
+TEST(StanceWalk, StanceThatOutlastsTheBedding_CreepsLessInInverseProportionDownToItsShare) {
+  StanceWalk::Params params = round_numbers();
+  params.bedding_s = 2.0;
+  params.bedded_share = 0.25;
+  StanceWalk walk;
+  walk.reset(params);
+  const auto x_m2ps_after = [&](double more_s) {
+    for (int i = 0; i < static_cast<int>(more_s / kTick_s + 0.5); ++i) walk.update({true, true}, kTick_s);
+    return walk.contact_m2ps(0, true, 0.01).x();
+  };
+  constexpr double kWhole_m2ps = 36e-6 + 16e-8;
+  EXPECT_NEAR(x_m2ps_after(1.0), kWhole_m2ps, 1e-12);
+  EXPECT_NEAR(x_m2ps_after(4.0 - walk.age_s(0)), kWhole_m2ps / 4.0, 1e-12);
+  EXPECT_NEAR(x_m2ps_after(100.0), kWhole_m2ps / 16.0, 1e-12);
+  walk.update({false, true}, kTick_s);
+  EXPECT_NEAR(x_m2ps_after(1.0), kWhole_m2ps, 1e-12);  // of a new stance
 }
 
 TEST_F(StanceWalkOfOldStance, PointFoot_CreepsMoreThanASole) {
