@@ -189,7 +189,7 @@ TEST(EstimateReplay, LioOfTwentyMillimetres_CountsForWhatItsNoiseIsMeasuredToBe)
   EXPECT_LT(with.position_rmse_m, 0.012);
   EXPECT_LT(with.nees_mean, 9.0);
   EXPECT_GT(with.nees_mean, 0.3);
-  EXPECT_LT(with.tilt_rmse_rad, 1.05 * score(log, replay(log, {}, {})).tilt_rmse_rad)
+  EXPECT_LT(with.tilt_rmse_rad, 1.1 * score(log, replay(log, {}, {})).tilt_rmse_rad)
       << "its noise tells next to no tilt";
 }
 
@@ -614,7 +614,7 @@ TEST_F(EstimateCommand, StandingLog_WritesScoresAndOneRowPerRow) {
     EXPECT_LT(json.at(key).get<double>(), 0.1) << key;
   }
   EXPECT_TRUE(json.contains("nees_in_bounds_percent"));
-  EXPECT_LT(json["planted_foot_mm"].get<double>(), 0.1);
+  EXPECT_TRUE(json["planted_foot_mm"].is_null());  // it stands for less than a second
   EXPECT_EQ(json["lio"]["accepted"], 1);
   EXPECT_EQ(json["innovations"]["foot_position"]["updates"], 499);
   EXPECT_EQ(json["innovations"]["lio_position"]["updates"], 0);
