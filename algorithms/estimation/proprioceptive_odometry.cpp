@@ -35,7 +35,6 @@ void ProprioceptiveOdometry::reset(const Params& params, const Transform& base_T
   base_w_base_radps_.setZero();
   covariance_.setZero();
   published_.setZero();
-  last_accel_mps2_.setZero();
   growth_ = {};
   innovations_ = {};
   tie_.reset(params_.lidar_tie);
@@ -47,7 +46,6 @@ void ProprioceptiveOdometry::initialise(const ContactInEkf::Start& start, const 
   tie_.reset(params_.lidar_tie);
   covariance_ = published_ = filter_.covariance();
   growth_.odom_m2 = growth_.filter_m2 = covariance_.diagonal().head<3>().maxCoeff();
-  last_accel_mps2_ = accel_mps2;
   scale_.reset(params_.published);
   growth_.filter = growth_.fusion = fusion_variances(covariance_);
   fusion_.begin(growth_.fusion);
@@ -101,8 +99,7 @@ void ProprioceptiveOdometry::step(const Step& whole, const Legs& legs, const Con
   base_w_base_radps_ = gyro_radps - filter_.gyro_bias_radps();
   count_innovations(step);
   covariance_ = filter_.covariance();
-  scale_.update(step.new_legs ? filter_.mean_innovation_ratio() : -1.0, accel_mps2 - last_accel_mps2_, step.dt_s);
-  last_accel_mps2_ = accel_mps2;
+  scale_.update(step.new_legs ? filter_.mean_innovation_ratio() : -1.0, filter_.accel_step_mps2(), step.dt_s);
   published_ = scale_.published(covariance_);
   const double filter_m2 = covariance_.diagonal().head<3>().maxCoeff();
   growth_.odom_m2 = std::max(growth_.odom_m2 + scale_.growth_share() * (filter_m2 - growth_.filter_m2), 0.0);

@@ -115,7 +115,6 @@ class ProprioceptiveOdometry {
   bool feet_lost_ = false;  // by a gap, until the next legs
   Vec3 base_w_base_radps_ = Vec3::Zero();
   CovarianceScale scale_;
-  Vec3 last_accel_mps2_ = Vec3::Zero();
   Eigen::Matrix<double, 9, 9> published_ = Eigen::Matrix<double, 9, 9>::Zero();
   // Variances of the odometry, which grow as the filter's do, by the share of the published covariance.
   struct Growth {

@@ -15,7 +15,7 @@ from campaigns.engine import ROOT, Page, Table, code_hash, rows
 LOGS = {"cassie/cassie_walk_open.csv": "Cassie, simulated walk, 5 s", "icub/walk.csv": "iCub, real walk, Vicon, 12 s",
         "icub/gazebo_0_35.csv": "iCub3 in Gazebo, 35 s"}
 FIGURES = {"position RMSE mm": ("position_rmse_mm", 1), "velocity RMSE mm/s": ("velocity_rmse_mmps", 1), "tilt deg": ("tilt_rmse_deg", 2),
-           "yaw deg": ("yaw_rmse_deg", 2), "drift % of the way": ("drift_percent", 2),
+           "yaw deg": ("yaw_rmse_deg", 2), "drift % of the way": ("drift_percent", 2), "a planted foot moves mm": ("planted_foot_mm", 1),
            "rows within the 95 % bounds %": ("nees_in_bounds_percent", 0), "mean NEES, 6 is honest": ("nees_mean", 1)}
 
 PEER = "https://github.com/RossHartley/invariant-ekf"
@@ -97,7 +97,7 @@ def side_by_side(filters, logs):
             if isinstance(s, str):
                 unscored.append(f"{what}, {name}: {s}")
                 break  # the others would say the same
-            lines.append((what, name, *(f"{s[key]:.{digits}f}" for key, digits in FIGURES.values())))
+            lines.append((what, name, *("-" if s[key] is None else f"{s[key]:.{digits}f}" for key, digits in FIGURES.values())))
     return lines, unscored
 
 

@@ -44,7 +44,7 @@ void ContactInEkf::reset(const Params& params) noexcept {
 void ContactInEkf::initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs,
                               const Vec3& gyro_radps, const Vec3& accel_mps2) noexcept {
   stance_.reset(params_.stance);
-  motion_ = {0.0, 0.0, accel_mps2};
+  motion_ = {.accel_mps2 = accel_mps2};
   odom_R_base_ = start.odom_R_base;
   odom_p_base_m_ = start.odom_p_base_m;
   odom_v_base_mps_ = start.odom_v_base_mps;
@@ -110,12 +110,11 @@ void ContactInEkf::predict(const Vec3& gyro_radps, const Vec3& accel_mps2, doubl
   P_(kImuDelay, kImuDelay) += math::square(params_.imu_delay_sigma_s) * (1.0 - kept * kept);
   const double gyro_rad2ps = math::square(params_.gyro_noise_radprs) +
                              (motion == Motion::kUnfelt ? math::square(params_.lost_gyro_noise_radprs) : 0.0);
-  const double accel_step_m2ps4 = (accel_mps2 - motion_.felt_mps2).squaredNorm() / 3.0;
-  motion_.felt_mps2 = accel_mps2;
-  const double accel_m2ps3 = math::square(params_.accel_noise_mpsrs) +
-                             math::square(params_.accel_noise_rs) * motion_.accel_m2ps4 +
-                             math::square(params_.accel_step_share) * accel_step_m2ps4 * dt_s +
-                             (motion == Motion::kFelt ? 0.0 : math::square(params_.lost_accel_noise_mpsrs));
+  motion_.accel_step_mps2 = accel_mps2 - std::exchange(motion_.accel_mps2, accel_mps2);
+  const double accel_m2ps3 =
+      math::square(params_.accel_noise_mpsrs) + math::square(params_.accel_noise_rs) * motion_.accel_m2ps4 +
+      math::square(params_.accel_step_share) * motion_.accel_step_mps2.squaredNorm() / 3.0 * dt_s +
+      (motion == Motion::kFelt ? 0.0 : math::square(params_.lost_accel_noise_mpsrs));
   predict_covariance(gyro_rad2ps, accel_m2ps3, dt_s);
   odom_p_base_m_ += dt_s * (odom_v_base_mps_ + 0.5 * dt_s * odom_a_mps2);
   odom_v_base_mps_ += dt_s * odom_a_mps2;
@@ -194,11 +193,11 @@ void ContactInEkf::correct_by_feet(const LegHistory::Moment& legs, double legs_d
   apply(batch.error());
 }
 
-void ContactInEkf::average_innovation(std::size_t foot, const Innovation& innovation_m, double dt_s) noexcept {
+void ContactInEkf::average_innovation(std::size_t foot, const Innovation& innovation, double dt_s) noexcept {
   constexpr double kWindow_s = 0.02;
   const double share = dt_s / (std::min(kWindow_s, stance_.age_s(foot) - dt_s) + dt_s);
-  innovation_m_[foot] += share * (innovation_m.value - innovation_m_[foot]);
-  const double expected_m2 = innovation_m.variance + math::square(params_.foot_sigma_m);
+  innovation_m_[foot] += share * (innovation.value - innovation_m_[foot]);
+  const double expected_m2 = innovation.variance + math::square(params_.foot_sigma_m);
   const double ratio = innovation_m_[foot].squaredNorm() / (3.0 * expected_m2);
   mean_innovation_ratio_ = mean_innovation_ratio_ < 0.0 ? ratio : 0.5 * (mean_innovation_ratio_ + ratio);
 }

@@ -149,6 +149,8 @@ class ContactInEkf {
   // Of late.
   [[nodiscard]] const Vec3& odom_a_base_mps2() const noexcept { return odom_a_base_mps2_; }
   [[nodiscard]] double gravity_mps2() const noexcept { return gravity_mps2_; }
+  // By which what the IMU feels changed with the last prediction.
+  [[nodiscard]] const Vec3& accel_step_mps2() const noexcept { return motion_.accel_step_mps2; }
   // Of roll and pitch, one sigma, the larger one; and of yaw.
   [[nodiscard]] double tilt_sigma_rad() const noexcept {
     return math::sqrt(std::max(P_(kAttitude, kAttitude), P_(kAttitude + 1, kAttitude + 1)));
@@ -161,8 +163,8 @@ class ContactInEkf {
   [[nodiscard]] const NormalisedRows& position_rows() const noexcept { return rows_.position; }
   [[nodiscard]] const NormalisedRows& sole_rows() const noexcept { return rows_.sole; }
   [[nodiscard]] const NormalisedRows& height_rows() const noexcept { return rows_.height; }
-  // Square of the standing feet's innovations, each averaged over some milliseconds, over the variance that the filter
-  // expects of them; per axis; negative: none.
+  // Mean over the standing feet and their axes: the square of an innovation that is averaged over some milliseconds,
+  // over the variance that the filter expects of it. Negative: no foot stands.
   [[nodiscard]] double mean_innovation_ratio() const noexcept { return mean_innovation_ratio_; }
   [[nodiscard]] std::uint32_t outliers() const noexcept { return outliers_; }
 
@@ -192,7 +194,7 @@ class ContactInEkf {
     int plus, minus;
     Vec3 per_delay;
   };
-  // What is left of an innovation after the rows before it, and the variance that the state gives it, per axis.
+  // What is left of an innovation after the rows before it, and the variance per axis that the state's errors give it.
   struct Innovation {
     Vec3 value;
     double variance;
@@ -200,7 +202,7 @@ class ContactInEkf {
   // variance: of each of the three measurements.
   Innovation take(const Difference& difference, const Vec3& innovation, double variance, FeetBatch& batch,
                   NormalisedRows& rows) noexcept;
-  void average_innovation(std::size_t foot, const Innovation& innovation_m, double dt_s) noexcept;
+  void average_innovation(std::size_t foot, const Innovation& innovation, double dt_s) noexcept;
   void apply(const Vector& error) noexcept;
   static constexpr int kYawRow = 3;
   struct LidarRow {
@@ -224,7 +226,8 @@ class ContactInEkf {
   double mean_innovation_ratio_ = -1.0;
   struct {
     double turn_rad2ps2 = 0.0, accel_m2ps4 = 0.0;  // of the base, mean squares of late
-    Vec3 felt_mps2 = Vec3::Zero();                 // by the last sample
+    Vec3 accel_mps2 = Vec3::Zero();                // as the IMU felt it in the last prediction, ...
+    Vec3 accel_step_mps2 = Vec3::Zero();           // ... against the one before
   } motion_;
   std::array<Mat3, kFootCount> odom_R_foot_{Mat3::Identity(), Mat3::Identity()};
   Transform odom_T_lidar_;  // its world's

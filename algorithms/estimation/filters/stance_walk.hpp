@@ -2,9 +2,9 @@
 // How much a foot that stands moves all the same: it settles when it has landed, creeps and rolls while the body moves
 // over it, and gives way when it is unloaded. As densities, so that the rate of samples does not matter.
 //
-// The constants were chosen on the three logs of docs/measured/estimation.md, the rocking of a sole that rests on
-// simulated climbs over soft ground: with a fifteenth of it the robot of seed 32, twice as bad as real ones, lost its
-// tilt and fell.
+// The constants were chosen on the three logs of docs/measured/estimation.md, the bedding on a log of iCub that sways
+// on two planted feet (com-sinusoid of ami-iit's base estimation), the rocking of a sole that rests on simulated climbs
+// over soft ground: with a fifteenth of it the robot of seed 32, twice as bad as real ones, lost its tilt and fell.
 #pragma once
 
 #include <algorithm>
@@ -42,7 +42,7 @@ class StanceWalk {
             "A foot creeps less where the base moves more slowly, turning included.");
       field("bedding_s", p.bedding_s, 0.01, 1e6,
             "And less once it has stood for this time, in inverse proportion: it has bedded in.");
-      field("bedded_share", p.bedded_share, 0.0, 1.0, "To this share at least.");
+      field("bedded_share", p.bedded_share, 0.0, 1.0, "Bedded in, it creeps by this share of that, at least.");
       field("least_mprs", p.least_mprs, 1e-6, 0.1, "But it creeps like this at least.");
       field("point_mprs", p.point_mprs, 1e-6, 1.0,
             "A foot that is known as a point rolls: its place creeps like this.");

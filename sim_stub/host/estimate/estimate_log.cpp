@@ -16,7 +16,7 @@ constexpr double kMaxStamp_s = 1e11, kMaxSpan_s = 1e8;
 constexpr double kMaxRate_radps = 200.0, kMaxAccel_mps2 = 2000.0, kMaxLeg_m = 20.0;
 constexpr double kMaxPlace_m = 1e6, kMaxSpeed_mps = 1e3;
 constexpr double kMaxGap_s = 5.0;        // nobody knows where a robot went in longer ones
-constexpr double kMaxPeriod_s = 0.06;    // of rows, in the median: feet land and leave in less
+constexpr double kMaxPeriod_s = 0.06;    // of rows, in the median: in less a foot lands and leaves
 constexpr double kNormTolerance = 0.01;  // of a quaternion
 
 using Columns3 = std::array<std::size_t, 3>;

@@ -13,13 +13,13 @@ namespace {
 // Distances are gone along steps of this length at least: noise of the truth's digits walks nowhere.
 constexpr double kStep_m = 0.005;
 
-// Where both feet stand: how far the estimate lets them go.
 class PlantedFeet {
  public:
-  void take(const LogRow& row, const Transform& world_T_base, double& farthest_m) {
+  // How far the estimate has let one of two standing feet go since both were planted; negative: not for kPlanted_s yet.
+  double moved_m(const LogRow& row, const Transform& world_T_base) {
     if (!(row.contact[0] >= 0.5 && row.contact[1] >= 0.5)) {
       stand_ = false;
-      return;
+      return -1.0;
     }
     std::array<Vec3, kFootCount> world_p_foot_m;
     for (std::size_t f = 0; f < kFootCount; ++f) world_p_foot_m[f] = world_T_base * row.base_p_foot_m[f];
@@ -32,7 +32,7 @@ class PlantedFeet {
     for (std::size_t f = 0; f < kFootCount; ++f) {
       farthest_m_ = std::max(farthest_m_, (world_p_foot_m[f] - planted_m_[f]).norm());
     }
-    if (seconds(row.stamp_ns - since_ns_) >= kPlanted_s) farthest_m = std::max(farthest_m, farthest_m_);
+    return seconds(row.stamp_ns - since_ns_) >= kPlanted_s ? farthest_m_ : -1.0;
   }
 
  private:
@@ -53,7 +53,7 @@ Score score(const EstimateLog& log, const Replay& replay) {
     const LogTruth& truth = log.rows[i].truth;
     const ReplayTick& tick = replay.ticks[i];
     Eigen::Matrix<double, kNeesStates, 1> error;
-    planted.take(log.rows[i], tick.world_T_base, s.planted_foot_m);
+    s.planted_foot_m = std::max(s.planted_foot_m, planted.moved_m(log.rows[i], tick.world_T_base));
     error << tick.world_T_base.p_m - truth.true_T_base.p_m, tick.world_v_base_mps - truth.true_v_base_mps;
     const Vec3 turn_rad = so3_log(tick.world_T_base.R * truth.true_T_base.R.transpose());  // world axes
     s.position_rmse_m += error.head<3>().squaredNorm() / rows;

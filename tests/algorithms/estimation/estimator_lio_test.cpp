@@ -103,6 +103,30 @@ TEST_F(EstimatorLioTest, TenSteps_NoisyLateLio_WorldStaysWithinAFewMillimetres) 
   }
 }
 
+// The filter that balances until the standstill is over has an origin of its own, in which no pose of LIO's says
+// anything.
+TEST_F(EstimatorLioTest, PosesBeforeTheOdometryHasBegun_DoNotMoveTheFilterThatBalances) {
+  WalkSpec spec;
+  spec.stand_s = 10.0;
+  std::array<Vec3, 2> filter_p_base_m, filter_v_base_mps;
+  for (const bool heard : {false, true}) {
+    start();
+    SyntheticWalk walk(spec);
+    const auto deliver = [&](const LioSample& sample) {
+      if (heard) estimator_.add_lio(sample, t_ns_);
+    };
+    for (std::int64_t until_ns = 100 * kNsPerMs; !aligned_; until_ns += 100 * kNsPerMs) {
+      ASSERT_LT(until_ns, 10 * kNsPerS);
+      filter_p_base_m[heard] = estimator_.odometry().filter().odom_p_base_m();
+      filter_v_base_mps[heard] = estimator_.odometry().filter().odom_v_base_mps();
+      run(walk, until_ns, deliver);
+    }
+    EXPECT_EQ(estimator_.counters().lio_of(LioVerdict::kAccepted) > 0, heard);
+  }
+  EXPECT_EQ(filter_p_base_m[0], filter_p_base_m[1]);
+  EXPECT_EQ(filter_v_base_mps[0], filter_v_base_mps[1]);
+}
+
 TEST_F(EstimatorLioTest, LateLio_FastWalkPerfectSensors_IsFusedAtItsStampWithoutLag) {
   WalkSpec spec;
   spec.noise_scale = 0.0;

@@ -365,9 +365,6 @@ TEST(EstimateReplay, LidarMount_PosesOfTheLidar_AreThoseOfTheBase) {
   EXPECT_LT((plain.ticks.back().world_T_base.p_m - mounted.ticks.back().world_T_base.p_m).norm(), 1e-6);
 }
 
-// --- Cassie: a robot of another make, its truth from its own simulator
-// ------------------------------------------------
-
 // A log of rows at 100 Hz whose feet stand, but for one row of the right one's; the estimate goes off by 10 mm/s.
 Score score_of_creep(int rows, int lifted_row) {
   EstimateLog log;
@@ -391,6 +388,9 @@ TEST(EstimateScore, PlantedFeet_TheFarthestThatTheyGoCountsOfStancesOfASecondAtL
   EXPECT_NEAR(score_of_creep(151, 120).planted_foot_m, 0.0119, 1e-9);  // anew from there, and not for long enough
   EXPECT_LT(score_of_creep(151, 60).planted_foot_m, 0.0);
 }
+
+// --- Cassie: a robot of another make, its truth from its own simulator
+// ------------------------------------------------
 
 TEST(EstimateReplay, CassieWalk_OwnAttitude_StaysWithinNineMillimetres) {
   const char* folder = std::getenv("POLYGMAP_SHARED_DATA");
@@ -659,6 +659,16 @@ TEST_F(EstimateCommand, GapsAreCountedAndTheLongestIsTold) {
   ASSERT_EQ(call({"estimate", write("gap.csv", text)}), kExitPass) << err_;
   EXPECT_EQ(err_, "");
   EXPECT_NE(out_.find("1 gap of more than 50 ms without rows, the longest 2.002 s"), std::string::npos) << out_;
+}
+
+TEST_F(EstimateCommand, TwentyRowsASecond_AreNoGapsAndGetAWarning) {
+  std::string text = std::string(kHeader) + "\n";
+  for (int i = 0; i < 50; ++i) text += std::to_string(100.0 + 0.0505 * i) + kRow + "\n";
+  ASSERT_EQ(call({"estimate", write("slow.csv", text), "--json", at("out.json")}), kExitPass) << err_;
+  const nlohmann::json json = nlohmann::json::parse(std::ifstream(at("out.json")));
+  EXPECT_EQ(json["gaps"], 0);
+  EXPECT_EQ(json["warnings"].size(), 1U);
+  EXPECT_LT(json["planted_foot_mm"].get<double>(), 0.1);
 }
 
 TEST_F(EstimateCommand, TenRowsASecond_AreRefusedWithTheRatesThatWereTried) {
