@@ -53,6 +53,7 @@ void LioFusion::reset(const Params& params, const Transform& base_T_lidar) noexc
   position_noise_m_.reset(params.unstated_position_m);
   rotation_noise_rad_.reset(params.unstated_rotation_rad);
   position_sigma_m_ = uncertainty_.position_sigma_m(Vec3::Zero());
+  yaw_sigma_rad_ = uncertainty_.yaw_sigma_rad();
 }
 
 LioVerdict LioFusion::check(const LioSample& sample, std::int64_t now_ns) const noexcept {
@@ -83,6 +84,7 @@ LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base
     last_accepted_ns_ = last_used_ns_ = sample.stamp_ns;
     last_lio_T_odom_ = world_T_lio_.inverse();
     tie(odom_T_base, sigmas, count_);
+    odom_p_first_m_ = odom_T_base.p_m;
     return LioVerdict::kAccepted;
   }
 
@@ -119,13 +121,15 @@ void LioFusion::rebase(const Transform& new_T_old) noexcept {
   last_lio_T_odom_ = last_lio_T_odom_ * new_T_old.inverse();
   uncertainty_.rebase(new_T_old);
   untied_.rebase(new_T_old);
+  odom_p_first_m_ = new_T_old * odom_p_first_m_;
   jumped_count_ = 0;
 }
 
 void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept {
   uncertainty_.move(world_T_odom_.R * odom_step_m);
-  if (!aligned_) untied_.move(odom_step_m);  // until then world is odom
-  const Transform wanted = fused_world_T_odom_ * odom_T_base;
+  untied_.move(odom_step_m);
+  const Believed best = believed(odom_T_base);
+  const Transform& wanted = best.world_T_base;
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
   const Vec3 turn_rad = so3_log(wanted.R * now.R.transpose());
@@ -133,13 +137,32 @@ void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, doub
   const double move_share = share_within(move_m.norm(), params_.slew_mps * slew_s);
   const double turn_share = share_within(turn_rad.norm(), params_.slew_radps * slew_s);
   if (move_share >= 1.0 && turn_share >= 1.0) {
-    world_T_odom_ = fused_world_T_odom_;
+    world_T_odom_ = best.world_T_odom;
   } else {
     const Transform next{so3_renormalised(so3_exp(turn_share * turn_rad) * now.R), now.p_m + move_share * move_m};
     world_T_odom_ = next * odom_T_base.inverse();
   }
   const Vec3 held_back_m = (1.0 - move_share) * move_m;
-  position_sigma_m_ = (known().position_sigma_m(wanted.p_m).cwiseAbs2() + held_back_m.cwiseAbs2()).cwiseSqrt();
+  position_sigma_m_ = (best.variance_m2 + held_back_m.cwiseAbs2()).cwiseSqrt();
+  yaw_sigma_rad_ = best.yaw_sigma_rad;
+}
+
+LioFusion::Believed LioFusion::believed(const Transform& odom_T_base) const noexcept {
+  const Transform fused = fused_world_T_odom_ * odom_T_base;
+  const Vec3 way_m = odom_T_base.p_m - odom_p_first_m_;
+  const Vec3 alone_m2 =
+      untied_.position_sigma_m(odom_T_base.p_m).cwiseAbs2() + math::square(params_.way_share) * way_m.cwiseAbs2();
+  const Vec3 tied_m2 = known().position_sigma_m(fused.p_m).cwiseAbs2();
+  const double alone_rad2 = math::square(untied_.yaw_sigma_rad()), tied_rad2 = math::square(known().yaw_sigma_rad());
+  const Vec3 moved_m = fused.p_m - odom_T_base.p_m;
+  const double yaw_rad = so3_log(fused_world_T_odom_.R).z();
+  const double ratio =
+      moved_m.cwiseAbs2().cwiseQuotient(alone_m2 + tied_m2).sum() + math::square(yaw_rad) / (alone_rad2 + tied_rad2);
+  const double share = share_within(ratio, params_.most_ratio);
+  if (share >= 1.0) return {fused_world_T_odom_, fused, tied_m2, known().yaw_sigma_rad()};
+  const Transform shared = fuse_pose(odom_T_base, fused, share);
+  return {shared * odom_T_base.inverse(), shared, share * tied_m2 + (1.0 - share) * alone_m2,
+          math::sqrt(share * tied_rad2 + (1.0 - share) * alone_rad2)};
 }
 
 bool LioFusion::is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept {

@@ -70,6 +70,8 @@ class LioFusion {
     double jump_growth_radps = 0.004;
     double max_jump_m = 0.5;
     double max_jump_rad = 0.3;
+    double most_ratio = 0.5;
+    double way_share = 0.0075;
     std::uint32_t realign_count = 20;
     double slew_mps = 0.1;
     double slew_radps = 0.175;
@@ -96,6 +98,11 @@ class LioFusion {
             "The bound of turns grows by this for each second of silence.");
       field("max_jump_m", p.max_jump_m, 0.001, 100.0, "A pose farther off is a jump however long the silence.");
       field("max_jump_rad", p.max_jump_rad, 0.001, 3.2, "A pose turned farther is a jump however long the silence.");
+      field("most_ratio", p.most_ratio, 0.0, 1e6,
+            "The odometry is moved by all of an offset whose square over its variance is up to this, by less of a "
+            "larger one: lidar odometry drifts, too.");
+      field("way_share", p.way_share, 0.0, 0.1,
+            "Of its way by which the odometry may be off along it, in that variance: legs are longer than thought.");
       field("realign_count", p.realign_count, 1, 1000000,
             "Jumped poses in a row that agree among themselves are LIO's new world after as many.");
       field("slew_mps", p.slew_mps, 0.001, 10.0, "The fused pose moves no faster: 0.2 mm in a tick of 2 ms.");
@@ -121,7 +128,7 @@ class LioFusion {
   }
   void follow(const LioUncertainty::Quantities& odometry) noexcept {
     uncertainty_.follow(odometry);
-    if (!aligned_) untied_.follow(odometry);
+    untied_.follow(odometry);
   }
   // Once per tick: moves the published offset towards the fused one within the slew limits, which hold at the base,
   // wherever odom's origin is; lets the sigmas grow. odom_step: by which the odometry moved the base since the last.
@@ -129,7 +136,7 @@ class LioFusion {
   [[nodiscard]] const Transform& world_T_odom() const noexcept { return world_T_odom_; }
   // Of the published pose, world axes; what the slew limit still holds back counts as error.
   [[nodiscard]] const Vec3& position_sigma_m() const noexcept { return position_sigma_m_; }
-  [[nodiscard]] double yaw_sigma_rad() const noexcept { return known().yaw_sigma_rad(); }
+  [[nodiscard]] double yaw_sigma_rad() const noexcept { return yaw_sigma_rad_; }
   struct LioSigmas {
     double position_m, rotation_rad;  // of the base
   };
@@ -145,6 +152,14 @@ class LioFusion {
                                  const LioSigmas& sigmas) noexcept;
   // A pose whose tilt is not the odometry's cannot be tied to it by any heading and place.
   [[nodiscard]] bool is_tilted(const Transform& world_T_base, const Transform& lio_T_base) const noexcept;
+  // What of the fused offset the odometry can have drifted by. Beyond that, the longer the offset the more of it is
+  // lidar odometry's own drift; that part is kept from what is published only.
+  struct Believed {
+    Transform world_T_odom, world_T_base;
+    Vec3 variance_m2;
+    double yaw_sigma_rad;
+  };
+  [[nodiscard]] Believed believed(const Transform& odom_T_base) const noexcept;
   // Of the published pose: a tie that was contradicted, and that no second pose confirmed, says nothing.
   [[nodiscard]] const LioUncertainty& known() const noexcept {
     return !aligned_ && doubted_ && count_ <= 1 ? untied_ : uncertainty_;
@@ -174,8 +189,10 @@ class LioFusion {
   std::int64_t last_accepted_ns_ = -1;
   std::int64_t last_used_ns_ = -1;  // accepted or realigned: since then LIO was silent
   LioUncertainty uncertainty_;
-  LioUncertainty untied_;  // as if there were no LIO, until the worlds are aligned
+  LioUncertainty untied_;               // as if there were no LIO
+  Vec3 odom_p_first_m_ = Vec3::Zero();  // of the base, at the first pose
   Vec3 position_sigma_m_ = Vec3::Zero();
+  double yaw_sigma_rad_ = 0.0;
   LioInnovations innovations_;
 };
 

@@ -2,7 +2,9 @@
 // The stage with LIO as it comes: late, noisy, silent, wrong.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <random>
 #include <vector>
 
 #include "algorithms/estimation/estimator.hpp"
@@ -100,6 +102,43 @@ TEST_F(EstimatorLioTest, TenSteps_NoisyLateLio_WorldStaysWithinAFewMillimetres) 
     EXPECT_EQ(estimator_.counters().lio_of(LioVerdict::kJump), 0U);
     EXPECT_GT(estimator_.counters().lio_of(LioVerdict::kAccepted), 300U);
     EXPECT_LE(estimator_.state().lio_age_ns, 202 * kNsPerMs);
+  }
+}
+
+// 8 mm after a second, 40 mm after twenty-five, and its sigma knows nothing of that: the published pose is no worse
+// than the odometry's own by more than a tenth. Without drift it is better than that.
+TEST_F(EstimatorLioTest, LioOfRandomWalk_OnTheStairs_FusedPoseIsNoWorseThanTheOdometrys) {
+  for (const double drift_mprs : {0.0, 0.008, 0.03}) {
+    double fused_m2 = 0.0, odometry_m2 = 0.0;
+    for (std::uint32_t seed = 1; seed <= 6; ++seed) {
+      WalkSpec spec;
+      spec.seed = seed;
+      spec.steps = 10;
+      SyntheticWalk walk(spec);
+      start();
+      std::mt19937 random(seed);
+      std::normal_distribution<double> step_m(0.0, drift_mprs * std::sqrt(0.1));  // of a tenth of a second
+      Vec3 drift_m = Vec3::Zero();
+      Transform true_T_odom;
+      bool tied = false;
+      run(
+          walk, walk.end_ns(),
+          [&](LioSample sample) {
+            if (drift_mprs > 0.0) {
+              for (double& axis_m : drift_m) axis_m += step_m(random);
+            }
+            sample.lio_T_lidar.p_m += drift_m;
+            estimator_.add_lio(sample, t_ns_);
+          },
+          [&](const StateEstimate& state) {
+            const Transform true_T_base = walk.truth(t_ns_).true_T_base;
+            if (!tied) true_T_odom = level_tie(true_T_base, state.odom_T_base);
+            tied = true;
+            fused_m2 += error_m_.squaredNorm();
+            odometry_m2 += (true_T_odom * state.odom_T_base.p_m - true_T_base.p_m).squaredNorm();
+          });
+    }
+    EXPECT_LT(std::sqrt(fused_m2 / odometry_m2), drift_mprs > 0.0 ? 1.1 : 0.9) << drift_mprs;
   }
 }
 

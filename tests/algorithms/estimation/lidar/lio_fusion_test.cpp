@@ -69,6 +69,11 @@ class LioFusionTest : public ::testing::Test {
   void align() {
     for (int i = 0; i < 60; ++i) ASSERT_EQ(feed(kPose, kPose), LioVerdict::kAccepted);
   }
+  // The odometry's filter says that it may have drifted so far.
+  void unsure(double sigma_m, double sigma_rad) {
+    const double m2 = math::square(sigma_m);
+    fusion_.follow({m2, m2, m2, math::square(sigma_rad)});
+  }
 
   static constexpr double kLioSigma_m = 0.01, kLioSigma_rad = 0.0035;
   LioFusion::Params params_;
@@ -92,6 +97,7 @@ TEST_F(LioFusionTest, FirstPoses_NoisyLio_AreAveragedIntoTheAlignment) {
 
 TEST_F(LioFusionTest, Offset_OdometryStepsAway_DecaysWithTau) {
   align();
+  unsure(0.1, 0.1);
   const Transform drift{rotation_z(0.02), Vec3{0.02, -0.01, 0.01}};
   const Transform drifted = drift * kPose;
   const int steps = static_cast<int>(params_.tau_s / 0.1);
@@ -105,6 +111,26 @@ TEST_F(LioFusionTest, Offset_OdometryStepsAway_DecaysWithTau) {
   EXPECT_NEAR(so3_log(kPose.R.transpose() * fused.R).norm() / 0.02, share, 1e-3);
 }
 
+// 2 mm/s while the robot stands, and its legs are sure to a millimetre: no foot moved.
+TEST_F(LioFusionTest, LioDrifts_OdometryIsSureThatItDidNot_FusedPoseStays) {
+  const auto drift_for_25s = [this] {
+    align();
+    for (int i = 1; i <= 250; ++i) {
+      const Transform drifted{kPose.R, kPose.p_m + Vec3{2e-4 * i, -1e-4 * i, 0}};
+      ASSERT_EQ(feed(drifted, kPose), LioVerdict::kAccepted);
+      tick(kPose);
+    }
+  };
+  drift_for_25s();
+  EXPECT_LT((fusion_.world_T_odom() * kPose.p_m - kPose.p_m).norm(), 0.001);  // of 56 mm
+  const Vec3 sure_m = fusion_.position_sigma_m();
+  fusion_.reset(params_, mount_);
+  unsure(0.05, 0.01);
+  drift_for_25s();
+  EXPECT_GT((fusion_.world_T_odom() * kPose.p_m - kPose.p_m).norm(), 0.045);  // it may be the odometry's
+  EXPECT_LT(sure_m.maxCoeff(), 0.005);
+}
+
 // The odometry walks and turns on, far from its origin; what it does not do itself, the world's offset does.
 TEST_F(LioFusionTest, Slew_YawCorrectedFiftyMetresFromTheOrigin_BaseMovesByNoMoreThanTheBoundPerTick) {
   Transform odom_T_base{rotation_z(0.4), Vec3{40, 30, 0.8}};
@@ -113,6 +139,7 @@ TEST_F(LioFusionTest, Slew_YawCorrectedFiftyMetresFromTheOrigin_BaseMovesByNoMor
   const Vec3 there_m = odom_T_base.p_m;
   const Transform drift{true_T_odom.R, there_m - true_T_odom.R * there_m + true_T_odom.p_m};  // ... taken back
   now_ns_ += 20 * kNsPerS;
+  unsure(0.1, 0.05);
   double offset_moved_m = 0.0, corrected_m = 0.0;
   for (int i = 0; i < 1000; ++i) {
     if (i % 50 == 0) {
@@ -141,6 +168,7 @@ TEST_F(LioFusionTest, Slew_YawCorrectedFiftyMetresFromTheOrigin_BaseMovesByNoMor
 
 TEST_F(LioFusionTest, Slew_AfterLongSilence_NoTickMovesTheFusedPoseByMoreThanTheBound) {
   align();
+  unsure(0.2, 0.1);
   const Transform drifted = Transform{rotation_z(0.06), Vec3{0.05, 0.03, 0}} * kPose;
   now_ns_ += 20 * kNsPerS;
   ASSERT_EQ(feed(kPose, drifted), LioVerdict::kAccepted);
@@ -160,6 +188,7 @@ TEST_F(LioFusionTest, Slew_AfterLongSilence_NoTickMovesTheFusedPoseByMoreThanThe
 
 TEST_F(LioFusionTest, Slew_TicksOfAnyLength_IsARateAndNoTickMovesByMoreThanOneMillimetre) {
   align();
+  unsure(0.2, 0.1);
   const Transform drifted = Transform{Mat3::Identity(), Vec3{0.05, 0.03, 0}} * kPose;
   now_ns_ += 20 * kNsPerS;
   ASSERT_EQ(feed(kPose, drifted), LioVerdict::kAccepted);
@@ -370,6 +399,7 @@ double fused_rmse_m(bool at_stamp) {
       EXPECT_EQ(fusion.fuse(sample, state.odom_T_base), LioVerdict::kAccepted);
     }
     const Transform odom_T_base = odometry(t_ns);
+    fusion.follow({math::square(0.04 * odom_T_base.p_m.x()), 0.0, 0.0, 0.0});  // its filter knows of it
     fusion.tick(odom_T_base, odom_T_base.p_m - before_m, kTick_s);
     before_m = odom_T_base.p_m;
     sum_m2 += (fusion.world_T_odom() * odom_T_base.p_m - truth(t_ns).p_m).squaredNorm();
