@@ -136,6 +136,31 @@ def sole_pivots(log):
     return with_rows(with_rows(log, attitude, attitudes), rate, rates)
 
 
+def truth_late(log, late_s):
+    """The truth of a row is that of so much earlier, of the nearest row."""
+    times = log["t_s"]
+    at = [max(bisect.bisect_right(times, t - late_s + 1e-9) - 1, 0) for t in times]
+    return {**log, **{name: [values[i] for i in at] for name, values in log.items() if name.startswith("truth_")}}
+
+
+def gyro_against_truth(log, span_s):
+    """rad, of each span in turn: between the turn that the gyro felt, its bias in it, and the truth's."""
+    times, attitudes, rates = log["t_s"], rows_of(log, TRUE_ATTITUDE), rows_of(log, GYRO)
+    apart, first, felt = [], 0, (1.0, 0.0, 0.0, 0.0)
+    for i in range(len(times) - 1):
+        turn = [rate * (times[i + 1] - times[i]) for rate in rates[i]]
+        angle = math.hypot(*turn)
+        axis = [part / angle if angle > 0.0 else 0.0 for part in turn]
+        felt = product(felt, (math.cos(angle / 2), *(math.sin(angle / 2) * part for part in axis)))
+        if times[i + 1] - times[first] >= span_s:
+            w, *v = attitudes[first]
+            true = product((w, *(-part for part in v)), attitudes[i + 1])
+            w, *v = product((felt[0], *(-part for part in felt[1:])), true)
+            apart.append(2 * math.atan2(math.hypot(*v), abs(w)))
+            first, felt = i + 1, (1.0, 0.0, 0.0, 0.0)
+    return apart
+
+
 # What a table calls it -> the log so.
 VARIANTS = {
     "as it is": lambda log: log,
@@ -147,5 +172,8 @@ VARIANTS = {
     "contacts 20 ms late": lambda log: contacts_late(log, 0.020),
     "IMU 10 ms late": lambda log: imu_late(log, 0.010),
     "accelerometer 1 % high": lambda log: accel_scaled(log, 1.01),
+    "truth 10 ms late": lambda log: truth_late(log, 0.010),
+    "truth 10 ms early": lambda log: truth_late(log, -0.010),
     "IMU tilted 1 degree": lambda log: imu_tilted(log, math.radians(1)),
 }
+THINNED = ("as it is", "every 2nd row", "every 5th row")
