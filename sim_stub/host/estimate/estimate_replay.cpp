@@ -25,11 +25,12 @@ Mat3 level_R_base(const Vec3& up) {
   return rotation_y(pitch_rad) * rotation_x(roll_rad);
 }
 
-// Means over the standstill at the start.
+// What the standstill at the start tells. What the legs know of a sway in that time is taken off what the IMU feels.
 struct Opening {
-  Vec3 gyro_radps = Vec3::Zero(), accel_mps2 = Vec3::Zero();
+  Vec3 gyro_radps = Vec3::Zero();  // bias
+  Vec3 accel_mps2 = Vec3::Zero();  // gravity and bias, in axes of the base at the first row
   double still_s = 0.0;
-  double gyro_sigma_radps = 0.0;  // of the mean: noise, and a turn too slow to be seen
+  double gyro_sigma_radps = 0.0;  // of the bias: noise, and a turn too slow to be seen
 };
 
 // Signals of one row, smoothed.
@@ -66,21 +67,48 @@ std::int64_t end_of_standstill_ns(const EstimateLog& log) {
   return last_ns;
 }
 
+// Coefficients of a polynomial in time through the columns, by least squares.
+Eigen::MatrixX3d fitted(const Eigen::VectorXd& times_s, const Eigen::MatrixX3d& values, int degree) {
+  Eigen::MatrixXd powers(times_s.size(), degree + 1);
+  powers.col(0).setOnes();
+  for (int i = 1; i <= degree; ++i) powers.col(i) = powers.col(i - 1).cwiseProduct(times_s);
+  return powers.colPivHouseholderQr().solve(values);
+}
+
 Opening opening(const EstimateLog& log) {
   const std::int64_t end_ns = end_of_standstill_ns(log) - static_cast<std::int64_t>(kUnseenMotion_s * 1e9);
+  const auto past =
+      std::find_if(log.rows.begin(), log.rows.end(), [&](const LogRow& row) { return row.stamp_ns > end_ns; });
+  const Eigen::Index rows = past - log.rows.begin();
   Opening o;
-  double count = 0.0;
-  Vec3 squares = Vec3::Zero();
-  for (const LogRow& row : log.rows) {
-    if (row.stamp_ns > end_ns) break;
-    count += 1.0;
-    const Vec3 off_radps = row.gyro_radps - o.gyro_radps;
-    o.gyro_radps += off_radps / count;
-    squares += off_radps.cwiseProduct(row.gyro_radps - o.gyro_radps);
-    o.accel_mps2 += (row.accel_mps2 - o.accel_mps2) / count;
-    o.still_s = seconds(row.stamp_ns);
+  if (rows < 4) return o;
+  const LogRow& first = log.rows.front();
+  Eigen::VectorXd times_s(rows);
+  Eigen::MatrixX3d unturned_rad(rows, 3), first_p_base_m(rows, 3);  // felt less seen by the legs; seen
+  Vec3 felt_rad = Vec3::Zero(), squares = Vec3::Zero(), mean_radps = Vec3::Zero();
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const LogRow& row = log.rows[static_cast<std::size_t>(i)];
+    Vec3 turn_rad = Vec3::Zero(), place_m = Vec3::Zero();
+    for (std::size_t f = 0; f < kFootCount; ++f) {
+      const Mat3 first_R_base =
+          log.has_soles ? Mat3(first.base_R_foot[f] * row.base_R_foot[f].transpose()) : Mat3::Identity();
+      turn_rad += so3_log(first_R_base) / kFootCount;
+      place_m += (first.base_p_foot_m[f] - first_R_base * row.base_p_foot_m[f]) / kFootCount;
+    }
+    times_s[i] = seconds(row.stamp_ns);
+    if (i > 0) felt_rad += (times_s[i] - times_s[i - 1]) * row.gyro_radps;
+    unturned_rad.row(i) = felt_rad - turn_rad;
+    first_p_base_m.row(i) = place_m;
+    o.accel_mps2 += so3_exp(turn_rad) * row.accel_mps2 / static_cast<double>(rows);
+    const Vec3 off_radps = row.gyro_radps - mean_radps;
+    mean_radps += off_radps / static_cast<double>(i + 1);
+    squares += off_radps.cwiseProduct(row.gyro_radps - mean_radps);
   }
-  o.gyro_sigma_radps = std::hypot(std::sqrt(squares.maxCoeff()) / count, kUnseenTurn_rad / o.still_s);
+  o.still_s = times_s[rows - 1];
+  o.gyro_radps = fitted(times_s, unturned_rad, 1).row(1);
+  o.accel_mps2 -= 2.0 * fitted(times_s, first_p_base_m, 2).row(2).transpose();
+  o.gyro_sigma_radps =
+      std::hypot(std::sqrt(squares.maxCoeff()) / static_cast<double>(rows), kUnseenTurn_rad / o.still_s);
   return o;
 }
 
