@@ -44,6 +44,8 @@ void ContactInEkf::reset(const Params& params) noexcept {
 void ContactInEkf::initialise(const Start& start, const std::array<LegMeasurement, kFootCount>& legs,
                               const Vec3& gyro_radps, const Vec3& accel_mps2) noexcept {
   stance_.reset(params_.stance);
+  innovation_m_.fill(Vec3::Zero());
+  mean_innovation_ratio_ = -1.0;
   motion_ = {.accel_mps2 = accel_mps2};
   odom_R_base_ = start.odom_R_base;
   odom_p_base_m_ = start.odom_p_base_m;

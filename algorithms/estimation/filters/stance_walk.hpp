@@ -30,8 +30,8 @@ class StanceWalk {
     double unloading_mprs = 7e-3;
     double unloading_s = 0.3;
     double vertical_share = 0.4;
-    double sole_radprs = 1.5e-3;
-    double sole_radpmrs = 5e-3;
+    double sole_radprs = 2.4e-3;
+    double sole_radpmrs = 2e-3;
     double sole_yaw_radprs = 3e-4;
     double sole_yaw_radpmrs = 16e-3;
 

@@ -109,9 +109,6 @@ void print(const EstimateLog& log, const Replay& replay, std::ostream& out) {
                   gaps.count, gaps.count == 1 ? "" : "s", 1e3 * log.gap_s(), gaps.longest_s);
     out << line;
   }
-  if (replay.rows_without_contact == log.rows.size()) {
-    out << "No foot ever stands (contact of 0.5 or more): this is dead reckoning by the IMU alone.\n";
-  }
   if (replay.imu_invalid > 0) {
     out << replay.imu_invalid
         << " rows have an IMU beyond what can be true and were left out: are its units rad/s and m/s^2?\n";

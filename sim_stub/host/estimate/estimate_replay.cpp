@@ -221,9 +221,11 @@ class LogReplay {
     last_world_T_odom_ = state.world_T_odom;
     const auto& feet = estimator_.contacts();
     if (!feet[0].stands && !feet[1].stands) ++result_.rows_without_contact;
+    bool slips = false;
     for (std::size_t f = 0; f < kFootCount; ++f) {
-      if (feet[f].stands && estimator_.odometry().motion().speed_mps(f) > kSlip_mps) ++result_.slipping_rows;
+      slips = slips || (feet[f].stands && estimator_.odometry().motion().speed_mps(f) > kSlip_mps);
     }
+    if (slips) ++result_.slipping_rows;
   }
 
   bool has_soles_;

@@ -47,6 +47,9 @@ double moving(const Replay& replay) { return share(replay.slipping_rows, replay)
 }  // namespace
 
 std::string doubt_about_contacts(const EstimateLog& log, const Replay& whole, const ReplayOptions& options) {
+  if (whole.rows_without_contact == whole.ticks.size()) {
+    return "No foot ever stands (contact of 0.5 or more): this is dead reckoning by the IMU alone.";
+  }
   if (whole.slipping_rows < kLeastRows || moving(whole) < kSuspect) return {};
   EstimateLog beginning = log;
   beginning.rows.resize(std::min(beginning.rows.size(), kMostReplayed_rows));
@@ -80,6 +83,11 @@ std::string doubt_about_contacts(const EstimateLog& log, const Replay& whole, co
 std::string doubt_about_lio(const std::string& path, std::size_t poses, const Replay& whole) {
   const auto count = [&whole](LioVerdict verdict) { return whole.lio[static_cast<std::size_t>(verdict)]; };
   constexpr std::uint32_t kLeastPoses = 5;
+  if (2 * (count(LioVerdict::kTooOld) + whole.lio_not_arrived) > poses) {
+    return "\"" + path + "\": of " + std::to_string(poses) + " poses " + std::to_string(count(LioVerdict::kTooOld)) +
+           " arrived too late to be of use and " + std::to_string(whole.lio_not_arrived) +
+           " after the log's end: are stamp_s and arrival_s in seconds, and of the log's clock?";
+  }
   const std::uint32_t refused = count(LioVerdict::kJump) + count(LioVerdict::kRealigned);
   if (refused < kLeastPoses || refused <= count(LioVerdict::kAccepted)) return {};
   return "\"" + path + "\": " + std::to_string(refused) + " of " + std::to_string(poses) +

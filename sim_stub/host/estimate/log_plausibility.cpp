@@ -143,8 +143,8 @@ Doubt doubt_of_gyro(const EstimateLog& log, const LogFigures& figures) {
   const LogFigures in_degrees = figures_of(log, kPi / 180.0);
   if ((!loses_gravity || in_degrees.gravity_kept > 0.95) && (!denies_truth || in_degrees.gyro_error_share < 0.8)) {
     return {
-        "The gyro turns 57 times as fast as the rest of the log: it is in degrees per second, but gyro_* are in "
-        "rad/s.",
+        "The gyro turns many times as fast as the rest of the log: it is in degrees per second, but gyro_* are in "
+        "rad/s, or t_s is not in seconds.",
         true};
   }
   if (denies_truth) {
@@ -168,6 +168,18 @@ Doubt doubt_of_gyro_axes(const LogFigures& figures) {
              "xyz"[axis])};
   }
   return {};
+}
+
+// Ahead is where a robot's maker has its base's x axis.
+Doubt doubt_of_soles(const LogFigures& figures) {
+  const Vec3 up = figures.base_up_by_feet.normalized();
+  if (figures.base_sole_up.dot(up) >= 0.7 * figures.base_sole_up.norm()) return {};
+  return {"The standing soles' z axes do not point up: is the order of *_foot_q* w, x, y, z, of the sole in the base?"};
+}
+
+Doubt doubt_of_true_place(const LogFigures& figures) {
+  if (figures.true_speed_mps < 5.0) return {};
+  return {text("The truth moves at %.3g m/s, in the mean: are truth_p*_m in metres?", figures.true_speed_mps), true};
 }
 
 Doubt doubt_of_rate(const LogFigures& figures) {
@@ -204,11 +216,15 @@ LogFigures figures_of(const EstimateLog& log, double gyro_scale) {
   LogFigures figures;
   Vec3 true_felt_mps2 = Vec3::Zero();
   std::vector<double> accels_mps2, legs_m, periods_s;
+  double way_m = 0.0;
   const double share = 1.0 / static_cast<double>(log.rows.size());
   for (std::size_t i = 1; i < log.rows.size(); ++i) {
     periods_s.push_back(seconds(log.rows[i].stamp_ns - log.rows[i - 1].stamp_ns));
+    const Vec3 moved_m = log.rows[i].truth.true_T_base.p_m - log.rows[i - 1].truth.true_T_base.p_m;
+    way_m += moved_m.norm();
   }
   figures.period_s = median(std::move(periods_s));
+  if (log.has_truth) figures.true_speed_mps = way_m / std::max(seconds(log.rows.back().stamp_ns), 1e-9);
   for (const LogRow& row : log.rows) {
     accels_mps2.push_back(row.accel_mps2.norm());
     figures.base_up_felt += share * row.accel_mps2;
@@ -216,6 +232,10 @@ LogFigures figures_of(const EstimateLog& log, double gyro_scale) {
     for (const Vec3& foot_m : row.base_p_foot_m) {
       legs_m.push_back(foot_m.norm());
       figures.base_up_by_feet -= share / kFootCount * foot_m;
+    }
+    for (std::size_t f = 0; log.has_soles && f < kFootCount; ++f) {
+      if (row.contact[f] < 0.5) continue;
+      figures.base_sole_up += share * row.base_R_foot[f].col(2);
     }
   }
   figures.accel_mps2 = median(std::move(accels_mps2));
@@ -231,9 +251,10 @@ LogFigures figures_of(const EstimateLog& log, double gyro_scale) {
 std::vector<std::string> doubts_about(const EstimateLog& log, const std::string& path) {
   const LogFigures figures = figures_of(log);
   std::vector<std::string> doubts;
-  for (const Doubt& doubt : {doubt_of_acceleration(figures), doubt_of_feet(figures), doubt_of_up(figures),
-                             doubt_of_gyro(log, figures), doubt_of_gyro_axes(figures), doubt_of_rate(figures),
-                             doubt_of_truth(figures, seconds(log.rows.back().stamp_ns))}) {
+  for (const Doubt& doubt :
+       {doubt_of_acceleration(figures), doubt_of_feet(figures), doubt_of_up(figures), doubt_of_soles(figures),
+        doubt_of_true_place(figures), doubt_of_gyro(log, figures), doubt_of_gyro_axes(figures), doubt_of_rate(figures),
+        doubt_of_truth(figures, seconds(log.rows.back().stamp_ns))}) {
     if (doubt.impossible) throw config::FileError("\"" + path + "\": " + doubt.sentence);
     if (!doubt.sentence.empty()) doubts.push_back(doubt.sentence);
   }

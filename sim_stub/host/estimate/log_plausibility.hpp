@@ -16,11 +16,13 @@ struct LogFigures {
   Vec3 base_up_by_feet = Vec3::Zero();  // from the feet to the base, in the mean
   double leg_m = 0.0;                   // median distance of a foot
   double period_s = 0.0;                // median time from row to row
+  Vec3 base_sole_up = Vec3::Zero();     // z axes of standing soles, in the mean; 0 without soles
   double gravity_kept = 1.0;            // share of gravity that the gyro's turns leave, at worst
   // Against the truth, 0 without it.
   double true_turn_radps = 0.0;                                                    // RMS
   double gyro_error_share = 0.0;                                                   // of the turns, squared
   Vec3 true_axis_turn_radps = Vec3::Zero(), gyro_axis_error_share = Vec3::Zero();  // the same of each axis
+  double true_speed_mps = 0.0;                                                     // mean
   double felt_lean_mps2 = 0.0;  // of the mean acceleration, out of the vertical
 };
 struct LogGaps {

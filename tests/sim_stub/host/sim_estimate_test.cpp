@@ -455,6 +455,16 @@ TEST_F(LogDoubts, UpOfTheAccelerometerIsNotThatOfTheFeet_IsRefused) {
   expect(said([](LogRow& row) { std::swap(row.accel_mps2.x(), row.accel_mps2.z()); }), "swapped or flipped", true);
 }
 
+TEST_F(LogDoubts, SolesUpsideDownAndTruthInMillimetres_AreNamed) {
+  log_.has_soles = true;
+  EXPECT_EQ(said([](LogRow&) {}), "");
+  const auto upside_down = [](LogRow& row) {
+    for (Mat3& R : row.base_R_foot) R = R * rotation_x(kPi);
+  };
+  expect(said(upside_down), "z axes do not point up", false);
+  expect(said([](LogRow& row) { row.truth.true_T_base.p_m *= 1000.0; }), "in metres?", true);
+}
+
 TEST_F(LogDoubts, OddNumbersThatMayBeRight_AreTold) {
   expect(said([](LogRow& row) { row.accel_mps2 *= 1.5; }), "gravity's 9.81", false);
   expect(said([](LogRow& row) { row.gyro_radps = -row.gyro_radps; }), "truth's quaternion", false);
@@ -522,6 +532,19 @@ TEST_F(Contradictions, FlippedAxesAndWrongFeet_AreNamed) {
                  for (double& contact : row.contact) contact = 1.0 - contact;
                }),
                "contacts");
+}
+
+TEST_F(Contradictions, NoContacts_AreTold) {
+  EXPECT_NE(contradiction([](LogRow& row) { row.contact.fill(0.0); }).find("No foot ever stands"), std::string::npos);
+}
+
+TEST(LioDoubt, PosesThatAllComeTooLate_AreTold) {
+  WalkSpec spec;
+  spec.steps = 2;
+  const EstimateLog log = climb_log(spec);
+  std::vector<LioRow> late = lio_of(log, 4);
+  for (LioRow& row : late) row.arrival_ns += kNsPerS;
+  EXPECT_NE(doubt_about_lio("lio.csv", late.size(), replay(log, late, {})).find("arrived too late"), std::string::npos);
 }
 
 TEST(LioDoubt, PosesInMillimetresOrOfAnotherOrder_AreRefusedAndTold_AndMoveNoSigma) {
