@@ -200,11 +200,11 @@ TEST(ControlBits, ClimbOfNoisyInputs_GivesTheRecordedBits) {
   // Estimate, map, footholds, plan and swings all took part.
   EXPECT_GE(pipeline->control().gait_status().treads_climbed, 1U);
   // Recorded anew when a result changes on purpose, and then the same in presets release and orin.
-  EXPECT_EQ(hashes.estimates.value(), 12213583679481869646U);
-  EXPECT_EQ(hashes.gait.value(), 5948645047963785399U);
-  EXPECT_EQ(hashes.commands.value(), 15687487767871806623U);
-  EXPECT_EQ(hashes.surfaces.value(), 8514004870879266789U);
-  EXPECT_EQ(hashes.map.value(), 4974132220760532670U);
+  EXPECT_EQ(hashes.estimates.value(), 6293686569484842569U);
+  EXPECT_EQ(hashes.gait.value(), 9201600561060212328U);
+  EXPECT_EQ(hashes.commands.value(), 5960913546302797237U);
+  EXPECT_EQ(hashes.surfaces.value(), 15584342161614648320U);
+  EXPECT_EQ(hashes.map.value(), 18027269456546164412U);
 }
 
 }  // namespace

@@ -151,7 +151,7 @@ TEST_F(OperatedModule, ResetOfASafeStop_IsRefusedForWhatLasts) {
 
   // Slower than what would be taken for a jump, faster than what two feet creep apart.
   for (int i = 0; i < 250; ++i) {
-    standing_q_rad_[9] += 0.0016;
+    standing_q_rad_[9] += 0.0020;
     stand(1);
   }
   ask(OperatorCommand::kReset, 1);
@@ -159,7 +159,7 @@ TEST_F(OperatedModule, ResetOfASafeStop_IsRefusedForWhatLasts) {
   EXPECT_EQ(refusal(&joints), Refusal::kJointsAway);
   EXPECT_EQ(joints.bits(), 1U << 9U);
   for (int i = 0; i < 250; ++i) {
-    standing_q_rad_[9] -= 0.0016;
+    standing_q_rad_[9] -= 0.0020;
     stand(1);
   }
 

@@ -36,6 +36,10 @@ def turned(q, v):
     return product(product(q, (0.0, *v)), (q[0], -q[1], -q[2], -q[3]))[1:]
 
 
+def yaw_of(q):
+    return math.atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] ** 2 + q[3] ** 2))
+
+
 def rows_of(log, names):
     return list(zip(*(log[name] for name in names)))
 

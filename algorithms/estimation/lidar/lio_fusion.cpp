@@ -128,7 +128,9 @@ void LioFusion::rebase(const Transform& new_T_old) noexcept {
 void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept {
   uncertainty_.move(world_T_odom_.R * odom_step_m);
   untied_.move(odom_step_m);
-  const Believed best = believed(odom_T_base);
+  const double ratio = offset_ratio(odom_T_base);
+  doubted_offset_ = ratio > (doubted_offset_ ? params_.trusted_ratio : params_.most_ratio);
+  const Believed best = believed(odom_T_base, doubted_offset_ ? params_.trusted_ratio / ratio : 1.0);
   const Transform& wanted = best.world_T_base;
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
@@ -143,26 +145,40 @@ void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, doub
     world_T_odom_ = next * odom_T_base.inverse();
   }
   const Vec3 held_back_m = (1.0 - move_share) * move_m;
-  position_sigma_m_ = (best.variance_m2 + held_back_m.cwiseAbs2()).cwiseSqrt();
-  yaw_sigma_rad_ = best.yaw_sigma_rad;
+  position_sigma_m_ = (best.variance.head<3>() + held_back_m.cwiseAbs2()).cwiseSqrt();
+  yaw_sigma_rad_ = math::sqrt(best.variance[3]);
 }
 
-LioFusion::Believed LioFusion::believed(const Transform& odom_T_base) const noexcept {
-  const Transform fused = fused_world_T_odom_ * odom_T_base;
+LioUncertainty::Quantities LioFusion::odometry_variance(const Transform& odom_T_base) const noexcept {
   const Vec3 way_m = odom_T_base.p_m - odom_p_first_m_;
-  const Vec3 alone_m2 =
+  LioUncertainty::Quantities variance;
+  variance.head<3>() =
       untied_.position_sigma_m(odom_T_base.p_m).cwiseAbs2() + math::square(params_.way_share) * way_m.cwiseAbs2();
-  const Vec3 tied_m2 = known().position_sigma_m(fused.p_m).cwiseAbs2();
-  const double alone_rad2 = math::square(untied_.yaw_sigma_rad()), tied_rad2 = math::square(known().yaw_sigma_rad());
-  const Vec3 moved_m = fused.p_m - odom_T_base.p_m;
-  const double yaw_rad = so3_log(fused_world_T_odom_.R).z();
-  const double ratio =
-      moved_m.cwiseAbs2().cwiseQuotient(alone_m2 + tied_m2).sum() + math::square(yaw_rad) / (alone_rad2 + tied_rad2);
-  const double share = share_within(ratio, params_.most_ratio);
-  if (share >= 1.0) return {fused_world_T_odom_, fused, tied_m2, known().yaw_sigma_rad()};
+  variance[3] = math::square(untied_.yaw_sigma_rad());
+  return variance;
+}
+
+LioUncertainty::Quantities LioFusion::fused_variance(const Vec3& world_p_base_m) const noexcept {
+  LioUncertainty::Quantities variance;
+  variance.head<3>() = known().position_sigma_m(world_p_base_m).cwiseAbs2();
+  variance[3] = math::square(known().yaw_sigma_rad());
+  return variance;
+}
+
+double LioFusion::offset_ratio(const Transform& odom_T_base) const noexcept {
+  const Transform fused = fused_world_T_odom_ * odom_T_base;
+  LioUncertainty::Quantities offset;
+  offset.head<3>() = fused.p_m - odom_T_base.p_m;
+  offset[3] = so3_log(fused_world_T_odom_.R).z();
+  return offset.cwiseAbs2().cwiseQuotient(odometry_variance(odom_T_base) + fused_variance(fused.p_m)).sum();
+}
+
+LioFusion::Believed LioFusion::believed(const Transform& odom_T_base, double share) const noexcept {
+  const Transform fused = fused_world_T_odom_ * odom_T_base;
+  const LioUncertainty::Quantities variance = fused_variance(fused.p_m);
+  if (share >= 1.0) return {fused_world_T_odom_, fused, variance};
   const Transform shared = fuse_pose(odom_T_base, fused, share);
-  return {shared * odom_T_base.inverse(), shared, share * tied_m2 + (1.0 - share) * alone_m2,
-          math::sqrt(share * tied_rad2 + (1.0 - share) * alone_rad2)};
+  return {shared * odom_T_base.inverse(), shared, share * variance + (1.0 - share) * odometry_variance(odom_T_base)};
 }
 
 bool LioFusion::is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept {

@@ -19,11 +19,11 @@
 
 namespace polygmap {
 
-// Eq. (5): the base in LIO's world, through the lidar's mount.
 // Where LIO's world lies in ours, from one body's pose in both. Both know which way is up, LIO by an IMU of its own:
 // the tie is a heading and a place. A tie that took over what the odometry's tilt was off by, 10 to 20 mrad where a
 // robot sways at the start, would tilt the world that LIO is there to keep level (40 mm on ten stairs, 2026-11).
 [[nodiscard]] Transform tied_level(const Transform& world_T_body, const Transform& lio_T_body) noexcept;
+// Eq. (5): the base in LIO's world, through the lidar's mount.
 [[nodiscard]] Transform base_from_lidar(const Transform& lio_T_lidar, const Transform& base_T_lidar) noexcept;
 // Eq. (9): 1 - alpha.
 [[nodiscard]] double complementary_gain(double dt_s, double tau_s) noexcept;
@@ -70,7 +70,8 @@ class LioFusion {
     double jump_growth_radps = 0.004;
     double max_jump_m = 0.5;
     double max_jump_rad = 0.3;
-    double most_ratio = 0.5;
+    double most_ratio = 9.5;
+    double trusted_ratio = 0.5;
     double way_share = 0.0075;
     std::uint32_t realign_count = 20;
     double slew_mps = 0.1;
@@ -99,10 +100,13 @@ class LioFusion {
       field("max_jump_m", p.max_jump_m, 0.001, 100.0, "A pose farther off is a jump however long the silence.");
       field("max_jump_rad", p.max_jump_rad, 0.001, 3.2, "A pose turned farther is a jump however long the silence.");
       field("most_ratio", p.most_ratio, 0.0, 1e6,
-            "The odometry is moved by all of an offset whose square over its variance is up to this, by less of a "
-            "larger one: lidar odometry drifts, too.");
+            "Where the squares of the offset, of place and heading, over their variances add up to more, it is lidar "
+            "odometry that drifts: 9.5 is more than 95 % of honest ones.");
+      field("trusted_ratio", p.trusted_ratio, 0.0, 1e6,
+            "Then, until the sum is below this, the odometry is moved by this over the sum of the offset.");
       field("way_share", p.way_share, 0.0, 0.1,
             "Of its way by which the odometry may be off along it, in that variance: legs are longer than thought.");
+      field.ordered("trusted_ratio", "most_ratio");
       field("realign_count", p.realign_count, 1, 1000000,
             "Jumped poses in a row that agree among themselves are LIO's new world after as many.");
       field("slew_mps", p.slew_mps, 0.001, 10.0, "The fused pose moves no faster: 0.2 mm in a tick of 2 ms.");
@@ -152,14 +156,17 @@ class LioFusion {
                                  const LioSigmas& sigmas) noexcept;
   // A pose whose tilt is not the odometry's cannot be tied to it by any heading and place.
   [[nodiscard]] bool is_tilted(const Transform& world_T_base, const Transform& lio_T_base) const noexcept;
-  // What of the fused offset the odometry can have drifted by. Beyond that, the longer the offset the more of it is
-  // lidar odometry's own drift; that part is kept from what is published only.
+  // Place and heading, squared: of the odometry alone, and with LIO.
+  [[nodiscard]] LioUncertainty::Quantities odometry_variance(const Transform& odom_T_base) const noexcept;
+  [[nodiscard]] LioUncertainty::Quantities fused_variance(const Vec3& world_p_base_m) const noexcept;
+  // The squared offset over its variance, four rows of it: honest sigmas and a LIO that does not drift give 4 at most.
+  [[nodiscard]] double offset_ratio(const Transform& odom_T_base) const noexcept;
   struct Believed {
     Transform world_T_odom, world_T_base;
-    Vec3 variance_m2;
-    double yaw_sigma_rad;
+    LioUncertainty::Quantities variance;
   };
-  [[nodiscard]] Believed believed(const Transform& odom_T_base) const noexcept;
+  // By a share of the fused offset. The rest is kept from what is published only.
+  [[nodiscard]] Believed believed(const Transform& odom_T_base, double share) const noexcept;
   // Of the published pose: a tie that was contradicted, and that no second pose confirmed, says nothing.
   [[nodiscard]] const LioUncertainty& known() const noexcept {
     return !aligned_ && doubted_ && count_ <= 1 ? untied_ : uncertainty_;
@@ -193,6 +200,7 @@ class LioFusion {
   Vec3 odom_p_first_m_ = Vec3::Zero();  // of the base, at the first pose
   Vec3 position_sigma_m_ = Vec3::Zero();
   double yaw_sigma_rad_ = 0.0;
+  bool doubted_offset_ = false;
   LioInnovations innovations_;
 };
 

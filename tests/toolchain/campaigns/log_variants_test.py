@@ -81,6 +81,23 @@ class LogVariants(unittest.TestCase):
         half = log_variants.imu_late(log_of_steps(), 0.004)  # between two rows
         self.assertAlmostEqual(half["accel_z_mps2"][200], 5.0 + 20.0 - 0.04, 9)
 
+    def test_truth_late_and_early_is_that_of_another_row(self):
+        log = log_of_steps()
+        log["truth_qx"] = [float(i) for i in range(ROWS)]
+        for name, row in (("truth 10 ms late", 99.0), ("truth 10 ms early", 101.0)):
+            self.assertEqual(self.made(name, ("truth_qx",), dict(log))["truth_qx"][100], row)
+
+    def test_gyro_against_truth_is_the_angle_between_both(self):
+        log = log_of_steps()
+        for name, rate in zip(log_variants.GYRO, (0.0, 0.0, 0.2)):
+            log[name] = [rate] * ROWS
+        for part, value in zip("wz", (math.cos, math.sin)):
+            log[f"truth_q{part}"] = [value(0.15 * t / 2) for t in log["t_s"]]  # 0.05 rad/s less
+        apart = log_variants.gyro_against_truth(log, 0.5)
+        self.assertEqual(len(apart), 6)
+        for angle in apart:
+            self.assertAlmostEqual(angle, 0.025, 6)
+
     def test_contacts_late_and_early(self):
         for name, rows in (("contacts 20 ms late", 2), ("contacts 20 ms early", -2)):
             out = self.made(name, ("left_contact", "right_contact"))

@@ -19,7 +19,9 @@ namespace {
 constexpr const char* kUsage =
     "inekf_replay LOG.csv [--json OUT.json] [--csv OUT.csv] [NAME=VALUE...]\n"
     "The filter's noise: gyro, accel, gyro_bias, accel_bias, contact, in its own units, and foot, of the feet's "
-    "positions, m.\nWhat is not given is as in the filter's own example.";
+    "positions, m.\nWhat is not given is as in the filter's own example. still: the gyro's bias begins as its mean "
+    "over "
+    "so many seconds, where it begins at 0 otherwise.";
 
 // Of the start, one sigma: attitude (rad), velocity (m/s) and position (m) as the module's; biases of gyro (rad/s) and
 // accelerometer (m/s^2) as the filter's authors have them for Cassie.
@@ -27,8 +29,8 @@ constexpr std::array<double, 5> kStartSigmas{1e-4, 1e-3, 1e-4, 0.01, 0.1};
 
 struct Request {
   std::string log, json, csv;
-  std::map<std::string, double> noise{{"gyro", 0.01},       {"accel", 0.1},    {"gyro_bias", 1e-5},
-                                      {"accel_bias", 1e-4}, {"contact", 0.01}, {"foot", 0.003}};
+  std::map<std::string, double> noise{{"gyro", 0.01},    {"accel", 0.1},  {"gyro_bias", 1e-5}, {"accel_bias", 1e-4},
+                                      {"contact", 0.01}, {"foot", 0.003}, {"still", 0.0}};
 };
 
 void take_noise(const std::string& word, Request& request) {
@@ -56,7 +58,19 @@ Request request_of(const std::vector<std::string>& words) {
   return request;
 }
 
-inekf::InEKF filter_at(const LogTruth& start, const Request& request) {
+Vec3 mean_gyro_radps(const EstimateLog& log, double still_s) {
+  Vec3 sum_radps = Vec3::Zero();
+  double count = 0.0;
+  for (const LogRow& row : log.rows) {
+    if (seconds(row.stamp_ns) >= still_s) break;
+    sum_radps += row.gyro_radps;
+    count += 1.0;
+  }
+  return sum_radps / std::max(count, 1.0);
+}
+
+inekf::InEKF filter_at(const EstimateLog& log, const Request& request) {
+  const LogTruth& start = log.rows.front().truth;
   inekf::NoiseParams noise;
   noise.setGyroscopeNoise(request.noise.at("gyro"));
   noise.setAccelerometerNoise(request.noise.at("accel"));
@@ -67,6 +81,7 @@ inekf::InEKF filter_at(const LogTruth& start, const Request& request) {
   state.setRotation(start.true_T_base.R);
   state.setVelocity(start.true_v_base_mps);
   state.setPosition(start.true_T_base.p_m);
+  state.setGyroscopeBias(mean_gyro_radps(log, request.noise.at("still")));
   Eigen::VectorXd variances(15);
   for (int i = 0; i < 5; ++i) variances.segment<3>(3 * i).setConstant(math::square(kStartSigmas[i]));
   state.setP(variances.asDiagonal());
@@ -115,7 +130,7 @@ ReplayTick tick_of(inekf::InEKF& filter, const LogRow& row) {
 
 Replay replay_peer(const EstimateLog& log, const Request& request) {
   Replay replay;
-  inekf::InEKF filter = filter_at(log.rows.front().truth, request);
+  inekf::InEKF filter = filter_at(log, request);
   for (std::size_t i = 0; i < log.rows.size(); ++i) {
     if (i > 0) propagate(filter, log.rows[i - 1], log.rows[i]);
     correct(filter, log.rows[i], request.noise.at("foot"));
