@@ -50,10 +50,10 @@ void LioFusion::reset(const Params& params, const Transform& base_T_lidar) noexc
   base_T_lidar_ = base_T_lidar;
   uncertainty_.reset(params.uncertainty);
   untied_.reset(params.uncertainty);
-  position_noise_m_.reset(params.unstated_position_m);
-  rotation_noise_rad_.reset(params.unstated_rotation_rad);
-  position_sigma_m_ = uncertainty_.position_sigma_m(Vec3::Zero());
-  yaw_sigma_rad_ = uncertainty_.yaw_sigma_rad();
+  noise_.position_m.reset(params.unstated_position_m);
+  noise_.rotation_rad.reset(params.unstated_rotation_rad);
+  sigmas_.position_m = uncertainty_.position_sigma_m(Vec3::Zero());
+  sigmas_.yaw_rad = uncertainty_.yaw_sigma_rad();
 }
 
 LioVerdict LioFusion::check(const LioSample& sample, std::int64_t now_ns) const noexcept {
@@ -97,7 +97,7 @@ LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base
     last_lio_T_odom_ = lio_T_base * odom_T_base.inverse();
     return LioVerdict::kRealigned;
   }
-  jumped_count_ = 0;
+  jumped_.count = 0;
   last_accepted_ns_ = last_used_ns_ = sample.stamp_ns;
   const bool stated = sample.position_sigma_m.maxCoeff() > 0.0 && sample.rotation_sigma_rad.maxCoeff() > 0.0;
   if (!stated) measure_noise(lio_T_base, odom_T_base, silence_s);
@@ -122,15 +122,15 @@ void LioFusion::rebase(const Transform& new_T_old) noexcept {
   uncertainty_.rebase(new_T_old);
   untied_.rebase(new_T_old);
   odom_p_first_m_ = new_T_old * odom_p_first_m_;
-  jumped_count_ = 0;
+  jumped_.count = 0;
 }
 
 void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept {
   uncertainty_.move(world_T_odom_.R * odom_step_m);
   untied_.move(odom_step_m);
   const double ratio = offset_ratio(odom_T_base);
-  doubted_offset_ = ratio > (doubted_offset_ ? params_.trusted_ratio : params_.most_ratio);
-  const Believed best = believed(odom_T_base, doubted_offset_ ? params_.trusted_ratio / ratio : 1.0);
+  doubted_offset_ = ratio > (doubted_offset_ ? params_.drift.trusted_ratio : params_.drift.most_ratio);
+  const Believed best = believed(odom_T_base, doubted_offset_ ? params_.drift.trusted_ratio / ratio : 1.0);
   const Transform& wanted = best.world_T_base;
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
@@ -145,15 +145,15 @@ void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, doub
     world_T_odom_ = next * odom_T_base.inverse();
   }
   const Vec3 held_back_m = (1.0 - move_share) * move_m;
-  position_sigma_m_ = (best.variance.head<3>() + held_back_m.cwiseAbs2()).cwiseSqrt();
-  yaw_sigma_rad_ = math::sqrt(best.variance[3]);
+  sigmas_.position_m = (best.variance.head<3>() + held_back_m.cwiseAbs2()).cwiseSqrt();
+  sigmas_.yaw_rad = math::sqrt(best.variance[3]);
 }
 
 LioUncertainty::Quantities LioFusion::odometry_variance(const Transform& odom_T_base) const noexcept {
   const Vec3 way_m = odom_T_base.p_m - odom_p_first_m_;
   LioUncertainty::Quantities variance;
   variance.head<3>() =
-      untied_.position_sigma_m(odom_T_base.p_m).cwiseAbs2() + math::square(params_.way_share) * way_m.cwiseAbs2();
+      untied_.position_sigma_m(odom_T_base.p_m).cwiseAbs2() + math::square(params_.drift.way_share) * way_m.cwiseAbs2();
   variance[3] = math::square(untied_.yaw_sigma_rad());
   return variance;
 }
@@ -190,23 +190,23 @@ bool LioFusion::is_jump(const Transform& predicted, const Transform& measured, d
 
 bool LioFusion::try_realign(const Transform& lio_T_base, const Transform& odom_T_base,
                             const LioSigmas& sigmas) noexcept {
-  const bool agrees = jumped_count_ > 0 && !is_jump(jumped_lio_T_odom_ * odom_T_base, lio_T_base, 0.0);
-  jumped_count_ = agrees ? jumped_count_ + 1 : 1;
-  const Transform before = agrees ? jumped_lio_T_odom_ * odom_T_base : lio_T_base;
-  jumped_lio_T_odom_ = fuse_pose(before, lio_T_base, 1.0 / static_cast<double>(jumped_count_)) * odom_T_base.inverse();
-  jumped_lio_T_odom_.R = so3_renormalised(jumped_lio_T_odom_.R);
+  const bool agrees = jumped_.count > 0 && !is_jump(jumped_.lio_T_odom * odom_T_base, lio_T_base, 0.0);
+  jumped_.count = agrees ? jumped_.count + 1 : 1;
+  const Transform before = agrees ? jumped_.lio_T_odom * odom_T_base : lio_T_base;
+  jumped_.lio_T_odom = fuse_pose(before, lio_T_base, 1.0 / static_cast<double>(jumped_.count)) * odom_T_base.inverse();
+  jumped_.lio_T_odom.R = so3_renormalised(jumped_.lio_T_odom.R);
   // Which of the first two poses is wrong nobody knows: the later one is tried, once. If a third contradicts it, too,
   // it takes as many poses that agree as after any other jump.
   const bool first_pose_contradicted = !aligned_ && count_ == 1 && !doubted_;
   doubted_ = doubted_ || first_pose_contradicted;
-  if (jumped_count_ < params_.realign_count && !first_pose_contradicted) return false;
-  const Transform world_T_base = fused_world_T_odom_ * odom_T_base, mean_T_base = jumped_lio_T_odom_ * odom_T_base;
+  if (jumped_.count < params_.realign_count && !first_pose_contradicted) return false;
+  const Transform world_T_base = fused_world_T_odom_ * odom_T_base, mean_T_base = jumped_.lio_T_odom * odom_T_base;
   if (is_tilted(world_T_base, mean_T_base)) return false;
   if (!aligned_) uncertainty_ = untied_;                 // the former tie was none
   world_T_lio_ = tied_level(world_T_base, mean_T_base);  // our world stays where it is
-  tie(odom_T_base, sigmas, jumped_count_);
-  count_ = jumped_count_;
-  jumped_count_ = 0;
+  tie(odom_T_base, sigmas, jumped_.count);
+  count_ = jumped_.count;
+  jumped_.count = 0;
   return true;
 }
 
@@ -215,9 +215,9 @@ bool LioFusion::is_tilted(const Transform& world_T_base, const Transform& lio_T_
 }
 
 LioFusion::LioSigmas LioFusion::sigmas_of(const LioSample& sample) const noexcept {
-  const double rotation_rad = stated_or(sample.rotation_sigma_rad.maxCoeff(), rotation_noise_rad_.sigma());
+  const double rotation_rad = stated_or(sample.rotation_sigma_rad.maxCoeff(), noise_.rotation_rad.sigma());
   const bool stated = sample.position_sigma_m.maxCoeff() > 0.0;  // of the lidar; what is measured is the base's
-  const double lidar_m = stated_or(sample.position_sigma_m.maxCoeff(), position_noise_m_.sigma());
+  const double lidar_m = stated_or(sample.position_sigma_m.maxCoeff(), noise_.position_m.sigma());
   const double lever_m = stated ? base_T_lidar_.p_m.norm() * rotation_rad : 0.0;
   return {math::sqrt(math::square(lidar_m) + math::square(lever_m)), rotation_rad};
 }
@@ -227,8 +227,8 @@ void LioFusion::measure_noise(const Transform& lio_T_base, const Transform& odom
   last_lio_T_odom_ = lio_T_base * odom_T_base.inverse();
   if (silence_s > params_.max_gap_s) return;
   constexpr double kRows = 2.0 * 3.0;
-  position_noise_m_.take((lio_T_base.p_m - expected.p_m).squaredNorm() / kRows, silence_s);
-  rotation_noise_rad_.take(so3_log(lio_T_base.R * expected.R.transpose()).squaredNorm() / kRows, silence_s);
+  noise_.position_m.take((lio_T_base.p_m - expected.p_m).squaredNorm() / kRows, silence_s);
+  noise_.rotation_rad.take(so3_log(lio_T_base.R * expected.R.transpose()).squaredNorm() / kRows, silence_s);
 }
 
 void LioFusion::observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,

@@ -54,6 +54,23 @@ struct LioInnovations {
 
 class LioFusion {
  public:
+  // Whose drift an offset between the odometry and LIO is.
+  struct Drift {
+    double most_ratio = 9.5;
+    double trusted_ratio = 0.5;
+    double way_share = 0.0075;
+
+    static void visit(auto& p, auto& field) {
+      field("most_ratio", p.most_ratio, 0.0, 1e6,
+            "Where the squares of the offset, of place and heading, over their variances add up to more, it is lidar "
+            "odometry that drifts: 9.5 is more than 95 % of honest ones.");
+      field("trusted_ratio", p.trusted_ratio, 0.0, 1e6,
+            "Then, until the sum is below this, the odometry is moved by this over the sum of the offset.");
+      field("way_share", p.way_share, 0.0, 0.1,
+            "Of its way by which the odometry may be off along it, in that variance: legs are longer than thought.");
+      field.ordered("trusted_ratio", "most_ratio");
+    }
+  };
   struct Params {
     double max_age_s = 0.4;
     double tau_s = 4.0;
@@ -70,9 +87,7 @@ class LioFusion {
     double jump_growth_radps = 0.004;
     double max_jump_m = 0.5;
     double max_jump_rad = 0.3;
-    double most_ratio = 9.5;
-    double trusted_ratio = 0.5;
-    double way_share = 0.0075;
+    Drift drift;
     std::uint32_t realign_count = 20;
     double slew_mps = 0.1;
     double slew_radps = 0.175;
@@ -99,14 +114,7 @@ class LioFusion {
             "The bound of turns grows by this for each second of silence.");
       field("max_jump_m", p.max_jump_m, 0.001, 100.0, "A pose farther off is a jump however long the silence.");
       field("max_jump_rad", p.max_jump_rad, 0.001, 3.2, "A pose turned farther is a jump however long the silence.");
-      field("most_ratio", p.most_ratio, 0.0, 1e6,
-            "Where the squares of the offset, of place and heading, over their variances add up to more, it is lidar "
-            "odometry that drifts: 9.5 is more than 95 % of honest ones.");
-      field("trusted_ratio", p.trusted_ratio, 0.0, 1e6,
-            "Then, until the sum is below this, the odometry is moved by this over the sum of the offset.");
-      field("way_share", p.way_share, 0.0, 0.1,
-            "Of its way by which the odometry may be off along it, in that variance: legs are longer than thought.");
-      field.ordered("trusted_ratio", "most_ratio");
+      field("drift", p.drift);
       field("realign_count", p.realign_count, 1, 1000000,
             "Jumped poses in a row that agree among themselves are LIO's new world after as many.");
       field("slew_mps", p.slew_mps, 0.001, 10.0, "The fused pose moves no faster: 0.2 mm in a tick of 2 ms.");
@@ -139,8 +147,8 @@ class LioFusion {
   void tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept;
   [[nodiscard]] const Transform& world_T_odom() const noexcept { return world_T_odom_; }
   // Of the published pose, world axes; what the slew limit still holds back counts as error.
-  [[nodiscard]] const Vec3& position_sigma_m() const noexcept { return position_sigma_m_; }
-  [[nodiscard]] double yaw_sigma_rad() const noexcept { return yaw_sigma_rad_; }
+  [[nodiscard]] const Vec3& position_sigma_m() const noexcept { return sigmas_.position_m; }
+  [[nodiscard]] double yaw_sigma_rad() const noexcept { return sigmas_.yaw_rad; }
   struct LioSigmas {
     double position_m, rotation_rad;  // of the base
   };
@@ -189,17 +197,23 @@ class LioFusion {
   Transform fused_world_T_odom_;  // towards which the published one moves
   Transform world_T_odom_;        // published
   Transform last_lio_T_odom_;     // by the last accepted pose alone
-  NoiseLevel position_noise_m_, rotation_noise_rad_;
-  Transform jumped_lio_T_odom_;
-  std::uint32_t jumped_count_ = 0;
+  struct {
+    NoiseLevel position_m, rotation_rad;
+  } noise_;  // as it is measured
+  struct {
+    Transform lio_T_odom;
+    std::uint32_t count = 0;
+  } jumped_;  // the mean of poses that agree among themselves
   std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();  // of any pose that was in order
   std::int64_t last_accepted_ns_ = -1;
   std::int64_t last_used_ns_ = -1;  // accepted or realigned: since then LIO was silent
   LioUncertainty uncertainty_;
   LioUncertainty untied_;               // as if there were no LIO
   Vec3 odom_p_first_m_ = Vec3::Zero();  // of the base, at the first pose
-  Vec3 position_sigma_m_ = Vec3::Zero();
-  double yaw_sigma_rad_ = 0.0;
+  struct {
+    Vec3 position_m = Vec3::Zero();
+    double yaw_rad = 0.0;
+  } sigmas_;  // of the published pose
   bool doubted_offset_ = false;
   LioInnovations innovations_;
 };
