@@ -3,8 +3,9 @@
 // over it, and gives way when it is unloaded. As densities, so that the rate of samples does not matter.
 //
 // The constants were chosen on the three logs of docs/measured/estimation.md, the bedding on a log of iCub that sways
-// on two planted feet (com-sinusoid of ami-iit's base estimation), the rocking of a sole that rests on simulated climbs
-// over soft ground: with a fifteenth of it the robot of seed 32, twice as bad as real ones, lost its tilt and fell.
+// on two planted feet (com-sinusoid of ami-iit's base estimation). The rocking of a sole that rests was chosen on the
+// logs of simulated climbs with play in the joints (--reality 1, seeds 201 to 208) and on those of iCub; over soft
+// ground, with about a twentieth of it, the robot of seed 32, twice as bad as real ones, lost its tilt and fell.
 #pragma once
 
 #include <algorithm>
