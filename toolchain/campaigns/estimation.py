@@ -127,15 +127,15 @@ def disturbed(found, logs):
     return lines, [f"{what}, {name}: {s}" for (what, name), s in found.items() if isinstance(s, str)]
 
 
-def thinned(found_of, logs):
-    """A line for each log and filter: its figures by how many rows are left."""
-    def cell(of_rows, key, digits):
-        return " / ".join("-" if isinstance(s, str) or s[key] is None else f"{s[key]:.{digits}f}" for s in of_rows)
+def by_filter(found_of, logs, variants, figures):
+    """A line for each log and filter: its figures, of one variant after the other."""
+    def cell(of_variants, key, digits):
+        return " / ".join("-" if isinstance(s, str) or s[key] is None else f"{s[key]:.{digits}f}" for s in of_variants)
     lines = []
     for what in logs:
         for name, found in found_of.items():
-            of_rows = [found[what, variant] for variant in log_variants.THINNED]
-            lines.append((what, name, *(cell(of_rows, *FIGURES[figure]) for figure in THINNED)))
+            of_variants = [found[what, variant] for variant in variants]
+            lines.append((what, name, *(cell(of_variants, *FIGURES[figure]) for figure in figures)))
     return lines
 
 
@@ -239,7 +239,9 @@ def estimation(engine, _):
         "\n\n## Logs that are not as they should be\n\nPosition RMSE, mm, of ours on the same logs made otherwise (`toolchain/campaigns/log_variants.py`). "
         "What slips or pivots is the foot that stands nearest to the log's middle.\n\n" +
         rows(("log", *log_variants.VARIANTS), worse) + list_of(unscored_variants) +
-        "\n\nFewer rows, every one / every 2nd / every 5th of them:\n\n" + rows(("log", "filter", *THINNED), thinned(variants, scored)) +
+        "\n\nFewer rows, every one / every 2nd / every 5th of them:\n\n" + rows(("log", "filter", *THINNED), by_filter(variants, scored, log_variants.THINNED, THINNED)) +
+        "\n\nBegun on one foot, in the middle of the log: the start is what the truth says there, and biases are unknown:\n\n" +
+        rows(("log", "filter", *FIGURES), by_filter(variants, scored, ["begun on one foot"], FIGURES)) +
         "\n\nThe turn that the gyro feels in half a second, against the truth's: how far they are apart, median / worst. Steady, it is the gyro's bias; "
         "what comes and goes no filter can know.\n\n" +
         rows(("log", "mrad"), [(what, "{:.0f} / {:.0f}".format(*gyro_against_truth(path))) for what, path in scored.items()]) +

@@ -53,6 +53,15 @@ def thinned(log, every):
     return {name: values[::every] for name, values in log.items()}
 
 
+def begun_on_one_foot(log):
+    """From the first row on, of its second half, at which one foot stands."""
+    left, right = (log[f"{foot}_contact"] for foot in FEET)
+    at = next((i for i in range(len(left) // 2, len(left)) if (left[i] >= 0.5) != (right[i] >= 0.5)), None)
+    if at is None:
+        raise ValueError("it has no foot that stands alone")
+    return {name: values[at:] for name, values in log.items()}
+
+
 def imu_late(log, late_s):
     """The samples are of so much earlier than their rows say, interpolated."""
     times = log["t_s"]
@@ -170,6 +179,7 @@ VARIANTS = {
     "as it is": lambda log: log,
     "every 2nd row": lambda log: thinned(log, 2),
     "every 5th row": lambda log: thinned(log, 5),
+    "begun on one foot": begun_on_one_foot,
     "a foot slips 60 mm in 0.2 s": foot_slips,
     "a sole pivots 5 degrees in 0.2 s": sole_pivots,
     "contacts 20 ms early": lambda log: contacts_late(log, -0.020),

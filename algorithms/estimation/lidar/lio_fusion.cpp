@@ -48,6 +48,7 @@ void LioFusion::reset(const Params& params, const Transform& base_T_lidar) noexc
   *this = LioFusion{};
   params_ = params;
   base_T_lidar_ = base_T_lidar;
+  mount_.reset(params.mount);
   uncertainty_.reset(params.uncertainty);
   untied_.reset(params.uncertainty);
   noise_.position_m.reset(params.unstated_position_m);
@@ -84,7 +85,7 @@ LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base
     last_accepted_ns_ = last_used_ns_ = sample.stamp_ns;
     last_lio_T_odom_ = world_T_lio_.inverse();
     tie(odom_T_base, sigmas, count_);
-    odom_p_first_m_ = odom_T_base.p_m;
+    offset_.odom_p_first_m = odom_T_base.p_m;
     return LioVerdict::kAccepted;
   }
 
@@ -106,9 +107,12 @@ LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base
                                          std::max(params_.tau_s, params_.tau_spm * sigmas.position_m));
   if (aligned_) {
     observe(predicted, measured, sigmas, sample.stamp_ns);
-    fused_world_T_odom_ = fuse_pose(predicted, turned_by_yaw(predicted, measured), gain) * odom_T_base.inverse();
+    const Transform fused = fuse_pose(predicted, turned_by_yaw(predicted, measured), gain);
+    fused_world_T_odom_ = fused * odom_T_base.inverse();
     fused_world_T_odom_.R = so3_renormalised(fused_world_T_odom_.R);
     uncertainty_.blend(gain, sigmas.position_m, sigmas.rotation_rad);
+    mount_.see({fused.p_m, so3_log(fused.R * predicted.R.transpose()).z(), gain,
+                uncertainty_.offset_variance().head<2>().mean()});
   } else {
     align(predicted, lio_T_base, sigmas, gain);
   }
@@ -116,28 +120,30 @@ LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base
 }
 
 void LioFusion::rebase(const Transform& new_T_old) noexcept {
-  world_T_lio_ = new_T_old * fused_world_T_odom_.inverse() * world_T_lio_;
+  const Transform new_T_world = new_T_old * fused_world_T_odom_.inverse();
+  world_T_lio_ = new_T_world * world_T_lio_;
+  mount_.rebase(new_T_world);
   fused_world_T_odom_ = {};
   last_lio_T_odom_ = last_lio_T_odom_ * new_T_old.inverse();
   uncertainty_.rebase(new_T_old);
   untied_.rebase(new_T_old);
-  odom_p_first_m_ = new_T_old * odom_p_first_m_;
+  offset_.odom_p_first_m = new_T_old * offset_.odom_p_first_m;
   jumped_.count = 0;
 }
 
 void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept {
   uncertainty_.move(world_T_odom_.R * odom_step_m);
   untied_.move(odom_step_m);
-  const double ratio = offset_ratio(odom_T_base);
-  doubted_offset_ = ratio > (doubted_offset_ ? params_.drift.trusted_ratio : params_.drift.most_ratio);
-  const Believed best = believed(odom_T_base, doubted_offset_ ? params_.drift.trusted_ratio / ratio : 1.0);
+  mount_.move(fused_world_T_odom_ * odom_T_base.p_m, fused_world_T_odom_.R * odom_step_m,
+              math::sqrt(known().offset_variance()[3]));
+  const Known best = believed(odom_T_base);
   const Transform& wanted = best.world_T_base;
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
   const Vec3 turn_rad = so3_log(wanted.R * now.R.transpose());
-  const double slew_s = std::min(dt_s, params_.max_slew_s);
-  const double move_share = share_within(move_m.norm(), params_.slew_mps * slew_s);
-  const double turn_share = share_within(turn_rad.norm(), params_.slew_radps * slew_s);
+  const double slew_s = std::min(dt_s, params_.slew.most_s);
+  const double move_share = share_within(move_m.norm(), params_.slew.mps * slew_s);
+  const double turn_share = share_within(turn_rad.norm(), params_.slew.radps * slew_s);
   if (move_share >= 1.0 && turn_share >= 1.0) {
     world_T_odom_ = best.world_T_odom;
   } else {
@@ -149,36 +155,38 @@ void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, doub
   sigmas_.yaw_rad = math::sqrt(best.variance[3]);
 }
 
-LioUncertainty::Quantities LioFusion::odometry_variance(const Transform& odom_T_base) const noexcept {
-  const Vec3 way_m = odom_T_base.p_m - odom_p_first_m_;
-  LioUncertainty::Quantities variance;
-  variance.head<3>() =
+LioFusion::Known LioFusion::by_legs(const Transform& odom_T_base) const noexcept {
+  const Vec3 way_m = odom_T_base.p_m - offset_.odom_p_first_m;
+  Known known{{}, odom_T_base, {}};
+  known.variance.head<3>() =
       untied_.position_sigma_m(odom_T_base.p_m).cwiseAbs2() + math::square(params_.drift.way_share) * way_m.cwiseAbs2();
-  variance[3] = math::square(untied_.yaw_sigma_rad());
-  return variance;
+  known.variance[3] = math::square(untied_.yaw_sigma_rad());
+  return known;
 }
 
-LioUncertainty::Quantities LioFusion::fused_variance(const Vec3& world_p_base_m) const noexcept {
-  LioUncertainty::Quantities variance;
-  variance.head<3>() = known().position_sigma_m(world_p_base_m).cwiseAbs2();
-  variance[3] = math::square(known().yaw_sigma_rad());
-  return variance;
+LioFusion::Known LioFusion::by_lidar(const Transform& odom_T_base) const noexcept {
+  const Vec3 p_m = fused_world_T_odom_ * odom_T_base.p_m;
+  const MountHeading::Bend& bend = mount_.bend();
+  Known known_pose{fused_world_T_odom_, {}, {}};
+  known_pose.world_T_odom.p_m -= bend.way_m;
+  known_pose.world_T_base = known_pose.world_T_odom * odom_T_base;
+  known_pose.variance.head<3>() = known().position_sigma_m(p_m).cwiseAbs2() + bend.variance_m2;
+  known_pose.variance[3] = math::square(known().yaw_sigma_rad());
+  return known_pose;
 }
 
-double LioFusion::offset_ratio(const Transform& odom_T_base) const noexcept {
-  const Transform fused = fused_world_T_odom_ * odom_T_base;
+// The squared offset over its variance, four rows of it: honest sigmas and a LIO that does not drift give 4 at most.
+LioFusion::Known LioFusion::believed(const Transform& odom_T_base) noexcept {
+  const Known lidar = by_lidar(odom_T_base), legs = by_legs(odom_T_base);
   LioUncertainty::Quantities offset;
-  offset.head<3>() = fused.p_m - odom_T_base.p_m;
-  offset[3] = so3_log(fused_world_T_odom_.R).z();
-  return offset.cwiseAbs2().cwiseQuotient(odometry_variance(odom_T_base) + fused_variance(fused.p_m)).sum();
-}
-
-LioFusion::Believed LioFusion::believed(const Transform& odom_T_base, double share) const noexcept {
-  const Transform fused = fused_world_T_odom_ * odom_T_base;
-  const LioUncertainty::Quantities variance = fused_variance(fused.p_m);
-  if (share >= 1.0) return {fused_world_T_odom_, fused, variance};
-  const Transform shared = fuse_pose(odom_T_base, fused, share);
-  return {shared * odom_T_base.inverse(), shared, share * variance + (1.0 - share) * odometry_variance(odom_T_base)};
+  offset.head<3>() = lidar.world_T_base.p_m - odom_T_base.p_m;
+  offset[3] = so3_log(lidar.world_T_odom.R).z();
+  const double ratio = offset.cwiseAbs2().cwiseQuotient(lidar.variance + legs.variance).sum();
+  offset_.doubted = ratio > (offset_.doubted ? params_.drift.trusted_ratio : params_.drift.most_ratio);
+  if (!offset_.doubted) return lidar;
+  const double share = params_.drift.trusted_ratio / ratio;
+  const Transform shared = fuse_pose(odom_T_base, lidar.world_T_base, share);
+  return {shared * odom_T_base.inverse(), shared, share * lidar.variance + (1.0 - share) * legs.variance};
 }
 
 bool LioFusion::is_jump(const Transform& predicted, const Transform& measured, double silence_s) const noexcept {
@@ -200,8 +208,10 @@ bool LioFusion::try_realign(const Transform& lio_T_base, const Transform& odom_T
   const bool first_pose_contradicted = !aligned_ && count_ == 1 && !doubted_;
   doubted_ = doubted_ || first_pose_contradicted;
   if (jumped_.count < params_.realign_count && !first_pose_contradicted) return false;
-  const Transform world_T_base = fused_world_T_odom_ * odom_T_base, mean_T_base = jumped_.lio_T_odom * odom_T_base;
+  const Known known_pose = by_lidar(odom_T_base);
+  const Transform &world_T_base = known_pose.world_T_base, mean_T_base = jumped_.lio_T_odom * odom_T_base;
   if (is_tilted(world_T_base, mean_T_base)) return false;
+  fused_world_T_odom_ = known_pose.world_T_odom;
   if (!aligned_) uncertainty_ = untied_;                 // the former tie was none
   world_T_lio_ = tied_level(world_T_base, mean_T_base);  // our world stays where it is
   tie(odom_T_base, sigmas, jumped_.count);
@@ -255,12 +265,14 @@ void LioFusion::align(const Transform& predicted, const Transform& lio_T_base, c
   uncertainty_.average(gains, sigmas.position_m, sigmas.rotation_rad);
   ++count_;
   aligned_ = gains.position <= gain * (1.0 + 1e-9);
+  mount_.tie();
 }
 
 // LIO's world, as the mean of so many poses has it, is where ours is now.
 void LioFusion::tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept {
   const double share = 1.0 / math::sqrt(static_cast<double>(poses));
   uncertainty_.tie(fused_world_T_odom_ * odom_T_base.p_m, share * sigmas.position_m, share * sigmas.rotation_rad);
+  mount_.tie();
 }
 
 }  // namespace polygmap

@@ -14,6 +14,7 @@
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/estimation/calibration/noise_level.hpp"
 #include "algorithms/estimation/lidar/lio_uncertainty.hpp"
+#include "algorithms/estimation/lidar/mount_heading.hpp"
 #include "algorithms/estimation/quality/innovation.hpp"
 #include "algorithms/robot/robot_model.hpp"
 
@@ -71,6 +72,18 @@ class LioFusion {
       field.ordered("trusted_ratio", "most_ratio");
     }
   };
+  // How fast the published pose moves towards the fused one.
+  struct Slew {
+    double mps = 0.1;
+    double radps = 0.175;
+    double most_s = 0.01;
+
+    static void visit(auto& p, auto& field) {
+      field("mps", p.mps, 0.001, 10.0, "The fused pose moves no faster: 0.2 mm in a tick of 2 ms.");
+      field("radps", p.radps, 0.001, 10.0, "The fused pose turns no faster: 0.02 degrees in a tick.");
+      field("most_s", p.most_s, 0.001, 1.0, "A longer tick moves it no farther than one of these: 1 mm.");
+    }
+  };
   struct Params {
     double max_age_s = 0.4;
     double tau_s = 4.0;
@@ -88,10 +101,9 @@ class LioFusion {
     double max_jump_m = 0.5;
     double max_jump_rad = 0.3;
     Drift drift;
+    MountHeading::Params mount;
     std::uint32_t realign_count = 20;
-    double slew_mps = 0.1;
-    double slew_radps = 0.175;
-    double max_slew_s = 0.01;
+    Slew slew;
     LioUncertainty::Params uncertainty;
 
     static void visit(auto& p, auto& field) {
@@ -115,11 +127,10 @@ class LioFusion {
       field("max_jump_m", p.max_jump_m, 0.001, 100.0, "A pose farther off is a jump however long the silence.");
       field("max_jump_rad", p.max_jump_rad, 0.001, 3.2, "A pose turned farther is a jump however long the silence.");
       field("drift", p.drift);
+      field("mount", p.mount);
       field("realign_count", p.realign_count, 1, 1000000,
             "Jumped poses in a row that agree among themselves are LIO's new world after as many.");
-      field("slew_mps", p.slew_mps, 0.001, 10.0, "The fused pose moves no faster: 0.2 mm in a tick of 2 ms.");
-      field("slew_radps", p.slew_radps, 0.001, 10.0, "The fused pose turns no faster: 0.02 degrees in a tick.");
-      field("max_slew_s", p.max_slew_s, 0.001, 1.0, "A longer tick moves it no farther than one of these: 1 mm.");
+      field("slew", p.slew);
       field("uncertainty", p.uncertainty);
     }
   };
@@ -164,17 +175,16 @@ class LioFusion {
                                  const LioSigmas& sigmas) noexcept;
   // A pose whose tilt is not the odometry's cannot be tied to it by any heading and place.
   [[nodiscard]] bool is_tilted(const Transform& world_T_base, const Transform& lio_T_base) const noexcept;
-  // Place and heading, squared: of the odometry alone, and with LIO.
-  [[nodiscard]] LioUncertainty::Quantities odometry_variance(const Transform& odom_T_base) const noexcept;
-  [[nodiscard]] LioUncertainty::Quantities fused_variance(const Vec3& world_p_base_m) const noexcept;
-  // The squared offset over its variance, four rows of it: honest sigmas and a LIO that does not drift give 4 at most.
-  [[nodiscard]] double offset_ratio(const Transform& odom_T_base) const noexcept;
-  struct Believed {
+  // A pose of the base, and variances of its place and heading.
+  struct Known {
     Transform world_T_odom, world_T_base;
     LioUncertainty::Quantities variance;
   };
-  // By a share of the fused offset. The rest is kept from what is published only.
-  [[nodiscard]] Believed believed(const Transform& odom_T_base, double share) const noexcept;
+  [[nodiscard]] Known by_legs(const Transform& odom_T_base) const noexcept;
+  // By LIO, without what the heading of its mount bends.
+  [[nodiscard]] Known by_lidar(const Transform& odom_T_base) const noexcept;
+  // Of both, whose drift the offset between them is.
+  [[nodiscard]] Known believed(const Transform& odom_T_base) noexcept;
   // Of the published pose: a tie that was contradicted, and that no second pose confirmed, says nothing.
   [[nodiscard]] const LioUncertainty& known() const noexcept {
     return !aligned_ && doubted_ && count_ <= 1 ? untied_ : uncertainty_;
@@ -208,13 +218,16 @@ class LioFusion {
   std::int64_t last_accepted_ns_ = -1;
   std::int64_t last_used_ns_ = -1;  // accepted or realigned: since then LIO was silent
   LioUncertainty uncertainty_;
-  LioUncertainty untied_;               // as if there were no LIO
-  Vec3 odom_p_first_m_ = Vec3::Zero();  // of the base, at the first pose
+  LioUncertainty untied_;  // as if there were no LIO
+  MountHeading mount_;
+  struct {
+    Vec3 odom_p_first_m = Vec3::Zero();  // of the base, at the first pose
+    bool doubted = false;                // the offset is LIO's drift
+  } offset_;
   struct {
     Vec3 position_m = Vec3::Zero();
     double yaw_rad = 0.0;
   } sigmas_;  // of the published pose
-  bool doubted_offset_ = false;
   LioInnovations innovations_;
 };
 

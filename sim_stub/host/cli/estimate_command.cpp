@@ -156,7 +156,7 @@ CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
   keep_within(
       *estimate->add_option(
           "--lio-tau", a.lio_tau_s,
-          "Time constant of the offset's low-pass, s; 0: 0.4 s per mm of LIO's noise as measured, 1 s at least"),
+          "Time constant of the offset's low-pass, s; 0: 0.3 s per mm of LIO's noise as measured, 1 s at least"),
       0.0, kMaxTau_s, "s");
   estimate->add_option("--params", a.params, "Parameters of the module; of the estimator and of the robot")
       ->type_name("PARAMS.toml");

@@ -18,6 +18,7 @@ constexpr double kSlip_mps = 0.15;  // a standing foot that seems faster moves
 constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0, kSmoothing_s = 0.05, kUnseenMotion_s = 0.15;
 constexpr double kStillRate_radps = 0.1, kStillAccel_mps2 = 1.0, kStillMove_m = 0.004;
 constexpr double kUnseenTurn_rad = 2e-3, kUnseenSpeed_mps = 5e-3;  // in that time
+constexpr double kTruthSpeed_mps = 0.02;                           // a truth's velocity is differenced places
 
 Mat3 level_R_base(const Vec3& up) {
   const double roll_rad = std::atan2(up.y(), up.z());
@@ -147,6 +148,7 @@ KnownStart start_of(const EstimateLog& log, const ReplayOptions& options) {
     // The filter's errors turn about its origin, so that is the start, wherever on earth the truth counts from.
     known.world_p_odom_m = first.truth.true_T_base.p_m;
     start.odom_v_base_mps = first.truth.true_v_base_mps;
+    if (!stood) start.velocity_sigma_mps = kTruthSpeed_mps;
     if (stood) {
       start.accel_bias_mps2 = o.accel_mps2 - start.odom_R_base.transpose() * Vec3{0, 0, kGravity_mps2};
       start.accel_bias_sigma_mps2 = std::hypot(kUnseenSpeed_mps / o.still_s, kUnseenTurn_rad * kGravity_mps2);
@@ -248,7 +250,7 @@ Estimator::Params log_params() {
   params.fusion.uncertainty.initial_sigma_rad = 1e-4;
   // As the module's 4 s are to its lidar's 10 mm: what comes through grows with LIO's noise, drift does not.
   params.fusion.tau_s = 1.0;
-  params.fusion.tau_spm = 400.0;
+  params.fusion.tau_spm = 300.0;
   return params;
 }
 
