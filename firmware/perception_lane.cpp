@@ -237,7 +237,9 @@ Progress PerceptionLane::footholds(std::int64_t now_ns, WorkBudget& budget) noex
   if (progress == Progress::kDone) {
     FootholdSet& told = link_.footholds.back();
     told = search_.result();
-    told.obstruction = pictures_.explain(told.obstruction, link_.search_context.front().climbing);
+    const bool climbing = link_.search_context.front().climbing;
+    told.obstruction = pictures_.explain(told.obstruction, climbing);
+    told.unsteady = pictures_.explain(StopReason::kUnsteady, climbing);
     link_.footholds.publish(now_ns);
   }
   if (progress != Progress::kBusy) pending_.searching = false;

@@ -168,7 +168,7 @@ void Gait::enter(const GaitInput& in, GaitShared& gait, const Transition& next) 
         state_.emplace<WeightShift>().begin(in, gait, *next.decision, next.same_foot);
       } else {
         state_.emplace<Standing>().begin(in, gait);
-        end(in, gait, Transition::stop(StopReason::kUnsteady));
+        end(in, gait, Transition::stop(in.footholds.unsteady));
       }
       break;
     case Transition::To::kSwing:

@@ -216,6 +216,7 @@ void each_field(auto& f, Of<FootholdSet> auto& m) {
   walk(f, "p_star_star_feet", m.p_star_star_feet);
   walk(f, "tread", m.tread);
   walk(f, "obstruction", m.obstruction);
+  walk(f, "unsteady", m.unsteady);
   walk(f, "measured_rise_m", m.measured_rise_m);
   walk(f, "measured_tread_m", m.measured_tread_m);
 }

@@ -34,7 +34,7 @@ namespace polygmap::recording {
 
 inline constexpr std::string_view kMagic = "PGMAPREC";
 inline constexpr std::string_view kPictureMagic = "PGMAPPIX";
-inline constexpr std::uint32_t kVersion = 5;
+inline constexpr std::uint32_t kVersion = 6;
 inline constexpr const char* kFileName = "recording.bin";
 inline constexpr const char* kPictureFileName = "pictures.bin";
 inline constexpr std::size_t kPictureHeader_bytes = 20;

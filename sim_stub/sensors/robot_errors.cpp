@@ -50,6 +50,8 @@ RobotErrors draw_errors(const ErrorParams& params, std::uint64_t seed) {
                                  params.camera_mount_rad, params.camera_mount_m);
   errors.base_T_lidar = mounted(nominal_robot().mounts.base_T_lidar, {seed, Stream::kLidarMount}, params.lio_mount_rad,
                                 params.lio_mount_m);
+  const Vec3& turned_rad = params.lio_turned_rad;
+  errors.base_T_lidar.R = rotation_zyx(turned_rad.z(), turned_rad.y(), turned_rad.x()) * errors.base_T_lidar.R;
   errors.lio_T_true = {rotation_z(lio.uniform(0, -kPi, kPi)),
                        Vec3{lio.uniform(1, -5, 5), lio.uniform(2, -5, 5), lio.uniform(3, -1, 1)}};
   return errors;

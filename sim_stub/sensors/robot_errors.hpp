@@ -39,6 +39,7 @@ struct ErrorParams {
   double lio_drift_radps = 0.0;                   // of its yaw
   double lio_walk_mprs = 0.0;                     // random walk, per axis
   double lio_mount_rad = 0.0, lio_mount_m = 0.0;  // half range, uniform, per axis
+  Vec3 lio_turned_rad = Vec3::Zero();             // roll, pitch and yaw of the lidar's mount besides that
   Vec3 lio_jump_m = Vec3::Zero();                 // at lio_jump_s, true axes
   double lio_jump_s = 20.0;
   double lio_outage_s = 0.0;  // from lio_outage_from_s on it says nothing for so long
@@ -81,6 +82,7 @@ struct ErrorParams {
     field("lio_drift_radps", p.lio_drift_radps, -0.2, 0.2, "Steady drift of the LIO yaw.");
     field("lio_walk_mprs", p.lio_walk_mprs, 0.0, 0.1, "Random walk of the LIO position, per axis.");
     field("lio_mount_rad", p.lio_mount_rad, 0.0, 0.1, "Half range of the lidar's mount, per axis.");
+    field("lio_turned_rad", p.lio_turned_rad, -0.3, 0.3, "Roll, pitch and yaw of the lidar's mount besides that.");
     field("lio_mount_m", p.lio_mount_m, 0.0, 0.1, "Half range of the lidar's place, per axis.");
     field("lio_jump_m", p.lio_jump_m, -2.0, 2.0, "Jump of the LIO position, for good.");
     field("lio_jump_s", p.lio_jump_s, 0.0, 1000.0, "When it jumps.");

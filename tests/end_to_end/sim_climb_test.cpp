@@ -224,7 +224,7 @@ TEST(ClimbCausality, SunOnTheLowerTreads_NoStepOntoAnythingAndTheReasonIsThePict
 
 TEST(ClimbCausality, NoiseBeyondTheCameras_NoStepOntoAnythingAndTheReasonIsTheNoise) {
   ClimbOptions options = options_of(4, 3);
-  options.reality.sensors.depth_noise = 15.0;  // of 10, three seeds of eight stop as what they see keeps changing
+  options.reality.sensors.depth_noise = 10.0;
   const ClimbSummary summary = climb(options);
   EXPECT_EQ(steps_onto_treads(summary), 0);
   EXPECT_NE(summary.reason.find("too noisy"), std::string::npos) << summary.reason;

@@ -17,8 +17,8 @@ CLIMBS = {f"`{gait}`, seed {seed}": ["--gait", gait, "--steps", 10, "--seed", se
 STEADY = {"sensors.lio_position_m": 0.01, "sensors.lio_sigma_scale": 1, "sensors.lio_delay_s": 0.1, "sensors.lio_stamp_s": 0,
           "sensors.lio_drift_mps": [0, 0, 0], "sensors.lio_drift_radps": 0, "sensors.lio_walk_mprs": 0, "sensors.lio_mount_rad": 0,
           "sensors.lio_mount_m": 0, "sensors.lio_jump_m": [0, 0, 0], "sensors.lio_outage_s": 0}
-NOISY, TURNED, DRAWN = "lidar odometry with noise of 10 mm, 100 ms late", "the same, mounted 1 degree off", "as drawn: it drifts and jumps"
-LIDARS = {NOISY: STEADY, TURNED: {**STEADY, "sensors.lio_mount_rad": 0.0175}, DRAWN: {}}
+NOISY, TURNED, DRAWN = "lidar odometry with noise of 10 mm, 100 ms late", "the same, mounted 1 degree off in heading", "as drawn: it drifts and jumps"
+LIDARS = {NOISY: STEADY, TURNED: {**STEADY, "sensors.lio_turned_rad": [0, 0, 0.0175]}, DRAWN: {}}
 TRUE_PLACE = [f"truth_p{axis}_m" for axis in "xyz"]
 FIGURES = {"velocity mm/s": ("velocity_rmse_mmps", 1), "tilt deg": ("tilt_rmse_deg", 3),
            "a planted foot moves mm": ("planted_foot_mm", 1), "rows within the 95 % bounds %": ("nees_in_bounds_percent", 0)}

@@ -29,7 +29,7 @@ REPLAY_NEEDS = ("sim_stub/host/estimate/csv_table.cpp", "sim_stub/host/estimate/
 # The authors' for Cassie (matlab_example/example_code/RIEKF_InitFcn.m of their Contact-Aided-Invariant-EKF). They compute the feet's
 # noise from the encoders'; 8 mm is our choice.
 CASSIE_NOISE = ("gyro=0.002", "accel=0.04", "gyro_bias=0.001", "accel_bias=0.001", "contact=0.05", "foot=0.008")
-THINNED = tuple(FIGURES)[:-1]  # all but the mean NEES
+COMPARED = tuple(FIGURES)[:-1]  # where rows are left out: all but the mean NEES
 # What is run for each row, in callgrind's names.
 OURS_RUNS, PEER_RUNS = r"polygmap::Estimator::(?:add_\w+|tick)", r"inekf::InEKF::(?:Propagate|setContacts|CorrectKinematics)"
 
@@ -145,6 +145,12 @@ DISTURBED = ("a foot slips 60 mm in 0.2 s", "a sole pivots 5 degrees in 0.2 s", 
              "accelerometer 1 % high")
 
 
+def bound_text(least, most):
+    if most == math.inf:
+        return f">= {least:g}"
+    return f"<= {most:g}" if least in (0, -math.inf) else f"{least:g} to {most:g}"
+
+
 def asked(found, climbed):
     """A line for each figure that the estimator is held to: what, asked, measured, whether it holds."""
     own = {what: found[what, "as it is"] for what in LOGS.values() if (what, "as it is") in found}
@@ -155,9 +161,8 @@ def asked(found, climbed):
     def line(what, bounds, values, digits=1):
         """bounds: (least, most) for each value."""
         holds = all(value is not None and least <= value <= most for value, (least, most) in zip(values, bounds))
-        said = [f"{least:g} to {most:g}" if math.isfinite(least) and least != 0 and most < math.inf else f">= {least:g}" if least > 0 else f"<= {most:g}" for least, most in bounds]
-        unique = said[:1] if len(set(said)) == 1 else said
-        lines.append((what, "; ".join(unique), "; ".join("-" if v is None else f"{v:.{digits}f}" for v in values), "yes" if holds else "**no**"))
+        said = [bound_text(*bound) for bound in bounds]
+        lines.append((what, "; ".join(said[:1] if len(set(said)) == 1 else said), "; ".join("-" if v is None else f"{v:.{digits}f}" for v in values), "yes" if holds else "**no**"))
 
     def figures(what, *keys):
         return [own[what][key] for key in keys]
@@ -175,11 +180,13 @@ def asked(found, climbed):
     for what in own:
         for variant in CHANGED_ROWS:
             s = found[what, variant]
-            changes = [None if isinstance(s, str) else 100 * (s[key] / own[what][key] - 1)
-                       for key, _ in (FIGURES[f] for f in THINNED) if own[what][key]]
-            line(f"{what}, {variant}: change of each of those figures, %", [(-15, 15)] * len(changes), changes, 0)
+            known = [figure for figure in COMPARED if own[what][FIGURES[figure][0]]]
+            changes = [None if isinstance(s, str) else 100 * (s[key] / own[what][key] - 1) for key, _ in map(FIGURES.get, known)]
+            line(f"{what}, {variant}: change in % of {', '.join(figure.split(' RMSE')[0].split(' %')[0] for figure in known)}",
+                 [(-15, 15)] * len(changes), changes, 0)
     for what in own:
-        worse = [found[what, v]["position_rmse_mm"] - own[what]["position_rmse_mm"] for v in DISTURBED if not isinstance(found[what, v], str)]
+        worse = [found[what, v]["position_rmse_mm"] - own[what]["position_rmse_mm"]
+                 for v in DISTURBED if not isinstance(found[what, v], str)]  # a log without soles has no pivot; it is told above
         line(f"{what}: slip, pivot, contacts, IMU late, scale: position worse by mm, worst", up_to(3), [max(worse, default=None)])
     for name, key, lidar, bound in (("velocity mm/s", "velocity_rmse_mmps", climb_logs.NOISY, 12), ("tilt deg", "tilt_rmse_deg", climb_logs.NOISY, 0.12),
                                     ("position mm", "position_rmse_mm", climb_logs.NOISY, 6), ("position mm", "position_rmse_mm", climb_logs.TURNED, 8)):
@@ -239,7 +246,7 @@ def estimation(engine, _):
         "\n\n## Logs that are not as they should be\n\nPosition RMSE, mm, of ours on the same logs made otherwise (`toolchain/campaigns/log_variants.py`). "
         "What slips or pivots is the foot that stands nearest to the log's middle.\n\n" +
         rows(("log", *log_variants.VARIANTS), worse) + list_of(unscored_variants) +
-        "\n\nFewer rows, every one / every 2nd / every 5th of them:\n\n" + rows(("log", "filter", *THINNED), by_filter(variants, scored, log_variants.THINNED, THINNED)) +
+        "\n\nFewer rows, every one / every 2nd / every 5th of them:\n\n" + rows(("log", "filter", *COMPARED), by_filter(variants, scored, log_variants.THINNED, COMPARED)) +
         "\n\nBegun on one foot, in the middle of the log: the start is what the truth says there, and biases are unknown:\n\n" +
         rows(("log", "filter", *FIGURES), by_filter(variants, scored, ["begun on one foot"], FIGURES)) +
         "\n\nThe turn that the gyro feels in half a second, against the truth's: how far they are apart, median / worst. Steady, it is the gyro's bias; "

@@ -84,7 +84,7 @@ LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base
     count_ = 1;
     last_accepted_ns_ = last_used_ns_ = sample.stamp_ns;
     last_lio_T_odom_ = world_T_lio_.inverse();
-    tie(odom_T_base, sigmas, count_);
+    tie(by_lidar(odom_T_base), sigmas, count_);
     offset_.odom_p_first_m = odom_T_base.p_m;
     return LioVerdict::kAccepted;
   }
@@ -112,7 +112,7 @@ LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base
     fused_world_T_odom_.R = so3_renormalised(fused_world_T_odom_.R);
     uncertainty_.blend(gain, sigmas.position_m, sigmas.rotation_rad);
     mount_.see({fused.p_m, so3_log(fused.R * predicted.R.transpose()).z(), gain,
-                uncertainty_.offset_variance().head<2>().mean()});
+                (uncertainty_.offset_variance() + uncertainty_.tie_variance()).head<2>().mean()});
   } else {
     align(predicted, lio_T_base, sigmas, gain);
   }
@@ -120,9 +120,8 @@ LioVerdict LioFusion::fuse(const LioSample& sample, const Transform& odom_T_base
 }
 
 void LioFusion::rebase(const Transform& new_T_old) noexcept {
-  const Transform new_T_world = new_T_old * fused_world_T_odom_.inverse();
-  world_T_lio_ = new_T_world * world_T_lio_;
-  mount_.rebase(new_T_world);
+  world_T_lio_ = new_T_old * fused_world_T_odom_.inverse() * world_T_lio_;
+  mount_.tie();
   fused_world_T_odom_ = {};
   last_lio_T_odom_ = last_lio_T_odom_ * new_T_old.inverse();
   uncertainty_.rebase(new_T_old);
@@ -134,16 +133,15 @@ void LioFusion::rebase(const Transform& new_T_old) noexcept {
 void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, double dt_s) noexcept {
   uncertainty_.move(world_T_odom_.R * odom_step_m);
   untied_.move(odom_step_m);
-  mount_.move(fused_world_T_odom_ * odom_T_base.p_m, fused_world_T_odom_.R * odom_step_m,
-              math::sqrt(known().offset_variance()[3]));
-  const Known best = believed(odom_T_base);
+  mount_.move(fused_world_T_odom_ * odom_T_base.p_m, fused_world_T_odom_.R * odom_step_m);
+  const PoseBelief best = believed(odom_T_base);
   const Transform& wanted = best.world_T_base;
   const Transform now = world_T_odom_ * odom_T_base;
   const Vec3 move_m = wanted.p_m - now.p_m;
   const Vec3 turn_rad = so3_log(wanted.R * now.R.transpose());
   const double slew_s = std::min(dt_s, params_.slew.most_s);
-  const double move_share = share_within(move_m.norm(), params_.slew.mps * slew_s);
-  const double turn_share = share_within(turn_rad.norm(), params_.slew.radps * slew_s);
+  const double move_share = share_within(move_m.norm(), params_.slew.speed_mps * slew_s);
+  const double turn_share = share_within(turn_rad.norm(), params_.slew.turn_radps * slew_s);
   if (move_share >= 1.0 && turn_share >= 1.0) {
     world_T_odom_ = best.world_T_odom;
   } else {
@@ -155,35 +153,36 @@ void LioFusion::tick(const Transform& odom_T_base, const Vec3& odom_step_m, doub
   sigmas_.yaw_rad = math::sqrt(best.variance[3]);
 }
 
-LioFusion::Known LioFusion::by_legs(const Transform& odom_T_base) const noexcept {
+LioFusion::PoseBelief LioFusion::by_legs(const Transform& odom_T_base) const noexcept {
   const Vec3 way_m = odom_T_base.p_m - offset_.odom_p_first_m;
-  Known known{{}, odom_T_base, {}};
-  known.variance.head<3>() =
+  PoseBelief legs{{}, odom_T_base, {}};
+  legs.variance.head<3>() =
       untied_.position_sigma_m(odom_T_base.p_m).cwiseAbs2() + math::square(params_.drift.way_share) * way_m.cwiseAbs2();
-  known.variance[3] = math::square(untied_.yaw_sigma_rad());
-  return known;
+  legs.variance[3] = math::square(untied_.yaw_sigma_rad());
+  return legs;
 }
 
-LioFusion::Known LioFusion::by_lidar(const Transform& odom_T_base) const noexcept {
+LioFusion::PoseBelief LioFusion::by_lidar(const Transform& odom_T_base) const noexcept {
   const Vec3 p_m = fused_world_T_odom_ * odom_T_base.p_m;
   const MountHeading::Bend& bend = mount_.bend();
-  Known known_pose{fused_world_T_odom_, {}, {}};
-  known_pose.world_T_odom.p_m -= bend.way_m;
-  known_pose.world_T_base = known_pose.world_T_odom * odom_T_base;
-  known_pose.variance.head<3>() = known().position_sigma_m(p_m).cwiseAbs2() + bend.variance_m2;
-  known_pose.variance[3] = math::square(known().yaw_sigma_rad());
-  return known_pose;
+  PoseBelief lidar{fused_world_T_odom_, {}, {}};
+  lidar.world_T_odom.p_m -= bend.way_m;
+  lidar.world_T_base = lidar.world_T_odom * odom_T_base;
+  lidar.variance.head<3>() = known().position_sigma_m(p_m).cwiseAbs2() + bend.variance_m2;
+  lidar.variance[3] = math::square(known().yaw_sigma_rad());
+  return lidar;
 }
 
-// The squared offset over its variance, four rows of it: honest sigmas and a LIO that does not drift give 4 at most.
-LioFusion::Known LioFusion::believed(const Transform& odom_T_base) noexcept {
-  const Known lidar = by_lidar(odom_T_base), legs = by_legs(odom_T_base);
+// The squared offset over its variance, four rows of it: 4 in the mean where sigmas are honest
+// and LIO does not drift, and less, since both have part of the error.
+LioFusion::PoseBelief LioFusion::believed(const Transform& odom_T_base) noexcept {
+  const PoseBelief lidar = by_lidar(odom_T_base), legs = by_legs(odom_T_base);
   LioUncertainty::Quantities offset;
   offset.head<3>() = lidar.world_T_base.p_m - odom_T_base.p_m;
   offset[3] = so3_log(lidar.world_T_odom.R).z();
   const double ratio = offset.cwiseAbs2().cwiseQuotient(lidar.variance + legs.variance).sum();
-  offset_.doubted = ratio > (offset_.doubted ? params_.drift.trusted_ratio : params_.drift.most_ratio);
-  if (!offset_.doubted) return lidar;
+  offset_.lio_drifts = ratio > (offset_.lio_drifts ? params_.drift.trusted_ratio : params_.drift.most_ratio);
+  if (!offset_.lio_drifts) return lidar;
   const double share = params_.drift.trusted_ratio / ratio;
   const Transform shared = fuse_pose(odom_T_base, lidar.world_T_base, share);
   return {shared * odom_T_base.inverse(), shared, share * lidar.variance + (1.0 - share) * legs.variance};
@@ -205,16 +204,18 @@ bool LioFusion::try_realign(const Transform& lio_T_base, const Transform& odom_T
   jumped_.lio_T_odom.R = so3_renormalised(jumped_.lio_T_odom.R);
   // Which of the first two poses is wrong nobody knows: the later one is tried, once. If a third contradicts it, too,
   // it takes as many poses that agree as after any other jump.
-  const bool first_pose_contradicted = !aligned_ && count_ == 1 && !doubted_;
-  doubted_ = doubted_ || first_pose_contradicted;
+  const bool first_pose_contradicted = !aligned_ && count_ == 1 && !first_contradicted_;
+  first_contradicted_ = first_contradicted_ || first_pose_contradicted;
   if (jumped_.count < params_.realign_count && !first_pose_contradicted) return false;
-  const Known known_pose = by_lidar(odom_T_base);
-  const Transform &world_T_base = known_pose.world_T_base, mean_T_base = jumped_.lio_T_odom * odom_T_base;
-  if (is_tilted(world_T_base, mean_T_base)) return false;
-  fused_world_T_odom_ = known_pose.world_T_odom;
-  if (!aligned_) uncertainty_ = untied_;                 // the former tie was none
-  world_T_lio_ = tied_level(world_T_base, mean_T_base);  // our world stays where it is
-  tie(odom_T_base, sigmas, jumped_.count);
+  // Our world stays where it is by LIO. Where LIO was found to drift that is not what is published: it has to come
+  // back.
+  const PoseBelief before_jump = by_lidar(odom_T_base);
+  const Transform mean_T_base = jumped_.lio_T_odom * odom_T_base;
+  if (is_tilted(before_jump.world_T_base, mean_T_base)) return false;
+  if (!aligned_) uncertainty_ = untied_;  // the former tie was none
+  fused_world_T_odom_ = before_jump.world_T_odom;
+  world_T_lio_ = tied_level(before_jump.world_T_base, mean_T_base);
+  tie(before_jump, sigmas, jumped_.count);
   count_ = jumped_.count;
   jumped_.count = 0;
   return true;
@@ -269,9 +270,9 @@ void LioFusion::align(const Transform& predicted, const Transform& lio_T_base, c
 }
 
 // LIO's world, as the mean of so many poses has it, is where ours is now.
-void LioFusion::tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept {
+void LioFusion::tie(const PoseBelief& now, const LioSigmas& sigmas, std::uint32_t poses) noexcept {
   const double share = 1.0 / math::sqrt(static_cast<double>(poses));
-  uncertainty_.tie(fused_world_T_odom_ * odom_T_base.p_m, share * sigmas.position_m, share * sigmas.rotation_rad);
+  uncertainty_.tie(now.world_T_base.p_m, share * sigmas.position_m, share * sigmas.rotation_rad, now.variance);
   mount_.tie();
 }
 

@@ -74,13 +74,13 @@ class LioFusion {
   };
   // How fast the published pose moves towards the fused one.
   struct Slew {
-    double mps = 0.1;
-    double radps = 0.175;
+    double speed_mps = 0.1;
+    double turn_radps = 0.175;
     double most_s = 0.01;
 
     static void visit(auto& p, auto& field) {
-      field("mps", p.mps, 0.001, 10.0, "The fused pose moves no faster: 0.2 mm in a tick of 2 ms.");
-      field("radps", p.radps, 0.001, 10.0, "The fused pose turns no faster: 0.02 degrees in a tick.");
+      field("speed_mps", p.speed_mps, 0.001, 10.0, "The fused pose moves no faster: 0.2 mm in a tick of 2 ms.");
+      field("turn_radps", p.turn_radps, 0.001, 10.0, "The fused pose turns no faster: 0.02 degrees in a tick.");
       field("most_s", p.most_s, 0.001, 1.0, "A longer tick moves it no farther than one of these: 1 mm.");
     }
   };
@@ -176,25 +176,25 @@ class LioFusion {
   // A pose whose tilt is not the odometry's cannot be tied to it by any heading and place.
   [[nodiscard]] bool is_tilted(const Transform& world_T_base, const Transform& lio_T_base) const noexcept;
   // A pose of the base, and variances of its place and heading.
-  struct Known {
+  struct PoseBelief {
     Transform world_T_odom, world_T_base;
     LioUncertainty::Quantities variance;
   };
-  [[nodiscard]] Known by_legs(const Transform& odom_T_base) const noexcept;
+  [[nodiscard]] PoseBelief by_legs(const Transform& odom_T_base) const noexcept;
   // By LIO, without what the heading of its mount bends.
-  [[nodiscard]] Known by_lidar(const Transform& odom_T_base) const noexcept;
-  // Of both, whose drift the offset between them is.
-  [[nodiscard]] Known believed(const Transform& odom_T_base) noexcept;
+  [[nodiscard]] PoseBelief by_lidar(const Transform& odom_T_base) const noexcept;
+  // Of both: says whose drift the offset between them is, once per tick.
+  [[nodiscard]] PoseBelief believed(const Transform& odom_T_base) noexcept;
   // Of the published pose: a tie that was contradicted, and that no second pose confirmed, says nothing.
   [[nodiscard]] const LioUncertainty& known() const noexcept {
-    return !aligned_ && doubted_ && count_ <= 1 ? untied_ : uncertainty_;
+    return !aligned_ && first_contradicted_ && count_ <= 1 ? untied_ : uncertainty_;
   }
   // The odometry moves by next to nothing against LIO from one pose to the next: what is left is LIO's noise, twice.
   void measure_noise(const Transform& lio_T_base, const Transform& odom_T_base, double silence_s) noexcept;
   void observe(const Transform& predicted, const Transform& measured, const LioSigmas& sigmas,
                std::int64_t stamp_ns) noexcept;
   void align(const Transform& predicted, const Transform& lio_T_base, const LioSigmas& sigmas, double gain) noexcept;
-  void tie(const Transform& odom_T_base, const LioSigmas& sigmas, std::uint32_t poses) noexcept;
+  void tie(const PoseBelief& now, const LioSigmas& sigmas, std::uint32_t poses) noexcept;
 
   Params params_;
   Transform base_T_lidar_;
@@ -202,11 +202,11 @@ class LioFusion {
   // drift since the first. Once that is no more than eq. (9)'s gain the tie stays and odom moves as it drifts.
   Transform world_T_lio_;
   bool aligned_ = false;
-  bool doubted_ = false;          // the first pose was contradicted before a second one agreed: that happens once
-  std::uint32_t count_ = 0;       // poses averaged into the alignment
-  Transform fused_world_T_odom_;  // towards which the published one moves
-  Transform world_T_odom_;        // published
-  Transform last_lio_T_odom_;     // by the last accepted pose alone
+  bool first_contradicted_ = false;  // the first pose was before a second one agreed: that happens once
+  std::uint32_t count_ = 0;          // poses averaged into the alignment
+  Transform fused_world_T_odom_;     // towards which the published one moves
+  Transform world_T_odom_;           // published
+  Transform last_lio_T_odom_;        // by the last accepted pose alone
   struct {
     NoiseLevel position_m, rotation_rad;
   } noise_;  // as it is measured
@@ -222,7 +222,7 @@ class LioFusion {
   MountHeading mount_;
   struct {
     Vec3 odom_p_first_m = Vec3::Zero();  // of the base, at the first pose
-    bool doubted = false;                // the offset is LIO's drift
+    bool lio_drifts = false;             // it is LIO that is off
   } offset_;
   struct {
     Vec3 position_m = Vec3::Zero();

@@ -37,9 +37,9 @@ void LioUncertainty::blend(double gain, double lio_sigma_m, double lio_sigma_rad
   tie_share_ = 1.0 - kept * (1.0 - tie_share_);
 }
 
-void LioUncertainty::tie(const Vec3& world_p_base_m, double sigma_m, double sigma_rad) noexcept {
-  start_variance_.head<3>() = position_sigma_m(world_p_base_m).cwiseAbs2();
-  start_variance_[kYaw] = math::square(yaw_sigma_rad());
+void LioUncertainty::tie(const Vec3& world_p_base_m, double sigma_m, double sigma_rad,
+                         const Quantities& known) noexcept {
+  start_variance_ = known;
   lag_.setZero();
   bent_m_.setZero();
   walk_variance_.setZero();

@@ -42,8 +42,9 @@ class LioUncertainty {
   void begin(const Quantities& odometry) noexcept { odometry_variance_ = odometry; }
   // A LIO pose of these sigmas, blended in with the gain of eq. (9).
   void blend(double gain, double lio_sigma_m, double lio_sigma_rad) noexcept;
-  // LIO's world is tied to ours anew, from here on: with these sigmas, the base at world_p_base.
-  void tie(const Vec3& world_p_base_m, double sigma_m, double sigma_rad) noexcept;
+  // LIO's world is tied to ours anew, from here on: with these sigmas, the base at world_p_base, whose place and
+  // heading are known with variance `known`.
+  void tie(const Vec3& world_p_base_m, double sigma_m, double sigma_rad, const Quantities& known) noexcept;
   // Before any blend: the share of one more LIO pose's innovation that is the tie's error rather than the odometry's
   // drift since the tie, for position and for rotation. A robot at rest: 1/2, 1/3, ...
   struct TieGains {
@@ -56,6 +57,7 @@ class LioUncertainty {
 
   [[nodiscard]] Vec3 position_sigma_m(const Vec3& world_p_base_m) const noexcept;
   [[nodiscard]] double yaw_sigma_rad() const noexcept;
+  [[nodiscard]] const Quantities& tie_variance() const noexcept { return tie_variance_; }
   // Of LIO's next pose against the prediction, without that pose's own noise.
   [[nodiscard]] Quantities offset_variance() const noexcept;
 

@@ -4,8 +4,9 @@
 // right by then, because the tie has the mount in it. So the way that legs tell, turned by LIO's headings, and LIO's
 // way are apart by the mount's turn of the way since the tie, and by what legs drift to the side.
 //
-// That drift is taken for a random walk, whose newest value says all there is to say of a constant slope: no filter is
-// needed, the newest offset is shared out. Roll and pitch of the mount bend nothing: LIO's world is level.
+// That drift is taken for a random walk of the way walked, so on a straight way the newest offset says all there is to
+// say of the mount, and it is shared out; on the way back what was learnt farther off is forgotten. Roll and pitch of
+// the mount bend nothing: LIO's world is level.
 #pragma once
 
 #include "algorithms/core/math/transform.hpp"
@@ -16,12 +17,14 @@ class MountHeading {
  public:
   struct Params {
     double sigma_rad = 0.01;
-    double legs_mrm = 0.006;
+    double drift_mprm = 0.006;
 
     static void visit(auto& p, auto& field) {
-      field("sigma_rad", p.sigma_rad, 0.0, 0.5, "Heading of the lidar's mount, as installed; 0: as configured.");
-      field("legs_mrm", p.legs_mrm, 1e-5, 0.1,
-            "Legs drift to the side by this after a metre, besides what their heading does; with the root of the way.");
+      field("sigma_rad", p.sigma_rad, 0.0, 0.5,
+            "Sigma of the heading of the lidar's mount, as installed; 0: it is as configured.");
+      field("drift_mprm", p.drift_mprm, 1e-5, 0.1,
+            "Legs drift to the side by this after a metre, besides what their heading does, and with the root of the "
+            "way.");
     }
   };
   void reset(const Params& params) noexcept {
@@ -41,10 +44,8 @@ class MountHeading {
     double turn_rad, gain, variance_m2;
   };
   void see(const Seen& seen) noexcept;
-  // Once per tick. The base as LIO has it; by which legs moved it, turned as LIO has it, and how well that is known.
-  void move(const Vec3& world_p_base_m, const Vec3& world_step_m, double yaw_sigma_rad) noexcept;
-  // Where ours becomes another world.
-  void rebase(const Transform& new_T_old) noexcept;
+  // Once per tick. The base as LIO has it; by which legs moved it, turned as LIO has it.
+  void move(const Vec3& world_p_base_m, const Vec3& world_step_m) noexcept;
 
   struct Bend {
     Vec3 way_m = Vec3::Zero();  // part of LIO's way, world axes
@@ -60,9 +61,10 @@ class MountHeading {
   bool tied_ = false, seen_ = false;
   double variance_m2_ = 0.0;
   Vec3 tied_m_ = Vec3::Zero();     // the base at the tie
-  Vec3 lagging_m_ = Vec3::Zero();  // the base, low-passed as the headings are
   Vec3 legs_m_ = Vec3::Zero();     // the base as legs have it, turned by LIO's headings since then
-  Vec3 bent_m_ = Vec3::Zero();     // sigma of that by the headings: signed, so that sway cancels
+  Vec3 lagging_m_ = Vec3::Zero();  // the base, low-passed as the headings are
+  Vec3 counted_m_ = Vec3::Zero();  // up to where the way walked is counted, in pieces: sway is none
+  double walked_m_ = 0.0;
   Bend bend_;
 };
 

@@ -51,10 +51,11 @@ Transition Standing::tick(const GaitInput& in, GaitShared& gait) noexcept {
     return {};
   }
   if (was_tall) begin(in, gait);
-  return wait(gait, decision);
+  return wait(gait, decision, in.footholds.unsteady);
 }
 
-Transition Standing::wait(const GaitShared& gait, const ClimbPlanner::Decision& decision) noexcept {
+Transition Standing::wait(const GaitShared& gait, const ClimbPlanner::Decision& decision,
+                          StopReason unsteady) noexcept {
   const StandingParams& params = gait.params.standing;
   StopReason reason = decision.obstruction;
   if (reason == StopReason::kTop || reason == StopReason::kNoStaircase) {  // nothing higher is mapped
@@ -73,7 +74,7 @@ Transition Standing::wait(const GaitShared& gait, const ClimbPlanner::Decision& 
   const bool obstacle = 2 * gait.memory.obstacle_ticks > gait.memory.idle_ticks;
   const std::int32_t most = params.unsteady_patience * patience;
   if (gait.memory.idle_ticks < (obstacle ? std::max(most, params.obstacle_patience_ticks) : most)) return {};
-  return Transition::stop(obstacle ? StopReason::kObstacle : StopReason::kUnsteady);
+  return Transition::stop(obstacle ? StopReason::kObstacle : unsteady);
 }
 
 }  // namespace polygmap

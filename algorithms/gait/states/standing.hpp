@@ -17,7 +17,9 @@ class Standing {
 
  private:
   void begin_toe_calibration(const GaitInput& in, GaitShared& gait, Foot leading) noexcept;
-  [[nodiscard]] Transition wait(const GaitShared& gait, const ClimbPlanner::Decision& decision) noexcept;
+  // unsteady: the reason where what is decided keeps changing.
+  [[nodiscard]] Transition wait(const GaitShared& gait, const ClimbPlanner::Decision& decision,
+                                StopReason unsteady) noexcept;
 
   BetweenFeet rest_;
   struct {

@@ -34,6 +34,7 @@ StopReason PictureMonitor::explain(StopReason found, bool climbing) const noexce
       [[fallthrough]];
     case StopReason::kNothingSeen:
     case StopReason::kNoStaircase:
+    case StopReason::kUnsteady:
       return lacks_depth() ? StopReason::kDepthMissing : is_noisy() ? StopReason::kDepthNoisy : found;
     case StopReason::kRiseTooHigh:
     case StopReason::kTreadTooShort:

@@ -248,7 +248,8 @@ Estimator::Params log_params() {
   params.filter.imu_delay_start_sigma_s = 0.01;  // the truth of the first row is that of another time than its IMU's
   params.fusion.uncertainty.initial_sigma_m = 1e-4;  // the start is the truth's, or defined there
   params.fusion.uncertainty.initial_sigma_rad = 1e-4;
-  // As the module's 4 s are to its lidar's 10 mm: what comes through grows with LIO's noise, drift does not.
+  // What comes through grows with LIO's noise, drift does not. Nearly as the module's 4 s are to its lidar's 10 mm: of
+  // 300 to 400 s/m on climbs of seeds 201 to 212 the least followed best.
   params.fusion.tau_s = 1.0;
   params.fusion.tau_spm = 300.0;
   return params;

@@ -8,9 +8,9 @@
 namespace polygmap::sim {
 namespace {
 
-// Counted foot by foot: on logs as they should be, 0 to 0.9 % of the rows have a standing foot that moves; on one,
-// simulated and slippery, 8.3 %. With a flipped axis or the wrong feet it is 7 % at least, mostly a third and more
-// (2026-11).
+// Counted foot by foot, which is at most twice what rows are: on logs as they should be, 0 to 0.9 % of the rows have a
+// standing foot that moves; on one, simulated and slippery, 8.3 %. With a flipped axis or the wrong feet it is 7 % at
+// least, mostly a third and more (2026-11).
 constexpr double kSuspect = 0.02;    // share of the rows: worth a look
 constexpr double kSure = 0.15;       // no walk slips so much
 constexpr double kExplained = 0.25;  // what a change must leave of it, to be named

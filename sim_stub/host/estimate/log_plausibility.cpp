@@ -170,7 +170,7 @@ Doubt doubt_of_gyro_axes(const LogFigures& figures) {
   return {};
 }
 
-// Ahead is where a robot's maker has its base's x axis.
+// Only which way is up can be told: ahead is wherever a robot's maker has its base's x axis.
 Doubt doubt_of_soles(const LogFigures& figures) {
   const Vec3 up = figures.base_up_by_feet.normalized();
   if (figures.base_sole_up.dot(up) >= 0.7 * figures.base_sole_up.norm()) return {};
@@ -216,12 +216,14 @@ LogFigures figures_of(const EstimateLog& log, double gyro_scale) {
   LogFigures figures;
   Vec3 true_felt_mps2 = Vec3::Zero();
   std::vector<double> accels_mps2, legs_m, periods_s;
-  double way_m = 0.0;
+  std::size_t second_ago = 0;
+  double way_m = 0.0;  // of places a second apart: noise is none
   const double share = 1.0 / static_cast<double>(log.rows.size());
   for (std::size_t i = 1; i < log.rows.size(); ++i) {
     periods_s.push_back(seconds(log.rows[i].stamp_ns - log.rows[i - 1].stamp_ns));
-    const Vec3 moved_m = log.rows[i].truth.true_T_base.p_m - log.rows[i - 1].truth.true_T_base.p_m;
-    way_m += moved_m.norm();
+    if (log.rows[i].stamp_ns - log.rows[second_ago].stamp_ns < kNsPerS && i + 1 < log.rows.size()) continue;
+    way_m += (log.rows[i].truth.true_T_base.p_m - log.rows[second_ago].truth.true_T_base.p_m).norm();
+    second_ago = i;
   }
   figures.period_s = median(std::move(periods_s));
   if (log.has_truth) figures.true_speed_mps = way_m / std::max(seconds(log.rows.back().stamp_ns), 1e-9);

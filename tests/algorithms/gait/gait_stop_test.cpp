@@ -203,6 +203,17 @@ TEST(GaitStop, FootholdsThatComeAndGo_AreCalledUnsteady) {
   expect_unsteady(climb);
 }
 
+TEST(GaitStop, FootholdsThatComeAndGoInNoisyPictures_BlameTheNoise) {
+  IdealClimb climb({});
+  disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {
+    if (since_ns % kNsPerS > 100 * kNsPerMs) set.obstruction = StopReason::kNothingSeen;
+    set.unsteady = StopReason::kDepthNoisy;
+  });
+  climb.run(60.0);
+  EXPECT_EQ(climb.status().phase, GaitPhase::kStopped);
+  EXPECT_EQ(climb.status().stop_reason, StopReason::kDepthNoisy);
+}
+
 TEST(GaitStop, ReasonsThatComeAndGo_AreCalledUnsteady) {
   IdealClimb climb({});
   disturb_after_the_first_tread(climb, [](std::int64_t since_ns, FootholdSet& set) {

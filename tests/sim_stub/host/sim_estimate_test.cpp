@@ -236,7 +236,7 @@ TEST(EstimateReplay, LateLioWithOutliersAndFutureStamps_IsCountedAndNeverMakesAS
   EXPECT_GT(count(LioVerdict::kAccepted), lio.size() - 8);
   EXPECT_GT(result.lio_not_arrived, 0U);
   EXPECT_EQ(std::accumulate(result.lio.begin(), result.lio.end(), result.lio_not_arrived), lio.size());
-  EXPECT_LE(result.largest_slew_m, options.estimator.fusion.slew.mps * seconds(SyntheticWalk::kTick_ns) + 1e-9);
+  EXPECT_LE(result.largest_slew_m, options.estimator.fusion.slew.speed_mps * seconds(SyntheticWalk::kTick_ns) + 1e-9);
   EXPECT_EQ(result.ticks[10].lio_age_ns, -1);
   EXPECT_LT(result.ticks.back().lio_age_ns, 210 * kNsPerMs);
 }
@@ -325,7 +325,7 @@ TEST(EstimateReplay, LioWithoutDelay_IsAccepted_AtAnyRateOfRows) {
 // The biases are unknown at the start, and half of the robots set out after 0.2 s. Where the odometry is better than
 // LIO (5 mm) some of LIO's noise comes through: 3.3 mm at tau 1 s; and of what legs drift to the side most could be the
 // heading of the lidar's mount, and stays: 7 mm.
-TEST(EstimateReplay, BiasedLogWithLateLio_IsNoWorseThanWithoutAndKnowsHowGoodItIs) {
+TEST(EstimateReplay, BiasedLogWithLateLio_IsNoWorseThanWithoutOrLiosNoiseAndMountAndKnowsHowGoodItIs) {
   constexpr std::uint32_t kSeeds = test::kSlowMachine ? 1 : 6;
   for (std::uint32_t seed = 11; seed < 11 + kSeeds; ++seed) {
     WalkSpec spec;
@@ -394,7 +394,7 @@ TEST(EstimateScore, PlantedFeet_TheFarthestThatTheyGoCountsOfStancesOfASecondAtL
 
 struct KnownLog {
   std::string path;
-  double position_mm, velocity_mmps, drift_percent;  // at most: what docs/measured/estimation.md asks, or 1.3 of it
+  double position_mm, velocity_mmps, drift_percent;  // at most: what is asked, or 1.3 of what docs/measured/estimation.md has
 };
 const std::array<KnownLog, 3> kKnownLogs{{{"/cassie/cassie_walk_open.csv", 5.0, 8.5, 0.7},
                                           {"/icub/walk.csv", 13.0, 88.0, 3.0},

@@ -19,9 +19,8 @@ namespace {
 constexpr const char* kUsage =
     "inekf_replay LOG.csv [--json OUT.json] [--csv OUT.csv] [NAME=VALUE...]\n"
     "The filter's noise: gyro, accel, gyro_bias, accel_bias, contact, in its own units, and foot, of the feet's "
-    "positions, m.\nWhat is not given is as in the filter's own example. still: the gyro's bias begins as its mean "
-    "over "
-    "so many seconds, where it begins at 0 otherwise.";
+    "positions, m.\nWhat is not given is as in the filter's own example.\n"
+    "still: the gyro's bias begins as its mean over so many seconds, where it begins at 0 otherwise.";
 
 // Of the start, one sigma: attitude (rad), velocity (m/s) and position (m) as the module's; biases of gyro (rad/s) and
 // accelerometer (m/s^2) as the filter's authors have them for Cassie.
@@ -38,7 +37,8 @@ void take_noise(const std::string& word, Request& request) {
   const auto noise = request.noise.find(word.substr(0, equals));
   char* end = nullptr;
   if (noise != request.noise.end()) noise->second = std::strtod(word.c_str() + equals + 1, &end);
-  if (end == nullptr || *end != '\0' || !(noise->second > 0.0)) throw config::FileError("\"" + word + "\" is no noise");
+  if (end == nullptr || *end != '\0' || !(noise->second > 0.0))
+    throw config::FileError("\"" + word + "\" is none of those, or not above 0");
 }
 
 Request request_of(const std::vector<std::string>& words) {

@@ -38,7 +38,9 @@ TEST(LioUncertainty, Tie_AtThatMomentChangesNothing) {
   for (int i = 0; i < 100; ++i) uncertainty.move({0.02, 0.01, 0.005});
   const Vec3 there_m{2.0, 1.0, 0.5}, before_m = uncertainty.position_sigma_m(there_m);
   const double yaw_rad = uncertainty.yaw_sigma_rad();
-  uncertainty.tie(there_m, 0.01, 0.003);
+  LioUncertainty::Quantities known;
+  known << uncertainty.position_sigma_m(there_m).cwiseAbs2(), math::square(uncertainty.yaw_sigma_rad());
+  uncertainty.tie(there_m, 0.01, 0.003, known);
   EXPECT_LT((uncertainty.position_sigma_m(there_m) - before_m).norm(), 1e-12);
   EXPECT_NEAR(uncertainty.yaw_sigma_rad(), yaw_rad, 1e-12);
   for (int i = 0; i < 500; ++i) uncertainty.blend(0.1, 0.0, 0.0);  // what is forgotten no longer cancels it

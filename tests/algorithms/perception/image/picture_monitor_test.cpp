@@ -90,7 +90,8 @@ TEST_F(PictureMonitorTest, Take_NoisyPictures_ExplainWhatWasTooVagueToFind) {
   EXPECT_FALSE(monitor_.is_bad());
   show(60, nothing, 3.9);
   EXPECT_TRUE(monitor_.is_bad());
-  for (const StopReason found : {StopReason::kNothingSeen, StopReason::kNoStaircase, StopReason::kEdgeUncertain})
+  for (const StopReason found :
+       {StopReason::kNothingSeen, StopReason::kNoStaircase, StopReason::kEdgeUncertain, StopReason::kUnsteady})
     EXPECT_EQ(monitor_.explain(found, true), StopReason::kDepthNoisy);
   for (const StopReason found : {StopReason::kRiseTooHigh, StopReason::kTreadTooShort, StopReason::kTop})
     EXPECT_EQ(monitor_.explain(found, true), found);
