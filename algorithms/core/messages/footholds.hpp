@@ -125,8 +125,8 @@ struct FootholdSet {
   TreadView tread;                                    // of p*
   StopReason obstruction = StopReason::kNothingSeen;
   StopReason unsteady = StopReason::kUnsteady;  // why, where what is offered keeps changing
-  double measured_rise_m = 0.0;   // stance to the next tread, valid unless nothing was seen
-  double measured_tread_m = 0.0;  // nosing to what rises behind it; 0: nothing is mapped there
+  double measured_rise_m = 0.0;                 // stance to the next tread, valid unless nothing was seen
+  double measured_tread_m = 0.0;                // nosing to what rises behind it; 0: nothing is mapped there
 };
 
 }  // namespace polygmap

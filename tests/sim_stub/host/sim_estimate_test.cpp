@@ -394,7 +394,7 @@ TEST(EstimateScore, PlantedFeet_TheFarthestThatTheyGoCountsOfStancesOfASecondAtL
 
 struct KnownLog {
   std::string path;
-  double position_mm, velocity_mmps, drift_percent;  // at most: what is asked, or 1.3 of what docs/measured/estimation.md has
+  double position_mm, velocity_mmps, drift_percent;  // at most: as asked, or 1.3 of what is measured
 };
 const std::array<KnownLog, 3> kKnownLogs{{{"/cassie/cassie_walk_open.csv", 5.0, 8.5, 0.7},
                                           {"/icub/walk.csv", 13.0, 88.0, 3.0},
