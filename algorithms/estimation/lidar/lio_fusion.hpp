@@ -57,14 +57,14 @@ class LioFusion {
  public:
   // Whose drift an offset between the odometry and LIO is.
   struct Drift {
-    double most_ratio = 9.5;
+    double most_ratio = 7.0;
     double trusted_ratio = 0.5;
     double way_share = 0.0075;
 
     static void visit(auto& p, auto& field) {
       field("most_ratio", p.most_ratio, 0.0, 1e6,
             "Where the squares of the offset, of place and heading, over their variances add up to more, it is lidar "
-            "odometry that drifts: 9.5 is more than 95 % of honest ones.");
+            "odometry that drifts: honest ones have part of the error in common, and stay below.");
       field("trusted_ratio", p.trusted_ratio, 0.0, 1e6,
             "Then, until the sum is below this, the odometry is moved by this over the sum of the offset.");
       field("way_share", p.way_share, 0.0, 0.1,

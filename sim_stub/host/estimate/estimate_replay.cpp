@@ -18,7 +18,6 @@ constexpr double kSlip_mps = 0.15;  // a standing foot that seems faster moves
 constexpr double kMinStill_s = 0.25, kMaxStill_s = 2.0, kSmoothing_s = 0.05, kUnseenMotion_s = 0.15;
 constexpr double kStillRate_radps = 0.1, kStillAccel_mps2 = 1.0, kStillMove_m = 0.004;
 constexpr double kUnseenTurn_rad = 2e-3, kUnseenSpeed_mps = 5e-3;  // in that time
-constexpr double kTruthSpeed_mps = 0.02;                           // a truth's velocity is differenced places
 
 Mat3 level_R_base(const Vec3& up) {
   const double roll_rad = std::atan2(up.y(), up.z());
@@ -134,6 +133,22 @@ struct KnownStart {
   Vec3 world_p_odom_m = Vec3::Zero();
 };
 
+// Of the truth's velocity, by its second differences in the first second: that of a camera system is differenced
+// places, and smoothed, so it errs by three times as much as that shows (chosen on iCub's walk, cut where one foot
+// stands).
+double true_velocity_noise_mps(const EstimateLog& log) {
+  double squares = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 2; i < log.rows.size() && seconds(log.rows[i].stamp_ns) < 1.0; ++i) {
+    const auto v_mps = [&](std::size_t back) -> const Vec3& { return log.rows[i - back].truth.true_v_base_mps; };
+    squares += (v_mps(0) - 2.0 * v_mps(1) + v_mps(2)).squaredNorm();
+    ++count;
+  }
+  constexpr double kRows = 3.0 * 6.0;  // variance of a second difference: 1 + 4 + 1
+  constexpr double kSmoothed = 3.0;
+  return count > 0 ? kSmoothed * std::sqrt(squares / (kRows * static_cast<double>(count))) : 0.0;
+}
+
 KnownStart start_of(const EstimateLog& log, const ReplayOptions& options) {
   const LogRow& first = log.rows.front();
   const Opening o = opening(log);
@@ -148,7 +163,7 @@ KnownStart start_of(const EstimateLog& log, const ReplayOptions& options) {
     // The filter's errors turn about its origin, so that is the start, wherever on earth the truth counts from.
     known.world_p_odom_m = first.truth.true_T_base.p_m;
     start.odom_v_base_mps = first.truth.true_v_base_mps;
-    if (!stood) start.velocity_sigma_mps = kTruthSpeed_mps;
+    if (!stood) start.velocity_sigma_mps = std::hypot(start.velocity_sigma_mps, true_velocity_noise_mps(log));
     if (stood) {
       start.accel_bias_mps2 = o.accel_mps2 - start.odom_R_base.transpose() * Vec3{0, 0, kGravity_mps2};
       start.accel_bias_sigma_mps2 = std::hypot(kUnseenSpeed_mps / o.still_s, kUnseenTurn_rad * kGravity_mps2);

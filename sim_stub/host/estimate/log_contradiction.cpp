@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <utility>
 
 namespace polygmap::sim {
@@ -21,7 +22,7 @@ struct Change {
   const char* name;
   void (*apply)(LogRow& row);
 };
-constexpr std::array<Change, 9> kChanges{{
+constexpr std::array<Change, 11> kChanges{{
     {"gyro_x_radps negated", [](LogRow& row) { row.gyro_radps.x() *= -1.0; }},
     {"gyro_y_radps negated", [](LogRow& row) { row.gyro_radps.y() *= -1.0; }},
     {"all three of gyro_* negated", [](LogRow& row) { row.gyro_radps *= -1.0; }},
@@ -29,6 +30,14 @@ constexpr std::array<Change, 9> kChanges{{
     {"accel_x_mps2 negated", [](LogRow& row) { row.accel_mps2.x() *= -1.0; }},
     {"accel_y_mps2 negated", [](LogRow& row) { row.accel_mps2.y() *= -1.0; }},
     {"accel_x_mps2 and accel_y_mps2 exchanged", [](LogRow& row) { std::swap(row.accel_mps2.x(), row.accel_mps2.y()); }},
+    {"the x axes of both feet's places negated",
+     [](LogRow& row) {
+       for (Vec3& foot_m : row.base_p_foot_m) foot_m.x() *= -1.0;
+     }},
+    {"the y axes of both feet's places negated",
+     [](LogRow& row) {
+       for (Vec3& foot_m : row.base_p_foot_m) foot_m.y() *= -1.0;
+     }},
     {"the left and the right foot (or their contacts) exchanged",
      [](LogRow& row) {
        std::swap(row.base_p_foot_m[0], row.base_p_foot_m[1]);
@@ -74,9 +83,10 @@ std::string doubt_about_contacts(const EstimateLog& log, const Replay& whole, co
                          " rows a foot moves by gyro, accelerometer and feet while its contact says that it stands: "
                          "they contradict each other";
   if (best != nullptr) {
-    const double percent = 100.0 * moving_then;
+    std::array<char, 32> percent{};
+    std::snprintf(percent.data(), percent.size(), "only %.1f %% of the rows", 100.0 * moving_then);
     sentence += "; with " + std::string(best->name) + " it does so in " +
-                (percent < 0.05 ? "no row" : "only " + std::to_string(percent).substr(0, 3) + " % of the rows");
+                (moving_then < 0.0005 ? "no row" : std::string(percent.data()));
   }
   return sentence + ".";
 }
@@ -89,8 +99,12 @@ std::string doubt_about_lio(const std::string& path, std::size_t poses, const Re
            " arrived too late to be of use and " + std::to_string(whole.lio_not_arrived) +
            " after the log's end: are stamp_s and arrival_s in seconds, and of the log's clock?";
   }
+  if (2 * count(LioVerdict::kFuture) > poses) {
+    return "\"" + path + "\": of " + std::to_string(poses) + " poses " + std::to_string(count(LioVerdict::kFuture)) +
+           " arrived before their stamp: is stamp_s the moment of the scan?";
+  }
   const std::uint32_t refused = count(LioVerdict::kJump) + count(LioVerdict::kRealigned);
-  if (refused < kLeastPoses || refused <= count(LioVerdict::kAccepted)) return {};
+  if (refused < kLeastPoses || 10 * refused <= poses) return {};  // right ones: 6 % at most, from a start on the move
   return "\"" + path + "\": " + std::to_string(refused) + " of " + std::to_string(poses) +
          " poses contradict the odometry, or are tilted against gravity, and were not used: are p*_m in metres, is the "
          "quaternion's order w, x, y, z, and is the pose the base's (or --lidar-mount given)?";

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_stub/host/estimate/log_plausibility.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -90,6 +92,92 @@ void hold_against_truth(const EstimateLog& log, double gyro_scale, LogFigures& f
   }
 }
 
+// A sole that stands turns in the base as the base turns by the gyro, the other way round.
+void hold_soles_against_gyro(const EstimateLog& log, double gyro_scale, LogFigures& figures) {
+  constexpr double kWindow_s = 0.2;
+  using Reading = Mat3 (*)(const Mat3&);
+  constexpr std::array<Reading, 3> kReadings{[](const Mat3& R) { return R; },
+                                             [](const Mat3& R) {
+                                               const Eigen::Quaterniond q(R);
+                                               return Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()).matrix();
+                                             },
+                                             [](const Mat3& R) { return Mat3(R.transpose()); }};
+  std::array<double, kReadings.size()> squares{};
+  int windows = 0;
+  for (std::size_t f = 0; f < kFootCount; ++f) {
+    Mat3 R = Mat3::Identity();
+    std::size_t begin = 0;
+    for (std::size_t i = 1; i < log.rows.size(); ++i) {
+      const LogRow &from = log.rows[i - 1], &to = log.rows[i];
+      if (is_gap(log, from, to) || from.contact[f] < 0.5 || to.contact[f] < 0.5) {
+        R.setIdentity();
+        begin = i;
+        continue;
+      }
+      R = R * turn_between(from, to, gyro_scale);
+      if (seconds(to.stamp_ns - log.rows[begin].stamp_ns) < kWindow_s) continue;
+      for (std::size_t r = 0; r < kReadings.size(); ++r) {
+        const Mat3 before = kReadings[r](log.rows[begin].base_R_foot[f]), after = kReadings[r](to.base_R_foot[f]);
+        squares[r] += so3_log((R.transpose() * before).transpose() * after).squaredNorm();
+      }
+      ++windows;
+      R.setIdentity();
+      begin = i;
+    }
+  }
+  if (windows == 0) return;
+  figures.sole_turn_rad = std::sqrt(squares[0] / windows);
+  figures.reordered_sole_turn_rad = std::sqrt(squares[1] / windows);
+  figures.inverted_sole_turn_rad = std::sqrt(squares[2] / windows);
+}
+
+LogFigures::Frozen longest_frozen(const EstimateLog& log) {
+  struct Signal {
+    const char* what;
+    bool (*same)(const LogRow& a, const LogRow& b);
+  };
+  constexpr std::array<Signal, 3> kSignals{
+      {{"gyro_*", [](const LogRow& a, const LogRow& b) { return a.gyro_radps == b.gyro_radps; }},
+       {"accel_*", [](const LogRow& a, const LogRow& b) { return a.accel_mps2 == b.accel_mps2; }},
+       {"the places of both feet", [](const LogRow& a, const LogRow& b) {
+          return a.base_p_foot_m[0] == b.base_p_foot_m[0] && a.base_p_foot_m[1] == b.base_p_foot_m[1];
+        }}}};
+  LogFigures::Frozen longest;
+  for (const Signal& signal : kSignals) {
+    std::size_t begin = 0;
+    for (std::size_t i = 1; i < log.rows.size(); ++i) {
+      if (!signal.same(log.rows[begin], log.rows[i])) begin = i;
+      const double for_s = seconds(log.rows[i].stamp_ns - log.rows[begin].stamp_ns);
+      if (for_s > longest.for_s) longest = {signal.what, seconds(log.rows[begin].stamp_ns), for_s};
+    }
+  }
+  return longest;
+}
+
+// Over a second each.
+void hold_velocity_against_place(const EstimateLog& log, LogFigures& figures) {
+  Vec3 added_m = Vec3::Zero();
+  double error_m = 0.0, way_m = 0.0;
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i < log.rows.size(); ++i) {
+    const LogRow &from = log.rows[i - 1], &to = log.rows[i];
+    if (is_gap(log, from, to)) {
+      added_m.setZero();
+      begin = i;
+      continue;
+    }
+    added_m += 0.5 * seconds(to.stamp_ns - from.stamp_ns) * (from.truth.true_v_base_mps + to.truth.true_v_base_mps);
+    if (to.stamp_ns - log.rows[begin].stamp_ns < kNsPerS) continue;
+    const Vec3 moved_m = to.truth.true_T_base.p_m - log.rows[begin].truth.true_T_base.p_m;
+    error_m += (added_m - moved_m).norm();
+    way_m += std::max(added_m.norm(), moved_m.norm());
+    added_m.setZero();
+    begin = i;
+  }
+  constexpr double kLeastWay_m = 0.2;
+  if (way_m > kLeastWay_m) figures.true_velocity_error_share = error_m / way_m;
+}
+
 struct Doubt {
   std::string sentence;  // empty: none
   bool impossible = false;
@@ -106,7 +194,10 @@ std::string text(const char* format, Values... values) {
 Doubt doubt_of_acceleration(const LogFigures& figures) {
   const double felt_mps2 = figures.accel_mps2;
   if (felt_mps2 > 0.8 && felt_mps2 < 1.25) {
-    return {text("The median acceleration is %.2f: that is in g, but accel_* are in m/s^2.", felt_mps2), true};
+    return {text("The median acceleration is %.2f: that is in g, or gravity is taken off, but accel_* are "
+                 "in m/s^2 and feel it.",
+                 felt_mps2),
+            true};
   }
   const bool impossible = felt_mps2 < 3.0 || felt_mps2 > 30.0;
   if (!impossible && felt_mps2 > 7.0 && felt_mps2 < 13.0) return {};
@@ -177,6 +268,31 @@ Doubt doubt_of_soles(const LogFigures& figures) {
   return {"The standing soles' z axes do not point up: is the order of *_foot_q* w, x, y, z, of the sole in the base?"};
 }
 
+Doubt doubt_of_sole_turns(const LogFigures& figures) {
+  constexpr double kLeast_rad = 0.004;  // of six logs as they should be, the other readings turn twice as far and more
+  const double other_rad = std::min(figures.reordered_sole_turn_rad, figures.inverted_sole_turn_rad);
+  if (figures.sole_turn_rad < kLeast_rad || 1.5 * other_rad > figures.sole_turn_rad) return {};
+  return {
+      text("Standing soles turn otherwise than the gyro says, and with %s they would not: *_foot_q* are the sole in "
+           "the base, w, x, y, z.",
+           figures.reordered_sole_turn_rad < figures.inverted_sole_turn_rad ? "quaternions in the order x, y, z, w"
+                                                                            : "their quaternions inverted")};
+}
+
+Doubt doubt_of_freezing(const LogFigures& figures) {
+  if (figures.frozen.for_s < 0.5) return {};
+  return {text("From %.3f s after the first row on %s stay the same to the last digit for %.3f s: did a sensor freeze?",
+               figures.frozen.from_s, figures.frozen.what, figures.frozen.for_s)};
+}
+
+Doubt doubt_of_true_velocity(const LogFigures& figures) {
+  if (figures.true_velocity_error_share < 0.3) return {};
+  return {
+      text("The truth's velocities do not add up to its places, by %.0f %% of "
+           "the way: are both in the world\'s axes, and truth_v*_mps in m/s?",
+           100.0 * figures.true_velocity_error_share)};
+}
+
 Doubt doubt_of_true_place(const LogFigures& figures) {
   if (figures.true_speed_mps < 5.0) return {};
   return {text("The truth moves at %.3g m/s, in the mean: are truth_p*_m in metres?", figures.true_speed_mps), true};
@@ -243,8 +359,11 @@ LogFigures figures_of(const EstimateLog& log, double gyro_scale) {
   figures.accel_mps2 = median(std::move(accels_mps2));
   figures.leg_m = median(std::move(legs_m));
   figures.gravity_kept = gravity_kept(log, gyro_scale);
+  if (log.has_soles) hold_soles_against_gyro(log, gyro_scale, figures);
+  figures.frozen = longest_frozen(log);
   if (log.has_truth) {
     hold_against_truth(log, gyro_scale, figures);
+    hold_velocity_against_place(log, figures);
     figures.felt_lean_mps2 = true_felt_mps2.head<2>().norm();
   }
   return figures;
@@ -255,6 +374,7 @@ std::vector<std::string> doubts_about(const EstimateLog& log, const std::string&
   std::vector<std::string> doubts;
   for (const Doubt& doubt :
        {doubt_of_acceleration(figures), doubt_of_feet(figures), doubt_of_up(figures), doubt_of_soles(figures),
+        doubt_of_sole_turns(figures), doubt_of_freezing(figures), doubt_of_true_velocity(figures),
         doubt_of_true_place(figures), doubt_of_gyro(log, figures), doubt_of_gyro_axes(figures), doubt_of_rate(figures),
         doubt_of_truth(figures, seconds(log.rows.back().stamp_ns))}) {
     if (doubt.impossible) throw config::FileError("\"" + path + "\": " + doubt.sentence);

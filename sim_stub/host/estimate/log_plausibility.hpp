@@ -17,13 +17,21 @@ struct LogFigures {
   double leg_m = 0.0;                   // median distance of a foot
   double period_s = 0.0;                // median time from row to row
   Vec3 base_sole_up = Vec3::Zero();     // z axes of standing soles, in the mean; 0 without soles
-  double gravity_kept = 1.0;            // share of gravity that the gyro's turns leave, at worst
+  // How standing soles turn against the gyro in a fifth of a second, RMS; 0 without soles: as they are, with a
+  // quaternion in the order x, y, z, w, and with one that is inverted.
+  double sole_turn_rad = 0.0, reordered_sole_turn_rad = 0.0, inverted_sole_turn_rad = 0.0;
+  struct Frozen {
+    const char* what = "";
+    double from_s = 0.0, for_s = 0.0;
+  } frozen;                   // the longest time in which a signal stays the same to the last digit
+  double gravity_kept = 1.0;  // share of gravity that the gyro's turns leave, at worst
   // Against the truth, 0 without it.
   double true_turn_radps = 0.0;                                                    // RMS
   double gyro_error_share = 0.0;                                                   // of the turns, squared
   Vec3 true_axis_turn_radps = Vec3::Zero(), gyro_axis_error_share = Vec3::Zero();  // the same of each axis
   double true_speed_mps = 0.0;                                                     // mean
-  double felt_lean_mps2 = 0.0;  // of the mean acceleration, out of the vertical
+  double true_velocity_error_share = 0.0;  // of places a second apart: what the velocity does not add up to
+  double felt_lean_mps2 = 0.0;             // of the mean acceleration, out of the vertical
 };
 struct LogGaps {
   std::size_t count = 0;

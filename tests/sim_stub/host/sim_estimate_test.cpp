@@ -473,7 +473,8 @@ TEST_F(LogDoubts, LogAsItShouldBe_HasNone) {
 
 TEST_F(LogDoubts, WrongUnits_AreRefused) {
   for (const bool with_truth : {true, false}) {
-    expect(said([](LogRow& row) { row.accel_mps2 /= kGravity_mps2; }, with_truth), "is in g, but", true);
+    expect(said([](LogRow& row) { row.accel_mps2 /= kGravity_mps2; }, with_truth), "is in g, or gravity is taken off",
+           true);
     expect(said([](LogRow& row) { row.gyro_radps *= 180.0 / kPi; }, with_truth), "degrees per second", true);
     expect(said([](LogRow& row) { row.accel_mps2 *= 100.0; }, with_truth), "other units", true);
     const auto in_decimetres = [](LogRow& row) {
@@ -496,6 +497,59 @@ TEST_F(LogDoubts, SolesUpsideDownAndTruthInMillimetres_AreNamed) {
   };
   expect(said(upside_down), "z axes do not point up", false);
   expect(said([](LogRow& row) { row.truth.true_T_base.p_m *= 1000.0; }), "in metres?", true);
+}
+
+// A base that nods above its soles.
+TEST_F(LogDoubts, SoleQuaternionsInAnotherOrderOrInverted_AreNamed) {
+  log_.has_soles = true;
+  const auto nodding = [](LogRow& row) {
+    const auto world_R_base = [](double t_s) -> Mat3 {
+      return rotation_y(0.1 * std::sin(2.0 * t_s)) * rotation_x(0.07 * std::cos(3.0 * t_s));
+    };
+    constexpr double kStep_s = 1e-4;
+    const double t_s = seconds(row.stamp_ns);
+    row.gyro_radps = so3_log(world_R_base(t_s).transpose() * world_R_base(t_s + kStep_s)) / kStep_s;
+    row.base_R_foot.fill(world_R_base(t_s).transpose() * rotation_z(0.05));
+  };
+  const auto reordered = [&](LogRow& row) {
+    nodding(row);
+    for (Mat3& R : row.base_R_foot) {
+      const Eigen::Quaterniond q(R);
+      R = Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()).matrix();
+    }
+  };
+  const auto inverted = [&](LogRow& row) {
+    nodding(row);
+    for (Mat3& R : row.base_R_foot) R.transposeInPlace();
+  };
+  EXPECT_EQ(said(nodding).find("soles"), std::string::npos) << said(nodding);
+  expect(said(reordered), "order x, y, z, w", false);
+  expect(said(inverted), "quaternions inverted", false);
+}
+
+TEST_F(LogDoubts, SignalThatStaysTheSame_IsNamed) {
+  const auto from_2_s_on = [](auto freeze) {
+    return [freeze](LogRow& row) {
+      if (row.stamp_ns > 2 * kNsPerS) freeze(row);
+    };
+  };
+  expect(said(from_2_s_on([](LogRow& row) {
+                row.gyro_radps = {0.1, 0.0, 0.0};
+              }),
+              false),
+         "gyro_* stay the same", false);
+  expect(said(from_2_s_on([](LogRow& row) { row.accel_mps2 = {0.0, 0.1, 9.8}; })), "accel_* stay the same", false);
+  expect(said(from_2_s_on([](LogRow& row) {
+           row.base_p_foot_m = {Vec3{0.0, 0.1, -0.8}, Vec3{0.0, -0.1, -0.8}};
+         })),
+         "places of both feet stay the same", false);
+}
+
+TEST_F(LogDoubts, TrueVelocityThatIsNotThePlaces_IsNamed) {
+  const std::string wanted = "do not add up to its places";
+  expect(said([](LogRow& row) { row.truth.true_v_base_mps *= 1000.0; }), wanted, false);
+  expect(said([](LogRow& row) { row.truth.true_T_base.p_m.setZero(); }), wanted, false);
+  EXPECT_EQ(said([](LogRow& row) { row.truth.true_v_base_mps *= 1000.0; }, false), "");
 }
 
 TEST_F(LogDoubts, OddNumbersThatMayBeRight_AreTold) {
@@ -562,6 +616,10 @@ TEST_F(Contradictions, FlippedAxesAndWrongFeet_AreNamed) {
   expect_named(contradiction([](LogRow& row) { row.gyro_radps *= -1.0; }), "gyro_");
   expect_named(contradiction([](LogRow& row) { std::swap(row.base_p_foot_m[0], row.base_p_foot_m[1]); }), "exchanged");
   expect_named(contradiction([](LogRow& row) {
+                 for (Vec3& foot_m : row.base_p_foot_m) foot_m.x() *= -1.0;
+               }),
+               "x axes of both feet's places negated");
+  expect_named(contradiction([](LogRow& row) {
                  for (double& contact : row.contact) contact = 1.0 - contact;
                }),
                "contacts");
@@ -578,6 +636,26 @@ TEST(LioDoubt, PosesThatAllComeTooLate_AreTold) {
   std::vector<LioRow> late = lio_of(log, 4);
   for (LioRow& row : late) row.arrival_ns += kNsPerS;
   EXPECT_NE(doubt_about_lio("lio.csv", late.size(), replay(log, late, {})).find("arrived too late"), std::string::npos);
+}
+
+TEST(LioDoubt, PosesThatComeBeforeTheirStamp_AreTold) {
+  WalkSpec spec;
+  spec.steps = 2;
+  const EstimateLog log = climb_log(spec);
+  std::vector<LioRow> early = lio_of(log, 4);
+  for (LioRow& row : early) row.arrival_ns = row.stamp_ns - 50 * kNsPerMs;
+  EXPECT_NE(doubt_about_lio("lio.csv", early.size(), replay(log, early, {})).find("before their stamp"),
+            std::string::npos);
+}
+
+TEST(LioDoubt, PosesWithZFlipped_AreTold) {
+  WalkSpec spec;
+  spec.steps = 6;
+  const EstimateLog log = climb_log(spec);
+  std::vector<LioRow> flipped = lio_of(log, 4);
+  for (LioRow& row : flipped) row.pose.p_m.z() *= -1.0;
+  EXPECT_NE(doubt_about_lio("lio.csv", flipped.size(), replay(log, flipped, {})).find("contradict the odometry"),
+            std::string::npos);
 }
 
 TEST(LioDoubt, PosesInMillimetresOrOfAnotherOrder_AreRefusedAndTold_AndMoveNoSigma) {
@@ -641,10 +719,14 @@ class EstimateCommand : public testing::Test {
     EXPECT_EQ(std::count(err_.begin(), err_.end(), '\n'), 1) << err_;
     EXPECT_EQ(out_, "") << culprit;
   }
+  // No sensor says the same twice.
+  static std::string row_of(int i) {
+    return i % 2 == 0 ? kRow : ",1e-7,0,0,1e-6,0,9.81,1,1,1e-7,0.1,-0.8,0,-0.1,-0.8,0,0,0.8,0,0,0,1,0,0,0";
+  }
   // Standing still on two feet, a row every 2 ms.
   static std::string log_text(int rows) {
     std::string text = std::string(kHeader) + "\n";
-    for (int i = 0; i < rows; ++i) text += std::to_string(100.0 + 0.002 * i) + kRow + "\n";
+    for (int i = 0; i < rows; ++i) text += std::to_string(100.0 + 0.002 * i) + row_of(i) + "\n";
     return text;
   }
   static constexpr const char* kHeader =
@@ -710,7 +792,7 @@ TEST_F(EstimateCommand, ParamsOfAllDefaults_AreTakenWithAWarning) {
 
 TEST_F(EstimateCommand, GapsAreCountedAndTheLongestIsTold) {
   std::string text = log_text(300);
-  for (int i = 0; i < 300; ++i) text += std::to_string(102.6 + 0.002 * i) + kRow + "\n";
+  for (int i = 0; i < 300; ++i) text += std::to_string(102.6 + 0.002 * i) + row_of(i) + "\n";
   ASSERT_EQ(call({"estimate", write("gap.csv", text)}), kExitPass) << err_;
   EXPECT_EQ(err_, "");
   EXPECT_NE(out_.find("1 gap of more than 50 ms without rows, the longest 2.002 s"), std::string::npos) << out_;
@@ -718,7 +800,7 @@ TEST_F(EstimateCommand, GapsAreCountedAndTheLongestIsTold) {
 
 TEST_F(EstimateCommand, TwentyRowsASecond_AreNoGapsAndGetAWarning) {
   std::string text = std::string(kHeader) + "\n";
-  for (int i = 0; i < 50; ++i) text += std::to_string(100.0 + 0.0505 * i) + kRow + "\n";
+  for (int i = 0; i < 50; ++i) text += std::to_string(100.0 + 0.0505 * i) + row_of(i) + "\n";
   ASSERT_EQ(call({"estimate", write("slow.csv", text), "--json", at("out.json")}), kExitPass) << err_;
   const nlohmann::json json = nlohmann::json::parse(std::ifstream(at("out.json")));
   EXPECT_EQ(json["gaps"], 0);
@@ -728,7 +810,7 @@ TEST_F(EstimateCommand, TwentyRowsASecond_AreNoGapsAndGetAWarning) {
 
 TEST_F(EstimateCommand, TenRowsASecond_AreRefusedWithTheRatesThatWereTried) {
   std::string text = std::string(kHeader) + "\n";
-  for (int i = 0; i < 50; ++i) text += std::to_string(100.0 + 0.1 * i) + kRow + "\n";
+  for (int i = 0; i < 50; ++i) text += std::to_string(100.0 + 0.1 * i) + row_of(i) + "\n";
   expect_refused({"estimate", write("slow.csv", text)}, "tried on 100 to 1000 Hz");
 }
 
@@ -750,7 +832,7 @@ TEST_F(EstimateCommand, LogThatIsRefused_LeavesNoFormerOutput) {
   write("out.csv", "old");
   std::string text = log_text(50);
   for (std::size_t at = 0; (at = text.find("9.81", at)) != std::string::npos; at += 4) text.replace(at, 4, "1.00");
-  expect_refused({"estimate", write("g.csv", text), "--json", at("out.json"), "--csv", at("out.csv")}, "is in g, but");
+  expect_refused({"estimate", write("g.csv", text), "--json", at("out.json"), "--csv", at("out.csv")}, "is in g, or");
   EXPECT_FALSE(std::filesystem::exists(at("out.json")));
   EXPECT_FALSE(std::filesystem::exists(at("out.csv")));
 }
