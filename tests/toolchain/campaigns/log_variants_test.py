@@ -72,6 +72,14 @@ class LogVariants(unittest.TestCase):
             self.assertEqual(out["t_s"][3], log["t_s"][3 * every])
             self.assertEqual(out["accel_z_mps2"][:2], [log["accel_z_mps2"][0], log["accel_z_mps2"][every]])
 
+    def test_begun_on_one_foot_in_the_second_half(self):
+        log = log_of_steps()
+        out = log_variants.VARIANTS["begun on one foot"](log)
+        self.assertEqual(out["t_s"], log["t_s"][250:])  # the left foot lifts
+        self.assertEqual({len(values) for values in out.values()}, {ROWS - 250})
+        with self.assertRaisesRegex(ValueError, "stands alone"):
+            log_variants.begun_on_one_foot({**log, "left_contact": log["right_contact"]})
+
     def test_imu_late_tells_what_was_so_much_earlier(self):
         out = self.made("IMU 10 ms late", IMU)
         for name, first in (("gyro_x_radps", 0.0), ("accel_z_mps2", 5.0)):
