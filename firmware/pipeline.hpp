@@ -44,7 +44,11 @@ class Pipeline {
   }
   // What crosses between the lanes, for a replay.
   [[nodiscard]] ControlPerceptionLink& link() noexcept { return link_; }
+  [[nodiscard]] const ControlPerceptionLink& link() const noexcept { return link_; }
   [[nodiscard]] Exchange<Health, kEveryFrameSlots>& published_health(std::size_t lane) noexcept {
+    return health_[lane].published;
+  }
+  [[nodiscard]] const Exchange<Health, kEveryFrameSlots>& published_health(std::size_t lane) const noexcept {
     return health_[lane].published;
   }
 

@@ -116,6 +116,15 @@ class EventCounters {
   }
   constexpr void clear() noexcept { (of<Codes>().fill({}), ...); }
 
+  // As they were counted elsewhere, in the order of the tables: for who replays a lane without its tasks.
+  constexpr void assign(std::span<const EventCount> counts) noexcept {
+    const auto assign_to = [&counts](auto& own) {
+      for (std::size_t i = 0; i < own.size() && i < counts.size(); ++i) own[i] = counts[i];
+      counts = counts.subspan(std::min(own.size(), counts.size()));
+    };
+    (assign_to(of<Codes>()), ...);
+  }
+
   // Adds another lane's counts.
   constexpr void merge(const EventCounters& other) noexcept { (merge_in(of<Codes>(), other.of<Codes>()), ...); }
 

@@ -14,6 +14,7 @@
 #include "hal/ports/imu.hpp"
 #include "hal/ports/joint_bus.hpp"
 #include "hal/ports/lidar_odometry.hpp"
+#include "hal/ports/picture_keeper.hpp"
 #include "sim_stub/camera/depth_camera.hpp"
 #include "sim_stub/plant/kinematic_plant.hpp"
 #include "sim_stub/plant/mujoco_plant.hpp"
@@ -59,7 +60,8 @@ class SimRobot final : public hal::Clock,
                        public hal::DepthCamera,
                        public hal::Imu,
                        public hal::JointBus,
-                       public hal::LidarOdometry {
+                       public hal::LidarOdometry,
+                       public hal::PictureKeeper {
  public:
   explicit SimRobot(const SimOptions& options);
   SimRobot(const SimRobot&) = delete;
@@ -86,6 +88,8 @@ class SimRobot final : public hal::Clock,
   [[nodiscard]] CameraIntrinsics intrinsics() const noexcept override { return camera_.intrinsics(); }
   [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept override { return camera_.try_acquire(frame); }
   void release() noexcept override { camera_.release(); }
+  [[nodiscard]] bool try_keep(const DepthFrameView&) noexcept override { return camera_.try_keep(); }
+  void let_go(const std::uint16_t* pixels) noexcept override { camera_.let_go(pixels); }
   [[nodiscard]] bool try_read(ImuSample& sample) noexcept override { return imu_queue_.try_pop(sample); }
   [[nodiscard]] bool try_read(JointFeedback& feedback) noexcept override;
   // Takes every command; the drives are wired directly.

@@ -29,7 +29,7 @@ class Devices {
   // After open().
   [[nodiscard]] Ports ports() noexcept;
   // Whom a recorder asks to keep pictures.
-  [[nodiscard]] recording::PictureKeeper& picture_keeper() noexcept { return keeper_; }
+  [[nodiscard]] hal::PictureKeeper& picture_keeper() noexcept { return keeper_; }
   // After open(): all counters of all devices. They refer to this.
   void count_in(DeviceCounts& counts) const;
   // Opens anew what was lost; each call tries once. Some ten times a second, outside the lanes.
@@ -43,11 +43,11 @@ class Devices {
     [[nodiscard]] bool try_read(LioSample&) noexcept override { return false; }
   };
   // The camera's second holder.
-  class Keeper final : public recording::PictureKeeper {
+  class Keeper final : public hal::PictureKeeper {
    public:
     explicit Keeper(hal::V4l2Camera& camera) noexcept : camera_(camera) {}
-    [[nodiscard]] bool try_keep(DepthFrameView& frame) noexcept override { return camera_.try_share(frame); }
-    void let_go() noexcept override { camera_.release_second(); }
+    [[nodiscard]] bool try_keep(const DepthFrameView&) noexcept override { return camera_.try_share(); }
+    void let_go(const std::uint16_t* pixels) noexcept override { camera_.release_shared(pixels); }
 
    private:
     hal::V4l2Camera& camera_;

@@ -19,12 +19,12 @@ namespace polygmap::daemon {
 namespace {
 
 constexpr const char* kUsage =
-    "polygmapd --config FILE [--record DIR]   runs the module with the devices of this file; writes all that goes in\n"
-    "                                         and comes out into DIR, for --replay\n"
+    "polygmapd --config FILE [--record RUN.mcap]   runs the module with the devices of this file; writes all that\n"
+    "                                    goes in and comes out, pictures too, for --replay and any MCAP tool\n"
     "polygmapd --config FILE --check     only reads it\n"
     "polygmapd --ask WHAT --config FILE  asks the one that runs with this file to arm, start, pause, resume, stop,\n"
     "                                    reset or hand_over, or for its state; says the state that came of it\n"
-    "polygmapd --replay DIR              feeds a recording to the module and compares what comes out\n"
+    "polygmapd --replay RUN.mcap         feeds a recording to the module and compares what comes out\n"
     "polygmapd --doctor [--json] [--strict] [--config FILE]   says what on this machine hinders it, and what to do\n"
     "polygmapd --version\n"
     "\n"
@@ -32,7 +32,8 @@ constexpr const char* kUsage =
     "with the\n"
     "recording incomplete.\n"
     "Exit codes of --ask: 0 it does so, 1 it refuses and says why, 2 configuration, 3 nobody listens.\n"
-    "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording. Of --doctor: 0 nothing hinders, 1 "
+    "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording, 3 an unfinished\n"
+    "one that agrees as far as it goes. Of --doctor: 0 nothing hinders, 1 "
     "else; with --strict a warning hinders, too.\n";
 
 struct Options {
@@ -103,18 +104,13 @@ int run_replay(const std::string& directory) {
   return static_cast<int>(result.verdict);
 }
 
-// A second of pictures, and of all else, 4 kB a cycle, four seconds.
-constexpr recording::Recorder::Capacity kRecorded{.queue_bytes = 8U * 1024U * 1024U, .pictures = 32};
-
 // Empty, or why nothing can be written there.
-std::string begin_recording(recording::Recorder& recorder, const std::string& directory, const Params& params) {
-  std::error_code error;
-  std::filesystem::create_directory(directory, error);  // what fails here the recorder says of its files
-  recorder.begin(directory, params);
+std::string begin_recording(recording::Recorder& recorder, const std::string& path, const Params& params) {
+  recorder.begin(path, params, static_cast<std::uint64_t>(monotonic_ns()));
   return recorder.failed() ? recorder.finish() : std::string();
 }
 
-int run_service(const DaemonConfig& config, const std::string& record_directory) {
+int run_service(const DaemonConfig& config, const std::string& recording_path) {
   const StopSignals signals;
   Notifier notifier;
   if (!notifier.open()) return complain("NOTIFY_SOCKET names no socket that can be used.", ExitCode::kConfiguration);
@@ -129,12 +125,10 @@ int run_service(const DaemonConfig& config, const std::string& record_directory)
     if (!wrong.empty()) return complain(config.path + ", operator: " + wrong + ".", ExitCode::kDevice);
     ports.operator_input = &operator_socket;
   }
-  std::optional<recording::Recorder> recorder;
-  if (!record_directory.empty()) {
-    recording::Recorder::Capacity capacity = kRecorded;
-    capacity.keeper = &devices.picture_keeper();
-    recorder.emplace(ports, capacity);
-    const std::string wrong = begin_recording(*recorder, record_directory, config.params);
+  std::unique_ptr<recording::Recorder> recorder;
+  if (!recording_path.empty()) {
+    recorder = std::make_unique<recording::Recorder>(ports, &devices.picture_keeper());
+    const std::string wrong = begin_recording(*recorder, recording_path, config.params);
     if (!wrong.empty()) return complain(wrong, ExitCode::kRecording);
   }
   ServiceParts parts{.ports = recorder ? recorder->ports() : ports,
@@ -143,7 +137,7 @@ int run_service(const DaemonConfig& config, const std::string& record_directory)
                      .heap = counted_heap(),
                      .operator_socket = config.operator_socket.empty() ? nullptr : &operator_socket,
                      .devices = &counts,
-                     .recorder = recorder ? &*recorder : nullptr,
+                     .recorder = recorder.get(),
                      .hook = row_hook()};
   Service service(config, std::move(parts), signals, notifier);
   const Outcome outcome = service.run();

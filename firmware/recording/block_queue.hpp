@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blocks of bytes from one thread to one other, in memory of a fixed size. Nobody waits.
+// Blocks of bytes from one thread to one other, in memory that somebody else owns. Nobody waits.
 #pragma once
 
 #include <algorithm>
@@ -8,13 +8,12 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
-#include <vector>
 
 namespace polygmap::recording {
 
 class BlockQueue {
  public:
-  explicit BlockQueue(std::size_t bytes) : memory_(bytes) {}
+  explicit BlockQueue(std::span<std::byte> memory) noexcept : memory_(memory) {}
 
   // On the writer's thread: both parts, as one block. False, and nothing of it is there, when it has no room.
   [[nodiscard]] bool try_push(std::span<const std::byte> head, std::span<const std::byte> body) noexcept {
@@ -40,9 +39,6 @@ class BlockQueue {
     popped_.store(begin + kLength_bytes + length, std::memory_order_release);
     return block;
   }
-  [[nodiscard]] bool empty() const noexcept {
-    return pushed_.load(std::memory_order_acquire) == popped_.load(std::memory_order_acquire);
-  }
 
  private:
   static constexpr std::size_t kLength_bytes = sizeof(std::uint32_t);
@@ -58,7 +54,7 @@ class BlockQueue {
     if (first < bytes.size()) std::memcpy(bytes.data() + first, memory_.data(), bytes.size() - first);
   }
 
-  std::vector<std::byte> memory_;
+  std::span<std::byte> memory_;
   alignas(64) std::atomic<std::size_t> pushed_{0};  // bytes, since the start
   alignas(64) std::atomic<std::size_t> popped_{0};
 };

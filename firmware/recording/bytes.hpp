@@ -76,6 +76,12 @@ class ByteReader {
     at_ += count;
     return {reinterpret_cast<const char*>(bytes_.data() + at_ - count), count};
   }
+  [[nodiscard]] std::span<const std::byte> get_bytes(std::size_t count) noexcept {
+    failed_ = failed_ || count > bytes_.size() - at_;
+    if (failed_) return {};
+    at_ += count;
+    return bytes_.subspan(at_ - count, count);
+  }
   void fail() noexcept { failed_ = true; }
   [[nodiscard]] bool failed() const noexcept { return failed_; }
   [[nodiscard]] bool at_end() const noexcept { return at_ == bytes_.size(); }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string_view>
 #include <type_traits>
 
@@ -15,6 +16,7 @@
 #include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/estimation/quality/estimate_quality.hpp"
 #include "algorithms/robot/robot_model.hpp"
+#include "firmware/lane_link.hpp"
 #include "firmware/recording/bytes.hpp"
 #include "hal/ports/joint_bus.hpp"
 #include "scheduler/event_counters.hpp"
@@ -27,7 +29,9 @@ concept Of = std::is_same_v<std::remove_const_t<T>, Message>;
 // A visitor f has
 //   leaf(name, index, value)      a number; index: its place in an array, -1 outside one
 //   enter(name, index), leave()   around the fields of a struct and the elements of an array
-//   count(n)                      before the n elements of a vector: how many of them to visit
+//   count(n)                      before the n elements of a vector: how many of them to visit; or, of who fills it,
+//   resize(vector)                which gives it its elements
+//   leaves(numbers)               optional, in the stead of leaf() for the numbers of a matrix, as they lie
 //   names_only()                  in the stead of count(): it wants no values, and a vector's element once
 template <class F, class T>
 void walk(F& f, std::string_view name, T& value, int index = -1);
@@ -220,6 +224,10 @@ void each_field(auto& f, Of<FootholdSet> auto& m) {
   walk(f, "measured_rise_m", m.measured_rise_m);
   walk(f, "measured_tread_m", m.measured_tread_m);
 }
+void each_field(auto& f, Of<PoseRequest> auto& m) {
+  walk(f, "number", m.number);
+  walk(f, "stamp_ns", m.stamp_ns);
+}
 void each_field(auto& f, Of<LatchedStep> auto& m) {
   walk(f, "sequence", m.sequence);
   walk(f, "foot", m.foot);
@@ -287,7 +295,9 @@ void walk(F& f, std::string_view name, T& value, int index) {
     f.leaf(name, index, value);
   } else {
     f.enter(name, index);
-    if constexpr (detail::kIsMatrix<Value>) {  // column by column
+    if constexpr (detail::kIsMatrix<Value> && requires { f.leaves(std::span(value.data(), std::size_t{})); }) {
+      f.leaves(std::span(value.data(), static_cast<std::size_t>(value.size())));
+    } else if constexpr (detail::kIsMatrix<Value>) {  // column by column
       for (int i = 0; i < static_cast<int>(value.size()); ++i) f.leaf("", i, value.data()[i]);
     } else if constexpr (detail::kIsArray<Value>) {
       for (std::size_t i = 0; i < value.size(); ++i) walk(f, "", value[i], static_cast<int>(i));
@@ -296,7 +306,13 @@ void walk(F& f, std::string_view name, T& value, int index) {
         static const typename Value::value_type kNone;
         walk(f, "", kNone, 0);
       } else {
-        const std::size_t count = f.count(value.size());
+        std::size_t count = 0;
+        if constexpr (requires { f.resize(value); }) {
+          f.resize(value);
+          count = value.size();
+        } else {
+          count = f.count(value.size());
+        }
         for (std::size_t i = 0; i < count; ++i) walk(f, "", value[i], static_cast<int>(i));
       }
     } else {

@@ -1,26 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a recording is: a directory with two files, all numbers little-endian.
+// What a recording is: an MCAP file (mcap/) whose topics (schemas.hpp) any MCAP tool reads, and among them two that a
+// replay lives by, all numbers little-endian.
 //
-// recording.bin: a header, then records.
-//   header: magic (8 bytes), version (u32), hash of the field lists (u64, fields.hpp), then, as u32 count and the
-//   entries,
-//     parameters: name, kind (u8), count (u32), values (bool, i32, u32, i64, f64, choice u8)
-//     rows of the schedule: task, lane (u8), slots (u16), budget_us (i32), unit_cost_ns (i32), shed_order (u8)
-//     the camera's intrinsics, and the gains that each drive can take at most. A name is a u16 length and the
-//     characters.
-//   record: kind (u8), length of the rest (u32), then by kind
-//     row        a call of a schedule's row: row (u8), cycle_ns (i64), units (i32), frame of the other lane that had
-//     been
-//                finished (i64); u16 count of port calls and each of them: kind (u8), whether it gave something (bool),
-//                and what; progress (u8), units left (i32), and the stage's outputs
+// /parameters, field header: magic (8 bytes), version (u32), hash of the field lists (u64, fields.hpp), then, as u32
+// count and the entries,
+//   parameters: name, kind (u8), count (u32), values (bool, i32, u32, i64, f64, choice u8)
+//   rows of the schedule: task, lane (u8), slots (u16), budget_us (i32), unit_cost_ns (i32), shed_order (u8)
+//   the camera's intrinsics, and the gains that each drive can take at most. A name is a u16 length and the characters.
+// /replay, one message for each frame of a lane, in the order in which a replay has to live them: records, each of
+//   kind (u8), length of the rest (u32), then by kind
+//     row        a call of a schedule's row: row (u8), cycle_ns (i64), units (i32); u16 count of port calls and each of
+//                them: kind (u8), whether it gave something (bool), and what; how far the other lane was (i64), and
+//                which of its frames this one saw; progress (u8), units left (i32), and the stage's outputs
 //     event      what the executive counted: lane (u8), code (u8), when (i64), times (u32)
 //     stop       the operator asked for the end
 //     cycle      what the executive did: lane (u8), cycle (u64), due_ns (i64), slot (u8), rows run, shed, deferred and
 //                overrun (u32 masks), whether the cycle overran and whether it was run late (bool), cycles skipped
 //                before (u64)
+//     lost       frames of a lane (u8) that found no room before this one: how many (u32)
 //     end        cycles (u64) and pictures (u32): a file without it was cut off
-// pictures.bin: magic (8 bytes), version (u32), width, height (i32), then each picture's pixels (u16, 0.6 MB at
-// 640x480).
+// The other topics repeat what is in the records: as long as a replay finds them the same, no bit was changed since.
 #pragma once
 
 #include <cstddef>
@@ -33,19 +32,14 @@
 namespace polygmap::recording {
 
 inline constexpr std::string_view kMagic = "PGMAPREC";
-inline constexpr std::string_view kPictureMagic = "PGMAPPIX";
-inline constexpr std::uint32_t kVersion = 6;
-inline constexpr const char* kFileName = "recording.bin";
-inline constexpr const char* kPictureFileName = "pictures.bin";
-inline constexpr std::size_t kPictureHeader_bytes = 20;
+inline constexpr std::uint32_t kVersion = 7;
 
-inline constexpr std::size_t kMaxRecord_bytes = 256U * 1024U;
 inline constexpr std::size_t kMaxCallsPerRow = 16;
 inline constexpr std::uint32_t kMaxEntries = 4096;  // parameters or rows
 // Times are within this: no sum of two of them overflows.
 inline constexpr std::int64_t kLatest_ns = std::int64_t{1} << 60;
 
-enum class RecordKind : std::uint8_t { kRow = 'R', kEvent = 'V', kStop = 'S', kCycle = 'C', kEnd = 'E' };
+enum class RecordKind : std::uint8_t { kRow = 'R', kEvent = 'V', kStop = 'S', kCycle = 'C', kLost = 'L', kEnd = 'E' };
 enum class CallKind : std::uint8_t {
   kReadImu = 1,
   kReadJoints = 2,
@@ -64,7 +58,12 @@ enum class CallKind : std::uint8_t {
 }
 enum class ValueKind : std::uint8_t { kBool, kI32, kU32, kI64, kF64, kChoice };
 // Where a picture's pixels are.
-enum class Pixels : std::uint8_t { kNone, kStored, kOtherSize };
+enum class Pixels : std::uint8_t {
+  kNone,         // there were none
+  kStored,       // in the next message of /depth
+  kOtherSize,    // than the camera's: the module refuses such a picture unseen
+  kNotRecorded,  // nobody asked for pictures, or the driver had no buffer to spare
+};
 
 // Of a picture's pixels, eight bytes at a time. A flipped bit changes it.
 [[nodiscard]] inline std::uint64_t hash_of_pixels(const std::uint16_t* pixels, std::size_t count) noexcept {

@@ -34,8 +34,16 @@ void walk_health(auto& f, const HealthCounts& counts) {
 }
 // Written where they changed: f.health(counts).
 
+// What the writer's row has just published in its frame, where it did. The other lane does not see it before the frame is
+// over, so nobody has taken it.
+template <class T, std::size_t Slots>
+[[nodiscard]] T published_in(const Exchange<T, Slots>& exchange, std::int64_t frame_ns) noexcept {
+  const T* const value = exchange.published_ns() == frame_ns ? exchange.find(frame_ns) : nullptr;
+  return value != nullptr ? *value : T{};
+}
+
 // f sees what the row has just made.
-void walk_outputs(auto& f, const Pipeline& module, std::size_t row, Progress progress) {
+void walk_outputs(auto& f, const Pipeline& module, std::size_t row, std::int64_t cycle_ns, Progress progress) {
   const std::string_view task = kTasks[row].row.task;
   const ControlLane& control = module.control();
   const PerceptionLane& perception = module.perception();
@@ -50,7 +58,9 @@ void walk_outputs(auto& f, const Pipeline& module, std::size_t row, Progress pro
   } else if (task == "health") {
     f.health(counts_of(control.all_faults()));
   } else if (task == "intake") {
-    f.health(counts_of(perception.faults()));
+    f.health(counts_of(published_in(module.published_health(kPerceptionLane), cycle_ns)));
+    const PoseRequest request = published_in(module.link().pose_request, cycle_ns);
+    walk(f, "pose_request", request);
   } else if (progress != Progress::kDone) {
     return;
   } else if (task == "surfaces") {
@@ -61,7 +71,8 @@ void walk_outputs(auto& f, const Pipeline& module, std::size_t row, Progress pro
   } else if (task == "map") {
     walk(f, "map", perception.map_snapshot());
   } else if (task == "footholds") {
-    walk(f, "footholds", perception.footholds_found());
+    const FootholdSet footholds = published_in(module.link().footholds, cycle_ns);
+    walk(f, "footholds", footholds);
   }
 }
 
@@ -76,7 +87,8 @@ void walk_recorded(auto& f) {
       f);
   constexpr JointSet kTaken;
   walk(f, "taken", kTaken);
-  walk_messages<StateEstimate, EstimateQuality, GaitStatus, FootholdSet, SurfaceFrame, MountFound, MapSnapshot>(f);
+  walk_messages<StateEstimate, EstimateQuality, GaitStatus, FootholdSet, SurfaceFrame, MountFound, MapSnapshot,
+                PoseRequest>(f);
   constexpr OperatorCommand kCommand{};
   walk(f, "command", kCommand);
   constexpr ModuleState kState{};
@@ -88,6 +100,10 @@ class FieldWriter {
  public:
   FieldWriter(ByteWriter& out, HealthCounts* last_health) noexcept : out_(out), last_health_(last_health) {}
   void leaf(std::string_view, int, Number auto value) noexcept { out_.put(value); }
+  template <Number T>
+  void leaves(std::span<T> values) noexcept {
+    out_.put_bytes(values.data(), values.size_bytes());
+  }
   void enter(std::string_view, int) noexcept {}
   void leave() noexcept {}
   std::size_t count(std::size_t n) noexcept {
@@ -107,7 +123,6 @@ class FieldWriter {
   HealthCounts* last_health_;
 };
 
-// Samples alone: they have no vectors.
 class FieldReader {
  public:
   explicit FieldReader(ByteReader& in) noexcept : in_(in) {}
@@ -117,6 +132,15 @@ class FieldReader {
   }
   void enter(std::string_view, int) noexcept {}
   void leave() noexcept {}
+  template <class T, std::size_t Capacity>
+  void resize(StaticVector<T, Capacity>& vector) noexcept {
+    const auto count = in_.get<std::uint32_t>();
+    if (count > Capacity) in_.fail();
+    vector.clear();
+    T none{};
+    if constexpr (detail::kIsMatrix<T>) none.setZero();  // Eigen leaves it unset
+    for (std::size_t i = 0; i < count && !in_.failed(); ++i) (void)vector.try_push_back(none);
+  }
 
  private:
   ByteReader& in_;

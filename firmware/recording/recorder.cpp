@@ -4,13 +4,22 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <vector>
 
 #include "firmware/config/param_table.hpp"
+#include "firmware/recording/recording_header.hpp"
 
 namespace polygmap::recording {
 namespace {
 
 constexpr std::size_t kHeaderMemory_bytes = 1024U * 1024U;
+
+// The module's own rows, in their order.
+constexpr auto kRows = [] {
+  std::array<std::uint8_t, kTasks.size()> rows{};
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = static_cast<std::uint8_t>(i);
+  return rows;
+}();
 
 // Where a lane's health counts what its executive raises.
 struct EventPlace {
@@ -32,56 +41,6 @@ constexpr auto kEventPlaces = [] {
   return places;
 }();
 
-void put_name(ByteWriter& out, std::string_view name) {
-  out.put(static_cast<std::uint16_t>(name.size()));
-  out.put_bytes(name.data(), name.size());
-}
-
-void put_numbers(ByteWriter& out, ValueKind kind, const auto* first, std::size_t count) {
-  out.put(kind);
-  out.put(static_cast<std::uint32_t>(count));
-  for (std::size_t i = 0; i < count; ++i) out.put(first[i]);
-}
-
-struct PutValue {
-  ByteWriter& out;
-  void operator()(const bool* value) const { put_numbers(out, ValueKind::kBool, value, 1); }
-  void operator()(const std::int32_t* value) const { put_numbers(out, ValueKind::kI32, value, 1); }
-  void operator()(const std::uint32_t* value) const { put_numbers(out, ValueKind::kU32, value, 1); }
-  void operator()(const std::int64_t* value) const { put_numbers(out, ValueKind::kI64, value, 1); }
-  void operator()(const double* value) const { put_numbers(out, ValueKind::kF64, value, 1); }
-  void operator()(std::span<double> values) const { put_numbers(out, ValueKind::kF64, values.data(), values.size()); }
-  void operator()(config::EnumValue choice) const { put_numbers(out, ValueKind::kChoice, choice.value, 1); }
-  void operator()(config::RotationValue rotation) const {
-    put_numbers(out, ValueKind::kF64, rotation.value->data(), 9);
-  }
-};
-
-void put_header(ByteWriter& out, const Params& params, const CameraIntrinsics& camera) {
-  out.put_bytes(kMagic.data(), kMagic.size());
-  out.put(kVersion);
-  out.put(hash_of_fields());
-  Params copy = params;
-  const config::ParamTable table = config::param_table(copy);
-  out.put(static_cast<std::uint32_t>(table.params.size()));
-  for (const config::Param& param : table.params) {
-    put_name(out, param.name);
-    std::visit(PutValue{out}, param.value);
-  }
-  out.put(static_cast<std::uint32_t>(kTasks.size()));
-  for (const Task& task : kTasks) {
-    put_name(out, task.row.task);
-    out.put(task.row.lane);
-    out.put(task.row.slots);
-    out.put(task.row.budget_us);
-    out.put(task.row.unit_cost_ns);
-    out.put(task.row.shed_order);
-  }
-  FieldWriter writer(out, nullptr);
-  walk(writer, "camera", camera);
-  walk(writer, "gain_limits", params.robot.drives.gain_limits);
-}
-
 // Kind and length, which put_length() fills in.
 std::size_t put_record(ByteWriter& out, RecordKind kind) noexcept {
   out.put(kind);
@@ -94,56 +53,45 @@ void put_length(ByteWriter& out, std::size_t begin) noexcept {
 
 }  // namespace
 
-Recorder::Recorder(const Ports& robot, const Capacity& capacity)
-    : robot_(robot), capacity_(capacity), logs_{LaneLog(capacity.queue_bytes), LaneLog(capacity.queue_bytes)} {
+Recorder::Recorder(const Ports& robot, hal::PictureKeeper* keeper) noexcept
+    : robot_(robot),
+      keeper_(keeper),
+      logs_{LaneLog(control_frame_, control_queue_, control_next_),
+            LaneLog(perception_frame_, perception_queue_, perception_next_)},
+      parser_(robot.camera.intrinsics(), kRows) {
   static_assert(kLaneCount == 2);
-  const CameraIntrinsics camera = robot.camera.intrinsics();
-  if (camera.width_px > 0 && camera.height_px > 0) {
-    picture_px_ = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
-  }
-  pixels_.resize(capacity_.pictures * picture_px_);
 }
 
 Recorder::~Recorder() {
-  if (copy_.kept) capacity_.keeper->let_go();
-  for (std::FILE* file : {file_, picture_file_}) {
-    if (file != nullptr) (void)std::fclose(file);
-  }
+  for (const std::uint16_t* const pixels : pictures_.kept) keeper_->let_go(pixels);
 }
 
-void Recorder::begin(const std::string& directory, const Params& params) {
-  directory_ = directory;
+void Recorder::begin(const std::string& path, const Params& params, std::uint64_t run) {
   const CameraIntrinsics camera = robot_.camera.intrinsics();
-  file_ = std::fopen((directory + "/" + kFileName).c_str(), "wb");
-  if (file_ != nullptr) picture_file_ = std::fopen((directory + "/" + kPictureFileName).c_str(), "wb");
-  if (picture_file_ == nullptr) {
-    errno_.store(errno);
-    unmade_file_ = file_ == nullptr ? kFileName : kPictureFileName;
-    return fail(Failure::kBegin);
-  }
-  std::vector<std::byte> memory(kHeaderMemory_bytes);
+  if (!writer_.open(path, channels(), run)) return fail();
+  std::vector<std::byte> memory(kHeaderMemory_bytes), message_memory(2 * kHeaderMemory_bytes);
   ByteWriter header(memory);
-  put_header(header, params, camera);
-  write(file_, header.bytes().data(), header.size());
-  header.clear();
-  header.put_bytes(kPictureMagic.data(), kPictureMagic.size());
-  header.put(kVersion);
-  header.put(camera.width_px);
-  header.put(camera.height_px);
-  write(picture_file_, header.bytes().data(), header.size());
+  put_recording_header(header, params, camera);
+  Params copy = params;
+  const config::ParamTable table = config::param_table(copy);
+  mcap::CdrWriter message(message_memory);
+  message.put_text(config::hash_of(table));
+  message.put_count(table.params.size());
+  for (const config::Param& param : table.params) message.put_text(param.name);
+  message.put_count(table.params.size());
+  for (const config::Param& param : table.params) message.put_text(config::text_of(param));
+  message.put_bytes(header.bytes());
+  write(Topic::kParameters, 0, 0, message.bytes());
 }
 
-void Recorder::fail(Failure failure) noexcept {
-  Failure none = Failure::kNone;  // the first one is told
-  (void)failure_.compare_exchange_strong(none, failure, std::memory_order_acq_rel);
+void Recorder::Sink::take(Topic topic, std::int64_t log_ns, std::int64_t publish_ns,
+                          std::span<const std::byte> message) noexcept {
+  (void)writer.write(static_cast<std::size_t>(topic), log_ns, publish_ns, message);
 }
 
-void Recorder::write(std::FILE* file, const void* bytes, std::size_t count) noexcept {
-  const Failure before = failure_.load(std::memory_order_acquire);
-  if (before == Failure::kBegin || before == Failure::kWrite || count == 0) return;
-  if (std::fwrite(bytes, 1, count, file) == count) return;
-  errno_.store(errno);
-  fail(Failure::kWrite);
+void Recorder::write(Topic topic, std::int64_t log_ns, std::int64_t publish_ns,
+                     std::span<const std::byte> message) noexcept {
+  if (!writer_.write(static_cast<std::size_t>(topic), log_ns, publish_ns, message)) fail();
 }
 
 void Recorder::request_stop() noexcept {
@@ -200,7 +148,7 @@ void Recorder::end_row(std::size_t row, Progress progress, const WorkBudget& bud
   log.out.put(progress);
   log.out.put(budget.left());
   FieldWriter writer(log.out, &log.health);
-  walk_outputs(writer, *pipeline_, row, progress);
+  walk_outputs(writer, *pipeline_, row, log.head.cycle_ns, progress);
   put_length(log.out, log.length_at);
 }
 
@@ -217,8 +165,9 @@ void Recorder::cycle_done(std::size_t lane, const CycleReport& report) noexcept 
   out.put(report.caught_up);
   out.put(report.skipped_before);
   put_length(out, begin);
+  last_cycle_ns_ = report.due_ns;
   if (lane == kControlLane) ++cycles_;
-  hand_over(logs_[lane]);
+  hand_over(lane, report.due_ns);
   // An executive of one lane has the rows of both.
   constexpr std::size_t kFirstOfPerception = [] {
     std::size_t row = 0;
@@ -226,14 +175,39 @@ void Recorder::cycle_done(std::size_t lane, const CycleReport& report) noexcept 
     return row;
   }();
   const std::uint32_t rows = report.ran | report.shed | report.deferred;
-  if (lane == kControlLane && rows >> kFirstOfPerception != 0) hand_over(logs_[kPerceptionLane]);
+  if (lane == kControlLane && rows >> kFirstOfPerception != 0) hand_over(kPerceptionLane, report.due_ns);
 }
 
-void Recorder::hand_over(LaneLog& log) noexcept {
-  if (log.out.full()) fail(Failure::kFrameTooLarge);
+void Recorder::put_lost(std::size_t lane) noexcept {
+  ByteWriter& out = logs_[lane].out;
+  const std::size_t begin = put_record(out, RecordKind::kLost);
+  out.put(static_cast<std::uint8_t>(lane));
+  out.put(logs_[lane].lost);
+  put_length(out, begin);
+}
+
+void Recorder::hand_over(std::size_t lane, std::int64_t now_ns) noexcept {
+  LaneLog& log = logs_[lane];
+  if (lane == kPerceptionLane) let_go_written();
   const std::span<const std::byte> head(reinterpret_cast<const std::byte*>(&log.head), sizeof log.head);
-  if (log.out.size() > 0 && !failed() && !log.queue.try_push(head, log.out.bytes())) fail(Failure::kQueueFull);
+  const bool is_empty = log.out.size() == 0;
+  const bool is_lost = !is_empty && (log.out.full() || !log.queue.try_push(head, log.out.bytes()));
   log.out.clear();
+  if (is_lost) {
+    if (log.head.picture.depth != nullptr) {
+      keeper_->let_go(pictures_.kept.back());
+      (void)pictures_.kept.try_pop_back();
+      --pictures_.acquired;
+      ++lost_pictures_;
+    }
+    ++log.lost;
+    ++lost_frames_;
+    pipeline_->lane_health(lane).raise(Limit::kRecordingLost, now_ns);
+    log.health.fill({UINT32_MAX, 0, 0});  // so that the next frame has all of it
+    put_lost(lane);
+  } else if (!is_empty) {
+    log.lost = 0;
+  }
   log.head = {};
 }
 
@@ -248,73 +222,68 @@ bool Recorder::load(LaneLog& log) noexcept {
 
 // A lane hands its frame over before the other one can see it (RecordedTasks). So what a frame saw is in the other
 // queue when it is looked into after the frame was there.
-void Recorder::write_out() {
+void Recorder::write_out() noexcept {
   for (std::size_t lane = 0, waited = 0; waited < kLaneCount;) {
     LaneLog &log = logs_[lane], &other = logs_[1 - lane];
-    const bool sees_all =
-        load(log) && (!load(other) || other.next_head.cycle_ns > log.next_head.saw_ns) && write_frame(log);
+    const bool sees_all = load(log) && (!load(other) || other.next_head.cycle_ns > log.next_head.saw_ns);
+    if (sees_all) write_frame(log);
     waited = sees_all ? 0 : waited + 1;
     if (!sees_all) lane = 1 - lane;
   }
+  if (writer_.error() != 0) fail();
 }
 
-bool Recorder::write_frame(LaneLog& log) {
-  const std::uint32_t written = pictures_written_.load(std::memory_order_relaxed);
-  if (pictures_copied_.load(std::memory_order_acquire) - written < log.next_head.pictures) return false;
-  for (std::uint32_t i = 0; i < log.next_head.pictures; ++i) {
-    const std::uint16_t* pixels = pixels_.data() + ((written + i) % capacity_.pictures) * picture_px_;
-    const std::uint64_t hash = hash_of_pixels(pixels, picture_px_);
-    std::memcpy(log.next.data() + log.next_head.hash_at[i], &hash, sizeof hash);
-    write(picture_file_, pixels, picture_px_ * sizeof(std::uint16_t));
-    pictures_written_.store(written + i + 1, std::memory_order_release);
-  }
-  write(file_, log.next.data(), log.next.size());
+void Recorder::write_picture(LaneLog& log) noexcept {
+  const DepthFrameView& picture = log.next_head.picture;
+  const auto count = static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(picture.height_px);
+  const std::uint64_t hash = hash_of_pixels(picture.depth, count);
+  std::memcpy(log.next.data() + log.next_head.hash_at, &hash, sizeof hash);
+  const std::int64_t log_ns = log.next_head.cycle_ns;
+  constexpr auto kCameraInfo = static_cast<std::size_t>(Topic::kCameraInfo), kDepth = static_cast<std::size_t>(Topic::kDepth);
+  (void)writer_.write(kCameraInfo, log_ns, picture.stamp_ns, topics_.camera_info(intrinsics(), picture.stamp_ns));
+  (void)writer_.write_alone(kDepth, log_ns, picture.stamp_ns, topics_.image_head(picture),
+                            std::as_bytes(std::span(picture.depth, count)));
+  pictures_written_.fetch_add(1, std::memory_order_release);
+}
+
+void Recorder::write_frame(LaneLog& log) noexcept {
+  if (log.next_head.picture.depth != nullptr) write_picture(log);
+  // The head was copied; its last bytes become the message's.
+  const std::span<std::byte> message = log.next_memory.subspan(sizeof(FrameHead) - kMessageHead_bytes,
+                                                               kMessageHead_bytes + log.next.size());
+  constexpr std::array<std::uint8_t, mcap::kCdrHead_bytes> kLittleEndian{0, 1, 0, 0};
+  const auto count = static_cast<std::uint32_t>(log.next.size());
+  std::memcpy(message.data(), kLittleEndian.data(), kLittleEndian.size());
+  std::memcpy(message.data() + kLittleEndian.size(), &count, sizeof count);
+  const std::int64_t log_ns = std::max<std::int64_t>(log.next_head.cycle_ns, 0);
+  (void)writer_.write(static_cast<std::size_t>(Topic::kReplay), log_ns, log_ns, message);
+  ByteReader in(log.next);
+  while (!in.at_end() && parser_.parse(in, record_)) topics_.write(record_, sink_);
   log.next = {};
-  return true;
 }
 
-void Recorder::flush() {
-  for (LaneLog& log : logs_) hand_over(log);
-  copy_pixels(picture_px_);
+void Recorder::flush() noexcept {
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) hand_over(lane, last_cycle_ns_);
   write_out();
+  let_go_written();
 }
 
 std::string Recorder::finish() {
   flush();
   if (!failed()) {
-    ByteWriter& out = logs_[kControlLane].out;
-    const std::size_t begin = put_record(out, RecordKind::kEnd);
-    out.put(cycles_);
-    out.put(pictures_);
-    put_length(out, begin);
+    LaneLog& log = logs_[kControlLane];
+    log.head.cycle_ns = last_cycle_ns_;
+    const std::size_t begin = put_record(log.out, RecordKind::kEnd);
+    log.out.put(cycles_);
+    log.out.put(pictures_.acquired);
+    put_length(log.out, begin);
     flush();
   }
-  for (std::FILE** file : {&file_, &picture_file_}) {
-    if (*file != nullptr && std::fclose(*file) != 0) {
-      errno_.store(errno);
-      fail(Failure::kWrite);
-    }
-    *file = nullptr;
-  }
-  return sentence();
-}
-
-std::string Recorder::sentence() const {
-  switch (failure_.load(std::memory_order_acquire)) {
-    case Failure::kNone:
-      break;
-    case Failure::kBegin:
-      return "Cannot write \"" + directory_ + "/" + unmade_file_ + "\": " + std::strerror(errno_.load()) + ".";
-    case Failure::kWrite:
-      return "Cannot write into \"" + directory_ + "\": " + std::strerror(errno_.load()) + ".";
-    case Failure::kFrameTooLarge:
-      return "The recording in \"" + directory_ + "\" ends early: a cycle had more to record than there is memory for.";
-    case Failure::kQueueFull:
-      return "The recording in \"" + directory_ + "\" ends early: its queue was full.";
-    case Failure::kPicturesFull:
-      return "The recording in \"" + directory_ + "\" ends early: its queue of pictures was full.";
-  }
-  return {};
+  if (!failed() && !writer_.close()) fail();
+  if (failed()) return std::string("Cannot write \"") + writer_.path() + "\": " + std::strerror(writer_.error()) + ".";
+  if (lost_frames_ == 0 && lost_pictures_ == 0) return {};
+  return std::string("The recording \"") + writer_.path() + "\" lacks " + std::to_string(lost_frames_) + " frames and " +
+         std::to_string(lost_pictures_) + " pictures: the disk was too slow for its memory.";
 }
 
 void Recorder::put_call(LaneLog& log, CallKind kind, bool gave) const noexcept {
@@ -393,40 +362,38 @@ bool Recorder::try_acquire(DepthFrameView& frame) noexcept {
   } else if (frame.width_px != camera.width_px || frame.height_px != camera.height_px) {
     log.out.put(Pixels::kOtherSize);
   } else {
-    log.out.put(Pixels::kStored);
-    put_picture(log, frame);
+    keep_picture(log, frame);
   }
   return true;
 }
 
-// The hash takes longer than a row has: it is the other thread's work, as is the file's.
-void Recorder::put_picture(LaneLog& log, const DepthFrameView& frame) noexcept {
-  copy_pixels(picture_px_);  // the rest of the one before, if a lane was so late
-  const std::size_t waiting = pictures_ - pictures_written_.load(std::memory_order_acquire);
-  if (waiting == capacity_.pictures || log.head.pictures == kPicturesPerFrame) fail(Failure::kPicturesFull);
-  log.head.hash_at[log.head.pictures % kPicturesPerFrame] = static_cast<std::uint32_t>(log.out.size());
-  log.out.put(std::uint64_t{0});
-  if (failed()) return;
-  ++log.head.pictures;
-  ++pictures_;
-  DepthFrameView kept = frame;
-  const bool is_kept = capacity_.keeper != nullptr && capacity_.keeper->try_keep(kept);
-  copy_ = {is_kept ? kept.depth : frame.depth, 0, is_kept};
-  if (!copy_.kept) copy_pixels(picture_px_);
+void Recorder::keep_picture(LaneLog& log, const DepthFrameView& frame) noexcept {
+  let_go_written();
+  const bool can_be = keeper_ != nullptr && log.head.picture.depth == nullptr && !pictures_.kept.full();
+  if (!can_be || !keeper_->try_keep(frame)) {
+    log.out.put(Pixels::kNotRecorded);
+    if (keeper_ == nullptr) return;
+    ++lost_pictures_;
+    return pipeline_->lane_health(kPerceptionLane).raise(Limit::kRecordingLost, frame.stamp_ns);
+  }
+  log.out.put(Pixels::kStored);
+  log.head.picture = frame;
+  log.head.hash_at = log.out.size();
+  log.out.put(std::uint64_t{0});  // it takes longer than a row has: the other thread's work
+  (void)pictures_.kept.try_push_back(frame.depth);
+  ++pictures_.acquired;
 }
 
-void Recorder::copy_piece() noexcept { copy_pixels(kPiece_px); }
-
-void Recorder::copy_pixels(std::size_t most_px) noexcept {
-  if (copy_.from == nullptr) return;
-  const std::size_t count = std::min(most_px, picture_px_ - copy_.done_px);
-  std::uint16_t* to = pixels_.data() + ((pictures_ - 1) % capacity_.pictures) * picture_px_ + copy_.done_px;
-  std::memcpy(to, copy_.from + copy_.done_px, count * sizeof *to);
-  copy_.done_px += count;
-  if (copy_.done_px < picture_px_) return;
-  if (copy_.kept) capacity_.keeper->let_go();
-  copy_ = {};
-  pictures_copied_.store(pictures_, std::memory_order_release);
+// The driver's buffers go back in the lane that took them.
+void Recorder::let_go_written() noexcept {
+  const std::uint32_t written = pictures_written_.load(std::memory_order_acquire);
+  std::size_t gone = 0;
+  for (; gone < pictures_.kept.size() && pictures_.let_go < written; ++gone, ++pictures_.let_go) {
+    keeper_->let_go(pictures_.kept[gone]);
+  }
+  if (gone == 0) return;
+  std::copy(pictures_.kept.begin() + gone, pictures_.kept.end(), pictures_.kept.begin());
+  (void)pictures_.kept.try_resize(pictures_.kept.size() - gone);
 }
 
 void Recorder::release() noexcept {

@@ -1,57 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes down everything that goes into the module and comes out of it, for replay.hpp.
+// Writes down everything that goes into the module and comes out of it, for replay.hpp and for people.
 #pragma once
 
 #include <array>
 #include <atomic>
-#include <cstdio>
-#include <memory>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "firmware/recording/block_queue.hpp"
 #include "firmware/recording/format.hpp"
+#include "firmware/recording/mcap/mcap_writer.hpp"
 #include "firmware/recording/outputs.hpp"
+#include "firmware/recording/topics.hpp"
 #include "firmware/schedule.hpp"
+#include "hal/ports/picture_keeper.hpp"
 
 namespace polygmap::recording {
 
-// A picture that the module holds, kept for a second holder after the module has released it (V4l2Camera).
-class PictureKeeper {
- public:
-  // The picture that was acquired last, its pixels valid until let_go(); false: it cannot be kept.
-  [[nodiscard]] virtual bool try_keep(DepthFrameView& frame) noexcept = 0;
-  virtual void let_go() noexcept = 0;
-
- protected:
-  ~PictureKeeper() = default;
-};
-
-// Stands between the robot's ports and the module, and between the executive and the module's rows. While the module
-// calls it allocates nothing and talks to no file: each lane writes into memory of its own and hands it over when its
-// cycle is over, through a queue of a fixed size. write_out() empties the queues into the files, on whatever thread,
-// while the lanes run or between their ticks. What finds no room in a queue ends the recording there, and says so.
+// Stands between the robot's ports and the module, and between the executive and the module's rows. Its memory is part
+// of the object. While the module calls, it copies into memory of the lane's own and hands that over when the lane's
+// cycle is over, through a queue of a fixed size. write_out() empties the queues into the file, on whatever thread,
+// while the lanes run or between their ticks. A frame that finds no room in a queue is lost as a whole: the lane counts
+// it (Limit::kRecordingLost), the file says how many are missing, and what follows is recorded again. Pictures are
+// written from the driver's own buffers.
 class Recorder final : public hal::DepthCamera,
                        public hal::Imu,
                        public hal::JointBus,
                        public hal::LidarOdometry,
                        public hal::OperatorInput {
  public:
-  struct Capacity {
-    std::size_t queue_bytes = 4U * 1024U * 1024U;  // of each lane
-    std::size_t pictures = 4;
-    PictureKeeper* keeper = nullptr;  // null: a picture is copied when it is acquired, in one piece
-  };
-  explicit Recorder(const Ports& robot) : Recorder(robot, Capacity{}) {}
-  Recorder(const Ports& robot, const Capacity& capacity);
+  // keeper: of the camera's pictures; null: none is recorded.
+  explicit Recorder(const Ports& robot, hal::PictureKeeper* keeper = nullptr) noexcept;
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
   ~Recorder();
 
   [[nodiscard]] Ports ports() noexcept { return {*this, *this, *this, *this, this}; }
-  // Makes both files in a directory that exists. params: the module's, from its start on.
-  void begin(const std::string& directory, const Params& params);
+  // Makes the file, in a directory that exists. params: the module's, from its start on. run: a number of this run's
+  // own. Allocates, and is not to be called once the module runs.
+  void begin(const std::string& path, const Params& params, std::uint64_t run);
   // The module that ports() were given to, before its first cycle.
   void watch(Pipeline& pipeline) noexcept { pipeline_ = &pipeline; }
 
@@ -59,18 +46,21 @@ class Recorder final : public hal::DepthCamera,
   void begin_row(std::size_t row, std::int64_t cycle_ns, const WorkBudget& budget) noexcept;
   void end_row(std::size_t row, Progress progress, const WorkBudget& budget) noexcept;
   void cycle_done(std::size_t lane, const CycleReport& report) noexcept;
-  // In perception's lane after a tick: copies a piece of the picture that is kept.
-  void copy_piece() noexcept;
 
   // On one thread, whether the lanes run or not: writes what was handed over.
-  void write_out();
+  void write_out() noexcept;
+  // A message of somebody who knows more than the module does; on the thread of write_out().
+  void write(Topic topic, std::int64_t log_ns, std::int64_t publish_ns, std::span<const std::byte> message) noexcept;
   // No lane runs: hands over what belongs to no finished cycle, too, and writes it.
-  void flush();
-  // No lane runs: writes the rest and closes the files. What begin() or a write could not do, or what was lost, is said
+  void flush() noexcept;
+  // No lane runs: writes the rest and closes the file. What begin() or a write could not do, or what was lost, is said
   // here: one sentence, empty when all was written.
   [[nodiscard]] std::string finish();
   // The recording has ended before the module. From any thread.
-  [[nodiscard]] bool failed() const noexcept { return failure_.load(std::memory_order_acquire) != Failure::kNone; }
+  [[nodiscard]] bool failed() const noexcept { return failed_.load(std::memory_order_acquire); }
+  // Frames of lanes, and pictures, that were lost so far. No lane runs.
+  [[nodiscard]] std::uint64_t lost_frames() const noexcept { return lost_frames_; }
+  [[nodiscard]] std::uint64_t lost_pictures() const noexcept { return lost_pictures_; }
 
   [[nodiscard]] CameraIntrinsics intrinsics() const noexcept override { return robot_.camera.intrinsics(); }
   [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept override;
@@ -86,68 +76,81 @@ class Recorder final : public hal::DepthCamera,
   }
 
  private:
-  static constexpr std::size_t kFrameMemory_bytes = 1024U * 1024U;  // of a lane in one frame, with all its polygons
-  static constexpr std::size_t kPicturesPerFrame = 4;
-  static constexpr std::size_t kPiece_px = 32U * 1024U;  // a tenth of a picture
-  enum class Failure : std::uint8_t { kNone, kBegin, kFrameTooLarge, kQueueFull, kPicturesFull, kWrite };
+  // Of a frame: control has some 4 kB; perception's largest have 64 surfaces and a map of as many.
+  static constexpr std::array<std::size_t, kLaneCount> kFrame_bytes{32U * 1024U, 160U * 1024U};
+  // A quarter of a second of control's frames; pictures' results come with every tenth frame.
+  static constexpr std::array<std::size_t, kLaneCount> kQueue_bytes{896U * 1024U, 384U * 1024U};
 
   // What a lane wrote in one frame. It goes into the file after all of the other lane that it saw: a replay lives the
   // frames one after the other.
   struct FrameHead {
     std::int64_t cycle_ns = kNoFrame_ns;
     std::int64_t saw_ns = kNoFrame_ns;  // up to this frame of the other lane
-    std::uint32_t pictures = 0;         // acquired in it; their hashes are filled in when they are written
-    std::array<std::uint32_t, kPicturesPerFrame> hash_at{};
+    DepthFrameView picture;             // acquired in it and kept; depth is null when there is none
+    std::size_t hash_at = 0;            // where its hash is to be filled in
   };
+  // In front of a frame's records in the message that has them: CDR's head and their count.
+  static constexpr std::size_t kMessageHead_bytes = mcap::kCdrHead_bytes + sizeof(std::uint32_t);
+  static_assert(sizeof(FrameHead) >= kMessageHead_bytes);
+
   struct LaneLog {
-    explicit LaneLog(std::size_t queue_bytes) : queue(queue_bytes) {}
-    std::vector<std::byte> memory = std::vector<std::byte>(kFrameMemory_bytes);
-    ByteWriter out{memory};
+    LaneLog(std::span<std::byte> frame, std::span<std::byte> queued, std::span<std::byte> oldest) noexcept
+        : out(frame), queue(queued), next_memory(oldest) {}
+    ByteWriter out;
     FrameHead head;
     std::size_t length_at = 0, count_at = 0;  // to be filled in when the row is over
     std::uint16_t calls = 0;
+    std::uint32_t lost = 0;                                                // frames since the last one that found room
     std::array<std::uint32_t, kEventTable<ExecutiveEvent>.size()> told{};  // events written so far
     HealthCounts health{};                                                 // as written last
     BlockQueue queue;
     // Of the thread that writes: the oldest frame that it has not written.
-    std::vector<std::byte> next_memory = std::vector<std::byte>(sizeof(FrameHead) + kFrameMemory_bytes);
-    std::span<std::byte> next;
+    std::span<std::byte> next_memory, next;
     FrameHead next_head;
+  };
+  struct Sink final : MessageSink {
+    explicit Sink(mcap::McapWriter& to) noexcept : writer(to) {}
+    void take(Topic topic, std::int64_t log_ns, std::int64_t publish_ns,
+              std::span<const std::byte> message) noexcept override;
+    mcap::McapWriter& writer;
   };
 
   void put_call(LaneLog& log, CallKind kind, bool gave) const noexcept;
   void put_events(std::size_t lane) noexcept;
-  void hand_over(LaneLog& log) noexcept;
-  void put_picture(LaneLog& log, const DepthFrameView& frame) noexcept;
-  void copy_pixels(std::size_t most_px) noexcept;
-  void fail(Failure failure) noexcept;
+  void put_lost(std::size_t lane) noexcept;
+  void hand_over(std::size_t lane, std::int64_t now_ns) noexcept;
+  void keep_picture(LaneLog& log, const DepthFrameView& frame) noexcept;
+  void let_go_written() noexcept;
+  void fail() noexcept { failed_.store(true, std::memory_order_release); }
   // False: there is no frame that could be written now.
   [[nodiscard]] bool load(LaneLog& log) noexcept;
-  [[nodiscard]] bool write_frame(LaneLog& log);
-  void write(std::FILE* file, const void* bytes, std::size_t count) noexcept;
-  [[nodiscard]] std::string sentence() const;
+  void write_frame(LaneLog& log) noexcept;
+  void write_picture(LaneLog& log) noexcept;
 
   Ports robot_;
-  Capacity capacity_;
+  hal::PictureKeeper* keeper_;
   Pipeline* pipeline_ = nullptr;
+  std::array<std::byte, kFrame_bytes[0]> control_frame_;
+  std::array<std::byte, kFrame_bytes[1]> perception_frame_;
+  std::array<std::byte, kQueue_bytes[0]> control_queue_;
+  std::array<std::byte, kQueue_bytes[1]> perception_queue_;
+  std::array<std::byte, sizeof(FrameHead) + kFrame_bytes[0]> control_next_;
+  std::array<std::byte, sizeof(FrameHead) + kFrame_bytes[1]> perception_next_;
   mutable std::array<LaneLog, kLaneCount> logs_;  // a const port call is recorded, too
-  std::vector<std::uint16_t> pixels_;             // of all pictures that the capacity has
-  std::size_t picture_px_ = 0;
-  struct {
-    const std::uint16_t* from = nullptr;  // null: nothing is being copied
-    std::size_t done_px = 0;
-    bool kept = false;
-  } copy_;
-  std::uint32_t pictures_ = 0;  // acquired
-  std::atomic<std::uint32_t> pictures_copied_{0};
+  struct {                                        // of perception's lane
+    StaticVector<const std::uint16_t*, hal::PictureKeeper::kMostKept> kept;  // the oldest first
+    std::uint32_t acquired = 0, let_go = 0;
+  } pictures_;
   std::atomic<std::uint32_t> pictures_written_{0};
-  std::uint64_t cycles_ = 0;
-  std::string directory_;
-  std::FILE* file_ = nullptr;
-  std::FILE* picture_file_ = nullptr;
-  std::atomic<Failure> failure_{Failure::kNone};
-  const char* unmade_file_ = "";
-  std::atomic<int> errno_{0};  // of begin() or of a write
+  std::uint64_t cycles_ = 0, lost_frames_ = 0, lost_pictures_ = 0;
+  std::int64_t last_cycle_ns_ = 0;
+  std::atomic<bool> failed_{false};
+  // Of the thread that writes.
+  mcap::McapWriter writer_;
+  Topics topics_;
+  Sink sink_{writer_};
+  RecordParser parser_;
+  Record record_;
 };
 
 // The module's rows on their way to an executive.

@@ -2,120 +2,97 @@
 // A recording as it is read: record by record, and nothing of it believed before it was looked at.
 #pragma once
 
-#include <cstdio>
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "firmware/params.hpp"
 #include "firmware/recording/format.hpp"
-#include "firmware/recording/outputs.hpp"
+#include "firmware/recording/mcap/mcap_reader.hpp"
+#include "firmware/recording/record.hpp"
+#include "firmware/recording/topics.hpp"
 
 namespace polygmap::recording {
 
-struct Picture {
-  Pixels pixels = Pixels::kNone;
-  std::uint32_t index = 0;  // among those stored
-  std::uint64_t hash = 0;
-  std::uint64_t place = 0;  // of the record that has it, bytes
-};
-
-// A port's call and what it gave, in recording.bin.
-struct PortCall {
-  CallKind kind = CallKind::kReadImu;
-  bool gave = false;
-  ImuSample imu;
-  JointFeedback joints;
-  LioSample lio;
-  OperatorCommand asked{};
-  JointCommand command;
-  JointSet taken;
-  hal::JointBusStatus status;
-  DepthFrameView frame;  // without its pixels
-  Picture picture;
-};
-
-struct RowCall {
-  std::size_t row = 0;  // of this module's schedule
-  std::int64_t cycle_ns = 0;
-  std::int32_t units = 0;
-  std::int64_t other_finished_ns = 0;
-  StaticVector<TakenFrame, kMaxTaken> taken;
-  std::vector<PortCall> calls;
-  std::uint8_t progress = 0;
-  std::int32_t units_left = 0;
-  ByteReader outputs;  // into the file's memory, until the next record is read
-};
-
-struct ExecutiveEventCount {
-  std::uint8_t lane = 0;
-  ExecutiveEvent event = ExecutiveEvent::kCycleOverrun;
-  std::int64_t at_ns = 0;
-  std::uint32_t times = 0;
-};
-
-struct Record {
-  RecordKind kind = RecordKind::kEnd;
-  RowCall row;
-  ExecutiveEventCount event;
-  std::uint8_t cycle_lane = 0;
-  CycleReport cycle;
-};
-
 class RecordingFile {
  public:
-  RecordingFile() = default;
+  enum class Found : std::uint8_t {
+    kRecord,
+    kEnd,  // all of it
+    kCut,  // unfinished: what came is good
+    kBad,  // complaint() says where and why
+  };
+  explicit RecordingFile(mcap::McapReader::Decompress decompress = {}) : decompress_(std::move(decompress)) {}
   RecordingFile(const RecordingFile&) = delete;
   RecordingFile& operator=(const RecordingFile&) = delete;
-  ~RecordingFile();
 
   // Each false when the file is none, or not of this module: complaint() says where and why.
-  [[nodiscard]] bool open(const std::string& directory);
-  // Of files that are open, and become this one's; name: what they are called in sentences, as their directory.
-  [[nodiscard]] bool open(const std::string& name, std::FILE* recording, std::FILE* pictures);
-  [[nodiscard]] bool read(Record& record);
-  [[nodiscard]] bool read_picture(const Picture& picture, std::span<std::uint16_t> pixels);
+  [[nodiscard]] bool open(const std::string& path);
+  // Of a file that is open, and becomes this one's. name: what it is called in sentences.
+  [[nodiscard]] bool open(const std::string& name, std::FILE* file);
+  // The next record. Where a file of several is over, the next one is read on.
+  [[nodiscard]] Found read(Record& record);
+  // The picture that the record read last acquired, its size the camera's; false, and complaint(), when it is not the
+  // recorded one.
+  [[nodiscard]] bool read_picture(const DepthFrameView& frame, const Picture& picture,
+                                  std::span<const std::uint16_t>& pixels);
   // One sentence with file and byte. For whoever finds something else wrong with the record read last.
   bool complain(const std::string& what);
   [[nodiscard]] const std::string& complaint() const noexcept { return complaint_; }
+  // The first message of a topic that is not what the records say: empty when all are.
+  [[nodiscard]] const std::string& contradiction() const noexcept { return contradiction_; }
+  // A chunk's bytes are not those that were written: one sentence about the first one. Its messages are read all the
+  // same, so that contradiction() or a replay may say which it is.
+  [[nodiscard]] const std::string& damage() const noexcept { return damage_; }
+  // A message that is none of the module's: of the truth, the verdict. Since the last record.
+  struct Extra {
+    Topic topic;
+    std::int64_t log_ns = 0;
+    std::vector<std::byte> message;
+  };
+  [[nodiscard]] std::vector<Extra> take_extras() { return std::exchange(extras_, {}); }
 
   [[nodiscard]] const Params& params() const noexcept { return params_; }
   [[nodiscard]] const CameraIntrinsics& camera() const noexcept { return camera_; }
 
  private:
-  bool complain_at(const char* name, std::uint64_t place, const std::string& what);
-  [[nodiscard]] bool load(std::size_t count, const char* what);
-  template <Number T>
-  [[nodiscard]] bool take(T& value, const char* what);
-  [[nodiscard]] bool take_name(std::string& name);
-  [[nodiscard]] bool read_beginning();
-  [[nodiscard]] bool read_header();
-  [[nodiscard]] bool read_params();
-  [[nodiscard]] bool read_schedule();
-  [[nodiscard]] bool read_camera();
-  [[nodiscard]] bool read_gain_limits();
-  [[nodiscard]] bool open_pictures();
-  [[nodiscard]] bool parse_row(RowCall& row);
-  [[nodiscard]] bool parse_view(RowCall& row);
-  [[nodiscard]] bool parse_call(PortCall& call);
-  [[nodiscard]] bool parse_cycle(std::uint8_t& lane, CycleReport& cycle);
-  [[nodiscard]] bool parse_event(ExecutiveEventCount& event);
-  [[nodiscard]] bool parse_end();
+  struct Expected {
+    Topic topic;
+    std::int64_t log_ns = 0;
+    std::vector<std::byte> message;
+  };
+  struct Collector final : MessageSink {
+    std::deque<Expected> messages;
+    void take(Topic topic, std::int64_t log_ns, std::int64_t, std::span<const std::byte> message) noexcept override {
+      messages.push_back({topic, log_ns, {message.begin(), message.end()}});
+    }
+  };
 
-  std::string directory_, complaint_;
-  std::FILE* file_ = nullptr;
-  std::FILE* picture_file_ = nullptr;
-  std::uint64_t place_ = 0;         // of the next byte
-  std::uint64_t record_place_ = 0;  // of the record read last
-  std::vector<std::byte> memory_;
-  ByteReader in_;
+  [[nodiscard]] bool read_beginning();
+  [[nodiscard]] Found next_message();
+  [[nodiscard]] bool open_next_part();
+  [[nodiscard]] Found take(const mcap::MessageRead& message, Topic topic);
+  void compare(const mcap::MessageRead& message, Topic topic);
+  void contradict(Topic topic, std::int64_t log_ns, const std::string& what);
+  [[nodiscard]] bool read_header(std::span<const std::byte> message);
+
+  mcap::McapReader::Decompress decompress_;
+  std::unique_ptr<mcap::McapReader> reader_;
+  std::string first_path_, run_, complaint_, contradiction_, damage_;
+  unsigned part_ = 0;
+  bool has_ended_ = false;
   Params params_;
   CameraIntrinsics camera_;
   std::vector<std::uint8_t> rows_;  // the file's -> this module's
-  std::array<std::int64_t, kLaneCount> last_cycle_ns_{-1, -1};
-  std::array<std::size_t, kLaneCount> last_row_{};
-  std::uint64_t cycles_ = 0;
-  std::uint32_t pictures_ = 0;
+  std::unique_ptr<RecordParser> parser_;
+  std::vector<std::byte> frame_memory_;
+  ByteReader frame_;
+  Topics topics_;
+  Collector expected_;
+  std::vector<std::byte> picture_;  // the newest message of /depth
+  std::vector<std::uint16_t> pixels_;
+  std::vector<Extra> extras_;
 };
 
 }  // namespace polygmap::recording

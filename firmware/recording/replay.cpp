@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/recording/replay.hpp"
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <set>
@@ -18,9 +19,7 @@ class ReplayedPorts final : public hal::DepthCamera,
                             public hal::LidarOdometry,
                             public hal::OperatorInput {
  public:
-  explicit ReplayedPorts(RecordingFile& file)
-      : file_(file),
-        pixels_(static_cast<std::size_t>(file.camera().width_px) * static_cast<std::size_t>(file.camera().height_px)) {}
+  explicit ReplayedPorts(RecordingFile& file) : file_(file) {}
 
   void begin_row(const RowCall& row) {
     row_ = &row;
@@ -38,11 +37,12 @@ class ReplayedPorts final : public hal::DepthCamera,
   [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept override {
     const PortCall* call = next(CallKind::kAcquire);
     if (call == nullptr || !call->gave) return false;
-    if (call->picture.pixels == Pixels::kStored)
-      unreadable_ = unreadable_ || !file_.read_picture(call->picture, pixels_);
+    std::span<const std::uint16_t> pixels;  // of another size: refused anyway
+    if (call->picture.pixels == Pixels::kStored) {
+      unreadable_ = unreadable_ || !file_.read_picture(call->frame, call->picture, pixels);
+    }
     frame = call->frame;
-    frame.depth =
-        call->picture.pixels == Pixels::kStored ? pixels_.data() : nullptr;  // of another size: refused anyway
+    frame.depth = pixels.data();
     return true;
   }
   void release() noexcept override { (void)next(CallKind::kRelease); }
@@ -106,7 +106,6 @@ class ReplayedPorts final : public hal::DepthCamera,
   }
 
   RecordingFile& file_;
-  std::vector<std::uint16_t> pixels_;
   const RowCall* row_ = nullptr;
   mutable std::size_t next_ = 0;  // a const port call is one, too
   bool unreadable_ = false;
@@ -123,6 +122,7 @@ class Values {
     const std::int64_t frame_ns = exchange_.published_ns();
     if (const auto* value = exchange_.find(frame_ns); value != nullptr) kept_.try_emplace(frame_ns, *value);
   }
+  void keep(std::int64_t frame_ns, const auto& value) { kept_.try_emplace(frame_ns, value); }
   // False: nobody published what the reader took.
   [[nodiscard]] bool replay(const TakenFrame& taken) {
     if (taken.frame_ns == exchange_.front_frame_ns()) {
@@ -153,6 +153,10 @@ class Crossings {
     const auto keep = [](auto&... values) { (values.keep_newest(), ...); };
     writer == kControlLane ? std::apply(keep, of_perception_) : std::apply(keep, of_control_);
   }
+  // The same of a perception that is not run, by what its rows left in the recording.
+  void keep(std::int64_t frame_ns, const PoseRequest& request) { std::get<0>(of_control_).keep(frame_ns, request); }
+  void keep(std::int64_t frame_ns, const FootholdSet& footholds) { std::get<1>(of_control_).keep(frame_ns, footholds); }
+  void keep(std::int64_t frame_ns, const Health& health) { std::get<2>(of_control_).keep(frame_ns, health); }
   [[nodiscard]] bool replay(std::size_t reader, std::span<const TakenFrame> taken) {
     const auto replay = [taken](auto&... values) {
       std::size_t i = 0;
@@ -170,6 +174,38 @@ class Crossings {
       of_perception_;
 };
 
+// Perception's part in a recording without pictures: its rows are not run, and what they left is handed to control.
+class BelievedPerception {
+ public:
+  // Every row of perception's, since counts are told when they change. crossings: null while the rows are run. False: the
+  // outputs cannot be.
+  [[nodiscard]] bool live(const RowCall& row, Crossings* crossings) {
+    ByteReader in = row.outputs;
+    FieldReader reader(in);
+    const std::string_view task = kTasks[row.row].row.task;
+    if (task == "intake") {
+      if (in.get<bool>()) {
+        for (EventCount& count : counts_) walk(reader, "", count);
+      }
+      if (crossings == nullptr) return !in.failed();
+      Health health;
+      health.assign(counts_);
+      crossings->keep(row.cycle_ns, health);
+      PoseRequest request;
+      walk(reader, "pose_request", request);
+      if (request.number != 0) crossings->keep(row.cycle_ns, request);
+    } else if (crossings != nullptr && task == "footholds" && row.progress == static_cast<std::uint8_t>(Progress::kDone)) {
+      FootholdSet footholds;
+      walk(reader, "footholds", footholds);
+      crossings->keep(row.cycle_ns, footholds);
+    }
+    return !in.failed();
+  }
+
+ private:
+  HealthCounts counts_{};
+};
+
 class Replay {
  public:
   explicit Replay(RecordingFile& file)
@@ -177,37 +213,68 @@ class Replay {
         ports_(file),
         module_(std::make_unique<Pipeline>(Ports{ports_, ports_, ports_, ports_, &ports_}, file.params())) {}
 
-  // False when the file cannot be read on.
-  [[nodiscard]] bool run(ReplayResult& result) {
-    Record record;
-    while (file_.read(record)) {
-      switch (record.kind) {
-        case RecordKind::kRow:
-          if (!run_row(record.row, result)) return false;
-          break;
-        case RecordKind::kEvent:
-          module_->lane_health(record.event.lane).raise(record.event.event, record.event.at_ns, record.event.times);
-          break;
-        case RecordKind::kStop:
-          module_->control().request_stop();
-          break;
-        case RecordKind::kCycle:
-          module_->cycle_done(record.cycle_lane, record.cycle);
-          result.ticks += record.cycle_lane == kControlLane ? 1U : 0U;
-          break;
-        case RecordKind::kEnd:
-          result.differ = differing_ns_.size();
-          return true;
+  [[nodiscard]] ReplayResult run() {
+    const auto record = std::make_unique<Record>();
+    RecordingFile::Found found = file_.read(*record);
+    while (found == RecordingFile::Found::kRecord && result_.ends.empty()) {
+      if (!live(*record)) {
+        found = RecordingFile::Found::kBad;
+        break;
       }
+      found = file_.read(*record);
     }
-    result.differ = differing_ns_.size();
-    return false;
+    if (found == RecordingFile::Found::kCut && result_.ends.empty()) result_.ends = "it was cut off";
+    result_.differ = differing_ns_.size();
+    if (result_.difference.empty()) result_.difference = file_.contradiction();
+    result_.complaint = file_.complaint().empty() ? file_.damage() : file_.complaint();
+    if (found == RecordingFile::Found::kBad || !result_.complaint.empty()) {
+      result_.verdict = ReplayVerdict::kUnreadable;
+    } else if (!result_.difference.empty()) {
+      result_.verdict = ReplayVerdict::kDiffers;
+    } else {
+      result_.verdict = result_.ends.empty() ? ReplayVerdict::kSame : ReplayVerdict::kUnfinished;
+    }
+    return std::move(result_);
   }
 
  private:
-  [[nodiscard]] bool run_row(const RowCall& row, ReplayResult& result) {
+  // False when the file cannot be read on.
+  [[nodiscard]] bool live(const Record& record) {
+    switch (record.kind) {
+      case RecordKind::kRow:
+        return run_row(record.row);
+      case RecordKind::kEvent:
+        module_->lane_health(record.event.lane).raise(record.event.event, record.event.at_ns, record.event.times);
+        break;
+      case RecordKind::kStop:
+        module_->control().request_stop();
+        break;
+      case RecordKind::kCycle:
+        module_->cycle_done(record.cycle_lane, record.cycle);
+        result_.ticks += record.cycle_lane == kControlLane ? 1U : 0U;
+        break;
+      case RecordKind::kLost:
+        result_.ends = std::to_string(record.lost_frames) + " frames of " +
+                       (record.lost_lane == kControlLane ? "control" : "perception") + " found no room in it";
+        break;
+      case RecordKind::kEnd:
+        break;
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool run_row(const RowCall& row) {
     const std::size_t lane = kTasks[row.row].row.lane;
     if (first_ns_ < 0) first_ns_ = row.cycle_ns;
+    if (lane == kPerceptionLane && !result_.without_perception) {
+      result_.without_perception = std::ranges::any_of(row.calls, [](const PortCall& call) {
+        return call.kind == CallKind::kAcquire && call.gave && call.picture.pixels == Pixels::kNotRecorded;
+      });
+    }
+    if (lane == kPerceptionLane && !believed_.live(row, result_.without_perception ? &crossings_ : nullptr)) {
+      return file_.complain("a row whose outputs cannot be");
+    }
+    if (lane == kPerceptionLane && result_.without_perception) return true;
     module_->lane_finished(1 - lane, row.other_finished_ns);
     const bool looks_across = row.row == 0 || kTasks[row.row - 1].row.lane != lane;
     if (looks_across && !crossings_.replay(lane, row.taken)) {
@@ -226,39 +293,40 @@ class Replay {
     comparer.compare("units_left", -1, row.units_left, budget.left());
     // What a row leaves depends on how it ended: the recorded outputs are those of the recorded end.
     const bool ended_alike = row.progress == static_cast<std::uint8_t>(progress);
-    if (ended_alike) walk_outputs(comparer, *module_, row.row, progress);
+    if (ended_alike) walk_outputs(comparer, *module_, row.row, row.cycle_ns, progress);
     if (outputs.failed() || (ended_alike && !comparer.stopped() && !outputs.at_end())) {
       return file_.complain("a row whose outputs cannot be");
     }
     if (difference.empty()) difference = comparer.difference();
-    if (difference.empty()) return true;
-    differing_ns_.insert(row.cycle_ns);
-    if (result.difference.empty()) {
-      result.difference = "tick " + std::to_string((row.cycle_ns - first_ns_) / kCycle_ns) + ", " +
-                          std::string(kTasks[row.row].row.task) + ", " + difference;
-    }
+    if (!difference.empty()) note_difference(row, difference);
     return true;
+  }
+
+  void note_difference(const RowCall& row, const std::string& difference) {
+    differing_ns_.insert(row.cycle_ns);
+    if (!result_.difference.empty()) return;
+    result_.difference = "tick " + std::to_string((row.cycle_ns - first_ns_) / kCycle_ns) + ", " +
+                         std::string(kTasks[row.row].row.task) + ", " + difference;
   }
 
   RecordingFile& file_;
   ReplayedPorts ports_;
   std::unique_ptr<Pipeline> module_;
   Crossings crossings_{*module_};
+  BelievedPerception believed_;
   std::array<HealthCounts, kLaneCount> last_health_{};
   std::set<std::int64_t> differing_ns_;
   std::int64_t first_ns_ = -1;
+  ReplayResult result_;
 };
 
 }  // namespace
 
-ReplayResult replay(const std::string& directory) {
+ReplayResult replay(const std::string& path, mcap::McapReader::Decompress decompress) {
+  RecordingFile file(std::move(decompress));
+  if (file.open(path)) return Replay(file).run();
   ReplayResult result;
-  RecordingFile file;
-  if (!file.open(directory) || !Replay(file).run(result)) {
-    result.complaint = file.complaint();
-    return result;
-  }
-  result.verdict = result.differ == 0 ? ReplayVerdict::kSame : ReplayVerdict::kDiffers;
+  result.complaint = file.complaint();
   return result;
 }
 
@@ -266,6 +334,10 @@ std::string text_of(const ReplayResult& result) {
   std::string text;
   if (!result.difference.empty()) text += "first difference: " + result.difference + "\n";
   if (result.verdict == ReplayVerdict::kUnreadable) return text + result.complaint + "\n";
+  if (result.without_perception) {
+    text += "There are no pictures in it: what perception had found was believed, and all else replayed.\n";
+  }
+  if (!result.ends.empty()) text += "The recording is unfinished: " + result.ends + ".\n";
   return text + "replay: " + std::to_string(result.ticks) + " ticks, " + std::to_string(result.differ) + " differ\n";
 }
 

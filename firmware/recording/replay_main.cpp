@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// polygmap_replay DIR: the replay alone, for machines without the host tool.
+// polygmap_replay RUN.mcap: the replay alone, for machines without the host tool.
 #include <cstdio>
 
 #include "firmware/recording/replay.hpp"
@@ -7,7 +7,7 @@
 int main(int argc, char** argv) {
   using namespace polygmap::recording;
   if (argc != 2) {
-    std::fputs("usage: polygmap_replay DIR (written by polygmap climb --record DIR)\n", stderr);
+    std::fputs("usage: polygmap_replay RUN.mcap (written by polygmap climb --record DIR)\n", stderr);
     return static_cast<int>(ReplayVerdict::kUnreadable);
   }
   const ReplayResult result = replay(argv[1]);

@@ -56,7 +56,7 @@ void V4l2Camera::close() noexcept {
   owner_.set_closed();
   unmap();
   device_.close();
-  book_.reset(1);
+  book_.reset(4);
 }
 
 void V4l2Camera::maintain() noexcept {
@@ -192,7 +192,7 @@ DeviceError V4l2Camera::start(int fd) noexcept {
   }
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   if (call(fd, VIDIOC_STREAMON, &type) != 0) return system_error(name, "cannot start the stream", errno);
-  book_.reset(count - 3);  // one held by each holder, one being filled
+  book_.reset(count);
   given_up_ = false;
   io_errors_in_a_row_ = 0;
   last_.numbered = false;
@@ -308,9 +308,7 @@ bool V4l2Camera::try_acquire(DepthFrameView& frame) noexcept {
   return owner_.is_open() && !given_up_ && poll_stream() && book_.take(frame);
 }
 
-void V4l2Camera::give_back(BufferBook::Holder holder) noexcept {
-  if (!owner_.is_open()) return;
-  const auto buffer = book_.give_back(holder);
+void V4l2Camera::give_back(std::optional<BufferBook::Index> buffer) noexcept {
   if (!given_up_) {
     if (buffer) static_cast<void>(hand_back(*buffer));
   } else if (!book_.any_held()) {
@@ -318,7 +316,11 @@ void V4l2Camera::give_back(BufferBook::Holder holder) noexcept {
   }
 }
 
-void V4l2Camera::release() noexcept { give_back(BufferBook::Holder::kModule); }
-void V4l2Camera::release_second() noexcept { give_back(BufferBook::Holder::kSecond); }
+void V4l2Camera::release() noexcept {
+  if (owner_.is_open()) give_back(book_.give_back());
+}
+void V4l2Camera::release_shared(const std::uint16_t* pixels) noexcept {
+  if (owner_.is_open()) give_back(book_.give_back_shared(pixels));
+}
 
 }  // namespace polygmap::hal

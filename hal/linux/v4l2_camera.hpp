@@ -21,7 +21,7 @@ class V4l2Camera final : public DepthCamera {
     FixedText<63> device{};         // "/dev/video2"
     CameraIntrinsics intrinsics{};  // width, height and what no V4L2 call tells
     PixelFormat format = PixelFormat::kZ16;
-    std::uint32_t buffers = 5;              // 4 to BufferBook::kMostBuffers; three are never with the kernel at a time
+    std::uint32_t buffers = 8;              // 4 to BufferBook::kMostBuffers
     std::uint32_t frames_per_s = 0;         // that the device must give; 0: its own
     std::int64_t latency_ns = 0;            // from the end of the exposure to the device's stamp
     std::int64_t exposure_ns = 0;           // the stamp given is the middle of it
@@ -57,9 +57,9 @@ class V4l2Camera final : public DepthCamera {
   void release() noexcept override;
   void poll() noexcept;
 
-  // What the module holds, for a second holder in the module's lane; kept until release_second().
-  [[nodiscard]] bool try_share(DepthFrameView& frame) noexcept { return book_.share(frame); }
-  void release_second() noexcept;
+  // What the module holds, for a second holder in the module's lane; kept until release_shared() of its pixels.
+  [[nodiscard]] bool try_share() noexcept { return book_.share(); }
+  void release_shared(const std::uint16_t* pixels) noexcept;
 
   [[nodiscard]] bool is_lost() const noexcept { return owner_.is_lost(); }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
@@ -88,7 +88,7 @@ class V4l2Camera final : public DepthCamera {
   [[nodiscard]] bool poll_stream() noexcept;
   [[nodiscard]] bool take(const v4l2_buffer& buffer) noexcept;
   [[nodiscard]] bool hand_back(std::uint32_t index) noexcept;
-  void give_back(BufferBook::Holder holder) noexcept;
+  void give_back(std::optional<BufferBook::Index> buffer) noexcept;
   [[nodiscard]] std::int64_t now_ns() noexcept;
   // At once, or as soon as nobody holds a picture of it.
   void give_up() noexcept;

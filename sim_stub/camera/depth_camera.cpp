@@ -62,6 +62,7 @@ SimDepthCamera::SimDepthCamera(const DepthCameraOptions& options, const CameraNo
   for (Slot& slot : slots_) {
     slot.depth.resize(static_cast<std::size_t>(stated_.width_px) * static_cast<std::size_t>(stated_.height_px));
   }
+  for (Spare& spare : spares_) spare.depth.resize(slots_.front().depth.size());
 }
 
 SimDepthCamera::~SimDepthCamera() {
@@ -151,7 +152,26 @@ bool SimDepthCamera::try_acquire(DepthFrameView& frame) noexcept {
 }
 
 void SimDepthCamera::release() noexcept {
-  if (Slot* slot = oldest(SlotState::kHeld)) slot->state = SlotState::kFree;
+  Slot* slot = oldest(SlotState::kHeld);
+  if (slot == nullptr) return;
+  slot->state = SlotState::kFree;
+  if (!slot->kept) return;
+  slot->kept = false;
+  const auto spare = std::ranges::find(spares_, false, &Spare::keeps);
+  spare->keeps = true;
+  spare->depth.swap(slot->depth);
+}
+
+bool SimDepthCamera::try_keep() noexcept {
+  Slot* slot = oldest(SlotState::kHeld);
+  if (slot == nullptr || slot->kept || std::ranges::find(spares_, false, &Spare::keeps) == spares_.end()) return false;
+  slot->kept = true;
+  return true;
+}
+
+void SimDepthCamera::let_go(const std::uint16_t* pixels) noexcept {
+  if (Slot* slot = oldest(SlotState::kHeld); slot != nullptr && slot->depth.data() == pixels) slot->kept = false;
+  for (Spare& spare : spares_) spare.keeps = spare.keeps && spare.depth.data() != pixels;
 }
 
 }  // namespace polygmap::sim

@@ -66,6 +66,10 @@ class SimDepthCamera {
   [[nodiscard]] double scan_s() const noexcept { return seconds(2 * half_scan_ticks_ * VirtualClock::kTick_ns); }
   [[nodiscard]] bool try_acquire(DepthFrameView& frame) noexcept;
   void release() noexcept;
+  // A second holder keeps the picture that is held until let_go() of its pixels, also after release().
+  static constexpr std::size_t kMostKept = 4;
+  [[nodiscard]] bool try_keep() noexcept;
+  void let_go(const std::uint16_t* pixels) noexcept;
   [[nodiscard]] std::uint32_t overwritten() const noexcept { return overwritten_; }  // arrived, but never acquired
 
  private:
@@ -75,6 +79,13 @@ class SimDepthCamera {
     std::int64_t stamp_ns = 0;
     std::int64_t arrival_tick = 0;
     std::uint32_t sequence = 0;
+    bool kept = false;
+    std::vector<std::uint16_t> depth;
+  };
+  // Memory that takes the place of a kept picture's in its slot: how many slots there are decides which picture is lost
+  // when nobody fetches any.
+  struct Spare {
+    bool keeps = false;
     std::vector<std::uint16_t> depth;
   };
   void expose();
@@ -94,6 +105,7 @@ class SimDepthCamera {
   DepthHoles holes_;
   CounterNoise frame_draws_, edge_draws_;
   std::vector<Slot> slots_;
+  std::array<Spare, kMostKept> spares_;
   std::future<void> rendering_;
   std::int64_t next_frame_ = 0;
   std::uint32_t overwritten_ = 0;

@@ -287,8 +287,6 @@ void Service::run_lane(LaneRun& lane) noexcept {
       if (Table[row].lane == Lane) board_.rows[row].store(executive.row_statistics(row));
     }
     if (ticks % kTicksPerCount == 0) publish_devices();
-    constexpr bool kHasPerception = Lane == kPerceptionLane || lane_count(Table) == 1;
-    if (kHasPerception && parts_.recorder != nullptr) parts_.recorder->copy_piece();
   }
   publish_devices();
   lane.page_faults = thread_page_faults() - faults;

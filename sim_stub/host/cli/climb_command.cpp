@@ -41,6 +41,7 @@ struct ClimbArguments {
   std::string plant = name_of(ClimbOptions{}.plant);
   std::string gait = "ds";
   std::string contacts = "inferred";
+  std::string record = "no-pictures";
   std::vector<double> render_shift_m;
   std::optional<int> missing_step;  // 1-based as people count
   std::string bus;
@@ -178,11 +179,12 @@ void declare_files(CLI::App& climb, ClimbArguments& a) {
   climb.add_flag(
       "--save-inputs", a.options.save_inputs,
       "Also write what the sensors said, for perceive and estimate: OUT/inputs/depth_NN.png, log.csv, lio.csv");
-  climb
-      .add_option("--record", a.options.record_dir,
-                  "Also write all that goes into the module and comes out of it, to the bit, for replay: some 220 MB "
-                  "and 50 MB for each step")
-      ->type_name("DIR");
+  keep_among(*climb
+                  .add_option("--record", a.record,
+                              "What OUT/run.mcap has, for replay, report and MCAP tools: all that goes into the module "
+                              "and comes out of it, but pictures; all: pictures too, 18 MB a second; none: no file")
+                  ->capture_default_str(),
+              {"no-pictures", "all", "none"});
 }
 
 void declare(CLI::App& climb, ClimbArguments& a) {
@@ -542,9 +544,8 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   }
   std::string sentence = complaint(a);
   if (sentence.empty()) sentence = output_complaint(a.options.out_dir, a.options.save_inputs);
-  if (sentence.empty() && !a.options.record_dir.empty()) {
-    sentence = directory_complaint(a.options.record_dir, "--record");
-  }
+  if (a.record != "none" && !a.options.out_dir.empty()) a.options.recording = a.options.out_dir + "/run.mcap";
+  a.options.record_pictures = a.record == "all";
   if (!sentence.empty()) {
     err << "polygmap: " << sentence << "\n";
     return kExitUsage;

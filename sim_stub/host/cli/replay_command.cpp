@@ -14,13 +14,13 @@ CLI::App* declare_replay(CLI::App& app, ReplayArguments& a) {
   CLI::App* command = app.add_subcommand(
       "replay",
       "Feed a recording to the module and compare what comes out, to the bit: exit code 0 when nothing differs, 1 with "
-      "the first difference, 2 when it cannot be read");
-  command->add_option("dir", a.directory, "Directory that climb --record wrote")->required()->type_name("DIR");
+      "the first difference, 2 when it cannot be read, 3 when it is unfinished and agrees as far as it goes");
+  command->add_option("recording", a.recording, "run.mcap that climb or polygmapd wrote")->required()->type_name("RUN.mcap");
   return command;
 }
 
 int run_replay(const ReplayArguments& a, std::ostream& out, std::ostream& err) {
-  const recording::ReplayResult result = recording::replay(a.directory);
+  const recording::ReplayResult result = recording::replay(a.recording);
   if (result.verdict == recording::ReplayVerdict::kUnreadable) {
     if (!result.difference.empty()) out << "first difference: " << result.difference << "\n" << std::flush;
     err << "polygmap: " << result.complaint << "\n";

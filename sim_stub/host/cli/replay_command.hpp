@@ -12,7 +12,7 @@ class App;
 namespace polygmap::sim {
 
 struct ReplayArguments {
-  std::string directory;
+  std::string recording;
 };
 CLI::App* declare_replay(CLI::App& app, ReplayArguments& a);
 [[nodiscard]] int run_replay(const ReplayArguments& a, std::ostream& out, std::ostream& err);

@@ -14,6 +14,8 @@
 #include "sim_stub/heap_trap.hpp"
 #include "sim_stub/host/climb/climb_report.hpp"
 #include "sim_stub/host/record/climb_recorder.hpp"
+#include "sim_stub/host/record/preview_camera.hpp"
+#include "sim_stub/host/record/truth_topics.hpp"
 #include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/sim_robot.hpp"
 #include "sim_stub/world/clearance.hpp"
@@ -219,15 +221,19 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   }
   hal::JointBus& joints = bus ? static_cast<hal::JointBus&>(bus->joints()) : robot;
   WatchedLidar lidar(robot);
+  PreviewCamera camera(robot);
   std::optional<ClimbRecorder> recorder;
-  if (options.save_inputs) recorder.emplace(robot, robot, joints, lidar);
+  if (options.save_inputs) recorder.emplace(camera, robot, joints, lidar);
   Ports watched_ports =
-      recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{robot, robot, joints, lidar};
+      recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{camera, robot, joints, lidar};
   watched_ports.operator_input = options.climb_operator;
-  std::optional<recording::Recorder> recording;
-  if (!options.record_dir.empty()) {
-    recording.emplace(watched_ports);
-    recording->begin(options.record_dir, params);
+  std::unique_ptr<recording::Recorder> recording;
+  std::optional<TruthTopics> truth_topics;
+  if (!options.recording.empty()) {
+    recording = std::make_unique<recording::Recorder>(watched_ports, options.record_pictures ? &robot : nullptr);
+    recording->begin(options.recording, params,
+                     static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count()));
+    truth_topics.emplace(*recording).write_stairs(robot.stairs());
   }
   const auto module = std::make_unique<Module>();
   {
@@ -236,7 +242,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     module->pipeline->watch(module->watched);
     if (recording) recording->watch(*module->pipeline);
     module->timed.emplace(*module->pipeline);
-    module->tasks.emplace(*module->timed, recording ? &*recording : nullptr);
+    module->tasks.emplace(*module->timed, recording.get());
     module->executive.emplace(*module->tasks, robot, module->pipeline->lane_health(0));
     module->executive->start(robot.now_ns() + kCycle_ns);
   }
@@ -264,7 +270,11 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
       const heap::ModuleCall call("CyclicExecutive::tick");
       executive.tick(robot.now_ns());
     }
-    if (recording) recording->flush();
+    if (recording) {
+      recording->flush();
+      truth_topics->write(robot.truth());
+      if (const Preview* preview = camera.take()) truth_topics->write(*preview);
+    }
     const Telemetry telemetry = pipeline.telemetry(robot.now_ns(), module->watched);
     report.observe(robot.truth(), telemetry);
     if (recorder) recorder->observe(robot.truth(), telemetry.state);
@@ -322,6 +332,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   figures.wall_seconds = std::chrono::duration<double>(WallClock::now() - wall_begin).count();
   const ClimbSummary summary = report.finish(figures);
   if (recording) {
+    truth_topics->write_verdict(summary_text(summary), robot.now_ns());
     if (const std::string failure = recording->finish(); !failure.empty()) throw ClimbNotWritten(failure, summary);
   }
   if (!options.out_dir.empty()) {

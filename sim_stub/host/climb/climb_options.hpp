@@ -36,7 +36,9 @@ struct ClimbOptions {
   GaitPattern gait = GaitPattern::kDoubleStep;
   std::string out_dir;       // empty: no files
   bool save_inputs = false;  // what the sensors said, in out_dir/inputs, a directory that exists
-  std::string record_dir;  // all that goes into the module and comes out of it; empty: nothing; a directory that exists
+  // All that goes into the module and comes out of it; empty: nothing. In a directory that exists.
+  std::string recording;
+  bool record_pictures = false;  // too
   double time_limit_s = 150.0;  // simulated
   // Becomes the number of the signal that asks for the end; the climb then ends with what there is. Null: none may.
   const std::atomic<int>* interrupt = nullptr;

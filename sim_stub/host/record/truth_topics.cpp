@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim_stub/host/record/truth_topics.hpp"
+
+#include <lodepng.h>
+
+#include <algorithm>
+#include <string>
+
+#include "firmware/recording/mcap/cdr_parts.hpp"
+
+namespace polygmap::sim {
+namespace {
+
+using namespace mcap;  // what messages are put together from
+using recording::Topic;
+
+constexpr Color kStone{0.75, 0.74, 0.72, 1.0}, kThing{0.80, 0.47, 0.65, 1.0};
+
+void put_cube(CdrWriter& out, const Transform& pose, const Vec3& size_m, const Color& color, const std::string& id) {
+  begin_entity(out, 0, "true_world", id);
+  put_no_primitives(out, 2);  // metadata, arrows
+  out.put_count(1);
+  put_pose(out, pose);
+  put_vector(out, size_m);
+  put_color(out, color);
+  put_no_primitives(out, 6);
+}
+
+}  // namespace
+
+void TruthTopics::send(Topic topic, std::int64_t stamp_ns, const CdrWriter& message) {
+  if (!message.full()) recorder_.write(topic, stamp_ns, stamp_ns, message.bytes());
+}
+
+// A step as a block from the floor up to its tread.
+void TruthTopics::write_stairs(const StairWorld& stairs) {
+  CdrWriter out = message();
+  begin_scene(out, 0, stairs.steps.size() + stairs.obstacles.size());
+  for (std::size_t i = 0; i < stairs.steps.size(); ++i) {
+    const Step& step = stairs.steps[i];
+    const Vec3 middle_m{0.5 * (step.nosing_x_m + step.back_x_m), 0.0, 0.5 * step.height_m};
+    const Vec3 size_m{step.back_x_m - step.nosing_x_m, 2.0 * stairs.half_width_m, step.height_m};
+    const Transform own{Mat3::Identity(), middle_m};
+    put_cube(out, step.true_T_step * own, size_m, kStone, "step " + std::to_string(i + 1));
+  }
+  for (std::size_t i = 0; i < stairs.obstacles.size(); ++i) {
+    const Obstacle& obstacle = stairs.obstacles[i];
+    put_cube(out, {Mat3::Identity(), obstacle.centre_m}, obstacle.size_m, kThing, "thing " + std::to_string(i + 1));
+  }
+  send(Topic::kStairs, 0, out);
+}
+
+void TruthTopics::write(const Truth& truth) {
+  CdrWriter out = message();
+  put_header(out, truth.stamp_ns, "true_world");
+  out.put_text("base");
+  put_pose(out, truth.true_T_base);
+  for (int i = 0; i < 36; ++i) out.put(0.0);
+  const std::int64_t dt_ns = truth.stamp_ns - last_.stamp_ns;
+  const Vec3 way_m = truth.true_T_base.p_m - last_.true_T_base.p_m;
+  const bool has_speed = last_.stamp_ns != 0 && dt_ns > 0;
+  put_vector(out, has_speed ? Vec3(truth.true_T_base.R.transpose() * way_m / seconds(dt_ns)) : Vec3(Vec3::Zero()));
+  put_vector(out, Vec3::Zero());
+  for (int i = 0; i < 36; ++i) out.put(0.0);
+  send(Topic::kTruth, truth.stamp_ns, out);
+
+  out = message();
+  put_header(out, truth.stamp_ns, "true_world");
+  out.put_count(truth.true_T_sole.size());
+  for (const Transform& sole : truth.true_T_sole) put_pose(out, sole);
+  send(Topic::kTruthFeet, truth.stamp_ns, out);
+  last_ = truth;
+}
+
+void TruthTopics::write(const Preview& preview) {
+  std::vector<unsigned char> png;
+  if (lodepng::encode(png, preview.pixels, preview.width_px, preview.height_px, LCT_GREY, 8) != 0) return;
+  CdrWriter out = message();
+  put_header(out, preview.stamp_ns, "camera");
+  out.put_text("png");
+  out.put_bytes(std::as_bytes(std::span(png)));
+  send(Topic::kPreview, preview.stamp_ns, out);
+}
+
+void TruthTopics::write_verdict(std::string_view json, std::int64_t now_ns) {
+  CdrWriter out = message();
+  out.put_text(json);
+  send(Topic::kVerdict, now_ns, out);
+}
+
+}  // namespace polygmap::sim
