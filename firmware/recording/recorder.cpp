@@ -81,7 +81,7 @@ void Recorder::begin(const std::string& path, const Params& params, std::uint64_
   message.put_count(table.params.size());
   for (const config::Param& param : table.params) message.put_text(config::text_of(param));
   message.put_bytes(header.bytes());
-  write(Topic::kParameters, 0, 0, message.bytes());
+  parameters_.assign(message.bytes().begin(), message.bytes().end());
 }
 
 void Recorder::Sink::take(Topic topic, std::int64_t log_ns, std::int64_t publish_ns,
@@ -247,7 +247,6 @@ void Recorder::write_picture(LaneLog& log) noexcept {
 }
 
 void Recorder::write_frame(LaneLog& log) noexcept {
-  if (log.next_head.picture.depth != nullptr) write_picture(log);
   // The head was copied; its last bytes become the message's.
   const std::span<std::byte> message = log.next_memory.subspan(sizeof(FrameHead) - kMessageHead_bytes,
                                                                kMessageHead_bytes + log.next.size());
@@ -256,6 +255,9 @@ void Recorder::write_frame(LaneLog& log) noexcept {
   std::memcpy(message.data(), kLittleEndian.data(), kLittleEndian.size());
   std::memcpy(message.data() + kLittleEndian.size(), &count, sizeof count);
   const std::int64_t log_ns = std::max<std::int64_t>(log.next_head.cycle_ns, 0);
+  if (!has_parameters_) write(Topic::kParameters, log_ns, log_ns, parameters_);
+  has_parameters_ = true;
+  if (log.next_head.picture.depth != nullptr) write_picture(log);
   (void)writer_.write(static_cast<std::size_t>(Topic::kReplay), log_ns, log_ns, message);
   ByteReader in(log.next);
   while (!in.at_end() && parser_.parse(in, record_)) topics_.write(record_, sink_);

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "firmware/recording/block_queue.hpp"
 #include "firmware/recording/format.hpp"
@@ -147,6 +148,8 @@ class Recorder final : public hal::DepthCamera,
   std::atomic<bool> failed_{false};
   // Of the thread that writes.
   mcap::McapWriter writer_;
+  std::vector<std::byte> parameters_;  // until the first frame says when they were
+  bool has_parameters_ = false;
   Topics topics_;
   Sink sink_{writer_};
   RecordParser parser_;

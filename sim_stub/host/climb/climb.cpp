@@ -233,7 +233,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     recording = std::make_unique<recording::Recorder>(watched_ports, options.record_pictures ? &robot : nullptr);
     recording->begin(options.recording, params,
                      static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count()));
-    truth_topics.emplace(*recording).write_stairs(robot.stairs());
+    truth_topics.emplace(*recording, robot.stairs());
   }
   const auto module = std::make_unique<Module>();
   {

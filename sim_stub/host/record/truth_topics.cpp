@@ -33,9 +33,10 @@ void TruthTopics::send(Topic topic, std::int64_t stamp_ns, const CdrWriter& mess
 }
 
 // A step as a block from the floor up to its tread.
-void TruthTopics::write_stairs(const StairWorld& stairs) {
+void TruthTopics::write_stairs(std::int64_t now_ns) {
+  const StairWorld& stairs = stairs_;
   CdrWriter out = message();
-  begin_scene(out, 0, stairs.steps.size() + stairs.obstacles.size());
+  begin_scene(out, now_ns, stairs.steps.size() + stairs.obstacles.size());
   for (std::size_t i = 0; i < stairs.steps.size(); ++i) {
     const Step& step = stairs.steps[i];
     const Vec3 middle_m{0.5 * (step.nosing_x_m + step.back_x_m), 0.0, 0.5 * step.height_m};
@@ -47,10 +48,11 @@ void TruthTopics::write_stairs(const StairWorld& stairs) {
     const Obstacle& obstacle = stairs.obstacles[i];
     put_cube(out, {Mat3::Identity(), obstacle.centre_m}, obstacle.size_m, kThing, "thing " + std::to_string(i + 1));
   }
-  send(Topic::kStairs, 0, out);
+  send(Topic::kStairs, now_ns, out);
 }
 
 void TruthTopics::write(const Truth& truth) {
+  if (last_.stamp_ns == 0) write_stairs(truth.stamp_ns);
   CdrWriter out = message();
   put_header(out, truth.stamp_ns, "true_world");
   out.put_text("base");

@@ -14,10 +14,11 @@ namespace polygmap::sim {
 
 class TruthTopics {
  public:
-  explicit TruthTopics(recording::Recorder& recorder) : recorder_(recorder), memory_(kMemory_bytes) {}
+  // Both outlive this.
+  TruthTopics(recording::Recorder& recorder, const StairWorld& stairs)
+      : recorder_(recorder), stairs_(stairs), memory_(kMemory_bytes) {}
 
-  // Between ticks.
-  void write_stairs(const StairWorld& stairs);
+  // Between ticks; with the first truth the stairs.
   void write(const Truth& truth);
   void write(const Preview& preview);
   void write_verdict(std::string_view json, std::int64_t now_ns);
@@ -27,7 +28,10 @@ class TruthTopics {
   [[nodiscard]] mcap::CdrWriter message() noexcept { return mcap::CdrWriter(memory_); }
   void send(recording::Topic topic, std::int64_t stamp_ns, const mcap::CdrWriter& message);
 
+  void write_stairs(std::int64_t now_ns);
+
   recording::Recorder& recorder_;
+  const StairWorld& stairs_;
   std::vector<std::byte> memory_;
   Truth last_;
 };
