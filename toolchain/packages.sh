@@ -11,3 +11,6 @@ kPackagesCross=(g++-aarch64-linux-gnu libc6:arm64 libstdc++6:arm64 libgtest-dev:
 kPackagesVm=(qemu-system-arm python3)
 # What toolchain/package makes and looks at the package with.
 kPackagesPackage=(systemd dpkg-dev)
+# What toolchain/report_bundle bundles the report's page with, where there is no npm yet, and what its tests open it with.
+kPackagesBundle=(nodejs npm)
+kPackagesPage=(chromium python3 python3-numpy python3-pil)

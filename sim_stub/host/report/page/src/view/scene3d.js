@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+// The replay in three dimensions, drawn when something has changed and not otherwise. World: x up the stairs, y left, z up.
+import { DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { colours, onTheme } from "../core/colours.js";
+import { robotAt } from "../core/now.js";
+import { turn } from "../core/pose.js";
+import { Footholds3d } from "./footholds3d.js";
+import { Map3d } from "./map3d.js";
+import { Robot3d } from "./robot3d.js";
+import { Stairs3d } from "./stairs3d.js";
+import { Trails3d } from "./trails3d.js";
+
+// From where each view looks, relative to the base.
+const VIEWS = {
+  1: { from: [-1.75, -1.95, 0.85], at: [0.25, 0, -0.42] },
+  2: { from: [0.2, -3.2, -0.1], at: [0.2, 0, -0.3] },
+  3: { from: [0.3, -0.001, 3.0], at: [0.3, 0, 0] },
+};
+
+export class Scene3d {
+  /** Throws where the browser has no WebGL. */
+  constructor(host, run) {
+    this.run = run;
+    this.host = host;
+    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "low-power" });
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
+    host.append(this.renderer.domElement);
+    this.scene = new Scene();
+    this.eye = new PerspectiveCamera(38, 1, 0.05, 60);
+    this.eye.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.eye, this.renderer.domElement);
+    this.controls.addEventListener("change", () => this.draw());
+    this.controls.addEventListener("start", () => (this.throughCamera = false));
+    this.controls.enableKeys = false;
+    this.sky = new HemisphereLight(0xffffff, 0x8a8a8a, 2.1);
+    const sun = new DirectionalLight(0xffffff, 1.6);
+    sun.position.set(-2, -3, 5);
+    this.scene.add(this.sky, sun);
+    this.parts = [new Stairs3d(run), new Map3d(run), new Footholds3d(run), new Trails3d(run), new Robot3d(run)];
+    for (const part of this.parts) this.scene.add(part.group);
+    this.followed = null;
+    this.throughCamera = false;
+    this.view = 1;
+    onTheme(() => this.repaint());
+    new ResizeObserver(() => this.resize()).observe(host);
+    this.repaint();
+  }
+
+  repaint() {
+    this.scene.background = null;
+    this.renderer.setClearColor(colours.stage ?? colours.panel, 1);
+    for (const part of this.parts) part.repaint();
+    if (this.t_s !== undefined) this.show(this.t_s);
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.host;
+    if (!width || !height) return;
+    this.renderer.setSize(width, height);
+    this.eye.aspect = width / height;
+    this.eye.updateProjectionMatrix();
+    for (const part of this.parts) part.resize?.(width, height);
+    if (this.followed) this.draw();
+  }
+
+  /** 1: beside and behind, 2: from the right, 3: from above, 4: through the robot's camera. */
+  look(view) {
+    this.view = view;
+    this.throughCamera = view === 4;
+    this.eye.fov = this.throughCamera ? this.cameraAngle() : 38;
+    this.eye.updateProjectionMatrix();
+    if (!this.throughCamera && this.followed) this.aim(VIEWS[view]);
+    if (this.t_s !== undefined) this.show(this.t_s);
+  }
+
+  cameraAngle() {
+    const camera = this.run.camera;
+    return camera ? (2 * Math.atan(camera.height_px / 2 / camera.fy_px) * 180) / Math.PI : 60;
+  }
+
+  aim({ from, at }) {
+    const wide = Math.max(1, 1.15 / Math.max(this.eye.aspect, 0.3));
+    this.controls.target.set(...this.followed.map((c, k) => c + at[k]));
+    this.eye.position.set(...this.followed.map((c, k) => c + at[k] + (from[k] - at[k]) * wide));
+    this.controls.update();
+  }
+
+  show(t_s) {
+    this.t_s = t_s;
+    const now = robotAt(this.run, t_s);
+    for (const part of this.parts) part.show(t_s, now);
+    this.follow(now);
+    this.draw();
+  }
+
+  /** The eye moves along with the base, and not with its sway. */
+  follow(now) {
+    if (!now.base) {
+      if (!this.followed) {
+        this.followed = [0, 0, 0.8];
+        this.aim(VIEWS[1]);
+      }
+      return;
+    }
+    if (this.throughCamera && now.camera) {
+      this.followed = [now.base.p[0], 0, now.base.p[2]];
+      this.eye.position.set(...now.camera.p);
+      this.eye.up.set(...turn(now.camera.q, [0, -1, 0]));
+      this.eye.lookAt(new Vector3(...now.camera.p.map((c, k) => c + turn(now.camera.q, [0, 0, 1])[k])));
+      this.eye.up.set(0, 0, 1);
+      return;
+    }
+    const to = [now.base.p[0], 0, now.base.p[2]];
+    const first = !this.followed;
+    if (!first) {
+      const move = new Vector3(...to.map((c, k) => c - this.followed[k]));
+      this.eye.position.add(move);
+      this.controls.target.add(move);
+    }
+    this.followed = to;
+    if (first) this.aim(VIEWS[this.view]);
+    else this.controls.update();
+  }
+
+  draw() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => this.drawNow());
+  }
+
+  drawNow() {
+    this.waiting = false;
+    this.renderer.render(this.scene, this.eye);
+  }
+}
