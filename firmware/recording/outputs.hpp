@@ -34,8 +34,8 @@ void walk_health(auto& f, const HealthCounts& counts) {
 }
 // Written where they changed: f.health(counts).
 
-// What the writer's row has just published in its frame, where it did. The other lane does not see it before the frame is
-// over, so nobody has taken it.
+// What the writer's row has just published in its frame, where it did. The other lane does not see it before the frame
+// is over, so nobody has taken it.
 template <class T, std::size_t Slots>
 [[nodiscard]] T published_in(const Exchange<T, Slots>& exchange, std::int64_t frame_ns) noexcept {
   const T* const value = exchange.published_ns() == frame_ns ? exchange.find(frame_ns) : nullptr;

@@ -239,7 +239,8 @@ void Recorder::write_picture(LaneLog& log) noexcept {
   const std::uint64_t hash = hash_of_pixels(picture.depth, count);
   std::memcpy(log.next.data() + log.next_head.hash_at, &hash, sizeof hash);
   const std::int64_t log_ns = log.next_head.cycle_ns;
-  constexpr auto kCameraInfo = static_cast<std::size_t>(Topic::kCameraInfo), kDepth = static_cast<std::size_t>(Topic::kDepth);
+  constexpr auto kCameraInfo = static_cast<std::size_t>(Topic::kCameraInfo),
+                 kDepth = static_cast<std::size_t>(Topic::kDepth);
   (void)writer_.write(kCameraInfo, log_ns, picture.stamp_ns, topics_.camera_info(intrinsics(), picture.stamp_ns));
   (void)writer_.write_alone(kDepth, log_ns, picture.stamp_ns, topics_.image_head(picture),
                             std::as_bytes(std::span(picture.depth, count)));
@@ -248,8 +249,8 @@ void Recorder::write_picture(LaneLog& log) noexcept {
 
 void Recorder::write_frame(LaneLog& log) noexcept {
   // The head was copied; its last bytes become the message's.
-  const std::span<std::byte> message = log.next_memory.subspan(sizeof(FrameHead) - kMessageHead_bytes,
-                                                               kMessageHead_bytes + log.next.size());
+  const std::span<std::byte> message =
+      log.next_memory.subspan(sizeof(FrameHead) - kMessageHead_bytes, kMessageHead_bytes + log.next.size());
   constexpr std::array<std::uint8_t, mcap::kCdrHead_bytes> kLittleEndian{0, 1, 0, 0};
   const auto count = static_cast<std::uint32_t>(log.next.size());
   std::memcpy(message.data(), kLittleEndian.data(), kLittleEndian.size());
@@ -284,8 +285,8 @@ std::string Recorder::finish() {
   if (!failed() && !writer_.close()) fail();
   if (failed()) return std::string("Cannot write \"") + writer_.path() + "\": " + std::strerror(writer_.error()) + ".";
   if (lost_frames_ == 0 && lost_pictures_ == 0) return {};
-  return std::string("The recording \"") + writer_.path() + "\" lacks " + std::to_string(lost_frames_) + " frames and " +
-         std::to_string(lost_pictures_) + " pictures: the disk was too slow for its memory.";
+  return std::string("The recording \"") + writer_.path() + "\" lacks " + std::to_string(lost_frames_) +
+         " frames and " + std::to_string(lost_pictures_) + " pictures: the disk was too slow for its memory.";
 }
 
 void Recorder::put_call(LaneLog& log, CallKind kind, bool gave) const noexcept {

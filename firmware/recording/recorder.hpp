@@ -137,8 +137,8 @@ class Recorder final : public hal::DepthCamera,
   std::array<std::byte, kQueue_bytes[1]> perception_queue_;
   std::array<std::byte, sizeof(FrameHead) + kFrame_bytes[0]> control_next_;
   std::array<std::byte, sizeof(FrameHead) + kFrame_bytes[1]> perception_next_;
-  mutable std::array<LaneLog, kLaneCount> logs_;  // a const port call is recorded, too
-  struct {                                        // of perception's lane
+  mutable std::array<LaneLog, kLaneCount> logs_;                             // a const port call is recorded, too
+  struct {                                                                   // of perception's lane
     StaticVector<const std::uint16_t*, hal::PictureKeeper::kMostKept> kept;  // the oldest first
     std::uint32_t acquired = 0, let_go = 0;
   } pictures_;

@@ -53,7 +53,8 @@ bool RecordingFile::read_beginning() {
 // The next part's, where this one is over: of the same run, and beside it.
 bool RecordingFile::open_next_part() {
   std::array<char, mcap::McapWriter::kMaxPath> path{};
-  if (first_path_.empty() || run_.empty() || !mcap::McapWriter::path_of_part(first_path_, part_ + 1, path)) return false;
+  if (first_path_.empty() || run_.empty() || !mcap::McapWriter::path_of_part(first_path_, part_ + 1, path))
+    return false;
   auto next = std::make_unique<McapReader>(decompress_);
   if (!next->open(path.data()) || next->read_run() != run_) return false;
   ++part_;
@@ -139,7 +140,8 @@ void RecordingFile::compare(const mcap::MessageRead& message, Topic topic) {
   const auto place = here - recorded.begin();
   std::array<char, 120> text{};
   if (here == recorded.end() || there == message.data.end()) {
-    std::snprintf(text.data(), text.size(), "%zu bytes, where the records say %zu", message.data.size(), recorded.size());
+    std::snprintf(text.data(), text.size(), "%zu bytes, where the records say %zu", message.data.size(),
+                  recorded.size());
   } else {
     std::snprintf(text.data(), text.size(), "byte %td of the message is 0x%02x, where the records say 0x%02x", place,
                   static_cast<unsigned>(*there), static_cast<unsigned>(*here));
@@ -158,7 +160,8 @@ bool RecordingFile::read_picture(const DepthFrameView& frame, const Picture& pic
   if (picture_.size() != head.size() + count * sizeof(std::uint16_t)) return complain(which + "is missing");
   pixels_.resize(count);
   std::memcpy(pixels_.data(), picture_.data() + head.size(), count * sizeof(std::uint16_t));
-  if (!std::equal(head.begin(), head.end(), picture_.begin()) || hash_of_pixels(pixels_.data(), count) != picture.hash) {
+  if (!std::equal(head.begin(), head.end(), picture_.begin()) ||
+      hash_of_pixels(pixels_.data(), count) != picture.hash) {
     return complain(which + "is not the one that was recorded, or its hash in /replay is wrong");
   }
   pixels = pixels_;

@@ -104,7 +104,6 @@ std::string printable(std::string name) {
   return name.substr(0, 60);
 }
 
-
 class HeaderReader {
  public:
   HeaderReader(std::span<const std::byte> bytes, RecordingHeader& header)

@@ -177,8 +177,8 @@ class Crossings {
 // Perception's part in a recording without pictures: its rows are not run, and what they left is handed to control.
 class BelievedPerception {
  public:
-  // Every row of perception's, since counts are told when they change. crossings: null while the rows are run. False: the
-  // outputs cannot be.
+  // Every row of perception's, since counts are told when they change. crossings: null while the rows are run. False:
+  // the outputs cannot be.
   [[nodiscard]] bool live(const RowCall& row, Crossings* crossings) {
     ByteReader in = row.outputs;
     FieldReader reader(in);
@@ -194,7 +194,8 @@ class BelievedPerception {
       PoseRequest request;
       walk(reader, "pose_request", request);
       if (request.number != 0) crossings->keep(row.cycle_ns, request);
-    } else if (crossings != nullptr && task == "footholds" && row.progress == static_cast<std::uint8_t>(Progress::kDone)) {
+    } else if (crossings != nullptr && task == "footholds" &&
+               row.progress == static_cast<std::uint8_t>(Progress::kDone)) {
       FootholdSet footholds;
       walk(reader, "footholds", footholds);
       crossings->keep(row.cycle_ns, footholds);

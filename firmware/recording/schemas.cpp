@@ -5,7 +5,8 @@ namespace polygmap::recording {
 namespace {
 
 // A definition is followed by those that it is made of, each behind such a line.
-#define POLYGMAP_MSG(name) "\n================================================================================\nMSG: " name "\n"
+#define POLYGMAP_MSG(name) \
+  "\n================================================================================\nMSG: " name "\n"
 #define POLYGMAP_VECTOR3 POLYGMAP_MSG("geometry_msgs/Vector3") "float64 x\nfloat64 y\nfloat64 z"
 #define POLYGMAP_POINT POLYGMAP_MSG("geometry_msgs/Point") "float64 x\nfloat64 y\nfloat64 z"
 #define POLYGMAP_QUATERNION POLYGMAP_MSG("geometry_msgs/Quaternion") "float64 x\nfloat64 y\nfloat64 z\nfloat64 w"

@@ -11,29 +11,29 @@
 namespace polygmap::recording {
 
 enum class Topic : std::uint8_t {
-  kParameters,   // all values, once
-  kReplay,       // everything, exactly, in the order in which it is to be lived again
-  kImu,          // what the module was given
-  kJoints,       //
-  kFeet,         //
-  kLio,          //
-  kDepth,        //
-  kCameraInfo,   //
-  kCommands,     // what it answered
-  kGains,        //
-  kOdometry,     // what it thought
-  kTransforms,   //
-  kSurfaces,     //
-  kMap,          //
-  kFootholds,    //
-  kGait,         //
-  kFrame,        // what the executive did
-  kFaults,       //
-  kTruth,        // what a simulation knows, written by whoever runs it
-  kTruthFeet,    //
-  kStairs,       //
-  kPreview,      // small pictures
-  kVerdict,      //
+  kParameters,  // all values, once
+  kReplay,      // everything, exactly, in the order in which it is to be lived again
+  kImu,         // what the module was given
+  kJoints,      //
+  kFeet,        //
+  kLio,         //
+  kDepth,       //
+  kCameraInfo,  //
+  kCommands,    // what it answered
+  kGains,       //
+  kOdometry,    // what it thought
+  kTransforms,  //
+  kSurfaces,    //
+  kMap,         //
+  kFootholds,   //
+  kGait,        //
+  kFrame,       // what the executive did
+  kFaults,      //
+  kTruth,       // what a simulation knows, written by whoever runs it
+  kTruthFeet,   //
+  kStairs,      //
+  kPreview,     // small pictures
+  kVerdict,     //
 };
 inline constexpr std::size_t kTopicCount = static_cast<std::size_t>(Topic::kVerdict) + 1;
 static_assert(kTopicCount <= mcap::kMaxChannels);

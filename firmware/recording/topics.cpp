@@ -235,7 +235,8 @@ void Topics::write_command(const JointCommand& command) noexcept {
   out_.begin();
   put_header(out_, command.stamp_ns, "");
   put_joint_names(out_);
-  for (double JointSetpoint::*const field : {&JointSetpoint::q_rad, &JointSetpoint::dq_radps, &JointSetpoint::tau_ff_nm}) {
+  for (double JointSetpoint::*const field :
+       {&JointSetpoint::q_rad, &JointSetpoint::dq_radps, &JointSetpoint::tau_ff_nm}) {
     put_joints(out_, [&command, field](std::size_t n) { return command.joints[n].*field; });
   }
 }

@@ -87,8 +87,8 @@ McapReader::Loaded McapReader::load_record(Opcode& opcode, std::uint64_t& begin)
     return Loaded::kBad;
   }
   if (is_needed(opcode)) {
-    const std::uint64_t most = opcode == Opcode::kChunk || opcode == Opcode::kMessage ? kMaxChunk_bytes
-                                                                                      : kMaxSmallRecord_bytes;
+    const std::uint64_t most =
+        opcode == Opcode::kChunk || opcode == Opcode::kMessage ? kMaxChunk_bytes : kMaxSmallRecord_bytes;
     if (length <= most) return load(record_, length);
     (void)complain_at(begin, "a record of " + std::to_string(length) + " bytes");
     return Loaded::kBad;
@@ -106,8 +106,11 @@ McapReader::Loaded McapReader::load_record(Opcode& opcode, std::uint64_t& begin)
 bool McapReader::read_schema(ByteReader in) {
   const auto id = in.get<std::uint16_t>();
   const std::string_view name = get_text(in);
+  (void)get_text(in);  // its language
+  const std::string_view text = get_text(in);
   if (in.failed() || schemas_.size() >= kMaxChannelsRead) return false;
-  if (std::ranges::find(schemas_, id, &Schema::id) == schemas_.end()) schemas_.push_back({id, std::string(name)});
+  if (std::ranges::find(schemas_, id, &Schema::id) == schemas_.end())
+    schemas_.push_back({id, std::string(name), std::string(text)});
   return true;
 }
 
@@ -119,8 +122,8 @@ bool McapReader::read_channel(ByteReader in) {
   if (std::ranges::find(channel_ids_, id) != channel_ids_.end()) return true;  // the summary repeats it
   const auto named = std::ranges::find(schemas_, schema, &Schema::id);
   channel_ids_.push_back(id);
-  channels_.push_back(
-      {std::string(topic), named == schemas_.end() ? std::string() : named->name, std::string(encoding)});
+  const Schema none, &of = named == schemas_.end() ? none : *named;
+  channels_.push_back({std::string(topic), of.name, of.text, std::string(encoding)});
   return true;
 }
 
@@ -153,7 +156,8 @@ McapReader::Found McapReader::read_chunk(std::uint64_t begin) {
     chunk_memory_.assign(packed.begin(), packed.end());
   } else {
     if (!decompress_) {
-      return complain_at(begin, "a chunk compressed by \"" + printable(compression) + "\", which this program does not read");
+      return complain_at(begin,
+                         "a chunk compressed by \"" + printable(compression) + "\", which this program does not read");
     }
     chunk_memory_.resize(plain_bytes);
     if (!decompress_(compression, packed, chunk_memory_)) {
@@ -161,7 +165,8 @@ McapReader::Found McapReader::read_chunk(std::uint64_t begin) {
     }
   }
   if (crc != 0 && Crc32::of(chunk_memory_) != crc && damage_.empty()) {
-    damage_ = "\"" + name_ + "\", byte " + std::to_string(begin) + ": the bytes of this chunk are not those that were written (CRC).";
+    damage_ = "\"" + name_ + "\", byte " + std::to_string(begin) +
+              ": the bytes of this chunk are not those that were written (CRC).";
   }
   chunk_ = chunk_memory_;
   chunk_place_ = begin;
@@ -172,7 +177,8 @@ McapReader::Found McapReader::next_in_chunk(MessageRead& message) {
   ByteReader in(chunk_);
   const auto opcode = in.get<Opcode>();
   const auto length = in.get<std::uint64_t>();
-  if (in.failed() || length > chunk_.size() - in.place()) return complain_at(chunk_place_, "a record in this chunk is too long");
+  if (in.failed() || length > chunk_.size() - in.place())
+    return complain_at(chunk_place_, "a record in this chunk is too long");
   ByteReader content(chunk_.subspan(in.place(), length));
   const std::span<const std::byte> all = chunk_.subspan(in.place(), length);
   chunk_ = chunk_.subspan(in.place() + length);

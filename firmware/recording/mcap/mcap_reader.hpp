@@ -15,7 +15,7 @@
 namespace polygmap::mcap {
 
 struct ChannelRead {
-  std::string topic, schema, encoding;
+  std::string topic, schema, schema_text, encoding;
 };
 struct MessageRead {
   std::size_t channel = 0;  // of McapReader::channels()
@@ -90,7 +90,7 @@ class McapReader {
   std::uint64_t chunk_place_ = 0;
   struct Schema {
     std::uint16_t id = 0;
-    std::string name;
+    std::string name, text;
   };
   std::vector<Schema> schemas_;
   std::vector<ChannelRead> channels_;

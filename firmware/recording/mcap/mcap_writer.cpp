@@ -44,7 +44,7 @@ constexpr std::size_t kIndexEntry_bytes = 8 + 8;
 constexpr std::uint64_t index_bytes(std::size_t count) noexcept {
   return count == 0 ? 0 : kRecordHead_bytes + 2 + 4 + kIndexEntry_bytes * count;
 }
-// Of a chunk's record, before the messages: times, size, CRC, compression "", length of the messages.
+// Of a chunk's record, before the messages: times, size, CRC, compression's length, length of the messages.
 constexpr std::size_t kChunkHead_bytes = 8 + 8 + 8 + 4 + 4 + 8;
 
 }  // namespace
@@ -181,17 +181,22 @@ bool McapWriter::end_chunk(std::span<const std::byte> records, std::span<const s
   Crc32 crc;
   crc.add(records);
   crc.add(more);
+  std::span<const std::byte> packed;
+  if (compressor_.compress != nullptr) packed = compressor_.compress(compressor_.of, records, more);
+  const std::string_view compression = packed.empty() ? std::string_view() : compressor_.name;
+  const std::uint64_t stored = packed.empty() ? length : packed.size();
   ByteWriter out(scratch_memory_);
   open_chunk_.begin = place_;
   open_chunk_.records_bytes = static_cast<std::uint32_t>(length);
-  put_record_head(out, Opcode::kChunk, kChunkHead_bytes + length);
+  open_chunk_.stored_bytes = static_cast<std::uint32_t>(stored);
+  put_record_head(out, Opcode::kChunk, kChunkHead_bytes + compression.size() + stored);
   out.put(open_chunk_.first_ns);
   out.put(open_chunk_.last_ns);
   out.put(length);
   out.put(crc.value());
-  put_text(out, "");
-  out.put(length);
-  const bool good = put(out) && put(records) && put(more) && put_indexes();
+  put_text(out, compression);
+  out.put(stored);
+  const bool good = put(out) && (packed.empty() ? put(records) && put(more) : put(packed)) && put_indexes();
   for (std::size_t i = 0; i < channels_.size(); ++i) counts_[i] += open_chunk_.counts[i];
   (void)chunks_.try_push_back(open_chunk_);
   messages_.clear();
@@ -259,7 +264,9 @@ void McapWriter::put_statistics(ByteWriter& out) const noexcept {
 }
 
 void McapWriter::put_chunk_index(ByteWriter& out, const ChunkEntry& chunk) const noexcept {
-  const std::uint64_t length = kRecordHead_bytes + kChunkHead_bytes + chunk.records_bytes;
+  const bool is_packed = chunk.stored_bytes != chunk.records_bytes;
+  const std::string_view compression = is_packed ? compressor_.name : std::string_view();
+  const std::uint64_t length = kRecordHead_bytes + kChunkHead_bytes + compression.size() + chunk.stored_bytes;
   const std::size_t begin = begin_record(out, Opcode::kChunkIndex);
   out.put(chunk.first_ns);
   out.put(chunk.last_ns);
@@ -276,8 +283,8 @@ void McapWriter::put_chunk_index(ByteWriter& out, const ChunkEntry& chunk) const
   }
   out.put_at(map_at, static_cast<std::uint32_t>(out.size() - map_at - sizeof(std::uint32_t)));
   out.put(index - chunk.begin - length);
-  put_text(out, "");
-  out.put(std::uint64_t{chunk.records_bytes});
+  put_text(out, compression);
+  out.put(std::uint64_t{chunk.stored_bytes});
   out.put(std::uint64_t{chunk.records_bytes});
   end_record(out, begin);
 }

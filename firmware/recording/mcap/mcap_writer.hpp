@@ -24,7 +24,7 @@ using ByteWriter = recording::ByteWriter;
 inline constexpr std::size_t kMaxChannels = 24;
 struct ChunkEntry {  // where a chunk is; the lengths of its message indexes follow from the counts
   std::uint64_t begin = 0;
-  std::uint32_t records_bytes = 0;
+  std::uint32_t records_bytes = 0, stored_bytes = 0;  // as they are, and in the file
   std::int64_t first_ns = 0, last_ns = 0;
   std::array<std::uint16_t, kMaxChannels> counts{};
 };
@@ -34,8 +34,8 @@ struct MessageEntry {
   std::uint16_t channel = 0;
 };
 
-// A chunk is closed when it is full or spans kChunk_ns: so much is lost at most when the program is killed. A file whose
-// index is full is finished, and the next one is begun beside it: run.mcap, run-1.mcap, run-2.mcap.
+// A chunk is closed when it is full or spans kChunk_ns: so much is lost at most when the program is killed. A file
+// whose index is full is finished, and the next one is begun beside it: run.mcap, run-1.mcap, run-2.mcap.
 class McapWriter {
  public:
   static constexpr std::size_t kMaxChunks = 4096;  // of a file
@@ -44,7 +44,17 @@ class McapWriter {
   static constexpr std::int64_t kChunk_ns = 400'000'000;
   static constexpr std::size_t kMaxPath = 512;
 
+  // Compresses a chunk's messages, given in two parts; where that does not make them fewer it answers none. What it
+  // answers stays until its next call. Off the robot: no codec belongs on its cores.
+  struct Compressor {
+    std::string_view name;  // as MCAP has it: zstd
+    std::span<const std::byte> (*compress)(void* of, std::span<const std::byte> records,
+                                           std::span<const std::byte> more) = nullptr;
+    void* of = nullptr;
+  };
+
   McapWriter() = default;
+  explicit McapWriter(const Compressor& compressor) noexcept : compressor_(compressor) {}
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
   ~McapWriter();
@@ -85,6 +95,7 @@ class McapWriter {
   [[nodiscard]] bool put(const ByteWriter& bytes) noexcept { return put(bytes.bytes()); }
   [[nodiscard]] bool fail(int error) noexcept;
 
+  Compressor compressor_;
   int file_ = -1;
   int errno_ = 0;
   std::array<char, kMaxPath> path_{}, first_path_{};

@@ -19,9 +19,10 @@
 #include "sim_stub/host/cli/params_command.hpp"
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
-#include "sim_stub/host/cli/replay_command.hpp"
+#include "sim_stub/host/cli/recording_commands.hpp"
 #include "sim_stub/host/operator/keyboard.hpp"
 #include "sim_stub/host/output_file.hpp"
+#include "sim_stub/host/report/report_page.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
 
 namespace polygmap::sim {
@@ -184,7 +185,7 @@ void declare_files(CLI::App& climb, ClimbArguments& a) {
                               "What OUT/run.mcap has, for replay, report and MCAP tools: all that goes into the module "
                               "and comes out of it, but pictures; all: pictures too, 18 MB a second; none: no file")
                   ->capture_default_str(),
-              {"no-pictures", "all", "none"});
+             {"no-pictures", "all", "none"});
 }
 
 void declare(CLI::App& climb, ClimbArguments& a) {
@@ -426,30 +427,14 @@ std::string complaint(ClimbArguments& a) {
   return {};
 }
 
-// Makes the directory and tries to write into it before a minute of climbing is spent.
-std::string directory_complaint(const std::string& directory, const std::string& option = "--out") {
-  namespace fs = std::filesystem;
-  std::error_code why, error;
-  fs::create_directories(directory, why);
-  if (!fs::is_directory(directory, error)) {
-    return "Cannot create the directory \"" + directory + "\" given by " + option + ": " + why.message() + ".";
-  }
-  const fs::path probe = fs::path(directory) / ".polygmap_probe";
-  std::ofstream file(probe);
-  file << "x";
-  file.close();
-  const bool written = static_cast<bool>(file);
-  fs::remove(probe, error);
-  return written ? "" : "Cannot write into the directory \"" + directory + "\" given by " + option + ".";
-}
-
 std::string output_complaint(const std::string& directory, bool with_inputs) {
   if (directory.empty()) return "--out must name a directory.";
   std::string complaint = directory_complaint(directory);
   if (complaint.empty() && with_inputs) complaint = directory_complaint(directory + "/inputs");
   if (!complaint.empty()) return complaint;
   try {  // what a former run left is none of this one's
-    for (const char* name : {"summary.json", "climb.svg"}) remove_output(directory + "/" + name);
+    for (const char* name : {"summary.json", "climb.svg", "run.mcap", "report.html"})
+      remove_output(directory + "/" + name);
     if (with_inputs) {
       for (const auto& entry : std::filesystem::directory_iterator(directory + "/inputs")) {
         const std::string name = entry.path().filename().string();
@@ -509,14 +494,16 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   CLI::App* perceive = declare_perceive(app, perceive_arguments);
   EstimateArguments estimate_arguments;
   CLI::App* estimate = declare_estimate(app, estimate_arguments);
-  ReplayArguments replay_arguments;
-  CLI::App* replay = declare_replay(app, replay_arguments);
+  RecordingArguments recording_arguments;
+  declare_recording_commands(app, recording_arguments);
   ParamsArguments params_arguments;
   CLI::App* params = declare_params(app, params_arguments);
   CanArguments can_arguments;
   CLI::App* can = declare_can(app, can_arguments);
-  for (CLI::App* command : {climb, perceive, estimate, replay, params_arguments.list, params_arguments.diff,
-                            can_arguments.encode, can_arguments.decode, can_arguments.dbc}) {
+  std::vector<CLI::App*> commands(recording_arguments.commands.begin(), recording_arguments.commands.end());
+  commands.insert(commands.end(), {climb, perceive, estimate, params_arguments.list, params_arguments.diff,
+                                   can_arguments.encode, can_arguments.decode, can_arguments.dbc});
+  for (CLI::App* command : commands) {
     for (CLI::Option* option : command->get_options()) option->check(not_empty);
   }
 
@@ -535,7 +522,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   }
   if (perceive->parsed()) return run_perceive(perceive_arguments, out, err, interrupt);
   if (estimate->parsed()) return run_estimate(estimate_arguments, out, err, interrupt);
-  if (replay->parsed()) return run_replay(replay_arguments, out, err);
+  if (const auto code = run_recording_command(recording_arguments, out, err)) return *code;
   if (can->parsed()) return run_can(can_arguments, out, err);
   if (params->parsed()) return run_params(params_arguments, out, err);
   if (!climb->parsed()) {  // asked for here: CLI11 would not name a subcommand that it does not know
@@ -574,6 +561,18 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   if (!not_written.empty()) {
     err << "polygmap: " << not_written << "\n";
     return kExitUsage;
+  }
+  if (!a.options.recording.empty()) {
+    try {
+      not_written = write_report({a.options.recording}, a.options.out_dir);
+    } catch (const std::exception& error) {
+      not_written = error.what();
+    }
+    if (not_written.empty()) out << a.options.out_dir << "/report.html\n" << std::flush;
+    if (!not_written.empty()) {
+      err << "polygmap: " << not_written << "\n";
+      return kExitUsage;
+    }
   }
   if (summary.interrupted_by != 0) return kExitSignal + summary.interrupted_by;
   return summary.pass ? kExitPass : kExitFail;

@@ -6,6 +6,8 @@
 #include <charconv>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <ostream>
 #include <system_error>
 
@@ -110,6 +112,22 @@ int written(std::ostream& out, std::ostream& err) {
   if (out << std::flush) return kExitPass;
   err << "polygmap: Cannot write to the standard output.\n";
   return kExitUsage;
+}
+
+std::string directory_complaint(const std::string& directory, const std::string& option) {
+  namespace fs = std::filesystem;
+  std::error_code why, error;
+  fs::create_directories(directory, why);
+  if (!fs::is_directory(directory, error)) {
+    return "Cannot create the directory \"" + directory + "\" given by " + option + ": " + why.message() + ".";
+  }
+  const fs::path probe = fs::path(directory) / ".polygmap_probe";
+  std::ofstream file(probe);
+  file << "x";
+  file.close();
+  const bool written = static_cast<bool>(file);
+  fs::remove(probe, error);
+  return written ? "" : "Cannot write into the directory \"" + directory + "\" given by " + option + ".";
 }
 
 std::string command_of(const CLI::App& app) {

@@ -21,6 +21,9 @@ namespace polygmap::sim {
 // The exit code of a command that is done: whether its standard output took everything, or a sentence on err.
 [[nodiscard]] int written(std::ostream& out, std::ostream& err);
 
+// Makes the directory and tries to write into it before minutes are spent. Empty, or why it cannot be.
+[[nodiscard]] std::string directory_complaint(const std::string& directory, const std::string& option = "--out");
+
 // "polygmap can encode ": the command that the words got as far as, to ask for its help.
 [[nodiscard]] std::string command_of(const CLI::App& app);
 

@@ -20,11 +20,13 @@ bool PreviewCamera::try_acquire(DepthFrameView& frame) noexcept {
   next_ns_ = frame.stamp_ns + kPeriod_ns;
   preview_.stamp_ns = frame.stamp_ns;
   for (std::uint32_t y = 0; y < preview_.height_px; ++y) {
-    const std::uint16_t* row = frame.depth + std::size_t{y} * Preview::kEvery_px * static_cast<std::size_t>(size.width_px);
+    const std::uint16_t* row =
+        frame.depth + std::size_t{y} * Preview::kEvery_px * static_cast<std::size_t>(size.width_px);
     for (std::uint32_t x = 0; x < preview_.width_px; ++x) {
       const std::uint16_t raw = row[x * Preview::kEvery_px];
       constexpr double kSteps = 254.0;
-      const double share = (size.depth_unit_m * raw - Preview::kNearest_m) / (Preview::kFarthest_m - Preview::kNearest_m);
+      const double share =
+          (size.depth_unit_m * raw - Preview::kNearest_m) / (Preview::kFarthest_m - Preview::kNearest_m);
       const auto level = static_cast<std::uint8_t>(1.0 + std::clamp(kSteps * share, 0.0, kSteps));
       preview_.pixels[std::size_t{y} * preview_.width_px + x] = raw == 0 ? std::uint8_t{0} : level;
     }
