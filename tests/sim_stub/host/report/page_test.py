@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """page_test [--page TEMPLATE] [--inject FILE] [TEST...]: opens the report's page in a headless Chromium, with the data of
 made-up climbs, and checks what the page promises. --inject puts a piece of HTML at each page's end: that is how every test is
@@ -35,7 +35,8 @@ class Pages:
         file = self.folder / f"{variant}.html"
         if not file.exists():
             text = sample_report.page_of(self.template, sample_report.data_of(variant))
-            file.write_text(text.replace("</body>", self.inject + "</body>"))
+            fill = re.sub(r"@FILL (\d+)@", lambda m: "." * int(m[1]), self.inject)
+            file.write_text(text.replace("</body>", fill + "</body>"))
         return file
 
 
@@ -215,6 +216,19 @@ def ClosestList_OfAClimb_LeadsToTheMoment(browser, pages):
 
 
 @test
+def TwoRuns_Opened_ShowDifferencesFirst(browser, pages):
+    page = browser.open(pages.path("two"))
+    check(page.run("document.querySelector('main > *').id") == "differences", "the differences do not come first")
+    said = page.run("document.querySelector('#differences').innerText")
+    for word in ("steps_climbed", "verdict", "--seed 11"):
+        check(word in said, f"the differences do not name {word}")
+    check("plane_rate_hz" not in said, "a figure that is the same in both is among the differences")
+    check(page.run("document.querySelectorAll('#overlaid .chart').length") >= 8, "the curves of both are not there")
+    page.close()
+    return None
+
+
+@test
 def LongRun_Opened_SeeksAnywhere(browser, pages):
     page = browser.open(pages.path("long"))
     page.run("window.polygmap.seek(900.5)")
@@ -277,7 +291,7 @@ def main():
     if not program():
         print("report_page: skipped, since there is no Chromium (apt-get install chromium)")
         return 77
-    inject = re.sub(r"^<!-- .*? -->\n", "", pathlib.Path(arguments.inject).read_text(), flags=re.M) if arguments.inject else ""
+    inject = pathlib.Path(arguments.inject).read_text() if arguments.inject else ""
     count = failed = 0
     with tempfile.TemporaryDirectory() as folder:
         pages = Pages(folder, pathlib.Path(arguments.page).read_text(), inject)

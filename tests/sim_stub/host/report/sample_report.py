@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """sample_report [--page TEMPLATE] [--list] VARIANT OUT: the data of a made-up climb, or a report page with them, as
 sim_stub/host/report/page/DATA.md has it. Variants: --list."""
