@@ -111,7 +111,9 @@ void ReportRun::take_call(const PortCall& call, std::int64_t cycle_ns) {
   }
   if (call.kind == CallKind::kReadLidar) {
     const Transform pose = page_T_world_ * (call.lio.lio_T_lidar * file_->params().robot.mounts.base_T_lidar.inverse());
-    lio_ms_.push_back(std::round(1e3 * time_s(cycle_ns)));
+    const double at_ms = std::round(1e3 * time_s(call.lio.stamp_ns));
+    if (!lio_ms_.empty() && at_ms <= lio_ms_.back()) return;
+    lio_ms_.push_back(at_ms);
     lio_.add(std::span(pose.p_m.data(), 3));
   }
   if (call.kind == CallKind::kAcquire && call.picture.pixels == recording::Pixels::kStored) has_pictures_ = true;
@@ -125,6 +127,7 @@ void ReportRun::take_outputs(const RowCall& row) {
   if (task == "estimate") {
     walk(reader, "state", state_);
     walk(reader, "quality", quality_);
+    if (!has_truth_) page_T_odom_ = state_.world_T_odom;
   } else if (task == "gait") {
     walk(reader, "status", gait_);
     walk(reader, "command", command_);
@@ -142,7 +145,7 @@ void ReportRun::take_outputs(const RowCall& row) {
     take_surfaces(surfaces_);
   } else if (task == "map" && is_done) {
     walk(reader, "map", map_);
-    versions_.add(time_s(now_ns_), map_, page_T_odom());
+    versions_.add(time_s(now_ns_), map_, page_T_odom_);
   } else if (task == "footholds" && is_done) {
     walk(reader, "footholds", footholds_);
     take_footholds(footholds_);
@@ -182,14 +185,14 @@ void ReportRun::take_steps() {
   if (steps_.empty() || steps_.back().sequence != step.sequence) {
     steps_.push_back(step);
     step_places_.emplace_back();
-    const Transform page_T_target = page_T_odom() * step.odom_T_target;
+    const Transform page_T_target = page_T_odom_ * step.odom_T_target;
     step_places_.back()["target_m"] = rounded(
         std::array{page_T_target.p_m.x(), page_T_target.p_m.y(), page_T_target.p_m.z(), yaw_of(page_T_target.R)});
   }
   const bool has_landed = steps_.back().touch_down_stamp_ns == 0 && step.touch_down_stamp_ns != 0;
   steps_.back() = step;
   if (!has_landed) return;
-  const Transform page_T_sole = page_T_odom() * step.odom_T_executed;
+  const Transform page_T_sole = page_T_odom_ * step.odom_T_executed;
   step_places_.back()["executed_m"] =
       rounded(std::array{page_T_sole.p_m.x(), page_T_sole.p_m.y(), page_T_sole.p_m.z(), yaw_of(page_T_sole.R)});
 }
@@ -225,8 +228,8 @@ void ReportRun::finish_sample() {
   }
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     has_truth_ ? sole_true_[foot].add(true_T_sole_[foot]) : sole_true_[foot].add_missing();
-    sole_estimated_[foot].add(page_T_odom() * state_.odom_T_sole[foot]);
-    sole_desired_[foot].add(page_T_odom() * gait_.odom_T_sole_desired[foot]);
+    sole_estimated_[foot].add(page_T_odom_ * state_.odom_T_sole[foot]);
+    sole_desired_[foot].add(page_T_odom_ * gait_.odom_T_sole_desired[foot]);
   }
   base_fused_.add(page_T_world_ * state_.world_T_base());
   base_odometry_.add(page_T_world_ * state_.odom_T_base);
@@ -267,6 +270,7 @@ void ReportRun::take_true_feet(std::span<const std::byte> message) {
   skip_header(in);
   if (in.get_count(7 * sizeof(double)) != kFootCount) return;
   for (Transform& sole : true_T_sole_) sole = get_pose(in);
+  page_T_odom_ = true_T_base_ * state_.odom_T_base.inverse();
   finish_sample();
 }
 
@@ -368,7 +372,7 @@ ReportJson ReportRun::safe_json(const Foothold& foothold) const {
   ReportJson corners = ReportJson::array();
   const double height_m = foothold.position_m.z();
   for (const Vec2& corner : safe) {
-    const Vec3 there = page_T_odom() * Vec3(corner.x(), corner.y(), height_m);
+    const Vec3 there = page_T_odom_ * Vec3(corner.x(), corner.y(), height_m);
     for (int i = 0; i < 3; ++i) corners.push_back(rounded(there[i]));
   }
   return {{"polygon_id", foothold.polygon_id}, {"vertices", corners}};
@@ -390,7 +394,7 @@ void ReportRun::take_footholds(const FootholdSet& set) {
   search["safe"] = ReportJson::array();
   const auto add = [&](const char* name, const std::array<Foothold, kFootCount>& feet) {
     ReportJson both = ReportJson::array();
-    for (const Foothold& foot : feet) both.push_back(foothold_json(foot, page_T_odom()));
+    for (const Foothold& foot : feet) both.push_back(foothold_json(foot, page_T_odom_));
     search[name] = std::move(both);
     if (ReportJson safe = safe_json(feet[0]); !safe.is_null()) search["safe"].push_back(std::move(safe));
   };

@@ -43,7 +43,6 @@ class ReportRun {
   [[nodiscard]] double time_s(std::int64_t at_ns) const noexcept {
     return 1e-9 * static_cast<double>(at_ns - first_ns_);
   }
-  [[nodiscard]] Transform page_T_odom() const noexcept { return page_T_world_ * state_.world_T_odom; }
   [[nodiscard]] ReportJson foothold_json(const Foothold& foothold, const Transform& page_T_odom) const;
   [[nodiscard]] ReportJson safe_json(const Foothold& foothold) const;
 
@@ -68,6 +67,8 @@ class ReportRun {
   std::array<Transform, kFootCount> true_T_sole_;
   bool has_truth_ = false, has_pictures_ = false;
   Transform page_T_world_;  // of the module's world on the true one, once, when it has initialised
+  // Of odometry by the moment: drift moves no foothold against its stairs, and so it must not on the page.
+  Transform page_T_odom_;
   bool is_aligned_ = false;
 
   // A sample that waits for its truth.

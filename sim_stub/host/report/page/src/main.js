@@ -5,6 +5,7 @@ import { failureOf } from "./core/failure.js";
 import { robotAt } from "./core/now.js";
 import { Player } from "./core/player.js";
 import { parse } from "./core/run.js";
+import { closestOfBoth, compareHeader, compareSection, differencesPanel } from "./panels/compare.js";
 import { bindKeys, helpDialog } from "./panels/keys.js";
 import { legend } from "./panels/legend.js";
 import { MomentPanel } from "./panels/moment.js";
@@ -23,19 +24,25 @@ function say(sentence) {
   root.replaceChildren(h("header", {}, h("div.title", {}, h("h1", {}, "PolygMap"), h("p.reason", {}, sentence))));
 }
 
+/** The SECONDS of #t=SECONDS, or null. */
+function asksForTime() {
+  const asked = /[#&]t=([-+\d.eE]+)/.exec(location.hash)?.[1];
+  return asked !== undefined && Number.isFinite(Number(asked)) ? asked : null;
+}
+
 /** Where to open: as the address says, else where it failed, else at the start. */
 function openingTime(run) {
-  const asked = /[#&]t=([-+\d.eE]+)/.exec(location.hash)?.[1];
-  if (asked !== undefined && Number.isFinite(Number(asked))) return Number(asked);
+  if (asksForTime()) return Number(asksForTime());
   return run.failure?.t_s ?? 0;
 }
 
-function build(run) {
-  const player = new Player(run.duration_s);
+function build(runs) {
+  const [run, other] = runs;
+  const player = new Player(Math.max(...runs.map((r) => r.duration_s)));
   const pictures = new Pictures(run);
   const picture = new PicturePanel(run, pictures), top = new TopView(run, pictures), words = new MomentPanel(run);
   const stage = h("section.panel.stage", { id: "stage", "aria-label": "Replay" });
-  const view = replayView(stage, run);
+  const view = replayView(stage, run, other);
   const help = helpDialog();
   const look = (n) => {
     view.look(n);
@@ -43,10 +50,12 @@ function build(run) {
   };
   const transport = new Transport(run, player, look, () => help.showModal());
   setPlayer(player);
-  stage.append(legend(run));
-  root.replaceChildren(header(run, player), h("main", {}, h("div.replay", {}, stage, h("div.column", {}, picture.element, top.element), words.element),
-    closestPanel(run, player), stepsPanel(run, player), h("div.pair", {}, paperPanel(run), h("div", {}, faultsPanel(run, player))), timeSection(run, player),
-    h("div.pair", {}, memoryPanel(run), originPanel(run)), parametersPanel(run)), transport.element, help);
+  stage.append(legend(run, other));
+  const replay = h("div.replay", {}, stage, h("div.column", {}, picture.element, top.element), words.element);
+  const parts = other ? [differencesPanel(runs), replay, compareSection(runs), closestOfBoth(runs, player)]
+    : [replay, closestPanel(run, player), stepsPanel(run, player), h("div.pair", {}, paperPanel(run), h("div", {}, faultsPanel(run, player))), timeSection(run, player),
+      h("div.pair", {}, memoryPanel(run), originPanel(run)), parametersPanel(run)];
+  root.replaceChildren(other ? compareHeader(runs, player) : header(run, player), h("main", {}, parts), transport.element, help);
   let settled = Promise.resolve();
   player.seek(openingTime(run));
   player.listen((t_s) => {
@@ -56,8 +65,8 @@ function build(run) {
     settled = Promise.all([picture.show(t_s), top.show(t_s)]);
   });
   bindKeys(player, look, help);
-  window.addEventListener("hashchange", () => player.seek(openingTime(run)));
-  return { player, settled: () => settled, view };
+  window.addEventListener("hashchange", () => asksForTime() && player.seek(openingTime(run)));
+  return { player, settled: () => settled };
 }
 
 function state(run, t_s) {
@@ -74,11 +83,11 @@ async function main() {
   } catch (error) {
     return say(`This report cannot be read: ${error.message}.`);
   }
-  const run = runs[0];
-  run.failure = failureOf(run);
-  const page = build(run);
+  runs = runs.slice(0, 2);
+  for (const run of runs) run.failure = failureOf(run);
+  const page = build(runs);
   window.polygmap = {
-    duration_s: run.duration_s,
+    duration_s: page.player.duration_s,
     /** Shows that moment; what it promises is kept when all of the page does. */
     seek: async (t_s) => {
       page.player.pause();
@@ -86,7 +95,7 @@ async function main() {
       page.player.flush();
       await page.settled();
     },
-    state: () => state(run, page.player.t_s),
+    state: () => state(runs[0], page.player.t_s),
   };
   await page.settled();
   document.documentElement.dataset.ready = "yes";

@@ -3,7 +3,7 @@
 // who see red and green alike tell them by lightness, and no role is told by colour alone.
 
 const NAMES = ["map", "safe", "pstar", "pstarstar", "truth", "odometry", "lio", "fused", "left", "right", "ink", "faint", "line", "panel", "page", "stair",
-  "stairline", "riser", "robot", "robotdark", "camera", "bad", "good", "warn", "band", "band3", "grid", "stage", "floor", "nosing"];
+  "stairline", "riser", "robot", "robotdark", "camera", "bad", "good", "warn", "band", "band3", "grid", "stage", "floor", "nosing", "runA", "runB"];
 
 export const colours = {};
 

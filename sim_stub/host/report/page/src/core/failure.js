@@ -26,7 +26,7 @@ export function before(run, t_s, seconds = 4) {
   for (const e of run.events) if (within(e.t_s)) out.push([e.t_s, `${e.kind} ${e.name.replace(/_/g, " ")}${e.text ? `: ${e.text}` : ""}`]);
   for (const p of run.pushes) if (within(p.t_s)) out.push([p.t_s, `pushed by ${Math.hypot(...p.force_n).toFixed(0)} N`]);
   for (const s of run.steps) {
-    if (within(s.latch_s)) out.push([s.latch_s, `${s.foot} foot lifts off, step ${s.sequence}`]);
+    if (within(s.latch_s)) out.push([s.latch_s, `${s.foot} foot lifts off for ${s.step ? `step ${s.step}` : "the floor"}`]);
     if (isNumber(s.touch_down_s) && within(s.touch_down_s)) out.push([s.touch_down_s, `${s.foot} foot lands`]);
   }
   let last = null;

@@ -2,7 +2,7 @@
 // What the colours of the replay mean.
 import { h } from "../core/dom.js";
 
-export function legend(run) {
+export function legend(run, other) {
   const entries = [
     run.stairs ? ["stair", "true stairs", "The stairs as they are: the robot does not know them."] : null,
     run.polygons.length ? ["map", "mapped tread", "Polygons that the robot made of its pictures; dashed where it has not seen the end."] : null,
@@ -14,6 +14,7 @@ export function legend(run) {
     ["right", "right foot's path", ""],
     run.camera ? ["camera", "camera's view", ""] : null,
     run.hasTruth ? ["fused", "sole as estimated", "Outline of where the robot believes its soles to be."] : null,
+    other ? ["runB", `${other.name}'s robot`, "The second run at the same time."] : null,
   ].filter(Boolean);
   return h("ul.legend3d", {}, entries.map(([role, label, title]) => h("li", { title }, h(`span.key.${role}`), label)));
 }

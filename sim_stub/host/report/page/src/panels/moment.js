@@ -46,7 +46,7 @@ export function does(run, t_s) {
   const swing = run.swingAt(t_s);
   if (swing) out.push(`The ${swing.foot} foot is in the air, to ${placeOf(swing)}${swing.touch_down_s ? `; it lands at ${seconds(swing.touch_down_s)}` : "; it is put back where it stood"}.`);
   else if (phase === "double_support") out.push("Both feet stand; the weight moves over the next standing foot.");
-  else if (phase) out.push("Both feet stand.");
+  else if (phase && state !== "fallen") out.push("Both feet stand.");
   const push = run.pushes.find((p) => p.t_s <= t_s && t_s <= p.t_s + p.duration_s);
   if (push) out.push(`It is pushed by ${number(Math.hypot(...push.force_n), 0)} N.`);
   return out.length ? out : ["The file does not say."];

@@ -76,11 +76,13 @@ export class PicturePanel {
 
   coloured(pixels) {
     const canvas = new OffscreenCanvas(pixels.width, pixels.height);
-    const context = canvas.getContext("2d");
+    const context = canvas.getContext("2d", { willReadFrequently: true });
     const image = context.createImageData(pixels.width, pixels.height);
-    const { near_m, far_m } = this.run.camera;
+    const sorted = pixels.depth_m.filter(Number.isFinite).sort();
+    this.range_m = [sorted[Math.floor(0.01 * sorted.length)] ?? 0, sorted[Math.floor(0.99 * sorted.length)] ?? 1];
+    const [near_m, far_m] = this.range_m;
     for (let i = 0; i < pixels.depth_m.length; ++i) {
-      const [r, g, b] = depthColour((pixels.depth_m[i] - near_m) / (far_m - near_m));
+      const [r, g, b] = depthColour((pixels.depth_m[i] - near_m) / Math.max(far_m - near_m, 0.05));
       image.data.set([r, g, b, 255], 4 * i);
     }
     context.putImageData(image, 0, 0);
@@ -92,7 +94,7 @@ export class PicturePanel {
     const camera = this.run.camera;
     this.canvas.width = 640;
     this.canvas.height = Math.round((640 * camera.height_px) / camera.width_px);
-    const context = this.canvas.getContext("2d");
+    const context = this.canvas.getContext("2d", { willReadFrequently: true });
     context.imageSmoothingEnabled = false;
     context.drawImage(this.image, 0, 0, this.canvas.width, this.canvas.height);
     if (this.withPlanes) for (const surface of this.picture.surfaces ?? []) this.paintSurface(context, surface, this.canvas.width / camera.width_px);
@@ -106,7 +108,7 @@ export class PicturePanel {
     context.beginPath();
     corners.forEach(([u, v], i) => (i ? context.lineTo(u, v) : context.moveTo(u, v)));
     context.closePath();
-    context.fillStyle = faded(colour, 0.42);
+    context.fillStyle = faded(colour, 0.3);
     context.fill();
     context.lineWidth = 3;
     context.strokeStyle = colour;
@@ -138,7 +140,8 @@ export class PicturePanel {
     if (!this.picture) return;
     const surfaces = this.picture.surfaces ?? [];
     const none = this.picture.invalid_fraction;
-    this.said.textContent = `${seconds(this.picture.t_s)}: ${surfaces.length} surfaces${none === undefined ? "" : `, ${number(none * 100, 0)} % of the pixels without depth`}`;
+    const holes = none === undefined ? "" : `; ${number(none * 100, 0)} % without depth`;
+    this.said.textContent = `${seconds(this.picture.t_s)}: ${surfaces.length} surfaces. Bright is ${number(this.range_m[0], 1)} m, dark ${number(this.range_m[1], 1)} m away${holes}`;
   }
 
   readOut(event) {

@@ -9,8 +9,8 @@ import { points } from "../view/points.js";
 import { heightColour } from "./ramp.js";
 
 const CELL_m = 0.02;
-const SPAN_m = 1.7; // shown from left to right
-const BEHIND_m = 0.45;
+const SPAN_m = 1.5; // shown from left to right
+const BEHIND_m = 0.3;
 
 export class TopView {
   constructor(run, pictures) {
@@ -60,14 +60,14 @@ export class TopView {
   paint() {
     if (!this.now) return;
     const canvas = this.canvas;
-    canvas.width = 720;
-    canvas.height = 560;
-    const context = canvas.getContext("2d");
+    canvas.width = 640;
+    canvas.height = 520;
+    const context = canvas.getContext("2d", { willReadFrequently: true });
     const middle = this.now.base?.p ?? [0, 0, 0];
     const scale = canvas.width / SPAN_m;
     this.x0 = middle[0] - BEHIND_m;
     this.scale = scale;
-    const at = ([x, y]) => [(x - this.x0) * scale, canvas.height / 2 - y * scale];
+    const at = ([x, y]) => [canvas.width / 2 - y * scale, canvas.height - (x - this.x0) * scale];
     context.fillStyle = colours.panel;
     context.fillRect(0, 0, canvas.width, canvas.height);
     this.lowest = Math.min(...[this.now.soles[0], this.now.soles[1]].map((s) => s?.p[2] ?? 0));
@@ -96,8 +96,8 @@ export class TopView {
     if (!this.raster) return;
     const size = CELL_m * scale + 0.6;
     for (const [x, y, z] of this.raster.values()) {
-      const [u, v] = at([x - CELL_m / 2, y + CELL_m / 2]);
-      if (u < -size || u > 720) continue;
+      const [u, v] = at([x + CELL_m / 2, y + CELL_m / 2]);
+      if (v < -size || v > 520) continue;
       const [r, g, b] = heightColour((z - this.lowest + 0.15) / 0.7);
       context.fillStyle = `rgb(${r},${g},${b})`;
       context.fillRect(u, v, size, size);
@@ -143,14 +143,14 @@ export class TopView {
   }
 
   describe() {
-    const heights = this.raster ? `colours: heights that the picture of ${number(this.picture.t_s, 2)} s shows, dark low, bright high` : "no picture, so no heights: the map alone";
-    this.said.textContent = `Up the stairs is to the right; ${heights}`;
+    const heights = this.raster ? `squares of 20 mm: heights in the picture, dark low, bright high` : "no picture, so no heights: the map alone";
+    this.said.textContent = `Up the stairs is up; ${heights}`;
   }
 
   readOut(event) {
     const box = this.canvas.getBoundingClientRect();
-    const x = this.x0 + (((event.clientX - box.left) / box.width) * this.canvas.width) / this.scale;
-    const y = (this.canvas.height / 2 - ((event.clientY - box.top) / box.height) * this.canvas.height) / this.scale;
+    const y = (this.canvas.width / 2 - ((event.clientX - box.left) / box.width) * this.canvas.width) / this.scale;
+    const x = this.x0 + (this.canvas.height * (1 - (event.clientY - box.top) / box.height)) / this.scale;
     const z = this.raster?.get(Math.round(x / CELL_m) * 4096 + Math.round(y / CELL_m))?.[2];
     this.said.textContent = `x ${number(x, 2)} m, y ${number(y, 2)} m: ${z === undefined ? "no height measured" : `height ${number(z, 3)} m`}`;
   }

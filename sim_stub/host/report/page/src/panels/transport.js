@@ -21,7 +21,7 @@ export class Transport {
       player.seek(this.slider.value);
     } });
     this.speed = h("select", { "aria-label": "Speed", title: "Speed (- and +)", onchange: () => player.setSpeed(Number(this.speed.value)) }, SPEEDS.map((s) => h("option", { value: s, selected: s === 1 }, `${s}×`)));
-    this.views = ["3D", "side", "top", "camera"].map((name, i) => h("button.small", { type: "button", title: `View ${i + 1} (key ${i + 1})`, "aria-pressed": i === 0, onclick: () => look(i + 1) }, name));
+    this.views = ["3D", "side", "top", "camera"].map((name, i) => h("button.small", { type: "button", title: `View ${i + 1} (key ${i + 1})`, "aria-pressed": String(i === 0), onclick: () => look(i + 1) }, name));
     this.element = h("div.transport", { role: "toolbar", "aria-label": "Replay" },
       this.play, this.time, h("div.track", {}, this.marks(), this.slider),
       this.speed, h("div.views", { role: "group", "aria-label": "View" }, this.views), h("button.small.help", { type: "button", title: "Keys (?)", "aria-label": "Keys", onclick: help }, "?"));

@@ -14,13 +14,19 @@ function facts(run) {
   return [`${s.steps_total} steps${a?.rise_m ? ` of ${number(a.rise_m, 2)} × ${number(a.tread_m, 2)} m` : ""}`, s.gait && `gait ${s.gait}`, s.plant && `plant ${s.plant}`, noise, isNumber(s.seed) && `seed ${s.seed}`].filter(Boolean);
 }
 
+export const chip = (verdict) => h(`span.chip.${verdict ?? "unknown"}`, {}, WORDS[verdict] ?? "Not judged");
+
 export function header(run, player) {
-  const verdict = run.verdict;
-  const chip = h(`span.chip.${verdict ?? "unknown"}`, {}, WORDS[verdict] ?? "Not judged");
-  const title = h("div.title", {}, h("h1", {}, "PolygMap"), chip, h("p.reason", {}, run.failure?.sentence ?? run.summary?.reason ?? run.missing("summary")));
-  const element = h("header", {}, title, h("p.facts", {}, [run.name, seconds(run.duration_s), ...facts(run)].join(" · ")));
+  const title = h("div.title", {}, h("h1", {}, "PolygMap"), chip(run.verdict), h("p.reason", {}, run.failure?.sentence ?? run.summary?.reason ?? run.missing("summary")));
+  const element = h("header", {}, title, h("div.facts", {}, h("p", {}, [run.name, seconds(run.duration_s), ...facts(run)].join(" · ")), contents()));
   if (run.failure) element.append(failureBox(run, player));
   return element;
+}
+
+const PARTS = [["closest", "closest to going wrong"], ["steps", "steps"], ["paper", "beside the paper"], ["time", "over time"], ["cost", "cost"], ["memory", "memory"], ["parameters", "parameters"]];
+
+function contents() {
+  return h("nav.contents", { "aria-label": "Parts of the page" }, PARTS.map(([id, text]) => h("button", { type: "button", onclick: () => document.getElementById(id)?.scrollIntoView({ behavior: "smooth" }) }, text)));
 }
 
 function failureBox(run, player) {

@@ -5,7 +5,9 @@ import { colours, onTheme } from "../core/colours.js";
 import { h, number } from "../core/dom.js";
 
 const all = new Set();
+const zoomed = []; // who else shows a part of the run
 let player = null;
+let shown = null; // [from, to] in s; null: all of the run
 
 export function setPlayer(p) {
   player = p;
@@ -14,8 +16,18 @@ export function setPlayer(p) {
   });
 }
 
+/** What part of the run is shown: [from, to]. */
+export const part = () => shown ?? [0, player.duration_s];
+
+/** Calls back when the reader zooms. */
+export function onZoom(call) {
+  zoomed.push(call);
+}
+
 function zoom(range) {
-  for (const chart of all) chart.plot?.setScale("x", range ? { min: range[0], max: range[1] } : { min: 0, max: player.duration_s });
+  shown = range;
+  for (const chart of all) chart.plot?.setScale("x", { min: part()[0], max: part()[1] });
+  for (const call of zoomed) call();
 }
 
 const axis = (more) => ({ stroke: () => colours.faint, grid: { stroke: () => colours.grid, width: 1 }, ticks: { stroke: () => colours.grid, width: 1, size: 4 }, font: "11px system-ui, sans-serif", ...more });
@@ -29,7 +41,7 @@ export class Chart {
     this.spec = spec;
     this.host = h("div.plot");
     this.legend = h("div.legend", {}, spec.lines.map((line) => h("button.small.entry", { type: "button", "aria-pressed": "true", title: "Show or hide", onclick: (e) => this.hide(line, e.currentTarget) }, h("span.stroke", { style: `--c: var(--${line.colour}); ${line.dash ? "border-top-style: dashed" : ""}${line.points ? "; border-top-style: dotted" : ""}` }), h("span", {}, line.label), h("output", {}))));
-    this.element = h("figure.chart", {}, h("figcaption", {}, h("span", {}, spec.title), this.legend), this.host);
+    this.element = h("figure.chart", {}, h("figcaption", {}, spec.title), h("div.row", {}, this.host, this.legend));
     this.outputs = [...this.legend.querySelectorAll("output")];
     all.add(this);
     onTheme(() => this.plot?.redraw(false));
@@ -47,9 +59,10 @@ export class Chart {
       paths: line.points ? () => null : undefined, spanGaps: false,
     }))];
     const options = {
-      width: this.host.clientWidth || 600, height: spec.height ?? 150, legend: { show: false }, scales: { x: { time: false, min: 0, max: player.duration_s }, y: { range: spec.range } },
+      width: this.host.clientWidth || 600, height: spec.height ?? 150, legend: { show: false }, scales: { x: { time: false, min: part()[0], max: part()[1] }, y: { range: spec.range } },
       series, bands: (spec.bands ?? []).map((b) => ({ series: b.series, fill: () => colours.band })),
-      axes: [axis({ values: (_, ticks) => ticks.map((t) => `${t} s`), size: 26 }), axis({ label: spec.unit, labelSize: 16, labelFont: "11px system-ui, sans-serif", size: 50 })],
+      axes: [axis({ values: (_, ticks) => ticks.map((t) => `${t} s`), size: 26 }), axis({ label: spec.unit, labelSize: 16, labelFont: "11px system-ui, sans-serif", size: this.gutter() - 16 })],
+      padding: [8, 1, 0, 0],
       cursor: { sync: { key: "polygmap" }, drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
       hooks: { draw: [(plot) => this.over(plot)], setCursor: [(plot) => this.readOut(plot.cursor.idx)], setSelect: [(plot) => this.select(plot)] },
     };
@@ -65,6 +78,11 @@ export class Chart {
     this.plot.over.addEventListener("dblclick", () => zoom(null));
     new ResizeObserver(() => this.host.clientWidth && this.plot.setSize({ width: this.host.clientWidth, height: spec.height ?? 150 })).observe(this.host);
     this.mark(player.t_s);
+  }
+
+  /** Wide enough that curves and strips stand under each other. */
+  gutter() {
+    return this.host.clientWidth < 500 ? 66 : 100;
   }
 
   select(plot) {

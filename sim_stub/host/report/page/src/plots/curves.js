@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The curves of a run: what each chart shows, made of the run's series when it is first looked at.
-import uPlot from "uplot";
 import { h, isNumber } from "../core/dom.js";
 import { FEET } from "../core/now.js";
 import { tiltOf, yawOf } from "../core/pose.js";
+import { indexAt } from "../core/series.js";
 import { Chart } from "./chart.js";
 
 const finite = (values, scale = 1) => Array.from(values, (v) => (Number.isFinite(v) ? v * scale : null));
@@ -34,7 +34,9 @@ export function poseCharts(run) {
       const table = [Array.from(t), ...made];
       if (!lio?.count) return table;
       const off = minus(lio.columns[c], read(truth, lio.t_s, c), 1e3);
-      return uPlot.join([table, [Array.from(lio.t_s), off]]).map((column, i) => (i ? column.map((v) => v ?? null) : column));
+      const points = new Array(t.length).fill(null); // each at the sample before it
+      off.forEach((v, i) => (points[Math.max(indexAt(t, lio.t_s[i]), 0)] = v));
+      return [...table, points];
     };
     if (sigma) {
       add({ label: "+3σ", colour: "band3", width: 1 }, () => finite(sigma.columns[c], 3e3));

@@ -4,6 +4,7 @@ import { costs } from "../core/closest.js";
 import { colours, faded, onTheme } from "../core/colours.js";
 import { h, isNumber, moment, number, words } from "../core/dom.js";
 import { bands } from "../panels/transport.js";
+import { onZoom, part } from "./chart.js";
 
 const STATE_COLOUR = { walking_up: "lio", climbing: "map", stopping: "warn", safe_stop: "warn", fallen: "bad", on_top: "safe" };
 const PHASE_COLOUR = { double_support: "stairline", swing: "camera", finished: "safe", stopped: "warn" };
@@ -18,12 +19,18 @@ class Strip {
     this.cursor = h("i.cursor");
     this.said = h("output", {});
     this.element = h("div.strip", {}, h("span.name", {}, label), h("div.lane", {}, this.canvas, this.cursor), tail ?? h("span.tail", {}, this.said));
-    const timeAt = (e) => (e.offsetX / this.canvas.clientWidth) * player.duration_s;
+    const timeAt = (e) => part()[0] + (e.offsetX / this.canvas.clientWidth) * (part()[1] - part()[0]);
     this.canvas.addEventListener("click", (e) => player.seek(timeAt(e)));
     this.canvas.addEventListener("pointermove", (e) => (this.canvas.title = say(timeAt(e)) ?? ""));
     this.say_ = say;
     new ResizeObserver(() => this.paint()).observe(this.canvas);
     onTheme(() => this.paint());
+    onZoom(() => this.paint());
+  }
+
+  share(t_s) {
+    const [from, to] = part();
+    return (t_s - from) / Math.max(to - from, 1e-6);
   }
 
   paint() {
@@ -34,11 +41,14 @@ class Strip {
     this.canvas.height = Math.round(this.height * ratio);
     const context = this.canvas.getContext("2d");
     context.scale(ratio, ratio);
-    this.paint_(context, (t_s) => (t_s / Math.max(this.player.duration_s, 1e-6)) * width, width, this.height);
+    this.paint_(context, (t_s) => this.share(t_s) * width, width, this.height);
+    this.mark(this.player.t_s);
   }
 
   mark(t_s) {
-    this.cursor.style.left = `${(100 * t_s) / Math.max(this.player.duration_s, 1e-6)}%`;
+    const share = this.share(t_s);
+    this.cursor.hidden = share < 0 || share > 1;
+    this.cursor.style.left = `${100 * share}%`;
     this.said.textContent = this.say_(t_s) ?? "";
   }
 }
@@ -59,7 +69,7 @@ function contactStrip(run, player) {
   if (!contact?.count) return null;
   const paint = (context, x, width, height) => {
     for (let px = 0; px < width; ++px) {
-      const row = contact.at((px / width) * player.duration_s);
+      const row = contact.at(part()[0] + (px / width) * (part()[1] - part()[0]));
       row.forEach((p, foot) => {
         if (!(p > 0.02)) return;
         context.fillStyle = faded(colours[foot ? "right" : "left"], Math.min(p, 1));
@@ -80,7 +90,7 @@ function eventStrip(label, events, colour, player) {
       context.fillRect(x(e.t_s) - 1, 0, Math.max(x(e.t_s + (e.duration_s ?? 0)) - x(e.t_s), 2), height);
     }
   };
-  const near = (t) => events.filter((e) => Math.abs(e.t_s - t) < Math.max(player.duration_s / 150, e.duration_s ?? 0));
+  const near = (t) => events.filter((e) => Math.abs(e.t_s - t) < Math.max((part()[1] - part()[0]) / 150, e.duration_s ?? 0));
   return new Strip(label, player, 16, paint, (t) => near(t).map((e) => e.say ?? `${words(e.name)}${e.count > 1 ? ` ×${e.count}` : ""} at ${number(e.t_s, 2)} s`).join("; "));
 }
 
@@ -109,12 +119,12 @@ export function costStrips(run, player) {
       context.fillRect(0, 0, width, height);
       const peak = new Float64Array(Math.ceil(width) + 1);
       for (let i = 0; i < cost.count; ++i) {
-        const px = Math.floor(x(cost.t_s[i])), part = column[i] / budget;
-        if (part > peak[px]) peak[px] = part;
+        const px = Math.floor(x(cost.t_s[i])), used = column[i] / budget;
+        if (used > peak[px]) peak[px] = used;
       }
-      peak.forEach((part, px) => {
-        context.fillStyle = part > 1 ? colours.bad : faded(colours.fused, 0.85);
-        const high = Math.min(part, 1) * height;
+      peak.forEach((used, px) => {
+        context.fillStyle = used > 1 ? colours.bad : faded(colours.fused, 0.85);
+        const high = Math.min(used, 1) * height;
         context.fillRect(px, height - high, 1, high);
       });
     };

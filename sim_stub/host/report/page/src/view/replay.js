@@ -4,7 +4,7 @@ import { h } from "../core/dom.js";
 import { Scene3d } from "./scene3d.js";
 import { SideView } from "./sideview.js";
 
-export function replayView(stage, run) {
+export function replayView(stage, run, other) {
   const host = h("div.canvas");
   stage.append(host);
   if (!run.base?.count) {
@@ -12,18 +12,9 @@ export function replayView(stage, run) {
     return { show() {}, look() {} };
   }
   const asked = new URLSearchParams(location.search).has("svg");
-  if (!asked && hasWebGl()) {
-    try {
-      return new Scene3d(host, run);
-    } catch {
-      host.replaceChildren(); // it said that it has WebGL, and has not
-    }
-  }
-  return new SideView(host, run, asked ? null : "This browser has no WebGL: the climb is drawn from the right.");
-}
-
-function hasWebGl() {
-  const context = document.createElement("canvas").getContext("webgl2");
-  context?.getExtension("WEBGL_lose_context")?.loseContext();
-  return !!context;
+  const canvas = h("canvas");
+  const context = asked ? null : canvas.getContext("webgl2", { antialias: true, powerPreference: "low-power" });
+  if (!context) return new SideView(host, run, asked ? null : "This browser has no WebGL: the climb is drawn from the right.");
+  host.append(canvas);
+  return new Scene3d(host, canvas, context, run, other);
 }

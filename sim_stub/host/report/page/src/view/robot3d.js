@@ -7,10 +7,13 @@ import { soleCorners } from "../core/pose.js";
 import { boxMesh, capsuleMesh, line, outline, put, segments, solid } from "./shapes3d.js";
 
 export class Robot3d {
-  constructor(run) {
+  /** other: a second run's robot, seen through. */
+  constructor(run, other = false) {
+    this.other = other;
     this.group = new Group();
-    this.legs = { left: solid({}), right: solid({}) };
-    this.sketch = solid({ transparent: true, opacity: 0.55 });
+    const through = other ? { transparent: true, opacity: 0.4 } : {};
+    this.legs = { left: solid(through), right: solid(through) };
+    this.sketch = solid({ transparent: true, opacity: 0.42 });
     this.ghost = line(1.6, { transparent: true, opacity: 0.9 });
     this.links = [];
     this.feet = FEET.map(() => new Group());
@@ -46,16 +49,15 @@ export class Robot3d {
       this.torso.add(boxMesh([0.06, 0.1, 0.05], this.sketch));
       return;
     }
-    this.torso.add(capsuleMesh(hips[0], hips[1], 0.055, this.sketch), capsuleMesh([-0.01, 0, 0], [-0.02, 0, 0.34], 0.085, this.sketch));
-    const head = capsuleMesh([0, 0, 0.52], [0.01, 0, 0.58], 0.065, this.sketch);
-    this.torso.add(head);
+    this.torso.add(capsuleMesh(hips[0], hips[1], 0.05, this.sketch), capsuleMesh([-0.015, 0, 0.06], [-0.02, 0, 0.3], 0.07, this.sketch));
+    this.torso.add(capsuleMesh([-0.02, 0.13, 0.36], [-0.02, -0.13, 0.36], 0.06, this.sketch), capsuleMesh([0, 0, 0.53], [0.005, 0, 0.57], 0.06, this.sketch));
     for (const hip of hips) this.torso.add(capsuleMesh(hip, [hip[0], hip[1], hip[2] - 0.1287], 0.05, this.sketch));
   }
 
   repaint() {
-    this.legs.left.color.set(colours.robot);
-    this.legs.right.color.set(colours.robotdark);
-    this.sketch.color.set(colours.robot);
+    this.legs.left.color.set(this.other ? colours.runB : colours.robot);
+    this.legs.right.color.set(this.other ? colours.runB : colours.robotdark);
+    this.sketch.color.set(this.other ? colours.runB : colours.robot);
     this.ghost.color.set(colours.fused);
   }
 
@@ -67,7 +69,7 @@ export class Robot3d {
     put(this.torso, now.base);
     this.links.forEach((group, j) => put(group, now.links[j] ?? null));
     this.feet.forEach((group, i) => put(group, now.soles[i]));
-    this.ghosts.forEach((group, i) => put(group, now.estimated[i]));
+    this.ghosts.forEach((group, i) => put(group, this.other ? null : now.estimated[i]));
   }
 }
 

@@ -6,6 +6,7 @@ import { colours, onTheme } from "../core/colours.js";
 import { robotAt } from "../core/now.js";
 import { turn } from "../core/pose.js";
 import { Footholds3d } from "./footholds3d.js";
+import { Labels } from "./labels.js";
 import { Map3d } from "./map3d.js";
 import { Robot3d } from "./robot3d.js";
 import { Stairs3d } from "./stairs3d.js";
@@ -13,19 +14,18 @@ import { Trails3d } from "./trails3d.js";
 
 // From where each view looks, relative to the base.
 const VIEWS = {
-  1: { from: [-1.75, -1.95, 0.85], at: [0.25, 0, -0.42] },
-  2: { from: [0.2, -3.2, -0.1], at: [0.2, 0, -0.3] },
-  3: { from: [0.3, -0.001, 3.0], at: [0.3, 0, 0] },
+  1: { from: [-0.85, -2.15, 0.95], at: [0.22, 0, -0.38] },
+  2: { from: [0.2, -3.0, -0.15], at: [0.2, 0, -0.25] },
+  3: { from: [0.299, 0, 2.4], at: [0.3, 0, 0] },
 };
 
 export class Scene3d {
-  /** Throws where the browser has no WebGL. */
-  constructor(host, run) {
+  /** other: a second run, whose robot is drawn beside the first. */
+  constructor(host, canvas, context, run, other) {
     this.run = run;
     this.host = host;
-    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "low-power" });
+    this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
-    host.append(this.renderer.domElement);
     this.scene = new Scene();
     this.eye = new PerspectiveCamera(38, 1, 0.05, 60);
     this.eye.up.set(0, 0, 1);
@@ -33,11 +33,15 @@ export class Scene3d {
     this.controls.addEventListener("change", () => this.draw());
     this.controls.addEventListener("start", () => (this.throughCamera = false));
     this.controls.enableKeys = false;
-    this.sky = new HemisphereLight(0xffffff, 0x8a8a8a, 2.1);
-    const sun = new DirectionalLight(0xffffff, 1.6);
-    sun.position.set(-2, -3, 5);
+    this.sky = new HemisphereLight(0xffffff, 0x9aa4ad, 2.2);
+    this.sky.position.set(0, 0, 1);
+    const sun = new DirectionalLight(0xffffff, 1.5);
+    sun.position.set(-1.5, -3, 5);
     this.scene.add(this.sky, sun);
+    this.labels = new Labels(host, run);
     this.parts = [new Stairs3d(run), new Map3d(run), new Footholds3d(run), new Trails3d(run), new Robot3d(run)];
+    this.other = other ? { run: other, robot: new Robot3d(other, true) } : null;
+    if (this.other) this.parts.push(this.other.robot);
     for (const part of this.parts) this.scene.add(part.group);
     this.followed = null;
     this.throughCamera = false;
@@ -89,7 +93,7 @@ export class Scene3d {
   show(t_s) {
     this.t_s = t_s;
     const now = robotAt(this.run, t_s);
-    for (const part of this.parts) part.show(t_s, now);
+    for (const part of this.parts) part.show(t_s, part === this.other?.robot ? robotAt(this.other.run, t_s) : now);
     this.follow(now);
     this.draw();
   }
@@ -132,5 +136,6 @@ export class Scene3d {
   drawNow() {
     this.waiting = false;
     this.renderer.render(this.scene, this.eye);
+    this.labels.place(this.eye, this.t_s);
   }
 }
