@@ -533,6 +533,8 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   if (sentence.empty()) sentence = output_complaint(a.options.out_dir, a.options.save_inputs);
   if (a.record != "none" && !a.options.out_dir.empty()) a.options.recording = a.options.out_dir + "/run.mcap";
   a.options.record_pictures = a.record == "all";
+  a.options.command = {"polygmap"};
+  a.options.command.insert(a.options.command.end(), arguments.begin(), arguments.end());
   if (!sentence.empty()) {
     err << "polygmap: " << sentence << "\n";
     return kExitUsage;

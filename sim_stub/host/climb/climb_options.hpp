@@ -28,6 +28,7 @@ struct ClimbOptions {
   std::uint64_t seed = 1;
   NoiseKind noise = NoiseKind::kWhite;
   PlantKind plant = PlantKind::kMujoco;
+  std::vector<std::string> command;  // that was typed; for the record
   std::vector<Push> pushes;
   std::vector<TimedCommand> asked;          // of an operator with a script; for the record
   ClimbOperator* climb_operator = nullptr;  // null: the module starts by itself. Outlives the climb

@@ -136,6 +136,7 @@ Json to_json(const ClimbSummary& s) {
   j["plant"] = name_of(s.options.plant);
   j["gait"] = name_of(s.options.gait);
   j["seed"] = s.options.seed;
+  j["command"] = s.options.command;
   j["arguments"] = arguments_json(s.options);
   j["params_hash"] = s.params_hash;
   j["reality"] = {{"scale", s.options.reality_scale}};

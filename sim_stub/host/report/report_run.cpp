@@ -221,6 +221,10 @@ void ReportRun::finish_sample() {
     page_T_world_ = aligned(true_T_base_, state_.world_T_base());
     is_aligned_ = true;
   }
+  // Before it has initialised the module knows no pose.
+  const auto add = [this](ReportTable& table, const Transform& pose) {
+    state_.initialised ? table.add(pose) : table.add_missing();
+  };
   if (has_truth_) {
     base_true_.add(true_T_base_);
   } else {
@@ -228,11 +232,11 @@ void ReportRun::finish_sample() {
   }
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     has_truth_ ? sole_true_[foot].add(true_T_sole_[foot]) : sole_true_[foot].add_missing();
-    sole_estimated_[foot].add(page_T_odom_ * state_.odom_T_sole[foot]);
-    sole_desired_[foot].add(page_T_odom_ * gait_.odom_T_sole_desired[foot]);
+    add(sole_estimated_[foot], page_T_odom_ * state_.odom_T_sole[foot]);
+    add(sole_desired_[foot], page_T_odom_ * gait_.odom_T_sole_desired[foot]);
   }
-  base_fused_.add(page_T_world_ * state_.world_T_base());
-  base_odometry_.add(page_T_world_ * state_.odom_T_base);
+  add(base_fused_, page_T_world_ * state_.world_T_base());
+  add(base_odometry_, page_T_world_ * state_.odom_T_base);
   sigma_.add(std::array{state_.position_sigma_m.x(), state_.position_sigma_m.y(), state_.position_sigma_m.z(),
                         state_.yaw_sigma_rad, state_.tilt_sigma_rad});
   joint_angles_.add(std::span(joints_.q_rad.data(), kJointCount));

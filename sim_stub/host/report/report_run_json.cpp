@@ -156,11 +156,17 @@ ReportJson ReportRun::json() const {
     }
   }
   run["pushes"] = pushes;
+  if (summary_.is_object() && summary_.contains("command")) run["arguments"] = summary_["command"];
+  // A row that takes what its resumable predecessor left may spend all of both; and the last piece of work may
+  // overdraw, which is paid back.
+  double shared = 0.0;
   for (const ScheduleRow& row : kSchedule) {
+    const auto own = static_cast<double>(instructions_per_slot(row));
+    shared = row.takes_leftover ? shared + own : own;
     run["schedule"].push_back({{"task", row.task},
                                {"lane", row.lane == kControlLane ? "control" : "perception"},
                                {"budget_us", row.budget_us},
-                               {"budget_instructions", instructions_per_slot(row)}});
+                               {"budget_instructions", row.resumable() ? shared + kOverdraftInstructions : own}});
   }
   if (!ends_.empty()) {
     run["ending"] = {{"t_s", rounded(time_s(now_ns_), 3)}, {"sentence", ends_}};
