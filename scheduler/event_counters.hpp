@@ -83,7 +83,10 @@ class EventCounters {
     if (c.count == 0) c.first_ns = now_ns;
     c.last_ns = now_ns;
     c.count = saturating_sum(c.count, times);
+    raised_ += times;
   }
+  // Another number than before when a count has changed since: for who looks in every cycle. Wraps.
+  [[nodiscard]] constexpr std::uint32_t raised() const noexcept { return raised_; }
   // As often as a stage's own counter has grown since this was last told of it, from 0 on. A code follows one counter.
   template <typename Code>
   constexpr void follow(Code code, std::int64_t now_ns, std::uint32_t stage_total) noexcept {
@@ -113,8 +116,12 @@ class EventCounters {
   constexpr void clear(Code code) noexcept {
     const std::size_t i = index_of_event(code);
     if (i < kEventTable<Code>.size()) of<Code>()[i] = {};
+    ++raised_;
   }
-  constexpr void clear() noexcept { (of<Codes>().fill({}), ...); }
+  constexpr void clear() noexcept {
+    (of<Codes>().fill({}), ...);
+    ++raised_;
+  }
 
   // As they were counted elsewhere, in the order of the tables: for who replays a lane without its tasks.
   constexpr void assign(std::span<const EventCount> counts) noexcept {
@@ -123,10 +130,14 @@ class EventCounters {
       counts = counts.subspan(std::min(own.size(), counts.size()));
     };
     (assign_to(of<Codes>()), ...);
+    ++raised_;
   }
 
   // Adds another lane's counts.
-  constexpr void merge(const EventCounters& other) noexcept { (merge_in(of<Codes>(), other.of<Codes>()), ...); }
+  constexpr void merge(const EventCounters& other) noexcept {
+    (merge_in(of<Codes>(), other.of<Codes>()), ...);
+    raised_ += other.raised_;
+  }
 
  private:
   // Arrays of a length alone would be one type for two enumerations.
@@ -159,6 +170,7 @@ class EventCounters {
 
   std::tuple<Counts<Codes>...> counts_{};
   std::tuple<Totals<Codes>...> followed_{};  // the stages' counters as last told
+  std::uint32_t raised_ = 0;
 };
 
 }  // namespace polygmap

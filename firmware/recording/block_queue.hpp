@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blocks of bytes from one thread to one other, in memory that somebody else owns. Nobody waits.
+// Blocks of bytes from one thread to one other, in memory that somebody else owns: written and read where they lie.
+// Nobody waits.
 #pragma once
 
-#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -13,48 +13,60 @@ namespace polygmap::recording {
 
 class BlockQueue {
  public:
+  // memory: a multiple of 8 bytes.
   explicit BlockQueue(std::span<std::byte> memory) noexcept : memory_(memory) {}
 
-  // On the writer's thread: both parts, as one block. False, and nothing of it is there, when it has no room.
-  [[nodiscard]] bool try_push(std::span<const std::byte> head, std::span<const std::byte> body) noexcept {
-    const std::size_t length = head.size() + body.size();
-    const std::size_t begin = pushed_.load(std::memory_order_relaxed);
-    const std::size_t used = begin - popped_.load(std::memory_order_acquire);
-    if (kLength_bytes + length > memory_.size() - used) return false;
-    const auto prefix = static_cast<std::uint32_t>(length);
-    put(begin, {reinterpret_cast<const std::byte*>(&prefix), kLength_bytes});
-    put(begin + kLength_bytes, head);
-    put(begin + kLength_bytes + head.size(), body);
-    pushed_.store(begin + kLength_bytes + length, std::memory_order_release);
-    return true;
+  // On the writer's thread: memory for a block of at most so many bytes, in one piece; empty when there is no room.
+  // Nobody sees it before commit().
+  [[nodiscard]] std::span<std::byte> reserve(std::size_t most) noexcept {
+    const std::size_t begin = pushed_.load(std::memory_order_relaxed), at = begin % memory_.size();
+    const std::size_t free = memory_.size() - (begin - popped_.load(std::memory_order_acquire));
+    const std::size_t to_end = memory_.size() - at, needed = kHead_bytes + most;
+    reserved_ = begin;
+    if (needed <= to_end) return needed <= free ? memory_.subspan(at + kHead_bytes, most) : std::span<std::byte>();
+    if (to_end + needed > free) return {};
+    put_length(at, kGoesOnAtTheBeginning);
+    reserved_ = begin + to_end;
+    return memory_.subspan(kHead_bytes, most);
   }
-  // On the reader's thread: the oldest block; empty when there is none. A block that into does not hold is cut off.
-  [[nodiscard]] std::span<std::byte> pop(std::span<std::byte> into) noexcept {
-    const std::size_t begin = popped_.load(std::memory_order_relaxed);
+  // The first bytes of what was reserved are a block.
+  void commit(std::size_t count) noexcept {
+    put_length(reserved_ % memory_.size(), static_cast<std::uint32_t>(count));
+    pushed_.store(reserved_ + size_of(count), std::memory_order_release);
+  }
+
+  // On the reader's thread: the oldest block, its own until pop(); empty when there is none.
+  [[nodiscard]] std::span<std::byte> front() noexcept {
+    std::size_t begin = popped_.load(std::memory_order_relaxed);
     if (pushed_.load(std::memory_order_acquire) == begin) return {};
-    std::uint32_t length = 0;
-    get(begin, {reinterpret_cast<std::byte*>(&length), kLength_bytes});
-    const std::span<std::byte> block = into.first(std::min<std::size_t>(length, into.size()));
-    get(begin + kLength_bytes, block);
-    popped_.store(begin + kLength_bytes + length, std::memory_order_release);
-    return block;
+    if (length_at(begin % memory_.size()) == kGoesOnAtTheBeginning) {
+      begin += memory_.size() - begin % memory_.size();
+      popped_.store(begin, std::memory_order_release);
+    }
+    const std::size_t at = begin % memory_.size();
+    return memory_.subspan(at + kHead_bytes, length_at(at));
+  }
+  void pop() noexcept {
+    const std::size_t begin = popped_.load(std::memory_order_relaxed);
+    popped_.store(begin + size_of(length_at(begin % memory_.size())), std::memory_order_release);
   }
 
  private:
-  static constexpr std::size_t kLength_bytes = sizeof(std::uint32_t);
+  static constexpr std::size_t kHead_bytes = 8;  // its length, and what keeps blocks aligned
+  static constexpr std::uint32_t kGoesOnAtTheBeginning = UINT32_MAX;
 
-  void put(std::size_t place, std::span<const std::byte> bytes) noexcept {
-    const std::size_t at = place % memory_.size(), first = std::min(bytes.size(), memory_.size() - at);
-    if (first > 0) std::memcpy(memory_.data() + at, bytes.data(), first);
-    if (first < bytes.size()) std::memcpy(memory_.data(), bytes.data() + first, bytes.size() - first);
+  [[nodiscard]] static std::size_t size_of(std::size_t count) noexcept { return (kHead_bytes + count + 7U) / 8U * 8U; }
+  void put_length(std::size_t at, std::uint32_t length) noexcept {
+    std::memcpy(memory_.data() + at, &length, sizeof length);
   }
-  void get(std::size_t place, std::span<std::byte> bytes) const noexcept {
-    const std::size_t at = place % memory_.size(), first = std::min(bytes.size(), memory_.size() - at);
-    if (first > 0) std::memcpy(bytes.data(), memory_.data() + at, first);
-    if (first < bytes.size()) std::memcpy(bytes.data() + first, memory_.data(), bytes.size() - first);
+  [[nodiscard]] std::uint32_t length_at(std::size_t at) const noexcept {
+    std::uint32_t length = 0;
+    std::memcpy(&length, memory_.data() + at, sizeof length);
+    return length;
   }
 
   std::span<std::byte> memory_;
+  std::size_t reserved_ = 0;                        // the writer's
   alignas(64) std::atomic<std::size_t> pushed_{0};  // bytes, since the start
   alignas(64) std::atomic<std::size_t> popped_{0};
 };

@@ -33,11 +33,21 @@ class ByteWriter {
     std::memcpy(memory_.data() + size_, bytes, count);
     size_ += count;
   }
+  // To be filled in by put_at().
+  void skip(std::size_t count) noexcept {
+    full_ = full_ || count > memory_.size() - size_;
+    if (!full_) size_ += count;
+  }
   // Over what was put at that place before.
-  template <Number T>
-  void put_at(std::size_t place, T value) noexcept {
+  template <class T>
+  requires Number<T> || std::is_same_v<typename T::value_type, std::byte>
+  void put_at(std::size_t place, const T& value) noexcept {
     if (place + sizeof value <= size_) std::memcpy(memory_.data() + place, &value, sizeof value);
   }
+  // The memory behind what was put, for somebody who fills some of it and says how much.
+  [[nodiscard]] std::span<std::byte> rest() noexcept { return memory_.subspan(size_); }
+  void advance(std::size_t count) noexcept { size_ += count; }
+  void set_full() noexcept { full_ = true; }
   void clear() noexcept { size_ = 0; }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool full() const noexcept { return full_; }

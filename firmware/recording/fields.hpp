@@ -31,14 +31,20 @@ concept Of = std::is_same_v<std::remove_const_t<T>, Message>;
 //   enter(name, index), leave()   around the fields of a struct and the elements of an array
 //   count(n)                      before the n elements of a vector: how many of them to visit; or, of who fills it,
 //   resize(vector)                which gives it its elements
-//   leaves(numbers)               optional, in the stead of leaf() for the numbers of a matrix, as they lie
+//   leaves(numbers)               optional, in the stead of leaf() for numbers that lie side by side
 //   names_only()                  in the stead of count(): it wants no values, and a vector's element once
 template <class F, class T>
 void walk(F& f, std::string_view name, T& value, int index = -1);
 
 void each_field(auto& f, Of<Transform> auto& m) {
-  walk(f, "R", m.R);
-  walk(f, "p_m", m.p_m);
+  constexpr std::size_t kNumbers = 9 + 3;
+  static_assert(sizeof m == kNumbers * sizeof(double), "numbers that lie side by side");
+  if constexpr (requires { f.leaves(std::span(m.R.data(), std::size_t{})); }) {
+    f.leaves(std::span(m.R.data(), kNumbers));
+  } else {
+    walk(f, "R", m.R);
+    walk(f, "p_m", m.p_m);
+  }
 }
 void each_field(auto& f, Of<ImuSample> auto& m) {
   walk(f, "stamp_ns", m.stamp_ns);
@@ -89,7 +95,12 @@ void each_field(auto& f, Of<JointSetpoint> auto& m) {
 }
 void each_field(auto& f, Of<JointCommand> auto& m) {
   walk(f, "stamp_ns", m.stamp_ns);
-  walk(f, "joints", m.joints);
+  static_assert(sizeof m.joints == 5 * sizeof(double) * kJointCount, "numbers that lie side by side");
+  if constexpr (requires { f.leaves(std::span(&m.joints[0].q_rad, std::size_t{})); }) {
+    f.leaves(std::span(&m.joints[0].q_rad, 5 * kJointCount));
+  } else {
+    walk(f, "joints", m.joints);
+  }
 }
 void each_field(auto& f, Of<LioSample> auto& m) {
   walk(f, "stamp_ns", m.stamp_ns);
@@ -120,6 +131,7 @@ void each_field(auto& f, Of<StateEstimate> auto& m) {
   walk(f, "contact_probability", m.contact_probability);
   walk(f, "foot_force_sigma_n", m.foot_force_sigma_n);
   walk(f, "position_sigma_m", m.position_sigma_m);
+  walk(f, "odom_turned_rad", m.odom_turned_rad);
   walk(f, "odom_sigma_m", m.odom_sigma_m);
   walk(f, "velocity_sigma_mps", m.velocity_sigma_mps);
   walk(f, "yaw_sigma_rad", m.yaw_sigma_rad);
@@ -279,6 +291,12 @@ inline constexpr bool kIsMatrix = false;
 template <class Scalar, int Rows, int Columns, int Options, int MaxRows, int MaxColumns>
 inline constexpr bool kIsMatrix<Eigen::Matrix<Scalar, Rows, Columns, Options, MaxRows, MaxColumns>> = true;
 template <class T>
+inline constexpr bool kHasNumbers = false;  // and nothing else, side by side
+template <class Scalar, int Rows, int Columns, int Options, int MaxRows, int MaxColumns>
+inline constexpr bool kHasNumbers<Eigen::Matrix<Scalar, Rows, Columns, Options, MaxRows, MaxColumns>> = true;
+template <Number T, std::size_t N>
+inline constexpr bool kHasNumbers<std::array<T, N>> = true;
+template <class T>
 inline constexpr bool kIsVector = false;
 template <class T, std::size_t Capacity>
 inline constexpr bool kIsVector<StaticVector<T, Capacity>> = true;
@@ -295,7 +313,7 @@ void walk(F& f, std::string_view name, T& value, int index) {
     f.leaf(name, index, value);
   } else {
     f.enter(name, index);
-    if constexpr (detail::kIsMatrix<Value> && requires { f.leaves(std::span(value.data(), std::size_t{})); }) {
+    if constexpr (detail::kHasNumbers<Value> && requires { f.leaves(std::span(value.data(), std::size_t{})); }) {
       f.leaves(std::span(value.data(), static_cast<std::size_t>(value.size())));
     } else if constexpr (detail::kIsMatrix<Value>) {  // column by column
       for (int i = 0; i < static_cast<int>(value.size()); ++i) f.leaf("", i, value.data()[i]);

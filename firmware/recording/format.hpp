@@ -9,9 +9,10 @@
 //   the camera's intrinsics, and the gains that each drive can take at most. A name is a u16 length and the characters.
 // /replay, one message for each frame of a lane, in the order in which a replay has to live them: records, each of
 //   kind (u8), length of the rest (u32), then by kind
-//     row        a call of a schedule's row: row (u8), cycle_ns (i64), units (i32); u16 count of port calls and each of
-//                them: kind (u8), whether it gave something (bool), and what; how far the other lane was (i64), and
-//                which of its frames this one saw; progress (u8), units left (i32), and the stage's outputs
+//     row        a call of a schedule's row: row (u8), cycle_ns (i64), units (i32), progress (u8), units left (i32);
+//                u16 count of port calls and each of them: kind (u8), whether it gave something (bool), and what; of a
+//                lane's first row how far the other lane was (i64), and which of its frames this one saw; the stage's
+//                outputs
 //     event      what the executive counted: lane (u8), code (u8), when (i64), times (u32)
 //     stop       the operator asked for the end
 //     cycle      what the executive did: lane (u8), cycle (u64), due_ns (i64), slot (u8), rows run, shed, deferred and

@@ -14,6 +14,27 @@
 
 namespace polygmap::recording {
 
+// The row that settles what its lane sees of the other one.
+[[nodiscard]] constexpr bool looks_across(std::size_t row) noexcept {
+  constexpr std::uint32_t kRows = [] {
+    std::uint32_t rows = 1;
+    for (std::size_t i = 1; i < kTasks.size(); ++i)
+      rows |= (kTasks[i - 1].row.lane != kTasks[i].row.lane ? 1U : 0U) << i;
+    return rows;
+  }();
+  return (kRows >> row & 1U) != 0;
+}
+
+[[nodiscard]] constexpr std::size_t row_of(std::string_view task) noexcept {
+  std::size_t row = 0;
+  while (kTasks[row].row.task != task) ++row;
+  return row;
+}
+inline constexpr std::size_t kEstimateRow = row_of("estimate"), kGaitRow = row_of("gait"),
+                             kHealthRow = row_of("health"), kIntakeRow = row_of("intake"),
+                             kSurfacesRow = row_of("surfaces"), kMapRow = row_of("map"),
+                             kFootholdsRow = row_of("footholds");
+
 // Of all faults and limits, in the order of their tables.
 using HealthCounts = std::array<EventCount, kFaultTable.size() + kLimitTable.size()>;
 [[nodiscard]] inline HealthCounts counts_of(const Health& health) noexcept {
@@ -27,51 +48,52 @@ void walk_health(auto& f, const HealthCounts& counts) {
     walk(f, i < kFaultTable.size() ? kFaultTable[i].name : kLimitTable[i - kFaultTable.size()].name, counts[i]);
   }
 }
-[[nodiscard]] inline bool same_counts(const HealthCounts& a, const HealthCounts& b) noexcept {
-  return std::equal(a.begin(), a.end(), b.begin(), [](const EventCount& x, const EventCount& y) {
-    return x.count == y.count && x.first_ns == y.first_ns && x.last_ns == y.last_ns;
-  });
+// Written where they changed: f.health(health).
+
+// Whether it makes any.
+[[nodiscard]] constexpr bool has_outputs(std::size_t row, Progress progress) noexcept {
+  constexpr std::uint32_t kAlways = 1U << kEstimateRow | 1U << kGaitRow | 1U << kHealthRow | 1U << kIntakeRow;
+  constexpr std::uint32_t kWhenDone = 1U << kSurfacesRow | 1U << kMapRow | 1U << kFootholdsRow;
+  return ((progress == Progress::kDone ? kAlways | kWhenDone : kAlways) >> row & 1U) != 0;
 }
-// Written where they changed: f.health(counts).
 
 // What the writer's row has just published in its frame, where it did. The other lane does not see it before the frame
 // is over, so nobody has taken it.
 template <class T, std::size_t Slots>
-[[nodiscard]] T published_in(const Exchange<T, Slots>& exchange, std::int64_t frame_ns) noexcept {
+[[nodiscard]] const T& published_in(const Exchange<T, Slots>& exchange, std::int64_t frame_ns) noexcept {
+  static const T kNone{};
   const T* const value = exchange.published_ns() == frame_ns ? exchange.find(frame_ns) : nullptr;
-  return value != nullptr ? *value : T{};
+  return value != nullptr ? *value : kNone;
 }
 
 // f sees what the row has just made.
 void walk_outputs(auto& f, const Pipeline& module, std::size_t row, std::int64_t cycle_ns, Progress progress) {
-  const std::string_view task = kTasks[row].row.task;
   const ControlLane& control = module.control();
   const PerceptionLane& perception = module.perception();
-  if (task == "estimate") {
+  if (row == kEstimateRow) {
     walk(f, "state", control.state());
     walk(f, "quality", control.estimator().quality());
-  } else if (task == "gait") {
+  } else if (row == kGaitRow) {
     walk(f, "status", control.gait_status());
-    walk(f, "command", control.last_command());
     const ModuleState module_state = control.module_state();
     walk(f, "module_state", module_state);
-  } else if (task == "health") {
-    f.health(counts_of(control.all_faults()));
-  } else if (task == "intake") {
-    f.health(counts_of(published_in(module.published_health(kPerceptionLane), cycle_ns)));
-    const PoseRequest request = published_in(module.link().pose_request, cycle_ns);
+  } else if (row == kHealthRow) {
+    f.health(control.all_faults());
+  } else if (row == kIntakeRow) {
+    f.health(published_in(module.published_health(kPerceptionLane), cycle_ns));
+    const PoseRequest& request = published_in(module.link().pose_request, cycle_ns);
     walk(f, "pose_request", request);
   } else if (progress != Progress::kDone) {
     return;
-  } else if (task == "surfaces") {
+  } else if (row == kSurfacesRow) {
     const CameraExtrinsicsEstimator& mount = perception.mount();
     walk(f, "frame", perception.surface_frame());
     const MountFound found{mount.roll_rad(), mount.pitch_rad(), mount.x_m(), mount.height_m(), mount.tilt_sigma_rad()};
     walk(f, "mount", found);
-  } else if (task == "map") {
+  } else if (row == kMapRow) {
     walk(f, "map", perception.map_snapshot());
-  } else if (task == "footholds") {
-    const FootholdSet footholds = published_in(module.link().footholds, cycle_ns);
+  } else if (row == kFootholdsRow) {
+    const FootholdSet& footholds = published_in(module.link().footholds, cycle_ns);
     walk(f, "footholds", footholds);
   }
 }
@@ -96,31 +118,54 @@ void walk_recorded(auto& f) {
   walk_health(f, HealthCounts{});
 }
 
+// Into the rest of a ByteWriter's memory, whose size it has brought up to date when it ends: within a cycle a number
+// costs a comparison and a store.
 class FieldWriter {
  public:
-  FieldWriter(ByteWriter& out, HealthCounts* last_health) noexcept : out_(out), last_health_(last_health) {}
-  void leaf(std::string_view, int, Number auto value) noexcept { out_.put(value); }
+  // last_raised: Health::raised() as it was when it was written last; null where there is none to be written.
+  FieldWriter(ByteWriter& out, std::uint32_t* last_raised) noexcept
+      : out_(out), at_(out.rest().data()), left_(out.rest().size()), last_raised_(last_raised) {}
+  FieldWriter(const FieldWriter&) = delete;
+  FieldWriter& operator=(const FieldWriter&) = delete;
+  ~FieldWriter() { is_full_ ? out_.set_full() : out_.advance(out_.rest().size() - left_); }
+  template <Number T>
+  void leaf(std::string_view, int, T value) noexcept {
+    put(&value, sizeof value);
+  }
   template <Number T>
   void leaves(std::span<T> values) noexcept {
-    out_.put_bytes(values.data(), values.size_bytes());
+    put(values.data(), values.size_bytes());
   }
   void enter(std::string_view, int) noexcept {}
   void leave() noexcept {}
   std::size_t count(std::size_t n) noexcept {
-    out_.put(static_cast<std::uint32_t>(n));
+    leaf("", -1, static_cast<std::uint32_t>(n));
     return n;
   }
-  void health(const HealthCounts& counts) noexcept {
-    const bool changed = !same_counts(counts, *last_health_);
-    out_.put(changed);
+  void health(const Health& health) noexcept {
+    const bool changed = health.raised() != *last_raised_;
+    leaf("", -1, changed);
     if (!changed) return;
-    walk_health(*this, counts);
-    *last_health_ = counts;
+    *last_raised_ = health.raised();
+    walk_health(*this, counts_of(health));
   }
 
  private:
+  void put(const void* bytes, std::size_t count) noexcept {
+    if (count > left_) {
+      is_full_ = true;
+      return;
+    }
+    std::memcpy(at_, bytes, count);
+    at_ += count;
+    left_ -= count;
+  }
+
   ByteWriter& out_;
-  HealthCounts* last_health_;
+  std::byte* at_;
+  std::size_t left_;
+  bool is_full_ = false;
+  std::uint32_t* last_raised_;
 };
 
 class FieldReader {
@@ -129,6 +174,15 @@ class FieldReader {
   template <Number T>
   void leaf(std::string_view, int, T& value) noexcept {
     value = in_.get<T>();
+  }
+  template <Number T>
+  void leaves(std::span<T> values) noexcept {
+    if constexpr (std::is_same_v<T, bool>) {
+      for (T& value : values) value = in_.get<T>();
+    } else {
+      const std::span<const std::byte> bytes = in_.get_bytes(values.size_bytes());
+      if (!bytes.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
+    }
   }
   void enter(std::string_view, int) noexcept {}
   void leave() noexcept {}
@@ -191,7 +245,8 @@ class FieldComparer {
     stopped_ = stopped_ || recorded != computed;
     return stopped_ ? 0 : computed;
   }
-  void health(const HealthCounts& computed) {
+  void health(const Health& health) {
+    const HealthCounts computed = counts_of(health);
     if (in_.get<bool>()) {
       FieldReader reader(in_);
       for (EventCount& recorded : *last_health_) walk(reader, "", recorded);

@@ -97,6 +97,8 @@ bool RecordParser::parse_row(ByteReader& in, RowCall& row) {
   row.row = rows_[index];
   row.cycle_ns = in.get<std::int64_t>();
   row.units = in.get<std::int32_t>();
+  row.progress = in.get<std::uint8_t>();
+  row.units_left = in.get<std::int32_t>();
   const auto calls = in.get<std::uint16_t>();
   const std::size_t lane = kTasks[row.row].row.lane;
   const bool in_order =
@@ -109,9 +111,7 @@ bool RecordParser::parse_row(ByteReader& in, RowCall& row) {
     if (!parse_call(in, row.call_memory[i])) return is("a call of a port that cannot be");
   }
   row.calls = std::span(row.call_memory).first(calls);
-  if (!parse_view(in, row)) return is("frames of the other lane that cannot be");
-  row.progress = in.get<std::uint8_t>();
-  row.units_left = in.get<std::int32_t>();
+  if (looks_across(row.row) && !parse_view(in, row)) return is("frames of the other lane that cannot be");
   if (in.failed()) return is("a row that is too short");
   row.outputs = in;
   return true;

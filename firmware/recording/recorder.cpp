@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "firmware/config/param_table.hpp"
@@ -41,14 +42,34 @@ constexpr auto kEventPlaces = [] {
   return places;
 }();
 
-// Kind and length, which put_length() fills in.
-std::size_t put_record(ByteWriter& out, RecordKind kind) noexcept {
-  out.put(kind);
-  out.put(std::uint32_t{0});
-  return out.size();
+// Numbers one behind the other, in one piece: cheaper than one by one.
+template <Number... T>
+[[nodiscard]] std::array<std::byte, (sizeof(T) + ...)> bytes_of(T... values) noexcept {
+  std::array<std::byte, (sizeof(T) + ...)> bytes;
+  std::size_t at = 0;
+  ((std::memcpy(bytes.data() + at, &values, sizeof values), at += sizeof values), ...);
+  return bytes;
 }
-void put_length(ByteWriter& out, std::size_t begin) noexcept {
-  out.put_at(begin - sizeof(std::uint32_t), static_cast<std::uint32_t>(out.size() - begin));
+template <Number... T>
+void put_all(ByteWriter& out, T... values) noexcept {
+  const auto bytes = bytes_of(values...);
+  out.put_bytes(bytes.data(), bytes.size());
+}
+// Of any record: its kind and the length of the rest. Of a row, before its calls: row, cycle, units, progress, units
+// left, how many calls.
+constexpr std::size_t kRecordHead_bytes = sizeof(RecordKind) + sizeof(std::uint32_t);
+constexpr std::size_t kRowHead_bytes = kRecordHead_bytes + 1 + 8 + 4 + 1 + 4 + 2;
+constexpr auto kLaneOf = [] {
+  std::array<std::uint8_t, kTasks.size()> lanes{};
+  for (std::size_t row = 0; row < lanes.size(); ++row) lanes[row] = kTasks[row].row.lane;
+  return lanes;
+}();
+
+// A record of these numbers alone.
+template <Number... T>
+void put_record(ByteWriter& out, RecordKind kind, T... values) noexcept {
+  const auto length = static_cast<std::uint32_t>((sizeof(T) + ... + 0U));
+  put_all(out, kind, length, values...);
 }
 
 }  // namespace
@@ -56,10 +77,10 @@ void put_length(ByteWriter& out, std::size_t begin) noexcept {
 Recorder::Recorder(const Ports& robot, hal::PictureKeeper* keeper) noexcept
     : robot_(robot),
       keeper_(keeper),
-      logs_{LaneLog(control_frame_, control_queue_, control_next_),
-            LaneLog(perception_frame_, perception_queue_, perception_next_)},
+      logs_{LaneLog(control_queue_), LaneLog(perception_queue_)},
       parser_(robot.camera.intrinsics(), kRows) {
   static_assert(kLaneCount == 2);
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) open_frame(lane);
 }
 
 Recorder::~Recorder() {
@@ -96,7 +117,7 @@ void Recorder::write(Topic topic, std::int64_t log_ns, std::int64_t publish_ns,
 
 void Recorder::request_stop() noexcept {
   LaneLog& log = logs_[kControlLane];
-  put_length(log.out, put_record(log.out, RecordKind::kStop));
+  put_record(log.out, RecordKind::kStop);
   pipeline_->control().request_stop();
 }
 
@@ -104,67 +125,60 @@ void Recorder::request_stop() noexcept {
 void Recorder::put_events(std::size_t lane) noexcept {
   LaneLog& log = logs_[lane];
   const Health& health = pipeline_->lane_health(lane);
+  log.raised = health.raised();
   for (std::size_t i = 0; i < kEventPlaces.size(); ++i) {
     const EventCount& count = kEventPlaces[i].is_fault ? health.counts<Fault>()[kEventPlaces[i].index]
                                                        : health.counts<Limit>()[kEventPlaces[i].index];
     std::uint32_t& told = log.told[i];
     if (count.count == told) continue;
-    const std::size_t begin = put_record(log.out, RecordKind::kEvent);
-    log.out.put(static_cast<std::uint8_t>(lane));
-    log.out.put(kEventTable<ExecutiveEvent>[i].code);
-    log.out.put(count.last_ns);
-    log.out.put(count.count - told);
-    put_length(log.out, begin);
+    put_record(log.out, RecordKind::kEvent, static_cast<std::uint8_t>(lane), kEventTable<ExecutiveEvent>[i].code,
+               count.last_ns, count.count - told);
     told = count.count;
   }
 }
 
 void Recorder::begin_row(std::size_t row, std::int64_t cycle_ns, const WorkBudget& budget) noexcept {
-  const std::size_t lane = kTasks[row].row.lane;
+  const std::size_t lane = kLaneOf[row];
   LaneLog& log = logs_[lane];
   log.head.cycle_ns = cycle_ns;
-  put_events(lane);
-  log.length_at = put_record(log.out, RecordKind::kRow);
-  log.out.put(static_cast<std::uint8_t>(row));
-  log.out.put(cycle_ns);
-  log.out.put(budget.left());
-  log.count_at = log.out.size();
-  log.out.put(std::uint16_t{0});
+  if (pipeline_->lane_health(lane).raised() != log.raised) put_events(lane);
+  log.row_at = log.out.size();
+  log.out.skip(kRowHead_bytes);
+  log.units = budget.left();
   log.calls = 0;
 }
 
-void Recorder::end_row(std::size_t row, Progress progress, const WorkBudget& budget) noexcept {
-  const std::size_t lane = kTasks[row].row.lane;
+// Flattened: so the place that the next number goes to stays in a register.
+[[gnu::flatten]] void Recorder::end_row(std::size_t row, Progress progress, const WorkBudget& budget) noexcept {
+  const std::size_t lane = kLaneOf[row];
   LaneLog& log = logs_[lane];
+  if (looks_across(row)) put_view(log, lane);
+  if (has_outputs(row, progress)) {
+    FieldWriter writer(log.out, &log.health);
+    walk_outputs(writer, *pipeline_, row, log.head.cycle_ns, progress);
+  }
+  const auto length = static_cast<std::uint32_t>(log.out.size() - log.row_at - kRecordHead_bytes);
+  log.out.put_at(log.row_at, bytes_of(RecordKind::kRow, length, static_cast<std::uint8_t>(row), log.head.cycle_ns,
+                                      log.units, progress, budget.left(), log.calls));
+}
+
+void Recorder::put_view(LaneLog& log, std::size_t lane) noexcept {
   const LaneView& view = lane == kControlLane ? pipeline_->control().view() : pipeline_->perception().view();
   log.head.saw_ns = view.last_ns();
-  log.out.put_at(log.count_at, log.calls);
-  log.out.put(view.other_finished_ns());
-  log.out.put(static_cast<std::uint8_t>(view.taken().size()));
+  FieldWriter writer(log.out, nullptr);
+  writer.leaf("", -1, view.other_finished_ns());
+  writer.leaf("", -1, static_cast<std::uint8_t>(view.taken().size()));
   for (const TakenFrame& taken : view.taken()) {
-    log.out.put(taken.frame_ns);
-    log.out.put(taken.missed);
+    writer.leaf("", -1, taken.frame_ns);
+    writer.leaf("", -1, taken.missed);
   }
-  log.out.put(progress);
-  log.out.put(budget.left());
-  FieldWriter writer(log.out, &log.health);
-  walk_outputs(writer, *pipeline_, row, log.head.cycle_ns, progress);
-  put_length(log.out, log.length_at);
 }
 
 void Recorder::cycle_done(std::size_t lane, const CycleReport& report) noexcept {
   put_events(lane);
-  ByteWriter& out = logs_[lane].out;
-  const std::size_t begin = put_record(out, RecordKind::kCycle);
-  out.put(static_cast<std::uint8_t>(lane));
-  out.put(report.cycle);
-  out.put(report.due_ns);
-  out.put(static_cast<std::uint8_t>(report.slot));
-  for (const std::uint32_t rows : {report.ran, report.shed, report.deferred, report.overran}) out.put(rows);
-  out.put(report.overrun);
-  out.put(report.caught_up);
-  out.put(report.skipped_before);
-  put_length(out, begin);
+  put_record(logs_[lane].out, RecordKind::kCycle, static_cast<std::uint8_t>(lane), report.cycle, report.due_ns,
+             static_cast<std::uint8_t>(report.slot), report.ran, report.shed, report.deferred, report.overran,
+             report.overrun, report.caught_up, report.skipped_before);
   last_cycle_ns_ = report.due_ns;
   if (lane == kControlLane) ++cycles_;
   hand_over(lane, report.due_ns);
@@ -178,45 +192,51 @@ void Recorder::cycle_done(std::size_t lane, const CycleReport& report) noexcept 
   if (lane == kControlLane && rows >> kFirstOfPerception != 0) hand_over(kPerceptionLane, report.due_ns);
 }
 
-void Recorder::put_lost(std::size_t lane) noexcept {
-  ByteWriter& out = logs_[lane].out;
-  const std::size_t begin = put_record(out, RecordKind::kLost);
-  out.put(static_cast<std::uint8_t>(lane));
-  out.put(logs_[lane].lost);
-  put_length(out, begin);
+// Records are written where the queue has them.
+void Recorder::open_frame(std::size_t lane) noexcept {
+  LaneLog& log = logs_[lane];
+  log.head = {};
+  log.frame = log.queue.reserve(kFrame_bytes[lane]);
+  log.out = ByteWriter(log.frame.empty() ? log.frame : log.frame.subspan(sizeof(FrameHead)));
+  if (log.lost > 0 && !log.frame.empty()) {
+    put_record(log.out, RecordKind::kLost, static_cast<std::uint8_t>(lane), log.lost);
+  }
+  log.opened_bytes = log.out.size();
 }
 
 void Recorder::hand_over(std::size_t lane, std::int64_t now_ns) noexcept {
   LaneLog& log = logs_[lane];
   if (lane == kPerceptionLane) let_go_written();
-  const std::span<const std::byte> head(reinterpret_cast<const std::byte*>(&log.head), sizeof log.head);
-  const bool is_empty = log.out.size() == 0;
-  const bool is_lost = !is_empty && (log.out.full() || !log.queue.try_push(head, log.out.bytes()));
-  log.out.clear();
-  if (is_lost) {
-    if (log.head.picture.depth != nullptr) {
-      keeper_->let_go(pictures_.kept.back());
-      (void)pictures_.kept.try_pop_back();
-      --pictures_.acquired;
-      ++lost_pictures_;
-    }
-    ++log.lost;
-    ++lost_frames_;
-    pipeline_->lane_health(lane).raise(Limit::kRecordingLost, now_ns);
-    log.health.fill({UINT32_MAX, 0, 0});  // so that the next frame has all of it
-    put_lost(lane);
-  } else if (!is_empty) {
-    log.lost = 0;
+  const bool is_lost = log.out.full();
+  if (!is_lost && log.out.size() == log.opened_bytes) {
+    if (log.frame.empty()) open_frame(lane);
+    return;
   }
-  log.head = {};
+  if (!is_lost) {
+    std::memcpy(log.frame.data(), &log.head, sizeof log.head);
+    log.queue.commit(sizeof log.head + log.out.size());
+    log.lost = 0;
+    return open_frame(lane);
+  }
+  if (log.head.picture.depth != nullptr) {
+    keeper_->let_go(pictures_.kept.back());
+    (void)pictures_.kept.try_pop_back();
+    --pictures_.acquired;
+    ++lost_pictures_;
+  }
+  ++log.lost;
+  ++lost_frames_;
+  pipeline_->lane_health(lane).raise(Limit::kRecordingLost, now_ns);
+  --log.health;  // so that the next frame has all of it
+  open_frame(lane);
 }
 
 bool Recorder::load(LaneLog& log) noexcept {
   if (!log.next.empty()) return true;
-  const std::span<std::byte> block = log.queue.pop(log.next_memory);
+  const std::span<std::byte> block = log.queue.front();
   if (block.empty()) return false;
   std::memcpy(&log.next_head, block.data(), sizeof log.next_head);
-  log.next = block.subspan(sizeof log.next_head);
+  log.next = block;
   return true;
 }
 
@@ -237,7 +257,7 @@ void Recorder::write_picture(LaneLog& log) noexcept {
   const DepthFrameView& picture = log.next_head.picture;
   const auto count = static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(picture.height_px);
   const std::uint64_t hash = hash_of_pixels(picture.depth, count);
-  std::memcpy(log.next.data() + log.next_head.hash_at, &hash, sizeof hash);
+  std::memcpy(log.next.data() + sizeof(FrameHead) + log.next_head.hash_at, &hash, sizeof hash);
   const std::int64_t log_ns = log.next_head.cycle_ns;
   constexpr auto kCameraInfo = static_cast<std::size_t>(Topic::kCameraInfo),
                  kDepth = static_cast<std::size_t>(Topic::kDepth);
@@ -249,10 +269,10 @@ void Recorder::write_picture(LaneLog& log) noexcept {
 
 void Recorder::write_frame(LaneLog& log) noexcept {
   // The head was copied; its last bytes become the message's.
-  const std::span<std::byte> message =
-      log.next_memory.subspan(sizeof(FrameHead) - kMessageHead_bytes, kMessageHead_bytes + log.next.size());
+  const std::span<std::byte> records = log.next.subspan(sizeof(FrameHead));
+  const std::span<std::byte> message = log.next.subspan(sizeof(FrameHead) - kMessageHead_bytes);
   constexpr std::array<std::uint8_t, mcap::kCdrHead_bytes> kLittleEndian{0, 1, 0, 0};
-  const auto count = static_cast<std::uint32_t>(log.next.size());
+  const auto count = static_cast<std::uint32_t>(records.size());
   std::memcpy(message.data(), kLittleEndian.data(), kLittleEndian.size());
   std::memcpy(message.data() + kLittleEndian.size(), &count, sizeof count);
   const std::int64_t log_ns = std::max<std::int64_t>(log.next_head.cycle_ns, 0);
@@ -260,9 +280,10 @@ void Recorder::write_frame(LaneLog& log) noexcept {
   has_parameters_ = true;
   if (log.next_head.picture.depth != nullptr) write_picture(log);
   (void)writer_.write(static_cast<std::size_t>(Topic::kReplay), log_ns, log_ns, message);
-  ByteReader in(log.next);
+  ByteReader in(records);
   while (!in.at_end() && parser_.parse(in, record_)) topics_.write(record_, sink_);
   log.next = {};
+  log.queue.pop();
 }
 
 void Recorder::flush() noexcept {
@@ -276,10 +297,7 @@ std::string Recorder::finish() {
   if (!failed()) {
     LaneLog& log = logs_[kControlLane];
     log.head.cycle_ns = last_cycle_ns_;
-    const std::size_t begin = put_record(log.out, RecordKind::kEnd);
-    log.out.put(cycles_);
-    log.out.put(pictures_.acquired);
-    put_length(log.out, begin);
+    put_record(log.out, RecordKind::kEnd, cycles_, pictures_.acquired);
     flush();
   }
   if (!failed() && !writer_.close()) fail();
@@ -295,7 +313,7 @@ void Recorder::put_call(LaneLog& log, CallKind kind, bool gave) const noexcept {
   log.out.put(gave);
 }
 
-bool Recorder::try_read(ImuSample& sample) noexcept {
+[[gnu::flatten]] bool Recorder::try_read(ImuSample& sample) noexcept {
   LaneLog& log = logs_[kControlLane];
   const bool gave = robot_.imu.try_read(sample);
   put_call(log, CallKind::kReadImu, gave);
@@ -304,7 +322,7 @@ bool Recorder::try_read(ImuSample& sample) noexcept {
   return gave;
 }
 
-bool Recorder::try_read(JointFeedback& feedback) noexcept {
+[[gnu::flatten]] bool Recorder::try_read(JointFeedback& feedback) noexcept {
   LaneLog& log = logs_[kControlLane];
   const bool gave = robot_.joints.try_read(feedback);
   put_call(log, CallKind::kReadJoints, gave);
@@ -331,7 +349,7 @@ bool Recorder::try_read(OperatorCommand& command) noexcept {
   return gave;
 }
 
-JointSet Recorder::try_write(const JointCommand& command) noexcept {
+[[gnu::flatten]] JointSet Recorder::try_write(const JointCommand& command) noexcept {
   LaneLog& log = logs_[kControlLane];
   const JointSet taken = robot_.joints.try_write(command);
   put_call(log, CallKind::kWriteJoints, taken.is_all());
@@ -341,7 +359,7 @@ JointSet Recorder::try_write(const JointCommand& command) noexcept {
   return taken;
 }
 
-hal::JointBusStatus Recorder::status() const noexcept {
+[[gnu::flatten]] hal::JointBusStatus Recorder::status() const noexcept {
   const hal::JointBusStatus status = robot_.joints.status();
   LaneLog& log = logs_[kControlLane];
   put_call(log, CallKind::kJointStatus, true);

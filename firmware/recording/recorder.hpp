@@ -80,7 +80,7 @@ class Recorder final : public hal::DepthCamera,
   // Of a frame: control has some 4 kB; perception's largest have 64 surfaces and a map of as many.
   static constexpr std::array<std::size_t, kLaneCount> kFrame_bytes{32U * 1024U, 160U * 1024U};
   // A quarter of a second of control's frames; pictures' results come with every tenth frame.
-  static constexpr std::array<std::size_t, kLaneCount> kQueue_bytes{896U * 1024U, 384U * 1024U};
+  static constexpr std::array<std::size_t, kLaneCount> kQueue_bytes{1024U * 1024U, 640U * 1024U};
 
   // What a lane wrote in one frame. It goes into the file after all of the other lane that it saw: a replay lives the
   // frames one after the other.
@@ -95,18 +95,21 @@ class Recorder final : public hal::DepthCamera,
   static_assert(sizeof(FrameHead) >= kMessageHead_bytes);
 
   struct LaneLog {
-    LaneLog(std::span<std::byte> frame, std::span<std::byte> queued, std::span<std::byte> oldest) noexcept
-        : out(frame), queue(queued), next_memory(oldest) {}
-    ByteWriter out;
+    explicit LaneLog(std::span<std::byte> queued) noexcept : queue(queued) {}
+    BlockQueue queue;
+    std::span<std::byte> frame;  // in the queue, or empty: there was no room; a head and records
+    ByteWriter out{{}};          // of its records
+    std::size_t opened_bytes = 0;
     FrameHead head;
-    std::size_t length_at = 0, count_at = 0;  // to be filled in when the row is over
+    std::size_t row_at = 0;  // where the row's head is to be filled in when it is over
+    std::int32_t units = 0;
     std::uint16_t calls = 0;
     std::uint32_t lost = 0;                                                // frames since the last one that found room
+    std::uint32_t raised = 0;                                              // by the lane's health when it looked last
     std::array<std::uint32_t, kEventTable<ExecutiveEvent>.size()> told{};  // events written so far
-    HealthCounts health{};                                                 // as written last
-    BlockQueue queue;
-    // Of the thread that writes: the oldest frame that it has not written.
-    std::span<std::byte> next_memory, next;
+    std::uint32_t health = 0;                                              // Health::raised(), as written last
+    // Of the thread that writes: the oldest frame that it has not written, in the queue.
+    std::span<std::byte> next;
     FrameHead next_head;
   };
   struct Sink final : MessageSink {
@@ -118,7 +121,8 @@ class Recorder final : public hal::DepthCamera,
 
   void put_call(LaneLog& log, CallKind kind, bool gave) const noexcept;
   void put_events(std::size_t lane) noexcept;
-  void put_lost(std::size_t lane) noexcept;
+  void put_view(LaneLog& log, std::size_t lane) noexcept;
+  void open_frame(std::size_t lane) noexcept;
   void hand_over(std::size_t lane, std::int64_t now_ns) noexcept;
   void keep_picture(LaneLog& log, const DepthFrameView& frame) noexcept;
   void let_go_written() noexcept;
@@ -131,12 +135,8 @@ class Recorder final : public hal::DepthCamera,
   Ports robot_;
   hal::PictureKeeper* keeper_;
   Pipeline* pipeline_ = nullptr;
-  std::array<std::byte, kFrame_bytes[0]> control_frame_;
-  std::array<std::byte, kFrame_bytes[1]> perception_frame_;
-  std::array<std::byte, kQueue_bytes[0]> control_queue_;
-  std::array<std::byte, kQueue_bytes[1]> perception_queue_;
-  std::array<std::byte, sizeof(FrameHead) + kFrame_bytes[0]> control_next_;
-  std::array<std::byte, sizeof(FrameHead) + kFrame_bytes[1]> perception_next_;
+  alignas(8) std::array<std::byte, kQueue_bytes[0]> control_queue_;
+  alignas(8) std::array<std::byte, kQueue_bytes[1]> perception_queue_;
   mutable std::array<LaneLog, kLaneCount> logs_;                             // a const port call is recorded, too
   struct {                                                                   // of perception's lane
     StaticVector<const std::uint16_t*, hal::PictureKeeper::kMostKept> kept;  // the oldest first

@@ -276,9 +276,8 @@ class Replay {
       return file_.complain("a row whose outputs cannot be");
     }
     if (lane == kPerceptionLane && result_.without_perception) return true;
-    module_->lane_finished(1 - lane, row.other_finished_ns);
-    const bool looks_across = row.row == 0 || kTasks[row.row - 1].row.lane != lane;
-    if (looks_across && !crossings_.replay(lane, row.taken)) {
+    if (looks_across(row.row)) module_->lane_finished(1 - lane, row.other_finished_ns);
+    if (looks_across(row.row) && !crossings_.replay(lane, row.taken)) {
       return file_.complain("a frame that saw what the other lane had not published");
     }
     ports_.begin_row(row);

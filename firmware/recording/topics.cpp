@@ -169,7 +169,6 @@ void Topics::write_outputs(const RowCall& row, MessageSink& sink) noexcept {
     send(Topic::kTransforms, state_.stamp_ns, sink);
   } else if (task == "gait") {
     walk(reader, "status", gait_);
-    walk(reader, "command", command_);
     walk(reader, "module_state", module_state_);
     write_gait();
     send(Topic::kGait, gait_.stamp_ns, sink);

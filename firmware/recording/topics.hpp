@@ -63,7 +63,6 @@ class Topics {
   StateEstimate state_;
   EstimateQuality quality_;
   GaitStatus gait_;
-  JointCommand command_;
   ModuleState module_state_{};
   SurfaceFrame surfaces_;
   MapSnapshot map_;

@@ -130,7 +130,6 @@ void ReportRun::take_outputs(const RowCall& row) {
     if (!has_truth_) page_T_odom_ = state_.world_T_odom;
   } else if (task == "gait") {
     walk(reader, "status", gait_);
-    walk(reader, "command", command_);
     walk(reader, "module_state", module_state_);
     note_change(states_, name_of(module_state_));
     note_change(phases_, name_of(gait_.phase));

@@ -56,7 +56,6 @@ class ReportRun {
   StateEstimate state_;
   EstimateQuality quality_;
   GaitStatus gait_;
-  JointCommand command_;
   ModuleState module_state_{};
   SurfaceFrame surfaces_;
   MapSnapshot map_;
