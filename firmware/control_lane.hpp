@@ -45,6 +45,8 @@ class ControlLane {
 
   [[nodiscard]] const StateEstimate& state() const noexcept { return estimator_.state(); }
   [[nodiscard]] const GaitStatus& gait_status() const noexcept { return gait_.status(); }
+  // What the gait means to do, as of its last tick; for whoever asks, and no part of the cycle.
+  void tell_plan(GaitPlan& plan) const noexcept { gait_.tell_plan(plan); }
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
   [[nodiscard]] const Health& all_faults() const noexcept { return all_faults_; }  // of all lanes, as of this cycle
   [[nodiscard]] const JointCommand& last_command() const noexcept { return command_; }

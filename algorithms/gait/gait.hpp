@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "algorithms/core/messages/footholds.hpp"
+#include "algorithms/core/messages/gait_plan.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
 #include "algorithms/core/messages/state.hpp"
 #include "algorithms/gait/balance/balance.hpp"
@@ -29,6 +30,8 @@ class Gait {
   void tick(std::int64_t now_ns, const StateEstimate& state, const FootholdSet& footholds,
             const JointFeedback& feedback, JointCommand& command) noexcept;
   [[nodiscard]] const GaitStatus& status() const noexcept { return status_; }
+  // What it means to do, as of the last tick. Costs some tens of microseconds, and nothing of it is made in the cycle.
+  void tell_plan(GaitPlan& plan) const noexcept;
   [[nodiscard]] const Balance& balance() const noexcept { return balance_; }
   // Finishes the committed step, or puts its foot back where the operator asks so early (SwingParams), then holds in
   // double support. From the thread of tick().

@@ -143,6 +143,8 @@ class ClimbPlanner {
   // estimated, none while the estimate tells nothing.
   void landed(const std::optional<SolePair>& soles) noexcept;
   void swing_aborted() noexcept;
+  // The last one that was latched.
+  [[nodiscard]] const Decision& latched_decision() const noexcept { return latched_; }
   [[nodiscard]] std::uint32_t tread_id() const noexcept { return tread_id_; }  // under the foot that landed last
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
 

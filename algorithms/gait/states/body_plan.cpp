@@ -100,6 +100,28 @@ void BodyPlan::count_tick() noexcept {
   torso_tick_ = next_tick(torso_tick_);
 }
 
+PlannedBody BodyPlan::ahead(std::int32_t ticks) const noexcept {
+  TorsoTrajectory::State torso = torso_state_;
+  const std::int32_t com_tick = std::max(com_tick_ - 1 + ticks, 0);
+  Vec2 zmp_m = com().position_m;
+  if (!held_) {
+    HorizontalMotion com = com_.at(com_tick);
+    com.position_m += com_shift_m_;
+    zmp_m = com_.zmp_m(com_tick) + com_shift_m_;
+    torso = torso_.at(std::max(torso_tick_ - 1 + ticks, 0), com);
+  }
+  Transform plan_T_base = TorsoTrajectory::pose(torso);
+  plan_T_base.p_m.head<2>() -= (plan_T_base.R * reference_p_com_m_).head<2>();
+  const Transform to_odom = odom_T_plan(), odom_T_base = to_odom * plan_T_base;
+  PlannedBody body;
+  body.p_com_m = odom_T_base * reference_p_com_m_;
+  body.v_com_mps = to_odom.R * Vec3{torso[0].speed, torso[1].speed, torso[2].speed};
+  body.zmp_m = (to_odom * Vec3{zmp_m.x(), zmp_m.y(), 0.0}).head<2>();
+  body.p_base_m = odom_T_base.p_m;
+  body.base_yaw_rad = yaw_of(odom_T_base.R);
+  return body;
+}
+
 void BodyPlan::carry_to_odometry() noexcept {
   const Transform to_odom = odom_T_plan();
   for (Transform& sole : plan_T_sole_) sole = to_odom * sole;

@@ -3,6 +3,7 @@
 // in which standing feet do not move and the joint commands never jump.
 #pragma once
 
+#include "algorithms/core/messages/gait_plan.hpp"
 #include "algorithms/core/messages/state.hpp"
 #include "algorithms/gait/joints/base_correction.hpp"
 #include "algorithms/gait/joints/joint_reference.hpp"
@@ -74,6 +75,9 @@ class BodyPlan {
   [[nodiscard]] Transform plan_T_odom() const noexcept { return odom_T_plan().inverse(); }
   // x and y: of the centre of mass.
   [[nodiscard]] const TorsoTrajectory::State& torso() const noexcept { return torso_state_; }
+  // So many ticks after this one, which is counted, with the legs as they are now; while it is held, where it is.
+  [[nodiscard]] PlannedBody ahead(std::int32_t ticks) const noexcept;
+  [[nodiscard]] bool is_held() const noexcept { return held_; }
   [[nodiscard]] double height_m() const noexcept { return torso_state_[2].position; }
   [[nodiscard]] HorizontalMotion com() const noexcept { return TorsoTrajectory::horizontal(torso_state_); }
   [[nodiscard]] double drive_share(const DriveModel& drives, Foot leg) const noexcept {

@@ -66,6 +66,16 @@ struct GaitShared {
   return !gait.memory.toes_calibrated && goal.kind == StepKind::kLeading && gait.planner.treads_climbed() == 0;
 }
 
+// The next step, as a state knows it; ticks from the one that is over.
+struct StepAhead {
+  const StepGoal* goal = nullptr;
+  const StepGoal* after = nullptr;  // the step that may come after it; null: none is thought of
+  std::int32_t lift_off_ticks = 0;  // 0: its foot is in the air
+  std::int32_t swing_ticks = 0;     // from then on, of one in the air from now on
+  bool returns = false;             // its foot goes back, at no planned time,
+  Transform back_to;                // to there
+};
+
 // What a state wants next.
 struct Transition {
   enum class To : std::uint8_t { kStay, kStanding, kWeightShift, kSwing, kEnd };

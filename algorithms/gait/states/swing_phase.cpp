@@ -58,6 +58,21 @@ Transform SwingPhase::sole() const noexcept {
   return odom_T_sole;
 }
 
+StepAhead SwingPhase::ahead(const ClimbPlanner& planner) const noexcept {
+  StepAhead step;
+  step.goal = &goal_;
+  step.lift_off_ticks = 0;
+  step.returns = timing_.goes_back();
+  if (step.returns) {
+    step.back_to = path_.at(0.0);
+    return step;
+  }
+  if (leads(goal_.kind)) step.after = &planner.latched_decision().trailing;
+  const double left = std::max(path_.duration_ticks() - timing_.tick() + 1.0, 1.0) / std::max(timing_.pace(), 1.0);
+  step.swing_ticks = static_cast<std::int32_t>(std::ceil(left));
+  return step;
+}
+
 bool SwingPhase::feel_force(const GaitInput& in, const SwingParams& params, std::int64_t steer_age_ns) noexcept {
   if (in.now_ns - in.feedback.stamp_ns > steer_age_ns) {  // what was felt then tells nothing of now
     touch_ = {};

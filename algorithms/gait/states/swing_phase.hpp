@@ -17,6 +17,8 @@ class SwingPhase {
   // On its path, odometry, without steering.
   [[nodiscard]] Transform sole() const noexcept;
   [[nodiscard]] Foot foot() const noexcept { return goal_.foot; }
+  // After this tick: the step that it is of, at the pace that it has.
+  [[nodiscard]] StepAhead ahead(const ClimbPlanner& planner) const noexcept;
 
  private:
   struct Contact {

@@ -17,6 +17,7 @@ void WeightShift::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanne
   ComPlan& com = body.renewed_com();
   plan_shift(params, body.com(), reshift_ticks, plan, com);
   shift_ticks_ = plan.shift_ticks;
+  swing_ticks_ = plan.swing_ticks;
   plan_torso(gait.robot.legs, params, soles, com, shift_ticks_, plan);
   crouch_.begin(in, gait, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad);
   body.move_torso(crouch_.height_m(), crouch_.yaw_rad(), shift_ticks_, shift_ticks_);
@@ -64,6 +65,15 @@ void WeightShift::follow(const GaitInput& in, GaitShared& gait) noexcept {
   if (in.held) return;
   crouch_.update(in, gait, shift_ticks_ - tick_);
   tick_ = next_tick(tick_);
+}
+
+StepAhead WeightShift::ahead() const noexcept {
+  StepAhead step;
+  step.goal = &decision_.goal;
+  if (leads(decision_.goal.kind)) step.after = &decision_.trailing;
+  step.lift_off_ticks = std::max(shift_ticks_ - tick_ + 1, 1);
+  step.swing_ticks = search_.state() == StepSearch::State::kFound ? search_.plan().swing_ticks : swing_ticks_;
+  return step;
 }
 
 bool WeightShift::close_to_planned(const WeightShiftParams& params, const StepGoal& goal) const noexcept {

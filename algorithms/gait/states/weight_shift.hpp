@@ -13,6 +13,8 @@ class WeightShift {
   void begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner::Decision& decision, bool same_foot) noexcept;
   [[nodiscard]] Transition tick(const GaitInput& in, GaitShared& gait) noexcept;
   void follow(const GaitInput& in, GaitShared& gait) noexcept;
+  // After this tick: the step that is to follow. Its foot lifts no sooner, and later where the body is not steady.
+  [[nodiscard]] StepAhead ahead() const noexcept;
 
  private:
   [[nodiscard]] Transition legs_cannot(const GaitInput& in, GaitShared& gait) const noexcept;
@@ -27,6 +29,7 @@ class WeightShift {
   Crouch crouch_;
   std::int32_t tick_ = 0;
   std::int32_t shift_ticks_ = 0;
+  std::int32_t swing_ticks_ = 0;  // of the shape that is tried first
 };
 
 }  // namespace polygmap
