@@ -2,6 +2,7 @@
 # Orin-class AArch64 Linux from an x86 Debian 12; the tests run under qemu-user.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)
+set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)
 set(CMAKE_CXX_COMPILER aarch64-linux-gnu-g++)
 set(CMAKE_CXX_FLAGS_INIT "-mcpu=cortex-a78ae")
 set(CMAKE_LIBRARY_ARCHITECTURE aarch64-linux-gnu)

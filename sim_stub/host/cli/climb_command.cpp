@@ -12,6 +12,7 @@
 #include <ostream>
 
 #include "firmware/config/param_file.hpp"
+#include "firmware/live/live_display.hpp"
 #include "sim_stub/host/cli/can_command.hpp"
 #include "sim_stub/host/cli/command_words.hpp"
 #include "sim_stub/host/cli/estimate_command.hpp"
@@ -52,6 +53,7 @@ struct ClimbArguments {
   std::vector<std::string> pushes;
   std::vector<std::string> set;
   bool keyboard = false;
+  bool watch = false, json = false;
   std::vector<std::string> ask;
   Reality usual;  // of the options that are items of it
   double mount_error_deg = 1.0;
@@ -117,7 +119,7 @@ void declare_reality(CLI::App& climb, ClimbArguments& a) {
 void declare_operator(CLI::App& climb, ClimbArguments& a) {
   CLI::Option* keys =
       climb.add_flag("--operator", a.keyboard,
-                     "Nothing starts by itself: keys arm, start, pause and stop it, in the wall clock's time");
+                     "Nothing starts by itself: keys arm, start, pause and stop it, at the wall clock's speed");
   climb
       .add_option("--ask", a.ask,
                   "The same by a script: arm, start, pause, resume, stop, reset or hand_over, and at which simulated "
@@ -126,6 +128,30 @@ void declare_operator(CLI::App& climb, ClimbArguments& a) {
       ->expected(1, 64)
       ->excludes(keys)
       ->type_name("WHAT@S");
+}
+
+void declare_live(CLI::App& climb, ClimbArguments& a) {
+  CLI::Option* watch = climb.add_flag(
+      "--watch", a.watch,
+      "State, step, rate, slack of each row, ages, next foothold and faults while it climbs: a table in place on a "
+      "terminal, else a line each simulated second");
+  climb
+      .add_flag(
+          "--json", a.json,
+          "With --watch: an object each simulated second instead, see docs/reference/live-json.md; the verdict goes "
+          "to the standard error")
+      ->needs(watch);
+  keep_within(
+      *climb.add_option("--pace", a.options.pace,
+                        "Simulated seconds in one of the wall clock's, at most: 1 is its speed; 0 as fast as it "
+                        "can. With --operator 1 unless said otherwise"),
+      0.0, 1000.0);
+  climb
+      .add_option(
+          "--mailbox", a.options.mailbox,
+          "Also write what it knows and plans into shared memory of this name, as in /polygmap, in every cycle: "
+          "see docs/deploy.md")
+      ->type_name("/NAME");
 }
 
 void declare_camera(CLI::App& climb, ClimbArguments& a) {
@@ -218,6 +244,7 @@ void declare(CLI::App& climb, ClimbArguments& a) {
       ->expected(1, 16)
       ->type_name("\"T,AXIS,NS\"");
   declare_operator(climb, a);
+  declare_live(climb, a);
   declare_reality(climb, a);
   declare_files(climb, a);
   declare_camera(climb, a);
@@ -542,13 +569,24 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
 
   std::optional<ScriptedOperator> script;
   std::optional<Keyboard> keyboard;
-  if (!a.options.asked.empty()) a.options.climb_operator = &script.emplace(a.options.asked, err);
-  if (a.keyboard) a.options.climb_operator = &keyboard.emplace(err);
+  std::optional<LiveDisplay> display;
+  std::optional<NoteBuffer> notes;
+  if (a.watch) {
+    using Form = LiveDisplay::Form;
+    display.emplace(out, a.json ? Form::kJson : live && is_terminal() ? Form::kTable : Form::kLines);
+    a.options.display = &*display;
+    if (!a.json) notes.emplace(*display);
+  }
+  std::ostream words(notes ? &*notes : err.rdbuf());
+  if (!a.options.asked.empty()) a.options.climb_operator = &script.emplace(a.options.asked, words);
+  if (a.keyboard) a.options.climb_operator = &keyboard.emplace(words);
+  if (a.keyboard && a.said->count("--pace") == 0) a.options.pace = 1.0;
   ProgressLine progress(out, a.options.stairs.steps, live && a.options.climb_operator == nullptr);
   ClimbSummary summary;
   std::string not_written;
   try {
-    summary = run(a.options, [&progress](const ClimbProgress& p) { progress.show(p); });
+    const ClimbProgressFunction show = [&progress](const ClimbProgress& p) { progress.show(p); };
+    summary = run(a.options, a.watch ? ClimbProgressFunction{} : show);
   } catch (const ClimbNotWritten& error) {
     summary = error.summary;
     not_written = error.what();
@@ -558,7 +596,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
     return kExitUsage;
   }
   progress.end();
-  out << verdict_line(summary) << "\n" << std::flush;
+  (a.json ? err : out) << verdict_line(summary) << "\n" << std::flush;
   if (!out && not_written.empty()) not_written = "Cannot write the verdict to the standard output.";
   if (!not_written.empty()) {
     err << "polygmap: " << not_written << "\n";

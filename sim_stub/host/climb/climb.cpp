@@ -13,6 +13,8 @@
 #include "sim_stub/bus/bus_robot.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "sim_stub/host/climb/climb_report.hpp"
+#include "sim_stub/host/live/climb_live.hpp"
+#include "sim_stub/host/live/pacer.hpp"
 #include "sim_stub/host/record/climb_recorder.hpp"
 #include "sim_stub/host/record/preview_camera.hpp"
 #include "sim_stub/host/record/truth_topics.hpp"
@@ -32,18 +34,23 @@ class TimedPipeline {
 
   Progress run_row(std::size_t row, std::int64_t cycle_ns, WorkBudget& budget) noexcept {
     const auto begin = WallClock::now();
+    const std::int32_t units = budget.left();
     const Progress progress = pipeline_.run_row(row, cycle_ns, budget);
     if (progress != Progress::kIdle) {
       wall_[row].add(static_cast<std::uint64_t>(std::chrono::nanoseconds(WallClock::now() - begin).count()));
+      charged_[row].add(static_cast<std::uint64_t>(std::max(units - budget.left(), 0)) *
+                        static_cast<std::uint64_t>(kSchedule[row].unit_cost_ns));
     }
     return progress;
   }
   void cycle_done(std::size_t lane, const CycleReport& report) noexcept { pipeline_.cycle_done(lane, report); }
   [[nodiscard]] const DurationStatistics& wall(std::size_t row) const noexcept { return wall_[row]; }
+  // By the work that was done, at the robot's prices; 0 of rows whose work is not counted.
+  [[nodiscard]] const DurationStatistics& charged(std::size_t row) const noexcept { return charged_[row]; }
 
  private:
   Pipeline& pipeline_;
-  std::array<DurationStatistics, kTasks.size()> wall_;
+  std::array<DurationStatistics, kTasks.size()> wall_, charged_;
 };
 
 // The lidar's port on the way to the module: the report wants to see what the module accepts.
@@ -132,6 +139,27 @@ std::vector<ScheduleRow> schedule_of(const Executive& executive, const TimedPipe
                     1e-3 * static_cast<double>(tasks.wall(row).max_ns())});
   }
   return rows;
+}
+
+polygmap_mailbox_timing timing_of(const Executive& executive, const TimedPipeline& tasks, std::int64_t now_ns) {
+  polygmap_mailbox_timing timing{};
+  timing.stamp_ns = now_ns;
+  timing.measured_by_host = 1;
+  timing.row_count = static_cast<std::uint32_t>(kTasks.size());
+  timing.lane_count = 1;
+  for (std::size_t row = 0; row < kTasks.size(); ++row) {
+    const RowStatistics& statistics = executive.row_statistics(row);
+    timing.rows[row] = {statistics.runs,
+                        tasks.wall(row).count() * tasks.wall(row).mean_ns(),
+                        tasks.wall(row).max_ns(),
+                        statistics.overruns,
+                        statistics.shed,
+                        tasks.charged(row).count() * tasks.charged(row).mean_ns(),
+                        tasks.charged(row).max_ns()};
+  }
+  const LaneStatistics& lane = executive.lane_statistics();
+  timing.lanes[0] = {lane.cycles, lane.overruns, lane.slips, lane.caught_up, lane.lateness.max_ns()};
+  return timing;
 }
 
 CameraFigures camera_figures(const SimRobot& robot, const CameraExtrinsicsEstimator& mount) {
@@ -252,6 +280,9 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   ClimbReport report(robot.stairs(), robot.errors().base_T_camera, robot.depth_camera().intrinsics(),
                      robot.errors().sole);
 
+  ClimbLive live(options.display, options.mailbox, options.pace);
+  const auto timing = [&] { return timing_of(executive, tasks, robot.now_ns()); };
+  Pacer pacer(options.pace, options.interrupt);
   std::vector<StateChange> states;
   std::int64_t end_ns = -1, released_ns = -1;
   bool held_again = false;
@@ -263,6 +294,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     } else {
       robot.advance();
     }
+    pacer.wait_for(robot.now_ns());
     if (options.climb_operator != nullptr) {
       options.climb_operator->look(robot.now_ns(), pipeline.control().module_state());
     }
@@ -276,6 +308,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
       if (const Preview* preview = camera.take()) truth_topics->write(*preview);
     }
     const Telemetry telemetry = pipeline.telemetry(robot.now_ns(), module->watched);
+    live.after_cycle(pipeline.control(), telemetry, timing);
     report.observe(robot.truth(), telemetry);
     if (recorder) recorder->observe(robot.truth(), telemetry.state);
     if (lidar.accepted(telemetry.state)) report.observe_lio(lidar.last());
@@ -314,6 +347,8 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     }
     if (options.interrupt != nullptr && *options.interrupt != 0) break;
   }
+
+  live.end(pipeline.control(), pipeline.telemetry(robot.now_ns(), module->watched), timing);
 
   RunFigures figures;
   figures.options = options;

@@ -17,6 +17,9 @@
 #include "sim_stub/reality.hpp"
 #include "sim_stub/world/stair_world.hpp"
 
+namespace polygmap {
+class LiveDisplay;
+}
 namespace polygmap::sim {
 
 [[nodiscard]] inline std::string name_of(GaitPattern gait) {
@@ -43,6 +46,9 @@ struct ClimbOptions {
   double time_limit_s = 150.0;  // simulated
   // Becomes the number of the signal that asks for the end; the climb then ends with what there is. Null: none may.
   const std::atomic<int>* interrupt = nullptr;
+  double pace = 0.0;               // simulated seconds in one of the wall clock's, at most; 0: as fast as it can
+  LiveDisplay* display = nullptr;  // of who watches; null: nobody. Outlives the climb
+  std::string mailbox;             // for programs that watch; empty: there is none
   bool threaded_render = true;
   // Causality tests: the picture shows something else than the plant stands on.
   double render_dx_m = 0.0, render_dy_m = 0.0, render_dz_m = 0.0;

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <ostream>
-#include <thread>
 
 namespace polygmap::sim {
 namespace {
@@ -54,14 +53,7 @@ void Keyboard::read_keys() {
   }
 }
 
-void Keyboard::listen() {
-  if (begun_ns_ < 0) {
-    begun_ns_ = now_ns();
-    begun_ = std::chrono::steady_clock::now();
-  }
-  read_keys();
-  std::this_thread::sleep_until(begun_ + std::chrono::nanoseconds(now_ns() - begun_ns_));
-}
+void Keyboard::listen() { read_keys(); }
 
 std::optional<OperatorCommand> Keyboard::next() {
   if (asked_.empty()) return std::nullopt;

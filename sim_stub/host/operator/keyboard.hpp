@@ -3,7 +3,6 @@
 
 #include <termios.h>
 
-#include <chrono>
 #include <deque>
 #include <iosfwd>
 #include <optional>
@@ -12,8 +11,7 @@
 
 namespace polygmap::sim {
 
-// Keys on the standard input, each a command, and the climb no faster than the wall's clock. Whoever quits, or whose
-// input ends, has left.
+// Keys on the standard input, each a command. Whoever quits, or whose input ends, has left.
 class Keyboard final : public ClimbOperator {
  public:
   explicit Keyboard(std::ostream& out);
@@ -32,8 +30,6 @@ class Keyboard final : public ClimbOperator {
   std::optional<termios> usual_;  // of a terminal, to be put back
   std::deque<OperatorCommand> asked_;
   bool closed_ = false, quits_ = false;
-  std::int64_t begun_ns_ = -1;
-  std::chrono::steady_clock::time_point begun_;
 };
 
 }  // namespace polygmap::sim
