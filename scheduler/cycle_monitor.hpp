@@ -43,6 +43,7 @@ class DurationStatistics {
   [[nodiscard]] constexpr std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] constexpr std::uint64_t min_ns() const noexcept { return count_ == 0 ? 0 : min_ns_; }
   [[nodiscard]] constexpr std::uint64_t max_ns() const noexcept { return max_ns_; }
+  [[nodiscard]] constexpr std::uint64_t sum_ns() const noexcept { return sum_ns_; }
   [[nodiscard]] constexpr std::uint64_t mean_ns() const noexcept { return count_ == 0 ? 0 : sum_ns_ / count_; }
   [[nodiscard]] constexpr const std::array<std::uint32_t, kBuckets>& histogram() const noexcept { return histogram_; }
 
@@ -61,10 +62,13 @@ struct RowStatistics {
   std::uint64_t idle = 0;            // calls that returned kIdle
   std::uint64_t overruns = 0;        // calls longer than the row's budget
   std::uint64_t overrun_max_ns = 0;  // the longest of those calls
-  std::uint64_t shed = 0;            // slots given up for lack of time
-  std::uint64_t deferred = 0;        // slots that paid back an overdraft instead of working
-  std::uint64_t overdrawn = 0;       // calls that spent more units than they were given
-  std::uint64_t units = 0;           // work units spent
+  // What runs that had work left of what they were given, leftovers of others among it; negative: an overrun.
+  std::int64_t slack_min_ns = std::numeric_limits<std::int64_t>::max();
+  std::int64_t slack_sum_ns = 0;
+  std::uint64_t shed = 0;       // slots given up for lack of time
+  std::uint64_t deferred = 0;   // slots that paid back an overdraft instead of working
+  std::uint64_t overdrawn = 0;  // calls that spent more units than they were given
+  std::uint64_t units = 0;      // work units spent
 };
 
 // One lane.

@@ -192,11 +192,16 @@ class CyclicExecutive {
     const Progress progress = tasks_.run_row(row, report_.due_ns, budget);
     const std::uint64_t time_ns = scale_.to_ns(clock_.count() - begin_count);
     report_.ran |= 1U << row;
+    const std::int64_t budget_ns =
+        std::int64_t{Table[row].budget_us} * 1000 + std::int64_t{more} * Table[row].unit_cost_ns;
     if (progress == Progress::kIdle) {
       count_up(statistics.idle);
     } else {
+      const std::int64_t slack_ns = budget_ns - static_cast<std::int64_t>(time_ns);
       count_up(statistics.runs);
       statistics.time.add(time_ns);
+      statistics.slack_min_ns = std::min(statistics.slack_min_ns, slack_ns);
+      statistics.slack_sum_ns += slack_ns;
     }
     if (Table[row].resumable()) {
       statistics.units += static_cast<std::uint64_t>(std::max(allowance - budget.left(), 0));
@@ -206,8 +211,6 @@ class CyclicExecutive {
         overdraft_[row] = -budget.left();
       }
     }
-    const std::int64_t budget_ns =
-        std::int64_t{Table[row].budget_us} * 1000 + std::int64_t{more} * Table[row].unit_cost_ns;
     if (time_ns > static_cast<std::uint64_t>(budget_ns)) {
       count_up(statistics.overruns);
       statistics.overrun_max_ns = std::max(statistics.overrun_max_ns, time_ns);

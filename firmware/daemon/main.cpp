@@ -13,6 +13,8 @@
 #include "firmware/daemon/devices.hpp"
 #include "firmware/daemon/doctor/doctor.hpp"
 #include "firmware/daemon/service/service.hpp"
+#include "firmware/daemon/watch.hpp"
+#include "firmware/mailbox/mailbox_writer.hpp"
 #include "firmware/recording/replay.hpp"
 
 namespace polygmap::daemon {
@@ -24,6 +26,10 @@ constexpr const char* kUsage =
     "polygmapd --config FILE --check     only reads it\n"
     "polygmapd --ask WHAT --config FILE  asks the one that runs with this file to arm, start, pause, resume, stop,\n"
     "                                    reset or hand_over, or for its state; says the state that came of it\n"
+    "polygmapd --watch [--json] [--config FILE]   looks on at one that runs, and writes the mailbox that FILE names, "
+    "else\n"
+    "                                    /polygmap: a table in place on a terminal, else a line a second; --json: an\n"
+    "                                    object a second\n"
     "polygmapd --replay RUN.mcap         feeds a recording to the module and compares what comes out\n"
     "polygmapd --doctor [--json] [--strict] [--config FILE]   says what on this machine hinders it, and what to do\n"
     "polygmapd --version\n"
@@ -32,12 +38,13 @@ constexpr const char* kUsage =
     "with the\n"
     "recording incomplete.\n"
     "Exit codes of --ask: 0 it does so, 1 it refuses and says why, 2 configuration, 3 nobody listens.\n"
+    "Exit codes of --watch: 0 ended by a signal, 2 configuration, 3 that mailbox cannot be read.\n"
     "Exit codes of --replay: 0 the same bits, 1 a difference, 2 no recording, 3 an unfinished\n"
     "one that agrees as far as it goes. Of --doctor: 0 nothing hinders, 1 "
     "else; with --strict a warning hinders, too.\n";
 
 struct Options {
-  enum class Mode { kRun, kCheck, kAsk, kReplay, kDoctor, kHelp, kVersion } mode = Mode::kRun;
+  enum class Mode { kRun, kCheck, kAsk, kReplay, kDoctor, kWatch, kHelp, kVersion } mode = Mode::kRun;
   std::string ask;
   std::string config, recording;  // recording: to be replayed, or written
   bool json = false, strict = false;
@@ -63,9 +70,9 @@ std::string parse(int argc, char** argv, Options& options) {
       options.recording = argv[++i];
       options.mode = Options::Mode::kReplay;
       modes.push_back(word);
-    } else if (word == "--doctor" || word == "--help" || word == "-h" || word == "--version") {
+    } else if (word == "--doctor" || word == "--watch" || word == "--help" || word == "-h" || word == "--version") {
       using enum Options::Mode;
-      options.mode = word == "--doctor" ? kDoctor : word == "--version" ? kVersion : kHelp;
+      options.mode = word == "--doctor" ? kDoctor : word == "--watch" ? kWatch : word == "--version" ? kVersion : kHelp;
       modes.push_back(word);
     } else if (word == "--ask") {
       options.ask = argv[++i];
@@ -82,7 +89,8 @@ std::string parse(int argc, char** argv, Options& options) {
     }
   }
   if (modes.size() > 1) return std::string(modes[0]) + " and " + std::string(modes[1]) + " do not go together";
-  if (options.json && options.mode != Options::Mode::kDoctor) return "--json is of --doctor";
+  const bool may_be_json = options.mode == Options::Mode::kDoctor || options.mode == Options::Mode::kWatch;
+  if (options.json && !may_be_json) return "--json is of --doctor and --watch";
   if (options.strict && options.mode != Options::Mode::kDoctor) return "--strict is of --doctor";
   const bool needs_config = modes.empty() || options.mode == Options::Mode::kAsk;
   if (needs_config && options.config.empty()) return "--config FILE is missing";
@@ -131,6 +139,11 @@ int run_service(const DaemonConfig& config, const std::string& recording_path) {
     const std::string wrong = begin_recording(*recorder, recording_path, config.params);
     if (!wrong.empty()) return complain(wrong, ExitCode::kRecording);
   }
+  MailboxWriter mailbox;
+  if (!config.mailbox.empty()) {
+    const std::string wrong = mailbox.open({.name = config.mailbox, .group = config.mailbox_group});
+    if (!wrong.empty()) return complain(config.path + ", mailbox: " + wrong + ".", ExitCode::kDevice);
+  }
   ServiceParts parts{.ports = recorder ? recorder->ports() : ports,
                      .maintain = [&devices] { devices.maintain(); },
                      .let_go = [&devices] { devices.let_go(); },
@@ -138,6 +151,7 @@ int run_service(const DaemonConfig& config, const std::string& recording_path) {
                      .operator_socket = config.operator_socket.empty() ? nullptr : &operator_socket,
                      .devices = &counts,
                      .recorder = recorder.get(),
+                     .mailbox = mailbox.is_open() ? &mailbox : nullptr,
                      .hook = row_hook()};
   Service service(config, std::move(parts), signals, notifier);
   const Outcome outcome = service.run();
@@ -147,6 +161,7 @@ int run_service(const DaemonConfig& config, const std::string& recording_path) {
                    outcome.code == ExitCode::kRecording;
   if (ran) std::printf("%s%s", counts.text().c_str(), text_of(outcome).c_str());
   std::fflush(stdout);
+  mailbox.tell_closed();
   if (outcome.threads_hang) std::_Exit(number_of(outcome.code));
   return number_of(outcome.code);
 }
@@ -164,6 +179,21 @@ int run_ask(const Options& options) {
   if (!try_ask(socket, options.ask, text)) return complain(text + ".", ExitCode::kDevice);
   std::puts(text.c_str());
   return text.starts_with(kRefusedAnswer) ? number_of(ExitCode::kStoppedItself) : 0;
+}
+
+int run_watch(const Options& options) {
+  const StopSignals signals;
+  if (options.config.empty()) return run_watch(POLYGMAP_MAILBOX_NAME, options.json, signals);
+  std::string mailbox;
+  try {
+    mailbox = read_mailbox_name(options.config);
+  } catch (const config::FileError& error) {
+    return complain(error.what(), ExitCode::kConfiguration);
+  }
+  if (mailbox.empty()) {
+    return complain(options.config + " has no key mailbox: there is nothing to watch.", ExitCode::kConfiguration);
+  }
+  return run_watch(mailbox, options.json, signals);
 }
 
 int run_with_config(const Options& options) {
@@ -199,6 +229,8 @@ int run(int argc, char** argv) {
       return run_doctor(options.config, options.json, options.strict);
     case Options::Mode::kAsk:
       return run_ask(options);
+    case Options::Mode::kWatch:
+      return run_watch(options);
     case Options::Mode::kRun:
     case Options::Mode::kCheck:
       break;

@@ -35,6 +35,8 @@ class LiveDisplay {
   [[nodiscard]] bool is_due(std::int64_t stamp_ns, std::int64_t wall_ns) const noexcept {
     return form_ == Form::kTable ? wall_ns >= next_ns_ : stamp_ns >= next_ns_;
   }
+  // What comes next has stamps of another clock.
+  void begin_anew() noexcept { next_ns_ = 0; }
   // Not asked whether it is due. False when it cannot be written any more.
   bool show(const LiveView& view, std::int64_t stamp_ns, std::int64_t wall_ns);
   // A sentence, which stays below the table for a while; not among objects.

@@ -52,7 +52,7 @@ std::string step_text(const LiveView& view) {
 std::string worst_text(const LiveView& view) {
   if (view.worst_row >= view.rows.size()) return "none yet";
   const LiveRow& row = view.rows[view.worst_row];
-  return print("%s, slack %.0f us of %.0f%s", row.name.c_str(), row.worst_slack_us(), row.budget_us,
+  return print("%s, slack %.0f us of %.0f%s", row.name.c_str(), row.robot.worst_slack_us, row.budget_us,
                view.is_virtual ? " by its work" : "");
 }
 std::string next_text(const LiveView& view, std::size_t foot) {
@@ -86,16 +86,15 @@ void add_wrapped(std::vector<std::string>& lines, const std::string& head, std::
 std::string json_number(double value, const char* format = "%.6g") {
   return std::isfinite(value) ? print_number(format, value) : "null";
 }
-void add_cost(std::string& json, const char* prefix, const std::optional<LiveCost>& cost) {
-  const std::string mean = cost ? json_number(cost->mean_us) : "null";
-  const std::string worst = cost ? json_number(cost->worst_us) : "null";
-  json += print(",\"%smean_us\":%s,\"%sworst_us\":%s", prefix, mean.c_str(), prefix, worst.c_str());
+void add_cost(std::string& json, const char* prefix, const LiveCost& cost) {
+  json += print(",\"%smean_us\":%s,\"%sworst_us\":%s", prefix, json_number(cost.mean_us).c_str(), prefix,
+                json_number(cost.worst_us).c_str());
 }
 void add_row(std::string& json, const LiveRow& row, bool is_virtual) {
   json += print("{\"row\":\"%s\",\"budget_us\":%.0f", row.name.c_str(), row.budget_us);
   add_cost(json, "", row.robot);
-  json += print(",\"mean_slack_us\":%s,\"worst_slack_us\":%s", json_number(row.mean_slack_us()).c_str(),
-                json_number(row.worst_slack_us()).c_str());
+  json += print(",\"mean_slack_us\":%s,\"worst_slack_us\":%s", json_number(row.robot.mean_slack_us).c_str(),
+                json_number(row.robot.worst_slack_us).c_str());
   if (is_virtual) add_cost(json, "host_", row.host);
   json += print(",\"runs\":%llu,\"overruns\":%llu,\"shed\":%llu}", static_cast<unsigned long long>(row.runs),
                 static_cast<unsigned long long>(row.overruns), static_cast<unsigned long long>(row.shed));
@@ -132,23 +131,19 @@ std::vector<std::string> table_of(const LiveView& view, std::size_t width) {
   if (!view.next[0] && !view.next[1]) lines.push_back("next     no foothold: " + view.no_way);
   add_wrapped(lines, "faults   ", events_text(view.faults), width);
   lines.push_back("worst    " + worst_text(view));
-  lines.push_back(std::string("row          budget    mean   worst   slack  overrun     shed") +
-                  (view.is_virtual ? "   host mean   worst" : ""));
-  lines.push_back(std::string("                 us      us      us      us") +
-                  (view.is_virtual ? "  (robot's, by work)    (us of this machine)" : ""));
+  lines.push_back(std::string("row         budget   mean  worst   slack: mean  worst  overrun  shed") +
+                  (view.is_virtual ? "  host: mean  worst" : "  us"));
   for (const LiveRow& row : view.rows) {
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-    std::string line =
-        print("%-11s %7.0f %7s %7s %7s %8llu %8llu", row.name.c_str(), row.budget_us,
-              us_text(row.robot ? row.robot->mean_us : kNone).c_str(),
-              us_text(row.robot ? row.robot->worst_us : kNone).c_str(), us_text(row.worst_slack_us()).c_str(),
-              static_cast<unsigned long long>(row.overruns), static_cast<unsigned long long>(row.shed));
-    if (view.is_virtual) {
-      line += print(" %11s %7s", us_text(row.host ? row.host->mean_us : kNone).c_str(),
-                    us_text(row.host ? row.host->worst_us : kNone).c_str());
-    }
+    std::string line = print("%-10s %7.0f %6s %6s %13s %6s %8llu %5llu", row.name.c_str(), row.budget_us,
+                             us_text(row.robot.mean_us).c_str(), us_text(row.robot.worst_us).c_str(),
+                             us_text(row.robot.mean_slack_us).c_str(), us_text(row.robot.worst_slack_us).c_str(),
+                             static_cast<unsigned long long>(row.overruns), static_cast<unsigned long long>(row.shed));
+    if (view.is_virtual)
+      line += print(" %11s %6s", us_text(row.host.mean_us).c_str(), us_text(row.host.worst_us).c_str());
     lines.push_back(line);
   }
+  if (view.is_virtual)
+    lines.push_back("us of a robot, by the work that is counted; host: us of this machine, which judge no robot");
   lines.push_back(print("cycles   %llu, overrun %llu, skipped %llu", static_cast<unsigned long long>(view.cycles),
                         static_cast<unsigned long long>(view.cycle_overruns),
                         static_cast<unsigned long long>(view.skipped_cycles)));

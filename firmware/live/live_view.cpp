@@ -25,10 +25,11 @@ double age_s(std::int64_t stamp_ns, std::int64_t now_ns) {
   return stamp_ns == 0 ? kUnknown : 1e-9 * static_cast<double>(now_ns - stamp_ns);
 }
 
-std::optional<LiveCost> cost(std::uint64_t total_ns, std::uint64_t most_ns, std::uint64_t runs) {
-  if (runs == 0 || most_ns == 0) return std::nullopt;
-  return LiveCost{1e-3 * static_cast<double>(total_ns) / static_cast<double>(runs),
-                  1e-3 * static_cast<double>(most_ns)};
+LiveCost cost_of(const polygmap_mailbox_cost& from, std::uint64_t runs) {
+  if (runs == 0 || from.most_ns == 0) return {};
+  const double mean_us = 1e-3 / static_cast<double>(runs);
+  return {mean_us * static_cast<double>(from.total_ns), 1e-3 * static_cast<double>(from.most_ns),
+          mean_us * static_cast<double>(from.total_slack_ns), 1e-3 * static_cast<double>(from.least_slack_ns)};
 }
 
 void put_rows(LiveView& view, const MailboxImage& image) {
@@ -37,19 +38,17 @@ void put_rows(LiveView& view, const MailboxImage& image) {
   view.worst_row = count;
   for (std::size_t i = 0; i < count; ++i) {
     const polygmap_mailbox_row& from = image.timing.rows[i];
-    const std::optional<LiveCost> measured = cost(from.total_ns, from.most_ns, from.runs);
-    const std::optional<LiveCost> charged = cost(from.charged_total_ns, from.charged_most_ns, from.runs);
     LiveRow row;
     row.name = text_of(image.names.rows[i]);
     row.budget_us = image.names.row_budgets_us[i];
-    const bool by_host = image.timing.measured_by_host != 0;
-    row.robot = by_host ? charged : measured;
-    if (by_host) row.host = measured;
+    row.robot = cost_of(from.robot, from.runs);
+    row.host = cost_of(from.host, from.runs);
     row.runs = from.runs;
     row.overruns = from.overruns;
     row.shed = from.shed;
-    if (row.robot && row.worst_slack_us() / row.budget_us < least_share) {
-      least_share = row.worst_slack_us() / row.budget_us;
+    const double share = row.robot.worst_slack_us / row.budget_us;
+    if (share < least_share) {
+      least_share = share;
       view.worst_row = i;
     }
     view.rows.push_back(std::move(row));

@@ -20,29 +20,25 @@ namespace polygmap {
 struct MailboxImage {
   bool is_virtual = false;    // stamps are a simulation's
   std::int64_t epoch_ns = 0;  // time 0 of the view, on the stamps' clock
+  bool has_names = false;
   polygmap_mailbox_names names{};
   polygmap_mailbox_status status{};
   polygmap_mailbox_timing timing{};
   polygmap_mailbox_events events{};
 };
 
+// What is not a number is not known: no run yet, or no work is counted.
 struct LiveCost {
-  double mean_us, worst_us;
+  double mean_us = std::numeric_limits<double>::quiet_NaN();
+  double worst_us = std::numeric_limits<double>::quiet_NaN();
+  double mean_slack_us = std::numeric_limits<double>::quiet_NaN();
+  double worst_slack_us = std::numeric_limits<double>::quiet_NaN();
 };
 struct LiveRow {
   std::string name;
   double budget_us = 0.0;
-  // Of the robot: as measured on it; of a simulation: what the row's work costs on a robot, nothing where no work is
-  // counted.
-  std::optional<LiveCost> robot;
-  std::optional<LiveCost> host;  // of a simulation: as measured on this machine, which judges no robot
+  LiveCost robot, host;  // see polygmap_mailbox_row
   std::uint64_t runs = 0, overruns = 0, shed = 0;
-  [[nodiscard]] double worst_slack_us() const noexcept {
-    return robot ? budget_us - robot->worst_us : std::numeric_limits<double>::quiet_NaN();
-  }
-  [[nodiscard]] double mean_slack_us() const noexcept {
-    return robot ? budget_us - robot->mean_us : std::numeric_limits<double>::quiet_NaN();
-  }
 };
 
 struct LiveFoothold {
@@ -67,7 +63,7 @@ struct LiveView {
   double speed = 1.0;         // seconds of the view's clock in one of the wall's; NaN likewise
   double asked_speed = 0.0;   // 0: as fast as it can
   std::vector<LiveRow> rows;  // in the schedule's order
-  std::size_t worst_row = 0;  // by its worst slack over its budget; rows.size(): none
+  std::size_t worst_row = 0;  // by its worst slack against its budget; rows.size(): none
   double picture_age_s = 0.0, map_age_s = 0.0, lio_age_s = 0.0;  // NaN: there is none yet
   std::array<std::optional<LiveFoothold>, 2> next;               // of left and right foot
   std::string no_way;                                            // why there is no next foothold; "none"

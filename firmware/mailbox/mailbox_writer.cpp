@@ -118,7 +118,8 @@ std::string MailboxWriter::open(const MailboxConfig& config) {
   header.version = POLYGMAP_MAILBOX_VERSION;
   header.state = POLYGMAP_MAILBOX_IS_OPEN;
   header.writer_pid = ::getpid();
-  header.writer_start_ticks = polygmap_mailbox_start_ticks(header.writer_pid);
+  char state = '?';
+  header.writer_start_ticks = polygmap_mailbox_start_ticks(header.writer_pid, &state);
   header.opened_ns = polygmap_mailbox_now_ns();
   header.clock = config.clock;
   header.cycle_us = kCycle_us;
@@ -171,10 +172,15 @@ int MailboxWriter::take_name(const MailboxConfig& config) {
   return -1;
 }
 
-void MailboxWriter::close() noexcept {
+void MailboxWriter::tell_closed() noexcept {
   if (box_ == nullptr) return;
   __atomic_store_n(&box_->header.state, std::uint32_t{POLYGMAP_MAILBOX_IS_CLOSED}, __ATOMIC_RELEASE);
   if (same_file(fd_, name_)) ::shm_unlink(name_.c_str());
+}
+
+void MailboxWriter::close() noexcept {
+  if (box_ == nullptr) return;
+  tell_closed();
   ::munmap(box_, sizeof(polygmap_mailbox));
   ::close(fd_);
   box_ = nullptr;

@@ -26,7 +26,9 @@ class MailboxWriter {
   // Makes it anew, in the stead of one whose writer is gone. Empty, or one sentence. Calls the system; before the
   // lanes.
   [[nodiscard]] std::string open(const MailboxConfig& config);
-  // Tells the readers that there is no writer any more, and takes the name away.
+  // Tells the readers that there is no writer any more, and takes the name away; writes then reach nobody.
+  void tell_closed() noexcept;
+  // No thread writes any more.
   void close() noexcept;
   [[nodiscard]] bool is_open() const noexcept { return box_ != nullptr; }
 

@@ -128,15 +128,22 @@ typedef struct polygmap_mailbox_status {
   double measured_tread_m;  // from its nosing to what rises behind it; NaN: nothing is mapped there
 } polygmap_mailbox_status;
 
+// What a row of the schedule took, of runs that had work. Slack is what a run left of what it was given: its budget and
+// what rows before it had left; negative where it took more.
+typedef struct polygmap_mailbox_cost {
+  uint64_t total_ns;  // of all runs together
+  uint64_t most_ns;   // of one run
+  int64_t total_slack_ns;
+  int64_t least_slack_ns;
+} polygmap_mailbox_cost;
+
 // A row of the schedule, since the start.
 typedef struct polygmap_mailbox_row {
-  uint64_t runs;      // calls that had work
-  uint64_t total_ns;  // of these runs together, as measured: see measured_by_host
-  uint64_t most_ns;   // of one run, as measured
-  uint64_t overruns;  // calls longer than the budget
-  uint64_t shed;      // slots given up for lack of time
-  // Of a simulation: the same two by the work that was done, at the robot's prices. 0: of this row no work is counted.
-  uint64_t charged_total_ns, charged_most_ns;
+  uint64_t runs;                // calls that had work
+  uint64_t overruns;            // calls longer than they may be
+  uint64_t shed;                // slots given up for lack of time
+  polygmap_mailbox_cost robot;  // as measured; of a simulation, by the work that was done, at the robot's prices
+  polygmap_mailbox_cost host;   // of a simulation, as measured: of this machine, which judges no robot
 } polygmap_mailbox_row;
 
 typedef struct polygmap_mailbox_lane {
@@ -150,10 +157,8 @@ typedef struct polygmap_mailbox_lane {
 // How long it takes. Every 50 cycles.
 typedef struct polygmap_mailbox_timing {
   int64_t stamp_ns;
-  uint32_t row_count, lane_count;
-  // 1: total_ns and most_ns are a simulating machine's wall clock, which says nothing of the robot's budgets.
-  uint32_t measured_by_host;
-  uint32_t reserved;
+  uint32_t row_count;
+  uint32_t lane_count;
   polygmap_mailbox_row rows[POLYGMAP_MAILBOX_ROWS];
   polygmap_mailbox_lane lanes[POLYGMAP_MAILBOX_LANES];
 } polygmap_mailbox_timing;
@@ -218,14 +223,14 @@ typedef struct polygmap_mailbox {
   X(polygmap_mailbox_status, map_stamp_ns) X(polygmap_mailbox_status, lio_stamp_ns) \
   X(polygmap_mailbox_status, next) X(polygmap_mailbox_status, measured_rise_m) \
   X(polygmap_mailbox_status, measured_tread_m) \
-  X(polygmap_mailbox_row, runs) X(polygmap_mailbox_row, total_ns) X(polygmap_mailbox_row, most_ns) \
-  X(polygmap_mailbox_row, overruns) X(polygmap_mailbox_row, shed) X(polygmap_mailbox_row, charged_total_ns) \
-  X(polygmap_mailbox_row, charged_most_ns) \
+  X(polygmap_mailbox_cost, total_ns) X(polygmap_mailbox_cost, most_ns) X(polygmap_mailbox_cost, total_slack_ns) \
+  X(polygmap_mailbox_cost, least_slack_ns) \
+  X(polygmap_mailbox_row, runs) X(polygmap_mailbox_row, overruns) X(polygmap_mailbox_row, shed) \
+  X(polygmap_mailbox_row, robot) X(polygmap_mailbox_row, host) \
   X(polygmap_mailbox_lane, cycles) X(polygmap_mailbox_lane, overruns) X(polygmap_mailbox_lane, skipped) \
   X(polygmap_mailbox_lane, caught_up) X(polygmap_mailbox_lane, late_ns) \
   X(polygmap_mailbox_timing, stamp_ns) X(polygmap_mailbox_timing, row_count) \
-  X(polygmap_mailbox_timing, lane_count) X(polygmap_mailbox_timing, measured_by_host) \
-  X(polygmap_mailbox_timing, reserved) X(polygmap_mailbox_timing, rows) X(polygmap_mailbox_timing, lanes) \
+  X(polygmap_mailbox_timing, lane_count) X(polygmap_mailbox_timing, rows) X(polygmap_mailbox_timing, lanes) \
   X(polygmap_mailbox_events, stamp_ns) X(polygmap_mailbox_events, count) \
   X(polygmap_mailbox_lock, sequence) X(polygmap_mailbox_lock, written_ns) \
   X(polygmap_mailbox, header) X(polygmap_mailbox, names) X(polygmap_mailbox, pose_lock) X(polygmap_mailbox, pose) \

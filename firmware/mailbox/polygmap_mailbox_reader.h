@@ -63,9 +63,11 @@ static inline void polygmap_mailbox_detach(polygmap_mailbox_reader* reader) {
 // Reads one that may change at any moment.
 static inline uint64_t polygmap_mailbox_load(const uint64_t* value) { return __atomic_load_n(value, __ATOMIC_ACQUIRE); }
 
-// Field 22 of /proc/PID/stat, after the name in brackets, which may hold anything. 0: there is none that could be read.
-static inline uint64_t polygmap_mailbox_start_ticks(int64_t pid) {
+// Field 22 of /proc/PID/stat, after the name in brackets, which may hold anything; the state, field 3, likewise. 0, and
+// '?', where there is none that could be read.
+static inline uint64_t polygmap_mailbox_start_ticks(int64_t pid, char* state) {
   char path[48], text[1024];
+  *state = '?';
   snprintf(path, sizeof path, "/proc/%lld/stat", (long long)pid);
   FILE* file = fopen(path, "r");
   if (file == NULL) return 0;
@@ -73,15 +75,17 @@ static inline uint64_t polygmap_mailbox_start_ticks(int64_t pid) {
   fclose(file);
   text[length] = '\0';
   const char* at = strrchr(text, ')');
+  if (at != NULL && at[1] == ' ' && at[2] != '\0') *state = at[2];
   for (int field = 2; at != NULL && field < 22; ++field) at = strchr(at + 1, ' ');
   return at == NULL ? 0 : strtoull(at, NULL, 10);
 }
 
 // Whether the writer's process is there. One that cannot be seen from here, from within a container, is not.
 static inline bool polygmap_mailbox_writer_lives(const polygmap_mailbox_header* header) {
-  const uint64_t ticks = polygmap_mailbox_start_ticks(header->writer_pid);
-  const bool another = ticks != 0 && ticks != header->writer_start_ticks;
-  return !another && (kill((pid_t)header->writer_pid, 0) == 0 || errno != ESRCH);
+  char state;
+  const uint64_t ticks = polygmap_mailbox_start_ticks(header->writer_pid, &state);
+  const bool ended = state == 'Z' || state == 'X' || (ticks != 0 && ticks != header->writer_start_ticks);
+  return !ended && (kill((pid_t)header->writer_pid, 0) == 0 || errno != ESRCH);
 }
 static inline bool polygmap_mailbox_is_torn(const polygmap_mailbox* box) {
   return (polygmap_mailbox_load(&box->pose_lock.sequence) | polygmap_mailbox_load(&box->status_lock.sequence) |

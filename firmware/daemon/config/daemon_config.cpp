@@ -18,7 +18,8 @@ namespace polygmap::daemon {
 namespace {
 
 constexpr std::size_t kMostSocketPath_bytes = 107;  // sockaddr_un holds so many and a null
-constexpr double kMostProcessor = 1023;             // CPU_SETSIZE - 1
+constexpr std::size_t kMostMailbox_bytes = 201;
+constexpr double kMostProcessor = 1023;  // CPU_SETSIZE - 1
 constexpr Range kPort{1, 65535, ""};
 constexpr Range kAngle{-7.0, 7.0, "rad"};
 constexpr Range kImuRate{100, 1000, "Hz"};  // what imu_interval_ns may be
@@ -35,10 +36,17 @@ std::string operator_socket_of(const std::string& path, const TomlSection& root)
   return socket;
 }
 
-// The line that gives the file's own key operator; lines before it are left empty, so that it keeps its number. Empty:
+std::string mailbox_of(const TomlSection& root) {
+  const std::string name = root.text("mailbox");
+  const bool good = name.size() > 1 && name.size() <= kMostMailbox_bytes && name.rfind('/') == 0;
+  if (!good) root.fail("mailbox", "must be a name as in \"/polygmap\", a slash and 1 to 200 characters without one");
+  return name;
+}
+
+// The line that gives the file's own key; lines before it are left empty, so that it keeps its number. Empty:
 // there is none that stands by itself.
-std::string operator_line_of(std::string_view text) {
-  constexpr std::string_view kKey = "operator", kBlank = " \t\r";
+std::string line_of(std::string_view key, std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r";
   const auto trimmed = [=](std::string_view words) {
     words.remove_prefix(std::min(words.find_first_not_of(kBlank), words.size()));
     return words.substr(0, words.find_last_not_of(kBlank) + 1);
@@ -47,7 +55,7 @@ std::string operator_line_of(std::string_view text) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     const std::string_view line = trimmed(text.substr(0, end));
     if (line.starts_with('[')) return {};  // a table begins, and what follows is its
-    if (line.starts_with(kKey) && trimmed(line.substr(kKey.size())).starts_with('=')) return before.append(line);
+    if (line.starts_with(key) && trimmed(line.substr(key.size())).starts_with('=')) return before.append(line);
     text.remove_prefix(std::min(end + 1, text.size()));
   }
   return {};
@@ -58,8 +66,8 @@ class DaemonFile {
   DaemonFile(const std::string& path, const toml::table& root) : path_(path), root_(path, "", root, 1) {}
 
   DaemonConfig read() {
-    root_.only(
-        {"bus", "params", "lanes", "real_time", "hold_s", "control", "perception", "camera", "imu", "lio", "operator"});
+    root_.only({"bus", "params", "lanes", "real_time", "hold_s", "control", "perception", "camera", "imu", "lio",
+                "operator", "mailbox", "mailbox_group"});
     config_.path = path_;
     config_.lanes = static_cast<std::size_t>(root_.whole("lanes", {1, kLaneCount, ""}, kLaneCount));
     config_.needs_real_time = root_.choice("real_time", {"required", "preferred"}, 0) == 0;
@@ -78,6 +86,9 @@ class DaemonFile {
     } else if (!config_.params.supervisor.autostart) {
       root_.fail("params", "switches supervisor.autostart off, and there is no key operator: it would never arm");
     }
+    if (root_.has("mailbox")) config_.mailbox = mailbox_of(root_);
+    if (root_.has("mailbox_group")) config_.mailbox_group = root_.text("mailbox_group");
+    if (config_.mailbox.empty() && root_.has("mailbox_group")) root_.fail("mailbox_group", "needs the key mailbox");
     take_bus();
     take_imu(*root_.section("imu", true));
     if (const auto lio = root_.section("lio", false)) take_lio(*lio);
@@ -240,10 +251,17 @@ DaemonConfig read_daemon_config(const std::string& path) {
 }
 std::string read_operator_socket(const std::string& path) {
   const std::string text = config::read_text({"daemon", path});
-  const std::string line = operator_line_of(text);
+  const std::string line = line_of("operator", text);
   const toml::table root = config::parse_toml({"daemon", path}, line.empty() ? text : line);
   const TomlSection section(path, "", root, 1);
   return section.has("operator") ? operator_socket_of(path, section) : std::string();
+}
+std::string read_mailbox_name(const std::string& path) {
+  const std::string text = config::read_text({"daemon", path});
+  const std::string line = line_of("mailbox", text);
+  const toml::table root = config::parse_toml({"daemon", path}, line.empty() ? text : line);
+  const TomlSection section(path, "", root, 1);
+  return section.has("mailbox") ? mailbox_of(section) : std::string();
 }
 
 }  // namespace polygmap::daemon

@@ -39,6 +39,7 @@ struct DaemonConfig {
   std::variant<hal::LivoxImu::Config, hal::SerialImu::Config> imu;
   std::optional<hal::LioUdp::Config> lio;
   std::string operator_socket;  // its path; empty: the module arms and starts by itself
+  std::string mailbox, mailbox_group;  // names; empty: there is none; the process's own
   std::size_t lanes = kLaneCount;
   std::array<LaneThread::Placement, kLaneCount> placement{};  // of one lane, the first
   bool needs_real_time = true;
@@ -55,5 +56,7 @@ struct DaemonConfig {
 // The key operator alone, as operator_socket; whatever else the file holds may be wrong, since who asks a robot to stop
 // must not be held up by it. Throws config::FileError when there is no file, or when that key's line is wrong.
 [[nodiscard]] std::string read_operator_socket(const std::string& path);
+// The key mailbox likewise.
+[[nodiscard]] std::string read_mailbox_name(const std::string& path);
 
 }  // namespace polygmap::daemon

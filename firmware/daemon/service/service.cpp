@@ -71,9 +71,10 @@ struct Service::LaneRun {
 // The module's rows, the operator's request to stop before them, and what they say of themselves after.
 class Service::Tasks {
  public:
-  Tasks(Pipeline& pipeline, StatusBoard& board, const ServiceParts& parts) noexcept
+  Tasks(Pipeline& pipeline, StatusBoard& board, ServiceMailbox* mailbox, const ServiceParts& parts) noexcept
       : pipeline_(pipeline),
         board_(board),
+        mailbox_(mailbox),
         recorder_(parts.recorder),
         hook_(parts.hook),
         rows_(pipeline, parts.recorder) {}
@@ -86,7 +87,9 @@ class Service::Tasks {
   }
   void cycle_done(std::size_t lane, const CycleReport& report) noexcept {
     rows_.cycle_done(lane, report);
-    if (lane == kControlLane) board_.publish(pipeline_.control());
+    if (lane != kControlLane) return;
+    board_.publish(pipeline_.control());
+    if (mailbox_ != nullptr) mailbox_->after_cycle(pipeline_, report.due_ns);
   }
 
  private:
@@ -99,6 +102,7 @@ class Service::Tasks {
   }
   Pipeline& pipeline_;
   StatusBoard& board_;
+  ServiceMailbox* mailbox_;
   recording::Recorder* recorder_;
   RowHook* hook_;
   recording::RecordedTasks<Pipeline> rows_;
@@ -174,7 +178,11 @@ std::string Service::start() {
   fault_in_stack();
   pipeline_ = std::make_unique<Pipeline>(parts_.ports, config_.params);
   if (parts_.recorder != nullptr) parts_.recorder->watch(*pipeline_);
-  tasks_ = std::make_unique<Tasks>(*pipeline_, board_, parts_);
+  if (parts_.mailbox != nullptr) {
+    mailbox_ = std::make_unique<ServiceMailbox>(*parts_.mailbox, board_, config_.lanes);
+    mailbox_->watch(*pipeline_);
+  }
+  tasks_ = std::make_unique<Tasks>(*pipeline_, board_, mailbox_.get(), parts_);
   return start_lanes();
 }
 

@@ -18,6 +18,7 @@
 #include "firmware/daemon/service/device_counts.hpp"
 #include "firmware/daemon/service/operator_socket.hpp"
 #include "firmware/daemon/service/row_hook.hpp"
+#include "firmware/daemon/service/service_mailbox.hpp"
 #include "firmware/daemon/service/status_board.hpp"
 #include "firmware/daemon/service/stop_signals.hpp"
 #include "firmware/daemon/system/heap_count.hpp"
@@ -36,6 +37,7 @@ struct ServiceParts {
   OperatorSocket* operator_socket = nullptr;  // the port of it, or of who records it; null: none
   DeviceCounts* devices = nullptr;            // null: there are no drivers whose counters could be told
   recording::Recorder* recorder = nullptr;    // has begun, and stands before the ports; null: nothing is recorded
+  MailboxWriter* mailbox = nullptr;           // is open; null: there is none
   RowHook* hook = nullptr;                    // of a test's build
 };
 
@@ -118,6 +120,7 @@ class Service {
   hal::PosixClock clock_;
   StatusBoard board_;
   std::unique_ptr<Pipeline> pipeline_;
+  std::unique_ptr<ServiceMailbox> mailbox_;
   std::unique_ptr<Tasks> tasks_;
   std::array<std::unique_ptr<LaneRun>, kLaneCount> lanes_;
   std::atomic<std::int64_t> first_due_ns_{0};  // 0: the lanes wait for it

@@ -8,6 +8,7 @@
 
 #include "firmware/control_lane.hpp"
 #include "firmware/daemon/service/status_text.hpp"
+#include "firmware/mailbox/polygmap_mailbox.h"
 #include "firmware/schedule.hpp"
 
 namespace polygmap::daemon {
@@ -65,16 +66,41 @@ struct alignas(64) LaneCounts {
   std::atomic<std::uint64_t> skipped{0};    // cycles that slipped
   std::atomic<std::uint64_t> caught_up{0};  // cycles run late
   std::atomic<std::uint64_t> wake_max_ns{0};
+
+  void load(polygmap_mailbox_lane& lane) const noexcept {
+    lane = {cycles.load(std::memory_order_relaxed), overruns.load(std::memory_order_relaxed),
+            skipped.load(std::memory_order_relaxed), caught_up.load(std::memory_order_relaxed),
+            wake_max_ns.load(std::memory_order_relaxed)};
+  }
 };
 
 // Of a row of kSchedule; written by the row's lane only.
 struct RowCounts {
   std::atomic<std::uint64_t> overruns{0};    // calls longer than the row's budget
   std::atomic<std::uint64_t> longest_ns{0};  // of those calls
+  // Of runs that had work.
+  std::atomic<std::uint64_t> runs{0}, shed{0}, total_ns{0}, most_ns{0};
+  std::atomic<std::int64_t> total_slack_ns{0}, least_slack_ns{0};
 
   void store(const RowStatistics& statistics) noexcept {
-    longest_ns.store(statistics.overrun_max_ns, std::memory_order_relaxed);
-    overruns.store(statistics.overruns, std::memory_order_relaxed);
+    constexpr auto kRelaxed = std::memory_order_relaxed;
+    longest_ns.store(statistics.overrun_max_ns, kRelaxed);
+    overruns.store(statistics.overruns, kRelaxed);
+    runs.store(statistics.runs, kRelaxed);
+    shed.store(statistics.shed, kRelaxed);
+    total_ns.store(statistics.time.sum_ns(), kRelaxed);
+    most_ns.store(statistics.time.max_ns(), kRelaxed);
+    total_slack_ns.store(statistics.slack_sum_ns, kRelaxed);
+    least_slack_ns.store(statistics.slack_min_ns, kRelaxed);
+  }
+  // Each number as of then or of a run later.
+  void load(polygmap_mailbox_row& row) const noexcept {
+    constexpr auto kRelaxed = std::memory_order_relaxed;
+    row.runs = runs.load(kRelaxed);
+    row.overruns = overruns.load(kRelaxed);
+    row.shed = shed.load(kRelaxed);
+    row.robot = {total_ns.load(kRelaxed), most_ns.load(kRelaxed), total_slack_ns.load(kRelaxed),
+                 least_slack_ns.load(kRelaxed)};
   }
 };
 

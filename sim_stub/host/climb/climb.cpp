@@ -38,19 +38,30 @@ class TimedPipeline {
     const Progress progress = pipeline_.run_row(row, cycle_ns, budget);
     if (progress != Progress::kIdle) {
       wall_[row].add(static_cast<std::uint64_t>(std::chrono::nanoseconds(WallClock::now() - begin).count()));
-      charged_[row].add(static_cast<std::uint64_t>(std::max(units - budget.left(), 0)) *
-                        static_cast<std::uint64_t>(kSchedule[row].unit_cost_ns));
+      charge(row, units - budget.left(), budget.left());
     }
     return progress;
   }
   void cycle_done(std::size_t lane, const CycleReport& report) noexcept { pipeline_.cycle_done(lane, report); }
   [[nodiscard]] const DurationStatistics& wall(std::size_t row) const noexcept { return wall_[row]; }
   // By the work that was done, at the robot's prices; 0 of rows whose work is not counted.
-  [[nodiscard]] const DurationStatistics& charged(std::size_t row) const noexcept { return charged_[row]; }
+  [[nodiscard]] const polygmap_mailbox_cost& charged(std::size_t row) const noexcept { return charged_[row]; }
 
  private:
+  void charge(std::size_t row, std::int64_t spent_units, std::int64_t left_units) noexcept {
+    if (!kSchedule[row].resumable()) return;
+    polygmap_mailbox_cost& cost = charged_[row];
+    const bool is_first = cost.most_ns == 0;
+    const std::int64_t unit_ns = kSchedule[row].unit_cost_ns;
+    const auto spent_ns = static_cast<std::uint64_t>(spent_units * unit_ns);
+    cost.total_ns += spent_ns;
+    cost.most_ns = std::max(cost.most_ns, spent_ns);
+    cost.total_slack_ns += left_units * unit_ns;
+    cost.least_slack_ns = is_first ? left_units * unit_ns : std::min(cost.least_slack_ns, left_units * unit_ns);
+  }
   Pipeline& pipeline_;
-  std::array<DurationStatistics, kTasks.size()> wall_, charged_;
+  std::array<DurationStatistics, kTasks.size()> wall_;
+  std::array<polygmap_mailbox_cost, kTasks.size()> charged_{};
 };
 
 // The lidar's port on the way to the module: the report wants to see what the module accepts.
@@ -144,18 +155,17 @@ std::vector<ScheduleRow> schedule_of(const Executive& executive, const TimedPipe
 polygmap_mailbox_timing timing_of(const Executive& executive, const TimedPipeline& tasks, std::int64_t now_ns) {
   polygmap_mailbox_timing timing{};
   timing.stamp_ns = now_ns;
-  timing.measured_by_host = 1;
   timing.row_count = static_cast<std::uint32_t>(kTasks.size());
   timing.lane_count = 1;
   for (std::size_t row = 0; row < kTasks.size(); ++row) {
     const RowStatistics& statistics = executive.row_statistics(row);
-    timing.rows[row] = {statistics.runs,
-                        tasks.wall(row).count() * tasks.wall(row).mean_ns(),
-                        tasks.wall(row).max_ns(),
-                        statistics.overruns,
-                        statistics.shed,
-                        tasks.charged(row).count() * tasks.charged(row).mean_ns(),
-                        tasks.charged(row).max_ns()};
+    polygmap_mailbox_row& to = timing.rows[row];
+    to.runs = statistics.runs;
+    to.overruns = statistics.overruns;
+    to.shed = statistics.shed;
+    to.robot = tasks.charged(row);
+    to.host.total_ns = tasks.wall(row).sum_ns();
+    to.host.most_ns = tasks.wall(row).max_ns();
   }
   const LaneStatistics& lane = executive.lane_statistics();
   timing.lanes[0] = {lane.cycles, lane.overruns, lane.slips, lane.caught_up, lane.lateness.max_ns()};

@@ -21,8 +21,10 @@ ClimbLive::ClimbLive(LiveDisplay* display, const std::string& mailbox, double pa
   fill(image_.names);
   if (mailbox.empty()) return;
   mailbox_ = std::make_unique<MailboxWriter>();
-  const std::string wrong = mailbox_->open({.name = mailbox, .group = {}, .clock = POLYGMAP_MAILBOX_VIRTUAL});
-  if (!wrong.empty()) throw std::runtime_error(wrong + ".");
+  std::string wrong = mailbox_->open({.name = mailbox, .group = {}, .clock = POLYGMAP_MAILBOX_VIRTUAL});
+  if (wrong.empty()) return;
+  wrong.front() = 'T';  // a sentence of its own: "the mailbox ..."
+  throw std::runtime_error(wrong + ".");
 }
 
 void ClimbLive::after_cycle(const ControlLane& control, const Telemetry& telemetry,
