@@ -221,7 +221,7 @@ int run(int argc, char** argv) {
       std::fputs(kUsage, stdout);
       return 0;
     case Options::Mode::kVersion:
-      std::puts("polygmapd " POLYGMAP_VERSION);
+      std::puts("polygmapd " POLYGMAP_PROGRAM_VERSION);
       return 0;
     case Options::Mode::kReplay:
       return run_replay(options.recording);

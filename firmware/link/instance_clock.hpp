@@ -16,6 +16,13 @@ class InstanceClock final : public hal::Clock {
   // A sample that is stamped later than now by more is none of this clock's.
   static constexpr std::int64_t kMostAhead_ns = kNsPerS;
 
+  // Of a caller whose time is the module's.
+  [[nodiscard]] static InstanceClock of_module() noexcept {
+    InstanceClock clock;
+    clock.first_ns_ = kFirst_ns;
+    return clock;
+  }
+
   // False, and nothing changes: it does not come after the last one, or lies too far from the first.
   [[nodiscard]] bool try_advance(std::int64_t now_ns) noexcept {
     std::int64_t since_ns = 0;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The plan, of what the gait, the map and the search for footholds know.
+#include "firmware/link/plan_reading.hpp"
+
 #include <algorithm>
 #include <cstdint>
 #include <limits>
@@ -107,24 +109,20 @@ polygmap_polygon polygon_of(const InstanceClock& clock, const MapPolygon& from, 
 
 }  // namespace
 
-bool read_plan(const Instance& instance, polygmap_plan& to) noexcept {
-  if (instance.executive->lane_statistics().cycles == 0) return false;
-  const InstanceClock& clock = instance.clock;
-  const ControlLane& control = instance.pipeline->control();
-  const GaitStatus& gait = control.gait_status();
-  const MapSnapshot& map = instance.watched.map.front();
+void read_steps(const PlanSource& source, const InstanceClock& clock, polygmap_plan& to) noexcept {
+  const GaitStatus& gait = source.control.gait_status();
   GaitPlan plan;
-  control.tell_plan(plan);
+  source.control.tell_plan(plan);
 
   to.phase = static_cast<std::int32_t>(gait.phase);
-  to.stamp_ns = clock.to_caller(instance.executive->last_cycle().due_ns);
-  to.map_stamp_ns = clock.to_caller_or_0(map.stamp_ns);
+  to.stamp_ns = clock.to_caller(source.cycle_ns);
+  to.map_stamp_ns = clock.to_caller_or_0(source.map.stamp_ns);
   to.held = plan.planned && plan.held ? 1 : 0;
-  to.stairs = stairs_of(control);
+  to.stairs = stairs_of(source.control);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     to.foot[foot] = {transform_of(gait.odom_T_sole_desired[foot]), gait.stands[foot] ? 1U : 0U};
   }
-  to.step_count = to.contact_count = to.body_count = to.polygon_count = 0;
+  to.step_count = to.contact_count = to.body_count = 0;
   for (const PlannedStep& step : plan.steps) to.step[to.step_count++] = target_of(clock, step);
   if (plan.has_landing) {
     to.step[0].torso_x_m = plan.landing.p_base_m.x();
@@ -134,9 +132,21 @@ bool read_plan(const Instance& instance, polygmap_plan& to) noexcept {
   }
   for (const PlannedBody& body : plan.bodies) to.body[to.body_count++] = body_of(clock, body);
   if (plan.planned) list_contacts(clock, plan, gait.stands, to);
-  for (const MapPolygon& polygon : map.polygons) {
-    to.polygon[to.polygon_count++] = polygon_of(clock, polygon, map.drift_m);
+}
+
+void read_polygons(const PlanSource& source, const InstanceClock& clock, polygmap_plan& to) noexcept {
+  to.polygon_count = 0;
+  for (const MapPolygon& polygon : source.map.polygons) {
+    to.polygon[to.polygon_count++] = polygon_of(clock, polygon, source.map.drift_m);
   }
+}
+
+bool read_plan(const Instance& instance, polygmap_plan& to) noexcept {
+  if (instance.executive->lane_statistics().cycles == 0) return false;
+  const PlanSource source{instance.pipeline->control(), instance.watched.map.front(),
+                          instance.executive->last_cycle().due_ns};
+  read_steps(source, instance.clock, to);
+  read_polygons(source, instance.clock, to);
   return true;
 }
 

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "firmware/mailbox/polygmap_mailbox.h"
+#include "firmware/mailbox/mailbox_layout.hpp"
 
 namespace polygmap {
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "firmware/live/live_view.hpp"
+#include "firmware/mailbox/mailbox_layout.hpp"
 #include "firmware/mailbox/polygmap_mailbox_reader.h"
 
 namespace polygmap {

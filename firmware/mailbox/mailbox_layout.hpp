@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "firmware/link/abi.hpp"
 #include "firmware/mailbox/polygmap_mailbox.h"
 
 namespace polygmap {
@@ -28,8 +29,9 @@ inline constexpr auto kMailboxFields = std::to_array<MailboxField>({
     const bool is_first = i == 0 || kMailboxFields[i - 1].structure != field.structure;
     const bool is_last = i + 1 == kMailboxFields.size() || kMailboxFields[i + 1].structure != field.structure;
     const std::size_t begin = is_first ? 0 : kMailboxFields[i - 1].offset + kMailboxFields[i - 1].size;
-    // The sections of the segment begin at cache lines of their own.
-    const std::size_t most = field.structure == "polygmap_mailbox" ? 63 : 0;
+    // The sections of the segment begin at cache lines of their own; structs of polygmap.h may be padded.
+    const bool is_segment = field.structure == "polygmap_mailbox";
+    const std::size_t most = is_segment ? 63 : field.structure.starts_with("polygmap_mailbox_") ? 0 : 7;
     gaps += field.offset - begin > most ? 1U : 0U;
     gaps += is_last && field.structure_size - field.offset - field.size > most ? 1U : 0U;
   }

@@ -69,22 +69,53 @@ static void sleep_until(int64_t due_ns) {
   }
 }
 
-// As old as the newest section: ages of a simulation are of its own clock.
-static double age_ms(int64_t stamp_ns, int64_t now_ns) {
-  return stamp_ns == 0 ? -1.0 : 1e-6 * (double)(now_ns - stamp_ns);
+typedef struct sections {
+  polygmap_mailbox_pose pose;
+  polygmap_mailbox_status status;
+  polygmap_plan plan;  // without its polygons
+} sections;
+
+// Of a simulation, whose time stands still between its cycles, as of its newest status.
+static int64_t now_ns(const polygmap_mailbox* box, const polygmap_mailbox_status* status) {
+  return box->header.clock == POLYGMAP_MAILBOX_VIRTUAL ? status->stamp_ns : polygmap_mailbox_now_ns();
 }
 
-static void print_line(const polygmap_mailbox* box, const polygmap_mailbox_pose* pose,
-                       const polygmap_mailbox_status* status) {
-  const bool is_virtual = box->header.clock == POLYGMAP_MAILBOX_VIRTUAL;
-  const int64_t now_ns = is_virtual ? status->stamp_ns : polygmap_mailbox_now_ns();
-  const uint32_t state = status->module_state, phase = status->gait_phase;
-  printf("%.3f s %s %s, status %.1f ms old; base %.3f %.3f %.3f", 1e-9 * (double)status->stamp_ns,
+static void print_age(const char* what, int64_t stamp_ns, int64_t now) {
+  if (stamp_ns == 0) {
+    printf("%s none", what);
+  } else {
+    printf("%s %.1f ms", what, 1e-6 * (double)(now - stamp_ns));
+  }
+}
+
+static void print_line(const polygmap_mailbox* box, const sections* s) {
+  static const char* const kFeet[] = {"left", "right"};
+  static const char* const kCertainties[] = {"latched", "planned", "expected"};
+  const int64_t now = now_ns(box, &s->status);
+  const uint32_t state = s->status.module_state, phase = s->status.gait_phase;
+  printf("%.3f %s %s;", 1e-9 * (double)s->status.stamp_ns,
          state < POLYGMAP_MAILBOX_NAMES ? box->names.module_states[state].text : "?",
-         phase < POLYGMAP_MAILBOX_NAMES ? box->names.gait_phases[phase].text : "?", age_ms(status->stamp_ns, now_ns),
-         pose->odom_p_base_m[0], pose->odom_p_base_m[1], pose->odom_p_base_m[2]);
-  printf("; picture %.0f, map %.0f, lidar %.0f ms old\n", age_ms(status->picture_stamp_ns, now_ns),
-         age_ms(status->map_stamp_ns, now_ns), age_ms(status->lio_stamp_ns, now_ns));
+         phase < POLYGMAP_MAILBOX_NAMES ? box->names.gait_phases[phase].text : "?");
+  print_age(" age of pose", s->pose.stamp_ns, now);
+  print_age(", plan", s->plan.stamp_ns, now);
+  print_age(", picture", s->status.picture_stamp_ns, now);
+  print_age(", map", s->status.map_stamp_ns, now);
+  print_age(", lidar", s->status.lio_stamp_ns, now);
+  printf("; base %.3f %.3f %.3f", s->pose.odom_p_base_m[0], s->pose.odom_p_base_m[1], s->pose.odom_p_base_m[2]);
+  for (uint32_t i = 0; i < s->plan.step_count && i < POLYGMAP_MAX_STEPS; ++i) {
+    const polygmap_foot_target* step = &s->plan.step[i];
+    const char* const certainty = kCertainties[(uint32_t)step->certainty % 3];
+    printf("; %s %s to %.3f %.3f %.3f yaw %.3f", certainty, kFeet[step->foot == 1], step->x_m, step->y_m, step->z_m,
+           step->yaw_rad);
+    if (step->touch_down_ns != 0) printf(" in %.3f s", 1e-9 * (double)(step->touch_down_ns - now));
+  }
+  if (s->plan.body_count > 0) {
+    const polygmap_body* body = &s->plan.body[0];
+    printf("; com %.3f %.3f %.3f, torso %.3f %.3f %.3f", body->com_m[0], body->com_m[1], body->com_m[2],
+           body->torso_m[0], body->torso_m[1], body->torso_m[2]);
+  }
+  printf("; %u contacts, %u polygons, rise %.3f tread %.3f heading %.3f\n", s->plan.contact_count,
+         s->plan.polygon_count, s->plan.stairs.rise_m, s->plan.stairs.tread_m, s->plan.stairs.heading_rad);
   fflush(stdout);
 }
 
@@ -113,8 +144,7 @@ int main(int argc, char** argv) {
   sigaction(SIGTERM, &action, NULL);
 
   polygmap_mailbox_reader reader = POLYGMAP_MAILBOX_READER;
-  polygmap_mailbox_pose pose;
-  polygmap_mailbox_status status;
+  static sections s;
   char why[POLYGMAP_MAILBOX_SENTENCE];
   bool cannot = false;
   long lines = 0;
@@ -128,11 +158,12 @@ int main(int argc, char** argv) {
       const bool silent = result == POLYGMAP_MAILBOX_SILENT;
       if (silent && !was_silent) fprintf(stderr, "mailbox_reader: %s\n", why);
       was_silent = silent;
-      const bool whole =
-          polygmap_mailbox_try_copy(&reader.box->pose_lock, &reader.box->pose, &pose, sizeof pose) &&
-          polygmap_mailbox_try_copy(&reader.box->status_lock, &reader.box->status, &status, sizeof status);
+      const polygmap_mailbox* const box = reader.box;
+      const bool whole = polygmap_mailbox_try_copy(&box->pose_lock, &box->pose, &s.pose, sizeof s.pose) &&
+                         polygmap_mailbox_try_copy(&box->status_lock, &box->status, &s.status, sizeof s.status) &&
+                         polygmap_mailbox_try_copy(&box->plan_lock, &box->plan, &s.plan, POLYGMAP_MAILBOX_PLAN_BYTES);
       if (result == POLYGMAP_MAILBOX_OK && whole) {
-        print_line(reader.box, &pose, &status);
+        print_line(box, &s);
         if (++lines == o.lines) stop_asked = 1;
       }
       due_ns += 1000000000 / o.rate_hz;

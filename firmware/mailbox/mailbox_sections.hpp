@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "firmware/control_lane.hpp"
-#include "firmware/mailbox/polygmap_mailbox.h"
+#include "firmware/mailbox/mailbox_layout.hpp"
 #include "firmware/schedule.hpp"
 
 namespace polygmap {
@@ -18,8 +18,5 @@ void fill(polygmap_mailbox_pose& pose, const StateEstimate& state) noexcept;
 void fill(polygmap_mailbox_status& status, const ControlLane& control, const Telemetry& telemetry,
           std::uint64_t cycles) noexcept;
 void fill(polygmap_mailbox_events& events, const Health& health, std::int64_t now_ns) noexcept;
-
-// Sections of how long it takes and what was counted are written every so many cycles.
-inline constexpr std::uint64_t kMailboxSeldom_cycles = 50;
 
 }  // namespace polygmap

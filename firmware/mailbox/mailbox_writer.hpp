@@ -39,6 +39,12 @@ class MailboxWriter {
   void write(const polygmap_mailbox_status& status, std::int64_t now_ns) noexcept {
     write(box_->status_lock, box_->status, status, now_ns);
   }
+  // with_polygons: the map has become another one.
+  void write(const polygmap_plan& plan, bool with_polygons, std::int64_t now_ns) noexcept {
+    const std::size_t polygons = with_polygons ? plan.polygon_count : 0;
+    write(box_->plan_lock, &box_->plan, &plan, POLYGMAP_MAILBOX_PLAN_BYTES + polygons * sizeof(polygmap_polygon),
+          now_ns);
+  }
   void write(const polygmap_mailbox_timing& timing, std::int64_t now_ns) noexcept {
     write(box_->timing_lock, box_->timing, timing, now_ns);
   }
@@ -49,9 +55,13 @@ class MailboxWriter {
  private:
   template <typename Section>
   static void write(polygmap_mailbox_lock& lock, Section& shared, const Section& own, std::int64_t now_ns) noexcept {
+    write(lock, &shared, &own, sizeof own, now_ns);
+  }
+  static void write(polygmap_mailbox_lock& lock, void* shared, const void* own, std::size_t bytes,
+                    std::int64_t now_ns) noexcept {
     const std::uint64_t sequence = lock.sequence;  // nobody else writes it
     __atomic_store_n(&lock.sequence, sequence + 1, __ATOMIC_RELAXED);
-    polygmap_mailbox_copy_in(&shared, &own, sizeof own);
+    polygmap_mailbox_copy_in(shared, own, bytes);
     __atomic_store_n(&lock.written_ns, now_ns, __ATOMIC_RELAXED);
     __atomic_store_n(&lock.sequence, sequence + 2, __ATOMIC_RELEASE);
   }

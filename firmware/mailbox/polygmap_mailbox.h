@@ -17,6 +17,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "polygmap.h"  // the plan, and the numbers of states and phases
+
 #ifdef __cplusplus
 #define POLYGMAP_MAILBOX_FUNCTION constexpr inline
 #else
@@ -175,6 +177,10 @@ typedef struct polygmap_mailbox_lock {
   int64_t written_ns;  // on the module's clock: the cycle's due time
 } polygmap_mailbox_lock;
 
+// The plan is polygmap.h's. It is written in every cycle that makes it another one, else every tenth. Its polygons are
+// the last of it and most of it: who needs none copies POLYGMAP_MAILBOX_PLAN_BYTES alone.
+#define POLYGMAP_MAILBOX_PLAN_BYTES offsetof(polygmap_plan, polygon)
+
 #define POLYGMAP_MAILBOX_ALIGNED __attribute__((aligned(64)))
 typedef struct polygmap_mailbox {
   polygmap_mailbox_header header POLYGMAP_MAILBOX_ALIGNED;
@@ -183,6 +189,8 @@ typedef struct polygmap_mailbox {
   polygmap_mailbox_pose pose;
   polygmap_mailbox_lock status_lock POLYGMAP_MAILBOX_ALIGNED;
   polygmap_mailbox_status status;
+  polygmap_mailbox_lock plan_lock POLYGMAP_MAILBOX_ALIGNED;
+  polygmap_plan plan;
   polygmap_mailbox_lock timing_lock POLYGMAP_MAILBOX_ALIGNED;
   polygmap_mailbox_timing timing;
   polygmap_mailbox_lock events_lock POLYGMAP_MAILBOX_ALIGNED;
@@ -192,6 +200,27 @@ typedef struct polygmap_mailbox {
 // All fields of all structures above. mailbox_layout.hpp refuses a field that is not here.
 // clang-format off
 #define POLYGMAP_MAILBOX_FIELDS(X) \
+  X(polygmap_transform, p_m) X(polygmap_transform, q) \
+  X(polygmap_foot_target, foot) X(polygmap_foot_target, certainty) X(polygmap_foot_target, lift_off_ns) \
+  X(polygmap_foot_target, touch_down_ns) X(polygmap_foot_target, x_m) X(polygmap_foot_target, y_m) \
+  X(polygmap_foot_target, z_m) X(polygmap_foot_target, yaw_rad) X(polygmap_foot_target, up) \
+  X(polygmap_foot_target, torso_x_m) X(polygmap_foot_target, torso_y_m) X(polygmap_foot_target, torso_z_m) \
+  X(polygmap_foot_target, torso_yaw_rad) X(polygmap_foot_target, polygon_id) X(polygmap_foot_target, onto_tread) \
+  X(polygmap_foot_target, returns) \
+  X(polygmap_body, time_ns) X(polygmap_body, com_m) X(polygmap_body, com_mps) X(polygmap_body, zmp_m) \
+  X(polygmap_body, torso_m) X(polygmap_body, torso_yaw_rad) \
+  X(polygmap_contact, begin_ns) X(polygmap_contact, end_ns) X(polygmap_contact, stands) \
+  X(polygmap_polygon, id) X(polygmap_polygon, surface) X(polygmap_polygon, sightings) \
+  X(polygmap_polygon, vertices) X(polygmap_polygon, last_seen_ns) X(polygmap_polygon, normal) \
+  X(polygmap_polygon, offset_sigma_m) X(polygmap_polygon, vertex_m) X(polygmap_polygon, observed) \
+  X(polygmap_polygon, has_nosing) X(polygmap_polygon, nosing_m) \
+  X(polygmap_stairs, state) X(polygmap_stairs, climbed) X(polygmap_stairs, rise_m) X(polygmap_stairs, tread_m) \
+  X(polygmap_stairs, heading_rad) X(polygmap_stairs, nosing_m) \
+  X(polygmap_foot, odom_T_sole) X(polygmap_foot, stands) \
+  X(polygmap_plan, size) X(polygmap_plan, phase) X(polygmap_plan, stamp_ns) X(polygmap_plan, map_stamp_ns) \
+  X(polygmap_plan, held) X(polygmap_plan, stairs) X(polygmap_plan, foot) X(polygmap_plan, step_count) \
+  X(polygmap_plan, contact_count) X(polygmap_plan, body_count) X(polygmap_plan, polygon_count) \
+  X(polygmap_plan, step) X(polygmap_plan, contact) X(polygmap_plan, body) X(polygmap_plan, polygon) \
   X(polygmap_mailbox_header, magic) X(polygmap_mailbox_header, layout_hash) \
   X(polygmap_mailbox_header, segment_bytes) X(polygmap_mailbox_header, version) X(polygmap_mailbox_header, state) \
   X(polygmap_mailbox_header, writer_pid) X(polygmap_mailbox_header, writer_start_ticks) \
@@ -234,8 +263,9 @@ typedef struct polygmap_mailbox {
   X(polygmap_mailbox_events, stamp_ns) X(polygmap_mailbox_events, count) \
   X(polygmap_mailbox_lock, sequence) X(polygmap_mailbox_lock, written_ns) \
   X(polygmap_mailbox, header) X(polygmap_mailbox, names) X(polygmap_mailbox, pose_lock) X(polygmap_mailbox, pose) \
-  X(polygmap_mailbox, status_lock) X(polygmap_mailbox, status) X(polygmap_mailbox, timing_lock) \
-  X(polygmap_mailbox, timing) X(polygmap_mailbox, events_lock) X(polygmap_mailbox, events)
+  X(polygmap_mailbox, status_lock) X(polygmap_mailbox, status) X(polygmap_mailbox, plan_lock) \
+  X(polygmap_mailbox, plan) X(polygmap_mailbox, timing_lock) X(polygmap_mailbox, timing) \
+  X(polygmap_mailbox, events_lock) X(polygmap_mailbox, events)
 // clang-format on
 
 // FNV-1a over the name, place and size of every field: two programs that agree on it agree on every byte.

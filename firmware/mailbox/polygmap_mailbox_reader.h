@@ -89,7 +89,8 @@ static inline bool polygmap_mailbox_writer_lives(const polygmap_mailbox_header* 
 }
 static inline bool polygmap_mailbox_is_torn(const polygmap_mailbox* box) {
   return (polygmap_mailbox_load(&box->pose_lock.sequence) | polygmap_mailbox_load(&box->status_lock.sequence) |
-          polygmap_mailbox_load(&box->timing_lock.sequence) | polygmap_mailbox_load(&box->events_lock.sequence)) %
+          polygmap_mailbox_load(&box->plan_lock.sequence) | polygmap_mailbox_load(&box->timing_lock.sequence) |
+          polygmap_mailbox_load(&box->events_lock.sequence)) %
              2 !=
          0;
 }

@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "firmware/daemon/service/status_board.hpp"
-#include "firmware/mailbox/mailbox_writer.hpp"
+#include "firmware/mailbox/mailbox_feed.hpp"
 #include "firmware/pipeline.hpp"
 
 namespace polygmap::daemon {
@@ -15,20 +15,20 @@ class ServiceMailbox {
  public:
   // All of them outlive it. mailbox: is open. lanes: of the daemon.
   ServiceMailbox(MailboxWriter& mailbox, const StatusBoard& board, std::size_t lanes) noexcept
-      : mailbox_(mailbox), board_(board), lanes_(lanes) {}
+      : feed_(mailbox), board_(board), lanes_(lanes) {}
 
   // Before the first cycle: perception then copies what it finishes into memory of this.
   void watch(Pipeline& pipeline) noexcept { pipeline.watch(perception_); }
+  // On control's thread.
   void after_cycle(const Pipeline& pipeline, std::int64_t cycle_ns) noexcept;
 
  private:
   void write_timing(std::int64_t cycle_ns) noexcept;
 
-  MailboxWriter& mailbox_;
+  MailboxFeed feed_;
   const StatusBoard& board_;
   std::size_t lanes_;
   PerceptionTelemetry perception_;
-  std::uint64_t cycles_ = 0;
 };
 
 }  // namespace polygmap::daemon

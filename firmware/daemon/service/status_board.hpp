@@ -8,7 +8,7 @@
 
 #include "firmware/control_lane.hpp"
 #include "firmware/daemon/service/status_text.hpp"
-#include "firmware/mailbox/polygmap_mailbox.h"
+#include "firmware/mailbox/mailbox_layout.hpp"
 #include "firmware/schedule.hpp"
 
 namespace polygmap::daemon {

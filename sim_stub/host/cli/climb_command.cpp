@@ -507,7 +507,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
                   std::ostream& err, bool live, const std::atomic<int>* interrupt) {
   CLI::App app("PolygMap-RT: a humanoid climbs stairs that it sees.", "polygmap");
   app.require_subcommand(0, 1);
-  app.set_version_flag("--version", "polygmap " POLYGMAP_VERSION, "Print the version and exit");
+  app.set_version_flag("--version", "polygmap " POLYGMAP_PROGRAM_VERSION, "Print the version and exit");
   app.footer(
       "Exit codes: 0 pass or done, 1 the climb failed or the replay differs, 2 a bad argument, file or output, 130 or "
       "143 interrupted.");

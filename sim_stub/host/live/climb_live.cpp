@@ -20,8 +20,8 @@ ClimbLive::ClimbLive(LiveDisplay* display, const std::string& mailbox, double pa
   image_.is_virtual = true;
   fill(image_.names);
   if (mailbox.empty()) return;
-  mailbox_ = std::make_unique<MailboxWriter>();
-  std::string wrong = mailbox_->open({.name = mailbox, .group = {}, .clock = POLYGMAP_MAILBOX_VIRTUAL});
+  std::string wrong = mailbox_.open({.name = mailbox, .group = {}, .clock = POLYGMAP_MAILBOX_VIRTUAL});
+  if (wrong.empty()) feed_ = std::make_unique<MailboxFeed>(mailbox_);
   if (wrong.empty()) return;
   wrong.front() = 'T';  // a sentence of its own: "the mailbox ..."
   throw std::runtime_error(wrong + ".");
@@ -30,7 +30,10 @@ ClimbLive::ClimbLive(LiveDisplay* display, const std::string& mailbox, double pa
 void ClimbLive::after_cycle(const ControlLane& control, const Telemetry& telemetry,
                             const std::function<polygmap_mailbox_timing()>& timing) {
   ++cycles_;
-  if (mailbox_) write(control, telemetry, timing);
+  if (feed_) {
+    const heap::ModuleCall call("MailboxFeed::after_cycle");
+    if (feed_->after_cycle(control, telemetry)) feed_->write_timing(timing());
+  }
   if (display_ != nullptr && display_->is_due(telemetry.now_ns, wall_ns())) show(control, telemetry, timing());
 }
 
@@ -44,23 +47,6 @@ void ClimbLive::show(const ControlLane& control, const Telemetry& telemetry, con
   fill(image_.events, control.all_faults(), telemetry.now_ns);
   image_.timing = timing;
   display_->show(meter_.view(image_, telemetry.now_ns, wall_ns()), telemetry.now_ns, wall_ns());
-}
-
-void ClimbLive::write(const ControlLane& control, const Telemetry& telemetry,
-                      const std::function<polygmap_mailbox_timing()>& timing) {
-  const bool is_seldom = cycles_ % kMailboxSeldom_cycles == 1;
-  const heap::ModuleCall call("MailboxWriter::write");
-  polygmap_mailbox_pose pose;
-  polygmap_mailbox_status status;
-  fill(pose, telemetry.state);
-  fill(status, control, telemetry, cycles_);
-  mailbox_->write(pose, telemetry.now_ns);
-  mailbox_->write(status, telemetry.now_ns);
-  if (!is_seldom) return;
-  polygmap_mailbox_events events;
-  fill(events, control.all_faults(), telemetry.now_ns);
-  mailbox_->write(events, telemetry.now_ns);
-  mailbox_->write(timing(), telemetry.now_ns);
 }
 
 }  // namespace polygmap::sim

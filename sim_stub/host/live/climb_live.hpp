@@ -9,8 +9,7 @@
 
 #include "firmware/live/live_display.hpp"
 #include "firmware/live/live_view.hpp"
-#include "firmware/mailbox/mailbox_sections.hpp"
-#include "firmware/mailbox/mailbox_writer.hpp"
+#include "firmware/mailbox/mailbox_feed.hpp"
 #include "firmware/pipeline.hpp"
 
 namespace polygmap::sim {
@@ -30,11 +29,10 @@ class ClimbLive {
 
  private:
   void show(const ControlLane& control, const Telemetry& telemetry, const polygmap_mailbox_timing& timing);
-  void write(const ControlLane& control, const Telemetry& telemetry,
-             const std::function<polygmap_mailbox_timing()>& timing);
 
   LiveDisplay* display_;
-  std::unique_ptr<MailboxWriter> mailbox_;
+  MailboxWriter mailbox_;
+  std::unique_ptr<MailboxFeed> feed_;  // null: there is no mailbox
   LiveMeter meter_;
   MailboxImage image_;
   std::uint64_t cycles_ = 0;

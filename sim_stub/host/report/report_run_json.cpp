@@ -189,7 +189,7 @@ ReportJson ReportRun::json() const {
                          {"text", mine.text}});
   }
   run["params"] = {{"hash", config::hash_of(own_table)}, {"differing", differing}};
-  run["versions"] = {{"polygmap", POLYGMAP_VERSION}, {"recording", std::to_string(recording::kVersion)}};
+  run["versions"] = {{"polygmap", POLYGMAP_PROGRAM_VERSION}, {"recording", std::to_string(recording::kVersion)}};
   return run;
 }
 

@@ -82,6 +82,8 @@ class MailboxFixture : public testing::Test {
       const char done = writer.open(config_).empty() ? 1 : 0;
       (void)!::write(pipe[1], &done, 1);
       const polygmap_mailbox_status status{};
+      static const polygmap_plan kPlan{};
+      writer.write(kPlan, true, 1);
       for (std::uint64_t n = 1;; ++n) {
         writer.write(pose_of(n), static_cast<std::int64_t>(n));
         writer.write(status, static_cast<std::int64_t>(n));

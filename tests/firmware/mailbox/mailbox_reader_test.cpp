@@ -43,7 +43,7 @@ TEST_F(MailboxReaderProgram, WriterIsThere_PrintsAtItsRate) {
   EXPECT_EQ(done.code, 0) << done.said;
   EXPECT_EQ(std::count(done.said.begin(), done.said.end(), '\n'), 251) << "one says whose mailbox it is";
   EXPECT_TRUE(has(done, "reads what process " + std::to_string(child_) + " writes")) << done.said.substr(0, 500);
-  EXPECT_TRUE(has(done, " off standing, ")) << done.said.substr(0, 500);
+  EXPECT_TRUE(has(done, " off standing; age of pose ")) << done.said.substr(0, 500);
   EXPECT_GE(took_s, 0.49);
 }
 

@@ -64,7 +64,7 @@ void expect_refused(const std::vector<std::string>& arguments, const std::string
 TEST(PolygmapCommand, Version_IsTheProjects) {
   const Call version = call({"--version"});
   EXPECT_EQ(version.code, 0);
-  EXPECT_EQ(version.out, "polygmap " POLYGMAP_VERSION "\n");
+  EXPECT_EQ(version.out, "polygmap " POLYGMAP_PROGRAM_VERSION "\n");
 }
 
 TEST(ClimbCommand, Contacts_InferredUnlessSensed) {
