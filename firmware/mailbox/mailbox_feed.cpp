@@ -5,7 +5,7 @@
 
 namespace polygmap {
 
-bool MailboxFeed::after_cycle(const ControlLane& control, const Telemetry& telemetry) noexcept {
+bool MailboxFeed::write_state(const ControlLane& control, const Telemetry& telemetry) noexcept {
   ++cycles_;
   polygmap_mailbox_pose pose;
   fill(pose, telemetry.state);
@@ -13,7 +13,6 @@ bool MailboxFeed::after_cycle(const ControlLane& control, const Telemetry& telem
   polygmap_mailbox_status status;
   fill(status, control, telemetry, cycles_);
   mailbox_.write(status, telemetry.now_ns);
-  write_plan(control, telemetry);
   if (cycles_ % kSeldom_cycles != 1) return false;
   polygmap_mailbox_events events;
   fill(events, control.all_faults(), telemetry.now_ns);
@@ -21,16 +20,20 @@ bool MailboxFeed::after_cycle(const ControlLane& control, const Telemetry& telem
   return true;
 }
 
+bool MailboxFeed::plan_is_due(const Telemetry& telemetry) const noexcept {
+  const GaitStatus& gait = telemetry.gait;
+  return cycles_ % kPlan_cycles == 0 || telemetry.map.stamp_ns != written_.map_ns || gait.phase != written_.phase ||
+         gait.step.sequence != written_.step || gait.step.touch_down_stamp_ns != written_.touch_down_ns;
+}
+
 void MailboxFeed::write_plan(const ControlLane& control, const Telemetry& telemetry) noexcept {
   const GaitStatus& gait = telemetry.gait;
   const bool is_other_map = telemetry.map.stamp_ns != written_.map_ns;
-  const bool is_other = is_other_map || gait.phase != written_.phase || gait.step.sequence != written_.step ||
-                        gait.step.touch_down_stamp_ns != written_.touch_down_ns;
-  if (!is_other && cycles_ % kPlan_cycles != 0) return;
   written_ = {gait.phase, gait.step.sequence, gait.step.touch_down_stamp_ns, telemetry.map.stamp_ns};
   const link::PlanSource source{control, telemetry.map, telemetry.now_ns};
-  link::read_steps(source, link::InstanceClock::of_module(), plan_);
-  if (is_other_map) link::read_polygons(source, link::InstanceClock::of_module(), plan_);
+  const link::InstanceClock clock = link::InstanceClock::of_module();
+  link::read_steps(source, clock, plan_);
+  if (is_other_map) link::read_polygons(source, clock, plan_);
   mailbox_.write(plan_, is_other_map, telemetry.now_ns);
 }
 

@@ -22,12 +22,19 @@ class MailboxFeed {
   explicit MailboxFeed(MailboxWriter& mailbox) noexcept : mailbox_(mailbox) {}
 
   // True, every kSeldom_cycles: it is time for write_timing(), too.
-  bool after_cycle(const ControlLane& control, const Telemetry& telemetry) noexcept;
+  bool after_cycle(const ControlLane& control, const Telemetry& telemetry) noexcept {
+    const bool is_seldom = write_state(control, telemetry);
+    if (plan_is_due(telemetry)) write_plan(control, telemetry);
+    return is_seldom;
+  }
   void write_timing(const polygmap_mailbox_timing& timing) noexcept { mailbox_.write(timing, timing.stamp_ns); }
 
- private:
+  // Its parts, for who measures them.
+  bool write_state(const ControlLane& control, const Telemetry& telemetry) noexcept;
+  [[nodiscard]] bool plan_is_due(const Telemetry& telemetry) const noexcept;
   void write_plan(const ControlLane& control, const Telemetry& telemetry) noexcept;
 
+ private:
   MailboxWriter& mailbox_;
   std::uint64_t cycles_ = 0;
   struct {

@@ -9,7 +9,7 @@ WANTED = {"whole_frame": 3_650_000, "footholds": 1_200_000, "gait_swing_tick": 2
 
 
 def cost(engine, _):
-    records = {"instructions.txt": ("perception_instructions", "estimation_instructions", "gait_instructions"),
+    records = {"instructions.txt": ("perception_instructions", "estimation_instructions", "gait_instructions", "mailbox_instructions"),
                "reference_instructions.txt": ("reference_instructions",)}
     build(*(p for programs in records.values() for p in programs))
     counted = "".join(subprocess.run([ROOT / "toolchain/checks/instructions", "--recorded", ROOT / "tests/benchmarks" / record,

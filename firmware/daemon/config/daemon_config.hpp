@@ -38,7 +38,7 @@ struct DaemonConfig {
   hal::V4l2Camera::Config camera;
   std::variant<hal::LivoxImu::Config, hal::SerialImu::Config> imu;
   std::optional<hal::LioUdp::Config> lio;
-  std::string operator_socket;  // its path; empty: the module arms and starts by itself
+  std::string operator_socket;         // its path; empty: the module arms and starts by itself
   std::string mailbox, mailbox_group;  // names; empty: there is none; the process's own
   std::size_t lanes = kLaneCount;
   std::array<LaneThread::Placement, kLaneCount> placement{};  // of one lane, the first

@@ -154,6 +154,7 @@ TEST_F(DaemonConfigTest, ShippedUnit_GrantsWhatTheFilesTake) {
   const DaemonConfig config = read_daemon_config(write("polygmapd.toml", shipped));
   EXPECT_TRUE(config.warnings.empty()) << config.warnings[0];
   EXPECT_EQ(config.operator_socket, "/run/polygmap/operator");
+  EXPECT_EQ(config.mailbox, "/polygmap");
   EXPECT_FALSE(config.params.supervisor.autostart) << "no robot walks off by itself";
   EXPECT_NE(unit.find("\nRuntimeDirectory=polygmap\n"), std::string::npos);
   EXPECT_TRUE(read_daemon_config(write("robot.toml", good())).params.supervisor.autostart);
@@ -209,6 +210,11 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"vector", "driver = \"livox\"", "driver = \"livox\"\nbase_rpy_rad = [1, 2]",
               "line 11: imu.base_rpy_rad must be three numbers in brackets"},
         Wrong{"lane", "real_time = \"preferred\"", "lanes = 3", "line 2: lanes must be from 1 to 2, not 3"},
+        Wrong{"mailbox", "real_time = \"preferred\"", "mailbox = \"polygmap\"",
+              "line 2: mailbox must be a name as in \"/polygmap\""},
+        Wrong{"mailbox_folder", "real_time = \"preferred\"", "mailbox = \"/a/b\"", "line 2: mailbox must be a name"},
+        Wrong{"mailbox_group", "real_time = \"preferred\"", "mailbox_group = \"robot\"",
+              "line 2: mailbox_group needs the key mailbox"},
         Wrong{"syntax", "cpu = 4", "cpu = ", "line 4"},
         Wrong{"bus", "cubemars.toml", "nobodys.toml", "line 1: bus names no file"},
         Wrong{"camera", "d435.toml", "nobodys.toml", "line 8: camera.file names no file"}),

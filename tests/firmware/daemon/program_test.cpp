@@ -1,19 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 // The shipped program: what it says, and its exit codes.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "firmware/mailbox/mailbox_writer.hpp"
+#include "firmware/mailbox/polygmap_mailbox_reader.h"
 #include "firmware/recording/recorder.hpp"
 #include "tests/support/fake_robot.hpp"
 
@@ -52,8 +59,9 @@ class ProgramTest : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
-  [[nodiscard]] Done run(const std::string& arguments) const {
-    const std::string command = "env -u NOTIFY_SOCKET timeout 60 " + kProgram + " " + arguments + " 2>&1";
+  [[nodiscard]] Done run(const std::string& arguments) const { return run_as("timeout 60", arguments); }
+  [[nodiscard]] Done run_as(const std::string& before, const std::string& arguments) const {
+    const std::string command = "env -u NOTIFY_SOCKET " + before + " " + kProgram + " " + arguments + " 2>&1";
     Done done;
     std::FILE* pipe = ::popen(command.c_str(), "r");
     std::array<char, 4096> text{};
@@ -122,6 +130,88 @@ TEST_F(ProgramTest, Ask_SaysWhereNobodyListens) {
   const Done silent = run("--ask state --config " + write("operated.toml", all));
   EXPECT_EQ(silent.code, 3) << silent.said;
   EXPECT_NE(silent.said.find("nobody listens at"), std::string::npos) << silent.said;
+}
+
+// Looks on at a mailbox that this test writes; ended by a signal.
+class WatchTest : public ProgramTest {
+ protected:
+  void SetUp() override {
+    ProgramTest::SetUp();
+    if (IsSkipped()) return;
+    path_ = write("watched.toml", "mailbox = \"" + mailbox_ + "\"\nbus = 3\n");
+    ASSERT_EQ(writer_.open({.name = mailbox_, .group = {}}), "");
+    status_.module_state = static_cast<std::uint32_t>(ModuleState::kClimbing);
+  }
+  void TearDown() override {
+    ends_ = true;
+    if (writes_.joinable()) writes_.join();
+    writer_.close();
+    ProgramTest::TearDown();
+  }
+  void start_writing() {
+    writes_ = std::thread([this] {
+      for (std::uint64_t cycles = 1; !ends_; ++cycles) {
+        status_.stamp_ns = polygmap_mailbox_now_ns();
+        status_.cycles = cycles;
+        writer_.write(status_, status_.stamp_ns);
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      }
+    });
+  }
+  [[nodiscard]] Done watch(const std::string& seconds, const std::string& arguments = "") const {
+    return run_as("timeout --preserve-status --signal=INT " + seconds, "--watch --config " + path_ + arguments);
+  }
+
+  const std::string mailbox_ = "/polygmap_watch_" + std::to_string(::getpid());
+  std::string path_;
+  MailboxWriter writer_;
+  polygmap_mailbox_status status_{};
+  std::thread writes_;
+  std::atomic<bool> ends_{false};
+};
+
+TEST_F(WatchTest, Pipe_GetsALineASecondAndASignalIsNoFailure) {
+  start_writing();
+  const Done done = watch("2.6");
+  EXPECT_EQ(done.code, 0) << done.said;
+  const auto lines = std::ranges::count(done.said, '\n');
+  EXPECT_GE(lines, 2) << done.said;
+  EXPECT_LE(lines, 4) << done.said;
+  EXPECT_NE(done.said.find(" s climbing, standing; no step yet"), std::string::npos) << done.said;
+  EXPECT_EQ(done.said.find('\x1b'), std::string::npos);
+}
+
+TEST_F(WatchTest, Json_IsAnObjectASecond) {
+  start_writing();
+  const Done done = watch("1.6", " --json");
+  EXPECT_EQ(done.code, 0) << done.said;
+  EXPECT_TRUE(done.said.starts_with("{\"t_s\":")) << done.said;
+  EXPECT_NE(done.said.find("\"clock\":\"monotonic\",\"state\":\"climbing\""), std::string::npos) << done.said;
+}
+
+TEST_F(WatchTest, NobodyWritesAnyMore_IsSaid) {
+  writer_.write(status_, 1);
+  const Done silent = watch("1.5");
+  EXPECT_NE(silent.said.find("has written nothing for"), std::string::npos) << silent.said;
+  writer_.close();
+  const Done absent = watch("0.5");
+  EXPECT_EQ(absent.code, 0) << absent.said;
+  EXPECT_EQ(absent.said, "There is no mailbox " + mailbox_ + ": nobody writes one. Waiting for a writer.\n");
+}
+
+TEST_F(WatchTest, CannotBeRead_IsASentenceAndItsCode) {
+  EXPECT_EQ(run("--watch --config " + config()).code, 2);
+  EXPECT_NE(run("--watch --config " + config()).said.find("has no key mailbox"), std::string::npos);
+  writer_.close();
+  const int other = ::shm_open(mailbox_.c_str(), O_RDWR | O_CREAT | O_EXCL, 0600);
+  ASSERT_GE(other, 0);
+  EXPECT_EQ(::write(other, "something else", 14), 14);
+  ::close(other);
+  const Done done = watch("5");
+  ::shm_unlink(mailbox_.c_str());
+  EXPECT_EQ(done.code, 3) << done.said;
+  EXPECT_EQ(std::ranges::count(done.said, '\n'), 1) << done.said;
+  EXPECT_NE(done.said.find("has 14 bytes"), std::string::npos) << done.said;
 }
 
 // Somebody edits the file while the robot climbs: it must be possible to stop it all the same.

@@ -13,6 +13,8 @@
 #include <fstream>
 #include <thread>
 
+#include "firmware/mailbox/mailbox_layout.hpp"
+#include "firmware/mailbox/polygmap_mailbox_reader.h"
 #include "firmware/recording/replay.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "tests/firmware/daemon/live_robot.hpp"
@@ -59,6 +61,7 @@ class ServiceTest : public testing::Test {
             .operator_socket = operator_socket_,
             .devices = &counts_,
             .recorder = nullptr,
+            .mailbox = mailbox_,
             .hook = nullptr};
   }
   // The same, with a recorder before the ports.
@@ -71,6 +74,7 @@ class ServiceTest : public testing::Test {
             .operator_socket = operator_socket_,
             .devices = &counts_,
             .recorder = &recorder,
+            .mailbox = mailbox_,
             .hook = nullptr};
   }
   // Runs the service on a thread of its own, as long as during() takes, then SIGTERM.
@@ -110,6 +114,7 @@ class ServiceTest : public testing::Test {
   Notifier notifier_;
   DeviceCounts counts_;
   OperatorSocket* operator_socket_ = nullptr;
+  MailboxWriter* mailbox_ = nullptr;
   std::vector<std::string> heard_;
   std::chrono::steady_clock::duration stopped_after_{};
   std::atomic<int> maintained_ = 0;
@@ -143,6 +148,52 @@ TEST_F(ServiceTest, ImuMountIsNotAsConfigured_IsSaidAndTheDrivesAreLetGo) {
   EXPECT_EQ(outcome.module.state, ModuleState::kArming);
   EXPECT_EQ(let_go_, 1);
   EXPECT_FALSE(robot_.has_gains);
+}
+
+// What a program beside the service reads is whole, new in every cycle, and costs no call of the heap.
+TEST_F(ServiceTest, Mailbox_IsWrittenInEveryCycle) {
+  MailboxWriter mailbox;
+  const std::string name = "/polygmap_service_" + std::to_string(::getpid());
+  ASSERT_EQ(mailbox.open({.name = name, .group = {}}), "");
+  mailbox_ = &mailbox;
+  polygmap_mailbox_reader reader = POLYGMAP_MAILBOX_READER;
+  char why[POLYGMAP_MAILBOX_SENTENCE];
+  ASSERT_EQ(polygmap_mailbox_attach(&reader, name.c_str(), why), POLYGMAP_MAILBOX_OK) << why;
+  polygmap_mailbox_pose pose{};
+  polygmap_mailbox_status status{};
+  polygmap_mailbox_timing timing{};
+  std::uint64_t cycles = 0, writes = 0;
+  std::int64_t age_ns = 0;
+  const Outcome outcome = run([&] {
+    listen_until("STATUS=walking_up", 5s);
+    const auto read = [](const auto& lock, const auto& section, auto& copy) {
+      return polygmap_mailbox_try_copy(&lock, &section, &copy, sizeof copy);
+    };
+    EXPECT_TRUE(read(reader.box->status_lock, reader.box->status, status));
+    cycles = status.cycles;
+    writes = reader.box->pose_lock.sequence / 2;
+    std::this_thread::sleep_for(300ms);
+    EXPECT_TRUE(read(reader.box->status_lock, reader.box->status, status));
+    EXPECT_TRUE(read(reader.box->pose_lock, reader.box->pose, pose));
+    age_ns = polygmap_mailbox_now_ns() - pose.stamp_ns;
+    writes = reader.box->pose_lock.sequence / 2 - writes;
+    EXPECT_TRUE(read(reader.box->timing_lock, reader.box->timing, timing));
+    EXPECT_EQ(polygmap_mailbox_look(&reader, 1000, why), POLYGMAP_MAILBOX_OK) << why;
+  });
+  EXPECT_GT(status.cycles, cycles + 20);
+  EXPECT_GE(writes + 1, status.cycles - cycles);
+  EXPECT_EQ(status.module_state, static_cast<std::uint32_t>(ModuleState::kWalkingUp));
+  EXPECT_LT(age_ns, kNsPerS) << "not of the machine's own clock";
+  EXPECT_GT(reader.box->plan_lock.sequence / 2, status.cycles / 20) << "a plan in every tenth cycle";
+  EXPECT_EQ(timing.lane_count, 1U);
+  EXPECT_EQ(timing.row_count, kSchedule.size());
+  const polygmap_mailbox_row& gait = timing.rows[row_named(kSchedule, "gait")];
+  EXPECT_GT(gait.runs, 100U);
+  EXPECT_GT(gait.robot.most_ns, 0U);
+  EXPECT_LE(gait.robot.least_slack_ns, 1000 * kSchedule[row_named(kSchedule, "gait")].budget_us);
+  EXPECT_EQ(gait.host.most_ns, 0U) << "a robot is no simulation's host";
+  EXPECT_EQ(outcome.heap_calls, 0U);
+  polygmap_mailbox_detach(&reader);
 }
 
 TEST_F(ServiceTest, AskedToStopWhileItRuns_StandsOnItsDrives) {

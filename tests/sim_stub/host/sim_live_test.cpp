@@ -85,14 +85,14 @@ TEST(LiveClimb, PaceOfTwo_IsKept) {
 
 // The keys of an object, those in others as a.b, those of lists' objects as a[].b.
 void add_keys(const nlohmann::json& value, const std::string& path, std::set<std::string>& keys) {
-  if (value.is_array()) {
-    for (const auto& one : value) add_keys(one, path + "[]", keys);
-  }
-  if (!value.is_object()) {
-    if (!value.is_array() || value.empty() || !value[0].is_object()) keys.insert(path);
+  const bool lists_objects = value.is_array() && !value.empty() && value[0].is_object();
+  if (!value.is_object() && !lists_objects) {
+    keys.insert(path);
     return;
   }
-  for (const auto& [key, inner] : value.items()) add_keys(inner, path.empty() ? key : path + "." + key, keys);
+  for (const auto& [key, inner] : value.items()) {
+    add_keys(inner, lists_objects ? path + "[]" : path.empty() ? key : path + "." + key, keys);
+  }
 }
 // The first column of the page's table.
 std::set<std::string> documented_keys() {
