@@ -84,7 +84,8 @@ static inline uint64_t polygmap_mailbox_start_ticks(int64_t pid, char* state) {
 static inline bool polygmap_mailbox_writer_lives(const polygmap_mailbox_header* header) {
   char state;
   const uint64_t ticks = polygmap_mailbox_start_ticks(header->writer_pid, &state);
-  const bool ended = state == 'Z' || state == 'X' || (ticks != 0 && ticks != header->writer_start_ticks);
+  const bool ended = state == 'Z' || state == 'X' ||
+                     (ticks != 0 && header->writer_start_ticks != 0 && ticks != header->writer_start_ticks);
   return !ended && (kill((pid_t)header->writer_pid, 0) == 0 || errno != ESRCH);
 }
 static inline bool polygmap_mailbox_is_torn(const polygmap_mailbox* box) {

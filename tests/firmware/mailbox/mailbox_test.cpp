@@ -141,6 +141,9 @@ TEST_F(Mailbox, WriterKilledInTheMiddleOfAWrite_IsSaidAndNothingIsRead) {
 }
 
 TEST_F(Mailbox, WriterStopped_IsSilentWithItsNumber) {
+#ifdef POLYGMAP_EMULATED
+  GTEST_SKIP() << "qemu-user tells a process another time of its start than the kernel tells others";
+#endif
   start_writing_child();
   ASSERT_EQ(attach(), POLYGMAP_MAILBOX_OK) << why_;
   ASSERT_EQ(::kill(child_, SIGSTOP), 0);
