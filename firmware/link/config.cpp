@@ -140,6 +140,7 @@ class FieldSetter {
 class Find final : public ParamVisitor {
  public:
   Find(Params& params, std::string_view name) noexcept : name_(name) { walk_params(params, *this); }
+  [[nodiscard]] bool wants(std::string_view table) const noexcept override { return name_.starts_with(table); }
   void take(const ParamField& field) noexcept override {
     if (field.name != name_) return;
     found_ = field;
@@ -200,6 +201,7 @@ class CheckOrders final : public ParamVisitor {
       : params_(params), entries_(entries), wrong_(wrong) {
     walk_params(params, *this);
   }
+  [[nodiscard]] bool wants(std::string_view) const noexcept override { return true; }
   void take(const ParamField&) noexcept override {}
   void ordered(std::string_view less, std::string_view more) noexcept override {
     const Find a(params_, less), b(params_, more);

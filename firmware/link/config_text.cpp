@@ -38,6 +38,7 @@ class NumberReader {
     if (!digits(0)) return "is no number, such as 5, 0.5 or 1e-3";
     if (text_[begin] == '0' && at_ > begin + 1) return "has a number that begins with 0";
     if (next() == '.') {
+      is_whole_ = false;
       ++at_;
       if (!digits(-1)) return "is no number, such as 5, 0.5 or 1e-3";
     }
@@ -45,6 +46,7 @@ class NumberReader {
     if (at_ != text_.size()) return "is no number, such as 5, 0.5 or 1e-3";
     if (too_many_) return "has a number of more than 19 digits";
     if (decimal_.digits == 0) decimal_.exponent = 0;
+    if (decimal_.digits == 0 && is_whole_) return nullptr;  // and there is no -0 of those
     // Zeros at the end are no digits that matter.
     while (decimal_.exponent < 0 && decimal_.digits % 10 == 0 && decimal_.digits != 0) {
       decimal_.digits /= 10;
@@ -82,6 +84,7 @@ class NumberReader {
   }
   [[nodiscard]] bool power() noexcept {
     constexpr int kMost = 1000;
+    is_whole_ = false;
     ++at_;
     const bool negative = next() == '-';
     if (next() == '-' || next() == '+') ++at_;
@@ -95,7 +98,7 @@ class NumberReader {
   std::string_view text_;
   std::size_t at_ = 0;
   Decimal decimal_;
-  bool too_many_ = false;
+  bool too_many_ = false, is_whole_ = true;
 };
 
 class ConfigReader {
@@ -256,6 +259,7 @@ class ConfigReader {
       if (at_ == text_.size()) return fail("has brackets that are not closed", name);
       if (!take_number(name, read_word()) || !skip_to_entry()) return false;
       if (next() == ']') break;
+      if (at_ == text_.size()) continue;
       if (next() != ',') return fail("has numbers in brackets without a comma between them", name);
       ++at_;
     }

@@ -45,27 +45,28 @@ class Walk {
     take(name, Kind::kRotation, &value, 1, {}, -kPi, kPi);
   }
   void operator()(std::string_view name, Transform& value, std::string_view text) noexcept {
-    const std::size_t outer = enter(name);
+    const Outer outer = enter(name);
     (*this)("p_m", value.p_m, -2.0, 2.0, text);
     (*this)("rpy_rad", value.R, text);
-    name_.resize(outer);
+    leave(outer);
   }
   template <class T, std::size_t N>
   requires std::is_class_v<T>
   void operator()(std::string_view name, std::array<T, N>& values,
                   const std::array<std::string_view, N>& names) noexcept {
-    const std::size_t outer = enter(name);
+    const Outer outer = enter(name);
     for (std::size_t i = 0; i < N; ++i) (*this)(names[i], values[i]);
-    name_.resize(outer);
+    leave(outer);
   }
   template <class T>
   requires std::is_class_v<T>
   void operator()(std::string_view name, T& value) noexcept {
-    const std::size_t outer = enter(name);
+    const Outer outer = enter(name);
     T::visit(value, *this);
-    name_.resize(outer);
+    leave(outer);
   }
   void ordered(std::string_view less, std::string_view more) noexcept {
+    if (skips_) return;
     const std::size_t outer = name_.size();
     FixedText<kMaxParamName> second = name_;
     name_.append(less);
@@ -75,25 +76,37 @@ class Walk {
   }
 
  private:
-  // The length of the name that it goes back to.
-  [[nodiscard]] std::size_t enter(std::string_view table) noexcept {
-    const std::size_t outer = name_.size();
+  // What it goes back to: how long the name is there, and whether nobody wants to be told.
+  struct Outer {
+    std::size_t size;
+    bool skips;
+  };
+  [[nodiscard]] Outer enter(std::string_view table) noexcept {
+    const Outer outer{name_.size(), skips_};
+    if (skips_) return outer;
     name_.append(table);
     name_.append(".");
+    skips_ = !visitor_.wants(name_.view());
     return outer;
+  }
+  void leave(const Outer& outer) noexcept {
+    name_.resize(outer.size);
+    skips_ = outer.skips;
   }
   // One for all types, or the walk over all fields is large.
   [[gnu::noinline]] void take(std::string_view name, Kind kind, void* value, std::size_t count,
                               std::span<const std::string_view> choices, double least, double most) noexcept {
-    const std::size_t outer = name_.size();
+    const std::size_t index = index_++, outer = name_.size();
+    if (skips_) return;
     name_.append(name);
-    visitor_.take({name_.view(), index_++, kind, value, count, choices, least, most});
+    visitor_.take({name_.view(), index, kind, value, count, choices, least, most});
     name_.resize(outer);
   }
 
   ParamVisitor& visitor_;
   FixedText<kMaxParamName> name_;
   std::size_t index_ = 0;
+  bool skips_ = false;
 };
 
 }  // namespace

@@ -33,6 +33,8 @@ struct ParamField {
 
 class ParamVisitor {
  public:
+  // Whether it is to be told of what is in that table: "gait.planner.".
+  [[nodiscard]] virtual bool wants(std::string_view table) const noexcept = 0;
   virtual void take(const ParamField& field) noexcept = 0;
   // One may not exceed the other.
   virtual void ordered(std::string_view less, std::string_view more) noexcept = 0;
