@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The simulated robot's camera, as firmware/cameras/kuavo.toml has it: written from there by CMakeLists.txt.
+// The robot's camera, as firmware/cameras/kuavo.toml has it: CMakeLists.txt refuses other numbers.
 #pragma once
 
 #include "algorithms/core/messages/samples.hpp"
@@ -7,7 +7,7 @@
 namespace polygmap {
 
 [[nodiscard]] inline CameraIntrinsics robot_camera_intrinsics() noexcept {
-  return {@width@, @height@, @fx@, @fy@, @cx@, @cy@, @depth_unit_m@};
+  return {640, 480, 366.7, 366.8, 322.7, 242.3, 0.00025};
 }
 
 }  // namespace polygmap
