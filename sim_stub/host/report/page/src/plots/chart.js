@@ -66,7 +66,9 @@ export class Chart {
       cursor: { sync: { key: "polygmap" }, drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
       hooks: { draw: [(plot) => this.over(plot)], setCursor: [(plot) => this.readOut(plot.cursor.idx)], setSelect: [(plot) => this.select(plot)] },
     };
-    this.plot = new uPlot(options, typeof spec.data === "function" ? (spec.data = spec.data()) : spec.data, this.host);
+    this.plot = unaccelerated(() => new uPlot(options, typeof spec.data === "function" ? (spec.data = spec.data()) : spec.data, this.host));
+    this.now = h("i.cursor");
+    this.plot.over.append(this.now);
     new IntersectionObserver((seen) => {
       this.visible = seen.at(-1).isIntersecting;
       if (this.visible) this.mark(player.t_s);
@@ -100,7 +102,7 @@ export class Chart {
     this.plot?.setSeries(i, { show: on });
   }
 
-  /** The moment, drawn over the curves; and the limits. */
+  /** The limits, drawn over the curves. */
   over(plot) {
     const { ctx, bbox } = plot;
     ctx.save();
@@ -120,23 +122,22 @@ export class Chart {
         ctx.fillText(limit.label, bbox.left + bbox.width - 4, y - 4);
       }
     }
-    ctx.setLineDash([]);
-    const x = plot.valToPos(this.t_s ?? 0, "x", true);
-    if (x >= bbox.left && x <= bbox.left + bbox.width) {
-      ctx.strokeStyle = colours.ink;
-      ctx.lineWidth = 1.5 * devicePixelRatio;
-      ctx.beginPath();
-      ctx.moveTo(x, bbox.top);
-      ctx.lineTo(x, bbox.top + bbox.height);
-      ctx.stroke();
-    }
     ctx.restore();
+    this.place();
+  }
+
+  /** The moment's line stands over the curves, so that they need not be drawn anew for it. */
+  place() {
+    if (!this.now) return;
+    const share = ((this.t_s ?? 0) - part()[0]) / Math.max(part()[1] - part()[0], 1e-6);
+    this.now.hidden = share < 0 || share > 1;
+    this.now.style.left = `${100 * share}%`;
   }
 
   mark(t_s) {
     this.t_s = t_s;
     if (!this.plot || !this.visible) return;
-    this.plot.redraw(false);
+    this.place();
     this.readOut(null);
   }
 
@@ -149,6 +150,19 @@ export class Chart {
       const value = data[k + 1]?.[i];
       output.textContent = value === null || value === undefined ? "" : number(value, this.spec.digits ?? 1);
     });
+  }
+}
+
+/** Without the graphics card, where long dashed curves take many times as long to draw if that is software. */
+function unaccelerated(make) {
+  const own = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    return own.call(this, kind, { ...options, willReadFrequently: true });
+  };
+  try {
+    return make();
+  } finally {
+    HTMLCanvasElement.prototype.getContext = own;
   }
 }
 

@@ -23,6 +23,11 @@ class Strip {
     this.canvas.addEventListener("click", (e) => player.seek(timeAt(e)));
     this.canvas.addEventListener("pointermove", (e) => (this.canvas.title = say(timeAt(e)) ?? ""));
     this.say_ = say;
+    this.near = false; // nothing is drawn before it is scrolled near
+    new IntersectionObserver((seen) => {
+      this.near = seen.at(-1).isIntersecting;
+      this.paint();
+    }, { rootMargin: "300px" }).observe(this.canvas);
     new ResizeObserver(() => this.paint()).observe(this.canvas);
     onTheme(() => this.paint());
     onZoom(() => this.paint());
@@ -35,17 +40,18 @@ class Strip {
 
   paint() {
     const width = this.canvas.clientWidth;
-    if (!width) return;
+    if (!width || !this.near) return;
     const ratio = window.devicePixelRatio || 1;
     this.canvas.width = Math.round(width * ratio);
     this.canvas.height = Math.round(this.height * ratio);
-    const context = this.canvas.getContext("2d");
+    const context = this.canvas.getContext("2d", { willReadFrequently: true });
     context.scale(ratio, ratio);
     this.paint_(context, (t_s) => this.share(t_s) * width, width, this.height);
     this.mark(this.player.t_s);
   }
 
   mark(t_s) {
+    if (!this.near) return;
     const share = this.share(t_s);
     this.cursor.hidden = share < 0 || share > 1;
     this.cursor.style.left = `${100 * share}%`;
