@@ -45,14 +45,15 @@ function build(runs) {
   const view = replayView(stage, run, other);
   const help = helpDialog();
   const look = (n) => {
+    if (!view.look) return; // a drawing has one view
     view.look(n);
     transport.look(n);
   };
-  const transport = new Transport(run, player, look, () => help.showModal());
+  const transport = new Transport(run, player, view.look ? look : null, () => help.showModal());
   setPlayer(player);
   stage.append(legend(run, other));
   const replay = h("div.replay", {}, stage, h("div.column", {}, picture.element, top.element), words.element);
-  const parts = other ? [differencesPanel(runs), replay, compareSection(runs), closestOfBoth(runs, player)]
+  const parts = other ? [differencesPanel(runs), replay, compareSection(runs, player), closestOfBoth(runs, player)]
     : [replay, closestPanel(run, player), stepsPanel(run, player), h("div.pair", {}, paperPanel(run), h("div", {}, faultsPanel(run, player))), timeSection(run, player),
       h("div.pair", {}, memoryPanel(run), originPanel(run)), parametersPanel(run)];
   root.replaceChildren(other ? compareHeader(runs, player) : header(run, player), h("main", {}, parts), transport.element, help);

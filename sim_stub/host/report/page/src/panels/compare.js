@@ -6,6 +6,7 @@ import { h, isNumber, moment, number, table } from "../core/dom.js";
 import { FEET } from "../core/now.js";
 import { tiltOf } from "../core/pose.js";
 import { Chart } from "../plots/chart.js";
+import { STATE_COLOUR, bandStrip } from "../plots/strips.js";
 import { chip } from "./verdict.js";
 
 export function compareHeader(runs, player) {
@@ -50,7 +51,11 @@ const over = (series, value) => (series?.count ? { t_s: Array.from(series.t_s), 
   return Number.isFinite(v) ? v : null;
 }) } : null);
 
-export function compareSection(runs) {
+export function compareSection(runs, player) {
+  const strips = runs.map((run, i) => (run.states.length ? bandStrip(`state of ${"AB"[i]}`, run.states, STATE_COLOUR, player, run.duration_s) : null)).filter(Boolean);
+  player.listen((t_s) => {
+    for (const strip of strips) strip.mark(t_s);
+  });
   const pose = (c, name) => both(runs, { title: `Fused base ${name} against truth`, unit: "mm", height: 120 }, (run) => {
     const truth = run.series("base_true"), fused = run.series("base_fused");
     return truth && fused && truth.count === fused.count ? over(fused, (i) => 1e3 * (fused.columns[c][i] - truth.columns[c][i])) : null;
@@ -77,7 +82,7 @@ export function compareSection(runs) {
       return over(cost, (i) => 100 * Math.max(...cost.columns.map((c, k) => c[i] / run.schedule[k]?.budget_instructions).filter(Number.isFinite)));
     }),
   ].filter(Boolean);
-  return h("section.wide", { id: "overlaid" }, h("h2", {}, "Both over time"), h("p.note", {}, "Each run's time counts from its first frame."), charts.map((c) => c.element));
+  return h("section.wide", { id: "overlaid" }, h("h2", {}, "Both over time"), h("p.note", {}, "Each run's time counts from its first frame."), strips.map((s) => s.element), charts.map((c) => c.element));
 }
 
 export function closestOfBoth(runs, player) {

@@ -14,7 +14,7 @@ const KEYS = [
 
 export function helpDialog() {
   const dialog = h("dialog", { "aria-label": "Keys" }, h("h2", {}, "Keys"), h("dl", {}, KEYS.flatMap(([key, what]) => [h("dt", {}, key.split(" ").map((k) => h("kbd", {}, k))), h("dd", {}, what)])),
-    h("p.note", {}, "Drag the scene to turn it, with the right button to move it, and turn the wheel to come nearer. Click into a curve to go to that moment; drag over it to zoom in, double-click to zoom out."),
+    h("p.note", {}, "Drag the scene to turn it, with the right button to move it; once you have clicked into it, the wheel brings you nearer. Click into a curve to go to that moment; drag over it to zoom in, double-click to zoom out."),
     h("form", { method: "dialog" }, h("button", {}, "Close")));
   return dialog;
 }

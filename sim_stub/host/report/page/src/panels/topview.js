@@ -19,12 +19,15 @@ export class TopView {
     this.canvas = h("canvas", { role: "img", "aria-label": "Heights, map and footholds from above" });
     this.said = h("p.said");
     this.element = h("section.panel.top", { id: "top" }, h("h2", {}, "Heights from above"), h("div.frame", {}, this.canvas), this.said);
+    this.off = !run.base && !run.polygons.length;
+    if (this.off) this.element.replaceChildren(h("h2", {}, "Heights from above"), h("p.missing", {}, run.missing("map")));
     this.canvas.addEventListener("pointermove", (e) => this.readOut(e));
     this.canvas.addEventListener("pointerleave", () => this.describe());
     onTheme(() => this.paint());
   }
 
   async show(t_s) {
+    if (this.off) return;
     this.t_s = t_s;
     this.now = robotAt(this.run, t_s);
     const picture = this.run.camera ? this.run.newest("pictures", t_s) : null;

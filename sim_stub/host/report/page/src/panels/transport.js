@@ -24,7 +24,7 @@ export class Transport {
     this.views = ["3D", "side", "top", "camera"].map((name, i) => h("button.small", { type: "button", title: `View ${i + 1} (key ${i + 1})`, "aria-pressed": String(i === 0), onclick: () => look(i + 1) }, name));
     this.element = h("div.transport", { role: "toolbar", "aria-label": "Replay" },
       this.play, this.time, h("div.track", {}, this.marks(), this.slider),
-      this.speed, h("div.views", { role: "group", "aria-label": "View" }, this.views), h("button.small.help", { type: "button", title: "Keys (?)", "aria-label": "Keys", onclick: help }, "?"));
+      this.speed, look ? h("div.views", { role: "group", "aria-label": "View" }, this.views) : null, h("button.small.help", { type: "button", title: "Keys (?)", "aria-label": "Keys", onclick: help }, "?"));
   }
 
   marks() {

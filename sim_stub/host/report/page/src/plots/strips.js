@@ -6,7 +6,7 @@ import { h, isNumber, moment, number, words } from "../core/dom.js";
 import { bands } from "../panels/transport.js";
 import { onZoom, part } from "./chart.js";
 
-const STATE_COLOUR = { walking_up: "lio", climbing: "map", stopping: "warn", safe_stop: "warn", fallen: "bad", on_top: "safe" };
+export const STATE_COLOUR = { walking_up: "lio", climbing: "map", stopping: "warn", safe_stop: "warn", fallen: "bad", on_top: "safe" };
 const PHASE_COLOUR = { double_support: "stairline", swing: "camera", finished: "safe", stopped: "warn" };
 
 class Strip {
@@ -59,8 +59,8 @@ class Strip {
   }
 }
 
-function bandStrip(label, changes, colourOf, player) {
-  const list = bands(changes, player.duration_s);
+export function bandStrip(label, changes, colourOf, player, end_s = player.duration_s) {
+  const list = bands(changes, end_s);
   const paint = (context, x, width, height) => {
     for (const [from, to, name] of list) {
       context.fillStyle = faded(colours[colourOf[name] ?? "stairline"], 0.75);

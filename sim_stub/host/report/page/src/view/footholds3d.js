@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the feet are to go next: p* red, p** purple, and the target of the foot in the air.
-import { Group, Mesh } from "three";
+import { Group } from "three";
 import { colours } from "../core/colours.js";
 import { FEET } from "../core/now.js";
 import { aboutZ, soleCorners } from "../core/pose.js";
-import { line, outline, polygonGeometry, put, segments, sheet } from "./shapes3d.js";
+import { line, outline, put, segments, sheet, sheetMesh } from "./shapes3d.js";
 
 export class Footholds3d {
   constructor(run) {
@@ -17,7 +17,7 @@ export class Footholds3d {
     for (const name of Object.keys(this.fills)) {
       this.marks[name] = (name === "target" ? [null] : FEET).map(() => {
         const mark = new Group();
-        mark.add(new Mesh(polygonGeometry(corners), this.fills[name]), segments(outline(corners), this.edges[name]));
+        mark.add(sheetMesh(corners, this.fills[name], 3), segments(outline(corners), this.edges[name]));
         this.group.add(mark);
         return mark;
       });

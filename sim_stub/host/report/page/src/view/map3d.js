@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the module remembers: its polygons, their nosings, the squares that something lies on, and the safe regions.
-import { Group, Mesh } from "three";
+import { Group } from "three";
 import { colours } from "../core/colours.js";
 import { points } from "./points.js";
-import { boxMesh, empty, line, outline, polygonGeometry, segments, sheet, solid } from "./shapes3d.js";
+import { boxMesh, empty, line, outline, segments, sheet, sheetMesh, solid } from "./shapes3d.js";
 
 const KEPT = 300; // versions of polygons whose meshes are kept
 
@@ -53,7 +53,7 @@ export class Map3d {
   make(version) {
     const corners = points(version.vertices);
     const object = new Group();
-    object.add(new Mesh(polygonGeometry(corners), version.kind === "riser" ? this.riser : this.tread));
+    object.add(sheetMesh(corners, version.kind === "riser" ? this.riser : this.tread, 1));
     const edges = outline(corners);
     const known = edges.filter((_, i) => version.observed?.[i] !== 0), open = edges.filter((_, i) => version.observed?.[i] === 0);
     if (known.length) object.add(segments(known, this.edge));
@@ -84,7 +84,7 @@ export class Map3d {
     for (const region of search?.safe ?? []) {
       const corners = points(region.vertices);
       if (corners.length < 3) continue;
-      this.safe.add(new Mesh(polygonGeometry(corners), this.safeFill), segments(outline(corners), this.safeEdge));
+      this.safe.add(sheetMesh(corners, this.safeFill, 2), segments(outline(corners), this.safeEdge));
     }
   }
 

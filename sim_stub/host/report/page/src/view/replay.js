@@ -9,7 +9,7 @@ export function replayView(stage, run, other) {
   stage.append(host);
   if (!run.base?.count) {
     host.append(h("p.missing", {}, run.missing("motion")));
-    return { show() {}, look() {} };
+    return { show() {} };
   }
   const asked = new URLSearchParams(location.search).has("svg");
   const canvas = h("canvas");

@@ -31,8 +31,11 @@ export class Scene3d {
     this.eye.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.eye, this.renderer.domElement);
     this.controls.addEventListener("change", () => this.draw());
-    this.controls.addEventListener("start", () => (this.throughCamera = false));
-    this.controls.enableKeys = false;
+    this.controls.addEventListener("start", () => this.leaveCamera());
+    // The wheel moves the page until the scene is taken hold of.
+    this.controls.enableZoom = false;
+    canvas.addEventListener("pointerdown", () => (this.controls.enableZoom = true));
+    canvas.addEventListener("pointerleave", (e) => e.pointerType === "mouse" && !e.buttons && (this.controls.enableZoom = false));
     this.sky = new HemisphereLight(0xffffff, 0x9aa4ad, 2.2);
     this.sky.position.set(0, 0, 1);
     const sun = new DirectionalLight(0xffffff, 1.5);
@@ -76,6 +79,14 @@ export class Scene3d {
     this.eye.updateProjectionMatrix();
     if (!this.throughCamera && this.followed) this.aim(VIEWS[view]);
     if (this.t_s !== undefined) this.show(this.t_s);
+  }
+
+  /** From the robot's camera on the reader turns about what it looked at. */
+  leaveCamera() {
+    if (!this.throughCamera) return;
+    this.throughCamera = false;
+    const ahead = this.eye.getWorldDirection(new Vector3());
+    this.controls.target.copy(this.eye.position).addScaledVector(ahead, 0.9);
   }
 
   cameraAngle() {

@@ -14,13 +14,20 @@ export function sheet(opacity, layer) {
   return new MeshBasicMaterial({ side: DoubleSide, transparent: opacity < 1, opacity, depthWrite: false, polygonOffset: true, polygonOffsetFactor: -layer, polygonOffsetUnits: -4 * layer });
 }
 
+/** A sheet's mesh; those of a higher layer are painted over the others. */
+export function sheetMesh(corners, material, layer) {
+  const mesh = new Mesh(polygonGeometry(corners), material);
+  mesh.renderOrder = layer;
+  return mesh;
+}
+
 /** Lines so many pixels wide. */
 export function line(width_px, options = {}) {
   return new LineMaterial({ linewidth: width_px, ...options });
 }
 
 /** Corners of a convex polygon as one mesh. */
-export function polygonGeometry(corners) {
+function polygonGeometry(corners) {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new Float32BufferAttribute(corners.flat(), 3));
   const index = [];

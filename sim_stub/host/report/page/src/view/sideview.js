@@ -28,8 +28,6 @@ export class SideView {
     new ResizeObserver(() => this.t_s !== undefined && this.show(this.t_s)).observe(host);
   }
 
-  look() {}
-
   boxFront(box) {
     const pose = poseOf(box.pose), [a, , c] = box.half_m;
     return [[-a, 0, -c], [a, 0, -c], [a, 0, c], [-a, 0, c]].map((v) => placed(pose, v));

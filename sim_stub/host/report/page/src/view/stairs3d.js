@@ -8,9 +8,11 @@ import { put, solid } from "./shapes3d.js";
 export class Stairs3d {
   constructor(run) {
     this.group = new Group();
-    this.stone = solid({ polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 });
-    this.thing = solid({ polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 });
-    this.floor = solid({ polygonOffset: true, polygonOffsetFactor: 3, polygonOffsetUnits: 3 });
+    // Some millimetres farther from the eye than it is, so that what was mapped a little too low is not hidden in it.
+    const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1200 };
+    this.stone = solid(behind);
+    this.thing = solid(behind);
+    this.floor = solid({ ...behind, polygonOffsetUnits: 1500 });
     this.edge = new LineBasicMaterial();
     if (!run.stairs) return;
     const last = run.stairs.treads?.at(-1);
