@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // polygmapd: the module as a robot's service. Exit codes: exit_code.hpp; of --replay those of replay.hpp; of --doctor 0
 // when nothing hinders, else 1.
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
-#include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -114,7 +115,7 @@ int run_replay(const std::string& directory) {
 
 // Empty, or why nothing can be written there.
 std::string begin_recording(recording::Recorder& recorder, const std::string& path, const Params& params) {
-  recorder.begin(path, params, static_cast<std::uint64_t>(monotonic_ns()));
+  recorder.begin(path, params, static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count()));
   return recorder.failed() ? recorder.finish() : std::string();
 }
 

@@ -18,6 +18,7 @@ bool is_host_topic(Topic topic) { return topic >= Topic::kTruth; }
 }  // namespace
 
 bool RecordingFile::complain(const std::string& what) {
+  if (!complaint_.empty()) return false;
   complaint_ = "\"" + reader_->name() + "\", byte " + std::to_string(reader_->chunk_place()) + ": " + what + ".";
   return false;
 }

@@ -37,7 +37,7 @@ class RecordingFile {
   // recorded one.
   [[nodiscard]] bool read_picture(const DepthFrameView& frame, const Picture& picture,
                                   std::span<const std::uint16_t>& pixels);
-  // One sentence with file and byte. For whoever finds something else wrong with the record read last.
+  // One sentence with file and byte, the first one. For whoever finds something else wrong with the record read last.
   bool complain(const std::string& what);
   [[nodiscard]] const std::string& complaint() const noexcept { return complaint_; }
   // The first message of a topic that is not what the records say: empty when all are.

@@ -224,10 +224,10 @@ class Replay {
       }
       found = file_.read(*record);
     }
-    if (found == RecordingFile::Found::kCut && result_.ends.empty()) result_.ends = "it was cut off";
     result_.differ = differing_ns_.size();
     if (result_.difference.empty()) result_.difference = file_.contradiction();
-    result_.complaint = file_.complaint().empty() ? file_.damage() : file_.complaint();
+    result_.complaint = file_.complaint().empty() || !result_.ends.empty() ? file_.damage() : file_.complaint();
+    if (found == RecordingFile::Found::kCut && result_.ends.empty()) result_.ends = "it was cut off";
     if (found == RecordingFile::Found::kBad || !result_.complaint.empty()) {
       result_.verdict = ReplayVerdict::kUnreadable;
     } else if (!result_.difference.empty()) {
@@ -278,7 +278,8 @@ class Replay {
     if (lane == kPerceptionLane && result_.without_perception) return true;
     if (looks_across(row.row)) module_->lane_finished(1 - lane, row.other_finished_ns);
     if (looks_across(row.row) && !crossings_.replay(lane, row.taken)) {
-      return file_.complain("a frame that saw what the other lane had not published");
+      (void)file_.complain("a frame that saw what the other lane had not published");
+      return reaches_loss_of(1 - lane);
     }
     ports_.begin_row(row);
     WorkBudget budget(row.units);
@@ -300,6 +301,15 @@ class Replay {
     if (difference.empty()) difference = comparer.difference();
     if (!difference.empty()) note_difference(row, difference);
     return true;
+  }
+
+  // A frame that saw one that was lost is written before the other lane's next one, which says so.
+  [[nodiscard]] bool reaches_loss_of(std::size_t lane) {
+    const auto record = std::make_unique<Record>();
+    while (result_.ends.empty() && file_.read(*record) == RecordingFile::Found::kRecord) {
+      if (record->kind == RecordKind::kLost && record->lost_lane == lane) (void)live(*record);
+    }
+    return !result_.ends.empty();
   }
 
   void note_difference(const RowCall& row, const std::string& difference) {

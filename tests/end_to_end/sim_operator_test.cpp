@@ -131,7 +131,8 @@ TEST(OperatedRobot, Recorded_NothingDiffersInTheReplay) {
   ASSERT_TRUE(std::filesystem::create_directories(directory, error));
   ClimbOptions options;
   options.plant = PlantKind::kKinematic;
-  options.record_dir = directory.string();
+  options.recording = (directory / "run.mcap").string();
+  options.record_pictures = true;
   options.time_limit_s = 9.0;
   const ClimbSummary summary = climb_with(options, {{1.2, Command::kArm},
                                                     {1.3, Command::kReset},
@@ -141,7 +142,7 @@ TEST(OperatedRobot, Recorded_NothingDiffersInTheReplay) {
                                                     {6.5, Command::kHandOver}});
   EXPECT_TRUE(states_of(summary).starts_with("off standing walking_up holding ")) << states_of(summary);
   EXPECT_TRUE(states_of(summary).ends_with("safe_stop handing_over released")) << states_of(summary);
-  const recording::ReplayResult result = recording::replay(options.record_dir);
+  const recording::ReplayResult result = recording::replay(options.recording);
   EXPECT_EQ(result.verdict, recording::ReplayVerdict::kSame) << recording::text_of(result);
   std::filesystem::remove_all(directory, error);
 }

@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void expect_replay_of_a_climb(int steps, PlantKind plant, GaitPattern gait, NoiseKind noise) {
+void expect_replay_of_a_climb(int steps, PlantKind plant, GaitPattern gait, NoiseKind noise, bool pictures = true) {
   const fs::path directory = fs::path(testing::TempDir()) / "polygmap_recorded_climb";
   std::error_code error;
   fs::remove_all(directory, error);
@@ -22,17 +22,23 @@ void expect_replay_of_a_climb(int steps, PlantKind plant, GaitPattern gait, Nois
   options.plant = plant;
   options.gait = gait;
   options.noise = noise;
-  options.record_dir = directory.string();
+  options.recording = (directory / "run.mcap").string();
+  options.record_pictures = pictures;
   const ClimbSummary summary = run_climb(options, {});
   EXPECT_TRUE(summary.pass);
-  const recording::ReplayResult result = recording::replay(options.record_dir);
+  const recording::ReplayResult result = recording::replay(options.recording);
   EXPECT_EQ(result.verdict, recording::ReplayVerdict::kSame) << recording::text_of(result);
   EXPECT_GT(result.ticks, 3000U);
+  EXPECT_EQ(result.without_perception, !pictures);
   fs::remove_all(directory, error);
 }
 
 TEST(RecordedClimb, OneStep_NothingDiffersInTheReplay) {
   expect_replay_of_a_climb(1, PlantKind::kKinematic, GaitPattern::kDoubleStep, NoiseKind::kWhite);
+}
+
+TEST(RecordedClimb, WithoutPictures_PerceptionIsBelievedAndNothingElseDiffers) {
+  expect_replay_of_a_climb(1, PlantKind::kKinematic, GaitPattern::kSingleStep, NoiseKind::kWhite, false);
 }
 
 TEST(LongRecordedClimbs, BothPlantsGaitsAndNoises_NothingDiffersInTheReplay) {

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdio>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -43,15 +44,16 @@ bool read_log(const std::string& path, const config::BusFile& file, Frames& fram
   return log.eof();
 }
 
-int compare(const std::string& directory, const config::BusFile& file, const Frames& seen) {
+int compare(const std::string& path, const config::BusFile& file, const Frames& seen) {
   recording::RecordingFile recording;
-  if (!recording.open(directory)) return refuse(recording.complaint());
+  if (!recording.open(path)) return refuse(recording.complaint());
   std::array<std::size_t, kJointCount> next{};
   std::size_t frames = 0, differ = 0, special = 0, missing = 0, cycles = 0, pictures = 0;
   std::uint32_t last = 0, lost = 0;  // by the pictures' numbers, from the first one on
-  recording::Record record;
+  const auto memory = std::make_unique<recording::Record>();
+  recording::Record& record = *memory;
   bool ended = false;
-  while (!ended && recording.read(record)) {
+  while (!ended && recording.read(record) == recording::RecordingFile::Found::kRecord) {
     ended = record.kind == recording::RecordKind::kEnd;
     if (record.kind != recording::RecordKind::kRow) continue;
     for (const recording::PortCall& call : record.row.calls) {
@@ -83,7 +85,7 @@ int compare(const std::string& directory, const config::BusFile& file, const Fra
   for (std::size_t n = 0; n < kJointCount; ++n) differ += seen[n].size() - next[n];  // that no command was
   std::printf("FRAMES frames=%zu frames_differ=%zu special=%zu missing=%zu cycles=%zu pictures=%zu lost=%u\n", frames,
               differ, special, missing, cycles, pictures, lost);
-  if (!ended) return refuse(recording.complaint());
+  if (!ended) return refuse(recording.complaint().empty() ? "the recording is unfinished" : recording.complaint());
   return frames > 0 && differ == 0 && missing == 0 ? 0 : 1;
 }
 

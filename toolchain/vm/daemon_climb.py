@@ -45,7 +45,7 @@ RUN = r"""
   --witness /out/frames.log --notify polygmap {inject} >/out/plant.txt 2>&1 & plant=$!
 while ! grep -qs ready /out/plant.txt; do [ -d /proc/$plant ] || break; sleep 0.05; done
 export NOTIFY_SOCKET=@polygmap WATCHDOG_USEC=400000
-( sh -c 'echo $$ >/tmp/daemon; exec {daemon} --config /etc/polygmap/vm.toml --record /out/recording' >/out/daemon.txt 2>&1; echo $? >/out/code ) & runs=$!
+( sh -c 'echo $$ >/tmp/daemon; exec {daemon} --config /etc/polygmap/vm.toml --record /out/run.mcap' >/out/daemon.txt 2>&1; echo $? >/out/code ) & runs=$!
 for i in $(seq {limit_tenths}); do
   [ -e /out/code ] && break
   grep -qs '^PLANT climbed' /out/plant.txt && sleep 1.5 && break
@@ -108,7 +108,7 @@ def replay(recording):
 
 
 def compare(out, bus):
-    words = [RELEASE / "tests/vm/recorded_frames", out / "recording", bus, out / "frames.log"]
+    words = [RELEASE / "tests/vm/recorded_frames", out / "run.mcap", bus, out / "frames.log"]
     done = subprocess.run([str(word) for word in words], capture_output=True, text=True)
     if done.returncode:
         say((done.stdout + done.stderr).strip())
@@ -121,7 +121,7 @@ def judge(out, args):
     robot, last, camera = numbers("PLANT(?= steps=)", plant), numbers("stopped", daemon), numbers("device camera", daemon)
     missed = missed_fault(plant + daemon)
     frames = compare(out, args.bus)
-    ticks, differ = replay(out / "recording")
+    ticks, differ = replay(out / "run.mcap")
     figures = {
         "steps": int(robot.get("steps", 0)), "ticks": int(last.get("cycles", 0)),
         "overruns": sum(int(last.get(key, 1)) for key in ("overruns", "skipped", "caught_up")),

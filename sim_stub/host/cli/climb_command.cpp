@@ -404,7 +404,7 @@ std::string bus_complaint(ClimbArguments& a) {
   config::limit_by_drives(*a.options.bus, robot);
   if (a.options.can_log.empty()) return {};
   for (const std::string& taken : {a.bus, a.camera, a.options.params_file, a.options.out_dir + "/summary.json",
-                                   a.options.out_dir + "/climb.svg"}) {
+                                   a.options.out_dir + "/climb.svg", a.options.out_dir + "/run.mcap"}) {
     if (one_name(taken) == one_name(a.options.can_log)) return "\"" + taken + "\" would be overwritten by --can-log.";
   }
   std::ofstream probe(a.options.can_log);

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -11,6 +12,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -23,27 +25,28 @@
 #include "firmware/mailbox/polygmap_mailbox_reader.h"
 #include "firmware/recording/recorder.hpp"
 #include "tests/support/fake_robot.hpp"
+#include "tests/support/slow_machine.hpp"
 
 namespace polygmap::daemon {
 namespace {
 
 // The first ticks of a fake robot's life.
-void record(const std::string& directory, int ticks) {
+void record(const std::string& path, int ticks) {
   test::FakeRobot robot(0.062);
   robot.camera_speaks = false;
-  recording::Recorder recorder(robot.ports());
-  const auto module = std::make_unique<Pipeline>(recorder.ports(), Params{});
-  recording::RecordedTasks<Pipeline> tasks(*module, &recorder);
+  const auto recorder = std::make_unique<recording::Recorder>(robot.ports());
+  const auto module = std::make_unique<Pipeline>(recorder->ports(), Params{});
+  recording::RecordedTasks<Pipeline> tasks(*module, recorder.get());
   OneLaneExecutive<recording::RecordedTasks<Pipeline>> executive(tasks, robot.clock, module->lane_health(0));
-  recorder.begin(directory, Params{});
-  recorder.watch(*module);
+  recorder->begin(path, Params{}, 1);
+  recorder->watch(*module);
   executive.start(robot.clock.now_ns() + kCycle_ns);
   for (int i = 0; i < ticks; ++i) {
     robot.advance();
     executive.tick(robot.clock.now_ns());
-    recorder.flush();
+    recorder->flush();
   }
-  EXPECT_EQ(recorder.finish(), "");
+  EXPECT_EQ(recorder->finish(), "");
 }
 
 struct Done {
@@ -59,9 +62,12 @@ class ProgramTest : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
-  [[nodiscard]] Done run(const std::string& arguments) const { return run_as("timeout 60", arguments); }
-  [[nodiscard]] Done run_as(const std::string& before, const std::string& arguments) const {
-    const std::string command = "env -u NOTIFY_SOCKET " + before + " " + kProgram + " " + arguments + " 2>&1";
+  [[nodiscard]] Done run(const std::string& arguments, const std::string& before = "") const {
+    return run_as("timeout 60", arguments, before);
+  }
+  [[nodiscard]] Done run_as(const std::string& timed, const std::string& arguments,
+                            const std::string& before = "") const {
+    const std::string command = before + "env -u NOTIFY_SOCKET " + timed + " " + kProgram + " " + arguments + " 2>&1";
     Done done;
     std::FILE* pipe = ::popen(command.c_str(), "r");
     std::array<char, 4096> text{};
@@ -80,9 +86,24 @@ class ProgramTest : public testing::Test {
                      "\"\nfile = \"" POLYGMAP_SOURCE "/firmware/cameras/d435.toml\"\n[imu]\ndriver = \"livox\"\n");
   }
 
+  // code < 0: a verdict, whichever.
+  void expect_refusal(const std::string& path, int code, const std::string& words, const std::string& name) const {
+    // All of the program's memory, with its code and its stack, is below 100 MB; sanitizers map more.
+    const std::string limited = test::kSlowMachine ? "" : "ulimit -v 102400; ";
+    const auto begun = std::chrono::steady_clock::now();
+    const Done done = run("--replay " + path, limited);
+    EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(test::kSlowMachine ? 30 : 2)) << name;
+    EXPECT_TRUE(code < 0 ? done.code >= 0 && done.code <= 3 : done.code == code)
+        << name << ": " << done.code << ": " << done.said;
+    EXPECT_NE(done.said.find(words), std::string::npos) << name << ": " << done.said;
+    EXPECT_TRUE(!done.said.empty() && done.said.back() == '\n') << name;
+    EXPECT_TRUE(code != 2 || std::ranges::count(done.said, '\n') == 1) << name << ": " << done.said;
+  }
+
   const std::string kProgram = POLYGMAPD;
   const std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) / ("polygmapd_" + std::to_string(::getpid()));
+  const std::string recording_ = (folder_ / "run.mcap").string();
 };
 
 TEST_F(ProgramTest, WrongArguments_AreConfigurationErrorsWithTheUsage) {
@@ -257,17 +278,15 @@ TEST_F(ProgramTest, Doctor_SaysWhatItFinds) {
 }
 
 TEST_F(ProgramTest, Replay_OfTheSameModule_IsCodeZero) {
-  record(folder_.string(), 50);
-  const Done done = run("--replay " + folder_.string());
+  record(recording_, 50);
+  const Done done = run("--replay " + recording_);
   EXPECT_EQ(done.code, 0) << done.said;
   EXPECT_EQ(done.said, "replay: 50 ticks, 0 differ\n");
 }
 
-TEST_F(ProgramTest, ReplayWithAFlippedBitOfAnInput_IsCodeOneAndNamesTheFirstDifference) {
-  constexpr int kTicks = 120;  // it listens for the first fifty
-  record(folder_.string(), kTicks);
-  const std::filesystem::path file = folder_ / recording::kFileName;
-  std::ifstream in(file, std::ios::binary);
+TEST_F(ProgramTest, ReplayWithAFlippedBit_IsCodeTwoAndNamesTheTopicAndTheChunk) {
+  record(recording_, 120);  // it listens for the first fifty
+  std::ifstream in(recording_, std::ios::binary);
   std::vector<char> bytes((std::istreambuf_iterator<char>(in)), {});
   in.close();
   // Of a standing robot the IMU's vertical acceleration is gravity.
@@ -277,17 +296,51 @@ TEST_F(ProgramTest, ReplayWithAFlippedBitOfAnInput_IsCodeOneAndNamesTheFirstDiff
                               pattern + sizeof gravity_mps2);
   ASSERT_NE(at, bytes.end());
   at[3] = static_cast<char>(at[3] ^ 1);
-  std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  const Done done = run("--replay " + folder_.string());
-  EXPECT_EQ(done.code, 1) << done.said;
-  EXPECT_NE(done.said.find("tick "), std::string::npos) << done.said;
-  EXPECT_NE(done.said.find("replay: " + std::to_string(kTicks) + " ticks, "), std::string::npos) << done.said;
+  std::ofstream(recording_, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  const Done done = run("--replay " + recording_);
+  EXPECT_EQ(done.code, 2) << done.said;
+  EXPECT_NE(done.said.find("first difference: "), std::string::npos) << done.said;
+  EXPECT_NE(done.said.find("\"" + recording_ + "\", byte "), std::string::npos) << done.said;
+  EXPECT_NE(done.said.find("(CRC)"), std::string::npos) << done.said;
 }
 
-TEST_F(ProgramTest, ReplayOfWhatIsNone_IsCodeTwo) {
-  const Done done = run("--replay " + folder_.string());
-  EXPECT_EQ(done.code, 2) << done.said;
-  EXPECT_FALSE(done.said.empty());
+// Whatever it is given: one sentence, at once, and little memory.
+TEST_F(ProgramTest, ReplayOfWhatIsNone_IsOneSentence) {
+  record(recording_, 300);
+  std::ifstream in(recording_, std::ios::binary);
+  const std::string good{std::istreambuf_iterator<char>(in), {}};
+  const auto with_length = [&](std::size_t at, std::uint64_t length) {
+    std::string bytes = good;
+    std::memcpy(&bytes[at], &length, sizeof length);
+    return bytes;
+  };
+  const std::size_t first_record = 8;
+  struct Case {
+    std::string name, bytes;
+    int code = 2;
+    std::string words = "is no recording: ";
+  };
+  std::vector<Case> cases{{"empty", ""},
+                          {"foreign", std::string(5'000'000, 'x')},
+                          {"magic alone", good.substr(0, 8), 2, "it has no topic /parameters"},
+                          {"long first record", with_length(first_record + 1, ~std::uint64_t{0}), 2, "no topic"},
+                          {"cut in the middle", good.substr(0, good.size() / 2), 3, "it was cut off"}};
+  for (const std::size_t part : {5, 9, 90, 95}) {
+    Case flipped{"flipped at " + std::to_string(part) + " %", good, -1, ""};
+    char& byte = flipped.bytes[good.size() * part / 100];
+    byte = static_cast<char>(byte ^ 0x10);
+    cases.push_back(flipped);
+  }
+  for (const Case& c : cases) {
+    const std::string path = write("none.mcap", c.bytes);
+    expect_refusal(path, c.code, c.words, c.name);
+  }
+  expect_refusal(folder_.string(), 2, "is no recording: it is a directory", "a folder");
+  expect_refusal((folder_ / "nowhere").string(), 2, "there is no such file", "nothing");
+  const std::string fifo = (folder_ / "fifo").string();
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  expect_refusal(fifo, 2, "it is no plain file", "a pipe");
+  expect_refusal("/dev/zero", 2, "it is no plain file", "a device");
 }
 
 }  // namespace

@@ -8,9 +8,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <thread>
 
 #include "firmware/mailbox/mailbox_layout.hpp"
@@ -497,21 +499,20 @@ TEST_F(ServiceTest, WithoutTheRights_IsNoRealTime) {
               "CAP_IPC_LOCK.*LimitMEMLOCK|CAP_SYS_NICE.*LimitRTPRIO");  // a sanitizer locks no memory
 }
 
-// All that went in and came out, in files that a replay takes; the request to stop is in them.
+// All that went in and came out, in a file that a replay takes; the request to stop is in it.
 TEST_F(ServiceTest, WithARecorder_TheReplayHasTheSameBits) {
-  const std::string directory = testing::TempDir() + "/polygmap_service_" + std::to_string(::getpid());
-  std::filesystem::create_directories(directory);
+  const std::string path = testing::TempDir() + "/polygmap_service_" + std::to_string(::getpid()) + ".mcap";
   robot_.sees = true;
   for (const std::size_t lanes : {1U, 2U}) {
     if (lanes == 2) robot_.sees = false;  // the fake robot's camera is for one lane
     config_.lanes = lanes;
-    recording::Recorder recorder(robot_.ports());
-    recorder.begin(directory, config_.params);
+    const auto recorder = std::make_unique<recording::Recorder>(robot_.ports(), &robot_.robot.camera);
+    recorder->begin(path, config_.params, lanes);
     const auto during = [&] {
       listen_until("STATUS=walking_up", 5s);
       std::this_thread::sleep_for(kEstimates);
     };
-    const Outcome outcome = run(during, true, &recorder);
+    const Outcome outcome = run(during, true, recorder.get());
     // A machine that starves the lanes stops the robot: such a run is replayed, too.
     const bool starved = test::kSlowMachine && outcome.module.reason == StopReason::kStateStale;
     if (!starved) {
@@ -519,27 +520,37 @@ TEST_F(ServiceTest, WithARecorder_TheReplayHasTheSameBits) {
       EXPECT_EQ(outcome.module.reason, StopReason::kOperator);
     }
     EXPECT_EQ(outcome.recording_failure, "");
-    const recording::ReplayResult replay = recording::replay(directory);
+    const recording::ReplayResult replay = recording::replay(path);
     EXPECT_EQ(replay.verdict, recording::ReplayVerdict::kSame) << recording::text_of(replay);
     EXPECT_EQ(replay.ticks, outcome.cycles);
   }
-  std::filesystem::remove_all(directory);
+  std::filesystem::remove(path);
 }
 
+// The disk is full before the robot walks.
 TEST_F(ServiceTest, RecordingThatEndsEarly_IsSaidByTheExitCodeAndTheModuleGoesOn) {
-  const std::string directory = testing::TempDir() + "/polygmap_early_" + std::to_string(::getpid());
-  std::filesystem::create_directories(directory);
-  recording::Recorder recorder(robot_.ports(), {.queue_bytes = 256, .pictures = 1});
-  recorder.begin(directory, config_.params);
+  const std::string path = testing::TempDir() + "/polygmap_early_" + std::to_string(::getpid()) + ".mcap";
+  const auto recorder = std::make_unique<recording::Recorder>(robot_.ports());
+  recorder->begin(path, config_.params, 1);
+  ASSERT_FALSE(recorder->failed());
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit full{1U << 20U, before.rlim_max};
+  const auto signalled = std::signal(SIGXFSZ, SIG_IGN);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &full), 0);
   const auto during = [&] {
     listen_until("STATUS=walking_up", 5s);
-    std::this_thread::sleep_for(200ms);
+    std::this_thread::sleep_for(500ms);
   };
-  const Outcome outcome = run(during, true, &recorder);
+  const Outcome outcome = run(during, true, recorder.get());
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, signalled);
   EXPECT_EQ(outcome.code, ExitCode::kRecording) << outcome.why;
-  EXPECT_NE(outcome.recording_failure.find("its queue was full"), std::string::npos) << outcome.recording_failure;
-  EXPECT_GT(outcome.cycles, 10U);
-  std::filesystem::remove_all(directory);
+  EXPECT_EQ(outcome.recording_failure, "Cannot write \"" + path + "\": File too large.");
+  EXPECT_GT(outcome.cycles, 250U);
+  const recording::ReplayResult replay = recording::replay(path);
+  EXPECT_EQ(replay.verdict, recording::ReplayVerdict::kUnfinished) << recording::text_of(replay);
+  std::filesystem::remove(path);
 }
 
 // In a process that may have one more thread: the lane's. The user is no other process's.

@@ -414,18 +414,29 @@ TEST(ClimbCommand, Help_ExplainsExitCodesAndOptions) {
   }
 }
 
-TEST(Cli, Record_IsMadeAndHandedOn) {
-  const Call c = call({"climb", "--record", temporary("record/inner")});
-  ASSERT_TRUE(c.options);
-  EXPECT_EQ(c.options->record_dir, temporary("record/inner"));
-  EXPECT_TRUE(std::filesystem::is_directory(c.options->record_dir));
-  expect_refused({"climb", "--record", "/dev/null/none"}, "given by --record");
+TEST(Cli, Record_IsBesideTheOtherFilesAndHandedOn) {
+  const std::string folder = temporary("record/inner");
+  const auto recorded = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words{"climb", "--out", folder};
+    words.insert(words.end(), more.begin(), more.end());
+    const Call c = call(words);
+    EXPECT_TRUE(c.options);
+    return std::pair{c.options->recording, c.options->record_pictures};
+  };
+  EXPECT_EQ(recorded({}), std::pair(folder + "/run.mcap", false));
+  EXPECT_TRUE(std::filesystem::is_directory(folder));
+  EXPECT_EQ(recorded({"--record", "no-pictures"}), std::pair(folder + "/run.mcap", false));
+  EXPECT_EQ(recorded({"--record", "all"}), std::pair(folder + "/run.mcap", true));
+  std::ofstream(folder + "/run.mcap") << "of a former run";
+  EXPECT_EQ(recorded({"--record", "none"}), std::pair(std::string(), false));
+  EXPECT_FALSE(std::filesystem::exists(folder + "/run.mcap")) << "it is none of this run's";
+  expect_refused({"climb", "--record", "some"}, "--record");
 }
 
 TEST(Cli, ReplayOfNoRecording_IsOneSentence) {
   std::ostringstream out, err;
   EXPECT_EQ(polygmap_main({"replay", "/there/is/none"}, {}, out, err, false), kExitUsage);
-  EXPECT_EQ(err.str().find("polygmap: \"/there/is/none\" is no recording: there is no such directory.\n"), 0U)
+  EXPECT_EQ(err.str().find("polygmap: \"/there/is/none\" is no recording: there is no such file.\n"), 0U)
       << err.str();
   const std::string said = err.str();
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
