@@ -140,6 +140,7 @@ void Recorder::put_events(std::size_t lane) noexcept {
 void Recorder::begin_row(std::size_t row, std::int64_t cycle_ns, const WorkBudget& budget) noexcept {
   const std::size_t lane = kLaneOf[row];
   LaneLog& log = logs_[lane];
+  if (log.frame.empty() && !log.out.full()) open_frame(lane);  // there may be room by now
   log.head.cycle_ns = cycle_ns;
   if (pipeline_->lane_health(lane).raised() != log.raised) put_events(lane);
   log.row_at = log.out.size();
