@@ -77,7 +77,7 @@ namespace polygmap {
     "Soles and weight say that the IMU is not mounted as configured: its samples are turned.")                      \
   X(118, kPictureBad, "picture_bad",                                                                                \
     "The last pictures had no depth on much of the way ahead, or were noisier than the camera is to be.")           \
-  X(119, kRecordingLost, "recording_lost", "A frame or a picture found no room in the recording's memory.")          \
+  X(119, kRecordingLost, "recording_lost", "A frame or a picture found no room in the recording's memory.")         \
   X(130, kDriveClamped, "drive_clamped", "A command's value was beyond its drive's range and became the nearest end.")
 
 #define POLYGMAP_ENUMERATOR(number, code, name, text) code = number,

@@ -43,7 +43,7 @@ struct ClimbOptions {
   // All that goes into the module and comes out of it; empty: nothing. In a directory that exists.
   std::string recording;
   bool record_pictures = false;  // too
-  double time_limit_s = 150.0;  // simulated
+  double time_limit_s = 150.0;   // simulated
   // Becomes the number of the signal that asks for the end; the climb then ends with what there is. Null: none may.
   const std::atomic<int>* interrupt = nullptr;
   double pace = 0.0;               // simulated seconds in one of the wall clock's, at most; 0: as fast as it can

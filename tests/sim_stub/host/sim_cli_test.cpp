@@ -436,8 +436,7 @@ TEST(Cli, Record_IsBesideTheOtherFilesAndHandedOn) {
 TEST(Cli, ReplayOfNoRecording_IsOneSentence) {
   std::ostringstream out, err;
   EXPECT_EQ(polygmap_main({"replay", "/there/is/none"}, {}, out, err, false), kExitUsage);
-  EXPECT_EQ(err.str().find("polygmap: \"/there/is/none\" is no recording: there is no such file.\n"), 0U)
-      << err.str();
+  EXPECT_EQ(err.str().find("polygmap: \"/there/is/none\" is no recording: there is no such file.\n"), 0U) << err.str();
   const std::string said = err.str();
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
   EXPECT_TRUE(out.str().empty());
