@@ -3,7 +3,7 @@
 
 kPackagesClimb=(g++ cmake ninja-build libeigen3-dev libopencv-core-dev nlohmann-json3-dev libcli11-dev
   liblodepng-dev libzstd-dev libtomlplusplus-dev libmujoco-dev libgtest-dev)
-kPackagesCheck=("${kPackagesClimb[@]}" clang-14 libclang-rt-14-dev clang-format-14 clang-tidy-14 libbenchmark-dev valgrind
+kPackagesCheck=("${kPackagesClimb[@]}" clang-14 libclang-rt-14-dev clang-format-14 clang-tidy-14 libbenchmark-dev valgrind pkgconf
   liborocos-kdl-dev python3 python3-numpy python3-pil python3-canmatrix)
 # libc6 and libstdc++6 of the target let qemu-user start the test programs.
 kPackagesCross=(g++-aarch64-linux-gnu libc6:arm64 libstdc++6:arm64 libgtest-dev:arm64 qemu-user)

@@ -291,7 +291,7 @@ void begin_sentence(Sentence& sentence, std::uint32_t line) noexcept {
     sentence.append(": ");
     return;
   }
-  char reversed[12]{};
+  std::array<char, 12> reversed{};
   std::size_t count = 0;
   for (; line > 0; line /= 10) reversed[count++] = static_cast<char>('0' + line % 10);
   sentence.append(", line ");

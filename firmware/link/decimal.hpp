@@ -3,6 +3,8 @@
 // on the heap, and neither is the module's to link.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -68,25 +70,27 @@ __extension__ using Wide = unsigned __int128;
 template <std::size_t Capacity>
 constexpr void append(FixedText<Capacity>& text, double number) noexcept {
   constexpr int kMostDecimals = 12;
-  const double size = number < 0.0 ? -number : number;
+  constexpr double kMost = 1e15;
+  if (number < 0.0) text.append("-");
+  const double size = std::min(number < 0.0 ? -number : number, kMost);
   double scale = 1.0;
   int decimals = 0;
   const auto scaled = [&] { return static_cast<std::uint64_t>(size * scale + 0.5); };
-  if (!(size < 1e15)) return text.append(number < 0.0 ? "-1e15" : "1e15");
-  for (; decimals < kMostDecimals && size * scale < 1e12; ++decimals, scale *= 10.0) {
+  const auto is_enough = [&] {
     const double off = static_cast<double>(scaled()) / scale - size;
-    if (scaled() > 0 && (off < 0.0 ? -off : off) <= 1e-12 * size) break;
+    return size == 0.0 || (scaled() > 0 && (off < 0.0 ? -off : off) <= 1e-12 * size);
+  };
+  while (decimals < kMostDecimals && size * scale < 1e12 && !is_enough()) {
+    ++decimals;
+    scale *= 10.0;
   }
-  if (size == 0.0) decimals = 0;
-  std::uint64_t digits = size == 0.0 ? 0 : scaled();
-  char reversed[24]{};
+  std::array<char, 32> reversed{};
   std::size_t count = 0;
-  for (int place = 0; digits > 0 || place <= decimals; ++place) {
+  std::uint64_t digits = scaled();
+  for (int place = 0; digits > 0 || place <= decimals; ++place, digits /= 10) {
     if (place > 0 && place == decimals) reversed[count++] = '.';
     reversed[count++] = static_cast<char>('0' + digits % 10);
-    digits /= 10;
   }
-  if (number < 0.0) text.append("-");
   while (count > 0) text.append({&reversed[--count], 1});
 }
 

@@ -48,10 +48,8 @@ int read(const polygmap_handle* handle, Struct* to, Function function) noexcept 
 
 int stamped(bool taken) noexcept { return taken ? POLYGMAP_OK : POLYGMAP_E_STAMP; }
 
-polygmap::Vec3 vector_of(const double (&xyz)[3]) noexcept { return {xyz[0], xyz[1], xyz[2]}; }
-polygmap::JointVector joints_of(const double (&joints)[POLYGMAP_JOINTS]) noexcept {
-  return polygmap::JointVector(joints);
-}
+polygmap::Vec3 vector_of(const double* xyz) noexcept { return {xyz[0], xyz[1], xyz[2]}; }
+polygmap::JointVector joints_of(const double* joints) noexcept { return polygmap::JointVector(joints); }
 
 }  // namespace
 
@@ -96,7 +94,8 @@ int polygmap_create(polygmap_handle** out, void* memory, size_t bytes, const cha
   if (memory == nullptr) return POLYGMAP_E_NULL;
   if (std::bit_cast<std::uintptr_t>(memory) % POLYGMAP_ALIGNMENT != 0) return POLYGMAP_E_ALIGNMENT;
   if (bytes < sizeof(Instance)) return POLYGMAP_E_MEMORY;
-  auto* instance = ::new (memory) Instance;
+  ::new (memory) Instance;  // there is nobody to own it: its end is the memory's
+  auto* instance = std::launder(static_cast<Instance*>(memory));
   if (!instance->try_begin(config)) {
     instance->mark = Mark::kFailed;
     return POLYGMAP_E_CONFIG;

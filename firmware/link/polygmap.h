@@ -36,6 +36,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+// NOLINTBEGIN(readability-identifier-naming,modernize-avoid-c-arrays): this is C
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -44,8 +45,8 @@ extern "C" {
 #define POLYGMAP_VERSION_MINOR 1
 #define POLYGMAP_VERSION_PATCH 0
 #define POLYGMAP_VERSION_TEXT "0.1.0"
-// For comparisons: POLYGMAP_VERSION >= 10200 is 1.2.0 or newer.
-#define POLYGMAP_VERSION (POLYGMAP_VERSION_MAJOR * 10000 + POLYGMAP_VERSION_MINOR * 100 + POLYGMAP_VERSION_PATCH)
+// For comparisons: POLYGMAP_VERSION_NUMBER >= 10200 is 1.2.0 or newer.
+#define POLYGMAP_VERSION_NUMBER (POLYGMAP_VERSION_MAJOR * 10000 + POLYGMAP_VERSION_MINOR * 100 + POLYGMAP_VERSION_PATCH)
 
 #define POLYGMAP_JOINTS 12
 #define POLYGMAP_FEET 2
@@ -463,3 +464,4 @@ int polygmap_read_plan(const polygmap* instance, polygmap_plan* plan);
 #ifdef __cplusplus
 }
 #endif
+// NOLINTEND(readability-identifier-naming,modernize-avoid-c-arrays)

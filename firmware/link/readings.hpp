@@ -14,8 +14,8 @@ namespace polygmap::link {
 [[nodiscard]] bool read_faults(const Instance& instance, polygmap_faults& to) noexcept;
 [[nodiscard]] bool read_plan(const Instance& instance, polygmap_plan& to) noexcept;
 
-// Parts of several.
-inline void copy(const Vec3& from, double (&to)[3]) noexcept {
+// Parts of several. to: three numbers.
+inline void copy(const Vec3& from, double* to) noexcept {
   for (int i = 0; i < 3; ++i) to[i] = from[i];
 }
 [[nodiscard]] inline polygmap_transform transform_of(const Transform& from) noexcept {

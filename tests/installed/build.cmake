@@ -18,7 +18,7 @@ endif()
 # Of the library's names only its own are seen, what it asks others for the C library has, and it has no variables.
 execute_process(COMMAND ${NM} ${WORK}/moved/lib/libpolygmap.a OUTPUT_VARIABLE names COMMAND_ERROR_IS_FATAL ANY)
 string(REGEX MATCHALL "[^\n]+" names "${names}")
-set(asked "mem(cpy|move|set|cmp)|strlen|(sqrt|floor|ceil|trunc|round|rint|lrint|lround)f?|__stack_chk_fail|_GLOBAL_OFFSET_TABLE_")
+set(asked "mem(cpy|move|set|cmp)|strlen|(sqrt|floor|ceil|trunc|round|rint|lrint|lround)f?|__stack_chk_fail|__assert_fail|_GLOBAL_OFFSET_TABLE_")
 list(FILTER names EXCLUDE REGEX ":$| [tnrdN] | T polygmap_| U (${asked})$")
 if(names)
   message(FATAL_ERROR "the installed library has the names ${names}")

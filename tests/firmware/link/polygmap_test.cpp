@@ -239,6 +239,7 @@ TEST(Link, Operator_IsObeyedOrRefused) {
   EXPECT_EQ(linked.status().answer.refusal, 0);
   EXPECT_EQ(linked.status().state, POLYGMAP_STATE_STANDING);
   EXPECT_EQ(linked.plan().step_count, 0U);
+  for (int i = 0; i < 600 && linked.plan().stairs.state == POLYGMAP_STAIRS_NONE; ++i) linked.tick();
   EXPECT_EQ(linked.plan().stairs.state, POLYGMAP_STAIRS_APPROACHING);
 }
 
