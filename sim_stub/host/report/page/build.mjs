@@ -20,8 +20,16 @@ ${packages.map((p) => `${p}:\n${licence(p)}`).join("\n\n")}
 
 async function bundled(entry) {
   const result = await build({
-    entryPoints: [join(here, entry)], bundle: true, minify: true, write: false, format: "iife", target: ["chrome109", "firefox115", "safari16.4"], legalComments: "none", charset: "utf8",
-    absWorkingDir: here, logLevel: "warning",
+    entryPoints: [join(here, entry)],
+    bundle: true,
+    minify: true,
+    write: false,
+    format: "iife",
+    target: ["chrome109", "firefox115", "safari16.4"],
+    legalComments: "none",
+    charset: "utf8",
+    absWorkingDir: here,
+    logLevel: "warning",
   });
   return result.outputFiles[0].text;
 }
@@ -30,7 +38,8 @@ const js = banner + "\n" + (await bundled("src/main.js"));
 const css = await bundled("page.css");
 const parts = { CSS: css, JS: js };
 for (const [name, part] of Object.entries(parts)) {
-  if (/<\/(script|style)|@POLYGMAP_|<!--/i.test(part)) throw new Error(`the bundle's ${name} holds what would end it in a page`);
+  if (/<\/(script|style)|@POLYGMAP_|<!--/i.test(part))
+    throw new Error(`the bundle's ${name} holds what would end it in a page`);
 }
 const page = text("page.html").replace(/@POLYGMAP_(CSS|JS)@/g, (_, name) => parts[name]);
 writeFileSync(process.argv[2], page);

@@ -40,7 +40,9 @@ function build(runs) {
   const [run, other] = runs;
   const player = new Player(Math.max(...runs.map((r) => r.duration_s)));
   const pictures = new Pictures(run);
-  const picture = new PicturePanel(run, pictures), top = new TopView(run, pictures), words = new MomentPanel(run);
+  const picture = new PicturePanel(run, pictures),
+    top = new TopView(run, pictures),
+    words = new MomentPanel(run);
   const stage = h("section.panel.stage", { id: "stage", "aria-label": "Replay" });
   const view = replayView(stage, run, other);
   const help = helpDialog();
@@ -53,10 +55,23 @@ function build(runs) {
   setPlayer(player);
   stage.append(legend(run, other));
   const replay = h("div.replay", {}, stage, h("div.column", {}, picture.element, top.element), words.element);
-  const parts = other ? [differencesPanel(runs), replay, compareSection(runs, player), closestOfBoth(runs, player)]
-    : [replay, closestPanel(run, player), stepsPanel(run, player), h("div.pair", {}, paperPanel(run), h("div", {}, faultsPanel(run, player))), timeSection(run, player),
-      h("div.pair", {}, memoryPanel(run), originPanel(run)), parametersPanel(run)];
-  root.replaceChildren(other ? compareHeader(runs, player) : header(run, player), h("main", {}, parts), transport.element, help);
+  const parts = other
+    ? [differencesPanel(runs), replay, compareSection(runs, player), closestOfBoth(runs, player)]
+    : [
+        replay,
+        closestPanel(run, player),
+        stepsPanel(run, player),
+        h("div.pair", {}, paperPanel(run), h("div", {}, faultsPanel(run, player))),
+        timeSection(run, player),
+        h("div.pair", {}, memoryPanel(run), originPanel(run)),
+        parametersPanel(run),
+      ];
+  root.replaceChildren(
+    other ? compareHeader(runs, player) : header(run, player),
+    h("main", {}, parts),
+    transport.element,
+    help,
+  );
   let settled = Promise.resolve();
   player.seek(openingTime(run));
   player.listen((t_s) => {

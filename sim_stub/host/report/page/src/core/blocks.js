@@ -37,7 +37,8 @@ export function unpack(block) {
   for (let c = 0; c < block.columns; ++c) {
     const part = raw.subarray(c * block.count, (c + 1) * block.count);
     if (block.delta) for (let i = 1; i < part.length; ++i) part[i] += part[i - 1]; // wraps as it was written
-    const scale = of(block.scale, c, 1), offset = of(block.offset, c, 0);
+    const scale = of(block.scale, c, 1),
+      offset = of(block.offset, c, 0);
     columns.push(Float64Array.from(part, (v) => (v === missing ? NaN : offset + scale * v)));
   }
   return columns;

@@ -2,8 +2,40 @@
 // Colours by role. Map green, safe regions blue, p* red and p** purple are the paper's; tones are chosen so that people
 // who see red and green alike tell them by lightness, and no role is told by colour alone.
 
-const NAMES = ["map", "safe", "pstar", "pstarstar", "truth", "odometry", "lio", "fused", "left", "right", "ink", "faint", "line", "panel", "page", "stair",
-  "stairline", "riser", "robot", "robotdark", "camera", "bad", "good", "warn", "band", "band3", "grid", "stage", "floor", "nosing", "runA", "runB"];
+const NAMES = [
+  "map",
+  "safe",
+  "pstar",
+  "pstarstar",
+  "truth",
+  "odometry",
+  "lio",
+  "fused",
+  "left",
+  "right",
+  "ink",
+  "faint",
+  "line",
+  "panel",
+  "page",
+  "stair",
+  "stairline",
+  "riser",
+  "robot",
+  "robotdark",
+  "camera",
+  "bad",
+  "good",
+  "warn",
+  "band",
+  "band3",
+  "grid",
+  "stage",
+  "floor",
+  "nosing",
+  "runA",
+  "runB",
+];
 
 export const colours = {};
 

@@ -28,7 +28,10 @@ export const isNumber = (v) => typeof v === "number" && Number.isFinite(v);
 /** A number with so many digits behind the point, a real minus, and a dash where there is none. */
 export function number(value, digits = 1, unit = "") {
   if (!isNumber(value)) return "–";
-  const text = value.toFixed(digits).replace(/^-(0(?:\.0*)?)$/, "$1").replace("-", "−");
+  const text = value
+    .toFixed(digits)
+    .replace(/^-(0(?:\.0*)?)$/, "$1")
+    .replace("-", "−");
   return unit ? `${text} ${unit}` : text;
 }
 
@@ -46,9 +49,33 @@ export function moment(player, t_s, text = seconds(t_s)) {
 }
 
 export function table(heads, rows, attributes = {}) {
-  const head = h("thead", {}, h("tr", {}, heads.map((c) => (typeof c === "string" ? h("th", {}, c) : h("th", { class: c.class, title: c.title }, c.text)))));
-  const body = h("tbody", {}, rows.map((row) => row instanceof Node ? row : h("tr", {}, row.map((c, i) => cell(c, heads[i])))));
-  return h("div.scroll", { tabindex: "0", role: "region", "aria-label": attributes.label }, h("table", { class: attributes.class }, head, body));
+  const head = h(
+    "thead",
+    {},
+    h(
+      "tr",
+      {},
+      heads.map((c) => (typeof c === "string" ? h("th", {}, c) : h("th", { class: c.class, title: c.title }, c.text))),
+    ),
+  );
+  const body = h(
+    "tbody",
+    {},
+    rows.map((row) =>
+      row instanceof Node
+        ? row
+        : h(
+            "tr",
+            {},
+            row.map((c, i) => cell(c, heads[i])),
+          ),
+    ),
+  );
+  return h(
+    "div.scroll",
+    { tabindex: "0", role: "region", "aria-label": attributes.label },
+    h("table", { class: attributes.class }, head, body),
+  );
 }
 
 export function cell(content, head) {

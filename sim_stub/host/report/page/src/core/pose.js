@@ -3,7 +3,9 @@
 
 export function turn(q, v) {
   const [x, y, z, w] = q;
-  const tx = 2 * (y * v[2] - z * v[1]), ty = 2 * (z * v[0] - x * v[2]), tz = 2 * (x * v[1] - y * v[0]);
+  const tx = 2 * (y * v[2] - z * v[1]),
+    ty = 2 * (z * v[0] - x * v[2]),
+    tz = 2 * (x * v[1] - y * v[0]);
   return [v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx];
 }
 
@@ -47,7 +49,8 @@ export function linkPoses(robot, base, angles) {
   robot.joints.forEach((joint, j) => {
     const parent = joint.parent < 0 ? base : poses[joint.parent];
     const axis = AXES[joint.axis] ?? joint.axis;
-    const half = (angles?.[j] ?? 0) / 2, s = Math.sin(half);
+    const half = (angles?.[j] ?? 0) / 2,
+      s = Math.sin(half);
     poses.push(joined(parent, { p: joint.origin_m, q: [axis[0] * s, axis[1] * s, axis[2] * s, Math.cos(half)] }));
   });
   return poses;
@@ -55,5 +58,10 @@ export function linkPoses(robot, base, angles) {
 
 /** Corners of a sole's rectangle [toe, heel, half width], from the left toe on. */
 export function soleCorners([toe, heel, half]) {
-  return [[toe, half, 0], [toe, -half, 0], [heel, -half, 0], [heel, half, 0]];
+  return [
+    [toe, half, 0],
+    [toe, -half, 0],
+    [heel, -half, 0],
+    [heel, half, 0],
+  ];
 }

@@ -32,7 +32,18 @@ export class Run {
     this.camera = json.camera ?? null;
     this.stairs = json.stairs ?? null;
     this.polygons = json.map?.polygons ?? [];
-    for (const list of ["pictures", "searches", "steps", "states", "phases", "events", "pushes", "operator", "schedule", "memory"]) {
+    for (const list of [
+      "pictures",
+      "searches",
+      "steps",
+      "states",
+      "phases",
+      "events",
+      "pushes",
+      "operator",
+      "schedule",
+      "memory",
+    ]) {
       this[list] = json[list] ?? [];
     }
     this.occupied = json.map?.occupied ?? [];
@@ -70,7 +81,9 @@ export class Run {
 
   /** The robot's base: true where that is known, else as the module has it. */
   get base() {
-    return (this.hasTruth ? this.series("base_true") : null) ?? this.series("base_fused") ?? this.series("base_odometry");
+    return (
+      (this.hasTruth ? this.series("base_true") : null) ?? this.series("base_fused") ?? this.series("base_odometry")
+    );
   }
 
   sole(foot) {
@@ -81,7 +94,11 @@ export class Run {
   newest(list, t_s, time = "t_s") {
     const entries = this[list];
     const key = `${list}.${time}`;
-    if (!this.times_.has(key)) this.times_.set(key, entries.map((e) => (Array.isArray(e) ? e[0] : e[time])));
+    if (!this.times_.has(key))
+      this.times_.set(
+        key,
+        entries.map((e) => (Array.isArray(e) ? e[0] : e[time])),
+      );
     return entries[indexAt(this.times_.get(key), t_s)] ?? null;
   }
 
@@ -98,7 +115,10 @@ export class Run {
   }
 
   occupiedAt(t_s) {
-    return this.occupied.find((o) => o.from_s <= t_s && (o.to_s === undefined || o.to_s === null || t_s < o.to_s))?.cells ?? [];
+    return (
+      this.occupied.find((o) => o.from_s <= t_s && (o.to_s === undefined || o.to_s === null || t_s < o.to_s))?.cells ??
+      []
+    );
   }
 
   /** The step whose foot is in the air at a time, or null. */
@@ -121,6 +141,7 @@ export class Run {
 export function parse(text) {
   const data = JSON.parse(text);
   if (data.format !== "polygmap-report") throw new Error("the page's data are not a PolygMap report");
-  if (data.version !== 1) throw new Error(`the page's data have version ${data.version}, and this page reads version 1`);
+  if (data.version !== 1)
+    throw new Error(`the page's data have version ${data.version}, and this page reads version 1`);
   return (data.runs ?? []).map((run) => new Run(run));
 }

@@ -3,7 +3,8 @@
 
 /** The last i with t[i] <= at, -1 before the first. */
 export function indexAt(t, at) {
-  let low = 0, high = t.length;
+  let low = 0,
+    high = t.length;
   while (low < high) {
     const middle = (low + high) >> 1;
     if (t[middle] <= at) low = middle + 1;

@@ -13,9 +13,29 @@ const KEYS = [
 ];
 
 export function helpDialog() {
-  const dialog = h("dialog", { "aria-label": "Keys" }, h("h2", {}, "Keys"), h("dl", {}, KEYS.flatMap(([key, what]) => [h("dt", {}, key.split(" ").map((k) => h("kbd", {}, k))), h("dd", {}, what)])),
-    h("p.note", {}, "Drag the scene to turn it, with the right button to move it; once you have clicked into it, the wheel brings you nearer. Click into a curve to go to that moment; drag over it to zoom in, double-click to zoom out."),
-    h("form", { method: "dialog" }, h("button", {}, "Close")));
+  const dialog = h(
+    "dialog",
+    { "aria-label": "Keys" },
+    h("h2", {}, "Keys"),
+    h(
+      "dl",
+      {},
+      KEYS.flatMap(([key, what]) => [
+        h(
+          "dt",
+          {},
+          key.split(" ").map((k) => h("kbd", {}, k)),
+        ),
+        h("dd", {}, what),
+      ]),
+    ),
+    h(
+      "p.note",
+      {},
+      "Drag the scene to turn it, with the right button to move it; once you have clicked into it, the wheel brings you nearer. Click into a curve to go to that moment; drag over it to zoom in, double-click to zoom out.",
+    ),
+    h("form", { method: "dialog" }, h("button", {}, "Close")),
+  );
   return dialog;
 }
 
@@ -37,7 +57,12 @@ export function bindKeys(player, look, help) {
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || help.open) return;
     const within = event.target;
-    if (within.tagName === "SELECT" || (event.key === " " && within.tagName === "BUTTON") || (event.key === " " && within.tagName === "SUMMARY")) return;
+    if (
+      within.tagName === "SELECT" ||
+      (event.key === " " && within.tagName === "BUTTON") ||
+      (event.key === " " && within.tagName === "SUMMARY")
+    )
+      return;
     const call = act[event.key];
     if (!call) return;
     event.preventDefault();

@@ -20,7 +20,9 @@ export const STATES = {
 function counted(list) {
   const count = new Map();
   for (const name of list) count.set(name, (count.get(name) ?? 0) + 1);
-  return [...count].map(([name, n]) => (n === 1 ? `1 ${name}` : `${n} ${name === "other" ? "other surfaces" : `${name}s`}`)).join(", ");
+  return [...count]
+    .map(([name, n]) => (n === 1 ? `1 ${name}` : `${n} ${name === "other" ? "other surfaces" : `${name}s`}`))
+    .join(", ");
 }
 
 export function sees(run, t_s) {
@@ -32,7 +34,10 @@ export function sees(run, t_s) {
   }
   const polygons = run.polygonsAt(t_s);
   const treads = polygons.filter((p) => p.kind === "tread").map((p) => p.vertices[2]);
-  if (polygons.length) out.push(`The map holds ${counted(polygons.map((p) => p.kind))}${treads.length ? `, the highest tread at ${number(Math.max(...treads), 2)} m` : ""}.`);
+  if (polygons.length)
+    out.push(
+      `The map holds ${counted(polygons.map((p) => p.kind))}${treads.length ? `, the highest tread at ${number(Math.max(...treads), 2)} m` : ""}.`,
+    );
   else if (run.polygons.length) out.push("The map is empty.");
   const occupied = run.occupiedAt(t_s).length;
   if (occupied) out.push(`Something lies on ${occupied} squares of 20 mm.`);
@@ -40,11 +45,15 @@ export function sees(run, t_s) {
 }
 
 export function does(run, t_s) {
-  const state = run.stateAt(t_s), phase = run.phaseAt(t_s);
+  const state = run.stateAt(t_s),
+    phase = run.phaseAt(t_s);
   const out = [];
   if (state) out.push(STATES[state] ?? `State ${words(state)}.`);
   const swing = run.swingAt(t_s);
-  if (swing) out.push(`The ${swing.foot} foot is in the air, to ${placeOf(swing)}${swing.touch_down_s ? `; it lands at ${seconds(swing.touch_down_s)}` : "; it is put back where it stood"}.`);
+  if (swing)
+    out.push(
+      `The ${swing.foot} foot is in the air, to ${placeOf(swing)}${swing.touch_down_s ? `; it lands at ${seconds(swing.touch_down_s)}` : "; it is put back where it stood"}.`,
+    );
   else if (phase === "double_support") out.push("Both feet stand; the weight moves over the next standing foot.");
   else if (phase && state !== "fallen") out.push("Both feet stand.");
   const push = run.pushes.find((p) => p.t_s <= t_s && t_s <= p.t_s + p.duration_s);
@@ -57,20 +66,35 @@ export function placeOf(step) {
   return `${isNumber(step.step) && step.step > 0 ? `step ${step.step}` : "a tread"}${step.target_m ? ` (${number(step.target_m[2], 2)} m up)` : ""}`;
 }
 
+function chosenBecause(step) {
+  const toe = isNumber(step.toe_clearance_mm)
+    ? ` and its toe ${number(step.toe_clearance_mm, 1)} mm from the riser`
+    : "";
+  const on = isNumber(step.polygon_id) ? ` on polygon ${step.polygon_id}` : "";
+  return `The ${step.foot} foot's place was frozen at lift-off${on}: it keeps ${number(step.clearance_mm, 1)} mm from the edge${toe}.`;
+}
+
 export function why(run, t_s) {
   const search = run.newest("searches", t_s);
-  if (!search) return [run.searches.length ? "No search has ended yet." : run.missing("searches")];
-  const out = [];
-  if (search.stop && search.stop !== "none") out.push(`${search.stop === "top" ? "It sees no further step" : "It does not step on"}: ${search.stop_text ?? words(search.stop)}.`);
+  const swing = run.swingAt(t_s);
+  const chosen = swing && isNumber(swing.clearance_mm) ? [chosenBecause(swing)] : [];
+  if (!search) return [...chosen, run.searches.length ? "No search has ended yet." : run.missing("searches")];
+  const out = chosen;
+  if (search.stop && search.stop !== "none")
+    out.push(
+      `${search.stop === "top" ? "It sees no further step" : "It does not step on"}: ${search.stop_text ?? words(search.stop)}.`,
+    );
   if (isNumber(search.measured_rise_m)) {
-    const deep = search.measured_tread_m ? `, and ${number(search.measured_tread_m, 3)} m deep` : "";
-    out.push(`The next tread is ${number(search.measured_rise_m, 3)} m up${deep}, as it measured.`);
+    const deep = search.measured_tread_m ? `, ${number(search.measured_tread_m, 3)} m deep` : "";
+    out.push(`Next up: a tread ${number(search.measured_rise_m, 3)} m higher${deep}, as it measured.`);
   }
   const feet = (search.p_star ?? []).filter(Boolean);
   if (feet.length) {
     const least = Math.min(...feet.map((f) => f.clearance_m));
     const id = feet[0].polygon_id;
-    out.push(`p* is on the nearest tread above it${id === undefined ? "" : ` (polygon ${id})`}: a sole there keeps ${mm(least)} from the polygon's edge.`);
+    out.push(
+      `p* is on the nearest tread above it${id === undefined ? "" : ` (polygon ${id})`}: a sole there keeps ${mm(least)} from the polygon's edge.`,
+    );
   }
   return out;
 }
@@ -80,10 +104,17 @@ export class MomentPanel {
     this.run = run;
     this.lists = { sees: h("div"), does: h("div"), why: h("div") };
     this.margins = h("div.margins");
-    this.element = h("section.panel.words", { id: "words" },
-      h("h2", {}, "What it sees"), this.lists.sees,
-      h("h2", {}, "What it does"), this.lists.does,
-      h("h2", {}, "Where next, and why there"), this.lists.why, this.margins);
+    this.element = h(
+      "section.panel.words",
+      { id: "words" },
+      h("h2", {}, "What it sees"),
+      this.lists.sees,
+      h("h2", {}, "What it does"),
+      this.lists.does,
+      h("h2", {}, "Where next, and why there"),
+      this.lists.why,
+      this.margins,
+    );
   }
 
   show(t_s) {
@@ -101,7 +132,10 @@ export class MomentPanel {
   showMargins(search) {
     if (search === this.search) return;
     this.search = search;
-    const columns = [["p*", "pstar", search?.p_star], ["p**", "pstarstar", search?.p_star_star]].filter(([, , feet]) => feet?.some(Boolean));
+    const columns = [
+      ["p*", "pstar", search?.p_star],
+      ["p**", "pstarstar", search?.p_star_star],
+    ].filter(([, , feet]) => feet?.some(Boolean));
     if (!columns.length) {
       this.margins.replaceChildren();
       return;
@@ -113,11 +147,36 @@ export class MomentPanel {
       ["room to the left", (f) => f.side_room_m?.[0]],
       ["room to the right", (f) => f.side_room_m?.[1]],
     ];
-    const head = h("tr", {}, h("th", {}, "mm"), columns.flatMap(([name, css]) => ["L", "R"].map((side) => h(`th.n`, {}, h(`span.key.${css}`), `${name} ${side}`))));
+    const head = h(
+      "tr",
+      {},
+      h("th", {}, "mm"),
+      columns.flatMap(([name, css]) =>
+        ["L", "R"].map((side) => h(`th.n`, {}, h(`span.key.${css}`), `${name} ${side}`)),
+      ),
+    );
     const value = (foot, read) => {
       const v = foot ? read(foot) : null;
       return h(isNumber(v) && v < 0 ? "td.n.bad" : "td.n", {}, isNumber(v) ? number(v * 1e3, 0) : "–");
     };
-    this.margins.replaceChildren(h("table", {}, h("thead", {}, head), h("tbody", {}, rows.map(([label, read]) => h("tr", {}, h("th", { scope: "row" }, label), columns.flatMap(([, , feet]) => [0, 1].map((i) => value(feet[i], read))))))));
+    this.margins.replaceChildren(
+      h(
+        "table",
+        {},
+        h("thead", {}, head),
+        h(
+          "tbody",
+          {},
+          rows.map(([label, read]) =>
+            h(
+              "tr",
+              {},
+              h("th", { scope: "row" }, label),
+              columns.flatMap(([, , feet]) => [0, 1].map((i) => value(feet[i], read))),
+            ),
+          ),
+        ),
+      ),
+    );
   }
 }

@@ -32,7 +32,8 @@ export class Pictures {
     const grey = context.getImageData(0, 0, image.width, image.height).data;
     const { near_m, far_m } = this.run.camera;
     const depth_m = new Float32Array(image.width * image.height);
-    for (let i = 0; i < depth_m.length; ++i) depth_m[i] = grey[4 * i] ? near_m + ((grey[4 * i] - 1) / 254) * (far_m - near_m) : NaN;
+    for (let i = 0; i < depth_m.length; ++i)
+      depth_m[i] = grey[4 * i] ? near_m + ((grey[4 * i] - 1) / 254) * (far_m - near_m) : NaN;
     return { width: image.width, height: image.height, depth_m };
   }
 }
@@ -45,7 +46,13 @@ export class PicturePanel {
     this.said = h("p.said", { "aria-live": "off" });
     this.canvas = h("canvas", { role: "img", "aria-label": "Depth picture" });
     this.toggle = h("button.small", { type: "button", "aria-pressed": "true", onclick: () => this.flip() }, "planes");
-    this.element = h("section.panel.picture", { id: "picture" }, h("h2", {}, "Depth picture", this.toggle), h("div.frame", {}, this.canvas), this.said);
+    this.element = h(
+      "section.panel.picture",
+      { id: "picture" },
+      h("h2", {}, "Depth picture", this.toggle),
+      h("div.frame", {}, this.canvas),
+      this.said,
+    );
     if (!run.pictures.length || !run.camera) {
       this.element.replaceChildren(h("h2", {}, "Depth picture"), h("p.missing", {}, run.missing("pictures")));
       this.off = true;
@@ -97,7 +104,9 @@ export class PicturePanel {
     const context = this.canvas.getContext("2d", { willReadFrequently: true });
     context.imageSmoothingEnabled = false;
     context.drawImage(this.image, 0, 0, this.canvas.width, this.canvas.height);
-    if (this.withPlanes) for (const surface of this.picture.surfaces ?? []) this.paintSurface(context, surface, this.canvas.width / camera.width_px);
+    if (this.withPlanes)
+      for (const surface of this.picture.surfaces ?? [])
+        this.paintSurface(context, surface, this.canvas.width / camera.width_px);
   }
 
   paintSurface(context, surface, scale) {
@@ -150,7 +159,8 @@ export class PicturePanel {
     const u = Math.floor(((event.clientX - box.left) / box.width) * this.pixels.width);
     const v = Math.floor(((event.clientY - box.top) / box.height) * this.pixels.height);
     const depth = this.pixels.depth_m[v * this.pixels.width + u];
-    this.said.textContent = Number.isFinite(depth) ? `Depth here: ${number(depth, 2)} m along the optical axis` : "No depth here";
+    this.said.textContent = Number.isFinite(depth)
+      ? `Depth here: ${number(depth, 2)} m along the optical axis`
+      : "No depth here";
   }
 }
-

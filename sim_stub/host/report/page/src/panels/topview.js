@@ -18,9 +18,16 @@ export class TopView {
     this.pictures = pictures;
     this.canvas = h("canvas", { role: "img", "aria-label": "Heights, map and footholds from above" });
     this.said = h("p.said");
-    this.element = h("section.panel.top", { id: "top" }, h("h2", {}, "Heights from above"), h("div.frame", {}, this.canvas), this.said);
+    this.element = h(
+      "section.panel.top",
+      { id: "top" },
+      h("h2", {}, "Heights from above"),
+      h("div.frame", {}, this.canvas),
+      this.said,
+    );
     this.off = !run.base && !run.polygons.length;
-    if (this.off) this.element.replaceChildren(h("h2", {}, "Heights from above"), h("p.missing", {}, run.missing("map")));
+    if (this.off)
+      this.element.replaceChildren(h("h2", {}, "Heights from above"), h("p.missing", {}, run.missing("map")));
     this.canvas.addEventListener("pointermove", (e) => this.readOut(e));
     this.canvas.addEventListener("pointerleave", () => this.describe());
     onTheme(() => this.paint());
@@ -51,10 +58,12 @@ export class TopView {
       for (let u = 0; u < pixels.width; ++u) {
         const depth = pixels.depth_m[v * pixels.width + u];
         if (!Number.isFinite(depth)) continue;
-        const x = (((u + 0.5) * width_px) / pixels.width - 0.5 - cx_px) / fx_px, y = (((v + 0.5) * height_px) / pixels.height - 0.5 - cy_px) / fy_px;
+        const x = (((u + 0.5) * width_px) / pixels.width - 0.5 - cx_px) / fx_px,
+          y = (((v + 0.5) * height_px) / pixels.height - 0.5 - cy_px) / fy_px;
         const p = placed(pose, [x * depth, y * depth, depth]);
         const key = Math.round(p[0] / CELL_m) * 4096 + Math.round(p[1] / CELL_m);
-        if (!(cells.get(key)?.[2] > p[2])) cells.set(key, [Math.round(p[0] / CELL_m) * CELL_m, Math.round(p[1] / CELL_m) * CELL_m, p[2]]);
+        if (!(cells.get(key)?.[2] > p[2]))
+          cells.set(key, [Math.round(p[0] / CELL_m) * CELL_m, Math.round(p[1] / CELL_m) * CELL_m, p[2]]);
       }
     }
     return cells;
@@ -87,10 +96,12 @@ export class TopView {
       context.strokeStyle = stroke;
       context.stroke();
     };
-    for (const p of this.run.polygonsAt(this.t_s)) if (p.kind !== "riser") shape(points(p.vertices), this.raster ? null : faded(colours.map, 0.3), colours.map, 3);
+    for (const p of this.run.polygonsAt(this.t_s))
+      if (p.kind !== "riser") shape(points(p.vertices), this.raster ? null : faded(colours.map, 0.3), colours.map, 3);
     for (const p of this.run.polygonsAt(this.t_s)) if (p.nosing) shape(points(p.nosing), null, colours.nosing, 5);
     const search = this.run.newest("searches", this.t_s);
-    for (const region of search?.safe ?? []) shape(points(region.vertices), faded(colours.safe, 0.35), colours.safe, 2.5);
+    for (const region of search?.safe ?? [])
+      shape(points(region.vertices), faded(colours.safe, 0.35), colours.safe, 2.5);
     this.paintFeet(context, at, shape, search);
     this.paintScale(context, canvas);
   }
@@ -119,18 +130,31 @@ export class TopView {
       context.fillStyle = colour;
       context.fillText(text, ...at(p));
     };
-    for (const [name, colour, text] of [["p_star_star", colours.pstarstar, "p**"], ["p_star", colours.pstar, "p*"]]) {
+    for (const [name, colour, text] of [
+      ["p_star_star", colours.pstarstar, "p**"],
+      ["p_star", colours.pstar, "p*"],
+    ]) {
       for (const place of search?.[name] ?? []) {
         if (!place) continue;
         const pose = { p: place.position_m, q: aboutZ(place.yaw_rad) };
-        shape(sole.map((c) => placed(pose, c)), faded(colour, 0.55), colour, 4);
+        shape(
+          sole.map((c) => placed(pose, c)),
+          faded(colour, 0.55),
+          colour,
+          4,
+        );
         label(text, placed(pose, [0.05, 0, 0]), "#fff");
       }
     }
     this.now.soles.forEach((pose, i) => {
       if (!pose) return;
       const colour = i ? colours.right : colours.left;
-      shape(sole.map((c) => placed(pose, c)), faded(colour, 0.75), colours.ink, 2.5);
+      shape(
+        sole.map((c) => placed(pose, c)),
+        faded(colour, 0.75),
+        colours.ink,
+        2.5,
+      );
       label(i ? "R" : "L", placed(pose, [0.05, 0, 0]), "#fff");
     });
   }
@@ -146,7 +170,9 @@ export class TopView {
   }
 
   describe() {
-    const heights = this.raster ? `squares of 20 mm: heights in the picture, dark low, bright high` : "no picture, so no heights: the map alone";
+    const heights = this.raster
+      ? `squares of 20 mm: heights in the picture, dark low, bright high`
+      : "no picture, so no heights: the map alone";
     this.said.textContent = `Up the stairs is up; ${heights}`;
   }
 

@@ -30,7 +30,13 @@ function zoom(range) {
   for (const call of zoomed) call();
 }
 
-const axis = (more) => ({ stroke: () => colours.faint, grid: { stroke: () => colours.grid, width: 1 }, ticks: { stroke: () => colours.grid, width: 1, size: 4 }, font: "11px system-ui, sans-serif", ...more });
+const axis = (more) => ({
+  stroke: () => colours.faint,
+  grid: { stroke: () => colours.grid, width: 1 },
+  ticks: { stroke: () => colours.grid, width: 1, size: 4 },
+  font: "11px system-ui, sans-serif",
+  ...more,
+});
 
 /**
  * {title, unit, digits, data: [t, ...ys] or what makes them, lines: [{label, colour (a role), dash, width, points}], bands: [{series: [a, b], colour}],
@@ -40,33 +46,76 @@ export class Chart {
   constructor(spec) {
     this.spec = spec;
     this.host = h("div.plot");
-    this.legend = h("div.legend", {}, spec.lines.map((line) => h("button.small.entry", { type: "button", "aria-pressed": "true", title: "Show or hide", onclick: (e) => this.hide(line, e.currentTarget) }, h("span.stroke", { style: `--c: var(--${line.colour}); ${line.dash ? "border-top-style: dashed" : ""}${line.points ? "; border-top-style: dotted" : ""}` }), h("span", {}, line.label), h("output", {}))));
+    this.legend = h(
+      "div.legend",
+      {},
+      spec.lines.map((line) =>
+        h(
+          "button.small.entry",
+          {
+            type: "button",
+            "aria-pressed": "true",
+            title: "Show or hide",
+            onclick: (e) => this.hide(line, e.currentTarget),
+          },
+          h("span.stroke", {
+            style: `--c: var(--${line.colour}); ${line.dash ? "border-top-style: dashed" : ""}${line.points ? "; border-top-style: dotted" : ""}`,
+          }),
+          h("span", {}, line.label),
+          h("output", {}),
+        ),
+      ),
+    );
     this.element = h("figure.chart", {}, h("figcaption", {}, spec.title), h("div.row", {}, this.host, this.legend));
     this.outputs = [...this.legend.querySelectorAll("output")];
     all.add(this);
     onTheme(() => this.plot?.redraw(false));
-    new IntersectionObserver((seen, observer) => {
-      if (!seen.some((s) => s.isIntersecting)) return;
-      observer.disconnect();
-      this.make();
-    }, { rootMargin: "300px" }).observe(this.host);
+    new IntersectionObserver(
+      (seen, observer) => {
+        if (!seen.some((s) => s.isIntersecting)) return;
+        observer.disconnect();
+        this.make();
+      },
+      { rootMargin: "300px" },
+    ).observe(this.host);
   }
 
   make() {
     const { spec } = this;
-    const series = [{}, ...spec.lines.map((line) => ({
-      label: line.label, stroke: () => colours[line.colour], width: line.width ?? 1.5, dash: line.dash, points: { show: !!line.points, size: 3, fill: () => colours[line.colour] },
-      paths: line.points ? () => null : undefined, spanGaps: false,
-    }))];
+    const series = [
+      {},
+      ...spec.lines.map((line) => ({
+        label: line.label,
+        stroke: () => colours[line.colour],
+        width: line.width ?? 1.5,
+        dash: line.dash,
+        points: { show: !!line.points, size: 3, fill: () => colours[line.colour] },
+        paths: line.points ? () => null : undefined,
+        spanGaps: false,
+      })),
+    ];
     const options = {
-      width: this.host.clientWidth || 600, height: spec.height ?? 150, legend: { show: false }, scales: { x: { time: false, min: part()[0], max: part()[1] }, y: { range: spec.range } },
-      series, bands: (spec.bands ?? []).map((b) => ({ series: b.series, fill: () => colours.band })),
-      axes: [axis({ values: (_, ticks) => ticks.map((t) => `${t} s`), size: 26 }), axis({ label: spec.unit, labelSize: 16, labelFont: "11px system-ui, sans-serif", size: this.gutter() - 16 })],
+      width: this.host.clientWidth || 600,
+      height: spec.height ?? 150,
+      legend: { show: false },
+      scales: { x: { time: false, min: part()[0], max: part()[1] }, y: { range: spec.range } },
+      series,
+      bands: (spec.bands ?? []).map((b) => ({ series: b.series, fill: () => colours.band })),
+      axes: [
+        axis({ values: (_, ticks) => ticks.map((t) => `${t} s`), size: 26 }),
+        axis({ label: spec.unit, labelSize: 16, labelFont: "11px system-ui, sans-serif", size: this.gutter() - 16 }),
+      ],
       padding: [8, 1, 0, 0],
       cursor: { sync: { key: "polygmap" }, drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
-      hooks: { draw: [(plot) => this.over(plot)], setCursor: [(plot) => this.readOut(plot.cursor.idx)], setSelect: [(plot) => this.select(plot)] },
+      hooks: {
+        draw: [(plot) => this.over(plot)],
+        setCursor: [(plot) => this.readOut(plot.cursor.idx)],
+        setSelect: [(plot) => this.select(plot)],
+      },
     };
-    this.plot = unaccelerated(() => new uPlot(options, typeof spec.data === "function" ? (spec.data = spec.data()) : spec.data, this.host));
+    this.plot = unaccelerated(
+      () => new uPlot(options, typeof spec.data === "function" ? (spec.data = spec.data()) : spec.data, this.host),
+    );
     this.now = h("i.cursor");
     this.plot.over.append(this.now);
     new IntersectionObserver((seen) => {
@@ -78,7 +127,9 @@ export class Chart {
       else player.seek(this.plot.posToVal(e.offsetX, "x"));
     });
     this.plot.over.addEventListener("dblclick", () => zoom(null));
-    new ResizeObserver(() => this.host.clientWidth && this.plot.setSize({ width: this.host.clientWidth, height: spec.height ?? 150 })).observe(this.host);
+    new ResizeObserver(
+      () => this.host.clientWidth && this.plot.setSize({ width: this.host.clientWidth, height: spec.height ?? 150 }),
+    ).observe(this.host);
     this.mark(player.t_s);
   }
 
@@ -167,7 +218,8 @@ function unaccelerated(make) {
 }
 
 function closestIndex(t, at) {
-  let low = 0, high = t.length - 1;
+  let low = 0,
+    high = t.length - 1;
   while (high - low > 1) {
     const middle = (low + high) >> 1;
     if (t[middle] <= at) low = middle;

@@ -6,7 +6,14 @@ import { h, isNumber, moment, number, words } from "../core/dom.js";
 import { bands } from "../panels/transport.js";
 import { onZoom, part } from "./chart.js";
 
-export const STATE_COLOUR = { walking_up: "lio", climbing: "map", stopping: "warn", safe_stop: "warn", fallen: "bad", on_top: "safe" };
+export const STATE_COLOUR = {
+  walking_up: "lio",
+  climbing: "map",
+  stopping: "warn",
+  safe_stop: "warn",
+  fallen: "bad",
+  on_top: "safe",
+};
 const PHASE_COLOUR = { double_support: "stairline", swing: "camera", finished: "safe", stopped: "warn" };
 
 class Strip {
@@ -18,16 +25,25 @@ class Strip {
     this.canvas = h("canvas", { height });
     this.cursor = h("i.cursor");
     this.said = h("output", {});
-    this.element = h("div.strip", {}, h("span.name", {}, label), h("div.lane", {}, this.canvas, this.cursor), tail ?? h("span.tail", {}, this.said));
+    this.element = h(
+      "div.strip",
+      {},
+      h("span.name", {}, label),
+      h("div.lane", {}, this.canvas, this.cursor),
+      tail ?? h("span.tail", {}, this.said),
+    );
     const timeAt = (e) => part()[0] + (e.offsetX / this.canvas.clientWidth) * (part()[1] - part()[0]);
     this.canvas.addEventListener("click", (e) => player.seek(timeAt(e)));
     this.canvas.addEventListener("pointermove", (e) => (this.canvas.title = say(timeAt(e)) ?? ""));
     this.say_ = say;
     this.near = false; // nothing is drawn before it is scrolled near
-    new IntersectionObserver((seen) => {
-      this.near = seen.at(-1).isIntersecting;
-      this.paint();
-    }, { rootMargin: "300px" }).observe(this.canvas);
+    new IntersectionObserver(
+      (seen) => {
+        this.near = seen.at(-1).isIntersecting;
+        this.paint();
+      },
+      { rootMargin: "300px" },
+    ).observe(this.canvas);
     new ResizeObserver(() => this.paint()).observe(this.canvas);
     onTheme(() => this.paint());
     onZoom(() => this.paint());
@@ -83,7 +99,12 @@ function contactStrip(run, player) {
       });
     }
   };
-  return new Strip("contact L, R", player, 18, paint, (t) => contact.at(t).map((p, i) => `${"LR"[i]} ${number(100 * p, 0)} %`).join(", "));
+  return new Strip("contact L, R", player, 18, paint, (t) =>
+    contact
+      .at(t)
+      .map((p, i) => `${"LR"[i]} ${number(100 * p, 0)} %`)
+      .join(", "),
+  );
 }
 
 function eventStrip(label, events, colour, player) {
@@ -96,12 +117,20 @@ function eventStrip(label, events, colour, player) {
       context.fillRect(x(e.t_s) - 1, 0, Math.max(x(e.t_s + (e.duration_s ?? 0)) - x(e.t_s), 2), height);
     }
   };
-  const near = (t) => events.filter((e) => Math.abs(e.t_s - t) < Math.max((part()[1] - part()[0]) / 150, e.duration_s ?? 0));
-  return new Strip(label, player, 16, paint, (t) => near(t).map((e) => e.say ?? `${words(e.name)}${e.count > 1 ? ` ×${e.count}` : ""} at ${number(e.t_s, 2)} s`).join("; "));
+  const near = (t) =>
+    events.filter((e) => Math.abs(e.t_s - t) < Math.max((part()[1] - part()[0]) / 150, e.duration_s ?? 0));
+  return new Strip(label, player, 16, paint, (t) =>
+    near(t)
+      .map((e) => e.say ?? `${words(e.name)}${e.count > 1 ? ` ×${e.count}` : ""} at ${number(e.t_s, 2)} s`)
+      .join("; "),
+  );
 }
 
 export function stateStrips(run, player) {
-  const pushes = run.pushes.map((p) => ({ ...p, say: `${number(p.force_n[0], 0)}, ${number(p.force_n[1], 0)}, ${number(p.force_n[2], 0)} N for ${number(p.duration_s * 1e3, 0)} ms at ${number(p.t_s, 2)} s` }));
+  const pushes = run.pushes.map((p) => ({
+    ...p,
+    say: `${number(p.force_n[0], 0)}, ${number(p.force_n[1], 0)}, ${number(p.force_n[2], 0)} N for ${number(p.duration_s * 1e3, 0)} ms at ${number(p.t_s, 2)} s`,
+  }));
   const asked = run.operator.map(([t_s, name]) => ({ t_s, name }));
   return [
     run.states.length ? bandStrip("state", run.states, STATE_COLOUR, player) : null,
@@ -109,8 +138,18 @@ export function stateStrips(run, player) {
     contactStrip(run, player),
     eventStrip("operator", asked, "ink", player),
     eventStrip("pushes", pushes, "warn", player),
-    eventStrip("faults", run.events.filter((e) => e.kind === "fault"), "bad", player),
-    eventStrip("limits", run.events.filter((e) => e.kind === "limit"), "odometry", player),
+    eventStrip(
+      "faults",
+      run.events.filter((e) => e.kind === "fault"),
+      "bad",
+      player,
+    ),
+    eventStrip(
+      "limits",
+      run.events.filter((e) => e.kind === "limit"),
+      "odometry",
+      player,
+    ),
   ].filter(Boolean);
 }
 
@@ -119,13 +158,15 @@ export function costStrips(run, player) {
   const cost = run.series("cost");
   if (!cost?.count) return [];
   return costs(run).map(({ row, most, share, t_s }, k) => {
-    const column = cost.columns[k], budget = row.budget_instructions;
+    const column = cost.columns[k],
+      budget = row.budget_instructions;
     const paint = (context, x, width, height) => {
       context.fillStyle = faded(colours.stairline, 0.15);
       context.fillRect(0, 0, width, height);
       const peak = new Float64Array(Math.ceil(width) + 1);
       for (let i = 0; i < cost.count; ++i) {
-        const px = Math.floor(x(cost.t_s[i])), used = column[i] / budget;
+        const px = Math.floor(x(cost.t_s[i])),
+          used = column[i] / budget;
         if (used > peak[px]) peak[px] = used;
       }
       peak.forEach((used, px) => {
@@ -134,10 +175,29 @@ export function costStrips(run, player) {
         context.fillRect(px, height - high, 1, high);
       });
     };
-    const tail = h("span.tail", {}, isNumber(share) ? [h(share > 1 ? "b.bad" : "b", {}, number(100 * share, 0, "%")), ` of ${number(budget / 1e3, budget < 1e4 ? 1 : 0)} k `, moment(player, t_s)] : isNumber(most) ? `${number(most / 1e3, 1)} k, no budget` : "not counted");
-    return new Strip(row.task, player, 20, paint, (t) => {
-      const value = cost.at(t)[k];
-      return Number.isFinite(value) ? `${number(value / 1e3, 1)} k of ${number(budget / 1e3, 1)} k instructions` : "";
-    }, tail);
+    const tail = h(
+      "span.tail",
+      {},
+      isNumber(share)
+        ? [
+            h(share > 1 ? "b.bad" : "b", {}, number(100 * share, 0, "%")),
+            ` of ${number(budget / 1e3, budget < 1e4 ? 1 : 0)} k `,
+            moment(player, t_s),
+          ]
+        : isNumber(most)
+          ? `${number(most / 1e3, 1)} k, no budget`
+          : "not counted",
+    );
+    return new Strip(
+      row.task,
+      player,
+      20,
+      paint,
+      (t) => {
+        const value = cost.at(t)[k];
+        return Number.isFinite(value) ? `${number(value / 1e3, 1)} k of ${number(budget / 1e3, 1)} k instructions` : "";
+      },
+      tail,
+    );
   });
 }

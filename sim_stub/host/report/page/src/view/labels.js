@@ -7,12 +7,19 @@ export class Labels {
   constructor(host, run) {
     this.run = run;
     this.host = host;
-    this.tags = Object.fromEntries([["p_star", "p*"], ["p_star_star", "p**"], ["target", ""]].map(([name, text]) => [name, h(`span.tag.${name}`, {}, text)]));
+    this.tags = Object.fromEntries(
+      [
+        ["p_star", "p*"],
+        ["p_star_star", "p**"],
+        ["target", ""],
+      ].map(([name, text]) => [name, h(`span.tag.${name}`, {}, text)]),
+    );
     host.append(...Object.values(this.tags));
   }
 
   place(eye, t_s) {
-    const search = this.run.newest("searches", t_s), swing = this.run.swingAt(t_s);
+    const search = this.run.newest("searches", t_s),
+      swing = this.run.swingAt(t_s);
     const middle = (feet) => {
       const places = (feet ?? []).filter(Boolean).map((f) => f.position_m);
       return places.length ? [0, 1, 2].map((k) => places.reduce((sum, p) => sum + p[k], 0) / places.length) : null;
@@ -27,6 +34,7 @@ export class Labels {
     const at = place ? new Vector3(...place).project(eye) : null;
     const seen = at && Math.abs(at.x) < 0.98 && Math.abs(at.y) < 0.98 && at.z < 1;
     tag.hidden = !seen;
-    if (seen) tag.style.transform = `translate(${((at.x + 1) / 2) * this.host.clientWidth}px, ${((1 - at.y) / 2) * this.host.clientHeight}px) translate(-50%, ${tag === this.tags.target ? "90%" : "-190%"})`;
+    if (seen)
+      tag.style.transform = `translate(${((at.x + 1) / 2) * this.host.clientWidth}px, ${((1 - at.y) / 2) * this.host.clientHeight}px) translate(-50%, ${tag === this.tags.target ? "90%" : "-190%"})`;
   }
 }

@@ -38,7 +38,8 @@ export class Map3d {
   }
 
   resize(width, height) {
-    for (const material of [this.edge, this.unknown, this.nosing, this.safeEdge]) material.resolution.set(width, height);
+    for (const material of [this.edge, this.unknown, this.nosing, this.safeEdge])
+      material.resolution.set(width, height);
   }
 
   show(t_s) {
@@ -55,7 +56,8 @@ export class Map3d {
     const object = new Group();
     object.add(sheetMesh(corners, version.kind === "riser" ? this.riser : this.tread, 1));
     const edges = outline(corners);
-    const known = edges.filter((_, i) => version.observed?.[i] !== 0), open = edges.filter((_, i) => version.observed?.[i] === 0);
+    const known = edges.filter((_, i) => version.observed?.[i] !== 0),
+      open = edges.filter((_, i) => version.observed?.[i] === 0);
     if (known.length) object.add(segments(known, this.edge));
     if (open.length) {
       const dashed = segments(open, this.unknown);

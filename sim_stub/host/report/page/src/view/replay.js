@@ -14,7 +14,8 @@ export function replayView(stage, run, other) {
   const asked = new URLSearchParams(location.search).has("svg");
   const canvas = h("canvas");
   const context = asked ? null : canvas.getContext("webgl2", { antialias: true, powerPreference: "low-power" });
-  if (!context) return new SideView(host, run, asked ? null : "This browser has no WebGL: the climb is drawn from the right.");
+  if (!context)
+    return new SideView(host, run, asked ? null : "This browser has no WebGL: the climb is drawn from the right.");
   host.append(canvas);
   return new Scene3d(host, canvas, context, run, other);
 }

@@ -18,7 +18,9 @@ export class Robot3d {
     this.links = [];
     this.feet = FEET.map(() => new Group());
     this.torso = new Group();
-    this.ghosts = FEET.map(() => segments(outline(soleCorners(run.robot?.sole?.contact_m ?? [0.17, -0.07, 0.048])), this.ghost));
+    this.ghosts = FEET.map(() =>
+      segments(outline(soleCorners(run.robot?.sole?.contact_m ?? [0.17, -0.07, 0.048])), this.ghost),
+    );
     this.group.add(...this.feet, this.torso, ...this.ghosts);
     for (const shape of run.robot?.shapes ?? []) this.add(run.robot, shape);
     this.addSketch(run.robot);
@@ -49,8 +51,14 @@ export class Robot3d {
       this.torso.add(boxMesh([0.06, 0.1, 0.05], this.sketch));
       return;
     }
-    this.torso.add(capsuleMesh(hips[0], hips[1], 0.05, this.sketch), capsuleMesh([-0.015, 0, 0.06], [-0.02, 0, 0.3], 0.07, this.sketch));
-    this.torso.add(capsuleMesh([-0.02, 0.13, 0.36], [-0.02, -0.13, 0.36], 0.06, this.sketch), capsuleMesh([0, 0, 0.53], [0.005, 0, 0.57], 0.06, this.sketch));
+    this.torso.add(
+      capsuleMesh(hips[0], hips[1], 0.05, this.sketch),
+      capsuleMesh([-0.015, 0, 0.06], [-0.02, 0, 0.3], 0.07, this.sketch),
+    );
+    this.torso.add(
+      capsuleMesh([-0.02, 0.13, 0.36], [-0.02, -0.13, 0.36], 0.06, this.sketch),
+      capsuleMesh([0, 0, 0.53], [0.005, 0, 0.57], 0.06, this.sketch),
+    );
     for (const hip of hips) this.torso.add(capsuleMesh(hip, [hip[0], hip[1], hip[2] - 0.1287], 0.05, this.sketch));
   }
 
@@ -72,4 +80,3 @@ export class Robot3d {
     this.ghosts.forEach((group, i) => put(group, this.other ? null : now.estimated[i]));
   }
 }
-

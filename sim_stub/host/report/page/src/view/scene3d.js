@@ -35,7 +35,10 @@ export class Scene3d {
     // The wheel moves the page until the scene is taken hold of.
     this.controls.enableZoom = false;
     canvas.addEventListener("pointerdown", () => (this.controls.enableZoom = true));
-    canvas.addEventListener("pointerleave", (e) => e.pointerType === "mouse" && !e.buttons && (this.controls.enableZoom = false));
+    canvas.addEventListener(
+      "pointerleave",
+      (e) => e.pointerType === "mouse" && !e.buttons && (this.controls.enableZoom = false),
+    );
     this.sky = new HemisphereLight(0xffffff, 0x9aa4ad, 2.2);
     this.sky.position.set(0, 0, 1);
     const sun = new DirectionalLight(0xffffff, 1.5);

@@ -1,7 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the parts of the scene are made of.
 import {
-  BoxGeometry, BufferGeometry, CapsuleGeometry, DoubleSide, Float32BufferAttribute, Mesh, MeshBasicMaterial, MeshLambertMaterial, Quaternion, Vector3,
+  BoxGeometry,
+  BufferGeometry,
+  CapsuleGeometry,
+  DoubleSide,
+  Float32BufferAttribute,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  Quaternion,
+  Vector3,
 } from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
@@ -11,7 +20,15 @@ export const solid = (options) => new MeshLambertMaterial(options);
 
 /** A flat sheet of one colour that is seen through and lies just above what it lies on. */
 export function sheet(opacity, layer) {
-  return new MeshBasicMaterial({ side: DoubleSide, transparent: opacity < 1, opacity, depthWrite: false, polygonOffset: true, polygonOffsetFactor: -layer, polygonOffsetUnits: -4 * layer });
+  return new MeshBasicMaterial({
+    side: DoubleSide,
+    transparent: opacity < 1,
+    opacity,
+    depthWrite: false,
+    polygonOffset: true,
+    polygonOffsetFactor: -layer,
+    polygonOffsetUnits: -4 * layer,
+  });
 }
 
 /** A sheet's mesh; those of a higher layer are painted over the others. */
@@ -50,7 +67,8 @@ export function boxMesh(half, material) {
 }
 
 export function capsuleMesh(a, b, radius, material) {
-  const from = new Vector3(...a), to = new Vector3(...b);
+  const from = new Vector3(...a),
+    to = new Vector3(...b);
   const mesh = new Mesh(new CapsuleGeometry(radius, from.distanceTo(to), 6, 20), material);
   mesh.position.copy(from).add(to).multiplyScalar(0.5);
   mesh.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), to.sub(from).normalize());

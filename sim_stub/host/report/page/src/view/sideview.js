@@ -9,12 +9,17 @@ import { points } from "./points.js";
 const WIDTH_m = 2.6; // shown at once
 const MOST = 600; // points of a trail
 
-const path = (corners, close) => corners.map(([x, , z], i) => `${i ? "L" : "M"}${x.toFixed(4)} ${(-z).toFixed(4)}`).join("") + (close ? "Z" : "");
+const path = (corners, close) =>
+  corners.map(([x, , z], i) => `${i ? "L" : "M"}${x.toFixed(4)} ${(-z).toFixed(4)}`).join("") + (close ? "Z" : "");
 
 export class SideView {
   constructor(host, run, why) {
     this.run = run;
-    this.drawing = svg("svg.side", { role: "img", "aria-label": "The climb from the right", preserveAspectRatio: "xMidYMid slice" });
+    this.drawing = svg("svg.side", {
+      role: "img",
+      "aria-label": "The climb from the right",
+      preserveAspectRatio: "xMidYMid slice",
+    });
     this.groups = {};
     for (const name of ["floor", "stairs", "map", "safe", "trails", "footholds", "legs", "camera"]) {
       this.groups[name] = svg(`g.${name}`);
@@ -23,21 +28,31 @@ export class SideView {
     host.append(this.drawing);
     if (why) host.append(h("p.note", {}, why));
     this.groups.floor.append(svg("line", { x1: -20, x2: 20, y1: 0, y2: 0 }));
-    for (const box of run.stairs?.boxes ?? []) this.groups.stairs.append(svg("path", { d: path(this.boxFront(box), true) }));
-    this.trails = FEET.concat("base").map((name) => this.trailOf(name)).filter(Boolean);
+    for (const box of run.stairs?.boxes ?? [])
+      this.groups.stairs.append(svg("path", { d: path(this.boxFront(box), true) }));
+    this.trails = FEET.concat("base")
+      .map((name) => this.trailOf(name))
+      .filter(Boolean);
     new ResizeObserver(() => this.t_s !== undefined && this.show(this.t_s)).observe(host);
   }
 
   boxFront(box) {
-    const pose = poseOf(box.pose), [a, , c] = box.half_m;
-    return [[-a, 0, -c], [a, 0, -c], [a, 0, c], [-a, 0, c]].map((v) => placed(pose, v));
+    const pose = poseOf(box.pose),
+      [a, , c] = box.half_m;
+    return [
+      [-a, 0, -c],
+      [a, 0, -c],
+      [a, 0, c],
+      [-a, 0, c],
+    ].map((v) => placed(pose, v));
   }
 
   trailOf(name) {
     const series = name === "base" ? this.run.base : this.run.sole(name);
     if (!series?.count) return null;
     const every = Math.max(1, Math.floor(series.count / MOST));
-    const places = [], t_s = [];
+    const places = [],
+      t_s = [];
     for (let i = 0; i < series.count; i += every) {
       const row = series.row(i);
       if (!Number.isFinite(row[0])) continue;
@@ -51,18 +66,25 @@ export class SideView {
 
   show(t_s) {
     this.t_s = t_s;
-    const run = this.run, now = robotAt(run, t_s);
+    const run = this.run,
+      now = robotAt(run, t_s);
     const middle = now.base?.p ?? [0, 0, 0.8];
     const ratio = this.drawing.clientHeight / Math.max(this.drawing.clientWidth, 1) || 0.6;
-    const height = Math.max(WIDTH_m * ratio, 1.9), width = Math.max(WIDTH_m, height / ratio);
-    this.drawing.setAttribute("viewBox", `${middle[0] - width * 0.45} ${-(middle[2] + height * 0.42)} ${width} ${height}`);
+    const height = Math.max(WIDTH_m * ratio, 1.9),
+      width = Math.max(WIDTH_m, height / ratio);
+    this.drawing.setAttribute(
+      "viewBox",
+      `${middle[0] - width * 0.45} ${-(middle[2] + height * 0.42)} ${width} ${height}`,
+    );
     for (const trail of this.trails) {
       const count = indexAt(trail.t_s, t_s) + 1;
       trail.element.setAttribute("d", count > 1 ? path(trail.places.slice(0, count)) : "");
     }
     this.groups.map.replaceChildren(...run.polygonsAt(t_s).flatMap((p) => this.polygon(p)));
     const search = run.newest("searches", t_s);
-    this.groups.safe.replaceChildren(...(search?.safe ?? []).map((region) => svg("path", { d: path(points(region.vertices), true) })));
+    this.groups.safe.replaceChildren(
+      ...(search?.safe ?? []).map((region) => svg("path", { d: path(points(region.vertices), true) })),
+    );
     this.groups.footholds.replaceChildren(...this.footholds(search, t_s));
     this.groups.legs.replaceChildren(...this.legs(now));
     this.groups.camera.replaceChildren(...this.frustum(now));
@@ -79,9 +101,20 @@ export class SideView {
 
   footholds(search, t_s) {
     const sole = this.run.robot?.sole?.contact_m ?? [0.17, -0.07, 0.048];
-    const mark = (p, yaw, name) => svg(`path.${name}`, { d: path([[sole[1], 0, 0.004], [sole[0], 0, 0.004]].map((v) => placed({ p, q: aboutZ(yaw) }, v))) });
+    const mark = (p, yaw, name) =>
+      svg(`path.${name}`, {
+        d: path(
+          [
+            [sole[1], 0, 0.004],
+            [sole[0], 0, 0.004],
+          ].map((v) => placed({ p, q: aboutZ(yaw) }, v)),
+        ),
+      });
     const out = [];
-    for (const [name, css] of [["p_star_star", "pstarstar"], ["p_star", "pstar"]]) {
+    for (const [name, css] of [
+      ["p_star_star", "pstarstar"],
+      ["p_star", "pstar"],
+    ]) {
       for (const place of search?.[name] ?? []) if (place) out.push(mark(place.position_m, place.yaw_rad, css));
     }
     const target = this.run.swingAt(t_s)?.target_m;
@@ -93,16 +126,39 @@ export class SideView {
     const out = [];
     for (const shape of this.run.robot?.shapes ?? []) {
       const right = (shape.sole ?? this.run.robot.joints[shape.joint]?.name ?? "").startsWith("right");
-      const pose = shape.sole ? now.soles[FEET.indexOf(shape.sole)] : (now.links[shape.joint] ?? (shape.joint < 0 ? now.base : null));
+      const pose = shape.sole
+        ? now.soles[FEET.indexOf(shape.sole)]
+        : (now.links[shape.joint] ?? (shape.joint < 0 ? now.base : null));
       if (!pose) continue;
       const css = right ? "right" : "left";
       let element;
-      if (shape.type === "capsule") element = svg(`path.limb.${css}`, { d: path([shape.a_m, shape.b_m].map((v) => placed(pose, v))), "stroke-width": 2 * shape.radius_m });
-      else element = svg(`path.foot.${css}`, { d: path(this.boxFront({ pose: [...shape.centre_m, 0, 0, 0, 1], half_m: shape.half_m }).map((v) => placed(pose, v)), true) });
+      if (shape.type === "capsule")
+        element = svg(`path.limb.${css}`, {
+          d: path([shape.a_m, shape.b_m].map((v) => placed(pose, v))),
+          "stroke-width": 2 * shape.radius_m,
+        });
+      else
+        element = svg(`path.foot.${css}`, {
+          d: path(
+            this.boxFront({ pose: [...shape.centre_m, 0, 0, 0, 1], half_m: shape.half_m }).map((v) => placed(pose, v)),
+            true,
+          ),
+        });
       if (right) out.push(element);
       else out.unshift(element); // the left leg is behind
     }
-    if (now.base) out.unshift(svg("path.limb.sketch", { d: path([[0, 0, -0.05], [-0.01, 0, 0.34]].map((v) => placed(now.base, v))), "stroke-width": 0.15 }));
+    if (now.base)
+      out.unshift(
+        svg("path.limb.sketch", {
+          d: path(
+            [
+              [0, 0, -0.05],
+              [-0.01, 0, 0.34],
+            ].map((v) => placed(now.base, v)),
+          ),
+          "stroke-width": 0.15,
+        }),
+      );
     return out;
   }
 

@@ -12,7 +12,8 @@ const FAR_m = 0.9; // to which the frustum is drawn
 function trailOf(series) {
   if (!series?.count) return null;
   const every = Math.max(1, Math.floor(series.count / MOST));
-  const t_s = [], pairs = [];
+  const t_s = [],
+    pairs = [];
   let last = null;
   for (let i = 0; i < series.count; i += every) {
     const p = [series.columns[0][i], series.columns[1][i], series.columns[2][i]];
@@ -32,9 +33,18 @@ function trailOf(series) {
 export class Trails3d {
   constructor(run) {
     this.group = new Group();
-    this.materials = { base: line(1.5), left: line(2.2), right: line(2.2), camera: line(1.2, { transparent: true, opacity: 0.8 }) };
+    this.materials = {
+      base: line(1.5),
+      left: line(2.2),
+      right: line(2.2),
+      camera: line(1.2, { transparent: true, opacity: 0.8 }),
+    };
     this.trails = [];
-    for (const [name, series] of [["base", run.base], ["left", run.sole("left")], ["right", run.sole("right")]]) {
+    for (const [name, series] of [
+      ["base", run.base],
+      ["left", run.sole("left")],
+      ["right", run.sole("right")],
+    ]) {
       const trail = trailOf(series);
       if (!trail) continue;
       trail.object = segments(trail.pairs, this.materials[name]);
@@ -65,7 +75,10 @@ export class Trails3d {
     const { width_px, height_px, fx_px, fy_px, cx_px, cy_px } = this.camera;
     const corner = (u, v) => placed(pose, [((u - cx_px) / fx_px) * FAR_m, ((v - cy_px) / fy_px) * FAR_m, FAR_m]);
     const corners = [corner(0, 0), corner(width_px, 0), corner(width_px, height_px), corner(0, height_px)];
-    return corners.flatMap((c, i) => [[pose.p, c], [c, corners[(i + 1) % 4]]]);
+    return corners.flatMap((c, i) => [
+      [pose.p, c],
+      [c, corners[(i + 1) % 4]],
+    ]);
   }
 
   show(t_s, now) {
