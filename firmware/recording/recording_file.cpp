@@ -5,6 +5,7 @@
 #include <array>
 #include <utility>
 
+#include "firmware/config/param_table.hpp"
 #include "firmware/recording/recording_header.hpp"
 
 namespace polygmap::recording {
@@ -90,7 +91,7 @@ RecordingFile::Found RecordingFile::next_message() {
 RecordingFile::Found RecordingFile::take(const mcap::MessageRead& message, Topic topic) {
   if (topic == Topic::kParameters) {
     if (parser_ != nullptr) return Found::kRecord;
-    return read_header(message.data) ? Found::kRecord : Found::kBad;
+    return read_header(message) ? Found::kRecord : Found::kBad;
   }
   if (parser_ == nullptr) {
     (void)complain("a message of " + std::string(name_of(topic)) + " before the parameters");
@@ -100,8 +101,11 @@ RecordingFile::Found RecordingFile::take(const mcap::MessageRead& message, Topic
     extras_.push_back({topic, message.log_ns, {message.data.begin(), message.data.end()}});
   } else if (topic == Topic::kDepth) {
     picture_.assign(message.data.begin(), message.data.end());
+  } else if (topic == Topic::kCameraInfo) {
+    camera_info_.assign(message.data.begin(), message.data.end());
+    camera_info_ns_ = message.log_ns;
   } else if (topic != Topic::kReplay) {
-    if (topic != Topic::kCameraInfo) compare(message, topic);
+    compare(message, topic);
   } else {
     if (!expected_.messages.empty()) {
       const Expected& missing = expected_.messages.front();
@@ -135,6 +139,9 @@ void RecordingFile::compare(const mcap::MessageRead& message, Topic topic) {
   if (expected.topic != topic) {
     return contradict(expected.topic, expected.log_ns, "its message is missing");
   }
+  if (expected.log_ns != message.log_ns || expected.publish_ns != message.publish_ns) {
+    return contradict(topic, expected.log_ns, "its times are not those of the records");
+  }
   const auto& recorded = expected.message;
   const auto [here, there] = std::ranges::mismatch(recorded, message.data);
   if (here == recorded.end() && there == message.data.end()) return;
@@ -156,6 +163,9 @@ bool RecordingFile::read_picture(const DepthFrameView& frame, const Picture& pic
     const std::span<const std::byte> bytes = topics_.image_head(frame);
     return std::vector<std::byte>(bytes.begin(), bytes.end());
   }();
+  if (!std::ranges::equal(topics_.camera_info(camera_, frame.stamp_ns), camera_info_)) {
+    contradict(Topic::kCameraInfo, camera_info_ns_, "it is not the camera of the parameters");
+  }
   const auto count = static_cast<std::size_t>(frame.width_px) * static_cast<std::size_t>(frame.height_px);
   const std::string which = "picture " + std::to_string(picture.index) + " of /depth ";
   if (picture_.size() != head.size() + count * sizeof(std::uint16_t)) return complain(which + "is missing");
@@ -184,12 +194,13 @@ RecordingFile::Found RecordingFile::read(Record& record) {
   return Found::kRecord;
 }
 
-bool RecordingFile::read_header(std::span<const std::byte> message) {
-  CdrReader in(message);
-  (void)in.get_text();
-  for (int list = 0; list < 2; ++list) {
+bool RecordingFile::read_header(const mcap::MessageRead& message) {
+  CdrReader in(message.data);
+  const std::string_view hash = in.get_text();
+  std::array<std::vector<std::string_view>, 2> lists;  // names, values
+  for (auto& list : lists) {
     const std::size_t count = in.get_count(1);
-    for (std::size_t i = 0; i < count && !in.failed(); ++i) (void)in.get_text();
+    for (std::size_t i = 0; i < count && !in.failed(); ++i) list.push_back(in.get_text());
   }
   const std::span<const std::byte> header = in.get_bytes();
   if (in.failed()) return complain("parameters that cannot be");
@@ -199,6 +210,16 @@ bool RecordingFile::read_header(std::span<const std::byte> message) {
   camera_ = read.camera;
   rows_ = read.rows;
   parser_ = std::make_unique<RecordParser>(camera_, rows_);
+  // What people read of them is what a replay has, in whatever order.
+  const config::ParamTable table = config::param_table(read.params);
+  const auto& [names, values] = lists;
+  bool is_same = hash == config::hash_of(table) && names.size() == table.params.size() && values.size() == names.size();
+  for (std::size_t i = 0; is_same && i < names.size(); ++i) {
+    auto param = table.params.begin() + static_cast<std::ptrdiff_t>(i);
+    if (param->name != names[i]) param = std::ranges::find(table.params, names[i], &config::Param::name);
+    is_same = param != table.params.end() && config::text_of(*param) == values[i];
+  }
+  if (!is_same) contradict(Topic::kParameters, message.log_ns, "its texts are not those of its header");
   return true;
 }
 

@@ -59,13 +59,14 @@ class RecordingFile {
  private:
   struct Expected {
     Topic topic;
-    std::int64_t log_ns = 0;
+    std::int64_t log_ns = 0, publish_ns = 0;
     std::vector<std::byte> message;
   };
   struct Collector final : MessageSink {
     std::deque<Expected> messages;
-    void take(Topic topic, std::int64_t log_ns, std::int64_t, std::span<const std::byte> message) noexcept override {
-      messages.push_back({topic, log_ns, {message.begin(), message.end()}});
+    void take(Topic topic, std::int64_t log_ns, std::int64_t publish_ns,
+              std::span<const std::byte> message) noexcept override {
+      messages.push_back({topic, log_ns, publish_ns, {message.begin(), message.end()}});
     }
   };
 
@@ -75,7 +76,7 @@ class RecordingFile {
   [[nodiscard]] Found take(const mcap::MessageRead& message, Topic topic);
   void compare(const mcap::MessageRead& message, Topic topic);
   void contradict(Topic topic, std::int64_t log_ns, const std::string& what);
-  [[nodiscard]] bool read_header(std::span<const std::byte> message);
+  [[nodiscard]] bool read_header(const mcap::MessageRead& message);
 
   mcap::McapReader::Decompress decompress_;
   std::unique_ptr<mcap::McapReader> reader_;
@@ -90,7 +91,8 @@ class RecordingFile {
   ByteReader frame_;
   Topics topics_;
   Collector expected_;
-  std::vector<std::byte> picture_;  // the newest message of /depth
+  std::vector<std::byte> picture_, camera_info_;  // the newest messages of /depth and /camera_info
+  std::int64_t camera_info_ns_ = 0;
   std::vector<std::uint16_t> pixels_;
   std::vector<Extra> extras_;
 };

@@ -292,6 +292,7 @@ class Replay {
     FieldComparer comparer(outputs, &last_health_[lane]);
     comparer.compare("progress", -1, row.progress, static_cast<std::uint8_t>(progress));
     comparer.compare("units_left", -1, row.units_left, budget.left());
+    compare_view(comparer, row, lane == kControlLane ? module_->control().view() : module_->perception().view());
     // What a row leaves depends on how it ended: the recorded outputs are those of the recorded end.
     const bool ended_alike = row.progress == static_cast<std::uint8_t>(progress);
     if (ended_alike) walk_outputs(comparer, *module_, row.row, row.cycle_ns, progress);
@@ -301,6 +302,17 @@ class Replay {
     if (difference.empty()) difference = comparer.difference();
     if (!difference.empty()) note_difference(row, difference);
     return true;
+  }
+
+  // What the lane saw of the other one: of the frame's first row it was an input.
+  static void compare_view(FieldComparer& comparer, const RowCall& row, const LaneView& view) {
+    comparer.compare("other_finished_ns", -1, row.other_finished_ns, view.other_finished_ns());
+    comparer.compare("taken", -1, row.taken.size(), view.taken().size());
+    for (std::size_t i = 0; i < std::min(row.taken.size(), view.taken().size()); ++i) {
+      const int index = static_cast<int>(i);
+      comparer.compare("taken.frame_ns", index, row.taken[i].frame_ns, view.taken()[i].frame_ns);
+      comparer.compare("taken.missed", index, row.taken[i].missed, view.taken()[i].missed);
+    }
   }
 
   // A frame that saw one that was lost is written before the other lane's next one, which says so.

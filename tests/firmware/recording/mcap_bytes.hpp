@@ -85,7 +85,7 @@ inline std::vector<MessagePlace> messages_of(std::span<const std::byte> file) {
   return messages;
 }
 
-inline void flip_bit(Bytes& file, std::size_t byte, unsigned bit) { file[byte] ^= std::byte{1} << (bit % 8); }
+inline void flip_bit(Bytes& file, std::size_t byte, std::uint64_t bit) { file[byte] ^= std::byte{1} << (bit % 8); }
 // So that the chunk looks whole.
 inline void repair_crc(Bytes& file, std::size_t chunk) {
   const auto size = number_at<std::uint64_t>(file, chunk + 32);

@@ -29,12 +29,12 @@ constexpr int kQuarterSecond = 125, kSecond = 500;  // ticks
 std::uint32_t times_lost(const Pipeline& module) { return module.health().count(Limit::kRecordingLost).count; }
 
 // What the file says of the frames that are not in it, and how many cycles of control are in it behind the gap.
-struct Told {
+struct Gap {
   std::array<std::uint64_t, kLaneCount> lost{};
   std::uint64_t cycles_before = 0, cycles_after = 0;
 };
-Told told_by(const std::string& path) {
-  Told told;
+Gap gap_in(const std::string& path) {
+  Gap told;
   RecordingFile file;
   EXPECT_TRUE(file.open(path)) << file.complaint();
   const auto record = std::make_unique<Record>();
@@ -67,7 +67,7 @@ TEST(Recorder, QueueThatIsFull_FramesAreCountedAndLaterOnesRecorded) {
   EXPECT_FALSE(run.recorder->failed());
   EXPECT_EQ(run.robot.camera.still_kept(), 0);
 
-  const Told told = told_by(folder.file());
+  const Gap told = gap_in(folder.file());
   EXPECT_EQ(told.lost[kControlLane] + told.lost[kPerceptionLane], lost);
   EXPECT_GT(told.lost[kControlLane], 100U);
   EXPECT_GE(told.cycles_before, 100U + kQuarterSecond);
