@@ -89,6 +89,7 @@ Recorder::~Recorder() {
 
 void Recorder::begin(const std::string& path, const Params& params, std::uint64_t run) {
   const CameraIntrinsics camera = robot_.camera.intrinsics();
+  topics_.set_camera(params.robot.mounts.base_T_camera);
   if (!writer_.open(path, channels(), run)) return fail();
   std::vector<std::byte> memory(kHeaderMemory_bytes), message_memory(2 * kHeaderMemory_bytes);
   ByteWriter header(memory);

@@ -208,6 +208,7 @@ bool RecordingFile::read_header(const mcap::MessageRead& message) {
   if (const std::string wrong = read_recording_header(header, read); !wrong.empty()) return complain(wrong);
   params_ = read.params;
   camera_ = read.camera;
+  topics_.set_camera(params_.robot.mounts.base_T_camera);
   rows_ = read.rows;
   parser_ = std::make_unique<RecordParser>(camera_, rows_);
   // What people read of them is what a replay has, in whatever order.

@@ -271,13 +271,16 @@ void Topics::write_odometry() noexcept {
 
 void Topics::write_transforms() noexcept {
   out_.begin();
-  out_.put_count(2);
+  out_.put_count(3);
   put_header(out_, state_.stamp_ns, "world");
   out_.put_text("odom");
   put_pose(out_, state_.world_T_odom);
   put_header(out_, state_.stamp_ns, "odom");
   out_.put_text("base");
   put_pose(out_, state_.odom_T_base);
+  put_header(out_, state_.stamp_ns, "base");
+  out_.put_text("camera");
+  put_pose(out_, base_T_camera_);
 }
 
 void Topics::write_gait() noexcept {

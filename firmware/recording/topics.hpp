@@ -26,6 +26,8 @@ class MessageSink {
 
 class Topics {
  public:
+  // Where the camera sits, by the parameters: before the first record.
+  void set_camera(const Transform& base_T_camera) noexcept { base_T_camera_ = base_T_camera; }
   // The messages of a record, in a fixed order. log_ns: of the frame that has it. Pictures are not among them.
   void write(const Record& record, MessageSink& sink) noexcept;
   // Before each picture: an Image up to its pixels, whose bytes follow.
@@ -58,6 +60,7 @@ class Topics {
   static constexpr std::size_t kMemory_bytes = 192U * 1024U;
   std::array<std::byte, kMemory_bytes> memory_;
   mcap::CdrWriter out_{memory_};
+  Transform base_T_camera_;
   std::int64_t log_ns_ = 0;
   std::uint32_t too_long_ = 0;
   StateEstimate state_;
