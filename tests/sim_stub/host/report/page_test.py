@@ -33,10 +33,14 @@ class Pages:
 
     def path(self, variant):
         file = self.folder / f"{variant}.html"
-        if not file.exists():
-            text = sample_report.page_of(self.template, sample_report.data_of(variant))
-            fill = re.sub(r"@FILL (\d+)@", lambda m: "." * int(m[1]), self.inject)
-            file.write_text(text.replace("</body>", fill + "</body>"))
+        return file if file.exists() else self.raw(variant, sample_report.text_of(sample_report.data_of(variant)))
+
+    def raw(self, name, data):
+        """The page with that text in it."""
+        file = self.folder / f"{name}.html"
+        text = self.template.replace("@POLYGMAP_DATA@", data)
+        fill = re.sub(r"@FILL (\d+)@", lambda m: "." * int(m[1]), self.inject)
+        file.write_text(text.replace("</body>", fill + "</body>"))
         return file
 
 
@@ -179,6 +183,23 @@ def MissingParts_Opened_AreNamed(browser, pages):
     check("no run" in page.run("document.body.innerText"), "a report without a run does not say so")
     page.close()
     return f"{said} parts"
+
+
+@test
+def BrokenData_Opened_SayWhatIsWrong(browser, pages):
+    """One sentence in the page, and no more than that."""
+    good = sample_report.text_of(sample_report.data_of("full"))
+    cases = {"cut": (good[:5000], "cannot be read"), "stranger": ('{"format":"other"}', "not a PolygMap report"),
+             "newer": (good.replace('"version":1', '"version":2'), "version 2"), "short": (re.sub(r'"count":(\d+)', lambda m: f'"count":{int(m[1]) + 1}', good, count=1), "bytes and not"),
+             "packed": (re.sub(r'("zlib":true,"data":")....', r"\1AAAA", good, count=1), "cannot be read"),
+             "clock": (good.replace('"clock":"motion"', '"clock":"gone"'), 'the clock "gone"')}
+    for name, (text, said) in cases.items():
+        check(name in ("cut", "stranger") or text != good, f"{name}: the data were not broken, so this proves nothing")
+        page = browser.open(pages.raw(name, text))
+        check(said in page.run("document.body.innerText"), f"{name}: the page does not say what is wrong")
+        check(not page.complaints(), f"{name}: the console has: {page.complaints()}")
+        page.close()
+    return f"{len(cases)} kinds"
 
 
 @test

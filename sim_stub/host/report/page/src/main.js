@@ -91,17 +91,17 @@ function state(run, t_s) {
 }
 
 async function main() {
-  let runs;
+  let runs, page;
   try {
     runs = parse(document.getElementById("polygmap-data").textContent);
     if (!runs.length) return say("This report has no run in it.");
+    runs = runs.slice(0, 2);
     await Promise.all(runs.map((run) => run.load()));
+    for (const run of runs) run.failure = failureOf(run);
+    page = build(runs);
   } catch (error) {
     return say(`This report cannot be read: ${error.message}.`);
   }
-  runs = runs.slice(0, 2);
-  for (const run of runs) run.failure = failureOf(run);
-  const page = build(runs);
   window.polygmap = {
     duration_s: page.player.duration_s,
     /** Shows that moment; what it promises is kept when all of the page does. */

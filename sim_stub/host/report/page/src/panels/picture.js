@@ -16,7 +16,10 @@ export class Pictures {
 
   async get(picture) {
     if (!this.decoded.has(picture)) {
-      this.decoded.set(picture, this.decode(picture));
+      this.decoded.set(
+        picture,
+        this.decode(picture).catch(() => null),
+      ); // null: it cannot be read
       if (this.decoded.size > KEPT) this.decoded.delete(this.decoded.keys().next().value);
     }
     return this.decoded.get(picture);
@@ -75,6 +78,10 @@ export class PicturePanel {
     this.picture = picture;
     const pixels = await this.pictures.get(picture);
     if (picture !== this.picture) return; // another was asked for meanwhile
+    if (!pixels) {
+      this.said.textContent = `The picture of ${seconds(picture.t_s)} cannot be read.`;
+      return;
+    }
     this.pixels = pixels;
     this.image = this.coloured(pixels);
     this.paint();

@@ -40,7 +40,8 @@ export class TopView {
     const picture = this.run.camera ? this.run.newest("pictures", t_s) : null;
     if (picture !== this.picture) {
       this.picture = picture;
-      const raster = picture ? this.rasterOf(picture, await this.pictures.get(picture)) : null;
+      const pixels = picture ? await this.pictures.get(picture) : null;
+      const raster = pixels ? this.rasterOf(picture, pixels) : null;
       if (picture !== this.picture) return;
       this.raster = raster;
     }

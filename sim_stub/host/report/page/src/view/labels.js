@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Names over the scene: the next footholds, and where the foot in the air lands.
 import { Vector3 } from "three";
-import { h } from "../core/dom.js";
+import { h, number } from "../core/dom.js";
+import { pushAt } from "./push3d.js";
 
 export class Labels {
   constructor(host, run) {
@@ -12,6 +13,7 @@ export class Labels {
         ["p_star", "p*"],
         ["p_star_star", "p**"],
         ["target", ""],
+        ["push", ""],
       ].map(([name, text]) => [name, h(`span.tag.${name}`, {}, text)]),
     );
     host.append(...Object.values(this.tags));
@@ -24,7 +26,11 @@ export class Labels {
       const places = (feet ?? []).filter(Boolean).map((f) => f.position_m);
       return places.length ? [0, 1, 2].map((k) => places.reduce((sum, p) => sum + p[k], 0) / places.length) : null;
     };
-    this.tags.target.textContent = swing ? `${swing.foot} foot lands here` : "";
+    const lands = swing?.touch_down_s === null ? "was to land" : "lands";
+    this.tags.target.textContent = swing ? `${swing.foot} foot ${lands} here` : "";
+    const push = pushAt(this.run, t_s);
+    this.tags.push.textContent = push ? `pushed by ${number(Math.hypot(...push.force_n), 0)} N` : "";
+    this.put(this.tags.push, push ? (this.run.base?.poseAt(t_s)?.p ?? null) : null, eye);
     this.put(this.tags.p_star, middle(search?.p_star), eye);
     this.put(this.tags.p_star_star, middle(search?.p_star_star), eye);
     this.put(this.tags.target, swing?.target_m?.slice(0, 3) ?? null, eye);

@@ -8,6 +8,7 @@ import { turn } from "../core/pose.js";
 import { Footholds3d } from "./footholds3d.js";
 import { Labels } from "./labels.js";
 import { Map3d } from "./map3d.js";
+import { Push3d } from "./push3d.js";
 import { Robot3d } from "./robot3d.js";
 import { Stairs3d } from "./stairs3d.js";
 import { Trails3d } from "./trails3d.js";
@@ -45,7 +46,7 @@ export class Scene3d {
     sun.position.set(-1.5, -3, 5);
     this.scene.add(this.sky, sun);
     this.labels = new Labels(host, run);
-    this.parts = [new Stairs3d(run), new Map3d(run), new Footholds3d(run), new Trails3d(run), new Robot3d(run)];
+    this.parts = [Stairs3d, Map3d, Footholds3d, Trails3d, Robot3d, Push3d].map((Part) => new Part(run));
     this.other = other ? { run: other, robot: new Robot3d(other, true) } : null;
     if (this.other) this.parts.push(this.other.robot);
     for (const part of this.parts) this.scene.add(part.group);
