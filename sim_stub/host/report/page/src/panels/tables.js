@@ -47,7 +47,7 @@ function because(s) {
   if (s.why) return s.why;
   if (!s.onto_tread) return "walks up to the stairs";
   const polygon = isNumber(s.polygon_id) ? `polygon ${s.polygon_id}` : "its polygon";
-  return `nearest mapped tread above it, ${polygon}${isNumber(s.target_m?.[2]) ? ` at ${number(s.target_m[2], 3)} m` : ""}`;
+  return `nearest mapped tread above it: ${polygon}${isNumber(s.target_m?.[2]) ? `, ${number(s.target_m[2], 2)} m up` : ""}`;
 }
 
 function value(v, judged = false, digits = 1) {
