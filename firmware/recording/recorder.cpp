@@ -80,6 +80,7 @@ Recorder::Recorder(const Ports& robot, hal::PictureKeeper* keeper) noexcept
       logs_{LaneLog(control_queue_), LaneLog(perception_queue_)},
       parser_(robot.camera.intrinsics(), kRows) {
   static_assert(kLaneCount == 2);
+  static_assert(sizeof(Recorder) <= kMemoryBudget_bytes);
   for (std::size_t lane = 0; lane < kLaneCount; ++lane) open_frame(lane);
 }
 

@@ -30,6 +30,8 @@ class Recorder final : public hal::DepthCamera,
                        public hal::LidarOdometry,
                        public hal::OperatorInput {
  public:
+  static constexpr std::size_t kMemoryBudget_bytes = 3'000'000;
+
   // keeper: of the camera's pictures; null: none is recorded.
   explicit Recorder(const Ports& robot, hal::PictureKeeper* keeper = nullptr) noexcept;
   Recorder(const Recorder&) = delete;

@@ -373,6 +373,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   figures.heap_first_caller = heap::report().first_caller;
   const auto memory = static_memory();
   figures.static_memory.assign(memory.begin(), memory.end());
+  if (recording) figures.static_memory.push_back({"recording", sizeof(recording::Recorder)});
   figures.schedule = schedule_of(executive, tasks);
   figures.wall_seconds = std::chrono::duration<double>(WallClock::now() - wall_begin).count();
   const ClimbSummary summary = report.finish(figures);
