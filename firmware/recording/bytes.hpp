@@ -92,6 +92,8 @@ class ByteReader {
     at_ += count;
     return bytes_.subspan(at_ - count, count);
   }
+  // What was not read yet.
+  [[nodiscard]] std::span<const std::byte> rest() const noexcept { return bytes_.subspan(at_); }
   void fail() noexcept { failed_ = true; }
   [[nodiscard]] bool failed() const noexcept { return failed_; }
   [[nodiscard]] bool at_end() const noexcept { return at_ == bytes_.size(); }

@@ -45,7 +45,7 @@ def scores(engine, climb, items):
     """(without, with lidar odometry), or a sentence with which there are none. The second has raw_rmse_mm, too."""
     sets = [word for name, value in items.items() for word in ("--set", f"{name}={value}")]
     with tempfile.TemporaryDirectory() as out:
-        told = [str(a) for a in (*climb, *sets, "--save-inputs", "--out", out)]
+        told = [str(a) for a in (*climb, *sets, "--save-inputs", "--record", "none", "--out", out)]
         done = subprocess.run([engine.tool, "climb", *told], capture_output=True, text=True, start_new_session=True)
         log, lio = (pathlib.Path(out, "inputs", name) for name in ("log.csv", "lio.csv"))
         if not log.exists():

@@ -116,7 +116,7 @@ class Engine:
         if kept.exists():
             return json.loads(kept.read_text())
         with tempfile.TemporaryDirectory() as out:
-            done = subprocess.run([self.tool, "climb", *arguments, "--out", out], capture_output=True, text=True,
+            done = subprocess.run([self.tool, "climb", *arguments, "--record", "none", "--out", out], capture_output=True, text=True,
                                   timeout=timeout_s, start_new_session=True)  # Ctrl-C is for the campaign alone
             written = pathlib.Path(out, "summary.json")
             summary = json.loads(written.read_text()) if written.exists() else {}
@@ -133,7 +133,7 @@ class Engine:
     def picture(self, arguments):
         """The drawing of one climb (SVG)."""
         with tempfile.TemporaryDirectory() as out:
-            subprocess.run([self.tool, "climb", *told(arguments), "--out", out], check=True, capture_output=True, start_new_session=True)
+            subprocess.run([self.tool, "climb", *told(arguments), "--record", "none", "--out", out], check=True, capture_output=True, start_new_session=True)
             return pathlib.Path(out, "climb.svg").read_text()
 
     def climbs(self, what, all_arguments):

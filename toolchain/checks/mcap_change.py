@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""For the scripts in seeded/mcap: run.mcap of this folder, its messages, and its CRCs mended after a change."""
+"""A recording, its messages, and its CRCs mended after a change: for the scripts in seeded/mcap (run.mcap of this folder),
+toolchain/scenes and recordings."""
 import struct
 import zlib
 
@@ -8,13 +9,13 @@ FOOTER, CHANNEL, MESSAGE, CHUNK, DATA_END = 0x02, 0x04, 0x05, 0x06, 0x0F
 HEAD = 9  # opcode, length
 
 
-def read():
-    with open(PATH, "rb") as file:
+def read(path=PATH):
+    with open(path, "rb") as file:
         return bytearray(file.read())
 
 
-def write(data):
-    with open(PATH, "wb") as file:
+def write(data, path=PATH):
+    with open(path, "wb") as file:
         file.write(data)
 
 
@@ -31,7 +32,7 @@ def top(data):
 
 
 def messages(data):
-    """those in chunks: topic, begin of the record, content of the chunk"""
+    """those in chunks: topic, begin of the record, size of the data, content of the chunk"""
     topics, found = {}, []
     for opcode, _, content, length in top(data):
         if opcode == CHANNEL:
@@ -39,9 +40,10 @@ def messages(data):
             topics[number] = data[content + 8:content + 8 + size].decode()
         if opcode != CHUNK:
             continue
-        for inner, begin, inside, _ in records(data, content + 40, content + length):
+        for inner, begin, inside, size in records(data, content + 40, content + length):
             if inner == MESSAGE:
-                found.append({"topic": topics[struct.unpack_from("<H", data, inside)[0]], "begin": begin, "chunk": content})
+                found.append({"topic": topics[struct.unpack_from("<H", data, inside)[0]], "begin": begin, "size": size - 22,
+                              "chunk": content})
     return found
 
 

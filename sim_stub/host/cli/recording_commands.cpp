@@ -6,6 +6,7 @@
 #include <ostream>
 
 #include "firmware/config/file_error.hpp"
+#include "firmware/recording/digests.hpp"
 #include "firmware/recording/replay.hpp"
 #include "sim_stub/host/cli/climb_command.hpp"
 #include "sim_stub/host/cli/command_words.hpp"
@@ -19,7 +20,19 @@ namespace {
 enum Command : std::size_t { kReplay, kReport, kInfo, kPack };
 constexpr int kExitUnfinished = 3;
 
+int print_digests(const RecordingArguments& a, std::ostream& out, std::ostream& err) {
+  const recording::RecordingDigests digests = recording::digests_of(a.recordings.front(), zstd_decompress());
+  out << text_of(digests);
+  const int said = written(out, err);
+  if (!digests.complaint.empty()) {
+    err << "polygmap: " << digests.complaint << "\n";
+    return kExitUsage;
+  }
+  return said != kExitPass || digests.is_finished ? said : kExitUnfinished;
+}
+
 int run_replay(const RecordingArguments& a, std::ostream& out, std::ostream& err) {
+  if (a.digests) return print_digests(a, out, err);
   const recording::ReplayResult result = recording::replay(a.recordings.front(), zstd_decompress());
   const bool is_read = result.verdict != recording::ReplayVerdict::kUnreadable;
   if (a.json) {
@@ -88,11 +101,14 @@ void declare_recording_commands(CLI::App& app, RecordingArguments& a) {
     a.commands[command] = sub;
     return sub;
   };
-  declare(kReplay, "replay",
-          "Feed a recording to the module and compare what comes out, to the bit: exit code 0 when nothing differs, 1 "
-          "with the first difference, 2 when it cannot be read, 3 when it is unfinished and agrees as far as it goes",
-          1)
-      ->add_flag("--json", a.json, "One JSON object instead of lines");
+  CLI::App* const replay = declare(
+      kReplay, "replay",
+      "Feed a recording to the module and compare what comes out, to the bit: exit code 0 when nothing differs, 1 with "
+      "the first difference, 2 when it cannot be read, 3 when it is unfinished and agrees as far as it goes",
+      1);
+  replay->add_flag("--json", a.json, "One JSON object instead of lines");
+  replay->add_flag("--digests", a.digests,
+                   "Instead, print a hash of what each stage left in each second: SECOND STAGE HASH, line by line");
   declare(kReport, "report", "Write one page about a recording, or about two side by side: OUT/report.html", 2)
       ->add_option("--out", a.out, "Directory for report.html")
       ->capture_default_str();

@@ -18,7 +18,7 @@ struct RecordingArguments {
   std::array<CLI::App*, 4> commands{};  // in the order above
   std::vector<std::string> recordings;
   std::string out = "report_out", packed;
-  bool json = false;
+  bool json = false, digests = false;
 };
 void declare_recording_commands(CLI::App& app, RecordingArguments& a);
 // Of the one that was given; none when none was. The exit code; errors are one sentence on err.
