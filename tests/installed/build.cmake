@@ -9,7 +9,8 @@ file(REMOVE_RECURSE ${WORK})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/installed_here)
 file(RENAME ${WORK}/installed_here ${WORK}/moved)  # nothing names the place
 file(GLOB_RECURSE files RELATIVE ${WORK}/moved ${WORK}/moved/*)
-set(expected include/polygmap.h include/polygmap.hpp lib/cmake/polygmap/polygmapConfig.cmake
+set(expected include/polygmap.h include/polygmap.hpp include/polygmap_mailbox.h include/polygmap_mailbox_reader.h
+             lib/cmake/polygmap/polygmapConfig.cmake
              lib/cmake/polygmap/polygmapConfigVersion.cmake lib/libpolygmap.a lib/pkgconfig/polygmap.pc)
 if(NOT files STREQUAL expected)
   message(FATAL_ERROR "installed is ${files}, not ${expected}")
