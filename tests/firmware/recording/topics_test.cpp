@@ -17,8 +17,8 @@ namespace {
 // bytes.
 class Message {
  public:
-  Message(Topic topic, std::int64_t log_ns, std::int64_t publish_ns, std::span<const std::byte> bytes)
-      : topic(topic), log_ns(log_ns), publish_ns(publish_ns), bytes_(bytes.begin(), bytes.end()) {}
+  Message(Topic of, std::int64_t logged_ns, std::int64_t published_ns, std::span<const std::byte> bytes)
+      : topic(of), log_ns(logged_ns), publish_ns(published_ns), bytes_(bytes.begin(), bytes.end()) {}
 
   template <class T>
   T get() {
