@@ -168,6 +168,12 @@ class FieldWriter {
   std::uint32_t* last_raised_;
 };
 
+// All of it is there afterwards.
+void write_fields(ByteWriter& out, auto&& write) noexcept {
+  FieldWriter writer(out, nullptr);
+  write(writer);
+}
+
 class FieldReader {
  public:
   explicit FieldReader(ByteReader& in) noexcept : in_(in) {}
@@ -254,8 +260,7 @@ class FieldComparer {
     if (in_.failed()) return;
     std::array<std::byte, sizeof(HealthCounts)> memory;
     ByteWriter bytes(memory);
-    FieldWriter writer(bytes, nullptr);
-    walk_health(writer, *last_health_);
+    write_fields(bytes, [this](FieldWriter& writer) { walk_health(writer, *last_health_); });
     ByteReader recorded(bytes.bytes());
     FieldComparer of_health(recorded, nullptr);
     walk_health(of_health, computed);

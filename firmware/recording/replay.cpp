@@ -97,8 +97,7 @@ class ReplayedPorts final : public hal::DepthCamera,
   [[nodiscard]] static std::string difference_of(const JointCommand& recorded, const JointCommand& computed) {
     std::array<std::byte, sizeof(JointCommand)> memory;
     ByteWriter bytes(memory);
-    FieldWriter writer(bytes, nullptr);
-    walk(writer, "", recorded);
+    write_fields(bytes, [&recorded](FieldWriter& writer) { walk(writer, "", recorded); });
     ByteReader in(bytes.bytes());
     FieldComparer comparer(in, nullptr);
     walk(comparer, "joints.try_write", computed);

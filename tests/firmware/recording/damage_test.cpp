@@ -176,7 +176,7 @@ class ShortRecording : public testing::Test {
       if (message.topic != "/replay") continue;
       for (std::size_t at = message.data + 8; at < message.data + message.size;) {
         if (bytes_[at] == std::byte{'R'} && bytes_[at + 5] == std::byte{row} && ++found == n) {
-          return at + 5 + 1 + 8 + 4 + 2;
+          return at + 5 + 1 + 8 + 4 + 1 + 4 + 2;
         }
         at += 5 + number_at<std::uint32_t>(bytes_, at + 1);
       }
@@ -222,6 +222,43 @@ TEST_F(ShortRecording, OneBitOfAnInputFlipped_TickStageAndFieldAreNamed) {
     EXPECT_EQ(result.ticks, static_cast<std::uint64_t>(kTicks));
     EXPECT_EQ(result.difference.find("tick 30, estimate, "), 0U) << result.difference;
     EXPECT_NE(result.difference.find(": recorded 0x"), std::string::npos) << result.difference;
+  }
+}
+
+TEST_F(ShortRecording, OneBitOfACommandFlipped_CallAndFieldAreNamed) {
+  Bytes flipped = bytes_;
+  const std::size_t call = first_call(static_cast<std::uint8_t>(row_of("command")), 30);
+  ASSERT_EQ(flipped[call], static_cast<std::byte>(CallKind::kWriteJoints));
+  const std::size_t knee_kp = call + 2 + 2 + 8 + (3 * 5 + 3) * 8;
+  mcap_bytes::flip_bit(flipped, knee_kp + 5, 3);
+  const ReplayResult result = replay_repaired(flipped, knee_kp);
+  EXPECT_EQ(result.verdict, ReplayVerdict::kDiffers);
+  EXPECT_EQ(result.differ, 1U);
+  EXPECT_EQ(result.difference.find("tick 30, command, joints.try_write.joints[3].kp_nmprad: recorded 0x"), 0U)
+      << result.difference;
+}
+
+TEST(FieldComparer, HealthThatCountedMore_NamesTheFault) {
+  Health recorded, computed;
+  recorded.raise(Fault::kDriveError, 10);
+  computed.raise(Fault::kDriveError, 10, 2);
+  std::vector<std::byte> memory(64U * 1024U);
+  ByteWriter out(memory);
+  std::uint32_t never = recorded.raised() - 1;
+  {
+    FieldWriter writer(out, &never);
+    writer.health(recorded);
+  }
+  for (const Health* health : {&recorded, &computed}) {
+    HealthCounts last{};
+    ByteReader in(out.bytes());
+    FieldComparer comparer(in, &last);
+    comparer.health(*health);
+    const bool same = health == &recorded;
+    EXPECT_EQ(comparer.difference().empty(), same) << comparer.difference();
+    if (!same) {
+      EXPECT_EQ(comparer.difference().find("drive_error.count: recorded 0x1 (1), computed 0x2 (2)"), 0U);
+    }
   }
 }
 

@@ -113,8 +113,7 @@ class TopicsTest : public testing::Test {
   void set_outputs(RowCall& row, const Outputs&... outputs) {
     memory_.resize(512U * 1024U);
     ByteWriter out(memory_);
-    FieldWriter writer(out, nullptr);
-    (walk(writer, "", outputs), ...);
+    write_fields(out, [&](FieldWriter& writer) { (walk(writer, "", outputs), ...); });
     row.outputs = ByteReader(std::span<const std::byte>(memory_).first(out.size()));
   }
   void write() {
@@ -225,6 +224,7 @@ TEST_F(TopicsTest, Command_IsAJointStateAndItsGains) {
 
 // Odometry's axes turned by a quarter turn against the world's: pose in the world, speeds in the base.
 TEST_F(TopicsTest, Estimate_IsNavMsgsOdometryAndTransforms) {
+  topics_->set_camera({Mat3::Identity(), {0.1, 0.0, 0.2}});
   StateEstimate state;
   state.stamp_ns = kStamp_ns;
   state.world_T_odom = {rotation_z(0.5 * kPi), {10.0, 0.0, 0.0}};
@@ -258,7 +258,7 @@ TEST_F(TopicsTest, Estimate_IsNavMsgsOdometryAndTransforms) {
   m.expect_end();
 
   Message& tf = collected_.of(Topic::kTransforms);
-  ASSERT_EQ(tf.u32(), 2U);
+  ASSERT_EQ(tf.u32(), 3U);
   tf.expect_header(kStamp_ns, "world");
   EXPECT_EQ(tf.text(), "odom");
   tf.expect_vector({10.0, 0.0, 0.0});
@@ -266,6 +266,9 @@ TEST_F(TopicsTest, Estimate_IsNavMsgsOdometryAndTransforms) {
   tf.expect_header(kStamp_ns, "odom");
   EXPECT_EQ(tf.text(), "base");
   tf.expect_upright_pose({1.0, 2.0, 0.8});
+  tf.expect_header(kStamp_ns, "base");
+  EXPECT_EQ(tf.text(), "camera");
+  tf.expect_upright_pose({0.1, 0.0, 0.2});
   tf.expect_end();
   int transforms = 0;
   for (int i = 0; i < 10; ++i) {
