@@ -31,6 +31,8 @@ void Gait::tell_plan(GaitPlan& plan) const noexcept {
   plan.bodies.clear();
   plan.has_landing = false;
   if (!started_) return;
+  const Transform odom_T_plan = plan_.odom_T_plan();
+  for (std::size_t i = 0; i < kFootCount; ++i) plan.odom_T_sole[i] = odom_T_plan * plan_.plan_T_sole()[i];
   const auto at = [&](std::int32_t ticks) { return plan.stamp_ns + ticks * kTick_ns; };
   const auto body_at = [&](std::int32_t ticks) {
     PlannedBody body = plan_.ahead(ticks);

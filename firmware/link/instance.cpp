@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "firmware/link/instance.hpp"
 
-#include "firmware/link/config.hpp"
+#include "firmware/link/config/apply_config.hpp"
 #include "firmware/robot_camera.hpp"
 
 namespace polygmap::link {

@@ -8,7 +8,7 @@
 #include <type_traits>
 
 #include "firmware/link/abi.hpp"
-#include "firmware/link/config_text.hpp"
+#include "firmware/link/config/config_text.hpp"
 #include "firmware/link/pushed_ports.hpp"
 #include "firmware/schedule.hpp"
 

@@ -19,6 +19,7 @@ static_assert(POLYGMAP_SURFACE_OTHER == static_cast<int>(SurfaceKind::kOther));
 static_assert(POLYGMAP_MAX_CONTACTS >= 2 * POLYGMAP_MAX_STEPS + 1);
 
 constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+constexpr polygmap_transform kNowhere{{kNotKnown, kNotKnown, kNotKnown}, {kNotKnown, kNotKnown, kNotKnown, kNotKnown}};
 
 polygmap_foot_target target_of(const InstanceClock& clock, const PlannedStep& step) noexcept {
   polygmap_foot_target to{};
@@ -120,7 +121,7 @@ void read_steps(const PlanSource& source, const InstanceClock& clock, polygmap_p
   to.held = plan.planned && plan.held ? 1 : 0;
   to.stairs = stairs_of(source.control);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-    to.foot[foot] = {transform_of(gait.odom_T_sole_desired[foot]), gait.stands[foot] ? 1U : 0U};
+    to.foot[foot] = {plan.planned ? transform_of(plan.odom_T_sole[foot]) : kNowhere, gait.stands[foot] ? 1U : 0U};
   }
   to.step_count = to.contact_count = to.body_count = 0;
   for (const PlannedStep& step : plan.steps) to.step[to.step_count++] = target_of(clock, step);

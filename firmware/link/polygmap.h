@@ -7,7 +7,8 @@
 // instance does follows from what was pushed, stepped and configured alone: the same inputs give the same commands, to
 // the bit, on x86 and on AArch64.
 //
-// Threads: calls on one instance must not overlap. Different instances know nothing of each other.
+// Threads: calls on one instance must not overlap. Different instances know nothing of each other. A call takes less
+// than 32 kB of stack.
 //
 // Results: every int that a function returns is POLYGMAP_OK or one of the negative polygmap_error. A call that fails
 // has changed nothing, unless it says so here.
@@ -434,10 +435,10 @@ typedef struct polygmap_stairs {
   double nosing_m[2][3];  // front edge of the next tread, from left to right; not a number likewise
 } polygmap_stairs;
 
-// A foot as planned now: where its sole is to be.
+// A foot as planned now.
 typedef struct polygmap_foot {
-  polygmap_transform odom_T_sole;
-  uint32_t stands;  // 0: it is to be in the air
+  polygmap_transform odom_T_sole;  // where it is to be; not a number while there is no plan yet
+  uint32_t stands;                 // 0: it is to be in the air
 } polygmap_foot;
 
 typedef struct polygmap_plan {

@@ -50,10 +50,11 @@ struct GaitPlan {
   bool planned = false;
   // A drive is mute: the body stays where it is, and bodies has only that.
   bool held = false;
-  StaticVector<PlannedStep, 2> steps;          // in their order
-  StaticVector<PlannedBody, kSamples> bodies;  // from stamp_ns on
-  bool has_landing = false;                    // the first step's touch-down has a time
-  PlannedBody landing;                         // at that time
+  std::array<Transform, kFootCount> odom_T_sole;  // where the soles are to be now
+  StaticVector<PlannedStep, 2> steps;             // in their order
+  StaticVector<PlannedBody, kSamples> bodies;     // from stamp_ns on
+  bool has_landing = false;                       // the first step's touch-down has a time
+  PlannedBody landing;                            // at that time
 };
 
 }  // namespace polygmap

@@ -86,6 +86,7 @@ TEST(GaitPlan, Bodies_AreWhereThePlanGoes) {
     if (!plan.planned || climb.status().phase != GaitPhase::kSwing) continue;  // double support has several plans
     ASSERT_EQ(plan.bodies.size(), GaitPlan::kSamples);
     EXPECT_EQ(plan.bodies[0].stamp_ns, climb.status().stamp_ns);
+    EXPECT_EQ(plan.odom_T_sole[0].p_m, climb.status().odom_T_sole_desired[0].p_m);
     EXPECT_EQ(plan.bodies[1].stamp_ns - plan.bodies[0].stamp_ns, GaitPlan::kSample_ticks * kTick_ns);
     EXPECT_LT((plan.bodies[0].p_com_m.head<2>() - climb.status().odom_p_com_desired_m).norm(), 0.005);
     for (const Announced& a : announced) {

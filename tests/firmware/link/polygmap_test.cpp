@@ -167,6 +167,7 @@ TEST(Link, Plan_OfAClimb_IsWhatHappens) {
     ASSERT_LE(plan.step_count, static_cast<std::uint32_t>(POLYGMAP_MAX_STEPS));
     EXPECT_EQ(plan.stamp_ns, linked.robot.clock.now_ns());
     stairs_seen |= 1U << plan.stairs.state;
+    EXPECT_EQ(std::isnan(plan.foot[0].odom_T_sole.p_m[0]), plan.body_count == 0);
     if (plan.body_count > 0) {
       ASSERT_GT(plan.contact_count, 0U);
       EXPECT_EQ(plan.contact[0].begin_ns, plan.stamp_ns);

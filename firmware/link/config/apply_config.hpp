@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "algorithms/core/messages/samples.hpp"
-#include "firmware/link/config_text.hpp"
+#include "firmware/link/config/config_text.hpp"
 #include "firmware/params.hpp"
 
 namespace polygmap::link {

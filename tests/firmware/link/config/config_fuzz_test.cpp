@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "firmware/link/config.hpp"
+#include "firmware/link/config/apply_config.hpp"
 #include "firmware/robot_camera.hpp"
 #include "tests/firmware/daemon/text_mutator.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "firmware/link/param_walk.hpp"
+#include "firmware/link/config/param_walk.hpp"
 
 #include "firmware/params.hpp"
 

@@ -12,7 +12,7 @@
 #include "firmware/config/camera_file.hpp"
 #include "firmware/config/param_file.hpp"
 #include "firmware/config/param_table.hpp"
-#include "firmware/link/config.hpp"
+#include "firmware/link/config/apply_config.hpp"
 #include "firmware/robot_camera.hpp"
 #include "tests/firmware/daemon/text_mutator.hpp"
 

@@ -10,7 +10,7 @@
 #include <type_traits>
 
 #include "algorithms/core/math/transform.hpp"
-#include "firmware/link/fixed_text.hpp"
+#include "firmware/link/config/fixed_text.hpp"
 
 namespace polygmap {
 struct Params;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lines of a configuration: what is read, and the sentence about what is not.
-#include "firmware/link/config_text.hpp"
+#include "firmware/link/config/config_text.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parameters and camera from a configuration.
-#include "firmware/link/config.hpp"
+#include "firmware/link/config/apply_config.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "firmware/link/fixed_text.hpp"
+#include "firmware/link/config/fixed_text.hpp"
 
 namespace polygmap::link {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Decimals as the C library reads them, without it.
-#include "firmware/link/decimal.hpp"
+#include "firmware/link/config/decimal.hpp"
 
 #include <gtest/gtest.h>
 

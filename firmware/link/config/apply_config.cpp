@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "firmware/link/config.hpp"
+#include "firmware/link/config/apply_config.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "firmware/link/decimal.hpp"
-#include "firmware/link/param_walk.hpp"
+#include "firmware/link/config/decimal.hpp"
+#include "firmware/link/config/param_walk.hpp"
 
 namespace polygmap::link {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "firmware/link/config_text.hpp"
+#include "firmware/link/config/config_text.hpp"
 
 #include <algorithm>
 
-#include "firmware/link/decimal.hpp"
+#include "firmware/link/config/decimal.hpp"
 
 namespace polygmap::link {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "algorithms/core/containers/static_vector.hpp"
-#include "firmware/link/fixed_text.hpp"
+#include "firmware/link/config/fixed_text.hpp"
 
 namespace polygmap::link {
 
