@@ -23,7 +23,6 @@
 #include "sim_stub/host/cli/recording_commands.hpp"
 #include "sim_stub/host/operator/keyboard.hpp"
 #include "sim_stub/host/output_file.hpp"
-#include "sim_stub/host/report/report_page.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
 
 namespace polygmap::sim {
@@ -602,18 +601,8 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
     err << "polygmap: " << not_written << "\n";
     return kExitUsage;
   }
-  if (!a.options.recording.empty()) {
-    try {
-      not_written = write_report({a.options.recording}, a.options.out_dir);
-    } catch (const std::exception& error) {
-      not_written = error.what();
-    }
-    if (not_written.empty()) out << a.options.out_dir << "/report.html\n" << std::flush;
-    if (!not_written.empty()) {
-      err << "polygmap: " << not_written << "\n";
-      return kExitUsage;
-    }
-  }
+  const std::string report = a.options.out_dir + "/report.html";
+  if (std::error_code none; std::filesystem::exists(report, none)) (a.json ? err : out) << report << "\n" << std::flush;
   if (summary.interrupted_by != 0) return kExitSignal + summary.interrupted_by;
   return summary.pass ? kExitPass : kExitFail;
 }

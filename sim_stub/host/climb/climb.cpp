@@ -18,6 +18,7 @@
 #include "sim_stub/host/record/climb_recorder.hpp"
 #include "sim_stub/host/record/preview_camera.hpp"
 #include "sim_stub/host/record/truth_topics.hpp"
+#include "sim_stub/host/report/report_page.hpp"
 #include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/sim_robot.hpp"
 #include "sim_stub/world/clearance.hpp"
@@ -377,19 +378,26 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   figures.schedule = schedule_of(executive, tasks);
   figures.wall_seconds = std::chrono::duration<double>(WallClock::now() - wall_begin).count();
   const ClimbSummary summary = report.finish(figures);
+  std::string recording_failure;
   if (recording) {
     truth_topics->write_verdict(summary_text(summary), robot.now_ns());
-    if (const std::string failure = recording->finish(); !failure.empty()) throw ClimbNotWritten(failure, summary);
+    recording_failure = recording->finish();
   }
   if (!options.out_dir.empty()) {
     try {
       write_climb_files(options.out_dir, report, summary);
       if (recorder) recorder->write(options.out_dir + "/inputs");
       if (can_log) can_log->close();
+      if (recording && recording_failure.empty()) {
+        // One that is interrupted may have nothing to report yet.
+        const std::string wrong = write_report({options.recording}, options.out_dir);
+        if (figures.interrupted_by == 0) recording_failure = wrong;
+      }
     } catch (const std::runtime_error& error) {
       throw ClimbNotWritten(error.what(), summary);
     }
   }
+  if (!recording_failure.empty()) throw ClimbNotWritten(recording_failure, summary);
   return summary;
 }
 

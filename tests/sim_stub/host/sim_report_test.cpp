@@ -559,7 +559,7 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
   for (const auto& [key, value] : j.items()) keys += key + " ";
   EXPECT_EQ(
       keys,
-      "verdict reason fell ended_by ended_at_s plant gait seed arguments params_hash reality camera states "
+      "verdict reason fell ended_by ended_at_s plant gait seed command arguments params_hash reality camera states "
       "steps_total steps_climbed climb_time_s seconds_per_step plane_rate_hz "
       "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min stand_off_mm "
       "closure_error_mm tracking_error_mm com_tracking_mm_max zmp_margin_mm_min torque_peak_ratio torque_limited_ms "
