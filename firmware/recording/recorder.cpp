@@ -142,7 +142,7 @@ void Recorder::put_events(std::size_t lane) noexcept {
 void Recorder::begin_row(std::size_t row, std::int64_t cycle_ns, const WorkBudget& budget) noexcept {
   const std::size_t lane = kLaneOf[row];
   LaneLog& log = logs_[lane];
-  if (log.frame.empty() && !log.out.full()) open_frame(lane);  // there may be room by now
+  if (log.waits && !log.out.full()) open_frame(lane);  // there may be room by now
   log.head.cycle_ns = cycle_ns;
   if (pipeline_->lane_health(lane).raised() != log.raised) put_events(lane);
   log.row_at = log.out.size();
@@ -205,6 +205,7 @@ void Recorder::open_frame(std::size_t lane) noexcept {
     put_record(log.out, RecordKind::kLost, static_cast<std::uint8_t>(lane), log.lost);
   }
   log.opened_bytes = log.out.size();
+  log.waits = log.frame.empty();
 }
 
 void Recorder::hand_over(std::size_t lane, std::int64_t now_ns) noexcept {
@@ -312,8 +313,7 @@ std::string Recorder::finish() {
 
 void Recorder::put_call(LaneLog& log, CallKind kind, bool gave) const noexcept {
   ++log.calls;
-  log.out.put(kind);
-  log.out.put(gave);
+  put_all(log.out, kind, gave);
 }
 
 [[gnu::flatten]] bool Recorder::try_read(ImuSample& sample) noexcept {

@@ -101,6 +101,7 @@ class Recorder final : public hal::DepthCamera,
     BlockQueue queue;
     std::span<std::byte> frame;  // in the queue, or empty: there was no room; a head and records
     ByteWriter out{{}};          // of its records
+    bool waits = false;          // for room
     std::size_t opened_bytes = 0;
     FrameHead head;
     std::size_t row_at = 0;  // where the row's head is to be filled in when it is over

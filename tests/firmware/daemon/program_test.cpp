@@ -325,7 +325,7 @@ TEST_F(ProgramTest, ReplayOfWhatIsNone_IsOneSentence) {
                           {"magic alone", good.substr(0, 8), 2, "it has no topic /parameters"},
                           {"long first record", with_length(first_record + 1, ~std::uint64_t{0}), 2, "no topic"},
                           {"cut in the middle", good.substr(0, good.size() / 2), 3, "it was cut off"}};
-  for (const std::size_t part : {5, 9, 90, 95}) {
+  for (const std::size_t part : {5U, 9U, 90U, 95U}) {
     Case flipped{"flipped at " + std::to_string(part) + " %", good, -1, ""};
     char& byte = flipped.bytes[good.size() * part / 100];
     byte = static_cast<char>(byte ^ 0x10);
