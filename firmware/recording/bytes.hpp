@@ -29,7 +29,7 @@ class ByteWriter {
   }
   void put_bytes(const void* bytes, std::size_t count) noexcept {
     full_ = full_ || count > memory_.size() - size_;
-    if (full_) return;
+    if (full_ || count == 0) return;
     std::memcpy(memory_.data() + size_, bytes, count);
     size_ += count;
   }
