@@ -182,7 +182,7 @@ void Recorder::cycle_done(std::size_t lane, const CycleReport& report) noexcept 
   put_record(logs_[lane].out, RecordKind::kCycle, static_cast<std::uint8_t>(lane), report.cycle, report.due_ns,
              static_cast<std::uint8_t>(report.slot), report.ran, report.shed, report.deferred, report.overran,
              report.overrun, report.caught_up, report.skipped_before);
-  last_cycle_ns_ = report.due_ns;
+  logs_[lane].last_cycle_ns = report.due_ns;
   if (lane == kControlLane) ++cycles_;
   hand_over(lane, report.due_ns);
   // An executive of one lane has the rows of both.
@@ -229,7 +229,7 @@ void Recorder::hand_over(std::size_t lane, std::int64_t now_ns) noexcept {
     ++lost_pictures_;
   }
   ++log.lost;
-  ++lost_frames_;
+  ++log.all_lost;
   pipeline_->lane_health(lane).raise(Limit::kRecordingLost, now_ns);
   --log.health;  // so that the next frame has all of it
   open_frame(lane);
@@ -291,7 +291,7 @@ void Recorder::write_frame(LaneLog& log) noexcept {
 }
 
 void Recorder::flush() noexcept {
-  for (std::size_t lane = 0; lane < kLaneCount; ++lane) hand_over(lane, last_cycle_ns_);
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) hand_over(lane, logs_[lane].last_cycle_ns);
   write_out();
   let_go_written();
 }
@@ -300,14 +300,14 @@ std::string Recorder::finish() {
   flush();
   if (!failed()) {
     LaneLog& log = logs_[kControlLane];
-    log.head.cycle_ns = last_cycle_ns_;
+    log.head.cycle_ns = log.last_cycle_ns;
     put_record(log.out, RecordKind::kEnd, cycles_, pictures_.acquired);
     flush();
   }
   if (!failed() && !writer_.close()) fail();
   if (failed()) return std::string("Cannot write \"") + writer_.path() + "\": " + std::strerror(writer_.error()) + ".";
-  if (lost_frames_ == 0 && lost_pictures_ == 0) return {};
-  return std::string("The recording \"") + writer_.path() + "\" lacks " + std::to_string(lost_frames_) +
+  if (lost_frames() == 0 && lost_pictures_ == 0) return {};
+  return std::string("The recording \"") + writer_.path() + "\" lacks " + std::to_string(lost_frames()) +
          " frames and " + std::to_string(lost_pictures_) + " pictures: the disk was too slow for its memory.";
 }
 

@@ -62,7 +62,9 @@ class Recorder final : public hal::DepthCamera,
   // The recording has ended before the module. From any thread.
   [[nodiscard]] bool failed() const noexcept { return failed_.load(std::memory_order_acquire); }
   // Frames of lanes, and pictures, that were lost so far. No lane runs.
-  [[nodiscard]] std::uint64_t lost_frames() const noexcept { return lost_frames_; }
+  [[nodiscard]] std::uint64_t lost_frames() const noexcept {
+    return logs_[kControlLane].all_lost + logs_[kPerceptionLane].all_lost;
+  }
   [[nodiscard]] std::uint64_t lost_pictures() const noexcept { return lost_pictures_; }
 
   [[nodiscard]] CameraIntrinsics intrinsics() const noexcept override { return robot_.camera.intrinsics(); }
@@ -107,7 +109,9 @@ class Recorder final : public hal::DepthCamera,
     std::size_t row_at = 0;  // where the row's head is to be filled in when it is over
     std::int32_t units = 0;
     std::uint16_t calls = 0;
+    std::int64_t last_cycle_ns = 0;
     std::uint32_t lost = 0;                                                // frames since the last one that found room
+    std::uint64_t all_lost = 0;                                            // frames
     std::uint32_t raised = 0;                                              // by the lane's health when it looked last
     std::array<std::uint32_t, kEventTable<ExecutiveEvent>.size()> told{};  // events written so far
     std::uint32_t health = 0;                                              // Health::raised(), as written last
@@ -146,8 +150,8 @@ class Recorder final : public hal::DepthCamera,
     std::uint32_t acquired = 0, let_go = 0;
   } pictures_;
   std::atomic<std::uint32_t> pictures_written_{0};
-  std::uint64_t cycles_ = 0, lost_frames_ = 0, lost_pictures_ = 0;
-  std::int64_t last_cycle_ns_ = 0;
+  std::uint64_t cycles_ = 0;         // control's
+  std::uint64_t lost_pictures_ = 0;  // perception's
   std::atomic<bool> failed_{false};
   // Of the thread that writes.
   mcap::McapWriter writer_;
