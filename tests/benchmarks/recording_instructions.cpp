@@ -26,17 +26,11 @@ using recording::Recorder;
   recorder.end_row(row, progress, budget);
 }
 [[gnu::noinline]] void stage_record(Recorder& recorder, const CycleReport& report) { recorder.cycle_done(0, report); }
-template <class Sample>
-[[gnu::noinline]] bool stage_record(Recorder& recorder, Sample& sample) {
-  if constexpr (std::is_same_v<Sample, DepthFrameView>) {
-    return recorder.try_acquire(sample);
-  } else if constexpr (std::is_same_v<Sample, hal::JointBusStatus>) {
-    sample = recorder.status();
-    return true;
-  } else {
-    return recorder.try_read(sample);
-  }
-}
+[[gnu::noinline]] bool stage_record(Recorder& recorder, ImuSample& sample) { return recorder.try_read(sample); }
+[[gnu::noinline]] bool stage_record(Recorder& recorder, JointFeedback& sample) { return recorder.try_read(sample); }
+[[gnu::noinline]] bool stage_record(Recorder& recorder, LioSample& sample) { return recorder.try_read(sample); }
+[[gnu::noinline]] bool stage_record(Recorder& recorder, DepthFrameView& frame) { return recorder.try_acquire(frame); }
+[[gnu::noinline]] hal::JointBusStatus stage_record(const Recorder& recorder) { return recorder.status(); }
 [[gnu::noinline]] JointSet stage_record(Recorder& recorder, const JointCommand& command) {
   return recorder.try_write(command);
 }
@@ -55,11 +49,7 @@ class CountedPorts final : public hal::DepthCamera, public hal::Imu, public hal:
   [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override {
     return stage_record(recorder_, command);
   }
-  [[nodiscard]] hal::JointBusStatus status() const noexcept override {
-    hal::JointBusStatus status;
-    (void)stage_record(recorder_, status);
-    return status;
-  }
+  [[nodiscard]] hal::JointBusStatus status() const noexcept override { return stage_record(recorder_); }
 
  private:
   Recorder& recorder_;
