@@ -15,15 +15,18 @@ namespace polygmap::sim {
 struct Preview {
   static constexpr int kEvery_px = 4;
   static constexpr double kNearest_m = 0.3, kFarthest_m = 3.0;
+  static constexpr std::int64_t kPeriod_ns = 200'000'000;  // from one to the next
   std::int64_t stamp_ns = 0;
   std::uint32_t width_px = 0, height_px = 0;
   std::vector<std::uint8_t> pixels;
 };
 
+// Of a picture whose size is the camera's. Allocates nothing where the preview has its size already.
+void fill(Preview& preview, const DepthFrameView& frame, double depth_unit_m);
+[[nodiscard]] std::vector<unsigned char> png_of(const Preview& preview);
+
 class PreviewCamera final : public hal::DepthCamera {
  public:
-  static constexpr std::int64_t kPeriod_ns = 200'000'000;
-
   explicit PreviewCamera(hal::DepthCamera& camera);
   [[nodiscard]] CameraIntrinsics intrinsics() const noexcept override { return camera_.intrinsics(); }
   // Allocates nothing.

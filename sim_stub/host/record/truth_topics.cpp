@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_stub/host/record/truth_topics.hpp"
 
-#include <lodepng.h>
-
 #include <algorithm>
 #include <string>
 
@@ -75,8 +73,7 @@ void TruthTopics::write(const Truth& truth) {
 }
 
 void TruthTopics::write(const Preview& preview) {
-  std::vector<unsigned char> png;
-  if (lodepng::encode(png, preview.pixels, preview.width_px, preview.height_px, LCT_GREY, 8) != 0) return;
+  const std::vector<unsigned char> png = png_of(preview);
   CdrWriter out = message();
   put_header(out, preview.stamp_ns, "camera");
   out.put_text("png");

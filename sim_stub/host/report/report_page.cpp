@@ -36,7 +36,11 @@ std::string write_report(const std::vector<std::string>& recordings, const std::
   for (const std::string& path : recordings) {
     ReportRun run(path);
     if (std::string wrong = run.read(); !wrong.empty()) return wrong;
-    data["runs"].push_back(run.json());
+    try {
+      data["runs"].push_back(run.json());
+    } catch (const ReportJson::exception&) {  // of another program's making
+      return "\"" + path + "\" has a verdict that is no summary.json.";
+    }
   }
   constexpr std::string_view kPlace = "@POLYGMAP_DATA@";
   const std::string_view page(polygmap_report_page,

@@ -6,6 +6,7 @@
 
 #include "algorithms/geometry/convex.hpp"
 #include "algorithms/geometry/oriented_rectangle.hpp"
+#include "sim_stub/host/record/preview_camera.hpp"
 #include "sim_stub/host/record/zstd_chunks.hpp"
 
 namespace polygmap::sim {
@@ -116,7 +117,7 @@ void ReportRun::take_call(const PortCall& call, std::int64_t cycle_ns) {
     lio_ms_.push_back(at_ms);
     lio_.add(std::span(pose.p_m.data(), 3));
   }
-  if (call.kind == CallKind::kAcquire && call.picture.pixels == recording::Pixels::kStored) has_pictures_ = true;
+  if (call.kind == CallKind::kAcquire && call.picture.pixels == recording::Pixels::kStored) take_picture(call);
 }
 
 void ReportRun::take_outputs(const RowCall& row) {
@@ -256,7 +257,7 @@ void ReportRun::take_extra(const RecordingFile::Extra& extra) {
   if (extra.topic != Topic::kVerdict) return;
   mcap::CdrReader in(extra.message);
   summary_ = ReportJson::parse(in.get_text(), nullptr, false);
-  if (summary_.is_discarded()) summary_ = nullptr;
+  if (!summary_.is_object()) summary_ = ReportJson::object();
 }
 
 void ReportRun::take_truth(std::span<const std::byte> message) {
@@ -314,10 +315,26 @@ void ReportRun::take_preview(std::span<const std::byte> message) {
   (void)in.get_text();
   const std::span<const std::byte> png = in.get_bytes();
   if (in.failed()) return;
-  const std::int64_t stamp_ns = seconds * kNsPerS + nanoseconds;
-  pictures_.push_back({{"t_s", rounded(time_s(stamp_ns), 3)},
-                       {"png", base64_of({reinterpret_cast<const unsigned char*>(png.data()), png.size()})},
-                       {"surfaces", ReportJson::array()}});
+  add_picture(seconds * kNsPerS + nanoseconds, {reinterpret_cast<const unsigned char*>(png.data()), png.size()});
+}
+
+// A simulation's recording has small ones anyway, a robot's the pictures themselves: either will do.
+void ReportRun::take_picture(const PortCall& call) {
+  std::span<const std::uint16_t> pixels;
+  if (call.frame.stamp_ns < next_picture_ns_ || !file_->read_picture(call.frame, call.picture, pixels)) return;
+  Preview preview;
+  DepthFrameView frame = call.frame;
+  frame.depth = pixels.data();
+  fill(preview, frame, file_->camera().depth_unit_m);
+  add_picture(frame.stamp_ns, png_of(preview));
+}
+
+// At most one in a while, whichever topic has it.
+void ReportRun::add_picture(std::int64_t stamp_ns, std::span<const unsigned char> png) {
+  if (stamp_ns < next_picture_ns_) return;
+  next_picture_ns_ = stamp_ns + Preview::kPeriod_ns;
+  pictures_.push_back(
+      {{"t_s", rounded(time_s(stamp_ns), 3)}, {"png", base64_of(png)}, {"surfaces", ReportJson::array()}});
 }
 
 // A frame is finished some cycles after its picture was acquired.

@@ -31,6 +31,8 @@ class ReportRun {
   void take_true_feet(std::span<const std::byte> message);
   void take_stairs(std::span<const std::byte> message);
   void take_preview(std::span<const std::byte> message);
+  void take_picture(const recording::PortCall& call);
+  void add_picture(std::int64_t stamp_ns, std::span<const unsigned char> png);
   void take_surfaces(const SurfaceFrame& frame);
   void take_footholds(const FootholdSet& footholds);
   void take_health(const recording::HealthCounts& counts);
@@ -64,7 +66,7 @@ class ReportRun {
   recording::HealthCounts counts_{};
   Transform true_T_base_;
   std::array<Transform, kFootCount> true_T_sole_;
-  bool has_truth_ = false, has_pictures_ = false;
+  bool has_truth_ = false;
   Transform page_T_world_;  // of the module's world on the true one, once, when it has initialised
   // Of odometry by the moment: drift moves no foothold against its stairs, and so it must not on the page.
   Transform page_T_odom_;
@@ -80,14 +82,14 @@ class ReportRun {
   std::vector<double> lio_ms_, cost_ms_;
   ReportTable lio_, cost_;
   std::array<double, kTasks.size()> most_cost_{};
-  std::uint64_t next_cost_ = 0;
   MapVersions versions_;
   ReportJson states_ = ReportJson::array(), phases_ = ReportJson::array(), events_ = ReportJson::array(),
              operator_ = ReportJson::array(), pictures_ = ReportJson::array(), searches_ = ReportJson::array(),
-             boxes_ = ReportJson::array(), summary_;
+             boxes_ = ReportJson::array(), summary_ = ReportJson::object();  // empty: nobody judged the run
   std::vector<LatchedStep> steps_;
   std::vector<ReportJson> step_places_;
   double next_search_s_ = 0.0;
+  std::int64_t next_picture_ns_ = 0;
   StopReason last_stop_ = StopReason::kNone;
 };
 

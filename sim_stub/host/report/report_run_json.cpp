@@ -140,9 +140,9 @@ ReportJson ReportRun::json() const {
     run["missing"]["truth"] =
         "The file has no truth, as a robot's own has none: stairs, true poses and true margins are not known.";
   }
-  if (!summary_.is_null()) run["summary"] = summary_;
+  if (!summary_.empty()) run["summary"] = summary_;
   ReportJson pushes = ReportJson::array();
-  if (summary_.is_object() && summary_.contains("arguments")) {
+  if (summary_.contains("arguments")) {
     for (const ReportJson& push : summary_["arguments"].value("pushes", ReportJson::array())) {
       const double force_n = push["impulse_ns"].get<double>() / Push::kDuration_s;
       const bool is_x = push["axis"] == "x";
@@ -156,7 +156,7 @@ ReportJson ReportRun::json() const {
     }
   }
   run["pushes"] = pushes;
-  if (summary_.is_object() && summary_.contains("command")) run["arguments"] = summary_["command"];
+  if (summary_.contains("command")) run["arguments"] = summary_["command"];
   // A row that takes what its resumable predecessor left may spend all of both; and the last piece of work may
   // overdraw, which is paid back.
   double shared = 0.0;
@@ -166,13 +166,14 @@ ReportJson ReportRun::json() const {
     run["schedule"].push_back({{"task", row.task},
                                {"lane", row.lane == kControlLane ? "control" : "perception"},
                                {"budget_us", row.budget_us},
+                               {"resumable", row.resumable()},
                                {"budget_instructions", row.resumable() ? shared + kOverdraftInstructions : own}});
   }
   if (!ends_.empty()) {
     run["ending"] = {{"t_s", rounded(time_s(now_ns_), 3)}, {"sentence", ends_}};
   } else if (gait_.stop_reason != StopReason::kNone && gait_.stop_reason != StopReason::kTop) {
     run["ending"] = {{"t_s", states_.back()[0]},
-                     {"sentence", summary_.is_object() ? summary_.value("reason", std::string()) : std::string()},
+                     {"sentence", summary_.value("reason", std::string(text_of(gait_.stop_reason)))},
                      {"stop", name_of(gait_.stop_reason)},
                      {"stop_text", text_of(gait_.stop_reason)}};
   }

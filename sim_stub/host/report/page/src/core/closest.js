@@ -215,7 +215,7 @@ export function costs(run) {
 
 function addCost(run, add) {
   const dearest = costs(run)
-    .filter((c) => isNumber(c.share))
+    .filter((c) => isNumber(c.share) && !c.row.resumable) // who is resumed uses all that it is given
     .sort((a, b) => b.share - a.share)[0];
   if (dearest)
     add(
