@@ -22,6 +22,7 @@ using recording::Topic;
 constexpr std::uint64_t kSampleEvery_ticks = 5;  // 100 Hz: linear between two, a foot is off by 0.3 mm at most
 constexpr std::uint64_t kCostEvery_ticks = 10;
 constexpr double kSearchEvery_s = 0.2;
+constexpr std::int64_t kSameEvent_ns = 100'000'000;
 constexpr double kInstructionsPerWorkUnit = 100.0;
 
 Vec3 get_vector(mcap::CdrReader& in) {
@@ -162,6 +163,15 @@ void ReportRun::take_health(const recording::HealthCounts& counts) {
     const std::uint32_t more = counts[i].count - counts_[i].count;
     if (more == 0) continue;
     const bool is_fault = i < kFaultTable.size();
+    // What goes on is one event: each of its counts prolongs it.
+    if (const std::size_t last = last_event_[i]; last > 0 && counts[i].last_ns - last_raised_ns_[i] <= kSameEvent_ns) {
+      ReportJson& event = events_[last - 1];
+      event["count"] = event["count"].get<std::uint32_t>() + more;
+      last_raised_ns_[i] = counts[i].last_ns;
+      continue;
+    }
+    last_event_[i] = events_.size() + 1;
+    last_raised_ns_[i] = counts[i].last_ns;
     const auto add = [&](const auto& line) {
       events_.push_back({{"t_s", rounded(time_s(counts[i].last_ns), 3)},
                          {"kind", is_fault ? "fault" : "limit"},

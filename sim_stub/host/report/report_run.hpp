@@ -64,6 +64,8 @@ class ReportRun {
   FootholdSet footholds_;
   JointFeedback joints_;
   recording::HealthCounts counts_{};
+  std::array<std::size_t, std::tuple_size_v<recording::HealthCounts>> last_event_{};  // 1 + place in events_; 0: none
+  std::array<std::int64_t, std::tuple_size_v<recording::HealthCounts>> last_raised_ns_{};
   Transform true_T_base_;
   std::array<Transform, kFootCount> true_T_sole_;
   bool has_truth_ = false;
