@@ -208,7 +208,7 @@ void declare_files(CLI::App& climb, ClimbArguments& a) {
   keep_among(*climb
                   .add_option("--record", a.record,
                               "What OUT/run.mcap has, for replay, report and MCAP tools: all that goes into the module "
-                              "and comes out of it, but pictures; all: pictures too, 18 MB a second; none: no file")
+                              "and comes out of it, but pictures; all: pictures too; none: no file")
                   ->capture_default_str(),
              {"no-pictures", "all", "none"});
 }
