@@ -154,42 +154,32 @@ void Topics::write_call(const PortCall& call, MessageSink& sink) noexcept {
 }
 
 void Topics::write_outputs(const RowCall& row, MessageSink& sink) noexcept {
-  const std::string_view task = kTasks[row.row].row.task;
-  ByteReader in = row.outputs;
-  FieldReader reader(in);
-  const bool is_done = row.progress == static_cast<std::uint8_t>(Progress::kDone);
-  if (task == "estimate") {
-    walk(reader, "state", state_);
-    walk(reader, "quality", quality_);
-    write_odometry();
-    send(Topic::kOdometry, state_.stamp_ns, sink);
-    constexpr std::uint32_t kEvery = 5;  // 100 Hz
-    if (transform_skip_++ % kEvery != 0) return;
-    write_transforms();
-    send(Topic::kTransforms, state_.stamp_ns, sink);
-  } else if (task == "gait") {
-    walk(reader, "status", gait_);
-    walk(reader, "module_state", module_state_);
-    write_gait();
-    send(Topic::kGait, gait_.stamp_ns, sink);
-  } else if (task == "health") {
-    if (!in.get<bool>()) return;
-    HealthCounts counts;
-    for (EventCount& count : counts) walk(reader, "", count);
-    write_faults(counts, row.cycle_ns);
-    send(Topic::kFaults, row.cycle_ns, sink);
-  } else if (task == "surfaces" && is_done) {
-    walk(reader, "frame", surfaces_);
-    write_surfaces();
-    send(Topic::kSurfaces, surfaces_.stamp_ns, sink);
-  } else if (task == "map" && is_done) {
-    walk(reader, "map", map_);
-    write_map();
-    send(Topic::kMap, map_.stamp_ns, sink);
-  } else if (task == "footholds" && is_done) {
-    walk(reader, "footholds", footholds_);
-    write_footholds(row.cycle_ns);
-    send(Topic::kFootholds, footholds_.map_stamp_ns, sink);
+  using Left = RowOutputs::Left;
+  constexpr std::uint32_t kEvery = 5;  // of the transforms: 100 Hz
+  switch (outputs_.read(row)) {
+    case Left::kState:
+      write_odometry();
+      send(Topic::kOdometry, outputs_.state.stamp_ns, sink);
+      if (transform_skip_++ % kEvery != 0) return;
+      write_transforms();
+      return send(Topic::kTransforms, outputs_.state.stamp_ns, sink);
+    case Left::kGait:
+      write_gait();
+      return send(Topic::kGait, outputs_.gait.stamp_ns, sink);
+    case Left::kHealth:
+      write_faults(outputs_.health, row.cycle_ns);
+      return send(Topic::kFaults, row.cycle_ns, sink);
+    case Left::kSurfaces:
+      write_surfaces();
+      return send(Topic::kSurfaces, outputs_.surfaces.stamp_ns, sink);
+    case Left::kMap:
+      write_map();
+      return send(Topic::kMap, outputs_.map.stamp_ns, sink);
+    case Left::kFootholds:
+      write_footholds(row.cycle_ns);
+      return send(Topic::kFootholds, outputs_.footholds.map_stamp_ns, sink);
+    case Left::kNothing:
+      return;
   }
 }
 
@@ -250,19 +240,19 @@ void Topics::write_gains(const JointCommand& command) noexcept {
 }
 
 void Topics::write_odometry() noexcept {
-  const Transform pose = state_.world_T_base();
+  const Transform pose = outputs_.state.world_T_base();
   out_.begin();
-  put_header(out_, state_.stamp_ns, "world");
+  put_header(out_, outputs_.state.stamp_ns, "world");
   out_.put_text("base");
   put_pose(out_, pose);
-  const auto& covariance = quality_.covariance;  // position, velocity, rotation; odometry's axes
+  const auto& covariance = outputs_.quality.covariance;  // position, velocity, rotation; odometry's axes
   constexpr std::array<int, 6> kPose{0, 1, 2, 6, 7, 8};
   for (const int row : kPose) {
     for (const int column : kPose) out_.put(covariance(row, column));
   }
-  const Mat3& odom_R_base = state_.odom_T_base.R;
-  put_vector(out_, Vec3(odom_R_base.transpose() * state_.odom_v_base_mps));
-  put_vector(out_, state_.base_w_base_radps);
+  const Mat3& odom_R_base = outputs_.state.odom_T_base.R;
+  put_vector(out_, Vec3(odom_R_base.transpose() * outputs_.state.odom_v_base_mps));
+  put_vector(out_, outputs_.state.base_w_base_radps);
   const Mat3 velocity = odom_R_base.transpose() * covariance.block<3, 3>(3, 3) * odom_R_base;
   for (int row = 0; row < 6; ++row) {
     for (int column = 0; column < 6; ++column) out_.put(row < 3 && column < 3 ? velocity(row, column) : 0.0);
@@ -272,31 +262,31 @@ void Topics::write_odometry() noexcept {
 void Topics::write_transforms() noexcept {
   out_.begin();
   out_.put_count(3);
-  put_header(out_, state_.stamp_ns, "world");
+  put_header(out_, outputs_.state.stamp_ns, "world");
   out_.put_text("odom");
-  put_pose(out_, state_.world_T_odom);
-  put_header(out_, state_.stamp_ns, "odom");
+  put_pose(out_, outputs_.state.world_T_odom);
+  put_header(out_, outputs_.state.stamp_ns, "odom");
   out_.put_text("base");
-  put_pose(out_, state_.odom_T_base);
-  put_header(out_, state_.stamp_ns, "base");
+  put_pose(out_, outputs_.state.odom_T_base);
+  put_header(out_, outputs_.state.stamp_ns, "base");
   out_.put_text("camera");
   put_pose(out_, base_T_camera_);
 }
 
 void Topics::write_gait() noexcept {
   out_.begin();
-  put_header(out_, gait_.stamp_ns, "odom");
-  out_.put_text(polygmap::name_of(gait_.phase));
-  out_.put_text(polygmap::name_of(module_state_));
-  out_.put_text(polygmap::name_of(gait_.stop_reason));
-  out_.put(gait_.stop_measured_m);
-  out_.put(gait_.treads_climbed);
-  out_.put(gait_.step.sequence);
-  for (const bool stands : gait_.stands) out_.put(stands);
-  for (const double probability : state_.contact_probability) out_.put(probability);
-  for (const Transform& sole : gait_.odom_T_sole_desired) put_pose(out_, sole);
-  for (const Transform& sole : state_.odom_T_sole) put_pose(out_, sole);
-  put_vector(out_, Vec3(gait_.odom_p_com_desired_m[0], gait_.odom_p_com_desired_m[1], 0.0));
+  put_header(out_, outputs_.gait.stamp_ns, "odom");
+  out_.put_text(polygmap::name_of(outputs_.gait.phase));
+  out_.put_text(polygmap::name_of(outputs_.module_state));
+  out_.put_text(polygmap::name_of(outputs_.gait.stop_reason));
+  out_.put(outputs_.gait.stop_measured_m);
+  out_.put(outputs_.gait.treads_climbed);
+  out_.put(outputs_.gait.step.sequence);
+  for (const bool stands : outputs_.gait.stands) out_.put(stands);
+  for (const double probability : outputs_.state.contact_probability) out_.put(probability);
+  for (const Transform& sole : outputs_.gait.odom_T_sole_desired) put_pose(out_, sole);
+  for (const Transform& sole : outputs_.state.odom_T_sole) put_pose(out_, sole);
+  put_vector(out_, Vec3(outputs_.gait.odom_p_com_desired_m[0], outputs_.gait.odom_p_com_desired_m[1], 0.0));
 }
 
 void Topics::write_faults(const HealthCounts& counts, std::int64_t now_ns) noexcept {
@@ -341,17 +331,18 @@ void Topics::write_frame(std::uint8_t lane, const CycleReport& cycle) noexcept {
 
 void Topics::write_surfaces() noexcept {
   out_.begin();
-  begin_scene(out_, surfaces_.stamp_ns, surfaces_.surfaces.size());
-  for (std::size_t i = 0; i < surfaces_.surfaces.size(); ++i) {
-    put_surface(out_, surfaces_.surfaces[i], surfaces_.stamp_ns, "camera", IdText("surface ", i).view());
+  begin_scene(out_, outputs_.surfaces.stamp_ns, outputs_.surfaces.surfaces.size());
+  for (std::size_t i = 0; i < outputs_.surfaces.surfaces.size(); ++i) {
+    put_surface(out_, outputs_.surfaces.surfaces[i], outputs_.surfaces.stamp_ns, "camera",
+                IdText("surface ", i).view());
   }
 }
 
 void Topics::write_map() noexcept {
   out_.begin();
-  begin_scene(out_, map_.stamp_ns, map_.polygons.size());
-  for (const MapPolygon& polygon : map_.polygons) {
-    put_surface(out_, polygon.surface, map_.stamp_ns, "odom", IdText("polygon ", polygon.id).view());
+  begin_scene(out_, outputs_.map.stamp_ns, outputs_.map.polygons.size());
+  for (const MapPolygon& polygon : outputs_.map.polygons) {
+    put_surface(out_, polygon.surface, outputs_.map.stamp_ns, "odom", IdText("polygon ", polygon.id).view());
   }
 }
 
@@ -375,9 +366,10 @@ void Topics::write_footholds(std::int64_t now_ns) noexcept {
     put_no_primitives(out_, 6);
   };
   out_.begin();
-  begin_scene(out_, now_ns, static_cast<std::size_t>(footholds_.has_p_star) + (footholds_.has_p_star_star ? 1U : 0U));
-  if (footholds_.has_p_star) put_feet(footholds_.p_star_feet, "p*", kNext);
-  if (footholds_.has_p_star_star) put_feet(footholds_.p_star_star_feet, "p**", kAfterNext);
+  begin_scene(out_, now_ns,
+              static_cast<std::size_t>(outputs_.footholds.has_p_star) + (outputs_.footholds.has_p_star_star ? 1U : 0U));
+  if (outputs_.footholds.has_p_star) put_feet(outputs_.footholds.p_star_feet, "p*", kNext);
+  if (outputs_.footholds.has_p_star_star) put_feet(outputs_.footholds.p_star_star_feet, "p**", kAfterNext);
 }
 
 std::span<const std::byte> Topics::image_head(const DepthFrameView& frame) noexcept {

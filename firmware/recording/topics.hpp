@@ -9,7 +9,7 @@
 #include <span>
 
 #include "firmware/recording/mcap/cdr.hpp"
-#include "firmware/recording/record.hpp"
+#include "firmware/recording/row_outputs.hpp"
 #include "firmware/recording/schemas.hpp"
 
 namespace polygmap::recording {
@@ -63,13 +63,7 @@ class Topics {
   Transform base_T_camera_;
   std::int64_t log_ns_ = 0;
   std::uint32_t too_long_ = 0;
-  StateEstimate state_;
-  EstimateQuality quality_;
-  GaitStatus gait_;
-  ModuleState module_state_{};
-  SurfaceFrame surfaces_;
-  MapSnapshot map_;
-  FootholdSet footholds_;
+  RowOutputs outputs_;
   std::array<std::int32_t, kTasks.size()> units_spent_{};
   std::uint32_t transform_skip_ = 0;
 };

@@ -122,34 +122,25 @@ void ReportRun::take_call(const PortCall& call, std::int64_t cycle_ns) {
 }
 
 void ReportRun::take_outputs(const RowCall& row) {
-  const std::string_view task = kTasks[row.row].row.task;
-  recording::ByteReader in = row.outputs;
-  recording::FieldReader reader(in);
-  const bool is_done = row.progress == static_cast<std::uint8_t>(Progress::kDone);
-  if (task == "estimate") {
-    walk(reader, "state", state_);
-    walk(reader, "quality", quality_);
-    if (!has_truth_) page_T_odom_ = state_.world_T_odom;
-  } else if (task == "gait") {
-    walk(reader, "status", gait_);
-    walk(reader, "module_state", module_state_);
-    note_change(states_, name_of(module_state_));
-    note_change(phases_, name_of(gait_.phase));
-    take_steps();
-  } else if (task == "health") {
-    if (!in.get<bool>()) return;
-    recording::HealthCounts counts;
-    for (EventCount& count : counts) walk(reader, "", count);
-    take_health(counts);
-  } else if (task == "surfaces" && is_done) {
-    walk(reader, "frame", surfaces_);
-    take_surfaces(surfaces_);
-  } else if (task == "map" && is_done) {
-    walk(reader, "map", map_);
-    versions_.add(time_s(now_ns_), map_, page_T_odom_);
-  } else if (task == "footholds" && is_done) {
-    walk(reader, "footholds", footholds_);
-    take_footholds(footholds_);
+  using Left = recording::RowOutputs::Left;
+  switch (outputs_.read(row)) {
+    case Left::kState:
+      if (!has_truth_) page_T_odom_ = outputs_.state.world_T_odom;
+      return;
+    case Left::kGait:
+      note_change(states_, name_of(outputs_.module_state));
+      note_change(phases_, name_of(outputs_.gait.phase));
+      return take_steps();
+    case Left::kHealth:
+      return take_health(outputs_.health);
+    case Left::kSurfaces:
+      return take_surfaces(outputs_.surfaces);
+    case Left::kMap:
+      return versions_.add(time_s(now_ns_), outputs_.map, page_T_odom_);
+    case Left::kFootholds:
+      return take_footholds(outputs_.footholds);
+    case Left::kNothing:
+      return;
   }
 }
 
@@ -190,7 +181,7 @@ void ReportRun::take_health(const recording::HealthCounts& counts) {
 }
 
 void ReportRun::take_steps() {
-  const LatchedStep& step = gait_.step;
+  const LatchedStep& step = outputs_.gait.step;
   if (step.sequence == 0) return;
   if (steps_.empty() || steps_.back().sequence != step.sequence) {
     steps_.push_back(step);
@@ -227,13 +218,13 @@ void ReportRun::end_cycle(const CycleReport& cycle) {
 void ReportRun::finish_sample() {
   if (!sample_waits_) return;
   sample_waits_ = false;
-  if (!is_aligned_ && has_truth_ && state_.initialised) {
-    page_T_world_ = aligned(true_T_base_, state_.world_T_base());
+  if (!is_aligned_ && has_truth_ && outputs_.state.initialised) {
+    page_T_world_ = aligned(true_T_base_, outputs_.state.world_T_base());
     is_aligned_ = true;
   }
   // Before it has initialised the module knows no pose.
   const auto add = [this](ReportTable& table, const Transform& pose) {
-    state_.initialised ? table.add(pose) : table.add_missing();
+    outputs_.state.initialised ? table.add(pose) : table.add_missing();
   };
   if (has_truth_) {
     base_true_.add(true_T_base_);
@@ -242,13 +233,14 @@ void ReportRun::finish_sample() {
   }
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     has_truth_ ? sole_true_[foot].add(true_T_sole_[foot]) : sole_true_[foot].add_missing();
-    add(sole_estimated_[foot], page_T_odom_ * state_.odom_T_sole[foot]);
-    add(sole_desired_[foot], page_T_odom_ * gait_.odom_T_sole_desired[foot]);
+    add(sole_estimated_[foot], page_T_odom_ * outputs_.state.odom_T_sole[foot]);
+    add(sole_desired_[foot], page_T_odom_ * outputs_.gait.odom_T_sole_desired[foot]);
   }
-  add(base_fused_, page_T_world_ * state_.world_T_base());
-  add(base_odometry_, page_T_world_ * state_.odom_T_base);
-  sigma_.add(std::array{state_.position_sigma_m.x(), state_.position_sigma_m.y(), state_.position_sigma_m.z(),
-                        state_.yaw_sigma_rad, state_.tilt_sigma_rad});
+  add(base_fused_, page_T_world_ * outputs_.state.world_T_base());
+  add(base_odometry_, page_T_world_ * outputs_.state.odom_T_base);
+  sigma_.add(std::array{outputs_.state.position_sigma_m.x(), outputs_.state.position_sigma_m.y(),
+                        outputs_.state.position_sigma_m.z(), outputs_.state.yaw_sigma_rad,
+                        outputs_.state.tilt_sigma_rad});
   joint_angles_.add(std::span(joints_.q_rad.data(), kJointCount));
   std::array<double, kJointCount> share{};
   for (std::size_t n = 0; n < kJointCount; ++n) {
@@ -256,7 +248,7 @@ void ReportRun::finish_sample() {
     share[n] = std::abs(tau_nm) / file_->params().robot.drives.limits[n].torque_nm;
   }
   torque_share_.add(share);
-  contact_.add(state_.contact_probability);
+  contact_.add(outputs_.state.contact_probability);
 }
 
 void ReportRun::take_extra(const RecordingFile::Extra& extra) {
@@ -284,7 +276,7 @@ void ReportRun::take_true_feet(std::span<const std::byte> message) {
   skip_header(in);
   if (in.get_count(7 * sizeof(double)) != kFootCount) return;
   for (Transform& sole : true_T_sole_) sole = get_pose(in);
-  page_T_odom_ = true_T_base_ * state_.odom_T_base.inverse();
+  page_T_odom_ = true_T_base_ * outputs_.state.odom_T_base.inverse();
   finish_sample();
 }
 

@@ -55,13 +55,7 @@ class ReportRun {
   std::uint64_t ticks_ = 0;
 
   // As of the newest rows.
-  StateEstimate state_;
-  EstimateQuality quality_;
-  GaitStatus gait_;
-  ModuleState module_state_{};
-  SurfaceFrame surfaces_;
-  MapSnapshot map_;
-  FootholdSet footholds_;
+  recording::RowOutputs outputs_;
   JointFeedback joints_;
   recording::HealthCounts counts_{};
   std::array<std::size_t, std::tuple_size_v<recording::HealthCounts>> last_event_{};  // 1 + place in events_; 0: none

@@ -171,11 +171,11 @@ ReportJson ReportRun::json() const {
   }
   if (!ends_.empty()) {
     run["ending"] = {{"t_s", rounded(time_s(now_ns_), 3)}, {"sentence", ends_}};
-  } else if (gait_.stop_reason != StopReason::kNone && gait_.stop_reason != StopReason::kTop) {
+  } else if (outputs_.gait.stop_reason != StopReason::kNone && outputs_.gait.stop_reason != StopReason::kTop) {
     run["ending"] = {{"t_s", states_.back()[0]},
-                     {"sentence", summary_.value("reason", std::string(text_of(gait_.stop_reason)))},
-                     {"stop", name_of(gait_.stop_reason)},
-                     {"stop_text", text_of(gait_.stop_reason)}};
+                     {"sentence", summary_.value("reason", std::string(text_of(outputs_.gait.stop_reason)))},
+                     {"stop", name_of(outputs_.gait.stop_reason)},
+                     {"stop_text", text_of(outputs_.gait.stop_reason)}};
   }
   Params defaults, own = params;
   const config::ParamTable own_table = config::param_table(own), default_table = config::param_table(defaults);
