@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "firmware/config/param_table.hpp"
-#include "firmware/recording/recording_header.hpp"
+#include "firmware/recording/stream/recording_header.hpp"
 
 namespace polygmap::recording {
 namespace {

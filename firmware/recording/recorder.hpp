@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "firmware/recording/block_queue.hpp"
-#include "firmware/recording/format.hpp"
 #include "firmware/recording/mcap/mcap_writer.hpp"
-#include "firmware/recording/outputs.hpp"
-#include "firmware/recording/topics.hpp"
+#include "firmware/recording/stream/format.hpp"
+#include "firmware/recording/stream/outputs.hpp"
+#include "firmware/recording/topics/topics.hpp"
 #include "firmware/schedule.hpp"
 #include "hal/ports/picture_keeper.hpp"
 

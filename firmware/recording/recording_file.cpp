@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "firmware/config/param_table.hpp"
-#include "firmware/recording/recording_header.hpp"
+#include "firmware/recording/stream/recording_header.hpp"
 
 namespace polygmap::recording {
 namespace {

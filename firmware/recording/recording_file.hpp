@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "firmware/params.hpp"
-#include "firmware/recording/format.hpp"
 #include "firmware/recording/mcap/mcap_reader.hpp"
-#include "firmware/recording/record.hpp"
-#include "firmware/recording/topics.hpp"
+#include "firmware/recording/stream/format.hpp"
+#include "firmware/recording/stream/record.hpp"
+#include "firmware/recording/topics/topics.hpp"
 
 namespace polygmap::recording {
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <string_view>
 
-#include "firmware/recording/bytes.hpp"
+#include "firmware/recording/stream/bytes.hpp"
 
 namespace polygmap::mcap {
 

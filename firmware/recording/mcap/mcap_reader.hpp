@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "firmware/recording/bytes.hpp"
 #include "firmware/recording/mcap/mcap_format.hpp"
+#include "firmware/recording/stream/bytes.hpp"
 
 namespace polygmap::mcap {
 

@@ -9,9 +9,9 @@
 #include <string_view>
 
 #include "algorithms/core/containers/static_vector.hpp"
-#include "firmware/recording/bytes.hpp"
 #include "firmware/recording/mcap/crc32.hpp"
 #include "firmware/recording/mcap/mcap_format.hpp"
+#include "firmware/recording/stream/bytes.hpp"
 
 namespace polygmap::mcap {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "firmware/recording/record.hpp"
+#include "firmware/recording/stream/record.hpp"
 
 namespace polygmap::recording {
 namespace {

@@ -2,7 +2,7 @@
 // What a row of the schedule left behind, as values again: of each kind the newest.
 #pragma once
 
-#include "firmware/recording/record.hpp"
+#include "firmware/recording/stream/record.hpp"
 
 namespace polygmap::recording {
 

@@ -8,8 +8,8 @@
 #include <span>
 #include <string>
 
-#include "firmware/recording/format.hpp"
-#include "firmware/recording/outputs.hpp"
+#include "firmware/recording/stream/format.hpp"
+#include "firmware/recording/stream/outputs.hpp"
 
 namespace polygmap::recording {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each message that common tools read, taken apart by hand as its ROS 2 definition says.
-#include "firmware/recording/topics.hpp"
+#include "firmware/recording/topics/topics.hpp"
 
 #include <gtest/gtest.h>
 

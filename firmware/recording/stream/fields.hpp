@@ -17,7 +17,7 @@
 #include "algorithms/estimation/quality/estimate_quality.hpp"
 #include "algorithms/robot/robot_model.hpp"
 #include "firmware/lane_link.hpp"
-#include "firmware/recording/bytes.hpp"
+#include "firmware/recording/stream/bytes.hpp"
 #include "hal/ports/joint_bus.hpp"
 #include "scheduler/event_counters.hpp"
 
@@ -32,6 +32,7 @@ concept Of = std::is_same_v<std::remove_const_t<T>, Message>;
 //   count(n)                      before the n elements of a vector: how many of them to visit; or, of who fills it,
 //   resize(vector)                which gives it its elements
 //   leaves(numbers)               optional, in the stead of leaf() for numbers that lie side by side
+//   whole(message)                optional, in the stead of enter(), its fields and leave()
 //   names_only()                  in the stead of count(): it wants no values, and a vector's element once
 template <class F, class T>
 void walk(F& f, std::string_view name, T& value, int index = -1);
@@ -311,6 +312,8 @@ void walk(F& f, std::string_view name, T& value, int index) {
   using Value = std::remove_const_t<T>;
   if constexpr (Number<Value>) {
     f.leaf(name, index, value);
+  } else if constexpr (requires { f.whole(value); }) {
+    f.whole(value);
   } else {
     f.enter(name, index);
     if constexpr (detail::kHasNumbers<Value> && requires { f.leaves(std::span(value.data(), std::size_t{})); }) {

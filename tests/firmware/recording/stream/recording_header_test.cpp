@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "firmware/recording/recording_header.hpp"
+#include "firmware/recording/stream/recording_header.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "firmware/recording/format.hpp"
-#include "firmware/recording/outputs.hpp"
+#include "firmware/recording/stream/format.hpp"
+#include "firmware/recording/stream/outputs.hpp"
 
 namespace polygmap::recording {
 namespace {

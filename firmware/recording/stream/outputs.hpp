@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "firmware/recording/fields.hpp"
+#include "firmware/recording/stream/fields.hpp"
 #include "firmware/schedule.hpp"
 
 namespace polygmap::recording {
@@ -118,6 +118,33 @@ void walk_recorded(auto& f) {
   walk_health(f, HealthCounts{});
 }
 
+// What is written most, and has no vector: PlainWriter would not compile.
+template <class T>
+concept Fixed = (Of<T, StateEstimate> || Of<T, EstimateQuality> || Of<T, GaitStatus> || Of<T, ImuSample> ||
+                 Of<T, JointFeedback> || Of<T, JointCommand> || Of<T, hal::JointBusStatus> || Of<T, LioSample> ||
+                 Of<T, EdgeLine> || Of<T, OccupiedCell> || Of<T, Foothold> || Of<T, TreadView>);
+
+// Where there is room: a number costs its copy, to a place that the compiler knows.
+class PlainWriter {
+ public:
+  explicit PlainWriter(std::byte* at) noexcept : at_(at) {}
+  template <Number T>
+  void leaf(std::string_view, int, T value) noexcept {
+    leaves(std::span<const T>(&value, 1));
+  }
+  template <Number T, std::size_t N>
+  void leaves(std::span<T, N> values) noexcept {
+    std::memcpy(at_, values.data(), values.size_bytes());
+    at_ += values.size_bytes();
+  }
+  void enter(std::string_view, int) noexcept {}
+  void leave() noexcept {}
+  [[nodiscard]] std::byte* at() const noexcept { return at_; }
+
+ private:
+  std::byte* at_;
+};
+
 // Into the rest of a ByteWriter's memory, whose size it has brought up to date when it ends: within a cycle a number
 // costs a comparison and a store.
 class FieldWriter {
@@ -135,6 +162,18 @@ class FieldWriter {
   template <Number T>
   void leaves(std::span<T> values) noexcept {
     put(values.data(), values.size_bytes());
+  }
+  // Its fields take no more than it does: there is room for all of them, or for none.
+  template <Fixed T>
+  void whole(T& message) noexcept {
+    if (sizeof message > left_) {
+      is_full_ = true;
+      return;
+    }
+    PlainWriter plain(at_);
+    each_field(plain, message);
+    left_ -= static_cast<std::size_t>(plain.at() - at_);
+    at_ = plain.at();
   }
   void enter(std::string_view, int) noexcept {}
   void leave() noexcept {}

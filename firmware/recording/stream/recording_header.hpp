@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "firmware/params.hpp"
-#include "firmware/recording/bytes.hpp"
+#include "firmware/recording/stream/bytes.hpp"
 
 namespace polygmap::recording {
 

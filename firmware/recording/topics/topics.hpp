@@ -9,8 +9,8 @@
 #include <span>
 
 #include "firmware/recording/mcap/cdr.hpp"
-#include "firmware/recording/row_outputs.hpp"
-#include "firmware/recording/schemas.hpp"
+#include "firmware/recording/stream/row_outputs.hpp"
+#include "firmware/recording/topics/schemas.hpp"
 
 namespace polygmap::recording {
 

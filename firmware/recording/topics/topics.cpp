@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "firmware/recording/topics.hpp"
+#include "firmware/recording/topics/topics.hpp"
 
 #include <bit>
 #include <cstdio>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "firmware/recording/schemas.hpp"
+#include "firmware/recording/topics/schemas.hpp"
 
 namespace polygmap::recording {
 namespace {
@@ -165,7 +165,7 @@ constexpr char kParameters[] =
     "# The same, exactly, with the schedule and the camera: for a replay.\n"
     "uint8[] header";
 constexpr char kReplay[] =
-    "# One frame of a lane: firmware/recording/format.hpp.\n"
+    "# One frame of a lane: firmware/recording/stream/format.hpp.\n"
     "uint8[] records";
 constexpr char kJointGains[] =
     "std_msgs/Header header\n"

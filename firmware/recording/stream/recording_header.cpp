@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "firmware/recording/recording_header.hpp"
+#include "firmware/recording/stream/recording_header.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "firmware/config/param_table.hpp"
-#include "firmware/recording/format.hpp"
-#include "firmware/recording/outputs.hpp"
+#include "firmware/recording/stream/format.hpp"
+#include "firmware/recording/stream/outputs.hpp"
 
 namespace polygmap::recording {
 namespace {
