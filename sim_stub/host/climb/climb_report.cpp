@@ -235,7 +235,11 @@ void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
     const int step = truth.step_index[foot];
     if (flights_[foot]) {
       if (step >= 0 && first_lift_off_ns_ < 0) first_lift_off_ns_ = flights_[foot]->lift_off_ns;
-      clearance_min_m_ = flight_clearance_m(*flights_[foot], step, clearance_min_m_);
+      const double flight_m = flight_clearance_m(*flights_[foot], step, std::numeric_limits<double>::infinity());
+      clearance_min_m_ = std::min(clearance_min_m_, flight_m);
+      if (!footsteps_.empty() && index_of(footsteps_.back().foot) == foot) {
+        keep_min(footsteps_.back().swing_clearance_m, flight_m);
+      }
       flights_[foot].reset();
       landed_ns_[foot] = truth.stamp_ns;
     }

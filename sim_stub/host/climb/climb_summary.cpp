@@ -50,6 +50,7 @@ Json footstep_json(const Footstep& f) {
           {"along_error_mm", mm(f.along_error_m)},
           {"across_error_mm", mm(f.across_error_m)},
           {"sole_margin_mm", mm(f.sole_margin_m)},
+          {"swing_clearance_mm", mm(f.swing_clearance_m)},
           {"map_age_at_latch_ms", ms(f.map_age_at_latch_ms)},
           {"target_last_seen_ms", ms(f.target_last_seen_ms)}};
 }

@@ -40,7 +40,8 @@ struct Footstep {
   // Signed, latched minus true: the sole's distance behind the nosing and its lateral place seen from the stance sole.
   double along_error_m = kNotMeasured;
   double across_error_m = kNotMeasured;
-  double sole_margin_m = kNotMeasured;  // least while it stood there
+  double sole_margin_m = kNotMeasured;      // least while it stood there
+  double swing_clearance_m = kNotMeasured;  // least of the foot to the stairs on its way
   double map_age_at_latch_ms = kNotMeasured;
   double target_last_seen_ms = kNotMeasured;
 };

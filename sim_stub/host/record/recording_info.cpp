@@ -12,7 +12,7 @@
 #include "firmware/recording/mcap/cdr.hpp"
 #include "firmware/recording/mcap/mcap_reader.hpp"
 #include "firmware/recording/mcap/mcap_writer.hpp"
-#include "firmware/recording/schemas.hpp"
+#include "firmware/recording/topics/schemas.hpp"
 #include "sim_stub/host/record/zstd_chunks.hpp"
 
 namespace polygmap::sim {

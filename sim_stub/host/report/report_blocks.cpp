@@ -23,12 +23,12 @@ std::array<double, 7> numbers_of(const Transform& pose) {
 
 // Integers of one width, as differences; the least one of it stands for what is missing.
 template <class Integer>
-void append_differences(std::vector<unsigned char>& bytes, const std::vector<double>& column, double offset,
-                        double step) {
+void append_differences(std::vector<unsigned char>& bytes, const std::vector<double>& column, std::size_t every,
+                        double offset, double step) {
   using Unsigned = std::make_unsigned_t<Integer>;
   Unsigned before = 0;
-  for (const double value : column) {
-    const double scaled = std::round((value - offset) / step);
+  for (std::size_t row = 0; row < column.size(); row += every) {
+    const double scaled = std::round((column[row] - offset) / step);
     const auto whole = static_cast<Unsigned>(std::isfinite(scaled) ? static_cast<Integer>(scaled)
                                                                    : std::numeric_limits<Integer>::min());
     const auto difference = static_cast<Unsigned>(whole - before);
@@ -65,7 +65,7 @@ void ReportTable::add_missing() {
   for (auto& column : columns_) column.push_back(std::numeric_limits<double>::quiet_NaN());
 }
 
-ReportJson ReportTable::json() const {
+ReportJson ReportTable::json(std::size_t every) const {
   std::vector<double> offsets;
   bool is_narrow = true;
   for (std::size_t c = 0; c < columns_.size(); ++c) {
@@ -83,15 +83,15 @@ ReportJson ReportTable::json() const {
   std::vector<unsigned char> bytes, packed;
   for (std::size_t c = 0; c < columns_.size(); ++c) {
     if (is_narrow) {
-      append_differences<std::int16_t>(bytes, columns_[c], offsets[c], steps_[c]);
+      append_differences<std::int16_t>(bytes, columns_[c], every, offsets[c], steps_[c]);
     } else {
-      append_differences<std::int32_t>(bytes, columns_[c], offsets[c], steps_[c]);
+      append_differences<std::int32_t>(bytes, columns_[c], every, offsets[c], steps_[c]);
     }
   }
   (void)lodepng::compress(packed, bytes);
   return {{"type", is_narrow ? "i16" : "i32"},
           {"columns", columns_.size()},
-          {"count", columns_.front().size()},
+          {"count", (columns_.front().size() + every - 1) / every},
           {"scale", steps_},
           {"offset", offsets},
           {"delta", true},

@@ -29,8 +29,8 @@ class ReportTable {
   void add_missing();
 
   [[nodiscard]] bool empty() const noexcept { return columns_.empty() || columns_.front().empty(); }
-  // A block, its columns as differences of integers, compressed.
-  [[nodiscard]] ReportJson json() const;
+  // A block of every so many rows, its columns as differences of integers, compressed.
+  [[nodiscard]] ReportJson json(std::size_t every = 1) const;
 
  private:
   std::vector<double> steps_;

@@ -42,6 +42,7 @@ class ReportRun {
   void finish_sample();
   [[nodiscard]] ReportJson steps_json() const;
   [[nodiscard]] ReportJson stairs_json() const;
+  [[nodiscard]] ReportJson pictures_json() const;
   [[nodiscard]] double time_s(std::int64_t at_ns) const noexcept {
     return 1e-9 * static_cast<double>(at_ns - first_ns_);
   }

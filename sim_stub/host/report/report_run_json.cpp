@@ -11,14 +11,20 @@ namespace polygmap::sim {
 namespace {
 
 constexpr double kMillisecond = 1e-3;
+// So much of a page that its ten steps stay within 4 MB, and one of an hour opens.
+constexpr std::size_t kMostSamples = 6000, kMostPictures_bytes = 1'700'000;
+
+std::size_t every_of(std::size_t count, std::size_t most) {
+  return std::max<std::size_t>(1, (count + most - 1) / most);
+}
 
 const char* name_of_foot(Foot foot) { return foot == Foot::kLeft ? "left" : "right"; }
 
-ReportJson times_json(const std::vector<double>& at_ms) {
+ReportJson times_json(const std::vector<double>& at_ms, std::size_t every = 1) {
   ReportTable table({1.0});
   for (const double ms : at_ms) table.add(std::array{ms});
   if (table.empty()) return nullptr;
-  ReportJson block = table.json();  // milliseconds as whole numbers, told as seconds
+  ReportJson block = table.json(every);  // milliseconds as whole numbers, told as seconds
   for (auto& number : block["scale"]) number = number.get<double>() * kMillisecond;
   for (auto& number : block["offset"]) number = number.get<double>() * kMillisecond;
   return block;
@@ -79,6 +85,16 @@ ReportJson ReportRun::stairs_json() const {
   return {{"boxes", boxes_}, {"treads", treads}, {"half_width_m", half_width_m}};
 }
 
+// Evenly fewer where they are too many, the last one among them.
+ReportJson ReportRun::pictures_json() const {
+  std::size_t bytes = 0;
+  for (const ReportJson& picture : pictures_) bytes += picture["png"].get_ref<const std::string&>().size();
+  const std::size_t every = every_of(bytes, kMostPictures_bytes);
+  ReportJson list = ReportJson::array();
+  for (std::size_t i = (pictures_.size() - 1) % every; i < pictures_.size(); i += every) list.push_back(pictures_[i]);
+  return list;
+}
+
 ReportJson ReportRun::json() const {
   const Params& params = file_->params();
   const CameraIntrinsics& k = file_->camera();
@@ -87,30 +103,31 @@ ReportJson ReportRun::json() const {
                  {"world", has_truth_ ? "true" : "module"},
                  {"clock_t0_s", rounded(1e-9 * static_cast<double>(first_ns_), 3)},
                  {"missing", ReportJson::object()}};
-  run["clocks"] = {{"motion", times_json(motion_ms_)}};
+  const std::size_t every = every_of(motion_ms_.size(), kMostSamples);
+  run["clocks"] = {{"motion", times_json(motion_ms_, every)}};
   if (!lio_ms_.empty()) run["clocks"]["lio"] = times_json(lio_ms_);
   if (!cost_ms_.empty()) run["clocks"]["cost"] = times_json(cost_ms_);
-  const auto add = [&run](const std::string& name, const char* clock, const ReportTable& table) {
+  const auto add = [&run](const std::string& name, const char* clock, const ReportTable& table, std::size_t every_row) {
     if (table.empty()) return;
     ReportJson series{{"clock", clock}};
-    series.update(table.json());
+    series.update(table.json(every_row));
     run["series"][name] = std::move(series);
   };
-  if (has_truth_) add("base_true", "motion", base_true_);
-  add("base_fused", "motion", base_fused_);
-  add("base_odometry", "motion", base_odometry_);
+  if (has_truth_) add("base_true", "motion", base_true_, every);
+  add("base_fused", "motion", base_fused_, every);
+  add("base_odometry", "motion", base_odometry_, every);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     const std::string name = name_of_foot(static_cast<Foot>(foot));
-    if (has_truth_) add("sole_true_" + name, "motion", sole_true_[foot]);
-    add("sole_estimated_" + name, "motion", sole_estimated_[foot]);
-    add("sole_desired_" + name, "motion", sole_desired_[foot]);
+    if (has_truth_) add("sole_true_" + name, "motion", sole_true_[foot], every);
+    add("sole_estimated_" + name, "motion", sole_estimated_[foot], every);
+    add("sole_desired_" + name, "motion", sole_desired_[foot], every);
   }
-  add("sigma_fused", "motion", sigma_);
-  add("joints", "motion", joint_angles_);
-  add("torque_share", "motion", torque_share_);
-  add("contact", "motion", contact_);
-  add("lio", "lio", lio_);
-  add("cost", "cost", cost_);
+  add("sigma_fused", "motion", sigma_, every);
+  add("joints", "motion", joint_angles_, every);
+  add("torque_share", "motion", torque_share_, every);
+  add("contact", "motion", contact_, every);
+  add("lio", "lio", lio_, 1);
+  add("cost", "cost", cost_, 1);
   run["states"] = states_;
   run["phases"] = phases_;
   run["events"] = events_;
@@ -130,7 +147,7 @@ ReportJson ReportRun::json() const {
   run["map"] = versions_.json();
   run["searches"] = searches_;
   if (!pictures_.empty()) {
-    run["pictures"] = pictures_;
+    run["pictures"] = pictures_json();
   } else {
     run["missing"]["pictures"] = "The file has no pictures: record them with --record all.";
   }
