@@ -136,6 +136,9 @@ TEST(ClimbReport, PassingFoot_MustClearTheTreadItPasses) {
       climb.swing(Foot::kLeft, climb.on_step(2, Foot::kLeft), 2);
       EXPECT_LT(climb.finish().swing_clearance_min_m, -0.005);
       EXPECT_FALSE(climb.finish().pass);
+      const std::vector<Footstep> steps = climb.finish().footsteps;
+      EXPECT_EQ(steps.back().swing_clearance_m, climb.finish().swing_clearance_min_m);  // of that swing alone
+      EXPECT_GT(steps.front().swing_clearance_m, 0.0);
     }
   }
 }
