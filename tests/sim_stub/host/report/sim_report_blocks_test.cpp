@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim_stub/host/report/report_blocks.hpp"
-
 #include <gtest/gtest.h>
 
 #include <array>
+
+#include "sim_stub/host/report/report_blocks.hpp"
 
 namespace polygmap::sim {
 namespace {
