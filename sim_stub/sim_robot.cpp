@@ -55,7 +55,8 @@ Transform start_transform(const StartPose& start) {
 std::unique_ptr<Plant> make_plant(const SimOptions& options, const StairWorld& stairs, const RobotErrors& errors,
                                   const StartPose& start, StandController& holder) {
   if (options.plant_kind == PlantKind::kMujoco) {
-    auto plant = make_mujoco_plant(options.mujoco, stairs, errors, start_transform(start), standing_q_rad());
+    auto plant =
+        make_mujoco_plant(options.mujoco, stairs, errors, start_transform(start), standing_q_rad(), start.height_m);
     constexpr int kSettle_ticks = 1000;  // it has stood there for a while
     for (int i = 0; i < kSettle_ticks; ++i) plant->step(holder.command(*plant));
     return plant;
@@ -72,7 +73,7 @@ StartPose draw_start(std::uint64_t seed) {
 }
 
 SimRobot::SimRobot(const SimOptions& options)
-    : stairs_(make_stairs(options.stairs, options.seed, options.stair_errors)),
+    : stairs_(options.world ? *options.world : make_stairs(options.stairs, options.seed, options.stair_errors)),
       start_(options.start.value_or(draw_start(options.seed))),
       error_params_(options.errors),
       errors_(draw_errors(options.errors, options.seed)),

@@ -29,11 +29,12 @@
 
 namespace polygmap::sim {
 
-// Where the robot starts, standing on the floor.
+// Where the robot starts.
 struct StartPose {
-  double distance_m = 0.5;  // from the base to the first riser along the stairs' axis
+  double distance_m = 0.5;  // from the base to x = 0, the first riser
   double lateral_m = 0.0;
   double yaw_rad = 0.0;
+  double height_m = 0.0;  // of what it stands on
 };
 // 0.35-0.8 m, +-0.15 m, +-10 degrees.
 [[nodiscard]] StartPose draw_start(std::uint64_t seed);
@@ -42,6 +43,7 @@ struct SimOptions {
   std::uint64_t seed = 1;
   StairParams stairs;
   StairErrors stair_errors;
+  std::optional<StairWorld> world;  // in the stead of stairs
   NoiseKind noise = NoiseKind::kWhite;
   CameraIntrinsics intrinsics = robot_camera_intrinsics();
   DepthNoiseModel depth_sigma;

@@ -10,8 +10,8 @@ namespace {
 
 std::vector<SolidBox> rendered_solids(const StairWorld& world, const DepthCameraOptions& options) {
   std::vector<SolidBox> solids;
-  for (SolidBox solid : stair_solids(world)) {
-    if (solid.step == options.missing_step) continue;
+  for (SolidBox solid : solids_of(world)) {
+    if (solid.step == options.missing_step || solid.is_glass) continue;
     solid.true_T_solid.p_m += options.stairs_shift_m;
     solids.push_back(solid);
   }

@@ -19,6 +19,18 @@ struct AlongRow {
   [[nodiscard]] double z(int u, double depth_m) const { return at.z() + depth_m * (at_zero.z() + u * per_px.z()); }
 };
 
+// Whether what is seen at that depth is in or behind the box: its numbers along the box's axes.
+bool is_behind(const AlongRow& box_p, const Vec3& half_m, int u, double depth_m) {
+  double enters_m = 0.0, leaves_m = depth_m;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double from_m = box_p.at[axis], per_m = box_p.at_zero[axis] + u * box_p.per_px[axis];
+    const double a_m = (-half_m[axis] - from_m) / per_m, b_m = (half_m[axis] - from_m) / per_m;
+    enters_m = std::max(enters_m, std::min(a_m, b_m));
+    leaves_m = std::min(leaves_m, std::max(a_m, b_m));
+  }
+  return enters_m < leaves_m;
+}
+
 double drawn(const CounterNoise& noise, std::uint64_t a, std::uint64_t b, std::uint64_t c) {
   return noise.uniform(mix64(mix64(mix64(a + 1) ^ b) ^ c));
 }
@@ -63,7 +75,10 @@ class DepthHoles::Draws {
 };
 
 DepthHoles::DepthHoles(const CameraErrors& errors, const StairWorld& world, std::uint64_t seed)
-    : errors_(errors), half_width_m_(world.half_width_m), noise_(seed, Stream::kTreadHoles) {
+    : errors_(errors), noise_(seed, Stream::kTreadHoles) {
+  for (const SolidBox& solid : world.solids) {
+    if (solid.is_glass) glass_.push_back(solid.box());
+  }
   for (std::size_t k = 0; k < world.steps.size(); ++k) {
     const Step& step = world.steps[k];
     treads_.push_back({step.true_T_step.inverse(), step, noise_.uniform(k) < errors.hole_treads});
@@ -86,16 +101,17 @@ bool DepthHoles::is_lost(const Tread& tread, const Vec3& step_p_m, int u, int v,
 bool DepthHoles::is_on(const Step& step, const Vec3& step_p_m) const {
   const double round_m = step_p_m.x() < step.edge_x_m() ? step.worn_m : 0.0;
   return step_p_m.z() - step.height_m >= -kOn_m - round_m && step_p_m.x() >= step.nosing_x_m - kOn_m &&
-         step_p_m.x() <= step.back_x_m + step.beneath_m && std::abs(step_p_m.y()) <= half_width_m_;
+         step_p_m.x() <= step.back_x_m + step.beneath_m && std::abs(step_p_m.y()) <= step.half_width_m;
 }
 
 void DepthHoles::apply(const DepthRenderer& picture, const DepthScene& first, const DepthScene& last,
                        std::uint64_t frame, std::uint16_t* depth) const {
-  if (std::max({errors_.dark_share, errors_.shiny_share, errors_.nosing_strip_m, errors_.sun_patch_m}) <= 0.0) return;
+  const double holes = std::max({errors_.dark_share, errors_.shiny_share, errors_.nosing_strip_m, errors_.sun_patch_m});
+  if (holes <= 0.0 && glass_.empty()) return;
   const CameraIntrinsics& k = picture.intrinsics();
   const Transform &from = first.true_T_camera, &to = last.true_T_camera;
   Draws draws(errors_, noise_, frame);
-  std::vector<AlongRow> step_p(treads_.size());
+  std::vector<AlongRow> step_p(treads_.size()), glass_p(glass_.size());
   const bool sun = errors_.sun_patch_m > 0.0;
   for (int v = 0; v < k.height_px; ++v) {
     const double s = picture.moment_of(v);
@@ -108,6 +124,10 @@ void DepthHoles::apply(const DepthRenderer& picture, const DepthScene& first, co
       const Transform& step_T_true = treads_[i].step_T_true;
       step_p[i] = {step_T_true * true_p.at, step_T_true.R * true_p.at_zero, step_T_true.R * true_p.per_px};
     }
+    for (std::size_t i = 0; i < glass_.size(); ++i) {
+      const Transform glass_T_true = glass_[i].centre.inverse();
+      glass_p[i] = {glass_T_true * true_p.at, glass_T_true.R * true_p.at_zero, glass_T_true.R * true_p.per_px};
+    }
     const float* inverse_depth = picture.inverse_depth(v);
     for (int u = 0; u < k.width_px; ++u, ++depth) {
       if (*depth == 0 || inverse_depth[u] <= 0.0F) continue;
@@ -115,6 +135,9 @@ void DepthHoles::apply(const DepthRenderer& picture, const DepthScene& first, co
       if (sun && off_ray(u, depth_m).squaredNorm() < math::square(errors_.sun_patch_m)) {
         *depth = 0;
         continue;
+      }
+      for (std::size_t i = 0; i < glass_.size(); ++i) {
+        if (is_behind(glass_p[i], glass_[i].half_m, u, depth_m)) *depth = 0;
       }
       for (std::size_t i = 0; i < treads_.size(); ++i) {
         const Tread& tread = treads_[i];

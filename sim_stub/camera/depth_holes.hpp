@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pixels without depth for what they show: dark and shiny treads, strips along the nosings, sunlight.
+// Pixels without depth for what they show: dark and shiny treads, strips along the nosings, sunlight, glass.
 #pragma once
 
 #include <cstdint>
@@ -33,9 +33,9 @@ class DepthHoles {
   [[nodiscard]] bool is_lost(const Tread& tread, const Vec3& step_p_m, int u, int v, Draws& draws) const;
 
   CameraErrors errors_;
-  double half_width_m_;
   CounterNoise noise_;
   std::vector<Tread> treads_;
+  std::vector<OrientedBox> glass_;
   Vec3 sun_place_m_ = Vec3::Zero(), sun_ray_ = Vec3::UnitZ();
 };
 

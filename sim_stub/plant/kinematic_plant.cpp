@@ -56,7 +56,7 @@ double smooth_step(double x) {
 
 KinematicPlant::KinematicPlant(const Params& params, const StairWorld& world, const RobotErrors& errors,
                                const Transform& true_T_start, const JointVector& q_rad)
-    : params_(params), world_(world), errors_(errors), solids_(stair_solids(world)), q_(q_rad), led_q_(q_rad) {
+    : params_(params), world_(world), errors_(errors), solids_(solids_of(world)), q_(q_rad), led_q_(q_rad) {
   update_leg_kinematics();
   for (FootState& foot : feet_) {
     foot.true_T_sole = flattened(true_T_start * foot.base_T_sole);

@@ -134,7 +134,7 @@ std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& wo
   xml.add("<default class='ground'><geom contype='1' conaffinity='2'/></default></default>");
   xml.add("<worldbody><geom class='ground' name='floor' type='plane' size='0 0 1'/>");
   std::size_t number = 0;
-  for (const SolidBox& solid : stair_solids(world)) add_solid(xml, solid, number++);
+  for (const SolidBox& solid : solids_of(world)) add_solid(xml, solid, number++);
   const LinkMass torso = nominal_robot().masses.torso;
   xml.add("<body name='base'><freejoint/>");
   const double wide = std::sqrt(params.inertia_scale);

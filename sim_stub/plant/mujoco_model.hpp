@@ -9,7 +9,7 @@
 namespace polygmap::sim {
 
 // Bodies "base", "left_1".."right_6" (one per joint, in the order of LegJoint), geoms "floor" and "solid_K", the boxes
-// of stair_solids().
+// of solids_of().
 [[nodiscard]] std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& world,
                                        const RobotErrors& errors);
 

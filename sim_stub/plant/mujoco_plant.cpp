@@ -59,7 +59,7 @@ void MujocoPlant::Delete::operator()(mjModel* model) const noexcept { mj_deleteM
 void MujocoPlant::Delete::operator()(mjData* data) const noexcept { mj_deleteData(data); }
 
 MujocoPlant::MujocoPlant(const Params& params, const StairWorld& world, const RobotErrors& errors,
-                         const Transform& true_T_start, const JointVector& q_rad)
+                         const Transform& true_T_start, const JointVector& q_rad, double ground_m)
     : params_(params), errors_(errors), model_(compile(mujoco_model(params, world, errors))) {
   data_.reset(mj_makeData(model_.get()));
   feet_[0].body = mj_name2id(model_.get(), mjOBJ_BODY, "left_6");
@@ -70,14 +70,14 @@ MujocoPlant::MujocoPlant(const Params& params, const StairWorld& world, const Ro
     v_at_[j] = model_->jnt_dofadr[joint];
   }
 
-  // Upright, the lower sole on the floor.
+  // Upright, the lower sole on what it starts on.
   const JointVector true_q = q_rad - errors.encoder_offset_rad;
   double drop_m = 0.0;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     drop_m = std::min(drop_m, base_T_sole(errors.legs[index_of(leg)], leg, leg_joints(true_q, leg)).p_m.z());
   }
   const double yaw = yaw_of(true_T_start.R);
-  const Vec3 p_m{true_T_start.p_m.x(), true_T_start.p_m.y(), -drop_m};
+  const Vec3 p_m{true_T_start.p_m.x(), true_T_start.p_m.y(), ground_m - drop_m};
   for (int a = 0; a < 3; ++a) data_->qpos[a] = p_m[a];
   data_->qpos[3] = std::cos(0.5 * yaw);
   data_->qpos[6] = std::sin(0.5 * yaw);
@@ -219,8 +219,8 @@ Vec3 MujocoPlant::true_p_com_m() const noexcept {
 
 std::unique_ptr<Plant> make_mujoco_plant(const MujocoPlant::Params& params, const StairWorld& world,
                                          const RobotErrors& errors, const Transform& true_T_start,
-                                         const JointVector& q_rad) {
-  return std::make_unique<MujocoPlant>(params, world, errors, true_T_start, q_rad);
+                                         const JointVector& q_rad, double ground_m) {
+  return std::make_unique<MujocoPlant>(params, world, errors, true_T_start, q_rad, ground_m);
 }
 
 }  // namespace polygmap::sim

@@ -68,9 +68,10 @@ class MujocoPlant final : public Plant {
     }
   };
 
-  // Stands with the middle of the soles below true_T_start (x, y and yaw are used) and the drives at q_rad.
+  // Stands with the middle of the soles below true_T_start (x, y and yaw are used), at the height of the
+  // ground there, and the drives at q_rad.
   MujocoPlant(const Params& params, const StairWorld& world, const RobotErrors& errors, const Transform& true_T_start,
-              const JointVector& q_rad);
+              const JointVector& q_rad, double ground_m = 0.0);
   ~MujocoPlant() override;
 
   // Two steps of 1 ms. It goes on after a fall: what falls, falls.
@@ -133,6 +134,6 @@ class MujocoPlant final : public Plant {
 // As its constructor. A program without the physics library has one that refuses.
 [[nodiscard]] std::unique_ptr<Plant> make_mujoco_plant(const MujocoPlant::Params& params, const StairWorld& world,
                                                        const RobotErrors& errors, const Transform& true_T_start,
-                                                       const JointVector& q_rad);
+                                                       const JointVector& q_rad, double ground_m = 0.0);
 
 }  // namespace polygmap::sim

@@ -12,27 +12,10 @@
 
 namespace polygmap::sim {
 
-inline constexpr int kFloorStep = -1;     // the floor among step indices
-inline constexpr int kObstacleStep = -2;  // what is no step: posts, boxes
-
-// A box along its own axes, with all that is nearer to it than round_m.
-struct SolidBox {
-  Vec3 min_m;
-  Vec3 max_m;
-  int step;
-  Transform true_T_solid{};
-  double round_m = 0.0;
-
-  [[nodiscard]] Vec3 half_m() const noexcept { return 0.5 * (max_m - min_m); }
-  // About its middle, without what is round.
-  [[nodiscard]] OrientedBox box() const noexcept {
-    return {{true_T_solid.R, true_T_solid * Vec3(0.5 * (min_m + max_m))}, half_m()};
-  }
-};
 // Every step as a solid standing on the ground; with a nosing, its slab as a second solid; a worn one is a round bar
-// between boxes; then the obstacles. The steps reach below the floor, so that nothing is ever pushed out downwards.
-// Camera, physics and report have no other description of the staircase.
-[[nodiscard]] std::vector<SolidBox> stair_solids(const StairWorld& world);
+// between boxes; then the obstacles. The steps reach below the floor, so that nothing is ever pushed out downwards. Of
+// a world file, its solids. Camera, physics and report have no other description of the world.
+[[nodiscard]] std::vector<SolidBox> solids_of(const StairWorld& world);
 // A round bar as a capsule, its ends within the solid's sides.
 [[nodiscard]] Capsule bar_of(const SolidBox& solid) noexcept;
 
@@ -48,6 +31,8 @@ struct SolidBox {
 
 // Least signed distance of the contact rectangle's corners, seen from above, to the edges of the tread of one step
 // (nosing, next riser, sides; the landing's far end); negative = overhang. For kFloorStep the edge is the staircase.
+// In a world file's, tops within kSameTop_m of each other are one, and the floor has no edge.
+inline constexpr double kSameTop_m = 0.005;
 [[nodiscard]] double sole_margin_m(const Transform& true_T_sole, const StairWorld& world, int step,
                                    const SoleModel& sole = nominal_robot().sole) noexcept;
 // The same for one point.

@@ -73,6 +73,7 @@ StairWorld make_stairs(const StairParams& params, std::uint64_t seed, const Stai
     x_m += landing ? params.landing_m : tread_m;
     step.back_x_m = x_m;
     step.height_m = z_m;
+    step.half_width_m = world.half_width_m;
     step.worn_m = errors.worn_nosing_m;
     // About y, a positive angle lowers what is ahead.
     const double slope_rad = within(1, errors.tread_slope_rad) - errors.tread_fall_rad;

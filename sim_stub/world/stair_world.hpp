@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// The true staircase of the simulation. True world frame: x up the stairs, y left, z up; level floor at z = 0; the
-// first riser stands at x = 0, the staircase is centred on y = 0.
+// The true staircase of the simulation, or the world of a file (world_file.hpp). True world frame: z up, level floor at
+// z = 0; of a staircase x up the stairs, y left, the first riser at x = 0, the middle at y = 0.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "algorithms/core/math/transform.hpp"
+#include "algorithms/robot/body_shapes.hpp"
 
 namespace polygmap::sim {
 
@@ -62,8 +65,28 @@ struct StairErrors {
 // A tread with a nosing is a slab of this thickness that overhangs its riser.
 inline constexpr double kTreadSlab_m = 0.03;
 
+inline constexpr int kFloorStep = -1;     // the floor among step indices
+inline constexpr int kObstacleStep = -2;  // what is no step: posts, boxes
+
+// A box along its own axes, with all that is nearer to it than round_m.
+struct SolidBox {
+  Vec3 min_m;
+  Vec3 max_m;
+  int step;
+  Transform true_T_solid{};
+  double round_m = 0.0;
+  bool is_glass = false;  // it gives no depth, and nor does what is behind it
+
+  [[nodiscard]] Vec3 half_m() const noexcept { return 0.5 * (max_m - min_m); }
+  // About its middle, without what is round.
+  [[nodiscard]] OrientedBox box() const noexcept {
+    return {{true_T_solid.R, true_T_solid * Vec3(0.5 * (min_m + max_m))}, half_m()};
+  }
+};
+
 // Step k (1-based in speech, index k - 1): a tread from its nosing to the next riser. Its numbers are along its own
-// axes: those of the true world, turned about the middle of its nosing.
+// axes: those of the true world, turned about the middle of its nosing; of a world file's solid the solid's, about the
+// middle of its top.
 struct Step {
   double riser_x_m = 0.0;   // plane of the riser beneath the tread
   double nosing_x_m = 0.0;  // front edge of the tread: riser_x_m - nosing
@@ -72,6 +95,8 @@ struct Step {
   double worn_m = 0.0;      // radius of the nosing
   double beneath_m = 0.0;   // how far it reaches beneath the next step, which is turned otherwise
   Transform true_T_step{};  // a level, square step has the true world's axes
+  double half_width_m = 0.6;
+  std::string name{};  // of a world file's solid
 
   // Where the tread is flat from.
   [[nodiscard]] double edge_x_m() const noexcept { return nosing_x_m + worn_m; }
@@ -85,10 +110,22 @@ struct Step {
   [[nodiscard]] double top_m(double x_m, double y_m) const noexcept;
 };
 
+// Where somebody is to stand.
+struct WorldPlace {
+  double x_m = 0.0, y_m = 0.0;
+  std::optional<double> yaw_rad;
+  int step = kFloorStep;
+};
+
 struct StairWorld {
+  // What can be stood on beside the floor: a staircase's from the lowest up, a world file's in its order.
   std::vector<Step> steps;
   double half_width_m = 0.6;
   std::vector<Obstacle> obstacles;  // posts among them; seen and collided with, never stood on
+  // Of a world file alone: all that is seen and collided with, and where the robot is to go.
+  bool is_staircase = true;
+  std::vector<SolidBox> solids;
+  std::optional<WorldPlace> goal;
 
   // Height of the highest step at (x, y): 0 beside, before and behind the staircase. Index of its step in *step
   // (-1: floor).

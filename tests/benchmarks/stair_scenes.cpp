@@ -39,7 +39,7 @@ constexpr std::array<Place, 6> kPlaces{{
 
 StairScene scene_at(const Place& place) {
   const sim::StairWorld world = sim::make_stairs(place.stairs, place.seed);
-  const std::vector<sim::SolidBox> solids = sim::stair_solids(world);
+  const std::vector<sim::SolidBox> solids = sim::solids_of(world);
   Vec3 ground{-kBeforeStairs_m, 0.0, 0.0};
   if (place.step > 0) {
     const sim::Step& step = world.steps[static_cast<std::size_t>(place.step - 1)];

@@ -42,7 +42,7 @@ class RenderedMapTest : public testing::Test {
 
   // Off the module's knowledge: narrow enough that both sides of a tread are in the picture.
   const sim::StairWorld world_ = sim::make_stairs({.steps = 4, .width_m = 0.7, .jitter_m = 0.0}, 1);
-  const std::vector<sim::SolidBox> solids_ = sim::stair_solids(world_);
+  const std::vector<sim::SolidBox> solids_ = sim::solids_of(world_);
   const CameraIntrinsics k_ = robot_camera_intrinsics();
   sim::DepthRenderer renderer_{k_};
   sim::CameraNoise noise_{{}, k_, 1};

@@ -139,7 +139,7 @@ TEST(PhysicalFailure, TreadsTenMillimetresNearerThanSeen_ToesMissTheRisers) {
   SimOptions options = stairs_of(2, 2);
   options.camera.stairs_shift_m.x() = 0.010;
   PhysicalClimb climb(options);
-  const auto solids = stair_solids(climb.stairs());
+  const auto solids = solids_of(climb.stairs());
   double least_m = 1.0;  // of a toe in the air to the riser behind the tread it goes to
   while (climb.time_s() < 60.0 && climb.tick()) {
     if (climb.status().phase != GaitPhase::kSwing || !climb.status().step.onto_tread) continue;

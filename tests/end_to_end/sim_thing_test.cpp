@@ -21,7 +21,7 @@ SimOptions with_cube(double x_m, double y_m, double side_m) {
 
 // Runs it to its end; the least distance of a sole to the cube on the way, 0 or less where it touched it.
 double least_to_cube_m(PhysicalClimb& climb, double limit_s) {
-  std::vector<SolidBox> cubes = stair_solids(climb.stairs());
+  std::vector<SolidBox> cubes = solids_of(climb.stairs());
   std::erase_if(cubes, [](const SolidBox& solid) { return solid.step != kObstacleStep; });
   EXPECT_EQ(cubes.size(), 1U);
   double least_m = std::numeric_limits<double>::infinity();

@@ -33,7 +33,7 @@
 namespace polygmap::sim {
 
 std::unique_ptr<Plant> make_mujoco_plant(const MujocoPlant::Params&, const StairWorld&, const RobotErrors&,
-                                         const Transform&, const JointVector&) {
+                                         const Transform&, const JointVector&, double) {
   vm::refuse("there is no physics in the guest");
 }
 

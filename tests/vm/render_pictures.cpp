@@ -16,7 +16,7 @@ class Renderer {
  public:
   explicit Renderer(const sim::SimOptions& options)
       : robot_(options),
-        solids_(sim::stair_solids(robot_.stairs())),
+        solids_(sim::solids_of(robot_.stairs())),
         renderer_(robot_.depth_camera().intrinsics()),
         noise_({.scale = robot_.errors().depth_scale, .strength = sim::ErrorParams{}.depth_noise},
                robot_.depth_camera().intrinsics(), options.seed),

@@ -215,6 +215,10 @@ void declare_files(CLI::App& climb, ClimbArguments& a) {
 
 void declare(CLI::App& climb, ClimbArguments& a) {
   declare_stairs(climb, a.options.stairs);
+  climb
+      .add_option("--world", a.options.world_file,
+                  "A world of boxes with a start and a goal in the staircase's stead, see docs/reference/world.md")
+      ->type_name("WORLD.toml");
   keep_among(
       *climb
            .add_option("--plant", a.plant,
@@ -299,6 +303,19 @@ std::string plant_complaint(ClimbArguments& a) {
   a.options.gait = a.gait == "ss" ? GaitPattern::kSingleStep : GaitPattern::kDoubleStep;
   a.options.plant = a.plant == "mujoco" ? PlantKind::kMujoco : PlantKind::kKinematic;
   a.options.foot_sensors = a.contacts == "sensed";
+  return {};
+}
+
+// Throws config::FileError.
+std::string world_complaint(ClimbArguments& a) {
+  if (a.options.world_file.empty()) return {};
+  for (const char* name : {"--steps", "--rise", "--tread", "--width", "--nosing", "--landing", "--jitter",
+                           "--balusters", "--obstacle", "--render-missing-step"}) {
+    if (a.said->count(name) > 0) return std::string(name) + " is of a staircase, and --world has none.";
+  }
+  if (a.options.plant != PlantKind::kMujoco)
+    return "--world needs --plant mujoco: the kinematic plant knows stairs alone.";
+  a.options.world = read_world(a.options.world_file);
   return {};
 }
 
@@ -438,7 +455,7 @@ std::string complaint(ClimbArguments& a) {
   try {
     take_params(a);
     std::string sentence = stairs_complaint(a.options.stairs);
-    for (const auto part : {balusters_complaint, plant_complaint, pushes_complaint, operator_complaint,
+    for (const auto part : {balusters_complaint, plant_complaint, world_complaint, pushes_complaint, operator_complaint,
                             errors_complaint, reality_complaint, camera_complaint, bus_complaint, picture_complaint}) {
       if (sentence.empty()) sentence = part(a);
     }
@@ -448,6 +465,8 @@ std::string complaint(ClimbArguments& a) {
   }
   a.options.self_filter = !a.no_self_filter;
   a.options.estimate_mount = !a.no_mount_estimate;
+  constexpr double kWorldLimit_s = 300.0;
+  if (a.options.world) a.options.time_limit_s = kWorldLimit_s;
   a.options.time_limit_s =
       std::max(a.options.time_limit_s, kTimeLimit_s + kTimeLimitPerStep_s * a.options.stairs.steps);
   return {};

@@ -107,6 +107,11 @@ SimOptions sim_options(const ClimbOptions& options) {
   SimOptions sim;
   sim.seed = options.seed;
   sim.stairs = options.stairs;
+  if (options.world) {
+    const WorldPlace& start = options.world->start;
+    sim.world = options.world->world;
+    sim.start = {-start.x_m, start.y_m, start.yaw_rad.value_or(0.0), options.world->start_height_m};
+  }
   sim.noise = options.noise;
   sim.plant_kind = options.plant;
   sim.pushes = options.pushes;

@@ -14,6 +14,7 @@
 #include "firmware/params.hpp"
 #include "sim_stub/camera/noise_kind.hpp"
 #include "sim_stub/host/operator/climb_operator.hpp"
+#include "sim_stub/host/world_file.hpp"
 #include "sim_stub/reality.hpp"
 #include "sim_stub/world/stair_world.hpp"
 
@@ -28,6 +29,8 @@ namespace polygmap::sim {
 
 struct ClimbOptions {
   StairParams stairs;
+  std::optional<WorldFile> world;  // in their stead
+  std::string world_file;          // that it was read from
   std::uint64_t seed = 1;
   NoiseKind noise = NoiseKind::kWhite;
   PlantKind plant = PlantKind::kMujoco;

@@ -32,9 +32,19 @@ Vec3 level_frame_p(const Transform& any_T_sole, const Vec3& any_p_m) {
   return rotation_z(yaw_of(any_T_sole.R)).transpose() * (any_p_m - any_T_sole.p_m);
 }
 
-// Along the sole's axis from the nosing to the sole's origin.
-double nosing_distance_m(const Step& step, const Transform& true_T_sole) {
+// Along the sole's axis from the nosing to the sole's origin; of a world file's top, from whichever edge is behind it.
+double nosing_distance_m(const Step& step, const Transform& true_T_sole, bool is_staircase) {
   const Transform step_T_sole = step.true_T_step.inverse() * true_T_sole;
+  if (!is_staircase) {
+    const Vec2 back = -unit_at(yaw_of(step_T_sole.R));
+    const Vec2 half_m{step.back_x_m, step.half_width_m};
+    double way_m = std::numeric_limits<double>::infinity();
+    for (const int axis : {0, 1}) {
+      if (back[axis] == 0.0) continue;
+      way_m = std::min(way_m, (std::copysign(half_m[axis], back[axis]) - step_T_sole.p_m[axis]) / back[axis]);
+    }
+    return way_m;
+  }
   return (step_T_sole.p_m.x() - step.nosing_x_m) / std::cos(yaw_of(step_T_sole.R));
 }
 
@@ -43,10 +53,11 @@ double nosing_distance_m(const Step& step, const Transform& true_T_sole) {
 ClimbReport::ClimbReport(StairWorld world, const Transform& true_base_T_camera, const CameraIntrinsics& intrinsics,
                          const SoleModel& true_sole)
     : world_(std::move(world)),
-      solids_(stair_solids(world_)),
+      solids_(solids_of(world_)),
       true_base_T_camera_(true_base_T_camera),
       true_sole_(true_sole),
       visibility_(world_, intrinsics),
+      route_(world_),
       climbed_(world_.steps.size(), false) {}
 
 void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
@@ -70,6 +81,7 @@ void ClimbReport::observe(const Truth& truth, const Telemetry& telemetry) {
     observe_tracking(truth, telemetry.gait);
     observe_balance(truth, telemetry);
   }
+  route_.observe(truth);
   observe_soles(truth, telemetry.gait.step.onto_tread);
   observe_stance(truth);
   observe_steps_climbed(truth);
@@ -172,12 +184,13 @@ void ClimbReport::observe_landing(const Truth& truth) {
   if (!f.onto_tread || world_.steps.empty()) return;
 
   if (target_mapped_ && f.step_index >= 0) {
-    f.along_error_m = target_.nosing_distance_m -
-                      nosing_distance_m(world_.steps[static_cast<std::size_t>(f.step_index)], true_T_sole);
+    f.along_error_m =
+        target_.nosing_distance_m -
+        nosing_distance_m(world_.steps[static_cast<std::size_t>(f.step_index)], true_T_sole, world_.is_staircase);
   } else if (target_mapped_) {
     // It stands on the floor although a tread was meant: the nosing that makes the error least is the meant one.
     for (const Step& step : world_.steps) {
-      const double error_m = target_.nosing_distance_m - nosing_distance_m(step, true_T_sole);
+      const double error_m = target_.nosing_distance_m - nosing_distance_m(step, true_T_sole, world_.is_staircase);
       if (!(std::abs(f.along_error_m) <= std::abs(error_m))) f.along_error_m = error_m;
     }
   }
@@ -214,7 +227,8 @@ void ClimbReport::observe_balance(const Truth& truth, const Telemetry& telemetry
 }
 
 double ClimbReport::flight_clearance_m(const Flight& flight, int to_step, double at_most_m) const {
-  const std::array excluded{flight.from_step, to_step};
+  // What stands in the way is no less so where a foot stands on it.
+  const std::array excluded{std::max(flight.from_step, kFloorStep), std::max(to_step, kFloorStep)};
   for (const Transform& true_T_sole : flight.true_T_sole) {
     at_most_m = clearance_m(collision_box(true_sole_, true_T_sole), solids_, excluded, at_most_m);
   }
@@ -244,7 +258,8 @@ void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
       landed_ns_[foot] = truth.stamp_ns;
     }
     last_step_[foot] = step;
-    clearance_min_m_ = clearance_m(collision_box(true_sole_, true_T_sole), solids_, std::array{step}, clearance_min_m_);
+    clearance_min_m_ = clearance_m(collision_box(true_sole_, true_T_sole), solids_,
+                                   std::array{std::max(step, kFloorStep)}, clearance_min_m_);
     if (step < 0 || truth.stamp_ns - landed_ns_[foot] < kRest_ns) continue;
     const double margin_m = sole_margin_m(true_T_sole, world_, step, true_sole_);
     keep_min(sole_margin_min_m_, margin_m);
@@ -256,7 +271,7 @@ void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
 void ClimbReport::observe_stance(const Truth& truth) {
   if (!truth.in_contact[0] || !truth.in_contact[1]) return;
   closure_error_m_.push_back(truth.closure_error_m);
-  if (world_.steps.empty() || first_lift_off_ns_ >= 0) return;
+  if (!world_.is_staircase || world_.steps.empty() || first_lift_off_ns_ >= 0) return;
   double toe_x_m = -std::numeric_limits<double>::infinity();
   for (const Transform& true_T_sole : truth.true_T_sole) {
     const OrientedBox box = collision_box(true_sole_, world_.steps.front().true_T_step.inverse() * true_T_sole);
@@ -266,6 +281,7 @@ void ClimbReport::observe_stance(const Truth& truth) {
 }
 
 void ClimbReport::observe_steps_climbed(const Truth& truth) {
+  if (!world_.is_staircase) return;
   const int step = std::min(truth.step_index[0], truth.step_index[1]);
   bool rests = step >= 0 && truth.in_contact[0] && truth.in_contact[1];
   for (std::size_t foot = 0; rests && foot < kFootCount; ++foot) {
@@ -295,7 +311,10 @@ int ClimbReport::meant_step(Foot foot, const Flight& flight) const {
   if (!flight_onto_tread_) return flight.from_step;
   if (footsteps_.empty() || footsteps_.back().foot != foot) return flight.from_step + 1;
   const auto off_m = [this](const Step& step) {
-    return std::abs(footsteps_.back().true_T_planned.p_m.z() - step.height_m);
+    const Vec3& planned_m = footsteps_.back().true_T_planned.p_m;
+    if (world_.is_staircase) return std::abs(planned_m.z() - step.height_m);
+    const Vec3 p_m = step.true_T_step.inverse() * planned_m;
+    return std::max({std::abs(p_m.z()), std::abs(p_m.x()) - step.back_x_m, std::abs(p_m.y()) - step.half_width_m});
   };
   const auto nearest = std::ranges::min_element(world_.steps, {}, off_m);
   return static_cast<int>(nearest - world_.steps.begin());
@@ -318,7 +337,8 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
   s.bus = run.bus;
   s.camera = run.camera;
   s.fell = fell_;
-  s.steps_total = static_cast<int>(world_.steps.size());
+  s.steps_total = world_.is_staircase ? static_cast<int>(world_.steps.size()) : 0;
+  s.route = route_.figures();
   s.steps_climbed = steps_climbed_;
   const bool module_ended = ending_.phase == GaitPhase::kFinished || ending_.phase == GaitPhase::kStopped ||
                             ending_.module_state == ModuleState::kFallen || ending_.arming_waits_for.leans();

@@ -16,6 +16,7 @@
 #include "sim_stub/host/climb/climb_svg.hpp"
 #include "sim_stub/host/climb/climb_verdict.hpp"
 #include "sim_stub/host/climb/odometry_report.hpp"
+#include "sim_stub/host/climb/route_report.hpp"
 #include "sim_stub/host/climb/surface_match.hpp"
 #include "sim_stub/nominal_robot.hpp"
 #include "sim_stub/robot_camera.hpp"
@@ -99,6 +100,7 @@ class ClimbReport {
   ClimbEnding ending_;
 
   OdometryReport odometry_;
+  RouteReport route_;
 
   std::uint32_t frame_sequence_ = 0;
   std::int64_t frame_stamp_ns_ = 0;

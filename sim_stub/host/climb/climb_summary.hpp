@@ -15,6 +15,7 @@
 #include "algorithms/core/math/transform.hpp"
 #include "algorithms/core/messages/samples.hpp"
 #include "sim_stub/host/climb/climb_options.hpp"
+#include "sim_stub/host/climb/route_report.hpp"
 
 namespace polygmap::sim {
 
@@ -109,6 +110,8 @@ struct ClimbSummary {
   std::vector<StateChange> states;  // the module's, the first one included
   CameraFigures camera;
   std::optional<BusFigures> bus;
+  RouteFigures route;
+  std::string stop_sentence;  // of the module, where it stopped
   int steps_total = 0;
   int steps_climbed = 0;  // both true soles rested on it or above, inside their treads' edges
   double climb_time_s = kNotMeasured;

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <span>
 
+#include "algorithms/geometry/convex.hpp"
 #include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
@@ -188,6 +189,7 @@ void add_stairs_from_the_side(std::string& out, const View& view, const StairWor
   std::vector<Vec3> profile_m{{x_m.low, 0, floor_bottom_m}, {x_m.low, 0, 0}};
   double below_m = 0.0;
   for (const Step& s : world.steps) {
+    if (!world.is_staircase) break;
     const double slab_m = std::min(kTreadSlab_m, s.height_m - below_m);
     profile_m.emplace_back(s.riser_x_m, 0, below_m);
     if (s.nosing_x_m < s.riser_x_m) {
@@ -198,7 +200,7 @@ void add_stairs_from_the_side(std::string& out, const View& view, const StairWor
     below_m = s.top_m(s.back_x_m, 0.0);
     if (s.turned()) profile_m.emplace_back(s.back_x_m, 0, below_m);
   }
-  if (!world.steps.empty()) {
+  if (world.is_staircase && !world.steps.empty()) {
     profile_m.emplace_back(world.steps.back().back_x_m, 0, below_m);
     profile_m.emplace_back(world.steps.back().back_x_m, 0, 0);
   }
@@ -214,6 +216,7 @@ void add_stairs_from_above(std::string& out, const View& view, const StairWorld&
   std::string style;
   add(style, "fill=\"%s\" stroke=\"%s\" stroke-width=\"1.2\"", kStairFill, kStairLine);
   for (const Step& s : world.steps) {
+    if (!world.is_staircase) break;
     std::array<Vec3, 4> tread_m{{{s.nosing_x_m, -w, s.height_m},
                                  {s.back_x_m, -w, s.height_m},
                                  {s.back_x_m, w, s.height_m},
@@ -228,8 +231,36 @@ void add_stairs_from_above(std::string& out, const View& view, const StairWorld&
   }
 }
 
+// Each as its outline, the nearest last.
+void add_solids(std::string& out, const View& view, const StairWorld& world) {
+  std::vector<const SolidBox*> solids;
+  for (const SolidBox& solid : world.solids) solids.push_back(&solid);
+  const int toward = view.up == 1 ? 2 : 1;  // from above, or from the right
+  const double sign = view.up == 1 ? 1.0 : -1.0;
+  std::ranges::stable_sort(solids, {}, [&](const SolidBox* solid) { return sign * solid->true_T_solid.p_m[toward]; });
+  for (const SolidBox* solid : solids) {
+    const OrientedBox box = solid->box();
+    ConvexPolygon seen;
+    for (unsigned i = 0; i < 8; ++i) {
+      const Vec3 corner{(i & 1U) != 0U ? 1.0 : -1.0, (i & 2U) != 0U ? 1.0 : -1.0, (i & 4U) != 0U ? 1.0 : -1.0};
+      const Vec3 there_m = box.centre * Vec3(corner.cwiseProduct(box.half_m));
+      static_cast<void>(seen.try_push_back(Vec2(there_m.x(), there_m[view.up])));
+    }
+    std::vector<Vec3> outline_m;
+    for (const Vec2& corner : convex_hull(seen)) {
+      Vec3 there_m{corner.x(), 0.0, 0.0};
+      there_m[view.up] = corner.y();
+      outline_m.push_back(there_m);
+    }
+    std::string style;
+    add(style, "fill=\"%s\" fill-opacity=\"%.2f\" stroke=\"%s\" stroke-width=\"1.2\"",
+        solid->step == kObstacleStep ? "#857d70" : kStairFill, solid->is_glass ? 0.2 : 1.0, kStairLine);
+    add_polygon(out, view, outline_m, style.c_str());
+  }
+}
+
 void add_step_numbers(std::string& out, const View& view, const StairWorld& world, bool from_the_side) {
-  if (view.scale_pxpm < kLabelScale_pxpm) return;
+  if (view.scale_pxpm < kLabelScale_pxpm || !world.is_staircase) return;
   for (std::size_t k = 0; k < world.steps.size(); ++k) {
     const Step& s = world.steps[k];
     const double drop_m = from_the_side ? 0.0 : world.half_width_m;
@@ -324,10 +355,21 @@ std::string value(const char* name, double figure, const char* unit) {
 }  // namespace
 
 std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, const ClimbSummary& s) {
-  Range x_m{-0.5, 0.5}, y_m{-world.half_width_m, world.half_width_m}, z_m{-0.06, 0.5};
+  Range x_m{-0.5, 0.5}, y_m{-0.5, 0.5}, z_m{-0.06, 0.5};
+  if (world.is_staircase) y_m = {-world.half_width_m, world.half_width_m};
   for (const Step& step : world.steps) {
+    if (!world.is_staircase) break;
     x_m.include(step.back_x_m);
     z_m.include(step.height_m);
+  }
+  for (const SolidBox& solid : world.solids) {
+    const OrientedBox box = solid.box();
+    const Vec3 reach_m = box.centre.R.cwiseAbs() * box.half_m;
+    for (const Vec3& p_m : {Vec3(box.centre.p_m - reach_m), Vec3(box.centre.p_m + reach_m)}) {
+      x_m.include(p_m.x());
+      y_m.include(p_m.y());
+      z_m.include(p_m.z());
+    }
   }
   const auto include_point = [&](const Vec3& p_m) {
     x_m.include(p_m.x());
@@ -373,7 +415,9 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
       s.pass ? "#1c8a4b" : "#c0312b");
   add_text(out, kBorder_px + 37.0, 43.0, 18.0, "text-anchor=\"middle\" font-weight=\"700\" fill=\"#fff\"",
            s.pass ? "PASS" : "FAIL");
-  std::string title = std::to_string(s.steps_climbed) + " of " + std::to_string(s.steps_total) + " steps climbed";
+  const std::string title =
+      world.is_staircase ? std::to_string(s.steps_climbed) + " of " + std::to_string(s.steps_total) + " steps climbed"
+                         : std::to_string(s.footsteps.size()) + " footsteps";
   add_text(out, kBorder_px + 90.0, 44.0, 21.0, "font-weight=\"600\" fill=\"#222\"", title);
   add_text(out, kWidth_px - kBorder_px, 44.0, 13.0, "text-anchor=\"end\" fill=\"#6b6b6b\"",
            "gait " + name_of(s.options.gait) + ", seed " + std::to_string(s.options.seed) + ", " +
@@ -395,6 +439,7 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
   add_text(out, kBorder_px, side_top_px - 8.0, 13.0, "font-weight=\"600\" fill=\"#555\"", "Side");
   out += "<g clip-path=\"url(#side)\">\n";
   add_stairs_from_the_side(out, side, world, x_m, z_m.low - 1.0);
+  add_solids(out, side, world);
   add_step_numbers(out, side, world, true);
   add_map(out, side, drawing, Layer::kAll);
   add_footsteps(out, side, s.footsteps);
@@ -409,6 +454,7 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
   out += "<g clip-path=\"url(#above)\">\n";
   add_map(out, above, drawing, Layer::kFloor);
   add_stairs_from_above(out, above, world);
+  add_solids(out, above, world);
   add_step_numbers(out, above, world, false);
   add_map(out, above, drawing, Layer::kStairs);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim_stub/host/climb/climb_verdict.hpp"
 
+#include <cmath>
 #include <cstdio>
 
 namespace polygmap::sim {
@@ -32,18 +33,42 @@ std::string why_ended_early(const std::string& climbed, const ClimbEnding& endin
   return "Time ran out after " + climbed + ".";
 }
 
+// A staircase's top; a world file's goal, or, without one, where the module says that it has ended.
+bool has_arrived(const ClimbSummary& s, const ClimbEnding& ending) {
+  if (!s.options.world) return s.steps_total > 0 && s.steps_climbed == s.steps_total;
+  return s.route.goal_reached.value_or(ending.phase == GaitPhase::kFinished);
+}
+
+// How far it came.
+std::string way_of(const ClimbSummary& s) {
+  if (!s.options.world) return sentence("%.0f of %.0f steps", s.steps_climbed, s.steps_total);
+  std::string way = sentence("%.0f footsteps", static_cast<double>(s.footsteps.size()));
+  if (!s.route.surfaces_stood_on.empty()) way += ", the last on \"" + s.route.surfaces_stood_on.back() + "\"";
+  return way;
+}
+
+std::string success_of(const ClimbSummary& s) {
+  const double clearance_mm = s.swing_clearance_min_m * 1e3;
+  if (!s.options.world) {
+    return "Climbed " + way_of(s) +
+           sentence(" in %.1f s (%.2f s per step), least sole margin %.1f mm, least swing clearance %.1f mm",
+                    s.climb_time_s, s.seconds_per_step, s.sole_margin_min_m * 1e3, clearance_mm);
+  }
+  std::string text = (s.route.goal_reached ? "Reached the goal in " : "Ended by itself after ") +
+                     sentence("%.1f s, ", s.ended_at_s) + way_of(s);
+  if (!std::isnan(s.sole_margin_min_m)) text += sentence(", least sole margin %.1f mm", s.sole_margin_min_m * 1e3);
+  return text + sentence(", least swing clearance %.1f mm", clearance_mm);
+}
+
 std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
-  const std::string climbed = sentence("%.0f of %.0f steps", s.steps_climbed, s.steps_total);
+  const std::string climbed = way_of(s);
   const std::string over_the_edge =
       sentence("A sole stood %.1f mm over the edge of its tread", -s.sole_margin_min_m * 1e3);
   const bool over = s.sole_margin_min_m < 0.0;
-  const bool all_climbed = s.steps_total > 0 && s.steps_climbed == s.steps_total;
+  const bool all_climbed = has_arrived(s, ending);
   const std::string why = why_stopped(ending.stop_reason, ending.stop_measured_m);
   if (s.pass) {
-    std::string reason =
-        "Climbed " + climbed +
-        sentence(" in %.1f s (%.2f s per step), least sole margin %.1f mm, least swing clearance %.1f mm",
-                 s.climb_time_s, s.seconds_per_step, s.sole_margin_min_m * 1e3, s.swing_clearance_min_m * 1e3);
+    std::string reason = success_of(s);
     if (ending.module_state == ModuleState::kFallen) return reason + "; the module took the robot for fallen there.";
     if (ending.module_state == ModuleState::kReleased) return reason + "; it handed the robot over there.";
     if (ending.phase == GaitPhase::kStopped) return reason + "; the module stopped there: " + why + ".";
@@ -74,7 +99,7 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
     return "The module called the heap, " + std::to_string(s.heap_calls) + " times in all, first from " +
            (ending.heap_first_caller.empty() ? "an unknown function" : ending.heap_first_caller) + ".";
   }
-  if (!(s.sole_margin_min_m >= 0.0)) return over_the_edge + ".";
+  if (!(s.sole_margin_min_m >= 0.0) && (over || !s.options.world)) return over_the_edge + ".";
   return sentence("A foot came within %.1f mm of the stairs (0 or less is a collision).",
                   s.swing_clearance_min_m * 1e3);
 }
@@ -82,9 +107,11 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
 }  // namespace
 
 void judge(ClimbSummary& s, const ClimbEnding& ending) {
-  const bool all_climbed = s.steps_total > 0 && s.steps_climbed == s.steps_total;
-  s.pass = all_climbed && !s.fell && s.sole_margin_min_m >= 0.0 && s.swing_clearance_min_m > 0.0 && s.heap_calls == 0 &&
+  // In a world file a way may be without an edge.
+  const bool stood_inside = s.options.world ? !(s.sole_margin_min_m < 0.0) : s.sole_margin_min_m >= 0.0;
+  s.pass = has_arrived(s, ending) && !s.fell && stood_inside && s.swing_clearance_min_m > 0.0 && s.heap_calls == 0 &&
            s.interrupted_by == 0;
+  if (ending.phase == GaitPhase::kStopped) s.stop_sentence = why_stopped(ending.stop_reason, ending.stop_measured_m);
   s.reason = reason_of(s, ending);
   for (const Push& push : s.options.pushes) {
     if (push.at_s < s.ended_at_s) continue;

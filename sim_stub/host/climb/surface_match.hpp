@@ -21,20 +21,24 @@ struct SurfaceMatchLimits {
   double overhang_m = 0.05;   // of the centroid beyond the true surface's edges
 };
 
-// A rectangle along a step's axes: flat along `axis`, facing `sign` along it. Its place on the axis may be a range: a
-// riser under a nosing shows two planes. Rectangles of one id are one surface.
+// A rectangle along its step's or solid's axes: flat along `axis`, facing `sign` along it. Its place on the axis may be
+// a range: a riser under a nosing shows two planes. Rectangles of one id are one surface.
 struct TrueSurface {
   int id;
   int axis;
   double sign;
   Vec3 low_m;
   Vec3 high_m;
-  int step = kFloorStep;  // whose axes; of none: the true world's
+  int axes = -1;  // which of TrueSurfaces::own_T_true; none: the true world's
+};
+struct TrueSurfaces {
+  std::vector<TrueSurface> all;
+  std::vector<Transform> own_T_true;
 };
 
 inline constexpr int kNoSurface = -1;
-// Which true surface the patch is: the floor, a tread, a riser, a side of the staircase. patch in the camera frame,
-// true_T_camera at its exposure.
+// Which true surface the patch is: the floor, a tread, a riser, a side of the staircase, or any face of what is none.
+// patch in the camera frame, true_T_camera at its exposure.
 [[nodiscard]] int matching_surface(const StairWorld& world, const SurfacePatch& patch, const Transform& true_T_camera,
                                    const SurfaceMatchLimits& limits = {});
 
@@ -68,9 +72,8 @@ class SurfaceVisibility {
   using SeenSurface = std::array<Seen, 2>;
   void see(const Vec3& point_m, int px);
 
-  std::vector<Transform> step_T_true_;
   std::vector<SolidBox> solids_;
-  std::vector<TrueSurface> surfaces_;
+  TrueSurfaces surfaces_;
   std::vector<SeenSurface> seen_;  // by id
   std::vector<int> in_view_;
   DepthRenderer renderer_;

@@ -34,8 +34,14 @@ void TruthTopics::send(Topic topic, std::int64_t stamp_ns, const CdrWriter& mess
 void TruthTopics::write_stairs(std::int64_t now_ns) {
   const StairWorld& stairs = stairs_;
   CdrWriter out = message();
-  begin_scene(out, now_ns, stairs.steps.size() + stairs.obstacles.size());
-  for (std::size_t i = 0; i < stairs.steps.size(); ++i) {
+  const std::size_t steps = stairs.is_staircase ? stairs.steps.size() : 0;
+  begin_scene(out, now_ns, steps + stairs.obstacles.size() + stairs.solids.size());
+  for (const SolidBox& solid : stairs.solids) {
+    const bool stands = solid.step >= 0;
+    put_cube(out, solid.box().centre, 2.0 * solid.half_m(), stands ? kStone : kThing,
+             stands ? stairs.steps[static_cast<std::size_t>(solid.step)].name : "thing");
+  }
+  for (std::size_t i = 0; i < steps; ++i) {
     const Step& step = stairs.steps[i];
     const Vec3 middle_m{0.5 * (step.nosing_x_m + step.back_x_m), 0.0, 0.5 * step.height_m};
     const Vec3 size_m{step.back_x_m - step.nosing_x_m, 2.0 * stairs.half_width_m, step.height_m};

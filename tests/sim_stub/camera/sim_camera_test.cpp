@@ -72,7 +72,7 @@ double depth_m(const DepthRenderer& renderer, int u, int v) {
 
 void compare_with_a_ray_marcher(const StairErrors& errors) {
   const StairWorld world = make_stairs({.steps = 5, .nosing_m = 0.02}, 2, errors);
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   struct Pose {
     Vec3 p_m;
     double yaw, pitch, roll, lift, forward;
@@ -107,7 +107,7 @@ TEST(DepthRenderer, TreadsThatSlopeAndTurnAndAreWorn_AgreeWithARayMarcher) {
 
 TEST(DepthRenderer, MovingWhileItScans_EveryRowIsAsSeenFromItsOwnMoment) {
   const StairWorld world = make_stairs({.steps = 5, .nosing_m = 0.02}, 2);
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   // 1 m/s and half a radian per second for 16 ms, a leg swinging.
   const auto scene = [&](double s) {
     const Mat3 turn = rotation_z(0.1 + 0.006 * s) * rotation_y(0.03 - 0.008 * s) * rotation_x(0.005 * s);
@@ -131,7 +131,7 @@ TEST(DepthRenderer, MovingWhileItScans_EveryRowIsAsSeenFromItsOwnMoment) {
 
 TEST(DepthRenderer, IncidenceCosine_EverySurface_IsTheAngleToItsNormal) {
   const StairWorld world = make_stairs({}, 1);
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   DepthRenderer renderer(robot_camera_intrinsics());
   renderer.render(scene_at({rotation_z(0.2), Vec3{-0.3, 0, 0.79}}, solids, bent_q_rad(0.1, 0.1)));
   const auto point = [&](int u, int v) { return Vec3(depth_m(renderer, u, v) * ray_of(u, v)); };
@@ -154,7 +154,7 @@ TEST(DepthRenderer, IncidenceCosine_EverySurface_IsTheAngleToItsNormal) {
 
 TEST(DepthRenderer, RaisedKnee_ShowsWhereItProjects) {
   const StairWorld world = make_stairs({}, 1);
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   DepthRenderer renderer(robot_camera_intrinsics());
   DepthScene scene = scene_at({Mat3::Identity(), Vec3{0.1, 0, 0.92}}, solids, bent_q_rad(0.2, 0.1));
   const Vec3 knee = base_T_camera().inverse() * scene.base_legs[0].thigh.b_m;
@@ -349,7 +349,7 @@ TEST(DepthNoise, Scale_StretchesEveryDepth) {
 
 TEST(DepthNoise, Edges_AtADepthJump_GetFlyingPixels) {
   const StairWorld world = make_stairs({.steps = 1, .rise_m = 0.3, .width_m = 0.6, .jitter_m = 0.0}, 1);
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   DepthRenderer renderer(robot_camera_intrinsics());
   DepthScene scene = scene_at({Mat3::Identity(), Vec3{0.1, 0.2, 0.9}}, solids, bent_q_rad(0, 0));
   scene.legs_visible = false;

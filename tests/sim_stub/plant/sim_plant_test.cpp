@@ -340,7 +340,7 @@ TEST(SimPlant, ScriptedClimb_TwoTreads_StandsOnTheSecond) {
   SimRobot robot(options);
   Script script(robot);
   double least_clearance = 1.0;
-  const std::vector<SolidBox> solids = stair_solids(robot.stairs());
+  const std::vector<SolidBox> solids = solids_of(robot.stairs());
   script.watch = [&] {
     for (const Transform& sole : robot.truth().true_T_sole) {
       least_clearance = std::min(least_clearance, clearance_m(collision_box(kSole, sole), solids));

@@ -72,7 +72,7 @@ TEST(BuiltStairs, TreadsThatFall_HaveTheirNosingLowest) {
 TEST(BuiltStairs, AnywhereOnTurnedTreads_SolidsEndWhereTheWorldSays) {
   const StairWorld world =
       make_stairs(kDrawing, 7, {.tread_slope_rad = 0.05, .tread_cant_rad = 0.05, .tread_yaw_rad = 0.08});
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   for (double x_m = -0.05; x_m < 2.2; x_m += 0.013) {
     for (double y_m = -0.5; y_m < 0.5; y_m += 0.07) {
       constexpr double kLean_m = 0.01;  // by which the foot of a riser that leans comes forward
@@ -92,7 +92,7 @@ TEST(BuiltStairs, AnywhereOnTurnedTreads_SolidsEndWhereTheWorldSays) {
 
 TEST(BuiltStairs, SoleFlatOnASlopedTread_TouchesItAndHasItsMarginAlongTheTread) {
   const StairWorld world = make_stairs(kDrawing, 2, {.tread_fall_rad = 0.04, .tread_cant_rad = 0.04});
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   const double heel_m = -kContactRectangle.heel_x_m;
   const Transform sole = on_tread(world.steps[2], heel_m + 0.011, 0.1);
   EXPECT_NEAR(sole_margin_m(sole, world, 2), 0.011, 1e-6);
@@ -125,7 +125,7 @@ TEST(BuiltStairs, WornNosing_CarriesFromWhereItHasFallenByAMillimetreAndIsCleare
   EXPECT_NEAR(sole_margin_m(on_tread(world.steps[2], heel_m + 0.02, 0.1), world, 2),
               0.02 - kWorn_m + std::sqrt(math::square(kWorn_m) - math::square(kWorn_m - 0.001)), 1e-9);
   // A corner at 45 degrees before the edge: the round is nearer to it than the edge was far.
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   constexpr double kHalf_m = 0.01, kGap_m = 0.004;
   const OrientedBox box{
       {Mat3::Identity(),

@@ -123,7 +123,7 @@ double point_distance_m(const Vec3& p, const SolidBox& solid) {
 
 void compare_with_sampled_points(const StairErrors& errors) {
   const StairWorld world = make_stairs({.steps = 4, .nosing_m = 0.02}, 3, errors);
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   const CounterNoise noise(11, Stream::kStart);
   constexpr double kSpacing_m = 0.01;
   int apart = 0, inside = 0;
@@ -171,7 +171,7 @@ TEST(Clearance, RandomFeetNearTurnedAndWornStairs_AgreesWithSampledPoints) {
 
 TEST(Clearance, KnownPlaces_HaveTheirGapAndDepth) {
   const StairWorld world = make_stairs({.steps = 3, .jitter_m = 0.0}, 1);
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   const auto foot = [](double x, double z, double yaw = 0.0) {
     return collision_box(kSole, {rotation_z(yaw), Vec3{x, 0, z}});
   };
@@ -190,7 +190,7 @@ TEST(Clearance, KnownPlaces_HaveTheirGapAndDepth) {
 
 TEST(Clearance, ExcludedSteps_AreLeftOut) {
   const StairWorld world = make_stairs({.steps = 3, .jitter_m = 0.0}, 1);
-  const std::vector<SolidBox> solids = stair_solids(world);
+  const std::vector<SolidBox> solids = solids_of(world);
   const OrientedBox foot =
       collision_box(kSole, {Mat3::Identity(), Vec3{-0.1, 0, 0.0}});  // its toe is in the first riser
   EXPECT_LT(clearance_m(foot, solids), -0.05);

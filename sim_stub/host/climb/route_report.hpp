@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which surfaces the robot stood on, how near its body came to the world, and whether it stands where it was to go.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sim_stub/world/clearance.hpp"
+#include "sim_stub/world/truth.hpp"
+
+namespace polygmap::sim {
+
+struct RouteFigures {
+  std::optional<bool> goal_reached;                                        // none: the world has no goal
+  std::vector<std::string> surfaces_stood_on;                              // in order, each as often as it was come to
+  double body_clearance_min_m = std::numeric_limits<double>::quiet_NaN();  // torso, thighs, shanks to the solids
+};
+
+class RouteReport {
+ public:
+  static constexpr double kGoalWithin_m = 0.25, kGoalWithin_rad = 0.26;
+  static constexpr std::int64_t kRest_ns = 50 * kNsPerMs;  // a sole that stands this long rests
+
+  explicit RouteReport(const StairWorld& world) : world_(world), solids_(solids_of(world)) {}
+
+  void observe(const Truth& truth);
+  [[nodiscard]] RouteFigures figures() const;
+
+ private:
+  [[nodiscard]] std::string name_of(int step) const;
+  void observe_body(const Truth& truth);
+  [[nodiscard]] bool is_at_goal(const WorldPlace& goal) const;
+
+  StairWorld world_;
+  std::vector<SolidBox> solids_;
+  Truth last_;
+  std::uint64_t ticks_ = 0;
+  std::array<std::int64_t, kFootCount> stands_since_ns_{-1, -1};
+  std::vector<int> stood_on_;
+  double body_clearance_m_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace polygmap::sim
