@@ -6,8 +6,9 @@ import re
 
 from campaigns import buses, climbs, cost, estimation, mute, perception, reality
 from campaigns.engine import ROOT, code_hash, commit
+from campaigns.paper import trials as paper
 
-TABLES = {**climbs.TABLES, **buses.TABLES, **mute.TABLES, **reality.TABLES, **perception.TABLES, **estimation.TABLES, **cost.TABLES}
+TABLES = {**climbs.TABLES, **paper.TABLES, **buses.TABLES, **mute.TABLES, **reality.TABLES, **perception.TABLES, **estimation.TABLES, **cost.TABLES}
 MEASURED = ROOT / "docs/measured"
 FIGURES = MEASURED / "headline.json"
 STALE = "**Stale: the code has changed since this was measured.**"
@@ -31,6 +32,7 @@ def write_page(name, table, page, date, code):
         f"# {table.title}\n\nWritten by `toolchain/campaign {name}`, not by hand: commit `{commit()}`, code hash `{code}`, {date}.\n\n"
         f"{page.text.rstrip()}\n")
     for path, text in page.files.items():
+        (ROOT / path).parent.mkdir(parents=True, exist_ok=True)
         (ROOT / path).write_text(text)
     figures = figures_of()
     figures[name] = {"code": code, "figures": page.headline,
