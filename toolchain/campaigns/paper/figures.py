@@ -80,7 +80,8 @@ def fusion(run):
 def draw_stairs(axis, run):
     treads = run.data["stairs"]["treads"]
     for tread in treads:
-        axis.add_patch(Rectangle((tread["nosing_x_m"], 0), tread["back_x_m"] - tread["nosing_x_m"], tread["height_m"], facecolor="#dfe3e8", edgecolor="#9aa3ad", linewidth=0.6))
+        axis.add_patch(Rectangle((tread["nosing_x_m"], 0), tread["back_x_m"] - tread["nosing_x_m"], tread["height_m"],
+                                 facecolor="#dfe3e8", edgecolor="#9aa3ad", linewidth=0.6))
     axis.plot([-3, treads[0]["nosing_x_m"]], [0, 0], color="#9aa3ad", linewidth=0.8)
 
 
@@ -94,12 +95,12 @@ def snapshots(run, masses):
     frames = run.joint_frames()
     world = [p + np.einsum("nij,nj->ni", R, joint[1]) for joint in frames]
     x_m, z_m, y_m = (p[:, 0].min() - 0.35, p[:, 0].max() + 0.45), (-0.1, p[:, 2].max() + 0.95), (-0.35, 0.35)
-    per_m = 0.86 * WIDTH_IN / np.ptp(x_m)  # one scale for both views
+    per_m = 0.85 * WIDTH_IN / np.ptp(x_m)  # one scale for both views
     heights = [per_m * np.ptp(z_m), per_m * np.ptp(y_m)]
     tall = sum(heights) + 0.75
     figure = pyplot.figure(figsize=(WIDTH_IN, tall), constrained_layout=False)
-    side = figure.add_axes((0.11, (heights[1] + 0.6) / tall, 0.86, heights[0] / tall))
-    top = figure.add_axes((0.11, 0.45 / tall, 0.86, heights[1] / tall))
+    side = figure.add_axes((0.13, (heights[1] + 0.6) / tall, 0.85, heights[0] / tall))
+    top = figure.add_axes((0.13, 0.45 / tall, 0.85, heights[1] / tall))
     draw_stairs(side, run)
     end = min(run.data["duration_s"], t[-1])
     moments = [int(np.argmax(p[:, 0] >= x)) for x in np.linspace(p[0, 0] + 0.01, p[:, 0].max() - 0.005, 7)]
@@ -134,14 +135,15 @@ def snapshots(run, masses):
     side.set_ylim(z_m)
     side.tick_params(labelbottom=False)
     top.set_ylim(y_m)
+    top.set_yticks((-0.2, 0, 0.2))
     side.set_ylabel("z, m")
     top.set_ylabel("y, m")
     top.set_xlabel("x, m")
     side.legend(loc="upper left")
     return svg_of(figure), (
         "Side view of the simulated robot at seven moments of a climb, with the paths of its centre of mass and feet, and the same paths and the footsteps from above",
-        f"A climb of {run.summary['steps_total']} steps, {end:.0f} s with the walk to the stairs. Feet are true; the centre of mass is that of the module's masses at the measured joints. "
-        "Torso and head are drawn, not simulated as such; there are no arms to draw.")
+        f"A climb of {run.summary['steps_total']} steps, {end:.0f} s with the walk to the stairs. Feet are true; the centre of mass is that of the "
+        "module's masses at the measured joints. Torso and head are only drawn so; there are no arms to draw.")
 
 
 def tracking(run, bound_mm):
@@ -191,7 +193,8 @@ def tracking(run, bound_mm):
     summary = run.summary["tracking_error_mm"]
     return svg_of(figure), (
         "Paths of base and feet in space; desired and true x and z of each foot over time, with their errors and the paper's bound of 40 mm",
-        f"A climb of {run.summary['steps_total']} steps, from a second before it begins. A foot is off its desired path by at most {most['x']:.1f} mm in x and {most['z']:.1f} mm in z, "
+        f"A climb of {run.summary['steps_total']} steps, from a second before it begins. A foot is off its desired path by at most "
+        f"{most['x']:.1f} mm in x and {most['z']:.1f} mm in z, "
         f"by the true pose of base and foot; `summary.json`, which measures relative to the standing foot, has {summary['x_max']:.1f} and {summary['z_max']:.1f} mm.")
 
 

@@ -11,12 +11,13 @@ from campaigns.engine import rows
 
 STYLE = """body{font:16px/1.5 system-ui,sans-serif;color:#1c2026;background:#fff;max-width:46rem;margin:0 auto;padding:1rem;overflow-wrap:break-word}
 h1{font-size:1.5rem;line-height:1.25}h2{font-size:1.15rem;margin:2rem 0 .5rem;border-bottom:1px solid #d5d9df}
-p,ul{margin:.5rem 0}li{margin:.35rem 0}code{font:.88em ui-monospace,monospace;background:#f0f2f5;padding:0 .2em;border-radius:3px}
+p,ul{margin:.5rem 0}li{margin:.35rem 0}code{font:.88em ui-monospace,monospace;white-space:nowrap;background:#f0f2f5;padding:0 .2em;border-radius:3px}
 .first{background:#fdf3e7;border-left:4px solid #c4620f;padding:.1rem 1rem .5rem}.first h2{margin-top:.6rem;border:0}
 .wide{overflow-x:auto;margin:.75rem 0}table{border-collapse:collapse;font-size:.85rem;font-variant-numeric:tabular-nums}
-th,td{padding:.25rem .55rem;text-align:left;border-bottom:1px solid #e3e6ea;white-space:nowrap}th{background:#f0f2f5}
+th,td{padding:.25rem .55rem;text-align:left;border-bottom:1px solid #e3e6ea;white-space:nowrap}th{background:#f0f2f5;white-space:normal;vertical-align:bottom}
 tr.paper td{background:#f7f8fa}figure{margin:.75rem 0}img{width:100%;height:auto;border:1px solid #e3e6ea}
-figcaption{font-size:.88rem;color:#454c55}"""
+figcaption{font-size:.88rem;color:#454c55}figcaption code{white-space:normal}
+@media(max-width:40rem){body{padding:.6rem}th,td{white-space:normal;padding:.25rem .3rem}table{font-size:.75rem}ul{padding-left:1.1rem}}"""
 
 
 def words(text):
@@ -44,7 +45,7 @@ def markdown(blocks, folder):
 def html(title, blocks, svgs):
     """svgs: {name: text}. The first heading and what is under it are set apart."""
     def table(header, lines):
-        body = "".join(f"<tr{' class=paper' if 'paper' in line else ''}>" + "".join(f"<td>{words(c)}</td>" for c in line) + "</tr>\n" for line in lines)
+        body = "".join(f"<tr{' class=paper' if ': paper**' in str(line[0]) else ''}>" + "".join(f"<td>{words(c)}</td>" for c in line) + "</tr>\n" for line in lines)
         return f"<div class=wide><table>\n<tr>{''.join(f'<th>{words(c)}</th>' for c in header)}</tr>\n{body}</table></div>"
 
     def figure(name, alt, caption, command):
