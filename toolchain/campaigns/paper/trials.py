@@ -136,7 +136,8 @@ def table_of(trials, groups):
     lines = []
     for trial in trials:
         scene = trial.scene if trial.table == "I" else f"{trial.scene} {trial.gait}"
-        lines.append((f"**{scene}, {trial.steps} steps: paper**", f"1 of 1{', see below' if trial.scene == 'outdoor' else ''}", f"{trial.t_s:g}", f"{trial.planes_hz:g}", f"{trial.e_m_mm:g}", "not said"))
+        lines.append((f"**{scene}, {trial.steps} steps: paper**", f"1 of 1{', see below' if trial.scene == 'outdoor' else ''}",
+                      f"{trial.t_s:g}", f"{trial.planes_hz:g}", f"{trial.e_m_mm:g}", "not said"))
         for of, which, summaries in groups:
             if of == trial:
                 lines.append((f"ours, {which}", f"{sum(map(passed, summaries))} of {len(summaries)}",
@@ -243,7 +244,8 @@ def blocks_of(groups, trials, seeds, worse, edge, fused, figures_told, commands)
                 ("p", "**Ours is a simulation here, too**, with everything drawn as on a real robot (`--reality 1`); the paper's is a real robot. "
                       "A simulated climb beside a real one is no proof. Median; worst (its seed)."),
                 table_of(of_table["II"], groups),
-                ("p", "In one of the two outdoor trials, on stairs with a protruding edge, a toe of the paper's robot hit the edge in the end (its Fig. 8). Ours climbed "
+                ("p", "In one of the two outdoor trials, on stairs with a protruding edge, a toe of the paper's robot hit the edge in the end (its Fig. 8). "
+                      "Ours climbed "
                       f"{sum(map(passed, edge))} of {len(edge)} with an edge of {1000 * NOSING_M:.0f} mm (`ss`, 5 steps, `--reality 1`); a swinging foot "
                       f"came within {number(worst(edge, 'swing_clearance_mm_min', best=min))} mm of the stairs at the nearest."))
     yield from (("h2", "Fig. 4: odometry, lidar odometry and the fused pose"), ("figure", "fig4", *figures_told["fig4"], commands["fig4"]),
