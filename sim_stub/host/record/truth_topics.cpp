@@ -39,7 +39,7 @@ void TruthTopics::write_stairs(std::int64_t now_ns) {
   for (const SolidBox& solid : stairs.solids) {
     const bool stands = solid.step >= 0;
     put_cube(out, solid.box().centre, 2.0 * solid.half_m(), stands ? kStone : kThing,
-             stands ? stairs.steps[static_cast<std::size_t>(solid.step)].name : "thing");
+             "solid " + (stands ? stairs.steps[static_cast<std::size_t>(solid.step)].name : std::string()));
   }
   for (std::size_t i = 0; i < steps; ++i) {
     const Step& step = stairs.steps[i];

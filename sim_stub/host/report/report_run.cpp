@@ -112,7 +112,11 @@ void ReportRun::take_call(const PortCall& call, std::int64_t cycle_ns) {
     operator_.push_back({rounded(time_s(cycle_ns), 3), name_of(call.asked)});
   }
   if (call.kind == CallKind::kReadLidar) {
-    const Transform pose = page_T_world_ * (call.lio.lio_T_lidar * file_->params().robot.mounts.base_T_lidar.inverse());
+    const Transform lio_T_base = call.lio.lio_T_lidar * file_->params().robot.mounts.base_T_lidar.inverse();
+    const auto then = std::ranges::lower_bound(past_bases_, call.lio.stamp_ns, {}, &PastBase::stamp_ns);
+    if (!page_T_lio_ && then != past_bases_.end()) page_T_lio_ = aligned(then->page_T_base, lio_T_base);
+    if (!page_T_lio_) return;
+    const Transform pose = *page_T_lio_ * lio_T_base;
     const double at_ms = std::round(1e3 * time_s(call.lio.stamp_ns));
     if (!lio_ms_.empty() && at_ms <= lio_ms_.back()) return;
     lio_ms_.push_back(at_ms);
@@ -198,8 +202,16 @@ void ReportRun::take_steps() {
       rounded(std::array{page_T_sole.p_m.x(), page_T_sole.p_m.y(), page_T_sole.p_m.z(), yaw_of(page_T_sole.R)});
 }
 
+// The lidar tells late of where the base was.
+void ReportRun::remember_base(const Transform& page_T_base) {
+  constexpr std::size_t kMost = 600;
+  past_bases_.push_back({now_ns_, page_T_base});
+  if (past_bases_.size() > kMost) past_bases_.pop_front();
+}
+
 void ReportRun::end_cycle(const CycleReport& cycle) {
   now_ns_ = cycle.due_ns;
+  if (!has_truth_ && outputs_.state.initialised) remember_base(outputs_.state.world_T_base());
   const double at_ms = std::round(1e3 * time_s(now_ns_));
   if (ticks_ % kCostEvery_ticks == kCostEvery_ticks - 1) {
     std::array<double, kTasks.size()> row{};
@@ -268,6 +280,7 @@ void ReportRun::take_truth(std::span<const std::byte> message) {
   (void)in.get_text();
   true_T_base_ = get_pose(in);
   has_truth_ = !in.failed();
+  if (has_truth_) remember_base(true_T_base_);
 }
 
 // The last of a tick's truth.

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +41,7 @@ class ReportRun {
   void take_steps();
   void end_cycle(const CycleReport& cycle);
   void note_change(ReportJson& list, std::string_view name) const;
+  void remember_base(const Transform& page_T_base);
   void finish_sample();
   [[nodiscard]] ReportJson steps_json() const;
   [[nodiscard]] ReportJson stairs_json() const;
@@ -64,7 +67,13 @@ class ReportRun {
   Transform true_T_base_;
   std::array<Transform, kFootCount> true_T_sole_;
   bool has_truth_ = false;
-  Transform page_T_world_;  // of the module's world on the true one, once, when it has initialised
+  struct PastBase {
+    std::int64_t stamp_ns;
+    Transform page_T_base;
+  };
+  std::deque<PastBase> past_bases_;
+  std::optional<Transform> page_T_lio_;  // of the lidar's world, once, by its first pose
+  Transform page_T_world_;               // of the module's world on the true one, once, when it has initialised
   // Of odometry by the moment: drift moves no foothold against its stairs, and so it must not on the page.
   Transform page_T_odom_;
   bool is_aligned_ = false;
