@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # The Debian 12 packages, once. Sourced.
 
-kPackagesClimb=(g++ cmake ninja-build libeigen3-dev libopencv-core-dev nlohmann-json3-dev libcli11-dev
+kPackagesClimb=(g++ cmake ninja-build libeigen3-dev libopencv-core-dev libopencv-imgproc-dev nlohmann-json3-dev libcli11-dev
   liblodepng-dev libzstd-dev libtomlplusplus-dev libmujoco-dev libgtest-dev)
 kPackagesCheck=("${kPackagesClimb[@]}" clang-14 libclang-rt-14-dev clang-format-14 clang-tidy-14 libbenchmark-dev valgrind pkgconf
   liborocos-kdl-dev python3 python3-numpy python3-pil python3-canmatrix)

@@ -16,6 +16,7 @@
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/estimate/estimate_report.hpp"
 #include "sim_stub/host/estimate/log_contradiction.hpp"
+#include "sim_stub/host/estimate/log_page.hpp"
 #include "sim_stub/host/estimate/log_plausibility.hpp"
 #include "sim_stub/host/output_file.hpp"
 
@@ -26,10 +27,10 @@ constexpr double kMaxMount_m = 10.0, kMaxAngle_deg = 360.0, kMaxTau_s = 1000.0;
 
 std::string complaint(const EstimateArguments& a) {
   std::set<std::string> taken;  // nothing that is read, and nothing written for another option, is overwritten
-  for (const std::string& file : {a.log, a.lio, a.params, a.json, a.csv}) {
+  for (const std::string& file : {a.log, a.lio, a.params, a.json, a.csv, a.html}) {
     if (file.empty()) continue;
     const bool fresh = taken.insert(one_name(file)).second;
-    if (!fresh && (file == a.json || file == a.csv)) return "\"" + file + "\" would be overwritten.";
+    if (!fresh && (file == a.json || file == a.csv || file == a.html)) return "\"" + file + "\" would be overwritten.";
   }
   for (std::size_t i = 0; i < a.lidar_mount.size(); ++i) {
     const double limit = i < 3 ? kMaxMount_m : kMaxAngle_deg;
@@ -163,6 +164,8 @@ CLI::App* declare_estimate(CLI::App& app, EstimateArguments& a) {
   estimate->add_option("--json", a.json, "Scores, biases, innovations, rejections")->type_name("OUT.json");
   estimate->add_option("--csv", a.csv, "Pose, twist, sigmas, contact probabilities, LIO's age, row by row")
       ->type_name("OUT.csv");
+  estimate->add_option("--html", a.html, "One page with the curves, what was refused, and the scores")
+      ->type_name("OUT.html");
   return estimate;
 }
 
@@ -172,7 +175,7 @@ int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& er
     return kExitUsage;
   }
   try {
-    for (const std::string& file : {a.json, a.csv}) {
+    for (const std::string& file : {a.json, a.csv, a.html}) {
       if (!file.empty()) remove_output(file);  // a former run's is none of this one
     }
     throw_if_interrupted(interrupt);
@@ -196,6 +199,7 @@ int run_estimate(const EstimateArguments& a, std::ostream& out, std::ostream& er
     tell();
     if (!a.json.empty()) write_estimate_json(a.json, log, lio, result, options.params_hash, warnings);
     if (!a.csv.empty()) write_estimate_csv(a.csv, log, result);
+    if (!a.html.empty()) write_log_page(a.html, a.log, log, lio, result, options, warnings);
     print(log, result, out);
     if (!a.lio.empty()) print_lio(result, lio.size(), out);
   } catch (const Interrupted& by) {

@@ -14,7 +14,7 @@ class App;
 namespace polygmap::sim {
 
 struct EstimateArguments {
-  std::string log, lio, json, csv, params;
+  std::string log, lio, json, csv, html, params;
   std::vector<double> lidar_mount;
   double lio_tau_s = 0.0;  // 0: by LIO's noise, as log_params() has it
 };

@@ -16,13 +16,15 @@
 #include "sim_stub/host/cli/command_words.hpp"
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/output_file.hpp"
+#include "sim_stub/host/perceive/frame_page.hpp"
 #include "sim_stub/host/perceive/perceive.hpp"
+#include "sim_stub/host/perceive/perceived_picture.hpp"
 
 namespace polygmap::sim {
 namespace {
 
 constexpr int kMaxRepeat = 100000;
-constexpr const char *kLabels = ".labels.png", *kPlanes = ".planes.json", *kPicture = ".picture.png";
+constexpr const char *kLabels = ".labels.png", *kPlanes = ".planes.json", *kPicture = ".picture.png", *kPage = ".html";
 
 // Where one picture's output goes: OUT itself, or NAME + suffix in the folder OUT when there are several pictures.
 std::string place(const std::string& out, const std::string& depth, bool several, const char* suffix) {
@@ -33,15 +35,15 @@ std::string place(const std::string& out, const std::string& depth, bool several
 // The files that are written of one picture.
 std::vector<std::string> outputs_of(const PerceiveArguments& a, const std::string& depth) {
   std::vector<std::string> files;
-  for (const auto& [out, suffix] :
-       {std::pair{&a.labels, kLabels}, std::pair{&a.json, kPlanes}, std::pair{&a.picture, kPicture}}) {
+  for (const auto& [out, suffix] : {std::pair{&a.labels, kLabels}, std::pair{&a.json, kPlanes},
+                                    std::pair{&a.picture, kPicture}, std::pair{&a.html, kPage}}) {
     if (!out->empty()) files.push_back(place(*out, depth, a.depth.size() > 1, suffix));
   }
   return files;
 }
 
 std::string complaint(const PerceiveArguments& a) {
-  if (a.depth.size() > 1 && !(a.labels + a.json + a.picture).empty()) {
+  if (a.depth.size() > 1 && !(a.labels + a.json + a.picture + a.html).empty()) {
     std::set<std::string> names;
     for (const std::string& path : a.depth) {
       const std::string name = std::filesystem::path(path).stem().string();
@@ -110,6 +112,8 @@ std::string one_picture(const PerceiveArguments& a, const config::CameraProfile&
   if (!a.labels.empty()) write_labels(place(a.labels, path, several, kLabels), picture, perceived);
   if (!a.json.empty()) write_planes(place(a.json, path, several, kPlanes), perceived, tuning.hash);
   if (!a.picture.empty()) write_picture(place(a.picture, path, several, kPicture), camera, picture, perceived);
+  if (!a.html.empty())
+    write_frame_page(place(a.html, path, several, kPage), path, camera, picture, perceived, tuning.hash);
   std::vector<double>& times = perceived.microseconds;
   std::sort(times.begin(), times.end());
   const Vec3& up = perceived.camera_up;
@@ -151,6 +155,7 @@ CLI::App* declare_perceive(CLI::App& app, PerceiveArguments& a) {
   perceive->add_option("--json", a.json, "The planes" + folder)->type_name("OUT.json");
   perceive->add_option("--picture", a.picture, "Planes, polygons and nosings over the depth" + folder)
       ->type_name("OUT.png");
+  perceive->add_option("--html", a.html, "One page to look at it in three dimensions" + folder)->type_name("OUT.html");
   keep_within(*perceive->add_option("--repeat", a.repeat, "Extract so often, for the median and the longest time")
                    ->transform(CLI::Validator(decimal, ""))
                    ->capture_default_str(),
@@ -177,7 +182,7 @@ int run_perceive(const PerceiveArguments& a, std::ostream& out, std::ostream& er
     }
     tuning = tuning_of(a);
     camera = config::read_camera(a.camera);
-    if (several) make_folders({a.labels, a.json, a.picture});
+    if (several) make_folders({a.labels, a.json, a.picture, a.html});
   } catch (const std::exception& error) {
     complain(error);
     return code;

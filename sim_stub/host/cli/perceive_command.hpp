@@ -17,7 +17,7 @@ struct PerceiveArguments {
   std::vector<std::string> depth;
   std::string camera, params;
   std::vector<double> gravity;
-  std::string labels, json, picture;
+  std::string labels, json, picture, html;
   int repeat = 1;
 };
 

@@ -203,6 +203,7 @@ class LogReplay {
     }
     keep();
     read_lio(lio_, now_ns, estimator_);
+    result_.ticks.back().lio = estimator_.counters().lio;
   }
 
   [[nodiscard]] Replay take() {
@@ -230,6 +231,7 @@ class LogReplay {
     tick.quality = estimator_.quality();
     tick.contact_probability = state.contact_probability;
     tick.lio_age_ns = state.lio_age_ns;
+    tick.imu_invalid = estimator_.counters().imu_invalid;
     if (!result_.ticks.empty()) {  // as the fusion's limit counts: the new offset against the old one, at one place
       const double slew_m = (state.world_T_base().p_m - last_world_T_odom_ * state.odom_T_base.p_m).norm();
       result_.largest_slew_m = std::max(result_.largest_slew_m, slew_m);
@@ -238,7 +240,7 @@ class LogReplay {
     last_world_T_odom_ = state.world_T_odom;
     const auto& feet = estimator_.contacts();
     if (!feet[0].stands && !feet[1].stands) ++result_.rows_without_contact;
-    bool slips = false;
+    bool& slips = result_.ticks.back().slips;
     for (std::size_t f = 0; f < kFootCount; ++f) {
       slips = slips || (feet[f].stands && estimator_.odometry().motion().speed_mps(f) > kSlip_mps);
     }

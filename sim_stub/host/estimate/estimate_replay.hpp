@@ -38,6 +38,9 @@ struct ReplayTick {
   EstimateQuality quality;
   std::array<double, kFootCount> contact_probability{};
   std::int64_t lio_age_ns = -1;
+  bool slips = false;                                 // a standing foot seems to move
+  std::uint32_t imu_invalid = 0;                      // so far
+  std::array<std::uint32_t, kLioVerdictCount> lio{};  // so far
 };
 
 struct Replay {

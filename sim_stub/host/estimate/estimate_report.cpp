@@ -80,9 +80,8 @@ double horizontal_drift_percent(const Score& score) {
   return score.horizontal_distance_m > 0.0 ? 100.0 * score.final_horizontal_error_m / score.horizontal_distance_m : 0.0;
 }
 
-void write_estimate_json(const std::string& path, const EstimateLog& log, const std::vector<LioRow>& lio,
-                         const Replay& replay, const std::string& params_hash,
-                         const std::vector<std::string>& warnings) {
+Json estimate_json(const EstimateLog& log, const std::vector<LioRow>& lio, const Replay& replay,
+                   const std::string& params_hash, const std::vector<std::string>& warnings) {
   Json json{{"params_hash", params_hash},
             {"rows", log.rows.size()},
             {"duration_s", seconds(log.rows.back().stamp_ns)},
@@ -104,6 +103,13 @@ void write_estimate_json(const std::string& path, const EstimateLog& log, const 
   json["lio"] = lio_counts(lio, replay);
   json["lio"]["age_at_end_s"] = last.lio_age_ns < 0 ? Json(nullptr) : Json(seconds(last.lio_age_ns));
   json["slew_max_mm_per_tick"] = 1e3 * replay.largest_slew_m;
+  return json;
+}
+
+void write_estimate_json(const std::string& path, const EstimateLog& log, const std::vector<LioRow>& lio,
+                         const Replay& replay, const std::string& params_hash,
+                         const std::vector<std::string>& warnings) {
+  const Json json = estimate_json(log, lio, replay, params_hash, warnings);
   write_output(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

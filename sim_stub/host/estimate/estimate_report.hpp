@@ -2,6 +2,7 @@
 // What a replay comes to, as files.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "sim_stub/host/estimate/estimate_score.hpp"
@@ -13,6 +14,10 @@ namespace polygmap::sim {
 [[nodiscard]] double drift_percent(const Score& score);
 [[nodiscard]] double horizontal_drift_percent(const Score& score);
 
+// Scores where the log has truth, biases, innovations, what was refused.
+[[nodiscard]] nlohmann::ordered_json estimate_json(const EstimateLog& log, const std::vector<LioRow>& lio,
+                                                   const Replay& replay, const std::string& params_hash,
+                                                   const std::vector<std::string>& warnings);
 // Throw config::FileError when the file cannot be written.
 void write_estimate_json(const std::string& path, const EstimateLog& log, const std::vector<LioRow>& lio,
                          const Replay& replay, const std::string& params_hash,

@@ -29,11 +29,6 @@ constexpr std::uintmax_t kMostFile_bytes = 16U << 20U;  // ten times what the la
 
 Json point(const Vec3& p) { return Json::array({p.x(), p.y(), p.z()}); }
 
-const char* kind_of(const Surface& surface, UpSource up) {
-  if (up == UpSource::kAssumed) return "unknown";
-  return surface.kind == Kind::kTread ? "tread" : (surface.kind == Kind::kRiser ? "riser" : "other");
-}
-
 // What is a surface's own; the rest is its plane's.
 Json piece(const Surface& surface) {
   Json j;
@@ -48,15 +43,6 @@ Json piece(const Surface& surface) {
 
 void save(const std::string& path, const std::vector<unsigned char>& bytes) {
   write_output(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-}
-
-// Of the normal and d of m = -normal / d, from that of m.
-Eigen::Matrix4d plane_covariance(const Surface& surface) {
-  const Vec3& n = surface.normal;
-  Eigen::Matrix<double, 4, 3> jacobian;
-  jacobian.topRows<3>() = -surface.d_m * (Mat3::Identity() - n * n.transpose());
-  jacobian.bottomRows<1>() = surface.d_m * surface.d_m * n.transpose();
-  return jacobian * surface.covariance * jacobian.transpose();
 }
 
 class Extraction {
@@ -250,6 +236,19 @@ Perceived perceive(const config::CameraProfile& camera, const DepthPng& picture,
   return out;
 }
 
+Eigen::Matrix4d plane_covariance(const Surface& surface) {
+  const Vec3& n = surface.normal;
+  Eigen::Matrix<double, 4, 3> jacobian;
+  jacobian.topRows<3>() = -surface.d_m * (Mat3::Identity() - n * n.transpose());
+  jacobian.bottomRows<1>() = surface.d_m * surface.d_m * n.transpose();
+  return jacobian * surface.covariance * jacobian.transpose();
+}
+
+const char* kind_name(const Surface& surface, UpSource up) {
+  if (up == UpSource::kAssumed) return "unknown";
+  return surface.kind == Kind::kTread ? "tread" : (surface.kind == Kind::kRiser ? "riser" : "other");
+}
+
 const char* name_of(UpSource source) {
   switch (source) {
     case UpSource::kGiven:
@@ -317,7 +316,7 @@ void write_planes(const std::string& path, const Perceived& perceived, const std
     const Surface& largest = pieces.front();
     Json j;
     j["id"] = i + 1;
-    j["kind"] = kind_of(largest, perceived.up_source);
+    j["kind"] = kind_name(largest, perceived.up_source);
     j["normal"] = point(largest.normal);
     j["d_m"] = largest.d_m;
     j["covariance"] = Json::array();
@@ -341,53 +340,6 @@ void write_planes(const std::string& path, const Perceived& perceived, const std
                   {"warnings", warnings},
                   {"params_hash", params_hash}};
   write_output(path, json.dump(1) + "\n");
-}
-
-void write_picture(const std::string& path, const config::CameraProfile& camera, const DepthPng& picture,
-                   const Perceived& perceived) {
-  const auto width = static_cast<std::size_t>(picture.width_px);
-  std::vector<unsigned char> rgb(3 * picture.depth.size());
-  for (std::size_t i = 0; i < picture.depth.size(); ++i) {
-    const double z_m = picture.depth[i] * camera.intrinsics.depth_unit_m;
-    const double grey = picture.depth[i] == 0 ? 0.0 : 60.0 + 140.0 * std::max(0.0, 1.0 - z_m / camera.max_depth_m);
-    const unsigned label = perceived.labels[i];
-    const std::array<unsigned, 3> hue{(label * 67U) % 200U + 55U, (label * 131U + 80U) % 200U + 55U,
-                                      (label * 29U + 160U) % 200U + 55U};
-    for (std::size_t k = 0; k < 3; ++k) {
-      rgb[3 * i + k] = static_cast<unsigned char>(label == 0 ? grey : 0.5 * grey + 0.5 * hue[k]);
-    }
-  }
-  const CameraIntrinsics& intrinsics = camera.intrinsics;
-  const auto draw = [&](const Vec3& a, const Vec3& b, const std::array<unsigned char, 3>& colour) {
-    constexpr int kSteps = 800;
-    for (int s = 0; s <= kSteps; ++s) {
-      const Vec3 p = a + (b - a) * (static_cast<double>(s) / kSteps);
-      if (!(p.z() > 0.01)) continue;
-      const auto u = static_cast<std::int64_t>(std::lround(p.x() / p.z() * intrinsics.fx_px + intrinsics.cx_px));
-      const auto v = static_cast<std::int64_t>(std::lround(p.y() / p.z() * intrinsics.fy_px + intrinsics.cy_px));
-      if (u < 0 || v < 0 || u >= picture.width_px || v >= picture.height_px) continue;
-      for (std::size_t k = 0; k < 3; ++k) {
-        rgb[3 * (static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u)) + k] = colour[k];
-      }
-    }
-  };
-  for (const PerceivedPlane& pieces : perceived.planes) {
-    for (const Surface& s : pieces) {
-      for (std::size_t i = 0; i < s.polygon_m.size(); ++i) {
-        draw(s.polygon_m[i], s.polygon_m[(i + 1) % s.polygon_m.size()], {255, 255, 255});
-      }
-    }
-  }
-  for (const PerceivedPlane& pieces : perceived.planes) {  // above all edges: a nosing lies on those of two surfaces
-    for (const Surface& s : pieces) {
-      if (s.nosing_m) draw((*s.nosing_m)[0], (*s.nosing_m)[1], {255, 40, 40});
-    }
-  }
-  std::vector<unsigned char> bytes;
-  const unsigned error = lodepng::encode(bytes, rgb, static_cast<unsigned>(picture.width_px),
-                                         static_cast<unsigned>(picture.height_px), LCT_RGB, 8);
-  if (error != 0) fail("Cannot encode \"" + path + "\": " + lodepng_error_text(error) + ".");
-  save(path, bytes);
 }
 
 }  // namespace polygmap::sim

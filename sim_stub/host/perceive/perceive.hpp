@@ -34,6 +34,11 @@ enum class UpSource : std::uint8_t {
   kAssumed  // no plane looks level: up is up in the picture, and what is a tread is not known
 };
 [[nodiscard]] const char* name_of(UpSource source);
+// As planes.json has it: tread, riser, other, or unknown where up was assumed.
+[[nodiscard]] const char* kind_name(const Surface& surface, UpSource up);
+
+// Of the normal and d_m together: the surface has that of -normal / d_m.
+[[nodiscard]] Eigen::Matrix4d plane_covariance(const Surface& surface);
 
 struct Perceived {
   std::vector<PerceivedPlane> planes;  // id is the index + 1
@@ -59,7 +64,5 @@ struct Perceived {
 // Throw config::FileError when the file cannot be written.
 void write_labels(const std::string& path, const DepthPng& picture, const Perceived& perceived);
 void write_planes(const std::string& path, const Perceived& perceived, const std::string& params_hash);
-void write_picture(const std::string& path, const config::CameraProfile& camera, const DepthPng& picture,
-                   const Perceived& perceived);
 
 }  // namespace polygmap::sim

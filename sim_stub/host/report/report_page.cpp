@@ -31,6 +31,14 @@ std::string page_text(const ReportJson& data) {
 
 }  // namespace
 
+void write_page(const std::string& path, const ReportJson& data) {
+  constexpr std::string_view kPlace = "@POLYGMAP_DATA@";
+  const std::string_view page(polygmap_report_page,
+                              static_cast<std::size_t>(polygmap_report_page_end - polygmap_report_page));
+  const std::size_t at = page.find(kPlace);
+  write_output(path, std::string(page.substr(0, at)) + page_text(data) + std::string(page.substr(at + kPlace.size())));
+}
+
 std::string write_report(const std::vector<std::string>& recordings, const std::string& directory) {
   ReportJson data{{"format", "polygmap-report"}, {"version", 1}, {"runs", ReportJson::array()}};
   for (const std::string& path : recordings) {
@@ -42,12 +50,7 @@ std::string write_report(const std::vector<std::string>& recordings, const std::
       return "\"" + path + "\" has a verdict that is no summary.json.";
     }
   }
-  constexpr std::string_view kPlace = "@POLYGMAP_DATA@";
-  const std::string_view page(polygmap_report_page,
-                              static_cast<std::size_t>(polygmap_report_page_end - polygmap_report_page));
-  const std::size_t at = page.find(kPlace);
-  write_output(directory + "/report.html",
-               std::string(page.substr(0, at)) + page_text(data) + std::string(page.substr(at + kPlace.size())));
+  write_page(directory + "/report.html", data);
   return {};
 }
 

@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// report.html: one self-contained page about one run or two.
+// Self-contained pages: report.html about one run or two, and those of other commands with their own data.
 #pragma once
 
 #include <string>
 #include <vector>
+
+#include "sim_stub/host/report/report_blocks.hpp"
 
 namespace polygmap::sim {
 
 // Reads the recordings and writes DIR/report.html, in a directory that exists. Empty, or one sentence about the file
 // that cannot be read. Throws config::FileError for what cannot be written.
 [[nodiscard]] std::string write_report(const std::vector<std::string>& recordings, const std::string& directory);
+
+// Writes the page with these data in it (page/DATA.md), whose first key, "format", says what it shows. Throws
+// config::FileError for what cannot be written.
+void write_page(const std::string& path, const ReportJson& data);
 
 }  // namespace polygmap::sim

@@ -34,7 +34,7 @@ async function bundled(entry) {
   return result.outputFiles[0].text;
 }
 
-const js = banner + "\n" + (await bundled("src/main.js"));
+const js = banner + "\n" + (await bundled("src/entry.js"));
 const css = await bundled("page.css");
 const parts = { CSS: css, JS: js };
 for (const [name, part] of Object.entries(parts)) {

@@ -11,6 +11,8 @@ import tempfile
 
 import numpy as np
 
+import frame_page_tests
+import log_page_tests
 import sample_report
 from chromium import Chromium, Failed, program
 
@@ -302,6 +304,10 @@ def Drawing_WithoutWebGl_MovesWithTheSlider(browser, pages):
     check(not page.complaints(), f"the console has: {page.complaints()}")
     page.close()
     return None
+
+
+TESTS |= frame_page_tests.TESTS | log_page_tests.TESTS
+NO_WEBGL |= frame_page_tests.NO_WEBGL
 
 
 def main():

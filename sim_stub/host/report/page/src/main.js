@@ -90,7 +90,7 @@ function state(run, t_s) {
   return { t_s, base: now.base?.p ?? null, feet: now.soles.map((s) => s?.p ?? null) };
 }
 
-async function main() {
+export async function climbPage() {
   let runs, page;
   try {
     runs = parse(document.getElementById("polygmap-data").textContent);
@@ -116,5 +116,3 @@ async function main() {
   await page.settled();
   document.documentElement.dataset.ready = "yes";
 }
-
-main();

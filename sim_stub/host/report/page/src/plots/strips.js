@@ -107,7 +107,7 @@ function contactStrip(run, player) {
   );
 }
 
-function eventStrip(label, events, colour, player) {
+export function eventStrip(label, events, colour, player) {
   if (!events.length) return null;
   const paint = (context, x, width, height) => {
     context.fillStyle = faded(colours.stairline, 0.25);
