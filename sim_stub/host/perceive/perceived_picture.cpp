@@ -109,7 +109,7 @@ class Drawing {
     if (a.z() < b.z()) std::swap(a, b);
     if (a.z() < kNear_m) return;
     if (b.z() < kNear_m) b = a + (b - a) * ((a.z() - kNear_m) / (a.z() - b.z()));
-    cv::line(area_, pixel_of(a), pixel_of(b), kDark, width_px + 4, cv::LINE_AA, kShift);
+    cv::line(area_, pixel_of(a), pixel_of(b), kDark, width_px + (width_px > 1 ? 4 : 2), cv::LINE_AA, kShift);
     cv::line(area_, pixel_of(a), pixel_of(b), colour, width_px, cv::LINE_AA, kShift);
   }
   void outline(const std::vector<Vec3>& corners) {

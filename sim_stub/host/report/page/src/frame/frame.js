@@ -32,13 +32,13 @@ export class Frame {
   }
 
   plane(json) {
-    const pieces = json.pieces.map((piece) => ({
-      ...piece,
-      corners: points(piece.vertices).map((p) => this.level(p)),
-      nosing: piece.nosing ? points(piece.nosing).map((p) => this.level(p)) : null,
-    }));
-    const { corners } = pieces[0];
-    const middle = [0, 1, 2].map((k) => corners.reduce((sum, p) => sum + p[k], 0) / corners.length);
+    const pieces = json.pieces.map((piece) => {
+      const corners = points(piece.vertices).map((p) => this.level(p));
+      const nosing = piece.nosing ? points(piece.nosing).map((p) => this.level(p)) : null;
+      const middle = [0, 1, 2].map((k) => corners.reduce((sum, p) => sum + p[k], 0) / corners.length);
+      return { ...piece, corners, nosing, middle };
+    });
+    const { middle } = pieces[0];
     return { ...json, normal: this.level(json.normal), pieces, middle, nosing: pieces.find((p) => p.nosing)?.nosing };
   }
 

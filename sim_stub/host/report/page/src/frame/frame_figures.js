@@ -118,7 +118,7 @@ export function sourcePanel(frame) {
       `${number(100 * json.in_range_share, 1, "%")}, ${camera.min_depth_m} to ${camera.max_depth_m} m`,
     ],
     ["up", UP[json.up_source] ?? json.up_source],
-    ["points drawn", `${frame.points.planes.length}, every ${json.points.stride}. column and row`],
+    ["points drawn", `${frame.points.planes.length}, of one in ${json.points.stride} columns and rows`],
     ["parameters", json.params_hash],
   ];
   const took = `${number(cost.median_us, 0)} µs in the median of ${cost.repeats}, ${number(cost.most_us, 0)} µs at most`;

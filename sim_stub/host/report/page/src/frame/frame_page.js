@@ -32,12 +32,14 @@ function saidOf(frame) {
     : "No plane was found in this picture";
 }
 
-function legend() {
+function legend(frame) {
   const key = (colour, said, css = "") => h("li", {}, h(`i.key${css}`, { style: `--k: ${colour}` }), said);
   return h(
     "ul.legend3d",
     {},
-    Object.values(KINDS).map((kind) => key(kind.colour, kind.said)),
+    Object.entries(KINDS)
+      .filter(([name]) => (name === "unknown") === (frame.json.up_source === "assumed"))
+      .map(([, kind]) => key(kind.colour, kind.said)),
     key(NOSING, "nosing", ".nosing"),
     key(NO_PLANE, "no plane"),
     h("li", {}, h("i.key.camera"), "camera"),
@@ -54,7 +56,7 @@ export async function framePage(root, data) {
     { id: "stage", "aria-label": "Planes in three dimensions" },
     host,
     views,
-    legend(),
+    legend(frame),
   );
   const picture = h(
     "section.panel.picture",
@@ -91,7 +93,7 @@ export async function framePage(root, data) {
     : null;
   const buttons = look
     ? VIEWS.map((name, i) =>
-        h("button.small", { type: "button", "aria-pressed": i === 0, onclick: () => look(i + 1) }, name),
+        h("button.small", { type: "button", "aria-pressed": String(i === 0), onclick: () => look(i + 1) }, name),
       )
     : [];
   const keys = [[["p"], "points on or off", toggle]];

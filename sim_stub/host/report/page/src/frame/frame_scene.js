@@ -19,7 +19,7 @@ import { line, outline, segments, sheet, sheetMesh } from "../view/shapes3d.js";
 import { CASING, NOSING, NO_PLANE, colourOf } from "./kinds.js";
 
 // From where each view looks, in reaches of the points from their middle.
-const VIEWS = { 1: [-1.5, -1.5, 1.3], 2: [0, -2.4, 0.05], 3: [-0.001, 0, 2.4] };
+const VIEWS = { 1: [-1.8, -1.8, 1.5], 2: [0, -3, 0.05], 3: [-0.001, 0, 3] };
 
 export class FrameScene {
   constructor(host, canvas, context, frame) {
@@ -43,12 +43,15 @@ export class FrameScene {
     this.planes = frame.planes.map((plane) => this.planeGroup(plane));
     const own = this.pen(1.5, colours.camera);
     this.frustum = own;
-    const far = frame.frustum(Math.min(0.4, frame.bounds().reach / 2));
+    const far = frame.frustum(Math.min(0.3, frame.bounds().reach / 5));
     this.scene.add(this.cloud, ...this.planes, segments([...outline(far), ...far.map((c) => [[0, 0, 0], c])], own));
-    this.tags = frame.planes.map((plane) =>
-      h("span.tag.plane", { style: `background: ${CASING}`, "data-id": plane.id }, `${plane.id}`),
+    this.tags = frame.planes.flatMap(({ id, pieces }) =>
+      pieces.map(({ middle }) => {
+        const element = h("span.tag.plane", { style: `background: ${CASING}`, "data-id": id }, `${id}`);
+        return { element, id, middle };
+      }),
     );
-    host.append(...this.tags);
+    host.append(...this.tags.map((tag) => tag.element));
     onTheme(() => this.repaint());
     new ResizeObserver(() => this.resize()).observe(host);
     this.repaint();
@@ -71,7 +74,7 @@ export class FrameScene {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new Float32BufferAttribute(places, 3));
     geometry.setAttribute("color", new Float32BufferAttribute(shades, 3));
-    return new Points(geometry, new PointsMaterial({ size: 2, sizeAttenuation: false, vertexColors: true }));
+    return new Points(geometry, new PointsMaterial({ size: 1.5, sizeAttenuation: false, vertexColors: true }));
   }
 
   planeGroup(plane) {
@@ -87,7 +90,10 @@ export class FrameScene {
         core = segments([piece.nosing], this.pen(4, NOSING));
       edge.renderOrder = 3;
       core.renderOrder = 4;
-      core.material.depthTest = edge.material.depthTest = false;
+      for (const { material } of [edge, core]) {
+        material.transparent = true; // so that it is painted after the sheets
+        material.depthTest = false;
+      }
       group.add(edge, core);
     }
     return group;
@@ -132,10 +138,8 @@ export class FrameScene {
 
   /** One plane alone, or all of them with null. */
   select(id) {
-    this.frame.planes.forEach((plane, i) => {
-      this.planes[i].visible = id === null || plane.id === id;
-      this.tags[i].classList.toggle("away", !this.planes[i].visible);
-    });
+    this.frame.planes.forEach((plane, i) => (this.planes[i].visible = id === null || plane.id === id));
+    for (const tag of this.tags) tag.away = id !== null && tag.id !== id;
     this.draw();
   }
 
@@ -145,15 +149,15 @@ export class FrameScene {
     requestAnimationFrame(() => {
       this.waiting = false;
       this.renderer.render(this.scene, this.eye);
-      this.frame.planes.forEach((plane, i) => this.put(this.tags[i], plane.middle));
+      for (const tag of this.tags) this.put(tag);
     });
   }
 
-  put(tag, place) {
-    const at = new Vector3(...place).project(this.eye);
-    tag.hidden = tag.classList.contains("away") || Math.abs(at.x) > 0.98 || Math.abs(at.y) > 0.98 || at.z > 1;
+  put({ element, middle, away }) {
+    const at = new Vector3(...middle).project(this.eye);
+    element.hidden = away || Math.abs(at.x) > 0.98 || Math.abs(at.y) > 0.98 || at.z > 1;
     const x = ((at.x + 1) / 2) * this.host.clientWidth,
       y = ((1 - at.y) / 2) * this.host.clientHeight;
-    tag.style.transform = `translate(${x}px, ${y}px) translate(-50%, -50%)`;
+    element.style.transform = `translate(${x}px, ${y}px) translate(-50%, -50%)`;
   }
 }

@@ -14,7 +14,7 @@ export class FrameSide {
     const { ends } = frame.bounds();
     const from = [Math.min(ends[0][0], 0) - 0.1, -Math.max(ends[2][1], 0) - 0.15];
     const size = [Math.max(ends[0][1], 0.3) + 0.1 - from[0], -Math.min(ends[2][0], 0) + 0.1 - from[1]];
-    this.text = Math.max(...size) / 32;
+    this.text = Math.max(...size) / 40;
     this.cloud = svg("g", {}, this.dots());
     this.planes = frame.planes.map((plane) => this.planeGroup(plane));
     const far = frame.frustum(Math.min(0.4, size[0] / 4));

@@ -28,6 +28,6 @@ export function chartOf(json) {
       const [t_s, ...columns] = unpack(json.table);
       return [Array.from(t_s), ...columns.map((c) => Array.from(c, (v) => (Number.isFinite(v) ? v : null)))];
     },
-    height: json.group === "error" ? 130 : 120,
+    height: json.group === "error" ? 150 : 120,
   });
 }

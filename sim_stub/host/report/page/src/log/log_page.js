@@ -13,7 +13,7 @@ const GROUPS = [
   [
     "error",
     "Errors: estimate minus truth",
-    "The band is 3 sigma as the estimator states it. LIO is as it came: its world is laid on the truth once, over its first second.",
+    "The band is 3 sigma as the estimator states it. Where there is LIO, it is as it came: its world is laid on the truth once, over its first second.",
   ],
   [
     "sigma",
@@ -68,7 +68,7 @@ function timeBar(player, help) {
     "div.transport",
     {},
     time,
-    h("div.track", {}, slider),
+    h("div.track.plain", {}, slider),
     h("button", { type: "button", "aria-label": "Keys", onclick: () => help.showModal() }, "?"),
   );
 }
@@ -120,7 +120,7 @@ export async function logPage(root, data) {
       "main",
       {},
       none,
-      h("div.pair", {}, scoresPanel(data), sourcePanel(data)),
+      data.has_truth ? h("div.pair", {}, scoresPanel(data), sourcePanel(data)) : sourcePanel(data),
       h(
         "section.wide",
         { id: "time" },

@@ -27,20 +27,10 @@ export function saidOf(data) {
 
 export function scoresPanel(data) {
   const rows = SCORES.filter(
-    ([key]) => data.has_truth && key in data.summary && (data.has_lio || key !== "odometry_position_rmse_mm"),
-  );
-  return h(
-    "section",
-    { id: "scores" },
-    h("h2", {}, "Scores"),
-    rows.length
-      ? table(
-          ["", { text: "", class: "n" }],
-          rows.map(([key, what, unit, digits]) => [what, number(data.summary[key], digits, unit)]),
-          { label: "Scores" },
-        )
-      : h("p.missing", {}, "Nothing is scored: the log has no truth."),
-  );
+    ([key]) => key in data.summary && (data.has_lio || key !== "odometry_position_rmse_mm"),
+  ).map(([key, what, unit, digits]) => [what, number(data.summary[key], digits, unit)]);
+  const heads = ["", { text: "", class: "n" }];
+  return h("section", { id: "scores" }, h("h2", {}, "Scores"), table(heads, rows, { label: "Scores" }));
 }
 
 const vector = (v, scale, digits, unit) => `${v.map((c) => number(c * scale, digits)).join(", ")} ${unit}`;
