@@ -73,8 +73,7 @@ class Drawing {
         const std::size_t at = index(u / scale_, v / scale_);
         const unsigned label = perceived_.labels[at];
         const double z_m = picture_.depth[at] * camera_.intrinsics.depth_unit_m;
-        const double grey =
-            picture_.depth[at] == 0 ? 0.0 : 60.0 + 140.0 * std::max(0.0, 1.0 - z_m / camera_.max_depth_m);
+        const double grey = picture_.depth[at] == 0 ? 0.0 : grey_of(z_m);
         auto& pixel = drawn_.at<cv::Vec3b>(v, u);
         for (int k = 0; k < 3; ++k) {
           pixel[k] = cv::saturate_cast<uchar>(label == 0 ? grey : 0.35 * grey + 0.65 * hues[label][k]);
@@ -82,6 +81,11 @@ class Drawing {
         }
       }
     }
+  }
+  // In steps, so that noise of the depth does not make the file three times as large.
+  [[nodiscard]] double grey_of(double z_m) const {
+    constexpr double kStep = 10.0;
+    return kStep * std::round((60.0 + 140.0 * std::max(0.0, 1.0 - z_m / camera_.max_depth_m)) / kStep);
   }
   [[nodiscard]] bool is_seam(int column, int row) const {
     const auto differs = [&](int c, int r) {

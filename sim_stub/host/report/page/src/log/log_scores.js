@@ -50,7 +50,10 @@ export function sourcePanel(data) {
     ["updates with less weight", s.innovation_outliers],
     ...Object.entries(s.innovations)
       .filter(([, of]) => of.updates > 0)
-      .map(([name, of]) => [`innovations, ${words(name)}`, `${number(of.mean, 2)} in the mean of ${of.updates}`]),
+      .map(([name, of]) => [
+        `innovations, ${words(name).replace("lio", "LIO")}`,
+        `${number(of.mean, 2)} in the mean of ${of.updates}`,
+      ]),
     ["σ of the position at the end", vector(s.final_position_sigma_mm, 1, 1, "mm")],
     ["σ of the yaw at the end", number(s.final_yaw_sigma_deg, 3, "°")],
     ["LIO", data.has_lio ? lio(s.lio) : "none"],
@@ -58,10 +61,18 @@ export function sourcePanel(data) {
   return h("section", { id: "source" }, h("h2", {}, "How the replay went"), table(["", ""], rows, { label: "Replay" }));
 }
 
+const REFUSED = {
+  no_odometry: "from before the start",
+  jump: "too far from the odometry",
+  realigned: "taken as a new world",
+  future: "of the future",
+  order: "not newer than the last",
+};
+
 function lio(counts) {
   const refused = Object.entries(counts)
     .filter(([name, n]) => !["poses", "accepted", "age_at_end_s"].includes(name) && n > 0)
-    .map(([name, n]) => `${n} ${words(name)}`);
+    .map(([name, n]) => `${n} ${REFUSED[name] ?? words(name)}`);
   const age = isNumber(counts.age_at_end_s)
     ? `; the last one is ${number(counts.age_at_end_s, 2, "s")} old at the end`
     : "";
