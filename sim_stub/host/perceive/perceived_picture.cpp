@@ -23,7 +23,7 @@ struct KindLook {
   const char* said;
   cv::Scalar rgb;
 };
-// Okabe and Ito's colours, which people of any colour vision tell apart; page.css has the same.
+// Okabe and Ito's colours, which people of any colour vision tell apart; frame/kinds.js has the same.
 const std::array<KindLook, 4> kKinds{{{"tread", "tread, floor", {0, 158, 115}},
                                       {"riser", "riser", {86, 180, 233}},
                                       {"other", "other", {230, 159, 0}},

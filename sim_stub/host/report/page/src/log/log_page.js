@@ -97,7 +97,10 @@ export async function logPage(root, data) {
         { id: "no-truth" },
         "The log has no truth: there are no errors and no scores, only what the estimator says of itself.",
       );
-  const quiet = data.events.length ? null : h("p.note", {}, "Nothing was bridged, left out or refused.");
+  const quiet =
+    data.events.length || data.summary.lio.not_arrived
+      ? null
+      : h("p.note", {}, "Nothing was bridged, left out or refused.");
   const help = shortcuts(
     [
       [
