@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <lodepng.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
