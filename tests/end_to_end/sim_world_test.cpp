@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // Worlds of a file, under physics, perception in the loop.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <string>
 
 #include "sim_stub/host/climb/climb.hpp"
+#include "sim_stub/host/report/report_run.hpp"
 #include "sim_stub/host/world_file.hpp"
 
 namespace polygmap::sim {
 namespace {
 
-ClimbSummary climb(const std::string& world, std::uint64_t seed) {
+ClimbSummary climb(const std::string& world, std::uint64_t seed, const std::string& recording = "") {
   ClimbOptions options;
   options.seed = seed;
+  options.recording = recording;
   options.world = parse_world("world.toml", world);
   return run_climb(options, {});
 }
@@ -34,6 +38,21 @@ TEST(WorldClimb, TwoBoxesThatAreStairs_GoalIsReachedAndWhatItStoodOnIsTold) {
   EXPECT_GT(s.sole_margin_min_m, 0.0);
   EXPECT_LT(s.foothold_error_m.max, 0.0124);
   EXPECT_GT(s.route.body_clearance_min_m, 0.0);
+}
+
+// The page lays the lidar's own world on the true one: its way lies where the base's does.
+TEST(WorldClimb, Recorded_ReportHasTheSolidsAndTheLidarsWay) {
+  const std::string path = testing::TempDir() + "/polygmap_world_" + std::to_string(::getpid()) + ".mcap";
+  EXPECT_TRUE(climb(kOnTheFloor + solid("step one", 0.0, 1.5, 0.13), 5, path).pass);
+  ReportRun run(path);
+  ASSERT_EQ(run.read(), "");
+  const ReportJson json = run.json();
+  EXPECT_EQ(json["stairs"]["boxes"].size(), 1U);
+  for (std::size_t axis = 0; axis < 3; ++axis) {  // the middle of what the column has
+    const double middle_m = json["series"]["base_true"]["offset"][axis].get<double>();
+    EXPECT_NEAR(json["series"]["lio"]["offset"][axis].get<double>(), middle_m, 0.1) << axis;
+  }
+  std::filesystem::remove(path);
 }
 
 TEST(WorldClimb, GoalSomewhereElse_IsNotReached) {
