@@ -28,7 +28,7 @@ def numbers(tool):
     for line in listed.splitlines():
         if line.startswith("["):
             section = line.strip("[]")
-        elif section in SECTIONS:
+        elif section in SECTIONS and " = " in line:
             name, value = line.split("#")[0].split(" = ")
             if value.strip() not in ("true", "false"):
                 yield section, name, float(value)
