@@ -12,4 +12,7 @@ namespace polygmap::sim {
   return robot;
 }
 
+// Half of the torso's box, about its centre of mass.
+[[nodiscard]] inline Vec3 torso_half_m() noexcept { return {0.1, 0.17, 0.28}; }
+
 }  // namespace polygmap::sim

@@ -14,8 +14,5 @@ kPackagesPackage=(systemd dpkg-dev)
 # What toolchain/report_bundle bundles the report's page with, where there is no npm yet, and what its tests open it with.
 kPackagesBundle=(nodejs npm)
 kPackagesPage=(chromium python3 python3-numpy python3-pil)
-# What toolchain/report_bundle bundles the report's page with, where there is no npm yet, and what its tests open it with.
-kPackagesBundle=(nodejs npm)
-kPackagesPage=(chromium python3 python3-numpy python3-pil)
 # What toolchain/campaign paper draws its figures with.
 kPackagesFigures=(python3-matplotlib)

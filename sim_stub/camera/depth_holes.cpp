@@ -81,6 +81,7 @@ DepthHoles::DepthHoles(const CameraErrors& errors, const StairWorld& world, std:
   }
   for (std::size_t k = 0; k < world.steps.size(); ++k) {
     const Step& step = world.steps[k];
+    if (!step.is_walkable) continue;
     treads_.push_back({step.true_T_step.inverse(), step, noise_.uniform(k) < errors.hole_treads});
   }
   if (treads_.empty()) return;
@@ -88,7 +89,8 @@ DepthHoles::DepthHoles(const CameraErrors& errors, const StairWorld& world, std:
   const CounterNoise sun(seed, Stream::kSunPatch);
   constexpr std::uint64_t kLower = 4;
   const Step& lit = treads_[sun.bits(0) % std::min<std::uint64_t>(kLower, treads_.size())].step;
-  sun_place_m_ = {sun.uniform(1, lit.nosing_x_m, lit.back_x_m), sun.uniform(2, -0.25, 0.25), lit.height_m};
+  sun_place_m_ =
+      lit.true_T_step * Vec3(sun.uniform(1, lit.nosing_x_m, lit.back_x_m), sun.uniform(2, -0.25, 0.25), lit.height_m);
   sun_ray_ = Vec3{sun.uniform(3, -0.6, 0.6), sun.uniform(4, -0.6, 0.6), 1.0}.normalized();
 }
 
@@ -139,7 +141,7 @@ void DepthHoles::apply(const DepthRenderer& picture, const DepthScene& first, co
       for (std::size_t i = 0; i < glass_.size(); ++i) {
         if (is_behind(glass_p[i], glass_[i].half_m, u, depth_m)) *depth = 0;
       }
-      for (std::size_t i = 0; i < treads_.size(); ++i) {
+      for (std::size_t i = 0; holes > 0.0 && i < treads_.size(); ++i) {
         const Tread& tread = treads_[i];
         const double above_m = step_p[i].z(u, depth_m) - tread.step.height_m;
         if (above_m > kOn_m || above_m < -kOn_m - tread.step.worn_m) continue;

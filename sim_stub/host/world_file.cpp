@@ -11,6 +11,8 @@
 #include "algorithms/core/math/transform.hpp"
 #include "firmware/config/param_table.hpp"
 #include "firmware/config/toml_reader.hpp"
+#include "sim_stub/world/clearance.hpp"
+#include "sim_stub/world/tops.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -36,9 +38,11 @@ class WorldReader {
     file_.start = place(root, "start").value_or(WorldPlace{});
     if (!root.contains("start")) throw config::FileError(name_.text() + ": [start] is missing.");
     file_.world.goal = place(root, "goal");
+    group_tops(file_.world);
     if (file_.start.step != kFloorStep) {
       file_.start_height_m = step_of(file_.start).top_m(file_.start.x_m, file_.start.y_m);
     }
+    check_start(root.get("start")->source().begin.line);
     return file_;
   }
 
@@ -70,7 +74,10 @@ class WorldReader {
   }
   [[nodiscard]] std::string text(const toml::node& node, const std::string& what) const {
     const auto* value = node.as_string();
-    if (value == nullptr || value->get().empty()) fail(node.source().begin.line, what + " must be a text in quotes");
+    const auto is_control = [](unsigned char byte) { return byte < 0x20 || byte == 0x7F; };
+    if (value == nullptr || value->get().empty() || std::ranges::any_of(value->get(), is_control)) {
+      fail(node.source().begin.line, what + " must be a text in quotes, without control characters");
+    }
     return value->get();
   }
   [[nodiscard]] Vec3 three(const toml::node& node, const std::string& what, double least, double most) const {
@@ -122,20 +129,53 @@ class WorldReader {
       }
       is_glass = kind == "glass";
     }
-    int step = kObstacleStep;
-    if (is_walkable && true_T_solid.R(2, 2) >= std::cos(kSteepest_rad)) {
-      Step top;
-      top.name = name;
-      top.true_T_step = {true_T_solid.R, true_T_solid * Vec3(0.0, 0.0, half_m.z())};
-      top.riser_x_m = top.nosing_x_m = -half_m.x();
-      top.back_x_m = half_m.x();
-      top.half_width_m = half_m.y();
-      step = static_cast<int>(file_.world.steps.size());
-      file_.world.steps.push_back(top);
-    }
-    file_.world.solids.push_back({-half_m, half_m, step, true_T_solid, 0.0, is_glass});
+    Step top = top_of(true_T_solid, half_m);
+    top.name = name;
+    top.is_walkable = is_walkable && top.true_T_step.R(2, 2) >= std::cos(kSteepest_rad);
+    file_.world.solids.push_back(
+        {-half_m, half_m, static_cast<int>(file_.world.steps.size()), true_T_solid, 0.0, is_glass});
+    file_.world.steps.push_back(top);
+  }
+  // Of the face that is turned up most.
+  [[nodiscard]] static Step top_of(const Transform& true_T_solid, const Vec3& half_m) {
+    Eigen::Index up = 0;
+    true_T_solid.R.row(2).cwiseAbs().maxCoeff(&up);
+    const Eigen::Index x = (up + 1) % 3, y = (up + 2) % 3;
+    const double sign = true_T_solid.R(2, up) < 0.0 ? -1.0 : 1.0;
+    Step top;
+    top.true_T_step.R << true_T_solid.R.col(x), sign * true_T_solid.R.col(y), sign * true_T_solid.R.col(up);
+    top.true_T_step.p_m = true_T_solid.p_m + half_m[up] * top.true_T_step.R.col(2);
+    top.riser_x_m = top.nosing_x_m = -half_m[x];
+    top.back_x_m = half_m[x];
+    top.half_width_m = half_m[y];
+    return top;
   }
 
+  // Physics puts it there with level soles, as it would stand on a floor.
+  void check_start(Line line) const {
+    const WorldPlace& start = file_.start;
+    const Mat3 turn = rotation_z(start.yaw_rad.value_or(0.0));
+    const Vec3 middle_m{start.x_m, start.y_m, file_.start_height_m};
+    constexpr double kLevel_rad = 0.02;
+    if (start.step >= 0 && step_of(start).true_T_step.R(2, 2) < std::cos(kLevel_rad)) {
+      fail(line, "start: " + in_quotes(step_of(start).name) + " slopes, and the robot starts on what is level");
+    }
+    const double aside_m = nominal_robot().stance.half_width_m;
+    for (const double side : {1.0, -1.0}) {
+      const Transform true_T_sole{turn, middle_m + turn * Vec3(0.0, side * aside_m, 0.0)};
+      if (margin_on_tops_m(true_T_sole, file_.world, start.step, nominal_robot().sole) < 0.0) {
+        fail(line, "start: a sole would reach over an edge");
+      }
+    }
+    // What a robot that stands takes up, above its soles.
+    const Vec3 half_m{0.2, 0.25, 0.8}, above_m{0.0, 0.0, half_m.z() + 0.02};
+    const OrientedBox body{{turn, middle_m + above_m}, half_m};
+    for (const SolidBox& solid : file_.world.solids) {
+      if (signed_distance_m(body, solid) > 0.0 || file_.world.are_one(solid.step, start.step)) continue;
+      fail(line, "start: the robot would stand in " +
+                     in_quotes(file_.world.steps[static_cast<std::size_t>(solid.step)].name));
+    }
+  }
   [[nodiscard]] const Step& step_of(const WorldPlace& at) const {
     return file_.world.steps[static_cast<std::size_t>(at.step)];
   }
@@ -156,7 +196,7 @@ class WorldReader {
     const std::string name = text(surface, label + ": surface");
     if (name == kFloor) return at;
     const auto named = std::ranges::find(file_.world.steps, name, &Step::name);
-    if (named == file_.world.steps.end()) {
+    if (named == file_.world.steps.end() || !named->is_walkable) {
       fail(surface.source().begin.line, label + ": " + in_quotes(name) + " is no walkable solid and not \"floor\"");
     }
     at.step = static_cast<int>(named - file_.world.steps.begin());

@@ -140,10 +140,10 @@ std::string mujoco_model(const MujocoPlant::Params& params, const StairWorld& wo
   const double wide = std::sqrt(params.inertia_scale);
   xml.add("<geom class='mass' type='box' pos='%.9g %.9g %.9g' size='%.9g %.9g %.9g' mass='%.9g'/>",
           torso.centre_m.x() + params.torso_offset_x_m, torso.centre_m.y() + params.torso_offset_y_m,
-          torso.centre_m.z() + params.torso_offset_z_m, wide * 0.1, wide * 0.17, wide * 0.28,
-          params.torso_mass_scale * torso.mass_kg);
-  xml.add("<geom class='torso' type='box' pos='%.9g %.9g %.9g' size='0.1 0.17 0.28'/>", torso.centre_m.x(),
-          torso.centre_m.y(), torso.centre_m.z());
+          torso.centre_m.z() + params.torso_offset_z_m, wide * torso_half_m().x(), wide * torso_half_m().y(),
+          wide * torso_half_m().z(), params.torso_mass_scale * torso.mass_kg);
+  xml.add("<geom class='torso' type='box' pos='%.9g %.9g %.9g' size='%.9g %.9g %.9g'/>", torso.centre_m.x(),
+          torso.centre_m.y(), torso.centre_m.z(), torso_half_m().x(), torso_half_m().y(), torso_half_m().z());
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) add_link(xml, leg, j, errors, params);
     for (std::size_t j = 0; j < kJointsPerLeg; ++j) xml.add("</body>");

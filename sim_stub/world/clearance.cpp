@@ -131,21 +131,7 @@ double clearance_m(const OrientedBox& box, std::span<const SolidBox> solids, std
   return least;
 }
 
-// Of a world file: how far within the tops that are one with the step's.
-double top_margin_m(const Vec3& point_m, const StairWorld& world, int step) noexcept {
-  if (step < 0) return kInf;
-  const double top_m = world.steps[static_cast<std::size_t>(step)].top_m(point_m.x(), point_m.y());
-  double margin_m = -kInf;
-  for (const Step& s : world.steps) {
-    if (std::abs(s.top_m(point_m.x(), point_m.y()) - top_m) > kSameTop_m) continue;
-    const Vec3 p_m = s.true_T_step.inverse() * point_m;
-    margin_m = std::max(margin_m, std::min(s.back_x_m - std::abs(p_m.x()), s.half_width_m - std::abs(p_m.y())));
-  }
-  return margin_m;
-}
-
 double tread_margin_m(const Vec3& point_m, const StairWorld& world, int step) noexcept {
-  if (!world.is_staircase) return top_margin_m(point_m, world, step);
   const auto along = [&point_m](const Step& s) { return Vec3(s.true_T_step.inverse() * point_m); };
   if (step < 0) {
     if (world.steps.empty()) return kInf;

@@ -31,8 +31,7 @@ namespace polygmap::sim {
 
 // Least signed distance of the contact rectangle's corners, seen from above, to the edges of the tread of one step
 // (nosing, next riser, sides; the landing's far end); negative = overhang. For kFloorStep the edge is the staircase.
-// In a world file's, tops within kSameTop_m of each other are one, and the floor has no edge.
-inline constexpr double kSameTop_m = 0.005;
+// Of a staircase alone.
 [[nodiscard]] double sole_margin_m(const Transform& true_T_sole, const StairWorld& world, int step,
                                    const SoleModel& sole = nominal_robot().sole) noexcept;
 // The same for one point.

@@ -96,7 +96,11 @@ struct Step {
   double beneath_m = 0.0;   // how far it reaches beneath the next step, which is turned otherwise
   Transform true_T_step{};  // a level, square step has the true world's axes
   double half_width_m = 0.6;
-  std::string name{};  // of a world file's solid
+  // Of a world file's solid: its name, whether it may be stood on, and which tops are one with it (kFloorStep: the
+  // floor is).
+  std::string name{};
+  bool is_walkable = true;
+  int group = 0;
 
   // Where the tread is flat from.
   [[nodiscard]] double edge_x_m() const noexcept { return nosing_x_m + worn_m; }
@@ -122,12 +126,20 @@ struct StairWorld {
   std::vector<Step> steps;
   double half_width_m = 0.6;
   std::vector<Obstacle> obstacles;  // posts among them; seen and collided with, never stood on
-  // Of a world file alone: all that is seen and collided with, and where the robot is to go.
+  // Of a world file alone: all that is seen and collided with, a step for each; and where the robot is to go.
   bool is_staircase = true;
   std::vector<SolidBox> solids;
   std::optional<WorldPlace> goal;
 
-  // Height of the highest step at (x, y): 0 beside, before and behind the staircase. Index of its step in *step
+  // Whether who stands on the one stands on the other.
+  [[nodiscard]] bool are_one(int a, int b) const noexcept {
+    const auto group = [this](int step) {
+      return step < 0 || is_staircase ? step : steps[static_cast<std::size_t>(step)].group;
+    };
+    return group(a) == group(b);
+  }
+  // Of a staircase: height of the highest step at (x, y): 0 beside, before and behind the staircase. Index of its step
+  // in *step
   // (-1: floor).
   [[nodiscard]] double height_m(double x_m, double y_m, int* step = nullptr) const noexcept;
 };

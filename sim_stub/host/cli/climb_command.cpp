@@ -501,8 +501,9 @@ class ProgressLine {
     if (!live_ && p.time_s < next_s_) return;
     next_s_ = p.time_s + kQuietPeriod_s;
     char line[160];
-    std::snprintf(line, sizeof line, "%6.1f s  step %d of %d  %-16.*s worst row %s %.0f us (host)", p.time_s,
-                  p.treads_climbed, steps_, static_cast<int>(p.phase.size()), p.phase.data(), p.worst_row,
+    const std::string of = steps_ > 0 ? " of " + std::to_string(steps_) : "";
+    std::snprintf(line, sizeof line, "%6.1f s  step %d%s  %-16.*s worst row %s %.0f us (host)", p.time_s,
+                  p.treads_climbed, of.c_str(), static_cast<int>(p.phase.size()), p.phase.data(), p.worst_row,
                   p.worst_row_us);
     out_ << (live_ ? "\r" : "") << line << (live_ ? "\x1b[K" : "\n") << std::flush;
     shown_ = true;
@@ -599,7 +600,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   if (!a.options.asked.empty()) a.options.climb_operator = &script.emplace(a.options.asked, words);
   if (a.keyboard) a.options.climb_operator = &keyboard.emplace(words);
   if (a.keyboard && a.said->count("--pace") == 0) a.options.pace = 1.0;
-  ProgressLine progress(out, a.options.stairs.steps, live && a.options.climb_operator == nullptr);
+  ProgressLine progress(out, a.options.world ? 0 : a.options.stairs.steps, live && a.options.climb_operator == nullptr);
   ClimbSummary summary;
   std::string not_written;
   try {

@@ -56,9 +56,11 @@ int run_report(const RecordingArguments& a, std::ostream& out, std::ostream& err
     err << "polygmap: " << wrong << "\n";
     return kExitUsage;
   }
+  ReportedFiles files;
   try {
-    if (const std::string wrong = write_report(a.recordings, a.out); !wrong.empty()) {
-      err << "polygmap: " << wrong << "\n";
+    files = write_report(a.recordings, a.out);
+    if (!files.unreadable.empty()) {
+      err << "polygmap: " << files.unreadable << "\n";
       return kExitUsage;
     }
   } catch (const config::FileError& error) {
@@ -66,7 +68,9 @@ int run_report(const RecordingArguments& a, std::ostream& out, std::ostream& err
     return kExitUsage;
   }
   out << a.out << "/report.html\n";
-  return written(out, err);
+  if (!files.unsound.empty()) err << "polygmap: " << files.unsound << "\n";
+  const int said = written(out, err);
+  return said == kExitPass && !files.unsound.empty() ? kExitUnfinished : said;
 }
 
 int run_info(const RecordingArguments& a, std::ostream& out, std::ostream& err) {
@@ -76,6 +80,9 @@ int run_info(const RecordingArguments& a, std::ostream& out, std::ostream& err) 
   if (!info.complaint.empty()) {
     err << "polygmap: " << info.complaint << "\n";
     return kExitUsage;
+  }
+  if (info.topics.empty() && !info.is_finished) {
+    err << "polygmap: \"" << a.recordings.front() << "\" ends before its first message.\n";
   }
   return said != kExitPass || info.is_finished ? said : kExitUnfinished;
 }

@@ -395,7 +395,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
       if (can_log) can_log->close();
       if (recording && recording_failure.empty()) {
         // One that is interrupted may have nothing to report yet.
-        const std::string wrong = write_report({options.recording}, options.out_dir);
+        const std::string wrong = write_report({options.recording}, options.out_dir).unreadable;
         if (figures.interrupted_by == 0) recording_failure = wrong;
       }
     } catch (const std::runtime_error& error) {

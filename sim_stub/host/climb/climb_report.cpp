@@ -32,20 +32,12 @@ Vec3 level_frame_p(const Transform& any_T_sole, const Vec3& any_p_m) {
   return rotation_z(yaw_of(any_T_sole.R)).transpose() * (any_p_m - any_T_sole.p_m);
 }
 
-// Along the sole's axis from the nosing to the sole's origin; of a world file's top, from whichever edge is behind it.
-double nosing_distance_m(const Step& step, const Transform& true_T_sole, bool is_staircase) {
-  const Transform step_T_sole = step.true_T_step.inverse() * true_T_sole;
-  if (!is_staircase) {
-    const Vec2 back = -unit_at(yaw_of(step_T_sole.R));
-    const Vec2 half_m{step.back_x_m, step.half_width_m};
-    double way_m = std::numeric_limits<double>::infinity();
-    for (const int axis : {0, 1}) {
-      if (back[axis] == 0.0) continue;
-      way_m = std::min(way_m, (std::copysign(half_m[axis], back[axis]) - step_T_sole.p_m[axis]) / back[axis]);
-    }
-    return way_m;
-  }
-  return (step_T_sole.p_m.x() - step.nosing_x_m) / std::cos(yaw_of(step_T_sole.R));
+// Along the sole's axis from the nosing to the sole's origin; of a world file's tops, from whichever edge is behind it.
+double nosing_distance_m(const StairWorld& world, int step, const Transform& true_T_sole) {
+  if (!world.is_staircase) return edge_behind_m(true_T_sole.p_m, yaw_of(true_T_sole.R), world, step);
+  const Step& tread = world.steps[static_cast<std::size_t>(step)];
+  const Transform step_T_sole = tread.true_T_step.inverse() * true_T_sole;
+  return (step_T_sole.p_m.x() - tread.nosing_x_m) / std::cos(yaw_of(step_T_sole.R));
 }
 
 }  // namespace
@@ -104,7 +96,8 @@ void ClimbReport::observe_surfaces(const SurfaceFrame& frame) {
   }
   const Transform true_T_camera = *true_T_base * true_base_T_camera_;
   std::vector<int> found;
-  for (const SurfacePatch& patch : frame.surfaces) found.push_back(matching_surface(world_, patch, true_T_camera));
+  for (const SurfacePatch& patch : frame.surfaces)
+    found.push_back(matching_surface(visibility_.surfaces(), patch, true_T_camera));
   const auto unmatched = static_cast<std::uint64_t>(std::count(found.begin(), found.end(), kNoSurface));
   std::uint64_t missed = 0;
   const std::vector<int>& in_view = visibility_.in_view(true_T_camera, true_base_T_camera_, legs->base_legs);
@@ -184,13 +177,11 @@ void ClimbReport::observe_landing(const Truth& truth) {
   if (!f.onto_tread || world_.steps.empty()) return;
 
   if (target_mapped_ && f.step_index >= 0) {
-    f.along_error_m =
-        target_.nosing_distance_m -
-        nosing_distance_m(world_.steps[static_cast<std::size_t>(f.step_index)], true_T_sole, world_.is_staircase);
+    f.along_error_m = target_.nosing_distance_m - nosing_distance_m(world_, f.step_index, true_T_sole);
   } else if (target_mapped_) {
     // It stands on the floor although a tread was meant: the nosing that makes the error least is the meant one.
-    for (const Step& step : world_.steps) {
-      const double error_m = target_.nosing_distance_m - nosing_distance_m(step, true_T_sole, world_.is_staircase);
+    for (std::size_t step = 0; step < world_.steps.size(); ++step) {
+      const double error_m = target_.nosing_distance_m - nosing_distance_m(world_, static_cast<int>(step), true_T_sole);
       if (!(std::abs(f.along_error_m) <= std::abs(error_m))) f.along_error_m = error_m;
     }
   }
@@ -226,9 +217,23 @@ void ClimbReport::observe_balance(const Truth& truth, const Telemetry& telemetry
   keep_max(com_tracking_max_m_, (desired_m - actual_m).head<2>().norm());
 }
 
+// What a foot that stands there touches by right. What is in the way is no less so where a foot stands on it.
+std::vector<int> ClimbReport::beneath_foot(int step) const {
+  if (step < 0) return {kFloorStep};
+  if (world_.is_staircase) return {step};
+  std::vector<int> ones;
+  if (!world_.steps[static_cast<std::size_t>(step)].is_walkable) return {kFloorStep};
+  if (world_.are_one(step, kFloorStep)) ones.push_back(kFloorStep);
+  for (int other = 0; other < static_cast<int>(world_.steps.size()); ++other) {
+    if (world_.are_one(step, other)) ones.push_back(other);
+  }
+  return ones;
+}
+
 double ClimbReport::flight_clearance_m(const Flight& flight, int to_step, double at_most_m) const {
-  // What stands in the way is no less so where a foot stands on it.
-  const std::array excluded{std::max(flight.from_step, kFloorStep), std::max(to_step, kFloorStep)};
+  std::vector<int> excluded = beneath_foot(flight.from_step);
+  const std::vector<int> landed_on = beneath_foot(to_step);
+  excluded.insert(excluded.end(), landed_on.begin(), landed_on.end());
   for (const Transform& true_T_sole : flight.true_T_sole) {
     at_most_m = clearance_m(collision_box(true_sole_, true_T_sole), solids_, excluded, at_most_m);
   }
@@ -256,12 +261,20 @@ void ClimbReport::observe_soles(const Truth& truth, bool onto_tread) {
       }
       flights_[foot].reset();
       landed_ns_[foot] = truth.stamp_ns;
+      // It was in the air for a moment once more: it still stands where that footstep has landed.
+      const bool has_landed =
+          !footsteps_.empty() && index_of(footsteps_.back().foot) == foot && footsteps_.back().landed;
+      if (has_landed) standing_footstep_[foot] = static_cast<int>(footsteps_.size()) - 1;
     }
     last_step_[foot] = step;
-    clearance_min_m_ = clearance_m(collision_box(true_sole_, true_T_sole), solids_,
-                                   std::array{std::max(step, kFloorStep)}, clearance_min_m_);
+    clearance_min_m_ =
+        clearance_m(collision_box(true_sole_, true_T_sole), solids_, beneath_foot(step), clearance_min_m_);
     if (step < 0 || truth.stamp_ns - landed_ns_[foot] < kRest_ns) continue;
-    const double margin_m = sole_margin_m(true_T_sole, world_, step, true_sole_);
+    constexpr std::uint64_t kMarginEvery_ticks = 5;  // of a world file, where it takes longer
+    if (!world_.is_staircase && ticks_ % kMarginEvery_ticks != 0) continue;
+    const double margin_m = world_.is_staircase ? sole_margin_m(true_T_sole, world_, step, true_sole_)
+                                                : margin_on_tops_m(true_T_sole, world_, step, true_sole_);
+    if (std::isinf(margin_m)) continue;  // the floor has no edge
     keep_min(sole_margin_min_m_, margin_m);
     const int footstep = standing_footstep_[foot];
     if (footstep >= 0) keep_min(footsteps_[static_cast<std::size_t>(footstep)].sole_margin_m, margin_m);
@@ -313,11 +326,12 @@ int ClimbReport::meant_step(Foot foot, const Flight& flight) const {
   const auto off_m = [this](const Step& step) {
     const Vec3& planned_m = footsteps_.back().true_T_planned.p_m;
     if (world_.is_staircase) return std::abs(planned_m.z() - step.height_m);
+    if (!step.is_walkable) return std::numeric_limits<double>::infinity();
     const Vec3 p_m = step.true_T_step.inverse() * planned_m;
     return std::max({std::abs(p_m.z()), std::abs(p_m.x()) - step.back_x_m, std::abs(p_m.y()) - step.half_width_m});
   };
   const auto nearest = std::ranges::min_element(world_.steps, {}, off_m);
-  return static_cast<int>(nearest - world_.steps.begin());
+  return nearest == world_.steps.end() ? kFloorStep : static_cast<int>(nearest - world_.steps.begin());
 }
 
 double ClimbReport::clearance_min_m() const {

@@ -22,6 +22,7 @@
 #include "sim_stub/robot_camera.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
+#include "sim_stub/world/tops.hpp"
 #include "sim_stub/world/truth.hpp"
 
 namespace polygmap::sim {
@@ -81,6 +82,7 @@ class ClimbReport {
   void observe_stance(const Truth& truth);
   void observe_steps_climbed(const Truth& truth);
   void observe_trails(const Truth& truth);
+  [[nodiscard]] std::vector<int> beneath_foot(int step) const;
   // The least of a flight that ended on to_step, and of at_most_m.
   [[nodiscard]] double flight_clearance_m(const Flight& flight, int to_step, double at_most_m) const;
   [[nodiscard]] double clearance_min_m() const;

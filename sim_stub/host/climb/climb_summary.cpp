@@ -96,7 +96,11 @@ Json arguments_json(const ClimbOptions& o) {
                {"render_shift_m", {o.render_dx_m, o.render_dy_m, o.render_dz_m}},
                {"render_missing_step", o.render_missing_step < 0 ? Json(nullptr) : Json(o.render_missing_step + 1)},
                {"blank_depth", o.blank_depth}};
-  if (o.world) json["world"] = o.world_file;
+  if (o.world) {
+    for (const char* key : {"steps", "rise_m", "tread_m", "width_m", "nosing_m", "landing_m", "jitter_m"})
+      json.erase(key);
+    json["world"] = o.world_file;
+  }
   if (stairs.balusters.spacing_m > 0.0) {
     const Balusters& posts = stairs.balusters;
     json["balusters"] = {{"spacing_m", posts.spacing_m},
@@ -181,7 +185,8 @@ Json to_json(const ClimbSummary& s) {
   j["footsteps_total"] = s.footsteps.size();
   j["surfaces_stood_on"] = route.surfaces_stood_on;
   j["body_clearance_mm_min"] = mm(route.body_clearance_min_m);
-  j["overhang_mm_max"] = mm(std::max(0.0, -s.sole_margin_min_m));
+  const bool stood = !std::isnan(s.sole_margin_min_m);
+  j["overhang_mm_max"] = stood ? mm(std::max(0.0, -s.sole_margin_min_m)) : Json(nullptr);
   j["stop_sentence"] = s.stop_sentence.empty() ? Json(nullptr) : Json(s.stop_sentence);
   j["climb_time_s"] = seconds_of(s.climb_time_s);
   j["seconds_per_step"] = seconds_of(s.seconds_per_step);

@@ -254,7 +254,8 @@ void add_solids(std::string& out, const View& view, const StairWorld& world) {
     }
     std::string style;
     add(style, "fill=\"%s\" fill-opacity=\"%.2f\" stroke=\"%s\" stroke-width=\"1.2\"",
-        solid->step == kObstacleStep ? "#857d70" : kStairFill, solid->is_glass ? 0.2 : 1.0, kStairLine);
+        world.steps[static_cast<std::size_t>(solid->step)].is_walkable ? kStairFill : "#857d70",
+        solid->is_glass ? 0.2 : 1.0, kStairLine);
     add_polygon(out, view, outline_m, style.c_str());
   }
 }
@@ -362,15 +363,6 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
     x_m.include(step.back_x_m);
     z_m.include(step.height_m);
   }
-  for (const SolidBox& solid : world.solids) {
-    const OrientedBox box = solid.box();
-    const Vec3 reach_m = box.centre.R.cwiseAbs() * box.half_m;
-    for (const Vec3& p_m : {Vec3(box.centre.p_m - reach_m), Vec3(box.centre.p_m + reach_m)}) {
-      x_m.include(p_m.x());
-      y_m.include(p_m.y());
-      z_m.include(p_m.z());
-    }
-  }
   const auto include_point = [&](const Vec3& p_m) {
     x_m.include(p_m.x());
     y_m.include(p_m.y());
@@ -379,6 +371,19 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
   for (const Vec3& p_m : drawing.base_trail_m) include_point(p_m);
   for (const auto& trail_m : drawing.sole_trail_m) {
     for (const Vec3& p_m : trail_m) include_point(p_m);
+  }
+  // What is farther from the robot's way than this is no part of the picture.
+  constexpr double kAround_m = 2.0;
+  const Range near_x_m{x_m.low - kAround_m, x_m.high + kAround_m}, near_y_m{y_m.low - kAround_m, y_m.high + kAround_m},
+      near_z_m{z_m.low, z_m.high + kAround_m};
+  for (const SolidBox& solid : world.solids) {
+    const OrientedBox box = solid.box();
+    const Vec3 reach_m = box.centre.R.cwiseAbs() * box.half_m;
+    for (const Vec3& p_m : {Vec3(box.centre.p_m - reach_m), Vec3(box.centre.p_m + reach_m)}) {
+      x_m.include(std::clamp(p_m.x(), near_x_m.low, near_x_m.high));
+      y_m.include(std::clamp(p_m.y(), near_y_m.low, near_y_m.high));
+      z_m.include(std::clamp(p_m.z(), near_z_m.low, near_z_m.high));
+    }
   }
   x_m.grow(0.22);
   y_m.grow(0.08);

@@ -43,7 +43,9 @@ bool has_arrived(const ClimbSummary& s, const ClimbEnding& ending) {
 std::string way_of(const ClimbSummary& s) {
   if (!s.options.world) return sentence("%.0f of %.0f steps", s.steps_climbed, s.steps_total);
   std::string way = sentence("%.0f footsteps", static_cast<double>(s.footsteps.size()));
-  if (!s.route.surfaces_stood_on.empty()) way += ", the last on \"" + s.route.surfaces_stood_on.back() + "\"";
+  if (s.route.surfaces_stood_on.empty()) return way;
+  way += (s.footsteps.empty() ? ", on \"" : ", the last on \"") + s.route.surfaces_stood_on.back() + "\"";
+  if (s.route.goal_reached == false) way += sentence(", %.2f m from the goal", s.route.goal_distance_m);
   return way;
 }
 
@@ -57,7 +59,8 @@ std::string success_of(const ClimbSummary& s) {
   std::string text = (s.route.goal_reached ? "Reached the goal in " : "Ended by itself after ") +
                      sentence("%.1f s, ", s.ended_at_s) + way_of(s);
   if (!std::isnan(s.sole_margin_min_m)) text += sentence(", least sole margin %.1f mm", s.sole_margin_min_m * 1e3);
-  return text + sentence(", least swing clearance %.1f mm", clearance_mm);
+  if (!std::isnan(clearance_mm)) text += sentence(", least swing clearance %.1f mm", clearance_mm);
+  return text;
 }
 
 std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
@@ -92,6 +95,7 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
   // A step counts where both soles rest inside its edges, so a sole over one may be why the count is short.
   if (!all_climbed && ending.phase == GaitPhase::kFinished) {
     if (over) return over_the_edge + "; " + climbed + " count.";
+    if (s.options.world) return "The module ended after " + climbed + ": it saw nothing higher, and knows of no goal.";
     return "The module ended the climb after " + climbed + ": " + why_stopped(StopReason::kTop, 0.0) + ".";
   }
   if (!all_climbed) return why_ended_early(climbed, ending);
@@ -99,7 +103,14 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
     return "The module called the heap, " + std::to_string(s.heap_calls) + " times in all, first from " +
            (ending.heap_first_caller.empty() ? "an unknown function" : ending.heap_first_caller) + ".";
   }
-  if (!(s.sole_margin_min_m >= 0.0) && (over || !s.options.world)) return over_the_edge + ".";
+  if (!s.route.stood_on_wrongly.empty()) {
+    return "A foot stood on \"" + s.route.stood_on_wrongly + "\", which is not to be stood on.";
+  }
+  if (over || (!s.options.world && std::isnan(s.sole_margin_min_m))) return over_the_edge + ".";
+  if (s.options.world && s.route.body_clearance_min_m <= 0.0) {
+    return sentence("The body came within %.1f mm of a solid (0 or less is a collision).",
+                    s.route.body_clearance_min_m * 1e3);
+  }
   return sentence("A foot came within %.1f mm of the stairs (0 or less is a collision).",
                   s.swing_clearance_min_m * 1e3);
 }
@@ -107,10 +118,12 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
 }  // namespace
 
 void judge(ClimbSummary& s, const ClimbEnding& ending) {
-  // In a world file a way may be without an edge.
-  const bool stood_inside = s.options.world ? !(s.sole_margin_min_m < 0.0) : s.sole_margin_min_m >= 0.0;
-  s.pass = has_arrived(s, ending) && !s.fell && stood_inside && s.swing_clearance_min_m > 0.0 && s.heap_calls == 0 &&
-           s.interrupted_by == 0;
+  bool is_clean = s.sole_margin_min_m >= 0.0 && s.swing_clearance_min_m > 0.0;
+  if (s.options.world) {  // a way may be without an edge, and there may be none to go
+    is_clean = !(s.sole_margin_min_m < 0.0) && !(s.swing_clearance_min_m <= 0.0) &&
+               !(s.route.body_clearance_min_m <= 0.0) && s.route.stood_on_wrongly.empty();
+  }
+  s.pass = has_arrived(s, ending) && !s.fell && is_clean && s.heap_calls == 0 && s.interrupted_by == 0;
   if (ending.phase == GaitPhase::kStopped) s.stop_sentence = why_stopped(ending.stop_reason, ending.stop_measured_m);
   s.reason = reason_of(s, ending);
   for (const Push& push : s.options.pushes) {

@@ -40,12 +40,11 @@ void RouteReport::observe(const Truth& truth) {
     if (stands_since_ns_[foot] < 0) stands_since_ns_[foot] = truth.stamp_ns;
     if (truth.stamp_ns - stands_since_ns_[foot] < kRest_ns) continue;
     const int step = truth.step_index[foot];
-    // The foot that still stands on the one before is no return to it.
-    const std::size_t recent = std::min<std::size_t>(stood_on_.size(), 2);
-    if (std::find(stood_on_.end() - static_cast<std::ptrdiff_t>(recent), stood_on_.end(), step) != stood_on_.end()) {
-      continue;
-    }
-    stood_on_.push_back(step);
+    // A sole across two tops that are one stays where it is; so does the list while both feet come to one surface.
+    int& rests_on = rests_on_[foot];
+    if (rests_on != kNowhere && world_.are_one(rests_on, step)) continue;
+    rests_on = step;
+    if (stood_on_.empty() || !world_.are_one(stood_on_.back(), step)) stood_on_.push_back(step);
   }
 }
 
@@ -55,8 +54,7 @@ void RouteReport::observe_body(const Truth& truth) {
     const double least_m = clearance_m(part, solids_, std::array{kFloorStep}, body_clearance_m_ + radius_m) - radius_m;
     body_clearance_m_ = std::min(body_clearance_m_, least_m);
   };
-  constexpr double kTorsoHalf_m[3] = {0.1, 0.17, 0.28};  // as physics has it
-  look({{Mat3::Identity(), nominal_robot().masses.torso.centre_m}, Vec3(kTorsoHalf_m)}, truth.true_T_base, 0.0);
+  look({{Mat3::Identity(), nominal_robot().masses.torso.centre_m}, torso_half_m()}, truth.true_T_base, 0.0);
   for (const LegShapes& leg : truth.base_legs) {
     if (!(leg.shank.radius_m > 0.0)) continue;  // a test's
     for (const Capsule& limb : {leg.thigh, above_the_foot(leg.shank)}) {
@@ -72,11 +70,16 @@ std::string RouteReport::name_of(int step) const {
   return name.empty() ? "step " + std::to_string(step + 1) : name;
 }
 
-bool RouteReport::is_at_goal(const WorldPlace& goal) const {
+double RouteReport::distance_m(const WorldPlace& goal) const {
   const Vec2 middle_m = 0.5 * (last_.true_T_sole[0].p_m + last_.true_T_sole[1].p_m).head<2>();
-  if ((middle_m - Vec2(goal.x_m, goal.y_m)).norm() > kGoalWithin_m || last_.fell) return false;
+  return (middle_m - Vec2(goal.x_m, goal.y_m)).norm();
+}
+
+bool RouteReport::is_at_goal(const WorldPlace& goal) const {
+  if (distance_m(goal) > kGoalWithin_m || last_.fell) return false;
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
-    if (!last_.in_contact[foot] || last_.step_index[foot] != goal.step) return false;
+    const bool rests = stands_since_ns_[foot] >= 0 && last_.stamp_ns - stands_since_ns_[foot] >= kRest_ns;
+    if (!rests || !world_.are_one(last_.step_index[foot], goal.step)) return false;
   }
   const double yaw_rad = yaw_of(last_.true_T_base.R);
   return !goal.yaw_rad || std::abs(std::remainder(yaw_rad - *goal.yaw_rad, 2.0 * kPi)) <= kGoalWithin_rad;
@@ -84,8 +87,15 @@ bool RouteReport::is_at_goal(const WorldPlace& goal) const {
 
 RouteFigures RouteReport::figures() const {
   RouteFigures figures;
-  if (world_.goal) figures.goal_reached = is_at_goal(*world_.goal);
-  for (const int step : stood_on_) figures.surfaces_stood_on.push_back(name_of(step));
+  if (world_.goal) {
+    figures.goal_reached = is_at_goal(*world_.goal);
+    figures.goal_distance_m = distance_m(*world_.goal);
+  }
+  for (const int step : stood_on_) {
+    figures.surfaces_stood_on.push_back(name_of(step));
+    const bool is_wrong = step >= 0 ? !world_.steps[static_cast<std::size_t>(step)].is_walkable : step != kFloorStep;
+    if (is_wrong && figures.stood_on_wrongly.empty()) figures.stood_on_wrongly = name_of(step);
+  }
   if (std::isfinite(body_clearance_m_)) figures.body_clearance_min_m = body_clearance_m_;
   return figures;
 }

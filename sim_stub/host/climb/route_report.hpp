@@ -14,14 +14,16 @@
 namespace polygmap::sim {
 
 struct RouteFigures {
-  std::optional<bool> goal_reached;                                        // none: the world has no goal
-  std::vector<std::string> surfaces_stood_on;                              // in order, each as often as it was come to
+  std::optional<bool> goal_reached;                                   // none: the world has no goal
+  double goal_distance_m = std::numeric_limits<double>::quiet_NaN();  // from the middle of the soles, at the end
+  std::vector<std::string> surfaces_stood_on;  // in order, each as often as a foot came to it from another one
+  std::string stood_on_wrongly;                // the first that is not to be stood on; empty: none
   double body_clearance_min_m = std::numeric_limits<double>::quiet_NaN();  // torso, thighs, shanks to the solids
 };
 
 class RouteReport {
  public:
-  static constexpr double kGoalWithin_m = 0.25, kGoalWithin_rad = 0.26;
+  static constexpr double kGoalWithin_m = 0.25, kGoalWithin_rad = kPi / 12.0;
   static constexpr std::int64_t kRest_ns = 50 * kNsPerMs;  // a sole that stands this long rests
 
   explicit RouteReport(const StairWorld& world) : world_(world), solids_(solids_of(world)) {}
@@ -30,8 +32,10 @@ class RouteReport {
   [[nodiscard]] RouteFigures figures() const;
 
  private:
+  static constexpr int kNowhere = -100;
   [[nodiscard]] std::string name_of(int step) const;
   void observe_body(const Truth& truth);
+  [[nodiscard]] double distance_m(const WorldPlace& goal) const;
   [[nodiscard]] bool is_at_goal(const WorldPlace& goal) const;
 
   StairWorld world_;
@@ -39,6 +43,7 @@ class RouteReport {
   Truth last_;
   std::uint64_t ticks_ = 0;
   std::array<std::int64_t, kFootCount> stands_since_ns_{-1, -1};
+  std::array<int, kFootCount> rests_on_{kNowhere, kNowhere};
   std::vector<int> stood_on_;
   double body_clearance_m_ = std::numeric_limits<double>::infinity();
 };

@@ -28,31 +28,35 @@ void add_faces(std::vector<TrueSurface>& all, const Vec3& low_m, const Vec3& hig
   }
 }
 
-TrueSurfaces surfaces_of(const StairWorld& world) {
-  const double w = world.half_width_m;
-  TrueSurfaces out;
-  std::vector<TrueSurface>& all = out.all;
-  for (const SolidBox& solid : world.solids) {
-    add_faces(all, solid.min_m, solid.max_m, static_cast<int>(out.own_T_true.size()));
-    out.own_T_true.push_back(solid.true_T_solid.inverse());
+// Of what the floor's plane cuts, from above: the outline of a box that stands or is sunk in the floor.
+ConvexPolygon footprint_of(const SolidBox& solid) {
+  constexpr double kJustAbove_m = 0.005;
+  const OrientedBox box = solid.box();
+  std::array<Vec3, 8> corners_m;
+  for (unsigned i = 0; i < 8; ++i) {
+    const Vec3 sign{(i & 1U) != 0U ? 1.0 : -1.0, (i & 2U) != 0U ? 1.0 : -1.0, (i & 4U) != 0U ? 1.0 : -1.0};
+    corners_m[i] = box.centre * Vec3(sign.cwiseProduct(box.half_m));
   }
-  if (!world.is_staircase) return out;
-  double below_m = 0.0;
-  const int left = 1 + 2 * static_cast<int>(world.steps.size());
-  int id = kFloorSurface;
-  for (int k = 0; k < static_cast<int>(world.steps.size()); ++k) {
-    const Step& s = world.steps[static_cast<std::size_t>(k)];
-    const double back_m = s.back_x_m + s.beneath_m;
-    out.own_T_true.push_back(s.true_T_step.inverse());
-    all.push_back({++id, 2, 1.0, {s.nosing_x_m, -w, s.height_m}, {back_m, w, s.height_m}, k});
-    all.push_back({++id, 0, -1.0, {s.nosing_x_m, -w, below_m}, {s.riser_x_m, w, s.height_m}, k});
-    all.push_back({left, 1, 1.0, {s.riser_x_m, w, 0.0}, {back_m, w, s.height_m}, k});
-    all.push_back({left + 1, 1, -1.0, {s.riser_x_m, -w, 0.0}, {back_m, -w, s.height_m}, k});
-    below_m = s.height_m;
+  ConvexPolygon cut;
+  for (unsigned i = 0; i < 8; ++i) {
+    for (const unsigned axis : {1U, 2U, 4U}) {
+      if ((i & axis) != 0U) continue;
+      const Vec3 &a_m = corners_m[i], &b_m = corners_m[i | axis];
+      const double share = (kJustAbove_m - a_m.z()) / (b_m.z() - a_m.z());
+      if (share >= 0.0 && share <= 1.0) static_cast<void>(cut.try_push_back(Vec3(a_m + share * (b_m - a_m)).head<2>()));
+    }
   }
-  for (const Obstacle& o : world.obstacles)
-    add_faces(all, o.centre_m - 0.5 * o.size_m, o.centre_m + 0.5 * o.size_m, -1);
-  return out;
+  return convex_hull(cut);
+}
+
+ConvexPolygon shrunk(const ConvexPolygon& outline, double by_m) {
+  ConvexPolygon smaller = outline;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    HalfPlane inside = edge_half_plane(outline, i);
+    inside.offset_m += by_m;
+    smaller = clip(smaller, inside);
+  }
+  return smaller;
 }
 
 bool is_on(const TrueSurface& surface, const Vec3& normal, const Vec3& centroid_m, std::span<const Vec3> polygon_m,
@@ -70,35 +74,8 @@ bool is_on(const TrueSurface& surface, const Vec3& normal, const Vec3& centroid_
   return true;
 }
 
-// The convex hull of what stands on the floor, from above, shrunk: of a staircase one rectangle, else of each solid.
-std::vector<ConvexPolygon> footprints(const StairWorld& world, double shrunk_m) {
-  std::vector<ConvexPolygon> all;
-  const auto add = [&all](const Transform& true_T_own, const Vec2& low_m, const Vec2& high_m, double z_m) {
-    ConvexPolygon corners;
-    for (const Vec2& corner_m : {low_m, Vec2{high_m.x(), low_m.y()}, high_m, Vec2{low_m.x(), high_m.y()}}) {
-      const Vec3 there_m = true_T_own * Vec3(corner_m.x(), corner_m.y(), z_m);
-      static_cast<void>(corners.try_push_back(there_m.head<2>()));
-    }
-    all.push_back(convex_hull(corners));
-  };
-  const Vec2 in_m = Vec2::Constant(shrunk_m);
-  if (world.is_staircase && !world.steps.empty()) {
-    const Vec2 low_m{world.steps.front().riser_x_m, -world.half_width_m};
-    const Vec2 high_m{world.steps.back().back_x_m, world.half_width_m};
-    add({}, low_m + in_m, high_m - in_m, 0.0);
-  }
-  for (const SolidBox& solid : world.solids) {
-    const Vec2 low_m = solid.min_m.head<2>() + in_m, high_m = solid.max_m.head<2>() - in_m;
-    const Vec3 bottom_m = solid.true_T_solid * Vec3(0.0, 0.0, solid.min_m.z());
-    if (bottom_m.z() <= shrunk_m && (high_m.array() > low_m.array()).all()) {
-      add(solid.true_T_solid, low_m, high_m, solid.min_m.z());
-    }
-  }
-  return all;
-}
-
 // On the floor, and not beneath what stands there: a polygon that runs through it covers what it has not seen.
-bool is_on_floor(const StairWorld& world, const Vec3& normal, std::span<const Vec3> polygon_m,
+bool is_on_floor(const TrueSurfaces& surfaces, const Vec3& normal, std::span<const Vec3> polygon_m,
                  const SurfaceMatchLimits& limits) {
   if (!(normal.z() >= std::cos(limits.angle_rad))) return false;
   ConvexPolygon plan;
@@ -108,34 +85,78 @@ bool is_on_floor(const StairWorld& world, const Vec3& normal, std::span<const Ve
   }
   const ConvexPolygon seen = convex_hull(plan);
   constexpr double kTouched_m2 = 1e-3;
-  return std::ranges::all_of(footprints(world, limits.overhang_m), [&](const ConvexPolygon& footprint) {
-    return area_m2(intersection(seen, footprint)) < kTouched_m2;
+  return std::ranges::all_of(surfaces.footprints, [&](const ConvexPolygon& footprint) {
+    return area_m2(intersection(seen, shrunk(footprint, limits.overhang_m))) < kTouched_m2;
   });
 }
 
 }  // namespace
 
-int matching_surface(const StairWorld& world, const SurfacePatch& patch, const Transform& true_T_camera,
+TrueSurfaces::TrueSurfaces(const StairWorld& world) {
+  const double w = world.half_width_m;
+  for (const SolidBox& solid : world.solids) {
+    add_faces(all, solid.min_m, solid.max_m, static_cast<int>(axes.size()));
+    axes.push_back({solid.true_T_solid.inverse(), solid.min_m, solid.max_m});
+    if (ConvexPolygon footprint = footprint_of(solid); footprint.size() > 2) footprints.push_back(footprint);
+  }
+  if (!world.is_staircase) return;
+  double below_m = 0.0;
+  const int left = 1 + 2 * static_cast<int>(world.steps.size());
+  int id = kFloorSurface;
+  for (int k = 0; k < static_cast<int>(world.steps.size()); ++k) {
+    const Step& s = world.steps[static_cast<std::size_t>(k)];
+    const double back_m = s.back_x_m + s.beneath_m;
+    axes.push_back({s.true_T_step.inverse()});
+    all.push_back({++id, 2, 1.0, {s.nosing_x_m, -w, s.height_m}, {back_m, w, s.height_m}, k});
+    all.push_back({++id, 0, -1.0, {s.nosing_x_m, -w, below_m}, {s.riser_x_m, w, s.height_m}, k});
+    all.push_back({left, 1, 1.0, {s.riser_x_m, w, 0.0}, {back_m, w, s.height_m}, k});
+    all.push_back({left + 1, 1, -1.0, {s.riser_x_m, -w, 0.0}, {back_m, -w, s.height_m}, k});
+    below_m = s.height_m;
+  }
+  for (const TrueSurface& surface : all) {
+    Axes& own = axes[static_cast<std::size_t>(surface.axes)];
+    own.low_m = own.low_m.cwiseMin(surface.low_m);
+    own.high_m = own.high_m.cwiseMax(surface.high_m);
+  }
+  for (const Obstacle& o : world.obstacles) {
+    add_faces(all, o.centre_m - 0.5 * o.size_m, o.centre_m + 0.5 * o.size_m, -1);
+  }
+  if (world.steps.empty()) return;
+  ConvexPolygon under;
+  const Vec2 low_m{world.steps.front().riser_x_m, -w}, high_m{world.steps.back().back_x_m, w};
+  for (const Vec2& corner_m : {low_m, Vec2{high_m.x(), low_m.y()}, high_m, Vec2{low_m.x(), high_m.y()}}) {
+    static_cast<void>(under.try_push_back(corner_m));
+  }
+  footprints.push_back(under);
+}
+
+int matching_surface(const TrueSurfaces& surfaces, const SurfacePatch& patch, const Transform& true_T_camera,
                      const SurfaceMatchLimits& limits) {
   if (patch.polygon.size() < 3) return kNoSurface;
   const Vec3 normal = true_T_camera.R * patch.normal;
   const Vec3 centroid_m = true_T_camera * patch.centroid_m;
   std::vector<Vec3> polygon_m;
   for (const Vec3& vertex_m : patch.polygon) polygon_m.push_back(true_T_camera * vertex_m);
-  if (is_on_floor(world, normal, polygon_m, limits)) return kFloorSurface;
-  const TrueSurfaces surfaces = surfaces_of(world);
+  if (is_on_floor(surfaces, normal, polygon_m, limits)) return kFloorSurface;
+  std::vector<Vec3> own_m;
+  Vec3 own_normal = normal, own_centroid_m = centroid_m;
+  int along = -2;  // whose axes own_m has
   for (const TrueSurface& surface : surfaces.all) {
-    const Transform own_T_true =
-        surface.axes < 0 ? Transform{} : surfaces.own_T_true[static_cast<std::size_t>(surface.axes)];
-    std::vector<Vec3> own_m;
-    for (const Vec3& vertex_m : polygon_m) own_m.push_back(own_T_true * vertex_m);
-    if (is_on(surface, own_T_true.R * normal, own_T_true * centroid_m, own_m, limits)) return surface.id;
+    if (surface.axes != along) {
+      along = surface.axes;
+      const Transform own_T_true = along < 0 ? Transform{} : surfaces.axes[static_cast<std::size_t>(along)].own_T_true;
+      own_m.clear();
+      for (const Vec3& vertex_m : polygon_m) own_m.push_back(own_T_true * vertex_m);
+      own_normal = own_T_true.R * normal;
+      own_centroid_m = own_T_true * centroid_m;
+    }
+    if (is_on(surface, own_normal, own_centroid_m, own_m, limits)) return surface.id;
   }
   return kNoSurface;
 }
 
 SurfaceVisibility::SurfaceVisibility(const StairWorld& world, const CameraIntrinsics& intrinsics)
-    : solids_(solids_of(world)), surfaces_(surfaces_of(world)), seen_(3 + 2 * world.steps.size()), renderer_([&] {
+    : solids_(solids_of(world)), surfaces_(world), seen_(3 + 2 * world.steps.size()), renderer_([&] {
         CameraIntrinsics coarse = intrinsics;
         coarse.width_px /= kCoarse_px, coarse.height_px /= kCoarse_px;
         coarse.fx_px /= kCoarse_px, coarse.fy_px /= kCoarse_px;
@@ -176,13 +197,22 @@ void SurfaceVisibility::see(const Vec3& point_m, int px) {
   int id = std::abs(point_m.z()) <= kOnSurface_m ? kFloorSurface : kNoSurface;
   bool farther = false;
   Vec3 along_m = point_m;
-  int along = -1;  // whose axes
+  int along = -1;       // whose axes
+  bool is_near = true;  // what lies along them
   for (std::size_t i = 0; i < surfaces_.all.size() && id == kNoSurface; ++i) {
     const TrueSurface& s = surfaces_.all[i];
     if (s.axes != along) {
       along = s.axes;
-      along_m = along < 0 ? point_m : surfaces_.own_T_true[static_cast<std::size_t>(along)] * point_m;
+      is_near = true;
+      along_m = point_m;
+      if (along >= 0) {
+        const TrueSurfaces::Axes& own = surfaces_.axes[static_cast<std::size_t>(along)];
+        along_m = own.own_T_true * point_m;
+        is_near = ((along_m - own.low_m).array() >= -kOnSurface_m).all() &&
+                  ((own.high_m - along_m).array() >= -kOnSurface_m).all();
+      }
     }
+    if (!is_near) continue;
     if (((along_m - s.low_m).array() < -kOnSurface_m).any() || ((s.high_m - along_m).array() < -kOnSurface_m).any()) {
       continue;
     }

@@ -7,6 +7,7 @@
 
 #include "algorithms/core/math/transform.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
+#include "algorithms/geometry/convex.hpp"
 #include "sim_stub/camera/depth_renderer.hpp"
 #include "sim_stub/world/clearance.hpp"
 #include "sim_stub/world/stair_world.hpp"
@@ -29,18 +30,26 @@ struct TrueSurface {
   double sign;
   Vec3 low_m;
   Vec3 high_m;
-  int axes = -1;  // which of TrueSurfaces::own_T_true; none: the true world's
+  int axes = -1;  // which of TrueSurfaces::axes; none: the true world's
 };
 struct TrueSurfaces {
+  explicit TrueSurfaces(const StairWorld& world);
+
+  // Axes, and what lies along them of these surfaces.
+  struct Axes {
+    Transform own_T_true;
+    Vec3 low_m = Vec3::Constant(1e9), high_m = Vec3::Constant(-1e9);
+  };
   std::vector<TrueSurface> all;
-  std::vector<Transform> own_T_true;
+  std::vector<Axes> axes;
+  std::vector<ConvexPolygon> footprints;  // of what stands on the floor, from above
 };
 
 inline constexpr int kNoSurface = -1;
 // Which true surface the patch is: the floor, a tread, a riser, a side of the staircase, or any face of what is none.
 // patch in the camera frame, true_T_camera at its exposure.
-[[nodiscard]] int matching_surface(const StairWorld& world, const SurfacePatch& patch, const Transform& true_T_camera,
-                                   const SurfaceMatchLimits& limits = {});
+[[nodiscard]] int matching_surface(const TrueSurfaces& surfaces, const SurfacePatch& patch,
+                                   const Transform& true_T_camera, const SurfaceMatchLimits& limits = {});
 
 // A true surface is well in view where at least least_px of one of its planes are seen past the legs, not grazing,
 // near, and over least_extent_m both ways. (The scorer of generated frames counts planes from 1500 pixels on, without
@@ -60,6 +69,8 @@ class SurfaceVisibility {
   [[nodiscard]] const std::vector<int>& in_view(const Transform& true_T_camera, const Transform& base_T_camera,
                                                 const std::array<LegShapes, kFootCount>& base_legs,
                                                 const InViewLimits& limits = {});
+
+  [[nodiscard]] const TrueSurfaces& surfaces() const noexcept { return surfaces_; }
 
  private:
   // What is seen of a plane.

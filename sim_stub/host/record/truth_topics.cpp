@@ -37,9 +37,8 @@ void TruthTopics::write_stairs(std::int64_t now_ns) {
   const std::size_t steps = stairs.is_staircase ? stairs.steps.size() : 0;
   begin_scene(out, now_ns, steps + stairs.obstacles.size() + stairs.solids.size());
   for (const SolidBox& solid : stairs.solids) {
-    const bool stands = solid.step >= 0;
-    put_cube(out, solid.box().centre, 2.0 * solid.half_m(), stands ? kStone : kThing,
-             "solid " + (stands ? stairs.steps[static_cast<std::size_t>(solid.step)].name : std::string()));
+    const Step& top = stairs.steps[static_cast<std::size_t>(solid.step)];
+    put_cube(out, solid.box().centre, 2.0 * solid.half_m(), top.is_walkable ? kStone : kThing, "solid " + top.name);
   }
   for (std::size_t i = 0; i < steps; ++i) {
     const Step& step = stairs.steps[i];

@@ -21,7 +21,7 @@ std::array<double, 7> numbers_of(const Transform& pose) {
   return {pose.p_m.x(), pose.p_m.y(), pose.p_m.z(), q.x(), q.y(), q.z(), q.w()};
 }
 
-// Integers of one width, as differences; the least one of it stands for what is missing.
+// Integers of one width, as differences; the least one of it stands for what is missing or beyond the width.
 template <class Integer>
 void append_differences(std::vector<unsigned char>& bytes, const std::vector<double>& column, std::size_t every,
                         double offset, double step) {
@@ -29,8 +29,8 @@ void append_differences(std::vector<unsigned char>& bytes, const std::vector<dou
   Unsigned before = 0;
   for (std::size_t row = 0; row < column.size(); row += every) {
     const double scaled = std::round((column[row] - offset) / step);
-    const auto whole = static_cast<Unsigned>(std::isfinite(scaled) ? static_cast<Integer>(scaled)
-                                                                   : std::numeric_limits<Integer>::min());
+    const bool fits = std::abs(scaled) <= static_cast<double>(std::numeric_limits<Integer>::max());
+    const auto whole = static_cast<Unsigned>(fits ? static_cast<Integer>(scaled) : std::numeric_limits<Integer>::min());
     const auto difference = static_cast<Unsigned>(whole - before);
     for (std::size_t i = 0; i < sizeof difference; ++i)
       bytes.push_back(static_cast<unsigned char>(difference >> (8 * i)));

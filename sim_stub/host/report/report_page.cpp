@@ -39,19 +39,23 @@ void write_page(const std::string& path, const ReportJson& data) {
   write_output(path, std::string(page.substr(0, at)) + page_text(data) + std::string(page.substr(at + kPlace.size())));
 }
 
-std::string write_report(const std::vector<std::string>& recordings, const std::string& directory) {
+ReportedFiles write_report(const std::vector<std::string>& recordings, const std::string& directory) {
   ReportJson data{{"format", "polygmap-report"}, {"version", 1}, {"runs", ReportJson::array()}};
+  ReportedFiles files;
   for (const std::string& path : recordings) {
     ReportRun run(path);
-    if (std::string wrong = run.read(); !wrong.empty()) return wrong;
+    files.unreadable = run.read();
+    if (!files.unreadable.empty()) return files;
+    if (files.unsound.empty() && !run.unsound().empty()) files.unsound = "\"" + path + "\": " + run.unsound();
     try {
       data["runs"].push_back(run.json());
     } catch (const ReportJson::exception&) {  // of another program's making
-      return "\"" + path + "\" has a verdict that is no summary.json.";
+      files.unreadable = "\"" + path + "\" has a verdict that is no summary.json.";
+      return files;
     }
   }
   write_page(directory + "/report.html", data);
-  return {};
+  return files;
 }
 
 }  // namespace polygmap::sim

@@ -9,9 +9,14 @@
 
 namespace polygmap::sim {
 
-// Reads the recordings and writes DIR/report.html, in a directory that exists. Empty, or one sentence about the file
-// that cannot be read. Throws config::FileError for what cannot be written.
-[[nodiscard]] std::string write_report(const std::vector<std::string>& recordings, const std::string& directory);
+// Each empty, or one sentence about the first such file.
+struct ReportedFiles {
+  std::string unreadable;  // no page was written
+  std::string unsound;     // cut off or damaged: the page has what there is, and says so
+};
+// Reads the recordings and writes DIR/report.html, in a directory that exists. Throws config::FileError for what cannot
+// be written.
+[[nodiscard]] ReportedFiles write_report(const std::vector<std::string>& recordings, const std::string& directory);
 
 // Writes the page with these data in it (page/DATA.md), whose first key, "format", says what it shows. Throws
 // config::FileError for what cannot be written.

@@ -422,7 +422,7 @@ void ReportRun::take_footholds(const FootholdSet& set) {
                     {"map_stamp_s", rounded(time_s(set.map_stamp_ns), 3)},
                     {"stop", name_of(set.obstruction)}};
   if (set.obstruction != StopReason::kNone) search["stop_text"] = text_of(set.obstruction);
-  if (set.obstruction != StopReason::kNothingSeen) {
+  if (set.measured_rise_m > 0.0) {
     search["measured_rise_m"] = rounded(set.measured_rise_m);
     search["measured_tread_m"] = rounded(set.measured_tread_m);
   }

@@ -22,6 +22,10 @@ class ReportRun {
   // Empty, or why the file is no recording. An unfinished one is read as far as it goes.
   [[nodiscard]] std::string read();
   [[nodiscard]] ReportJson json() const;
+  // Empty, or one sentence: it is cut off, or some of its bytes are not those that were written.
+  [[nodiscard]] const std::string& unsound() const noexcept {
+    return file_->damage().empty() ? ends_ : file_->damage();
+  }
 
  private:
   void take(const recording::Record& record);

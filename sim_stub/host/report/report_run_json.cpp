@@ -186,6 +186,7 @@ ReportJson ReportRun::json() const {
                                {"resumable", row.resumable()},
                                {"budget_instructions", row.resumable() ? shared + kOverdraftInstructions : own}});
   }
+  if (!file_->damage().empty()) run["damage"] = file_->damage();
   if (!ends_.empty()) {
     run["ending"] = {{"t_s", rounded(time_s(now_ns_), 3)}, {"sentence", ends_}};
   } else if (outputs_.gait.stop_reason != StopReason::kNone && outputs_.gait.stop_reason != StopReason::kTop) {

@@ -489,7 +489,7 @@ TEST(SurfaceMatch, TurnedTread_MatchesAsItIsTurned) {
   const Transform camera{rotation_y(0.3), Vec3(-0.4, 0, 0.8)}, &turn = world.steps[1].true_T_step;
   const auto matched = [&](const Transform& as) {
     return matching_surface(
-        world,
+        TrueSurfaces(world),
         patch_of(camera, as * Vec3(0.28, 0, 0.20), as.R * -Vec3::UnitX(), as.R * Vec3(0, 0.2, 0), Vec3(0, 0, 0.05)),
         camera);
   };
@@ -525,7 +525,7 @@ TEST(SurfaceMatch, TrueSurfaces_MatchAndOthersDoNot) {
   const StairWorld world = plain_stairs(3);
   const Transform camera{rotation_y(0.3), Vec3(-0.4, 0, 0.8)};
   const auto matches = [&](const Vec3& centre_m, const Vec3& normal, const Vec3& u_m, const Vec3& v_m) {
-    return matching_surface(world, patch_of(camera, centre_m, normal, u_m, v_m), camera) != kNoSurface;
+    return matching_surface(TrueSurfaces(world), patch_of(camera, centre_m, normal, u_m, v_m), camera) != kNoSurface;
   };
   const Vec3 x(0.1, 0, 0), y(0, 0.2, 0), z(0, 0, 0.05);
   EXPECT_TRUE(matches({0.14, 0, 0.135}, Vec3::UnitZ(), x, y));                // tread, 5 mm high

@@ -36,18 +36,28 @@ TEST(WorldFile, StartGoalAndSolids_AreAsTheFileSays) {
   EXPECT_FALSE(file.world.goal->yaw_rad);
   EXPECT_FALSE(file.world.is_staircase);
   ASSERT_EQ(file.world.solids.size(), 2U);
-  ASSERT_EQ(file.world.steps.size(), 1U);
+  ASSERT_EQ(file.world.steps.size(), 2U);
   EXPECT_NEAR(file.world.steps[0].top_m(1.1, 0.2), 0.2, 1e-12);
   EXPECT_TRUE(file.world.solids[1].is_glass);
-  EXPECT_EQ(file.world.solids[1].step, kObstacleStep);
+  EXPECT_EQ(file.world.solids[1].step, 1);
+  EXPECT_FALSE(file.world.steps[1].is_walkable);
   EXPECT_NEAR(std::abs(file.world.solids[1].true_T_solid.R(1, 0)), 1.0, 1e-9);  // turned to the side
 }
 
 TEST(WorldFile, StartOnASolid_IsAsHighAsItsTop) {
   const std::string text =
-      "[start]\nx = 1.0\ny = 0\nyaw_deg = 0\nsurface = \"ramp\"\n"
-      "[[solid]]\nname = \"ramp\"\ncentre = [1, 0, 0.5]\nsize = [1, 1, 0.2]\nrpy_deg = [0, -10, 0]\n";
-  EXPECT_NEAR(parse_world("w.toml", text).start_height_m, 0.5 + 0.1 / std::cos(10.0 * kPi / 180.0), 1e-9);
+      "[start]\nx = 1.0\ny = 0\nyaw_deg = 0\nsurface = \"stage\"\n"
+      "[[solid]]\nname = \"stage\"\ncentre = [1, 0, 0.5]\nsize = [1, 1, 0.2]\n";
+  EXPECT_NEAR(parse_world("w.toml", text).start_height_m, 0.6, 1e-9);
+}
+
+TEST(WorldFile, BoxOnItsSide_IsStoodOnWhereItIsUp) {
+  const std::string text =
+      std::string(kStart) +
+      "[[solid]]\nname = \"plank\"\ncentre = [2, 0, 0.5]\nsize = [0.1, 1, 2]\nrpy_deg = [0, 90, 0]\n";
+  const Step top = parse_world("w.toml", text).world.steps[0];
+  EXPECT_TRUE(top.is_walkable);
+  EXPECT_NEAR(top.top_m(2.9, 0.4), 0.55, 1e-9);
 }
 
 TEST(WorldFile, WhatItCannotBe_IsRefusedWithLineAndKey) {
@@ -68,20 +78,12 @@ TEST(WorldFile, WhatItCannotBe_IsRefusedWithLineAndKey) {
   expect(start + "[[solid]]\nname = \"a\"\ncentre = [nan, 0, 0]\nsize = [1, 1, 1]\n", "a: centre must be from");
   expect("solid = 3\n" + start, "each solid must be a table");
   expect(start + "[sun]\n", "\"sun\" is no key of a world");
-}
-
-TEST(WorldFile, TopsBesideEachOther_AreOneAndStepsAreNot) {
-  const auto world = [](double second_height_m) {
-    const std::string height = std::to_string(second_height_m), middle = std::to_string(0.5 * second_height_m);
-    return parse_world("w.toml", std::string(kStart) +
-                                     "[[solid]]\nname = \"a\"\ncentre = [0, 0, 0.1]\nsize = [1, 1, 0.2]\n"
-                                     "[[solid]]\nname = \"b\"\ncentre = [1, 0, " +
-                                     middle + "]\nsize = [1, 1, " + height + "]\n")
-        .world;
-  };
-  EXPECT_NEAR(tread_margin_m(Vec3(0.6, 0.0, 0.2), world(0.2), 0), 0.1, 1e-9);     // on b, which is as high
-  EXPECT_NEAR(tread_margin_m(Vec3(0.6, 0.0, 0.2), world(0.18), 0), -0.1, 1e-9);   // over the edge of a
-  EXPECT_NEAR(tread_margin_m(Vec3(0.3, 0.45, 0.2), world(0.18), 0), 0.05, 1e-9);  // across, too
+  expect(start + "[[solid]]\nname = \"a\\u001b[2J\"\ncentre = [2, 0, 0]\nsize = [1, 1, 1]\n",
+         "without control characters");
+  expect(start + "[[solid]]\nname = \"a\"\ncentre = [-0.5, 0, 0.5]\nsize = [1, 1, 1]\n", "would stand in \"a\"");
+  const std::string on_a = "[start]\nx = 0.05\ny = 0\nyaw_deg = 0\nsurface = \"a\"\n[[solid]]\nname = \"a\"\n";
+  expect(on_a + "centre = [0.5, 0, 0]\nsize = [1, 1, 1]\n", "a sole would reach over an edge");
+  expect(on_a + "centre = [0, 0, 0]\nsize = [3, 3, 1]\nrpy_deg = [0, 5, 0]\n", "\"a\" slopes");
 }
 
 TEST(WorldFile, SolidsOfIt_AreWhatIsCollidedWith) {

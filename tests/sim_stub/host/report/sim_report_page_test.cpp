@@ -36,7 +36,9 @@ TEST(WriteReport, RecordingOfARobot_HasItsPicturesAndSaysWhatIsMissing) {
   }
   ASSERT_EQ(recorder->finish(), "");
 
-  EXPECT_EQ(write_report({path}, folder.string()), "");
+  const ReportedFiles files = write_report({path}, folder.string());
+  EXPECT_EQ(files.unreadable, "");
+  EXPECT_EQ(files.unsound, "");
   std::ifstream file(folder / "report.html");
   const std::string page((std::istreambuf_iterator<char>(file)), {});
   const std::size_t data = page.find("polygmap-report");
@@ -44,6 +46,20 @@ TEST(WriteReport, RecordingOfARobot_HasItsPicturesAndSaysWhatIsMissing) {
   EXPECT_NE(page.find(R"("png":)", data), std::string::npos);
   EXPECT_NE(page.find("The file has no truth, as a robot's own has none", data), std::string::npos);
   EXPECT_EQ(page.find(R"("summary":)", data), std::string::npos);
+  // One bit of its middle is not what was written.
+  std::fstream bytes(path, std::ios::in | std::ios::out | std::ios::binary);
+  const auto middle = static_cast<std::streamoff>(std::filesystem::file_size(path) / 2);
+  bytes.seekg(middle);
+  const int byte = bytes.get();
+  bytes.seekp(middle);
+  bytes.put(static_cast<char>(byte ^ 4));
+  bytes.close();
+  const ReportedFiles damaged = write_report({path}, folder.string());
+  EXPECT_EQ(damaged.unreadable, "");
+  EXPECT_NE(damaged.unsound.find("(CRC)"), std::string::npos) << damaged.unsound;
+  std::ifstream again(folder / "report.html");
+  const std::string damaged_page((std::istreambuf_iterator<char>(again)), {});
+  EXPECT_NE(damaged_page.find(R"("damage":)", damaged_page.find("polygmap-report")), std::string::npos);
   std::filesystem::remove_all(folder);
 }
 

@@ -19,6 +19,13 @@ export function failureOf(run) {
   return { t_s: run.duration_s, sentence };
 }
 
+function pushed(p) {
+  const [x, y] = p.force_n;
+  const where = Math.abs(x) > Math.abs(y) ? (x > 0 ? "ahead" : "back") : y > 0 ? "to the left" : "to the right";
+  const force = Math.hypot(...p.force_n);
+  return `pushed ${where} by ${force.toFixed(0)} N for ${p.duration_s} s, ${(force * p.duration_s).toFixed(0)} N s`;
+}
+
 /** What happened in the seconds before, the newest last: [[t_s, text]]. */
 export function before(run, t_s, seconds = 4) {
   const within = (t) => t >= t_s - seconds && t <= t_s + 0.5;
@@ -27,7 +34,7 @@ export function before(run, t_s, seconds = 4) {
   for (const e of run.events)
     if (within(e.t_s)) out.push([e.t_s, `${e.kind} ${e.name.replace(/_/g, " ")}${e.text ? `: ${e.text}` : ""}`]);
   for (const p of run.pushes)
-    if (within(p.t_s)) out.push([p.t_s, `pushed by ${Math.hypot(...p.force_n).toFixed(0)} N`]);
+    if (within(p.t_s)) out.push([p.t_s, pushed(p)]);
   for (const s of run.steps) {
     if (within(s.latch_s))
       out.push([s.latch_s, `${s.foot} foot lifts off for ${s.step ? `step ${s.step}` : "the floor"}`]);

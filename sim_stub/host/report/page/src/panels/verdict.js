@@ -13,11 +13,12 @@ function facts(run) {
   if (!s) return [];
   const noise = s.reality?.scale ? `reality ${s.reality.scale}` : null;
   return [
-    `${s.steps_total} steps${a?.rise_m ? ` of ${number(a.rise_m, 2)} × ${number(a.tread_m, 2)} m` : ""}`,
+    a?.world ? `world ${a.world}` : `${s.steps_total} steps${a?.rise_m ? ` of ${number(a.rise_m, 2)} × ${number(a.tread_m, 2)} m` : ""}`,
     s.gait && `gait ${s.gait}`,
     s.plant && `plant ${s.plant}`,
     noise,
     isNumber(s.seed) && `seed ${s.seed}`,
+    isNumber(run.json.clock_t0_s) && `0 s here is ${number(run.json.clock_t0_s, 3)} s of its clock`,
   ].filter(Boolean);
 }
 
@@ -37,6 +38,7 @@ export function header(run, player) {
     title,
     h("div.facts", {}, h("p", {}, [run.name, seconds(run.duration_s), ...facts(run)].join(" · ")), contents()),
   );
+  if (run.json.damage) element.append(h("div.failure", {}, h("p", {}, `This file is damaged: ${run.json.damage}`)));
   if (run.failure) element.append(failureBox(run, player));
   return element;
 }
@@ -74,7 +76,7 @@ function failureBox(run, player) {
     h(
       "p",
       {},
-      "The page opens at the moment it failed: ",
+      run.verdict === null ? "The page opens where the recording ends: " : "The page opens at the moment it failed: ",
       moment(player, t_s),
       run.failure.stop_text ? `. The module's reason: ${run.failure.stop_text}.` : "",
     ),
