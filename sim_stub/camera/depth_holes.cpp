@@ -84,6 +84,15 @@ DepthHoles::DepthHoles(const CameraErrors& errors, const StairWorld& world, std:
     if (!step.is_walkable) continue;
     treads_.push_back({step.true_T_step.inverse(), step, noise_.uniform(k) < errors.hole_treads});
   }
+  for (const Tread& tread : treads_) {
+    const Step& step = tread.step;
+    for (const double x_m : {step.nosing_x_m, step.back_x_m + step.beneath_m}) {
+      for (const double y_m : {step.half_width_m, -step.half_width_m}) {
+        const double corner_m = (step.true_T_step * Vec3(x_m, y_m, step.height_m)).z();
+        lowest_m_ = std::min(lowest_m_, corner_m - step.worn_m - 2.0 * kOn_m);
+      }
+    }
+  }
   if (treads_.empty()) return;
   // On one of the treads that the robot sees from the floor.
   const CounterNoise sun(seed, Stream::kSunPatch);
@@ -115,6 +124,7 @@ void DepthHoles::apply(const DepthRenderer& picture, const DepthScene& first, co
   Draws draws(errors_, noise_, frame);
   std::vector<AlongRow> step_p(treads_.size()), glass_p(glass_.size());
   const bool sun = errors_.sun_patch_m > 0.0;
+  std::size_t hit = 0;
   for (int v = 0; v < k.height_px; ++v) {
     const double s = picture.moment_of(v);
     const Mat3 R = from.R + s * (to.R - from.R);
@@ -141,13 +151,18 @@ void DepthHoles::apply(const DepthRenderer& picture, const DepthScene& first, co
       for (std::size_t i = 0; i < glass_.size(); ++i) {
         if (is_behind(glass_p[i], glass_[i].half_m, u, depth_m)) *depth = 0;
       }
-      for (std::size_t i = 0; holes > 0.0 && i < treads_.size(); ++i) {
+      if (holes <= 0.0 || true_p.z(u, depth_m) < lowest_m_) continue;
+      // The pixel beside is mostly of the same tread.
+      for (std::size_t round = 0; round <= treads_.size(); ++round) {
+        const std::size_t i = round == 0 ? hit : round - 1;
+        if (round > 0 && i == hit) continue;
         const Tread& tread = treads_[i];
         const double above_m = step_p[i].z(u, depth_m) - tread.step.height_m;
         if (above_m > kOn_m || above_m < -kOn_m - tread.step.worn_m) continue;
         const Vec3 step_p_m = step_p[i](u, depth_m);
         if (!is_on(tread.step, step_p_m)) continue;
         if (is_lost(tread, step_p_m, u, v, draws)) *depth = 0;
+        hit = i;
         break;
       }
     }

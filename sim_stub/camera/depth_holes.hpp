@@ -36,6 +36,7 @@ class DepthHoles {
   CounterNoise noise_;
   std::vector<Tread> treads_;
   std::vector<OrientedBox> glass_;
+  double lowest_m_ = 1e9;  // of the treads' tops
   Vec3 sun_place_m_ = Vec3::Zero(), sun_ray_ = Vec3::UnitZ();
 };
 

@@ -108,9 +108,13 @@ void group_tops(StairWorld& world) {
 
 double margin_on_tops_m(const Transform& true_T_sole, const StairWorld& world, int step, const SoleModel& sole) {
   if (world.are_one(step, kFloorStep)) return std::numeric_limits<double>::infinity();
+  const Vec3& at_m = true_T_sole.p_m;
+  const double height_m = world.steps[static_cast<std::size_t>(step)].top_m(at_m.x(), at_m.y());
   std::vector<ConvexPolygon> tops;
-  for (std::size_t i = 0; i < world.steps.size(); ++i) {
-    if (world.are_one(step, static_cast<int>(i))) tops.push_back(outline_of(world.steps[i], 0.5 * kSlit_m));
+  for (const Step& top : world.steps) {  // who stands across a gap stands on both its sides
+    if (top.is_walkable && std::abs(top.top_m(at_m.x(), at_m.y()) - height_m) <= kSameTop_m) {
+      tops.push_back(outline_of(top, 0.5 * kSlit_m));
+    }
   }
   const std::vector<ConvexPolygon> bare = bare_parts(rectangle_of(true_T_sole, sole, 0.0), tops);
   if (!bare.empty()) return -beyond_m(bare, tops) - 0.5 * kSlit_m;

@@ -15,8 +15,8 @@ inline constexpr double kSlit_m = 0.001;     // tops that are no farther apart t
 // Fills in the groups of the steps.
 void group_tops(StairWorld& world);
 
-// How far the contact rectangle could grow on every side, its corners rounded, and still lie on tops that are one with
-// the step's: kMostMargin_m at most, +inf on what is one with the floor. Negative: how far it reaches beyond them, of a
+// How far the contact rectangle could grow on every side, its corners rounded, and still lie on tops as high as the
+// step's: kMostMargin_m at most, +inf on what is one with the floor. Negative: how far it reaches beyond them, of a
 // gap beneath it to the gap's middle.
 inline constexpr double kMostMargin_m = 0.5;
 [[nodiscard]] double margin_on_tops_m(const Transform& true_T_sole, const StairWorld& world, int step,

@@ -219,10 +219,9 @@ void ClimbReport::observe_balance(const Truth& truth, const Telemetry& telemetry
 
 // What a foot that stands there touches by right. What is in the way is no less so where a foot stands on it.
 std::vector<int> ClimbReport::beneath_foot(int step) const {
-  if (step < 0) return {kFloorStep};
-  if (world_.is_staircase) return {step};
+  if (world_.is_staircase) return {std::max(step, kFloorStep)};
+  if (step >= 0 && !world_.steps[static_cast<std::size_t>(step)].is_walkable) return {kFloorStep};
   std::vector<int> ones;
-  if (!world_.steps[static_cast<std::size_t>(step)].is_walkable) return {kFloorStep};
   if (world_.are_one(step, kFloorStep)) ones.push_back(kFloorStep);
   for (int other = 0; other < static_cast<int>(world_.steps.size()); ++other) {
     if (world_.are_one(step, other)) ones.push_back(other);

@@ -100,6 +100,7 @@ TrueSurfaces::TrueSurfaces(const StairWorld& world) {
     if (ConvexPolygon footprint = footprint_of(solid); footprint.size() > 2) footprints.push_back(footprint);
   }
   if (!world.is_staircase) return;
+  any_to_be_found = true;
   double below_m = 0.0;
   const int left = 1 + 2 * static_cast<int>(world.steps.size());
   int id = kFloorSurface;
@@ -195,6 +196,7 @@ const std::vector<int>& SurfaceVisibility::in_view(const Transform& true_T_camer
 void SurfaceVisibility::see(const Vec3& point_m, int px) {
   // The floor first: under a nosing it reaches to the riser.
   int id = std::abs(point_m.z()) <= kOnSurface_m ? kFloorSurface : kNoSurface;
+  if (id == kNoSurface && !surfaces_.any_to_be_found) return;
   bool farther = false;
   Vec3 along_m = point_m;
   int along = -1;       // whose axes

@@ -42,6 +42,7 @@ struct TrueSurfaces {
   };
   std::vector<TrueSurface> all;
   std::vector<Axes> axes;
+  bool any_to_be_found = false;           // beside the floor
   std::vector<ConvexPolygon> footprints;  // of what stands on the floor, from above
 };
 
