@@ -75,14 +75,15 @@ Progress ControlLane::sense(std::int64_t now_ns) noexcept {
 }
 
 void ControlLane::read_operator(std::int64_t now_ns) noexcept {
-  OperatorCommand command{};
-  if (ports_.operator_input == nullptr || !ports_.operator_input->try_read(command)) return;
-  const OperatorAnswer answer = obey(command, now_ns);
+  OperatorRequest request;
+  if (ports_.operator_input == nullptr || !ports_.operator_input->try_read(request)) return;
+  const OperatorAnswer answer = obey(request, now_ns);
   if (!answer.is_obeyed()) health_.raise(Limit::kOperatorRefused, now_ns);
   ports_.operator_input->answer(answer);
 }
 
-OperatorAnswer ControlLane::obey(OperatorCommand command, std::int64_t now_ns) noexcept {
+OperatorAnswer ControlLane::obey(const OperatorRequest& request, std::int64_t now_ns) noexcept {
+  const OperatorCommand command = request.command;
   const ModuleState state = module_state();
   if (!Supervisor::answers(state, command)) return {Refusal::kState, {}};
   if (command == OperatorCommand::kReset) {
@@ -95,6 +96,11 @@ OperatorAnswer ControlLane::obey(OperatorCommand command, std::int64_t now_ns) n
     if (const OperatorAnswer answer = answer_if_it_stands(now_ns); !answer.is_obeyed()) return answer;
     hand_over_.begin();
   }
+  if (command == OperatorCommand::kGoTo) {
+    if (!request.destination.is_valid()) return {Refusal::kNoPlace, {}};
+    gait_.go_to(request.destination);
+  }
+  if (command == OperatorCommand::kStart) gait_.climb();
   supervisor_.obey(command, state);
   const bool ends = command == OperatorCommand::kStop && state != ModuleState::kArming;
   const bool stands_on = command == OperatorCommand::kHandOver && state == ModuleState::kStanding;
@@ -309,7 +315,7 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   const LatchedStep& step = status.step;
   const bool stands = step.touch_down_stamp_ns != 0 || step.sequence == 0;
   context.stance = stands ? step.foot : other(step.foot);
-  context.climbing = status.treads_climbed > 0 || status.step.onto_tread;
+  context.climbing = status.step.onto_tread;  // a step on the floor behind stairs ends it
   link_.search_context.publish(now_ns);
   return Progress::kDone;
 }

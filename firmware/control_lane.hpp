@@ -61,7 +61,7 @@ class ControlLane {
  private:
   void look_across(std::int64_t now_ns) noexcept;
   void read_operator(std::int64_t now_ns) noexcept;
-  [[nodiscard]] OperatorAnswer obey(OperatorCommand command, std::int64_t now_ns) noexcept;
+  [[nodiscard]] OperatorAnswer obey(const OperatorRequest& request, std::int64_t now_ns) noexcept;
   [[nodiscard]] OperatorAnswer answer_to_reset(std::int64_t now_ns) const noexcept;
   // Whether it balances: all drives speak and take commands, the estimate is fresh, and both feet carry.
   [[nodiscard]] OperatorAnswer answer_if_it_stands(std::int64_t now_ns) const noexcept;

@@ -13,6 +13,7 @@ constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers w
 constexpr std::int32_t kLearnMount = 2500, kLearnPerSurface = 60;
 constexpr std::int32_t kJudgePicture = PictureMonitor::kInstructions;
 constexpr std::int32_t kBeginMap = 16'000, kMapPerSurface = 60;
+constexpr double kStands = 0.9;  // probability
 constexpr std::int32_t kBeginSearch = 16'000, kSearchPerPolygon = 20;
 
 }  // namespace
@@ -145,7 +146,6 @@ RawRange PerceptionLane::depth_range() const noexcept {
 }
 
 void PerceptionLane::begin_learning() noexcept {
-  constexpr double kStands = 0.9;
   const StateEstimate& state = exposure_state_;
   const Transform base_T_odom = state.odom_T_base.inverse();
   learning_.stance = {};
@@ -193,6 +193,11 @@ void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   view.body = body_;
   view.body_margin = body_margin(params_.body, params_.robot.legs, params_.mount.prior.tilt_sigma_rad);
   view.columns = &extractor_.segmenter().image().columns;  // no next picture before the map is done, see intake()
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    view.odom_T_sole[foot] = exposure_state_.odom_T_sole[foot];
+    view.stands[foot] = exposure_state_.contact_probability[foot] > kStands;
+  }
+  view.sole = params_.robot.sole.contact;
   map_.begin(extractor_.result(), view);
   pending_.mapping = true;
   const PolygonMap::Counters& counters = map_.counters();

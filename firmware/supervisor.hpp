@@ -39,12 +39,12 @@ inline constexpr std::array kModuleStateTable{
     ModuleStateInfo{"off", "Its commands have no gains and no torques; it waits to be armed."},
     ModuleStateInfo{"arming", "The same commands, until every drive and sensor has answered and IMU and legs agree."},
     ModuleStateInfo{"standing", "The gait commands the joints and balances; it waits to be started."},
-    ModuleStateInfo{"walking_up", "It looks for stairs, and steps on the floor."},
+    ModuleStateInfo{"walking_up", "It looks for stairs, and steps on the floor; or walks to its goal."},
     ModuleStateInfo{"climbing", "It has begun to step onto treads."},
     ModuleStateInfo{"holding", "Paused: a foot in the air comes down as planned, and then it stands."},
     ModuleStateInfo{"stopping", "It was asked to stop, or has to: a foot in the air comes down first."},
     ModuleStateInfo{"safe_stop", "The gait has stopped on two feet and holds; the stop's reason says why."},
-    ModuleStateInfo{"on_top", "The gait has ended the climb, and holds."},
+    ModuleStateInfo{"on_top", "The gait has ended the climb, or is at its goal, and holds."},
     ModuleStateInfo{"fallen", "The joints are damped, and nothing else is asked of them; only a new start leads on."},
     ModuleStateInfo{"handing_over",
                     "It balances until the robot is at rest; then the drives get a law that holds it there."},
@@ -71,10 +71,13 @@ inline constexpr auto kOperatorTransitions = std::to_array<OperatorTransition>({
     {ModuleState::kOff, OperatorCommand::kArm, ModuleState::kArming},
     {ModuleState::kArming, OperatorCommand::kStop, ModuleState::kOff},
     {ModuleState::kStanding, OperatorCommand::kStart, ModuleState::kWalkingUp, ", or climbing where it was"},
+    {ModuleState::kStanding, OperatorCommand::kGoTo, ModuleState::kWalkingUp, ", or climbing where it was"},
     {ModuleState::kStanding, OperatorCommand::kStop, ModuleState::kStopping},
     {ModuleState::kWalkingUp, OperatorCommand::kPause, ModuleState::kHolding},
+    {ModuleState::kWalkingUp, OperatorCommand::kGoTo, ModuleState::kWalkingUp},
     {ModuleState::kWalkingUp, OperatorCommand::kStop, ModuleState::kStopping},
     {ModuleState::kClimbing, OperatorCommand::kPause, ModuleState::kHolding},
+    {ModuleState::kClimbing, OperatorCommand::kGoTo, ModuleState::kClimbing},
     {ModuleState::kClimbing, OperatorCommand::kStop, ModuleState::kStopping},
     {ModuleState::kHolding, OperatorCommand::kResume, ModuleState::kWalkingUp, ", or climbing where it was"},
     {ModuleState::kHolding, OperatorCommand::kStop, ModuleState::kStopping},
@@ -187,7 +190,7 @@ class Supervisor {
   void obey(OperatorCommand command, ModuleState state) noexcept {
     if (command == OperatorCommand::kArm) armed_ = true;
     if (command == OperatorCommand::kStop && state == ModuleState::kArming) armed_ = false;
-    if (command == OperatorCommand::kStart) started_ = true;
+    if (command == OperatorCommand::kStart || command == OperatorCommand::kGoTo) started_ = true;
     if (command == OperatorCommand::kReset) started_ = false;
     hands_over_ = command == OperatorCommand::kHandOver;
     paused_ = command == OperatorCommand::kPause;

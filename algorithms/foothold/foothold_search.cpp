@@ -20,6 +20,7 @@ FootholdSet moved(FootholdSet set, const Vec3& by_m, const std::array<double, kF
   for (Vec3* p : {&set.p_star.position_m, &set.tread.nosing_a_m, &set.tread.nosing_b_m}) {
     *p += by_m;
   }
+  set.ground.corner_m += by_m.head<2>();
   for (std::size_t f = 0; f < kFootCount; ++f) {
     for (Foothold* foot : {&set.p_star_feet[f], &set.p_star_star_feet[f]}) {
       foot->position_m += by_m - feet_ahead_m[f] * rotation_z(foot->yaw_rad).col(0);
@@ -46,6 +47,7 @@ void FootholdSearch::begin(const MapSnapshot& map, const Query& query) noexcept 
   z_foot_ = z_foot_m(foot_, query_.odom_T_sole[index_of(query.stance)]);
   pending_ = {};
   pending_.map_stamp_ns = map.stamp_ns;
+  pending_.ground = map.ground;
   levels_.clear();
   uprights_.clear();
   found_ = {};

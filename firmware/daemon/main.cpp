@@ -16,6 +16,7 @@
 #include "firmware/daemon/service/service.hpp"
 #include "firmware/daemon/watch.hpp"
 #include "firmware/mailbox/mailbox_writer.hpp"
+#include "firmware/operator_request_text.hpp"
 #include "firmware/recording/replay.hpp"
 
 namespace polygmap::daemon {
@@ -26,7 +27,8 @@ constexpr const char* kUsage =
     "                                    goes in and comes out, pictures too, for --replay and any MCAP tool\n"
     "polygmapd --config FILE --check     only reads it\n"
     "polygmapd --ask WHAT --config FILE  asks the one that runs with this file to arm, start, pause, resume, stop,\n"
-    "                                    reset or hand_over, or for its state; says the state that came of it\n"
+    "                                    reset, hand_over or go_to=AHEAD,LEFT[,TURN] (metres, degrees), or for its "
+    "state\n"
     "polygmapd --watch [--json] [--config FILE]   looks on at one that runs, and writes the mailbox that FILE names, "
     "else\n"
     "                                    /polygmap: a table in place on a terminal, else a line a second; --json: an\n"
@@ -60,8 +62,8 @@ std::string parse(int argc, char** argv, Options& options) {
     const bool takes_path = word == "--config" || word == "--replay" || word == "--record";
     const bool lacks_value = i + 1 == argc || argv[i + 1][0] == '\0';
     if (takes_path && lacks_value) return std::string(word) + " takes a path";
-    const bool may_ask = !lacks_value && (operator_command_of(argv[i + 1]) || argv[i + 1] == std::string_view("state"));
-    if (word == "--ask" && !may_ask) return "--ask takes arm, start, pause, resume, stop, reset, hand_over or state";
+    const bool may_ask = !lacks_value && (operator_request_of(argv[i + 1]) || argv[i + 1] == std::string_view("state"));
+    if (word == "--ask" && !may_ask) return "--ask takes state, or one of " + std::string(kWhatMayBeAsked);
     if (word == "--config") {
       options.config = argv[++i];
     } else if (word == "--record") {

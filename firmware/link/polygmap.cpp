@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The functions of polygmap.h.
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <new>
 
@@ -81,6 +82,8 @@ const char* polygmap_error_text(int error) {
       return "Too many operations wait for a step.";
     case POLYGMAP_E_NONE:
       return "There is nothing of that kind, or not yet.";
+    case POLYGMAP_E_PLACE:
+      return "That is no place to go to: it is not a number, or farther than 50 m.";
     default:
       return "This is no error of this library.";
   }
@@ -185,13 +188,23 @@ int polygmap_step(polygmap_handle* handle, int64_t now_ns) {
 
 int polygmap_operate(polygmap_handle* handle, int command) {
   using polygmap::OperatorCommand;
-  static_assert(POLYGMAP_OPERATE_HAND_OVER - POLYGMAP_OPERATE_ARM == static_cast<int>(OperatorCommand::kHandOver));
+  static_assert(POLYGMAP_OPERATE_GO_TO - POLYGMAP_OPERATE_ARM == static_cast<int>(OperatorCommand::kGoTo));
   if (handle == nullptr) return POLYGMAP_E_NULL;
   Instance* instance = alive(handle);
   if (instance == nullptr) return POLYGMAP_E_INSTANCE;
   if (command < POLYGMAP_OPERATE_ARM || command > POLYGMAP_OPERATE_HAND_OVER) return POLYGMAP_E_OPERATE;
   const auto asked = static_cast<OperatorCommand>(command - POLYGMAP_OPERATE_ARM);
   return instance->operations.try_push(asked) ? POLYGMAP_OK : POLYGMAP_E_FULL;
+}
+
+int polygmap_go_to(polygmap_handle* handle, double ahead_m, double left_m, double turn_rad) {
+  if (handle == nullptr) return POLYGMAP_E_NULL;
+  Instance* instance = alive(handle);
+  if (instance == nullptr) return POLYGMAP_E_INSTANCE;
+  const bool has_turn = !std::isnan(turn_rad);
+  const polygmap::Destination to{ahead_m, left_m, has_turn ? turn_rad : 0.0, has_turn};
+  if (!to.is_valid()) return POLYGMAP_E_PLACE;
+  return instance->operations.try_push(polygmap::OperatorRequest(to)) ? POLYGMAP_OK : POLYGMAP_E_FULL;
 }
 
 int polygmap_read_command(const polygmap_handle* handle, polygmap_command* command) {

@@ -73,6 +73,7 @@ typedef enum polygmap_error {
   POLYGMAP_E_OPERATE = -9,    // there is no such polygmap_operation
   POLYGMAP_E_FULL = -10,      // too many operations wait for a step
   POLYGMAP_E_NONE = -11,      // there is nothing of that kind, or not yet
+  POLYGMAP_E_PLACE = -12,     // no place to go to: not a number, or farther than 50 m
 } polygmap_error;
 
 // One sentence of any number that a function here returned. Never NULL; the text is static.
@@ -190,12 +191,18 @@ typedef enum polygmap_operation {
   POLYGMAP_OPERATE_STOP = 5,       // the foot in the air comes down, then end
   POLYGMAP_OPERATE_RESET = 6,      // after an end whose cause is over: stand, and be ready to start
   POLYGMAP_OPERATE_HAND_OVER = 7,  // let go of a robot that stands, for another controller
+  POLYGMAP_OPERATE_GO_TO = 8,      // what polygmap_go_to() asks; polygmap_operate() does not take it
 } polygmap_operation;
 
 // Asks for it; the next cycle that has not been asked for something else answers, and polygmap_status has the answer.
 // It is refused there where the module's state has no answer to it (docs/reference/states.md). Unless the configuration
 // has supervisor.autostart = false the module arms and starts by itself.
 int polygmap_operate(polygmap* instance, int command);
+
+// The same, and answered likewise: to walk and climb to a place and end there, from where it stands when its next step
+// hears of it: ahead and to the left of the middle between the feet, m, 50 at most. turn_rad: how the heading there is
+// turned to the left against the present one, from -3.2 to 3.2; not a number: any heading will do.
+int polygmap_go_to(polygmap* instance, double ahead_m, double left_m, double turn_rad);
 
 // ---------------------------------------------------------------------------------------------------------------------
 // What comes out, as of the last step. A read changes nothing, and may be repeated.

@@ -194,12 +194,12 @@ class PushedOperator final : public hal::OperatorInput {
     OperatorCommand command{};  // the last one, if there was any
     OperatorAnswer answer;
   };
-  [[nodiscard]] bool try_push(OperatorCommand command) noexcept { return commands_.try_push(command); }
+  [[nodiscard]] bool try_push(const OperatorRequest& request) noexcept { return requests_.try_push(request); }
   [[nodiscard]] const Answered& answered() const noexcept { return answered_; }
 
-  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override {
-    if (!commands_.try_pop(command)) return false;
-    answered_.command = command;
+  [[nodiscard]] bool try_read(OperatorRequest& request) noexcept override {
+    if (!requests_.try_pop(request)) return false;
+    answered_.command = request.command;
     return true;
   }
   void answer(const OperatorAnswer& answer) noexcept override {
@@ -208,7 +208,7 @@ class PushedOperator final : public hal::OperatorInput {
   }
 
  private:
-  RingBuffer<OperatorCommand, 8> commands_;
+  RingBuffer<OperatorRequest, 8> requests_;
   Answered answered_;
 };
 

@@ -343,12 +343,12 @@ bool Recorder::try_read(LioSample& sample) noexcept {
   return gave;
 }
 
-bool Recorder::try_read(OperatorCommand& command) noexcept {
+bool Recorder::try_read(OperatorRequest& request) noexcept {
   LaneLog& log = logs_[kControlLane];
-  const bool gave = robot_.operator_input != nullptr && robot_.operator_input->try_read(command);
+  const bool gave = robot_.operator_input != nullptr && robot_.operator_input->try_read(request);
   put_call(log, CallKind::kReadOperator, gave);
   FieldWriter writer(log.out, nullptr);
-  if (gave) walk(writer, "command", command);
+  if (gave) walk(writer, "request", request);
   return gave;
 }
 

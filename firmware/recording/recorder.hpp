@@ -75,7 +75,7 @@ class Recorder final : public hal::DepthCamera,
   [[nodiscard]] JointSet try_write(const JointCommand& command) noexcept override;
   [[nodiscard]] hal::JointBusStatus status() const noexcept override;
   [[nodiscard]] bool try_read(LioSample& sample) noexcept override;
-  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override;
+  [[nodiscard]] bool try_read(OperatorRequest& request) noexcept override;
   void answer(const OperatorAnswer& answer) noexcept override {
     if (robot_.operator_input != nullptr) robot_.operator_input->answer(answer);
   }

@@ -74,10 +74,10 @@ class ReplayedPorts final : public hal::DepthCamera,
     sample = call->lio;
     return true;
   }
-  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override {
+  [[nodiscard]] bool try_read(OperatorRequest& request) noexcept override {
     const PortCall* call = next(CallKind::kReadOperator);
     if (call == nullptr || !call->gave) return false;
-    command = call->asked;
+    request = call->asked;
     return true;
   }
   void answer(const OperatorAnswer&) noexcept override {}  // who asked is gone

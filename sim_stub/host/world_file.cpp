@@ -214,6 +214,15 @@ class WorldReader {
 
 }  // namespace
 
+std::optional<Destination> destination_in(const WorldFile& file) {
+  if (!file.world.goal) return std::nullopt;
+  const WorldPlace &from = file.start, &to = *file.world.goal;
+  const double yaw_rad = from.yaw_rad.value_or(0.0);
+  const Vec3 way_m = rotation_z(yaw_rad).transpose() * Vec3{to.x_m - from.x_m, to.y_m - from.y_m, 0.0};
+  return Destination{way_m.x(), way_m.y(), math::wrap_angle(to.yaw_rad.value_or(yaw_rad) - yaw_rad),
+                     to.yaw_rad.has_value()};
+}
+
 WorldFile parse_world(const std::string& path, std::string_view text) {
   return WorldReader({"world", path}).read(text);
 }

@@ -23,7 +23,7 @@ std::string states_of(const ClimbSummary& summary) {
 }
 
 // asked: in the order of time.
-ClimbSummary climb_with(ClimbOptions options, const std::vector<TimedCommand>& asked, std::string* said = nullptr) {
+ClimbSummary climb_with(ClimbOptions options, const std::vector<TimedRequest>& asked, std::string* said = nullptr) {
   std::ostringstream out;
   ScriptedOperator script(asked, out);
   options.climb_operator = &script;
@@ -67,7 +67,7 @@ TEST(OperatedRobot, NothingAsked_StandsOnItsOwnControllerAndTheModuleIsOff) {
 
 struct AskedInVain {
   const char* name;
-  std::vector<TimedCommand> asked;
+  std::vector<TimedRequest> asked;
   std::string_view said, state;
 };
 class OperatorWithNothingMoreToAsk : public testing::TestWithParam<AskedInVain> {};

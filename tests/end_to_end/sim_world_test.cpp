@@ -55,13 +55,51 @@ TEST(WorldClimb, Recorded_ReportHasTheSolidsAndTheLidarsWay) {
   std::filesystem::remove(path);
 }
 
-TEST(WorldClimb, GoalSomewhereElse_IsNotReached) {
+TEST(WorldClimb, GoalBehindADrop_StopsBeforeTheEdgeAndSaysWhy) {
   const ClimbSummary s =
-      climb(kOnTheFloor + solid("block", 0.0, 1.5, 0.13) + "[goal]\nx = 1.4\ny = 0\nsurface = \"block\"\n", 2);
+      climb(kOnTheFloor + solid("block", 0.0, 1.5, 0.13) + "[goal]\nx = 2.5\ny = 0\nsurface = \"floor\"\n", 2);
   EXPECT_FALSE(s.pass);
   EXPECT_FALSE(s.fell);
   EXPECT_EQ(s.route.goal_reached, false);
   EXPECT_EQ(s.route.surfaces_stood_on.back(), "block");
+  EXPECT_GT(s.sole_margin_min_m, 0.005);
+  EXPECT_EQ(s.stop_sentence, text_of(StopReason::kGroundEnds));
+}
+
+// It turns on the spot, having seen nothing of what is behind it, and goes there.
+TEST(WorldClimb, GoalBehindItOnTheFloor_IsReachedInItsHeading) {
+  const ClimbSummary s = climb(
+      kOnTheFloor + solid("far", 5.0, 6.0, 0.13) + "[goal]\nx = -1.6\ny = 0.2\nyaw_deg = 90\nsurface = \"floor\"\n", 3);
+  EXPECT_TRUE(s.pass) << s.reason;
+  EXPECT_EQ(s.route.surfaces_stood_on, (std::vector<std::string>{"floor"}));
+}
+
+// Up the stairs that lie on the way, which it does not see from where it is; on the landing it turns round.
+TEST(WorldClimb, StairsBehindIt_AreFoundAndClimbedAndTheGoalIsReachedInItsHeading) {
+  const ClimbSummary s =
+      climb("[start]\nx = -1.2\ny = -0.4\nyaw_deg = 120\nsurface = \"floor\"\n" + solid("low", 0.0, 0.28, 0.13) +
+                solid("high", 0.28, 2.2, 0.26) + "[goal]\nx = 1.2\ny = 0\nyaw_deg = 180\nsurface = \"high\"\n",
+            4);
+  EXPECT_TRUE(s.pass) << s.reason;
+  EXPECT_EQ(s.route.surfaces_stood_on, (std::vector<std::string>{"floor", "low", "high"}));
+}
+
+// A polygon of the deck would span it.
+TEST(WorldClimb, HoleInTheDeckOnTheWay_StopsBeforeIt) {
+  const auto deck = [](const std::string& name, double x_m, double y_m, double length_m, double width_m) {
+    return "[[solid]]\nname = \"" + name + "\"\ncentre = [" + std::to_string(x_m) + ", " + std::to_string(y_m) +
+           ", 0.3]\nsize = [" + std::to_string(length_m) + ", " + std::to_string(width_m) + ", 0.6]\n";
+  };
+  const ClimbSummary s =
+      climb("[start]\nx = 0.3\ny = 0\nyaw_deg = 0\nsurface = \"near\"\n" + deck("near", 0.5, 0.0, 1.4, 2.0) +
+                deck("left", 1.45, 0.65, 0.5, 0.7) + deck("right", 1.45, -0.65, 0.5, 0.7) +
+                deck("far", 2.4, 0.0, 1.4, 2.0) + "[goal]\nx = 2.6\ny = 0\nsurface = \"far\"\n",
+            5);
+  EXPECT_FALSE(s.fell);
+  EXPECT_FALSE(s.pass);
+  EXPECT_EQ(s.route.surfaces_stood_on, (std::vector<std::string>{"near"}));
+  EXPECT_GT(s.sole_margin_min_m, 0.005);
+  EXPECT_EQ(s.stop_sentence, text_of(StopReason::kGroundEnds));
 }
 
 TEST(WorldClimb, StairsOfGlass_AreNoneToTheModule) {

@@ -14,8 +14,8 @@ namespace polygmap {
 namespace {
 
 using Command = OperatorCommand;
-constexpr std::array kCommands{Command::kArm,  Command::kStart, Command::kPause,   Command::kResume,
-                               Command::kStop, Command::kReset, Command::kHandOver};
+constexpr std::array kCommands{Command::kArm,  Command::kStart, Command::kPause,    Command::kResume,
+                               Command::kStop, Command::kReset, Command::kHandOver, Command::kGoTo};
 
 Supervisor supervisor_of(bool autostart) {
   Supervisor::Params params;
@@ -32,12 +32,12 @@ constexpr Supervisor::GaitView kStopped{true, GaitPhase::kStopped, true, true};
 TEST(Supervisor, EveryCommandInEveryState_IsObeyedWhereItMeansSomething) {
   // In the order of kCommands.
   const std::vector<std::pair<ModuleState, std::string>> obeyed{
-      {ModuleState::kOff, "yes no no no no no no"},         {ModuleState::kArming, "no no no no yes no no"},
-      {ModuleState::kStanding, "no yes no no yes no yes"},  {ModuleState::kWalkingUp, "no no yes no yes no no"},
-      {ModuleState::kClimbing, "no no yes no yes no no"},   {ModuleState::kHolding, "no no no yes yes no no"},
-      {ModuleState::kStopping, "no no no no no no no"},     {ModuleState::kSafeStop, "no no no no no yes yes"},
-      {ModuleState::kOnTop, "no no no no yes yes yes"},     {ModuleState::kFallen, "no no no no no no no"},
-      {ModuleState::kHandingOver, "no no no no yes no no"}, {ModuleState::kReleased, "no no no no no no no"}};
+      {ModuleState::kOff, "yes no no no no no no no"},         {ModuleState::kArming, "no no no no yes no no no"},
+      {ModuleState::kStanding, "no yes no no yes no yes yes"}, {ModuleState::kWalkingUp, "no no yes no yes no no yes"},
+      {ModuleState::kClimbing, "no no yes no yes no no yes"},  {ModuleState::kHolding, "no no no yes yes no no no"},
+      {ModuleState::kStopping, "no no no no no no no no"},     {ModuleState::kSafeStop, "no no no no no yes yes no"},
+      {ModuleState::kOnTop, "no no no no yes yes yes no"},     {ModuleState::kFallen, "no no no no no no no no"},
+      {ModuleState::kHandingOver, "no no no no yes no no no"}, {ModuleState::kReleased, "no no no no no no no no"}};
   ASSERT_EQ(obeyed.size(), kModuleStateTable.size());
   for (const auto& [state, expected] : obeyed) {
     std::string answers;

@@ -87,7 +87,7 @@ INSTANTIATE_TYPED_TEST_SUITE_P(Sim, DepthCameraContract, SimDepthCameraHarness);
 
 struct ScriptedOperatorHarness {
   std::ostringstream out;
-  std::vector<sim::TimedCommand> script;
+  std::vector<sim::TimedRequest> script;
   std::optional<sim::ScriptedOperator> scripted;
   // Of what was asked until the first look; asking begins anew.
   hal::OperatorInput& port() {

@@ -377,9 +377,9 @@ class OperatorInputContract : public ::testing::Test {
  protected:
   // Nothing where there is no command.
   [[nodiscard]] std::optional<OperatorCommand> read() {
-    auto command = OperatorCommand::kPause;
-    if (this->harness.port().try_read(command)) return command;
-    EXPECT_EQ(command, OperatorCommand::kPause) << "a refused read must leave the command alone";
+    OperatorRequest request = OperatorCommand::kPause;
+    if (this->harness.port().try_read(request)) return request.command;
+    EXPECT_EQ(request.command, OperatorCommand::kPause) << "a refused read must leave the request alone";
     return std::nullopt;
   }
   Harness harness;

@@ -10,6 +10,7 @@
 
 #include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/core/math/math.hpp"
+#include "algorithms/core/messages/ground_view.hpp"
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
 
@@ -32,7 +33,7 @@ struct Foothold {
 };
 
 // Why the climb does not go on: what the search found in the map's way, or from kLegsCannot on what the gait met.
-// Anything but kNone and kTop is a reason to stop.
+// Anything but kNone, kTop and kAtGoal is a reason to stop.
 enum class StopReason : std::uint8_t {
   kNone,
   kNothingSeen,    // no frame, no surface in it, or too little of the next tread
@@ -60,6 +61,8 @@ enum class StopReason : std::uint8_t {
   kTimeShort,        // control's cycles were lost or overran again and again
   kCommandsRefused,  // one command after the other was not taken by the bus, or not finite and never sent
   kDriveHot,         // a drive told that it is hotter than it may be
+  kAtGoal,           // it stands where it was told to go
+  kGroundEnds,       // on the way there no more level ground was seen
 };
 
 // One line for each reason, in the enumeration's order: a name for machines, and for people what may follow "the module
@@ -94,8 +97,10 @@ inline constexpr std::array kStopReasonTable{
     StopReasonInfo{"time_short", "its control cycles kept coming late"},
     StopReasonInfo{"commands_refused", "its drives could not be sent its commands"},
     StopReasonInfo{"drive_hot", "a drive was too hot"},
+    StopReasonInfo{"at_goal", "it stood at its goal"},
+    StopReasonInfo{"ground_ends", "it saw no more level ground on the way to its goal"},
 };
-static_assert(kStopReasonTable.size() == static_cast<std::size_t>(StopReason::kDriveHot) + 1);
+static_assert(kStopReasonTable.size() == static_cast<std::size_t>(StopReason::kGroundEnds) + 1);
 
 [[nodiscard]] constexpr std::string_view name_of(StopReason reason) noexcept {
   const auto i = static_cast<std::size_t>(reason);
@@ -127,6 +132,7 @@ struct FootholdSet {
   StopReason unsteady = StopReason::kUnsteady;  // why, where what is offered keeps changing
   double measured_rise_m = 0.0;                 // stance to the next tread, valid unless nothing was seen
   double measured_tread_m = 0.0;                // nosing to what rises behind it; 0: nothing is mapped there
+  GroundView ground;
 };
 
 }  // namespace polygmap

@@ -22,19 +22,21 @@ enum class Refusal : std::uint8_t {
   kEstimateStale,   //
   kFootLifted,      // by the estimate one foot does not carry, or both
   kJointsAway,      // from where they were commanded; the answer names them
+  kNoPlace,         // the destination of a go_to is no place within Destination::kFarthest_m
 };
 // Joints go behind it.
 [[nodiscard]] constexpr std::string_view text_of(Refusal refusal) noexcept {
-  constexpr std::array<std::string_view, 9> kTexts{"",
-                                                   "",
-                                                   "no answer yet from",
-                                                   "in error:",
-                                                   "too hot:",
-                                                   "the last command did not reach the drives",
-                                                   "the estimate is too old",
-                                                   "not both feet carry",
-                                                   "not where commanded:"};
-  static_assert(kTexts.size() == static_cast<std::size_t>(Refusal::kJointsAway) + 1);
+  constexpr std::array<std::string_view, 10> kTexts{"",
+                                                    "",
+                                                    "no answer yet from",
+                                                    "in error:",
+                                                    "too hot:",
+                                                    "the last command did not reach the drives",
+                                                    "the estimate is too old",
+                                                    "not both feet carry",
+                                                    "not where commanded:",
+                                                    "that is no place within 50 m"};
+  static_assert(kTexts.size() == static_cast<std::size_t>(Refusal::kNoPlace) + 1);
   return kTexts[static_cast<std::size_t>(refusal)];
 }
 

@@ -8,6 +8,7 @@
 #include "algorithms/core/capacities.hpp"
 #include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/core/math/math.hpp"
+#include "algorithms/core/messages/ground_view.hpp"
 
 namespace polygmap {
 
@@ -92,6 +93,7 @@ struct MapSnapshot {
   Vec3 drift_m = Vec3::Zero();  // what lies at p in the map lies at p + drift in the pose's odometry
   MapPolygons polygons;
   OccupiedCells occupied;
+  GroundView ground;  // along the map's axes
 };
 
 }  // namespace polygmap

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "algorithms/geometry/line.hpp"
+
 namespace polygmap {
 namespace {
 
@@ -135,7 +137,7 @@ Foot ClimbPlanner::leading_foot(const Situation& situation, const SolePair& targ
   // With the weight on its way, and from tread to tread, the foot stays the one it was: a footstep may go that far
   // sideways with either, and the other one just landed (seed 16 of ten steps toppled by 20 mm when it had to lead at
   // once).
-  if (situation.leads || treads_climbed_ > 0) {
+  if (situation.leads || on_treads_) {
     return swing_foot(
         step, situation.leads ? situation.leading : memory_.leading,
         {params_.turn_round * params_.rule.lateral_dead_band_m, params_.turn_round * params_.rule.turn_dead_band_rad});
@@ -191,12 +193,8 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   goal = {};
   goal.kind = StepKind::kFloor;
   goal.foot = foot;
-  FloorStepLimits limits = params_.floor;
-  limits.forward_m *= stride_share_;
-  limits.backward_m *= stride_share_;
-  limits.lateral_m *= stride_share_;
-  limits.turn_rad *= stride_share_;
-  goal.target = floor_step(robot_->sole.collision, stance, foot, torso_goal, half_width_m, limits);
+  goal.target = floor_step(robot_->sole.collision, stance, foot, torso_goal, half_width_m,
+                           shortened(params_.floor, stride_share_));
   // On the way, with the heading still wrong, no toe comes near the riser.
   const double short_m =
       params_.floor_clearance_m - toe_to_line_m(robot_->sole.collision, goal.target, to.nosing, to.yaw_rad);
@@ -206,7 +204,7 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
 }
 
 void ClimbPlanner::watch_feet(const SolePair& soles) noexcept {
-  if (slid_ || treads_climbed_ == 0 || split_stance_ || !odom_stood_ || set_back_ >= params_.max_set_back) return;
+  if (slid_ || !on_treads_ || split_stance_ || !odom_stood_ || set_back_ >= params_.max_set_back) return;
   const auto right_p_left_m = [](const SolePair& pair) -> Vec2 {
     const Vec3 apart_m = pair[0].position_m - pair[1].position_m;
     return (rotation_z(pair[1].yaw_rad).transpose() * apart_m).head<2>();
@@ -237,7 +235,7 @@ StepGoal ClimbPlanner::closing_goal(const Situation& situation, const FootholdSe
 
 bool ClimbPlanner::close_up(const Situation& situation) noexcept {
   const double apart_m = (situation.soles[0].position_m - situation.soles[1].position_m).norm();
-  closes_up_ = treads_climbed_ > 0 && apart_m > 2.0 * (robot_->stance.half_width_m + params_.line_up.lateral_m);
+  closes_up_ = on_treads_ && apart_m > 2.0 * (robot_->stance.half_width_m + params_.line_up.lateral_m);
   return closes_up_;
 }
 
@@ -247,13 +245,59 @@ StopReason ClimbPlanner::reason_against(const Situation& situation, const Footho
     return footholds.obstruction == StopReason::kNone ? StopReason::kNothingSeen : footholds.obstruction;
   }
   if (situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) return StopReason::kMapStale;
-  const bool walks_up = footholds.obstruction == StopReason::kEdgeUncertain && treads_climbed_ == 0;
+  const bool walks_up = footholds.obstruction == StopReason::kEdgeUncertain && !on_treads_;
   if (footholds.obstruction != StopReason::kNone && !walks_up) return footholds.obstruction;
   if (!(footholds.has_p_star || walks_up) || !usable(footholds.p_star_feet) ||
       !math::all_finite(footholds.tread.nosing_a_m) || !math::all_finite(footholds.tread.nosing_b_m)) {
     return StopReason::kNoStaircase;
   }
   return StopReason::kNone;
+}
+
+// Stairs are the way where the goal lies behind their edge. Until it is known whether more of them come, they still
+// are.
+bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& footholds) const noexcept {
+  if (footholds.map_stamp_ns <= 0 || situation.stamp_ns - footholds.map_stamp_ns > params_.max_map_age_ns) return true;
+  const bool offers = footholds.has_p_star || footholds.obstruction == StopReason::kEdgeUncertain;
+  if (!offers) return on_treads_ && footholds.obstruction == StopReason::kNothingSeen;
+  if (!usable(footholds.p_star_feet)) return false;
+  const Vec2 heading = unit_at(footholds.p_star_feet[0].yaw_rad);
+  const Vec2 nosing_m = 0.5 * (footholds.tread.nosing_a_m + footholds.tread.nosing_b_m).head<2>();
+  const Vec2 way_m = goal_->odom_p_m - middle_of(situation.soles).position_m.head<2>();
+  return heading.dot(goal_->odom_p_m - nosing_m) > params_.goal_beyond_m &&
+         heading.dot(way_m) > math::cos(params_.goal_aside_rad) * way_m.norm();
+}
+
+ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const FootholdSet& footholds) const noexcept {
+  const LevelWalk walk(params_.walk, robot_->sole, robot_->stance.half_width_m, shortened(params_.floor, stride_share_),
+                       params_.rule);
+  const LevelStep step =
+      walk.next(situation.soles, memory_.last_swing, !walking_ && floor_steps_ == 0, *goal_, footholds.ground);
+  Decision decision;
+  decision.walks = true;
+  switch (step.outcome) {
+    case LevelStep::Outcome::kArrived:
+      decision.obstruction = StopReason::kAtGoal;
+      return decision;
+    case LevelStep::Outcome::kSteps:
+      decision.has_step = true;
+      decision.goal.kind = StepKind::kFloor;
+      decision.goal.foot = step.foot;
+      decision.goal.target = step.target;
+      decision.goal.foothold = foothold_at(step.target, footholds.map_stamp_ns);
+      return decision;
+    case LevelStep::Outcome::kNoGround:
+    case LevelStep::Outcome::kBlocked:
+      break;
+  }
+  // What the search says of what comes next is the better reason, where it says anything.
+  decision.measured_m = measured(footholds);
+  decision.obstruction = footholds.obstruction;
+  const bool says_nothing = footholds.obstruction == StopReason::kNone || footholds.obstruction == StopReason::kTop ||
+                            footholds.obstruction == StopReason::kNoStaircase;
+  if (!says_nothing) return decision;
+  decision.obstruction = step.outcome == LevelStep::Outcome::kBlocked ? StopReason::kObstacle : StopReason::kGroundEnds;
+  return decision;
 }
 
 ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const FootholdSet& footholds) const noexcept {
@@ -267,6 +311,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     decision.goal = closing_goal(situation, footholds, *closing);
     return decision;
   }
+  if (goal_ && !leads_to_goal(situation, footholds)) return walk(situation, footholds);
   decision.measured_m = measured(footholds);
   decision.obstruction = reason_against(situation, footholds);
   if (decision.obstruction != StopReason::kNone) return decision;
@@ -280,7 +325,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     decision.obstruction = StopReason::kMapStale;
     return decision;
   }
-  if (treads_climbed_ == 0 && floor_goal(situation, footholds, decision.goal)) {
+  if (!on_treads_ && floor_goal(situation, footholds, decision.goal)) {
     decision.has_step = corrections_ < params_.line_up.max_corrections && floor_steps_ < params_.max_floor_steps;
     if (decision.has_step) return decision;
     decision = {};
@@ -301,7 +346,12 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
   before_latch_ = memory_;
   memory_.last_swing = decision.goal.foot;
   const Vec3 travel_m = decision.goal.target.position_m - situation.soles[index_of(memory_.last_swing)].position_m;
-  if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < params_.correction_m) ++corrections_;
+  walking_ = decision.walks;
+  if (walking_) {
+    floor_steps_ = corrections_ = 0;
+  } else if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < params_.correction_m) {
+    ++corrections_;
+  }
   if (leads(decision.goal.kind)) {
     memory_.leading = decision.goal.foot;
     memory_.has_leading = true;
@@ -337,7 +387,8 @@ void ClimbPlanner::landed(const std::optional<SolePair>& soles) noexcept {
   landed_ = latched_.goal.target;
   switch (latched_.goal.kind) {
     case StepKind::kFloor:
-      ++floor_steps_;
+      if (!walking_) ++floor_steps_;
+      on_treads_ = false;
       break;
     case StepKind::kClosing:
       ++set_back_;
@@ -354,7 +405,9 @@ void ClimbPlanner::landed(const std::optional<SolePair>& soles) noexcept {
       ++treads_climbed_;
       break;
   }
-  if (onto_tread(latched_.goal.kind)) tread_id_ = latched_.goal.foothold.polygon_id;
+  if (!onto_tread(latched_.goal.kind)) return;
+  tread_id_ = latched_.goal.foothold.polygon_id;
+  on_treads_ = on_treads_ || latched_.goal.kind != StepKind::kClosing;
 }
 
 }  // namespace polygmap

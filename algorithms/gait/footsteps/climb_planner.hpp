@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which foot goes where next: the walk up to the stand-off before the stairs, then both feet on every tread (DS) or one
-// (SS).
+// (SS); where it was told to go somewhere, the walk there on level ground, before stairs and behind them.
 #pragma once
 
 #include <array>
@@ -9,6 +9,7 @@
 
 #include "algorithms/core/messages/footholds.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
+#include "algorithms/gait/footsteps/level_walk.hpp"
 #include "algorithms/gait/footsteps/step_goal.hpp"
 
 namespace polygmap {
@@ -62,6 +63,9 @@ class ClimbPlanner {
     double slid_m = 0.012;
     std::uint32_t max_set_back = 2;
     LineUpParams line_up;
+    LevelWalkParams walk;
+    double goal_beyond_m = 0.10;
+    double goal_aside_rad = 1.2;
 
     static void visit(auto& p, auto& field) {
       field("pattern", p.pattern, kGaitPatternNames,
@@ -94,6 +98,10 @@ class ClimbPlanner {
           "A foot that is farther from where it landed, seen from the other one on its tread, is set back beside it.");
       field("max_set_back", p.max_set_back, 0, 100, "Feet that slid are set back so often on a tread.");
       field("line_up", p.line_up);
+      field("walk", p.walk);
+      field("goal_beyond_m", p.goal_beyond_m, 0.0, 2.0, "Stairs lead to a goal that lies farther behind their nosing.");
+      field("goal_aside_rad", p.goal_aside_rad, 0.1, 3.2,
+            "They do not, where it lies farther round from their heading.");
     }
   };
 
@@ -108,6 +116,7 @@ class ClimbPlanner {
   };
   struct Decision {
     bool has_step = false;
+    bool walks = false;  // to a place, on level ground
     StepGoal goal;
     StepGoal trailing;                           // the step that may come after a leading or passing one
     StopReason obstruction = StopReason::kNone;  // without a step: why
@@ -121,6 +130,8 @@ class ClimbPlanner {
   // After an end: what it has tried to line up with the stairs, and what it has given up, is forgotten; where it stands
   // is not.
   void restart() noexcept;
+  // From now on; none: up the stairs that it sees.
+  void set_goal(const std::optional<WalkGoal>& goal) noexcept { goal_ = goal; }
   // A swing was latched: its goal is what the next decisions build on.
   void latched(const Situation& situation, const Decision& decision) noexcept;
   // The legs cannot do the step: the next ones on the floor are shorter. False when they are short already.
@@ -149,6 +160,8 @@ class ClimbPlanner {
   [[nodiscard]] std::uint32_t treads_climbed() const noexcept { return treads_climbed_; }
 
  private:
+  [[nodiscard]] bool leads_to_goal(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  [[nodiscard]] Decision walk(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] Decision trailing_step(const Situation& situation, const FootholdSet& footholds) const noexcept;
   // Past the standing foot onto the tread beyond it; false when there is none to be sure of.
   [[nodiscard]] bool passing_step(const Situation& situation, const FootholdSet& footholds,
@@ -176,6 +189,9 @@ class ClimbPlanner {
     Foot leading = Foot::kLeft;
     bool has_leading = false;
   } memory_, before_latch_;
+  std::optional<WalkGoal> goal_;
+  bool walking_ = false;       // the last step was one to a place
+  bool on_treads_ = false;     // false: on level ground, before stairs or behind them
   bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this
   bool passing_refused_ = false;
   bool closes_up_ = false;

@@ -98,6 +98,13 @@ struct FloorStepLimits {
           "A foot that would land on the other one goes farther out by this until it does not.");
   }
 };
+[[nodiscard]] constexpr FloorStepLimits shortened(FloorStepLimits limits, double share) noexcept {
+  limits.forward_m *= share;
+  limits.backward_m *= share;
+  limits.lateral_m *= share;
+  limits.turn_rad *= share;
+  return limits;
+}
 // The next step of `swing` on level floor towards the goal torso pose: the torso's displacement from the pose that the
 // stance foot belongs to is limited (35), the foot follows from it (31) and moves outwards until the feet are apart
 // (34).

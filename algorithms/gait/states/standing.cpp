@@ -68,7 +68,8 @@ Transition Standing::wait(const GaitShared& gait, const ClimbPlanner::Decision& 
   std::int32_t patience = gait.status.step.sequence == 0 ? params.start_patience_ticks : params.patience_ticks;
   if (reason == StopReason::kObstacle) patience = std::max(patience, params.obstacle_patience_ticks);
   if (wait_ticks_ >= patience) {
-    return reason == StopReason::kTop ? Transition::finish() : Transition::stop(reason, decision.measured_m);
+    return reason == StopReason::kTop || reason == StopReason::kAtGoal ? Transition::finish()
+                                                                       : Transition::stop(reason, decision.measured_m);
   }
   // At the margin of what it may stand beside, a thing is in the way in some pictures and not in others.
   const bool obstacle = 2 * gait.memory.obstacle_ticks > gait.memory.idle_ticks;

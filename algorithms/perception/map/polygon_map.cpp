@@ -54,7 +54,9 @@ void PolygonMap::clear() noexcept {
   snapshot_.drift_m.setZero();
   drift_.clear();
   things_.clear();
+  ground_.clear();
   snapshot_.occupied.clear();
+  snapshot_.ground = {};
   any_frame_ = false;
   newest_ns_ = 0;
   stage_ = Stage::kIdle;
@@ -127,6 +129,7 @@ Progress PolygonMap::step(WorkBudget& budget) noexcept {
     do_piece();
     work_.add(120);
     work_.add(things_.work());
+    work_.add(ground_.work());
     budget.spend(work_.take_units());
     if (stage_ == Stage::kIdle) return Progress::kDone;
   }
@@ -171,7 +174,13 @@ void PolygonMap::do_piece() noexcept {
         things_.look_again(pass_.thing++);
         if (pass_.thing % kAtOnce == 0) break;
       }
-      if (pass_.thing >= things_.count()) stage_ = Stage::kPublish;
+      if (pass_.thing >= things_.count()) begin_ground();
+      break;
+    case Stage::kGround:
+      if (ground_.look()) stage_ = Stage::kTellGround;
+      break;
+    case Stage::kTellGround:
+      if (ground_.tell(snapshot_.ground)) stage_ = Stage::kPublish;
       break;
     case Stage::kPublish:
       publish();
@@ -186,6 +195,14 @@ void PolygonMap::begin_things() noexcept {
   things_.begin({map_T_camera_, view_.intrinsics, view_.columns});
   pass_.thing = 0;
   stage_ = Stage::kThings;
+}
+
+void PolygonMap::begin_ground() noexcept {
+  GroundMap::View view{map_T_camera_,     view_.intrinsics, view_.columns, frame_.sequence,
+                       view_.odom_T_sole, view_.stands,     view_.sole};
+  for (Transform& sole : view.map_T_sole) sole.p_m -= view_.odom_T_camera.p_m - map_T_camera_.p_m;
+  ground_.begin(view);
+  stage_ = Stage::kGround;
 }
 
 bool PolygonMap::load(const SurfacePatch& patch) noexcept {

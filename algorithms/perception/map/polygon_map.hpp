@@ -11,6 +11,7 @@
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
 #include "algorithms/core/work.hpp"
+#include "algorithms/perception/map/ground_map.hpp"
 #include "algorithms/perception/map/map_drift.hpp"
 #include "algorithms/perception/map/map_track.hpp"
 #include "algorithms/perception/map/thing_map.hpp"
@@ -169,6 +170,7 @@ class PolygonMap {
     PlainViewParams plain_view;
     SideParams sides;
     ThingMap::Params things;
+    GroundMap::Params ground;
 
     static void visit(auto& p, auto& field) {
       field("window_s", p.window_s, 0.05, 1000.0, "Information fades to 1/e in this time.");
@@ -194,6 +196,7 @@ class PolygonMap {
       field("plain_view", p.plain_view);
       field("sides", p.sides);
       field("things", p.things);
+      field("ground", p.ground);
     }
   };
   struct View {
@@ -205,6 +208,9 @@ class PolygonMap {
     BodyMargin body_margin{0.02, 0.0};
     double mount_sigma_rad = 0.0;  // of the camera's roll and pitch on the base: between what is seen and the feet
     const ColumnImage* columns = nullptr;  // the picture, until the frame is done; none: no thing is seen to be gone
+    std::array<Transform, kFootCount> odom_T_sole{};
+    std::array<bool, kFootCount> stands{};
+    SoleRectangle sole{};
   };
   struct Counters {
     std::uint32_t frames = 0;
@@ -229,7 +235,8 @@ class PolygonMap {
   };
 
   PolygonMap() noexcept : PolygonMap(Params{}) {}
-  explicit PolygonMap(const Params& params) noexcept : params_(params), drift_(params.drift), things_(params.things) {}
+  explicit PolygonMap(const Params& params) noexcept
+      : params_(params), drift_(params.drift), things_(params.things), ground_(params.ground) {}
 
   // Copies the frame. A frame that is invalid or not newer is counted and leaves nothing to do.
   void begin(const SurfaceFrame& frame, const View& view) noexcept;
@@ -237,7 +244,18 @@ class PolygonMap {
   static constexpr std::int32_t kMaxPieceUnits = 120'000 / kInstructionsPerUnit;
   Progress step(WorkBudget& budget) noexcept;
   // What the next step begins with; a benchmark charges instructions to it.
-  enum class Stage : std::uint8_t { kIdle, kLoad, kCompare, kFuse, kAge, kThings, kThingsAgain, kPublish };
+  enum class Stage : std::uint8_t {
+    kIdle,
+    kLoad,
+    kCompare,
+    kFuse,
+    kAge,
+    kThings,
+    kThingsAgain,
+    kGround,
+    kTellGround,
+    kPublish
+  };
   [[nodiscard]] Stage stage() const noexcept { return stage_; }
   // Changes only in the step that returns kDone. The stamp moves on only with a frame in which something was seen.
   [[nodiscard]] const MapSnapshot& snapshot() const noexcept { return snapshot_; }
@@ -266,6 +284,7 @@ class PolygonMap {
 
   void do_piece() noexcept;
   void begin_things() noexcept;
+  void begin_ground() noexcept;
   void order_surfaces() noexcept;
   void begin_fusing() noexcept;
   void next_surface() noexcept;
@@ -308,6 +327,7 @@ class PolygonMap {
   StaticVector<MapTrack, kMaxMapPolygons> tracks_;  // index i is snapshot polygon i once published
   MapDrift drift_;
   ThingMap things_;
+  GroundMap ground_;
   SurfaceFrame frame_;
   StaticVector<std::uint8_t, kMaxPlanesPerFrame> order_;  // of the frame's surfaces: treads and risers first
   std::size_t alignment_count_ = 0;                       // how many of these say where the frame lies

@@ -17,14 +17,13 @@
 
 #include "algorithms/core/messages/samples.hpp"
 #include "firmware/daemon/system/error_text.hpp"
+#include "firmware/operator_request_text.hpp"
 
 namespace polygmap::daemon {
 namespace {
 
 constexpr std::size_t kMostAsked_bytes = 64;
 constexpr std::int64_t kDrop_ns = 500'000'000;
-constexpr std::string_view kWhatMayBeAsked =
-    "refused: ask for arm, start, pause, resume, stop, reset, hand_over or state";
 constexpr std::string_view kNoTime = "refused: its time is missing, CLOCK_MONOTONIC in ns, as polygmapd --ask sends it";
 constexpr std::string_view kTooOld = "refused: it was not heard within half a second";
 
@@ -124,21 +123,22 @@ void OperatorSocket::listen(ModuleState state, std::int64_t now_ns) noexcept {
   const std::size_t space = std::min(asked.find(' '), asked.size());
   const std::string_view word = without_end(asked.substr(0, space));
   const auto sent_ns = number_in(without_end(asked.substr(std::min(space + 1, asked.size()))));
-  const auto command = operator_command_of(word);
-  if (!command) return tell(word == "state" ? name_of(state) : kWhatMayBeAsked);
+  const auto request = operator_request_of(word);
+  if (!request && word == "state") return tell(name_of(state));
+  if (!request) return tell("refused: ask for state, or one of " + std::string(kWhatMayBeAsked));
   if (!sent_ns) return tell(kNoTime);
   // Of the future, too: it is of another clock.
   if (*sent_ns < now_ns - kDrop_ns || *sent_ns > now_ns + kDrop_ns) return tell(kTooOld);
-  command_.store(*command, std::memory_order_relaxed);
+  request_ = *request;
   sent_ns_ = *sent_ns;
   was_answered_ = false;
   stage_.store(kAsked, std::memory_order_release);
 }
 
-bool OperatorSocket::try_read(OperatorCommand& command) noexcept {
+bool OperatorSocket::try_read(OperatorRequest& request) noexcept {
   std::uint8_t asked = kAsked;
   if (!stage_.compare_exchange_strong(asked, kTaken, std::memory_order_acq_rel)) return false;
-  command = command_.load(std::memory_order_relaxed);
+  request = request_;
   return true;
 }
 

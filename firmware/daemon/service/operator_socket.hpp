@@ -34,7 +34,7 @@ class OperatorSocket final : public hal::OperatorInput {
   // What was sent before the lanes ran is not theirs.
   void drop_waiting() noexcept;
 
-  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override;
+  [[nodiscard]] bool try_read(OperatorRequest& request) noexcept override;
   void answer(const OperatorAnswer& answer) noexcept override;
 
  private:
@@ -48,8 +48,8 @@ class OperatorSocket final : public hal::OperatorInput {
   std::string path_;
   int fd_ = -1;
   std::atomic<std::uint8_t> stage_{kNone};
-  std::atomic<OperatorCommand> command_{};  // written before kAsked is
-  OperatorAnswer answer_;                   // written before kAnswered is
+  OperatorRequest request_;  // written before kAsked is
+  OperatorAnswer answer_;    // written before kAnswered is
   std::int64_t sent_ns_ = 0;
   bool was_answered_ = false;  // at the last look: by this one its cycle has published the state
   sockaddr_un asker_{};

@@ -11,6 +11,7 @@
 #include "algorithms/core/containers/static_vector.hpp"
 #include "algorithms/core/messages/footholds.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
+#include "algorithms/core/messages/operator_command.hpp"
 #include "algorithms/core/messages/samples.hpp"
 #include "algorithms/core/messages/state.hpp"
 #include "algorithms/core/messages/surfaces.hpp"
@@ -102,6 +103,16 @@ void each_field(auto& f, Of<JointCommand> auto& m) {
   } else {
     walk(f, "joints", m.joints);
   }
+}
+void each_field(auto& f, Of<Destination> auto& m) {
+  walk(f, "ahead_m", m.ahead_m);
+  walk(f, "left_m", m.left_m);
+  walk(f, "turn_rad", m.turn_rad);
+  walk(f, "has_turn", m.has_turn);
+}
+void each_field(auto& f, Of<OperatorRequest> auto& m) {
+  walk(f, "command", m.command);
+  walk(f, "destination", m.destination);
 }
 void each_field(auto& f, Of<LioSample> auto& m) {
   walk(f, "stamp_ns", m.stamp_ns);
@@ -224,6 +235,11 @@ void each_field(auto& f, Of<TreadView> auto& m) {
   walk(f, "nosing_a_m", m.nosing_a_m);
   walk(f, "nosing_b_m", m.nosing_b_m);
 }
+void each_field(auto& f, Of<GroundView> auto& m) {
+  walk(f, "corner_m", m.corner_m);
+  walk(f, "level", m.level);
+  walk(f, "tall", m.tall);
+}
 void each_field(auto& f, Of<FootholdSet> auto& m) {
   walk(f, "map_stamp_ns", m.map_stamp_ns);
   walk(f, "p_star", m.p_star);
@@ -236,6 +252,7 @@ void each_field(auto& f, Of<FootholdSet> auto& m) {
   walk(f, "unsteady", m.unsteady);
   walk(f, "measured_rise_m", m.measured_rise_m);
   walk(f, "measured_tread_m", m.measured_tread_m);
+  walk(f, "ground", m.ground);
 }
 void each_field(auto& f, Of<PoseRequest> auto& m) {
   walk(f, "number", m.number);

@@ -111,8 +111,8 @@ void walk_recorded(auto& f) {
   walk(f, "taken", kTaken);
   walk_messages<StateEstimate, EstimateQuality, GaitStatus, FootholdSet, SurfaceFrame, MountFound, MapSnapshot,
                 PoseRequest>(f);
-  constexpr OperatorCommand kCommand{};
-  walk(f, "command", kCommand);
+  constexpr OperatorRequest kRequest;
+  walk(f, "request", kRequest);
   constexpr ModuleState kState{};
   walk(f, "module_state", kState);
   walk_health(f, HealthCounts{});

@@ -149,7 +149,7 @@ bool RecordParser::parse_call(ByteReader& in, PortCall& call) noexcept {
       if (call.gave) walk(reader, "lio", call.lio);
       break;
     case CallKind::kReadOperator:
-      if (call.gave) walk(reader, "command", call.asked);
+      if (call.gave) walk(reader, "request", call.asked);
       break;
     case CallKind::kWriteJoints:
       walk(reader, "taken", call.taken);

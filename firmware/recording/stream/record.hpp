@@ -26,7 +26,7 @@ struct PortCall {
   ImuSample imu;
   JointFeedback joints;
   LioSample lio;
-  OperatorCommand asked{};
+  OperatorRequest asked;
   JointCommand command;
   JointSet taken;
   hal::JointBusStatus status;

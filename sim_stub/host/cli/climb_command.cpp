@@ -350,13 +350,13 @@ std::string pushes_complaint(ClimbArguments& a) {
 
 std::string operator_complaint(ClimbArguments& a) {
   for (const std::string& text : a.ask) {
-    TimedCommand command;
-    const std::string sentence = read_command(text, command);
+    TimedRequest request;
+    const std::string sentence = read_request(text, request);
     if (!sentence.empty()) return sentence;
-    if (!a.options.asked.empty() && command.at_s < a.options.asked.back().at_s) {
+    if (!a.options.asked.empty() && request.at_s < a.options.asked.back().at_s) {
       return "--ask must be in the order of time: \"" + text + "\" comes after a later one.";
     }
-    a.options.asked.push_back(command);
+    a.options.asked.push_back(request);
   }
   if (!a.options.params.supervisor.autostart && !a.keyboard && a.options.asked.empty()) {
     return "Parameter file \"" + a.options.params_file +
@@ -600,7 +600,8 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   if (!a.options.asked.empty()) a.options.climb_operator = &script.emplace(a.options.asked, words);
   if (a.keyboard) a.options.climb_operator = &keyboard.emplace(words);
   if (a.keyboard && a.said->count("--pace") == 0) a.options.pace = 1.0;
-  ProgressLine progress(out, a.options.world ? 0 : a.options.stairs.steps, live && a.options.climb_operator == nullptr);
+  ProgressLine progress(out, a.options.world ? 0 : a.options.stairs.steps,
+                        live && a.options.climb_operator == nullptr);
   ClimbSummary summary;
   std::string not_written;
   try {

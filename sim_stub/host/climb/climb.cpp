@@ -244,9 +244,15 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   heap::reset();
 
   SimRobot robot(sim_options(options));
+  // Who says nothing else wants the robot to go to the world's goal.
+  std::ostream nobody(nullptr);
+  const std::optional<Destination> goal = options.world ? destination_in(*options.world) : std::nullopt;
+  std::optional<Dispatcher> dispatcher;
+  ClimbOperator* const climb_operator =
+      options.climb_operator != nullptr || !goal ? options.climb_operator : &dispatcher.emplace(*goal, nobody);
   Params params = options.params;
   params.gait.planner.pattern = options.gait;
-  params.supervisor.autostart = params.supervisor.autostart && options.climb_operator == nullptr;
+  params.supervisor.autostart = params.supervisor.autostart && climb_operator == nullptr;
   params.self_filter = options.self_filter;
   params.estimate_mount = options.estimate_mount;
   if (options.camera) {
@@ -270,7 +276,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
   if (options.save_inputs) recorder.emplace(camera, robot, joints, lidar);
   Ports watched_ports =
       recorder ? Ports{*recorder, *recorder, *recorder, *recorder} : Ports{camera, robot, joints, lidar};
-  watched_ports.operator_input = options.climb_operator;
+  watched_ports.operator_input = climb_operator;
   std::unique_ptr<recording::Recorder> recording;
   std::optional<TruthTopics> truth_topics;
   if (!options.recording.empty()) {
@@ -311,8 +317,8 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
       robot.advance();
     }
     pacer.wait_for(robot.now_ns());
-    if (options.climb_operator != nullptr) {
-      options.climb_operator->look(robot.now_ns(), pipeline.control().module_state());
+    if (climb_operator != nullptr) {
+      climb_operator->look(robot.now_ns(), pipeline.control().module_state());
     }
     {
       const heap::ModuleCall call("CyclicExecutive::tick");
@@ -334,7 +340,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     }
     const ModuleState state = telemetry.module_state;
     if (states.empty() || states.back().state != state) states.push_back({seconds(robot.now_ns()), state});
-    const bool goes_on = options.climb_operator != nullptr && options.climb_operator->has_more();
+    const bool goes_on = climb_operator != nullptr && climb_operator->has_more();
     const bool ended = state == ModuleState::kOnTop || state == ModuleState::kSafeStop;
     const bool waits = waits_for_operator(state);
     const bool released = state == ModuleState::kReleased;
@@ -353,7 +359,7 @@ ClimbSummary run_climb(const ClimbOptions& options, const ClimbProgressFunction&
     if (!over) end_ns = -1;
     if (over && end_ns < 0) end_ns = robot.now_ns() + (released ? kRestAfterRelease_ns : kRestAfterEnd_ns);
     if (robot.truth().fell) break;
-    if (options.climb_operator != nullptr && options.climb_operator->has_left()) {
+    if (climb_operator != nullptr && climb_operator->has_left()) {
       operator_end = OperatorEnd::kLeft;
       break;
     }

@@ -36,7 +36,7 @@ struct ClimbOptions {
   PlantKind plant = PlantKind::kMujoco;
   std::vector<std::string> command;  // that was typed; for the record
   std::vector<Push> pushes;
-  std::vector<TimedCommand> asked;          // of an operator with a script; for the record
+  std::vector<TimedRequest> asked;          // of an operator with a script; for the record
   ClimbOperator* climb_operator = nullptr;  // null: the module starts by itself. Outlives the climb
   double reality_scale = 0.0;               // that reality was drawn at
   Reality reality;                          // the robot and the ground as they are; the module believes the data sheet

@@ -63,9 +63,9 @@ Json pushes_json(const std::vector<Push>& pushes) {
   return list;
 }
 
-Json asked_json(const std::vector<TimedCommand>& asked) {
+Json asked_json(const std::vector<TimedRequest>& asked) {
   Json list = Json::array();
-  for (const TimedCommand& one : asked) list.push_back({{"at_s", one.at_s}, {"command", name_of(one.command)}});
+  for (const TimedRequest& one : asked) list.push_back({{"at_s", one.at_s}, {"command", name_of(one.request.command)}});
   return list;
 }
 

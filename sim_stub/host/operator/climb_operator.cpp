@@ -8,6 +8,7 @@
 
 #include "firmware/config/file_error.hpp"
 #include "firmware/operator_answer_text.hpp"
+#include "firmware/operator_request_text.hpp"
 #include "sim_stub/heap_trap.hpp"
 
 namespace polygmap::sim {
@@ -25,11 +26,12 @@ void ClimbOperator::look(std::int64_t now_ns, ModuleState state) {
   listen();
 }
 
-bool ClimbOperator::try_read(OperatorCommand& command) noexcept {
+bool ClimbOperator::try_read(OperatorRequest& request) noexcept {
   const heap::HostCall host;  // of the module's cycle
-  const std::optional<OperatorCommand> asked = next();
+  const std::optional<OperatorRequest> asked = next();
   if (!asked) return false;
-  command = asked_ = *asked;
+  request = *asked;
+  asked_ = asked->command;
   return true;
 }
 
@@ -39,10 +41,20 @@ void ClimbOperator::answer(const OperatorAnswer& answer) noexcept {
   say(std::string(name_of(asked_)) + " " + std::string(text_of(answer, *state_).view()));
 }
 
-std::string read_command(const std::string& text, TimedCommand& command) {
+std::optional<OperatorRequest> Dispatcher::next() {
+  if (state() == ModuleState::kOff && !armed_) {
+    armed_ = true;
+    return OperatorRequest(OperatorCommand::kArm);
+  }
+  if (state() != ModuleState::kStanding || sent_) return std::nullopt;
+  sent_ = true;
+  return OperatorRequest(to_);
+}
+
+std::string read_request(const std::string& text, TimedRequest& request) {
   constexpr double kLatest_s = 10000.0;
   const std::size_t at = text.find('@');
-  const auto known = operator_command_of(std::string_view(text).substr(0, at));
+  const auto known = operator_request_of(std::string_view(text).substr(0, at));
   double at_s = -1.0;
   if (at != std::string::npos) {
     const char *first = text.data() + at + 1, *last = text.data() + text.size();
@@ -50,12 +62,10 @@ std::string read_command(const std::string& text, TimedCommand& command) {
     if (error != std::errc{} || end != last) at_s = -1.0;
   }
   if (!known || !(at_s >= 0.0 && at_s <= kLatest_s)) {
-    return config::without_controls(
-        "--ask must be arm, start, pause, resume, stop, reset or hand_over, and when, from 0 to 10000 s, "
-        "as in pause@12.5, not \"" +
-        text + "\".");
+    return config::without_controls("--ask must be one of " + std::string(kWhatMayBeAsked) +
+                                    ", and when, from 0 to 10000 s, as in pause@12.5, not \"" + text + "\".");
   }
-  command = {at_s, *known};
+  request = {at_s, *known};
   return {};
 }
 

@@ -24,7 +24,7 @@ class ClimbOperator : public hal::OperatorInput {
   [[nodiscard]] virtual bool has_more() const = 0;
   // It wants no more of this climb.
   [[nodiscard]] virtual bool has_left() const { return false; }
-  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept final;
+  [[nodiscard]] bool try_read(OperatorRequest& request) noexcept final;
   void answer(const OperatorAnswer& answer) noexcept final;
 
  protected:
@@ -32,9 +32,10 @@ class ClimbOperator : public hal::OperatorInput {
   ~ClimbOperator() = default;
 
   [[nodiscard]] std::ostream& out() { return out_; }
+  [[nodiscard]] std::optional<ModuleState> state() const { return state_; }  // of the module, before its cycle
   [[nodiscard]] std::int64_t now_ns() const { return now_ns_; }
   virtual void listen() = 0;  // once a cycle, before the module's
-  [[nodiscard]] virtual std::optional<OperatorCommand> next() = 0;
+  [[nodiscard]] virtual std::optional<OperatorRequest> next() = 0;
 
  private:
   void say(const std::string& words);
@@ -45,32 +46,47 @@ class ClimbOperator : public hal::OperatorInput {
   OperatorCommand asked_{};  // last
 };
 
-struct TimedCommand {
+struct TimedRequest {
   double at_s = 0.0;
-  OperatorCommand command{};
+  OperatorRequest request;
 };
 
-// Each command at its time, simulated.
+// Each request at its time, simulated.
 class ScriptedOperator final : public ClimbOperator {
  public:
   // In the order of their times.
-  ScriptedOperator(std::vector<TimedCommand> script, std::ostream& out)
+  ScriptedOperator(std::vector<TimedRequest> script, std::ostream& out)
       : ClimbOperator(out), script_(std::move(script)) {}
 
   [[nodiscard]] bool has_more() const override { return next_ < script_.size(); }
 
  private:
   void listen() override {}
-  [[nodiscard]] std::optional<OperatorCommand> next() override {
+  [[nodiscard]] std::optional<OperatorRequest> next() override {
     if (next_ >= script_.size() || 1e-9 * static_cast<double>(now_ns()) < script_[next_].at_s) return std::nullopt;
-    return script_[next_++].command;
+    return script_[next_++].request;
   }
 
-  std::vector<TimedCommand> script_;
+  std::vector<TimedRequest> script_;
   std::size_t next_ = 0;
 };
 
 // As in "start@4.5"; a sentence where it is none.
-[[nodiscard]] std::string read_command(const std::string& text, TimedCommand& command);
+[[nodiscard]] std::string read_request(const std::string& text, TimedRequest& request);
+
+// Arms the robot, and sends it to a place as soon as it stands.
+class Dispatcher final : public ClimbOperator {
+ public:
+  Dispatcher(const Destination& to, std::ostream& out) : ClimbOperator(out), to_(to) {}
+
+  [[nodiscard]] bool has_more() const override { return !sent_; }
+
+ private:
+  void listen() override {}
+  [[nodiscard]] std::optional<OperatorRequest> next() override;
+
+  Destination to_;
+  bool armed_ = false, sent_ = false;
+};
 
 }  // namespace polygmap::sim

@@ -55,7 +55,7 @@ void Keyboard::read_keys() {
 
 void Keyboard::listen() { read_keys(); }
 
-std::optional<OperatorCommand> Keyboard::next() {
+std::optional<OperatorRequest> Keyboard::next() {
   if (asked_.empty()) return std::nullopt;
   const OperatorCommand command = asked_.front();
   asked_.pop_front();

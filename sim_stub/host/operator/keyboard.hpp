@@ -24,7 +24,7 @@ class Keyboard final : public ClimbOperator {
 
  private:
   void listen() override;
-  [[nodiscard]] std::optional<OperatorCommand> next() override;
+  [[nodiscard]] std::optional<OperatorRequest> next() override;
   void read_keys();
 
   std::optional<termios> usual_;  // of a terminal, to be put back

@@ -109,7 +109,7 @@ void ReportRun::take_call(const PortCall& call, std::int64_t cycle_ns) {
   if (!call.gave) return;
   if (call.kind == CallKind::kReadJoints) joints_ = call.joints;
   if (call.kind == CallKind::kReadOperator) {
-    operator_.push_back({rounded(time_s(cycle_ns), 3), name_of(call.asked)});
+    operator_.push_back({rounded(time_s(cycle_ns), 3), name_of(call.asked.command)});
   }
   if (call.kind == CallKind::kReadLidar) {
     const Transform lio_T_base = call.lio.lio_T_lidar * file_->params().robot.mounts.base_T_lidar.inverse();

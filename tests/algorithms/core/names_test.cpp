@@ -34,6 +34,7 @@ TEST(Names, EveryStopReason_HasANameAndAClauseOfItsOwn) {
   EXPECT_EQ(text_of(StopReason::kObstacle), "something stood where its feet would have gone next");
   EXPECT_EQ(name_of(StopReason::kCommandsRefused), "commands_refused");
   EXPECT_EQ(name_of(StopReason::kDriveHot), "drive_hot");
+  EXPECT_EQ(name_of(StopReason::kGroundEnds), "ground_ends");
   EXPECT_EQ(text_of(static_cast<StopReason>(99)), "it gave no known reason");
 }
 

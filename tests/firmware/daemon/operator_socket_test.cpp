@@ -147,12 +147,12 @@ TEST(OperatorSocketTest, WordThatWaitedForMoreThanHalfASecond_StartsNothing) {
   OperatorSocket socket;
   ASSERT_EQ(socket.open(path), "");
   const Client client(path);
-  OperatorCommand command{};
+  OperatorRequest request;
   for (const std::int64_t waited_ns : {400 * kNsPerMs, 600 * kNsPerMs}) {
     const std::int64_t sent_ns = monotonic_ns();
     client.send("start " + std::to_string(sent_ns));
     socket.serve(ModuleState::kStanding, sent_ns + waited_ns);
-    EXPECT_EQ(socket.try_read(command), waited_ns < 500 * kNsPerMs);
+    EXPECT_EQ(socket.try_read(request), waited_ns < 500 * kNsPerMs);
     if (waited_ns < 500 * kNsPerMs) {
       socket.answer({});
       for (int look = 0; look < 2; ++look) socket.serve(ModuleState::kWalkingUp, sent_ns + waited_ns);
@@ -174,8 +174,8 @@ TEST(OperatorSocketTest, ControlDoesNotTakeIt_IsDroppedHalfASecondAfterItWasSent
   socket.serve(ModuleState::kStanding, sent_ns + 400 * kNsPerMs);
   socket.serve(ModuleState::kStanding, sent_ns + 510 * kNsPerMs);
   EXPECT_EQ(client.heard(), "refused: control did not take it");
-  OperatorCommand command{};
-  EXPECT_FALSE(socket.try_read(command));
+  OperatorRequest request;
+  EXPECT_FALSE(socket.try_read(request));
 }
 
 TEST(OperatorSocketTest, WordWithoutItsTime_IsRefused) {
@@ -183,13 +183,13 @@ TEST(OperatorSocketTest, WordWithoutItsTime_IsRefused) {
   OperatorSocket socket;
   ASSERT_EQ(socket.open(path), "");
   const Client client(path);
-  OperatorCommand command{};
+  OperatorRequest request;
   for (const char* text : {"start", "start ", "start now", "start 12x", "start -9223372036854775808",
                            "start 9223372036854775807", "start 99999999999999999999"}) {
     client.send(text);
     socket.serve(ModuleState::kStanding, monotonic_ns());
     EXPECT_TRUE(client.heard().starts_with("refused: ")) << text;
-    EXPECT_FALSE(socket.try_read(command)) << text;
+    EXPECT_FALSE(socket.try_read(request)) << text;
   }
   client.send("state");
   socket.serve(ModuleState::kStanding, monotonic_ns());
@@ -205,8 +205,8 @@ TEST(OperatorSocketTest, EveryJointIsNamed_ReachesTheClientWhole) {
   ASSERT_EQ(socket.open(path), "");
   std::string heard;
   std::thread client([&] { EXPECT_TRUE(try_ask(path, "reset", heard)); });
-  OperatorCommand command{};
-  while (!socket.try_read(command)) socket.serve(ModuleState::kSafeStop, monotonic_ns());
+  OperatorRequest request;
+  while (!socket.try_read(request)) socket.serve(ModuleState::kSafeStop, monotonic_ns());
   socket.answer(answer);
   for (int look = 0; look < 2; ++look) socket.serve(ModuleState::kSafeStop, monotonic_ns());
   client.join();

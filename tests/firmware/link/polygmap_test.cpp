@@ -244,6 +244,21 @@ TEST(Link, Operator_IsObeyedOrRefused) {
   EXPECT_EQ(linked.plan().stairs.state, POLYGMAP_STAIRS_APPROACHING);
 }
 
+TEST(Link, SentToAPlace_WalksThereAndEnds) {
+  LinkedRobot linked(kToeGap_m, "[supervisor]\nautostart = false\n");
+  EXPECT_EQ(polygmap_operate(linked.module(), POLYGMAP_OPERATE_ARM), POLYGMAP_OK);
+  for (int i = 0; i < kUntilItStands_ticks; ++i) linked.tick();
+  const double nan = std::nan("");
+  EXPECT_EQ(polygmap_go_to(nullptr, 0.0, 0.0, nan), POLYGMAP_E_NULL);
+  EXPECT_EQ(polygmap_go_to(linked.module(), 51.0, 0.0, nan), POLYGMAP_E_PLACE);
+  EXPECT_EQ(polygmap_go_to(linked.module(), nan, 0.0, 0.0), POLYGMAP_E_PLACE);
+  EXPECT_EQ(polygmap_operate(linked.module(), POLYGMAP_OPERATE_GO_TO), POLYGMAP_E_OPERATE) << "it names no place";
+  EXPECT_EQ(polygmap_go_to(linked.module(), -0.02, 0.0, nan), POLYGMAP_OK);
+  for (int i = 0; i < 3000 && linked.status().state != POLYGMAP_STATE_ON_TOP; ++i) linked.tick();
+  EXPECT_EQ(linked.status().answer.operation, POLYGMAP_OPERATE_GO_TO);
+  EXPECT_EQ(linked.status().state, POLYGMAP_STATE_ON_TOP);
+}
+
 // Two masters on a bus contradict each other: nothing is to be sent any more.
 TEST(Link, AfterTheHandOver_ThereIsNoCommand) {
   LinkedRobot linked(kToeGap_m, "[supervisor]\nautostart = false\n");

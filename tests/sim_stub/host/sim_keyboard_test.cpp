@@ -34,9 +34,9 @@ class KeyboardTest : public testing::Test {
     pipe_[1] = -1;
   }
   [[nodiscard]] std::optional<OperatorCommand> read() {
-    OperatorCommand command{};
-    if (!keyboard_->try_read(command)) return std::nullopt;
-    return command;
+    OperatorRequest request;
+    if (!keyboard_->try_read(request)) return std::nullopt;
+    return request.command;
   }
 
   std::ostringstream out_;

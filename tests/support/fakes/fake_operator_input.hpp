@@ -6,20 +6,20 @@
 
 namespace polygmap::fakes {
 
-// Commands in the order they were given, and their answers.
+// Requests in the order they were made, and their answers.
 class FakeOperatorInput final : public hal::OperatorInput {
  public:
   static constexpr std::size_t kCapacity = 8;
 
-  void ask(OperatorCommand command) noexcept { commands_.push_overwrite(command); }
+  void ask(const OperatorRequest& request) noexcept { requests_.push_overwrite(request); }
   // The oldest answer that was not taken; false: there is none.
   [[nodiscard]] bool try_take_answer(OperatorAnswer& answer) noexcept { return answers_.try_pop(answer); }
 
-  [[nodiscard]] bool try_read(OperatorCommand& command) noexcept override { return commands_.try_pop(command); }
+  [[nodiscard]] bool try_read(OperatorRequest& request) noexcept override { return requests_.try_pop(request); }
   void answer(const OperatorAnswer& answer) noexcept override { answers_.push_overwrite(answer); }
 
  private:
-  RingBuffer<OperatorCommand, kCapacity> commands_;
+  RingBuffer<OperatorRequest, kCapacity> requests_;
   RingBuffer<OperatorAnswer, kCapacity> answers_;
 };
 

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// The ground about the robot as pictures showed it, in squares along the axes of odometry.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "algorithms/core/math/math.hpp"
+
+namespace polygmap {
+
+struct GroundView {
+  static constexpr std::int32_t kSide_cells = 64;  // 2.56 m
+  static constexpr double kCell_m = 0.04;
+  using Rows = std::array<std::uint64_t, kSide_cells>;  // bit x of row y
+
+  Vec2 corner_m = Vec2::Zero();  // where x and y of cell (0, 0) begin
+  Rows level{};                  // ground at the height of the standing soles was seen there, or a sole has stood there
+  Rows tall{};                   // something rises there
+
+  [[nodiscard]] std::int32_t cell_of(double along_m) const noexcept {
+    return static_cast<std::int32_t>(std::floor(along_m / kCell_m));
+  }
+  // False outside the view.
+  [[nodiscard]] static bool has(const Rows& rows, std::int32_t x, std::int32_t y) noexcept {
+    if (x < 0 || y < 0 || x >= kSide_cells || y >= kSide_cells) return false;
+    return (rows[static_cast<std::size_t>(y)] >> static_cast<std::uint32_t>(x) & 1U) != 0;
+  }
+};
+
+}  // namespace polygmap

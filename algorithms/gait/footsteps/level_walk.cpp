@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/footsteps/level_walk.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "algorithms/geometry/line.hpp"
+
+namespace polygmap {
+
+bool LevelWalk::carries(const GroundView& ground, const OrientedRectangle& sole) noexcept {
+  const Vec2 ahead = unit_at(sole.yaw_rad), left = left_of(ahead);
+  const Vec2 at_m = sole.centre_m - ground.corner_m;
+  // Lines and points as near together as half a square miss none that the rectangle covers by more than a corner.
+  constexpr double kStep_m = 0.5 * GroundView::kCell_m;
+  const auto steps = [](double half_m) { return static_cast<std::int32_t>(std::ceil(2.0 * half_m / kStep_m)); };
+  const std::int32_t along = steps(sole.half_length_m), across = steps(sole.half_width_m);
+  for (std::int32_t i = 0; i <= along; ++i) {
+    for (std::int32_t j = 0; j <= across; ++j) {
+      const Vec2 p_m = at_m + (2.0 * i / along - 1.0) * sole.half_length_m * ahead +
+                       (2.0 * j / across - 1.0) * sole.half_width_m * left;
+      if (!GroundView::has(ground.level, ground.cell_of(p_m.x()), ground.cell_of(p_m.y()))) return false;
+    }
+  }
+  return true;
+}
+
+double LevelWalk::clearance_m(const GroundView& ground, const Vec2& odom_p_m, double most_m) noexcept {
+  const Vec2 at_m = odom_p_m - ground.corner_m;
+  double least2_m2 = math::square(most_m);
+  const std::int32_t last_y = ground.cell_of(at_m.y() + most_m), last_x = ground.cell_of(at_m.x() + most_m);
+  for (std::int32_t y = ground.cell_of(at_m.y() - most_m); y <= last_y; ++y) {
+    for (std::int32_t x = ground.cell_of(at_m.x() - most_m); x <= last_x; ++x) {
+      const Vec2 middle_m = Vec2{x + 0.5, y + 0.5} * GroundView::kCell_m;
+      if (GroundView::has(ground.tall, x, y)) least2_m2 = std::min(least2_m2, (middle_m - at_m).squaredNorm());
+    }
+  }
+  return math::sqrt(least2_m2);
+}
+
+bool LevelWalk::is_there(const SolePose& sole, Foot foot, const TorsoPose& at) const noexcept {
+  const SolePose to = foot_of_torso(at, foot, half_width_m_, 0.0);
+  const Vec2 off_m = (rotation_z(to.yaw_rad).transpose() * (sole.position_m - to.position_m)).head<2>();
+  return off_m.cwiseAbs().maxCoeff() <= params_.within_m &&
+         std::abs(math::wrap_angle(sole.yaw_rad - to.yaw_rad)) <= params_.within_rad;
+}
+
+// Where the torso is to go from there: first round towards the goal, then on to it, last round as it is to stand.
+LevelWalk::Aim LevelWalk::aim(const TorsoPose& middle, const WalkGoal& goal) const noexcept {
+  const Vec2 way_m = goal.odom_p_m - middle.position_m.head<2>();
+  Aim aim{middle, false};
+  if (way_m.norm() > params_.near_m) {
+    aim.pose.yaw_rad = math::atan2(way_m.y(), way_m.x());
+    aim.turns_first = std::abs(math::wrap_angle(aim.pose.yaw_rad - middle.yaw_rad)) > params_.turn_first_rad;
+    if (aim.turns_first) return aim;
+  } else if (goal.has_yaw) {
+    aim.pose.yaw_rad = goal.yaw_rad;
+  }
+  aim.pose.position_m.head<2>() = goal.odom_p_m;
+  return aim;
+}
+
+LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, const WalkGoal& goal,
+                          const GroundView& ground) const noexcept {
+  const TorsoPose middle = middle_of(soles);
+  const auto [to, turns_first] = aim(middle, goal);
+  const auto is_there = [&, &at = to](Foot foot) { return this->is_there(soles[index_of(foot)], foot, at); };
+  LevelStep step;
+  if (is_there(Foot::kLeft) && is_there(Foot::kRight)) {
+    step.outcome = LevelStep::Outcome::kArrived;
+    return step;
+  }
+  step.foot = other(last_swing);
+  if (begins) step.foot = swing_foot(displacement(middle, to), step.foot, rule_);
+  if (is_there(step.foot)) step.foot = other(step.foot);
+  // A shorter step may still be on what was seen; and from an edge or a wall it goes a step away before it turns.
+  constexpr std::array kShares{1.0, 0.5, 0.25};
+  constexpr std::array kAway_m{0.0, 0.1, 0.2, -0.1};
+  for (const double share : kShares) {
+    if (try_step(soles, to, shortened(limits_, share), ground, step)) return step;
+  }
+  const double turn_rad = math::wrap_angle(to.yaw_rad - middle.yaw_rad);
+  if (!turns_first && std::abs(turn_rad) < params_.within_rad) return step;
+  const LevelStep refused = step;
+  for (const double turn_share : {1.0, 0.0}) {
+    if (turn_share == 0.0 && !turns_first) break;
+    for (const double away_m : kAway_m) {
+      TorsoPose aside = middle;
+      aside.position_m.head<2>() += away_m * unit_at(middle.yaw_rad);
+      aside.yaw_rad += turn_share * turn_rad;
+      if (try_step(soles, aside, limits_, ground, step)) return step;
+    }
+  }
+  return refused;
+}
+
+bool LevelWalk::try_step(const SolePair& soles, const TorsoPose& to, const FloorStepLimits& limits,
+                         const GroundView& ground, LevelStep& step) const noexcept {
+  const double now_m = clearance_m(ground, middle_of(soles).position_m.head<2>(), params_.body_m);
+  step.target = floor_step(sole_.collision, soles[index_of(other(step.foot))], step.foot, to, half_width_m_, limits);
+  SolePair landed = soles;
+  landed[index_of(step.foot)] = step.target;
+  if (clearance_m(ground, middle_of(landed).position_m.head<2>(), params_.body_m) < now_m) {
+    step.outcome = LevelStep::Outcome::kBlocked;
+  } else if (!carries(ground, foot_rectangle(sole_.contact, step.target, params_.sole_margin_m))) {
+    step.outcome = LevelStep::Outcome::kNoGround;
+  } else {
+    step.outcome = LevelStep::Outcome::kSteps;
+  }
+  return step.outcome == LevelStep::Outcome::kSteps;
+}
+
+}  // namespace polygmap

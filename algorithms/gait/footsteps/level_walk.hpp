@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Steps on level ground to a place, each on ground that was seen and past nothing that rises.
+#pragma once
+
+#include "algorithms/core/messages/ground_view.hpp"
+#include "algorithms/gait/footsteps/footstep_plan.hpp"
+
+namespace polygmap {
+
+// Odometry, plan view.
+struct WalkGoal {
+  Vec2 odom_p_m = Vec2::Zero();  // of the middle between the feet
+  double yaw_rad = 0.0;
+  bool has_yaw = false;  // false: any heading will do
+};
+
+struct LevelWalkParams {
+  double near_m = 0.30;
+  double turn_first_rad = 0.5;
+  double within_m = 0.03;
+  double within_rad = 0.06;
+  double sole_margin_m = 0.02;
+  double body_m = 0.30;
+
+  static void visit(auto& p, auto& field) {
+    field("near_m", p.near_m, 0.0, 2.0, "As near to the goal it no longer turns towards it, but as it is to stand.");
+    field("turn_first_rad", p.turn_first_rad, 0.05, 3.2, "It turns in place towards a goal that lies farther round.");
+    field("within_m", p.within_m, 0.005, 0.2, "A foot is at the goal within this, along and across.");
+    field("within_rad", p.within_rad, 0.01, 0.5, "A foot is at the goal within this turn.");
+    field("sole_margin_m", p.sole_margin_m, 0.0, 0.2, "Ground was seen as far beyond a sole on all sides.");
+    field("body_m", p.body_m, 0.0, 1.0, "What rises as near to the middle between the feet comes no nearer by a step.");
+  }
+};
+
+struct LevelStep {
+  enum class Outcome : std::uint8_t { kSteps, kArrived, kNoGround, kBlocked };
+  Outcome outcome = Outcome::kNoGround;
+  Foot foot = Foot::kLeft;
+  SolePose target;
+};
+
+class LevelWalk {
+ public:
+  // sole, half_width_m: of the robot. limits: of a step.
+  LevelWalk(const LevelWalkParams& params, const SoleModel& sole, double half_width_m, const FloorStepLimits& limits,
+            const SwingRule& rule) noexcept
+      : params_(params), sole_(sole), half_width_m_(half_width_m), limits_(limits), rule_(rule) {}
+
+  // last_swing: the foot that stepped last. begins: none has yet, on this walk.
+  [[nodiscard]] LevelStep next(const SolePair& soles, Foot last_swing, bool begins, const WalkGoal& goal,
+                               const GroundView& ground) const noexcept;
+  // Ground was seen under all of the sole.
+  [[nodiscard]] static bool carries(const GroundView& ground, const OrientedRectangle& sole) noexcept;
+  // To the nearest square that rises; most_m where there is none as near.
+  [[nodiscard]] static double clearance_m(const GroundView& ground, const Vec2& odom_p_m, double most_m) noexcept;
+
+ private:
+  [[nodiscard]] bool is_there(const SolePose& sole, Foot foot, const TorsoPose& at) const noexcept;
+  struct Aim {
+    TorsoPose pose;
+    bool turns_first;
+  };
+  [[nodiscard]] Aim aim(const TorsoPose& middle, const WalkGoal& goal) const noexcept;
+  // Of step.foot; false: its outcome says why not.
+  [[nodiscard]] bool try_step(const SolePair& soles, const TorsoPose& to, const FloorStepLimits& limits,
+                              const GroundView& ground, LevelStep& step) const noexcept;
+
+  const LevelWalkParams& params_;
+  const SoleModel& sole_;
+  double half_width_m_;
+  FloorStepLimits limits_;
+  SwingRule rule_;
+};
+
+}  // namespace polygmap

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/perception/map/ground_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace polygmap {
+namespace {
+
+constexpr int kClosings = 6;
+
+[[nodiscard]] std::int32_t cell_of(double along_m) noexcept {
+  return static_cast<std::int32_t>(std::floor(along_m / GroundView::kCell_m));
+}
+[[nodiscard]] double middle_of_cell_m(std::int32_t cell) noexcept { return (cell + 0.5) * GroundView::kCell_m; }
+[[nodiscard]] std::int32_t mm_of(double m) noexcept {
+  return static_cast<std::int32_t>(std::floor(1e3 * math::clamp(m, -30.0, 30.0) + 0.5));
+}
+
+// Adds one to 64 counts, where the bit is set.
+void count_up(std::uint64_t bits, std::uint64_t& ones, std::uint64_t& twos, std::uint64_t& fours,
+              std::uint64_t& eights) noexcept {
+  const std::uint64_t from_ones = ones & bits, from_twos = twos & from_ones;
+  ones ^= bits;
+  twos ^= from_ones;
+  eights |= fours & from_twos;
+  fours ^= from_twos;
+}
+
+}  // namespace
+
+void GroundMap::each_cell_under(std::size_t foot, double grown_m, auto&& visit) const noexcept {
+  const PlanFrame& plan = soles_[foot];
+  const double reach_m = std::max(view_.sole.toe_x_m, -view_.sole.heel_x_m) + view_.sole.half_width_m + grown_m;
+  const Vec2& p_m = plan.origin_m();
+  for (std::int32_t y = cell_of(p_m.y() - reach_m); y <= cell_of(p_m.y() + reach_m); ++y) {
+    for (std::int32_t x = cell_of(p_m.x() - reach_m); x <= cell_of(p_m.x() + reach_m); ++x) {
+      const Vec2 in_sole_m = plan({middle_of_cell_m(x), middle_of_cell_m(y)});
+      if (in_sole_m.x() > view_.sole.toe_x_m + grown_m || in_sole_m.x() < view_.sole.heel_x_m - grown_m) continue;
+      if (std::abs(in_sole_m.y()) <= view_.sole.half_width_m + grown_m) visit(x, y);
+    }
+  }
+}
+
+void GroundMap::stand_on(std::size_t foot, double grown_m, std::int32_t count) noexcept {
+  const auto sole_mm = static_cast<std::int16_t>(mm_of(view_.map_T_sole[foot].p_m.z()));
+  work_.add(grown_m > 0.0 ? 30000 : 6000);
+  each_cell_under(foot, grown_m, [&](std::int32_t x, std::int32_t y) {
+    at(x, y) = {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), sole_mm, static_cast<std::uint8_t>(count)};
+  });
+}
+
+void GroundMap::begin(const View& view) noexcept {
+  view_ = view;
+  work_.add(300);
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) soles_[foot] = PlanFrame(view.map_T_sole[foot]);
+  double lowest_m = std::min(view.map_T_sole[0].p_m.z(), view.map_T_sole[1].p_m.z());
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    if (view.stands[foot] && !view.stands[1 - foot]) lowest_m = view.map_T_sole[foot].p_m.z();
+  }
+  height_mm_ = mm_of(lowest_m);
+  const bool begins = !std::exchange(has_begun_, true);
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    if (begins) stand_on(foot, params_.start_m, params_.sightings);
+  }
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    if (view.stands[foot]) stand_on(foot, 0.0, kMostCount);
+  }
+  row_ = static_cast<std::int32_t>(view.sequence * 13U % kRowStep);
+}
+
+// Beside the robot's own legs, and where a picture has no depth, some of a column's pixels are of something else.
+bool GroundMap::is_at_a_gap(std::int32_t column) const noexcept {
+  const ColumnImage& image = *view_.columns;
+  const auto is_empty = [&](std::int32_t g, std::int32_t row) {
+    return g >= 0 && g < view_.intrinsics.width_px / kColumn_px && row >= 0 && row < view_.intrinsics.height_px &&
+           image.valid(g, row) < kColumn_px;
+  };
+  return is_empty(column, row_) || is_empty(column - 1, row_) || is_empty(column + 1, row_) ||
+         is_empty(column, row_ - kColumn_px) || is_empty(column, row_ + kColumn_px);
+}
+
+// A foot is where the legs say within some centimetres, and so is the shin above it.
+bool GroundMap::is_at_own_foot(const Vec2& map_p_m) const noexcept {
+  return std::ranges::any_of(soles_, [&](const PlanFrame& sole) {
+    const Vec2 p_m = sole(map_p_m);
+    return p_m.x() < view_.sole.toe_x_m + params_.own_m && p_m.x() > view_.sole.heel_x_m - params_.own_m &&
+           std::abs(p_m.y()) < view_.sole.half_width_m + params_.own_m;
+  });
+}
+
+bool GroundMap::look() noexcept {
+  const CameraIntrinsics& c = view_.intrinsics;
+  work_.add(60);
+  if (view_.columns == nullptr || row_ >= c.height_px) {
+    row_ = 0;
+    return true;
+  }
+  const std::int32_t columns = c.width_px / kColumn_px;
+  const auto first = static_cast<std::int32_t>(view_.sequence % kColumnStep);
+  const Mat3& R = view_.map_T_camera.R;
+  const Vec3 row_ray = R.col(1) * ((row_ - c.cy_px) / c.fy_px) + R.col(2);
+  for (std::int32_t g = first; g < columns; g += kColumnStep) {
+    work_.add(16);
+    const float inverse_depth = view_.columns->inverse_depth(g, row_);
+    if (!(inverse_depth * static_cast<float>(params_.range_m) > 1.0F) || is_at_a_gap(g)) continue;
+    work_.add(130);
+    const double x = (kColumn_px * g + 0.5 * (kColumn_px - 1) - c.cx_px) / c.fx_px;
+    const Vec3 map_p_m = view_.map_T_camera.p_m + (row_ray + x * R.col(0)) / static_cast<double>(inverse_depth);
+    if (!is_at_own_foot(map_p_m.head<2>())) see(map_p_m);
+  }
+  row_ += kRowStep;
+  return false;
+}
+
+void GroundMap::see(const Vec3& map_p_m) noexcept {
+  const std::int32_t x = cell_of(map_p_m.x()), y = cell_of(map_p_m.y());
+  if (std::abs(x) > 30'000 || std::abs(y) > 30'000) return;
+  const std::int32_t seen_mm = mm_of(map_p_m.z());
+  Cell& cell = at(x, y);
+  if (!knows(cell, x, y)) {
+    cell = {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), static_cast<std::int16_t>(seen_mm), 1};
+    return;
+  }
+  const std::int32_t higher_mm = seen_mm - cell.height_mm;
+  if (std::abs(higher_mm) <= mm_of(params_.level_m)) {
+    cell.height_mm = static_cast<std::int16_t>(cell.height_mm + higher_mm / (cell.count + 1));
+    cell.count = std::min<std::uint8_t>(static_cast<std::uint8_t>(cell.count + 1), kMostCount);
+    return;
+  }
+  if (cell.count > 1) {
+    --cell.count;
+  } else {
+    cell.height_mm = static_cast<std::int16_t>(seen_mm);
+  }
+}
+
+bool GroundMap::tell(GroundView& out) noexcept {
+  const Vec2 middle_m = 0.5 * (view_.map_T_sole[0].p_m + view_.map_T_sole[1].p_m).head<2>();
+  const std::int32_t first_x = cell_of(middle_m.x()) - GroundView::kSide_cells / 2;
+  const std::int32_t first_y = cell_of(middle_m.y()) - GroundView::kSide_cells / 2;
+  if (row_ < GroundView::kSide_cells) {
+    out.corner_m = Vec2{first_x, first_y} * GroundView::kCell_m;
+    tell_row(first_x, first_y, out);
+    ++row_;
+    return false;
+  }
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    if (!view_.stands[foot] || std::abs(mm_of(view_.map_T_sole[foot].p_m.z()) - height_mm_) > mm_of(params_.level_m))
+      continue;
+    work_.add(10000);
+    each_cell_under(foot, params_.beside_m, [&](std::int32_t x, std::int32_t y) {
+      const std::uint64_t bit = std::uint64_t{1} << static_cast<std::uint32_t>(x - first_x);
+      const auto row = static_cast<std::size_t>(y - first_y);
+      if ((other_[row] & bit) == 0) out.level[row] |= bit;
+    });
+  }
+  for (int pass = 0; pass < kClosings; ++pass) close(out.level);
+  return true;
+}
+
+void GroundMap::tell_row(std::int32_t first_x, std::int32_t first_y, GroundView& out) noexcept {
+  std::uint64_t level = 0, tall = 0, other = 0;
+  work_.add(GroundView::kSide_cells, 12);
+  for (std::int32_t i = 0; i < GroundView::kSide_cells; ++i) {
+    const Cell& cell = at(first_x + i, first_y + row_);
+    if (!knows(cell, first_x + i, first_y + row_) || cell.count < params_.sightings) continue;
+    const std::int32_t above_mm = cell.height_mm - height_mm_;
+    const std::uint64_t bit = std::uint64_t{1} << static_cast<std::uint32_t>(i);
+    (std::abs(above_mm) <= mm_of(params_.level_m) ? level : other) |= bit;
+    if (above_mm > mm_of(params_.tall_m)) tall |= bit;
+  }
+  const auto row = static_cast<std::size_t>(row_);
+  out.level[row] = level;
+  out.tall[row] = tall;
+  other_[row] = other;
+}
+
+// A square that no picture has shown yet is level where five or more of the eight about it are: pictures are looked at
+// in some of their pixels, and what lies before a foot that turned is hidden by the leg. Again and again that fills
+// what is up to three squares wide, and nothing wider.
+void GroundMap::close(GroundView::Rows& level) noexcept {
+  work_.add(GroundView::kSide_cells, 60);
+  std::uint64_t above = 0;
+  for (std::size_t row = 0; row < level.size(); ++row) {
+    const std::uint64_t here = level[row], below = row + 1 < level.size() ? level[row + 1] : 0;
+    std::uint64_t ones = 0, twos = 0, fours = 0, eights = 0;
+    for (const std::uint64_t line : {above, below}) {
+      for (const std::uint64_t neighbours : {line, line << 1U, line >> 1U})
+        count_up(neighbours, ones, twos, fours, eights);
+    }
+    for (const std::uint64_t neighbours : {here << 1U, here >> 1U}) count_up(neighbours, ones, twos, fours, eights);
+    above = here;
+    level[row] |= (eights | (fours & (twos | ones))) & ~other_[row];
+  }
+}
+
+}  // namespace polygmap
