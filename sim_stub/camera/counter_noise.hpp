@@ -43,6 +43,7 @@ enum class Stream : std::uint64_t {
   kTreadHoles,
   kSunPatch,
   kLidarMount,
+  kWorld,
 };
 
 // Finaliser of SplitMix64 (Steele, Lea, Flood 2014): a bijection that passes the usual statistical batteries.

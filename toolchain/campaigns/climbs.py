@@ -200,7 +200,7 @@ def at_random(engine, seeds):
                 {"1 climbed": headline("climbs drawn at random", climbed(summaries))})
 
 
-def stairs(engine, seeds):
+def treads(engine, seeds):
     named = collections.defaultdict(list)
     for seed in seeds:
         for rise in (0.10, 0.12, 0.15, 0.17):
@@ -208,7 +208,7 @@ def stairs(engine, seeds):
                 named[f"tread {tread:.2f} m"].append(["--rise", rise, "--tread", tread, "--steps", 6, "--seed", seed, "--noise", own_noise(seed)])
             named["tread 0.27 m, built evenly"].append(
                 ["--rise", rise, "--tread", 0.27, "--jitter", 0, "--steps", 6, "--seed", seed, "--noise", own_noise(seed)])
-    groups = grouped(engine, "stairs", named)
+    groups = grouped(engine, "treads", named)
     return Page(f"Rises of 0.10, 0.12, 0.15 and 0.17 m, six steps, `ds`, {span(seeds)}, under physics.\n\n" + figures(groups) +
                 not_climbed([s for g in groups.values() for s in g]), {})
 
@@ -322,7 +322,7 @@ def balusters(engine, seeds):
 TABLES = {
     "physics": Table("Climbs under physics, beside the paper's tables", range(1, 13), physics, 5),
     "random": Table("Climbs drawn at random", range(200, 260), at_random, 4),
-    "stairs": Table("Other stairs", range(1, 3), stairs, 2),
+    "treads": Table("Other stairs", range(1, 3), treads, 2),
     "kinematic": Table("Climbs on the kinematic plant", range(1, 51), kinematic, 2),
     "nosing": Table("Overhanging nosings", range(1, 13), nosing, 4),
     "odometry": Table("Odometry, lidar odometry and the fused pose (the paper's Fig. 4)", (*range(1, 13), *range(101, 109)), odometry, 2),

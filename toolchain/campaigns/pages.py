@@ -4,11 +4,11 @@ import hashlib
 import json
 import re
 
-from campaigns import buses, climbs, cost, estimation, mute, perception, reality, settings
+from campaigns import buses, climbs, cost, estimation, mute, perception, reality, settings, stairs
 from campaigns.engine import ROOT, code_hash, commit
 from campaigns.paper import trials as paper
 
-TABLES = {**climbs.TABLES, **paper.TABLES, **buses.TABLES, **mute.TABLES, **reality.TABLES, **perception.TABLES, **estimation.TABLES, **settings.TABLES, **cost.TABLES}
+TABLES = {**climbs.TABLES, **paper.TABLES, **buses.TABLES, **mute.TABLES, **reality.TABLES, **stairs.TABLES, **perception.TABLES, **estimation.TABLES, **settings.TABLES, **cost.TABLES}
 MEASURED = ROOT / "docs/measured"
 FIGURES = MEASURED / "headline.json"
 STALE = "**Stale: the code has changed since this was measured.**"

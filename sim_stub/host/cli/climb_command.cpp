@@ -21,6 +21,7 @@
 #include "sim_stub/host/cli/paths.hpp"
 #include "sim_stub/host/cli/perceive_command.hpp"
 #include "sim_stub/host/cli/recording_commands.hpp"
+#include "sim_stub/host/cli/world_options.hpp"
 #include "sim_stub/host/operator/keyboard.hpp"
 #include "sim_stub/host/output_file.hpp"
 #include "sim_stub/sensors/virtual_clock.hpp"
@@ -215,10 +216,7 @@ void declare_files(CLI::App& climb, ClimbArguments& a) {
 
 void declare(CLI::App& climb, ClimbArguments& a) {
   declare_stairs(climb, a.options.stairs);
-  climb
-      .add_option("--world", a.options.world_file,
-                  "A world of boxes with a start and a goal in the staircase's stead, see docs/reference/world.md")
-      ->type_name("WORLD.toml");
+  declare_worlds(climb, a.options);
   keep_among(
       *climb
            .add_option("--plant", a.plant,
@@ -307,17 +305,7 @@ std::string plant_complaint(ClimbArguments& a) {
 }
 
 // Throws config::FileError.
-std::string world_complaint(ClimbArguments& a) {
-  if (a.options.world_file.empty()) return {};
-  for (const char* name : {"--steps", "--rise", "--tread", "--width", "--nosing", "--landing", "--jitter",
-                           "--balusters", "--obstacle", "--render-missing-step"}) {
-    if (a.said->count(name) > 0) return std::string(name) + " is of a staircase, and --world has none.";
-  }
-  if (a.options.plant != PlantKind::kMujoco)
-    return "--world needs --plant mujoco: the kinematic plant knows stairs alone.";
-  a.options.world = read_world(a.options.world_file);
-  return {};
-}
+std::string world_complaint(ClimbArguments& a) { return take_world(*a.said, a.options); }
 
 std::string balusters_complaint(ClimbArguments& a) {
   for (const char* name : {"--baluster-side", "--baluster-inset", "--baluster-size"}) {
@@ -472,7 +460,9 @@ std::string complaint(ClimbArguments& a) {
   return {};
 }
 
-std::string output_complaint(const std::string& directory, bool with_inputs) {
+std::string output_complaint(const ClimbOptions& options) {
+  const std::string& directory = options.out_dir;
+  const bool with_inputs = options.save_inputs;
   if (directory.empty()) return "--out must name a directory.";
   std::string complaint = directory_complaint(directory);
   if (complaint.empty() && with_inputs) complaint = directory_complaint(directory + "/inputs");
@@ -480,6 +470,7 @@ std::string output_complaint(const std::string& directory, bool with_inputs) {
   try {  // what a former run left is none of this one's
     for (const char* name : {"summary.json", "climb.svg", "run.mcap", "report.html"})
       remove_output(directory + "/" + name);
+    write_drawn_world(options);
     if (with_inputs) {
       for (const auto& entry : std::filesystem::directory_iterator(directory + "/inputs")) {
         const std::string name = entry.path().filename().string();
@@ -576,7 +567,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
     return kExitUsage;
   }
   std::string sentence = complaint(a);
-  if (sentence.empty()) sentence = output_complaint(a.options.out_dir, a.options.save_inputs);
+  if (sentence.empty()) sentence = output_complaint(a.options);
   if (a.record != "none" && !a.options.out_dir.empty()) a.options.recording = a.options.out_dir + "/run.mcap";
   a.options.record_pictures = a.record == "all";
   a.options.command = {"polygmap"};

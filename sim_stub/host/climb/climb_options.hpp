@@ -30,7 +30,9 @@ namespace polygmap::sim {
 struct ClimbOptions {
   StairParams stairs;
   std::optional<WorldFile> world;  // in their stead
-  std::string world_file;          // that it was read from
+  std::string world_file;          // that it was read from, or is written to
+  std::string world_kind;          // that it was drawn of; empty: of none
+  std::string world_drawn;         // and what was, in one sentence
   std::uint64_t seed = 1;
   NoiseKind noise = NoiseKind::kWhite;
   PlantKind plant = PlantKind::kMujoco;

@@ -367,6 +367,7 @@ ClimbSummary ClimbReport::finish(const RunFigures& run) const {
     s.climb_time_s = seconds(on_top_ns_ - first_lift_off_ns_);
     s.seconds_per_step = s.climb_time_s / s.steps_total;
   }
+  if (!world_.is_staircase) s.seconds_per_step = s.route.seconds_per_surface;
 
   const double run_s = odometry_.aligned() ? seconds(last_stamp_ns_ - odometry_.aligned_stamp_ns()) : 0.0;
   s.plane_rate_hz = run_s > 0.0 ? static_cast<double>(frames_matching_) / run_s : 0.0;

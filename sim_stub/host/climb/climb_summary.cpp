@@ -100,6 +100,10 @@ Json arguments_json(const ClimbOptions& o) {
     for (const char* key : {"steps", "rise_m", "tread_m", "width_m", "nosing_m", "landing_m", "jitter_m"})
       json.erase(key);
     json["world"] = o.world_file;
+    if (!o.world_kind.empty()) {
+      json["kind"] = o.world_kind;
+      json["drawn"] = o.world_drawn;
+    }
   }
   if (stairs.balusters.spacing_m > 0.0) {
     const Balusters& posts = stairs.balusters;

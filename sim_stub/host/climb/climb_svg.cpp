@@ -3,112 +3,27 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
 #include <cstdio>
 #include <span>
 
-#include "algorithms/geometry/convex.hpp"
+#include "sim_stub/host/climb/picture/svg_canvas.hpp"
+#include "sim_stub/host/climb/picture/world_picture.hpp"
 #include "sim_stub/nominal_robot.hpp"
 
 namespace polygmap::sim {
 namespace {
 
+using namespace svg;
+
 constexpr double kWidth_px = 1440.0;
 constexpr double kBorder_px = 36.0;
-constexpr double kMaxView_px = 1000.0;      // height of the side view of a tall staircase
-constexpr double kLabelScale_pxpm = 150.0;  // below, numbers in the feet would not be readable
+constexpr double kMaxView_px = 1000.0;  // height of the side view of a tall staircase
 
-constexpr const char* kStairFill = "#ddd8cf";
-constexpr const char* kStairLine = "#8b8376";
 constexpr const char* kTreadColour = "#1f9d57";
 constexpr const char* kRiserColour = "#2b8ca8";
 constexpr const char* kOtherColour = "#e08a1e";
 constexpr const char* kBaseColour = "#30343b";
 constexpr std::array<const char*, kFootCount> kFootColour{"#cf3f36", "#7a45b8"};
-
-// Appends printf-style: an SVG is mostly numbers.
-[[gnu::format(printf, 2, 3)]] void add(std::string& out, const char* format, ...) {
-  std::va_list arguments;
-  va_start(arguments, format);
-  char buffer[512];
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  out += buffer;
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return out;
-}
-
-struct Range {
-  double low = 0.0, high = 0.0;
-  void include(double value) {
-    if (!std::isfinite(value)) return;
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-  void grow(double by) {
-    low -= by;
-    high += by;
-  }
-  [[nodiscard]] double length() const { return high - low; }
-};
-
-// One view: x to the right, `up` (2: z, the side view; 1: y, the view from above) upwards.
-struct View {
-  int up;
-  double left_px, bottom_px, scale_pxpm, x_low_m, up_low_m;
-  [[nodiscard]] double x_px(const Vec3& p_m) const { return left_px + (p_m.x() - x_low_m) * scale_pxpm; }
-  [[nodiscard]] double y_px(const Vec3& p_m) const { return bottom_px - (p_m[up] - up_low_m) * scale_pxpm; }
-};
-
-// With min_gap_px, points closer than that to the last one are left out.
-std::string points(const View& view, std::span<const Vec3> path_m, double min_gap_px = 0.0) {
-  std::string out;
-  double x = 0.0, y = 0.0;
-  for (const Vec3& p_m : path_m) {
-    if (!math::all_finite(p_m)) continue;
-    const double next_x = view.x_px(p_m), next_y = view.y_px(p_m);
-    if (!out.empty() && std::hypot(next_x - x, next_y - y) < min_gap_px) continue;
-    x = next_x;
-    y = next_y;
-    add(out, "%.1f,%.1f ", x, y);
-  }
-  return out;
-}
-
-void add_trail(std::string& out, const View& view, std::span<const Vec3> path_m, const char* colour, double width_px) {
-  out += "<polyline points=\"" + points(view, path_m, 1.2);
-  add(out, "\" fill=\"none\" stroke=\"%s\" stroke-width=\"%.1f\" stroke-linejoin=\"round\"/>\n", colour, width_px);
-}
-
-void add_polygon(std::string& out, const View& view, std::span<const Vec3> vertices_m, const char* style) {
-  out += "<polygon points=\"" + points(view, vertices_m) + "\" " + style + "/>\n";
-}
-
-void add_text(std::string& out, double x_px, double y_px, double size_px, const char* more, const std::string& text) {
-  add(out, "<text x=\"%.1f\" y=\"%.1f\" font-size=\"%.1f\" %s>", x_px, y_px, size_px, more);
-  out += escaped(text) + "</text>\n";
-}
 
 enum class Layer { kAll, kFloor, kStairs };
 
@@ -181,93 +96,6 @@ void add_footsteps(std::string& out, const View& view, const std::vector<Footste
     std::snprintf(style, sizeof style, "text-anchor=\"middle\" font-weight=\"600\" fill=\"%s\"",
                   f.sole_margin_m < 0.0 ? "#c00000" : "#26282c");
     add_text(out, view.x_px(centre_m), view.y_px(centre_m) + 4.0, 11.0, style, margin);
-  }
-}
-
-void add_stairs_from_the_side(std::string& out, const View& view, const StairWorld& world, const Range& x_m,
-                              double floor_bottom_m) {
-  std::vector<Vec3> profile_m{{x_m.low, 0, floor_bottom_m}, {x_m.low, 0, 0}};
-  double below_m = 0.0;
-  for (const Step& s : world.steps) {
-    if (!world.is_staircase) break;
-    const double slab_m = std::min(kTreadSlab_m, s.height_m - below_m);
-    profile_m.emplace_back(s.riser_x_m, 0, below_m);
-    if (s.nosing_x_m < s.riser_x_m) {
-      profile_m.emplace_back(s.riser_x_m, 0, s.height_m - slab_m);
-      profile_m.emplace_back(s.nosing_x_m, 0, s.height_m - slab_m);
-    }
-    profile_m.emplace_back(s.nosing_x_m, 0, s.height_m);
-    below_m = s.top_m(s.back_x_m, 0.0);
-    if (s.turned()) profile_m.emplace_back(s.back_x_m, 0, below_m);
-  }
-  if (world.is_staircase && !world.steps.empty()) {
-    profile_m.emplace_back(world.steps.back().back_x_m, 0, below_m);
-    profile_m.emplace_back(world.steps.back().back_x_m, 0, 0);
-  }
-  profile_m.emplace_back(x_m.high, 0, 0);
-  profile_m.emplace_back(x_m.high, 0, floor_bottom_m);
-  std::string style;
-  add(style, "fill=\"%s\" stroke=\"%s\" stroke-width=\"1.5\"", kStairFill, kStairLine);
-  add_polygon(out, view, profile_m, style.c_str());
-}
-
-void add_stairs_from_above(std::string& out, const View& view, const StairWorld& world) {
-  const double w = world.half_width_m;
-  std::string style;
-  add(style, "fill=\"%s\" stroke=\"%s\" stroke-width=\"1.2\"", kStairFill, kStairLine);
-  for (const Step& s : world.steps) {
-    if (!world.is_staircase) break;
-    std::array<Vec3, 4> tread_m{{{s.nosing_x_m, -w, s.height_m},
-                                 {s.back_x_m, -w, s.height_m},
-                                 {s.back_x_m, w, s.height_m},
-                                 {s.nosing_x_m, w, s.height_m}}};
-    for (Vec3& corner_m : tread_m) corner_m = s.true_T_step * corner_m;
-    add_polygon(out, view, tread_m, style.c_str());
-  }
-  for (const Obstacle& o : world.obstacles) {
-    const Vec3 x{0.5 * o.size_m.x(), 0, 0}, y{0, 0.5 * o.size_m.y(), 0}, c = o.centre_m;
-    const std::array<Vec3, 4> box_m{{c - x - y, c + x - y, c + x + y, c - x + y}};
-    add_polygon(out, view, box_m, "fill=\"#857d70\" stroke=\"none\"");
-  }
-}
-
-// Each as its outline, the nearest last.
-void add_solids(std::string& out, const View& view, const StairWorld& world) {
-  std::vector<const SolidBox*> solids;
-  for (const SolidBox& solid : world.solids) solids.push_back(&solid);
-  const int toward = view.up == 1 ? 2 : 1;  // from above, or from the right
-  const double sign = view.up == 1 ? 1.0 : -1.0;
-  std::ranges::stable_sort(solids, {}, [&](const SolidBox* solid) { return sign * solid->true_T_solid.p_m[toward]; });
-  for (const SolidBox* solid : solids) {
-    const OrientedBox box = solid->box();
-    ConvexPolygon seen;
-    for (unsigned i = 0; i < 8; ++i) {
-      const Vec3 corner{(i & 1U) != 0U ? 1.0 : -1.0, (i & 2U) != 0U ? 1.0 : -1.0, (i & 4U) != 0U ? 1.0 : -1.0};
-      const Vec3 there_m = box.centre * Vec3(corner.cwiseProduct(box.half_m));
-      static_cast<void>(seen.try_push_back(Vec2(there_m.x(), there_m[view.up])));
-    }
-    std::vector<Vec3> outline_m;
-    for (const Vec2& corner : convex_hull(seen)) {
-      Vec3 there_m{corner.x(), 0.0, 0.0};
-      there_m[view.up] = corner.y();
-      outline_m.push_back(there_m);
-    }
-    std::string style;
-    add(style, "fill=\"%s\" fill-opacity=\"%.2f\" stroke=\"%s\" stroke-width=\"1.2\"",
-        world.steps[static_cast<std::size_t>(solid->step)].is_walkable ? kStairFill : "#857d70",
-        solid->is_glass ? 0.2 : 1.0, kStairLine);
-    add_polygon(out, view, outline_m, style.c_str());
-  }
-}
-
-void add_step_numbers(std::string& out, const View& view, const StairWorld& world, bool from_the_side) {
-  if (view.scale_pxpm < kLabelScale_pxpm || !world.is_staircase) return;
-  for (std::size_t k = 0; k < world.steps.size(); ++k) {
-    const Step& s = world.steps[k];
-    const double drop_m = from_the_side ? 0.0 : world.half_width_m;
-    const Vec3 front_m{s.riser_x_m, -drop_m, s.height_m};
-    add_text(out, view.x_px(front_m) + 7.0, view.y_px(front_m) + (from_the_side ? 18.0 : -6.0), 11.0,
-             "fill=\"#857d70\"", std::to_string(k + 1));
   }
 }
 
@@ -363,7 +191,10 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
     x_m.include(step.back_x_m);
     z_m.include(step.height_m);
   }
-  const auto include_point = [&](const Vec3& p_m) {
+  const WorldFile* file = s.options.world ? &*s.options.world : nullptr;
+  const Mat3 view_R_true = file != nullptr ? view_turn(*file) : Mat3::Identity();
+  const auto include_point = [&](const Vec3& true_p_m) {
+    const Vec3 p_m = view_R_true * true_p_m;
     x_m.include(p_m.x());
     y_m.include(p_m.y());
     z_m.include(p_m.z());
@@ -372,14 +203,19 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
   for (const auto& trail_m : drawing.sole_trail_m) {
     for (const Vec3& p_m : trail_m) include_point(p_m);
   }
+  if (file != nullptr) {
+    include_point({file->start.x_m, file->start.y_m, file->start_height_m});
+    if (file->world.goal) include_point({file->world.goal->x_m, file->world.goal->y_m, 0.0});
+  }
   // What is farther from the robot's way than this is no part of the picture.
   constexpr double kAround_m = 2.0;
   const Range near_x_m{x_m.low - kAround_m, x_m.high + kAround_m}, near_y_m{y_m.low - kAround_m, y_m.high + kAround_m},
       near_z_m{z_m.low, z_m.high + kAround_m};
   for (const SolidBox& solid : world.solids) {
     const OrientedBox box = solid.box();
-    const Vec3 reach_m = box.centre.R.cwiseAbs() * box.half_m;
-    for (const Vec3& p_m : {Vec3(box.centre.p_m - reach_m), Vec3(box.centre.p_m + reach_m)}) {
+    const Vec3 reach_m = (view_R_true * box.centre.R).cwiseAbs() * box.half_m;
+    const Vec3 middle_m = view_R_true * box.centre.p_m;
+    for (const Vec3& p_m : {Vec3(middle_m - reach_m), Vec3(middle_m + reach_m)}) {
       x_m.include(std::clamp(p_m.x(), near_x_m.low, near_x_m.high));
       y_m.include(std::clamp(p_m.y(), near_y_m.low, near_y_m.high));
       z_m.include(std::clamp(p_m.z(), near_z_m.low, near_z_m.high));
@@ -400,8 +236,8 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
   const double above_px = y_m.length() * scale;
   const double legend_px = above_top_px + above_px + 36.0;
   const double height_px = legend_px + 44.0;
-  const View side{2, kBorder_px, side_top_px + side_px, scale, x_m.low, z_m.low};
-  const View above{1, kBorder_px, above_top_px + above_px, scale, x_m.low, y_m.low};
+  const View side{2, kBorder_px, side_top_px + side_px, scale, x_m.low, z_m.low, view_R_true};
+  const View above{1, kBorder_px, above_top_px + above_px, scale, x_m.low, y_m.low, view_R_true};
   const double view_px = x_m.length() * scale;
 
   std::string out;
@@ -452,6 +288,7 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
     add_trail(out, side, drawing.sole_trail_m[foot], kFootColour[foot], 1.0);
   }
   add_trail(out, side, drawing.base_trail_m, kBaseColour, 2.2);
+  if (file != nullptr) add_places(out, side, *file);
   out += "</g>\n";
   add_scale_bar(out, side, kBorder_px + view_px, side_top_px - 6.0);
 
@@ -467,6 +304,7 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
   }
   add_trail(out, above, drawing.base_trail_m, kBaseColour, 2.2);
   add_footsteps(out, above, s.footsteps);
+  if (file != nullptr) add_places(out, above, *file);
   out += "</g>\n";
   add_legend(out, legend_px);
   out += "</svg>\n";

@@ -44,7 +44,10 @@ void RouteReport::observe(const Truth& truth) {
     int& rests_on = rests_on_[foot];
     if (rests_on != kNowhere && world_.are_one(rests_on, step)) continue;
     rests_on = step;
-    if (stood_on_.empty() || !world_.are_one(stood_on_.back(), step)) stood_on_.push_back(step);
+    if (!stood_on_.empty() && world_.are_one(stood_on_.back(), step)) continue;
+    if (!stood_on_.empty()) last_came_ns_ = stands_since_ns_[foot];
+    if (stood_on_.size() == 1) first_came_ns_ = last_came_ns_;
+    stood_on_.push_back(step);
   }
 }
 
@@ -95,6 +98,9 @@ RouteFigures RouteReport::figures() const {
     figures.surfaces_stood_on.push_back(name_of(step));
     const bool is_wrong = step >= 0 ? !world_.steps[static_cast<std::size_t>(step)].is_walkable : step != kFloorStep;
     if (is_wrong && figures.stood_on_wrongly.empty()) figures.stood_on_wrongly = name_of(step);
+  }
+  if (stood_on_.size() > 2) {
+    figures.seconds_per_surface = seconds(last_came_ns_ - first_came_ns_) / static_cast<double>(stood_on_.size() - 2);
   }
   if (std::isfinite(body_clearance_m_)) figures.body_clearance_min_m = body_clearance_m_;
   return figures;

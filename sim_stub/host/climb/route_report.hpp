@@ -18,6 +18,8 @@ struct RouteFigures {
   double goal_distance_m = std::numeric_limits<double>::quiet_NaN();  // from the middle of the soles, at the end
   std::vector<std::string> surfaces_stood_on;  // in order, each as often as a foot came to it from another one
   std::string stood_on_wrongly;                // the first that is not to be stood on; empty: none
+  // From the first surface that it came to, to the last one, in the mean; of fewer than two: none.
+  double seconds_per_surface = std::numeric_limits<double>::quiet_NaN();
   double body_clearance_min_m = std::numeric_limits<double>::quiet_NaN();  // torso, thighs, shanks to the solids
 };
 
@@ -45,6 +47,7 @@ class RouteReport {
   std::array<std::int64_t, kFootCount> stands_since_ns_{-1, -1};
   std::array<int, kFootCount> rests_on_{kNowhere, kNowhere};
   std::vector<int> stood_on_;
+  std::int64_t first_came_ns_ = -1, last_came_ns_ = -1;  // to another surface than where it began
   double body_clearance_m_ = std::numeric_limits<double>::infinity();
 };
 

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "sim_stub/host/cli/climb_command.hpp"
+#include "sim_stub/world/kinds/kinds.hpp"
 
 namespace polygmap::sim {
 namespace {
@@ -440,6 +441,46 @@ TEST(Cli, ReplayOfNoRecording_IsOneSentence) {
   const std::string said = err.str();
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
   EXPECT_TRUE(out.str().empty());
+}
+
+// What the runner got is what the file says, which --world reads: to a tenth of a millimetre there is no other world.
+TEST(ClimbCommand, Kind_IsDrawnByTheSeedAndWrittenForWorldToRead) {
+  const std::string out = temporary("kind");
+  for (const char* kind : {"up", "spiral-down", "stones", "trap"}) {
+    const Call drawn = call({"climb", "--kind", kind, "--seed", "5", "--out", out});
+    ASSERT_TRUE(drawn.options && drawn.options->world) << drawn.err;
+    EXPECT_EQ(drawn.options->world_kind, kind);
+    EXPECT_EQ(drawn.options->world_drawn.find(std::string(kind) + ", seed 5: "), 0U);
+    const Call read = call({"climb", "--world", out + "/world.toml", "--seed", "5", "--out", out});
+    ASSERT_TRUE(read.options && read.options->world) << read.err;
+    const WorldFile &a = *drawn.options->world, &b = *read.options->world;
+    EXPECT_EQ(a.start.x_m, b.start.x_m);
+    EXPECT_EQ(a.start.yaw_rad, b.start.yaw_rad);
+    EXPECT_EQ(a.start_height_m, b.start_height_m);
+    ASSERT_EQ(a.world.solids.size(), b.world.solids.size());
+    for (std::size_t i = 0; i < a.world.solids.size(); ++i) {
+      EXPECT_EQ(a.world.solids[i].max_m, b.world.solids[i].max_m);
+      EXPECT_EQ(a.world.solids[i].true_T_solid.p_m, b.world.solids[i].true_T_solid.p_m);
+      EXPECT_EQ(a.world.solids[i].true_T_solid.R, b.world.solids[i].true_T_solid.R);
+      EXPECT_EQ(a.world.steps[i].name, b.world.steps[i].name);
+    }
+  }
+  EXPECT_EQ(read_world(out + "/world.toml").world.is_staircase, false);
+}
+
+TEST(ClimbCommand, Kind_ThatCannotBe_IsRefused) {
+  expect_refused({"climb", "--kind", "escalator"}, "--kind must be up, up-high, ");
+  expect_refused({"climb", "--kind", "up", "--world", "w.toml"}, "--world");
+  expect_refused({"climb", "--kind", "up", "--steps", "4"}, "--steps is of a staircase, and --kind has none");
+  expect_refused({"climb", "--kind", "up", "--plant", "kinematic"}, "--kind needs --plant mujoco");
+}
+
+TEST(ClimbCommand, Help_HasASentenceForEachKind) {
+  const Call help = call({"climb", "--help"});
+  for (const WorldKind& kind : world_kinds()) {
+    EXPECT_NE(help.out.find("  " + std::string(kind.name) + " "), std::string::npos);
+    EXPECT_NE(help.out.find(kind.what), std::string::npos);
+  }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,18 @@ TEST(RouteReport, ThereAndBack_IsToldInOrder) {
     walk.rest(step, step);
   }
   EXPECT_EQ(walk.route.figures().surfaces_stood_on, (Names{"floor", "a", "b", "c", "b", "a"}));
+}
+
+TEST(RouteReport, Pace_IsFromTheFirstSurfaceItCameToToTheLast) {
+  Walk walk(some_world());
+  walk.rest(kFloorStep, kFloorStep);
+  walk.rest(0, kFloorStep);
+  EXPECT_TRUE(std::isnan(walk.route.figures().seconds_per_surface));
+  for (const int step : {1, 2}) {
+    walk.rest(step, Walk::kInTheAir);  // a tenth of a second
+    walk.rest(step, step);
+  }
+  EXPECT_NEAR(walk.route.figures().seconds_per_surface, 0.15, 1e-9);  // comes to b after 0.1 s, to c 0.2 s later
 }
 
 TEST(RouteReport, OneFootOnEachTop_IsToldOnceEach) {
