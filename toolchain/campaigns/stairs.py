@@ -40,17 +40,16 @@ KINDS = {
     "approach": Bars((4, 9), gaits=DS),
     "trap": Bars((None, None), gaits=DS),
 }
-# Where a robot may stop, and what is true then: of these worlds alone, all others can be gone through. By what is drawn,
-# words of its sentence.
+# Traps that nobody can go through or round, and words of what is true there. In all other worlds a stop is a miss, whatever
+# it says: the way to the goal is free.
 STOPS = {
-    "a hole": ("no surface to step on", "level ground", "something stood", "ended by itself"),
-    "a stairwell": ("no surface to step on", "level ground", "something stood", "ended by itself"),
     "a missing tread": ("too high to step on", "no surface to step on", "could not do the next step"),
-    "a stool": ("level ground", "something stood", "too narrow", "too short"),
+    "a stool": ("level ground", "something stood"),
     "a table edge": ("level ground", "no surface to step on"),
     "stairs of glass": ("level ground", "no depth", "no surface to step on"),
     "a pane of glass": ("level ground", "no depth", "no surface to step on"),
 }
+HAS_A_GOAL = "a missing tread"  # of these; where another one has a goal, a way leads round it
 
 
 def drawn(summary):
@@ -72,13 +71,16 @@ def in_a_solid(summary):
 
 
 def unsafe(summary):
-    return bool(summary.get("fell") or (summary.get("overhang_mm_max") or 0) > 0 or in_a_solid(summary))
+    return bool(summary.get("fell") or (summary.get("overhang_mm_max") or 0) > 0 or in_a_solid(summary) or summary.get("stood_on_wrongly"))
 
 
 def is_known_true(summary):
     """It stopped where nobody could go on, and said what is so there."""
     sentence, what = stop_of(summary), drawn(summary)
-    return any(what.startswith(trap) and any(w in sentence for w in words) for trap, words in STOPS.items())
+    trap = next((name for name in STOPS if what.startswith(name)), None)
+    if trap is None or (summary.get("goal_reached") is not None and trap != HAS_A_GOAL):
+        return False
+    return any(words in sentence for words in STOPS[trap])
 
 
 def arrived(summary):
@@ -134,9 +136,11 @@ def cells_of(kind, bars, summaries):
         "at the goal": Cell(name, done, len(summaries), 0, True),
         "falls": Cell("falls", sum(bool(s.get("fell")) for s in summaries), 0, 0),
         "overhang mm": worst_cell("overhang mm", 0, ("overhang_mm_max",)),
+        "stood wrongly": Cell("runs with a foot on what is not to be stood on", sum(bool(s.get("stood_on_wrongly")) for s in summaries), 0, 0),
         "in a solid": Cell("runs with foot or body in a solid", sum(map(in_a_solid, summaries)), 0, 0),
         "foothold mm, median": Cell("foothold error mm, median", median(summaries), bars.foothold_mm[0]),
         "max": worst_cell("foothold error mm, worst", bars.foothold_mm[1], ("foothold_error_mm", "max")),
+        "body mm": worst_cell("body to a solid mm", None, ("body_clearance_mm_min",), min),
         "margin mm": worst_cell("sole margin mm", bars.margin_mm, ("sole_margin_mm_min",), min),
         **{f"s/step {gait}": worst_cell(f"seconds a step, {gait}", bars.pace_s[i], ("seconds_per_step",), digits=2,
                                         group=of_gait(summaries, gait)) for i, gait in enumerate(GAITS)},
@@ -182,16 +186,18 @@ def page_of(groups, seeds):
     text = (f"Worlds drawn by the seed ({span(seeds)}) of every kind (`polygmap climb --kind KIND --seed S`, see "
             "[kinds](../reference/cli.md#polygmap-climb)), under physics with perception in the loop, `--reality 1`, even seeds with correlated "
             f"noise, `ds` and `ss` where a kind has steps.\n\n## What is missed\n\n{missed(table)}\n\n"
-            "## Figures\n\nThe worst of each kind's runs, the median over them; in brackets what is asked.\n\n" +
+            "## Figures\n\nThe worst of each kind's runs, the median over them; in brackets what is asked. Seconds a step are from surface to surface. "
+            "Asked, too, and not measured here: seconds for a turn on a landing, how flat a sole is on a ramp, the stand-off after an approach and how "
+            "near the body comes to furniture alone, how soon it stops at a trap, pushes.\n\n" +
             rows(("kind", "runs", *columns), [(kind, len(groups[kind]), *(c.text() for c in cells.values())) for kind, cells in table.items()]) +
-            f"\n\n## Falls, soles over an edge, feet or bodies in a solid\n\n{unsafe_runs(groups)}\n\n"
+            f"\n\n## Falls, soles over an edge, feet where they must not stand, feet or bodies in a solid\n\n{unsafe_runs(groups)}\n\n"
             "## Where it did not arrive\n\nThe module's own sentence. Whether it is true is known of traps alone: all other worlds can be gone "
             f"through, so none of them is a reason to stop.\n\n{endings(groups)}")
     bad, there = sum(map(unsafe, everything)), sum(arrived(s) or is_known_true(s) for s in everything)
     return Page(text, {
         "1 arrived": headline("stairs, ramps, stones and traps of every kind, drawn: at the goal, or stopped where one must",
                               Figure(there, f"{there} of {len(everything)}")),
-        "2 unsafe": headline("falls, soles over an edge, feet or bodies in a solid among them", Figure(bad, f"{bad} of {len(everything)}", "most", 0))})
+        "2 unsafe": headline("falls, soles over an edge or where they must not stand, feet or bodies in a solid among them", Figure(bad, f"{bad} of {len(everything)}", "most", 0))})
 
 
 def stairs(engine, seeds):

@@ -37,7 +37,7 @@ void declare_worlds(CLI::App& climb, ClimbOptions& options) {
                            ->excludes(file);
   keep_among(kind, names);
   kind.type_name("KIND");
-  climb.footer(listed);
+  climb.footer(listed + "\n\n" + climb.get_footer());
 }
 
 std::string take_world(const CLI::App& climb, ClimbOptions& options) {

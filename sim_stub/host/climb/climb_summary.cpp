@@ -188,6 +188,7 @@ Json to_json(const ClimbSummary& s) {
   j["goal_reached"] = route.goal_reached ? Json(*route.goal_reached) : Json(nullptr);
   j["footsteps_total"] = s.footsteps.size();
   j["surfaces_stood_on"] = route.surfaces_stood_on;
+  j["stood_on_wrongly"] = route.stood_on_wrongly.empty() ? Json(nullptr) : Json(route.stood_on_wrongly);
   j["body_clearance_mm_min"] = mm(route.body_clearance_min_m);
   const bool stood = !std::isnan(s.sole_margin_min_m);
   j["overhang_mm_max"] = stood ? mm(std::max(0.0, -s.sole_margin_min_m)) : Json(nullptr);

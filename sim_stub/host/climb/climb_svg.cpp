@@ -204,8 +204,9 @@ std::string climb_svg(const StairWorld& world, const ClimbDrawing& drawing, cons
     for (const Vec3& p_m : trail_m) include_point(p_m);
   }
   if (file != nullptr) {
-    include_point({file->start.x_m, file->start.y_m, file->start_height_m});
-    if (file->world.goal) include_point({file->world.goal->x_m, file->world.goal->y_m, 0.0});
+    constexpr double kLabel_m = 0.3;  // above the ground
+    include_point(point_of(file->start, world));
+    if (file->world.goal) include_point(point_of(*file->world.goal, world) + kLabel_m * Vec3::UnitZ());
   }
   // What is farther from the robot's way than this is no part of the picture.
   constexpr double kAround_m = 2.0;

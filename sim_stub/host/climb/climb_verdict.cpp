@@ -79,6 +79,9 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
   }
   if (s.interrupted_by != 0) return "The run was interrupted after " + climbed + ".";
   if (s.fell) return "Fell after " + climbed + ": " + ending.fall_reason;
+  if (!s.route.stood_on_wrongly.empty()) {
+    return "A foot stood on \"" + s.route.stood_on_wrongly + "\", which is not to be stood on.";
+  }
   if (!all_climbed && ending.module_state == ModuleState::kFallen) {
     return "The module took the robot for fallen after " + climbed + ", and damped its joints.";
   }
@@ -102,9 +105,6 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
   if (s.heap_calls != 0) {
     return "The module called the heap, " + std::to_string(s.heap_calls) + " times in all, first from " +
            (ending.heap_first_caller.empty() ? "an unknown function" : ending.heap_first_caller) + ".";
-  }
-  if (!s.route.stood_on_wrongly.empty()) {
-    return "A foot stood on \"" + s.route.stood_on_wrongly + "\", which is not to be stood on.";
   }
   if (over || (!s.options.world && std::isnan(s.sole_margin_min_m))) return over_the_edge + ".";
   if (s.options.world && s.route.body_clearance_min_m <= 0.0) {

@@ -45,7 +45,7 @@ void RouteReport::observe(const Truth& truth) {
     if (rests_on != kNowhere && world_.are_one(rests_on, step)) continue;
     rests_on = step;
     if (!stood_on_.empty() && world_.are_one(stood_on_.back(), step)) continue;
-    if (!stood_on_.empty()) last_came_ns_ = stands_since_ns_[foot];
+    if (!stood_on_.empty()) last_came_ns_ = truth.stamp_ns;
     if (stood_on_.size() == 1) first_came_ns_ = last_came_ns_;
     stood_on_.push_back(step);
   }

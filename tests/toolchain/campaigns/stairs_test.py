@@ -26,8 +26,8 @@ def page(*summaries):
     return stairs.page_of(groups, [1, 2])
 
 
-def stopped(kind, sentence, drawn="8 steps."):
-    return run(kind, drawn=drawn, verdict="fail", goal_reached=False, stop_sentence=sentence)
+def stopped(kind, sentence, drawn="8 steps.", goal_reached=None):
+    return run(kind, drawn=drawn, verdict="fail", goal_reached=goal_reached, stop_sentence=sentence)
 
 
 class Stairs(unittest.TestCase):
@@ -50,8 +50,10 @@ class Stairs(unittest.TestCase):
         self.assertTrue(stairs.is_known_true(stopped("trap", glass, "stairs of glass, 5 steps.")))
         self.assertFalse(stairs.is_known_true(stopped("trap", "it measured a tread too short for the foot", "stairs of glass, 5 steps.")))
         self.assertFalse(stairs.is_known_true(stopped("trap", "it saw level ground and no higher tread", "a spiral overhead, 2 m above 5 steps.")))
+        self.assertTrue(stairs.is_known_true(stopped("trap", "its legs could not do the next step (0.3 m)", "a missing tread, step 2.", False)))
+        self.assertFalse(stairs.is_known_true(stopped("trap", "something stood where its feet would have gone next", "a stool of 0.3 m.", False)))
         for kind in stairs.KINDS:
-            self.assertFalse(stairs.is_known_true(stopped(kind, glass)), kind)
+            self.assertFalse(stairs.is_known_true(stopped(kind, glass, goal_reached=False)), kind)
 
     def test_a_fall_at_a_trap_is_no_true_stop(self):
         fall = {**stopped("trap", "it saw level ground and no higher tread", "a table edge, 0.5 m high."), "fell": True, "ended_by": "fall"}

@@ -95,12 +95,6 @@ double nearness_m(const View& view, const OrientedBox& box) {
   return axis.dot(box.centre.p_m) + (box.centre.R.transpose() * axis).cwiseAbs().dot(box.half_m);
 }
 
-Vec3 point_of(const WorldPlace& place, const StairWorld& world) {
-  const double top_m =
-      place.step < 0 ? 0.0 : world.steps[static_cast<std::size_t>(place.step)].top_m(place.x_m, place.y_m);
-  return {place.x_m, place.y_m, top_m};
-}
-
 }  // namespace
 
 void add_solids(std::string& out, const View& view, const StairWorld& world) {
@@ -115,6 +109,12 @@ void add_solids(std::string& out, const View& view, const StairWorld& world) {
         is_walkable ? kStairFill : "#857d70", solid->is_glass ? kGlass : (is_walkable ? 1.0 : kInTheWay), kStairLine);
     add_polygon(out, view, outline_m(view, solid->box()), style.c_str());
   }
+}
+
+Vec3 point_of(const WorldPlace& place, const StairWorld& world) {
+  const double top_m =
+      place.step < 0 ? 0.0 : world.steps[static_cast<std::size_t>(place.step)].top_m(place.x_m, place.y_m);
+  return {place.x_m, place.y_m, top_m};
 }
 
 void add_places(std::string& out, const View& view, const WorldFile& file) {
