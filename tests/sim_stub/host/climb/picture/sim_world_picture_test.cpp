@@ -44,7 +44,7 @@ TEST(WorldPicture, TurnedView_TurnsPointsAndFloorAlike) {
   std::string out;
   turned.up = 2;
   add_stairs_from_the_side(out, turned, world_of("").world, {-1.0, 3.0}, -1.0);
-  EXPECT_NE(out.find("\"-100.0,100.0 -100.0,-0.0 300.0,-0.0 300.0,100.0 \""), std::string::npos) << out;
+  EXPECT_NE(out.find("\"-100.0,100.0 -100.0,0.0 300.0,0.0 300.0,100.0 \""), std::string::npos) << out;
 }
 
 TEST(WorldPicture, Solids_TheHighestIsLastAndGlassAndThingsShowWhatIsBehind) {
