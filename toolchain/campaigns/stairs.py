@@ -2,6 +2,7 @@
 """Worlds of every kind, drawn by the seed: stairs both ways, spirals, ramps, stones, the way to them, and traps."""
 import collections
 import dataclasses
+import re
 import statistics
 
 from campaigns.climbs import grouped, number, own_noise, ratio, span, worst_climb
@@ -55,6 +56,11 @@ HAS_A_GOAL = "a missing tread"  # of these; where another one has a goal, a way 
 def drawn(summary):
     """What the seed drew, without its kind and seed: "a hole of 1 x 2 m."."""
     return (summary.get("arguments") or {}).get("drawn", "").partition(": ")[2]
+
+
+def trap_of(summary):
+    """Without its measures: "a hole"."""
+    return re.match(r"\D*?(?=( of| before)? \d|[,.]|$)", drawn(summary))[0]
 
 
 def stop_of(summary):
@@ -163,7 +169,7 @@ def endings(groups):
                 continue
             what = "fell" if s.get("fell") else stop_of(s) or f"ended by the {s.get('ended_by', 'tool')}: {s.get('reason', '')}"
             truth = "" if kind != "trap" else "true" if is_known_true(s) else "not known to be true"
-            said[(drawn(s).partition(",")[0] if kind == "trap" else "", what, truth)].append(s)
+            said[(trap_of(s) if kind == "trap" else "", what, truth)].append(s)
         for (trap, what, truth), those in sorted(said.items(), key=lambda item: -len(item[1])):
             lines.append((kind + (f": {trap}" if trap else ""), len(those), what, truth or "the way was free", f"`polygmap climb {those[0]['run']}`"))
     return rows(("kind", "runs", "how it ended", "is that so", "the first of them"), lines) if lines else "None."

@@ -55,6 +55,11 @@ class Stairs(unittest.TestCase):
         for kind in stairs.KINDS:
             self.assertFalse(stairs.is_known_true(stopped(kind, glass, goal_reached=False)), kind)
 
+    def test_a_trap_has_its_name_without_measures(self):
+        for what, name in (("a hole of 0.8 x 0.9 m in a floor.", "a hole"), ("a table edge, 0.5 m high.", "a table edge"), ("stairs of glass, 5 steps.", "stairs of glass"),
+                           ("a pane of glass before 5 steps of 0.1 m.", "a pane of glass"), ("a missing tread, step 2 of 5.", "a missing tread")):
+            self.assertEqual(stairs.trap_of(run("trap", drawn=what)), name)
+
     def test_a_fall_at_a_trap_is_no_true_stop(self):
         fall = {**stopped("trap", "it saw level ground and no higher tread", "a table edge, 0.5 m high."), "fell": True, "ended_by": "fall"}
         self.assertFalse(stairs.is_known_true(fall))
