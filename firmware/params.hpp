@@ -9,6 +9,7 @@
 #include "algorithms/perception/extrinsics/camera_extrinsics.hpp"
 #include "algorithms/perception/image/picture_monitor.hpp"
 #include "algorithms/perception/map/polygon_map.hpp"
+#include "algorithms/perception/map/way_scale.hpp"
 #include "algorithms/perception/surface_extractor.hpp"
 #include "algorithms/robot/robot_model.hpp"
 #include "firmware/hand_over.hpp"
@@ -25,6 +26,7 @@ struct Params {
   PictureMonitor::Params pictures;
   CameraExtrinsicsEstimator::Params mount;
   PolygonMap::Params map;
+  WayScale::Params way;
   FootholdSearch::Params footholds;
   Gait::Params gait;
   bool estimate_mount = true;
@@ -45,6 +47,7 @@ struct Params {
     field("pictures", p.pictures);
     field("mount", p.mount);
     field("map", p.map);
+    field("way", p.way);
     field("footholds", p.footholds);
     field("gait", p.gait);
     field("estimate_mount", p.estimate_mount, "The mount is estimated, starting from the data sheet.");

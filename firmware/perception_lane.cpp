@@ -12,9 +12,9 @@ constexpr std::int64_t kPoseTimeout_ns = 20 * kNsPerMs;     // control answers w
 // In instructions, by what they copy and go through.
 constexpr std::int32_t kLearnMount = 2500, kLearnPerSurface = 60;
 constexpr std::int32_t kJudgePicture = PictureMonitor::kInstructions;
-constexpr std::int32_t kBeginMap = 16'000, kMapPerSurface = 60;
-constexpr double kStands = 0.9;  // probability
+constexpr std::int32_t kBeginMap = 16'000, kMapPerSurface = 60, kWayPerSurface = 400;
 constexpr std::int32_t kBeginSearch = 16'000, kSearchPerPolygon = 20;
+constexpr double kStands = 0.9;  // probability of a contact
 
 }  // namespace
 
@@ -28,6 +28,7 @@ PerceptionLane::PerceptionLane(hal::DepthCamera& camera, ControlPerceptionLink& 
       extractor_(params.surfaces),
       pictures_(params.pictures),
       mount_(params.mount, params.robot.mounts.base_T_camera),
+      learning_{{}, {}, 0, WayScale{params.way}},
       map_(params.map),
       search_(params.footholds, params.robot.sole) {}
 
@@ -115,7 +116,7 @@ Progress PerceptionLane::surfaces(std::int64_t now_ns, WorkBudget& budget) noexc
   if (params_.estimate_mount && !learn_some(budget)) return Progress::kBusy;
   const auto count = static_cast<std::int32_t>(extractor_.result().surfaces.size());
   finish_picture(now_ns);
-  budget.spend(units_of(kJudgePicture + kBeginMap + count * kMapPerSurface));
+  budget.spend(units_of(kJudgePicture + kBeginMap + count * (kMapPerSurface + kWayPerSurface)));
   return Progress::kDone;
 }
 
@@ -199,6 +200,9 @@ void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
   }
   view.sole = params_.robot.sole.contact;
   map_.begin(extractor_.result(), view);
+  // On the stairs alone: before them the mount is still being found, and treads seem to move with it.
+  if (params_.estimate_mount && link_.search_context.front().climbing)
+    learning_.way.update(extractor_.result(), view.odom_T_camera, exposure_state_.odom_T_base.p_m);
   pending_.mapping = true;
   const PolygonMap::Counters& counters = map_.counters();
   const std::uint32_t lost = counters.abandoned_frames + counters.stale_frames + counters.rejected_frames;
@@ -226,6 +230,7 @@ void PerceptionLane::begin_search() noexcept {
   query.stance = context.stance;
   query.climbing = context.climbing;
   query.feet_ahead_m = mount_.feet_ahead_m();
+  query.way_excess = learning_.way.excess();
   search_.begin(map_.snapshot(), query);
   pending_.search_due = false;
   pending_.searching = true;

@@ -71,10 +71,11 @@ class PerceptionLane {
   SurfaceExtractor extractor_;
   PictureMonitor pictures_;
   CameraExtrinsicsEstimator mount_;
-  struct {  // what the picture says of the mount
+  struct {  // what the picture says of the mount, and all of them of the legs
     CameraExtrinsicsEstimator::Stance stance;
     ToeDetector toe;
     std::size_t foot = 0;  // whose toe it is
+    WayScale way;
   } learning_;
   PolygonMap map_;
   FootholdSearch search_;

@@ -12,18 +12,20 @@ bool valid(const FootholdSearch::Query& q) noexcept {
   const auto finite = [](const Transform& t) { return math::all_finite(t.R) && math::all_finite(t.p_m); };
   return finite(q.odom_T_base) && finite(q.odom_T_sole[0]) && finite(q.odom_T_sole[1]) &&
          q.odom_T_base.p_m.cwiseAbs().maxCoeff() < 1e6 && std::isfinite(q.feet_ahead_m[0]) &&
-         std::isfinite(q.feet_ahead_m[1]);
+         std::isfinite(q.feet_ahead_m[1]) && std::isfinite(q.way_excess);
 }
 
-// From the map's frame to odometry, where a foot is told to go.
-FootholdSet moved(FootholdSet set, const Vec3& by_m, const std::array<double, kFootCount>& feet_ahead_m) noexcept {
+// From the map's frame, in which the base is given, to odometry, where a foot is told to go.
+FootholdSet moved(FootholdSet set, const Vec3& by_m, const FootholdSearch::Query& query, const PlanFrame& base,
+                  double seen_behind_m) noexcept {
   for (Vec3* p : {&set.p_star.position_m, &set.tread.nosing_a_m, &set.tread.nosing_b_m}) {
     *p += by_m;
   }
   set.ground.corner_m += by_m.head<2>();
   for (std::size_t f = 0; f < kFootCount; ++f) {
     for (Foothold* foot : {&set.p_star_feet[f], &set.p_star_star_feet[f]}) {
-      foot->position_m += by_m - feet_ahead_m[f] * rotation_z(foot->yaw_rad).col(0);
+      const double way_m = base(foot->position_m.head<2>()).x() + seen_behind_m;
+      foot->position_m += by_m - (query.feet_ahead_m[f] + query.way_excess * way_m) * rotation_z(foot->yaw_rad).col(0);
     }
   }
   return set;
@@ -632,7 +634,7 @@ void FootholdSearch::finish() noexcept {
         judge_tread(levels_[found_.next_next], levels_[found_.next].height_m, pending_.p_star.position_m.head<2>(),
                     params_.step_max_m, pending_.p_star_star_feet) == StopReason::kNone;
   }
-  result_ = moved(pending_, map_.drift_m, query_.feet_ahead_m);
+  result_ = moved(pending_, map_.drift_m, query_, base_, params_.feet.seen_behind_m);
   ++counters_.searches;
 }
 

@@ -46,6 +46,7 @@ class FootholdSearch {
     double heel_inset_max_m = 0.030;
     double nosing_round_m = 0.0015;
     double evade_max_m = 0.06;
+    double seen_behind_m = 0.2;
     std::int32_t spacings = 7;
 
     static void visit(auto& p, auto& field) {
@@ -62,6 +63,8 @@ class FootholdSearch {
       field("nosing_round_m", p.nosing_round_m, 0.0, 0.05,
             "A nosing is rounded, by wear or as it was built: the tread carries a heel from so far behind it on.");
       field("evade_max_m", p.evade_max_m, 0.0, 0.3, "Feet go no farther sideways to stand beside an obstacle.");
+      field("seen_behind_m", p.seen_behind_m, 0.0, 2.0,
+            "A tread is where it was seen from this much farther behind, on the mean of the map's sightings.");
       field("spacings", p.spacings, 2, 14,
             "As many distances between the feet are tried, from half_spacing_m to half_spacing_min_m.");
     }
@@ -144,6 +147,7 @@ class FootholdSearch {
     bool climbing = false;      // a tread has been climbed already
     // By how much each foot stands ahead of where it is told to: its footholds are told as much farther back.
     std::array<double, kFootCount> feet_ahead_m{};
+    double way_excess = 0.0;  // 0.01: base and feet go 1 % farther than told, so footholds are told nearer
   };
   struct Counters {
     std::uint32_t searches = 0;

@@ -423,6 +423,31 @@ TEST_F(FootholdSearchTest, FootThatStandsAheadOfWhereItIsTold_IsToldFartherBackO
   }
 }
 
+TEST_F(FootholdSearchTest, RobotThatGoesFartherThanItsLegsSay_IsToldNearerByAShareOfTheWay) {
+  Stairs s;
+  s.yaw_rad = 0.3;
+  MapSnapshot map = ideal_map(s);
+  map.drift_m = {0.4, 0.3, 0.1};
+  FootholdSearch::Query query = standing(s, 0);
+  query.odom_T_base.p_m += map.drift_m;
+  for (Transform& sole : query.odom_T_sole) sole.p_m += map.drift_m;
+  const FootholdSet without = search(map, query);
+  query.way_excess = 0.01;
+  const FootholdSet& with = search(map, query);
+  ASSERT_TRUE(with.has_p_star_star);
+  const Vec3 heading = rotation_z(s.yaw_rad).col(0);
+  for (std::size_t foot = 0; foot < kFootCount; ++foot) {
+    for (const auto feet : {&FootholdSet::p_star_feet, &FootholdSet::p_star_star_feet}) {
+      const Foothold &told = (with.*feet)[foot], &before = (without.*feet)[foot];
+      const double way_m =
+          heading.dot(before.position_m - query.odom_T_base.p_m) + FootholdSearch::Params{}.feet.seen_behind_m;
+      EXPECT_GT(way_m, 0.3);
+      EXPECT_LT((told.position_m - before.position_m + 0.01 * way_m * heading).norm(), 1e-9);
+      EXPECT_EQ(told.nosing_distance_m, before.nosing_distance_m);
+    }
+  }
+}
+
 TEST_F(FootholdSearchTest, CubeAtTheOuterSideOfAFoot_BothMoveAwayFromIt) {
   const Stairs s;
   MapSnapshot map = ideal_map(s);
