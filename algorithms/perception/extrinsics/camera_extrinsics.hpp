@@ -23,7 +23,7 @@ class CameraExtrinsicsEstimator {
     double tilt_sigma_rad = 0.0175;
     double height_sigma_m = 0.005;
     double x_sigma_m = 0.003;
-    double toe_sigma_m = 0.002;
+    double toe_sigma_m = 0.003;
     double legs_apart_sigma_m = 0.0025;  // 2 mrad of each encoder at hips and knees, 0.8 and 0.4 m above the sole
 
     static void visit(auto& p, auto& field) {
