@@ -14,8 +14,8 @@ constexpr double kSameAlong_m = 0.08, kSameUp_m = 0.05;  // less than between an
 }  // namespace
 
 double WayScale::excess() const noexcept {
-  const double most = 3.0 * params_.prior_sigma;
-  return math::clamp(weighted_ / (information_ + 1.0 / math::square(params_.prior_sigma)), -most, most);
+  const double most = 3.0 * params_.legs_share;
+  return math::clamp(weighted_ / (information_ + 1.0 / math::square(params_.legs_share)), -most, most);
 }
 
 void WayScale::update(const SurfaceFrame& frame, const Transform& odom_T_camera, const Vec3& odom_p_base_m) noexcept {

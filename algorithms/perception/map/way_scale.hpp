@@ -15,14 +15,14 @@ namespace polygmap {
 class WayScale {
  public:
   struct Params {
-    double prior_sigma = 0.005;
+    double legs_share = 0.005;
     double along_sigma_m = 0.005;
     double up_sigma_m = 0.002;
     double alike_m = 0.2;
     double nearest_m = 0.25, farthest_m = 1.2;
 
     static void visit(auto& p, auto& field) {
-      field("prior_sigma", p.prior_sigma, 1e-6, 0.1, "Length of both legs by the data sheet, relative.");
+      field("legs_share", p.legs_share, 1e-6, 0.1, "Length of both legs by the data sheet, relative.");
       field("along_sigma_m", p.along_sigma_m, 1e-4, 0.1, "Place of a nosing ahead that one frame sees.");
       field("up_sigma_m", p.up_sigma_m, 1e-4, 0.1, "Height of a tread that one frame sees.");
       field("alike_m", p.alike_m, 0.001, 10.0, "Frames on as much of the way err alike.");

@@ -67,7 +67,7 @@ class Climb {
 // Of whom nothing is known before, so that the treads alone speak.
 WayScale without_prior() {
   WayScale::Params params;
-  params.prior_sigma = 0.1;
+  params.legs_share = 0.1;
   return WayScale{params};
 }
 
@@ -114,7 +114,7 @@ TEST(WayScale, RobotThatStands_LearnsNothing) {
 TEST(WayScale, MoreThanLegsCanBeOff_IsBounded) {
   WayScale way;
   Climb(0.1).go(way, 5.0);
-  EXPECT_DOUBLE_EQ(way.excess(), 3.0 * WayScale::Params{}.prior_sigma);
+  EXPECT_DOUBLE_EQ(way.excess(), 3.0 * WayScale::Params{}.legs_share);
 }
 
 TEST(WayScale, NotANumber_IsNotTaken) {
