@@ -316,6 +316,7 @@ Progress ControlLane::gait(std::int64_t now_ns) noexcept {
   const bool stands = step.touch_down_stamp_ns != 0 || step.sequence == 0;
   context.stance = stands ? step.foot : other(step.foot);
   context.climbing = status.step.onto_tread;  // a step on the floor behind stairs ends it
+  context.goes_to = gait_.goes_to();
   link_.search_context.publish(now_ns);
   return Progress::kDone;
 }

@@ -102,6 +102,7 @@ struct SearchContext {
   StateEstimate state;
   Foot stance = Foot::kLeft;  // the foot that stays
   bool climbing = false;      // has stepped onto a tread
+  bool goes_to = false;       // a place, on the ground that the map shows
 };
 
 // The pair of control and perception.

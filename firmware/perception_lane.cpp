@@ -199,6 +199,7 @@ void PerceptionLane::begin_map(std::int64_t now_ns) noexcept {
     view.stands[foot] = exposure_state_.contact_probability[foot] > kStands;
   }
   view.sole = params_.robot.sole.contact;
+  view.tell_ground = link_.search_context.front().goes_to;
   map_.begin(extractor_.result(), view);
   // On the stairs alone: before them the mount is still being found, and treads seem to move with it.
   if (params_.estimate_mount && link_.search_context.front().climbing)

@@ -22,6 +22,7 @@ FootholdSet moved(FootholdSet set, const Vec3& by_m, const FootholdSearch::Query
     *p += by_m;
   }
   set.ground.corner_m += by_m.head<2>();
+  set.ground.height_m += by_m.z();
   for (std::size_t f = 0; f < kFootCount; ++f) {
     for (Foothold* foot : {&set.p_star_feet[f], &set.p_star_star_feet[f]}) {
       const double way_m = base(foot->position_m.head<2>()).x() + seen_behind_m;

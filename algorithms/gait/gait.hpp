@@ -47,6 +47,7 @@ class Gait {
   // Goes there, or where it cannot stops; from the first tick on in which it knows where it stands. From the thread of
   // tick().
   void go_to(const Destination& destination) noexcept { destination_ = destination; }
+  [[nodiscard]] bool goes_to() const noexcept { return destination_.has_value() || planner_.has_goal(); }
   // Up the stairs that it sees, until they end.
   void climb() noexcept {
     destination_.reset();

@@ -99,6 +99,9 @@ class Bench {
     seen.odom_T_camera = scene_.world_T_camera;
     seen.intrinsics = k;
     seen.body = scene_.legs;
+    seen.columns = &extractor_->segmenter().image().columns;
+    seen.stands = {true, true};
+    seen.sole = SoleModel{}.contact;
     map_->begin(extractor_->result(), seen);
     run_marked([&](WorkBudget& b) { return map_->step(b); },
                [&] { return kMap + static_cast<std::int64_t>(map_->stage()); });

@@ -19,6 +19,7 @@ void extract(Workbench& bench) {
 
 void fuse(Workbench& bench) {
   bench.surfaces.stamp_ns = bench.now_ns += kFramePeriod_ns;
+  bench.scene.map_view.columns = &bench.extractor->segmenter().image().columns;
   bench.map->begin(bench.surfaces, bench.scene.map_view);
   WorkBudget whole_frame(1 << 20);
   static_cast<void>(bench.map->step(whole_frame));

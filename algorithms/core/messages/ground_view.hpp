@@ -16,6 +16,7 @@ struct GroundView {
   using Rows = std::array<std::uint64_t, kSide_cells>;  // bit x of row y
 
   Vec2 corner_m = Vec2::Zero();  // where x and y of cell (0, 0) begin
+  double height_m = 0.0;         // of the standing soles, as they stood for it
   Rows level{};                  // ground at the height of the standing soles was seen there, or a sole has stood there
   Rows tall{};                   // something rises there
 

@@ -132,6 +132,7 @@ class ClimbPlanner {
   void restart() noexcept;
   // From now on; none: up the stairs that it sees.
   void set_goal(const std::optional<WalkGoal>& goal) noexcept { goal_ = goal; }
+  [[nodiscard]] bool has_goal() const noexcept { return goal_.has_value(); }
   // A swing was latched: its goal is what the next decisions build on.
   void latched(const Situation& situation, const Decision& decision) noexcept;
   // The legs cannot do the step: the next ones on the floor are shorter. False when they are short already.

@@ -66,6 +66,8 @@ LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, c
   const auto [to, turns_first] = aim(middle, goal);
   const auto is_there = [&, &at = to](Foot foot) { return this->is_there(soles[index_of(foot)], foot, at); };
   LevelStep step;
+  // Of before the last step, from another level.
+  if (!(std::abs(ground.height_m - middle.position_m.z()) < params_.level_m)) return step;
   if (is_there(Foot::kLeft) && is_there(Foot::kRight)) {
     step.outcome = LevelStep::Outcome::kArrived;
     return step;

@@ -19,16 +19,19 @@ struct LevelWalkParams {
   double turn_first_rad = 0.5;
   double within_m = 0.03;
   double within_rad = 0.06;
-  double sole_margin_m = 0.02;
+  double sole_margin_m = 0.045;
   double body_m = 0.30;
+  double level_m = 0.03;
 
   static void visit(auto& p, auto& field) {
     field("near_m", p.near_m, 0.0, 2.0, "As near to the goal it no longer turns towards it, but as it is to stand.");
     field("turn_first_rad", p.turn_first_rad, 0.05, 3.2, "It turns in place towards a goal that lies farther round.");
     field("within_m", p.within_m, 0.005, 0.2, "A foot is at the goal within this, along and across.");
     field("within_rad", p.within_rad, 0.01, 0.5, "A foot is at the goal within this turn.");
-    field("sole_margin_m", p.sole_margin_m, 0.0, 0.2, "Ground was seen as far beyond a sole on all sides.");
+    field("sole_margin_m", p.sole_margin_m, 0.0, 0.2,
+          "Ground was seen as far beyond a sole on all sides: a square of 40 mm may be half over an edge.");
     field("body_m", p.body_m, 0.0, 1.0, "What rises as near to the middle between the feet comes no nearer by a step.");
+    field("level_m", p.level_m, 0.005, 0.1, "What was seen from soles at another height than this says nothing.");
   }
 };
 

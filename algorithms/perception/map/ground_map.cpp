@@ -8,7 +8,7 @@
 namespace polygmap {
 namespace {
 
-constexpr int kClosings = 6;
+constexpr int kClosings = 4;
 
 [[nodiscard]] std::int32_t cell_of(double along_m) noexcept {
   return static_cast<std::int32_t>(std::floor(along_m / GroundView::kCell_m));
@@ -53,62 +53,57 @@ void GroundMap::stand_on(std::size_t foot, double grown_m, std::int32_t count) n
 
 void GroundMap::begin(const View& view) noexcept {
   view_ = view;
-  work_.add(300);
+  work_.add(500);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) soles_[foot] = PlanFrame(view.map_T_sole[foot]);
   double lowest_m = std::min(view.map_T_sole[0].p_m.z(), view.map_T_sole[1].p_m.z());
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     if (view.stands[foot] && !view.stands[1 - foot]) lowest_m = view.map_T_sole[foot].p_m.z();
   }
   height_mm_ = mm_of(lowest_m);
+  const Vec2 middle_m = 0.5 * (view_.map_T_sole[0].p_m + view_.map_T_sole[1].p_m).head<2>();
+  first_x_ = cell_of(middle_m.x()) - GroundView::kSide_cells / 2;
+  first_y_ = cell_of(middle_m.y()) - GroundView::kSide_cells / 2;
   const bool begins = !std::exchange(has_begun_, true);
+  own_.fill(0);
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     if (begins) stand_on(foot, params_.start_m, params_.sightings);
+    each_cell_under(foot, params_.own_m, [&](std::int32_t x, std::int32_t y) { set(own_, x, y); });
+    work_.add(7000);
   }
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     if (view.stands[foot]) stand_on(foot, 0.0, kMostCount);
   }
-  row_ = static_cast<std::int32_t>(view.sequence * 13U % kRowStep);
+  row_ = kColumn_px + static_cast<std::int32_t>(view.number * 13U % kRowStep);
 }
 
 // Beside the robot's own legs, and where a picture has no depth, some of a column's pixels are of something else.
 bool GroundMap::is_at_a_gap(std::int32_t column) const noexcept {
-  const ColumnImage& image = *view_.columns;
-  const auto is_empty = [&](std::int32_t g, std::int32_t row) {
-    return g >= 0 && g < view_.intrinsics.width_px / kColumn_px && row >= 0 && row < view_.intrinsics.height_px &&
-           image.valid(g, row) < kColumn_px;
-  };
-  return is_empty(column, row_) || is_empty(column - 1, row_) || is_empty(column + 1, row_) ||
-         is_empty(column, row_ - kColumn_px) || is_empty(column, row_ + kColumn_px);
-}
-
-// A foot is where the legs say within some centimetres, and so is the shin above it.
-bool GroundMap::is_at_own_foot(const Vec2& map_p_m) const noexcept {
-  return std::ranges::any_of(soles_, [&](const PlanFrame& sole) {
-    const Vec2 p_m = sole(map_p_m);
-    return p_m.x() < view_.sole.toe_x_m + params_.own_m && p_m.x() > view_.sole.heel_x_m - params_.own_m &&
-           std::abs(p_m.y()) < view_.sole.half_width_m + params_.own_m;
-  });
+  constexpr std::uint8_t kMost_px = 6, kSome_px = 2;  // of a column's eight
+  const auto& valid = view_.columns->valid;
+  return valid(column, row_) < kMost_px || valid(column - 1, row_) < kSome_px || valid(column + 1, row_) < kSome_px ||
+         valid(column, row_ - kColumn_px) < kSome_px || valid(column, row_ + kColumn_px) < kSome_px;
 }
 
 bool GroundMap::look() noexcept {
   const CameraIntrinsics& c = view_.intrinsics;
-  work_.add(60);
-  if (view_.columns == nullptr || row_ >= c.height_px) {
+  work_.add(100);
+  if (view_.columns == nullptr || row_ + kColumn_px >= c.height_px) {
     row_ = 0;
     return true;
   }
   const std::int32_t columns = c.width_px / kColumn_px;
-  const auto first = static_cast<std::int32_t>(view_.sequence % kColumnStep);
+  const auto first = 1 + static_cast<std::int32_t>(view_.number / 2 % kColumnStep);
   const Mat3& R = view_.map_T_camera.R;
   const Vec3 row_ray = R.col(1) * ((row_ - c.cy_px) / c.fy_px) + R.col(2);
-  for (std::int32_t g = first; g < columns; g += kColumnStep) {
-    work_.add(16);
-    const float inverse_depth = view_.columns->inverse_depth(g, row_);
-    if (!(inverse_depth * static_cast<float>(params_.range_m) > 1.0F) || is_at_a_gap(g)) continue;
-    work_.add(130);
+  const float nearest = 1.0F / static_cast<float>(params_.range_m);
+  const float* inverse_depths = view_.columns->inverse_depth.row(row_);
+  for (std::int32_t g = first; g + 1 < columns; g += kColumnStep) {
+    work_.add(12);
+    const float inverse_depth = inverse_depths[g];
+    if (!(inverse_depth > nearest) || is_at_a_gap(g)) continue;
+    work_.add(70);
     const double x = (kColumn_px * g + 0.5 * (kColumn_px - 1) - c.cx_px) / c.fx_px;
-    const Vec3 map_p_m = view_.map_T_camera.p_m + (row_ray + x * R.col(0)) / static_cast<double>(inverse_depth);
-    if (!is_at_own_foot(map_p_m.head<2>())) see(map_p_m);
+    see(view_.map_T_camera.p_m + (row_ray + x * R.col(0)) / static_cast<double>(inverse_depth));
   }
   row_ += kRowStep;
   return false;
@@ -117,6 +112,8 @@ bool GroundMap::look() noexcept {
 void GroundMap::see(const Vec3& map_p_m) noexcept {
   const std::int32_t x = cell_of(map_p_m.x()), y = cell_of(map_p_m.y());
   if (std::abs(x) > 30'000 || std::abs(y) > 30'000) return;
+  // A foot is where the legs say within some centimetres, and so is the shin above it.
+  if (GroundView::has(own_, x - first_x_, y - first_y_)) return;
   const std::int32_t seen_mm = mm_of(map_p_m.z());
   Cell& cell = at(x, y);
   if (!knows(cell, x, y)) {
@@ -137,35 +134,37 @@ void GroundMap::see(const Vec3& map_p_m) noexcept {
 }
 
 bool GroundMap::tell(GroundView& out) noexcept {
-  const Vec2 middle_m = 0.5 * (view_.map_T_sole[0].p_m + view_.map_T_sole[1].p_m).head<2>();
-  const std::int32_t first_x = cell_of(middle_m.x()) - GroundView::kSide_cells / 2;
-  const std::int32_t first_y = cell_of(middle_m.y()) - GroundView::kSide_cells / 2;
   if (row_ < GroundView::kSide_cells) {
-    out.corner_m = Vec2{first_x, first_y} * GroundView::kCell_m;
-    tell_row(first_x, first_y, out);
+    out.corner_m = Vec2{first_x_, first_y_} * GroundView::kCell_m;
+    out.height_m = 1e-3 * height_mm_;
+    tell_row(out);
     ++row_;
     return false;
   }
   for (std::size_t foot = 0; foot < kFootCount; ++foot) {
     if (!view_.stands[foot] || std::abs(mm_of(view_.map_T_sole[foot].p_m.z()) - height_mm_) > mm_of(params_.level_m))
       continue;
-    work_.add(10000);
+    work_.add(7000);
     each_cell_under(foot, params_.beside_m, [&](std::int32_t x, std::int32_t y) {
-      const std::uint64_t bit = std::uint64_t{1} << static_cast<std::uint32_t>(x - first_x);
-      const auto row = static_cast<std::size_t>(y - first_y);
-      if ((other_[row] & bit) == 0) out.level[row] |= bit;
+      if (!GroundView::has(other_, x - first_x_, y - first_y_)) set(out.level, x, y);
     });
   }
   for (int pass = 0; pass < kClosings; ++pass) close(out.level);
   return true;
 }
 
-void GroundMap::tell_row(std::int32_t first_x, std::int32_t first_y, GroundView& out) noexcept {
+void GroundMap::set(GroundView::Rows& rows, std::int32_t x, std::int32_t y) const noexcept {
+  const std::int32_t column = x - first_x_, row = y - first_y_;
+  if (column < 0 || row < 0 || column >= GroundView::kSide_cells || row >= GroundView::kSide_cells) return;
+  rows[static_cast<std::size_t>(row)] |= std::uint64_t{1} << static_cast<std::uint32_t>(column);
+}
+
+void GroundMap::tell_row(GroundView& out) noexcept {
   std::uint64_t level = 0, tall = 0, other = 0;
   work_.add(GroundView::kSide_cells, 12);
   for (std::int32_t i = 0; i < GroundView::kSide_cells; ++i) {
-    const Cell& cell = at(first_x + i, first_y + row_);
-    if (!knows(cell, first_x + i, first_y + row_) || cell.count < params_.sightings) continue;
+    const Cell& cell = at(first_x_ + i, first_y_ + row_);
+    if (!knows(cell, first_x_ + i, first_y_ + row_) || cell.count < params_.sightings) continue;
     const std::int32_t above_mm = cell.height_mm - height_mm_;
     const std::uint64_t bit = std::uint64_t{1} << static_cast<std::uint32_t>(i);
     (std::abs(above_mm) <= mm_of(params_.level_m) ? level : other) |= bit;

@@ -44,7 +44,7 @@ class GroundMap {
     Transform map_T_camera;  // at the exposure
     CameraIntrinsics intrinsics;
     const ColumnImage* columns = nullptr;  // the picture; none: nothing is seen
-    std::uint32_t sequence = 0;            // pictures of different numbers are looked at in different pixels
+    std::uint32_t number = 0;              // pictures of different numbers are looked at in different pixels
     std::array<Transform, kFootCount> map_T_sole{};
     std::array<bool, kFootCount> stands{};
     SoleRectangle sole{};
@@ -56,7 +56,7 @@ class GroundMap {
     has_begun_ = false;
   }
 
-  // One frame: begin, look until it is true, tell until it is true.
+  // One frame: begin, look until it is true, and, where it is to be told, tell until it is true.
   void begin(const View& view) noexcept;
   [[nodiscard]] bool look() noexcept;
   [[nodiscard]] bool tell(GroundView& out) noexcept;
@@ -64,7 +64,7 @@ class GroundMap {
 
  private:
   static constexpr std::int32_t kSide_cells = 128;  // of the square of cells, which repeats
-  static constexpr std::int32_t kRowStep = 32, kColumnStep = 2;
+  static constexpr std::int32_t kRowStep = 96, kColumnStep = 2;
   static constexpr std::uint8_t kMostCount = 7;
   struct Cell {
     std::int16_t x = 0, y = 0;
@@ -79,10 +79,11 @@ class GroundMap {
   [[nodiscard]] bool knows(const Cell& cell, std::int32_t x, std::int32_t y) const noexcept {
     return cell.x == x && cell.y == y && cell.count > 0;
   }
-  [[nodiscard]] bool is_at_own_foot(const Vec2& map_p_m) const noexcept;
   [[nodiscard]] bool is_at_a_gap(std::int32_t column) const noexcept;
   void see(const Vec3& map_p_m) noexcept;
-  void tell_row(std::int32_t first_x, std::int32_t first_y, GroundView& out) noexcept;
+  void tell_row(GroundView& out) noexcept;
+  // Of a cell; what is outside the view is left out.
+  void set(GroundView::Rows& rows, std::int32_t x, std::int32_t y) const noexcept;
   void close(GroundView::Rows& level) noexcept;
   void stand_on(std::size_t foot, double grown_m, std::int32_t count) noexcept;
   // visit(x, y) for the cells whose middles are within the sole, grown by so much on all sides.
@@ -94,7 +95,9 @@ class GroundMap {
   std::int32_t row_ = 0;        // of the picture, then of what is told
   std::int32_t height_mm_ = 0;  // of the standing soles
   std::array<Cell, static_cast<std::size_t>(kSide_cells) * kSide_cells> cells_{};
-  GroundView::Rows other_{};  // of what is told: ground of another height was seen there
+  std::int32_t first_x_ = 0, first_y_ = 0;  // cell (0, 0) of the view
+  GroundView::Rows own_{};                  // at and beside the robot's own feet, wherever they are
+  GroundView::Rows other_{};                // of what is told: ground of another height was seen there
   bool has_begun_ = false;
   WorkCount work_;
 };

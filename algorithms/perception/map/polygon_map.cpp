@@ -177,7 +177,7 @@ void PolygonMap::do_piece() noexcept {
       if (pass_.thing >= things_.count()) begin_ground();
       break;
     case Stage::kGround:
-      if (ground_.look()) stage_ = Stage::kTellGround;
+      if (ground_.look()) stage_ = view_.tell_ground ? Stage::kTellGround : Stage::kPublish;
       break;
     case Stage::kTellGround:
       if (ground_.tell(snapshot_.ground)) stage_ = Stage::kPublish;
@@ -198,7 +198,7 @@ void PolygonMap::begin_things() noexcept {
 }
 
 void PolygonMap::begin_ground() noexcept {
-  GroundMap::View view{map_T_camera_,     view_.intrinsics, view_.columns, frame_.sequence,
+  GroundMap::View view{map_T_camera_,     view_.intrinsics, view_.columns, counters_.frames,
                        view_.odom_T_sole, view_.stands,     view_.sole};
   for (Transform& sole : view.map_T_sole) sole.p_m -= view_.odom_T_camera.p_m - map_T_camera_.p_m;
   ground_.begin(view);

@@ -211,6 +211,7 @@ class PolygonMap {
     std::array<Transform, kFootCount> odom_T_sole{};
     std::array<bool, kFootCount> stands{};
     SoleRectangle sole{};
+    bool tell_ground = false;  // somebody walks on it
   };
   struct Counters {
     std::uint32_t frames = 0;

@@ -25,12 +25,13 @@ void WayScale::update(const SurfaceFrame& frame, const Transform& odom_T_camera,
   begun_ = true;
   last_base_m_ = odom_p_base_m;
   if (!(way_m > 0.0)) return;  // a robot that stands learns nothing
+  const Vec2 looks = odom_T_camera.R.col(0).head<2>().normalized();
   for (const SurfacePatch& patch : frame.surfaces) {
     if (patch.kind != SurfaceKind::kTread || !patch.nosing.valid) continue;
     EdgeLine nosing = patch.nosing;
     nosing.a_m = odom_T_camera * nosing.a_m;
     nosing.b_m = odom_T_camera * nosing.b_m;
-    if (math::all_finite(nosing.a_m) && math::all_finite(nosing.b_m)) add(nosing, odom_p_base_m, way_m);
+    if (math::all_finite(nosing.a_m) && math::all_finite(nosing.b_m)) add(nosing, looks, odom_p_base_m, way_m);
   }
 }
 
@@ -45,11 +46,12 @@ Vec2 WayScale::place_m(const Tread& tread, const EdgeLine& odom_nosing, const Ve
           odom_nosing.a_m.z() + share * (odom_nosing.b_m.z() - odom_nosing.a_m.z())};
 }
 
-void WayScale::add(const EdgeLine& odom_nosing, const Vec3& odom_p_base_m, double way_m) noexcept {
+void WayScale::add(const EdgeLine& odom_nosing, const Vec2& looks, const Vec3& odom_p_base_m, double way_m) noexcept {
   const std::optional<Line2> line = line_through(odom_nosing.a_m.head<2>(), odom_nosing.b_m.head<2>());
   if (!line) return;
   Tread fresh;
   fresh.ahead = left_of(line->direction);
+  fresh.looked = looks;
   double ahead_m = fresh.ahead.dot(line->point_m - odom_p_base_m.head<2>());
   if (ahead_m < 0.0) fresh.ahead = -fresh.ahead;
   ahead_m = std::abs(ahead_m);
@@ -68,6 +70,7 @@ void WayScale::add(const EdgeLine& odom_nosing, const Vec3& odom_p_base_m, doubl
     *tread = fresh;
   }
   tread->last_m = place_m(*tread, odom_nosing, odom_p_base_m);
+  if (!(std::abs(cross(tread->looked, looks)) <= params_.turned_rad)) return;
   const Vec2 base_m{tread->ahead.dot(odom_p_base_m.head<2>()), odom_p_base_m.z()};
   const Vec2 base_off_m = base_m - tread->mean_base_m, nosing_off_m = tread->last_m - tread->mean_nosing_m;
   const double share = way_m / (tread->way_m + way_m);

@@ -19,6 +19,7 @@ class WayScale {
     double along_sigma_m = 0.005;
     double up_sigma_m = 0.002;
     double alike_m = 0.2;
+    double turned_rad = 0.03;
     double nearest_m = 0.25, farthest_m = 1.2;
 
     static void visit(auto& p, auto& field) {
@@ -26,6 +27,9 @@ class WayScale {
       field("along_sigma_m", p.along_sigma_m, 1e-4, 0.1, "Place of a nosing ahead that one frame sees.");
       field("up_sigma_m", p.up_sigma_m, 1e-4, 0.1, "Height of a tread that one frame sees.");
       field("alike_m", p.alike_m, 0.001, 10.0, "Frames on as much of the way err alike.");
+      field("turned_rad", p.turned_rad, 0.001, 0.5,
+            "A nosing counts while the camera looks the way it did at first: by a turn, what the mount's yaw is off "
+            "would move it.");
       field("nearest_m", p.nearest_m, 0.0, 5.0, "A nosing counts from this far ahead of the base.");
       field("farthest_m", p.farthest_m, 0.0, 5.0, "A nosing counts up to this far ahead of the base.");
       field.ordered("nearest_m", "farthest_m");
@@ -44,15 +48,16 @@ class WayScale {
  private:
   // Places are along the nosing's normal in plan, and up.
   struct Tread {
-    Vec2 ahead = Vec2::UnitX();  // that normal, away from the robot, as first seen
-    Vec2 last_m = Vec2::Zero();  // where the nosing was seen last
-    double way_m = 0.0;          // that the means below are made of
+    Vec2 ahead = Vec2::UnitX();   // that normal, away from the robot, as first seen
+    Vec2 looked = Vec2::UnitX();  // the way of the camera's x axis then, in plan
+    Vec2 last_m = Vec2::Zero();   // where the nosing was seen last
+    double way_m = 0.0;           // that the means below are made of
     Vec2 mean_base_m = Vec2::Zero();
     Vec2 mean_nosing_m = Vec2::Zero();
   };
   static constexpr std::size_t kTreads = 8;  // in range at once are no more than five
 
-  void add(const EdgeLine& odom_nosing, const Vec3& odom_p_base_m, double way_m) noexcept;
+  void add(const EdgeLine& odom_nosing, const Vec2& looks, const Vec3& odom_p_base_m, double way_m) noexcept;
   // Where the nosing crosses the base's way along the tread's normal.
   [[nodiscard]] static Vec2 place_m(const Tread& tread, const EdgeLine& odom_nosing,
                                     const Vec3& odom_p_base_m) noexcept;

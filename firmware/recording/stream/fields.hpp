@@ -237,6 +237,7 @@ void each_field(auto& f, Of<TreadView> auto& m) {
 }
 void each_field(auto& f, Of<GroundView> auto& m) {
   walk(f, "corner_m", m.corner_m);
+  walk(f, "height_m", m.height_m);
   walk(f, "level", m.level);
   walk(f, "tall", m.tall);
 }

@@ -27,8 +27,10 @@ class Climb {
     for (int i = 0; i < frames; ++i) see(way, [&] { return noise(random_); });
   }
   SurfaceFrame& frame() { return frame_; }
+  double turn_per_m = 0.0;  // of the robot
   [[nodiscard]] Transform odom_T_camera() const {
-    return {odom_R_stairs_ * rotation_x(kPi), odom_R_stairs_ * Vec3{odom_p_base_m() + Vec3{0.1, 0.0, 0.2}}};
+    return {odom_R_stairs_ * rotation_z(turn_per_m * x_m_) * rotation_x(kPi),
+            odom_R_stairs_ * Vec3{odom_p_base_m() + Vec3{0.1, 0.0, 0.2}}};
   }
   [[nodiscard]] Vec3 odom_p_base_m() const {
     return Vec3{x_m_, 0.05 * std::sin(3.0 * x_m_), kRise_m / kTread_m * x_m_ + 0.8} / (1.0 + excess_);
@@ -91,6 +93,15 @@ TEST(WayScale, FewTreads_DataSheetIsBelievedMore) {
   climb.go(way, 2.6);
   EXPECT_GT(way.excess(), 0.007);
   EXPECT_LT(way.excess(), 0.01);
+}
+
+// A spiral: what the camera's mount is off in yaw would move its nosings, too.
+TEST(WayScale, RobotThatTurnsOnItsWay_IsNotBelieved) {
+  WayScale way;
+  Climb climb(0.01);
+  climb.turn_per_m = 0.6;
+  climb.go(way, 3.0);
+  EXPECT_LT(way.excess(), 0.001);
 }
 
 TEST(WayScale, NosingsThatWander_AreNoScale) {
