@@ -38,7 +38,6 @@ void Gait::reset(const Params& params, const RobotModel& robot) noexcept {
   armed_ = placed_ = started_ = leg_impaired_ = lost_in_swing_ = restarts_ = false;
   may_step_ = true;
   last_tick_ns_ = 0;
-  destination_.reset();
   stop_requested_ = StopReason::kNone;
 }
 
@@ -197,18 +196,9 @@ void Gait::follow_state(const GaitInput& in, GaitShared& gait) noexcept {
   if (auto* over = std::get_if<End>(&state_)) over->follow(in, gait);
 }
 
-void Gait::lay_out_destination(const GaitInput& in) noexcept {
-  if (!destination_ || !in.usable || !in.state.initialised) return;
-  const TorsoPose middle = middle_of(situation(in).soles);
-  const Vec3 way_m = rotation_z(middle.yaw_rad) * Vec3{destination_->ahead_m, destination_->left_m, 0.0};
-  planner_.set_goal(WalkGoal{(middle.position_m + way_m).head<2>(),
-                             math::wrap_angle(middle.yaw_rad + destination_->turn_rad), destination_->has_turn});
-  destination_.reset();
-}
-
 void Gait::advance(const GaitInput& in) noexcept {
   GaitShared gait = shared();
-  lay_out_destination(in);
+  if (in.usable && in.state.initialised) planner_.lay_out_destination(situation(in).soles);
   if (in.held) {
     plan_.hold(params_.held_body, status_.stands[0] && status_.stands[1], in.leg_impaired);
   } else {

@@ -3,13 +3,11 @@
 #pragma once
 
 #include <array>
-#include <optional>
 #include <variant>
 
 #include "algorithms/core/messages/footholds.hpp"
 #include "algorithms/core/messages/gait_plan.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
-#include "algorithms/core/messages/operator_command.hpp"
 #include "algorithms/core/messages/state.hpp"
 #include "algorithms/gait/balance/balance.hpp"
 #include "algorithms/gait/footsteps/climb_planner.hpp"
@@ -46,13 +44,10 @@ class Gait {
   void allow_steps(bool may_step) noexcept { may_step_ = may_step; }
   // Goes there, or where it cannot stops; from the first tick on in which it knows where it stands. From the thread of
   // tick().
-  void go_to(const Destination& destination) noexcept { destination_ = destination; }
-  [[nodiscard]] bool goes_to() const noexcept { return destination_.has_value() || planner_.has_goal(); }
+  void go_to(const Destination& destination) noexcept { planner_.go_to(destination); }
+  [[nodiscard]] bool goes_to() const noexcept { return planner_.goes_to(); }
   // Up the stairs that it sees, until they end.
-  void climb() noexcept {
-    destination_.reset();
-    planner_.set_goal({});
-  }
+  void climb() noexcept { planner_.climb(); }
   // After its end, finished or stopped, with both feet on the ground: it stands, and looks for a step. Where it stands
   // and how many treads it has climbed stays. False, and nothing happens: there are joints_away().
   [[nodiscard]] bool try_restart(const JointVector& q_rad) noexcept;
@@ -68,7 +63,6 @@ class Gait {
   [[nodiscard]] bool try_arm(const JointFeedback& feedback) noexcept;
   void judge_ground(const StateEstimate& state) noexcept;
   void take_turn(const StateEstimate& state) noexcept;
-  void lay_out_destination(const GaitInput& in) noexcept;
   void hold_upright(const GaitInput& in, JointCommand& command) noexcept;
   void advance(const GaitInput& in) noexcept;
   [[nodiscard]] Transition tick_state(const GaitInput& in, GaitShared& gait) noexcept;
@@ -98,7 +92,6 @@ class Gait {
   bool lost_in_swing_ = false;  // so was the estimate; the foot in the air came down all the same
   bool restarts_ = false;       // with the next tick
   bool may_step_ = true;
-  std::optional<Destination> destination_;  // not yet laid out in odometry
   StopReason stop_requested_ = StopReason::kNone;
 };
 

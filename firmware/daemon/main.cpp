@@ -11,12 +11,12 @@
 #include <string_view>
 #include <vector>
 
+#include "firmware/config/operator_request_text.hpp"
 #include "firmware/daemon/devices.hpp"
 #include "firmware/daemon/doctor/doctor.hpp"
 #include "firmware/daemon/service/service.hpp"
 #include "firmware/daemon/watch.hpp"
 #include "firmware/mailbox/mailbox_writer.hpp"
-#include "firmware/operator_request_text.hpp"
 #include "firmware/recording/replay.hpp"
 
 namespace polygmap::daemon {

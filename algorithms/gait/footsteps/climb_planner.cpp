@@ -254,6 +254,15 @@ StopReason ClimbPlanner::reason_against(const Situation& situation, const Footho
   return StopReason::kNone;
 }
 
+void ClimbPlanner::lay_out_destination(const SolePair& soles) noexcept {
+  if (!goal_.asked) return;
+  const TorsoPose middle = middle_of(soles);
+  const Vec3 way_m = rotation_z(middle.yaw_rad) * Vec3{goal_.asked->ahead_m, goal_.asked->left_m, 0.0};
+  goal_.laid_out = WalkGoal{(middle.position_m + way_m).head<2>(),
+                            math::wrap_angle(middle.yaw_rad + goal_.asked->turn_rad), goal_.asked->has_turn};
+  goal_.asked.reset();
+}
+
 // Stairs are the way where the goal lies behind their edge. Until it is known whether more of them come, they still
 // are.
 bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& footholds) const noexcept {
@@ -263,16 +272,16 @@ bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& 
   if (!usable(footholds.p_star_feet)) return false;
   const Vec2 heading = unit_at(footholds.p_star_feet[0].yaw_rad);
   const Vec2 nosing_m = 0.5 * (footholds.tread.nosing_a_m + footholds.tread.nosing_b_m).head<2>();
-  const Vec2 way_m = goal_->odom_p_m - middle_of(situation.soles).position_m.head<2>();
-  return heading.dot(goal_->odom_p_m - nosing_m) > params_.goal_beyond_m &&
-         heading.dot(way_m) > math::cos(params_.goal_aside_rad) * way_m.norm();
+  const Vec2 way_m = goal_.laid_out->odom_p_m - middle_of(situation.soles).position_m.head<2>();
+  return heading.dot(goal_.laid_out->odom_p_m - nosing_m) > params_.walk.stairs_beyond_m &&
+         heading.dot(way_m) > math::cos(params_.walk.stairs_aside_rad) * way_m.norm();
 }
 
 ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const FootholdSet& footholds) const noexcept {
   const LevelWalk walk(params_.walk, robot_->sole, robot_->stance.half_width_m, shortened(params_.floor, stride_share_),
                        params_.rule);
   const LevelStep step =
-      walk.next(situation.soles, memory_.last_swing, !walking_ && floor_steps_ == 0, *goal_, footholds.ground);
+      walk.next(situation.soles, memory_.last_swing, !walking_ && floor_steps_ == 0, *goal_.laid_out, footholds.ground);
   Decision decision;
   decision.walks = true;
   switch (step.outcome) {
@@ -311,7 +320,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     decision.goal = closing_goal(situation, footholds, *closing);
     return decision;
   }
-  if (goal_ && !leads_to_goal(situation, footholds)) return walk(situation, footholds);
+  if (goal_.laid_out && !leads_to_goal(situation, footholds)) return walk(situation, footholds);
   decision.measured_m = measured(footholds);
   decision.obstruction = reason_against(situation, footholds);
   if (decision.obstruction != StopReason::kNone) return decision;

@@ -9,6 +9,7 @@
 
 #include "algorithms/core/messages/footholds.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
+#include "algorithms/core/messages/operator_command.hpp"
 #include "algorithms/gait/footsteps/level_walk.hpp"
 #include "algorithms/gait/footsteps/step_goal.hpp"
 
@@ -64,8 +65,6 @@ class ClimbPlanner {
     std::uint32_t max_set_back = 2;
     LineUpParams line_up;
     LevelWalkParams walk;
-    double goal_beyond_m = 0.10;
-    double goal_aside_rad = 1.2;
 
     static void visit(auto& p, auto& field) {
       field("pattern", p.pattern, kGaitPatternNames,
@@ -99,9 +98,6 @@ class ClimbPlanner {
       field("max_set_back", p.max_set_back, 0, 100, "Feet that slid are set back so often on a tread.");
       field("line_up", p.line_up);
       field("walk", p.walk);
-      field("goal_beyond_m", p.goal_beyond_m, 0.0, 2.0, "Stairs lead to a goal that lies farther behind their nosing.");
-      field("goal_aside_rad", p.goal_aside_rad, 0.1, 3.2,
-            "They do not, where it lies farther round from their heading.");
     }
   };
 
@@ -130,9 +126,13 @@ class ClimbPlanner {
   // After an end: what it has tried to line up with the stairs, and what it has given up, is forgotten; where it stands
   // is not.
   void restart() noexcept;
-  // From now on; none: up the stairs that it sees.
-  void set_goal(const std::optional<WalkGoal>& goal) noexcept { goal_ = goal; }
-  [[nodiscard]] bool has_goal() const noexcept { return goal_.has_value(); }
+  // From now on: to there, from where the soles are when it is laid out.
+  void go_to(const Destination& destination) noexcept { goal_.asked = destination; }
+  // In odometry, where one was asked for that is not yet laid out.
+  void lay_out_destination(const SolePair& soles) noexcept;
+  // Up the stairs that it sees, until they end.
+  void climb() noexcept { goal_ = {}; }
+  [[nodiscard]] bool goes_to() const noexcept { return goal_.asked || goal_.laid_out; }
   // A swing was latched: its goal is what the next decisions build on.
   void latched(const Situation& situation, const Decision& decision) noexcept;
   // The legs cannot do the step: the next ones on the floor are shorter. False when they are short already.
@@ -190,7 +190,10 @@ class ClimbPlanner {
     Foot leading = Foot::kLeft;
     bool has_leading = false;
   } memory_, before_latch_;
-  std::optional<WalkGoal> goal_;
+  struct {
+    std::optional<Destination> asked;
+    std::optional<WalkGoal> laid_out;
+  } goal_;
   bool walking_ = false;       // the last step was one to a place
   bool on_treads_ = false;     // false: on level ground, before stairs or behind them
   bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this

@@ -77,7 +77,7 @@ void PolygonMap::begin(const SurfaceFrame& frame, const View& view) noexcept {
   view_ = view;
   newest_ns_ = frame.stamp_ns;
   any_frame_ = true;
-  fused_in_frame_ = 0;
+  pass_.fused = 0;
   order_surfaces();
   drift_.begin_frame(frame.stamp_ns, view.position_sigma_m);
   map_T_camera_ = view.odom_T_camera;

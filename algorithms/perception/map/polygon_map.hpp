@@ -280,7 +280,8 @@ class PolygonMap {
     std::size_t second = kMaxMapPolygons;
     double best_cost = 0.0;
     double second_cost = 0.0;
-    std::size_t thing = 0;  // the frame's sighting, or the map's cell
+    std::size_t thing = 0;    // the frame's sighting, or the map's cell
+    std::uint32_t fused = 0;  // surfaces, of this frame
   };
 
   void do_piece() noexcept;
@@ -338,7 +339,6 @@ class PolygonMap {
   ConvexPolygon seen_local_;  // in the frame of the track being updated
   std::int64_t newest_ns_ = 0;
   std::uint32_t next_id_ = 1;
-  std::uint32_t fused_in_frame_ = 0;
   bool any_frame_ = false;
   Stage stage_ = Stage::kIdle;
   Pass pass_;

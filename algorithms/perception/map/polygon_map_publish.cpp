@@ -31,7 +31,7 @@ void PolygonMap::publish() noexcept {
   ++counters_.frames;
   things_.finish(snapshot_.occupied);
   snapshot_.drift_m = drift_.drift_m();
-  if (fused_in_frame_ > 0) snapshot_.stamp_ns = newest_ns_;
+  if (pass_.fused > 0) snapshot_.stamp_ns = newest_ns_;
 }
 
 void PolygonMap::write(const MapTrack& track, MapPolygon& out) const noexcept {

@@ -14,7 +14,7 @@ void PolygonMap::fuse_best() noexcept {
   work_.add(is_new ? kCreate : kRebuild);
   work_.add(seen_.polygon.size(), kPerCorner);
   if (is_new) {
-    ++fused_in_frame_;
+    ++pass_.fused;
     create();
     return;
   }
@@ -38,7 +38,7 @@ void PolygonMap::fuse_best() noexcept {
   }
   if (gone != nullptr) merge(*keep, *gone);
   fuse(*keep, offset_m, outlier ? 0.0 : faded(keep->last_seen_ns));
-  ++fused_in_frame_;
+  ++pass_.fused;
   ++counters_.fused;
 }
 

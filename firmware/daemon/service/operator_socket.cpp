@@ -16,8 +16,8 @@
 #include <utility>
 
 #include "algorithms/core/messages/samples.hpp"
+#include "firmware/config/operator_request_text.hpp"
 #include "firmware/daemon/system/error_text.hpp"
-#include "firmware/operator_request_text.hpp"
 
 namespace polygmap::daemon {
 namespace {

@@ -591,8 +591,7 @@ int polygmap_main(const std::vector<std::string>& arguments, const ClimbRunner& 
   if (!a.options.asked.empty()) a.options.climb_operator = &script.emplace(a.options.asked, words);
   if (a.keyboard) a.options.climb_operator = &keyboard.emplace(words);
   if (a.keyboard && a.said->count("--pace") == 0) a.options.pace = 1.0;
-  ProgressLine progress(out, a.options.world ? 0 : a.options.stairs.steps,
-                        live && a.options.climb_operator == nullptr);
+  ProgressLine progress(out, a.options.world ? 0 : a.options.stairs.steps, live && a.options.climb_operator == nullptr);
   ClimbSummary summary;
   std::string not_written;
   try {

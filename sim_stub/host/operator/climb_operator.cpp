@@ -7,8 +7,8 @@
 #include <ostream>
 
 #include "firmware/config/file_error.hpp"
+#include "firmware/config/operator_request_text.hpp"
 #include "firmware/operator_answer_text.hpp"
-#include "firmware/operator_request_text.hpp"
 #include "sim_stub/heap_trap.hpp"
 
 namespace polygmap::sim {

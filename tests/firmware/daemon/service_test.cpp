@@ -15,9 +15,9 @@
 #include <memory>
 #include <thread>
 
+#include "firmware/config/operator_request_text.hpp"
 #include "firmware/mailbox/mailbox_layout.hpp"
 #include "firmware/mailbox/polygmap_mailbox_reader.h"
-#include "firmware/operator_request_text.hpp"
 #include "firmware/recording/replay.hpp"
 #include "sim_stub/heap_trap.hpp"
 #include "tests/firmware/daemon/live_robot.hpp"
@@ -258,8 +258,7 @@ TEST_F(ServiceTest, OperatorAsks_ArmsStartsStopsAndResetsThenAndNotBefore) {
     std::this_thread::sleep_for(kEstimates);
     EXPECT_EQ(ask("start"), "walking_up");
     EXPECT_EQ(ask("dance"), "refused: ask for state, or one of " + std::string(kWhatMayBeAsked));
-    EXPECT_EQ(ask(std::string(100, 'a')),
-              "refused: ask for state, or one of " + std::string(kWhatMayBeAsked));
+    EXPECT_EQ(ask(std::string(100, 'a')), "refused: ask for state, or one of " + std::string(kWhatMayBeAsked));
     EXPECT_EQ(ask("pause\n"), "holding");
     (void)ask("stop");
     listen_until("STATUS=safe_stop", 5s);

@@ -109,7 +109,7 @@ TEST_F(LevelWalkTest, BoxBesideItWhereItStands_TurnsAwayAllTheSame) {
 // As it stands on a landing that it has just climbed: its heels are at the edge.
 TEST_F(LevelWalkTest, EdgeBehindTheHeels_GoesAStepAheadBeforeItTurns) {
   set(ground_.level, false, [](const Vec2& p_m) { return p_m.x() < -0.10; });
-  const WalkGoal goal{{0.1, 1.0}, 0.0, false};
+  const WalkGoal goal{{0.3, 1.0}, 0.0, false};
   EXPECT_EQ(walk_to(goal, 80).outcome, Outcome::kArrived);
 }
 

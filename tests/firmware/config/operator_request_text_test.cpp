@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "firmware/operator_request_text.hpp"
+#include "firmware/config/operator_request_text.hpp"
 
 #include <gtest/gtest.h>
 

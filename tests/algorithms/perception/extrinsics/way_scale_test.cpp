@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "algorithms/perception/map/way_scale.hpp"
+#include "algorithms/perception/extrinsics/way_scale.hpp"
 
 #include <gtest/gtest.h>
 
