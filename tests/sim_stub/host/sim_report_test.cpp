@@ -563,8 +563,8 @@ TEST(ClimbJson, Keys_StandInTheirOrderWithRoundedFigures) {
   EXPECT_EQ(
       keys,
       "verdict reason fell ended_by ended_at_s plant gait seed command arguments params_hash reality camera states "
-      "steps_total steps_climbed goal_reached footsteps_total surfaces_stood_on body_clearance_mm_min overhang_mm_max "
-      "stop_sentence climb_time_s seconds_per_step plane_rate_hz "
+      "steps_total steps_climbed goal_reached footsteps_total surfaces_stood_on stood_on_wrongly body_clearance_mm_min "
+      "overhang_mm_max stop_sentence climb_time_s seconds_per_step plane_rate_hz "
       "execution_error_mm foothold_error_mm sole_margin_mm_min swing_clearance_mm_min stand_off_mm "
       "closure_error_mm tracking_error_mm com_tracking_mm_max zmp_margin_mm_min torque_peak_ratio torque_limited_ms "
       "joint_speed_peak_ratio odometry_rmse_mm odometry_drift_mm odometry_jitter_mm odometry_nees "
