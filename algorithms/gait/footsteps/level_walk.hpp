@@ -33,11 +33,11 @@ struct LevelWalkParams {
     field("sole_margin_m", p.sole_margin_m, 0.0, 0.2,
           "Ground was seen as far beyond a sole on all sides: a square of 40 mm may be half over an edge.");
     field("body_m", p.body_m, 0.0, 1.0, "What rises as near to the middle between the feet comes no nearer by a step.");
+    field("level_m", p.level_m, 0.005, 0.1, "What was seen from soles at another height than this says nothing.");
     field("stairs_beyond_m", p.stairs_beyond_m, 0.0, 2.0,
           "Stairs lead to a goal that lies farther behind their nosing.");
     field("stairs_aside_rad", p.stairs_aside_rad, 0.1, 3.2,
           "They do not where it lies farther round from their heading.");
-    field("level_m", p.level_m, 0.005, 0.1, "What was seen from soles at another height than this says nothing.");
   }
 };
 

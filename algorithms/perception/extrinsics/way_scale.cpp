@@ -78,7 +78,7 @@ void WayScale::add(const EdgeLine& odom_nosing, const Vec2& looks, const Vec3& o
   tread->way_m += way_m;
   tread->mean_base_m += share * base_off_m;
   tread->mean_nosing_m += share * nosing_off_m;
-  const double sigma_m[] = {params_.along_sigma_m, params_.up_sigma_m};
+  const Vec2 sigma_m{params_.along_sigma_m, params_.up_sigma_m};
   for (int axis = 0; axis < 2; ++axis) {
     const double weight = frames / math::square(sigma_m[axis]);
     information_ += weight * math::square(base_off_m[axis]);

@@ -8,6 +8,8 @@
 namespace polygmap {
 namespace {
 
+constexpr std::size_t kThingsAtOnce = 16;  // in a piece of work
+
 bool valid(const SurfacePatch& patch, double max_range_m) noexcept {
   if (patch.polygon.size() < 3 || !math::all_finite(patch.normal) || !math::all_finite(patch.centroid_m)) return false;
   if (!(std::abs(patch.normal.squaredNorm() - 1.0) < 1e-3) ||
@@ -170,10 +172,8 @@ void PolygonMap::do_piece() noexcept {
       }
       break;
     case Stage::kThingsAgain:
-      for (constexpr std::size_t kAtOnce = 16; pass_.thing < things_.count();) {
+      for (const std::size_t end = std::min(pass_.thing + kThingsAtOnce, things_.count()); pass_.thing < end;)
         things_.look_again(pass_.thing++);
-        if (pass_.thing % kAtOnce == 0) break;
-      }
       if (pass_.thing >= things_.count()) begin_ground();
       break;
     case Stage::kGround:

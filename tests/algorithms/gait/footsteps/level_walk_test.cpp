@@ -13,8 +13,8 @@ using Outcome = LevelStep::Outcome;
 
 class LevelWalkTest : public ::testing::Test {
  protected:
-  const RobotModel robot_;
-  const LevelWalkParams params_;
+  const RobotModel robot_{};
+  const LevelWalkParams params_{};
   const LevelWalk walk_{params_, robot_.sole, robot_.stance.half_width_m, {}, {}};
   SolePair soles_ = stand_at({0.0, 0.0}, 0.0);
   GroundView ground_ = everywhere();
