@@ -98,6 +98,9 @@ std::string reason_of(const ClimbSummary& s, const ClimbEnding& ending) {
   // A step counts where both soles rest inside its edges, so a sole over one may be why the count is short.
   if (!all_climbed && ending.phase == GaitPhase::kFinished) {
     if (over) return over_the_edge + "; " + climbed + " count.";
+    if (s.options.world && s.options.world->world.goal) {
+      return "The module ended after " + climbed + ": it took the place where it stood for its goal.";
+    }
     if (s.options.world) return "The module ended after " + climbed + ": it saw nothing higher, and knows of no goal.";
     return "The module ended the climb after " + climbed + ": " + why_stopped(StopReason::kTop, 0.0) + ".";
   }
