@@ -98,10 +98,10 @@ bool GroundMap::look() noexcept {
   const float nearest = 1.0F / static_cast<float>(params_.range_m);
   const float* inverse_depths = view_.columns->inverse_depth.row(row_);
   for (std::int32_t g = first; g + 1 < columns; g += kColumnStep) {
-    work_.add(12);
+    work_.add(20);
     const float inverse_depth = inverse_depths[g];
     if (!(inverse_depth > nearest) || is_at_a_gap(g)) continue;
-    work_.add(70);
+    work_.add(105);
     const double x = (kColumn_px * g + 0.5 * (kColumn_px - 1) - c.cx_px) / c.fx_px;
     see(view_.map_T_camera.p_m + (row_ray + x * R.col(0)) / static_cast<double>(inverse_depth));
   }

@@ -100,7 +100,7 @@ bool ThingMap::seen_free(const ThingCell& cell) const noexcept {
 
 void ThingMap::look_again(std::size_t i) noexcept {
   ThingCell& cell = cells_[i];
-  work_.add(cell.seen ? 12 : 90);
+  work_.add(cell.seen ? 12 : 150);
   if (!cell.seen && seen_free(cell)) --cell.count;
 }
 
