@@ -273,7 +273,8 @@ void ControlLane::look_across(std::int64_t now_ns) noexcept {
 }
 
 Progress ControlLane::estimate(std::int64_t now_ns) noexcept {
-  estimator_.tick(gait_.status().stands);
+  const GaitStatus& planned = gait_.status();
+  estimator_.tick({planned.stands[0] && !planned.on_toe[0], planned.stands[1] && !planned.on_toe[1]});
   if (estimator_.state().odom_turned_rad.norm() > params_.estimator.imu_mount.told_rad) {
     health_.raise(Limit::kImuTurned, now_ns);
   }

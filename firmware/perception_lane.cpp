@@ -230,6 +230,7 @@ void PerceptionLane::begin_search() noexcept {
     query.odom_T_sole[index_of(foot)] = context.state.odom_T_sole[index_of(foot)];
   query.stance = context.stance;
   query.climbing = context.climbing;
+  query.descends = context.goes_to;
   query.feet_ahead_m = mount_.feet_ahead_m();
   query.way_excess = learning_.way.excess();
   search_.begin(map_.snapshot(), query);

@@ -95,7 +95,7 @@ Progress FootholdSearch::step(WorkBudget& budget) noexcept {
         break;
       case Stage::kChoose:
         choose();
-        stage_ = pending_.has_p_star ? Stage::kLookAhead : Stage::kFinish;
+        stage_ = pending_.has_p_star && pending_.measured_rise_m > 0.0 ? Stage::kLookAhead : Stage::kFinish;
         break;
       case Stage::kLookAhead:
         rows([this](std::int32_t row) { look_ahead_row(row); }, Stage::kFinish);
@@ -253,8 +253,9 @@ void FootholdSearch::find_next(std::int32_t row) noexcept {
   if (distance2_to_row_m2(base_.origin_m(), row) >= found_.next_distance2_m2) return;
   const Vec2 first = base_(raster_.at(0, row)), step = base_(raster_.at(1, row)) - first;
   const double range_m = params_.raster.g_range_m, half_width_m = params_.corridor_half_width_m;
+  const double nearest_m = query_.descends ? 0.0 : -range_m;  // down stairs the higher ones lie behind
   const FootholdRaster::Columns corridor =
-      FootholdRaster::columns_within(first.x(), step.x(), {-range_m, range_m}) &
+      FootholdRaster::columns_within(first.x(), step.x(), {nearest_m, range_m}) &
       FootholdRaster::columns_within(first.y(), step.y(), {-half_width_m, half_width_m});
   work_.add(200);
   // Distances grow to both sides of the nearest column: of what the corridor has of a surface that is high enough all
@@ -282,7 +283,9 @@ void FootholdSearch::find_next(std::int32_t row) noexcept {
     for (std::int32_t column = from; column < until; ++column) {
       const Vec2 base_p = first + static_cast<double>(column) * step;
       const double distance2 = base_p.squaredNorm();
-      if (distance2 >= found_.next_distance2_m2 || std::abs(base_p.y()) > half_width_m) continue;
+      if (distance2 >= found_.next_distance2_m2 || std::abs(base_p.y()) > half_width_m || base_p.x() < nearest_m) {
+        continue;
+      }
       if (plane.height_m(raster_.at(column, row)) <= least_z_m || !in_range(base_p, range_m)) continue;  // eq. (20)
       found_.next_distance2_m2 = distance2;
       found_.next = stretch.layer;
@@ -380,7 +383,8 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
   };
   for (const FootLimit& limit : tread.toe) bound_by(limit, limit.margin_m);
   if (tread.toe.empty()) {  // nothing is mapped behind: it is as deep as it was seen to be, at least
-    const double toe_ahead_m = foot_.collision.toe_x_m - foot_.contact.toe_x_m;
+    // Over a lip nothing is in the toe's way.
+    const double toe_ahead_m = tread.lip ? 0.0 : foot_.collision.toe_x_m - foot_.contact.toe_x_m;
     for (const FootLimit& edge : tread.edges) {
       const bool is_back = edge.inside.inward.dot(tread.heading) < -params_.levels.square_cos;
       if (is_back) bound_by(edge, tread.back_margin_m + toe_ahead_m);
@@ -392,11 +396,12 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
   }
   // A tread that ends in nothing ends all the same: the next riser may be there and not be seen.
   if (tread.ends.far_m) {
-    const double room_m = *tread.ends.far_m - heel_m - foot_.collision.toe_x_m;
+    const double room_m = *tread.ends.far_m - heel_m - (tread.lip ? foot_.contact : foot_.collision).toe_x_m;
     spare_m = std::min(spare_m, room_m - margin_m - tread.back_margin_m);
   }
   const double round_m = std::min(params_.feet.nosing_round_m, std::max(0.5 * spare_m, 0.0));
-  return heel_m + math::clamp(margin_m + 0.5 * (spare_m + round_m), 0.0, params_.feet.heel_inset_max_m);
+  const double inset_max_m = tread.below_lip ? params_.down.heel_inset_max_m : params_.feet.heel_inset_max_m;
+  return heel_m + math::clamp(margin_m + 0.5 * (spare_m + round_m), 0.0, inset_max_m);
 }
 
 Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept {
@@ -592,6 +597,20 @@ StopReason FootholdSearch::judge_next() noexcept {
 }
 
 void FootholdSearch::choose() noexcept {
+  if (query_.descends) {
+    work_.add(200);
+    work_.add(levels_.size(), 120);
+    const Lip* lip = lip_ahead();
+    const std::size_t below = lip != nullptr ? level_below(*lip) : kNone;
+    if (below != kNone) {
+      pending_.obstruction = judge_below(*lip, below);
+      return;
+    }
+  }
+  choose_up();
+}
+
+void FootholdSearch::choose_up() noexcept {
   work_.add(400);
   work_.add(uprights_.size(), 90);
   if (found_.next != kNone) work_.add(place_feet_instructions(levels_[found_.next]));

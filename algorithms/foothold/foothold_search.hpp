@@ -83,6 +83,26 @@ class FootholdSearch {
       field("fraction", p.fraction, 0.0, 1.0, "At least this share of that floor has been seen.");
     }
   };
+  // Down over the lip of the surface that it stands on.
+  struct DownParams {
+    double drop_max_m = 0.21;
+    double beyond_m = 0.16;
+    double level_gap_m = 0.35;
+    double facing_cos = 0.64;
+    double heel_inset_max_m = 0.022;
+
+    static void visit(auto& p, auto& field) {
+      field("drop_max_m", p.drop_max_m, 0.02, 0.5, "A step goes no farther down; below that the legs say.");
+      field("beyond_m", p.beyond_m, 0.0, 0.5,
+            "The next surface down lies this far beyond the lip: a tread that was not seen is not stepped over.");
+      field("level_gap_m", p.level_gap_m, 0.0, 1.0,
+            "Where something higher begins as near beyond the lip, the way goes up: a tread of open stairs has a lip.");
+      field("facing_cos", p.facing_cos, 0.0, 1.0,
+            "A lip whose turn against the base's heading has a smaller cosine is not ahead.");
+      field("heel_inset_max_m", p.heel_inset_max_m, 0.0, 0.5,
+            "Heel edge beyond the lip at most, on a deep surface: the legs reach no farther down.");
+    }
+  };
   struct Params {
     double g_z_m = 0.40;
     double delta_foot_m = 0.025;
@@ -105,6 +125,7 @@ class FootholdSearch {
     RasterParams raster;
     FeetParams feet;
     TopParams top;
+    DownParams down;
 
     static void visit(auto& p, auto& field) {
       field("g_z_m", p.g_z_m, 0.01, 2.0, "Eq. 23: a foothold is no higher, two rises of 0.175 m and margin.");
@@ -138,6 +159,7 @@ class FootholdSearch {
       field("raster", p.raster);
       field("feet", p.feet);
       field("top", p.top);
+      field("down", p.down);
     }
   };
   struct Query {
@@ -145,6 +167,7 @@ class FootholdSearch {
     std::array<Transform, kFootCount> odom_T_sole;
     Foot stance = Foot::kLeft;  // the foot that stays
     bool climbing = false;      // a tread has been climbed already
+    bool descends = false;      // down is a way, too
     // By how much each foot stands ahead of where it is told to: its footholds are told as much farther back.
     std::array<double, kFootCount> feet_ahead_m{};
     double way_excess = 0.0;  // 0.01: base and feet go 1 % farther than told, so footholds are told nearer
@@ -225,6 +248,12 @@ class FootholdSearch {
   [[nodiscard]] bool blocked_by_upright(double next_distance_m, double& top_m) const noexcept;
   [[nodiscard]] StopReason without_next() const noexcept;
   [[nodiscard]] StopReason judge_next() noexcept;
+  // The nearest lip ahead of the surface that it stands on, where that is what comes next.
+  [[nodiscard]] const Lip* lip_ahead() const noexcept;
+  // What lies below it; kNone: nothing that was seen.
+  [[nodiscard]] std::size_t level_below(const Lip& lip) const noexcept;
+  [[nodiscard]] StopReason judge_below(const Lip& lip, std::size_t level) noexcept;
+  void choose_up() noexcept;
 
   Params params_;
   const SoleModel& foot_;

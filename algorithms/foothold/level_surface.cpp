@@ -69,23 +69,56 @@ void find_heading(const SurfacePatch& surface, double base_yaw_rad, const Vec2& 
   }
 }
 
-// Contact rectangle to every edge, collision box to the back line.
+void find_lip(const SurfacePatch& surface, const Vec2& centre, LevelSurface& out) noexcept {
+  if (!surface.back.valid || !surface.back_drops) return;
+  const EdgeLine& line = surface.back;
+  const Vec2 along = (line.b_m - line.a_m).head<2>();
+  const double length_m = along.norm();
+  if (!(length_m > 0.0)) return;
+  const bool a_is_left = cross(along, centre - line.a_m.head<2>()) < 0.0;  // the surface lies behind
+  Lip& lip = out.lip.emplace();
+  lip.left_m = a_is_left ? line.a_m : line.b_m;
+  lip.right_m = a_is_left ? line.b_m : line.a_m;
+  lip.heading = left_of((lip.right_m - lip.left_m).head<2>() / length_m);
+  lip.sigma_m = line.sigma_m;
+}
+
+// Contact rectangle to every edge, collision box to a back line that rises.
 void add_edge_limits(const SurfacePatch& surface, const LevelSurfaceParams& params, const EdgeMargin& margin,
-                     const SoleModel& sole, LevelSurface& out) noexcept {
+                     const SoleModel& sole, bool below_lip, LevelSurface& out) noexcept {
   for (std::size_t i = 0; i < out.hull.size(); ++i) {
     const HalfPlane inside = edge_half_plane(out.hull, i);
     const double facing = inside.inward.dot(out.heading);
     double margin_m = margin.least_m;  // the sides keep one of their own
     if (facing > params.square_cos && surface.nosing.valid) margin_m = out.nosing_margin_m;
     if (facing < -params.square_cos && surface.back.valid) margin_m = out.back_margin_m;
-    (void)out.edges.try_push_back({inside, reach_m(sole.contact, out.heading, inside.inward), margin_m,
-                                   std::abs(inside.inward.dot(out.left)) > params.side_sin});
+    const bool is_side = std::abs(inside.inward.dot(out.left)) > params.side_sin;
+    const FootLimit limit{inside, reach_m(sole.contact, out.heading, inside.inward), margin_m, is_side};
+    if (below_lip && facing > params.square_cos) {
+      (void)out.hidden.try_push_back(limit);
+    } else {
+      (void)out.edges.try_push_back(limit);
+    }
   }
-  if (out.has_nosing && surface.back.valid) {
+  if (out.has_nosing && surface.back.valid && !surface.back_drops) {
     const std::optional<Line2> back = line_through(surface.back.a_m.head<2>(), surface.back.b_m.head<2>());
     if (back)
       add_toe_limit(out, params, sole, *back, out.back_margin_m, {0.0, std::numeric_limits<double>::infinity()});
   }
+}
+
+// Eqs (14)-(16); false without an area.
+bool find_outline(const MapPolygon& polygon, LevelSurface& out) noexcept {
+  const SurfacePatch& surface = polygon.surface;
+  out = {};
+  out.id = polygon.id;
+  out.last_seen_ns = polygon.last_seen_ns;
+  out.plane = {surface.normal, surface.d_m};
+  ConvexPolygon plan;  // eq. (14): z = 0
+  for (const Vec3& v : surface.polygon) (void)plan.try_push_back(v.head<2>());
+  out.hull = convex_hull(plan);
+  out.box = bounding_box(out.hull);
+  return area_m2(out.hull) > 0.0 && std::abs(surface.normal.z()) > 0.5;
 }
 
 }  // namespace
@@ -104,24 +137,50 @@ double LevelSurface::spare_m(const Vec2& p_m) const noexcept {
 
 bool prepare(const MapPolygon& polygon, double base_yaw_rad, const LevelSurfaceParams& params, const EdgeMargin& margin,
              const SoleModel& sole, LevelSurface& out) noexcept {
+  if (!find_outline(polygon, out)) return false;
   const SurfacePatch& surface = polygon.surface;
-  out = {};
-  out.id = polygon.id;
-  out.last_seen_ns = polygon.last_seen_ns;
-  out.plane = {surface.normal, surface.d_m};
-  ConvexPolygon plan;  // eq. (14): z = 0
-  for (const Vec3& v : surface.polygon) (void)plan.try_push_back(v.head<2>());
-  out.hull = convex_hull(plan);
-  out.box = bounding_box(out.hull);
-  if (!(area_m2(out.hull) > 0.0) || !(std::abs(surface.normal.z()) > 0.5)) return false;
   const Vec2 centre = centroid_m(out.hull);
-
   find_heading(surface, base_yaw_rad, centre, margin, out);
+  find_lip(surface, centre, out);
   out.back_margin_m = surface.back.valid ? margin.of(surface.back.sigma_m) : out.nosing_margin_m;
   out.height_m = out.plane.height_m(out.has_nosing ? out.nosing_middle_m() : centre);
 
   note_ends(surface, params, out);
-  add_edge_limits(surface, params, margin, sole, out);
+  add_edge_limits(surface, params, margin, sole, false, out);
+  return true;
+}
+
+bool prepare_below(const MapPolygon& polygon, const Lip& lip, const LevelSurfaceParams& params,
+                   const EdgeMargin& margin, const SoleModel& sole, LevelSurface& out) noexcept {
+  if (!find_outline(polygon, out)) return false;
+  const SurfacePatch& surface = polygon.surface;
+  find_lip(surface, centroid_m(out.hull), out);
+  // On a wedge the foot stands between the headings of both its edges.
+  const bool is_wedge = out.lip && out.lip->heading.dot(lip.heading) > params.square_cos;
+  out.heading = is_wedge ? Vec2{(lip.heading + out.lip->heading).normalized()} : lip.heading;
+  out.yaw_rad = math::atan2(out.heading.y(), out.heading.x());
+  out.left = left_of(out.heading);
+  out.has_nosing = out.below_lip = true;
+  out.nosing_a_m = lip.left_m;
+  out.nosing_b_m = lip.right_m;
+  for (Vec3* end_m : {&out.nosing_a_m, &out.nosing_b_m}) end_m->z() = out.plane.height_m(end_m->head<2>());
+  const double margin_m = margin.of(lip.sigma_m);
+  out.nosing_margin_m = margin_m + sole.contact.heel_x_m - sole.collision.heel_x_m;
+  out.back_margin_m = surface.back.valid ? margin.of(surface.back.sigma_m) : out.nosing_margin_m;
+  out.height_m = out.plane.height_m(out.nosing_middle_m());
+
+  note_ends(surface, params, out);
+  if (out.lip) out.depth_m = out.along_m(out.lip->middle_m());
+  add_edge_limits(surface, params, margin, sole, true, out);
+  const auto limit = [&](const SoleRectangle& foot, const Vec2& inward, const Vec3& at_m, double kept_m, bool side) {
+    (void)out.edges.try_push_back(
+        {{inward, inward.dot(at_m.head<2>())}, reach_m(foot, out.heading, inward), kept_m, side});
+  };
+  limit(sole.collision, lip.heading, lip.left_m, margin_m, false);
+  // The feet come from where the upper surface was seen.
+  const Vec2 left = left_of(lip.heading);
+  limit(sole.contact, -left, lip.left_m, margin.least_m, true);
+  limit(sole.contact, left, lip.right_m, margin.least_m, true);
   return true;
 }
 

@@ -87,6 +87,15 @@ struct SeenEnds {
   std::optional<double> left_m, right_m, far_m;
 };
 
+// Where a surface drops away ahead. Plan view, in the map.
+struct Lip {
+  Vec3 left_m = Vec3::Zero();  // its ends, looking out over it
+  Vec3 right_m = Vec3::Zero();
+  Vec2 heading = Vec2::UnitX();  // out over it
+  double sigma_m = 0.0;
+  [[nodiscard]] Vec2 middle_m() const noexcept { return 0.5 * (left_m + right_m).head<2>(); }
+};
+
 struct LevelSurface {
   std::uint32_t id = 0;
   std::int64_t last_seen_ns = 0;
@@ -95,18 +104,23 @@ struct LevelSurface {
   BoundingBox box;        // eq. 16
   double height_m = 0.0;  // at the nosing's middle, else at the centroid
   bool has_nosing = false;
-  double yaw_rad = 0.0;  // up the stairs
+  bool below_lip = false;  // its nosing is the lip above it
+  double yaw_rad = 0.0;    // up the stairs
   Vec2 heading = Vec2::UnitX();
   Vec2 left = Vec2::UnitY();
   Vec3 nosing_a_m = Vec3::Zero();  // left end
   Vec3 nosing_b_m = Vec3::Zero();
   double nosing_margin_m = 0.0;
-  double back_margin_m = 0.0;                          // of the nosing where there is no back line
-  StaticVector<FootLimit, kMaxPolygonVertices> edges;  // contact rectangle
-  StaticVector<FootLimit, 3> toe;                      // collision box to back edge, next nosing, next riser
-  double depth_m = 0.0;                                // nosing to the nearest of these, 0: none
+  double back_margin_m = 0.0;  // of the nosing where there is no back line
+  // Contact rectangle to its edges; of a surface below a lip, collision box to that and contact rectangle to its ends.
+  StaticVector<FootLimit, kMaxPolygonVertices + 3> edges;
+  StaticVector<FootLimit, 3> toe;  // collision box to back edge, next nosing, next riser
+  double depth_m = 0.0;            // nosing to the nearest of these, 0: none
   StaticVector<TreadObstacle, 8> obstacles;
   SeenEnds ends;
+  std::optional<Lip> lip;  // its far edge, where that drops
+  // Of a surface below a lip: its near edges, which the lip hides from farther off.
+  StaticVector<FootLimit, kMaxPolygonVertices> hidden;
 
   [[nodiscard]] Vec2 nosing_middle_m() const noexcept { return 0.5 * (nosing_a_m + nosing_b_m).head<2>(); }
   // Sole origin at a distance behind the nosing and to the left of its middle.
@@ -128,6 +142,11 @@ struct LevelSurface {
 // the polygon has no area.
 [[nodiscard]] bool prepare(const MapPolygon& polygon, double base_yaw_rad, const LevelSurfaceParams& params,
                            const EdgeMargin& margin, const SoleModel& sole, LevelSurface& out) noexcept;
+
+// The same of a surface below a lip, for feet that come down over it: what a nosing is to a tread that is climbed, the
+// lip is to this one, since no heel may touch it.
+[[nodiscard]] bool prepare_below(const MapPolygon& polygon, const Lip& lip, const LevelSurfaceParams& params,
+                                 const EdgeMargin& margin, const SoleModel& sole, LevelSurface& out) noexcept;
 
 // Adds something that the collision box must not reach: a line in plan that rises behind the surface, through point_m
 // along the unit vector direction. Ignored unless it lies across the stairs, by params.square_cos, and between

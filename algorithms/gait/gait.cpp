@@ -124,8 +124,8 @@ void Gait::observe_links() noexcept {
 
 void Gait::add_torques(const StateEstimate& state, const JointFeedback& feedback, bool usable,
                        JointCommand& command) noexcept {
-  const Balance::Reference reference{plan_.com(), link_acceleration_, plan_.plan_T_sole(), status_.stands,
-                                     memory_.soft_ground};
+  const Balance::Reference reference{plan_.com(),    link_acceleration_, plan_.plan_T_sole(),
+                                     status_.stands, status_.on_toe,     memory_.soft_ground};
   // Blind, it feeds forward to where the plan has itself, and as fast: at rest it would brake.
   const TorsoTrajectory::State& torso = plan_.torso();
   const Vec3 plan_v_base_mps{torso[0].speed, torso[1].speed, torso[2].speed};
@@ -223,6 +223,10 @@ void Gait::advance(const GaitInput& in) noexcept {
   }
   plan_.hold_landed_foot(params_.landed_foot, in.feedback, in.now_ns);
   follow_state(in, gait);
+  if (!std::holds_alternative<WeightShift>(state_)) {
+    plan_.lower_heels(robot_->sole, params_.step.down.heel_rise.radps * kTick_s);
+  }
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) status_.on_toe[index_of(foot)] = plan_.is_on_toe(foot);
   if (!in.held) plan_.count_tick();
 }
 

@@ -113,8 +113,8 @@ void SurfaceBuilder::look_beyond(Edge edge, Beyond& beyond) noexcept {
   }
 }
 
-// In most columns, and on the right side of the surface (a nosing has it below, a back line above).
-RegionId SurfaceBuilder::most_beyond(Edge edge, const Beyond& beyond, bool riser_only) const noexcept {
+// In most columns, of those that lie so against the surface.
+RegionId SurfaceBuilder::most_beyond(Edge edge, const Beyond& beyond, Lies lies) const noexcept {
   const Regions& regions = *regions_;
   const InversePlane& plane = regions[id_].plane;
   RegionId most = kNoRegion;
@@ -123,20 +123,24 @@ RegionId SurfaceBuilder::most_beyond(Edge edge, const Beyond& beyond, bool riser
     // The foot of a post is no end of a tread.
     if (edge == Edge::kBack && beyond.columns[p] < params_.least_back_share * beyond.all_columns) continue;
     const double height_m = plane.distance_m(regions[p].centre_m);
-    if (edge == Edge::kNosing ? height_m > -params_.least_step_m : height_m < params_.least_step_m) continue;
-    if (riser_only && regions[p].kind != SurfaceKind::kRiser) continue;
+    if (lies == Lies::kBelow ? height_m > -params_.least_step_m : height_m < params_.least_step_m) continue;
+    if (lies == Lies::kAboveUpright && regions[p].kind != SurfaceKind::kRiser) continue;
     if (most == kNoRegion || beyond.columns[p] > beyond.columns[most]) most = p;
   }
   return most;
 }
 
 bool SurfaceBuilder::begin_line(Edge edge) noexcept {
-  work_.add(2 * regions_->count * 12);
+  work_.add(3 * regions_->count * 12);
   Beyond beyond;
   look_beyond(edge, beyond);
-  // Above, a riser is the back; without one, a higher tread whose nosing hides the rest of this surface.
-  const RegionId riser = edge == Edge::kNosing ? kNoRegion : most_beyond(edge, beyond, true);
-  const RegionId other = riser != kNoRegion ? riser : most_beyond(edge, beyond, false);
+  // A nosing has something below. At the back a riser is the end; without one, a higher tread whose nosing hides the
+  // rest of this surface; without either, the edge where it drops away from the viewer.
+  const RegionId riser = edge == Edge::kNosing ? kNoRegion : most_beyond(edge, beyond, Lies::kAboveUpright);
+  const RegionId higher =
+      edge == Edge::kNosing || riser != kNoRegion ? kNoRegion : most_beyond(edge, beyond, Lies::kAbove);
+  const bool drops = riser == kNoRegion && higher == kNoRegion;
+  const RegionId other = drops ? most_beyond(edge, beyond, Lies::kBelow) : riser != kNoRegion ? riser : higher;
   if (other == kNoRegion) return false;
   const ColumnExtents& extents = regions_->extents[id_];
   work_.add(12 * (extents.last_column - extents.first_column + 1));
@@ -153,7 +157,8 @@ bool SurfaceBuilder::begin_line(Edge edge) noexcept {
   work_.add(900);
   edge_lines_.begin(params_.edge_lines, noise_, raw_->intrinsics, image_->column_rays, image_->columns, near_side,
                     &far_side, edge == Edge::kNosing);
-  if (edge == Edge::kBack && riser == kNoRegion) {
+  lines_.back_drops = edge == Edge::kBack && drops;
+  if (higher != kNoRegion) {
     lines_.occluder = edge_lines_.guessed_line();
     return false;
   }

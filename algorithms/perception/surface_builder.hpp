@@ -36,8 +36,8 @@ class SurfaceBuilder {
       field("least_back_share", p.least_back_share, 0.0, 1.0,
             "What ends a surface at its back is seen beyond it in this share of its columns.");
       field("least_step_m", p.least_step_m, 0.0, 0.1,
-            "The middle of what ends a surface lies farther below its plane at the nosing, farther above it at the "
-            "back.");
+            "The middle of what ends a surface lies farther below its plane at the nosing and at an edge that drops, "
+            "farther above it at another back.");
       field(
           "corner_px", p.corner_px, 0.0, 100.0,
           "A side that was seen to end as many pixels of half resolution from the columns beside it, or fewer, ends at "
@@ -83,7 +83,8 @@ class SurfaceBuilder {
   // Gathers where the surface ends in each column and what lies beyond; false when there is too little to look for.
   [[nodiscard]] bool begin_line(Edge edge) noexcept;
   void look_beyond(Edge edge, Beyond& beyond) noexcept;
-  [[nodiscard]] RegionId most_beyond(Edge edge, const Beyond& beyond, bool riser_only) const noexcept;
+  enum class Lies : std::uint8_t { kBelow, kAbove, kAboveUpright };
+  [[nodiscard]] RegionId most_beyond(Edge edge, const Beyond& beyond, Lies lies) const noexcept;
   void build_polygon() noexcept;
   // Where the surface ends in a column.
   [[nodiscard]] std::int32_t end_of(Edge edge, std::int32_t column) const noexcept {

@@ -50,6 +50,7 @@ struct GaitStatus {
   LatchedStep step;                                 // the current or the last swing
   std::uint32_t treads_climbed = 0;                 // both feet on it, by the module's own count
   std::array<bool, kFootCount> stands{true, true};  // planned contact
+  std::array<bool, kFootCount> on_toe{};            // of a foot that stands: its heel rises, only the toe's edge rests
   std::array<Transform, kFootCount> odom_T_sole_desired;
   Vec2 odom_p_com_desired_m = Vec2::Zero();  // planned centre of mass, laid on the estimate by the standing soles
   std::uint32_t ik_limited_ticks = 0;        // ticks in which a leg could not reach what was asked

@@ -45,8 +45,9 @@ struct SurfacePatch {
   std::array<EdgeKind, kMaxPolygonVertices> edges{};  // edge i: vertex i to i + 1
   Mat3 covariance = Mat3::Zero();                     // of m = -normal / d, 1/m; in a frame only
   std::uint8_t plane = 0;                             // surfaces cut from one plane share its number; in a frame only
-  EdgeLine nosing;  // treads: the front edge where the surface drops away towards the viewer
-  EdgeLine back;    // treads: the far edge where the next riser starts
+  EdgeLine nosing;          // treads: the front edge where the surface drops away towards the viewer
+  EdgeLine back;            // treads: the far edge, where the next riser starts or,
+  bool back_drops = false;  // where this is set, a lower surface lies beyond
 };
 
 using SurfacePatches = StaticVector<SurfacePatch, kMaxPlanesPerFrame>;

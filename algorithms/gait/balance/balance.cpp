@@ -118,13 +118,15 @@ JointVector Balance::torques_nm(const Params& params, const RobotModel& robot, c
   const BodyFrames frames = body_frames(robot.legs, body.q_rad);
   Support support;
   support.stands = reference.stands;
+  support.on_toe = reference.on_toe;
+  support.toe_x_m = robot.sole.contact.toe_x_m;
   Vec3 odom_p_plan_m = Vec3::Zero();
   double ground_m = 0.0;
   const std::array<double, kFootCount> holds = held_by(params.pressed_n, reference.stands, feedback.foot_force_n);
   for (std::size_t f = 0; f < kFootCount; ++f) {
     support.odom_T_sole[f] = body.odom_T_base * frames[f].sole;
     odom_p_plan_m += holds[f] * (support.odom_T_sole[f].p_m - reference.plan_T_sole[f].p_m);
-    ground_m += share_[f] * support.odom_T_sole[f].p_m.z();
+    ground_m += share_[f] * support.odom_p_carrier_m(f).z();
   }
   const PerLink& links_mps2 = reference.links.plan_mps2;
   Pendulum pendulum = pendulum_of(robot.masses, frames, body, feedback.dq_radps, links_mps2, ground_m);

@@ -39,6 +39,7 @@ class Balance {
     LinkMotion::Acceleration links;
     std::array<Transform, kFootCount> plan_T_sole;
     std::array<bool, kFootCount> stands{true, true};
+    std::array<bool, kFootCount> on_toe{};
     bool soft_ground = false;
   };
   struct Body {  // as estimated

@@ -28,8 +28,8 @@ Pressure press(const Support& support, const PressureLimits& limits, const Carri
     const Vec3 carried_m = carriers.odom_p_m[f] - sole.p_m;
     const Vec3 local_m = sole.R.transpose() * Vec3{carried_m.x() + rest_m.x(), carried_m.y() + rest_m.y(), 0.0};
     const double ahead_m = std::min(limits.ahead_m / std::max(pressure.share[f], 1e-3), limits.toe_m);
-    pressure.centre_m[f] = sole * Vec3{math::clamp(local_m.x(), -limits.behind_m, ahead_m),
-                                       math::clamp(local_m.y(), -limits.aside_m, limits.aside_m), 0.0};
+    const double along_m = support.on_toe[f] ? support.toe_x_m : math::clamp(local_m.x(), -limits.behind_m, ahead_m);
+    pressure.centre_m[f] = sole * Vec3{along_m, math::clamp(local_m.y(), -limits.aside_m, limits.aside_m), 0.0};
     pressure.zmp_m += pressure.share[f] * pressure.centre_m[f];
   }
   missed_m = (pressure.zmp_m.head<2>() - line_m).norm();
@@ -40,7 +40,7 @@ Pressure press(const Support& support, const PressureLimits& limits, const Carri
 
 Pressure distribute(const Support& support, const PressureLimits& limits, const Vec3& odom_p_com_m,
                     const Vec2& slope) noexcept {
-  Carriers carriers{{support.odom_T_sole[0].p_m, support.odom_T_sole[1].p_m}};
+  Carriers carriers{{support.odom_p_carrier_m(0), support.odom_p_carrier_m(1)}};
   const bool both = support.stands[0] && support.stands[1];
   if (both) {
     carriers.odom_p_m[0] -= limits.inward_m * support.odom_T_sole[0].R.col(1);

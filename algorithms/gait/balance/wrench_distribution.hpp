@@ -36,6 +36,13 @@ struct PressureLimits {
 struct Support {
   std::array<Transform, kFootCount> odom_T_sole;
   std::array<bool, kFootCount> stands{true, true};
+  std::array<bool, kFootCount> on_toe{};  // carried by the toe's edge alone
+  double toe_x_m = 0.17;                  // of that edge, from the sole's origin
+
+  // Where the sole carries without any turning of its own.
+  [[nodiscard]] Vec3 odom_p_carrier_m(std::size_t foot) const noexcept {
+    return on_toe[foot] ? odom_T_sole[foot] * Vec3{toe_x_m, 0.0, 0.0} : odom_T_sole[foot].p_m;
+  }
 };
 
 struct Pressure {

@@ -32,6 +32,8 @@ double measured(const FootholdSet& set) noexcept {
   switch (set.obstruction) {
     case StopReason::kRiseTooHigh:
       return set.measured_rise_m;
+    case StopReason::kDropTooDeep:
+      return -set.measured_rise_m;
     case StopReason::kTreadTooShort:
       return set.measured_tread_m;
     default:
@@ -62,6 +64,7 @@ double toe_to_line_m(const SoleRectangle& collision, const SolePose& sole, const
 struct ClimbPlanner::StandOff {
   Nosing nosing;
   double yaw_rad = 0.0;
+  bool at_lip = false;  // it is the edge of what it stands on
   SolePair soles;
 };
 
@@ -149,11 +152,12 @@ ClimbPlanner::StandOff ClimbPlanner::stand_off(const Situation& situation,
                                                const FootholdSet& footholds) const noexcept {
   const TreadView& tread = footholds.tread;
   const SolePair on_tread{sole_on(footholds.p_star_feet[0]), sole_on(footholds.p_star_feet[1])};
-  StandOff to{{tread.nosing_a_m, tread.nosing_b_m}, middle_of(on_tread).yaw_rad, {}};
   const double floor_m = middle_of(situation.soles).position_m.z();
+  StandOff to{{tread.nosing_a_m, tread.nosing_b_m}, middle_of(on_tread).yaw_rad, false, {}};
+  to.at_lip = middle_of(on_tread).position_m.z() < floor_m;
+  const double stand_off_m = to.at_lip ? params_.lip.stand_off_m : params_.stand_off_m;
   for (std::size_t i = 0; i < kFootCount; ++i) {
-    const double back_m =
-        params_.stand_off_m - toe_to_line_m(robot_->sole.collision, on_tread[i], to.nosing, to.yaw_rad);
+    const double back_m = stand_off_m - toe_to_line_m(robot_->sole.collision, on_tread[i], to.nosing, to.yaw_rad);
     to.soles[i] = {on_tread[i].position_m - rotation_z(to.yaw_rad) * Vec3{back_m, 0, 0}, to.yaw_rad};
     to.soles[i].position_m.z() = floor_m;
   }
@@ -172,7 +176,8 @@ bool ClimbPlanner::lined_up(const Situation& situation, const StandOff& to, std:
   return std::abs(off_m.x()) <= tolerance * params_.line_up.along_m &&
          std::abs(off_m.y()) <= tolerance * params_.line_up.lateral_m &&
          std::abs(math::wrap_angle(sole.yaw_rad - to.yaw_rad)) <= tolerance * params_.line_up.yaw_rad &&
-         toe_to_line_m(robot_->sole.collision, sole, to.nosing, to.yaw_rad) >= params_.min_stand_off_m;
+         toe_to_line_m(robot_->sole.collision, sole, to.nosing, to.yaw_rad) >=
+             (to.at_lip ? params_.lip.min_stand_off_m : params_.min_stand_off_m);
 }
 
 bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& footholds, StepGoal& goal) const noexcept {
@@ -196,8 +201,8 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   goal.target = floor_step(robot_->sole.collision, stance, foot, torso_goal, half_width_m,
                            shortened(params_.floor, stride_share_));
   // On the way, with the heading still wrong, no toe comes near the riser.
-  const double short_m =
-      params_.floor_clearance_m - toe_to_line_m(robot_->sole.collision, goal.target, to.nosing, to.yaw_rad);
+  const double short_m = (to.at_lip ? params_.lip.clearance_m : params_.floor_clearance_m) -
+                         toe_to_line_m(robot_->sole.collision, goal.target, to.nosing, to.yaw_rad);
   if (short_m > 0.0) goal.target.position_m -= rotation_z(to.yaw_rad) * Vec3{short_m, 0, 0};
   goal.foothold = foothold_at(goal.target, footholds.map_stamp_ns);
   return true;
@@ -330,7 +335,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
   const SolePair targets{sole_on(feet[0]), sole_on(feet[1])};
   decision.rise_m = middle_of(targets).position_m.z() - middle_of(situation.soles).position_m.z();
   const bool underfoot = treads_climbed_ > 0 && feet[0].polygon_id == tread_id_;
-  if (decision.rise_m < params_.min_rise_m || underfoot) {  // a search from before the last step
+  if (std::abs(decision.rise_m) < params_.min_rise_m || underfoot) {  // a search from before the last step
     decision.obstruction = StopReason::kMapStale;
     return decision;
   }

@@ -21,6 +21,19 @@ inline constexpr std::array<std::string_view, 2> kGaitPatternNames{"ds", "ss"};
 
 class ClimbPlanner {
  public:
+  // Before an edge that drops away.
+  struct LipParams {
+    double stand_off_m = 0.018;
+    double min_stand_off_m = 0.008;
+    double clearance_m = 0.008;
+
+    static void visit(auto& p, auto& field) {
+      field("stand_off_m", p.stand_off_m, 0.0, 0.3, "Collision toe to the lip.");
+      field("min_stand_off_m", p.min_stand_off_m, 0.0, 0.3, "Nearer is not lined up, whatever the tolerance.");
+      field.ordered("min_stand_off_m", "stand_off_m");
+      field("clearance_m", p.clearance_m, 0.0, 0.5, "Clearance of a toe from the lip on the way.");
+    }
+  };
   // When the feet are lined up before the stairs.
   struct LineUpParams {
     double along_m = 0.004;
@@ -63,6 +76,7 @@ class ClimbPlanner {
     double wider_m = 0.03;
     double slid_m = 0.012;
     std::uint32_t max_set_back = 2;
+    LipParams lip;
     LineUpParams line_up;
     LevelWalkParams walk;
 
@@ -96,6 +110,7 @@ class ClimbPlanner {
           "slid_m", p.slid_m, 0.002, 0.2,
           "A foot that is farther from where it landed, seen from the other one on its tread, is set back beside it.");
       field("max_set_back", p.max_set_back, 0, 100, "Feet that slid are set back so often on a tread.");
+      field("lip", p.lip);
       field("line_up", p.line_up);
       field("walk", p.walk);
     }
@@ -117,7 +132,7 @@ class ClimbPlanner {
     StepGoal trailing;                           // the step that may come after a leading or passing one
     StopReason obstruction = StopReason::kNone;  // without a step: why
     double measured_m = 0.0;
-    double rise_m = 0.0;  // of a leading step
+    double rise_m = 0.0;  // of a leading step, negative down
   };
 
   // robot: outlives the planner.
@@ -173,7 +188,7 @@ class ClimbPlanner {
   [[nodiscard]] bool floor_goal(const Situation& situation, const FootholdSet& footholds,
                                 StepGoal& goal) const noexcept;
   [[nodiscard]] StopReason reason_against(const Situation& situation, const FootholdSet& footholds) const noexcept;
-  // Soles straight back from the footholds, so far that the toes are stand_off_m from the nosing.
+  // Soles straight back from the footholds, so far that the toes are a stand-off from the nosing or the lip.
   struct StandOff;
   [[nodiscard]] StandOff stand_off(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] bool lined_up(const Situation& situation, const StandOff& to, std::size_t foot) const noexcept;

@@ -15,6 +15,7 @@ namespace polygmap {
 struct TorsoPose {
   Vec3 position_m = Vec3::Zero();
   double yaw_rad = 0.0;
+  double lean_rad = 0.0;  // ahead
 };
 
 // A sole that lies on a surface. position: of the sole frame's origin.
@@ -37,6 +38,13 @@ using SolePair = std::array<SolePose, kFootCount>;
 
 // Flattens a pose: where a sole stands is planned from, not how its ground slopes.
 [[nodiscard]] inline SolePose sole_pose(const Transform& sole) noexcept { return {sole.p_m, yaw_of(sole.R)}; }
+
+// In its own frame, a sole that was turned about its toe's edge until its heel has risen by that.
+[[nodiscard]] inline Transform turned_about_toe(const SoleModel& sole, double heel_up_rad) noexcept {
+  const Vec3 toe_m{sole.contact.toe_x_m, 0.0, 0.0};
+  const Mat3 R = rotation_y(heel_up_rad);
+  return {R, toe_m - R * toe_m};
+}
 
 // Eq. (31): the foot below a torso pose; half_width_m is the paper's y_b, z of the torso pose is height_m above it.
 [[nodiscard]] SolePose foot_of_torso(const TorsoPose& torso, Foot foot, double half_width_m, double height_m) noexcept;

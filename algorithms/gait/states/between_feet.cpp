@@ -15,11 +15,13 @@ void BetweenFeet::settle(const GaitInput& in, GaitShared& gait, double height_m)
   const TorsoPose middle = torso_between(gait.robot.legs, torso, soles);
   // The base is still elsewhere: rising at once would take the ground from the leg that it is far from.
   const TorsoPose here = torso_at(gait.robot.legs, torso, soles, plan.plan_T_base().p_m.head<2>());
-  crouch_.begin(in, gait, std::min(middle.position_m.z(), here.position_m.z()), middle.yaw_rad);
-  const double drop_m = plan.height_m() - crouch_.height_m();
+  TorsoPose rest = middle;
+  rest.position_m.z() = std::min(middle.position_m.z(), here.position_m.z());
+  crouch_.begin(in, gait, rest);
+  const double drop_m = plan.height_m() - crouch_.torso().position_m.z();
   const bool soon = crouch_.crouches() && drop_m > 0.0;
   const std::int32_t height_ticks = soon ? lowering_ticks(step.torso, drop_m) : settle_ticks;
-  plan.move_torso(crouch_.height_m(), crouch_.yaw_rad(), settle_ticks, height_ticks);
+  plan.move_torso(crouch_.torso(), settle_ticks, height_ticks);
   const Vec3 ahead_m = rotation_z(middle.yaw_rad) * Vec3{step.zmp_ahead_m, 0, 0};
   plan.rest_over(step.com, (middle.position_m + ahead_m).head<2>());
   tick_ = 0;
@@ -39,7 +41,7 @@ void BetweenFeet::rise(GaitShared& gait) noexcept {
   const double height_m = torso_between(gait.robot.legs, gait.params.step.torso, gait.plan.soles()).position_m.z();
   if (height_m < crouch_.upright_height_m() + gait.params.crouch.step_m) return;
   crouch_.set_upright_height_m(height_m);
-  gait.plan.move_torso(crouch_.height_m(), crouch_.yaw_rad(), settle_ticks, settle_ticks);
+  gait.plan.move_torso(crouch_.torso(), settle_ticks, settle_ticks);
 }
 
 }  // namespace polygmap

@@ -17,6 +17,7 @@ void BodyPlan::reset() noexcept {
   landed_ = {};
   held_ = false;
   com_shift_m_.setZero();
+  heel_up_rad_ = {};
 }
 
 void BodyPlan::place(const JointReference& joints, const Transform& plan_T_base) noexcept {
@@ -132,8 +133,8 @@ void BodyPlan::carry_to_odometry() noexcept {
   correction_.reset();
 }
 
-void BodyPlan::move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept {
-  torso_.plan(torso_state_, height_m, yaw_rad, ticks, height_ticks);
+void BodyPlan::move_torso(const TorsoPose& goal, std::int32_t ticks, std::int32_t height_ticks) noexcept {
+  torso_.plan(torso_state_, goal, ticks, height_ticks);
   torso_tick_ = 0;
 }
 
@@ -182,10 +183,24 @@ void BodyPlan::release_landed_foot() noexcept {
   landed_.release();
 }
 
+void BodyPlan::raise_heel(const SoleModel& sole, Foot foot, double heel_up_rad) noexcept {
+  double& now_rad = heel_up_rad_[index_of(foot)];
+  Transform& plan_T_sole = plan_T_sole_[index_of(foot)];
+  plan_T_sole = plan_T_sole * turned_about_toe(sole, heel_up_rad - now_rad);
+  now_rad = heel_up_rad;
+}
+
+void BodyPlan::lower_heels(const SoleModel& sole, double by_rad) noexcept {
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    if (is_on_toe(foot)) raise_heel(sole, foot, std::max(heel_up_rad_[index_of(foot)] - by_rad, 0.0));
+  }
+}
+
 void BodyPlan::settle_feet_apart(const FeetApartParams& params, const StateEstimate& state,
                                  const JointFeedback& feedback) noexcept {
   const std::array<double, kFootCount>& force_n = feedback.foot_force_n;
-  if (landed_.held() || !(force_n[0] > params.pressed_n && force_n[1] > params.pressed_n)) return;
+  if (landed_.held() || is_on_toe(Foot::kLeft) || is_on_toe(Foot::kRight)) return;
+  if (!(force_n[0] > params.pressed_n && force_n[1] > params.pressed_n)) return;
   const Mat3 plan_R_odom = odom_T_plan().R.transpose();
   const Vec3 seen_m = plan_R_odom * (state.odom_T_sole[0].p_m - state.odom_T_sole[1].p_m);
   const Vec2 off_m = (seen_m - (plan_T_sole_[0].p_m - plan_T_sole_[1].p_m)).head<2>();

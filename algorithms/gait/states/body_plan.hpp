@@ -46,12 +46,22 @@ class BodyPlan {
 
   // The plan goes on in odometry as it is now.
   void carry_to_odometry() noexcept;
-  void move_torso(double height_m, double yaw_rad, std::int32_t ticks, std::int32_t height_ticks) noexcept;
+  void move_torso(const TorsoPose& goal, std::int32_t ticks, std::int32_t height_ticks) noexcept;
   // The plan of the centre of mass, to be made anew from this tick on.
   [[nodiscard]] ComPlan& renewed_com() noexcept;
   // The centre of mass comes to rest there.
   void rest_over(const ComPlan::Params& params, const Vec2& plan_p_m) noexcept;
   void set_sole(Foot foot, const Transform& plan_T_sole) noexcept { plan_T_sole_[index_of(foot)] = plan_T_sole; }
+  // Turns a standing sole about its toe's edge, until its heel has risen by that.
+  void raise_heel(const SoleModel& sole, Foot foot, double heel_up_rad) noexcept;
+  // Of feet that stand: down again by so much at most, a tick.
+  void lower_heels(const SoleModel& sole, double by_rad) noexcept;
+  [[nodiscard]] Transform flat_sole(const SoleModel& sole, Foot foot) const noexcept {
+    return plan_T_sole(foot) * turned_about_toe(sole, -heel_up_rad_[index_of(foot)]);
+  }
+  [[nodiscard]] double heel_up_rad(Foot foot) const noexcept { return heel_up_rad_[index_of(foot)]; }
+  [[nodiscard]] bool is_on_toe(Foot foot) const noexcept { return heel_up_rad_[index_of(foot)] > 0.0; }
+  void leave_ground(Foot foot) noexcept { heel_up_rad_[index_of(foot)] = 0.0; }
   void restart_posture() noexcept { posture_.restart(); }
 
   // The foot stands where it is planned to be, early_m above its target, and is held there in odometry.
@@ -93,6 +103,7 @@ class BodyPlan {
   Vec2 com_shift_m_ = Vec2::Zero();  // of that plan: the leg in the air moved while the base was held
   Transform plan_T_base_;
   std::array<Transform, kFootCount> plan_T_sole_;
+  std::array<double, kFootCount> heel_up_rad_{};  // of feet that stand
   BaseCorrection correction_;
   PlannedPosture posture_;
   Vec3 reference_p_com_m_ = Vec3::Zero();  // centre of mass of the posture last asked for, base frame, without the next

@@ -9,9 +9,8 @@ namespace polygmap {
 class Crouch {
  public:
   // The torso is to be there when nothing is off: as low as the body is off now.
-  void begin(const GaitInput& in, const GaitShared& gait, double height_m, double yaw_rad) noexcept {
-    height_m_ = height_m;
-    yaw_rad_ = yaw_rad;
+  void begin(const GaitInput& in, const GaitShared& gait, const TorsoPose& torso) noexcept {
+    torso_ = torso;
     crouched_m_ = wanted_m(in, gait.params);
   }
   // One tick: lower, as soon as it is needed for longer than an estimate jumps. rest_ticks: of the torso's plan.
@@ -24,14 +23,17 @@ class Crouch {
     }
     if (++off_ticks_ < params.off_ticks) return;
     crouched_m_ = wanted;
-    gait.plan.move_torso(height_m(), yaw_rad_, std::max(rest_ticks, params.plan_ticks), params.plan_ticks);
+    gait.plan.move_torso(torso(), std::max(rest_ticks, params.plan_ticks), params.plan_ticks);
   }
-  void set_upright_height_m(double height_m) noexcept { height_m_ = height_m; }
+  void set_upright_height_m(double height_m) noexcept { torso_.position_m.z() = height_m; }
 
   [[nodiscard]] bool crouches() const noexcept { return crouched_m_ > 0.0; }
-  [[nodiscard]] double height_m() const noexcept { return height_m_ - crouched_m_; }
-  [[nodiscard]] double upright_height_m() const noexcept { return height_m_; }
-  [[nodiscard]] double yaw_rad() const noexcept { return yaw_rad_; }
+  [[nodiscard]] TorsoPose torso() const noexcept {
+    TorsoPose torso = torso_;
+    torso.position_m.z() -= crouched_m_;
+    return torso;
+  }
+  [[nodiscard]] double upright_height_m() const noexcept { return torso_.position_m.z(); }
 
  private:
   [[nodiscard]] static double wanted_m(const GaitInput& in, const GaitParams& params) noexcept {
@@ -40,7 +42,7 @@ class Crouch {
     return falls ? std::min(params.crouch.gain * off_m, params.crouch.max_m) : 0.0;
   }
 
-  double height_m_ = 0.0, yaw_rad_ = 0.0;  // plan frame, upright
+  TorsoPose torso_;  // plan frame, where nothing is off
   double crouched_m_ = 0.0;
   std::int32_t off_ticks_ = 0;  // for which more was wanted
 };

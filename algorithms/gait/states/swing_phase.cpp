@@ -18,14 +18,14 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
   const SolePair soles = body.soles();
   StepPlan plan = plan_step(params, goal_, soles, tried_);
   ComPlan& com = body.renewed_com();
-  com.plan(params.com, body.com(), zmp_of_swing(params, plan));
+  com.plan(params.com, body.com(), zmp_of_swing(plan));
   plan_torso(gait.robot.legs, params, soles, com, 0, plan);
   path_.plan(gait.robot.sole, body.plan_T_sole(goal_.foot), goal_.target, plan.shape, plan.swing_ticks);
   if (in.usable) {
     odom_off_path_m_ = in.state.odom_T_sole[index_of(goal_.foot)].p_m - body.plan_T_sole(goal_.foot).p_m;
     odom_off_path_m_.z() = 0.0;
   }
-  body.move_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, plan.swing_ticks, plan.rise_ticks);
+  body.move_torso(plan.touch_down, plan.swing_ticks, plan.rise_ticks);
   zmp_stance_m_ = plan.zmp_stance_m;
   gait.planner.latched(situation(in), decision);
 
@@ -43,6 +43,7 @@ void SwingPhase::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner
       .odom_T_executed = {}};
   gait.status.phase = GaitPhase::kSwing;
   gait.status.stands[index_of(goal_.foot)] = false;
+  body.leave_ground(goal_.foot);
   gait.memory.shifts = gait.memory.idle_ticks = gait.memory.obstacle_ticks = gait.memory.refusals = 0;
   gait.memory.rests_first = false;
   body.release_landed_foot();
@@ -220,9 +221,9 @@ void SwingPhase::land_soon(GaitShared& gait) noexcept {
   StepPlan plan = plan_step(step, goal_, soles, tried_);
   plan.swing_ticks = ticks;
   ComPlan& com = body.renewed_com();
-  com.plan(step.com, body.com(), zmp_of_swing(step, plan));
+  com.plan(step.com, body.com(), zmp_of_swing(plan));
   plan_torso(gait.robot.legs, step, soles, com, 0, plan);
-  body.move_torso(plan.touch_down.position_m.z(), plan.touch_down.yaw_rad, ticks, ticks);
+  body.move_torso(plan.touch_down, ticks, ticks);
   path_.redirect(timing_.tick(), timing_.pace(), target, ticks);
   odom_off_path_m_.setZero();  // the path begins elsewhere now
   timing_.begin_straight();
@@ -299,10 +300,11 @@ void SwingPhase::stop_foot(const GaitInput& in, GaitShared& gait) const noexcept
 void SwingPhase::lower_torso(GaitShared& gait, const SolePose& sole) const noexcept {
   SolePair soles = gait.plan.soles();
   soles[index_of(goal_.foot)] = sole;
-  const TorsoPose low = torso_over(gait.robot.legs, gait.params.step.torso, other(goal_.foot), soles);
-  const double height_m = std::min(low.position_m.z() - gait.params.swing.lowering_spare_m, gait.plan.height_m());
+  TorsoPose low = torso_over(gait.robot.legs, gait.params.step.torso, other(goal_.foot), soles);
+  double& height_m = low.position_m.z();
+  height_m = std::min(height_m - gait.params.swing.lowering_spare_m, gait.plan.height_m());
   const std::int32_t ticks = lowering_ticks(gait.params.step.torso, gait.plan.height_m() - height_m);
-  gait.plan.move_torso(height_m, low.yaw_rad, ticks, ticks);
+  gait.plan.move_torso(low, ticks, ticks);
 }
 
 // The foot goes back: the weight rests over the stance foot, as far towards the free foot as the sole carries. The

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "algorithms/gait/states/weight_shift.hpp"
 
+#include <algorithm>
+
 namespace polygmap {
 
 void WeightShift::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanner::Decision& decision,
@@ -11,17 +13,19 @@ void WeightShift::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanne
   body.carry_to_odometry();
   decision_ = decision;
   gait.status.phase = GaitPhase::kDoubleSupport;
-  const SolePair soles = body.soles();
-  StepPlan plan = plan_step(params, decision.goal, soles, kStepTries[0]);
+  const std::array<Transform, kFootCount> flat{body.flat_sole(gait.robot.sole, Foot::kLeft),
+                                               body.flat_sole(gait.robot.sole, Foot::kRight)};
+  const SolePair soles{sole_pose(flat[0]), sole_pose(flat[1])};
+  StepPlan plan = plan_step(params, decision.goal, soles, tries_for(decision.goal, soles)[0]);
   if (same_foot) plan.shift_ticks = reshift_ticks;
   ComPlan& com = body.renewed_com();
   plan_shift(params, body.com(), reshift_ticks, plan, com);
   shift_ticks_ = plan.shift_ticks;
   swing_ticks_ = plan.swing_ticks;
   plan_torso(gait.robot.legs, params, soles, com, shift_ticks_, plan);
-  crouch_.begin(in, gait, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad);
-  body.move_torso(crouch_.height_m(), crouch_.yaw_rad(), shift_ticks_, shift_ticks_);
-  search_.begin(gait.robot, params, decision.goal, decision.trailing, shift_ticks_, body.torso(), body.plan_T_sole());
+  crouch_.begin(in, gait, plan.lift_off);
+  body.move_torso(crouch_.torso(), shift_ticks_, shift_ticks_);
+  search_.begin(gait.robot, params, decision.goal, decision.trailing, shift_ticks_, body.torso(), flat);
 }
 
 Transition WeightShift::tick(const GaitInput& in, GaitShared& gait) noexcept {
@@ -64,6 +68,11 @@ Transition WeightShift::legs_cannot(const GaitInput& in, GaitShared& gait) const
 void WeightShift::follow(const GaitInput& in, GaitShared& gait) noexcept {
   if (in.held) return;
   crouch_.update(in, gait, shift_ticks_ - tick_);
+  const Foot foot = decision_.goal.foot;
+  if (search_.state() == StepSearch::State::kFound && search_.plan().heel_up_rad > 0.0) {
+    const double heel_up_rad = search_.plan().heel_up_rad_at(tick_);
+    gait.plan.raise_heel(gait.robot.sole, foot, std::max(heel_up_rad, gait.plan.heel_up_rad(foot)));
+  }
   tick_ = next_tick(tick_);
 }
 

@@ -25,13 +25,15 @@ StepKnots::StepKnots(const RobotModel& robot, const StepParams& params, std::int
       count_(1 + (step.shift_ticks + step.swing_ticks + knot_ticks_ - 1) / knot_ticks_) {
   const HorizontalMotion com = TorsoTrajectory::horizontal(from);
   com_.plan(params.com, com, zmp_of_shift(params, step, ComPlan::zmp_under(params.com, com)));
-  StepPlan plan = step;
+  plan_ = step;
+  sole_ = robot.sole;
+  StepPlan& plan = plan_;
   plan_torso(robot.legs, params, {sole_pose(soles[0]), sole_pose(soles[1])}, com_, plan.shift_ticks, plan);
   torso_at_landing_ = plan.touch_down;
-  shift_.plan(from, plan.lift_off.position_m.z(), plan.lift_off.yaw_rad, plan.shift_ticks, plan.shift_ticks);
-  lean_.plan(shift_.at(plan.shift_ticks, com), plan.touch_down.position_m.z(), plan.touch_down.yaw_rad,
-             plan.swing_ticks, plan.rise_ticks);
-  swing_.plan(robot.sole, soles[index_of(foot_)], plan.goal.target, plan.shape, plan.swing_ticks);
+  shift_.plan(from, plan.lift_off, plan.shift_ticks, plan.shift_ticks);
+  lean_.plan(shift_.at(plan.shift_ticks, com), plan.touch_down, plan.swing_ticks, plan.rise_ticks);
+  swing_.plan(robot.sole, soles[index_of(foot_)] * turned_about_toe(sole_, plan.heel_up_rad), plan.goal.target,
+              plan.shape, plan.swing_ticks);
 }
 
 double StepKnots::air_roll_rad(const StepKnot& knot) const noexcept {
@@ -48,6 +50,8 @@ StepKnot StepKnots::operator[](std::int32_t i) const noexcept {
   const std::int32_t swing_tick = std::min(knot.tick - shift_ticks_, swing_.duration_ticks());
   if (swing_tick < 0) {
     knot.odom_T_base = TorsoTrajectory::pose(shift_.at(knot.tick, com_.at(knot.tick)));
+    Transform& rear = knot.odom_T_sole[index_of(foot_)];
+    if (plan_.heel_up_rad > 0.0) rear = rear * turned_about_toe(sole_, plan_.heel_up_rad_at(knot.tick));
   } else {
     const TorsoTrajectory::State torso = lean_.at(swing_tick, com_.at(knot.tick));
     knot.odom_T_base = TorsoTrajectory::pose(torso);

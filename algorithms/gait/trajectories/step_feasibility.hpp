@@ -45,6 +45,8 @@ class StepKnots {
   ComPlan com_;
   Swing swing_;
   TorsoPose torso_at_landing_;
+  StepPlan plan_;
+  SoleModel sole_;
   double joint_margin_rad_ = 0.0;
   double start_z_m_ = 0.0, goal_z_m_ = 0.0;
   double half_width_m_ = 0.0, most_air_roll_rad_ = 0.0;

@@ -3,38 +3,93 @@
 
 #include <algorithm>
 
+#include "algorithms/core/time.hpp"
+#include "algorithms/geometry/line.hpp"
+
 namespace polygmap {
+
+namespace {
+
+// In which the weight goes from one foot to the other.
+std::int32_t zmp_ramp_ticks(const StepParams& params) noexcept {
+  return params.durations.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
+}
+
+// Where a foot carries all.
+Vec2 zmp_in(const StepParams& params, const SolePose& sole, Foot foot, bool down) noexcept {
+  const Vec3 local_m{down ? params.down.zmp_ahead_m : params.zmp_ahead_m, -side_sign(foot) * params.zmp_inward_m, 0.0};
+  return (sole.position_m + rotation_z(sole.yaw_rad) * local_m).head<2>();
+}
+
+// Down: the weight waits between the toe's edge of the upper foot and the other one while the upper heel rises.
+void plan_heel_rise(const StepParams& params, const SolePair& soles, StepPlan& plan) noexcept {
+  constexpr double kQuintic = 1.875;  // greatest speed between two rests, of way over time
+  const StepDownParams& down = params.down;
+  const HeelRiseParams& heel = down.heel_rise;
+  const StepGoal& goal = plan.goal;
+  const bool is_leading = leads(goal.kind);
+  const Foot upper = is_leading ? other(goal.foot) : goal.foot;
+  const double drop_m = soles[index_of(upper)].position_m.z() - goal.target.position_m.z();
+  const double heel_up_rad = math::clamp(heel.rad_per_m * (drop_m - heel.flat_m), 0.0, heel.most_rad);
+  const auto heel_ticks = static_cast<std::int32_t>(kQuintic * heel_up_rad / heel.radps / kTick_s);
+  WeightTransfer& transfer = is_leading ? plan.next : plan.shift;
+  transfer.hold_ticks = down.landing_hold_ticks;
+  if (heel_up_rad > 0.0) {
+    transfer.to_between_ticks = transfer.on_ticks = heel.ramp_ticks;
+    transfer.stay_ticks = std::max(heel_ticks - heel.ramp_ticks - params.lift_hold_ticks, 1);
+    const Vec2 from_m = is_leading ? plan.zmp_stance_m : zmp_in(params, soles[index_of(upper)], upper, true);
+    const Vec2 to_m = is_leading ? plan.zmp_next_m : plan.zmp_stance_m;
+    transfer.between_m = from_m + heel.between_share * (to_m - from_m);
+  }
+  if (is_leading) return;
+  plan.heel_up_rad = heel_up_rad;
+  plan.heel_ticks = transfer.stay_ticks + transfer.on_ticks + params.lift_hold_ticks;
+  plan.shift_ticks = transfer.ticks() + params.lift_hold_ticks;
+}
+
+}  // namespace
+
+bool goes_down(const StepGoal& goal, const SolePair& soles) noexcept {
+  constexpr double kLeastDrop_m = 0.015;
+  return onto_tread(goal.kind) && goal.target.position_m.z() < soles[index_of(goal.foot)].position_m.z() - kLeastDrop_m;
+}
+
+const StepTries& tries_for(const StepGoal& goal, const SolePair& soles) noexcept {
+  if (goes_down(goal, soles)) return leads(goal.kind) ? kDownTries : kDownAfterTries;
+  return goal.kind == StepKind::kPassing ? kPassingTries : kStepTries;
+}
 
 StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePair& soles,
                    const StepTry& tried) noexcept {
-  const bool on_floor = on_level(goal.kind), passing = goal.kind == StepKind::kPassing;
+  const bool on_floor = on_level(goal.kind), passing = goal.kind == StepKind::kPassing, down = goes_down(goal, soles);
   const Foot stance = other(goal.foot);
   SolePair landed = soles;
   landed[index_of(goal.foot)] = goal.target;
 
   StepPlan plan;
   plan.goal = goal;
-  plan.shape = on_floor ? params.floor_swing : passing ? params.passing_swing : params.stair_swing;
+  plan.shape = on_floor  ? params.floor_swing
+               : down    ? params.down_swing
+               : passing ? params.passing_swing
+                         : params.stair_swing;
   plan.shift_ticks = on_floor ? params.durations.floor_shift_ticks : params.durations.stair_shift_ticks;
   const std::int32_t usual_ticks = on_floor  ? params.durations.floor_swing_ticks
+                                   : down    ? params.durations.down_swing_ticks
                                    : passing ? params.durations.passing_swing_ticks
                                              : params.durations.stair_swing_ticks;
   plan.swing_ticks = static_cast<std::int32_t>(tried.longer * usual_ticks);
-  const double rise_share = on_floor ? 1.0 : passing ? params.passing_rise_share : params.rise_share;
+  const double rise_share = on_floor || down ? 1.0 : passing ? params.passing_rise_share : params.rise_share;
   plan.rise_ticks = static_cast<std::int32_t>(std::min(tried.rise_longer * rise_share, 1.0) * plan.swing_ticks);
   plan.tried = tried;
   const bool needed = goal.kind == StepKind::kClosing || goal.kind == StepKind::kTrailing;
   plan.joint_margin_rad = needed ? params.needed_margin_rad : params.joint_margin_rad;
   plan.shape.toe_down_rad = on_floor ? 0.5 * tried.toe_down_rad : tried.toe_down_rad;
-  const auto zmp_in = [&](Foot foot) -> Vec2 {
-    const SolePose& sole = landed[index_of(foot)];
-    const Vec3 local_m{params.zmp_ahead_m, -side_sign(foot) * params.zmp_inward_m, 0.0};
-    return (sole.position_m + rotation_z(sole.yaw_rad) * local_m).head<2>();
-  };
-  plan.zmp_stance_m = zmp_in(stance);
+  plan.zmp_stance_m = zmp_in(params, landed[index_of(stance)], stance, down);
   // After a step that leads the weight goes on to that foot; after the others it may have to stop anywhere.
-  plan.zmp_next_m = zmp_in(goal.foot);
+  plan.zmp_next_m = zmp_in(params, goal.target, goal.foot, down);
   if (!leads(goal.kind)) plan.zmp_next_m = 0.5 * (plan.zmp_next_m + plan.zmp_stance_m);
+  plan.shift = plan.next = {params.landing_hold_ticks, 0, 0, zmp_ramp_ticks(params), Vec2::Zero()};
+  if (down) plan_heel_rise(params, soles, plan);
   return plan;
 }
 
@@ -42,30 +97,57 @@ void plan_torso(const LegGeometry& geometry, const StepParams& params, const Sol
                 std::int32_t lift_off_tick, StepPlan& plan) noexcept {
   SolePair landed = soles;
   landed[index_of(plan.goal.foot)] = plan.goal.target;
-  plan.lift_off = torso_at(geometry, params.torso, soles, com.at(lift_off_tick + params.leave_ticks).position_m);
-  plan.touch_down = torso_at(geometry, params.torso, landed, com.at(lift_off_tick + plan.swing_ticks).position_m);
+  TorsoParams torso = params.torso;
+  double turn_rad = 0.0, lean_rad = 0.0;  // in a split stance down
+  if (goes_down(plan.goal, soles)) {
+    torso.max_leg_m = params.down.max_leg_m;
+    const double share = math::clamp(std::abs(landed[0].position_m.z() - soles[0].position_m.z() +
+                                              landed[1].position_m.z() - soles[1].position_m.z()) /
+                                         params.down.full_m,
+                                     0.0, 1.0);
+    lean_rad = share * params.down.lean_rad;
+    turn_rad = share * params.down.turn_rad * (leads(plan.goal.kind) ? -1.0 : 1.0) * side_sign(plan.goal.foot);
+  }
+  const auto torso_when = [&](std::int32_t tick, const SolePair& stand, bool is_split) {
+    const double lean = is_split ? lean_rad : 0.0;
+    // The centre of mass is above the base, and ahead of one that leans.
+    const Vec2 base_m =
+        com.at(tick).position_m - lean * params.down.com_above_base_m * unit_at(middle_of(stand).yaw_rad);
+    return torso_at(geometry, torso, stand, base_m, is_split ? turn_rad : 0.0, lean);
+  };
+  plan.lift_off = torso_when(lift_off_tick + params.leave_ticks, soles, !leads(plan.goal.kind));
+  plan.touch_down = torso_when(lift_off_tick + plan.swing_ticks, landed, leads(plan.goal.kind));
   if (!leads(plan.goal.kind)) return;
   // Rising with the foot gives the leading leg room to fold, at a lower knee speed.
   const double tall_m = soles[index_of(other(plan.goal.foot))].position_m.z() + params.torso.lead_height_m;
   plan.touch_down.position_m.z() = std::min(plan.touch_down.position_m.z(), tall_m);
 }
 
-ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept {
-  const std::int32_t stay = plan.swing_ticks + params.landing_hold_ticks;
-  const std::int32_t ramp = params.durations.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
+ZmpKnots zmp_of_swing(const StepPlan& plan) noexcept {
+  const WeightTransfer& next = plan.next;
   ZmpKnots knots;
-  (void)knots.try_push_back({stay, plan.zmp_stance_m});
-  (void)knots.try_push_back({stay + std::max(ramp, 1), plan.zmp_next_m});
+  std::int32_t tick = plan.swing_ticks + next.hold_ticks;
+  (void)knots.try_push_back({tick, plan.zmp_stance_m});
+  if (next.stay_ticks > 0) {
+    (void)knots.try_push_back({tick += next.to_between_ticks, next.between_m});
+    (void)knots.try_push_back({tick += next.stay_ticks, next.between_m});
+  }
+  (void)knots.try_push_back({tick + std::max(next.on_ticks, 1), plan.zmp_next_m});
   return knots;
 }
 
 ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2& start_m) noexcept {
+  const WeightTransfer& shift = plan.shift;
   ZmpKnots knots;
   const std::int32_t over = std::max(plan.shift_ticks - params.lift_hold_ticks, 2);
-  const std::int32_t ramp = params.durations.stair_shift_ticks - params.landing_hold_ticks - params.lift_hold_ticks;
-  (void)knots.try_push_back({std::max(over - ramp, over / 5), start_m});
+  const std::int32_t leave = over - shift.on_ticks, arrive = leave - shift.stay_ticks;
+  (void)knots.try_push_back({std::max(arrive - shift.to_between_ticks, over / 5), start_m});
+  if (shift.stay_ticks > 0) {
+    (void)knots.try_push_back({std::max(arrive, over / 5 + 1), shift.between_m});
+    (void)knots.try_push_back({std::max(leave, over / 5 + 2), shift.between_m});
+  }
   (void)knots.try_push_back({over, plan.zmp_stance_m});
-  for (const ZmpKnot& knot : zmp_of_swing(params, plan)) {
+  for (const ZmpKnot& knot : zmp_of_swing(plan)) {
     (void)knots.try_push_back({plan.shift_ticks + knot.tick, knot.zmp_m});
   }
   return knots;

@@ -16,6 +16,7 @@ struct StepDurations {
   std::int32_t stair_shift_ticks = 165;
   std::int32_t stair_swing_ticks = 450;
   std::int32_t passing_swing_ticks = 460;
+  std::int32_t down_swing_ticks = 600;
   std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
 
@@ -23,8 +24,56 @@ struct StepDurations {
     field("stair_shift_ticks", p.stair_shift_ticks, 66, 2000, "Double support before a step on the stairs: 0.33 s.");
     field("stair_swing_ticks", p.stair_swing_ticks, 50, 2000, "A swing onto a tread: 0.90 s.");
     field("passing_swing_ticks", p.passing_swing_ticks, 50, 2000, "A swing past a tread: 0.92 s.");
+    field("down_swing_ticks", p.down_swing_ticks, 50, 2000, "A swing down onto a tread.");
     field("floor_shift_ticks", p.floor_shift_ticks, 66, 2000, "Double support before a step on the floor.");
     field("floor_swing_ticks", p.floor_swing_ticks, 50, 2000, "A swing on the floor.");
+  }
+};
+// The rear heel rises before its foot leaves a higher tread: flat, the ankle's range ends above some 0.1 m.
+struct HeelRiseParams {
+  double flat_m = 0.04;
+  double rad_per_m = 3.8;
+  double most_rad = 0.65;
+  double radps = 3.0;
+  std::int32_t ramp_ticks = 40;
+  double between_share = 0.68;
+
+  static void visit(auto& p, auto& field) {
+    field("flat_m", p.flat_m, 0.0, 0.5, "Down by no more than this the rear sole stays flat until it lifts.");
+    field("rad_per_m", p.rad_per_m, 0.0, 20.0, "Beyond that the heel rises by this.");
+    field("most_rad", p.most_rad, 0.0, 1.0, "The heel rises no farther.");
+    field("radps", p.radps, 0.1, 10.0, "The heel rises no faster.");
+    field("ramp_ticks", p.ramp_ticks, 10, 500, "The weight takes as long to there and as long on to the lower foot.");
+    field("between_share", p.between_share, 0.0, 1.0,
+          "While it rises the zero-moment point is this share of the way on, ahead of the rear toe: its ankle holds 36 "
+          "Nm.");
+  }
+};
+// Steps down over a lip.
+struct StepDownParams {
+  double zmp_ahead_m = 0.01;
+  double max_leg_m = 0.612;
+  std::int32_t landing_hold_ticks = 100;
+  double full_m = 0.13;
+  double lean_rad = 0.15;
+  double turn_rad = 0.35;
+  double com_above_base_m = 0.09;
+  HeelRiseParams heel_rise;
+
+  static void visit(auto& p, auto& field) {
+    field("zmp_ahead_m", p.zmp_ahead_m, -0.05, 0.12,
+          "Zero-moment point ahead of the ankle: where the ankles of both legs keep most of their ranges.");
+    field("max_leg_m", p.max_leg_m, 0.4, 0.63, "Hip pitch to ankle, of 0.630 stretched.");
+    field(
+        "landing_hold_ticks", p.landing_hold_ticks, 0, 500,
+        "The weight sets off so long after the leading foot's landing: a body far ahead of a flat rear foot bends its "
+        "ankle.");
+    field("full_m", p.full_m, 0.01, 0.5, "The torso leans and turns in full from this drop on, and less below it.");
+    field("lean_rad", p.lean_rad, 0.0, 0.5,
+          "The torso leans ahead by this when the leading foot lands, which keeps the hips back.");
+    field("turn_rad", p.turn_rad, 0.0, 0.5, "It turns by this, the hip of the leading foot ahead.");
+    field("com_above_base_m", p.com_above_base_m, 0.0, 0.5, "Centre of mass above the base, with legs bent.");
+    field("heel_rise", p.heel_rise);
   }
 };
 struct StepParams {
@@ -49,6 +98,17 @@ struct StepParams {
                            .toe_down_full = 0.29,
                            .toe_up_begin = 0.30,
                            .toe_up_end = 0.70};
+  // Down over a lip: ahead first, then down before it, and the last part back.
+  SwingShape down_swing{.lift_end = 0.26,
+                        .forward_begin = 0.14,
+                        .forward_end = 0.56,
+                        .landing_begin = 0.57,
+                        .short_m = -0.012,
+                        .short_begin = 0.72,
+                        .short_end = 0.95,
+                        .clearance_m = 0.035,
+                        .retreat_m = -0.014,
+                        .retreat_end = 0.20};
   ComPlan::Params com;
   double max_zmp_offset_m = 0.03;
   double zmp_ahead_m = 0.0;
@@ -64,6 +124,7 @@ struct StepParams {
   double knee_min_rad = 0.08;
   double speed_share = 0.95;
   double torque_share = 1.0;
+  StepDownParams down;
   StepDurations durations;
 
   static void visit(auto& p, auto& field) {
@@ -71,6 +132,7 @@ struct StepParams {
     field("stair_swing", p.stair_swing);
     field("floor_swing", p.floor_swing);
     field("passing_swing", p.passing_swing);
+    field("down_swing", p.down_swing);
     field("com", p.com);
     field("max_zmp_offset_m", p.max_zmp_offset_m, 0.0, 0.1, "The zero-moment point goes no farther, to set off.");
     field("zmp_ahead_m", p.zmp_ahead_m, -0.05, 0.1,
@@ -98,6 +160,7 @@ struct StepParams {
     field("torque_share", p.torque_share, 0.1, 1.0,
           "A plan asks the knee that stands alone for at most this share of its drive's torque: one that has no more "
           "lags and then throws the body up.");
+    field("down", p.down);
     field("durations", p.durations);
   }
 };
@@ -112,8 +175,27 @@ struct StepTry {
 inline constexpr std::size_t kStepTryCount = 8;
 using StepTries = std::array<StepTry, kStepTryCount>;
 inline constexpr StepTries kStepTries{{{0.3}, {0.2}, {0.4}, {0.1}, {0.5}, {0.3, 1.15}, {0.2, 1.15}, {0.4, 1.15}}};
+// Down: the foot that leads stays level, the one that follows keeps its heel up until it is over the lip.
+inline constexpr StepTries kDownTries{
+    {{0.0}, {0.1}, {0.2}, {0.0, 1.25}, {0.1, 1.25}, {0.2, 1.25}, {0.1, 1.5}, {0.0, 1.5}}};
+inline constexpr StepTries kDownAfterTries{
+    {{0.4}, {0.3}, {0.5}, {0.2}, {0.4, 1.25}, {0.3, 1.25}, {0.5, 1.25}, {0.6, 1.25}}};
 inline constexpr StepTries kPassingTries{
     {{0.4}, {0.5}, {0.3}, {0.6}, {0.2}, {0.4, 1.15}, {0.5, 1.15}, {0.5, 1.15, 1.1}}};
+
+// From where its foot stands it comes down onto a tread.
+[[nodiscard]] bool goes_down(const StepGoal& goal, const SolePair& soles) noexcept;
+[[nodiscard]] const StepTries& tries_for(const StepGoal& goal, const SolePair& soles) noexcept;
+
+// How the zero-moment point goes from one foot to the other.
+struct WeightTransfer {
+  std::int32_t hold_ticks = 0;        // until it sets off
+  std::int32_t to_between_ticks = 0;  // then to between the feet, where it stays; none: straight on
+  std::int32_t stay_ticks = 0;
+  std::int32_t on_ticks = 1;
+  Vec2 between_m = Vec2::Zero();
+  [[nodiscard]] std::int32_t ticks() const noexcept { return hold_ticks + to_between_ticks + stay_ticks + on_ticks; }
+};
 
 struct StepPlan {
   StepGoal goal;
@@ -127,6 +209,13 @@ struct StepPlan {
   std::int32_t swing_ticks = 1;
   std::int32_t rise_ticks = 1;    // of the swing: the torso has risen
   double joint_margin_rad = 0.0;  // what it is to keep from the joints' ranges
+  double heel_up_rad = 0.0;       // of its foot, when it lifts off
+  std::int32_t heel_ticks = 1;    // before which it begins to rise
+  WeightTransfer shift, next;     // onto the stance foot, and from it after the landing
+
+  [[nodiscard]] double heel_up_rad_at(std::int32_t tick) const noexcept {
+    return heel_up_rad * smooth_window(tick, shift_ticks - heel_ticks, shift_ticks);
+  }
 };
 
 // All but the torso.
@@ -140,7 +229,7 @@ void plan_torso(const LegGeometry& geometry, const StepParams& params, const Sol
 
 // Zero-moment points of a step whose shift begins with one at start_m, and from its lift-off on.
 [[nodiscard]] ZmpKnots zmp_of_shift(const StepParams& params, const StepPlan& plan, const Vec2& start_m) noexcept;
-[[nodiscard]] ZmpKnots zmp_of_swing(const StepParams& params, const StepPlan& plan) noexcept;
+[[nodiscard]] ZmpKnots zmp_of_swing(const StepPlan& plan) noexcept;
 // Sets plan.shift_ticks, not below least_ticks, and plans the centre of mass on from `from`. As plan.shift_ticks was,
 // sooner where the weight is on its way already, or later where it stands over the other foot with little room to set
 // off: the first that needs a small offset of the zero-moment point.

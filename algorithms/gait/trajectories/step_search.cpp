@@ -27,11 +27,12 @@ void StepSearch::try_candidate(const RobotModel& robot, const StepParams& params
   TorsoTrajectory::State from = from_;
   if (leading_found_) {
     soles[index_of(goal_.foot)] = goal_.target.transform();
-    from = TorsoTrajectory::at_rest({rotation_z(torso_landed_.yaw_rad), torso_landed_.position_m});
+    from = TorsoTrajectory::at_rest(
+        {rotation_zyx(torso_landed_.yaw_rad, torso_landed_.lean_rad, 0.0), torso_landed_.position_m});
     TorsoTrajectory::set_horizontal(from, com_landed_);
   }
-  const StepTries& tries = goal.kind == StepKind::kPassing ? kPassingTries : kStepTries;
-  candidate_ = plan_step(params, goal, {sole_pose(soles[0]), sole_pose(soles[1])}, tries[try_]);
+  const SolePair from_soles{sole_pose(soles[0]), sole_pose(soles[1])};
+  candidate_ = plan_step(params, goal, from_soles, tries_for(goal, from_soles)[try_]);
   if (leading_found_) {
     candidate_.joint_margin_rad = params.joint_margin_rad;  // the needed one is for a foot that lands some mm off
   } else {

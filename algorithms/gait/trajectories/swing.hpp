@@ -40,15 +40,16 @@ struct SwingShape {
     field("forward_end", p.forward_end, 0.1, 1.0, "Horizontal motion ends but for the last part.");
     field.ordered("forward_begin", "forward_end");
     field("landing_begin", p.landing_begin, 0.05, 0.99, "The way down begins.");
-    field("short_m", p.short_m, 0.0, 0.05,
+    field("short_m", p.short_m, -0.05, 0.05,
           "The last part of the way ahead, which the foot goes on the way down: it comes 2 mm too far by its inertia, "
-          "up to 4 on slack drives.");
+          "up to 4 on slack drives. Negative: it goes too far, and back on the way down.");
     field("short_begin", p.short_begin, 0.0, 0.95, "That last part begins.");
     field("short_end", p.short_end, 0.05, 1.0, "That last part ends.");
     field.ordered("short_begin", "short_end");
     field("clearance_m", p.clearance_m, 0.005, 0.3,
           "Lowest point of the foot at the apex above the higher of start and target.");
-    field("retreat_m", p.retreat_m, 0.0, 0.2, "The foot goes this far away from the riser while rising.");
+    field("retreat_m", p.retreat_m, -0.1, 0.2,
+          "The foot goes this far back from the riser ahead while rising; negative: on from the one behind it.");
     field("retreat_end", p.retreat_end, 0.01, 1.0, "The retreat ends.");
     field("toe_down_rad", p.toe_down_rad, 0.0, 1.0,
           "Pitch at the top of the rise: folds the leg without the ankle's limit.");

@@ -7,13 +7,15 @@
 
 namespace polygmap {
 
-double reach_height_m(const LegGeometry& g, const Vec3& base_m, double yaw_rad, Foot leg, const SolePose& sole,
+double reach_height_m(const LegGeometry& g, const TorsoPose& base, Foot leg, const SolePose& sole,
                       double max_leg_m) noexcept {
   // The leg bends in a plane through the hip's roll axis: its forward reach and the distance from that axis add up to
   // the leg, the axis being |hip_p_hip_pitch.z| above the pitch joint.
-  const Vec3 hip_m{g.base_p_hip_m.x() + g.hip_p_hip_pitch_m.x(),
+  // A base that leans takes the hips back, which hang below it.
+  const double back_m = math::sin(base.lean_rad) * -(g.base_p_hip_m.z() + g.hip_p_hip_pitch_m.z());
+  const Vec3 hip_m{g.base_p_hip_m.x() + g.hip_p_hip_pitch_m.x() - back_m,
                    side_sign(leg) * (g.base_p_hip_m.y() + g.hip_p_hip_pitch_m.y()), 0.0};
-  const Vec3 d = rotation_z(yaw_rad).transpose() * (sole.position_m - base_m) - hip_m;
+  const Vec3 d = rotation_z(base.yaw_rad).transpose() * (sole.position_m - base.position_m) - hip_m;
   const double in_plane_m =
       math::sqrt(std::max(math::square(max_leg_m) - math::square(d.x()), 0.0)) - g.hip_p_hip_pitch_m.z();
   const double drop_m = math::sqrt(std::max(math::square(in_plane_m) - math::square(d.y()), 0.0));
@@ -26,17 +28,16 @@ double allowed_height_m(const LegGeometry& geometry, const TorsoParams& params, 
                         const TorsoPose& torso) noexcept {
   double z_m = std::max(soles[0].position_m.z(), soles[1].position_m.z()) + params.height_m;
   for (const Foot leg : {Foot::kLeft, Foot::kRight}) {
-    z_m = std::min(
-        z_m, reach_height_m(geometry, torso.position_m, torso.yaw_rad, leg, soles[index_of(leg)], params.max_leg_m));
+    z_m = std::min(z_m, reach_height_m(geometry, torso, leg, soles[index_of(leg)], params.max_leg_m));
   }
   return z_m;
 }
 
 }  // namespace
 
-TorsoPose torso_at(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles,
-                   const Vec2& base_m) noexcept {
-  TorsoPose torso{{base_m.x(), base_m.y(), 0.0}, middle_of(soles).yaw_rad};
+TorsoPose torso_at(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles, const Vec2& base_m,
+                   double turn_rad, double lean_rad) noexcept {
+  TorsoPose torso{{base_m.x(), base_m.y(), 0.0}, middle_of(soles).yaw_rad + turn_rad, lean_rad};
   torso.position_m.z() = allowed_height_m(geometry, params, soles, torso);
   return torso;
 }
@@ -93,10 +94,10 @@ void TorsoTrajectory::set_horizontal(State& state, const HorizontalMotion& motio
   }
 }
 
-void TorsoTrajectory::plan(const State& from, double height_m, double yaw_rad, std::int32_t duration_ticks,
+void TorsoTrajectory::plan(const State& from, const TorsoPose& to, std::int32_t duration_ticks,
                            std::int32_t height_ticks) noexcept {
-  const std::array<double, kAxes - 2> goal{height_m, 0.0, 0.0,
-                                           from[5].position + math::wrap_angle(yaw_rad - from[5].position)};
+  const std::array<double, kAxes - 2> goal{to.position_m.z(), 0.0, to.lean_rad,
+                                           from[5].position + math::wrap_angle(to.yaw_rad - from[5].position)};
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const std::int32_t ticks = std::max(i == 0 ? height_ticks : duration_ticks, 1);
     axes_[i] = Quintic(from[i + 2], {goal[i]}, ticks * kTick_s);

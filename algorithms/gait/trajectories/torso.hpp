@@ -30,13 +30,14 @@ struct TorsoParams {
   }
 };
 
-// Base height at which the leg to `sole` is max_leg_m long, for a base at (x, y) with that heading.
-[[nodiscard]] double reach_height_m(const LegGeometry& geometry, const Vec3& base_m, double yaw_rad, Foot leg,
-                                    const SolePose& sole, double max_leg_m) noexcept;
+// Base height at which the leg to `sole` is max_leg_m long, for a base at (x, y) with that heading and lean.
+[[nodiscard]] double reach_height_m(const LegGeometry& geometry, const TorsoPose& base, Foot leg, const SolePose& sole,
+                                    double max_leg_m) noexcept;
 
-// With its base there, heading between the soles; height: the highest that both feet allow.
+// With its base there, heading between the soles and as much to the left, leaning ahead; height: the highest that both
+// feet allow.
 [[nodiscard]] TorsoPose torso_at(const LegGeometry& geometry, const TorsoParams& params, const SolePair& soles,
-                                 const Vec2& base_m) noexcept;
+                                 const Vec2& base_m, double turn_rad = 0.0, double lean_rad = 0.0) noexcept;
 // At rest over the foot that stands alone.
 [[nodiscard]] TorsoPose torso_over(const LegGeometry& geometry, const TorsoParams& params, Foot stance,
                                    const SolePair& soles) noexcept;
@@ -46,7 +47,7 @@ struct TorsoParams {
 [[nodiscard]] TorsoPose torso_between(const LegGeometry& geometry, const TorsoParams& params,
                                       const SolePair& soles) noexcept;
 
-// x, y, z, roll, pitch, yaw: height and attitude move from any motion to an upright rest; x and y are the centre of
+// x, y, z, roll, pitch, yaw: height and attitude move from any motion to a rest without roll; x and y are the centre of
 // mass's and come from elsewhere (com_plan.hpp).
 class TorsoTrajectory {
  public:
@@ -62,9 +63,8 @@ class TorsoTrajectory {
   [[nodiscard]] static HorizontalMotion horizontal(const State& state) noexcept;
   static void set_horizontal(State& state, const HorizontalMotion& motion) noexcept;
 
-  // height_ticks: the height may arrive earlier than the rest.
-  void plan(const State& from, double height_m, double yaw_rad, std::int32_t duration_ticks,
-            std::int32_t height_ticks) noexcept;
+  // goal: but for x and y. height_ticks: the height may arrive earlier than the rest.
+  void plan(const State& from, const TorsoPose& goal, std::int32_t duration_ticks, std::int32_t height_ticks) noexcept;
   // x and y as set in `horizontal`.
   [[nodiscard]] State at(std::int32_t tick, const HorizontalMotion& horizontal) const noexcept;
 

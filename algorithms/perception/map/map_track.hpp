@@ -84,6 +84,7 @@ struct SeenSurface {
   std::array<EdgeKind, kMaxPolygonVertices> edges{};
   EdgeLine nosing;
   EdgeLine back;
+  bool back_drops = false;
 };
 struct MapTrack {
   std::uint32_t id = 0;
@@ -101,7 +102,8 @@ struct MapTrack {
   std::array<TrackedSide, kMapSides> sides{};
   TrackedLine nosing;
   TrackedLine back;
-  ConvexPolygon polygon;  // local
+  std::int32_t back_drops = 0;  // sightings of the back line that say so, less those that do not
+  ConvexPolygon polygon;        // local
   EdgeTags tags{};
   bool dirty = false;
   bool erased = false;

@@ -228,6 +228,7 @@ bool PolygonMap::load(const SurfacePatch& patch) noexcept {
   seen_.edges = patch.edges;
   seen_.nosing = moved(map_T_camera_, patch.nosing);
   seen_.back = moved(map_T_camera_, patch.back);
+  seen_.back_drops = patch.back_drops;
   return true;
 }
 

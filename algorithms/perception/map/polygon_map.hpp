@@ -313,6 +313,7 @@ class PolygonMap {
   [[nodiscard]] bool agrees(const TrackedLine& line, const SeenLine& seen) const noexcept;
   void turn_to(MapTrack& track, const Vec3& map_x) noexcept;
   void update_line(TrackedLine& line, const SeenLine& seen) noexcept;
+  void update_back(MapTrack& track) noexcept;
   void update_sides(MapTrack& track, bool first) noexcept;
   void update_side(TrackedSide& side, double seen_m, bool observed) noexcept;
   void rebuild(MapTrack& track) noexcept;

@@ -103,6 +103,14 @@ void PolygonMap::update_line(TrackedLine& line, const SeenLine& seen) noexcept {
   ++line.sightings;
 }
 
+void PolygonMap::update_back(MapTrack& track) noexcept {
+  constexpr std::int32_t kMostDrops = 8;
+  const std::optional<SeenLine> seen = local_line(track, seen_.back);
+  if (!seen) return;
+  update_line(track.back, *seen);
+  track.back_drops = std::clamp(track.back_drops + (seen_.back_drops ? 1 : -1), -kMostDrops, kMostDrops);
+}
+
 void PolygonMap::update_sides(MapTrack& track, bool first) noexcept {
   for (std::size_t k = 0; k < kMapSides; ++k) {
     const Vec2 u = side_direction(k);
@@ -189,6 +197,7 @@ void PolygonMap::rebuild(MapTrack& track) noexcept {
     polygon = build(false, false, tags);
     track.nosing = {};  // the next sighting says anew which way is up the stairs
     track.back = {};
+    track.back_drops = 0;
   }
   if (area_m2(polygon) < kMinArea_m2) return;  // ends that cross: the old polygon stays
   track.polygon = polygon;

@@ -48,6 +48,7 @@ void PolygonMap::write(const MapTrack& track, MapPolygon& out) const noexcept {
   surface.polygon.clear();
   surface.nosing = {};
   surface.back = {};
+  surface.back_drops = track.back_drops > 0;
   const std::size_t n = track.polygon.size();
   for (std::size_t i = 0; i < n && i < kMaxPolygonVertices; ++i) {
     const std::uint8_t tag = track.tags[i];

@@ -64,7 +64,7 @@ void PolygonMap::create() noexcept {
   track.invalid_fraction = seen_.invalid_fraction;
   seen_local_ = local_polygon(track);
   if (const auto line = local_line(track, seen_.nosing)) update_line(track.nosing, *line);
-  if (const auto line = local_line(track, seen_.back)) update_line(track.back, *line);
+  update_back(track);
   update_sides(track, true);
   rebuild(track);
   if (track.polygon.size() < 3) {
@@ -143,7 +143,7 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
       if (const std::optional<Vec3> heading = heading_from_lines()) turn_to(track, *heading);
     }
     if (const auto line = local_line(track, seen_.nosing)) update_line(track.nosing, *line);
-    if (const auto line = local_line(track, seen_.back)) update_line(track.back, *line);
+    update_back(track);
     const TrackedLine& reference = track.nosing.sightings >= params_.lines.min_sightings ? track.nosing : track.back;
     if (reference.sightings >= params_.lines.min_sightings && std::abs(reference.state[1]) > params_.turn_slope) {
       turn_to(track, frame.R * Vec3{1.0, -reference.state[1], 0.0});

@@ -355,7 +355,7 @@ void PolygonBuilder::judge_edges(const Piece& piece, SurfacePatch& patch) noexce
     const bool on_line = on_nosing || on_back;
     patch.edges[i] = on_line ? EdgeKind::kObserved : judge_edge(seen[i], seen[next], inside);
     if (on_nosing) patch.nosing = lines.nosing;
-    if (on_back) patch.back = lines.back;
+    if (on_back) patch.back = lines.back, patch.back_drops = lines.back_drops;
   }
   work_.add(picture.any_body ? 6000 : 4000);
   patch.invalid_fraction = invalid_share(picture, seen);
@@ -425,7 +425,7 @@ void PolygonBuilder::add_patch() noexcept {
   Piece& piece = pieces_[next_];
   std::optional<SurfacePatch> patch = patch_of(piece);
   if (patch) {
-    if (next_ == 0) patch->nosing = lines_->nosing, patch->back = lines_->back;
+    if (next_ == 0) patch->nosing = lines_->nosing, patch->back = lines_->back, patch->back_drops = lines_->back_drops;
     ++(patches_->try_push_back(*patch) ? built_.pieces : built_.without_room);
   }
   if (++next_ == pieces_.size()) part_ = Part::kDone;

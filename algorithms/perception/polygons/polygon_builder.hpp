@@ -20,6 +20,7 @@ namespace polygmap {
 struct SurfaceLines {  // each only if valid
   EdgeLine nosing;
   EdgeLine back;
+  bool back_drops = false;  // a lower surface lies beyond it
   EdgeLine occluder;  // where a nearer surface hides the rest: cuts the polygon, but is no end of it
 };
 

@@ -187,6 +187,7 @@ void each_field(auto& f, Of<SurfacePatch> auto& m) {
   walk(f, "plane", m.plane);
   walk(f, "nosing", m.nosing);
   walk(f, "back", m.back);
+  walk(f, "back_drops", m.back_drops);
 }
 void each_field(auto& f, Of<ThingSighting> auto& m) {
   walk(f, "near_m", m.near_m);
@@ -279,6 +280,7 @@ void each_field(auto& f, Of<GaitStatus> auto& m) {
   walk(f, "step", m.step);
   walk(f, "treads_climbed", m.treads_climbed);
   walk(f, "stands", m.stands);
+  walk(f, "on_toe", m.on_toe);
   walk(f, "odom_T_sole_desired", m.odom_T_sole_desired);
   walk(f, "odom_p_com_desired_m", m.odom_p_com_desired_m);
   walk(f, "ik_limited_ticks", m.ik_limited_ticks);

@@ -35,7 +35,7 @@ TEST(ReachHeight, AtThatHeight_LegHasThatLength) {
   for (int i = 0; i < 200; ++i) {
     const Foot leg = i % 2 == 0 ? Foot::kLeft : Foot::kRight;
     const SolePose sole{{place(random), side_sign(leg) * 0.1 + 0.5 * place(random), place(random)}, 0};
-    const double z = reach_height_m(g, Vec3::Zero(), 0.0, leg, sole, 0.6);
+    const double z = reach_height_m(g, {}, leg, sole, 0.6);
     const LegSolution s = solve_leg(g, leg, Transform{Mat3::Identity(), Vec3{0, 0, z}}.inverse() * sole.transform());
     const double length = math::sqrt(g.thigh_m * g.thigh_m + g.shank_m * g.shank_m +
                                      2 * g.thigh_m * g.shank_m * math::cos(s.q_rad[kKnee]));
