@@ -77,6 +77,7 @@ void ClimbPlanner::reset(const Params& params, const RobotModel& robot) noexcept
 void ClimbPlanner::restart() noexcept {
   stride_share_ = 1.0;
   floor_steps_ = corrections_ = 0;
+  way_.forget();
   passing_refused_ = closes_up_ = false;
   odom_stood_.reset();
   slid_.reset();
@@ -266,6 +267,7 @@ void ClimbPlanner::lay_out_destination(const SolePair& soles) noexcept {
   goal_.laid_out = WalkGoal{(middle.position_m + way_m).head<2>(),
                             math::wrap_angle(middle.yaw_rad + goal_.asked->turn_rad), goal_.asked->has_turn};
   goal_.asked.reset();
+  way_.forget();
 }
 
 // Stairs are the way where the goal lies behind their edge. Until it is known whether more of them come, they still
@@ -278,20 +280,30 @@ bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& 
   const Vec2 heading = unit_at(footholds.p_star_feet[0].yaw_rad);
   const Vec2 nosing_m = 0.5 * (footholds.tread.nosing_a_m + footholds.tread.nosing_b_m).head<2>();
   const Vec2 way_m = goal_.laid_out->odom_p_m - middle_of(situation.soles).position_m.head<2>();
+  // Amid a flight there is no other way than on: the landing behind it may lead back, or aside.
+  constexpr double kOnTread_m = 0.40, kReach_m = 0.60;
+  const double nosing_ahead_m = heading.dot(nosing_m - middle_of(situation.soles).position_m.head<2>());
+  const double goal_ahead_m = heading.dot(way_m);
+  const bool goal_is_here = goal_ahead_m < nosing_ahead_m && way_m.norm() < kReach_m;
+  const bool amid_flight = on_treads_ && nosing_ahead_m < kOnTread_m && !goal_is_here;
+  if (amid_flight || way_.takes_any_stairs()) return true;
   return heading.dot(goal_.laid_out->odom_p_m - nosing_m) > params_.walk.stairs_beyond_m &&
          heading.dot(way_m) > math::cos(params_.walk.stairs_aside_rad) * way_m.norm();
 }
 
 ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const FootholdSet& footholds) const noexcept {
+  Decision decision;
+  decision.walks = true;
+  const std::optional<WalkGoal> to = way_.next(*goal_.laid_out);
+  if (!to) return decision;
   const LevelWalk walk(params_.walk, robot_->sole, robot_->stance.half_width_m, shortened(params_.floor, stride_share_),
                        params_.rule);
   const LevelStep step =
-      walk.next(situation.soles, memory_.last_swing, !walking_ && floor_steps_ == 0, *goal_.laid_out, footholds.ground);
-  Decision decision;
-  decision.walks = true;
+      walk.next(situation.soles, memory_.last_swing, !walking_ && floor_steps_ == 0, *to, footholds.ground);
+  decision.walk = step.outcome;
   switch (step.outcome) {
     case LevelStep::Outcome::kArrived:
-      decision.obstruction = StopReason::kAtGoal;
+      if (!way_.is_on_its_way()) decision.obstruction = StopReason::kAtGoal;
       return decision;
     case LevelStep::Outcome::kSteps:
       decision.has_step = true;
@@ -314,6 +326,17 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
   return decision;
 }
 
+ClimbPlanner::Decision ClimbPlanner::look_and_decide(const Situation& situation,
+                                                     const FootholdSet& footholds) noexcept {
+  if (!goal_.laid_out || split_stance_) return decide(situation, footholds);
+  const bool climbs = leads_to_goal(situation, footholds), lines_up = floor_steps_ > 0;
+  const GoalWay::Input in{situation.soles, footholds, *goal_.laid_out, climbs, lines_up, on_treads_};
+  way_.watch(params_.way, in);
+  const Decision decision = decide(situation, footholds);
+  if (decision.walk) way_.walked(params_.way, in, *decision.walk);
+  return decision;
+}
+
 ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const FootholdSet& footholds) const noexcept {
   Decision decision;
   if (split_stance_) {
@@ -325,7 +348,8 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     decision.goal = closing_goal(situation, footholds, *closing);
     return decision;
   }
-  if (goal_.laid_out && !leads_to_goal(situation, footholds)) return walk(situation, footholds);
+  const bool walks = goal_.laid_out && (way_.looks_first() || !leads_to_goal(situation, footholds));
+  if (walks) return walk(situation, footholds);
   decision.measured_m = measured(footholds);
   decision.obstruction = reason_against(situation, footholds);
   if (decision.obstruction != StopReason::kNone) return decision;
@@ -361,6 +385,7 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
   memory_.last_swing = decision.goal.foot;
   const Vec3 travel_m = decision.goal.target.position_m - situation.soles[index_of(memory_.last_swing)].position_m;
   walking_ = decision.walks;
+  way_.stepped();
   if (walking_) {
     floor_steps_ = corrections_ = 0;
   } else if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < params_.correction_m) {
@@ -411,6 +436,7 @@ void ClimbPlanner::landed(const std::optional<SolePair>& soles) noexcept {
       ++treads_climbed_;
       break;
     case StepKind::kLeading:
+      way_.forget();
       split_stance_ = true;
       set_back_ = 0;
       break;

@@ -10,6 +10,7 @@
 #include "algorithms/core/messages/footholds.hpp"
 #include "algorithms/core/messages/gait_status.hpp"
 #include "algorithms/core/messages/operator_command.hpp"
+#include "algorithms/gait/footsteps/goal_way.hpp"
 #include "algorithms/gait/footsteps/level_walk.hpp"
 #include "algorithms/gait/footsteps/step_goal.hpp"
 
@@ -79,6 +80,7 @@ class ClimbPlanner {
     LipParams lip;
     LineUpParams line_up;
     LevelWalkParams walk;
+    GoalWayParams way;
 
     static void visit(auto& p, auto& field) {
       field("pattern", p.pattern, kGaitPatternNames,
@@ -113,6 +115,7 @@ class ClimbPlanner {
       field("lip", p.lip);
       field("line_up", p.line_up);
       field("walk", p.walk);
+      field("way", p.way);
     }
   };
 
@@ -127,7 +130,8 @@ class ClimbPlanner {
   };
   struct Decision {
     bool has_step = false;
-    bool walks = false;  // to a place, on level ground
+    bool walks = false;                                     // to a place, on level ground
+    std::optional<LevelStep::Outcome> walk = std::nullopt;  // how the step there came out; none: it looks for its way
     StepGoal goal;
     StepGoal trailing;                           // the step that may come after a leading or passing one
     StopReason obstruction = StopReason::kNone;  // without a step: why
@@ -138,6 +142,8 @@ class ClimbPlanner {
   // robot: outlives the planner.
   void reset(const Params& params, const RobotModel& robot) noexcept;
   [[nodiscard]] Decision decide(const Situation& situation, const FootholdSet& footholds) const noexcept;
+  // The same of who stands and waits for a step: with every tick that it does it looks on for the way to its goal.
+  [[nodiscard]] Decision look_and_decide(const Situation& situation, const FootholdSet& footholds) noexcept;
   // After an end: what it has tried to line up with the stairs, and what it has given up, is forgotten; where it stands
   // is not.
   void restart() noexcept;
@@ -209,6 +215,7 @@ class ClimbPlanner {
     std::optional<Destination> asked;
     std::optional<WalkGoal> laid_out;
   } goal_;
+  GoalWay way_;                // to where it is told to go
   bool walking_ = false;       // the last step was one to a place
   bool on_treads_ = false;     // false: on level ground, before stairs or behind them
   bool split_stance_ = false;  // the leading foot stands on a tread, the other one below: the trailing step ends this

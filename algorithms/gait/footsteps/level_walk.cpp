@@ -99,7 +99,10 @@ LevelStep LevelWalk::next(const SolePair& soles, Foot last_swing, bool begins, c
 bool LevelWalk::try_step(const SolePair& soles, const TorsoPose& to, const FloorStepLimits& limits,
                          const GroundView& ground, LevelStep& step) const noexcept {
   const double now_m = clearance_m(ground, middle_of(soles).position_m.head<2>(), params_.body_m);
-  step.target = floor_step(sole_.collision, soles[index_of(other(step.foot))], step.foot, to, half_width_m_, limits);
+  const SolePose& stance = soles[index_of(other(step.foot))];
+  FloorStepLimits of_foot = limits;
+  if (side_sign(step.foot) * math::wrap_angle(to.yaw_rad - stance.yaw_rad) > 0.0) of_foot.turn_rad *= params_.turn_out;
+  step.target = floor_step(sole_.collision, stance, step.foot, to, half_width_m_, of_foot);
   SolePair landed = soles;
   landed[index_of(step.foot)] = step.target;
   if (clearance_m(ground, middle_of(landed).position_m.head<2>(), params_.body_m) < now_m) {

@@ -17,6 +17,7 @@ struct WalkGoal {
 struct LevelWalkParams {
   double near_m = 0.30;
   double turn_first_rad = 0.5;
+  double turn_out = 5.0;
   double within_m = 0.03;
   double within_rad = 0.06;
   double sole_margin_m = 0.045;
@@ -28,6 +29,8 @@ struct LevelWalkParams {
   static void visit(auto& p, auto& field) {
     field("near_m", p.near_m, 0.0, 2.0, "As near to the goal it no longer turns towards it, but as it is to stand.");
     field("turn_first_rad", p.turn_first_rad, 0.05, 3.2, "It turns in place towards a goal that lies farther round.");
+    field("turn_out", p.turn_out, 1.0, 6.0,
+          "A foot that turns away from the other one does so as many times as far as one that turns towards it.");
     field("within_m", p.within_m, 0.005, 0.2, "A foot is at the goal within this, along and across.");
     field("within_rad", p.within_rad, 0.01, 0.5, "A foot is at the goal within this turn.");
     field("sole_margin_m", p.sole_margin_m, 0.0, 0.2,

@@ -41,7 +41,7 @@ Transition Standing::tick(const GaitInput& in, GaitShared& gait) noexcept {
   if (toe_calibration_.active && rest_.tick() < params.toe_calibration.ticks) return {};
   gait.planner.watch_feet(situation(in).soles);
   const ClimbPlanner::Decision decision =
-      gait.planner.decide(situation(in, toe_calibration_.active, toe_calibration_.leading), in.footholds);
+      gait.planner.look_and_decide(situation(in, toe_calibration_.active, toe_calibration_.leading), in.footholds);
   const bool was_tall = std::exchange(toe_calibration_.active, false);
   gait.memory.toes_calibrated = gait.memory.toes_calibrated || was_tall;
   if (decision.has_step) {

@@ -142,7 +142,12 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
     if (track.nosing.sightings == 0 && track.back.sightings == 0) {
       if (const std::optional<Vec3> heading = heading_from_lines()) turn_to(track, *heading);
     }
-    if (const auto line = local_line(track, seen_.nosing)) update_line(track.nosing, *line);
+    const auto nosing = local_line(track, seen_.nosing);
+    if (nosing) {
+      update_line(track.nosing, *nosing);
+    } else {
+      see_other_front(track);
+    }
     update_back(track);
     const TrackedLine& reference = track.nosing.sightings >= params_.lines.min_sightings ? track.nosing : track.back;
     if (reference.sightings >= params_.lines.min_sightings && std::abs(reference.state[1]) > params_.turn_slope) {
@@ -152,6 +157,19 @@ void PolygonMap::fuse(MapTrack& track, double offset_m, double fade) noexcept {
   seen_local_ = local_polygon(track);
   update_sides(track, false);
   rebuild(track);
+}
+
+// From another side, as on a landing or on the way back, another edge is the front one: seen again and again, and no
+// worse.
+void PolygonMap::see_other_front(MapTrack& track) noexcept {
+  constexpr double kAside_cos = 0.70;
+  const std::optional<Vec3> heading = seen_.nosing.valid ? heading_from_lines() : std::nullopt;
+  if (!heading || heading->dot(track.map_T_local.R.col(0)) >= kAside_cos) return;
+  if (++track.nosing.outliers < params_.outliers_to_reset) return;
+  track.nosing = track.back = {};
+  track.back_drops = 0;
+  turn_to(track, *heading);
+  if (const auto line = local_line(track, seen_.nosing)) update_line(track.nosing, *line);
 }
 
 void PolygonMap::merge(MapTrack& into, MapTrack& from) noexcept {

@@ -82,7 +82,9 @@ TEST_F(LevelWalkTest, EveryStep_IsWithinTheLimitsAndClearOfTheOtherFoot) {
     const LevelStep step = next(goal);
     if (step.outcome != Outcome::kSteps) break;
     const SolePose& stance = before[index_of(other(step.foot))];
-    EXPECT_LE(std::abs(math::wrap_angle(step.target.yaw_rad - stance.yaw_rad)), FloorStepLimits{}.turn_rad + 1e-9);
+    const double outwards_rad = side_sign(step.foot) * math::wrap_angle(step.target.yaw_rad - stance.yaw_rad);
+    EXPECT_LE(outwards_rad, params_.turn_out * FloorStepLimits{}.turn_rad + 1e-9);
+    EXPECT_GE(outwards_rad, -FloorStepLimits{}.turn_rad - 1e-9);
     EXPECT_FALSE(overlap(foot_rectangle(robot_.sole.collision, step.target, 0.0),
                          foot_rectangle(robot_.sole.collision, stance, 0.0)));
   }

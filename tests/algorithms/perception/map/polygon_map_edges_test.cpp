@@ -168,6 +168,26 @@ TEST_F(PolygonMapEdges, EdgesSeenOnlyAfterTheTread_TurnItsAxes) {
   EXPECT_NEAR(std::atan2(-along.x(), along.y()), 0.3, 1e-3);
 }
 
+// As from a landing: first the side of a tread of the next flight drops towards the robot, then it stands before it.
+TEST_F(PolygonMapEdges, AnotherEdgeIsTheFrontOneFromHere_BecomesTheNosing) {
+  const Transform camera = looking_down({0, 0, 1});
+  SurfacePatch patch = level_patch({0, 0, 0}, 0.14, 0.3);
+  const auto see = [&](const EdgeLine& nosing, int frames) {
+    patch.nosing = nosing;
+    for (int i = 0; i < frames; ++i) {
+      stamp_ns_ += kFrame_ns;
+      fuse(in_camera({patch}, camera, stamp_ns_), camera);
+    }
+    const EdgeLine& line = map_->snapshot().polygons[0].surface.nosing;
+    return Vec3{(line.a_m - line.b_m).cwiseAbs()};
+  };
+  const EdgeLine side{{-0.14, 0.3, 0}, {-0.14, -0.3, 0}, 0.001, true};
+  const EdgeLine front{{-0.14, -0.3, 0}, {0.14, -0.3, 0}, 0.001, true};
+  EXPECT_NEAR(see(side, 10).y(), 0.6, 0.01);
+  EXPECT_NEAR(see(front, 3).y(), 0.6, 0.01) << "a few sightings may err";
+  EXPECT_NEAR(see(front, 12).x(), 0.28, 0.01);
+}
+
 TEST_F(PolygonMapEdges, NosingBehindTheBackEdge_FallsBackToTheEndsAndIsCounted) {
   const Transform camera = looking_down({0, 0, 1});
   SurfacePatch patch = level_patch({0, 0, 0}, 0.14, 0.3);

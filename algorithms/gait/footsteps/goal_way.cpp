@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "algorithms/gait/footsteps/goal_way.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "algorithms/geometry/line.hpp"
+
+namespace polygmap {
+namespace {
+
+struct Stairs {
+  Vec2 nosing_m;  // its middle
+  double yaw_rad;
+};
+
+std::optional<Stairs> stairs_in(const FootholdSet& set) noexcept {
+  const Vec2 left_m = set.tread.nosing_a_m.head<2>(), right_m = set.tread.nosing_b_m.head<2>();
+  const Vec2 across_m = left_m - right_m;
+  constexpr double kShortest_m = 0.40;  // a tread's own side is no front
+  if (!(across_m.norm() > kShortest_m) || !(across_m.norm() < 1e3)) return std::nullopt;
+  return Stairs{0.5 * (left_m + right_m), math::atan2(-across_m.x(), across_m.y())};
+}
+
+bool may_be_told_better(StopReason reason) noexcept {
+  switch (reason) {
+    case StopReason::kNone:
+    case StopReason::kNothingSeen:
+    case StopReason::kTreadTooShort:
+    case StopReason::kTooNarrow:
+    case StopReason::kEdgeUncertain:
+    case StopReason::kObstacle:
+    case StopReason::kRiseTooHigh:
+      return true;
+    default:
+      return false;
+  }
+}
+
+// Bits of a view as another one has them, whose corner is elsewhere.
+void move_to(const Vec2& corner_m, GroundView::Rows& rows, Vec2& rows_corner_m) noexcept {
+  if (corner_m == rows_corner_m) return;
+  const Vec2 by = (corner_m - rows_corner_m) / GroundView::kCell_m;
+  constexpr double kSide = GroundView::kSide_cells;
+  const GroundView::Rows before = rows;
+  rows = {};
+  rows_corner_m = corner_m;
+  if (!(by.cwiseAbs().maxCoeff() < kSide - 1.0)) return;
+  const auto dx = static_cast<std::int32_t>(std::lround(by.x())), dy = static_cast<std::int32_t>(std::lround(by.y()));
+  for (std::int32_t y = 0; y < GroundView::kSide_cells; ++y) {
+    const std::int32_t from = y + dy;
+    if (from < 0 || from >= GroundView::kSide_cells) continue;
+    const std::uint64_t row = before[static_cast<std::size_t>(from)];
+    rows[static_cast<std::size_t>(y)] =
+        dx >= 0 ? row >> static_cast<std::uint32_t>(dx) : row << static_cast<std::uint32_t>(-dx);
+  }
+}
+
+}  // namespace
+
+void GoalWay::stepped() noexcept {
+  is_known_ = false;
+  round_ticks_ = refused_ticks_ = ticks_ = refusals_ = 0;
+  ++steps_;
+}
+
+void GoalWay::seek_vantage(const GoalWayParams& params, const Input& in) noexcept {
+  const TorsoPose middle = middle_of(in.soles);
+  if (look_from_) {
+    const Vec2 off_m = look_from_->odom_p_m - middle.position_m.head<2>();
+    looked_ = looked_ || (off_m.norm() < params.looked_m &&
+                          std::abs(math::wrap_angle(look_from_->yaw_rad - middle.yaw_rad)) < params.looked_rad);
+  }
+  const std::optional<Stairs> stairs = stairs_in(in.footholds);
+  if (!stairs || !may_be_told_better(in.footholds.obstruction) || looks_ >= params.most_looks) return;
+  const Vec2 heading = unit_at(stairs->yaw_rad);
+  const Vec2 way_m = stairs->nosing_m - middle.position_m.head<2>();
+  const bool leads = heading.dot(in.goal.odom_p_m - stairs->nosing_m) > 0.0 && heading.dot(way_m) > 0.0;
+  // From tread to tread a seen part of the nosing says little of its middle.
+  const bool aside = (!(in.climbs && in.on_tread) && std::abs(left_of(heading).dot(way_m)) > params.aside_m) ||
+                     std::abs(math::wrap_angle(stairs->yaw_rad - middle.yaw_rad)) > params.aside_rad;
+  // Below a tread out of reach there are others, which were not seen from there.
+  constexpr double kRise_m = 0.15, kTread_m = 0.30, kMost_m = 0.60;
+  const double rise_m = in.footholds.measured_rise_m;
+  if (rise_m > kMost_m) return;
+  const double back_m = params.look_from_m + kTread_m * std::max(std::ceil(rise_m / kRise_m - 0.1) - 1.0, 0.0);
+  const WalkGoal place{stairs->nosing_m - back_m * heading, stairs->yaw_rad, true};
+  const bool offers = in.footholds.has_p_star && in.footholds.obstruction == StopReason::kNone;
+  if (!leads && !in.climbs && offers) other_stairs_ = place;
+  if (!(leads || takes_any_) || !aside) return;
+  if (look_from_ && (look_from_->odom_p_m - place.odom_p_m).norm() < params.moved_m) return;
+  look_from_ = place;
+  looked_ = false;
+  ++looks_;
+  route_.clear();
+}
+
+void GoalWay::watch(const GoalWayParams& params, const Input& in) noexcept {
+  Vec2 corner_m = barred_corner_m_;
+  move_to(in.footholds.ground.corner_m, barred_.unseen, corner_m);
+  move_to(in.footholds.ground.corner_m, barred_.tried, barred_corner_m_);
+  if (!(in.climbs && in.lines_up)) seek_vantage(params, in);
+  if (in.climbs && !looks_first()) {
+    goes_round_ = false;
+    route_.clear();
+    return;
+  }
+  const TorsoPose middle = middle_of(in.soles);
+  const Vec2 to_m = looks_first() ? look_from_->odom_p_m : in.goal.odom_p_m;
+  if (route_.is_busy()) {
+    route_.step(params.route);
+  } else if (!is_known_ || ++ticks_ >= params.again_ticks) {
+    ticks_ = 0;
+    route_.begin(params.route, in.footholds.ground, barred_, middle.position_m.head<2>(), to_m);
+  }
+  if (route_.is_busy()) return;
+  is_known_ = true;
+  const Vec2 way_m = to_m - middle.position_m.head<2>();
+  faces_ = std::abs(math::wrap_angle(math::atan2(way_m.y(), way_m.x()) - middle.yaw_rad)) < params.faces_rad;
+  if (route_.way() != GroundRoute::Way::kRound || steps_ >= params.most_steps) {
+    goes_round_ = false;
+    round_ticks_ = 0;
+  } else if (faces_ && ++round_ticks_ >= params.sure_ticks) {
+    goes_round_ = true;
+  }
+}
+
+void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Outcome outcome) noexcept {
+  if (outcome == LevelStep::Outcome::kSteps) {
+    refused_ticks_ = 0;
+    return;
+  }
+  if (looks_first() && outcome == LevelStep::Outcome::kArrived) looked_ = true;
+  if (++refused_ticks_ < params.sure_ticks || steps_ >= params.most_steps) return;
+  refused_ticks_ = 0;
+  const bool gives_up = ++refusals_ > 1 && other_stairs_ && !takes_any_;
+  if (gives_up) {
+    takes_any_ = true;
+    look_from_ = other_stairs_;
+    looked_ = false;
+    barred_ = {};
+  } else if (looks_first()) {
+    looked_ = true;  // from as near as it could come
+  } else if (outcome == LevelStep::Outcome::kNoGround) {
+    bar_unseen(in);
+  } else if (outcome == LevelStep::Outcome::kBlocked) {
+    bar_place(params, in);
+  }
+  route_.clear();
+  goes_round_ = false;
+  round_ticks_ = 0;
+  ticks_ = params.again_ticks;
+}
+
+void GoalWay::bar_place(const GoalWayParams& params, const Input& in) noexcept {
+  const Vec2 at_m = middle_of(in.soles).position_m.head<2>() - in.footholds.ground.corner_m;
+  for (std::int32_t y = 0; y < GroundView::kSide_cells; ++y) {
+    for (std::int32_t x = 0; x < GroundView::kSide_cells; ++x) {
+      if ((Vec2{x + 0.5, y + 0.5} * GroundView::kCell_m - at_m).norm() > params.tried_m) continue;
+      barred_.tried[static_cast<std::size_t>(y)] |= std::uint64_t{1} << static_cast<std::uint32_t>(x);
+    }
+  }
+}
+
+// What the camera looks at before the feet, and is not known to be level.
+void GoalWay::bar_unseen(const Input& in) noexcept {
+  const TorsoPose middle = middle_of(in.soles);
+  const Vec2 ahead = unit_at(middle.yaw_rad), left = left_of(ahead);
+  constexpr double kFrom_m = 0.10, kTo_m = 0.75, kHalf_m = 0.20, kWider = 0.3;
+  const GroundView& ground = in.footholds.ground;
+  for (std::int32_t y = 0; y < GroundView::kSide_cells; ++y) {
+    for (std::int32_t x = 0; x < GroundView::kSide_cells; ++x) {
+      if (GroundView::has(ground.level, x, y) || GroundView::has(ground.tall, x, y)) continue;
+      const Vec2 p_m = ground.corner_m + Vec2{x + 0.5, y + 0.5} * GroundView::kCell_m - middle.position_m.head<2>();
+      const double ahead_m = ahead.dot(p_m);
+      if (ahead_m < kFrom_m || ahead_m > kTo_m || std::abs(left.dot(p_m)) > kHalf_m + kWider * ahead_m) continue;
+      barred_.unseen[static_cast<std::size_t>(y)] |= std::uint64_t{1} << static_cast<std::uint32_t>(x);
+    }
+  }
+}
+
+std::optional<WalkGoal> GoalWay::next(const WalkGoal& goal) const noexcept {
+  if (!is_known_) return std::nullopt;
+  if (goes_round_) return WalkGoal{route_.via_m(), 0.0, false};
+  // What is in the way it first turns to, and looks at for a while.
+  if (faces_ && round_ticks_ > 0) return std::nullopt;
+  return looks_first() ? *look_from_ : goal;
+}
+
+}  // namespace polygmap
