@@ -171,5 +171,41 @@ TEST(ClimbPlanner, LegsCannotSetTheSlidFootBack_GoesOnWithout) {
   EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
 }
 
+// The next tread, as seen from there.
+FootholdSet next_tread(const OnATread& on) {
+  FootholdSet set;
+  set.map_stamp_ns = 1;
+  set.obstruction = StopReason::kNone;
+  set.has_p_star = true;
+  set.tread = {{1.2, 0.5, 0.26}, {1.2, -0.5, 0.26}};
+  for (std::size_t i = 0; i < kFootCount; ++i) {
+    set.p_star_feet[i].position_m = on.situation.soles[i].position_m + Vec3{0.3, 0.0, 0.13};
+    set.p_star_feet[i].polygon_id = 8;
+  }
+  set.ground.corner_m = Vec2{1.0, 0.0} - Vec2::Constant(32 * GroundView::kCell_m);
+  set.ground.height_m = 0.13;
+  set.ground.level.fill(~std::uint64_t{0});
+  return set;
+}
+
+TEST(ClimbPlanner, AmidAFlight_ClimbsOnThoughTheGoalLiesBehindIt) {
+  OnATread on;
+  on.planner.go_to({-1.0, -2.0, 0.0, false});
+  on.planner.lay_out_destination(on.situation.soles);
+  const ClimbPlanner::Decision decision = on.planner.look_and_decide(on.situation, next_tread(on));
+  ASSERT_TRUE(decision.has_step);
+  EXPECT_EQ(decision.goal.kind, StepKind::kLeading);
+}
+
+TEST(ClimbPlanner, GoalOnTheTreadItStandsOn_WalksThere) {
+  OnATread on;
+  on.planner.go_to({0.0, -0.4, 0.0, false});
+  on.planner.lay_out_destination(on.situation.soles);
+  const ClimbPlanner::Decision decision = on.planner.look_and_decide(on.situation, next_tread(on));
+  ASSERT_TRUE(decision.has_step);
+  EXPECT_TRUE(decision.walks);
+  EXPECT_EQ(decision.goal.kind, StepKind::kFloor);
+}
+
 }  // namespace
 }  // namespace polygmap
