@@ -86,7 +86,7 @@ void GoalWay::seek_vantage(const GoalWayParams& params, const Input& in) noexcep
   const double back_m = params.look_from_m + kTread_m * std::max(std::ceil(rise_m / kRise_m - 0.1) - 1.0, 0.0);
   const WalkGoal place{stairs->nosing_m - back_m * heading, stairs->yaw_rad, true};
   const bool offers = in.footholds.has_p_star && in.footholds.obstruction == StopReason::kNone;
-  if (!leads && !in.climbs && offers) other_stairs_ = place;
+  if (!in.climbs && offers) other_stairs_ = place;
   if (!(leads || takes_any_) || !aside) return;
   if (look_from_ && (look_from_->odom_p_m - place.odom_p_m).norm() < params.moved_m) return;
   look_from_ = place;
