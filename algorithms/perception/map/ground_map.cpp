@@ -115,6 +115,7 @@ void GroundMap::see(const Vec3& map_p_m) noexcept {
   // A foot is where the legs say within some centimetres, and so is the shin above it.
   if (GroundView::has(own_, x - first_x_, y - first_y_)) return;
   const std::int32_t seen_mm = mm_of(map_p_m.z());
+  if (seen_mm < height_mm_ - mm_of(params_.tall_m)) look_through(map_p_m);
   Cell& cell = at(x, y);
   if (!knows(cell, x, y)) {
     cell = {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), static_cast<std::int16_t>(seen_mm), 1};
@@ -126,11 +127,25 @@ void GroundMap::see(const Vec3& map_p_m) noexcept {
     cell.count = std::min<std::uint8_t>(static_cast<std::uint8_t>(cell.count + 1), kMostCount);
     return;
   }
+  // What is higher hides what was seen beneath it, from elsewhere: the floor under open stairs.
   if (cell.count > 1) {
-    --cell.count;
+    cell.count = static_cast<std::uint8_t>(higher_mm > 0 ? cell.count / 2 : cell.count - 1);
   } else {
     cell.height_mm = static_cast<std::int16_t>(seen_mm);
   }
+}
+
+// What is lower is seen through where level ground would be: behind an edge nothing else shows that there is none.
+void GroundMap::look_through(const Vec3& map_p_m) noexcept {
+  const Vec3& eye_m = view_.map_T_camera.p_m;
+  const double share = (eye_m.z() - 1e-3 * height_mm_) / (eye_m.z() - map_p_m.z());
+  if (!(share > 0.0)) return;
+  work_.add(60);
+  const Vec2 through_m = (eye_m + share * (map_p_m - eye_m)).head<2>();
+  const std::int32_t x = cell_of(through_m.x()), y = cell_of(through_m.y());
+  Cell& cell = at(x, y);
+  const bool is_level = knows(cell, x, y) && std::abs(cell.height_mm - height_mm_) <= mm_of(params_.level_m);
+  if (is_level && !GroundView::has(own_, x - first_x_, y - first_y_)) --cell.count;
 }
 
 bool GroundMap::tell(GroundView& out) noexcept {
@@ -146,10 +161,12 @@ bool GroundMap::tell(GroundView& out) noexcept {
       continue;
     work_.add(7000);
     each_cell_under(foot, params_.beside_m, [&](std::int32_t x, std::int32_t y) {
-      if (!GroundView::has(other_, x - first_x_, y - first_y_)) set(out.level, x, y);
+      const bool is_other =
+          GroundView::has(higher_, x - first_x_, y - first_y_) || GroundView::has(lower_, x - first_x_, y - first_y_);
+      if (!is_other) set(out.level, x, y);
     });
   }
-  for (int pass = 0; pass < kClosings; ++pass) close(out.level);
+  for (int pass = 0; pass < kClosings; ++pass) close(out.level, pass == 0);
   return true;
 }
 
@@ -160,26 +177,28 @@ void GroundMap::set(GroundView::Rows& rows, std::int32_t x, std::int32_t y) cons
 }
 
 void GroundMap::tell_row(GroundView& out) noexcept {
-  std::uint64_t level = 0, tall = 0, other = 0;
+  std::uint64_t level = 0, tall = 0, lower = 0, higher = 0;
   work_.add(GroundView::kSide_cells, 12);
   for (std::int32_t i = 0; i < GroundView::kSide_cells; ++i) {
     const Cell& cell = at(first_x_ + i, first_y_ + row_);
     if (!knows(cell, first_x_ + i, first_y_ + row_) || cell.count < params_.sightings) continue;
     const std::int32_t above_mm = cell.height_mm - height_mm_;
     const std::uint64_t bit = std::uint64_t{1} << static_cast<std::uint32_t>(i);
-    (std::abs(above_mm) <= mm_of(params_.level_m) ? level : other) |= bit;
+    (std::abs(above_mm) <= mm_of(params_.level_m) ? level : above_mm < 0 ? lower : higher) |= bit;
     if (above_mm > mm_of(params_.tall_m)) tall |= bit;
   }
   const auto row = static_cast<std::size_t>(row_);
   out.level[row] = level;
   out.tall[row] = tall;
-  other_[row] = other;
+  lower_[row] = lower;
+  higher_[row] = higher;
 }
 
 // A square that no picture has shown yet is level where five or more of the eight about it are: pictures are looked at
 // in some of their pixels, and what lies before a foot that turned is hidden by the leg. Again and again that fills
-// what is up to three squares wide, and nothing wider.
-void GroundMap::close(GroundView::Rows& level) noexcept {
+// what is up to three squares wide, and nothing wider. A sole bridges one or two squares that are lower: as these were
+// seen through open stairs.
+void GroundMap::close(GroundView::Rows& level, bool bridges) noexcept {
   work_.add(GroundView::kSide_cells, 60);
   std::uint64_t above = 0;
   for (std::size_t row = 0; row < level.size(); ++row) {
@@ -191,7 +210,8 @@ void GroundMap::close(GroundView::Rows& level) noexcept {
     }
     for (const std::uint64_t neighbours : {here << 1U, here >> 1U}) count_up(neighbours, ones, twos, fours, eights);
     above = here;
-    level[row] |= (eights | (fours & (twos | ones))) & ~other_[row];
+    const std::uint64_t many = eights | (fours & (twos | ones)), most = eights | (fours & twos & ones);
+    level[row] |= ((many & ~lower_[row]) | (bridges ? most : 0)) & ~higher_[row];
   }
 }
 

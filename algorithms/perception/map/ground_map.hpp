@@ -81,10 +81,11 @@ class GroundMap {
   }
   [[nodiscard]] bool is_at_a_gap(std::int32_t column) const noexcept;
   void see(const Vec3& map_p_m) noexcept;
+  void look_through(const Vec3& map_p_m) noexcept;
   void tell_row(GroundView& out) noexcept;
   // Of a cell; what is outside the view is left out.
   void set(GroundView::Rows& rows, std::int32_t x, std::int32_t y) const noexcept;
-  void close(GroundView::Rows& level) noexcept;
+  void close(GroundView::Rows& level, bool bridges) noexcept;
   void stand_on(std::size_t foot, double grown_m, std::int32_t count) noexcept;
   // visit(x, y) for the cells whose middles are within the sole, grown by so much on all sides.
   void each_cell_under(std::size_t foot, double grown_m, auto&& visit) const noexcept;
@@ -97,7 +98,7 @@ class GroundMap {
   std::array<Cell, static_cast<std::size_t>(kSide_cells) * kSide_cells> cells_{};
   std::int32_t first_x_ = 0, first_y_ = 0;  // cell (0, 0) of the view
   GroundView::Rows own_{};                  // at and beside the robot's own feet, wherever they are
-  GroundView::Rows other_{};                // of what is told: ground of another height was seen there
+  GroundView::Rows lower_{}, higher_{};     // of what is told: ground of another height was seen there
   bool has_begun_ = false;
   WorkCount work_;
 };

@@ -16,7 +16,7 @@ using Height = std::function<double(double x_m, double y_m)>;  // of what is the
 
 class GroundMapTest : public ::testing::Test {
  protected:
-  const Transform camera_ = test::looking_down({0.5, 0.0, 1.0});
+  Transform camera_ = test::looking_down({0.5, 0.0, 1.0});
   const CameraIntrinsics intrinsics_ = robot_camera_intrinsics();
   std::unique_ptr<ColumnImage> picture_ = std::make_unique<ColumnImage>();
   std::unique_ptr<GroundMap> map_ = std::make_unique<GroundMap>(GroundMap::Params{});
@@ -94,6 +94,25 @@ TEST_F(GroundMapTest, WhereItIsMet_GroundAboutTheSolesIsLevelUntilItIsSeen) {
   look([](double, double) { return -0.3; }, 80);
   EXPECT_FALSE(is(told_.level, 0.45, 0.1));
   EXPECT_TRUE(is(told_.level, 0.0, 0.1)) << "it stands there";
+}
+
+// What the edge hides is never seen: that pictures see through where it would be says that there is none.
+TEST_F(GroundMapTest, EdgeWhereItIsMet_NothingBehindItIsGround) {
+  camera_.p_m.x() = 0.1;
+  look([](double x, double) { return x < 0.36 ? 0.0 : -0.8; }, 100);
+  EXPECT_TRUE(is(told_.level, 0.30, 0.1));
+  for (const double x_m : {0.38, 0.42, 0.46, 0.5}) EXPECT_FALSE(is(told_.level, x_m, 0.1)) << x_m;
+}
+
+// Of open stairs, seen from below: what is higher, seen a few times, is what it stands on.
+TEST_F(GroundMapTest, FloorSeenThroughOpenStairs_IsForgottenOnceTheTreadIsSeen) {
+  look([](double, double) { return 0.0; }, 200);
+  for (Transform& sole : soles_) sole.p_m.z() = 0.13;
+  const auto on_tread = [](double x, double y) { return x > 0.3 && std::abs(y) < 0.5; };
+  int frames = 0;
+  for (; frames < 100 && !is(told_.level, 0.7, 0.2); ++frames)
+    look([&](double x, double y) { return on_tread(x, y) ? 0.13 : 0.0; }, 1);
+  EXPECT_LE(frames, 16);
 }
 
 // A leg hides it, and no picture has shown it.
