@@ -125,6 +125,7 @@ bool ClimbPlanner::passing_step(const Situation& situation, const FootholdSet& f
     feet = &footholds.p_star_star_feet;
     if (!footholds.has_p_star_star || !usable(*feet) || rise_m(*feet) < params_.min_rise_m) return false;
   }
+  if (rise_m(*feet) > params_.max_passing_rise_m) return false;
   decision.has_step = true;
   decision.rise_m = rise_m(*feet);
   const auto goal = [&](StepKind kind, Foot f) -> StepGoal {

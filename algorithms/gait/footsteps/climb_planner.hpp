@@ -67,6 +67,7 @@ class ClimbPlanner {
     double floor_clearance_m = 0.02;
     SwingRule rule;
     double min_rise_m = 0.02;
+    double max_passing_rise_m = 0.185;
     std::int64_t max_map_age_ns = 500 * kNsPerMs;
     std::int64_t remembered_ns = 5 * kNsPerS;
     double correction_m = 0.05;
@@ -95,6 +96,9 @@ class ClimbPlanner {
             "Clearance of a toe from the line of the first nosing on the way.");
       field("rule", p.rule);
       field("min_rise_m", p.min_rise_m, 0.001, 0.039, "Delta_foot: a tread that is not higher is already underfoot.");
+      field("max_passing_rise_m", p.max_passing_rise_m, 0.0, 0.5,
+            "No foot passes the other one up a higher rise, it stops beside it: past 0.19 m the shin touched the edge "
+            "above.");
       field("max_map_age_ns", p.max_map_age_ns, 1000000, 10000000000, "An older map is no reason to step.");
       field("remembered_ns", p.remembered_ns, 1000000, 100000000000,
             "After a longer pause between two treads the rear foot goes as far beside the other one as its foothold "

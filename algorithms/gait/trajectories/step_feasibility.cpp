@@ -15,6 +15,7 @@ StepKnots::StepKnots(const RobotModel& robot, const StepParams& params, std::int
     : foot_(step.goal.foot),
       soles_(soles),
       joint_margin_rad_(step.joint_margin_rad),
+      torque_share_(step.torque_share),
       start_z_m_(soles[index_of(step.goal.foot)].p_m.z()),
       goal_z_m_(step.goal.target.position_m.z()),
       half_width_m_(robot.sole.collision.half_width_m),
@@ -139,7 +140,7 @@ bool StepFeasibility::advance(const RobotModel& robot, const StepParams& params,
     previous_ = q_rad;
     check_.feasible = check_.feasible && check_.joint_margin_rad >= knots_.joint_margin_rad() &&
                       check_.knee_rad >= params.knee_min_rad && check_.speed_share <= params.speed_share &&
-                      check_.torque_share <= params.torque_share;
+                      check_.torque_share <= knots_.torque_share();
     if (!check_.feasible) return true;
   }
   return next_ == knots_.count();

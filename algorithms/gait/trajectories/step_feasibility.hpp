@@ -29,6 +29,7 @@ class StepKnots {
   [[nodiscard]] HorizontalMotion com_at_landing() const noexcept { return com_.at(shift_ticks_ + swing_ticks_); }
   [[nodiscard]] std::int32_t count() const noexcept { return count_; }
   [[nodiscard]] double joint_margin_rad() const noexcept { return joint_margin_rad_; }  // that the plan is to keep
+  [[nodiscard]] double torque_share() const noexcept { return torque_share_; }          // that it may ask for
   [[nodiscard]] std::int32_t knot_ticks() const noexcept { return knot_ticks_; }
   [[nodiscard]] Foot stance() const noexcept { return other(foot_); }
   [[nodiscard]] Foot swing() const noexcept { return foot_; }
@@ -48,6 +49,7 @@ class StepKnots {
   StepPlan plan_;
   SoleModel sole_;
   double joint_margin_rad_ = 0.0;
+  double torque_share_ = 1.0;
   double start_z_m_ = 0.0, goal_z_m_ = 0.0;
   double half_width_m_ = 0.0, most_air_roll_rad_ = 0.0;
   std::int32_t shift_ticks_ = 0, swing_ticks_ = 0, knot_ticks_ = 1, count_ = 0;

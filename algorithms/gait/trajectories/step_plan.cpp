@@ -83,6 +83,9 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
   plan.tried = tried;
   const bool needed = goal.kind == StepKind::kClosing || goal.kind == StepKind::kTrailing;
   plan.joint_margin_rad = needed ? params.needed_margin_rad : params.joint_margin_rad;
+  const double rise_m = soles[index_of(stance)].position_m.z() - soles[index_of(goal.foot)].position_m.z();
+  plan.torque_share =
+      rise_m > params.high_rise_m ? std::min(params.high_torque_share, params.torque_share) : params.torque_share;
   plan.shape.toe_down_rad = on_floor ? 0.5 * tried.toe_down_rad : tried.toe_down_rad;
   plan.zmp_stance_m = zmp_in(params, landed[index_of(stance)], stance, down);
   // After a step that leads the weight goes on to that foot; after the others it may have to stop anywhere.

@@ -124,6 +124,8 @@ struct StepParams {
   double knee_min_rad = 0.08;
   double speed_share = 0.95;
   double torque_share = 1.0;
+  double high_rise_m = 0.1775;
+  double high_torque_share = 0.89;
   StepDownParams down;
   StepDurations durations;
 
@@ -160,6 +162,10 @@ struct StepParams {
     field("torque_share", p.torque_share, 0.1, 1.0,
           "A plan asks the knee that stands alone for at most this share of its drive's torque: one that has no more "
           "lags and then throws the body up.");
+    field("high_rise_m", p.high_rise_m, 0.0, 1.0,
+          "A foot that steps up from this much below the other one leaves a knee that bends deep to lift the body.");
+    field("high_torque_share", p.high_torque_share, 0.1, 1.0,
+          "A plan asks such a knee for at most this share: balance, masses and drives that are off take the rest.");
     field("down", p.down);
     field("durations", p.durations);
   }
@@ -172,16 +178,44 @@ struct StepTry {
   double longer = 1.0;        // the swing
   double rise_longer = 1.0;   // factor on the torso's rise, which takes a share of the swing
 };
-inline constexpr std::size_t kStepTryCount = 8;
+inline constexpr std::size_t kStepTryCount = 11;
 using StepTries = std::array<StepTry, kStepTryCount>;
-inline constexpr StepTries kStepTries{{{0.3}, {0.2}, {0.4}, {0.1}, {0.5}, {0.3, 1.15}, {0.2, 1.15}, {0.4, 1.15}}};
+inline constexpr StepTries kStepTries{
+    {{0.3}, {0.2}, {0.4}, {0.1}, {0.5}, {0.3, 1.15}, {0.2, 1.15}, {0.4, 1.15}, {0.3, 1.3}, {0.4, 1.3}, {0.3, 1.45}}};
 // Down: the foot that leads stays level, the one that follows keeps its heel up until it is over the lip.
-inline constexpr StepTries kDownTries{
-    {{0.0}, {0.1}, {0.2}, {0.0, 1.25}, {0.1, 1.25}, {0.2, 1.25}, {0.1, 1.5}, {0.0, 1.5}}};
-inline constexpr StepTries kDownAfterTries{
-    {{0.4}, {0.3}, {0.5}, {0.2}, {0.4, 1.25}, {0.3, 1.25}, {0.5, 1.25}, {0.6, 1.25}}};
-inline constexpr StepTries kPassingTries{
-    {{0.4}, {0.5}, {0.3}, {0.6}, {0.2}, {0.4, 1.15}, {0.5, 1.15}, {0.5, 1.15, 1.1}}};
+inline constexpr StepTries kDownTries{{{0.0},
+                                       {0.1},
+                                       {0.2},
+                                       {0.0, 1.25},
+                                       {0.1, 1.25},
+                                       {0.2, 1.25},
+                                       {0.1, 1.5},
+                                       {0.0, 1.5},
+                                       {0.2, 1.5},
+                                       {0.0, 1.8},
+                                       {0.1, 1.8}}};
+inline constexpr StepTries kDownAfterTries{{{0.4},
+                                            {0.3},
+                                            {0.5},
+                                            {0.2},
+                                            {0.4, 1.25},
+                                            {0.3, 1.25},
+                                            {0.5, 1.25},
+                                            {0.6, 1.25},
+                                            {0.4, 1.5},
+                                            {0.3, 1.5},
+                                            {0.5, 1.5}}};
+inline constexpr StepTries kPassingTries{{{0.4},
+                                          {0.5},
+                                          {0.3},
+                                          {0.6},
+                                          {0.2},
+                                          {0.4, 1.15},
+                                          {0.5, 1.15},
+                                          {0.5, 1.15, 1.1},
+                                          {0.4, 1.3},
+                                          {0.5, 1.3},
+                                          {0.4, 1.45}}};
 
 // From where its foot stands it comes down onto a tread.
 [[nodiscard]] bool goes_down(const StepGoal& goal, const SolePair& soles) noexcept;
@@ -209,6 +243,7 @@ struct StepPlan {
   std::int32_t swing_ticks = 1;
   std::int32_t rise_ticks = 1;    // of the swing: the torso has risen
   double joint_margin_rad = 0.0;  // what it is to keep from the joints' ranges
+  double torque_share = 1.0;      // what it may ask of what the knee that stands alone has
   double heel_up_rad = 0.0;       // of its foot, when it lifts off
   std::int32_t heel_ticks = 1;    // before which it begins to rise
   WeightTransfer shift, next;     // onto the stance foot, and from it after the landing

@@ -32,7 +32,8 @@ void StepSearch::try_candidate(const RobotModel& robot, const StepParams& params
     TorsoTrajectory::set_horizontal(from, com_landed_);
   }
   const SolePair from_soles{sole_pose(soles[0]), sole_pose(soles[1])};
-  candidate_ = plan_step(params, goal, from_soles, tries_for(goal, from_soles)[try_]);
+  tries_ = &tries_for(goal, from_soles);
+  candidate_ = plan_step(params, goal, from_soles, (*tries_)[try_]);
   if (leading_found_) {
     candidate_.joint_margin_rad = params.joint_margin_rad;  // the needed one is for a foot that lands some mm off
   } else {
@@ -40,6 +41,15 @@ void StepSearch::try_candidate(const RobotModel& robot, const StepParams& params
   }
   const std::int32_t knot_ticks = leading_found_ ? kLookAhead * params.knot_ticks : params.knot_ticks;
   proof_.begin(robot, StepKnots(robot, params, knot_ticks, candidate_, from, soles));
+}
+
+// How far the toes point down is nothing to a knee that lacks torque: the next try is the next slower one.
+void StepSearch::next_try() noexcept {
+  const StepTry failed = (*tries_)[try_++];
+  if (proof_.check().torque_share <= proof_.knots().torque_share()) return;
+  while (try_ < kStepTryCount && (*tries_)[try_].longer <= failed.longer &&
+         (*tries_)[try_].rise_longer <= failed.rise_longer)
+    ++try_;
 }
 
 // Can the weight then move over the foot that landed? A wide diagonal step could be a dead end: the ankle roll of the
@@ -63,7 +73,8 @@ bool StepSearch::leads_on(const RobotModel& robot, const StepParams& params) con
 StepSearch::State StepSearch::step(const RobotModel& robot, const StepParams& params) noexcept {
   if (state_ != State::kSearching || !proof_.advance(robot, params, kKnotsPerCall)) return state_;
   if (!proof_.check().feasible) {
-    if (++try_ == kStepTryCount) return state_ = State::kImpossible;
+    next_try();
+    if (try_ == kStepTryCount) return state_ = State::kImpossible;
   } else {
     if (!leading_found_) plan_ = candidate_;
     if (goal_.kind == StepKind::kFloor && !leads_on(robot, params)) return state_ = State::kImpossible;

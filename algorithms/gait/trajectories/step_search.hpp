@@ -24,9 +24,11 @@ class StepSearch {
   [[nodiscard]] const StepPlan& plan() const noexcept { return plan_; }
 
  private:
+  void next_try() noexcept;
   void try_candidate(const RobotModel& robot, const StepParams& params) noexcept;
   [[nodiscard]] bool leads_on(const RobotModel& robot, const StepParams& params) const noexcept;
 
+  const StepTries* tries_ = &kStepTries;
   StepGoal goal_, trailing_;
   TorsoTrajectory::State from_{};
   std::array<Transform, kFootCount> soles_;

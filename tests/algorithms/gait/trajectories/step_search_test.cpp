@@ -188,6 +188,24 @@ TEST(StepSearch, PassingStepThatTheKneeCannotLiftInTime_IsDoneMoreSlowlyOrNotAtA
   EXPECT_EQ(searched(step, too_weak).state(), StepSearch::State::kImpossible);
 }
 
+// The knee bends deeper than on lower stairs, and balance and weak drives take their share of it.
+TEST(StepSearch, TrailingStepUpAHighRise_IsDoneSlowlyAndKeepsTorqueBack) {
+  for (const double rise : {0.17, 0.19, 0.2, 0.21, 0.22}) {
+    std::array<Transform, kFootCount> soles;
+    TorsoTrajectory::State from;
+    const StepPlan plan = stair_step(StepKind::kTrailing, rise, 0.28, soles, from);
+    StepSearch search;
+    search.begin(nominal_robot(), {}, plan.goal, {}, StepParams{}.durations.stair_shift_ticks, from, soles);
+    ASSERT_EQ(finish(search), StepSearch::State::kFound) << rise;
+    EXPECT_EQ(search.plan().tried.longer > 1.0, rise > StepParams{}.high_rise_m) << rise;
+    const StepKnots knots(nominal_robot(), {}, 2, search.plan(), from, soles);
+    StepFeasibility proof;
+    proof.begin(nominal_robot(), knots);
+    ASSERT_TRUE(proof.advance(nominal_robot(), {}, knots.count()));
+    EXPECT_LT(proof.check().torque_share, 0.9) << rise;
+  }
+}
+
 // All else alike: a drive that has all its torque at rest only.
 TEST(StepSearch, PassingStepForWhichTheTurningKneeLacksTorque_IsDoneMoreSlowlyOrNotAtAll) {
   const auto searched_with = [](double no_load_radps) {
@@ -211,7 +229,7 @@ TEST(StepSearch, PassingStepThatIsPossibleWithNoTrailingStepAfterIt_IsImpossible
   step.trailing.target.position_m.z() += 0.3;
   EXPECT_EQ(searched(step).state(), StepSearch::State::kImpossible);
   StepParams fast;
-  fast.durations.passing_swing_ticks = 300;
+  fast.durations.passing_swing_ticks = 220;
   EXPECT_EQ(searched(passing_step(0.13, 0.28), fast).state(), StepSearch::State::kImpossible);
 }
 
