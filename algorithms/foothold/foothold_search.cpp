@@ -188,6 +188,8 @@ void FootholdSearch::link(std::size_t i) noexcept {
     const Vec2 a_m = other.nosing_a_m.head<2>(), b_m = other.nosing_b_m.head<2>();
     // A tread seen in part goes on; the top of a box beside the way does not.
     if (extent_on(tread, a_m, b_m) == Extent::kAside) continue;
+    const bool is_next = tread.along_m(0.5 * (a_m + b_m)) < params_.step_max_m;
+    if (is_next && (tread.rise_behind_m == 0.0 || rise_m < tread.rise_behind_m)) tread.rise_behind_m = rise_m;
     add_toe_limit(tread, params_.levels, foot_, {other.nosing_middle_m(), other.left}, other.nosing_margin_m,
                   {params_.back_min_m, params_.back_max_m});
   }
@@ -370,7 +372,8 @@ void FootholdSearch::erode_row(std::int32_t row) noexcept {
 }
 
 // Sole origin behind the nosing for a foot between two lateral positions: as much to spare at the heel, behind the
-// nosing's round, as at the toe, but not deep into a long tread or a landing.
+// nosing's round, as at the toe, but not deep into a long tread or a landing. Before a high rise more at the toe: the
+// shin leans over it while the knee bends deep, and touched the next nosing from 0.20 m on (2026-11).
 double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, double right_m) const noexcept {
   const double heel_m = -foot_.contact.heel_x_m;
   const double margin_m = tread.nosing_margin_m;
@@ -400,6 +403,10 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
     spare_m = std::min(spare_m, room_m - margin_m - tread.back_margin_m);
   }
   const double round_m = std::min(params_.feet.nosing_round_m, std::max(0.5 * spare_m, 0.0));
+  if (tread.rise_behind_m > params_.feet.high_rise_m) {
+    const double inset_m = margin_m + 0.5 * round_m + params_.feet.high_heel_share * spare_m;
+    return heel_m + math::clamp(inset_m, 0.0, params_.feet.heel_inset_m);
+  }
   const double inset_max_m = tread.below_lip ? params_.down.heel_inset_max_m : params_.feet.heel_inset_max_m;
   return heel_m + math::clamp(margin_m + 0.5 * (spare_m + round_m), 0.0, inset_max_m);
 }
@@ -523,13 +530,32 @@ bool FootholdSearch::carries(const Upright& riser, const LevelSurface& tread) co
   return behind_m >= -p.overhang_tolerance_m && behind_m <= p.hidden_max_m;
 }
 
+bool FootholdSearch::is_one_rise(const LevelSurface& tread) const noexcept {
+  return std::any_of(uprights_.begin(), uprights_.end(), [&](const Upright& u) {
+    return u.width_m() > 2.0 * params_.top.half_width_m && carries(u, tread) &&
+           tread.height_m - u.bottom_m > params_.riser_least_m;
+  });
+}
+
+bool FootholdSearch::too_steep(const LevelSurface& tread) const noexcept {
+  constexpr double kTread_m = 0.28, kSteepness = 0.5;
+  return tread.rise_behind_m > params_.rise_sure_m && tread.depth_m > 0.0 &&
+         tread.rise_behind_m > params_.feet.shin_rise_m + kSteepness * (tread.depth_m - kTread_m);
+}
+
+bool FootholdSearch::is_stool(const LevelSurface& tread) const noexcept {
+  return tread.depth_m == 0.0 && tread.ends.left_m && tread.ends.right_m &&
+         *tread.ends.left_m - *tread.ends.right_m < params_.feet.lone_width_m;
+}
+
 // A face that rises from the level the robot stands on higher than it may climb, before the next tread.
 bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) const noexcept {
   const Vec2 sole_p_m = base_(sole_.origin_m());
   const double farthest_m = std::min(query_.climbing ? sole_p_m.x() + params_.step_max_m : params_.raster.g_range_m,
                                      next_distance_m + params_.upright_beyond_m);
+  const double highest_m = found_.next == kNone ? params_.rise_max_m : params_.rise_sure_m;
   for (const Upright& u : uprights_) {
-    if (u.top_m - z_foot_ <= params_.rise_max_m || u.bottom_m > z_foot_ + 2.0 * params_.delta_foot_m) continue;
+    if (u.top_m - z_foot_ <= highest_m || u.bottom_m > z_foot_ + 2.0 * params_.delta_foot_m) continue;
     // A post is no rise: the feet may go beside it, see link_upright().
     if (u.outward.dot(base_.heading()) > -params_.uprights.facing_cos || u.width_m() < 2.0 * params_.top.half_width_m)
       continue;
@@ -573,9 +599,12 @@ StopReason FootholdSearch::judge_feet(const LevelSurface& tread, const Feet& fee
 
 StopReason FootholdSearch::judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
                                        double step_max_m, Feet& feet) const noexcept {
-  if (tread.height_m - from_height_m > params_.rise_max_m) return StopReason::kRiseTooHigh;
+  const double rise_m = tread.height_m - from_height_m;
+  if (rise_m > params_.rise_max_m || (rise_m > params_.rise_sure_m && !is_one_rise(tread)) || too_steep(tread))
+    return StopReason::kRiseTooHigh;
   if (!tread.has_nosing) return StopReason::kNothingSeen;
   if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return StopReason::kTreadTooShort;
+  if (is_stool(tread)) return StopReason::kTooNarrow;
   const StopReason placed = place_feet(tread, feet);
   if (placed != StopReason::kNone) return placed;
   const Foothold& foot = feet[index_of(query_.stance)];
@@ -612,7 +641,7 @@ void FootholdSearch::choose() noexcept {
 
 void FootholdSearch::choose_up() noexcept {
   work_.add(400);
-  work_.add(uprights_.size(), 90);
+  work_.add(uprights_.size(), 150);
   if (found_.next != kNone) work_.add(place_feet_instructions(levels_[found_.next]));
   double top_m = 0.0;
   if (map_.stamp_ns == 0 || (levels_.empty() && uprights_.empty())) {
@@ -648,6 +677,7 @@ void FootholdSearch::look_ahead_row(std::int32_t row) noexcept {
 
 void FootholdSearch::finish() noexcept {
   work_.add(1200);
+  work_.add(uprights_.size(), 60);
   if (found_.next_next != kNone) work_.add(place_feet_instructions(levels_[found_.next_next]));
   if (found_.next_next != kNone) {
     pending_.has_p_star_star =

@@ -39,11 +39,15 @@ class FootholdSearch {
   // Where the feet go on a tread.
   struct FeetParams {
     double side_margin_m = 0.020;
+    double lone_width_m = 0.55;
     double veer_max_m = 0.02;
     double half_spacing_m = 0.100;
     double half_spacing_min_m = 0.085;
     double heel_inset_m = 0.014;
     double heel_inset_max_m = 0.030;
+    double high_rise_m = 0.1775;
+    double high_heel_share = 0.25;
+    double shin_rise_m = 0.205;
     double nosing_round_m = 0.0015;
     double evade_max_m = 0.06;
     double seen_behind_m = 0.2;
@@ -51,6 +55,10 @@ class FootholdSearch {
 
     static void visit(auto& p, auto& field) {
       field("side_margin_m", p.side_margin_m, 0.0, 0.5, "Contact rectangle to the tread's sides.");
+      field("lone_width_m", p.lone_width_m, 0.0, 5.0,
+            "What is narrower between the sides that were seen, with nothing rising behind it, is a stool or a box: "
+            "stairs "
+            "are 0.6 m wide.");
       field("veer_max_m", p.veer_max_m, 0.0, 0.2,
             "Feet go no farther sideways per tread, towards the middle of the staircase.");
       field("half_spacing_m", p.half_spacing_m, 0.05, 0.3, "Soles from their common middle.");
@@ -60,6 +68,13 @@ class FootholdSearch {
       field("heel_inset_m", p.heel_inset_m, 0.0, 0.2, "Heel edge behind the nosing where the back edge is not mapped.");
       field("heel_inset_max_m", p.heel_inset_max_m, 0.0, 0.5, "Heel edge behind the nosing at most, on deep treads.");
       field.ordered("heel_inset_m", "heel_inset_max_m");
+      field("high_rise_m", p.high_rise_m, 0.0, 0.5,
+            "Before a higher rise the feet stand back, heel_inset_m behind the nosing at most: the shin needs room.");
+      field("high_heel_share", p.high_heel_share, 0.0, 0.5, "Then the heel keeps this share of what is to spare.");
+      field("shin_rise_m", p.shin_rise_m, 0.0, 1.0,
+            "Behind a tread of 0.28 m it rises no higher, or the shin touches the edge above; behind a deeper one by "
+            "half "
+            "of what it is deeper more.");
       field("nosing_round_m", p.nosing_round_m, 0.0, 0.05,
             "A nosing is rounded, by wear or as it was built: the tread carries a heel from so far behind it on.");
       field("evade_max_m", p.evade_max_m, 0.0, 0.3, "Feet go no farther sideways to stand beside an obstacle.");
@@ -104,9 +119,11 @@ class FootholdSearch {
     }
   };
   struct Params {
-    double g_z_m = 0.40;
+    double g_z_m = 0.49;
     double delta_foot_m = 0.025;
-    double rise_max_m = 0.19;
+    double rise_max_m = 0.23;
+    double rise_sure_m = 0.19;
+    double riser_least_m = 0.15;
     // Contact rectangle to the tread's front and back edge, collision toe to the riser: the least, and two sigmas of
     // where edge and foot are. An edge errs by as much as its own sigma says, 2.3 mm rms in 620 steps on treads of
     // 270 mm; beside that a foot lands 2.2 mm off, by its legs' errors and the camera's yaw. Two sigmas of both, 6.4
@@ -128,11 +145,16 @@ class FootholdSearch {
     DownParams down;
 
     static void visit(auto& p, auto& field) {
-      field("g_z_m", p.g_z_m, 0.01, 2.0, "Eq. 23: a foothold is no higher, two rises of 0.175 m and margin.");
+      field("g_z_m", p.g_z_m, 0.01, 2.0, "Eq. 23: a foothold is no higher, two rises and margin.");
       field("delta_foot_m", p.delta_foot_m, 0.0, 0.039,
             "Eqs 26, 28: heights as close are one level; the published 0.04 steps over a 40 mm step.");
-      field("rise_max_m", p.rise_max_m, 0.02, 0.5,
-            "A step rises no higher: above the highest rise we climb, 0.175 m; below two of the least, 0.2 m.");
+      field("rise_max_m", p.rise_max_m, 0.02, 0.5, "A step rises no higher: above the highest rise we climb, 0.22 m.");
+      field("rise_sure_m", p.rise_sure_m, 0.02, 0.5,
+            "What rises higher may be two of the least rises, 0.1 m, and the tread between was not seen.");
+      field.ordered("rise_sure_m", "rise_max_m");
+      field(
+          "riser_least_m", p.riser_least_m, 0.0, 0.5,
+          "Such a rise is one where its riser was seen to reach as far down below the tread: farther than one of two.");
       field("margin", p.margin);
       field("tread_min_m", p.tread_min_m, 0.1, 1.0,
             "A tread is as deep: collision toe and contact heel, 252 mm, and 4 mm at either end.");
@@ -244,6 +266,12 @@ class FootholdSearch {
   // Of a step onto the tread from soles at a point before it; places the feet. kNoStaircase: it is too far for a step.
   [[nodiscard]] StopReason judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
                                        double step_max_m, Feet& feet) const noexcept;
+  // Not two steps of which the tread between was missed.
+  [[nodiscard]] bool is_one_rise(const LevelSurface& tread) const noexcept;
+  // A shin meets the edge that rises behind it.
+  [[nodiscard]] bool too_steep(const LevelSurface& tread) const noexcept;
+  // Something narrow to step on that is no stairs.
+  [[nodiscard]] bool is_stool(const LevelSurface& tread) const noexcept;
   [[nodiscard]] bool carries(const Upright& riser, const LevelSurface& tread) const noexcept;
   [[nodiscard]] bool blocked_by_upright(double next_distance_m, double& top_m) const noexcept;
   [[nodiscard]] StopReason without_next() const noexcept;

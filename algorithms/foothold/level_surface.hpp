@@ -116,6 +116,7 @@ struct LevelSurface {
   StaticVector<FootLimit, kMaxPolygonVertices + 3> edges;
   StaticVector<FootLimit, 3> toe;  // collision box to back edge, next nosing, next riser
   double depth_m = 0.0;            // nosing to the nearest of these, 0: none
+  double rise_behind_m = 0.0;      // to the nearest tread that rises behind it, 0: none
   StaticVector<TreadObstacle, 8> obstacles;
   SeenEnds ends;
   std::optional<Lip> lip;  // its far edge, where that drops

@@ -41,8 +41,8 @@ enum class StopReason : std::uint8_t {
   kTop,            // standing on the highest tread of a staircase just climbed
   kRiseTooHigh,    // the next surface is out of reach, or the tread before it was not seen: measured_rise_m
   kTreadTooShort,  // the foot does not fit: measured_tread_m
-  kTooNarrow,      // both feet do not fit side by side between the sides that were seen
-  kMapStale,       // the newest fused frame is too old
+  kTooNarrow,  // both feet do not fit side by side between the sides that were seen, or what lies there is no stairs
+  kMapStale,   // the newest fused frame is too old
   kEdgeUncertain,  // the foot fits the next tread, but not with its edges known so vaguely
   kObstacle,       // something stands on the next tread or before it, and both feet do not fit beside it
   // Where the search found no way, and the pictures may be why (PictureMonitor).
@@ -79,7 +79,7 @@ inline constexpr std::array kStopReasonTable{
     StopReasonInfo{"top", "it took the tread it stood on for the highest"},
     StopReasonInfo{"rise_too_high", "the next surface that it saw was too high to step on"},
     StopReasonInfo{"tread_too_short", "it measured a tread too short for the foot"},
-    StopReasonInfo{"too_narrow", "it measured a tread too narrow for two feet"},
+    StopReasonInfo{"too_narrow", "it measured a tread too narrow for two feet and room beside them"},
     StopReasonInfo{"map_stale", "its map was stale"},
     StopReasonInfo{"edge_uncertain", "it knew the edges of the next tread too vaguely"},
     StopReasonInfo{"obstacle", "something stood where its feet would have gone next"},

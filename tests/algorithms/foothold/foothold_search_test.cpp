@@ -114,7 +114,11 @@ class FootholdSearchTest : public ::testing::Test {
       EXPECT_GT(heel, 0.005);
       EXPECT_GT(toe, 0.005);
       if (k < s.steps && s.tread_m < 0.3) {
-        EXPECT_NEAR(heel - kRound_m, toe, 1e-6) << "centred";
+        if (s.rise_m < FootholdSearch::Params{}.feet.high_rise_m) {
+          EXPECT_NEAR(heel - kRound_m, toe, 1e-6) << "centred";
+        } else {
+          EXPECT_LT(heel + 0.005, toe) << "the shin has room";
+        }
       }
       EXPECT_NEAR(f.nosing_distance_m, p.x() - nosing, 1e-9);
       EXPECT_LE(std::abs(p.y()) + kContactRectangle.half_width_m + 0.02, 0.5 * s.width_m + 1e-9);
@@ -272,9 +276,9 @@ TEST_F(FootholdSearchTest, SecondRiseTooHigh_IsNoPStarStar) {
   for (MapPolygon& polygon : map.polygons) {
     const bool above = polygon.surface.kind == SurfaceKind::kTread && polygon.surface.centroid_m.z() > 1.5 * s.rise_m;
     if (!above) continue;
-    polygon.surface.centroid_m.z() += 0.07;
-    polygon.surface.d_m -= 0.07;
-    for (Vec3& v : polygon.surface.polygon) v.z() += 0.07;
+    polygon.surface.centroid_m.z() += 0.11;
+    polygon.surface.d_m -= 0.11;
+    for (Vec3& v : polygon.surface.polygon) v.z() += 0.11;
   }
   const FootholdSet& r = search(map, standing(s, 0));
   EXPECT_EQ(r.obstruction, StopReason::kNone);
@@ -662,6 +666,67 @@ TEST_F(FootholdSearchTest, StepMissing_SaysRiseTooHighAndPlacesNothing) {
       EXPECT_FALSE(search_->result().has_p_star);
     }
   }
+}
+
+TEST_F(FootholdSearchTest, StepOf200mm_IsClimbedWhereItsRiserWasSeenFarEnoughDown) {
+  for (int on = 0; on <= 2; ++on) {
+    const Stairs s{.rise_m = 0.2};
+    expect_feet_on(search(s, on), s, on + 1);
+    EXPECT_TRUE(search_->result().has_p_star_star);
+    MapSnapshot open;
+    open.stamp_ns = kNow_ns;
+    for (const MapPolygon& p : ideal_map(s).polygons) {
+      if (p.surface.kind == SurfaceKind::kTread) {
+        EXPECT_TRUE(open.polygons.try_push_back(p));
+      }
+    }
+    EXPECT_EQ(search(open, standing(s, on)).obstruction, StopReason::kRiseTooHigh);
+  }
+}
+
+// The shin of the leg that lifts the body leans over the toe.
+TEST_F(FootholdSearchTest, HighStairs_AreTooHighWhereTheirTreadsAreNotDeepEnough) {
+  for (const double tread : {0.27, 0.28, 0.30, 0.32}) {
+    for (const double rise : {0.18, 0.2, 0.21, 0.22}) {
+      const Stairs s{.rise_m = rise, .tread_m = tread};
+      const bool fits = rise < 0.19 || rise < 0.205 + 0.5 * (tread - 0.28);
+      EXPECT_EQ(search(s, 1).obstruction, fits ? StopReason::kNone : StopReason::kRiseTooHigh) << rise << " " << tread;
+    }
+  }
+  const Stairs curb{.steps = 1, .rise_m = 0.22};
+  EXPECT_EQ(search(curb, 0).obstruction, StopReason::kNone);
+}
+
+TEST_F(FootholdSearchTest, TreadOfLowStairsNotSeen_IsNotSteppedOver) {
+  for (const double rise : {0.10, 0.11, 0.115}) {
+    for (int on = 0; on <= 2; ++on) {
+      const Stairs s{.rise_m = rise};
+      MapSnapshot map;
+      map.stamp_ns = kNow_ns;
+      for (const MapPolygon& p : ideal_map(s).polygons) {
+        const double z_m = p.surface.centroid_m.z();
+        const bool gone = std::abs(z_m - (on + 1) * rise) < 0.01 || std::abs(z_m - (on + 0.5) * rise) < 0.01;
+        if (!gone) {
+          EXPECT_TRUE(map.polygons.try_push_back(p));
+        }
+      }
+      EXPECT_EQ(search(map, standing(s, on)).obstruction, StopReason::kRiseTooHigh) << rise << " " << on;
+      EXPECT_NEAR(search_->result().measured_rise_m, 2 * rise, 1e-9);
+      EXPECT_FALSE(search_->result().has_p_star);
+    }
+  }
+}
+
+TEST_F(FootholdSearchTest, NarrowTopWithNothingBehind_IsAStoolUnlessItsSidesWereNotSeen) {
+  for (const double width : {0.36, 0.5, 0.6}) {
+    const Stairs s{.steps = 1, .rise_m = 0.15, .width_m = width};
+    MapSnapshot map = ideal_map(s);
+    EXPECT_EQ(search(map, standing(s, 0)).obstruction, width < 0.55 ? StopReason::kTooNarrow : StopReason::kNone);
+    for (MapPolygon& p : map.polygons) p.surface.edges.fill(EdgeKind::kUnknown);
+    EXPECT_EQ(search(map, standing(s, 0)).obstruction, StopReason::kNone);
+  }
+  const Stairs narrow{.rise_m = 0.15, .width_m = 0.5};
+  expect_feet_on(search(narrow, 0), narrow, 1);
 }
 
 TEST_F(FootholdSearchTest, StepOf500mm_SaysRiseTooHighFromTheTreadOrFromItsFaceAlone) {
