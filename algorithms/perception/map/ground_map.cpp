@@ -166,7 +166,7 @@ bool GroundMap::tell(GroundView& out) noexcept {
       if (!is_other) set(out.level, x, y);
     });
   }
-  for (int pass = 0; pass < kClosings; ++pass) close(out.level, pass == 0);
+  for (int pass = 0; pass < kClosings; ++pass) close(out.level, pass + 1 == kClosings);
   return true;
 }
 

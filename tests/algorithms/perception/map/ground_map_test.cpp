@@ -74,6 +74,15 @@ TEST_F(GroundMapTest, HoleInTheFloor_IsNoGround) {
   EXPECT_TRUE(is(told_.level, 0.75, 0.3));
 }
 
+TEST_F(GroundMapTest, SquareThatIsLower_IsBridgedAndAWiderHoleIsNot) {
+  for (const double side_m : {0.04, 0.12}) {
+    const auto in_hole = [&](double x, double y) { return x > 0.6 && x < 0.6 + side_m && y > 0.0 && y < side_m; };
+    map_->clear();
+    look([&](double x, double y) { return in_hole(x, y) ? -0.3 : 0.0; }, 200);
+    EXPECT_EQ(is(told_.level, 0.6 + 0.5 * side_m, 0.5 * side_m), side_m < 0.05);
+  }
+}
+
 TEST_F(GroundMapTest, GroundWithoutDepth_IsNoGround) {
   const auto in_hole = [](double x, double y) { return x > 0.6 && x < 0.9 && std::abs(y) < 0.15; };
   look([&](double x, double y) { return in_hole(x, y) ? std::numeric_limits<double>::quiet_NaN() : 0.0; }, 40);
