@@ -600,8 +600,8 @@ StopReason FootholdSearch::judge_feet(const LevelSurface& tread, const Feet& fee
 StopReason FootholdSearch::judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
                                        double step_max_m, Feet& feet) const noexcept {
   const double rise_m = tread.height_m - from_height_m;
-  if (rise_m > params_.rise_max_m || (rise_m > params_.rise_sure_m && !is_one_rise(tread)) || too_steep(tread))
-    return StopReason::kRiseTooHigh;
+  const bool sure = rise_m <= params_.rise_sure_m || (is_one_rise(tread) && !too_steep(tread));
+  if (rise_m > params_.rise_max_m || !sure) return StopReason::kRiseTooHigh;
   if (!tread.has_nosing) return StopReason::kNothingSeen;
   if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return StopReason::kTreadTooShort;
   if (is_stool(tread)) return StopReason::kTooNarrow;
