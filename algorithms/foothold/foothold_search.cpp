@@ -407,8 +407,13 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
     const double inset_m = margin_m + 0.5 * round_m + params_.feet.high_heel_share * spare_m;
     return heel_m + math::clamp(inset_m, 0.0, params_.feet.heel_inset_m);
   }
-  const double inset_max_m = tread.below_lip ? params_.down.heel_inset_max_m : params_.feet.heel_inset_max_m;
-  return heel_m + math::clamp(margin_m + 0.5 * (spare_m + round_m), 0.0, inset_max_m);
+  const FeetParams& feet = params_.feet;
+  const DownParams& down = params_.down;
+  const double inset_max_m = !tread.below_lip ? feet.heel_inset_max_m
+                             : tread.lip      ? down.tread_heel_inset_max_m
+                                              : down.floor_heel_inset_max_m;
+  const double heel_share = tread.below_lip ? down.heel_share : 0.5;
+  return heel_m + math::clamp(margin_m + heel_share * (spare_m + round_m), 0.0, inset_max_m);
 }
 
 Foothold FootholdSearch::foothold_at(const LevelSurface& tread, double along_m, double lateral_m) const noexcept {

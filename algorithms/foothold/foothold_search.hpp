@@ -104,7 +104,10 @@ class FootholdSearch {
     double beyond_m = 0.16;
     double level_gap_m = 0.35;
     double facing_cos = 0.64;
-    double heel_inset_max_m = 0.022;
+    double heel_share = 0.65;
+    double tread_heel_inset_max_m = 0.026;
+    double floor_heel_inset_max_m = 0.028;
+    double hidden_m = 0.010;
 
     static void visit(auto& p, auto& field) {
       field("drop_max_m", p.drop_max_m, 0.02, 0.5, "A step goes no farther down; below that the legs say.");
@@ -114,8 +117,18 @@ class FootholdSearch {
             "Where something higher begins as near beyond the lip, the way goes up: a tread of open stairs has a lip.");
       field("facing_cos", p.facing_cos, 0.0, 1.0,
             "A lip whose turn against the base's heading has a smaller cosine is not ahead.");
-      field("heel_inset_max_m", p.heel_inset_max_m, 0.0, 0.5,
-            "Heel edge beyond the lip at most, on a deep surface: the legs reach no farther down.");
+      field("heel_share", p.heel_share, 0.0, 1.0,
+            "Of what a tread has to spare as much is at the heel, which a riser is behind, and the rest at the toe. "
+            "Chosen "
+            "on 12 flights of the simulation (2026-11-30), and tried on nothing else.");
+      field("tread_heel_inset_max_m", p.tread_heel_inset_max_m, 0.0, 0.5,
+            "Heel edge beyond the lip at most, on a tread: the legs reach no farther down.");
+      field("floor_heel_inset_max_m", p.floor_heel_inset_max_m, 0.0, 0.5,
+            "Heel edge beyond the lip at most where no other lip follows: a foot that walks on goes back a little "
+            "first.");
+      field("hidden_m", p.hidden_m, 0.0, 0.05,
+            "A surface was seen from this much nearer to the lip than the map tells: an unknown end keeps "
+            "`map.sides.unknown_margin_m`.");
     }
   };
   struct Params {

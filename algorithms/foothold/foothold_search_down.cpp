@@ -69,7 +69,7 @@ StopReason FootholdSearch::judge_below(const Lip& lip, std::size_t level) noexce
   // What the lip hid of it is seen from nearer by.
   for (const Foothold& foot : pending_.p_star_feet) {
     for (const FootLimit& near : tread.hidden) {
-      if (near.clearance_m(foot.position_m.head<2>()) < 0.0) return StopReason::kEdgeUncertain;
+      if (near.clearance_m(foot.position_m.head<2>()) < -params_.down.hidden_m) return StopReason::kEdgeUncertain;
     }
   }
   pending_.p_star = pending_.p_star_feet[index_of(query_.stance)];

@@ -182,6 +182,13 @@ bool ClimbPlanner::lined_up(const Situation& situation, const StandOff& to, std:
              (to.at_lip ? params_.lip.min_stand_off_m : params_.min_stand_off_m);
 }
 
+bool ClimbPlanner::far_from_lip(const Situation& situation, const FootholdSet& footholds) const noexcept {
+  const StandOff to = stand_off(situation, footholds);
+  return to.at_lip && std::any_of(situation.soles.begin(), situation.soles.end(), [&](const SolePose& sole) {
+           return toe_to_line_m(robot_->sole.collision, sole, to.nosing, to.yaw_rad) > params_.lip.far_m;
+         });
+}
+
 bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& footholds, StepGoal& goal) const noexcept {
   const StandOff to = stand_off(situation, footholds);
   const std::array<bool, kFootCount> lined{lined_up(situation, to, 0), lined_up(situation, to, 1)};
@@ -364,7 +371,8 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
     decision.obstruction = StopReason::kMapStale;
     return decision;
   }
-  if (!on_treads_ && floor_goal(situation, footholds, decision.goal)) {
+  const bool lines_up = !on_treads_ || far_from_lip(situation, footholds);
+  if (lines_up && floor_goal(situation, footholds, decision.goal)) {
     decision.has_step = corrections_ < params_.line_up.max_corrections && floor_steps_ < params_.max_floor_steps;
     if (decision.has_step) return decision;
     decision = {};
@@ -387,7 +395,8 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
   const Vec3 travel_m = decision.goal.target.position_m - situation.soles[index_of(memory_.last_swing)].position_m;
   walking_ = decision.walks;
   way_.stepped();
-  if (walking_) {
+  const bool begins_on_tread = on_treads_ && decision.goal.kind == StepKind::kFloor;
+  if (walking_ || begins_on_tread) {
     floor_steps_ = corrections_ = 0;
   } else if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < params_.correction_m) {
     ++corrections_;

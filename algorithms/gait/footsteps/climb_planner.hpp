@@ -24,15 +24,18 @@ class ClimbPlanner {
  public:
   // Before an edge that drops away.
   struct LipParams {
-    double stand_off_m = 0.018;
-    double min_stand_off_m = 0.008;
-    double clearance_m = 0.008;
+    double stand_off_m = 0.014;
+    double min_stand_off_m = 0.006;
+    double clearance_m = 0.006;
+    double far_m = 0.035;
 
     static void visit(auto& p, auto& field) {
       field("stand_off_m", p.stand_off_m, 0.0, 0.3, "Collision toe to the lip.");
       field("min_stand_off_m", p.min_stand_off_m, 0.0, 0.3, "Nearer is not lined up, whatever the tolerance.");
       field.ordered("min_stand_off_m", "stand_off_m");
       field("clearance_m", p.clearance_m, 0.0, 0.5, "Clearance of a toe from the lip on the way.");
+      field("far_m", p.far_m, 0.0, 0.5,
+            "From farther off it comes nearer first, on a deep tread, too: the legs reach no farther down.");
     }
   };
   // When the feet are lined up before the stairs.
@@ -202,6 +205,7 @@ class ClimbPlanner {
   struct StandOff;
   [[nodiscard]] StandOff stand_off(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] bool lined_up(const Situation& situation, const StandOff& to, std::size_t foot) const noexcept;
+  [[nodiscard]] bool far_from_lip(const Situation& situation, const FootholdSet& footholds) const noexcept;
   [[nodiscard]] Foot leading_foot(const Situation& situation, const SolePair& targets) const noexcept;
 
   Params params_;

@@ -159,6 +159,9 @@ void ClimbReport::take_target(const Telemetry& telemetry) {
   const LatchedStep& step = telemetry.gait.step;
   target_ = step.target;
   target_mapped_ = step.height_mapped;
+  constexpr double kLeastDrop_m = 0.015;
+  const Transform& odom_T_foot = telemetry.state.odom_T_sole[index_of(step.foot)];
+  target_below_ = step.target.position_m.z() < odom_T_foot.p_m.z() - kLeastDrop_m;
   footsteps_.back().true_T_planned =
       odometry_.true_T_odom() * Transform{rotation_z(step.target.yaw_rad), step.target.position_m};
   const Transform& odom_T_stance = telemetry.state.odom_T_sole[index_of(other(step.foot))];
@@ -178,7 +181,7 @@ void ClimbReport::observe_landing(const Truth& truth) {
 
   if (target_mapped_ && f.step_index >= 0) {
     f.along_error_m = target_.nosing_distance_m - nosing_distance_m(world_, f.step_index, true_T_sole);
-  } else if (target_mapped_) {
+  } else if (target_mapped_ && !target_below_) {  // down on the floor there is no nosing to measure from
     // It stands on the floor although a tread was meant: the nosing that makes the error least is the meant one.
     for (std::size_t step = 0; step < world_.steps.size(); ++step) {
       const double error_m = target_.nosing_distance_m - nosing_distance_m(world_, static_cast<int>(step), true_T_sole);

@@ -120,6 +120,7 @@ class ClimbReport {
   std::vector<Footstep> footsteps_;
   Foothold target_;              // of the newest footstep
   double latched_across_m_ = 0;  // the same: target's lateral place seen from the stance sole when it was chosen
+  bool target_below_ = false;    // of where its foot stood
   bool target_mapped_ = false;   // the same: on a mapped tread, not beside the standing foot
   bool landing_pending_ = false;
   double com_tracking_max_m_ = kNotMeasured, zmp_margin_min_m_ = kNotMeasured;
