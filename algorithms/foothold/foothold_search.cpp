@@ -189,7 +189,8 @@ void FootholdSearch::link(std::size_t i) noexcept {
     // A tread seen in part goes on; the top of a box beside the way does not.
     if (extent_on(tread, a_m, b_m) == Extent::kAside) continue;
     const bool is_next = tread.along_m(0.5 * (a_m + b_m)) < params_.step_max_m;
-    if (is_next && (tread.rise_behind_m == 0.0 || rise_m < tread.rise_behind_m)) tread.rise_behind_m = rise_m;
+    if (is_next && (tread.rise_behind_m == 0.0 || rise_m < tread.rise_behind_m))
+      tread.rise_behind_m = rise_m;
     add_toe_limit(tread, params_.levels, foot_, {other.nosing_middle_m(), other.left}, other.nosing_margin_m,
                   {params_.back_min_m, params_.back_max_m});
   }
@@ -387,7 +388,7 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
   for (const FootLimit& limit : tread.toe) bound_by(limit, limit.margin_m);
   if (tread.toe.empty()) {  // nothing is mapped behind: it is as deep as it was seen to be, at least
     // Over a lip nothing is in the toe's way.
-    const double toe_ahead_m = tread.lip ? 0.0 : foot_.collision.toe_x_m - foot_.contact.toe_x_m;
+    const double toe_ahead_m = tread.ends.lip ? 0.0 : foot_.collision.toe_x_m - foot_.contact.toe_x_m;
     for (const FootLimit& edge : tread.edges) {
       const bool is_back = edge.inside.inward.dot(tread.heading) < -params_.levels.square_cos;
       if (is_back) bound_by(edge, tread.back_margin_m + toe_ahead_m);
@@ -399,7 +400,7 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
   }
   // A tread that ends in nothing ends all the same: the next riser may be there and not be seen.
   if (tread.ends.far_m) {
-    const double room_m = *tread.ends.far_m - heel_m - (tread.lip ? foot_.contact : foot_.collision).toe_x_m;
+    const double room_m = *tread.ends.far_m - heel_m - (tread.ends.lip ? foot_.contact : foot_.collision).toe_x_m;
     spare_m = std::min(spare_m, room_m - margin_m - tread.back_margin_m);
   }
   const double round_m = std::min(params_.feet.nosing_round_m, std::max(0.5 * spare_m, 0.0));
@@ -409,10 +410,10 @@ double FootholdSearch::aim_along_m(const LevelSurface& tread, double left_m, dou
   }
   const FeetParams& feet = params_.feet;
   const DownParams& down = params_.down;
-  const double inset_max_m = !tread.below_lip ? feet.heel_inset_max_m
-                             : tread.lip      ? down.tread_heel_inset_max_m
-                                              : down.floor_heel_inset_max_m;
-  const double heel_share = tread.below_lip ? down.heel_share : 0.5;
+  const double inset_max_m = !tread.ends.below ? feet.heel_inset_max_m
+                             : tread.ends.lip  ? down.tread_heel_inset_max_m
+                                               : down.floor_heel_inset_max_m;
+  const double heel_share = tread.ends.below ? down.heel_share : 0.5;
   return heel_m + math::clamp(margin_m + heel_share * (spare_m + round_m), 0.0, inset_max_m);
 }
 
@@ -538,13 +539,13 @@ bool FootholdSearch::carries(const Upright& riser, const LevelSurface& tread) co
 bool FootholdSearch::is_one_rise(const LevelSurface& tread) const noexcept {
   return std::any_of(uprights_.begin(), uprights_.end(), [&](const Upright& u) {
     return u.width_m() > 2.0 * params_.top.half_width_m && carries(u, tread) &&
-           tread.height_m - u.bottom_m > params_.riser_least_m;
+           tread.height_m - u.bottom_m > params_.high_rise.riser_least_m;
   });
 }
 
 bool FootholdSearch::too_steep(const LevelSurface& tread) const noexcept {
   constexpr double kTread_m = 0.28, kSteepness = 0.5;
-  return tread.rise_behind_m > params_.rise_sure_m && tread.depth_m > 0.0 &&
+  return tread.rise_behind_m > params_.high_rise.from_m && tread.depth_m > 0.0 &&
          tread.rise_behind_m > params_.feet.shin_rise_m + kSteepness * (tread.depth_m - kTread_m);
 }
 
@@ -558,7 +559,7 @@ bool FootholdSearch::blocked_by_upright(double next_distance_m, double& top_m) c
   const Vec2 sole_p_m = base_(sole_.origin_m());
   const double farthest_m = std::min(query_.climbing ? sole_p_m.x() + params_.step_max_m : params_.raster.g_range_m,
                                      next_distance_m + params_.upright_beyond_m);
-  const double highest_m = found_.next == kNone ? params_.rise_max_m : params_.rise_sure_m;
+  const double highest_m = found_.next == kNone ? params_.rise_max_m : params_.high_rise.from_m;
   for (const Upright& u : uprights_) {
     if (u.top_m - z_foot_ <= highest_m || u.bottom_m > z_foot_ + 2.0 * params_.delta_foot_m) continue;
     // A post is no rise: the feet may go beside it, see link_upright().
@@ -605,7 +606,7 @@ StopReason FootholdSearch::judge_feet(const LevelSurface& tread, const Feet& fee
 StopReason FootholdSearch::judge_tread(const LevelSurface& tread, double from_height_m, const Vec2& from_p_m,
                                        double step_max_m, Feet& feet) const noexcept {
   const double rise_m = tread.height_m - from_height_m;
-  const bool sure = rise_m <= params_.rise_sure_m || (is_one_rise(tread) && !too_steep(tread));
+  const bool sure = rise_m <= params_.high_rise.from_m || (is_one_rise(tread) && !too_steep(tread));
   if (rise_m > params_.rise_max_m || !sure) return StopReason::kRiseTooHigh;
   if (!tread.has_nosing) return StopReason::kNothingSeen;
   if (tread.depth_m > 0.0 && tread.depth_m < params_.tread_min_m) return StopReason::kTreadTooShort;

@@ -131,12 +131,24 @@ class FootholdSearch {
             "`map.sides.unknown_margin_m`.");
     }
   };
+  // What may be two steps.
+  struct HighRiseParams {
+    double from_m = 0.19;
+    double riser_least_m = 0.15;
+
+    static void visit(auto& p, auto& field) {
+      field("from_m", p.from_m, 0.02, 0.5,
+            "What rises higher may be two of the least rises, 0.1 m, and the tread between was not seen.");
+      field(
+          "riser_least_m", p.riser_least_m, 0.0, 0.5,
+          "Such a rise is one where its riser was seen to reach as far down below the tread: farther than one of two.");
+    }
+  };
   struct Params {
     double g_z_m = 0.49;
     double delta_foot_m = 0.025;
     double rise_max_m = 0.23;
-    double rise_sure_m = 0.19;
-    double riser_least_m = 0.15;
+    HighRiseParams high_rise;
     // Contact rectangle to the tread's front and back edge, collision toe to the riser: the least, and two sigmas of
     // where edge and foot are. An edge errs by as much as its own sigma says, 2.3 mm rms in 620 steps on treads of
     // 270 mm; beside that a foot lands 2.2 mm off, by its legs' errors and the camera's yaw. Two sigmas of both, 6.4
@@ -162,12 +174,7 @@ class FootholdSearch {
       field("delta_foot_m", p.delta_foot_m, 0.0, 0.039,
             "Eqs 26, 28: heights as close are one level; the published 0.04 steps over a 40 mm step.");
       field("rise_max_m", p.rise_max_m, 0.02, 0.5, "A step rises no higher: above the highest rise we climb, 0.22 m.");
-      field("rise_sure_m", p.rise_sure_m, 0.02, 0.5,
-            "What rises higher may be two of the least rises, 0.1 m, and the tread between was not seen.");
-      field.ordered("rise_sure_m", "rise_max_m");
-      field(
-          "riser_least_m", p.riser_least_m, 0.0, 0.5,
-          "Such a rise is one where its riser was seen to reach as far down below the tread: farther than one of two.");
+      field("high_rise", p.high_rise);
       field("margin", p.margin);
       field("tread_min_m", p.tread_min_m, 0.1, 1.0,
             "A tread is as deep: collision toe and contact heel, 252 mm, and 4 mm at either end.");

@@ -12,8 +12,8 @@ const Lip* FootholdSearch::lip_ahead() const noexcept {
   const Vec2& sole_p_m = sole_.origin_m();
   const double feet_m = params_.feet.half_spacing_m + foot_.collision.half_width_m;
   for (const LevelSurface& level : levels_) {
-    if (!level.lip || !in_sole_layer(level.plane.height_m(sole_p_m), z_foot_, params_.delta_foot_m)) continue;
-    const Lip& lip = *level.lip;
+    if (!level.ends.lip || !in_sole_layer(level.plane.height_m(sole_p_m), z_foot_, params_.delta_foot_m)) continue;
+    const Lip& lip = *level.ends.lip;
     const double ahead_m = lip.heading.dot(lip.middle_m() - sole_p_m);
     // A foot whose toe is over it stands on it all the same.
     if (!(ahead_m > 0.0) || !(ahead_m < nearest_m)) continue;
@@ -68,7 +68,7 @@ StopReason FootholdSearch::judge_below(const Lip& lip, std::size_t level) noexce
   if (judged != StopReason::kNone) return judged;
   // What the lip hid of it is seen from nearer by.
   for (const Foothold& foot : pending_.p_star_feet) {
-    for (const FootLimit& near : tread.hidden) {
+    for (const FootLimit& near : tread.ends.below->hidden) {
       if (near.clearance_m(foot.position_m.head<2>()) < -params_.down.hidden_m) return StopReason::kEdgeUncertain;
     }
   }

@@ -76,7 +76,7 @@ void find_lip(const SurfacePatch& surface, const Vec2& centre, LevelSurface& out
   const double length_m = along.norm();
   if (!(length_m > 0.0)) return;
   const bool a_is_left = cross(along, centre - line.a_m.head<2>()) < 0.0;  // the surface lies behind
-  Lip& lip = out.lip.emplace();
+  Lip& lip = out.ends.lip.emplace();
   lip.left_m = a_is_left ? line.a_m : line.b_m;
   lip.right_m = a_is_left ? line.b_m : line.a_m;
   lip.heading = left_of((lip.right_m - lip.left_m).head<2>() / length_m);
@@ -85,7 +85,7 @@ void find_lip(const SurfacePatch& surface, const Vec2& centre, LevelSurface& out
 
 // Contact rectangle to every edge, collision box to a back line that rises.
 void add_edge_limits(const SurfacePatch& surface, const LevelSurfaceParams& params, const EdgeMargin& margin,
-                     const SoleModel& sole, bool below_lip, LevelSurface& out) noexcept {
+                     const SoleModel& sole, LevelSurface& out) noexcept {
   for (std::size_t i = 0; i < out.hull.size(); ++i) {
     const HalfPlane inside = edge_half_plane(out.hull, i);
     const double facing = inside.inward.dot(out.heading);
@@ -94,8 +94,8 @@ void add_edge_limits(const SurfacePatch& surface, const LevelSurfaceParams& para
     if (facing < -params.square_cos && surface.back.valid) margin_m = out.back_margin_m;
     const bool is_side = std::abs(inside.inward.dot(out.left)) > params.side_sin;
     const FootLimit limit{inside, reach_m(sole.contact, out.heading, inside.inward), margin_m, is_side};
-    if (below_lip && facing > params.square_cos) {
-      (void)out.hidden.try_push_back(limit);
+    if (out.ends.below && facing > params.square_cos) {
+      (void)out.ends.below->hidden.try_push_back(limit);
     } else {
       (void)out.edges.try_push_back(limit);
     }
@@ -146,7 +146,7 @@ bool prepare(const MapPolygon& polygon, double base_yaw_rad, const LevelSurfaceP
   out.height_m = out.plane.height_m(out.has_nosing ? out.nosing_middle_m() : centre);
 
   note_ends(surface, params, out);
-  add_edge_limits(surface, params, margin, sole, false, out);
+  add_edge_limits(surface, params, margin, sole, out);
   return true;
 }
 
@@ -156,11 +156,12 @@ bool prepare_below(const MapPolygon& polygon, const Lip& lip, const LevelSurface
   const SurfacePatch& surface = polygon.surface;
   find_lip(surface, centroid_m(out.hull), out);
   // On a wedge the foot stands between the headings of both its edges.
-  const bool is_wedge = out.lip && out.lip->heading.dot(lip.heading) > params.square_cos;
-  out.heading = is_wedge ? Vec2{(lip.heading + out.lip->heading).normalized()} : lip.heading;
+  const bool is_wedge = out.ends.lip && out.ends.lip->heading.dot(lip.heading) > params.square_cos;
+  out.heading = is_wedge ? Vec2{(lip.heading + out.ends.lip->heading).normalized()} : lip.heading;
   out.yaw_rad = math::atan2(out.heading.y(), out.heading.x());
   out.left = left_of(out.heading);
-  out.has_nosing = out.below_lip = true;
+  out.has_nosing = true;
+  out.ends.below.emplace();
   out.nosing_a_m = lip.left_m;
   out.nosing_b_m = lip.right_m;
   for (Vec3* end_m : {&out.nosing_a_m, &out.nosing_b_m}) end_m->z() = out.plane.height_m(end_m->head<2>());
@@ -170,8 +171,8 @@ bool prepare_below(const MapPolygon& polygon, const Lip& lip, const LevelSurface
   out.height_m = out.plane.height_m(out.nosing_middle_m());
 
   note_ends(surface, params, out);
-  if (out.lip) out.depth_m = out.along_m(out.lip->middle_m());
-  add_edge_limits(surface, params, margin, sole, true, out);
+  if (out.ends.lip) out.depth_m = out.along_m(out.ends.lip->middle_m());
+  add_edge_limits(surface, params, margin, sole, out);
   const auto limit = [&](const SoleRectangle& foot, const Vec2& inward, const Vec3& at_m, double kept_m, bool side) {
     (void)out.edges.try_push_back(
         {{inward, inward.dot(at_m.head<2>())}, reach_m(foot, out.heading, inward), kept_m, side});

@@ -81,12 +81,6 @@ struct TreadObstacle {
   }
 };
 
-// Where they were seen: lateral places of a tread's sides, and how far behind the nosing it ends, in a riser or in
-// nothing.
-struct SeenEnds {
-  std::optional<double> left_m, right_m, far_m;
-};
-
 // Where a surface drops away ahead. Plan view, in the map.
 struct Lip {
   Vec3 left_m = Vec3::Zero();  // its ends, looking out over it
@@ -94,6 +88,18 @@ struct Lip {
   Vec2 heading = Vec2::UnitX();  // out over it
   double sigma_m = 0.0;
   [[nodiscard]] Vec2 middle_m() const noexcept { return 0.5 * (left_m + right_m).head<2>(); }
+};
+
+struct BelowLip {
+  StaticVector<FootLimit, kMaxPolygonVertices> hidden;  // near edges, which the lip hides from farther off
+};
+
+// Where they were seen: lateral places of a tread's sides, and how far behind the nosing it ends, in a riser or in
+// nothing.
+struct SeenEnds {
+  std::optional<double> left_m, right_m, far_m;
+  std::optional<BelowLip> below;  // what is the nosing is the lip above it
+  std::optional<Lip> lip;         // the far one, where it drops
 };
 
 struct LevelSurface {
@@ -104,8 +110,7 @@ struct LevelSurface {
   BoundingBox box;        // eq. 16
   double height_m = 0.0;  // at the nosing's middle, else at the centroid
   bool has_nosing = false;
-  bool below_lip = false;  // its nosing is the lip above it
-  double yaw_rad = 0.0;    // up the stairs
+  double yaw_rad = 0.0;  // up the stairs
   Vec2 heading = Vec2::UnitX();
   Vec2 left = Vec2::UnitY();
   Vec3 nosing_a_m = Vec3::Zero();  // left end
@@ -119,9 +124,6 @@ struct LevelSurface {
   double rise_behind_m = 0.0;      // to the nearest tread that rises behind it, 0: none
   StaticVector<TreadObstacle, 8> obstacles;
   SeenEnds ends;
-  std::optional<Lip> lip;  // its far edge, where that drops
-  // Of a surface below a lip: its near edges, which the lip hides from farther off.
-  StaticVector<FootLimit, kMaxPolygonVertices> hidden;
 
   [[nodiscard]] Vec2 nosing_middle_m() const noexcept { return 0.5 * (nosing_a_m + nosing_b_m).head<2>(); }
   // Sole origin at a distance behind the nosing and to the left of its middle.

@@ -72,7 +72,7 @@ void stage_gait_plan(StairPlan& p) {
     p.com.plan(p.params.com, com, zmp_of_shift(p.params, plan, ComPlan::zmp_under(p.params.com, com)));
     plan_torso(nominal_robot().legs, p.params, flat, p.com, plan.shift_ticks, plan);
     const HorizontalMotion lift_off = p.com.at(plan.shift_ticks);
-    p.com.plan(p.params.com, lift_off, zmp_of_swing(p.params, plan));
+    p.com.plan(p.params.com, lift_off, zmp_of_swing(plan));
     plan_torso(nominal_robot().legs, p.params, flat, p.com, 0, plan);
     p.swing.plan(kSole, p.soles[i][index_of(plan.goal.foot)], plan.goal.target, plan.shape, plan.swing_ticks);
     if (i > 0) continue;

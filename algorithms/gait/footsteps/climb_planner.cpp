@@ -75,8 +75,8 @@ void ClimbPlanner::reset(const Params& params, const RobotModel& robot) noexcept
 }
 
 void ClimbPlanner::restart() noexcept {
-  stride_share_ = 1.0;
-  floor_steps_ = corrections_ = 0;
+  floor_.stride_share = 1.0;
+  floor_.steps = floor_.corrections = 0;
   way_.forget();
   passing_refused_ = closes_up_ = false;
   odom_stood_.reset();
@@ -167,8 +167,8 @@ ClimbPlanner::StandOff ClimbPlanner::stand_off(const Situation& situation,
 }
 
 bool ClimbPlanner::lined_up(const Situation& situation, const StandOff& to, std::size_t foot) const noexcept {
-  const double relaxed = corrections_ > params_.line_up.strict_corrections
-                             ? 1.0 + 0.5 * (corrections_ - params_.line_up.strict_corrections)
+  const double relaxed = floor_.corrections > params_.line_up.strict_corrections
+                             ? 1.0 + 0.5 * (floor_.corrections - params_.line_up.strict_corrections)
                              : 1.0;
   // With the leading step under way a little more is no reason to line up again.
   const double tolerance =
@@ -198,17 +198,18 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
   Foot foot = other(memory_.last_swing);
   if (lined[index_of(foot)]) {
     foot = other(foot);
-  } else if (floor_steps_ == 0) {
+  } else if (floor_.steps == 0) {
     foot = swing_foot(displacement(middle_of(situation.soles), torso_goal), foot, params_.rule);
   }
-  const double half_width_m = math::clamp(0.5 * (to.soles[0].position_m - to.soles[1].position_m).norm(),
-                                          params_.least_half_width_m, robot_->stance.half_width_m + params_.wider_m);
+  const double half_width_m =
+      math::clamp(0.5 * (to.soles[0].position_m - to.soles[1].position_m).norm(), params_.width.least_half_m,
+                  robot_->stance.half_width_m + params_.width.wider_m);
   const SolePose& stance = situation.soles[index_of(other(foot))];
   goal = {};
   goal.kind = StepKind::kFloor;
   goal.foot = foot;
   goal.target = floor_step(robot_->sole.collision, stance, foot, torso_goal, half_width_m,
-                           shortened(params_.floor, stride_share_));
+                           shortened(params_.floor, floor_.stride_share));
   // On the way, with the heading still wrong, no toe comes near the riser.
   const double short_m = (to.at_lip ? params_.lip.clearance_m : params_.floor_clearance_m) -
                          toe_to_line_m(robot_->sole.collision, goal.target, to.nosing, to.yaw_rad);
@@ -218,12 +219,12 @@ bool ClimbPlanner::floor_goal(const Situation& situation, const FootholdSet& foo
 }
 
 void ClimbPlanner::watch_feet(const SolePair& soles) noexcept {
-  if (slid_ || !on_treads_ || split_stance_ || !odom_stood_ || set_back_ >= params_.max_set_back) return;
+  if (slid_ || !on_treads_ || split_stance_ || !odom_stood_ || set_back_ >= params_.slid.max_set_back) return;
   const auto right_p_left_m = [](const SolePair& pair) -> Vec2 {
     const Vec3 apart_m = pair[0].position_m - pair[1].position_m;
     return (rotation_z(pair[1].yaw_rad).transpose() * apart_m).head<2>();
   };
-  if (!((right_p_left_m(soles) - right_p_left_m(*odom_stood_)).norm() > params_.slid_m)) return;
+  if (!((right_p_left_m(soles) - right_p_left_m(*odom_stood_)).norm() > params_.slid.off_m)) return;
   const auto moved_m = [&](std::size_t i) { return (soles[i].position_m - (*odom_stood_)[i].position_m).norm(); };
   slid_ = moved_m(0) > moved_m(1) ? Foot::kLeft : Foot::kRight;
 }
@@ -231,7 +232,7 @@ void ClimbPlanner::watch_feet(const SolePair& soles) noexcept {
 bool ClimbPlanner::leave_slid_foot() noexcept {
   if (closes_up_ || !slid_) return false;
   slid_.reset();
-  set_back_ = params_.max_set_back;
+  set_back_ = params_.slid.max_set_back;
   return true;
 }
 
@@ -304,10 +305,10 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
   decision.walks = true;
   const std::optional<WalkGoal> to = way_.next(*goal_.laid_out);
   if (!to) return decision;
-  const LevelWalk walk(params_.walk, robot_->sole, robot_->stance.half_width_m, shortened(params_.floor, stride_share_),
-                       params_.rule);
+  const LevelWalk walk(params_.walk, robot_->sole, robot_->stance.half_width_m,
+                       shortened(params_.floor, floor_.stride_share), params_.rule);
   const LevelStep step =
-      walk.next(situation.soles, memory_.last_swing, !walking_ && floor_steps_ == 0, *to, footholds.ground);
+      walk.next(situation.soles, memory_.last_swing, !walking_ && floor_.steps == 0, *to, footholds.ground);
   decision.walk = step.outcome;
   switch (step.outcome) {
     case LevelStep::Outcome::kArrived:
@@ -337,7 +338,7 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
 ClimbPlanner::Decision ClimbPlanner::look_and_decide(const Situation& situation,
                                                      const FootholdSet& footholds) noexcept {
   if (!goal_.laid_out || split_stance_) return decide(situation, footholds);
-  const bool climbs = leads_to_goal(situation, footholds), lines_up = floor_steps_ > 0;
+  const bool climbs = leads_to_goal(situation, footholds), lines_up = floor_.steps > 0;
   const GoalWay::Input in{situation.soles, footholds, *goal_.laid_out, climbs, lines_up, on_treads_};
   way_.watch(params_.way, in);
   const Decision decision = decide(situation, footholds);
@@ -373,7 +374,7 @@ ClimbPlanner::Decision ClimbPlanner::decide(const Situation& situation, const Fo
   }
   const bool lines_up = !on_treads_ || far_from_lip(situation, footholds);
   if (lines_up && floor_goal(situation, footholds, decision.goal)) {
-    decision.has_step = corrections_ < params_.line_up.max_corrections && floor_steps_ < params_.max_floor_steps;
+    decision.has_step = floor_.corrections < params_.line_up.max_corrections && floor_.steps < params_.max_floor_steps;
     if (decision.has_step) return decision;
     decision = {};
     decision.obstruction = StopReason::kNotLinedUp;
@@ -397,9 +398,9 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
   way_.stepped();
   const bool begins_on_tread = on_treads_ && decision.goal.kind == StepKind::kFloor;
   if (walking_ || begins_on_tread) {
-    floor_steps_ = corrections_ = 0;
+    floor_.steps = floor_.corrections = 0;
   } else if (decision.goal.kind == StepKind::kFloor && travel_m.norm() < params_.correction_m) {
-    ++corrections_;
+    ++floor_.corrections;
   }
   if (leads(decision.goal.kind)) {
     memory_.leading = decision.goal.foot;
@@ -410,8 +411,8 @@ void ClimbPlanner::latched(const Situation& situation, const Decision& decision)
 }
 
 bool ClimbPlanner::shorten_floor_steps() noexcept {
-  stride_share_ *= params_.shorter;
-  return stride_share_ > params_.shortest;
+  floor_.stride_share *= params_.shorter.share;
+  return floor_.stride_share > params_.shorter.least_share;
 }
 
 SolePose ClimbPlanner::beside_passed(const SolePose& stance, Foot foot) const noexcept {
@@ -431,12 +432,12 @@ void ClimbPlanner::swing_aborted() noexcept { memory_ = before_latch_; }
 void ClimbPlanner::landed(const std::optional<SolePair>& soles) noexcept {
   odom_stood_ = soles;
   slid_.reset();
-  stride_share_ = 1.0;
+  floor_.stride_share = 1.0;
   closes_up_ = false;
   landed_ = latched_.goal.target;
   switch (latched_.goal.kind) {
     case StepKind::kFloor:
-      if (!walking_) ++floor_steps_;
+      if (!walking_) ++floor_.steps;
       on_treads_ = false;
       break;
     case StepKind::kClosing:

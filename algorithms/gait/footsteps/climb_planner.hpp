@@ -22,6 +22,41 @@ inline constexpr std::array<std::string_view, 2> kGaitPatternNames{"ds", "ss"};
 
 class ClimbPlanner {
  public:
+  // Floor steps that the legs cannot do.
+  struct ShorterParams {
+    double share = 0.6;
+    double least_share = 0.2;
+
+    static void visit(auto& p, auto& field) {
+      field("share", p.share, 0.1, 0.95, "Floor steps become this times as long when the legs cannot do one.");
+      field("least_share", p.least_share, 0.01, 1.0,
+            "Floor steps that would be no longer than this share are given up.");
+    }
+  };
+  // Of the soles from their middle, in floor steps.
+  struct WidthParams {
+    double least_half_m = 0.08;
+    double wider_m = 0.03;
+
+    static void visit(auto& p, auto& field) {
+      field("least_half_m", p.least_half_m, 0.03, 0.08,
+            "Floor steps keep the soles at least this far from their middle.");
+      field("wider_m", p.wider_m, 0.0, 0.2,
+            "Floor steps keep the soles no farther from their middle than the stance's half width and this.");
+    }
+  };
+  // Feet that slid on their tread.
+  struct SlidParams {
+    double off_m = 0.012;
+    std::uint32_t max_set_back = 2;
+
+    static void visit(auto& p, auto& field) {
+      field(
+          "off_m", p.off_m, 0.002, 0.2,
+          "A foot that is farther from where it landed, seen from the other one on its tread, is set back beside it.");
+      field("max_set_back", p.max_set_back, 0, 100, "Feet that slid are set back so often on a tread.");
+    }
+  };
   // Before an edge that drops away.
   struct LipParams {
     double stand_off_m = 0.014;
@@ -75,12 +110,9 @@ class ClimbPlanner {
     std::int64_t remembered_ns = 5 * kNsPerS;
     double correction_m = 0.05;
     double turn_round = 2.5;
-    double shorter = 0.6;
-    double shortest = 0.2;
-    double least_half_width_m = 0.08;
-    double wider_m = 0.03;
-    double slid_m = 0.012;
-    std::uint32_t max_set_back = 2;
+    ShorterParams shorter;
+    WidthParams width;
+    SlidParams slid;
     LipParams lip;
     LineUpParams line_up;
     LevelWalkParams walk;
@@ -109,16 +141,9 @@ class ClimbPlanner {
       field("correction_m", p.correction_m, 0.0, 0.5, "A shorter step on the floor only corrects.");
       field("turn_round", p.turn_round, 1.0, 100.0,
             "The other foot leads than the one that was to only for a displacement beyond this times the dead bands.");
-      field("shorter", p.shorter, 0.1, 0.95, "Floor steps become this times as long when the legs cannot do one.");
-      field("shortest", p.shortest, 0.01, 1.0, "Floor steps that would be no longer than this share are given up.");
-      field("least_half_width_m", p.least_half_width_m, 0.03, 0.08,
-            "Floor steps keep the soles at least this far from their middle.");
-      field("wider_m", p.wider_m, 0.0, 0.2,
-            "Floor steps keep the soles no farther from their middle than the stance's half width and this.");
-      field(
-          "slid_m", p.slid_m, 0.002, 0.2,
-          "A foot that is farther from where it landed, seen from the other one on its tread, is set back beside it.");
-      field("max_set_back", p.max_set_back, 0, 100, "Feet that slid are set back so often on a tread.");
+      field("shorter", p.shorter);
+      field("width", p.width);
+      field("slid", p.slid);
       field("lip", p.lip);
       field("line_up", p.line_up);
       field("walk", p.walk);
@@ -235,9 +260,11 @@ class ClimbPlanner {
   std::uint32_t set_back_ = 0;          // feet that slid, on this tread
   std::uint32_t tread_id_ = 0;          // under the foot that landed last
   std::uint32_t treads_climbed_ = 0;
-  double stride_share_ = 1.0;  // of the floor step's limits
-  std::uint32_t floor_steps_ = 0;
-  std::uint32_t corrections_ = 0;  // the short ones of them
+  struct {
+    double stride_share = 1.0;  // of a step's limits
+    std::uint32_t steps = 0;
+    std::uint32_t corrections = 0;  // the short ones of them
+  } floor_;
 };
 
 }  // namespace polygmap

@@ -69,7 +69,7 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
   StepPlan plan;
   plan.goal = goal;
   plan.shape = on_floor  ? params.floor_swing
-               : down    ? params.down_swing
+               : down    ? params.down.swing
                : passing ? params.passing_swing
                          : params.stair_swing;
   plan.shift_ticks = on_floor ? params.durations.floor_shift_ticks : params.durations.stair_shift_ticks;
@@ -78,14 +78,16 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
                                    : passing ? params.durations.passing_swing_ticks
                                              : params.durations.stair_swing_ticks;
   plan.swing_ticks = static_cast<std::int32_t>(tried.longer * usual_ticks);
-  const double rise_share = on_floor || down ? 1.0 : passing ? params.passing_rise_share : params.rise_share;
+  const double rise_share = on_floor || down ? 1.0
+                            : passing        ? params.durations.passing_rise_share
+                                             : params.durations.rise_share;
   plan.rise_ticks = static_cast<std::int32_t>(std::min(tried.rise_longer * rise_share, 1.0) * plan.swing_ticks);
   plan.tried = tried;
   const bool needed = goal.kind == StepKind::kClosing || goal.kind == StepKind::kTrailing;
   plan.joint_margin_rad = needed ? params.needed_margin_rad : params.joint_margin_rad;
   const double rise_m = soles[index_of(stance)].position_m.z() - soles[index_of(goal.foot)].position_m.z();
   plan.torque_share =
-      rise_m > params.high_rise_m ? std::min(params.high_torque_share, params.torque_share) : params.torque_share;
+      rise_m > params.high.from_m ? std::min(params.high.torque_share, params.torque_share) : params.torque_share;
   plan.shape.toe_down_rad = on_floor ? 0.5 * tried.toe_down_rad : tried.toe_down_rad;
   plan.zmp_stance_m = zmp_in(params, landed[index_of(stance)], stance, down);
   // After a step that leads the weight goes on to that foot; after the others it may have to stop anywhere.
@@ -118,7 +120,7 @@ void plan_torso(const LegGeometry& geometry, const StepParams& params, const Sol
         com.at(tick).position_m - lean * params.down.com_above_base_m * unit_at(middle_of(stand).yaw_rad);
     return torso_at(geometry, torso, stand, base_m, is_split ? turn_rad : 0.0, lean);
   };
-  plan.lift_off = torso_when(lift_off_tick + params.leave_ticks, soles, !leads(plan.goal.kind));
+  plan.lift_off = torso_when(lift_off_tick + params.durations.leave_ticks, soles, !leads(plan.goal.kind));
   plan.touch_down = torso_when(lift_off_tick + plan.swing_ticks, landed, leads(plan.goal.kind));
   if (!leads(plan.goal.kind)) return;
   // Rising with the foot gives the leading leg room to fold, at a lower knee speed.

@@ -19,6 +19,9 @@ struct StepDurations {
   std::int32_t down_swing_ticks = 600;
   std::int32_t floor_shift_ticks = 350;
   std::int32_t floor_swing_ticks = 350;
+  std::int32_t leave_ticks = 30;
+  double rise_share = 0.5;
+  double passing_rise_share = 0.6;
 
   static void visit(auto& p, auto& field) {
     field("stair_shift_ticks", p.stair_shift_ticks, 66, 2000, "Double support before a step on the stairs: 0.33 s.");
@@ -27,6 +30,12 @@ struct StepDurations {
     field("down_swing_ticks", p.down_swing_ticks, 50, 2000, "A swing down onto a tread.");
     field("floor_shift_ticks", p.floor_shift_ticks, 66, 2000, "Double support before a step on the floor.");
     field("floor_swing_ticks", p.floor_swing_ticks, 50, 2000, "A swing on the floor.");
+    field("leave_ticks", p.leave_ticks, 0, 200,
+          "The rear leg still reaches the ground as long after its foot has left it.");
+    field("rise_share", p.rise_share, 0.05, 1.0,
+          "The torso rises in this share of a swing onto a tread, to give the foot room.");
+    field("passing_rise_share", p.passing_rise_share, 0.05, 1.0,
+          "The torso rises in this share of a swing past a tread.");
   }
 };
 // The rear heel rises before its foot leaves a higher tread: flat, the ankle's range ends above some 0.1 m.
@@ -51,6 +60,17 @@ struct HeelRiseParams {
 };
 // Steps down over a lip.
 struct StepDownParams {
+  // Ahead first, then down before it, and the last part back.
+  SwingShape swing{.lift_end = 0.26,
+                   .forward_begin = 0.14,
+                   .forward_end = 0.56,
+                   .landing_begin = 0.57,
+                   .short_m = -0.012,
+                   .short_begin = 0.72,
+                   .short_end = 0.95,
+                   .clearance_m = 0.035,
+                   .retreat_m = -0.014,
+                   .retreat_end = 0.20};
   double zmp_ahead_m = 0.01;
   double max_leg_m = 0.612;
   std::int32_t landing_hold_ticks = 100;
@@ -61,6 +81,7 @@ struct StepDownParams {
   HeelRiseParams heel_rise;
 
   static void visit(auto& p, auto& field) {
+    field("swing", p.swing);
     field("zmp_ahead_m", p.zmp_ahead_m, -0.05, 0.12,
           "Zero-moment point ahead of the ankle: where the ankles of both legs keep most of their ranges.");
     field("max_leg_m", p.max_leg_m, 0.4, 0.63, "Hip pitch to ankle, of 0.630 stretched.");
@@ -74,6 +95,18 @@ struct StepDownParams {
     field("turn_rad", p.turn_rad, 0.0, 0.5, "It turns by this, the hip of the leading foot ahead.");
     field("com_above_base_m", p.com_above_base_m, 0.0, 0.5, "Centre of mass above the base, with legs bent.");
     field("heel_rise", p.heel_rise);
+  }
+};
+// Steps up so high that a knee lifts the body with a deep bend.
+struct HighStepParams {
+  double from_m = 0.1775;
+  double torque_share = 0.89;
+
+  static void visit(auto& p, auto& field) {
+    field("from_m", p.from_m, 0.0, 1.0,
+          "A foot that steps up from this much below the other one leaves a knee that bends deep to lift the body.");
+    field("torque_share", p.torque_share, 0.1, 1.0,
+          "A plan asks such a knee for at most this share: balance, masses and drives that are off take the rest.");
   }
 };
 struct StepParams {
@@ -98,34 +131,19 @@ struct StepParams {
                            .toe_down_full = 0.29,
                            .toe_up_begin = 0.30,
                            .toe_up_end = 0.70};
-  // Down over a lip: ahead first, then down before it, and the last part back.
-  SwingShape down_swing{.lift_end = 0.26,
-                        .forward_begin = 0.14,
-                        .forward_end = 0.56,
-                        .landing_begin = 0.57,
-                        .short_m = -0.012,
-                        .short_begin = 0.72,
-                        .short_end = 0.95,
-                        .clearance_m = 0.035,
-                        .retreat_m = -0.014,
-                        .retreat_end = 0.20};
   ComPlan::Params com;
   double max_zmp_offset_m = 0.03;
   double zmp_ahead_m = 0.0;
   double zmp_inward_m = 0.022;
   std::int32_t landing_hold_ticks = 50;
   std::int32_t lift_hold_ticks = 15;
-  std::int32_t leave_ticks = 30;
-  double rise_share = 0.5;
-  double passing_rise_share = 0.6;
   std::int32_t knot_ticks = 15;
   double joint_margin_rad = 0.03;
   double needed_margin_rad = 0.01;
   double knee_min_rad = 0.08;
   double speed_share = 0.95;
   double torque_share = 1.0;
-  double high_rise_m = 0.1775;
-  double high_torque_share = 0.89;
+  HighStepParams high;
   StepDownParams down;
   StepDurations durations;
 
@@ -134,7 +152,6 @@ struct StepParams {
     field("stair_swing", p.stair_swing);
     field("floor_swing", p.floor_swing);
     field("passing_swing", p.passing_swing);
-    field("down_swing", p.down_swing);
     field("com", p.com);
     field("max_zmp_offset_m", p.max_zmp_offset_m, 0.0, 0.1, "The zero-moment point goes no farther, to set off.");
     field("zmp_ahead_m", p.zmp_ahead_m, -0.05, 0.1,
@@ -145,12 +162,6 @@ struct StepParams {
           "The foot may land this late before the weight sets off for it.");
     field("lift_hold_ticks", p.lift_hold_ticks, 0, 60,
           "The weight is over the stance foot for so long before the other one lifts.");
-    field("leave_ticks", p.leave_ticks, 0, 200,
-          "The rear leg still reaches the ground as long after its foot has left it.");
-    field("rise_share", p.rise_share, 0.05, 1.0,
-          "The torso rises in this share of a swing onto a tread, to give the foot room.");
-    field("passing_rise_share", p.passing_rise_share, 0.05, 1.0,
-          "The torso rises in this share of a swing past a tread.");
     field("knot_ticks", p.knot_ticks, 1, 200,
           "Eq. 37: time between two knots; a drive is up to 2 % faster between them than its knots say.");
     field("joint_margin_rad", p.joint_margin_rad, 0.0, 0.3, "A plan keeps this from the joints' ranges.");
@@ -162,10 +173,7 @@ struct StepParams {
     field("torque_share", p.torque_share, 0.1, 1.0,
           "A plan asks the knee that stands alone for at most this share of its drive's torque: one that has no more "
           "lags and then throws the body up.");
-    field("high_rise_m", p.high_rise_m, 0.0, 1.0,
-          "A foot that steps up from this much below the other one leaves a knee that bends deep to lift the body.");
-    field("high_torque_share", p.high_torque_share, 0.1, 1.0,
-          "A plan asks such a knee for at most this share: balance, masses and drives that are off take the rest.");
+    field("high", p.high);
     field("down", p.down);
     field("durations", p.durations);
   }

@@ -21,7 +21,7 @@ struct SurfaceLines {  // each only if valid
   EdgeLine nosing;
   EdgeLine back;
   bool back_drops = false;  // a lower surface lies beyond it
-  EdgeLine occluder;  // where a nearer surface hides the rest: cuts the polygon, but is no end of it
+  EdgeLine occluder;        // where a nearer surface hides the rest: cuts the polygon, but is no end of it
 };
 
 struct PlaneSide {  // inward . (p - point) >= 0

@@ -27,6 +27,15 @@ TEST(WrenchDistribution, ForceBetweenTheSoles_IsSharedByPlace) {
   EXPECT_NEAR(left.zmp_m.y(), 0.08, 1e-12);
 }
 
+TEST(WrenchDistribution, SoleOnItsToe_IsPressedAtItsEdgeAlone) {
+  Support support = standing();
+  support.on_toe[0] = true;
+  support.toe_x_m = kContactRectangle.toe_x_m;
+  const Pressure pressure = distribute(support, {}, {0.1, 0.0, 0.8}, Vec2::Zero());
+  EXPECT_NEAR(pressure.centre_m[0].x(), kContactRectangle.toe_x_m, 1e-12);
+  EXPECT_GT(pressure.share[0], 0.3);
+}
+
 TEST(WrenchDistribution, WrenchesOfBothSoles_AddUpToTheForceThroughTheCentreOfMass) {
   const Support support = standing(0.13);
   const Vec3 com_m{0.02, 0.03, 0.9};

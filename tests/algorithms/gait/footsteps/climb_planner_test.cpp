@@ -124,7 +124,7 @@ struct OnATread {
 
 TEST(ClimbPlanner, FootSlidOnATread_IsSetBackBesideTheOtherOne_AsOftenAsItMayBe) {
   OnATread on;
-  for (std::uint32_t n = 0; n < on.params.max_set_back; ++n) {
+  for (std::uint32_t n = 0; n < on.params.slid.max_set_back; ++n) {
     on.situation.soles[1].position_m += Vec3{-0.011, -0.006, 0.0};
     on.planner.watch_feet(on.situation.soles);
     const ClimbPlanner::Decision decision = on.planner.decide(on.situation, {});
@@ -147,14 +147,14 @@ TEST(ClimbPlanner, OdometryCarriesAndTurnsBothFeet_NoneSlid) {
   for (SolePose& sole : on.situation.soles) sole = {turned * sole.position_m + Vec3{0.05, 0, 0}, sole.yaw_rad + 0.1};
   on.planner.watch_feet(on.situation.soles);
   EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
-  on.situation.soles[1].position_m.x() += on.params.slid_m - 1e-4;
+  on.situation.soles[1].position_m.x() += on.params.slid.off_m - 1e-4;
   on.planner.watch_feet(on.situation.soles);
   EXPECT_FALSE(on.planner.decide(on.situation, {}).has_step);
 }
 
 TEST(ClimbPlanner, FootThatSlidComesNearer_IsSetBackAllTheSame) {
   OnATread on;
-  on.situation.soles[1].position_m.x() += on.params.slid_m + 1e-4;
+  on.situation.soles[1].position_m.x() += on.params.slid.off_m + 1e-4;
   on.planner.watch_feet(on.situation.soles);
   on.situation.soles[1].position_m.x() -= 2e-4;
   on.planner.watch_feet(on.situation.soles);

@@ -52,6 +52,41 @@ TEST(StepKnots_Eq30Eq37, WholeStep_KnotsAreEvenInTimeAndEndOnTheTarget) {
   EXPECT_LT((knots[0].odom_T_sole[0].p_m - soles[0].p_m).norm(), 1e-12);
 }
 
+// Down: both steps, from a platform and on from a tread.
+TEST(StepSearch, DropsOfTheStairs_LegsCanDoAllOfThem) {
+  const StepParams params;
+  for (const double drop : {0.04, 0.08, 0.10, 0.12, 0.13}) {
+    for (const double ahead : {0.27, 0.285}) {
+      StepGoal lead, trail;
+      lead.kind = StepKind::kLeading, lead.foot = Foot::kRight, lead.target = {{ahead, -0.1, -drop}, 0};
+      trail.kind = StepKind::kTrailing, trail.foot = Foot::kLeft, trail.target = {{ahead, 0.1, -drop}, 0};
+      const std::array<Transform, kFootCount> soles{SolePose{{0, 0.1, 0}, 0}.transform(),
+                                                    SolePose{{0, -0.1, 0}, 0}.transform()};
+      StepSearch search;
+      search.begin(nominal_robot(), params, lead, trail, params.durations.stair_shift_ticks,
+                   TorsoTrajectory::at_rest({Mat3::Identity(), {0.0, 0.0, 0.79}}), soles);
+      while (search.step(nominal_robot(), params) == StepSearch::State::kSearching) continue;
+      EXPECT_EQ(search.state(), StepSearch::State::kFound) << drop << " " << ahead;
+    }
+  }
+}
+
+TEST(StepPlan, DownAfterTheOtherFoot_HeelRisesAboutTheToesEdge) {
+  const StepParams params;
+  StepGoal goal;
+  goal.kind = StepKind::kTrailing, goal.foot = Foot::kLeft, goal.target = {{0.28, 0.1, -0.13}, 0};
+  const SolePair soles{SolePose{{0, 0.1, 0}, 0}, SolePose{{0.28, -0.1, -0.13}, 0}};
+  ASSERT_TRUE(goes_down(goal, soles));
+  const StepPlan plan = plan_step(params, goal, soles, tries_for(goal, soles)[0]);
+  EXPECT_GT(plan.heel_up_rad, 0.2);
+  EXPECT_EQ(plan.heel_up_rad_at(0), 0.0);
+  EXPECT_EQ(plan.heel_up_rad_at(plan.shift_ticks), plan.heel_up_rad);
+  const Vec3 toe_m{kContactRectangle.toe_x_m, 0.0, 0.0};
+  const Transform turned = turned_about_toe(nominal_robot().sole, plan.heel_up_rad);
+  EXPECT_LT((turned * toe_m - toe_m).norm(), 1e-12);
+  EXPECT_GT((turned * Vec3{kContactRectangle.heel_x_m, 0.0, 0.0}).z(), 0.03);
+}
+
 // Every rise and tread that the module climbs, from the floor and from a tread, at both ends of the stand-off.
 TEST(StepSearch, RisesAndTreadsOfTheStairs_LegsCanDoAllOfThem) {
   StepParams params;
@@ -197,7 +232,7 @@ TEST(StepSearch, TrailingStepUpAHighRise_IsDoneSlowlyAndKeepsTorqueBack) {
     StepSearch search;
     search.begin(nominal_robot(), {}, plan.goal, {}, StepParams{}.durations.stair_shift_ticks, from, soles);
     ASSERT_EQ(finish(search), StepSearch::State::kFound) << rise;
-    EXPECT_EQ(search.plan().tried.longer > 1.0, rise > StepParams{}.high_rise_m) << rise;
+    EXPECT_EQ(search.plan().tried.longer > 1.0, rise > StepParams{}.high.from_m) << rise;
     const StepKnots knots(nominal_robot(), {}, 2, search.plan(), from, soles);
     StepFeasibility proof;
     proof.begin(nominal_robot(), knots);

@@ -16,7 +16,7 @@ TEST(TorsoTrajectory, EveryDuration_HeightHasNoLeapBetweenTwoTicks) {
   for (std::int32_t ticks = 1; ticks <= 1000; ++ticks) {
     const auto from = TorsoTrajectory::at_rest({Mat3::Identity(), Vec3{0, 0, 0.70}});
     TorsoTrajectory torso;
-    torso.plan(from, 0.83, 0.0, ticks, ticks);
+    torso.plan(from, {{0, 0, 0.83}}, ticks, ticks);
     const double most_mps2 = 5.78 * 0.13 / math::square(ticks * kTick_s);  // of a quintic between two rests
     for (std::int32_t tick = 0; tick <= ticks; ++tick) {
       const Motion z = torso.at(tick, {})[2];
