@@ -189,8 +189,7 @@ void FootholdSearch::link(std::size_t i) noexcept {
     // A tread seen in part goes on; the top of a box beside the way does not.
     if (extent_on(tread, a_m, b_m) == Extent::kAside) continue;
     const bool is_next = tread.along_m(0.5 * (a_m + b_m)) < params_.step_max_m;
-    if (is_next && (tread.rise_behind_m == 0.0 || rise_m < tread.rise_behind_m))
-      tread.rise_behind_m = rise_m;
+    if (is_next && (tread.rise_behind_m == 0.0 || rise_m < tread.rise_behind_m)) tread.rise_behind_m = rise_m;
     add_toe_limit(tread, params_.levels, foot_, {other.nosing_middle_m(), other.left}, other.nosing_margin_m,
                   {params_.back_min_m, params_.back_max_m});
   }

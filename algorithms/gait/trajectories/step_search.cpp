@@ -45,11 +45,16 @@ void StepSearch::try_candidate(const RobotModel& robot, const StepParams& params
 
 // How far the toes point down is nothing to a knee that lacks torque: the next try is the next slower one.
 void StepSearch::next_try() noexcept {
+  // Slower, a foot that passes the other one is in the air alone for too long.
+  constexpr double kLongestPassing = 1.2;
+  const bool passes = goal_.kind == StepKind::kPassing && !leading_found_;
   const StepTry failed = (*tries_)[try_++];
-  if (proof_.check().torque_share <= proof_.knots().torque_share()) return;
-  while (try_ < kStepTryCount && (*tries_)[try_].longer <= failed.longer &&
-         (*tries_)[try_].rise_longer <= failed.rise_longer)
-    ++try_;
+  const bool lacks_torque = proof_.check().torque_share > proof_.knots().torque_share();
+  const auto is_no_use = [&](const StepTry& next) {
+    return (passes && next.longer > kLongestPassing) ||
+           (lacks_torque && next.longer <= failed.longer && next.rise_longer <= failed.rise_longer);
+  };
+  while (try_ < kStepTryCount && is_no_use((*tries_)[try_])) ++try_;
 }
 
 // Can the weight then move over the foot that landed? A wide diagonal step could be a dead end: the ankle roll of the
