@@ -69,7 +69,7 @@ struct ClimbPlanner::StandOff {
 };
 
 void ClimbPlanner::reset(const Params& params, const RobotModel& robot) noexcept {
-  *this = ClimbPlanner{};
+  std::construct_at(this);  // in place: another one would take kilobytes of stack
   params_ = params;
   robot_ = &robot;
 }
@@ -303,12 +303,18 @@ bool ClimbPlanner::leads_to_goal(const Situation& situation, const FootholdSet& 
 ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const FootholdSet& footholds) const noexcept {
   Decision decision;
   decision.walks = true;
-  const std::optional<WalkGoal> to = way_.next(*goal_.laid_out);
-  if (!to) return decision;
   const LevelWalk walk(params_.walk, robot_->sole, robot_->stance.half_width_m,
                        shortened(params_.floor, floor_.stride_share), params_.rule);
-  const LevelStep step =
-      walk.next(situation.soles, memory_.last_swing, !walking_ && floor_.steps == 0, *to, footholds.ground);
+  const auto step_to = [&](const WalkGoal& to) {
+    return walk.next(situation.soles, memory_.last_swing, !walking_ && floor_.steps == 0, to, footholds.ground);
+  };
+  if (step_to(*goal_.laid_out).outcome == LevelStep::Outcome::kArrived) {  // whatever the way is thought to be
+    decision.obstruction = StopReason::kAtGoal;
+    return decision;
+  }
+  const std::optional<WalkGoal> to = way_.next(*goal_.laid_out);
+  if (!to) return decision;
+  const LevelStep step = step_to(*to);
   decision.walk = step.outcome;
   switch (step.outcome) {
     case LevelStep::Outcome::kArrived:

@@ -118,7 +118,7 @@ struct StepParams {
                          .landing_begin = 0.55,
                          .short_m = 0.0,
                          .clearance_m = 0.05,
-                         .retreat_m = -0.008};  // on from a riser behind the heel
+                         .retreat_m = 0.0};
   // Two rises up and past the nosing of the tread that the other foot stands on.
   SwingShape passing_swing{.lift_end = 0.67,
                            .forward_begin = 0.16,
