@@ -120,7 +120,7 @@ class FootholdSearch {
       field("heel_share", p.heel_share, 0.0, 1.0,
             "Of what a tread has to spare as much is at the heel, which a riser is behind, and the rest at the toe. "
             "Chosen "
-            "on 12 flights of the simulation (2026-11-30), and tried on nothing else.");
+            "on a few flights of the simulation (2026-11-30), and tried on nothing else.");
       field("tread_heel_inset_max_m", p.tread_heel_inset_max_m, 0.0, 0.5,
             "Heel edge beyond the lip at most, on a tread: the legs reach no farther down.");
       field("floor_heel_inset_max_m", p.floor_heel_inset_max_m, 0.0, 0.5,

@@ -2,6 +2,7 @@
 #include "algorithms/gait/footsteps/climb_planner.hpp"
 
 #include <algorithm>
+#include <memory>
 
 #include "algorithms/geometry/line.hpp"
 

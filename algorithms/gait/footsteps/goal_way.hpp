@@ -61,7 +61,7 @@ class GoalWay {
     bool on_tread = false;
   };
 
-  // Each tick that it stands and may step, before place() is asked.
+  // Each tick that it stands and may step, before next() is asked.
   void watch(const GoalWayParams& params, const Input& in) noexcept;
   // A step was taken: what is in the way is looked for anew.
   void stepped() noexcept;

@@ -14,7 +14,7 @@ struct GroundRouteParams {
   double brink_m = 0.22;
   double ahead_m = 0.80;
   double reached_m = 0.25;
-  std::int32_t waves_per_tick = 8;
+  std::int32_t waves_per_tick = 2;
 
   static void visit(auto& p, auto& field) {
     field("thing_m", p.thing_m, 0.0, 1.0, "The middle between the feet keeps as far from what rises, where it can.");

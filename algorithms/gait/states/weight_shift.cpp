@@ -16,7 +16,7 @@ void WeightShift::begin(const GaitInput& in, GaitShared& gait, const ClimbPlanne
   const std::array<Transform, kFootCount> flat{body.flat_sole(gait.robot.sole, Foot::kLeft),
                                                body.flat_sole(gait.robot.sole, Foot::kRight)};
   const SolePair soles{sole_pose(flat[0]), sole_pose(flat[1])};
-  StepPlan plan = plan_step(params, decision.goal, soles, tries_for(decision.goal, soles)[0]);
+  StepPlan plan = plan_step(params, decision.goal, soles, tries_for(params, decision.goal, soles)[0]);
   if (same_foot) plan.shift_ticks = reshift_ticks;
   ComPlan& com = body.renewed_com();
   plan_shift(params, body.com(), reshift_ticks, plan, com);

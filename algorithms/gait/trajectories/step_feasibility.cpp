@@ -12,53 +12,44 @@ namespace polygmap {
 
 StepKnots::StepKnots(const RobotModel& robot, const StepParams& params, std::int32_t knot_ticks, const StepPlan& step,
                      const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept
-    : foot_(step.goal.foot),
+    : plan_(step),
+      sole_(robot.sole),
       soles_(soles),
-      joint_margin_rad_(step.joint_margin_rad),
-      torque_share_(step.torque_share),
-      start_z_m_(soles[index_of(step.goal.foot)].p_m.z()),
-      goal_z_m_(step.goal.target.position_m.z()),
-      half_width_m_(robot.sole.collision.half_width_m),
-      most_air_roll_rad_(step.shape.air_roll_rad),
-      shift_ticks_(step.shift_ticks),
-      swing_ticks_(step.swing_ticks),
       knot_ticks_(std::max(knot_ticks, 1)),
       count_(1 + (step.shift_ticks + step.swing_ticks + knot_ticks_ - 1) / knot_ticks_) {
   const HorizontalMotion com = TorsoTrajectory::horizontal(from);
   com_.plan(params.com, com, zmp_of_shift(params, step, ComPlan::zmp_under(params.com, com)));
-  plan_ = step;
-  sole_ = robot.sole;
-  StepPlan& plan = plan_;
-  plan_torso(robot.legs, params, {sole_pose(soles[0]), sole_pose(soles[1])}, com_, plan.shift_ticks, plan);
-  torso_at_landing_ = plan.touch_down;
-  shift_.plan(from, plan.lift_off, plan.shift_ticks, plan.shift_ticks);
-  lean_.plan(shift_.at(plan.shift_ticks, com), plan.touch_down, plan.swing_ticks, plan.rise_ticks);
-  swing_.plan(robot.sole, soles[index_of(foot_)] * turned_about_toe(sole_, plan.heel_up_rad), plan.goal.target,
-              plan.shape, plan.swing_ticks);
+  plan_torso(robot.legs, params, {sole_pose(soles[0]), sole_pose(soles[1])}, com_, plan_.shift_ticks, plan_);
+  shift_.plan(from, plan_.lift_off, plan_.shift_ticks, plan_.shift_ticks);
+  lean_.plan(shift_.at(plan_.shift_ticks, com), plan_.touch_down, plan_.swing_ticks, plan_.rise_ticks);
+  path_.plan(sole_, soles[index_of(swing())] * turned_about_toe(sole_, plan_.heel_up_rad), plan_.goal.target,
+             plan_.shape, plan_.swing_ticks);
 }
 
 double StepKnots::air_roll_rad(const StepKnot& knot) const noexcept {
   if (!swings_at(knot.tick)) return 0.0;
-  const bool leaves = 2 * (knot.tick - shift_ticks_) < swing_ticks_;
-  const double above_m = knot.odom_T_sole[index_of(foot_)].p_m.z() - (leaves ? start_z_m_ : goal_z_m_);
-  return math::clamp(0.5 * above_m / half_width_m_, 0.0, most_air_roll_rad_);
+  const bool leaves = 2 * (knot.tick - plan_.shift_ticks) < plan_.swing_ticks;
+  const std::size_t foot = index_of(swing());
+  const double ground_m = leaves ? soles_[foot].p_m.z() : plan_.goal.target.position_m.z();
+  const double above_m = knot.odom_T_sole[foot].p_m.z() - ground_m;
+  return math::clamp(0.5 * above_m / sole_.collision.half_width_m, 0.0, plan_.shape.air_roll_rad);
 }
 
 StepKnot StepKnots::operator[](std::int32_t i) const noexcept {
   StepKnot knot;
   knot.tick = i * knot_ticks_;
   knot.odom_T_sole = soles_;
-  const std::int32_t swing_tick = std::min(knot.tick - shift_ticks_, swing_.duration_ticks());
+  Transform& odom_T_swing = knot.odom_T_sole[index_of(swing())];
+  const std::int32_t swing_tick = std::min(knot.tick - plan_.shift_ticks, path_.duration_ticks());
   if (swing_tick < 0) {
     knot.odom_T_base = TorsoTrajectory::pose(shift_.at(knot.tick, com_.at(knot.tick)));
-    Transform& rear = knot.odom_T_sole[index_of(foot_)];
-    if (plan_.heel_up_rad > 0.0) rear = rear * turned_about_toe(sole_, plan_.heel_up_rad_at(knot.tick));
+    if (plan_.heel_up_rad > 0.0) odom_T_swing = odom_T_swing * turned_about_toe(sole_, plan_.heel_up_rad_at(knot.tick));
   } else {
     const TorsoTrajectory::State torso = lean_.at(swing_tick, com_.at(knot.tick));
     knot.odom_T_base = TorsoTrajectory::pose(torso);
     knot.odom_felt_mps2 = {torso[0].acceleration, torso[1].acceleration, kGravity_mps2 + torso[2].acceleration};
     knot.odom_zmp_m = com_.zmp_m(knot.tick);
-    knot.odom_T_sole[index_of(foot_)] = swing_.at(swing_tick);
+    odom_T_swing = path_.at(swing_tick);
   }
   return knot;
 }

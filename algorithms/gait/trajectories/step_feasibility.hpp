@@ -25,34 +25,30 @@ class StepKnots {
   // knot_ticks: between two knots, at least 1.
   StepKnots(const RobotModel& robot, const StepParams& params, std::int32_t knot_ticks, const StepPlan& plan,
             const TorsoTrajectory::State& from, const std::array<Transform, kFootCount>& soles) noexcept;
-  [[nodiscard]] const TorsoPose& torso_at_landing() const noexcept { return torso_at_landing_; }
-  [[nodiscard]] HorizontalMotion com_at_landing() const noexcept { return com_.at(shift_ticks_ + swing_ticks_); }
+  [[nodiscard]] const TorsoPose& torso_at_landing() const noexcept { return plan_.touch_down; }
+  [[nodiscard]] HorizontalMotion com_at_landing() const noexcept {
+    return com_.at(plan_.shift_ticks + plan_.swing_ticks);
+  }
   [[nodiscard]] std::int32_t count() const noexcept { return count_; }
-  [[nodiscard]] double joint_margin_rad() const noexcept { return joint_margin_rad_; }  // that the plan is to keep
-  [[nodiscard]] double torque_share() const noexcept { return torque_share_; }          // that it may ask for
+  [[nodiscard]] double joint_margin_rad() const noexcept { return plan_.joint_margin_rad; }  // that the plan is to keep
+  [[nodiscard]] double torque_share() const noexcept { return plan_.torque_share; }          // that it may ask for
   [[nodiscard]] std::int32_t knot_ticks() const noexcept { return knot_ticks_; }
-  [[nodiscard]] Foot stance() const noexcept { return other(foot_); }
-  [[nodiscard]] Foot swing() const noexcept { return foot_; }
-  [[nodiscard]] bool swings_at(std::int32_t tick) const noexcept { return tick >= shift_ticks_; }
+  [[nodiscard]] Foot stance() const noexcept { return other(swing()); }
+  [[nodiscard]] Foot swing() const noexcept { return plan_.goal.foot; }
+  [[nodiscard]] bool swings_at(std::int32_t tick) const noexcept { return tick >= plan_.shift_ticks; }
   [[nodiscard]] StepKnot operator[](std::int32_t i) const noexcept;
   // By how much the sole in the air may roll where its ankle's range ends: its lower side then comes down by half of
   // what the sole is above the ground. The swing is planned level; the sole rolls because its ankle stops at the range.
   [[nodiscard]] double air_roll_rad(const StepKnot& knot) const noexcept;
 
  private:
-  Foot foot_ = Foot::kLeft;
+  StepPlan plan_;
+  SoleModel sole_;
   std::array<Transform, kFootCount> soles_;
   TorsoTrajectory shift_, lean_;
   ComPlan com_;
-  Swing swing_;
-  TorsoPose torso_at_landing_;
-  StepPlan plan_;
-  SoleModel sole_;
-  double joint_margin_rad_ = 0.0;
-  double torque_share_ = 1.0;
-  double start_z_m_ = 0.0, goal_z_m_ = 0.0;
-  double half_width_m_ = 0.0, most_air_roll_rad_ = 0.0;
-  std::int32_t shift_ticks_ = 0, swing_ticks_ = 0, knot_ticks_ = 1, count_ = 0;
+  Swing path_;
+  std::int32_t knot_ticks_ = 1, count_ = 0;
 };
 
 struct StepCheck {

@@ -54,9 +54,15 @@ bool goes_down(const StepGoal& goal, const SolePair& soles) noexcept {
   return onto_tread(goal.kind) && goal.target.position_m.z() < soles[index_of(goal.foot)].position_m.z() - kLeastDrop_m;
 }
 
-const StepTries& tries_for(const StepGoal& goal, const SolePair& soles) noexcept {
-  if (goes_down(goal, soles)) return leads(goal.kind) ? kDownTries : kDownAfterTries;
-  return goal.kind == StepKind::kPassing ? kPassingTries : kStepTries;
+bool is_high(const StepParams& params, const StepGoal& goal, const SolePair& soles) noexcept {
+  const std::size_t foot = index_of(goal.foot), stance = index_of(other(goal.foot));
+  return soles[stance].position_m.z() - soles[foot].position_m.z() > params.high.from_m;
+}
+
+StepTries tries_for(const StepParams& params, const StepGoal& goal, const SolePair& soles) noexcept {
+  if (goal.kind == StepKind::kPassing) return kPassingTries;
+  if (goes_down(goal, soles)) return leads(goal.kind) ? StepTries(kDownTries) : StepTries(kDownAfterTries);
+  return is_high(params, goal, soles) ? StepTries(kHighStepTries) : StepTries(kStepTries);
 }
 
 StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePair& soles,
@@ -85,9 +91,8 @@ StepPlan plan_step(const StepParams& params, const StepGoal& goal, const SolePai
   plan.tried = tried;
   const bool needed = goal.kind == StepKind::kClosing || goal.kind == StepKind::kTrailing;
   plan.joint_margin_rad = needed ? params.needed_margin_rad : params.joint_margin_rad;
-  const double rise_m = soles[index_of(stance)].position_m.z() - soles[index_of(goal.foot)].position_m.z();
   plan.torque_share =
-      rise_m > params.high.from_m ? std::min(params.high.torque_share, params.torque_share) : params.torque_share;
+      is_high(params, goal, soles) ? std::min(params.high.torque_share, params.torque_share) : params.torque_share;
   plan.shape.toe_down_rad = on_floor ? 0.5 * tried.toe_down_rad : tried.toe_down_rad;
   plan.zmp_stance_m = zmp_in(params, landed[index_of(stance)], stance, down);
   // After a step that leads the weight goes on to that foot; after the others it may have to stop anywhere.

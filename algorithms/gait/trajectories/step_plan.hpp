@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 
 #include "algorithms/gait/footsteps/step_goal.hpp"
 #include "algorithms/gait/trajectories/com_plan.hpp"
@@ -186,48 +187,24 @@ struct StepTry {
   double longer = 1.0;        // the swing
   double rise_longer = 1.0;   // factor on the torso's rise, which takes a share of the swing
 };
-inline constexpr std::size_t kStepTryCount = 11;
-using StepTries = std::array<StepTry, kStepTryCount>;
-inline constexpr StepTries kStepTries{
+using StepTries = std::span<const StepTry>;
+inline constexpr std::array<StepTry, 8> kStepTries{
+    {{0.3}, {0.2}, {0.4}, {0.1}, {0.5}, {0.3, 1.15}, {0.2, 1.15}, {0.4, 1.15}}};
+inline constexpr std::array<StepTry, 11> kHighStepTries{
     {{0.3}, {0.2}, {0.4}, {0.1}, {0.5}, {0.3, 1.15}, {0.2, 1.15}, {0.4, 1.15}, {0.3, 1.3}, {0.4, 1.3}, {0.3, 1.45}}};
+inline constexpr std::array<StepTry, 8> kPassingTries{
+    {{0.4}, {0.5}, {0.3}, {0.6}, {0.2}, {0.4, 1.15}, {0.5, 1.15}, {0.5, 1.15, 1.1}}};
 // Down: the foot that leads stays level, the one that follows keeps its heel up until it is over the lip.
-inline constexpr StepTries kDownTries{{{0.0},
-                                       {0.1},
-                                       {0.2},
-                                       {0.0, 1.25},
-                                       {0.1, 1.25},
-                                       {0.2, 1.25},
-                                       {0.1, 1.5},
-                                       {0.0, 1.5},
-                                       {0.2, 1.5},
-                                       {0.0, 1.8},
-                                       {0.1, 1.8}}};
-inline constexpr StepTries kDownAfterTries{{{0.4},
-                                            {0.3},
-                                            {0.5},
-                                            {0.2},
-                                            {0.4, 1.25},
-                                            {0.3, 1.25},
-                                            {0.5, 1.25},
-                                            {0.6, 1.25},
-                                            {0.4, 1.5},
-                                            {0.3, 1.5},
-                                            {0.5, 1.5}}};
-inline constexpr StepTries kPassingTries{{{0.4},
-                                          {0.5},
-                                          {0.3},
-                                          {0.6},
-                                          {0.2},
-                                          {0.4, 1.15},
-                                          {0.5, 1.15},
-                                          {0.5, 1.15, 1.1},
-                                          {0.4, 1.3},
-                                          {0.5, 1.3},
-                                          {0.4, 1.45}}};
+inline constexpr std::array<StepTry, 8> kDownTries{
+    {{0.0}, {0.1}, {0.2}, {0.0, 1.25}, {0.1, 1.25}, {0.2, 1.25}, {0.1, 1.5}, {0.0, 1.5}}};
+inline constexpr std::array<StepTry, 8> kDownAfterTries{
+    {{0.4}, {0.3}, {0.5}, {0.2}, {0.4, 1.25}, {0.3, 1.25}, {0.5, 1.25}, {0.6, 1.25}}};
 
 // From where its foot stands it comes down onto a tread.
 [[nodiscard]] bool goes_down(const StepGoal& goal, const SolePair& soles) noexcept;
-[[nodiscard]] const StepTries& tries_for(const StepGoal& goal, const SolePair& soles) noexcept;
+// It leaves a knee that bends deep to lift the body.
+[[nodiscard]] bool is_high(const StepParams& params, const StepGoal& goal, const SolePair& soles) noexcept;
+[[nodiscard]] StepTries tries_for(const StepParams& params, const StepGoal& goal, const SolePair& soles) noexcept;
 
 // How the zero-moment point goes from one foot to the other.
 struct WeightTransfer {

@@ -32,8 +32,8 @@ void StepSearch::try_candidate(const RobotModel& robot, const StepParams& params
     TorsoTrajectory::set_horizontal(from, com_landed_);
   }
   const SolePair from_soles{sole_pose(soles[0]), sole_pose(soles[1])};
-  tries_ = &tries_for(goal, from_soles);
-  candidate_ = plan_step(params, goal, from_soles, (*tries_)[try_]);
+  tries_ = tries_for(params, goal, from_soles);
+  candidate_ = plan_step(params, goal, from_soles, tries_[try_]);
   if (leading_found_) {
     candidate_.joint_margin_rad = params.joint_margin_rad;  // the needed one is for a foot that lands some mm off
   } else {
@@ -45,16 +45,10 @@ void StepSearch::try_candidate(const RobotModel& robot, const StepParams& params
 
 // How far the toes point down is nothing to a knee that lacks torque: the next try is the next slower one.
 void StepSearch::next_try() noexcept {
-  // Slower, a foot that passes the other one is in the air alone for too long.
-  constexpr double kLongestPassing = 1.2;
-  const bool passes = goal_.kind == StepKind::kPassing && !leading_found_;
-  const StepTry failed = (*tries_)[try_++];
-  const bool lacks_torque = proof_.check().torque_share > proof_.knots().torque_share();
-  const auto is_no_use = [&](const StepTry& next) {
-    return (passes && next.longer > kLongestPassing) ||
-           (lacks_torque && next.longer <= failed.longer && next.rise_longer <= failed.rise_longer);
-  };
-  while (try_ < kStepTryCount && is_no_use((*tries_)[try_])) ++try_;
+  const StepTry failed = tries_[try_++];
+  if (proof_.check().torque_share <= proof_.knots().torque_share()) return;
+  while (try_ < tries_.size() && tries_[try_].longer <= failed.longer && tries_[try_].rise_longer <= failed.rise_longer)
+    ++try_;
 }
 
 // Can the weight then move over the foot that landed? A wide diagonal step could be a dead end: the ankle roll of the
@@ -79,7 +73,7 @@ StepSearch::State StepSearch::step(const RobotModel& robot, const StepParams& pa
   if (state_ != State::kSearching || !proof_.advance(robot, params, kKnotsPerCall)) return state_;
   if (!proof_.check().feasible) {
     next_try();
-    if (try_ == kStepTryCount) return state_ = State::kImpossible;
+    if (try_ == tries_.size()) return state_ = State::kImpossible;
   } else {
     if (!leading_found_) plan_ = candidate_;
     if (goal_.kind == StepKind::kFloor && !leads_on(robot, params)) return state_ = State::kImpossible;

@@ -28,7 +28,7 @@ class StepSearch {
   void try_candidate(const RobotModel& robot, const StepParams& params) noexcept;
   [[nodiscard]] bool leads_on(const RobotModel& robot, const StepParams& params) const noexcept;
 
-  const StepTries* tries_ = &kStepTries;
+  StepTries tries_ = kStepTries;
   StepGoal goal_, trailing_;
   TorsoTrajectory::State from_{};
   std::array<Transform, kFootCount> soles_;

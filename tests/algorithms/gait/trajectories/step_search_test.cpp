@@ -77,7 +77,7 @@ TEST(StepPlan, DownAfterTheOtherFoot_HeelRisesAboutTheToesEdge) {
   goal.kind = StepKind::kTrailing, goal.foot = Foot::kLeft, goal.target = {{0.28, 0.1, -0.13}, 0};
   const SolePair soles{SolePose{{0, 0.1, 0}, 0}, SolePose{{0.28, -0.1, -0.13}, 0}};
   ASSERT_TRUE(goes_down(goal, soles));
-  const StepPlan plan = plan_step(params, goal, soles, tries_for(goal, soles)[0]);
+  const StepPlan plan = plan_step(params, goal, soles, tries_for(params, goal, soles)[0]);
   EXPECT_GT(plan.heel_up_rad, 0.2);
   EXPECT_EQ(plan.heel_up_rad_at(0), 0.0);
   EXPECT_EQ(plan.heel_up_rad_at(plan.shift_ticks), plan.heel_up_rad);
