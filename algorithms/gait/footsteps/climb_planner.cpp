@@ -332,6 +332,11 @@ ClimbPlanner::Decision ClimbPlanner::walk(const Situation& situation, const Foot
     case LevelStep::Outcome::kBlocked:
       break;
   }
+  if (way_.gave_up_for()) {
+    decision.obstruction = way_.gave_up_for()->reason;
+    decision.measured_m = way_.gave_up_for()->measured_m;
+    return decision;
+  }
   // What the search says of what comes next is the better reason, where it says anything.
   decision.measured_m = measured(footholds);
   decision.obstruction = footholds.obstruction;
@@ -349,7 +354,7 @@ ClimbPlanner::Decision ClimbPlanner::look_and_decide(const Situation& situation,
   const GoalWay::Input in{situation.soles, footholds, *goal_.laid_out, climbs, lines_up, on_treads_};
   way_.watch(params_.way, in);
   const Decision decision = decide(situation, footholds);
-  if (decision.walk) way_.walked(params_.way, in, *decision.walk);
+  if (decision.walk) way_.walked(params_.way, in, *decision.walk, {decision.obstruction, decision.measured_m});
   return decision;
 }
 

@@ -106,6 +106,12 @@ void GoalWay::watch(const GoalWayParams& params, const Input& in) noexcept {
     return;
   }
   const TorsoPose middle = middle_of(in.soles);
+  constexpr double kNearer_m = 0.05;
+  const double goal_m = (in.goal.odom_p_m - middle.position_m.head<2>()).norm();
+  if (goal_m < nearest_m_ - kNearer_m) {
+    nearest_m_ = goal_m;
+    steps_ = 0;
+  }
   const Vec2 to_m = looks_first() ? look_from_->odom_p_m : in.goal.odom_p_m;
   if (route_.is_busy()) {
     route_.step(params.route);
@@ -125,16 +131,22 @@ void GoalWay::watch(const GoalWayParams& params, const Input& in) noexcept {
   }
 }
 
-void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Outcome outcome) noexcept {
+void GoalWay::walked(const GoalWayParams& params, const Input& in, LevelStep::Outcome outcome,
+                     const Refusal& refusal) noexcept {
   if (outcome == LevelStep::Outcome::kSteps) {
     refused_ticks_ = 0;
     return;
   }
   if (looks_first() && outcome == LevelStep::Outcome::kArrived) looked_ = true;
-  if (++refused_ticks_ < params.sure_ticks || steps_ >= params.most_steps) return;
+  if (++refused_ticks_ < params.sure_ticks || gave_up_for_) return;
   refused_ticks_ = 0;
-  const bool gives_up = ++refusals_ > 1 && other_stairs_ && !takes_any_;
-  if (gives_up) {
+  if (!first_refusal_) first_refusal_ = refusal;
+  if (++all_refusals_ > params.most_refusals || steps_ >= params.most_steps) {
+    gave_up_for_ = first_refusal_;
+    return;
+  }
+  const bool last_way_is_stairs = ++refusals_ > 1 && other_stairs_ && !takes_any_;
+  if (last_way_is_stairs) {
     takes_any_ = true;
     look_from_ = other_stairs_;
     looked_ = false;

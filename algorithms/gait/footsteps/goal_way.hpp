@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "algorithms/core/messages/footholds.hpp"
@@ -21,7 +22,8 @@ struct GoalWayParams {
   double looked_rad = 0.15;
   double moved_m = 0.12;
   std::int32_t most_looks = 12;
-  std::int32_t most_steps = 150;
+  std::int32_t most_steps = 40;
+  std::int32_t most_refusals = 6;
   double faces_rad = 0.5;
   double tried_m = 0.35;
   std::int32_t sure_ticks = 200;
@@ -38,7 +40,10 @@ struct GoalWayParams {
     field("moved_m", p.moved_m, 0.01, 1.0,
           "The place to look from is another one when the nosing is as far from before.");
     field("most_looks", p.most_looks, 1, 1000, "Between two treads no more places to look from are gone to.");
-    field("most_steps", p.most_steps, 0, 10000, "Between two treads it goes round nothing after as many steps.");
+    field("most_steps", p.most_steps, 0, 10000,
+          "It looks for no other way after as many steps without coming nearer to the goal.");
+    field("most_refusals", p.most_refusals, 1, 1000,
+          "Where it came no further so often between two treads, it looks for no other way.");
     field("faces_rad", p.faces_rad, 0.05, 3.2, "It turns to what is in the way, within this, before it goes round.");
     field("tried_m", p.tried_m, 0.1, 1.0,
           "Where it stood before a thing and came no further, no way leads through so much about its place.");
@@ -61,13 +66,20 @@ class GoalWay {
     bool on_tread = false;
   };
 
+  // Why it came no further, and the rise, drop or tread behind it.
+  struct Refusal {
+    StopReason reason = StopReason::kNone;
+    double measured_m = 0.0;
+  };
+
   // Each tick that it stands and may step, before next() is asked.
   void watch(const GoalWayParams& params, const Input& in) noexcept;
   // A step was taken: what is in the way is looked for anew.
   void stepped() noexcept;
   void forget() noexcept { *this = {}; }
   // The step to the next place came out so, this tick.
-  void walked(const GoalWayParams& params, const Input& in, LevelStep::Outcome outcome) noexcept;
+  void walked(const GoalWayParams& params, const Input& in, LevelStep::Outcome outcome,
+              const Refusal& refusal) noexcept;
 
   [[nodiscard]] bool looks_first() const noexcept { return look_from_ && !looked_; }
   // No other way is left than up stairs that it saw, though they do not seem to lead to the goal: as where they turn
@@ -75,6 +87,8 @@ class GoalWay {
   [[nodiscard]] bool takes_any_stairs() const noexcept { return takes_any_; }
   // The next place is not the goal.
   [[nodiscard]] bool is_on_its_way() const noexcept { return looks_first() || goes_round_; }
+  // What was in the way where it first came no further, once it looks for no other way.
+  [[nodiscard]] const std::optional<Refusal>& gave_up_for() const noexcept { return gave_up_for_; }
   // Where to walk next; none: that is not known yet.
   [[nodiscard]] std::optional<WalkGoal> next(const WalkGoal& goal) const noexcept;
 
@@ -95,7 +109,10 @@ class GoalWay {
   bool goes_round_ = false;
   bool faces_ = false;  // the place that it would go to straight on
   std::int32_t round_ticks_ = 0, refused_ticks_ = 0, ticks_ = 0, steps_ = 0;
-  std::int32_t refusals_ = 0;  // since the last step
+  double nearest_m_ = std::numeric_limits<double>::infinity();  // to the goal, since the last tread
+  std::int32_t refusals_ = 0;                                   // since the last step
+  std::int32_t all_refusals_ = 0;                               // since the last tread
+  std::optional<Refusal> first_refusal_, gave_up_for_;
 };
 
 }  // namespace polygmap

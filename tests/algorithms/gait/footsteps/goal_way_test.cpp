@@ -23,6 +23,7 @@ class GoalWayTest : public ::testing::Test {
     const double half_m = robot_.stance.half_width_m;
     return {foot_of_torso(torso, Foot::kLeft, half_m, 0.0), foot_of_torso(torso, Foot::kRight, half_m, 0.0)};
   }
+  [[nodiscard]] Vec2 soles_middle() const { return middle_of(soles_).position_m.head<2>(); }
   [[nodiscard]] static FootholdSet level_everywhere() {
     FootholdSet set;
     set.ground.corner_m = Vec2{-32, -32} * GroundView::kCell_m;
@@ -37,10 +38,10 @@ class GoalWayTest : public ::testing::Test {
   void watch(int ticks, bool climbs = false) {
     for (int i = 0; i < ticks; ++i) way_.watch(params_, {soles_, footholds_, goal_, climbs});
   }
-  void walked(int ticks, LevelStep::Outcome outcome) {
+  void walked(int ticks, LevelStep::Outcome outcome, const GoalWay::Refusal& refusal = {}) {
     for (int i = 0; i < ticks; ++i) {
       watch(1);
-      way_.walked(params_, {soles_, footholds_, goal_}, outcome);
+      way_.walked(params_, {soles_, footholds_, goal_}, outcome, refusal);
     }
   }
 };
@@ -153,6 +154,41 @@ TEST_F(GoalWayTest, NoGroundAheadForAWhile_GoesRoundIt_WhereverTheViewIs) {
   watch(30);
   ASSERT_TRUE(way_.next(goal_));
   EXPECT_GT(std::abs(way_.next(goal_)->odom_p_m.y()), 0.15);
+}
+
+TEST_F(GoalWayTest, RefusedAgainAndAgain_GivesUpForWhatWasInTheWayFirst) {
+  const auto refuse = [&](const GoalWay::Refusal& refusal) {
+    walked(params_.sure_ticks, LevelStep::Outcome::kNoGround, refusal);
+    way_.stepped();
+  };
+  refuse({StopReason::kDropTooDeep, 0.4});
+  for (int i = 1; i < params_.most_refusals; ++i) refuse({StopReason::kGroundEnds, 0.0});
+  EXPECT_FALSE(way_.gave_up_for());
+  refuse({StopReason::kGroundEnds, 0.0});
+  ASSERT_TRUE(way_.gave_up_for());
+  EXPECT_EQ(way_.gave_up_for()->reason, StopReason::kDropTooDeep);
+  EXPECT_EQ(way_.gave_up_for()->measured_m, 0.4);
+}
+
+// A detour leads away from the goal for a while; one that never comes nearer is none.
+TEST_F(GoalWayTest, SoManyStepsWithoutComingNearer_GivesUpAtTheNextRefusal) {
+  const auto walk = [&](int steps, double nearer_m) {
+    for (int i = 0; i < steps; ++i) {
+      soles_ = stand_at(soles_middle() + Vec2{0.0, nearer_m}, 0.0);
+      watch(1);
+      way_.stepped();
+    }
+  };
+  walk(params_.most_steps - 1, -0.01);
+  walked(params_.sure_ticks, LevelStep::Outcome::kBlocked, {StopReason::kObstacle, 0.0});
+  EXPECT_FALSE(way_.gave_up_for());
+  walk(8, 0.15);  // nearer than ever
+  walk(params_.most_steps - 2, -0.01);
+  walked(params_.sure_ticks, LevelStep::Outcome::kBlocked, {StopReason::kObstacle, 0.0});
+  EXPECT_FALSE(way_.gave_up_for());
+  walk(3, -0.01);
+  walked(params_.sure_ticks, LevelStep::Outcome::kBlocked, {StopReason::kObstacle, 0.0});
+  EXPECT_TRUE(way_.gave_up_for());
 }
 
 }  // namespace
